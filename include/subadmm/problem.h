@@ -1,0 +1,118 @@
+/* Problem level: one contact problem, solved once.
+ *
+ *   A_i v_i = b_i + sum_k J_{i,k}^T lambda_k                      (eq. 1 of the paper, impulse form)
+ *   (J_a v_a + J_b v_b, lambda_k) in C(e_k)                       (eqs. 2-5)
+ *
+ * Velocities are (linear, angular) in the world frame, m/s and rad/s. Impulses are N s (rows that act on
+ * rotation: N m s). A body index of -1 means the static world. lambda acts with +J_b^T on body b and with
+ * J_a^T on body a (for contacts J_a = -[I, -[r_a]x]): a positive normal impulse pushes b along the normal and a against it.
+ *
+ * A problem is owned by one thread at a time; different problems may be used on different threads.
+ */
+#ifndef SUBADMM_PROBLEM_H
+#define SUBADMM_PROBLEM_H
+
+#include "settings.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct sadmm_problem sadmm_problem;
+
+/* A contact point given by geometry. Contacts of one pair of bodies that share normal and friction are
+ * solved together; give them one after another for speed (the solution does not depend on it). */
+typedef struct sadmm_problem_contact {
+    int32_t body_a, body_b; /* in [-1, body count), not both -1, not equal */
+    double normal[3];       /* unit vector from a to b, world frame */
+    double arm_a[3];        /* contact point relative to a's centre of mass, m, world frame; ignored when a is -1 */
+    double arm_b[3];        /* the same for b */
+    double error;           /* e of eq. (5) along the normal, m/s: gap/dt, or the stabilised penetration (negative) */
+    double friction;        /* mu, >= 0 */
+} sadmm_problem_contact;
+
+/* A constraint given by its Jacobian rows. */
+typedef enum sadmm_block_kind {
+    SADMM_BLOCK_CONTACT = 0, /* 3 rows (normal, tangent, tangent), eq. (5) */
+    SADMM_BLOCK_HARD,        /* 1..6 rows, eq. (4) */
+    SADMM_BLOCK_SOFT         /* 1..6 rows, eq. (3) with a gain and a damping a row */
+} sadmm_block_kind;
+
+typedef struct sadmm_problem_block {
+    sadmm_block_kind kind;
+    int32_t rows;            /* 3 for CONTACT, else in [1, 6] */
+    int32_t body_a, body_b;  /* in [-1, body count), not both -1, not equal */
+    double jacobian_a[36];   /* (rows x 6) row-major, acts on (linear, angular) of a; ignored when a is -1 */
+    double jacobian_b[36];   /* the same for b */
+    double error[6];         /* CONTACT and HARD: e, m/s. SOFT: e, m or rad */
+    double friction;         /* CONTACT: mu >= 0 */
+    double stiffness[6];     /* SOFT: k of lambda = -(k e + c x), N s/m, i.e. dt times the spring constant; >= 0 */
+    double damping[6];       /* SOFT: c, kg (use c = dt (damping + dt stiffness) for an implicit spring); >= 0 */
+} sadmm_problem_block;
+
+/* What a solve did. */
+typedef struct sadmm_solve_report {
+    sadmm_backend backend;      /* the one that ran */
+    sadmm_precision precision;
+    int iterations;             /* done */
+    bool converged;             /* a stop rule was met (false when none was asked for) */
+    sadmm_residual residual;    /* of the last iteration */
+    sadmm_certificate certificate;
+    double solve_ms;            /* wall time of the solve without the certificate, ms */
+    int threads;                /* CPU threads used */
+} sadmm_solve_report;
+
+/* Create an empty problem. Errors: OUT_OF_MEMORY, INVALID_ARGUMENT (out NULL). */
+SADMM_API sadmm_status sadmm_problem_create(sadmm_problem **out);
+SADMM_API void sadmm_problem_destroy(sadmm_problem *problem); /* NULL is fine */
+
+/* The message of the last failed call on this problem, "" when none failed. */
+SADMM_API const char *sadmm_problem_message(const sadmm_problem *problem);
+
+/* Set all bodies. A: (count x 6 x 6), symmetric positive definite, kg, kg m, kg m^2. b: (count x 6), N s, N m s.
+ * v0: (count x 6) initial velocities for a warm start, or NULL for A^-1 b. Replaces earlier bodies and drops
+ * every constraint. count in [0, 2^27]. Errors: INVALID_ARGUMENT, LIMIT, OUT_OF_MEMORY. */
+SADMM_API sadmm_status sadmm_problem_set_bodies(sadmm_problem *problem, int32_t count, const double *A,
+                                                const double *b, const double *v0);
+
+/* Set all contacts given by geometry. impulses0: (count x 3) initial impulses on b, world frame, N s, or NULL
+ * for 0. Errors: INVALID_ARGUMENT, LIMIT (count > 2^28), OUT_OF_MEMORY. */
+SADMM_API sadmm_status sadmm_problem_set_contacts(sadmm_problem *problem, int32_t count,
+                                                  const sadmm_problem_contact *contacts, const double *impulses0);
+
+/* Set all constraints given by Jacobians. lambda0: (count x 6) initial multipliers or NULL for 0. Errors as above. */
+SADMM_API sadmm_status sadmm_problem_set_blocks(sadmm_problem *problem, int32_t count,
+                                                const sadmm_problem_block *blocks, const double *lambda0);
+
+SADMM_API int32_t sadmm_problem_body_count(const sadmm_problem *problem);
+SADMM_API int32_t sadmm_problem_contact_count(const sadmm_problem *problem);
+SADMM_API int32_t sadmm_problem_block_count(const sadmm_problem *problem);
+
+/* Read back what was set (or what sadmm_world_freeze put in). A, b as in set_bodies, v0 (count x 6); any may be NULL. */
+SADMM_API sadmm_status sadmm_problem_get_bodies(const sadmm_problem *problem, double *A, double *b, double *v0);
+SADMM_API sadmm_status sadmm_problem_get_contact(const sadmm_problem *problem, int32_t index, sadmm_problem_contact *contact);
+SADMM_API sadmm_status sadmm_problem_get_block(const sadmm_problem *problem, int32_t index, sadmm_problem_block *block);
+
+/* Solve. The solution replaces the initial values, so that solving again continues from there (when
+ * settings->warm_start). gravity, dt (but for the unit of penalty_offset) and stabilisation are not used: they are
+ * in A, b and e already. report may be NULL. Errors: INVALID_ARGUMENT, UNAVAILABLE, OUT_OF_MEMORY, NON_FINITE
+ * (the problem keeps its previous values), DEVICE. */
+SADMM_API sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend backend, sadmm_precision precision,
+                                           const sadmm_settings *settings, sadmm_solve_report *report);
+
+/* The solution. velocities: (bodies x 6). impulses: (contacts x 3) on b, world frame, N s. block_lambda:
+ * (blocks x 6), unused rows 0. Any may be NULL. */
+SADMM_API sadmm_status sadmm_problem_get_solution(const sadmm_problem *problem, double *velocities, double *impulses,
+                                                  double *block_lambda);
+
+/* Set (v, lambda) by hand, e.g. to certify another solver's answer. Shapes as above; NULL leaves a part alone. */
+SADMM_API sadmm_status sadmm_problem_set_solution(sadmm_problem *problem, const double *velocities,
+                                                  const double *impulses, const double *block_lambda);
+
+/* The error of the current (v, lambda), in double from raw data; no solve. */
+SADMM_API sadmm_status sadmm_problem_certify(const sadmm_problem *problem, sadmm_certificate *certificate);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,96 @@
+/* Solver settings and reports shared by the problem level (problem.h) and the world level (world.h). */
+#ifndef SUBADMM_SETTINGS_H
+#define SUBADMM_SETTINGS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Arithmetic of the solver. Poses are kept in double in both; velocities and impulses are in this precision. */
+typedef enum sadmm_precision { SADMM_F32 = 0, SADMM_F64 = 1 } sadmm_precision;
+
+/* Where a solve runs. AUTO picks among the available ones and says why (sadmm_world_explain). */
+typedef enum sadmm_backend {
+    SADMM_BACKEND_AUTO = 0,
+    SADMM_BACKEND_REF,  /* the paper's Steps 1-4 with x, z, u, naive, double only: the oracle */
+    SADMM_BACKEND_CPU,  /* OpenMP, reduced form */
+    SADMM_BACKEND_CUDA, /* NVIDIA GPUs */
+    SADMM_BACKEND_COUNT
+} sadmm_backend;
+
+/* What a build and this machine can do. */
+typedef struct sadmm_backend_info {
+    sadmm_backend backend;
+    const char *name;       /* "ref", "cpu", "cuda" */
+    bool available[2];      /* by sadmm_precision */
+    const char *reason;     /* why it is (partly) unavailable, or what it runs on; never NULL; static storage */
+} sadmm_backend_info;
+
+/* Describe one backend. `backend` in [SADMM_BACKEND_REF, SADMM_BACKEND_COUNT).
+ * Errors: INVALID_ARGUMENT. Thread-safe. */
+SADMM_API sadmm_status sadmm_backend_query(sadmm_backend backend, sadmm_backend_info *info);
+
+/* Settings of a solve. Start from sadmm_settings_default(); a struct is validated when it is handed over.
+ * Symbols are the paper's (Sec. III-D). "kg/s^2" values are the paper's time-scaled units; the solver works
+ * in impulses and converts (beta_impulse = dt^2 beta_paper, docs/algorithm.md). */
+typedef struct sadmm_settings {
+    double dt;                   /* time step, s, in [1e-6, 1]; default 0.005 */
+    double gravity[3];           /* m/s^2, world frame, finite, norm <= 1e6; default (0, 0, -9.81) */
+
+    int iterations;              /* iterations a step, in [1, 1000000]; default 100 */
+    int penalty_period;          /* m of eq. (15): iterations between penalty updates, 0 = never; default 30 */
+    double penalty_mass_factor;  /* M of eq. (13), dimensionless, in [0, 1e12]; default 16 */
+    double penalty_offset;       /* c of eq. (13), kg/s^2, in [0, 1e15]; default 1e5. M and c are not both 0 */
+    double penalty_ratio_limit;  /* alpha of eq. (15), in [1, 1e6]; default 4 */
+    bool warm_start;             /* start from the previous step's impulses and velocities; default true.
+                                    false: impulses start at 0 and velocities at A^-1 b */
+
+    double residual_tolerance;   /* stop when |r_primal|_inf (m/s) and |r_dual|_inf (N s) are both <= this;
+                                    0 = never; finite, >= 0; default 0 */
+    double certificate_tolerance;/* stop when the natural map (m/s) is <= this and the momentum error, relative,
+                                    is <= certificate_momentum_tolerance; 0 = never; default 0 */
+    double certificate_momentum_tolerance; /* dimensionless, > 0; default 1e-6 */
+    int check_period;            /* iterations between looks at the stop rule, in [1, 1000000]; default 10 */
+
+    bool measure_residuals;      /* report the residuals of the last iteration; default false */
+    bool certify;                /* report the certificate of every step; default false */
+    bool recover_wrenches;       /* compute the contact wrench of every body; default true */
+
+    double baumgarte;            /* share of penetration beyond the slop removed a step, in [0, 1]; default 0.2 */
+    double slop;                 /* penetration left alone, m, in [0, 1]; default 1e-5 */
+    double correction_speed;     /* cap of the corrective normal speed, m/s, in [0, 1e3]; default 1 */
+    double restitution_threshold;/* approach speed under which restitution is ignored, m/s, >= 0; default 0.1 */
+
+    int threads;                 /* CPU threads, in [0, 1024]; 0 = all; default 0. Results do not depend on it */
+} sadmm_settings;
+
+SADMM_API sadmm_settings sadmm_settings_default(void);
+
+/* Residuals of eqs. (16) and (17), infinity norms, at the last iteration they were measured. */
+typedef struct sadmm_residual {
+    double primal; /* m/s, |x - z| */
+    double dual;   /* N s (linear) and N m s (angular), |A v - b - J^T lambda| */
+} sadmm_residual;
+
+/* True error of (v, lambda), computed in double from raw data, the same for every backend (docs/algorithm.md). */
+typedef struct sadmm_certificate {
+    double ncp_max;          /* natural map, largest over constraints, m/s */
+    double ncp_mean;         /* the same, mean over constraints, m/s */
+    int64_t ncp_worst;       /* index of the worst constraint: contacts first (in contact order), then blocks; -1: none */
+    double momentum_max;     /* |A v - b - J^T lambda| of the worst body over the largest |b|, |A v|, |J^T lambda|
+                                of any body (infinity norms), dimensionless */
+    int64_t momentum_worst;  /* index of that body among the dynamic ones; -1: none */
+    double siconos;          /* siconos' global measure for friction contact (gfc3d_compute_error), dimensionless;
+                                -1 when the problem holds soft constraints, which that measure does not know */
+} sadmm_certificate;
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,51 @@
+/* Status codes and the version of the library.
+ *
+ * Every call that can fail returns a sadmm_status. The object it was made on keeps a message that names
+ * the argument, its value and the allowed range (sadmm_world_message, sadmm_problem_message); calls that
+ * have no object yet (creation) leave it in sadmm_last_message. The library never prints, aborts or exits.
+ */
+#ifndef SUBADMM_STATUS_H
+#define SUBADMM_STATUS_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#if defined(__GNUC__) && !defined(SADMM_STATIC)
+#define SADMM_API __attribute__((visibility("default")))
+#else
+#define SADMM_API
+#endif
+
+typedef enum sadmm_status {
+    SADMM_OK = 0,
+    SADMM_ERROR_INVALID_ARGUMENT, /* an argument is out of range, not finite or inconsistent; nothing changed */
+    SADMM_ERROR_STALE_ID,         /* an id names an object that was destroyed or never existed; nothing changed */
+    SADMM_ERROR_OUT_OF_MEMORY,    /* an allocation failed; the object is as it was before the call */
+    SADMM_ERROR_UNAVAILABLE,      /* this build or this machine lacks the backend, precision or feature */
+    SADMM_ERROR_UNSUPPORTED,      /* the input is valid but asks for something this library does not do */
+    SADMM_ERROR_LIMIT,            /* a size exceeds what the library can index (stated in the message) */
+    SADMM_ERROR_NON_FINITE,       /* a step produced NaN or infinity; the state was rolled back */
+    SADMM_ERROR_DEVICE,           /* the accelerator failed; the message names the kernel */
+    SADMM_ERROR_IO,               /* a file could not be read or written */
+    SADMM_STATUS_COUNT
+} sadmm_status;
+
+/* The name of a status, e.g. "SADMM_ERROR_STALE_ID"; "SADMM_STATUS_UNKNOWN" for other values. Thread-safe. */
+SADMM_API const char *sadmm_status_name(sadmm_status status);
+
+/* The message of the last failed call on this thread, "" when none failed yet. Thread-local; valid until
+ * the next failing call on the same thread. */
+SADMM_API const char *sadmm_last_message(void);
+
+/* "major.minor.patch". Thread-safe. */
+SADMM_API const char *sadmm_version(void);
+
+/* Commit the library was built from ("unknown" outside a checkout) and the compiler that built it. Thread-safe. */
+SADMM_API const char *sadmm_build_commit(void);
+SADMM_API const char *sadmm_build_compiler(void);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,10 @@
+/* Everything: rigid bodies in exact frictional contact, on CPU cores and NVIDIA GPUs. */
+#ifndef SUBADMM_SUBADMM_H
+#define SUBADMM_SUBADMM_H
+
+#include "problem.h"
+#include "settings.h"
+#include "status.h"
+#include "world.h"
+
+#endif

@@ -1,0 +1,188 @@
+/* World level: bodies with shapes, stepped through time.
+ *
+ * SI units. World frame for positions, orientations (unit quaternion w x y z, body to world), linear velocity
+ * (of the centre of mass) and angular velocity. A body's own frame has its origin at the centre of mass and its
+ * axes along the principal axes of inertia.
+ *
+ * A world is owned by one thread at a time; different worlds may be stepped on different threads. Ids are small
+ * values with a generation: an id of a destroyed object gives SADMM_ERROR_STALE_ID, never another object.
+ */
+#ifndef SUBADMM_WORLD_H
+#define SUBADMM_WORLD_H
+
+#include "problem.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct sadmm_world sadmm_world;
+
+/* index + 1 in `slot`, so that a zeroed id is never valid. */
+typedef struct sadmm_body_id { uint32_t slot, generation; } sadmm_body_id;
+typedef struct sadmm_shape_id { uint32_t slot, generation; } sadmm_shape_id;
+
+/* ---- world ------------------------------------------------------------------------------------------------- */
+
+typedef struct sadmm_world_def {
+    sadmm_backend backend;      /* default AUTO */
+    sadmm_precision precision;  /* default F64 */
+    int device;                 /* accelerator index, >= 0; default 0 */
+    double contact_margin;      /* speculative margin as a share of the thinner shape's smallest extent, in [0, 1];
+                                   default 0.02. Contacts within margin + the distance closed in one step are made */
+    sadmm_settings settings;
+} sadmm_world_def;
+
+SADMM_API sadmm_world_def sadmm_world_def_default(void);
+
+/* Errors: INVALID_ARGUMENT, UNAVAILABLE, OUT_OF_MEMORY (message: sadmm_last_message). */
+SADMM_API sadmm_status sadmm_world_create(const sadmm_world_def *def, sadmm_world **out);
+SADMM_API void sadmm_world_destroy(sadmm_world *world); /* NULL is fine */
+SADMM_API const char *sadmm_world_message(const sadmm_world *world);
+
+/* Replace or read the settings; they take effect at the next step. Errors: INVALID_ARGUMENT (nothing changes). */
+SADMM_API sadmm_status sadmm_world_set_settings(sadmm_world *world, const sadmm_settings *settings);
+SADMM_API sadmm_settings sadmm_world_settings(const sadmm_world *world);
+
+/* ---- bodies ------------------------------------------------------------------------------------------------ */
+
+typedef enum sadmm_body_type { SADMM_BODY_DYNAMIC = 0, SADMM_BODY_STATIC } sadmm_body_type;
+
+typedef struct sadmm_body_def {
+    sadmm_body_type type;        /* default DYNAMIC */
+    double mass;                 /* kg, in [1e-9, 1e12]; ignored for static bodies; no default (must be set) */
+    double inertia[3];           /* principal moments, kg m^2, > 0, each <= the sum of the other two (relative 1e-9) */
+    double position[3];          /* centre of mass, m, |x| <= 1e9 */
+    double orientation[4];       /* w x y z, | |q| - 1 | <= 1e-6 (then normalised); default identity */
+    double linear_velocity[3];   /* m/s, |v| <= 1e6; 0 for static bodies */
+    double angular_velocity[3];  /* rad/s, |w| <= 1e6; 0 for static bodies */
+    int32_t environment;         /* bodies of different environments never meet; >= 0, or -1 (static only): meets all; default 0 (static: -1 is the usual choice) */
+    const char *name;            /* copied, at most 63 bytes; NULL = "" */
+} sadmm_body_def;
+
+SADMM_API sadmm_body_def sadmm_body_def_default(void);
+SADMM_API sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def, sadmm_body_id *id);
+/* Destroys its shapes too. */
+SADMM_API sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id);
+SADMM_API int32_t sadmm_world_body_count(const sadmm_world *world);      /* all, static ones included */
+/* The index-th live body in order of creation slot, index in [0, body_count). */
+SADMM_API sadmm_status sadmm_world_body_at(const sadmm_world *world, int32_t index, sadmm_body_id *id);
+
+typedef struct sadmm_body_state {
+    double position[3];          /* m */
+    double orientation[4];       /* w x y z */
+    double linear_velocity[3];   /* m/s */
+    double angular_velocity[3];  /* rad/s, world frame */
+} sadmm_body_state;
+
+SADMM_API sadmm_status sadmm_world_body_state(const sadmm_world *world, sadmm_body_id id, sadmm_body_state *state);
+SADMM_API sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, const sadmm_body_state *state);
+/* Read back the definition (mass, inertia, type, name; the name stays valid until the body is removed) with the current state. */
+SADMM_API sadmm_status sadmm_world_body_def(const sadmm_world *world, sadmm_body_id id, sadmm_body_def *def);
+/* External force (N) at the centre of mass and torque (N m), world frame; kept until set again. */
+SADMM_API sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, const double force[3],
+                                                   const double torque[3]);
+/* Sum of the contact wrenches of the last step on the body: force (N), then torque about its centre of mass
+ * (N m), world frame (eq. 12). Errors: STALE_ID, UNAVAILABLE when settings.recover_wrenches was false. */
+SADMM_API sadmm_status sadmm_world_body_contact_wrench(const sadmm_world *world, sadmm_body_id id, double wrench[6]);
+/* Turn contact between two bodies off or on again (default on). */
+SADMM_API sadmm_status sadmm_world_set_body_pair_contact(sadmm_world *world, sadmm_body_id a, sadmm_body_id b, bool enabled);
+
+/* Principal inertia of solid bodies with their axes along the shape's, kg m^2.
+ * box: half extents (m). capsule: radius and half length of the segment (m), axis z. */
+SADMM_API void sadmm_box_inertia(double mass, const double half_extents[3], double inertia[3]);
+SADMM_API void sadmm_sphere_inertia(double mass, double radius, double inertia[3]);
+SADMM_API void sadmm_capsule_inertia(double mass, double radius, double half_length, double inertia[3]);
+
+/* ---- shapes ------------------------------------------------------------------------------------------------ */
+
+typedef enum sadmm_shape_type {
+    SADMM_SHAPE_PLANE = 0, /* half-space z <= 0 of the shape's frame; static bodies only. size unused */
+    SADMM_SHAPE_SPHERE,    /* size[0] radius */
+    SADMM_SHAPE_CAPSULE,   /* size[0] radius, size[1] half length of the segment along the shape's z */
+    SADMM_SHAPE_BOX,       /* size: half extents */
+    SADMM_SHAPE_TYPE_COUNT
+} sadmm_shape_type;
+
+typedef struct sadmm_shape_def {
+    sadmm_shape_type type;
+    double size[3];              /* m, each used entry in [1e-6, 1e6] */
+    double position[3];          /* of the shape's frame in the body's, m; default 0 */
+    double orientation[4];       /* shape to body, w x y z; default identity */
+    double friction;             /* mu >= 0, <= 1e6; a pair uses the geometric mean; default 0.5 */
+    double restitution;          /* in [0, 1]; a pair uses the larger; default 0 */
+    uint32_t category, mask;     /* two shapes meet if (a.category & b.mask) and (b.category & a.mask); default 1, all */
+} sadmm_shape_def;
+
+SADMM_API sadmm_shape_def sadmm_shape_def_default(void);
+SADMM_API sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body, const sadmm_shape_def *def,
+                                             sadmm_shape_id *id /* may be NULL */);
+SADMM_API sadmm_status sadmm_world_remove_shape(sadmm_world *world, sadmm_shape_id id);
+SADMM_API int32_t sadmm_world_shape_count(const sadmm_world *world);
+SADMM_API sadmm_status sadmm_world_shape_at(const sadmm_world *world, int32_t index, sadmm_shape_id *id);
+SADMM_API sadmm_status sadmm_world_shape_def(const sadmm_world *world, sadmm_shape_id id, sadmm_shape_def *def,
+                                             sadmm_body_id *body /* may be NULL */);
+/* Override the pair's friction (mu >= 0), or give -1 to return to the geometric mean. */
+SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_shape_id a, sadmm_shape_id b, double friction);
+
+/* ---- stepping ---------------------------------------------------------------------------------------------- */
+
+/* One time step of settings.dt. Errors: OUT_OF_MEMORY, NON_FINITE (state rolled back to before the step, message
+ * names the body), DEVICE, LIMIT. After an error the world is as before the step and stays usable. */
+SADMM_API sadmm_status sadmm_world_step(sadmm_world *world);
+
+typedef struct sadmm_phase_times { double total, collide, assemble, solve, finish; } sadmm_phase_times; /* ms, wall */
+
+typedef struct sadmm_step_report {
+    sadmm_backend backend;
+    sadmm_precision precision;
+    int threads;
+    int64_t step;                  /* steps done since creation */
+    double time;                   /* simulated time after the step, s */
+    int32_t bodies;                /* dynamic bodies */
+    int32_t joints;                /* constraint blocks (none yet at the world level) */
+    int32_t contacts;              /* contact points of the step */
+    int32_t pairs;                 /* shape pairs with at least one contact */
+    int iterations;                /* done */
+    bool converged;                /* a stop rule was met */
+    double penetration_max;        /* deepest overlap at the start of the step, m, >= 0 */
+    sadmm_phase_times ms;          /* the certificate's own time is in `certify_ms`, not in here */
+    double certify_ms;
+    sadmm_residual residual;       /* valid if measured (settings or penalty update or tolerance); else -1 */
+    sadmm_certificate certificate; /* valid if settings.certify or a certificate tolerance; else ncp_max = -1 */
+} sadmm_step_report;
+
+/* The report of the last step (zeroed before the first). */
+SADMM_API sadmm_status sadmm_world_report(const sadmm_world *world, sadmm_step_report *report);
+
+typedef struct sadmm_contact {
+    sadmm_body_id body_a, body_b;
+    sadmm_shape_id shape_a, shape_b;
+    double position[3];   /* m, world, midway between the surfaces, at the start of the step */
+    double normal[3];     /* unit, world, from a to b */
+    double gap;           /* m, negative: penetration, at the start of the step */
+    double friction;      /* mu of the pair */
+    double impulse[3];    /* on b, world, N s */
+    double force[3];      /* impulse / dt, on b, world, N (eq. 12) */
+    uint32_t feature;     /* id of the touching features, stable from step to step within a shape pair */
+} sadmm_contact;
+
+SADMM_API int32_t sadmm_world_contact_count(const sadmm_world *world); /* of the last step */
+/* Copy contacts [first, first + count) of the last step. Errors: INVALID_ARGUMENT (range). */
+SADMM_API sadmm_status sadmm_world_contacts(const sadmm_world *world, int32_t first, int32_t count, sadmm_contact *contacts);
+
+/* 64-bit hash of all live bodies' poses and velocities (bit patterns, in slot order). */
+SADMM_API uint64_t sadmm_world_state_hash(const sadmm_world *world);
+
+/* What the last step ran, what it left out and why, as text lines. Writes at most `size` bytes with the final 0 and
+ * returns the full length. Before the first step: the choice of backend only. */
+SADMM_API size_t sadmm_world_explain(const sadmm_world *world, char *text, size_t size);
+
+/* Freeze the contact problem of the last step (bodies, contacts, its starting values) into `problem`. The k-th
+ * dynamic body in slot order is body k. Errors: UNAVAILABLE before the first step, OUT_OF_MEMORY. */
+SADMM_API sadmm_status sadmm_world_freeze(const sadmm_world *world, sadmm_problem *problem);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
