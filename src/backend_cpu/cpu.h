@@ -1,0 +1,198 @@
+/* The CPU backend: reduced form (docs/algorithm.md) on OpenMP threads and SIMD lanes.
+ *
+ * These sources are compiled once per precision (SADMM_REAL) and instruction set (SADMM_VARIANT, SADMM_VECTOR_BYTES);
+ * cpu_find.c picks the best table the machine can run.
+ *
+ * Layout. A contact pair shares normal, friction and bodies among its points, so the pair is the unit:
+ *   - pairs go into blocks of LANES pairs, one pair a lane; a point slot holds one point of each of its pairs;
+ *   - with d = x_a - x_b (difference of the centres of mass) r_b = r_a + d, so that a point's relative velocity is
+ *         x = u + w x r_a,   u = v_b - v_a + w_b x d,   w = w_b - w_a,
+ *     and the pair's wrench needs only f = sum E_k and tau = sum r_k x E_k (E = 2 lambda - lambda_prev):
+ *         on a: (-f, -tau)      on b: (f, tau + d x f);
+ *   - the pair writes two wrench rows, bodies gather their rows over a CSR list: E is never stored, nothing is added
+ *     atomically, and the order of a body's sum does not depend on the threads.
+ * Constraints given by Jacobians (row blocks) write the same wrench rows, after the pairs'.
+ *
+ * Bodies come in two forms (`rigid_bodies`): where A is (m I, inertia) and all constraints are three-row contacts,
+ * A + beta C has the 3x3 structure of one rigid body and LANES bodies are updated at once from 23 numbers each; everything
+ * else goes through a full 6x6 inverse.
+ *
+ * An iteration is two sweeps with a barrier after each: bodies (Step 1), constraints (Steps 2-4).
+ */
+#ifndef SADMM_CPU_H
+#define SADMM_CPU_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "../core/kernels.h"
+#include "cpu_barrier.h"
+#include "cpu_lanes.h"
+
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+#define SADMM_JOIN2(a, b) a##b
+#define SADMM_JOIN(a, b) SADMM_JOIN2(a, b)
+/* A symbol of this variant, e.g. sadmm_cpu_iterate_f32_avx2. */
+#define CPU(name) SADMM_JOIN(sadmm_cpu_##name, SADMM_VARIANT)
+
+enum { STATE_INV_BETA = 6 }; /* slot of a state row */
+enum { PACKED6 = 21 };       /* symmetric 6x6: lower triangle, rows first */
+
+/* LANES contact pairs; points of all of them in `slots` slots from `first` on. Lanes without a pair point at the
+ * static body; slots without a point have an error so large that lambda stays 0. */
+struct pair_block {
+    vec normal, d;
+    lanes friction, inv_s; /* mu, 1 / (1/beta_a + 1/beta_b) */
+    int32_t body_a[LANES], body_b[LANES];
+    int32_t pair[LANES];   /* index in the system, -1 for an empty lane */
+    int32_t slots;
+    size_t first;          /* in units of slots */
+};
+
+struct point_slot { /* 3 rows a contact */
+    vec arm;
+    lanes error;
+    vec lambda;
+};
+struct normal_slot { /* 1 row a contact (no friction anywhere) */
+    vec arm;
+    lanes error, lambda;
+};
+
+/* LANES rigid bodies under three-row contacts only. With n points, S = sum r, Q = sum (|r|^2 I - r r^T):
+ *     A + beta C = [ alpha I, -beta [S]x; beta [S]x, I + beta Q ],  alpha = m + beta n,
+ * and eliminating the linear part leaves K = I + beta Q + beta^2/alpha [S]x[S]x. */
+struct body_block {
+    vec b_linear, b_angular;
+    lanes mass;
+    lane_sym3 inertia;
+    lanes inv_alpha;
+    vec sigma;       /* beta/alpha S */
+    lane_sym3 K_inverse;
+};
+
+/* A constraint given by Jacobian rows. */
+struct row_block {
+    int32_t kind, rows, body_a, body_b;
+    real jacobian_a[36], jacobian_b[36];
+    real error[6], stiffness[6], damping[6], lambda[6];
+    real friction;
+    bool active[6]; /* a hard row of zeros is no constraint (Sec. III-C) */
+};
+
+struct sadmm_context {
+    const struct sadmm_system *system;
+    struct sadmm_plan plan;
+    struct sadmm_settings settings;
+    struct cpu_barrier barrier;
+
+    /* Bodies; index `bodies` is the static world: state and 1/beta 0, never written. Rows are padded to whole blocks. */
+    int32_t bodies;
+    size_t body_block_count;
+    bool rigid_bodies;
+    real *state;                     /* rows: v, w, 1/beta, 0 */
+    double *A, *C;                   /* bodies x PACKED6 */
+    double *beta;                    /* bodies, kg */
+    struct body_block *body_blocks;  /* if rigid_bodies */
+    real *b, *A_columns, *H_columns; /* else: rows; 6 rows (columns of A, of (A + beta C)^-1) a body */
+    size_t state_capacity, A_capacity, C_capacity, beta_capacity, body_block_capacity, b_capacity, A_column_capacity,
+        H_column_capacity;
+
+    /* Geometric contacts */
+    struct pair_block *pair_blocks;
+    void *slots; /* point_slot or normal_slot */
+    size_t pair_block_count, slot_count, pair_block_capacity, slot_capacity;
+    int32_t *pair_order; /* scratch */
+    size_t pair_order_capacity;
+
+    struct row_block *row_blocks;
+    size_t row_block_count, row_block_capacity;
+
+    /* Wrench rows: record_count rows on a, then as many on b; record: pair lane, or row block after all pair lanes.
+     * `change` holds J^T (lambda - lambda_prev) after a measured iteration, when `wrenches` holds J^T lambda. */
+    real *wrenches, *change;
+    size_t record_count, wrench_capacity, change_capacity;
+    bool measured;     /* wrenches are split: the next Step 1 uses wrenches + ratio * change */
+    double ratio;
+    struct sadmm_residual residual; /* primal part of a measured iteration */
+
+    /* Body -> its wrench rows: offsets (bodies + 2), incident: row index */
+    int32_t *offsets, *incident;
+    size_t offsets_capacity, incident_capacity;
+
+    double *thread_max; /* one cache line a thread */
+    size_t thread_max_capacity;
+};
+
+enum { THREAD_MAX_STRIDE = 8 };
+
+/* Share `thread` of `threads` of [0, count): contiguous, sizes differ by at most one. */
+static inline void cpu_share(size_t count, int thread, int threads, size_t *begin, size_t *end)
+{
+    size_t base = count / (size_t)threads, extra = count % (size_t)threads, t = (size_t)thread;
+    *begin = t * base + (t < extra ? t : extra);
+    *end = *begin + base + (t < extra ? 1 : 0);
+}
+
+#ifdef _OPENMP
+/* Works on the context `c`. */
+#define CPU_PARALLEL _Pragma("omp parallel num_threads(c->plan.threads)")
+static inline int cpu_thread(void) { return omp_get_thread_num(); }
+static inline int cpu_threads(void) { return omp_get_num_threads(); }
+#else
+#define CPU_PARALLEL
+static inline int cpu_thread(void) { return 0; }
+static inline int cpu_threads(void) { return 1; }
+#endif
+#define CPU_BARRIER cpu_barrier_wait(&c->barrier, cpu_threads())
+
+/* The larger of the threads' maxima. */
+static inline double cpu_reduce_max(const struct sadmm_context *c)
+{
+    double largest = 0;
+    for (int t = 0; t < c->plan.threads; ++t) largest = fmax(largest, c->thread_max[t * THREAD_MAX_STRIDE]);
+    return largest;
+}
+
+/* Row of a body in `state`: the static world is the last one. */
+static inline int32_t cpu_body(const struct sadmm_context *c, int32_t body) { return body < 0 ? c->bodies : body; }
+
+sadmm_status CPU(create)(int device, struct sadmm_context **out, struct sadmm_error *error);
+void CPU(destroy)(struct sadmm_context *context);
+sadmm_status CPU(begin)(struct sadmm_context *, const struct sadmm_system *, const struct sadmm_plan *,
+                        const struct sadmm_settings *, struct sadmm_error *);
+sadmm_status CPU(assemble_bodies)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CPU(assemble_contacts)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CPU(assemble_joints)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CPU(assemble_springs)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CPU(init_penalty)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CPU(factorize)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CPU(update_velocity)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CPU(update_constraints)(struct sadmm_context *, bool measure, struct sadmm_error *);
+sadmm_status CPU(iterate)(struct sadmm_context *, int count, bool measure, struct sadmm_error *);
+sadmm_status CPU(measure_residuals)(struct sadmm_context *, struct sadmm_residual *, struct sadmm_error *);
+sadmm_status CPU(update_penalty)(struct sadmm_context *, double ratio, struct sadmm_error *);
+sadmm_status CPU(read_solution)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CPU(read_penalty)(struct sadmm_context *, double *beta, struct sadmm_error *);
+sadmm_status CPU(integrate)(struct sadmm_context *, struct sadmm_rigid *next, struct sadmm_error *);
+sadmm_status CPU(recover_wrenches)(struct sadmm_context *, double *wrench, struct sadmm_error *);
+
+/* Sweeps: a thread's share, used by the stepwise entries and by iterate alike. */
+enum cpu_sweep {
+    CPU_SWEEP_START,   /* wrenches = J^T lambda of the start values */
+    CPU_SWEEP_ITERATE, /* Steps 2-4; wrenches = J^T (2 lambda - lambda_prev) */
+    CPU_SWEEP_MEASURE  /* Steps 2-4; wrenches = J^T lambda, change = J^T (lambda - lambda_prev); *primal: eq. (16) */
+};
+void CPU(sweep_pairs)(struct sadmm_context *, size_t begin, size_t end, enum cpu_sweep sweep, double *primal);
+void CPU(sweep_row_blocks)(struct sadmm_context *, size_t begin, size_t end, enum cpu_sweep sweep, double *primal);
+/* Step 1 of body blocks [begin, end). */
+void CPU(sweep_bodies)(struct sadmm_context *, size_t begin, size_t end);
+/* Largest entry of A v - b - (sum of wrenches), eq. (17), over body blocks [begin, end). */
+double CPU(dual_residual)(const struct sadmm_context *, size_t begin, size_t end);
+void CPU(start_wrenches)(struct sadmm_context *);
+
+#endif

@@ -1,0 +1,125 @@
+/* begin: room for the step, pairs into lane blocks, and the body -> record list. */
+#include <string.h>
+
+#include "../core/memory.h"
+#include "cpu.h"
+
+/* Pairs are sorted by point count inside windows of this many blocks: a block is as deep as its deepest pair, so equal
+ * counts waste no slots, while a window keeps neighbours in memory together. */
+enum { WINDOW_BLOCKS = 32 };
+
+static int32_t points_of(const struct sadmm_context *c, int32_t pair) { return c->system->contacts->pairs[pair].count; }
+
+/* Stable counting sort of each window by point count, most first. */
+static void order_pairs(struct sadmm_context *c)
+{
+    size_t count = (size_t)c->plan.pairs, window = (size_t)WINDOW_BLOCKS * LANES;
+    for (size_t begin = 0; begin < count; begin += window) {
+        size_t end = begin + window < count ? begin + window : count, at[SADMM_MAX_POINTS + 2] = {0};
+        for (size_t p = begin; p < end; ++p) ++at[SADMM_MAX_POINTS - points_of(c, (int32_t)p) + 1];
+        for (int k = 0; k <= SADMM_MAX_POINTS; ++k) at[k + 1] += at[k];
+        for (size_t p = begin; p < end; ++p)
+            c->pair_order[begin + at[SADMM_MAX_POINTS - points_of(c, (int32_t)p)]++] = (int32_t)p;
+    }
+}
+
+static void count_slots(struct sadmm_context *c)
+{
+    size_t slots = 0;
+    for (size_t k = 0; k < c->pair_block_count; ++k) {
+        struct pair_block *block = &c->pair_blocks[k];
+        block->first = slots;
+        block->slots = 0;
+        for (int l = 0; l < LANES; ++l) {
+            size_t at = k * (size_t)LANES + (size_t)l;
+            block->pair[l] = at < (size_t)c->plan.pairs ? c->pair_order[at] : -1;
+            if (block->pair[l] >= 0 && points_of(c, block->pair[l]) > block->slots)
+                block->slots = points_of(c, block->pair[l]);
+        }
+        slots += (size_t)block->slots;
+    }
+    c->slot_count = slots;
+}
+
+static void record_bodies(const struct sadmm_context *c, size_t record, int32_t bodies[2])
+{
+    size_t pair_records = c->pair_block_count * (size_t)LANES;
+    if (record >= pair_records) {
+        const struct sadmm_problem_block *block = &c->system->blocks[record - pair_records];
+        bodies[0] = block->body_a;
+        bodies[1] = block->body_b;
+        return;
+    }
+    int32_t index = c->pair_blocks[record / (size_t)LANES].pair[record % (size_t)LANES];
+    bodies[0] = index < 0 ? -1 : c->system->contacts->pairs[index].body_a;
+    bodies[1] = index < 0 ? -1 : c->system->contacts->pairs[index].body_b;
+}
+
+/* Counting sort by body; records ascend within a body, so a body's sum has one order whatever the threads. */
+static void list_incident(struct sadmm_context *c)
+{
+    int32_t *offsets = c->offsets, bodies[2];
+    memset(offsets, 0, ((size_t)c->bodies + 2) * sizeof *offsets);
+    for (size_t r = 0; r < c->record_count; ++r) {
+        record_bodies(c, r, bodies);
+        for (int side = 0; side < 2; ++side)
+            if (bodies[side] >= 0) ++offsets[bodies[side] + 2];
+    }
+    for (int32_t i = 0; i < c->bodies; ++i) offsets[i + 2] += offsets[i + 1];
+    for (size_t r = 0; r < c->record_count; ++r) {
+        record_bodies(c, r, bodies);
+        for (int side = 0; side < 2; ++side)
+            if (bodies[side] >= 0) c->incident[offsets[bodies[side] + 1]++] = (int32_t)(r + (side ? c->record_count : 0));
+    }
+}
+
+static bool grow(void *array, size_t *capacity, size_t needed, size_t size)
+{
+    return sadmm_grow((void **)array, capacity, 0, needed, size);
+}
+
+sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *system, const struct sadmm_plan *plan,
+                        const struct sadmm_settings *settings, struct sadmm_error *error)
+{
+    size_t n = (size_t)plan->bodies;
+    c->system = system;
+    c->plan = *plan;
+    c->settings = *settings;
+    c->bodies = plan->bodies;
+    c->measured = false;
+    c->ratio = 1;
+    c->pair_block_count = ((size_t)plan->pairs + LANES - 1) / LANES;
+    c->row_block_count = (size_t)system->block_count;
+    c->record_count = c->pair_block_count * (size_t)LANES + c->row_block_count;
+    if (c->record_count > INT32_MAX / 2)
+        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%zu constraints: at most %d", c->record_count, INT32_MAX / 2);
+
+    c->rigid_bodies = plan->rigid && plan->contact_rows != 1 && c->row_block_count == 0;
+    c->body_block_count = (n + LANES - 1) / LANES;
+    size_t rows = c->body_block_count * (size_t)LANES + 1, general = c->rigid_bodies ? 0 : n;
+    bool ok = grow(&c->state, &c->state_capacity, rows * ROW, sizeof(real)) &&
+              grow(&c->A, &c->A_capacity, n * PACKED6, sizeof(double)) &&
+              grow(&c->C, &c->C_capacity, n * PACKED6, sizeof(double)) &&
+              grow(&c->beta, &c->beta_capacity, n, sizeof(double)) &&
+              grow(&c->body_blocks, &c->body_block_capacity, c->rigid_bodies ? c->body_block_count : 0,
+                   sizeof *c->body_blocks) &&
+              grow(&c->b, &c->b_capacity, general * ROW, sizeof(real)) &&
+              grow(&c->A_columns, &c->A_column_capacity, general * 6 * ROW, sizeof(real)) &&
+              grow(&c->H_columns, &c->H_column_capacity, general * 6 * ROW, sizeof(real)) &&
+              grow(&c->pair_order, &c->pair_order_capacity, (size_t)plan->pairs, sizeof(int32_t)) &&
+              grow(&c->pair_blocks, &c->pair_block_capacity, c->pair_block_count, sizeof *c->pair_blocks) &&
+              grow(&c->row_blocks, &c->row_block_capacity, c->row_block_count, sizeof *c->row_blocks) &&
+              grow(&c->wrenches, &c->wrench_capacity, 2 * c->record_count * ROW, sizeof(real)) &&
+              (!plan->residuals || grow(&c->change, &c->change_capacity, 2 * c->record_count * ROW, sizeof(real))) &&
+              grow(&c->offsets, &c->offsets_capacity, n + 2, sizeof(int32_t)) &&
+              grow(&c->incident, &c->incident_capacity, 2 * c->record_count, sizeof(int32_t)) &&
+              grow(&c->thread_max, &c->thread_max_capacity, (size_t)plan->threads * THREAD_MAX_STRIDE, sizeof(double));
+    if (!ok) return sadmm_fail_memory(error, "the cpu backend's step");
+    order_pairs(c);
+    count_slots(c);
+    size_t slot_size = plan->contact_rows == 1 ? sizeof(struct normal_slot) : sizeof(struct point_slot);
+    size_t slot_bytes = c->slot_count * slot_size;
+    if (!grow(&c->slots, &c->slot_capacity, slot_bytes, 1)) return sadmm_fail_memory(error, "the cpu backend's contacts");
+    list_incident(c);
+    return SADMM_OK;
+}

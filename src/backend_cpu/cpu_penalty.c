@@ -1,0 +1,204 @@
+/* Kernels E-H and P: C_i (14), beta_i (13), (15), and the factor of A_i + beta_i C_i.
+ *
+ * In double whatever the precision, from the system's raw data: it runs a few times a step, and H only preconditions (the
+ * fixed point of Step 1 does not depend on it). Each body gathers over its own constraints. */
+#include <string.h>
+
+#include "../core/dense6.h"
+#include "cpu.h"
+
+/* C += row^T row, packed lower triangle. */
+static void add_row(double C[PACKED6], const double row[6])
+{
+    int at = 0;
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j <= i; ++j) C[at++] += row[i] * row[j];
+}
+
+/* Sums over a body's three-row points: J^T J = [ I, -[r]x; [r]x, |r|^2 I - r r^T ] does not depend on the frame. */
+struct arm_sums {
+    double count, r[3], rr[6]; /* rr: xx yy zz xy xz yz */
+};
+
+static void add_arm(struct arm_sums *s, const double r[3])
+{
+    s->count += 1;
+    for (int k = 0; k < 3; ++k) {
+        s->r[k] += r[k];
+        s->rr[k] += r[k] * r[k];
+    }
+    s->rr[3] += r[0] * r[1];
+    s->rr[4] += r[0] * r[2];
+    s->rr[5] += r[1] * r[2];
+}
+
+static void add_arm_sums(double C[PACKED6], const struct arm_sums *s)
+{
+    C[0] += s->count, C[2] += s->count, C[5] += s->count;
+    /* Rows 3-5, columns 0-2: [r]x */
+    C[7] -= s->r[2], C[8] += s->r[1];
+    C[10] += s->r[2], C[12] -= s->r[0];
+    C[15] -= s->r[1], C[16] += s->r[0];
+    C[9] += s->rr[1] + s->rr[2];
+    C[13] -= s->rr[3], C[14] += s->rr[0] + s->rr[2];
+    C[18] -= s->rr[4], C[19] -= s->rr[5], C[20] += s->rr[0] + s->rr[1];
+}
+
+static void add_pair(const struct sadmm_context *c, size_t record, int side, struct arm_sums *sums, double C[PACKED6])
+{
+    const struct sadmm_contact_set *contacts = c->system->contacts;
+    const struct pair_block *block = &c->pair_blocks[record / (size_t)LANES];
+    const struct sadmm_contact_pair *pair = &contacts->pairs[block->pair[record % (size_t)LANES]];
+    for (int k = 0; k < pair->count; ++k) {
+        const struct sadmm_contact_point *point = &contacts->points[pair->first + k];
+        const double *r = side ? point->arm_b : point->arm_a, *n = pair->normal;
+        if (c->plan.contact_rows == 3) {
+            add_arm(sums, r);
+        } else {
+            double row[6] = {n[0], n[1], n[2], r[1] * n[2] - r[2] * n[1], r[2] * n[0] - r[0] * n[2],
+                             r[0] * n[1] - r[1] * n[0]};
+            add_row(C, row);
+        }
+    }
+}
+
+static void add_row_block(const struct row_block *block, int side, double C[PACKED6])
+{
+    const real *J = side ? block->jacobian_b : block->jacobian_a;
+    for (int r = 0; r < block->rows; ++r) {
+        double row[6];
+        for (int j = 0; j < 6; ++j) row[j] = (double)J[6 * r + j];
+        add_row(C, row);
+    }
+}
+
+static double packed_trace(const double M[PACKED6]) { return M[0] + M[2] + M[5] + M[9] + M[14] + M[20]; }
+
+static void assemble_C(struct sadmm_context *c, int32_t i)
+{
+    double *C = &c->C[(size_t)i * PACKED6];
+    struct arm_sums sums = {0};
+    size_t pair_records = c->pair_block_count * (size_t)LANES;
+    memset(C, 0, PACKED6 * sizeof *C);
+    for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) {
+        size_t row = (size_t)c->incident[at];
+        int side = row >= c->record_count;
+        size_t record = side ? row - c->record_count : row;
+        if (record < pair_records)
+            add_pair(c, record, side, &sums, C);
+        else
+            add_row_block(&c->row_blocks[record - pair_records], side, C);
+    }
+    add_arm_sums(C, &sums);
+
+    double trace_A = packed_trace(&c->A[(size_t)i * PACKED6]), trace_C = packed_trace(C);
+    const struct sadmm_settings *s = &c->settings;
+    /* dt^2: c is given in the paper's time-scaled units */
+    c->beta[i] = trace_C > 0 ? s->penalty_mass_factor * trace_A / trace_C + s->penalty_offset * s->dt * s->dt : 1;
+}
+
+sadmm_status CPU(init_penalty)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    (void)error;
+    CPU_PARALLEL
+    {
+        size_t begin, end;
+        cpu_share((size_t)c->bodies, cpu_thread(), cpu_threads(), &begin, &end);
+        for (size_t i = begin; i < end; ++i) assemble_C(c, (int32_t)i);
+    }
+    CPU(start_wrenches)(c);
+    return SADMM_OK;
+}
+
+/* The factor of a rigid body (struct body_block). */
+static void factorize_rigid(struct sadmm_context *c, size_t i)
+{
+    const double *A = &c->A[i * PACKED6], *C = &c->C[i * PACKED6];
+    double beta = c->beta[i], alpha = A[0] + beta * C[0], ratio = beta / alpha;
+    double S[3] = {C[16], C[8], C[10]}; /* [S]x is the lower left block */
+    double S2 = S[0] * S[0] + S[1] * S[1] + S[2] * S[2], q = beta * ratio;
+    /* K = I + beta Q + beta^2/alpha (S S^T - |S|^2 I) */
+    double xx = A[9] + beta * C[9] + q * (S[0] * S[0] - S2), yy = A[14] + beta * C[14] + q * (S[1] * S[1] - S2);
+    double zz = A[20] + beta * C[20] + q * (S[2] * S[2] - S2), xy = A[13] + beta * C[13] + q * S[0] * S[1];
+    double xz = A[18] + beta * C[18] + q * S[0] * S[2], yz = A[19] + beta * C[19] + q * S[1] * S[2];
+    double c00 = yy * zz - yz * yz, c01 = xz * yz - xy * zz, c02 = xy * yz - xz * yy;
+    double inv = 1 / (xx * c00 + xy * c01 + xz * c02);
+
+    struct body_block *block = &c->body_blocks[i / (size_t)LANES];
+    int l = (int)(i % (size_t)LANES);
+    block->inv_alpha[l] = (real)(1 / alpha);
+    block->sigma.x[l] = (real)(ratio * S[0]), block->sigma.y[l] = (real)(ratio * S[1]);
+    block->sigma.z[l] = (real)(ratio * S[2]);
+    lane_sym3 *K = &block->K_inverse;
+    K->xx[l] = (real)(inv * c00), K->xy[l] = (real)(inv * c01), K->xz[l] = (real)(inv * c02);
+    K->yy[l] = (real)(inv * (xx * zz - xz * xz)), K->yz[l] = (real)(inv * (xy * xz - xx * yz));
+    K->zz[l] = (real)(inv * (xx * yy - xy * xy));
+}
+
+/* (A + beta C)^-1 in full. */
+static void factorize_general(struct sadmm_context *c, size_t i)
+{
+    double M[36], L[36], column[6];
+    const double *A = &c->A[i * PACKED6], *C = &c->C[i * PACKED6];
+    int at = 0;
+    for (int r = 0; r < 6; ++r)
+        for (int k = 0; k <= r; ++k, ++at) M[6 * r + k] = M[6 * k + r] = A[at] + c->beta[i] * C[at];
+    /* A is positive definite; only a beta C some 1e15 times larger can lose it to rounding: precondition by the diagonal. */
+    if (!dense6_cholesky(M, L)) {
+        memset(L, 0, sizeof L);
+        for (int k = 0; k < 6; ++k) L[7 * k] = sqrt(M[7 * k]);
+    }
+    for (int k = 0; k < 6; ++k) {
+        double unit[6] = {0};
+        unit[k] = 1;
+        dense6_solve(L, unit, column);
+        real *out = &c->H_columns[(6 * i + (size_t)k) * ROW];
+        for (int r = 0; r < ROW; ++r) out[r] = r < 6 ? (real)column[r] : 0;
+    }
+}
+
+static void factorize_body(struct sadmm_context *c, size_t i)
+{
+    c->state[i * ROW + STATE_INV_BETA] = (real)(1 / c->beta[i]);
+    if (c->rigid_bodies) factorize_rigid(c, i);
+    else factorize_general(c, i);
+}
+
+static void weigh_pair_block(struct sadmm_context *c, struct pair_block *block)
+{
+    for (int l = 0; l < LANES; ++l) {
+        real s = c->state[(size_t)block->body_a[l] * ROW + STATE_INV_BETA] +
+                 c->state[(size_t)block->body_b[l] * ROW + STATE_INV_BETA];
+        block->inv_s[l] = s > 0 ? 1 / s : 0;
+    }
+}
+
+sadmm_status CPU(factorize)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    (void)error;
+    CPU_PARALLEL
+    {
+        size_t begin, end;
+        cpu_share((size_t)c->bodies, cpu_thread(), cpu_threads(), &begin, &end);
+        for (size_t i = begin; i < end; ++i) factorize_body(c, i);
+        CPU_BARRIER;
+        cpu_share(c->pair_block_count, cpu_thread(), cpu_threads(), &begin, &end);
+        for (size_t k = begin; k < end; ++k) weigh_pair_block(c, &c->pair_blocks[k]);
+    }
+    return SADMM_OK;
+}
+
+sadmm_status CPU(update_penalty)(struct sadmm_context *c, double ratio, struct sadmm_error *error)
+{
+    (void)error;
+    for (int32_t i = 0; i < c->bodies; ++i) c->beta[i] *= ratio;
+    c->ratio = ratio;
+    return SADMM_OK;
+}
+
+sadmm_status CPU(read_penalty)(struct sadmm_context *c, double *beta, struct sadmm_error *error)
+{
+    (void)error;
+    memcpy(beta, c->beta, (size_t)c->bodies * sizeof *beta);
+    return SADMM_OK;
+}

@@ -1,0 +1,75 @@
+/* Steps 2-4 of constraints given by Jacobian rows: general contacts, hard and soft blocks. */
+#include <string.h>
+
+#include "../core/math/contact.h"
+#include "cpu.h"
+
+/* Row r of J_a v_a + J_b v_b. */
+static real row_velocity(const struct row_block *block, int r, const real *va, const real *vb)
+{
+    real x = 0;
+    for (int j = 0; j < 6; ++j) x += block->jacobian_a[6 * r + j] * va[j] + block->jacobian_b[6 * r + j] * vb[j];
+    return x;
+}
+
+/* lambda^{l+1} (Step 3), s = 1/beta_a + 1/beta_b. */
+static void update_lambda(const struct row_block *block, const real *va, const real *vb, real s, real out[6])
+{
+    real y[3];
+    for (int r = 0; r < block->rows; ++r) {
+        real x = row_velocity(block, r, va, vb), old = block->lambda[r];
+        if (block->kind == SADMM_BLOCK_SOFT)
+            out[r] = soft_multiplier(block->stiffness[r], block->damping[r], block->error[r], x, s, old);
+        else if (block->kind == SADMM_BLOCK_HARD)
+            out[r] = block->active[r] ? old - (x + block->error[r]) / s : 0;
+        else
+            y[r] = old - (x + block->error[r]) / s;
+    }
+    if (block->kind == SADMM_BLOCK_CONTACT) contact_project_rows(y, block->friction, out);
+}
+
+/* J^T lambda on both sides. */
+static void write_wrenches(const struct sadmm_context *c, real *wrenches, size_t record, const struct row_block *block,
+                           const real lambda[6])
+{
+    real *on_a = wrenches + record * ROW, *on_b = wrenches + (c->record_count + record) * ROW;
+    memset(on_a, 0, ROW * sizeof *on_a);
+    memset(on_b, 0, ROW * sizeof *on_b);
+    for (int r = 0; r < block->rows; ++r)
+        for (int j = 0; j < 6; ++j) {
+            on_a[j] += block->jacobian_a[6 * r + j] * lambda[r];
+            on_b[j] += block->jacobian_b[6 * r + j] * lambda[r];
+        }
+}
+
+static void sweep_row_block(struct sadmm_context *c, size_t k, enum cpu_sweep sweep, double *primal)
+{
+    struct row_block *block = &c->row_blocks[k];
+    size_t record = c->pair_block_count * (size_t)LANES + k;
+    if (sweep == CPU_SWEEP_START) {
+        write_wrenches(c, c->wrenches, record, block, block->lambda);
+        return;
+    }
+    const real *va = &c->state[(size_t)block->body_a * ROW], *vb = &c->state[(size_t)block->body_b * ROW];
+    real lambda[6], delta[6], extrapolated[6];
+    update_lambda(block, va, vb, va[STATE_INV_BETA] + vb[STATE_INV_BETA], lambda);
+    real largest = 0;
+    for (int r = 0; r < block->rows; ++r) {
+        delta[r] = lambda[r] - block->lambda[r];
+        extrapolated[r] = lambda[r] + delta[r];
+        block->lambda[r] = lambda[r];
+        largest = real_max(largest, real_abs(delta[r]));
+    }
+    if (sweep == CPU_SWEEP_ITERATE) {
+        write_wrenches(c, c->wrenches, record, block, extrapolated);
+        return;
+    }
+    write_wrenches(c, c->wrenches, record, block, lambda);
+    write_wrenches(c, c->change, record, block, delta);
+    *primal = fmax(*primal, (double)(largest * real_max(va[STATE_INV_BETA], vb[STATE_INV_BETA])));
+}
+
+void CPU(sweep_row_blocks)(struct sadmm_context *c, size_t begin, size_t end, enum cpu_sweep sweep, double *primal)
+{
+    for (size_t k = begin; k < end; ++k) sweep_row_block(c, k, sweep, primal);
+}

@@ -1,0 +1,90 @@
+/* What the step gives back: v and lambda (double), the moved bodies (Q), the contact wrenches (R, eq. 12). */
+#include <string.h>
+
+#include "../core/system_terms.h"
+#include "cpu.h"
+
+static void read_pair(struct sadmm_context *c, const struct pair_block *block, int l)
+{
+    struct sadmm_contact_set *contacts = c->system->contacts;
+    const struct sadmm_contact_pair *pair = &contacts->pairs[block->pair[l]];
+    for (int k = 0; k < pair->count; ++k) {
+        double *impulse = contacts->points[pair->first + k].impulse;
+        if (c->plan.contact_rows == 3) {
+            const vec *lambda = &((const struct point_slot *)c->slots + block->first + k)->lambda;
+            impulse[0] = (double)lambda->x[l], impulse[1] = (double)lambda->y[l], impulse[2] = (double)lambda->z[l];
+        } else {
+            double normal = (double)((const struct normal_slot *)c->slots + block->first + k)->lambda[l];
+            for (int j = 0; j < 3; ++j) impulse[j] = normal * pair->normal[j];
+        }
+    }
+}
+
+sadmm_status CPU(read_solution)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    (void)error;
+    CPU_PARALLEL
+    {
+        size_t begin, end;
+        cpu_share((size_t)c->bodies, cpu_thread(), cpu_threads(), &begin, &end);
+        for (size_t i = begin; i < end; ++i)
+            for (int k = 0; k < 6; ++k) c->system->velocity[6 * i + (size_t)k] = (double)c->state[i * ROW + (size_t)k];
+        cpu_share(c->pair_block_count, cpu_thread(), cpu_threads(), &begin, &end);
+        for (size_t k = begin; k < end; ++k)
+            for (int l = 0; l < LANES; ++l)
+                if (c->pair_blocks[k].pair[l] >= 0) read_pair(c, &c->pair_blocks[k], l);
+    }
+    for (size_t k = 0; k < c->row_block_count; ++k)
+        for (int r = 0; r < 6; ++r) c->system->block_lambda[6 * k + (size_t)r] = (double)c->row_blocks[k].lambda[r];
+    return SADMM_OK;
+}
+
+sadmm_status CPU(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)
+{
+    (void)error;
+    CPU_PARALLEL
+    {
+        size_t begin, end;
+        cpu_share((size_t)c->bodies, cpu_thread(), cpu_threads(), &begin, &end);
+        for (size_t i = begin; i < end; ++i)
+            sadmm_rigid_advance(&c->system->rigid[i], &c->system->velocity[6 * i], c->settings.dt, &next[i]);
+    }
+    return SADMM_OK;
+}
+
+/* Eq. (12) with lambda = -u: J^T lambda / dt, summed over a body's contacts in their fixed order. */
+static void body_wrench(const struct sadmm_context *c, size_t i, double wrench[6])
+{
+    const struct sadmm_contact_set *contacts = c->system->contacts;
+    size_t pair_records = c->pair_block_count * (size_t)LANES;
+    memset(wrench, 0, 6 * sizeof *wrench);
+    for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) {
+        size_t row = (size_t)c->incident[at];
+        int side = row >= c->record_count;
+        size_t record = side ? row - c->record_count : row;
+        if (record >= pair_records) continue; /* contact wrenches only */
+        const struct sadmm_contact_pair *pair =
+            &contacts->pairs[c->pair_blocks[record / (size_t)LANES].pair[record % (size_t)LANES]];
+        double per_dt = (side ? 1 : -1) / c->settings.dt;
+        for (int k = 0; k < pair->count; ++k) {
+            const struct sadmm_contact_point *point = &contacts->points[pair->first + k];
+            const double *r = side ? point->arm_b : point->arm_a, *f = point->impulse;
+            for (int j = 0; j < 3; ++j) wrench[j] += per_dt * f[j];
+            wrench[3] += per_dt * (r[1] * f[2] - r[2] * f[1]);
+            wrench[4] += per_dt * (r[2] * f[0] - r[0] * f[2]);
+            wrench[5] += per_dt * (r[0] * f[1] - r[1] * f[0]);
+        }
+    }
+}
+
+sadmm_status CPU(recover_wrenches)(struct sadmm_context *c, double *wrench, struct sadmm_error *error)
+{
+    (void)error;
+    CPU_PARALLEL
+    {
+        size_t begin, end;
+        cpu_share((size_t)c->bodies, cpu_thread(), cpu_threads(), &begin, &end);
+        for (size_t i = begin; i < end; ++i) body_wrench(c, i, wrench + 6 * i);
+    }
+    return SADMM_OK;
+}

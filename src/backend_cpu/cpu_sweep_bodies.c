@@ -1,0 +1,112 @@
+/* Step 1 (kernels I-K), eq. (6) in the reduced form: v <- v + (A + beta C)^-1 (b - A v + sum of wrenches). */
+#include "cpu.h"
+
+/* ---- rigid bodies under three-row contacts: LANES at a time ---------------------------------------------------- */
+
+/* Sum of a body's wrench rows, in list order; rows beyond the last body are 0. */
+static inline row8 wrench_sum(const struct sadmm_context *c, size_t i)
+{
+    const row8 *wrenches = (const row8 *)c->wrenches;
+    row8 sum = {0};
+    if (i < (size_t)c->bodies)
+        for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) sum += wrenches[c->incident[at]];
+    return sum;
+}
+
+/* b - A v + sum of wrenches of a block; `state` gets the block's state by number. */
+static inline __attribute__((always_inline)) void block_defect(const struct sadmm_context *c, size_t index,
+                                                               lanes state[ROW], vec *linear, vec *angular)
+{
+    const struct body_block *block = &c->body_blocks[index];
+    const row8 *rows = (const row8 *)c->state + index * (size_t)LANES;
+    size_t first = index * (size_t)LANES;
+    row8 sums[LANES];
+    lanes g[ROW];
+    for (int l = 0; l < LANES; ++l) sums[l] = wrench_sum(c, first + (size_t)l);
+#define STATE_ROW(l) rows[l]
+#define SUM_ROW(l) sums[l]
+    LOAD_ROWS(state, STATE_ROW);
+    LOAD_ROWS(g, SUM_ROW);
+#undef STATE_ROW
+#undef SUM_ROW
+    vec v = {state[0], state[1], state[2]}, w = {state[3], state[4], state[5]};
+    *linear = add(sub(block->b_linear, scale(v, block->mass)), (vec){g[0], g[1], g[2]});
+    *angular = add(sub(block->b_angular, sym3_times(block->inertia, w)), (vec){g[3], g[4], g[5]});
+}
+
+static void update_rigid(struct sadmm_context *c, size_t begin, size_t end)
+{
+    for (size_t index = begin; index < end; ++index) {
+        const struct body_block *block = &c->body_blocks[index];
+        lanes state[ROW];
+        vec linear, angular;
+        block_defect(c, index, state, &linear, &angular);
+        vec dw = sym3_times(block->K_inverse, sub(angular, cross(block->sigma, linear)));
+        vec dv = add(scale(linear, block->inv_alpha), cross(block->sigma, dw));
+        state[0] += dv.x, state[1] += dv.y, state[2] += dv.z;
+        state[3] += dw.x, state[4] += dw.y, state[5] += dw.z;
+        store_rows(c->state + index * (size_t)LANES * ROW, state);
+    }
+}
+
+static double rigid_residual(const struct sadmm_context *c, size_t begin, size_t end)
+{
+    lanes largest = {0};
+    for (size_t index = begin; index < end; ++index) {
+        lanes state[ROW];
+        vec r[2];
+        block_defect(c, index, state, &r[0], &r[1]);
+        for (int part = 0; part < 2; ++part)
+            largest = larger(largest, larger(magnitude(r[part].x), larger(magnitude(r[part].y), magnitude(r[part].z))));
+    }
+    return (double)horizontal_max(largest);
+}
+
+/* ---- any bodies: full 6x6 -------------------------------------------------------------------------------------- */
+
+static inline row8 general_defect(const struct sadmm_context *c, size_t i)
+{
+    const row8 *A = (const row8 *)c->A_columns + 6 * i;
+    row8 v = ((const row8 *)c->state)[i], g = ((const row8 *)c->b)[i] + wrench_sum(c, i);
+    for (int k = 0; k < 6; ++k) g -= A[k] * v[k];
+    return g;
+}
+
+static void update_general(struct sadmm_context *c, size_t begin, size_t end)
+{
+    for (size_t i = begin; i < end; ++i) {
+        const row8 *H = (const row8 *)c->H_columns + 6 * i;
+        row8 g = general_defect(c, i), step = {0};
+        for (int k = 0; k < 6; ++k) step += H[k] * g[k];
+        ((row8 *)c->state)[i] += step; /* number 6 of step is 0: 1/beta stays */
+    }
+}
+
+static double general_residual(const struct sadmm_context *c, size_t begin, size_t end)
+{
+    double largest = 0;
+    for (size_t i = begin; i < end; ++i) {
+        row8 g = general_defect(c, i);
+        for (int k = 0; k < 6; ++k) largest = fmax(largest, fabs((double)g[k]));
+    }
+    return largest;
+}
+
+/* ---- by blocks, so that both forms share the work the same way -------------------------------------------------- */
+
+static size_t first_body(const struct sadmm_context *c, size_t block)
+{
+    size_t body = block * (size_t)LANES;
+    return body < (size_t)c->bodies ? body : (size_t)c->bodies;
+}
+
+void CPU(sweep_bodies)(struct sadmm_context *c, size_t begin, size_t end)
+{
+    if (c->rigid_bodies) update_rigid(c, begin, end);
+    else update_general(c, first_body(c, begin), first_body(c, end));
+}
+
+double CPU(dual_residual)(const struct sadmm_context *c, size_t begin, size_t end)
+{
+    return c->rigid_bodies ? rigid_residual(c, begin, end) : general_residual(c, first_body(c, begin), first_body(c, end));
+}

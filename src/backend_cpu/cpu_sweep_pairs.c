@@ -1,0 +1,138 @@
+/* Steps 2-4 (kernels L-N) of geometric contacts, LANES pairs at a time. Written once, specialised at compile time by the
+ * number of contact rows and by what the sweep is for. */
+#include "cpu.h"
+
+/* What a pair adds up over its points: force and torque about a, of lambda-like vectors. */
+struct pair_sum {
+    vec force, torque;
+};
+
+static inline void add_to(struct pair_sum *sum, vec arm, vec impulse)
+{
+    sum->force = add(sum->force, impulse);
+    sum->torque = add(sum->torque, cross(arm, impulse));
+}
+
+static inline void write_wrenches(const struct sadmm_context *c, real *wrenches, size_t block, const struct pair_sum *sum,
+                                  vec d)
+{
+    vec f = sum->force, ta = sum->torque, tb = add(ta, cross(d, f));
+    size_t record = block * (size_t)LANES;
+    const lanes zero = {0};
+    const lanes on_a[ROW] = {-f.x, -f.y, -f.z, -ta.x, -ta.y, -ta.z, zero, zero};
+    const lanes on_b[ROW] = {f.x, f.y, f.z, tb.x, tb.y, tb.z, zero, zero};
+    store_rows(wrenches + record * ROW, on_a);
+    store_rows(wrenches + (c->record_count + record) * ROW, on_b);
+}
+
+/* Largest |d lambda| over the rows of the contact frame (math/vec3.h, v3_tangents). */
+static inline lanes frame_max(vec change, vec n)
+{
+    lanes sign = pick(n.z < 0, fill(-1), fill(1)), a = -1 / (sign + n.z), b = n.x * n.y * a;
+    vec t1 = {1 + sign * n.x * n.x * a, sign * b, -sign * n.x}, t2 = {b, sign + n.y * n.y * a, -n.y};
+    return larger(magnitude(dot(change, n)), larger(magnitude(dot(change, t1)), magnitude(dot(change, t2))));
+}
+
+static inline lanes larger_inv_beta(const struct sadmm_context *c, const struct pair_block *block)
+{
+    lanes out;
+    for (int l = 0; l < LANES; ++l)
+        out[l] = real_max(c->state[(size_t)block->body_a[l] * ROW + STATE_INV_BETA],
+                          c->state[(size_t)block->body_b[l] * ROW + STATE_INV_BETA]);
+    return out;
+}
+
+/* Relative motion of the pair: u = v_b - v_a + w_b x d, w = w_b - w_a. */
+static inline void pair_motion(const struct sadmm_context *c, const struct pair_block *block, vec *u, vec *w)
+{
+    const row8 *state = (const row8 *)c->state;
+    lanes a[ROW], b[ROW];
+#define ROW_A(l) state[block->body_a[l]]
+#define ROW_B(l) state[block->body_b[l]]
+    LOAD_ROWS(a, ROW_A);
+    LOAD_ROWS(b, ROW_B);
+#undef ROW_A
+#undef ROW_B
+    vec wb = {b[3], b[4], b[5]}, turn = cross(wb, block->d);
+    *u = (vec){b[0] - a[0] + turn.x, b[1] - a[1] + turn.y, b[2] - a[2] + turn.z};
+    *w = (vec){b[3] - a[3], b[4] - a[4], b[5] - a[5]};
+}
+
+static inline __attribute__((always_inline)) void sweep_block(struct sadmm_context *c, size_t index, int rows,
+                                                              enum cpu_sweep sweep, double *primal)
+{
+    const struct pair_block *block = &c->pair_blocks[index];
+    vec n = block->normal, u = {0}, w = {0};
+    lanes mu = block->friction, inv_s = block->inv_s, change_max = {0};
+    const lanes zero = {0};
+    struct pair_sum next = {0}, change = {0};
+
+    if (sweep != CPU_SWEEP_START) pair_motion(c, block, &u, &w);
+    if (rows == 3) {
+        struct point_slot *slot = (struct point_slot *)c->slots + block->first;
+        for (int k = 0; k < block->slots; ++k, ++slot) {
+            vec arm = slot->arm, old = slot->lambda;
+            if (sweep == CPU_SWEEP_START) {
+                add_to(&next, arm, old);
+                continue;
+            }
+            vec x = add(u, cross(w, arm)), e = scale(n, slot->error);
+            vec y = sub(old, scale(add(x, e), inv_s));
+            /* The strict projection (math/contact.h, contact_project). */
+            lanes yn = dot(n, y), normal = pick(yn > 0, yn, zero), limit = mu * normal;
+            vec t = sub(y, scale(n, yn));
+            lanes t2 = dot(t, t), shrink = pick(t2 > limit * limit, limit / root(t2), fill(1));
+            vec lambda = add(scale(n, normal), scale(t, shrink));
+            vec delta = sub(lambda, old);
+            slot->lambda = lambda;
+            if (sweep == CPU_SWEEP_MEASURE) {
+                add_to(&next, arm, lambda);
+                add_to(&change, arm, delta);
+                change_max = larger(change_max, frame_max(delta, n));
+            } else {
+                add_to(&next, arm, add(lambda, delta));
+            }
+        }
+    } else {
+        struct normal_slot *slot = (struct normal_slot *)c->slots + block->first;
+        for (int k = 0; k < block->slots; ++k, ++slot) {
+            vec arm = slot->arm;
+            lanes old = slot->lambda;
+            if (sweep == CPU_SWEEP_START) {
+                add_to(&next, arm, scale(n, old));
+                continue;
+            }
+            lanes y = old - (dot(n, add(u, cross(w, arm))) + slot->error) * inv_s;
+            lanes lambda = pick(y > 0, y, zero), delta = lambda - old;
+            slot->lambda = lambda;
+            if (sweep == CPU_SWEEP_MEASURE) {
+                add_to(&next, arm, scale(n, lambda));
+                add_to(&change, arm, scale(n, delta));
+                change_max = larger(change_max, magnitude(delta));
+            } else {
+                add_to(&next, arm, scale(n, lambda + delta));
+            }
+        }
+    }
+    write_wrenches(c, c->wrenches, index, &next, block->d);
+    if (sweep == CPU_SWEEP_MEASURE) {
+        write_wrenches(c, c->change, index, &change, block->d);
+        *primal = fmax(*primal, (double)horizontal_max(change_max * larger_inv_beta(c, block)));
+    }
+}
+
+void CPU(sweep_pairs)(struct sadmm_context *c, size_t begin, size_t end, enum cpu_sweep sweep, double *primal)
+{
+#define SWEEP(rows, kind) \
+    for (size_t k = begin; k < end; ++k) sweep_block(c, k, rows, kind, primal)
+    if (c->plan.contact_rows == 3) {
+        if (sweep == CPU_SWEEP_ITERATE) SWEEP(3, CPU_SWEEP_ITERATE);
+        else if (sweep == CPU_SWEEP_MEASURE) SWEEP(3, CPU_SWEEP_MEASURE);
+        else SWEEP(3, CPU_SWEEP_START);
+    } else {
+        if (sweep == CPU_SWEEP_ITERATE) SWEEP(1, CPU_SWEEP_ITERATE);
+        else if (sweep == CPU_SWEEP_MEASURE) SWEEP(1, CPU_SWEEP_MEASURE);
+        else SWEEP(1, CPU_SWEEP_START);
+    }
+#undef SWEEP
+}

@@ -1,0 +1,53 @@
+#include "../collision/collision.h"
+#include "../core/memory.h"
+#include "cpu.h"
+
+
+sadmm_status CPU(create)(int device, struct sadmm_context **out, struct sadmm_error *error)
+{
+    (void)device;
+    *out = (struct sadmm_context *)sadmm_alloc(1, sizeof **out);
+    return *out ? SADMM_OK : sadmm_fail_memory(error, "the cpu backend's context");
+}
+
+void CPU(destroy)(struct sadmm_context *c)
+{
+    if (!c) return;
+    void *blocks[] = {c->state, c->A, c->C, c->beta, c->body_blocks, c->b, c->A_columns, c->H_columns, c->pair_blocks, c->slots,
+                      c->pair_order, c->row_blocks, c->wrenches, c->change, c->offsets, c->incident, c->thread_max};
+    for (size_t i = 0; i < sizeof blocks / sizeof *blocks; ++i) sadmm_free(blocks[i]);
+    sadmm_free(c);
+}
+
+static sadmm_status find_contacts(struct sadmm_context *context, struct sadmm_collision *collision,
+                                  const struct sadmm_collision_input *input, struct sadmm_contact_set *contacts,
+                                  struct sadmm_error *error)
+{
+    (void)context;
+    return sadmm_collision_find(collision, input, contacts, error);
+}
+
+const struct sadmm_kernels CPU(kernels) = {
+    .backend = SADMM_BACKEND_CPU,
+    .precision = sizeof(real) == 4 ? SADMM_F32 : SADMM_F64,
+    .variant = SADMM_ISA,
+    .create = CPU(create),
+    .destroy = CPU(destroy),
+    .find_contacts = find_contacts,
+    .begin = CPU(begin),
+    .assemble_bodies = CPU(assemble_bodies),
+    .assemble_contacts = CPU(assemble_contacts),
+    .assemble_joints = CPU(assemble_joints),
+    .assemble_springs = CPU(assemble_springs),
+    .init_penalty = CPU(init_penalty),
+    .factorize = CPU(factorize),
+    .update_velocity = CPU(update_velocity),
+    .update_constraints = CPU(update_constraints),
+    .iterate = CPU(iterate),
+    .measure_residuals = CPU(measure_residuals),
+    .update_penalty = CPU(update_penalty),
+    .read_solution = CPU(read_solution),
+    .read_penalty = CPU(read_penalty),
+    .integrate = CPU(integrate),
+    .recover_wrenches = CPU(recover_wrenches),
+};

@@ -1,0 +1,144 @@
+/* The kernel table of the literal backend, its context, and what surrounds the iteration. */
+#include <string.h>
+
+#include "../collision/collision.h"
+#include "../core/backends.h"
+#include "../core/memory.h"
+#include "../core/system_math.h"
+#include "literal.h"
+
+static sadmm_status create(int device, struct sadmm_context **out, struct sadmm_error *error)
+{
+    (void)device;
+    *out = sadmm_alloc(1, sizeof **out);
+    return *out ? SADMM_OK : sadmm_fail_memory(error, "the literal backend");
+}
+
+static void destroy(struct sadmm_context *c)
+{
+    if (!c) return;
+    sadmm_free(c->bodies);
+    sadmm_free(c->constraints);
+    sadmm_free(c);
+}
+
+static sadmm_status find_contacts(struct sadmm_context *c, struct sadmm_collision *collision,
+                                  const struct sadmm_collision_input *input, struct sadmm_contact_set *contacts,
+                                  struct sadmm_error *error)
+{
+    (void)c;
+    return sadmm_collision_find(collision, input, contacts, error);
+}
+
+static sadmm_status begin(struct sadmm_context *c, const struct sadmm_system *system, const struct sadmm_plan *plan,
+                          const struct sadmm_settings *settings, struct sadmm_error *error)
+{
+    size_t bodies = (size_t)system->body_count;
+    size_t constraints = system->contacts->point_count + (size_t)system->block_count;
+    if (!sadmm_grow((void **)&c->bodies, &c->body_capacity, 0, bodies, sizeof *c->bodies) ||
+        !sadmm_grow((void **)&c->constraints, &c->constraint_capacity, 0, constraints, sizeof *c->constraints))
+        return sadmm_fail_memory(error, "the literal backend");
+    c->system = system;
+    c->plan = plan;
+    c->settings = settings;
+    c->constraint_count = constraints;
+    return SADMM_OK;
+}
+
+static sadmm_status read_solution(struct sadmm_context *c, struct sadmm_error *error)
+{
+    (void)error;
+    const struct sadmm_system *system = c->system;
+    for (int32_t i = 0; i < system->body_count; ++i)
+        memcpy(system->velocity + 6 * (size_t)i, c->bodies[i].v, sizeof c->bodies[i].v);
+
+    for (size_t p = 0; p < system->contacts->pair_count; ++p) {
+        const struct sadmm_contact_pair *pair = &system->contacts->pairs[p];
+        mat3 frame = sadmm_contact_frame(pair->normal);
+        for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
+            const double *lambda = c->constraints[k].lambda; /* rows that do not exist are 0 */
+            v3_store(m3_tmul(frame, v3_load(lambda)), system->contacts->points[k].impulse);
+        }
+    }
+    for (int32_t k = 0; k < system->block_count; ++k)
+        memcpy(system->block_lambda + 6 * (size_t)k, c->constraints[system->contacts->point_count + (size_t)k].lambda,
+               6 * sizeof(double));
+    return SADMM_OK;
+}
+
+static sadmm_status read_penalty(struct sadmm_context *c, double *beta, struct sadmm_error *error)
+{
+    (void)error;
+    for (int32_t i = 0; i < c->system->body_count; ++i) beta[i] = c->bodies[i].beta;
+    return SADMM_OK;
+}
+
+/* Q: semi-implicit Euler with the primal iterate v. */
+static sadmm_status integrate(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)
+{
+    double dt = c->settings->dt;
+    if (!c->system->rigid)
+        return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "integrate: the system gives A and b, not rigid bodies");
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        const double *v = c->bodies[i].v;
+        struct sadmm_rigid body = c->system->rigid[i];
+        v3_store(rigid_move(v3_load(body.position), v3_load(v), dt), body.position);
+        q_store(rigid_turn(q_load(body.orientation), v3_load(v + 3), dt), body.orientation);
+        memcpy(body.velocity, v, sizeof body.velocity);
+        next[i] = body;
+    }
+    return SADMM_OK;
+}
+
+/* R, (12): F_i = - sum over the contacts given by geometry (the world's) of J_{i,k}^T u_{i,k} / dt. */
+static sadmm_status recover_wrenches(struct sadmm_context *c, double *wrench, struct sadmm_error *error)
+{
+    (void)error;
+    memset(wrench, 0, 6 * (size_t)c->system->body_count * sizeof *wrench);
+    for (size_t k = 0; k < c->system->contacts->point_count; ++k) {
+        const struct ref_constraint *constraint = &c->constraints[k];
+        for (int s = 0; s < 2; ++s) {
+            const struct ref_side *side = &constraint->side[s];
+            if (side->body < 0) continue;
+            double *F = wrench + 6 * (size_t)side->body;
+            for (int r = 0; r < constraint->rows; ++r)
+                for (int j = 0; j < 6; ++j) F[j] -= side->J[6 * r + j] * side->u[r] / c->settings->dt;
+        }
+    }
+    return SADMM_OK;
+}
+
+static const struct sadmm_kernels kernels_ref = {
+    .backend = SADMM_BACKEND_REF,
+    .precision = SADMM_F64,
+    .variant = "literal",
+    .create = create,
+    .destroy = destroy,
+    .find_contacts = find_contacts,
+    .begin = begin,
+    .assemble_bodies = sadmm_ref_assemble_bodies,
+    .assemble_contacts = sadmm_ref_assemble_contacts,
+    .assemble_joints = sadmm_ref_assemble_joints,
+    .assemble_springs = sadmm_ref_assemble_springs,
+    .init_penalty = sadmm_ref_init_penalty,
+    .factorize = sadmm_ref_factorize,
+    .update_velocity = sadmm_ref_update_velocity,
+    .update_constraints = sadmm_ref_update_constraints,
+    .iterate = NULL, /* core composes it */
+    .measure_residuals = sadmm_ref_measure_residuals,
+    .update_penalty = sadmm_ref_update_penalty,
+    .read_solution = read_solution,
+    .read_penalty = read_penalty,
+    .integrate = integrate,
+    .recover_wrenches = recover_wrenches,
+};
+
+const struct sadmm_kernels *sadmm_ref_find(sadmm_precision precision, const char **reason)
+{
+    if (precision != SADMM_F64) {
+        *reason = "the literal form is the oracle and exists in double precision only";
+        return NULL;
+    }
+    *reason = "runs on any CPU, one thread";
+    return &kernels_ref;
+}

@@ -1,0 +1,69 @@
+/* The paper's SubADMM written down literally: Steps 1-4 with x, z and u for every constraint and both of its sides.
+ *
+ * This is the oracle the fast backends are compared with, so it takes nothing from them: every constraint is a dense
+ * (rows x 6) Jacobian a side (a geometric contact becomes rows n, t1, t2, or n alone when no contact has friction),
+ * every body a dense 6x6 system, all loops are plain, all numbers double. It is never meant to be fast.
+ *
+ * Units are the library's: J is not scaled by dt, x is a velocity, e = error/dt, lambda an impulse, beta in kg. The
+ * paper's c (kg/s^2) enters (13) as c dt^2. The static world is a side with 1/beta = 0: x, z and u stay 0 there.
+ *
+ * Start: z = J v0 and u = -lambda0, the state in which an earlier iteration would have left (v0, lambda0).
+ */
+#ifndef SADMM_BACKEND_REF_LITERAL_H
+#define SADMM_BACKEND_REF_LITERAL_H
+
+#include "../core/kernels.h"
+
+/* One side of a constraint: the paper's subscript (i,k) or (j,k). */
+struct ref_side {
+    int32_t body;                    /* -1: static */
+    double J[36];                    /* (rows x 6) row-major */
+    double x[6], z[6], u[6];         /* at l+1, once Steps 2-4 ran */
+    double z_before[6];              /* z at l, for (17) */
+};
+
+struct ref_constraint {
+    sadmm_block_kind kind;
+    int rows;
+    struct ref_side side[2];
+    double e[6];
+    double mu;                       /* contact */
+    double k[6], c[6];               /* soft: (3) */
+    bool free_row[6];                /* hard: zero on both bodies (Sec. III-C), carries nothing */
+    double lambda[6];
+};
+
+struct ref_body {
+    double A[36], b[6];              /* (1) */
+    double C[36];                    /* (14) */
+    double beta;                     /* (13), (15), kg */
+    double factor[36];               /* Cholesky of A + beta C */
+    double v[6];
+    double dual[6];                  /* (17), this body's part */
+};
+
+struct sadmm_context {
+    const struct sadmm_system *system;
+    const struct sadmm_plan *plan;
+    const struct sadmm_settings *settings;
+    struct ref_body *bodies;
+    size_t body_capacity;
+    struct ref_constraint *constraints; /* contact points in order, then blocks in order */
+    size_t constraint_capacity, constraint_count;
+};
+
+/* assemble.c */
+sadmm_status sadmm_ref_assemble_bodies(struct sadmm_context *, struct sadmm_error *);
+sadmm_status sadmm_ref_assemble_contacts(struct sadmm_context *, struct sadmm_error *);
+sadmm_status sadmm_ref_assemble_joints(struct sadmm_context *, struct sadmm_error *);
+sadmm_status sadmm_ref_assemble_springs(struct sadmm_context *, struct sadmm_error *);
+
+/* iterate.c */
+sadmm_status sadmm_ref_init_penalty(struct sadmm_context *, struct sadmm_error *);
+sadmm_status sadmm_ref_factorize(struct sadmm_context *, struct sadmm_error *);
+sadmm_status sadmm_ref_update_velocity(struct sadmm_context *, struct sadmm_error *);
+sadmm_status sadmm_ref_update_constraints(struct sadmm_context *, bool measure, struct sadmm_error *);
+sadmm_status sadmm_ref_measure_residuals(struct sadmm_context *, struct sadmm_residual *, struct sadmm_error *);
+sadmm_status sadmm_ref_update_penalty(struct sadmm_context *, double ratio, struct sadmm_error *);
+
+#endif

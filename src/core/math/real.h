@@ -1,0 +1,33 @@
+/* The scalar of the formulas. A source that includes src/core/math is compiled once per precision with
+ * -DSADMM_REAL=float or double; everything here is static inline, so the two never meet at link time.
+ * nvcc compiles the same functions for the device. */
+#ifndef SADMM_MATH_REAL_H
+#define SADMM_MATH_REAL_H
+
+#include <float.h>
+#include <math.h>
+#include <stdint.h>
+
+#ifndef SADMM_REAL
+#define SADMM_REAL double
+#define SADMM_REAL_IS_DOUBLE 1
+#endif
+
+typedef SADMM_REAL real;
+
+#ifdef __CUDACC__
+#define SADMM_INLINE static inline __host__ __device__
+#else
+#define SADMM_INLINE static inline
+#endif
+
+/* sizeof folds at compile time: one source serves both precisions without the preprocessor knowing the type. */
+#define SADMM_EPSILON ((real)(sizeof(real) == 4 ? (double)FLT_EPSILON : DBL_EPSILON))
+
+SADMM_INLINE real real_sqrt(real x) { return sizeof(real) == 4 ? (real)sqrtf((float)x) : (real)sqrt((double)x); }
+SADMM_INLINE real real_abs(real x) { return x < 0 ? -x : x; }
+SADMM_INLINE real real_min(real a, real b) { return a < b ? a : b; }
+SADMM_INLINE real real_max(real a, real b) { return a > b ? a : b; }
+SADMM_INLINE real real_clamp(real x, real lo, real hi) { return x < lo ? lo : (x > hi ? hi : x); }
+
+#endif

@@ -1,0 +1,58 @@
+#include "memory.h"
+
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+static _Thread_local long allocations_left = -1;
+
+void sadmm_test_fail_allocations_after(long successes)
+{
+    allocations_left = successes;
+}
+
+bool sadmm_test_allocation_fails(void)
+{
+    if (allocations_left < 0) return false;
+    if (allocations_left == 0) return true;
+    --allocations_left;
+    return false;
+}
+
+enum { ALIGNMENT = 64 };
+
+static void *allocate(size_t count, size_t size)
+{
+    if (size && count > (SIZE_MAX / 2 - ALIGNMENT) / size) return NULL;
+    if (sadmm_test_allocation_fails()) return NULL;
+    size_t bytes = (count * size + ALIGNMENT) / ALIGNMENT * ALIGNMENT;
+    return aligned_alloc(ALIGNMENT, bytes);
+}
+
+void *sadmm_alloc(size_t count, size_t size)
+{
+    void *block = allocate(count, size);
+    if (block) memset(block, 0, count * size);
+    return block;
+}
+
+void sadmm_free(void *block)
+{
+    free(block);
+}
+
+bool sadmm_grow(void **array, size_t *capacity, size_t used, size_t needed, size_t size)
+{
+    if (needed <= *capacity) return true;
+    size_t wanted = *capacity + *capacity / 2;
+    if (wanted < needed) wanted = needed;
+    if (wanted < 16) wanted = 16;
+    char *block = (char *)allocate(wanted, size);
+    if (!block) return false;
+    if (used) memcpy(block, *array, used * size);
+    memset(block + used * size, 0, (wanted - used) * size);
+    free(*array);
+    *array = block;
+    *capacity = wanted;
+    return true;
+}

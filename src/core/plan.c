@@ -1,0 +1,46 @@
+#include "plan.h"
+
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+#include "math/rigid.h"
+
+static int resolve_threads(int wanted)
+{
+#ifdef _OPENMP
+    return wanted > 0 ? wanted : omp_get_max_threads();
+#else
+    (void)wanted;
+    return 1;
+#endif
+}
+
+struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struct sadmm_settings *settings)
+{
+    struct sadmm_plan plan = {0};
+    plan.bodies = system->body_count;
+    plan.pairs = (int32_t)system->contacts->pair_count;
+    plan.points = (int32_t)system->contacts->point_count;
+    if (plan.points > 0) {
+        plan.contact_rows = 1;
+        for (size_t p = 0; p < system->contacts->pair_count && plan.contact_rows == 1; ++p)
+            if (system->contacts->pairs[p].friction > 0) plan.contact_rows = 3;
+    }
+    for (int32_t k = 0; k < system->block_count; ++k) ++plan.blocks[system->blocks[k].kind];
+    plan.rigid = system->rigid != NULL;
+    for (int32_t i = 0; plan.rigid && !plan.gyroscopic && i < system->body_count; ++i) {
+        const double *inertia = system->rigid[i].inertia;
+        plan.gyroscopic = !rigid_is_isotropic(v3_load(inertia));
+    }
+    bool constrained = plan.points > 0 || system->block_count > 0;
+    plan.warm_start = settings->warm_start;
+    plan.penalty_updates = constrained && settings->penalty_period > 0 && settings->penalty_ratio_limit > 1 &&
+                           settings->iterations > settings->penalty_period;
+    plan.certificate = settings->certify || settings->certificate_tolerance > 0;
+    plan.residuals = constrained && (plan.penalty_updates || settings->measure_residuals ||
+                                     settings->residual_tolerance > 0);
+    plan.wrenches = settings->recover_wrenches;
+    plan.threads = resolve_threads(settings->threads);
+    return plan;
+}

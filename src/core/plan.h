@@ -1,0 +1,27 @@
+/* The plan: what this step needs, found once from what the scene contains. Backends specialise on it. */
+#ifndef SADMM_CORE_PLAN_H
+#define SADMM_CORE_PLAN_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "system.h"
+
+struct sadmm_plan {
+    int32_t bodies;         /* dynamic */
+    int32_t pairs, points;  /* contacts given by geometry */
+    int32_t blocks[3];      /* constraints given by Jacobians, by sadmm_block_kind */
+    int contact_rows;       /* rows of a geometric contact: 0 no contact, 1 every mu is 0, 3 otherwise */
+    bool rigid;             /* A is (m I, world inertia) */
+    bool gyroscopic;        /* some body has unequal principal moments (world level) */
+    bool warm_start;
+    bool penalty_updates;   /* eq. (15) will run at least once */
+    bool residuals;         /* some iteration is measured */
+    bool wrenches;          /* eq. (12) a body */
+    bool certificate;
+    int threads;            /* resolved, >= 1 */
+};
+
+struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struct sadmm_settings *settings);
+
+#endif

@@ -1,0 +1,93 @@
+#include "registry.h"
+
+#include <stdio.h>
+
+#include "backends.h"
+#include "config.h"
+
+/* The one list: a backend is registered by adding its line here (backends.h declares the functions). */
+static const struct {
+    const char *name;
+    const struct sadmm_kernels *(*find)(sadmm_precision precision, const char **reason);
+} backends[SADMM_BACKEND_COUNT] = {
+    [SADMM_BACKEND_REF] = {"ref", sadmm_ref_find},
+    [SADMM_BACKEND_CPU] = {"cpu", sadmm_cpu_find},
+    [SADMM_BACKEND_CUDA] = {"cuda", sadmm_cuda_find},
+};
+
+const struct sadmm_kernels *sadmm_kernels_find(sadmm_backend backend, sadmm_precision precision, const char **reason)
+{
+    static const char *no_reason;
+    if ((unsigned)backend >= SADMM_BACKEND_COUNT || !backends[backend].find || (unsigned)precision > SADMM_F64) {
+        if (reason) *reason = "no such backend or precision";
+        return NULL;
+    }
+    return backends[backend].find(precision, reason ? reason : &no_reason);
+}
+
+const struct sadmm_kernels *sadmm_kernels_at(size_t index)
+{
+    for (int backend = SADMM_BACKEND_REF; backend < SADMM_BACKEND_COUNT; ++backend)
+        for (int precision = SADMM_F32; precision <= SADMM_F64; ++precision) {
+            const struct sadmm_kernels *found = sadmm_kernels_find((sadmm_backend)backend, (sadmm_precision)precision, NULL);
+            if (found && index-- == 0) return found;
+        }
+    return NULL;
+}
+
+sadmm_status sadmm_backend_query(sadmm_backend backend, sadmm_backend_info *info)
+{
+    if (!info) return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "info is NULL");
+    if (backend < SADMM_BACKEND_REF || backend >= SADMM_BACKEND_COUNT)
+        return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "backend = %d: must be in [%d, %d]", (int)backend,
+                          SADMM_BACKEND_REF, SADMM_BACKEND_COUNT - 1);
+    info->backend = backend;
+    info->name = backends[backend].name;
+    /* An unavailable precision explains itself; else the f32 line says what it runs on. */
+    const char *reasons[2] = {"", ""};
+    for (int precision = SADMM_F32; precision <= SADMM_F64; ++precision)
+        info->available[precision] = sadmm_kernels_find(backend, (sadmm_precision)precision, &reasons[precision]) != NULL;
+    info->reason = reasons[info->available[SADMM_F32] ? SADMM_F64 : SADMM_F32];
+    return SADMM_OK;
+}
+
+/* Below this many contacts the launches of a GPU step cost more than the same iterations on cores. */
+enum { AUTO_CUDA_CONTACTS = 2000 };
+
+sadmm_status sadmm_backend_choose(sadmm_backend wanted, sadmm_precision precision, int64_t expected_contacts,
+                                  const struct sadmm_kernels **out, char *why, size_t why_size,
+                                  struct sadmm_error *error)
+{
+    const char *reason = "";
+    if ((unsigned)precision > SADMM_F64)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "precision = %d: must be SADMM_F32 (0) or SADMM_F64 (1)",
+                          (int)precision);
+    if ((unsigned)wanted >= SADMM_BACKEND_COUNT)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "backend = %d: must be in [0, %d]", (int)wanted,
+                          SADMM_BACKEND_COUNT - 1);
+    if (wanted != SADMM_BACKEND_AUTO) {
+        *out = sadmm_kernels_find(wanted, precision, &reason);
+        if (!*out)
+            return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE, "backend %s in %s is not available: %s",
+                              backends[wanted].name, precision == SADMM_F32 ? "f32" : "f64", reason);
+        if (why) snprintf(why, why_size, "%s (%s), as asked", backends[wanted].name, (*out)->variant);
+        return SADMM_OK;
+    }
+    const struct sadmm_kernels *cuda = sadmm_kernels_find(SADMM_BACKEND_CUDA, precision, &reason);
+    if (cuda && expected_contacts >= AUTO_CUDA_CONTACTS) {
+        *out = cuda;
+        if (why) snprintf(why, why_size, "cuda: a device is present and the scene is large (%lld contacts expected)",
+                          (long long)expected_contacts);
+        return SADMM_OK;
+    }
+    *out = sadmm_kernels_find(SADMM_BACKEND_CPU, precision, NULL);
+    if (!*out) return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE, "no backend is available");
+    if (why) {
+        if (cuda)
+            snprintf(why, why_size, "cpu (%s): too few contacts for the GPU to pay (%lld expected, %d needed)",
+                     (*out)->variant, (long long)expected_contacts, AUTO_CUDA_CONTACTS);
+        else
+            snprintf(why, why_size, "cpu (%s): cuda is not available (%s)", (*out)->variant, reason);
+    }
+    return SADMM_OK;
+}

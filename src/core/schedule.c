@@ -1,0 +1,170 @@
+/* A solve, from the raw system to (v, lambda): the paper's Fig. 4 without collision detection and integration.
+ *
+ *     begin            room for this step (the only allocation)
+ *     assemble         A bodies, B contacts, C/D hard and soft blocks (classes the plan lacks are not called)
+ *     E-H              C_i, beta_i, factor of A_i + beta_i C_i
+ *     I-P              iterations in stretches: a stretch ends where someone has to look (penalty update, stop rule, end)
+ *     read_solution
+ */
+#include "schedule.h"
+
+#include <math.h>
+#include <string.h>
+#include <time.h>
+
+#include "certificate.h"
+
+double sadmm_clock_ms(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return 1e3 * (double)now.tv_sec + 1e-6 * (double)now.tv_nsec;
+}
+
+#define TRY(call)                                 \
+    do {                                          \
+        sadmm_status try_status = (call);         \
+        if (try_status != SADMM_OK) return try_status; \
+    } while (0)
+
+static sadmm_status assemble(const struct sadmm_kernels *k, struct sadmm_context *c, const struct sadmm_plan *plan,
+                             struct sadmm_error *error)
+{
+    TRY(k->assemble_bodies(c, error));
+    if (plan->points || plan->blocks[SADMM_BLOCK_CONTACT]) TRY(k->assemble_contacts(c, error));
+    if (plan->blocks[SADMM_BLOCK_HARD]) TRY(k->assemble_joints(c, error));
+    if (plan->blocks[SADMM_BLOCK_SOFT]) TRY(k->assemble_springs(c, error));
+    TRY(k->init_penalty(c, error));
+    return k->factorize(c, error);
+}
+
+static sadmm_status iterate(const struct sadmm_kernels *k, struct sadmm_context *c, int count, bool measure,
+                            struct sadmm_error *error)
+{
+    if (k->iterate) return k->iterate(c, count, measure, error);
+    for (int i = 0; i < count; ++i) {
+        TRY(k->update_velocity(c, error));
+        TRY(k->update_constraints(c, measure && i + 1 == count, error));
+    }
+    return SADMM_OK;
+}
+
+/* Iterations until the next multiple of `period` (0: none) after `done`, at most `limit`. */
+static int until(int done, int period, int limit)
+{
+    if (period <= 0) return limit;
+    int left = period - done % period;
+    return left < limit ? left : limit;
+}
+
+/* Eq. (15). A residual of zero on both sides says nothing about the balance: leave the penalty alone. */
+static double penalty_ratio(struct sadmm_residual r, double limit)
+{
+    if (r.primal <= 0 && r.dual <= 0) return 1;
+    double ratio = r.primal / fmax(r.dual, 1e-300);
+    return fmin(fmax(ratio, 1 / limit), limit);
+}
+
+static bool finite_array(const double *x, size_t count)
+{
+    double sum = 0; /* NaN and infinity survive a sum of x - x */
+    for (size_t i = 0; i < count; ++i) sum += x[i] - x[i];
+    return sum == 0;
+}
+
+static bool finite_impulses(const struct sadmm_contact_set *contacts)
+{
+    double sum = 0;
+    for (size_t k = 0; k < contacts->point_count; ++k) {
+        const double *impulse = contacts->points[k].impulse;
+        sum += (impulse[0] - impulse[0]) + (impulse[1] - impulse[1]) + (impulse[2] - impulse[2]);
+    }
+    return sum == 0;
+}
+
+static sadmm_status certificate_met(const struct sadmm_kernels *k, struct sadmm_context *c, struct sadmm_system *system,
+                                    const struct sadmm_settings *s, struct sadmm_solve_report *report, bool *met,
+                                    struct sadmm_error *error)
+{
+    TRY(k->read_solution(c, error));
+    TRY(sadmm_certify(system, s, &report->certificate, error));
+    *met = report->certificate.ncp_max <= s->certificate_tolerance &&
+           report->certificate.momentum_max <= s->certificate_momentum_tolerance;
+    return SADMM_OK;
+}
+
+static sadmm_status run(const struct sadmm_kernels *k, struct sadmm_context *c, struct sadmm_system *system,
+                        const struct sadmm_settings *s, const struct sadmm_plan *plan,
+                        struct sadmm_solve_report *report, struct sadmm_error *error)
+{
+    bool constrained = plan->points || system->block_count;
+    bool stop_rule = constrained && (s->residual_tolerance > 0 || s->certificate_tolerance > 0);
+    /* Without constraints Step 1 is exact at once: v = A^-1 b. */
+    int budget = constrained ? s->iterations : 1;
+    int done = 0;
+    while (done < budget) {
+        int count = budget - done;
+        if (plan->penalty_updates) count = until(done, s->penalty_period, count);
+        if (stop_rule) count = until(done, s->check_period, count);
+        bool last = done + count == budget;
+        bool update = plan->penalty_updates && !last && (done + count) % s->penalty_period == 0;
+        bool look = stop_rule && (last || (done + count) % s->check_period == 0);
+        bool measure = plan->residuals && (update || (last && s->measure_residuals) || (look && s->residual_tolerance > 0));
+        TRY(iterate(k, c, count, measure, error));
+        done += count;
+        report->iterations = done;
+        if (measure) TRY(k->measure_residuals(c, &report->residual, error));
+        if (look) {
+            bool met = true;
+            if (s->residual_tolerance > 0)
+                met = report->residual.primal <= s->residual_tolerance && report->residual.dual <= s->residual_tolerance;
+            if (met && s->certificate_tolerance > 0)
+                TRY(certificate_met(k, c, system, s, report, &met, error));
+            if (met) {
+                report->converged = true;
+                return SADMM_OK;
+            }
+        }
+        if (update) {
+            double ratio = penalty_ratio(report->residual, s->penalty_ratio_limit);
+            if (ratio != 1) {
+                TRY(k->update_penalty(c, ratio, error));
+                TRY(k->factorize(c, error));
+            }
+        }
+    }
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_schedule_solve(const struct sadmm_kernels *kernels, struct sadmm_context *context,
+                                  struct sadmm_system *system, const struct sadmm_settings *settings,
+                                  const struct sadmm_plan *plan, struct sadmm_solve_report *report,
+                                  struct sadmm_phase_times *ms, struct sadmm_error *error)
+{
+    double start = sadmm_clock_ms();
+    report->backend = kernels->backend;
+    report->precision = kernels->precision;
+    report->iterations = 0;
+    report->converged = false;
+    report->residual.primal = report->residual.dual = -1;
+    report->certificate.ncp_max = report->certificate.ncp_mean = -1;
+    report->certificate.momentum_max = report->certificate.siconos = -1;
+    report->certificate.ncp_worst = report->certificate.momentum_worst = -1;
+    report->threads = kernels->backend == SADMM_BACKEND_REF ? 1 : plan->threads;
+
+    TRY(kernels->begin(context, system, plan, settings, error));
+    TRY(assemble(kernels, context, plan, error));
+    double assembled = sadmm_clock_ms();
+    TRY(run(kernels, context, system, settings, plan, report, error));
+    TRY(kernels->read_solution(context, error));
+    double end = sadmm_clock_ms();
+    report->solve_ms = end - start;
+    if (ms) {
+        ms->assemble = assembled - start;
+        ms->solve = end - assembled;
+    }
+    if (!finite_array(system->velocity, 6 * (size_t)system->body_count) ||
+        !finite_array(system->block_lambda, 6 * (size_t)system->block_count) || !finite_impulses(system->contacts))
+        return sadmm_fail(error, SADMM_ERROR_NON_FINITE, "the solve gave a velocity or multiplier that is not finite");
+    return SADMM_OK;
+}

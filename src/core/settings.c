@@ -1,0 +1,101 @@
+#include "settings.h"
+
+#include <math.h>
+
+sadmm_settings sadmm_settings_default(void)
+{
+    sadmm_settings s = {
+        .dt = 0.005,
+        .gravity = {0, 0, -9.81},
+        .iterations = 100,
+        .penalty_period = 30,
+        .penalty_mass_factor = 16,
+        .penalty_offset = 1e5,
+        .penalty_ratio_limit = 4,
+        .warm_start = true,
+        .residual_tolerance = 0,
+        .certificate_tolerance = 0,
+        .certificate_momentum_tolerance = 1e-6,
+        .check_period = 10,
+        .measure_residuals = false,
+        .certify = false,
+        .recover_wrenches = true,
+        .baumgarte = 0.2,
+        .slop = 1e-5,
+        .correction_speed = 1,
+        .restitution_threshold = 0.1,
+        .threads = 0,
+    };
+    return s;
+}
+
+/* Comparisons are written so that NaN fails them. */
+static bool in_range(double x, double lo, double hi) { return x >= lo && x <= hi; }
+
+sadmm_status sadmm_settings_validate(const struct sadmm_settings *s, struct sadmm_error *error)
+{
+    if (!s)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings = NULL: must be given (sadmm_settings_default())");
+
+    const struct {
+        const char *name;
+        double value, lo, hi;
+    } reals[] = {
+        {"dt", s->dt, 1e-6, 1},
+        {"penalty_mass_factor", s->penalty_mass_factor, 0, 1e12},
+        {"penalty_offset", s->penalty_offset, 0, 1e15},
+        {"penalty_ratio_limit", s->penalty_ratio_limit, 1, 1e6},
+        {"baumgarte", s->baumgarte, 0, 1},
+        {"slop", s->slop, 0, 1},
+        {"correction_speed", s->correction_speed, 0, 1e3},
+    };
+    const struct {
+        const char *name;
+        int value, lo, hi;
+    } integers[] = {
+        {"iterations", s->iterations, 1, 1000000},
+        {"check_period", s->check_period, 1, 1000000},
+        {"threads", s->threads, 0, 1024},
+    };
+    const struct {
+        const char *name;
+        double value;
+    } nonnegative[] = {
+        {"residual_tolerance", s->residual_tolerance},
+        {"certificate_tolerance", s->certificate_tolerance},
+        {"restitution_threshold", s->restitution_threshold},
+    };
+
+    for (size_t i = 0; i < sizeof reals / sizeof *reals; ++i)
+        if (!in_range(reals[i].value, reals[i].lo, reals[i].hi))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.%s = %g: must be in [%g, %g]",
+                              reals[i].name, reals[i].value, reals[i].lo, reals[i].hi);
+    for (size_t i = 0; i < sizeof integers / sizeof *integers; ++i)
+        if (integers[i].value < integers[i].lo || integers[i].value > integers[i].hi)
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.%s = %d: must be in [%d, %d]",
+                              integers[i].name, integers[i].value, integers[i].lo, integers[i].hi);
+    for (size_t i = 0; i < sizeof nonnegative / sizeof *nonnegative; ++i)
+        if (!(nonnegative[i].value >= 0) || isinf(nonnegative[i].value))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.%s = %g: must be finite and >= 0",
+                              nonnegative[i].name, nonnegative[i].value);
+
+    if (s->penalty_period < 0)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.penalty_period = %d: must be >= 0 (0: never)",
+                          s->penalty_period);
+    if (!(s->penalty_mass_factor > 0) && !(s->penalty_offset > 0))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "settings.penalty_mass_factor = 0 and settings.penalty_offset = 0: one must be > 0");
+    if (!(s->certificate_momentum_tolerance > 0) || isinf(s->certificate_momentum_tolerance))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "settings.certificate_momentum_tolerance = %g: must be finite and > 0",
+                          s->certificate_momentum_tolerance);
+
+    const double *g = s->gravity;
+    for (int i = 0; i < 3; ++i)
+        if (!isfinite(g[i]))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.gravity[%d] = %g: must be finite", i, g[i]);
+    double norm = hypot(hypot(g[0], g[1]), g[2]);
+    if (!(norm <= 1e6))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.gravity: norm = %g: must be <= 1e6 m/s^2", norm);
+    return SADMM_OK;
+}

@@ -1,0 +1,76 @@
+/* The contact problem of one step as core and the backends share it on the host, in double.
+ *
+ * Bodies are the dynamic ones only, numbered 0..body_count-1; -1 is the static world. There are two ways to give them:
+ * `rigid` (world level: A and b follow from the state, see math/rigid.h) or `A` and `b` (problem level).
+ * The certificate and every backend read the same raw data through the same inline formulas.
+ */
+#ifndef SADMM_CORE_SYSTEM_H
+#define SADMM_CORE_SYSTEM_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "subadmm/problem.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A dynamic rigid body at the start of a step. */
+struct sadmm_rigid {
+    double position[3];     /* m, world */
+    double orientation[4];  /* w x y z */
+    double velocity[6];     /* m/s, rad/s, world */
+    double mass;            /* kg */
+    double inertia[3];      /* principal, kg m^2 */
+    double wrench[6];       /* external, N, N m, world */
+};
+
+enum { SADMM_MAX_POINTS = 8 };
+
+/* Contacts of one pair of shapes: one normal, up to SADMM_MAX_POINTS points. */
+struct sadmm_contact_pair {
+    int32_t body_a, body_b;   /* system body or -1 */
+    int32_t shape_a, shape_b; /* world shape slot (world level), else -1 */
+    int32_t first, count;     /* points */
+    double normal[3];         /* unit, from a to b */
+    double friction;          /* mu */
+    double restitution;
+    uint32_t cache;           /* narrow phase: separating or reference axis of the last step, 0 = none */
+    uint32_t reserved;
+};
+
+struct sadmm_contact_point {
+    double arm_a[3], arm_b[3]; /* from the centre of mass, m, world; arm_a is 0 when a is -1 (same for b) */
+    double gap;                /* m (world level) */
+    double error;              /* e, m/s: given at the problem level; at the world level see math/contact.h */
+    double impulse[3];         /* lambda on b, world frame, N s: warm start in, solution out */
+    uint32_t feature;
+    uint32_t reserved;
+};
+
+/* A contact set that grows. Order: pairs by (shape_a, shape_b), points in pair order: point index = contact index. */
+struct sadmm_contact_set {
+    struct sadmm_contact_pair *pairs;
+    struct sadmm_contact_point *points;
+    size_t pair_count, pair_capacity, point_count, point_capacity;
+};
+
+struct sadmm_system {
+    int32_t body_count;
+    const struct sadmm_rigid *rigid; /* (body_count) or NULL */
+    const double *A;                 /* (body_count x 36), when rigid is NULL */
+    const double *b;                 /* (body_count x 6), when rigid is NULL */
+    double *velocity;                /* (body_count x 6) start in, solution out */
+    struct sadmm_contact_set *contacts;
+    bool errors_given;               /* points carry e (problem level) instead of a gap */
+    int32_t block_count;
+    const struct sadmm_problem_block *blocks;
+    double *block_lambda;            /* (block_count x 6) start in, solution out */
+};
+
+#ifdef __cplusplus
+}
+#endif
+#endif

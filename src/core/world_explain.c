@@ -1,0 +1,74 @@
+/* --explain: what the last step ran, what it left out, and why. */
+#include <stdarg.h>
+#include <stdio.h>
+
+#include "world_internal.h"
+
+struct text {
+    char *out;
+    size_t size, length;
+};
+
+__attribute__((format(printf, 2, 3))) static void line(struct text *text, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    char *at = text->length < text->size ? text->out + text->length : NULL;
+    int written = vsnprintf(at, at ? text->size - text->length : 0, format, arguments);
+    va_end(arguments);
+    if (written > 0) text->length += (size_t)written;
+}
+
+static void explain_constraints(struct text *t, const struct sadmm_plan *plan)
+{
+    if (plan->contact_rows == 3)
+        line(t, "contacts     %d points in %d pairs, 3 rows each (friction)\n", plan->points, plan->pairs);
+    else if (plan->contact_rows == 1)
+        line(t, "contacts     %d points in %d pairs, 1 row each (every friction coefficient is 0)\n", plan->points,
+             plan->pairs);
+    else
+        line(t, "contacts     left out: nothing touches\n");
+    static const char *const kinds[] = {"general contacts", "hard blocks", "soft blocks"};
+    for (int kind = 0; kind < 3; ++kind) {
+        if (plan->blocks[kind]) line(t, "%-12s %d\n", kinds[kind], plan->blocks[kind]);
+        else line(t, "%-16s left out: there are none\n", kinds[kind]);
+    }
+}
+
+static void explain_options(struct text *t, const struct sadmm_plan *plan, const sadmm_settings *s)
+{
+    line(t, plan->gyroscopic ? "gyroscopic   implicit midpoint, for bodies of unequal principal moments\n"
+                             : "gyroscopic   left out: every body has equal principal moments\n");
+    line(t, plan->warm_start ? "start        warm: impulses and velocities of the last step\n"
+                             : "start        cold: impulses 0, velocities A^-1 b (asked for)\n");
+    if (plan->penalty_updates)
+        line(t, "penalty      eq. (13) with M = %g, c = %g kg/s^2; updated (15) every %d iterations\n",
+             s->penalty_mass_factor, s->penalty_offset, s->penalty_period);
+    else
+        line(t, "penalty      eq. (13) with M = %g, c = %g kg/s^2; updates left out: %s\n", s->penalty_mass_factor,
+             s->penalty_offset,
+             s->penalty_period <= 0             ? "asked for"
+             : s->penalty_ratio_limit <= 1      ? "alpha is 1"
+             : s->iterations <= s->penalty_period ? "fewer iterations than their period"
+                                                  : "no constraints");
+    line(t, plan->residuals ? "residuals    measured when needed (16), (17)\n" : "residuals    left out: nobody asks\n");
+    line(t, plan->wrenches ? "wrenches     recovered (12)\n" : "wrenches     left out: not asked for\n");
+    line(t, plan->certificate ? "certificate  computed\n" : "certificate  left out: not asked for\n");
+}
+
+size_t sadmm_world_explain(const sadmm_world *world, char *out, size_t size)
+{
+    struct text t = {out, out ? size : 0, 0};
+    const struct sadmm_plan *plan = &world->plan;
+    line(&t, "backend      %s\n", world->why[0] ? world->why : "chosen at the first step");
+    if (!world->stepped) return t.length;
+    line(&t, "precision    %s, %d thread%s\n", world->report.precision == SADMM_F32 ? "f32" : "f64", world->report.threads,
+         world->report.threads == 1 ? "" : "s");
+    line(&t, "broad phase  %s\n", sadmm_collision_broad_phase_name());
+    line(&t, "bodies       %d dynamic (static ones take no part in the solve)\n", plan->bodies);
+    explain_constraints(&t, plan);
+    explain_options(&t, plan, &world->step_settings);
+    line(&t, "iterations   %d of at most %d%s\n", world->report.iterations, world->step_settings.iterations,
+         world->report.iterations == 1 && !plan->points ? ": without constraints Step 1 is exact" : "");
+    return t.length;
+}

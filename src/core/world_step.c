@@ -1,0 +1,243 @@
+/* One time step: the whole of the paper's Fig. 4, seen from above.
+ *
+ *     gather        dynamic bodies in slot order -> rigid[], collision bodies
+ *     find_contacts broad phase, pair manifolds, matching with the last step
+ *     plan          what this step needs (plan.c)
+ *     solve         assembly, iterations (schedule.c)
+ *     finish        integrate (Q), wrenches (R)
+ *     certify       if asked for
+ *     commit        states back into the slots; nothing before this line changes a body
+ */
+#include <math.h>
+#include <string.h>
+
+#include "memory.h"
+#include "registry.h"
+#include "world_internal.h"
+
+#define TRY(call)                                      \
+    do {                                               \
+        sadmm_status try_status = (call);              \
+        if (try_status != SADMM_OK) return try_status; \
+    } while (0)
+
+static bool grow(void *array, size_t *capacity, size_t needed, size_t size)
+{
+    return sadmm_grow((void **)array, capacity, 0, needed, size);
+}
+
+/* Settled boxes have about ten contacts each; AUTO needs an order of magnitude before the first contact is known. */
+enum { EXPECTED_CONTACTS_PER_BODY = 8 };
+
+static sadmm_status choose_backend(sadmm_world *world)
+{
+    if (world->context) return SADMM_OK;
+    int64_t expected = (int64_t)world->dynamic_count * EXPECTED_CONTACTS_PER_BODY;
+    TRY(sadmm_backend_choose(world->def.backend, world->def.precision, expected, &world->kernels, world->why,
+                             sizeof world->why, &world->error));
+    return world->kernels->create(world->def.device, &world->context, &world->error);
+}
+
+static sadmm_status gather(sadmm_world *world)
+{
+    size_t n = (size_t)world->dynamic_count, slots = world->body_slots;
+    if (!grow(&world->collision_bodies, &world->collision_body_capacity, slots, sizeof *world->collision_bodies) ||
+        !grow(&world->start, &world->start_capacity, n, sizeof *world->start) ||
+        !grow(&world->next, &world->next_capacity, n, sizeof *world->next) ||
+        !grow(&world->velocity, &world->velocity_capacity, 6 * n, sizeof *world->velocity) ||
+        !grow(&world->wrench, &world->wrench_capacity, 6 * n, sizeof *world->wrench) ||
+        !grow(&world->slot_of, &world->slot_of_capacity, n, sizeof *world->slot_of))
+        return sadmm_fail_memory(&world->error, "the step");
+    int32_t dynamic = 0;
+    for (size_t slot = 0; slot < slots; ++slot) {
+        struct sadmm_world_body *body = &world->bodies[slot];
+        struct sadmm_collision_body *out = &world->collision_bodies[slot];
+        memcpy(out->position, body->rigid.position, sizeof out->position);
+        memcpy(out->orientation, body->rigid.orientation, sizeof out->orientation);
+        memcpy(out->velocity, body->rigid.velocity, sizeof out->velocity);
+        out->environment = body->environment;
+        out->system_body = body->system_body = -1;
+        if (!body->alive || body->type == SADMM_BODY_STATIC) continue;
+        out->system_body = body->system_body = dynamic;
+        world->start[dynamic] = body->rigid;
+        memcpy(world->velocity + 6 * (size_t)dynamic, body->rigid.velocity, 6 * sizeof *world->velocity);
+        world->slot_of[dynamic++] = (int32_t)slot;
+    }
+    return SADMM_OK;
+}
+
+static sadmm_status find_contacts(sadmm_world *world)
+{
+    struct sadmm_collision_input input = {
+        .shapes = world->shapes,
+        .shape_count = world->shape_slots,
+        .bodies = world->collision_bodies,
+        .body_count = world->body_slots,
+        .dt = world->def.settings.dt,
+        .margin = world->def.contact_margin,
+        .threads = world->def.settings.threads,
+        .disabled_body_pairs = world->disabled_pairs.keys,
+        .disabled_body_pair_count = world->disabled_pairs.count,
+        .friction_pairs = world->friction_pairs.keys,
+        .friction_values = world->friction_pairs.values,
+        .friction_pair_count = world->friction_pairs.count,
+    };
+    return world->kernels->find_contacts(world->context, world->collision, &input, &world->contacts, &world->error);
+}
+
+static sadmm_status keep_start_impulses(sadmm_world *world)
+{
+    size_t count = world->contacts.point_count;
+    if (!grow(&world->start_impulse, &world->start_impulse_capacity, 3 * count, sizeof *world->start_impulse))
+        return sadmm_fail_memory(&world->error, "the step's starting impulses");
+    for (size_t k = 0; k < count; ++k)
+        memcpy(world->start_impulse + 3 * k, world->contacts.points[k].impulse, 3 * sizeof *world->start_impulse);
+    return SADMM_OK;
+}
+
+static bool finite_state(const struct sadmm_rigid *body)
+{
+    double sum = 0;
+    for (int k = 0; k < 3; ++k) sum += body->position[k] - body->position[k];
+    for (int k = 0; k < 4; ++k) sum += body->orientation[k] - body->orientation[k];
+    for (int k = 0; k < 6; ++k) sum += body->velocity[k] - body->velocity[k];
+    return sum == 0;
+}
+
+static sadmm_status check_next(sadmm_world *world)
+{
+    for (int32_t i = 0; i < world->dynamic_count; ++i)
+        if (!finite_state(&world->next[i])) {
+            const struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
+            return sadmm_fail(&world->error, SADMM_ERROR_NON_FINITE,
+                              "the step made body (slot %d, generation %u, \"%s\") not finite; the world is as before it",
+                              world->slot_of[i] + 1, body->generation, body->name);
+        }
+    return SADMM_OK;
+}
+
+static void commit(sadmm_world *world)
+{
+    for (int32_t i = 0; i < world->dynamic_count; ++i) {
+        struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
+        body->rigid = world->next[i];
+        if (world->plan.wrenches) memcpy(body->contact_wrench, world->wrench + 6 * (size_t)i, sizeof body->contact_wrench);
+    }
+    world->stepped = true;
+    world->contacts_readable = true;
+}
+
+static double deepest(const struct sadmm_contact_set *contacts)
+{
+    double depth = 0;
+    for (size_t k = 0; k < contacts->point_count; ++k) depth = fmax(depth, -contacts->points[k].gap);
+    return depth;
+}
+
+static struct sadmm_system make_system(sadmm_world *world)
+{
+    struct sadmm_system system = {
+        .body_count = world->dynamic_count,
+        .rigid = world->start,
+        .velocity = world->velocity,
+        .contacts = &world->contacts,
+    };
+    return system;
+}
+
+/* Everything that may fail; the report is written on the way. */
+static sadmm_status try_step(sadmm_world *world, sadmm_step_report *report)
+{
+    const struct sadmm_kernels *kernels;
+    const sadmm_settings *settings = &world->def.settings;
+    struct sadmm_solve_report solve = {0};
+    double begin = sadmm_clock_ms();
+
+    TRY(choose_backend(world));
+    kernels = world->kernels;
+    TRY(gather(world));
+    TRY(find_contacts(world));
+    double found = sadmm_clock_ms();
+
+    struct sadmm_system system = make_system(world);
+    world->plan = sadmm_plan_make(&system, settings);
+    TRY(keep_start_impulses(world));
+    TRY(sadmm_schedule_solve(kernels, world->context, &system, settings, &world->plan, &solve, &report->ms, &world->error));
+    double solved = sadmm_clock_ms();
+
+    TRY(kernels->integrate(world->context, world->next, &world->error));
+    TRY(check_next(world));
+    if (world->plan.wrenches) TRY(kernels->recover_wrenches(world->context, world->wrench, &world->error));
+    double end = sadmm_clock_ms();
+
+    report->certificate = solve.certificate;
+    if (world->plan.certificate)
+        TRY(sadmm_certify_with(&world->certificate_workspace, &system, settings, &report->certificate, &world->error));
+    report->certify_ms = world->plan.certificate ? sadmm_clock_ms() - end : 0;
+
+    report->backend = solve.backend;
+    report->precision = solve.precision;
+    report->threads = solve.threads;
+    report->bodies = world->dynamic_count;
+    report->contacts = (int32_t)world->contacts.point_count;
+    report->pairs = (int32_t)world->contacts.pair_count;
+    report->iterations = solve.iterations;
+    report->converged = solve.converged;
+    report->residual = solve.residual;
+    report->penetration_max = deepest(&world->contacts);
+    report->ms.collide = found - begin;
+    report->ms.finish = end - solved;
+    report->ms.total = end - begin;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_step(sadmm_world *world)
+{
+    sadmm_step_report report = world->report;
+    sadmm_status status = try_step(world, &report);
+    if (status != SADMM_OK) {
+        world->contacts_readable = false;
+        sadmm_collision_undo(world->collision, &world->contacts);
+        return status;
+    }
+    commit(world);
+    world->step_settings = world->def.settings;
+    report.step = world->report.step + 1;
+    report.time = world->report.time + world->def.settings.dt;
+    world->report = report;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_report(const sadmm_world *world, sadmm_step_report *report)
+{
+    if (!report) return sadmm_fail((struct sadmm_error *)&world->error, SADMM_ERROR_INVALID_ARGUMENT, "report is NULL");
+    *report = world->report;
+    return SADMM_OK;
+}
+
+/* FNV-1a over the bit patterns. */
+static uint64_t hash_doubles(uint64_t hash, const double *x, int count)
+{
+    for (int k = 0; k < count; ++k) {
+        uint64_t bits;
+        memcpy(&bits, &x[k], sizeof bits);
+        for (int byte = 0; byte < 8; ++byte) {
+            hash ^= bits >> (8 * byte) & 0xff;
+            hash *= UINT64_C(0x100000001b3);
+        }
+    }
+    return hash;
+}
+
+uint64_t sadmm_world_state_hash(const sadmm_world *world)
+{
+    uint64_t hash = UINT64_C(0xcbf29ce484222325);
+    for (size_t slot = 0; slot < world->body_slots; ++slot) {
+        const struct sadmm_world_body *body = &world->bodies[slot];
+        if (!body->alive) continue;
+        hash = hash_doubles(hash, body->rigid.position, 3);
+        hash = hash_doubles(hash, body->rigid.orientation, 4);
+        hash = hash_doubles(hash, body->rigid.velocity, 6);
+    }
+    return hash;
+}
