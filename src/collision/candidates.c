@@ -1,0 +1,368 @@
+#include "candidates.h"
+
+#include <string.h>
+
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+#include "../core/math/quat.h"
+#include "../core/memory.h"
+#include "radix_sort.h"
+
+enum { SLOT_PRESENT = 1, SLOT_LEFT = 2 /* its box left the larger one, or the entry changed */ };
+
+/* The larger box: this share of the shape's radius on every side. Larger: fewer updates, more pairs to look at. */
+#define ROOM 0.05
+/* Ask the broad phase for single shapes up to this share of all. */
+enum { FEW = 8 };
+
+static uint64_t pair_key(uint32_t a, uint32_t b) { return (uint64_t)a << 32 | b; }
+
+bool sadmm_pair_list_add(struct sadmm_pair_list *list, uint32_t a, uint32_t b)
+{
+    if (list->count == list->capacity &&
+        !sadmm_grow((void **)&list->keys, &list->capacity, list->count, list->count + 1, sizeof *list->keys))
+        return false;
+    list->keys[list->count++] = a < b ? pair_key(a, b) : pair_key(b, a);
+    return true;
+}
+
+sadmm_status sadmm_candidates_init(struct sadmm_candidates *c, const struct sadmm_broad_phase_kind *kind,
+                                   struct sadmm_error *error)
+{
+    memset(c, 0, sizeof *c);
+    c->kind = kind;
+    return kind->create(&c->broad_phase, error);
+}
+
+void sadmm_candidates_free(struct sadmm_candidates *c)
+{
+    if (c->broad_phase) c->kind->destroy(c->broad_phase);
+    sadmm_free(c->proxies);
+    sadmm_free(c->boxes);
+    sadmm_free(c->entries);
+    sadmm_free(c->seen);
+    sadmm_free(c->state);
+    sadmm_free(c->changed);
+    sadmm_free(c->movers);
+    sadmm_free(c->planes);
+    sadmm_free(c->list.keys);
+    sadmm_free(c->found.keys);
+    sadmm_free(c->merged.keys);
+    memset(c, 0, sizeof *c);
+}
+
+static bool grow(void *array, size_t *capacity, size_t used, size_t needed, size_t size)
+{
+    return sadmm_grow((void **)array, capacity, used, needed, size);
+}
+
+static bool make_room(struct sadmm_candidates *c, size_t slots)
+{
+    /* entries and seen remember the last step */
+    return grow(&c->proxies, &c->proxy_capacity, 0, slots, sizeof *c->proxies) &&
+           grow(&c->boxes, &c->box_capacity, 0, slots, sizeof *c->boxes) &&
+           grow(&c->entries, &c->entry_capacity, c->slot_count, slots, sizeof *c->entries) &&
+           grow(&c->seen, &c->seen_capacity, c->slot_count, slots, sizeof *c->seen) &&
+           grow(&c->state, &c->state_capacity, 0, slots, sizeof *c->state) &&
+           grow(&c->changed, &c->changed_capacity, 0, slots, sizeof *c->changed) &&
+           grow(&c->movers, &c->mover_capacity, 0, 2 * slots, sizeof *c->movers) &&
+           grow(&c->planes, &c->plane_capacity, 0, slots, sizeof *c->planes);
+}
+
+static void place(const struct sadmm_shape *shape, const struct sadmm_collision_body *body,
+                  const struct sadmm_collision_input *input, struct sadmm_proxy *p, struct sadmm_box3 *box)
+{
+    quat q_body = q_load(body->orientation), q = q_normalize(q_mul(q_body, q_load(shape->orientation)));
+    mat3 R = q_matrix(q);
+    vec3 arm = m3_mul(q_matrix(q_body), v3_load(shape->position));
+    bool moves = body->system_body >= 0;
+    double extent[3];
+
+    for (int i = 0; i < 3; ++i) v3_store(R.r[i], p->R + 3 * i);
+    v3_store(arm, p->arm);
+    for (int i = 0; i < 3; ++i) {
+        p->com[i] = body->position[i];
+        p->x[i] = body->position[i] + p->arm[i];
+        p->size[i] = shape->size[i];
+        p->velocity[i] = moves ? body->velocity[i] : 0;
+    }
+    p->spin = moves ? rotation_sweep(body->velocity + 3, v3_norm(arm) + shape_radius((int)shape->type, shape->size),
+                                     input->dt)
+                    : 0;
+    p->fall = moves ? input->acceleration * input->dt * input->dt : 0;
+    p->thin = shape_thickness((int)shape->type, shape->size);
+    p->friction = shape->friction;
+    p->restitution = shape->restitution;
+    p->type = (int32_t)shape->type;
+    p->body = shape->body;
+    p->system_body = body->system_body;
+    p->revision = shape->revision;
+    if (shape->type == SADMM_SHAPE_PLANE) return;
+    shape_world_extent(p->type, p->size, p->R, extent);
+    shape_box(p->x, extent, input->margin * p->thin, p->velocity, p->spin, p->fall, input->dt, box);
+}
+
+static bool contains(const struct sadmm_box3 *outer, const struct sadmm_box3 *inner)
+{
+    for (int k = 0; k < 3; ++k)
+        if (!(outer->lo[k] <= inner->lo[k] && inner->hi[k] <= outer->hi[k])) return false;
+    return true;
+}
+
+/* A plane has no box: its entry remembers a point and the normal. */
+static bool plane_stays(const struct sadmm_broad_entry *entry, const struct sadmm_proxy *plane)
+{
+    for (int k = 0; k < 3; ++k)
+        if (!(entry->box.lo[k] == plane->x[k] && entry->box.hi[k] == plane->R[3 * k + 2])) return false;
+    return true;
+}
+
+/* Pose and box of a slot; its entry, enlarged, when the old one does not hold it any more. */
+static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision_input *input, size_t slot, bool renew)
+{
+    const struct sadmm_shape *shape = slot < input->shape_count ? &input->shapes[slot] : NULL;
+    struct sadmm_broad_entry *entry = &c->entries[slot];
+    struct sadmm_seen *seen = &c->seen[slot], now = {0};
+    const struct sadmm_collision_body *body;
+    bool plane, same;
+
+    if (!shape || !shape->alive) {
+        c->state[slot] = seen->alive ? SLOT_LEFT : 0;
+        entry->present = false;
+        *seen = now;
+        return;
+    }
+    body = &input->bodies[shape->body];
+    plane = shape->type == SADMM_SHAPE_PLANE;
+    now.revision = shape->revision;
+    now.body = shape->body;
+    now.group = body->environment;
+    now.alive = true;
+    now.moves = body->system_body >= 0;
+    place(shape, body, input, &c->proxies[slot], &c->boxes[slot]);
+    same = seen->alive && seen->revision == now.revision && seen->body == now.body && seen->group == now.group &&
+           seen->moves == now.moves && !renew;
+    c->state[slot] = SLOT_PRESENT;
+    if (same && (plane ? plane_stays(entry, &c->proxies[slot]) : contains(&entry->box, &c->boxes[slot]))) return;
+    c->state[slot] = SLOT_PRESENT | SLOT_LEFT;
+    *seen = now;
+    entry->present = !plane;
+    entry->group = now.group;
+    entry->moves = now.moves;
+    for (int k = 0; k < 3; ++k) {
+        double room = now.moves ? ROOM * shape_radius((int)shape->type, shape->size) : 0;
+        entry->box.lo[k] = plane ? c->proxies[slot].x[k] : c->boxes[slot].lo[k] - room;
+        entry->box.hi[k] = plane ? c->proxies[slot].R[3 * k + 2] : c->boxes[slot].hi[k] + room;
+    }
+}
+
+/* Lowest point of a box over a plane, m; `reach`: the plane's share of the pair's limit is not in the box. */
+static bool box_meets_plane(const struct sadmm_proxy *plane, const struct sadmm_box3 *box, double reach)
+{
+    double height = 0, lowest = 0;
+    for (int k = 0; k < 3; ++k) {
+        double n = plane->R[3 * k + 2];
+        height += n * (0.5 * (box->lo[k] + box->hi[k]) - plane->x[k]);
+        lowest += fabs(n) * 0.5 * (box->hi[k] - box->lo[k]);
+    }
+    return height - lowest <= reach + 1e-12 * lowest;
+}
+
+bool sadmm_candidate_meets(const struct sadmm_candidates *c, double margin, uint32_t a, uint32_t b)
+{
+    if (c->proxies[a].type == SADMM_SHAPE_PLANE)
+        return box_meets_plane(&c->proxies[a], &c->boxes[b], 0.5 * margin * c->proxies[b].thin);
+    return boxes_overlap(&c->boxes[a], &c->boxes[b]);
+}
+
+/* Things that do not change while the shapes stay what they are. */
+static bool may_meet(const struct sadmm_collision_input *input, uint32_t a, uint32_t b)
+{
+    const struct sadmm_shape *sa = &input->shapes[a], *sb = &input->shapes[b];
+    return sa->body != sb->body && (sa->category & sb->mask) && (sb->category & sa->mask);
+}
+
+static uint64_t ordered(const struct sadmm_candidates *c, uint64_t key)
+{
+    uint32_t low = (uint32_t)(key >> 32), high = (uint32_t)key;
+    return c->proxies[high].type < c->proxies[low].type ? pair_key(high, low) : key;
+}
+
+static int bits_for(size_t count)
+{
+    int bits = 1;
+    while (bits < 32 && count >> bits) ++bits;
+    return bits;
+}
+
+/* Keys to order (slot of a, slot of b); slots need few bits, so squeeze them together for the sort. */
+static bool sort_pairs(struct sadmm_pair_list *list, struct sadmm_pair_list *scratch, size_t slots)
+{
+    int bits = bits_for(slots);
+    uint64_t mask = (UINT64_C(1) << bits) - 1;
+    if (!grow(&scratch->keys, &scratch->capacity, 0, list->count, sizeof *scratch->keys)) return false;
+    for (size_t i = 0; i < list->count; ++i)
+        list->keys[i] = (list->keys[i] >> 32) << bits | (list->keys[i] & UINT32_MAX);
+    sadmm_radix_sort(list->keys, scratch->keys, list->count, 2 * bits);
+    for (size_t i = 0; i < list->count; ++i)
+        list->keys[i] = (list->keys[i] >> bits) << 32 | (list->keys[i] & mask);
+    return true;
+}
+
+/* What moves, by (group, slot). */
+static void list_movers(struct sadmm_candidates *c)
+{
+    c->mover_count = 0;
+    int bits = 0;
+    for (size_t slot = 0; slot < c->slot_count; ++slot) {
+        const struct sadmm_broad_entry *e = &c->entries[slot];
+        if (!e->present || !e->moves || e->group < 0) continue;
+        c->movers[c->mover_count++] = pair_key((uint32_t)e->group, (uint32_t)slot);
+        if (bits_for((size_t)e->group) > bits) bits = bits_for((size_t)e->group);
+    }
+    /* slots ascend already: the sort is stable, but it looks at whole keys */
+    sadmm_radix_sort(c->movers, c->movers + c->mover_count, c->mover_count, 32 + bits);
+}
+
+static size_t first_mover(const struct sadmm_candidates *c, uint64_t key)
+{
+    size_t low = 0, high = c->mover_count;
+    while (low < high) {
+        size_t mid = low + (high - low) / 2;
+        if (c->movers[mid] < key) low = mid + 1;
+        else high = mid;
+    }
+    return low;
+}
+
+static double plane_reach(const struct sadmm_candidates *c, double margin, uint32_t slot)
+{
+    return 0.5 * margin * c->proxies[slot].thin;
+}
+
+/* Planes against what moves, all of it or, when few moved, that. */
+static bool plane_pairs(struct sadmm_candidates *c, const struct sadmm_collision_input *input, bool only_changed)
+{
+    for (size_t p = 0; p < c->plane_count; ++p) {
+        uint32_t plane = c->planes[p];
+        int32_t group = c->entries[plane].group;
+        size_t i = 0, end = only_changed ? c->changed_count : c->mover_count;
+        if (!only_changed && group >= 0) {
+            i = first_mover(c, pair_key((uint32_t)group, 0));
+            end = first_mover(c, pair_key((uint32_t)group + 1, 0));
+        }
+        for (; i < end; ++i) {
+            uint32_t slot = only_changed ? c->changed[i] : (uint32_t)c->movers[i];
+            const struct sadmm_broad_entry *e = &c->entries[slot];
+            if (!e->present || !e->moves || (group >= 0 && e->group != group)) continue;
+            if (box_meets_plane(&c->proxies[plane], &e->box, plane_reach(c, input->margin, slot)) &&
+                !sadmm_pair_list_add(&c->found, plane, slot))
+                return false;
+        }
+    }
+    return true;
+}
+
+/* Drop what may not meet, order, sort and, where pairs may come twice, make unique. */
+static bool finish_found(struct sadmm_candidates *c, const struct sadmm_collision_input *input)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < c->found.count; ++i) {
+        uint64_t key = c->found.keys[i];
+        if (may_meet(input, (uint32_t)(key >> 32), (uint32_t)key)) c->found.keys[n++] = ordered(c, key);
+    }
+    c->found.count = n;
+    if (!sort_pairs(&c->found, &c->merged, c->slot_count)) return false;
+    n = 0;
+    for (size_t i = 0; i < c->found.count; ++i)
+        if (n == 0 || c->found.keys[n - 1] != c->found.keys[i]) c->found.keys[n++] = c->found.keys[i];
+    c->found.count = n;
+    return true;
+}
+
+/* list = (list without the pairs of what left its box) merged with found. */
+static bool merge_found(struct sadmm_candidates *c)
+{
+    size_t i = 0, j = 0, n = 0;
+    struct sadmm_pair_list swap;
+    if (!grow(&c->merged.keys, &c->merged.capacity, 0, c->list.count + c->found.count, sizeof *c->merged.keys))
+        return false;
+    for (; i < c->list.count; ++i) {
+        uint64_t key = c->list.keys[i];
+        if ((c->state[key >> 32] | c->state[key & UINT32_MAX]) & SLOT_LEFT) continue;
+        while (j < c->found.count && c->found.keys[j] < key) c->merged.keys[n++] = c->found.keys[j++];
+        c->merged.keys[n++] = key;
+    }
+    while (j < c->found.count) c->merged.keys[n++] = c->found.keys[j++];
+    c->merged.count = n;
+    swap = c->list;
+    c->list = c->merged;
+    c->merged = swap;
+    return true;
+}
+
+static sadmm_status refresh_list(struct sadmm_candidates *c, const struct sadmm_collision_input *input, bool few,
+                                 struct sadmm_error *error)
+{
+    sadmm_status status;
+    c->found.count = 0;
+    if (few) {
+        status = c->kind->pairs_of(c->broad_phase, c->entries, c->slot_count, c->changed, c->changed_count, &c->found,
+                                   error);
+    } else {
+        c->list.count = 0;
+        status = c->kind->pairs(c->broad_phase, c->entries, c->slot_count, &c->found, error);
+        if (c->plane_count > 0) list_movers(c);
+    }
+    if (status != SADMM_OK) return status;
+    if (!plane_pairs(c, input, few) || !finish_found(c, input) || !merge_found(c))
+        return sadmm_fail_memory(error, "candidate pairs");
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sadmm_collision_input *input, int threads,
+                                     struct sadmm_error *error)
+{
+    /* Slots never go away; should a caller drop some, they count as dead. */
+    size_t slots = input->shape_count > c->slot_count ? input->shape_count : c->slot_count, present = 0;
+    bool renew = !c->broad_phase_valid || !(c->margin == input->margin), few, plane_changed = false;
+    sadmm_status status;
+    (void)threads; /* unused without OpenMP */
+
+    if (!make_room(c, slots)) return sadmm_fail_memory(error, "collision shapes");
+    if (slots > c->slot_count) {
+        memset(c->entries + c->slot_count, 0, (slots - c->slot_count) * sizeof *c->entries);
+        memset(c->seen + c->slot_count, 0, (slots - c->slot_count) * sizeof *c->seen);
+    }
+    c->slot_count = slots;
+
+#ifdef _OPENMP
+#pragma omp parallel for schedule(static) num_threads(threads) if (threads > 1 && slots > 256)
+#endif
+    for (size_t slot = 0; slot < slots; ++slot) update_slot(c, input, slot, renew);
+
+    c->changed_count = c->plane_count = 0;
+    for (size_t slot = 0; slot < slots; ++slot) {
+        bool plane = slot < input->shape_count && input->shapes[slot].type == SADMM_SHAPE_PLANE;
+        if (c->state[slot] & SLOT_PRESENT) {
+            if (plane) c->planes[c->plane_count++] = (uint32_t)slot;
+            else ++present;
+        }
+        if (!(c->state[slot] & SLOT_LEFT)) continue;
+        plane_changed = plane_changed || plane;
+        c->changed[c->changed_count++] = (uint32_t)slot;
+    }
+    if (c->changed_count == 0 && c->list_valid && !renew) return SADMM_OK;
+
+    few = c->list_valid && !renew && !plane_changed && c->kind->pairs_of && c->changed_count * FEW < present;
+    c->broad_phase_valid = c->list_valid = false;
+    c->margin = input->margin;
+    status = c->kind->update(c->broad_phase, c->entries, slots, c->changed, c->changed_count, error);
+    if (status != SADMM_OK) return status;
+    c->broad_phase_valid = true;
+    status = refresh_list(c, input, few, error);
+    c->list_valid = status == SADMM_OK;
+    return status;
+}

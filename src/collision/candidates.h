@@ -1,0 +1,74 @@
+/* From shapes and bodies to the list of pairs worth a narrow phase.
+ *
+ * Every step each shape gets its pose, its box for this step (bounds.h) and the numbers the narrow phase needs. The broad
+ * phase works on larger boxes that are kept until a shape's own box leaves them: as long as nothing leaves, the list of
+ * the last step is still complete and the broad phase does not run at all; when little moved, only that is asked for.
+ * The list may therefore hold more pairs than overlap at present. The narrow phase asks sadmm_candidate_meets, which
+ * looks at this step's boxes alone: results depend on the present state and never on the history of the larger boxes.
+ */
+#ifndef SADMM_COLLISION_CANDIDATES_H
+#define SADMM_COLLISION_CANDIDATES_H
+
+#include "broad_phase.h"
+#include "collision.h"
+
+/* A shape in the world, this step. */
+struct sadmm_proxy {
+    double R[9], x[3];  /* shape to world, row-major; centre, m */
+    double size[3];
+    double arm[3];      /* centre relative to the body's centre of mass, m, world */
+    double com[3];      /* of the body */
+    double velocity[3]; /* of the body, m/s */
+    double spin, fall;  /* reach of rotation and of acceleration within the step, m */
+    double thin;        /* smallest extent, m */
+    double friction, restitution;
+    int32_t type, body, system_body;
+    uint32_t revision;
+};
+
+/* What decides whether a shape's entry in the broad phase is still the same. Planes have no entry. */
+struct sadmm_seen {
+    uint32_t revision;
+    int32_t body, group;
+    bool alive, moves;
+};
+
+struct sadmm_candidates {
+    const struct sadmm_broad_phase_kind *kind;
+    struct sadmm_broad_phase *broad_phase;
+    bool broad_phase_valid; /* it holds every present entry */
+    bool list_valid;
+    double margin; /* of the last update */
+
+    /* by shape slot */
+    struct sadmm_proxy *proxies;
+    struct sadmm_box3 *boxes;
+    struct sadmm_broad_entry *entries;
+    struct sadmm_seen *seen;
+    unsigned char *state; /* SLOT_ flags of the step */
+    size_t slot_count, proxy_capacity, box_capacity, entry_capacity, seen_capacity, state_capacity;
+
+    uint32_t *changed;
+    size_t changed_count, changed_capacity;
+    uint64_t *movers; /* (group << 32) | slot of what moves, sorted: planes look up their group here */
+    size_t mover_count, mover_capacity;
+    uint32_t *planes;
+    size_t plane_count, plane_capacity;
+
+    /* (slot of a << 32) | slot of b, sorted; a: lower (type, slot) */
+    struct sadmm_pair_list list;
+    struct sadmm_pair_list found, merged;
+};
+
+sadmm_status sadmm_candidates_init(struct sadmm_candidates *c, const struct sadmm_broad_phase_kind *kind,
+                                   struct sadmm_error *error);
+void sadmm_candidates_free(struct sadmm_candidates *c);
+
+/* Bring proxies, boxes and the list up to date. After a failure the next call starts from scratch. */
+sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sadmm_collision_input *input, int threads,
+                                     struct sadmm_error *error);
+
+/* Do this step's boxes of a pair in the list overlap? */
+bool sadmm_candidate_meets(const struct sadmm_candidates *c, double margin, uint32_t a, uint32_t b);
+
+#endif

@@ -1,0 +1,169 @@
+/* The pipeline of a step: candidates, narrow phase, and the swap of contact sets.
+ *
+ * The new set is written beside the old one and the two are exchanged at the end, so a failure changes nothing and a
+ * step that fails later can be undone. Threads take consecutive stretches of the sorted candidates and write to sets of
+ * their own, which are put together in order: the result does not depend on their number.
+ */
+#include "collision.h"
+
+#include <string.h>
+
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+#include "../core/memory.h"
+#include "config.h"
+#include "pipeline.h"
+#include "narrow_phase.h"
+
+/* Fewer candidates a thread than this are not worth waking it. */
+enum { PAIRS_PER_THREAD = 256 };
+
+const struct sadmm_broad_phase_kind *sadmm_broad_phase_default(void)
+{
+#ifdef SADMM_HAVE_FCL
+    return &sadmm_broad_phase_fcl;
+#else
+    return &sadmm_broad_phase_sweep;
+#endif
+}
+
+const char *sadmm_collision_broad_phase_name(void) { return sadmm_broad_phase_default()->name; }
+
+sadmm_status sadmm_collision_create_with(const struct sadmm_broad_phase_kind *kind, struct sadmm_collision **out,
+                                         struct sadmm_error *error)
+{
+    struct sadmm_collision *collision = sadmm_alloc(1, sizeof *collision);
+    sadmm_status status;
+    *out = NULL;
+    if (!collision) return sadmm_fail_memory(error, "collision detection");
+    status = sadmm_candidates_init(&collision->candidates, kind, error);
+    if (status != SADMM_OK) {
+        sadmm_free(collision);
+        return status;
+    }
+    *out = collision;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_collision_create(struct sadmm_collision **out, struct sadmm_error *error)
+{
+    return sadmm_collision_create_with(sadmm_broad_phase_default(), out, error);
+}
+
+void sadmm_contact_set_free(struct sadmm_contact_set *contacts)
+{
+    if (!contacts) return;
+    sadmm_free(contacts->pairs);
+    sadmm_free(contacts->points);
+    memset(contacts, 0, sizeof *contacts);
+}
+
+void sadmm_collision_destroy(struct sadmm_collision *collision)
+{
+    if (!collision) return;
+    sadmm_candidates_free(&collision->candidates);
+    sadmm_contact_set_free(&collision->spare);
+    for (size_t i = 0; i < collision->part_count; ++i) sadmm_contact_set_free(&collision->parts[i]);
+    sadmm_free(collision->parts);
+    sadmm_free(collision);
+}
+
+static int thread_count(const struct sadmm_collision_input *input, size_t pairs)
+{
+#ifdef _OPENMP
+    size_t wanted = input->threads > 0 ? (size_t)input->threads : (size_t)omp_get_max_threads();
+    size_t useful = pairs / PAIRS_PER_THREAD + 1;
+    return (int)(wanted < useful ? wanted : useful);
+#else
+    (void)input;
+    (void)pairs;
+    return 1;
+#endif
+}
+
+static bool reserve_parts(struct sadmm_collision *collision, size_t count)
+{
+    if (count <= collision->part_count) return true;
+    if (!sadmm_grow((void **)&collision->parts, &collision->part_capacity, collision->part_count, count,
+                    sizeof *collision->parts))
+        return false;
+    memset(collision->parts + collision->part_count, 0, (count - collision->part_count) * sizeof *collision->parts);
+    collision->part_count = count;
+    return true;
+}
+
+/* Append the parts to `set`. */
+static bool append_parts(struct sadmm_contact_set *set, const struct sadmm_contact_set *parts, size_t count)
+{
+    size_t pairs = set->pair_count, points = set->point_count;
+    for (size_t t = 0; t < count; ++t) {
+        pairs += parts[t].pair_count;
+        points += parts[t].point_count;
+    }
+    if (!sadmm_grow((void **)&set->pairs, &set->pair_capacity, set->pair_count, pairs, sizeof *set->pairs) ||
+        !sadmm_grow((void **)&set->points, &set->point_capacity, set->point_count, points, sizeof *set->points))
+        return false;
+    for (size_t t = 0; t < count; ++t) {
+        struct sadmm_contact_pair *pair = set->pairs + set->pair_count;
+        if (parts[t].pair_count == 0) continue;
+        memcpy(pair, parts[t].pairs, parts[t].pair_count * sizeof *pair);
+        memcpy(set->points + set->point_count, parts[t].points, parts[t].point_count * sizeof *set->points);
+        for (size_t i = 0; i < parts[t].pair_count; ++i) pair[i].first += (int32_t)set->point_count;
+        set->pair_count += parts[t].pair_count;
+        set->point_count += parts[t].point_count;
+    }
+    return true;
+}
+
+static bool find_in_threads(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
+                            const struct sadmm_contact_set *old, int threads)
+{
+    const struct sadmm_candidates *c = &collision->candidates;
+    size_t count = c->list.count;
+    bool ok = true;
+#ifdef _OPENMP
+#pragma omp parallel for schedule(static, 1) num_threads(threads) reduction(&& : ok) if (threads > 1)
+#endif
+    for (int t = 0; t < threads; ++t) {
+        struct sadmm_contact_set *out = t == 0 ? &collision->spare : &collision->parts[t - 1];
+        size_t begin = count * (size_t)t / (size_t)threads, end = count * ((size_t)t + 1) / (size_t)threads;
+        out->pair_count = out->point_count = 0;
+        ok = sadmm_narrow_phase(c, input, begin, end, old, out) && ok;
+    }
+    return ok && append_parts(&collision->spare, collision->parts, (size_t)threads - 1);
+}
+
+sadmm_status sadmm_collision_find(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
+                                  struct sadmm_contact_set *contacts, struct sadmm_error *error)
+{
+    struct sadmm_contact_set swap;
+    sadmm_status status;
+    int threads;
+
+    collision->can_undo = false;
+    status = sadmm_candidates_update(&collision->candidates, input, thread_count(input, input->shape_count), error);
+    if (status != SADMM_OK) return status;
+    if (collision->candidates.list.count > INT32_MAX / SADMM_MAX_POINTS)
+        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%zu pairs of shapes may touch: at most %d can be indexed",
+                          collision->candidates.list.count, (int)(INT32_MAX / SADMM_MAX_POINTS));
+    threads = thread_count(input, collision->candidates.list.count);
+    if (!reserve_parts(collision, (size_t)threads - 1) || !find_in_threads(collision, input, contacts, threads))
+        return sadmm_fail_memory(error, "contacts");
+    swap = *contacts;
+    *contacts = collision->spare;
+    collision->spare = swap;
+    collision->can_undo = true;
+    return SADMM_OK;
+}
+
+void sadmm_collision_undo(struct sadmm_collision *collision, struct sadmm_contact_set *contacts)
+{
+    struct sadmm_contact_set swap;
+    if (!collision->can_undo) return;
+    collision->can_undo = false;
+    swap = *contacts;
+    *contacts = collision->spare;
+    collision->spare = swap;
+}

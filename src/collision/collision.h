@@ -1,0 +1,73 @@
+/* Collision detection on the host: broad phase (FCL, or sort and sweep), pair manifolds, matching with the last step.
+ *
+ * Shapes live in slots that stay put for a shape's life; a dead slot has alive = false. The result does not depend on
+ * the order in which a broad phase finds pairs: pairs come out sorted by (shape_a, shape_b), where a is the shape of the
+ * lower (type, slot) and the normal runs from a to b.
+ */
+#ifndef SADMM_COLLISION_COLLISION_H
+#define SADMM_COLLISION_COLLISION_H
+
+#include "subadmm/world.h"
+#include "../core/error.h"
+#include "../core/system.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+struct sadmm_shape {
+    sadmm_shape_type type;
+    double size[3];
+    double position[3], orientation[4]; /* shape frame in the body's */
+    double friction, restitution;
+    uint32_t category, mask;
+    int32_t body;     /* world body slot */
+    bool alive;
+    uint32_t revision; /* changes whenever the slot is reused or the shape's definition changes */
+};
+
+/* What a world body slot looks like to collision. */
+struct sadmm_collision_body {
+    double position[3], orientation[4], velocity[6]; /* velocity 0 for static bodies */
+    int32_t system_body;  /* index among dynamic bodies, -1 for static */
+    int32_t environment;  /* -1: meets all */
+};
+
+struct sadmm_collision_input {
+    const struct sadmm_shape *shapes;
+    size_t shape_count;               /* slots, dead ones included */
+    const struct sadmm_collision_body *bodies; /* by world body slot */
+    size_t body_count;
+    double dt;
+    double margin;                    /* share of the thinner shape's smallest extent (world def contact_margin) */
+    int threads;
+    /* Pair overrides, both sorted by key = (low slot << 32) | high slot. */
+    const uint64_t *disabled_body_pairs; size_t disabled_body_pair_count;      /* body slots */
+    const uint64_t *friction_pairs; const double *friction_values; size_t friction_pair_count; /* shape slots */
+    double acceleration; /* bound on what gravity and the like add to a velocity, m/s^2: a body at rest just outside the
+                            margin falls acceleration x dt^2 in its first step. 0: not counted */
+};
+
+struct sadmm_collision;
+sadmm_status sadmm_collision_create(struct sadmm_collision **out, struct sadmm_error *error);
+void sadmm_collision_destroy(struct sadmm_collision *collision);
+
+/* Find all contacts. On entry `contacts` holds the previous step's set (with its impulses and caches; points of a new
+ * pair or feature start with impulse 0); on success it holds the new one. On failure it is unchanged. */
+sadmm_status sadmm_collision_find(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
+                                  struct sadmm_contact_set *contacts, struct sadmm_error *error);
+
+/* Put back the set that the last successful sadmm_collision_find replaced, impulses and caches included (the pipeline keeps
+ * it until the next find), so that a step that fails later leaves no trace. Does nothing when the last find failed or was
+ * undone already. */
+void sadmm_collision_undo(struct sadmm_collision *collision, struct sadmm_contact_set *contacts);
+
+/* "fcl" or "sweep". */
+const char *sadmm_collision_broad_phase_name(void);
+
+void sadmm_contact_set_free(struct sadmm_contact_set *contacts);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,78 @@
+/* What two shapes that touch give: one normal and up to eight points. The narrow phase is a set of inline functions
+ * on small structs, one header a family of pairs, compiled by gcc (double) and nvcc (float and double): no allocation,
+ * bounded loops, no state but the cache word.
+ *
+ * Pair convention. a is the shape of the lower (type, slot): plane, sphere, capsule, box. Everything is computed and
+ * given in the frame of b, the shape with more structure: positions stay near b's centre, where float is precise
+ * (pair_pose does the differences in double). The normal runs from a to b, a separation below 0 is penetration and a
+ * point lies midway between the two surfaces.
+ *
+ * limit: points with separation <= limit are kept; a deep manifold is never dropped, and rounding favours contact.
+ *
+ * cache: the axis the pair used in its last step, 0 at first. Where two axes are nearly as good (apex of a house of
+ * cards, a body past the midplane of a thin one) the cached axis and side stay unless clearly beaten; otherwise the
+ * normal would flip from step to step.
+ *
+ * feature: which features of the two shapes make the point. Ids do not depend on which box was the reference, so that
+ * impulses survive a change of it. A feature occurs once in a manifold.
+ */
+#ifndef SADMM_COLLISION_MANIFOLD_H
+#define SADMM_COLLISION_MANIFOLD_H
+
+#include "../core/math/vec3.h"
+
+enum { SADMM_MANIFOLD_POINTS = 8 };
+
+struct manifold_point {
+    vec3 position;   /* m, frame of b */
+    real separation; /* m */
+    uint32_t feature;
+};
+
+struct manifold {
+    vec3 normal; /* unit, frame of b, from a to b */
+    int count;   /* 0: not in contact */
+    uint32_t cache;
+    struct manifold_point points[SADMM_MANIFOLD_POINTS];
+};
+
+/* Pose of a in the frame of b. Rows of R: p_b = R p_a + t. */
+struct pair_pose {
+    mat3 R;
+    vec3 t;
+};
+
+/* How clearly the cached axis must be beaten: this share of the depth, and of the thinner shape's extent. */
+#define MANIFOLD_KEEP_DEPTH ((real)0.1)
+#define MANIFOLD_KEEP_EXTENT ((real)0.005)
+/* Lateral tolerance of clipping, as a share of the face's half extent: corners of aligned boxes stay corners. */
+#define MANIFOLD_SNAP ((real)1e-3)
+/* cos 8 degrees: axes within this angle are the same direction for the choice of an axis. */
+#define MANIFOLD_COS_NEAR ((real)0.99026806874157036)
+
+SADMM_INLINE void manifold_add(struct manifold *m, vec3 position, real separation, uint32_t feature)
+{
+    if (m->count < SADMM_MANIFOLD_POINTS) {
+        struct manifold_point *p = &m->points[m->count++];
+        p->position = position;
+        p->separation = separation;
+        p->feature = feature;
+    }
+}
+
+/* One point between surface points pa (on a) and pb (on b) along m->normal. */
+SADMM_INLINE void manifold_add_between(struct manifold *m, vec3 pa, vec3 pb, uint32_t feature)
+{
+    manifold_add(m, v3_scale(v3_add(pa, pb), (real)0.5), v3_dot(m->normal, v3_sub(pb, pa)), feature);
+}
+
+SADMM_INLINE vec3 m3_column(const mat3 *m, int j)
+{
+    return j == 0 ? v3(m->r[0].x, m->r[1].x, m->r[2].x)
+                  : (j == 1 ? v3(m->r[0].y, m->r[1].y, m->r[2].y) : v3(m->r[0].z, m->r[1].z, m->r[2].z));
+}
+
+SADMM_INLINE void v3_to_array(vec3 v, real a[3]) { a[0] = v.x; a[1] = v.y; a[2] = v.z; }
+SADMM_INLINE vec3 v3_from_array(const real a[3]) { return v3(a[0], a[1], a[2]); }
+
+#endif

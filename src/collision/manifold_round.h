@@ -1,0 +1,118 @@
+/* Spheres and capsules against each other. A sphere is a capsule with a segment of length 0. Capsules lie along z of
+ * their own frame. */
+#ifndef SADMM_COLLISION_MANIFOLD_ROUND_H
+#define SADMM_COLLISION_MANIFOLD_ROUND_H
+
+#include <stdbool.h>
+
+#include "manifold.h"
+
+/* Unit vector of d, or `fallback` (unit) when d is too short to have a direction; returns the length. */
+SADMM_INLINE real direction_or(vec3 d, real size, vec3 fallback, vec3 *n)
+{
+    real length = v3_norm(d);
+    if (length > 16 * SADMM_EPSILON * size && length > (real)1e-18) {
+        *n = v3_scale(d, 1 / length);
+        return length;
+    }
+    *n = fallback;
+    return 0;
+}
+
+/* Point of ball a (centre ca) against ball b (centre cb) along m->normal. */
+SADMM_INLINE void manifold_add_balls(struct manifold *m, vec3 ca, real ra, vec3 cb, real rb, real limit,
+                                     uint32_t feature)
+{
+    real s = v3_dot(m->normal, v3_sub(cb, ca)) - ra - rb;
+    if (s <= limit)
+        manifold_add_between(m, v3_madd(ca, ra, m->normal), v3_madd(cb, -rb, m->normal), feature);
+}
+
+SADMM_INLINE void manifold_sphere_sphere(real ra, real rb, const struct pair_pose *pose, real limit,
+                                         struct manifold *m)
+{
+    /* concentric: every normal is right, take b's z */
+    direction_or(v3_neg(pose->t), ra + rb, v3(0, 0, 1), &m->normal);
+    manifold_add_balls(m, pose->t, ra, v3(0, 0, 0), rb, limit, 1);
+}
+
+SADMM_INLINE void manifold_sphere_capsule(real ra, real rb, real half, const struct pair_pose *pose, real limit,
+                                          struct manifold *m)
+{
+    vec3 c = v3(0, 0, real_clamp(pose->t.z, -half, half));
+    /* centre on the segment: any direction across it */
+    direction_or(v3_sub(c, pose->t), ra + rb, v3(1, 0, 0), &m->normal);
+    manifold_add_balls(m, pose->t, ra, c, rb, limit, 1);
+}
+
+/* Closest points of the segments p + s u, |s| <= hp and q + t w, |t| <= hq (u, w unit). */
+SADMM_INLINE void segments_closest(vec3 p, vec3 u, real hp, vec3 q, vec3 w, real hq, real *s, real *t)
+{
+    vec3 d = v3_sub(q, p);
+    real c = v3_dot(u, w), du = v3_dot(d, u), dw = v3_dot(d, w), sin2 = v3_norm2(v3_cross(u, w));
+    real a = sin2 > 16 * SADMM_EPSILON * SADMM_EPSILON ? (du - c * dw) / sin2 : du;
+    real b;
+    a = real_clamp(a, -hp, hp);
+    b = a * c - dw;
+    if (b > hq) {
+        b = hq;
+        a = real_clamp(du + c * hq, -hp, hp);
+    } else if (b < -hq) {
+        b = -hq;
+        a = real_clamp(du - c * hq, -hp, hp);
+    }
+    *s = a;
+    *t = b;
+}
+
+/* Cross-section of two capsules at height z on b's axis: the point of a's axis there, p + s u. Away from the crossing the
+ * axes drift apart sideways; that excess is added to the separation along the normal. */
+SADMM_INLINE real manifold_capsule_section(const struct manifold *m, vec3 ca, vec3 cb, real radii)
+{
+    vec3 d = v3_sub(cb, ca);
+    real along = v3_dot(m->normal, d);
+    return along - radii + (v3_norm(d) - real_abs(along));
+}
+
+/* Two capsules side by side touch along a line: both ends of the common stretch. Otherwise the closest points.
+ * cache: 1 or 2, the side of a on which b was along (axis of a) x (axis of b); it stays when the axes cross. */
+SADMM_INLINE void manifold_capsule_capsule(real ra, real ha, real rb, real hb, const struct pair_pose *pose,
+                                           real limit, uint32_t cache, struct manifold *m)
+{
+    vec3 u = m3_column(&pose->R, 2), w = v3(0, 0, 1), p = pose->t, cross = v3_cross(u, w), fallback = v3(1, 0, 0), d;
+    vec3 ca, cb;
+    real s, t, closest, sin2 = v3_norm2(cross), radii = ra + rb;
+
+    segments_closest(p, u, ha, v3(0, 0, 0), w, hb, &s, &t);
+    ca = v3_madd(p, s, u);
+    cb = v3_scale(w, t);
+    d = v3_sub(cb, ca);
+    if (sin2 > (real)1e-6) {
+        real side = v3_dot(cross, d);
+        bool crossing = real_abs(s) < ha && real_abs(t) < hb && v3_norm2(d) < (real)0.25 * radii * radii;
+        fallback = v3_scale(cross, (cache == 2 ? -1 : 1) / real_sqrt(sin2));
+        if (crossing && ((cache == 1 && side < 0) || (cache == 2 && side > 0))) d = v3_neg(d);
+    }
+    direction_or(d, radii + ha + hb, fallback, &m->normal);
+    if (sin2 > (real)1e-6) m->cache = v3_dot(m->normal, cross) < 0 ? 2 : 1;
+
+    closest = v3_dot(m->normal, v3_sub(cb, ca)) - radii;
+    if (closest > limit) return;
+    if (sin2 < 1 - MANIFOLD_COS_NEAR * MANIFOLD_COS_NEAR) {
+        /* nearly parallel: the stretch of b beside a */
+        real reach = ha * real_abs(u.z), lo = real_max(p.z - reach, -hb), hi = real_min(p.z + reach, hb);
+        if (hi - lo > MANIFOLD_SNAP * (ha + hb)) {
+            vec3 a_lo = v3_madd(p, (lo - p.z) / u.z, u), a_hi = v3_madd(p, (hi - p.z) / u.z, u);
+            vec3 b_lo = v3(0, 0, lo), b_hi = v3(0, 0, hi);
+            real s_lo = manifold_capsule_section(m, a_lo, b_lo, radii);
+            real s_hi = manifold_capsule_section(m, a_hi, b_hi, radii);
+            vec3 shift = v3_scale(m->normal, (ra - rb) / 2);
+            if (s_lo <= limit) manifold_add(m, v3_madd(v3_scale(v3_add(a_lo, b_lo), (real)0.5), 1, shift), s_lo, 1);
+            if (s_hi <= limit) manifold_add(m, v3_madd(v3_scale(v3_add(a_hi, b_hi), (real)0.5), 1, shift), s_hi, 2);
+            if (m->count > 0 && real_min(s_lo, s_hi) - closest < (real)0.01 * radii) return;
+        }
+    }
+    manifold_add_balls(m, ca, ra, cb, rb, limit, 3);
+}
+
+#endif

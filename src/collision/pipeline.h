@@ -1,0 +1,21 @@
+/* The insides of struct sadmm_collision, for collision.c and the tests. */
+#ifndef SADMM_COLLISION_PIPELINE_H
+#define SADMM_COLLISION_PIPELINE_H
+
+#include "candidates.h"
+
+struct sadmm_collision {
+    struct sadmm_candidates candidates;
+    /* The set before the last find, to undo it; the next find writes here. */
+    struct sadmm_contact_set spare;
+    bool can_undo;
+    /* One a thread beyond the first; its first thread writes to `spare`. */
+    struct sadmm_contact_set *parts;
+    size_t part_count, part_capacity;
+};
+
+/* sadmm_collision_create with a broad phase of choice. */
+sadmm_status sadmm_collision_create_with(const struct sadmm_broad_phase_kind *kind, struct sadmm_collision **out,
+                                         struct sadmm_error *error);
+
+#endif
