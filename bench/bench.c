@@ -1,0 +1,69 @@
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bench.h"
+#include "core/schedule.h"
+
+static const struct {
+    const char *name;
+    int (*run)(int argc, char **argv);
+    const char *description;
+} commands[] = {
+    {"kernels", bench_kernels, "ns per contact per iteration by backend, precision, threads and size"},
+};
+
+static void usage(FILE *out)
+{
+    fprintf(out, "usage: subadmm-bench COMMAND [options]\n\n");
+    for (size_t k = 0; k < sizeof commands / sizeof *commands; ++k)
+        fprintf(out, "  %-10s %s\n", commands[k].name, commands[k].description);
+    fprintf(out, "\nsubadmm-bench COMMAND --help lists the options of one.\n");
+}
+
+int main(int argc, char **argv)
+{
+    if (argc >= 2 && (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h"))) {
+        usage(stdout);
+        return 0;
+    }
+    for (size_t k = 0; argc >= 2 && k < sizeof commands / sizeof *commands; ++k)
+        if (!strcmp(argv[1], commands[k].name)) return commands[k].run(argc - 1, argv + 1);
+    if (argc >= 2) fprintf(stderr, "subadmm-bench: unknown command \"%s\"\n", argv[1]);
+    usage(stderr);
+    return 2;
+}
+
+bool bench_write_json(json_t *json, const char *path)
+{
+    int failed = strcmp(path, "-") ? json_dump_file(json, path, JSON_INDENT(2)) : json_dumpf(json, stdout, JSON_INDENT(2));
+    if (!strcmp(path, "-")) putchar('\n');
+    if (failed) fprintf(stderr, "subadmm-bench: cannot write %s\n", path);
+    return !failed;
+}
+
+int bench_compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+double bench_memory_bandwidth(int threads)
+{
+    size_t count = (size_t)1 << 25; /* 256 MB each: out of every cache */
+    double *from = malloc(count * sizeof *from), *to = malloc(count * sizeof *to), best = 0;
+    (void)threads;
+    if (from && to) {
+        for (int repeat = 0; repeat < 5; ++repeat) {
+            double begin = sadmm_clock_ms();
+#pragma omp parallel for num_threads(threads) schedule(static)
+            for (size_t k = 0; k < count; ++k) to[k] = repeat ? from[k] : (from[k] = (double)k);
+            double rate = 16e-6 * (double)count / (sadmm_clock_ms() - begin);
+            if (repeat && rate > best) best = rate;
+        }
+    }
+    free(from);
+    free(to);
+    return best;
+}

@@ -1,0 +1,19 @@
+/* subadmm-bench: one file a command, each prints a table and takes --json FILE|-. */
+#ifndef BENCH_BENCH_H
+#define BENCH_BENCH_H
+
+#include <stdbool.h>
+
+#include <jansson.h>
+
+int bench_kernels(int argc, char **argv);
+
+/* Write to a file, or to standard output for "-"; false (with a message on standard error) when that fails. */
+bool bench_write_json(json_t *json, const char *path);
+
+/* Measured bandwidth of memory with that many threads, GB/s (copy, read + write counted). */
+double bench_memory_bandwidth(int threads);
+
+int bench_compare_doubles(const void *a, const void *b);
+
+#endif

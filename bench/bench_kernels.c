@@ -1,0 +1,278 @@
+/* subadmm-bench kernels: the cost of one iteration (Step 1 included) per contact, and how much of memory's bandwidth it
+ * uses. The problem is the lattice of lattice.h; the solve is checked by its certificate, printed beside the time. */
+#include <getopt.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bench.h"
+#include "core/certificate.h"
+#include "core/schedule.h"
+#include "lattice.h"
+
+enum { MAX_LIST = 16 };
+
+struct options {
+    sadmm_backend backend; /* AUTO: all */
+    int precision;         /* -1: both */
+    int threads[MAX_LIST], thread_count;
+    long contacts[MAX_LIST];
+    int contact_count;
+    double seconds;
+    const char *json;
+};
+
+struct row {
+    sadmm_backend backend;
+    const char *name, *variant;
+    sadmm_precision precision;
+    int threads;
+    long contacts, pairs, bodies;
+    int iterations;
+    double ns, gb_per_s, share, spread;
+    sadmm_certificate certificate;
+};
+
+/* The bytes an iteration of the reduced form has to move at least: contact (arm, error, lambda read and written), pair
+ * (normal, offset, friction, weight, two indices, both wrenches written and read), body (A, H, b, v read and written). */
+static double bytes_per_iteration(const struct lattice *lattice, size_t real)
+{
+    double contact = 10.0 * (double)real, pair = (8 + 2 * 12) * (double)real + 16, body = (7 + 21 + 6 + 12) * (double)real;
+    return contact * (double)lattice->contacts.point_count + pair * (double)lattice->contacts.pair_count +
+           body * (double)lattice->system.body_count;
+}
+
+static sadmm_status prepare(const struct sadmm_kernels *k, struct sadmm_context *c, struct lattice *lattice,
+                            const struct sadmm_settings *settings, const struct sadmm_plan *plan, struct sadmm_error *error)
+{
+    sadmm_status status = k->begin(c, &lattice->system, plan, settings, error);
+    if (status == SADMM_OK) status = k->assemble_bodies(c, error);
+    if (status == SADMM_OK) status = k->assemble_contacts(c, error);
+    if (status == SADMM_OK) status = k->init_penalty(c, error);
+    if (status == SADMM_OK) status = k->factorize(c, error);
+    return status;
+}
+
+static sadmm_status iterate(const struct sadmm_kernels *k, struct sadmm_context *c, int count, struct sadmm_error *error)
+{
+    sadmm_status status = SADMM_OK;
+    if (k->iterate) {
+        status = k->iterate(c, count, false, error);
+    } else {
+        for (int i = 0; i < count && status == SADMM_OK; ++i) {
+            status = k->update_velocity(c, error);
+            if (status == SADMM_OK) status = k->update_constraints(c, false, error);
+        }
+    }
+    /* A device returns before it is done: reading waits for it. */
+    return status == SADMM_OK && k->backend == SADMM_BACKEND_CUDA ? k->read_solution(c, error) : status;
+}
+
+/* Median over batches of `batch` iterations; the first batch warms up. */
+static sadmm_status measure(const struct sadmm_kernels *k, struct sadmm_context *c, double seconds, struct row *row,
+                            struct sadmm_error *error)
+{
+    enum { MAX_BATCHES = 200 };
+    double times[MAX_BATCHES], begin = sadmm_clock_ms();
+    sadmm_status status = iterate(k, c, 2, error);
+    double once = (sadmm_clock_ms() - begin) / 2;
+    int batch = once > 0 ? (int)(seconds * 1e3 / 20 / once) : 1000, batches = 0;
+    if (batch < 10) batch = 10;
+    if (batch > 100000) batch = 100000;
+    begin = sadmm_clock_ms();
+    while (status == SADMM_OK && batches < MAX_BATCHES && (batches < 3 || sadmm_clock_ms() - begin < seconds * 1e3)) {
+        double start = sadmm_clock_ms();
+        status = iterate(k, c, batch, error);
+        times[batches++] = (sadmm_clock_ms() - start) / batch;
+        row->iterations += batch;
+    }
+    if (status != SADMM_OK) return status;
+    row->iterations += 2;
+    qsort(times, (size_t)batches, sizeof *times, bench_compare_doubles);
+    double median = times[batches / 2];
+    row->ns = 1e6 * median / (double)row->contacts;
+    row->spread = (times[batches - 1 - batches / 10] - times[batches / 10]) / median;
+    return SADMM_OK;
+}
+
+static sadmm_status run_row(const struct sadmm_kernels *k, struct lattice *lattice, double seconds, struct row *row,
+                            struct sadmm_error *error)
+{
+    struct sadmm_settings settings = sadmm_settings_default();
+    settings.threads = row->threads;
+    settings.penalty_period = 0;
+    lattice_reset(lattice);
+    struct sadmm_plan plan = sadmm_plan_make(&lattice->system, &settings);
+    struct sadmm_context *context = NULL;
+    sadmm_status status = k->create(0, &context, error);
+    if (status != SADMM_OK) return status;
+    status = prepare(k, context, lattice, &settings, &plan, error);
+    row->bodies = lattice->system.body_count;
+    row->pairs = (long)lattice->contacts.pair_count;
+    row->contacts = (long)lattice->contacts.point_count;
+    if (status == SADMM_OK) status = measure(k, context, seconds, row, error);
+    if (status == SADMM_OK) status = k->read_solution(context, error);
+    if (status == SADMM_OK) status = sadmm_certify(&lattice->system, &settings, &row->certificate, error);
+    k->destroy(context);
+    row->gb_per_s = bytes_per_iteration(lattice, k->precision == SADMM_F32 ? 4 : 8) / (row->ns * (double)row->contacts);
+    return status;
+}
+
+static void usage(FILE *out)
+{
+    fprintf(out,
+            "usage: subadmm-bench kernels [options]\n\n"
+            "  --backend ref|cpu|cuda|all   default all (ref up to 10,000 contacts)\n"
+            "  --precision f32|f64|both     default both\n"
+            "  --threads N[,N...]           CPU threads, default 1,2\n"
+            "  --contacts N[,N...]          default 1000,10000,100000,1000000\n"
+            "  --seconds S                  time spent on each row, default 1\n"
+            "  --json FILE|-                rows[] of {backend, precision, threads, contacts, ns_per_contact_iteration, gb_per_s, ...}\n");
+}
+
+static bool parse_list(const char *text, long low, long high, long *values, int *count)
+{
+    *count = 0;
+    while (*count < MAX_LIST) {
+        char *end;
+        long value = strtol(text, &end, 10);
+        if (end == text || value < low || value > high || (*end && *end != ',')) return false;
+        values[(*count)++] = value;
+        if (!*end) return true;
+        text = end + 1;
+    }
+    return false;
+}
+
+static bool parse_backend(const char *text, sadmm_backend *backend)
+{
+    static const char *const names[] = {"all", "ref", "cpu", "cuda"};
+    for (int k = 0; k < 4; ++k)
+        if (!strcmp(text, names[k])) {
+            *backend = (sadmm_backend)k;
+            return true;
+        }
+    return false;
+}
+
+static int bad(const char *option, const char *value, const char *allowed)
+{
+    fprintf(stderr, "subadmm-bench kernels: --%s %s: must be %s\n", option, value, allowed);
+    return 2;
+}
+
+/* 0, 2 for wrong usage, -1 for --help. */
+static int parse(int argc, char **argv, struct options *o)
+{
+    static const struct option longs[] = {
+        {"backend", required_argument, NULL, 'b'},  {"precision", required_argument, NULL, 'p'},
+        {"threads", required_argument, NULL, 't'},  {"contacts", required_argument, NULL, 'c'},
+        {"seconds", required_argument, NULL, 's'},  {"json", required_argument, NULL, 'j'},
+        {"help", no_argument, NULL, 'h'},           {NULL, 0, NULL, 0},
+    };
+    long threads[MAX_LIST];
+    for (int option; (option = getopt_long(argc, argv, "h", longs, NULL)) != -1;) {
+        char *end;
+        switch (option) {
+        case 'b':
+            if (!parse_backend(optarg, &o->backend)) return bad("backend", optarg, "ref, cpu, cuda or all");
+            break;
+        case 'p':
+            o->precision = !strcmp(optarg, "f32") ? SADMM_F32 : !strcmp(optarg, "f64") ? SADMM_F64 : -1;
+            if (o->precision < 0 && strcmp(optarg, "both")) return bad("precision", optarg, "f32, f64 or both");
+            break;
+        case 't':
+            if (!parse_list(optarg, 1, 1024, threads, &o->thread_count)) return bad("threads", optarg, "up to 16 numbers in [1, 1024]");
+            for (int k = 0; k < o->thread_count; ++k) o->threads[k] = (int)threads[k];
+            break;
+        case 'c':
+            if (!parse_list(optarg, 1, 20000000, o->contacts, &o->contact_count))
+                return bad("contacts", optarg, "up to 16 numbers in [1, 20000000]");
+            break;
+        case 's':
+            o->seconds = strtod(optarg, &end);
+            if (end == optarg || *end || !(o->seconds > 0 && o->seconds <= 600)) return bad("seconds", optarg, "in (0, 600]");
+            break;
+        case 'j': o->json = optarg; break;
+        case 'h': usage(stdout); return -1;
+        default: usage(stderr); return 2;
+        }
+    }
+    if (optind < argc) {
+        fprintf(stderr, "subadmm-bench kernels: unexpected argument \"%s\"\n", argv[optind]);
+        return 2;
+    }
+    return 0;
+}
+
+static json_t *row_json(const struct row *row)
+{
+    return json_pack("{s:s, s:s, s:s, s:i, s:I, s:I, s:I, s:i, s:f, s:f, s:f, s:f, s:{s:f, s:f}}", "backend", row->name,
+                     "variant", row->variant, "precision", row->precision == SADMM_F32 ? "f32" : "f64", "threads",
+                     row->threads, "contacts", (json_int_t)row->contacts, "pairs", (json_int_t)row->pairs, "bodies",
+                     (json_int_t)row->bodies, "iterations", row->iterations, "ns_per_contact_iteration", row->ns,
+                     "gb_per_s", row->gb_per_s, "bandwidth_share", row->share, "spread", row->spread, "certificate",
+                     "ncp_max", row->certificate.ncp_max, "momentum_max", row->certificate.momentum_max);
+}
+
+int bench_kernels(int argc, char **argv)
+{
+    struct options o = {
+        .backend = SADMM_BACKEND_AUTO, .precision = -1, .threads = {1, 2}, .thread_count = 2,
+        .contacts = {1000, 10000, 100000, 1000000}, .contact_count = 4, .seconds = 1,
+    };
+    int status = parse(argc, argv, &o);
+    if (status) return status < 0 ? 0 : status;
+    bool quiet = o.json && !strcmp(o.json, "-");
+    json_t *rows = json_array(), *bandwidths = json_array();
+    double bandwidth[MAX_LIST];
+    for (int t = 0; t < o.thread_count; ++t) {
+        bandwidth[t] = bench_memory_bandwidth(o.threads[t]);
+        json_array_append_new(bandwidths, json_pack("{s:i, s:f}", "threads", o.threads[t], "gb_per_s", bandwidth[t]));
+        if (!quiet) printf("memory, %d thread%s: %.1f GB/s (copy)\n", o.threads[t], o.threads[t] == 1 ? "" : "s", bandwidth[t]);
+    }
+    if (!quiet)
+        printf("%-5s %-8s %-4s %7s %9s %11s %8s %7s %10s\n", "", "variant", "", "threads", "contacts", "ns/cont/it", "GB/s",
+               "of mem", "ncp_max");
+    for (int size = 0; size < o.contact_count && status == 0; ++size) {
+        struct lattice lattice;
+        if (!lattice_create(&lattice, o.contacts[size])) {
+            fprintf(stderr, "subadmm-bench kernels: out of memory at %ld contacts\n", o.contacts[size]);
+            status = 1;
+            break;
+        }
+        const struct sadmm_kernels *k;
+        for (size_t index = 0; (k = sadmm_kernels_at(index)) != NULL && status == 0; ++index) {
+            if (o.backend != SADMM_BACKEND_AUTO && k->backend != o.backend) continue;
+            if (o.precision >= 0 && (int)k->precision != o.precision) continue;
+            if (k->backend == SADMM_BACKEND_REF && o.contacts[size] > 10000 && o.backend != SADMM_BACKEND_REF) continue;
+            for (int t = 0; t < (k->backend == SADMM_BACKEND_CPU ? o.thread_count : 1) && status == 0; ++t) {
+                sadmm_backend_info info;
+                struct sadmm_error error = {SADMM_OK, ""};
+                sadmm_backend_query(k->backend, &info);
+                struct row row = {.backend = k->backend, .name = info.name, .variant = k->variant, .precision = k->precision,
+                                  .threads = k->backend == SADMM_BACKEND_CPU ? o.threads[t] : 1};
+                if (run_row(k, &lattice, o.seconds, &row, &error) != SADMM_OK) {
+                    fprintf(stderr, "subadmm-bench kernels: %s\n", error.message);
+                    status = 1;
+                    break;
+                }
+                row.share = k->backend == SADMM_BACKEND_CUDA ? 0 : row.gb_per_s / bandwidth[t];
+                if (!quiet) {
+                    printf("%-5s %-8s %-4s %7d %9ld %11.2f %8.2f %6.0f%% %10.1e\n", row.name, row.variant,
+                           row.precision == SADMM_F32 ? "f32" : "f64", row.threads, row.contacts, row.ns, row.gb_per_s,
+                           100 * row.share, row.certificate.ncp_max);
+                    fflush(stdout);
+                }
+                json_array_append_new(rows, row_json(&row));
+            }
+        }
+        lattice_destroy(&lattice);
+    }
+    json_t *document = json_pack("{s:s, s:s, s:s, s:o, s:o}", "bench", "kernels", "commit", sadmm_build_commit(), "compiler",
+                                 sadmm_build_compiler(), "memory", bandwidths, "rows", rows);
+    if (status == 0 && o.json && !bench_write_json(document, o.json)) status = 1;
+    json_decref(document);
+    return status;
+}

@@ -1,0 +1,243 @@
+/* subadmm run: step a scene and say what it cost, how exact it was and where it ended. */
+#include <limits.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "cli.h"
+#include "core/memory.h"
+#include "fclib/fclib.h"
+#include "run_record.h"
+#include "run_trace.h"
+
+enum {
+    OPTION_BACKEND, OPTION_PRECISION, OPTION_STEPS, OPTION_DT, OPTION_ITERATIONS, OPTION_PENALTY_PERIOD, OPTION_THREADS,
+    OPTION_NO_WARM_START, OPTION_CERTIFY, OPTION_EXPLAIN, OPTION_JSON, OPTION_TRACE, OPTION_DUMP, OPTION_QUIET
+};
+
+static const struct cli_option options[] = {
+    [OPTION_BACKEND] = {"backend", "NAME", "auto, ref, cpu or cuda (default auto)"},
+    [OPTION_PRECISION] = {"precision", "P", "f32 or f64 (default the scene's)"},
+    [OPTION_STEPS] = {"steps", "N", "number of steps (default the scene's duration / dt)"},
+    [OPTION_DT] = {"dt", "S", "time step, s (default the scene's)"},
+    [OPTION_ITERATIONS] = {"iterations", "N", "iterations a step (default the scene's)"},
+    [OPTION_PENALTY_PERIOD] = {"penalty-period", "N", "iterations between penalty updates, 0 = never"},
+    [OPTION_THREADS] = {"threads", "N", "CPU threads, 0 = all (default)"},
+    [OPTION_NO_WARM_START] = {"no-warm-start", NULL, "start every step from zero impulses"},
+    [OPTION_CERTIFY] = {"certify", NULL, "measure the true error of every step"},
+    [OPTION_EXPLAIN] = {"explain", NULL, "say what the last step ran, what it left out and why"},
+    [OPTION_JSON] = {"json", "[FILE|-]", "write JSON to FILE, or to standard output (-, the default)"},
+    [OPTION_TRACE] = {"trace", "FILE", "write every body's state after every step as CSV"},
+    [OPTION_DUMP] = {"dump-problem", "STEP:FILE", "write the contact problem of a step (1 is the first) as FCLIB HDF5"},
+    [OPTION_QUIET] = {"quiet", NULL, "no progress, no table"},
+};
+
+struct run_options {
+    sadmm_backend backend;
+    sadmm_precision precision;
+    long steps, iterations, penalty_period, threads; /* -1: the scene's */
+    double dt;                                       /* 0: the scene's */
+    bool no_warm_start, certify, explain, quiet, precision_given;
+    const char *json, *trace, *dump_path;
+    long dump_step;
+};
+
+static bool read_dump(struct run_options *o, const char *value)
+{
+    char step[24];
+    const char *colon = strchr(value, ':');
+    size_t length = colon ? (size_t)(colon - value) : 0;
+    if (length == 0 || length >= sizeof step || colon[1] == 0) {
+        cli_error(CLI_USAGE, "--dump-problem '%s': must be STEP:FILE", value);
+        return false;
+    }
+    memcpy(step, value, length);
+    step[length] = 0;
+    o->dump_path = colon + 1;
+    return cli_read_int("--dump-problem STEP", step, 1, LONG_MAX, &o->dump_step);
+}
+
+static int set_option(void *target, size_t index, const char *value)
+{
+    struct run_options *o = target;
+    bool ok = true;
+    switch (index) {
+    case OPTION_BACKEND: ok = cli_read_backend("--backend", value, &o->backend); break;
+    case OPTION_PRECISION:
+        ok = cli_read_precision("--precision", value, &o->precision);
+        o->precision_given = true;
+        break;
+    case OPTION_STEPS: ok = cli_read_int("--steps", value, 0, 1000000000, &o->steps); break;
+    case OPTION_DT: ok = cli_read_real("--dt", value, 1e-6, 1, &o->dt); break;
+    case OPTION_ITERATIONS: ok = cli_read_int("--iterations", value, 1, 1000000, &o->iterations); break;
+    case OPTION_PENALTY_PERIOD: ok = cli_read_int("--penalty-period", value, 0, 1000000, &o->penalty_period); break;
+    case OPTION_THREADS: ok = cli_read_int("--threads", value, 0, 1024, &o->threads); break;
+    case OPTION_NO_WARM_START: o->no_warm_start = true; break;
+    case OPTION_CERTIFY: o->certify = true; break;
+    case OPTION_EXPLAIN: o->explain = true; break;
+    case OPTION_JSON: o->json = value ? value : "-"; break;
+    case OPTION_TRACE: o->trace = value; break;
+    case OPTION_DUMP: ok = read_dump(o, value); break;
+    case OPTION_QUIET: o->quiet = true; break;
+    }
+    return ok ? CLI_DONE : CLI_USAGE;
+}
+
+static void apply(const struct run_options *o, struct sadmm_scene *scene)
+{
+    sadmm_settings *s = &scene->def.settings;
+    scene->def.backend = o->backend;
+    if (o->precision_given) scene->def.precision = o->precision;
+    if (o->dt > 0) s->dt = o->dt;
+    if (o->iterations >= 0) s->iterations = (int)o->iterations;
+    if (o->penalty_period >= 0) s->penalty_period = (int)o->penalty_period;
+    if (o->threads >= 0) s->threads = (int)o->threads;
+    if (o->no_warm_start) s->warm_start = false;
+    if (o->certify) s->certify = true;
+}
+
+/* ---- progress --------------------------------------------------------------------------------------------------- */
+
+struct progress {
+    bool shown;
+    double next; /* s */
+};
+
+static double clock_seconds(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static void show_progress(struct progress *p, const struct run_record *record, long steps)
+{
+    double now = clock_seconds();
+    if (now < p->next) return;
+    p->next = now + 0.1;
+    p->shown = true;
+    fprintf(stderr, "\rstep %zu of %ld, %d contacts, %.3g ms \033[K", record->steps, steps, record->last.contacts,
+            record->last.ms.total);
+}
+
+/* ---- the run ---------------------------------------------------------------------------------------------------- */
+
+static int dump_problem(const struct run_options *o, const char *spec, const sadmm_world *world)
+{
+    char title[160];
+    struct sadmm_error error = {0};
+    sadmm_problem *problem = NULL;
+    snprintf(title, sizeof title, "%s, step %ld", spec, o->dump_step);
+    if (sadmm_problem_create(&problem) != SADMM_OK) return cli_error(CLI_FAILED, "%s", sadmm_last_message());
+    int code = CLI_DONE;
+    if (sadmm_world_freeze(world, problem) != SADMM_OK) code = cli_error(CLI_FAILED, "%s", sadmm_world_message(world));
+    else if (sadmm_fclib_save(problem, o->dump_path, title, &error) != SADMM_OK)
+        code = cli_error(CLI_FAILED, "%s", error.message);
+    sadmm_problem_destroy(problem);
+    return code;
+}
+
+/* The last step measures its residuals, whatever the run measures: they are in every report. */
+static bool prepare_last_step(sadmm_world *world)
+{
+    sadmm_settings s = sadmm_world_settings(world);
+    s.measure_residuals = true;
+    return sadmm_world_set_settings(world, &s) == SADMM_OK;
+}
+
+static int step_all(const struct run_options *o, const char *spec, const struct sadmm_scene *scene, sadmm_world *world,
+                    struct run_record *record, FILE *trace)
+{
+    struct progress progress = {0};
+    bool watched = !o->quiet && isatty(STDERR_FILENO);
+    int code = CLI_DONE;
+    if (trace && !run_trace_step(trace, record, world, 0)) code = CLI_FAILED;
+    for (long step = 0; code == CLI_DONE && step < o->steps; ++step) {
+        struct sadmm_error error = {0};
+        if (sadmm_scene_before_step(scene, world, step, &error) != SADMM_OK) {
+            snprintf(record->failure, sizeof record->failure, "%s", error.message);
+            code = CLI_FAILED;
+        } else if ((step + 1 == o->steps && !prepare_last_step(world)) || sadmm_world_step(world) != SADMM_OK) {
+            snprintf(record->failure, sizeof record->failure, "step %ld: %.280s", step + 1, sadmm_world_message(world));
+            code = CLI_FAILED;
+        } else if (!run_record_step(record, world) || (trace && !run_trace_step(trace, record, world, record->last.time))) {
+            code = CLI_FAILED;
+        } else if (o->dump_path && step + 1 == o->dump_step) {
+            code = dump_problem(o, spec, world);
+        }
+        if (watched) show_progress(&progress, record, o->steps);
+    }
+    if (progress.shown) fputs("\r\033[K", stderr);
+    return code;
+}
+
+/* After the step; to stderr when standard output carries the JSON. */
+static void explain(const struct run_options *o, const sadmm_world *world)
+{
+    size_t size = sadmm_world_explain(world, NULL, 0) + 1;
+    char *text = sadmm_alloc(size, 1);
+    if (!text) return;
+    sadmm_world_explain(world, text, size);
+    FILE *out = o->json && strcmp(o->json, "-") == 0 ? stderr : stdout;
+    fprintf(out, "%s%s", text, size > 1 && text[size - 2] != '\n' ? "\n" : "");
+    sadmm_free(text);
+}
+
+static int run_world(const struct run_options *o, const char *spec, const struct sadmm_scene *scene, sadmm_world *world)
+{
+    struct run_record record = {0};
+    FILE *trace = NULL;
+    int code = run_record_start(&record, world) ? CLI_DONE : CLI_FAILED;
+    if (code == CLI_DONE && o->trace && !(trace = run_trace_open(o->trace))) code = CLI_FAILED;
+    if (code == CLI_DONE) {
+        code = step_all(o, spec, scene, world, &record, trace);
+        if (*record.failure) cli_error(CLI_FAILED, "%s", record.failure);
+        if (!run_record_finish(&record, world) || !record.finite) code = CLI_FAILED;
+        if (o->explain) explain(o, world);
+        if (!o->quiet && !(o->json && strcmp(o->json, "-") == 0)) run_record_print(&record, spec, scene);
+        if (o->json) {
+            int written = cli_write_json(run_record_json(&record, spec, scene), o->json);
+            if (code == CLI_DONE) code = written;
+        }
+    }
+    if (trace && !run_trace_close(trace, o->trace)) code = CLI_FAILED;
+    run_record_free(&record);
+    return code;
+}
+
+static int run(int argc, char **argv)
+{
+    struct run_options o = {.steps = -1, .iterations = -1, .penalty_period = -1, .threads = -1};
+    struct sadmm_scene scene;
+    struct sadmm_error error = {0};
+    sadmm_world *world = NULL;
+    const char *spec;
+    int code = cli_parse(&cli_run, argc, argv, set_option, &o, &spec);
+    if (code >= 0) return code;
+    if (sadmm_scene_open(spec, &scene, &error) != SADMM_OK) return cli_error(CLI_USAGE, "%s", error.message);
+    apply(&o, &scene);
+    if (o.steps < 0) o.steps = lround(fmin(scene.duration / scene.def.settings.dt, 1e9));
+    if (o.dump_path && o.dump_step > o.steps)
+        return cli_error(CLI_USAGE, "--dump-problem STEP %ld: must be in [1, %ld], the steps of this run", o.dump_step, o.steps);
+    if (o.dump_path && !sadmm_fclib_available()) {
+        sadmm_fclib_save(NULL, o.dump_path, NULL, &error);
+        return cli_error(CLI_FAILED, "%s", error.message);
+    }
+    if (sadmm_scene_build(&scene, &world, &error) != SADMM_OK) return cli_error(CLI_FAILED, "%s", error.message);
+    code = run_world(&o, spec, &scene, world);
+    sadmm_world_destroy(world);
+    return code;
+}
+
+const struct cli_command cli_run = {
+    .name = "run",
+    .operands = "SCENE",
+    .summary = "simulate a scene (subadmm scenes lists them)",
+    .options = options,
+    .option_count = sizeof options / sizeof *options,
+    .operands_min = 1,
+    .operands_max = 1,
+    .run = run,
+};

@@ -1,0 +1,197 @@
+/* subadmm scenes: the list, or one whole scene as JSON so that another program can rebuild it. */
+#include <string.h>
+
+#include "cli.h"
+#include "scenes/scenes.h"
+
+enum { OPTION_JSON };
+
+static const struct cli_option options[] = {
+    [OPTION_JSON] = {"json", "[FILE|-]", "write JSON to FILE, or to standard output (-, the default)"},
+};
+
+static int set_option(void *target, size_t index, const char *value)
+{
+    (void)index;
+    *(const char **)target = value ? value : "-";
+    return CLI_DONE;
+}
+
+/* ---- the list ------------------------------------------------------------------------------------------------- */
+
+static json_t *list_json(void)
+{
+    json_t *array = json_array();
+    for (size_t k = 0; k < sadmm_scene_count(); ++k) {
+        const struct sadmm_scene_info *info = sadmm_scene_at(k);
+        json_t *o = json_object();
+        json_object_set_new(o, "name", json_string(info->name));
+        json_object_set_new(o, "arguments", json_string(info->arguments));
+        json_object_set_new(o, "description", json_string(info->description));
+        json_object_set_new(o, "duration", cli_json_real(info->duration));
+        json_array_append_new(array, o);
+    }
+    return array;
+}
+
+static void list_text(void)
+{
+    for (size_t k = 0; k < sadmm_scene_count(); ++k) {
+        const struct sadmm_scene_info *info = sadmm_scene_at(k);
+        int width = printf("%s%s", info->name, info->arguments);
+        printf("%*s%6.3g s   %s\n", width < 24 ? 24 - width : 1, "", info->duration, info->description);
+    }
+}
+
+/* ---- one scene ------------------------------------------------------------------------------------------------ */
+
+static const char *const shape_names[SADMM_SHAPE_TYPE_COUNT] = {
+    [SADMM_SHAPE_PLANE] = "plane",
+    [SADMM_SHAPE_SPHERE] = "sphere",
+    [SADMM_SHAPE_CAPSULE] = "capsule",
+    [SADMM_SHAPE_BOX] = "box",
+};
+static const size_t shape_sizes[SADMM_SHAPE_TYPE_COUNT] = {
+    [SADMM_SHAPE_PLANE] = 0, [SADMM_SHAPE_SPHERE] = 1, [SADMM_SHAPE_CAPSULE] = 2, [SADMM_SHAPE_BOX] = 3,
+};
+
+static json_t *shape_json(const sadmm_shape_def *shape)
+{
+    json_t *o = json_object();
+    json_object_set_new(o, "type", json_string(shape_names[shape->type]));
+    json_object_set_new(o, "size", cli_json_reals(shape->size, shape_sizes[shape->type]));
+    json_object_set_new(o, "position", cli_json_reals(shape->position, 3));
+    json_object_set_new(o, "orientation", cli_json_reals(shape->orientation, 4));
+    json_object_set_new(o, "friction", cli_json_real(shape->friction));
+    json_object_set_new(o, "restitution", cli_json_real(shape->restitution));
+    json_object_set_new(o, "category", json_integer(shape->category));
+    json_object_set_new(o, "mask", json_integer(shape->mask));
+    return o;
+}
+
+static json_t *body_json(int32_t index, const sadmm_body_def *body)
+{
+    bool dynamic = body->type == SADMM_BODY_DYNAMIC;
+    json_t *o = json_object();
+    json_object_set_new(o, "index", json_integer(index));
+    json_object_set_new(o, "name", json_string(body->name ? body->name : ""));
+    json_object_set_new(o, "type", json_string(dynamic ? "dynamic" : "static"));
+    json_object_set_new(o, "mass", dynamic ? cli_json_real(body->mass) : json_null());
+    json_object_set_new(o, "inertia", dynamic ? cli_json_reals(body->inertia, 3) : json_null());
+    json_object_set_new(o, "position", cli_json_reals(body->position, 3));
+    json_object_set_new(o, "orientation", cli_json_reals(body->orientation, 4));
+    json_object_set_new(o, "linear_velocity", cli_json_reals(body->linear_velocity, 3));
+    json_object_set_new(o, "angular_velocity", cli_json_reals(body->angular_velocity, 3));
+    json_object_set_new(o, "environment", json_integer(body->environment));
+    json_object_set_new(o, "shapes", json_array());
+    return o;
+}
+
+static sadmm_status add_bodies(const sadmm_world *world, json_t *bodies)
+{
+    for (int32_t k = 0; k < sadmm_world_body_count(world); ++k) {
+        sadmm_body_id id;
+        sadmm_body_def def;
+        sadmm_status status = sadmm_world_body_at(world, k, &id);
+        if (status == SADMM_OK) status = sadmm_world_body_def(world, id, &def);
+        if (status != SADMM_OK) return status;
+        json_array_append_new(bodies, body_json(k, &def));
+    }
+    return SADMM_OK;
+}
+
+/* The entry of a body in the array: bodies are listed in order of their slots. */
+static json_t *find_body(const sadmm_world *world, json_t *bodies, sadmm_body_id wanted)
+{
+    int32_t lo = 0, hi = sadmm_world_body_count(world) - 1;
+    while (lo <= hi) {
+        int32_t middle = lo + (hi - lo) / 2;
+        sadmm_body_id id;
+        if (sadmm_world_body_at(world, middle, &id) != SADMM_OK) return NULL;
+        if (id.slot == wanted.slot) return json_array_get(bodies, (size_t)middle);
+        if (id.slot < wanted.slot) lo = middle + 1;
+        else hi = middle - 1;
+    }
+    return NULL;
+}
+
+static sadmm_status add_shapes(const sadmm_world *world, json_t *bodies)
+{
+    for (int32_t k = 0; k < sadmm_world_shape_count(world); ++k) {
+        sadmm_shape_id id;
+        sadmm_shape_def def;
+        sadmm_body_id body;
+        sadmm_status status = sadmm_world_shape_at(world, k, &id);
+        if (status == SADMM_OK) status = sadmm_world_shape_def(world, id, &def, &body);
+        if (status != SADMM_OK) return status;
+        json_array_append_new(json_object_get(find_body(world, bodies, body), "shapes"), shape_json(&def));
+    }
+    return SADMM_OK;
+}
+
+static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, json_t *bodies)
+{
+    static const char *const units = "SI; world frame; quaternions w x y z, body to world; inertia: principal moments in "
+                                     "the body's frame; box: half extents; capsule: radius, half length along z; plane: "
+                                     "half-space z <= 0 of its frame";
+    json_t *o = json_object();
+    json_object_set_new(o, "scene", json_string(spec));
+    json_object_set_new(o, "name", json_string(scene->info->name));
+    json_object_set_new(o, "n", *scene->info->arguments ? json_integer(scene->n) : json_null());
+    json_object_set_new(o, "description", json_string(scene->info->description));
+    json_object_set_new(o, "units", json_string(units));
+    json_object_set_new(o, "duration", cli_json_real(scene->duration));
+    json_object_set_new(o, "contact_margin", cli_json_real(scene->def.contact_margin));
+    json_object_set_new(o, "friction_of_a_pair", json_string("geometric mean"));
+    json_object_set_new(o, "settings", cli_json_settings(&scene->def.settings));
+    json_object_set_new(o, "bodies", bodies);
+    cli_json_add_build(o);
+    return o;
+}
+
+static int show_scene(const char *spec, const char *destination)
+{
+    struct sadmm_scene scene;
+    struct sadmm_error error = {0};
+    sadmm_world *world = NULL;
+    if (sadmm_scene_open(spec, &scene, &error) != SADMM_OK) return cli_error(CLI_USAGE, "%s", error.message);
+    if (sadmm_scene_build(&scene, &world, &error) != SADMM_OK) return cli_error(CLI_FAILED, "%s", error.message);
+    if (!destination) {
+        printf("%s%s: %s\n%d bodies, %d shapes, %g s, dt = %g s, %d iterations (--json for all of it)\n", scene.info->name,
+               scene.info->arguments, scene.info->description, sadmm_world_body_count(world),
+               sadmm_world_shape_count(world), scene.duration, scene.def.settings.dt, scene.def.settings.iterations);
+        sadmm_world_destroy(world);
+        return CLI_DONE;
+    }
+    json_t *bodies = json_array();
+    int code;
+    if (add_bodies(world, bodies) == SADMM_OK && add_shapes(world, bodies) == SADMM_OK) {
+        code = cli_write_json(scene_json(spec, &scene, bodies), destination);
+    } else {
+        json_decref(bodies);
+        code = cli_error(CLI_FAILED, "%s", sadmm_world_message(world));
+    }
+    sadmm_world_destroy(world);
+    return code;
+}
+
+static int run(int argc, char **argv)
+{
+    const char *json = NULL, *operands[1];
+    int code = cli_parse(&cli_scenes, argc, argv, set_option, &json, operands);
+    if (code >= 0) return code;
+    if (operands[0]) return show_scene(operands[0], json);
+    if (json) return cli_write_json(list_json(), json);
+    list_text();
+    return CLI_DONE;
+}
+
+const struct cli_command cli_scenes = {
+    .name = "scenes",
+    .operands = "[SCENE]",
+    .summary = "list the scenes, or describe one",
+    .options = options,
+    .option_count = sizeof options / sizeof *options,
+    .operands_max = 1,
+    .run = run,
+};

@@ -1,0 +1,199 @@
+/* subadmm solve: one contact problem from a file, to a tolerance. */
+#include <math.h>
+#include <string.h>
+
+#include "cli.h"
+#include "fclib/fclib.h"
+#include "fclib/global_problem.h"
+#include "solve_loop.h"
+
+enum {
+    OPTION_BACKEND, OPTION_PRECISION, OPTION_TOLERANCE, OPTION_MAX_ITERATIONS, OPTION_CHECK_PERIOD, OPTION_LEVEL,
+    OPTION_MASS_FACTOR, OPTION_PENALTY_PERIOD, OPTION_THREADS, OPTION_SOLUTION, OPTION_JSON, OPTION_QUIET
+};
+
+static const struct cli_option options[] = {
+    [OPTION_BACKEND] = {"backend", "NAME", "auto, ref, cpu or cuda (default auto)"},
+    [OPTION_PRECISION] = {"precision", "P", "f32 or f64 (default f64)"},
+    [OPTION_TOLERANCE] = {"tolerance", "T", "of siconos' measure (default 1e-8; f32: 1e-6)"},
+    [OPTION_MAX_ITERATIONS] = {"max-iterations", "N", "give up after (default 100000)"},
+    [OPTION_CHECK_PERIOD] = {"check-period", "N", "iterations between looks at the error (default 100)"},
+    [OPTION_LEVEL] = {"penalty-offset", "KG", "c of eq. (13), kg (default: tried automatically from the mean mass)"},
+    [OPTION_MASS_FACTOR] = {"penalty-mass-factor", "M", "M of eq. (13) (default 0)"},
+    [OPTION_PENALTY_PERIOD] = {"penalty-period", "N", "iterations between penalty updates, 0 = never (default 30)"},
+    [OPTION_THREADS] = {"threads", "N", "CPU threads, 0 = all (default)"},
+    [OPTION_SOLUTION] = {"solution", "FILE", "write a copy of the problem's file with this solution in it"},
+    [OPTION_JSON] = {"json", "[FILE|-]", "write JSON to FILE, or to standard output (-, the default)"},
+    [OPTION_QUIET] = {"quiet", NULL, "no table"},
+};
+
+struct solve_options {
+    struct solve_plan plan;
+    bool tolerance_given, quiet;
+    const char *json, *solution;
+};
+
+static bool read_small_int(const char *option, const char *text, long lo, long hi, int *out)
+{
+    long value;
+    if (!cli_read_int(option, text, lo, hi, &value)) return false;
+    *out = (int)value;
+    return true;
+}
+
+static int set_option(void *target, size_t index, const char *value)
+{
+    struct solve_options *o = target;
+    sadmm_settings *s = &o->plan.settings;
+    bool ok = true;
+    switch (index) {
+    case OPTION_BACKEND: ok = cli_read_backend("--backend", value, &o->plan.backend); break;
+    case OPTION_PRECISION: ok = cli_read_precision("--precision", value, &o->plan.precision); break;
+    case OPTION_TOLERANCE:
+        ok = cli_read_real("--tolerance", value, 0, 1, &o->plan.tolerance);
+        o->tolerance_given = true;
+        break;
+    case OPTION_MAX_ITERATIONS: ok = cli_read_int("--max-iterations", value, 1, 1000000000, &o->plan.max_iterations); break;
+    case OPTION_CHECK_PERIOD: ok = read_small_int("--check-period", value, 1, 1000000, &o->plan.stretch); break;
+    case OPTION_LEVEL: ok = cli_read_real("--penalty-offset", value, 1e-12, 1e12, &o->plan.level); break;
+    case OPTION_MASS_FACTOR: ok = cli_read_real("--penalty-mass-factor", value, 0, 1e12, &s->penalty_mass_factor); break;
+    case OPTION_PENALTY_PERIOD: ok = read_small_int("--penalty-period", value, 0, 1000000, &s->penalty_period); break;
+    case OPTION_THREADS: ok = read_small_int("--threads", value, 0, 1024, &s->threads); break;
+    case OPTION_SOLUTION: o->solution = value; break;
+    case OPTION_JSON: o->json = value ? value : "-"; break;
+    case OPTION_QUIET: o->quiet = true; break;
+    }
+    return ok ? CLI_DONE : CLI_USAGE;
+}
+
+/* ---- reports ---------------------------------------------------------------------------------------------------- */
+
+static json_t *certificate_json(const sadmm_certificate *c)
+{
+    json_t *o = json_object();
+    json_object_set_new(o, "siconos", cli_json_real(c->siconos));
+    json_object_set_new(o, "ncp_max", cli_json_real(c->ncp_max));
+    json_object_set_new(o, "ncp_mean", cli_json_real(c->ncp_mean));
+    json_object_set_new(o, "ncp_worst", c->ncp_worst >= 0 ? json_integer(c->ncp_worst) : json_null());
+    json_object_set_new(o, "momentum_max", cli_json_real(c->momentum_max));
+    json_object_set_new(o, "momentum_worst", c->momentum_worst >= 0 ? json_integer(c->momentum_worst) : json_null());
+    return o;
+}
+
+static json_t *triples_json(const double *x, int32_t count)
+{
+    json_t *array = json_array();
+    for (int32_t k = 0; k < count; ++k) json_array_append_new(array, cli_json_reals(x + 3 * (size_t)k, 3));
+    return array;
+}
+
+static json_t *outcome_json(const char *path, const struct solve_options *o, const struct solve_outcome *out,
+                            const struct sadmm_global_solution *s)
+{
+    json_t *root = json_object(), *penalty = json_object();
+    json_object_set_new(root, "file", json_string(path));
+    json_object_set_new(root, "backend", json_string(cli_backend_name(out->report.backend)));
+    json_object_set_new(root, "precision", json_string(cli_precision_name(out->report.precision)));
+    json_object_set_new(root, "method", json_string("paper"));
+    json_object_set_new(root, "bodies", json_integer(s->bodies));
+    json_object_set_new(root, "contacts", json_integer(s->contacts));
+    json_object_set_new(root, "hard_rows", json_integer(s->hard_rows));
+    json_object_set_new(root, "converged", json_boolean(out->converged));
+    json_object_set_new(root, "tolerance", cli_json_real(o->plan.tolerance));
+    json_object_set_new(root, "iterations", json_integer(out->iterations));
+    json_object_set_new(root, "ms", cli_json_real(out->ms));
+    json_object_set_new(root, "threads", json_integer(out->report.threads));
+    json_object_set_new(penalty, "mass_factor", cli_json_real(o->plan.settings.penalty_mass_factor));
+    json_object_set_new(penalty, "offset_kg", cli_json_real(out->level));
+    json_object_set_new(penalty, "offsets_tried", json_integer(out->levels_tried));
+    json_object_set_new(penalty, "period", json_integer(o->plan.settings.penalty_period));
+    json_object_set_new(root, "penalty", penalty);
+    json_object_set_new(root, "certificate", certificate_json(&out->certificate));
+    json_object_set_new(root, "u", triples_json(s->u, s->contacts));
+    json_object_set_new(root, "r", triples_json(s->r, s->contacts));
+    json_object_set_new(root, "v", cli_json_reals(s->v, 6 * (size_t)s->bodies));
+    json_object_set_new(root, "l", cli_json_reals(s->l, (size_t)s->hard_rows));
+    cli_json_add_build(root);
+    json_object_set_new(root, "device", cli_json_device(out->report.backend));
+    return root;
+}
+
+static void print_outcome(const char *path, const struct solve_options *o, const struct solve_outcome *out,
+                          const struct sadmm_global_solution *s)
+{
+    const sadmm_certificate *c = &out->certificate;
+    double closing = 0, sliding = 0, largest = 0;
+    for (int32_t k = 0; k < s->contacts; ++k) {
+        const double *u = s->u + 3 * (size_t)k, *r = s->r + 3 * (size_t)k;
+        closing = fmin(closing, u[0]);
+        sliding = fmax(sliding, hypot(u[1], u[2]));
+        largest = fmax(largest, r[0]);
+    }
+    printf("problem        %s: %d bodies, %d contacts, %d bilateral rows\n", path, s->bodies, s->contacts, s->hard_rows);
+    printf("backend        %s %s, %d thread%s\n", cli_backend_name(out->report.backend),
+           cli_precision_name(out->report.precision), out->report.threads, out->report.threads == 1 ? "" : "s");
+    printf("solve          %s after %ld iterations, %.3f ms (penalty offset %.3g kg, %d tried)\n",
+           out->converged ? "converged" : "NOT converged", out->iterations, out->ms, out->level, out->levels_tried);
+    printf("siconos        %.3g (tolerance %g)\n", c->siconos, o->plan.tolerance);
+    printf("certificate    ncp %.3g m/s at most, %.3g mean; momentum %.3g\n", c->ncp_max, c->ncp_mean, c->momentum_max);
+    printf("velocities u   closing %.3g m/s at most, sliding %.3g m/s at most\n", closing < 0 ? -closing : 0, sliding);
+    printf("impulses r     normal %.3g N s at most\n", largest);
+}
+
+/* ---- the solve -------------------------------------------------------------------------------------------------- */
+
+static int solve_problem(sadmm_problem *problem, const char *path, const struct solve_options *o)
+{
+    struct solve_outcome out;
+    struct sadmm_global_solution solution;
+    struct sadmm_error error = {0};
+    if (solve_loop(problem, &o->plan, &out, &error) != SADMM_OK ||
+        sadmm_global_solution_from_problem(problem, &solution, &error) != SADMM_OK)
+        return cli_error(CLI_FAILED, "%s: %s", path, error.message);
+    int code = CLI_DONE;
+    if (!out.converged)
+        code = cli_error(CLI_FAILED, "%s: not converged: siconos' measure is %.3g after %ld iterations, %g was asked for",
+                         path, out.certificate.siconos, out.iterations, o->plan.tolerance);
+    if (!o->quiet && !(o->json && strcmp(o->json, "-") == 0)) print_outcome(path, o, &out, &solution);
+    if (o->json) {
+        int written = cli_write_json(outcome_json(path, o, &out, &solution), o->json);
+        if (code == CLI_DONE) code = written;
+    }
+    if (o->solution && sadmm_fclib_save_solution(problem, path, o->solution, &error) != SADMM_OK)
+        code = cli_error(CLI_FAILED, "%s", error.message);
+    sadmm_global_solution_free(&solution);
+    return code;
+}
+
+static int run(int argc, char **argv)
+{
+    struct solve_options o = {
+        .plan = {.precision = SADMM_F64, .settings = sadmm_settings_default(), .max_iterations = 100000, .stretch = 100},
+    };
+    struct sadmm_error error = {0};
+    sadmm_problem *problem = NULL;
+    const char *path;
+    o.plan.settings.dt = 1; /* the problem has no time step: offsets are in kg as they are */
+    o.plan.settings.penalty_mass_factor = 0;
+    int code = cli_parse(&cli_solve, argc, argv, set_option, &o, &path);
+    if (code >= 0) return code;
+    if (!o.tolerance_given) o.plan.tolerance = o.plan.precision == SADMM_F32 ? 1e-6 : 1e-8;
+    if (sadmm_fclib_load(path, &problem, &error) != SADMM_OK)
+        return cli_error(CLI_FAILED, "%s: %s", path, error.message);
+    code = solve_problem(problem, path, &o);
+    sadmm_problem_destroy(problem);
+    return code;
+}
+
+const struct cli_command cli_solve = {
+    .name = "solve",
+    .operands = "FILE.hdf5",
+    .summary = "solve an FCLIB problem file to a tolerance",
+    .text = "Reads a global 3D friction contact problem (FCLIB's HDF5 layout) of rigid bodies and solves it until siconos'\n"
+            "global error measure is below the tolerance. Single precision usually ends near 1e-7.\n",
+    .options = options,
+    .option_count = sizeof options / sizeof *options,
+    .operands_min = 1,
+    .operands_max = 1,
+    .run = run,
+};

@@ -1,0 +1,133 @@
+/* A run's record as JSON and as a table. What was not measured is null, or left out. */
+#include <inttypes.h>
+#include <math.h>
+#include <string.h>
+
+#include "run_record.h"
+
+static const char *const phase_names[RUN_PHASES] = {
+    [RUN_TOTAL] = "total", [RUN_COLLIDE] = "collide", [RUN_ASSEMBLE] = "assemble",
+    [RUN_SOLVE] = "solve", [RUN_FINISH] = "finish",
+};
+
+static json_t *times_json(const struct run_record *record)
+{
+    json_t *o = json_object();
+    for (int k = 0; k < RUN_PHASES; ++k) {
+        double median, p95;
+        json_t *phase = json_null();
+        if (record->steps > 0 && run_percentiles(record->ms[k], record->steps, &median, &p95)) {
+            phase = json_object();
+            json_object_set_new(phase, "median", cli_json_real(median));
+            json_object_set_new(phase, "p95", cli_json_real(p95));
+        }
+        json_object_set_new(o, phase_names[k], phase);
+    }
+    return o;
+}
+
+static json_t *residual_json(const struct sadmm_residual *residual)
+{
+    json_t *o = json_object();
+    bool measured = residual->primal >= 0;
+    json_object_set_new(o, "primal", measured ? cli_json_real(residual->primal) : json_null());
+    json_object_set_new(o, "dual", measured ? cli_json_real(residual->dual) : json_null());
+    return o;
+}
+
+static json_t *certificate_json(const struct run_record *record)
+{
+    const sadmm_certificate *c = &record->last.certificate;
+    /* A NaN certificate is a measured one: it becomes null by itself. */
+    if (record->steps == 0 || c->ncp_max == -1) return json_null();
+    json_t *o = json_object();
+    json_object_set_new(o, "ncp_max", cli_json_real(c->ncp_max));
+    json_object_set_new(o, "ncp_mean", cli_json_real(c->ncp_mean));
+    json_object_set_new(o, "momentum_max", cli_json_real(c->momentum_max));
+    json_object_set_new(o, "ncp_max_run", cli_json_real(record->ncp_max));
+    json_object_set_new(o, "momentum_max_run", cli_json_real(record->momentum_max));
+    return o;
+}
+
+static json_t *contacts_json(const struct run_record *record)
+{
+    json_t *o = json_object();
+    bool any = record->steps > 0;
+    json_object_set_new(o, "mean", any ? cli_json_real(record->contacts_sum / (double)record->steps) : json_null());
+    json_object_set_new(o, "max", any ? json_integer(record->contacts_max) : json_null());
+    return o;
+}
+
+/* Set what only a step tells, or null before the first. */
+static void set_or_null(json_t *o, const char *name, const struct run_record *record, json_t *value)
+{
+    if (record->steps > 0) {
+        json_object_set_new(o, name, value);
+    } else {
+        json_decref(value);
+        json_object_set_new(o, name, json_null());
+    }
+}
+
+json_t *run_record_json(const struct run_record *record, const char *spec, const struct sadmm_scene *scene)
+{
+    const sadmm_step_report *last = &record->last;
+    char hash[17];
+    json_t *o = json_object();
+    snprintf(hash, sizeof hash, "%016" PRIx64, record->hash);
+    json_object_set_new(o, "scene", json_string(spec));
+    set_or_null(o, "backend", record, json_string(cli_backend_name(last->backend)));
+    json_object_set_new(o, "precision", json_string(cli_precision_name(scene->def.precision)));
+    json_object_set_new(o, "method", json_string("paper"));
+    json_object_set_new(o, "bodies", json_integer((json_int_t)record->body_count));
+    set_or_null(o, "joints", record, json_integer(last->joints));
+    json_object_set_new(o, "contacts", contacts_json(record));
+    json_object_set_new(o, "steps", json_integer((json_int_t)record->steps));
+    json_object_set_new(o, "dt", cli_json_real(scene->def.settings.dt));
+    json_object_set_new(o, "iterations", json_integer(scene->def.settings.iterations));
+    json_object_set_new(o, "warm_start", json_boolean(scene->def.settings.warm_start));
+    set_or_null(o, "threads", record, json_integer(last->threads));
+    json_object_set_new(o, "ms_per_step", times_json(record));
+    if (record->steps > 0) json_object_set_new(o, "residual", residual_json(&last->residual));
+    else json_object_set_new(o, "residual", json_null());
+    json_object_set_new(o, "certificate", certificate_json(record));
+    set_or_null(o, "penetration_max", record, cli_json_real(record->penetration_max));
+    json_object_set_new(o, "speed_max_final", cli_json_real(record->speed_max));
+    json_object_set_new(o, "displacement_max", cli_json_real(record->displacement_max));
+    json_object_set_new(o, "state_hash", json_string(hash));
+    json_object_set_new(o, "finite", json_boolean(record->finite));
+    json_object_set_new(o, "error", *record->failure ? json_string(record->failure) : json_null());
+    cli_json_add_build(o);
+    json_object_set_new(o, "device", record->steps > 0 ? cli_json_device(last->backend) : json_null());
+    json_object_set_new(o, "settings", cli_json_settings(&scene->def.settings));
+    return o;
+}
+
+void run_record_print(const struct run_record *record, const char *spec, const struct sadmm_scene *scene)
+{
+    const sadmm_step_report *last = &record->last;
+    const sadmm_certificate *c = &last->certificate;
+    printf("scene          %s, %zu bodies\n", spec, record->body_count);
+    printf("steps          %zu of %g s\n", record->steps, scene->def.settings.dt);
+    if (record->steps > 0) {
+        printf("backend        %s %s, %d thread%s, %d iterations a step\n", cli_backend_name(last->backend),
+               cli_precision_name(last->precision), last->threads, last->threads == 1 ? "" : "s",
+               scene->def.settings.iterations);
+        printf("contacts       %.1f mean, %d max\n", record->contacts_sum / (double)record->steps, record->contacts_max);
+        printf("ms per step    %10s %10s\n", "median", "p95");
+    }
+    for (int k = 0; k < RUN_PHASES; ++k) {
+        double median, p95;
+        if (record->steps > 0 && run_percentiles(record->ms[k], record->steps, &median, &p95))
+            printf("  %-12s %10.4f %10.4f\n", phase_names[k], median, p95);
+    }
+    if (record->steps > 0 && last->residual.primal >= 0)
+        printf("residual       primal %.3g m/s, dual %.3g N s (last step)\n", last->residual.primal, last->residual.dual);
+    if (record->steps > 0 && c->ncp_max != -1)
+        printf("certificate    ncp %.3g m/s (largest of the run %.3g), momentum %.3g (%.3g)\n", c->ncp_max,
+               record->ncp_max, c->momentum_max, record->momentum_max);
+    if (record->steps > 0) printf("penetration    %.3g m at most\n", record->penetration_max);
+    printf("final state    fastest %.3g m/s, moved %.3g m at most, %s, hash %016" PRIx64 "\n", record->speed_max,
+           record->displacement_max, record->finite ? "finite" : "NOT FINITE", record->hash);
+    if (*record->failure) printf("FAILED         %s\n", record->failure);
+}

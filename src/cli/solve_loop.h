@@ -1,0 +1,37 @@
+/* Solve a problem until siconos' measure is small enough.
+ *
+ * Stretches of iterations, each a warm continuation of the one before, with the certificate between them. The penalty
+ * is beta = M Tr(A)/Tr(C) + level (eq. 13) with M = 0 unless asked for: near-uniform weights converge where
+ * mass-proportional ones stall, but which level is best differs from problem to problem (docs/algorithm.md). So the
+ * level starts at the mean mass of the bodies and, when the measure stalls, goes on with another one.
+ */
+#ifndef SADMM_CLI_SOLVE_LOOP_H
+#define SADMM_CLI_SOLVE_LOOP_H
+
+#include "cli.h"
+
+struct solve_plan {
+    sadmm_backend backend;
+    sadmm_precision precision;
+    sadmm_settings settings;  /* iterations and warm_start are the loop's */
+    double tolerance;         /* of siconos' measure */
+    long max_iterations;
+    int stretch;              /* iterations between looks */
+    double level;             /* kg; 0: chosen and changed automatically */
+};
+
+struct solve_outcome {
+    bool converged;
+    long iterations;
+    double ms;                /* solving, without the certificates */
+    double level;             /* kg, the last one used */
+    int levels_tried;
+    sadmm_solve_report report;/* of the last stretch */
+    sadmm_certificate certificate; /* of the solution left in the problem: the best one seen */
+};
+
+/* Errors: those of sadmm_problem_solve; `error` holds the message. */
+sadmm_status solve_loop(sadmm_problem *problem, const struct solve_plan *plan, struct solve_outcome *outcome,
+                        struct sadmm_error *error);
+
+#endif

@@ -1,0 +1,31 @@
+/* One scene of the library, as scenes.c sees it. Every family of scenes has a file that defines some of these and is
+ * listed in scenes.c. */
+#ifndef SADMM_SCENES_FAMILY_H
+#define SADMM_SCENES_FAMILY_H
+
+#include "scenes.h"
+
+struct sadmm_scene_family {
+    struct sadmm_scene_info info;
+    long n_default, n_min, n_max; /* the N of "name:N"; n_max = 0: the scene takes no size */
+
+    /* Fill the settings of the scene (dt, iterations, m, margin) in a default definition. */
+    void (*configure)(long n, sadmm_world_def *def);
+    /* Fill an empty world made from scene->def. */
+    sadmm_status (*fill)(const struct sadmm_scene *scene, sadmm_world *world, struct sadmm_error *error);
+    /* (optional) Scripted input before each step. */
+    sadmm_status (*before_step)(const struct sadmm_scene *scene, sadmm_world *world, int64_t step,
+                                struct sadmm_error *error);
+};
+
+extern const struct sadmm_scene_family sadmm_family_sliding_cubes;
+extern const struct sadmm_scene_family sadmm_family_vertical_stacks;
+extern const struct sadmm_scene_family sadmm_family_oblique_stacks;
+extern const struct sadmm_scene_family sadmm_family_card_houses;
+extern const struct sadmm_scene_family sadmm_family_pyramid;
+extern const struct sadmm_scene_family sadmm_family_pile;
+extern const struct sadmm_scene_family sadmm_family_incline;
+extern const struct sadmm_scene_family sadmm_family_bounce;
+extern const struct sadmm_scene_family sadmm_family_spin_plate;
+
+#endif

@@ -1,0 +1,80 @@
+/* A heap: N boxes in all orientations fall from a loose grid. Contacts come and go, islands merge, no two contacts are
+ * alike. Orientations, sizes and offsets come from an integer hash of the index, the same on every machine.
+ */
+#include <math.h>
+#include <stdint.h>
+
+#include "core/math/quat.h"
+#include "family.h"
+#include "place.h"
+
+static const double spacing = 0.2; /* m: more than the diagonal of either box */
+
+/* Finaliser of MurmurHash3: all bits of the result depend on all bits of x. */
+static uint64_t hash(uint64_t x)
+{
+    x ^= x >> 33;
+    x *= 0xff51afd7ed558ccdu;
+    x ^= x >> 33;
+    x *= 0xc4ceb9fe1a85ec53u;
+    return x ^ x >> 33;
+}
+
+/* The k-th number in [-1, 1) of body i. */
+static double noise(long i, uint64_t k)
+{
+    return (double)(hash((uint64_t)i * 4096 + k + 1) >> 11) * 0x1p-52 - 1.0;
+}
+
+/* Uniform over all orientations: a point of the 4-cube that falls into the ball, normalised. A try succeeds with
+ * probability 0.31, so the last resort after 1000 is for the proof only. */
+static quat random_orientation(long i)
+{
+    for (uint64_t k = 0; k < 4000; k += 4) {
+        quat q = { noise(i, k), noise(i, k + 1), noise(i, k + 2), noise(i, k + 3) };
+        double norm2 = q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z;
+        if (norm2 > 0.01 && norm2 <= 1.0) return q_normalize(q);
+    }
+    return (quat){ 1, 0, 0, 0 };
+}
+
+static sadmm_status fill(const struct sadmm_scene *scene, sadmm_world *world, struct sadmm_error *error)
+{
+    static const struct sadmm_piece pieces[2] = {
+        { .half_extents = { 0.05, 0.05, 0.05 }, .mass = 1.0, .friction = 0.5 },
+        { .half_extents = { 0.08, 0.04, 0.04 }, .mass = 1.0, .friction = 0.5 },
+    };
+    sadmm_status status = sadmm_place_plane(world, sadmm_frame_world(), 0.5, error);
+    /* A column about twice as high as wide: it spreads into a heap. */
+    long side = (long)fmax(1.0, round(cbrt((double)scene->n / 2.0)));
+
+    for (long i = 0; i < scene->n && status == SADMM_OK; ++i) {
+        long column = i % side, row = i / side % side, layer = i / (side * side);
+        double x = spacing * ((double)column - 0.5 * (double)(side - 1));
+        double y = spacing * ((double)row - 0.5 * (double)(side - 1));
+        struct sadmm_frame place = sadmm_frame_moved(sadmm_frame_world(), x, y, spacing * ((double)layer + 0.6));
+        q_store(random_orientation(i), place.orientation);
+        status = sadmm_place_box(world, place, &pieces[i % 2], NULL, error);
+    }
+    return status;
+}
+
+static void configure(long n, sadmm_world_def *def)
+{
+    (void)n;
+    def->settings.dt = 0.005;
+    def->settings.iterations = 100;
+    def->settings.penalty_period = 30;
+}
+
+const struct sadmm_scene_family sadmm_family_pile = {
+    .info = {
+        .name = "pile",
+        .arguments = "[:N]",
+        .description = "N boxes falling into a heap (N in [1, 1000000], default 1000)",
+        .duration = 3.0,
+    },
+    .n_default = 1000, .n_min = 1, .n_max = 1000000,
+    .configure = configure,
+    .fill = fill,
+};
