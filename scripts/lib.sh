@@ -1,0 +1,71 @@
+# shellcheck shell=bash
+# What the scripts of this folder share: the project's folder, its packages, building and testing one configuration.
+
+# shellcheck disable=SC2034 # used by the scripts that source this
+project=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+jobs=${JOBS:-$(nproc)}
+
+# Debian's and Ubuntu's names. "package=command": having the command is enough.
+packages_to_run=(gcc=cc 'g++=c++' meson=meson ninja-build=ninja pkgconf=pkg-config libfcl-dev libjansson-dev)
+packages_to_test=("${packages_to_run[@]}" git=git libhdf5-dev check clang=clang libomp-dev util-linux=setarch)
+# Used where the release offers them: they went by other names, or not at all, in some.
+packages_to_test_if_offered=(libclang-rt-dev libsiconos-numerics-dev)
+
+say() { printf '\n==> %s\n' "$*"; }
+fail() { printf 'error: %s\n' "$*" >&2; exit 1; }
+
+package_installed() { [[ $(dpkg-query -W -f='${Status}' "$1" 2>/dev/null) == 'install ok installed' ]]; }
+
+# missing_packages ENTRY...: those that are not there, into the array `missing`
+missing_packages() {
+    local entry package command
+    missing=()
+    for entry in "$@"; do
+        package=${entry%%=*} command=${entry#*=}
+        if [[ $entry == *=* ]] && command -v "$command" >/dev/null; then continue; fi
+        package_installed "$package" || missing+=("$package")
+    done
+}
+
+# install_packages ENTRY...: install what is missing as root or by sudo without a password, or say what to install
+install_packages() {
+    local as_root=() missing
+    if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
+        echo "not Debian or Ubuntu: nothing is installed, these packages or their like must be there: ${*%%=*}"
+        return
+    fi
+    missing_packages "$@"
+    ((${#missing[@]})) || return 0
+    if ((EUID != 0)); then
+        if ! command -v sudo >/dev/null || ! sudo -n true 2>/dev/null; then
+            fail "packages are missing, and this is neither root nor can it use sudo without a password. Run this, then try again:
+    apt-get install ${missing[*]}"
+        fi
+        as_root=(sudo -n)
+    fi
+    say "Installing ${missing[*]}"
+    "${as_root[@]}" apt-get update -qq
+    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
+}
+
+# install_packages_if_offered ENTRY...: the same for those this release has and this user may install; others are named
+install_packages_if_offered() {
+    local package missing
+    command -v apt-cache >/dev/null || return 0
+    missing_packages "$@"
+    for package in "${missing[@]}"; do
+        if apt-cache show "$package" >/dev/null 2>&1; then
+            install_packages "$package"
+        else
+            echo "this release has no package $package: what needs it is skipped"
+        fi
+    done
+}
+
+# configure FOLDER OPTION...: meson setup, or the same again in a folder that exists; quiet unless it fails
+configure() {
+    local folder=$1 output again=()
+    shift
+    [[ -f $folder/build.ninja ]] && again=(--reconfigure)
+    output=$(meson setup "${again[@]}" "$folder" "$project" "$@" 2>&1) || { printf '%s\n' "$output"; return 1; }
+}

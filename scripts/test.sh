@@ -1,0 +1,140 @@
+#!/usr/bin/env bash
+# Everything that must hold before a change goes in.
+set -euo pipefail
+# shellcheck source=scripts/lib.sh
+source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+
+steps=(plain asan tsan minimal cuda)
+
+usage() {
+    cat <<TXT
+usage: scripts/test.sh [--slow] [--only STEP]... [--help]
+
+Installs what is missing (Debian and Ubuntu, as root or by sudo without a password; else says what to install), then:
+    plain    every feature but CUDA, warnings are errors, the whole suite
+    asan     address and undefined-behaviour sanitizers, the whole suite
+    tsan     thread sanitizer, the tests of suite 'threads'
+    minimal  no optional feature, no instruction set beyond the compiler's default, the whole suite
+    cuda     when nvcc is found: the CUDA backend compiles; its tests run where there is a GPU
+The last line sums up the checks of all steps. Exit status 0: nothing failed.
+
+--slow       run the tests of suite 'slow' too (in step plain)
+--only STEP  this step only; may be given more than once
+JOBS=n       compile and test with n jobs instead of all cores
+
+Build folders are build-STEP/; they are kept, so that a second run is quick.
+TXT
+}
+
+slow=false
+only=()
+while (($#)); do
+    case $1 in
+        --slow) slow=true ;;
+        --only)
+            [[ " ${steps[*]} " == *" ${2:-} "* ]] || fail "--only ${2:-}: must be one of ${steps[*]}"
+            only+=("$2")
+            shift
+            ;;
+        --help | -h) usage; exit ;;
+        *) usage >&2; fail "unknown argument $1" ;;
+    esac
+    shift
+done
+((${#only[@]})) && steps=("${only[@]}")
+
+install_packages "${packages_to_test[@]}"
+install_packages_if_offered "${packages_to_test_if_offered[@]}"
+
+# Features are demanded, not hoped for: a missing package must not pass for a shorter suite.
+features=(-Dwerror=true -Dfcl=enabled -Dopenmp=enabled -Dhdf5=enabled -Dcli=enabled -Dbench=enabled -Dtests=enabled)
+package_installed libsiconos-numerics-dev && features+=(-Dsiconos=enabled)
+
+logs=()        # testlog.json of each step that ran
+broken=()      # steps that did not build
+left_out=()    # steps that could not run here
+
+# build STEP OPTION...
+build() {
+    local step=$1
+    shift
+    configure "$project/build-$step" "$@" && ninja -C "$project/build-$step" -j "$jobs" --quiet
+}
+
+# run_tests STEP ARGUMENT...
+run_tests() {
+    local step=$1 folder=$project/build-$1
+    shift
+    rm -f "$folder/meson-logs/testlog.json"
+    meson test -C "$folder" --no-rebuild --num-processes "$jobs" --print-errorlogs --quiet "$@" || true
+    logs+=("$folder/meson-logs/testlog.json")
+}
+
+# Sanitizers of older compilers cannot place their shadow memory when a kernel randomises addresses with 32 bits.
+unrandomised=()
+if setarch "$(uname -m)" -R true 2>/dev/null; then
+    unrandomised=(--wrapper "setarch $(uname -m) -R")
+fi
+
+step_plain() {
+    say "plain: every feature but CUDA, warnings are errors"
+    build plain "${features[@]}" -Dcuda=disabled || return 1
+    if $slow; then run_tests plain; else run_tests plain --no-suite slow; fi
+}
+
+step_asan() {
+    say "asan: address and undefined-behaviour sanitizers"
+    build asan --native-file "$project/presets/asan.ini" "${features[@]}" -Dcpu_isas=avx2 || return 1
+    run_tests asan --no-suite slow "${unrandomised[@]}"
+}
+
+step_tsan() {
+    say "tsan: thread sanitizer"
+    build tsan --native-file "$project/presets/tsan.ini" "${features[@]}" -Dcpu_isas=avx2 || return 1
+    if ! meson test -C "$project/build-tsan" --no-rebuild --quiet "${unrandomised[@]}" omp_clean >/dev/null; then
+        # The program itself says which it is.
+        local output
+        output=$("$project/build-tsan/tests/omp_clean" 2>&1 || true)
+        if [[ $output == *'unexpected memory mapping'* || $output == *ADDR_NO_RANDOMIZE* ]]; then
+            echo "the thread sanitizer cannot start here: the kernel randomises addresses too much for it and forbids to turn" \
+                "that off (run as root: sysctl vm.mmap_rnd_bits=28)"
+            left_out+=(tsan)
+            return
+        fi
+    fi
+    run_tests tsan --suite threads "${unrandomised[@]}"
+}
+
+step_minimal() {
+    say "minimal: no FCL, CUDA, HDF5 or OpenMP, no instruction set beyond the compiler's default"
+    build minimal -Dwerror=true -Dtests=enabled -Dcli=enabled -Dbench=enabled -Dfcl=disabled -Dcuda=disabled \
+        -Dhdf5=disabled -Dopenmp=disabled -Dsiconos=disabled -Dcpu_isas=baseline || return 1
+    run_tests minimal --no-suite slow
+}
+
+step_cuda() {
+    if ! command -v nvcc >/dev/null && [[ ! -x /usr/local/cuda/bin/nvcc ]]; then
+        say "cuda: left out, nvcc was not found"
+        left_out+=(cuda)
+        return
+    fi
+    say "cuda: the CUDA backend"
+    build cuda "${features[@]}" -Dcuda=enabled || return 1
+    if command -v nvidia-smi >/dev/null && nvidia-smi -L 2>/dev/null | grep -q GPU; then
+        run_tests cuda --no-suite slow
+    else
+        echo "compiled; no GPU here, its tests were not run"
+    fi
+}
+
+for step in "${steps[@]}"; do
+    started=$SECONDS
+    if ! "step_$step"; then
+        broken+=("$step")
+        echo "step $step did not build"
+    fi
+    echo "step $step took $((SECONDS - started)) s"
+done
+
+say "Sum"
+exec python3 "$project/scripts/sum_tests.py" --broken "${broken[*]}" --left-out "${left_out[*]}" "${logs[@]}"

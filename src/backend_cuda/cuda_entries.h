@@ -1,0 +1,35 @@
+/* The entries of the kernel table for one precision, in C: CUDA(name) is set by the includer. */
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* NULL, or why no device can be used; *about (static storage) says what was found. */
+bool CUDA(probe)(const char **about);
+void CUDA(set_tier)(struct sadmm_context *, enum sadmm_cuda_tier tier);
+enum sadmm_cuda_tier CUDA(get_tier)(const struct sadmm_context *, int32_t *blocks);
+
+sadmm_status CUDA(create)(int device, struct sadmm_context **out, struct sadmm_error *error);
+void CUDA(destroy)(struct sadmm_context *);
+sadmm_status CUDA(find_contacts)(struct sadmm_context *, struct sadmm_collision *, const struct sadmm_collision_input *,
+                                 struct sadmm_contact_set *, struct sadmm_error *);
+sadmm_status CUDA(begin)(struct sadmm_context *, const struct sadmm_system *, const struct sadmm_plan *,
+                         const struct sadmm_settings *, struct sadmm_error *);
+sadmm_status CUDA(assemble_bodies)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CUDA(assemble_contacts)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CUDA(assemble_joints)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CUDA(assemble_springs)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CUDA(init_penalty)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CUDA(factorize)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CUDA(update_velocity)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CUDA(update_constraints)(struct sadmm_context *, bool measure, struct sadmm_error *);
+sadmm_status CUDA(iterate)(struct sadmm_context *, int count, bool measure, struct sadmm_error *);
+sadmm_status CUDA(measure_residuals)(struct sadmm_context *, struct sadmm_residual *, struct sadmm_error *);
+sadmm_status CUDA(update_penalty)(struct sadmm_context *, double ratio, struct sadmm_error *);
+sadmm_status CUDA(read_solution)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CUDA(read_penalty)(struct sadmm_context *, double *beta, struct sadmm_error *);
+sadmm_status CUDA(integrate)(struct sadmm_context *, struct sadmm_rigid *next, struct sadmm_error *);
+sadmm_status CUDA(recover_wrenches)(struct sadmm_context *, double *wrench, struct sadmm_error *);
+
+#ifdef __cplusplus
+}
+#endif

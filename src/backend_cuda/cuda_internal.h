@@ -1,0 +1,233 @@
+/* The CUDA backend: reduced form (docs/algorithm.md), one source for both precisions (SADMM_REAL, SADMM_VARIANT).
+ *
+ * Units of work
+ *   - A contact pair shares normal, friction and bodies among its points, so one thread takes a pair. With d = x_a - x_b
+ *     a point's relative velocity is u + w x r_a (u = v_b - v_a + w_b x d, w = w_b - w_a), and the pair's wrench needs only
+ *     f = sum E_k and tau = sum r_k x E_k (E = 2 lambda - lambda_prev): on a (-f, -tau), on b (f, tau + d x f).
+ *   - The pair writes both wrenches as one record; bodies gather records over a CSR list in a fixed order. No float atomics:
+ *     a result does not depend on timing, grid size or tier, bit for bit (the sources are compiled without contraction
+ *     of a * b + c for the same reason).
+ *   - Eight lanes take a body: lane r < 6 owns component r of A v, of the gathered sum and of H g, H = (A + beta C)^-1.
+ *
+ * Order. begin() finds islands (bodies that touch, directly or through others) and numbers bodies, pairs and row blocks
+ * by island, stably: "slots". Static bodies join nothing and share the state row after the last body, which is 0. Within a
+ * body's list records ascend, so that the sums are the same in every tier.
+ *
+ * Tiers of the fused entry
+ *   BLOCK   islands packed into thread blocks; pairs in registers, bodies and records in shared memory, __syncthreads only
+ *   GRID    one cooperative launch; pairs in registers, factors in shared memory, velocities and records in L2, grid barriers
+ *   STREAM  two kernels an iteration, in a CUDA graph: any size
+ * BLOCK and GRID are one kernel (cuda_resident.cu) over a partition into `parts`.
+ *
+ * Raw data (bodies, contact pairs and points, blocks as core has them, in double) is copied to the device as it is and turned
+ * into this layout there, so that a collision stage on the device can later produce the contacts in place.
+ */
+#ifndef SADMM_CUDA_INTERNAL_H
+#define SADMM_CUDA_INTERNAL_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cuda_runtime.h>
+
+#include "../core/kernels.h"
+#include "cuda_tier.h"
+
+typedef SADMM_REAL solver_real;
+
+#define SADMM_JOIN2(a, b) a##b
+#define SADMM_JOIN(a, b) SADMM_JOIN2(a, b)
+/* A symbol of this precision, e.g. sadmm_cuda_begin_f32. */
+#define CUDA(name) SADMM_JOIN(sadmm_cuda_##name, SADMM_VARIANT)
+
+enum {
+    ROW = 8,              /* a wrench or a body's state: 6 used, 32 bytes in f32 */
+    RECORD = 2 * ROW,     /* wrench on a, wrench on b */
+    STATE_INV_BETA = 6,   /* slot of a state row */
+    MATRIX = 40,          /* a symmetric 6x6, rows of 6; the padding keeps four bodies' rows on different banks */
+    PACKED = 21,          /* lower triangle, rows first */
+    THREADS = 256,        /* a block, everywhere */
+    WARP = 32,
+    LANES = 8             /* threads a body */
+};
+
+/* Planes of the row blocks' data, each row_stride long. */
+enum {
+    ROW_J_A = 0,
+    ROW_J_B = 36,
+    ROW_ERROR = 72,
+    ROW_STIFFNESS = 78,
+    ROW_DAMPING = 84,
+    ROW_LAMBDA = 90,
+    ROW_FRICTION = 96,
+    ROW_PLANES = 97
+};
+
+struct alignas(16) real4 {
+    solver_real x, y, z, w;
+};
+
+struct row_about {
+    int32_t kind, rows, body_a, body_b; /* slots */
+    int32_t active;                     /* bit r: row r exists (a hard row of zeros is no constraint, Sec. III-C) */
+};
+
+/* Where a part of the resident kernel begins; it ends where the next one begins. */
+struct part {
+    int32_t body, pair, row;
+};
+
+/* What kernels see. Pointers are device memory. Bodies, pairs and row blocks are counted in slots unless "raw". */
+struct cuda_view {
+    int32_t bodies, pairs, rows, points;
+    int32_t stride;      /* of point planes: point k of pair p is at k stride + p */
+    int32_t row_stride;
+    int32_t contact_rows;
+    int32_t warm_start;
+
+    solver_real *state; /* (bodies + 1) x ROW: v, w, 1/beta, 0; the last row is the static world, all 0 */
+    solver_real *b;     /* bodies x ROW */
+    solver_real *A, *H; /* bodies x MATRIX */
+    double *C;          /* bodies x PACKED */
+    double *beta;       /* bodies, kg */
+
+    real4 *normal;      /* pairs: n, mu */
+    real4 *difference;  /* pairs: d, 1/s */
+    int2 *pair_bodies;
+    int32_t *pair_count;
+    real4 *arm;         /* points: r_a (r_b when a is static), e */
+    real4 *lambda;      /* points, 3 rows a contact */
+    solver_real *lambda_n; /* points, 1 row a contact */
+
+    row_about *row_info;
+    solver_real *row_data; /* ROW_PLANES x row_stride */
+
+    /* pairs, then row blocks. After a measured iteration `records` holds J^T lambda and `change` J^T (lambda - lambda_prev),
+     * else `records` holds J^T (2 lambda - lambda_prev). */
+    solver_real *records, *change;
+
+    const int32_t *offsets, *incident; /* body -> 2 record + (0 on a, 1 on b) */
+    const int32_t *body_of, *slot_of;  /* slot -> raw body, raw body -> slot */
+    const int32_t *pair_of, *row_of;   /* slot -> raw */
+    const part *parts;
+    unsigned *barrier;                 /* arrivals at the grid barrier since launch */
+    unsigned long long *residual;      /* primal, dual: bit patterns of doubles >= 0, which order like the numbers */
+
+    struct sadmm_system raw;           /* rigid, A, b, velocity, blocks, block_lambda */
+    const struct sadmm_contact_pair *raw_pairs;
+    const struct sadmm_contact_point *raw_points;
+    struct sadmm_settings settings;
+    double *out; /* results in raw order */
+};
+
+/* What differs between launches of a kernel. */
+struct cuda_args {
+    int32_t count;      /* iterations, or a kind of block */
+    int32_t measure;
+    int32_t join;       /* the first Step 1 takes records + ratio change */
+    solver_real ratio;
+    double factor;
+};
+
+typedef void (*cuda_kernel)(const cuda_view, const cuda_args);
+
+/* Device or pinned memory that only grows. */
+struct cuda_buffer {
+    void *data;
+    size_t capacity; /* bytes */
+    bool pinned;
+};
+
+enum cuda_buffer_name {
+    /* device */
+    BUFFER_STATE, BUFFER_B, BUFFER_A, BUFFER_H, BUFFER_C, BUFFER_BETA,
+    BUFFER_NORMAL, BUFFER_DIFFERENCE, BUFFER_PAIR_BODIES, BUFFER_PAIR_COUNT, BUFFER_ARM, BUFFER_LAMBDA,
+    BUFFER_ROW_INFO, BUFFER_ROW_DATA, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_LAYOUT, BUFFER_SCALARS,
+    BUFFER_RAW_BODIES, BUFFER_RAW_PAIRS, BUFFER_RAW_POINTS, BUFFER_RAW_BLOCKS, BUFFER_OUT,
+    /* pinned */
+    PINNED_LAYOUT, PINNED_BODIES, PINNED_PAIRS, PINNED_POINTS, PINNED_BLOCKS, PINNED_OUT,
+    BUFFER_COUNT
+};
+
+/* Arrays of begin(), on the host. */
+struct cuda_scratch {
+    int32_t *parent;         /* bodies */
+    int32_t *island_of;      /* bodies */
+    struct island *islands;  /* islands + 1 */
+    int32_t *cursor;         /* islands or bodies */
+    struct part *parts;
+    size_t parent_capacity, island_of_capacity, islands_capacity, cursor_capacity, parts_capacity;
+};
+
+struct sadmm_context {
+    int device;
+    cudaStream_t stream;
+    int multiprocessors, shared_limit; /* shared_limit: bytes a block may have */
+    bool cooperative;
+
+    const struct sadmm_system *system;
+    struct sadmm_plan plan;
+    struct sadmm_settings settings;
+    cuda_view view;
+    cuda_buffer buffers[BUFFER_COUNT];
+    cuda_scratch scratch;
+    bool blocks_uploaded;
+    bool measured; /* records and change are apart: the next Step 1 uses records + ratio change */
+    double ratio;
+
+    enum sadmm_cuda_tier wanted, tier;
+    int32_t part_count;
+    size_t part_shared;    /* bytes a block of the resident kernel */
+    int32_t point_slots;   /* largest point count of a pair */
+    cuda_kernel resident;
+    const char *resident_name;
+
+    cudaGraphExec_t graph; /* GRAPH_ITERATIONS plain iterations */
+    bool graph_valid;      /* for this step's view */
+    const char *kernel;    /* launched last: what an asynchronous error is about, or what ran before it */
+};
+
+/* ---- cuda_context.cu ---- */
+
+sadmm_status CUDA(fail)(struct sadmm_context *, cudaError_t code, const char *what, struct sadmm_error *error);
+/* At least `bytes` in a buffer; what it held is lost when it grows. */
+sadmm_status CUDA(room)(struct sadmm_context *, enum cuda_buffer_name name, size_t bytes, struct sadmm_error *error);
+/* Launch on the stream; 0 blocks: nothing to do. */
+sadmm_status CUDA(launch)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks, size_t shared,
+                          bool cooperative, const cuda_args *args, struct sadmm_error *error);
+/* Through pinned memory, asynchronously; the pinned buffer is free again once the stream is idle. */
+sadmm_status CUDA(upload)(struct sadmm_context *, void *to, enum cuda_buffer_name staging, size_t at, const void *from,
+                          size_t bytes, struct sadmm_error *error);
+/* The first `bytes` of view.out into PINNED_OUT, and wait. */
+sadmm_status CUDA(download)(struct sadmm_context *, const void *from, size_t bytes, struct sadmm_error *error);
+sadmm_status CUDA(select_device)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(wait)(struct sadmm_context *, struct sadmm_error *error);
+
+/* ---- cuda_iterate.cu, cuda_resident.cu ---- */
+
+/* Records of the start values: J^T lambda^0. */
+sadmm_status CUDA(start_records)(struct sadmm_context *, struct sadmm_error *error);
+/* 1/s of every pair, from 1/beta. */
+sadmm_status CUDA(weigh_pairs)(struct sadmm_context *, struct sadmm_error *error);
+/* The instance of the resident kernel for this step, and what it costs. */
+cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, bool grid, const char **name);
+size_t CUDA(resident_shared)(int32_t bodies, int32_t pairs, int32_t rows, int32_t incident, bool grid);
+/* Let every instance use `bytes` of shared memory a block. */
+cudaError_t CUDA(resident_allow)(int bytes);
+
+#define CUDA_TRY(call)                                  \
+    do {                                                \
+        sadmm_status try_status = (call);               \
+        if (try_status != SADMM_OK) return try_status;  \
+    } while (0)
+#define CUDA_CALL(c, call, name)                                                \
+    do {                                                                        \
+        cudaError_t try_code = (call);                                          \
+        if (try_code != cudaSuccess) return CUDA(fail)((c), try_code, (name), error); \
+    } while (0)
+
+static inline int64_t blocks_for(int64_t threads) { return (threads + THREADS - 1) / THREADS; }
+
+#include "cuda_entries.h"
+
+#endif

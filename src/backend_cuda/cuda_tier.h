@@ -1,0 +1,28 @@
+/* How the CUDA backend's fused entry runs (cuda_internal.h), and how tests choose it. */
+#ifndef SADMM_CUDA_TIER_H
+#define SADMM_CUDA_TIER_H
+
+#include "../core/kernels.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum sadmm_cuda_tier {
+    SADMM_CUDA_TIER_AUTO = 0,
+    SADMM_CUDA_TIER_BLOCK,  /* islands packed into thread blocks */
+    SADMM_CUDA_TIER_GRID,   /* one cooperative launch with grid barriers */
+    SADMM_CUDA_TIER_STREAM  /* two kernels an iteration */
+};
+
+/* From the next begin on. A begin whose system does not fit the tier fails with SADMM_ERROR_UNSUPPORTED. `kernels`: the
+ * table that made the context. */
+void sadmm_cuda_force_tier(const struct sadmm_kernels *kernels, struct sadmm_context *context, enum sadmm_cuda_tier tier);
+/* The tier the last begin chose, and its blocks (0 for STREAM). */
+enum sadmm_cuda_tier sadmm_cuda_tier_of(const struct sadmm_kernels *kernels, const struct sadmm_context *context,
+                                        int32_t *blocks);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

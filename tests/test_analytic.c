@@ -1,0 +1,430 @@
+/* Motions with a known answer, on every CPU backend, in double.
+ *
+ * A world integrates by semi-implicit Euler: under a constant acceleration a velocities are exact and positions are
+ * x_n = x_0 + v_0 t + a dt^2 n (n + 1) / 2, which is the parabola plus a t dt / 2. Where a test compares with the
+ * discrete formula only rounding and the solver's error remain; where it compares with the continuous one, the
+ * difference must shrink with dt.
+ */
+#include "scenes/place.h"
+#include "scene_tools.h"
+
+static const sadmm_backend backends[] = { SADMM_BACKEND_CPU, SADMM_BACKEND_REF };
+enum { BACKENDS = sizeof backends / sizeof backends[0] };
+
+static const double g = 9.81;
+static const double degree = 0.017453292519943295;
+
+static sadmm_world_def world_def(int backend_index, double dt, int iterations)
+{
+    sadmm_world_def def = sadmm_world_def_default();
+    def.backend = backends[backend_index];
+    def.precision = SADMM_F64;
+    def.settings.dt = dt;
+    def.settings.iterations = iterations;
+    return def;
+}
+
+static void no_gravity(sadmm_world_def *def)
+{
+    memset(def->settings.gravity, 0, sizeof def->settings.gravity);
+}
+
+static sadmm_body_id add_box(sadmm_world *world, struct sadmm_frame frame, double half, double friction)
+{
+    const struct sadmm_piece piece = { .half_extents = { half, half, half }, .mass = 1.0, .friction = friction };
+    sadmm_body_id id;
+    struct sadmm_error error = { 0 };
+    ck_assert_msg(sadmm_place_box(world, frame, &piece, &id, &error) == SADMM_OK, "%s", error.message);
+    return id;
+}
+
+static sadmm_body_id add_sphere(sadmm_world *world, struct sadmm_frame frame, double mass, double restitution)
+{
+    const struct sadmm_piece piece = { .half_extents = { 0.1 }, .mass = mass, .friction = 0.5, .restitution = restitution };
+    sadmm_body_id id;
+    struct sadmm_error error = { 0 };
+    ck_assert_msg(sadmm_place_sphere(world, frame, &piece, &id, &error) == SADMM_OK, "%s", error.message);
+    return id;
+}
+
+static void add_plane(sadmm_world *world, struct sadmm_frame frame, double friction)
+{
+    struct sadmm_error error = { 0 };
+    ck_assert_msg(sadmm_place_plane(world, frame, friction, &error) == SADMM_OK, "%s", error.message);
+}
+
+static void set_velocity(sadmm_world *world, sadmm_body_id id, const double linear[3], const double angular[3])
+{
+    sadmm_body_state state = body_state(world, id);
+    memcpy(state.linear_velocity, linear, sizeof state.linear_velocity);
+    memcpy(state.angular_velocity, angular, sizeof state.angular_velocity);
+    MUST(world, sadmm_world_set_body_state(world, id, &state));
+}
+
+/* ---- a block on a slope: the critical angle is tan alpha = mu ---- */
+
+/* heading: of the downhill direction about the vertical; turn: of the block on the slope. With both, no axis of the
+ * block, of the contact frame or of the world lies along the motion. */
+static const struct {
+    double heading, turn;
+} slopes[] = { { 0, 0 }, { 30, 0 }, { 0, 30 }, { 30, 30 } };
+enum { SLOPES = sizeof slopes / sizeof slopes[0] };
+
+static sadmm_body_id block_on_slope(sadmm_world *world, int slope_index, double alpha, double mu, double downhill[3])
+{
+    struct sadmm_frame slope = sadmm_frame_turned(sadmm_frame_world(), 2, slopes[slope_index].heading * degree);
+    slope = sadmm_frame_turned(slope, 1, alpha);
+    add_plane(world, slope, mu);
+    struct sadmm_frame along = sadmm_frame_moved(slope, 1, 0, 0);
+    for (int i = 0; i < 3; ++i) downhill[i] = along.origin[i];
+    struct sadmm_frame place = sadmm_frame_turned(slope, 2, slopes[slope_index].turn * degree);
+    return add_box(world, sadmm_frame_moved(place, 0, 0, 0.1), 0.1, mu);
+}
+
+START_TEST(a_block_below_the_critical_angle_does_not_creep)
+{
+    const double mu = 0.5;
+    sadmm_world_def def = world_def(_i / SLOPES, 0.005, 100);
+    sadmm_world *world = create_world(&def);
+    double downhill[3];
+    sadmm_body_id id = block_on_slope(world, _i % SLOPES, atan(0.99 * mu), mu, downhill);
+
+    step_world(world, 200);
+    sadmm_body_state before = body_state(world, id);
+    step_world(world, 200);
+    sadmm_body_state after = body_state(world, id);
+    /* 1e-9 m/s is a millimetre in twelve days; gravity gives 0.02 m/s in one step. */
+    ck_assert_double_lt(distance(before.position, after.position) / (200 * 0.005), 1e-9);
+    ck_assert_double_lt(norm3(after.linear_velocity), 1e-9);
+    ck_assert_double_lt(norm3(after.angular_velocity), 1e-8); /* the same at the corners, 0.1 m away */
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+START_TEST(a_block_above_the_critical_angle_slides_as_coulomb_says)
+{
+    const double mu = 0.5, alpha = atan(1.01 * mu), dt = 0.005;
+    const double acceleration = g * (sin(alpha) - mu * cos(alpha));
+    sadmm_world_def def = world_def(_i / SLOPES, dt, 100);
+    sadmm_world *world = create_world(&def);
+    double downhill[3], along = 0, across = 0;
+    sadmm_body_id id = block_on_slope(world, _i % SLOPES, alpha, mu, downhill);
+
+    step_world(world, 400);
+    sadmm_body_state state = body_state(world, id);
+    for (int i = 0; i < 3; ++i) along += state.linear_velocity[i] * downhill[i];
+    for (int i = 0; i < 3; ++i) across = fmax(across, fabs(state.linear_velocity[i] - along * downhill[i]));
+    /* Coulomb friction of a sliding block is constant: the velocity is exact but for the solver's error. */
+    ck_assert_double_eq_tol(along / (400 * dt) / acceleration, 1.0, 1e-6);
+    ck_assert_double_lt(across, 1e-6 * along);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+/* ---- stopping distance v^2 / (2 mu g) ---- */
+
+static double stopping_distance(int backend_index, double dt, double speed, double mu, double heading)
+{
+    sadmm_world_def def = world_def(backend_index, dt, 100);
+    sadmm_world *world = create_world(&def);
+    add_plane(world, sadmm_frame_world(), mu);
+    sadmm_body_id id = add_box(world, sadmm_frame_moved(sadmm_frame_world(), 0, 0, 0.1), 0.1, mu);
+    const double velocity[3] = { speed * cos(heading), speed * sin(heading), 0 }, none[3] = { 0 };
+    sadmm_body_state start = body_state(world, id);
+
+    set_velocity(world, id, velocity, none);
+    step_world(world, (int)ceil(1.2 * speed / (mu * g) / dt));
+    sadmm_body_state state = body_state(world, id);
+    ck_assert_double_lt(norm3(state.linear_velocity), 1e-9); /* it has stopped */
+    double moved = distance(state.position, start.position);
+    sadmm_world_destroy(world);
+    return moved;
+}
+
+START_TEST(a_block_stops_where_coulomb_says)
+{
+    /* mu 0.2: the block neither tips nor lifts an edge */
+    const double mu = 0.2, speed = 2.0, exact = speed * speed / (2 * mu * g);
+
+    for (int i = 0; i < 2; ++i) {
+        const double dt = i ? 0.0025 : 0.005, lost = mu * g * dt;
+        const double n = floor(speed / lost);
+        /* sum of v dt over the steps until friction can stop it within one */
+        const double discrete = dt * (n * speed - lost * n * (n + 1) / 2);
+        const double moved = stopping_distance(_i, dt, speed, mu, 30 * degree);
+        /* 200 steps, each with a solver error well under 1e-8 m/s */
+        ck_assert_double_eq_tol(moved, discrete, 1e-7);
+        /* first order: the integrator loses v dt / 2 */
+        ck_assert_double_eq_tol(moved, exact - 0.5 * speed * dt, 0.5 * lost * dt + 1e-7);
+    }
+}
+END_TEST
+
+/* ---- free flight ---- */
+
+START_TEST(free_fall)
+{
+    const double dt = 0.005;
+    const int n = 200;
+    sadmm_world_def def = world_def(_i, dt, 10);
+    sadmm_world *world = create_world(&def);
+    sadmm_body_id id = add_box(world, sadmm_frame_moved(sadmm_frame_world(), 1, 2, 3), 0.1, 0.5);
+    const double linear[3] = { 0.5, -0.25, 2 }, angular[3] = { 0, 0, 3 };
+
+    set_velocity(world, id, linear, angular);
+    step_world(world, n);
+    sadmm_body_state state = body_state(world, id);
+    /* 200 roundings of numbers of about 10 */
+    const double rounding = 200 * 10 * 2.3e-16;
+    ck_assert_double_eq_tol(state.position[0], 1 + 0.5 * n * dt, rounding);
+    ck_assert_double_eq_tol(state.position[1], 2 - 0.25 * n * dt, rounding);
+    ck_assert_double_eq_tol(state.position[2], 3 + 2 * n * dt - g * dt * dt * n * (n + 1) / 2, rounding);
+    ck_assert_double_eq_tol(state.position[2], 3 + 2 * n * dt - g * n * dt * n * dt / 2, g * n * dt * dt / 2 + rounding);
+    ck_assert_double_eq_tol(state.linear_velocity[2], 2 - g * n * dt, rounding);
+    /* a cube keeps its spin, and the exponential map adds up turns about one axis without error */
+    ck_assert_double_eq_tol(state.angular_velocity[2], 3, rounding);
+    ck_assert_double_eq_tol(fabs(state.orientation[0]), fabs(cos(0.5 * 3 * n * dt)), rounding);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+/* v in the body frame of q: R^T v. */
+static void to_body(const double q[4], const double v[3], double out[3])
+{
+    const double w = q[0], *u = &q[1];
+    const double c[3] = { u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0] };
+    const double d = u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+    for (int i = 0; i < 3; ++i) out[i] = (2 * w * w - 1) * v[i] - 2 * w * c[i] + 2 * d * u[i];
+}
+
+START_TEST(a_plate_at_a_thousand_rad_s_keeps_energy_and_momentum)
+{
+    struct sadmm_scene scene = open_scene("spin_plate");
+    scene.def.backend = backends[_i];
+    sadmm_world *world = build_scene(&scene);
+    sadmm_body_id id = body_at(world, 0);
+    sadmm_body_def def = body_def(world, id);
+    double start[2] = { 0 }, least_turn = 1e9, most_turn = -1e9;
+
+    for (int step = 0; step <= 100000; ++step) {
+        if (step % 100 == 0) {
+            sadmm_body_state state = body_state(world, id);
+            double w[3], energy = 0, momentum = 0;
+            to_body(state.orientation, state.angular_velocity, w);
+            for (int i = 0; i < 3; ++i) {
+                energy += 0.5 * def.inertia[i] * w[i] * w[i];
+                momentum += def.inertia[i] * w[i] * def.inertia[i] * w[i];
+            }
+            momentum = sqrt(momentum);
+            if (step == 0) start[0] = energy, start[1] = momentum;
+            /* The midpoint rule keeps both exactly; what is left is rounding, some ten operations a step that add up
+             * like a random walk at best and linearly at worst: 1e5 x 10 x 2e-16. */
+            ck_assert_double_eq_tol(energy / start[0], 1.0, 2e-10);
+            ck_assert_double_eq_tol(momentum / start[1], 1.0, 2e-10);
+            least_turn = fmin(least_turn, w[1]);
+            most_turn = fmax(most_turn, w[1]);
+            ck_assert_double_eq_tol(norm3(state.position), 0, 1e-12);
+        }
+        if (step < 100000) step_world(world, 1);
+    }
+    /* It did tumble about its unstable middle axis; a solver that drops the gyroscopic term spins on. */
+    ck_assert_double_lt(least_turn, -900);
+    ck_assert_double_gt(most_turn, 900);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+/* A symmetric body (I1 = I2) without torque: its axis turns about the fixed angular momentum L at the rate |L| / I1.
+ * Returns the distance of the axis from where it should be after `time`. */
+static double precession_error(int backend_index, double dt, double time)
+{
+    sadmm_world_def def = world_def(backend_index, dt, 1);
+    sadmm_body_def body = sadmm_body_def_default();
+    const double spin[3] = { 2, 0, 10 };
+    sadmm_body_id id;
+
+    no_gravity(&def);
+    sadmm_world *world = create_world(&def);
+    body.mass = 1;
+    body.inertia[0] = body.inertia[1] = 0.01;
+    body.inertia[2] = 0.018;
+    memcpy(body.angular_velocity, spin, sizeof spin);
+    MUST(world, sadmm_world_add_body(world, &body, &id));
+    step_world(world, (int)lround(time / dt));
+    sadmm_body_state state = body_state(world, id);
+    sadmm_world_destroy(world);
+
+    const double inverse[4] = { state.orientation[0], -state.orientation[1], -state.orientation[2], -state.orientation[3] };
+    const double z[3] = { 0, 0, 1 };
+    double axis[3], expected[3];
+    to_body(inverse, z, axis);
+    /* L = (0.02, 0, 0.18), constant; turn z about it (Rodrigues) */
+    const double length = hypot(0.02, 0.18), u[3] = { 0.02 / length, 0, 0.18 / length };
+    const double angle = length / 0.01 * time, c = cos(angle), s = sin(angle), d = u[2];
+    expected[0] = u[1] * s + u[0] * d * (1 - c);
+    expected[1] = -u[0] * s + u[1] * d * (1 - c);
+    expected[2] = c + u[2] * d * (1 - c);
+    return distance(axis, expected);
+}
+
+START_TEST(a_symmetric_top_precesses_at_the_right_rate)
+{
+    /* 0.5 s are 1.4 turns of the axis, on a cone of 6 degrees (radius 0.11) */
+    const double coarse = precession_error(_i, 1e-3, 0.5), fine = precession_error(_i, 5e-4, 0.5);
+    ck_assert_double_lt(coarse, 0.02);
+    /* first order at least: half the step, half the error; 1.8 leaves room for higher terms */
+    ck_assert_double_gt(coarse / fine, 1.8);
+}
+END_TEST
+
+/* ---- collisions ---- */
+
+struct momenta {
+    double linear[3], angular[3]; /* about the origin */
+    double scale[2];              /* largest single term of each */
+};
+
+/* Of bodies whose principal moments are all equal. */
+static struct momenta momenta_of(const sadmm_world *world)
+{
+    struct momenta sum = { 0 };
+    for (int32_t k = 0; k < sadmm_world_body_count(world); ++k) {
+        sadmm_body_def def = body_def(world, body_at(world, k));
+        const double *x = def.position, *v = def.linear_velocity;
+        for (int i = 0; i < 3; ++i) {
+            int j = (i + 1) % 3, l = (i + 2) % 3;
+            sum.linear[i] += def.mass * v[i];
+            sum.angular[i] += def.mass * (x[j] * v[l] - x[l] * v[j]) + def.inertia[i] * def.angular_velocity[i];
+            sum.scale[0] = fmax(sum.scale[0], def.mass * fabs(v[i]));
+            sum.scale[1] = fmax(sum.scale[1], fabs(def.mass * x[j] * v[l]));
+        }
+    }
+    return sum;
+}
+
+START_TEST(an_isolated_collision_keeps_momentum)
+{
+    const bool boxes = _i % 2;
+    sadmm_world_def def = world_def(_i / 2, 0.005, 2000); /* enough for the solver to reach rounding */
+    struct sadmm_frame left = sadmm_frame_world(), right = sadmm_frame_moved(left, 0.4, 0.05, 0.02);
+    const double ahead[3] = { 1, 0.1, 0 }, back[3] = { -0.5, 0, 0.1 }, spin[3] = { 1, 2, -1 }, none[3] = { 0 };
+    sadmm_body_id a, b;
+
+    no_gravity(&def);
+    def.settings.penalty_period = 0; /* a plain fixed-point iteration to the end */
+    sadmm_world *world = create_world(&def);
+    if (boxes) {
+        a = add_box(world, sadmm_frame_turned(left, 1, 0.3), 0.1, 0.5);
+        b = add_box(world, sadmm_frame_turned(right, 0, 0.4), 0.08, 0.5);
+    } else {
+        a = add_sphere(world, left, 1.0, 0.5);
+        b = add_sphere(world, right, 3.0, 0.5);
+    }
+    set_velocity(world, a, ahead, spin);
+    set_velocity(world, b, back, none);
+
+    struct momenta before = momenta_of(world);
+    double met = 0;
+    for (int i = 0; i < 100; ++i) {
+        step_world(world, 1);
+        sadmm_contact contact;
+        if (world_report(world).contacts == 0) continue;
+        MUST(world, sadmm_world_contacts(world, 0, 1, &contact));
+        met = fmax(met, norm3(contact.impulse));
+    }
+    struct momenta after = momenta_of(world);
+    ck_assert_double_gt(met, 0.1); /* they did collide */
+    for (int i = 0; i < 3; ++i) {
+        /* 100 steps of rounding, and at most a few solves with an error of the size of rounding */
+        ck_assert_double_eq_tol(after.linear[i], before.linear[i], 1e-13 * before.scale[0]);
+        /* contact arms end in one point for both bodies, so no couple is left over */
+        ck_assert_double_eq_tol(after.angular[i], before.angular[i], 1e-12 * (before.scale[0] + before.scale[1]));
+    }
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+START_TEST(a_sphere_leaves_the_ground_with_its_restitution)
+{
+    const double restitution = 0.25 * (_i % 5);
+    struct sadmm_scene scene = open_scene("bounce");
+    scene.def.backend = backends[_i / 5];
+    sadmm_world *world = build_scene(&scene);
+    sadmm_body_id id = body_at(world, 1 + _i % 5); /* after the ground */
+    const double fall = sqrt(2 * g * 1.0), dt = scene.def.settings.dt;
+    double approach = 0, leave = 0, top = 0, start_top = body_state(world, id).position[2];
+
+    for (int i = 0; i < 900; ++i) {
+        sadmm_body_state before = body_state(world, id);
+        step_world(world, 1);
+        sadmm_body_state after = body_state(world, id);
+        if (approach == 0 && after.linear_velocity[2] > before.linear_velocity[2]) {
+            approach = -before.linear_velocity[2];
+            leave = after.linear_velocity[2];
+        }
+        if (approach > 0) top = fmax(top, after.position[2]);
+    }
+    /* It lands at the speed of a fall from 1 m, up to one step of gravity and one of being caught before it touches. */
+    ck_assert_double_eq_tol(approach, fall, 2 * g * dt);
+    if (restitution > 0) {
+        /* Newton's law holds for the step's own approach speed; 1e-9: the solver's error. */
+        ck_assert_double_eq_tol(leave, restitution * approach, 1e-9);
+        /* height e^2 h, first order in dt: (v dt) of the landing and (v dt / 2) of the flight */
+        ck_assert_double_eq_tol(top - 0.1, restitution * restitution * 1.0, 2 * fall * dt);
+    } else {
+        /* What is left of the gap is closed in the step, no more: it rests on the ground without a bounce. */
+        ck_assert_double_lt(body_state(world, id).position[2], 0.1 + 1e-9);
+        ck_assert_double_gt(body_state(world, id).position[2], 0.1 - 2e-5); /* slop */
+    }
+    ck_assert_double_le(top, start_top + 1e-9); /* no bounce gains height */
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+/* Head-on, masses 1 and 3: velocities after follow from momentum and from v_b' - v_a' = -e (v_b - v_a). */
+START_TEST(head_on_spheres_part_as_newton_says)
+{
+    const double e = 0.25 * (_i % 5), ma = 1, mb = 3, va = 2, vb = -1;
+    sadmm_world_def def = world_def(_i / 5, 0.001, 2000);
+    const double ahead[3] = { va, 0, 0 }, back[3] = { vb, 0, 0 }, none[3] = { 0 };
+
+    no_gravity(&def);
+    def.settings.penalty_period = 0;
+    sadmm_world *world = create_world(&def);
+    sadmm_body_id a = add_sphere(world, sadmm_frame_world(), ma, e);
+    sadmm_body_id b = add_sphere(world, sadmm_frame_moved(sadmm_frame_world(), 0.35, 0, 0), mb, 0);
+    set_velocity(world, a, ahead, none);
+    set_velocity(world, b, back, none);
+    step_world(world, 100);
+
+    /* With e = 0 the first step closes the gap that is left, the next one stops the approach. */
+    const double centre = (ma * va + mb * vb) / (ma + mb);
+    const double wa = centre + e * mb / (ma + mb) * (vb - va), wb = centre - e * ma / (ma + mb) * (vb - va);
+    /* 1e-9: the solver's error after 2000 iterations, with room */
+    ck_assert_double_eq_tol(body_state(world, a).linear_velocity[0], wa, 1e-9);
+    ck_assert_double_eq_tol(body_state(world, b).linear_velocity[0], wb, 1e-9);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("analytic");
+    TCase *slope = tcase_create("slope"), *flight = tcase_create("flight"), *collision = tcase_create("collision");
+
+    tcase_add_loop_test(slope, a_block_below_the_critical_angle_does_not_creep, 0, BACKENDS * SLOPES);
+    tcase_add_loop_test(slope, a_block_above_the_critical_angle_slides_as_coulomb_says, 0, BACKENDS * SLOPES);
+    tcase_add_loop_test(slope, a_block_stops_where_coulomb_says, 0, BACKENDS);
+    tcase_add_loop_test(flight, free_fall, 0, BACKENDS);
+    tcase_add_loop_test(flight, a_plate_at_a_thousand_rad_s_keeps_energy_and_momentum, 0, BACKENDS);
+    tcase_add_loop_test(flight, a_symmetric_top_precesses_at_the_right_rate, 0, BACKENDS);
+    tcase_add_loop_test(collision, an_isolated_collision_keeps_momentum, 0, 2 * BACKENDS);
+    tcase_add_loop_test(collision, a_sphere_leaves_the_ground_with_its_restitution, 0, 5 * BACKENDS);
+    tcase_add_loop_test(collision, head_on_spheres_part_as_newton_says, 0, 5 * BACKENDS);
+    tcase_set_timeout(flight, 60);
+    tcase_set_timeout(slope, 60);
+    suite_add_tcase(suite, slope);
+    suite_add_tcase(suite, flight);
+    suite_add_tcase(suite, collision);
+    return run_suite(suite);
+}

@@ -1,0 +1,51 @@
+#!/bin/sh
+# The installed tree works for a user: pkg-config finds it, a program links with the shared and with the static library,
+# in C and in C++, and runs; the shared library exports sadmm_ symbols only.
+# usage: test_install.sh BUILD_FOLDER PROGRAM.c
+set -eu
+
+build=$1
+program=$2
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+
+meson install -C "$build" --no-rebuild --quiet --destdir "$folder"
+
+pc=$(find "$folder" -name subadmm.pc)
+[ -n "$pc" ] || { echo "subadmm.pc was not installed"; exit 1; }
+PKG_CONFIG_PATH=${pc%/*}
+export PKG_CONFIG_PATH
+version=$(pkg-config --modversion subadmm)
+library=$(pkg-config --variable=libdir subadmm)
+
+# link NAME COMPILER FLAGS...: compile the user's program and run it
+link() {
+    name=$1
+    shift
+    "$@" -o "$folder/$name"
+    LD_LIBRARY_PATH=$library "$folder/$name" "$version" || { echo "the $name program failed"; exit 1; }
+    echo "$name: works"
+}
+
+# The compilers and pkg-config's answers are lists of words.
+# shellcheck disable=SC2046,SC2086
+{
+    flags="-Wall -Wextra -Werror $(pkg-config --cflags subadmm)"
+    link shared_c ${CC:-cc} $flags -std=c11 "$program" $(pkg-config --libs subadmm)
+    link shared_c++ ${CXX:-c++} $flags -std=c++17 -x c++ "$program" -x none $(pkg-config --libs subadmm)
+    mkdir "$folder/static"
+    cp "$library/libsubadmm.a" "$folder/static"
+    link static_c ${CC:-cc} $flags -std=c11 "$program" -L"$folder/static" $(pkg-config --static --libs subadmm)
+}
+if ldd "$folder/static_c" | grep -q libsubadmm; then
+    echo "the static program needs the shared library"
+    exit 1
+fi
+
+foreign=$(nm -D --defined-only "$library/libsubadmm.so" | awk '$2 ~ /[TDBRVW]/ { print $3 }' | sed 's/@.*//' |
+    grep -v '^sadmm_' || true)
+if [ -n "$foreign" ]; then
+    echo "the shared library exports what is not ours:"
+    echo "$foreign" | head -20
+    exit 1
+fi

@@ -1,0 +1,203 @@
+/* The scene library: what it promises about bodies and contacts, repeatability, bad specs. */
+#include "scene_tools.h"
+
+static int32_t dynamic_bodies(const sadmm_world *world)
+{
+    int32_t count = 0;
+    for (int32_t i = 0; i < sadmm_world_body_count(world); ++i)
+        count += body_def(world, body_at(world, i)).type == SADMM_BODY_DYNAMIC;
+    return count;
+}
+
+START_TEST(every_scene_builds_and_steps)
+{
+    const struct sadmm_scene_info *info = sadmm_scene_at((size_t)_i);
+    struct sadmm_scene scene = open_scene(info->name);
+    sadmm_world *world = build_scene(&scene);
+    struct sadmm_error error = { 0 };
+    uint64_t start = sadmm_world_state_hash(world);
+
+    ck_assert_str_eq(scene.info->name, info->name);
+    ck_assert(info->description[0] && info->duration > 0 && scene.duration == info->duration);
+    ck_assert_int_gt(dynamic_bodies(world), 0);
+    ck_assert_int_eq(sadmm_scene_before_step(&scene, world, 0, &error), SADMM_OK);
+    step_world(world, 1);
+    ck_assert(sadmm_world_state_hash(world) != start);
+    /* Scenes are laid out without overlaps: touching faces may overlap by rounding only. */
+    ck_assert_double_lt(world_report(world).penetration_max, 1e-12);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+/* Table I: bodies = DoFs / 6, dt, iterations, m (beside the name in the table), contacts on average. */
+static const struct table_row {
+    const char *spec;
+    int bodies, dt_ms, iterations, m;
+    double contacts;
+    int settle, steps; /* the part of the run that this test looks at; the whole run: test_standing_slow */
+} table[] = {
+    { "sliding_cubes:100", 600 / 6, 5, 120, 30, 488, 0, 20 },
+    { "sliding_cubes:500", 3000 / 6, 5, 120, 30, 3864, 0, 20 },
+    { "sliding_cubes:1000", 6000 / 6, 5, 120, 30, 8961, 0, 10 },
+    { "sliding_cubes:1500", 9000 / 6, 5, 120, 30, 14813, 0, 5 },
+    { "sliding_cubes:2000", 12000 / 6, 5, 120, 30, 21156, 0, 5 },
+    { "vertical_stacks", 2160 / 6, 5, 200, 50, 1438, 20, 20 },
+    { "oblique_stacks", 840 / 6, 5, 150, 30, 1087, 0, 20 },
+    { "card_houses", 2376 / 6, 1, 300, 100, 2551, 0, 20 },
+};
+
+START_TEST(table_one)
+{
+    const struct table_row *row = &table[_i];
+    struct sadmm_scene scene = open_scene(row->spec);
+    sadmm_world *world = build_scene(&scene);
+    double sum = 0;
+
+    ck_assert_int_eq(dynamic_bodies(world), row->bodies);
+    ck_assert_double_eq_tol(scene.def.settings.dt, 1e-3 * row->dt_ms, 1e-12);
+    ck_assert_int_eq(scene.def.settings.iterations, row->iterations);
+    ck_assert_int_eq(scene.def.settings.penalty_period, row->m);
+    step_world(world, row->settle);
+    for (int i = 0; i < row->steps; ++i) {
+        step_world(world, 1);
+        sum += world_report(world).contacts;
+    }
+    /* 15 %: what the scenes promise; the paper gives counts but no geometry. */
+    ck_assert_double_eq_tol(sum / row->steps / row->contacts, 1.0, 0.15);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+/* Sizes around the turns of the layout: one cube, no upper layer, full and partly filled layers. */
+START_TEST(sliding_cubes_have_n_cubes)
+{
+    static const char *const sizes[] = { "1", "2", "3", "64", "65", "66", "99", "101", "400", "441", "484", "3000", "20000" };
+    for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; ++i) {
+        char spec[32];
+        snprintf(spec, sizeof spec, "sliding_cubes:%s", sizes[i]);
+        struct sadmm_scene scene = open_scene(spec);
+        sadmm_world *world = build_scene(&scene);
+        ck_assert_int_eq(scene.n, atol(sizes[i]));
+        ck_assert_int_eq(dynamic_bodies(world), scene.n);
+        sadmm_world_destroy(world);
+    }
+}
+END_TEST
+
+static const struct {
+    const char *spec;
+    int steps;
+} repeatable[] = {
+    { "sliding_cubes:100", 20 },
+    { "sliding_cubes:1000", 3 }, /* large enough that two threads really share the work */
+    { "vertical_stacks:4", 60 }, /* through the landing */
+    { "oblique_stacks:2", 20 },
+    { "card_houses:1", 20 },
+    { "pyramid:6", 20 },
+    { "pile:100", 120 }, /* through the first impacts */
+    { "incline", 20 },
+    { "bounce", 500 }, /* through the first bounce */
+    { "spin_plate", 100 },
+};
+
+static uint64_t hash_after(const char *spec, int threads, int steps)
+{
+    struct sadmm_scene scene = open_scene(spec);
+    scene.def.backend = SADMM_BACKEND_CPU;
+    scene.def.settings.threads = threads;
+    sadmm_world *world = build_scene(&scene);
+    step_world(world, steps);
+    uint64_t hash = sadmm_world_state_hash(world);
+    sadmm_world_destroy(world);
+    return hash;
+}
+
+START_TEST(runs_repeat_bit_for_bit)
+{
+    const char *spec = repeatable[_i].spec;
+    int steps = repeatable[_i].steps;
+    uint64_t once = hash_after(spec, 1, steps);
+
+    ck_assert_msg(once == hash_after(spec, 1, steps), "%s: two runs differ", spec);
+    ck_assert_msg(once == hash_after(spec, 2, steps), "%s: one and two threads differ", spec);
+    ck_assert_msg(once == hash_after(spec, 5, steps), "%s: one and five threads differ", spec);
+    ck_assert_msg(once != hash_after(spec, 1, steps - 1), "%s: the hash does not see the last step", spec);
+}
+END_TEST
+
+START_TEST(bad_specs_are_refused)
+{
+    static const struct {
+        const char *spec, *message;
+    } bad[] = {
+        { "", "must be one of sliding_cubes[:N], vertical_stacks" },
+        { "sliding_cube", "must be one of" },
+        { "sliding_cubesx", "must be one of" },
+        { ":5", "must be one of" },
+        { "sliding_cubes:", "must be a whole number in [1, 1000000]" },
+        { "sliding_cubes:abc", "\"sliding_cubes:abc\": N must be a whole number" },
+        { "sliding_cubes:5x", "whole number" },
+        { "sliding_cubes:-5", "whole number" },
+        { "sliding_cubes:+5", "whole number" },
+        { "sliding_cubes: 5", "whole number" },
+        { "sliding_cubes:1e3", "whole number" },
+        { "sliding_cubes:99999999999999999999999", "whole number" },
+        { "sliding_cubes:0", "N must be in [1, 1000000]" },
+        { "sliding_cubes:1000001", "\"sliding_cubes:1000001\": N must be in [1, 1000000]" },
+        { "pyramid:301", "N must be in [1, 300]" },
+        { "incline:3", "incline takes no size" },
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
+        struct sadmm_scene scene = { .n = 77 };
+        struct sadmm_error error = { 0 };
+        ck_assert_int_eq(sadmm_scene_open(bad[i].spec, &scene, &error), SADMM_ERROR_INVALID_ARGUMENT);
+        ck_assert_msg(strstr(error.message, bad[i].message), "\"%s\": %s", bad[i].spec, error.message);
+        ck_assert_int_eq(scene.n, 77); /* untouched */
+    }
+    ck_assert_int_eq(sadmm_scene_open(NULL, &(struct sadmm_scene){ 0 }, NULL), SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert_int_eq(sadmm_scene_open("incline", NULL, NULL), SADMM_ERROR_INVALID_ARGUMENT);
+}
+END_TEST
+
+START_TEST(bad_builds_are_refused)
+{
+    struct sadmm_scene scene = open_scene("incline");
+    sadmm_world *world = (sadmm_world *)&scene;
+    struct sadmm_error error = { 0 };
+
+    scene.def.settings.dt = -1; /* the caller's own change */
+    ck_assert_int_eq(sadmm_scene_build(&scene, &world, &error), SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert_ptr_null(world);
+    ck_assert_msg(strstr(error.message, "dt"), "%s", error.message);
+    ck_assert_int_eq(sadmm_scene_build(&(struct sadmm_scene){ 0 }, &world, &error), SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert_int_eq(sadmm_scene_build(&scene, NULL, &error), SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert_int_eq(sadmm_scene_before_step(NULL, NULL, 0, &error), SADMM_ERROR_INVALID_ARGUMENT);
+}
+END_TEST
+
+START_TEST(the_list_has_no_twins)
+{
+    ck_assert_uint_eq(sadmm_scene_count(), 9);
+    ck_assert_ptr_null(sadmm_scene_at(sadmm_scene_count()));
+    for (size_t i = 0; i < sadmm_scene_count(); ++i) {
+        for (size_t j = 0; j < i; ++j) ck_assert_str_ne(sadmm_scene_at(i)->name, sadmm_scene_at(j)->name);
+    }
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("scenes");
+    TCase *cases = tcase_create("scenes");
+
+    tcase_set_timeout(cases, 100);
+    tcase_add_test(cases, the_list_has_no_twins);
+    tcase_add_test(cases, bad_specs_are_refused);
+    tcase_add_test(cases, bad_builds_are_refused);
+    tcase_add_loop_test(cases, every_scene_builds_and_steps, 0, (int)sadmm_scene_count());
+    tcase_add_test(cases, sliding_cubes_have_n_cubes);
+    tcase_add_loop_test(cases, table_one, 0, sizeof table / sizeof table[0]);
+    tcase_add_loop_test(cases, runs_repeat_bit_for_bit, 0, sizeof repeatable / sizeof repeatable[0]);
+    suite_add_tcase(suite, cases);
+    return run_suite(suite);
+}

@@ -1,0 +1,78 @@
+/* The scenes of Table I in full length: they stand, and their contacts are Table I's on average. */
+#include "standing.h"
+
+START_TEST(vertical_stacks)
+{
+    const struct standing_case limits = { "vertical_stacks", SADMM_F64, 5.0, 0.5, 1e-3, 1e-3, 1e-6, 1438 };
+    sadmm_world *world = run_standing(&limits);
+    expect_vertical_stacks(world);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+START_TEST(oblique_stacks)
+{
+    const struct standing_case limits = { "oblique_stacks", SADMM_F64, 5.0, 0.1, 1e-3, 1e-3, 1e-6, 1087 };
+    sadmm_world_destroy(run_standing(&limits));
+}
+END_TEST
+
+/* 5 mm: a card that slips off or a house that folds moves by centimetres. The gaps close within 0.5 s. */
+START_TEST(card_houses)
+{
+    const struct standing_case limits = { "card_houses", SADMM_F64, 10.0, 0.5, 5e-3, 1e-2, 1e-3, 2551 };
+    sadmm_world_destroy(run_standing(&limits));
+}
+END_TEST
+
+START_TEST(pyramid)
+{
+    const struct standing_case limits = { "pyramid:30", SADMM_F64, 5.0, 0.1, 1e-3, 1e-3, 1e-5, 0 };
+    sadmm_world_destroy(run_standing(&limits));
+}
+END_TEST
+
+/* Rafts keep their contacts while they slide, and slide at g (sin a - mu cos a). */
+START_TEST(sliding_cubes)
+{
+    static const struct {
+        const char *spec;
+        double contacts, duration;
+    } rows[] = {
+        { "sliding_cubes:100", 488, 5.0 },    { "sliding_cubes:500", 3864, 5.0 },   { "sliding_cubes:1000", 8961, 2.0 },
+        { "sliding_cubes:1500", 14813, 1.0 }, { "sliding_cubes:2000", 21156, 1.0 },
+    };
+    struct sadmm_scene scene = open_scene(rows[_i].spec);
+    scene.def.backend = SADMM_BACKEND_CPU;
+    sadmm_world *world = build_scene(&scene);
+    int steps = (int)lround(rows[_i].duration / scene.def.settings.dt);
+    double sum = 0, expected = 9.81 * (sin(atan(0.4)) - 0.3 * cos(atan(0.4))) * rows[_i].duration;
+
+    for (int i = 0; i < steps; ++i) {
+        step_world(world, 1);
+        sum += world_report(world).contacts;
+    }
+    ck_assert_double_eq_tol(sum / steps / rows[_i].contacts, 1.0, 0.15);
+    for (int32_t i = 1; i < sadmm_world_body_count(world); ++i) {
+        /* 1 %: the rafts are large, iterations are few, and errors at the edges average out only over the raft */
+        double speed = norm3(body_state(world, body_at(world, i)).linear_velocity);
+        ck_assert_double_eq_tol(speed / expected, 1.0, 0.01);
+    }
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("standing_slow");
+    TCase *cases = tcase_create("standing_slow");
+
+    tcase_set_timeout(cases, 3000);
+    tcase_add_test(cases, vertical_stacks);
+    tcase_add_test(cases, oblique_stacks);
+    tcase_add_test(cases, card_houses);
+    tcase_add_test(cases, pyramid);
+    tcase_add_loop_test(cases, sliding_cubes, 0, 5);
+    suite_add_tcase(suite, cases);
+    return run_suite(suite);
+}
