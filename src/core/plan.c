@@ -16,6 +16,22 @@ static int resolve_threads(int wanted)
 #endif
 }
 
+static bool any_nonzero(const double *x, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (x[k] != 0) return true;
+    return false;
+}
+
+/* Does at least half of the constraints start with an impulse? */
+static bool starts_warm(const struct sadmm_system *system)
+{
+    size_t total = system->contacts->point_count + (size_t)system->block_count, warm = 0;
+    for (size_t k = 0; k < system->contacts->point_count; ++k) warm += any_nonzero(system->contacts->points[k].impulse, 3);
+    for (size_t k = 0; k < (size_t)system->block_count; ++k) warm += any_nonzero(system->block_lambda + 6 * k, 6);
+    return total > 0 && 2 * warm >= total;
+}
+
 struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struct sadmm_settings *settings)
 {
     struct sadmm_plan plan = {0};
@@ -35,8 +51,10 @@ struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struc
     }
     bool constrained = plan.points > 0 || system->block_count > 0;
     plan.warm_start = settings->warm_start;
+    plan.warm = plan.warm_start && starts_warm(system);
     plan.penalty_updates = constrained && settings->penalty_period > 0 && settings->penalty_ratio_limit > 1 &&
-                           settings->iterations > settings->penalty_period;
+                           settings->iterations > settings->penalty_period &&
+                           (settings->penalty_update_warm || !plan.warm);
     plan.certificate = settings->certify || settings->certificate_tolerance > 0;
     plan.residuals = constrained && (plan.penalty_updates || settings->measure_residuals ||
                                      settings->residual_tolerance > 0);

@@ -14,7 +14,8 @@ struct sadmm_plan {
     int contact_rows;       /* rows of a geometric contact: 0 no contact, 1 every mu is 0, 3 otherwise */
     bool rigid;             /* A is (m I, world inertia) */
     bool gyroscopic;        /* some body has unequal principal moments (world level) */
-    bool warm_start;
+    bool warm_start;        /* take the system's start values */
+    bool warm;              /* ... and most constraints have one */
     bool penalty_updates;   /* eq. (15) will run at least once */
     bool residuals;         /* some iteration is measured */
     bool wrenches;          /* eq. (12) a body */

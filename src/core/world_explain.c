@@ -50,6 +50,7 @@ static void explain_options(struct text *t, const struct sadmm_plan *plan, const
              s->penalty_period <= 0             ? "asked for"
              : s->penalty_ratio_limit <= 1      ? "alpha is 1"
              : s->iterations <= s->penalty_period ? "fewer iterations than their period"
+             : plan->warm                         ? "the step starts warm"
                                                   : "no constraints");
     line(t, plan->residuals ? "residuals    measured when needed (16), (17)\n" : "residuals    left out: nobody asks\n");
     line(t, plan->wrenches ? "wrenches     recovered (12)\n" : "wrenches     left out: not asked for\n");
