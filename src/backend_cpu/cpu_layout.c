@@ -44,6 +44,8 @@ static void count_slots(struct sadmm_context *c)
 static void record_bodies(const struct sadmm_context *c, size_t record, int32_t bodies[2])
 {
     size_t pair_records = c->pair_block_count * (size_t)LANES;
+    bodies[0] = bodies[1] = -1;
+    if (record >= pair_records + c->row_block_count) return;
     if (record >= pair_records) {
         const struct sadmm_problem_block *block = &c->system->blocks[record - pair_records];
         bodies[0] = block->body_a;
@@ -51,8 +53,9 @@ static void record_bodies(const struct sadmm_context *c, size_t record, int32_t 
         return;
     }
     int32_t index = c->pair_blocks[record / (size_t)LANES].pair[record % (size_t)LANES];
-    bodies[0] = index < 0 ? -1 : c->system->contacts->pairs[index].body_a;
-    bodies[1] = index < 0 ? -1 : c->system->contacts->pairs[index].body_b;
+    if (index < 0) return;
+    bodies[0] = c->system->contacts->pairs[index].body_a;
+    bodies[1] = c->system->contacts->pairs[index].body_b;
 }
 
 /* Counting sort by body; records ascend within a body, so a body's sum has one order whatever the threads. */
@@ -90,7 +93,8 @@ sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *syst
     c->ratio = 1;
     c->pair_block_count = ((size_t)plan->pairs + LANES - 1) / LANES;
     c->row_block_count = (size_t)system->block_count;
-    c->record_count = c->pair_block_count * (size_t)LANES + c->row_block_count;
+    /* Whole vectors of rows on either side, so that pairs store aligned. */
+    c->record_count = (c->pair_block_count + (c->row_block_count + LANES - 1) / LANES) * (size_t)LANES;
     if (c->record_count > INT32_MAX / 2)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%zu constraints: at most %d", c->record_count, INT32_MAX / 2);
 

@@ -13,6 +13,15 @@ static inline row8 wrench_sum(const struct sadmm_context *c, size_t i)
     return sum;
 }
 
+/* The wrench rows of a block to come. */
+static inline void prefetch_wrenches(const struct sadmm_context *c, size_t index)
+{
+    size_t begin = index * (size_t)LANES, end = begin + (size_t)LANES;
+    if (end > (size_t)c->bodies) return;
+    for (int32_t at = c->offsets[begin]; at < c->offsets[end]; ++at)
+        __builtin_prefetch(c->wrenches + (size_t)c->incident[at] * ROW);
+}
+
 /* b - A v + sum of wrenches of a block; `state` gets the block's state by number. */
 static inline __attribute__((always_inline)) void block_defect(const struct sadmm_context *c, size_t index,
                                                                lanes state[ROW], vec *linear, vec *angular)
@@ -22,6 +31,7 @@ static inline __attribute__((always_inline)) void block_defect(const struct sadm
     size_t first = index * (size_t)LANES;
     row8 sums[LANES];
     lanes g[ROW];
+    prefetch_wrenches(c, index + 1);
     for (int l = 0; l < LANES; ++l) sums[l] = wrench_sum(c, first + (size_t)l);
 #define STATE_ROW(l) rows[l]
 #define SUM_ROW(l) sums[l]

@@ -58,6 +58,17 @@ static inline void pair_motion(const struct sadmm_context *c, const struct pair_
     *w = (vec){b[3] - a[3], b[4] - a[4], b[5] - a[5]};
 }
 
+/* The bodies of a block to come: their rows are the sweep's only scattered reads. */
+static inline void prefetch_bodies(const struct sadmm_context *c, size_t index)
+{
+    if (index >= c->pair_block_count) return;
+    const struct pair_block *block = &c->pair_blocks[index];
+    for (int l = 0; l < LANES; ++l) {
+        __builtin_prefetch(c->state + (size_t)block->body_a[l] * ROW);
+        __builtin_prefetch(c->state + (size_t)block->body_b[l] * ROW);
+    }
+}
+
 static inline __attribute__((always_inline)) void sweep_block(struct sadmm_context *c, size_t index, int rows,
                                                               enum cpu_sweep sweep, double *primal)
 {
@@ -67,7 +78,10 @@ static inline __attribute__((always_inline)) void sweep_block(struct sadmm_conte
     const lanes zero = {0};
     struct pair_sum next = {0}, change = {0};
 
-    if (sweep != CPU_SWEEP_START) pair_motion(c, block, &u, &w);
+    if (sweep != CPU_SWEEP_START) {
+        prefetch_bodies(c, index + 2);
+        pair_motion(c, block, &u, &w);
+    }
     if (rows == 3) {
         struct point_slot *slot = (struct point_slot *)c->slots + block->first;
         for (int k = 0; k < block->slots; ++k, ++slot) {

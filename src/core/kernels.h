@@ -9,7 +9,8 @@
  *     repeat: update_velocity; update_constraints(measure)      or, fused: iterate(count, measure)
  *     after a measured iteration: measure_residuals; then update_penalty(ratio); factorize
  *
- * `measure` asks the iteration (for `iterate`: its last one) to keep what the residuals and a penalty update need.
+ * `measure` asks the iteration (for `iterate`: its last one) to keep what the residuals and a penalty update need; only
+ * allowed when the plan's `residuals` is set.
  */
 #ifndef SADMM_CORE_KERNELS_H
 #define SADMM_CORE_KERNELS_H

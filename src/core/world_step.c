@@ -40,7 +40,8 @@ static sadmm_status choose_backend(sadmm_world *world)
 
 static sadmm_status gather(sadmm_world *world)
 {
-    size_t n = (size_t)world->dynamic_count, slots = world->body_slots;
+    /* One at least: a system without bodies is still one of rigid bodies. */
+    size_t n = (size_t)world->dynamic_count + 1, slots = world->body_slots;
     if (!grow(&world->collision_bodies, &world->collision_body_capacity, slots, sizeof *world->collision_bodies) ||
         !grow(&world->start, &world->start_capacity, n, sizeof *world->start) ||
         !grow(&world->next, &world->next_capacity, n, sizeof *world->next) ||
@@ -104,16 +105,34 @@ static bool finite_state(const struct sadmm_rigid *body)
     return sum == 0;
 }
 
+static sadmm_status not_finite(sadmm_world *world, int32_t body)
+{
+    int32_t slot = world->slot_of[body];
+    return sadmm_fail(&world->error, SADMM_ERROR_NON_FINITE,
+                      "the step made body (slot %d, generation %u, \"%s\") not finite; the world is as before it", slot + 1,
+                      world->bodies[slot].generation, world->bodies[slot].name);
+}
+
 static sadmm_status check_next(sadmm_world *world)
 {
     for (int32_t i = 0; i < world->dynamic_count; ++i)
-        if (!finite_state(&world->next[i])) {
-            const struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
-            return sadmm_fail(&world->error, SADMM_ERROR_NON_FINITE,
-                              "the step made body (slot %d, generation %u, \"%s\") not finite; the world is as before it",
-                              world->slot_of[i] + 1, body->generation, body->name);
-        }
+        if (!finite_state(&world->next[i])) return not_finite(world, i);
     return SADMM_OK;
+}
+
+/* The solve found something that is not finite: name a body of it. */
+static sadmm_status name_culprit(sadmm_world *world)
+{
+    for (size_t k = 0; k < 6 * (size_t)world->dynamic_count; ++k)
+        if (!isfinite(world->velocity[k])) return not_finite(world, (int32_t)(k / 6));
+    for (size_t p = 0; p < world->contacts.pair_count; ++p) {
+        const struct sadmm_contact_pair *pair = &world->contacts.pairs[p];
+        for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
+            for (int j = 0; j < 3; ++j)
+                if (!isfinite(world->contacts.points[k].impulse[j]))
+                    return not_finite(world, pair->body_b >= 0 ? pair->body_b : pair->body_a);
+    }
+    return SADMM_ERROR_NON_FINITE;
 }
 
 static void commit(sadmm_world *world)
@@ -145,8 +164,8 @@ static struct sadmm_system make_system(sadmm_world *world)
     return system;
 }
 
-/* Everything that may fail; the report is written on the way. */
-static sadmm_status try_step(sadmm_world *world, sadmm_step_report *report)
+/* Everything that may fail; the report is written on the way. *found: the contacts have been replaced. */
+static sadmm_status try_step(sadmm_world *world, sadmm_step_report *report, bool *found)
 {
     const struct sadmm_kernels *kernels;
     const sadmm_settings *settings = &world->def.settings;
@@ -157,12 +176,16 @@ static sadmm_status try_step(sadmm_world *world, sadmm_step_report *report)
     kernels = world->kernels;
     TRY(gather(world));
     TRY(find_contacts(world));
-    double found = sadmm_clock_ms();
+    *found = true;
+    double collided = sadmm_clock_ms();
 
     struct sadmm_system system = make_system(world);
     world->plan = sadmm_plan_make(&system, settings);
     TRY(keep_start_impulses(world));
-    TRY(sadmm_schedule_solve(kernels, world->context, &system, settings, &world->plan, &solve, &report->ms, &world->error));
+    sadmm_status status = sadmm_schedule_solve(kernels, world->context, &system, settings, &world->plan, &solve,
+                                               &report->ms, &world->error);
+    if (status == SADMM_ERROR_NON_FINITE) return name_culprit(world);
+    TRY(status);
     double solved = sadmm_clock_ms();
 
     TRY(kernels->integrate(world->context, world->next, &world->error));
@@ -185,7 +208,7 @@ static sadmm_status try_step(sadmm_world *world, sadmm_step_report *report)
     report->converged = solve.converged;
     report->residual = solve.residual;
     report->penetration_max = deepest(&world->contacts);
-    report->ms.collide = found - begin;
+    report->ms.collide = collided - begin;
     report->ms.finish = end - solved;
     report->ms.total = end - begin;
     return SADMM_OK;
@@ -194,10 +217,11 @@ static sadmm_status try_step(sadmm_world *world, sadmm_step_report *report)
 sadmm_status sadmm_world_step(sadmm_world *world)
 {
     sadmm_step_report report = world->report;
-    sadmm_status status = try_step(world, &report);
+    bool found = false;
+    sadmm_status status = try_step(world, &report, &found);
     if (status != SADMM_OK) {
         world->contacts_readable = false;
-        sadmm_collision_undo(world->collision, &world->contacts);
+        if (found) sadmm_collision_undo(world->collision, &world->contacts);
         return status;
     }
     commit(world);
