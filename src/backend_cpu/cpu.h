@@ -116,6 +116,7 @@ struct sadmm_context {
      * `change` holds J^T (lambda - lambda_prev) after a measured iteration, when `wrenches` holds J^T lambda. */
     real *wrenches, *change;
     size_t record_count, wrench_capacity, change_capacity;
+    bool settled;      /* Step 1 ran: bodies without constraints are at A^-1 b and need no more */
     bool measured;     /* wrenches are split: the next Step 1 uses wrenches + ratio * change */
     double ratio;
     struct sadmm_residual residual; /* primal part of a measured iteration */
@@ -189,8 +190,8 @@ enum cpu_sweep {
 };
 void CPU(sweep_pairs)(struct sadmm_context *, size_t begin, size_t end, enum cpu_sweep sweep, double *primal);
 void CPU(sweep_row_blocks)(struct sadmm_context *, size_t begin, size_t end, enum cpu_sweep sweep, double *primal);
-/* Step 1 of body blocks [begin, end). */
-void CPU(sweep_bodies)(struct sadmm_context *, size_t begin, size_t end);
+/* Step 1 of body blocks [begin, end); `settled`: all but the bodies without constraints. */
+void CPU(sweep_bodies)(struct sadmm_context *, size_t begin, size_t end, bool settled);
 /* Largest entry of A v - b - (sum of wrenches), eq. (17), over body blocks [begin, end). */
 double CPU(dual_residual)(const struct sadmm_context *, size_t begin, size_t end);
 void CPU(start_wrenches)(struct sadmm_context *);

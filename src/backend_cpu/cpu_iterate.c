@@ -3,11 +3,11 @@
 
 #include "cpu.h"
 
-static void update_bodies(struct sadmm_context *c, int thread, int threads)
+static void update_bodies(struct sadmm_context *c, int thread, int threads, bool settled)
 {
     size_t begin, end;
     cpu_share(c->body_block_count, thread, threads, &begin, &end);
-    CPU(sweep_bodies)(c, begin, end);
+    CPU(sweep_bodies)(c, begin, end, settled);
 }
 
 static void update_constraints(struct sadmm_context *c, int thread, int threads, enum cpu_sweep sweep, double *primal)
@@ -44,6 +44,7 @@ void CPU(start_wrenches)(struct sadmm_context *c)
         double none = 0;
         update_constraints(c, cpu_thread(), cpu_threads(), CPU_SWEEP_START, &none);
     }
+    c->settled = false;
     c->measured = false;
     c->ratio = 1;
 }
@@ -57,8 +58,9 @@ sadmm_status CPU(update_velocity)(struct sadmm_context *c, struct sadmm_error *e
             join_wrenches(c, cpu_thread(), cpu_threads());
             CPU_BARRIER;
         }
-        update_bodies(c, cpu_thread(), cpu_threads());
+        update_bodies(c, cpu_thread(), cpu_threads(), c->settled);
     }
+    c->settled = true;
     c->measured = false;
     c->ratio = 1;
     return SADMM_OK;
@@ -93,13 +95,14 @@ sadmm_status CPU(iterate)(struct sadmm_context *c, int count, bool measure, stru
         }
         for (int i = 0; i < count; ++i) {
             bool last = measure && i + 1 == count;
-            update_bodies(c, thread, threads);
+            update_bodies(c, thread, threads, c->settled || i > 0);
             CPU_BARRIER;
             update_constraints(c, thread, threads, last ? CPU_SWEEP_MEASURE : CPU_SWEEP_ITERATE, &primal);
             CPU_BARRIER;
         }
         c->thread_max[thread * THREAD_MAX_STRIDE] = primal;
     }
+    c->settled = c->settled || count > 0;
     c->measured = measure;
     c->ratio = 1;
     if (measure) c->residual.primal = cpu_reduce_max(c);

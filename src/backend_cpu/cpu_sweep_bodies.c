@@ -44,9 +44,16 @@ static inline __attribute__((always_inline)) void block_defect(const struct sadm
     *angular = add(sub(block->b_angular, sym3_times(block->inertia, w)), (vec){g[3], g[4], g[5]});
 }
 
-static void update_rigid(struct sadmm_context *c, size_t begin, size_t end)
+static size_t first_body(const struct sadmm_context *c, size_t block)
+{
+    size_t body = block * (size_t)LANES;
+    return body < (size_t)c->bodies ? body : (size_t)c->bodies;
+}
+
+static void update_rigid(struct sadmm_context *c, size_t begin, size_t end, bool settled)
 {
     for (size_t index = begin; index < end; ++index) {
+        if (settled && c->offsets[first_body(c, index)] == c->offsets[first_body(c, index + 1)]) continue;
         const struct body_block *block = &c->body_blocks[index];
         lanes state[ROW];
         vec linear, angular;
@@ -82,9 +89,10 @@ static inline row8 general_defect(const struct sadmm_context *c, size_t i)
     return g;
 }
 
-static void update_general(struct sadmm_context *c, size_t begin, size_t end)
+static void update_general(struct sadmm_context *c, size_t begin, size_t end, bool settled)
 {
     for (size_t i = begin; i < end; ++i) {
+        if (settled && c->offsets[i] == c->offsets[i + 1]) continue;
         const row8 *H = (const row8 *)c->H_columns + 6 * i;
         row8 g = general_defect(c, i), step = {0};
         for (int k = 0; k < 6; ++k) step += H[k] * g[k];
@@ -104,16 +112,10 @@ static double general_residual(const struct sadmm_context *c, size_t begin, size
 
 /* ---- by blocks, so that both forms share the work the same way -------------------------------------------------- */
 
-static size_t first_body(const struct sadmm_context *c, size_t block)
+void CPU(sweep_bodies)(struct sadmm_context *c, size_t begin, size_t end, bool settled)
 {
-    size_t body = block * (size_t)LANES;
-    return body < (size_t)c->bodies ? body : (size_t)c->bodies;
-}
-
-void CPU(sweep_bodies)(struct sadmm_context *c, size_t begin, size_t end)
-{
-    if (c->rigid_bodies) update_rigid(c, begin, end);
-    else update_general(c, first_body(c, begin), first_body(c, end));
+    if (c->rigid_bodies) update_rigid(c, begin, end, settled);
+    else update_general(c, first_body(c, begin), first_body(c, end), settled);
 }
 
 double CPU(dual_residual)(const struct sadmm_context *c, size_t begin, size_t end)
