@@ -4,7 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <Friction_cst.h>
 #include <GlobalFrictionContactProblem.h>
 #include <NumericsMatrix.h>
 #include <SolverOptions.h>
@@ -74,13 +73,15 @@ static double siconos_error(const struct sadmm_system *system)
         }
     }
 
-    SolverOptions *options = solver_options_create(SICONOS_GLOBAL_FRICTION_3D_NSGS);
+    SolverOptions options; /* only lends its work space */
+    memset(&options, 0, sizeof options);
+    options.dWorkSize = 2 * (size_t)n;
+    options.dWork = calloc(options.dWorkSize, sizeof(double));
     double norm_q = 0, norm_b = 0;
     for (int i = 0; i < n; ++i) norm_q = hypot(norm_q, problem->q[i]);
     for (int i = 0; i < 3 * contacts; ++i) norm_b = hypot(norm_b, problem->b[i]);
-    gfc3d_compute_error(problem, r, u, v, 1e-8, options, norm_q, norm_b, &error);
-    solver_options_delete(options);
-    free(options);
+    gfc3d_compute_error(problem, r, u, v, 1e-8, &options, norm_q, norm_b, &error);
+    free(options.dWork);
     globalFrictionContact_free(problem);
     free(v);
     free(r);

@@ -1,9 +1,9 @@
 /* Reduced form = literal form, iterate by iterate.
  *
  * Every kernel table of this machine is driven side by side with the literal backend on the same system, through the
- * stepwise entries, with penalty updates in between; v, lambda, beta and both residuals are compared after every iteration.
- * The fused entry of a table is compared with its own stepwise entries, and with itself on other thread counts.
- * What makes the oracle itself trustworthy is at the end: the paper's invariants, checked on its internals.
+ * stepwise entries, with penalty updates in between; v, lambda, beta and both residuals are compared after every
+ * iteration. The fused entry of a table is compared with its own stepwise entries, and with itself on other thread
+ * counts. What makes the oracle itself trustworthy is at the end: the paper's invariants, checked on its internals.
  */
 #include <check.h>
 #include <math.h>
@@ -71,8 +71,8 @@ struct scene {
     bool warm;
     double tilt; /* of gravity, degrees */
     /* |v - v_ref| and |lambda - lambda_ref| over the largest |v_ref| and |lambda_ref| so far, worst of 120 iterations:
-     * rounding (6e-8, 1e-16) times the stiffest over the softest direction of A + beta C (about the mass ratio, but damped
-     * because light bodies move with heavy ones). Ten times what was measured, rounded up. */
+     * rounding (6e-8, 1e-16) times the stiffest over the softest direction of A + beta C (about the mass ratio, but
+     * damped because light bodies move with heavy ones). Ten times what was measured, rounded up. */
     double tolerance[2];
 };
 
@@ -126,6 +126,7 @@ static sadmm_settings scene_settings(const struct scene *scene)
     s.gravity[0] = 9.81 * sin(angle);
     s.gravity[2] = -9.81 * cos(angle);
     s.warm_start = scene->warm;
+    s.measure_residuals = true; /* so that every plan has room for them */
     return s;
 }
 
@@ -288,8 +289,8 @@ START_TEST(stepwise_equals_literal)
     ck_assert_msg(worst_primal <= rounding, "%s: primal residual differs by %g", scene->name, worst_primal);
     ck_assert_msg(worst_dual <= rounding, "%s: dual residual differs by %g", scene->name, worst_dual);
     /* Sums of a body's rows in another order, then one product an update. */
-    ck_assert_msg(relative(betas) <= (table->precision == SADMM_F32 ? 1e-5 : 1e-13), "%s: beta differs by %g", scene->name,
-                  relative(betas));
+    ck_assert_msg(relative(betas) <= (table->precision == SADMM_F32 ? 1e-5 : 1e-13), "%s: beta differs by %g",
+                  scene->name, relative(betas));
 
     /* Q and R from the same solution: only their own rounding is added. Torques have arms of a metre or so. */
     struct spread wrenches = {0, 0}, states = {0, 0};
@@ -393,7 +394,8 @@ END_TEST
 
 /* ---- the oracle ---------------------------------------------------------------------------------------------- */
 
-/* What the paper says holds after any iteration: (10) and (11), u = -lambda on both sides; (8), (z_i + z_j, lambda) in C(e). */
+/* What the paper says holds after any iteration: (10) and (11), u = -lambda on both sides; (8), (z_i + z_j, lambda)
+ * in C(e). */
 START_TEST(literal_invariants)
 {
     const struct scene *scene = &scenes[_i];
@@ -410,8 +412,10 @@ START_TEST(literal_invariants)
                 if (side->body < 0) continue;
                 stiffest = fmax(stiffest, r.c->bodies[side->body].beta);
                 for (int i = 0; i < constraint->rows; ++i) {
-                    scale = fmax(scale, fmax(fabs(constraint->lambda[i]), r.c->bodies[side->body].beta * fabs(side->x[i])));
-                    z_scale = fmax(z_scale, fabs(side->z[i]) + fabs(constraint->e[i]) + scale / r.c->bodies[side->body].beta);
+                    scale =
+                        fmax(scale, fmax(fabs(constraint->lambda[i]), r.c->bodies[side->body].beta * fabs(side->x[i])));
+                    z_scale =
+                        fmax(z_scale, fabs(side->z[i]) + fabs(constraint->e[i]) + scale / r.c->bodies[side->body].beta);
                 }
             }
             for (int i = 0; i < constraint->rows; ++i)
@@ -456,8 +460,8 @@ START_TEST(literal_invariants)
 }
 END_TEST
 
-/* (13) and (14) for one cube on the ground: Tr C = sum over 4 contacts of |n|^2 + |t1|^2 + |t2|^2 + the same of r x d, and
- * the latter sum to 2 |r|^2. */
+/* (13) and (14) for one cube on the ground: Tr C = sum over 4 contacts of |n|^2 + |t1|^2 + |t2|^2 + the same of r x
+ * d, and the latter sum to 2 |r|^2. */
 START_TEST(literal_penalty)
 {
     struct contact_problem *problem = contact_problem_stack((double[]){2}, 1, 0.5);
@@ -465,7 +469,8 @@ START_TEST(literal_penalty)
     runner_start(&r, literal(), &scenes[0], problem, 1);
     double beta, inertia = 2.0 / 3 * 0.02, trace_A = 3 * 2.0 + 3 * inertia, trace_C = 4 * (3 + 2 * 0.03);
     read_betas(&r, &beta);
-    ck_assert_double_eq_tol(beta, 16 * trace_A / trace_C + 1e5 * 0.005 * 0.005, 1e-13); /* rounding of numbers near 10 */
+    ck_assert_double_eq_tol(beta, 16 * trace_A / trace_C + 1e5 * 0.005 * 0.005,
+                            1e-13); /* rounding of numbers near 10 */
     runner_penalty(&r, 0.5);
     double halved;
     read_betas(&r, &halved);
@@ -483,7 +488,8 @@ START_TEST(tables_are_all_here)
     for (size_t e = 0; e < sizeof expected / sizeof *expected; ++e) {
         bool found = false;
         for (size_t i = 0; sadmm_kernels_at(i); ++i)
-            if (sadmm_kernels_at(i)->backend == expected[e].backend && sadmm_kernels_at(i)->precision == expected[e].precision)
+            if (sadmm_kernels_at(i)->backend == expected[e].backend &&
+                sadmm_kernels_at(i)->precision == expected[e].precision)
                 found = true;
         ck_assert_msg(found, "backend %d precision %d is missing", expected[e].backend, expected[e].precision);
     }

@@ -199,6 +199,6 @@ sadmm_status CPU(update_penalty)(struct sadmm_context *c, double ratio, struct s
 sadmm_status CPU(read_penalty)(struct sadmm_context *c, double *beta, struct sadmm_error *error)
 {
     (void)error;
-    memcpy(beta, c->beta, (size_t)c->bodies * sizeof *beta);
+    if (c->bodies) memcpy(beta, c->beta, (size_t)c->bodies * sizeof *beta);
     return SADMM_OK;
 }
