@@ -3,7 +3,7 @@
 extern "C" {
 #endif
 
-/* NULL, or why no device can be used; *about (static storage) says what was found. */
+/* Whether a device can be used; *about (static storage): what was found, or why not. */
 bool CUDA(probe)(const char **about);
 void CUDA(set_tier)(struct sadmm_context *, enum sadmm_cuda_tier tier);
 enum sadmm_cuda_tier CUDA(get_tier)(const struct sadmm_context *, int32_t *blocks);

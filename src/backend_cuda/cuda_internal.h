@@ -1,26 +1,29 @@
 /* The CUDA backend: reduced form (docs/algorithm.md), one source for both precisions (SADMM_REAL, SADMM_VARIANT).
  *
  * Units of work
- *   - A contact pair shares normal, friction and bodies among its points, so one thread takes a pair. With d = x_a - x_b
- *     a point's relative velocity is u + w x r_a (u = v_b - v_a + w_b x d, w = w_b - w_a), and the pair's wrench needs only
- *     f = sum E_k and tau = sum r_k x E_k (E = 2 lambda - lambda_prev): on a (-f, -tau), on b (f, tau + d x f).
- *   - The pair writes both wrenches as one record; bodies gather records over a CSR list in a fixed order. No float atomics:
- *     a result does not depend on timing, grid size or tier, bit for bit (the sources are compiled without contraction
- *     of a * b + c for the same reason).
+ *   - A contact pair shares normal, friction and bodies among its points, so one thread takes a pair. With
+ *     d = x_a - x_b a point's relative velocity is u + w x r_a (u = v_b - v_a + w_b x d, w = w_b - w_a), and the pair's
+ *     wrench needs only f = sum E_k and tau = sum r_k x E_k (E = 2 lambda - lambda_prev): on a (-f, -tau), on b (f, tau
+ *     + d x f).
+ *   - The pair writes both wrenches as one record; bodies gather records over a CSR list in a fixed order. No float
+ *     atomics: a result does not depend on timing, grid size or tier, bit for bit (the sources are compiled without
+ *     contraction of a * b + c for the same reason).
  *   - Eight lanes take a body: lane r < 6 owns component r of A v, of the gathered sum and of H g, H = (A + beta C)^-1.
  *
  * Order. begin() finds islands (bodies that touch, directly or through others) and numbers bodies, pairs and row blocks
- * by island, stably: "slots". Static bodies join nothing and share the state row after the last body, which is 0. Within a
- * body's list records ascend, so that the sums are the same in every tier.
+ * by island, stably: "slots". Static bodies join nothing and share the state row after the last body, which is 0.
+ * Within a body's list records ascend, so that the sums are the same in every tier.
  *
  * Tiers of the fused entry
- *   BLOCK   islands packed into thread blocks; pairs in registers, bodies and records in shared memory, __syncthreads only
- *   GRID    one cooperative launch; pairs in registers, factors in shared memory, velocities and records in L2, grid barriers
+ *   BLOCK   islands packed into thread blocks; pairs in registers, bodies and records in shared memory; only
+ *           __syncthreads
+ *   GRID    one cooperative launch; pairs in registers, factors in shared memory, velocities and records in L2; grid
+ *           barriers
  *   STREAM  two kernels an iteration, in a CUDA graph: any size
  * BLOCK and GRID are one kernel (cuda_resident.cu) over a partition into `parts`.
  *
- * Raw data (bodies, contact pairs and points, blocks as core has them, in double) is copied to the device as it is and turned
- * into this layout there, so that a collision stage on the device can later produce the contacts in place.
+ * Raw data (bodies, contact pairs and points, blocks as core has them, in double) is copied to the device as it is and
+ * turned into this layout there, so that a collision stage on the device can later produce the contacts in place.
  */
 #ifndef SADMM_CUDA_INTERNAL_H
 #define SADMM_CUDA_INTERNAL_H
@@ -102,8 +105,8 @@ struct cuda_view {
     row_about *row_info;
     solver_real *row_data; /* ROW_PLANES x row_stride */
 
-    /* pairs, then row blocks. After a measured iteration `records` holds J^T lambda and `change` J^T (lambda - lambda_prev),
-     * else `records` holds J^T (2 lambda - lambda_prev). */
+    /* pairs, then row blocks. After a measured iteration `records` holds J^T lambda and `change`
+     * J^T (lambda - lambda_prev), else `records` holds J^T (2 lambda - lambda_prev). */
     solver_real *records, *change;
 
     const int32_t *offsets, *incident; /* body -> 2 record + (0 on a, 1 on b) */
@@ -200,8 +203,23 @@ sadmm_status CUDA(upload)(struct sadmm_context *, void *to, enum cuda_buffer_nam
                           size_t bytes, struct sadmm_error *error);
 /* The first `bytes` of view.out into PINNED_OUT, and wait. */
 sadmm_status CUDA(download)(struct sadmm_context *, const void *from, size_t bytes, struct sadmm_error *error);
-sadmm_status CUDA(select_device)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(wait)(struct sadmm_context *, struct sadmm_error *error);
+
+/* The context's device is current while this lives; then the caller's again. */
+struct device_scope {
+    int before;
+    cudaError_t code;
+    explicit device_scope(int device) : before(device), code(cudaGetDevice(&before))
+    {
+        if (code == cudaSuccess && before != device) code = cudaSetDevice(device);
+    }
+    ~device_scope() { (void)cudaSetDevice(before); }
+    device_scope(const device_scope &) = delete;
+    device_scope &operator=(const device_scope &) = delete;
+};
+#define CUDA_ENTER(c)                   \
+    device_scope scope((c)->device);    \
+    CUDA_CALL((c), scope.code, "cudaSetDevice")
 
 /* ---- cuda_iterate.cu, cuda_resident.cu ---- */
 
@@ -225,6 +243,13 @@ cudaError_t CUDA(resident_allow)(int bytes);
         cudaError_t try_code = (call);                                          \
         if (try_code != cudaSuccess) return CUDA(fail)((c), try_code, (name), error); \
     } while (0)
+
+/* Shared memory of a block, sized at launch. */
+#ifdef SADMM_CUDA_EMULATED
+#define CUDA_DYNAMIC_SHARED(name) unsigned char *const name = cuda_emulation_shared()
+#else
+#define CUDA_DYNAMIC_SHARED(name) extern __shared__ __align__(16) unsigned char name[]
+#endif
 
 static inline int64_t blocks_for(int64_t threads) { return (threads + THREADS - 1) / THREADS; }
 

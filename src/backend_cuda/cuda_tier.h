@@ -17,7 +17,8 @@ enum sadmm_cuda_tier {
 
 /* From the next begin on. A begin whose system does not fit the tier fails with SADMM_ERROR_UNSUPPORTED. `kernels`: the
  * table that made the context. */
-void sadmm_cuda_force_tier(const struct sadmm_kernels *kernels, struct sadmm_context *context, enum sadmm_cuda_tier tier);
+void sadmm_cuda_force_tier(const struct sadmm_kernels *kernels, struct sadmm_context *context,
+                           enum sadmm_cuda_tier tier);
 /* The tier the last begin chose, and its blocks (0 for STREAM). */
 enum sadmm_cuda_tier sadmm_cuda_tier_of(const struct sadmm_kernels *kernels, const struct sadmm_context *context,
                                         int32_t *blocks);

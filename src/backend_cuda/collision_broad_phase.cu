@@ -1,0 +1,276 @@
+/* Candidates: from shapes and bodies to the pairs whose boxes overlap.
+ *
+ * The hierarchy is Karras' (Maximizing Parallelism in the Construction of BVHs, Octrees, and k-d Trees, HPG 2012) over
+ * sorted keys, ties broken by position. An inner node i covers a range of leaves that begins or ends at i; the right child
+ * of a node split after leaf r is numbered r + 1. The node after a subtree whose last leaf is r is therefore either inner
+ * node r + 1 or leaf r + 1, which the keys around r tell: no stack and no stored ropes' construction (the observation is
+ * Prokopenko and Lebrun-Grandie's, Revising Apetrei's Bounding Volume Hierarchy Construction Algorithm to Allow Stackless
+ * Traversal, 2022).
+ */
+#include "collision_internal.h"
+#include "collision_parallel.h"
+
+/* ---- place ----------------------------------------------------------------------------------------------------- */
+
+/* Two zero bits after each of the low 21. */
+static __device__ uint64_t spread(uint64_t x)
+{
+    x = (x | x << 32) & 0x001f00000000ffffu;
+    x = (x | x << 16) & 0x001f0000ff0000ffu;
+    x = (x | x << 8) & 0x100f00f00f00f00fu;
+    x = (x | x << 4) & 0x10c30c30c30c30c3u;
+    return (x | x << 2) & 0x1249249249249249u;
+}
+
+static __device__ uint64_t morton(const struct collision_layout &layout, const double x[3])
+{
+    const double most = (double)((1 << MORTON_BITS) - 1);
+    uint64_t code = 0;
+    for (int k = 0; k < 3; ++k) {
+        double cell = (x[k] - layout.origin[k]) * layout.scale;
+        /* what is far away, and what is no number, goes to the edge */
+        uint64_t at = cell > 0 ? (uint64_t)(cell < most ? cell : most) : 0;
+        code |= spread(at) << k;
+    }
+    return code;
+}
+
+static __global__ void __launch_bounds__(COLLISION_THREADS) place_kernel(const __grid_constant__ collision_view v)
+{
+    const int64_t i = collision_thread(COLLISION_THREADS);
+    if (i >= v.leaf_count + v.plane_count) return;
+    const uint32_t slot = v.present[i];
+    const struct sadmm_shape &shape = v.shapes[slot];
+    const struct sadmm_collision_body &body = v.bodies[shape.body];
+    const bool moves = body.system_body >= 0;
+    struct sadmm_proxy proxy;
+    struct collision_node node;
+    struct collision_filter filter;
+
+    proxy_place(&shape, &body, v.step.dt, v.step.margin, v.step.acceleration, &proxy, &node.box);
+    v.proxies[slot] = proxy;
+    filter.category = shape.category;
+    filter.mask = shape.mask;
+    filter.body = shape.body;
+    filter.kind = (int32_t)shape.type | (moves ? FILTER_MOVES : 0);
+    v.filters[slot] = filter;
+    if (i >= v.leaf_count) return;
+
+    node.child = (int32_t)slot;
+    node.next = -1;
+    node.group_low = body.environment < 0 ? INT32_MIN : body.environment;
+    node.group_high = body.environment < 0 ? INT32_MAX : body.environment;
+    v.placed[slot] = node;
+
+    const uint64_t group = body.environment < 0 ? 0 : (uint64_t)body.environment;
+    const int rest = LEAF_CLASS_SHIFT - v.layout.group_bits;
+    uint64_t key = shape_radius(proxy.type, proxy.size) >= v.layout.large ? LEAF_LARGE : 0;
+    if (!moves) key = LEAF_STATIC;
+    v.leaf_keys[i] = key << LEAF_CLASS_SHIFT | group << rest | morton(v.layout, proxy.x) >> (3 * MORTON_BITS - rest);
+    v.leaf_slots[i] = slot;
+}
+
+/* ---- tree ------------------------------------------------------------------------------------------------------ */
+
+/* Length of the prefix that leaves i and j have in common, positions included; -1 when j is none. */
+static __device__ __forceinline__ int common(const collision_view &v, int32_t i, int32_t j)
+{
+    if (j < 0 || j >= v.leaf_count) return -1;
+    uint64_t difference = v.leaf_keys[i] ^ v.leaf_keys[j];
+    return difference ? leading_zeros(difference) : 64 + leading_zeros((uint64_t)(uint32_t)(i ^ j));
+}
+
+/* The node after a subtree whose last leaf is r. */
+static __device__ __forceinline__ int32_t node_after(const collision_view &v, int32_t r)
+{
+    const int32_t first_leaf = v.leaf_count - 1;
+    if (r == v.leaf_count - 1) return -1;
+    return common(v, r + 1, r + 2) > common(v, r, r + 1) ? r + 1 : first_leaf + r + 1;
+}
+
+static __global__ void __launch_bounds__(COLLISION_THREADS) build_kernel(const __grid_constant__ collision_view v)
+{
+    const int64_t thread = collision_thread(COLLISION_THREADS);
+    if (thread >= v.leaf_count) return;
+    const int32_t i = (int32_t)thread, first_leaf = v.leaf_count - 1;
+
+    struct collision_node leaf = v.placed[v.leaf_slots[i]];
+    leaf.next = node_after(v, i);
+    v.nodes[first_leaf + i] = leaf;
+    if (i == 0) v.parents[0] = -1;
+    if (i >= first_leaf) return;
+
+    /* the range: from i towards the neighbour with more in common, as far as more is shared than with the other one */
+    const int32_t d = common(v, i, i + 1) > common(v, i, i - 1) ? 1 : -1;
+    const int least = common(v, i, i - d);
+    int32_t reach = 2, length = 0;
+    while (common(v, i, i + reach * d) > least) reach *= 2;
+    for (int32_t step = reach / 2; step > 0; step /= 2)
+        if (common(v, i, i + (length + step) * d) > least) length += step;
+    const int32_t j = i + length * d, low = i < j ? i : j, high = i < j ? j : i;
+
+    /* the split: the last leaf that shares more with the first one than the whole range does */
+    const int shared = common(v, low, high);
+    int32_t split = 0, span = high - low;
+    for (int32_t step = span; step > 1;) {
+        step = (step + 1) / 2;
+        if (split + step < span && common(v, low, low + split + step) > shared) split += step;
+    }
+    split += low;
+    const int32_t left = split == low ? first_leaf + split : split;
+    const int32_t right = split + 1 == high ? first_leaf + split + 1 : split + 1;
+    v.nodes[i].child = left;
+    v.nodes[i].next = node_after(v, high);
+    v.parents[left] = i;
+    v.parents[right] = i;
+    v.arrivals[i] = 0;
+}
+
+/* Boxes from the leaves up: of two children the one that arrives last goes on. Smallest and largest do not depend on the
+ * order. A node's right child is the node after its left one. */
+static __global__ void __launch_bounds__(COLLISION_THREADS) refit_kernel(const __grid_constant__ collision_view v)
+{
+    const int64_t thread = collision_thread(COLLISION_THREADS);
+    if (thread >= v.leaf_count) return;
+    for (int32_t at = v.parents[v.leaf_count - 1 + thread]; at >= 0; at = v.parents[at]) {
+        if (arrive(&v.arrivals[at]) == 0) return;
+        struct collision_node *node = &v.nodes[at];
+        const struct collision_node left = v.nodes[node->child], right = v.nodes[left.next];
+        for (int k = 0; k < 3; ++k) {
+            node->box.lo[k] = fmin(left.box.lo[k], right.box.lo[k]);
+            node->box.hi[k] = fmax(left.box.hi[k], right.box.hi[k]);
+        }
+        node->group_low = left.group_low < right.group_low ? left.group_low : right.group_low;
+        node->group_high = left.group_high > right.group_high ? left.group_high : right.group_high;
+    }
+}
+
+/* ---- pairs ----------------------------------------------------------------------------------------------------- */
+
+static __global__ void __launch_bounds__(COLLISION_THREADS) clear_kernel(const __grid_constant__ collision_view v)
+{
+    const int64_t i = collision_thread(COLLISION_THREADS);
+    if (i == 0) *v.candidate_count = 0;
+    if (i < v.candidate_room) v.candidates[i] = ~UINT64_C(0);
+}
+
+/* Candidates on their way to memory. */
+struct batch {
+    uint64_t keys[PAIR_TILE];
+    int count;
+};
+
+static __device__ void flush(const collision_view &v, struct batch *out)
+{
+    if (out->count == 0) return;
+    const unsigned long long first = reserve(v.candidate_count, (unsigned)out->count);
+    for (int i = 0; i < out->count; ++i)
+        if (first + (unsigned)i < (unsigned long long)v.candidate_room) v.candidates[first + (unsigned)i] = out->keys[i];
+    out->count = 0;
+}
+
+static __device__ void add(const collision_view &v, struct batch *out, uint32_t a, uint32_t b)
+{
+    if (out->count == PAIR_TILE) flush(v, out);
+    out->keys[out->count++] = (uint64_t)a << v.slot_bits | b;
+}
+
+static __device__ bool may_meet(const collision_view &v, const struct collision_filter &a, const struct collision_filter &b)
+{
+    if (a.body == b.body || !(a.category & b.mask) || !(b.category & a.mask)) return false;
+    if (!((a.kind | b.kind) & FILTER_MOVES)) return false;
+    return v.disabled_count == 0 ||
+           find_key(v.disabled_pairs, v.disabled_count, unordered_key((uint32_t)a.body, (uint32_t)b.body)) < 0;
+}
+
+/* Two leaves whose boxes and groups meet; the shape of the lower (type, slot) comes first. */
+static __device__ void add_leaves(const collision_view &v, struct batch *out, const struct collision_filter &own,
+                                  uint32_t a, uint32_t b)
+{
+    const struct collision_filter other = v.filters[b];
+    const int type_a = own.kind & FILTER_TYPE, type_b = other.kind & FILTER_TYPE;
+    if (!may_meet(v, own, other)) return;
+    if (type_a < type_b || (type_a == type_b && a < b)) add(v, out, a, b);
+    else add(v, out, b, a);
+}
+
+static __device__ __forceinline__ bool nodes_meet(const struct collision_node &a, const struct collision_node &b)
+{
+    return a.group_low <= b.group_high && b.group_low <= a.group_high && boxes_overlap(&a.box, &b.box);
+}
+
+/* The planes that a mover meets: those of every group, and those of its own. */
+static __device__ void add_planes(const collision_view &v, struct batch *out, const struct collision_filter &own,
+                                  const struct collision_node &node)
+{
+    const uint32_t slot = (uint32_t)node.child;
+    if (v.plane_count == 0 || !(own.kind & FILTER_MOVES)) return;
+    const double reach = proxy_plane_reach(&v.proxies[slot], v.step.margin);
+    const bool grouped = v.shared_planes < v.plane_count && node.group_low == node.group_high;
+    for (int pass = 0; pass < (grouped ? 2 : 1); ++pass) {
+        const uint64_t group = pass == 0 ? 0 : (uint64_t)node.group_low + 1;
+        int64_t i = pass == 0 ? 0 : lower_bound(v.planes, v.plane_count, group << 32);
+        for (; i < v.plane_count && v.planes[i] >> 32 == group; ++i) {
+            const uint32_t plane = (uint32_t)v.planes[i];
+            if (may_meet(v, v.filters[plane], own) && proxy_plane_meets(&v.proxies[plane], &node.box, reach))
+                add(v, out, plane, slot);
+        }
+    }
+}
+
+/* One leaf against the planes and the later leaves of the tree. Static leaves come last and do not meet each other. */
+static __global__ void __launch_bounds__(COLLISION_THREADS) walk_kernel(const __grid_constant__ collision_view v)
+{
+    const int64_t thread = collision_thread(COLLISION_THREADS);
+    if (thread >= v.leaf_count) return;
+    const int32_t first_leaf = v.leaf_count - 1;
+    const struct collision_node leaf = v.nodes[first_leaf + thread];
+    const struct collision_filter own = v.filters[leaf.child];
+    struct batch out;
+    if (!(own.kind & FILTER_MOVES)) return;
+    out.count = 0;
+    add_planes(v, &out, own, leaf);
+    for (int32_t at = leaf.next; at >= 0;) {
+        const struct collision_node node = v.nodes[at];
+        const bool meet = nodes_meet(leaf, node);
+        if (meet && at < first_leaf) {
+            at = node.child;
+            continue;
+        }
+        if (meet) add_leaves(v, &out, own, (uint32_t)leaf.child, (uint32_t)node.child);
+        at = node.next;
+    }
+    flush(v, &out);
+}
+
+/* All pairs: one leaf against PAIR_TILE others, later ones only. The first tile has the planes. */
+static __global__ void __launch_bounds__(COLLISION_THREADS) tiles_kernel(const __grid_constant__ collision_view v)
+{
+    const int64_t thread = collision_thread(COLLISION_THREADS);
+    const int32_t tiles = (v.leaf_count + PAIR_TILE - 1) / PAIR_TILE;
+    if (thread >= (int64_t)v.leaf_count * tiles) return;
+    const int32_t i = (int32_t)(thread / tiles), tile = (int32_t)(thread % tiles);
+    const int32_t end = (tile + 1) * PAIR_TILE < v.leaf_count ? (tile + 1) * PAIR_TILE : v.leaf_count;
+    int32_t j = tile * PAIR_TILE > i ? tile * PAIR_TILE : i + 1;
+    if (j >= end && tile > 0) return;
+    const struct collision_node leaf = v.placed[v.present[i]];
+    const struct collision_filter own = v.filters[leaf.child];
+    struct batch out;
+    out.count = 0;
+    if (tile == 0) add_planes(v, &out, own, leaf);
+    for (; j < end; ++j) {
+        const uint32_t other = v.present[j];
+        if (nodes_meet(leaf, v.placed[other])) add_leaves(v, &out, own, (uint32_t)leaf.child, other);
+    }
+    flush(v, &out);
+}
+
+void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels)
+{
+    kernels->place = place_kernel;
+    kernels->build = build_kernel;
+    kernels->refit = refit_kernel;
+    kernels->clear = clear_kernel;
+    kernels->walk = walk_kernel;
+    kernels->tiles = tiles_kernel;
+}

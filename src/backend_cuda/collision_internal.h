@@ -1,0 +1,132 @@
+/* Contact finding on the device: the kernels' view, the pipeline's insides.
+ *
+ *   place    pose, box and filter of every shape                                   a thread a shape
+ *   tree     Morton codes, radix sort, Karras' hierarchy, boxes bottom up          (few shapes: not needed)
+ *   pairs    candidates: boxes overlap and the pair may meet                       a thread a shape
+ *   sort     candidates by (slot of a, slot of b), the host's order
+ *   narrow   the last step's pair (binary search), manifold into slots[candidate]  a thread a candidate
+ *   scan     where each candidate's contacts go
+ *   emit     pairs and points in world terms, the last step's impulses             eight threads a candidate
+ *
+ * Candidates are appended in any order (an integer counter) and then sorted: keys are unique, so the result does not depend
+ * on timing. The counter also counts what does not fit, hence a stage that lacks room says exactly how much it needs: the
+ * kernels after it do nothing, the host, which reads the counts once at the end of the stage, makes room and repeats it.
+ * Launches and sorts are sized by the room there is (the host does not know the counts); unused candidates are all ones
+ * and sort to the end.
+ *
+ * Double throughout, with the host pipeline's own inline formulas (collision_formulas.h, pair_manifold.h).
+ */
+#ifndef SADMM_CUDA_COLLISION_INTERNAL_H
+#define SADMM_CUDA_COLLISION_INTERNAL_H
+
+#include <cuda_runtime.h>
+
+#include "collision_device.h"
+#include "collision_formulas.h"
+
+enum {
+    COLLISION_THREADS = 256, /* a block */
+    NARROW_THREADS = 128,    /* the manifolds need many registers */
+    POINT_LANES = SADMM_MANIFOLD_POINTS,
+    MORTON_BITS = 21,        /* an axis */
+    PAIR_TILE = 16           /* all pairs: tests a thread */
+};
+
+/* A leaf (a shape that is no plane) or an inner node of the tree. Inner nodes come first: [0, leaves - 1), then leaves in
+ * tree order. A walk goes to `child` where boxes and groups meet, else to `next`: the node after the whole subtree, -1 at
+ * the end. It needs no stack, and a walk that starts at a leaf's `next` sees later leaves only. */
+struct alignas(16) collision_node {
+    struct sadmm_box3 box;
+    int32_t child;                 /* inner node: its left child; leaf: the slot */
+    int32_t next;
+    int32_t group_low, group_high; /* of the leaves below; a leaf that meets every group spans all */
+};
+
+/* What decides whether two shapes may meet at all; by slot. */
+struct alignas(16) collision_filter {
+    uint32_t category, mask;
+    int32_t body;
+    int32_t kind; /* type, + FILTER_MOVES */
+};
+enum { FILTER_TYPE = 0xff, FILTER_MOVES = 0x100 };
+
+/* Key of a leaf: class, group, then as much of the Morton code as fits. Small movers come first, large ones and static
+ * shapes last: a walk looks for later leaves only, so that no single thread finds everything that a large shape touches. */
+enum { LEAF_CLASS_SHIFT = 62, LEAF_LARGE = 1, LEAF_STATIC = 2 };
+
+struct collision_layout {
+    double origin[3], scale; /* of the Morton grid */
+    double large;            /* radius from which a mover is large, m */
+    int32_t group_bits;
+};
+
+/* Numbers of the step. */
+struct collision_step {
+    double dt, margin, acceleration;
+};
+
+struct collision_set {
+    struct sadmm_contact_pair *pairs;
+    struct sadmm_contact_point *points;
+    uint64_t *keys; /* of the pairs: slot of a << 32 | slot of b */
+    struct sadmm_cuda_contact_counts *counts;
+};
+
+/* What kernels see: device memory. */
+struct collision_view {
+    const struct sadmm_shape *shapes;              /* by slot */
+    const struct sadmm_collision_body *bodies;     /* by body slot */
+    const uint32_t *present;                       /* slots: leaves, then planes */
+    const uint64_t *planes;                        /* (group + 1) << 32 | slot, sorted */
+    const uint64_t *disabled_pairs, *friction_pairs;
+    const double *friction_values;
+    int32_t leaf_count, plane_count, disabled_count, friction_count;
+    int32_t shared_planes;                         /* the first ones: of group -1 */
+    struct collision_step step;
+    struct collision_layout layout;
+
+    struct sadmm_proxy *proxies;                   /* by slot */
+    struct collision_filter *filters;              /* by slot */
+    struct collision_node *placed;                 /* by slot: box, slot and groups */
+    uint64_t *leaf_keys;                           /* by leaf; sorted: tree order */
+    uint32_t *leaf_slots;
+    struct collision_node *nodes;                  /* 2 leaves - 1 */
+    int32_t *parents;                              /* of nodes; -1: the root */
+    int32_t *arrivals;                             /* at inner nodes, bottom up */
+
+    unsigned long long *candidate_count;           /* found, whether they fit or not */
+    uint64_t *candidates;                          /* slot of a << slot_bits | slot of b */
+    int32_t candidate_room;
+    int32_t slot_bits;
+    struct manifold *manifolds;                    /* by candidate; points beyond `count` are not written */
+    int32_t *matches;                              /* by candidate: pair of the last step, or -1 */
+    uint64_t *sizes, *places;                      /* by candidate: pairs << 32 | points; its exclusive sum */
+
+    struct collision_set before, after;
+    int32_t before_count;                          /* pairs */
+    int32_t point_room;
+};
+
+typedef void (*collision_kernel)(const collision_view);
+
+/* Candidates that the kernels after the pairs stage work on: none when they did not all fit. */
+static __device__ __forceinline__ int32_t usable_candidates(const collision_view &v)
+{
+    unsigned long long found = *v.candidate_count;
+    return found <= (unsigned long long)v.candidate_room ? (int32_t)found : 0;
+}
+
+static __device__ __forceinline__ int64_t collision_thread(int block)
+{
+    return (int64_t)blockIdx.x * block + threadIdx.x;
+}
+
+/* The kernels, each beside what it does. */
+struct collision_kernels {
+    collision_kernel place, build, refit, clear, walk, tiles, narrow, emit;
+};
+void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels);
+void COLLISION(narrow_phase_kernels)(struct collision_kernels *kernels);
+void COLLISION(matching_kernels)(struct collision_kernels *kernels);
+
+#endif

@@ -1,0 +1,69 @@
+/* Sort and scan: CUB, or the standard library for the emulated device. */
+#include "collision_parallel.h"
+
+#ifndef SADMM_CUDA_EMULATED
+
+#include <cub/device/device_radix_sort.cuh>
+#include <cub/device/device_scan.cuh>
+
+cudaError_t COLLISION(sort)(void *temp, size_t *bytes, uint64_t *const keys[2], uint32_t *const *values, int count, int bits,
+                            int *result, cudaStream_t stream)
+{
+    cub::DoubleBuffer<uint64_t> key(keys[0], keys[1]);
+    cudaError_t code;
+    if (values) {
+        cub::DoubleBuffer<uint32_t> value(values[0], values[1]);
+        code = cub::DeviceRadixSort::SortPairs(temp, *bytes, key, value, count, 0, bits, stream);
+        /* CUB moves both together; the callers rely on it */
+        if (code == cudaSuccess && value.selector != key.selector) code = cudaErrorUnknown;
+    } else {
+        code = cub::DeviceRadixSort::SortKeys(temp, *bytes, key, count, 0, bits, stream);
+    }
+    *result = key.selector;
+    return code;
+}
+
+cudaError_t COLLISION(sum)(void *temp, size_t *bytes, const uint64_t *in, uint64_t *out, int count, cudaStream_t stream)
+{
+    return cub::DeviceScan::ExclusiveSum(temp, *bytes, in, out, count, stream);
+}
+
+#else
+
+#include <vector>
+
+cudaError_t COLLISION(sort)(void *temp, size_t *bytes, uint64_t *const keys[2], uint32_t *const *values, int count, int bits,
+                            int *result, cudaStream_t)
+{
+    *bytes = 1;
+    *result = 0;
+    if (!temp) return cudaSuccess;
+    CUDA_EMULATION_CALL;
+    const uint64_t mask = bits < 64 ? (UINT64_C(1) << bits) - 1 : ~UINT64_C(0);
+    std::vector<uint32_t> order((size_t)count);
+    for (size_t i = 0; i < order.size(); ++i) order[i] = (uint32_t)i;
+    std::stable_sort(order.begin(), order.end(),
+                     [&](uint32_t a, uint32_t b) { return (keys[0][a] & mask) < (keys[0][b] & mask); });
+    for (size_t i = 0; i < order.size(); ++i) {
+        keys[1][i] = keys[0][order[i]];
+        if (values) values[1][i] = values[0][order[i]];
+    }
+    *result = 1;
+    return cudaSuccess;
+}
+
+cudaError_t COLLISION(sum)(void *temp, size_t *bytes, const uint64_t *in, uint64_t *out, int count, cudaStream_t)
+{
+    *bytes = 1;
+    if (!temp) return cudaSuccess;
+    CUDA_EMULATION_CALL;
+    uint64_t sum = 0;
+    for (int i = 0; i < count; ++i) {
+        uint64_t item = in[i];
+        out[i] = sum;
+        sum += item;
+    }
+    return cudaSuccess;
+}
+
+#endif

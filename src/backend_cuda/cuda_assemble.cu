@@ -1,0 +1,161 @@
+/* Kernels A-D: raw bodies, contacts and blocks, as core has them, into this precision's layout. */
+#include "cuda_double.h"
+
+/* ---- bodies --------------------------------------------------------------------------------------------------- */
+
+static __global__ void assemble_bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    int32_t i = thread_index();
+    if (i >= v.bodies) return;
+    int32_t raw = v.body_of[i];
+    double A[36], b[6], x[6], factor[36];
+    sadmm_system_body(&v.raw, &v.settings, raw, A, b);
+    if (v.warm_start || !dense6_cholesky(A, factor)) {
+        for (int k = 0; k < 6; ++k) x[k] = v.raw.velocity[6 * (size_t)raw + (size_t)k];
+    } else {
+        dense6_solve(factor, b, x);
+    }
+    solver_real *state = v.state + (size_t)i * ROW, *row = v.b + (size_t)i * ROW, *matrix = v.A + (size_t)i * MATRIX;
+    for (int k = 0; k < ROW; ++k) {
+        state[k] = k < 6 ? (solver_real)x[k] : (solver_real)0;
+        row[k] = k < 6 ? (solver_real)b[k] : (solver_real)0;
+    }
+    for (int k = 0; k < MATRIX; ++k) matrix[k] = k < 36 ? (solver_real)A[k] : (solver_real)0;
+}
+
+extern "C" sadmm_status CUDA(assemble_bodies)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    const struct sadmm_system *system = c->system;
+    const cuda_view *v = &c->view;
+    size_t n = (size_t)v->bodies, at = 0;
+    cuda_args args = {};
+    CUDA_ENTER(c);
+    if (c->plan.rigid) {
+        at = n * sizeof *system->rigid;
+        CUDA_TRY(CUDA(upload)(c, (void *)v->raw.rigid, PINNED_BODIES, 0, system->rigid, at, error));
+    } else {
+        size_t bytes = 36 * n * sizeof(double);
+        CUDA_TRY(CUDA(upload)(c, (void *)v->raw.A, PINNED_BODIES, 0, system->A, bytes, error));
+        CUDA_TRY(CUDA(upload)(c, (void *)v->raw.b, PINNED_BODIES, bytes, system->b, 6 * n * sizeof(double), error));
+        at = 42 * n * sizeof(double);
+    }
+    CUDA_TRY(CUDA(upload)(c, v->raw.velocity, PINNED_BODIES, at, system->velocity, 6 * n * sizeof(double), error));
+    return CUDA(launch)(c, assemble_bodies_kernel, "assemble_bodies", blocks_for(v->bodies), 0, false, &args, error);
+}
+
+/* ---- contacts given by geometry -------------------------------------------------------------------------------- */
+
+static __device__ real4 pack(vec3 a, double w)
+{
+    real4 out = {(solver_real)a.x, (solver_real)a.y, (solver_real)a.z, (solver_real)w};
+    return out;
+}
+
+static __global__ void assemble_contacts_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    int32_t p = thread_index();
+    if (p >= v.pairs) return;
+    const struct sadmm_contact_pair *pair = &v.raw_pairs[v.pair_of[p]];
+    const struct sadmm_contact_point *points = v.raw_points + pair->first;
+    vec3 normal = v3_load(pair->normal), difference = v3(0, 0, 0);
+    bool a = pair->body_a >= 0, b = pair->body_b >= 0;
+    if (a && b && pair->count > 0) difference = v3_sub(v3_load(points[0].arm_b), v3_load(points[0].arm_a));
+    v.normal[p] = pack(normal, pair->friction);
+    v.difference[p] = pack(difference, 0); /* 1/s follows from the penalties */
+    v.pair_bodies[p].x = a ? v.slot_of[pair->body_a] : v.bodies;
+    v.pair_bodies[p].y = b ? v.slot_of[pair->body_b] : v.bodies;
+    v.pair_count[p] = pair->count;
+    for (int32_t k = 0; k < pair->count; ++k) {
+        size_t slot = (size_t)k * (size_t)v.stride + (size_t)p;
+        vec3 lambda = v.warm_start ? v3_load(points[k].impulse) : v3(0, 0, 0);
+        double error = sadmm_contact_e(&v.raw, &v.settings, pair, &points[k]);
+        v.arm[slot] = pack(v3_load(a ? points[k].arm_a : points[k].arm_b), error);
+        if (v.contact_rows == 1) v.lambda_n[slot] = (solver_real)v3_dot(normal, lambda);
+        else v.lambda[slot] = pack(lambda, 0);
+    }
+}
+
+/* ---- constraints given by Jacobian rows ------------------------------------------------------------------------ */
+
+static __device__ void store(const cuda_view &v, int32_t plane, int32_t k, double value)
+{
+    v.row_data[(size_t)plane * (size_t)v.row_stride + (size_t)k] = (solver_real)value;
+}
+
+static __global__ void assemble_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    int32_t k = thread_index();
+    if (k >= v.rows) return;
+    int32_t raw = v.row_of[k];
+    const struct sadmm_problem_block *block = &v.raw.blocks[raw];
+    if ((int32_t)block->kind != args.count) return;
+    bool a = block->body_a >= 0, b = block->body_b >= 0;
+    row_about about = {(int32_t)block->kind, block->rows, a ? v.slot_of[block->body_a] : v.bodies,
+                       b ? v.slot_of[block->body_b] : v.bodies, 0};
+    for (int r = 0; r < 6; ++r) {
+        bool used = r < block->rows, any = false;
+        for (int j = 0; j < 6; ++j) {
+            double ja = used && a ? block->jacobian_a[6 * r + j] : 0, jb = used && b ? block->jacobian_b[6 * r + j] : 0;
+            store(v, ROW_J_A + 6 * r + j, k, ja);
+            store(v, ROW_J_B + 6 * r + j, k, jb);
+            any = any || ja != 0 || jb != 0;
+        }
+        bool active = used && (any || block->kind != SADMM_BLOCK_HARD);
+        if (active) about.active |= 1 << r;
+        store(v, ROW_ERROR + r, k, used ? block->error[r] : 0);
+        store(v, ROW_STIFFNESS + r, k, used ? block->stiffness[r] : 0);
+        store(v, ROW_DAMPING + r, k, used ? block->damping[r] : 0);
+        store(v, ROW_LAMBDA + r, k, v.warm_start && active ? v.raw.block_lambda[6 * (size_t)raw + (size_t)r] : 0);
+    }
+    store(v, ROW_FRICTION, k, block->friction);
+    v.row_info[k] = about;
+}
+
+/* Blocks of all kinds are uploaded with the first kind that is assembled. */
+static sadmm_status assemble_rows(struct sadmm_context *c, enum sadmm_block_kind kind, struct sadmm_error *error)
+{
+    const cuda_view *v = &c->view;
+    size_t rows = (size_t)v->rows, bytes = rows * sizeof *c->system->blocks;
+    cuda_args args = {};
+    args.count = (int32_t)kind;
+    if (!c->blocks_uploaded) {
+        CUDA_TRY(CUDA(upload)(c, (void *)v->raw.blocks, PINNED_BLOCKS, 0, c->system->blocks, bytes, error));
+        CUDA_TRY(CUDA(upload)(c, v->raw.block_lambda, PINNED_BLOCKS, bytes, c->system->block_lambda,
+                              6 * rows * sizeof(double), error));
+        c->blocks_uploaded = true;
+    }
+    return CUDA(launch)(c, assemble_rows_kernel, "assemble_blocks", blocks_for(v->rows), 0, false, &args, error);
+}
+
+/* ---- entries --------------------------------------------------------------------------------------------------- */
+
+static sadmm_status upload_contacts(struct sadmm_context *c, struct sadmm_error *error)
+{
+    const struct sadmm_contact_set *contacts = c->system->contacts;
+    CUDA_TRY(CUDA(upload)(c, (void *)c->view.raw_pairs, PINNED_PAIRS, 0, contacts->pairs,
+                          contacts->pair_count * sizeof *contacts->pairs, error));
+    return CUDA(upload)(c, (void *)c->view.raw_points, PINNED_POINTS, 0, contacts->points,
+                        contacts->point_count * sizeof *contacts->points, error);
+}
+
+extern "C" sadmm_status CUDA(assemble_contacts)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    CUDA_ENTER(c);
+    CUDA_TRY(upload_contacts(c, error));
+    CUDA_TRY(CUDA(launch)(c, assemble_contacts_kernel, "assemble_contacts", blocks_for(c->view.pairs), 0, false, &args,
+                          error));
+    return c->plan.blocks[SADMM_BLOCK_CONTACT] ? assemble_rows(c, SADMM_BLOCK_CONTACT, error) : SADMM_OK;
+}
+
+extern "C" sadmm_status CUDA(assemble_joints)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    CUDA_ENTER(c);
+    return assemble_rows(c, SADMM_BLOCK_HARD, error);
+}
+
+extern "C" sadmm_status CUDA(assemble_springs)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    CUDA_ENTER(c);
+    return assemble_rows(c, SADMM_BLOCK_SOFT, error);
+}

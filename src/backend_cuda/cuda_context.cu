@@ -1,0 +1,234 @@
+/* A context: device, stream, buffers that only grow, launches, errors. */
+#include <stdio.h>
+#include <string.h>
+
+#include "../collision/collision.h"
+#include "../core/memory.h"
+#include "cuda_internal.h"
+
+/* ---- errors --------------------------------------------------------------------------------------------------- */
+
+sadmm_status CUDA(fail)(struct sadmm_context *c, cudaError_t code, const char *what, struct sadmm_error *error)
+{
+    (void)cudaGetLastError(); /* an error that does not last must not be found by the next call */
+    return sadmm_fail(error, code == cudaErrorMemoryAllocation ? SADMM_ERROR_OUT_OF_MEMORY : SADMM_ERROR_DEVICE,
+                      "CUDA device %d: %s: %s", c->device, what, cudaGetErrorString(code));
+}
+
+sadmm_status CUDA(wait)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cudaError_t code = cudaStreamSynchronize(c->stream);
+    if (code == cudaSuccess) return SADMM_OK;
+    char what[160];
+    snprintf(what, sizeof what, "kernel %s (the last one launched, or one before it)", c->kernel ? c->kernel : "none");
+    return CUDA(fail)(c, code, what, error);
+}
+
+/* ---- memory --------------------------------------------------------------------------------------------------- */
+
+static const char *const buffer_names[BUFFER_COUNT] = {
+    "states",
+    "b",
+    "A",
+    "factors",
+    "C",
+    "penalties",
+    "normals",
+    "arms between bodies",
+    "pairs' bodies",
+    "pairs' points",
+    "arms",
+    "impulses",
+    "row blocks",
+    "row blocks' data",
+    "wrench records",
+    "changes of wrench records",
+    "layout",
+    "scalars",
+    "bodies' input",
+    "pairs' input",
+    "points' input",
+    "blocks' input",
+    "results",
+    "staged layout",
+    "staged bodies",
+    "staged pairs",
+    "staged points",
+    "staged blocks",
+    "staged results",
+};
+
+static void release(cuda_buffer *buffer)
+{
+    if (buffer->data) (void)(buffer->pinned ? cudaFreeHost(buffer->data) : cudaFree(buffer->data));
+    buffer->data = nullptr;
+    buffer->capacity = 0;
+}
+
+sadmm_status CUDA(room)(struct sadmm_context *c, enum cuda_buffer_name name, size_t bytes, struct sadmm_error *error)
+{
+    cuda_buffer *buffer = &c->buffers[name];
+    if (bytes <= buffer->capacity && buffer->data) return SADMM_OK;
+    size_t wanted = buffer->capacity + buffer->capacity / 2;
+    if (wanted < bytes) wanted = bytes;
+    if (wanted < 256) wanted = 256;
+    char what[96];
+    snprintf(what, sizeof what, "allocation of %zu bytes for the cuda backend's %s", wanted, buffer_names[name]);
+    if (sadmm_test_allocation_fails()) return CUDA(fail)(c, cudaErrorMemoryAllocation, what, error);
+    release(buffer);
+    buffer->pinned = name >= PINNED_LAYOUT;
+    CUDA_CALL(c, buffer->pinned ? cudaMallocHost(&buffer->data, wanted) : cudaMalloc(&buffer->data, wanted), what);
+    buffer->capacity = wanted;
+    return SADMM_OK;
+}
+
+sadmm_status CUDA(upload)(struct sadmm_context *c, void *to, enum cuda_buffer_name staging, size_t at, const void *from,
+                          size_t bytes, struct sadmm_error *error)
+{
+    if (bytes == 0) return SADMM_OK;
+    unsigned char *staged = (unsigned char *)c->buffers[staging].data + at;
+    memcpy(staged, from, bytes);
+    CUDA_CALL(c, cudaMemcpyAsync(to, staged, bytes, cudaMemcpyHostToDevice, c->stream),
+              "cudaMemcpyAsync to the device");
+    return SADMM_OK;
+}
+
+sadmm_status CUDA(download)(struct sadmm_context *c, const void *from, size_t bytes, struct sadmm_error *error)
+{
+    if (bytes > 0)
+        CUDA_CALL(c, cudaMemcpyAsync(c->buffers[PINNED_OUT].data, from, bytes, cudaMemcpyDeviceToHost, c->stream),
+                  "cudaMemcpyAsync from the device");
+    return CUDA(wait)(c, error);
+}
+
+/* ---- launches ------------------------------------------------------------------------------------------------- */
+
+sadmm_status CUDA(launch)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, size_t shared,
+                          bool cooperative, const cuda_args *args, struct sadmm_error *error)
+{
+    if (blocks <= 0) return SADMM_OK;
+    c->kernel = name;
+#ifdef SADMM_CUDA_EMULATED
+    cudaError_t code = cuda_emulation_launch(kernel, (unsigned)blocks, THREADS, shared, cooperative, c->view, *args);
+#else
+    void *parameters[] = {&c->view, const_cast<cuda_args *>(args)};
+    dim3 grid((unsigned)blocks), block(THREADS);
+    cudaError_t code =
+        cooperative ? cudaLaunchCooperativeKernel((const void *)kernel, grid, block, parameters, shared, c->stream)
+                    : cudaLaunchKernel((const void *)kernel, grid, block, parameters, shared, c->stream);
+#endif
+    CUDA_CALL(c, code, name);
+    return SADMM_OK;
+}
+
+/* ---- devices -------------------------------------------------------------------------------------------------- */
+
+struct probe_result {
+    bool found;
+    char about[512];
+};
+
+static probe_result probe(void)
+{
+    probe_result result = {false, ""};
+    int count = 0;
+    cudaError_t code = cudaGetDeviceCount(&count);
+    if (code != cudaSuccess || count == 0) {
+        (void)cudaGetLastError();
+        snprintf(result.about, sizeof result.about, "no CUDA device: %s",
+                 code != cudaSuccess ? cudaGetErrorString(code) : "the driver lists none");
+        return result;
+    }
+    cudaDeviceProp properties;
+    code = cudaGetDeviceProperties(&properties, 0);
+    if (code != cudaSuccess) {
+        (void)cudaGetLastError();
+        snprintf(result.about, sizeof result.about, "CUDA device 0 does not answer: %s", cudaGetErrorString(code));
+        return result;
+    }
+    result.found = true;
+    snprintf(result.about, sizeof result.about, "%s, compute capability %d.%d, %d multiprocessors; %d device%s",
+             properties.name, properties.major, properties.minor, properties.multiProcessorCount, count,
+             count == 1 ? "" : "s");
+    return result;
+}
+
+extern "C" bool CUDA(probe)(const char **about)
+{
+    static const probe_result result = probe(); /* once a process: starting the driver takes a while */
+    *about = result.about;
+    return result.found;
+}
+
+static sadmm_status open_device(struct sadmm_context *c, struct sadmm_error *error)
+{
+    int cooperative = 0, count = 0;
+    CUDA_CALL(c, cudaGetDeviceCount(&count), "cudaGetDeviceCount");
+    if (c->device < 0 || c->device >= count)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "device = %d: must be in [0, %d]", c->device, count - 1);
+    CUDA_ENTER(c);
+    CUDA_CALL(c, cudaDeviceGetAttribute(&c->multiprocessors, cudaDevAttrMultiProcessorCount, c->device),
+              "cudaDeviceGetAttribute");
+    CUDA_CALL(c, cudaDeviceGetAttribute(&c->shared_limit, cudaDevAttrMaxSharedMemoryPerBlockOptin, c->device),
+              "cudaDeviceGetAttribute");
+    CUDA_CALL(c, cudaDeviceGetAttribute(&cooperative, cudaDevAttrCooperativeLaunch, c->device),
+              "cudaDeviceGetAttribute");
+    c->cooperative = cooperative != 0;
+    CUDA_CALL(c, CUDA(resident_allow)(c->shared_limit), "loading the kernels");
+    CUDA_CALL(c, cudaStreamCreateWithFlags(&c->stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
+    return SADMM_OK;
+}
+
+/* ---- entries -------------------------------------------------------------------------------------------------- */
+
+extern "C" sadmm_status CUDA(create)(int device, struct sadmm_context **out, struct sadmm_error *error)
+{
+    struct sadmm_context *c = (struct sadmm_context *)sadmm_alloc(1, sizeof *c);
+    *out = nullptr;
+    if (!c) return sadmm_fail_memory(error, "the cuda backend's context");
+    c->device = device;
+    sadmm_status status = open_device(c, error);
+    if (status != SADMM_OK) {
+        CUDA(destroy)(c);
+        return status;
+    }
+    *out = c;
+    return SADMM_OK;
+}
+
+extern "C" void CUDA(destroy)(struct sadmm_context *c)
+{
+    if (!c) return;
+    if (c->stream) { /* a device was opened; after a device error these calls fail, and there is nothing left to free */
+        device_scope scope(c->device);
+        (void)cudaStreamSynchronize(c->stream);
+        if (c->graph) (void)cudaGraphExecDestroy(c->graph);
+        for (cuda_buffer &buffer : c->buffers) release(&buffer);
+        (void)cudaStreamDestroy(c->stream);
+        (void)cudaGetLastError();
+    }
+    sadmm_free(c->scratch.parent);
+    sadmm_free(c->scratch.island_of);
+    sadmm_free(c->scratch.islands);
+    sadmm_free(c->scratch.cursor);
+    sadmm_free(c->scratch.parts);
+    sadmm_free(c);
+}
+
+extern "C" sadmm_status CUDA(find_contacts)(struct sadmm_context *, struct sadmm_collision *collision,
+                                            const struct sadmm_collision_input *input,
+                                            struct sadmm_contact_set *contacts, struct sadmm_error *error)
+{
+    return sadmm_collision_find(collision, input, contacts, error);
+}
+
+extern "C" void CUDA(set_tier)(struct sadmm_context *c, enum sadmm_cuda_tier tier)
+{
+    c->wanted = tier;
+}
+
+extern "C" enum sadmm_cuda_tier CUDA(get_tier)(const struct sadmm_context *c, int32_t *blocks)
+{
+    if (blocks) *blocks = c->tier == SADMM_CUDA_TIER_STREAM ? 0 : c->part_count;
+    return c->tier;
+}

@@ -1,0 +1,417 @@
+/* A CUDA device in ordinary C++, for machines that have none: what src/backend_cuda asks of the runtime, and its
+ * kernels run thread by thread. Put this folder before the toolkit's on the include path and define
+ * SADMM_CUDA_EMULATED.
+ *
+ * Every CUDA thread is a fiber; a barrier or a shuffle gives way to the others. A barrier that not every thread of its
+ * warp, block or grid reaches, fails the launch instead of hanging. Fibers run in ascending or descending order on
+ * request: a missing barrier shows as a difference between the two. Device and shared memory is filled with NaN
+ * patterns when it is allocated, and each block has its own heap block, so that sanitizers see every access out of
+ * bounds.
+ *
+ * Not emulated: memory ordering, and any concurrency between blocks of a launch that is not cooperative.
+ */
+#ifndef SADMM_CUDA_EMULATION_H
+#define SADMM_CUDA_EMULATION_H
+
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <ucontext.h>
+
+#include <algorithm>
+#include <functional>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "emulation_control.h"
+
+#define __global__
+#define __device__
+#define __host__
+#define __forceinline__ inline __attribute__((always_inline))
+#define __launch_bounds__(threads)
+#define __grid_constant__
+
+struct int2 {
+    int x, y;
+};
+struct dim3 {
+    unsigned x, y, z;
+};
+
+/* ---- threads as fibers ----------------------------------------------------------------------------------------- */
+
+inline dim3 threadIdx, blockIdx, gridDim;
+
+namespace cuda_emulation {
+
+enum { WARP_SIZE = 32, STACK = 128 * 1024 };
+enum waiting { NOT, AT_WARP, AT_BLOCK, AT_GRID };
+
+struct fiber {
+    ucontext_t context;
+    unsigned block, thread;
+    waiting at;
+    bool done;
+    unsigned long long shuffled[2]; /* in turn: a lane may write the next value before all have read the last */
+    unsigned shuffles;
+};
+
+struct launch_state {
+    std::vector<fiber> fibers;
+    std::vector<std::unique_ptr<unsigned char, void (*)(void *)>> shared; /* by block of the launch */
+    unsigned threads, first_block;
+    ucontext_t scheduler;
+    fiber *current;
+    const std::function<void()> *body;
+};
+
+inline launch_state *running;
+inline std::vector<std::unique_ptr<char[]>> stacks;
+
+inline void give_way(waiting at)
+{
+    fiber *self = running->current;
+    self->at = at;
+    swapcontext(&self->context, &running->scheduler);
+}
+
+inline void fiber_main(void)
+{
+    (*running->body)();
+    running->current->done = true;
+    /* returns to the scheduler (uc_link) */
+}
+
+inline unsigned char *poisoned(size_t bytes)
+{
+    unsigned char *block = (unsigned char *)malloc(bytes ? bytes : 1);
+    if (block) memset(block, 0xff, bytes ? bytes : 1);
+    return block;
+}
+
+/* Let fibers [begin, end) past a barrier all of them wait at. */
+inline bool release(launch_state *l, size_t begin, size_t end, waiting at)
+{
+    for (size_t i = begin; i < end; ++i)
+        if (l->fibers[i].done || l->fibers[i].at != at) return false;
+    for (size_t i = begin; i < end; ++i) l->fibers[i].at = NOT;
+    return true;
+}
+
+/* Run `blocks` blocks side by side; false when threads wait for each other for ever. */
+inline bool run_blocks(const std::function<void()> &body, unsigned first, unsigned blocks, unsigned threads,
+                       size_t shared)
+{
+    launch_state l;
+    l.fibers.resize((size_t)blocks * threads);
+    l.threads = threads;
+    l.first_block = first;
+    l.body = &body;
+    running = &l;
+    for (unsigned i = 0; i < blocks; ++i) l.shared.emplace_back(poisoned(shared), free);
+    while (stacks.size() < l.fibers.size()) stacks.emplace_back(new char[STACK]);
+    for (size_t i = 0; i < l.fibers.size(); ++i) {
+        fiber &f = l.fibers[i];
+        f.block = first + (unsigned)(i / threads);
+        f.thread = (unsigned)(i % threads);
+        getcontext(&f.context);
+        f.context.uc_stack.ss_sp = stacks[i].get();
+        f.context.uc_stack.ss_size = STACK;
+        f.context.uc_link = &l.scheduler;
+        makecontext(&f.context, fiber_main, 0);
+    }
+    size_t left = l.fibers.size();
+    while (left > 0) {
+        bool moved = false;
+        for (size_t k = 0; k < l.fibers.size(); ++k) {
+            fiber &f = l.fibers[cuda_emulation_descending ? l.fibers.size() - 1 - k : k];
+            if (f.done || f.at != NOT) continue;
+            l.current = &f;
+            threadIdx.x = f.thread;
+            blockIdx.x = f.block;
+            swapcontext(&l.scheduler, &f.context);
+            moved = true;
+            if (f.done) --left;
+        }
+        for (size_t i = 0; i < l.fibers.size(); i += WARP_SIZE) release(&l, i, i + WARP_SIZE, AT_WARP);
+        for (size_t i = 0; i < l.fibers.size(); i += threads) release(&l, i, i + threads, AT_BLOCK);
+        release(&l, 0, l.fibers.size(), AT_GRID);
+        if (!moved) return false;
+    }
+    return true;
+}
+
+inline unsigned long long exchange(unsigned mask, unsigned long long value, unsigned from)
+{
+    fiber *self = running->current, *warp = self - self->thread % WARP_SIZE;
+    if (mask != 0xffffffffu) abort(); /* the backend has no use for partial warps */
+    unsigned turn = self->shuffles++ % 2;
+    self->shuffled[turn] = value;
+    give_way(AT_WARP);
+    return warp[from].shuffled[turn];
+}
+
+} // namespace cuda_emulation
+
+inline void __syncthreads(void) { cuda_emulation::give_way(cuda_emulation::AT_BLOCK); }
+inline void __syncwarp(unsigned) { cuda_emulation::give_way(cuda_emulation::AT_WARP); }
+inline void cuda_emulation_grid_barrier(void) { cuda_emulation::give_way(cuda_emulation::AT_GRID); }
+
+inline unsigned char *cuda_emulation_shared(void)
+{
+    cuda_emulation::launch_state *l = cuda_emulation::running;
+    return l->shared[l->current->block - l->first_block].get();
+}
+
+template <class T> static inline T cuda_emulation_exchange(unsigned mask, T value, unsigned from)
+{
+    unsigned long long bits = 0;
+    memcpy(&bits, &value, sizeof value);
+    bits = cuda_emulation::exchange(mask, bits, from);
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+template <class T> static inline T __shfl_sync(unsigned mask, T value, int from, int width)
+{
+    unsigned lane = threadIdx.x % cuda_emulation::WARP_SIZE;
+    return cuda_emulation_exchange(mask, value, lane / (unsigned)width * (unsigned)width + (unsigned)from);
+}
+template <class T> static inline T __shfl_xor_sync(unsigned mask, T value, int bits)
+{
+    return cuda_emulation_exchange(mask, value, threadIdx.x % cuda_emulation::WARP_SIZE ^ (unsigned)bits);
+}
+
+inline long long __double_as_longlong(double value)
+{
+    long long bits;
+    memcpy(&bits, &value, sizeof bits);
+    return bits;
+}
+inline void atomicMax(unsigned long long *to, unsigned long long value) { *to = std::max(*to, value); }
+
+/* ---- the runtime ----------------------------------------------------------------------------------------------- */
+
+enum cudaError_t {
+    cudaSuccess = 0,
+    cudaErrorInvalidValue,
+    cudaErrorMemoryAllocation,
+    cudaErrorInvalidDevice,
+    cudaErrorGraphExecUpdateFailure,
+    cudaErrorLaunchFailure,
+    cudaErrorLaunchTimeout,
+};
+enum { cudaMemcpyHostToDevice, cudaMemcpyDeviceToHost };
+enum cudaDeviceAttr {
+    cudaDevAttrMultiProcessorCount,
+    cudaDevAttrMaxSharedMemoryPerBlockOptin,
+    cudaDevAttrCooperativeLaunch
+};
+enum { cudaFuncAttributeMaxDynamicSharedMemorySize, cudaStreamNonBlocking, cudaStreamCaptureModeThreadLocal };
+
+struct cudaDeviceProp {
+    char name[256];
+    int major, minor, multiProcessorCount;
+};
+struct cudaGraphExecUpdateResultInfo {
+    int unused;
+};
+typedef struct cuda_emulation_stream *cudaStream_t;
+struct cuda_emulation_stream {
+    int device;
+};
+typedef std::vector<std::function<bool()>> *cudaGraph_t;
+typedef cudaGraph_t cudaGraphExec_t;
+
+namespace cuda_emulation {
+
+enum { DEVICES = 2, MULTIPROCESSORS = 4, BLOCKS_PER_MULTIPROCESSOR = 2, SHARED_LIMIT = 96 * 1024 };
+inline int device;
+inline cudaGraph_t capture; /* what is recorded, when a stream is being captured */
+
+/* The call of this thread that cuda_emulation_fail_after() chose fails. */
+inline bool fails(void)
+{
+    if (cuda_emulation_calls_left < 0) return false;
+    return cuda_emulation_calls_left-- == 0;
+}
+
+} // namespace cuda_emulation
+
+#define CUDA_EMULATION_CALL \
+    if (cuda_emulation::fails()) return cudaErrorLaunchFailure
+
+inline const char *cudaGetErrorString(cudaError_t code)
+{
+    switch (code) {
+    case cudaSuccess: return "no error";
+    case cudaErrorMemoryAllocation: return "out of memory";
+    case cudaErrorInvalidDevice: return "invalid device ordinal";
+    case cudaErrorLaunchTimeout: return "emulated threads wait for each other for ever";
+    case cudaErrorLaunchFailure: return "unspecified launch failure (emulated)";
+    default: return "invalid argument (emulated)";
+    }
+}
+inline cudaError_t cudaGetLastError(void) { return cudaSuccess; }
+
+inline cudaError_t cudaGetDeviceCount(int *count)
+{
+    *count = cuda_emulation::DEVICES;
+    return cudaSuccess;
+}
+inline cudaError_t cudaGetDevice(int *device)
+{
+    *device = cuda_emulation::device;
+    return cudaSuccess;
+}
+inline cudaError_t cudaSetDevice(int device)
+{
+    if (device < 0 || device >= cuda_emulation::DEVICES) return cudaErrorInvalidDevice;
+    cuda_emulation::device = device;
+    return cudaSuccess;
+}
+inline cudaError_t cudaGetDeviceProperties(cudaDeviceProp *properties, int)
+{
+    memset(properties, 0, sizeof *properties);
+    snprintf(properties->name, sizeof properties->name, "emulated device");
+    properties->multiProcessorCount = cuda_emulation::MULTIPROCESSORS;
+    return cudaSuccess;
+}
+inline cudaError_t cudaDeviceGetAttribute(int *value, cudaDeviceAttr attribute, int)
+{
+    CUDA_EMULATION_CALL;
+    *value = attribute == cudaDevAttrMultiProcessorCount            ? cuda_emulation::MULTIPROCESSORS
+             : attribute == cudaDevAttrMaxSharedMemoryPerBlockOptin ? cuda_emulation::SHARED_LIMIT
+                                                                    : 1;
+    return cudaSuccess;
+}
+inline cudaError_t cudaFuncSetAttribute(const void *, int, int)
+{
+    CUDA_EMULATION_CALL;
+    return cudaSuccess;
+}
+inline cudaError_t cudaOccupancyMaxActiveBlocksPerMultiprocessor(int *blocks, const void *, int, size_t shared)
+{
+    CUDA_EMULATION_CALL;
+    *blocks = 2 * shared <= cuda_emulation::SHARED_LIMIT ? cuda_emulation::BLOCKS_PER_MULTIPROCESSOR : 1;
+    return cudaSuccess;
+}
+
+inline cudaError_t cudaMallocHost(void **block, size_t bytes)
+{
+    CUDA_EMULATION_CALL;
+    *block = cuda_emulation::poisoned(bytes);
+    if (!*block) return cudaErrorMemoryAllocation;
+    ++cuda_emulation_allocations;
+    return cudaSuccess;
+}
+inline cudaError_t cudaMalloc(void **block, size_t bytes) { return cudaMallocHost(block, bytes); }
+inline cudaError_t cudaFreeHost(void *block)
+{
+    free(block);
+    --cuda_emulation_allocations;
+    return cudaSuccess;
+}
+inline cudaError_t cudaFree(void *block) { return cudaFreeHost(block); }
+inline cudaError_t cudaMemcpyAsync(void *to, const void *from, size_t bytes, int, cudaStream_t)
+{
+    CUDA_EMULATION_CALL;
+    memcpy(to, from, bytes);
+    return cudaSuccess;
+}
+inline cudaError_t cudaMemsetAsync(void *to, int value, size_t bytes, cudaStream_t)
+{
+    CUDA_EMULATION_CALL;
+    memset(to, value, bytes);
+    return cudaSuccess;
+}
+
+inline cudaError_t cudaStreamCreateWithFlags(cudaStream_t *stream, int)
+{
+    CUDA_EMULATION_CALL;
+    *stream = new cuda_emulation_stream{cuda_emulation::device};
+    ++cuda_emulation_allocations;
+    return cudaSuccess;
+}
+inline cudaError_t cudaStreamDestroy(cudaStream_t stream)
+{
+    delete stream;
+    --cuda_emulation_allocations;
+    return cudaSuccess;
+}
+inline cudaError_t cudaStreamSynchronize(cudaStream_t)
+{
+    CUDA_EMULATION_CALL;
+    return cudaSuccess;
+}
+
+inline cudaError_t cudaStreamBeginCapture(cudaStream_t, int)
+{
+    CUDA_EMULATION_CALL;
+    cuda_emulation::capture = new std::vector<std::function<bool()>>;
+    return cudaSuccess;
+}
+inline cudaError_t cudaStreamEndCapture(cudaStream_t, cudaGraph_t *graph)
+{
+    *graph = cuda_emulation::capture;
+    cuda_emulation::capture = nullptr;
+    CUDA_EMULATION_CALL;
+    return cudaSuccess;
+}
+inline cudaError_t cudaGraphDestroy(cudaGraph_t graph)
+{
+    delete graph;
+    return cudaSuccess;
+}
+inline cudaError_t cudaGraphInstantiate(cudaGraphExec_t *out, cudaGraph_t graph, unsigned long long)
+{
+    CUDA_EMULATION_CALL;
+    *out = new std::vector<std::function<bool()>>(*graph);
+    ++cuda_emulation_allocations;
+    return cudaSuccess;
+}
+inline cudaError_t cudaGraphExecDestroy(cudaGraphExec_t graph)
+{
+    delete graph;
+    --cuda_emulation_allocations;
+    return cudaSuccess;
+}
+inline cudaError_t cudaGraphExecUpdate(cudaGraphExec_t exec, cudaGraph_t graph, cudaGraphExecUpdateResultInfo *)
+{
+    if (exec->size() != graph->size()) return cudaErrorGraphExecUpdateFailure;
+    *exec = *graph;
+    return cudaSuccess;
+}
+inline cudaError_t cudaGraphLaunch(cudaGraphExec_t exec, cudaStream_t)
+{
+    CUDA_EMULATION_CALL;
+    for (const auto &node : *exec)
+        if (!node()) return cudaErrorLaunchTimeout;
+    return cudaSuccess;
+}
+
+/* Internal linkage: the argument types are others in every precision, under the same names. */
+template <class View, class Args>
+static cudaError_t cuda_emulation_launch(void (*kernel)(const View, const Args), unsigned blocks, unsigned threads,
+                                         size_t shared, bool cooperative, const View &view, const Args &args)
+{
+    CUDA_EMULATION_CALL;
+    if (shared > cuda_emulation::SHARED_LIMIT) return cudaErrorInvalidValue;
+    if (cooperative && blocks > cuda_emulation::MULTIPROCESSORS * cuda_emulation::BLOCKS_PER_MULTIPROCESSOR)
+        return cudaErrorInvalidValue;
+    std::function<bool()> node = [=]() {
+        std::function<void()> body = [&]() { kernel(view, args); };
+        gridDim.x = blocks;
+        unsigned together = cooperative ? blocks : 1;
+        for (unsigned first = 0; first < blocks; first += together)
+            if (!cuda_emulation::run_blocks(body, first, together, threads, shared)) return false;
+        return true;
+    };
+    if (cuda_emulation::capture) cuda_emulation::capture->push_back(node);
+    else if (!node()) return cudaErrorLaunchTimeout;
+    return cudaSuccess;
+}
+
+#endif

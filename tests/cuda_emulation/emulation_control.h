@@ -1,0 +1,24 @@
+/* What a test may ask of the emulated device (cuda_runtime.h beside this), and its two kernel tables. */
+#ifndef SADMM_EMULATION_CONTROL_H
+#define SADMM_EMULATION_CONTROL_H
+
+#include "core/kernels.h"
+#include "backend_cuda/cuda_tier.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+extern int cuda_emulation_descending;   /* run threads from the last one to the first */
+extern long cuda_emulation_calls_left;  /* runtime calls that succeed before one fails; < 0: none fails */
+extern long cuda_emulation_allocations; /* device and pinned blocks, streams and graphs alive */
+
+extern const struct sadmm_kernels cuda_emulation_tables[2]; /* by precision */
+void cuda_emulation_force_tier(const struct sadmm_kernels *, struct sadmm_context *, enum sadmm_cuda_tier);
+enum sadmm_cuda_tier cuda_emulation_tier_of(const struct sadmm_kernels *, const struct sadmm_context *,
+                                            int32_t *blocks);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

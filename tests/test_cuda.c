@@ -1,0 +1,622 @@
+/* The CUDA backend, entry by entry, tier by tier.
+ *
+ * test_reduced_form.c drives every registered table beside the literal backend; here is what only this backend has:
+ * each entry alone from identical inputs, tiers of the fused entry that must agree to the last bit, contexts side by
+ * side, devices that are missing or fail. The same checks run on the emulated device (test_cuda_emulated.c,
+ * cuda_emulation/), where every build can run them; here they run on a real one, or the program is skipped and says
+ * why.
+ */
+#include <check.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "contact_problems.h"
+#include "core/backends.h"
+#include "core/schedule.h"
+
+#ifdef CUDA_EMULATED
+#include "emulation_control.h"
+#define force_tier cuda_emulation_force_tier
+#define tier_of cuda_emulation_tier_of
+#else
+#include "backend_cuda/cuda_tier.h"
+#define force_tier sadmm_cuda_force_tier
+#define tier_of sadmm_cuda_tier_of
+#endif
+
+static const struct sadmm_kernels *tables[2]; /* by precision */
+static const char *const precision_names[] = {"f32", "f64"};
+
+static const struct sadmm_kernels *literal(void)
+{
+    const char *reason;
+    return sadmm_ref_find(SADMM_F64, &reason);
+}
+
+/* ---- scenes ---------------------------------------------------------------------------------------------------- */
+
+enum form { RIGID, RAW };
+
+/* Stacks that do not touch each other, of different heights, a joint in some: islands for the BLOCK tier. */
+static struct contact_problem *towers(int count, double friction)
+{
+    static const double up[3] = {0, 0, 1};
+    struct contact_problem *p = contact_problem_new();
+    for (int t = 0; t < count; ++t) {
+        int32_t below = -1;
+        for (int i = 0; i <= t % 4; ++i) {
+            int32_t box = contact_problem_box(p, 1 + i, 0.1, 0.1, 0.1, t, 0, 0.1 + 0.2 * i);
+            for (int k = 0; k < 4; ++k)
+                contact_problem_touch(p, below, box, (double[3]){t + (k & 1 ? 0.1 : -0.1), k & 2 ? 0.1 : -0.1, 0.2 * i},
+                                      up, 0, friction, 0);
+            if (t % 3 == 1 && below >= 0) {
+                sadmm_problem_block *block = contact_problem_block(p, SADMM_BLOCK_HARD, 1, below, box);
+                block->jacobian_a[5] = -1; /* no relative turn about z */
+                block->jacobian_b[5] = 1;
+                block->error[0] = 0.01;
+            }
+            below = box;
+        }
+    }
+    return p;
+}
+
+static size_t pick_below(size_t count) { return (size_t)((contact_problem_random() + 1) / 2 * (double)count); }
+
+/* Bodies and pairs in an order that has nothing to do with the islands: slots must undo it. */
+static struct contact_problem *shuffled_towers(void)
+{
+    struct contact_problem *p = towers(12, 0.5);
+    struct sadmm_contact_set *set = &p->contacts;
+    int32_t n = p->system.body_count, *place = malloc((size_t)n * sizeof *place);
+    struct sadmm_rigid *bodies = malloc((size_t)n * sizeof *bodies);
+    contact_problem_seed(9);
+    for (int32_t i = 0; i < n; ++i) {
+        size_t other = pick_below((size_t)i + 1);
+        place[i] = place[other];
+        place[other] = i;
+    }
+    memcpy(bodies, p->rigid, (size_t)n * sizeof *bodies);
+    for (int32_t i = 0; i < n; ++i) p->rigid[place[i]] = bodies[i];
+    for (size_t k = 0; k < set->pair_count; ++k) {
+        int32_t *a = &set->pairs[k].body_a, *b = &set->pairs[k].body_b;
+        if (*a >= 0) *a = place[*a];
+        if (*b >= 0) *b = place[*b];
+    }
+    for (int32_t k = 0; k < p->system.block_count; ++k) {
+        p->blocks[k].body_a = place[p->blocks[k].body_a];
+        p->blocks[k].body_b = place[p->blocks[k].body_b];
+    }
+    for (size_t k = set->pair_count; k-- > 1;) {
+        size_t other = pick_below(k + 1);
+        struct sadmm_contact_pair pair = set->pairs[k];
+        set->pairs[k] = set->pairs[other];
+        set->pairs[other] = pair;
+    }
+    free(bodies);
+    free(place);
+    return p;
+}
+
+/* A manifold of eight points: the larger instances. */
+static struct contact_problem *octagon(void)
+{
+    static const double up[3] = {0, 0, 1};
+    struct contact_problem *p = contact_problem_new();
+    for (int i = 0; i < 3; ++i) {
+        contact_problem_box(p, 2, 0.1, 0.1, 0.1, 0.01 * i, 0, 0.1 + 0.2 * i);
+        for (int k = 0; k < 8; ++k)
+            contact_problem_touch(p, i - 1, i, (double[3]){0.1 * cos(0.7 * k), 0.1 * sin(0.7 * k), 0.2 * i}, up, 1e-4,
+                                  0.4, 0);
+    }
+    return p;
+}
+
+static struct contact_problem *scene_mixed(void) { return contact_problem_mixed(11, 0.5); }
+static struct contact_problem *scene_slippery(void) { return contact_problem_mixed(12, 0); }
+static struct contact_problem *scene_pyramid(void) { return contact_problem_pyramid(7, 0.5); }
+static struct contact_problem *scene_towers(void) { return towers(25, 0.5); }
+static struct contact_problem *scene_slippery_towers(void) { return towers(9, 0); }
+static struct contact_problem *scene_blocks(void)
+{
+    struct contact_problem *p = contact_problem_mixed(13, 0.5);
+    p->contacts.pair_count = p->contacts.point_count = 0;
+    return p;
+}
+static struct contact_problem *scene_free(void)
+{
+    struct contact_problem *p = scene_blocks();
+    p->system.block_count = 0;
+    return p;
+}
+static struct contact_problem *scene_empty(void) { return contact_problem_new(); }
+/* 17 rows: 289 pairs in one island, more than a thread block takes: parts that exchange records over the grid. */
+static struct contact_problem *scene_large(void) { return contact_problem_pyramid(17, 0.5); }
+
+static const struct scene {
+    const char *name;
+    struct contact_problem *(*make)(void);
+    enum form form;
+    bool warm;
+    int tiers; /* bit SADMM_CUDA_TIER_x: the tier takes this scene */
+} scenes[] = {
+    {"mixed", scene_mixed, RIGID, true, 14},
+    {"mixed, A and b, cold", scene_mixed, RAW, false, 14},
+    {"mixed, frictionless", scene_slippery, RAW, true, 14},
+    {"pyramid", scene_pyramid, RIGID, false, 14},
+    {"towers", scene_towers, RIGID, true, 14},
+    {"towers, frictionless", scene_slippery_towers, RIGID, false, 14},
+    {"towers, shuffled", shuffled_towers, RIGID, true, 14},
+    {"octagons", octagon, RIGID, true, 14},
+    {"large", scene_large, RIGID, true, 12},
+    {"blocks alone", scene_blocks, RAW, true, 14},
+    {"free bodies", scene_free, RIGID, true, 14},
+    {"nothing", scene_empty, RAW, true, 14},
+};
+enum { SCENES = sizeof scenes / sizeof *scenes };
+
+/* ---- one table at work ----------------------------------------------------------------------------------------- */
+
+struct runner {
+    const struct sadmm_kernels *k;
+    struct sadmm_context *c;
+    struct contact_problem *p;
+    struct sadmm_plan plan;
+    sadmm_settings settings;
+    struct sadmm_error error;
+};
+
+#define CALL(r, call)                                                                                         \
+    do {                                                                                                      \
+        (r)->error.message[0] = 0;                                                                            \
+        sadmm_status call_status = (call);                                                                    \
+        ck_assert_msg(call_status == SADMM_OK, "%s: %s", sadmm_status_name(call_status), (r)->error.message); \
+    } while (0)
+
+static struct contact_problem *make_problem(const struct scene *scene, const sadmm_settings *settings)
+{
+    struct contact_problem *p = scene->make();
+    contact_problem_seed(42);
+    if (scene->form == RAW) contact_problem_raw(p, settings, 0.1);
+    if (scene->warm) contact_problem_warm(p, 0.3, 0.2);
+    return p;
+}
+
+static void runner_create(struct runner *r, const struct sadmm_kernels *k)
+{
+    memset(r, 0, sizeof *r);
+    r->k = k;
+    CALL(r, k->create(0, &r->c, &r->error));
+}
+
+static sadmm_status runner_begin(struct runner *r, const struct scene *scene)
+{
+    r->settings = sadmm_settings_default();
+    r->settings.warm_start = scene->warm;
+    r->settings.measure_residuals = true; /* so that every plan has room for them */
+    contact_problem_free(r->p);
+    r->p = make_problem(scene, &r->settings);
+    r->plan = sadmm_plan_make(&r->p->system, &r->settings);
+    return r->k->begin(r->c, &r->p->system, &r->plan, &r->settings, &r->error);
+}
+
+static void runner_assemble(struct runner *r)
+{
+    CALL(r, r->k->assemble_bodies(r->c, &r->error));
+    if (r->plan.points || r->plan.blocks[SADMM_BLOCK_CONTACT]) CALL(r, r->k->assemble_contacts(r->c, &r->error));
+    if (r->plan.blocks[SADMM_BLOCK_HARD]) CALL(r, r->k->assemble_joints(r->c, &r->error));
+    if (r->plan.blocks[SADMM_BLOCK_SOFT]) CALL(r, r->k->assemble_springs(r->c, &r->error));
+    CALL(r, r->k->init_penalty(r->c, &r->error));
+    CALL(r, r->k->factorize(r->c, &r->error));
+}
+
+static void runner_start(struct runner *r, const struct sadmm_kernels *k, const struct scene *scene,
+                         enum sadmm_cuda_tier tier)
+{
+    runner_create(r, k);
+    if (k->backend == SADMM_BACKEND_CUDA) force_tier(k, r->c, tier);
+    CALL(r, runner_begin(r, scene));
+    runner_assemble(r);
+    if (k->backend == SADMM_BACKEND_CUDA && tier != SADMM_CUDA_TIER_AUTO)
+        ck_assert_int_eq(tier_of(k, r->c, NULL), tier);
+}
+
+static void runner_stop(struct runner *r)
+{
+    r->k->destroy(r->c);
+    contact_problem_free(r->p);
+}
+
+static void runner_step(struct runner *r, bool measure)
+{
+    CALL(r, r->k->update_velocity(r->c, &r->error));
+    CALL(r, r->k->update_constraints(r->c, measure, &r->error));
+}
+
+static struct sadmm_residual runner_residual(struct runner *r)
+{
+    struct sadmm_residual residual;
+    CALL(r, r->k->measure_residuals(r->c, &residual, &r->error));
+    return residual;
+}
+
+static void runner_read(struct runner *r) { CALL(r, r->k->read_solution(r->c, &r->error)); }
+
+/* ---- comparing ------------------------------------------------------------------------------------------------- */
+
+struct spread {
+    double difference, scale;
+};
+
+static void add(struct spread *s, double got, double wanted)
+{
+    ck_assert_msg(isfinite(got) && isfinite(wanted), "got %g, wanted %g", got, wanted);
+    s->difference = fmax(s->difference, fabs(got - wanted));
+    s->scale = fmax(s->scale, fabs(wanted));
+}
+
+static double relative(struct spread s) { return s.difference > 0 ? s.difference / s.scale : 0; }
+
+static struct spread velocity_spread(const struct runner *got, const struct runner *wanted)
+{
+    struct spread s = {0, 0};
+    for (int32_t i = 0; i < 6 * wanted->p->system.body_count; ++i)
+        add(&s, got->p->system.velocity[i], wanted->p->system.velocity[i]);
+    return s;
+}
+
+static struct spread lambda_spread(const struct runner *got, const struct runner *wanted)
+{
+    struct spread s = {0, 0};
+    const struct sadmm_system *a = &got->p->system, *b = &wanted->p->system;
+    for (size_t k = 0; k < b->contacts->point_count; ++k)
+        for (int i = 0; i < 3; ++i) add(&s, a->contacts->points[k].impulse[i], b->contacts->points[k].impulse[i]);
+    for (int32_t i = 0; i < 6 * b->block_count; ++i) add(&s, a->block_lambda[i], b->block_lambda[i]);
+    return s;
+}
+
+/* Not one bit may differ. */
+static void check_same(struct runner *got, struct runner *wanted, const char *what)
+{
+    runner_read(got);
+    runner_read(wanted);
+    struct spread v = velocity_spread(got, wanted), lambda = lambda_spread(got, wanted);
+    ck_assert_msg(v.difference == 0 && lambda.difference == 0, "%s: v differs by %g, lambda by %g", what, relative(v),
+                  relative(lambda));
+}
+
+/* ---- entries against the literal form -------------------------------------------------------------------------- */
+
+/* One pass of every entry from identical inputs. An entry rounds its inputs to the precision (6e-8, 1e-16) and sums
+ * some tens of terms; Step 1 multiplies by (A + beta C)^-1, whose condition number here is under a hundred. */
+static const double entry_tolerance[2] = {1e-5, 1e-12};
+
+START_TEST(entries_equal_literal)
+{
+    const struct sadmm_kernels *table = tables[_i / SCENES];
+    const struct scene *scene = &scenes[_i % SCENES];
+    double tolerance = entry_tolerance[table->precision];
+    struct runner ref, own;
+    runner_start(&ref, literal(), scene, SADMM_CUDA_TIER_AUTO);
+    runner_start(&own, table, scene, SADMM_CUDA_TIER_AUTO);
+    size_t n = (size_t)own.p->system.body_count;
+
+    /* A-D: the start values come back. */
+    runner_read(&ref);
+    runner_read(&own);
+    ck_assert_msg(relative(velocity_spread(&own, &ref)) <= tolerance, "start v: %g",
+                  relative(velocity_spread(&own, &ref)));
+    ck_assert_msg(relative(lambda_spread(&own, &ref)) <= tolerance, "start lambda");
+
+    /* E-H */
+    double *beta = calloc(n + 1, sizeof *beta), *own_beta = calloc(n + 1, sizeof *own_beta);
+    CALL(&ref, ref.k->read_penalty(ref.c, beta, &ref.error));
+    CALL(&own, own.k->read_penalty(own.c, own_beta, &own.error));
+    for (size_t i = 0; i < n; ++i)
+        ck_assert_msg(fabs(own_beta[i] / beta[i] - 1) <= tolerance, "beta of body %zu: %g, %g", i, own_beta[i],
+                      beta[i]);
+
+    /* I-K */
+    CALL(&ref, ref.k->update_velocity(ref.c, &ref.error));
+    CALL(&own, own.k->update_velocity(own.c, &own.error));
+    runner_read(&ref);
+    runner_read(&own);
+    ck_assert_msg(relative(velocity_spread(&own, &ref)) <= tolerance, "Step 1: %g",
+                  relative(velocity_spread(&own, &ref)));
+
+    /* L-O, (16), (17) */
+    CALL(&ref, ref.k->update_constraints(ref.c, true, &ref.error));
+    CALL(&own, own.k->update_constraints(own.c, true, &own.error));
+    runner_read(&ref);
+    runner_read(&own);
+    struct spread lambda = lambda_spread(&own, &ref);
+    ck_assert_msg(relative(lambda) <= tolerance, "Steps 2-4: %g", relative(lambda));
+    struct sadmm_residual wanted = runner_residual(&ref), got = runner_residual(&own);
+    /* The reduced form takes the residuals as differences of multipliers and impulses, so those set their rounding. */
+    double softest = INFINITY;
+    for (size_t i = 0; i < n; ++i) softest = fmin(softest, beta[i]);
+    ck_assert_msg(fabs(got.primal - wanted.primal) <= tolerance * (wanted.primal + lambda.scale / softest),
+                  "primal %g, %g", got.primal, wanted.primal);
+    ck_assert_msg(fabs(got.dual - wanted.dual) <= tolerance * (wanted.dual + 10 * lambda.scale + 100), "dual %g, %g",
+                  got.dual, wanted.dual);
+
+    /* P, and the extrapolation that follows it */
+    CALL(&ref, ref.k->update_penalty(ref.c, 2.5, &ref.error));
+    CALL(&own, own.k->update_penalty(own.c, 2.5, &own.error));
+    CALL(&ref, ref.k->factorize(ref.c, &ref.error));
+    CALL(&own, own.k->factorize(own.c, &own.error));
+    CALL(&ref, ref.k->read_penalty(ref.c, beta, &ref.error));
+    CALL(&own, own.k->read_penalty(own.c, own_beta, &own.error));
+    for (size_t i = 0; i < n; ++i) ck_assert(fabs(own_beta[i] / beta[i] - 1) <= tolerance);
+    runner_step(&ref, false);
+    runner_step(&own, false);
+    runner_read(&ref);
+    runner_read(&own);
+    ck_assert_msg(relative(velocity_spread(&own, &ref)) <= tolerance, "v after (15): %g",
+                  relative(velocity_spread(&own, &ref)));
+    ck_assert_msg(relative(lambda_spread(&own, &ref)) <= 4 * tolerance, "lambda after (15): %g",
+                  relative(lambda_spread(&own, &ref)));
+
+    /* R and Q */
+    double *wrench = calloc(6 * n + 1, sizeof *wrench), *own_wrench = calloc(6 * n + 1, sizeof *own_wrench);
+    struct spread wrenches = {0, 0}, moved = {0, 0};
+    CALL(&ref, ref.k->recover_wrenches(ref.c, wrench, &ref.error));
+    CALL(&own, own.k->recover_wrenches(own.c, own_wrench, &own.error));
+    for (size_t i = 0; i < 6 * n; ++i) add(&wrenches, own_wrench[i], wrench[i]);
+    ck_assert_msg(relative(wrenches) <= 4 * tolerance, "wrenches: %g", relative(wrenches));
+    struct sadmm_rigid *next = calloc(n + 1, sizeof *next), *own_next = calloc(n + 1, sizeof *own_next);
+    if (scene->form == RIGID) {
+        CALL(&ref, ref.k->integrate(ref.c, next, &ref.error));
+        CALL(&own, own.k->integrate(own.c, own_next, &own.error));
+        for (size_t i = 0; i < n; ++i) {
+            for (int j = 0; j < 3; ++j) add(&moved, own_next[i].position[j], next[i].position[j]);
+            for (int j = 0; j < 4; ++j) add(&moved, own_next[i].orientation[j], next[i].orientation[j]);
+            for (int j = 0; j < 6; ++j) add(&moved, own_next[i].velocity[j], next[i].velocity[j]);
+            ck_assert(own_next[i].mass == next[i].mass); /* what does not move is kept */
+        }
+        ck_assert_msg(relative(moved) <= tolerance, "integrate: %g", relative(moved));
+    } else {
+        ck_assert_int_eq(own.k->integrate(own.c, own_next, &own.error), SADMM_ERROR_UNSUPPORTED);
+    }
+    free(next);
+    free(own_next);
+    free(wrench);
+    free(own_wrench);
+    free(beta);
+    free(own_beta);
+    runner_stop(&ref);
+    runner_stop(&own);
+}
+END_TEST
+
+/* ---- tiers ----------------------------------------------------------------------------------------------------- */
+
+/* The same arithmetic in the same order, wherever the state is kept. 34 covers two launches of the graph and a rest. */
+START_TEST(tiers_equal_stepwise)
+{
+    const struct sadmm_kernels *table = tables[_i / SCENES];
+    const struct scene *scene = &scenes[_i % SCENES];
+    static const int stretches[] = {1, 2, 34, 7};
+    static const enum sadmm_cuda_tier tiers[] = {SADMM_CUDA_TIER_BLOCK, SADMM_CUDA_TIER_GRID, SADMM_CUDA_TIER_STREAM};
+    for (size_t t = 0; t < sizeof tiers / sizeof *tiers; ++t) {
+        struct runner step, fused;
+        char what[128];
+        if (!(scene->tiers >> tiers[t] & 1)) {
+            runner_create(&fused, table);
+            force_tier(table, fused.c, tiers[t]);
+            ck_assert_int_eq(runner_begin(&fused, scene), SADMM_ERROR_UNSUPPORTED);
+            force_tier(table, fused.c, SADMM_CUDA_TIER_AUTO); /* and the context stays usable */
+            CALL(&fused, runner_begin(&fused, scene));
+            runner_stop(&fused);
+            continue;
+        }
+        runner_start(&step, table, scene, SADMM_CUDA_TIER_STREAM);
+        runner_start(&fused, table, scene, tiers[t]);
+        for (size_t s = 0; s < sizeof stretches / sizeof *stretches; ++s) {
+            bool measure = s != 1;
+            for (int i = 1; i <= stretches[s]; ++i) runner_step(&step, measure && i == stretches[s]);
+            CALL(&fused, table->iterate(fused.c, stretches[s], measure, &fused.error));
+            snprintf(what, sizeof what, "%s, tier %d, stretch %zu", scene->name, (int)tiers[t], s);
+            if (measure) {
+                struct sadmm_residual wanted = runner_residual(&step), got = runner_residual(&fused);
+                ck_assert_msg(got.primal == wanted.primal && got.dual == wanted.dual, "%s: residuals", what);
+                struct runner *both[] = {&step, &fused};
+                for (int k = 0; s == 2 && k < 2; ++k) {
+                    CALL(both[k], table->update_penalty(both[k]->c, 0.6, &both[k]->error));
+                    CALL(both[k], table->factorize(both[k]->c, &both[k]->error));
+                }
+            }
+            check_same(&fused, &step, what);
+        }
+        runner_stop(&step);
+        runner_stop(&fused);
+    }
+}
+END_TEST
+
+/* What auto takes, and that a partition into several blocks really ran. */
+START_TEST(automatic_tiers)
+{
+    int32_t blocks;
+    struct runner r;
+    runner_start(&r, tables[_i], &scenes[4], SADMM_CUDA_TIER_AUTO);
+    ck_assert_int_eq(tier_of(r.k, r.c, &blocks), SADMM_CUDA_TIER_BLOCK);
+    ck_assert_int_gt(blocks, 1);
+    runner_stop(&r);
+    runner_start(&r, tables[_i], &scenes[8], SADMM_CUDA_TIER_AUTO);
+    ck_assert_int_eq(tier_of(r.k, r.c, &blocks), SADMM_CUDA_TIER_GRID);
+    ck_assert_int_gt(blocks, 1);
+    runner_stop(&r);
+}
+END_TEST
+
+/* ---- contexts -------------------------------------------------------------------------------------------------- */
+
+static void solve(struct runner *r, const struct scene *scene)
+{
+    struct sadmm_solve_report report;
+    r->settings = sadmm_settings_default();
+    r->settings.warm_start = scene->warm;
+    r->settings.measure_residuals = true;
+    r->settings.iterations = 41; /* three penalty updates where the scene starts cold */
+    r->settings.penalty_period = 12;
+    contact_problem_free(r->p);
+    r->p = make_problem(scene, &r->settings);
+    r->plan = sadmm_plan_make(&r->p->system, &r->settings);
+    CALL(r, sadmm_schedule_solve(r->k, r->c, &r->p->system, &r->settings, &r->plan, &report, NULL, &r->error));
+}
+
+static void check_same_solution(struct runner *a, struct runner *b, const char *what)
+{
+    struct spread v = velocity_spread(a, b), lambda = lambda_spread(a, b);
+    ck_assert_msg(v.difference == 0 && lambda.difference == 0, "%s: v %g, lambda %g", what, v.difference,
+                  lambda.difference);
+}
+
+/* A whole solve through the schedule, twice, in a fresh context and in one that has seen larger and smaller systems; on
+ * the emulated device the second one also runs its threads in the other order. */
+START_TEST(runs_repeat)
+{
+    const struct sadmm_kernels *table = tables[_i];
+    struct runner used, fresh;
+    runner_create(&used, table);
+    for (size_t s = 0; s < SCENES; ++s) {
+        runner_create(&fresh, table);
+        solve(&fresh, &scenes[s]);
+#ifdef CUDA_EMULATED
+        cuda_emulation_descending = 1;
+#endif
+        solve(&used, &scenes[s]);
+#ifdef CUDA_EMULATED
+        cuda_emulation_descending = 0;
+#endif
+        check_same_solution(&used, &fresh, scenes[s].name);
+        runner_stop(&fresh);
+    }
+    runner_stop(&used);
+}
+END_TEST
+
+/* Two contexts whose entries take turns do not disturb each other. */
+START_TEST(contexts_side_by_side)
+{
+    const struct sadmm_kernels *table = tables[_i];
+    struct runner alone, one, two;
+    runner_start(&alone, table, &scenes[0], SADMM_CUDA_TIER_AUTO);
+    runner_start(&one, table, &scenes[0], SADMM_CUDA_TIER_STREAM);
+    runner_start(&two, table, &scenes[3], SADMM_CUDA_TIER_GRID);
+    for (int i = 0; i < 5; ++i) runner_step(&alone, false);
+    for (int i = 0; i < 5; ++i) {
+        CALL(&one, table->update_velocity(one.c, &one.error));
+        runner_step(&two, false);
+        CALL(&one, table->update_constraints(one.c, false, &one.error));
+    }
+    check_same(&one, &alone, "alternating");
+    runner_stop(&alone);
+    runner_stop(&one);
+    runner_stop(&two);
+}
+END_TEST
+
+/* ---- errors ---------------------------------------------------------------------------------------------------- */
+
+START_TEST(no_such_device)
+{
+    struct sadmm_context *c = (struct sadmm_context *)&tables;
+    struct sadmm_error error;
+    ck_assert_int_eq(tables[_i]->create(4711, &c, &error), SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert_ptr_null(c);
+    ck_assert_msg(strstr(error.message, "device = 4711") != NULL, "%s", error.message);
+    ck_assert_int_eq(tables[_i]->create(-1, &c, &error), SADMM_ERROR_INVALID_ARGUMENT);
+}
+END_TEST
+
+#ifdef CUDA_EMULATED
+/* Let each runtime call of a solve fail in turn: always a status and a message, never a leak, and a new context works.
+ * */
+START_TEST(calls_that_fail)
+{
+    const struct sadmm_kernels *table = tables[_i];
+    const struct scene *scene = &scenes[0];
+    sadmm_settings settings = sadmm_settings_default();
+    settings.warm_start = false;
+    settings.measure_residuals = true;
+    int failed = 0;
+    for (int tier = SADMM_CUDA_TIER_BLOCK; tier <= SADMM_CUDA_TIER_STREAM; ++tier) {
+        /* 18 iterations are a graph in the STREAM tier; the others launch once, however many there are. */
+        settings.penalty_period = tier == SADMM_CUDA_TIER_STREAM ? 18 : 1;
+        settings.iterations = settings.penalty_period + 1;
+        for (long calls = 0;; ++calls) {
+            struct contact_problem *p = make_problem(scene, &settings);
+            struct sadmm_plan plan = sadmm_plan_make(&p->system, &settings);
+            struct sadmm_solve_report report;
+            struct sadmm_context *c = NULL;
+            struct sadmm_error error = {SADMM_OK, ""};
+            cuda_emulation_calls_left = calls;
+            sadmm_status status = table->create(1, &c, &error);
+            if (status == SADMM_OK) {
+                force_tier(table, c, (enum sadmm_cuda_tier)tier);
+                status = sadmm_schedule_solve(table, c, &p->system, &settings, &plan, &report, NULL, &error);
+            } else {
+                ck_assert_ptr_null(c);
+            }
+            bool reached = cuda_emulation_calls_left < 0;
+            cuda_emulation_calls_left = -1;
+            if (reached) {
+                ++failed;
+                ck_assert_msg(status == SADMM_ERROR_DEVICE, "call %ld: %s", calls, sadmm_status_name(status));
+                ck_assert_msg(strstr(error.message, "CUDA device 1: ") && strstr(error.message, "launch failure"), "%s",
+                              error.message);
+            } else {
+                ck_assert_int_eq(status, SADMM_OK);
+            }
+            table->destroy(c);
+            contact_problem_free(p);
+            ck_assert_msg(cuda_emulation_allocations == 0, "call %ld: %ld left", calls, cuda_emulation_allocations);
+            if (!reached) break;
+        }
+    }
+    ck_assert_int_gt(failed, 100);
+}
+END_TEST
+#endif
+
+/* ---------------------------------------------------------------------------------------------------------------- */
+
+int main(void)
+{
+#ifdef CUDA_EMULATED
+    for (int p = 0; p < 2; ++p) tables[p] = &cuda_emulation_tables[p];
+#else
+    const char *reason = "";
+    for (int p = 0; p < 2; ++p) {
+        tables[p] = sadmm_cuda_find((sadmm_precision)p, &reason);
+        if (!tables[p]) {
+            printf("skipped: %s: %s\n", precision_names[p], reason);
+            return 77;
+        }
+    }
+    printf("on %s\n", reason);
+#endif
+    Suite *suite = suite_create("cuda");
+    TCase *tests = tcase_create("cuda");
+    tcase_set_timeout(tests, 300);
+    tcase_add_loop_test(tests, entries_equal_literal, 0, 2 * SCENES);
+    tcase_add_loop_test(tests, tiers_equal_stepwise, 0, 2 * SCENES);
+    tcase_add_loop_test(tests, automatic_tiers, 0, 2);
+    tcase_add_loop_test(tests, runs_repeat, 0, 2);
+    tcase_add_loop_test(tests, contexts_side_by_side, 0, 2);
+    tcase_add_loop_test(tests, no_such_device, 0, 2);
+#ifdef CUDA_EMULATED
+    tcase_add_loop_test(tests, calls_that_fail, 0, 2);
+#endif
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_set_fork_status(runner, CK_NOFORK); /* a driver that was started does not survive a fork */
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+}
