@@ -8,8 +8,8 @@ jobs=${JOBS:-$(nproc)}
 # Debian's and Ubuntu's names. "package=command": having the command is enough.
 packages_to_run=(gcc=cc 'g++=c++' meson=meson ninja-build=ninja pkgconf=pkg-config libfcl-dev libjansson-dev)
 packages_to_test=("${packages_to_run[@]}" git=git libhdf5-dev check clang=clang libomp-dev util-linux=setarch)
-# Used where the release offers them: they went by other names, or not at all, in some.
-packages_to_test_if_offered=(libclang-rt-dev libsiconos-numerics-dev)
+# Used where the release offers it.
+packages_to_test_if_offered=(libsiconos-numerics-dev)
 
 say() { printf '\n==> %s\n' "$*"; }
 fail() { printf 'error: %s\n' "$*" >&2; exit 1; }
@@ -27,33 +27,43 @@ missing_packages() {
     done
 }
 
+# How to become root, into the array `as_root`; false if there is no way
+become_root() {
+    as_root=()
+    ((EUID == 0)) && return
+    as_root=(sudo -n)
+    command -v sudo >/dev/null && sudo -n true 2>/dev/null
+}
+
+update_package_lists() {
+    ${package_lists_updated:-false} && return
+    "${as_root[@]}" apt-get update -qq
+    package_lists_updated=true
+}
+
 # install_packages ENTRY...: install what is missing as root or by sudo without a password, or say what to install
 install_packages() {
-    local as_root=() missing
+    local missing as_root
     if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
         echo "not Debian or Ubuntu: nothing is installed, these packages or their like must be there: ${*%%=*}"
         return
     fi
     missing_packages "$@"
     ((${#missing[@]})) || return 0
-    if ((EUID != 0)); then
-        if ! command -v sudo >/dev/null || ! sudo -n true 2>/dev/null; then
-            fail "packages are missing, and this is neither root nor can it use sudo without a password. Run this, then try again:
+    become_root || fail "packages are missing, and this is neither root nor can it use sudo without a password. Run this as root, then try again:
     apt-get install ${missing[*]}"
-        fi
-        as_root=(sudo -n)
-    fi
     say "Installing ${missing[*]}"
-    "${as_root[@]}" apt-get update -qq
+    update_package_lists
     "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
 }
 
-# install_packages_if_offered ENTRY...: the same for those this release has and this user may install; others are named
+# install_packages_if_offered ENTRY...: the same for those this release has; the others are named
 install_packages_if_offered() {
-    local package missing
+    local package missing as_root
     command -v apt-cache >/dev/null || return 0
     missing_packages "$@"
     for package in "${missing[@]}"; do
+        if become_root; then update_package_lists; fi
         if apt-cache show "$package" >/dev/null 2>&1; then
             install_packages "$package"
         else

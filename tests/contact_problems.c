@@ -289,8 +289,9 @@ struct contact_problem *contact_problem_mixed(uint64_t seed, double friction)
     enum { BODIES = 14 };
     for (int i = 0; i < BODIES; ++i) {
         double mass = pow(10, 1.5 * contact_problem_random());
-        int32_t k = contact_problem_box(p, mass, 0.2, 0.1 + 0.05 * contact_problem_random(), 0.15,
-                                        contact_problem_random(), contact_problem_random(), 0.5 + contact_problem_random());
+        int32_t k =
+            contact_problem_box(p, mass, 0.2, 0.1 + 0.05 * contact_problem_random(), 0.15, contact_problem_random(),
+                                contact_problem_random(), 0.5 + contact_problem_random());
         random_unit(p->rigid[k].orientation, 4);
         for (int j = 0; j < 6; ++j) {
             p->rigid[k].velocity[j] = (j < 3 ? 1 : 10) * contact_problem_random();
@@ -322,7 +323,8 @@ struct contact_problem *contact_problem_mixed(uint64_t seed, double friction)
             int32_t body = side ? b : a;
             double arm[3] = {0.2 * contact_problem_random(), 0.1, -0.1};
             for (int r = 0; body >= 0 && r < 3; ++r)
-                sadmm_contact_row(frame.r[r], arm, side ? 1 : -1, (side ? block->jacobian_b : block->jacobian_a) + 6 * r);
+                sadmm_contact_row(frame.r[r], arm, side ? 1 : -1,
+                                  (side ? block->jacobian_b : block->jacobian_a) + 6 * r);
         }
         for (int r = 0; r < 3; ++r) block->error[r] = 0.1 * contact_problem_random();
         block->friction = k == 3 ? 0 : 0.6;

@@ -26,8 +26,8 @@ int32_t contact_problem_box(struct contact_problem *problem, double mass, double
 void contact_problem_touch(struct contact_problem *problem, int32_t a, int32_t b, const double at[3],
                            const double normal[3], double gap, double friction, double restitution);
 /* A zeroed block to fill; valid until the next call. */
-sadmm_problem_block *contact_problem_block(struct contact_problem *problem, sadmm_block_kind kind, int32_t rows, int32_t a,
-                                           int32_t b);
+sadmm_problem_block *contact_problem_block(struct contact_problem *problem, sadmm_block_kind kind, int32_t rows,
+                                           int32_t a, int32_t b);
 /* Give A, b and e instead of rigid bodies and gaps. `coupling` > 0 mixes linear and angular parts of A, relatively. */
 void contact_problem_raw(struct contact_problem *problem, const sadmm_settings *settings, double coupling);
 /* Random start values. */
@@ -39,12 +39,12 @@ void contact_problem_seed(uint64_t seed);
 
 /* Boxes of 0.2 m on top of each other on the ground, four contacts each. */
 struct contact_problem *contact_problem_stack(const double *masses, int count, double friction);
-/* The pyramid of ALGORITHM's table: `rows` rows of 1 kg boxes, 2.2 half widths apart. */
+/* `rows` rows of 1 kg boxes, 2.2 half widths apart. */
 struct contact_problem *contact_problem_pyramid(int rows, double friction);
 /* 10 kg plates on four 50 g cubes each, tilted by the direction of gravity the caller chooses. */
 struct contact_problem *contact_problem_plates(int layers, double friction);
-/* Rotated, spinning bodies with contacts (gaps, penetration, restitution), general contacts, welds and joints with free rows,
- * soft rows, a body on its own, and blocks to the static world on either side. */
+/* Rotated, spinning bodies with contacts (gaps, penetration, restitution), general contacts, welds and joints with
+ * free rows, soft rows, a body on its own, and blocks to the static world on either side. */
 struct contact_problem *contact_problem_mixed(uint64_t seed, double friction);
 
 #endif

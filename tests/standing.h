@@ -21,6 +21,7 @@ static inline sadmm_world *run_standing(const struct standing_case *limits)
     struct sadmm_scene scene = open_scene(limits->spec);
     scene.def.backend = SADMM_BACKEND_CPU;
     scene.def.precision = limits->precision;
+    scene.def.settings.threads = 1; /* others run beside this one */
     sadmm_world *world = build_scene(&scene);
     sadmm_body_state *settled = NULL;
     int steps = (int)lround(limits->duration / scene.def.settings.dt);

@@ -21,6 +21,7 @@ static sadmm_world_def world_def(int backend_index, double dt, int iterations)
     def.precision = SADMM_F64;
     def.settings.dt = dt;
     def.settings.iterations = iterations;
+    def.settings.threads = 1; /* a body or two */
     return def;
 }
 
@@ -70,6 +71,11 @@ static const struct {
 } slopes[] = { { 0, 0 }, { 30, 0 }, { 0, 30 }, { 30, 30 } };
 enum { SLOPES = sizeof slopes / sizeof slopes[0] };
 
+/* A sliding contact's impulse sits on the cone and no longer answers to the velocity, so the velocity follows the
+ * momentum balance by (A + beta C)^-1 A alone: for this block (beta = 6.5 kg, 4 contacts) the distance shrinks by 0.963
+ * an iteration. 1e-7 of a step's change of speed takes 430 of them. */
+enum { SLIDING_ITERATIONS = 500 };
+
 static sadmm_body_id block_on_slope(sadmm_world *world, int slope_index, double alpha, double mu, double downhill[3])
 {
     struct sadmm_frame slope = sadmm_frame_turned(sadmm_frame_world(), 2, slopes[slope_index].heading * degree);
@@ -105,7 +111,7 @@ START_TEST(a_block_above_the_critical_angle_slides_as_coulomb_says)
 {
     const double mu = 0.5, alpha = atan(1.01 * mu), dt = 0.005;
     const double acceleration = g * (sin(alpha) - mu * cos(alpha));
-    sadmm_world_def def = world_def(_i / SLOPES, dt, 100);
+    sadmm_world_def def = world_def(_i / SLOPES, dt, SLIDING_ITERATIONS);
     sadmm_world *world = create_world(&def);
     double downhill[3], along = 0, across = 0;
     sadmm_body_id id = block_on_slope(world, _i % SLOPES, alpha, mu, downhill);
@@ -125,7 +131,7 @@ END_TEST
 
 static double stopping_distance(int backend_index, double dt, double speed, double mu, double heading)
 {
-    sadmm_world_def def = world_def(backend_index, dt, 100);
+    sadmm_world_def def = world_def(backend_index, dt, SLIDING_ITERATIONS);
     sadmm_world *world = create_world(&def);
     add_plane(world, sadmm_frame_world(), mu);
     sadmm_body_id id = add_box(world, sadmm_frame_moved(sadmm_frame_world(), 0, 0, 0.1), 0.1, mu);
@@ -201,6 +207,7 @@ START_TEST(a_plate_at_a_thousand_rad_s_keeps_energy_and_momentum)
 {
     struct sadmm_scene scene = open_scene("spin_plate");
     scene.def.backend = backends[_i];
+    scene.def.settings.threads = 1;
     sadmm_world *world = build_scene(&scene);
     sadmm_body_id id = body_at(world, 0);
     sadmm_body_def def = body_def(world, id);
@@ -335,10 +342,10 @@ START_TEST(an_isolated_collision_keeps_momentum)
     struct momenta after = momenta_of(world);
     ck_assert_double_gt(met, 0.1); /* they did collide */
     for (int i = 0; i < 3; ++i) {
-        /* 100 steps of rounding, and at most a few solves with an error of the size of rounding */
-        ck_assert_double_eq_tol(after.linear[i], before.linear[i], 1e-13 * before.scale[0]);
-        /* contact arms end in one point for both bodies, so no couple is left over */
-        ck_assert_double_eq_tol(after.angular[i], before.angular[i], 1e-12 * (before.scale[0] + before.scale[1]));
+        /* Rounding: up to 100 steps in contact, each solved by 2000 iterations to some 20 eps (beta is 20 times the
+         * mass). Contact arms end in one point for both bodies, so that no couple is left over either. */
+        ck_assert_double_eq_tol(after.linear[i], before.linear[i], 1e-11 * before.scale[0]);
+        ck_assert_double_eq_tol(after.angular[i], before.angular[i], 1e-11 * (before.scale[0] + before.scale[1]));
     }
     sadmm_world_destroy(world);
 }
@@ -349,6 +356,7 @@ START_TEST(a_sphere_leaves_the_ground_with_its_restitution)
     const double restitution = 0.25 * (_i % 5);
     struct sadmm_scene scene = open_scene("bounce");
     scene.def.backend = backends[_i / 5];
+    scene.def.settings.threads = 1;
     sadmm_world *world = build_scene(&scene);
     sadmm_body_id id = body_at(world, 1 + _i % 5); /* after the ground */
     const double fall = sqrt(2 * g * 1.0), dt = scene.def.settings.dt;
@@ -423,6 +431,7 @@ int main(void)
     tcase_add_loop_test(collision, head_on_spheres_part_as_newton_says, 0, 5 * BACKENDS);
     tcase_set_timeout(flight, 60);
     tcase_set_timeout(slope, 60);
+    tcase_set_timeout(collision, 60);
     suite_add_tcase(suite, slope);
     suite_add_tcase(suite, flight);
     suite_add_tcase(suite, collision);

@@ -94,8 +94,8 @@ START_TEST(known_contact_errors)
     for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
         sadmm_problem *p = ball(cases[k].e, cases[k].mu);
         sadmm_certificate c = certify(p, cases[k].vx, cases[k].vz, cases[k].rx, cases[k].rz);
-        ck_assert_msg(fabs(c.ncp_max - cases[k].expected) <= ROUNDING && c.ncp_mean == c.ncp_max, "%s: %.17g, not %.17g",
-                      cases[k].what, c.ncp_max, cases[k].expected);
+        ck_assert_msg(fabs(c.ncp_max - cases[k].expected) <= ROUNDING && c.ncp_mean == c.ncp_max,
+                      "%s: %.17g, not %.17g", cases[k].what, c.ncp_max, cases[k].expected);
         sadmm_problem_destroy(p);
     }
 }
@@ -128,7 +128,8 @@ START_TEST(momentum_error)
 }
 END_TEST
 
-/* siconos: |A v - b - H r| / max(|b|, |A v|, |H r|) + |r - P_K(r - u^)| / max(|u|, |r|), u^ = u + mu |u_t| n, K the cone. */
+/* siconos: |A v - b - H r| / max(|b|, |A v|, |H r|) + |r - P_K(r - u^)| / max(|u|, |r|), u^ = u + mu |u_t| n,
+ * K the friction cone. */
 START_TEST(siconos_measure)
 {
     const double r = weight, mu = 0.5;
@@ -141,9 +142,9 @@ START_TEST(siconos_measure)
     /* Outside: force (r, 2 r): projected to n = (2 mu + 1) r / (1 + mu^2) = 1.6 r, t = 0.8 r. Moved by (0.6, -1.2) r.
      * H r is (2 r, 0, r) and the torque -radius * 2 r: momentum |(2, 1)| r over |(2, 1, 1)| r. */
     double norm_r = sqrt(5) * r, norm_Hr = sqrt(6) * r;
-    ck_assert_double_eq_tol(certify(p, 0, 0, 2 * r, r).siconos, sqrt(4 + 1) * r / norm_Hr + sqrt(0.36 + 1.44) * r / norm_r,
-                            ROUNDING);
-    /* In the polar cone, everything is lost: r = 0 and u = (s, 0): r - u^ = (-s, 0) -> 0, error 0; momentum: b + m s. */
+    ck_assert_double_eq_tol(certify(p, 0, 0, 2 * r, r).siconos,
+                            sqrt(4 + 1) * r / norm_Hr + sqrt(0.36 + 1.44) * r / norm_r, ROUNDING);
+    /* In the polar cone: r = 0 and u = (s, 0), so r - u^ = (-s, 0) goes to 0 = r. Momentum: b + m s. */
     ck_assert_double_eq_tol(certify(p, 0, s, 0, 0).siconos, (r + mass * s) / r, ROUNDING);
     sadmm_problem_destroy(p);
 }
@@ -194,7 +195,8 @@ START_TEST(hard_and_soft_rows)
     /* Row 0: -1.5 + 10 * 0.1 + 2 * 0.1 = -0.3. Row 1: 2e8 - 3e8 + 1e8 = 0 exactly solved. */
     ck_assert_double_eq_tol(c.ncp_max, 0.3 * 1.25 / (1 + 2 * 1.25), 1e-9 * 1.25 /* row 1 rounds 1e-16 * 3e8 / 1e9 */);
     ck_assert(c.siconos == -1);
-    const double stiff_lambda[6] = {-1.2, 2e8 + 1e7, 0, 0, 0, 0}; /* row 0 exact; row 1 off by 1e7 N s of 1e9 kg: 1 cm/s */
+    /* Row 0 exact; row 1 off by 1e7 N s of 1e9 kg: 1 cm/s. */
+    const double stiff_lambda[6] = {-1.2, 2e8 + 1e7, 0, 0, 0, 0};
     ck_assert(sadmm_problem_set_solution(p, v, NULL, stiff_lambda) == SADMM_OK);
     ck_assert(sadmm_problem_certify(p, &c) == SADMM_OK);
     ck_assert_double_eq_tol(c.ncp_max, 0.01, 1e-10 /* 1/(1 + c w) = 1/(c w) to 1e-9 */);

@@ -20,7 +20,7 @@ END_TEST
 /* 5 mm: a card that slips off or a house that folds moves by centimetres. The gaps close within 0.5 s. */
 START_TEST(card_houses)
 {
-    const struct standing_case limits = { "card_houses", SADMM_F64, 10.0, 0.5, 5e-3, 1e-2, 1e-3, 2551 };
+    const struct standing_case limits = { "card_houses", SADMM_F64, 10.0, 0.5, 5e-3, 1e-3, 1e-4, 2551 };
     sadmm_world_destroy(run_standing(&limits));
 }
 END_TEST
@@ -44,6 +44,7 @@ START_TEST(sliding_cubes)
     };
     struct sadmm_scene scene = open_scene(rows[_i].spec);
     scene.def.backend = SADMM_BACKEND_CPU;
+    scene.def.settings.threads = 1; /* others run beside this one */
     sadmm_world *world = build_scene(&scene);
     int steps = (int)lround(rows[_i].duration / scene.def.settings.dt);
     double sum = 0, expected = 9.81 * (sin(atan(0.4)) - 0.3 * cos(atan(0.4))) * rows[_i].duration;
@@ -54,9 +55,10 @@ START_TEST(sliding_cubes)
     }
     ck_assert_double_eq_tol(sum / steps / rows[_i].contacts, 1.0, 0.15);
     for (int32_t i = 1; i < sadmm_world_body_count(world); ++i) {
-        /* 1 %: the rafts are large, iterations are few, and errors at the edges average out only over the raft */
+        /* 2 %: the velocity of a sliding cube closes in on the momentum balance by 0.963 an iteration (beta = 6.5 kg,
+         * 4 contacts), so 120 iterations leave 1.1 % of each step's change of speed (docs/scenes.md). */
         double speed = norm3(body_state(world, body_at(world, i)).linear_velocity);
-        ck_assert_double_eq_tol(speed / expected, 1.0, 0.01);
+        ck_assert_double_eq_tol(speed / expected, 1.0, 0.02);
     }
     sadmm_world_destroy(world);
 }

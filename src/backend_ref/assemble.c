@@ -15,7 +15,8 @@ sadmm_status sadmm_ref_assemble_bodies(struct sadmm_context *c, struct sadmm_err
         } else {
             double L[36];
             if (!dense6_cholesky(body->A, L))
-                return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "mass matrix of body %d: not positive definite", i);
+                return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "mass matrix of body %d: not positive definite",
+                                  i);
             dense6_solve(L, body->b, body->v); /* v0 = A^-1 b */
         }
     }

@@ -1,4 +1,4 @@
-/* Boxes E-P of the paper's Fig. 4: penalty weights, Steps 1-4, residuals. Numbers in comments are the paper's equations. */
+/* Boxes E-P of the paper's Fig. 4: penalty weights, Steps 1-4, residuals. Numbers in brackets are its equations. */
 #include <string.h>
 
 #include "../core/dense6.h"
@@ -137,7 +137,8 @@ sadmm_status sadmm_ref_update_constraints(struct sadmm_context *c, bool measure,
 }
 
 /* (16): x - z. (17): beta_i sum_k J_{i,k}^T (z^l - z^{l+1}). Infinity norms. */
-sadmm_status sadmm_ref_measure_residuals(struct sadmm_context *c, struct sadmm_residual *residual, struct sadmm_error *error)
+sadmm_status sadmm_ref_measure_residuals(struct sadmm_context *c, struct sadmm_residual *residual,
+                                         struct sadmm_error *error)
 {
     (void)error;
     residual->primal = residual->dual = 0;

@@ -5,7 +5,7 @@
 
 #include "core/memory.h"
 
-enum { STATE = 13 }; /* numbers of a body's state */
+enum { STATE = 13 }; /* numbers of a body's state: check_reference.states */
 
 static bool fail(struct sadmm_error *error, const char *what, const char *message)
 {
@@ -31,7 +31,19 @@ static double largest_difference(const double *a, const double *b, size_t count,
     return start;
 }
 
-static bool read_states(const sadmm_world *world, size_t count, double *states)
+static bool read_gyration(const sadmm_world *world, size_t count, double *gyration)
+{
+    for (size_t k = 0; k < count; ++k) {
+        sadmm_body_id id;
+        sadmm_body_def def;
+        if (sadmm_world_body_at(world, (int32_t)k, &id) != SADMM_OK || sadmm_world_body_def(world, id, &def) != SADMM_OK)
+            return false;
+        if (def.type == SADMM_BODY_DYNAMIC) gyration[k] = sqrt(largest(def.inertia, 3, 0) / def.mass);
+    }
+    return true;
+}
+
+static bool read_states(const sadmm_world *world, size_t count, const double *gyration, double *states)
 {
     for (size_t k = 0; k < count; ++k) {
         sadmm_body_id id;
@@ -41,9 +53,9 @@ static bool read_states(const sadmm_world *world, size_t count, double *states)
             return false;
         double *out = states + STATE * k;
         memcpy(out, s.position, sizeof s.position);
-        memcpy(out + 3, s.orientation, sizeof s.orientation);
+        for (int i = 0; i < 4; ++i) out[3 + i] = 2 * gyration[k] * s.orientation[i];
         memcpy(out + 7, s.linear_velocity, sizeof s.linear_velocity);
-        memcpy(out + 10, s.angular_velocity, sizeof s.angular_velocity);
+        for (int i = 0; i < 3; ++i) out[10 + i] = gyration[k] * s.angular_velocity[i];
     }
     return true;
 }
@@ -142,11 +154,15 @@ static bool record_reference(void *data, const sadmm_world *world, long step, st
     struct check_reference *r = data;
     if (step == 0) {
         r->bodies = (size_t)sadmm_world_body_count(world);
+        r->gyration = sadmm_alloc(r->bodies, sizeof(double));
         r->states = sadmm_alloc((size_t)r->steps * r->bodies, STATE * sizeof(double));
-        if (!r->states) return fail(error, "ref", "out of memory");
+        if (!r->gyration || !r->states) return fail(error, "ref", "out of memory");
+        if (!read_gyration(world, r->bodies, r->gyration)) return fail(error, "ref", sadmm_world_message(world));
+        sadmm_settings s = sadmm_world_settings(world);
+        r->speed = s.dt * sqrt(s.gravity[0] * s.gravity[0] + s.gravity[1] * s.gravity[1] + s.gravity[2] * s.gravity[2]);
     }
     double *states = r->states + (size_t)step * r->bodies * STATE;
-    if (!read_states(world, r->bodies, states)) return fail(error, "ref", sadmm_world_message(world));
+    if (!read_states(world, r->bodies, r->gyration, states)) return fail(error, "ref", sadmm_world_message(world));
     for (size_t k = 0; k < r->bodies; ++k) r->speed = largest(states + STATE * k + 7, 6, r->speed);
     /* The last step, and others evenly before it. */
     long most = r->steps < CHECK_MOST_FROZEN ? r->steps : CHECK_MOST_FROZEN;
@@ -169,6 +185,7 @@ bool check_reference_make(struct check_reference *reference, const struct sadmm_
 void check_reference_free(struct check_reference *reference)
 {
     for (size_t k = 0; k < reference->frozen_count; ++k) frozen_free(&reference->frozen[k]);
+    sadmm_free(reference->gyration);
     sadmm_free(reference->states);
     memset(reference, 0, sizeof *reference);
 }
@@ -184,10 +201,10 @@ static bool compare_step(void *data, const sadmm_world *world, long step, struct
     const struct comparison *c = data;
     const struct check_reference *r = c->reference;
     const double *theirs = r->states + (size_t)step * r->bodies * STATE;
-    if (!read_states(world, r->bodies, c->states)) return fail(error, "state", sadmm_world_message(world));
+    if (!read_states(world, r->bodies, r->gyration, c->states)) return fail(error, "state", sadmm_world_message(world));
     for (size_t k = 0; k < r->bodies; ++k) {
         const double *a = c->states + STATE * k, *b = theirs + STATE * k;
-        c->difference->position = largest_difference(a, b, 3, c->difference->position);
+        c->difference->position = largest_difference(a, b, 7, c->difference->position);
         c->difference->velocity = largest_difference(a + 7, b + 7, 6, c->difference->velocity);
     }
     return true;

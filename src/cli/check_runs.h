@@ -25,16 +25,18 @@ struct check_reference {
     const struct sadmm_scene *scene;
     long steps;
     size_t bodies;           /* all of the world's */
-    double *states;          /* (steps x bodies x 13) position, quaternion, velocities after every step */
-    double speed;            /* largest entry of any velocity of the run, m/s or rad/s */
+    double *gyration;        /* (bodies) largest radius of gyration, m; 0 for static bodies */
+    double *states;          /* (steps x bodies x 13) after every step: position, 2 x gyration x quaternion, velocity,
+                                gyration x angular velocity; all in m and m/s */
+    double speed;            /* largest entry of any velocity of the run, or what gravity gives in a step, m/s */
     size_t frozen_count;
     struct check_frozen frozen[CHECK_MOST_FROZEN];
 };
 
 /* Largest differences from ref. */
 struct check_difference {
-    double position;         /* m, of all steps */
-    double velocity;         /* m/s and rad/s, of all steps */
+    double position;         /* m, of all steps; rotations count times the radius of gyration */
+    double velocity;         /* m/s, of all steps; angular velocities count times the radius of gyration */
     double step_velocity;    /* relative to v_scale, of all frozen problems */
     double step_impulse;     /* relative to impulse_scale */
 };

@@ -5,107 +5,191 @@
 
 #include "core/memory.h"
 
-/* Levels after a stall, as multiples of the first: both sides of it, farther out every time. */
-static const double factors[] = {1, 10, 0.1, 100, 0.01, 1e3, 1e-3};
-enum { FACTOR_COUNT = sizeof factors / sizeof *factors };
+/* The lanes: levels as multiples of the first one. Lane 0 has penalty updates. */
+static const double factors[] = {1, 1, 10, 0.1, 100, 0.01, 1e3, 1e-3};
+enum { LANES = sizeof factors / sizeof *factors };
 
-/* A level is kept while the measure halves within this many stretches. */
-enum { PATIENCE = 6 };
+/* In stretches: the first lane stalls when its measure has not halved in PATIENCE; rates are measured over RATE. */
+enum { PATIENCE = 6, RATE = 10 };
 
-struct solution {
-    double *velocities, *impulses, *lambda;
+struct lane {
+    double level;                            /* kg */
+    bool updates;
+    double *velocities, *impulses, *lambda;  /* where it is; NULL before its first stretch */
+    double measure;                          /* the smallest so far */
+    double left;                             /* stretches it still needs at its present rate */
 };
 
-static bool solution_create(struct solution *s, const sadmm_problem *problem)
+struct loop {
+    sadmm_problem *problem;
+    const struct solve_plan *plan;
+    struct solve_outcome *out;
+    struct lane lanes[LANES];
+    struct lane best;       /* the best solution of all */
+    bool exhausted;         /* the solver itself has no more iterations to make */
+    struct sadmm_error *error;
+};
+
+#define TRY(call)                                      \
+    do {                                               \
+        sadmm_status try_status = (call);              \
+        if (try_status != SADMM_OK) return try_status; \
+    } while (0)
+
+/* ---- solutions -------------------------------------------------------------------------------------------------- */
+
+static sadmm_status check(struct loop *l, sadmm_status status)
 {
-    s->velocities = sadmm_alloc(6 * (size_t)sadmm_problem_body_count(problem), sizeof(double));
-    s->impulses = sadmm_alloc(3 * (size_t)sadmm_problem_contact_count(problem), sizeof(double));
-    s->lambda = sadmm_alloc(6 * (size_t)sadmm_problem_block_count(problem), sizeof(double));
-    return s->velocities && s->impulses && s->lambda;
+    return status == SADMM_OK ? status : sadmm_fail(l->error, status, "%s", sadmm_problem_message(l->problem));
 }
 
-static void solution_free(struct solution *s)
+static sadmm_status keep(struct loop *l, struct lane *lane)
 {
-    sadmm_free(s->velocities);
-    sadmm_free(s->impulses);
-    sadmm_free(s->lambda);
+    if (!lane->velocities) {
+        lane->velocities = sadmm_alloc(6 * (size_t)sadmm_problem_body_count(l->problem), sizeof(double));
+        lane->impulses = sadmm_alloc(3 * (size_t)sadmm_problem_contact_count(l->problem), sizeof(double));
+        lane->lambda = sadmm_alloc(6 * (size_t)sadmm_problem_block_count(l->problem), sizeof(double));
+    }
+    if (!lane->velocities || !lane->impulses || !lane->lambda) return sadmm_fail_memory(l->error, "a solution");
+    return check(l, sadmm_problem_get_solution(l->problem, lane->velocities, lane->impulses, lane->lambda));
+}
+
+static sadmm_status restore(struct loop *l, const struct lane *lane)
+{
+    return check(l, sadmm_problem_set_solution(l->problem, lane->velocities, lane->impulses, lane->lambda));
+}
+
+static void lane_free(struct lane *lane)
+{
+    sadmm_free(lane->velocities);
+    sadmm_free(lane->impulses);
+    sadmm_free(lane->lambda);
 }
 
 /* The mean mass of the bodies on a logarithmic scale, kg. */
-static sadmm_status mean_mass(const sadmm_problem *problem, double *mass, struct sadmm_error *error)
+static sadmm_status mean_mass(struct loop *l, double *mass)
 {
-    size_t count = (size_t)sadmm_problem_body_count(problem);
+    size_t count = (size_t)sadmm_problem_body_count(l->problem);
     double *A = sadmm_alloc(36 * count, sizeof *A), sum = 0;
-    if (!A) return sadmm_fail_memory(error, "the bodies' masses");
-    sadmm_status status = sadmm_problem_get_bodies(problem, A, NULL, NULL);
+    if (!A) return sadmm_fail_memory(l->error, "the bodies' masses");
+    sadmm_status status = check(l, sadmm_problem_get_bodies(l->problem, A, NULL, NULL));
     for (size_t i = 0; status == SADMM_OK && i < count; ++i)
         sum += log((A[36 * i] + A[36 * i + 7] + A[36 * i + 14]) / 3);
     sadmm_free(A);
-    if (status != SADMM_OK) return sadmm_fail(error, status, "%s", sadmm_problem_message(problem));
     *mass = count ? exp(sum / (double)count) : 1;
+    return status;
+}
+
+/* ---- running ------------------------------------------------------------------------------------------------------ */
+
+static bool finished(const struct loop *l)
+{
+    return l->out->converged || l->exhausted || l->out->iterations >= l->plan->max_iterations;
+}
+
+/* One stretch on what is in the problem; `cold`: from nothing. */
+static sadmm_status stretch(struct loop *l, struct lane *lane, bool cold)
+{
+    struct solve_outcome *out = l->out;
+    sadmm_settings s = l->plan->settings;
+    sadmm_certificate c;
+    long left = l->plan->max_iterations - out->iterations;
+    s.iterations = left < l->plan->stretch ? (int)left : l->plan->stretch;
+    s.warm_start = !cold;
+    s.penalty_update_warm = true;
+    if (!lane->updates) s.penalty_period = 0;
+    /* The paper's offset is in kg/s^2 and is multiplied by dt^2. */
+    s.penalty_offset = lane->level / (s.dt * s.dt);
+    TRY(check(l, sadmm_problem_solve(l->problem, l->plan->backend, l->plan->precision, &s, &out->report)));
+    TRY(check(l, sadmm_problem_certify(l->problem, &c)));
+    bool first = out->iterations == 0;
+    out->level = lane->level;
+    out->iterations += out->report.iterations;
+    out->ms += out->report.solve_ms;
+    out->converged = c.siconos <= l->plan->tolerance;
+    l->exhausted = out->report.iterations < s.iterations; /* without constraints one iteration is exact */
+    if (cold || c.siconos < lane->measure) lane->measure = c.siconos;
+    if (first || c.siconos < l->best.measure) {
+        out->certificate = c;
+        l->best.measure = c.siconos;
+        TRY(keep(l, &l->best));
+    }
     return SADMM_OK;
 }
 
-static sadmm_status stretch(sadmm_problem *problem, const struct solve_plan *plan, struct solve_outcome *out,
-                            sadmm_certificate *certificate)
+/* Some stretches of one lane, from where it is; then how many more it needs if it goes on like that. */
+static sadmm_status advance(struct loop *l, struct lane *lane)
 {
-    sadmm_settings s = plan->settings;
-    long left = plan->max_iterations - out->iterations;
-    s.iterations = left < plan->stretch ? (int)left : plan->stretch;
-    s.warm_start = out->iterations > 0;
-    /* The paper's offset is in kg/s^2 and is multiplied by dt^2. */
-    s.penalty_offset = out->level / (s.dt * s.dt);
-    sadmm_status status = sadmm_problem_solve(problem, plan->backend, plan->precision, &s, &out->report);
-    if (status != SADMM_OK) return status;
-    out->iterations += out->report.iterations;
-    out->ms += out->report.solve_ms;
-    return sadmm_problem_certify(problem, certificate);
+    bool cold = lane->velocities == NULL;
+    double before = lane->measure;
+    int done = 0;
+    if (!cold) TRY(restore(l, lane));
+    for (; done < RATE && !finished(l); ++done) {
+        TRY(stretch(l, lane, cold && done == 0));
+        if (cold && done == RATE / 2 - 1) before = lane->measure; /* the first half is a transient */
+    }
+    if (finished(l)) return SADMM_OK;
+    double decades = log10(before / lane->measure) / (cold ? RATE - RATE / 2 : RATE);
+    lane->left = decades > 0 ? log10(lane->measure / l->plan->tolerance) / decades : INFINITY;
+    return keep(l, lane);
 }
 
-static sadmm_status loop(sadmm_problem *problem, const struct solve_plan *plan, struct solve_outcome *out,
-                         struct solution *best)
+/* The first lane alone, until the end or, when the level is open, until it stalls. */
+static sadmm_status run_first(struct loop *l)
 {
-    double first = out->level, reference = INFINITY; /* the measure that has to be halved */
+    struct lane *lane = &l->lanes[0];
+    double to_halve = INFINITY;
     int unimproved = 0;
-    for (;;) {
-        sadmm_certificate c;
-        sadmm_status status = stretch(problem, plan, out, &c);
-        if (status != SADMM_OK) return status;
-        if (out->levels_tried == 0 || !(c.siconos >= out->certificate.siconos)) {
-            if (out->levels_tried == 0) out->levels_tried = 1;
-            out->certificate = c;
-            status = sadmm_problem_get_solution(problem, best->velocities, best->impulses, best->lambda);
-            if (status != SADMM_OK) return status;
-        }
-        out->converged = c.siconos <= plan->tolerance;
-        if (out->converged || out->iterations >= plan->max_iterations || out->report.iterations == 0) break;
-        if (c.siconos <= 0.5 * reference) {
-            reference = c.siconos;
-            unimproved = 0;
-        } else if (++unimproved >= PATIENCE && plan->level <= 0) {
-            out->level = first * factors[out->levels_tried++ % FACTOR_COUNT];
-            reference = INFINITY;
+    bool cold = true;
+    while (!finished(l) && (l->plan->level > 0 || unimproved < PATIENCE)) {
+        TRY(stretch(l, lane, cold));
+        cold = false;
+        ++unimproved;
+        if (lane->measure <= 0.5 * to_halve) {
+            to_halve = lane->measure;
             unimproved = 0;
         }
     }
-    if (out->converged) return SADMM_OK;
-    return sadmm_problem_set_solution(problem, best->velocities, best->impulses, best->lambda);
+    return keep(l, lane);
+}
+
+static struct lane *choose(struct loop *l)
+{
+    struct lane *chosen = &l->lanes[0];
+    for (int k = 1; k < LANES; ++k)
+        if (l->lanes[k].left < chosen->left) chosen = &l->lanes[k];
+    if (chosen->left < INFINITY) return chosen;
+    for (int k = 1; k < LANES; ++k) /* nobody gets anywhere at present: the one that got farthest */
+        if (l->lanes[k].measure < chosen->measure) chosen = &l->lanes[k];
+    return chosen;
+}
+
+static sadmm_status run(struct loop *l)
+{
+    double level = l->plan->level;
+    if (level <= 0) TRY(mean_mass(l, &level));
+    for (int k = 0; k < LANES; ++k) {
+        l->lanes[k].level = level * factors[k];
+        l->lanes[k].updates = k == 0;
+    }
+    l->out->levels_tried = 1;
+    TRY(run_first(l));
+    if (!finished(l)) TRY(advance(l, &l->lanes[0]));
+    for (int k = 1; k < LANES && !finished(l); ++k) {
+        TRY(advance(l, &l->lanes[k]));
+        l->out->levels_tried += k > 1; /* lane 1 has the level of lane 0 */
+    }
+    while (!finished(l)) TRY(advance(l, choose(l)));
+    return restore(l, &l->best);
 }
 
 sadmm_status solve_loop(sadmm_problem *problem, const struct solve_plan *plan, struct solve_outcome *out,
                         struct sadmm_error *error)
 {
-    struct solution best = {0};
+    struct loop l = {.problem = problem, .plan = plan, .out = out, .error = error};
     memset(out, 0, sizeof *out);
-    out->level = plan->level;
-    if (plan->level <= 0) {
-        sadmm_status status = mean_mass(problem, &out->level, error);
-        if (status != SADMM_OK) return status;
-    }
-    sadmm_status status = SADMM_ERROR_OUT_OF_MEMORY;
-    if (!solution_create(&best, problem)) sadmm_fail_memory(error, "the best solution");
-    else if ((status = loop(problem, plan, out, &best)) != SADMM_OK)
-        sadmm_fail(error, status, "%s", sadmm_problem_message(problem));
-    solution_free(&best);
+    sadmm_status status = run(&l);
+    for (int k = 0; k < LANES; ++k) lane_free(&l.lanes[k]);
+    lane_free(&l.best);
     return status;
 }

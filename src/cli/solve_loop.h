@@ -2,8 +2,10 @@
  *
  * Stretches of iterations, each a warm continuation of the one before, with the certificate between them. The penalty
  * is beta = M Tr(A)/Tr(C) + level (eq. 13) with M = 0 unless asked for: near-uniform weights converge where
- * mass-proportional ones stall, but which level is best differs from problem to problem (docs/algorithm.md). So the
- * level starts at the mean mass of the bodies and, when the measure stalls, goes on with another one.
+ * mass-proportional ones stall, but the best level differs by decades from problem to problem (docs/algorithm.md), and
+ * updates by eq. (15) help most problems and ruin some. So the loop starts from the mean mass of the bodies with updates.
+ * When the measure stalls, other levels without updates start from nothing beside it, and from then on the one runs that
+ * will be the first to arrive if it goes on at its present rate.
  */
 #ifndef SADMM_CLI_SOLVE_LOOP_H
 #define SADMM_CLI_SOLVE_LOOP_H
@@ -17,7 +19,7 @@ struct solve_plan {
     double tolerance;         /* of siconos' measure */
     long max_iterations;
     int stretch;              /* iterations between looks */
-    double level;             /* kg; 0: chosen and changed automatically */
+    double level;             /* kg, kept; 0: chosen and changed automatically */
 };
 
 struct solve_outcome {

@@ -71,8 +71,8 @@ SADMM_INLINE void shape_box(const double centre[3], const double extent[3], doub
         double e = extent[k] + 0.5 * margin_thickness + spin + fall, sweep = velocity[k] * dt;
         /* rounding favours contact */
         e += 8 * DBL_EPSILON * (fabs(centre[k]) + e);
-        box->lo[k] = centre[k] - e + fmin(sweep, 0);
-        box->hi[k] = centre[k] + e + fmax(sweep, 0);
+        box->lo[k] = centre[k] - e + fmin(sweep, 0.0);
+        box->hi[k] = centre[k] + e + fmax(sweep, 0.0);
     }
 }
 

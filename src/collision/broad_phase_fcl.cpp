@@ -43,8 +43,14 @@ struct Proxy : fcl::CollisionObject<double> {
     bool moves = false;
 };
 
+/* A tree that is refitted keeps the shape it was built with: after boxes have mixed, queries take four times as long
+ * (measured: 2,000 boxes, 400 steps of 1 cm). It is built anew once every box has moved this many times on average, which
+ * costs a few per cent. */
+constexpr size_t moves_before_rebuild = 32;
+
 struct Group {
     Tree moving, fixed;
+    size_t moves = 0; /* since the moving tree was built */
     /* objects of the update at hand */
     std::vector<fcl::CollisionObject<double> *> added_moving, added_fixed, moved, fixed_moved;
     bool touched = false;
@@ -125,8 +131,13 @@ void sadmm_broad_phase::apply(const sadmm_broad_entry *entries, size_t count, co
         }
     }
     for (Group *g : touched) {
+        g->moves += g->moved.size();
+        const bool rebuild = g->moves > moves_before_rebuild * g->moving.size();
+        if (rebuild) g->moves = 0;
+        /* setup(), also within update(), builds the tree anew when it is higher than log2(size) + this */
+        g->moving.max_tree_nonbalanced_level = rebuild ? -1000 : 10;
         /* Most of a tree moved: refit it as a whole; else move the leaves one by one. */
-        if (g->moved.size() * 2 > g->moving.size()) g->moving.update();
+        if (rebuild || g->moved.size() * 2 > g->moving.size()) g->moving.update();
         else if (!g->moved.empty()) g->moving.update(g->moved);
         if (!g->fixed_moved.empty()) g->fixed.update(g->fixed_moved);
         g->moving.registerObjects(g->added_moving);

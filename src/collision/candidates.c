@@ -6,7 +6,6 @@
 #include <omp.h>
 #endif
 
-#include "../core/math/quat.h"
 #include "../core/memory.h"
 #include "radix_sort.h"
 
@@ -14,8 +13,8 @@ enum { SLOT_PRESENT = 1, SLOT_LEFT = 2 /* its box left the larger one, or the en
 
 /* The larger box: this share of the shape's radius on every side. Larger: fewer updates, more pairs to look at. */
 #define ROOM 0.05
-/* Ask the broad phase for single shapes up to this share of all. */
-enum { FEW = 8 };
+/* Ask the broad phase for single shapes up to one in so many: a query costs as much as some ten of a sweep over all. */
+enum { FEW = 16 };
 
 static uint64_t pair_key(uint32_t a, uint32_t b) { return (uint64_t)a << 32 | b; }
 
@@ -71,39 +70,6 @@ static bool make_room(struct sadmm_candidates *c, size_t slots)
            grow(&c->planes, &c->plane_capacity, 0, slots, sizeof *c->planes);
 }
 
-static void place(const struct sadmm_shape *shape, const struct sadmm_collision_body *body,
-                  const struct sadmm_collision_input *input, struct sadmm_proxy *p, struct sadmm_box3 *box)
-{
-    quat q_body = q_load(body->orientation), q = q_normalize(q_mul(q_body, q_load(shape->orientation)));
-    mat3 R = q_matrix(q);
-    vec3 arm = m3_mul(q_matrix(q_body), v3_load(shape->position));
-    bool moves = body->system_body >= 0;
-    double extent[3];
-
-    for (int i = 0; i < 3; ++i) v3_store(R.r[i], p->R + 3 * i);
-    v3_store(arm, p->arm);
-    for (int i = 0; i < 3; ++i) {
-        p->com[i] = body->position[i];
-        p->x[i] = body->position[i] + p->arm[i];
-        p->size[i] = shape->size[i];
-        p->velocity[i] = moves ? body->velocity[i] : 0;
-    }
-    p->spin = moves ? rotation_sweep(body->velocity + 3, v3_norm(arm) + shape_radius((int)shape->type, shape->size),
-                                     input->dt)
-                    : 0;
-    p->fall = moves ? input->acceleration * input->dt * input->dt : 0;
-    p->thin = shape_thickness((int)shape->type, shape->size);
-    p->friction = shape->friction;
-    p->restitution = shape->restitution;
-    p->type = (int32_t)shape->type;
-    p->body = shape->body;
-    p->system_body = body->system_body;
-    p->revision = shape->revision;
-    if (shape->type == SADMM_SHAPE_PLANE) return;
-    shape_world_extent(p->type, p->size, p->R, extent);
-    shape_box(p->x, extent, input->margin * p->thin, p->velocity, p->spin, p->fall, input->dt, box);
-}
-
 static bool contains(const struct sadmm_box3 *outer, const struct sadmm_box3 *inner)
 {
     for (int k = 0; k < 3; ++k)
@@ -141,7 +107,7 @@ static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision
     now.group = body->environment;
     now.alive = true;
     now.moves = body->system_body >= 0;
-    place(shape, body, input, &c->proxies[slot], &c->boxes[slot]);
+    proxy_place(shape, body, input->dt, input->margin, input->acceleration, &c->proxies[slot], &c->boxes[slot]);
     same = seen->alive && seen->revision == now.revision && seen->body == now.body && seen->group == now.group &&
            seen->moves == now.moves && !renew;
     c->state[slot] = SLOT_PRESENT;
@@ -158,22 +124,10 @@ static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision
     }
 }
 
-/* Lowest point of a box over a plane, m; `reach`: the plane's share of the pair's limit is not in the box. */
-static bool box_meets_plane(const struct sadmm_proxy *plane, const struct sadmm_box3 *box, double reach)
-{
-    double height = 0, lowest = 0;
-    for (int k = 0; k < 3; ++k) {
-        double n = plane->R[3 * k + 2];
-        height += n * (0.5 * (box->lo[k] + box->hi[k]) - plane->x[k]);
-        lowest += fabs(n) * 0.5 * (box->hi[k] - box->lo[k]);
-    }
-    return height - lowest <= reach + 1e-12 * lowest;
-}
-
 bool sadmm_candidate_meets(const struct sadmm_candidates *c, double margin, uint32_t a, uint32_t b)
 {
     if (c->proxies[a].type == SADMM_SHAPE_PLANE)
-        return box_meets_plane(&c->proxies[a], &c->boxes[b], 0.5 * margin * c->proxies[b].thin);
+        return proxy_plane_meets(&c->proxies[a], &c->boxes[b], proxy_plane_reach(&c->proxies[b], margin));
     return boxes_overlap(&c->boxes[a], &c->boxes[b]);
 }
 
@@ -237,11 +191,6 @@ static size_t first_mover(const struct sadmm_candidates *c, uint64_t key)
     return low;
 }
 
-static double plane_reach(const struct sadmm_candidates *c, double margin, uint32_t slot)
-{
-    return 0.5 * margin * c->proxies[slot].thin;
-}
-
 /* Planes against what moves, all of it or, when few moved, that. */
 static bool plane_pairs(struct sadmm_candidates *c, const struct sadmm_collision_input *input, bool only_changed)
 {
@@ -257,7 +206,7 @@ static bool plane_pairs(struct sadmm_candidates *c, const struct sadmm_collision
             uint32_t slot = only_changed ? c->changed[i] : (uint32_t)c->movers[i];
             const struct sadmm_broad_entry *e = &c->entries[slot];
             if (!e->present || !e->moves || (group >= 0 && e->group != group)) continue;
-            if (box_meets_plane(&c->proxies[plane], &e->box, plane_reach(c, input->margin, slot)) &&
+            if (proxy_plane_meets(&c->proxies[plane], &e->box, proxy_plane_reach(&c->proxies[slot], input->margin)) &&
                 !sadmm_pair_list_add(&c->found, plane, slot))
                 return false;
         }

@@ -11,20 +11,7 @@
 
 #include "broad_phase.h"
 #include "collision.h"
-
-/* A shape in the world, this step. */
-struct sadmm_proxy {
-    double R[9], x[3];  /* shape to world, row-major; centre, m */
-    double size[3];
-    double arm[3];      /* centre relative to the body's centre of mass, m, world */
-    double com[3];      /* of the body */
-    double velocity[3]; /* of the body, m/s */
-    double spin, fall;  /* reach of rotation and of acceleration within the step, m */
-    double thin;        /* smallest extent, m */
-    double friction, restitution;
-    int32_t type, body, system_body;
-    uint32_t revision;
-};
+#include "proxy.h"
 
 /* What decides whether a shape's entry in the broad phase is still the same. Planes have no entry. */
 struct sadmm_seen {

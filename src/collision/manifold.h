@@ -45,7 +45,7 @@ struct pair_pose {
 /* How clearly the cached axis must be beaten: this share of the depth, and of the thinner shape's extent. */
 #define MANIFOLD_KEEP_DEPTH ((real)0.1)
 #define MANIFOLD_KEEP_EXTENT ((real)0.005)
-/* Lateral tolerance of clipping, as a share of the face's half extent: corners of aligned boxes stay corners. */
+/* Lateral tolerance of clipping, as a share of the smaller face's half extent: corners of aligned boxes stay corners. */
 #define MANIFOLD_SNAP ((real)1e-3)
 /* cos 8 degrees: axes within this angle are the same direction for the choice of an axis. */
 #define MANIFOLD_COS_NEAR ((real)0.99026806874157036)

@@ -15,12 +15,13 @@
  *   - the cached axis stays unless beaten by 10 % of the depth plus 0.5 % of the thinner box: at the apex of two cards the
  *     two inner faces are equally good and 60 degrees apart;
  *   - the cached side stays, also past the midplane, until the boxes are apart;
- *   - an edge axis within 8 degrees of the best face must win by 5 % of the depth: points of a face are worth more;
+ *   - an edge axis within 8 degrees of the best face must win by 5 % of the depth and 0.5 % of the thinner box (faces at
+ *     rest have no depth to speak of): points of a face are worth more;
  *   - an edge axis is charged with its rounding error, which grows as the edges become parallel.
  *
  * Features. Vertex of box 1: 1 + v; of box 2: 9 + v (v: bit k set when coordinate k is positive). Crossing of edge e1 of
  * box 1 and e2 of box 2: 32 + 12 e1 + e2. An edge is 4 x direction + the signs of the two following axes.
- * Coincident vertices are box 1's. Closest points of corners: 256 + edge.
+ * Coincident vertices are box 1's. Corners: 256 + 3 e2 + (two ends of a stretch, closest point).
  */
 #ifndef SADMM_COLLISION_MANIFOLD_BOX_H
 #define SADMM_COLLISION_MANIFOLD_BOX_H
@@ -105,7 +106,7 @@ SADMM_INLINE int box_clip_face(const real hr[3], const real hi[3], const real R[
     int u = k == 2 ? 0 : k + 1, v = u == 2 ? 0 : u + 1, j = 0, ju, jv, q, i, count = 4, base_bits, ref_bits;
     struct clip_vertex poly[12], other[12];
     int bits[4];
-    real si, cx, cy, cz, ux, uy, uz, vx, vy, vz, tol_u = MANIFOLD_SNAP * hr[u], tol_v = MANIFOLD_SNAP * hr[v];
+    real si, cx, cy, cz, ux, uy, uz, vx, vy, vz, tol_u, tol_v;
     bool clip_u = false, clip_v = false;
 
     /* incident face: the axis most against the normal */
@@ -122,6 +123,9 @@ SADMM_INLINE int box_clip_face(const real hr[3], const real hi[3], const real R[
     cz = sg * (t[k] + si * hi[j] * R[k][j]) - hr[k];
     ux = hi[ju] * R[u][ju]; uy = hi[ju] * R[v][ju]; uz = sg * hi[ju] * R[k][ju];
     vx = hi[jv] * R[u][jv]; vy = hi[jv] * R[v][jv]; vz = sg * hi[jv] * R[k][jv];
+    /* the smaller of the two faces says what is near */
+    tol_u = MANIFOLD_SNAP * real_min(hr[u], real_abs(ux) + real_abs(vx));
+    tol_v = MANIFOLD_SNAP * real_min(hr[v], real_abs(uy) + real_abs(vy));
     for (q = 0; q < 4; ++q) {
         /* around the face: (+,+), (-,+), (-,-), (+,-) */
         int pu = q == 0 || q == 3, pv = q < 2;
@@ -148,24 +152,18 @@ SADMM_INLINE int box_clip_face(const real hr[3], const real hi[3], const real R[
         uint32_t feature;
         real position[3];
         bool duplicate = false;
+        /* on a corner of the reference face? */
+        bool corner = real_abs(real_abs(p->x) - hr[u]) <= tol_u && real_abs(real_abs(p->y) - hr[v]) <= tol_v;
+        int corner_bits = ref_bits | (p->x > 0 ? 1 << u : 0) | (p->y > 0 ? 1 << v : 0);
         if (p->z > limit) continue;
         if (in < 4 && out < 4) {
-            int vertex = bits[out];
-            real ax = real_abs(p->x) - hr[u], ay = real_abs(p->y) - hr[v];
-            if (owner && real_abs(ax) <= tol_u && real_abs(ay) <= tol_v) {
-                /* on a vertex of the reference, box 2: the id is that of box 1's, which is this one */
-                feature = box_feature_vertex(0, vertex);
-            } else if (!owner && real_abs(ax) <= tol_u && real_abs(ay) <= tol_v) {
-                int rv = ref_bits | (p->x > 0 ? 1 << u : 0) | (p->y > 0 ? 1 << v : 0);
-                feature = box_feature_vertex(0, rv);
-            } else {
-                feature = box_feature_vertex(!owner, vertex);
-            }
+            /* vertex of the incident box; where two coincide the id is that of box 1's */
+            feature = corner && !owner ? box_feature_vertex(0, corner_bits)
+                                       : box_feature_vertex(!owner && !corner, bits[out]);
         } else if (in >= 4 && out >= 4) {
             /* corner of the reference; collinear leftovers (in == out) carry no information */
-            int rv = ref_bits | (p->x > 0 ? 1 << u : 0) | (p->y > 0 ? 1 << v : 0);
             if (in == out) continue;
-            feature = box_feature_vertex(owner, rv);
+            feature = box_feature_vertex(owner, corner_bits);
         } else {
             /* side of the reference face x edge of the incident face */
             int side = in >= 4 ? in : out, edge = in >= 4 ? out : in;
@@ -178,6 +176,7 @@ SADMM_INLINE int box_clip_face(const real hr[3], const real hi[3], const real R[
             if (edge == 0 || edge == 2) e_inc = box_edge_id(ju, edge == 0, jb);
             else e_inc = box_edge_id(jv, jb, edge == 3);
             feature = owner ? box_feature_crossing(e_inc, e_ref) : box_feature_crossing(e_ref, e_inc);
+            if (corner) feature = box_feature_vertex(owner, corner_bits); /* the edge passes by a corner */
         }
         for (d = 0; d < m->count; ++d) {
             real dx = real_abs(m->points[d].position.x - p->x), dy = real_abs(m->points[d].position.y - p->y);
@@ -238,6 +237,13 @@ SADMM_INLINE int box_support_edge(const real h[3], int i, const real n[3], const
     return box_edge_id(i, bu, bv);
 }
 
+/* Vertex at the upper or lower end of the edge along i through centre. */
+SADMM_INLINE int box_edge_end(const real centre[3], int i, int upper)
+{
+    int u = i == 2 ? 0 : i + 1, v = u == 2 ? 0 : u + 1;
+    return (upper ? 1 << i : 0) | (centre[u] > 0 ? 1 << u : 0) | (centre[v] > 0 ? 1 << v : 0);
+}
+
 /* Tangent of the steepest descent of the box's surface beside the edge, looking sideways along `side` (unit, across the
  * edge and the normal): how fast the gap opens there. */
 SADMM_INLINE real box_edge_fall(const real centre[3], int i, const real n[3], const real side[3])
@@ -255,7 +261,7 @@ SADMM_INLINE bool box_edge_manifold(const struct box_pair *b, int axis, int nega
 {
     int i = (axis - 6) / 3, j = (axis - 6) % 3, e1, e2, k, end;
     vec3 n = box_axis_direction(b, axis, negative), p, q, w, axis1 = v3_axis(i, 1), p1, p2;
-    real n1[3], n2[3], lean1[3], lean2[3], c1[3], c2[3], s, t, sin2, separation;
+    real n1[3], n2[3], lean1[3], lean2[3], c1[3], c2[3], s, t, separation;
     bool crossing;
     vec3 l = box_edge_axis(b, i, j);
 
@@ -282,45 +288,43 @@ SADMM_INLINE bool box_edge_manifold(const struct box_pair *b, int axis, int nega
     p2 = v3_madd(q, t, w);
     separation = v3_dot(n, v3_sub(p2, p1));
 
-    sin2 = v3_norm2(l);
-    if (sin2 < 1 - MANIFOLD_COS_NEAR * MANIFOLD_COS_NEAR) {
-        /* nearly parallel: ends of the stretch of edge 1 beside edge 2, where the gap has not opened past the limit */
-        real cij = b->R[i][j], lo, hi, qi = i == 0 ? q.x : (i == 1 ? q.y : q.z), worst = -(real)1e30;
+    if (v3_norm2(l) < 1 - MANIFOLD_COS_NEAR * MANIFOLD_COS_NEAR) {
+        /* nearly parallel: ends of the stretch the edges have in common along their mean direction, where the gap has not
+         * opened past the limit */
+        vec3 mean = b->R[i][j] > 0 ? v3_add(axis1, w) : v3_sub(axis1, w);
+        real inverse = 1 / v3_norm(mean), d1, d2, lo1, hi1, lo2, hi2, lo, hi, worst = -(real)1e30;
         int added = 0;
-        lo = real_max(-b->h1[i], qi - b->h2[j] * real_abs(cij));
-        hi = real_min(b->h1[i], qi + b->h2[j] * real_abs(cij));
+        mean = v3_scale(mean, inverse);
+        d1 = v3_dot(mean, axis1);
+        d2 = v3_dot(mean, w);
+        lo1 = v3_dot(mean, p) - b->h1[i] * d1;
+        hi1 = v3_dot(mean, p) + b->h1[i] * d1;
+        lo2 = v3_dot(mean, q) - b->h2[j] * real_abs(d2);
+        hi2 = v3_dot(mean, q) + b->h2[j] * real_abs(d2);
+        lo = real_max(lo1, lo2);
+        hi = real_min(hi1, hi2);
         if (hi - lo > MANIFOLD_SNAP * real_min(b->h1[i], b->h2[j])) {
             for (end = 0; end < 2; ++end) {
-                real x = end ? hi : lo, side_length, gap, side1[3], side2[3];
-                vec3 a1 = v3_madd(p, x, axis1), a2 = v3_madd(q, (x - qi) / cij, w), d = v3_sub(a2, a1), side;
-                real along = v3_dot(n, d);
+                real x = end ? hi : lo, side_length, gap;
+                vec3 a1 = v3_madd(p, (x - v3_dot(mean, p)) / d1, axis1), a2 = v3_madd(q, (x - v3_dot(mean, q)) / d2, w);
+                vec3 d = v3_sub(a2, a1), side;
                 uint32_t feature;
-                side = v3_madd(d, -along, n);
+                gap = v3_dot(n, d);
+                side = v3_madd(d, -gap, n);
                 side_length = v3_norm(side);
-                gap = along;
                 if (side_length > 0) {
-                    real fall1, fall2;
+                    real side1[3], side2[3];
                     side = v3_scale(side, 1 / side_length);
                     v3_to_array(side, side1);
                     for (k = 0; k < 3; ++k)
                         side2[k] = -(side1[0] * b->R[0][k] + side1[1] * b->R[1][k] + side1[2] * b->R[2][k]);
-                    fall1 = box_edge_fall(c1, i, n1, side1);
-                    fall2 = box_edge_fall(c2, j, n2, side2);
-                    gap += side_length * real_min(fall1, fall2);
+                    gap += side_length * real_min(box_edge_fall(c1, i, n1, side1), box_edge_fall(c2, j, n2, side2));
                 }
                 worst = real_max(worst, gap);
                 if (gap > b->limit) continue;
                 /* the end belongs to the edge that stops there */
-                if (real_abs(x) >= b->h1[i]) {
-                    int u = i == 2 ? 0 : i + 1, v = u == 2 ? 0 : u + 1;
-                    int bits = (end ? 1 << i : 0) | (c1[u] > 0 ? 1 << u : 0) | (c1[v] > 0 ? 1 << v : 0);
-                    feature = box_feature_vertex(0, bits);
-                } else {
-                    int u = j == 2 ? 0 : j + 1, v = u == 2 ? 0 : u + 1;
-                    int bits = ((end != 0) == (cij > 0) ? 1 << j : 0) | (c2[u] > 0 ? 1 << u : 0) |
-                               (c2[v] > 0 ? 1 << v : 0);
-                    feature = box_feature_vertex(1, bits);
-                }
+                if (end ? hi1 <= hi2 : lo1 >= lo2) feature = box_feature_vertex(0, box_edge_end(c1, i, end));
+                else feature = box_feature_vertex(1, box_edge_end(c2, j, (end != 0) == (d2 > 0)));
                 manifold_add(m, v3_scale(v3_add(a1, a2), (real)0.5), gap, feature);
                 ++added;
             }
@@ -333,41 +337,51 @@ SADMM_INLINE bool box_edge_manifold(const struct box_pair *b, int axis, int nega
     return crossing;
 }
 
-/* Boxes apart whose closest features are corners: closest points over the edges of 2 against the solid 1. */
+/* Boxes apart whose closest features are corners and edges that do not cross: the edges of 2 against the solid 1. */
 SADMM_INLINE void box_corner_manifold(const struct box_pair *b, vec3 fallback, struct manifold *m)
 {
+    vec3 h1 = v3_from_array(b->h1), p = v3(0, 0, 0), u = p, x = p, q = p;
+    real best2 = (real)1e30, best_slope = (real)1e30, half = 0, distance;
     int direction, side, best = 0;
-    real best2 = (real)1e30, distance;
-    vec3 best1 = v3(0, 0, 0), best_2 = v3(0, 0, 0);
+    uint32_t cache = m->cache;
+
     m->count = 0;
     for (direction = 0; direction < 3; ++direction) {
-        int u = direction == 2 ? 0 : direction + 1, v = u == 2 ? 0 : u + 1;
+        int i = direction == 2 ? 0 : direction + 1, j = i == 2 ? 0 : i + 1, k;
         real w[3];
-        w[0] = b->R[0][direction];
-        w[1] = b->R[1][direction];
-        w[2] = b->R[2][direction];
+        for (k = 0; k < 3; ++k) w[k] = b->R[k][direction];
         for (side = 0; side < 4; ++side) {
-            real c[3], s, d2, hu = side & 1 ? b->h2[u] : -b->h2[u], hv = side & 2 ? b->h2[v] : -b->h2[v];
-            vec3 p2, p1;
-            int k;
-            for (k = 0; k < 3; ++k) c[k] = b->t[k] + b->R[k][u] * hu + b->R[k][v] * hv;
-            s = segment_box_closest(c, w, b->h1, b->h2[direction]);
-            p2 = v3_madd(v3_from_array(c), s, v3_from_array(w));
-            p1 = box_clamp(p2, v3_from_array(b->h1));
-            d2 = v3_norm2(v3_sub(p2, p1));
-            if (d2 < best2) {
+            real c[3], d2, slope, hi = side & 1 ? b->h2[i] : -b->h2[i], hj = side & 2 ? b->h2[j] : -b->h2[j];
+            vec3 x2, q1;
+            for (k = 0; k < 3; ++k) c[k] = b->t[k] + b->R[k][i] * hi + b->R[k][j] * hj;
+            x2 = v3_madd(v3_from_array(c), segment_box_closest(c, w, b->h1, b->h2[direction]), v3_from_array(w));
+            q1 = box_clamp(x2, h1);
+            d2 = v3_norm2(v3_sub(x2, q1));
+            slope = real_abs(v3_dot(v3_from_array(w), v3_sub(x2, q1)));
+            /* three edges meet in a closest vertex: the one that runs along the other box */
+            if (d2 < best2 * (1 - 64 * SADMM_EPSILON) || (d2 <= best2 * (1 + 64 * SADMM_EPSILON) && slope < best_slope)) {
                 best2 = d2;
+                best_slope = slope;
                 best = box_edge_id(direction, side & 1, side >> 1);
-                best1 = p1;
-                best_2 = p2;
+                p = v3_from_array(c);
+                u = v3_from_array(w);
+                half = b->h2[direction];
+                x = x2;
+                q = q1;
             }
         }
     }
     distance = real_sqrt(best2);
     if (distance > b->limit) return;
-    m->normal = fallback;
-    if (distance > (real)1e-4 * b->thin) m->normal = v3_scale(v3_sub(best_2, best1), 1 / distance);
-    manifold_add(m, v3_scale(v3_add(best1, best_2), (real)0.5), distance, 256u + (uint32_t)best);
+    if (distance > (real)1e-4 * b->thin) {
+        manifold_segment_outside(0, half, h1, p, u, x, q, distance, (real)0.01 * b->thin, b->limit,
+                                 256u + 3u * (uint32_t)best, m);
+        m->normal = v3_neg(m->normal); /* it came from 2 to 1 */
+    } else {
+        m->normal = fallback;
+        manifold_add(m, v3_scale(v3_add(x, q), (real)0.5), distance, 258u + 3u * (uint32_t)best);
+    }
+    m->cache = cache;
 }
 
 /* Deepest vertex of 2 along the normal: the last resort of an overlap that clipping lost to rounding. */
@@ -494,7 +508,7 @@ SADMM_INLINE void manifold_box_box(vec3 half1, vec3 half2, const struct pair_pos
         if (real_abs(v3_dot(n, ne)) > MANIFOLD_COS_NEAR) {
             /* same direction: points of a face are worth more (without the bonus of a cached edge) */
             real s = s_edge - (edge == cached ? MANIFOLD_KEEP_DEPTH * real_max(0, -s_edge) + keep : 0);
-            use_edge = s > s_face + (real)0.05 * real_abs(s_face) + b.slack;
+            use_edge = s > s_face + (real)0.05 * real_abs(s_face) + keep;
         } else if (edge == cached || cached < 0) {
             use_edge = s_edge > s_face;
         } else {

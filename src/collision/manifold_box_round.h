@@ -141,7 +141,7 @@ SADMM_INLINE void manifold_capsule_box_inside(real radius, real half, vec3 h, ve
 {
     real pa[3], ua[3], ha[3], lo[3], hi[3], s_face, s_edge = -(real)1e30, first = -half, last = half;
     real thin = 2 * real_min(radius, real_min(h.x, real_min(h.y, h.z)));
-    vec3 n_edge = v3(0, 0, 1), n;
+    vec3 n_edge = v3(0, 0, 1), n, n_kept = v3(0, 0, 0);
     int k, face, edge = -1, edge_cache = 0;
 
     v3_to_array(p, pa);
@@ -152,9 +152,10 @@ SADMM_INLINE void manifold_capsule_box_inside(real radius, real half, vec3 h, ve
         hi[k] = pa[k] + half * real_abs(ua[k]);
     }
     face = box_core_face(lo, hi, ha, thin, cache, &s_face);
+    if (cache >= 1 && cache <= 6) n_kept = v3_axis(((int)cache - 1) / 2, (cache - 1) % 2 ? (real)-1 : (real)1);
     for (k = 0; k < 3; ++k) {
         int i = (k + 1) % 3, j = (k + 2) % 3, negative;
-        real ci = ua[j], cj = -ua[i], length2 = ci * ci + cj * cj, d, r, s, inverse;
+        real ci = ua[j], cj = -ua[i], length2 = ci * ci + cj * cj, d, r, s, inverse, along;
         if (length2 < (real)1e-8) continue;
         inverse = 1 / real_sqrt(length2);
         d = (ci * pa[i] + cj * pa[j]) * inverse;
@@ -162,6 +163,9 @@ SADMM_INLINE void manifold_capsule_box_inside(real radius, real half, vec3 h, ve
         negative = d < 0;
         if (cache == (uint32_t)(7 + k)) negative = 0;
         if (cache == (uint32_t)(15 + k)) negative = 1;
+        /* an axis much like the cached face keeps its side too */
+        along = v3_dot(n_kept, v3_add(v3_axis(i, ci * inverse), v3_axis(j, cj * inverse)));
+        if (real_abs(along) > (real)0.9) negative = along < 0;
         s = (negative ? -d : d) - r;
         if (cache == (uint32_t)(7 + k) || cache == (uint32_t)(15 + k))
             s += MANIFOLD_KEEP_DEPTH * real_abs(s) + MANIFOLD_KEEP_EXTENT * thin;
@@ -207,54 +211,65 @@ SADMM_INLINE void manifold_capsule_box_inside(real radius, real half, vec3 h, ve
     }
 }
 
-SADMM_INLINE void manifold_capsule_box(real radius, real half, vec3 h, const struct pair_pose *pose, real limit,
-                                       uint32_t cache, struct manifold *m)
+/* Segment p + s u, |s| <= half, with a round of `radius` around it, outside the box: s is its closest parameter, x and q the
+ * closest points of segment and box, `length` > 0 their distance. Sets the normal (segment to box). Touching along a
+ * line gives the ends of the stretch over the same feature of the box, features first_feature and + 1, the closest point
+ * is first_feature + 2. flat: what the closest point must be below the ends to count beside them. */
+SADMM_INLINE void manifold_segment_outside(real radius, real half, vec3 h, vec3 p, vec3 u, vec3 x, vec3 q, real length,
+                                           real flat, real limit, uint32_t first_feature, struct manifold *m)
 {
-    vec3 p = pose->t, u = m3_column(&pose->R, 2), x, q, d;
-    real pa[3], ua[3], ha[3], na[3], s, length, closest, first = -half, last = half, end_s[2];
-    real size = radius + half + v3_max_abs(h), best_end = (real)1e30;
+    real pa[3], ua[3], ha[3], na[3], closest = length - radius, first = -half, last = half, best_end = (real)1e30;
     bool stretch = true;
     int k, e, main_axis = 0;
 
+    m->normal = v3_scale(v3_sub(q, x), 1 / length);
     v3_to_array(p, pa);
     v3_to_array(u, ua);
     v3_to_array(h, ha);
-    s = segment_box_closest(pa, ua, ha, half);
-    x = segment_at(p, s, u);
-    q = box_clamp(x, h);
-    d = v3_sub(q, x);
-    length = v3_norm(d);
-    if (length <= 64 * SADMM_EPSILON * size) {
-        manifold_capsule_box_inside(radius, half, h, p, u, limit, cache, m);
-        return;
-    }
-    closest = length - radius;
-    if (closest > limit) return;
-    m->normal = v3_scale(d, 1 / length);
     v3_to_array(m->normal, na);
     for (k = 1; k < 3; ++k)
         if (real_abs(na[k]) > real_abs(na[main_axis])) main_axis = k;
     m->cache = (uint32_t)(1 + 2 * main_axis + (na[main_axis] > 0));
 
-    /* The stretch of the segment over the same feature: inside the slabs in which the closest point is inside. Its ends
-     * count as points where the box is found in nearly the same direction. */
+    /* The slabs in which the closest point lies bound the stretch; its ends count where the box is found in nearly the
+     * same direction. */
     for (k = 0; k < 3; ++k)
         if (na[k] * na[k] < 1 - MANIFOLD_COS_NEAR * MANIFOLD_COS_NEAR && k != main_axis)
             stretch = stretch && segment_slab(pa[k], ua[k], ha[k], &first, &last);
     if (stretch && last - first > MANIFOLD_SNAP * half) {
-        end_s[0] = first;
-        end_s[1] = last;
         for (e = 0; e < 2; ++e) {
-            vec3 c = segment_at(p, end_s[e], u), qe = box_clamp(c, h), de = v3_sub(qe, c);
-            real along = v3_dot(m->normal, de), distance = v3_norm(de), separation;
-            if (along < MANIFOLD_COS_NEAR * distance || distance <= 64 * SADMM_EPSILON * size) continue;
-            separation = distance - radius;
+            vec3 c = segment_at(p, e ? last : first, u), qe = box_clamp(c, h), d = v3_sub(qe, c);
+            real distance = v3_norm(d), separation = distance - radius;
+            if (!(v3_dot(m->normal, d) >= MANIFOLD_COS_NEAR * distance)) continue;
             best_end = real_min(best_end, separation);
-            if (separation <= limit) manifold_add(m, v3_madd(qe, -separation / 2, m->normal), separation, (uint32_t)e + 1);
+            if (separation <= limit)
+                manifold_add(m, v3_madd(qe, -separation / 2, m->normal), separation, first_feature + (uint32_t)e);
         }
-        if (m->count > 0 && best_end - closest < (real)0.01 * radius) return;
+        if (m->count == 2 && best_end - closest < flat) return;
+        if (m->count == 1 && best_end - closest < flat) { /* the closest point, in the name of that end */
+            first_feature = m->points[0].feature - 2;
+            m->count = 0;
+        }
     }
-    manifold_add(m, v3_madd(q, -closest / 2, m->normal), closest, 3);
+    manifold_add(m, v3_madd(q, -closest / 2, m->normal), closest, first_feature + 2);
+}
+
+SADMM_INLINE void manifold_capsule_box(real radius, real half, vec3 h, const struct pair_pose *pose, real limit,
+                                       uint32_t cache, struct manifold *m)
+{
+    vec3 p = pose->t, u = m3_column(&pose->R, 2), x, q;
+    real pa[3], ua[3], ha[3], length;
+
+    v3_to_array(p, pa);
+    v3_to_array(u, ua);
+    v3_to_array(h, ha);
+    x = segment_at(p, segment_box_closest(pa, ua, ha, half), u);
+    q = box_clamp(x, h);
+    length = v3_norm(v3_sub(q, x));
+    if (length <= 64 * SADMM_EPSILON * (radius + half + v3_max_abs(h)))
+        manifold_capsule_box_inside(radius, half, h, p, u, limit, cache, m);
+    else if (length - radius <= limit)
+        manifold_segment_outside(radius, half, h, p, u, x, q, length, (real)0.01 * radius, limit, 1, m);
 }
 
 #endif

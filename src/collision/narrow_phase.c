@@ -1,16 +1,8 @@
-/* Impulses of the last step carry over by identity: pair of shapes (and their revisions: a slot may hold another shape
- * by now), then feature. They are kept as world vectors, so a contact whose normal turned takes the normal part along
- * the new normal and the tangential part projected into the new tangent plane, within the friction disc. */
 #include "narrow_phase.h"
 
-#include <string.h>
-
 #include "../core/memory.h"
+#include "contact_carry.h"
 #include "pair_manifold.h"
-
-/* One word from two revisions: a change of either always shows, of both together as well while the revisions are
- * less than some ten thousand apart (the multipliers have no shorter relation). */
-static uint32_t pair_revision(uint32_t a, uint32_t b) { return a * 0x9E3779B1u + b * 0x85EBCA77u; }
 
 static uint64_t pair_key_of(const struct sadmm_contact_pair *pair)
 {
@@ -51,29 +43,6 @@ static double pair_friction(const struct sadmm_collision_input *input, uint32_t 
     return mu_a == mu_b ? mu_a : sqrt(mu_a * mu_b);
 }
 
-static void carry_impulse(const double old_normal[3], const double impulse[3], const double normal[3], double friction,
-                          double out[3])
-{
-    double turned = 0, along = 0, back = 0, size = 0, limit, scale, t[3];
-    for (int k = 0; k < 3; ++k) {
-        turned += old_normal[k] * normal[k];
-        along += old_normal[k] * impulse[k];
-    }
-    if (turned <= 0 || along <= 0) return;
-    for (int k = 0; k < 3; ++k) {
-        t[k] = impulse[k] - along * old_normal[k];
-        back += t[k] * normal[k];
-    }
-    for (int k = 0; k < 3; ++k) {
-        t[k] -= back * normal[k];
-        size += t[k] * t[k];
-    }
-    size = sqrt(size);
-    limit = friction * along;
-    scale = size > limit ? limit / size : 1;
-    for (int k = 0; k < 3; ++k) out[k] = along * normal[k] + scale * t[k];
-}
-
 static void rotate(const double R[9], vec3 v, double out[3])
 {
     for (int k = 0; k < 3; ++k)
@@ -99,7 +68,7 @@ static void emit(const struct sadmm_candidates *c, const struct sadmm_collision_
     pair->friction = pair_friction(input, a, b, pa->friction, pb->friction);
     pair->restitution = fmax(pa->restitution, pb->restitution);
     pair->cache = m->cache;
-    pair->reserved = pair_revision(pa->revision, pb->revision);
+    pair->reserved = revision_of_pair(pa->revision, pb->revision);
     for (int k = 0; k < 3; ++k) between[k] = pb->com[k] - pa->com[k];
 
     for (int i = 0; i < m->count; ++i) {
@@ -121,7 +90,7 @@ static void emit(const struct sadmm_candidates *c, const struct sadmm_collision_
         for (int32_t j = 0; j < old->count; ++j) {
             const struct sadmm_contact_point *before = &old_set->points[old->first + j];
             if (before->feature != from->feature) continue;
-            carry_impulse(old->normal, before->impulse, pair->normal, pair->friction, point->impulse);
+            impulse_carry(old->normal, before->impulse, pair->normal, pair->friction, point->impulse);
             break;
         }
     }
@@ -149,7 +118,7 @@ bool sadmm_narrow_phase(const struct sadmm_candidates *c, const struct sadmm_col
             continue;
         while (next < old->pair_count && pair_key_of(&old->pairs[next]) < key) ++next;
         if (next < old->pair_count && pair_key_of(&old->pairs[next]) == key &&
-            old->pairs[next].reserved == pair_revision(pa->revision, pb->revision))
+            old->pairs[next].reserved == revision_of_pair(pa->revision, pb->revision))
             before = &old->pairs[next];
 
         limit = pair_limit(input->margin, pa->thin, pb->thin, pa->velocity, pb->velocity, pa->spin, pb->spin,

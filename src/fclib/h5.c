@@ -12,6 +12,8 @@ static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 sadmm_status sadmm_h5_begin(struct sadmm_h5_session *session, struct sadmm_error *error)
 {
     pthread_mutex_lock(&lock);
+    /* Every file is closed here. libhdf5's own clean-up at exit can loop, and print, over what a damaged file left. */
+    H5dont_atexit();
     if (H5open() >= 0 && H5Eget_auto2(H5E_DEFAULT, &session->print, &session->print_data) >= 0 &&
         H5Eset_auto2(H5E_DEFAULT, NULL, NULL) >= 0)
         return SADMM_OK;
@@ -35,7 +37,7 @@ static herr_t keep_first(unsigned depth, const H5E_error2_t *e, void *data)
     return 0;
 }
 
-/* Fail with what HDF5 says was the innermost reason. */
+/* Fail with what HDF5 says was the innermost reason. Before any other call of HDF5: those forget it. */
 static sadmm_status fail_h5(struct sadmm_error *error, const char *name, const char *what)
 {
     const char *reason = NULL;
@@ -58,16 +60,19 @@ sadmm_status sadmm_h5_open(const char *path, enum sadmm_h5_mode mode, hid_t *fil
 #endif
     if (mode == SADMM_H5_CREATE) *file = H5Fcreate(path, H5F_ACC_EXCL, H5P_DEFAULT, access);
     else *file = H5Fopen(path, mode == SADMM_H5_EDIT ? H5F_ACC_RDWR : H5F_ACC_RDONLY, access);
+    sadmm_status status = SADMM_OK;
+    if (*file < 0)
+        status = fail_h5(error, path, mode == SADMM_H5_CREATE ? "cannot create the file" : "cannot open as HDF5");
     H5Pclose(access);
-    if (*file >= 0) return SADMM_OK;
-    return fail_h5(error, path, mode == SADMM_H5_CREATE ? "cannot create the file" : "cannot open as HDF5");
+    return status;
 }
 
 sadmm_status sadmm_h5_close(hid_t file, struct sadmm_error *error)
 {
-    bool flushed = H5Fflush(file, H5F_SCOPE_LOCAL) >= 0;
-    if (H5Fclose(file) < 0 || !flushed) return fail_h5(error, "file", "could not be written completely");
-    return SADMM_OK;
+    sadmm_status status = SADMM_OK;
+    if (H5Fflush(file, H5F_SCOPE_LOCAL) < 0) status = fail_h5(error, "file", "could not be written completely");
+    if (H5Fclose(file) < 0 && status == SADMM_OK) status = fail_h5(error, "file", "could not be written completely");
+    return status;
 }
 
 /* ---- names: a link that leaves the file is refused -------------------------------------------------------------- */
@@ -155,10 +160,10 @@ static sadmm_status read_array(hid_t file, const char *name, H5T_class_t class, 
     if (!sadmm_h5_exists(file, name)) return sadmm_fail(error, SADMM_ERROR_IO, "%s: missing", name);
     hid_t access = access_list(H5P_DATASET_ACCESS);
     hid_t dataset = access >= 0 ? H5Dopen2(file, name, access) : -1;
+    sadmm_status status = dataset >= 0 ? SADMM_ERROR_IO : fail_h5(error, name, "cannot open as a dataset");
     if (access >= 0) H5Pclose(access);
-    if (dataset < 0) return fail_h5(error, name, "cannot open as a dataset");
+    if (dataset < 0) return status;
 
-    sadmm_status status = SADMM_ERROR_IO;
     int64_t found = check_dataset(file, dataset, class, name, *count, error);
     if (found >= 0) {
         *data = sadmm_alloc((size_t)found, size);
@@ -224,11 +229,13 @@ static sadmm_status write_dataset(hid_t file, const char *name, hid_t file_type,
     hid_t links = H5Pcreate(H5P_LINK_CREATE), dataset = -1;
     if (space >= 0 && links >= 0 && H5Pset_create_intermediate_group(links, 1) >= 0)
         dataset = H5Dcreate2(file, name, file_type, space, links, H5P_DEFAULT, H5P_DEFAULT);
-    bool written = dataset >= 0 && (!data || H5Dwrite(dataset, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0);
-    if (dataset >= 0 && H5Dclose(dataset) < 0) written = false;
+    sadmm_status status = SADMM_OK;
+    if (dataset < 0 || (data && H5Dwrite(dataset, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0))
+        status = fail_h5(error, name, "cannot be written");
+    if (dataset >= 0 && H5Dclose(dataset) < 0 && status == SADMM_OK) status = fail_h5(error, name, "cannot be written");
     if (links >= 0) H5Pclose(links);
     if (space >= 0) H5Sclose(space);
-    return written ? SADMM_OK : fail_h5(error, name, "cannot be written");
+    return status;
 }
 
 sadmm_status sadmm_h5_write_double(hid_t file, const char *name, size_t count, const double *data, struct sadmm_error *error)

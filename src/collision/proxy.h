@@ -1,0 +1,72 @@
+/* A shape in the world, this step: what every backend computes from a shape and its body before it looks at pairs. */
+#ifndef SADMM_COLLISION_PROXY_H
+#define SADMM_COLLISION_PROXY_H
+
+#include "../core/math/quat.h"
+#include "bounds.h"
+#include "collision.h"
+
+struct sadmm_proxy {
+    double R[9], x[3];  /* shape to world, row-major; centre, m */
+    double size[3];
+    double arm[3];      /* centre relative to the body's centre of mass, m, world */
+    double com[3];      /* of the body */
+    double velocity[3]; /* of the body, m/s */
+    double spin, fall;  /* reach of rotation and of acceleration within the step, m */
+    double thin;        /* smallest extent, m */
+    double friction, restitution;
+    int32_t type, body, system_body;
+    uint32_t revision;
+};
+
+/* `box` is left alone for a plane. */
+SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadmm_collision_body *body, double dt,
+                              double margin, double acceleration, struct sadmm_proxy *p, struct sadmm_box3 *box)
+{
+    quat q_body = q_load(body->orientation), q = q_normalize(q_mul(q_body, q_load(shape->orientation)));
+    mat3 R = q_matrix(q);
+    vec3 arm = m3_mul(q_matrix(q_body), v3_load(shape->position));
+    bool moves = body->system_body >= 0;
+    double extent[3];
+    int i;
+
+    for (i = 0; i < 3; ++i) v3_store(R.r[i], p->R + 3 * i);
+    v3_store(arm, p->arm);
+    for (i = 0; i < 3; ++i) {
+        p->com[i] = body->position[i];
+        p->x[i] = body->position[i] + p->arm[i];
+        p->size[i] = shape->size[i];
+        p->velocity[i] = moves ? body->velocity[i] : 0;
+    }
+    p->spin = moves ? rotation_sweep(body->velocity + 3, v3_norm(arm) + shape_radius((int)shape->type, shape->size), dt)
+                    : 0;
+    p->fall = moves ? acceleration * dt * dt : 0;
+    p->thin = shape_thickness((int)shape->type, shape->size);
+    p->friction = shape->friction;
+    p->restitution = shape->restitution;
+    p->type = (int32_t)shape->type;
+    p->body = shape->body;
+    p->system_body = body->system_body;
+    p->revision = shape->revision;
+    if (shape->type == SADMM_SHAPE_PLANE) return;
+    shape_world_extent(p->type, p->size, p->R, extent);
+    shape_box(p->x, extent, margin * p->thin, p->velocity, p->spin, p->fall, dt, box);
+}
+
+/* Half the margin of a pair with a plane, m: the share that is not in the other shape's box. */
+SADMM_INLINE double proxy_plane_reach(const struct sadmm_proxy *p, double margin) { return 0.5 * margin * p->thin; }
+
+/* Does the box come within `reach` of the plane? */
+SADMM_INLINE bool proxy_plane_meets(const struct sadmm_proxy *plane, const struct sadmm_box3 *box, double reach)
+{
+    double height = 0, lowest = 0;
+    int k;
+    for (k = 0; k < 3; ++k) {
+        double n = plane->R[3 * k + 2];
+        height += n * (0.5 * (box->lo[k] + box->hi[k]) - plane->x[k]);
+        lowest += fabs(n) * 0.5 * (box->hi[k] - box->lo[k]);
+    }
+    return height - lowest <= reach + 1e-12 * lowest;
+}
+
+#endif

@@ -1,0 +1,591 @@
+/* The `subadmm` command as its users see it: exit codes, messages, JSON, files. */
+#include <check.h>
+#include <jansson.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "config.h"
+
+/* ---- running it --------------------------------------------------------------------------------------------------- */
+
+static const char command[] = SUBADMM_COMMAND; /* the build gives its path */
+static char folder[64];
+
+static void make_folder(void)
+{
+    strcpy(folder, "/tmp/test_cli_XXXXXX");
+    ck_assert_ptr_nonnull(mkdtemp(folder));
+}
+
+static void remove_folder(void)
+{
+    char text[128];
+    snprintf(text, sizeof text, "rm -rf %s", folder);
+    ck_assert_int_eq(system(text), 0);
+}
+
+static char *read_text(const char *name)
+{
+    char path[128];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *file = fopen(path, "r");
+    if (!file) return NULL;
+    size_t size = 0, room = 1 << 16;
+    char *text = malloc(room);
+    for (size_t got; (got = fread(text + size, 1, room - 1 - size, file)) > 0;) {
+        size += got;
+        if (room - 1 - size == 0) text = realloc(text, room *= 2);
+    }
+    text[size] = 0;
+    fclose(file);
+    return text;
+}
+
+static char *out, *err; /* of the last run */
+
+/* Run with these arguments in the temporary folder; returns the exit code (128 + n: killed by signal n). */
+static int run(const char *arguments)
+{
+    char text[2048];
+    free(out);
+    free(err);
+    snprintf(text, sizeof text, "cd %s && %s %s >out 2>err </dev/null", folder, command, arguments);
+    int status = system(text);
+    out = read_text("out");
+    err = read_text("err");
+    ck_assert_msg(out && err, "%s: could not be run", text);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128;
+}
+
+#define MUST(arguments, code)                                                                                   \
+    do {                                                                                                        \
+        int got = run(arguments);                                                                               \
+        ck_assert_msg(got == (code), "subadmm %s: exit code %d, expected %d\n%s%s", arguments, got, code, out, err); \
+    } while (0)
+
+static json_t *parse(const char *text)
+{
+    json_error_t error;
+    json_t *root = json_loads(text, 0, &error);
+    ck_assert_msg(root != NULL, "line %d: %s\n%.400s", error.line, error.text, text);
+    return root;
+}
+
+static json_t *run_json(const char *arguments)
+{
+    MUST(arguments, 0);
+    return parse(out);
+}
+
+/* "a.b.c" of nested objects; NULL when it is not there. */
+static json_t *at(json_t *root, const char *path)
+{
+    char key[64];
+    while (root && *path) {
+        size_t length = strcspn(path, ".");
+        memcpy(key, path, length);
+        key[length] = 0;
+        root = json_object_get(root, key);
+        path += length + (path[length] == '.');
+    }
+    return root;
+}
+
+static double number(json_t *root, const char *path)
+{
+    json_t *value = at(root, path);
+    ck_assert_msg(json_is_number(value), "%s is not a number", path);
+    return json_number_value(value);
+}
+
+static const char *string(json_t *root, const char *path)
+{
+    json_t *value = at(root, path);
+    ck_assert_msg(json_is_string(value), "%s is not a string", path);
+    return json_string_value(value);
+}
+
+/* ---- usage -------------------------------------------------------------------------------------------------------- */
+
+static const struct {
+    const char *arguments;
+    int code;
+    const char *says; /* on stderr for code > 0, else on stdout */
+} usages[] = {
+    {"", 2, "usage: subadmm COMMAND"},
+    {"--help", 0, "exit status: 0 done; 1"},
+    {"--version", 0, "subadmm "},
+    {"fly", 2, "unknown command 'fly'; valid: scenes backends run check solve --help --version"},
+    {"--fly", 2, "unknown option '--fly'"},
+    {"run --help", 0, "--dump-problem STEP:FILE"},
+    {"check --help", 0, "Exit status 1 when"},
+    {"solve --help", 0, "--tolerance"},
+    {"scenes --help", 0, "--json"},
+    {"backends --help", 0, "--json"},
+    {"run", 2, "SCENE is missing"},
+    {"run incline bounce", 2, "unexpected argument 'bounce'"},
+    {"run nonsense", 2, "pyramid"},
+    {"run pyramid:0", 2, "[1, 300]"},
+    {"run pyramid:x", 2, "[1, 300]"},
+    {"scenes nonsense --json", 2, "pyramid"},
+    {"check nonsense", 2, "pyramid"},
+    {"run incline --fly", 2, "unknown option '--fly'; valid: --backend"},
+    {"run incline -x", 2, "unknown option '-x'; valid: --backend"},
+    {"run incline --steps", 2, "'--steps' needs a value"},
+    {"run incline --backend gpu", 2, "must be auto, ref, cpu or cuda"},
+    {"run incline --precision double", 2, "must be f32 or f64"},
+    {"run incline --steps 1e3", 2, "must be an integer in [0, 1000000000]"},
+    {"run incline --steps -1", 2, "must be an integer in"},
+    {"run incline --steps ' 5'", 2, "must be an integer in"},
+    {"run incline --steps ''", 2, "must be an integer in"},
+    {"run incline --steps 99999999999999999999", 2, "must be an integer in"},
+    {"run incline --dt 0", 2, "must be a number in [1e-06, 1]"},
+    {"run incline --dt nan", 2, "must be a number in"},
+    {"run incline --dt 0.01s", 2, "must be a number in"},
+    {"run incline --iterations 0", 2, "must be an integer in [1, 1000000]"},
+    {"run incline --penalty-period -1", 2, "must be an integer in [0, 1000000]"},
+    {"run incline --threads 2000", 2, "must be an integer in [0, 1024]"},
+    {"run incline --dump-problem x.hdf5", 2, "must be STEP:FILE"},
+    {"run incline --dump-problem 0:x.hdf5", 2, "must be an integer in [1,"},
+    {"run incline --steps 3 --dump-problem 4:x.hdf5", 2, "must be in [1, 3]"},
+    {"check incline --steps 0", 2, "must be an integer in [1, 100000]"},
+    {"solve", 2, "FILE.hdf5 is missing"},
+    {"solve x --tolerance -1", 2, "must be a number in [0, 1]"},
+    {"solve missing.hdf5", 1, "missing.hdf5"},
+    {"run incline --precision f32 --backend ref --steps 1", 1, "double"},
+    {"run incline --steps 1 --json /no/such/folder/x", 1, "/no/such/folder/x: No such file or directory"},
+    {"run incline --steps 1 --trace /no/such/folder/x", 1, "/no/such/folder/x: No such file or directory"},
+};
+enum { USAGE_COUNT = sizeof usages / sizeof *usages };
+
+START_TEST(exit_codes_and_messages)
+{
+    MUST(usages[_i].arguments, usages[_i].code);
+    const char *text = usages[_i].code ? err : out;
+    ck_assert_msg(strstr(text, usages[_i].says) != NULL, "subadmm %s: '%s' does not say '%s'", usages[_i].arguments, text,
+                  usages[_i].says);
+    if (usages[_i].code == 0) ck_assert_str_eq(err, "");
+    if (usages[_i].code == 2) ck_assert_str_eq(out, "");
+}
+END_TEST
+
+START_TEST(a_full_disk_is_a_failure)
+{
+    char text[700];
+    snprintf(text, sizeof text, "%s scenes >/dev/full 2>/dev/null", command);
+    ck_assert_int_eq(WEXITSTATUS(system(text)), 1);
+    snprintf(text, sizeof text, "%s run incline --steps 1 --json >/dev/full 2>/dev/null", command);
+    ck_assert_int_eq(WEXITSTATUS(system(text)), 1);
+    MUST("run incline --steps 1 --quiet --json /dev/full", 1);
+    MUST("run incline --steps 100 --quiet --trace /dev/full", 1);
+}
+END_TEST
+
+/* ---- run ---------------------------------------------------------------------------------------------------------- */
+
+static void expect_phase(json_t *root, const char *phase)
+{
+    char path[64];
+    snprintf(path, sizeof path, "ms_per_step.%s.median", phase);
+    double median = number(root, path);
+    snprintf(path, sizeof path, "ms_per_step.%s.p95", phase);
+    ck_assert_double_ge(median, 0);
+    ck_assert_double_ge(number(root, path), median);
+}
+
+START_TEST(run_reports)
+{
+    json_t *r = run_json("run pyramid:3 --steps 12 --backend cpu --threads 1 --iterations 70 --certify --json -");
+    ck_assert_str_eq(err, "");
+    ck_assert_str_eq(string(r, "scene"), "pyramid:3");
+    ck_assert_str_eq(string(r, "backend"), "cpu");
+    ck_assert_str_eq(string(r, "method"), "paper");
+    ck_assert_double_eq(number(r, "bodies"), 6);
+    ck_assert_double_eq(number(r, "joints"), 0);
+    ck_assert_double_eq(number(r, "steps"), 12);
+    ck_assert_double_eq(number(r, "iterations"), 70);
+    ck_assert_double_eq(number(r, "threads"), 1);
+    ck_assert_double_gt(number(r, "dt"), 0);
+    /* six boxes on each other and on the ground: 9 faces of at least 3 points */
+    ck_assert_double_ge(number(r, "contacts.mean"), 27);
+    ck_assert_double_ge(number(r, "contacts.max"), number(r, "contacts.mean"));
+    static const char *const phases[] = {"total", "collide", "assemble", "solve", "finish"};
+    for (size_t k = 0; k < 5; ++k) expect_phase(r, phases[k]);
+    ck_assert_double_ge(number(r, "residual.primal"), 0);
+    ck_assert_double_ge(number(r, "residual.dual"), 0);
+    ck_assert_double_ge(number(r, "certificate.ncp_max"), number(r, "certificate.ncp_mean"));
+    ck_assert_double_ge(number(r, "certificate.ncp_max_run"), number(r, "certificate.ncp_max"));
+    ck_assert_double_ge(number(r, "certificate.momentum_max_run"), number(r, "certificate.momentum_max"));
+    ck_assert_double_ge(number(r, "penetration_max"), 0);
+    ck_assert_double_ge(number(r, "speed_max_final"), 0);
+    /* it stands: what moves, moves less than the 5 % of a box that a collapse takes at once */
+    ck_assert_double_lt(number(r, "displacement_max"), 0.01);
+    ck_assert_uint_eq(strlen(string(r, "state_hash")), 16);
+    ck_assert_uint_eq(strspn(string(r, "state_hash"), "0123456789abcdef"), 16);
+    ck_assert(json_is_true(at(r, "finite")));
+    ck_assert(json_is_null(at(r, "error")));
+    ck_assert_uint_gt(strlen(string(r, "commit")), 0);
+    ck_assert_uint_gt(strlen(string(r, "compiler")), 0);
+    ck_assert_uint_gt(strlen(string(r, "device")), 0);
+    json_decref(r);
+}
+END_TEST
+
+/* What was not measured is null. */
+START_TEST(run_reports_null)
+{
+    json_t *r = run_json("run pyramid:2 --steps 2 --json");
+    ck_assert(json_is_null(at(r, "certificate")));
+    ck_assert(json_is_number(at(r, "residual.primal")));
+    json_decref(r);
+    r = run_json("run pyramid:2 --steps 0 --certify --json=-");
+    static const char *const unknown[] = {"contacts.mean", "contacts.max", "ms_per_step.total", "residual", "certificate",
+                                          "penetration_max", "backend", "threads", "device"};
+    for (size_t k = 0; k < sizeof unknown / sizeof *unknown; ++k)
+        ck_assert_msg(json_is_null(at(r, unknown[k])), "%s is not null", unknown[k]);
+    ck_assert_double_eq(number(r, "displacement_max"), 0);
+    ck_assert_double_eq(number(r, "steps"), 0);
+    json_decref(r);
+}
+END_TEST
+
+START_TEST(run_prints)
+{
+    MUST("run pyramid:2 --steps 3 --certify --explain", 0);
+    static const char *const parts[] = {"pyramid:2, 3 bodies", "ms per step", "certificate", "hash", "penalty"};
+    for (size_t k = 0; k < sizeof parts / sizeof *parts; ++k)
+        ck_assert_msg(strstr(out, parts[k]) != NULL, "no '%s' in\n%s", parts[k], out);
+    MUST("run pyramid:2 --steps 3 --quiet", 0);
+    ck_assert_str_eq(out, "");
+    ck_assert_str_eq(err, ""); /* no progress line where nobody watches */
+    /* --explain stays out of the JSON */
+    json_decref(run_json("run pyramid:2 --steps 3 --explain --json"));
+    ck_assert_ptr_nonnull(strstr(err, "penalty"));
+    /* to a file: the table is still printed */
+    MUST("run pyramid:2 --steps 3 --json r.json", 0);
+    ck_assert_ptr_nonnull(strstr(out, "ms per step"));
+    char *text = read_text("r.json");
+    json_decref(parse(text));
+    free(text);
+}
+END_TEST
+
+/* Duration / dt steps when none are asked for. */
+START_TEST(run_default_steps)
+{
+    json_t *scene = run_json("scenes bounce --json -");
+    double duration = number(scene, "duration"), dt = number(scene, "settings.dt");
+    json_t *r = run_json("run bounce --threads 1 --json -");
+    ck_assert_double_eq(number(r, "steps"), round(duration / dt));
+    json_decref(r);
+    r = run_json("run bounce --dt 0.01 --threads 1 --json -");
+    ck_assert_double_eq(number(r, "steps"), round(duration / 0.01));
+    ck_assert_double_eq(number(r, "dt"), 0.01);
+    json_decref(r);
+    json_decref(scene);
+}
+END_TEST
+
+static void hash_of(const char *arguments, char hash[17])
+{
+    json_t *r = run_json(arguments);
+    snprintf(hash, 17, "%s", string(r, "state_hash"));
+    json_decref(r);
+}
+
+/* The hash is of the state: equal for any number of threads and from run to run, different for different states. */
+START_TEST(same_hash)
+{
+    static const char *const scenes[] = {"pyramid:6", "pile:60"};
+    static const char *const precisions[] = {"f32", "f64"};
+    char text[256], hash[4][17];
+    const char *scene = scenes[_i / 2], *precision = precisions[_i % 2];
+    const char *const variants[] = {"--steps 60 --threads 1", "--steps 60 --threads 2", "--steps 60 --threads 2",
+                                    "--steps 59 --threads 1"};
+    for (int k = 0; k < 4; ++k) {
+        snprintf(text, sizeof text, "run %s --backend cpu --precision %s %s --json -", scene, precision, variants[k]);
+        hash_of(text, hash[k]);
+    }
+    ck_assert_str_eq(hash[0], hash[1]);
+    ck_assert_str_eq(hash[0], hash[2]);
+    ck_assert_str_ne(hash[0], hash[3]);
+    /* measuring changes nothing */
+    snprintf(text, sizeof text, "run %s --backend cpu --precision %s --steps 60 --certify --trace t.csv --json -", scene,
+             precision);
+    hash_of(text, hash[3]);
+    ck_assert_str_eq(hash[0], hash[3]);
+}
+END_TEST
+
+/* Options reach the simulation. */
+START_TEST(options_matter)
+{
+    static const char *const others[] = {"--iterations 40", "--no-warm-start", "--dt 0.004", "--precision f32"};
+    char text[256], hash[17], other[17];
+    hash_of("run pile:20 --backend cpu --precision f64 --steps 100 --iterations 41 --json -", hash);
+    for (size_t k = 0; k < sizeof others / sizeof *others; ++k) {
+        snprintf(text, sizeof text, "run pile:20 --backend cpu --precision f64 --steps 100 --iterations 41 %s --json -",
+                 others[k]);
+        hash_of(text, other);
+        ck_assert_msg(strcmp(hash, other) != 0, "%s changed nothing", others[k]);
+    }
+    hash_of("run pile:20 --backend cpu --steps 100 --no-warm-start --penalty-period 10 --json -", hash);
+    hash_of("run pile:20 --backend cpu --steps 100 --no-warm-start --penalty-period 0 --json -", other);
+    ck_assert_str_ne(hash, other);
+    json_t *r = run_json("run pile:5 --backend ref --steps 1 --json -");
+    ck_assert_str_eq(string(r, "backend"), "ref");
+    json_decref(r);
+}
+END_TEST
+
+START_TEST(traces)
+{
+    MUST("run pyramid:2 --steps 4 --quiet --trace t.csv", 0);
+    json_t *scene = run_json("scenes pyramid:2 --json -"), *bodies = at(scene, "bodies");
+    char *text = read_text("t.csv"), *line = strtok(text, "\n");
+    int rows = 0;
+    ck_assert_str_eq(line, "step,time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz");
+    for (; (line = strtok(NULL, "\n")); ++rows) {
+        double x[13], time;
+        int step, body, end = 0;
+        ck_assert_int_eq(sscanf(line, "%d,%lf,%d,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf%n", &step, &time, &body,
+                                x, x + 1, x + 2, x + 3, x + 4, x + 5, x + 6, x + 7, x + 8, x + 9, x + 10, x + 11, x + 12,
+                                &end), 16);
+        ck_assert_uint_eq(strlen(line), (size_t)end);
+        ck_assert_int_eq(step, rows / 3);
+        ck_assert_double_le(fabs(time - step * number(scene, "settings.dt")), 1e-12);
+        json_t *about = json_array_get(bodies, (size_t)body);
+        ck_assert_str_eq(string(about, "type"), "dynamic");
+        /* the first rows are the scene's definition, digit for digit */
+        for (size_t i = 0; step == 0 && i < 3; ++i)
+            ck_assert_double_eq(x[i], json_number_value(json_array_get(at(about, "position"), i)));
+    }
+    ck_assert_int_eq(rows, 5 * 3);
+    free(text);
+    json_decref(scene);
+}
+END_TEST
+
+/* ---- scenes and backends ------------------------------------------------------------------------------------------ */
+
+static double length(json_t *array)
+{
+    double sum = 0;
+    size_t k;
+    json_t *x;
+    json_array_foreach(array, k, x) sum += json_number_value(x) * json_number_value(x);
+    return sqrt(sum);
+}
+
+static void expect_body(json_t *body, size_t index)
+{
+    ck_assert_double_eq(number(body, "index"), (double)index);
+    bool dynamic = strcmp(string(body, "type"), "dynamic") == 0;
+    ck_assert_uint_eq(json_array_size(at(body, "position")), 3);
+    ck_assert_uint_eq(json_array_size(at(body, "linear_velocity")), 3);
+    ck_assert_uint_eq(json_array_size(at(body, "angular_velocity")), 3);
+    ck_assert_double_eq_tol(length(at(body, "orientation")), 1, 1e-12);
+    if (dynamic) ck_assert_double_gt(number(body, "mass"), 0);
+    else ck_assert(json_is_null(at(body, "mass")));
+    ck_assert_uint_eq(json_array_size(at(body, "inertia")), dynamic ? 3 : 0);
+    json_t *shapes = at(body, "shapes"), *shape;
+    size_t k;
+    json_array_foreach(shapes, k, shape) {
+        const char *type = string(shape, "type");
+        size_t sizes = !strcmp(type, "box") ? 3 : !strcmp(type, "capsule") ? 2 : !strcmp(type, "sphere") ? 1 : 0;
+        ck_assert(sizes > 0 || !strcmp(type, "plane"));
+        ck_assert_uint_eq(json_array_size(at(shape, "size")), sizes);
+        ck_assert_double_ge(number(shape, "friction"), 0);
+        ck_assert_double_ge(number(shape, "restitution"), 0);
+        ck_assert_uint_eq(json_array_size(at(shape, "position")), 3);
+        ck_assert_double_eq_tol(length(at(shape, "orientation")), 1, 1e-12);
+    }
+}
+
+/* Every scene, at a small size, is told completely, and has the bodies that a run of it has. */
+START_TEST(scenes_are_told)
+{
+    json_t *list = run_json("scenes --json"), *info;
+    size_t k, i;
+    ck_assert_uint_gt(json_array_size(list), 4);
+    MUST("scenes", 0);
+    char *table = strdup(out);
+    json_array_foreach(list, k, info) {
+        char text[256], spec[128];
+        const char *name = string(info, "name");
+        ck_assert_ptr_nonnull(strstr(table, name));
+        snprintf(spec, sizeof spec, "%s%s", name, *string(info, "arguments") ? ":2" : "");
+        snprintf(text, sizeof text, "scenes %s --json -", spec);
+        json_t *scene = run_json(text), *bodies = at(scene, "bodies"), *body;
+        double dynamic = 0;
+        json_array_foreach(bodies, i, body) {
+            expect_body(body, i);
+            dynamic += strcmp(string(body, "type"), "dynamic") == 0;
+        }
+        ck_assert_double_gt(number(scene, "duration"), 0);
+        ck_assert_double_gt(number(scene, "settings.iterations"), 0);
+        ck_assert_uint_eq(json_array_size(at(scene, "settings.gravity")), 3);
+        snprintf(text, sizeof text, "run %s --steps 1 --json -", spec);
+        json_t *r = run_json(text);
+        ck_assert_double_eq(number(r, "bodies"), dynamic);
+        json_decref(r);
+        json_decref(scene);
+    }
+    free(table);
+    json_decref(list);
+}
+END_TEST
+
+START_TEST(backends_are_told)
+{
+    static const char *const names[] = {"ref", "cpu", "cuda"};
+    json_t *r = run_json("backends --json"), *backends = at(r, "backends"), *b;
+    size_t k;
+    ck_assert_uint_eq(json_array_size(backends), 3);
+    json_array_foreach(backends, k, b) {
+        ck_assert_str_eq(string(b, "name"), names[k]);
+        ck_assert(json_is_boolean(at(b, "f32")) && json_is_boolean(at(b, "f64")));
+        ck_assert_uint_gt(strlen(string(b, "reason")), 0);
+        /* what is not available says so when it is asked for */
+        if (!json_is_true(at(b, "f64"))) {
+            char text[128];
+            snprintf(text, sizeof text, "run incline --steps 1 --precision f64 --backend %s", names[k]);
+            MUST(text, 1);
+            ck_assert_ptr_nonnull(strstr(err, string(b, "reason")));
+        }
+    }
+    ck_assert(json_is_true(at(json_array_get(backends, 0), "f64")));
+    ck_assert(json_is_true(at(json_array_get(backends, 1), "f32")));
+    ck_assert(json_is_true(at(json_array_get(backends, 1), "f64")));
+    MUST("backends", 0);
+    for (k = 0; k < 3; ++k) ck_assert_ptr_nonnull(strstr(out, names[k]));
+    json_decref(r);
+}
+END_TEST
+
+/* ---- check and solve ---------------------------------------------------------------------------------------------- */
+
+START_TEST(backends_agree)
+{
+    static const char *const scenes[] = {"pyramid:3", "vertical_stacks:1", "bounce"};
+    char text[128];
+    snprintf(text, sizeof text, "check %s --steps 10 --json -", scenes[_i]);
+    json_t *r = run_json(text), *tables = at(r, "tables"), *t;
+    double counted[4] = {0};
+    static const char *const verdicts[] = {"agrees", "DISAGREES", "FAILED", "skipped"};
+    static const char *const counts[] = {"agree", "disagree", "failed", "skipped"};
+    size_t k;
+    ck_assert_uint_eq(json_array_size(tables), 5); /* {ref, cpu, cuda} x {f32, f64} without ref f64 itself */
+    json_array_foreach(tables, k, t) {
+        for (int v = 0; v < 4; ++v) counted[v] += strcmp(string(t, "verdict"), verdicts[v]) == 0;
+        if (strcmp(string(t, "verdict"), "skipped") == 0) ck_assert_uint_gt(strlen(string(t, "note")), 0);
+        else ck_assert_double_le(number(t, "step_velocity.difference"), number(t, "step_velocity.tolerance"));
+    }
+    for (int v = 0; v < 4; ++v) ck_assert_double_eq(number(r, counts[v]), counted[v]);
+    ck_assert_double_ge(counted[0], 2); /* cpu f32 and f64 are always there */
+    ck_assert_uint_eq(json_array_size(at(r, "frozen_steps")), 5);
+    ck_assert_double_eq(json_number_value(json_array_get(at(r, "frozen_steps"), 4)), 10);
+    json_decref(r);
+    snprintf(text, sizeof text, "check %s --steps 1", scenes[_i]);
+    MUST(text, 0);
+    ck_assert_ptr_nonnull(strstr(out, "0 disagree, 0 failed"));
+}
+END_TEST
+
+#ifdef SADMM_HAVE_HDF5
+START_TEST(dumps_and_solves)
+{
+    MUST("run pyramid:3 --steps 8 --quiet --dump-problem 5:p.hdf5", 0);
+    json_t *r = run_json("solve p.hdf5 --backend cpu --threads 1 --solution s.hdf5 --json -");
+    ck_assert(json_is_true(at(r, "converged")));
+    ck_assert_double_eq(number(r, "bodies"), 6);
+    ck_assert_double_gt(number(r, "contacts"), 0);
+    ck_assert_uint_eq(json_array_size(at(r, "u")), (size_t)number(r, "contacts"));
+    ck_assert_uint_eq(json_array_size(json_array_get(at(r, "u"), 0)), 3);
+    ck_assert_double_le(number(r, "certificate.siconos"), 1e-8);
+    ck_assert_double_ge(number(r, "certificate.ncp_max"), 0);
+    ck_assert_double_gt(number(r, "iterations"), 0);
+    ck_assert_double_gt(number(r, "ms"), 0);
+    json_decref(r);
+    /* the copy holds the same problem: the same numbers come out; other settings lead to the same v */
+    r = run_json("solve p.hdf5 --backend ref --tolerance 1e-11 --json -");
+    json_t *copy = run_json("solve s.hdf5 --backend ref --tolerance 1e-11 --json -");
+    ck_assert(json_equal(at(r, "v"), at(copy, "v")));
+    json_decref(copy);
+    json_t *other = run_json("solve p.hdf5 --tolerance 1e-11 --penalty-offset 5 --penalty-period 0 --json -");
+    size_t k;
+    json_t *v;
+    /* unique velocities, both at 1e-11 of siconos' measure, of a step with dt g = 0.05 m/s */
+    json_array_foreach(at(r, "v"), k, v)
+        ck_assert_double_le(fabs(json_number_value(v) - json_number_value(json_array_get(at(other, "v"), k))), 1e-8);
+    json_decref(other);
+    json_decref(r);
+    MUST("solve p.hdf5 --precision f32", 0);
+    ck_assert_ptr_nonnull(strstr(out, "converged"));
+}
+END_TEST
+
+START_TEST(solve_fails_loudly)
+{
+    MUST("run pyramid:3 --steps 2 --quiet --dump-problem 2:p.hdf5", 0);
+    MUST("solve p.hdf5 --max-iterations 3 --tolerance 1e-14 --json r.json", 1);
+    ck_assert_ptr_nonnull(strstr(err, "not converged"));
+    char *text = read_text("r.json");
+    json_t *r = parse(text);
+    ck_assert(json_is_false(at(r, "converged")));
+    ck_assert_double_eq(number(r, "iterations"), 3);
+    ck_assert_double_gt(number(r, "certificate.siconos"), 1e-14);
+    json_decref(r);
+    free(text);
+    MUST("solve out", 1); /* its own last output: not HDF5 */
+    ck_assert_ptr_nonnull(strstr(err, "cannot open as HDF5"));
+    MUST("run pyramid:3 --steps 2 --quiet --dump-problem 2:/no/such/folder/p.hdf5", 1);
+}
+END_TEST
+#else
+START_TEST(says_what_is_missing)
+{
+    MUST("solve p.hdf5", 1);
+    ck_assert_ptr_nonnull(strstr(err, "built without"));
+    MUST("run pyramid:3 --steps 2 --dump-problem 2:p.hdf5", 1);
+    ck_assert_ptr_nonnull(strstr(err, "built without"));
+}
+END_TEST
+#endif
+
+int main(void)
+{
+    Suite *suite = suite_create("cli");
+    TCase *tests = tcase_create("command");
+    tcase_set_timeout(tests, 120);
+    tcase_add_checked_fixture(tests, make_folder, remove_folder);
+    tcase_add_loop_test(tests, exit_codes_and_messages, 0, USAGE_COUNT);
+    tcase_add_test(tests, a_full_disk_is_a_failure);
+    tcase_add_test(tests, run_reports);
+    tcase_add_test(tests, run_reports_null);
+    tcase_add_test(tests, run_prints);
+    tcase_add_test(tests, run_default_steps);
+    tcase_add_loop_test(tests, same_hash, 0, 4);
+    tcase_add_test(tests, options_matter);
+    tcase_add_test(tests, traces);
+    tcase_add_test(tests, scenes_are_told);
+    tcase_add_test(tests, backends_are_told);
+    tcase_add_loop_test(tests, backends_agree, 0, 3);
+#ifdef SADMM_HAVE_HDF5
+    tcase_add_test(tests, dumps_and_solves);
+    tcase_add_test(tests, solve_fails_loudly);
+#else
+    tcase_add_test(tests, says_what_is_missing);
+#endif
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_ENV);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed != 0;
+}
