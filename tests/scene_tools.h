@@ -10,6 +10,7 @@
 
 #include "scenes/scenes.h"
 #include "subadmm/subadmm.h"
+#include "run_suite.h"
 
 #define MUST(world, call)                                                                                   \
     do {                                                                                                    \
@@ -125,16 +126,6 @@ static inline double top_drift(const sadmm_world *world, const sadmm_body_state 
     for (int32_t i = 0; i < sadmm_world_body_count(world); ++i)
         top = fmax(top, distance(body_state(world, body_at(world, i)).position, from[i].position));
     return top;
-}
-
-/* The main of a test program. */
-static inline int run_suite(Suite *suite)
-{
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
 }
 
 #endif

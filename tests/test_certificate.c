@@ -9,6 +9,7 @@
 #include "core/memory.h"
 #include "core/system_math.h"
 #include "subadmm/problem.h"
+#include "run_suite.h"
 
 /* Expected values below are exact in real arithmetic with factors near 1: a few roundings. */
 #define ROUNDING 1e-14
@@ -340,9 +341,5 @@ int main(void)
     tcase_add_test(cases, not_a_number_shows);
     tcase_add_test(cases, workspace_is_kept_and_failures_change_nothing);
     suite_add_tcase(suite, cases);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return run_suite(suite);
 }

@@ -12,6 +12,7 @@
 #include "contact_problems.h"
 #include "core/certificate.h"
 #include "core/system_math.h"
+#include "run_suite.h"
 
 /* Dense matrices are stored by columns; NM_zentry's arguments changed between versions. */
 static void set_entry(NumericsMatrix *matrix, int row, int column, double value)
@@ -117,9 +118,5 @@ int main(void)
     TCase *cases = tcase_create("certificate and siconos");
     tcase_add_loop_test(cases, same_value, 0, 6);
     suite_add_tcase(suite, cases);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return run_suite(suite);
 }

@@ -10,6 +10,7 @@
 #include "core/memory.h"
 #include "core/settings.h"
 #include "subadmm/problem.h"
+#include "run_suite.h"
 
 #define OK(call)                                                                                            \
     do {                                                                                                    \
@@ -451,9 +452,5 @@ int main(void)
     tcase_add_test(cases, allocations_that_fail);
     tcase_add_loop_test(cases, solves_without_memory, 0, 3);
     suite_add_tcase(suite, cases);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return run_suite(suite);
 }

@@ -7,6 +7,7 @@
 #include "contact_problems.h"
 #include "core/kernels.h"
 #include "subadmm/problem.h"
+#include "run_suite.h"
 
 #define OK(call)                                                                                              \
     do {                                                                                                      \
@@ -644,9 +645,5 @@ int main(void)
     tcase_add_test(cases, backends);
     tcase_add_test(cases, what_was_set_can_be_read);
     suite_add_tcase(suite, cases);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return run_suite(suite);
 }

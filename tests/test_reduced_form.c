@@ -17,6 +17,7 @@
 #include "core/backends.h"
 #include "core/memory.h"
 #include "core/system_math.h"
+#include "run_suite.h"
 
 /* ---- tables -------------------------------------------------------------------------------------------------- */
 
@@ -514,9 +515,5 @@ int main(void)
     tcase_add_loop_test(cases, fused_equals_stepwise, 0, table_count * SCENES);
     tcase_add_loop_test(cases, contexts_can_be_used_again, 0, table_count + 1);
     suite_add_tcase(suite, cases);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return run_suite(suite);
 }
