@@ -61,19 +61,21 @@ build() {
     configure "$project/build-$step" "$@" && ninja -C "$project/build-$step" -j "$jobs" --quiet
 }
 
-# run_tests STEP ARGUMENT...
+# run_tests STEP ARGUMENT...: the tests' results go into `logs`
 run_tests() {
     local step=$1 folder=$project/build-$1
     shift
     rm -f "$folder/meson-logs/testlog.json"
-    meson test -C "$folder" --timeout-multiplier 4 --num-processes "$jobs" --print-errorlogs --quiet "$@" || true
+    "${launcher[@]}" meson test -C "$folder" --timeout-multiplier 4 --num-processes "$jobs" --print-errorlogs --quiet "$@" || true
     logs+=("$folder/meson-logs/testlog.json")
 }
 
-# Sanitizers of older compilers cannot place their shadow memory when a kernel randomises addresses with 32 bits.
+# Sanitizers of older compilers cannot place their shadow memory when a kernel randomises addresses with 32 bits: their
+# tests are started without randomisation. (As meson's --wrapper this would rename the log.)
+launcher=()
 unrandomised=()
 if setarch "$(uname -m)" -R true 2>/dev/null; then
-    unrandomised=(--wrapper "setarch $(uname -m) -R")
+    unrandomised=(setarch "$(uname -m)" -R)
 fi
 
 step_plain() {
@@ -85,17 +87,19 @@ step_plain() {
 step_asan() {
     say "asan: address and undefined-behaviour sanitizers"
     build asan --native-file "$project/presets/asan.ini" "${features[@]}" -Dcpu_isas=avx2 || return 1
-    run_tests asan --no-suite slow "${unrandomised[@]}"
+    local launcher=("${unrandomised[@]}")
+    run_tests asan --no-suite slow
 }
 
 step_tsan() {
     say "tsan: thread sanitizer"
     # Only what the tests of this suite need is built.
     configure "$project/build-tsan" --native-file "$project/presets/tsan.ini" "${features[@]}" -Dcpu_isas=avx2 || return 1
-    if ! meson test -C "$project/build-tsan" --quiet "${unrandomised[@]}" omp_clean >/dev/null; then
+    local launcher=("${unrandomised[@]}")
+    if ! "${launcher[@]}" meson test -C "$project/build-tsan" --quiet omp_clean >/dev/null; then
         # The program itself says which it is.
         local output
-        output=$("$project/build-tsan/tests/omp_clean" 2>&1 || true)
+        output=$("${launcher[@]}" "$project/build-tsan/tests/omp_clean" 2>&1 || true)
         if [[ $output == *'unexpected memory mapping'* || $output == *ADDR_NO_RANDOMIZE* ]]; then
             echo "the thread sanitizer cannot start here: the kernel randomises addresses too much for it and forbids to turn" \
                 "that off (run as root: sysctl vm.mmap_rnd_bits=28)"
@@ -103,7 +107,7 @@ step_tsan() {
             return
         fi
     fi
-    run_tests tsan --suite threads "${unrandomised[@]}"
+    run_tests tsan --suite threads
 }
 
 step_minimal() {

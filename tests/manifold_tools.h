@@ -189,6 +189,7 @@ static inline double sweep_separation(const struct solid *a, const struct solid 
 static inline double box_separation(const struct solid *a, const struct solid *b, double axis[3])
 {
     double best = -HUGE_VAL;
+    if (axis) memset(axis, 0, 3 * sizeof *axis);
     for (int n = 0; n < 15; ++n) {
         double d[3], length, s;
         for (int k = 0; k < 3; ++k) d[k] = n < 3 ? a->R[3 * k + n] : b->R[3 * k + n % 3];

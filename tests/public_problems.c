@@ -9,7 +9,8 @@
 static void must(sadmm_status status, const sadmm_problem *problem)
 {
     if (status == SADMM_OK) return;
-    fprintf(stderr, "%s: %s\n", sadmm_status_name(status), problem ? sadmm_problem_message(problem) : sadmm_last_message());
+    fprintf(stderr, "%s: %s\n", sadmm_status_name(status),
+            problem ? sadmm_problem_message(problem) : sadmm_last_message());
     abort();
 }
 

@@ -11,7 +11,7 @@
 
 #include "config.h"
 
-/* ---- running it --------------------------------------------------------------------------------------------------- */
+/* ---- running it -------------------------------------------------------------------------------------------------- */
 
 static const char command[] = SUBADMM_COMMAND; /* the build gives its path */
 static char folder[64];
@@ -110,7 +110,7 @@ static const char *string(json_t *root, const char *path)
     return json_string_value(value);
 }
 
-/* ---- usage -------------------------------------------------------------------------------------------------------- */
+/* ---- usage ------------------------------------------------------------------------------------------------------- */
 
 static const struct {
     const char *arguments;
@@ -167,8 +167,8 @@ START_TEST(exit_codes_and_messages)
 {
     MUST(usages[_i].arguments, usages[_i].code);
     const char *text = usages[_i].code ? err : out;
-    ck_assert_msg(strstr(text, usages[_i].says) != NULL, "subadmm %s: '%s' does not say '%s'", usages[_i].arguments, text,
-                  usages[_i].says);
+    ck_assert_msg(strstr(text, usages[_i].says) != NULL, "subadmm %s: '%s' does not say '%s'", usages[_i].arguments,
+                  text, usages[_i].says);
     if (usages[_i].code == 0) ck_assert_str_eq(err, "");
     if (usages[_i].code == 2) ck_assert_str_eq(out, "");
 }
@@ -186,7 +186,7 @@ START_TEST(a_full_disk_is_a_failure)
 }
 END_TEST
 
-/* ---- run ---------------------------------------------------------------------------------------------------------- */
+/* ---- run --------------------------------------------------------------------------------------------------------- */
 
 static void expect_phase(json_t *root, const char *phase)
 {
@@ -244,8 +244,9 @@ START_TEST(run_reports_null)
     ck_assert(json_is_number(at(r, "residual.primal")));
     json_decref(r);
     r = run_json("run pyramid:2 --steps 0 --certify --json=-");
-    static const char *const unknown[] = {"contacts.mean", "contacts.max", "ms_per_step.total", "residual", "certificate",
-                                          "penetration_max", "backend", "threads", "device"};
+    static const char *const unknown[] = {"contacts.mean", "contacts.max", "ms_per_step.total",
+                                          "residual",      "certificate",  "penetration_max",
+                                          "backend",       "threads",      "device"};
     for (size_t k = 0; k < sizeof unknown / sizeof *unknown; ++k)
         ck_assert_msg(json_is_null(at(r, unknown[k])), "%s is not null", unknown[k]);
     ck_assert_double_eq(number(r, "displacement_max"), 0);
@@ -315,8 +316,8 @@ START_TEST(same_hash)
     ck_assert_str_eq(hash[0], hash[2]);
     ck_assert_str_ne(hash[0], hash[3]);
     /* measuring changes nothing */
-    snprintf(text, sizeof text, "run %s --backend cpu --precision %s --steps 60 --certify --trace t.csv --json -", scene,
-             precision);
+    snprintf(text, sizeof text, "run %s --backend cpu --precision %s --steps 60 --certify --trace t.csv --json -",
+             scene, precision);
     hash_of(text, hash[3]);
     ck_assert_str_eq(hash[0], hash[3]);
 }
@@ -353,9 +354,10 @@ START_TEST(traces)
     for (; (line = strtok(NULL, "\n")); ++rows) {
         double x[13], time;
         int step, body, end = 0;
-        ck_assert_int_eq(sscanf(line, "%d,%lf,%d,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf%n", &step, &time, &body,
-                                x, x + 1, x + 2, x + 3, x + 4, x + 5, x + 6, x + 7, x + 8, x + 9, x + 10, x + 11, x + 12,
-                                &end), 16);
+        ck_assert_int_eq(sscanf(line, "%d,%lf,%d,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf%n", &step, &time,
+                                &body, x, x + 1, x + 2, x + 3, x + 4, x + 5, x + 6, x + 7, x + 8, x + 9, x + 10, x + 11,
+                                x + 12, &end),
+                         16);
         ck_assert_uint_eq(strlen(line), (size_t)end);
         ck_assert_int_eq(step, rows / 3);
         ck_assert_double_le(fabs(time - step * number(scene, "settings.dt")), 1e-12);
@@ -371,7 +373,7 @@ START_TEST(traces)
 }
 END_TEST
 
-/* ---- scenes and backends ------------------------------------------------------------------------------------------ */
+/* ---- scenes and backends ----------------------------------------------------------------------------------------- */
 
 static double length(json_t *array)
 {
@@ -468,7 +470,7 @@ START_TEST(backends_are_told)
 }
 END_TEST
 
-/* ---- check and solve ---------------------------------------------------------------------------------------------- */
+/* ---- check and solve --------------------------------------------------------------------------------------------- */
 
 START_TEST(backends_agree)
 {

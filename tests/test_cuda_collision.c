@@ -1,9 +1,9 @@
 /* Contact finding on the CUDA device against the host pipeline: the same set, in the same order, number for number.
  *
- * Every formula is the host's, in double and without contraction, so there are no tolerances: a difference of one bit in a
- * gap or an arm is a failure. Inputs are scenes that the CPU backend steps and random soups. The same checks run on the
- * emulated device (test_cuda_collision_emulated.c, cuda_emulation/), where every build can run them; here they run on a
- * real one, or the program is skipped and says why.
+ * Every formula is the host's, in double and without contraction, so there are no tolerances: a difference of one bit
+ * in a gap or an arm is a failure. Inputs are scenes that the CPU backend steps and random soups. The same checks run
+ * on the emulated device (test_cuda_collision_emulated.c, cuda_emulation/), where every build can run them; here they
+ * run on a real one, or the program is skipped and says why.
  */
 #include "scene_tools.h"
 
@@ -63,12 +63,13 @@ static void check_same(const struct sadmm_contact_set *host, const struct sadmm_
                   device->point_count, host->pair_count, host->point_count);
     for (size_t i = 0; i < host->pair_count; ++i) {
         const struct sadmm_contact_pair *p = &host->pairs[i], *q = &device->pairs[i];
-        ck_assert_msg(p->shape_a == q->shape_a && p->shape_b == q->shape_b, "%s: pair %zu is %d-%d instead of %d-%d", about,
-                      i, q->shape_a, q->shape_b, p->shape_a, p->shape_b);
-        ck_assert_msg(p->body_a == q->body_a && p->body_b == q->body_b && p->first == q->first && p->count == q->count &&
-                          p->cache == q->cache && p->reserved == q->reserved,
-                      "%s: pair %zu (shapes %d-%d): %d points from %d, cache %u instead of %d from %d, cache %u", about, i,
-                      p->shape_a, p->shape_b, q->count, q->first, q->cache, p->count, p->first, p->cache);
+        ck_assert_msg(p->shape_a == q->shape_a && p->shape_b == q->shape_b,
+                      "%s: pair %zu is %d-%d instead of %d-%d", about, i, q->shape_a, q->shape_b, p->shape_a,
+                      p->shape_b);
+        ck_assert_msg(p->body_a == q->body_a && p->body_b == q->body_b && p->first == q->first &&
+                          p->count == q->count && p->cache == q->cache && p->reserved == q->reserved,
+                      "%s: pair %zu (shapes %d-%d): %d points from %d, cache %u instead of %d from %d, cache %u", about,
+                      i, p->shape_a, p->shape_b, q->count, q->first, q->cache, p->count, p->first, p->cache);
         ck_assert_msg(same_numbers(p->normal, q->normal, 3) && same_numbers(&p->friction, &q->friction, 1) &&
                           same_numbers(&p->restitution, &q->restitution, 1),
                       "%s: pair %zu (shapes %d-%d): normal %.17g %.17g %.17g instead of %.17g %.17g %.17g", about, i,
@@ -82,13 +83,15 @@ static void check_same(const struct sadmm_contact_set *host, const struct sadmm_
         ck_assert_msg(same_numbers(p->arm_a, q->arm_a, 3) && same_numbers(p->arm_b, q->arm_b, 3) &&
                           same_numbers(&p->gap, &q->gap, 1) && same_numbers(&p->error, &q->error, 1),
                       "%s: point %zu: gap %.17g instead of %.17g", about, k, q->gap, p->gap);
-        ck_assert_msg(same_numbers(p->impulse, q->impulse, 3), "%s: point %zu: impulse %.17g %.17g %.17g instead of %.17g %.17g %.17g",
-                      about, k, q->impulse[0], q->impulse[1], q->impulse[2], p->impulse[0], p->impulse[1], p->impulse[2]);
+        ck_assert_msg(same_numbers(p->impulse, q->impulse, 3),
+                      "%s: point %zu: impulse %.17g %.17g %.17g instead of %.17g %.17g %.17g", about, k, q->impulse[0],
+                      q->impulse[1], q->impulse[2], p->impulse[0], p->impulse[1], p->impulse[2]);
     }
 }
 
 /* The next set of both, from what each of them has. */
-static struct sadmm_cuda_contacts both_find(struct both *b, const struct sadmm_collision_input *input, const char *about)
+static struct sadmm_cuda_contacts both_find(struct both *b, const struct sadmm_collision_input *input,
+                                            const char *about)
 {
     struct sadmm_cuda_contacts out = {0};
     OK(sadmm_collision_find(b->host, input, &b->host_set, error));
@@ -269,8 +272,10 @@ static struct soup soup_new(const struct soup_kind *kind, uint64_t number)
     s.input.disabled_body_pairs = s.disabled;
     s.input.friction_pairs = s.friction;
     s.input.friction_values = s.values;
-    if (chance(kind->disabled_share)) s.input.disabled_body_pair_count = random_pairs(s.disabled, overrides - 1, bodies);
-    if (chance(kind->friction_share)) s.input.friction_pair_count = random_pairs(s.friction, overrides - 1, shapes);
+    if (chance(kind->disabled_share))
+        s.input.disabled_body_pair_count = random_pairs(s.disabled, overrides - 1, bodies);
+    if (chance(kind->friction_share))
+        s.input.friction_pair_count = random_pairs(s.friction, overrides - 1, shapes);
     for (size_t i = 0; i < overrides; ++i) s.values[i] = uniform();
     return s;
 }
@@ -305,14 +310,15 @@ static void soup_advance(struct soup *s, const struct soup_kind *kind)
         for (int k = 0; k < 4; ++k) b->orientation[k] /= sqrt(size);
     }
     for (size_t i = 0; i < s->input.shape_count && kind->dead_share > 0; ++i)
-        if (s->shapes[i].type != SADMM_SHAPE_PLANE && chance(0.05)) random_shape(s, kind, &s->shapes[i], s->shapes[i].body);
+        if (s->shapes[i].type != SADMM_SHAPE_PLANE && chance(0.05))
+            random_shape(s, kind, &s->shapes[i], s->shapes[i].body);
 }
 
 static const struct soup_kind soups[] = {
     {.name = "loose, all pairs", .bodies = 120, .shapes_a_body = 1, .planes = 1, .density = 1, .size_low = 0.5,
      .size_high = 1, .static_share = 0.1, .steps = 4, .tree_from = 1000000},
-    {.name = "loose, tree", .bodies = 120, .shapes_a_body = 1, .planes = 1, .density = 1, .size_low = 0.5, .size_high = 1,
-     .static_share = 0.1, .steps = 4, .tree_from = 1},
+    {.name = "loose, tree", .bodies = 120, .shapes_a_body = 1, .planes = 1, .density = 1, .size_low = 0.5,
+     .size_high = 1, .static_share = 0.1, .steps = 4, .tree_from = 1},
     {.name = "sizes 1e-3 to 1e3, tree", .bodies = 700, .shapes_a_body = 1, .planes = 2, .density = 4, .size_low = 1e-3,
      .size_high = 1e3, .static_share = 0.2, .steps = 2},
     {.name = "sizes 1e-3 to 1e3, all pairs", .bodies = 200, .shapes_a_body = 1, .planes = 2, .density = 4,
@@ -500,7 +506,8 @@ START_TEST(few_shapes)
         {.position = {0, 0, 1.4}, .orientation = {1, 0, 0, 0}, .system_body = 1},
     };
     struct sadmm_shape shapes[3] = {sphere(0, 0), sphere(1, 0.5), sphere(2, 0.5)};
-    struct sadmm_collision_input input = {.shapes = shapes, .bodies = bodies, .body_count = 3, .dt = 0.01, .margin = 0.02};
+    struct sadmm_collision_input input = {.shapes = shapes, .bodies = bodies, .body_count = 3, .dt = 0.01,
+                                          .margin = 0.02};
     shapes[0].type = SADMM_SHAPE_PLANE;
     for (int round = 0; round < 2; ++round)
         for (size_t count = 0; count <= 3; ++count) {
@@ -703,6 +710,24 @@ START_TEST(calls_that_fail)
 }
 END_TEST
 
+/* The tree leaves out nearly everything: some dozen nodes a shape. A walk along the leaves would see half of all
+ * shapes; the result would be the same. */
+START_TEST(tree_prunes)
+{
+    const struct soup_kind kind = {.name = "sparse", .bodies = 1500, .shapes_a_body = 1, .density = 0.5,
+                                   .size_low = 0.5, .size_high = 1};
+    struct soup s = soup_new(&kind, 11);
+    struct both b = both_new(1);
+    if (_i) s.bodies[7].position[1] = 1e8; /* must not spoil the grid */
+    const int64_t before = COLLISION(stats)(b.device).visits;
+    both_find(&b, &s.input, kind.name);
+    const double visits = (double)(COLLISION(stats)(b.device).visits - before) / kind.bodies;
+    ck_assert_msg(visits > 3 && visits < 60, "%g nodes a shape", visits);
+    both_free(&b);
+    soup_free(&s);
+}
+END_TEST
+
 /* Threads in the opposite order: candidates are found, and nodes of the tree reached, in another one. */
 START_TEST(threads_in_reverse)
 {
@@ -752,6 +777,7 @@ int main(void)
     tcase_add_test(tests, host_memory_that_lacks);
 #ifdef SADMM_CUDA_EMULATED
     tcase_add_loop_test(tests, calls_that_fail, 0, 2);
+    tcase_add_loop_test(tests, tree_prunes, 0, 2);
     tcase_add_loop_test(tests, threads_in_reverse, 0, SOUPS);
 #endif
     suite_add_tcase(suite, tests);

@@ -19,7 +19,7 @@
 #include "public_problems.h"
 #include "scenes/scenes.h"
 
-/* ---- files of the test ------------------------------------------------------------------------------------------ */
+/* ---- files of the test ------------------------------------------------------------------------------------------- */
 
 static char folder[64];
 
@@ -43,7 +43,8 @@ static void remove_folder(void)
     char command[128];
     snprintf(command, sizeof command, "rm -rf %s", folder);
     ck_assert_int_eq(system(command), 0);
-    ck_assert_int_eq(H5Fget_obj_count((hid_t)H5F_OBJ_ALL, H5F_OBJ_ALL), 0); /* whatever happened, nothing is left open */
+    ck_assert_int_eq(H5Fget_obj_count((hid_t)H5F_OBJ_ALL, H5F_OBJ_ALL),
+                     0); /* whatever happened, nothing is left open */
 }
 
 static char *read_file(const char *path, long *size)
@@ -68,7 +69,7 @@ static void write_file(const char *path, const char *data, long size)
     fclose(file);
 }
 
-/* ---- plain HDF5 ------------------------------------------------------------------------------------------------- */
+/* ---- plain HDF5 -------------------------------------------------------------------------------------------------- */
 
 static void put(hid_t file, const char *name, hid_t type, hid_t memory, hsize_t count, const void *data)
 {
@@ -124,7 +125,7 @@ static double *get_reals(hid_t file, const char *name, int expected)
     return data;
 }
 
-/* ---- dense matrices and their sparse forms ------------------------------------------------------------------------ */
+/* ---- dense matrices and their sparse forms ----------------------------------------------------------------------- */
 
 enum format { TRIPLET = 0, COLUMNS = -1, ROWS = -2 };
 
@@ -190,7 +191,7 @@ static double *get_matrix(hid_t file, const char *group, int m, int n)
     return dense;
 }
 
-/* ---- the sample: 3 bodies, 2 contacts, 10 bilateral rows ------------------------------------------------------------ */
+/* ---- the sample: 3 bodies, 2 contacts, 10 bilateral rows --------------------------------------------------------- */
 
 enum { DOFS = 18, CONTACTS = 2, HARD = 10 };
 
@@ -308,7 +309,7 @@ START_TEST(reads_all_formats)
 }
 END_TEST
 
-/* ---- writing ---------------------------------------------------------------------------------------------------- */
+/* ---- writing ----------------------------------------------------------------------------------------------------- */
 
 static void save(const sadmm_problem *problem, const char *path)
 {
@@ -335,7 +336,13 @@ static void expect_contact(const double *H, int n, int column, const sadmm_probl
     }
 }
 
-enum { RANDOM_BODIES = 6, RANDOM_CONTACTS = 9, RANDOM_BLOCKS = 4, RANDOM_JOINTS = 6, RANDOM_HARD = 1 + 2 + 3 + 4 + 5 + 6 };
+enum {
+    RANDOM_BODIES = 6,
+    RANDOM_CONTACTS = 9,
+    RANDOM_BLOCKS = 4,
+    RANDOM_JOINTS = 6,
+    RANDOM_HARD = 1 + 2 + 3 + 4 + 5 + 6
+};
 
 static sadmm_problem *random_problem(void)
 {
@@ -473,7 +480,7 @@ START_TEST(refuses_to_write)
 }
 END_TEST
 
-/* ---- solutions -------------------------------------------------------------------------------------------------- */
+/* ---- solutions --------------------------------------------------------------------------------------------------- */
 
 static void solve(sadmm_problem *problem, double tolerance)
 {
@@ -562,7 +569,8 @@ START_TEST(writes_solutions)
     /* another problem's file */
     sadmm_problem *other = public_problem_random(1, 2, 1, 0, 0, 0.4);
     ck_assert_int_eq(sadmm_fclib_save_solution(other, path_of("p.hdf5"), path_of("bad.hdf5"), &error), SADMM_ERROR_IO);
-    ck_assert_int_eq(sadmm_fclib_save_solution(problem, path_of("none.hdf5"), path_of("bad.hdf5"), &error), SADMM_ERROR_IO);
+    ck_assert_int_eq(sadmm_fclib_save_solution(problem, path_of("none.hdf5"), path_of("bad.hdf5"), &error),
+                     SADMM_ERROR_IO);
     ck_assert_int_eq(files_in_folder(), 3); /* and nothing half done is left */
     sadmm_problem_destroy(original);
     sadmm_problem_destroy(problem);
@@ -602,7 +610,7 @@ START_TEST(world_to_file)
 }
 END_TEST
 
-/* ---- files that are refused --------------------------------------------------------------------------------------- */
+/* ---- files that are refused -------------------------------------------------------------------------------------- */
 
 static void drop(hid_t file, const char *name) { ck_assert_int_ge(H5Ldelete(file, name, H5P_DEFAULT), 0); }
 
@@ -645,7 +653,11 @@ static void no_b(hid_t f) { drop(f, "/fclib_global/vectors/b"); }
 static void group_for_data(hid_t f) { drop(f, "/fclib_global/vectors/f"), put_int(f, "/fclib_global/vectors/f/x", 1); }
 static void short_mu(hid_t f) { double x = 1; drop(f, MU), put_reals(f, MU, 1, &x); }
 static void mu_of_ints(hid_t f) { int x[2] = {1, 1}; drop(f, MU), put_ints(f, MU, 2, x); }
-static void p_of_reals(hid_t f) { double x[7] = {0}; drop(f, "/fclib_global/H/p"), put_reals(f, "/fclib_global/H/p", 7, x); }
+static void p_of_reals(hid_t f)
+{
+    double x[7] = {0};
+    drop(f, "/fclib_global/H/p"), put_reals(f, "/fclib_global/H/p", 7, x);
+}
 static void nan_mu(hid_t f) { poke_real(f, MU, 1, NAN); }
 static void infinite_x(hid_t f) { poke_real(f, "/fclib_global/H/x", 3, -INFINITY); }
 static void negative_mu(hid_t f) { poke_real(f, MU, 1, -0.5); }
@@ -653,7 +665,10 @@ static void bad_nz(hid_t f) { replace_int(f, "/fclib_global/H/nz", -3); }
 static void huge_nz(hid_t f) { replace_int(f, "/fclib_global/M/nz", INT_MAX); }
 static void negative_size(hid_t f) { replace_int(f, "/fclib_global/H/m", -6); }
 static void huge_size(hid_t f) { replace_int(f, "/fclib_global/H/n", INT_MAX); }
-static void big_square(hid_t f) { replace_int(f, "/fclib_global/M/m", 2147483640), replace_int(f, "/fclib_global/M/n", 2147483640); }
+static void big_square(hid_t f)
+{
+    replace_int(f, "/fclib_global/M/m", 2147483640), replace_int(f, "/fclib_global/M/n", 2147483640);
+}
 static void rows_differ(hid_t f) { replace_int(f, "/fclib_global/H/m", 24); }
 static void not_square(hid_t f) { replace_int(f, "/fclib_global/M/n", 24); }
 static void index_past_end(hid_t f) { poke_int(f, "/fclib_global/H/i", 5, DOFS); }
@@ -661,8 +676,12 @@ static void index_negative(hid_t f) { poke_int(f, "/fclib_global/H/i", 5, -1); }
 static void pointers_start(hid_t f) { poke_int(f, "/fclib_global/H/p", 0, 1); }
 static void pointers_decrease(hid_t f) { poke_int(f, "/fclib_global/H/p", 2, 1); }
 static void pointers_past_end(hid_t f) { poke_int(f, "/fclib_global/H/p", 6, 1 << 20); }
-static void couples_bodies(hid_t f) { poke_int(f, "/fclib_global/M/i", 0, 0); } /* the first triplet is in the last column */
-static void three_bodies(hid_t f) { poke_int(f, "/fclib_global/H/i", 12 * 3 + 6 - 3, 17), poke_int(f, "/fclib_global/H/i", 0, 17); poke_int(f, "/fclib_global/H/i", 1, 0); }
+static void couples_bodies(hid_t f) { poke_int(f, "/fclib_global/M/i", 0, 0); } /* this triplet is in the last column */
+static void three_bodies(hid_t f) /* contact 0 acts on body 1; let it act on 2 and 0 too */
+{
+    poke_int(f, "/fclib_global/H/i", 0, 17);
+    poke_int(f, "/fclib_global/H/i", 1, 0);
+}
 static void no_bodies(hid_t f) { for (int k = 0; k < 18; ++k) poke_real(f, "/fclib_global/H/x", k, 0); }
 static void not_definite(hid_t f) { poke_real(f, "/fclib_global/M/x", 0, -1e6); }
 
@@ -707,12 +726,14 @@ static void terabytes_unwritten(hid_t f) { put_empty(f, "/fclib_global/H/x", (hs
 static void external_link(hid_t f)
 {
     drop(f, "/fclib_global/vectors/f");
-    H5Lcreate_external(path_of("sample2.hdf5"), "/fclib_global/vectors/f", f, "/fclib_global/vectors/f", H5P_DEFAULT, H5P_DEFAULT);
+    H5Lcreate_external(path_of("sample2.hdf5"), "/fclib_global/vectors/f", f, "/fclib_global/vectors/f", H5P_DEFAULT,
+                       H5P_DEFAULT);
 }
 static void external_group(hid_t f)
 {
     drop(f, "/fclib_global/vectors");
-    H5Lcreate_external(path_of("sample2.hdf5"), "/fclib_global/vectors", f, "/fclib_global/vectors", H5P_DEFAULT, H5P_DEFAULT);
+    H5Lcreate_external(path_of("sample2.hdf5"), "/fclib_global/vectors", f, "/fclib_global/vectors", H5P_DEFAULT,
+                       H5P_DEFAULT);
 }
 static void external_data(hid_t f)
 {

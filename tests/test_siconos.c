@@ -17,7 +17,7 @@
 #include "fclib/global_problem.h"
 #include "public_problems.h"
 
-/* ---- the same problem for siconos ------------------------------------------------------------------------------- */
+/* ---- the same problem for siconos -------------------------------------------------------------------------------- */
 
 static NumericsMatrix *make_matrix(const struct sadmm_triplets *m)
 {
@@ -127,7 +127,7 @@ static sadmm_problem *make(int k)
                                  problems[k].friction);
 }
 
-/* ---- tests ------------------------------------------------------------------------------------------------------ */
+/* ---- tests ------------------------------------------------------------------------------------------------------- */
 
 /* The measure at points far from and near the solution. Both compute the same double formula from the same data, in
  * another order of sums over at most some hundred terms: 1e-11 relative plus rounding at the solution's scale of 1. */
@@ -149,9 +149,9 @@ START_TEST(same_measure)
 }
 END_TEST
 
-/* Ours is siconos' solution where it is unique: v (and with it u). Its solver here is a nonsmooth Newton method, another
- * kind than ours. Both stop at a measure of 1e-12; v follows within that times the conditioning of these small problems:
- * 1e-9 of the largest velocity. Impulses are not unique (four contacts under a box) and are not compared. */
+/* Ours is siconos' solution where it is unique: v (and with it u). Its solver here is a nonsmooth Newton method,
+ * another kind than ours. Both stop at a measure of 1e-12; v follows within that times the conditioning of these small
+ * problems: 1e-9 of the largest velocity. Impulses are not unique (four contacts under a box) and are not compared. */
 START_TEST(same_solution)
 {
     sadmm_problem *problem = make(_i);
@@ -166,7 +166,8 @@ START_TEST(same_solution)
     for (int stretch = 0; stretch < 200 && (stretch == 0 || certify(problem).siconos > 1e-12); ++stretch)
         solve(problem, SADMM_BACKEND_CPU, 100, stretch > 0);
     struct sadmm_global_solution x = solution_of(problem);
-    ck_assert_msg(certify(problem).siconos <= 1e-12, "%s: ours ends at %g", problems[_i].name, certify(problem).siconos);
+    ck_assert_msg(certify(problem).siconos <= 1e-12, "%s: ours ends at %g", problems[_i].name,
+                  certify(problem).siconos);
     ck_assert_double_le(siconos_error(s, &x), 1.0001e-12);
 
     double scale = 1e-12, difference = 0, sliding = 0;

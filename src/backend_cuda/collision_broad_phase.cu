@@ -1,11 +1,11 @@
 /* Candidates: from shapes and bodies to the pairs whose boxes overlap.
  *
  * The hierarchy is Karras' (Maximizing Parallelism in the Construction of BVHs, Octrees, and k-d Trees, HPG 2012) over
- * sorted keys, ties broken by position. An inner node i covers a range of leaves that begins or ends at i; the right child
- * of a node split after leaf r is numbered r + 1. The node after a subtree whose last leaf is r is therefore either inner
- * node r + 1 or leaf r + 1, which the keys around r tell: no stack and no stored ropes' construction (the observation is
+ * sorted keys, ties broken by position. An inner node i covers a range of leaves that begins or ends at i; the right
+ * child of a node split after leaf r is numbered r + 1. The node after a subtree whose last leaf is r is therefore
+ * either inner node r + 1 or leaf r + 1, and the keys around r tell which: walks need no stack (the observation is
  * Prokopenko and Lebrun-Grandie's, Revising Apetrei's Bounding Volume Hierarchy Construction Algorithm to Allow Stackless
- * Traversal, 2022).
+ * Traversal).
  */
 #include "collision_internal.h"
 #include "collision_parallel.h"
@@ -126,8 +126,8 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) build_kernel(const _
     v.arrivals[i] = 0;
 }
 
-/* Boxes from the leaves up: of two children the one that arrives last goes on. Smallest and largest do not depend on the
- * order. A node's right child is the node after its left one. */
+/* Boxes from the leaves up: of two children the one that arrives last goes on. Smallest and largest do not depend on
+ * the order. A node's right child is the node after its left one. */
 static __global__ void __launch_bounds__(COLLISION_THREADS) refit_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t thread = collision_thread(COLLISION_THREADS);
@@ -165,7 +165,7 @@ static __device__ void flush(const collision_view &v, struct batch *out)
     if (out->count == 0) return;
     const unsigned long long first = reserve(v.candidate_count, (unsigned)out->count);
     for (int i = 0; i < out->count; ++i)
-        if (first + (unsigned)i < (unsigned long long)v.candidate_room) v.candidates[first + (unsigned)i] = out->keys[i];
+        if (first + (unsigned)i < (unsigned)v.candidate_room) v.candidates[first + (unsigned)i] = out->keys[i];
     out->count = 0;
 }
 
@@ -175,7 +175,7 @@ static __device__ void add(const collision_view &v, struct batch *out, uint32_t 
     out->keys[out->count++] = (uint64_t)a << v.slot_bits | b;
 }
 
-static __device__ bool may_meet(const collision_view &v, const struct collision_filter &a, const struct collision_filter &b)
+static __device__ bool may_meet(const collision_view &v, const collision_filter &a, const collision_filter &b)
 {
     if (a.body == b.body || !(a.category & b.mask) || !(b.category & a.mask)) return false;
     if (!((a.kind | b.kind) & FILTER_MOVES)) return false;
@@ -233,6 +233,7 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) walk_kernel(const __
     for (int32_t at = leaf.next; at >= 0;) {
         const struct collision_node node = v.nodes[at];
         const bool meet = nodes_meet(leaf, node);
+        count_visit();
         if (meet && at < first_leaf) {
             at = node.child;
             continue;

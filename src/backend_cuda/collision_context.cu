@@ -1,8 +1,8 @@
 /* The pipeline on the host's side: buffers that only grow, input, the stages of a find, contact sets to and fro.
  *
  * What rarely changes (shapes, overrides, which shapes there are) is kept in pinned memory as it was last uploaded, and
- * uploaded again only when it differs. Pinned memory is written only while nothing reads it: every entry that leaves work
- * on the stream behind sets `pending`, and the next one waits first.
+ * uploaded again only when it differs. Pinned memory is written only while nothing reads it: every entry that leaves
+ * work on the stream behind sets `pending`, and the next one waits first.
  */
 #include <math.h>
 #include <stdio.h>
@@ -36,8 +36,9 @@ enum { SET_BUFFERS = COUNTS_2 - COUNTS, INPUTS = PINNED_SHAPES - SHAPES };
 static const char *const buffer_names[BUFFERS] = {
     "placed shapes", "filters", "boxes", "tree keys", "sorted tree keys", "leaves", "sorted leaves", "tree", "parents",
     "arrivals", "counter", "candidates", "sorted candidates", "manifolds", "matches", "sizes", "places", "sort",
-    "contact pairs", "contact points", "contact keys", "contact counts", "contact pairs", "contact points", "contact keys",
-    "contact counts", "shapes", "bodies", "list of shapes", "planes", "disabled pairs", "friction pairs", "friction values",
+    "contact pairs", "contact points", "contact keys", "contact counts",
+    "contact pairs", "contact points", "contact keys", "contact counts",
+    "shapes", "bodies", "list of shapes", "planes", "disabled pairs", "friction pairs", "friction values",
     "staged shapes", "staged bodies", "staged list of shapes", "staged planes", "staged disabled pairs",
     "staged friction pairs", "staged friction values", "staged contact pairs", "staged contact points",
     "staged contact keys", "staged contact counts",
@@ -120,7 +121,8 @@ struct sadmm_cuda_collision {
 
 /* ---- errors, memory, launches ---------------------------------------------------------------------------------- */
 
-static sadmm_status fail(const struct sadmm_cuda_collision *c, cudaError_t code, const char *what, struct sadmm_error *error)
+static sadmm_status fail(const struct sadmm_cuda_collision *c, cudaError_t code, const char *what,
+                         struct sadmm_error *error)
 {
     (void)cudaGetLastError(); /* an error that does not last must not be found by the next call */
     return sadmm_fail(error, code == cudaErrorMemoryAllocation ? SADMM_ERROR_OUT_OF_MEMORY : SADMM_ERROR_DEVICE,
@@ -194,8 +196,9 @@ static sadmm_status launch(struct sadmm_cuda_collision *c, collision_kernel kern
     const emulated_call call = {kernel, c->view};
     cudaError_t code = cuda_emulation_launch(run_emulated, blocks, (unsigned)block, 0, false, call, 0);
 #else
+    const dim3 grid(blocks), threads_a_block((unsigned)block);
     void *parameters[] = {&c->view};
-    cudaError_t code = cudaLaunchKernel((const void *)kernel, dim3(blocks), dim3((unsigned)block), parameters, 0, c->stream);
+    cudaError_t code = cudaLaunchKernel((const void *)kernel, grid, threads_a_block, parameters, 0, c->stream);
 #endif
     CUDA_CALL(c, code, name);
     return SADMM_OK;
@@ -204,8 +207,9 @@ static sadmm_status launch(struct sadmm_cuda_collision *c, collision_kernel kern
 static sadmm_status copy(struct sadmm_cuda_collision *c, void *to, const void *from, size_t bytes, bool to_device,
                          struct sadmm_error *error)
 {
+    const auto kind = to_device ? cudaMemcpyHostToDevice : cudaMemcpyDeviceToHost;
     if (bytes > 0)
-        CUDA_CALL(c, cudaMemcpyAsync(to, from, bytes, to_device ? cudaMemcpyHostToDevice : cudaMemcpyDeviceToHost, c->stream),
+        CUDA_CALL(c, cudaMemcpyAsync(to, from, bytes, kind, c->stream),
                   to_device ? "cudaMemcpyAsync to the device" : "cudaMemcpyAsync from the device");
     return SADMM_OK;
 }
@@ -219,7 +223,8 @@ static sadmm_status upload_input(struct sadmm_cuda_collision *c, int name, const
     const int staged = name + INPUTS;
     const size_t bytes = count * size;
     size_t *uploaded = &c->input_bytes[name - SHAPES];
-    if (!changed && *uploaded == bytes && (bytes == 0 || memcmp(in<void>(c, staged), data, bytes) == 0)) return SADMM_OK;
+    if (!changed && *uploaded == bytes && (bytes == 0 || memcmp(in<void>(c, staged), data, bytes) == 0))
+        return SADMM_OK;
     *uploaded = SIZE_MAX;
     TRY(room(c, name, count, size, error));
     TRY(room(c, staged, count, size, error));
@@ -235,8 +240,8 @@ static bool shapes_changed(const struct sadmm_cuda_collision *c, const struct sa
     const struct sadmm_shape *before = in<struct sadmm_shape>(c, PINNED_SHAPES);
     if (c->input_bytes[0] != input->shape_count * sizeof *before) return true;
     for (size_t slot = 0; slot < input->shape_count; ++slot) {
-        const struct sadmm_shape *now = &input->shapes[slot];
-        if (now->alive != before[slot].alive || now->revision != before[slot].revision || now->body != before[slot].body)
+        const struct sadmm_shape *now = &input->shapes[slot], *old = &before[slot];
+        if (now->alive != old->alive || now->revision != old->revision || now->body != old->body)
             return true;
     }
     return false;
@@ -294,8 +299,8 @@ static sadmm_status list_planes(struct sadmm_cuda_collision *c, const struct sad
     return upload_input(c, PLANES, c->planes, count, sizeof *c->planes, false, error);
 }
 
-/* Where the Morton grid lies and how many bits the groups need. Only speed depends on the grid, but a body far away must
- * not spoil it: it covers three times what holds nine in ten of a sample. */
+/* Where the Morton grid lies and how many bits the groups need. Only speed depends on the grid, but a body far away
+ * must not spoil it: it covers three times what holds nine in ten of a sample. */
 static void lay_out(struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input)
 {
     struct collision_layout *layout = &c->view.layout;
@@ -335,15 +340,16 @@ static sadmm_status take_input(struct sadmm_cuda_collision *c, const struct sadm
     if (shapes_changed(c, input)) {
         c->input_bytes[0] = SIZE_MAX;
         TRY(list_shapes(c, input, error));
-        TRY(upload_input(c, PRESENT, c->present, (size_t)(v->leaf_count + v->plane_count), sizeof *c->present, true, error));
+        TRY(upload_input(c, PRESENT, c->present, (size_t)(v->leaf_count + v->plane_count), sizeof *c->present, true,
+                         error));
         TRY(upload_input(c, SHAPES, input->shapes, input->shape_count, sizeof *input->shapes, true, error));
     }
     TRY(upload_input(c, BODIES, input->bodies, input->body_count, sizeof *input->bodies, true, error));
     TRY(list_planes(c, input, error));
     TRY(upload_input(c, DISABLED_PAIRS, input->disabled_body_pairs, input->disabled_body_pair_count,
                      sizeof *input->disabled_body_pairs, false, error));
-    TRY(upload_input(c, FRICTION_PAIRS, input->friction_pairs, input->friction_pair_count, sizeof *input->friction_pairs,
-                     false, error));
+    TRY(upload_input(c, FRICTION_PAIRS, input->friction_pairs, input->friction_pair_count,
+                     sizeof *input->friction_pairs, false, error));
     TRY(upload_input(c, FRICTION_VALUES, input->friction_values, input->friction_pair_count,
                      sizeof *input->friction_values, false, error));
     lay_out(c, input);
@@ -440,7 +446,8 @@ static sadmm_status make_candidate_room(struct sadmm_cuda_collision *c, struct s
 }
 
 /* Memory that sorts and scans of these sizes need. */
-static sadmm_status make_temp_room(struct sadmm_cuda_collision *c, int leaves, int candidates, struct sadmm_error *error)
+static sadmm_status make_temp_room(struct sadmm_cuda_collision *c, int leaves, int candidates,
+                                   struct sadmm_error *error)
 {
     uint64_t *none[2] = {nullptr, nullptr};
     uint32_t *no_values[2] = {nullptr, nullptr};
@@ -449,7 +456,8 @@ static sadmm_status make_temp_room(struct sadmm_cuda_collision *c, int leaves, i
     if (leaves <= c->temp_leaves && candidates <= c->temp_candidates) return SADMM_OK;
     leaves = std::max(leaves, c->temp_leaves);
     candidates = std::max(candidates, c->temp_candidates);
-    CUDA_CALL(c, COLLISION(sort)(nullptr, &bytes, none, no_values, leaves, 64, &unused, c->stream), "sizing of the leaf sort");
+    CUDA_CALL(c, COLLISION(sort)(nullptr, &bytes, none, no_values, leaves, 64, &unused, c->stream),
+              "sizing of the leaf sort");
     most = std::max(most, bytes);
     CUDA_CALL(c, COLLISION(sort)(nullptr, &bytes, none, nullptr, candidates, 64, &unused, c->stream),
               "sizing of the candidate sort");
@@ -492,8 +500,8 @@ static sadmm_status find_candidates(struct sadmm_cuda_collision *c, bool tree, s
         TRY(launch(c, c->kernels.tiles, "candidates of all pairs", tiles * v->leaf_count, COLLISION_THREADS, error));
     }
     c->kernel = "candidate sort";
-    CUDA_CALL(c, COLLISION(sort)(in<void>(c, TEMP), &bytes, keys, nullptr, v->candidate_room, 2 * v->slot_bits, &at, c->stream),
-              c->kernel);
+    CUDA_CALL(c, COLLISION(sort)(in<void>(c, TEMP), &bytes, keys, nullptr, v->candidate_room, 2 * v->slot_bits, &at,
+                                 c->stream), c->kernel);
     v->candidates = keys[at];
     return SADMM_OK;
 }
@@ -504,7 +512,8 @@ static sadmm_status make_contacts(struct sadmm_cuda_collision *c, struct sadmm_e
     size_t bytes = c->buffers[TEMP].capacity;
     TRY(launch(c, c->kernels.narrow, "narrow phase", (int64_t)v->candidate_room + 1, NARROW_THREADS, error));
     c->kernel = "scan of the contacts";
-    CUDA_CALL(c, COLLISION(sum)(in<void>(c, TEMP), &bytes, v->sizes, v->places, v->candidate_room + 1, c->stream), c->kernel);
+    CUDA_CALL(c, COLLISION(sum)(in<void>(c, TEMP), &bytes, v->sizes, v->places, v->candidate_room + 1, c->stream),
+              c->kernel);
     return launch(c, c->kernels.emit, "contacts", (int64_t)v->candidate_room * POINT_LANES, COLLISION_THREADS, error);
 }
 
@@ -586,8 +595,8 @@ extern "C" void COLLISION(destroy)(struct sadmm_cuda_collision *c)
     sadmm_free(c);
 }
 
-extern "C" sadmm_status COLLISION(upload)(struct sadmm_cuda_collision *c, void *stream, const struct sadmm_contact_set *set,
-                                          struct sadmm_error *error)
+extern "C" sadmm_status COLLISION(upload)(struct sadmm_cuda_collision *c, void *stream,
+                                          const struct sadmm_contact_set *set, struct sadmm_error *error)
 {
     const int which = 1 - c->current;
     c->can_undo = false;
@@ -649,8 +658,8 @@ extern "C" sadmm_status COLLISION(find)(struct sadmm_cuda_collision *c, void *st
     return SADMM_OK;
 }
 
-extern "C" sadmm_status COLLISION(download)(struct sadmm_cuda_collision *c, void *stream, struct sadmm_contact_set *contacts,
-                                            struct sadmm_error *error)
+extern "C" sadmm_status COLLISION(download)(struct sadmm_cuda_collision *c, void *stream,
+                                            struct sadmm_contact_set *contacts, struct sadmm_error *error)
 {
     const struct contact_counts counts = c->counts[c->current];
     const size_t pairs = (size_t)counts.pairs, points = (size_t)counts.points;
@@ -686,6 +695,9 @@ extern "C" struct sadmm_cuda_collision_stats COLLISION(stats)(const struct sadmm
     struct sadmm_cuda_collision_stats stats = c->stats;
     stats.candidate_room = c->candidate_room;
     stats.point_room = c->point_room;
+#ifdef SADMM_CUDA_EMULATED
+    stats.visits = node_visits;
+#endif
     return stats;
 }
 

@@ -1,9 +1,9 @@
 /* Contact finding on a CUDA device: the interface.
  *
- * A pipeline keeps two sets of contacts on the device, in core's own structs: the current one and the one before it. The
- * solver may write impulses into the current one in place; the next find carries them over. All entries may be called with
- * any device current and leave it so. `stream` is a cudaStream_t of the pipeline's device; one after another, the calls on
- * a pipeline are ordered by the caller. There is no global state: pipelines are independent.
+ * A pipeline keeps two sets of contacts on the device, in core's own structs: the current one and the one before it.
+ * The solver may write impulses into the current one in place; the next find carries them over. All entries may be
+ * called with any device current and leave it so. `stream` is a cudaStream_t of the pipeline's device; one after
+ * another, the calls on a pipeline are ordered by the caller. There is no global state: pipelines are independent.
  */
 #ifndef SADMM_CUDA_COLLISION_DEVICE_H
 #define SADMM_CUDA_COLLISION_DEVICE_H
@@ -30,6 +30,7 @@ struct sadmm_cuda_collision_stats {
     int64_t repeats;     /* stages repeated because something did not fit */
     int64_t allocations; /* of device and pinned memory, since creation */
     int64_t candidate_room, point_room;
+    int64_t visits;      /* of nodes of the tree; counted on the emulated device only */
 };
 
 /* For tests and measurements; 0: the default. */

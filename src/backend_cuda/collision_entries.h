@@ -9,12 +9,12 @@ sadmm_status COLLISION(create)(int device, struct sadmm_cuda_collision **out, st
 void COLLISION(destroy)(struct sadmm_cuda_collision *collision);
 
 /* Replace the current set by one of the host's. `set` is free again when this returns. */
-sadmm_status COLLISION(upload)(struct sadmm_cuda_collision *collision, void *stream, const struct sadmm_contact_set *set,
-                               struct sadmm_error *error);
+sadmm_status COLLISION(upload)(struct sadmm_cuda_collision *collision, void *stream,
+                               const struct sadmm_contact_set *set, struct sadmm_error *error);
 
 /* Find all contacts: the same set, in the same order, with the same impulses and caches as sadmm_collision_find. The
- * current set is the previous step's on entry and the new one on success; after a failure it is what it was. Waits for the
- * stream once at the end, or once more for every time that room has to grow. */
+ * current set is the previous step's on entry and the new one on success; after a failure it is what it was. Waits
+ * for the stream once at the end, or once more for every time that room has to grow. */
 sadmm_status COLLISION(find)(struct sadmm_cuda_collision *collision, void *stream,
                              const struct sadmm_collision_input *input, struct sadmm_cuda_contacts *out,
                              struct sadmm_error *error);

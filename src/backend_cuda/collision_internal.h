@@ -8,11 +8,11 @@
  *   scan     where each candidate's contacts go
  *   emit     pairs and points in world terms, the last step's impulses             eight threads a candidate
  *
- * Candidates are appended in any order (an integer counter) and then sorted: keys are unique, so the result does not depend
- * on timing. The counter also counts what does not fit, hence a stage that lacks room says exactly how much it needs: the
- * kernels after it do nothing, the host, which reads the counts once at the end of the stage, makes room and repeats it.
- * Launches and sorts are sized by the room there is (the host does not know the counts); unused candidates are all ones
- * and sort to the end.
+ * Candidates are appended in any order (an integer counter) and then sorted: keys are unique, so the result does not
+ * depend on timing. The counter also counts what does not fit, hence a stage that lacks room says exactly how much it
+ * needs: the kernels after it do nothing, the host, which reads the counts once at the end of the stage, makes room and
+ * repeats it. Launches and sorts are sized by the room there is (the host does not know the counts); unused candidates
+ * are all ones and sort to the end.
  *
  * Double throughout, with the host pipeline's own inline formulas (collision_formulas.h, pair_manifold.h).
  */
@@ -32,9 +32,9 @@ enum {
     PAIR_TILE = 16           /* all pairs: tests a thread */
 };
 
-/* A leaf (a shape that is no plane) or an inner node of the tree. Inner nodes come first: [0, leaves - 1), then leaves in
- * tree order. A walk goes to `child` where boxes and groups meet, else to `next`: the node after the whole subtree, -1 at
- * the end. It needs no stack, and a walk that starts at a leaf's `next` sees later leaves only. */
+/* A leaf (a shape that is no plane) or an inner node of the tree. Inner nodes come first: [0, leaves - 1), then
+ * leaves in tree order. A walk goes to `child` where boxes and groups meet, else to `next`: the node after the whole
+ * subtree, -1 at the end. It needs no stack, and a walk that starts at a leaf's `next` sees later leaves only. */
 struct alignas(16) collision_node {
     struct sadmm_box3 box;
     int32_t child;                 /* inner node: its left child; leaf: the slot */
@@ -50,8 +50,9 @@ struct alignas(16) collision_filter {
 };
 enum { FILTER_TYPE = 0xff, FILTER_MOVES = 0x100 };
 
-/* Key of a leaf: class, group, then as much of the Morton code as fits. Small movers come first, large ones and static
- * shapes last: a walk looks for later leaves only, so that no single thread finds everything that a large shape touches. */
+/* Key of a leaf: class, group, then as much of the Morton code as fits. Small movers come first, large ones and
+ * static shapes last: a walk looks for later leaves only, so that no single thread finds everything that a large
+ * shape touches. */
 enum { LEAF_CLASS_SHIFT = 62, LEAF_LARGE = 1, LEAF_STATIC = 2 };
 
 struct collision_layout {

@@ -1,5 +1,5 @@
-/* Manifolds to contacts: world terms, and the last step's impulses by feature. Eight threads take a candidate, one a point;
- * the first one writes the pair as well. */
+/* Manifolds to contacts: world terms, and the last step's impulses by feature. Eight threads take a candidate, one a
+ * point; the first one writes the pair as well. */
 #include "collision_internal.h"
 
 static __device__ double pair_friction(const collision_view &v, uint32_t a, uint32_t b, double mu_a, double mu_b)

@@ -3,11 +3,12 @@
 
 #ifndef SADMM_CUDA_EMULATED
 
+#define CCCL_DISABLE_NVTX /* no hooks for profilers inside a library */
 #include <cub/device/device_radix_sort.cuh>
 #include <cub/device/device_scan.cuh>
 
-cudaError_t COLLISION(sort)(void *temp, size_t *bytes, uint64_t *const keys[2], uint32_t *const *values, int count, int bits,
-                            int *result, cudaStream_t stream)
+cudaError_t COLLISION(sort)(void *temp, size_t *bytes, uint64_t *const keys[2], uint32_t *const *values, int count,
+                            int bits, int *result, cudaStream_t stream)
 {
     cub::DoubleBuffer<uint64_t> key(keys[0], keys[1]);
     cudaError_t code;
@@ -32,8 +33,8 @@ cudaError_t COLLISION(sum)(void *temp, size_t *bytes, const uint64_t *in, uint64
 
 #include <vector>
 
-cudaError_t COLLISION(sort)(void *temp, size_t *bytes, uint64_t *const keys[2], uint32_t *const *values, int count, int bits,
-                            int *result, cudaStream_t)
+cudaError_t COLLISION(sort)(void *temp, size_t *bytes, uint64_t *const keys[2], uint32_t *const *values, int count,
+                            int bits, int *result, cudaStream_t)
 {
     *bytes = 1;
     *result = 0;

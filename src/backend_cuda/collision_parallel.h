@@ -11,10 +11,11 @@
 
 /* Sort keys[0] by their low `bits` bits, stably, with values[0] (values NULL: keys alone); the result is in
  * keys[*result], values[*result]. temp NULL: only *bytes is set, to what temp must hold. */
-cudaError_t COLLISION(sort)(void *temp, size_t *bytes, uint64_t *const keys[2], uint32_t *const *values, int count, int bits,
-                            int *result, cudaStream_t stream);
+cudaError_t COLLISION(sort)(void *temp, size_t *bytes, uint64_t *const keys[2], uint32_t *const *values, int count,
+                            int bits, int *result, cudaStream_t stream);
 /* out[i] = sum of in[0 .. i-1]. temp as above. */
-cudaError_t COLLISION(sum)(void *temp, size_t *bytes, const uint64_t *in, uint64_t *out, int count, cudaStream_t stream);
+cudaError_t COLLISION(sum)(void *temp, size_t *bytes, const uint64_t *in, uint64_t *out, int count,
+                           cudaStream_t stream);
 
 #ifdef SADMM_CUDA_EMULATED
 
@@ -24,6 +25,8 @@ static inline unsigned long long reserve(unsigned long long *counter, unsigned c
     *counter += count;
     return before;
 }
+inline int64_t node_visits;
+static inline void count_visit(void) { ++node_visits; }
 static inline int arrive(int *arrivals) { return (*arrivals)++; }
 static inline int leading_zeros(uint64_t x) { return x ? __builtin_clzll(x) : 64; }
 #else
@@ -41,6 +44,7 @@ static __device__ __forceinline__ int arrive(int *arrivals)
     __threadfence();
     return before;
 }
+static __device__ __forceinline__ void count_visit(void) {}
 static __device__ __forceinline__ int leading_zeros(uint64_t x) { return __clzll((long long)x); }
 #endif
 

@@ -270,7 +270,8 @@ CUDA_INLINE void update_body(bool live, int32_t r, const solver_real *b, const s
  * */
 CUDA_INLINE void reduce_max(double value, unsigned long long *out)
 {
-    unsigned long long bits = (unsigned long long)__double_as_longlong(value);
+    /* -0 (what real_abs may give) has the largest pattern but one: it counts as 0. */
+    unsigned long long bits = value == 0 ? 0 : (unsigned long long)__double_as_longlong(value);
     for (int o = WARP / 2; o > 0; o /= 2) {
         unsigned long long other = __shfl_xor_sync((unsigned)ALL_LANES, bits, o);
         bits = other > bits ? other : bits;

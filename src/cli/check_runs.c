@@ -36,7 +36,8 @@ static bool read_gyration(const sadmm_world *world, size_t count, double *gyrati
     for (size_t k = 0; k < count; ++k) {
         sadmm_body_id id;
         sadmm_body_def def;
-        if (sadmm_world_body_at(world, (int32_t)k, &id) != SADMM_OK || sadmm_world_body_def(world, id, &def) != SADMM_OK)
+        if (sadmm_world_body_at(world, (int32_t)k, &id) != SADMM_OK ||
+            sadmm_world_body_def(world, id, &def) != SADMM_OK)
             return false;
         if (def.type == SADMM_BODY_DYNAMIC) gyration[k] = sqrt(largest(def.inertia, 3, 0) / def.mass);
     }
@@ -74,7 +75,8 @@ static void frozen_free(struct check_frozen *f)
 
 static bool frozen_allocate(struct check_frozen *f)
 {
-    size_t bodies = (size_t)sadmm_problem_body_count(f->problem), contacts = (size_t)sadmm_problem_contact_count(f->problem);
+    size_t bodies = (size_t)sadmm_problem_body_count(f->problem),
+           contacts = (size_t)sadmm_problem_contact_count(f->problem);
     f->start_v = sadmm_alloc(6 * bodies, sizeof(double));
     f->start_impulses = sadmm_alloc(3 * contacts, sizeof(double));
     f->start_lambda = sadmm_alloc(6 * (size_t)sadmm_problem_block_count(f->problem), sizeof(double));
@@ -84,8 +86,8 @@ static bool frozen_allocate(struct check_frozen *f)
 }
 
 /* From what the step started from, so that every table gets the same problem. */
-static sadmm_status solve_frozen(const struct check_frozen *f, const struct sadmm_settings *settings, sadmm_backend backend,
-                                 sadmm_precision precision, double *v, double *impulses)
+static sadmm_status solve_frozen(const struct check_frozen *f, const struct sadmm_settings *settings,
+                                 sadmm_backend backend, sadmm_precision precision, double *v, double *impulses)
 {
     sadmm_status status = sadmm_problem_set_solution(f->problem, f->start_v, f->start_impulses, f->start_lambda);
     if (status == SADMM_OK) status = sadmm_problem_solve(f->problem, backend, precision, settings, NULL);
@@ -117,7 +119,8 @@ static bool freeze(const sadmm_world *world, long step, struct check_frozen *f, 
     if (sadmm_problem_create(&f->problem) != SADMM_OK) return fail(error, "ref", "out of memory");
     if (sadmm_world_freeze(world, f->problem) != SADMM_OK) return fail(error, "ref", sadmm_world_message(world));
     if (!frozen_allocate(f)) return fail(error, "ref", "out of memory");
-    size_t bodies = (size_t)sadmm_problem_body_count(f->problem), contacts = (size_t)sadmm_problem_contact_count(f->problem);
+    size_t bodies = (size_t)sadmm_problem_body_count(f->problem),
+           contacts = (size_t)sadmm_problem_contact_count(f->problem);
     if (sadmm_problem_get_solution(f->problem, f->start_v, f->start_impulses, f->start_lambda) != SADMM_OK ||
         solve_frozen(f, &settings, SADMM_BACKEND_REF, SADMM_F64, f->v, f->impulses) != SADMM_OK)
         return fail(error, "ref", sadmm_problem_message(f->problem));
@@ -219,7 +222,8 @@ static bool compare_frozen(const struct check_frozen *f, const struct sadmm_sett
     if (!v) return fail(error, "frozen step", "out of memory");
     bool ok = solve_frozen(f, settings, backend, precision, v, impulses) == SADMM_OK;
     if (ok) {
-        double dv = largest_difference(v, f->v, v_count, 0), di = largest_difference(impulses, f->impulses, impulse_count, 0);
+        double dv = largest_difference(v, f->v, v_count, 0),
+               di = largest_difference(impulses, f->impulses, impulse_count, 0);
         d->step_velocity = larger(d->step_velocity, f->v_scale > 0 ? dv / f->v_scale : dv);
         d->step_impulse = larger(d->step_impulse, f->impulse_scale > 0 ? di / f->impulse_scale : di);
     } else {

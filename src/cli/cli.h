@@ -15,7 +15,7 @@
 /* Exit codes. */
 enum { CLI_DONE = 0, CLI_FAILED = 1, CLI_USAGE = 2 };
 
-/* ---- subcommands and their options (options.c) ------------------------------------------------------------------ */
+/* ---- subcommands and their options (options.c) ------------------------------------------------------------------- */
 
 struct cli_option {
     const char *name;
@@ -58,7 +58,7 @@ const char *cli_precision_name(sadmm_precision precision);
 /* "subadmm: message" on stderr; returns `code` for `return cli_error(...)`. */
 __attribute__((format(printf, 2, 3))) int cli_error(int code, const char *format, ...);
 
-/* ---- JSON (json.c) ------------------------------------------------------------------------------------------- */
+/* ---- JSON (json.c) ----------------------------------------------------------------------------------------------- */
 
 /* null for what is not a finite number (JSON has no NaN), and for what was not measured. */
 json_t *cli_json_real(double x);

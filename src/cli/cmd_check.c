@@ -40,9 +40,10 @@ struct tolerances {
     const char *reason;
 };
 
-/* One step: iterates are the same in exact arithmetic, so differences are rounding, amplified by the iterations; measured
- * on all scenes they stay below 3e-12 (f64) and 7e-5 (f32). Run: contact makes motion sensitive, and a difference doubles
- * in 2.5 steps on the worst scene (card_houses), so this one only finds gross mistakes, and only in short runs. */
+/* One step: iterates are the same in exact arithmetic, so differences are rounding, amplified by the iterations;
+ * measured on all scenes they stay below 3e-12 (f64) and 7e-5 (f32). Run: contact makes motion sensitive, and a
+ * difference doubles in 2.5 steps on the worst scene (card_houses), so this one only finds gross mistakes, and only in
+ * short runs. */
 static struct tolerances tolerances_of(sadmm_precision precision, const struct check_reference *r)
 {
     bool single = precision == SADMM_F32;
@@ -53,10 +54,11 @@ static struct tolerances tolerances_of(sadmm_precision precision, const struct c
         .velocity = share * speed,
         .step_velocity = single ? 1e-4 : 1e-10,
         .step_impulse = single ? 1e-3 : 1e-9,
-        .reason = single ? "f32: one step, 6e-8 of rounding amplified by the iterations; run, 1e-3 of the speed, doubling "
-                           "in 2.5 steps"
-                         : "f64: one step, 1e-16 of rounding amplified by the iterations; run, 1e-8 of the speed, doubling "
-                           "in 2.5 steps",
+        .reason =
+            single ? "f32: one step, 6e-8 of rounding amplified by the iterations; run, 1e-3 of the speed, doubling "
+                     "in 2.5 steps"
+                   : "f64: one step, 1e-16 of rounding amplified by the iterations; run, 1e-8 of the speed, doubling "
+                     "in 2.5 steps",
     };
 }
 
@@ -227,8 +229,9 @@ const struct cli_command cli_check = {
     .name = "check",
     .operands = "SCENE",
     .summary = "compare every backend and precision with the literal one on a scene",
-    .text = "Run: each table simulates the scene on its own. One step: contact problems of the literal run are frozen and\n"
-            "solved by each table with equal iterations. Exit status 1 when a difference exceeds its tolerance.\n",
+    .text =
+        "Run: each table simulates the scene on its own. One step: contact problems of the literal run are frozen and\n"
+        "solved by each table with equal iterations. Exit status 1 when a difference exceeds its tolerance.\n",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .operands_min = 1,

@@ -98,7 +98,7 @@ static void apply(const struct run_options *o, struct sadmm_scene *scene)
     if (o->certify) s->certify = true;
 }
 
-/* ---- progress --------------------------------------------------------------------------------------------------- */
+/* ---- progress ---------------------------------------------------------------------------------------------------- */
 
 struct progress {
     bool shown;
@@ -122,7 +122,7 @@ static void show_progress(struct progress *p, const struct run_record *record, l
             record->last.ms.total);
 }
 
-/* ---- the run ---------------------------------------------------------------------------------------------------- */
+/* ---- the run ----------------------------------------------------------------------------------------------------- */
 
 static int dump_problem(const struct run_options *o, const char *spec, const sadmm_world *world)
 {
@@ -162,7 +162,8 @@ static int step_all(const struct run_options *o, const char *spec, const struct 
         } else if ((step + 1 == o->steps && !prepare_last_step(world)) || sadmm_world_step(world) != SADMM_OK) {
             snprintf(record->failure, sizeof record->failure, "step %ld: %.280s", step + 1, sadmm_world_message(world));
             code = CLI_FAILED;
-        } else if (!run_record_step(record, world) || (trace && !run_trace_step(trace, record, world, record->last.time))) {
+        } else if (!run_record_step(record, world) ||
+                   (trace && !run_trace_step(trace, record, world, record->last.time))) {
             code = CLI_FAILED;
         } else if (o->dump_path && step + 1 == o->dump_step) {
             code = dump_problem(o, spec, world);
@@ -220,7 +221,8 @@ static int run(int argc, char **argv)
     apply(&o, &scene);
     if (o.steps < 0) o.steps = lround(fmin(scene.duration / scene.def.settings.dt, 1e9));
     if (o.dump_path && o.dump_step > o.steps)
-        return cli_error(CLI_USAGE, "--dump-problem STEP %ld: must be in [1, %ld], the steps of this run", o.dump_step, o.steps);
+        return cli_error(CLI_USAGE, "--dump-problem STEP %ld: must be in [1, %ld], the steps of this run", o.dump_step,
+                         o.steps);
     if (o.dump_path && !sadmm_fclib_available()) {
         sadmm_fclib_save(NULL, o.dump_path, NULL, &error);
         return cli_error(CLI_FAILED, "%s", error.message);

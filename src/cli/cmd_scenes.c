@@ -17,7 +17,7 @@ static int set_option(void *target, size_t index, const char *value)
     return CLI_DONE;
 }
 
-/* ---- the list ------------------------------------------------------------------------------------------------- */
+/* ---- the list ---------------------------------------------------------------------------------------------------- */
 
 static json_t *list_json(void)
 {
@@ -43,7 +43,7 @@ static void list_text(void)
     }
 }
 
-/* ---- one scene ------------------------------------------------------------------------------------------------ */
+/* ---- one scene --------------------------------------------------------------------------------------------------- */
 
 static const char *const shape_names[SADMM_SHAPE_TYPE_COUNT] = {
     [SADMM_SHAPE_PLANE] = "plane",
@@ -131,9 +131,10 @@ static sadmm_status add_shapes(const sadmm_world *world, json_t *bodies)
 
 static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, json_t *bodies)
 {
-    static const char *const units = "SI; world frame; quaternions w x y z, body to world; inertia: principal moments in "
-                                     "the body's frame; box: half extents; capsule: radius, half length along z; plane: "
-                                     "half-space z <= 0 of its frame";
+    static const char *const units =
+        "SI; world frame; quaternions w x y z, body to world; inertia: principal moments in "
+        "the body's frame; box: half extents; capsule: radius, half length along z; plane: "
+        "half-space z <= 0 of its frame";
     json_t *o = json_object();
     json_object_set_new(o, "scene", json_string(spec));
     json_object_set_new(o, "name", json_string(scene->info->name));
@@ -157,8 +158,8 @@ static int show_scene(const char *spec, const char *destination)
     if (sadmm_scene_open(spec, &scene, &error) != SADMM_OK) return cli_error(CLI_USAGE, "%s", error.message);
     if (sadmm_scene_build(&scene, &world, &error) != SADMM_OK) return cli_error(CLI_FAILED, "%s", error.message);
     if (!destination) {
-        printf("%s%s: %s\n%d bodies, %d shapes, %g s, dt = %g s, %d iterations (--json for all of it)\n", scene.info->name,
-               scene.info->arguments, scene.info->description, sadmm_world_body_count(world),
+        printf("%s%s: %s\n%d bodies, %d shapes, %g s, dt = %g s, %d iterations (--json for all of it)\n",
+               scene.info->name, scene.info->arguments, scene.info->description, sadmm_world_body_count(world),
                sadmm_world_shape_count(world), scene.duration, scene.def.settings.dt, scene.def.settings.iterations);
         sadmm_world_destroy(world);
         return CLI_DONE;

@@ -53,10 +53,14 @@ static int set_option(void *target, size_t index, const char *value)
         ok = cli_read_real("--tolerance", value, 0, 1, &o->plan.tolerance);
         o->tolerance_given = true;
         break;
-    case OPTION_MAX_ITERATIONS: ok = cli_read_int("--max-iterations", value, 1, 1000000000, &o->plan.max_iterations); break;
+    case OPTION_MAX_ITERATIONS:
+        ok = cli_read_int("--max-iterations", value, 1, 1000000000, &o->plan.max_iterations);
+        break;
     case OPTION_CHECK_PERIOD: ok = read_small_int("--check-period", value, 1, 1000000, &o->plan.stretch); break;
     case OPTION_LEVEL: ok = cli_read_real("--penalty-offset", value, 1e-12, 1e12, &o->plan.level); break;
-    case OPTION_MASS_FACTOR: ok = cli_read_real("--penalty-mass-factor", value, 0, 1e12, &s->penalty_mass_factor); break;
+    case OPTION_MASS_FACTOR:
+        ok = cli_read_real("--penalty-mass-factor", value, 0, 1e12, &s->penalty_mass_factor);
+        break;
     case OPTION_PENALTY_PERIOD: ok = read_small_int("--penalty-period", value, 0, 1000000, &s->penalty_period); break;
     case OPTION_THREADS: ok = read_small_int("--threads", value, 0, 1024, &s->threads); break;
     case OPTION_SOLUTION: o->solution = value; break;
@@ -66,7 +70,7 @@ static int set_option(void *target, size_t index, const char *value)
     return ok ? CLI_DONE : CLI_USAGE;
 }
 
-/* ---- reports ---------------------------------------------------------------------------------------------------- */
+/* ---- reports ----------------------------------------------------------------------------------------------------- */
 
 static json_t *certificate_json(const sadmm_certificate *c)
 {
@@ -129,7 +133,8 @@ static void print_outcome(const char *path, const struct solve_options *o, const
         sliding = fmax(sliding, hypot(u[1], u[2]));
         largest = fmax(largest, r[0]);
     }
-    printf("problem        %s: %d bodies, %d contacts, %d bilateral rows\n", path, s->bodies, s->contacts, s->hard_rows);
+    printf("problem        %s: %d bodies, %d contacts, %d bilateral rows\n", path, s->bodies, s->contacts,
+           s->hard_rows);
     printf("backend        %s %s, %d thread%s\n", cli_backend_name(out->report.backend),
            cli_precision_name(out->report.precision), out->report.threads, out->report.threads == 1 ? "" : "s");
     printf("solve          %s after %ld iterations, %.3f ms (penalty offset %.3g kg, %d tried)\n",
@@ -140,7 +145,7 @@ static void print_outcome(const char *path, const struct solve_options *o, const
     printf("impulses r     normal %.3g N s at most\n", largest);
 }
 
-/* ---- the solve -------------------------------------------------------------------------------------------------- */
+/* ---- the solve --------------------------------------------------------------------------------------------------- */
 
 static int solve_problem(sadmm_problem *problem, const char *path, const struct solve_options *o)
 {
@@ -152,8 +157,9 @@ static int solve_problem(sadmm_problem *problem, const char *path, const struct 
         return cli_error(CLI_FAILED, "%s: %s", path, error.message);
     int code = CLI_DONE;
     if (!out.converged)
-        code = cli_error(CLI_FAILED, "%s: not converged: siconos' measure is %.3g after %ld iterations, %g was asked for",
-                         path, out.certificate.siconos, out.iterations, o->plan.tolerance);
+        code =
+            cli_error(CLI_FAILED, "%s: not converged: siconos' measure is %.3g after %ld iterations, %g was asked for",
+                      path, out.certificate.siconos, out.iterations, o->plan.tolerance);
     if (!o->quiet && !(o->json && strcmp(o->json, "-") == 0)) print_outcome(path, o, &out, &solution);
     if (o->json) {
         int written = cli_write_json(outcome_json(path, o, &out, &solution), o->json);
@@ -168,7 +174,10 @@ static int solve_problem(sadmm_problem *problem, const char *path, const struct 
 static int run(int argc, char **argv)
 {
     struct solve_options o = {
-        .plan = {.precision = SADMM_F64, .settings = sadmm_settings_default(), .max_iterations = 100000, .stretch = 100},
+        .plan = {.precision = SADMM_F64,
+                 .settings = sadmm_settings_default(),
+                 .max_iterations = 100000,
+                 .stretch = 100},
     };
     struct sadmm_error error = {0};
     sadmm_problem *problem = NULL;
@@ -189,8 +198,9 @@ const struct cli_command cli_solve = {
     .name = "solve",
     .operands = "FILE.hdf5",
     .summary = "solve an FCLIB problem file to a tolerance",
-    .text = "Reads a global 3D friction contact problem (FCLIB's HDF5 layout) of rigid bodies and solves it until siconos'\n"
-            "global error measure is below the tolerance. Single precision usually ends near 1e-7.\n",
+    .text =
+        "Reads a global 3D friction contact problem of rigid bodies (FCLIB's HDF5 layout) and solves it until\n"
+        "siconos' error measure is below the tolerance. Single precision usually ends near 1e-7.\n",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .operands_min = 1,

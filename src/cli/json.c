@@ -65,6 +65,7 @@ json_t *cli_json_settings(const sadmm_settings *s)
     json_object_set_new(o, "penalty_mass_factor", cli_json_real(s->penalty_mass_factor));
     json_object_set_new(o, "penalty_offset", cli_json_real(s->penalty_offset));
     json_object_set_new(o, "penalty_ratio_limit", cli_json_real(s->penalty_ratio_limit));
+    json_object_set_new(o, "penalty_update_warm", json_boolean(s->penalty_update_warm));
     json_object_set_new(o, "warm_start", json_boolean(s->warm_start));
     json_object_set_new(o, "residual_tolerance", cli_json_real(s->residual_tolerance));
     json_object_set_new(o, "certificate_tolerance", cli_json_real(s->certificate_tolerance));
@@ -92,5 +93,6 @@ int cli_write_json(json_t *object, const char *destination)
     } else if (fclose(file) != 0) {
         ok = false;
     }
-    return ok ? CLI_DONE : cli_error(CLI_FAILED, "%s could not be written", to_stdout ? "standard output" : destination);
+    return ok ? CLI_DONE
+              : cli_error(CLI_FAILED, "%s could not be written", to_stdout ? "standard output" : destination);
 }

@@ -20,7 +20,7 @@ int cli_error(int code, const char *format, ...)
     return code;
 }
 
-/* ---- help ----------------------------------------------------------------------------------------------------- */
+/* ---- help -------------------------------------------------------------------------------------------------------- */
 
 static bool value_is_optional(const struct cli_option *option)
 {
@@ -41,7 +41,7 @@ void cli_print_help(const struct cli_command *command)
     printf("  --help%*sthis text\n", HELP_COLUMN - 8, "");
 }
 
-/* ---- parsing -------------------------------------------------------------------------------------------------- */
+/* ---- parsing ----------------------------------------------------------------------------------------------------- */
 
 static int unknown_option(const struct cli_command *command, const char *text)
 {
@@ -66,7 +66,8 @@ static int take_operands(const struct cli_command *command, int argc, char **arg
     size_t count = (size_t)(argc - optind);
     for (size_t k = 0; k < command->operands_max; ++k) operands[k] = k < count ? argv[optind + (int)k] : NULL;
     if (count < command->operands_min)
-        return cli_error(CLI_USAGE, "%s: %s is missing (subadmm %s --help)", command->name, command->operands, command->name);
+        return cli_error(CLI_USAGE, "%s: %s is missing (subadmm %s --help)", command->name, command->operands,
+                         command->name);
     if (count > command->operands_max)
         return cli_error(CLI_USAGE, "%s: unexpected argument '%s' (subadmm %s --help)", command->name,
                          argv[optind + (int)command->operands_max], command->name);
@@ -104,7 +105,7 @@ int cli_parse(const struct cli_command *command, int argc, char **argv, cli_set_
     return take_operands(command, argc, argv, operands);
 }
 
-/* ---- values --------------------------------------------------------------------------------------------------- */
+/* ---- values ------------------------------------------------------------------------------------------------------ */
 
 /* strtol and strtod skip blanks; a number starts with a digit, a sign or a point. */
 static bool starts_like_a_number(const char *text)

@@ -113,7 +113,8 @@ void run_record_print(const struct run_record *record, const char *spec, const s
         printf("backend        %s %s, %d thread%s, %d iterations a step\n", cli_backend_name(last->backend),
                cli_precision_name(last->precision), last->threads, last->threads == 1 ? "" : "s",
                scene->def.settings.iterations);
-        printf("contacts       %.1f mean, %d max\n", record->contacts_sum / (double)record->steps, record->contacts_max);
+        printf("contacts       %.1f mean, %d max\n", record->contacts_sum / (double)record->steps,
+               record->contacts_max);
         printf("ms per step    %10s %10s\n", "median", "p95");
     }
     for (int k = 0; k < RUN_PHASES; ++k) {
@@ -122,7 +123,8 @@ void run_record_print(const struct run_record *record, const char *spec, const s
             printf("  %-12s %10.4f %10.4f\n", phase_names[k], median, p95);
     }
     if (record->steps > 0 && last->residual.primal >= 0)
-        printf("residual       primal %.3g m/s, dual %.3g N s (last step)\n", last->residual.primal, last->residual.dual);
+        printf("residual       primal %.3g m/s, dual %.3g N s (last step)\n", last->residual.primal,
+               last->residual.dual);
     if (record->steps > 0 && c->ncp_max != -1)
         printf("certificate    ncp %.3g m/s (largest of the run %.3g), momentum %.3g (%.3g)\n", c->ncp_max,
                record->ncp_max, c->momentum_max, record->momentum_max);

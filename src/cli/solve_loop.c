@@ -36,7 +36,7 @@ struct loop {
         if (try_status != SADMM_OK) return try_status; \
     } while (0)
 
-/* ---- solutions -------------------------------------------------------------------------------------------------- */
+/* ---- solutions --------------------------------------------------------------------------------------------------- */
 
 static sadmm_status check(struct loop *l, sadmm_status status)
 {
@@ -80,7 +80,7 @@ static sadmm_status mean_mass(struct loop *l, double *mass)
     return status;
 }
 
-/* ---- running ------------------------------------------------------------------------------------------------------ */
+/* ---- running ----------------------------------------------------------------------------------------------------- */
 
 static bool finished(const struct loop *l)
 {

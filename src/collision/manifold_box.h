@@ -15,7 +15,7 @@
  *   - the cached axis stays unless beaten by 10 % of the depth plus 0.5 % of the thinner box: at the apex of two cards the
  *     two inner faces are equally good and 60 degrees apart;
  *   - the cached side stays, also past the midplane, until the boxes are apart;
- *   - an edge axis within 8 degrees of the best face must win by 5 % of the depth and 0.5 % of the thinner box (faces at
+ *   - an edge axis within 8 degrees of a face must beat that face by 5 % of the depth and 0.5 % of the thinner box (faces at
  *     rest have no depth to speak of): points of a face are worth more;
  *   - an edge axis is charged with its rounding error, which grows as the edges become parallel.
  *
@@ -341,7 +341,7 @@ SADMM_INLINE bool box_edge_manifold(const struct box_pair *b, int axis, int nega
 SADMM_INLINE void box_corner_manifold(const struct box_pair *b, vec3 fallback, struct manifold *m)
 {
     vec3 h1 = v3_from_array(b->h1), p = v3(0, 0, 0), u = p, x = p, q = p;
-    real best2 = (real)1e30, best_slope = (real)1e30, half = 0, distance;
+    real best2 = (real)1e30, best_slope = (real)1e30, half = 0, distance, tie = 64 * b->slack * b->limit;
     int direction, side, best = 0;
     uint32_t cache = m->cache;
 
@@ -359,7 +359,7 @@ SADMM_INLINE void box_corner_manifold(const struct box_pair *b, vec3 fallback, s
             d2 = v3_norm2(v3_sub(x2, q1));
             slope = real_abs(v3_dot(v3_from_array(w), v3_sub(x2, q1)));
             /* three edges meet in a closest vertex: the one that runs along the other box */
-            if (d2 < best2 * (1 - 64 * SADMM_EPSILON) || (d2 <= best2 * (1 + 64 * SADMM_EPSILON) && slope < best_slope)) {
+            if (d2 < best2 - tie || (d2 <= best2 + tie && slope < best_slope)) {
                 best2 = d2;
                 best_slope = slope;
                 best = box_edge_id(direction, side & 1, side >> 1);
@@ -502,19 +502,28 @@ SADMM_INLINE void manifold_box_box(vec3 half1, vec3 half2, const struct pair_pos
             }
         }
     }
-    n = box_axis_direction(&b, face, negative_face);
     if (edge >= 0) {
         vec3 ne = box_axis_direction(&b, edge, negative_edge);
-        if (real_abs(v3_dot(n, ne)) > MANIFOLD_COS_NEAR) {
-            /* same direction: points of a face are worth more (without the bonus of a cached edge) */
+        int near_face = -1;
+        if (edge == cached || cached < 0) use_edge = s_edge > s_face;
+        else use_edge = s_edge > s_face + MANIFOLD_KEEP_DEPTH * real_max(0, -s_face) + keep;
+        for (axis = 0; axis < 6; ++axis)
+            if (real_abs(v3_dot(box_axis_direction(&b, axis, 0), ne)) > MANIFOLD_COS_NEAR &&
+                (near_face < 0 || separation[axis] > separation[near_face]))
+                near_face = axis;
+        if (near_face >= 0) {
+            /* a face in the same direction: its points are worth more (the bonus of a cached edge does not count) */
             real s = s_edge - (edge == cached ? MANIFOLD_KEEP_DEPTH * real_max(0, -s_edge) + keep : 0);
-            use_edge = s > s_face + (real)0.05 * real_abs(s_face) + keep;
-        } else if (edge == cached || cached < 0) {
-            use_edge = s_edge > s_face;
-        } else {
-            use_edge = s_edge > s_face + MANIFOLD_KEEP_DEPTH * real_max(0, -s_face) + keep;
+            bool beaten = s > separation[near_face] + (real)0.05 * real_abs(separation[near_face]) + keep;
+            if (use_edge && !beaten) {
+                face = near_face;
+                s_face = separation[face];
+                negative_face = negative[face];
+                use_edge = false;
+            }
         }
     }
+    n = box_axis_direction(&b, face, negative_face);
 
     s_chosen = s_face;
     if (use_edge) {

@@ -1,6 +1,6 @@
 /* The certificate: the true error of (v, lambda) in double, from the raw data every backend reads (system.h).
  *
- * It knows nothing of a backend or of the iteration: x comes from v, J^T lambda from lambda, and A, b, e from the system.
+ * It knows nothing of a backend or of the iteration: x comes from v, J^T lambda from lambda; A, b, e from the system.
  *
  *   contact  |lambda - Pi_C(lambda - (x + e)/w)| w     w: largest diagonal entry of the contact's own J A^-1 J^T
  *   hard     |x + e|                                   largest row; rows that are zero on both bodies do not count

@@ -172,8 +172,8 @@ static sadmm_status check_mass(int32_t index, const double A[36], struct sadmm_e
         for (int j = 0; j < i; ++j) {
             double scale = sqrt(fabs(A[7 * i])) * sqrt(fabs(A[7 * j]));
             if (!(fabs(A[6 * i + j] - A[6 * j + i]) <= 1e-9 * scale))
-                REFUSE("A[%d]: entries (%d, %d) = %g and (%d, %d) = %g: must be symmetric", index, i, j, A[6 * i + j], j, i,
-                       A[6 * j + i]);
+                REFUSE("A[%d]: entries (%d, %d) = %g and (%d, %d) = %g: must be symmetric", index, i, j, A[6 * i + j],
+                       j, i, A[6 * j + i]);
         }
     if (!dense6_cholesky(A, L)) REFUSE("A[%d]: must be positive definite, and is not to double precision", index);
     return SADMM_OK;
@@ -262,7 +262,7 @@ static sadmm_status check_contact(int32_t index, const sadmm_problem_contact *co
     return check_friction("contacts", index, contact->friction, error);
 }
 
-/* Backends share normal, friction and arm_b - arm_a (the distance of the centres of mass) among the points of a pair. */
+/* Backends share normal, friction and arm_b - arm_a (from b's centre of mass to a's) among the points of a pair. */
 static bool continues_pair(const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *first,
                            const struct sadmm_contact_pair *next, const struct sadmm_contact_point *point)
 {
@@ -340,9 +340,11 @@ sadmm_status sadmm_problem_set_contacts(sadmm_problem *problem, int32_t count, c
 
 /* ---- blocks -------------------------------------------------------------------------------------------------- */
 
-static sadmm_status check_block(int32_t index, const sadmm_problem_block *block, int32_t bodies, struct sadmm_error *error)
+static sadmm_status check_block(int32_t index, const sadmm_problem_block *block, int32_t bodies,
+                                struct sadmm_error *error)
 {
-    if ((unsigned)block->kind > SADMM_BLOCK_SOFT) REFUSE("blocks[%d].kind = %d: must be in [0, 2]", index, (int)block->kind);
+    if ((unsigned)block->kind > SADMM_BLOCK_SOFT)
+        REFUSE("blocks[%d].kind = %d: must be in [0, 2]", index, (int)block->kind);
     bool contact = block->kind == SADMM_BLOCK_CONTACT;
     if (contact ? block->rows != 3 : block->rows < 1 || block->rows > 6)
         REFUSE("blocks[%d].rows = %d: must be %s", index, block->rows, contact ? "3 for a contact" : "in [1, 6]");
@@ -355,7 +357,8 @@ static sadmm_status check_block(int32_t index, const sadmm_problem_block *block,
     TRY(check_vector("blocks", index, "error", block->error, rows, -HUGE_VAL, error));
     if (contact) {
         TRY(check_friction("blocks", index, block->friction, error));
-        if (!row_acts(block, 0)) REFUSE("blocks[%d]: the normal row of a contact must not be zero on both bodies", index);
+        if (!row_acts(block, 0))
+            REFUSE("blocks[%d]: the normal row of a contact must not be zero on both bodies", index);
     }
     if (block->kind == SADMM_BLOCK_SOFT) {
         TRY(check_vector("blocks", index, "stiffness", block->stiffness, rows, 0, error));
@@ -391,8 +394,8 @@ static void load_lambda(const sadmm_problem_block *blocks, int32_t count, const 
             lambda[6 * (size_t)k + (size_t)r] = r < blocks[k].rows ? given[6 * (size_t)k + (size_t)r] : 0;
 }
 
-static sadmm_status check_lambda(const char *name, const sadmm_problem_block *blocks, int32_t count, const double *lambda,
-                                 struct sadmm_error *error)
+static sadmm_status check_lambda(const char *name, const sadmm_problem_block *blocks, int32_t count,
+                                 const double *lambda, struct sadmm_error *error)
 {
     for (int32_t k = 0; lambda && k < count; ++k)
         for (int r = 0; r < blocks[k].rows; ++r)

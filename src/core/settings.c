@@ -35,7 +35,8 @@ static bool in_range(double x, double lo, double hi) { return x >= lo && x <= hi
 sadmm_status sadmm_settings_validate(const struct sadmm_settings *s, struct sadmm_error *error)
 {
     if (!s)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings = NULL: must be given (sadmm_settings_default())");
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "settings = NULL: must be given (sadmm_settings_default())");
 
     const struct {
         const char *name;
@@ -93,9 +94,11 @@ sadmm_status sadmm_settings_validate(const struct sadmm_settings *s, struct sadm
     const double *g = s->gravity;
     for (int i = 0; i < 3; ++i)
         if (!isfinite(g[i]))
-            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.gravity[%d] = %g: must be finite", i, g[i]);
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.gravity[%d] = %g: must be finite", i,
+                              g[i]);
     double norm = hypot(hypot(g[0], g[1]), g[2]);
     if (!(norm <= 1e6))
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.gravity: norm = %g: must be <= 1e6 m/s^2", norm);
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.gravity: norm = %g: must be <= 1e6 m/s^2",
+                          norm);
     return SADMM_OK;
 }

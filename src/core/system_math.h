@@ -1,5 +1,5 @@
 /* What a system's raw data means, in double: A_i and b_i of a body, e and Jacobian rows of a contact. Used by the
- * certificate, the literal backend and the tests; the fast backends evaluate the same math/ formulas in their own precision. */
+ * certificate, the literal backend and the tests; the fast backends evaluate the same math/ formulas in theirs. */
 #ifndef SADMM_CORE_SYSTEM_MATH_H
 #define SADMM_CORE_SYSTEM_MATH_H
 

@@ -24,7 +24,7 @@ bool sadmm_fclib_available(void)
     return true;
 }
 
-/* ---- sparse matrices ------------------------------------------------------------------------------------------ */
+/* ---- sparse matrices --------------------------------------------------------------------------------------------- */
 
 struct stored_matrix {
     int32_t rows, columns, nz;
@@ -114,7 +114,8 @@ static sadmm_status read_matrix(hid_t file, const char *group, struct sadmm_trip
     return status;
 }
 
-static sadmm_status write_matrix(hid_t file, const char *group, const struct sadmm_triplets *m, struct sadmm_error *error)
+static sadmm_status write_matrix(hid_t file, const char *group, const struct sadmm_triplets *m,
+                                 struct sadmm_error *error)
 {
     char name[NAME_SIZE];
     if (m->count > INT32_MAX)
@@ -129,15 +130,16 @@ static sadmm_status write_matrix(hid_t file, const char *group, const struct sad
     return sadmm_h5_write_double(file, part(name, group, "x"), m->count, m->value, error);
 }
 
-/* ---- reading a problem ------------------------------------------------------------------------------------------ */
+/* ---- reading a problem ------------------------------------------------------------------------------------------- */
 
 static sadmm_status check_kind(hid_t file, struct sadmm_error *error)
 {
     int32_t dimension;
     if (!sadmm_h5_exists(file, "/fclib_global")) {
         if (sadmm_h5_exists(file, "/fclib_local"))
-            return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED,
-                              "the file holds a local problem (/fclib_local): only global ones, with bodies, are solved");
+            return sadmm_fail(
+                error, SADMM_ERROR_UNSUPPORTED,
+                "the file holds a local problem (/fclib_local): only global ones, with bodies, are solved");
         if (sadmm_h5_exists(file, "/fclib_global_rolling"))
             return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED,
                               "the file holds a problem with rolling friction (/fclib_global_rolling)");
@@ -155,9 +157,11 @@ static sadmm_status check_shapes(const struct sadmm_global_problem *g, bool bila
         return sadmm_fail(error, SADMM_ERROR_IO, "/fclib_global/M is %d x %d: must be square", g->M.rows, g->M.columns);
     if (g->H.rows != g->M.rows || (bilateral && g->G.rows != g->M.rows))
         return sadmm_fail(error, SADMM_ERROR_IO, "/fclib_global/%s has %d rows, M has %d: must be equal",
-                          g->H.rows != g->M.rows ? "H" : "G", g->H.rows != g->M.rows ? g->H.rows : g->G.rows, g->M.rows);
+                          g->H.rows != g->M.rows ? "H" : "G", g->H.rows != g->M.rows ? g->H.rows : g->G.rows,
+                          g->M.rows);
     if (g->H.columns % 3 != 0)
-        return sadmm_fail(error, SADMM_ERROR_IO, "/fclib_global/H has %d columns: must be a multiple of 3", g->H.columns);
+        return sadmm_fail(error, SADMM_ERROR_IO, "/fclib_global/H has %d columns: must be a multiple of 3",
+                          g->H.columns);
     if (g->M.rows % 6 != 0)
         return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED,
                           "M is %d x %d, not a multiple of 6: only rigid bodies of 6 degrees of freedom are solved",
@@ -205,7 +209,7 @@ sadmm_status sadmm_fclib_load(const char *path, sadmm_problem **out, struct sadm
     return status;
 }
 
-/* ---- writing ---------------------------------------------------------------------------------------------------- */
+/* ---- writing ----------------------------------------------------------------------------------------------------- */
 
 static sadmm_status write_global(hid_t file, const struct sadmm_global_problem *g, const char *title,
                                  struct sadmm_error *error)
@@ -248,11 +252,11 @@ static sadmm_status check_same_sizes(hid_t file, const struct sadmm_global_solut
         TRY(sadmm_h5_read_value(file, "/fclib_global/G/n", 0, LARGEST, &hard, error));
     if (rows == 6 * s->bodies && columns == 3 * s->contacts && hard == s->hard_rows) return SADMM_OK;
     return sadmm_fail(error, SADMM_ERROR_IO,
-                      "the file holds %d velocities, %d contact rows and %d bilateral rows, the solution %d, %d and %d", rows,
-                      columns, hard, 6 * s->bodies, 3 * s->contacts, s->hard_rows);
+                      "the file holds %d velocities, %d contact rows and %d bilateral rows, the solution %d, %d and %d",
+                      rows, columns, hard, 6 * s->bodies, 3 * s->contacts, s->hard_rows);
 }
 
-/* ---- files that appear whole or not at all ------------------------------------------------------------------------ */
+/* ---- files that appear whole or not at all ----------------------------------------------------------------------- */
 
 /* A name beside `path` that nobody uses, for sadmm_free. */
 static sadmm_status beside(const char *path, char **out, struct sadmm_error *error)
@@ -306,7 +310,8 @@ static sadmm_status copy_file(const char *from, const char *to, struct sadmm_err
 
 /* Write what is not NULL into `file_name`: a new file, or (edit) the copy of a problem file. */
 static sadmm_status write_file(const char *file_name, bool edit, const struct sadmm_global_problem *global,
-                               const char *title, const struct sadmm_global_solution *solution, struct sadmm_error *error)
+                               const char *title, const struct sadmm_global_solution *solution,
+                               struct sadmm_error *error)
 {
     struct sadmm_h5_session session;
     hid_t file;
@@ -323,7 +328,8 @@ static sadmm_status write_file(const char *file_name, bool edit, const struct sa
     return status;
 }
 
-sadmm_status sadmm_fclib_save(const sadmm_problem *problem, const char *path, const char *title, struct sadmm_error *error)
+sadmm_status sadmm_fclib_save(const sadmm_problem *problem, const char *path, const char *title,
+                              struct sadmm_error *error)
 {
     struct sadmm_global_problem global;
     char *temporary;

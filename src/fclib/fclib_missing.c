@@ -20,7 +20,8 @@ sadmm_status sadmm_fclib_load(const char *path, sadmm_problem **out, struct sadm
     return missing(error);
 }
 
-sadmm_status sadmm_fclib_save(const sadmm_problem *problem, const char *path, const char *title, struct sadmm_error *error)
+sadmm_status sadmm_fclib_save(const sadmm_problem *problem, const char *path, const char *title,
+                              struct sadmm_error *error)
 {
     (void)problem, (void)path, (void)title;
     return missing(error);

@@ -5,7 +5,7 @@
 #include "core/memory.h"
 #include "core/system_math.h"
 
-/* ---- sparse matrices ------------------------------------------------------------------------------------------ */
+/* ---- sparse matrices --------------------------------------------------------------------------------------------- */
 
 bool sadmm_triplets_add(struct sadmm_triplets *m, int32_t row, int32_t column, double value)
 {
@@ -41,7 +41,7 @@ void sadmm_global_problem_free(struct sadmm_global_problem *g)
     memset(g, 0, sizeof *g);
 }
 
-/* ---- from a problem ------------------------------------------------------------------------------------------- */
+/* ---- from a problem ---------------------------------------------------------------------------------------------- */
 
 struct sizes {
     int64_t bodies, points, blocks; /* of the problem */
@@ -178,7 +178,7 @@ sadmm_status sadmm_global_from_problem(const sadmm_problem *problem, struct sadm
     return status;
 }
 
-/* ---- to a problem --------------------------------------------------------------------------------------------- */
+/* ---- to a problem ------------------------------------------------------------------------------------------------ */
 
 enum { NO_BODY = -2 }; /* a side that no entry has claimed yet */
 
@@ -261,10 +261,11 @@ static sadmm_status gather_bodies(const struct sadmm_global_problem *g, double *
         if (row / 6 == column / 6)
             A[36 * (size_t)(row / 6) + (size_t)(6 * (row % 6) + column % 6)] += g->M.value[e];
         else if (g->M.value[e] != 0)
-            return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED,
-                              "M is not block diagonal: entry (%d, %d) couples bodies %d and %d; only rigid bodies of 6 "
-                              "degrees of freedom each are solved",
-                              row, column, row / 6, column / 6);
+            return sadmm_fail(
+                error, SADMM_ERROR_UNSUPPORTED,
+                "M is not block diagonal: entry (%d, %d) couples bodies %d and %d; only rigid bodies of 6 "
+                "degrees of freedom each are solved",
+                row, column, row / 6, column / 6);
     }
     return SADMM_OK;
 }
@@ -291,7 +292,8 @@ static sadmm_status gather_blocks(const struct sadmm_global_problem *g, sadmm_pr
     return SADMM_OK;
 }
 
-sadmm_status sadmm_global_to_problem(const struct sadmm_global_problem *g, sadmm_problem **out, struct sadmm_error *error)
+sadmm_status sadmm_global_to_problem(const struct sadmm_global_problem *g, sadmm_problem **out,
+                                     struct sadmm_error *error)
 {
     sadmm_problem *problem = NULL;
     *out = NULL;
@@ -314,7 +316,7 @@ sadmm_status sadmm_global_to_problem(const struct sadmm_global_problem *g, sadmm
     return status;
 }
 
-/* ---- solutions ------------------------------------------------------------------------------------------------ */
+/* ---- solutions --------------------------------------------------------------------------------------------------- */
 
 void sadmm_global_solution_free(struct sadmm_global_solution *s)
 {
@@ -333,8 +335,8 @@ static void add_velocity(const double *J, int rows, const double *v, int32_t bod
         for (int c = 0; c < 6; ++c) out[r] += J[6 * r + c] * v[6 * (size_t)body + (size_t)c];
 }
 
-static void contact_solution(const sadmm_problem_contact *contact, const double *v, const double impulse[3], double u[3],
-                             double r[3])
+static void contact_solution(const sadmm_problem_contact *contact, const double *v, const double impulse[3],
+                             double u[3], double r[3])
 {
     double J[18];
     mat3 frame = sadmm_contact_frame(contact->normal);

@@ -28,7 +28,7 @@ void sadmm_h5_end(const struct sadmm_h5_session *session)
     pthread_mutex_unlock(&lock);
 }
 
-/* ---- errors --------------------------------------------------------------------------------------------------- */
+/* ---- errors ------------------------------------------------------------------------------------------------------ */
 
 static herr_t keep_first(unsigned depth, const H5E_error2_t *e, void *data)
 {
@@ -47,7 +47,7 @@ static sadmm_status fail_h5(struct sadmm_error *error, const char *name, const c
     return SADMM_ERROR_IO;
 }
 
-/* ---- files ---------------------------------------------------------------------------------------------------- */
+/* ---- files ------------------------------------------------------------------------------------------------------- */
 
 sadmm_status sadmm_h5_open(const char *path, enum sadmm_h5_mode mode, hid_t *file, struct sadmm_error *error)
 {
@@ -75,7 +75,7 @@ sadmm_status sadmm_h5_close(hid_t file, struct sadmm_error *error)
     return status;
 }
 
-/* ---- names: a link that leaves the file is refused -------------------------------------------------------------- */
+/* ---- names: a link that leaves the file is refused --------------------------------------------------------------- */
 
 static herr_t refuse_external(const char *parent_file, const char *parent_group, const char *child_file,
                               const char *child_object, unsigned *flags, hid_t access, void *data)
@@ -112,7 +112,7 @@ bool sadmm_h5_exists(hid_t file, const char *name)
     return found;
 }
 
-/* ---- reading -------------------------------------------------------------------------------------------------- */
+/* ---- reading ----------------------------------------------------------------------------------------------------- */
 
 /* Deflate cannot shrink data by more than 1032 times; a header that promises more lies about the data's size. */
 enum { MOST_COMPRESSION = 1100 };
@@ -136,7 +136,8 @@ static int64_t check_dataset(hid_t file, hid_t dataset, H5T_class_t class, const
     if (count < 0 || size == 0 || layout == H5D_LAYOUT_ERROR || external < 0) {
         fail_h5(error, name, "unreadable header");
     } else if (found != class) {
-        sadmm_fail(error, SADMM_ERROR_IO, "%s: must hold %s", name, class == H5T_FLOAT ? "floating point numbers" : "integers");
+        sadmm_fail(error, SADMM_ERROR_IO, "%s: must hold %s", name,
+                   class == H5T_FLOAT ? "floating point numbers" : "integers");
     } else if (external > 0 || layout == H5D_VIRTUAL) {
         sadmm_fail(error, SADMM_ERROR_IO, "%s: its data is in another file, which is not read", name);
     } else if (expected >= 0 && count != expected) {
@@ -144,8 +145,8 @@ static int64_t check_dataset(hid_t file, hid_t dataset, H5T_class_t class, const
                    (long long)expected);
     } else if (stored > file_size || (stored == 0 && count > 0) ||
                (hsize_t)count / MOST_COMPRESSION > stored / size + 1) {
-        sadmm_fail(error, SADMM_ERROR_IO, "%s: announces %lld values, but only %llu bytes of data are in the file", name,
-                   (long long)count, (unsigned long long)stored);
+        sadmm_fail(error, SADMM_ERROR_IO, "%s: announces %lld values, but only %llu bytes of data are in the file",
+                   name, (long long)count, (unsigned long long)stored);
     } else {
         return (int64_t)count;
     }
@@ -182,7 +183,8 @@ static sadmm_status read_array(hid_t file, const char *name, H5T_class_t class, 
     return status;
 }
 
-sadmm_status sadmm_h5_read_double(hid_t file, const char *name, int64_t *count, double **data, struct sadmm_error *error)
+sadmm_status sadmm_h5_read_double(hid_t file, const char *name, int64_t *count, double **data,
+                                  struct sadmm_error *error)
 {
     void *block = NULL;
     *data = NULL;
@@ -191,7 +193,8 @@ sadmm_status sadmm_h5_read_double(hid_t file, const char *name, int64_t *count, 
     double *values = block;
     for (int64_t i = 0; i < *count; ++i)
         if (!isfinite(values[i])) {
-            status = sadmm_fail(error, SADMM_ERROR_IO, "%s: value %lld is %g: must be finite", name, (long long)i, values[i]);
+            status = sadmm_fail(error, SADMM_ERROR_IO, "%s: value %lld is %g: must be finite", name, (long long)i,
+                                values[i]);
             sadmm_free(block);
             return status;
         }
@@ -221,7 +224,7 @@ sadmm_status sadmm_h5_read_value(hid_t file, const char *name, int32_t lo, int32
     return sadmm_fail(error, SADMM_ERROR_IO, "%s = %d: must be in [%d, %d]", name, *value, lo, hi);
 }
 
-/* ---- writing -------------------------------------------------------------------------------------------------- */
+/* ---- writing ----------------------------------------------------------------------------------------------------- */
 
 static sadmm_status write_dataset(hid_t file, const char *name, hid_t file_type, hid_t memory_type, hid_t space,
                                   const void *data, struct sadmm_error *error)
@@ -238,14 +241,16 @@ static sadmm_status write_dataset(hid_t file, const char *name, hid_t file_type,
     return status;
 }
 
-sadmm_status sadmm_h5_write_double(hid_t file, const char *name, size_t count, const double *data, struct sadmm_error *error)
+sadmm_status sadmm_h5_write_double(hid_t file, const char *name, size_t count, const double *data,
+                                   struct sadmm_error *error)
 {
     hsize_t size = count;
     return write_dataset(file, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, H5Screate_simple(1, &size, NULL),
                          count ? data : NULL, error);
 }
 
-sadmm_status sadmm_h5_write_int(hid_t file, const char *name, size_t count, const int32_t *data, struct sadmm_error *error)
+sadmm_status sadmm_h5_write_int(hid_t file, const char *name, size_t count, const int32_t *data,
+                                struct sadmm_error *error)
 {
     hsize_t size = count;
     return write_dataset(file, name, H5T_STD_I32LE, H5T_NATIVE_INT32, H5Screate_simple(1, &size, NULL),

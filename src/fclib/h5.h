@@ -28,15 +28,18 @@ bool sadmm_h5_exists(hid_t file, const char *name);
 
 /* Read a dataset whole. `count` in: the number of elements it must have, or -1 for any; out: the number read.
  * *data is for sadmm_free; NULL after an error. Doubles must be finite. Errors: IO, OUT_OF_MEMORY. */
-sadmm_status sadmm_h5_read_double(hid_t file, const char *name, int64_t *count, double **data, struct sadmm_error *error);
+sadmm_status sadmm_h5_read_double(hid_t file, const char *name, int64_t *count, double **data,
+                                  struct sadmm_error *error);
 sadmm_status sadmm_h5_read_int(hid_t file, const char *name, int64_t *count, int32_t **data, struct sadmm_error *error);
 /* One integer in [lo, hi]. */
 sadmm_status sadmm_h5_read_value(hid_t file, const char *name, int32_t lo, int32_t hi, int32_t *value,
                                  struct sadmm_error *error);
 
 /* Write into a new dataset; the parents are made. Errors: IO. */
-sadmm_status sadmm_h5_write_double(hid_t file, const char *name, size_t count, const double *data, struct sadmm_error *error);
-sadmm_status sadmm_h5_write_int(hid_t file, const char *name, size_t count, const int32_t *data, struct sadmm_error *error);
+sadmm_status sadmm_h5_write_double(hid_t file, const char *name, size_t count, const double *data,
+                                   struct sadmm_error *error);
+sadmm_status sadmm_h5_write_int(hid_t file, const char *name, size_t count, const int32_t *data,
+                                struct sadmm_error *error);
 sadmm_status sadmm_h5_write_string(hid_t file, const char *name, const char *text, struct sadmm_error *error);
 /* Remove an object if it is there. Errors: IO. */
 sadmm_status sadmm_h5_remove(hid_t file, const char *name, struct sadmm_error *error);
