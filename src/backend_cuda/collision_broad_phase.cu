@@ -4,8 +4,8 @@
  * sorted keys, ties broken by position. An inner node i covers a range of leaves that begins or ends at i; the right
  * child of a node split after leaf r is numbered r + 1. The node after a subtree whose last leaf is r is therefore
  * either inner node r + 1 or leaf r + 1, and the keys around r tell which: walks need no stack (the observation is
- * Prokopenko and Lebrun-Grandie's, Revising Apetrei's Bounding Volume Hierarchy Construction Algorithm to Allow Stackless
- * Traversal).
+ * Prokopenko and Lebrun-Grandie's, Revising Apetrei's Bounding Volume Hierarchy Construction Algorithm to Allow
+ * Stackless Traversal).
  */
 #include "collision_internal.h"
 #include "collision_parallel.h"

@@ -205,7 +205,9 @@ sadmm_status CUDA(upload)(struct sadmm_context *, void *to, enum cuda_buffer_nam
 sadmm_status CUDA(download)(struct sadmm_context *, const void *from, size_t bytes, struct sadmm_error *error);
 sadmm_status CUDA(wait)(struct sadmm_context *, struct sadmm_error *error);
 
-/* The context's device is current while this lives; then the caller's again. */
+/* The context's device is current while this lives; then the caller's again. (Unnamed: a test program links these sources
+ * twice, for a device and emulated, and each must keep its own.) */
+namespace {
 struct device_scope {
     int before;
     cudaError_t code;
@@ -217,6 +219,7 @@ struct device_scope {
     device_scope(const device_scope &) = delete;
     device_scope &operator=(const device_scope &) = delete;
 };
+} /* namespace */
 #define CUDA_ENTER(c)                   \
     device_scope scope((c)->device);    \
     CUDA_CALL((c), scope.code, "cudaSetDevice")
