@@ -20,7 +20,7 @@ END_TEST
 /* 5 mm: a card that slips off or a house that folds moves by centimetres. The gaps close within 0.5 s. */
 START_TEST(card_houses)
 {
-    const struct standing_case limits = { "card_houses", SADMM_F64, 10.0, 0.5, 5e-3, 1e-3, 1e-4, 2551 };
+    const struct standing_case limits = { "card_houses", SADMM_F64, 10.0, 0.5, 5e-3, 1e-3, 1e-6, 2551 };
     sadmm_world_destroy(run_standing(&limits));
 }
 END_TEST
@@ -55,10 +55,10 @@ START_TEST(sliding_cubes)
     }
     ck_assert_double_eq_tol(sum / steps / rows[_i].contacts, 1.0, 0.15);
     for (int32_t i = 1; i < sadmm_world_body_count(world); ++i) {
-        /* 2 %: the velocity of a sliding cube closes in on the momentum balance by 0.963 an iteration (beta = 6.5 kg,
-         * 4 contacts), so 120 iterations leave 1.1 % of each step's change of speed (docs/scenes.md). */
+        /* 1 %: in the first steps a sliding contact's velocity lags behind the momentum balance (a factor of 0.963 an
+         * iteration, beta = 6.5 kg and 4 contacts); once the change of velocity is steady it must not. */
         double speed = norm3(body_state(world, body_at(world, i)).linear_velocity);
-        ck_assert_double_eq_tol(speed / expected, 1.0, 0.02);
+        ck_assert_double_eq_tol(speed / expected, 1.0, 0.01);
     }
     sadmm_world_destroy(world);
 }

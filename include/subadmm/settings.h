@@ -70,7 +70,8 @@ typedef struct sadmm_settings {
     double correction_speed;     /* cap of the corrective normal speed, m/s, in [0, 1e3]; default 1 */
     double restitution_threshold;/* approach speed under which restitution is ignored, m/s, >= 0; default 0.1 */
 
-    int threads;                 /* CPU threads, in [0, 1024]; 0 = all; default 0. Results do not depend on it */
+    int threads;                 /* CPU threads, in [0, 1024]; 0 = as many as have enough to do, at most all;
+                                    default 0. Results do not depend on it */
 } sadmm_settings;
 
 SADMM_API sadmm_settings sadmm_settings_default(void);

@@ -24,7 +24,7 @@ static const struct cli_option options[] = {
     [OPTION_DT] = {"dt", "S", "time step, s (default the scene's)"},
     [OPTION_ITERATIONS] = {"iterations", "N", "iterations a step (default the scene's)"},
     [OPTION_PENALTY_PERIOD] = {"penalty-period", "N", "iterations between penalty updates, 0 = never"},
-    [OPTION_THREADS] = {"threads", "N", "CPU threads, 0 = all (default)"},
+    [OPTION_THREADS] = {"threads", "N", "CPU threads, 0 = as many as pay (default)"},
     [OPTION_NO_WARM_START] = {"no-warm-start", NULL, "start every step from zero impulses"},
     [OPTION_CERTIFY] = {"certify", NULL, "measure the true error of every step"},
     [OPTION_EXPLAIN] = {"explain", NULL, "say what the last step ran, what it left out and why"},

@@ -21,7 +21,7 @@ static const struct cli_option options[] = {
     [OPTION_LEVEL] = {"penalty-offset", "KG", "c of eq. (13), kg (default: tried automatically from the mean mass)"},
     [OPTION_MASS_FACTOR] = {"penalty-mass-factor", "M", "M of eq. (13) (default 0)"},
     [OPTION_PENALTY_PERIOD] = {"penalty-period", "N", "iterations between penalty updates, 0 = never (default 30)"},
-    [OPTION_THREADS] = {"threads", "N", "CPU threads, 0 = all (default)"},
+    [OPTION_THREADS] = {"threads", "N", "CPU threads, 0 = as many as pay (default)"},
     [OPTION_SOLUTION] = {"solution", "FILE", "write a copy of the problem's file with this solution in it"},
     [OPTION_JSON] = {"json", "[FILE|-]", "write JSON to FILE, or to standard output (-, the default)"},
     [OPTION_QUIET] = {"quiet", NULL, "no table"},

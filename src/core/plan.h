@@ -23,6 +23,9 @@ struct sadmm_plan {
     int threads;            /* resolved, >= 1 */
 };
 
+/* Threads for `points` contact points: as many as `wanted`, or for 0 as many as have enough to do. */
+int sadmm_plan_threads(int wanted, size_t points);
+
 struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struct sadmm_settings *settings);
 
 #endif

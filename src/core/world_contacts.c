@@ -81,7 +81,7 @@ static sadmm_status freeze(const sadmm_world *world, sadmm_problem *problem, dou
     struct sadmm_system system = {.body_count = world->plan.bodies, .rigid = world->start};
     for (size_t i = 0; i < n; ++i) {
         sadmm_system_body(&system, &world->step_settings, (int32_t)i, A + 36 * i, b + 6 * i);
-        memcpy(v + 6 * i, world->start[i].velocity, 6 * sizeof *v);
+        memcpy(v + 6 * i, world->start_velocity + 6 * i, 6 * sizeof *v);
     }
     for (size_t p = 0; p < world->contacts.pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &world->contacts.pairs[p];

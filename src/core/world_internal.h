@@ -19,6 +19,8 @@ struct sadmm_world_body {
     int32_t system_body; /* in the last step, -1: static or not there */
     struct sadmm_rigid rigid;
     double contact_wrench[6];
+    double change[6];  /* of the velocity in the last step */
+    int32_t steady[2]; /* steps in a row with nearly the same change: linear, angular (world_step.c) */
     char name[SADMM_NAME_SIZE];
 };
 
@@ -50,10 +52,11 @@ struct sadmm_world {
     struct sadmm_collision_body *collision_bodies; /* by slot */
     struct sadmm_rigid *start, *next;              /* dynamic bodies: before and after the step */
     double *velocity, *wrench;                     /* dynamic bodies x 6 */
+    double *start_velocity;                        /* dynamic bodies x 6: the warm start */
     double *start_impulse;                         /* points x 3: the warm start */
     int32_t *slot_of;                              /* dynamic body -> slot */
     size_t collision_body_capacity, start_capacity, next_capacity, velocity_capacity, wrench_capacity,
-        start_impulse_capacity, slot_of_capacity;
+        start_velocity_capacity, start_impulse_capacity, slot_of_capacity;
     struct sadmm_plan plan;
     sadmm_settings step_settings;
     bool stepped;
