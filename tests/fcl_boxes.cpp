@@ -4,7 +4,8 @@
 #include <fcl/geometry/shape/box.h>
 #include <fcl/narrowphase/collision.h>
 
-namespace {
+namespace
+{
 
 fcl::Transform3<double> transform(const double R[9], const double x[3])
 {
@@ -22,7 +23,8 @@ fcl::Transform3<double> transform(const double R[9], const double x[3])
 extern "C" int fcl_boxes(const double half_a[3], const double Ra[9], const double xa[3], const double half_b[3],
                          const double Rb[9], const double xb[3], double *depth, double normal[3])
 {
-    const fcl::Box<double> a(2 * half_a[0], 2 * half_a[1], 2 * half_a[2]), b(2 * half_b[0], 2 * half_b[1], 2 * half_b[2]);
+    const fcl::Box<double> a(2 * half_a[0], 2 * half_a[1], 2 * half_a[2]),
+        b(2 * half_b[0], 2 * half_b[1], 2 * half_b[2]);
     const fcl::CollisionRequest<double> request(8, true);
     fcl::CollisionResult<double> result;
     fcl::collide(&a, transform(Ra, xa), &b, transform(Rb, xb), request, result);

@@ -13,7 +13,9 @@
 #include "collision/pair_manifold.h"
 
 /* A deterministic generator: xorshift64*. */
-struct random { uint64_t state; };
+struct random {
+    uint64_t state;
+};
 
 static inline double random_unit(struct random *r) /* [0, 1) */
 {
@@ -35,10 +37,18 @@ struct solid {
 static inline void rotation(double R[9], double ax, double ay, double az, double angle)
 {
     double n = sqrt(ax * ax + ay * ay + az * az), c = cos(angle), s = sin(angle), v = 1 - c;
-    ax /= n; ay /= n; az /= n;
-    R[0] = c + ax * ax * v; R[1] = ax * ay * v - az * s; R[2] = ax * az * v + ay * s;
-    R[3] = ay * ax * v + az * s; R[4] = c + ay * ay * v; R[5] = ay * az * v - ax * s;
-    R[6] = az * ax * v - ay * s; R[7] = az * ay * v + ax * s; R[8] = c + az * az * v;
+    ax /= n;
+    ay /= n;
+    az /= n;
+    R[0] = c + ax * ax * v;
+    R[1] = ax * ay * v - az * s;
+    R[2] = ax * az * v + ay * s;
+    R[3] = ay * ax * v + az * s;
+    R[4] = c + ay * ay * v;
+    R[5] = ay * az * v - ax * s;
+    R[6] = az * ax * v - ay * s;
+    R[7] = az * ay * v + ax * s;
+    R[8] = c + az * az * v;
 }
 
 static inline void random_rotation(struct random *r, double R[9])
@@ -71,7 +81,7 @@ static inline double dot3(const double a[3], const double b[3]) { return a[0] * 
 
 static inline struct solid solid_at(int type, double s0, double s1, double s2, double x, double y, double z)
 {
-    struct solid s = { .type = type, .size = { s0, s1, s2 }, .R = { 1, 0, 0, 0, 1, 0, 0, 0, 1 }, .x = { x, y, z } };
+    struct solid s = {.type = type, .size = {s0, s1, s2}, .R = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .x = {x, y, z}};
     return s;
 }
 
@@ -111,7 +121,7 @@ static inline struct world_manifold touch(const struct solid *a, const struct so
     const struct solid *first = swap ? b : a, *second = swap ? a : b;
     struct pair_pose pose = pair_pose(first->type == SADMM_SHAPE_PLANE, first->R, first->x, second->R, second->x);
     struct manifold m;
-    struct world_manifold w = { 0 };
+    struct world_manifold w = {0};
 
     memset(&m, 0x55, sizeof m); /* nothing may rely on what was there */
     pair_manifold(first->type, v3_load(first->size), second->type, v3_load(second->size), &pose, limit, cache, &m);
@@ -144,7 +154,7 @@ static inline double least_separation(const struct world_manifold *m)
     return least;
 }
 
-/* ---- oracles ------------------------------------------------------------------------------------------------ */
+/* ---- oracles ----------------------------------------------------------------------------------------------------- */
 
 /* Extent of a solid along a direction: half the width of its shadow. Not for planes. */
 static inline double shadow(const struct solid *s, const double d[3])
@@ -160,7 +170,7 @@ static inline double shadow(const struct solid *s, const double d[3])
 /* Separation along the unit direction d, a to b: what b would have to move back along d until they touch. */
 static inline double separation_along(const struct solid *a, const struct solid *b, const double d[3])
 {
-    double t[3] = { b->x[0] - a->x[0], b->x[1] - a->x[1], b->x[2] - a->x[2] };
+    double t[3] = {b->x[0] - a->x[0], b->x[1] - a->x[1], b->x[2] - a->x[2]};
     return dot3(t, d) - shadow(a, d) - shadow(b, d);
 }
 
@@ -195,7 +205,7 @@ static inline double box_separation(const struct solid *a, const struct solid *b
         for (int k = 0; k < 3; ++k) d[k] = n < 3 ? a->R[3 * k + n] : b->R[3 * k + n % 3];
         if (n >= 6) {
             int i = (n - 6) / 3, j = (n - 6) % 3;
-            double e[3] = { a->R[i], a->R[3 + i], a->R[6 + i] }, f[3] = { b->R[j], b->R[3 + j], b->R[6 + j] };
+            double e[3] = {a->R[i], a->R[3 + i], a->R[6 + i]}, f[3] = {b->R[j], b->R[3 + j], b->R[6 + j]};
             d[0] = e[1] * f[2] - e[2] * f[1];
             d[1] = e[2] * f[0] - e[0] * f[2];
             d[2] = e[0] * f[1] - e[1] * f[0];
@@ -203,7 +213,7 @@ static inline double box_separation(const struct solid *a, const struct solid *b
         length = sqrt(dot3(d, d));
         if (length < 1e-6) continue; /* parallel edges: the faces cover them */
         for (int side = -1; side <= 1; side += 2) {
-            double u[3] = { side * d[0] / length, side * d[1] / length, side * d[2] / length };
+            double u[3] = {side * d[0] / length, side * d[1] / length, side * d[2] / length};
             s = separation_along(a, b, u);
             if (s > best) {
                 best = s;
@@ -217,9 +227,10 @@ static inline double box_separation(const struct solid *a, const struct solid *b
 /* Closest point of the solid's core (box; segment or centre without the radius) to p. */
 static inline void project_on_core(const struct solid *s, const double p[3], double out[3])
 {
-    double local[3], d[3] = { p[0] - s->x[0], p[1] - s->x[1], p[2] - s->x[2] };
+    double local[3], d[3] = {p[0] - s->x[0], p[1] - s->x[1], p[2] - s->x[2]};
     for (int k = 0; k < 3; ++k) {
-        double h = s->type == SADMM_SHAPE_BOX ? s->size[k] : (s->type == SADMM_SHAPE_CAPSULE && k == 2 ? s->size[1] : 0);
+        double h =
+            s->type == SADMM_SHAPE_BOX ? s->size[k] : (s->type == SADMM_SHAPE_CAPSULE && k == 2 ? s->size[1] : 0);
         double x = s->R[k] * d[0] + s->R[3 + k] * d[1] + s->R[6 + k] * d[2];
         local[k] = fmin(fmax(x, -h), h);
     }

@@ -44,7 +44,7 @@ static bool meet(const struct sadmm_broad_entry *a, const struct sadmm_broad_ent
 
 static struct sadmm_pair_list brute_force(const struct sadmm_broad_entry *entries, size_t count)
 {
-    struct sadmm_pair_list list = { 0 };
+    struct sadmm_pair_list list = {0};
     for (size_t i = 0; i < count; ++i)
         for (size_t j = i + 1; j < count; ++j)
             if (meet(&entries[i], &entries[j])) ck_assert(sadmm_pair_list_add(&list, (uint32_t)i, (uint32_t)j));
@@ -61,8 +61,8 @@ static void expect_equal(const struct sadmm_pair_list *a, const struct sadmm_pai
 static void expect_complete(const struct sadmm_broad_phase_kind *kind, struct sadmm_broad_phase *bp,
                             const struct sadmm_broad_entry *entries, size_t count)
 {
-    struct sadmm_pair_list found = { 0 }, expected = brute_force(entries, count);
-    struct sadmm_error error = { 0 };
+    struct sadmm_pair_list found = {0}, expected = brute_force(entries, count);
+    struct sadmm_error error = {0};
     ck_assert_int_eq(kind->pairs(bp, entries, count, &found, &error), SADMM_OK);
     size_t reported = found.count;
     sort_unique(&found);
@@ -93,15 +93,15 @@ START_TEST(every_broad_phase_finds_what_brute_force_finds)
     static struct sadmm_broad_entry entries[COUNT];
     uint32_t changed[COUNT];
     for (int groups = 1; groups <= 5; groups += 2) {
-        struct random r = { 17 + (uint64_t)groups };
+        struct random r = {17 + (uint64_t)groups};
         struct sadmm_broad_phase *bp;
-        struct sadmm_error error = { 0 };
+        struct sadmm_error error = {0};
         ck_assert_int_eq(kind->create(&bp, &error), SADMM_OK);
         memset(entries, 0, sizeof entries);
         for (int round = 0; round < 60; ++round) {
             size_t n = 0;
             /* all, a few, none, most: each takes another path; some leave, some come back, some change group or rest */
-            double share = (const double[]){ 1, 0.05, 0, 0.7 }[round % 4];
+            double share = (const double[]){1, 0.05, 0, 0.7}[round % 4];
             for (uint32_t i = 0; i < COUNT; ++i) {
                 if (random_unit(&r) >= share && round > 0) continue;
                 changed[n++] = i;
@@ -131,7 +131,7 @@ START_TEST(boxes_that_touch_or_coincide_meet)
     struct sadmm_broad_entry entries[30];
     uint32_t changed[30];
     struct sadmm_broad_phase *bp;
-    struct sadmm_error error = { 0 };
+    struct sadmm_error error = {0};
     /* a 3 x 3 x 3 grid of unit boxes that share faces, edges and corners: all 351 pairs of the middle's neighbourhood
      * that touch; and three equal boxes at one place */
     for (int i = 0; i < 30; ++i) {
@@ -147,7 +147,7 @@ START_TEST(boxes_that_touch_or_coincide_meet)
     ck_assert_int_eq(kind->create(&bp, &error), SADMM_OK);
     ck_assert_int_eq(kind->update(bp, entries, 30, changed, 30, &error), SADMM_OK);
     expect_complete(kind, bp, entries, 30);
-    struct sadmm_pair_list found = { 0 };
+    struct sadmm_pair_list found = {0};
     ck_assert_int_eq(kind->pairs(bp, entries, 30, &found, &error), SADMM_OK);
     /* 54 face, 72 edge and 32 corner neighbours, and 3 pairs of the equal ones */
     ck_assert_uint_eq(found.count, 54 + 72 + 32 + 3);
@@ -161,11 +161,11 @@ START_TEST(pairs_of_a_few_are_their_share_of_all)
     const struct sadmm_broad_phase_kind *kind = kinds[_i];
     static struct sadmm_broad_entry entries[COUNT];
     uint32_t changed[COUNT], few[COUNT];
-    bool asked[COUNT] = { false };
-    struct random r = { 90 };
+    bool asked[COUNT] = {false};
+    struct random r = {90};
     struct sadmm_broad_phase *bp;
-    struct sadmm_error error = { 0 };
-    struct sadmm_pair_list found = { 0 }, expected;
+    struct sadmm_error error = {0};
+    struct sadmm_pair_list found = {0}, expected;
     size_t n = 0;
     if (!kind->pairs_of) return;
     ck_assert_int_eq(kind->create(&bp, &error), SADMM_OK);
@@ -184,7 +184,8 @@ START_TEST(pairs_of_a_few_are_their_share_of_all)
     sort_unique(&found);
     n = 0;
     for (size_t i = 0; i < expected.count; ++i)
-        if (asked[expected.keys[i] >> 32] || asked[expected.keys[i] & UINT32_MAX]) expected.keys[n++] = expected.keys[i];
+        if (asked[expected.keys[i] >> 32] || asked[expected.keys[i] & UINT32_MAX])
+            expected.keys[n++] = expected.keys[i];
     ck_assert_uint_gt(n, 50);
     expected.count = n;
     expect_equal(&found, &expected);
@@ -200,8 +201,8 @@ START_TEST(the_order_of_insertion_does_not_matter)
     const struct sadmm_broad_phase_kind *kind = kinds[_i];
     static struct sadmm_broad_entry entries[COUNT], partial[COUNT];
     uint32_t order[COUNT];
-    struct random r = { 33 };
-    struct sadmm_error error = { 0 };
+    struct random r = {33};
+    struct sadmm_error error = {0};
     for (uint32_t i = 0; i < COUNT; ++i) {
         random_entry(&r, &entries[i], 2);
         order[i] = i;
@@ -217,8 +218,7 @@ START_TEST(the_order_of_insertion_does_not_matter)
         memset(partial, 0, sizeof partial);
         for (uint32_t i = 0; i < COUNT; ++i) {
             partial[order[i]] = entries[order[i]];
-            if (round % 2 == 0)
-                ck_assert_int_eq(kind->update(bp, partial, COUNT, &order[i], 1, &error), SADMM_OK);
+            if (round % 2 == 0) ck_assert_int_eq(kind->update(bp, partial, COUNT, &order[i], 1, &error), SADMM_OK);
         }
         if (round % 2) ck_assert_int_eq(kind->update(bp, entries, COUNT, order, COUNT, &error), SADMM_OK);
         expect_complete(kind, bp, entries, COUNT);
@@ -233,7 +233,7 @@ START_TEST(broad_phases_survive_lack_of_memory)
     const struct sadmm_broad_phase_kind *kind = kinds[_i];
     static struct sadmm_broad_entry entries[COUNT];
     uint32_t changed[COUNT];
-    struct random r = { 71 };
+    struct random r = {71};
     int failures = 0;
     for (uint32_t i = 0; i < COUNT; ++i) {
         random_entry(&r, &entries[i], 2);
@@ -241,8 +241,8 @@ START_TEST(broad_phases_survive_lack_of_memory)
     }
     for (long n = 0;; ++n) {
         struct sadmm_broad_phase *bp = NULL;
-        struct sadmm_pair_list list = { 0 };
-        struct sadmm_error error = { 0 };
+        struct sadmm_pair_list list = {0};
+        struct sadmm_error error = {0};
         sadmm_status status;
         sadmm_test_fail_allocations_after(n);
         status = kind->create(&bp, &error);
@@ -268,7 +268,7 @@ END_TEST
 
 START_TEST(radix_sort_sorts)
 {
-    struct random r = { 3 };
+    struct random r = {3};
     static uint64_t keys[5000], expected[5000], scratch[5000];
     for (int bits = 1; bits <= 64; bits += 7)
         for (size_t count = 0; count <= 5000; count = count * 3 + 1) {
@@ -281,7 +281,7 @@ START_TEST(radix_sort_sorts)
 }
 END_TEST
 
-/* ---- candidates ------------------------------------------------------------------------------------------------ */
+/* ---- candidates -------------------------------------------------------------------------------------------------- */
 
 struct scene {
     struct sadmm_shape shapes[COUNT];
@@ -323,8 +323,14 @@ static void fill_scene(struct scene *s, struct random *r, int environments)
         }
     }
     s->input = (struct sadmm_collision_input){
-        .shapes = s->shapes, .shape_count = COUNT, .bodies = s->bodies, .body_count = COUNT / 2,
-        .dt = 0.005, .margin = 0.02, .threads = 1, .acceleration = 9.81,
+        .shapes = s->shapes,
+        .shape_count = COUNT,
+        .bodies = s->bodies,
+        .body_count = COUNT / 2,
+        .dt = 0.005,
+        .margin = 0.02,
+        .threads = 1,
+        .acceleration = 9.81,
     };
 }
 
@@ -339,24 +345,24 @@ static bool may_touch(const struct scene *s, const struct sadmm_candidates *c, u
     return sadmm_candidate_meets(c, s->input.margin, i, j);
 }
 
-/* Over many steps with moves small and large, deaths, births and changes of shapes: the list holds every pair that meets,
- * in order, once. */
+/* Over many steps with moves small and large, deaths, births and changes of shapes: the list holds every pair that
+ * meets, in order, once. */
 START_TEST(the_list_of_candidates_is_complete_at_every_step)
 {
-    struct random r = { 400 };
+    struct random r = {400};
     static struct scene s;
     struct sadmm_candidates c;
-    struct sadmm_error error = { 0 };
+    struct sadmm_error error = {0};
     uint32_t revision = 10 * COUNT;
     size_t pairs = 0;
     fill_scene(&s, &r, 1 + 2 * (_i / KINDS));
     ck_assert_int_eq(sadmm_candidates_init(&c, kinds[_i % KINDS], &error), SADMM_OK);
     for (int step = 0; step < 60; ++step) {
-        double stride = (const double[]){ 1e-5, 1e-3, 0, 0.02 }[step % 4];
+        double stride = (const double[]){1e-5, 1e-3, 0, 0.02}[step % 4];
         for (int i = 0; i < COUNT / 2; ++i) {
             struct sadmm_collision_body *body = &s.bodies[i];
             if (body->system_body < 0 && random_unit(&r) > 0.01) continue; /* static bodies may be placed anew */
-            if (step % 8 > 5 && i % 50) continue;                         /* steps in which little moves */
+            if (step % 8 > 5 && i % 50) continue;                          /* steps in which little moves */
             for (int k = 0; k < 3; ++k) body->position[k] += stride * random_in(&r, -1, 1);
         }
         for (int i = 0; i < COUNT; ++i) {
@@ -388,10 +394,10 @@ END_TEST
 /* A scene at rest asks nothing of the broad phase, allocates nothing and keeps its list. */
 START_TEST(rest_costs_no_broad_phase)
 {
-    struct random r = { 2 };
+    struct random r = {2};
     static struct scene s;
     struct sadmm_candidates c;
-    struct sadmm_error error = { 0 };
+    struct sadmm_error error = {0};
     size_t count;
     fill_scene(&s, &r, 1);
     for (int i = 0; i < COUNT / 2; ++i) memset(s.bodies[i].velocity, 0, sizeof s.bodies[i].velocity);

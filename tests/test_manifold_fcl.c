@@ -5,12 +5,12 @@
  */
 #include "manifold_tools.h"
 
-int fcl_boxes(const double half_a[3], const double Ra[9], const double xa[3], const double half_b[3], const double Rb[9],
-              const double xb[3], double *depth, double normal[3]);
+int fcl_boxes(const double half_a[3], const double Ra[9], const double xa[3], const double half_b[3],
+              const double Rb[9], const double xb[3], double *depth, double normal[3]);
 
 static void compare(double thin, uint64_t seed, int pairs)
 {
-    struct random r = { seed };
+    struct random r = {seed};
     int contacts = 0, same_normal = 0;
     for (int n = 0; n < pairs; ++n) {
         struct solid a = box_at(0.05, 0.03, thin, 0, 0, 0), b = box_at(0.05, 0.03, thin, 0, 0, 0);
@@ -23,7 +23,8 @@ static void compare(double thin, uint64_t seed, int pairs)
         double axis[3];
         for (int k = 0; k < 3; ++k) b.x[k] = d[k] * 0.2;
         for (int i = 0; i < 20; ++i) {
-            double gap = box_separation(&a, &b, axis), shift = i < 19 ? fmax(gap, 0) : gap + random_in(&r, -0.1, 0.25) * thickness;
+            double gap = box_separation(&a, &b, axis),
+                   shift = i < 19 ? fmax(gap, 0) : gap + random_in(&r, -0.1, 0.25) * thickness;
             for (int k = 0; k < 3; ++k) b.x[k] -= axis[k] * shift;
         }
         int theirs = fcl_boxes(a.size, a.R, a.x, b.size, b.R, b.x, &depth, normal);

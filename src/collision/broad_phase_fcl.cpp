@@ -44,8 +44,8 @@ struct Proxy : fcl::CollisionObject<double> {
 };
 
 /* A tree that is refitted keeps the shape it was built with: after boxes have mixed, queries take four times as long
- * (measured: 2,000 boxes, 400 steps of 1 cm). It is built anew once every box has moved this many times on average, which
- * costs a few per cent. */
+ * (measured: 2,000 boxes, 400 steps of 1 cm). It is built anew once every box has moved this many times on average,
+ * which costs a few per cent. */
 constexpr size_t moves_before_rebuild = 32;
 
 struct Group {

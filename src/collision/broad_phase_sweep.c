@@ -2,7 +2,8 @@
  *
  * Intervals are sorted by (group, low end) along the axis in which the boxes are spread most relative to their size.
  * Static boxes of group -1 meet every group, so they are kept apart, sorted on their own, and each group is swept
- * together with them. In a pile one axis leaves about n^(2/3) candidates a body: fine to a few thousand bodies, FCL beyond.
+ * together with them. In a pile one axis leaves about n^(2/3) candidates a body: fine to a few thousand bodies, FCL
+ * beyond.
  */
 #include "broad_phase.h"
 

@@ -1,8 +1,8 @@
 /* How a contact of the last step lives on in this one.
  *
- * Identity: the pair of shapes and their revisions (a slot may hold another shape by now), then the feature. Impulses are
- * kept as world vectors; where the normal turned, the normal part goes along the new normal and the tangential part is
- * projected into the new tangent plane, within the friction disc.
+ * Identity: the pair of shapes and their revisions (a slot may hold another shape by now), then the feature. Impulses
+ * are kept as world vectors; where the normal turned, the normal part goes along the new normal and the tangential
+ * part is projected into the new tangent plane, within the friction disc.
  */
 #ifndef SADMM_COLLISION_CONTACT_CARRY_H
 #define SADMM_COLLISION_CONTACT_CARRY_H

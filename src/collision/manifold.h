@@ -45,8 +45,12 @@ struct pair_pose {
 /* How clearly the cached axis must be beaten: this share of the depth, and of the thinner shape's extent. */
 #define MANIFOLD_KEEP_DEPTH ((real)0.1)
 #define MANIFOLD_KEEP_EXTENT ((real)0.005)
-/* Lateral tolerance of clipping, as a share of the smaller face's half extent: corners of aligned boxes stay corners. */
+/* Lateral tolerance of clipping, as a share of the smaller face's half extent: corners of aligned boxes stay
+ * corners. */
 #define MANIFOLD_SNAP ((real)1e-3)
+/* A line contact is given by its two ends as long as nothing between them is deeper by more than this share of the
+ * thinner extent; otherwise the deepest point comes third. */
+#define MANIFOLD_FLAT ((real)1e-4)
 /* cos 8 degrees: axes within this angle are the same direction for the choice of an axis. */
 #define MANIFOLD_COS_NEAR ((real)0.99026806874157036)
 

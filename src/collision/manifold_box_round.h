@@ -39,7 +39,8 @@ SADMM_INLINE int box_core_face(const real lo[3], const real hi[3], const real h[
         int c = (int)cache - 1;
         kept = slab_separation(lo[c / 2], hi[c / 2], h[c / 2], c % 2);
         /* the cached side, too, when it is the same axis: past the midplane the other side is nearer but wrong */
-        if ((best - 1) / 2 == c / 2 || kept >= s_best - MANIFOLD_KEEP_DEPTH * real_abs(kept) - MANIFOLD_KEEP_EXTENT * thin) {
+        if ((best - 1) / 2 == c / 2 ||
+            kept >= s_best - MANIFOLD_KEEP_DEPTH * real_abs(kept) - MANIFOLD_KEEP_EXTENT * thin) {
             best = (int)cache;
             s_best = kept;
         }
@@ -211,10 +212,10 @@ SADMM_INLINE void manifold_capsule_box_inside(real radius, real half, vec3 h, ve
     }
 }
 
-/* Segment p + s u, |s| <= half, with a round of `radius` around it, outside the box: s is its closest parameter, x and q the
- * closest points of segment and box, `length` > 0 their distance. Sets the normal (segment to box). Touching along a
- * line gives the ends of the stretch over the same feature of the box, features first_feature and + 1, the closest point
- * is first_feature + 2. flat: what the closest point must be below the ends to count beside them. */
+/* Segment p + s u, |s| <= half, with a round of `radius` around it, outside the box: x and q the closest points of
+ * segment and box, `length` > 0 their distance. Sets the normal (segment to box). A line contact gives the ends of the
+ * stretch over the same feature of the box, with features first_feature and + 1; where the closest point is deeper than
+ * both by more than `flat`, or there is no line, it comes as first_feature + 2. */
 SADMM_INLINE void manifold_segment_outside(real radius, real half, vec3 h, vec3 p, vec3 u, vec3 x, vec3 q, real length,
                                            real flat, real limit, uint32_t first_feature, struct manifold *m)
 {
@@ -269,7 +270,7 @@ SADMM_INLINE void manifold_capsule_box(real radius, real half, vec3 h, const str
     if (length <= 64 * SADMM_EPSILON * (radius + half + v3_max_abs(h)))
         manifold_capsule_box_inside(radius, half, h, p, u, limit, cache, m);
     else if (length - radius <= limit)
-        manifold_segment_outside(radius, half, h, p, u, x, q, length, (real)0.01 * radius, limit, 1, m);
+        manifold_segment_outside(radius, half, h, p, u, x, q, length, MANIFOLD_FLAT * radius, limit, 1, m);
 }
 
 #endif

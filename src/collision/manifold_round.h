@@ -65,8 +65,8 @@ SADMM_INLINE void segments_closest(vec3 p, vec3 u, real hp, vec3 q, vec3 w, real
     *t = b;
 }
 
-/* Cross-section of two capsules at height z on b's axis: the point of a's axis there, p + s u. Away from the crossing the
- * axes drift apart sideways; that excess is added to the separation along the normal. */
+/* Cross-section of two capsules at height z on b's axis: the point of a's axis there, p + s u. Away from the crossing
+ * the axes drift apart sideways; that excess is added to the separation along the normal. */
 SADMM_INLINE real manifold_capsule_section(const struct manifold *m, vec3 ca, vec3 cb, real radii)
 {
     vec3 d = v3_sub(cb, ca);
@@ -109,7 +109,7 @@ SADMM_INLINE void manifold_capsule_capsule(real ra, real ha, real rb, real hb, c
             vec3 shift = v3_scale(m->normal, (ra - rb) / 2);
             if (s_lo <= limit) manifold_add(m, v3_madd(v3_scale(v3_add(a_lo, b_lo), (real)0.5), 1, shift), s_lo, 1);
             if (s_hi <= limit) manifold_add(m, v3_madd(v3_scale(v3_add(a_hi, b_hi), (real)0.5), 1, shift), s_hi, 2);
-            if (m->count > 0 && real_min(s_lo, s_hi) - closest < (real)0.01 * radii) return;
+            if (m->count > 0 && real_min(s_lo, s_hi) - closest <= MANIFOLD_FLAT * radii) return;
         }
     }
     manifold_add_balls(m, ca, ra, cb, rb, limit, 3);

@@ -51,8 +51,8 @@ static void rotate(const double R[9], vec3 v, double out[3])
 
 /* Write the manifold as a pair with its points; room is there. */
 static void emit(const struct sadmm_candidates *c, const struct sadmm_collision_input *input, uint32_t a, uint32_t b,
-                 const struct manifold *m, const struct sadmm_contact_set *old_set, const struct sadmm_contact_pair *old,
-                 struct sadmm_contact_set *out)
+                 const struct manifold *m, const struct sadmm_contact_set *old_set,
+                 const struct sadmm_contact_pair *old, struct sadmm_contact_set *out)
 {
     const struct sadmm_proxy *pa = &c->proxies[a], *pb = &c->proxies[b];
     struct sadmm_contact_pair *pair = &out->pairs[out->pair_count++];

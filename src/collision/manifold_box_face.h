@@ -1,0 +1,165 @@
+/* Face axis: the face of the other box that looks against the normal is clipped by the sides of the reference face
+ * (Sutherland-Hodgman). The edges of the polygon carry labels, from which the features of its vertices follow. */
+#ifndef SADMM_COLLISION_MANIFOLD_BOX_FACE_H
+#define SADMM_COLLISION_MANIFOLD_BOX_FACE_H
+
+#include "manifold_box_pair.h"
+
+/* A vertex of the clipped polygon: in-plane coordinates and separation, and the edge that leaves it: 0-3 edge of the
+ * incident face, 4-7 side of the reference face (+u, -u, +v, -v). */
+struct clip_vertex {
+    real x, y, z;
+    int out;
+};
+
+/* Keep the part of the polygon with sign * coordinate <= h. */
+SADMM_INLINE int clip_side(const struct clip_vertex *in, int count, int along_y, real sign, real h, real tolerance,
+                           int label, struct clip_vertex *out)
+{
+    int i, n = 0;
+    for (i = 0; i < count; ++i) {
+        const struct clip_vertex *p = &in[i], *q = &in[i + 1 < count ? i + 1 : 0];
+        real dp = sign * (along_y ? p->y : p->x) - h, dq = sign * (along_y ? q->y : q->x) - h;
+        bool inside = dp <= tolerance;
+        if (n > SADMM_MANIFOLD_POINTS) break;
+        if (inside) out[n++] = *p;
+        if (inside != (dq <= tolerance)) {
+            real f = real_clamp(dp / (dp - dq), 0, 1);
+            struct clip_vertex *c = &out[n++];
+            c->x = p->x + f * (q->x - p->x);
+            c->y = p->y + f * (q->y - p->y);
+            c->z = p->z + f * (q->z - p->z);
+            c->out = inside ? label : p->out;
+        }
+    }
+    return n;
+}
+
+/* Points of reference face (axis k, side sg of the reference box hr) against the incident box (hi, axes: columns of R,
+ * centre t, all in the reference frame). owner: 1 when the reference is box 2. Positions are in the reference frame.
+ * Returns the number of points within the limit. */
+SADMM_INLINE int box_clip_face(const real hr[3], const real hi[3], const real R[3][3], const real t[3], int k, real sg,
+                               real limit, int owner, struct manifold *m)
+{
+    int u = k == 2 ? 0 : k + 1, v = u == 2 ? 0 : u + 1, j = 0, ju, jv, q, i, count = 4, base_bits, ref_bits;
+    struct clip_vertex poly[12], other[12];
+    int bits[4];
+    real si, cx, cy, cz, ux, uy, uz, vx, vy, vz, tol_u, tol_v;
+    bool clip_u = false, clip_v = false;
+
+    /* incident face: the axis most against the normal */
+    if (real_abs(R[k][1]) > real_abs(R[k][j])) j = 1;
+    if (real_abs(R[k][2]) > real_abs(R[k][j])) j = 2;
+    si = sg * R[k][j] > 0 ? (real)-1 : (real)1;
+    ju = j == 2 ? 0 : j + 1;
+    jv = ju == 2 ? 0 : ju + 1;
+    base_bits = si > 0 ? 1 << j : 0;
+    ref_bits = sg > 0 ? 1 << k : 0;
+
+    cx = t[u] + si * hi[j] * R[u][j];
+    cy = t[v] + si * hi[j] * R[v][j];
+    cz = sg * (t[k] + si * hi[j] * R[k][j]) - hr[k];
+    ux = hi[ju] * R[u][ju]; uy = hi[ju] * R[v][ju]; uz = sg * hi[ju] * R[k][ju];
+    vx = hi[jv] * R[u][jv]; vy = hi[jv] * R[v][jv]; vz = sg * hi[jv] * R[k][jv];
+    /* the smaller of the two faces says what is near */
+    tol_u = MANIFOLD_SNAP * real_min(hr[u], real_abs(ux) + real_abs(vx));
+    tol_v = MANIFOLD_SNAP * real_min(hr[v], real_abs(uy) + real_abs(vy));
+    for (q = 0; q < 4; ++q) {
+        /* around the face: (+,+), (-,+), (-,-), (+,-) */
+        int pu = q == 0 || q == 3, pv = q < 2;
+        real a = pu ? (real)1 : (real)-1, b = pv ? (real)1 : (real)-1;
+        poly[q].x = cx + a * ux + b * vx;
+        poly[q].y = cy + a * uy + b * vy;
+        poly[q].z = cz + a * uz + b * vz;
+        poly[q].out = q;
+        bits[q] = base_bits | (pu ? 1 << ju : 0) | (pv ? 1 << jv : 0);
+        clip_u = clip_u || real_abs(poly[q].x) > hr[u] + tol_u;
+        clip_v = clip_v || real_abs(poly[q].y) > hr[v] + tol_v;
+    }
+    if (clip_u) {
+        count = clip_side(poly, count, 0, 1, hr[u], tol_u, 4, other);
+        count = clip_side(other, count, 0, -1, hr[u], tol_u, 5, poly);
+    }
+    if (clip_v) {
+        count = clip_side(poly, count, 1, 1, hr[v], tol_v, 6, other);
+        count = clip_side(other, count, 1, -1, hr[v], tol_v, 7, poly);
+    }
+    for (i = 0; i < count; ++i) {
+        const struct clip_vertex *p = &poly[i];
+        int in = poly[i > 0 ? i - 1 : count - 1].out, out = p->out, d;
+        uint32_t feature;
+        real position[3];
+        bool duplicate = false;
+        /* on a corner of the reference face? */
+        bool corner = real_abs(real_abs(p->x) - hr[u]) <= tol_u && real_abs(real_abs(p->y) - hr[v]) <= tol_v;
+        int corner_bits = ref_bits | (p->x > 0 ? 1 << u : 0) | (p->y > 0 ? 1 << v : 0);
+        if (p->z > limit) continue;
+        if (in < 4 && out < 4) {
+            /* vertex of the incident box; where two coincide the id is that of box 1's */
+            feature = corner && !owner ? box_feature_vertex(0, corner_bits)
+                                       : box_feature_vertex(!owner && !corner, bits[out]);
+        } else if (in >= 4 && out >= 4) {
+            /* corner of the reference; collinear leftovers (in == out) carry no information */
+            if (in == out) continue;
+            feature = box_feature_vertex(owner, corner_bits);
+        } else {
+            /* side of the reference face x edge of the incident face */
+            int side = in >= 4 ? in : out, edge = in >= 4 ? out : in;
+            int positive = side == 4 || side == 6, along_v = side < 6; /* the side at +-u runs along v */
+            int e_ref, e_inc, kb = ref_bits != 0, jb = si > 0;
+            /* signs of the two axes after the edge's direction */
+            if (along_v) e_ref = box_edge_id(v, kb, positive);
+            else e_ref = box_edge_id(u, positive, kb);
+            /* edges 0 and 2 run along ju at +-jv, edges 1 and 3 along jv at -+ju */
+            if (edge == 0 || edge == 2) e_inc = box_edge_id(ju, edge == 0, jb);
+            else e_inc = box_edge_id(jv, jb, edge == 3);
+            feature = owner ? box_feature_crossing(e_inc, e_ref) : box_feature_crossing(e_ref, e_inc);
+            if (corner) feature = box_feature_vertex(owner, corner_bits); /* the edge passes by a corner */
+        }
+        for (d = 0; d < m->count; ++d) {
+            real dx = real_abs(m->points[d].position.x - p->x), dy = real_abs(m->points[d].position.y - p->y);
+            duplicate = duplicate || (dx <= tol_u && dy <= tol_v) || m->points[d].feature == feature;
+        }
+        if (duplicate || m->count == SADMM_MANIFOLD_POINTS) continue;
+        position[0] = p->x;
+        position[1] = p->y;
+        position[2] = p->z;
+        manifold_add(m, v3_from_array(position), p->z, feature);
+    }
+    /* in-plane to the reference frame, midway between the incident face and the reference face */
+    for (i = 0; i < m->count; ++i) {
+        real position[3];
+        position[u] = m->points[i].position.x;
+        position[v] = m->points[i].position.y;
+        position[k] = sg * (hr[k] + m->points[i].separation / 2);
+        m->points[i].position = v3_from_array(position);
+    }
+    return m->count;
+}
+
+SADMM_INLINE void box_face_manifold(const struct box_pair *b, int axis, int negative, struct manifold *m)
+{
+    real sg = negative ? (real)-1 : (real)1;
+    int i, j;
+    m->count = 0;
+    m->normal = box_axis_direction(b, axis, negative);
+    if (axis < 3) {
+        box_clip_face(b->h1, b->h2, b->R, b->t, axis, sg, b->limit, 0, m);
+    } else {
+        /* in the frame of 2 the normal from 1 to 2 looks out of 1: the reference side of 2 is opposite */
+        real RT[3][3], t[3];
+        for (i = 0; i < 3; ++i) {
+            for (j = 0; j < 3; ++j) RT[i][j] = b->R[j][i];
+            t[i] = -b->t2[i];
+        }
+        box_clip_face(b->h2, b->h1, RT, t, axis - 3, -sg, b->limit, 1, m);
+        for (i = 0; i < m->count; ++i) {
+            real p[3], q[3];
+            v3_to_array(m->points[i].position, p);
+            for (j = 0; j < 3; ++j) q[j] = b->t[j] + b->R[j][0] * p[0] + b->R[j][1] * p[1] + b->R[j][2] * p[2];
+            m->points[i].position = v3_from_array(q);
+        }
+    }
+}
+
+#endif
