@@ -47,7 +47,7 @@ def main():
     for step in left_out:
         print(f"{step}: left out")
     for log in arguments.logs:
-        step = log.parent.parent.name
+        step = log.parent.parent.name.removeprefix("build-")
         counts = [0, 0, 0]
         if not log.is_file():
             counts[1] = 1

@@ -66,13 +66,15 @@ run_tests() {
     local step=$1 folder=$project/build-$1
     shift
     rm -f "$folder/meson-logs/testlog.json"
-    "${launcher[@]}" meson test -C "$folder" --timeout-multiplier 4 --num-processes "$jobs" --print-errorlogs --quiet "$@" || true
+    "${launcher[@]}" meson test -C "$folder" "${rebuild[@]}" --timeout-multiplier 4 --num-processes "$jobs" \
+        --print-errorlogs --quiet "$@" || true
     logs+=("$folder/meson-logs/testlog.json")
 }
 
 # Sanitizers of older compilers cannot place their shadow memory when a kernel randomises addresses with 32 bits: their
 # tests are started without randomisation. (As meson's --wrapper this would rename the log.)
 launcher=()
+rebuild=(--no-rebuild)
 unrandomised=()
 if setarch "$(uname -m)" -R true 2>/dev/null; then
     unrandomised=(setarch "$(uname -m)" -R)
@@ -95,7 +97,7 @@ step_tsan() {
     say "tsan: thread sanitizer"
     # Only what the tests of this suite need is built.
     configure "$project/build-tsan" --native-file "$project/presets/tsan.ini" "${features[@]}" -Dcpu_isas=avx2 || return 1
-    local launcher=("${unrandomised[@]}")
+    local launcher=("${unrandomised[@]}") rebuild=()
     if ! "${launcher[@]}" meson test -C "$project/build-tsan" --quiet omp_clean >/dev/null; then
         # The program itself says which it is.
         local output
