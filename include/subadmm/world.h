@@ -131,7 +131,18 @@ SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_s
  * names the body), DEVICE, LIMIT. After an error the world is as before the step and stays usable. */
 SADMM_API sadmm_status sadmm_world_step(sadmm_world *world);
 
-typedef struct sadmm_phase_times { double total, collide, assemble, solve, finish; } sadmm_phase_times; /* ms, wall */
+/* Begin a step and return without waiting for it, where the backend can (CUDA without a stop rule); elsewhere the same
+ * as sadmm_world_step. Steps run in order, a few of them at a time; states, wrenches and settings set in between take
+ * effect at the next one. Getters wait for the steps begun so far.
+ * Errors: as sadmm_world_step; they may be those of an earlier step, and then nothing after that step has been done
+ * (sadmm_step_report.step counts what has). With settings.certify the step is waited for. */
+SADMM_API sadmm_status sadmm_world_step_async(sadmm_world *world);
+/* Until all steps begun are done. Errors: the first one of a step, see above. */
+SADMM_API sadmm_status sadmm_world_wait(sadmm_world *world);
+
+/* ms. Wall time on the host; where the backend keeps the world (CUDA), the phases are on the device's clock, and so is the
+ * total of a step begun with sadmm_world_step_async. */
+typedef struct sadmm_phase_times { double total, collide, assemble, solve, finish; } sadmm_phase_times;
 
 typedef struct sadmm_step_report {
     sadmm_backend backend;

@@ -17,9 +17,10 @@
 
 #include "error.h"
 #include "plan.h"
+#include "resident.h"
 #include "system.h"
 
-struct sadmm_context; /* a backend's own */
+struct sadmm_context; /* a backend's own; nothing in it is shared with another context */
 struct sadmm_collision;
 struct sadmm_collision_input;
 
@@ -62,6 +63,8 @@ struct sadmm_kernels {
 
     sadmm_status (*integrate)(struct sadmm_context *, struct sadmm_rigid *next, struct sadmm_error *); /* Q: state after dt */
     sadmm_status (*recover_wrenches)(struct sadmm_context *, double *wrench, struct sadmm_error *);    /* R: (12), (bodies x 6) */
+
+    const struct sadmm_resident_kernels *resident; /* (optional) whole steps without the host (resident.h) */
 };
 
 /* One registration list (registry.c). Returns NULL with a reason when not available; `variant` NULL: the best. */

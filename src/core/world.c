@@ -57,7 +57,8 @@ void sadmm_world_destroy(sadmm_world *world)
     void *blocks[] = {world->bodies, world->shapes, world->shape_generations, world->disabled_pairs.keys,
                       world->disabled_pairs.values, world->friction_pairs.keys, world->friction_pairs.values,
                       world->collision_bodies, world->start, world->next, world->velocity, world->wrench,
-                      world->start_velocity, world->start_impulse, world->slot_of};
+                      world->start_velocity, world->start_impulse, world->slot_of,
+                      world->resident.steady, world->resident.edits};
     for (size_t i = 0; i < sizeof blocks / sizeof *blocks; ++i) sadmm_free(blocks[i]);
     sadmm_free(world);
 }

@@ -89,6 +89,7 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def,
     double orientation[4];
     if (!def || !id) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def or id is NULL");
     TRY(check_def(def, orientation, error));
+    TRY(sadmm_world_take_back(world));
     size_t slot = free_slot(world);
     if (slot >= (size_t)1 << 27)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d bodies: a world holds at most 2^27", world->body_count);
@@ -125,6 +126,7 @@ sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id)
 {
     struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", &world->error);
     if (!body) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_world_take_back(world));
     for (size_t s = 0; s < world->shape_slots; ++s)
         if (world->shapes[s].alive && world->shapes[s].body == (int32_t)id.slot - 1) sadmm_world_kill_shape(world, s);
     sadmm_pair_table_forget(&world->disabled_pairs, id.slot - 1);
@@ -160,6 +162,7 @@ sadmm_status sadmm_world_body_state(const sadmm_world *world, sadmm_body_id id, 
 {
     const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", (struct sadmm_error *)&world->error);
     if (!body) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_world_pull_bodies(world));
     memcpy(state->position, body->rigid.position, sizeof state->position);
     memcpy(state->orientation, body->rigid.orientation, sizeof state->orientation);
     memcpy(state->linear_velocity, body->rigid.velocity, sizeof state->linear_velocity);
@@ -178,10 +181,13 @@ sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, co
     TRY(sadmm_check_orientation("state->orientation", state->orientation, orientation, error));
     TRY(check_motion("state->linear_velocity", "state->angular_velocity", state->linear_velocity, state->angular_velocity,
                      body->type, error));
+    /* A static body is part of what the backend was given once. */
+    TRY(body->system_body < 0 ? sadmm_world_take_back(world) : sadmm_world_edit_room(world));
     memcpy(body->rigid.position, state->position, sizeof state->position);
     memcpy(body->rigid.orientation, orientation, sizeof orientation);
     memcpy(body->rigid.velocity, state->linear_velocity, sizeof state->linear_velocity);
     memcpy(body->rigid.velocity + 3, state->angular_velocity, sizeof state->angular_velocity);
+    sadmm_world_edit(world, body, SADMM_EDIT_STATE);
     return SADMM_OK;
 }
 
@@ -189,6 +195,7 @@ sadmm_status sadmm_world_body_def(const sadmm_world *world, sadmm_body_id id, sa
 {
     const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", (struct sadmm_error *)&world->error);
     if (!body) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_world_pull_bodies(world));
     memset(def, 0, sizeof *def);
     def->type = body->type;
     def->mass = body->rigid.mass;
@@ -210,8 +217,10 @@ sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, c
     if (!force || !torque) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "force or torque is NULL");
     TRY(sadmm_check_vector("force", force, 3, WRENCH_LIMIT, error));
     TRY(sadmm_check_vector("torque", torque, 3, WRENCH_LIMIT, error));
+    TRY(body->system_body < 0 ? sadmm_world_take_back(world) : sadmm_world_edit_room(world));
     memcpy(body->rigid.wrench, force, 3 * sizeof *force);
     memcpy(body->rigid.wrench + 3, torque, 3 * sizeof *torque);
+    sadmm_world_edit(world, body, SADMM_EDIT_WRENCH);
     return SADMM_OK;
 }
 
@@ -220,6 +229,7 @@ sadmm_status sadmm_world_body_contact_wrench(const sadmm_world *world, sadmm_bod
     struct sadmm_error *error = (struct sadmm_error *)&world->error;
     const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_world_pull_bodies(world));
     if (!world->stepped || !world->step_settings.recover_wrenches)
         return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE,
                           "contact wrenches: there was no step yet, or settings.recover_wrenches was false");
@@ -235,6 +245,7 @@ sadmm_status sadmm_world_set_body_pair_contact(sadmm_world *world, sadmm_body_id
     if (!sadmm_world_find_body(world, a, "a", error) || !sadmm_world_find_body(world, b, "b", error))
         return SADMM_ERROR_STALE_ID;
     if (a.slot == b.slot) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "a and b are the same body");
+    TRY(sadmm_world_take_back(world));
     uint64_t key = sadmm_pair_key(a.slot - 1, b.slot - 1);
     if (!enabled) return sadmm_pair_table_set(&world->disabled_pairs, key, 0, error);
     sadmm_pair_table_remove(&world->disabled_pairs, key);

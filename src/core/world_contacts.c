@@ -5,8 +5,16 @@
 #include "system_math.h"
 #include "world_internal.h"
 
+#define TRY(call)                                      \
+    do {                                               \
+        sadmm_status try_status = (call);              \
+        if (try_status != SADMM_OK) return try_status; \
+    } while (0)
+
 int32_t sadmm_world_contact_count(const sadmm_world *world)
 {
+    if (sadmm_world_settle(world) != SADMM_OK) return 0;
+    if (world->resident.contacts_behind) return world->contacts_readable ? world->report.contacts : 0;
     return world->contacts_readable ? (int32_t)world->contacts.point_count : 0;
 }
 
@@ -66,6 +74,7 @@ sadmm_status sadmm_world_contacts(const sadmm_world *world, int32_t first, int32
                           (long long)first + count, total);
     if (count == 0) return SADMM_OK;
     if (!contacts) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "contacts is NULL");
+    TRY(sadmm_world_pull_contacts(world));
     size_t p = pair_of(&world->contacts, first);
     for (int32_t k = first; k < first + count; ++k) {
         while (k >= world->contacts.pairs[p].first + world->contacts.pairs[p].count) ++p;
@@ -106,6 +115,7 @@ sadmm_status sadmm_world_freeze(const sadmm_world *world, sadmm_problem *problem
 {
     struct sadmm_error *error = (struct sadmm_error *)&world->error;
     if (!problem) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "problem is NULL");
+    TRY(sadmm_world_pull_contacts(world));
     if (!world->stepped || !world->contacts_readable)
         return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE,
                           "there is no step to freeze: none was made yet, or something was removed since");

@@ -62,10 +62,11 @@ size_t sadmm_world_explain(const sadmm_world *world, char *out, size_t size)
     struct text t = {out, out ? size : 0, 0};
     const struct sadmm_plan *plan = &world->plan;
     line(&t, "backend      %s\n", world->why[0] ? world->why : "chosen at the first step");
-    if (!world->stepped) return t.length;
+    if (sadmm_world_settle(world) != SADMM_OK || !world->stepped) return t.length;
     line(&t, "precision    %s, %d thread%s\n", world->report.precision == SADMM_F32 ? "f32" : "f64", world->report.threads,
          world->report.threads == 1 ? "" : "s");
-    line(&t, "broad phase  %s\n", sadmm_collision_broad_phase_name());
+    if (world->resident.loaded) line(&t, "world        kept by the backend: contacts are found there, the host reads on demand\n");
+    else line(&t, "broad phase  %s\n", sadmm_collision_broad_phase_name());
     line(&t, "bodies       %d dynamic (static ones take no part in the solve)\n", plan->bodies);
     explain_constraints(&t, plan);
     explain_options(&t, plan, &world->step_settings);

@@ -19,8 +19,7 @@ struct sadmm_world_body {
     int32_t system_body; /* in the last step, -1: static or not there */
     struct sadmm_rigid rigid;
     double contact_wrench[6];
-    double change[6];  /* of the velocity in the last step */
-    int32_t steady[2]; /* steps in a row with nearly the same change: linear, angular (world_step.c) */
+    struct sadmm_steady steady;
     char name[SADMM_NAME_SIZE];
 };
 
@@ -61,12 +60,50 @@ struct sadmm_world {
     sadmm_settings step_settings;
     bool stepped;
 
+    /* Where a backend keeps the world (world_resident.c). */
+    struct {
+        bool loaded;         /* the backend has the world; nothing but states and wrenches has changed since */
+        bool running;        /* steps were enqueued and not waited for */
+        bool bodies_behind;  /* the bodies above are older than the backend's */
+        bool contacts_behind;
+        int64_t done, repeats; /* steps since it was loaded, as far as known; repeated ones */
+        struct sadmm_steady *steady; /* dynamic bodies */
+        struct sadmm_resident_edit *edits; /* since the last step was enqueued */
+        size_t steady_capacity, edit_count, edit_capacity;
+    } resident;
+
     const struct sadmm_kernels *kernels; /* chosen at the first step */
     struct sadmm_context *context;
     char why[SADMM_WHY_SIZE];
     struct sadmm_certificate_workspace certificate_workspace;
     sadmm_step_report report;
 };
+
+/* Dynamic bodies in slot order into the arrays of the last step, and all bodies as collision sees them. */
+sadmm_status sadmm_world_gather(sadmm_world *world);
+struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *world);
+struct sadmm_system sadmm_world_system(sadmm_world *world);
+/* The choice of the kernels, at the first step. */
+sadmm_status sadmm_world_choose_backend(sadmm_world *world);
+/* SADMM_ERROR_NON_FINITE that names a dynamic body. */
+sadmm_status sadmm_world_not_finite(sadmm_world *world, int32_t body);
+
+/* ---- world_resident.c ---- */
+
+/* Can this step be made by a backend that keeps the world? */
+bool sadmm_world_may_reside(const sadmm_world *world);
+/* Enqueue a step; `wait`: until it is done, with its report. */
+sadmm_status sadmm_world_resident_step(sadmm_world *world, bool wait);
+/* Until every enqueued step is done. The error of a step that failed is returned once. */
+sadmm_status sadmm_world_settle(const sadmm_world *world);
+/* Bring the bodies (or contacts and everything else) of the last step back, where the backend is ahead. */
+sadmm_status sadmm_world_pull_bodies(const sadmm_world *world);
+sadmm_status sadmm_world_pull_contacts(const sadmm_world *world);
+/* Both, and from here on the host's world is the one that counts: before anything but a state or a wrench is changed. */
+sadmm_status sadmm_world_take_back(sadmm_world *world);
+/* Remember a change of a body for the backend. Makes room only: nothing can fail once the body has been changed. */
+sadmm_status sadmm_world_edit_room(sadmm_world *world);
+void sadmm_world_edit(sadmm_world *world, const struct sadmm_world_body *body, uint32_t what);
 
 /* The slot of a live object, or NULL with SADMM_ERROR_STALE_ID set on `error`. */
 struct sadmm_world_body *sadmm_world_find_body(const sadmm_world *world, sadmm_body_id id, const char *argument,

@@ -69,6 +69,7 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
     if (!body) return SADMM_ERROR_STALE_ID;
     if (!def) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def is NULL");
     TRY(check_def(body, def, orientation, error));
+    TRY(sadmm_world_take_back(world));
 
     size_t slot = 0;
     if ((size_t)world->shape_count == world->shape_slots)
@@ -119,6 +120,7 @@ void sadmm_world_kill_shape(sadmm_world *world, size_t slot)
 sadmm_status sadmm_world_remove_shape(sadmm_world *world, sadmm_shape_id id)
 {
     if (!sadmm_world_find_shape(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_world_take_back(world));
     sadmm_world_kill_shape(world, id.slot - 1);
     return SADMM_OK;
 }
@@ -171,9 +173,11 @@ sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_shape_id a,
     if (a.slot == b.slot) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "a and b are the same shape");
     uint64_t key = sadmm_pair_key(a.slot - 1, b.slot - 1);
     if (friction == -1) {
+        TRY(sadmm_world_take_back(world));
         sadmm_pair_table_remove(&world->friction_pairs, key);
         return SADMM_OK;
     }
     TRY(sadmm_check_range("friction (or -1 for the geometric mean)", friction, 0, 1e6, error));
+    TRY(sadmm_world_take_back(world));
     return sadmm_pair_table_set(&world->friction_pairs, key, friction, error);
 }

@@ -7,6 +7,8 @@
  *     finish        integrate (Q), wrenches (R)
  *     certify       if asked for
  *     commit        states back into the slots; nothing before this line changes a body
+ *
+ * A backend that keeps the world runs the same schedule on its own (world_resident.c).
  */
 #include <math.h>
 #include <string.h>
@@ -29,7 +31,7 @@ static bool grow(void *array, size_t *capacity, size_t needed, size_t size)
 /* Settled boxes have about ten contacts each; AUTO needs an order of magnitude before the first contact is known. */
 enum { EXPECTED_CONTACTS_PER_BODY = 8 };
 
-static sadmm_status choose_backend(sadmm_world *world)
+sadmm_status sadmm_world_choose_backend(sadmm_world *world)
 {
     if (world->context) return SADMM_OK;
     int64_t expected = (int64_t)world->dynamic_count * EXPECTED_CONTACTS_PER_BODY;
@@ -38,36 +40,7 @@ static sadmm_status choose_backend(sadmm_world *world)
     return world->kernels->create(world->def.device, &world->context, &world->error);
 }
 
-/* The velocity a solve starts from. A contact that slides holds its impulse at the cone's edge whatever the velocity
- * does, so a step's change of speed has to come from the momentum balance alone, by a factor m / (m + J^T beta J) an
- * iteration: a few per cent of it are still missing after a hundred. Where the last steps changed a body's velocity
- * by the same amount (sliding under gravity or friction), the next one starts from that change and nothing is missing.
- * Only after three such steps: with few iterations velocities jitter, and following the jitter would feed it. */
-enum { STEADY_STEPS = 3 };
-static const double STEADY_SHARE = 0.25;
-
-static void start_velocity(const struct sadmm_world_body *body, double velocity[6])
-{
-    for (int k = 0; k < 6; ++k)
-        velocity[k] = body->rigid.velocity[k] + (body->steady[k / 3] >= STEADY_STEPS ? body->change[k] : 0);
-}
-
-static void keep_change(struct sadmm_world_body *body, const struct sadmm_rigid *next)
-{
-    for (int part = 0; part < 2; ++part) {
-        double size = 0, differs = 0;
-        for (int k = 3 * part; k < 3 * part + 3; ++k) {
-            double change = next->velocity[k] - body->rigid.velocity[k], difference = change - body->change[k];
-            size += change * change;
-            differs += difference * difference;
-            body->change[k] = change;
-        }
-        bool same = differs <= STEADY_SHARE * STEADY_SHARE * size;
-        body->steady[part] = same ? (body->steady[part] < STEADY_STEPS ? body->steady[part] + 1 : STEADY_STEPS) : 0;
-    }
-}
-
-static sadmm_status gather(sadmm_world *world)
+sadmm_status sadmm_world_gather(sadmm_world *world)
 {
     /* One at least: a system without bodies is still one of rigid bodies. */
     size_t n = (size_t)world->dynamic_count + 1, slots = world->body_slots;
@@ -91,7 +64,7 @@ static sadmm_status gather(sadmm_world *world)
         if (!body->alive || body->type == SADMM_BODY_STATIC) continue;
         out->system_body = body->system_body = dynamic;
         world->start[dynamic] = body->rigid;
-        start_velocity(body, world->velocity + 6 * (size_t)dynamic);
+        steady_start(&body->rigid, &body->steady, world->velocity + 6 * (size_t)dynamic);
         memcpy(world->start_velocity + 6 * (size_t)dynamic, world->velocity + 6 * (size_t)dynamic,
                6 * sizeof *world->velocity);
         world->slot_of[dynamic++] = (int32_t)slot;
@@ -99,7 +72,7 @@ static sadmm_status gather(sadmm_world *world)
     return SADMM_OK;
 }
 
-static sadmm_status find_contacts(sadmm_world *world)
+struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *world)
 {
     struct sadmm_collision_input input = {
         .shapes = world->shapes,
@@ -115,6 +88,12 @@ static sadmm_status find_contacts(sadmm_world *world)
         .friction_values = world->friction_pairs.values,
         .friction_pair_count = world->friction_pairs.count,
     };
+    return input;
+}
+
+static sadmm_status find_contacts(sadmm_world *world)
+{
+    struct sadmm_collision_input input = sadmm_world_collision_input(world);
     return world->kernels->find_contacts(world->context, world->collision, &input, &world->contacts, &world->error);
 }
 
@@ -137,7 +116,7 @@ static bool finite_state(const struct sadmm_rigid *body)
     return sum == 0;
 }
 
-static sadmm_status not_finite(sadmm_world *world, int32_t body)
+sadmm_status sadmm_world_not_finite(sadmm_world *world, int32_t body)
 {
     int32_t slot = world->slot_of[body];
     return sadmm_fail(&world->error, SADMM_ERROR_NON_FINITE,
@@ -148,7 +127,7 @@ static sadmm_status not_finite(sadmm_world *world, int32_t body)
 static sadmm_status check_next(sadmm_world *world)
 {
     for (int32_t i = 0; i < world->dynamic_count; ++i)
-        if (!finite_state(&world->next[i])) return not_finite(world, i);
+        if (!finite_state(&world->next[i])) return sadmm_world_not_finite(world, i);
     return SADMM_OK;
 }
 
@@ -156,13 +135,13 @@ static sadmm_status check_next(sadmm_world *world)
 static sadmm_status name_culprit(sadmm_world *world)
 {
     for (size_t k = 0; k < 6 * (size_t)world->dynamic_count; ++k)
-        if (!isfinite(world->velocity[k])) return not_finite(world, (int32_t)(k / 6));
+        if (!isfinite(world->velocity[k])) return sadmm_world_not_finite(world, (int32_t)(k / 6));
     for (size_t p = 0; p < world->contacts.pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &world->contacts.pairs[p];
         for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
             for (int j = 0; j < 3; ++j)
                 if (!isfinite(world->contacts.points[k].impulse[j]))
-                    return not_finite(world, pair->body_b >= 0 ? pair->body_b : pair->body_a);
+                    return sadmm_world_not_finite(world, pair->body_b >= 0 ? pair->body_b : pair->body_a);
     }
     return SADMM_ERROR_NON_FINITE;
 }
@@ -171,7 +150,7 @@ static void commit(sadmm_world *world)
 {
     for (int32_t i = 0; i < world->dynamic_count; ++i) {
         struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
-        keep_change(body, &world->next[i]);
+        steady_keep(&body->steady, &body->rigid, &world->next[i]);
         body->rigid = world->next[i];
         if (world->plan.wrenches) memcpy(body->contact_wrench, world->wrench + 6 * (size_t)i, sizeof body->contact_wrench);
     }
@@ -186,7 +165,7 @@ static double deepest(const struct sadmm_contact_set *contacts)
     return depth;
 }
 
-static struct sadmm_system make_system(sadmm_world *world)
+struct sadmm_system sadmm_world_system(sadmm_world *world)
 {
     struct sadmm_system system = {
         .body_count = world->dynamic_count,
@@ -205,14 +184,14 @@ static sadmm_status try_step(sadmm_world *world, sadmm_step_report *report, bool
     struct sadmm_solve_report solve = {0};
     double begin = sadmm_clock_ms();
 
-    TRY(choose_backend(world));
+    
     kernels = world->kernels;
-    TRY(gather(world));
+    TRY(sadmm_world_gather(world));
     TRY(find_contacts(world));
     *found = true;
     double collided = sadmm_clock_ms();
 
-    struct sadmm_system system = make_system(world);
+    struct sadmm_system system = sadmm_world_system(world);
     world->plan = sadmm_plan_make(&system, settings);
     TRY(keep_start_impulses(world));
     sadmm_status status = sadmm_schedule_solve(kernels, world->context, &system, settings, &world->plan, &solve,
@@ -247,10 +226,12 @@ static sadmm_status try_step(sadmm_world *world, sadmm_step_report *report, bool
     return SADMM_OK;
 }
 
-sadmm_status sadmm_world_step(sadmm_world *world)
+/* A step made by the host, kernel by kernel. */
+static sadmm_status host_step(sadmm_world *world)
 {
     sadmm_step_report report = world->report;
     bool found = false;
+    TRY(sadmm_world_take_back(world));
     sadmm_status status = try_step(world, &report, &found);
     if (status != SADMM_OK) {
         world->contacts_readable = false;
@@ -265,9 +246,24 @@ sadmm_status sadmm_world_step(sadmm_world *world)
     return SADMM_OK;
 }
 
+sadmm_status sadmm_world_step(sadmm_world *world)
+{
+    TRY(sadmm_world_choose_backend(world));
+    return sadmm_world_may_reside(world) ? sadmm_world_resident_step(world, true) : host_step(world);
+}
+
+sadmm_status sadmm_world_step_async(sadmm_world *world)
+{
+    TRY(sadmm_world_choose_backend(world));
+    return sadmm_world_may_reside(world) ? sadmm_world_resident_step(world, false) : host_step(world);
+}
+
+sadmm_status sadmm_world_wait(sadmm_world *world) { return sadmm_world_settle(world); }
+
 sadmm_status sadmm_world_report(const sadmm_world *world, sadmm_step_report *report)
 {
     if (!report) return sadmm_fail((struct sadmm_error *)&world->error, SADMM_ERROR_INVALID_ARGUMENT, "report is NULL");
+    TRY(sadmm_world_settle(world));
     *report = world->report;
     return SADMM_OK;
 }
@@ -289,6 +285,7 @@ static uint64_t hash_doubles(uint64_t hash, const double *x, int count)
 uint64_t sadmm_world_state_hash(const sadmm_world *world)
 {
     uint64_t hash = UINT64_C(0xcbf29ce484222325);
+    if (sadmm_world_pull_bodies(world) != SADMM_OK) return 0;
     for (size_t slot = 0; slot < world->body_slots; ++slot) {
         const struct sadmm_world_body *body = &world->bodies[slot];
         if (!body->alive) continue;

@@ -1,0 +1,49 @@
+/* The velocity a solve starts from.
+ *
+ * A contact that slides holds its impulse at the cone's edge whatever the velocity does, so a step's change of speed has
+ * to come from the momentum balance alone, by a factor m / (m + J^T beta J) an iteration: a few per cent of it are still
+ * missing after a hundred. Where the last steps changed a body's velocity by the same amount (sliding under gravity or
+ * friction), the next one starts from that change and nothing is missing. Only after three such steps: with few
+ * iterations velocities jitter, and following the jitter would feed it.
+ */
+#ifndef SADMM_CORE_STEADY_H
+#define SADMM_CORE_STEADY_H
+
+#include "math/real.h"
+#include "system.h"
+
+/* What is remembered of a body's last steps. */
+struct sadmm_steady {
+    double change[6];  /* of the velocity in the last step */
+    int32_t streak[2]; /* steps in a row with nearly the same change: linear, angular */
+};
+
+enum { STEADY_STEPS = 3 };
+/* Changes that differ by less than this share are the same. */
+#define STEADY_SHARE 0.25
+
+SADMM_INLINE void steady_start(const struct sadmm_rigid *body, const struct sadmm_steady *steady, double velocity[6])
+{
+    for (int k = 0; k < 6; ++k)
+        velocity[k] = body->velocity[k] + (steady->streak[k / 3] >= STEADY_STEPS ? steady->change[k] : 0);
+}
+
+/* The step made `body` into `next`. */
+SADMM_INLINE void steady_keep(struct sadmm_steady *steady, const struct sadmm_rigid *body,
+                              const struct sadmm_rigid *next)
+{
+    for (int part = 0; part < 2; ++part) {
+        double size = 0, differs = 0;
+        for (int k = 3 * part; k < 3 * part + 3; ++k) {
+            double change = next->velocity[k] - body->velocity[k], difference = change - steady->change[k];
+            size += change * change;
+            differs += difference * difference;
+            steady->change[k] = change;
+        }
+        bool same = differs <= STEADY_SHARE * STEADY_SHARE * size;
+        int32_t before = steady->streak[part];
+        steady->streak[part] = same ? (before < STEADY_STEPS ? before + 1 : STEADY_STEPS) : 0;
+    }
+}
+
+#endif
