@@ -22,7 +22,7 @@ static __device__ uint64_t spread(uint64_t x)
     return (x | x << 2) & 0x1249249249249249u;
 }
 
-static __device__ uint64_t morton(const struct collision_layout &layout, const double x[3])
+static __device__ uint64_t morton(const struct collision_grid &layout, const double x[3])
 {
     const double most = (double)((1 << MORTON_BITS) - 1);
     uint64_t code = 0;
@@ -35,10 +35,48 @@ static __device__ uint64_t morton(const struct collision_layout &layout, const d
     return code;
 }
 
+/* The grid covers three times what holds nine in ten of a sample of the movers: a body far away must not spoil it. One
+ * block; thread t takes a body of the t-th share of the slots and finds its rank by comparing with all. */
+static __global__ void __launch_bounds__(COLLISION_THREADS) grid_kernel(const __grid_constant__ collision_view v)
+{
+#ifdef SADMM_CUDA_EMULATED
+    double(*const samples)[3] = (double(*)[3])cuda_emulation_shared();
+    double(*const bounds)[3] = samples + COLLISION_THREADS;
+#else
+    __shared__ double samples[COLLISION_THREADS][3], bounds[2][3];
+#endif
+    const int t = (int)threadIdx.x;
+    const int32_t slot = (int32_t)((int64_t)v.body_count * t / COLLISION_THREADS);
+    const bool stands = v.body_count <= t || v.bodies[slot].system_body < 0;
+    for (int k = 0; k < 3; ++k) {
+        samples[t][k] = stands ? HUGE_VAL : v.bodies[slot].position[k]; /* sorts to the end */
+        if (t < 2) bounds[t][k] = 0;
+    }
+    __syncthreads();
+    int rank[3] = {0, 0, 0}, count = 0;
+    for (int other = 0; other < COLLISION_THREADS; ++other) {
+        count += samples[other][0] < HUGE_VAL;
+        for (int k = 0; k < 3; ++k) {
+            const double there = samples[other][k], here = samples[t][k];
+            rank[k] += there < here || (there == here && other < t);
+        }
+    }
+    for (int k = 0; k < 3 && !stands; ++k) {
+        if (rank[k] == count / 20) bounds[0][k] = samples[t][k];
+        if (rank[k] == count - 1 - count / 20) bounds[1][k] = samples[t][k];
+    }
+    __syncthreads();
+    if (t > 0) return;
+    double range = 0;
+    for (int k = 0; k < 3; ++k) range = fmax(range, bounds[1][k] - bounds[0][k]);
+    for (int k = 0; k < 3; ++k) v.grid->origin[k] = 0.5 * (bounds[0][k] + bounds[1][k]) - 1.5 * range;
+    v.grid->scale = range > 0 && range < HUGE_VAL ? (double)(1 << MORTON_BITS) / (3 * range) : 0;
+}
+
 static __global__ void __launch_bounds__(COLLISION_THREADS) place_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t i = collision_thread(COLLISION_THREADS);
-    if (i >= v.leaf_count + v.plane_count) return;
+    if (i >= v.leaf_count + v.plane_count || halted(v)) return;
     const uint32_t slot = v.present[i];
     const struct sadmm_shape &shape = v.shapes[slot];
     const struct sadmm_collision_body &body = v.bodies[shape.body];
@@ -63,10 +101,10 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) place_kernel(const _
     v.placed[slot] = node;
 
     const uint64_t group = body.environment < 0 ? 0 : (uint64_t)body.environment;
-    const int rest = LEAF_CLASS_SHIFT - v.layout.group_bits;
-    uint64_t key = shape_radius(proxy.type, proxy.size) >= v.layout.large ? LEAF_LARGE : 0;
+    const int rest = LEAF_CLASS_SHIFT - v.group_bits;
+    uint64_t key = shape_radius(proxy.type, proxy.size) >= v.large ? LEAF_LARGE : 0;
     if (!moves) key = LEAF_STATIC;
-    v.leaf_keys[i] = key << LEAF_CLASS_SHIFT | group << rest | morton(v.layout, proxy.x) >> (3 * MORTON_BITS - rest);
+    v.leaf_keys[i] = key << LEAF_CLASS_SHIFT | group << rest | morton(*v.grid, proxy.x) >> (3 * MORTON_BITS - rest);
     v.leaf_slots[i] = slot;
 }
 
@@ -268,6 +306,7 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) tiles_kernel(const _
 
 void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels)
 {
+    kernels->grid = grid_kernel;
     kernels->place = place_kernel;
     kernels->build = build_kernel;
     kernels->refit = refit_kernel;

@@ -23,7 +23,7 @@ struct collision_buffer {
 enum buffer_name {
     /* device */
     PROXIES, FILTERS, PLACED, LEAF_KEYS, LEAF_KEYS_2, LEAF_SLOTS, LEAF_SLOTS_2, NODES, PARENTS, ARRIVALS,
-    COUNTER, CANDIDATES, CANDIDATES_2, MANIFOLDS, MATCHES, SIZES, PLACES, TEMP,
+    COUNTER, GRID, CANDIDATES, CANDIDATES_2, MANIFOLDS, MATCHES, SIZES, PLACES, TEMP,
     PAIRS, POINTS, PAIR_KEYS, COUNTS, PAIRS_2, POINTS_2, PAIR_KEYS_2, COUNTS_2,
     SHAPES, BODIES, PRESENT, PLANES, DISABLED_PAIRS, FRICTION_PAIRS, FRICTION_VALUES,
     /* pinned: first what was uploaded to the last buffers above, in their order */
@@ -35,7 +35,7 @@ enum { SET_BUFFERS = COUNTS_2 - COUNTS, INPUTS = PINNED_SHAPES - SHAPES };
 
 static const char *const buffer_names[BUFFERS] = {
     "placed shapes", "filters", "boxes", "tree keys", "sorted tree keys", "leaves", "sorted leaves", "tree", "parents",
-    "arrivals", "counter", "candidates", "sorted candidates", "manifolds", "matches", "sizes", "places", "sort",
+    "arrivals", "counter", "grid", "candidates", "sorted candidates", "manifolds", "matches", "sizes", "places", "sort",
     "contact pairs", "contact points", "contact keys", "contact counts",
     "contact pairs", "contact points", "contact keys", "contact counts",
     "shapes", "bodies", "list of shapes", "planes", "disabled pairs", "friction pairs", "friction values",
@@ -50,8 +50,6 @@ enum { TREE_FROM = 512 };
 static const int64_t MOST_CANDIDATES = INT32_MAX / SADMM_MAX_POINTS;
 /* A mover of this many median radii is large. */
 static const double LARGE = 8;
-/* Bodies that the extent of the scene is estimated from. */
-enum { SAMPLES = 256 };
 
 struct contact_counts {
     int32_t pairs, points;
@@ -190,12 +188,14 @@ static sadmm_status launch(struct sadmm_cuda_collision *c, collision_kernel kern
                            int block, struct sadmm_error *error)
 {
     const unsigned blocks = (unsigned)((threads + block - 1) / block);
+    const size_t shared = kernel == c->kernels.grid ? sizeof(double[COLLISION_THREADS + 2][3]) : 0; /* emulated */
     if (threads <= 0) return SADMM_OK;
     c->kernel = name;
 #ifdef SADMM_CUDA_EMULATED
     const emulated_call call = {kernel, c->view};
-    cudaError_t code = cuda_emulation_launch(run_emulated, blocks, (unsigned)block, 0, false, call, 0);
+    cudaError_t code = cuda_emulation_launch(run_emulated, blocks, (unsigned)block, shared, false, call, 0);
 #else
+    (void)shared;
     const dim3 grid(blocks), threads_a_block((unsigned)block);
     void *parameters[] = {&c->view};
     cudaError_t code = cudaLaunchKernel((const void *)kernel, grid, threads_a_block, parameters, 0, c->stream);
@@ -274,10 +274,10 @@ static sadmm_status list_shapes(struct sadmm_cuda_collision *c, const struct sad
         return sadmm_fail_memory(error, "collision's list of planes");
     v->leaf_count = (int32_t)leaves;
     v->plane_count = (int32_t)planes;
-    v->layout.large = HUGE_VAL;
+    v->large = HUGE_VAL;
     if (leaves > 0) {
         std::nth_element(c->radii, c->radii + leaves / 2, c->radii + leaves);
-        v->layout.large = LARGE * c->radii[leaves / 2];
+        v->large = LARGE * c->radii[leaves / 2];
     }
     return SADMM_OK;
 }
@@ -299,38 +299,17 @@ static sadmm_status list_planes(struct sadmm_cuda_collision *c, const struct sad
     return upload_input(c, PLANES, c->planes, count, sizeof *c->planes, false, error);
 }
 
-/* Where the Morton grid lies and how many bits the groups need. Only speed depends on the grid, but a body far away
- * must not spoil it: it covers three times what holds nine in ten of a sample. */
-static void lay_out(struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input)
+static int32_t group_bits(const struct sadmm_collision_input *input)
 {
-    struct collision_layout *layout = &c->view.layout;
-    double samples[3][SAMPLES], range = 0, middle[3] = {0, 0, 0};
-    size_t count = 0, stride = input->body_count / SAMPLES + 1;
-    int32_t last_group = 0;
-    for (size_t i = 0; i < input->body_count; ++i) last_group = std::max(last_group, input->bodies[i].environment);
-    for (layout->group_bits = 0; last_group >> layout->group_bits; ++layout->group_bits) {}
-    for (size_t i = 0; i < input->body_count; i += stride) {
-        /* of every stride the first mover */
-        size_t j = i;
-        while (j < input->body_count && j < i + stride && input->bodies[j].system_body < 0) ++j;
-        if (j == input->body_count || j == i + stride) continue;
-        for (int k = 0; k < 3; ++k) samples[k][count] = input->bodies[j].position[k];
-        ++count;
-    }
-    for (int k = 0; k < 3 && count > 0; ++k) {
-        double *low = samples[k] + count / 20, *high = samples[k] + (count - 1 - count / 20);
-        std::nth_element(samples[k], low, samples[k] + count);
-        const double from = *low;
-        std::nth_element(samples[k], high, samples[k] + count);
-        range = std::max(range, *high - from);
-        middle[k] = 0.5 * (*high + from);
-    }
-    for (int k = 0; k < 3; ++k) layout->origin[k] = middle[k] - 1.5 * range;
-    layout->scale = range > 0 && range < HUGE_VAL ? (double)(1 << MORTON_BITS) / (3 * range) : 0;
+    int32_t last = 0, bits = 0;
+    for (size_t i = 0; i < input->body_count; ++i) last = std::max(last, input->bodies[i].environment);
+    while (last >> bits) ++bits;
+    return bits;
 }
 
+/* `bodies`: on the device already; NULL: the input's. */
 static sadmm_status take_input(struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input,
-                               struct sadmm_error *error)
+                               const struct sadmm_collision_body *bodies, struct sadmm_error *error)
 {
     struct collision_view *v = &c->view;
     if (input->shape_count > (size_t)INT32_MAX / 2 || input->body_count > (size_t)INT32_MAX ||
@@ -344,7 +323,7 @@ static sadmm_status take_input(struct sadmm_cuda_collision *c, const struct sadm
                          error));
         TRY(upload_input(c, SHAPES, input->shapes, input->shape_count, sizeof *input->shapes, true, error));
     }
-    TRY(upload_input(c, BODIES, input->bodies, input->body_count, sizeof *input->bodies, true, error));
+    if (!bodies) TRY(upload_input(c, BODIES, input->bodies, input->body_count, sizeof *input->bodies, true, error));
     TRY(list_planes(c, input, error));
     TRY(upload_input(c, DISABLED_PAIRS, input->disabled_body_pairs, input->disabled_body_pair_count,
                      sizeof *input->disabled_body_pairs, false, error));
@@ -352,10 +331,12 @@ static sadmm_status take_input(struct sadmm_cuda_collision *c, const struct sadm
                      sizeof *input->friction_pairs, false, error));
     TRY(upload_input(c, FRICTION_VALUES, input->friction_values, input->friction_pair_count,
                      sizeof *input->friction_values, false, error));
-    lay_out(c, input);
 
     v->shapes = in<struct sadmm_shape>(c, SHAPES);
-    v->bodies = in<struct sadmm_collision_body>(c, BODIES);
+    v->bodies = bodies ? bodies : in<struct sadmm_collision_body>(c, BODIES);
+    v->body_count = (int32_t)input->body_count;
+    v->group_bits = group_bits(input);
+    v->halt = nullptr;
     v->present = in<uint32_t>(c, PRESENT);
     v->planes = in<uint64_t>(c, PLANES);
     v->disabled_pairs = in<uint64_t>(c, DISABLED_PAIRS);
@@ -389,6 +370,7 @@ static sadmm_status make_shape_room(struct sadmm_cuda_collision *c, size_t slots
         TRY(room(c, ARRIVALS, leaves, sizeof *v->arrivals, error));
     }
     TRY(room(c, COUNTER, 1, sizeof *v->candidate_count, error));
+    TRY(room(c, GRID, 1, sizeof *v->grid, error));
     v->proxies = in<struct sadmm_proxy>(c, PROXIES);
     v->filters = in<struct collision_filter>(c, FILTERS);
     v->placed = in<struct collision_node>(c, PLACED);
@@ -398,6 +380,7 @@ static sadmm_status make_shape_room(struct sadmm_cuda_collision *c, size_t slots
     v->parents = in<int32_t>(c, PARENTS);
     v->arrivals = in<int32_t>(c, ARRIVALS);
     v->candidate_count = in<unsigned long long>(c, COUNTER);
+    v->grid = in<struct collision_grid>(c, GRID);
     return SADMM_OK;
 }
 
@@ -419,7 +402,11 @@ static sadmm_status make_set_room(struct sadmm_cuda_collision *c, int which, siz
     TRY(room(c, PAIRS + shift, pairs, sizeof(struct sadmm_contact_pair), error));
     TRY(room(c, POINTS + shift, points, sizeof(struct sadmm_contact_point), error));
     TRY(room(c, PAIR_KEYS + shift, pairs, sizeof(uint64_t), error));
-    return room(c, COUNTS + shift, 1, sizeof(struct sadmm_cuda_contact_counts), error);
+    if (in<void>(c, COUNTS + shift)) return SADMM_OK;
+    TRY(room(c, COUNTS + shift, 1, sizeof(struct sadmm_cuda_contact_counts), error));
+    CUDA_CALL(c, cudaMemsetAsync(in<void>(c, COUNTS + shift), 0, sizeof(struct sadmm_cuda_contact_counts), c->stream),
+              "cudaMemsetAsync(counts)");
+    return SADMM_OK;
 }
 
 static sadmm_status make_candidate_room(struct sadmm_cuda_collision *c, struct sadmm_error *error)
@@ -432,17 +419,20 @@ static sadmm_status make_candidate_room(struct sadmm_cuda_collision *c, struct s
     TRY(room(c, MATCHES, candidates, sizeof *v->matches, error));
     TRY(room(c, SIZES, candidates + 1, sizeof *v->sizes, error));
     TRY(room(c, PLACES, candidates + 1, sizeof *v->places, error));
-    TRY(make_set_room(c, 1 - c->current, candidates, (size_t)c->point_room, error));
     v->manifolds = in<struct manifold>(c, MANIFOLDS);
     v->matches = in<int32_t>(c, MATCHES);
     v->sizes = in<uint64_t>(c, SIZES);
     v->places = in<uint64_t>(c, PLACES);
     v->candidate_room = (int32_t)c->candidate_room;
     v->point_room = (int32_t)c->point_room;
-    v->before = set_of(c, c->current);
-    v->before_count = c->counts[c->current].pairs;
-    v->after = set_of(c, 1 - c->current);
     return SADMM_OK;
+}
+
+/* From the other set into this one. */
+static void use_sets(struct sadmm_cuda_collision *c, int into)
+{
+    c->view.before = set_of(c, 1 - into);
+    c->view.after = set_of(c, into);
 }
 
 /* Memory that sorts and scans of these sizes need. */
@@ -477,6 +467,8 @@ static sadmm_status build_tree(struct sadmm_cuda_collision *c, struct sadmm_erro
     uint32_t *const slots[2] = {in<uint32_t>(c, LEAF_SLOTS), in<uint32_t>(c, LEAF_SLOTS_2)};
     size_t bytes = c->buffers[TEMP].capacity;
     int at = 0;
+    v->leaf_keys = keys[0];
+    v->leaf_slots = slots[0];
     c->kernel = "leaf sort";
     CUDA_CALL(c, COLLISION(sort)(in<void>(c, TEMP), &bytes, keys, slots, v->leaf_count, 64, &at, c->stream), c->kernel);
     v->leaf_keys = keys[at];
@@ -517,6 +509,17 @@ static sadmm_status make_contacts(struct sadmm_cuda_collision *c, struct sadmm_e
     return launch(c, c->kernels.emit, "contacts", (int64_t)v->candidate_room * POINT_LANES, COLLISION_THREADS, error);
 }
 
+/* Places, and with them the tree where it pays. */
+static sadmm_status place_shapes(struct sadmm_cuda_collision *c, bool tree, struct sadmm_error *error)
+{
+    const struct collision_view *v = &c->view;
+    c->view.leaf_keys = in<uint64_t>(c, LEAF_KEYS);
+    c->view.leaf_slots = in<uint32_t>(c, LEAF_SLOTS);
+    if (tree) TRY(launch(c, c->kernels.grid, "grid of the tree", 1, COLLISION_THREADS, error));
+    TRY(launch(c, c->kernels.place, "placing of the shapes", v->leaf_count + v->plane_count, COLLISION_THREADS, error));
+    return tree ? build_tree(c, error) : SADMM_OK;
+}
+
 /* More than needed, so that a growing number of contacts does not repeat every step. */
 static int64_t generous(int64_t needed, int64_t most) { return std::min(needed + needed / 4, most); }
 
@@ -533,10 +536,12 @@ static sadmm_status run_stages(struct sadmm_cuda_collision *c, size_t slots, str
 
     TRY(make_shape_room(c, slots, tree, error));
     TRY(make_temp_room(c, v->leaf_count, (int)c->candidate_room, error));
-    TRY(launch(c, c->kernels.place, "placing of the shapes", v->leaf_count + v->plane_count, COLLISION_THREADS, error));
-    if (tree) TRY(build_tree(c, error));
+    TRY(make_set_room(c, c->current, 0, 0, error));
+    TRY(place_shapes(c, tree, error));
     for (;;) {
         TRY(make_candidate_room(c, error));
+        TRY(make_set_room(c, 1 - c->current, (size_t)c->candidate_room, (size_t)c->point_room, error));
+        use_sets(c, 1 - c->current);
         TRY(make_temp_room(c, v->leaf_count, (int)c->candidate_room, error));
         TRY(find_candidates(c, tree, error));
         TRY(make_contacts(c, error));
@@ -640,7 +645,7 @@ extern "C" sadmm_status COLLISION(find)(struct sadmm_cuda_collision *c, void *st
     ENTER(c);
     TRY(begin_work(c, stream, error));
     TRY(room(c, PINNED_COUNTS, 1, sizeof counts, error));
-    TRY(take_input(c, input, error));
+    TRY(take_input(c, input, nullptr, error));
     TRY(run_stages(c, input->shape_count, &counts, error));
     c->pending = false; /* run_stages has waited */
     c->current = 1 - c->current;
@@ -682,6 +687,100 @@ extern "C" sadmm_status COLLISION(download)(struct sadmm_cuda_collision *c, void
     contacts->point_count = points;
     return SADMM_OK;
 }
+
+/* ---- enqueued finds -------------------------------------------------------------------------------------------- */
+
+extern "C" sadmm_status COLLISION(attach)(struct sadmm_cuda_collision *c, void *stream,
+                                          const struct sadmm_collision_input *input,
+                                          const struct sadmm_collision_body *bodies, const int32_t *halt,
+                                          struct sadmm_error *error)
+{
+    c->can_undo = false;
+    ENTER(c);
+    TRY(begin_work(c, stream, error));
+    TRY(take_input(c, input, bodies, error));
+    c->view.halt = halt;
+    return make_shape_room(c, input->shape_count, c->view.leaf_count >= c->tree_from, error);
+}
+
+/* Grow a buffer and keep what it holds. */
+static sadmm_status keep_room(struct sadmm_cuda_collision *c, int name, size_t count, size_t size,
+                              struct sadmm_error *error)
+{
+    struct collision_buffer old = c->buffers[name];
+    if (!old.data || count * size <= old.capacity) return room(c, name, count, size, error);
+    c->buffers[name].data = nullptr; /* the capacity stays: growth is by half at least */
+    sadmm_status status = room(c, name, count, size, error);
+    if (status == SADMM_OK) {
+        cudaError_t code = cudaMemcpyAsync(in<void>(c, name), old.data, old.capacity, cudaMemcpyDeviceToDevice, c->stream);
+        if (code == cudaSuccess) code = cudaStreamSynchronize(c->stream);
+        if (code != cudaSuccess) status = fail(c, code, "cudaMemcpyAsync on the device", error);
+    }
+    if (status != SADMM_OK) {
+        release(c, name);
+        c->buffers[name] = old;
+        return status;
+    }
+    (void)cudaFree(old.data);
+    return SADMM_OK;
+}
+
+extern "C" sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *c, int64_t *candidates, int64_t *points,
+                                           struct sadmm_error *error)
+{
+    const int64_t likely = std::max((int64_t)1024, (int64_t)8 * c->view.leaf_count);
+    ENTER(c);
+    TRY(wait(c, error));
+    if (*candidates > MOST_CANDIDATES)
+        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%lld pairs of shapes may touch: at most %d can be indexed",
+                          (long long)*candidates, (int)MOST_CANDIDATES);
+    const int64_t first_points = c->point_room > 0 ? c->point_room : likely;
+    c->candidate_room = std::max(c->candidate_room, *candidates > 0 ? *candidates : std::min(likely, MOST_CANDIDATES));
+    c->point_room = std::max(first_points, *points);
+    TRY(make_candidate_room(c, error));
+    TRY(make_temp_room(c, c->view.leaf_count, (int)c->candidate_room, error));
+    for (int which = 0; which < 2; ++which) {
+        const int shift = which * SET_BUFFERS;
+        TRY(keep_room(c, PAIRS + shift, (size_t)c->candidate_room, sizeof(struct sadmm_contact_pair), error));
+        TRY(keep_room(c, PAIR_KEYS + shift, (size_t)c->candidate_room, sizeof(uint64_t), error));
+        TRY(keep_room(c, POINTS + shift, (size_t)c->point_room, sizeof(struct sadmm_contact_point), error));
+        TRY(make_set_room(c, which, 0, 0, error));
+    }
+    *candidates = c->candidate_room;
+    *points = c->point_room;
+    return SADMM_OK;
+}
+
+extern "C" sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *c, void *stream, int into,
+                                           struct sadmm_error *error)
+{
+    const bool tree = c->view.leaf_count >= c->tree_from;
+    c->stream = (cudaStream_t)stream;
+    c->pending = true;
+    use_sets(c, into);
+    TRY(place_shapes(c, tree, error));
+    TRY(find_candidates(c, tree, error));
+    return make_contacts(c, error);
+}
+
+extern "C" struct sadmm_cuda_contacts COLLISION(set)(const struct sadmm_cuda_collision *c, int which)
+{
+    const struct collision_set set = set_of(c, which);
+    struct sadmm_cuda_contacts out = {set.pairs, set.points, set.counts, {}};
+    return out;
+}
+
+extern "C" void COLLISION(settle)(struct sadmm_cuda_collision *c, int current,
+                                  struct sadmm_cuda_contact_counts counts)
+{
+    c->current = current;
+    c->counts[current].pairs = counts.pairs;
+    c->counts[current].points = counts.points;
+    c->can_undo = false;
+    c->pending = false;
+}
+
+extern "C" int COLLISION(current)(const struct sadmm_cuda_collision *c) { return c->current; }
 
 extern "C" void COLLISION(undo)(struct sadmm_cuda_collision *c)
 {

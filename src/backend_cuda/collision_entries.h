@@ -24,6 +24,28 @@ sadmm_status COLLISION(find)(struct sadmm_cuda_collision *collision, void *strea
 sadmm_status COLLISION(download)(struct sadmm_cuda_collision *collision, void *stream,
                                  struct sadmm_contact_set *contacts, struct sadmm_error *error);
 
+/* ---- for steps that are enqueued: no host in between ---- */
+
+/* Take what a find takes from the host, once; `bodies` (by body slot) will be on the device, written before each
+ * enqueued find, and are as input->bodies now. `halt`, on the device: while it is not 0, enqueued finds do nothing.
+ * Everything enqueued earlier must be done. The current set stays. */
+sadmm_status COLLISION(attach)(struct sadmm_cuda_collision *collision, void *stream,
+                               const struct sadmm_collision_input *input, const struct sadmm_collision_body *bodies,
+                               const int32_t *halt, struct sadmm_error *error);
+/* Room for so many candidates and points in both sets, which keep what they hold. 0: what a scene of this size is likely
+ * to need. Everything enqueued must be done. *candidates and *points: what there is room for now, at least as much. */
+sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *collision, int64_t *candidates, int64_t *points,
+                                struct sadmm_error *error);
+/* Launches alone, so that a graph may record them: find contacts into set `into` (0 or 1), from the other one. The counts
+ * say afterwards whether everything fitted (nothing is written to the set when not). */
+sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *collision, void *stream, int into,
+                                struct sadmm_error *error);
+/* A set's pointers; counts are not filled. */
+struct sadmm_cuda_contacts COLLISION(set)(const struct sadmm_cuda_collision *collision, int which);
+/* Which set is the current one, and with how much in it, after enqueued finds. */
+void COLLISION(settle)(struct sadmm_cuda_collision *collision, int current, struct sadmm_cuda_contact_counts counts);
+int COLLISION(current)(const struct sadmm_cuda_collision *collision);
+
 /* Put back the set that the last successful find replaced. Does nothing when the last find failed or was undone. */
 void COLLISION(undo)(struct sadmm_cuda_collision *collision);
 

@@ -1,5 +1,6 @@
 /* Contact finding on the device: the kernels' view, the pipeline's insides.
  *
+ *   grid     where the Morton grid lies, from a sample of the bodies               one block
  *   place    pose, box and filter of every shape                                   a thread a shape
  *   tree     Morton codes, radix sort, Karras' hierarchy, boxes bottom up          (few shapes: not needed)
  *   pairs    candidates: boxes overlap and the pair may meet                       a thread a shape
@@ -55,10 +56,9 @@ enum { FILTER_TYPE = 0xff, FILTER_MOVES = 0x100 };
  * shape touches. */
 enum { LEAF_CLASS_SHIFT = 62, LEAF_LARGE = 1, LEAF_STATIC = 2 };
 
-struct collision_layout {
-    double origin[3], scale; /* of the Morton grid */
-    double large;            /* radius from which a mover is large, m */
-    int32_t group_bits;
+/* Where the Morton grid lies. Only speed depends on it. */
+struct collision_grid {
+    double origin[3], scale;
 };
 
 /* Numbers of the step. */
@@ -84,7 +84,11 @@ struct collision_view {
     int32_t leaf_count, plane_count, disabled_count, friction_count;
     int32_t shared_planes;                         /* the first ones: of group -1 */
     struct collision_step step;
-    struct collision_layout layout;
+    int32_t group_bits;                            /* of the leaf keys */
+    double large;                                  /* radius from which a mover is large, m */
+    int32_t body_count;                            /* slots */
+    struct collision_grid *grid;                   /* of this step */
+    const int32_t *halt;                           /* not NULL and not 0: do nothing */
 
     struct sadmm_proxy *proxies;                   /* by slot */
     struct collision_filter *filters;              /* by slot */
@@ -104,16 +108,18 @@ struct collision_view {
     uint64_t *sizes, *places;                      /* by candidate: pairs << 32 | points; its exclusive sum */
 
     struct collision_set before, after;
-    int32_t before_count;                          /* pairs */
     int32_t point_room;
 };
 
 typedef void (*collision_kernel)(const collision_view);
 
+static __device__ __forceinline__ bool halted(const collision_view &v) { return v.halt && *v.halt != 0; }
+
 /* Candidates that the kernels after the pairs stage work on: none when they did not all fit. */
 static __device__ __forceinline__ int32_t usable_candidates(const collision_view &v)
 {
     unsigned long long found = *v.candidate_count;
+    if (halted(v)) return 0;
     return found <= (unsigned long long)v.candidate_room ? (int32_t)found : 0;
 }
 
@@ -124,7 +130,7 @@ static __device__ __forceinline__ int64_t collision_thread(int block)
 
 /* The kernels, each beside what it does. */
 struct collision_kernels {
-    collision_kernel place, build, refit, clear, walk, tiles, narrow, emit;
+    collision_kernel grid, place, build, refit, clear, walk, tiles, narrow, emit;
 };
 void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels);
 void COLLISION(narrow_phase_kernels)(struct collision_kernels *kernels);

@@ -15,6 +15,7 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) emit_kernel(const __
 {
     const int64_t thread = collision_thread(COLLISION_THREADS), i = thread / POINT_LANES;
     const int32_t lane = (int32_t)(thread % POINT_LANES);
+    if (halted(v)) return;
     const uint64_t total = v.places[v.candidate_room];
     if (thread == 0) {
         v.after.counts->candidates = (int64_t)*v.candidate_count;

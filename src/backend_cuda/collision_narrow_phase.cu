@@ -18,7 +18,7 @@ static __global__ void __launch_bounds__(NARROW_THREADS) narrow_kernel(const __g
     const uint64_t key = v.candidates[i];
     const uint32_t a = (uint32_t)(key >> v.slot_bits), b = (uint32_t)(key & ((UINT64_C(1) << v.slot_bits) - 1));
     const struct sadmm_proxy *pa = &v.proxies[a], *pb = &v.proxies[b];
-    int64_t before = find_key(v.before.keys, v.before_count, ordered_key(a, b));
+    int64_t before = find_key(v.before.keys, v.before.counts->pairs, ordered_key(a, b));
     if (before >= 0 && v.before.pairs[before].reserved != revision_of_pair(pa->revision, pb->revision)) before = -1;
 
     const double limit = pair_limit(v.step.margin, pa->thin, pb->thin, pa->velocity, pb->velocity, pa->spin, pb->spin,

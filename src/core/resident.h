@@ -10,7 +10,6 @@
 
 #include "error.h"
 #include "plan.h"
-#include "steady.h"
 #include "system.h"
 
 struct sadmm_context;

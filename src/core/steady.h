@@ -12,12 +12,6 @@
 #include "math/real.h"
 #include "system.h"
 
-/* What is remembered of a body's last steps. */
-struct sadmm_steady {
-    double change[6];  /* of the velocity in the last step */
-    int32_t streak[2]; /* steps in a row with nearly the same change: linear, angular */
-};
-
 enum { STEADY_STEPS = 3 };
 /* Changes that differ by less than this share are the same. */
 #define STEADY_SHARE 0.25

@@ -27,6 +27,12 @@ struct sadmm_rigid {
     double wrench[6];       /* external, N, N m, world */
 };
 
+/* What is remembered of a body's last steps (steady.h). */
+struct sadmm_steady {
+    double change[6];  /* of the velocity in the last step */
+    int32_t streak[2]; /* steps in a row with nearly the same change: linear, angular */
+};
+
 enum { SADMM_MAX_POINTS = 8 };
 
 /* Contacts of one pair of shapes: one normal, up to SADMM_MAX_POINTS points. */

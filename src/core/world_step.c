@@ -15,6 +15,7 @@
 
 #include "memory.h"
 #include "registry.h"
+#include "steady.h"
 #include "world_internal.h"
 
 #define TRY(call)                                      \

@@ -203,7 +203,7 @@ enum cudaError_t {
     cudaErrorLaunchFailure,
     cudaErrorLaunchTimeout,
 };
-enum { cudaMemcpyHostToDevice, cudaMemcpyDeviceToHost };
+enum { cudaMemcpyHostToDevice, cudaMemcpyDeviceToHost, cudaMemcpyDeviceToDevice };
 enum cudaDeviceAttr {
     cudaDevAttrMultiProcessorCount,
     cudaDevAttrMaxSharedMemoryPerBlockOptin,
