@@ -770,6 +770,8 @@ extern "C" struct sadmm_cuda_contacts COLLISION(set)(const struct sadmm_cuda_col
     return out;
 }
 
+extern "C" void COLLISION(set_time_step)(struct sadmm_cuda_collision *c, double dt) { c->view.step.dt = dt; }
+
 extern "C" void COLLISION(settle)(struct sadmm_cuda_collision *c, int current,
                                   struct sadmm_cuda_contact_counts counts)
 {

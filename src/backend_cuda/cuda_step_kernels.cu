@@ -1,0 +1,227 @@
+/* The step's own kernels (cuda_step.h): start, admit, check, finish, commit, edits. */
+#include "cuda_double.h"
+
+#include "../core/steady.h"
+#include "cuda_solution.h"
+#include "cuda_step.h"
+
+static __device__ __forceinline__ unsigned long long nanoseconds(void)
+{
+#ifdef SADMM_CUDA_EMULATED
+    return 0;
+#else
+    unsigned long long now;
+    asm volatile("mov.u64 %0, %%globaltimer;" : "=l"(now));
+    return now;
+#endif
+}
+
+static __device__ __forceinline__ bool finite_numbers(const double *x, int count)
+{
+    double sum = 0;
+    for (int k = 0; k < count; ++k) sum += x[k] - x[k];
+    return sum == 0;
+}
+
+/* ---- edits ----------------------------------------------------------------------------------------------------- */
+
+static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    int32_t i = thread_index();
+    if (i >= args.count || v.live->halt) return;
+    const struct sadmm_resident_edit *edit = &args.edits[i];
+    struct sadmm_rigid *body = const_cast<struct sadmm_rigid *>(&v.step.before[edit->body]);
+    if (edit->what & SADMM_EDIT_STATE) {
+        for (int k = 0; k < 3; ++k) body->position[k] = edit->position[k];
+        for (int k = 0; k < 4; ++k) body->orientation[k] = edit->orientation[k];
+        for (int k = 0; k < 6; ++k) body->velocity[k] = edit->velocity[k];
+    }
+    if (edit->what & SADMM_EDIT_WRENCH)
+        for (int k = 0; k < 6; ++k) body->wrench[k] = edit->wrench[k];
+}
+
+/* ---- start ----------------------------------------------------------------------------------------------------- */
+
+static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    int32_t i = thread_index();
+    if (v.live->halt) return;
+    if (i == 0) {
+        v.step.control->depth = 0;
+        v.step.control->culprit = INT32_MAX;
+        v.step.control->stamps[STAMP_START] = nanoseconds();
+    }
+    if (i >= v.bodies) return;
+    const struct sadmm_rigid *body = &v.step.before[i];
+    struct sadmm_collision_body *out = &v.step.bodies[v.step.slot_of_body[i]];
+    for (int k = 0; k < 3; ++k) out->position[k] = body->position[k];
+    for (int k = 0; k < 4; ++k) out->orientation[k] = body->orientation[k];
+    for (int k = 0; k < 6; ++k) out->velocity[k] = body->velocity[k];
+    steady_start(body, &v.step.steady_before[i], v.step.start_velocity + 6 * (size_t)i);
+}
+
+/* ---- gates ----------------------------------------------------------------------------------------------------- */
+
+/* One thread. What was found is this step's when it fits. */
+static __global__ void admit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    if (threadIdx.x > 0 || v.live->halt) return;
+    const struct sadmm_cuda_contact_counts counts = *v.step.counts;
+    v.step.control->stamps[STAMP_FOUND] = nanoseconds();
+    if (counts.candidates > v.step.candidate_room || counts.points > v.step.point_room || counts.pairs > v.pair_room) {
+        v.live->halt = HALT_ROOM;
+        return;
+    }
+    v.live->bodies = v.bodies;
+    v.live->pairs = counts.pairs;
+    v.live->points = counts.points;
+}
+
+/* One thread. Is this what the step was planned for? */
+static __global__ void check_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    if (threadIdx.x > 0 || v.live->halt) return;
+    const struct cuda_facts *facts = v.facts;
+    const struct cuda_step_guess guess = v.step.guess;
+    const int32_t pairs = v.live->pairs, rows = pairs == 0 ? 0 : facts->rough > 0 ? 3 : 1;
+    const int32_t warm = pairs > 0 && 2 * (int64_t)facts->warm >= pairs;
+    if (rows != guess.contact_rows || facts->point_slots > guess.point_slots || (guess.warm >= 0 && warm != guess.warm))
+        v.live->halt = HALT_PLAN;
+}
+
+/* One thread, between assembly and iterations. */
+static __global__ void assembled_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    if (threadIdx.x == 0) v.step.control->stamps[STAMP_ASSEMBLED] = nanoseconds();
+}
+
+/* ---- finish ---------------------------------------------------------------------------------------------------- */
+
+static __device__ bool finish_body(const cuda_view &v, int32_t i)
+{
+    const int32_t raw = v.body_of[i];
+    const struct sadmm_rigid body = v.step.before[raw];
+    struct sadmm_steady steady = v.step.steady_before[raw];
+    struct sadmm_rigid next = body;
+    moved_body(v, i, &body, &next);
+    steady_keep(&steady, &body, &next);
+    v.step.after[raw] = next;
+    v.step.steady_after[raw] = steady;
+    if (v.settings.recover_wrenches) {
+        double wrench[6];
+        body_wrench(v, i, wrench);
+        for (int k = 0; k < 6; ++k) v.step.wrench[6 * (size_t)raw + (size_t)k] = wrench[k];
+    }
+    return finite_numbers(next.position, 3) && finite_numbers(next.orientation, 4) && finite_numbers(next.velocity, 6);
+}
+
+/* Impulses of a pair into its points; *depth: the deepest of them. */
+static __device__ bool finish_pair(const cuda_view &v, int32_t p, double *depth)
+{
+    const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
+    const vec3 normal = v3_load(pair->normal);
+    bool finite = true;
+    for (int32_t k = 0; k < pair->count; ++k) {
+        struct sadmm_contact_point *point = &v.step.points[pair->first + k];
+        double *start = v.step.start_impulse + 3 * (size_t)(pair->first + k), impulse[3];
+        v3_store(point_impulse(v, p, k, normal), impulse);
+        finite = finite && finite_numbers(impulse, 3);
+        for (int j = 0; j < 3; ++j) {
+            start[j] = point->impulse[j];
+            point->impulse[j] = impulse[j];
+        }
+        *depth = fmax(*depth, -point->gap);
+    }
+    return finite;
+}
+
+/* Threads for bodies, then for pairs. Does not look at culprits of this very kernel: which body is named must not depend
+ * on who came first. */
+static __global__ void finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    const int32_t i = thread_index(), p = i - (v.bodies + WARP - 1) / WARP * WARP;
+    struct cuda_step_control *control = v.step.control;
+    double depth = 0;
+    if (i == 0) control->stamps[STAMP_SOLVED] = nanoseconds();
+    if (p < 0) {
+        if (i < live_bodies(v) && !finish_body(v, i)) atomicMin(&control->culprit, v.body_of[i]);
+    } else if (p < live_pairs(v)) {
+        const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
+        /* bodies are named first: all of them are below any contact's */
+        if (!finish_pair(v, p, &depth))
+            atomicMin(&control->culprit, v.bodies + (pair->body_b >= 0 ? pair->body_b : pair->body_a));
+    }
+    /* -0 is no depth; a larger one may be there already */
+    unsigned long long bits = depth > 0 ? (unsigned long long)__double_as_longlong(depth) : 0;
+    for (int o = WARP / 2; o > 0; o /= 2) {
+        unsigned long long other = __shfl_xor_sync(0xffffffffu, bits, o);
+        bits = other > bits ? other : bits;
+    }
+    if (threadIdx.x % WARP == 0 && bits > control->depth) atomicMax(&control->depth, bits);
+}
+
+/* ---- commit ---------------------------------------------------------------------------------------------------- */
+
+static __device__ double double_of(unsigned long long bits) { return __longlong_as_double((long long)bits); }
+
+/* One thread. */
+static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    if (threadIdx.x > 0) return;
+    struct cuda_step_control *control = v.step.control;
+    struct cuda_step_report *report = &v.step.reports[control->sequence % STEPS_AHEAD];
+    if (!v.live->halt && control->culprit != INT32_MAX) v.live->halt = HALT_NON_FINITE;
+    control->stamps[STAMP_END] = nanoseconds();
+    report->sequence = control->sequence++;
+    report->halt = v.live->halt;
+    report->culprit = control->culprit;
+    report->counts = *v.step.counts;
+    report->facts = *v.facts;
+    report->depth = double_of(control->depth);
+    report->primal = v.step.measured ? double_of(v.residual[0]) : -1;
+    report->dual = v.step.measured ? double_of(v.residual[1]) : -1;
+    for (int k = 0; k < STAMPS; ++k) report->stamps[k] = control->stamps[k];
+}
+
+/* ---- launches -------------------------------------------------------------------------------------------------- */
+
+sadmm_status CUDA(launch_edits)(struct sadmm_context *c, const struct sadmm_resident_edit *edits, size_t count,
+                                struct sadmm_error *error)
+{
+    cuda_args args = {};
+    args.count = (int32_t)count;
+    args.edits = edits;
+    return CUDA(launch)(c, edit_kernel, "edit", blocks_for((int64_t)count), &args, error);
+}
+
+sadmm_status CUDA(launch_start)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    return CUDA(launch)(c, start_step_kernel, "start", blocks_for((int64_t)c->view.bodies + 1), &args, error);
+}
+
+sadmm_status CUDA(launch_admit)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    return CUDA(launch)(c, admit_kernel, "admit", 1, &args, error);
+}
+
+sadmm_status CUDA(launch_check)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    return CUDA(launch)(c, check_kernel, "check", 1, &args, error);
+}
+
+sadmm_status CUDA(launch_assembled)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    return CUDA(launch)(c, assembled_kernel, "assembled", 1, &args, error);
+}
+
+sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    int64_t threads = (int64_t)(c->view.bodies + WARP - 1) / WARP * WARP + c->view.pair_room;
+    CUDA_TRY(CUDA(launch)(c, finish_kernel, "finish", blocks_for(threads), &args, error));
+    return CUDA(launch)(c, commit_kernel, "commit", 1, &args, error);
+}

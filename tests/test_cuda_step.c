@@ -1,0 +1,434 @@
+/* Whole steps on the device (backend_cuda/cuda_step.h) against the same kernels driven by the host, step by step.
+ *
+ * Contacts are the same bits on both sides, and so are the solver's kernels: everything that can be read of a world must be
+ * equal to the last bit, however the steps were enqueued, planned or repeated. A stop rule that is never met sends a
+ * world through the host: `by_host`. The same checks run on the emulated device (test_cuda_step_emulated.c).
+ */
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/backends.h"
+#include "core/memory.h"
+#include "core/world_internal.h"
+#include "scene_tools.h"
+
+#ifdef CUDA_EMULATED
+#include "emulation_control.h"
+#define force_tier cuda_emulation_force_tier
+#define tier_of cuda_emulation_tier_of
+#define tune_rooms cuda_emulation_tune_rooms
+#else
+#include "backend_cuda/cuda_tier.h"
+#define force_tier sadmm_cuda_force_tier
+#define tier_of sadmm_cuda_tier_of
+#define tune_rooms sadmm_cuda_tune_rooms
+#endif
+
+static const struct sadmm_kernels *tables[2]; /* by precision */
+
+/* ---- worlds ---------------------------------------------------------------------------------------------------- */
+
+/* Give a world the device's kernels before its first step. */
+static void use_device(sadmm_world *world, int precision)
+{
+    world->kernels = tables[precision];
+    ck_assert_msg(world->kernels->create(0, &world->context, &world->error) == SADMM_OK, "%s", world->error.message);
+}
+
+/* The host makes the steps: a stop rule has to be looked at, and nothing ever meets this one. */
+static void by_host(sadmm_world *world)
+{
+    sadmm_settings settings = sadmm_world_settings(world);
+    settings.residual_tolerance = 1e-300;
+    settings.check_period = 1000000;
+    MUST(world, sadmm_world_set_settings(world, &settings));
+}
+
+static sadmm_body_id add_box(sadmm_world *world, double x, double y, double z, double half, double mass, double friction)
+{
+    sadmm_body_def body = sadmm_body_def_default();
+    sadmm_shape_def shape = sadmm_shape_def_default();
+    const double h[3] = {half, half, half};
+    sadmm_body_id id;
+    body.mass = mass;
+    body.position[0] = x;
+    body.position[1] = y;
+    body.position[2] = z;
+    sadmm_box_inertia(mass, h, body.inertia);
+    MUST(world, sadmm_world_add_body(world, &body, &id));
+    shape.type = SADMM_SHAPE_BOX;
+    shape.friction = friction;
+    memcpy(shape.size, h, sizeof h);
+    MUST(world, sadmm_world_add_shape(world, id, &shape, NULL));
+    return id;
+}
+
+static void add_ground(sadmm_world *world, double friction)
+{
+    sadmm_body_def body = sadmm_body_def_default();
+    sadmm_shape_def shape = sadmm_shape_def_default();
+    sadmm_body_id id;
+    body.type = SADMM_BODY_STATIC;
+    body.environment = -1;
+    MUST(world, sadmm_world_add_body(world, &body, &id));
+    shape.type = SADMM_SHAPE_PLANE;
+    shape.friction = friction;
+    MUST(world, sadmm_world_add_shape(world, id, &shape, NULL));
+}
+
+/* Towers of boxes that fall a little and land in different steps; every third one leans on its neighbour. */
+static sadmm_world *towers(int count, int height, double friction, int precision)
+{
+    sadmm_world_def def = sadmm_world_def_default();
+    def.backend = SADMM_BACKEND_CPU;
+    def.precision = (sadmm_precision)precision;
+    def.settings.iterations = 35;
+    def.settings.penalty_period = 10;
+    sadmm_world *world = create_world(&def);
+    add_ground(world, friction);
+    for (int t = 0; t < count; ++t)
+        for (int i = 0; i < height; ++i)
+            add_box(world, t % 3 == 2 ? 0.5 * t - 0.29 : 0.5 * t, 0.01 * i, 0.1 + 0.002 * t + 0.201 * i, 0.1, 1 + i, friction);
+    use_device(world, precision);
+    return world;
+}
+
+static void expect_same_world(sadmm_world *a, sadmm_world *b, const char *what)
+{
+    ck_assert_msg(sadmm_world_state_hash(a) == sadmm_world_state_hash(b), "%s: states differ", what);
+    int32_t count = sadmm_world_contact_count(a);
+    ck_assert_msg(count == sadmm_world_contact_count(b), "%s: %d and %d contacts", what, count,
+                  sadmm_world_contact_count(b));
+    sadmm_contact *x = calloc((size_t)count + 1, sizeof *x), *y = calloc((size_t)count + 1, sizeof *y);
+    MUST(a, sadmm_world_contacts(a, 0, count, x));
+    MUST(b, sadmm_world_contacts(b, 0, count, y));
+    for (int32_t k = 0; k < count; ++k)
+        ck_assert_msg(memcmp(&x[k], &y[k], sizeof *x) == 0, "%s: contact %d differs: gap %g %g, impulse %g %g", what, k,
+                      x[k].gap, y[k].gap, x[k].impulse[2], y[k].impulse[2]);
+    free(x);
+    free(y);
+    for (int32_t i = 0; i < sadmm_world_body_count(a); ++i) {
+        double wa[6], wb[6];
+        sadmm_body_id id = body_at(a, i);
+        if (body_def(a, id).type == SADMM_BODY_STATIC) continue;
+        MUST(a, sadmm_world_body_contact_wrench(a, id, wa));
+        MUST(b, sadmm_world_body_contact_wrench(b, id, wb));
+        ck_assert_msg(memcmp(wa, wb, sizeof wa) == 0, "%s: wrench of body %d differs", what, i);
+    }
+    sadmm_step_report ra = world_report(a), rb = world_report(b);
+    ck_assert_msg(ra.step == rb.step && ra.time == rb.time && ra.contacts == rb.contacts && ra.pairs == rb.pairs &&
+                      ra.bodies == rb.bodies && ra.iterations == rb.iterations &&
+                      ra.penetration_max == rb.penetration_max,
+                  "%s: reports differ: steps %lld %lld, depth %g %g, iterations %d %d", what, (long long)ra.step,
+                  (long long)rb.step, ra.penetration_max, rb.penetration_max, ra.iterations, rb.iterations);
+}
+
+/* ---- tests ------------------------------------------------------------------------------------------------------- */
+
+static const struct {
+    int count, height;
+    double friction;
+} cases[] = {{1, 1, 0.5}, {3, 2, 0.5}, {3, 2, 0}, {9, 4, 0.6}};
+enum { CASES = sizeof cases / sizeof *cases };
+
+/* From the first fall to rest: contacts appear, change and stay; cold steps with penalty updates, then warm ones. */
+START_TEST(resident_steps_equal_steps_by_host)
+{
+    const int precision = _i / CASES, at = _i % CASES;
+    sadmm_world *host = towers(cases[at].count, cases[at].height, cases[at].friction, precision);
+    sadmm_world *device = towers(cases[at].count, cases[at].height, cases[at].friction, precision);
+    char what[80];
+    by_host(host);
+    for (int step = 0; step < 24; ++step) {
+        MUST(host, sadmm_world_step(host));
+        MUST(device, sadmm_world_step(device));
+        ck_assert(device->resident.loaded && !host->resident.loaded);
+        if (step % 4 && step > 8) continue; /* also several steps between two reads */
+        snprintf(what, sizeof what, "case %d, %s, step %d", at, precision ? "f64" : "f32", step);
+        expect_same_world(host, device, what);
+    }
+    sadmm_world_destroy(host);
+    sadmm_world_destroy(device);
+}
+END_TEST
+
+/* The queue, however long, gives what single steps give; also where its first steps have to be repeated with more room. */
+START_TEST(enqueued_steps_equal_single_steps)
+{
+    const int precision = _i;
+    sadmm_world *single = towers(5, 3, 0.5, precision), *queue = towers(5, 3, 0.5, precision);
+    tune_rooms(tables[precision], queue->context, 1);
+    for (int step = 0; step < 20; ++step) {
+        MUST(single, sadmm_world_step(single));
+        MUST(queue, sadmm_world_step_async(queue));
+    }
+    MUST(queue, sadmm_world_wait(queue));
+    expect_same_world(single, queue, "20 steps");
+    ck_assert_int_gt(queue->resident.repeats, 0); /* the first contact changes the plan */
+    sadmm_world_destroy(single);
+    sadmm_world_destroy(queue);
+}
+END_TEST
+
+/* What may be changed between steps, one after the other. */
+static void change(sadmm_world *world, int step)
+{
+    const double force[3] = {0.5, -0.2, 0.1 * step}, torque[3] = {0, 0.01, 0.02};
+    sadmm_body_id id = body_at(world, 1 + step % 5);
+    if (step % 2 == 0) MUST(world, sadmm_world_set_body_wrench(world, id, force, torque));
+    if (step % 7 == 3) {
+        sadmm_body_state state = body_state(world, id);
+        state.linear_velocity[2] += 0.3;
+        state.position[0] += 0.003;
+        MUST(world, sadmm_world_set_body_state(world, id, &state));
+    }
+    if (step == 6) add_box(world, 0.1, 0.3, 1.2, 0.1, 2, 0.5);
+    if (step == 9) MUST(world, sadmm_world_remove_body(world, body_at(world, 3)));
+    if (step == 12) MUST(world, sadmm_world_set_body_pair_contact(world, body_at(world, 1), body_at(world, 2), false));
+    if (step == 14) {
+        sadmm_settings settings = sadmm_world_settings(world);
+        settings.dt = 0.004;
+        settings.iterations = 20;
+        MUST(world, sadmm_world_set_settings(world, &settings));
+    }
+    if (step == 16) {
+        sadmm_body_state state = body_state(world, body_at(world, 0));
+        state.position[2] = -0.05; /* the ground sinks */
+        MUST(world, sadmm_world_set_body_state(world, body_at(world, 0), &state));
+    }
+}
+
+START_TEST(changes_between_steps_equal_those_by_host)
+{
+    const int precision = _i;
+    sadmm_world *host = towers(4, 2, 0.5, precision), *device = towers(4, 2, 0.5, precision);
+    sadmm_world *queue = towers(4, 2, 0.5, precision);
+    by_host(host);
+    for (int step = 0; step < 22; ++step) {
+        change(host, step);
+        change(device, step);
+        change(queue, step);
+        MUST(host, sadmm_world_step(host));
+        MUST(device, sadmm_world_step(device));
+        MUST(queue, sadmm_world_step_async(queue));
+        if (step % 3 == 0) expect_same_world(host, device, "single steps");
+    }
+    expect_same_world(host, device, "single steps");
+    expect_same_world(host, queue, "enqueued steps");
+    sadmm_world_destroy(host);
+    sadmm_world_destroy(device);
+    sadmm_world_destroy(queue);
+}
+END_TEST
+
+/* Between the backend and the host and back, with warm starts kept. */
+START_TEST(worlds_come_and_go)
+{
+    const int precision = _i;
+    sadmm_world *host = towers(3, 3, 0.5, precision), *both = towers(3, 3, 0.5, precision);
+    by_host(host);
+    for (int step = 0; step < 18; ++step) {
+        sadmm_settings settings = sadmm_world_settings(both);
+        settings.residual_tolerance = step / 3 % 2 ? 1e-300 : 0;
+        settings.check_period = 1000000;
+        MUST(both, sadmm_world_set_settings(both, &settings));
+        MUST(host, sadmm_world_step(host));
+        MUST(both, sadmm_world_step(both));
+        ck_assert(both->resident.loaded == (step / 3 % 2 == 0));
+    }
+    expect_same_world(host, both, "18 steps");
+    sadmm_world_destroy(host);
+    sadmm_world_destroy(both);
+}
+END_TEST
+
+/* Certificate, residuals and the frozen problem of a resident step. */
+START_TEST(readings_of_a_resident_step)
+{
+    const int precision = _i;
+    sadmm_world *host = towers(2, 3, 0.5, precision), *device = towers(2, 3, 0.5, precision);
+    by_host(host);
+    for (int pass = 0; pass < 2; ++pass) {
+        sadmm_world *world = pass ? device : host;
+        sadmm_settings settings = sadmm_world_settings(world);
+        settings.certify = settings.measure_residuals = true;
+        MUST(world, sadmm_world_set_settings(world, &settings));
+        step_world(world, 12);
+    }
+    sadmm_step_report a = world_report(host), b = world_report(device);
+    ck_assert_double_ge(a.certificate.ncp_max, 0);
+    ck_assert(memcmp(&a.certificate, &b.certificate, sizeof a.certificate) == 0);
+    ck_assert_double_ge(a.residual.primal, 0);
+    ck_assert(a.residual.primal == b.residual.primal && a.residual.dual == b.residual.dual);
+    sadmm_problem *frozen[2];
+    for (int pass = 0; pass < 2; ++pass) {
+        ck_assert_int_eq(sadmm_problem_create(&frozen[pass]), SADMM_OK);
+        MUST(pass ? device : host, sadmm_world_freeze(pass ? device : host, frozen[pass]));
+        sadmm_problem_destroy(frozen[pass]);
+    }
+    sadmm_world_destroy(host);
+    sadmm_world_destroy(device);
+}
+END_TEST
+
+/* A step that makes a body not finite names it and leaves the world before it, with everything set since. */
+START_TEST(a_step_that_fails_leaves_the_world_before_it)
+{
+    const int precision = _i;
+    const double zero[3] = {0}, torque[3] = {1e15, 0, 0}, force[3] = {0, 0, 3};
+    sadmm_world *world = towers(3, 2, 0.5, precision), *other = towers(3, 2, 0.5, precision);
+    sadmm_body_def def = sadmm_body_def_default();
+    sadmm_body_id feather[2];
+    def.mass = 1;
+    def.position[2] = 9;
+    def.name = "feather";
+    for (int k = 0; k < 3; ++k) def.inertia[k] = 1e-300; /* 1e313 rad/s */
+    for (int pass = 0; pass < 2; ++pass)
+        MUST(pass ? other : world, sadmm_world_add_body(pass ? other : world, &def, &feather[pass]));
+    step_world(world, 5);
+    step_world(other, 5);
+    MUST(world, sadmm_world_set_body_wrench(world, feather[0], zero, torque));
+    uint64_t before = sadmm_world_state_hash(world);
+    sadmm_status status = sadmm_world_step_async(world);
+    MUST(world, sadmm_world_set_body_wrench(world, body_at(world, 1), force, zero));
+    for (int k = 0; k < 2 && status == SADMM_OK; ++k) status = sadmm_world_step_async(world);
+    if (status == SADMM_OK) status = sadmm_world_wait(world);
+    ck_assert_int_eq(status, SADMM_ERROR_NON_FINITE);
+    ck_assert_msg(strstr(sadmm_world_message(world), "feather") != NULL, "%s", sadmm_world_message(world));
+    ck_assert(sadmm_world_state_hash(world) == before);
+    ck_assert_int_eq(world_report(world).step, 5);
+    ck_assert_int_eq(sadmm_world_wait(world), SADMM_OK); /* once */
+    /* and on: the wrench set behind the failing step counts */
+    MUST(world, sadmm_world_set_body_wrench(world, feather[0], zero, zero));
+    MUST(other, sadmm_world_set_body_wrench(other, body_at(other, 1), force, zero));
+    step_world(world, 3);
+    step_world(other, 3);
+    expect_same_world(world, other, "after the failure");
+    sadmm_world_destroy(world);
+    sadmm_world_destroy(other);
+}
+END_TEST
+
+/* Every tier that takes the scene gives the same bits. */
+START_TEST(tiers_agree)
+{
+    const int precision = _i;
+    sadmm_world *first = towers(6, 3, 0.5, precision);
+    step_world(first, 12);
+    for (int tier = SADMM_CUDA_TIER_BLOCK; tier <= SADMM_CUDA_TIER_STREAM; ++tier) {
+        sadmm_world *world = towers(6, 3, 0.5, precision);
+        char what[40];
+        force_tier(tables[precision], world->context, (enum sadmm_cuda_tier)tier);
+        for (int step = 0; step < 12; ++step) {
+            sadmm_status status = sadmm_world_step(world);
+            if (status == SADMM_ERROR_UNSUPPORTED) break;
+            ck_assert_msg(status == SADMM_OK, "%s", sadmm_world_message(world));
+        }
+        if (world_report(world).step > 0) {
+            snprintf(what, sizeof what, "tier %d", tier);
+            expect_same_world(first, world, what);
+            ck_assert_int_eq(tier_of(tables[precision], world->context, NULL), tier);
+        }
+        sadmm_world_destroy(world);
+    }
+    sadmm_world_destroy(first);
+}
+END_TEST
+
+/* No memory: the step fails, nothing is lost, and the next one with memory goes on. */
+START_TEST(lack_of_memory)
+{
+    const int precision = _i;
+    sadmm_world *plain = towers(3, 2, 0.5, precision);
+    step_world(plain, 6);
+    int failures = 0;
+    for (long n = 0;; n += n < 40 ? 1 : 3) {
+        sadmm_world *world = towers(3, 2, 0.5, precision);
+        step_world(world, 1); /* what the host keeps has its room */
+        MUST(world, sadmm_world_take_back(world));
+        sadmm_test_fail_allocations_after(n);
+        sadmm_status status = sadmm_world_step(world);
+        bool reached = status != SADMM_OK;
+        sadmm_test_fail_allocations_after(-1);
+        if (reached) {
+            ++failures;
+            ck_assert_int_eq(status, SADMM_ERROR_OUT_OF_MEMORY);
+            ck_assert_int_eq(world_report(world).step, 1);
+        }
+        step_world(world, (int)(6 - world_report(world).step));
+        expect_same_world(plain, world, "after lack of memory");
+        sadmm_world_destroy(world);
+        if (!reached) break;
+    }
+    ck_assert_int_ge(failures, 1);
+    sadmm_world_destroy(plain);
+}
+END_TEST
+
+#ifdef CUDA_EMULATED
+/* Every call of the runtime may fail: an error that names the device, nothing leaks. */
+START_TEST(calls_that_fail)
+{
+    const int precision = _i;
+    int failed = 0;
+    for (long calls = 0;; calls += 1 + calls / 16) {
+        sadmm_world *world = towers(2, 1, 0.5, precision);
+        sadmm_status status = SADMM_OK;
+        cuda_emulation_calls_left = calls;
+        for (int step = 0; step < 3 && status == SADMM_OK; ++step) status = sadmm_world_step_async(world);
+        if (status == SADMM_OK) status = sadmm_world_wait(world);
+        bool reached = cuda_emulation_calls_left < 0;
+        cuda_emulation_calls_left = -1;
+        if (reached && status != SADMM_OK) {
+            ++failed;
+            ck_assert_msg(status == SADMM_ERROR_DEVICE, "call %ld: %s", calls, sadmm_status_name(status));
+            ck_assert_msg(strstr(sadmm_world_message(world), "CUDA device 0: ") != NULL, "%s", sadmm_world_message(world));
+        }
+        sadmm_world_destroy(world);
+        ck_assert_msg(cuda_emulation_allocations == 0, "call %ld: %ld left", calls, cuda_emulation_allocations);
+        if (!reached) break;
+    }
+    ck_assert_int_gt(failed, 30);
+}
+END_TEST
+#endif
+
+int main(void)
+{
+#ifdef CUDA_EMULATED
+    for (int p = 0; p < 2; ++p) tables[p] = &cuda_emulation_tables[p];
+#else
+    const char *reason = "";
+    for (int p = 0; p < 2; ++p) {
+        tables[p] = sadmm_cuda_find((sadmm_precision)p, &reason);
+        if (!tables[p]) {
+            printf("skipped: %s: %s\n", p ? "f64" : "f32", reason);
+            return 77;
+        }
+    }
+    printf("on %s\n", reason);
+#endif
+    Suite *suite = suite_create("cuda_step");
+    TCase *tests = tcase_create("cuda_step");
+    tcase_set_timeout(tests, 600);
+    tcase_add_loop_test(tests, resident_steps_equal_steps_by_host, 0, 2 * CASES);
+    tcase_add_loop_test(tests, enqueued_steps_equal_single_steps, 0, 2);
+    tcase_add_loop_test(tests, changes_between_steps_equal_those_by_host, 0, 2);
+    tcase_add_loop_test(tests, worlds_come_and_go, 0, 2);
+    tcase_add_loop_test(tests, readings_of_a_resident_step, 0, 2);
+    tcase_add_loop_test(tests, a_step_that_fails_leaves_the_world_before_it, 0, 2);
+    tcase_add_loop_test(tests, tiers_agree, 0, 2);
+    tcase_add_loop_test(tests, lack_of_memory, 0, 2);
+#ifdef CUDA_EMULATED
+    tcase_add_loop_test(tests, calls_that_fail, 0, 2);
+#endif
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_set_fork_status(runner, CK_NOFORK); /* a driver that was started does not survive a fork */
+    srunner_run_all(runner, CK_ENV);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+}
