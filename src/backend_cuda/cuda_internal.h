@@ -240,8 +240,10 @@ struct device_scope {
 /* Everything the stepwise kernels take for granted: J^T lambda^0 at the start, 1/s of every pair. The resident kernel makes
  * its own. */
 sadmm_status CUDA(prepare_stepwise)(struct sadmm_context *, struct sadmm_error *error);
-/* The instance of the resident kernel for a tier: threads a block it was compiled for at most, bytes of shared memory. */
-cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, enum sadmm_cuda_tier tier, const char **name);
+/* The instance of the resident kernel for a tier (full: there are row blocks, or the last iteration is measured); threads
+ * a block at most; bytes of shared memory. */
+cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, enum sadmm_cuda_tier tier, bool full,
+                                  const char **name);
 int CUDA(resident_threads)(int point_slots);
 size_t CUDA(resident_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies, bool row_blocks);
 /* Let every instance use `bytes` of shared memory a block. */

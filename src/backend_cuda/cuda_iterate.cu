@@ -344,8 +344,8 @@ static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool
     args.start = c->starting;
     args.most_bodies = partition->most_bodies;
     args.cluster = partition->cluster;
-    cuda_kernel kernel =
-        CUDA(resident_kernel)(c->view.contact_rows, c->facts.point_slots, partition->tier, &name);
+    cuda_kernel kernel = CUDA(resident_kernel)(c->view.contact_rows, c->facts.point_slots, partition->tier,
+                                               measure || c->view.rows > 0, &name);
     if (partition->tier == SADMM_CUDA_TIER_GRID)
         CUDA_CALL(c, cudaMemsetAsync(c->view.barrier, 0, sizeof *c->view.barrier, c->stream),
                   "cudaMemsetAsync(barrier)");

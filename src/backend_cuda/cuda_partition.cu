@@ -113,7 +113,7 @@ static const char *choose_grid(const struct sadmm_context *c, const struct cuda_
         if (!take_room(c, partition, bound, c->shared_limit / side_by_side)) continue;
         int resident = 0;
         cuda_kernel kernel =
-            CUDA(resident_kernel)(c->plan.contact_rows, facts->point_slots, SADMM_CUDA_TIER_GRID, &name);
+            CUDA(resident_kernel)(c->plan.contact_rows, facts->point_slots, SADMM_CUDA_TIER_GRID, true, &name);
         *code = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, (const void *)kernel, partition->threads,
                                                               partition->shared);
         if (*code != cudaSuccess) return nullptr;

@@ -158,7 +158,7 @@ CUDA_INLINE int32_t quad_slot(int32_t lane) { return (lane & 1) * QUAD + (lane &
 
 /* ---- a part ---------------------------------------------------------------------------------------------------- */
 
-template <int CONTACT_ROWS, int POINTS, int MODE> struct part_run {
+template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL> struct part_run {
     enum { COUNT = POINTS / QUAD };
     const cuda_view &v;
     const cuda_args &args;
@@ -178,13 +178,14 @@ template <int CONTACT_ROWS, int POINTS, int MODE> struct part_run {
           first_half(v.offsets[first_body]), halves(v.offsets[first_body + bodies] - first_half), body(t / LANES),
           begin(0), end(0), own_body(), momentum(0), own()
     {
-        lay_out(&m, memory, MODE == CLUSTER, (int)blockDim.x, args.most_bodies, v.rows > 0);
+        lay_out(&m, memory, MODE == CLUSTER, (int)blockDim.x, args.most_bodies, has_rows());
     }
 
     __device__ __forceinline__ solver_real *state(int32_t odd) const
     {
         return m.state + (MODE == CLUSTER && odd ? args.most_bodies * ROW : 0);
     }
+    __device__ __forceinline__ bool has_rows(void) const { return FULL && v.rows > 0; }
     /* Warps without work are left out of everything but barriers. */
     __device__ __forceinline__ bool warp_has_body(int32_t first) const { return first + t / WARP * (WARP / LANES) < bodies; }
     __device__ __forceinline__ bool warp_has_half(void) const { return t / WARP * (WARP / QUAD) < halves; }
@@ -202,8 +203,8 @@ template <int CONTACT_ROWS, int POINTS, int MODE> struct part_run {
     __device__ __forceinline__ void store(int32_t odd);
 };
 
-#define PART template <int CONTACT_ROWS, int POINTS, int MODE>
-#define PART_RUN part_run<CONTACT_ROWS, POINTS, MODE>
+#define PART template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL>
+#define PART_RUN part_run<CONTACT_ROWS, POINTS, MODE, FULL>
 
 /* ---- row blocks, out of line: few systems have them ------------------------------------------------------------ */
 
@@ -263,7 +264,7 @@ PART __device__ __forceinline__ void PART_RUN::find_other(int32_t other)
 PART __device__ __forceinline__ void PART_RUN::load_half(void)
 {
     const int32_t code = v.incident[first_half + half], side = code & 1, p = code / 2;
-    if (p >= v.pair_room) {
+    if (FULL && p >= v.pair_room) {
         const row_about about = v.row_info[p - v.pair_room];
         own.own = (side ? about.body_b : about.body_a) - first_body;
         find_other(side ? about.body_a : about.body_b);
@@ -342,7 +343,7 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
     if (half < halves) load_half();
     if (!args.start) load_records();
     else if (warp_has_half()) start_records();
-    if (v.rows > 0 && half < halves && !own.pair && lane == 0)
+    if (has_rows() && half < halves && !own.pair && lane == 0)
         start_row_half(v, v.incident[first_half + half], m.row_lambda + half * ROW, m.records + half * ROW, args.start);
     __syncthreads();
 }
@@ -433,7 +434,7 @@ PART template <bool MEASURE> __device__ __forceinline__ double PART_RUN::update_
         largest = real_max(largest, largest_row<CONTACT_ROWS>(own.normal, delta));
     }
     store_record(m.records + half * ROW, sum_quad(lane, force, torque));
-    if (!MEASURE && v.rows == 0) return primal;
+    if (!MEASURE && !has_rows()) return primal;
 
     const int32_t code = half < halves ? v.incident[first_half + half] : 0;
     if (MEASURE) {
@@ -443,7 +444,7 @@ PART template <bool MEASURE> __device__ __forceinline__ double PART_RUN::update_
             primal = (double)(largest * real_max(inv_beta_of(v, on.x), inv_beta_of(v, on.y)));
         }
     }
-    if (v.rows > 0 && half < halves && !own.pair && lane == 0)
+    if (has_rows() && half < halves && !own.pair && lane == 0)
         primal = update_row_half(v, code, own_row, other_row, m.row_lambda + half * ROW, m.records + half * ROW, MEASURE);
     return primal;
 }
@@ -467,7 +468,7 @@ PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
             const int32_t k = lane + QUAD * j;
             if (k < count) store_lambda<CONTACT_ROWS>(v, (size_t)k * (size_t)v.pair_room + (size_t)p, own.lambda[j]);
         }
-    } else if (lane == 0) {
+    } else if (FULL && lane == 0) {
         const int32_t k = p - v.pair_room;
         if (code & 1 && v.row_info[k].body_a != v.bodies) return;
         store_row_lambda(v, k, m.row_lambda + half * ROW);
@@ -476,24 +477,24 @@ PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
 
 /* ---- the kernel ------------------------------------------------------------------------------------------------ */
 
-template <int CONTACT_ROWS, int POINTS, int MODE>
+/* FULL: with row blocks, or to be measured; both cost registers, and most stretches have neither. */
+template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL>
 static __global__ void __launch_bounds__(most_threads(POINTS))
     resident_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     CUDA_DYNAMIC_SHARED(memory);
     if (v.live->halt) return;
-    part_run<CONTACT_ROWS, POINTS, MODE> part(v, args, memory);
+    part_run<CONTACT_ROWS, POINTS, MODE, FULL> part(v, args, memory);
     part.load();
     unsigned target = 0;
-    const int32_t plain = args.count - (args.measure ? 1 : 0);
-    int32_t iteration = 1;
-    for (; iteration <= args.count; ++iteration) {
+    for (int32_t iteration = 1; iteration <= args.count; ++iteration) {
         const int32_t odd = iteration & 1;
         part.move_bodies(odd);
         arrive<MODE>(v.barrier);
         if (part.warp_has_body(0)) part.momentum = free_momentum(part.own_body);
         wait<MODE>(v.barrier, target += gridDim.x);
-        if (iteration > plain) reduce_max(part.template update_halves<true>(odd), v.residual);
+        if (FULL && args.measure && iteration == args.count)
+            reduce_max(part.template update_halves<true>(odd), v.residual);
         else part.template update_halves<false>(odd);
         __syncthreads();
     }
@@ -510,33 +511,36 @@ static __global__ void __launch_bounds__(most_threads(POINTS))
 struct instance {
     int contact_rows, points;
     enum sadmm_cuda_tier tier;
+    bool full;
     cuda_kernel kernel;
     const char *name;
 };
 
-#define INSTANCE(rows, points, mode, name) \
-    {rows, points, SADMM_CUDA_TIER_##mode, resident_kernel<rows, points, mode>, name}
+#define INSTANCE(rows, points, mode, name)                                                                             \
+    {rows, points, SADMM_CUDA_TIER_##mode, false, resident_kernel<rows, points, mode, false>, "iterate (" name ")"},   \
+        {rows, points, SADMM_CUDA_TIER_##mode, true, resident_kernel<rows, points, mode, true>, "iterate (" name ", full)"}
 /* Boxes on boxes touch in up to 8 points, mostly 4: with 4 a lane needs fewer registers. */
 static const instance instances[] = {
-    INSTANCE(3, 4, BLOCK, "iterate (block, 3 rows, 4 points)"),
-    INSTANCE(3, 8, BLOCK, "iterate (block, 3 rows, 8 points)"),
-    INSTANCE(1, 4, BLOCK, "iterate (block, 1 row, 4 points)"),
-    INSTANCE(1, 8, BLOCK, "iterate (block, 1 row, 8 points)"),
-    INSTANCE(3, 4, CLUSTER, "iterate (cluster, 3 rows, 4 points)"),
-    INSTANCE(3, 8, CLUSTER, "iterate (cluster, 3 rows, 8 points)"),
-    INSTANCE(1, 4, CLUSTER, "iterate (cluster, 1 row, 4 points)"),
-    INSTANCE(1, 8, CLUSTER, "iterate (cluster, 1 row, 8 points)"),
-    INSTANCE(3, 4, GRID, "iterate (grid, 3 rows, 4 points)"),
-    INSTANCE(3, 8, GRID, "iterate (grid, 3 rows, 8 points)"),
-    INSTANCE(1, 4, GRID, "iterate (grid, 1 row, 4 points)"),
-    INSTANCE(1, 8, GRID, "iterate (grid, 1 row, 8 points)"),
+    INSTANCE(3, 4, BLOCK, "block, 3 rows, 4 points"),
+    INSTANCE(3, 8, BLOCK, "block, 3 rows, 8 points"),
+    INSTANCE(1, 4, BLOCK, "block, 1 row, 4 points"),
+    INSTANCE(1, 8, BLOCK, "block, 1 row, 8 points"),
+    INSTANCE(3, 4, CLUSTER, "cluster, 3 rows, 4 points"),
+    INSTANCE(3, 8, CLUSTER, "cluster, 3 rows, 8 points"),
+    INSTANCE(1, 4, CLUSTER, "cluster, 1 row, 4 points"),
+    INSTANCE(1, 8, CLUSTER, "cluster, 1 row, 8 points"),
+    INSTANCE(3, 4, GRID, "grid, 3 rows, 4 points"),
+    INSTANCE(3, 8, GRID, "grid, 3 rows, 8 points"),
+    INSTANCE(1, 4, GRID, "grid, 1 row, 4 points"),
+    INSTANCE(1, 8, GRID, "grid, 1 row, 8 points"),
 };
 
-cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, enum sadmm_cuda_tier tier, const char **name)
+cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, enum sadmm_cuda_tier tier, bool full,
+                                  const char **name)
 {
     int rows = contact_rows == 1 ? 1 : 3, points = point_slots <= 4 ? 4 : 8;
     for (const instance &one : instances)
-        if (one.contact_rows == rows && one.points == points && one.tier == tier) {
+        if (one.contact_rows == rows && one.points == points && one.tier == tier && one.full == full) {
             *name = one.name;
             return one.kernel;
         }
