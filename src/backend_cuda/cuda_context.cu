@@ -43,6 +43,7 @@ static const char *const buffer_names[BUFFER_COUNT] = {
     "row blocks' data",
     "wrench records",
     "changes of wrench records",
+    "exchanged velocities",
     "layout",
     "scalars",
     "bodies' input",
@@ -103,22 +104,53 @@ sadmm_status CUDA(download)(struct sadmm_context *c, const void *from, size_t by
 
 /* ---- launches ------------------------------------------------------------------------------------------------- */
 
-sadmm_status CUDA(launch)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, size_t shared,
-                          bool cooperative, const cuda_args *args, struct sadmm_error *error)
+/* Blocks of a launch run side by side in clusters (`cluster` > 1), or all of them (cooperative). */
+static sadmm_status launch_blocks(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
+                                  int threads, size_t shared, int cluster, bool cooperative, const cuda_args *args,
+                                  struct sadmm_error *error)
 {
     if (blocks <= 0) return SADMM_OK;
     c->kernel = name;
 #ifdef SADMM_CUDA_EMULATED
-    cudaError_t code = cuda_emulation_launch(kernel, (unsigned)blocks, THREADS, shared, cooperative, c->view, *args);
+    unsigned together = cooperative ? (unsigned)blocks : (unsigned)cluster;
+    cudaError_t code =
+        cuda_emulation_launch(kernel, (unsigned)blocks, (unsigned)threads, shared, together, c->view, *args);
 #else
     void *parameters[] = {&c->view, const_cast<cuda_args *>(args)};
-    dim3 grid((unsigned)blocks), block(THREADS);
-    cudaError_t code =
-        cooperative ? cudaLaunchCooperativeKernel((const void *)kernel, grid, block, parameters, shared, c->stream)
-                    : cudaLaunchKernel((const void *)kernel, grid, block, parameters, shared, c->stream);
+    cudaLaunchAttribute attribute[1];
+    cudaLaunchConfig_t launch = {};
+    launch.gridDim = dim3((unsigned)blocks);
+    launch.blockDim = dim3((unsigned)threads);
+    launch.dynamicSmemBytes = shared;
+    launch.stream = c->stream;
+    launch.attrs = attribute;
+    if (cooperative) {
+        attribute[launch.numAttrs].id = cudaLaunchAttributeCooperative;
+        attribute[launch.numAttrs++].val.cooperative = 1;
+    } else if (cluster > 1) {
+        attribute[launch.numAttrs].id = cudaLaunchAttributeClusterDimension;
+        attribute[launch.numAttrs].val.clusterDim.x = (unsigned)cluster;
+        attribute[launch.numAttrs].val.clusterDim.y = attribute[launch.numAttrs].val.clusterDim.z = 1;
+        ++launch.numAttrs;
+    }
+    cudaError_t code = cudaLaunchKernelExC(&launch, (const void *)kernel, parameters);
 #endif
     CUDA_CALL(c, code, name);
     return SADMM_OK;
+}
+
+sadmm_status CUDA(launch)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, size_t shared,
+                          bool cooperative, const cuda_args *args, struct sadmm_error *error)
+{
+    return launch_blocks(c, kernel, name, blocks, THREADS, shared, 1, cooperative, args, error);
+}
+
+sadmm_status CUDA(launch_partition)(struct sadmm_context *c, cuda_kernel kernel, const char *name,
+                                    const struct cuda_partition *partition, const cuda_args *args,
+                                    struct sadmm_error *error)
+{
+    return launch_blocks(c, kernel, name, partition->parts, partition->threads, partition->shared, partition->cluster,
+                         partition->tier == SADMM_CUDA_TIER_GRID, args, error);
 }
 
 /* ---- devices -------------------------------------------------------------------------------------------------- */
@@ -162,7 +194,7 @@ extern "C" bool CUDA(probe)(const char **about)
 
 static sadmm_status open_device(struct sadmm_context *c, struct sadmm_error *error)
 {
-    int cooperative = 0, count = 0;
+    int cooperative = 0, clusters = 0, count = 0;
     CUDA_CALL(c, cudaGetDeviceCount(&count), "cudaGetDeviceCount");
     if (c->device < 0 || c->device >= count)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "device = %d: must be in [0, %d]", c->device, count - 1);
@@ -173,7 +205,9 @@ static sadmm_status open_device(struct sadmm_context *c, struct sadmm_error *err
               "cudaDeviceGetAttribute");
     CUDA_CALL(c, cudaDeviceGetAttribute(&cooperative, cudaDevAttrCooperativeLaunch, c->device),
               "cudaDeviceGetAttribute");
+    CUDA_CALL(c, cudaDeviceGetAttribute(&clusters, cudaDevAttrClusterLaunch, c->device), "cudaDeviceGetAttribute");
     c->cooperative = cooperative != 0;
+    c->clusters = clusters != 0;
     CUDA_CALL(c, CUDA(resident_allow)(c->shared_limit), "loading the kernels");
     CUDA_CALL(c, cudaStreamCreateWithFlags(&c->stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
     return SADMM_OK;
@@ -211,7 +245,6 @@ extern "C" void CUDA(destroy)(struct sadmm_context *c)
     sadmm_free(c->scratch.island_of);
     sadmm_free(c->scratch.islands);
     sadmm_free(c->scratch.cursor);
-    sadmm_free(c->scratch.parts);
     sadmm_free(c);
 }
 
@@ -229,6 +262,6 @@ extern "C" void CUDA(set_tier)(struct sadmm_context *c, enum sadmm_cuda_tier tie
 
 extern "C" enum sadmm_cuda_tier CUDA(get_tier)(const struct sadmm_context *c, int32_t *blocks)
 {
-    if (blocks) *blocks = c->tier == SADMM_CUDA_TIER_STREAM ? 0 : c->part_count;
-    return c->tier;
+    if (blocks) *blocks = c->partition.parts;
+    return c->partition.tier;
 }

@@ -1,26 +1,30 @@
 /* The CUDA backend: reduced form (docs/algorithm.md), one source for both precisions (SADMM_REAL, SADMM_VARIANT).
  *
  * Units of work
- *   - A contact pair shares normal, friction and bodies among its points, so one thread takes a pair. With
- *     d = x_a - x_b a point's relative velocity is u + w x r_a (u = v_b - v_a + w_b x d, w = w_b - w_a), and the pair's
- *     wrench needs only f = sum E_k and tau = sum r_k x E_k (E = 2 lambda - lambda_prev): on a (-f, -tau), on b (f, tau
- *     + d x f).
- *   - The pair writes both wrenches as one record; bodies gather records over a CSR list in a fixed order. No float
- *     atomics: a result does not depend on timing, grid size or tier, bit for bit (the sources are compiled without
- *     contraction of a * b + c for the same reason).
+ *   - Points of a contact pair share normal, friction and bodies. With r_a, r_b = r_a + (x_a - x_b) a point's relative
+ *     velocity is (v_b - v_a) + (w_b x r_b - w_a x r_a), and the pair's wrench on b is f = sum E_k, tau = sum r_b x E_k
+ *     (E = 2 lambda - lambda_prev), on a -f, -sum r_a x E_k.
+ *   - A "half" is one constraint as seen by one of its dynamic bodies: 2 record + side (0: on a, 1: on b); its record is
+ *     the wrench on that body. Bodies gather the records of their halves over a CSR list in a fixed order. No float
+ *     atomics: a result does not depend on timing, thread count, grid size or tier, bit for bit (the sources are
+ *     compiled without contraction of a * b + c for the same reason).
+ *   - Sums over a pair's points, p_0 to p_7: q_j = p_j + p_{j+4} (p_j alone where there is no p_{j+4}, 0 where there is
+ *     no p_j), then (q_0 + q_1) + (q_2 + q_3): four lanes of a warp make it in two exchanges.
  *   - Eight lanes take a body: lane r < 6 owns component r of A v, of the gathered sum and of H g, H = (A + beta C)^-1.
  *
- * Order. begin() finds islands (bodies that touch, directly or through others) and numbers bodies, pairs and row blocks
- * by island, stably: "slots". Static bodies join nothing and share the state row after the last body, which is 0.
- * Within a body's list records ascend, so that the sums are the same in every tier.
+ * Order. Bodies are numbered by island (bodies that touch, directly or through others), stably, where the tier asks for
+ * it: "slots". Pairs and row blocks stay in raw order. Static bodies join nothing and share the state row after the last
+ * body, which is 0. Within a body's list records ascend, so that the sums are the same in every tier.
  *
  * Tiers of the fused entry
- *   BLOCK   islands packed into thread blocks; pairs in registers, bodies and records in shared memory; only
- *           __syncthreads
- *   GRID    one cooperative launch; pairs in registers, factors in shared memory, velocities and records in L2; grid
- *           barriers
- *   STREAM  two kernels an iteration, in a CUDA graph: any size
- * BLOCK and GRID are one kernel (cuda_resident.cu) over a partition into `parts`.
+ *   BLOCK    islands packed into thread blocks, everything on the chip; only __syncthreads
+ *   CLUSTER  islands packed into clusters of thread blocks, which read each other's velocities from shared memory
+ *   GRID     one cooperative launch; velocities go through L2, with a grid barrier an iteration
+ *   STREAM   two kernels an iteration, in a CUDA graph: any size
+ * BLOCK, CLUSTER and GRID are one kernel (cuda_resident.cu) over a partition into `parts` (cuda_partition.cu).
+ *
+ * Launch sizes follow from what the host knows (rooms, tier); kernels read the true counts from `live`, and do nothing
+ * once it says halt.
  *
  * Raw data (bodies, contact pairs and points, blocks as core has them, in double) is copied to the device as it is and
  * turned into this layout there, so that a collision stage on the device can later produce the contacts in place.
@@ -34,7 +38,7 @@
 #include <cuda_runtime.h>
 
 #include "../core/kernels.h"
-#include "cuda_tier.h"
+#include "cuda_layout.h"
 
 typedef SADMM_REAL solver_real;
 
@@ -45,7 +49,7 @@ typedef SADMM_REAL solver_real;
 
 enum {
     ROW = 8,              /* a wrench or a body's state: 6 used, 32 bytes in f32 */
-    RECORD = 2 * ROW,     /* wrench on a, wrench on b */
+    RECORD = 2 * ROW,     /* wrench on a, wrench on b; each force, 0, torque, 0 */
     STATE_INV_BETA = 6,   /* slot of a state row */
     MATRIX = 40,          /* a symmetric 6x6, rows of 6; the padding keeps four bodies' rows on different banks */
     PACKED = 21,          /* lower triangle, rows first */
@@ -75,15 +79,13 @@ struct row_about {
     int32_t active;                     /* bit r: row r exists (a hard row of zeros is no constraint, Sec. III-C) */
 };
 
-/* Where a part of the resident kernel begins; it ends where the next one begins. */
-struct part {
-    int32_t body, pair, row;
-};
-
-/* What kernels see. Pointers are device memory. Bodies, pairs and row blocks are counted in slots unless "raw". */
+/* What kernels see. Pointers are device memory. Bodies are counted in slots unless "raw". */
 struct cuda_view {
-    int32_t bodies, pairs, rows, points;
-    int32_t stride;      /* of point planes: point k of pair p is at k stride + p */
+    struct cuda_live *live;
+    int32_t bodies;      /* exact, known to the host (state row `bodies` is the static world) */
+    int32_t pair_room;   /* multiple of 32; stride of point planes: point k of pair p is at k pair_room + p. The record of
+                            pair p is p, of row block k pair_room + k */
+    int32_t rows;        /* row blocks: exact, known to the host */
     int32_t row_stride;
     int32_t contact_rows;
     int32_t warm_start;
@@ -95,7 +97,7 @@ struct cuda_view {
     double *beta;       /* bodies, kg */
 
     real4 *normal;      /* pairs: n, mu */
-    real4 *difference;  /* pairs: d, 1/s */
+    real4 *difference;  /* pairs: x_a - x_b, 1/s */
     int2 *pair_bodies;
     int32_t *pair_count;
     real4 *arm;         /* points: r_a (r_b when a is static), e */
@@ -111,8 +113,8 @@ struct cuda_view {
 
     const int32_t *offsets, *incident; /* body -> 2 record + (0 on a, 1 on b) */
     const int32_t *body_of, *slot_of;  /* slot -> raw body, raw body -> slot */
-    const int32_t *pair_of, *row_of;   /* slot -> raw */
-    const part *parts;
+    const int32_t *parts;              /* first body slots of the resident kernel's blocks, then `bodies` */
+    solver_real *exchange;             /* GRID: velocities of even and of odd iterations, bodies x ROW each */
     unsigned *barrier;                 /* arrivals at the grid barrier since launch */
     unsigned long long *residual;      /* primal, dual: bit patterns of doubles >= 0, which order like the numbers */
 
@@ -123,11 +125,18 @@ struct cuda_view {
     double *out; /* results in raw order */
 };
 
+/* This step's counts, 0 when it is halted. */
+static __device__ __forceinline__ int32_t live_bodies(const cuda_view &v) { return v.live->halt ? 0 : v.live->bodies; }
+static __device__ __forceinline__ int32_t live_pairs(const cuda_view &v) { return v.live->halt ? 0 : v.live->pairs; }
+static __device__ __forceinline__ int32_t live_rows(const cuda_view &v) { return v.live->halt ? 0 : v.rows; }
+
 /* What differs between launches of a kernel. */
 struct cuda_args {
     int32_t count;      /* iterations, or a kind of block */
     int32_t measure;
     int32_t join;       /* the first Step 1 takes records + ratio change */
+    int32_t start;      /* the first Step 1 takes J^T lambda^0, whatever the records are */
+    int32_t most_bodies, cluster; /* of the partition */
     solver_real ratio;
     double factor;
 };
@@ -145,7 +154,7 @@ enum cuda_buffer_name {
     /* device */
     BUFFER_STATE, BUFFER_B, BUFFER_A, BUFFER_H, BUFFER_C, BUFFER_BETA,
     BUFFER_NORMAL, BUFFER_DIFFERENCE, BUFFER_PAIR_BODIES, BUFFER_PAIR_COUNT, BUFFER_ARM, BUFFER_LAMBDA,
-    BUFFER_ROW_INFO, BUFFER_ROW_DATA, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_LAYOUT, BUFFER_SCALARS,
+    BUFFER_ROW_INFO, BUFFER_ROW_DATA, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_EXCHANGE, BUFFER_LAYOUT, BUFFER_SCALARS,
     BUFFER_RAW_BODIES, BUFFER_RAW_PAIRS, BUFFER_RAW_POINTS, BUFFER_RAW_BLOCKS, BUFFER_OUT,
     /* pinned */
     PINNED_LAYOUT, PINNED_BODIES, PINNED_PAIRS, PINNED_POINTS, PINNED_BLOCKS, PINNED_OUT,
@@ -158,15 +167,14 @@ struct cuda_scratch {
     int32_t *island_of;      /* bodies */
     struct island *islands;  /* islands + 1 */
     int32_t *cursor;         /* islands or bodies */
-    struct part *parts;
-    size_t parent_capacity, island_of_capacity, islands_capacity, cursor_capacity, parts_capacity;
+    size_t parent_capacity, island_of_capacity, islands_capacity, cursor_capacity;
 };
 
 struct sadmm_context {
     int device;
     cudaStream_t stream;
     int multiprocessors, shared_limit; /* shared_limit: bytes a block may have */
-    bool cooperative;
+    bool cooperative, clusters;        /* what the device can launch */
 
     const struct sadmm_system *system;
     struct sadmm_plan plan;
@@ -175,15 +183,14 @@ struct sadmm_context {
     cuda_buffer buffers[BUFFER_COUNT];
     cuda_scratch scratch;
     bool blocks_uploaded;
+    bool starting; /* no iteration yet: the next Step 1 uses J^T lambda^0, which `records` may not hold yet */
+    bool weighed;  /* 1/s of the pairs is up to date */
     bool measured; /* records and change are apart: the next Step 1 uses records + ratio change */
     double ratio;
 
-    enum sadmm_cuda_tier wanted, tier;
-    int32_t part_count;
-    size_t part_shared;    /* bytes a block of the resident kernel */
-    int32_t point_slots;   /* largest point count of a pair */
-    cuda_kernel resident;
-    const char *resident_name;
+    enum sadmm_cuda_tier wanted; /* by a test */
+    struct cuda_facts facts;
+    struct cuda_partition partition;
 
     cudaGraphExec_t graph; /* GRAPH_ITERATIONS plain iterations */
     bool graph_valid;      /* for this step's view */
@@ -198,6 +205,10 @@ sadmm_status CUDA(room)(struct sadmm_context *, enum cuda_buffer_name name, size
 /* Launch on the stream; 0 blocks: nothing to do. */
 sadmm_status CUDA(launch)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks, size_t shared,
                           bool cooperative, const cuda_args *args, struct sadmm_error *error);
+/* Launch a kernel on the partition's blocks. */
+sadmm_status CUDA(launch_partition)(struct sadmm_context *, cuda_kernel kernel, const char *name,
+                                    const struct cuda_partition *partition, const cuda_args *args,
+                                    struct sadmm_error *error);
 /* Through pinned memory, asynchronously; the pinned buffer is free again once the stream is idle. */
 sadmm_status CUDA(upload)(struct sadmm_context *, void *to, enum cuda_buffer_name staging, size_t at, const void *from,
                           size_t bytes, struct sadmm_error *error);
@@ -226,15 +237,23 @@ struct device_scope {
 
 /* ---- cuda_iterate.cu, cuda_resident.cu ---- */
 
-/* Records of the start values: J^T lambda^0. */
-sadmm_status CUDA(start_records)(struct sadmm_context *, struct sadmm_error *error);
-/* 1/s of every pair, from 1/beta. */
-sadmm_status CUDA(weigh_pairs)(struct sadmm_context *, struct sadmm_error *error);
-/* The instance of the resident kernel for this step, and what it costs. */
-cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, bool grid, const char **name);
-size_t CUDA(resident_shared)(int32_t bodies, int32_t pairs, int32_t rows, int32_t incident, bool grid);
+/* Everything the stepwise kernels take for granted: J^T lambda^0 at the start, 1/s of every pair. The resident kernel makes
+ * its own. */
+sadmm_status CUDA(prepare_stepwise)(struct sadmm_context *, struct sadmm_error *error);
+/* The instance of the resident kernel for a tier (full: there are row blocks, or the last iteration is measured); threads
+ * a block at most; bytes of shared memory. */
+cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, enum sadmm_cuda_tier tier, bool full,
+                                  const char **name);
+int CUDA(resident_threads)(int point_slots);
+size_t CUDA(resident_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies, bool row_blocks);
 /* Let every instance use `bytes` of shared memory a block. */
 cudaError_t CUDA(resident_allow)(int bytes);
+
+/* ---- cuda_partition.cu ---- */
+
+/* The tier and its thread blocks, from the facts of this step (or of one like it), the plan and the device. */
+sadmm_status CUDA(choose_partition)(struct sadmm_context *, const struct cuda_facts *facts,
+                                    struct cuda_partition *partition, struct sadmm_error *error);
 
 #define CUDA_TRY(call)                                  \
     do {                                                \

@@ -1,4 +1,4 @@
-/* begin: room for the step, islands and slots, the body -> record list, the tier and its parts (cuda_internal.h). */
+/* begin: room for the step, facts, the partition, slots, the body -> record list and the parts (cuda_internal.h). */
 #include <string.h>
 
 #include "../core/memory.h"
@@ -6,9 +6,9 @@
 
 /* ---- islands --------------------------------------------------------------------------------------------------- */
 
-/* First body, pair and row block of an island in slot order, and the list entries before it. */
+/* Bodies and halves of an island, then those before it. */
 struct island {
-    int32_t body, pair, row, incident;
+    int32_t body, half;
 };
 
 static int32_t find_root(int32_t *parent, int32_t i)
@@ -26,250 +26,186 @@ static void join_bodies(int32_t *parent, int32_t a, int32_t b)
     else parent[a] = b;
 }
 
-static int32_t island_with(const struct cuda_scratch *s, int32_t a, int32_t b)
-{
-    return a >= 0 ? s->island_of[a] : b >= 0 ? s->island_of[b] : 0;
-}
-
 /* Where the layout's arrays are in its one buffer, in order. */
 struct layout {
-    int32_t *body_of, *slot_of, *pair_of, *row_of, *offsets, *incident;
-    struct part *parts;
+    int32_t *body_of, *slot_of, *offsets, *incident, *parts;
     size_t bytes;
 };
 
-static struct layout lay_out(void *base, size_t n, size_t pairs, size_t rows, size_t parts)
+static struct layout lay_out(void *base, size_t n, size_t records, size_t parts)
 {
     struct layout l;
     l.body_of = (int32_t *)base;
     l.slot_of = l.body_of + n;
-    l.pair_of = l.slot_of + n;
-    l.row_of = l.pair_of + pairs;
-    l.offsets = l.row_of + rows;
+    l.offsets = l.slot_of + n;
     l.incident = l.offsets + n + 1;
-    l.parts = (struct part *)(l.incident + 2 * (pairs + rows));
-    l.bytes = (3 * n + 1 + 3 * (pairs + rows)) * sizeof(int32_t) + (parts + 1) * sizeof(struct part);
+    l.parts = l.incident + 2 * records;
+    l.bytes = (3 * n + 1 + 2 * records + parts + 1) * sizeof(int32_t);
     return l;
 }
 
-/* Number the islands by their first body; counts per island go to islands[island + 1], then become offsets. */
-static int32_t count_islands(struct sadmm_context *c)
+/* ---- the constraint graph --------------------------------------------------------------------------------------- */
+
+static int32_t larger(int32_t a, int32_t b) { return a > b ? a : b; }
+
+/* The bodies of constraint i, pairs first, then row blocks; its record. */
+static int32_t bodies_of(const struct sadmm_context *c, size_t i, int32_t bodies[2])
+{
+    size_t pairs = c->system->contacts->pair_count;
+    if (i < pairs) {
+        bodies[0] = c->system->contacts->pairs[i].body_a;
+        bodies[1] = c->system->contacts->pairs[i].body_b;
+        return (int32_t)i;
+    }
+    bodies[0] = c->system->blocks[i - pairs].body_a;
+    bodies[1] = c->system->blocks[i - pairs].body_b;
+    return c->view.pair_room + (int32_t)(i - pairs);
+}
+
+static size_t constraints(const struct sadmm_context *c)
+{
+    return c->system->contacts->pair_count + (size_t)c->system->block_count;
+}
+
+static bool is_warm(const struct sadmm_contact_set *contacts, const struct sadmm_contact_pair *pair)
+{
+    for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
+        for (int i = 0; i < 3; ++i)
+            if (contacts->points[k].impulse[i] != 0) return true;
+    return false;
+}
+
+/* Facts, and the islands, numbered by their first body: counts in islands[island + 1]. */
+static void survey(struct sadmm_context *c)
 {
     struct cuda_scratch *s = &c->scratch;
-    const struct sadmm_system *system = c->system;
-    const struct sadmm_contact_set *contacts = system->contacts;
-    int32_t n = c->plan.bodies, islands = 0;
+    struct cuda_facts *facts = &c->facts;
+    const struct sadmm_contact_set *contacts = c->system->contacts;
+    int32_t n = c->plan.bodies, bodies[2], part_halves = facts->part_halves, part_bodies = facts->part_bodies;
+    memset(facts, 0, sizeof *facts);
+    facts->part_halves = part_halves;
+    facts->part_bodies = part_bodies;
+    for (size_t p = 0; p < contacts->pair_count; ++p) {
+        facts->point_slots = larger(facts->point_slots, contacts->pairs[p].count);
+        facts->rough += contacts->pairs[p].friction > 0;
+        facts->warm += is_warm(contacts, &contacts->pairs[p]);
+    }
     for (int32_t i = 0; i < n; ++i) s->parent[i] = i;
-    for (size_t p = 0; p < contacts->pair_count; ++p)
-        join_bodies(s->parent, contacts->pairs[p].body_a, contacts->pairs[p].body_b);
-    for (int32_t k = 0; k < system->block_count; ++k)
-        join_bodies(s->parent, system->blocks[k].body_a, system->blocks[k].body_b);
+    memset(s->cursor, 0, ((size_t)n + 1) * sizeof *s->cursor);
+    for (size_t k = 0; k < constraints(c); ++k) {
+        bodies_of(c, k, bodies);
+        join_bodies(s->parent, bodies[0], bodies[1]);
+        for (int side = 0; side < 2; ++side)
+            if (bodies[side] >= 0) ++s->cursor[bodies[side]];
+    }
     memset(s->islands, 0, ((size_t)n + 2) * sizeof *s->islands);
     for (int32_t i = 0; i < n; ++i) {
         int32_t root = find_root(s->parent, i);
-        s->island_of[i] = root == i ? islands++ : s->island_of[root];
-        ++s->islands[s->island_of[i] + 1].body;
+        s->island_of[i] = root == i ? facts->islands++ : s->island_of[root];
+        struct island *one = &s->islands[s->island_of[i] + 1];
+        ++one->body;
+        one->half += s->cursor[i];
+        facts->degree = larger(facts->degree, s->cursor[i]);
+        facts->halves += s->cursor[i];
+        facts->island_bodies = larger(facts->island_bodies, one->body);
+        facts->island_halves = larger(facts->island_halves, one->half);
     }
-    if (islands == 0) islands = 1;
-    for (size_t p = 0; p < contacts->pair_count; ++p) {
-        int32_t a = contacts->pairs[p].body_a, b = contacts->pairs[p].body_b;
-        struct island *one = &s->islands[island_with(s, a, b) + 1];
-        ++one->pair;
-        one->incident += (a >= 0) + (b >= 0);
-    }
-    for (int32_t k = 0; k < system->block_count; ++k) {
-        int32_t a = system->blocks[k].body_a, b = system->blocks[k].body_b;
-        struct island *one = &s->islands[island_with(s, a, b) + 1];
-        ++one->row;
-        one->incident += (a >= 0) + (b >= 0);
-    }
-    for (int32_t i = 0; i < islands; ++i) {
+    for (int32_t i = 0; i < facts->islands; ++i) {
         s->islands[i + 1].body += s->islands[i].body;
-        s->islands[i + 1].pair += s->islands[i].pair;
-        s->islands[i + 1].row += s->islands[i].row;
-        s->islands[i + 1].incident += s->islands[i].incident;
+        s->islands[i + 1].half += s->islands[i].half;
     }
-    return islands;
 }
 
-/* Slots by island, in raw order within each (stable counting sorts). */
-static void number_slots(struct sadmm_context *c, const struct layout *l, int32_t islands)
+/* ---- slots, lists and parts ------------------------------------------------------------------------------------- */
+
+static bool by_island(enum sadmm_cuda_tier tier)
+{
+    return tier == SADMM_CUDA_TIER_BLOCK || tier == SADMM_CUDA_TIER_CLUSTER;
+}
+
+/* Slots by island, in raw order within each (a stable counting sort), or in raw order. */
+static void number_slots(struct sadmm_context *c, const struct layout *l)
 {
     struct cuda_scratch *s = &c->scratch;
-    const struct sadmm_system *system = c->system;
-    const struct sadmm_contact_set *contacts = system->contacts;
-    for (int32_t i = 0; i < islands; ++i) s->cursor[i] = s->islands[i].body;
+    bool islands = by_island(c->partition.tier);
+    for (int32_t i = 0; i < c->facts.islands; ++i) s->cursor[i] = s->islands[i].body;
     for (int32_t i = 0; i < c->plan.bodies; ++i) {
-        int32_t slot = s->cursor[s->island_of[i]]++;
+        int32_t slot = islands ? s->cursor[s->island_of[i]]++ : i;
         l->body_of[slot] = i;
         l->slot_of[i] = slot;
-    }
-    for (int32_t i = 0; i < islands; ++i) s->cursor[i] = s->islands[i].pair;
-    for (size_t p = 0; p < contacts->pair_count; ++p)
-        l->pair_of[s->cursor[island_with(s, contacts->pairs[p].body_a, contacts->pairs[p].body_b)]++] = (int32_t)p;
-    for (int32_t i = 0; i < islands; ++i) s->cursor[i] = s->islands[i].row;
-    for (int32_t k = 0; k < system->block_count; ++k)
-        l->row_of[s->cursor[island_with(s, system->blocks[k].body_a, system->blocks[k].body_b)]++] = k;
-}
-
-static void record_bodies(const struct sadmm_context *c, const struct layout *l, size_t record, int32_t bodies[2])
-{
-    size_t pairs = c->system->contacts->pair_count;
-    if (record < pairs) {
-        const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[l->pair_of[record]];
-        bodies[0] = pair->body_a;
-        bodies[1] = pair->body_b;
-    } else {
-        const struct sadmm_problem_block *block = &c->system->blocks[l->row_of[record - pairs]];
-        bodies[0] = block->body_a;
-        bodies[1] = block->body_b;
     }
 }
 
 /* Counting sort of record halves by body; records ascend within a body. */
 static void list_incident(struct sadmm_context *c, const struct layout *l)
 {
-    size_t n = (size_t)c->plan.bodies, records = c->system->contacts->pair_count + (size_t)c->system->block_count;
+    size_t n = (size_t)c->plan.bodies;
     int32_t *cursor = c->scratch.cursor, bodies[2];
     memset(l->offsets, 0, (n + 1) * sizeof *l->offsets);
-    for (size_t r = 0; r < records; ++r) {
-        record_bodies(c, l, r, bodies);
+    for (size_t k = 0; k < constraints(c); ++k) {
+        bodies_of(c, k, bodies);
         for (int side = 0; side < 2; ++side)
             if (bodies[side] >= 0) ++l->offsets[l->slot_of[bodies[side]] + 1];
     }
     for (size_t i = 0; i < n; ++i) l->offsets[i + 1] += l->offsets[i];
     memcpy(cursor, l->offsets, n * sizeof *cursor);
-    for (size_t r = 0; r < records; ++r) {
-        record_bodies(c, l, r, bodies);
+    for (size_t k = 0; k < constraints(c); ++k) {
+        int32_t record = bodies_of(c, k, bodies);
         for (int side = 0; side < 2; ++side)
-            if (bodies[side] >= 0) l->incident[cursor[l->slot_of[bodies[side]]]++] = (int32_t)(2 * r) + side;
+            if (bodies[side] >= 0) l->incident[cursor[l->slot_of[bodies[side]]]++] = 2 * record + side;
     }
 }
 
-/* ---- tiers ------------------------------------------------------------------------------------------------------ */
-
-static const char TOO_MANY[] = "an island does not fit a thread block";
-
-static int64_t larger(int64_t a, int64_t b) { return a > b ? a : b; }
-
-/* More never run at once: a multiprocessor has 2048 threads. */
-static int64_t most_grid_blocks(const struct sadmm_context *c)
+/* First slot from `slot` on, an island's first one when `heads`, whose cost before it is at least share / shares of all. */
+static int32_t boundary(const struct sadmm_context *c, const struct layout *l, bool heads, int32_t slot, int32_t share,
+                        int32_t shares)
 {
-    return (int64_t)c->multiprocessors * (2048 / THREADS);
-}
-/* Islands are at most as many as bodies, and at least one. */
-static size_t most_parts(const struct sadmm_context *c)
-{
-    return (size_t)larger((int64_t)c->plan.bodies + 1, most_grid_blocks(c));
+    int32_t n = c->plan.bodies;
+    const int32_t *island_of = c->scratch.island_of, *body_of = l->body_of;
+    int64_t total = (int64_t)l->offsets[n] + n, target = (total * share + shares - 1) / shares;
+    while (slot < n && (l->offsets[slot] + (int64_t)slot < target ||
+                        (heads && slot > 0 && island_of[body_of[slot]] == island_of[body_of[slot - 1]])))
+        ++slot;
+    return slot;
 }
 
-/* Pack islands, in order, into as many parts as there are multiprocessors to run them, each within a block's means.
- * Returns why it cannot be done, or NULL. */
-static const char *pack_islands(struct sadmm_context *c, int32_t islands)
+/* Parts by cost, halves + bodies: BLOCK islands in even shares, GRID bodies in even shares; CLUSTER shares of islands, each
+ * in even shares of its bodies. */
+static void divide(struct sadmm_context *c, const struct layout *l)
 {
-    struct cuda_scratch *s = &c->scratch;
-    const struct island *all = &s->islands[islands];
-    /* A pair is a thread; a body is eight, of less work. */
-    int64_t cost = (int64_t)all->pair + all->row + all->body,
-            target = (cost + c->multiprocessors - 1) / c->multiprocessors;
-    int32_t count = 0;
-    int64_t shared_max = 0;
-    for (int32_t i = 0; i < islands;) {
-        const struct island *begin = &s->islands[i];
-        int64_t shared = 0;
-        int32_t next = i;
-        while (next < islands) {
-            const struct island *end = &s->islands[next + 1];
-            int32_t bodies = end->body - begin->body, pairs = end->pair - begin->pair, rows = end->row - begin->row;
-            int64_t grown =
-                (int64_t)CUDA(resident_shared)(bodies, pairs, rows, end->incident - begin->incident, false);
-            bool fits = pairs <= THREADS && grown <= c->shared_limit;
-            bool full = (int64_t)pairs + rows + bodies > target;
-            if (!fits || (full && next > i)) break;
-            shared = grown;
-            ++next;
+    const struct cuda_partition *partition = &c->partition;
+    int32_t parts = partition->parts, cluster = partition->cluster, clusters = parts / cluster, n = c->plan.bodies;
+    c->facts.part_halves = c->facts.part_bodies = 0;
+    l->parts[0] = 0;
+    for (int32_t k = 0; k < clusters; ++k) {
+        int32_t *of = l->parts + k * cluster, begin = of[0];
+        int32_t end = k + 1 == clusters ? n : boundary(c, l, by_island(partition->tier), begin, k + 1, clusters);
+        int64_t before = (int64_t)l->offsets[begin] + begin, total = (int64_t)l->offsets[end] + end - before;
+        of[cluster] = end;
+        for (int32_t j = 1; j < cluster; ++j) {
+            int64_t target = before + (total * j + cluster - 1) / cluster;
+            of[j] = of[j - 1];
+            while (of[j] < end && (int64_t)l->offsets[of[j]] + of[j] < target) ++of[j];
         }
-        if (next == i) return TOO_MANY;
-        struct part part = {begin->body, begin->pair, begin->row};
-        s->parts[count++] = part;
-        shared_max = larger(shared_max, shared);
-        i = next;
     }
-    struct part end = {all->body, all->pair, all->row};
-    s->parts[count] = end;
-    c->part_count = count;
-    c->part_shared = (size_t)shared_max;
-    return nullptr;
-}
-
-/* Even shares of everything, in as few blocks as keep the threads busy; NULL, or why the grid does not fit. */
-static const char *share_evenly(struct sadmm_context *c, const struct layout *l, const char **failed, cudaError_t *code)
-{
-    int64_t n = c->plan.bodies, pairs = c->plan.pairs, rows = c->system->block_count;
-    if (!c->cooperative) return "the device has no cooperative launch";
-    /* Two warps of pairs a block until every multiprocessor has one, then more warps. */
-    int64_t blocks = (pairs + 2 * WARP - 1) / (2 * WARP);
-    blocks = larger(blocks, (rows + 2 * WARP - 1) / (2 * WARP));
-    blocks = larger(blocks, blocks_for(n * LANES));
-    if (blocks > c->multiprocessors) blocks = c->multiprocessors;
-    blocks = larger(larger(blocks, blocks_for(pairs)), 1);
-    if (blocks > most_grid_blocks(c)) return "more pairs than threads the device can hold at once";
-
-    int64_t shared = 0;
-    c->part_count = (int32_t)blocks;
-    for (int64_t i = 0; i <= blocks; ++i) {
-        struct part part = {(int32_t)(n * i / blocks), (int32_t)(pairs * i / blocks), (int32_t)(rows * i / blocks)};
-        c->scratch.parts[i] = part;
-        if (i == 0) continue;
-        int32_t first = c->scratch.parts[i - 1].body;
-        int32_t incident = l->offsets[part.body] - l->offsets[first];
-        shared = larger(shared, (int64_t)CUDA(resident_shared)(part.body - first, 0, 0, incident, true));
+    for (int32_t p = 0; p < parts; ++p) {
+        int32_t halves = l->offsets[l->parts[p + 1]] - l->offsets[l->parts[p]], bodies = l->parts[p + 1] - l->parts[p];
+        c->facts.part_halves = larger(c->facts.part_halves, halves);
+        c->facts.part_bodies = larger(c->facts.part_bodies, bodies);
     }
-    c->part_shared = (size_t)shared;
-    if (shared > c->shared_limit) return "a block's share of the bodies does not fit its shared memory";
-    int resident = 0;
-    cuda_kernel kernel = CUDA(resident_kernel)(c->plan.contact_rows, c->point_slots, true, failed);
-    *code = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, (const void *)kernel, THREADS, c->part_shared);
-    if (*code != cudaSuccess) return nullptr;
-    if (blocks > (int64_t)resident * c->multiprocessors) return "more pairs than threads the device can hold at once";
-    return nullptr;
-}
-
-static sadmm_status choose_tier(struct sadmm_context *c, const struct layout *l, int32_t islands,
-                                struct sadmm_error *error)
-{
-    const char *why = nullptr, *name = nullptr;
-    c->part_count = 0;
-    c->part_shared = 0;
-    c->tier = SADMM_CUDA_TIER_STREAM;
-    if (c->wanted == SADMM_CUDA_TIER_AUTO || c->wanted == SADMM_CUDA_TIER_BLOCK) {
-        why = pack_islands(c, islands);
-        if (!why) c->tier = SADMM_CUDA_TIER_BLOCK;
-    }
-    if (c->tier == SADMM_CUDA_TIER_STREAM && (c->wanted == SADMM_CUDA_TIER_AUTO || c->wanted == SADMM_CUDA_TIER_GRID)) {
-        cudaError_t code = cudaSuccess;
-        why = share_evenly(c, l, &name, &code);
-        if (code != cudaSuccess) return CUDA(fail)(c, code, "cudaOccupancyMaxActiveBlocksPerMultiprocessor", error);
-        if (!why) c->tier = SADMM_CUDA_TIER_GRID;
-    }
-    if (c->wanted != SADMM_CUDA_TIER_AUTO && c->tier != c->wanted)
-        return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "the cuda tier asked for: %s", why);
-    if (c->tier == SADMM_CUDA_TIER_STREAM) c->part_count = 0;
-    else
-        c->resident = CUDA(resident_kernel)(c->plan.contact_rows, c->point_slots, c->tier == SADMM_CUDA_TIER_GRID,
-                                            &c->resident_name);
-    return SADMM_OK;
 }
 
 /* ---- room ------------------------------------------------------------------------------------------------------- */
 
+enum { SCALARS = 128 }; /* bytes: residuals, barrier, live */
+
 static sadmm_status device_room(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_view *v = &c->view;
-    size_t n = (size_t)v->bodies, pairs = (size_t)v->pairs, rows = (size_t)v->row_stride,
+    size_t n = (size_t)v->bodies, pairs = (size_t)v->pair_room, rows = (size_t)v->row_stride,
            real_size = sizeof(solver_real);
-    size_t slots = (size_t)c->point_slots * (size_t)v->stride, records = (pairs + (size_t)v->rows) * RECORD * real_size;
-    size_t points = (size_t)v->points;
+    size_t slots = (size_t)c->facts.point_slots * pairs, records = (pairs + (size_t)v->rows) * RECORD * real_size;
+    size_t points = (size_t)c->plan.points;
     bool three = v->contact_rows != 1;
     size_t raw_body = c->plan.rigid ? sizeof(struct sadmm_rigid) : 42 * sizeof(double);
     size_t raw_bodies = n * (raw_body + 6 * sizeof(double)), raw_pairs = pairs * sizeof(struct sadmm_contact_pair);
@@ -296,7 +232,8 @@ static sadmm_status device_room(struct sadmm_context *c, struct sadmm_error *err
         {BUFFER_ROW_DATA, rows * ROW_PLANES * real_size},
         {BUFFER_RECORDS, records},
         {BUFFER_CHANGE, c->plan.residuals ? records : 0},
-        {BUFFER_SCALARS, 64},
+        {BUFFER_EXCHANGE, c->partition.tier == SADMM_CUDA_TIER_GRID ? 2 * n * ROW * real_size : 0},
+        {BUFFER_SCALARS, SCALARS},
         {BUFFER_RAW_BODIES, raw_bodies},
         {BUFFER_RAW_PAIRS, raw_pairs},
         {BUFFER_RAW_POINTS, raw_points},
@@ -331,6 +268,8 @@ static sadmm_status device_room(struct sadmm_context *c, struct sadmm_error *err
     v->change = (solver_real *)(c->plan.residuals ? b[BUFFER_CHANGE].data : none);
     v->residual = (unsigned long long *)b[BUFFER_SCALARS].data;
     v->barrier = (unsigned *)(v->residual + 4); /* a sector of its own */
+    v->live = (struct cuda_live *)(v->residual + 8);
+    v->exchange = (solver_real *)b[BUFFER_EXCHANGE].data;
     v->raw_pairs = (struct sadmm_contact_pair *)b[BUFFER_RAW_PAIRS].data;
     v->raw_points = (struct sadmm_contact_point *)b[BUFFER_RAW_POINTS].data;
     v->out = (double *)b[BUFFER_OUT].data;
@@ -356,24 +295,17 @@ static sadmm_status host_room(struct sadmm_context *c, struct sadmm_error *error
     bool ok = sadmm_grow((void **)&s->parent, &s->parent_capacity, 0, n, sizeof *s->parent) &&
               sadmm_grow((void **)&s->island_of, &s->island_of_capacity, 0, n, sizeof *s->island_of) &&
               sadmm_grow((void **)&s->islands, &s->islands_capacity, 0, n + 2, sizeof *s->islands) &&
-              sadmm_grow((void **)&s->cursor, &s->cursor_capacity, 0, n + 1, sizeof *s->cursor) &&
-              sadmm_grow((void **)&s->parts, &s->parts_capacity, 0, most_parts(c) + 1, sizeof *s->parts);
+              sadmm_grow((void **)&s->cursor, &s->cursor_capacity, 0, n + 1, sizeof *s->cursor);
     return ok ? SADMM_OK : sadmm_fail_memory(error, "the cuda backend's step");
 }
 
 /* The view's counts; the graph stays valid only while nothing in the view moves. */
 static void count(struct sadmm_context *c)
 {
-    const struct sadmm_contact_set *contacts = c->system->contacts;
     cuda_view *v = &c->view;
-    c->point_slots = 0;
-    for (size_t p = 0; p < contacts->pair_count; ++p)
-        if (contacts->pairs[p].count > c->point_slots) c->point_slots = contacts->pairs[p].count;
     v->bodies = c->plan.bodies;
-    v->pairs = c->plan.pairs;
-    v->points = c->plan.points;
+    v->pair_room = (c->plan.pairs + WARP - 1) / WARP * WARP;
     v->rows = c->system->block_count;
-    v->stride = (v->pairs + WARP - 1) / WARP * WARP;
     v->row_stride = (v->rows + WARP - 1) / WARP * WARP;
     v->contact_rows = c->plan.contact_rows;
     v->warm_start = c->plan.warm_start;
@@ -382,29 +314,35 @@ static void count(struct sadmm_context *c)
 
 static sadmm_status lay_out_step(struct sadmm_context *c, struct sadmm_error *error)
 {
-    size_t n = (size_t)c->view.bodies, pairs = (size_t)c->view.pairs, rows = (size_t)c->view.rows;
-    size_t parts = most_parts(c), bytes = lay_out(nullptr, n, pairs, rows, parts).bytes;
-    CUDA_TRY(CUDA(room)(c, PINNED_LAYOUT, bytes, error));
+    size_t n = (size_t)c->view.bodies;
+    survey(c);
+    CUDA_TRY(CUDA(choose_partition)(c, &c->facts, &c->partition, error));
+    size_t bytes = lay_out(nullptr, n, constraints(c), (size_t)c->partition.parts).bytes;
+    CUDA_TRY(CUDA(room)(c, PINNED_LAYOUT, bytes + sizeof(struct cuda_live), error));
     CUDA_TRY(CUDA(room)(c, BUFFER_LAYOUT, bytes, error));
-    struct layout host = lay_out(c->buffers[PINNED_LAYOUT].data, n, pairs, rows, parts);
-    int32_t islands = count_islands(c);
-    number_slots(c, &host, islands);
+    struct layout host = lay_out(c->buffers[PINNED_LAYOUT].data, n, constraints(c), (size_t)c->partition.parts);
+    number_slots(c, &host);
     list_incident(c, &host);
-    CUDA_TRY(choose_tier(c, &host, islands, error));
-    if (c->part_count > 0) memcpy(host.parts, c->scratch.parts, ((size_t)c->part_count + 1) * sizeof *host.parts);
+    if (c->partition.parts > 0) divide(c, &host);
 
-    struct layout device = lay_out(c->buffers[BUFFER_LAYOUT].data, n, pairs, rows, parts);
-    size_t used = bytes - (parts - (size_t)c->part_count) * sizeof *host.parts;
-    CUDA_CALL(c, cudaMemcpyAsync(device.body_of, host.body_of, used, cudaMemcpyHostToDevice, c->stream),
+    struct layout device = lay_out(c->buffers[BUFFER_LAYOUT].data, n, constraints(c), (size_t)c->partition.parts);
+    CUDA_CALL(c, cudaMemcpyAsync(device.body_of, host.body_of, bytes, cudaMemcpyHostToDevice, c->stream),
               "cudaMemcpyAsync(layout)");
     c->view.body_of = device.body_of;
     c->view.slot_of = device.slot_of;
-    c->view.pair_of = device.pair_of;
-    c->view.row_of = device.row_of;
     c->view.offsets = device.offsets;
     c->view.incident = device.incident;
     c->view.parts = device.parts;
     return SADMM_OK;
+}
+
+static sadmm_status upload_live(struct sadmm_context *c, struct sadmm_error *error)
+{
+    struct cuda_live live = {HALT_NONE, c->plan.bodies, c->plan.pairs, c->plan.points};
+    if (c->facts.part_halves > c->partition.most_halves || c->facts.part_bodies > c->partition.most_bodies)
+        live.halt = HALT_PARTITION;
+    size_t at = c->buffers[PINNED_LAYOUT].capacity - sizeof live; /* beyond the layout */
+    return CUDA(upload)(c, c->view.live, PINNED_LAYOUT, at, &live, sizeof live, error);
 }
 
 extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_system *system,
@@ -423,6 +361,8 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
     c->plan = *plan;
     c->settings = *settings;
     c->blocks_uploaded = false;
+    c->starting = true;
+    c->weighed = false;
     c->measured = false;
     c->ratio = 1;
     c->graph_valid = false;
@@ -430,8 +370,8 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
     CUDA_TRY(host_room(c, error));
     CUDA_TRY(lay_out_step(c, error));
     CUDA_TRY(device_room(c, error));
-    CUDA_CALL(c, cudaMemsetAsync(c->view.residual, 0, 64, c->stream), "cudaMemsetAsync(scalars)");
+    CUDA_CALL(c, cudaMemsetAsync(c->view.residual, 0, SCALARS, c->stream), "cudaMemsetAsync(scalars)");
     CUDA_CALL(c, cudaMemsetAsync(c->view.state + (size_t)plan->bodies * ROW, 0, ROW * sizeof(solver_real), c->stream),
               "cudaMemsetAsync(static world)");
-    return SADMM_OK;
+    return upload_live(c, error);
 }

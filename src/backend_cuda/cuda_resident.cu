@@ -1,273 +1,546 @@
-/* The fused iteration as one kernel whose state stays on the chip: tiers BLOCK and GRID (cuda_internal.h).
+/* The fused iteration as one kernel whose state stays on the chip: tiers BLOCK, CLUSTER and GRID (cuda_internal.h).
  *
- * A thread block owns a part: bodies, pairs (at most one a thread) and row blocks. Through all iterations a thread
- * keeps its pair in registers, and shared memory holds the bodies' factors and their lists. What parts exchange
- * differs:
- *   BLOCK  parts are whole islands and exchange nothing: velocities and records are in shared memory too;
- *   GRID   velocities and records are in global memory, and a barrier over the grid ends each half of an iteration. The
- *          launch is cooperative, so that every block runs and the spinning ends.
- * Row blocks read their Jacobians from memory (six rows on two bodies are more than registers hold).
+ * A thread block owns a part: a range of bodies and the halves of their constraints. Four lanes (a quad) take a half, one
+ * contact point each (points k and k + 4 where pairs have up to 8), and keep it in registers through all iterations. The
+ * multipliers of a pair between two dynamic bodies are thereby computed twice, from the same inputs by the same
+ * expressions, so that both copies stay equal bit for bit and no wrench ever leaves its block: an iteration exchanges
+ * velocities, and nothing else.
+ *   BLOCK    parts are whole islands: nothing to exchange
+ *   CLUSTER  the blocks of a cluster read each other's velocities from shared memory, written alternately to two
+ *            buffers, and meet in one cluster barrier an iteration
+ *   GRID     velocities go through global memory, two buffers again, with one grid barrier an iteration. The launch is
+ *            cooperative, so that every block runs and the spinning ends.
+ * A half of a row block is the work of its quad's first lane; it reads its Jacobians from memory (six rows on two bodies
+ * are more than registers hold).
  *
  * On entry and exit everything is in global memory as the stepwise kernels leave it.
  */
 #include "cuda_sweep.h"
 
+enum resident_mode { BLOCK, CLUSTER, GRID };
+
+enum { QUAD = 4 }; /* lanes a half */
+
+/* Threads a block at most: what the registers of a multiprocessor are enough for. */
+static constexpr int most_threads(int points)
+{
+    return sizeof(solver_real) == sizeof(float) ? (points == 4 ? 1024 : 768) : (points == 4 ? 512 : 384);
+}
+
+int CUDA(resident_threads)(int point_slots) { return most_threads(point_slots <= 4 ? 4 : 8); }
+
 /* ---- shared memory --------------------------------------------------------------------------------------------- */
 
+/* The same in every block of a launch: blocks of a cluster look into each other's memory. */
 struct part_memory {
-    solver_real *A, *H, *b;       /* bodies x MATRIX, MATRIX, ROW */
-    solver_real *state, *records; /* BLOCK: (bodies + 1) x ROW, (pairs + rows) x RECORD */
-    int32_t *offsets, *incident;  /* bodies + 1; BLOCK: records count from the part's first */
+    solver_real *state;      /* CLUSTER: of even, then of odd iterations; bodies x ROW each, then a row of 0 */
+    solver_real *records;    /* halves x ROW */
+    solver_real *row_lambda; /* halves x ROW, when there are row blocks */
+    solver_real *A, *H, *b;  /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x MATRIX, ROW */
 };
 
 /* One description of the layout for its size and its addresses. */
-static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *base, int32_t bodies, int32_t pairs,
-                                                 int32_t rows, int32_t incident, bool grid)
+static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *base, bool cluster, int threads,
+                                                 int32_t bodies, bool row_blocks)
 {
-    size_t n = (size_t)bodies, records = grid ? 0 : (size_t)(pairs + rows) * RECORD, state = grid ? 0 : (n + 1) * ROW;
-    solver_real *next = (solver_real *)base;
-    m->A = next;
-    m->H = m->A + n * MATRIX;
-    m->b = m->H + n * MATRIX;
-    m->state = m->b + n * ROW;
-    m->records = m->state + state;
-    m->offsets = (int32_t *)(m->records + records);
-    m->incident = m->offsets + n + 1;
-    return (n * (2 * MATRIX + ROW) + state + records) * sizeof(solver_real) +
-           (n + 1 + (size_t)incident) * sizeof(int32_t);
+    size_t n = (size_t)bodies, halves = (size_t)(threads / QUAD), first = (size_t)(threads / LANES);
+    size_t more = n > first ? n - first : 0;
+    m->state = (solver_real *)base;
+    m->records = m->state + ((cluster ? 2 * n : n) + 1) * ROW;
+    m->row_lambda = m->records + halves * ROW;
+    m->A = m->row_lambda + (row_blocks ? halves * ROW : 0);
+    m->H = m->A + more * MATRIX;
+    m->b = m->H + more * MATRIX;
+    return (size_t)(m->b + more * ROW - m->state) * sizeof(solver_real);
 }
 
-size_t CUDA(resident_shared)(int32_t bodies, int32_t pairs, int32_t rows, int32_t incident, bool grid)
+size_t CUDA(resident_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies, bool row_blocks)
 {
     part_memory unused;
-    return lay_out(&unused, nullptr, bodies, pairs, rows, incident, grid);
+    return lay_out(&unused, nullptr, tier == SADMM_CUDA_TIER_CLUSTER, threads, most_bodies, row_blocks);
 }
 
-/* ---- barrier --------------------------------------------------------------------------------------------------- */
+/* ---- barriers -------------------------------------------------------------------------------------------------- */
 
-/* Every block arrives `target` / blocks times. One thread of a block speaks for it: its release and acquire, with the
- * block's own barriers around them, order every thread's writes before every thread's reads. */
-static __device__ __forceinline__ void grid_barrier(unsigned *arrivals, unsigned target)
+/* Between the two halves of a barrier a thread may do what concerns nobody else. */
+template <int MODE> static __device__ __forceinline__ void arrive(unsigned *arrivals)
+{
+#ifdef SADMM_CUDA_EMULATED
+    (void)arrivals;
+#else
+    if (MODE == GRID) {
+        /* One thread of a block speaks for it: its release and acquire, with the block's own barriers around them, order
+         * every thread's writes before every thread's reads. */
+        __syncthreads();
+        if (threadIdx.x == 0) asm volatile("red.release.gpu.global.add.u32 [%0], 1;" ::"l"(arrivals) : "memory");
+    }
+#if __CUDA_ARCH__ >= 900
+    if (MODE == CLUSTER) asm volatile("barrier.cluster.arrive.release.aligned;" ::: "memory");
+#endif
+#endif
+}
+
+/* `target`: arrivals in all when every block has come. */
+template <int MODE> static __device__ __forceinline__ void wait(const unsigned *arrivals, unsigned target)
 {
 #ifdef SADMM_CUDA_EMULATED
     (void)arrivals;
     (void)target;
-    cuda_emulation_grid_barrier();
+    if (MODE == BLOCK) __syncthreads();
+    else cuda_emulation_barrier_together();
 #else
-    __syncthreads();
-    if (threadIdx.x == 0) {
+    if (MODE == GRID && threadIdx.x == 0) {
         unsigned now;
-        __threadfence();
-        asm volatile("red.release.gpu.global.add.u32 [%0], 1;" ::"l"(arrivals) : "memory");
         do asm volatile("ld.acquire.gpu.global.u32 %0, [%1];" : "=r"(now) : "l"(arrivals) : "memory");
         while ((int)(now - target) < 0);
-        __threadfence();
     }
-    __syncthreads();
+    if (MODE != CLUSTER) __syncthreads();
+#if __CUDA_ARCH__ >= 900
+    if (MODE == CLUSTER) asm volatile("barrier.cluster.wait.acquire.aligned;" ::: "memory");
+#endif
 #endif
 }
 
-/* ---- pairs in registers ---------------------------------------------------------------------------------------- */
+/* The same address in the shared memory of another block of the cluster. */
+static __device__ __forceinline__ const solver_real *in_block(const solver_real *own, unsigned rank)
+{
+#ifdef SADMM_CUDA_EMULATED
+    return (const solver_real *)cuda_emulation_in_block(own, rank);
+#elif __CUDA_ARCH__ >= 900
+    const solver_real *other;
+    asm("mapa.u64 %0, %1, %2;" : "=l"(other) : "l"(own), "r"(rank));
+    return other;
+#else
+    (void)rank;
+    return own;
+#endif
+}
 
-template <int POINTS> struct resident_pair {
-    pair_data pair;
-    vec3 arm[POINTS], lambda[POINTS];
-    real error[POINTS];
+/* ---- halves in registers --------------------------------------------------------------------------------------- */
+
+/* A lane's share of its quad's half: points lane, lane + 4, ... The half on side b sees the relative velocity x; the half
+ * on side a sees -x, so its errors and weights have the other sign too. A point that is not there has all 0. */
+template <int POINTS> struct half_lane {
+    enum { COUNT = POINTS / QUAD };
+    vec3 normal;
+    real friction, sign;
+    vec3 own_arm[COUNT], other_arm[COUNT], lambda[COUNT];
+    real error[COUNT], inv_s[COUNT];
+    int32_t own;              /* body, in the part */
+    const solver_real *other; /* row of the other body's state in even iterations */
+    int32_t other_odd;        /* from there to its row in odd iterations */
+    bool pair;                /* a half of a pair */
 };
 
-template <int CONTACT_ROWS, int POINTS>
-static __device__ __forceinline__ void load_resident(resident_pair<POINTS> *own, const cuda_view &v, int32_t p)
+struct real2_pair {
+    solver_real x, y;
+};
+
+/* Force and torque added over a quad as (q_0 + q_1) + (q_2 + q_3); lane 0 gets the force's x and y, lane 2 its z and 0, lanes
+ * 1 and 3 the torque's. Every lane of the warp comes here. */
+CUDA_INLINE real2_pair sum_quad(int32_t lane, vec3 force, vec3 torque)
 {
-    own->pair = load_pair(v, p);
-#pragma unroll
-    for (int k = 0; k < POINTS; ++k) {
-        if (k >= own->pair.count) continue;
-        size_t slot = (size_t)k * (size_t)v.stride + (size_t)p;
-        real4 arm = v.arm[slot];
-        own->arm[k] = xyz(arm);
-        own->error[k] = arm.w;
-        own->lambda[k] = load_lambda<CONTACT_ROWS>(v, slot);
+    const unsigned all = (unsigned)ALL_LANES;
+    const bool odd = lane & 1, high = lane & 2;
+    vec3 mine = odd ? torque : force, given = odd ? force : torque;
+    mine.x += __shfl_xor_sync(all, given.x, 1);
+    mine.y += __shfl_xor_sync(all, given.y, 1);
+    mine.z += __shfl_xor_sync(all, given.z, 1);
+    real first = high ? mine.z : mine.x, other = high ? mine.x : mine.z;
+    first += __shfl_xor_sync(all, other, 2);
+    mine.y += __shfl_xor_sync(all, mine.y, 2);
+    real2_pair sum = {first, high ? (real)0 : mine.y};
+    return sum;
+}
+
+/* Where a lane's share of that sum is in the record. */
+CUDA_INLINE int32_t quad_slot(int32_t lane) { return (lane & 1) * QUAD + (lane & 2); }
+
+/* ---- a part ---------------------------------------------------------------------------------------------------- */
+
+template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL> struct part_run {
+    enum { COUNT = POINTS / QUAD };
+    const cuda_view &v;
+    const cuda_args &args;
+    part_memory m;
+    int32_t t, r, lane, half; /* thread; component of a body; lane of a quad; the quad's half */
+    int32_t first_body, bodies, first_half, halves;
+
+    /* One body for each eight threads is in registers, with its halves and b - A v; more are in shared memory. */
+    int32_t body, begin, end;
+    body_lane own_body;
+    real momentum;
+    half_lane<POINTS> own;
+
+    __device__ __forceinline__ part_run(const cuda_view &view, const cuda_args &arguments, unsigned char *memory)
+        : v(view), args(arguments), t((int32_t)threadIdx.x), r(t % LANES), lane(t % QUAD), half(t / QUAD),
+          first_body(v.parts[blockIdx.x]), bodies(v.parts[blockIdx.x + 1] - first_body),
+          first_half(v.offsets[first_body]), halves(v.offsets[first_body + bodies] - first_half), body(t / LANES),
+          begin(0), end(0), own_body(), momentum(0), own()
+    {
+        lay_out(&m, memory, MODE == CLUSTER, (int)blockDim.x, args.most_bodies, has_rows());
+    }
+
+    __device__ __forceinline__ solver_real *state(int32_t odd) const
+    {
+        return m.state + (MODE == CLUSTER && odd ? args.most_bodies * ROW : 0);
+    }
+    __device__ __forceinline__ bool has_rows(void) const { return FULL && v.rows > 0; }
+    /* Warps without work are left out of everything but barriers. */
+    __device__ __forceinline__ bool warp_has_body(int32_t first) const { return first + t / WARP * (WARP / LANES) < bodies; }
+    __device__ __forceinline__ bool warp_has_half(void) const { return t / WARP * (WARP / QUAD) < halves; }
+
+    __device__ __forceinline__ void load(void);
+    __device__ __forceinline__ void load_half(void);
+    __device__ __forceinline__ void find_other(int32_t other);
+    __device__ __forceinline__ void start_records(void);
+    __device__ __forceinline__ void load_records(void);
+    __device__ __forceinline__ void store_record(solver_real *record, real2_pair sum) const;
+    __device__ __forceinline__ real gather(real g, int32_t from, int32_t to) const;
+    __device__ __forceinline__ void publish(int32_t i, real value, int32_t odd);
+    __device__ __forceinline__ void move_bodies(int32_t odd);
+    template <bool MEASURE> __device__ __forceinline__ double update_halves(int32_t odd);
+    __device__ __forceinline__ void store(int32_t odd);
+};
+
+#define PART template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL>
+#define PART_RUN part_run<CONTACT_ROWS, POINTS, MODE, FULL>
+
+/* ---- row blocks, out of line: few systems have them ------------------------------------------------------------ */
+
+/* Steps 2-4 of half `code` of a row block, into this side's records; `measure`: as after a measured iteration. */
+static __device__ __noinline__ double update_row_half(const cuda_view &v, int32_t code, const solver_real *own,
+                                                      const solver_real *other, solver_real *kept, solver_real *record,
+                                                      bool measure)
+{
+    const int32_t k = code / 2 - v.pair_room, side = code & 1;
+    const row_about about = v.row_info[k];
+    real lambda[6], delta[6];
+    for (int j = 0; j < 6; ++j) lambda[j] = kept[j];
+    update_row_block(v, k, about, side ? other : own, side ? own : other, lambda, delta);
+    for (int j = 0; j < 6; ++j) kept[j] = lambda[j];
+    if (!measure)
+        for (int j = 0; j < 6; ++j) lambda[j] += delta[j];
+    store_row_record(v, k, about.rows, side, lambda, record);
+    if (!measure) return 0;
+    store_row_record(v, k, about.rows, side, delta, v.change + (size_t)code * ROW);
+    return row_block_primal(v, about, delta);
+}
+
+static __device__ __noinline__ void start_row_half(const cuda_view &v, int32_t code, solver_real *kept,
+                                                   solver_real *record, bool start)
+{
+    const int32_t k = code / 2 - v.pair_room;
+    real lambda[6];
+    load_row_lambda(v, k, lambda);
+    for (int j = 0; j < 6; ++j) kept[j] = lambda[j];
+    if (start) store_row_record(v, k, v.row_info[k].rows, code & 1, lambda, record);
+}
+
+/* ---- loading --------------------------------------------------------------------------------------------------- */
+
+/* Where the other body's state will be. */
+PART __device__ __forceinline__ void PART_RUN::find_other(int32_t other)
+{
+    const int32_t local = other - first_body;
+    own.other_odd = 0;
+    if (other == v.bodies) { /* the static world */
+        own.other = m.state + (MODE == CLUSTER ? 2 : 1) * args.most_bodies * ROW;
+    } else if (MODE == BLOCK) {
+        own.other = m.state + local * ROW;
+    } else if (MODE == GRID) {
+        bool inside = local >= 0 && local < bodies;
+        own.other = inside ? m.state + local * ROW : v.exchange + (size_t)other * ROW;
+        own.other_odd = inside ? 0 : v.bodies * ROW;
+    } else {
+        const int32_t first_part = (int32_t)blockIdx.x / args.cluster * args.cluster;
+        int32_t rank = 0;
+        while (rank + 1 < args.cluster && other >= v.parts[first_part + rank + 1]) ++rank;
+        own.other = in_block(m.state, (unsigned)rank) + (other - v.parts[first_part + rank]) * ROW;
+        own.other_odd = args.most_bodies * ROW;
     }
 }
 
-template <int CONTACT_ROWS, int POINTS>
-static __device__ __forceinline__ void store_resident(const resident_pair<POINTS> &own, const cuda_view &v, int32_t p)
+PART __device__ __forceinline__ void PART_RUN::load_half(void)
 {
+    const int32_t code = v.incident[first_half + half], side = code & 1, p = code / 2;
+    if (FULL && p >= v.pair_room) {
+        const row_about about = v.row_info[p - v.pair_room];
+        own.own = (side ? about.body_b : about.body_a) - first_body;
+        find_other(side ? about.body_a : about.body_b);
+        return;
+    }
+    const real4 about = v.normal[p];
+    const vec3 difference = xyz(v.difference[p]);
+    const int2 on = v.pair_bodies[p];
+    const int32_t count = v.pair_count[p];
+    own.pair = true;
+    own.normal = xyz(about);
+    own.friction = about.w;
+    own.sign = side ? (real)1 : (real)-1;
+    own.own = (side ? on.y : on.x) - first_body;
+    find_other(side ? on.x : on.y);
+    const real inv_s = own.sign * inverse_weight(v, on.x, on.y);
 #pragma unroll
-    for (int k = 0; k < POINTS; ++k)
-        if (k < own.pair.count) store_lambda<CONTACT_ROWS>(v, (size_t)k * (size_t)v.stride + (size_t)p, own.lambda[k]);
+    for (int32_t j = 0; j < COUNT; ++j) {
+        const int32_t k = lane + QUAD * j;
+        if (k >= count) continue;
+        const size_t slot = (size_t)k * (size_t)v.pair_room + (size_t)p;
+        const real4 point = v.arm[slot];
+        const vec3 arm_a = xyz(point), arm_b = v3_add(arm_a, difference);
+        own.own_arm[j] = side ? arm_b : arm_a;
+        own.other_arm[j] = side ? arm_a : arm_b;
+        own.error[j] = own.sign * point.w;
+        own.inv_s[j] = inv_s;
+        own.lambda[j] = load_lambda<CONTACT_ROWS>(v, slot);
+    }
 }
 
-template <int CONTACT_ROWS, int POINTS, bool MEASURE>
-static __device__ __forceinline__ void sweep_resident(resident_pair<POINTS> *own, const solver_real *state,
-                                                      solver_real *record, solver_real *change, double *primal)
+/* J^T lambda. */
+PART __device__ __forceinline__ void PART_RUN::start_records(void)
 {
-    pair_motion motion = relative_motion(own->pair, state);
-    pair_sums sums = no_sums();
+    vec3 force = v3(0, 0, 0), torque = force;
 #pragma unroll
-    for (int k = 0; k < POINTS; ++k) {
-        if (k >= own->pair.count) continue;
-        vec3 old = own->lambda[k];
-        vec3 lambda = update_point<CONTACT_ROWS>(own->pair, motion, own->arm[k], own->error[k], old);
-        own->lambda[k] = lambda;
-        add_point<CONTACT_ROWS, MEASURE>(own->pair, own->arm[k], lambda, old, &sums);
+    for (int32_t j = 0; j < COUNT; ++j) {
+        vec3 impulse = impulse_of<CONTACT_ROWS>(own.normal, own.lambda[j]), moment = v3_cross(own.own_arm[j], impulse);
+        force = j == 0 ? impulse : v3_add(force, impulse);
+        torque = j == 0 ? moment : v3_add(torque, moment);
     }
-    store_record(record, sums.next, own->pair.difference);
+    store_record(m.records + half * ROW, sum_quad(lane, force, torque));
+}
+
+/* What the last stretch or the stepwise kernels left, joined after a measured iteration. */
+PART __device__ __forceinline__ void PART_RUN::load_records(void)
+{
+    for (int32_t i = t; i < halves * ROW; i += (int32_t)blockDim.x) {
+        const size_t from = (size_t)v.incident[first_half + i / ROW] * ROW + (size_t)(i % ROW);
+        m.records[i] = args.join ? v.records[from] + args.ratio * v.change[from] : v.records[from];
+    }
+}
+
+PART __device__ __forceinline__ void PART_RUN::load(void)
+{
+    const int32_t threads = (int32_t)blockDim.x, in_registers = threads / LANES;
+    const size_t at = (size_t)(first_body + (body < bodies ? body : 0));
+    own_body = load_body(body < bodies, r, v.A + at * MATRIX, v.H + at * MATRIX, v.b + at * ROW, v.state + at * ROW);
+    if (body < bodies) {
+        begin = v.offsets[at] - first_half;
+        end = v.offsets[at + 1] - first_half;
+    }
+    if (warp_has_body(0)) momentum = free_momentum(own_body);
+    for (int32_t i = t; i < bodies * ROW; i += threads) m.state[i] = v.state[(size_t)first_body * ROW + (size_t)i];
+    if (t < ROW) m.state[(MODE == CLUSTER ? 2 : 1) * args.most_bodies * ROW + t] = 0;
+    if (bodies > in_registers) {
+        const size_t first = (size_t)(first_body + in_registers);
+        for (int32_t i = t; i < (bodies - in_registers) * MATRIX; i += threads) {
+            m.A[i] = v.A[first * MATRIX + (size_t)i];
+            m.H[i] = v.H[first * MATRIX + (size_t)i];
+        }
+        for (int32_t i = t; i < (bodies - in_registers) * ROW; i += threads) m.b[i] = v.b[first * ROW + (size_t)i];
+    }
+    own.own = 0;
+    own.other = m.state;
+    if (half < halves) load_half();
+    if (!args.start) load_records();
+    else if (warp_has_half()) start_records();
+    if (has_rows() && half < halves && !own.pair && lane == 0)
+        start_row_half(v, v.incident[first_half + half], m.row_lambda + half * ROW, m.records + half * ROW, args.start);
+    __syncthreads();
+}
+
+/* ---- Step 1 ---------------------------------------------------------------------------------------------------- */
+
+/* g and component r of the records [from, to), one after the other. */
+PART __device__ __forceinline__ real PART_RUN::gather(real g, int32_t from, int32_t to) const
+{
+    enum { AHEAD = 8 }; /* loads on the way at once */
+    const solver_real *record = m.records + record_slot(r);
+    for (int32_t h = from; h < to; h += AHEAD) {
+        real value[AHEAD] = {};
+#pragma unroll
+        for (int32_t j = 0; j < AHEAD; ++j)
+            if (h + j < to) value[j] = record[(h + j) * ROW];
+#pragma unroll
+        for (int32_t j = 0; j < AHEAD; ++j)
+            if (h + j < to) g += value[j];
+    }
+    return g;
+}
+
+PART __device__ __forceinline__ void PART_RUN::publish(int32_t i, real value, int32_t odd)
+{
+    if (i >= bodies || r >= 6) return;
+    state(odd)[i * ROW + r] = value;
+    if (MODE == GRID) v.exchange[((size_t)(odd ? v.bodies : 0) + (size_t)(first_body + i)) * ROW + (size_t)r] = value;
+}
+
+PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd)
+{
+    if (warp_has_body(0)) {
+        const bool mine = body < bodies && r < 6;
+        real g = momentum;
+        if (mine) g = gather(g, begin, end);
+        move_body(&own_body, g);
+        publish(body, own_body.v, odd);
+    }
+    const int32_t in_registers = (int32_t)blockDim.x / LANES;
+    for (int32_t first = in_registers; warp_has_body(first); first += in_registers) {
+        const int32_t i = first + body, at = i - in_registers;
+        const bool live = i < bodies;
+        body_lane one = load_body(live, r, m.A + at * MATRIX, m.H + at * MATRIX, m.b + at * ROW, state(!odd) + i * ROW);
+        real g = free_momentum(one);
+        if (live && r < 6)
+            g = gather(g, v.offsets[first_body + i] - first_half, v.offsets[first_body + i + 1] - first_half);
+        move_body(&one, g);
+        publish(i, one.v, odd);
+    }
+}
+
+/* ---- Steps 2-4 ------------------------------------------------------------------------------------------------- */
+
+PART __device__ __forceinline__ void PART_RUN::store_record(solver_real *record, real2_pair sum) const
+{
+    if (!own.pair) return;
+    sum.x *= own.sign;
+    sum.y *= own.sign;
+    *(real2_pair *)(record + quad_slot(lane)) = sum;
+}
+
+/* The lane's share of the primal residual. */
+PART template <bool MEASURE> __device__ __forceinline__ double PART_RUN::update_halves(int32_t odd)
+{
+    double primal = 0;
+    if (!warp_has_half()) return primal;
+    const solver_real *own_row = state(odd) + own.own * ROW, *other_row = own.other + (odd ? own.other_odd : 0);
+    const body_motion own_motion = load_motion(own_row), other = load_motion(other_row);
+    vec3 force = v3(0, 0, 0), torque = force, change_force = force, change_torque = force;
+    real largest = 0;
+#pragma unroll
+    for (int32_t j = 0; j < COUNT; ++j) {
+        const vec3 old = own.lambda[j], x = relative_velocity(other, own.other_arm[j], own_motion, own.own_arm[j]);
+        const vec3 lambda =
+            update_point<CONTACT_ROWS>(own.normal, own.friction, x, own.error[j], own.inv_s[j], old);
+        const vec3 delta = v3_sub(lambda, old);
+        own.lambda[j] = lambda;
+        vec3 impulse = impulse_of<CONTACT_ROWS>(own.normal, MEASURE ? lambda : v3_add(lambda, delta));
+        vec3 moment = v3_cross(own.own_arm[j], impulse);
+        force = j == 0 ? impulse : v3_add(force, impulse);
+        torque = j == 0 ? moment : v3_add(torque, moment);
+        if (!MEASURE) continue;
+        impulse = impulse_of<CONTACT_ROWS>(own.normal, delta);
+        moment = v3_cross(own.own_arm[j], impulse);
+        change_force = j == 0 ? impulse : v3_add(change_force, impulse);
+        change_torque = j == 0 ? moment : v3_add(change_torque, moment);
+        largest = real_max(largest, largest_row<CONTACT_ROWS>(own.normal, delta));
+    }
+    store_record(m.records + half * ROW, sum_quad(lane, force, torque));
+    if (!MEASURE && !has_rows()) return primal;
+
+    const int32_t code = half < halves ? v.incident[first_half + half] : 0;
     if (MEASURE) {
-        store_record(change, sums.change, own->pair.difference);
-        *primal = (double)(sums.largest * motion.inv_beta);
+        store_record(v.change + (size_t)code * ROW, sum_quad(lane, change_force, change_torque));
+        if (own.pair) {
+            const int2 on = v.pair_bodies[code / 2];
+            primal = (double)(largest * real_max(inv_beta_of(v, on.x), inv_beta_of(v, on.y)));
+        }
+    }
+    if (has_rows() && half < halves && !own.pair && lane == 0)
+        primal = update_row_half(v, code, own_row, other_row, m.row_lambda + half * ROW, m.records + half * ROW, MEASURE);
+    return primal;
+}
+
+/* ---- storing --------------------------------------------------------------------------------------------------- */
+
+/* Velocities, records and, from side a (b where a is static), multipliers. */
+PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
+{
+    for (int32_t i = t; i < bodies * ROW; i += (int32_t)blockDim.x)
+        if (i % ROW < 6) v.state[(size_t)first_body * ROW + (size_t)i] = state(odd)[i];
+    for (int32_t i = t; i < halves * ROW; i += (int32_t)blockDim.x)
+        v.records[(size_t)v.incident[first_half + i / ROW] * ROW + (size_t)(i % ROW)] = m.records[i];
+    if (half >= halves) return;
+    const int32_t code = v.incident[first_half + half], p = code / 2;
+    if (own.pair) {
+        if (code & 1 && v.pair_bodies[p].x != v.bodies) return;
+        const int32_t count = v.pair_count[p];
+#pragma unroll
+        for (int32_t j = 0; j < COUNT; ++j) {
+            const int32_t k = lane + QUAD * j;
+            if (k < count) store_lambda<CONTACT_ROWS>(v, (size_t)k * (size_t)v.pair_room + (size_t)p, own.lambda[j]);
+        }
+    } else if (FULL && lane == 0) {
+        const int32_t k = p - v.pair_room;
+        if (code & 1 && v.row_info[k].body_a != v.bodies) return;
+        store_row_lambda(v, k, m.row_lambda + half * ROW);
     }
 }
 
 /* ---- the kernel ------------------------------------------------------------------------------------------------ */
 
-template <int CONTACT_ROWS, int POINTS, bool GRID>
-static __global__ void __launch_bounds__(THREADS)
+/* FULL: with row blocks, or to be measured; both cost registers, and most stretches have neither. */
+template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL>
+static __global__ void __launch_bounds__(most_threads(POINTS))
     resident_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     CUDA_DYNAMIC_SHARED(memory);
-    const part begin = v.parts[blockIdx.x], end = v.parts[blockIdx.x + 1];
-    const int32_t bodies = end.body - begin.body, pairs = end.pair - begin.pair, rows = end.row - begin.row;
-    const int32_t first_incident = v.offsets[begin.body], incident = v.offsets[end.body] - first_incident;
-    const int32_t t = (int32_t)threadIdx.x;
-    part_memory m;
-    lay_out(&m, memory, bodies, pairs, rows, incident, GRID);
-
-    /* Where velocities and records are, and how this part's bodies are numbered there. */
-    solver_real *const state = GRID ? v.state : m.state;
-    solver_real *const own_records = GRID ? v.records + (size_t)begin.pair * RECORD : m.records;
-    solver_real *const row_records = GRID ? v.records + ((size_t)v.pairs + (size_t)begin.row) * RECORD
-                                          : m.records + (size_t)pairs * RECORD;
-    const solver_real *const records = GRID ? v.records : m.records;
-    solver_real *const own_state = GRID ? v.state + (size_t)begin.body * ROW : m.state;
-    unsigned arrivals = 0;
-
-    for (int32_t i = t; i < bodies * MATRIX; i += THREADS) {
-        m.A[i] = v.A[(size_t)begin.body * MATRIX + (size_t)i];
-        m.H[i] = v.H[(size_t)begin.body * MATRIX + (size_t)i];
-    }
-    for (int32_t i = t; i < bodies * ROW; i += THREADS) m.b[i] = v.b[(size_t)begin.body * ROW + (size_t)i];
-    for (int32_t i = t; i <= bodies; i += THREADS) m.offsets[i] = v.offsets[begin.body + i] - first_incident;
-    for (int32_t i = t; i < incident; i += THREADS) {
-        int32_t half = v.incident[first_incident + i];
-        if (!GRID) half -= half < 2 * v.pairs ? 2 * begin.pair : 2 * (v.pairs - pairs + begin.row);
-        m.incident[i] = half;
-    }
-    if (!GRID) {
-        for (int32_t i = t; i < (bodies + 1) * ROW; i += THREADS)
-            m.state[i] = i < bodies * ROW ? v.state[(size_t)begin.body * ROW + (size_t)i] : (solver_real)0;
-    }
-    /* The records of this part: copied (BLOCK), and joined after a measured iteration. */
-    if (!GRID || args.join) {
-        for (int32_t i = t; i < (pairs + rows) * RECORD; i += THREADS) {
-            bool of_pair = i < pairs * RECORD;
-            size_t from = of_pair ? (size_t)begin.pair * RECORD + (size_t)i
-                                  : ((size_t)v.pairs + (size_t)begin.row) * RECORD + (size_t)(i - pairs * RECORD);
-            solver_real value = v.records[from];
-            if (args.join) value += args.ratio * v.change[from];
-            (of_pair ? own_records : row_records - pairs * RECORD)[i] = value;
-        }
-        if (GRID) grid_barrier(v.barrier, arrivals += gridDim.x);
-    }
-
-    resident_pair<POINTS> own = {};
-    const int32_t p = begin.pair + t;
-    if (t < pairs) {
-        load_resident<CONTACT_ROWS, POINTS>(&own, v, p);
-        if (!GRID) {
-            own.pair.body_a = own.pair.body_a == v.bodies ? bodies : own.pair.body_a - begin.body;
-            own.pair.body_b = own.pair.body_b == v.bodies ? bodies : own.pair.body_b - begin.body;
-        }
-    }
-    __syncthreads();
-
-    const int32_t r = t % LANES;
-    for (int32_t iteration = 1;; ++iteration) {
-        for (int32_t first = 0; first < bodies; first += THREADS / LANES) {
-            int32_t i = first + t / LANES;
-            bool live = i < bodies;
-            int32_t at = live ? i : 0;
-            update_body<false>(live, r, m.b + at * ROW, m.A + at * MATRIX, m.H + at * MATRIX, records, nullptr, 0,
-                               m.incident, m.offsets[at], m.offsets[at + 1], own_state + at * ROW);
-        }
-        if (GRID) grid_barrier(v.barrier, arrivals += gridDim.x);
-        else __syncthreads();
-
-        const bool last = iteration == args.count;
-        if (last && args.measure) {
-            double primal = 0;
-            if (t < pairs)
-                sweep_resident<CONTACT_ROWS, POINTS, true>(&own, state, own_records + t * RECORD,
-                                                           v.change + (size_t)p * RECORD, &primal);
-            for (int32_t k = t; k < rows; k += THREADS) {
-                row_about about = v.row_info[begin.row + k];
-                if (!GRID) {
-                    about.body_a = about.body_a == v.bodies ? bodies : about.body_a - begin.body;
-                    about.body_b = about.body_b == v.bodies ? bodies : about.body_b - begin.body;
-                }
-                sweep_row_block<true>(v, begin.row + k, about, state, about.body_a, about.body_b,
-                                      row_records + k * RECORD,
-                                      v.change + ((size_t)v.pairs + (size_t)(begin.row + k)) * RECORD, &primal);
-            }
-            reduce_max(primal, v.residual);
-        } else {
-            if (t < pairs)
-                sweep_resident<CONTACT_ROWS, POINTS, false>(&own, state, own_records + t * RECORD, nullptr, nullptr);
-            for (int32_t k = t; k < rows; k += THREADS) {
-                row_about about = v.row_info[begin.row + k];
-                if (!GRID) {
-                    about.body_a = about.body_a == v.bodies ? bodies : about.body_a - begin.body;
-                    about.body_b = about.body_b == v.bodies ? bodies : about.body_b - begin.body;
-                }
-                sweep_row_block<false>(v, begin.row + k, about, state, about.body_a, about.body_b,
-                                       row_records + k * RECORD, nullptr, nullptr);
-            }
-        }
-        if (last) break;
-        if (GRID) grid_barrier(v.barrier, arrivals += gridDim.x);
-        else __syncthreads();
-    }
-
-    if (t < pairs) store_resident<CONTACT_ROWS, POINTS>(own, v, p);
-    if (!GRID) {
+    if (v.live->halt) return;
+    part_run<CONTACT_ROWS, POINTS, MODE, FULL> part(v, args, memory);
+    part.load();
+    unsigned target = 0;
+    for (int32_t iteration = 1; iteration <= args.count; ++iteration) {
+        const int32_t odd = iteration & 1;
+        part.move_bodies(odd);
+        arrive<MODE>(v.barrier);
+        if (part.warp_has_body(0)) part.momentum = free_momentum(part.own_body);
+        wait<MODE>(v.barrier, target += gridDim.x);
+        if (FULL && args.measure && iteration == args.count)
+            reduce_max(part.template update_halves<true>(odd), v.residual);
+        else part.template update_halves<false>(odd);
         __syncthreads();
-        for (int32_t i = t; i < bodies * ROW; i += THREADS) v.state[(size_t)begin.body * ROW + (size_t)i] = m.state[i];
-        for (int32_t i = t; i < (pairs + rows) * RECORD; i += THREADS) {
-            size_t to = i < pairs * RECORD
-                            ? (size_t)begin.pair * RECORD + (size_t)i
-                            : ((size_t)v.pairs + (size_t)begin.row) * RECORD + (size_t)(i - pairs * RECORD);
-            v.records[to] = m.records[i];
-        }
     }
+    /* Nobody looks into this block's memory once it is gone. */
+    if (MODE == CLUSTER) {
+        arrive<MODE>(v.barrier);
+        wait<MODE>(v.barrier, 0);
+    }
+    part.store(args.count & 1);
 }
 
 /* ---- instances ------------------------------------------------------------------------------------------------- */
 
 struct instance {
     int contact_rows, points;
-    bool grid;
+    enum sadmm_cuda_tier tier;
+    bool full;
     cuda_kernel kernel;
     const char *name;
 };
 
-#define INSTANCE(rows, points, grid, name) {rows, points, grid, resident_kernel<rows, points, grid>, name}
-/* Boxes on boxes touch in up to 8 points, mostly 4: with 4 a thread needs half the registers. */
+#define INSTANCE(rows, points, mode, name)                                                                             \
+    {rows, points, SADMM_CUDA_TIER_##mode, false, resident_kernel<rows, points, mode, false>, "iterate (" name ")"},   \
+        {rows, points, SADMM_CUDA_TIER_##mode, true, resident_kernel<rows, points, mode, true>, "iterate (" name ", full)"}
+/* Boxes on boxes touch in up to 8 points, mostly 4: with 4 a lane needs fewer registers. */
 static const instance instances[] = {
-    INSTANCE(3, 4, false, "iterate (block, 3 rows, 4 points)"),
-    INSTANCE(3, 8, false, "iterate (block, 3 rows, 8 points)"),
-    INSTANCE(1, 4, false, "iterate (block, 1 row, 4 points)"),
-    INSTANCE(1, 8, false, "iterate (block, 1 row, 8 points)"),
-    INSTANCE(3, 4, true, "iterate (grid, 3 rows, 4 points)"),
-    INSTANCE(3, 8, true, "iterate (grid, 3 rows, 8 points)"),
-    INSTANCE(1, 4, true, "iterate (grid, 1 row, 4 points)"),
-    INSTANCE(1, 8, true, "iterate (grid, 1 row, 8 points)"),
+    INSTANCE(3, 4, BLOCK, "block, 3 rows, 4 points"),
+    INSTANCE(3, 8, BLOCK, "block, 3 rows, 8 points"),
+    INSTANCE(1, 4, BLOCK, "block, 1 row, 4 points"),
+    INSTANCE(1, 8, BLOCK, "block, 1 row, 8 points"),
+    INSTANCE(3, 4, CLUSTER, "cluster, 3 rows, 4 points"),
+    INSTANCE(3, 8, CLUSTER, "cluster, 3 rows, 8 points"),
+    INSTANCE(1, 4, CLUSTER, "cluster, 1 row, 4 points"),
+    INSTANCE(1, 8, CLUSTER, "cluster, 1 row, 8 points"),
+    INSTANCE(3, 4, GRID, "grid, 3 rows, 4 points"),
+    INSTANCE(3, 8, GRID, "grid, 3 rows, 8 points"),
+    INSTANCE(1, 4, GRID, "grid, 1 row, 4 points"),
+    INSTANCE(1, 8, GRID, "grid, 1 row, 8 points"),
 };
 
-cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, bool grid, const char **name)
+cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, enum sadmm_cuda_tier tier, bool full,
+                                  const char **name)
 {
     int rows = contact_rows == 1 ? 1 : 3, points = point_slots <= 4 ? 4 : 8;
     for (const instance &one : instances)
-        if (one.contact_rows == rows && one.points == points && one.grid == grid) {
+        if (one.contact_rows == rows && one.points == points && one.tier == tier && one.full == full) {
             *name = one.name;
             return one.kernel;
         }

@@ -1,5 +1,5 @@
 /* What one thread does in Steps 1-4: shared by the stepwise and the resident kernels, so that they agree bit for bit.
- * Pointers to states, records and factors are to global or shared memory. */
+ * Pointers to states and records are to global or shared memory. */
 #ifndef SADMM_CUDA_SWEEP_H
 #define SADMM_CUDA_SWEEP_H
 
@@ -19,48 +19,45 @@ CUDA_INLINE real4 pack(vec3 a, real w)
     return out;
 }
 
-struct body_state {
-    vec3 v, w;
-    real inv_beta;
+/* v of a body. */
+struct body_motion {
+    vec3 linear, angular;
 };
 
-CUDA_INLINE body_state load_state(const solver_real *state, int32_t body)
+CUDA_INLINE body_motion load_motion(const solver_real *row)
 {
-    const real4 *row = (const real4 *)(state + (size_t)body * ROW);
-    real4 lo = row[0], hi = row[1];
-    body_state s = {xyz(lo), v3(lo.w, hi.x, hi.y), hi.z};
-    return s;
+    real4 lo = ((const real4 *)row)[0], hi = ((const real4 *)row)[1];
+    body_motion m = {xyz(lo), v3(lo.w, hi.x, hi.y)};
+    return m;
 }
+
+CUDA_INLINE body_motion no_motion(void)
+{
+    body_motion m = {v3(0, 0, 0), v3(0, 0, 0)};
+    return m;
+}
+
+CUDA_INLINE real inv_beta_of(const cuda_view &v, int32_t body)
+{
+    return v.state[(size_t)body * ROW + STATE_INV_BETA];
+}
+
+/* 1/s, s = 1/beta_a + 1/beta_b. */
+CUDA_INLINE real inverse_weight(const cuda_view &v, int32_t body_a, int32_t body_b)
+{
+    real s = inv_beta_of(v, body_a) + inv_beta_of(v, body_b);
+    return s > 0 ? 1 / s : (real)0;
+}
+
+/* Component r < 6 of a wrench is number record_slot(r) of its record: force and torque are four apart. */
+CUDA_INLINE int32_t record_slot(int32_t r) { return r < 3 ? r : r + 1; }
 
 /* ---- pairs ---------------------------------------------------------------------------------------------------- */
 
-struct pair_data {
-    vec3 normal, difference;
-    real friction, inv_s;
-    int32_t body_a, body_b; /* rows of the state */
-    int32_t count;
-};
-
-CUDA_INLINE pair_data load_pair(const cuda_view &v, int32_t p)
+/* (v_b - v_a) + (w_b x r_b - w_a x r_a): with a and b changed places the same bits with the other sign. */
+CUDA_INLINE vec3 relative_velocity(const body_motion &a, vec3 arm_a, const body_motion &b, vec3 arm_b)
 {
-    real4 n = v.normal[p], d = v.difference[p];
-    int2 bodies = v.pair_bodies[p];
-    pair_data pair = {xyz(n), xyz(d), n.w, d.w, bodies.x, bodies.y, v.pair_count[p]};
-    return pair;
-}
-
-/* x = u + w x r_a at a point of the pair. */
-struct pair_motion {
-    vec3 u, w;
-    real inv_beta; /* the larger one */
-};
-
-CUDA_INLINE pair_motion relative_motion(const pair_data &pair, const solver_real *state)
-{
-    body_state a = load_state(state, pair.body_a), b = load_state(state, pair.body_b);
-    pair_motion m = {v3_add(v3_sub(b.v, a.v), v3_cross(b.w, pair.difference)), v3_sub(b.w, a.w),
-                     real_max(a.inv_beta, b.inv_beta)};
-    return m;
+    return v3_add(v3_sub(b.linear, a.linear), v3_sub(v3_cross(b.angular, arm_b), v3_cross(a.angular, arm_a)));
 }
 
 /* Multipliers of a point: a world vector, or its normal component alone in x when a contact has one row. */
@@ -75,84 +72,41 @@ template <int CONTACT_ROWS> CUDA_INLINE void store_lambda(const cuda_view &v, si
     else v.lambda_n[slot] = lambda.x;
 }
 
-/* Steps 2-4 of one point. */
-template <int CONTACT_ROWS>
-CUDA_INLINE vec3 update_point(const pair_data &pair, const pair_motion &m, vec3 arm, real error, vec3 old)
+CUDA_INLINE float inverse_sqrt(float x) { return rsqrtf(x); }
+CUDA_INLINE double inverse_sqrt(double x) { return rsqrt(x); }
+
+/* contact_project() with one inverse square root for a square root and a division (2 units of rounding). */
+CUDA_INLINE vec3 project(vec3 lambda, vec3 n, real mu)
 {
-    vec3 x = v3_add(m.u, v3_cross(m.w, arm));
-    if (CONTACT_ROWS == 3) {
-        vec3 y = v3_sub(old, v3_scale(v3_add(x, v3_scale(pair.normal, error)), pair.inv_s));
-        return contact_project(y, pair.normal, pair.friction);
-    }
-    real y = old.x - (v3_dot(pair.normal, x) + error) * pair.inv_s;
+    real ln = v3_dot(n, lambda);
+    vec3 t = v3_madd(lambda, -ln, n);
+    ln = ln > 0 ? ln : (real)0;
+    real limit = mu * ln, t2 = v3_norm2(t), scale = t2 > limit * limit ? limit * inverse_sqrt(t2) : (real)1;
+    return v3_madd(v3_scale(n, ln), scale, t);
+}
+
+/* Steps 2-4 of one point: x = J v, error e. With x, error and inv_s of the other sign the same bits. */
+template <int CONTACT_ROWS>
+CUDA_INLINE vec3 update_point(vec3 normal, real friction, vec3 x, real error, real inv_s, vec3 old)
+{
+    if (CONTACT_ROWS == 3)
+        return project(v3_sub(old, v3_scale(v3_add(x, v3_scale(normal, error)), inv_s)), normal, friction);
+    real y = old.x - (v3_dot(normal, x) + error) * inv_s;
     return v3(y > 0 ? y : (real)0, 0, 0);
 }
 
-template <int CONTACT_ROWS> CUDA_INLINE vec3 impulse_of(const pair_data &pair, vec3 lambda)
+template <int CONTACT_ROWS> CUDA_INLINE vec3 impulse_of(vec3 normal, vec3 lambda)
 {
-    return CONTACT_ROWS == 3 ? lambda : v3_scale(pair.normal, lambda.x);
+    return CONTACT_ROWS == 3 ? lambda : v3_scale(normal, lambda.x);
 }
 
 /* Largest |d lambda| over the rows of the contact. */
-template <int CONTACT_ROWS> CUDA_INLINE real largest_row(const pair_data &pair, vec3 delta)
+template <int CONTACT_ROWS> CUDA_INLINE real largest_row(vec3 normal, vec3 delta)
 {
     if (CONTACT_ROWS == 1) return real_abs(delta.x);
     vec3 t1, t2;
-    v3_tangents(pair.normal, &t1, &t2);
-    return real_max(real_abs(v3_dot(delta, pair.normal)),
-                    real_max(real_abs(v3_dot(delta, t1)), real_abs(v3_dot(delta, t2))));
-}
-
-/* What a pair adds up over its points: force, and torque about a. */
-struct pair_sum {
-    vec3 force, torque;
-};
-
-CUDA_INLINE pair_sum no_sum(void)
-{
-    pair_sum sum = {v3(0, 0, 0), v3(0, 0, 0)};
-    return sum;
-}
-
-CUDA_INLINE void add_to(pair_sum *sum, vec3 arm, vec3 impulse)
-{
-    sum->force = v3_add(sum->force, impulse);
-    sum->torque = v3_add(sum->torque, v3_cross(arm, impulse));
-}
-
-CUDA_INLINE void store_record(solver_real *record, const pair_sum &sum, vec3 difference)
-{
-    vec3 f = sum.force, t = sum.torque, tb = v3_add(t, v3_cross(difference, f));
-    real4 *out = (real4 *)record;
-    out[0] = pack(v3_neg(f), -t.x);
-    out[1] = pack(v3(-t.y, -t.z, 0), 0);
-    out[2] = pack(f, tb.x);
-    out[3] = pack(v3(tb.y, tb.z, 0), 0);
-}
-
-/* Sums of one iteration over a pair's points. */
-struct pair_sums {
-    pair_sum next, change;
-    real largest;
-};
-
-CUDA_INLINE pair_sums no_sums(void)
-{
-    pair_sums sums = {no_sum(), no_sum(), 0};
-    return sums;
-}
-
-template <int CONTACT_ROWS, bool MEASURE>
-CUDA_INLINE void add_point(const pair_data &pair, vec3 arm, vec3 lambda, vec3 old, pair_sums *sums)
-{
-    vec3 delta = v3_sub(lambda, old);
-    if (MEASURE) {
-        add_to(&sums->next, arm, impulse_of<CONTACT_ROWS>(pair, lambda));
-        add_to(&sums->change, arm, impulse_of<CONTACT_ROWS>(pair, delta));
-        sums->largest = real_max(sums->largest, largest_row<CONTACT_ROWS>(pair, delta));
-    } else {
-        add_to(&sums->next, arm, impulse_of<CONTACT_ROWS>(pair, v3_add(lambda, delta)));
-    }
+    v3_tangents(normal, &t1, &t2);
+    return real_max(real_abs(v3_dot(delta, normal)), real_max(real_abs(v3_dot(delta, t1)), real_abs(v3_dot(delta, t2))));
 }
 
 /* ---- row blocks ----------------------------------------------------------------------------------------------- */
@@ -162,37 +116,29 @@ CUDA_INLINE real row_value(const cuda_view &v, int32_t plane, int32_t k)
     return v.row_data[(size_t)plane * (size_t)v.row_stride + (size_t)k];
 }
 
-/* Records of J^T lambda on both sides. */
-CUDA_INLINE void store_row_record(const cuda_view &v, int32_t k, int32_t rows, const real lambda[6],
+/* J^T lambda on one side. */
+CUDA_INLINE void store_row_record(const cuda_view &v, int32_t k, int32_t rows, int side, const real lambda[6],
                                   solver_real *record)
 {
-    real sum[12] = {0};
-    for (int r = 0; r < 6; ++r) {
-        if (r >= rows) break;
-        for (int j = 0; j < 6; ++j) {
-            sum[j] += row_value(v, ROW_J_A + 6 * r + j, k) * lambda[r];
-            sum[6 + j] += row_value(v, ROW_J_B + 6 * r + j, k) * lambda[r];
-        }
-    }
-    for (int j = 0; j < ROW; ++j) {
-        record[j] = j < 6 ? sum[j] : (real)0;
-        record[ROW + j] = j < 6 ? sum[6 + j] : (real)0;
+    const int32_t jacobian = side ? ROW_J_B : ROW_J_A;
+    for (int j = 0; j < ROW; ++j) record[j] = 0;
+    for (int j = 0; j < 6; ++j) {
+        real sum = 0;
+        for (int r = 0; r < rows; ++r) sum += row_value(v, jacobian + 6 * r + j, k) * lambda[r];
+        record[record_slot(j)] = sum;
     }
 }
 
-/* Steps 2-4 of row block k; body_a, body_b: rows of `state`. */
-template <bool MEASURE>
-CUDA_INLINE void sweep_row_block(const cuda_view &v, int32_t k, const row_about &about, const solver_real *state,
-                                 int32_t body_a, int32_t body_b, solver_real *record, solver_real *change,
-                                 double *primal)
+/* Steps 2-4 of row block k for the velocities va, vb of its bodies: lambda, and its change in delta. */
+CUDA_INLINE void update_row_block(const cuda_view &v, int32_t k, const row_about &about, const solver_real *va,
+                                  const solver_real *vb, real lambda[6], real delta[6])
 {
-    const solver_real *va = state + (size_t)body_a * ROW, *vb = state + (size_t)body_b * ROW;
-    real s = va[STATE_INV_BETA] + vb[STATE_INV_BETA], old[6], lambda[6], delta[6], largest = 0;
+    real s = inv_beta_of(v, about.body_a) + inv_beta_of(v, about.body_b), old[6];
     for (int r = 0; r < 6; ++r) {
-        old[r] = lambda[r] = 0;
+        old[r] = lambda[r];
+        lambda[r] = 0;
         if (r >= about.rows) continue;
         real x = 0, error = row_value(v, ROW_ERROR + r, k);
-        old[r] = row_value(v, ROW_LAMBDA + r, k);
         for (int j = 0; j < 6; ++j)
             x += row_value(v, ROW_J_A + 6 * r + j, k) * va[j] + row_value(v, ROW_J_B + 6 * r + j, k) * vb[j];
         if (about.kind == SADMM_BLOCK_SOFT)
@@ -205,62 +151,65 @@ CUDA_INLINE void sweep_row_block(const cuda_view &v, int32_t k, const row_about 
         real y[3] = {lambda[0], lambda[1], lambda[2]};
         contact_project_rows(y, row_value(v, ROW_FRICTION, k), lambda);
     }
-    for (int r = 0; r < 6; ++r) {
-        delta[r] = lambda[r] - old[r];
-        largest = real_max(largest, real_abs(delta[r]));
-        if (r < about.rows) v.row_data[(size_t)(ROW_LAMBDA + r) * (size_t)v.row_stride + (size_t)k] = lambda[r];
-    }
-    if (MEASURE) {
-        store_row_record(v, k, about.rows, lambda, record);
-        store_row_record(v, k, about.rows, delta, change);
-        *primal = fmax(*primal, (double)(largest * real_max(va[STATE_INV_BETA], vb[STATE_INV_BETA])));
-    } else {
-        real extrapolated[6];
-        for (int r = 0; r < 6; ++r) extrapolated[r] = lambda[r] + delta[r];
-        store_row_record(v, k, about.rows, extrapolated, record);
-    }
+    for (int r = 0; r < 6; ++r) delta[r] = lambda[r] - old[r];
+}
+
+CUDA_INLINE void load_row_lambda(const cuda_view &v, int32_t k, real lambda[6])
+{
+    for (int r = 0; r < 6; ++r) lambda[r] = row_value(v, ROW_LAMBDA + r, k);
+}
+
+CUDA_INLINE void store_row_lambda(const cuda_view &v, int32_t k, const real lambda[6])
+{
+    for (int r = 0; r < 6; ++r) v.row_data[(size_t)(ROW_LAMBDA + r) * (size_t)v.row_stride + (size_t)k] = lambda[r];
+}
+
+/* Largest |d lambda| times the larger 1/beta: the block's share of the primal residual. */
+CUDA_INLINE double row_block_primal(const cuda_view &v, const row_about &about, const real delta[6])
+{
+    real largest = 0;
+    for (int r = 0; r < 6; ++r) largest = real_max(largest, real_abs(delta[r]));
+    return (double)(largest * real_max(inv_beta_of(v, about.body_a), inv_beta_of(v, about.body_b)));
 }
 
 /* ---- bodies --------------------------------------------------------------------------------------------------- */
 
-/* Component r of a body's gathered records. */
-template <bool JOIN>
-CUDA_INLINE real gather(real sum, const solver_real *records, const solver_real *change, real ratio,
-                        const int32_t *incident, int32_t begin, int32_t end, int32_t r)
+/* Lane r's part of a body: rows r of A and H (which are symmetric), b and v; all 0 in lanes 6 and 7. */
+struct body_lane {
+    real A[6], H[6], b, v;
+};
+
+CUDA_INLINE body_lane load_body(bool live, int32_t r, const solver_real *A, const solver_real *H, const solver_real *b,
+                                const solver_real *state)
 {
-#pragma unroll 4
-    for (int32_t at = begin; at < end; ++at) {
-        size_t from = (size_t)incident[at] * ROW + (size_t)r;
-        sum += JOIN ? records[from] + ratio * change[from] : records[from];
+    body_lane body = {};
+    if (!live || r >= 6) return body;
+#pragma unroll
+    for (int k = 0; k < 6; ++k) {
+        body.A[k] = A[6 * k + r];
+        body.H[k] = H[6 * k + r];
     }
-    return sum;
+    body.b = b[r];
+    body.v = state[r];
+    return body;
 }
 
-/* The end of Step 1, v <- v + H g, for lane r's component g of b - A v + J^T E. Every lane of the warp comes here. */
-CUDA_INLINE void finish_body(bool mine, int32_t r, real g, const solver_real *H, solver_real *state)
+/* b - A v. Every lane of the warp comes here. */
+CUDA_INLINE real free_momentum(const body_lane &body)
+{
+    real g = body.b;
+#pragma unroll
+    for (int k = 0; k < 6; ++k) g -= body.A[k] * __shfl_sync((unsigned)ALL_LANES, body.v, k, LANES);
+    return g;
+}
+
+/* v <- v + H g, lane r's component of g being b - A v + J^T E. Every lane of the warp comes here. */
+CUDA_INLINE void move_body(body_lane *body, real g)
 {
     real step = 0;
-    for (int k = 0; k < 6; ++k) {
-        real other = __shfl_sync((unsigned)ALL_LANES, g, k, LANES);
-        if (mine) step += H[6 * k + r] * other;
-    }
-    __syncwarp((unsigned)ALL_LANES); /* all lanes have read the state */
-    if (mine) state[r] += step;
-}
-
-/* Step 1 of a body by its eight lanes (kernels I-K). Every lane of the warp comes here. */
-template <bool JOIN>
-CUDA_INLINE void update_body(bool live, int32_t r, const solver_real *b, const solver_real *A, const solver_real *H,
-                             const solver_real *records, const solver_real *change, real ratio, const int32_t *incident,
-                             int32_t begin, int32_t end, solver_real *state)
-{
-    bool mine = live && r < 6;
-    real g = 0;
-    if (mine) {
-        g = gather<JOIN>(b[r], records, change, ratio, incident, begin, end, r);
-        for (int k = 0; k < 6; ++k) g -= A[6 * k + r] * state[k];
-    }
-    finish_body(mine, r, g, H, state);
+#pragma unroll
+    for (int k = 0; k < 6; ++k) step += body->H[k] * __shfl_sync((unsigned)ALL_LANES, g, k, LANES);
+    body->v += step;
 }
 
 /* ---- reductions ----------------------------------------------------------------------------------------------- */

@@ -8,11 +8,13 @@
  * patterns when it is allocated, and each block has its own heap block, so that sanitizers see every access out of
  * bounds.
  *
- * Not emulated: memory ordering, and any concurrency between blocks of a launch that is not cooperative.
+ * Not emulated: memory ordering, and any concurrency between blocks of a launch that is neither cooperative nor in
+ * clusters; blocks of a cluster run side by side, clusters one after the other.
  */
 #ifndef SADMM_CUDA_EMULATION_H
 #define SADMM_CUDA_EMULATION_H
 
+#include <math.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -31,6 +33,7 @@
 #define __device__
 #define __host__
 #define __forceinline__ inline __attribute__((always_inline))
+#define __noinline__ __attribute__((noinline))
 #define __launch_bounds__(threads)
 #define __grid_constant__
 
@@ -43,12 +46,12 @@ struct dim3 {
 
 /* ---- threads as fibers ----------------------------------------------------------------------------------------- */
 
-inline dim3 threadIdx, blockIdx, gridDim;
+inline dim3 threadIdx, blockIdx, gridDim, blockDim;
 
 namespace cuda_emulation {
 
 enum { WARP_SIZE = 32, STACK = 128 * 1024 };
-enum waiting { NOT, AT_WARP, AT_BLOCK, AT_GRID };
+enum waiting { NOT, AT_WARP, AT_BLOCK, AT_ALL };
 
 struct fiber {
     ucontext_t context;
@@ -61,7 +64,7 @@ struct fiber {
 
 struct launch_state {
     std::vector<fiber> fibers;
-    std::vector<std::unique_ptr<unsigned char, void (*)(void *)>> shared; /* by block of the launch */
+    std::vector<std::unique_ptr<unsigned char, void (*)(void *)>> shared; /* by block */
     unsigned threads, first_block;
     ucontext_t scheduler;
     fiber *current;
@@ -138,7 +141,7 @@ inline bool run_blocks(const std::function<void()> &body, unsigned first, unsign
         }
         for (size_t i = 0; i < l.fibers.size(); i += WARP_SIZE) release(&l, i, i + WARP_SIZE, AT_WARP);
         for (size_t i = 0; i < l.fibers.size(); i += threads) release(&l, i, i + threads, AT_BLOCK);
-        release(&l, 0, l.fibers.size(), AT_GRID);
+        release(&l, 0, l.fibers.size(), AT_ALL);
         if (!moved) return false;
     }
     return true;
@@ -158,12 +161,21 @@ inline unsigned long long exchange(unsigned mask, unsigned long long value, unsi
 
 inline void __syncthreads(void) { cuda_emulation::give_way(cuda_emulation::AT_BLOCK); }
 inline void __syncwarp(unsigned) { cuda_emulation::give_way(cuda_emulation::AT_WARP); }
-inline void cuda_emulation_grid_barrier(void) { cuda_emulation::give_way(cuda_emulation::AT_GRID); }
+/* Of the blocks that run side by side: all of a cooperative launch, or a cluster. */
+inline void cuda_emulation_barrier_together(void) { cuda_emulation::give_way(cuda_emulation::AT_ALL); }
 
 inline unsigned char *cuda_emulation_shared(void)
 {
     cuda_emulation::launch_state *l = cuda_emulation::running;
     return l->shared[l->current->block - l->first_block].get();
+}
+
+/* The address in another block's shared memory that `own` is in the caller's; rank: among the blocks side by side. */
+inline const void *cuda_emulation_in_block(const void *own, unsigned rank)
+{
+    cuda_emulation::launch_state *l = cuda_emulation::running;
+    if (rank >= l->shared.size()) abort();
+    return l->shared[rank].get() + ((const unsigned char *)own - cuda_emulation_shared());
 }
 
 template <class T> static inline T cuda_emulation_exchange(unsigned mask, T value, unsigned from)
@@ -190,6 +202,8 @@ inline long long __double_as_longlong(double value)
     memcpy(&bits, &value, sizeof bits);
     return bits;
 }
+inline float rsqrtf(float x) { return 1 / sqrtf(x); }
+inline double rsqrt(double x) { return 1 / sqrt(x); }
 inline void atomicMax(unsigned long long *to, unsigned long long value) { *to = std::max(*to, value); }
 
 /* ---- the runtime ----------------------------------------------------------------------------------------------- */
@@ -207,7 +221,8 @@ enum { cudaMemcpyHostToDevice, cudaMemcpyDeviceToHost, cudaMemcpyDeviceToDevice 
 enum cudaDeviceAttr {
     cudaDevAttrMultiProcessorCount,
     cudaDevAttrMaxSharedMemoryPerBlockOptin,
-    cudaDevAttrCooperativeLaunch
+    cudaDevAttrCooperativeLaunch,
+    cudaDevAttrClusterLaunch
 };
 enum { cudaFuncAttributeMaxDynamicSharedMemorySize, cudaStreamNonBlocking, cudaStreamCaptureModeThreadLocal };
 
@@ -392,19 +407,22 @@ inline cudaError_t cudaGraphLaunch(cudaGraphExec_t exec, cudaStream_t)
     return cudaSuccess;
 }
 
-/* Internal linkage: the argument types are others in every precision, under the same names. */
+/* `together`: blocks that run side by side. Internal linkage: the argument types are others in every precision, under the
+ * same names. */
 template <class View, class Args>
 static cudaError_t cuda_emulation_launch(void (*kernel)(const View, const Args), unsigned blocks, unsigned threads,
-                                         size_t shared, bool cooperative, const View &view, const Args &args)
+                                         size_t shared, unsigned together, const View &view, const Args &args)
 {
     CUDA_EMULATION_CALL;
-    if (shared > cuda_emulation::SHARED_LIMIT) return cudaErrorInvalidValue;
-    if (cooperative && blocks > cuda_emulation::MULTIPROCESSORS * cuda_emulation::BLOCKS_PER_MULTIPROCESSOR)
+    if (shared > cuda_emulation::SHARED_LIMIT || threads == 0 || threads > 1024 || threads % cuda_emulation::WARP_SIZE)
+        return cudaErrorInvalidValue;
+    if (together == 0 || together > cuda_emulation::MULTIPROCESSORS * cuda_emulation::BLOCKS_PER_MULTIPROCESSOR ||
+        blocks % together)
         return cudaErrorInvalidValue;
     std::function<bool()> node = [=]() {
         std::function<void()> body = [&]() { kernel(view, args); };
         gridDim.x = blocks;
-        unsigned together = cooperative ? blocks : 1;
+        blockDim.x = threads;
         for (unsigned first = 0; first < blocks; first += together)
             if (!cuda_emulation::run_blocks(body, first, together, threads, shared)) return false;
         return true;
