@@ -24,6 +24,14 @@ cudaError_t COLLISION(sort)(void *temp, size_t *bytes, uint64_t *const keys[2], 
     return code;
 }
 
+cudaError_t COLLISION(sort_numbers)(void *temp, size_t *bytes, const int32_t *keys, int32_t *sorted_keys,
+                                    const int32_t *values, int32_t *sorted_values, int count, int bits,
+                                    cudaStream_t stream)
+{
+    return cub::DeviceRadixSort::SortPairs(temp, *bytes, keys, sorted_keys, values, sorted_values, count, 0, bits,
+                                           stream);
+}
+
 cudaError_t COLLISION(sum)(void *temp, size_t *bytes, const uint64_t *in, uint64_t *out, int count, cudaStream_t stream)
 {
     return cub::DeviceScan::ExclusiveSum(temp, *bytes, in, out, count, stream);
@@ -51,6 +59,26 @@ cudaError_t COLLISION(sort)(void *temp, size_t *bytes, uint64_t *const keys[2], 
     }
     *result = 1;
     return cudaSuccess;
+}
+
+cudaError_t COLLISION(sort_numbers)(void *temp, size_t *bytes, const int32_t *keys, int32_t *sorted_keys,
+                                    const int32_t *values, int32_t *sorted_values, int count, int bits, cudaStream_t)
+{
+    *bytes = 1;
+    if (!temp) return cudaSuccess;
+    CUDA_EMULATION_CALL;
+    return cuda_emulation_enqueue([=]() {
+        const int32_t mask = (int32_t)((UINT32_C(1) << bits) - 1);
+        std::vector<int32_t> order((size_t)count);
+        for (size_t i = 0; i < order.size(); ++i) order[i] = (int32_t)i;
+        std::stable_sort(order.begin(), order.end(),
+                         [=](int32_t a, int32_t b) { return (keys[a] & mask) < (keys[b] & mask); });
+        for (size_t i = 0; i < order.size(); ++i) {
+            sorted_keys[i] = keys[order[i]];
+            sorted_values[i] = values[order[i]];
+        }
+        return true;
+    });
 }
 
 cudaError_t COLLISION(sum)(void *temp, size_t *bytes, const uint64_t *in, uint64_t *out, int count, cudaStream_t)

@@ -6,7 +6,7 @@
 static __global__ void assemble_bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     int32_t i = thread_index();
-    if (i >= v.bodies) return;
+    if (i >= live_bodies(v)) return;
     int32_t raw = v.body_of[i];
     double A[36], b[6], x[6], factor[36];
     sadmm_system_body(&v.raw, &v.settings, raw, A, b);
@@ -54,8 +54,8 @@ static __device__ real4 pack(vec3 a, double w)
 static __global__ void assemble_contacts_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     int32_t p = thread_index();
-    if (p >= v.pairs) return;
-    const struct sadmm_contact_pair *pair = &v.raw_pairs[v.pair_of[p]];
+    if (p >= live_pairs(v)) return;
+    const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
     const struct sadmm_contact_point *points = v.raw_points + pair->first;
     vec3 normal = v3_load(pair->normal), difference = v3(0, 0, 0);
     bool a = pair->body_a >= 0, b = pair->body_b >= 0;
@@ -66,7 +66,7 @@ static __global__ void assemble_contacts_kernel(const __grid_constant__ cuda_vie
     v.pair_bodies[p].y = b ? v.slot_of[pair->body_b] : v.bodies;
     v.pair_count[p] = pair->count;
     for (int32_t k = 0; k < pair->count; ++k) {
-        size_t slot = (size_t)k * (size_t)v.stride + (size_t)p;
+        size_t slot = (size_t)k * (size_t)v.pair_room + (size_t)p;
         vec3 lambda = v.warm_start ? v3_load(points[k].impulse) : v3(0, 0, 0);
         double error = sadmm_contact_e(&v.raw, &v.settings, pair, &points[k]);
         v.arm[slot] = pack(v3_load(a ? points[k].arm_a : points[k].arm_b), error);
@@ -85,9 +85,8 @@ static __device__ void store(const cuda_view &v, int32_t plane, int32_t k, doubl
 static __global__ void assemble_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     int32_t k = thread_index();
-    if (k >= v.rows) return;
-    int32_t raw = v.row_of[k];
-    const struct sadmm_problem_block *block = &v.raw.blocks[raw];
+    if (k >= live_rows(v)) return;
+    const struct sadmm_problem_block *block = &v.raw.blocks[k];
     if ((int32_t)block->kind != args.count) return;
     bool a = block->body_a >= 0, b = block->body_b >= 0;
     row_about about = {(int32_t)block->kind, block->rows, a ? v.slot_of[block->body_a] : v.bodies,
@@ -105,45 +104,26 @@ static __global__ void assemble_rows_kernel(const __grid_constant__ cuda_view v,
         store(v, ROW_ERROR + r, k, used ? block->error[r] : 0);
         store(v, ROW_STIFFNESS + r, k, used ? block->stiffness[r] : 0);
         store(v, ROW_DAMPING + r, k, used ? block->damping[r] : 0);
-        store(v, ROW_LAMBDA + r, k, v.warm_start && active ? v.raw.block_lambda[6 * (size_t)raw + (size_t)r] : 0);
+        store(v, ROW_LAMBDA + r, k, v.warm_start && active ? v.raw.block_lambda[6 * (size_t)k + (size_t)r] : 0);
     }
     store(v, ROW_FRICTION, k, block->friction);
     v.row_info[k] = about;
 }
 
-/* Blocks of all kinds are uploaded with the first kind that is assembled. */
 static sadmm_status assemble_rows(struct sadmm_context *c, enum sadmm_block_kind kind, struct sadmm_error *error)
 {
-    const cuda_view *v = &c->view;
-    size_t rows = (size_t)v->rows, bytes = rows * sizeof *c->system->blocks;
     cuda_args args = {};
     args.count = (int32_t)kind;
-    if (!c->blocks_uploaded) {
-        CUDA_TRY(CUDA(upload)(c, (void *)v->raw.blocks, PINNED_BLOCKS, 0, c->system->blocks, bytes, error));
-        CUDA_TRY(CUDA(upload)(c, v->raw.block_lambda, PINNED_BLOCKS, bytes, c->system->block_lambda,
-                              6 * rows * sizeof(double), error));
-        c->blocks_uploaded = true;
-    }
-    return CUDA(launch)(c, assemble_rows_kernel, "assemble_blocks", blocks_for(v->rows), 0, false, &args, error);
+    return CUDA(launch)(c, assemble_rows_kernel, "assemble_blocks", blocks_for(c->view.rows), 0, false, &args, error);
 }
 
 /* ---- entries --------------------------------------------------------------------------------------------------- */
-
-static sadmm_status upload_contacts(struct sadmm_context *c, struct sadmm_error *error)
-{
-    const struct sadmm_contact_set *contacts = c->system->contacts;
-    CUDA_TRY(CUDA(upload)(c, (void *)c->view.raw_pairs, PINNED_PAIRS, 0, contacts->pairs,
-                          contacts->pair_count * sizeof *contacts->pairs, error));
-    return CUDA(upload)(c, (void *)c->view.raw_points, PINNED_POINTS, 0, contacts->points,
-                        contacts->point_count * sizeof *contacts->points, error);
-}
 
 extern "C" sadmm_status CUDA(assemble_contacts)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
     CUDA_ENTER(c);
-    CUDA_TRY(upload_contacts(c, error));
-    CUDA_TRY(CUDA(launch)(c, assemble_contacts_kernel, "assemble_contacts", blocks_for(c->view.pairs), 0, false, &args,
+    CUDA_TRY(CUDA(launch)(c, assemble_contacts_kernel, "assemble_contacts", blocks_for(c->view.pair_room), 0, false, &args,
                           error));
     return c->plan.blocks[SADMM_BLOCK_CONTACT] ? assemble_rows(c, SADMM_BLOCK_CONTACT, error) : SADMM_OK;
 }

@@ -43,14 +43,17 @@ static const char *const buffer_names[BUFFER_COUNT] = {
     "row blocks' data",
     "wrench records",
     "changes of wrench records",
+    "live counts",
     "layout",
+    "sorts",
+    "numbers",
     "scalars",
     "bodies' input",
     "pairs' input",
     "points' input",
     "blocks' input",
     "results",
-    "staged layout",
+    "staged counts",
     "staged bodies",
     "staged pairs",
     "staged points",
@@ -76,7 +79,7 @@ sadmm_status CUDA(room)(struct sadmm_context *c, enum cuda_buffer_name name, siz
     snprintf(what, sizeof what, "allocation of %zu bytes for the cuda backend's %s", wanted, buffer_names[name]);
     if (sadmm_test_allocation_fails()) return CUDA(fail)(c, cudaErrorMemoryAllocation, what, error);
     release(buffer);
-    buffer->pinned = name >= PINNED_LAYOUT;
+    buffer->pinned = name >= PINNED_LIVE;
     CUDA_CALL(c, buffer->pinned ? cudaMallocHost(&buffer->data, wanted) : cudaMalloc(&buffer->data, wanted), what);
     buffer->capacity = wanted;
     return SADMM_OK;
@@ -207,11 +210,6 @@ extern "C" void CUDA(destroy)(struct sadmm_context *c)
         (void)cudaStreamDestroy(c->stream);
         (void)cudaGetLastError();
     }
-    sadmm_free(c->scratch.parent);
-    sadmm_free(c->scratch.island_of);
-    sadmm_free(c->scratch.islands);
-    sadmm_free(c->scratch.cursor);
-    sadmm_free(c->scratch.parts);
     sadmm_free(c);
 }
 
@@ -229,6 +227,6 @@ extern "C" void CUDA(set_tier)(struct sadmm_context *c, enum sadmm_cuda_tier tie
 
 extern "C" enum sadmm_cuda_tier CUDA(get_tier)(const struct sadmm_context *c, int32_t *blocks)
 {
-    if (blocks) *blocks = c->tier == SADMM_CUDA_TIER_STREAM ? 0 : c->part_count;
-    return c->tier;
+    if (blocks) *blocks = c->partition.tier == SADMM_CUDA_TIER_STREAM ? 0 : c->partition.parts;
+    return c->partition.tier;
 }

@@ -1,4 +1,6 @@
 /* The entries of the kernel table for one precision, in C: CUDA(name) is set by the includer. */
+#include "cuda_layout.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -7,6 +9,11 @@ extern "C" {
 bool CUDA(probe)(const char **about);
 void CUDA(set_tier)(struct sadmm_context *, enum sadmm_cuda_tier tier);
 enum sadmm_cuda_tier CUDA(get_tier)(const struct sadmm_context *, int32_t *blocks);
+
+/* For tests: survey and layout of the last begin's system once more, for this partition, halted from the start or not, as
+ * a graph or not. */
+sadmm_status CUDA(lay_out_again)(struct sadmm_context *, const struct cuda_partition *, enum cuda_halt, bool graph,
+                                 struct cuda_layout_copy *, struct sadmm_error *);
 
 sadmm_status CUDA(create)(int device, struct sadmm_context **out, struct sadmm_error *error);
 void CUDA(destroy)(struct sadmm_context *);

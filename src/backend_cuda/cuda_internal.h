@@ -10,9 +10,9 @@
  *     contraction of a * b + c for the same reason).
  *   - Eight lanes take a body: lane r < 6 owns component r of A v, of the gathered sum and of H g, H = (A + beta C)^-1.
  *
- * Order. begin() finds islands (bodies that touch, directly or through others) and numbers bodies, pairs and row blocks
- * by island, stably: "slots". Static bodies join nothing and share the state row after the last body, which is 0.
- * Within a body's list records ascend, so that the sums are the same in every tier.
+ * Order. Bodies are numbered by island, stably, where islands matter: "slots" (cuda_layout.h). Pairs and row blocks keep
+ * their raw order. Static bodies join nothing and share the state row after the last body, which is 0. Within a body's
+ * list records ascend, so that the sums are the same in every tier.
  *
  * Tiers of the fused entry
  *   BLOCK   islands packed into thread blocks; pairs in registers, bodies and records in shared memory; only
@@ -34,7 +34,7 @@
 #include <cuda_runtime.h>
 
 #include "../core/kernels.h"
-#include "cuda_tier.h"
+#include "layout_internal.h"
 
 typedef SADMM_REAL solver_real;
 
@@ -75,15 +75,14 @@ struct row_about {
     int32_t active;                     /* bit r: row r exists (a hard row of zeros is no constraint, Sec. III-C) */
 };
 
-/* Where a part of the resident kernel begins; it ends where the next one begins. */
-struct part {
-    int32_t body, pair, row;
-};
-
-/* What kernels see. Pointers are device memory. Bodies, pairs and row blocks are counted in slots unless "raw". */
+/* What kernels see. Pointers are device memory. Bodies are counted in slots unless "raw" (cuda_layout.h). */
 struct cuda_view {
-    int32_t bodies, pairs, rows, points;
-    int32_t stride;      /* of point planes: point k of pair p is at k stride + p */
+    struct cuda_live *live;
+    struct cuda_facts *facts;
+    int32_t bodies;      /* exact, known to the host (state row `bodies` is the static world) */
+    int32_t pair_room;   /* multiple of 32; = stride of point planes; record of pair p is p, of row block k is pair_room + k */
+    int32_t rows;        /* row blocks: exact, known to the host */
+    int32_t points;
     int32_t row_stride;
     int32_t contact_rows;
     int32_t warm_start;
@@ -105,14 +104,13 @@ struct cuda_view {
     row_about *row_info;
     solver_real *row_data; /* ROW_PLANES x row_stride */
 
-    /* pairs, then row blocks. After a measured iteration `records` holds J^T lambda and `change`
+    /* pairs (pair_room of them), then row blocks. After a measured iteration `records` holds J^T lambda and `change`
      * J^T (lambda - lambda_prev), else `records` holds J^T (2 lambda - lambda_prev). */
     solver_real *records, *change;
 
-    const int32_t *offsets, *incident; /* body -> 2 record + (0 on a, 1 on b) */
+    const int32_t *offsets, *incident; /* body -> its halves, ascending */
     const int32_t *body_of, *slot_of;  /* slot -> raw body, raw body -> slot */
-    const int32_t *pair_of, *row_of;   /* slot -> raw */
-    const part *parts;
+    const int32_t *parts;              /* first body slot of each part, and the end */
     unsigned *barrier;                 /* arrivals at the grid barrier since launch */
     unsigned long long *residual;      /* primal, dual: bit patterns of doubles >= 0, which order like the numbers */
 
@@ -122,6 +120,11 @@ struct cuda_view {
     struct sadmm_settings settings;
     double *out; /* results in raw order */
 };
+
+/* This step's counts; 0 when it is halted. */
+static __device__ __forceinline__ int32_t live_bodies(const cuda_view &v) { return v.live->halt ? 0 : v.bodies; }
+static __device__ __forceinline__ int32_t live_pairs(const cuda_view &v) { return v.live->halt ? 0 : v.live->pairs; }
+static __device__ __forceinline__ int32_t live_rows(const cuda_view &v) { return v.live->halt ? 0 : v.rows; }
 
 /* What differs between launches of a kernel. */
 struct cuda_args {
@@ -145,21 +148,12 @@ enum cuda_buffer_name {
     /* device */
     BUFFER_STATE, BUFFER_B, BUFFER_A, BUFFER_H, BUFFER_C, BUFFER_BETA,
     BUFFER_NORMAL, BUFFER_DIFFERENCE, BUFFER_PAIR_BODIES, BUFFER_PAIR_COUNT, BUFFER_ARM, BUFFER_LAMBDA,
-    BUFFER_ROW_INFO, BUFFER_ROW_DATA, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_LAYOUT, BUFFER_SCALARS,
+    BUFFER_ROW_INFO, BUFFER_ROW_DATA, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_LIVE, BUFFER_LAYOUT, BUFFER_SORT,
+    BUFFER_NUMBERS, BUFFER_SCALARS,
     BUFFER_RAW_BODIES, BUFFER_RAW_PAIRS, BUFFER_RAW_POINTS, BUFFER_RAW_BLOCKS, BUFFER_OUT,
     /* pinned */
-    PINNED_LAYOUT, PINNED_BODIES, PINNED_PAIRS, PINNED_POINTS, PINNED_BLOCKS, PINNED_OUT,
+    PINNED_LIVE, PINNED_BODIES, PINNED_PAIRS, PINNED_POINTS, PINNED_BLOCKS, PINNED_OUT,
     BUFFER_COUNT
-};
-
-/* Arrays of begin(), on the host. */
-struct cuda_scratch {
-    int32_t *parent;         /* bodies */
-    int32_t *island_of;      /* bodies */
-    struct island *islands;  /* islands + 1 */
-    int32_t *cursor;         /* islands or bodies */
-    struct part *parts;
-    size_t parent_capacity, island_of_capacity, islands_capacity, cursor_capacity, parts_capacity;
 };
 
 struct sadmm_context {
@@ -173,15 +167,14 @@ struct sadmm_context {
     struct sadmm_settings settings;
     cuda_view view;
     cuda_buffer buffers[BUFFER_COUNT];
-    cuda_scratch scratch;
-    bool blocks_uploaded;
     bool measured; /* records and change are apart: the next Step 1 uses records + ratio change */
     double ratio;
 
-    enum sadmm_cuda_tier wanted, tier;
-    int32_t part_count;
-    size_t part_shared;    /* bytes a block of the resident kernel */
-    int32_t point_slots;   /* largest point count of a pair */
+    enum sadmm_cuda_tier wanted;
+    struct cuda_facts facts;         /* of the last begin */
+    struct cuda_partition partition; /* what its layout was made for */
+    struct layout_view layout;
+    bool numbered;                   /* BUFFER_NUMBERS is filled */
     cuda_kernel resident;
     const char *resident_name;
 
@@ -223,6 +216,16 @@ struct device_scope {
 #define CUDA_ENTER(c)                   \
     device_scope scope((c)->device);    \
     CUDA_CALL((c), scope.code, "cudaSetDevice")
+
+/* ---- cuda_layout.cu -------------------------------------------------------------------------------------------------
+ * Counts and rooms in the view, then layout_room (it allocates); then per step, by enqueueing only: survey and layout of
+ * what view.raw_pairs, raw_points and raw.blocks point to. */
+
+sadmm_status CUDA(layout_room)(struct sadmm_context *, struct sadmm_error *error);
+/* The facts; islands: also which bodies hang together (what BLOCK and CLUSTER need). */
+sadmm_status CUDA(enqueue_survey)(struct sadmm_context *, bool islands, struct sadmm_error *error);
+/* Slots, offsets, incident, parts. A part that exceeds what the partition allows sets live->halt = HALT_PARTITION. */
+sadmm_status CUDA(enqueue_layout)(struct sadmm_context *, const struct cuda_partition *, struct sadmm_error *error);
 
 /* ---- cuda_iterate.cu, cuda_resident.cu ---- */
 

@@ -18,7 +18,7 @@ template <bool JOIN> static __global__ void bodies_kernel(const __grid_constant_
                                                           const __grid_constant__ cuda_args args)
 {
     int32_t i = thread_index() / LANES, r = (int32_t)threadIdx.x % LANES;
-    bool live = i < v.bodies;
+    bool live = i < live_bodies(v);
     size_t body = live ? (size_t)i : 0;
     update_body<JOIN>(live, r, v.b + body * ROW, v.A + body * MATRIX, v.H + body * MATRIX, v.records, v.change,
                       args.ratio, v.incident, live ? v.offsets[body] : 0, live ? v.offsets[body + 1] : 0,
@@ -33,7 +33,7 @@ static __device__ __forceinline__ void sweep_pair(const cuda_view &v, int32_t p,
     pair_motion motion = relative_motion(pair, v.state);
     pair_sums sums = no_sums();
     for (int32_t k = 0; k < pair.count; ++k) {
-        size_t slot = (size_t)k * (size_t)v.stride + (size_t)p;
+        size_t slot = (size_t)k * (size_t)v.pair_room + (size_t)p;
         real4 arm = v.arm[slot];
         vec3 old = load_lambda<CONTACT_ROWS>(v, slot);
         vec3 lambda = update_point<CONTACT_ROWS>(pair, motion, xyz(arm), arm.w, old);
@@ -51,13 +51,13 @@ static __device__ __forceinline__ void sweep_pair(const cuda_view &v, int32_t p,
 template <int CONTACT_ROWS, bool MEASURE>
 static __global__ void constraints_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    int32_t pair_threads = (v.pairs + THREADS - 1) / THREADS * THREADS, p = thread_index(), k = p - pair_threads;
+    int32_t pair_threads = (v.pair_room + THREADS - 1) / THREADS * THREADS, p = thread_index(), k = p - pair_threads;
     double primal = 0;
     if (k < 0) {
-        if (p < v.pairs) sweep_pair<CONTACT_ROWS, MEASURE>(v, p, &primal);
-    } else if (k < v.rows) {
+        if (p < live_pairs(v)) sweep_pair<CONTACT_ROWS, MEASURE>(v, p, &primal);
+    } else if (k < live_rows(v)) {
         row_about about = v.row_info[k];
-        size_t record = ((size_t)v.pairs + (size_t)k) * RECORD;
+        size_t record = ((size_t)v.pair_room + (size_t)k) * RECORD;
         sweep_row_block<MEASURE>(v, k, about, v.state, about.body_a, about.body_b, v.records + record,
                                  MEASURE ? v.change + record : nullptr, &primal);
     }
@@ -69,17 +69,17 @@ template <int CONTACT_ROWS>
 static __global__ void start_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     int32_t p = thread_index();
-    if (p < v.pairs) {
+    if (p < live_pairs(v)) {
         pair_data pair = load_pair(v, p);
         pair_sum sum = no_sum();
         for (int32_t k = 0; k < pair.count; ++k) {
-            size_t slot = (size_t)k * (size_t)v.stride + (size_t)p;
+            size_t slot = (size_t)k * (size_t)v.pair_room + (size_t)p;
             vec3 lambda = load_lambda<CONTACT_ROWS>(v, slot);
             add_to(&sum, xyz(v.arm[slot]), impulse_of<CONTACT_ROWS>(pair, lambda));
         }
         store_record(v.records + (size_t)p * RECORD, sum, pair.difference);
-    } else if (p < v.pairs + v.rows) {
-        int32_t k = p - v.pairs;
+    } else if (p >= v.pair_room && p - v.pair_room < live_rows(v)) {
+        int32_t k = p - v.pair_room;
         real lambda[6];
         for (int r = 0; r < 6; ++r) lambda[r] = row_value(v, ROW_LAMBDA + r, k);
         store_row_record(v, k, v.row_info[k].rows, lambda, v.records + (size_t)p * RECORD);
@@ -89,7 +89,7 @@ static __global__ void start_kernel(const __grid_constant__ cuda_view v, const _
 static __global__ void weigh_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     int32_t p = thread_index();
-    if (p >= v.pairs) return;
+    if (p >= live_pairs(v)) return;
     int2 bodies = v.pair_bodies[p];
     real s = v.state[(size_t)bodies.x * ROW + STATE_INV_BETA] + v.state[(size_t)bodies.y * ROW + STATE_INV_BETA];
     v.difference[p].w = s > 0 ? 1 / s : (real)0;
@@ -100,7 +100,7 @@ static __global__ void dual_kernel(const __grid_constant__ cuda_view v, const __
 {
     int32_t i = thread_index() / LANES, r = (int32_t)threadIdx.x % LANES;
     double dual = 0;
-    if (i < v.bodies && r < 6) {
+    if (i < live_bodies(v) && r < 6) {
         size_t body = (size_t)i;
         const solver_real *A = v.A + body * MATRIX, *state = v.state + body * ROW;
         real g = -v.b[body * ROW + (size_t)r];
@@ -116,7 +116,7 @@ static __global__ void dual_kernel(const __grid_constant__ cuda_view v, const __
 
 static int64_t constraint_blocks(const struct sadmm_context *c)
 {
-    return blocks_for(c->view.pairs) + blocks_for(c->view.rows);
+    return blocks_for(c->view.pair_room) + blocks_for(c->view.rows);
 }
 
 static sadmm_status launch_bodies(struct sadmm_context *c, bool join, struct sadmm_error *error)
@@ -139,7 +139,7 @@ static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, st
 static sadmm_status clear_primal(struct sadmm_context *c, bool measure, struct sadmm_error *error)
 {
     if (!measure) return SADMM_OK;
-    if (!c->view.change && c->view.pairs + c->view.rows > 0)
+    if (!c->view.change && c->view.pair_room + c->view.rows > 0)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "measure = true: the plan has residuals = false");
     CUDA_CALL(c, cudaMemsetAsync(c->view.residual, 0, sizeof *c->view.residual, c->stream),
               "cudaMemsetAsync(residual)");
@@ -152,13 +152,13 @@ sadmm_status CUDA(start_records)(struct sadmm_context *c, struct sadmm_error *er
     c->measured = false;
     c->ratio = 1;
     return CUDA(launch)(c, c->view.contact_rows == 1 ? start_kernel<1> : start_kernel<3>, "start_records",
-                        blocks_for((int64_t)c->view.pairs + c->view.rows), 0, false, &args, error);
+                        blocks_for((int64_t)c->view.pair_room + c->view.rows), 0, false, &args, error);
 }
 
 sadmm_status CUDA(weigh_pairs)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    return CUDA(launch)(c, weigh_kernel, "weigh_pairs", blocks_for(c->view.pairs), 0, false, &args, error);
+    return CUDA(launch)(c, weigh_kernel, "weigh_pairs", blocks_for(c->view.pair_room), 0, false, &args, error);
 }
 
 extern "C" sadmm_status CUDA(update_velocity)(struct sadmm_context *c, struct sadmm_error *error)
@@ -247,11 +247,11 @@ static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool
     args.measure = measure;
     args.join = c->measured;
     args.ratio = (solver_real)c->ratio;
-    bool grid = c->tier == SADMM_CUDA_TIER_GRID;
+    bool grid = c->partition.tier == SADMM_CUDA_TIER_GRID;
     if (grid)
         CUDA_CALL(c, cudaMemsetAsync(c->view.barrier, 0, sizeof *c->view.barrier, c->stream),
                   "cudaMemsetAsync(barrier)");
-    return CUDA(launch)(c, c->resident, c->resident_name, c->part_count, c->part_shared, grid, &args, error);
+    return CUDA(launch)(c, c->resident, c->resident_name, c->partition.parts, c->partition.shared, grid, &args, error);
 }
 
 extern "C" sadmm_status CUDA(iterate)(struct sadmm_context *c, int count, bool measure, struct sadmm_error *error)
@@ -259,7 +259,7 @@ extern "C" sadmm_status CUDA(iterate)(struct sadmm_context *c, int count, bool m
     if (count <= 0) return SADMM_OK;
     CUDA_ENTER(c);
     CUDA_TRY(clear_primal(c, measure, error));
-    CUDA_TRY(c->tier == SADMM_CUDA_TIER_STREAM ? stream_iterations(c, count, measure, error)
+    CUDA_TRY(c->partition.tier == SADMM_CUDA_TIER_STREAM ? stream_iterations(c, count, measure, error)
                                                : resident_iterations(c, count, measure, error));
     c->measured = measure;
     c->ratio = 1;

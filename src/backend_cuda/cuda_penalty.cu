@@ -40,7 +40,7 @@ static __device__ __forceinline__ void add_arm_sums(double C[PACKED], const arm_
 
 static __device__ void add_pair(const cuda_view &v, int32_t p, int side, arm_sums *sums, double C[PACKED])
 {
-    const struct sadmm_contact_pair *pair = &v.raw_pairs[v.pair_of[p]];
+    const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
     for (int32_t k = 0; k < pair->count; ++k) {
         const struct sadmm_contact_point *point = &v.raw_points[pair->first + k];
         const double *r = side ? point->arm_b : point->arm_a;
@@ -67,13 +67,13 @@ static __device__ void add_block(const struct sadmm_problem_block *block, int si
 static __global__ void penalty_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     int32_t i = thread_index();
-    if (i >= v.bodies) return;
+    if (i >= live_bodies(v)) return;
     double C[PACKED] = {0};
     arm_sums sums = {};
     for (int32_t at = v.offsets[i]; at < v.offsets[i + 1]; ++at) {
         int32_t record = v.incident[at] / 2, side = v.incident[at] & 1;
-        if (record < v.pairs) add_pair(v, record, side, &sums, C);
-        else add_block(&v.raw.blocks[v.row_of[record - v.pairs]], side, C);
+        if (record < v.pair_room) add_pair(v, record, side, &sums, C);
+        else add_block(&v.raw.blocks[record - v.pair_room], side, C);
     }
     add_arm_sums(C, &sums);
 
@@ -88,7 +88,7 @@ static __global__ void penalty_kernel(const __grid_constant__ cuda_view v, const
 static __global__ void factorize_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     int32_t i = thread_index();
-    if (i >= v.bodies) return;
+    if (i >= live_bodies(v)) return;
     double M[36], L[36];
     const double *C = v.C + (size_t)i * PACKED, beta = v.beta[i];
     const solver_real *A = v.A + (size_t)i * MATRIX;
@@ -114,7 +114,7 @@ static __global__ void factorize_kernel(const __grid_constant__ cuda_view v, con
 static __global__ void scale_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     int32_t i = thread_index();
-    if (i < v.bodies) v.beta[i] *= args.factor;
+    if (i < live_bodies(v)) v.beta[i] *= args.factor;
 }
 
 /* ---- entries --------------------------------------------------------------------------------------------------- */

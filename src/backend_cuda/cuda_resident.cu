@@ -12,6 +12,11 @@
  */
 #include "cuda_sweep.h"
 
+/* Where a part begins; it ends where the next one begins. */
+struct part {
+    int32_t body, pair, row;
+};
+
 /* ---- shared memory --------------------------------------------------------------------------------------------- */
 
 struct part_memory {
@@ -82,7 +87,7 @@ static __device__ __forceinline__ void load_resident(resident_pair<POINTS> *own,
 #pragma unroll
     for (int k = 0; k < POINTS; ++k) {
         if (k >= own->pair.count) continue;
-        size_t slot = (size_t)k * (size_t)v.stride + (size_t)p;
+        size_t slot = (size_t)k * (size_t)v.pair_room + (size_t)p;
         real4 arm = v.arm[slot];
         own->arm[k] = xyz(arm);
         own->error[k] = arm.w;
@@ -95,7 +100,7 @@ static __device__ __forceinline__ void store_resident(const resident_pair<POINTS
 {
 #pragma unroll
     for (int k = 0; k < POINTS; ++k)
-        if (k < own.pair.count) store_lambda<CONTACT_ROWS>(v, (size_t)k * (size_t)v.stride + (size_t)p, own.lambda[k]);
+        if (k < own.pair.count) store_lambda<CONTACT_ROWS>(v, (size_t)k * (size_t)v.pair_room + (size_t)p, own.lambda[k]);
 }
 
 template <int CONTACT_ROWS, int POINTS, bool MEASURE>
@@ -126,7 +131,7 @@ static __global__ void __launch_bounds__(THREADS)
     resident_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     CUDA_DYNAMIC_SHARED(memory);
-    const part begin = v.parts[blockIdx.x], end = v.parts[blockIdx.x + 1];
+    const part begin = ((const part *)v.parts)[blockIdx.x], end = ((const part *)v.parts)[blockIdx.x + 1];
     const int32_t bodies = end.body - begin.body, pairs = end.pair - begin.pair, rows = end.row - begin.row;
     const int32_t first_incident = v.offsets[begin.body], incident = v.offsets[end.body] - first_incident;
     const int32_t t = (int32_t)threadIdx.x;
@@ -136,7 +141,7 @@ static __global__ void __launch_bounds__(THREADS)
     /* Where velocities and records are, and how this part's bodies are numbered there. */
     solver_real *const state = GRID ? v.state : m.state;
     solver_real *const own_records = GRID ? v.records + (size_t)begin.pair * RECORD : m.records;
-    solver_real *const row_records = GRID ? v.records + ((size_t)v.pairs + (size_t)begin.row) * RECORD
+    solver_real *const row_records = GRID ? v.records + ((size_t)v.pair_room + (size_t)begin.row) * RECORD
                                           : m.records + (size_t)pairs * RECORD;
     const solver_real *const records = GRID ? v.records : m.records;
     solver_real *const own_state = GRID ? v.state + (size_t)begin.body * ROW : m.state;
@@ -150,7 +155,7 @@ static __global__ void __launch_bounds__(THREADS)
     for (int32_t i = t; i <= bodies; i += THREADS) m.offsets[i] = v.offsets[begin.body + i] - first_incident;
     for (int32_t i = t; i < incident; i += THREADS) {
         int32_t half = v.incident[first_incident + i];
-        if (!GRID) half -= half < 2 * v.pairs ? 2 * begin.pair : 2 * (v.pairs - pairs + begin.row);
+        if (!GRID) half -= half < 2 * v.pair_room ? 2 * begin.pair : 2 * (v.pair_room - pairs + begin.row);
         m.incident[i] = half;
     }
     if (!GRID) {
@@ -162,7 +167,7 @@ static __global__ void __launch_bounds__(THREADS)
         for (int32_t i = t; i < (pairs + rows) * RECORD; i += THREADS) {
             bool of_pair = i < pairs * RECORD;
             size_t from = of_pair ? (size_t)begin.pair * RECORD + (size_t)i
-                                  : ((size_t)v.pairs + (size_t)begin.row) * RECORD + (size_t)(i - pairs * RECORD);
+                                  : ((size_t)v.pair_room + (size_t)begin.row) * RECORD + (size_t)(i - pairs * RECORD);
             solver_real value = v.records[from];
             if (args.join) value += args.ratio * v.change[from];
             (of_pair ? own_records : row_records - pairs * RECORD)[i] = value;
@@ -207,7 +212,7 @@ static __global__ void __launch_bounds__(THREADS)
                 }
                 sweep_row_block<true>(v, begin.row + k, about, state, about.body_a, about.body_b,
                                       row_records + k * RECORD,
-                                      v.change + ((size_t)v.pairs + (size_t)(begin.row + k)) * RECORD, &primal);
+                                      v.change + ((size_t)v.pair_room + (size_t)(begin.row + k)) * RECORD, &primal);
             }
             reduce_max(primal, v.residual);
         } else {
@@ -235,7 +240,7 @@ static __global__ void __launch_bounds__(THREADS)
         for (int32_t i = t; i < (pairs + rows) * RECORD; i += THREADS) {
             size_t to = i < pairs * RECORD
                             ? (size_t)begin.pair * RECORD + (size_t)i
-                            : ((size_t)v.pairs + (size_t)begin.row) * RECORD + (size_t)(i - pairs * RECORD);
+                            : ((size_t)v.pair_room + (size_t)begin.row) * RECORD + (size_t)(i - pairs * RECORD);
             v.records[to] = m.records[i];
         }
     }

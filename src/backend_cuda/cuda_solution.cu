@@ -4,7 +4,7 @@
 /* Multiplier of a point as a world vector on b. */
 static __device__ vec3 point_impulse(const cuda_view &v, int32_t p, int32_t k, vec3 normal)
 {
-    size_t slot = (size_t)k * (size_t)v.stride + (size_t)p;
+    size_t slot = (size_t)k * (size_t)v.pair_room + (size_t)p;
     if (v.contact_rows == 1) return v3_scale(normal, (double)v.lambda_n[slot]);
     real4 lambda = v.lambda[slot];
     return v3((double)lambda.x, (double)lambda.y, (double)lambda.z);
@@ -22,22 +22,23 @@ static __global__ void read_kernel(const __grid_constant__ cuda_view v, const __
 {
     int32_t i = thread_index();
     double *impulses = v.out + 6 * (size_t)v.bodies, *multipliers = impulses + 3 * (size_t)v.points;
+    if (v.live->halt) return;
     if (i < v.bodies) {
         double *out = v.out + 6 * (size_t)v.body_of[i];
         for (int k = 0; k < 6; ++k) out[k] = (double)v.state[(size_t)i * ROW + (size_t)k];
         return;
     }
     i -= v.bodies;
-    if (i < v.pairs) {
-        const struct sadmm_contact_pair *pair = &v.raw_pairs[v.pair_of[i]];
+    if (i < live_pairs(v)) {
+        const struct sadmm_contact_pair *pair = &v.raw_pairs[i];
         vec3 normal = v3_load(pair->normal);
         for (int32_t k = 0; k < pair->count; ++k)
             v3_store(point_impulse(v, i, k, normal), impulses + 3 * (size_t)(pair->first + k));
         return;
     }
-    i -= v.pairs;
-    if (i < v.rows)
-        for (int r = 0; r < 6; ++r) multipliers[6 * (size_t)v.row_of[i] + (size_t)r] = row_multiplier(v, i, r);
+    i -= v.pair_room;
+    if (i >= 0 && i < v.rows)
+        for (int r = 0; r < 6; ++r) multipliers[6 * (size_t)i + (size_t)r] = row_multiplier(v, i, r);
 }
 
 extern "C" sadmm_status CUDA(read_solution)(struct sadmm_context *c, struct sadmm_error *error)
@@ -47,7 +48,7 @@ extern "C" sadmm_status CUDA(read_solution)(struct sadmm_context *c, struct sadm
     size_t n = (size_t)v->bodies, points = (size_t)v->points, rows = (size_t)v->rows;
     cuda_args args = {};
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(launch)(c, read_kernel, "read_solution", blocks_for((int64_t)v->bodies + v->pairs + v->rows), 0,
+    CUDA_TRY(CUDA(launch)(c, read_kernel, "read_solution", blocks_for((int64_t)v->bodies + v->pair_room + v->rows), 0,
                           false, &args, error));
     CUDA_TRY(CUDA(download)(c, v->out, (6 * n + 3 * points + 6 * rows) * sizeof(double), error));
     const double *from = (const double *)c->buffers[PINNED_OUT].data;
@@ -63,7 +64,7 @@ extern "C" sadmm_status CUDA(read_solution)(struct sadmm_context *c, struct sadm
 static __global__ void read_penalty_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     int32_t i = thread_index();
-    if (i < v.bodies) v.out[v.body_of[i]] = v.beta[i];
+    if (i < live_bodies(v)) v.out[v.body_of[i]] = v.beta[i];
 }
 
 extern "C" sadmm_status CUDA(read_penalty)(struct sadmm_context *c, double *beta, struct sadmm_error *error)
@@ -84,7 +85,7 @@ enum { MOVED = 13 }; /* position, orientation, velocity */
 static __global__ void integrate_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     int32_t i = thread_index();
-    if (i >= v.bodies) return;
+    if (i >= live_bodies(v)) return;
     const struct sadmm_rigid *body = &v.raw.rigid[v.body_of[i]];
     const solver_real *state = v.state + (size_t)i * ROW;
     double *out = v.out + MOVED * (size_t)v.body_of[i], dt = v.settings.dt;
@@ -119,7 +120,7 @@ extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_ri
 
 static __device__ void add_pair_wrench(const cuda_view &v, int32_t p, int side, double per_dt, double wrench[6])
 {
-    const struct sadmm_contact_pair *pair = &v.raw_pairs[v.pair_of[p]];
+    const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
     vec3 normal = v3_load(pair->normal);
     for (int32_t k = 0; k < pair->count; ++k) {
         const struct sadmm_contact_point *point = &v.raw_points[pair->first + k];
@@ -133,11 +134,11 @@ static __device__ void add_pair_wrench(const cuda_view &v, int32_t p, int side, 
 static __global__ void wrench_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     int32_t i = thread_index();
-    if (i >= v.bodies) return;
+    if (i >= live_bodies(v)) return;
     double wrench[6] = {0}, per_dt = 1 / v.settings.dt;
     for (int32_t at = v.offsets[i]; at < v.offsets[i + 1]; ++at) {
         int32_t record = v.incident[at] / 2, side = v.incident[at] & 1;
-        if (record < v.pairs) add_pair_wrench(v, record, side, per_dt, wrench); /* contacts given by geometry only */
+        if (record < v.pair_room) add_pair_wrench(v, record, side, per_dt, wrench); /* contacts given by geometry only */
     }
     double *out = v.out + 6 * (size_t)v.body_of[i];
     for (int k = 0; k < 6; ++k) out[k] = wrench[k];

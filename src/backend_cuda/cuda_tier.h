@@ -10,9 +10,10 @@ extern "C" {
 
 enum sadmm_cuda_tier {
     SADMM_CUDA_TIER_AUTO = 0,
-    SADMM_CUDA_TIER_BLOCK,  /* islands packed into thread blocks */
-    SADMM_CUDA_TIER_GRID,   /* one cooperative launch with grid barriers */
-    SADMM_CUDA_TIER_STREAM  /* two kernels an iteration */
+    SADMM_CUDA_TIER_BLOCK,   /* islands packed into thread blocks */
+    SADMM_CUDA_TIER_CLUSTER, /* islands packed into clusters of thread blocks */
+    SADMM_CUDA_TIER_GRID,    /* one cooperative launch with grid barriers */
+    SADMM_CUDA_TIER_STREAM   /* two kernels an iteration */
 };
 
 /* From the next begin on. A begin whose system does not fit the tier fails with SADMM_ERROR_UNSUPPORTED. `kernels`: the

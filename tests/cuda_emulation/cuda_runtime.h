@@ -190,7 +190,26 @@ inline long long __double_as_longlong(double value)
     memcpy(&bits, &value, sizeof bits);
     return bits;
 }
+/* Fibers give way at barriers only, so every access is atomic. */
 inline void atomicMax(unsigned long long *to, unsigned long long value) { *to = std::max(*to, value); }
+inline int atomicMax(int *to, int value)
+{
+    int before = *to;
+    *to = std::max(before, value);
+    return before;
+}
+inline int atomicAdd(int *to, int value)
+{
+    int before = *to;
+    *to += value;
+    return before;
+}
+inline int atomicCAS(int *to, int expected, int value)
+{
+    int before = *to;
+    if (before == expected) *to = value;
+    return before;
+}
 
 /* ---- the runtime ----------------------------------------------------------------------------------------------- */
 
@@ -239,6 +258,14 @@ inline bool fails(void)
 }
 
 } // namespace cuda_emulation
+
+/* Now, or when the graph that is being captured is launched. */
+template <class Node> static inline cudaError_t cuda_emulation_enqueue(Node node)
+{
+    if (cuda_emulation::capture) cuda_emulation::capture->push_back(node);
+    else if (!node()) return cudaErrorLaunchTimeout;
+    return cudaSuccess;
+}
 
 #define CUDA_EMULATION_CALL \
     if (cuda_emulation::fails()) return cudaErrorLaunchFailure
@@ -318,14 +345,12 @@ inline cudaError_t cudaFree(void *block) { return cudaFreeHost(block); }
 inline cudaError_t cudaMemcpyAsync(void *to, const void *from, size_t bytes, int, cudaStream_t)
 {
     CUDA_EMULATION_CALL;
-    memcpy(to, from, bytes);
-    return cudaSuccess;
+    return cuda_emulation_enqueue([=]() { return memcpy(to, from, bytes) == to; });
 }
 inline cudaError_t cudaMemsetAsync(void *to, int value, size_t bytes, cudaStream_t)
 {
     CUDA_EMULATION_CALL;
-    memset(to, value, bytes);
-    return cudaSuccess;
+    return cuda_emulation_enqueue([=]() { return memset(to, value, bytes) == to; });
 }
 
 inline cudaError_t cudaStreamCreateWithFlags(cudaStream_t *stream, int)
@@ -401,17 +426,14 @@ static cudaError_t cuda_emulation_launch(void (*kernel)(const View, const Args),
     if (shared > cuda_emulation::SHARED_LIMIT) return cudaErrorInvalidValue;
     if (cooperative && blocks > cuda_emulation::MULTIPROCESSORS * cuda_emulation::BLOCKS_PER_MULTIPROCESSOR)
         return cudaErrorInvalidValue;
-    std::function<bool()> node = [=]() {
+    return cuda_emulation_enqueue([=]() {
         std::function<void()> body = [&]() { kernel(view, args); };
         gridDim.x = blocks;
         unsigned together = cooperative ? blocks : 1;
         for (unsigned first = 0; first < blocks; first += together)
             if (!cuda_emulation::run_blocks(body, first, together, threads, shared)) return false;
         return true;
-    };
-    if (cuda_emulation::capture) cuda_emulation::capture->push_back(node);
-    else if (!node()) return cudaErrorLaunchTimeout;
-    return cudaSuccess;
+    });
 }
 
 #endif
