@@ -438,22 +438,6 @@ START_TEST(tiers_equal_stepwise)
 }
 END_TEST
 
-/* What auto takes, and that a partition into several blocks really ran. */
-START_TEST(automatic_tiers)
-{
-    int32_t blocks;
-    struct runner r;
-    runner_start(&r, tables[_i], &scenes[4], SADMM_CUDA_TIER_AUTO);
-    ck_assert_int_eq(tier_of(r.k, r.c, &blocks), SADMM_CUDA_TIER_BLOCK);
-    ck_assert_int_gt(blocks, 1);
-    runner_stop(&r);
-    runner_start(&r, tables[_i], &scenes[8], SADMM_CUDA_TIER_AUTO);
-    ck_assert_int_eq(tier_of(r.k, r.c, &blocks), SADMM_CUDA_TIER_GRID);
-    ck_assert_int_gt(blocks, 1);
-    runner_stop(&r);
-}
-END_TEST
-
 /* ---- contexts -------------------------------------------------------------------------------------------------- */
 
 static void solve(struct runner *r, const struct scene *scene)
@@ -508,7 +492,7 @@ START_TEST(contexts_side_by_side)
     struct runner alone, one, two;
     runner_start(&alone, table, &scenes[0], SADMM_CUDA_TIER_AUTO);
     runner_start(&one, table, &scenes[0], SADMM_CUDA_TIER_STREAM);
-    runner_start(&two, table, &scenes[3], SADMM_CUDA_TIER_GRID);
+    runner_start(&two, table, &scenes[3], SADMM_CUDA_TIER_STREAM);
     for (int i = 0; i < 5; ++i) runner_step(&alone, false);
     for (int i = 0; i < 5; ++i) {
         CALL(&one, table->update_velocity(one.c, &one.error));
@@ -608,7 +592,6 @@ int main(void)
     tcase_set_timeout(tests, 300);
     tcase_add_loop_test(tests, entries_equal_literal, 0, 2 * SCENES);
     tcase_add_loop_test(tests, tiers_equal_stepwise, 0, 2 * SCENES);
-    tcase_add_loop_test(tests, automatic_tiers, 0, 2);
     tcase_add_loop_test(tests, runs_repeat, 0, 2);
     tcase_add_loop_test(tests, contexts_side_by_side, 0, 2);
     tcase_add_loop_test(tests, no_such_device, 0, 2);

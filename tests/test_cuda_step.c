@@ -284,7 +284,7 @@ START_TEST(a_step_that_fails_leaves_the_world_before_it)
     def.mass = 1;
     def.position[2] = 9;
     def.name = "feather";
-    for (int k = 0; k < 3; ++k) def.inertia[k] = 1e-300; /* 1e313 rad/s */
+    for (int k = 0; k < 3; ++k) def.inertia[k] = precision ? 1e-300 : 1e-30; /* 5e312 or 5e42 rad/s */
     for (int pass = 0; pass < 2; ++pass)
         MUST(pass ? other : world, sadmm_world_add_body(pass ? other : world, &def, &feather[pass]));
     step_world(world, 5);
@@ -346,8 +346,6 @@ START_TEST(lack_of_memory)
     int failures = 0;
     for (long n = 0;; n += n < 40 ? 1 : 3) {
         sadmm_world *world = towers(3, 2, 0.5, precision);
-        step_world(world, 1); /* what the host keeps has its room */
-        MUST(world, sadmm_world_take_back(world));
         sadmm_test_fail_allocations_after(n);
         sadmm_status status = sadmm_world_step(world);
         bool reached = status != SADMM_OK;
@@ -355,14 +353,14 @@ START_TEST(lack_of_memory)
         if (reached) {
             ++failures;
             ck_assert_int_eq(status, SADMM_ERROR_OUT_OF_MEMORY);
-            ck_assert_int_eq(world_report(world).step, 1);
+            ck_assert_int_eq(world_report(world).step, 0);
         }
         step_world(world, (int)(6 - world_report(world).step));
         expect_same_world(plain, world, "after lack of memory");
         sadmm_world_destroy(world);
         if (!reached) break;
     }
-    ck_assert_int_ge(failures, 1);
+    ck_assert_int_ge(failures, 30); /* buffers, sets, graphs' arguments */
     sadmm_world_destroy(plain);
 }
 END_TEST

@@ -734,7 +734,7 @@ extern "C" sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *c, int64
     if (*candidates > MOST_CANDIDATES)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%lld pairs of shapes may touch: at most %d can be indexed",
                           (long long)*candidates, (int)MOST_CANDIDATES);
-    const int64_t first_points = c->point_room > 0 ? c->point_room : likely;
+    const int64_t first_points = c->point_room > 0 ? c->point_room : *points > 0 ? 1 : likely;
     c->candidate_room = std::max(c->candidate_room, *candidates > 0 ? *candidates : std::min(likely, MOST_CANDIDATES));
     c->point_room = std::max(first_points, *points);
     TRY(make_candidate_room(c, error));

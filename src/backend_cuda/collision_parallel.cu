@@ -24,6 +24,14 @@ cudaError_t COLLISION(sort)(void *temp, size_t *bytes, uint64_t *const keys[2], 
     return code;
 }
 
+cudaError_t COLLISION(sort_numbers)(void *temp, size_t *bytes, const int32_t *keys, int32_t *sorted_keys,
+                                    const int32_t *values, int32_t *sorted_values, int count, int bits,
+                                    cudaStream_t stream)
+{
+    return cub::DeviceRadixSort::SortPairs(temp, *bytes, keys, sorted_keys, values, sorted_values, count, 0, bits,
+                                           stream);
+}
+
 cudaError_t COLLISION(sum)(void *temp, size_t *bytes, const uint64_t *in, uint64_t *out, int count, cudaStream_t stream)
 {
     return cub::DeviceScan::ExclusiveSum(temp, *bytes, in, out, count, stream);
@@ -40,17 +48,41 @@ cudaError_t COLLISION(sort)(void *temp, size_t *bytes, uint64_t *const keys[2], 
     *result = 0;
     if (!temp) return cudaSuccess;
     CUDA_EMULATION_CALL;
-    const uint64_t mask = bits < 64 ? (UINT64_C(1) << bits) - 1 : ~UINT64_C(0);
-    std::vector<uint32_t> order((size_t)count);
-    for (size_t i = 0; i < order.size(); ++i) order[i] = (uint32_t)i;
-    std::stable_sort(order.begin(), order.end(),
-                     [&](uint32_t a, uint32_t b) { return (keys[0][a] & mask) < (keys[0][b] & mask); });
-    for (size_t i = 0; i < order.size(); ++i) {
-        keys[1][i] = keys[0][order[i]];
-        if (values) values[1][i] = values[0][order[i]];
-    }
     *result = 1;
-    return cudaSuccess;
+    uint64_t *const from = keys[0], *const to = keys[1];
+    uint32_t *const values_from = values ? values[0] : nullptr, *const values_to = values ? values[1] : nullptr;
+    return cuda_emulation_enqueue([=]() {
+        const uint64_t mask = bits < 64 ? (UINT64_C(1) << bits) - 1 : ~UINT64_C(0);
+        std::vector<uint32_t> order((size_t)count);
+        for (size_t i = 0; i < order.size(); ++i) order[i] = (uint32_t)i;
+        std::stable_sort(order.begin(), order.end(),
+                         [=](uint32_t a, uint32_t b) { return (from[a] & mask) < (from[b] & mask); });
+        for (size_t i = 0; i < order.size(); ++i) {
+            to[i] = from[order[i]];
+            if (values_to) values_to[i] = values_from[order[i]];
+        }
+        return true;
+    });
+}
+
+cudaError_t COLLISION(sort_numbers)(void *temp, size_t *bytes, const int32_t *keys, int32_t *sorted_keys,
+                                    const int32_t *values, int32_t *sorted_values, int count, int bits, cudaStream_t)
+{
+    *bytes = 1;
+    if (!temp) return cudaSuccess;
+    CUDA_EMULATION_CALL;
+    return cuda_emulation_enqueue([=]() {
+        const int32_t mask = (int32_t)((UINT32_C(1) << bits) - 1);
+        std::vector<int32_t> order((size_t)count);
+        for (size_t i = 0; i < order.size(); ++i) order[i] = (int32_t)i;
+        std::stable_sort(order.begin(), order.end(),
+                         [=](int32_t a, int32_t b) { return (keys[a] & mask) < (keys[b] & mask); });
+        for (size_t i = 0; i < order.size(); ++i) {
+            sorted_keys[i] = keys[order[i]];
+            sorted_values[i] = values[order[i]];
+        }
+        return true;
+    });
 }
 
 cudaError_t COLLISION(sum)(void *temp, size_t *bytes, const uint64_t *in, uint64_t *out, int count, cudaStream_t)
@@ -58,13 +90,15 @@ cudaError_t COLLISION(sum)(void *temp, size_t *bytes, const uint64_t *in, uint64
     *bytes = 1;
     if (!temp) return cudaSuccess;
     CUDA_EMULATION_CALL;
-    uint64_t sum = 0;
-    for (int i = 0; i < count; ++i) {
-        uint64_t item = in[i];
-        out[i] = sum;
-        sum += item;
-    }
-    return cudaSuccess;
+    return cuda_emulation_enqueue([=]() {
+        uint64_t sum = 0;
+        for (int i = 0; i < count; ++i) {
+            uint64_t item = in[i];
+            out[i] = sum;
+            sum += item;
+        }
+        return true;
+    });
 }
 
 #endif

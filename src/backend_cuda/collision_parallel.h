@@ -1,4 +1,4 @@
-/* What contact finding takes from CUB, and integer atomics. On the emulated device: plain C++. */
+/* What contact finding and the layout take from CUB, and integer atomics. On the emulated device: plain C++. */
 #ifndef SADMM_CUDA_COLLISION_PARALLEL_H
 #define SADMM_CUDA_COLLISION_PARALLEL_H
 
@@ -13,6 +13,10 @@
  * keys[*result], values[*result]. temp NULL: only *bytes is set, to what temp must hold. */
 cudaError_t COLLISION(sort)(void *temp, size_t *bytes, uint64_t *const keys[2], uint32_t *const *values, int count,
                             int bits, int *result, cudaStream_t stream);
+/* Sort keys >= 0 below 2^bits stably, with values; the input stays. temp as above. */
+cudaError_t COLLISION(sort_numbers)(void *temp, size_t *bytes, const int32_t *keys, int32_t *sorted_keys,
+                                    const int32_t *values, int32_t *sorted_values, int count, int bits,
+                                    cudaStream_t stream);
 /* out[i] = sum of in[0 .. i-1]. temp as above. */
 cudaError_t COLLISION(sum)(void *temp, size_t *bytes, const uint64_t *in, uint64_t *out, int count,
                            cudaStream_t stream);

@@ -23,12 +23,17 @@ static __global__ void assemble_bodies_kernel(const __grid_constant__ cuda_view 
     for (int k = 0; k < MATRIX; ++k) matrix[k] = k < 36 ? (solver_real)A[k] : (solver_real)0;
 }
 
+static sadmm_status launch_bodies(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    return CUDA(launch)(c, assemble_bodies_kernel, "assemble_bodies", blocks_for(c->view.bodies), &args, error);
+}
+
 extern "C" sadmm_status CUDA(assemble_bodies)(struct sadmm_context *c, struct sadmm_error *error)
 {
     const struct sadmm_system *system = c->system;
     const cuda_view *v = &c->view;
     size_t n = (size_t)v->bodies, at = 0;
-    cuda_args args = {};
     CUDA_ENTER(c);
     if (c->plan.rigid) {
         at = n * sizeof *system->rigid;
@@ -40,7 +45,7 @@ extern "C" sadmm_status CUDA(assemble_bodies)(struct sadmm_context *c, struct sa
         at = 42 * n * sizeof(double);
     }
     CUDA_TRY(CUDA(upload)(c, v->raw.velocity, PINNED_BODIES, at, system->velocity, 6 * n * sizeof(double), error));
-    return CUDA(launch)(c, assemble_bodies_kernel, "assemble_bodies", blocks_for(v->bodies), 0, false, &args, error);
+    return launch_bodies(c, error);
 }
 
 /* ---- contacts given by geometry -------------------------------------------------------------------------------- */
@@ -110,39 +115,20 @@ static __global__ void assemble_rows_kernel(const __grid_constant__ cuda_view v,
     v.row_info[k] = about;
 }
 
-/* Blocks of all kinds are uploaded with the first kind that is assembled. */
 static sadmm_status assemble_rows(struct sadmm_context *c, enum sadmm_block_kind kind, struct sadmm_error *error)
 {
-    const cuda_view *v = &c->view;
-    size_t rows = (size_t)v->rows, bytes = rows * sizeof *c->system->blocks;
     cuda_args args = {};
     args.count = (int32_t)kind;
-    if (!c->blocks_uploaded) {
-        CUDA_TRY(CUDA(upload)(c, (void *)v->raw.blocks, PINNED_BLOCKS, 0, c->system->blocks, bytes, error));
-        CUDA_TRY(CUDA(upload)(c, v->raw.block_lambda, PINNED_BLOCKS, bytes, c->system->block_lambda,
-                              6 * rows * sizeof(double), error));
-        c->blocks_uploaded = true;
-    }
-    return CUDA(launch)(c, assemble_rows_kernel, "assemble_blocks", blocks_for(v->rows), 0, false, &args, error);
+    return CUDA(launch)(c, assemble_rows_kernel, "assemble_blocks", blocks_for(c->view.rows), &args, error);
 }
 
 /* ---- entries --------------------------------------------------------------------------------------------------- */
-
-static sadmm_status upload_contacts(struct sadmm_context *c, struct sadmm_error *error)
-{
-    const struct sadmm_contact_set *contacts = c->system->contacts;
-    CUDA_TRY(CUDA(upload)(c, (void *)c->view.raw_pairs, PINNED_PAIRS, 0, contacts->pairs,
-                          contacts->pair_count * sizeof *contacts->pairs, error));
-    return CUDA(upload)(c, (void *)c->view.raw_points, PINNED_POINTS, 0, contacts->points,
-                        contacts->point_count * sizeof *contacts->points, error);
-}
 
 extern "C" sadmm_status CUDA(assemble_contacts)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
     CUDA_ENTER(c);
-    CUDA_TRY(upload_contacts(c, error));
-    CUDA_TRY(CUDA(launch)(c, assemble_contacts_kernel, "assemble_contacts", blocks_for(c->view.pair_room), 0, false, &args,
+    CUDA_TRY(CUDA(launch)(c, assemble_contacts_kernel, "assemble_contacts", blocks_for(c->view.pair_room), &args,
                           error));
     return c->plan.blocks[SADMM_BLOCK_CONTACT] ? assemble_rows(c, SADMM_BLOCK_CONTACT, error) : SADMM_OK;
 }
@@ -157,4 +143,12 @@ extern "C" sadmm_status CUDA(assemble_springs)(struct sadmm_context *c, struct s
 {
     CUDA_ENTER(c);
     return assemble_rows(c, SADMM_BLOCK_SOFT, error);
+}
+
+sadmm_status CUDA(enqueue_assembly)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    CUDA_TRY(launch_bodies(c, error));
+    CUDA_TRY(CUDA(assemble_contacts)(c, error));
+    CUDA_TRY(CUDA(init_penalty)(c, error));
+    return CUDA(factorize)(c, error);
 }

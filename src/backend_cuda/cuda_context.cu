@@ -44,19 +44,31 @@ static const char *const buffer_names[BUFFER_COUNT] = {
     "wrench records",
     "changes of wrench records",
     "exchanged velocities",
+    "live counts",
     "layout",
+    "sorts",
+    "numbers",
     "scalars",
     "bodies' input",
     "pairs' input",
     "points' input",
     "blocks' input",
     "results",
-    "staged layout",
+    "world's bodies",
+    "world's changes of velocity",
+    "world's wrenches",
+    "world's starting velocities",
+    "world's starting impulses",
+    "world's body slots",
+    "world's places of bodies",
+    "control of a step",
+    "staged counts",
     "staged bodies",
     "staged pairs",
     "staged points",
     "staged blocks",
     "staged results",
+    "reports",
 };
 
 static void release(cuda_buffer *buffer)
@@ -77,7 +89,7 @@ sadmm_status CUDA(room)(struct sadmm_context *c, enum cuda_buffer_name name, siz
     snprintf(what, sizeof what, "allocation of %zu bytes for the cuda backend's %s", wanted, buffer_names[name]);
     if (sadmm_test_allocation_fails()) return CUDA(fail)(c, cudaErrorMemoryAllocation, what, error);
     release(buffer);
-    buffer->pinned = name >= PINNED_LAYOUT;
+    buffer->pinned = name >= PINNED_LIVE;
     CUDA_CALL(c, buffer->pinned ? cudaMallocHost(&buffer->data, wanted) : cudaMalloc(&buffer->data, wanted), what);
     buffer->capacity = wanted;
     return SADMM_OK;
@@ -139,10 +151,10 @@ static sadmm_status launch_blocks(struct sadmm_context *c, cuda_kernel kernel, c
     return SADMM_OK;
 }
 
-sadmm_status CUDA(launch)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, size_t shared,
-                          bool cooperative, const cuda_args *args, struct sadmm_error *error)
+sadmm_status CUDA(launch)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
+                          const cuda_args *args, struct sadmm_error *error)
 {
-    return launch_blocks(c, kernel, name, blocks, THREADS, shared, 1, cooperative, args, error);
+    return launch_blocks(c, kernel, name, blocks, THREADS, 0, 1, false, args, error);
 }
 
 sadmm_status CUDA(launch_partition)(struct sadmm_context *c, cuda_kernel kernel, const char *name,
@@ -236,15 +248,12 @@ extern "C" void CUDA(destroy)(struct sadmm_context *c)
     if (c->stream) { /* a device was opened; after a device error these calls fail, and there is nothing left to free */
         device_scope scope(c->device);
         (void)cudaStreamSynchronize(c->stream);
+        CUDA(step_destroy)(c);
         if (c->graph) (void)cudaGraphExecDestroy(c->graph);
         for (cuda_buffer &buffer : c->buffers) release(&buffer);
         (void)cudaStreamDestroy(c->stream);
         (void)cudaGetLastError();
     }
-    sadmm_free(c->scratch.parent);
-    sadmm_free(c->scratch.island_of);
-    sadmm_free(c->scratch.islands);
-    sadmm_free(c->scratch.cursor);
     sadmm_free(c);
 }
 
@@ -254,6 +263,8 @@ extern "C" sadmm_status CUDA(find_contacts)(struct sadmm_context *, struct sadmm
 {
     return sadmm_collision_find(collision, input, contacts, error);
 }
+
+extern "C" void CUDA(tune_rooms)(struct sadmm_context *c, int64_t first_room) { c->first_room = first_room; }
 
 extern "C" void CUDA(set_tier)(struct sadmm_context *c, enum sadmm_cuda_tier tier)
 {

@@ -1,12 +1,21 @@
 /* The entries of the kernel table for one precision, in C: CUDA(name) is set by the includer. */
+#include "cuda_layout.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
 
 /* Whether a device can be used; *about (static storage): what was found, or why not. */
 bool CUDA(probe)(const char **about);
+/* Whole steps: room for so many candidates and points at first; 0: as likely (tests). */
+void CUDA(tune_rooms)(struct sadmm_context *, int64_t first_room);
 void CUDA(set_tier)(struct sadmm_context *, enum sadmm_cuda_tier tier);
 enum sadmm_cuda_tier CUDA(get_tier)(const struct sadmm_context *, int32_t *blocks);
+
+/* For tests: survey and layout of the last begin's system once more, for this partition, halted from the start or not, as
+ * a graph or not. */
+sadmm_status CUDA(lay_out_again)(struct sadmm_context *, const struct cuda_partition *, enum cuda_halt, bool graph,
+                                 struct cuda_layout_copy *, struct sadmm_error *);
 
 sadmm_status CUDA(create)(int device, struct sadmm_context **out, struct sadmm_error *error);
 void CUDA(destroy)(struct sadmm_context *);
@@ -29,6 +38,18 @@ sadmm_status CUDA(read_solution)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CUDA(read_penalty)(struct sadmm_context *, double *beta, struct sadmm_error *);
 sadmm_status CUDA(integrate)(struct sadmm_context *, struct sadmm_rigid *next, struct sadmm_error *);
 sadmm_status CUDA(recover_wrenches)(struct sadmm_context *, double *wrench, struct sadmm_error *);
+
+/* core/resident.h */
+sadmm_status CUDA(load_world)(struct sadmm_context *, const struct sadmm_resident_world *, const struct sadmm_settings *,
+                              struct sadmm_error *);
+sadmm_status CUDA(edit_world)(struct sadmm_context *, const struct sadmm_resident_edit *, size_t, struct sadmm_error *);
+sadmm_status CUDA(step_world)(struct sadmm_context *, const struct sadmm_settings *, struct sadmm_error *);
+sadmm_status CUDA(wait_world)(struct sadmm_context *, struct sadmm_resident_report *, struct sadmm_error *);
+sadmm_status CUDA(read_bodies)(struct sadmm_context *, struct sadmm_rigid *, struct sadmm_steady *, double *wrench,
+                               struct sadmm_error *);
+sadmm_status CUDA(read_contacts)(struct sadmm_context *, struct sadmm_contact_set *, struct sadmm_error *);
+sadmm_status CUDA(read_start)(struct sadmm_context *, struct sadmm_rigid *, double *velocity, double *impulse,
+                              struct sadmm_error *);
 
 #ifdef __cplusplus
 }

@@ -12,9 +12,9 @@
  *     no p_j), then (q_0 + q_1) + (q_2 + q_3): four lanes of a warp make it in two exchanges.
  *   - Eight lanes take a body: lane r < 6 owns component r of A v, of the gathered sum and of H g, H = (A + beta C)^-1.
  *
- * Order. Bodies are numbered by island (bodies that touch, directly or through others), stably, where the tier asks for
- * it: "slots". Pairs and row blocks stay in raw order. Static bodies join nothing and share the state row after the last
- * body, which is 0. Within a body's list records ascend, so that the sums are the same in every tier.
+ * Order. Bodies are numbered by island, stably, where islands matter: "slots" (cuda_layout.h). Pairs and row blocks keep
+ * their raw order. Static bodies join nothing and share the state row after the last body, which is 0. Within a body's
+ * list records ascend, so that the sums are the same in every tier.
  *
  * Tiers of the fused entry
  *   BLOCK    islands packed into thread blocks, everything on the chip; only __syncthreads
@@ -38,7 +38,8 @@
 #include <cuda_runtime.h>
 
 #include "../core/kernels.h"
-#include "cuda_layout.h"
+#include "cuda_step.h"
+#include "layout_internal.h"
 
 typedef SADMM_REAL solver_real;
 
@@ -79,13 +80,15 @@ struct row_about {
     int32_t active;                     /* bit r: row r exists (a hard row of zeros is no constraint, Sec. III-C) */
 };
 
-/* What kernels see. Pointers are device memory. Bodies are counted in slots unless "raw". */
+/* What kernels see. Pointers are device memory. Bodies are counted in slots unless "raw" (cuda_layout.h). */
 struct cuda_view {
     struct cuda_live *live;
+    struct cuda_facts *facts;
     int32_t bodies;      /* exact, known to the host (state row `bodies` is the static world) */
     int32_t pair_room;   /* multiple of 32; stride of point planes: point k of pair p is at k pair_room + p. The record of
                             pair p is p, of row block k pair_room + k */
     int32_t rows;        /* row blocks: exact, known to the host */
+    int32_t points;      /* room */
     int32_t row_stride;
     int32_t contact_rows;
     int32_t warm_start;
@@ -107,26 +110,28 @@ struct cuda_view {
     row_about *row_info;
     solver_real *row_data; /* ROW_PLANES x row_stride */
 
-    /* pairs, then row blocks. After a measured iteration `records` holds J^T lambda and `change`
+    /* pairs (pair_room of them), then row blocks. After a measured iteration `records` holds J^T lambda and `change`
      * J^T (lambda - lambda_prev), else `records` holds J^T (2 lambda - lambda_prev). */
     solver_real *records, *change;
 
-    const int32_t *offsets, *incident; /* body -> 2 record + (0 on a, 1 on b) */
+    const int32_t *offsets, *incident; /* body -> its halves, ascending */
     const int32_t *body_of, *slot_of;  /* slot -> raw body, raw body -> slot */
-    const int32_t *parts;              /* first body slots of the resident kernel's blocks, then `bodies` */
+    const int32_t *parts;              /* first body slot of each part, and the end */
     solver_real *exchange;             /* GRID: velocities of even and of odd iterations, bodies x ROW each */
     unsigned *barrier;                 /* arrivals at the grid barrier since launch */
     unsigned long long *residual;      /* primal, dual: bit patterns of doubles >= 0, which order like the numbers */
+    double *ratio;                     /* of (15), the last time */
 
     struct sadmm_system raw;           /* rigid, A, b, velocity, blocks, block_lambda */
     const struct sadmm_contact_pair *raw_pairs;
     const struct sadmm_contact_point *raw_points;
     struct sadmm_settings settings;
     double *out; /* results in raw order */
+    struct cuda_step_view step; /* whole steps alone */
 };
 
-/* This step's counts, 0 when it is halted. */
-static __device__ __forceinline__ int32_t live_bodies(const cuda_view &v) { return v.live->halt ? 0 : v.live->bodies; }
+/* This step's counts; 0 when it is halted. */
+static __device__ __forceinline__ int32_t live_bodies(const cuda_view &v) { return v.live->halt ? 0 : v.bodies; }
 static __device__ __forceinline__ int32_t live_pairs(const cuda_view &v) { return v.live->halt ? 0 : v.live->pairs; }
 static __device__ __forceinline__ int32_t live_rows(const cuda_view &v) { return v.live->halt ? 0 : v.rows; }
 
@@ -137,7 +142,8 @@ struct cuda_args {
     int32_t join;       /* the first Step 1 takes records + ratio change */
     int32_t start;      /* the first Step 1 takes J^T lambda^0, whatever the records are */
     int32_t most_bodies, cluster; /* of the partition */
-    solver_real ratio;
+    int32_t rescaled;   /* ratio is view.ratio, else 1 */
+    const struct sadmm_resident_edit *edits;
     double factor;
 };
 
@@ -154,20 +160,14 @@ enum cuda_buffer_name {
     /* device */
     BUFFER_STATE, BUFFER_B, BUFFER_A, BUFFER_H, BUFFER_C, BUFFER_BETA,
     BUFFER_NORMAL, BUFFER_DIFFERENCE, BUFFER_PAIR_BODIES, BUFFER_PAIR_COUNT, BUFFER_ARM, BUFFER_LAMBDA,
-    BUFFER_ROW_INFO, BUFFER_ROW_DATA, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_EXCHANGE, BUFFER_LAYOUT, BUFFER_SCALARS,
+    BUFFER_ROW_INFO, BUFFER_ROW_DATA, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_EXCHANGE, BUFFER_LIVE, BUFFER_LAYOUT, BUFFER_SORT,
+    BUFFER_NUMBERS, BUFFER_SCALARS,
     BUFFER_RAW_BODIES, BUFFER_RAW_PAIRS, BUFFER_RAW_POINTS, BUFFER_RAW_BLOCKS, BUFFER_OUT,
+    BUFFER_WORLD_BODIES, BUFFER_WORLD_STEADY, BUFFER_WORLD_WRENCH, BUFFER_WORLD_VELOCITY, BUFFER_WORLD_IMPULSE,
+    BUFFER_WORLD_SLOTS, BUFFER_WORLD_PLACES, BUFFER_WORLD_CONTROL,
     /* pinned */
-    PINNED_LAYOUT, PINNED_BODIES, PINNED_PAIRS, PINNED_POINTS, PINNED_BLOCKS, PINNED_OUT,
+    PINNED_LIVE, PINNED_BODIES, PINNED_PAIRS, PINNED_POINTS, PINNED_BLOCKS, PINNED_OUT, PINNED_REPORTS,
     BUFFER_COUNT
-};
-
-/* Arrays of begin(), on the host. */
-struct cuda_scratch {
-    int32_t *parent;         /* bodies */
-    int32_t *island_of;      /* bodies */
-    struct island *islands;  /* islands + 1 */
-    int32_t *cursor;         /* islands or bodies */
-    size_t parent_capacity, island_of_capacity, islands_capacity, cursor_capacity;
 };
 
 struct sadmm_context {
@@ -181,16 +181,21 @@ struct sadmm_context {
     struct sadmm_settings settings;
     cuda_view view;
     cuda_buffer buffers[BUFFER_COUNT];
-    cuda_scratch scratch;
-    bool blocks_uploaded;
     bool starting; /* no iteration yet: the next Step 1 uses J^T lambda^0, which `records` may not hold yet */
     bool weighed;  /* 1/s of the pairs is up to date */
     bool measured; /* records and change are apart: the next Step 1 uses records + ratio change */
-    double ratio;
+    bool rescaled; /* ... by view.ratio; else it is 1 */
+    bool recording; /* a graph of the whole step: nothing is allocated, no graph launched in it */
 
-    enum sadmm_cuda_tier wanted; /* by a test */
-    struct cuda_facts facts;
-    struct cuda_partition partition;
+    enum sadmm_cuda_tier wanted;     /* by a test */
+    struct cuda_facts facts;         /* of the last begin */
+    struct cuda_partition partition; /* what its layout was made for */
+    struct layout_view layout;
+    bool numbered;                   /* BUFFER_NUMBERS is filled */
+
+    struct cuda_step *step; /* the world, where whole steps are made here */
+    int64_t first_room;     /* for tests: candidates and points there is room for at first; 0: as likely */
+    unsigned refused;       /* bit of a tier: a part was too large */
 
     cudaGraphExec_t graph; /* GRAPH_ITERATIONS plain iterations */
     bool graph_valid;      /* for this step's view */
@@ -202,9 +207,9 @@ struct sadmm_context {
 sadmm_status CUDA(fail)(struct sadmm_context *, cudaError_t code, const char *what, struct sadmm_error *error);
 /* At least `bytes` in a buffer; what it held is lost when it grows. */
 sadmm_status CUDA(room)(struct sadmm_context *, enum cuda_buffer_name name, size_t bytes, struct sadmm_error *error);
-/* Launch on the stream; 0 blocks: nothing to do. */
-sadmm_status CUDA(launch)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks, size_t shared,
-                          bool cooperative, const cuda_args *args, struct sadmm_error *error);
+/* Launch blocks of THREADS on the stream; 0 blocks: nothing to do. */
+sadmm_status CUDA(launch)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks,
+                          const cuda_args *args, struct sadmm_error *error);
 /* Launch a kernel on the partition's blocks. */
 sadmm_status CUDA(launch_partition)(struct sadmm_context *, cuda_kernel kernel, const char *name,
                                     const struct cuda_partition *partition, const cuda_args *args,
@@ -234,6 +239,38 @@ struct device_scope {
 #define CUDA_ENTER(c)                   \
     device_scope scope((c)->device);    \
     CUDA_CALL((c), scope.code, "cudaSetDevice")
+
+/* ---- cuda_layout.cu, cuda_assemble.cu, cuda_penalty.cu, cuda_iterate.cu: parts of the entries, launches only ---- */
+
+/* This precision's data for the view's counts and the partition (allocates). */
+sadmm_status CUDA(solver_room)(struct sadmm_context *, struct sadmm_error *error);
+/* Everything from raw data on the device to the first iteration. */
+sadmm_status CUDA(enqueue_assembly)(struct sadmm_context *, struct sadmm_error *error);
+/* (16) and (17) of the iteration that was measured, into view.residual. */
+sadmm_status CUDA(enqueue_residuals)(struct sadmm_context *, struct sadmm_error *error);
+/* (15) by view.residual. */
+sadmm_status CUDA(enqueue_balance)(struct sadmm_context *, struct sadmm_error *error);
+
+/* ---- cuda_step.cu, cuda_step_kernels.cu ---- */
+
+void CUDA(step_destroy)(struct sadmm_context *);
+sadmm_status CUDA(launch_edits)(struct sadmm_context *, const struct sadmm_resident_edit *edits, size_t count,
+                                struct sadmm_error *error);
+sadmm_status CUDA(launch_start)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_admit)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_check)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_assembled)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_finish)(struct sadmm_context *, struct sadmm_error *error);
+
+/* ---- cuda_layout.cu -------------------------------------------------------------------------------------------------
+ * Counts and rooms in the view, then layout_room (it allocates); then per step, by enqueueing only: survey and layout of
+ * what view.raw_pairs, raw_points and raw.blocks point to. */
+
+sadmm_status CUDA(layout_room)(struct sadmm_context *, struct sadmm_error *error);
+/* The facts; islands: also which bodies hang together (what BLOCK and CLUSTER need). */
+sadmm_status CUDA(enqueue_survey)(struct sadmm_context *, bool islands, struct sadmm_error *error);
+/* Slots, offsets, incident, parts. A part that exceeds what the partition allows sets live->halt = HALT_PARTITION. */
+sadmm_status CUDA(enqueue_layout)(struct sadmm_context *, const struct cuda_partition *, struct sadmm_error *error);
 
 /* ---- cuda_iterate.cu, cuda_resident.cu ---- */
 

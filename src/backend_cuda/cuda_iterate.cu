@@ -22,12 +22,13 @@ template <bool JOIN> static __global__ void bodies_kernel(const __grid_constant_
     size_t at = live ? (size_t)i : 0;
     body_lane body = load_body(live, r, v.A + at * MATRIX, v.H + at * MATRIX, v.b + at * ROW, v.state + at * ROW);
     real g = free_momentum(body);
+    const real ratio = JOIN && args.rescaled ? (real)*v.ratio : (real)1;
     if (mine) {
         const int32_t slot = record_slot(r), end = v.offsets[i + 1];
 #pragma unroll 4
         for (int32_t h = v.offsets[i]; h < end; ++h) {
             size_t from = (size_t)v.incident[h] * ROW + (size_t)slot;
-            g += JOIN ? v.records[from] + args.ratio * v.change[from] : v.records[from];
+            g += JOIN ? v.records[from] + ratio * v.change[from] : v.records[from];
         }
     }
     move_body(&body, g);
@@ -213,9 +214,9 @@ static int64_t constraint_blocks(const struct sadmm_context *c)
 static sadmm_status launch_bodies(struct sadmm_context *c, bool join, struct sadmm_error *error)
 {
     cuda_args args = {};
-    args.ratio = (solver_real)c->ratio;
+    args.rescaled = c->rescaled;
     return CUDA(launch)(c, join ? bodies_kernel<true> : bodies_kernel<false>, "update_velocity",
-                        blocks_for((int64_t)c->view.bodies * LANES), 0, false, &args, error);
+                        blocks_for((int64_t)c->view.bodies * LANES), &args, error);
 }
 
 static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, struct sadmm_error *error)
@@ -224,7 +225,7 @@ static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, st
     cuda_kernel kernel = c->view.contact_rows == 1
                              ? (measure ? constraints_kernel<1, true> : constraints_kernel<1, false>)
                              : (measure ? constraints_kernel<3, true> : constraints_kernel<3, false>);
-    return CUDA(launch)(c, kernel, "update_constraints", constraint_blocks(c), 0, false, &args, error);
+    return CUDA(launch)(c, kernel, "update_constraints", constraint_blocks(c), &args, error);
 }
 
 static sadmm_status clear_primal(struct sadmm_context *c, bool measure, struct sadmm_error *error)
@@ -242,12 +243,12 @@ sadmm_status CUDA(prepare_stepwise)(struct sadmm_context *c, struct sadmm_error 
     cuda_args args = {};
     if (c->starting) {
         CUDA_TRY(CUDA(launch)(c, c->view.contact_rows == 1 ? start_kernel<1> : start_kernel<3>, "start_records",
-                              blocks_for((int64_t)c->view.pair_room + c->view.rows), 0, false, &args, error));
+                              blocks_for((int64_t)c->view.pair_room + c->view.rows), &args, error));
         c->starting = false;
     }
     if (c->weighed) return SADMM_OK;
     c->weighed = true;
-    return CUDA(launch)(c, weigh_kernel, "weigh_pairs", blocks_for(c->view.pair_room), 0, false, &args, error);
+    return CUDA(launch)(c, weigh_kernel, "weigh_pairs", blocks_for(c->view.pair_room), &args, error);
 }
 
 extern "C" sadmm_status CUDA(update_velocity)(struct sadmm_context *c, struct sadmm_error *error)
@@ -256,7 +257,7 @@ extern "C" sadmm_status CUDA(update_velocity)(struct sadmm_context *c, struct sa
     CUDA_TRY(CUDA(prepare_stepwise)(c, error));
     CUDA_TRY(launch_bodies(c, c->measured, error));
     c->measured = false;
-    c->ratio = 1;
+    c->rescaled = false;
     return SADMM_OK;
 }
 
@@ -319,8 +320,8 @@ static sadmm_status stream_iterations(struct sadmm_context *c, int count, bool m
         --count;
     }
     int plain = measure && count > 0 ? count - 1 : count;
-    if (plain >= GRAPH_ITERATIONS && !c->graph_valid) CUDA_TRY(make_graph(c, error));
-    for (; plain >= GRAPH_ITERATIONS; plain -= GRAPH_ITERATIONS, count -= GRAPH_ITERATIONS)
+    if (plain >= GRAPH_ITERATIONS && !c->recording && !c->graph_valid) CUDA_TRY(make_graph(c, error));
+    for (; plain >= GRAPH_ITERATIONS && !c->recording; plain -= GRAPH_ITERATIONS, count -= GRAPH_ITERATIONS)
         CUDA_CALL(c, cudaGraphLaunch(c->graph, c->stream), "cudaGraphLaunch");
     CUDA_TRY(plain_iterations(c, plain, error));
     if (count > plain) {
@@ -340,7 +341,7 @@ static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool
     args.count = count;
     args.measure = measure;
     args.join = c->measured;
-    args.ratio = (solver_real)c->ratio;
+    args.rescaled = c->rescaled;
     args.start = c->starting;
     args.most_bodies = partition->most_bodies;
     args.cluster = partition->cluster;
@@ -362,22 +363,26 @@ extern "C" sadmm_status CUDA(iterate)(struct sadmm_context *c, int count, bool m
     CUDA_TRY(c->partition.tier == SADMM_CUDA_TIER_STREAM ? stream_iterations(c, count, measure, error)
                                                : resident_iterations(c, count, measure, error));
     c->measured = measure;
-    c->ratio = 1;
+    c->rescaled = false;
     return SADMM_OK;
 }
 
 /* ---- residuals ------------------------------------------------------------------------------------------------ */
 
+sadmm_status CUDA(enqueue_residuals)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    CUDA_CALL(c, cudaMemsetAsync(c->view.residual + 1, 0, sizeof *c->view.residual, c->stream),
+              "cudaMemsetAsync(residual)");
+    return CUDA(launch)(c, dual_kernel, "measure_residuals", blocks_for((int64_t)c->view.bodies * LANES), &args, error);
+}
+
 extern "C" sadmm_status CUDA(measure_residuals)(struct sadmm_context *c, struct sadmm_residual *residual,
                                                 struct sadmm_error *error)
 {
-    cuda_args args = {};
     double both[2];
     CUDA_ENTER(c);
-    CUDA_CALL(c, cudaMemsetAsync(c->view.residual + 1, 0, sizeof *c->view.residual, c->stream),
-              "cudaMemsetAsync(residual)");
-    CUDA_TRY(CUDA(launch)(c, dual_kernel, "measure_residuals", blocks_for((int64_t)c->view.bodies * LANES), 0, false,
-                          &args, error));
+    CUDA_TRY(CUDA(enqueue_residuals)(c, error));
     CUDA_TRY(CUDA(download)(c, c->view.residual, sizeof both, error));
     memcpy(both, c->buffers[PINNED_OUT].data, sizeof both);
     residual->primal = both[0];

@@ -1,221 +1,185 @@
-/* begin: room for the step, facts, the partition, slots, the body -> record list and the parts (cuda_internal.h). */
+/* begin: room for the step, raw data to the device, the survey, the tier and the layout (cuda_layout.h). */
 #include <string.h>
 
-#include "../core/memory.h"
 #include "cuda_internal.h"
 
-/* ---- islands --------------------------------------------------------------------------------------------------- */
-
-/* Bodies and halves of an island, then those before it. */
-struct island {
-    int32_t body, half;
+/* Live counts and facts, side by side in device memory and in the staging buffer. */
+struct known {
+    struct cuda_live live;
+    struct cuda_facts facts;
 };
 
-static int32_t find_root(int32_t *parent, int32_t i)
-{
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-}
-
-static void join_bodies(int32_t *parent, int32_t a, int32_t b)
-{
-    if (a < 0 || b < 0) return;
-    a = find_root(parent, a);
-    b = find_root(parent, b);
-    if (a < b) parent[b] = a; /* the root is the island's first body */
-    else parent[a] = b;
-}
-
-/* Where the layout's arrays are in its one buffer, in order. */
-struct layout {
-    int32_t *body_of, *slot_of, *offsets, *incident, *parts;
+struct wanted_room {
+    enum cuda_buffer_name name;
     size_t bytes;
 };
 
-static struct layout lay_out(void *base, size_t n, size_t records, size_t parts)
+template <size_t N>
+static sadmm_status make_room(struct sadmm_context *c, const wanted_room (&wanted)[N], struct sadmm_error *error)
 {
-    struct layout l;
-    l.body_of = (int32_t *)base;
-    l.slot_of = l.body_of + n;
-    l.offsets = l.slot_of + n;
-    l.incident = l.offsets + n + 1;
-    l.parts = l.incident + 2 * records;
-    l.bytes = (3 * n + 1 + 2 * records + parts + 1) * sizeof(int32_t);
-    return l;
+    for (const wanted_room &one : wanted) CUDA_TRY(CUDA(room)(c, one.name, one.bytes, error));
+    return SADMM_OK;
 }
 
-/* ---- the constraint graph --------------------------------------------------------------------------------------- */
+/* ---- the layout's room and stages -------------------------------------------------------------------------------- */
 
-static int32_t larger(int32_t a, int32_t b) { return a > b ? a : b; }
-
-/* The bodies of constraint i, pairs first, then row blocks; its record. */
-static int32_t bodies_of(const struct sadmm_context *c, size_t i, int32_t bodies[2])
+/* Clusters of a block or more for every island, and as many blocks as the device can hold at once. */
+static int64_t most_parts(const struct sadmm_context *c)
 {
-    size_t pairs = c->system->contacts->pair_count;
-    if (i < pairs) {
-        bodies[0] = c->system->contacts->pairs[i].body_a;
-        bodies[1] = c->system->contacts->pairs[i].body_b;
-        return (int32_t)i;
-    }
-    bodies[0] = c->system->blocks[i - pairs].body_a;
-    bodies[1] = c->system->blocks[i - pairs].body_b;
-    return c->view.pair_room + (int32_t)(i - pairs);
+    return (int64_t)c->view.bodies + (int64_t)c->multiprocessors * (2048 / WARP);
 }
 
-static size_t constraints(const struct sadmm_context *c)
+/* The arrays in one buffer, in order; returns their bytes. base NULL: only that. */
+static size_t place_arrays(const struct sadmm_context *c, int32_t *base, struct layout_view *l)
 {
-    return c->system->contacts->pair_count + (size_t)c->system->block_count;
+    size_t n = (size_t)l->bodies, halves = 2 * ((size_t)l->pair_room + (size_t)l->rows), used = 0;
+    auto take = [&](size_t count) {
+        size_t at = used;
+        used += (count + 3) / 4 * 4; /* each begins at 16 bytes */
+        return base ? base + at : nullptr;
+    };
+    l->label = take(n);
+    l->degree = take(n);
+    l->island_bodies = take(n);
+    l->island_halves = take(n);
+    l->sorted_label = take(n);
+    l->body_of = take(n);
+    l->slot_of = take(n);
+    l->offsets = take(n + 1);
+    l->half_body = take(halves);
+    l->half_slot = take(halves);
+    l->sorted = take(halves);
+    l->incident = take(halves);
+    l->parts = take((size_t)most_parts(c) + 1);
+    return used * sizeof(int32_t);
 }
 
-static bool is_warm(const struct sadmm_contact_set *contacts, const struct sadmm_contact_pair *pair)
+/* 0, 1, ...: values of the sorts, the same in every step. */
+static sadmm_status number(struct sadmm_context *c, size_t count, struct sadmm_error *error)
 {
-    for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
-        for (int i = 0; i < 3; ++i)
-            if (contacts->points[k].impulse[i] != 0) return true;
-    return false;
+    cuda_buffer *numbers = &c->buffers[BUFFER_NUMBERS];
+    size_t before = numbers->capacity;
+    CUDA_TRY(CUDA(room)(c, BUFFER_NUMBERS, count * sizeof(int32_t), error));
+    if (numbers->capacity == before && c->numbered) return SADMM_OK;
+    c->numbered = false;
+    CUDA_CALL(c, LAYOUT(number)((int32_t *)numbers->data, (int32_t)(numbers->capacity / sizeof(int32_t)), c->stream,
+                                &c->kernel),
+              c->kernel);
+    c->numbered = true;
+    return SADMM_OK;
 }
 
-/* Facts, and the islands, numbered by their first body: counts in islands[island + 1]. */
-static void survey(struct sadmm_context *c)
+sadmm_status CUDA(layout_room)(struct sadmm_context *c, struct sadmm_error *error)
 {
-    struct cuda_scratch *s = &c->scratch;
-    struct cuda_facts *facts = &c->facts;
-    const struct sadmm_contact_set *contacts = c->system->contacts;
-    int32_t n = c->plan.bodies, bodies[2], part_halves = facts->part_halves, part_bodies = facts->part_bodies;
-    memset(facts, 0, sizeof *facts);
-    facts->part_halves = part_halves;
-    facts->part_bodies = part_bodies;
-    for (size_t p = 0; p < contacts->pair_count; ++p) {
-        facts->point_slots = larger(facts->point_slots, contacts->pairs[p].count);
-        facts->rough += contacts->pairs[p].friction > 0;
-        facts->warm += is_warm(contacts, &contacts->pairs[p]);
-    }
-    for (int32_t i = 0; i < n; ++i) s->parent[i] = i;
-    memset(s->cursor, 0, ((size_t)n + 1) * sizeof *s->cursor);
-    for (size_t k = 0; k < constraints(c); ++k) {
-        bodies_of(c, k, bodies);
-        join_bodies(s->parent, bodies[0], bodies[1]);
-        for (int side = 0; side < 2; ++side)
-            if (bodies[side] >= 0) ++s->cursor[bodies[side]];
-    }
-    memset(s->islands, 0, ((size_t)n + 2) * sizeof *s->islands);
-    for (int32_t i = 0; i < n; ++i) {
-        int32_t root = find_root(s->parent, i);
-        s->island_of[i] = root == i ? facts->islands++ : s->island_of[root];
-        struct island *one = &s->islands[s->island_of[i] + 1];
-        ++one->body;
-        one->half += s->cursor[i];
-        facts->degree = larger(facts->degree, s->cursor[i]);
-        facts->halves += s->cursor[i];
-        facts->island_bodies = larger(facts->island_bodies, one->body);
-        facts->island_halves = larger(facts->island_halves, one->half);
-    }
-    for (int32_t i = 0; i < facts->islands; ++i) {
-        s->islands[i + 1].body += s->islands[i].body;
-        s->islands[i + 1].half += s->islands[i].half;
-    }
+    cuda_view *v = &c->view;
+    struct layout_view *l = &c->layout;
+    size_t halves = 2 * ((size_t)v->pair_room + (size_t)v->rows), temp = 0;
+    l->bodies = v->bodies;
+    l->pair_room = v->pair_room;
+    l->rows = v->rows;
+    l->warm_start = v->warm_start;
+    l->most_blocks = c->multiprocessors * (2048 / LAYOUT_THREADS);
+    CUDA_CALL(c, LAYOUT(temp_bytes)(v->bodies, (int32_t)halves, &temp), "sizing of the layout's sorts");
+    const wanted_room wanted[] = {
+        {BUFFER_LIVE, sizeof(known)},
+        {PINNED_LIVE, sizeof(known)},
+        {BUFFER_LAYOUT, place_arrays(c, nullptr, l)},
+        {BUFFER_SORT, temp},
+    };
+    CUDA_TRY(make_room(c, wanted, error));
+    CUDA_TRY(number(c, halves > (size_t)v->bodies ? halves : (size_t)v->bodies, error));
+    place_arrays(c, (int32_t *)c->buffers[BUFFER_LAYOUT].data, l);
+    l->numbers = (const int32_t *)c->buffers[BUFFER_NUMBERS].data;
+    l->temp = c->buffers[BUFFER_SORT].data;
+    l->temp_bytes = c->buffers[BUFFER_SORT].capacity;
+    v->live = l->live = &((known *)c->buffers[BUFFER_LIVE].data)->live;
+    v->facts = l->facts = &((known *)c->buffers[BUFFER_LIVE].data)->facts;
+    v->body_of = l->body_of;
+    v->slot_of = l->slot_of;
+    v->offsets = l->offsets;
+    v->incident = l->incident;
+    v->parts = l->parts;
+    return SADMM_OK;
 }
 
-/* ---- slots, lists and parts ------------------------------------------------------------------------------------- */
-
-static bool by_island(enum sadmm_cuda_tier tier)
+/* Contacts may have been found on the device: the view says where they are. */
+static void bind_raw(struct sadmm_context *c)
 {
-    return tier == SADMM_CUDA_TIER_BLOCK || tier == SADMM_CUDA_TIER_CLUSTER;
+    c->layout.pairs = c->view.raw_pairs;
+    c->layout.points = c->view.raw_points;
+    c->layout.blocks = c->view.raw.blocks;
 }
 
-/* Slots by island, in raw order within each (a stable counting sort), or in raw order. */
-static void number_slots(struct sadmm_context *c, const struct layout *l)
+sadmm_status CUDA(enqueue_survey)(struct sadmm_context *c, bool islands, struct sadmm_error *error)
 {
-    struct cuda_scratch *s = &c->scratch;
-    bool islands = by_island(c->partition.tier);
-    for (int32_t i = 0; i < c->facts.islands; ++i) s->cursor[i] = s->islands[i].body;
-    for (int32_t i = 0; i < c->plan.bodies; ++i) {
-        int32_t slot = islands ? s->cursor[s->island_of[i]]++ : i;
-        l->body_of[slot] = i;
-        l->slot_of[i] = slot;
-    }
+    bind_raw(c);
+    CUDA_CALL(c, LAYOUT(survey)(&c->layout, islands, c->stream, &c->kernel), c->kernel);
+    return SADMM_OK;
 }
 
-/* Counting sort of record halves by body; records ascend within a body. */
-static void list_incident(struct sadmm_context *c, const struct layout *l)
+sadmm_status CUDA(enqueue_layout)(struct sadmm_context *c, const struct cuda_partition *partition,
+                                  struct sadmm_error *error)
 {
-    size_t n = (size_t)c->plan.bodies;
-    int32_t *cursor = c->scratch.cursor, bodies[2];
-    memset(l->offsets, 0, (n + 1) * sizeof *l->offsets);
-    for (size_t k = 0; k < constraints(c); ++k) {
-        bodies_of(c, k, bodies);
-        for (int side = 0; side < 2; ++side)
-            if (bodies[side] >= 0) ++l->offsets[l->slot_of[bodies[side]] + 1];
-    }
-    for (size_t i = 0; i < n; ++i) l->offsets[i + 1] += l->offsets[i];
-    memcpy(cursor, l->offsets, n * sizeof *cursor);
-    for (size_t k = 0; k < constraints(c); ++k) {
-        int32_t record = bodies_of(c, k, bodies);
-        for (int side = 0; side < 2; ++side)
-            if (bodies[side] >= 0) l->incident[cursor[l->slot_of[bodies[side]]]++] = 2 * record + side;
-    }
-}
-
-/* First slot from `slot` on, an island's first one when `heads`, whose cost before it is at least share / shares of all. */
-static int32_t boundary(const struct sadmm_context *c, const struct layout *l, bool heads, int32_t slot, int32_t share,
-                        int32_t shares)
-{
-    int32_t n = c->plan.bodies;
-    const int32_t *island_of = c->scratch.island_of, *body_of = l->body_of;
-    int64_t total = (int64_t)l->offsets[n] + n, target = (total * share + shares - 1) / shares;
-    while (slot < n && (l->offsets[slot] + (int64_t)slot < target ||
-                        (heads && slot > 0 && island_of[body_of[slot]] == island_of[body_of[slot - 1]])))
-        ++slot;
-    return slot;
-}
-
-/* Parts by cost, halves + bodies: BLOCK islands in even shares, GRID bodies in even shares; CLUSTER shares of islands, each
- * in even shares of its bodies. */
-static void divide(struct sadmm_context *c, const struct layout *l)
-{
-    const struct cuda_partition *partition = &c->partition;
-    int32_t parts = partition->parts, cluster = partition->cluster, clusters = parts / cluster, n = c->plan.bodies;
-    c->facts.part_halves = c->facts.part_bodies = 0;
-    l->parts[0] = 0;
-    for (int32_t k = 0; k < clusters; ++k) {
-        int32_t *of = l->parts + k * cluster, begin = of[0];
-        int32_t end = k + 1 == clusters ? n : boundary(c, l, by_island(partition->tier), begin, k + 1, clusters);
-        int64_t before = (int64_t)l->offsets[begin] + begin, total = (int64_t)l->offsets[end] + end - before;
-        of[cluster] = end;
-        for (int32_t j = 1; j < cluster; ++j) {
-            int64_t target = before + (total * j + cluster - 1) / cluster;
-            of[j] = of[j - 1];
-            while (of[j] < end && (int64_t)l->offsets[of[j]] + of[j] < target) ++of[j];
-        }
-    }
-    for (int32_t p = 0; p < parts; ++p) {
-        int32_t halves = l->offsets[l->parts[p + 1]] - l->offsets[l->parts[p]], bodies = l->parts[p + 1] - l->parts[p];
-        c->facts.part_halves = larger(c->facts.part_halves, halves);
-        c->facts.part_bodies = larger(c->facts.part_bodies, bodies);
-    }
+    if (partition->tier != SADMM_CUDA_TIER_STREAM &&
+        (partition->parts < 1 || partition->parts > most_parts(c) || partition->cluster < 1 ||
+         partition->parts % partition->cluster != 0))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "partition: parts = %d: must be in [1, %lld] and a multiple of cluster = %d >= 1",
+                          partition->parts, (long long)most_parts(c), partition->cluster);
+    CUDA_CALL(c, LAYOUT(make)(&c->layout, partition, c->stream, &c->kernel), c->kernel);
+    return SADMM_OK;
 }
 
 /* ---- room ------------------------------------------------------------------------------------------------------- */
 
-enum { SCALARS = 128 }; /* bytes: residuals, barrier, live */
+/* Raw data, as core has it. Bodies: rigid, or A then b; then velocities. Blocks, then their multipliers. */
+static sadmm_status raw_room(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_view *v = &c->view;
+    size_t n = (size_t)v->bodies, rows = (size_t)v->rows;
+    size_t body = c->plan.rigid ? sizeof(struct sadmm_rigid) : 42 * sizeof(double);
+    size_t bodies = n * (body + 6 * sizeof(double)), pairs = (size_t)v->pair_room * sizeof(struct sadmm_contact_pair);
+    size_t points = (size_t)v->points * sizeof(struct sadmm_contact_point);
+    size_t blocks = rows * (sizeof(struct sadmm_problem_block) + 6 * sizeof(double));
+    const wanted_room wanted[] = {
+        {BUFFER_RAW_BODIES, bodies},
+        {BUFFER_RAW_PAIRS, pairs},
+        {BUFFER_RAW_POINTS, points},
+        {BUFFER_RAW_BLOCKS, blocks},
+        {PINNED_BODIES, bodies},
+        {PINNED_PAIRS, pairs},
+        {PINNED_POINTS, points},
+        {PINNED_BLOCKS, blocks},
+    };
+    CUDA_TRY(make_room(c, wanted, error));
+    void *const none = nullptr;
+    cuda_buffer *b = c->buffers;
+    v->raw = *c->system;
+    v->raw.contacts = nullptr;
+    char *raw = (char *)b[BUFFER_RAW_BODIES].data;
+    v->raw.rigid = (const struct sadmm_rigid *)(c->plan.rigid ? raw : none);
+    v->raw.A = (const double *)(c->plan.rigid ? none : raw);
+    v->raw.b = c->plan.rigid ? nullptr : v->raw.A + 36 * n;
+    v->raw.velocity = (double *)(raw + n * body);
+    raw = (char *)b[BUFFER_RAW_BLOCKS].data;
+    v->raw.blocks = (const struct sadmm_problem_block *)raw;
+    v->raw.block_lambda = (double *)(raw + rows * sizeof(struct sadmm_problem_block));
+    v->raw_pairs = (struct sadmm_contact_pair *)b[BUFFER_RAW_PAIRS].data;
+    v->raw_points = (struct sadmm_contact_point *)b[BUFFER_RAW_POINTS].data;
+    return SADMM_OK;
+}
 
-static sadmm_status device_room(struct sadmm_context *c, struct sadmm_error *error)
+/* This precision's data, once the facts are known. */
+sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_view *v = &c->view;
     size_t n = (size_t)v->bodies, pairs = (size_t)v->pair_room, rows = (size_t)v->row_stride,
            real_size = sizeof(solver_real);
     size_t slots = (size_t)c->facts.point_slots * pairs, records = (pairs + (size_t)v->rows) * RECORD * real_size;
-    size_t points = (size_t)c->plan.points;
+    size_t points = (size_t)v->points;
     bool three = v->contact_rows != 1;
-    size_t raw_body = c->plan.rigid ? sizeof(struct sadmm_rigid) : 42 * sizeof(double);
-    size_t raw_bodies = n * (raw_body + 6 * sizeof(double)), raw_pairs = pairs * sizeof(struct sadmm_contact_pair);
-    size_t raw_points = points * sizeof(struct sadmm_contact_point);
-    size_t raw_blocks = (size_t)v->rows * (sizeof(struct sadmm_problem_block) + 6 * sizeof(double));
     size_t out = (13 * n + 3 * points + 6 * (size_t)v->rows + 2) * sizeof(double);
-    const struct {
-        enum cuda_buffer_name name;
-        size_t bytes;
-    } wanted[] = {
+    const wanted_room wanted[] = {
         {BUFFER_STATE, (n + 1) * ROW * real_size},
         {BUFFER_B, n * ROW * real_size},
         {BUFFER_A, n * MATRIX * real_size},
@@ -233,19 +197,11 @@ static sadmm_status device_room(struct sadmm_context *c, struct sadmm_error *err
         {BUFFER_RECORDS, records},
         {BUFFER_CHANGE, c->plan.residuals ? records : 0},
         {BUFFER_EXCHANGE, c->partition.tier == SADMM_CUDA_TIER_GRID ? 2 * n * ROW * real_size : 0},
-        {BUFFER_SCALARS, SCALARS},
-        {BUFFER_RAW_BODIES, raw_bodies},
-        {BUFFER_RAW_PAIRS, raw_pairs},
-        {BUFFER_RAW_POINTS, raw_points},
-        {BUFFER_RAW_BLOCKS, raw_blocks},
+        {BUFFER_SCALARS, 64},
         {BUFFER_OUT, out},
-        {PINNED_BODIES, raw_bodies},
-        {PINNED_PAIRS, raw_pairs},
-        {PINNED_POINTS, raw_points},
-        {PINNED_BLOCKS, raw_blocks},
         {PINNED_OUT, out},
     };
-    for (const auto &one : wanted) CUDA_TRY(CUDA(room)(c, one.name, one.bytes, error));
+    CUDA_TRY(make_room(c, wanted, error));
 
     void *const none = nullptr;
     cuda_buffer *b = c->buffers;
@@ -266,45 +222,25 @@ static sadmm_status device_room(struct sadmm_context *c, struct sadmm_error *err
     v->row_data = (solver_real *)b[BUFFER_ROW_DATA].data;
     v->records = (solver_real *)b[BUFFER_RECORDS].data;
     v->change = (solver_real *)(c->plan.residuals ? b[BUFFER_CHANGE].data : none);
-    v->residual = (unsigned long long *)b[BUFFER_SCALARS].data;
-    v->barrier = (unsigned *)(v->residual + 4); /* a sector of its own */
-    v->live = (struct cuda_live *)(v->residual + 8);
     v->exchange = (solver_real *)b[BUFFER_EXCHANGE].data;
-    v->raw_pairs = (struct sadmm_contact_pair *)b[BUFFER_RAW_PAIRS].data;
-    v->raw_points = (struct sadmm_contact_point *)b[BUFFER_RAW_POINTS].data;
+    v->residual = (unsigned long long *)b[BUFFER_SCALARS].data;
+    v->ratio = (double *)(v->residual + 2);
+    v->barrier = (unsigned *)(v->residual + 4); /* a sector of its own */
     v->out = (double *)b[BUFFER_OUT].data;
-
-    /* Raw bodies: rigid, or A then b; then velocities. Raw blocks: blocks, then multipliers. */
-    v->raw = *c->system;
-    v->raw.contacts = nullptr;
-    char *raw = (char *)b[BUFFER_RAW_BODIES].data;
-    v->raw.rigid = (const struct sadmm_rigid *)(c->plan.rigid ? raw : none);
-    v->raw.A = (const double *)(c->plan.rigid ? none : raw);
-    v->raw.b = c->plan.rigid ? nullptr : v->raw.A + 36 * n;
-    v->raw.velocity = (double *)(raw + n * raw_body);
-    raw = (char *)b[BUFFER_RAW_BLOCKS].data;
-    v->raw.blocks = (const struct sadmm_problem_block *)raw;
-    v->raw.block_lambda = (double *)(raw + (size_t)v->rows * sizeof(struct sadmm_problem_block));
+    CUDA_CALL(c, cudaMemsetAsync(v->residual, 0, 64, c->stream), "cudaMemsetAsync(scalars)");
+    CUDA_CALL(c, cudaMemsetAsync(v->state + n * ROW, 0, ROW * real_size, c->stream), "cudaMemsetAsync(static world)");
     return SADMM_OK;
 }
 
-static sadmm_status host_room(struct sadmm_context *c, struct sadmm_error *error)
-{
-    struct cuda_scratch *s = &c->scratch;
-    size_t n = (size_t)c->plan.bodies;
-    bool ok = sadmm_grow((void **)&s->parent, &s->parent_capacity, 0, n, sizeof *s->parent) &&
-              sadmm_grow((void **)&s->island_of, &s->island_of_capacity, 0, n, sizeof *s->island_of) &&
-              sadmm_grow((void **)&s->islands, &s->islands_capacity, 0, n + 2, sizeof *s->islands) &&
-              sadmm_grow((void **)&s->cursor, &s->cursor_capacity, 0, n + 1, sizeof *s->cursor);
-    return ok ? SADMM_OK : sadmm_fail_memory(error, "the cuda backend's step");
-}
+/* ---- begin ------------------------------------------------------------------------------------------------------ */
 
-/* The view's counts; the graph stays valid only while nothing in the view moves. */
+/* The view's counts. */
 static void count(struct sadmm_context *c)
 {
     cuda_view *v = &c->view;
     v->bodies = c->plan.bodies;
     v->pair_room = (c->plan.pairs + WARP - 1) / WARP * WARP;
+    v->points = c->plan.points;
     v->rows = c->system->block_count;
     v->row_stride = (v->rows + WARP - 1) / WARP * WARP;
     v->contact_rows = c->plan.contact_rows;
@@ -312,47 +248,67 @@ static void count(struct sadmm_context *c)
     v->settings = c->settings;
 }
 
-static sadmm_status lay_out_step(struct sadmm_context *c, struct sadmm_error *error)
+static sadmm_status upload_live(struct sadmm_context *c, enum cuda_halt halt, struct sadmm_error *error)
 {
-    size_t n = (size_t)c->view.bodies;
-    survey(c);
-    CUDA_TRY(CUDA(choose_partition)(c, &c->facts, &c->partition, error));
-    size_t bytes = lay_out(nullptr, n, constraints(c), (size_t)c->partition.parts).bytes;
-    CUDA_TRY(CUDA(room)(c, PINNED_LAYOUT, bytes + sizeof(struct cuda_live), error));
-    CUDA_TRY(CUDA(room)(c, BUFFER_LAYOUT, bytes, error));
-    struct layout host = lay_out(c->buffers[PINNED_LAYOUT].data, n, constraints(c), (size_t)c->partition.parts);
-    number_slots(c, &host);
-    list_incident(c, &host);
-    if (c->partition.parts > 0) divide(c, &host);
+    const struct cuda_live live = {halt, c->plan.bodies, c->plan.pairs, c->plan.points};
+    return CUDA(upload)(c, c->view.live, PINNED_LIVE, 0, &live, sizeof live, error);
+}
 
-    struct layout device = lay_out(c->buffers[BUFFER_LAYOUT].data, n, constraints(c), (size_t)c->partition.parts);
-    CUDA_CALL(c, cudaMemcpyAsync(device.body_of, host.body_of, bytes, cudaMemcpyHostToDevice, c->stream),
-              "cudaMemcpyAsync(layout)");
-    c->view.body_of = device.body_of;
-    c->view.slot_of = device.slot_of;
-    c->view.offsets = device.offsets;
-    c->view.incident = device.incident;
-    c->view.parts = device.parts;
+static sadmm_status upload_raw(struct sadmm_context *c, struct sadmm_error *error)
+{
+    const struct sadmm_system *system = c->system;
+    const struct sadmm_contact_set *contacts = system->contacts;
+    const cuda_view *v = &c->view;
+    size_t blocks = (size_t)v->rows * sizeof *system->blocks;
+    CUDA_TRY(CUDA(upload)(c, (void *)v->raw_pairs, PINNED_PAIRS, 0, contacts->pairs,
+                          contacts->pair_count * sizeof *contacts->pairs, error));
+    CUDA_TRY(CUDA(upload)(c, (void *)v->raw_points, PINNED_POINTS, 0, contacts->points,
+                          contacts->point_count * sizeof *contacts->points, error));
+    CUDA_TRY(CUDA(upload)(c, (void *)v->raw.blocks, PINNED_BLOCKS, 0, system->blocks, blocks, error));
+    return CUDA(upload)(c, v->raw.block_lambda, PINNED_BLOCKS, blocks, system->block_lambda,
+                        6 * (size_t)v->rows * sizeof(double), error);
+}
+
+/* Wait for what the device knows now. */
+static sadmm_status download_known(struct sadmm_context *c, struct known *out, struct sadmm_error *error)
+{
+    CUDA_CALL(c, cudaMemcpyAsync(c->buffers[PINNED_LIVE].data, c->view.live, sizeof *out, cudaMemcpyDeviceToHost,
+                                 c->stream),
+              "cudaMemcpyAsync from the device");
+    CUDA_TRY(CUDA(wait)(c, error));
+    memcpy(out, c->buffers[PINNED_LIVE].data, sizeof *out);
     return SADMM_OK;
 }
 
-static sadmm_status upload_live(struct sadmm_context *c, struct sadmm_error *error)
+/* Parts that turn out to be too large: STREAM has none. */
+static sadmm_status lay_out(struct sadmm_context *c, struct sadmm_error *error)
 {
-    struct cuda_live live = {HALT_NONE, c->plan.bodies, c->plan.pairs, c->plan.points};
-    if (c->facts.part_halves > c->partition.most_halves || c->facts.part_bodies > c->partition.most_bodies)
-        live.halt = HALT_PARTITION;
-    size_t at = c->buffers[PINNED_LAYOUT].capacity - sizeof live; /* beyond the layout */
-    return CUDA(upload)(c, c->view.live, PINNED_LAYOUT, at, &live, sizeof live, error);
+    struct cuda_partition *partition = &c->partition;
+    struct known known;
+    CUDA_TRY(CUDA(enqueue_layout)(c, partition, error));
+    if (partition->tier == SADMM_CUDA_TIER_STREAM) return SADMM_OK;
+    CUDA_TRY(download_known(c, &known, error));
+    c->facts = known.facts;
+    if (known.live.halt == HALT_NONE) return SADMM_OK;
+    if (c->wanted != SADMM_CUDA_TIER_AUTO)
+        return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED,
+                          "the cuda tier asked for: a thread block would get %d halves and %d bodies: at most %d and %d",
+                          known.facts.part_halves, known.facts.part_bodies, partition->most_halves,
+                          partition->most_bodies);
+    *partition = {};
+    partition->tier = SADMM_CUDA_TIER_STREAM;
+    CUDA_TRY(upload_live(c, HALT_NONE, error));
+    return CUDA(enqueue_layout)(c, partition, error);
 }
 
 extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_system *system,
                                     const struct sadmm_plan *plan, const struct sadmm_settings *settings,
                                     struct sadmm_error *error)
 {
-    int64_t records = (int64_t)plan->pairs + system->block_count;
+    int64_t records = (int64_t)plan->pairs + system->block_count + WARP;
     if (records > INT32_MAX / (2 * RECORD))
-        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%lld constraints: at most %d", (long long)records,
-                          INT32_MAX / (2 * RECORD));
+        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%lld constraints: at most %d", (long long)(records - WARP),
+                          INT32_MAX / (2 * RECORD) - WARP);
     if (plan->bodies > INT32_MAX / MATRIX - 1)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d bodies: at most %d", plan->bodies, INT32_MAX / MATRIX - 1);
     CUDA_ENTER(c);
@@ -360,18 +316,78 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
     c->system = system;
     c->plan = *plan;
     c->settings = *settings;
-    c->blocks_uploaded = false;
     c->starting = true;
-    c->weighed = false;
-    c->measured = false;
-    c->ratio = 1;
+    c->weighed = c->measured = c->rescaled = false;
+    c->refused = 0;
     c->graph_valid = false;
     count(c);
-    CUDA_TRY(host_room(c, error));
-    CUDA_TRY(lay_out_step(c, error));
-    CUDA_TRY(device_room(c, error));
-    CUDA_CALL(c, cudaMemsetAsync(c->view.residual, 0, SCALARS, c->stream), "cudaMemsetAsync(scalars)");
-    CUDA_CALL(c, cudaMemsetAsync(c->view.state + (size_t)plan->bodies * ROW, 0, ROW * sizeof(solver_real), c->stream),
-              "cudaMemsetAsync(static world)");
-    return upload_live(c, error);
+    CUDA_TRY(raw_room(c, error));
+    CUDA_TRY(CUDA(layout_room)(c, error));
+    CUDA_TRY(upload_raw(c, error));
+    CUDA_TRY(upload_live(c, HALT_NONE, error));
+    bool islands = c->wanted != SADMM_CUDA_TIER_GRID && c->wanted != SADMM_CUDA_TIER_STREAM;
+    struct known known;
+    CUDA_TRY(CUDA(enqueue_survey)(c, islands, error));
+    CUDA_TRY(download_known(c, &known, error));
+    c->facts = known.facts;
+    CUDA_TRY(CUDA(choose_partition)(c, &c->facts, &c->partition, error));
+    CUDA_TRY(CUDA(solver_room)(c, error));
+    return lay_out(c, error);
+}
+
+/* ---- for tests --------------------------------------------------------------------------------------------------- */
+
+static sadmm_status enqueue_all(struct sadmm_context *c, const struct cuda_partition *partition,
+                                struct sadmm_error *error)
+{
+    CUDA_TRY(CUDA(enqueue_survey)(c, true, error));
+    return CUDA(enqueue_layout)(c, partition, error);
+}
+
+/* Survey and layout as a graph, launched twice: captured, nothing may depend on when it runs or what ran before. */
+static sadmm_status run_graph(struct sadmm_context *c, const struct cuda_partition *partition, struct sadmm_error *error)
+{
+    cudaGraph_t graph = nullptr;
+    cudaGraphExec_t ready = nullptr;
+    CUDA_CALL(c, cudaStreamBeginCapture(c->stream, cudaStreamCaptureModeThreadLocal), "cudaStreamBeginCapture");
+    sadmm_status status = enqueue_all(c, partition, error);
+    CUDA_CALL(c, cudaStreamEndCapture(c->stream, &graph), "cudaStreamEndCapture");
+    if (status == SADMM_OK) {
+        cudaError_t code = cudaGraphInstantiate(&ready, graph, 0);
+        for (int i = 0; i < 2 && code == cudaSuccess; ++i) code = cudaGraphLaunch(ready, c->stream);
+        if (code != cudaSuccess) status = CUDA(fail)(c, code, "a graph of the layout", error);
+    }
+    if (status == SADMM_OK) status = CUDA(wait)(c, error);
+    if (ready) cudaGraphExecDestroy(ready);
+    if (graph) cudaGraphDestroy(graph);
+    return status;
+}
+
+extern "C" sadmm_status CUDA(lay_out_again)(struct sadmm_context *c, const struct cuda_partition *partition,
+                                            enum cuda_halt halt, bool graph, struct cuda_layout_copy *out,
+                                            struct sadmm_error *error)
+{
+    const cuda_view *v = &c->view;
+    struct known known;
+    CUDA_ENTER(c);
+    CUDA_TRY(CUDA(wait)(c, error));
+    CUDA_TRY(upload_live(c, halt, error));
+    CUDA_TRY(graph ? run_graph(c, partition, error) : enqueue_all(c, partition, error));
+    CUDA_TRY(download_known(c, &known, error));
+    out->live = known.live;
+    out->facts = known.facts;
+    size_t n = (size_t)v->bodies, halves = known.facts.halves >= 0 ? (size_t)known.facts.halves : 0,
+           parts = partition->tier == SADMM_CUDA_TIER_STREAM ? 0 : (size_t)partition->parts + 1;
+    const struct {
+        int32_t *to;
+        const int32_t *from;
+        size_t count;
+    } arrays[] = {{out->body_of, v->body_of, n},    {out->slot_of, v->slot_of, n},     {out->offsets, v->offsets, n + 1},
+                  {out->incident, v->incident, halves}, {out->parts, v->parts, parts}};
+    for (const auto &one : arrays) {
+        CUDA_TRY(CUDA(room)(c, PINNED_OUT, one.count * sizeof(int32_t), error));
+        CUDA_TRY(CUDA(download)(c, one.from, one.count * sizeof(int32_t), error));
+        if (one.count > 0) memcpy(one.to, c->buffers[PINNED_OUT].data, one.count * sizeof(int32_t));
+    }
+    return SADMM_OK;
 }

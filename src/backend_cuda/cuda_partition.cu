@@ -70,6 +70,7 @@ static const char *choose_block(const struct sadmm_context *c, const struct cuda
                                 struct cuda_partition *partition)
 {
     static const char too_large[] = "an island does not fit a thread block";
+    if (c->refused >> SADMM_CUDA_TIER_BLOCK & 1) return "a thread block would get too much";
     const int64_t most = CUDA(resident_threads)(facts->point_slots), most_halves = most / QUAD;
     if (facts->island_halves > most_halves) return too_large;
     /* As many blocks a multiprocessor as run side by side and find an island each; when that is too few for the room a
@@ -98,6 +99,7 @@ static const char *choose_grid(const struct sadmm_context *c, const struct cuda_
 {
     static const char too_many[] = "more constraints than the device can hold at once";
     const char *name = nullptr;
+    if (c->refused >> SADMM_CUDA_TIER_GRID & 1) return "a thread block would get too much";
     const int64_t most = CUDA(resident_threads)(facts->point_slots), cost = (int64_t)facts->halves + c->view.bodies;
     if (!c->cooperative) return "the device has no cooperative launch";
     int64_t parts = larger(smaller(c->multiprocessors, up(cost, SPREAD)), 1);

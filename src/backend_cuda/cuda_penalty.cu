@@ -114,7 +114,13 @@ static __global__ void factorize_kernel(const __grid_constant__ cuda_view v, con
 static __global__ void scale_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     int32_t i = thread_index();
-    if (i < live_bodies(v)) v.beta[i] *= args.factor;
+    if (i >= live_bodies(v)) return;
+    double ratio = args.factor;
+    if (args.measure) /* by the residuals */
+        ratio = sadmm_penalty_ratio(__longlong_as_double((long long)v.residual[0]),
+                                    __longlong_as_double((long long)v.residual[1]), v.settings.penalty_ratio_limit);
+    v.beta[i] *= ratio;
+    if (i == 0) *v.ratio = ratio;
 }
 
 /* ---- entries --------------------------------------------------------------------------------------------------- */
@@ -125,8 +131,8 @@ extern "C" sadmm_status CUDA(init_penalty)(struct sadmm_context *c, struct sadmm
     CUDA_ENTER(c);
     c->starting = true;
     c->measured = false;
-    c->ratio = 1;
-    return CUDA(launch)(c, penalty_kernel, "init_penalty", blocks_for(c->view.bodies), 0, false, &args, error);
+    c->rescaled = false;
+    return CUDA(launch)(c, penalty_kernel, "init_penalty", blocks_for(c->view.bodies), &args, error);
 }
 
 extern "C" sadmm_status CUDA(factorize)(struct sadmm_context *c, struct sadmm_error *error)
@@ -134,7 +140,7 @@ extern "C" sadmm_status CUDA(factorize)(struct sadmm_context *c, struct sadmm_er
     cuda_args args = {};
     CUDA_ENTER(c);
     c->weighed = false;
-    return CUDA(launch)(c, factorize_kernel, "factorize", blocks_for(c->view.bodies), 0, false, &args, error);
+    return CUDA(launch)(c, factorize_kernel, "factorize", blocks_for(c->view.bodies), &args, error);
 }
 
 extern "C" sadmm_status CUDA(update_penalty)(struct sadmm_context *c, double ratio, struct sadmm_error *error)
@@ -142,7 +148,16 @@ extern "C" sadmm_status CUDA(update_penalty)(struct sadmm_context *c, double rat
     cuda_args args = {};
     args.factor = ratio;
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(launch)(c, scale_kernel, "update_penalty", blocks_for(c->view.bodies), 0, false, &args, error));
-    c->ratio = ratio;
+    CUDA_TRY(CUDA(launch)(c, scale_kernel, "update_penalty", blocks_for(c->view.bodies), &args, error));
+    c->rescaled = true;
+    return SADMM_OK;
+}
+
+sadmm_status CUDA(enqueue_balance)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    args.measure = 1;
+    CUDA_TRY(CUDA(launch)(c, scale_kernel, "update_penalty", blocks_for(c->view.bodies), &args, error));
+    c->rescaled = true;
     return SADMM_OK;
 }

@@ -312,9 +312,10 @@ PART __device__ __forceinline__ void PART_RUN::start_records(void)
 /* What the last stretch or the stepwise kernels left, joined after a measured iteration. */
 PART __device__ __forceinline__ void PART_RUN::load_records(void)
 {
+    const real ratio = args.rescaled ? (real)*v.ratio : (real)1;
     for (int32_t i = t; i < halves * ROW; i += (int32_t)blockDim.x) {
         const size_t from = (size_t)v.incident[first_half + i / ROW] * ROW + (size_t)(i % ROW);
-        m.records[i] = args.join ? v.records[from] + args.ratio * v.change[from] : v.records[from];
+        m.records[i] = args.join ? v.records[from] + ratio * v.change[from] : v.records[from];
     }
 }
 

@@ -76,7 +76,7 @@ static void view_into(struct sadmm_context *c, int into)
     step->guess = s->guess;
     step->control = buffer<struct cuda_step_control>(c, BUFFER_WORLD_CONTROL);
     step->reports = reports(c);
-    step->measured = c->plan.residuals && c->settings.measure_residuals;
+    step->measured = c->plan.residuals;
     c->view.raw.rigid = step->before;
     c->view.raw.velocity = step->start_velocity;
     c->view.raw_pairs = set.pairs;
@@ -142,6 +142,8 @@ static sadmm_status enqueue_iterations(struct sadmm_context *c, struct sadmm_err
 
 static sadmm_status enqueue_step(struct sadmm_context *c, struct sadmm_error *error)
 {
+    c->starting = true;
+    c->weighed = c->measured = c->rescaled = false;
     const bool islands = c->partition.tier == SADMM_CUDA_TIER_BLOCK || c->partition.tier == SADMM_CUDA_TIER_CLUSTER;
     CUDA_TRY(enqueue_contacts(c, islands, error));
     CUDA_TRY(CUDA(launch_check)(c, error));
@@ -238,8 +240,9 @@ static sadmm_status make_plan(struct sadmm_context *c, struct sadmm_error *error
                          s->settings.warm_start;
     s->guess.warm = matters ? c->plan.warm : -1;
     view_counts(c, generous(seen.counts.pairs));
-    c->view.points = seen.live.points;
+    c->view.points = 0; /* results are read elsewhere */
     seen.facts.point_slots = s->guess.point_slots;
+    c->facts = seen.facts;
     CUDA_TRY(CUDA(choose_partition)(c, &seen.facts, &c->partition, error));
     CUDA_TRY(CUDA(layout_room)(c, error));
     CUDA_TRY(CUDA(solver_room)(c, error));
@@ -491,7 +494,8 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     view_counts(c, 0);
     CUDA_TRY(CUDA(layout_room)(c, error)); /* live is needed from here on */
     CUDA_TRY(clear_halt(c, error));
-    s->candidate_room = s->point_room = 0; /* as likely */
+    s->candidate_room = s->point_room = c->first_room;
+    c->refused = 0;
     CUDA_TRY(COLLISION(attach)(s->collision, c->stream, world->input,
                                buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES), &c->view.live->halt, error));
     view_into(c, s->into);

@@ -103,15 +103,11 @@ static __device__ bool finish_body(const cuda_view &v, int32_t i)
     const struct sadmm_rigid body = v.step.before[raw];
     struct sadmm_steady steady = v.step.steady_before[raw];
     struct sadmm_rigid next = body;
-    moved_body(v, i, &body, &next);
+    move_body(v, i, &body, next.position, next.orientation, next.velocity);
     steady_keep(&steady, &body, &next);
     v.step.after[raw] = next;
     v.step.steady_after[raw] = steady;
-    if (v.settings.recover_wrenches) {
-        double wrench[6];
-        body_wrench(v, i, wrench);
-        for (int k = 0; k < 6; ++k) v.step.wrench[6 * (size_t)raw + (size_t)k] = wrench[k];
-    }
+    if (v.settings.recover_wrenches) contact_wrench(v, i, v.step.wrench + 6 * (size_t)raw);
     return finite_numbers(next.position, 3) && finite_numbers(next.orientation, 4) && finite_numbers(next.velocity, 6);
 }
 

@@ -26,6 +26,15 @@
         .read_penalty = sadmm_cuda_read_penalty##suffix,       \
         .integrate = sadmm_cuda_integrate##suffix,             \
         .recover_wrenches = sadmm_cuda_recover_wrenches##suffix, \
+        .resident = &(const struct sadmm_resident_kernels){    \
+            .load = sadmm_cuda_load_world##suffix,             \
+            .edit = sadmm_cuda_edit_world##suffix,             \
+            .step = sadmm_cuda_step_world##suffix,             \
+            .wait = sadmm_cuda_wait_world##suffix,             \
+            .read_bodies = sadmm_cuda_read_bodies##suffix,     \
+            .read_contacts = sadmm_cuda_read_contacts##suffix, \
+            .read_start = sadmm_cuda_read_start##suffix,       \
+        },                                                     \
     }
 
 #endif

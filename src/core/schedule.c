@@ -13,6 +13,7 @@
 #include <time.h>
 
 #include "certificate.h"
+#include "system_math.h"
 
 double sadmm_clock_ms(void)
 {
@@ -55,14 +56,6 @@ static int until(int done, int period, int limit)
     if (period <= 0) return limit;
     int left = period - done % period;
     return left < limit ? left : limit;
-}
-
-/* Eq. (15). A residual of zero on both sides says nothing about the balance: leave the penalty alone. */
-static double penalty_ratio(struct sadmm_residual r, double limit)
-{
-    if (r.primal <= 0 && r.dual <= 0) return 1;
-    double ratio = r.primal / fmax(r.dual, 1e-300);
-    return fmin(fmax(ratio, 1 / limit), limit);
 }
 
 static bool finite_array(const double *x, size_t count)
@@ -126,7 +119,7 @@ static sadmm_status run(const struct sadmm_kernels *k, struct sadmm_context *c, 
             }
         }
         if (update) {
-            double ratio = penalty_ratio(report->residual, s->penalty_ratio_limit);
+            double ratio = sadmm_penalty_ratio(report->residual.primal, report->residual.dual, s->penalty_ratio_limit);
             if (ratio != 1) {
                 TRY(k->update_penalty(c, ratio, error));
                 TRY(k->factorize(c, error));

@@ -202,9 +202,40 @@ inline long long __double_as_longlong(double value)
     memcpy(&bits, &value, sizeof bits);
     return bits;
 }
+inline double __longlong_as_double(long long bits)
+{
+    double value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
 inline float rsqrtf(float x) { return 1 / sqrtf(x); }
 inline double rsqrt(double x) { return 1 / sqrt(x); }
+/* Fibers give way at barriers only, so every access is atomic. */
 inline void atomicMax(unsigned long long *to, unsigned long long value) { *to = std::max(*to, value); }
+inline int atomicMax(int *to, int value)
+{
+    int before = *to;
+    *to = std::max(before, value);
+    return before;
+}
+inline int atomicMin(int *to, int value)
+{
+    int before = *to;
+    *to = std::min(before, value);
+    return before;
+}
+inline int atomicAdd(int *to, int value)
+{
+    int before = *to;
+    *to += value;
+    return before;
+}
+inline int atomicCAS(int *to, int expected, int value)
+{
+    int before = *to;
+    if (before == expected) *to = value;
+    return before;
+}
 
 /* ---- the runtime ----------------------------------------------------------------------------------------------- */
 
@@ -254,6 +285,14 @@ inline bool fails(void)
 }
 
 } // namespace cuda_emulation
+
+/* Now, or when the graph that is being captured is launched. */
+template <class Node> static inline cudaError_t cuda_emulation_enqueue(Node node)
+{
+    if (cuda_emulation::capture) cuda_emulation::capture->push_back(node);
+    else if (!node()) return cudaErrorLaunchTimeout;
+    return cudaSuccess;
+}
 
 #define CUDA_EMULATION_CALL \
     if (cuda_emulation::fails()) return cudaErrorLaunchFailure
@@ -333,14 +372,12 @@ inline cudaError_t cudaFree(void *block) { return cudaFreeHost(block); }
 inline cudaError_t cudaMemcpyAsync(void *to, const void *from, size_t bytes, int, cudaStream_t)
 {
     CUDA_EMULATION_CALL;
-    memcpy(to, from, bytes);
-    return cudaSuccess;
+    return cuda_emulation_enqueue([=]() { return memcpy(to, from, bytes) == to; });
 }
 inline cudaError_t cudaMemsetAsync(void *to, int value, size_t bytes, cudaStream_t)
 {
     CUDA_EMULATION_CALL;
-    memset(to, value, bytes);
-    return cudaSuccess;
+    return cuda_emulation_enqueue([=]() { return memset(to, value, bytes) == to; });
 }
 
 inline cudaError_t cudaStreamCreateWithFlags(cudaStream_t *stream, int)
@@ -357,6 +394,21 @@ inline cudaError_t cudaStreamDestroy(cudaStream_t stream)
     return cudaSuccess;
 }
 inline cudaError_t cudaStreamSynchronize(cudaStream_t)
+{
+    CUDA_EMULATION_CALL;
+    return cudaSuccess;
+}
+
+typedef struct cuda_emulation_stream *cudaEvent_t;
+enum { cudaEventDisableTiming };
+inline cudaError_t cudaEventCreateWithFlags(cudaEvent_t *event, int) { return cudaStreamCreateWithFlags(event, 0); }
+inline cudaError_t cudaEventDestroy(cudaEvent_t event) { return cudaStreamDestroy(event); }
+inline cudaError_t cudaEventRecord(cudaEvent_t, cudaStream_t)
+{
+    CUDA_EMULATION_CALL;
+    return cudaSuccess;
+}
+inline cudaError_t cudaEventSynchronize(cudaEvent_t)
 {
     CUDA_EMULATION_CALL;
     return cudaSuccess;
@@ -419,17 +471,14 @@ static cudaError_t cuda_emulation_launch(void (*kernel)(const View, const Args),
     if (together == 0 || together > cuda_emulation::MULTIPROCESSORS * cuda_emulation::BLOCKS_PER_MULTIPROCESSOR ||
         blocks % together)
         return cudaErrorInvalidValue;
-    std::function<bool()> node = [=]() {
+    return cuda_emulation_enqueue([=]() {
         std::function<void()> body = [&]() { kernel(view, args); };
         gridDim.x = blocks;
         blockDim.x = threads;
         for (unsigned first = 0; first < blocks; first += together)
             if (!cuda_emulation::run_blocks(body, first, together, threads, shared)) return false;
         return true;
-    };
-    if (cuda_emulation::capture) cuda_emulation::capture->push_back(node);
-    else if (!node()) return cudaErrorLaunchTimeout;
-    return cudaSuccess;
+    });
 }
 
 #endif

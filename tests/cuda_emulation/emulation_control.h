@@ -18,6 +18,8 @@ void cuda_emulation_force_tier(const struct sadmm_kernels *, struct sadmm_contex
 enum sadmm_cuda_tier cuda_emulation_tier_of(const struct sadmm_kernels *, const struct sadmm_context *,
                                             int32_t *blocks);
 
+void cuda_emulation_tune_rooms(const struct sadmm_kernels *, struct sadmm_context *, int64_t first_room);
+
 #ifdef __cplusplus
 }
 #endif

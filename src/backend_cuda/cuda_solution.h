@@ -1,0 +1,54 @@
+/* What a body or a pair gives back, in double. */
+#ifndef SADMM_CUDA_SOLUTION_H
+#define SADMM_CUDA_SOLUTION_H
+
+#include "cuda_double.h"
+
+/* Multiplier of a point as a world vector on b. */
+static __device__ vec3 point_impulse(const cuda_view &v, int32_t p, int32_t k, vec3 normal)
+{
+    size_t slot = (size_t)k * (size_t)v.pair_room + (size_t)p;
+    if (v.contact_rows == 1) return v3_scale(normal, (double)v.lambda_n[slot]);
+    real4 lambda = v.lambda[slot];
+    return v3((double)lambda.x, (double)lambda.y, (double)lambda.z);
+}
+
+/* Q: semi-implicit Euler of the body in slot i. */
+static __device__ void move_body(const cuda_view &v, int32_t i, const struct sadmm_rigid *body, double position[3],
+                                 double orientation[4], double velocity[6])
+{
+    const solver_real *state = v.state + (size_t)i * ROW;
+    const double dt = v.settings.dt;
+    vec3 linear = v3((double)state[0], (double)state[1], (double)state[2]);
+    vec3 angular = v3((double)state[3], (double)state[4], (double)state[5]);
+    v3_store(rigid_move(v3_load(body->position), linear, dt), position);
+    q_store(rigid_turn(q_load(body->orientation), angular, dt), orientation);
+    v3_store(linear, velocity);
+    v3_store(angular, velocity + 3);
+}
+
+static __device__ void add_pair_wrench(const cuda_view &v, int32_t p, int side, double per_dt, double wrench[6])
+{
+    const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
+    vec3 normal = v3_load(pair->normal);
+    for (int32_t k = 0; k < pair->count; ++k) {
+        const struct sadmm_contact_point *point = &v.raw_points[pair->first + k];
+        vec3 f = point_impulse(v, p, k, normal), m = v3_cross(v3_load(side ? point->arm_b : point->arm_a), f);
+        double sign = side ? per_dt : -per_dt;
+        wrench[0] += sign * f.x, wrench[1] += sign * f.y, wrench[2] += sign * f.z;
+        wrench[3] += sign * m.x, wrench[4] += sign * m.y, wrench[5] += sign * m.z;
+    }
+}
+
+/* R: (12) with lambda = -u, J^T lambda / dt summed over a body's contacts in their order. */
+static __device__ void contact_wrench(const cuda_view &v, int32_t i, double wrench[6])
+{
+    double sum[6] = {0}, per_dt = 1 / v.settings.dt;
+    for (int32_t at = v.offsets[i]; at < v.offsets[i + 1]; ++at) {
+        int32_t record = v.incident[at] / 2, side = v.incident[at] & 1;
+        if (record < v.pair_room) add_pair_wrench(v, record, side, per_dt, sum); /* contacts given by geometry only */
+    }
+    for (int k = 0; k < 6; ++k) wrench[k] = sum[k];
+}
+
+#endif
