@@ -143,6 +143,40 @@ START_TEST(settled_piles_have_their_contacts)
 }
 END_TEST
 
+/* Ten times as many contacts in one step, each of them where it belongs, and everything lands. */
+START_TEST(burst_grows_in_one_step)
+{
+    static const int sizes[] = { 1, 2, 10 };
+    int n = sizes[_i / 2], small = 4 * n - 1, over = 5 * n - 2;
+    char spec[32];
+    snprintf(spec, sizeof spec, "burst:%d", n);
+    struct sadmm_scene scene = open_scene(spec);
+    scene.def.backend = SADMM_BACKEND_CPU;
+    scene.def.settings.threads = 1;
+    if (_i % 2) scene.def.settings.dt = 0.001; /* the caller's own: the scene starts closer */
+    sadmm_world *world = build_scene(&scene);
+
+    ck_assert_int_eq(dynamic_bodies(world), n * n + small * small);
+    ck_assert_int_eq(count_by_hand(world, &scene.def), 4 * n * n);
+    step_world(world, 1);
+    ck_assert_int_eq(world_report(world).contacts, 4 * n * n);
+    ck_assert_int_eq(count_by_hand(world, &scene.def), 4 * n * n + 4 * over * over);
+    step_world(world, 1);
+    ck_assert_int_eq(world_report(world).contacts, 4 * n * n + 4 * over * over);
+    ck_assert_int_ge(world_report(world).contacts, 10 * 4 * n * n);
+
+    step_world(world, 40);
+    ck_assert_int_eq(world_report(world).contacts, 4 * n * n + 4 * over * over);
+    ck_assert_double_lt(top_speed(world), 1e-3); /* see test_standing.c */
+    for (int32_t i = 1; i < sadmm_world_body_count(world); ++i) {
+        double z = body_state(world, body_at(world, i)).position[2];
+        /* a tenth of a millimetre: the slop and a penetration ten times as deep */
+        ck_assert_double_eq_tol(z, i <= n * n ? 0.21 : 0.42 + 0.05, 1e-4);
+    }
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 static const struct {
     const char *spec;
     int steps;
@@ -155,6 +189,7 @@ static const struct {
     { "pyramid:6", 20 },
     { "pile:100", 120 }, /* through the first impacts */
     { "settled_pile:1000", 5 },
+    { "burst:3", 30 }, /* through the landing */
     { "incline", 20 },
     { "bounce", 500 }, /* through the first bounce */
     { "spin_plate", 100 },
@@ -206,6 +241,7 @@ START_TEST(bad_specs_are_refused)
         { "sliding_cubes:1000001", "\"sliding_cubes:1000001\": N must be in [1, 1000000]" },
         { "pyramid:301", "N must be in [1, 300]" },
         { "settled_pile:0", "N must be in [1, 1000000]" },
+        { "burst:251", "N must be in [1, 250]" },
         { "incline:3", "incline takes no size" },
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
@@ -238,7 +274,7 @@ END_TEST
 
 START_TEST(the_list_has_no_twins)
 {
-    ck_assert_uint_eq(sadmm_scene_count(), 10);
+    ck_assert_uint_eq(sadmm_scene_count(), 11);
     ck_assert_ptr_null(sadmm_scene_at(sadmm_scene_count()));
     for (size_t i = 0; i < sadmm_scene_count(); ++i) {
         for (size_t j = 0; j < i; ++j) ck_assert_str_ne(sadmm_scene_at(i)->name, sadmm_scene_at(j)->name);
@@ -258,6 +294,7 @@ int main(void)
     tcase_add_loop_test(cases, every_scene_builds_and_steps, 0, (int)sadmm_scene_count());
     tcase_add_test(cases, sliding_cubes_have_n_cubes);
     tcase_add_loop_test(cases, settled_piles_have_their_contacts, 0, 5);
+    tcase_add_loop_test(cases, burst_grows_in_one_step, 0, 6);
     tcase_add_loop_test(cases, table_one, 0, sizeof table / sizeof table[0]);
     tcase_add_loop_test(cases, runs_repeat_bit_for_bit, 0, sizeof repeatable / sizeof repeatable[0]);
     suite_add_tcase(suite, cases);
