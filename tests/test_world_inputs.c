@@ -472,6 +472,27 @@ START_TEST(bad_ranges_and_early_calls_are_refused)
 }
 END_TEST
 
+/* Each names the argument, and the world goes on as if nothing had been asked. */
+START_TEST(missing_outputs_are_refused)
+{
+    struct small_world w = make_small(), other = make_small();
+    const sadmm_status invalid = SADMM_ERROR_INVALID_ARGUMENT;
+    sadmm_body_id body = { 7, 7 };
+    step_world(w.world, 1);
+    step_world(other.world, 1);
+    expect_refused(w.world, sadmm_world_body_at(w.world, 0, NULL), invalid, "id is NULL");
+    expect_refused(w.world, sadmm_world_shape_at(w.world, 0, NULL), invalid, "id is NULL");
+    expect_refused(w.world, sadmm_world_body_state(w.world, w.low, NULL), invalid, "state is NULL");
+    expect_refused(w.world, sadmm_world_body_def(w.world, w.low, NULL), invalid, "def is NULL");
+    expect_refused(w.world, sadmm_world_body_contact_wrench(w.world, w.low, NULL), invalid, "wrench is NULL");
+    expect_refused(w.world, sadmm_world_shape_def(w.world, w.low_shape, NULL, &body), invalid, "def is NULL");
+    ck_assert(body.slot == 7 && body.generation == 7);
+    expect_equal_future(w.world, other.world);
+    sadmm_world_destroy(w.world);
+    sadmm_world_destroy(other.world);
+}
+END_TEST
+
 START_TEST(long_names_are_cut)
 {
     struct small_world w = make_small();
@@ -743,7 +764,7 @@ END_TEST
 int main(void)
 {
     Suite *suite = suite_create("world_inputs");
-    TCase *values = tcase_create("values"), *memory = tcase_create("memory");
+    TCase *values = tcase_create("values"), *memory = tcase_create("memory"), *churn = tcase_create("churn");
 
     tcase_add_test(values, bad_bodies_are_refused);
     tcase_add_test(values, limits_are_inclusive);
@@ -753,8 +774,8 @@ int main(void)
     tcase_add_test(values, bad_states_and_wrenches_are_refused);
     tcase_add_test(values, stale_ids_are_refused);
     tcase_add_test(values, bad_ranges_and_early_calls_are_refused);
+    tcase_add_test(values, missing_outputs_are_refused);
     tcase_add_test(values, long_names_are_cut);
-    tcase_add_test(values, many_bodies_come_and_go);
     tcase_add_loop_test(values, an_empty_world_steps, 0, 2);
     tcase_add_test(values, a_step_that_is_not_finite_is_rolled_back);
     tcase_add_test(memory, creation_without_memory);
@@ -762,8 +783,11 @@ int main(void)
     tcase_add_test(memory, adding_without_memory);
     tcase_add_loop_test(memory, steps_without_memory, 0, 2);
     tcase_add_test(memory, freezing_without_memory);
+    tcase_add_test(churn, many_bodies_come_and_go);
     tcase_set_timeout(memory, 60);
+    tcase_set_timeout(churn, 10);
     suite_add_tcase(suite, values);
     suite_add_tcase(suite, memory);
+    suite_add_tcase(suite, churn);
     return run_suite(suite);
 }

@@ -149,6 +149,7 @@ int32_t sadmm_world_body_count(const sadmm_world *world)
 sadmm_status sadmm_world_body_at(const sadmm_world *world, int32_t index, sadmm_body_id *id)
 {
     struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    if (!id) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "id is NULL");
     if (index < 0 || index >= world->body_count)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index, world->body_count);
     size_t slot = (size_t)index;
@@ -161,8 +162,10 @@ sadmm_status sadmm_world_body_at(const sadmm_world *world, int32_t index, sadmm_
 
 sadmm_status sadmm_world_body_state(const sadmm_world *world, sadmm_body_id id, sadmm_body_state *state)
 {
-    const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", (struct sadmm_error *)&world->error);
+    struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
+    if (!state) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "state is NULL");
     memcpy(state->position, body->rigid.position, sizeof state->position);
     memcpy(state->orientation, body->rigid.orientation, sizeof state->orientation);
     memcpy(state->linear_velocity, body->rigid.velocity, sizeof state->linear_velocity);
@@ -190,8 +193,10 @@ sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, co
 
 sadmm_status sadmm_world_body_def(const sadmm_world *world, sadmm_body_id id, sadmm_body_def *def)
 {
-    const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", (struct sadmm_error *)&world->error);
+    struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
+    if (!def) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def is NULL");
     memset(def, 0, sizeof *def);
     def->type = body->type;
     def->mass = body->rigid.mass;
@@ -223,6 +228,7 @@ sadmm_status sadmm_world_body_contact_wrench(const sadmm_world *world, sadmm_bod
     struct sadmm_error *error = (struct sadmm_error *)&world->error;
     const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
+    if (!wrench) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "wrench is NULL");
     if (!world->stepped || !world->step_settings.recover_wrenches)
         return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE,
                           "contact wrenches: there was no step yet, or settings.recover_wrenches was false");

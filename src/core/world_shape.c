@@ -137,6 +137,7 @@ int32_t sadmm_world_shape_count(const sadmm_world *world)
 sadmm_status sadmm_world_shape_at(const sadmm_world *world, int32_t index, sadmm_shape_id *id)
 {
     struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    if (!id) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "id is NULL");
     if (index < 0 || index >= world->shape_count)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index, world->shape_count);
     size_t slot = (size_t)index;
@@ -149,8 +150,10 @@ sadmm_status sadmm_world_shape_at(const sadmm_world *world, int32_t index, sadmm
 
 sadmm_status sadmm_world_shape_def(const sadmm_world *world, sadmm_shape_id id, sadmm_shape_def *def, sadmm_body_id *body)
 {
-    const struct sadmm_shape *shape = sadmm_world_find_shape(world, id, "id", (struct sadmm_error *)&world->error);
+    struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    const struct sadmm_shape *shape = sadmm_world_find_shape(world, id, "id", error);
     if (!shape) return SADMM_ERROR_STALE_ID;
+    if (!def) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def is NULL");
     memset(def, 0, sizeof *def);
     def->type = shape->type;
     memcpy(def->size, shape->size, sizeof def->size);
