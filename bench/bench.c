@@ -12,6 +12,7 @@ static const struct {
     const char *description;
 } commands[] = {
     {"kernels", bench_kernels, "ns per contact per iteration by backend, precision, threads and size"},
+    {"scaling", bench_scaling, "ms per step of growing scenes, CPU by threads against GPU"},
 };
 
 static void usage(FILE *out)

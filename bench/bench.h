@@ -1,4 +1,4 @@
-/* subadmm-bench: one file a command, each prints a table and takes --json FILE|-. */
+/* subadmm-bench: one file a command, each prints a table and writes it to a file on request. */
 #ifndef BENCH_BENCH_H
 #define BENCH_BENCH_H
 
@@ -7,6 +7,7 @@
 #include <jansson.h>
 
 int bench_kernels(int argc, char **argv);
+int bench_scaling(int argc, char **argv);
 
 /* Write to a file, or to standard output for "-"; false (with a message on standard error) when that fails. */
 bool bench_write_json(json_t *json, const char *path);

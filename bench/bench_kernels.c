@@ -7,17 +7,16 @@
 #include <string.h>
 
 #include "bench.h"
+#include "bench_options.h"
 #include "core/certificate.h"
 #include "core/schedule.h"
 #include "lattice.h"
 
-enum { MAX_LIST = 16 };
-
 struct options {
     sadmm_backend backend; /* AUTO: all */
     int precision;         /* -1: both */
-    int threads[MAX_LIST], thread_count;
-    long contacts[MAX_LIST];
+    int threads[BENCH_LIST], thread_count;
+    long contacts[BENCH_LIST];
     int contact_count;
     double seconds;
     const char *json;
@@ -137,35 +136,9 @@ static void usage(FILE *out)
             "  --json FILE|-                rows[] of {backend, precision, threads, contacts, ns_per_contact_iteration, gb_per_s, ...}\n");
 }
 
-static bool parse_list(const char *text, long low, long high, long *values, int *count)
-{
-    *count = 0;
-    while (*count < MAX_LIST) {
-        char *end;
-        long value = strtol(text, &end, 10);
-        if (end == text || value < low || value > high || (*end && *end != ',')) return false;
-        values[(*count)++] = value;
-        if (!*end) return true;
-        text = end + 1;
-    }
-    return false;
-}
-
-static bool parse_backend(const char *text, sadmm_backend *backend)
-{
-    static const char *const names[] = {"all", "ref", "cpu", "cuda"};
-    for (int k = 0; k < 4; ++k)
-        if (!strcmp(text, names[k])) {
-            *backend = (sadmm_backend)k;
-            return true;
-        }
-    return false;
-}
-
 static int bad(const char *option, const char *value, const char *allowed)
 {
-    fprintf(stderr, "subadmm-bench kernels: --%s %s: must be %s\n", option, value, allowed);
-    return 2;
+    return bench_bad_option("kernels", option, value, allowed);
 }
 
 /* 0, 2 for wrong usage, -1 for --help. */
@@ -177,28 +150,25 @@ static int parse(int argc, char **argv, struct options *o)
         {"seconds", required_argument, NULL, 's'},  {"json", required_argument, NULL, 'j'},
         {"help", no_argument, NULL, 'h'},           {NULL, 0, NULL, 0},
     };
-    long threads[MAX_LIST];
+    long threads[BENCH_LIST];
     for (int option; (option = getopt_long(argc, argv, "h", longs, NULL)) != -1;) {
-        char *end;
         switch (option) {
         case 'b':
-            if (!parse_backend(optarg, &o->backend)) return bad("backend", optarg, "ref, cpu, cuda or all");
+            if (!bench_parse_backend(optarg, &o->backend)) return bad("backend", optarg, "ref, cpu, cuda or all");
             break;
         case 'p':
-            o->precision = !strcmp(optarg, "f32") ? SADMM_F32 : !strcmp(optarg, "f64") ? SADMM_F64 : -1;
-            if (o->precision < 0 && strcmp(optarg, "both")) return bad("precision", optarg, "f32, f64 or both");
+            if (!bench_parse_precision(optarg, &o->precision)) return bad("precision", optarg, "f32, f64 or both");
             break;
         case 't':
-            if (!parse_list(optarg, 1, 1024, threads, &o->thread_count)) return bad("threads", optarg, "up to 16 numbers in [1, 1024]");
+            if (!bench_parse_list(optarg, 1, 1024, threads, &o->thread_count)) return bad("threads", optarg, "up to 16 numbers in [1, 1024]");
             for (int k = 0; k < o->thread_count; ++k) o->threads[k] = (int)threads[k];
             break;
         case 'c':
-            if (!parse_list(optarg, 1, 20000000, o->contacts, &o->contact_count))
+            if (!bench_parse_list(optarg, 1, 20000000, o->contacts, &o->contact_count))
                 return bad("contacts", optarg, "up to 16 numbers in [1, 20000000]");
             break;
         case 's':
-            o->seconds = strtod(optarg, &end);
-            if (end == optarg || *end || !(o->seconds > 0 && o->seconds <= 600)) return bad("seconds", optarg, "in (0, 600]");
+            if (!bench_parse_seconds(optarg, 600, &o->seconds)) return bad("seconds", optarg, "in (0, 600]");
             break;
         case 'j': o->json = optarg; break;
         case 'h': usage(stdout); return -1;
@@ -215,7 +185,7 @@ static int parse(int argc, char **argv, struct options *o)
 static json_t *row_json(const struct row *row)
 {
     return json_pack("{s:s, s:s, s:s, s:i, s:I, s:I, s:I, s:i, s:f, s:f, s:f, s:f, s:{s:f, s:f}}", "backend", row->name,
-                     "variant", row->variant, "precision", row->precision == SADMM_F32 ? "f32" : "f64", "threads",
+                     "variant", row->variant, "precision", bench_precision_name(row->precision), "threads",
                      row->threads, "contacts", (json_int_t)row->contacts, "pairs", (json_int_t)row->pairs, "bodies",
                      (json_int_t)row->bodies, "iterations", row->iterations, "ns_per_contact_iteration", row->ns,
                      "gb_per_s", row->gb_per_s, "bandwidth_share", row->share, "spread", row->spread, "certificate",
@@ -232,7 +202,7 @@ int bench_kernels(int argc, char **argv)
     if (status) return status < 0 ? 0 : status;
     bool quiet = o.json && !strcmp(o.json, "-");
     json_t *rows = json_array(), *bandwidths = json_array();
-    double bandwidth[MAX_LIST];
+    double bandwidth[BENCH_LIST];
     for (int t = 0; t < o.thread_count; ++t) {
         bandwidth[t] = bench_memory_bandwidth(o.threads[t]);
         json_array_append_new(bandwidths, json_pack("{s:i, s:f}", "threads", o.threads[t], "gb_per_s", bandwidth[t]));
@@ -267,7 +237,7 @@ int bench_kernels(int argc, char **argv)
                 row.share = k->backend == SADMM_BACKEND_CUDA ? 0 : row.gb_per_s / bandwidth[t];
                 if (!quiet) {
                     printf("%-5s %-8s %-4s %7d %9ld %11.2f %8.2f %6.0f%% %10.1e\n", row.name, row.variant,
-                           row.precision == SADMM_F32 ? "f32" : "f64", row.threads, row.contacts, row.ns, row.gb_per_s,
+                           bench_precision_name(row.precision), row.threads, row.contacts, row.ns, row.gb_per_s,
                            100 * row.share, row.certificate.ncp_max);
                     fflush(stdout);
                 }

@@ -288,10 +288,11 @@ struct contact_problem *contact_problem_mixed(uint64_t seed, double friction)
     contact_problem_seed(seed);
     enum { BODIES = 14 };
     for (int i = 0; i < BODIES; ++i) {
-        double mass = pow(10, 1.5 * contact_problem_random());
-        int32_t k =
-            contact_problem_box(p, mass, 0.2, 0.1 + 0.05 * contact_problem_random(), 0.15, contact_problem_random(),
-                                contact_problem_random(), 0.5 + contact_problem_random());
+        double mass = pow(10, 1.5 * contact_problem_random()), at[3], hy;
+        /* One by one: compilers differ in the order they evaluate arguments in, and so would build different scenes. */
+        for (int j = 0; j < 3; ++j) at[j] = contact_problem_random();
+        hy = 0.1 + 0.05 * contact_problem_random();
+        int32_t k = contact_problem_box(p, mass, 0.2, hy, 0.15, at[2], at[1], 0.5 + at[0]);
         random_unit(p->rigid[k].orientation, 4);
         for (int j = 0; j < 6; ++j) {
             p->rigid[k].velocity[j] = (j < 3 ? 1 : 10) * contact_problem_random();

@@ -138,6 +138,7 @@ static const struct {
     {"run incline -x", 2, "unknown option '-x'; valid: --backend"},
     {"run incline --steps", 2, "'--steps' needs a value"},
     {"run incline --backend gpu", 2, "must be auto, ref, cpu or cuda"},
+    {"run incline --device -1", 2, "must be an integer in [0, 1023]"},
     {"run incline --precision double", 2, "must be f32 or f64"},
     {"run incline --steps 1e3", 2, "must be an integer in [0, 1000000000]"},
     {"run incline --steps -1", 2, "must be an integer in"},
@@ -162,6 +163,15 @@ static const struct {
     {"run incline --steps 1 --trace /no/such/folder/x", 1, "/no/such/folder/x: No such file or directory"},
 };
 enum { USAGE_COUNT = sizeof usages / sizeof *usages };
+
+/* A device that no machine has: said where there is a GPU backend, of no interest to the CPU. */
+START_TEST(device_is_handed_on)
+{
+    MUST("run incline --backend cpu --device 1000 --steps 1", 0);
+    MUST("run incline --backend cuda --device 1000 --steps 1", 1);
+    ck_assert_msg(strstr(err, "1000") || strstr(err, "is not available"), "%s", err);
+}
+END_TEST
 
 START_TEST(exit_codes_and_messages)
 {
@@ -566,6 +576,7 @@ int main(void)
     TCase *tests = tcase_create("command");
     tcase_set_timeout(tests, 120);
     tcase_add_checked_fixture(tests, make_folder, remove_folder);
+    tcase_add_test(tests, device_is_handed_on);
     tcase_add_loop_test(tests, exit_codes_and_messages, 0, USAGE_COUNT);
     tcase_add_test(tests, a_full_disk_is_a_failure);
     tcase_add_test(tests, run_reports);

@@ -6,6 +6,7 @@
 
 #include "contact_problems.h"
 #include "core/kernels.h"
+#include "core/problem_internal.h"
 #include "subadmm/problem.h"
 #include "run_suite.h"
 
@@ -368,6 +369,52 @@ START_TEST(contacts_that_do_not_share_a_pair)
 }
 END_TEST
 
+/* Contacts of one pair of bodies, all of which a pair could share, were it not for its limit. */
+START_TEST(pairs_have_eight_points_at_most)
+{
+    enum { MOST = 3 * SADMM_MAX_POINTS + 1 };
+    static const int counts[] = {1, 7, 8, 9, 16, 17, MOST};
+    double A[72] = {0}, b[12] = {0, 0, 1, 0, 0, 0, 0, 0, -1, 0, 0, 0}, v[2][12], r[2][3 * MOST];
+    sadmm_problem_contact contacts[MOST] = {0};
+    sadmm_problem *p;
+    ck_assert_int_eq(SADMM_MAX_POINTS, 8);
+    for (int i = 0; i < 12; ++i) A[36 * (i / 6) + 7 * (i % 6)] = 1;
+    for (int k = 0; k < MOST; ++k) { /* face on face, the second body 1 above the first */
+        contacts[k].body_b = 1;
+        contacts[k].normal[2] = 1;
+        contacts[k].friction = 0.5;
+        contacts[k].arm_a[0] = contacts[k].arm_b[0] = 0.25 * (k % 5);
+        contacts[k].arm_a[1] = contacts[k].arm_b[1] = 0.25 * (k / 5);
+        contacts[k].arm_a[2] = 0.5, contacts[k].arm_b[2] = -0.5;
+    }
+    OK(sadmm_problem_create(&p));
+    for (size_t c = 0; c < sizeof counts / sizeof *counts; ++c) {
+        for (int t = 0; t < table_count; ++t) {
+            OK(sadmm_problem_set_bodies(p, 2, A, b, NULL));
+            OK(sadmm_problem_set_contacts(p, counts[c], contacts, NULL));
+            const struct sadmm_contact_set *set = sadmm_problem_contact_set(p);
+            ck_assert_uint_eq(set->point_count, (size_t)counts[c]);
+            ck_assert_uint_eq(set->pair_count, (size_t)(counts[c] + 7) / 8);
+            for (int k = 0; k < (int)set->pair_count; ++k) {
+                ck_assert_int_eq(set->pairs[k].first, 8 * k);
+                ck_assert_int_eq(set->pairs[k].count, 8 * k + 8 < counts[c] ? 8 : counts[c] - 8 * k);
+            }
+            sadmm_settings s = sadmm_settings_default();
+            s.iterations = 50;
+            OK(sadmm_problem_solve(p, tables[t]->backend, tables[t]->precision, &s, NULL));
+            OK(sadmm_problem_get_solution(p, v[t > 0], r[t > 0], NULL));
+            /* The first table is the oracle. Rounding over 50 iterations, of numbers up to 1. */
+            ck_assert(tables[0]->backend == SADMM_BACKEND_REF);
+            double tolerance = tables[t]->precision == SADMM_F64 ? 1e-13 : 2e-5;
+            for (int i = 0; t > 0 && i < 12; ++i) ck_assert_double_eq_tol(v[1][i], v[0][i], tolerance);
+            for (int i = 0; t > 0 && i < 3 * counts[c]; ++i) ck_assert_double_eq_tol(r[1][i], r[0][i], tolerance);
+        }
+        ck_assert(fabs(r[0][2]) > 1e-3); /* they do carry something */
+    }
+    sadmm_problem_destroy(p);
+}
+END_TEST
+
 /* ---- starts and stops ---------------------------------------------------------------------------------------- */
 
 START_TEST(warm_and_cold_starts)
@@ -638,6 +685,7 @@ int main(void)
     tcase_add_loop_test(cases, spring_to_the_world, 0, table_count);
     tcase_add_loop_test(cases, order_of_contacts_does_not_matter, 0, table_count);
     tcase_add_loop_test(cases, contacts_that_do_not_share_a_pair, 0, table_count);
+    tcase_add_test(cases, pairs_have_eight_points_at_most);
     tcase_add_loop_test(cases, warm_and_cold_starts, 0, table_count);
     tcase_add_loop_test(cases, stop_rules_and_report, 0, table_count);
     tcase_add_loop_test(cases, free_bodies, 0, table_count);

@@ -85,6 +85,98 @@ START_TEST(sliding_cubes_have_n_cubes)
 }
 END_TEST
 
+/* Contacts of the next step, from the geometry alone: every pair of bodies is looked at. For cubes that are not turned,
+ * above a ground at z = 0 (body 0): faces that lie over each other within reach make four. */
+static int32_t count_by_hand(const sadmm_world *world, const sadmm_world_def *def)
+{
+    int32_t n = sadmm_world_body_count(world), count = 0;
+    sadmm_body_state *states = all_states(world);
+    double *half = malloc((size_t)n * sizeof *half);
+    for (int32_t i = 1; i < n; ++i) {
+        sadmm_shape_def shape;
+        sadmm_shape_id id;
+        MUST(world, sadmm_world_shape_at(world, i, &id)); /* every body has one */
+        MUST(world, sadmm_world_shape_def(world, id, &shape, NULL));
+        half[i] = shape.size[2];
+        ck_assert_double_eq_tol(fabs(states[i].orientation[0]), 1, 1e-12);
+    }
+    for (int32_t i = 1; i < n; ++i) {
+        double reach = def->contact_margin * 2 * half[i] + def->settings.dt * norm3(states[i].linear_velocity);
+        if (states[i].position[2] - half[i] <= reach) count += 4;
+        for (int32_t j = i + 1; j < n; ++j) {
+            const double *a = states[i].position, *b = states[j].position, sum = half[i] + half[j];
+            if (fabs(a[0] - b[0]) >= sum || fabs(a[1] - b[1]) >= sum) continue;
+            reach = def->contact_margin * 2 * fmin(half[i], half[j]) +
+                    def->settings.dt * distance(states[i].linear_velocity, states[j].linear_velocity);
+            if (fabs(a[2] - b[2]) - sum <= reach) count += 4;
+        }
+    }
+    free(states);
+    free(half);
+    return count;
+}
+
+/* Heaps of one layer, of few, of all ten, and with a top layer that is not full. */
+START_TEST(settled_piles_have_their_contacts)
+{
+    static const struct {
+        const char *spec;
+        int32_t bodies;
+        double low, high; /* contacts a body */
+    } piles[] = {
+        { "settled_pile:1", 1, 4, 4 },        { "settled_pile:7", 7, 4, 8 },
+        { "settled_pile:300", 300, 6, 9 },    { "settled_pile:1001", 1001, 8, 10 },
+        { "settled_pile:10000", 10000, 9, 10 },
+    };
+    struct sadmm_scene scene = open_scene(piles[_i].spec);
+    scene.def.settings.threads = 1;
+    sadmm_world *world = build_scene(&scene);
+
+    ck_assert_int_eq(dynamic_bodies(world), piles[_i].bodies);
+    int32_t expected = count_by_hand(world, &scene.def);
+    step_world(world, 1);
+    sadmm_step_report report = world_report(world);
+    ck_assert_int_eq(report.contacts, expected);
+    double each = (double)report.contacts / report.bodies;
+    ck_assert_msg(each >= piles[_i].low && each <= piles[_i].high, "%s: %g contacts a body", piles[_i].spec, each);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+/* Ten times as many contacts in one step, each of them where it belongs, and everything lands. */
+START_TEST(burst_grows_in_one_step)
+{
+    static const int sizes[] = { 1, 2, 10 };
+    int n = sizes[_i / 2], small = 4 * n - 1, over = 5 * n - 2;
+    char spec[32];
+    snprintf(spec, sizeof spec, "burst:%d", n);
+    struct sadmm_scene scene = open_scene(spec);
+    scene.def.backend = SADMM_BACKEND_CPU;
+    scene.def.settings.threads = 1;
+    if (_i % 2) scene.def.settings.dt = 0.001; /* the caller's own: the scene starts closer */
+    sadmm_world *world = build_scene(&scene);
+
+    ck_assert_int_eq(dynamic_bodies(world), n * n + small * small);
+    ck_assert_int_eq(count_by_hand(world, &scene.def), 4 * n * n);
+    step_world(world, 1);
+    ck_assert_int_eq(world_report(world).contacts, 4 * n * n);
+    ck_assert_int_eq(count_by_hand(world, &scene.def), 4 * n * n + 4 * over * over);
+    step_world(world, 1);
+    ck_assert_int_eq(world_report(world).contacts, 4 * n * n + 4 * over * over);
+    ck_assert_int_ge(world_report(world).contacts, 10 * 4 * n * n);
+
+    step_world(world, 40);
+    ck_assert_int_eq(world_report(world).contacts, 4 * n * n + 4 * over * over);
+    ck_assert_double_lt(top_speed(world), 1e-3); /* see test_standing.c */
+    for (int32_t i = 1; i < sadmm_world_body_count(world); ++i) {
+        double z = body_state(world, body_at(world, i)).position[2];
+        /* a tenth of a millimetre: the slop and a penetration ten times as deep */
+        ck_assert_double_eq_tol(z, i <= n * n ? 0.21 : 0.42 + 0.05, 1e-4);
+    }
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 static const struct {
     const char *spec;
     int steps;
@@ -96,6 +188,8 @@ static const struct {
     { "card_houses:1", 20 },
     { "pyramid:6", 20 },
     { "pile:100", 120 }, /* through the first impacts */
+    { "settled_pile:1000", 5 },
+    { "burst:3", 30 }, /* through the landing */
     { "incline", 20 },
     { "bounce", 500 }, /* through the first bounce */
     { "spin_plate", 100 },
@@ -146,6 +240,8 @@ START_TEST(bad_specs_are_refused)
         { "sliding_cubes:0", "N must be in [1, 1000000]" },
         { "sliding_cubes:1000001", "\"sliding_cubes:1000001\": N must be in [1, 1000000]" },
         { "pyramid:301", "N must be in [1, 300]" },
+        { "settled_pile:0", "N must be in [1, 1000000]" },
+        { "burst:251", "N must be in [1, 250]" },
         { "incline:3", "incline takes no size" },
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
@@ -178,7 +274,7 @@ END_TEST
 
 START_TEST(the_list_has_no_twins)
 {
-    ck_assert_uint_eq(sadmm_scene_count(), 9);
+    ck_assert_uint_eq(sadmm_scene_count(), 11);
     ck_assert_ptr_null(sadmm_scene_at(sadmm_scene_count()));
     for (size_t i = 0; i < sadmm_scene_count(); ++i) {
         for (size_t j = 0; j < i; ++j) ck_assert_str_ne(sadmm_scene_at(i)->name, sadmm_scene_at(j)->name);
@@ -197,6 +293,8 @@ int main(void)
     tcase_add_test(cases, bad_builds_are_refused);
     tcase_add_loop_test(cases, every_scene_builds_and_steps, 0, (int)sadmm_scene_count());
     tcase_add_test(cases, sliding_cubes_have_n_cubes);
+    tcase_add_loop_test(cases, settled_piles_have_their_contacts, 0, 5);
+    tcase_add_loop_test(cases, burst_grows_in_one_step, 0, 6);
     tcase_add_loop_test(cases, table_one, 0, sizeof table / sizeof table[0]);
     tcase_add_loop_test(cases, runs_repeat_bit_for_bit, 0, sizeof repeatable / sizeof repeatable[0]);
     suite_add_tcase(suite, cases);

@@ -39,6 +39,16 @@ START_TEST(pyramid)
 }
 END_TEST
 
+START_TEST(settled_pile)
+{
+    const struct standing_case limits[] = {
+        { "settled_pile:500", SADMM_F64, 1.0, 0.1, 1e-5, 1e-3, 1e-6, 0 }, /* at rest at once: a hundredth of the drift */
+        { "settled_pile:500", SADMM_F32, 1.0, 0.1, 1e-5, 1e-3, 1e-6, 0 },
+    };
+    sadmm_world_destroy(run_standing(&limits[_i]));
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("standing");
@@ -48,6 +58,7 @@ int main(void)
     tcase_add_loop_test(cases, vertical_stacks, 0, 2);
     tcase_add_loop_test(cases, oblique_stacks, 0, 2);
     tcase_add_loop_test(cases, pyramid, 0, 2);
+    tcase_add_loop_test(cases, settled_pile, 0, 2);
     suite_add_tcase(suite, cases);
     return run_suite(suite);
 }

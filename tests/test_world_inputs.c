@@ -472,6 +472,27 @@ START_TEST(bad_ranges_and_early_calls_are_refused)
 }
 END_TEST
 
+/* Each names the argument, and the world goes on as if nothing had been asked. */
+START_TEST(missing_outputs_are_refused)
+{
+    struct small_world w = make_small(), other = make_small();
+    const sadmm_status invalid = SADMM_ERROR_INVALID_ARGUMENT;
+    sadmm_body_id body = { 7, 7 };
+    step_world(w.world, 1);
+    step_world(other.world, 1);
+    expect_refused(w.world, sadmm_world_body_at(w.world, 0, NULL), invalid, "id is NULL");
+    expect_refused(w.world, sadmm_world_shape_at(w.world, 0, NULL), invalid, "id is NULL");
+    expect_refused(w.world, sadmm_world_body_state(w.world, w.low, NULL), invalid, "state is NULL");
+    expect_refused(w.world, sadmm_world_body_def(w.world, w.low, NULL), invalid, "def is NULL");
+    expect_refused(w.world, sadmm_world_body_contact_wrench(w.world, w.low, NULL), invalid, "wrench is NULL");
+    expect_refused(w.world, sadmm_world_shape_def(w.world, w.low_shape, NULL, &body), invalid, "def is NULL");
+    ck_assert(body.slot == 7 && body.generation == 7);
+    expect_equal_future(w.world, other.world);
+    sadmm_world_destroy(w.world);
+    sadmm_world_destroy(other.world);
+}
+END_TEST
+
 START_TEST(long_names_are_cut)
 {
     struct small_world w = make_small();
@@ -486,6 +507,65 @@ START_TEST(long_names_are_cut)
     MUST(w.world, sadmm_world_body_def(w.world, id, &read));
     ck_assert_uint_eq(strlen(read.name), 63);
     sadmm_world_destroy(w.world);
+}
+END_TEST
+
+/* Bodies that come and go by the hundred thousand, looked at one by one: work in proportion to their number. Any loop over
+ * all slots in one of these calls takes minutes here (the test's time limit). */
+START_TEST(many_bodies_come_and_go)
+{
+    enum { COUNT = 200000 };
+    sadmm_world_def def = small_def();
+    sadmm_world *world = create_world(&def);
+    sadmm_body_def body = box_body(0);
+    sadmm_shape_def box = box_shape();
+    sadmm_body_id *ids = malloc(COUNT * sizeof *ids);
+    sadmm_shape_id shape;
+    for (int32_t i = 0; i < COUNT; ++i) {
+        body.position[0] = i;
+        MUST(world, sadmm_world_add_body(world, &body, &ids[i]));
+        MUST(world, sadmm_world_add_shape(world, ids[i], &box, NULL));
+        if (i % 5 == 0) MUST(world, sadmm_world_add_shape(world, ids[i], &box, NULL));
+    }
+    /* The last shape of all belongs to the first body: it has to be found too. */
+    MUST(world, sadmm_world_add_shape(world, ids[0], &box, &shape));
+
+    for (int32_t i = 0; i < COUNT; i += 2) MUST(world, sadmm_world_remove_body(world, ids[i]));
+    ck_assert_int_eq(sadmm_world_body_count(world), COUNT / 2);
+    ck_assert_int_eq(sadmm_world_shape_count(world), COUNT / 2 + COUNT / 10);
+    ck_assert_int_eq(sadmm_world_shape_def(world, shape, &box, NULL), SADMM_ERROR_STALE_ID);
+    for (int32_t i = 0; i < COUNT / 2; ++i) {
+        ck_assert_uint_eq(body_at(world, i).slot, ids[2 * i + 1].slot);
+        MUST(world, sadmm_world_shape_at(world, i, &shape));
+    }
+    ck_assert_uint_eq(body_at(world, 7).slot, ids[15].slot); /* back again */
+    ck_assert_uint_eq(body_at(world, 5).slot, ids[11].slot);
+
+    /* Free slots are filled from the lowest on; the old ids stay stale. */
+    for (int32_t i = 0; i < COUNT; i += 2) {
+        sadmm_body_id id;
+        body.position[0] = -i;
+        MUST(world, sadmm_world_add_body(world, &body, &id));
+        ck_assert_uint_eq(id.slot, ids[i].slot);
+        ck_assert_uint_ne(id.generation, ids[i].generation);
+        MUST(world, sadmm_world_add_shape(world, id, &box, &shape));
+        ids[i] = id;
+        if (i % 1000 == 0) { /* the order of creation slots holds at every moment */
+            ck_assert_uint_eq(body_at(world, i).slot, ids[i].slot);
+            if (i + 2 < COUNT) ck_assert_uint_eq(body_at(world, i + 2).slot, ids[i + 3].slot);
+        }
+    }
+    ck_assert_int_eq(sadmm_world_body_count(world), COUNT);
+    for (int32_t i = 0; i < COUNT; ++i) {
+        sadmm_body_id id = body_at(world, i);
+        ck_assert(id.slot == ids[i].slot && id.generation == ids[i].generation);
+        ck_assert(body_state(world, id).position[0] == (i % 2 ? i : -i));
+    }
+    for (int32_t i = COUNT; i-- > 0;) MUST(world, sadmm_world_remove_body(world, ids[i]));
+    ck_assert_int_eq(sadmm_world_body_count(world), 0);
+    ck_assert_int_eq(sadmm_world_shape_count(world), 0);
+    sadmm_world_destroy(world);
+    free(ids);
 }
 END_TEST
 
@@ -684,7 +764,7 @@ END_TEST
 int main(void)
 {
     Suite *suite = suite_create("world_inputs");
-    TCase *values = tcase_create("values"), *memory = tcase_create("memory");
+    TCase *values = tcase_create("values"), *memory = tcase_create("memory"), *churn = tcase_create("churn");
 
     tcase_add_test(values, bad_bodies_are_refused);
     tcase_add_test(values, limits_are_inclusive);
@@ -694,6 +774,7 @@ int main(void)
     tcase_add_test(values, bad_states_and_wrenches_are_refused);
     tcase_add_test(values, stale_ids_are_refused);
     tcase_add_test(values, bad_ranges_and_early_calls_are_refused);
+    tcase_add_test(values, missing_outputs_are_refused);
     tcase_add_test(values, long_names_are_cut);
     tcase_add_loop_test(values, an_empty_world_steps, 0, 2);
     tcase_add_test(values, a_step_that_is_not_finite_is_rolled_back);
@@ -702,8 +783,11 @@ int main(void)
     tcase_add_test(memory, adding_without_memory);
     tcase_add_loop_test(memory, steps_without_memory, 0, 2);
     tcase_add_test(memory, freezing_without_memory);
+    tcase_add_test(churn, many_bodies_come_and_go);
     tcase_set_timeout(memory, 60);
+    tcase_set_timeout(churn, 10);
     suite_add_tcase(suite, values);
     suite_add_tcase(suite, memory);
+    suite_add_tcase(suite, churn);
     return run_suite(suite);
 }

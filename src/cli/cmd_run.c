@@ -13,12 +13,14 @@
 #include "run_trace.h"
 
 enum {
-    OPTION_BACKEND, OPTION_PRECISION, OPTION_STEPS, OPTION_DT, OPTION_ITERATIONS, OPTION_PENALTY_PERIOD, OPTION_THREADS,
-    OPTION_NO_WARM_START, OPTION_CERTIFY, OPTION_EXPLAIN, OPTION_JSON, OPTION_TRACE, OPTION_DUMP, OPTION_QUIET
+    OPTION_BACKEND, OPTION_DEVICE, OPTION_PRECISION, OPTION_STEPS, OPTION_DT, OPTION_ITERATIONS, OPTION_PENALTY_PERIOD,
+    OPTION_THREADS, OPTION_NO_WARM_START, OPTION_CERTIFY, OPTION_EXPLAIN, OPTION_JSON, OPTION_TRACE, OPTION_DUMP,
+    OPTION_QUIET
 };
 
 static const struct cli_option options[] = {
     [OPTION_BACKEND] = {"backend", "NAME", "auto, ref, cpu or cuda (default auto)"},
+    [OPTION_DEVICE] = {"device", "N", "which accelerator (default 0)"},
     [OPTION_PRECISION] = {"precision", "P", "f32 or f64 (default the scene's)"},
     [OPTION_STEPS] = {"steps", "N", "number of steps (default the scene's duration / dt)"},
     [OPTION_DT] = {"dt", "S", "time step, s (default the scene's)"},
@@ -39,6 +41,7 @@ struct run_options {
     sadmm_precision precision;
     long steps, iterations, penalty_period, threads; /* -1: the scene's */
     double dt;                                       /* 0: the scene's */
+    long device;
     bool no_warm_start, certify, explain, quiet, precision_given;
     const char *json, *trace, *dump_path;
     long dump_step;
@@ -65,6 +68,7 @@ static int set_option(void *target, size_t index, const char *value)
     bool ok = true;
     switch (index) {
     case OPTION_BACKEND: ok = cli_read_backend("--backend", value, &o->backend); break;
+    case OPTION_DEVICE: ok = cli_read_int("--device", value, 0, 1023, &o->device); break;
     case OPTION_PRECISION:
         ok = cli_read_precision("--precision", value, &o->precision);
         o->precision_given = true;
@@ -89,6 +93,7 @@ static void apply(const struct run_options *o, struct sadmm_scene *scene)
 {
     sadmm_settings *s = &scene->def.settings;
     scene->def.backend = o->backend;
+    scene->def.device = (int)o->device;
     if (o->precision_given) scene->def.precision = o->precision;
     if (o->dt > 0) s->dt = o->dt;
     if (o->iterations >= 0) s->iterations = (int)o->iterations;

@@ -15,6 +15,7 @@
 #include "certificate.h"
 #include "dense6.h"
 #include "memory.h"
+#include "problem_internal.h"
 #include "registry.h"
 #include "schedule.h"
 #include "settings.h"
@@ -336,6 +337,11 @@ sadmm_status sadmm_problem_set_contacts(sadmm_problem *problem, int32_t count, c
     sadmm_free(problem->contacts.points);
     problem->contacts = set;
     return SADMM_OK;
+}
+
+const struct sadmm_contact_set *sadmm_problem_contact_set(const sadmm_problem *problem)
+{
+    return &problem->contacts;
 }
 
 /* ---- blocks -------------------------------------------------------------------------------------------------- */

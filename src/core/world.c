@@ -1,4 +1,4 @@
-/* World level: creation, settings, ids and pair tables. Bodies, shapes, the step and its read-outs are in world_*.c. */
+/* World level: creation, settings, slots and pair tables. Bodies, shapes, the step and its read-outs are in world_*.c. */
 #include "subadmm/world.h"
 
 #include <string.h>
@@ -78,6 +78,34 @@ sadmm_status sadmm_world_set_settings(sadmm_world *world, const sadmm_settings *
 sadmm_settings sadmm_world_settings(const sadmm_world *world)
 {
     return world->def.settings;
+}
+
+/* ---- slots ---------------------------------------------------------------------------------------------------- */
+
+size_t sadmm_slot_free(struct sadmm_slot_marks *marks, const sadmm_world *world,
+                       bool (*alive)(const sadmm_world *world, size_t slot))
+{
+    while (alive(world, marks->free)) ++marks->free;
+    return marks->free;
+}
+
+size_t sadmm_slot_at(struct sadmm_slot_marks *marks, int32_t index, const sadmm_world *world,
+                     bool (*alive)(const sadmm_world *world, size_t slot))
+{
+    while (marks->below > index) marks->below -= alive(world, --marks->at);
+    while (marks->below < index || !alive(world, marks->at)) marks->below += alive(world, marks->at++);
+    return marks->at;
+}
+
+void sadmm_slot_taken(struct sadmm_slot_marks *marks, size_t slot)
+{
+    if (slot < marks->at) ++marks->below;
+}
+
+void sadmm_slot_freed(struct sadmm_slot_marks *marks, size_t slot)
+{
+    if (slot < marks->at) --marks->below;
+    if (slot < marks->free) marks->free = slot;
 }
 
 /* ---- pair tables ---------------------------------------------------------------------------------------------- */

@@ -74,13 +74,16 @@ static sadmm_status check_def(const sadmm_body_def *def, double orientation[4], 
     return SADMM_OK;
 }
 
+static bool alive(const sadmm_world *world, size_t slot)
+{
+    return world->bodies[slot].alive;
+}
+
 /* The lowest dead slot, or a new one. */
-static size_t free_slot(const sadmm_world *world)
+static size_t free_slot(sadmm_world *world)
 {
     if ((size_t)world->body_count == world->body_slots) return world->body_slots;
-    size_t slot = 0;
-    while (world->bodies[slot].alive) ++slot;
-    return slot;
+    return sadmm_slot_free(&world->body_marks, world, alive);
 }
 
 sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def, sadmm_body_id *id)
@@ -116,6 +119,7 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def,
     }
     if (def->name) strncpy(body->name, def->name, SADMM_NAME_SIZE - 1);
     if (slot == world->body_slots) ++world->body_slots;
+    sadmm_slot_taken(&world->body_marks, slot);
     ++world->body_count;
     id->slot = (uint32_t)slot + 1;
     id->generation = generation;
@@ -127,12 +131,13 @@ sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id)
     struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", &world->error);
     if (!body) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_world_take_back(world));
-    for (size_t s = 0; s < world->shape_slots; ++s)
+    for (size_t s = body->first_shape; body->shape_count > 0; ++s)
         if (world->shapes[s].alive && world->shapes[s].body == (int32_t)id.slot - 1) sadmm_world_kill_shape(world, s);
     sadmm_pair_table_forget(&world->disabled_pairs, id.slot - 1);
     body->alive = false;
     ++body->generation;
     --world->body_count;
+    sadmm_slot_freed(&world->body_marks, id.slot - 1);
     if (body->type == SADMM_BODY_DYNAMIC) --world->dynamic_count;
     world->contacts_readable = false;
     return SADMM_OK;
@@ -146,13 +151,12 @@ int32_t sadmm_world_body_count(const sadmm_world *world)
 sadmm_status sadmm_world_body_at(const sadmm_world *world, int32_t index, sadmm_body_id *id)
 {
     struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    if (!id) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "id is NULL");
     if (index < 0 || index >= world->body_count)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index, world->body_count);
     size_t slot = (size_t)index;
-    if ((size_t)world->body_count < world->body_slots) {
-        slot = 0;
-        for (int32_t left = index; !world->bodies[slot].alive || left-- > 0;) ++slot;
-    }
+    if ((size_t)world->body_count < world->body_slots)
+        slot = sadmm_slot_at((struct sadmm_slot_marks *)&world->body_marks, index, world, alive);
     id->slot = (uint32_t)slot + 1;
     id->generation = world->bodies[slot].generation;
     return SADMM_OK;
@@ -160,8 +164,10 @@ sadmm_status sadmm_world_body_at(const sadmm_world *world, int32_t index, sadmm_
 
 sadmm_status sadmm_world_body_state(const sadmm_world *world, sadmm_body_id id, sadmm_body_state *state)
 {
-    const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", (struct sadmm_error *)&world->error);
+    struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
+    if (!state) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "state is NULL");
     TRY(sadmm_world_pull_bodies(world));
     memcpy(state->position, body->rigid.position, sizeof state->position);
     memcpy(state->orientation, body->rigid.orientation, sizeof state->orientation);
@@ -193,8 +199,10 @@ sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, co
 
 sadmm_status sadmm_world_body_def(const sadmm_world *world, sadmm_body_id id, sadmm_body_def *def)
 {
-    const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", (struct sadmm_error *)&world->error);
+    struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
+    if (!def) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def is NULL");
     TRY(sadmm_world_pull_bodies(world));
     memset(def, 0, sizeof *def);
     def->type = body->type;
@@ -229,6 +237,7 @@ sadmm_status sadmm_world_body_contact_wrench(const sadmm_world *world, sadmm_bod
     struct sadmm_error *error = (struct sadmm_error *)&world->error;
     const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
+    if (!wrench) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "wrench is NULL");
     TRY(sadmm_world_pull_bodies(world));
     if (!world->stepped || !world->step_settings.recover_wrenches)
         return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE,

@@ -18,9 +18,18 @@ struct sadmm_world_body {
     int32_t environment;
     int32_t system_body; /* in the last step, -1: static or not there */
     struct sadmm_rigid rigid;
+    int32_t shape_count;
+    size_t first_shape;  /* none of its shapes is in a lower slot */
     double contact_wrench[6];
     struct sadmm_steady steady;
     char name[SADMM_NAME_SIZE];
+};
+
+/* Where to begin looking among the slots of an array, so that no call walks over all of them. */
+struct sadmm_slot_marks {
+    size_t free;   /* no slot below is free */
+    size_t at;     /* any slot, */
+    int32_t below; /* and how many live ones are below it */
 };
 
 /* A set of slot pairs, key = low slot << 32 | high slot, sorted; `values` where the set has them. */
@@ -37,10 +46,12 @@ struct sadmm_world {
     struct sadmm_world_body *bodies;
     size_t body_slots, body_capacity;
     int32_t body_count, dynamic_count;
+    struct sadmm_slot_marks body_marks;
     struct sadmm_shape *shapes;
     uint32_t *shape_generations;
     size_t shape_slots, shape_capacity, shape_generation_capacity;
     int32_t shape_count;
+    struct sadmm_slot_marks shape_marks;
     uint32_t shape_revisions;
     struct sadmm_pair_table disabled_pairs, friction_pairs;
 
@@ -111,6 +122,15 @@ struct sadmm_world_body *sadmm_world_find_body(const sadmm_world *world, sadmm_b
 struct sadmm_shape *sadmm_world_find_shape(const sadmm_world *world, sadmm_shape_id id, const char *argument,
                                            struct sadmm_error *error);
 void sadmm_world_kill_shape(sadmm_world *world, size_t slot);
+
+/* The lowest free slot, where there is one; sadmm_slot_taken says that it is free no more. `alive` tells of one slot. */
+size_t sadmm_slot_free(struct sadmm_slot_marks *marks, const sadmm_world *world,
+                       bool (*alive)(const sadmm_world *world, size_t slot));
+/* The slot of the index-th live one, where there is one. */
+size_t sadmm_slot_at(struct sadmm_slot_marks *marks, int32_t index, const sadmm_world *world,
+                     bool (*alive)(const sadmm_world *world, size_t slot));
+void sadmm_slot_taken(struct sadmm_slot_marks *marks, size_t slot);
+void sadmm_slot_freed(struct sadmm_slot_marks *marks, size_t slot);
 
 /* Is `key` in the table? *at is where it is or belongs. */
 bool sadmm_pair_table_find(const struct sadmm_pair_table *table, uint64_t key, size_t *at);

@@ -33,6 +33,11 @@ struct sadmm_shape *sadmm_world_find_shape(const sadmm_world *world, sadmm_shape
     return NULL;
 }
 
+static bool alive(const sadmm_world *world, size_t slot)
+{
+    return world->shapes[slot].alive;
+}
+
 static int size_entries(sadmm_shape_type type)
 {
     switch (type) {
@@ -64,18 +69,15 @@ static sadmm_status check_def(const struct sadmm_world_body *body, const sadmm_s
 sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, const sadmm_shape_def *def, sadmm_shape_id *id)
 {
     struct sadmm_error *error = &world->error;
-    const struct sadmm_world_body *body = sadmm_world_find_body(world, body_id, "body", error);
+    struct sadmm_world_body *body = sadmm_world_find_body(world, body_id, "body", error);
     double orientation[4];
     if (!body) return SADMM_ERROR_STALE_ID;
     if (!def) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def is NULL");
     TRY(check_def(body, def, orientation, error));
     TRY(sadmm_world_take_back(world));
 
-    size_t slot = 0;
-    if ((size_t)world->shape_count == world->shape_slots)
-        slot = world->shape_slots;
-    else
-        while (world->shapes[slot].alive) ++slot;
+    size_t slot = world->shape_slots;
+    if ((size_t)world->shape_count < world->shape_slots) slot = sadmm_slot_free(&world->shape_marks, world, alive);
     if (slot >= (size_t)1 << 28)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d shapes: a world holds at most 2^28", world->shape_count);
     if (!sadmm_grow((void **)&world->shapes, &world->shape_capacity, world->shape_slots, slot + 1, sizeof *world->shapes) ||
@@ -101,6 +103,8 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
     shape->alive = true;
     shape->revision = ++world->shape_revisions;
     ++world->shape_count;
+    sadmm_slot_taken(&world->shape_marks, slot);
+    if (body->shape_count++ == 0 || slot < body->first_shape) body->first_shape = slot;
     if (id) {
         id->slot = (uint32_t)slot + 1;
         id->generation = world->shape_generations[slot];
@@ -113,6 +117,8 @@ void sadmm_world_kill_shape(sadmm_world *world, size_t slot)
     world->shapes[slot].alive = false;
     ++world->shape_generations[slot];
     --world->shape_count;
+    --world->bodies[world->shapes[slot].body].shape_count;
+    sadmm_slot_freed(&world->shape_marks, slot);
     sadmm_pair_table_forget(&world->friction_pairs, (uint32_t)slot);
     world->contacts_readable = false;
 }
@@ -133,13 +139,12 @@ int32_t sadmm_world_shape_count(const sadmm_world *world)
 sadmm_status sadmm_world_shape_at(const sadmm_world *world, int32_t index, sadmm_shape_id *id)
 {
     struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    if (!id) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "id is NULL");
     if (index < 0 || index >= world->shape_count)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index, world->shape_count);
     size_t slot = (size_t)index;
-    if ((size_t)world->shape_count < world->shape_slots) {
-        slot = 0;
-        for (int32_t left = index; !world->shapes[slot].alive || left-- > 0;) ++slot;
-    }
+    if ((size_t)world->shape_count < world->shape_slots)
+        slot = sadmm_slot_at((struct sadmm_slot_marks *)&world->shape_marks, index, world, alive);
     id->slot = (uint32_t)slot + 1;
     id->generation = world->shape_generations[slot];
     return SADMM_OK;
@@ -147,8 +152,10 @@ sadmm_status sadmm_world_shape_at(const sadmm_world *world, int32_t index, sadmm
 
 sadmm_status sadmm_world_shape_def(const sadmm_world *world, sadmm_shape_id id, sadmm_shape_def *def, sadmm_body_id *body)
 {
-    const struct sadmm_shape *shape = sadmm_world_find_shape(world, id, "id", (struct sadmm_error *)&world->error);
+    struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    const struct sadmm_shape *shape = sadmm_world_find_shape(world, id, "id", error);
     if (!shape) return SADMM_ERROR_STALE_ID;
+    if (!def) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def is NULL");
     memset(def, 0, sizeof *def);
     def->type = shape->type;
     memcpy(def->size, shape->size, sizeof def->size);

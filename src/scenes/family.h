@@ -24,6 +24,8 @@ extern const struct sadmm_scene_family sadmm_family_oblique_stacks;
 extern const struct sadmm_scene_family sadmm_family_card_houses;
 extern const struct sadmm_scene_family sadmm_family_pyramid;
 extern const struct sadmm_scene_family sadmm_family_pile;
+extern const struct sadmm_scene_family sadmm_family_settled_pile;
+extern const struct sadmm_scene_family sadmm_family_burst;
 extern const struct sadmm_scene_family sadmm_family_incline;
 extern const struct sadmm_scene_family sadmm_family_bounce;
 extern const struct sadmm_scene_family sadmm_family_spin_plate;

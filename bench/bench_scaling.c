@@ -1,0 +1,379 @@
+/* subadmm-bench scaling: whole steps of a scene that grows, on the CPU by threads and on the GPU. Times come from steps
+ * without a certificate; the errors beside them from further steps of the same run with it. A size that would take too
+ * long is left out, and the row says so. bench/plot_scaling.py draws the CSV. */
+#include <ctype.h>
+#include <errno.h>
+#include <getopt.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+#include "bench.h"
+#include "bench_options.h"
+#include "scene_timing.h"
+
+static const char command[] = "scaling";
+
+struct options {
+    const char *scene;
+    sadmm_backend backend; /* AUTO: cpu and cuda */
+    int precision;         /* -1: both */
+    long sizes[BENCH_LIST], threads[BENCH_LIST], steps, warm_up, certified, device;
+    int size_count, thread_count;
+    double max_seconds;
+    const char *csv;
+};
+
+/* What is measured at all sizes: a backend in a precision on a number of threads. */
+struct series {
+    sadmm_backend backend;
+    sadmm_precision precision;
+    int threads;
+    char runs_on[128];
+    double size, least_s; /* of the last row: its N, and what warm-up, one timed step and the certificates took */
+};
+
+struct row {
+    const struct series *series;
+    const char *scene;
+    struct scene_timing timing;
+    char status[SADMM_MESSAGE_SIZE]; /* "ok", "skipped: why" or "failed: why" */
+};
+
+/* ---- output ---------------------------------------------------------------------------------------------------- */
+
+struct output {
+    FILE *table; /* NULL: not wanted */
+    FILE *csv;
+};
+
+static const char *backend_name(sadmm_backend backend)
+{
+    sadmm_backend_info info;
+    return sadmm_backend_query(backend, &info) == SADMM_OK ? info.name : "?";
+}
+
+static void write_text(FILE *out, const char *text)
+{
+    putc('"', out);
+    for (; *text; ++text) {
+        if (*text == '"') putc('"', out);
+        putc(*text == '\n' ? ' ' : *text, out);
+    }
+    putc('"', out);
+}
+
+static void write_header(const struct output *out, const struct options *o)
+{
+    if (out->csv)
+        fputs(
+            "scene,backend,threads,precision,runs_on,bodies,contacts,pairs,iterations,steps,"
+            "collide_ms,assemble_ms,solve_ms,finish_ms,solver_ms,step_ms,ncp_max,momentum_max,hash_step,state_hash,commit,status\n",
+            out->csv);
+    if (!out->table) return;
+    fprintf(out->table,
+            "medians of up to %ld steps after %ld, ms; solver: all but collide; ncp_max (m/s), momentum: worst of %ld "
+            "certified steps\n",
+            o->steps, o->warm_up, o->certified);
+    fprintf(out->table, "%-24s %-5s %4s %-4s %9s %5s %9s %9s %9s %9s %9s %9s %5s %8s %8s %16s\n", "scene", "", "thr",
+            "", "contacts", "iter", "collide", "assemble", "solve", "finish", "solver", "step", "steps", "ncp_max",
+            "momentum", "state");
+}
+
+static void write_csv(FILE *out, const struct row *row)
+{
+    const struct scene_timing *t = &row->timing;
+    const struct series *s = row->series;
+    fprintf(out, "%s,%s,%d,%s,", row->scene, backend_name(s->backend), s->threads, bench_precision_name(s->precision));
+    write_text(out, s->runs_on);
+    if (t->steps > 0)
+        fprintf(out, ",%d,%d,%d,%d,%d,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g", t->last.bodies, t->last.contacts, t->last.pairs,
+                t->last.iterations, t->steps, t->ms.collide, t->ms.assemble, t->ms.solve, t->ms.finish, t->solver_ms,
+                t->ms.total);
+    else fputs(",,,,,,,,,,,", out);
+    if (t->certified > 0) fprintf(out, ",%.3e,%.3e", t->ncp_max, t->momentum_max);
+    else fputs(",,", out);
+    if (t->steps > 0) fprintf(out, ",%" PRId64 ",%016" PRIx64, t->last.step, t->state_hash);
+    else fputs(",,", out);
+    fprintf(out, ",%s,", sadmm_build_commit());
+    write_text(out, row->status);
+    putc('\n', out);
+}
+
+static void write_row(const struct output *out, const struct row *row)
+{
+    const struct scene_timing *t = &row->timing;
+    const struct series *s = row->series;
+    if (out->csv) {
+        write_csv(out->csv, row);
+        fflush(out->csv); /* a run that is broken off leaves what it measured */
+    }
+    if (!out->table) return;
+    fprintf(out->table, "%-24s %-5s %4d %-4s ", row->scene, backend_name(s->backend), s->threads,
+            bench_precision_name(s->precision));
+    if (t->steps > 0) {
+        fprintf(out->table, "%9d %5d %9.3f %9.3f %9.3f %9.3f %9.3f %9.3f %5d ", t->last.contacts, t->last.iterations,
+                t->ms.collide, t->ms.assemble, t->ms.solve, t->ms.finish, t->solver_ms, t->ms.total, t->steps);
+        if (t->certified > 0) fprintf(out->table, "%8.1e %8.1e ", t->ncp_max, t->momentum_max);
+        else fprintf(out->table, "%8s %8s ", "-", "-");
+        fprintf(out->table, "%016" PRIx64, t->state_hash);
+    }
+    if (strcmp(row->status, "ok")) fputs(row->status, out->table);
+    putc('\n', out->table);
+    fflush(out->table);
+}
+
+/* ---- rows ------------------------------------------------------------------------------------------------------ */
+
+/* False: something failed (what is skipped has not failed). */
+static bool run_row(const struct options *o, struct series *s, long size, const struct output *out)
+{
+    struct scene_timing_plan plan = {(int)o->warm_up, (int)o->steps, (int)o->certified, o->max_seconds};
+    struct sadmm_scene scene;
+    struct sadmm_error error = {SADMM_OK, ""};
+    char spec[96];
+    snprintf(spec, sizeof spec, "%s:%ld", o->scene, size);
+    struct row row = {.series = s, .scene = spec, .status = "ok"};
+    double expected_s = s->size > 0 ? s->least_s * (double)size / s->size : 0;
+    sadmm_status status = SADMM_OK;
+    if (expected_s > o->max_seconds) {
+        snprintf(row.status, sizeof row.status, "skipped: would take %.3g s at least, --max-seconds is %g", expected_s,
+                 o->max_seconds);
+    } else {
+        status = sadmm_scene_open(spec, &scene, &error);
+        if (status == SADMM_OK) {
+            scene.def.backend = s->backend;
+            scene.def.precision = s->precision;
+            scene.def.device = (int)o->device;
+            scene.def.settings.threads = s->threads;
+            status = scene_timing_run(&scene, &plan, &row.timing, &error);
+        }
+        if (status != SADMM_OK) snprintf(row.status, sizeof row.status, "failed: %.300s", error.message);
+        else if (row.timing.steps == 0)
+            snprintf(row.status, sizeof row.status,
+                     "skipped: no step timed within --max-seconds %g (building %.3g s, slowest step %.3g s)",
+                     o->max_seconds, row.timing.build_s, row.timing.slowest_step_s);
+        if (status == SADMM_OK) {
+            double step_s = row.timing.steps > 0 ? 1e-3 * row.timing.ms.total : row.timing.slowest_step_s;
+            s->size = (double)size;
+            s->least_s = row.timing.build_s + step_s * (double)(o->warm_up + 1 + o->certified);
+        }
+    }
+    write_row(out, &row);
+    return status == SADMM_OK;
+}
+
+static bool run_series(const struct options *o, struct series *s, const struct output *out)
+{
+    bool good = true;
+    for (int k = 0; k < o->size_count; ++k)
+        if (!run_row(o, s, o->sizes[k], out)) good = false;
+    return good;
+}
+
+/* "model name" of the first core, else "CPU". */
+static void cpu_name(char *name, size_t size)
+{
+    char line[256];
+    snprintf(name, size, "CPU");
+    FILE *file = fopen("/proc/cpuinfo", "r");
+    if (!file) return;
+    while (fgets(line, sizeof line, file)) {
+        const char *colon = strchr(line, ':');
+        if (strncmp(line, "model name", 10) || !colon) continue;
+        for (++colon; isspace((unsigned char)*colon); ++colon) {}
+        snprintf(name, size, "%.*s", (int)strcspn(colon, "\n"), colon);
+        break;
+    }
+    fclose(file);
+}
+
+static int machine_threads(void)
+{
+#ifdef _OPENMP
+    return omp_get_num_procs();
+#else
+    return 1;
+#endif
+}
+
+static bool run_cpu(const struct options *o, sadmm_precision precision, const struct output *out, FILE *notes)
+{
+    struct series s = {.backend = SADMM_BACKEND_CPU, .precision = precision};
+    int most = machine_threads();
+    bool good = true;
+    cpu_name(s.runs_on, sizeof s.runs_on);
+    for (int t = 0; t < o->thread_count; ++t) {
+        if (o->threads[t] > most) {
+            fprintf(notes, "cpu, %ld threads: left out, this machine has %d\n", o->threads[t], most);
+            continue;
+        }
+        s.threads = (int)o->threads[t];
+        s.size = 0;
+        if (!run_series(o, &s, out)) good = false;
+    }
+    return good;
+}
+
+/* False: not available although asked for by name, or something failed. */
+static bool run_backend(const struct options *o, sadmm_backend backend, sadmm_precision precision,
+                        const struct output *out, FILE *notes)
+{
+    sadmm_backend_info info;
+    if (sadmm_backend_query(backend, &info) != SADMM_OK) return false;
+    if (!info.available[precision]) {
+        fprintf(notes, "%s in %s: not available: %s\n", info.name, bench_precision_name(precision), info.reason);
+        return o->backend != backend;
+    }
+    if (backend == SADMM_BACKEND_CPU) return run_cpu(o, precision, out, notes);
+    struct series s = {.backend = backend, .precision = precision, .threads = 1};
+    if (backend == SADMM_BACKEND_CUDA) snprintf(s.runs_on, sizeof s.runs_on, "%.100s", info.reason);
+    else cpu_name(s.runs_on, sizeof s.runs_on);
+    return run_series(o, &s, out);
+}
+
+/* ---- command line ---------------------------------------------------------------------------------------------- */
+
+static void usage(FILE *out)
+{
+    fprintf(out,
+            "usage: subadmm-bench scaling [options]\n\n"
+            "  --scene NAME               a scene that takes a size, default sliding_cubes\n"
+            "  --sizes N[,N...]           ascending; default 100,500,1000,2000,5000,10000,100000,1000000\n"
+            "  --backend ref|cpu|cuda|all all: cpu and cuda (default)\n"
+            "  --threads N[,N...]         CPU threads, default 1,2,4,8,16; more than the machine has are left out\n"
+            "  --precision f32|f64|both   default f32\n"
+            "  --device N                 accelerator, default 0\n"
+            "  --steps N                  timed steps a row, default 20\n"
+            "  --warm-up N                steps before them, default 5\n"
+            "  --certified N              steps with the certificate after them, default 1\n"
+            "  --max-seconds S            a row; larger sizes that would take longer are skipped; default 60\n"
+            "  --csv FILE|-               the rows as CSV\n");
+}
+
+static int bad(const char *option, const char *value, const char *allowed)
+{
+    return bench_bad_option(command, option, value, allowed);
+}
+
+/* 0, 2 for wrong usage, -1 for --help. */
+static int parse(int argc, char **argv, struct options *o)
+{
+    static const struct option longs[] = {
+        {"scene", required_argument, NULL, 'S'},
+        {"sizes", required_argument, NULL, 'n'},
+        {"backend", required_argument, NULL, 'b'},
+        {"threads", required_argument, NULL, 't'},
+        {"precision", required_argument, NULL, 'p'},
+        {"device", required_argument, NULL, 'd'},
+        {"steps", required_argument, NULL, 's'},
+        {"warm-up", required_argument, NULL, 'w'},
+        {"certified", required_argument, NULL, 'c'},
+        {"max-seconds", required_argument, NULL, 'm'},
+        {"csv", required_argument, NULL, 'C'},
+        {"help", no_argument, NULL, 'h'},
+        {NULL, 0, NULL, 0},
+    };
+    for (int option; (option = getopt_long(argc, argv, "h", longs, NULL)) != -1;) {
+        switch (option) {
+        case 'S': o->scene = optarg; break;
+        case 'n':
+            if (!bench_parse_list(optarg, 1, 1000000, o->sizes, &o->size_count))
+                return bad("sizes", optarg, "up to 16 numbers in [1, 1000000]");
+            for (int k = 1; k < o->size_count; ++k)
+                if (o->sizes[k] <= o->sizes[k - 1]) return bad("sizes", optarg, "ascending");
+            break;
+        case 'b':
+            if (!bench_parse_backend(optarg, &o->backend)) return bad("backend", optarg, "ref, cpu, cuda or all");
+            break;
+        case 't':
+            if (!bench_parse_list(optarg, 1, 1024, o->threads, &o->thread_count))
+                return bad("threads", optarg, "up to 16 numbers in [1, 1024]");
+            break;
+        case 'p':
+            if (!bench_parse_precision(optarg, &o->precision)) return bad("precision", optarg, "f32, f64 or both");
+            break;
+        case 'd':
+            if (!bench_parse_number(optarg, 0, 1023, &o->device)) return bad("device", optarg, "in [0, 1023]");
+            break;
+        case 's':
+            if (!bench_parse_number(optarg, 1, 100000, &o->steps)) return bad("steps", optarg, "in [1, 100000]");
+            break;
+        case 'w':
+            if (!bench_parse_number(optarg, 0, 100000, &o->warm_up)) return bad("warm-up", optarg, "in [0, 100000]");
+            break;
+        case 'c':
+            if (!bench_parse_number(optarg, 0, 1000, &o->certified)) return bad("certified", optarg, "in [0, 1000]");
+            break;
+        case 'm':
+            if (!bench_parse_seconds(optarg, 86400, &o->max_seconds))
+                return bad("max-seconds", optarg, "in (0, 86400]");
+            break;
+        case 'C': o->csv = optarg; break;
+        case 'h': usage(stdout); return -1;
+        default: usage(stderr); return 2;
+        }
+    }
+    if (optind < argc) {
+        fprintf(stderr, "subadmm-bench %s: unexpected argument \"%s\"\n", command, argv[optind]);
+        return 2;
+    }
+    /* Before anything is measured: does the scene take the smallest and the largest size? */
+    for (int k = 0; k < 2; ++k) {
+        struct sadmm_scene scene;
+        struct sadmm_error error;
+        char spec[96];
+        snprintf(spec, sizeof spec, "%.60s:%ld", o->scene, o->sizes[k ? o->size_count - 1 : 0]);
+        if (sadmm_scene_open(spec, &scene, &error) != SADMM_OK) {
+            fprintf(stderr, "subadmm-bench %s: %s\n", command, error.message);
+            return 2;
+        }
+    }
+    return 0;
+}
+
+int bench_scaling(int argc, char **argv)
+{
+    struct options o = {
+        .scene = "sliding_cubes",
+        .backend = SADMM_BACKEND_AUTO,
+        .precision = SADMM_F32,
+        .sizes = {100, 500, 1000, 2000, 5000, 10000, 100000, 1000000},
+        .size_count = 8,
+        .threads = {1, 2, 4, 8, 16},
+        .thread_count = 5,
+        .steps = 20,
+        .warm_up = 5,
+        .certified = 1,
+        .max_seconds = 60,
+    };
+    static const sadmm_backend order[] = {SADMM_BACKEND_REF, SADMM_BACKEND_CPU, SADMM_BACKEND_CUDA};
+    int status = parse(argc, argv, &o);
+    if (status) return status < 0 ? 0 : status;
+    bool to_stdout = o.csv && !strcmp(o.csv, "-");
+    struct output out = {.table = to_stdout ? NULL : stdout, .csv = to_stdout ? stdout : NULL};
+    if (o.csv && !to_stdout && !(out.csv = fopen(o.csv, "w"))) {
+        fprintf(stderr, "subadmm-bench %s: cannot write %s: %s\n", command, o.csv, strerror(errno));
+        return 1;
+    }
+    write_header(&out, &o);
+    for (int precision = SADMM_F32; precision <= SADMM_F64; ++precision) {
+        if (o.precision >= 0 && o.precision != precision) continue;
+        for (size_t k = 0; k < sizeof order / sizeof *order; ++k) {
+            bool wanted = o.backend == SADMM_BACKEND_AUTO ? order[k] != SADMM_BACKEND_REF : order[k] == o.backend;
+            if (wanted && !run_backend(&o, order[k], (sadmm_precision)precision, &out, to_stdout ? stderr : stdout))
+                status = 1;
+        }
+    }
+    bool written = !out.csv || !ferror(out.csv);
+    if (out.csv && !to_stdout && fclose(out.csv)) written = false;
+    if (!written) {
+        fprintf(stderr, "subadmm-bench %s: cannot write %s\n", command, o.csv);
+        status = 1;
+    }
+    return status;
+}

@@ -1,0 +1,228 @@
+/* The `subadmm-bench` command as its users see it: a small run, its CSV, what it leaves out, bad options. */
+#include <check.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+
+#include "run_suite.h"
+
+static const char command[] = SUBADMM_BENCH; /* the build gives its path */
+
+enum { MAX_TEXT = 1 << 16, MAX_ROWS = 16, COLUMNS = 22 };
+
+/* Run with these arguments; returns the exit code. `out` gets what it writes to both outputs. */
+static int run(const char *arguments, char *out)
+{
+    char text[1024];
+    snprintf(text, sizeof text, "%s %s 2>&1 </dev/null", command, arguments);
+    FILE *pipe = popen(text, "r");
+    ck_assert_ptr_nonnull(pipe);
+    out[fread(out, 1, MAX_TEXT - 1, pipe)] = 0;
+    int status = pclose(pipe);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128;
+}
+
+/* ---- CSV ------------------------------------------------------------------------------------------------------- */
+
+struct table {
+    char text[MAX_TEXT];
+    char *names[COLUMNS], *fields[MAX_ROWS][COLUMNS];
+    int rows;
+};
+
+/* Cut a line into its fields, quotes taken off ("" inside them is one quote); returns the start of the next line. */
+static char *cut(char *at, char *fields[COLUMNS])
+{
+    for (int k = 0; k < COLUMNS; ++k) {
+        char *to = fields[k] = at;
+        bool quoted = *at == '"';
+        for (at += quoted; *at && (quoted || (*at != ',' && *at != '\n')); ++at) {
+            if (quoted && *at == '"' && *++at != '"') break;
+            *to++ = *at;
+        }
+        char end = *at++;
+        *to = 0;
+        ck_assert_msg(end == (k == COLUMNS - 1 ? '\n' : ','), "field %d ends in '%c'", k, end);
+    }
+    return at;
+}
+
+static void read_csv(const char *path, struct table *table)
+{
+    FILE *file = fopen(path, "r");
+    ck_assert_ptr_nonnull(file);
+    table->text[fread(table->text, 1, MAX_TEXT - 1, file)] = 0;
+    fclose(file);
+    char *at = cut(table->text, table->names);
+    for (table->rows = 0; *at; ++table->rows) {
+        ck_assert_int_lt(table->rows, MAX_ROWS);
+        at = cut(at, table->fields[table->rows]);
+    }
+}
+
+static const char *field(const struct table *table, int row, const char *name)
+{
+    for (int k = 0; k < COLUMNS; ++k)
+        if (!strcmp(table->names[k], name)) return table->fields[row][k];
+    ck_abort_msg("no column \"%s\"", name);
+}
+
+static double number(const struct table *table, int row, const char *name)
+{
+    const char *text = field(table, row, name);
+    char *end;
+    double value = strtod(text, &end);
+    ck_assert_msg(end != text && !*end && isfinite(value), "row %d: %s = \"%s\"", row, name, text);
+    return value;
+}
+
+static char csv_path[64];
+
+static void make_csv(void)
+{
+    strcpy(csv_path, "/tmp/test_bench_XXXXXX");
+    int file = mkstemp(csv_path);
+    ck_assert_int_ge(file, 0);
+    fclose(fdopen(file, "w"));
+}
+
+static void remove_csv(void) { remove(csv_path); }
+
+/* ---------------------------------------------------------------------------------------------------------------- */
+
+/* Two series of two sizes. Where there is one core, the second series is left out and that is said. */
+START_TEST(scaling_measures)
+{
+    static struct table table;
+    static char out[MAX_TEXT];
+    char arguments[256];
+    snprintf(arguments, sizeof arguments,
+             "scaling --sizes 100,200 --threads 1,2 --backend cpu --precision f64 --steps 9 --warm-up 3 --csv %s",
+             csv_path);
+    int code = run(arguments, out);
+    ck_assert_msg(code == 0, "exit code %d\n%s", code, out);
+    read_csv(csv_path, &table);
+    if (table.rows == 2) ck_assert_msg(strstr(out, "cpu, 2 threads: left out, this machine has 1"), "%s", out);
+    else ck_assert_int_eq(table.rows, 4);
+    for (int row = 0; row < table.rows; ++row) {
+        int size = row % 2 ? 200 : 100;
+        char spec[32];
+        snprintf(spec, sizeof spec, "sliding_cubes:%d", size);
+        ck_assert_str_eq(field(&table, row, "scene"), spec);
+        ck_assert_str_eq(field(&table, row, "backend"), "cpu");
+        ck_assert_str_eq(field(&table, row, "precision"), "f64");
+        ck_assert_str_eq(field(&table, row, "status"), "ok");
+        ck_assert(*field(&table, row, "runs_on") && *field(&table, row, "commit"));
+        ck_assert(number(&table, row, "threads") == 1 + row / 2);
+        ck_assert(number(&table, row, "bodies") == size);
+        ck_assert(number(&table, row, "contacts") == 4 * number(&table, row, "pairs")); /* faces on faces */
+        ck_assert(number(&table, row, "contacts") >= 4 * size);
+        ck_assert(number(&table, row, "iterations") == 120);
+        ck_assert(number(&table, row, "steps") == 9);
+        ck_assert(number(&table, row, "hash_step") == 12);
+
+        /* Each is a median by itself, so the parts make up the whole only about; a step of this takes 0.5 ms. */
+        double step = number(&table, row, "step_ms"), solver = number(&table, row, "solver_ms"), sum = 0;
+        static const char *const parts[] = {"collide_ms", "assemble_ms", "solve_ms", "finish_ms"};
+        for (int k = 0; k < 4; ++k) {
+            double part = number(&table, row, parts[k]);
+            ck_assert_msg(part > 0 && part < step, "%s = %g of %g", parts[k], part, step);
+            sum += part;
+        }
+        ck_assert_msg(sum < 3 * step && sum > step / 3, "the parts of a step are %g of %g ms", sum, step);
+        ck_assert_msg(step > 0.01 && step < 1000, "a step of %g ms", step);
+        ck_assert(solver > 0 && solver < step);
+
+        /* The raft in f64: far better than the limits, which are what f32 reaches. */
+        ck_assert(number(&table, row, "ncp_max") >= 0 && number(&table, row, "ncp_max") < 1e-5);
+        ck_assert(number(&table, row, "momentum_max") >= 0 && number(&table, row, "momentum_max") < 1e-2);
+    }
+    /* The state does not depend on the number of threads, but on the scene. */
+    ck_assert_uint_eq(strlen(field(&table, 0, "state_hash")), 16);
+    ck_assert_str_ne(field(&table, 0, "state_hash"), field(&table, 1, "state_hash"));
+    for (int row = 2; row < table.rows; ++row)
+        ck_assert_str_eq(field(&table, row, "state_hash"), field(&table, row - 2, "state_hash"));
+}
+END_TEST
+
+/* No time at all: nothing is measured, every row is there and says so. */
+START_TEST(scaling_says_what_it_skips)
+{
+    static struct table table;
+    static char out[MAX_TEXT];
+    char arguments[256];
+    snprintf(arguments, sizeof arguments,
+             "scaling --sizes 10,1000000 --threads 1 --backend cpu --max-seconds 1e-9 --csv %s", csv_path);
+    ck_assert_int_eq(run(arguments, out), 0);
+    read_csv(csv_path, &table);
+    ck_assert_int_eq(table.rows, 2);
+    ck_assert_msg(strstr(field(&table, 0, "status"), "skipped: no step timed within --max-seconds 1e-09"), "%s", out);
+    ck_assert_msg(strstr(field(&table, 1, "status"), "skipped: would take"), "%s", out);
+    for (int row = 0; row < 2; ++row) {
+        ck_assert_str_eq(field(&table, row, "step_ms"), "");
+        ck_assert_str_eq(field(&table, row, "state_hash"), "");
+        ck_assert_msg(strstr(out, field(&table, row, "status")), "%s", out);
+    }
+    ck_assert_int_eq(run("scaling --sizes 10 --threads 1024 --backend cpu --csv -", out), 0);
+    ck_assert_msg(strstr(out, "cpu, 1024 threads: left out, this machine has"), "%s", out);
+}
+END_TEST
+
+static const struct {
+    const char *arguments, *says;
+} refused[] = {
+    {"", "usage: subadmm-bench COMMAND"},
+    {"fly", "unknown command \"fly\""},
+    {"scaling --sizes 0", "--sizes 0: must be up to 16 numbers"},
+    {"scaling --sizes 10,x", "--sizes 10,x: must be"},
+    {"scaling --sizes 200,100", "--sizes 200,100: must be ascending"},
+    {"scaling --scene incline", "incline takes no size"},
+    {"scaling --scene pyramid --sizes 10,301", "N must be in [1, 300]"},
+    {"scaling --threads 0", "--threads 0: must be"},
+    {"scaling --backend gpu", "--backend gpu: must be ref, cpu, cuda or all"},
+    {"scaling --precision f16", "--precision f16: must be f32, f64 or both"},
+    {"scaling --steps 0", "--steps 0: must be in [1, 100000]"},
+    {"scaling --warm-up -1", "--warm-up -1: must be"},
+    {"scaling --max-seconds 0", "--max-seconds 0: must be in (0, 86400]"},
+    {"scaling --max-seconds nan", "--max-seconds nan: must be"},
+    {"scaling --device -1", "--device -1: must be"},
+    {"scaling here", "unexpected argument \"here\""},
+    {"kernels --threads 0", "--threads 0: must be"},
+    {"kernels --contacts 1,,2", "--contacts 1,,2: must be"},
+    {"kernels --precision f16", "--precision f16: must be"},
+    {"kernels --seconds 0", "--seconds 0: must be in (0, 600]"},
+};
+
+START_TEST(bad_options_are_refused)
+{
+    static char out[MAX_TEXT];
+    int code = run(refused[_i].arguments, out);
+    ck_assert_msg(code == 2 && strstr(out, refused[_i].says), "subadmm-bench %s: exit code %d\n%s",
+                  refused[_i].arguments, code, out);
+}
+END_TEST
+
+START_TEST(a_file_that_cannot_be_written)
+{
+    static char out[MAX_TEXT];
+    ck_assert_int_eq(run("scaling --sizes 10 --threads 1 --backend cpu --csv /nowhere/x.csv", out), 1);
+    ck_assert_msg(strstr(out, "cannot write /nowhere/x.csv"), "%s", out);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("bench");
+    TCase *cases = tcase_create("bench");
+    tcase_set_timeout(cases, 60);
+    tcase_add_checked_fixture(cases, make_csv, remove_csv);
+    tcase_add_test(cases, scaling_measures);
+    tcase_add_test(cases, scaling_says_what_it_skips);
+    tcase_add_loop_test(cases, bad_options_are_refused, 0, sizeof refused / sizeof *refused);
+    tcase_add_test(cases, a_file_that_cannot_be_written);
+    suite_add_tcase(suite, cases);
+    return run_suite(suite);
+}
