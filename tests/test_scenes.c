@@ -146,7 +146,7 @@ END_TEST
 /* Ten times as many contacts in one step, each of them where it belongs, and everything lands. */
 START_TEST(burst_grows_in_one_step)
 {
-    static const int sizes[] = { 1, 2, 10 };
+    static const int sizes[] = { 1, 2, 6 };
     int n = sizes[_i / 2], small = 4 * n - 1, over = 5 * n - 2;
     char spec[32];
     snprintf(spec, sizeof spec, "burst:%d", n);

@@ -518,50 +518,52 @@ START_TEST(many_bodies_come_and_go)
     sadmm_world_def def = small_def();
     sadmm_world *world = create_world(&def);
     sadmm_body_def body = box_body(0);
+    sadmm_body_state state;
     sadmm_shape_def box = box_shape();
-    sadmm_body_id *ids = malloc(COUNT * sizeof *ids);
+    sadmm_body_id *ids = malloc(COUNT * sizeof *ids), id;
     sadmm_shape_id shape;
+    long failed = 0, wrong = 0; /* counted: a million assertions take longer than what they look at */
     for (int32_t i = 0; i < COUNT; ++i) {
         body.position[0] = i;
-        MUST(world, sadmm_world_add_body(world, &body, &ids[i]));
-        MUST(world, sadmm_world_add_shape(world, ids[i], &box, NULL));
-        if (i % 5 == 0) MUST(world, sadmm_world_add_shape(world, ids[i], &box, NULL));
+        failed += sadmm_world_add_body(world, &body, &ids[i]) != SADMM_OK;
+        for (int k = 0; k <= (i % 5 == 0); ++k) failed += sadmm_world_add_shape(world, ids[i], &box, NULL) != SADMM_OK;
     }
     /* The last shape of all belongs to the first body: it has to be found too. */
     MUST(world, sadmm_world_add_shape(world, ids[0], &box, &shape));
 
-    for (int32_t i = 0; i < COUNT; i += 2) MUST(world, sadmm_world_remove_body(world, ids[i]));
+    for (int32_t i = 0; i < COUNT; i += 2) failed += sadmm_world_remove_body(world, ids[i]) != SADMM_OK;
     ck_assert_int_eq(sadmm_world_body_count(world), COUNT / 2);
     ck_assert_int_eq(sadmm_world_shape_count(world), COUNT / 2 + COUNT / 10);
     ck_assert_int_eq(sadmm_world_shape_def(world, shape, &box, NULL), SADMM_ERROR_STALE_ID);
     for (int32_t i = 0; i < COUNT / 2; ++i) {
-        ck_assert_uint_eq(body_at(world, i).slot, ids[2 * i + 1].slot);
-        MUST(world, sadmm_world_shape_at(world, i, &shape));
+        failed += sadmm_world_body_at(world, i, &id) != SADMM_OK || sadmm_world_shape_at(world, i, &shape) != SADMM_OK;
+        wrong += id.slot != ids[2 * i + 1].slot;
     }
     ck_assert_uint_eq(body_at(world, 7).slot, ids[15].slot); /* back again */
     ck_assert_uint_eq(body_at(world, 5).slot, ids[11].slot);
 
     /* Free slots are filled from the lowest on; the old ids stay stale. */
     for (int32_t i = 0; i < COUNT; i += 2) {
-        sadmm_body_id id;
         body.position[0] = -i;
-        MUST(world, sadmm_world_add_body(world, &body, &id));
-        ck_assert_uint_eq(id.slot, ids[i].slot);
-        ck_assert_uint_ne(id.generation, ids[i].generation);
-        MUST(world, sadmm_world_add_shape(world, id, &box, &shape));
+        failed += sadmm_world_add_body(world, &body, &id) != SADMM_OK;
+        wrong += id.slot != ids[i].slot || id.generation == ids[i].generation;
+        failed += sadmm_world_add_shape(world, id, &box, NULL) != SADMM_OK;
         ids[i] = id;
         if (i % 1000 == 0) { /* the order of creation slots holds at every moment */
             ck_assert_uint_eq(body_at(world, i).slot, ids[i].slot);
-            if (i + 2 < COUNT) ck_assert_uint_eq(body_at(world, i + 2).slot, ids[i + 3].slot);
+            ck_assert_uint_eq(body_at(world, i + 2).slot, ids[i + 3].slot);
         }
     }
     ck_assert_int_eq(sadmm_world_body_count(world), COUNT);
     for (int32_t i = 0; i < COUNT; ++i) {
-        sadmm_body_id id = body_at(world, i);
-        ck_assert(id.slot == ids[i].slot && id.generation == ids[i].generation);
-        ck_assert(body_state(world, id).position[0] == (i % 2 ? i : -i));
+        failed += sadmm_world_body_at(world, i, &id) != SADMM_OK;
+        wrong += id.slot != ids[i].slot || id.generation != ids[i].generation;
+        failed += sadmm_world_body_state(world, id, &state) != SADMM_OK;
+        wrong += state.position[0] != (i % 2 ? i : -i);
     }
-    for (int32_t i = COUNT; i-- > 0;) MUST(world, sadmm_world_remove_body(world, ids[i]));
+    for (int32_t i = COUNT; i-- > 0;) failed += sadmm_world_remove_body(world, ids[i]) != SADMM_OK;
+    ck_assert_msg(failed == 0 && wrong == 0, "%ld calls failed (%s), %ld answers are wrong", failed,
+                  sadmm_world_message(world), wrong);
     ck_assert_int_eq(sadmm_world_body_count(world), 0);
     ck_assert_int_eq(sadmm_world_shape_count(world), 0);
     sadmm_world_destroy(world);
@@ -764,7 +766,7 @@ END_TEST
 int main(void)
 {
     Suite *suite = suite_create("world_inputs");
-    TCase *values = tcase_create("values"), *memory = tcase_create("memory"), *churn = tcase_create("churn");
+    TCase *values = tcase_create("values"), *memory = tcase_create("memory");
 
     tcase_add_test(values, bad_bodies_are_refused);
     tcase_add_test(values, limits_are_inclusive);
@@ -776,6 +778,7 @@ int main(void)
     tcase_add_test(values, bad_ranges_and_early_calls_are_refused);
     tcase_add_test(values, missing_outputs_are_refused);
     tcase_add_test(values, long_names_are_cut);
+    tcase_add_test(values, many_bodies_come_and_go);
     tcase_add_loop_test(values, an_empty_world_steps, 0, 2);
     tcase_add_test(values, a_step_that_is_not_finite_is_rolled_back);
     tcase_add_test(memory, creation_without_memory);
@@ -783,11 +786,8 @@ int main(void)
     tcase_add_test(memory, adding_without_memory);
     tcase_add_loop_test(memory, steps_without_memory, 0, 2);
     tcase_add_test(memory, freezing_without_memory);
-    tcase_add_test(churn, many_bodies_come_and_go);
     tcase_set_timeout(memory, 60);
-    tcase_set_timeout(churn, 10);
     suite_add_tcase(suite, values);
     suite_add_tcase(suite, memory);
-    suite_add_tcase(suite, churn);
     return run_suite(suite);
 }
