@@ -149,19 +149,20 @@ static const struct graph {
     const char *name;
     struct contact_problem *(*make)(void);
     bool warm;
+    bool small; /* one block can do it */
 } graphs[] = {
-    {"empty", empty, true},
-    {"one body", one, true},
-    {"no pairs", no_pairs, true},
-    {"static contacts", on_ground, true},
-    {"sparse", sparse, true},
-    {"dense", dense, false},
-    {"blocks alone", joined, true},
-    {"towers", towers, false},
-    {"shuffled chain", shuffled_chain, true},
-    {"falling chain", falling_chain, true},
-    {"star", star, true},
-    {"wide", wide, true},
+    {"empty", empty, true, true},
+    {"one body", one, true, true},
+    {"no pairs", no_pairs, true, true},
+    {"static contacts", on_ground, true, true},
+    {"sparse", sparse, true, true},
+    {"dense", dense, false, true},
+    {"blocks alone", joined, true, true},
+    {"towers", towers, false, true},
+    {"shuffled chain", shuffled_chain, true, true},
+    {"falling chain", falling_chain, true, true},
+    {"star", star, true, true},
+    {"wide", wide, true, false},
 };
 enum { GRAPHS = sizeof graphs / sizeof *graphs };
 
@@ -413,10 +414,10 @@ static void device_new(struct device *d, int precision)
     CALL(d, d->k->create(0, &d->c, &d->error));
 }
 
-static sadmm_status lay_out(struct device *d, const struct cuda_partition *partition, enum cuda_halt halt, bool graph,
+static sadmm_status lay_out(struct device *d, const struct cuda_partition *partition, enum cuda_halt halt, int way,
                             struct cuda_layout_copy *out)
 {
-    return (d->k->precision == SADMM_F32 ? LAY_OUT_F32 : LAY_OUT_F64)(d->c, partition, halt, graph, out, &d->error);
+    return (d->k->precision == SADMM_F32 ? LAY_OUT_F32 : LAY_OUT_F64)(d->c, partition, halt, way, out, &d->error);
 }
 
 /* ---- tests ----------------------------------------------------------------------------------------------------- */
@@ -435,12 +436,12 @@ static const struct cuda_partition partitions[] = {
 };
 enum { PARTITIONS = sizeof partitions / sizeof *partitions };
 
-/* One context goes through all graphs; every layout also as a graph and with threads in the other order. */
+/* One context goes through all graphs, every layout by all ways, some with threads in the other order. */
 START_TEST(equals_host)
 {
     struct device d;
     device_new(&d, _i);
-    for (size_t g = (size_t)_i; g < GRAPHS; g += 1 + (size_t)_i) {
+    for (size_t g = (size_t)_i; g < GRAPHS; g += 1 + 3 * (size_t)_i) {
         struct contact_problem *p = graphs[g].make();
         struct host_layout h = host_new(p, graphs[g].warm);
         struct cuda_layout_copy got = copy_new(&h);
@@ -452,12 +453,14 @@ START_TEST(equals_host)
             host_parts(&h, &partition);
             partition.most_bodies = h.wanted.facts.part_bodies;
             partition.most_halves = h.wanted.facts.part_halves;
-            for (int way = 0; way < 2; ++way) {
+            for (int way = 0; way < 4; ++way) {
 #ifdef CUDA_EMULATED
-                cuda_emulation_descending = way;
+                if (way != (int)(k + g) % 4) continue; /* slow: every way is somebody's turn */
+                cuda_emulation_descending = (int)(k + g / 2) & 1;
 #endif
-                snprintf(about, sizeof about, "%s, partition %zu%s", graphs[g].name, k, way ? ", as a graph" : "");
-                CALL(&d, lay_out(&d, &partition, HALT_NONE, way == 1, &got));
+                snprintf(about, sizeof about, "%s, partition %zu, way %d", graphs[g].name, k, way);
+                CALL(&d, lay_out(&d, &partition, HALT_NONE, way, &got));
+                ck_assert_msg(got.one_block == (graphs[g].small && !(way & CUDA_LAYOUT_GENERAL)), "%s", about);
                 ck_assert_int_eq(got.live.halt, HALT_NONE);
                 ck_assert_int_eq(got.live.pairs, (int32_t)p->contacts.pair_count);
                 same_layout(&h, &got, partition.parts, about);
@@ -487,10 +490,11 @@ START_TEST(too_large_parts_halt)
         struct cuda_partition partition = partitions[k];
         host_slots(&h, partition.tier != SADMM_CUDA_TIER_GRID);
         host_parts(&h, &partition);
-        for (int which = 0; which < 2; ++which) {
-            partition.most_bodies = h.wanted.facts.part_bodies - which;
-            partition.most_halves = h.wanted.facts.part_halves - !which;
-            CALL(&d, lay_out(&d, &partition, HALT_NONE, false, &got));
+        for (int which = 0; which < 4; ++which) {
+            const int way = which / 2 * CUDA_LAYOUT_GENERAL;
+            partition.most_bodies = h.wanted.facts.part_bodies - which % 2;
+            partition.most_halves = h.wanted.facts.part_halves - !(which % 2);
+            CALL(&d, lay_out(&d, &partition, HALT_NONE, way, &got));
             ck_assert_int_eq(got.live.halt, HALT_PARTITION);
             same_layout(&h, &got, partition.parts, "too large");
         }
@@ -514,17 +518,20 @@ START_TEST(halted_does_nothing)
     device_begin(&d, p, true);
     host_slots(&h, true);
     host_parts(&h, &partition);
-    partition.most_bodies = partition.most_halves = INT32_MAX;
-    CALL(&d, lay_out(&d, &partition, HALT_NONE, false, &got));
-    same_layout(&h, &got, partition.parts, "before");
-    partition.parts = 2;
-    partition.most_bodies = 1;
-    CALL(&d, lay_out(&d, &partition, HALT_NON_FINITE, true, &got));
-    ck_assert_int_eq(got.live.halt, HALT_NON_FINITE);
-    same_facts(&got.facts, &h.wanted.facts, "halted");
-    same_numbers(got.offsets, h.wanted.offsets, h.n + 1, "offsets", "halted");
-    same_numbers(got.slot_of, h.wanted.slot_of, h.n, "slot_of", "halted");
-    same_numbers(got.parts, h.wanted.parts, 3, "parts", "halted");
+    for (int way = 0; way < 4; ++way) {
+        partition = partitions[4];
+        partition.most_bodies = partition.most_halves = INT32_MAX;
+        CALL(&d, lay_out(&d, &partition, HALT_NONE, way, &got));
+        same_layout(&h, &got, partition.parts, "before");
+        partition.parts = 2;
+        partition.most_bodies = 1;
+        CALL(&d, lay_out(&d, &partition, HALT_NON_FINITE, way, &got));
+        ck_assert_int_eq(got.live.halt, HALT_NON_FINITE);
+        same_facts(&got.facts, &h.wanted.facts, "halted");
+        same_numbers(got.offsets, h.wanted.offsets, h.n + 1, "offsets", "halted");
+        same_numbers(got.slot_of, h.wanted.slot_of, h.n, "slot_of", "halted");
+        same_numbers(got.parts, h.wanted.parts, 3, "parts", "halted");
+    }
     copy_free(&got);
     host_free(&h);
     contact_problem_free(p);
@@ -546,7 +553,7 @@ START_TEST(partitions_refused)
     device_new(&d, _i);
     device_begin(&d, p, true);
     for (size_t k = 0; k < sizeof bad / sizeof *bad; ++k) {
-        ck_assert_int_eq(lay_out(&d, &bad[k], HALT_NONE, false, &none), SADMM_ERROR_INVALID_ARGUMENT);
+        ck_assert_int_eq(lay_out(&d, &bad[k], HALT_NONE, 0, &none), SADMM_ERROR_INVALID_ARGUMENT);
         ck_assert_ptr_nonnull(strstr(d.error.message, "partition: parts = "));
     }
     contact_problem_free(p);

@@ -221,6 +221,7 @@ static sadmm_status open_device(struct sadmm_context *c, struct sadmm_error *err
     c->cooperative = cooperative != 0;
     c->clusters = clusters != 0;
     CUDA_CALL(c, CUDA(resident_allow)(c->shared_limit), "loading the kernels");
+    CUDA_CALL(c, LAYOUT(one_block_allow)(c->shared_limit), "loading the kernels");
     CUDA_CALL(c, cudaStreamCreateWithFlags(&c->stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
     return SADMM_OK;
 }

@@ -12,9 +12,9 @@ void CUDA(tune_rooms)(struct sadmm_context *, int64_t first_room);
 void CUDA(set_tier)(struct sadmm_context *, enum sadmm_cuda_tier tier);
 enum sadmm_cuda_tier CUDA(get_tier)(const struct sadmm_context *, int32_t *blocks);
 
-/* For tests: survey and layout of the last begin's system once more, for this partition, halted from the start or not, as
- * a graph or not. */
-sadmm_status CUDA(lay_out_again)(struct sadmm_context *, const struct cuda_partition *, enum cuda_halt, bool graph,
+/* For tests: survey and layout of the last begin's system once more, for this partition, halted from the start or not;
+ * `way`: of enum cuda_layout_way. */
+sadmm_status CUDA(lay_out_again)(struct sadmm_context *, const struct cuda_partition *, enum cuda_halt, int way,
                                  struct cuda_layout_copy *, struct sadmm_error *);
 
 sadmm_status CUDA(create)(int device, struct sadmm_context **out, struct sadmm_error *error);

@@ -191,6 +191,7 @@ struct sadmm_context {
     struct cuda_facts facts;         /* of the last begin */
     struct cuda_partition partition; /* what its layout was made for */
     struct layout_view layout;
+    bool one_block;                  /* the layout takes one kernel of one block */
     bool numbered;                   /* BUFFER_NUMBERS is filled */
 
     struct cuda_step *step; /* the world, where whole steps are made here */
@@ -271,6 +272,10 @@ sadmm_status CUDA(layout_room)(struct sadmm_context *, struct sadmm_error *error
 sadmm_status CUDA(enqueue_survey)(struct sadmm_context *, bool islands, struct sadmm_error *error);
 /* Slots, offsets, incident, parts. A part that exceeds what the partition allows sets live->halt = HALT_PARTITION. */
 sadmm_status CUDA(enqueue_layout)(struct sadmm_context *, const struct cuda_partition *, struct sadmm_error *error);
+
+/* The same in one go; small scenes: in one kernel. */
+sadmm_status CUDA(enqueue_survey_and_layout)(struct sadmm_context *, bool islands, const struct cuda_partition *,
+                                             struct sadmm_error *error);
 
 /* ---- cuda_iterate.cu, cuda_resident.cu ---- */
 

@@ -92,6 +92,7 @@ sadmm_status CUDA(layout_room)(struct sadmm_context *c, struct sadmm_error *erro
     l->numbers = (const int32_t *)c->buffers[BUFFER_NUMBERS].data;
     l->temp = c->buffers[BUFFER_SORT].data;
     l->temp_bytes = c->buffers[BUFFER_SORT].capacity;
+    c->one_block = LAYOUT(one_block_shared)(v->bodies, (int32_t)halves) <= (size_t)c->shared_limit;
     v->live = l->live = &((known *)c->buffers[BUFFER_LIVE].data)->live;
     v->facts = l->facts = &((known *)c->buffers[BUFFER_LIVE].data)->facts;
     v->body_of = l->body_of;
@@ -110,15 +111,8 @@ static void bind_raw(struct sadmm_context *c)
     c->layout.blocks = c->view.raw.blocks;
 }
 
-sadmm_status CUDA(enqueue_survey)(struct sadmm_context *c, bool islands, struct sadmm_error *error)
-{
-    bind_raw(c);
-    CUDA_CALL(c, LAYOUT(survey)(&c->layout, islands, c->stream, &c->kernel), c->kernel);
-    return SADMM_OK;
-}
-
-sadmm_status CUDA(enqueue_layout)(struct sadmm_context *c, const struct cuda_partition *partition,
-                                  struct sadmm_error *error)
+static sadmm_status check_partition(struct sadmm_context *c, const struct cuda_partition *partition,
+                                    struct sadmm_error *error)
 {
     if (partition->tier != SADMM_CUDA_TIER_STREAM &&
         (partition->parts < 1 || partition->parts > most_parts(c) || partition->cluster < 1 ||
@@ -126,7 +120,38 @@ sadmm_status CUDA(enqueue_layout)(struct sadmm_context *c, const struct cuda_par
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                           "partition: parts = %d: must be in [1, %lld] and a multiple of cluster = %d >= 1",
                           partition->parts, (long long)most_parts(c), partition->cluster);
-    CUDA_CALL(c, LAYOUT(make)(&c->layout, partition, c->stream, &c->kernel), c->kernel);
+    return SADMM_OK;
+}
+
+sadmm_status CUDA(enqueue_survey)(struct sadmm_context *c, bool islands, struct sadmm_error *error)
+{
+    bind_raw(c);
+    CUDA_CALL(c, c->one_block ? LAYOUT(one_block)(&c->layout, true, islands, nullptr, c->stream, &c->kernel)
+                              : LAYOUT(survey)(&c->layout, islands, c->stream, &c->kernel),
+              c->kernel);
+    return SADMM_OK;
+}
+
+sadmm_status CUDA(enqueue_layout)(struct sadmm_context *c, const struct cuda_partition *partition,
+                                  struct sadmm_error *error)
+{
+    CUDA_TRY(check_partition(c, partition, error));
+    CUDA_CALL(c, c->one_block ? LAYOUT(one_block)(&c->layout, false, false, partition, c->stream, &c->kernel)
+                              : LAYOUT(make)(&c->layout, partition, c->stream, &c->kernel),
+              c->kernel);
+    return SADMM_OK;
+}
+
+sadmm_status CUDA(enqueue_survey_and_layout)(struct sadmm_context *c, bool islands,
+                                             const struct cuda_partition *partition, struct sadmm_error *error)
+{
+    if (!c->one_block) {
+        CUDA_TRY(CUDA(enqueue_survey)(c, islands, error));
+        return CUDA(enqueue_layout)(c, partition, error);
+    }
+    bind_raw(c);
+    CUDA_TRY(check_partition(c, partition, error));
+    CUDA_CALL(c, LAYOUT(one_block)(&c->layout, true, islands, partition, c->stream, &c->kernel), c->kernel);
     return SADMM_OK;
 }
 
@@ -337,20 +362,13 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
 
 /* ---- for tests --------------------------------------------------------------------------------------------------- */
 
-static sadmm_status enqueue_all(struct sadmm_context *c, const struct cuda_partition *partition,
-                                struct sadmm_error *error)
-{
-    CUDA_TRY(CUDA(enqueue_survey)(c, true, error));
-    return CUDA(enqueue_layout)(c, partition, error);
-}
-
 /* Survey and layout as a graph, launched twice: captured, nothing may depend on when it runs or what ran before. */
 static sadmm_status run_graph(struct sadmm_context *c, const struct cuda_partition *partition, struct sadmm_error *error)
 {
     cudaGraph_t graph = nullptr;
     cudaGraphExec_t ready = nullptr;
     CUDA_CALL(c, cudaStreamBeginCapture(c->stream, cudaStreamCaptureModeThreadLocal), "cudaStreamBeginCapture");
-    sadmm_status status = enqueue_all(c, partition, error);
+    sadmm_status status = CUDA(enqueue_survey_and_layout)(c, true, partition, error);
     CUDA_CALL(c, cudaStreamEndCapture(c->stream, &graph), "cudaStreamEndCapture");
     if (status == SADMM_OK) {
         cudaError_t code = cudaGraphInstantiate(&ready, graph, 0);
@@ -364,7 +382,7 @@ static sadmm_status run_graph(struct sadmm_context *c, const struct cuda_partiti
 }
 
 extern "C" sadmm_status CUDA(lay_out_again)(struct sadmm_context *c, const struct cuda_partition *partition,
-                                            enum cuda_halt halt, bool graph, struct cuda_layout_copy *out,
+                                            enum cuda_halt halt, int way, struct cuda_layout_copy *out,
                                             struct sadmm_error *error)
 {
     const cuda_view *v = &c->view;
@@ -372,7 +390,18 @@ extern "C" sadmm_status CUDA(lay_out_again)(struct sadmm_context *c, const struc
     CUDA_ENTER(c);
     CUDA_TRY(CUDA(wait)(c, error));
     CUDA_TRY(upload_live(c, halt, error));
-    CUDA_TRY(graph ? run_graph(c, partition, error) : enqueue_all(c, partition, error));
+    out->one_block = c->one_block && !(way & CUDA_LAYOUT_GENERAL);
+    bool chosen = c->one_block;
+    c->one_block = out->one_block;
+    sadmm_status status = SADMM_OK;
+    if (way & CUDA_LAYOUT_GRAPH) {
+        status = run_graph(c, partition, error);
+    } else {
+        status = CUDA(enqueue_survey)(c, true, error);
+        if (status == SADMM_OK) status = CUDA(enqueue_layout)(c, partition, error);
+    }
+    c->one_block = chosen;
+    CUDA_TRY(status);
     CUDA_TRY(download_known(c, &known, error));
     out->live = known.live;
     out->facts = known.facts;

@@ -18,6 +18,7 @@
 #define SADMM_CUDA_LAYOUT_H
 
 #include <stdalign.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -59,6 +60,12 @@ struct cuda_layout_copy {
     struct cuda_live live;
     struct cuda_facts facts;
     int32_t *body_of, *slot_of, *offsets, *incident, *parts;
+    bool one_block; /* made by the kernel for small scenes */
+};
+
+enum cuda_layout_way {
+    CUDA_LAYOUT_GENERAL = 1, /* by the kernels for any size */
+    CUDA_LAYOUT_GRAPH = 2    /* both stages enqueued together, captured into a graph */
 };
 
 #endif

@@ -48,12 +48,12 @@ struct layout_view {
 
 /* Which stages, and what of them. */
 struct layout_args {
-    int32_t survey, layout; /* one kernel for both: which */
+    int32_t survey, layout; /* of one_block: which */
     int32_t islands;        /* survey: look for them; layout: slots by island */
     struct cuda_partition partition;
 };
 
-static inline bool slots_by_island(const struct cuda_partition *partition)
+static __host__ __device__ inline bool slots_by_island(const struct cuda_partition *partition)
 {
     return partition->tier == SADMM_CUDA_TIER_BLOCK || partition->tier == SADMM_CUDA_TIER_CLUSTER;
 }
@@ -68,6 +68,12 @@ static inline bool slots_by_island(const struct cuda_partition *partition)
 cudaError_t LAYOUT(survey)(const struct layout_view *, bool islands, cudaStream_t stream, const char **kernel);
 cudaError_t LAYOUT(make)(const struct layout_view *, const struct cuda_partition *, cudaStream_t stream,
                          const char **kernel);
+/* Either or both by one block: survey, and a layout where there is a partition. `shared`: bytes it takes, SIZE_MAX: such a
+ * scene is too large. `allow`: let it take so many. */
+size_t LAYOUT(one_block_shared)(int32_t bodies, int32_t halves);
+cudaError_t LAYOUT(one_block_allow)(int bytes);
+cudaError_t LAYOUT(one_block)(const struct layout_view *, bool survey, bool islands, const struct cuda_partition *,
+                              cudaStream_t stream, const char **kernel);
 /* What view.temp has to hold. */
 cudaError_t LAYOUT(temp_bytes)(int32_t bodies, int32_t halves, size_t *bytes);
 /* view.numbers */

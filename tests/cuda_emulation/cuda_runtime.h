@@ -196,6 +196,25 @@ template <class T> static inline T __shfl_xor_sync(unsigned mask, T value, int b
     return cuda_emulation_exchange(mask, value, threadIdx.x % cuda_emulation::WARP_SIZE ^ (unsigned)bits);
 }
 
+template <class T> static inline T __shfl_up_sync(unsigned mask, T value, int by)
+{
+    unsigned lane = threadIdx.x % cuda_emulation::WARP_SIZE;
+    return cuda_emulation_exchange(mask, value, lane >= (unsigned)by ? lane - (unsigned)by : lane);
+}
+inline unsigned __ballot_sync(unsigned mask, bool vote)
+{
+    cuda_emulation::fiber *self = cuda_emulation::running->current;
+    const unsigned turn = self->shuffles % 2;
+    cuda_emulation::exchange(mask, vote, 0);
+    const cuda_emulation::fiber *warp = self - self->thread % cuda_emulation::WARP_SIZE;
+    unsigned votes = 0;
+    for (unsigned lane = 0; lane < cuda_emulation::WARP_SIZE; ++lane)
+        votes |= (unsigned)warp[lane].shuffled[turn] << lane;
+    return votes;
+}
+inline int __popc(unsigned bits) { return __builtin_popcount(bits); }
+inline int __ffs(int bits) { return __builtin_ffs(bits); }
+
 inline long long __double_as_longlong(double value)
 {
     long long bits;
