@@ -29,8 +29,7 @@ sadmm_status CUDA(wait)(struct sadmm_context *c, struct sadmm_error *error)
 static const char *const buffer_names[BUFFER_COUNT] = {
     "states",
     "b",
-    "A",
-    "factors",
+    "matrices",
     "C",
     "penalties",
     "normals",
@@ -157,6 +156,12 @@ sadmm_status CUDA(launch)(struct sadmm_context *c, cuda_kernel kernel, const cha
     return launch_blocks(c, kernel, name, blocks, THREADS, 0, 1, false, args, error);
 }
 
+sadmm_status CUDA(launch_of)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
+                             const cuda_args *args, struct sadmm_error *error)
+{
+    return launch_blocks(c, kernel, name, blocks, threads, 0, 1, false, args, error);
+}
+
 sadmm_status CUDA(launch_partition)(struct sadmm_context *c, cuda_kernel kernel, const char *name,
                                     const struct cuda_partition *partition, const cuda_args *args,
                                     struct sadmm_error *error)
@@ -223,6 +228,9 @@ static sadmm_status open_device(struct sadmm_context *c, struct sadmm_error *err
     CUDA_CALL(c, CUDA(resident_allow)(c->shared_limit), "loading the kernels");
     CUDA_CALL(c, LAYOUT(one_block_allow)(c->shared_limit), "loading the kernels");
     CUDA_CALL(c, cudaStreamCreateWithFlags(&c->stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
+    CUDA_CALL(c, cudaStreamCreateWithFlags(&c->side, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
+    CUDA_CALL(c, cudaEventCreateWithFlags(&c->fork, cudaEventDisableTiming), "cudaEventCreateWithFlags");
+    CUDA_CALL(c, cudaEventCreateWithFlags(&c->join, cudaEventDisableTiming), "cudaEventCreateWithFlags");
     return SADMM_OK;
 }
 
@@ -252,6 +260,9 @@ extern "C" void CUDA(destroy)(struct sadmm_context *c)
         CUDA(step_destroy)(c);
         if (c->graph) (void)cudaGraphExecDestroy(c->graph);
         for (cuda_buffer &buffer : c->buffers) release(&buffer);
+        if (c->join) (void)cudaEventDestroy(c->join);
+        if (c->fork) (void)cudaEventDestroy(c->fork);
+        if (c->side) (void)cudaStreamDestroy(c->side);
         (void)cudaStreamDestroy(c->stream);
         (void)cudaGetLastError();
     }

@@ -38,6 +38,7 @@
 #include <cuda_runtime.h>
 
 #include "../core/kernels.h"
+#include "cuda_line.h"
 #include "cuda_step.h"
 #include "layout_internal.h"
 
@@ -52,7 +53,6 @@ enum {
     ROW = 8,              /* a wrench or a body's state: 6 used, 32 bytes in f32 */
     RECORD = 2 * ROW,     /* wrench on a, wrench on b; each force, 0, torque, 0 */
     STATE_INV_BETA = 6,   /* slot of a state row */
-    MATRIX = 40,          /* a symmetric 6x6, rows of 6; the padding keeps four bodies' rows on different banks */
     PACKED = 21,          /* lower triangle, rows first */
     THREADS = 256,        /* a block, everywhere */
     WARP = 32,
@@ -95,7 +95,10 @@ struct cuda_view {
 
     solver_real *state; /* (bodies + 1) x ROW: v, w, 1/beta, 0; the last row is the static world, all 0 */
     solver_real *b;     /* bodies x ROW */
-    solver_real *A, *H; /* bodies x MATRIX */
+    solver_real *lines; /* bodies x line: A and H (cuda_line.h) */
+    int32_t line;
+    int32_t rigid;      /* how lines are packed */
+    int32_t point_slots; /* a pair has room for */
     double *C;          /* bodies x PACKED */
     double *beta;       /* bodies, kg */
 
@@ -142,6 +145,7 @@ struct cuda_args {
     int32_t join;       /* the first Step 1 takes records + ratio change */
     int32_t start;      /* the first Step 1 takes J^T lambda^0, whatever the records are */
     int32_t most_bodies, cluster; /* of the partition */
+    int32_t planned;    /* a whole step: compare with the plan */
     int32_t rescaled;   /* ratio is view.ratio, else 1 */
     const struct sadmm_resident_edit *edits;
     double factor;
@@ -158,7 +162,7 @@ struct cuda_buffer {
 
 enum cuda_buffer_name {
     /* device */
-    BUFFER_STATE, BUFFER_B, BUFFER_A, BUFFER_H, BUFFER_C, BUFFER_BETA,
+    BUFFER_STATE, BUFFER_B, BUFFER_LINES, BUFFER_C, BUFFER_BETA,
     BUFFER_NORMAL, BUFFER_DIFFERENCE, BUFFER_PAIR_BODIES, BUFFER_PAIR_COUNT, BUFFER_ARM, BUFFER_LAMBDA,
     BUFFER_ROW_INFO, BUFFER_ROW_DATA, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_EXCHANGE, BUFFER_LIVE, BUFFER_LAYOUT, BUFFER_SORT,
     BUFFER_NUMBERS, BUFFER_SCALARS,
@@ -173,6 +177,8 @@ enum cuda_buffer_name {
 struct sadmm_context {
     int device;
     cudaStream_t stream;
+    cudaStream_t side;        /* of a step's graph: what does not wait for contacts (cuda_step.cu) */
+    cudaEvent_t fork, join;
     int multiprocessors, shared_limit; /* shared_limit: bytes a block may have */
     bool cooperative, clusters;        /* what the device can launch */
 
@@ -211,6 +217,9 @@ sadmm_status CUDA(room)(struct sadmm_context *, enum cuda_buffer_name name, size
 /* Launch blocks of THREADS on the stream; 0 blocks: nothing to do. */
 sadmm_status CUDA(launch)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks,
                           const cuda_args *args, struct sadmm_error *error);
+/* The same with blocks of so many threads. */
+sadmm_status CUDA(launch_of)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
+                             const cuda_args *args, struct sadmm_error *error);
 /* Launch a kernel on the partition's blocks. */
 sadmm_status CUDA(launch_partition)(struct sadmm_context *, cuda_kernel kernel, const char *name,
                                     const struct cuda_partition *partition, const cuda_args *args,
@@ -245,8 +254,10 @@ struct device_scope {
 
 /* This precision's data for the view's counts and the partition (allocates). */
 sadmm_status CUDA(solver_room)(struct sadmm_context *, struct sadmm_error *error);
-/* Everything from raw data on the device to the first iteration. */
-sadmm_status CUDA(enqueue_assembly)(struct sadmm_context *, struct sadmm_error *error);
+/* A, b and the start velocities: they need no contacts. */
+sadmm_status CUDA(enqueue_bodies)(struct sadmm_context *, struct sadmm_error *error);
+/* Penalties and factors at once; in a whole step, also whether it is what was planned for. */
+sadmm_status CUDA(enqueue_penalties)(struct sadmm_context *, struct sadmm_error *error);
 /* (16) and (17) of the iteration that was measured, into view.residual. */
 sadmm_status CUDA(enqueue_residuals)(struct sadmm_context *, struct sadmm_error *error);
 /* (15) by view.residual. */
@@ -259,8 +270,6 @@ sadmm_status CUDA(launch_edits)(struct sadmm_context *, const struct sadmm_resid
                                 struct sadmm_error *error);
 sadmm_status CUDA(launch_start)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_admit)(struct sadmm_context *, struct sadmm_error *error);
-sadmm_status CUDA(launch_check)(struct sadmm_context *, struct sadmm_error *error);
-sadmm_status CUDA(launch_assembled)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_finish)(struct sadmm_context *, struct sadmm_error *error);
 
 /* ---- cuda_layout.cu -------------------------------------------------------------------------------------------------

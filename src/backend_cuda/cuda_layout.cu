@@ -203,12 +203,14 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
     size_t slots = (size_t)c->facts.point_slots * pairs, records = (pairs + (size_t)v->rows) * RECORD * real_size;
     size_t points = (size_t)v->points;
     bool three = v->contact_rows != 1;
+    v->rigid = c->plan.rigid;
+    v->line = v->rigid ? LINE_RIGID : LINE_GENERAL;
+    v->point_slots = c->facts.point_slots;
     size_t out = (13 * n + 3 * points + 6 * (size_t)v->rows + 2) * sizeof(double);
     const wanted_room wanted[] = {
         {BUFFER_STATE, (n + 1) * ROW * real_size},
         {BUFFER_B, n * ROW * real_size},
-        {BUFFER_A, n * MATRIX * real_size},
-        {BUFFER_H, n * MATRIX * real_size},
+        {BUFFER_LINES, n * (size_t)v->line * real_size},
         {BUFFER_C, n * PACKED * sizeof(double)},
         {BUFFER_BETA, n * sizeof(double)},
         {BUFFER_NORMAL, pairs * sizeof(real4)},
@@ -232,8 +234,7 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
     cuda_buffer *b = c->buffers;
     v->state = (solver_real *)b[BUFFER_STATE].data;
     v->b = (solver_real *)b[BUFFER_B].data;
-    v->A = (solver_real *)b[BUFFER_A].data;
-    v->H = (solver_real *)b[BUFFER_H].data;
+    v->lines = (solver_real *)b[BUFFER_LINES].data;
     v->C = (double *)b[BUFFER_C].data;
     v->beta = (double *)b[BUFFER_BETA].data;
     v->normal = (real4 *)b[BUFFER_NORMAL].data;
@@ -334,8 +335,8 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
     if (records > INT32_MAX / (2 * RECORD))
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%lld constraints: at most %d", (long long)(records - WARP),
                           INT32_MAX / (2 * RECORD) - WARP);
-    if (plan->bodies > INT32_MAX / MATRIX - 1)
-        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d bodies: at most %d", plan->bodies, INT32_MAX / MATRIX - 1);
+    if (plan->bodies > INT32_MAX / LINE_GENERAL)
+        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d bodies: at most %d", plan->bodies, INT32_MAX / LINE_GENERAL);
     CUDA_ENTER(c);
     CUDA_TRY(CUDA(wait)(c, error)); /* the staging buffers are about to be written */
     c->system = system;

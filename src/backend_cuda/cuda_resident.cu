@@ -36,7 +36,7 @@ struct part_memory {
     solver_real *state;      /* CLUSTER: of even, then of odd iterations; bodies x ROW each, then a row of 0 */
     solver_real *records;    /* halves x ROW */
     solver_real *row_lambda; /* halves x ROW, when there are row blocks */
-    solver_real *A, *H, *b;  /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x MATRIX, ROW */
+    solver_real *lines, *b;  /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x line, ROW */
 };
 
 /* One description of the layout for its size and its addresses. */
@@ -48,9 +48,8 @@ static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *
     m->state = (solver_real *)base;
     m->records = m->state + ((cluster ? 2 * n : n) + 1) * ROW;
     m->row_lambda = m->records + halves * ROW;
-    m->A = m->row_lambda + (row_blocks ? halves * ROW : 0);
-    m->H = m->A + more * MATRIX;
-    m->b = m->H + more * MATRIX;
+    m->lines = m->row_lambda + (row_blocks ? halves * ROW : 0);
+    m->b = m->lines + more * LINE_GENERAL;
     return (size_t)(m->b + more * ROW - m->state) * sizeof(solver_real);
 }
 
@@ -185,6 +184,11 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL> struct part_run {
     {
         return m.state + (MODE == CLUSTER && odd ? args.most_bodies * ROW : 0);
     }
+    /* Number i of the part's rows of ROW, in the bodies' raw order. */
+    __device__ __forceinline__ size_t raw_row(int32_t i) const
+    {
+        return (size_t)v.body_of[first_body + i / ROW] * ROW + (size_t)(i % ROW);
+    }
     __device__ __forceinline__ bool has_rows(void) const { return FULL && v.rows > 0; }
     /* Warps without work are left out of everything but barriers. */
     __device__ __forceinline__ bool warp_has_body(int32_t first) const { return first + t / WARP * (WARP / LANES) < bodies; }
@@ -242,7 +246,8 @@ static __device__ __noinline__ void start_row_half(const cuda_view &v, int32_t c
 /* Where the other body's state will be. */
 PART __device__ __forceinline__ void PART_RUN::find_other(int32_t other)
 {
-    const int32_t local = other - first_body;
+    /* slots are by island in BLOCK and CLUSTER, raw order in GRID */
+    const int32_t slot = MODE == GRID || other == v.bodies ? other : v.slot_of[other], local = slot - first_body;
     own.other_odd = 0;
     if (other == v.bodies) { /* the static world */
         own.other = m.state + (MODE == CLUSTER ? 2 : 1) * args.most_bodies * ROW;
@@ -255,8 +260,8 @@ PART __device__ __forceinline__ void PART_RUN::find_other(int32_t other)
     } else {
         const int32_t first_part = (int32_t)blockIdx.x / args.cluster * args.cluster;
         int32_t rank = 0;
-        while (rank + 1 < args.cluster && other >= v.parts[first_part + rank + 1]) ++rank;
-        own.other = in_block(m.state, (unsigned)rank) + (other - v.parts[first_part + rank]) * ROW;
+        while (rank + 1 < args.cluster && slot >= v.parts[first_part + rank + 1]) ++rank;
+        own.other = in_block(m.state, (unsigned)rank) + (slot - v.parts[first_part + rank]) * ROW;
         own.other_odd = args.most_bodies * ROW;
     }
 }
@@ -266,7 +271,7 @@ PART __device__ __forceinline__ void PART_RUN::load_half(void)
     const int32_t code = v.incident[first_half + half], side = code & 1, p = code / 2;
     if (FULL && p >= v.pair_room) {
         const row_about about = v.row_info[p - v.pair_room];
-        own.own = (side ? about.body_b : about.body_a) - first_body;
+        own.own = v.slot_of[side ? about.body_b : about.body_a] - first_body;
         find_other(side ? about.body_a : about.body_b);
         return;
     }
@@ -278,7 +283,7 @@ PART __device__ __forceinline__ void PART_RUN::load_half(void)
     own.normal = xyz(about);
     own.friction = about.w;
     own.sign = side ? (real)1 : (real)-1;
-    own.own = (side ? on.y : on.x) - first_body;
+    own.own = v.slot_of[side ? on.y : on.x] - first_body;
     find_other(side ? on.x : on.y);
     const real inv_s = own.sign * inverse_weight(v, on.x, on.y);
 #pragma unroll
@@ -322,22 +327,22 @@ PART __device__ __forceinline__ void PART_RUN::load_records(void)
 PART __device__ __forceinline__ void PART_RUN::load(void)
 {
     const int32_t threads = (int32_t)blockDim.x, in_registers = threads / LANES;
-    const size_t at = (size_t)(first_body + (body < bodies ? body : 0));
-    own_body = load_body(body < bodies, r, v.A + at * MATRIX, v.H + at * MATRIX, v.b + at * ROW, v.state + at * ROW);
+    const size_t at = (size_t)(first_body + (body < bodies ? body : 0)), raw = body < bodies ? (size_t)v.body_of[at] : 0;
+    own_body =
+        load_body(body < bodies, r, v.lines + raw * (size_t)v.line, v.rigid, v.b + raw * ROW, v.state + raw * ROW);
     if (body < bodies) {
         begin = v.offsets[at] - first_half;
         end = v.offsets[at + 1] - first_half;
     }
     if (warp_has_body(0)) momentum = free_momentum(own_body);
-    for (int32_t i = t; i < bodies * ROW; i += threads) m.state[i] = v.state[(size_t)first_body * ROW + (size_t)i];
+    for (int32_t i = t; i < bodies * ROW; i += threads) m.state[i] = v.state[raw_row(i)];
     if (t < ROW) m.state[(MODE == CLUSTER ? 2 : 1) * args.most_bodies * ROW + t] = 0;
     if (bodies > in_registers) {
-        const size_t first = (size_t)(first_body + in_registers);
-        for (int32_t i = t; i < (bodies - in_registers) * MATRIX; i += threads) {
-            m.A[i] = v.A[first * MATRIX + (size_t)i];
-            m.H[i] = v.H[first * MATRIX + (size_t)i];
-        }
-        for (int32_t i = t; i < (bodies - in_registers) * ROW; i += threads) m.b[i] = v.b[first * ROW + (size_t)i];
+        const int32_t more = bodies - in_registers;
+        for (int32_t i = t; i < more * v.line; i += threads)
+            m.lines[i / v.line * LINE_GENERAL + i % v.line] =
+                v.lines[(size_t)v.body_of[first_body + in_registers + i / v.line] * (size_t)v.line + (size_t)(i % v.line)];
+        for (int32_t i = t; i < more * ROW; i += threads) m.b[i] = v.b[raw_row(in_registers * ROW + i)];
     }
     own.own = 0;
     own.other = m.state;
@@ -388,7 +393,8 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd)
     for (int32_t first = in_registers; warp_has_body(first); first += in_registers) {
         const int32_t i = first + body, at = i - in_registers;
         const bool live = i < bodies;
-        body_lane one = load_body(live, r, m.A + at * MATRIX, m.H + at * MATRIX, m.b + at * ROW, state(!odd) + i * ROW);
+        body_lane one =
+            load_body(live, r, m.lines + at * LINE_GENERAL, v.rigid, m.b + at * ROW, state(!odd) + i * ROW);
         real g = free_momentum(one);
         if (live && r < 6)
             g = gather(g, v.offsets[first_body + i] - first_half, v.offsets[first_body + i + 1] - first_half);
@@ -456,7 +462,7 @@ PART template <bool MEASURE> __device__ __forceinline__ double PART_RUN::update_
 PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
 {
     for (int32_t i = t; i < bodies * ROW; i += (int32_t)blockDim.x)
-        if (i % ROW < 6) v.state[(size_t)first_body * ROW + (size_t)i] = state(odd)[i];
+        if (i % ROW < 6) v.state[raw_row(i)] = state(odd)[i];
     for (int32_t i = t; i < halves * ROW; i += (int32_t)blockDim.x)
         v.records[(size_t)v.incident[first_half + i / ROW] * ROW + (size_t)(i % ROW)] = m.records[i];
     if (half >= halves) return;

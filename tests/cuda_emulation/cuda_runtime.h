@@ -427,6 +427,11 @@ inline cudaError_t cudaEventRecord(cudaEvent_t, cudaStream_t)
     CUDA_EMULATION_CALL;
     return cudaSuccess;
 }
+inline cudaError_t cudaStreamWaitEvent(cudaStream_t, cudaEvent_t, unsigned)
+{
+    CUDA_EMULATION_CALL;
+    return cudaSuccess;
+}
 inline cudaError_t cudaEventSynchronize(cudaEvent_t)
 {
     CUDA_EMULATION_CALL;
