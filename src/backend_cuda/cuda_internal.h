@@ -80,7 +80,7 @@ struct cuda_view {
     struct cuda_live *live;
     struct cuda_facts *facts;
     int32_t bodies;      /* exact, known to the host (state row `bodies` is the static world) */
-    int32_t pair_room;   /* multiple of 32; = stride of point planes; record of pair p is p, of row block k is pair_room + k */
+    int32_t pair_room;   /* multiple of 32; = stride of point planes; row block k's record is pair_room + k */
     int32_t rows;        /* row blocks: exact, known to the host */
     int32_t points;
     int32_t row_stride;
