@@ -172,8 +172,7 @@ static sadmm_status enqueue_step(struct sadmm_context *c, struct sadmm_error *er
         CUDA_TRY(CUDA(assemble_contacts)(c, error));
         CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
     }
-    CUDA_TRY(CUDA(enqueue_survey)(c, islands, error));
-    CUDA_TRY(CUDA(enqueue_layout)(c, &c->partition, error));
+    CUDA_TRY(CUDA(enqueue_survey_and_layout)(c, islands, &c->partition, error));
     CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
     CUDA_TRY(CUDA(enqueue_penalties)(c, error));
     CUDA_TRY(enqueue_iterations(c, error));

@@ -249,8 +249,10 @@ inline int atomicAdd(int *to, int value)
     *to += value;
     return before;
 }
+/* The others go first: what is compared with was read some time ago. */
 inline int atomicCAS(int *to, int expected, int value)
 {
+    cuda_emulation::give_way(cuda_emulation::NOT);
     int before = *to;
     if (before == expected) *to = value;
     return before;
