@@ -337,6 +337,13 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
 
 /* ---- for tests --------------------------------------------------------------------------------------------------- */
 
+extern "C" sadmm_status CUDA(set_halt)(struct sadmm_context *c, enum cuda_halt halt, struct sadmm_error *error)
+{
+    CUDA_ENTER(c);
+    CUDA_TRY(CUDA(wait)(c, error));
+    return upload_live(c, halt, error);
+}
+
 static sadmm_status enqueue_all(struct sadmm_context *c, const struct cuda_partition *partition,
                                 struct sadmm_error *error)
 {
