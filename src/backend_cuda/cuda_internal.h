@@ -194,6 +194,7 @@ struct sadmm_context {
     bool recording; /* a graph of the whole step: nothing is allocated, no graph launched in it */
 
     enum sadmm_cuda_tier wanted;     /* by a test */
+    int wanted_cluster;              /* blocks a cluster, by a test; 0: any */
     struct cuda_facts facts;         /* of the last begin */
     struct cuda_partition partition; /* what its layout was made for */
     struct layout_view layout;
@@ -220,6 +221,9 @@ sadmm_status CUDA(launch)(struct sadmm_context *, cuda_kernel kernel, const char
 /* The same with blocks of so many threads. */
 sadmm_status CUDA(launch_of)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
                              const cuda_args *args, struct sadmm_error *error);
+/* How many of the partition's clusters the device runs side by side; 0: clusters that large do not exist. */
+cudaError_t CUDA(active_clusters)(const struct sadmm_context *, cuda_kernel kernel,
+                                  const struct cuda_partition *partition, int *clusters);
 /* Launch a kernel on the partition's blocks. */
 sadmm_status CUDA(launch_partition)(struct sadmm_context *, cuda_kernel kernel, const char *name,
                                     const struct cuda_partition *partition, const cuda_args *args,
@@ -297,8 +301,9 @@ cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, enum sadmm_
                                   const char **name);
 int CUDA(resident_threads)(int point_slots);
 size_t CUDA(resident_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies, bool row_blocks);
-/* Let every instance use `bytes` of shared memory a block. */
-cudaError_t CUDA(resident_allow)(int bytes);
+/* Let every instance use `bytes` of shared memory a block, and clusters of more than 8 blocks. *clusters: whether both the
+ * device and the code that was loaded for it know clusters. */
+cudaError_t CUDA(resident_allow)(int bytes, bool device_has_clusters, bool *clusters);
 
 /* ---- cuda_partition.cu ---- */
 

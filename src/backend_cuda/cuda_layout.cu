@@ -363,6 +363,13 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
 
 /* ---- for tests --------------------------------------------------------------------------------------------------- */
 
+extern "C" sadmm_status CUDA(set_halt)(struct sadmm_context *c, enum cuda_halt halt, struct sadmm_error *error)
+{
+    CUDA_ENTER(c);
+    CUDA_TRY(CUDA(wait)(c, error));
+    return upload_live(c, halt, error);
+}
+
 /* Survey and layout as a graph, launched twice: captured, nothing may depend on when it runs or what ran before. */
 static sadmm_status run_graph(struct sadmm_context *c, const struct cuda_partition *partition, struct sadmm_error *error)
 {

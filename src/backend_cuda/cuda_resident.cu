@@ -21,6 +21,8 @@ enum resident_mode { BLOCK, CLUSTER, GRID };
 
 enum { QUAD = 4 }; /* lanes a half */
 
+#define CLUSTER_ARCH 900 /* of the first devices with clusters of thread blocks */
+
 /* Threads a block at most: what the registers of a multiprocessor are enough for. */
 static constexpr int most_threads(int points)
 {
@@ -73,7 +75,7 @@ template <int MODE> static __device__ __forceinline__ void arrive(unsigned *arri
         __syncthreads();
         if (threadIdx.x == 0) asm volatile("red.release.gpu.global.add.u32 [%0], 1;" ::"l"(arrivals) : "memory");
     }
-#if __CUDA_ARCH__ >= 900
+#if __CUDA_ARCH__ >= CLUSTER_ARCH
     if (MODE == CLUSTER) asm volatile("barrier.cluster.arrive.release.aligned;" ::: "memory");
 #endif
 #endif
@@ -94,7 +96,7 @@ template <int MODE> static __device__ __forceinline__ void wait(const unsigned *
         while ((int)(now - target) < 0);
     }
     if (MODE != CLUSTER) __syncthreads();
-#if __CUDA_ARCH__ >= 900
+#if __CUDA_ARCH__ >= CLUSTER_ARCH
     if (MODE == CLUSTER) asm volatile("barrier.cluster.wait.acquire.aligned;" ::: "memory");
 #endif
 #endif
@@ -105,7 +107,7 @@ static __device__ __forceinline__ const solver_real *in_block(const solver_real 
 {
 #ifdef SADMM_CUDA_EMULATED
     return (const solver_real *)cuda_emulation_in_block(own, rank);
-#elif __CUDA_ARCH__ >= 900
+#elif __CUDA_ARCH__ >= CLUSTER_ARCH
     const solver_real *other;
     asm("mapa.u64 %0, %1, %2;" : "=l"(other) : "l"(own), "r"(rank));
     return other;
@@ -484,13 +486,21 @@ PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
 
 /* ---- the kernel ------------------------------------------------------------------------------------------------ */
 
+/* A block without bodies, or a cluster: there are more than islands, mostly. In the grid everybody comes to the barrier. */
+template <int MODE> static __device__ __forceinline__ bool nothing_to_do(const cuda_view &v, int32_t cluster)
+{
+    if (MODE == GRID) return false;
+    const int32_t first = MODE == BLOCK ? (int32_t)blockIdx.x : (int32_t)blockIdx.x / cluster * cluster;
+    return v.parts[first] == v.parts[first + (MODE == BLOCK ? 1 : cluster)];
+}
+
 /* FULL: with row blocks, or to be measured; both cost registers, and most stretches have neither. */
 template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL>
 static __global__ void __launch_bounds__(most_threads(POINTS))
     resident_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     CUDA_DYNAMIC_SHARED(memory);
-    if (v.live->halt) return;
+    if (v.live->halt || nothing_to_do<MODE>(v, args.cluster)) return;
     part_run<CONTACT_ROWS, POINTS, MODE, FULL> part(v, args, memory);
     part.load();
     unsigned target = 0;
@@ -554,11 +564,21 @@ cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, enum sadmm_
     return nullptr;
 }
 
-cudaError_t CUDA(resident_allow)(int bytes)
+cudaError_t CUDA(resident_allow)(int bytes, bool device_has_clusters, bool *clusters)
 {
+    cudaError_t code = cudaSuccess;
+    *clusters = device_has_clusters;
     for (const instance &one : instances) {
-        cudaError_t code =
-            cudaFuncSetAttribute((const void *)one.kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, bytes);
+        const void *kernel = (const void *)one.kernel;
+        code = cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, bytes);
+        if (code != cudaSuccess) return code;
+        if (one.tier != SADMM_CUDA_TIER_CLUSTER || !*clusters) continue;
+        /* What was compiled for earlier devices (__CUDA_ARCH__ above) has no cluster barriers, wherever it runs. */
+        cudaFuncAttributes about = {};
+        code = cudaFuncGetAttributes(&about, kernel);
+        if (code != cudaSuccess) return code;
+        *clusters = about.ptxVersion >= CLUSTER_ARCH / 10;
+        if (*clusters) code = cudaFuncSetAttribute(kernel, cudaFuncAttributeNonPortableClusterSizeAllowed, 1);
         if (code != cudaSuccess) return code;
     }
     return cudaSuccess;

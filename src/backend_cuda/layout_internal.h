@@ -94,7 +94,7 @@ static inline cudaError_t layout_launch(layout_kernel kernel, int64_t blocks, in
     if (blocks <= 0) return cudaSuccess;
 #ifdef SADMM_CUDA_EMULATED
     (void)stream;
-    return cuda_emulation_launch(kernel, (unsigned)blocks, (unsigned)threads, shared, 1, *view, *args);
+    return cuda_emulation_launch(kernel, (unsigned)blocks, (unsigned)threads, shared, *view, *args);
 #else
     void *parameters[] = {const_cast<layout_view *>(view), const_cast<layout_args *>(args)};
     return cudaLaunchKernel((const void *)kernel, dim3((unsigned)blocks), dim3((unsigned)threads), parameters, shared,
