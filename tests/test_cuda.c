@@ -167,6 +167,13 @@ static const struct scene {
 };
 enum { SCENES = sizeof scenes / sizeof *scenes };
 
+static const struct scene *find_scene(const char *name)
+{
+    const struct scene *scene = scenes;
+    while (strcmp(scene->name, name) != 0) ++scene;
+    return scene;
+}
+
 /* ---- one table at work ----------------------------------------------------------------------------------------- */
 
 struct runner {
@@ -480,8 +487,7 @@ START_TEST(cluster_sizes)
     const struct sadmm_kernels *table = tables[_i];
     if (!device_has(table, SADMM_CUDA_TIER_CLUSTER)) return;
     for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
-        const struct scene *scene = scenes;
-        while (strcmp(scene->name, cases[k].scene) != 0) ++scene;
+        const struct scene *scene = find_scene(cases[k].scene);
         struct runner wanted;
         runner_start(&wanted, table, scene, SADMM_CUDA_TIER_STREAM);
         CALL(&wanted, table->iterate(wanted.c, 6, true, &wanted.error));
@@ -524,6 +530,36 @@ START_TEST(cluster_sizes)
 }
 END_TEST
 
+/* The tier that is likely the fastest: small islands in blocks, a large one in a cluster, and all else that does not fit
+ * in the two kernels of STREAM. */
+static struct contact_problem *scene_huge(void) { return contact_problem_pyramid(40, 0.5); }
+START_TEST(tiers_chosen)
+{
+    static const struct scene huge = {"huge", scene_huge, RIGID, true, 0};
+    const struct {
+        const struct scene *scene;
+        enum sadmm_cuda_tier tier;
+    } cases[] = {{find_scene("towers"), SADMM_CUDA_TIER_BLOCK},
+                 {find_scene("free bodies"), SADMM_CUDA_TIER_BLOCK},
+                 {find_scene("large"), SADMM_CUDA_TIER_CLUSTER},
+#ifdef CUDA_EMULATED
+                 {&huge, SADMM_CUDA_TIER_STREAM},
+#endif
+                 {find_scene("nothing"), SADMM_CUDA_TIER_BLOCK}};
+    const struct sadmm_kernels *table = tables[_i];
+    (void)huge;
+    if (!device_has(table, SADMM_CUDA_TIER_CLUSTER)) return;
+    struct runner r;
+    runner_create(&r, table);
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
+        CALL(&r, runner_begin(&r, cases[k].scene));
+        ck_assert_msg(tier_of(table, r.c, NULL) == cases[k].tier, "%s: tier %d", cases[k].scene->name,
+                      (int)tier_of(table, r.c, NULL));
+    }
+    runner_stop(&r);
+}
+END_TEST
+
 static void set_halt(struct runner *r, enum cuda_halt halt)
 {
     if (r->k->precision == SADMM_F32) CALL(r, SYMBOL(set_halt, f32)(r->c, halt, &r->error));
@@ -535,8 +571,7 @@ START_TEST(halted_does_nothing)
 {
     static const char *const names[] = {"mixed", "large"};
     const struct sadmm_kernels *table = tables[_i / 2];
-    const struct scene *scene = scenes;
-    while (strcmp(scene->name, names[_i % 2]) != 0) ++scene;
+    const struct scene *scene = find_scene(names[_i % 2]);
     for (size_t t = 0; t < TIERS; ++t) {
         struct runner plain, halted;
         if (!device_has(table, tiers[t]) || !(scene->tiers >> tiers[t] & 1)) continue;
@@ -722,6 +757,7 @@ int main(void)
     tcase_add_loop_test(tests, entries_equal_literal, 0, 2 * SCENES);
     tcase_add_loop_test(tests, tiers_equal_stepwise, 0, 2 * SCENES);
     tcase_add_loop_test(tests, cluster_sizes, 0, 2);
+    tcase_add_loop_test(tests, tiers_chosen, 0, 2);
     tcase_add_loop_test(tests, halted_does_nothing, 0, 4);
     tcase_add_loop_test(tests, runs_repeat, 0, 2);
     tcase_add_loop_test(tests, contexts_side_by_side, 0, 2);

@@ -33,6 +33,7 @@ struct cuda_step {
 
     struct cuda_step_report last; /* of the last step that was done */
     int64_t done, repeats;
+    int64_t misfit;             /* the last step that its partition did not fit; -1: none */
     int32_t culprit;
 };
 
@@ -401,7 +402,11 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
     ++s->repeats;
     s->planned = false;
     if (report->halt == HALT_ROOM) s->candidate_room = std::max(s->candidate_room, generous(report->counts.candidates));
-    if (report->halt == HALT_PARTITION) c->refused |= 1u << c->partition.tier;
+    if (report->halt == HALT_PARTITION) {
+        /* The next partition is made for this very step, and fits; a tier that fails twice is left alone all the same. */
+        if (s->misfit == first) c->refused |= 1u << c->partition.tier;
+        s->misfit = first;
+    }
     return repeat_steps(c, first, end, error);
 }
 
@@ -524,6 +529,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     CUDA_TRY(clear_halt(c, error));
     s->candidate_room = s->point_room = c->first_room;
     c->refused = 0;
+    s->misfit = -1;
     CUDA_TRY(COLLISION(attach)(s->collision, c->stream, world->input,
                                buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES), &c->view.live->halt, error));
     view_into(c, s->into);
