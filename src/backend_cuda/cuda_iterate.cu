@@ -42,7 +42,7 @@ struct pair_sum {
 
 static __device__ __forceinline__ pair_sum sum_of(vec3 impulse, vec3 arm_a, vec3 arm_b)
 {
-    pair_sum sum = {impulse, v3_cross(arm_a, impulse), v3_cross(arm_b, impulse)};
+    pair_sum sum = {impulse, fused_cross(arm_a, impulse), fused_cross(arm_b, impulse)};
     return sum;
 }
 
@@ -346,7 +346,7 @@ static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool
     args.most_bodies = partition->most_bodies;
     args.cluster = partition->cluster;
     cuda_kernel kernel = CUDA(resident_kernel)(c->view.contact_rows, c->facts.point_slots, partition->tier,
-                                               measure || c->view.rows > 0, &name);
+                                               partition->threads, measure || c->view.rows > 0, &name);
     if (partition->tier == SADMM_CUDA_TIER_GRID)
         CUDA_CALL(c, cudaMemsetAsync(c->view.barrier, 0, sizeof *c->view.barrier, c->stream),
                   "cudaMemsetAsync(barrier)");
