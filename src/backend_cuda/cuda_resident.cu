@@ -24,17 +24,19 @@ enum { QUAD = 4 }; /* lanes a half */
 #define CLUSTER_ARCH 900 /* of the first devices with clusters of thread blocks */
 
 /* Threads a block at most: what the registers of a multiprocessor are enough for. */
-/* SMALL: blocks of few threads, which may have all the registers they want. */
-enum { SMALL_THREADS = 256 };
+/* Sizes of blocks an instance is made for: few threads may have all the registers they want, and a single warp needs no
+ * barrier (BLOCK alone). */
+enum block_size { ANY_SIZE, SMALL, ONE_WARP };
+enum { SMALL_THREADS = sizeof(solver_real) == sizeof(float) ? 512 : 256 };
 
-static constexpr int most_threads(int points, bool small)
+static constexpr int most_threads(int points, int size)
 {
-    if (small) return SMALL_THREADS;
-
+    if (size == ONE_WARP) return WARP;
+    if (size == SMALL) return SMALL_THREADS;
     return sizeof(solver_real) == sizeof(float) ? (points == 4 ? 1024 : 768) : (points == 4 ? 512 : 384);
 }
 
-int CUDA(resident_threads)(int point_slots) { return most_threads(point_slots <= 4 ? 4 : 8, false); }
+int CUDA(resident_threads)(int point_slots) { return most_threads(point_slots <= 4 ? 4 : 8, ANY_SIZE); }
 
 /* ---- shared memory --------------------------------------------------------------------------------------------- */
 
@@ -69,7 +71,7 @@ size_t CUDA(resident_shared)(enum sadmm_cuda_tier tier, int threads, int32_t mos
 /* ---- barriers -------------------------------------------------------------------------------------------------- */
 
 /* Between the two halves of a barrier a thread may do what concerns nobody else. */
-template <int MODE> static __device__ __forceinline__ void arrive(unsigned *arrivals)
+template <int MODE, int SIZE> static __device__ __forceinline__ void arrive(unsigned *arrivals)
 {
 #ifdef SADMM_CUDA_EMULATED
     (void)arrivals;
@@ -87,12 +89,19 @@ template <int MODE> static __device__ __forceinline__ void arrive(unsigned *arri
 }
 
 /* `target`: arrivals in all when every block has come. */
-template <int MODE> static __device__ __forceinline__ void wait(const unsigned *arrivals, unsigned target)
+/* Of the block's own. */
+template <int SIZE> static __device__ __forceinline__ void block_barrier(void)
+{
+    if (SIZE == ONE_WARP) __syncwarp((unsigned)ALL_LANES);
+    else __syncthreads();
+}
+
+template <int MODE, int SIZE> static __device__ __forceinline__ void wait(const unsigned *arrivals, unsigned target)
 {
 #ifdef SADMM_CUDA_EMULATED
     (void)arrivals;
     (void)target;
-    if (MODE == BLOCK) __syncthreads();
+    if (MODE == BLOCK) block_barrier<SIZE>();
     else cuda_emulation_barrier_together();
 #else
     if (MODE == GRID && threadIdx.x == 0) {
@@ -100,7 +109,7 @@ template <int MODE> static __device__ __forceinline__ void wait(const unsigned *
         do asm volatile("ld.acquire.gpu.global.u32 %0, [%1];" : "=r"(now) : "l"(arrivals) : "memory");
         while ((int)(now - target) < 0);
     }
-    if (MODE != CLUSTER) __syncthreads();
+    if (MODE != CLUSTER) block_barrier<SIZE>();
 #if __CUDA_ARCH__ >= CLUSTER_ARCH
     if (MODE == CLUSTER) asm volatile("barrier.cluster.wait.acquire.aligned;" ::: "memory");
 #endif
@@ -164,16 +173,22 @@ CUDA_INLINE int32_t quad_slot(int32_t lane) { return (lane & 1) * QUAD + (lane &
 
 /* ---- a part ---------------------------------------------------------------------------------------------------- */
 
-template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL> struct part_run {
-    enum { COUNT = POINTS / QUAD };
+template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE> struct part_run {
+    enum { COUNT = POINTS / QUAD, FEW = 4, MORE = 8 };
     const cuda_view &v;
     const cuda_args &args;
     part_memory m;
     int32_t t, r, lane, half; /* thread; component of a body; lane of a quad; the quad's half */
     int32_t first_body, bodies, first_half, halves;
 
-    /* One body for each eight threads is in registers, with its halves and b - A v; more are in shared memory. */
-    int32_t body, begin, end;
+    /* One body for each eight threads is in registers, with where its records are and b - A v; more are in shared
+     * memory. What the loop needs is worked out before it: addresses, and what holds for a whole warp. */
+    int32_t body;
+    const solver_real *gathered; /* component r of the first record */
+    int32_t gathered_count;      /* 0 in lanes that have no component */
+    bool many;                   /* some lane of the warp has more than FEW */
+    bool moves, updates;         /* the warp has bodies, halves */
+    real2_pair *own_record;
     body_lane own_body;
     real momentum;
     half_lane<POINTS> own;
@@ -182,7 +197,8 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL> struct part_run {
         : v(view), args(arguments), t((int32_t)threadIdx.x), r(t % LANES), lane(t % QUAD), half(t / QUAD),
           first_body(v.parts[blockIdx.x]), bodies(v.parts[blockIdx.x + 1] - first_body),
           first_half(v.offsets[first_body]), halves(v.offsets[first_body + bodies] - first_half), body(t / LANES),
-          begin(0), end(0), own_body(), momentum(0), own()
+          gathered(nullptr), gathered_count(0), many(false), moves(warp_has_body(0)), updates(warp_has_half()),
+          own_record(nullptr), own_body(), momentum(0), own()
     {
         lay_out(&m, memory, MODE == CLUSTER, (int)blockDim.x, args.most_bodies, has_rows());
     }
@@ -206,16 +222,16 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL> struct part_run {
     __device__ __forceinline__ void find_other(int32_t other);
     __device__ __forceinline__ void start_records(void);
     __device__ __forceinline__ void load_records(void);
-    __device__ __forceinline__ void store_record(solver_real *record, real2_pair sum) const;
-    __device__ __forceinline__ real gather(real g, int32_t from, int32_t to) const;
+    __device__ __forceinline__ void store_record(real2_pair *record, real2_pair sum) const;
+    __device__ __forceinline__ real gather(real g, const solver_real *from, int32_t count, bool more) const;
     __device__ __forceinline__ void publish(int32_t i, real value, int32_t odd);
     __device__ __forceinline__ void move_bodies(int32_t odd);
     template <bool MEASURE> __device__ __forceinline__ double update_halves(int32_t odd);
     __device__ __forceinline__ void store(int32_t odd);
 };
 
-#define PART template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL>
-#define PART_RUN part_run<CONTACT_ROWS, POINTS, MODE, FULL>
+#define PART template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE>
+#define PART_RUN part_run<CONTACT_ROWS, POINTS, MODE, FULL, SIZE>
 
 /* ---- row blocks, out of line: few systems have them ------------------------------------------------------------ */
 
@@ -318,7 +334,7 @@ PART __device__ __forceinline__ void PART_RUN::start_records(void)
         force = j == 0 ? impulse : v3_add(force, impulse);
         torque = j == 0 ? moment : v3_add(torque, moment);
     }
-    store_record(m.records + half * ROW, sum_quad(lane, force, torque));
+    store_record(own_record, sum_quad(lane, force, torque));
 }
 
 /* What the last stretch or the stepwise kernels left, joined after a measured iteration. */
@@ -337,11 +353,14 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
     const size_t at = (size_t)(first_body + (body < bodies ? body : 0)), raw = body < bodies ? (size_t)v.body_of[at] : 0;
     own_body =
         load_body(body < bodies, r, v.lines + raw * (size_t)v.line, v.rigid, v.b + raw * ROW, v.state + raw * ROW);
-    if (body < bodies) {
-        begin = v.offsets[at] - first_half;
-        end = v.offsets[at + 1] - first_half;
+    gathered = m.records;
+    if (body < bodies && r < 6) {
+        gathered = m.records + (v.offsets[at] - first_half) * ROW + record_slot(r);
+        gathered_count = v.offsets[at + 1] - v.offsets[at];
     }
-    if (warp_has_body(0)) momentum = free_momentum(own_body);
+    many = __ballot_sync((unsigned)ALL_LANES, gathered_count > FEW) != 0;
+    own_record = (real2_pair *)(m.records + half * ROW + quad_slot(lane));
+    if (moves) momentum = free_momentum(own_body);
     for (int32_t i = t; i < bodies * ROW; i += threads) m.state[i] = v.state[raw_row(i)];
     if (t < ROW) m.state[(MODE == CLUSTER ? 2 : 1) * args.most_bodies * ROW + t] = 0;
     if (bodies > in_registers) {
@@ -355,27 +374,30 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
     own.other = m.state;
     if (half < halves) load_half();
     if (!args.start) load_records();
-    else if (warp_has_half()) start_records();
+    else if (updates) start_records();
     if (has_rows() && half < halves && !own.pair && lane == 0)
         start_row_half(v, v.incident[first_half + half], m.row_lambda + half * ROW, m.records + half * ROW, args.start);
-    __syncthreads();
+    block_barrier<SIZE>();
 }
 
 /* ---- Step 1 ---------------------------------------------------------------------------------------------------- */
 
-/* g and component r of the records [from, to), one after the other. */
-PART __device__ __forceinline__ real PART_RUN::gather(real g, int32_t from, int32_t to) const
+/* g and `count` numbers, each a record after the last, one after the other; few are on the way at once. */
+PART __device__ __forceinline__ real PART_RUN::gather(real g, const solver_real *from, int32_t count, bool more) const
 {
-    enum { AHEAD = 4 }; /* loads on the way at once; few bodies have more halves */
-    const solver_real *record = m.records + record_slot(r);
-    for (int32_t h = from; h < to; h += AHEAD) {
-        real value[AHEAD] = {};
+    real value[MORE];
 #pragma unroll
-        for (int32_t j = 0; j < AHEAD; ++j)
-            if (h + j < to) value[j] = record[(h + j) * ROW];
+    for (int32_t j = 0; j < FEW; ++j) value[j] = j < count ? from[j * ROW] : (real)0;
 #pragma unroll
-        for (int32_t j = 0; j < AHEAD; ++j)
-            if (h + j < to) g += value[j];
+    for (int32_t j = 0; j < FEW; ++j)
+        if (j < count) g += value[j];
+    if (!more) return g;
+    for (int32_t h = FEW; h < count; h += MORE) {
+#pragma unroll
+        for (int32_t j = 0; j < MORE; ++j) value[j] = h + j < count ? from[(h + j) * ROW] : (real)0;
+#pragma unroll
+        for (int32_t j = 0; j < MORE; ++j)
+            if (h + j < count) g += value[j];
     }
     return g;
 }
@@ -389,13 +411,11 @@ PART __device__ __forceinline__ void PART_RUN::publish(int32_t i, real value, in
 
 PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd)
 {
-    if (warp_has_body(0)) {
-        const bool mine = body < bodies && r < 6;
-        real g = momentum;
-        if (mine) g = gather(g, begin, end);
-        move_body(&own_body, g);
+    if (moves) {
+        move_body(&own_body, gather(momentum, gathered, gathered_count, many));
         publish(body, own_body.v, odd);
     }
+    if (SIZE == ONE_WARP && !FULL && bodies <= WARP / LANES) return;
     const int32_t in_registers = (int32_t)blockDim.x / LANES;
     for (int32_t first = in_registers; warp_has_body(first); first += in_registers) {
         const int32_t i = first + body, at = i - in_registers;
@@ -403,8 +423,10 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd)
         body_lane one =
             load_body(live, r, m.lines + at * LINE_GENERAL, v.rigid, m.b + at * ROW, state(!odd) + i * ROW);
         real g = free_momentum(one);
-        if (live && r < 6)
-            g = gather(g, v.offsets[first_body + i] - first_half, v.offsets[first_body + i + 1] - first_half);
+        if (live && r < 6) {
+            const int32_t from = v.offsets[first_body + i], count = v.offsets[first_body + i + 1] - from;
+            g = gather(g, m.records + (from - first_half) * ROW + record_slot(r), count, count > FEW);
+        }
         move_body(&one, g);
         publish(i, one.v, odd);
     }
@@ -412,19 +434,18 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd)
 
 /* ---- Steps 2-4 ------------------------------------------------------------------------------------------------- */
 
-PART __device__ __forceinline__ void PART_RUN::store_record(solver_real *record, real2_pair sum) const
+PART __device__ __forceinline__ void PART_RUN::store_record(real2_pair *record, real2_pair sum) const
 {
-    if (!own.pair) return;
     sum.x *= own.sign;
     sum.y *= own.sign;
-    *(real2_pair *)(record + quad_slot(lane)) = sum;
+    if (own.pair) *record = sum;
 }
 
 /* The lane's share of the primal residual. */
 PART template <bool MEASURE> __device__ __forceinline__ double PART_RUN::update_halves(int32_t odd)
 {
     double primal = 0;
-    if (!warp_has_half()) return primal;
+    if (!updates) return primal;
     const solver_real *own_row = state(odd) + own.own * ROW, *other_row = own.other + (odd ? own.other_odd : 0);
     const body_motion own_motion = load_motion(own_row), other = load_motion(other_row);
     vec3 force = v3(0, 0, 0), torque = force, change_force = force, change_torque = force;
@@ -447,12 +468,13 @@ PART template <bool MEASURE> __device__ __forceinline__ double PART_RUN::update_
         change_torque = j == 0 ? moment : v3_add(change_torque, moment);
         largest = real_max(largest, largest_row<CONTACT_ROWS>(own.normal, delta));
     }
-    store_record(m.records + half * ROW, sum_quad(lane, force, torque));
+    store_record(own_record, sum_quad(lane, force, torque));
     if (!MEASURE && !has_rows()) return primal;
 
     const int32_t code = half < halves ? v.incident[first_half + half] : 0;
     if (MEASURE) {
-        store_record(v.change + (size_t)code * ROW, sum_quad(lane, change_force, change_torque));
+        store_record((real2_pair *)(v.change + (size_t)code * ROW + quad_slot(lane)),
+                     sum_quad(lane, change_force, change_torque));
         if (own.pair) {
             const int2 on = v.pair_bodies[code / 2];
             primal = (double)(largest * real_max(inv_beta_of(v, on.x), inv_beta_of(v, on.y)));
@@ -500,30 +522,30 @@ template <int MODE> static __device__ __forceinline__ bool nothing_to_do(const c
 }
 
 /* FULL: with row blocks, or to be measured; both cost registers, and most stretches have neither. */
-template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, bool SMALL>
-static __global__ void __launch_bounds__(most_threads(POINTS, SMALL))
+template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE>
+static __global__ void __launch_bounds__(most_threads(POINTS, SIZE))
     resident_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     CUDA_DYNAMIC_SHARED(memory);
     if (v.live->halt || nothing_to_do<MODE>(v, args.cluster)) return;
-    part_run<CONTACT_ROWS, POINTS, MODE, FULL> part(v, args, memory);
+    part_run<CONTACT_ROWS, POINTS, MODE, FULL, SIZE> part(v, args, memory);
     part.load();
     unsigned target = 0;
     for (int32_t iteration = 1; iteration <= args.count; ++iteration) {
         const int32_t odd = iteration & 1;
         part.move_bodies(odd);
-        arrive<MODE>(v.barrier);
-        if (part.warp_has_body(0)) part.momentum = free_momentum(part.own_body);
-        wait<MODE>(v.barrier, target += gridDim.x);
+        arrive<MODE, SIZE>(v.barrier);
+        if (part.moves) part.momentum = free_momentum(part.own_body);
+        wait<MODE, SIZE>(v.barrier, target += gridDim.x);
         if (FULL && args.measure && iteration == args.count)
             reduce_max(part.template update_halves<true>(odd), v.residual);
         else part.template update_halves<false>(odd);
-        __syncthreads();
+        block_barrier<SIZE>();
     }
     /* Nobody looks into this block's memory once it is gone. */
     if (MODE == CLUSTER) {
-        arrive<MODE>(v.barrier);
-        wait<MODE>(v.barrier, 0);
+        arrive<MODE, SIZE>(v.barrier);
+        wait<MODE, SIZE>(v.barrier, 0);
     }
     part.store(args.count & 1);
 }
@@ -533,41 +555,46 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SMALL))
 struct instance {
     int contact_rows, points;
     enum sadmm_cuda_tier tier;
-    bool full, small;
+    bool full;
+    int size;
     cuda_kernel kernel;
     const char *name;
 };
 
-#define INSTANCE(rows, points, mode, name)                                                                             \
-    {rows, points, SADMM_CUDA_TIER_##mode, false, false, resident_kernel<rows, points, mode, false, false>,            \
-     "iterate (" name ")"},                                                                                            \
-        {rows, points, SADMM_CUDA_TIER_##mode, false, true, resident_kernel<rows, points, mode, false, true>,          \
-         "iterate (" name ", small)"},                                                                                 \
-        {rows, points, SADMM_CUDA_TIER_##mode, true, false, resident_kernel<rows, points, mode, true, false>,          \
-         "iterate (" name ", full)"}
+#define INSTANCE(rows, points, mode, full, size, name)                                                                 \
+    {rows, points, SADMM_CUDA_TIER_##mode, full, size, resident_kernel<rows, points, mode, full, size>, "iterate (" name ")"}
+#define INSTANCES(rows, points, mode, name)                                                                            \
+    INSTANCE(rows, points, mode, false, ANY_SIZE, name), INSTANCE(rows, points, mode, false, SMALL, name ", small"),   \
+        INSTANCE(rows, points, mode, true, ANY_SIZE, name ", full")
 /* Boxes on boxes touch in up to 8 points, mostly 4: with 4 a lane needs fewer registers. */
 static const instance instances[] = {
-    INSTANCE(3, 4, BLOCK, "block, 3 rows, 4 points"),
-    INSTANCE(3, 8, BLOCK, "block, 3 rows, 8 points"),
-    INSTANCE(1, 4, BLOCK, "block, 1 row, 4 points"),
-    INSTANCE(1, 8, BLOCK, "block, 1 row, 8 points"),
-    INSTANCE(3, 4, CLUSTER, "cluster, 3 rows, 4 points"),
-    INSTANCE(3, 8, CLUSTER, "cluster, 3 rows, 8 points"),
-    INSTANCE(1, 4, CLUSTER, "cluster, 1 row, 4 points"),
-    INSTANCE(1, 8, CLUSTER, "cluster, 1 row, 8 points"),
-    INSTANCE(3, 4, GRID, "grid, 3 rows, 4 points"),
-    INSTANCE(3, 8, GRID, "grid, 3 rows, 8 points"),
-    INSTANCE(1, 4, GRID, "grid, 1 row, 4 points"),
-    INSTANCE(1, 8, GRID, "grid, 1 row, 8 points"),
+    INSTANCE(3, 4, BLOCK, false, ONE_WARP, "warp, 3 rows, 4 points"),
+    INSTANCE(3, 8, BLOCK, false, ONE_WARP, "warp, 3 rows, 8 points"),
+    INSTANCE(1, 4, BLOCK, false, ONE_WARP, "warp, 1 row, 4 points"),
+    INSTANCE(1, 8, BLOCK, false, ONE_WARP, "warp, 1 row, 8 points"),
+    INSTANCES(3, 4, BLOCK, "block, 3 rows, 4 points"),
+    INSTANCES(3, 8, BLOCK, "block, 3 rows, 8 points"),
+    INSTANCES(1, 4, BLOCK, "block, 1 row, 4 points"),
+    INSTANCES(1, 8, BLOCK, "block, 1 row, 8 points"),
+    INSTANCES(3, 4, CLUSTER, "cluster, 3 rows, 4 points"),
+    INSTANCES(3, 8, CLUSTER, "cluster, 3 rows, 8 points"),
+    INSTANCES(1, 4, CLUSTER, "cluster, 1 row, 4 points"),
+    INSTANCES(1, 8, CLUSTER, "cluster, 1 row, 8 points"),
+    INSTANCES(3, 4, GRID, "grid, 3 rows, 4 points"),
+    INSTANCES(3, 8, GRID, "grid, 3 rows, 8 points"),
+    INSTANCES(1, 4, GRID, "grid, 1 row, 4 points"),
+    INSTANCES(1, 8, GRID, "grid, 1 row, 8 points"),
 };
 
 cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, enum sadmm_cuda_tier tier, int threads,
                                   bool full, const char **name)
 {
     int rows = contact_rows == 1 ? 1 : 3, points = point_slots <= 4 ? 4 : 8;
-    bool small = !full && threads <= SMALL_THREADS;
+    int size = full || threads > SMALL_THREADS             ? ANY_SIZE
+               : tier == SADMM_CUDA_TIER_BLOCK && threads == WARP ? ONE_WARP
+                                                                 : SMALL;
     for (const instance &one : instances)
-        if (one.contact_rows == rows && one.points == points && one.tier == tier && one.full == full && one.small == small) {
+        if (one.contact_rows == rows && one.points == points && one.tier == tier && one.full == full && one.size == size) {
             *name = one.name;
             return one.kernel;
         }
