@@ -35,16 +35,16 @@ static __device__ uint64_t morton(const struct collision_grid &layout, const dou
     return code;
 }
 
+struct grid_sample {
+    double samples[COLLISION_THREADS][3], bounds[2][3];
+};
+
 /* The grid covers three times what holds nine in ten of a sample of the movers: a body far away must not spoil it. One
  * block; thread t takes a body of the t-th share of the slots and finds its rank by comparing with all. */
 static __global__ void __launch_bounds__(COLLISION_THREADS) grid_kernel(const __grid_constant__ collision_view v)
 {
-#ifdef SADMM_CUDA_EMULATED
-    double(*const samples)[3] = (double(*)[3])cuda_emulation_shared();
-    double(*const bounds)[3] = samples + COLLISION_THREADS;
-#else
-    __shared__ double samples[COLLISION_THREADS][3], bounds[2][3];
-#endif
+    COLLISION_SHARED(grid_sample, shared);
+    double(*const samples)[3] = shared.samples, (*const bounds)[3] = shared.bounds;
     const int t = (int)threadIdx.x;
     const int32_t slot = (int32_t)((int64_t)v.body_count * t / COLLISION_THREADS);
     const bool stands = v.body_count <= t || v.bodies[slot].system_body < 0;
@@ -73,10 +73,13 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) grid_kernel(const __
     v.grid->scale = range > 0 && range < HUGE_VAL ? (double)(1 << MORTON_BITS) / (3 * range) : 0;
 }
 
-static __global__ void __launch_bounds__(COLLISION_THREADS) place_kernel(const __grid_constant__ collision_view v)
+/* The first kernel of a find also resets the counter of the candidates. */
+static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __grid_constant__ collision_view v)
 {
-    const int64_t i = collision_thread(COLLISION_THREADS);
-    if (i >= v.leaf_count + v.plane_count || halted(v)) return;
+    const int64_t i = collision_thread(PLACE_THREADS);
+    if (halted(v)) return;
+    if (i == 0) *v.candidate_count = 0;
+    if (i >= v.leaf_count + v.plane_count) return;
     const uint32_t slot = v.present[i];
     const struct sadmm_shape &shape = v.shapes[slot];
     const struct sadmm_collision_body &body = v.bodies[shape.body];
@@ -185,32 +188,11 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) refit_kernel(const _
 
 /* ---- pairs ----------------------------------------------------------------------------------------------------- */
 
+/* What a radix sort of all the room needs. */
 static __global__ void __launch_bounds__(COLLISION_THREADS) clear_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t i = collision_thread(COLLISION_THREADS);
-    if (i == 0) *v.candidate_count = 0;
-    if (i < v.candidate_room) v.candidates[i] = ~UINT64_C(0);
-}
-
-/* Candidates on their way to memory. */
-struct batch {
-    uint64_t keys[PAIR_TILE];
-    int count;
-};
-
-static __device__ void flush(const collision_view &v, struct batch *out)
-{
-    if (out->count == 0) return;
-    const unsigned long long first = reserve(v.candidate_count, (unsigned)out->count);
-    for (int i = 0; i < out->count; ++i)
-        if (first + (unsigned)i < (unsigned)v.candidate_room) v.candidates[first + (unsigned)i] = out->keys[i];
-    out->count = 0;
-}
-
-static __device__ void add(const collision_view &v, struct batch *out, uint32_t a, uint32_t b)
-{
-    if (out->count == PAIR_TILE) flush(v, out);
-    out->keys[out->count++] = (uint64_t)a << v.slot_bits | b;
+    if (i < v.candidate_room) v.found[i] = ~UINT64_C(0);
 }
 
 static __device__ bool may_meet(const collision_view &v, const collision_filter &a, const collision_filter &b)
@@ -221,20 +203,50 @@ static __device__ bool may_meet(const collision_view &v, const collision_filter 
            find_key(v.disabled_pairs, v.disabled_count, unordered_key((uint32_t)a.body, (uint32_t)b.body)) < 0;
 }
 
-/* Two leaves whose boxes and groups meet; the shape of the lower (type, slot) comes first. */
-static __device__ void add_leaves(const collision_view &v, struct batch *out, const struct collision_filter &own,
-                                  uint32_t a, uint32_t b)
-{
-    const struct collision_filter other = v.filters[b];
-    const int type_a = own.kind & FILTER_TYPE, type_b = other.kind & FILTER_TYPE;
-    if (!may_meet(v, own, other)) return;
-    if (type_a < type_b || (type_a == type_b && a < b)) add(v, out, a, b);
-    else add(v, out, b, a);
-}
-
 static __device__ __forceinline__ bool nodes_meet(const struct collision_node &a, const struct collision_node &b)
 {
     return a.group_low <= b.group_high && b.group_low <= a.group_high && boxes_overlap(&a.box, &b.box);
+}
+
+/* The shape of the lower (type, slot) comes first. */
+static __device__ __forceinline__ uint64_t candidate_key(const collision_view &v, uint32_t a, int32_t kind_a,
+                                                         uint32_t b, int32_t kind_b)
+{
+    const int type_a = kind_a & FILTER_TYPE, type_b = kind_b & FILTER_TYPE;
+    const bool ordered = type_a < type_b || (type_a == type_b && a < b);
+    return (uint64_t)(ordered ? a : b) << v.slot_bits | (ordered ? b : a);
+}
+
+static __device__ __forceinline__ void store_candidate(const collision_view &v, unsigned long long at, uint64_t key)
+{
+    if (at < (unsigned)v.candidate_room) v.found[at] = key;
+}
+
+/* Candidates of a thread on their way to memory. */
+enum { BATCH = 16 };
+struct batch {
+    uint64_t keys[BATCH];
+    unsigned count;
+};
+
+static __device__ void write_batch(const collision_view &v, const struct batch &out, unsigned long long first)
+{
+    for (unsigned i = 0; i < out.count; ++i) store_candidate(v, first + i, out.keys[i]);
+}
+
+static __device__ void add(const collision_view &v, struct batch *out, uint64_t key)
+{
+    if (out->count == BATCH) {
+        write_batch(v, *out, reserve(v.candidate_count, out->count));
+        out->count = 0;
+    }
+    out->keys[out->count++] = key;
+}
+
+/* What is left, by all threads of a warp together. */
+static __device__ void finish_batches(const collision_view &v, const struct batch &out)
+{
+    write_batch(v, out, reserve_by_warp(v.candidate_count, out.count));
 }
 
 /* The planes that a mover meets: those of every group, and those of its own. */
@@ -251,23 +263,19 @@ static __device__ void add_planes(const collision_view &v, struct batch *out, co
         for (; i < v.plane_count && v.planes[i] >> 32 == group; ++i) {
             const uint32_t plane = (uint32_t)v.planes[i];
             if (may_meet(v, v.filters[plane], own) && proxy_plane_meets(&v.proxies[plane], &node.box, reach))
-                add(v, out, plane, slot);
+                add(v, out, (uint64_t)plane << v.slot_bits | slot);
         }
     }
 }
 
 /* One leaf against the planes and the later leaves of the tree. Static leaves come last and do not meet each other. */
-static __global__ void __launch_bounds__(COLLISION_THREADS) walk_kernel(const __grid_constant__ collision_view v)
+static __device__ void walk(const collision_view &v, int32_t i, struct batch *out)
 {
-    const int64_t thread = collision_thread(COLLISION_THREADS);
-    if (thread >= v.leaf_count) return;
     const int32_t first_leaf = v.leaf_count - 1;
-    const struct collision_node leaf = v.nodes[first_leaf + thread];
+    const struct collision_node leaf = v.nodes[first_leaf + i];
     const struct collision_filter own = v.filters[leaf.child];
-    struct batch out;
     if (!(own.kind & FILTER_MOVES)) return;
-    out.count = 0;
-    add_planes(v, &out, own, leaf);
+    add_planes(v, out, own, leaf);
     for (int32_t at = leaf.next; at >= 0;) {
         const struct collision_node node = v.nodes[at];
         const bool meet = nodes_meet(leaf, node);
@@ -276,41 +284,86 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) walk_kernel(const __
             at = node.child;
             continue;
         }
-        if (meet) add_leaves(v, &out, own, (uint32_t)leaf.child, (uint32_t)node.child);
+        if (meet) {
+            const struct collision_filter other = v.filters[node.child];
+            if (may_meet(v, own, other))
+                add(v, out, candidate_key(v, (uint32_t)leaf.child, own.kind, (uint32_t)node.child, other.kind));
+        }
         at = node.next;
     }
-    flush(v, &out);
 }
 
-/* All pairs: one leaf against PAIR_TILE others, later ones only. The first tile has the planes. */
-static __global__ void __launch_bounds__(COLLISION_THREADS) tiles_kernel(const __grid_constant__ collision_view v)
+static __global__ void __launch_bounds__(COLLISION_THREADS) walk_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t thread = collision_thread(COLLISION_THREADS);
-    const int32_t tiles = (v.leaf_count + PAIR_TILE - 1) / PAIR_TILE;
-    if (thread >= (int64_t)v.leaf_count * tiles) return;
-    const int32_t i = (int32_t)(thread / tiles), tile = (int32_t)(thread % tiles);
-    const int32_t end = (tile + 1) * PAIR_TILE < v.leaf_count ? (tile + 1) * PAIR_TILE : v.leaf_count;
-    int32_t j = tile * PAIR_TILE > i ? tile * PAIR_TILE : i + 1;
-    if (j >= end && tile > 0) return;
-    const struct collision_node leaf = v.placed[v.present[i]];
-    const struct collision_filter own = v.filters[leaf.child];
     struct batch out;
+    if (halted(v)) return;
     out.count = 0;
-    if (tile == 0) add_planes(v, &out, own, leaf);
-    for (; j < end; ++j) {
-        const uint32_t other = v.present[j];
-        if (nodes_meet(leaf, v.placed[other])) add_leaves(v, &out, own, (uint32_t)leaf.child, other);
+    if (thread < v.leaf_count) walk(v, (int32_t)thread, &out);
+    finish_batches(v, out);
+}
+
+/* All pairs, in tiles: TILE_ROWS leaves, one a thread, against TILE_COLUMNS others, which lie in shared memory; later
+ * ones only. A row's first block has the planes instead. */
+struct tile {
+    struct collision_node nodes[TILE_COLUMNS];
+    struct collision_filter filters[TILE_COLUMNS];
+};
+
+static __global__ void __launch_bounds__(TILE_ROWS) tiles_kernel(const __grid_constant__ collision_view v)
+{
+    COLLISION_SHARED(tile, others);
+    const int32_t t = (int32_t)threadIdx.x, columns = tile_columns(v.leaf_count);
+    const int32_t row = (int32_t)blockIdx.x / columns, column = (int32_t)blockIdx.x % columns - 1;
+    const int32_t i = row * TILE_ROWS + t, first = column * TILE_COLUMNS;
+    struct collision_node leaf;
+    struct collision_filter own;
+    if (halted(v) || (column >= 0 && first + TILE_COLUMNS - 1 <= row * TILE_ROWS)) return;
+    if (i < v.leaf_count) {
+        const uint32_t slot = v.present[i];
+        leaf = v.placed[slot];
+        own = v.filters[slot];
     }
-    flush(v, &out);
+    if (column < 0) {
+        struct batch out;
+        out.count = 0;
+        if (i < v.leaf_count) add_planes(v, &out, own, leaf);
+        finish_batches(v, out);
+        return;
+    }
+
+    const int32_t count = v.leaf_count - first < TILE_COLUMNS ? v.leaf_count - first : TILE_COLUMNS;
+    if (t < count) {
+        const uint32_t slot = v.present[first + t];
+        others.nodes[t] = v.placed[slot];
+        others.filters[t] = v.filters[slot];
+    }
+    __syncthreads();
+    uint64_t hits = 0;
+    if (i < v.leaf_count) {
+        for (int32_t j = 0; j < count; ++j) {
+            const struct collision_node other = others.nodes[j];
+            hits |= (uint64_t)nodes_meet(leaf, other) << j;
+        }
+        if (i >= first) hits &= i - first < TILE_COLUMNS - 1 ? ~UINT64_C(0) << (i - first + 1) : 0;
+        for (uint64_t left = hits; left; left &= left - 1)
+            if (!may_meet(v, own, others.filters[trailing_zeros(left)])) hits ^= left & (0 - left);
+    }
+    unsigned long long at = reserve_by_warp(v.candidate_count, (unsigned)bits_set(hits));
+    for (; hits; hits &= hits - 1) {
+        const int j = trailing_zeros(hits);
+        store_candidate(v, at++, candidate_key(v, (uint32_t)leaf.child, own.kind, (uint32_t)others.nodes[j].child,
+                                               others.filters[j].kind));
+    }
 }
 
 void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels)
 {
-    kernels->grid = grid_kernel;
-    kernels->place = place_kernel;
-    kernels->build = build_kernel;
-    kernels->refit = refit_kernel;
-    kernels->clear = clear_kernel;
-    kernels->walk = walk_kernel;
-    kernels->tiles = tiles_kernel;
+    kernels->grid = {grid_kernel, COLLISION_THREADS, sizeof(struct grid_sample), "grid of the tree"};
+    kernels->place = {place_kernel, PLACE_THREADS, 0, "placing of the shapes"};
+    kernels->build = {build_kernel, COLLISION_THREADS, 0, "build of the tree"};
+    kernels->refit = {refit_kernel, COLLISION_THREADS, 0, "boxes of the tree"};
+    kernels->clear = {clear_kernel, COLLISION_THREADS, 0, "reset of the candidates"};
+    kernels->walk = {walk_kernel, COLLISION_THREADS, 0, "candidates by the tree"};
+    kernels->tiles = {tiles_kernel, TILE_ROWS, sizeof(struct tile), "candidates of all pairs"};
 }

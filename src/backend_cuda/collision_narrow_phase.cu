@@ -10,9 +10,9 @@
 static __global__ void __launch_bounds__(NARROW_THREADS) narrow_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t i = collision_thread(NARROW_THREADS);
-    if (i > v.candidate_room) return;
+    if (i >= (int64_t)v.candidate_room + SIZES_BEYOND) return;
     if (i >= usable_candidates(v)) {
-        v.sizes[i] = 0; /* one more than there is room for: its place is the sum of all */
+        v.sizes[i] = 0;
         return;
     }
     const uint64_t key = v.candidates[i];
@@ -28,7 +28,7 @@ static __global__ void __launch_bounds__(NARROW_THREADS) narrow_kernel(const __g
     pair_manifold(pa->type, v3_load(pa->size), pb->type, v3_load(pb->size), &pose, (real)limit,
                   before >= 0 ? v.before.pairs[before].cache : 0, &m);
 
-    v.sizes[i] = m.count > 0 ? UINT64_C(1) << 32 | (uint32_t)m.count : 0;
+    v.sizes[i] = (uint8_t)m.count;
     if (m.count == 0) return;
     v.matches[i] = (int32_t)before;
     struct manifold *out = &v.manifolds[i];
@@ -40,5 +40,5 @@ static __global__ void __launch_bounds__(NARROW_THREADS) narrow_kernel(const __g
 
 void COLLISION(narrow_phase_kernels)(struct collision_kernels *kernels)
 {
-    kernels->narrow = narrow_kernel;
+    kernels->narrow = {narrow_kernel, NARROW_THREADS, 0, "narrow phase"};
 }
