@@ -446,7 +446,8 @@ START_TEST(room_grows)
     const struct soup_kind *kind = &soups[_i % SOUPS];
     struct soup s = soup_new(kind, 3);
     struct both b = both_new(0);
-    struct sadmm_cuda_collision_tuning tight = {.tree_from = kind->tree_from, .radix_from = _i / SOUPS, .first_room = 1};
+    const bool radix = _i / SOUPS;
+    struct sadmm_cuda_collision_tuning tight = {.tree_from = kind->tree_from, .radix_from = radix, .first_room = 1};
     COLLISION(tune)(b.device, &tight);
     struct sadmm_cuda_contacts out = both_find(&b, &s.input, kind->name);
     struct sadmm_cuda_collision_stats first = COLLISION(stats)(b.device);

@@ -22,7 +22,7 @@ struct collision_buffer {
 
 enum buffer_name {
     /* device */
-    PROXIES, FILTERS, PLACED, LEAF_KEYS, LEAF_KEYS_2, LEAF_SLOTS, LEAF_SLOTS_2, NODES, PARENTS, ARRIVALS,
+    PROXIES, FILTERS, PLACED, LEAF_KEYS, LEAF_KEYS_2, LEAF_SLOTS, LEAF_SLOTS_2, NODES, GROUPS, PARENTS, ARRIVALS,
     COUNTER, GRID, CANDIDATES, CANDIDATES_2, MANIFOLDS, MATCHES, SIZES, PLACES, TEMP,
     PAIRS, POINTS, PAIR_KEYS, COUNTS, PAIRS_2, POINTS_2, PAIR_KEYS_2, COUNTS_2,
     SHAPES, BODIES, PRESENT, PLANES, DISABLED_PAIRS, FRICTION_PAIRS, FRICTION_VALUES,
@@ -34,8 +34,9 @@ enum buffer_name {
 enum { SET_BUFFERS = COUNTS_2 - COUNTS, INPUTS = PINNED_SHAPES - SHAPES };
 
 static const char *const buffer_names[BUFFERS] = {
-    "placed shapes", "filters", "boxes", "tree keys", "sorted tree keys", "leaves", "sorted leaves", "tree", "parents",
-    "arrivals", "counter", "grid", "candidates", "sorted candidates", "manifolds", "matches", "sizes", "places", "sort",
+    "placed shapes", "filters", "boxes", "tree keys", "sorted tree keys", "leaves", "sorted leaves", "tree", "groups",
+    "parents", "arrivals", "counter", "grid", "candidates", "sorted candidates", "manifolds", "matches", "sizes",
+    "places", "sort",
     "contact pairs", "contact points", "contact keys", "contact counts",
     "contact pairs", "contact points", "contact keys", "contact counts",
     "shapes", "bodies", "list of shapes", "planes", "disabled pairs", "friction pairs", "friction values",
@@ -366,6 +367,7 @@ static sadmm_status make_shape_room(struct sadmm_cuda_collision *c, size_t slots
         TRY(room(c, LEAF_KEYS_2, leaves, sizeof *v->leaf_keys, error));
         TRY(room(c, LEAF_SLOTS_2, leaves, sizeof *v->leaf_slots, error));
         TRY(room(c, NODES, 2 * leaves, sizeof *v->nodes, error));
+        TRY(room(c, GROUPS, 2 * leaves, sizeof *v->groups, error));
         TRY(room(c, PARENTS, 2 * leaves, sizeof *v->parents, error));
         TRY(room(c, ARRIVALS, leaves, sizeof *v->arrivals, error));
     }
@@ -373,10 +375,11 @@ static sadmm_status make_shape_room(struct sadmm_cuda_collision *c, size_t slots
     TRY(room(c, GRID, 1, sizeof *v->grid, error));
     v->proxies = in<struct sadmm_proxy>(c, PROXIES);
     v->filters = in<struct collision_filter>(c, FILTERS);
-    v->placed = in<struct collision_node>(c, PLACED);
+    v->placed = in<struct collision_leaf>(c, PLACED);
     v->leaf_keys = in<uint64_t>(c, LEAF_KEYS);
     v->leaf_slots = in<uint32_t>(c, LEAF_SLOTS);
     v->nodes = in<struct collision_node>(c, NODES);
+    v->groups = in<struct collision_groups>(c, GROUPS);
     v->parents = in<int32_t>(c, PARENTS);
     v->arrivals = in<int32_t>(c, ARRIVALS);
     v->candidate_count = in<unsigned long long>(c, COUNTER);

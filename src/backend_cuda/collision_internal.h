@@ -31,6 +31,7 @@
 
 enum {
     COLLISION_THREADS = 256, /* a block */
+    GRID_SAMPLES = 128,
     PLACE_THREADS = 32,      /* every access is a sector a thread: what counts is how many multiprocessors share them */
     NARROW_THREADS = 32,     /* long chains of arithmetic, many registers */
     TILE_ROWS = 128,         /* all pairs: leaves of a block, one a thread, ... */
@@ -43,14 +44,26 @@ enum {
     MORTON_BITS = 21         /* an axis */
 };
 
-/* A leaf (a shape that is no plane) or an inner node of the tree. Inner nodes come first: [0, leaves - 1), then
- * leaves in tree order. A walk goes to `child` where boxes and groups meet, else to `next`: the node after the whole
- * subtree, -1 at the end. It needs no stack, and a walk that starts at a leaf's `next` sees later leaves only. */
-struct alignas(16) collision_node {
+/* A shape that is no plane. */
+struct alignas(16) collision_leaf {
     struct sadmm_box3 box;
-    int32_t child;                 /* inner node: its left child; leaf: the slot */
+    int32_t slot, reserved;
+    int32_t group_low, group_high; /* a leaf that meets every group spans all */
+};
+
+/* A leaf or an inner node of the tree. Inner nodes come first: [0, leaves - 1), then leaves in tree order. A walk goes
+ * to `child` where boxes and groups meet, else to `next`: the node after the whole subtree, -1 at the end. It needs
+ * no stack, and a walk that starts at a leaf's `next` sees later leaves only. Boxes are rounded outwards, so that a node
+ * is one sector of memory; whether two leaves meet is decided by their own boxes. */
+struct alignas(32) collision_node {
+    float lo[3], hi[3];
+    int32_t child; /* inner node: its left child; leaf: the slot */
     int32_t next;
-    int32_t group_low, group_high; /* of the leaves below; a leaf that meets every group spans all */
+};
+
+/* Of the leaves below a node. Looked at only where there are several groups. */
+struct alignas(8) collision_groups {
+    int32_t low, high;
 };
 
 /* What decides whether two shapes may meet at all; by slot. */
@@ -102,10 +115,11 @@ struct collision_view {
 
     struct sadmm_proxy *proxies;                   /* by slot */
     struct collision_filter *filters;              /* by slot */
-    struct collision_node *placed;                 /* by slot: box, slot and groups */
+    struct collision_leaf *placed;                 /* by slot */
     uint64_t *leaf_keys;                           /* by leaf; sorted: tree order */
     uint32_t *leaf_slots;
     struct collision_node *nodes;                  /* 2 leaves - 1 */
+    struct collision_groups *groups;               /* of nodes */
     int32_t *parents;                              /* of nodes; -1: the root */
     int32_t *arrivals;                             /* at inner nodes, bottom up */
 

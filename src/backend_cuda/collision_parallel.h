@@ -40,6 +40,8 @@ static inline int arrive(int *arrivals) { return (*arrivals)++; }
 static inline int leading_zeros(uint64_t x) { return x ? __builtin_clzll(x) : 64; }
 static inline int trailing_zeros(uint64_t x) { return __builtin_ctzll(x); }
 static inline int bits_set(uint64_t x) { return __builtin_popcountll(x); }
+static inline float round_down(double x) { return (float)x > x ? nextafterf((float)x, -HUGE_VALF) : (float)x; }
+static inline float round_up(double x) { return (float)x < x ? nextafterf((float)x, HUGE_VALF) : (float)x; }
 #else
 
 /* Take `count` consecutive places; returns the first. */
@@ -59,6 +61,8 @@ static __device__ __forceinline__ void count_visit(void) {}
 static __device__ __forceinline__ int leading_zeros(uint64_t x) { return __clzll((long long)x); }
 static __device__ __forceinline__ int trailing_zeros(uint64_t x) { return __ffsll((long long)x) - 1; } /* x not 0 */
 static __device__ __forceinline__ int bits_set(uint64_t x) { return __popcll(x); }
+static __device__ __forceinline__ float round_down(double x) { return __double2float_rd(x); }
+static __device__ __forceinline__ float round_up(double x) { return __double2float_ru(x); }
 #endif
 
 enum { WARP_LANES = 32 };
