@@ -31,15 +31,18 @@ struct both {
     struct sadmm_contact_set host_set, device_set;
 };
 
-static struct both both_new(int32_t tree_from)
+/* radix: with the sort and the scan of large scenes, whatever the room. */
+static struct both both_new_tuned(int32_t tree_from, bool radix)
 {
     struct both b = {0};
-    struct sadmm_cuda_collision_tuning tuning = {.tree_from = tree_from};
+    struct sadmm_cuda_collision_tuning tuning = {.tree_from = tree_from, .radix_from = radix};
     OK(sadmm_collision_create(&b.host, error));
     OK(COLLISION(create)(0, &b.device, error));
     COLLISION(tune)(b.device, &tuning);
     return b;
 }
+
+static struct both both_new(int32_t tree_from) { return both_new_tuned(tree_from, false); }
 
 static void both_free(struct both *b)
 {
@@ -320,7 +323,7 @@ static const struct soup_kind soups[] = {
     {.name = "loose, tree", .bodies = 120, .shapes_a_body = 1, .planes = 1, .density = 1, .size_low = 0.5,
      .size_high = 1, .static_share = 0.1, .steps = 4, .tree_from = 1},
     {.name = "sizes 1e-3 to 1e3, tree", .bodies = 700, .shapes_a_body = 1, .planes = 2, .density = 4, .size_low = 1e-3,
-     .size_high = 1e3, .static_share = 0.2, .steps = 2},
+     .size_high = 1e3, .static_share = 0.2, .steps = 2, .tree_from = 1},
     {.name = "sizes 1e-3 to 1e3, all pairs", .bodies = 200, .shapes_a_body = 1, .planes = 2, .density = 4,
      .size_low = 1e-3, .size_high = 1e3, .static_share = 0.2, .steps = 3},
     {.name = "environments in one place, tree", .bodies = 400, .shapes_a_body = 1, .groups = 20, .planes = 12,
@@ -343,7 +346,7 @@ START_TEST(soups_equal_host)
     size_t pairs = 0;
     for (uint64_t number = 1; number <= 2; ++number) {
         struct soup s = soup_new(kind, number);
-        struct both b = both_new(kind->tree_from);
+        struct both b = both_new_tuned(kind->tree_from, number == 2);
         for (int step = 0; step < kind->steps; ++step) {
             char about[128];
             snprintf(about, sizeof about, "%s, soup %d, step %d", kind->name, (int)number, step);
@@ -440,10 +443,11 @@ END_TEST
  * nothing is allocated any more while the numbers stay. */
 START_TEST(room_grows)
 {
-    const struct soup_kind *kind = &soups[_i];
+    const struct soup_kind *kind = &soups[_i % SOUPS];
     struct soup s = soup_new(kind, 3);
-    struct both b = both_new(kind->tree_from);
-    struct sadmm_cuda_collision_tuning tight = {.tree_from = kind->tree_from, .first_room = 1};
+    struct both b = both_new(0);
+    const bool radix = _i / SOUPS;
+    struct sadmm_cuda_collision_tuning tight = {.tree_from = kind->tree_from, .radix_from = radix, .first_room = 1};
     COLLISION(tune)(b.device, &tight);
     struct sadmm_cuda_contacts out = both_find(&b, &s.input, kind->name);
     struct sadmm_cuda_collision_stats first = COLLISION(stats)(b.device);
@@ -667,7 +671,7 @@ START_TEST(calls_that_fail)
 {
     const struct soup_kind *kind = &soups[_i ? 1 : 7];
     struct soup s = soup_new(kind, 9), later;
-    struct both b = both_new(kind->tree_from);
+    struct both b = both_new_tuned(kind->tree_from, _i);
     long before, calls;
     both_find(&b, &s.input, "first");
     random_impulses(&b.host_set);
@@ -676,7 +680,7 @@ START_TEST(calls_that_fail)
     later.input.dt = 0.02;
     for (calls = 0;; ++calls) {
         struct sadmm_error error = {0};
-        struct sadmm_cuda_collision_tuning tight = {.tree_from = kind->tree_from, .first_room = 3};
+        struct sadmm_cuda_collision_tuning tight = {.tree_from = kind->tree_from, .radix_from = _i, .first_room = 3};
         COLLISION(tune)(b.device, &tight); /* with the repeats */
         cuda_emulation_calls_left = calls;
         sadmm_status status = COLLISION(find)(b.device, NULL, &later.input, NULL, &error);
@@ -733,7 +737,7 @@ START_TEST(threads_in_reverse)
 {
     const struct soup_kind *kind = &soups[_i];
     struct soup s = soup_new(kind, 10);
-    struct both b = both_new(kind->tree_from);
+    struct both b = both_new_tuned(kind->tree_from, _i % 4 >= 2);
     cuda_emulation_descending = 1;
     for (int step = 0; step < 2; ++step) {
         both_find(&b, &s.input, kind->name);
@@ -766,7 +770,7 @@ int main(void)
     tcase_set_timeout(tests, 60);
     tcase_add_loop_test(tests, soups_equal_host, 0, SOUPS);
     tcase_add_loop_test(tests, scenes_equal_host, 0, 2 * SCENES);
-    tcase_add_loop_test(tests, room_grows, 0, SOUPS);
+    tcase_add_loop_test(tests, room_grows, 0, 2 * SOUPS);
     tcase_add_test(tests, room_grows_later);
     tcase_add_loop_test(tests, few_shapes, 0, 2);
     tcase_add_test(tests, one_place);

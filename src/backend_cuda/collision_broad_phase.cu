@@ -35,57 +35,55 @@ static __device__ uint64_t morton(const struct collision_grid &layout, const dou
     return code;
 }
 
+struct grid_sample {
+    double samples[3][GRID_SAMPLES], bounds[2][3];
+};
+
 /* The grid covers three times what holds nine in ten of a sample of the movers: a body far away must not spoil it. One
- * block; thread t takes a body of the t-th share of the slots and finds its rank by comparing with all. */
-static __global__ void __launch_bounds__(COLLISION_THREADS) grid_kernel(const __grid_constant__ collision_view v)
+ * block; a thread takes an axis of the body of its share of the slots and finds the rank by comparing with all. */
+static __global__ void __launch_bounds__(3 * GRID_SAMPLES) grid_kernel(const __grid_constant__ collision_view v)
 {
-#ifdef SADMM_CUDA_EMULATED
-    double(*const samples)[3] = (double(*)[3])cuda_emulation_shared();
-    double(*const bounds)[3] = samples + COLLISION_THREADS;
-#else
-    __shared__ double samples[COLLISION_THREADS][3], bounds[2][3];
-#endif
-    const int t = (int)threadIdx.x;
-    const int32_t slot = (int32_t)((int64_t)v.body_count * t / COLLISION_THREADS);
+    COLLISION_SHARED(grid_sample, shared);
+    const int t = (int)threadIdx.x % GRID_SAMPLES, axis = (int)threadIdx.x / GRID_SAMPLES;
+    const int32_t slot = (int32_t)((int64_t)v.body_count * t / GRID_SAMPLES);
     const bool stands = v.body_count <= t || v.bodies[slot].system_body < 0;
-    for (int k = 0; k < 3; ++k) {
-        samples[t][k] = stands ? HUGE_VAL : v.bodies[slot].position[k]; /* sorts to the end */
-        if (t < 2) bounds[t][k] = 0;
-    }
+    const double here = stands ? HUGE_VAL : v.bodies[slot].position[axis]; /* sorts to the end */
+    shared.samples[axis][t] = here;
+    if (t < 2) shared.bounds[t][axis] = 0;
     __syncthreads();
-    int rank[3] = {0, 0, 0}, count = 0;
-    for (int other = 0; other < COLLISION_THREADS; ++other) {
-        count += samples[other][0] < HUGE_VAL;
-        for (int k = 0; k < 3; ++k) {
-            const double there = samples[other][k], here = samples[t][k];
-            rank[k] += there < here || (there == here && other < t);
-        }
+    int rank = 0, count = 0;
+    for (int other = 0; other < GRID_SAMPLES; ++other) {
+        const double there = shared.samples[axis][other];
+        count += there < HUGE_VAL;
+        rank += there < here || (there == here && other < t);
     }
-    for (int k = 0; k < 3 && !stands; ++k) {
-        if (rank[k] == count / 20) bounds[0][k] = samples[t][k];
-        if (rank[k] == count - 1 - count / 20) bounds[1][k] = samples[t][k];
-    }
+    if (!stands && rank == count / 20) shared.bounds[0][axis] = here;
+    if (!stands && rank == count - 1 - count / 20) shared.bounds[1][axis] = here;
     __syncthreads();
-    if (t > 0) return;
+    if (threadIdx.x > 0) return;
     double range = 0;
-    for (int k = 0; k < 3; ++k) range = fmax(range, bounds[1][k] - bounds[0][k]);
-    for (int k = 0; k < 3; ++k) v.grid->origin[k] = 0.5 * (bounds[0][k] + bounds[1][k]) - 1.5 * range;
+    for (int k = 0; k < 3; ++k) range = fmax(range, shared.bounds[1][k] - shared.bounds[0][k]);
+    for (int k = 0; k < 3; ++k)
+        v.grid->origin[k] = 0.5 * (shared.bounds[0][k] + shared.bounds[1][k]) - 1.5 * range;
     v.grid->scale = range > 0 && range < HUGE_VAL ? (double)(1 << MORTON_BITS) / (3 * range) : 0;
 }
 
-static __global__ void __launch_bounds__(COLLISION_THREADS) place_kernel(const __grid_constant__ collision_view v)
+/* The first kernel of a find also resets the counter of the candidates. */
+static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __grid_constant__ collision_view v)
 {
-    const int64_t i = collision_thread(COLLISION_THREADS);
-    if (i >= v.leaf_count + v.plane_count || halted(v)) return;
+    const int64_t i = collision_thread(PLACE_THREADS);
+    if (halted(v)) return;
+    if (i == 0) *v.candidate_count = 0;
+    if (i >= v.leaf_count + v.plane_count) return;
     const uint32_t slot = v.present[i];
     const struct sadmm_shape &shape = v.shapes[slot];
     const struct sadmm_collision_body &body = v.bodies[shape.body];
     const bool moves = body.system_body >= 0;
     struct sadmm_proxy proxy;
-    struct collision_node node;
+    struct collision_leaf leaf;
     struct collision_filter filter;
 
-    proxy_place(&shape, &body, v.step.dt, v.step.margin, v.step.acceleration, &proxy, &node.box);
+    proxy_place(&shape, &body, v.step.dt, v.step.margin, v.step.acceleration, &proxy, &leaf.box);
     v.proxies[slot] = proxy;
     filter.category = shape.category;
     filter.mask = shape.mask;
@@ -94,11 +92,11 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) place_kernel(const _
     v.filters[slot] = filter;
     if (i >= v.leaf_count) return;
 
-    node.child = (int32_t)slot;
-    node.next = -1;
-    node.group_low = body.environment < 0 ? INT32_MIN : body.environment;
-    node.group_high = body.environment < 0 ? INT32_MAX : body.environment;
-    v.placed[slot] = node;
+    leaf.slot = (int32_t)slot;
+    leaf.reserved = 0;
+    leaf.group_low = body.environment < 0 ? INT32_MIN : body.environment;
+    leaf.group_high = body.environment < 0 ? INT32_MAX : body.environment;
+    v.placed[slot] = leaf;
 
     const uint64_t group = body.environment < 0 ? 0 : (uint64_t)body.environment;
     const int rest = LEAF_CLASS_SHIFT - v.group_bits;
@@ -132,9 +130,16 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) build_kernel(const _
     if (thread >= v.leaf_count) return;
     const int32_t i = (int32_t)thread, first_leaf = v.leaf_count - 1;
 
-    struct collision_node leaf = v.placed[v.leaf_slots[i]];
-    leaf.next = node_after(v, i);
-    v.nodes[first_leaf + i] = leaf;
+    const struct collision_leaf leaf = v.placed[v.leaf_slots[i]];
+    struct collision_node node;
+    for (int k = 0; k < 3; ++k) {
+        node.lo[k] = round_down(leaf.box.lo[k]);
+        node.hi[k] = round_up(leaf.box.hi[k]);
+    }
+    node.child = leaf.slot;
+    node.next = node_after(v, i);
+    v.nodes[first_leaf + i] = node;
+    v.groups[first_leaf + i] = {leaf.group_low, leaf.group_high};
     if (i == 0) v.parents[0] = -1;
     if (i >= first_leaf) return;
 
@@ -173,44 +178,25 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) refit_kernel(const _
     for (int32_t at = v.parents[v.leaf_count - 1 + thread]; at >= 0; at = v.parents[at]) {
         if (arrive(&v.arrivals[at]) == 0) return;
         struct collision_node *node = &v.nodes[at];
-        const struct collision_node left = v.nodes[node->child], right = v.nodes[left.next];
+        const int32_t child = node->child;
+        const struct collision_node left = v.nodes[child], right = v.nodes[left.next];
         for (int k = 0; k < 3; ++k) {
-            node->box.lo[k] = fmin(left.box.lo[k], right.box.lo[k]);
-            node->box.hi[k] = fmax(left.box.hi[k], right.box.hi[k]);
+            node->lo[k] = fminf(left.lo[k], right.lo[k]);
+            node->hi[k] = fmaxf(left.hi[k], right.hi[k]);
         }
-        node->group_low = left.group_low < right.group_low ? left.group_low : right.group_low;
-        node->group_high = left.group_high > right.group_high ? left.group_high : right.group_high;
+        if (v.group_bits == 0) continue;
+        const struct collision_groups a = v.groups[child], b = v.groups[left.next];
+        v.groups[at] = {a.low < b.low ? a.low : b.low, a.high > b.high ? a.high : b.high};
     }
 }
 
 /* ---- pairs ----------------------------------------------------------------------------------------------------- */
 
+/* What a radix sort of all the room needs. */
 static __global__ void __launch_bounds__(COLLISION_THREADS) clear_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t i = collision_thread(COLLISION_THREADS);
-    if (i == 0) *v.candidate_count = 0;
-    if (i < v.candidate_room) v.candidates[i] = ~UINT64_C(0);
-}
-
-/* Candidates on their way to memory. */
-struct batch {
-    uint64_t keys[PAIR_TILE];
-    int count;
-};
-
-static __device__ void flush(const collision_view &v, struct batch *out)
-{
-    if (out->count == 0) return;
-    const unsigned long long first = reserve(v.candidate_count, (unsigned)out->count);
-    for (int i = 0; i < out->count; ++i)
-        if (first + (unsigned)i < (unsigned)v.candidate_room) v.candidates[first + (unsigned)i] = out->keys[i];
-    out->count = 0;
-}
-
-static __device__ void add(const collision_view &v, struct batch *out, uint32_t a, uint32_t b)
-{
-    if (out->count == PAIR_TILE) flush(v, out);
-    out->keys[out->count++] = (uint64_t)a << v.slot_bits | b;
+    if (i < v.candidate_room) v.found[i] = ~UINT64_C(0);
 }
 
 static __device__ bool may_meet(const collision_view &v, const collision_filter &a, const collision_filter &b)
@@ -221,96 +207,179 @@ static __device__ bool may_meet(const collision_view &v, const collision_filter 
            find_key(v.disabled_pairs, v.disabled_count, unordered_key((uint32_t)a.body, (uint32_t)b.body)) < 0;
 }
 
-/* Two leaves whose boxes and groups meet; the shape of the lower (type, slot) comes first. */
-static __device__ void add_leaves(const collision_view &v, struct batch *out, const struct collision_filter &own,
-                                  uint32_t a, uint32_t b)
-{
-    const struct collision_filter other = v.filters[b];
-    const int type_a = own.kind & FILTER_TYPE, type_b = other.kind & FILTER_TYPE;
-    if (!may_meet(v, own, other)) return;
-    if (type_a < type_b || (type_a == type_b && a < b)) add(v, out, a, b);
-    else add(v, out, b, a);
-}
-
-static __device__ __forceinline__ bool nodes_meet(const struct collision_node &a, const struct collision_node &b)
+static __device__ __forceinline__ bool leaves_meet(const struct collision_leaf &a, const struct collision_leaf &b)
 {
     return a.group_low <= b.group_high && b.group_low <= a.group_high && boxes_overlap(&a.box, &b.box);
 }
 
+/* The shape of the lower (type, slot) comes first. */
+static __device__ __forceinline__ uint64_t candidate_key(const collision_view &v, uint32_t a, int32_t kind_a,
+                                                         uint32_t b, int32_t kind_b)
+{
+    const int type_a = kind_a & FILTER_TYPE, type_b = kind_b & FILTER_TYPE;
+    const bool ordered = type_a < type_b || (type_a == type_b && a < b);
+    return (uint64_t)(ordered ? a : b) << v.slot_bits | (ordered ? b : a);
+}
+
+static __device__ __forceinline__ void store_candidate(const collision_view &v, unsigned long long at, uint64_t key)
+{
+    if (at < (unsigned)v.candidate_room) v.found[at] = key;
+}
+
+/* Candidates of a thread on their way to memory. */
+enum { BATCH = 16 };
+struct batch {
+    uint64_t keys[BATCH];
+    unsigned count;
+};
+
+static __device__ void write_batch(const collision_view &v, const struct batch &out, unsigned long long first)
+{
+    for (unsigned i = 0; i < out.count; ++i) store_candidate(v, first + i, out.keys[i]);
+}
+
+static __device__ void add(const collision_view &v, struct batch *out, uint64_t key)
+{
+    if (out->count == BATCH) {
+        write_batch(v, *out, reserve(v.candidate_count, out->count));
+        out->count = 0;
+    }
+    out->keys[out->count++] = key;
+}
+
+/* What is left, by all threads of a warp together. */
+static __device__ void finish_batches(const collision_view &v, const struct batch &out)
+{
+    write_batch(v, out, reserve_by_warp(v.candidate_count, out.count));
+}
+
 /* The planes that a mover meets: those of every group, and those of its own. */
 static __device__ void add_planes(const collision_view &v, struct batch *out, const struct collision_filter &own,
-                                  const struct collision_node &node)
+                                  const struct collision_leaf &leaf)
 {
-    const uint32_t slot = (uint32_t)node.child;
+    const uint32_t slot = (uint32_t)leaf.slot;
     if (v.plane_count == 0 || !(own.kind & FILTER_MOVES)) return;
     const double reach = proxy_plane_reach(&v.proxies[slot], v.step.margin);
-    const bool grouped = v.shared_planes < v.plane_count && node.group_low == node.group_high;
+    const bool grouped = v.shared_planes < v.plane_count && leaf.group_low == leaf.group_high;
     for (int pass = 0; pass < (grouped ? 2 : 1); ++pass) {
-        const uint64_t group = pass == 0 ? 0 : (uint64_t)node.group_low + 1;
+        const uint64_t group = pass == 0 ? 0 : (uint64_t)leaf.group_low + 1;
         int64_t i = pass == 0 ? 0 : lower_bound(v.planes, v.plane_count, group << 32);
         for (; i < v.plane_count && v.planes[i] >> 32 == group; ++i) {
             const uint32_t plane = (uint32_t)v.planes[i];
-            if (may_meet(v, v.filters[plane], own) && proxy_plane_meets(&v.proxies[plane], &node.box, reach))
-                add(v, out, plane, slot);
+            if (may_meet(v, v.filters[plane], own) && proxy_plane_meets(&v.proxies[plane], &leaf.box, reach))
+                add(v, out, (uint64_t)plane << v.slot_bits | slot);
         }
     }
 }
 
-/* One leaf against the planes and the later leaves of the tree. Static leaves come last and do not meet each other. */
-static __global__ void __launch_bounds__(COLLISION_THREADS) walk_kernel(const __grid_constant__ collision_view v)
+static __device__ __forceinline__ bool nodes_meet(const struct collision_node &a, const struct collision_node &b)
 {
-    const int64_t thread = collision_thread(COLLISION_THREADS);
-    if (thread >= v.leaf_count) return;
+    return a.lo[0] <= b.hi[0] && b.lo[0] <= a.hi[0] && a.lo[1] <= b.hi[1] && b.lo[1] <= a.hi[1] && a.lo[2] <= b.hi[2] &&
+           b.lo[2] <= a.hi[2];
+}
+
+/* One leaf against the planes and the later leaves of the tree. Static leaves come last and do not meet each other. */
+static __device__ void walk(const collision_view &v, int32_t i, struct batch *out)
+{
     const int32_t first_leaf = v.leaf_count - 1;
-    const struct collision_node leaf = v.nodes[first_leaf + thread];
-    const struct collision_filter own = v.filters[leaf.child];
-    struct batch out;
+    const struct collision_node start = v.nodes[first_leaf + i];
+    const struct collision_filter own = v.filters[start.child];
+    const bool grouped = v.group_bits > 0;
     if (!(own.kind & FILTER_MOVES)) return;
-    out.count = 0;
-    add_planes(v, &out, own, leaf);
-    for (int32_t at = leaf.next; at >= 0;) {
+    const struct collision_leaf leaf = v.placed[start.child];
+    add_planes(v, out, own, leaf);
+    for (int32_t at = start.next; at >= 0;) {
         const struct collision_node node = v.nodes[at];
-        const bool meet = nodes_meet(leaf, node);
+        bool meet = nodes_meet(start, node);
         count_visit();
+        if (meet && grouped) {
+            const struct collision_groups groups = v.groups[at];
+            meet = leaf.group_low <= groups.high && groups.low <= leaf.group_high;
+        }
         if (meet && at < first_leaf) {
             at = node.child;
             continue;
         }
-        if (meet) add_leaves(v, &out, own, (uint32_t)leaf.child, (uint32_t)node.child);
+        if (meet && leaves_meet(leaf, v.placed[node.child])) {
+            const struct collision_filter other = v.filters[node.child];
+            if (may_meet(v, own, other))
+                add(v, out, candidate_key(v, (uint32_t)leaf.slot, own.kind, (uint32_t)node.child, other.kind));
+        }
         at = node.next;
     }
-    flush(v, &out);
 }
 
-/* All pairs: one leaf against PAIR_TILE others, later ones only. The first tile has the planes. */
-static __global__ void __launch_bounds__(COLLISION_THREADS) tiles_kernel(const __grid_constant__ collision_view v)
+static __global__ void __launch_bounds__(COLLISION_THREADS) walk_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t thread = collision_thread(COLLISION_THREADS);
-    const int32_t tiles = (v.leaf_count + PAIR_TILE - 1) / PAIR_TILE;
-    if (thread >= (int64_t)v.leaf_count * tiles) return;
-    const int32_t i = (int32_t)(thread / tiles), tile = (int32_t)(thread % tiles);
-    const int32_t end = (tile + 1) * PAIR_TILE < v.leaf_count ? (tile + 1) * PAIR_TILE : v.leaf_count;
-    int32_t j = tile * PAIR_TILE > i ? tile * PAIR_TILE : i + 1;
-    if (j >= end && tile > 0) return;
-    const struct collision_node leaf = v.placed[v.present[i]];
-    const struct collision_filter own = v.filters[leaf.child];
     struct batch out;
+    if (halted(v)) return;
     out.count = 0;
-    if (tile == 0) add_planes(v, &out, own, leaf);
-    for (; j < end; ++j) {
-        const uint32_t other = v.present[j];
-        if (nodes_meet(leaf, v.placed[other])) add_leaves(v, &out, own, (uint32_t)leaf.child, other);
+    if (thread < v.leaf_count) walk(v, (int32_t)thread, &out);
+    finish_batches(v, out);
+}
+
+/* All pairs, in tiles: TILE_ROWS leaves, one a thread, against TILE_COLUMNS others, which lie in shared memory; later
+ * ones only. A row's first block has the planes instead. */
+struct tile {
+    struct collision_leaf leaves[TILE_COLUMNS];
+    struct collision_filter filters[TILE_COLUMNS];
+};
+
+static __global__ void __launch_bounds__(TILE_ROWS) tiles_kernel(const __grid_constant__ collision_view v)
+{
+    COLLISION_SHARED(tile, others);
+    const int32_t t = (int32_t)threadIdx.x, columns = tile_columns(v.leaf_count);
+    const int32_t row = (int32_t)blockIdx.x / columns, column = (int32_t)blockIdx.x % columns - 1;
+    const int32_t i = row * TILE_ROWS + t, first = column * TILE_COLUMNS;
+    struct collision_leaf leaf;
+    struct collision_filter own;
+    if (halted(v) || (column >= 0 && first + TILE_COLUMNS - 1 <= row * TILE_ROWS)) return;
+    if (i < v.leaf_count) {
+        const uint32_t slot = v.present[i];
+        leaf = v.placed[slot];
+        own = v.filters[slot];
     }
-    flush(v, &out);
+    if (column < 0) {
+        struct batch out;
+        out.count = 0;
+        if (i < v.leaf_count) add_planes(v, &out, own, leaf);
+        finish_batches(v, out);
+        return;
+    }
+
+    const int32_t count = v.leaf_count - first < TILE_COLUMNS ? v.leaf_count - first : TILE_COLUMNS;
+    if (t < count) {
+        const uint32_t slot = v.present[first + t];
+        others.leaves[t] = v.placed[slot];
+        others.filters[t] = v.filters[slot];
+    }
+    __syncthreads();
+    uint64_t hits = 0;
+    if (i < v.leaf_count) {
+        for (int32_t j = 0; j < count; ++j) {
+            const struct collision_leaf other = others.leaves[j];
+            hits |= (uint64_t)leaves_meet(leaf, other) << j;
+        }
+        if (i >= first) hits &= i - first < TILE_COLUMNS - 1 ? ~UINT64_C(0) << (i - first + 1) : 0;
+        for (uint64_t left = hits; left; left &= left - 1)
+            if (!may_meet(v, own, others.filters[trailing_zeros(left)])) hits ^= left & (0 - left);
+    }
+    unsigned long long at = reserve_by_warp(v.candidate_count, (unsigned)bits_set(hits));
+    for (; hits; hits &= hits - 1) {
+        const int j = trailing_zeros(hits);
+        store_candidate(v, at++, candidate_key(v, (uint32_t)leaf.slot, own.kind, (uint32_t)others.leaves[j].slot,
+                                               others.filters[j].kind));
+    }
 }
 
 void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels)
 {
-    kernels->grid = grid_kernel;
-    kernels->place = place_kernel;
-    kernels->build = build_kernel;
-    kernels->refit = refit_kernel;
-    kernels->clear = clear_kernel;
-    kernels->walk = walk_kernel;
-    kernels->tiles = tiles_kernel;
+    kernels->grid = {grid_kernel, 3 * GRID_SAMPLES, sizeof(struct grid_sample), "grid of the tree"};
+    kernels->place = {place_kernel, PLACE_THREADS, 0, "placing of the shapes"};
+    kernels->build = {build_kernel, COLLISION_THREADS, 0, "build of the tree"};
+    kernels->refit = {refit_kernel, COLLISION_THREADS, 0, "boxes of the tree"};
+    kernels->clear = {clear_kernel, COLLISION_THREADS, 0, "reset of the candidates"};
+    kernels->walk = {walk_kernel, COLLISION_THREADS, 0, "candidates by the tree"};
+    kernels->tiles = {tiles_kernel, TILE_ROWS, sizeof(struct tile), "candidates of all pairs"};
 }

@@ -22,7 +22,7 @@ struct collision_buffer {
 
 enum buffer_name {
     /* device */
-    PROXIES, FILTERS, PLACED, LEAF_KEYS, LEAF_KEYS_2, LEAF_SLOTS, LEAF_SLOTS_2, NODES, PARENTS, ARRIVALS,
+    PROXIES, FILTERS, PLACED, LEAF_KEYS, LEAF_KEYS_2, LEAF_SLOTS, LEAF_SLOTS_2, NODES, GROUPS, PARENTS, ARRIVALS,
     COUNTER, GRID, CANDIDATES, CANDIDATES_2, MANIFOLDS, MATCHES, SIZES, PLACES, TEMP,
     PAIRS, POINTS, PAIR_KEYS, COUNTS, PAIRS_2, POINTS_2, PAIR_KEYS_2, COUNTS_2,
     SHAPES, BODIES, PRESENT, PLANES, DISABLED_PAIRS, FRICTION_PAIRS, FRICTION_VALUES,
@@ -34,8 +34,9 @@ enum buffer_name {
 enum { SET_BUFFERS = COUNTS_2 - COUNTS, INPUTS = PINNED_SHAPES - SHAPES };
 
 static const char *const buffer_names[BUFFERS] = {
-    "placed shapes", "filters", "boxes", "tree keys", "sorted tree keys", "leaves", "sorted leaves", "tree", "parents",
-    "arrivals", "counter", "grid", "candidates", "sorted candidates", "manifolds", "matches", "sizes", "places", "sort",
+    "placed shapes", "filters", "boxes", "tree keys", "sorted tree keys", "leaves", "sorted leaves", "tree", "groups",
+    "parents", "arrivals", "counter", "grid", "candidates", "sorted candidates", "manifolds", "matches", "sizes",
+    "places", "sort",
     "contact pairs", "contact points", "contact keys", "contact counts",
     "contact pairs", "contact points", "contact keys", "contact counts",
     "shapes", "bodies", "list of shapes", "planes", "disabled pairs", "friction pairs", "friction values",
@@ -44,8 +45,9 @@ static const char *const buffer_names[BUFFERS] = {
     "staged contact keys", "staged contact counts",
 };
 
-/* Shapes from which the tree pays. */
-enum { TREE_FROM = 512 };
+/* Shapes from which the tree pays, room from which the radix sort does. */
+enum { TREE_FROM = 6144 };
+static const int64_t RADIX_FROM = 16385;
 /* As on the host: contact points are indexed by 32 bits. */
 static const int64_t MOST_CANDIDATES = INT32_MAX / SADMM_MAX_POINTS;
 /* A mover of this many median radii is large. */
@@ -92,6 +94,7 @@ struct sadmm_cuda_collision {
     const char *kernel;         /* launched last: what an asynchronous error is about, or what ran before it */
 
     int32_t tree_from;
+    int64_t radix_from;
     int64_t candidate_room, point_room;
     int temp_leaves, temp_candidates; /* what TEMP is large enough for */
     struct sadmm_cuda_collision_stats stats;
@@ -178,29 +181,27 @@ template <class T> static T *in(const struct sadmm_cuda_collision *c, int name) 
 
 #ifdef SADMM_CUDA_EMULATED
 struct emulated_call {
-    collision_kernel kernel;
+    void (*kernel)(const collision_view);
     struct collision_view view;
 };
 static void run_emulated(const emulated_call call, const int) { call.kernel(call.view); }
 #endif
 
-static sadmm_status launch(struct sadmm_cuda_collision *c, collision_kernel kernel, const char *name, int64_t threads,
-                           int block, struct sadmm_error *error)
+static sadmm_status launch(struct sadmm_cuda_collision *c, const struct collision_launch &what, int64_t threads,
+                           struct sadmm_error *error)
 {
-    const unsigned blocks = (unsigned)((threads + block - 1) / block);
-    const size_t shared = kernel == c->kernels.grid ? sizeof(double[COLLISION_THREADS + 2][3]) : 0; /* emulated */
+    const unsigned blocks = (unsigned)((threads + what.threads - 1) / what.threads);
     if (threads <= 0) return SADMM_OK;
-    c->kernel = name;
+    c->kernel = what.name;
 #ifdef SADMM_CUDA_EMULATED
-    const emulated_call call = {kernel, c->view};
-    cudaError_t code = cuda_emulation_launch(run_emulated, blocks, (unsigned)block, shared, call, 0);
+    const emulated_call call = {what.kernel, c->view};
+    cudaError_t code = cuda_emulation_launch(run_emulated, blocks, (unsigned)what.threads, what.shared, call, 0);
 #else
-    (void)shared;
-    const dim3 grid(blocks), threads_a_block((unsigned)block);
+    const dim3 grid(blocks), threads_a_block((unsigned)what.threads);
     void *parameters[] = {&c->view};
-    cudaError_t code = cudaLaunchKernel((const void *)kernel, grid, threads_a_block, parameters, 0, c->stream);
+    cudaError_t code = cudaLaunchKernel((const void *)what.kernel, grid, threads_a_block, parameters, 0, c->stream);
 #endif
-    CUDA_CALL(c, code, name);
+    CUDA_CALL(c, code, what.name);
     return SADMM_OK;
 }
 
@@ -366,6 +367,7 @@ static sadmm_status make_shape_room(struct sadmm_cuda_collision *c, size_t slots
         TRY(room(c, LEAF_KEYS_2, leaves, sizeof *v->leaf_keys, error));
         TRY(room(c, LEAF_SLOTS_2, leaves, sizeof *v->leaf_slots, error));
         TRY(room(c, NODES, 2 * leaves, sizeof *v->nodes, error));
+        TRY(room(c, GROUPS, 2 * leaves, sizeof *v->groups, error));
         TRY(room(c, PARENTS, 2 * leaves, sizeof *v->parents, error));
         TRY(room(c, ARRIVALS, leaves, sizeof *v->arrivals, error));
     }
@@ -373,10 +375,11 @@ static sadmm_status make_shape_room(struct sadmm_cuda_collision *c, size_t slots
     TRY(room(c, GRID, 1, sizeof *v->grid, error));
     v->proxies = in<struct sadmm_proxy>(c, PROXIES);
     v->filters = in<struct collision_filter>(c, FILTERS);
-    v->placed = in<struct collision_node>(c, PLACED);
+    v->placed = in<struct collision_leaf>(c, PLACED);
     v->leaf_keys = in<uint64_t>(c, LEAF_KEYS);
     v->leaf_slots = in<uint32_t>(c, LEAF_SLOTS);
     v->nodes = in<struct collision_node>(c, NODES);
+    v->groups = in<struct collision_groups>(c, GROUPS);
     v->parents = in<int32_t>(c, PARENTS);
     v->arrivals = in<int32_t>(c, ARRIVALS);
     v->candidate_count = in<unsigned long long>(c, COUNTER);
@@ -417,11 +420,12 @@ static sadmm_status make_candidate_room(struct sadmm_cuda_collision *c, struct s
     TRY(room(c, CANDIDATES_2, candidates, sizeof *v->candidates, error));
     TRY(room(c, MANIFOLDS, candidates, sizeof *v->manifolds, error));
     TRY(room(c, MATCHES, candidates, sizeof *v->matches, error));
-    TRY(room(c, SIZES, candidates + 1, sizeof *v->sizes, error));
+    TRY(room(c, SIZES, candidates + SIZES_BEYOND, sizeof *v->sizes, error));
     TRY(room(c, PLACES, candidates + 1, sizeof *v->places, error));
+    v->found = in<uint64_t>(c, CANDIDATES);
     v->manifolds = in<struct manifold>(c, MANIFOLDS);
     v->matches = in<int32_t>(c, MATCHES);
-    v->sizes = in<uint64_t>(c, SIZES);
+    v->sizes = in<uint8_t>(c, SIZES);
     v->places = in<uint64_t>(c, PLACES);
     v->candidate_room = (int32_t)c->candidate_room;
     v->point_room = (int32_t)c->point_room;
@@ -473,24 +477,20 @@ static sadmm_status build_tree(struct sadmm_cuda_collision *c, struct sadmm_erro
     CUDA_CALL(c, COLLISION(sort)(in<void>(c, TEMP), &bytes, keys, slots, v->leaf_count, 64, &at, c->stream), c->kernel);
     v->leaf_keys = keys[at];
     v->leaf_slots = slots[at];
-    TRY(launch(c, c->kernels.build, "build of the tree", v->leaf_count, COLLISION_THREADS, error));
-    return launch(c, c->kernels.refit, "boxes of the tree", v->leaf_count, COLLISION_THREADS, error);
+    TRY(launch(c, c->kernels.build, v->leaf_count, error));
+    return launch(c, c->kernels.refit, v->leaf_count, error);
 }
 
-static sadmm_status find_candidates(struct sadmm_cuda_collision *c, bool tree, struct sadmm_error *error)
+static bool ranked(const struct sadmm_cuda_collision *c) { return c->view.candidate_room < c->radix_from; }
+
+static sadmm_status sort_candidates(struct sadmm_cuda_collision *c, struct sadmm_error *error)
 {
     struct collision_view *v = &c->view;
-    uint64_t *const keys[2] = {in<uint64_t>(c, CANDIDATES), in<uint64_t>(c, CANDIDATES_2)};
+    uint64_t *const keys[2] = {v->found, in<uint64_t>(c, CANDIDATES_2)};
     size_t bytes = c->buffers[TEMP].capacity;
     int at = 0;
-    v->candidates = keys[0];
-    TRY(launch(c, c->kernels.clear, "reset of the candidates", v->candidate_room, COLLISION_THREADS, error));
-    if (tree) {
-        TRY(launch(c, c->kernels.walk, "candidates by the tree", v->leaf_count, COLLISION_THREADS, error));
-    } else {
-        const int64_t tiles = (v->leaf_count + PAIR_TILE - 1) / PAIR_TILE;
-        TRY(launch(c, c->kernels.tiles, "candidates of all pairs", tiles * v->leaf_count, COLLISION_THREADS, error));
-    }
+    v->candidates = keys[1];
+    if (ranked(c)) return launch(c, c->kernels.rank, (int64_t)v->candidate_room * RANK_SHARES, error);
     c->kernel = "candidate sort";
     CUDA_CALL(c, COLLISION(sort)(in<void>(c, TEMP), &bytes, keys, nullptr, v->candidate_room, 2 * v->slot_bits, &at,
                                  c->stream), c->kernel);
@@ -498,15 +498,30 @@ static sadmm_status find_candidates(struct sadmm_cuda_collision *c, bool tree, s
     return SADMM_OK;
 }
 
+static sadmm_status find_candidates(struct sadmm_cuda_collision *c, bool tree, struct sadmm_error *error)
+{
+    const struct collision_view *v = &c->view;
+    if (!ranked(c)) TRY(launch(c, c->kernels.clear, v->candidate_room, error));
+    if (tree) {
+        TRY(launch(c, c->kernels.walk, v->leaf_count, error));
+    } else {
+        const int64_t rows = (v->leaf_count + TILE_ROWS - 1) / TILE_ROWS;
+        TRY(launch(c, c->kernels.tiles, rows * TILE_ROWS * tile_columns(v->leaf_count), error));
+    }
+    return sort_candidates(c, error);
+}
+
 static sadmm_status make_contacts(struct sadmm_cuda_collision *c, struct sadmm_error *error)
 {
     struct collision_view *v = &c->view;
+    const int64_t lanes = (int64_t)v->candidate_room * POINT_LANES;
     size_t bytes = c->buffers[TEMP].capacity;
-    TRY(launch(c, c->kernels.narrow, "narrow phase", (int64_t)v->candidate_room + 1, NARROW_THREADS, error));
+    TRY(launch(c, c->kernels.narrow, (int64_t)v->candidate_room + SIZES_BEYOND, error));
+    if (ranked(c)) return launch(c, c->kernels.emit_few, lanes, error);
     c->kernel = "scan of the contacts";
     CUDA_CALL(c, COLLISION(sum)(in<void>(c, TEMP), &bytes, v->sizes, v->places, v->candidate_room + 1, c->stream),
               c->kernel);
-    return launch(c, c->kernels.emit, "contacts", (int64_t)v->candidate_room * POINT_LANES, COLLISION_THREADS, error);
+    return launch(c, c->kernels.emit, lanes, error);
 }
 
 /* Places, and with them the tree where it pays. */
@@ -515,8 +530,8 @@ static sadmm_status place_shapes(struct sadmm_cuda_collision *c, bool tree, stru
     const struct collision_view *v = &c->view;
     c->view.leaf_keys = in<uint64_t>(c, LEAF_KEYS);
     c->view.leaf_slots = in<uint32_t>(c, LEAF_SLOTS);
-    if (tree) TRY(launch(c, c->kernels.grid, "grid of the tree", 1, COLLISION_THREADS, error));
-    TRY(launch(c, c->kernels.place, "placing of the shapes", v->leaf_count + v->plane_count, COLLISION_THREADS, error));
+    if (tree) TRY(launch(c, c->kernels.grid, 1, error));
+    TRY(launch(c, c->kernels.place, std::max(v->leaf_count + v->plane_count, 1), error));
     return tree ? build_tree(c, error) : SADMM_OK;
 }
 
@@ -556,6 +571,8 @@ static sadmm_status run_stages(struct sadmm_cuda_collision *c, size_t slots, str
         else if (counts->points > c->point_room) c->point_room = generous(counts->points, INT32_MAX);
         else return SADMM_OK;
         ++c->stats.repeats;
+        CUDA_CALL(c, cudaMemsetAsync(v->candidate_count, 0, sizeof *v->candidate_count, c->stream),
+                  "cudaMemsetAsync(counter)");
     }
 }
 
@@ -577,8 +594,10 @@ extern "C" sadmm_status COLLISION(create)(int device, struct sadmm_cuda_collisio
     if (!c) return sadmm_fail_memory(error, "collision detection on the device");
     c->device = device;
     c->tree_from = TREE_FROM;
+    c->radix_from = RADIX_FROM;
     for (size_t &bytes : c->input_bytes) bytes = SIZE_MAX;
     COLLISION(broad_phase_kernels)(&c->kernels);
+    COLLISION(sort_kernels)(&c->kernels);
     COLLISION(narrow_phase_kernels)(&c->kernels);
     COLLISION(matching_kernels)(&c->kernels);
     *out = c;
@@ -805,6 +824,7 @@ extern "C" struct sadmm_cuda_collision_stats COLLISION(stats)(const struct sadmm
 extern "C" void COLLISION(tune)(struct sadmm_cuda_collision *c, const struct sadmm_cuda_collision_tuning *tuning)
 {
     c->tree_from = tuning->tree_from > 0 ? tuning->tree_from : TREE_FROM;
+    c->radix_from = tuning->radix_from > 0 ? tuning->radix_from : RADIX_FROM;
     if (tuning->first_room > 0)
         c->candidate_room = c->point_room = std::min(tuning->first_room, MOST_CANDIDATES);
 }

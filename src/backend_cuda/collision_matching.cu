@@ -11,24 +11,22 @@ static __device__ double pair_friction(const collision_view &v, uint32_t a, uint
     return mu_a == mu_b ? mu_a : sqrt(mu_a * mu_b);
 }
 
-static __global__ void __launch_bounds__(COLLISION_THREADS) emit_kernel(const __grid_constant__ collision_view v)
+/* total: of all candidates. */
+static __device__ void emit_counts(const collision_view &v, uint64_t total)
 {
-    const int64_t thread = collision_thread(COLLISION_THREADS), i = thread / POINT_LANES;
-    const int32_t lane = (int32_t)(thread % POINT_LANES);
-    if (halted(v)) return;
-    const uint64_t total = v.places[v.candidate_room];
-    if (thread == 0) {
-        v.after.counts->candidates = (int64_t)*v.candidate_count;
-        v.after.counts->pairs = (int32_t)(total >> 32);
-        v.after.counts->points = (int32_t)(uint32_t)total;
-    }
-    if (i >= usable_candidates(v) || (int32_t)(uint32_t)total > v.point_room) return;
-    const int32_t count = (int32_t)(uint32_t)v.sizes[i];
+    v.after.counts->candidates = (int64_t)*v.candidate_count;
+    v.after.counts->pairs = (int32_t)(total >> 32);
+    v.after.counts->points = (int32_t)(uint32_t)total;
+}
+
+/* Point `lane` of candidate i; place: pairs << 32 | points before it. */
+static __device__ void emit_point(const collision_view &v, int64_t i, int32_t lane, uint64_t place)
+{
+    const int32_t count = v.sizes[i], at = (int32_t)(place >> 32), first = (int32_t)(uint32_t)place;
     if (lane >= count) return;
 
     const uint64_t key = v.candidates[i];
     const uint32_t a = (uint32_t)(key >> v.slot_bits), b = (uint32_t)(key & ((UINT64_C(1) << v.slot_bits) - 1));
-    const int32_t at = (int32_t)(v.places[i] >> 32), first = (int32_t)(uint32_t)v.places[i];
     const struct sadmm_proxy *pa = &v.proxies[a], *pb = &v.proxies[b];
     const struct manifold *m = &v.manifolds[i];
     const double friction = pair_friction(v, a, b, pa->friction, pb->friction);
@@ -69,8 +67,11 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) emit_kernel(const __
     const int32_t match = v.matches[i];
     if (match >= 0) {
         const struct sadmm_contact_pair *old = &v.before.pairs[match];
-        for (int32_t k = 0; k < old->count; ++k) {
-            const struct sadmm_contact_point *before = &v.before.points[old->first + k];
+        const int32_t old_first = old->first, old_count = old->count;
+        /* a feature occurs once; most are where they were */
+        for (int32_t n = 0; n < old_count; ++n) {
+            const int32_t k = lane + n < old_count ? lane + n : (lane + n) % old_count;
+            const struct sadmm_contact_point *before = &v.before.points[old_first + k];
             if (before->feature != from.feature) continue;
             impulse_carry(old->normal, before->impulse, normal, friction, point.impulse);
             break;
@@ -79,7 +80,70 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) emit_kernel(const __
     v.after.points[first + lane] = point;
 }
 
+static __global__ void __launch_bounds__(COLLISION_THREADS) emit_kernel(const __grid_constant__ collision_view v)
+{
+    const int64_t thread = collision_thread(COLLISION_THREADS), i = thread / POINT_LANES;
+    if (halted(v)) return;
+    const uint64_t total = v.places[v.candidate_room];
+    if (thread == 0) emit_counts(v, total);
+    if (i >= usable_candidates(v) || (int32_t)(uint32_t)total > v.point_room) return;
+    emit_point(v, i, (int32_t)(thread % POINT_LANES), v.places[i]);
+}
+
+/* ---- few candidates: every block adds up all sizes ------------------------------------------------------------- */
+
+enum { SIZES_A_WORD = 4, EMIT_WARPS = EMIT_CANDIDATES * POINT_LANES / 32 };
+
+/* Of four sizes of at most 8: pairs << 32 | points. */
+static __device__ __forceinline__ uint64_t sum_sizes(uint32_t sizes)
+{
+    const uint32_t any = (sizes | sizes >> 1 | sizes >> 2 | sizes >> 3) & 0x01010101u;
+    return (uint64_t)(any * 0x01010101u >> 24) << 32 | sizes * 0x01010101u >> 24;
+}
+
+struct emit_sums {
+    uint64_t before[EMIT_WARPS], all[EMIT_WARPS];
+};
+
+static __global__ void __launch_bounds__(EMIT_CANDIDATES *POINT_LANES)
+emit_few_kernel(const __grid_constant__ collision_view v)
+{
+    COLLISION_SHARED(emit_sums, shared);
+    const int32_t t = (int32_t)threadIdx.x, first = (int32_t)blockIdx.x * EMIT_CANDIDATES;
+    const int32_t i = first + t / POINT_LANES, found = usable_candidates(v);
+    const uint32_t *const sizes = (const uint32_t *)v.sizes;
+    uint64_t before = 0, all = 0;
+    if (halted(v) || (first >= found && first > 0)) return;
+    for (int32_t k = t; k < (found + SIZES_A_WORD - 1) / SIZES_A_WORD; k += EMIT_CANDIDATES * POINT_LANES) {
+        const uint64_t sum = sum_sizes(sizes[k]);
+        all += sum;
+        if (k < first / SIZES_A_WORD) before += sum;
+    }
+    for (int bits = 1; bits < 32; bits *= 2) {
+        before += __shfl_xor_sync(0xffffffffu, before, bits);
+        all += __shfl_xor_sync(0xffffffffu, all, bits);
+    }
+    if (t % 32 == 0) {
+        shared.before[t / 32] = before;
+        shared.all[t / 32] = all;
+    }
+    __syncthreads();
+    before = all = 0;
+    for (int k = 0; k < EMIT_WARPS; ++k) {
+        before += shared.before[k];
+        all += shared.all[k];
+    }
+    if (t == 0 && first == 0) emit_counts(v, all);
+    if (i >= found || (int32_t)(uint32_t)all > v.point_room) return;
+    for (int32_t k = first; k < i; k += SIZES_A_WORD) {
+        const uint32_t word = sizes[k / SIZES_A_WORD];
+        before += sum_sizes(i - k < SIZES_A_WORD ? word & ((UINT32_C(1) << 8 * (i - k)) - 1) : word);
+    }
+    emit_point(v, i, t % POINT_LANES, before);
+}
+
 void COLLISION(matching_kernels)(struct collision_kernels *kernels)
 {
-    kernels->emit = emit_kernel;
+    kernels->emit = {emit_kernel, COLLISION_THREADS, 0, "contacts"};
+    kernels->emit_few = {emit_few_kernel, EMIT_CANDIDATES * POINT_LANES, sizeof(struct emit_sums), "contacts"};
 }

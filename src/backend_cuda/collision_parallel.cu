@@ -6,6 +6,7 @@
 #define CCCL_DISABLE_NVTX /* no hooks for profilers inside a library */
 #include <cub/device/device_radix_sort.cuh>
 #include <cub/device/device_scan.cuh>
+#include <thrust/iterator/transform_iterator.h>
 
 cudaError_t COLLISION(sort)(void *temp, size_t *bytes, uint64_t *const keys[2], uint32_t *const *values, int count,
                             int bits, int *result, cudaStream_t stream)
@@ -32,9 +33,16 @@ cudaError_t COLLISION(sort_numbers)(void *temp, size_t *bytes, const int32_t *ke
                                            stream);
 }
 
-cudaError_t COLLISION(sum)(void *temp, size_t *bytes, const uint64_t *in, uint64_t *out, int count, cudaStream_t stream)
+namespace {
+struct size_operator {
+    __host__ __device__ uint64_t operator()(uint8_t points) const { return size_of(points); }
+};
+} // namespace
+
+cudaError_t COLLISION(sum)(void *temp, size_t *bytes, const uint8_t *in, uint64_t *out, int count, cudaStream_t stream)
 {
-    return cub::DeviceScan::ExclusiveSum(temp, *bytes, in, out, count, stream);
+    return cub::DeviceScan::ExclusiveSum(temp, *bytes, thrust::make_transform_iterator(in, size_operator()), out, count,
+                                         stream);
 }
 
 #else
@@ -85,7 +93,7 @@ cudaError_t COLLISION(sort_numbers)(void *temp, size_t *bytes, const int32_t *ke
     });
 }
 
-cudaError_t COLLISION(sum)(void *temp, size_t *bytes, const uint64_t *in, uint64_t *out, int count, cudaStream_t)
+cudaError_t COLLISION(sum)(void *temp, size_t *bytes, const uint8_t *in, uint64_t *out, int count, cudaStream_t)
 {
     *bytes = 1;
     if (!temp) return cudaSuccess;
@@ -93,9 +101,8 @@ cudaError_t COLLISION(sum)(void *temp, size_t *bytes, const uint64_t *in, uint64
     return cuda_emulation_enqueue([=]() {
         uint64_t sum = 0;
         for (int i = 0; i < count; ++i) {
-            uint64_t item = in[i];
             out[i] = sum;
-            sum += item;
+            sum += size_of(in[i]);
         }
         return true;
     });
