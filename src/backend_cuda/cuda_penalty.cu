@@ -130,6 +130,7 @@ extern "C" sadmm_status CUDA(init_penalty)(struct sadmm_context *c, struct sadmm
     cuda_args args = {};
     CUDA_ENTER(c);
     c->starting = true;
+    c->placed = false;
     c->measured = false;
     c->rescaled = false;
     return CUDA(launch)(c, penalty_kernel, "init_penalty", blocks_for(c->view.bodies), &args, error);
@@ -139,7 +140,6 @@ extern "C" sadmm_status CUDA(factorize)(struct sadmm_context *c, struct sadmm_er
 {
     cuda_args args = {};
     CUDA_ENTER(c);
-    c->weighed = false;
     return CUDA(launch)(c, factorize_kernel, "factorize", blocks_for(c->view.bodies), &args, error);
 }
 

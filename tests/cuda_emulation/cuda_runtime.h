@@ -40,6 +40,9 @@
 struct int2 {
     int x, y;
 };
+struct alignas(16) int4 {
+    int x, y, z, w;
+};
 struct dim3 {
     unsigned x, y, z;
 };
@@ -212,6 +215,7 @@ inline unsigned __ballot_sync(unsigned mask, bool vote)
         votes |= (unsigned)warp[lane].shuffled[turn] << lane;
     return votes;
 }
+template <class T> static inline T __ldcs(const T *from) { return *from; }
 inline int __popc(unsigned bits) { return __builtin_popcount(bits); }
 inline int __ffs(int bits) { return __builtin_ffs(bits); }
 
