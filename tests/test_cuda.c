@@ -19,12 +19,22 @@
 #ifdef CUDA_EMULATED
 #include "emulation_control.h"
 #define force_tier cuda_emulation_force_tier
+#define force_cluster cuda_emulation_force_cluster
 #define tier_of cuda_emulation_tier_of
+#define SYMBOL(name, precision) sadmm_cuda_##name##_emulated_##precision
 #else
 #include "backend_cuda/cuda_tier.h"
 #define force_tier sadmm_cuda_force_tier
+#define force_cluster sadmm_cuda_force_cluster
 #define tier_of sadmm_cuda_tier_of
+#define SYMBOL(name, precision) sadmm_cuda_##name##_##precision
 #endif
+#define CUDA(name) SYMBOL(name, f32)
+#include "backend_cuda/cuda_entries.h"
+#undef CUDA
+#define CUDA(name) SYMBOL(name, f64)
+#include "backend_cuda/cuda_entries.h"
+#undef CUDA
 
 static const struct sadmm_kernels *tables[2]; /* by precision */
 static const char *const precision_names[] = {"f32", "f64"};
@@ -132,7 +142,7 @@ static struct contact_problem *scene_free(void)
     return p;
 }
 static struct contact_problem *scene_empty(void) { return contact_problem_new(); }
-/* 17 rows: 289 pairs in one island, more than a thread block takes: parts that exchange records over the grid. */
+/* 17 rows: 289 pairs in one island, more than a thread block takes: parts that exchange velocities. */
 static struct contact_problem *scene_large(void) { return contact_problem_pyramid(17, 0.5); }
 
 static const struct scene {
@@ -142,20 +152,27 @@ static const struct scene {
     bool warm;
     int tiers; /* bit SADMM_CUDA_TIER_x: the tier takes this scene */
 } scenes[] = {
-    {"mixed", scene_mixed, RIGID, true, 26},
-    {"mixed, A and b, cold", scene_mixed, RAW, false, 26},
-    {"mixed, frictionless", scene_slippery, RAW, true, 26},
-    {"pyramid", scene_pyramid, RIGID, false, 26},
-    {"towers", scene_towers, RIGID, true, 26},
-    {"towers, frictionless", scene_slippery_towers, RIGID, false, 26},
-    {"towers, shuffled", shuffled_towers, RIGID, true, 26},
-    {"octagons", octagon, RIGID, true, 26},
-    {"large", scene_large, RIGID, true, 24},
-    {"blocks alone", scene_blocks, RAW, true, 26},
-    {"free bodies", scene_free, RIGID, true, 26},
-    {"nothing", scene_empty, RAW, true, 26},
+    {"mixed", scene_mixed, RIGID, true, 30},
+    {"mixed, A and b, cold", scene_mixed, RAW, false, 30},
+    {"mixed, frictionless", scene_slippery, RAW, true, 30},
+    {"pyramid", scene_pyramid, RIGID, false, 30},
+    {"towers", scene_towers, RIGID, true, 30},
+    {"towers, frictionless", scene_slippery_towers, RIGID, false, 30},
+    {"towers, shuffled", shuffled_towers, RIGID, true, 30},
+    {"octagons", octagon, RIGID, true, 30},
+    {"large", scene_large, RIGID, true, 28},
+    {"blocks alone", scene_blocks, RAW, true, 30},
+    {"free bodies", scene_free, RIGID, true, 30},
+    {"nothing", scene_empty, RAW, true, 30},
 };
 enum { SCENES = sizeof scenes / sizeof *scenes };
+
+static const struct scene *find_scene(const char *name)
+{
+    const struct scene *scene = scenes;
+    while (strcmp(scene->name, name) != 0) ++scene;
+    return scene;
+}
 
 /* ---- one table at work ----------------------------------------------------------------------------------------- */
 
@@ -391,10 +408,29 @@ START_TEST(entries_equal_literal)
 }
 END_TEST
 
-static const enum sadmm_cuda_tier tiers[] = {SADMM_CUDA_TIER_BLOCK, SADMM_CUDA_TIER_GRID, SADMM_CUDA_TIER_STREAM};
+static const enum sadmm_cuda_tier tiers[] = {SADMM_CUDA_TIER_BLOCK, SADMM_CUDA_TIER_CLUSTER, SADMM_CUDA_TIER_GRID,
+                                             SADMM_CUDA_TIER_STREAM};
 enum { TIERS = sizeof tiers / sizeof *tiers };
 
 /* ---- tiers ----------------------------------------------------------------------------------------------------- */
+
+/* Only devices of compute capability 9.0 and later have clusters; the emulated one has them. */
+static bool device_has(const struct sadmm_kernels *table, enum sadmm_cuda_tier tier)
+{
+#ifdef CUDA_EMULATED
+    (void)table;
+    (void)tier;
+    return true;
+#else
+    if (tier != SADMM_CUDA_TIER_CLUSTER) return true;
+    struct runner r;
+    runner_create(&r, table);
+    force_tier(table, r.c, tier);
+    const bool has = runner_begin(&r, &scenes[0]) == SADMM_OK || !strstr(r.error.message, "the device has no clusters");
+    runner_stop(&r);
+    return has;
+#endif
+}
 
 /* The same arithmetic in the same order, wherever the state is kept. 34 covers two launches of the graph and a rest. */
 START_TEST(tiers_equal_stepwise)
@@ -405,6 +441,7 @@ START_TEST(tiers_equal_stepwise)
     for (size_t t = 0; t < TIERS; ++t) {
         struct runner step, fused;
         char what[128];
+        if (!device_has(table, tiers[t])) continue;
         if (!(scene->tiers >> tiers[t] & 1)) {
             runner_create(&fused, table);
             force_tier(table, fused.c, tiers[t]);
@@ -434,6 +471,133 @@ START_TEST(tiers_equal_stepwise)
         }
         runner_stop(&step);
         runner_stop(&fused);
+    }
+}
+END_TEST
+
+/* Every size of cluster that holds an island; on the emulated device also with threads in the other order. */
+START_TEST(cluster_sizes)
+{
+    static const struct {
+        const char *scene;
+        int from[2]; /* blocks a cluster at least, by precision */
+    } cases[] = {{"mixed", {2, 2}},           {"pyramid", {2, 2}},  {"towers, shuffled", {2, 2}},
+                 {"towers, frictionless", {2, 2}}, {"octagons", {2, 2}}, {"large", {4, 8}},
+                 {"free bodies", {2, 2}},     {"nothing", {2, 2}}};
+    const struct sadmm_kernels *table = tables[_i];
+    if (!device_has(table, SADMM_CUDA_TIER_CLUSTER)) return;
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
+        const struct scene *scene = find_scene(cases[k].scene);
+        struct runner wanted;
+        runner_start(&wanted, table, scene, SADMM_CUDA_TIER_STREAM);
+        CALL(&wanted, table->iterate(wanted.c, 6, true, &wanted.error));
+        CALL(&wanted, table->iterate(wanted.c, 5, false, &wanted.error));
+        const struct sadmm_residual residual = runner_residual(&wanted);
+        for (int size = 2; size <= 16; size *= 2) {
+            struct runner got;
+            char what[128];
+            snprintf(what, sizeof what, "%s in clusters of %d", scene->name, size);
+            runner_create(&got, table);
+            force_tier(table, got.c, SADMM_CUDA_TIER_CLUSTER);
+            force_cluster(table, got.c, size);
+            const sadmm_status status = runner_begin(&got, scene);
+            if (size < cases[k].from[table->precision]) {
+                ck_assert_msg(status == SADMM_ERROR_UNSUPPORTED, "%s", what);
+                ck_assert_msg(strstr(got.error.message, "an island does not fit") != NULL, "%s", got.error.message);
+                runner_stop(&got);
+                continue;
+            }
+            ck_assert_msg(status == SADMM_OK, "%s: %s", what, got.error.message);
+            int32_t blocks = 0;
+            ck_assert_int_eq(tier_of(table, got.c, &blocks), SADMM_CUDA_TIER_CLUSTER);
+            ck_assert_msg(blocks > 0 && blocks % size == 0, "%s: %d blocks", what, blocks);
+#ifdef CUDA_EMULATED
+            cuda_emulation_descending = size % 3 == 1; /* 4 and 16 */
+#endif
+            runner_assemble(&got);
+            CALL(&got, table->iterate(got.c, 6, true, &got.error));
+            CALL(&got, table->iterate(got.c, 5, false, &got.error));
+#ifdef CUDA_EMULATED
+            cuda_emulation_descending = 0;
+#endif
+            const struct sadmm_residual same = runner_residual(&got);
+            ck_assert_msg(same.primal == residual.primal && same.dual == residual.dual, "%s: residuals", what);
+            check_same(&got, &wanted, what);
+            runner_stop(&got);
+        }
+        runner_stop(&wanted);
+    }
+}
+END_TEST
+
+/* The tier that is likely the fastest: small islands in blocks, a large one in a cluster, and all else that does not fit
+ * in the two kernels of STREAM. */
+static struct contact_problem *scene_huge(void) { return contact_problem_pyramid(40, 0.5); }
+START_TEST(tiers_chosen)
+{
+    static const struct scene huge = {"huge", scene_huge, RIGID, true, 0};
+    const struct {
+        const struct scene *scene;
+        enum sadmm_cuda_tier tier;
+    } cases[] = {{find_scene("towers"), SADMM_CUDA_TIER_BLOCK},
+                 {find_scene("free bodies"), SADMM_CUDA_TIER_BLOCK},
+                 {find_scene("large"), SADMM_CUDA_TIER_CLUSTER},
+#ifdef CUDA_EMULATED
+                 {&huge, SADMM_CUDA_TIER_STREAM},
+#endif
+                 {find_scene("nothing"), SADMM_CUDA_TIER_BLOCK}};
+    const struct sadmm_kernels *table = tables[_i];
+    (void)huge;
+    if (!device_has(table, SADMM_CUDA_TIER_CLUSTER)) return;
+    struct runner r;
+    runner_create(&r, table);
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
+        CALL(&r, runner_begin(&r, cases[k].scene));
+        ck_assert_msg(tier_of(table, r.c, NULL) == cases[k].tier, "%s: tier %d", cases[k].scene->name,
+                      (int)tier_of(table, r.c, NULL));
+    }
+    runner_stop(&r);
+}
+END_TEST
+
+static void set_halt(struct runner *r, enum cuda_halt halt)
+{
+    if (r->k->precision == SADMM_F32) CALL(r, SYMBOL(set_halt, f32)(r->c, halt, &r->error));
+    else CALL(r, SYMBOL(set_halt, f64)(r->c, halt, &r->error));
+}
+
+/* Between a halt and its end an iteration changes nothing, in any tier. */
+START_TEST(halted_does_nothing)
+{
+    static const char *const names[] = {"mixed", "large"};
+    const struct sadmm_kernels *table = tables[_i / 2];
+    const struct scene *scene = find_scene(names[_i % 2]);
+    for (size_t t = 0; t < TIERS; ++t) {
+        struct runner plain, halted;
+        if (!device_has(table, tiers[t]) || !(scene->tiers >> tiers[t] & 1)) continue;
+        runner_start(&plain, table, scene, tiers[t]);
+        runner_start(&halted, table, scene, tiers[t]);
+        CALL(&plain, table->iterate(plain.c, 3, false, &plain.error));
+        CALL(&halted, table->iterate(halted.c, 3, false, &halted.error));
+        set_halt(&halted, HALT_PARTITION);
+        CALL(&halted, table->iterate(halted.c, 20, false, &halted.error)); /* 20: STREAM launches its graph */
+        runner_step(&halted, false);
+        set_halt(&halted, HALT_NONE);
+        check_same(&halted, &plain, "halted");
+        CALL(&plain, table->iterate(plain.c, 4, true, &plain.error));
+        CALL(&halted, table->iterate(halted.c, 4, true, &halted.error));
+        check_same(&halted, &plain, "after the halt");
+        const struct sadmm_residual wanted = runner_residual(&plain), got = runner_residual(&halted);
+        ck_assert(got.primal == wanted.primal && got.dual == wanted.dual);
+        /* A measured iteration that is halted measures nothing. */
+        set_halt(&halted, HALT_NON_FINITE);
+        CALL(&halted, table->iterate(halted.c, 2, true, &halted.error));
+        const struct sadmm_residual none = runner_residual(&halted);
+        ck_assert(none.primal == 0 && none.dual == 0);
+        set_halt(&halted, HALT_NONE);
+        check_same(&halted, &plain, "halted and measured");
+        runner_stop(&plain);
+        runner_stop(&halted);
     }
 }
 END_TEST
@@ -592,6 +756,9 @@ int main(void)
     tcase_set_timeout(tests, 300);
     tcase_add_loop_test(tests, entries_equal_literal, 0, 2 * SCENES);
     tcase_add_loop_test(tests, tiers_equal_stepwise, 0, 2 * SCENES);
+    tcase_add_loop_test(tests, cluster_sizes, 0, 2);
+    tcase_add_loop_test(tests, tiers_chosen, 0, 2);
+    tcase_add_loop_test(tests, halted_does_nothing, 0, 4);
     tcase_add_loop_test(tests, runs_repeat, 0, 2);
     tcase_add_loop_test(tests, contexts_side_by_side, 0, 2);
     tcase_add_loop_test(tests, no_such_device, 0, 2);

@@ -170,8 +170,8 @@ enum { GRAPHS = sizeof graphs / sizeof *graphs };
 
 struct host_layout {
     const struct contact_problem *p;
-    int32_t n, records, room;           /* room: records of pairs, before those of blocks */
-    int32_t *label;                     /* raw body -> smallest body of its island */
+    int32_t n, records, room; /* room: records of pairs, before those of blocks */
+    int32_t *label;           /* raw body -> smallest body of its island */
     struct cuda_layout_copy wanted;
 };
 

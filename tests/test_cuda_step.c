@@ -311,7 +311,7 @@ START_TEST(a_step_that_fails_leaves_the_world_before_it)
 }
 END_TEST
 
-/* Every tier that takes the scene gives the same bits. */
+/* Every tier gives the same bits, from the first step (no contacts) to the last: parts are made anew as contacts come. */
 START_TEST(tiers_agree)
 {
     const int precision = _i;
@@ -323,8 +323,8 @@ START_TEST(tiers_agree)
         force_tier(tables[precision], world->context, (enum sadmm_cuda_tier)tier);
         for (int step = 0; step < 12; ++step) {
             sadmm_status status = sadmm_world_step(world);
-            if (status == SADMM_ERROR_UNSUPPORTED) break;
-            ck_assert_msg(status == SADMM_OK, "%s", sadmm_world_message(world));
+            if (strstr(sadmm_world_message(world), "the device has no clusters")) break;
+            ck_assert_msg(status == SADMM_OK, "tier %d, step %d: %s", tier, step, sadmm_world_message(world));
         }
         if (world_report(world).step > 0) {
             snprintf(what, sizeof what, "tier %d", tier);

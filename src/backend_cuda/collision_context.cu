@@ -193,7 +193,7 @@ static sadmm_status launch(struct sadmm_cuda_collision *c, collision_kernel kern
     c->kernel = name;
 #ifdef SADMM_CUDA_EMULATED
     const emulated_call call = {kernel, c->view};
-    cudaError_t code = cuda_emulation_launch(run_emulated, blocks, (unsigned)block, shared, 1, call, 0);
+    cudaError_t code = cuda_emulation_launch(run_emulated, blocks, (unsigned)block, shared, call, 0);
 #else
     (void)shared;
     const dim3 grid(blocks), threads_a_block((unsigned)block);

@@ -3,30 +3,43 @@
 
 /* ---- bodies --------------------------------------------------------------------------------------------------- */
 
-static __global__ void assemble_bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+/* Blocks of few threads: one thread's work is long, and there are many multiprocessors. */
+enum { BODY_THREADS = 64 };
+
+static __global__ void __launch_bounds__(BODY_THREADS)
+    assemble_bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    int32_t i = thread_index();
-    if (i >= live_bodies(v)) return;
-    int32_t raw = v.body_of[i];
+    int32_t i = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x);
+    if (i >= v.bodies || v.live->halt) return; /* may run before the step's contacts are known */
     double A[36], b[6], x[6], factor[36];
-    sadmm_system_body(&v.raw, &v.settings, raw, A, b);
+    sadmm_system_body(&v.raw, &v.settings, i, A, b);
     if (v.warm_start || !dense6_cholesky(A, factor)) {
-        for (int k = 0; k < 6; ++k) x[k] = v.raw.velocity[6 * (size_t)raw + (size_t)k];
+        for (int k = 0; k < 6; ++k) x[k] = v.raw.velocity[6 * (size_t)i + (size_t)k];
     } else {
         dense6_solve(factor, b, x);
     }
-    solver_real *state = v.state + (size_t)i * ROW, *row = v.b + (size_t)i * ROW, *matrix = v.A + (size_t)i * MATRIX;
+    solver_real *state = v.state + (size_t)i * ROW, *row = v.b + (size_t)i * ROW, *line = v.lines + (size_t)i * (size_t)v.line;
     for (int k = 0; k < ROW; ++k) {
         state[k] = k < 6 ? (solver_real)x[k] : (solver_real)0;
         row[k] = k < 6 ? (solver_real)b[k] : (solver_real)0;
     }
-    for (int k = 0; k < MATRIX; ++k) matrix[k] = k < 36 ? (solver_real)A[k] : (solver_real)0;
+    if (v.rigid) {
+        line[0] = (solver_real)A[0];
+        for (int r = 0; r < 3; ++r)
+            for (int k = 0; k <= r; ++k) line[1 + packed_place(r, k)] = (solver_real)A[6 * (r + 3) + k + 3];
+        line[LINE_RIGID_A - 1] = 0;
+    } else {
+        for (int r = 0; r < 6; ++r)
+            for (int k = 0; k <= r; ++k) line[packed_place(r, k)] = (solver_real)A[6 * r + k];
+        for (int k = PACKED; k < LINE_GENERAL_A; ++k) line[k] = 0;
+    }
 }
 
 static sadmm_status launch_bodies(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    return CUDA(launch)(c, assemble_bodies_kernel, "assemble_bodies", blocks_for(c->view.bodies), &args, error);
+    return CUDA(launch_of)(c, assemble_bodies_kernel, "assemble_bodies",
+                           ((int64_t)c->view.bodies + BODY_THREADS - 1) / BODY_THREADS, BODY_THREADS, &args, error);
 }
 
 extern "C" sadmm_status CUDA(assemble_bodies)(struct sadmm_context *c, struct sadmm_error *error)
@@ -66,10 +79,12 @@ static __global__ void assemble_contacts_kernel(const __grid_constant__ cuda_vie
     bool a = pair->body_a >= 0, b = pair->body_b >= 0;
     if (a && b && pair->count > 0) difference = v3_sub(v3_load(points[0].arm_b), v3_load(points[0].arm_a));
     v.normal[p] = pack(normal, pair->friction);
-    v.difference[p] = pack(difference, pair->count);
-    const pair_ends ends = {a ? v.slot_of[pair->body_a] : v.bodies, b ? v.slot_of[pair->body_b] : v.bodies, -1, -1};
+    /* A pair of more points than the step was planned for halts it (cuda_step.h), but not before this. */
+    const int32_t count = pair->count <= v.point_slots ? pair->count : v.point_slots;
+    const pair_ends ends = {a ? pair->body_a : v.bodies, b ? pair->body_b : v.bodies, -1, -1};
+    v.difference[p] = pack(difference, count);
     v.ends[p] = ends;
-    for (int32_t k = 0; k < pair->count; ++k) {
+    for (int32_t k = 0; k < count; ++k) {
         size_t slot = point_slot(v, p, k);
         vec3 lambda = v.warm_start ? v3_load(points[k].impulse) : v3(0, 0, 0);
         double error = sadmm_contact_e(&v.raw, &v.settings, pair, &points[k]);
@@ -95,8 +110,8 @@ static __global__ void assemble_rows_kernel(const __grid_constant__ cuda_view v,
     const struct sadmm_problem_block *block = &v.raw.blocks[k];
     if ((int32_t)block->kind != args.count) return;
     bool a = block->body_a >= 0, b = block->body_b >= 0;
-    row_about about = {(int32_t)block->kind, block->rows, a ? v.slot_of[block->body_a] : v.bodies,
-                       b ? v.slot_of[block->body_b] : v.bodies, -1, -1, 0};
+    row_about about = {(int32_t)block->kind, block->rows, a ? block->body_a : v.bodies,
+                       b ? block->body_b : v.bodies, -1, -1, 0};
     for (int r = 0; r < 6; ++r) {
         bool used = r < block->rows, any = false;
         for (int j = 0; j < 6; ++j) {
@@ -146,10 +161,4 @@ extern "C" sadmm_status CUDA(assemble_springs)(struct sadmm_context *c, struct s
     return assemble_rows(c, SADMM_BLOCK_SOFT, error);
 }
 
-sadmm_status CUDA(enqueue_assembly)(struct sadmm_context *c, struct sadmm_error *error)
-{
-    CUDA_TRY(launch_bodies(c, error));
-    CUDA_TRY(CUDA(assemble_contacts)(c, error));
-    CUDA_TRY(CUDA(init_penalty)(c, error));
-    return CUDA(factorize)(c, error);
-}
+sadmm_status CUDA(enqueue_bodies)(struct sadmm_context *c, struct sadmm_error *error) { return launch_bodies(c, error); }

@@ -29,8 +29,7 @@ sadmm_status CUDA(wait)(struct sadmm_context *c, struct sadmm_error *error)
 static const char *const buffer_names[BUFFER_COUNT] = {
     "states",
     "b",
-    "A",
-    "factors",
+    "matrices",
     "C",
     "penalties",
     "normals",
@@ -115,35 +114,48 @@ sadmm_status CUDA(download)(struct sadmm_context *c, const void *from, size_t by
 
 /* ---- launches ------------------------------------------------------------------------------------------------- */
 
-/* Blocks of a launch run side by side in clusters (`cluster` > 1), or all of them (cooperative). */
-static sadmm_status launch_blocks(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
-                                  int threads, size_t shared, int cluster, bool cooperative, const cuda_args *args,
-                                  struct sadmm_error *error)
+/* Blocks of a partition run side by side in clusters (`cluster` > 1), or all of them (GRID: a cooperative launch). */
+static cudaLaunchConfig_t configure(const struct sadmm_context *c, const struct cuda_partition *partition,
+                                    cudaLaunchAttribute *attribute)
 {
-    if (blocks <= 0) return SADMM_OK;
-    c->kernel = name;
-#ifdef SADMM_CUDA_EMULATED
-    unsigned together = cooperative ? (unsigned)blocks : (unsigned)cluster;
-    cudaError_t code =
-        cuda_emulation_launch(kernel, (unsigned)blocks, (unsigned)threads, shared, together, c->view, *args);
-#else
-    void *parameters[] = {&c->view, const_cast<cuda_args *>(args)};
-    cudaLaunchAttribute attribute[1];
     cudaLaunchConfig_t launch = {};
-    launch.gridDim = dim3((unsigned)blocks);
-    launch.blockDim = dim3((unsigned)threads);
-    launch.dynamicSmemBytes = shared;
+    launch.gridDim = dim3((unsigned)partition->parts);
+    launch.blockDim = dim3((unsigned)partition->threads);
+    launch.dynamicSmemBytes = partition->shared;
     launch.stream = c->stream;
     launch.attrs = attribute;
-    if (cooperative) {
-        attribute[launch.numAttrs].id = cudaLaunchAttributeCooperative;
-        attribute[launch.numAttrs++].val.cooperative = 1;
-    } else if (cluster > 1) {
-        attribute[launch.numAttrs].id = cudaLaunchAttributeClusterDimension;
-        attribute[launch.numAttrs].val.clusterDim.x = (unsigned)cluster;
-        attribute[launch.numAttrs].val.clusterDim.y = attribute[launch.numAttrs].val.clusterDim.z = 1;
-        ++launch.numAttrs;
+    if (partition->tier == SADMM_CUDA_TIER_GRID) {
+        attribute->id = cudaLaunchAttributeCooperative;
+        attribute->val.cooperative = 1;
+        launch.numAttrs = 1;
+    } else if (partition->cluster > 1) {
+        attribute->id = cudaLaunchAttributeClusterDimension;
+        attribute->val.clusterDim.x = (unsigned)partition->cluster;
+        attribute->val.clusterDim.y = attribute->val.clusterDim.z = 1;
+        launch.numAttrs = 1;
     }
+    return launch;
+}
+
+cudaError_t CUDA(active_clusters)(const struct sadmm_context *c, cuda_kernel kernel,
+                                  const struct cuda_partition *partition, int *clusters)
+{
+    cudaLaunchAttribute attribute;
+    const cudaLaunchConfig_t launch = configure(c, partition, &attribute);
+    return cudaOccupancyMaxActiveClusters(clusters, (const void *)kernel, &launch);
+}
+
+sadmm_status CUDA(launch_partition)(struct sadmm_context *c, cuda_kernel kernel, const char *name,
+                                    const struct cuda_partition *partition, const cuda_args *args,
+                                    struct sadmm_error *error)
+{
+    cudaLaunchAttribute attribute;
+    const cudaLaunchConfig_t launch = configure(c, partition, &attribute);
+    c->kernel = name;
+#ifdef SADMM_CUDA_EMULATED
+    cudaError_t code = cuda_emulation_launch(&launch, kernel, c->view, *args);
+#else
+    void *parameters[] = {&c->view, const_cast<cuda_args *>(args)};
     cudaError_t code = cudaLaunchKernelExC(&launch, (const void *)kernel, parameters);
 #endif
     CUDA_CALL(c, code, name);
@@ -153,15 +165,18 @@ static sadmm_status launch_blocks(struct sadmm_context *c, cuda_kernel kernel, c
 sadmm_status CUDA(launch)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
                           const cuda_args *args, struct sadmm_error *error)
 {
-    return launch_blocks(c, kernel, name, blocks, THREADS, 0, 1, false, args, error);
+    return CUDA(launch_of)(c, kernel, name, blocks, THREADS, args, error);
 }
 
-sadmm_status CUDA(launch_partition)(struct sadmm_context *c, cuda_kernel kernel, const char *name,
-                                    const struct cuda_partition *partition, const cuda_args *args,
-                                    struct sadmm_error *error)
+sadmm_status CUDA(launch_of)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
+                             const cuda_args *args, struct sadmm_error *error)
 {
-    return launch_blocks(c, kernel, name, partition->parts, partition->threads, partition->shared, partition->cluster,
-                         partition->tier == SADMM_CUDA_TIER_GRID, args, error);
+    struct cuda_partition plain = {};
+    if (blocks <= 0) return SADMM_OK;
+    plain.parts = (int32_t)blocks;
+    plain.cluster = 1;
+    plain.threads = threads;
+    return CUDA(launch_partition)(c, kernel, name, &plain, args, error);
 }
 
 /* ---- devices -------------------------------------------------------------------------------------------------- */
@@ -218,10 +233,12 @@ static sadmm_status open_device(struct sadmm_context *c, struct sadmm_error *err
               "cudaDeviceGetAttribute");
     CUDA_CALL(c, cudaDeviceGetAttribute(&clusters, cudaDevAttrClusterLaunch, c->device), "cudaDeviceGetAttribute");
     c->cooperative = cooperative != 0;
-    c->clusters = clusters != 0;
-    CUDA_CALL(c, CUDA(resident_allow)(c->shared_limit), "loading the kernels");
+    CUDA_CALL(c, CUDA(resident_allow)(c->shared_limit, clusters != 0, &c->clusters), "loading the kernels");
     CUDA_CALL(c, LAYOUT(one_block_allow)(c->shared_limit), "loading the kernels");
     CUDA_CALL(c, cudaStreamCreateWithFlags(&c->stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
+    CUDA_CALL(c, cudaStreamCreateWithFlags(&c->side, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
+    CUDA_CALL(c, cudaEventCreateWithFlags(&c->fork, cudaEventDisableTiming), "cudaEventCreateWithFlags");
+    CUDA_CALL(c, cudaEventCreateWithFlags(&c->join, cudaEventDisableTiming), "cudaEventCreateWithFlags");
     return SADMM_OK;
 }
 
@@ -251,6 +268,9 @@ extern "C" void CUDA(destroy)(struct sadmm_context *c)
         CUDA(step_destroy)(c);
         if (c->graph) (void)cudaGraphExecDestroy(c->graph);
         for (cuda_buffer &buffer : c->buffers) release(&buffer);
+        if (c->join) (void)cudaEventDestroy(c->join);
+        if (c->fork) (void)cudaEventDestroy(c->fork);
+        if (c->side) (void)cudaStreamDestroy(c->side);
         (void)cudaStreamDestroy(c->stream);
         (void)cudaGetLastError();
     }
@@ -270,6 +290,8 @@ extern "C" void CUDA(set_tier)(struct sadmm_context *c, enum sadmm_cuda_tier tie
 {
     c->wanted = tier;
 }
+
+extern "C" void CUDA(set_cluster)(struct sadmm_context *c, int blocks) { c->wanted_cluster = blocks; }
 
 extern "C" enum sadmm_cuda_tier CUDA(get_tier)(const struct sadmm_context *c, int32_t *blocks)
 {

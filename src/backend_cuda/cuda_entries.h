@@ -10,6 +10,9 @@ bool CUDA(probe)(const char **about);
 /* Whole steps: room for so many candidates and points at first; 0: as likely (tests). */
 void CUDA(tune_rooms)(struct sadmm_context *, int64_t first_room);
 void CUDA(set_tier)(struct sadmm_context *, enum sadmm_cuda_tier tier);
+/* For tests: blocks a cluster where there are clusters (0: as likely the fastest); what `live` says from now on. */
+void CUDA(set_cluster)(struct sadmm_context *, int blocks);
+sadmm_status CUDA(set_halt)(struct sadmm_context *, enum cuda_halt, struct sadmm_error *);
 enum sadmm_cuda_tier CUDA(get_tier)(const struct sadmm_context *, int32_t *blocks);
 
 /* For tests: survey and layout of the last begin's system once more, for this partition, halted from the start or not;

@@ -28,6 +28,12 @@ void sadmm_cuda_force_tier(const struct sadmm_kernels *kernels, struct sadmm_con
     else sadmm_cuda_set_tier_f64(context, tier);
 }
 
+void sadmm_cuda_force_cluster(const struct sadmm_kernels *kernels, struct sadmm_context *context, int blocks)
+{
+    if (kernels->precision == SADMM_F32) sadmm_cuda_set_cluster_f32(context, blocks);
+    else sadmm_cuda_set_cluster_f64(context, blocks);
+}
+
 enum sadmm_cuda_tier sadmm_cuda_tier_of(const struct sadmm_kernels *kernels, const struct sadmm_context *context,
                                         int32_t *blocks)
 {

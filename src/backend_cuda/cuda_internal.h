@@ -40,6 +40,7 @@
 #include <cuda_runtime.h>
 
 #include "../core/kernels.h"
+#include "cuda_line.h"
 #include "cuda_step.h"
 #include "layout_internal.h"
 
@@ -53,7 +54,6 @@ typedef SADMM_REAL solver_real;
 enum {
     ROW = 8,              /* a wrench or a body's state: 6 used, 32 bytes in f32 */
     STATE_INV_BETA = 6,   /* slot of a state row */
-    MATRIX = 40,          /* a symmetric 6x6, rows of 6; the padding keeps four bodies' rows on different banks */
     PACKED = 21,          /* lower triangle, rows first */
     THREADS = 256,        /* a block, everywhere */
     WARP = 32,
@@ -104,7 +104,10 @@ struct cuda_view {
 
     solver_real *state; /* (bodies + 1) x ROW: v, w, 1/beta, 0; the last row is the static world, all 0 */
     solver_real *b;     /* bodies x ROW */
-    solver_real *A, *H; /* bodies x MATRIX */
+    solver_real *lines; /* bodies x line: A and H (cuda_line.h) */
+    int32_t line;
+    int32_t rigid;      /* how lines are packed */
+    int32_t point_slots; /* a pair has room for */
     double *C;          /* bodies x PACKED */
     double *beta;       /* bodies, kg */
 
@@ -160,6 +163,7 @@ struct cuda_args {
     int32_t join;       /* the first Step 1 takes records + ratio change */
     int32_t start;      /* the first Step 1 takes J^T lambda^0, whatever the records are */
     int32_t most_bodies, cluster; /* of the partition */
+    int32_t planned;    /* a whole step: compare with the plan */
     int32_t rescaled;   /* ratio is view.ratio, else 1 */
     const struct sadmm_resident_edit *edits;
     double factor;
@@ -176,7 +180,7 @@ struct cuda_buffer {
 
 enum cuda_buffer_name {
     /* device */
-    BUFFER_STATE, BUFFER_B, BUFFER_A, BUFFER_H, BUFFER_C, BUFFER_BETA,
+    BUFFER_STATE, BUFFER_B, BUFFER_LINES, BUFFER_C, BUFFER_BETA,
     BUFFER_NORMAL, BUFFER_DIFFERENCE, BUFFER_PAIR_ENDS, BUFFER_ARM, BUFFER_LAMBDA,
     BUFFER_ROW_INFO, BUFFER_ROW_DATA, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_EXCHANGE, BUFFER_LIVE, BUFFER_LAYOUT, BUFFER_SORT,
     BUFFER_NUMBERS, BUFFER_SCALARS,
@@ -191,6 +195,8 @@ enum cuda_buffer_name {
 struct sadmm_context {
     int device;
     cudaStream_t stream;
+    cudaStream_t side;        /* of a step's graph: what does not wait for contacts (cuda_step.cu) */
+    cudaEvent_t fork, join;
     int multiprocessors, shared_limit; /* shared_limit: bytes a block may have */
     bool cooperative, clusters;        /* what the device can launch */
 
@@ -206,6 +212,7 @@ struct sadmm_context {
     bool recording; /* a graph of the whole step: nothing is allocated, no graph launched in it */
 
     enum sadmm_cuda_tier wanted;     /* by a test */
+    int wanted_cluster;              /* blocks a cluster, by a test; 0: any */
     struct cuda_facts facts;         /* of the last begin */
     struct cuda_partition partition; /* what its layout was made for */
     struct layout_view layout;
@@ -229,6 +236,12 @@ sadmm_status CUDA(room)(struct sadmm_context *, enum cuda_buffer_name name, size
 /* Launch blocks of THREADS on the stream; 0 blocks: nothing to do. */
 sadmm_status CUDA(launch)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks,
                           const cuda_args *args, struct sadmm_error *error);
+/* The same with blocks of so many threads. */
+sadmm_status CUDA(launch_of)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
+                             const cuda_args *args, struct sadmm_error *error);
+/* How many of the partition's clusters the device runs side by side; 0: clusters that large do not exist. */
+cudaError_t CUDA(active_clusters)(const struct sadmm_context *, cuda_kernel kernel,
+                                  const struct cuda_partition *partition, int *clusters);
 /* Launch a kernel on the partition's blocks. */
 sadmm_status CUDA(launch_partition)(struct sadmm_context *, cuda_kernel kernel, const char *name,
                                     const struct cuda_partition *partition, const cuda_args *args,
@@ -263,8 +276,10 @@ struct device_scope {
 
 /* This precision's data for the view's counts and the partition (allocates). */
 sadmm_status CUDA(solver_room)(struct sadmm_context *, struct sadmm_error *error);
-/* Everything from raw data on the device to the first iteration. */
-sadmm_status CUDA(enqueue_assembly)(struct sadmm_context *, struct sadmm_error *error);
+/* A, b and the start velocities: they need no contacts. */
+sadmm_status CUDA(enqueue_bodies)(struct sadmm_context *, struct sadmm_error *error);
+/* Penalties and factors at once; in a whole step, also whether it is what was planned for. */
+sadmm_status CUDA(enqueue_penalties)(struct sadmm_context *, struct sadmm_error *error);
 /* (16) and (17) of the iteration that was measured, into view.residual. */
 sadmm_status CUDA(enqueue_residuals)(struct sadmm_context *, struct sadmm_error *error);
 /* (15) by view.residual. */
@@ -277,8 +292,6 @@ sadmm_status CUDA(launch_edits)(struct sadmm_context *, const struct sadmm_resid
                                 struct sadmm_error *error);
 sadmm_status CUDA(launch_start)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_admit)(struct sadmm_context *, struct sadmm_error *error);
-sadmm_status CUDA(launch_check)(struct sadmm_context *, struct sadmm_error *error);
-sadmm_status CUDA(launch_assembled)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_finish)(struct sadmm_context *, struct sadmm_error *error);
 
 /* ---- cuda_layout.cu -------------------------------------------------------------------------------------------------
@@ -306,8 +319,9 @@ cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, enum sadmm_
                                   const char **name);
 int CUDA(resident_threads)(int point_slots);
 size_t CUDA(resident_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies, bool row_blocks);
-/* Let every instance use `bytes` of shared memory a block. */
-cudaError_t CUDA(resident_allow)(int bytes);
+/* Let every instance use `bytes` of shared memory a block, and clusters of more than 8 blocks. *clusters: whether both the
+ * device and the code that was loaded for it know clusters. */
+cudaError_t CUDA(resident_allow)(int bytes, bool device_has_clusters, bool *clusters);
 
 /* ---- cuda_partition.cu ---- */
 

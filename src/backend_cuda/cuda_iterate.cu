@@ -19,8 +19,8 @@ template <bool JOIN> static __global__ void bodies_kernel(const __grid_constant_
 {
     int32_t i = thread_index() / LANES, r = (int32_t)threadIdx.x % LANES;
     bool live = i < live_bodies(v), mine = live && r < 6;
-    size_t at = live ? (size_t)i : 0;
-    body_lane body = load_body(live, r, v.A + at * MATRIX, v.H + at * MATRIX, v.b + at * ROW, v.state + at * ROW);
+    size_t at = live ? (size_t)v.body_of[i] : 0;
+    body_lane body = load_body(live, r, v.lines + at * (size_t)v.line, v.rigid, v.b + at * ROW, v.state + at * ROW);
     real g = free_momentum(body);
     const real ratio = JOIN && args.rescaled ? (real)*v.ratio : (real)1;
     if (mine) {
@@ -234,10 +234,10 @@ static __global__ void dual_kernel(const __grid_constant__ cuda_view v, const __
     int32_t i = thread_index() / LANES, r = (int32_t)threadIdx.x % LANES;
     double dual = 0;
     if (i < live_bodies(v) && r < 6) {
-        size_t body = (size_t)i;
-        const solver_real *A = v.A + body * MATRIX, *state = v.state + body * ROW;
+        size_t body = (size_t)v.body_of[i];
+        const solver_real *line = v.lines + body * (size_t)v.line, *state = v.state + body * ROW;
         real g = -v.b[body * ROW + (size_t)r];
-        for (int k = 0; k < 6; ++k) g += A[6 * k + r] * state[k];
+        for (int k = 0; k < 6; ++k) g += line_a(line, v.rigid, r, k) * state[k];
         for (int32_t at = v.offsets[i]; at < v.offsets[i + 1]; ++at)
             g -= v.records[(size_t)at * ROW + (size_t)record_slot(r)];
         dual = fabs((double)g);

@@ -62,9 +62,10 @@ static sadmm_status number(struct sadmm_context *c, size_t count, struct sadmm_e
     CUDA_TRY(CUDA(room)(c, BUFFER_NUMBERS, count * sizeof(int32_t), error));
     if (numbers->capacity == before && c->numbered) return SADMM_OK;
     c->numbered = false;
-    CUDA_CALL(c, LAYOUT(number)((int32_t *)numbers->data, (int32_t)(numbers->capacity / sizeof(int32_t)), c->stream,
-                                &c->kernel),
-              c->kernel);
+    CUDA_CALL(
+        c,
+        LAYOUT(number)((int32_t *)numbers->data, (int32_t)(numbers->capacity / sizeof(int32_t)), c->stream, &c->kernel),
+        c->kernel);
     c->numbered = true;
     return SADMM_OK;
 }
@@ -126,8 +127,9 @@ static sadmm_status check_partition(struct sadmm_context *c, const struct cuda_p
 sadmm_status CUDA(enqueue_survey)(struct sadmm_context *c, bool islands, struct sadmm_error *error)
 {
     bind_raw(c);
-    CUDA_CALL(c, c->one_block ? LAYOUT(one_block)(&c->layout, true, islands, nullptr, c->stream, &c->kernel)
-                              : LAYOUT(survey)(&c->layout, islands, c->stream, &c->kernel),
+    CUDA_CALL(c,
+              c->one_block ? LAYOUT(one_block)(&c->layout, true, islands, nullptr, c->stream, &c->kernel)
+                           : LAYOUT(survey)(&c->layout, islands, c->stream, &c->kernel),
               c->kernel);
     return SADMM_OK;
 }
@@ -136,8 +138,9 @@ sadmm_status CUDA(enqueue_layout)(struct sadmm_context *c, const struct cuda_par
                                   struct sadmm_error *error)
 {
     CUDA_TRY(check_partition(c, partition, error));
-    CUDA_CALL(c, c->one_block ? LAYOUT(one_block)(&c->layout, false, false, partition, c->stream, &c->kernel)
-                              : LAYOUT(make)(&c->layout, partition, c->stream, &c->kernel),
+    CUDA_CALL(c,
+              c->one_block ? LAYOUT(one_block)(&c->layout, false, false, partition, c->stream, &c->kernel)
+                           : LAYOUT(make)(&c->layout, partition, c->stream, &c->kernel),
               c->kernel);
     return SADMM_OK;
 }
@@ -167,14 +170,9 @@ static sadmm_status raw_room(struct sadmm_context *c, struct sadmm_error *error)
     size_t points = (size_t)v->points * sizeof(struct sadmm_contact_point);
     size_t blocks = rows * (sizeof(struct sadmm_problem_block) + 6 * sizeof(double));
     const wanted_room wanted[] = {
-        {BUFFER_RAW_BODIES, bodies},
-        {BUFFER_RAW_PAIRS, pairs},
-        {BUFFER_RAW_POINTS, points},
-        {BUFFER_RAW_BLOCKS, blocks},
-        {PINNED_BODIES, bodies},
-        {PINNED_PAIRS, pairs},
-        {PINNED_POINTS, points},
-        {PINNED_BLOCKS, blocks},
+        {BUFFER_RAW_BODIES, bodies}, {BUFFER_RAW_PAIRS, pairs}, {BUFFER_RAW_POINTS, points},
+        {BUFFER_RAW_BLOCKS, blocks}, {PINNED_BODIES, bodies},   {PINNED_PAIRS, pairs},
+        {PINNED_POINTS, points},     {PINNED_BLOCKS, blocks},
     };
     CUDA_TRY(make_room(c, wanted, error));
     void *const none = nullptr;
@@ -205,12 +203,14 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
     size_t records = 2 * (pairs + (size_t)v->rows) * ROW * real_size;
     size_t points = (size_t)v->points;
     bool three = v->contact_rows != 1;
+    v->rigid = c->plan.rigid;
+    v->line = v->rigid ? LINE_RIGID : LINE_GENERAL;
+    v->point_slots = c->facts.point_slots;
     size_t out = (13 * n + 3 * points + 6 * (size_t)v->rows + 2) * sizeof(double);
     const wanted_room wanted[] = {
         {BUFFER_STATE, (n + 1) * ROW * real_size},
         {BUFFER_B, n * ROW * real_size},
-        {BUFFER_A, n * MATRIX * real_size},
-        {BUFFER_H, n * MATRIX * real_size},
+        {BUFFER_LINES, n * (size_t)v->line * real_size},
         {BUFFER_C, n * PACKED * sizeof(double)},
         {BUFFER_BETA, n * sizeof(double)},
         {BUFFER_NORMAL, pairs * sizeof(real4)},
@@ -233,8 +233,7 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
     cuda_buffer *b = c->buffers;
     v->state = (solver_real *)b[BUFFER_STATE].data;
     v->b = (solver_real *)b[BUFFER_B].data;
-    v->A = (solver_real *)b[BUFFER_A].data;
-    v->H = (solver_real *)b[BUFFER_H].data;
+    v->lines = (solver_real *)b[BUFFER_LINES].data;
     v->C = (double *)b[BUFFER_C].data;
     v->beta = (double *)b[BUFFER_BETA].data;
     v->normal = (real4 *)b[BUFFER_NORMAL].data;
@@ -297,9 +296,9 @@ static sadmm_status upload_raw(struct sadmm_context *c, struct sadmm_error *erro
 /* Wait for what the device knows now. */
 static sadmm_status download_known(struct sadmm_context *c, struct known *out, struct sadmm_error *error)
 {
-    CUDA_CALL(c, cudaMemcpyAsync(c->buffers[PINNED_LIVE].data, c->view.live, sizeof *out, cudaMemcpyDeviceToHost,
-                                 c->stream),
-              "cudaMemcpyAsync from the device");
+    CUDA_CALL(
+        c, cudaMemcpyAsync(c->buffers[PINNED_LIVE].data, c->view.live, sizeof *out, cudaMemcpyDeviceToHost, c->stream),
+        "cudaMemcpyAsync from the device");
     CUDA_TRY(CUDA(wait)(c, error));
     memcpy(out, c->buffers[PINNED_LIVE].data, sizeof *out);
     return SADMM_OK;
@@ -316,10 +315,10 @@ static sadmm_status lay_out(struct sadmm_context *c, struct sadmm_error *error)
     c->facts = known.facts;
     if (known.live.halt == HALT_NONE) return SADMM_OK;
     if (c->wanted != SADMM_CUDA_TIER_AUTO)
-        return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED,
-                          "the cuda tier asked for: a thread block would get %d halves and %d bodies: at most %d and %d",
-                          known.facts.part_halves, known.facts.part_bodies, partition->most_halves,
-                          partition->most_bodies);
+        return sadmm_fail(
+            error, SADMM_ERROR_UNSUPPORTED,
+            "the cuda tier asked for: a thread block would get %d halves and %d bodies: at most %d and %d",
+            known.facts.part_halves, known.facts.part_bodies, partition->most_halves, partition->most_bodies);
     *partition = {};
     partition->tier = SADMM_CUDA_TIER_STREAM;
     CUDA_TRY(upload_live(c, HALT_NONE, error));
@@ -334,8 +333,8 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
     if (records > INT32_MAX / (4 * ROW))
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%lld constraints: at most %d", (long long)(records - WARP),
                           INT32_MAX / (4 * ROW) - WARP);
-    if (plan->bodies > INT32_MAX / MATRIX - 1)
-        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d bodies: at most %d", plan->bodies, INT32_MAX / MATRIX - 1);
+    if (plan->bodies > INT32_MAX / LINE_GENERAL)
+        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d bodies: at most %d", plan->bodies, INT32_MAX / LINE_GENERAL);
     CUDA_ENTER(c);
     CUDA_TRY(CUDA(wait)(c, error)); /* the staging buffers are about to be written */
     c->system = system;
@@ -362,8 +361,16 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
 
 /* ---- for tests --------------------------------------------------------------------------------------------------- */
 
+extern "C" sadmm_status CUDA(set_halt)(struct sadmm_context *c, enum cuda_halt halt, struct sadmm_error *error)
+{
+    CUDA_ENTER(c);
+    CUDA_TRY(CUDA(wait)(c, error));
+    return upload_live(c, halt, error);
+}
+
 /* Survey and layout as a graph, launched twice: captured, nothing may depend on when it runs or what ran before. */
-static sadmm_status run_graph(struct sadmm_context *c, const struct cuda_partition *partition, struct sadmm_error *error)
+static sadmm_status run_graph(struct sadmm_context *c, const struct cuda_partition *partition,
+                              struct sadmm_error *error)
 {
     cudaGraph_t graph = nullptr;
     cudaGraphExec_t ready = nullptr;
@@ -411,8 +418,11 @@ extern "C" sadmm_status CUDA(lay_out_again)(struct sadmm_context *c, const struc
         int32_t *to;
         const int32_t *from;
         size_t count;
-    } arrays[] = {{out->body_of, v->body_of, n},    {out->slot_of, v->slot_of, n},     {out->offsets, v->offsets, n + 1},
-                  {out->incident, v->incident, halves}, {out->parts, v->parts, parts}};
+    } arrays[] = {{out->body_of, v->body_of, n},
+                  {out->slot_of, v->slot_of, n},
+                  {out->offsets, v->offsets, n + 1},
+                  {out->incident, v->incident, halves},
+                  {out->parts, v->parts, parts}};
     for (const auto &one : arrays) {
         CUDA_TRY(CUDA(room)(c, PINNED_OUT, one.count * sizeof(int32_t), error));
         CUDA_TRY(CUDA(download)(c, one.from, one.count * sizeof(int32_t), error));

@@ -3,13 +3,37 @@
  * A part costs its halves + its bodies, and the layout gives every part an even share of all cost, rounded up to whole
  * islands (BLOCK, CLUSTER) or bodies (GRID). That bounds the largest part before it is made. The rooms of a launch
  * (threads, shared memory) are sized above the bound: facts may be those of a step before, and contacts come and go.
+ *
+ * Which tier. An iteration takes what its barrier and its longest chain of dependent instructions take, and then the time
+ * a multiprocessor needs for the halves it holds: its warps take turns. A thread block to an island has the cheapest
+ * barrier; a cluster shares an island among 2 to 16 multiprocessors, and pays for it with a dearer barrier and velocities
+ * from other multiprocessors; the grid shares among all of them, through memory. Whatever fits and is estimated to be
+ * the fastest is taken, which comes to this:
+ *   BLOCK    islands of up to about a hundred halves, and larger ones where there are so many islands that every
+ *            multiprocessor has enough to do anyway
+ *   CLUSTER  else, whenever a cluster can hold an island: its size such that a block holds some tens of halves, or as
+ *            large as leaves one for every island
+ *   GRID     an island that no cluster can hold, or a few that do not fit side by side
+ *   STREAM   what the device cannot hold at once
  */
 #include "cuda_internal.h"
 
 enum {
     QUAD = 4,          /* threads a half */
     SPREAD = 48,       /* halves a block of the grid at least: below that, barriers of more blocks cost more than they gain */
-    MOST_BLOCKS = 16   /* thread blocks a multiprocessor */
+    MOST_BLOCKS = 16,  /* thread blocks a multiprocessor */
+    MOST_CLUSTER = 16  /* thread blocks a cluster */
+};
+
+/* Nanoseconds of an iteration: floors of the tiers, of a cluster for each of its blocks, and of each half that a
+ * multiprocessor holds. For an H200 and f32; how they compare is all that matters. */
+enum { BLOCK_TIME = 350, CLUSTER_TIME = 580, MEMBER_TIME = 8, GRID_TIME = 1900, HALF_TIME = 3 };
+
+/* A partition, why there is none (else NULL), and its nanoseconds an iteration. */
+struct choice {
+    struct cuda_partition partition;
+    const char *why;
+    int64_t time;
 };
 
 static int64_t smaller(int64_t a, int64_t b) { return a < b ? a : b; }
@@ -65,14 +89,28 @@ static struct bound body_bound(const struct sadmm_context *c, const struct cuda_
     return bound;
 }
 
-/* Islands in thread blocks: NULL, or why not. */
-static const char *choose_block(const struct sadmm_context *c, const struct cuda_facts *facts,
-                                struct cuda_partition *partition)
+static struct choice no_choice(const char *why)
+{
+    struct choice none = {{}, why, INT64_MAX};
+    return none;
+}
+
+static const char refused[] = "a thread block would get too much";
+static const char too_many[] = "more thread blocks than the layout has room for";
+
+/* No more than the layout has room for. */
+static int64_t most_parts(const struct sadmm_context *c)
+{
+    return c->view.bodies + (int64_t)c->multiprocessors * MOST_BLOCKS;
+}
+
+/* Islands in thread blocks. */
+static struct choice choose_block(const struct sadmm_context *c, const struct cuda_facts *facts)
 {
     static const char too_large[] = "an island does not fit a thread block";
-    if (c->refused >> SADMM_CUDA_TIER_BLOCK & 1) return "a thread block would get too much";
+    if (c->refused >> SADMM_CUDA_TIER_BLOCK & 1) return no_choice(refused);
     const int64_t most = CUDA(resident_threads)(facts->point_slots), most_halves = most / QUAD;
-    if (facts->island_halves > most_halves) return too_large;
+    if (facts->island_halves > most_halves) return no_choice(too_large);
     /* As many blocks a multiprocessor as run side by side and find an island each; when that is too few for the room a
      * block has, blocks that run one after another. */
     int64_t parts = c->multiprocessors, side_by_side = 1;
@@ -82,64 +120,147 @@ static const char *choose_block(const struct sadmm_context *c, const struct cuda
         side_by_side *= 2;
     }
     while (island_bound(c, facts, parts).halves > most_halves) parts += parts / 4 + 1;
+    if (parts > most_parts(c)) return no_choice(too_many);
     if (facts->islands <= 1) parts = 1;
     struct bound bound = island_bound(c, facts, parts);
-    partition->tier = SADMM_CUDA_TIER_BLOCK;
-    partition->parts = (int32_t)parts;
-    partition->cluster = 1;
-    partition->threads = (int32_t)threads_for(bound, most);
-    if (partition->threads > most) return too_large;
-    if (take_room(c, partition, bound, c->shared_limit / side_by_side)) return nullptr;
-    return take_room(c, partition, bound, c->shared_limit) ? nullptr : too_large;
+    struct choice choice = {};
+    choice.partition.tier = SADMM_CUDA_TIER_BLOCK;
+    choice.partition.parts = (int32_t)parts;
+    choice.partition.cluster = 1;
+    choice.partition.threads = (int32_t)threads_for(bound, most);
+    if (choice.partition.threads > most) return no_choice(too_large);
+    if (!take_room(c, &choice.partition, bound, c->shared_limit / side_by_side) &&
+        !take_room(c, &choice.partition, bound, c->shared_limit))
+        return no_choice(too_large);
+    const int64_t rounds = up(smaller(parts, larger(facts->islands, 1)), c->multiprocessors * side_by_side);
+    const int64_t halves = side_by_side * larger(facts->island_halves, up(facts->halves, parts));
+    choice.time = rounds * (BLOCK_TIME + HALF_TIME * halves);
+    return choice;
 }
 
-/* Bodies over the whole device: NULL, or why not, or a device error in *code. */
-static const char *choose_grid(const struct sadmm_context *c, const struct cuda_facts *facts,
-                               struct cuda_partition *partition, cudaError_t *code)
+/* Islands in clusters of `size` thread blocks. */
+static struct choice choose_cluster_of(const struct sadmm_context *c, const struct cuda_facts *facts, int32_t size,
+                                       cudaError_t *code)
 {
-    static const char too_many[] = "more constraints than the device can hold at once";
+    static const char too_large[] = "an island does not fit a cluster of thread blocks";
     const char *name = nullptr;
-    if (c->refused >> SADMM_CUDA_TIER_GRID & 1) return "a thread block would get too much";
+    const int64_t most = CUDA(resident_threads)(facts->point_slots), most_halves = most / QUAD;
+    const int64_t cost = (int64_t)facts->halves + c->view.bodies;
+    /* As many clusters as find a multiprocessor for each of their blocks; when that is too few for the room a block has,
+     * clusters that run one after another. */
+    int64_t clusters = facts->islands <= 1 ? 1 : larger(c->multiprocessors / size, 1);
+    struct bound bound;
+    for (;; clusters += clusters / 4 + 1) {
+        const struct bound whole = island_bound(c, facts, clusters);
+        const int64_t share = up(smaller(cost, whole.halves + whole.bodies), size);
+        bound.halves = smaller(whole.halves, share - 1 + facts->degree);
+        bound.bodies = smaller(whole.bodies, share);
+        if (bound.halves <= most_halves) break;
+        if (clusters >= cost) return no_choice(too_large);
+    }
+    if (clusters * size > most_parts(c)) return no_choice(too_many);
+    struct choice choice = {};
+    choice.partition.tier = SADMM_CUDA_TIER_CLUSTER;
+    choice.partition.parts = (int32_t)clusters * size;
+    choice.partition.cluster = size;
+    choice.partition.threads = (int32_t)threads_for(bound, most);
+    if (choice.partition.threads > most || !take_room(c, &choice.partition, bound, c->shared_limit))
+        return no_choice(too_large);
+    int active = 0;
+    cuda_kernel kernel =
+        CUDA(resident_kernel)(c->plan.contact_rows, facts->point_slots, SADMM_CUDA_TIER_CLUSTER, true, &name);
+    *code = CUDA(active_clusters)(c, kernel, &choice.partition, &active);
+    if (*code != cudaSuccess || active < 1) return no_choice("the device has no clusters that large");
+    const int64_t rounds = up(smaller(clusters, larger(facts->islands, 1)), active);
+    const int64_t halves = up(larger(facts->island_halves, up(facts->halves, clusters)), size);
+    choice.time = rounds * (CLUSTER_TIME + MEMBER_TIME * size + HALF_TIME * halves);
+    return choice;
+}
+
+/* Islands in clusters of the size that is likely the fastest. */
+static struct choice choose_cluster(const struct sadmm_context *c, const struct cuda_facts *facts, cudaError_t *code)
+{
+    if (c->refused >> SADMM_CUDA_TIER_CLUSTER & 1) return no_choice(refused);
+    if (!c->clusters) return no_choice("the device has no clusters of thread blocks");
+    struct choice best = no_choice("there are no clusters of that size");
+    for (int32_t size = 2; size <= MOST_CLUSTER; size *= 2) {
+        if (c->wanted_cluster > 0 && c->wanted_cluster != size) continue;
+        const struct choice one = choose_cluster_of(c, facts, size, code);
+        if (*code != cudaSuccess) return one;
+        if (best.why || one.time < best.time) best = one;
+    }
+    return best;
+}
+
+/* Bodies over the whole device. */
+static struct choice choose_grid(const struct sadmm_context *c, const struct cuda_facts *facts, cudaError_t *code)
+{
+    static const char too_large[] = "more constraints than the device can hold at once";
+    const char *name = nullptr;
+    if (c->refused >> SADMM_CUDA_TIER_GRID & 1) return no_choice(refused);
     const int64_t most = CUDA(resident_threads)(facts->point_slots), cost = (int64_t)facts->halves + c->view.bodies;
-    if (!c->cooperative) return "the device has no cooperative launch";
+    if (!c->cooperative) return no_choice("the device has no cooperative launch");
     int64_t parts = larger(smaller(c->multiprocessors, up(cost, SPREAD)), 1);
-    partition->tier = SADMM_CUDA_TIER_GRID;
-    partition->cluster = 1;
+    struct choice choice = {};
+    choice.partition.tier = SADMM_CUDA_TIER_GRID;
+    choice.partition.cluster = 1;
     for (int64_t side_by_side = 1; side_by_side <= MOST_BLOCKS; side_by_side *= 2) {
         if (side_by_side > 1) parts = c->multiprocessors * side_by_side;
         struct bound bound = body_bound(c, facts, parts);
         int64_t threads = threads_for(bound, most);
         if (threads > most) continue;
-        partition->parts = (int32_t)parts;
-        partition->threads = (int32_t)threads;
-        if (!take_room(c, partition, bound, c->shared_limit / side_by_side)) continue;
+        choice.partition.parts = (int32_t)parts;
+        choice.partition.threads = (int32_t)threads;
+        if (!take_room(c, &choice.partition, bound, c->shared_limit / side_by_side)) continue;
         int resident = 0;
         cuda_kernel kernel =
             CUDA(resident_kernel)(c->plan.contact_rows, facts->point_slots, SADMM_CUDA_TIER_GRID, true, &name);
-        *code = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, (const void *)kernel, partition->threads,
-                                                              partition->shared);
-        if (*code != cudaSuccess) return nullptr;
-        return parts <= (int64_t)resident * c->multiprocessors ? nullptr : too_many;
+        *code = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, (const void *)kernel,
+                                                              choice.partition.threads, choice.partition.shared);
+        if (*code != cudaSuccess || parts > (int64_t)resident * c->multiprocessors) return no_choice(too_large);
+        choice.time = GRID_TIME + HALF_TIME * side_by_side * up(facts->halves, parts);
+        return choice;
     }
-    return too_many;
+    return no_choice(too_large);
+}
+
+static struct choice choose_stream(void)
+{
+    struct choice choice = {{SADMM_CUDA_TIER_STREAM, 0, 1, THREADS, INT32_MAX, INT32_MAX, 0}, nullptr, 0};
+    return choice;
+}
+
+/* What is likely the fastest; a tier whose floor is above what another takes is not looked at. */
+static struct choice choose_any(const struct sadmm_context *c, const struct cuda_facts *facts, cudaError_t *code)
+{
+    struct choice best = choose_block(c, facts);
+    if (best.time > CLUSTER_TIME) {
+        const struct choice cluster = choose_cluster(c, facts, code);
+        if (*code != cudaSuccess) return cluster;
+        if (cluster.time < best.time) best = cluster;
+    }
+    if (best.time > GRID_TIME) {
+        const struct choice grid = choose_grid(c, facts, code);
+        if (*code != cudaSuccess) return grid;
+        if (grid.time < best.time) best = grid;
+    }
+    return best.why ? choose_stream() : best;
 }
 
 sadmm_status CUDA(choose_partition)(struct sadmm_context *c, const struct cuda_facts *facts,
                                     struct cuda_partition *partition, struct sadmm_error *error)
 {
-    const enum sadmm_cuda_tier wanted = c->wanted;
-    const bool any = wanted == SADMM_CUDA_TIER_AUTO;
-    const char *why = any ? "" : "the device has no clusters";
-    if (any || wanted == SADMM_CUDA_TIER_BLOCK) why = choose_block(c, facts, partition);
-    if ((any && why) || wanted == SADMM_CUDA_TIER_GRID) {
-        cudaError_t code = cudaSuccess;
-        why = choose_grid(c, facts, partition, &code);
-        if (code != cudaSuccess) return CUDA(fail)(c, code, "cudaOccupancyMaxActiveBlocksPerMultiprocessor", error);
+    cudaError_t code = cudaSuccess;
+    struct choice choice;
+    switch (c->wanted) {
+    case SADMM_CUDA_TIER_BLOCK: choice = choose_block(c, facts); break;
+    case SADMM_CUDA_TIER_CLUSTER: choice = choose_cluster(c, facts, &code); break;
+    case SADMM_CUDA_TIER_GRID: choice = choose_grid(c, facts, &code); break;
+    case SADMM_CUDA_TIER_STREAM: choice = choose_stream(); break;
+    default: choice = choose_any(c, facts, &code); break;
     }
-    if ((any && why) || wanted == SADMM_CUDA_TIER_STREAM) {
-        struct cuda_partition stream = {SADMM_CUDA_TIER_STREAM, 0, 1, THREADS, INT32_MAX, INT32_MAX, 0};
-        *partition = stream;
-        why = nullptr;
-    }
-    return why ? sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "the cuda tier asked for: %s", why) : SADMM_OK;
+    if (code != cudaSuccess) return CUDA(fail)(c, code, "looking for blocks that run side by side", error);
+    if (choice.why) return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "the cuda tier asked for: %s", choice.why);
+    *partition = choice.partition;
+    return SADMM_OK;
 }

@@ -1,6 +1,7 @@
-/* Kernels E-H and P: C_i (14), beta_i (13), (15), and H = (A_i + beta_i C_i)^-1. One thread a body, in double: they run
- * a few times a step, and H only preconditions (the fixed point of Step 1 does not depend on it). */
+/* Kernels E-H and P: C_i (14), beta_i (13), (15), and H = (A_i + beta_i C_i)^-1. In double: they run a few times
+ * a step, and H only preconditions (the fixed point of Step 1 does not depend on it). */
 #include "cuda_double.h"
+#include "cuda_step_check.h"
 
 /* C += row^T row, packed lower triangle. */
 static __device__ __forceinline__ void add_row(double C[PACKED], const double row[6])
@@ -64,51 +65,149 @@ static __device__ void add_block(const struct sadmm_problem_block *block, int si
     }
 }
 
-static __global__ void penalty_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+/* ---- a body by its eight lanes --------------------------------------------------------------------------------- */
+
+/* Blocks of few threads: the work of a lane is long, and there are many multiprocessors. */
+enum { BODY_THREADS = 64 };
+
+/* x[k] of the eight lanes added up, in all of them. Every lane of the warp comes here. */
+template <int COUNT> static __device__ __forceinline__ void sum_lanes(double x[COUNT])
 {
-    int32_t i = thread_index();
-    if (i >= live_bodies(v)) return;
-    double C[PACKED] = {0};
+#pragma unroll
+    for (int o = 1; o < LANES; o *= 2)
+#pragma unroll
+        for (int k = 0; k < COUNT; ++k) x[k] += __shfl_xor_sync(0xffffffffu, x[k], o);
+}
+
+/* C_i, in all lanes: each adds up every eighth half. Every lane of the warp comes here. */
+static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, int32_t begin, int32_t end, int32_t lane,
+                                                      double C[PACKED])
+{
     arm_sums sums = {};
-    for (int32_t at = v.offsets[i]; at < v.offsets[i + 1]; ++at) {
+    for (int k = 0; k < PACKED; ++k) C[k] = 0;
+    for (int32_t at = begin + lane; at < end; at += LANES) {
         int32_t record = v.incident[at] / 2, side = v.incident[at] & 1;
         if (record < v.pair_room) add_pair(v, record, side, &sums, C);
         else add_block(&v.raw.blocks[record - v.pair_room], side, C);
     }
+    if (v.contact_rows == 1 || v.rows > 0) sum_lanes<PACKED>(C);
+    sum_lanes<sizeof sums / sizeof(double)>(&sums.count);
     add_arm_sums(C, &sums);
-
-    double trace_A = 0, trace_C = C[0] + C[2] + C[5] + C[9] + C[14] + C[20];
-    for (int k = 0; k < 6; ++k) trace_A += (double)v.A[(size_t)i * MATRIX + (size_t)(7 * k)];
-    const struct sadmm_settings *s = &v.settings;
-    /* dt^2: c is given in the paper's time-scaled units. Without constraints beta does not matter. */
-    v.beta[i] = trace_C > 0 ? s->penalty_mass_factor * trace_A / trace_C + s->penalty_offset * s->dt * s->dt : 1;
-    for (int k = 0; k < PACKED; ++k) v.C[(size_t)i * PACKED + (size_t)k] = C[k];
 }
 
-static __global__ void factorize_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+/* (13). dt^2: c is given in the paper's time-scaled units. Without constraints beta does not matter. */
+static __device__ __forceinline__ double penalty_of(const cuda_view &v, const solver_real *line, const double C[PACKED])
 {
-    int32_t i = thread_index();
-    if (i >= live_bodies(v)) return;
-    double M[36], L[36];
-    const double *C = v.C + (size_t)i * PACKED, beta = v.beta[i];
-    const solver_real *A = v.A + (size_t)i * MATRIX;
-    solver_real *H = v.H + (size_t)i * MATRIX;
-    int at = 0;
+    const struct sadmm_settings *s = &v.settings;
+    double trace_A = 0, trace_C = C[0] + C[2] + C[5] + C[9] + C[14] + C[20];
 #pragma unroll
-    for (int r = 0; r < 6; ++r)
+    for (int k = 0; k < 6; ++k) trace_A += (double)line_a(line, v.rigid, k, k);
+    return trace_C > 0 ? s->penalty_mass_factor * trace_A / trace_C + s->penalty_offset * s->dt * s->dt : 1;
+}
+
+/* L of M = L L^T in place, packed, and 1 / L's diagonal; false: a pivot is lost to rounding. */
+static __device__ __forceinline__ bool packed_cholesky(double M[PACKED], double inverse[6])
+{
+    bool ok = true;
 #pragma unroll
-        for (int k = 0; k <= r; ++k, ++at) M[6 * r + k] = M[6 * k + r] = (double)A[6 * r + k] + beta * C[at];
-    /* A rounded to f32 stays positive definite unless the problem is beyond f32: then keep the diagonal. */
-    if (!dense6_cholesky(M, L))
-        for (int k = 0; k < 36; ++k) L[k] = k % 7 == 0 ? sqrt(M[k]) : 0;
-    for (int k = 0; k < 6; ++k) {
-        double unit[6], column[6];
-        for (int r = 0; r < 6; ++r) unit[r] = r == k ? 1 : 0;
-        dense6_solve(L, unit, column);
-        for (int r = 0; r < 6; ++r) H[6 * k + r] = (solver_real)column[r];
+    for (int j = 0; j < 6; ++j) {
+        const int at = j * (j + 1) / 2;
+        double d = M[at + j], whole = d;
+#pragma unroll
+        for (int k = 0; k < j; ++k) d -= M[at + k] * M[at + k];
+        ok = ok && d > 4 * DBL_EPSILON * whole && d <= DBL_MAX;
+        inverse[j] = 1 / sqrt(d);
+        M[at + j] = d * inverse[j];
+#pragma unroll
+        for (int i = j + 1; i < 6; ++i) {
+            const int row = i * (i + 1) / 2;
+            double s = M[row + j];
+#pragma unroll
+            for (int k = 0; k < j; ++k) s -= M[row + k] * M[at + k];
+            M[row + j] = s * inverse[j];
+        }
     }
-    for (int k = 36; k < MATRIX; ++k) H[k] = 0;
-    v.state[(size_t)i * ROW + STATE_INV_BETA] = (solver_real)(1 / beta);
+    return ok;
+}
+
+/* H = (A + beta C)^-1, a column a lane, and 1/beta. */
+static __device__ __forceinline__ void factor_body(const cuda_view &v, size_t body, int32_t lane, double beta,
+                                                   const double C[PACKED])
+{
+    solver_real *line = v.lines + body * (size_t)v.line, *H = line_h(line, v.rigid);
+    double M[PACKED], diagonal[6], inverse[6], x[6];
+#pragma unroll
+    for (int r = 0; r < 6; ++r) {
+#pragma unroll
+        for (int k = 0; k <= r; ++k)
+            M[r * (r + 1) / 2 + k] = (double)line_a(line, v.rigid, r, k) + beta * C[r * (r + 1) / 2 + k];
+        diagonal[r] = M[r * (r + 1) / 2 + r];
+    }
+    const bool ok = packed_cholesky(M, inverse);
+#pragma unroll
+    for (int i = 0; i < 6; ++i) { /* L y = e_lane */
+        double s = i == lane ? 1 : 0;
+#pragma unroll
+        for (int k = 0; k < i; ++k) s -= M[i * (i + 1) / 2 + k] * x[k];
+        x[i] = s * inverse[i];
+    }
+#pragma unroll
+    for (int i = 5; i >= 0; --i) { /* L^T x = y */
+        double s = x[i];
+#pragma unroll
+        for (int k = i + 1; k < 6; ++k) s -= M[k * (k + 1) / 2 + i] * x[k];
+        x[i] = s * inverse[i];
+    }
+#pragma unroll
+    for (int i = 0; i < 6; ++i) {
+        /* A rounded to f32 stays positive definite unless the problem is beyond f32: then keep the diagonal. */
+        if (!ok) x[i] = i == lane ? 1 / diagonal[i] : 0;
+        if (lane <= i) H[i * (i + 1) / 2 + lane] = (solver_real)x[i];
+    }
+    if (lane == 6)
+        for (int k = PACKED; k < LINE_H; ++k) H[k] = 0;
+    if (lane == 7) v.state[body * ROW + STATE_INV_BETA] = (solver_real)(1 / beta);
+}
+
+/* ---- kernels ----------------------------------------------------------------------------------------------------- */
+
+/* Which body a thread is about. */
+struct body_thread {
+    int32_t slot, lane;
+    bool live;
+    size_t body; /* raw */
+};
+
+static __device__ __forceinline__ body_thread body_of_thread(const cuda_view &v)
+{
+    const int32_t t = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x), slot = t / LANES;
+    const bool live = slot < live_bodies(v);
+    body_thread out = {slot, t % LANES, live, live ? (size_t)v.body_of[slot] : 0};
+    return out;
+}
+
+/* PENALTY: C and beta; FACTOR: H from them. */
+template <bool PENALTY, bool FACTOR>
+static __global__ void __launch_bounds__(BODY_THREADS)
+    penalty_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    const body_thread t = body_of_thread(v);
+    double C[PACKED], beta = 1;
+    if (PENALTY) {
+        penalty_matrix(v, t.live ? v.offsets[t.slot] : 0, t.live ? v.offsets[t.slot + 1] : 0, t.lane, C);
+        if (t.live) {
+            beta = penalty_of(v, v.lines + t.body * (size_t)v.line, C);
+            if (t.lane == 0) v.beta[t.body] = beta;
+#pragma unroll
+            for (int k = 0; k < PACKED; ++k)
+                if (k % LANES == t.lane) v.C[t.body * PACKED + (size_t)k] = C[k];
+        }
+    } else if (t.live) {
+        beta = v.beta[t.body];
+        for (int k = 0; k < PACKED; ++k) C[k] = v.C[t.body * PACKED + (size_t)k];
+    }
+    if (FACTOR && t.live) factor_body(v, t.body, t.lane, beta, C);
+    if (args.planned) check_plan(v);
 }
 
 static __global__ void scale_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
@@ -125,6 +224,13 @@ static __global__ void scale_kernel(const __grid_constant__ cuda_view v, const _
 
 /* ---- entries --------------------------------------------------------------------------------------------------- */
 
+static sadmm_status launch_bodies(struct sadmm_context *c, cuda_kernel kernel, const char *name, const cuda_args *args,
+                                  struct sadmm_error *error)
+{
+    const int64_t threads = (int64_t)c->view.bodies * LANES, blocks = (threads + BODY_THREADS - 1) / BODY_THREADS;
+    return CUDA(launch_of)(c, kernel, name, args->planned && blocks == 0 ? 1 : blocks, BODY_THREADS, args, error);
+}
+
 extern "C" sadmm_status CUDA(init_penalty)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
@@ -133,14 +239,14 @@ extern "C" sadmm_status CUDA(init_penalty)(struct sadmm_context *c, struct sadmm
     c->placed = false;
     c->measured = false;
     c->rescaled = false;
-    return CUDA(launch)(c, penalty_kernel, "init_penalty", blocks_for(c->view.bodies), &args, error);
+    return launch_bodies(c, penalty_kernel<true, false>, "init_penalty", &args, error);
 }
 
 extern "C" sadmm_status CUDA(factorize)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
     CUDA_ENTER(c);
-    return CUDA(launch)(c, factorize_kernel, "factorize", blocks_for(c->view.bodies), &args, error);
+    return launch_bodies(c, penalty_kernel<false, true>, "factorize", &args, error);
 }
 
 extern "C" sadmm_status CUDA(update_penalty)(struct sadmm_context *c, double ratio, struct sadmm_error *error)
@@ -151,6 +257,15 @@ extern "C" sadmm_status CUDA(update_penalty)(struct sadmm_context *c, double rat
     CUDA_TRY(CUDA(launch)(c, scale_kernel, "update_penalty", blocks_for(c->view.bodies), &args, error));
     c->rescaled = true;
     return SADMM_OK;
+}
+
+sadmm_status CUDA(enqueue_penalties)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    args.planned = true;
+    c->starting = true;
+    c->placed = c->measured = c->rescaled = false;
+    return launch_bodies(c, penalty_kernel<true, true>, "penalties", &args, error);
 }
 
 sadmm_status CUDA(enqueue_balance)(struct sadmm_context *c, struct sadmm_error *error)

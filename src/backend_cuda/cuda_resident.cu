@@ -21,6 +21,8 @@ enum resident_mode { BLOCK, CLUSTER, GRID };
 
 enum { QUAD = 4 }; /* lanes a half */
 
+#define CLUSTER_ARCH 900 /* of the first devices with clusters of thread blocks */
+
 /* Threads a block at most: what the registers of a multiprocessor are enough for. */
 static constexpr int most_threads(int points)
 {
@@ -36,7 +38,7 @@ struct part_memory {
     solver_real *state;      /* CLUSTER: of even, then of odd iterations; bodies x ROW each, then a row of 0 */
     solver_real *records;    /* halves x ROW */
     solver_real *row_lambda; /* halves x ROW, when there are row blocks */
-    solver_real *A, *H, *b;  /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x MATRIX, ROW */
+    solver_real *lines, *b;  /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x line, ROW */
 };
 
 /* One description of the layout for its size and its addresses. */
@@ -48,9 +50,8 @@ static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *
     m->state = (solver_real *)base;
     m->records = m->state + ((cluster ? 2 * n : n) + 1) * ROW;
     m->row_lambda = m->records + halves * ROW;
-    m->A = m->row_lambda + (row_blocks ? halves * ROW : 0);
-    m->H = m->A + more * MATRIX;
-    m->b = m->H + more * MATRIX;
+    m->lines = m->row_lambda + (row_blocks ? halves * ROW : 0);
+    m->b = m->lines + more * LINE_GENERAL;
     return (size_t)(m->b + more * ROW - m->state) * sizeof(solver_real);
 }
 
@@ -74,7 +75,7 @@ template <int MODE> static __device__ __forceinline__ void arrive(unsigned *arri
         __syncthreads();
         if (threadIdx.x == 0) asm volatile("red.release.gpu.global.add.u32 [%0], 1;" ::"l"(arrivals) : "memory");
     }
-#if __CUDA_ARCH__ >= 900
+#if __CUDA_ARCH__ >= CLUSTER_ARCH
     if (MODE == CLUSTER) asm volatile("barrier.cluster.arrive.release.aligned;" ::: "memory");
 #endif
 #endif
@@ -95,7 +96,7 @@ template <int MODE> static __device__ __forceinline__ void wait(const unsigned *
         while ((int)(now - target) < 0);
     }
     if (MODE != CLUSTER) __syncthreads();
-#if __CUDA_ARCH__ >= 900
+#if __CUDA_ARCH__ >= CLUSTER_ARCH
     if (MODE == CLUSTER) asm volatile("barrier.cluster.wait.acquire.aligned;" ::: "memory");
 #endif
 #endif
@@ -106,7 +107,7 @@ static __device__ __forceinline__ const solver_real *in_block(const solver_real 
 {
 #ifdef SADMM_CUDA_EMULATED
     return (const solver_real *)cuda_emulation_in_block(own, rank);
-#elif __CUDA_ARCH__ >= 900
+#elif __CUDA_ARCH__ >= CLUSTER_ARCH
     const solver_real *other;
     asm("mapa.u64 %0, %1, %2;" : "=l"(other) : "l"(own), "r"(rank));
     return other;
@@ -185,6 +186,11 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL> struct part_run {
     {
         return m.state + (MODE == CLUSTER && odd ? args.most_bodies * ROW : 0);
     }
+    /* Number i of the part's rows of ROW, in the bodies' raw order. */
+    __device__ __forceinline__ size_t raw_row(int32_t i) const
+    {
+        return (size_t)v.body_of[first_body + i / ROW] * ROW + (size_t)(i % ROW);
+    }
     __device__ __forceinline__ bool has_rows(void) const { return FULL && v.rows > 0; }
     /* Warps without work are left out of everything but barriers. */
     __device__ __forceinline__ bool warp_has_body(int32_t first) const { return first + t / WARP * (WARP / LANES) < bodies; }
@@ -242,7 +248,8 @@ static __device__ __noinline__ void start_row_half(const cuda_view &v, int32_t c
 /* Where the other body's state will be. */
 PART __device__ __forceinline__ void PART_RUN::find_other(int32_t other)
 {
-    const int32_t local = other - first_body;
+    /* slots are by island in BLOCK and CLUSTER, raw order in GRID */
+    const int32_t slot = MODE == GRID || other == v.bodies ? other : v.slot_of[other], local = slot - first_body;
     own.other_odd = 0;
     if (other == v.bodies) { /* the static world */
         own.other = m.state + (MODE == CLUSTER ? 2 : 1) * args.most_bodies * ROW;
@@ -255,8 +262,8 @@ PART __device__ __forceinline__ void PART_RUN::find_other(int32_t other)
     } else {
         const int32_t first_part = (int32_t)blockIdx.x / args.cluster * args.cluster;
         int32_t rank = 0;
-        while (rank + 1 < args.cluster && other >= v.parts[first_part + rank + 1]) ++rank;
-        own.other = in_block(m.state, (unsigned)rank) + (other - v.parts[first_part + rank]) * ROW;
+        while (rank + 1 < args.cluster && slot >= v.parts[first_part + rank + 1]) ++rank;
+        own.other = in_block(m.state, (unsigned)rank) + (slot - v.parts[first_part + rank]) * ROW;
         own.other_odd = args.most_bodies * ROW;
     }
 }
@@ -266,7 +273,7 @@ PART __device__ __forceinline__ void PART_RUN::load_half(void)
     const int32_t code = v.incident[first_half + half], side = code & 1, p = code / 2;
     if (FULL && p >= v.pair_room) {
         const row_about about = v.row_info[p - v.pair_room];
-        own.own = (side ? about.body_b : about.body_a) - first_body;
+        own.own = v.slot_of[side ? about.body_b : about.body_a] - first_body;
         find_other(side ? about.body_a : about.body_b);
         return;
     }
@@ -279,7 +286,7 @@ PART __device__ __forceinline__ void PART_RUN::load_half(void)
     own.normal = xyz(about);
     own.friction = about.w;
     own.sign = side ? (real)1 : (real)-1;
-    own.own = (side ? on.body_b : on.body_a) - first_body;
+    own.own = v.slot_of[side ? on.body_b : on.body_a] - first_body;
     find_other(side ? on.body_a : on.body_b);
     const real inv_s = own.sign * inverse_weight(inv_beta_of(v, on.body_a), inv_beta_of(v, on.body_b));
 #pragma unroll
@@ -323,22 +330,22 @@ PART __device__ __forceinline__ void PART_RUN::load_records(void)
 PART __device__ __forceinline__ void PART_RUN::load(void)
 {
     const int32_t threads = (int32_t)blockDim.x, in_registers = threads / LANES;
-    const size_t at = (size_t)(first_body + (body < bodies ? body : 0));
-    own_body = load_body(body < bodies, r, v.A + at * MATRIX, v.H + at * MATRIX, v.b + at * ROW, v.state + at * ROW);
+    const size_t at = (size_t)(first_body + (body < bodies ? body : 0)), raw = body < bodies ? (size_t)v.body_of[at] : 0;
+    own_body =
+        load_body(body < bodies, r, v.lines + raw * (size_t)v.line, v.rigid, v.b + raw * ROW, v.state + raw * ROW);
     if (body < bodies) {
         begin = v.offsets[at] - first_half;
         end = v.offsets[at + 1] - first_half;
     }
     if (warp_has_body(0)) momentum = free_momentum(own_body);
-    for (int32_t i = t; i < bodies * ROW; i += threads) m.state[i] = v.state[(size_t)first_body * ROW + (size_t)i];
+    for (int32_t i = t; i < bodies * ROW; i += threads) m.state[i] = v.state[raw_row(i)];
     if (t < ROW) m.state[(MODE == CLUSTER ? 2 : 1) * args.most_bodies * ROW + t] = 0;
     if (bodies > in_registers) {
-        const size_t first = (size_t)(first_body + in_registers);
-        for (int32_t i = t; i < (bodies - in_registers) * MATRIX; i += threads) {
-            m.A[i] = v.A[first * MATRIX + (size_t)i];
-            m.H[i] = v.H[first * MATRIX + (size_t)i];
-        }
-        for (int32_t i = t; i < (bodies - in_registers) * ROW; i += threads) m.b[i] = v.b[first * ROW + (size_t)i];
+        const int32_t more = bodies - in_registers;
+        for (int32_t i = t; i < more * v.line; i += threads)
+            m.lines[i / v.line * LINE_GENERAL + i % v.line] =
+                v.lines[(size_t)v.body_of[first_body + in_registers + i / v.line] * (size_t)v.line + (size_t)(i % v.line)];
+        for (int32_t i = t; i < more * ROW; i += threads) m.b[i] = v.b[raw_row(in_registers * ROW + i)];
     }
     own.own = 0;
     own.other = m.state;
@@ -389,7 +396,8 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd)
     for (int32_t first = in_registers; warp_has_body(first); first += in_registers) {
         const int32_t i = first + body, at = i - in_registers;
         const bool live = i < bodies;
-        body_lane one = load_body(live, r, m.A + at * MATRIX, m.H + at * MATRIX, m.b + at * ROW, state(!odd) + i * ROW);
+        body_lane one =
+            load_body(live, r, m.lines + at * LINE_GENERAL, v.rigid, m.b + at * ROW, state(!odd) + i * ROW);
         real g = free_momentum(one);
         if (live && r < 6)
             g = gather(g, v.offsets[first_body + i] - first_half, v.offsets[first_body + i + 1] - first_half);
@@ -458,7 +466,7 @@ PART template <bool MEASURE> __device__ __forceinline__ double PART_RUN::update_
 PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
 {
     for (int32_t i = t; i < bodies * ROW; i += (int32_t)blockDim.x)
-        if (i % ROW < 6) v.state[(size_t)first_body * ROW + (size_t)i] = state(odd)[i];
+        if (i % ROW < 6) v.state[raw_row(i)] = state(odd)[i];
     for (int32_t i = t; i < halves * ROW; i += (int32_t)blockDim.x)
         v.records[(size_t)first_half * ROW + (size_t)i] = m.records[i];
     if (half >= halves) return;
@@ -480,13 +488,21 @@ PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
 
 /* ---- the kernel ------------------------------------------------------------------------------------------------ */
 
+/* A block without bodies, or a cluster: there are more than islands, mostly. In the grid everybody comes to the barrier. */
+template <int MODE> static __device__ __forceinline__ bool nothing_to_do(const cuda_view &v, int32_t cluster)
+{
+    if (MODE == GRID) return false;
+    const int32_t first = MODE == BLOCK ? (int32_t)blockIdx.x : (int32_t)blockIdx.x / cluster * cluster;
+    return v.parts[first] == v.parts[first + (MODE == BLOCK ? 1 : cluster)];
+}
+
 /* FULL: with row blocks, or to be measured; both cost registers, and most stretches have neither. */
 template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL>
 static __global__ void __launch_bounds__(most_threads(POINTS))
     resident_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     CUDA_DYNAMIC_SHARED(memory);
-    if (v.live->halt) return;
+    if (v.live->halt || nothing_to_do<MODE>(v, args.cluster)) return;
     part_run<CONTACT_ROWS, POINTS, MODE, FULL> part(v, args, memory);
     part.load();
     unsigned target = 0;
@@ -550,11 +566,21 @@ cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, enum sadmm_
     return nullptr;
 }
 
-cudaError_t CUDA(resident_allow)(int bytes)
+cudaError_t CUDA(resident_allow)(int bytes, bool device_has_clusters, bool *clusters)
 {
+    cudaError_t code = cudaSuccess;
+    *clusters = device_has_clusters;
     for (const instance &one : instances) {
-        cudaError_t code =
-            cudaFuncSetAttribute((const void *)one.kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, bytes);
+        const void *kernel = (const void *)one.kernel;
+        code = cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, bytes);
+        if (code != cudaSuccess) return code;
+        if (one.tier != SADMM_CUDA_TIER_CLUSTER || !*clusters) continue;
+        /* What was compiled for earlier devices (__CUDA_ARCH__ above) has no cluster barriers, wherever it runs. */
+        cudaFuncAttributes about = {};
+        code = cudaFuncGetAttributes(&about, kernel);
+        if (code != cudaSuccess) return code;
+        *clusters = about.ptxVersion >= CLUSTER_ARCH / 10;
+        if (*clusters) code = cudaFuncSetAttribute(kernel, cudaFuncAttributeNonPortableClusterSizeAllowed, 1);
         if (code != cudaSuccess) return code;
     }
     return cudaSuccess;

@@ -16,7 +16,7 @@ static __global__ void read_kernel(const __grid_constant__ cuda_view v, const __
     double *impulses = v.out + 6 * (size_t)v.bodies, *multipliers = impulses + 3 * (size_t)v.points;
     if (i < v.bodies) {
         if (i >= live_bodies(v)) return;
-        double *out = v.out + 6 * (size_t)v.body_of[i];
+        double *out = v.out + 6 * (size_t)i;
         for (int k = 0; k < 6; ++k) out[k] = (double)v.state[(size_t)i * ROW + (size_t)k];
         return;
     }
@@ -56,7 +56,7 @@ extern "C" sadmm_status CUDA(read_solution)(struct sadmm_context *c, struct sadm
 static __global__ void read_penalty_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     int32_t i = thread_index();
-    if (i < live_bodies(v)) v.out[v.body_of[i]] = v.beta[i];
+    if (i < live_bodies(v)) v.out[i] = v.beta[i];
 }
 
 extern "C" sadmm_status CUDA(read_penalty)(struct sadmm_context *c, double *beta, struct sadmm_error *error)
@@ -78,8 +78,8 @@ static __global__ void integrate_kernel(const __grid_constant__ cuda_view v, con
 {
     int32_t i = thread_index();
     if (i >= live_bodies(v)) return;
-    double *out = v.out + MOVED * (size_t)v.body_of[i];
-    move_body(v, i, &v.raw.rigid[v.body_of[i]], out, out + 3, out + 7);
+    double *out = v.out + MOVED * (size_t)i;
+    move_body(v, i, &v.raw.rigid[i], out, out + 3, out + 7);
 }
 
 extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)
@@ -105,9 +105,11 @@ extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_ri
 
 static __global__ void wrench_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    int32_t i = thread_index();
-    if (i >= live_bodies(v)) return;
-    contact_wrench(v, i, v.out + 6 * (size_t)v.body_of[i]);
+    int32_t slot = thread_index() / LANES, lane = (int32_t)threadIdx.x % LANES;
+    bool live = slot < live_bodies(v);
+    double wrench[6];
+    contact_wrench(v, live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0, lane, wrench);
+    if (live) store_wrench(wrench, lane, v.out + 6 * (size_t)v.body_of[slot]);
 }
 
 extern "C" sadmm_status CUDA(recover_wrenches)(struct sadmm_context *c, double *wrench, struct sadmm_error *error)
@@ -115,7 +117,7 @@ extern "C" sadmm_status CUDA(recover_wrenches)(struct sadmm_context *c, double *
     size_t bytes = 6 * (size_t)c->view.bodies * sizeof *wrench;
     cuda_args args = {};
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(launch)(c, wrench_kernel, "recover_wrenches", blocks_for(c->view.bodies), &args, error));
+    CUDA_TRY(CUDA(launch)(c, wrench_kernel, "recover_wrenches", blocks_for((int64_t)c->view.bodies * LANES), &args, error));
     CUDA_TRY(CUDA(download)(c, c->view.out, bytes, error));
     if (bytes > 0) memcpy(wrench, c->buffers[PINNED_OUT].data, bytes);
     return SADMM_OK;

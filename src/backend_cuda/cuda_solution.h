@@ -12,7 +12,7 @@ static __device__ vec3 point_impulse(const cuda_view &v, int32_t p, int32_t k, v
     return v3((double)lambda[0], (double)lambda[v.lambda_stride], (double)lambda[2 * v.lambda_stride]);
 }
 
-/* Q: semi-implicit Euler of the body in slot i. */
+/* Q: semi-implicit Euler of body i. */
 static __device__ void move_body(const cuda_view &v, int32_t i, const struct sadmm_rigid *body, double position[3],
                                  double orientation[4], double velocity[6])
 {
@@ -39,15 +39,28 @@ static __device__ void add_pair_wrench(const cuda_view &v, int32_t p, int side, 
     }
 }
 
-/* R: (12) with lambda = -u, J^T lambda / dt summed over a body's contacts in their order. */
-static __device__ void contact_wrench(const cuda_view &v, int32_t i, double wrench[6])
+/* R: (12) with lambda = -u, J^T lambda / dt over the halves [begin, end) of a body, by eight lanes that take every eighth
+ * half each; the sum is in all of them. Every lane of the warp comes here. */
+static __device__ __forceinline__ void contact_wrench(const cuda_view &v, int32_t begin, int32_t end, int32_t lane,
+                                                      double wrench[6])
 {
-    double sum[6] = {0}, per_dt = 1 / v.settings.dt;
-    for (int32_t at = v.offsets[i]; at < v.offsets[i + 1]; ++at) {
+    const double per_dt = 1 / v.settings.dt;
+    for (int k = 0; k < 6; ++k) wrench[k] = 0;
+    for (int32_t at = begin + lane; at < end; at += LANES) {
         int32_t record = v.incident[at] / 2, side = v.incident[at] & 1;
-        if (record < v.pair_room) add_pair_wrench(v, record, side, per_dt, sum); /* contacts given by geometry only */
+        if (record < v.pair_room) add_pair_wrench(v, record, side, per_dt, wrench); /* contacts given by geometry only */
     }
-    for (int k = 0; k < 6; ++k) wrench[k] = sum[k];
+#pragma unroll
+    for (int o = 1; o < LANES; o *= 2)
+#pragma unroll
+        for (int k = 0; k < 6; ++k) wrench[k] += __shfl_xor_sync(0xffffffffu, wrench[k], o);
+}
+
+static __device__ __forceinline__ void store_wrench(const double wrench[6], int32_t lane, double *out)
+{
+#pragma unroll
+    for (int k = 0; k < 6; ++k)
+        if (k == lane) out[k] = wrench[k];
 }
 
 #endif

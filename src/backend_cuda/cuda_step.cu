@@ -33,6 +33,7 @@ struct cuda_step {
 
     struct cuda_step_report last; /* of the last step that was done */
     int64_t done, repeats;
+    int64_t misfit;             /* the last step that its partition did not fit; -1: none */
     int32_t culprit;
 };
 
@@ -104,14 +105,30 @@ static void view_counts(struct sadmm_context *c, int64_t pairs)
 
 /* ---- a step, launch by launch ---------------------------------------------------------------------------------- */
 
-static sadmm_status enqueue_contacts(struct sadmm_context *c, bool islands, struct sadmm_error *error)
+/* Contacts, up to the gate. */
+static sadmm_status enqueue_find(struct sadmm_context *c, struct sadmm_error *error)
 {
-    struct cuda_step *s = c->step;
-    CUDA_TRY(CUDA(launch_start)(c, error));
-    CUDA_TRY(COLLISION(enqueue)(s->collision, c->stream, s->into, error));
-    CUDA_TRY(CUDA(launch_admit)(c, error));
-    return CUDA(enqueue_survey)(c, islands, error);
+    CUDA_TRY(COLLISION(enqueue)(c->step->collision, c->stream, c->step->into, error));
+    return CUDA(launch_admit)(c, error);
 }
+
+/* Launches go to the side stream while this lives; it begins behind what is on the main one. */
+namespace {
+struct side_branch {
+    struct sadmm_context *c;
+    cudaStream_t main;
+    cudaError_t code;
+    explicit side_branch(struct sadmm_context *context) : c(context), main(context->stream)
+    {
+        code = cudaEventRecord(c->fork, main);
+        if (code == cudaSuccess) code = cudaStreamWaitEvent(c->side, c->fork, 0);
+        c->stream = c->side;
+    }
+    ~side_branch() { c->stream = main; }
+    side_branch(const side_branch &) = delete;
+    side_branch &operator=(const side_branch &) = delete;
+};
+} // namespace
 
 static int until(int done, int period, int limit)
 {
@@ -142,14 +159,23 @@ static sadmm_status enqueue_iterations(struct sadmm_context *c, struct sadmm_err
 
 static sadmm_status enqueue_step(struct sadmm_context *c, struct sadmm_error *error)
 {
-    c->starting = true;
-    c->measured = c->rescaled = false;
     const bool islands = c->partition.tier == SADMM_CUDA_TIER_BLOCK || c->partition.tier == SADMM_CUDA_TIER_CLUSTER;
-    CUDA_TRY(enqueue_contacts(c, islands, error));
-    CUDA_TRY(CUDA(launch_check)(c, error));
-    CUDA_TRY(CUDA(enqueue_layout)(c, &c->partition, error));
-    CUDA_TRY(CUDA(enqueue_assembly)(c, error));
-    CUDA_TRY(CUDA(launch_assembled)(c, error));
+    CUDA_TRY(CUDA(launch_start)(c, error));
+    { /* A, b: beside contact finding */
+        side_branch side(c);
+        CUDA_CALL(c, side.code, "a branch of the step");
+        CUDA_TRY(CUDA(enqueue_bodies)(c, error));
+    }
+    CUDA_TRY(enqueue_find(c, error));
+    { /* contacts in the solver's form: beside the layout */
+        side_branch side(c);
+        CUDA_CALL(c, side.code, "a branch of the step");
+        CUDA_TRY(CUDA(assemble_contacts)(c, error));
+        CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
+    }
+    CUDA_TRY(CUDA(enqueue_survey_and_layout)(c, islands, &c->partition, error));
+    CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
+    CUDA_TRY(CUDA(enqueue_penalties)(c, error));
     CUDA_TRY(enqueue_iterations(c, error));
     return CUDA(launch_finish)(c, error);
 }
@@ -189,7 +215,9 @@ static sadmm_status look_at_step(struct sadmm_context *c, struct look *out, stru
         CUDA_TRY(CUDA(layout_room)(c, error));
         view_into(c, s->into);
         CUDA_TRY(clear_halt(c, error));
-        CUDA_TRY(enqueue_contacts(c, true, error));
+        CUDA_TRY(CUDA(launch_start)(c, error));
+        CUDA_TRY(enqueue_find(c, error));
+        CUDA_TRY(CUDA(enqueue_survey)(c, true, error));
         CUDA_TRY(copy_out(c, &staged->live, c->view.live, sizeof staged->live, error));
         CUDA_TRY(copy_out(c, &staged->facts, c->view.facts, sizeof staged->facts, error));
         CUDA_TRY(copy_out(c, &staged->counts, c->view.step.counts, sizeof staged->counts, error));
@@ -373,7 +401,11 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
     ++s->repeats;
     s->planned = false;
     if (report->halt == HALT_ROOM) s->candidate_room = std::max(s->candidate_room, generous(report->counts.candidates));
-    if (report->halt == HALT_PARTITION) c->refused |= 1u << c->partition.tier;
+    if (report->halt == HALT_PARTITION) {
+        /* The next partition is made for this very step, and fits; a tier that fails twice is left alone all the same. */
+        if (s->misfit == first) c->refused |= 1u << c->partition.tier;
+        s->misfit = first;
+    }
     return repeat_steps(c, first, end, error);
 }
 
@@ -496,6 +528,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     CUDA_TRY(clear_halt(c, error));
     s->candidate_room = s->point_room = c->first_room;
     c->refused = 0;
+    s->misfit = -1;
     CUDA_TRY(COLLISION(attach)(s->collision, c->stream, world->input,
                                buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES), &c->view.live->halt, error));
     view_into(c, s->into);

@@ -1,15 +1,17 @@
 /* Whole steps on the device (core/resident.h): what the world is there, and how the host follows.
  *
- *     edit     states and wrenches set since the last step                  (when there are any)
- *     start    where a solve starts from; bodies as collision sees them
- *     find     contacts, from one set into the other                        (collision_internal.h)
- *     admit    do they fit? Then they are this step's (cuda_live)
- *     survey   facts about them; islands                                    (cuda_layout.cu)
- *     check    is this what the step was planned for?
- *     layout   slots, halves, parts
- *     solve    assembly, penalties, iterations                              (the kernel table's own kernels)
- *     finish   impulses into the contacts, moved bodies, wrenches
- *     commit   the report; the step counts only if nothing was halted
+ *     edit       states and wrenches set since the last step                 (when there are any)
+ *     start      where a solve starts from; bodies as collision sees them
+ *     find       contacts, from one set into the other                       (collision_internal.h)
+ *       beside it  A, b of the bodies
+ *     admit      do they fit? Then they are this step's (cuda_live)
+ *     survey     facts about them; islands                                   (cuda_layout.cu)
+ *     layout     slots, halves, parts
+ *       beside it  contacts in the solver's form
+ *     penalties  C, beta, factors; and: is this what the step was planned for?
+ *     iterate    (15), (16), (17) where asked for                            (the kernel table's own kernels)
+ *     finish     impulses into the contacts, moved bodies, wrenches
+ *     commit     the report; the step counts only if nothing was halted
  *
  * The host plans a step from the facts of an earlier one: rooms, tier and partition, rows a contact, warm or cold. All of
  * it goes into a graph that is launched again and again, two of them in turn, because states and contact sets change

@@ -3,18 +3,7 @@
 
 #include "../core/steady.h"
 #include "cuda_solution.h"
-#include "cuda_step.h"
-
-static __device__ __forceinline__ unsigned long long nanoseconds(void)
-{
-#ifdef SADMM_CUDA_EMULATED
-    return 0;
-#else
-    unsigned long long now;
-    asm volatile("mov.u64 %0, %%globaltimer;" : "=l"(now));
-    return now;
-#endif
-}
+#include "cuda_step_check.h"
 
 static __device__ __forceinline__ bool finite_numbers(const double *x, int count)
 {
@@ -77,37 +66,19 @@ static __global__ void admit_kernel(const __grid_constant__ cuda_view v, const _
     v.live->points = counts.points;
 }
 
-/* One thread. Is this what the step was planned for? */
-static __global__ void check_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
-{
-    if (threadIdx.x > 0 || v.live->halt) return;
-    const struct cuda_facts *facts = v.facts;
-    const struct cuda_step_guess guess = v.step.guess;
-    const int32_t pairs = v.live->pairs, rows = pairs == 0 ? 0 : facts->rough > 0 ? 3 : 1;
-    const int32_t warm = pairs > 0 && 2 * (int64_t)facts->warm >= pairs;
-    if (rows != guess.contact_rows || facts->point_slots > guess.point_slots || (guess.warm >= 0 && warm != guess.warm))
-        v.live->halt = HALT_PLAN;
-}
-
-/* One thread, between assembly and iterations. */
-static __global__ void assembled_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
-{
-    if (threadIdx.x == 0) v.step.control->stamps[STAMP_ASSEMBLED] = nanoseconds();
-}
+enum { FINISH_THREADS = 64 }; /* few: long work, many multiprocessors */
 
 /* ---- finish ---------------------------------------------------------------------------------------------------- */
 
 static __device__ bool finish_body(const cuda_view &v, int32_t i)
 {
-    const int32_t raw = v.body_of[i];
-    const struct sadmm_rigid body = v.step.before[raw];
-    struct sadmm_steady steady = v.step.steady_before[raw];
+    const struct sadmm_rigid body = v.step.before[i];
+    struct sadmm_steady steady = v.step.steady_before[i];
     struct sadmm_rigid next = body;
     move_body(v, i, &body, next.position, next.orientation, next.velocity);
     steady_keep(&steady, &body, &next);
-    v.step.after[raw] = next;
-    v.step.steady_after[raw] = steady;
-    if (v.settings.recover_wrenches) contact_wrench(v, i, v.step.wrench + 6 * (size_t)raw);
+    v.step.after[i] = next;
+    v.step.steady_after[i] = steady;
     return finite_numbers(next.position, 3) && finite_numbers(next.orientation, 4) && finite_numbers(next.velocity, 6);
 }
 
@@ -131,20 +102,40 @@ static __device__ bool finish_pair(const cuda_view &v, int32_t p, double *depth)
     return finite;
 }
 
-/* Threads for bodies, then for pairs. Does not look at culprits of this very kernel: which body is named must not depend
- * on who came first. */
-static __global__ void finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+/* Threads for bodies, eight lanes a wrench, threads for pairs: side by side, each of them long. */
+struct finish_ranges {
+    int32_t wrenches, pairs, end;
+};
+static __host__ __device__ inline finish_ranges ranges_of(const cuda_view &v)
 {
-    const int32_t i = thread_index(), p = i - (v.bodies + WARP - 1) / WARP * WARP;
+    finish_ranges r;
+    r.wrenches = (v.bodies + WARP - 1) / WARP * WARP;
+    r.pairs = r.wrenches + (v.settings.recover_wrenches ? (LANES * v.bodies + WARP - 1) / WARP * WARP : 0);
+    r.end = r.pairs + v.pair_room;
+    return r;
+}
+
+/* Does not look at culprits of this very kernel: which body is named must not depend on who came first. */
+static __global__ void __launch_bounds__(FINISH_THREADS)
+    finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    const int32_t i = (int32_t)(blockIdx.x * (unsigned)FINISH_THREADS + threadIdx.x);
+    const finish_ranges range = ranges_of(v);
     struct cuda_step_control *control = v.step.control;
     double depth = 0;
     if (i == 0) control->stamps[STAMP_SOLVED] = nanoseconds();
-    if (p < 0) {
-        if (i < live_bodies(v) && !finish_body(v, i)) atomicMin(&control->culprit, v.body_of[i]);
-    } else if (p < live_pairs(v)) {
-        const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
+    if (i < range.wrenches) {
+        if (i < live_bodies(v) && !finish_body(v, i)) atomicMin(&control->culprit, i);
+    } else if (i < range.pairs) {
+        const int32_t slot = (i - range.wrenches) / LANES, lane = i % LANES;
+        const bool live = slot < live_bodies(v);
+        double wrench[6];
+        contact_wrench(v, live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0, lane, wrench);
+        if (live) store_wrench(wrench, lane, v.step.wrench + 6 * (size_t)v.body_of[slot]);
+    } else if (i - range.pairs < live_pairs(v)) {
+        const struct sadmm_contact_pair *pair = &v.raw_pairs[i - range.pairs];
         /* bodies are named first: all of them are below any contact's */
-        if (!finish_pair(v, p, &depth))
+        if (!finish_pair(v, i - range.pairs, &depth))
             atomicMin(&control->culprit, v.bodies + (pair->body_b >= 0 ? pair->body_b : pair->body_a));
     }
     /* -0 is no depth; a larger one may be there already */
@@ -202,22 +193,10 @@ sadmm_status CUDA(launch_admit)(struct sadmm_context *c, struct sadmm_error *err
     return CUDA(launch)(c, admit_kernel, "admit", 1, &args, error);
 }
 
-sadmm_status CUDA(launch_check)(struct sadmm_context *c, struct sadmm_error *error)
-{
-    cuda_args args = {};
-    return CUDA(launch)(c, check_kernel, "check", 1, &args, error);
-}
-
-sadmm_status CUDA(launch_assembled)(struct sadmm_context *c, struct sadmm_error *error)
-{
-    cuda_args args = {};
-    return CUDA(launch)(c, assembled_kernel, "assembled", 1, &args, error);
-}
-
 sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    int64_t threads = (int64_t)(c->view.bodies + WARP - 1) / WARP * WARP + c->view.pair_room;
-    CUDA_TRY(CUDA(launch)(c, finish_kernel, "finish", blocks_for(threads), &args, error));
+    int64_t blocks = ((int64_t)ranges_of(c->view).end + FINISH_THREADS - 1) / FINISH_THREADS;
+    CUDA_TRY(CUDA(launch_of)(c, finish_kernel, "finish", blocks, FINISH_THREADS, &args, error));
     return CUDA(launch)(c, commit_kernel, "commit", 1, &args, error);
 }

@@ -210,15 +210,16 @@ struct body_lane {
     real A[6], H[6], b, v;
 };
 
-CUDA_INLINE body_lane load_body(bool live, int32_t r, const solver_real *A, const solver_real *H, const solver_real *b,
+CUDA_INLINE body_lane load_body(bool live, int32_t r, const solver_real *line, bool rigid, const solver_real *b,
                                 const solver_real *state)
 {
     body_lane body = {};
     if (!live || r >= 6) return body;
+    const solver_real *H = line_h(line, rigid);
 #pragma unroll
     for (int k = 0; k < 6; ++k) {
-        body.A[k] = A[6 * k + r];
-        body.H[k] = H[6 * k + r];
+        body.A[k] = line_a(line, rigid, r, k);
+        body.H[k] = H[packed_place(r, k)];
     }
     body.b = b[r];
     body.v = state[r];

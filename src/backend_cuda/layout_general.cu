@@ -105,11 +105,11 @@ static __global__ void number_kernel(const __grid_constant__ layout_view v, cons
 
 /* ---- launches -------------------------------------------------------------------------------------------------- */
 
-#define LAUNCH(function, name, blocks, threads, shared)                                                        \
-    do {                                                                                                       \
-        *kernel = (name);                                                                                      \
-        cudaError_t launch_code = layout_launch((function), (blocks), (threads), (shared), v, &args, stream);  \
-        if (launch_code != cudaSuccess) return launch_code;                                                    \
+#define LAUNCH(function, name, blocks, threads, shared)                                                       \
+    do {                                                                                                      \
+        *kernel = (name);                                                                                     \
+        cudaError_t launch_code = layout_launch((function), (blocks), (threads), (shared), v, &args, stream); \
+        if (launch_code != cudaSuccess) return launch_code;                                                   \
     } while (0)
 
 cudaError_t LAYOUT(survey)(const struct layout_view *v, bool islands, cudaStream_t stream, const char **kernel)

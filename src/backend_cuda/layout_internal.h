@@ -33,14 +33,14 @@ struct layout_view {
     const struct sadmm_problem_block *blocks;
     int32_t bodies, pair_room, rows; /* as in cuda_view */
     int32_t warm_start;
-    int32_t most_blocks;             /* that run at once */
+    int32_t most_blocks; /* that run at once */
 
-    int32_t *label, *degree;                  /* by raw body; label: its island's smallest body */
-    int32_t *island_bodies, *island_halves;   /* by label */
-    int32_t *half_body, *half_slot, *sorted;  /* 2 (pair_room + rows): raw body, slot, slots sorted */
-    int32_t *sorted_label;                    /* bodies */
-    const int32_t *numbers;                   /* 0, 1, ...: at least as many as halves or bodies */
-    void *temp;                               /* of the sorts */
+    int32_t *label, *degree;                 /* by raw body; label: its island's smallest body */
+    int32_t *island_bodies, *island_halves;  /* by label */
+    int32_t *half_body, *half_slot, *sorted; /* 2 (pair_room + rows): raw body, slot, slots sorted */
+    int32_t *sorted_label;                   /* bodies */
+    const int32_t *numbers;                  /* 0, 1, ...: at least as many as halves or bodies */
+    void *temp;                              /* of the sorts */
     size_t temp_bytes;
 
     int32_t *body_of, *slot_of, *offsets, *incident, *parts;
@@ -68,8 +68,8 @@ static __host__ __device__ inline bool slots_by_island(const struct cuda_partiti
 cudaError_t LAYOUT(survey)(const struct layout_view *, bool islands, cudaStream_t stream, const char **kernel);
 cudaError_t LAYOUT(make)(const struct layout_view *, const struct cuda_partition *, cudaStream_t stream,
                          const char **kernel);
-/* Either or both by one block: survey, and a layout where there is a partition. `shared`: bytes it takes, SIZE_MAX: such a
- * scene is too large. `allow`: let it take so many. */
+/* Either or both by one block: survey, and a layout where there is a partition. `shared`: bytes it takes, SIZE_MAX:
+ * such a scene is too large. `allow`: let it take so many. */
 size_t LAYOUT(one_block_shared)(int32_t bodies, int32_t halves);
 cudaError_t LAYOUT(one_block_allow)(int bytes);
 cudaError_t LAYOUT(one_block)(const struct layout_view *, bool survey, bool islands, const struct cuda_partition *,
@@ -94,7 +94,7 @@ static inline cudaError_t layout_launch(layout_kernel kernel, int64_t blocks, in
     if (blocks <= 0) return cudaSuccess;
 #ifdef SADMM_CUDA_EMULATED
     (void)stream;
-    return cuda_emulation_launch(kernel, (unsigned)blocks, (unsigned)threads, shared, 1, *view, *args);
+    return cuda_emulation_launch(kernel, (unsigned)blocks, (unsigned)threads, shared, *view, *args);
 #else
     void *parameters[] = {const_cast<layout_view *>(view), const_cast<layout_args *>(args)};
     return cudaLaunchKernel((const void *)kernel, dim3((unsigned)blocks), dim3((unsigned)threads), parameters, shared,

@@ -7,11 +7,11 @@ enum { WARPS = ONE_BLOCK_THREADS / LAYOUT_WARP, COUNTERS = DIGITS * WARPS };
 
 struct one_block_memory {
     cuda_facts *facts;
-    int32_t *most;                                                    /* 2 */
-    int32_t *label, *degree, *island_bodies, *island_halves;          /* bodies */
-    int32_t *body_of, *slot_of, *offsets;                             /* bodies, bodies, bodies + 1 */
-    int32_t *counters, *totals;                                       /* COUNTERS, WARPS */
-    uint32_t *items, *sorted;                                         /* halves or bodies, what there are more of */
+    int32_t *most;                                           /* 2 */
+    int32_t *label, *degree, *island_bodies, *island_halves; /* bodies */
+    int32_t *body_of, *slot_of, *offsets;                    /* bodies, bodies, bodies + 1 */
+    int32_t *counters, *totals;                              /* COUNTERS, WARPS */
+    uint32_t *items, *sorted;                                /* halves or bodies, what there are more of */
 };
 
 /* One description for its size and its addresses (base NULL: only that). */
@@ -236,6 +236,6 @@ cudaError_t LAYOUT(one_block)(const struct layout_view *v, bool with_survey, boo
     args.layout = partition != nullptr;
     if (partition) args.partition = *partition;
     *kernel = "layout (one block)";
-    return layout_launch(one_block_kernel, 1, ONE_BLOCK_THREADS, LAYOUT(one_block_shared)(v->bodies, 2 * (v->pair_room + v->rows)),
-                         v, &args, stream);
+    return layout_launch(one_block_kernel, 1, ONE_BLOCK_THREADS,
+                         LAYOUT(one_block_shared)(v->bodies, 2 * (v->pair_room + v->rows)), v, &args, stream);
 }

@@ -1,5 +1,5 @@
-/* What a thread, a warp or a block does in the layout (layout_internal.h): shared by the kernels of any size and the one
- * for small scenes. The view's arrays may be in global or shared memory. */
+/* What a thread, a warp or a block does in the layout (layout_internal.h): shared by the kernels of any size and the
+ * one for small scenes. The view's arrays may be in global or shared memory. */
 #ifndef SADMM_CUDA_LAYOUT_STEPS_H
 #define SADMM_CUDA_LAYOUT_STEPS_H
 
@@ -141,7 +141,7 @@ LAYOUT_INLINE void add_to_island(const layout_view &v, int32_t label, int32_t bo
     own->island_halves = larger(own->island_halves, atomicAdd(&v.island_halves[label], halves) + halves);
 }
 
-/* Label body i; `own` gets what is known of bodies and islands. Every lane of the warp comes here, i ascending in it. */
+/* Label body i; `own` gets what is known of bodies and islands. Every lane of the warp comes here, i ascending. */
 LAYOUT_INLINE void survey_body(const layout_view &v, int32_t i, bool islands, cuda_facts *own)
 {
     const bool live = i < v.bodies;
@@ -192,8 +192,8 @@ LAYOUT_INLINE int32_t part_begin(const layout_view &v, const cuda_partition &par
     return share_begin(v.offsets, first, last, p % each, each);
 }
 
-/* Parts, their largest, and whether all fit. Every thread of the one block (of `threads`) comes here; `most` (shared): two
- * numbers. */
+/* Parts, their largest, and whether all fit. Every thread of the one block (of `threads`) comes here; `most` (shared):
+ * two numbers. */
 LAYOUT_INLINE void make_parts(const layout_view &v, const cuda_partition &partition, int32_t threads, int32_t *most)
 {
     const int32_t t = (int32_t)threadIdx.x;

@@ -45,6 +45,7 @@ struct alignas(16) int4 {
 };
 struct dim3 {
     unsigned x, y, z;
+    dim3(unsigned x = 1, unsigned y = 1, unsigned z = 1) : x(x), y(y), z(z) {}
 };
 
 /* ---- threads as fibers ----------------------------------------------------------------------------------------- */
@@ -253,8 +254,10 @@ inline int atomicAdd(int *to, int value)
     *to += value;
     return before;
 }
+/* The others go first: what is compared with was read some time ago. */
 inline int atomicCAS(int *to, int expected, int value)
 {
+    cuda_emulation::give_way(cuda_emulation::NOT);
     int before = *to;
     if (before == expected) *to = value;
     return before;
@@ -278,11 +281,16 @@ enum cudaDeviceAttr {
     cudaDevAttrCooperativeLaunch,
     cudaDevAttrClusterLaunch
 };
-enum { cudaFuncAttributeMaxDynamicSharedMemorySize, cudaStreamNonBlocking, cudaStreamCaptureModeThreadLocal };
+enum { cudaStreamNonBlocking, cudaStreamCaptureModeThreadLocal };
+enum { cudaFuncAttributeMaxDynamicSharedMemorySize, cudaFuncAttributeNonPortableClusterSizeAllowed };
+enum { cudaLaunchAttributeCooperative = 1, cudaLaunchAttributeClusterDimension };
 
 struct cudaDeviceProp {
     char name[256];
     int major, minor, multiProcessorCount;
+};
+struct cudaFuncAttributes {
+    int ptxVersion;
 };
 struct cudaGraphExecUpdateResultInfo {
     int unused;
@@ -291,12 +299,27 @@ typedef struct cuda_emulation_stream *cudaStream_t;
 struct cuda_emulation_stream {
     int device;
 };
+struct cudaLaunchAttribute {
+    int id;
+    struct {
+        int cooperative;
+        dim3 clusterDim;
+    } val;
+};
+struct cudaLaunchConfig_t {
+    dim3 gridDim, blockDim;
+    size_t dynamicSmemBytes;
+    cudaStream_t stream;
+    cudaLaunchAttribute *attrs;
+    unsigned numAttrs;
+};
 typedef std::vector<std::function<bool()>> *cudaGraph_t;
 typedef cudaGraph_t cudaGraphExec_t;
 
 namespace cuda_emulation {
 
-enum { DEVICES = 2, MULTIPROCESSORS = 4, BLOCKS_PER_MULTIPROCESSOR = 2, SHARED_LIMIT = 96 * 1024 };
+enum { DEVICES = 2, MULTIPROCESSORS = 4, BLOCKS_PER_MULTIPROCESSOR = 4, THREADS_PER_MULTIPROCESSOR = 2048 };
+enum { SHARED_LIMIT = 96 * 1024 };
 inline int device;
 inline cudaGraph_t capture; /* what is recorded, when a stream is being captured */
 
@@ -369,11 +392,26 @@ inline cudaError_t cudaFuncSetAttribute(const void *, int, int)
     CUDA_EMULATION_CALL;
     return cudaSuccess;
 }
-inline cudaError_t cudaOccupancyMaxActiveBlocksPerMultiprocessor(int *blocks, const void *, int, size_t shared)
+inline cudaError_t cudaFuncGetAttributes(cudaFuncAttributes *attributes, const void *)
 {
     CUDA_EMULATION_CALL;
-    *blocks = 2 * shared <= cuda_emulation::SHARED_LIMIT ? cuda_emulation::BLOCKS_PER_MULTIPROCESSOR : 1;
+    attributes->ptxVersion = 90;
     return cudaSuccess;
+}
+inline cudaError_t cudaOccupancyMaxActiveBlocksPerMultiprocessor(int *blocks, const void *, int threads, size_t)
+{
+    CUDA_EMULATION_CALL;
+    *blocks = std::min((int)cuda_emulation::BLOCKS_PER_MULTIPROCESSOR,
+                       cuda_emulation::THREADS_PER_MULTIPROCESSOR / std::max(threads, 1));
+    return cudaSuccess;
+}
+inline cudaError_t cudaOccupancyMaxActiveClusters(int *clusters, const void *kernel, const cudaLaunchConfig_t *config)
+{
+    int blocks = 0;
+    cudaError_t code = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, (int)config->blockDim.x,
+                                                                     config->dynamicSmemBytes);
+    *clusters = blocks * cuda_emulation::MULTIPROCESSORS / (int)config->attrs->val.clusterDim.x;
+    return code;
 }
 
 inline cudaError_t cudaMallocHost(void **block, size_t bytes)
@@ -431,6 +469,11 @@ inline cudaError_t cudaEventRecord(cudaEvent_t, cudaStream_t)
     CUDA_EMULATION_CALL;
     return cudaSuccess;
 }
+inline cudaError_t cudaStreamWaitEvent(cudaStream_t, cudaEvent_t, unsigned)
+{
+    CUDA_EMULATION_CALL;
+    return cudaSuccess;
+}
 inline cudaError_t cudaEventSynchronize(cudaEvent_t)
 {
     CUDA_EMULATION_CALL;
@@ -482,13 +525,17 @@ inline cudaError_t cudaGraphLaunch(cudaGraphExec_t exec, cudaStream_t)
     return cudaSuccess;
 }
 
-/* `together`: blocks that run side by side. Internal linkage: the argument types are others in every precision, under the
- * same names. */
+/* Internal linkage: the argument types are others in every precision, under the same names. */
 template <class View, class Args>
-static cudaError_t cuda_emulation_launch(void (*kernel)(const View, const Args), unsigned blocks, unsigned threads,
-                                         size_t shared, unsigned together, const View &view, const Args &args)
+static cudaError_t cuda_emulation_launch(const cudaLaunchConfig_t *config, void (*kernel)(const View, const Args),
+                                         const View &view, const Args &args)
 {
     CUDA_EMULATION_CALL;
+    const unsigned blocks = config->gridDim.x, threads = config->blockDim.x;
+    const size_t shared = config->dynamicSmemBytes;
+    unsigned together = 1; /* blocks that run side by side */
+    for (unsigned i = 0; i < config->numAttrs; ++i)
+        together = config->attrs[i].id == cudaLaunchAttributeCooperative ? blocks : config->attrs[i].val.clusterDim.x;
     if (shared > cuda_emulation::SHARED_LIMIT || threads == 0 || threads > 1024 || threads % cuda_emulation::WARP_SIZE)
         return cudaErrorInvalidValue;
     if (together == 0 || together > cuda_emulation::MULTIPROCESSORS * cuda_emulation::BLOCKS_PER_MULTIPROCESSOR ||
@@ -502,6 +549,15 @@ static cudaError_t cuda_emulation_launch(void (*kernel)(const View, const Args),
             if (!cuda_emulation::run_blocks(body, first, together, threads, shared)) return false;
         return true;
     });
+}
+
+/* Blocks that run one after another. */
+template <class View, class Args>
+static cudaError_t cuda_emulation_launch(void (*kernel)(const View, const Args), unsigned blocks, unsigned threads,
+                                         size_t shared, const View &view, const Args &args)
+{
+    const cudaLaunchConfig_t config = {blocks, threads, shared, nullptr, nullptr, 0};
+    return cuda_emulation_launch(&config, kernel, view, args);
 }
 
 #endif

@@ -25,6 +25,12 @@ void cuda_emulation_force_tier(const struct sadmm_kernels *kernels, struct sadmm
     else sadmm_cuda_set_tier_emulated_f64(context, tier);
 }
 
+void cuda_emulation_force_cluster(const struct sadmm_kernels *kernels, struct sadmm_context *context, int blocks)
+{
+    if (kernels->precision == SADMM_F32) sadmm_cuda_set_cluster_emulated_f32(context, blocks);
+    else sadmm_cuda_set_cluster_emulated_f64(context, blocks);
+}
+
 enum sadmm_cuda_tier cuda_emulation_tier_of(const struct sadmm_kernels *kernels, const struct sadmm_context *context,
                                             int32_t *blocks)
 {

@@ -15,6 +15,7 @@ extern long cuda_emulation_allocations; /* device and pinned blocks, streams and
 
 extern const struct sadmm_kernels cuda_emulation_tables[2]; /* by precision */
 void cuda_emulation_force_tier(const struct sadmm_kernels *, struct sadmm_context *, enum sadmm_cuda_tier);
+void cuda_emulation_force_cluster(const struct sadmm_kernels *, struct sadmm_context *, int blocks);
 enum sadmm_cuda_tier cuda_emulation_tier_of(const struct sadmm_kernels *, const struct sadmm_context *,
                                             int32_t *blocks);
 

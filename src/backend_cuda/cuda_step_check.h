@@ -1,0 +1,34 @@
+/* Is a step what it was planned for? (cuda_step.h) */
+#ifndef SADMM_CUDA_STEP_CHECK_H
+#define SADMM_CUDA_STEP_CHECK_H
+
+#include "cuda_internal.h"
+
+/* The device's clock. */
+static __device__ __forceinline__ unsigned long long nanoseconds(void)
+{
+#ifdef SADMM_CUDA_EMULATED
+    return 0;
+#else
+    unsigned long long now;
+    asm volatile("mov.u64 %0, %%globaltimer;" : "=l"(now));
+    return now;
+#endif
+}
+
+/* The grid's first thread compares the facts with the plan; what runs now and what was assembled is of no use when they
+ * differ. Assembly ends here. */
+static __device__ __forceinline__ void check_plan(const cuda_view &v)
+{
+    if (blockIdx.x > 0 || threadIdx.x > 0) return;
+    const struct cuda_facts *facts = v.facts;
+    const struct cuda_step_guess guess = v.step.guess;
+    v.step.control->stamps[STAMP_ASSEMBLED] = nanoseconds();
+    if (v.live->halt) return;
+    const int32_t pairs = v.live->pairs, rows = pairs == 0 ? 0 : facts->rough > 0 ? 3 : 1;
+    const int32_t warm = pairs > 0 && 2 * (int64_t)facts->warm >= pairs;
+    if (rows != guess.contact_rows || facts->point_slots > guess.point_slots || (guess.warm >= 0 && warm != guess.warm))
+        v.live->halt = HALT_PLAN;
+}
+
+#endif
