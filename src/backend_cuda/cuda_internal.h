@@ -315,7 +315,7 @@ sadmm_status CUDA(enqueue_survey_and_layout)(struct sadmm_context *, bool island
 sadmm_status CUDA(prepare_stepwise)(struct sadmm_context *, struct sadmm_error *error);
 /* The instance of the resident kernel for a tier (full: there are row blocks, or the last iteration is measured); threads
  * a block at most; bytes of shared memory. */
-cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, enum sadmm_cuda_tier tier, bool full,
+cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, enum sadmm_cuda_tier tier, int threads, bool full,
                                   const char **name);
 int CUDA(resident_threads)(int point_slots);
 size_t CUDA(resident_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies, bool row_blocks);
@@ -328,6 +328,9 @@ cudaError_t CUDA(resident_allow)(int bytes, bool device_has_clusters, bool *clus
 /* The tier and its thread blocks, from the facts of this step (or of one like it), the plan and the device. */
 sadmm_status CUDA(choose_partition)(struct sadmm_context *, const struct cuda_facts *facts,
                                     struct cuda_partition *partition, struct sadmm_error *error);
+/* Fewer threads, where the layout made for it has smaller parts (facts->part_halves, part_bodies) than could be known. */
+void CUDA(tighten_partition)(const struct sadmm_context *, const struct cuda_facts *facts,
+                             struct cuda_partition *partition);
 
 #define CUDA_TRY(call)                                  \
     do {                                                \

@@ -45,7 +45,7 @@ struct pair_sum {
 /* The j-th point of a lane; absent ones are not added. */
 static __device__ __forceinline__ void add_point(pair_sum *sum, int32_t j, vec3 impulse, vec3 arm_a, vec3 arm_b)
 {
-    vec3 torque_a = v3_cross(arm_a, impulse), torque_b = v3_cross(arm_b, impulse);
+    vec3 torque_a = fused_cross(arm_a, impulse), torque_b = fused_cross(arm_b, impulse);
     sum->force = j == 0 ? impulse : v3_add(sum->force, impulse);
     sum->torque_a = j == 0 ? torque_a : v3_add(sum->torque_a, torque_a);
     sum->torque_b = j == 0 ? torque_b : v3_add(sum->torque_b, torque_b);
@@ -85,8 +85,8 @@ static __device__ __forceinline__ void store_records(solver_real *records, const
     if (live && half >= 0) out[2 * (size_t)half + (odd ? 1 : 0)] = pack(on_b ? sum : v3_neg(sum), 0);
 }
 
-/* A lane's share of a pair: points lane and, where COUNT is 2, lane + 4. Whatever the count decides not to need is loaded
- * all the same, before anything waits for another value. `live`: else nothing is stored. Every lane of the warp comes
+/* A lane's share of a pair: points lane and, where COUNT is 2, lane + 4. The first is loaded whether it is
+ * there or not, so that nothing but the states waits for another load. `live`: else nothing is stored. Every lane of the warp comes
  * here. Returns the lane's share of the primal residual. */
 template <int CONTACT_ROWS, int LANES_A_PAIR, int COUNT, bool MEASURE>
 static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t p, int32_t lane, bool live)
@@ -398,7 +398,7 @@ static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool
     args.most_bodies = partition->most_bodies;
     args.cluster = partition->cluster;
     cuda_kernel kernel = CUDA(resident_kernel)(c->view.contact_rows, c->facts.point_slots, partition->tier,
-                                               measure || c->view.rows > 0, &name);
+                                               partition->threads, measure || c->view.rows > 0, &name);
     if (partition->tier == SADMM_CUDA_TIER_GRID)
         CUDA_CALL(c, cudaMemsetAsync(c->view.barrier, 0, sizeof *c->view.barrier, c->stream),
                   "cudaMemsetAsync(barrier)");

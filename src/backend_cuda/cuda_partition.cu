@@ -168,7 +168,7 @@ static struct choice choose_cluster_of(const struct sadmm_context *c, const stru
         return no_choice(too_large);
     int active = 0;
     cuda_kernel kernel =
-        CUDA(resident_kernel)(c->plan.contact_rows, facts->point_slots, SADMM_CUDA_TIER_CLUSTER, true, &name);
+        CUDA(resident_kernel)(c->plan.contact_rows, facts->point_slots, SADMM_CUDA_TIER_CLUSTER, 0, true, &name);
     *code = CUDA(active_clusters)(c, kernel, &choice.partition, &active);
     if (*code != cudaSuccess || active < 1) return no_choice("the device has no clusters that large");
     const int64_t rounds = up(smaller(clusters, larger(facts->islands, 1)), active);
@@ -214,7 +214,7 @@ static struct choice choose_grid(const struct sadmm_context *c, const struct cud
         if (!take_room(c, &choice.partition, bound, c->shared_limit / side_by_side)) continue;
         int resident = 0;
         cuda_kernel kernel =
-            CUDA(resident_kernel)(c->plan.contact_rows, facts->point_slots, SADMM_CUDA_TIER_GRID, true, &name);
+            CUDA(resident_kernel)(c->plan.contact_rows, facts->point_slots, SADMM_CUDA_TIER_GRID, 0, true, &name);
         *code = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, (const void *)kernel,
                                                               choice.partition.threads, choice.partition.shared);
         if (*code != cudaSuccess || parts > (int64_t)resident * c->multiprocessors) return no_choice(too_large);
@@ -263,4 +263,14 @@ sadmm_status CUDA(choose_partition)(struct sadmm_context *c, const struct cuda_f
     if (choice.why) return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "the cuda tier asked for: %s", choice.why);
     *partition = choice.partition;
     return SADMM_OK;
+}
+
+void CUDA(tighten_partition)(const struct sadmm_context *c, const struct cuda_facts *facts,
+                             struct cuda_partition *partition)
+{
+    if (partition->tier == SADMM_CUDA_TIER_STREAM) return;
+    const struct bound bound = {facts->part_halves, facts->part_bodies};
+    struct cuda_partition tight = *partition;
+    tight.threads = (int32_t)threads_for(bound, CUDA(resident_threads)(facts->point_slots));
+    if (tight.threads < partition->threads && take_room(c, &tight, bound, (int64_t)partition->shared)) *partition = tight;
 }

@@ -24,12 +24,17 @@ enum { QUAD = 4 }; /* lanes a half */
 #define CLUSTER_ARCH 900 /* of the first devices with clusters of thread blocks */
 
 /* Threads a block at most: what the registers of a multiprocessor are enough for. */
-static constexpr int most_threads(int points)
+/* SMALL: blocks of few threads, which may have all the registers they want. */
+enum { SMALL_THREADS = 256 };
+
+static constexpr int most_threads(int points, bool small)
 {
+    if (small) return SMALL_THREADS;
+
     return sizeof(solver_real) == sizeof(float) ? (points == 4 ? 1024 : 768) : (points == 4 ? 512 : 384);
 }
 
-int CUDA(resident_threads)(int point_slots) { return most_threads(point_slots <= 4 ? 4 : 8); }
+int CUDA(resident_threads)(int point_slots) { return most_threads(point_slots <= 4 ? 4 : 8, false); }
 
 /* ---- shared memory --------------------------------------------------------------------------------------------- */
 
@@ -310,7 +315,7 @@ PART __device__ __forceinline__ void PART_RUN::start_records(void)
     vec3 force = v3(0, 0, 0), torque = force;
 #pragma unroll
     for (int32_t j = 0; j < COUNT; ++j) {
-        vec3 impulse = impulse_of<CONTACT_ROWS>(own.normal, own.lambda[j]), moment = v3_cross(own.own_arm[j], impulse);
+        vec3 impulse = impulse_of<CONTACT_ROWS>(own.normal, own.lambda[j]), moment = fused_cross(own.own_arm[j], impulse);
         force = j == 0 ? impulse : v3_add(force, impulse);
         torque = j == 0 ? moment : v3_add(torque, moment);
     }
@@ -362,7 +367,7 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
 /* g and component r of the records [from, to), one after the other. */
 PART __device__ __forceinline__ real PART_RUN::gather(real g, int32_t from, int32_t to) const
 {
-    enum { AHEAD = 8 }; /* loads on the way at once */
+    enum { AHEAD = 4 }; /* loads on the way at once; few bodies have more halves */
     const solver_real *record = m.records + record_slot(r);
     for (int32_t h = from; h < to; h += AHEAD) {
         real value[AHEAD] = {};
@@ -433,12 +438,12 @@ PART template <bool MEASURE> __device__ __forceinline__ double PART_RUN::update_
         const vec3 delta = v3_sub(lambda, old);
         own.lambda[j] = lambda;
         vec3 impulse = impulse_of<CONTACT_ROWS>(own.normal, MEASURE ? lambda : v3_add(lambda, delta));
-        vec3 moment = v3_cross(own.own_arm[j], impulse);
+        vec3 moment = fused_cross(own.own_arm[j], impulse);
         force = j == 0 ? impulse : v3_add(force, impulse);
         torque = j == 0 ? moment : v3_add(torque, moment);
         if (!MEASURE) continue;
         impulse = impulse_of<CONTACT_ROWS>(own.normal, delta);
-        moment = v3_cross(own.own_arm[j], impulse);
+        moment = fused_cross(own.own_arm[j], impulse);
         change_force = j == 0 ? impulse : v3_add(change_force, impulse);
         change_torque = j == 0 ? moment : v3_add(change_torque, moment);
         largest = real_max(largest, largest_row<CONTACT_ROWS>(own.normal, delta));
@@ -497,8 +502,8 @@ template <int MODE> static __device__ __forceinline__ bool nothing_to_do(const c
 }
 
 /* FULL: with row blocks, or to be measured; both cost registers, and most stretches have neither. */
-template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL>
-static __global__ void __launch_bounds__(most_threads(POINTS))
+template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, bool SMALL>
+static __global__ void __launch_bounds__(most_threads(POINTS, SMALL))
     resident_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     CUDA_DYNAMIC_SHARED(memory);
@@ -530,14 +535,18 @@ static __global__ void __launch_bounds__(most_threads(POINTS))
 struct instance {
     int contact_rows, points;
     enum sadmm_cuda_tier tier;
-    bool full;
+    bool full, small;
     cuda_kernel kernel;
     const char *name;
 };
 
 #define INSTANCE(rows, points, mode, name)                                                                             \
-    {rows, points, SADMM_CUDA_TIER_##mode, false, resident_kernel<rows, points, mode, false>, "iterate (" name ")"},   \
-        {rows, points, SADMM_CUDA_TIER_##mode, true, resident_kernel<rows, points, mode, true>, "iterate (" name ", full)"}
+    {rows, points, SADMM_CUDA_TIER_##mode, false, false, resident_kernel<rows, points, mode, false, false>,            \
+     "iterate (" name ")"},                                                                                            \
+        {rows, points, SADMM_CUDA_TIER_##mode, false, true, resident_kernel<rows, points, mode, false, true>,          \
+         "iterate (" name ", small)"},                                                                                 \
+        {rows, points, SADMM_CUDA_TIER_##mode, true, false, resident_kernel<rows, points, mode, true, false>,          \
+         "iterate (" name ", full)"}
 /* Boxes on boxes touch in up to 8 points, mostly 4: with 4 a lane needs fewer registers. */
 static const instance instances[] = {
     INSTANCE(3, 4, BLOCK, "block, 3 rows, 4 points"),
@@ -554,12 +563,13 @@ static const instance instances[] = {
     INSTANCE(1, 8, GRID, "grid, 1 row, 8 points"),
 };
 
-cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, enum sadmm_cuda_tier tier, bool full,
-                                  const char **name)
+cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, enum sadmm_cuda_tier tier, int threads,
+                                  bool full, const char **name)
 {
     int rows = contact_rows == 1 ? 1 : 3, points = point_slots <= 4 ? 4 : 8;
+    bool small = !full && threads <= SMALL_THREADS;
     for (const instance &one : instances)
-        if (one.contact_rows == rows && one.points == points && one.tier == tier && one.full == full) {
+        if (one.contact_rows == rows && one.points == points && one.tier == tier && one.full == full && one.small == small) {
             *name = one.name;
             return one.kernel;
         }

@@ -255,6 +255,24 @@ static struct sadmm_plan plan_of(const struct sadmm_context *c, const struct loo
     return plan;
 }
 
+/* The layout once, for what its parts are really like. */
+static sadmm_status tighten(struct sadmm_context *c, const struct look *seen, struct sadmm_error *error)
+{
+    if (c->partition.tier == SADMM_CUDA_TIER_STREAM) return SADMM_OK;
+    struct look *staged = buffer<struct look>(c, PINNED_OUT);
+    staged->live = seen->live;
+    CUDA_CALL(c, cudaMemcpyAsync(c->view.live, &staged->live, sizeof staged->live, cudaMemcpyHostToDevice, c->stream),
+              "cudaMemcpyAsync to the device");
+    CUDA_TRY(CUDA(enqueue_survey_and_layout)(c, true, &c->partition, error));
+    CUDA_TRY(copy_out(c, &staged->live, c->view.live, sizeof staged->live, error));
+    CUDA_TRY(copy_out(c, &staged->facts, c->view.facts, sizeof staged->facts, error));
+    CUDA_TRY(CUDA(wait)(c, error));
+    struct cuda_facts facts = staged->facts;
+    facts.point_slots = c->facts.point_slots;
+    if (staged->live.halt == HALT_NONE) CUDA(tighten_partition)(c, &facts, &c->partition);
+    return clear_halt(c, error);
+}
+
 static sadmm_status make_plan(struct sadmm_context *c, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
@@ -273,6 +291,7 @@ static sadmm_status make_plan(struct sadmm_context *c, struct sadmm_error *error
     c->facts = seen.facts;
     CUDA_TRY(CUDA(choose_partition)(c, &seen.facts, &c->partition, error));
     CUDA_TRY(CUDA(layout_room)(c, error));
+    CUDA_TRY(tighten(c, &seen, error));
     CUDA_TRY(CUDA(solver_room)(c, error));
     CUDA_TRY(CUDA(room)(c, BUFFER_WORLD_IMPULSE, 3 * (size_t)s->point_room * sizeof(double), error));
     s->planned = true;

@@ -80,12 +80,31 @@ CUDA_INLINE real inverse_weight(real inv_beta_a, real inv_beta_b)
 /* Component r < 6 of a wrench is number record_slot(r) of its record: force and torque are four apart. */
 CUDA_INLINE int32_t record_slot(int32_t r) { return r < 3 ? r : r + 1; }
 
+/* ---- fused products ------------------------------------------------------------------------------------------- */
+
+/* a b + c, rounded once. The sources are compiled without contraction; where the iteration fuses it says so here, and so
+ * does every tier. */
+#ifdef SADMM_CUDA_EMULATED
+CUDA_INLINE real fused(real a, real b, real c) { return a * b + c; }
+#else
+CUDA_INLINE float fused(float a, float b, float c) { return __fmaf_rn(a, b, c); }
+CUDA_INLINE double fused(double a, double b, double c) { return __fma_rn(a, b, c); }
+#endif
+
+/* a + s b */
+CUDA_INLINE vec3 fused_madd(vec3 a, real s, vec3 b) { return v3(fused(s, b.x, a.x), fused(s, b.y, a.y), fused(s, b.z, a.z)); }
+CUDA_INLINE real fused_dot(vec3 a, vec3 b) { return fused(a.z, b.z, fused(a.y, b.y, a.x * b.x)); }
+CUDA_INLINE vec3 fused_cross(vec3 a, vec3 b)
+{
+    return v3(fused(a.y, b.z, -(a.z * b.y)), fused(a.z, b.x, -(a.x * b.z)), fused(a.x, b.y, -(a.y * b.x)));
+}
+
 /* ---- pairs ---------------------------------------------------------------------------------------------------- */
 
 /* (v_b - v_a) + (w_b x r_b - w_a x r_a): with a and b changed places the same bits with the other sign. */
 CUDA_INLINE vec3 relative_velocity(const body_motion &a, vec3 arm_a, const body_motion &b, vec3 arm_b)
 {
-    return v3_add(v3_sub(b.linear, a.linear), v3_sub(v3_cross(b.angular, arm_b), v3_cross(a.angular, arm_a)));
+    return v3_add(v3_sub(b.linear, a.linear), v3_sub(fused_cross(b.angular, arm_b), fused_cross(a.angular, arm_a)));
 }
 
 /* Multipliers of a point: a world vector, or its normal component alone in x when a contact has one row. */
@@ -103,26 +122,36 @@ template <int CONTACT_ROWS> CUDA_INLINE void store_lambda(const cuda_view &v, si
     v.lambda[2 * v.lambda_stride + slot] = lambda.z;
 }
 
-CUDA_INLINE float inverse_sqrt(float x) { return rsqrtf(x); }
+/* Of x > 0 that is no denormal; 2 units of rounding. */
+#ifdef SADMM_CUDA_EMULATED
+CUDA_INLINE float inverse_sqrt(float x) { return 1 / sqrtf(x); }
+#else
+CUDA_INLINE float inverse_sqrt(float x)
+{
+    float y;
+    asm("rsqrt.approx.ftz.f32 %0, %1;" : "=f"(y) : "f"(x));
+    return y;
+}
+#endif
 CUDA_INLINE double inverse_sqrt(double x) { return rsqrt(x); }
 
-/* contact_project() with one inverse square root for a square root and a division (2 units of rounding). */
+/* contact_project() with one inverse square root for a square root and a division. */
 CUDA_INLINE vec3 project(vec3 lambda, vec3 n, real mu)
 {
-    real ln = v3_dot(n, lambda);
-    vec3 t = v3_madd(lambda, -ln, n);
+    real ln = fused_dot(n, lambda);
+    vec3 t = fused_madd(lambda, -ln, n);
     ln = ln > 0 ? ln : (real)0;
-    real limit = mu * ln, t2 = v3_norm2(t), scale = t2 > limit * limit ? limit * inverse_sqrt(t2) : (real)1;
-    return v3_madd(v3_scale(n, ln), scale, t);
+    real limit = mu * ln, t2 = real_max(fused_dot(t, t), (real)FLT_MIN);
+    real scale = t2 > limit * limit ? limit * inverse_sqrt(t2) : (real)1;
+    return fused_madd(v3_scale(n, ln), scale, t);
 }
 
 /* Steps 2-4 of one point: x = J v, error e. With x, error and inv_s of the other sign the same bits. */
 template <int CONTACT_ROWS>
 CUDA_INLINE vec3 update_point(vec3 normal, real friction, vec3 x, real error, real inv_s, vec3 old)
 {
-    if (CONTACT_ROWS == 3)
-        return project(v3_sub(old, v3_scale(v3_add(x, v3_scale(normal, error)), inv_s)), normal, friction);
-    real y = old.x - (v3_dot(normal, x) + error) * inv_s;
+    if (CONTACT_ROWS == 3) return project(fused_madd(old, -inv_s, fused_madd(x, error, normal)), normal, friction);
+    real y = fused(-inv_s, fused_dot(normal, x) + error, old.x);
     return v3(y > 0 ? y : (real)0, 0, 0);
 }
 
@@ -231,17 +260,20 @@ CUDA_INLINE real free_momentum(const body_lane &body)
 {
     real g = body.b;
 #pragma unroll
-    for (int k = 0; k < 6; ++k) g -= body.A[k] * __shfl_sync((unsigned)ALL_LANES, body.v, k, LANES);
+    for (int k = 0; k < 6; ++k) g = fused(-body.A[k], __shfl_sync((unsigned)ALL_LANES, body.v, k, LANES), g);
     return g;
 }
 
 /* v <- v + H g, lane r's component of g being b - A v + J^T E. Every lane of the warp comes here. */
 CUDA_INLINE void move_body(body_lane *body, real g)
 {
-    real step = 0;
+    real other[6];
 #pragma unroll
-    for (int k = 0; k < 6; ++k) step += body->H[k] * __shfl_sync((unsigned)ALL_LANES, g, k, LANES);
-    body->v += step;
+    for (int k = 0; k < 6; ++k) other[k] = __shfl_sync((unsigned)ALL_LANES, g, k, LANES);
+    /* two chains, half as long */
+    real even = fused(body->H[4], other[4], fused(body->H[2], other[2], body->H[0] * other[0]));
+    real odd = fused(body->H[5], other[5], fused(body->H[3], other[3], body->H[1] * other[1]));
+    body->v += even + odd;
 }
 
 /* ---- reductions ----------------------------------------------------------------------------------------------- */
