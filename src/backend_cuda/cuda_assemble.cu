@@ -79,19 +79,20 @@ static __global__ void assemble_contacts_kernel(const __grid_constant__ cuda_vie
     bool a = pair->body_a >= 0, b = pair->body_b >= 0;
     if (a && b && pair->count > 0) difference = v3_sub(v3_load(points[0].arm_b), v3_load(points[0].arm_a));
     v.normal[p] = pack(normal, pair->friction);
-    v.difference[p] = pack(difference, 0); /* 1/s follows from the penalties */
-    v.pair_bodies[p].x = a ? pair->body_a : v.bodies;
-    v.pair_bodies[p].y = b ? pair->body_b : v.bodies;
     /* A pair of more points than the step was planned for halts it (cuda_step.h), but not before this. */
     const int32_t count = pair->count <= v.point_slots ? pair->count : v.point_slots;
-    v.pair_count[p] = count;
+    const pair_ends ends = {a ? pair->body_a : v.bodies, b ? pair->body_b : v.bodies, -1, -1};
+    v.difference[p] = pack(difference, count);
+    v.ends[p] = ends;
     for (int32_t k = 0; k < count; ++k) {
-        size_t slot = (size_t)k * (size_t)v.pair_room + (size_t)p;
+        size_t slot = point_slot(v, p, k);
         vec3 lambda = v.warm_start ? v3_load(points[k].impulse) : v3(0, 0, 0);
         double error = sadmm_contact_e(&v.raw, &v.settings, pair, &points[k]);
         v.arm[slot] = pack(v3_load(a ? points[k].arm_a : points[k].arm_b), error);
-        if (v.contact_rows == 1) v.lambda_n[slot] = (solver_real)v3_dot(normal, lambda);
-        else v.lambda[slot] = pack(lambda, 0);
+        v.lambda[slot] = (solver_real)(v.contact_rows == 1 ? v3_dot(normal, lambda) : lambda.x);
+        if (v.contact_rows == 1) continue;
+        v.lambda[v.lambda_stride + slot] = (solver_real)lambda.y;
+        v.lambda[2 * v.lambda_stride + slot] = (solver_real)lambda.z;
     }
 }
 
@@ -110,7 +111,7 @@ static __global__ void assemble_rows_kernel(const __grid_constant__ cuda_view v,
     if ((int32_t)block->kind != args.count) return;
     bool a = block->body_a >= 0, b = block->body_b >= 0;
     row_about about = {(int32_t)block->kind, block->rows, a ? block->body_a : v.bodies,
-                       b ? block->body_b : v.bodies, 0};
+                       b ? block->body_b : v.bodies, -1, -1, 0};
     for (int r = 0; r < 6; ++r) {
         bool used = r < block->rows, any = false;
         for (int j = 0; j < 6; ++j) {

@@ -10,6 +10,8 @@
  *     compiled without contraction of a * b + c for the same reason).
  *   - Sums over a pair's points, p_0 to p_7: q_j = p_j + p_{j+4} (p_j alone where there is no p_{j+4}, 0 where there is
  *     no p_j), then (q_0 + q_1) + (q_2 + q_3): four lanes of a warp make it in two exchanges.
+ *   - Records are in the order of the bodies' lists, so that a body reads its own one after the other; whoever writes them
+ *     knows where they go. Points are stored pair by pair, four lanes a pair (point_slot).
  *   - Eight lanes take a body: lane r < 6 owns component r of A v, of the gathered sum and of H g, H = (A + beta C)^-1.
  *
  * Order. Bodies are numbered by island, stably, where islands matter: "slots" (cuda_layout.h). Pairs and row blocks keep
@@ -51,7 +53,6 @@ typedef SADMM_REAL solver_real;
 
 enum {
     ROW = 8,              /* a wrench or a body's state: 6 used, 32 bytes in f32 */
-    RECORD = 2 * ROW,     /* wrench on a, wrench on b; each force, 0, torque, 0 */
     STATE_INV_BETA = 6,   /* slot of a state row */
     PACKED = 21,          /* lower triangle, rows first */
     THREADS = 256,        /* a block, everywhere */
@@ -77,7 +78,15 @@ struct alignas(16) real4 {
 
 struct row_about {
     int32_t kind, rows, body_a, body_b; /* slots */
+    int32_t half_a, half_b;             /* as in pair_ends */
     int32_t active;                     /* bit r: row r exists (a hard row of zeros is no constraint, Sec. III-C) */
+};
+
+/* What a pair joins. */
+struct alignas(16) pair_ends {
+    int32_t body_a, body_b; /* slots; the static world: `bodies` */
+    int32_t half_a, half_b; /* places of its halves in `incident`, and of their records; of the static world: -1.
+                               For the stepwise kernels alone (prepare_stepwise) */
 };
 
 /* What kernels see. Pointers are device memory. Bodies are counted in slots unless "raw" (cuda_layout.h). */
@@ -85,8 +94,8 @@ struct cuda_view {
     struct cuda_live *live;
     struct cuda_facts *facts;
     int32_t bodies;      /* exact, known to the host (state row `bodies` is the static world) */
-    int32_t pair_room;   /* multiple of 32; stride of point planes: point k of pair p is at k pair_room + p. The record of
-                            pair p is p, of row block k pair_room + k */
+    int32_t pair_room;   /* multiple of 32. The number of pair p as a constraint is p, of row block k pair_room + k */
+    int32_t lanes;       /* threads a pair: 4, or 1 where no pair has more than one point */
     int32_t rows;        /* row blocks: exact, known to the host */
     int32_t points;      /* room */
     int32_t row_stride;
@@ -103,21 +112,20 @@ struct cuda_view {
     double *beta;       /* bodies, kg */
 
     real4 *normal;      /* pairs: n, mu */
-    real4 *difference;  /* pairs: x_a - x_b, 1/s */
-    int2 *pair_bodies;
-    int32_t *pair_count;
+    real4 *difference;  /* pairs: x_a - x_b, number of points */
+    pair_ends *ends;    /* pairs */
     real4 *arm;         /* points: r_a (r_b when a is static), e */
-    real4 *lambda;      /* points, 3 rows a contact */
-    solver_real *lambda_n; /* points, 1 row a contact */
+    solver_real *lambda; /* points: a plane for each of x, y, z; for the normal component alone when a contact has one row */
+    size_t lambda_stride; /* from plane to plane */
 
     row_about *row_info;
     solver_real *row_data; /* ROW_PLANES x row_stride */
 
-    /* pairs (pair_room of them), then row blocks. After a measured iteration `records` holds J^T lambda and `change`
+    /* halves x ROW: a force, 0, torque, 0. After a measured iteration `records` holds J^T lambda and `change`
      * J^T (lambda - lambda_prev), else `records` holds J^T (2 lambda - lambda_prev). */
     solver_real *records, *change;
 
-    const int32_t *offsets, *incident; /* body -> its halves, ascending */
+    const int32_t *offsets, *incident; /* body -> places of its halves; place -> half, ascending for each body */
     const int32_t *body_of, *slot_of;  /* slot -> raw body, raw body -> slot */
     const int32_t *parts;              /* first body slot of each part, and the end */
     solver_real *exchange;             /* GRID: velocities of even and of odd iterations, bodies x ROW each */
@@ -132,6 +140,16 @@ struct cuda_view {
     double *out; /* results in raw order */
     struct cuda_step_view step; /* whole steps alone */
 };
+
+/* Where the data of point k of pair p is. */
+template <int LANES_A_PAIR> static __device__ __forceinline__ size_t point_slot(const cuda_view &v, int32_t p, int32_t k)
+{
+    return (size_t)(k / LANES_A_PAIR * LANES_A_PAIR) * (size_t)v.pair_room + (size_t)p * LANES_A_PAIR + (size_t)(k % LANES_A_PAIR);
+}
+static __device__ __forceinline__ size_t point_slot(const cuda_view &v, int32_t p, int32_t k)
+{
+    return v.lanes == 1 ? point_slot<1>(v, p, k) : point_slot<4>(v, p, k);
+}
 
 /* This step's counts; 0 when it is halted. */
 static __device__ __forceinline__ int32_t live_bodies(const cuda_view &v) { return v.live->halt ? 0 : v.bodies; }
@@ -163,7 +181,7 @@ struct cuda_buffer {
 enum cuda_buffer_name {
     /* device */
     BUFFER_STATE, BUFFER_B, BUFFER_LINES, BUFFER_C, BUFFER_BETA,
-    BUFFER_NORMAL, BUFFER_DIFFERENCE, BUFFER_PAIR_BODIES, BUFFER_PAIR_COUNT, BUFFER_ARM, BUFFER_LAMBDA,
+    BUFFER_NORMAL, BUFFER_DIFFERENCE, BUFFER_PAIR_ENDS, BUFFER_ARM, BUFFER_LAMBDA,
     BUFFER_ROW_INFO, BUFFER_ROW_DATA, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_EXCHANGE, BUFFER_LIVE, BUFFER_LAYOUT, BUFFER_SORT,
     BUFFER_NUMBERS, BUFFER_SCALARS,
     BUFFER_RAW_BODIES, BUFFER_RAW_PAIRS, BUFFER_RAW_POINTS, BUFFER_RAW_BLOCKS, BUFFER_OUT,
@@ -188,7 +206,7 @@ struct sadmm_context {
     cuda_view view;
     cuda_buffer buffers[BUFFER_COUNT];
     bool starting; /* no iteration yet: the next Step 1 uses J^T lambda^0, which `records` may not hold yet */
-    bool weighed;  /* 1/s of the pairs is up to date */
+    bool placed;   /* pairs and row blocks know the places of their halves */
     bool measured; /* records and change are apart: the next Step 1 uses records + ratio change */
     bool rescaled; /* ... by view.ratio; else it is 1 */
     bool recording; /* a graph of the whole step: nothing is allocated, no graph launched in it */
@@ -292,7 +310,7 @@ sadmm_status CUDA(enqueue_survey_and_layout)(struct sadmm_context *, bool island
 
 /* ---- cuda_iterate.cu, cuda_resident.cu ---- */
 
-/* Everything the stepwise kernels take for granted: J^T lambda^0 at the start, 1/s of every pair. The resident kernel makes
+/* Everything the stepwise kernels take for granted: where records go, J^T lambda^0 at the start. The resident kernel makes
  * its own. */
 sadmm_status CUDA(prepare_stepwise)(struct sadmm_context *, struct sadmm_error *error);
 /* The instance of the resident kernel for a tier (full: there are row blocks, or the last iteration is measured); threads

@@ -27,7 +27,7 @@ template <bool JOIN> static __global__ void bodies_kernel(const __grid_constant_
         const int32_t slot = record_slot(r), end = v.offsets[i + 1];
 #pragma unroll 4
         for (int32_t h = v.offsets[i]; h < end; ++h) {
-            size_t from = (size_t)v.incident[h] * ROW + (size_t)slot;
+            size_t from = (size_t)h * ROW + (size_t)slot;
             g += JOIN ? v.records[from] + ratio * v.change[from] : v.records[from];
         }
     }
@@ -35,100 +35,127 @@ template <bool JOIN> static __global__ void bodies_kernel(const __grid_constant_
     if (mine) v.state[at * ROW + (size_t)r] = body.v;
 }
 
+/* ---- Steps 2-4 of a pair, points in memory ---------------------------------------------------------------------- */
+
 /* What points of a pair add up to: force on b, torque on b and, against it, on a. */
 struct pair_sum {
     vec3 force, torque_a, torque_b;
 };
 
-static __device__ __forceinline__ pair_sum sum_of(vec3 impulse, vec3 arm_a, vec3 arm_b)
+/* The j-th point of a lane; absent ones are not added. */
+static __device__ __forceinline__ void add_point(pair_sum *sum, int32_t j, vec3 impulse, vec3 arm_a, vec3 arm_b)
 {
-    pair_sum sum = {impulse, fused_cross(arm_a, impulse), fused_cross(arm_b, impulse)};
-    return sum;
+    vec3 torque_a = fused_cross(arm_a, impulse), torque_b = fused_cross(arm_b, impulse);
+    sum->force = j == 0 ? impulse : v3_add(sum->force, impulse);
+    sum->torque_a = j == 0 ? torque_a : v3_add(sum->torque_a, torque_a);
+    sum->torque_b = j == 0 ? torque_b : v3_add(sum->torque_b, torque_b);
 }
 
-static __device__ __forceinline__ void add_to(pair_sum *sum, const pair_sum &more)
+static __device__ __forceinline__ vec3 exchange(vec3 value, int lanes)
 {
-    sum->force = v3_add(sum->force, more.force);
-    sum->torque_a = v3_add(sum->torque_a, more.torque_a);
-    sum->torque_b = v3_add(sum->torque_b, more.torque_b);
+    const unsigned all = (unsigned)ALL_LANES;
+    return v3(__shfl_xor_sync(all, value.x, lanes), __shfl_xor_sync(all, value.y, lanes),
+              __shfl_xor_sync(all, value.z, lanes));
 }
 
-/* Of one iteration. */
-struct pair_sums {
-    pair_sum next, change;
-    real largest;
-};
-
-static __device__ __forceinline__ void add_to(pair_sums *sums, const pair_sums &more)
+/* The sums of a pair's lanes, added as (q_0 + q_1) + (q_2 + q_3), into the records of its halves. Of four lanes, 0 and 1
+ * end up with force and torque on a, 2 and 3 on b. Every lane of the warp comes here. */
+template <int LANES_A_PAIR>
+static __device__ __forceinline__ void store_records(solver_real *records, const pair_ends &ends, int32_t lane,
+                                                     bool live, const pair_sum &q)
 {
-    add_to(&sums->next, more.next);
-    add_to(&sums->change, more.change);
-    sums->largest = real_max(sums->largest, more.largest);
-}
-
-/* part(k) for each point k of a pair, added up in the order that cuda_internal.h sets. */
-template <class Sum, class Part> static __device__ __forceinline__ Sum sum_points(int32_t count, Part part)
-{
-    Sum q[4] = {};
-#pragma unroll
-    for (int32_t j = 0; j < 4; ++j) {
-        if (j < count) q[j] = part(j);
-        if (j + 4 < count) add_to(&q[j], part(j + 4));
-    }
-    add_to(&q[0], q[1]);
-    add_to(&q[2], q[3]);
-    add_to(&q[0], q[2]);
-    return q[0];
-}
-
-static __device__ __forceinline__ void store_record(solver_real *record, const pair_sum &sum)
-{
-    real4 *out = (real4 *)record;
-    out[0] = pack(v3_neg(sum.force), 0);
-    out[1] = pack(v3_neg(sum.torque_a), 0);
-    out[2] = pack(sum.force, 0);
-    out[3] = pack(sum.torque_b, 0);
-}
-
-/* Steps 2-4 of a pair, points in memory. */
-template <int CONTACT_ROWS, bool MEASURE>
-static __device__ __forceinline__ void sweep_pair(const cuda_view &v, int32_t p, double *primal)
-{
-    const real4 about = v.normal[p], between = v.difference[p];
-    const vec3 normal = xyz(about), difference = xyz(between);
-    const int2 bodies = v.pair_bodies[p];
-    const body_motion a = load_motion(v.state + (size_t)bodies.x * ROW), b = load_motion(v.state + (size_t)bodies.y * ROW);
-    const pair_sums sums = sum_points<pair_sums>(v.pair_count[p], [&](int32_t k) {
-        size_t slot = (size_t)k * (size_t)v.pair_room + (size_t)p;
-        real4 arm = v.arm[slot];
-        vec3 arm_a = xyz(arm), arm_b = v3_add(arm_a, difference), old = load_lambda<CONTACT_ROWS>(v, slot);
-        vec3 x = relative_velocity(a, arm_a, b, arm_b);
-        vec3 lambda = update_point<CONTACT_ROWS>(normal, about.w, x, arm.w, between.w, old), delta = v3_sub(lambda, old);
-        store_lambda<CONTACT_ROWS>(v, slot, lambda);
-        pair_sums one = {};
-        one.next = sum_of(impulse_of<CONTACT_ROWS>(normal, MEASURE ? lambda : v3_add(lambda, delta)), arm_a, arm_b);
-        if (MEASURE) {
-            one.change = sum_of(impulse_of<CONTACT_ROWS>(normal, delta), arm_a, arm_b);
-            one.largest = largest_row<CONTACT_ROWS>(normal, delta);
+    real4 *out = (real4 *)records;
+    if (LANES_A_PAIR == 1) {
+        if (live && ends.half_a >= 0) {
+            out[2 * (size_t)ends.half_a] = pack(v3_neg(q.force), 0);
+            out[2 * (size_t)ends.half_a + 1] = pack(v3_neg(q.torque_a), 0);
         }
-        return one;
-    });
-    store_record(v.records + (size_t)p * RECORD, sums.next);
-    if (MEASURE) {
-        store_record(v.change + (size_t)p * RECORD, sums.change);
-        *primal = (double)(sums.largest * real_max(inv_beta_of(v, bodies.x), inv_beta_of(v, bodies.y)));
+        if (live && ends.half_b >= 0) {
+            out[2 * (size_t)ends.half_b] = pack(q.force, 0);
+            out[2 * (size_t)ends.half_b + 1] = pack(q.torque_b, 0);
+        }
+        return;
     }
+    const bool odd = lane & 1, on_b = lane & 2;
+    const int32_t half = on_b ? ends.half_b : ends.half_a;
+    /* Even lanes keep the force, odd ones the torques. */
+    const vec3 kept = v3_add(odd ? q.torque_a : q.force, exchange(odd ? q.force : q.torque_a, 1));
+    const vec3 torque_b = v3_add(q.torque_b, exchange(q.torque_b, 1));
+    const vec3 sum = v3_add(odd && on_b ? torque_b : kept, exchange(odd && !on_b ? torque_b : kept, 2));
+    if (live && half >= 0) out[2 * (size_t)half + (odd ? 1 : 0)] = pack(on_b ? sum : v3_neg(sum), 0);
 }
 
-static __device__ __forceinline__ void store_row_records(const cuda_view &v, int32_t k, int32_t rows,
+/* A lane's share of a pair: points lane and, where COUNT is 2, lane + 4. The first is loaded whether it is
+ * there or not, so that nothing but the states waits for another load. `live`: else nothing is stored. Every lane of the warp comes
+ * here. Returns the lane's share of the primal residual. */
+template <int CONTACT_ROWS, int LANES_A_PAIR, int COUNT, bool MEASURE>
+static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t p, int32_t lane, bool live)
+{
+    const real4 about = load_once(v.normal + p), between = load_once(v.difference + p);
+    const pair_ends ends = load_once(v.ends + p);
+    size_t slot[COUNT];
+    real4 point[COUNT];
+    vec3 old[COUNT];
+    slot[0] = point_slot<LANES_A_PAIR>(v, p, lane);
+    point[0] = load_once(v.arm + slot[0]);
+    old[0] = load_lambda<CONTACT_ROWS>(v, slot[0]);
+    const int32_t count = (int32_t)between.w;
+#pragma unroll
+    for (int32_t j = 1; j < COUNT; ++j) {
+        if (lane + LANES_A_PAIR * j >= count) continue;
+        slot[j] = point_slot<LANES_A_PAIR>(v, p, lane + LANES_A_PAIR * j);
+        point[j] = load_once(v.arm + slot[j]);
+        old[j] = load_lambda<CONTACT_ROWS>(v, slot[j]);
+    }
+    const body_row a = load_row(v.state, ends.body_a), b = load_row(v.state, ends.body_b);
+
+    const vec3 normal = xyz(about), difference = xyz(between);
+    const real inv_s = inverse_weight(a.inv_beta, b.inv_beta);
+    real largest = 0;
+    pair_sum next = {}, change = {};
+#pragma unroll
+    for (int32_t j = 0; j < COUNT; ++j) {
+        if (lane + LANES_A_PAIR * j >= count) continue;
+        const vec3 arm_a = xyz(point[j]), arm_b = v3_add(arm_a, difference);
+        const vec3 x = relative_velocity(a.motion, arm_a, b.motion, arm_b);
+        const vec3 lambda = update_point<CONTACT_ROWS>(normal, about.w, x, point[j].w, inv_s, old[j]);
+        const vec3 delta = v3_sub(lambda, old[j]);
+        if (live) store_lambda<CONTACT_ROWS>(v, slot[j], lambda);
+        add_point(&next, j, impulse_of<CONTACT_ROWS>(normal, MEASURE ? lambda : v3_add(lambda, delta)), arm_a, arm_b);
+        if (!MEASURE) continue;
+        add_point(&change, j, impulse_of<CONTACT_ROWS>(normal, delta), arm_a, arm_b);
+        largest = real_max(largest, largest_row<CONTACT_ROWS>(normal, delta));
+    }
+    store_records<LANES_A_PAIR>(v.records, ends, lane, live, next);
+    if (MEASURE) store_records<LANES_A_PAIR>(v.change, ends, lane, live, change);
+    return MEASURE ? (double)(largest * real_max(a.inv_beta, b.inv_beta)) : 0;
+}
+
+/* The same for J^T lambda^0. */
+template <int CONTACT_ROWS, int LANES_A_PAIR>
+static __device__ __forceinline__ void start_pair(const cuda_view &v, int32_t p, int32_t lane, bool live)
+{
+    const vec3 normal = xyz(v.normal[p]);
+    const real4 between = v.difference[p];
+    pair_sum sum = {};
+    for (int32_t k = lane; k < (int32_t)between.w; k += LANES_A_PAIR) {
+        size_t slot = point_slot<LANES_A_PAIR>(v, p, k);
+        vec3 arm = xyz(v.arm[slot]), lambda = load_lambda<CONTACT_ROWS>(v, slot);
+        add_point(&sum, k / LANES_A_PAIR, impulse_of<CONTACT_ROWS>(normal, lambda), arm, v3_add(arm, xyz(between)));
+    }
+    store_records<LANES_A_PAIR>(v.records, v.ends[p], lane, live, sum);
+}
+
+/* ---- row blocks ------------------------------------------------------------------------------------------------- */
+
+static __device__ __forceinline__ void store_row_records(const cuda_view &v, int32_t k, const row_about &about,
                                                          const real lambda[6], solver_real *records)
 {
-    solver_real *record = records + ((size_t)v.pair_room + (size_t)k) * RECORD;
-    for (int side = 0; side < 2; ++side) store_row_record(v, k, rows, side, lambda, record + side * ROW);
+    if (about.half_a >= 0) store_row_record(v, k, about.rows, 0, lambda, records + (size_t)about.half_a * ROW);
+    if (about.half_b >= 0) store_row_record(v, k, about.rows, 1, lambda, records + (size_t)about.half_b * ROW);
 }
 
-template <bool MEASURE>
-static __device__ __forceinline__ void sweep_row_block(const cuda_view &v, int32_t k, double *primal)
+template <bool MEASURE> static __device__ __forceinline__ double sweep_row_block(const cuda_view &v, int32_t k)
 {
     const row_about about = v.row_info[k];
     real lambda[6], delta[6];
@@ -137,54 +164,68 @@ static __device__ __forceinline__ void sweep_row_block(const cuda_view &v, int32
                      delta);
     store_row_lambda(v, k, lambda);
     if (MEASURE) {
-        store_row_records(v, k, about.rows, lambda, v.records);
-        store_row_records(v, k, about.rows, delta, v.change);
-        *primal = row_block_primal(v, about, delta);
-    } else {
-        for (int r = 0; r < 6; ++r) lambda[r] += delta[r];
-        store_row_records(v, k, about.rows, lambda, v.records);
+        store_row_records(v, k, about, lambda, v.records);
+        store_row_records(v, k, about, delta, v.change);
+        return row_block_primal(v, about, delta);
     }
+    for (int r = 0; r < 6; ++r) lambda[r] += delta[r];
+    store_row_records(v, k, about, lambda, v.records);
+    return 0;
 }
 
-/* Blocks of threads for pairs, then blocks for row blocks. */
-template <int CONTACT_ROWS, bool MEASURE>
-static __global__ void constraints_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+/* ---- kernels over constraints: blocks of threads for pairs, then blocks for row blocks ----------------------------- */
+
+template <int LANES_A_PAIR> static __device__ __forceinline__ int32_t pair_threads(const cuda_view &v)
 {
-    int32_t pair_threads = (v.pair_room + THREADS - 1) / THREADS * THREADS, p = thread_index(), k = p - pair_threads;
+    return (LANES_A_PAIR * v.pair_room + THREADS - 1) / THREADS * THREADS;
+}
+
+/* The pair of thread t: work(pair, lane, live), in whole warps; lanes beyond the last pair come with that one, not live. */
+template <int LANES_A_PAIR, class Work>
+static __device__ __forceinline__ void with_pair(const cuda_view &v, int32_t t, Work work)
+{
+    const int32_t pairs = live_pairs(v), p = t / LANES_A_PAIR;
+    if (t / WARP * (WARP / LANES_A_PAIR) < pairs) work(p < pairs ? p : pairs - 1, t % LANES_A_PAIR, p < pairs);
+}
+
+template <int CONTACT_ROWS, int LANES_A_PAIR, int COUNT, bool MEASURE>
+static __global__ void __launch_bounds__(THREADS)
+    constraints_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    const int32_t t = thread_index(), k = t - pair_threads<LANES_A_PAIR>(v);
     double primal = 0;
-    if (k < 0) {
-        if (p < live_pairs(v)) sweep_pair<CONTACT_ROWS, MEASURE>(v, p, &primal);
-    } else if (k < live_rows(v)) {
-        sweep_row_block<MEASURE>(v, k, &primal);
-    }
+    if (k < 0)
+        with_pair<LANES_A_PAIR>(v, t, [&](int32_t p, int32_t lane, bool live) {
+            primal = sweep_pair<CONTACT_ROWS, LANES_A_PAIR, COUNT, MEASURE>(v, p, lane, live);
+        });
+    else if (k < live_rows(v)) primal = sweep_row_block<MEASURE>(v, k);
     if (MEASURE) reduce_max(primal, v.residual);
 }
 
 /* J^T lambda^0. */
-template <int CONTACT_ROWS>
+template <int CONTACT_ROWS, int LANES_A_PAIR>
 static __global__ void start_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    int32_t p = thread_index(), k = p - v.pair_room;
-    if (p < live_pairs(v)) {
-        vec3 normal = xyz(v.normal[p]), difference = xyz(v.difference[p]);
-        store_record(v.records + (size_t)p * RECORD, sum_points<pair_sum>(v.pair_count[p], [&](int32_t j) {
-            size_t slot = (size_t)j * (size_t)v.pair_room + (size_t)p;
-            vec3 arm = xyz(v.arm[slot]), lambda = load_lambda<CONTACT_ROWS>(v, slot);
-            return sum_of(impulse_of<CONTACT_ROWS>(normal, lambda), arm, v3_add(arm, difference));
-        }));
-    } else if (k >= 0 && k < live_rows(v)) {
+    const int32_t t = thread_index(), k = t - pair_threads<LANES_A_PAIR>(v);
+    if (k < 0) {
+        with_pair<LANES_A_PAIR>(v, t, [&](int32_t p, int32_t lane, bool live) {
+            start_pair<CONTACT_ROWS, LANES_A_PAIR>(v, p, lane, live);
+        });
+    } else if (k < live_rows(v)) {
         real lambda[6];
         load_row_lambda(v, k, lambda);
-        store_row_records(v, k, v.row_info[k].rows, lambda, v.records);
+        store_row_records(v, k, v.row_info[k], lambda, v.records);
     }
 }
 
-static __global__ void weigh_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+/* Where records go. */
+static __global__ void place_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    int32_t p = thread_index();
-    if (p >= live_pairs(v)) return;
-    int2 bodies = v.pair_bodies[p];
-    v.difference[p].w = inverse_weight(v, bodies.x, bodies.y);
+    const int32_t at = thread_index(), bodies = live_bodies(v);
+    if (bodies == 0 || at >= v.offsets[bodies]) return;
+    const int32_t half = v.incident[at], side = half & 1, k = half / 2 - v.pair_room;
+    if (k < 0) *(side ? &v.ends[half / 2].half_b : &v.ends[half / 2].half_a) = at;
+    else *(side ? &v.row_info[k].half_b : &v.row_info[k].half_a) = at;
 }
 
 /* (17) as the momentum residual A v - b - J^T lambda. */
@@ -198,18 +239,13 @@ static __global__ void dual_kernel(const __grid_constant__ cuda_view v, const __
         real g = -v.b[body * ROW + (size_t)r];
         for (int k = 0; k < 6; ++k) g += line_a(line, v.rigid, r, k) * state[k];
         for (int32_t at = v.offsets[i]; at < v.offsets[i + 1]; ++at)
-            g -= v.records[(size_t)v.incident[at] * ROW + (size_t)record_slot(r)];
+            g -= v.records[(size_t)at * ROW + (size_t)record_slot(r)];
         dual = fabs((double)g);
     }
     reduce_max(dual, v.residual + 1);
 }
 
 /* ---- launches ------------------------------------------------------------------------------------------------- */
-
-static int64_t constraint_blocks(const struct sadmm_context *c)
-{
-    return blocks_for(c->view.pair_room) + blocks_for(c->view.rows);
-}
 
 static sadmm_status launch_bodies(struct sadmm_context *c, bool join, struct sadmm_error *error)
 {
@@ -219,13 +255,26 @@ static sadmm_status launch_bodies(struct sadmm_context *c, bool join, struct sad
                         blocks_for((int64_t)c->view.bodies * LANES), &args, error);
 }
 
+static int64_t constraint_blocks(const cuda_view *v)
+{
+    return blocks_for((int64_t)v->lanes * v->pair_room) + blocks_for(v->rows);
+}
+
+template <int CONTACT_ROWS, int LANES_A_PAIR, int COUNT> static cuda_kernel sweep_kernel(bool measure)
+{
+    return measure ? constraints_kernel<CONTACT_ROWS, LANES_A_PAIR, COUNT, true>
+                   : constraints_kernel<CONTACT_ROWS, LANES_A_PAIR, COUNT, false>;
+}
+
 static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, struct sadmm_error *error)
 {
+    const bool one_row = c->view.contact_rows == 1;
     cuda_args args = {};
-    cuda_kernel kernel = c->view.contact_rows == 1
-                             ? (measure ? constraints_kernel<1, true> : constraints_kernel<1, false>)
-                             : (measure ? constraints_kernel<3, true> : constraints_kernel<3, false>);
-    return CUDA(launch)(c, kernel, "update_constraints", constraint_blocks(c), &args, error);
+    cuda_kernel kernel = c->view.lanes == 1 ? (one_row ? sweep_kernel<1, 1, 1>(measure) : sweep_kernel<3, 1, 1>(measure))
+                         : c->facts.point_slots <= 4
+                             ? (one_row ? sweep_kernel<1, 4, 1>(measure) : sweep_kernel<3, 4, 1>(measure))
+                             : (one_row ? sweep_kernel<1, 4, 2>(measure) : sweep_kernel<3, 4, 2>(measure));
+    return CUDA(launch)(c, kernel, "update_constraints", constraint_blocks(&c->view), &args, error);
 }
 
 static sadmm_status clear_primal(struct sadmm_context *c, bool measure, struct sadmm_error *error)
@@ -240,15 +289,18 @@ static sadmm_status clear_primal(struct sadmm_context *c, bool measure, struct s
 
 sadmm_status CUDA(prepare_stepwise)(struct sadmm_context *c, struct sadmm_error *error)
 {
+    const cuda_view *v = &c->view;
+    const bool one_row = v->contact_rows == 1;
     cuda_args args = {};
-    if (c->starting) {
-        CUDA_TRY(CUDA(launch)(c, c->view.contact_rows == 1 ? start_kernel<1> : start_kernel<3>, "start_records",
-                              blocks_for((int64_t)c->view.pair_room + c->view.rows), &args, error));
-        c->starting = false;
-    }
-    if (c->weighed) return SADMM_OK;
-    c->weighed = true;
-    return CUDA(launch)(c, weigh_kernel, "weigh_pairs", blocks_for(c->view.pair_room), &args, error);
+    if (!c->placed)
+        CUDA_TRY(CUDA(launch)(c, place_kernel, "place_records", blocks_for(2 * ((int64_t)v->pair_room + v->rows)), &args,
+                              error));
+    c->placed = true;
+    if (!c->starting) return SADMM_OK;
+    c->starting = false;
+    cuda_kernel kernel = v->lanes == 1 ? (one_row ? start_kernel<1, 1> : start_kernel<3, 1>)
+                                       : (one_row ? start_kernel<1, 4> : start_kernel<3, 4>);
+    return CUDA(launch)(c, kernel, "start_records", constraint_blocks(v), &args, error);
 }
 
 extern "C" sadmm_status CUDA(update_velocity)(struct sadmm_context *c, struct sadmm_error *error)

@@ -198,7 +198,9 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
     cuda_view *v = &c->view;
     size_t n = (size_t)v->bodies, pairs = (size_t)v->pair_room, rows = (size_t)v->row_stride,
            real_size = sizeof(solver_real);
-    size_t slots = (size_t)c->facts.point_slots * pairs, records = (pairs + (size_t)v->rows) * RECORD * real_size;
+    v->lanes = c->facts.point_slots <= 1 ? 1 : 4;
+    size_t lanes = (size_t)v->lanes, slots = ((size_t)c->facts.point_slots + lanes - 1) / lanes * lanes * pairs;
+    size_t records = 2 * (pairs + (size_t)v->rows) * ROW * real_size;
     size_t points = (size_t)v->points;
     bool three = v->contact_rows != 1;
     v->rigid = c->plan.rigid;
@@ -213,10 +215,9 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
         {BUFFER_BETA, n * sizeof(double)},
         {BUFFER_NORMAL, pairs * sizeof(real4)},
         {BUFFER_DIFFERENCE, pairs * sizeof(real4)},
-        {BUFFER_PAIR_BODIES, pairs * sizeof(int2)},
-        {BUFFER_PAIR_COUNT, pairs * sizeof(int32_t)},
+        {BUFFER_PAIR_ENDS, pairs * sizeof(pair_ends)},
         {BUFFER_ARM, slots * sizeof(real4)},
-        {BUFFER_LAMBDA, slots * (three ? sizeof(real4) : real_size)},
+        {BUFFER_LAMBDA, slots * (three ? 3 : 1) * real_size},
         {BUFFER_ROW_INFO, rows * sizeof(row_about)},
         {BUFFER_ROW_DATA, rows * ROW_PLANES * real_size},
         {BUFFER_RECORDS, records},
@@ -237,11 +238,10 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
     v->beta = (double *)b[BUFFER_BETA].data;
     v->normal = (real4 *)b[BUFFER_NORMAL].data;
     v->difference = (real4 *)b[BUFFER_DIFFERENCE].data;
-    v->pair_bodies = (int2 *)b[BUFFER_PAIR_BODIES].data;
-    v->pair_count = (int32_t *)b[BUFFER_PAIR_COUNT].data;
+    v->ends = (pair_ends *)b[BUFFER_PAIR_ENDS].data;
     v->arm = (real4 *)b[BUFFER_ARM].data;
-    v->lambda = (real4 *)(three ? b[BUFFER_LAMBDA].data : none);
-    v->lambda_n = (solver_real *)(three ? none : b[BUFFER_LAMBDA].data);
+    v->lambda = (solver_real *)b[BUFFER_LAMBDA].data;
+    v->lambda_stride = slots;
     v->row_info = (row_about *)b[BUFFER_ROW_INFO].data;
     v->row_data = (solver_real *)b[BUFFER_ROW_DATA].data;
     v->records = (solver_real *)b[BUFFER_RECORDS].data;
@@ -330,9 +330,9 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
                                     struct sadmm_error *error)
 {
     int64_t records = (int64_t)plan->pairs + system->block_count + WARP;
-    if (records > INT32_MAX / (2 * RECORD))
+    if (records > INT32_MAX / (4 * ROW))
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%lld constraints: at most %d", (long long)(records - WARP),
-                          INT32_MAX / (2 * RECORD) - WARP);
+                          INT32_MAX / (4 * ROW) - WARP);
     if (plan->bodies > INT32_MAX / LINE_GENERAL)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d bodies: at most %d", plan->bodies, INT32_MAX / LINE_GENERAL);
     CUDA_ENTER(c);
@@ -341,7 +341,7 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
     c->plan = *plan;
     c->settings = *settings;
     c->starting = true;
-    c->weighed = c->measured = c->rescaled = false;
+    c->placed = c->measured = c->rescaled = false;
     c->refused = 0;
     c->graph_valid = false;
     count(c);

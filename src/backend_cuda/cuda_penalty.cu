@@ -236,6 +236,7 @@ extern "C" sadmm_status CUDA(init_penalty)(struct sadmm_context *c, struct sadmm
     cuda_args args = {};
     CUDA_ENTER(c);
     c->starting = true;
+    c->placed = false;
     c->measured = false;
     c->rescaled = false;
     return launch_bodies(c, penalty_kernel<true, false>, "init_penalty", &args, error);
@@ -245,7 +246,6 @@ extern "C" sadmm_status CUDA(factorize)(struct sadmm_context *c, struct sadmm_er
 {
     cuda_args args = {};
     CUDA_ENTER(c);
-    c->weighed = false;
     return launch_bodies(c, penalty_kernel<false, true>, "factorize", &args, error);
 }
 
@@ -264,7 +264,7 @@ sadmm_status CUDA(enqueue_penalties)(struct sadmm_context *c, struct sadmm_error
     cuda_args args = {};
     args.planned = true;
     c->starting = true;
-    c->weighed = c->measured = c->rescaled = false;
+    c->placed = c->measured = c->rescaled = false;
     return launch_bodies(c, penalty_kernel<true, true>, "penalties", &args, error);
 }
 

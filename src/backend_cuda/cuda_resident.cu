@@ -235,10 +235,10 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE> struct pa
 
 /* ---- row blocks, out of line: few systems have them ------------------------------------------------------------ */
 
-/* Steps 2-4 of half `code` of a row block, into this side's records; `measure`: as after a measured iteration. */
+/* Steps 2-4 of half `code` of a row block, into this side's record; `change`: as after a measured iteration. */
 static __device__ __noinline__ double update_row_half(const cuda_view &v, int32_t code, const solver_real *own,
                                                       const solver_real *other, solver_real *kept, solver_real *record,
-                                                      bool measure)
+                                                      solver_real *change)
 {
     const int32_t k = code / 2 - v.pair_room, side = code & 1;
     const row_about about = v.row_info[k];
@@ -246,11 +246,11 @@ static __device__ __noinline__ double update_row_half(const cuda_view &v, int32_
     for (int j = 0; j < 6; ++j) lambda[j] = kept[j];
     update_row_block(v, k, about, side ? other : own, side ? own : other, lambda, delta);
     for (int j = 0; j < 6; ++j) kept[j] = lambda[j];
-    if (!measure)
+    if (!change)
         for (int j = 0; j < 6; ++j) lambda[j] += delta[j];
     store_row_record(v, k, about.rows, side, lambda, record);
-    if (!measure) return 0;
-    store_row_record(v, k, about.rows, side, delta, v.change + (size_t)code * ROW);
+    if (!change) return 0;
+    store_row_record(v, k, about.rows, side, delta, change);
     return row_block_primal(v, about, delta);
 }
 
@@ -299,21 +299,22 @@ PART __device__ __forceinline__ void PART_RUN::load_half(void)
         return;
     }
     const real4 about = v.normal[p];
-    const vec3 difference = xyz(v.difference[p]);
-    const int2 on = v.pair_bodies[p];
-    const int32_t count = v.pair_count[p];
+    const real4 between = v.difference[p];
+    const vec3 difference = xyz(between);
+    const pair_ends on = v.ends[p];
+    const int32_t count = (int32_t)between.w;
     own.pair = true;
     own.normal = xyz(about);
     own.friction = about.w;
     own.sign = side ? (real)1 : (real)-1;
-    own.own = v.slot_of[side ? on.y : on.x] - first_body;
-    find_other(side ? on.x : on.y);
-    const real inv_s = own.sign * inverse_weight(v, on.x, on.y);
+    own.own = v.slot_of[side ? on.body_b : on.body_a] - first_body;
+    find_other(side ? on.body_a : on.body_b);
+    const real inv_s = own.sign * inverse_weight(inv_beta_of(v, on.body_a), inv_beta_of(v, on.body_b));
 #pragma unroll
     for (int32_t j = 0; j < COUNT; ++j) {
         const int32_t k = lane + QUAD * j;
         if (k >= count) continue;
-        const size_t slot = (size_t)k * (size_t)v.pair_room + (size_t)p;
+        const size_t slot = point_slot(v, p, k);
         const real4 point = v.arm[slot];
         const vec3 arm_a = xyz(point), arm_b = v3_add(arm_a, difference);
         own.own_arm[j] = side ? arm_b : arm_a;
@@ -342,7 +343,7 @@ PART __device__ __forceinline__ void PART_RUN::load_records(void)
 {
     const real ratio = args.rescaled ? (real)*v.ratio : (real)1;
     for (int32_t i = t; i < halves * ROW; i += (int32_t)blockDim.x) {
-        const size_t from = (size_t)v.incident[first_half + i / ROW] * ROW + (size_t)(i % ROW);
+        const size_t from = (size_t)first_half * ROW + (size_t)i;
         m.records[i] = args.join ? v.records[from] + ratio * v.change[from] : v.records[from];
     }
 }
@@ -472,16 +473,16 @@ PART template <bool MEASURE> __device__ __forceinline__ double PART_RUN::update_
     if (!MEASURE && !has_rows()) return primal;
 
     const int32_t code = half < halves ? v.incident[first_half + half] : 0;
+    solver_real *change = MEASURE ? v.change + (size_t)(first_half + half) * ROW : nullptr;
     if (MEASURE) {
-        store_record((real2_pair *)(v.change + (size_t)code * ROW + quad_slot(lane)),
-                     sum_quad(lane, change_force, change_torque));
+        store_record((real2_pair *)(change + quad_slot(lane)), sum_quad(lane, change_force, change_torque));
         if (own.pair) {
-            const int2 on = v.pair_bodies[code / 2];
-            primal = (double)(largest * real_max(inv_beta_of(v, on.x), inv_beta_of(v, on.y)));
+            const pair_ends on = v.ends[code / 2];
+            primal = (double)(largest * real_max(inv_beta_of(v, on.body_a), inv_beta_of(v, on.body_b)));
         }
     }
     if (has_rows() && half < halves && !own.pair && lane == 0)
-        primal = update_row_half(v, code, own_row, other_row, m.row_lambda + half * ROW, m.records + half * ROW, MEASURE);
+        primal = update_row_half(v, code, own_row, other_row, m.row_lambda + half * ROW, m.records + half * ROW, change);
     return primal;
 }
 
@@ -493,16 +494,16 @@ PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
     for (int32_t i = t; i < bodies * ROW; i += (int32_t)blockDim.x)
         if (i % ROW < 6) v.state[raw_row(i)] = state(odd)[i];
     for (int32_t i = t; i < halves * ROW; i += (int32_t)blockDim.x)
-        v.records[(size_t)v.incident[first_half + i / ROW] * ROW + (size_t)(i % ROW)] = m.records[i];
+        v.records[(size_t)first_half * ROW + (size_t)i] = m.records[i];
     if (half >= halves) return;
     const int32_t code = v.incident[first_half + half], p = code / 2;
     if (own.pair) {
-        if (code & 1 && v.pair_bodies[p].x != v.bodies) return;
-        const int32_t count = v.pair_count[p];
+        if (code & 1 && v.ends[p].body_a != v.bodies) return;
+        const int32_t count = (int32_t)v.difference[p].w;
 #pragma unroll
         for (int32_t j = 0; j < COUNT; ++j) {
             const int32_t k = lane + QUAD * j;
-            if (k < count) store_lambda<CONTACT_ROWS>(v, (size_t)k * (size_t)v.pair_room + (size_t)p, own.lambda[j]);
+            if (k < count) store_lambda<CONTACT_ROWS>(v, point_slot(v, p, k), own.lambda[j]);
         }
     } else if (FULL && lane == 0) {
         const int32_t k = p - v.pair_room;

@@ -7,10 +7,9 @@
 /* Multiplier of a point as a world vector on b. */
 static __device__ vec3 point_impulse(const cuda_view &v, int32_t p, int32_t k, vec3 normal)
 {
-    size_t slot = (size_t)k * (size_t)v.pair_room + (size_t)p;
-    if (v.contact_rows == 1) return v3_scale(normal, (double)v.lambda_n[slot]);
-    real4 lambda = v.lambda[slot];
-    return v3((double)lambda.x, (double)lambda.y, (double)lambda.z);
+    const solver_real *lambda = v.lambda + point_slot(v, p, k);
+    if (v.contact_rows == 1) return v3_scale(normal, (double)lambda[0]);
+    return v3((double)lambda[0], (double)lambda[v.lambda_stride], (double)lambda[2 * v.lambda_stride]);
 }
 
 /* Q: semi-implicit Euler of body i. */

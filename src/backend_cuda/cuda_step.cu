@@ -280,7 +280,7 @@ static sadmm_status make_plan(struct sadmm_context *c, struct sadmm_error *error
     CUDA_TRY(look_at_step(c, &seen, error));
     c->plan = plan_of(c, &seen);
     s->guess.contact_rows = c->plan.contact_rows;
-    s->guess.point_slots = seen.facts.point_slots <= 4 ? 4 : SADMM_MAX_POINTS;
+    s->guess.point_slots = seen.facts.point_slots <= 1 ? 1 : seen.facts.point_slots <= 4 ? 4 : SADMM_MAX_POINTS;
     const bool matters = s->settings.penalty_period > 0 && s->settings.penalty_ratio_limit > 1 &&
                          s->settings.iterations > s->settings.penalty_period && !s->settings.penalty_update_warm &&
                          s->settings.warm_start;

@@ -3,6 +3,8 @@
 #ifndef SADMM_CUDA_SWEEP_H
 #define SADMM_CUDA_SWEEP_H
 
+#include <string.h>
+
 #include "../core/math/contact.h"
 #include "cuda_internal.h"
 
@@ -19,6 +21,18 @@ CUDA_INLINE real4 pack(vec3 a, real w)
     return out;
 }
 
+/* A value of 16 or 32 bytes that this launch reads once: it leaves the caches before those that stay useful. */
+template <class T> CUDA_INLINE T load_once(const T *from)
+{
+    enum { PARTS = sizeof(T) / sizeof(int4) };
+    int4 parts[PARTS];
+#pragma unroll
+    for (int i = 0; i < PARTS; ++i) parts[i] = __ldcs((const int4 *)from + i);
+    T value;
+    memcpy(&value, parts, sizeof value);
+    return value;
+}
+
 /* v of a body. */
 struct body_motion {
     vec3 linear, angular;
@@ -29,6 +43,20 @@ CUDA_INLINE body_motion load_motion(const solver_real *row)
     real4 lo = ((const real4 *)row)[0], hi = ((const real4 *)row)[1];
     body_motion m = {xyz(lo), v3(lo.w, hi.x, hi.y)};
     return m;
+}
+
+/* v and 1/beta of a body. */
+struct body_row {
+    body_motion motion;
+    real inv_beta;
+};
+
+CUDA_INLINE body_row load_row(const solver_real *state, int32_t body)
+{
+    const real4 *row = (const real4 *)(state + (size_t)body * ROW);
+    const real4 lo = row[0], hi = row[1];
+    body_row out = {{xyz(lo), v3(lo.w, hi.x, hi.y)}, hi.z}; /* STATE_INV_BETA */
+    return out;
 }
 
 CUDA_INLINE body_motion no_motion(void)
@@ -43,9 +71,9 @@ CUDA_INLINE real inv_beta_of(const cuda_view &v, int32_t body)
 }
 
 /* 1/s, s = 1/beta_a + 1/beta_b. */
-CUDA_INLINE real inverse_weight(const cuda_view &v, int32_t body_a, int32_t body_b)
+CUDA_INLINE real inverse_weight(real inv_beta_a, real inv_beta_b)
 {
-    real s = inv_beta_of(v, body_a) + inv_beta_of(v, body_b);
+    real s = inv_beta_a + inv_beta_b;
     return s > 0 ? 1 / s : (real)0;
 }
 
@@ -82,13 +110,16 @@ CUDA_INLINE vec3 relative_velocity(const body_motion &a, vec3 arm_a, const body_
 /* Multipliers of a point: a world vector, or its normal component alone in x when a contact has one row. */
 template <int CONTACT_ROWS> CUDA_INLINE vec3 load_lambda(const cuda_view &v, size_t slot)
 {
-    return CONTACT_ROWS == 3 ? xyz(v.lambda[slot]) : v3(v.lambda_n[slot], 0, 0);
+    const solver_real *lambda = v.lambda + slot;
+    return CONTACT_ROWS == 3 ? v3(lambda[0], lambda[v.lambda_stride], lambda[2 * v.lambda_stride]) : v3(lambda[0], 0, 0);
 }
 
 template <int CONTACT_ROWS> CUDA_INLINE void store_lambda(const cuda_view &v, size_t slot, vec3 lambda)
 {
-    if (CONTACT_ROWS == 3) v.lambda[slot] = pack(lambda, 0);
-    else v.lambda_n[slot] = lambda.x;
+    v.lambda[slot] = lambda.x;
+    if (CONTACT_ROWS == 1) return;
+    v.lambda[v.lambda_stride + slot] = lambda.y;
+    v.lambda[2 * v.lambda_stride + slot] = lambda.z;
 }
 
 /* Of x > 0 that is no denormal; 2 units of rounding. */

@@ -40,6 +40,9 @@
 struct int2 {
     int x, y;
 };
+struct alignas(16) int4 {
+    int x, y, z, w;
+};
 struct dim3 {
     unsigned x, y, z;
     dim3(unsigned x = 1, unsigned y = 1, unsigned z = 1) : x(x), y(y), z(z) {}
@@ -213,6 +216,7 @@ inline unsigned __ballot_sync(unsigned mask, bool vote)
         votes |= (unsigned)warp[lane].shuffled[turn] << lane;
     return votes;
 }
+template <class T> static inline T __ldcs(const T *from) { return *from; }
 inline int __popc(unsigned bits) { return __builtin_popcount(bits); }
 inline int __ffs(int bits) { return __builtin_ffs(bits); }
 
