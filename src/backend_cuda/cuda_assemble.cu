@@ -71,7 +71,7 @@ static __device__ real4 pack(vec3 a, double w)
 
 static __global__ void assemble_contacts_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    int32_t p = thread_index();
+    int32_t p = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x);
     if (p >= live_pairs(v)) return;
     const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
     const struct sadmm_contact_point *points = v.raw_points + pair->first;
@@ -144,8 +144,8 @@ extern "C" sadmm_status CUDA(assemble_contacts)(struct sadmm_context *c, struct 
 {
     cuda_args args = {};
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(launch)(c, assemble_contacts_kernel, "assemble_contacts", blocks_for(c->view.pair_room), &args,
-                          error));
+    CUDA_TRY(CUDA(launch_of)(c, assemble_contacts_kernel, "assemble_contacts",
+                             ((int64_t)c->view.pair_room + BODY_THREADS - 1) / BODY_THREADS, BODY_THREADS, &args, error));
     return c->plan.blocks[SADMM_BLOCK_CONTACT] ? assemble_rows(c, SADMM_BLOCK_CONTACT, error) : SADMM_OK;
 }
 

@@ -51,6 +51,7 @@ static size_t place_arrays(const struct sadmm_context *c, int32_t *base, struct 
     l->sorted = take(halves);
     l->incident = take(halves);
     l->parts = take((size_t)most_parts(c) + 1);
+    l->kept = (struct layout_kept *)take(sizeof *l->kept / sizeof(int32_t));
     return used * sizeof(int32_t);
 }
 
@@ -90,6 +91,7 @@ sadmm_status CUDA(layout_room)(struct sadmm_context *c, struct sadmm_error *erro
     CUDA_TRY(make_room(c, wanted, error));
     CUDA_TRY(number(c, halves > (size_t)v->bodies ? halves : (size_t)v->bodies, error));
     place_arrays(c, (int32_t *)c->buffers[BUFFER_LAYOUT].data, l);
+    CUDA_CALL(c, cudaMemsetAsync(l->kept, 0, sizeof *l->kept, c->stream), "cudaMemsetAsync(layout)");
     l->numbers = (const int32_t *)c->buffers[BUFFER_NUMBERS].data;
     l->temp = c->buffers[BUFFER_SORT].data;
     l->temp_bytes = c->buffers[BUFFER_SORT].capacity;

@@ -61,12 +61,15 @@ static bool take_room(const struct sadmm_context *c, struct cuda_partition *part
     bool rows = c->view.rows > 0;
     int64_t low = bound.bodies, high = larger(c->view.bodies, low);
     partition->most_halves = partition->threads / QUAD;
+    if (partition->threads == WARP && bound.bodies > WARP / LANES) return false;
     if ((int64_t)CUDA(resident_shared)(partition->tier, partition->threads, (int32_t)low, rows) > bytes) return false;
     while (low < high) { /* the most bodies that fit */
         int64_t middle = (low + high + 1) / 2;
         if ((int64_t)CUDA(resident_shared)(partition->tier, partition->threads, (int32_t)middle, rows) <= bytes) low = middle;
         else high = middle - 1;
     }
+    /* A block of one warp keeps all its bodies in registers (cuda_resident.cu). */
+    if (partition->threads == WARP) low = smaller(low, WARP / LANES);
     partition->most_bodies = (int32_t)low;
     partition->shared = CUDA(resident_shared)(partition->tier, partition->threads, partition->most_bodies, rows);
     return true;

@@ -38,12 +38,15 @@ static constexpr int most_threads(int points, int size)
 
 int CUDA(resident_threads)(int point_slots) { return most_threads(point_slots <= 4 ? 4 : 8, ANY_SIZE); }
 
+/* Records of a body that are fetched at once, whether it has them or not. */
+enum { FEW = 4 };
+
 /* ---- shared memory --------------------------------------------------------------------------------------------- */
 
 /* The same in every block of a launch: blocks of a cluster look into each other's memory. */
 struct part_memory {
     solver_real *state;      /* CLUSTER: of even, then of odd iterations; bodies x ROW each, then a row of 0 */
-    solver_real *records;    /* halves x ROW */
+    solver_real *records;    /* halves x ROW, and FEW rows that are read and not used */
     solver_real *row_lambda; /* halves x ROW, when there are row blocks */
     solver_real *lines, *b;  /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x line, ROW */
 };
@@ -56,7 +59,7 @@ static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *
     size_t more = n > first ? n - first : 0;
     m->state = (solver_real *)base;
     m->records = m->state + ((cluster ? 2 * n : n) + 1) * ROW;
-    m->row_lambda = m->records + halves * ROW;
+    m->row_lambda = m->records + (halves + FEW) * ROW;
     m->lines = m->row_lambda + (row_blocks ? halves * ROW : 0);
     m->b = m->lines + more * LINE_GENERAL;
     return (size_t)(m->b + more * ROW - m->state) * sizeof(solver_real);
@@ -174,7 +177,7 @@ CUDA_INLINE int32_t quad_slot(int32_t lane) { return (lane & 1) * QUAD + (lane &
 /* ---- a part ---------------------------------------------------------------------------------------------------- */
 
 template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE> struct part_run {
-    enum { COUNT = POINTS / QUAD, FEW = 4, MORE = 8 };
+    enum { COUNT = POINTS / QUAD, MORE = 8 };
     const cuda_view &v;
     const cuda_args &args;
     part_memory m;
@@ -202,6 +205,10 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE> struct pa
     {
         lay_out(&m, memory, MODE == CLUSTER, (int)blockDim.x, args.most_bodies, has_rows());
     }
+
+    /* A block of one warp has work, or would not be here. */
+    __device__ __forceinline__ bool has_moves(void) const { return SIZE == ONE_WARP || moves; }
+    __device__ __forceinline__ bool has_updates(void) const { return SIZE == ONE_WARP || updates; }
 
     __device__ __forceinline__ solver_real *state(int32_t odd) const
     {
@@ -388,7 +395,7 @@ PART __device__ __forceinline__ real PART_RUN::gather(real g, const solver_real 
 {
     real value[MORE];
 #pragma unroll
-    for (int32_t j = 0; j < FEW; ++j) value[j] = j < count ? from[j * ROW] : (real)0;
+    for (int32_t j = 0; j < FEW; ++j) value[j] = from[j * ROW];
 #pragma unroll
     for (int32_t j = 0; j < FEW; ++j)
         if (j < count) g += value[j];
@@ -412,11 +419,11 @@ PART __device__ __forceinline__ void PART_RUN::publish(int32_t i, real value, in
 
 PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd)
 {
-    if (moves) {
+    if (has_moves()) {
         move_body(&own_body, gather(momentum, gathered, gathered_count, many));
         publish(body, own_body.v, odd);
     }
-    if (SIZE == ONE_WARP && !FULL && bodies <= WARP / LANES) return;
+    if (SIZE == ONE_WARP) return; /* at most one body for each eight threads (cuda_partition.cu) */
     const int32_t in_registers = (int32_t)blockDim.x / LANES;
     for (int32_t first = in_registers; warp_has_body(first); first += in_registers) {
         const int32_t i = first + body, at = i - in_registers;
@@ -446,7 +453,7 @@ PART __device__ __forceinline__ void PART_RUN::store_record(real2_pair *record, 
 PART template <bool MEASURE> __device__ __forceinline__ double PART_RUN::update_halves(int32_t odd)
 {
     double primal = 0;
-    if (!updates) return primal;
+    if (!has_updates()) return primal;
     const solver_real *own_row = state(odd) + own.own * ROW, *other_row = own.other + (odd ? own.other_odd : 0);
     const body_motion own_motion = load_motion(own_row), other = load_motion(other_row);
     vec3 force = v3(0, 0, 0), torque = force, change_force = force, change_torque = force;
@@ -536,7 +543,7 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE))
         const int32_t odd = iteration & 1;
         part.move_bodies(odd);
         arrive<MODE, SIZE>(v.barrier);
-        if (part.moves) part.momentum = free_momentum(part.own_body);
+        if (part.has_moves()) part.momentum = free_momentum(part.own_body);
         wait<MODE, SIZE>(v.barrier, target += gridDim.x);
         if (FULL && args.measure && iteration == args.count)
             reduce_max(part.template update_halves<true>(odd), v.residual);

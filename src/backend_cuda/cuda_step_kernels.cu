@@ -12,6 +12,8 @@ static __device__ __forceinline__ bool finite_numbers(const double *x, int count
     return sum == 0;
 }
 
+enum { STEP_THREADS = 64 }; /* a block: few, for long work and many multiprocessors */
+
 /* ---- edits ----------------------------------------------------------------------------------------------------- */
 
 static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
@@ -33,7 +35,7 @@ static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __
 
 static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    int32_t i = thread_index();
+    int32_t i = (int32_t)(blockIdx.x * (unsigned)STEP_THREADS + threadIdx.x);
     if (v.live->halt) return;
     if (i == 0) {
         v.step.control->depth = 0;
@@ -65,8 +67,6 @@ static __global__ void admit_kernel(const __grid_constant__ cuda_view v, const _
     v.live->pairs = counts.pairs;
     v.live->points = counts.points;
 }
-
-enum { FINISH_THREADS = 64 }; /* few: long work, many multiprocessors */
 
 /* ---- finish ---------------------------------------------------------------------------------------------------- */
 
@@ -116,10 +116,10 @@ static __host__ __device__ inline finish_ranges ranges_of(const cuda_view &v)
 }
 
 /* Does not look at culprits of this very kernel: which body is named must not depend on who came first. */
-static __global__ void __launch_bounds__(FINISH_THREADS)
+static __global__ void __launch_bounds__(STEP_THREADS)
     finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    const int32_t i = (int32_t)(blockIdx.x * (unsigned)FINISH_THREADS + threadIdx.x);
+    const int32_t i = (int32_t)(blockIdx.x * (unsigned)STEP_THREADS + threadIdx.x);
     const finish_ranges range = ranges_of(v);
     struct cuda_step_control *control = v.step.control;
     double depth = 0;
@@ -184,7 +184,8 @@ sadmm_status CUDA(launch_edits)(struct sadmm_context *c, const struct sadmm_resi
 sadmm_status CUDA(launch_start)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    return CUDA(launch)(c, start_step_kernel, "start", blocks_for((int64_t)c->view.bodies + 1), &args, error);
+    return CUDA(launch_of)(c, start_step_kernel, "start", (int64_t)c->view.bodies / STEP_THREADS + 1, STEP_THREADS, &args,
+                           error);
 }
 
 sadmm_status CUDA(launch_admit)(struct sadmm_context *c, struct sadmm_error *error)
@@ -196,7 +197,7 @@ sadmm_status CUDA(launch_admit)(struct sadmm_context *c, struct sadmm_error *err
 sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    int64_t blocks = ((int64_t)ranges_of(c->view).end + FINISH_THREADS - 1) / FINISH_THREADS;
-    CUDA_TRY(CUDA(launch_of)(c, finish_kernel, "finish", blocks, FINISH_THREADS, &args, error));
+    int64_t blocks = ((int64_t)ranges_of(c->view).end + STEP_THREADS - 1) / STEP_THREADS;
+    CUDA_TRY(CUDA(launch_of)(c, finish_kernel, "finish", blocks, STEP_THREADS, &args, error));
     return CUDA(launch)(c, commit_kernel, "commit", 1, &args, error);
 }

@@ -136,6 +136,39 @@ static __device__ void survey(const layout_view &v, const layout_view &global, b
     if (t == 0) *global.facts = *v.facts;
 }
 
+/* Are the pairs, body by body, those that the arrays were made for? Then only what may differ is surveyed, into *facts
+ * (shared memory). Every thread comes here; `same` is shared. */
+static __device__ bool same_pairs(const layout_view &v, const layout_args &args, int32_t *same, cuda_facts *facts)
+{
+    const int32_t t = (int32_t)threadIdx.x, pairs = v.live->pairs;
+    const struct cuda_partition *now = &args.partition, *kept = &v.kept->partition;
+    cuda_facts own = {};
+    if (t == 0) {
+        *facts = own;
+        *same = v.kept->valid && v.kept->pairs == pairs && v.rows == 0 && kept->tier == now->tier &&
+                kept->parts == now->parts && kept->cluster == now->cluster && kept->most_halves == now->most_halves &&
+                kept->most_bodies == now->most_bodies;
+    }
+    __syncthreads();
+    if (!*same) return false;
+    __syncthreads();
+    for (int32_t p = t; p < pairs; p += ONE_BLOCK_THREADS) {
+        const struct sadmm_contact_pair &pair = v.pairs[p];
+        const int32_t a = pair.body_a >= 0 ? pair.body_a : v.bodies, b = pair.body_b >= 0 ? pair.body_b : v.bodies;
+        if (a != v.half_body[2 * p] || b != v.half_body[2 * p + 1]) *same = 0; /* whoever writes, writes 0 */
+        survey_pair(v, pair, &own);
+    }
+    __syncthreads();
+    if (!*same) return false;
+    gather_facts(facts, own);
+    if (t == 0) {
+        v.facts->rough = facts->rough;
+        v.facts->warm = facts->warm;
+        v.facts->point_slots = facts->point_slots;
+    }
+    return true;
+}
+
 static __device__ void load_survey(const layout_view &v, const layout_view &global)
 {
     for (int32_t i = (int32_t)threadIdx.x; i < v.bodies; i += ONE_BLOCK_THREADS) {
@@ -196,6 +229,8 @@ static __global__ void __launch_bounds__(ONE_BLOCK_THREADS)
     v.body_of = m.body_of;
     v.slot_of = m.slot_of;
     v.offsets = m.offsets;
+    if (args.survey && args.layout && same_pairs(global, args, m.most, m.facts)) return;
+    __syncthreads();
     if (args.survey) {
         v.facts = m.facts;
         survey(v, global, args.islands);
@@ -204,13 +239,22 @@ static __global__ void __launch_bounds__(ONE_BLOCK_THREADS)
     } else {
         load_survey(v, global);
     }
-    if (!args.layout) return;
+    if (!args.layout) {
+        if (threadIdx.x == 0) global.kept->valid = 0; /* half_body is another step's now */
+        return;
+    }
     int bits = 1;
     while (v.bodies >> bits) ++bits;
     make_slots(v, global, slots_by_island(&args.partition), bits, m);
     list_halves(v, global, bits, m);
     if (args.partition.tier != SADMM_CUDA_TIER_STREAM) make_parts(v, args.partition, ONE_BLOCK_THREADS, m.most);
     else if (threadIdx.x == 0) v.facts->part_halves = v.facts->part_bodies = 0;
+    __syncthreads();
+    if (threadIdx.x == 0) {
+        global.kept->valid = global.live->halt == HALT_NONE;
+        global.kept->pairs = global.live->pairs;
+        global.kept->partition = args.partition;
+    }
 }
 
 /* ---- launch ---------------------------------------------------------------------------------------------------- */

@@ -108,6 +108,14 @@ LAYOUT_INLINE bool starts_warm(const layout_view &v, const sadmm_contact_pair &p
     return false;
 }
 
+/* What may differ between steps of the same pairs. */
+LAYOUT_INLINE void survey_pair(const layout_view &v, const sadmm_contact_pair &pair, cuda_facts *own)
+{
+    own->point_slots = larger(own->point_slots, pair.count);
+    own->rough += pair.friction > 0;
+    if (v.warm_start) own->warm += starts_warm(v, pair);
+}
+
 /* A pair (record < pairs), a row block (record >= pair_room) or none. */
 LAYOUT_INLINE void survey_record(const layout_view &v, int32_t record, int32_t pairs, bool islands, cuda_facts *own)
 {
@@ -116,9 +124,7 @@ LAYOUT_INLINE void survey_record(const layout_view &v, int32_t record, int32_t p
         const sadmm_contact_pair &pair = v.pairs[record];
         body[0] = pair.body_a;
         body[1] = pair.body_b;
-        own->point_slots = larger(own->point_slots, pair.count);
-        own->rough += pair.friction > 0;
-        if (v.warm_start) own->warm += starts_warm(v, pair);
+        survey_pair(v, pair, own);
     } else if (record >= v.pair_room) {
         const sadmm_problem_block &block = v.blocks[record - v.pair_room];
         body[0] = block.body_a;
