@@ -111,7 +111,7 @@ static struct contact_problem *shuffled_towers(void)
 }
 
 /* A manifold of eight points: the larger instances. */
-static struct contact_problem *octagon(void)
+static struct contact_problem *octagons(double friction)
 {
     static const double up[3] = {0, 0, 1};
     struct contact_problem *p = contact_problem_new();
@@ -119,13 +119,39 @@ static struct contact_problem *octagon(void)
         contact_problem_box(p, 2, 0.1, 0.1, 0.1, 0.01 * i, 0, 0.1 + 0.2 * i);
         for (int k = 0; k < 8; ++k)
             contact_problem_touch(p, i - 1, i, (double[3]){0.1 * cos(0.7 * k), 0.1 * sin(0.7 * k), 0.2 * i}, up, 1e-4,
-                                  0.4, 0);
+                                  friction, 0);
     }
     return p;
 }
 
+/* No pair has more than one point: one thread a pair. Each ball rests on two of the row below, the lowest on the ground. */
+static struct contact_problem *balls(double friction)
+{
+    static const double up[3] = {0, 0, 1};
+    struct contact_problem *p = contact_problem_new();
+    const double radius = 0.1, height = radius * sqrt(3.0);
+    for (int row = 0, below = -1; row < 5; ++row) {
+        const int first = below + 1, width = 7 - row;
+        for (int i = 0; i < width; ++i) {
+            const double x = radius * (2 * i + row), z = radius + height * row;
+            int32_t ball = contact_problem_box(p, 1 + 0.1 * i, radius, radius, radius, x, 0, z);
+            if (row == 0) contact_problem_touch(p, -1, ball, (double[3]){x, 0, 0}, up, -1e-4, friction, 0);
+            for (int side = -1; row > 0 && side <= 1; side += 2)
+                contact_problem_touch(p, first - width - 1 + i + (side + 1) / 2, ball,
+                                      (double[3]){x + 0.5 * side * radius, 0, z - 0.5 * height},
+                                      (double[3]){-0.5 * side, 0, 0.5 * sqrt(3.0)}, 1e-4 * side, friction, 0);
+        }
+        below = first + width - 1;
+    }
+    return p;
+}
+
+static struct contact_problem *scene_balls(void) { return balls(0.5); }
+static struct contact_problem *scene_slippery_balls(void) { return balls(0); }
 static struct contact_problem *scene_mixed(void) { return contact_problem_mixed(11, 0.5); }
 static struct contact_problem *scene_slippery(void) { return contact_problem_mixed(12, 0); }
+static struct contact_problem *scene_octagons(void) { return octagons(0.4); }
+static struct contact_problem *scene_slippery_octagons(void) { return octagons(0); }
 static struct contact_problem *scene_pyramid(void) { return contact_problem_pyramid(7, 0.5); }
 static struct contact_problem *scene_towers(void) { return towers(25, 0.5); }
 static struct contact_problem *scene_slippery_towers(void) { return towers(9, 0); }
@@ -159,7 +185,10 @@ static const struct scene {
     {"towers", scene_towers, RIGID, true, 30},
     {"towers, frictionless", scene_slippery_towers, RIGID, false, 30},
     {"towers, shuffled", shuffled_towers, RIGID, true, 30},
-    {"octagons", octagon, RIGID, true, 30},
+    {"octagons", scene_octagons, RIGID, true, 30},
+    {"octagons, frictionless", scene_slippery_octagons, RIGID, false, 30},
+    {"balls", scene_balls, RIGID, true, 30},
+    {"balls, frictionless", scene_slippery_balls, RIGID, false, 30},
     {"large", scene_large, RIGID, true, 28},
     {"blocks alone", scene_blocks, RAW, true, 30},
     {"free bodies", scene_free, RIGID, true, 30},

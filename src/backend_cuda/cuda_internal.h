@@ -165,6 +165,7 @@ struct cuda_args {
     int32_t most_bodies, cluster; /* of the partition */
     int32_t planned;    /* a whole step: compare with the plan */
     int32_t rescaled;   /* ratio is view.ratio, else 1 */
+    int32_t backward;   /* thread blocks in descending order */
     const struct sadmm_resident_edit *edits;
     double factor;
 };
@@ -207,6 +208,7 @@ struct sadmm_context {
     cuda_buffer buffers[BUFFER_COUNT];
     bool starting; /* no iteration yet: the next Step 1 uses J^T lambda^0, which `records` may not hold yet */
     bool placed;   /* pairs and row blocks know the places of their halves */
+    bool backward; /* the next sweeps go over bodies and constraints from the last one to the first */
     bool measured; /* records and change are apart: the next Step 1 uses records + ratio change */
     bool rescaled; /* ... by view.ratio; else it is 1 */
     bool recording; /* a graph of the whole step: nothing is allocated, no graph launched in it */

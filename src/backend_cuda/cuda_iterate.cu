@@ -8,16 +8,19 @@ enum { GRAPH_ITERATIONS = 16 };
 
 /* ---- kernels -------------------------------------------------------------------------------------------------- */
 
-static __device__ __forceinline__ int32_t thread_index(void)
+/* Iterations go over the data forward and backward in turn: what one has touched last is still in the caches when the next
+ * one begins. */
+static __device__ __forceinline__ int32_t thread_index(const cuda_args &args)
 {
-    return (int32_t)(blockIdx.x * (unsigned)THREADS + threadIdx.x);
+    const unsigned block = args.backward ? gridDim.x - 1 - blockIdx.x : blockIdx.x;
+    return (int32_t)(block * (unsigned)THREADS + threadIdx.x);
 }
 
 /* Step 1: eight lanes a body. */
 template <bool JOIN> static __global__ void bodies_kernel(const __grid_constant__ cuda_view v,
                                                           const __grid_constant__ cuda_args args)
 {
-    int32_t i = thread_index() / LANES, r = (int32_t)threadIdx.x % LANES;
+    int32_t i = thread_index(args) / LANES, r = (int32_t)threadIdx.x % LANES;
     bool live = i < live_bodies(v), mine = live && r < 6;
     size_t at = live ? (size_t)v.body_of[i] : 0;
     body_lane body = load_body(live, r, v.lines + at * (size_t)v.line, v.rigid, v.b + at * ROW, v.state + at * ROW);
@@ -190,9 +193,9 @@ static __device__ __forceinline__ void with_pair(const cuda_view &v, int32_t t, 
 
 template <int CONTACT_ROWS, int LANES_A_PAIR, int COUNT, bool MEASURE>
 static __global__ void __launch_bounds__(THREADS)
-    constraints_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+    constraints_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    const int32_t t = thread_index(), k = t - pair_threads<LANES_A_PAIR>(v);
+    const int32_t t = thread_index(args), k = t - pair_threads<LANES_A_PAIR>(v);
     double primal = 0;
     if (k < 0)
         with_pair<LANES_A_PAIR>(v, t, [&](int32_t p, int32_t lane, bool live) {
@@ -204,9 +207,9 @@ static __global__ void __launch_bounds__(THREADS)
 
 /* J^T lambda^0. */
 template <int CONTACT_ROWS, int LANES_A_PAIR>
-static __global__ void start_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+static __global__ void start_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    const int32_t t = thread_index(), k = t - pair_threads<LANES_A_PAIR>(v);
+    const int32_t t = thread_index(args), k = t - pair_threads<LANES_A_PAIR>(v);
     if (k < 0) {
         with_pair<LANES_A_PAIR>(v, t, [&](int32_t p, int32_t lane, bool live) {
             start_pair<CONTACT_ROWS, LANES_A_PAIR>(v, p, lane, live);
@@ -219,9 +222,9 @@ static __global__ void start_kernel(const __grid_constant__ cuda_view v, const _
 }
 
 /* Where records go. */
-static __global__ void place_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+static __global__ void place_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    const int32_t at = thread_index(), bodies = live_bodies(v);
+    const int32_t at = thread_index(args), bodies = live_bodies(v);
     if (bodies == 0 || at >= v.offsets[bodies]) return;
     const int32_t half = v.incident[at], side = half & 1, k = half / 2 - v.pair_room;
     if (k < 0) *(side ? &v.ends[half / 2].half_b : &v.ends[half / 2].half_a) = at;
@@ -229,9 +232,9 @@ static __global__ void place_kernel(const __grid_constant__ cuda_view v, const _
 }
 
 /* (17) as the momentum residual A v - b - J^T lambda. */
-static __global__ void dual_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+static __global__ void dual_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    int32_t i = thread_index() / LANES, r = (int32_t)threadIdx.x % LANES;
+    int32_t i = thread_index(args) / LANES, r = (int32_t)threadIdx.x % LANES;
     double dual = 0;
     if (i < live_bodies(v) && r < 6) {
         size_t body = (size_t)v.body_of[i];
@@ -251,6 +254,7 @@ static sadmm_status launch_bodies(struct sadmm_context *c, bool join, struct sad
 {
     cuda_args args = {};
     args.rescaled = c->rescaled;
+    args.backward = c->backward;
     return CUDA(launch)(c, join ? bodies_kernel<true> : bodies_kernel<false>, "update_velocity",
                         blocks_for((int64_t)c->view.bodies * LANES), &args, error);
 }
@@ -270,6 +274,8 @@ static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, st
 {
     const bool one_row = c->view.contact_rows == 1;
     cuda_args args = {};
+    args.backward = c->backward;
+    c->backward = !c->backward;
     cuda_kernel kernel = c->view.lanes == 1 ? (one_row ? sweep_kernel<1, 1, 1>(measure) : sweep_kernel<3, 1, 1>(measure))
                          : c->facts.point_slots <= 4
                              ? (one_row ? sweep_kernel<1, 4, 1>(measure) : sweep_kernel<3, 4, 1>(measure))
