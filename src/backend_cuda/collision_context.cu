@@ -174,6 +174,9 @@ static sadmm_status room(struct sadmm_cuda_collision *c, int name, size_t count,
     CUDA_CALL(c, name >= PINNED_SHAPES ? cudaMallocHost(&b->data, wanted) : cudaMalloc(&b->data, wanted), what);
     b->capacity = wanted;
     ++c->stats.allocations;
+    /* Sets are copied whole when they grow, and the grid is read where there is no tree. */
+    if (name == GRID || (name >= PAIRS && name < SHAPES))
+        CUDA_CALL(c, cudaMemsetAsync(b->data, 0, wanted, c->stream), what);
     return SADMM_OK;
 }
 

@@ -92,6 +92,7 @@ sadmm_status CUDA(layout_room)(struct sadmm_context *c, struct sadmm_error *erro
     CUDA_TRY(number(c, halves > (size_t)v->bodies ? halves : (size_t)v->bodies, error));
     place_arrays(c, (int32_t *)c->buffers[BUFFER_LAYOUT].data, l);
     CUDA_CALL(c, cudaMemsetAsync(l->kept, 0, sizeof *l->kept, c->stream), "cudaMemsetAsync(layout)");
+    CUDA_CALL(c, cudaMemsetAsync(c->buffers[BUFFER_LIVE].data, 0, sizeof(known), c->stream), "cudaMemsetAsync(live)");
     l->numbers = (const int32_t *)c->buffers[BUFFER_NUMBERS].data;
     l->temp = c->buffers[BUFFER_SORT].data;
     l->temp_bytes = c->buffers[BUFFER_SORT].capacity;
@@ -229,8 +230,14 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
         {BUFFER_OUT, out},
         {PINNED_OUT, out},
     };
+    const void *const before[] = {c->buffers[BUFFER_ARM].data, c->buffers[BUFFER_LAMBDA].data};
     CUDA_TRY(make_room(c, wanted, error));
 
+    /* Lanes without a point read one all the same. */
+    for (enum cuda_buffer_name name : {BUFFER_ARM, BUFFER_LAMBDA})
+        if (c->buffers[name].data != before[name == BUFFER_LAMBDA])
+            CUDA_CALL(c, cudaMemsetAsync(c->buffers[name].data, 0, c->buffers[name].capacity, c->stream),
+                      "cudaMemsetAsync(points)");
     void *const none = nullptr;
     cuda_buffer *b = c->buffers;
     v->state = (solver_real *)b[BUFFER_STATE].data;

@@ -91,7 +91,6 @@ template <int MODE, int SIZE> static __device__ __forceinline__ void arrive(unsi
 #endif
 }
 
-/* `target`: arrivals in all when every block has come. */
 /* Of the block's own. */
 template <int SIZE> static __device__ __forceinline__ void block_barrier(void)
 {
@@ -99,6 +98,7 @@ template <int SIZE> static __device__ __forceinline__ void block_barrier(void)
     else __syncthreads();
 }
 
+/* `target`: arrivals in all when every block has come. */
 template <int MODE, int SIZE> static __device__ __forceinline__ void wait(const unsigned *arrivals, unsigned target)
 {
 #ifdef SADMM_CUDA_EMULATED

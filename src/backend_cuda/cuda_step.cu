@@ -65,7 +65,7 @@ static void view_into(struct sadmm_context *c, int into)
     step->after = rigid + (size_t)into * n;
     step->steady_before = steady + (size_t)(1 - into) * n;
     step->steady_after = steady + (size_t)into * n;
-    step->wrench = buffer<double>(c, BUFFER_WORLD_WRENCH);
+    step->wrench = buffer<double>(c, BUFFER_WORLD_WRENCH) + (size_t)into * 6 * n;
     step->start_velocity = buffer<double>(c, BUFFER_WORLD_VELOCITY);
     step->start_impulse = buffer<double>(c, BUFFER_WORLD_IMPULSE);
     step->points = set.points;
@@ -315,15 +315,10 @@ static sadmm_status record_graph(struct sadmm_context *c, int into, struct sadmm
     s->into = next;
     cudaError_t code = cudaStreamEndCapture(c->stream, &graph);
     if (status == SADMM_OK && code != cudaSuccess) status = CUDA(fail)(c, code, "cudaStreamEndCapture", error);
-    if (status == SADMM_OK && s->graphs[into]) {
-        cudaGraphExecUpdateResultInfo info;
-        if (cudaGraphExecUpdate(s->graphs[into], graph, &info) != cudaSuccess) {
-            (void)cudaGetLastError(); /* another topology: not an error, but remembered as one */
-            (void)cudaGraphExecDestroy(s->graphs[into]);
-            s->graphs[into] = nullptr;
-        }
-    }
-    if (status == SADMM_OK && !s->graphs[into]) {
+    /* Instantiated anew: plans change rarely, and then the graph's shape changes with them. */
+    if (s->graphs[into]) (void)cudaGraphExecDestroy(s->graphs[into]);
+    s->graphs[into] = nullptr;
+    if (status == SADMM_OK) {
         code = cudaGraphInstantiate(&s->graphs[into], graph, 0);
         if (code != cudaSuccess) {
             s->graphs[into] = nullptr;
@@ -515,7 +510,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     memset(&s->last, 0, sizeof s->last);
     CUDA_TRY(CUDA(room)(c, BUFFER_WORLD_BODIES, 2 * n * sizeof *world->rigid, error));
     CUDA_TRY(CUDA(room)(c, BUFFER_WORLD_STEADY, 2 * n * sizeof *world->steady, error));
-    CUDA_TRY(CUDA(room)(c, BUFFER_WORLD_WRENCH, 6 * n * sizeof(double), error));
+    CUDA_TRY(CUDA(room)(c, BUFFER_WORLD_WRENCH, 12 * n * sizeof(double), error));
     CUDA_TRY(CUDA(room)(c, BUFFER_WORLD_VELOCITY, 6 * n * sizeof(double), error));
     CUDA_TRY(CUDA(room)(c, BUFFER_WORLD_SLOTS, n * sizeof *world->slot_of, error));
     CUDA_TRY(CUDA(room)(c, BUFFER_WORLD_PLACES, slots * sizeof(struct sadmm_collision_body), error));
@@ -664,7 +659,8 @@ extern "C" sadmm_status CUDA(read_bodies)(struct sadmm_context *c, struct sadmm_
     view_into(c, s->into);
     CUDA_TRY(get(c, rigid, c->view.step.before, n * sizeof *rigid, error));
     CUDA_TRY(get(c, steady, c->view.step.steady_before, n * sizeof *steady, error));
-    return get(c, wrench, c->view.step.wrench, 6 * n * sizeof *wrench, error);
+    return get(c, wrench, buffer<double>(c, BUFFER_WORLD_WRENCH) + (size_t)(1 - s->into) * 6 * n, 6 * n * sizeof *wrench,
+               error);
 }
 
 extern "C" sadmm_status CUDA(read_contacts)(struct sadmm_context *c, struct sadmm_contact_set *contacts,
