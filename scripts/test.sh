@@ -5,6 +5,7 @@ set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 
 steps=(plain asan tsan minimal cuda)
+more_steps=(gpu) # only when asked for
 
 usage() {
     cat <<TXT
@@ -15,7 +16,10 @@ Installs what is missing (Debian and Ubuntu, as root or by sudo without a passwo
     asan     address and undefined-behaviour sanitizers, the whole suite
     tsan     thread sanitizer, the tests of suite 'threads'
     minimal  by clang, no optional feature, no instruction set beyond the compiler's default, the whole suite
-    cuda     when nvcc is found: the CUDA backend compiles; its tests run where there is a GPU
+    cuda     when nvcc is found: the CUDA backend compiles; its tests run where there is a GPU, and are counted as skipped
+             where there is none
+and, when asked for by --only, on a machine with a GPU:
+    gpu      the tests of suite 'gpu' under compute-sanitizer: memcheck, initcheck, synccheck, racecheck
 The last line sums up the checks of all steps. Exit status 0: nothing failed.
 
 --slow       run the tests of suite 'slow' too (in step plain)
@@ -32,7 +36,7 @@ while (($#)); do
     case $1 in
         --slow) slow=true ;;
         --only)
-            [[ " ${steps[*]} " == *" ${2:-} "* ]] || fail "--only ${2:-}: must be one of ${steps[*]}"
+            [[ " ${steps[*]} ${more_steps[*]} " == *" ${2:-} "* ]] || fail "--only ${2:-}: must be one of ${steps[*]} ${more_steps[*]}"
             only+=("$2")
             shift
             ;;
@@ -130,8 +134,22 @@ step_cuda() {
     if command -v nvidia-smi >/dev/null && nvidia-smi -L 2>/dev/null | grep -q GPU; then
         run_tests cuda --no-suite slow
     else
-        echo "compiled; no GPU here, its tests were not run"
+        echo "no GPU here: the tests of suite 'gpu' say so and are skipped"
+        run_tests cuda --suite gpu
     fi
+}
+
+step_gpu() {
+    local tool sanitizer
+    sanitizer=$(command -v compute-sanitizer || echo /usr/local/cuda/bin/compute-sanitizer)
+    [[ -x $sanitizer ]] || { echo "compute-sanitizer was not found"; return 1; }
+    build cuda "${features[@]}" -Dcuda=enabled || return 1
+    for tool in memcheck initcheck synccheck racecheck; do
+        say "gpu: $tool"
+        meson test -C "$project/build-cuda" --no-rebuild --suite gpu --num-processes 4 --timeout-multiplier 20 \
+            --logbase "gpu-$tool" --print-errorlogs --quiet --wrap "$sanitizer --tool $tool --error-exitcode 9" || true
+        logs+=("$project/build-cuda/meson-logs/gpu-$tool-compute-sanitizer.json") # meson adds the wrapper
+    done
 }
 
 for step in "${steps[@]}"; do

@@ -155,7 +155,7 @@ static __device__ bool same_pairs(const layout_view &v, const layout_args &args,
     for (int32_t p = t; p < pairs; p += ONE_BLOCK_THREADS) {
         const struct sadmm_contact_pair &pair = v.pairs[p];
         const int32_t a = pair.body_a >= 0 ? pair.body_a : v.bodies, b = pair.body_b >= 0 ? pair.body_b : v.bodies;
-        if (a != v.half_body[2 * p] || b != v.half_body[2 * p + 1]) *same = 0; /* whoever writes, writes 0 */
+        if (a != v.half_body[2 * p] || b != v.half_body[2 * p + 1]) atomicMin(same, 0);
         survey_pair(v, pair, &own);
     }
     __syncthreads();

@@ -57,21 +57,22 @@ LAYOUT_INLINE void gather_facts(struct cuda_facts *block, const cuda_facts &own)
 
 /* ---- islands --------------------------------------------------------------------------------------------------- */
 
-/* Parents only ever move towards the root, so an old one is as good as a new one; volatile: they are read again. */
+/* Parents only ever get smaller, on the way to the root, so an old one is as good as a new one. Several threads read and
+ * write them at once: atomically. */
+LAYOUT_INLINE int32_t parent_of(const int32_t *parents, int32_t i) { return atomicAdd(const_cast<int32_t *>(&parents[i]), 0); }
+
 LAYOUT_INLINE int32_t root_of(const int32_t *parents, int32_t i)
 {
-    const volatile int32_t *parent = parents;
-    for (int32_t up = parent[i]; up != i; up = parent[i]) i = up;
+    for (int32_t up = parent_of(parents, i); up != i; up = parent_of(parents, i)) i = up;
     return i;
 }
 
 /* The same, halving the way for those who come later. */
 LAYOUT_INLINE int32_t root_of_halving(int32_t *parents, int32_t i)
 {
-    volatile int32_t *parent = parents;
-    for (int32_t up = parent[i]; up != i;) {
-        int32_t next = parent[up];
-        if (next != up) parent[i] = next; /* i is no root: nobody hooks it now */
+    for (int32_t up = parent_of(parents, i); up != i;) {
+        int32_t next = parent_of(parents, up);
+        if (next != up) atomicMin(&parents[i], next); /* i is no root: nobody hooks it now */
         i = up;
         up = next;
     }
@@ -155,7 +156,7 @@ LAYOUT_INLINE void survey_body(const layout_view &v, int32_t i, bool islands, cu
     own->degree = larger(own->degree, degree);
     if (!islands) return;
     const int32_t label = live ? root_of(v.label, i) : -1;
-    if (live) v.label[i] = label;
+    if (live) atomicMin(&v.label[i], label); /* its root: no larger than what is there */
     own->islands += live && label == i;
     /* Neighbours are mostly of one island: those of the first lane's go together. */
     const bool together = label == __shfl_sync(WHOLE_WARP, label, 0, LAYOUT_WARP);
