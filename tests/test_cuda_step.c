@@ -38,10 +38,10 @@ enum { EMULATED = 0 };
 /* ---- worlds ---------------------------------------------------------------------------------------------------- */
 
 /* Give a world the device's kernels before its first step. */
-static void use_device(sadmm_world *world, int precision)
+static void use_device(sadmm_world *world, int precision, int device)
 {
     world->kernels = tables[precision];
-    ck_assert_msg(world->kernels->create(0, &world->context, &world->error) == SADMM_OK, "%s", world->error.message);
+    ck_assert_msg(world->kernels->create(device, &world->context, &world->error) == SADMM_OK, "%s", world->error.message);
 }
 
 /* The host makes the steps: a stop rule has to be looked at, and nothing ever meets this one. */
@@ -86,7 +86,7 @@ static void add_ground(sadmm_world *world, double friction)
 }
 
 /* Towers of boxes that fall a little and land in different steps; every third one leans on its neighbour. */
-static sadmm_world *towers(int count, int height, double friction, int precision)
+static sadmm_world *towers_on(int count, int height, double friction, int precision, int device)
 {
     sadmm_world_def def = sadmm_world_def_default();
     def.backend = SADMM_BACKEND_CPU;
@@ -98,8 +98,26 @@ static sadmm_world *towers(int count, int height, double friction, int precision
     for (int t = 0; t < count; ++t)
         for (int i = 0; i < height; ++i)
             add_box(world, t % 3 == 2 ? 0.5 * t - 0.29 : 0.5 * t, 0.01 * i, 0.1 + 0.002 * t + 0.201 * i, 0.1, 1 + i, friction);
-    use_device(world, precision);
+    use_device(world, precision, device);
     return world;
+}
+
+static sadmm_world *towers(int count, int height, double friction, int precision)
+{
+    return towers_on(count, height, friction, precision, 0);
+}
+
+/* The last device: another one than the first where there are several. */
+static int last_device(void)
+{
+    struct sadmm_context *context;
+    struct sadmm_error error;
+    int device = 0;
+    while (tables[0]->create(device + 1, &context, &error) == SADMM_OK) {
+        tables[0]->destroy(context);
+        ++device;
+    }
+    return device;
 }
 
 static void expect_same_world(sadmm_world *a, sadmm_world *b, const char *what)
@@ -354,6 +372,26 @@ START_TEST(tiers_agree)
 }
 END_TEST
 
+/* Worlds of two precisions on one device, and one on another device, step by step in turn: each as if it were alone. */
+START_TEST(worlds_side_by_side)
+{
+    const int steps = EMULATED ? 5 : 20, device = last_device();
+    sadmm_world *worlds[3], *alone[3];
+    for (int k = 0; k < 3; ++k) {
+        worlds[k] = towers_on(2 + k % 2, 2, 0.5, k % 2, k == 2 ? device : 0);
+        alone[k] = towers(2 + k % 2, 2, 0.5, k % 2);
+    }
+    for (int step = 0; step < steps; ++step)
+        for (int k = 0; k < 3; ++k) MUST(worlds[k], sadmm_world_step_async(worlds[k]));
+    for (int k = 0; k < 3; ++k) {
+        step_world(alone[k], steps);
+        expect_same_world(worlds[k], alone[k], k == 2 ? "the last device" : "the first device");
+        sadmm_world_destroy(alone[k]);
+    }
+    for (int k = 0; k < 3; ++k) sadmm_world_destroy(worlds[k]);
+}
+END_TEST
+
 /* No memory: the step fails, nothing is lost, and the next one with memory goes on. */
 START_TEST(lack_of_memory)
 {
@@ -435,6 +473,7 @@ int main(void)
     tcase_add_loop_test(tests, readings_of_a_resident_step, 0, 2);
     tcase_add_loop_test(tests, a_step_that_fails_leaves_the_world_before_it, 0, 2);
     tcase_add_loop_test(tests, tiers_agree, 0, 2);
+    tcase_add_test(tests, worlds_side_by_side);
     tcase_add_loop_test(tests, lack_of_memory, 0, 2);
 #ifdef CUDA_EMULATED
     tcase_add_loop_test(tests, calls_that_fail, 0, 2);

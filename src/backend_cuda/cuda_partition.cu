@@ -79,8 +79,8 @@ static bool take_room(const struct sadmm_context *c, struct cuda_partition *part
 static struct bound island_bound(const struct sadmm_context *c, const struct cuda_facts *facts, int64_t shares)
 {
     int64_t share = up((int64_t)facts->halves + c->view.bodies, shares);
-    struct bound bound = {smaller(facts->halves, share - 1 + facts->island_halves),
-                          smaller(c->view.bodies, share - 1 + facts->island_bodies)};
+    struct bound bound = {smaller(facts->halves, larger(share - 1, 0) + facts->island_halves),
+                          smaller(c->view.bodies, larger(share - 1, 0) + facts->island_bodies)};
     return bound;
 }
 
@@ -88,7 +88,7 @@ static struct bound island_bound(const struct sadmm_context *c, const struct cud
 static struct bound body_bound(const struct sadmm_context *c, const struct cuda_facts *facts, int64_t shares)
 {
     int64_t share = up((int64_t)facts->halves + c->view.bodies, shares);
-    struct bound bound = {smaller(facts->halves, share - 1 + facts->degree), smaller(c->view.bodies, share)};
+    struct bound bound = {smaller(facts->halves, larger(share - 1, 0) + facts->degree), smaller(c->view.bodies, share)};
     return bound;
 }
 
@@ -156,7 +156,7 @@ static struct choice choose_cluster_of(const struct sadmm_context *c, const stru
     for (;; clusters += clusters / 4 + 1) {
         const struct bound whole = island_bound(c, facts, clusters);
         const int64_t share = up(smaller(cost, whole.halves + whole.bodies), size);
-        bound.halves = smaller(whole.halves, share - 1 + facts->degree);
+        bound.halves = smaller(whole.halves, larger(share - 1, 0) + facts->degree);
         bound.bodies = smaller(whole.bodies, share);
         if (bound.halves <= most_halves) break;
         if (clusters >= cost) return no_choice(too_large);
