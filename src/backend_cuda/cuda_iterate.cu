@@ -169,11 +169,11 @@ template <bool MEASURE> static __device__ __forceinline__ double sweep_row_block
     if (MEASURE) {
         store_row_records(v, k, about, lambda, v.records);
         store_row_records(v, k, about, delta, v.change);
-        return row_block_primal(v, about, delta);
+    } else {
+        for (int r = 0; r < 6; ++r) lambda[r] += delta[r];
+        store_row_records(v, k, about, lambda, v.records);
     }
-    for (int r = 0; r < 6; ++r) lambda[r] += delta[r];
-    store_row_records(v, k, about, lambda, v.records);
-    return 0;
+    return MEASURE ? row_block_primal(v, about, delta) : 0;
 }
 
 /* ---- kernels over constraints: blocks of threads for pairs, then blocks for row blocks ----------------------------- */
