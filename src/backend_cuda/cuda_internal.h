@@ -28,8 +28,8 @@
  * Launch sizes follow from what the host knows (rooms, tier); kernels read the true counts from `live`, and do nothing
  * once it says halt.
  *
- * Raw data (bodies, contact pairs and points, blocks as core has them, in double) is copied to the device as it is and
- * turned into this layout there, so that a collision stage on the device can later produce the contacts in place.
+ * Raw data (bodies, contact pairs and points, blocks as core has them, in double) is turned into this layout on the device.
+ * In a whole step contact finding leaves it there; for a solve alone the host copies it.
  */
 #ifndef SADMM_CUDA_INTERNAL_H
 #define SADMM_CUDA_INTERNAL_H
@@ -77,19 +77,20 @@ struct alignas(16) real4 {
 };
 
 struct row_about {
-    int32_t kind, rows, body_a, body_b; /* slots */
+    int32_t kind, rows, body_a, body_b; /* raw; the static world: `bodies` */
     int32_t half_a, half_b;             /* as in pair_ends */
     int32_t active;                     /* bit r: row r exists (a hard row of zeros is no constraint, Sec. III-C) */
 };
 
 /* What a pair joins. */
 struct alignas(16) pair_ends {
-    int32_t body_a, body_b; /* slots; the static world: `bodies` */
+    int32_t body_a, body_b; /* raw; the static world: `bodies` */
     int32_t half_a, half_b; /* places of its halves in `incident`, and of their records; of the static world: -1.
                                For the stepwise kernels alone (prepare_stepwise) */
 };
 
-/* What kernels see. Pointers are device memory. Bodies are counted in slots unless "raw" (cuda_layout.h). */
+/* What kernels see. Pointers are device memory. Arrays over bodies are in raw order; offsets, parts and the states of
+ * resident blocks count bodies in slots (cuda_layout.h). */
 struct cuda_view {
     struct cuda_live *live;
     struct cuda_facts *facts;

@@ -23,7 +23,6 @@ enum { QUAD = 4 }; /* lanes a half */
 
 #define CLUSTER_ARCH 900 /* of the first devices with clusters of thread blocks */
 
-/* Threads a block at most: what the registers of a multiprocessor are enough for. */
 /* Sizes of blocks an instance is made for: few threads may have all the registers they want, and a single warp needs no
  * barrier (BLOCK alone). */
 enum block_size { ANY_SIZE, SMALL, ONE_WARP };

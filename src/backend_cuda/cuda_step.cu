@@ -5,6 +5,7 @@
 
 #include "../collision/collision.h"
 #include "../core/memory.h"
+#include "../core/schedule.h"
 #include "collision_device.h"
 #include "cuda_internal.h"
 
@@ -130,26 +131,16 @@ struct side_branch {
 };
 } // namespace
 
-static int until(int done, int period, int limit)
-{
-    if (period <= 0) return limit;
-    return std::min(period - done % period, limit);
-}
-
 /* schedule.c's iterations, with the ratio of (15) found on the device. */
 static sadmm_status enqueue_iterations(struct sadmm_context *c, struct sadmm_error *error)
 {
-    const struct sadmm_plan *plan = &c->plan;
-    const int budget = plan->contact_rows > 0 ? c->settings.iterations : 1;
+    const int budget = sadmm_schedule_budget(&c->plan, &c->settings);
     for (int done = 0; done < budget;) {
-        int count = plan->penalty_updates ? until(done, c->settings.penalty_period, budget - done) : budget - done;
-        done += count;
-        const bool last = done == budget;
-        const bool update = plan->penalty_updates && !last && done % c->settings.penalty_period == 0;
-        const bool measure = plan->residuals && (update || (last && c->settings.measure_residuals));
-        CUDA_TRY(CUDA(iterate)(c, count, measure, error));
-        if (measure) CUDA_TRY(CUDA(enqueue_residuals)(c, error));
-        if (update) {
+        const struct sadmm_stretch next = sadmm_schedule_stretch(&c->plan, &c->settings, done);
+        CUDA_TRY(CUDA(iterate)(c, next.count, next.measure, error));
+        done += next.count;
+        if (next.measure) CUDA_TRY(CUDA(enqueue_residuals)(c, error));
+        if (next.update) {
             CUDA_TRY(CUDA(enqueue_balance)(c, error));
             CUDA_TRY(CUDA(factorize)(c, error));
         }
@@ -231,11 +222,9 @@ static sadmm_status look_at_step(struct sadmm_context *c, struct look *out, stru
     }
 }
 
-/* As plan.c, from facts. */
 static struct sadmm_plan plan_of(const struct sadmm_context *c, const struct look *seen)
 {
     const struct cuda_step *s = c->step;
-    const struct sadmm_settings *settings = &s->settings;
     struct sadmm_plan plan = {};
     plan.bodies = s->bodies;
     plan.pairs = seen->live.pairs;
@@ -243,15 +232,8 @@ static struct sadmm_plan plan_of(const struct sadmm_context *c, const struct loo
     plan.contact_rows = plan.points == 0 ? 0 : seen->facts.rough > 0 ? 3 : 1;
     plan.rigid = true;
     plan.gyroscopic = c->plan.gyroscopic; /* since load */
-    plan.warm_start = settings->warm_start;
-    plan.warm = plan.warm_start && plan.pairs > 0 && 2 * (int64_t)seen->facts.warm >= plan.pairs;
-    plan.penalty_updates = plan.points > 0 && settings->penalty_period > 0 && settings->penalty_ratio_limit > 1 &&
-                           settings->iterations > settings->penalty_period &&
-                           (settings->penalty_update_warm || !plan.warm);
-    plan.certificate = settings->certify;
-    plan.residuals = plan.points > 0 && (plan.penalty_updates || settings->measure_residuals);
-    plan.wrenches = settings->recover_wrenches;
     plan.threads = 1;
+    sadmm_plan_settle(&plan, &s->settings, plan.pairs > 0 && 2 * (int64_t)seen->facts.warm >= plan.pairs);
     return plan;
 }
 
@@ -281,10 +263,7 @@ static sadmm_status make_plan(struct sadmm_context *c, struct sadmm_error *error
     c->plan = plan_of(c, &seen);
     s->guess.contact_rows = c->plan.contact_rows;
     s->guess.point_slots = seen.facts.point_slots <= 1 ? 1 : seen.facts.point_slots <= 4 ? 4 : SADMM_MAX_POINTS;
-    const bool matters = s->settings.penalty_period > 0 && s->settings.penalty_ratio_limit > 1 &&
-                         s->settings.iterations > s->settings.penalty_period && !s->settings.penalty_update_warm &&
-                         s->settings.warm_start;
-    s->guess.warm = matters ? c->plan.warm : -1;
+    s->guess.warm = sadmm_plan_depends_on_warmth(&s->settings) ? c->plan.warm : -1;
     view_counts(c, generous(seen.counts.pairs));
     c->view.points = 0; /* results are read elsewhere */
     seen.facts.point_slots = s->guess.point_slots;
@@ -519,11 +498,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     CUDA_CALL(c, cudaMemsetAsync(buffer<void>(c, BUFFER_WORLD_CONTROL), 0, sizeof(struct cuda_step_control), c->stream),
               "cudaMemsetAsync(control)");
 
-    c->plan.gyroscopic = false;
-    for (size_t i = 0; i < n && !c->plan.gyroscopic; ++i) {
-        const double *inertia = world->rigid[i].inertia;
-        c->plan.gyroscopic = inertia[0] != inertia[1] || inertia[1] != inertia[2];
-    }
+    c->plan.gyroscopic = sadmm_plan_is_gyroscopic(world->rigid, world->body_count);
     /* The state before the first step is the one that is not written by it. */
     CUDA_TRY(COLLISION(upload)(s->collision, c->stream, world->contacts, error));
     s->into = 1 - COLLISION(current)(s->collision);

@@ -24,13 +24,13 @@
 
 enum { LAYOUT_THREADS = 256, ONE_BLOCK_THREADS = 1024 };
 
-/* Device memory. A half that is none (no pair, a static side) has body and slot `bodies`. */
 /* What the arrays hold, so that a scene whose pairs are still the same keeps them (one_block). */
 struct layout_kept {
     int32_t valid, pairs;
     struct cuda_partition partition;
 };
 
+/* Device memory. A half that is none (no pair, a static side) has body and slot `bodies`. */
 struct layout_view {
     struct cuda_live *live;
     struct cuda_facts *facts;

@@ -47,6 +47,37 @@ static bool starts_warm(const struct sadmm_system *system)
     return total > 0 && 2 * warm >= total;
 }
 
+bool sadmm_plan_is_gyroscopic(const struct sadmm_rigid *rigid, int32_t count)
+{
+    for (int32_t i = 0; i < count; ++i)
+        if (!rigid_is_isotropic(v3_load(rigid[i].inertia))) return true;
+    return false;
+}
+
+static bool may_update_penalty(const struct sadmm_settings *settings)
+{
+    return settings->penalty_period > 0 && settings->penalty_ratio_limit > 1 &&
+           settings->iterations > settings->penalty_period;
+}
+
+bool sadmm_plan_depends_on_warmth(const struct sadmm_settings *settings)
+{
+    return may_update_penalty(settings) && settings->warm_start && !settings->penalty_update_warm;
+}
+
+void sadmm_plan_settle(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm)
+{
+    bool constrained = plan->points > 0 || plan->blocks[SADMM_BLOCK_CONTACT] > 0 ||
+                       plan->blocks[SADMM_BLOCK_HARD] > 0 || plan->blocks[SADMM_BLOCK_SOFT] > 0;
+    plan->warm_start = settings->warm_start;
+    plan->warm = plan->warm_start && mostly_warm;
+    plan->penalty_updates = constrained && may_update_penalty(settings) && (settings->penalty_update_warm || !plan->warm);
+    plan->certificate = settings->certify || settings->certificate_tolerance > 0;
+    plan->residuals = constrained && (plan->penalty_updates || settings->measure_residuals ||
+                                      settings->residual_tolerance > 0);
+    plan->wrenches = settings->recover_wrenches;
+}
+
 struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struct sadmm_settings *settings)
 {
     struct sadmm_plan plan = {0};
@@ -60,20 +91,8 @@ struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struc
     }
     for (int32_t k = 0; k < system->block_count; ++k) ++plan.blocks[system->blocks[k].kind];
     plan.rigid = system->rigid != NULL;
-    for (int32_t i = 0; plan.rigid && !plan.gyroscopic && i < system->body_count; ++i) {
-        const double *inertia = system->rigid[i].inertia;
-        plan.gyroscopic = !rigid_is_isotropic(v3_load(inertia));
-    }
-    bool constrained = plan.points > 0 || system->block_count > 0;
-    plan.warm_start = settings->warm_start;
-    plan.warm = plan.warm_start && starts_warm(system);
-    plan.penalty_updates = constrained && settings->penalty_period > 0 && settings->penalty_ratio_limit > 1 &&
-                           settings->iterations > settings->penalty_period &&
-                           (settings->penalty_update_warm || !plan.warm);
-    plan.certificate = settings->certify || settings->certificate_tolerance > 0;
-    plan.residuals = constrained && (plan.penalty_updates || settings->measure_residuals ||
-                                     settings->residual_tolerance > 0);
-    plan.wrenches = settings->recover_wrenches;
+    plan.gyroscopic = plan.rigid && sadmm_plan_is_gyroscopic(system->rigid, system->body_count);
+    sadmm_plan_settle(&plan, settings, settings->warm_start && starts_warm(system));
     plan.threads = sadmm_plan_threads(settings->threads, (size_t)plan.points + 4 * (size_t)system->block_count);
     return plan;
 }

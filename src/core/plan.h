@@ -7,6 +7,10 @@
 
 #include "system.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 struct sadmm_plan {
     int32_t bodies;         /* dynamic */
     int32_t pairs, points;  /* contacts given by geometry */
@@ -26,6 +30,19 @@ struct sadmm_plan {
 /* Threads for `points` contact points: as many as `wanted`, or for 0 as many as have enough to do. */
 int sadmm_plan_threads(int wanted, size_t points);
 
+/* What follows from the settings once the counts and `contact_rows` are in; `mostly_warm`: at least half of the constraints
+ * (contacts counted by pairs) carry an impulse. `threads` is left alone. */
+void sadmm_plan_settle(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm);
+
+/* Does the number of warm constraints decide anything in a plan with contacts? */
+bool sadmm_plan_depends_on_warmth(const struct sadmm_settings *settings);
+
+/* Does one of the bodies have unequal principal moments? */
+bool sadmm_plan_is_gyroscopic(const struct sadmm_rigid *rigid, int32_t count);
+
 struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struct sadmm_settings *settings);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -63,9 +63,10 @@ struct sadmm_resident_kernels {
     /* The world after the last step done; any pointer may be NULL. Nothing may be enqueued. */
     sadmm_status (*read_bodies)(struct sadmm_context *, struct sadmm_rigid *rigid, struct sadmm_steady *steady,
                                 double *wrench /* (bodies x 6) */, struct sadmm_error *);
-    /* The last step done: contacts with impulses, and what it started from: bodies, velocities (bodies x 6) and impulses
-     * (points x 3). `impulse` NULL: contacts only. Nothing may be enqueued. */
+    /* Contacts of the last step done, with its impulses. Nothing may be enqueued. */
     sadmm_status (*read_contacts)(struct sadmm_context *, struct sadmm_contact_set *contacts, struct sadmm_error *);
+    /* What the last step done started from: bodies, velocities (bodies x 6, m/s and rad/s) and impulses (points x 3, N s);
+     * any pointer may be NULL. Nothing may be enqueued. */
     sadmm_status (*read_start)(struct sadmm_context *, struct sadmm_rigid *rigid, double *velocity, double *impulse,
                                struct sadmm_error *);
 };

@@ -58,6 +58,33 @@ static int until(int done, int period, int limit)
     return left < limit ? left : limit;
 }
 
+static bool constrained(const struct sadmm_plan *plan)
+{
+    return plan->points > 0 || plan->blocks[SADMM_BLOCK_CONTACT] > 0 || plan->blocks[SADMM_BLOCK_HARD] > 0 ||
+           plan->blocks[SADMM_BLOCK_SOFT] > 0;
+}
+
+int sadmm_schedule_budget(const struct sadmm_plan *plan, const struct sadmm_settings *settings)
+{
+    return constrained(plan) ? settings->iterations : 1;
+}
+
+struct sadmm_stretch sadmm_schedule_stretch(const struct sadmm_plan *plan, const struct sadmm_settings *settings, int done)
+{
+    bool stop_rule = constrained(plan) && (settings->residual_tolerance > 0 || settings->certificate_tolerance > 0);
+    int budget = sadmm_schedule_budget(plan, settings);
+    struct sadmm_stretch next = {.count = budget - done};
+    if (plan->penalty_updates) next.count = until(done, settings->penalty_period, next.count);
+    if (stop_rule) next.count = until(done, settings->check_period, next.count);
+    int after = done + next.count;
+    next.last = after == budget;
+    next.update = plan->penalty_updates && !next.last && after % settings->penalty_period == 0;
+    next.look = stop_rule && (next.last || after % settings->check_period == 0);
+    next.measure = plan->residuals && (next.update || (next.last && settings->measure_residuals) ||
+                                       (next.look && settings->residual_tolerance > 0));
+    return next;
+}
+
 static bool finite_array(const double *x, size_t count)
 {
     double sum = 0; /* NaN and infinity survive a sum of x - x */
@@ -90,24 +117,14 @@ static sadmm_status run(const struct sadmm_kernels *k, struct sadmm_context *c, 
                         const struct sadmm_settings *s, const struct sadmm_plan *plan,
                         struct sadmm_solve_report *report, struct sadmm_error *error)
 {
-    bool constrained = plan->points || system->block_count;
-    bool stop_rule = constrained && (s->residual_tolerance > 0 || s->certificate_tolerance > 0);
-    /* Without constraints Step 1 is exact at once: v = A^-1 b. */
-    int budget = constrained ? s->iterations : 1;
-    int done = 0;
-    while (done < budget) {
-        int count = budget - done;
-        if (plan->penalty_updates) count = until(done, s->penalty_period, count);
-        if (stop_rule) count = until(done, s->check_period, count);
-        bool last = done + count == budget;
-        bool update = plan->penalty_updates && !last && (done + count) % s->penalty_period == 0;
-        bool look = stop_rule && (last || (done + count) % s->check_period == 0);
-        bool measure = plan->residuals && (update || (last && s->measure_residuals) || (look && s->residual_tolerance > 0));
-        TRY(iterate(k, c, count, measure, error));
-        done += count;
+    int budget = sadmm_schedule_budget(plan, s);
+    for (int done = 0; done < budget;) {
+        struct sadmm_stretch next = sadmm_schedule_stretch(plan, s, done);
+        TRY(iterate(k, c, next.count, next.measure, error));
+        done += next.count;
         report->iterations = done;
-        if (measure) TRY(k->measure_residuals(c, &report->residual, error));
-        if (look) {
+        if (next.measure) TRY(k->measure_residuals(c, &report->residual, error));
+        if (next.look) {
             bool met = true;
             if (s->residual_tolerance > 0)
                 met = report->residual.primal <= s->residual_tolerance && report->residual.dual <= s->residual_tolerance;
@@ -118,7 +135,7 @@ static sadmm_status run(const struct sadmm_kernels *k, struct sadmm_context *c, 
                 return SADMM_OK;
             }
         }
-        if (update) {
+        if (next.update) {
             double ratio = sadmm_penalty_ratio(report->residual.primal, report->residual.dual, s->penalty_ratio_limit);
             if (ratio != 1) {
                 TRY(k->update_penalty(c, ratio, error));

@@ -5,6 +5,10 @@
 #include "kernels.h"
 #include "subadmm/world.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Solve `system` with one backend: assembly, iterations, solution back into `system`. Fills report->iterations,
  * converged, residual (-1 when not measured), solve_ms (assembly and iterations), certificate (only when a certificate
  * tolerance made it necessary, else ncp_max = -1). `ms` (may be NULL) receives assemble and solve, in ms.
@@ -15,7 +19,23 @@ sadmm_status sadmm_schedule_solve(const struct sadmm_kernels *kernels, struct sa
                                   const struct sadmm_plan *plan, struct sadmm_solve_report *report,
                                   struct sadmm_phase_times *ms, struct sadmm_error *error);
 
+/* Iterations into which nobody has to look, and what comes after them. */
+struct sadmm_stretch {
+    int count;
+    bool last;    /* the budget is spent then */
+    bool look;    /* the stop rule looks */
+    bool update;  /* eq. (15) */
+    bool measure; /* the last of them is measured */
+};
+/* The stretch that begins after `done` iterations, done < sadmm_schedule_budget(). */
+struct sadmm_stretch sadmm_schedule_stretch(const struct sadmm_plan *plan, const struct sadmm_settings *settings, int done);
+/* Iterations of a solve that nobody stops: without constraints Step 1 is exact at once, v = A^-1 b. */
+int sadmm_schedule_budget(const struct sadmm_plan *plan, const struct sadmm_settings *settings);
+
 /* Monotonic wall clock, ms. */
 double sadmm_clock_ms(void);
 
+#ifdef __cplusplus
+}
+#endif
 #endif
