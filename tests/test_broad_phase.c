@@ -342,8 +342,49 @@ static bool may_touch(const struct scene *s, const struct sadmm_candidates *c, u
     if (p->system_body < 0 && q->system_body < 0) return false;
     if (p->environment != q->environment && p->environment >= 0 && q->environment >= 0) return false;
     if (!(a->category & b->mask) || !(b->category & a->mask)) return false;
-    return sadmm_candidate_meets(c, s->input.margin, i, j);
+    return sadmm_candidate_meets(c, s->input.margin, s->input.dt, i, j);
 }
+
+/* Boxes in straight motion against 400 moments of the step: what overlaps at one of them meets; and of two that move alike
+ * only what overlaps at rest does, however fast they are. */
+START_TEST(boxes_meet_when_they_come_together)
+{
+    const double dt = 0.01;
+    struct random r = {7};
+    int together = 0, apart = 0;
+    for (int trial = 0; trial < 4000; ++trial) {
+        struct sadmm_box3 box[2];
+        double centre[2][3], half[2][3], velocity[2][3];
+        for (int s = 0; s < 2; ++s) {
+            double extent[3];
+            for (int k = 0; k < 3; ++k) {
+                centre[s][k] = s ? centre[0][k] + random_in(&r, -1, 1) : 5;
+                extent[k] = random_in(&r, 0.05, 0.3);
+                velocity[s][k] = s && trial % 2 ? velocity[0][k] : random_in(&r, -100, 100);
+            }
+            shape_box(centre[s], extent, 0, velocity[s], 0, 0, dt, &box[s]);
+            memcpy(half[s], extent, sizeof extent);
+        }
+        bool touch = false;
+        for (int moment = 0; moment <= 400 && !touch; ++moment) {
+            double t = dt * moment / 400;
+            touch = true;
+            for (int k = 0; k < 3; ++k)
+                touch = touch && fabs(centre[1][k] - centre[0][k] + t * (velocity[1][k] - velocity[0][k])) <=
+                                     half[0][k] + half[1][k];
+        }
+        bool found = boxes_overlap(&box[0], &box[1]) &&
+                     boxes_meet(&box[0], velocity[0], &box[1], velocity[1], dt);
+        if (touch) ck_assert(found);
+        /* The same velocity: the moment does not matter. */
+        if (trial % 2) ck_assert_int_eq(found, touch);
+        together += touch;
+        apart += trial % 2 && !touch && boxes_overlap(&box[0], &box[1]);
+    }
+    ck_assert_int_gt(together, 300);
+    ck_assert_int_gt(apart, 300); /* what the relative velocity leaves out */
+}
+END_TEST
 
 /* Over many steps with moves small and large, deaths, births and changes of shapes: the list holds every pair that
  * meets, in order, once. */
@@ -436,6 +477,7 @@ int main(void)
     tcase_add_test(trees, radix_sort_sorts);
     suite_add_tcase(suite, trees);
     tcase_set_timeout(candidates, 60);
+    tcase_add_test(candidates, boxes_meet_when_they_come_together);
     tcase_add_loop_test(candidates, the_list_of_candidates_is_complete_at_every_step, 0, 2 * KINDS);
     tcase_add_loop_test(candidates, rest_costs_no_broad_phase, 0, KINDS);
     suite_add_tcase(suite, candidates);

@@ -207,9 +207,16 @@ static __device__ bool may_meet(const collision_view &v, const collision_filter 
            find_key(v.disabled_pairs, v.disabled_count, unordered_key((uint32_t)a.body, (uint32_t)b.body)) < 0;
 }
 
-static __device__ __forceinline__ bool leaves_meet(const struct collision_leaf &a, const struct collision_leaf &b)
+static __device__ __forceinline__ bool leaves_overlap(const struct collision_leaf &a, const struct collision_leaf &b)
 {
     return a.group_low <= b.group_high && b.group_low <= a.group_high && boxes_overlap(&a.box, &b.box);
+}
+
+/* Of leaves that overlap. */
+static __device__ __forceinline__ bool leaves_meet(const collision_view &v, const struct collision_leaf &a,
+                                                   const struct collision_leaf &b)
+{
+    return boxes_meet(&a.box, v.proxies[a.slot].velocity, &b.box, v.proxies[b.slot].velocity, v.step.dt);
 }
 
 /* The shape of the lower (type, slot) comes first. */
@@ -300,7 +307,7 @@ static __device__ void walk(const collision_view &v, int32_t i, struct batch *ou
             at = node.child;
             continue;
         }
-        if (meet && leaves_meet(leaf, v.placed[node.child])) {
+        if (meet && leaves_overlap(leaf, v.placed[node.child]) && leaves_meet(v, leaf, v.placed[node.child])) {
             const struct collision_filter other = v.filters[node.child];
             if (may_meet(v, own, other))
                 add(v, out, candidate_key(v, (uint32_t)leaf.slot, own.kind, (uint32_t)node.child, other.kind));
@@ -359,11 +366,13 @@ static __global__ void __launch_bounds__(TILE_ROWS) tiles_kernel(const __grid_co
     if (i < v.leaf_count) {
         for (int32_t j = 0; j < count; ++j) {
             const struct collision_leaf other = others.leaves[j];
-            hits |= (uint64_t)leaves_meet(leaf, other) << j;
+            hits |= (uint64_t)leaves_overlap(leaf, other) << j;
         }
         if (i >= first) hits &= i - first < TILE_COLUMNS - 1 ? ~UINT64_C(0) << (i - first + 1) : 0;
-        for (uint64_t left = hits; left; left &= left - 1)
-            if (!may_meet(v, own, others.filters[trailing_zeros(left)])) hits ^= left & (0 - left);
+        for (uint64_t left = hits; left; left &= left - 1) {
+            const int j = trailing_zeros(left);
+            if (!may_meet(v, own, others.filters[j]) || !leaves_meet(v, leaf, others.leaves[j])) hits ^= left & (0 - left);
+        }
     }
     unsigned long long at = reserve_by_warp(v.candidate_count, (unsigned)bits_set(hits));
     for (; hits; hits &= hits - 1) {

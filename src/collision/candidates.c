@@ -139,11 +139,12 @@ static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision
     }
 }
 
-bool sadmm_candidate_meets(const struct sadmm_candidates *c, double margin, uint32_t a, uint32_t b)
+bool sadmm_candidate_meets(const struct sadmm_candidates *c, double margin, double dt, uint32_t a, uint32_t b)
 {
     if (c->proxies[a].type == SADMM_SHAPE_PLANE)
         return proxy_plane_meets(&c->proxies[a], &c->boxes[b], proxy_plane_reach(&c->proxies[b], margin));
-    return boxes_overlap(&c->boxes[a], &c->boxes[b]);
+    return boxes_overlap(&c->boxes[a], &c->boxes[b]) &&
+           boxes_meet(&c->boxes[a], c->proxies[a].velocity, &c->boxes[b], c->proxies[b].velocity, dt);
 }
 
 /* Things that do not change while the shapes stay what they are. */

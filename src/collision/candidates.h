@@ -56,7 +56,7 @@ void sadmm_candidates_free(struct sadmm_candidates *c);
 sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sadmm_collision_input *input, int threads,
                                      struct sadmm_error *error);
 
-/* Do this step's boxes of a pair in the list overlap? */
-bool sadmm_candidate_meets(const struct sadmm_candidates *c, double margin, uint32_t a, uint32_t b);
+/* Do the two shapes of a pair in the list come together within this step, as far as their boxes tell (bounds.h)? */
+bool sadmm_candidate_meets(const struct sadmm_candidates *c, double margin, double dt, uint32_t a, uint32_t b);
 
 #endif

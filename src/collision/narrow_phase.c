@@ -111,7 +111,7 @@ bool sadmm_narrow_phase(const struct sadmm_candidates *c, const struct sadmm_col
         double limit;
         size_t at;
 
-        if (!sadmm_candidate_meets(c, input->margin, a, b)) continue;
+        if (!sadmm_candidate_meets(c, input->margin, input->dt, a, b)) continue;
         if (input->disabled_body_pair_count &&
             find_key(input->disabled_body_pairs, input->disabled_body_pair_count,
                      unordered_key((uint32_t)pa->body, (uint32_t)pb->body), &at))
