@@ -167,6 +167,7 @@ struct cuda_args {
     int32_t planned;    /* a whole step: compare with the plan */
     int32_t rescaled;   /* ratio is view.ratio, else 1 */
     int32_t backward;   /* thread blocks in descending order */
+    int32_t in_order;   /* slots are raw indices */
     const struct sadmm_resident_edit *edits;
     double factor;
 };

@@ -264,16 +264,20 @@ CUDA_INLINE real free_momentum(const body_lane &body)
     return g;
 }
 
+/* A row of H times g: two chains, half as long. */
+CUDA_INLINE real product_with_row(real h0, real h1, real h2, real h3, real h4, real h5, const real g[6])
+{
+    return fused(h4, g[4], fused(h2, g[2], h0 * g[0])) + fused(h5, g[5], fused(h3, g[3], h1 * g[1]));
+}
+
 /* v <- v + H g, lane r's component of g being b - A v + J^T E. Every lane of the warp comes here. */
 CUDA_INLINE void move_body(body_lane *body, real g)
 {
     real other[6];
 #pragma unroll
     for (int k = 0; k < 6; ++k) other[k] = __shfl_sync((unsigned)ALL_LANES, g, k, LANES);
-    /* two chains, half as long */
-    real even = fused(body->H[4], other[4], fused(body->H[2], other[2], body->H[0] * other[0]));
-    real odd = fused(body->H[5], other[5], fused(body->H[3], other[3], body->H[1] * other[1]));
-    body->v += even + odd;
+    const real *H = body->H;
+    body->v += product_with_row(H[0], H[1], H[2], H[3], H[4], H[5], other);
 }
 
 /* ---- reductions ----------------------------------------------------------------------------------------------- */
