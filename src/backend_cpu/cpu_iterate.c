@@ -1,13 +1,14 @@
 /* The iteration, stepwise and fused: sweeps over bodies and constraints, a barrier after each. */
 #include <string.h>
 
+#include "../core/math/relax.h"
 #include "cpu.h"
 
-static void update_bodies(struct sadmm_context *c, int thread, int threads, bool settled)
+static void update_bodies(struct sadmm_context *c, int thread, int threads, bool settled, double relaxation)
 {
     size_t begin, end;
     cpu_share(c->body_block_count, thread, threads, &begin, &end);
-    CPU(sweep_bodies)(c, begin, end, settled);
+    CPU(sweep_bodies)(c, begin, end, settled, relaxation);
 }
 
 static void update_constraints(struct sadmm_context *c, int thread, int threads, enum cpu_sweep sweep, double *primal)
@@ -58,7 +59,7 @@ sadmm_status CPU(update_velocity)(struct sadmm_context *c, struct sadmm_error *e
             join_wrenches(c, cpu_thread(), cpu_threads());
             CPU_BARRIER;
         }
-        update_bodies(c, cpu_thread(), cpu_threads(), c->settled);
+        update_bodies(c, cpu_thread(), cpu_threads(), c->settled, 1);
     }
     c->settled = true;
     c->measured = false;
@@ -94,10 +95,14 @@ sadmm_status CPU(iterate)(struct sadmm_context *c, int count, bool measure, stru
             CPU_BARRIER;
         }
         for (int i = 0; i < count; ++i) {
-            bool last = measure && i + 1 == count;
-            update_bodies(c, thread, threads, c->settled || i > 0);
+            bool last = i + 1 == count, settled = c->settled || i > 0;
+            enum cpu_sweep sweep = last && measure ? CPU_SWEEP_MEASURE
+                                   : c->fast && relax_constraints(i, count) ? CPU_SWEEP_RELAX
+                                                                            : CPU_SWEEP_ITERATE;
+            bool relax = c->fast && relax_velocity(i, count, settled);
+            update_bodies(c, thread, threads, settled, relax ? c->settings.relaxation : 1);
             CPU_BARRIER;
-            update_constraints(c, thread, threads, last ? CPU_SWEEP_MEASURE : CPU_SWEEP_ITERATE, &primal);
+            update_constraints(c, thread, threads, sweep, &primal);
             CPU_BARRIER;
         }
         c->thread_max[thread * THREAD_MAX_STRIDE] = primal;

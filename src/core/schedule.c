@@ -3,7 +3,8 @@
  *     begin            room for this step (the only allocation)
  *     assemble         A bodies, B contacts, C/D hard and soft blocks (classes the plan lacks are not called)
  *     E-H              C_i, beta_i, factor of A_i + beta_i C_i
- *     I-P              iterations in stretches: a stretch ends where someone has to look (penalty update, stop rule, end)
+ *     I-P              iterations in stretches: a stretch ends where someone has to look (penalty update, stop rule, new
+ *                      weights, end)
  *     read_solution
  */
 #include "schedule.h"
@@ -13,6 +14,7 @@
 #include <time.h>
 
 #include "certificate.h"
+#include "math/weight.h"
 #include "system_math.h"
 
 double sadmm_clock_ms(void)
@@ -94,10 +96,11 @@ static sadmm_status run(const struct sadmm_kernels *k, struct sadmm_context *c, 
     bool stop_rule = constrained && (s->residual_tolerance > 0 || s->certificate_tolerance > 0);
     /* Without constraints Step 1 is exact at once: v = A^-1 b. */
     int budget = constrained ? s->iterations : 1;
-    int done = 0;
+    int done = 0, refresh = 0, next_refresh = plan->weight_refresh ? WEIGHT_FIRST_REFRESH : budget;
     while (done < budget) {
         int count = budget - done;
         if (plan->penalty_updates) count = until(done, s->penalty_period, count);
+        if (next_refresh < done + count) count = next_refresh - done;
         if (stop_rule) count = until(done, s->check_period, count);
         bool last = done + count == budget;
         bool update = plan->penalty_updates && !last && (done + count) % s->penalty_period == 0;
@@ -117,6 +120,11 @@ static sadmm_status run(const struct sadmm_kernels *k, struct sadmm_context *c, 
                 report->converged = true;
                 return SADMM_OK;
             }
+        }
+        if (done == next_refresh && !last) {
+            TRY(k->update_weights(c, ++refresh, error));
+            TRY(k->factorize(c, error));
+            next_refresh *= 2;
         }
         if (update) {
             double ratio = sadmm_penalty_ratio(report->residual.primal, report->residual.dual, s->penalty_ratio_limit);
