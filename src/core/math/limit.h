@@ -2,7 +2,7 @@
  *
  * Contacts take energy out of the free motion v_f = A^-1 b, but for the work W = sum max(0, -e) lambda_n of those that push
  * overlapping bodies apart. An iteration that is cut short need not: then the island is slowed down to what is allowed.
- * W is believed only where the momentum A v - b - J^T lambda is balanced to a tenth (R: its energy, by A^-1). A solution
+ * W is believed only where the momentum A v - b - J^T lambda is balanced to 3 % (R: its energy, by A^-1). A solution
  * stays as it is. */
 #ifndef SADMM_MATH_LIMIT_H
 #define SADMM_MATH_LIMIT_H
@@ -11,7 +11,7 @@
 
 /* Rounding of energies in single precision, some hundred times over. */
 #define LIMIT_ROUNDING 1e-5
-#define LIMIT_BALANCED 0.01
+#define LIMIT_BALANCED 1e-3
 
 struct limit_energies {
     double now, free, defect, work; /* of v, of v_f, R, W; J */
