@@ -193,7 +193,7 @@ sadmm_status CPU(assemble_joints)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(assemble_springs)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(init_penalty)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(init_weights)(struct sadmm_context *, struct sadmm_error *);
-sadmm_status CPU(update_weights)(struct sadmm_context *, int refresh, struct sadmm_error *);
+sadmm_status CPU(update_weights)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(limit_velocity)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
 sadmm_status CPU(factorize)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(update_velocity)(struct sadmm_context *, struct sadmm_error *);

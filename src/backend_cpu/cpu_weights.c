@@ -159,7 +159,7 @@ static double pair_load(const struct sadmm_context *c, const struct pair_block *
     return sum / count;
 }
 
-static void weigh_pair_block(struct sadmm_context *c, size_t index, double floor)
+static void weigh_pair_block(struct sadmm_context *c, size_t index)
 {
     struct pair_block *block = &c->pair_blocks[index];
     for (int l = 0; l < LANES; ++l) {
@@ -168,13 +168,14 @@ static void weigh_pair_block(struct sadmm_context *c, size_t index, double floor
         const struct cpu_island *island = island_of(c, pair->body_a, pair->body_b);
         double *B = &c->pair_weight[index * (size_t)LANES + (size_t)l];
         double load = pair_load(c, block, l, pair->count);
-        *B = weight_mass(load, island->speed, island->mass) + floor / c->pair_response[index * (size_t)LANES + (size_t)l];
+        *B = weight_mass(load, island->speed, island->mass) +
+             WEIGHT_FLOOR_CONTACT / c->pair_response[index * (size_t)LANES + (size_t)l];
         block->inv_s[l] = (real)(pair->body_a >= 0 && pair->body_b >= 0 ? *B / 2 : *B);
     }
 }
 
 /* B = diag(weight) + along along^T */
-static void weigh_row_block(struct sadmm_context *c, struct row_block *block, double floor)
+static void weigh_row_block(struct sadmm_context *c, struct row_block *block)
 {
     const struct cpu_island *island = island_of(c, block->body_a, block->body_b);
     double load2 = 0, lambda2 = 0, w = 0;
@@ -185,13 +186,13 @@ static void weigh_row_block(struct sadmm_context *c, struct row_block *block, do
         w += (double)block->response[r] / block->rows;
     }
     double mass = weight_mass(sqrt(load2), island->speed, island->mass);
-    double share = load2 > 0 ? mass / load2 : 0; /* B = share lambda lambda^T + floor */
+    double share = load2 > 0 ? mass / load2 : 0; /* B = share lambda lambda^T + phi / w */
     for (int r = 0; r < block->rows; ++r) {
         double lambda = (double)block->lambda[r], response = (double)block->response[r];
-        double own = response > 0 ? floor / response : 0;
+        double own = response > 0 ? WEIGHT_FLOOR_BLOCK / response : 0;
         block->along[r] = 0;
         switch ((sadmm_block_kind)block->kind) {
-        case SADMM_BLOCK_CONTACT: block->weight[r] = (real)(share * lambda2 + (w > 0 ? floor / w : 1)); break;
+        case SADMM_BLOCK_CONTACT: block->weight[r] = (real)(share * lambda2 + (w > 0 ? WEIGHT_FLOOR_CONTACT / w : 1)); break;
         case SADMM_BLOCK_HARD:
             block->weight[r] = (real)own;
             block->along[r] = (real)(sqrt(share) * lambda);
@@ -242,12 +243,10 @@ static void assemble_C(struct sadmm_context *c, size_t i)
 
 /* ---- entries ----------------------------------------------------------------------------------------------------- */
 
-sadmm_status CPU(update_weights)(struct sadmm_context *c, int refresh, struct sadmm_error *error)
+sadmm_status CPU(update_weights)(struct sadmm_context *c, struct sadmm_error *error)
 {
     (void)error;
-    double floor = weight_floor(refresh);
-    CPU(start_wrenches)(c);
-    c->settled = refresh > 0;
+    CPU(sum_wrenches)(c);
     CPU_PARALLEL
     {
         int thread = cpu_thread(), threads = cpu_threads();
@@ -258,9 +257,9 @@ sadmm_status CPU(update_weights)(struct sadmm_context *c, int refresh, struct sa
         if (thread == 0) add_up_islands(c);
         CPU_BARRIER;
         cpu_share(c->pair_block_count, thread, threads, &begin, &end);
-        for (size_t k = begin; k < end; ++k) weigh_pair_block(c, k, floor);
+        for (size_t k = begin; k < end; ++k) weigh_pair_block(c, k);
         cpu_share(c->row_block_count, thread, threads, &begin, &end);
-        for (size_t k = begin; k < end; ++k) weigh_row_block(c, &c->row_blocks[k], floor);
+        for (size_t k = begin; k < end; ++k) weigh_row_block(c, &c->row_blocks[k]);
         CPU_BARRIER;
         cpu_share((size_t)c->bodies, thread, threads, &begin, &end);
         for (size_t i = begin; i < end; ++i) assemble_C(c, i);
@@ -286,5 +285,6 @@ sadmm_status CPU(init_weights)(struct sadmm_context *c, struct sadmm_error *erro
         cpu_share(c->row_block_count, thread, threads, &begin, &end);
         for (size_t k = begin; k < end; ++k) block_response(c, &c->row_blocks[k]);
     }
-    return CPU(update_weights)(c, 0, error);
+    c->settled = c->measured = false;
+    return CPU(update_weights)(c, error);
 }

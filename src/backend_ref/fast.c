@@ -95,7 +95,7 @@ static void add_up_islands(struct sadmm_context *c)
 }
 
 /* The points of a pair share one weight: mean load, mean response. */
-static void weigh_pair(struct sadmm_context *c, const struct sadmm_contact_pair *pair, double floor)
+static void weigh_pair(struct sadmm_context *c, const struct sadmm_contact_pair *pair)
 {
     double load = 0, w = 0;
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
@@ -109,7 +109,7 @@ static void weigh_pair(struct sadmm_context *c, const struct sadmm_contact_pair 
     }
     const struct ref_body *island = island_of(c, &c->constraints[pair->first]);
     double speed = weight_speed(island->island_energy, island->island_mass);
-    double B = weight_mass(load / pair->count, speed, island->island_mass) + floor / (w / pair->count);
+    double B = weight_mass(load / pair->count, speed, island->island_mass) + WEIGHT_FLOOR_CONTACT / (w / pair->count);
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
         struct ref_constraint *constraint = &c->constraints[k];
         memset(constraint->B, 0, sizeof constraint->B);
@@ -117,8 +117,8 @@ static void weigh_pair(struct sadmm_context *c, const struct sadmm_contact_pair 
     }
 }
 
-/* share lambda lambda^T + floor / w: in full for a hard block, its diagonal for a soft one, a scalar for a contact. */
-static void weigh_block(struct sadmm_context *c, struct ref_constraint *constraint, double floor)
+/* share lambda lambda^T + phi / w: in full for a hard block, its diagonal for a soft one, a scalar for a contact. */
+static void weigh_block(struct sadmm_context *c, struct ref_constraint *constraint)
 {
     const double *lambda = constraint->lambda;
     double load2 = 0, lambda2 = 0, mean = 0, w[6];
@@ -134,9 +134,9 @@ static void weigh_block(struct sadmm_context *c, struct ref_constraint *constrai
     double share = load2 > 0 ? weight_mass(sqrt(load2), speed, island->island_mass) / load2 : 0;
     memset(constraint->B, 0, sizeof constraint->B);
     for (int r = 0; r < constraint->rows; ++r) {
-        double own = w[r] > 0 ? floor / w[r] : 0;
+        double own = w[r] > 0 ? WEIGHT_FLOOR_BLOCK / w[r] : 0;
         if (constraint->kind == SADMM_BLOCK_CONTACT)
-            constraint->B[7 * r] = share * lambda2 + (mean > 0 ? floor / mean : 1);
+            constraint->B[7 * r] = share * lambda2 + (mean > 0 ? WEIGHT_FLOOR_CONTACT / mean : 1);
         else if (constraint->kind == SADMM_BLOCK_SOFT)
             constraint->B[7 * r] = w[r] > 0 ? share * lambda[r] * lambda[r] + own : 1;
         else
@@ -156,14 +156,13 @@ static void add_to_C(struct sadmm_context *c, const struct ref_constraint *const
                     C[6 * i + j] += side->J[6 * r + i] * constraint->B[6 * r + q] * side->J[6 * q + j];
 }
 
-sadmm_status sadmm_ref_update_weights(struct sadmm_context *c, int refresh, struct sadmm_error *error)
+sadmm_status sadmm_ref_update_weights(struct sadmm_context *c, struct sadmm_error *error)
 {
     (void)error;
-    double floor = weight_floor(refresh);
     size_t points = c->system->contacts->point_count;
     add_up_islands(c);
-    for (size_t p = 0; p < c->system->contacts->pair_count; ++p) weigh_pair(c, &c->system->contacts->pairs[p], floor);
-    for (size_t k = points; k < c->constraint_count; ++k) weigh_block(c, &c->constraints[k], floor);
+    for (size_t p = 0; p < c->system->contacts->pair_count; ++p) weigh_pair(c, &c->system->contacts->pairs[p]);
+    for (size_t k = points; k < c->constraint_count; ++k) weigh_block(c, &c->constraints[k]);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         memset(c->bodies[i].C, 0, sizeof c->bodies[i].C);
         c->bodies[i].beta = 1;
@@ -181,7 +180,7 @@ sadmm_status sadmm_ref_init_weights(struct sadmm_context *c, struct sadmm_error 
 {
     label_islands(c);
     c->settled = false;
-    return sadmm_ref_update_weights(c, 0, error);
+    return sadmm_ref_update_weights(c, error);
 }
 
 /* A v - b - sum J^T multiplier, by body, into `impulse`. */

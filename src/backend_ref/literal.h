@@ -77,7 +77,7 @@ sadmm_status sadmm_ref_update_penalty(struct sadmm_context *, double ratio, stru
 
 /* fast.c */
 sadmm_status sadmm_ref_init_weights(struct sadmm_context *, struct sadmm_error *);
-sadmm_status sadmm_ref_update_weights(struct sadmm_context *, int refresh, struct sadmm_error *);
+sadmm_status sadmm_ref_update_weights(struct sadmm_context *, struct sadmm_error *);
 sadmm_status sadmm_ref_iterate_fast(struct sadmm_context *, int count);
 sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
 sadmm_status sadmm_ref_measure_fast(struct sadmm_context *, struct sadmm_residual *);

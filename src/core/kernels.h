@@ -10,7 +10,7 @@
  *     after a measured iteration: measure_residuals; then update_penalty(ratio); factorize
  *
  * In the method FAST iterate is not optional: an iteration is Steps 2-4, then Step 1, and what is relaxed depends on how
- * far a stretch still goes (math/relax.h). update_weights(refresh) and factorize may follow a stretch in the place of
+ * far a stretch still goes (math/relax.h). update_weights and factorize may follow a stretch in the place of
  * update_penalty, and limit_velocity ends the step's iterations.
  *
  * `measure` asks the iteration (for `iterate`: its last one) to keep what the residuals and a penalty update need; only
@@ -51,9 +51,8 @@ struct sadmm_kernels {
     sadmm_status (*assemble_springs)(struct sadmm_context *, struct sadmm_error *);  /* C, D: soft blocks */
 
     sadmm_status (*init_penalty)(struct sadmm_context *, struct sadmm_error *); /* E-G: C_i (14), beta_i (13); FAST: weights */
-    /* FAST, after iterations: weights from the multipliers found by now (math/weight.h). `refresh`: 1 for the first time in
-     * a step. Then factorize. */
-    sadmm_status (*update_weights)(struct sadmm_context *, int refresh, struct sadmm_error *);
+    /* FAST, after iterations: weights from the multipliers found by now (math/weight.h). Then factorize. */
+    sadmm_status (*update_weights)(struct sadmm_context *, struct sadmm_error *);
     sadmm_status (*factorize)(struct sadmm_context *, struct sadmm_error *);    /* H: of A_i + beta_i C_i */
 
     sadmm_status (*update_velocity)(struct sadmm_context *, struct sadmm_error *);                  /* I-K: Step 1 (6) */

@@ -96,7 +96,7 @@ static sadmm_status run(const struct sadmm_kernels *k, struct sadmm_context *c, 
     bool stop_rule = constrained && (s->residual_tolerance > 0 || s->certificate_tolerance > 0);
     /* Without constraints Step 1 is exact at once: v = A^-1 b. */
     int budget = constrained ? s->iterations : 1;
-    int done = 0, refresh = 0, next_refresh = plan->weight_refresh ? WEIGHT_FIRST_REFRESH : budget;
+    int done = 0, next_refresh = plan->weight_refresh ? WEIGHT_FIRST_REFRESH : budget;
     while (done < budget) {
         int count = budget - done;
         if (plan->penalty_updates) count = until(done, s->penalty_period, count);
@@ -122,7 +122,7 @@ static sadmm_status run(const struct sadmm_kernels *k, struct sadmm_context *c, 
             }
         }
         if (done == next_refresh && !last) {
-            TRY(k->update_weights(c, ++refresh, error));
+            TRY(k->update_weights(c, error));
             TRY(k->factorize(c, error));
             next_refresh *= 2;
         }

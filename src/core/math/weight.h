@@ -4,9 +4,8 @@
  *
  * An impulse of size `load` changes velocities of its island by about V, so load / V is the mass behind the constraint.
  * Where impulses cancel in g (bodies clamped between each other) V says nothing: m, the mass of the island, is the cap.
- * phi / w, with w the constraint's own response, is what a constraint without a load gets; it starts high, because loads
- * that have not been found yet are the ones to come, and falls where a step takes its weights anew. Double in every
- * precision: it runs a few times a step. */
+ * phi / w, with w the constraint's own response, is what a constraint without a load gets. Double in every precision: it
+ * runs a few times a step. */
 #ifndef SADMM_MATH_WEIGHT_H
 #define SADMM_MATH_WEIGHT_H
 
@@ -16,14 +15,10 @@
  * 40, ... Changes as late as that are small, and a change disturbs. */
 enum { WEIGHT_FIRST_REFRESH = 5 };
 
-/* phi. `refresh`: 0 at the start of the step. */
-SADMM_INLINE double weight_floor(int refresh)
-{
-    double phi = 3;
-    int k;
-    for (k = 0; k < refresh && phi > 1; ++k) phi *= 0.7;
-    return phi > 1 ? phi : 1;
-}
+/* phi. Contacts: loads that have not been found yet are the ones to come. Joints and springs hold in all directions, loaded or
+ * not. */
+#define WEIGHT_FLOOR_CONTACT 3.0
+#define WEIGHT_FLOOR_BLOCK 30.0
 
 /* Less is rounding of the impulses, and says nothing about loads; m/s. */
 #define WEIGHT_LEAST_SPEED 1e-6
