@@ -110,9 +110,9 @@ void run_record_print(const struct run_record *record, const char *spec, const s
     printf("scene          %s, %zu bodies\n", spec, record->body_count);
     printf("steps          %zu of %g s\n", record->steps, scene->def.settings.dt);
     if (record->steps > 0) {
-        printf("backend        %s %s, %d thread%s, %d iterations a step\n", cli_backend_name(last->backend),
+        printf("backend        %s %s, %d thread%s, %d iterations a step (%s)\n", cli_backend_name(last->backend),
                cli_precision_name(last->precision), last->threads, last->threads == 1 ? "" : "s",
-               scene->def.settings.iterations);
+               scene->def.settings.iterations, cli_method_name(scene->def.settings.method));
         printf("contacts       %.1f mean, %d max\n", record->contacts_sum / (double)record->steps,
                record->contacts_max);
         printf("ms per step    %10s %10s\n", "median", "p95");
