@@ -56,6 +56,14 @@ bool bench_parse_precision(const char *text, int *precision)
     return true;
 }
 
+bool bench_parse_method(const char *text, sadmm_method *method)
+{
+    if (!strcmp(text, "paper")) *method = SADMM_METHOD_PAPER;
+    else if (!strcmp(text, "fast")) *method = SADMM_METHOD_FAST;
+    else return false;
+    return true;
+}
+
 const char *bench_precision_name(sadmm_precision precision) { return precision == SADMM_F32 ? "f32" : "f64"; }
 
 int bench_bad_option(const char *command, const char *option, const char *value, const char *allowed)

@@ -18,6 +18,9 @@ bool bench_parse_backend(const char *text, sadmm_backend *backend);
 /* f32, f64 or both (-1). */
 bool bench_parse_precision(const char *text, int *precision);
 
+/* paper or fast. */
+bool bench_parse_method(const char *text, sadmm_method *method);
+
 const char *bench_precision_name(sadmm_precision precision);
 
 /* Says on standard error what the value must be; returns the exit status of wrong usage. */

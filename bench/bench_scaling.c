@@ -22,6 +22,8 @@ struct options {
     const char *scene;
     sadmm_backend backend; /* AUTO: cpu and cuda */
     int precision;         /* -1: both */
+    sadmm_method method;
+    long iterations;       /* 0: the scene's */
     long sizes[BENCH_LIST], threads[BENCH_LIST], steps, warm_up, certified, device;
     int size_count, thread_count;
     double max_seconds;
@@ -150,6 +152,8 @@ static bool run_row(const struct options *o, struct series *s, long size, const 
             scene.def.precision = s->precision;
             scene.def.device = (int)o->device;
             scene.def.settings.threads = s->threads;
+            scene.def.settings.method = o->method;
+            if (o->iterations > 0) scene.def.settings.iterations = (int)o->iterations;
             status = scene_timing_run(&scene, &plan, &row.timing, &error);
         }
         if (status != SADMM_OK) snprintf(row.status, sizeof row.status, "failed: %.300s", error.message);
@@ -247,6 +251,8 @@ static void usage(FILE *out)
             "  --backend ref|cpu|cuda|all all: cpu and cuda (default)\n"
             "  --threads N[,N...]         CPU threads, default 1,2,4,8,16; more than the machine has are left out\n"
             "  --precision f32|f64|both   default f32\n"
+            "  --method paper|fast        default paper\n"
+            "  --iterations N             a step; default the scene's\n"
             "  --device N                 accelerator, default 0\n"
             "  --steps N                  timed steps a row, default 20\n"
             "  --warm-up N                steps before them, default 5\n"
@@ -269,6 +275,8 @@ static int parse(int argc, char **argv, struct options *o)
         {"backend", required_argument, NULL, 'b'},
         {"threads", required_argument, NULL, 't'},
         {"precision", required_argument, NULL, 'p'},
+        {"method", required_argument, NULL, 'M'},
+        {"iterations", required_argument, NULL, 'i'},
         {"device", required_argument, NULL, 'd'},
         {"steps", required_argument, NULL, 's'},
         {"warm-up", required_argument, NULL, 'w'},
@@ -296,6 +304,13 @@ static int parse(int argc, char **argv, struct options *o)
             break;
         case 'p':
             if (!bench_parse_precision(optarg, &o->precision)) return bad("precision", optarg, "f32, f64 or both");
+            break;
+        case 'M':
+            if (!bench_parse_method(optarg, &o->method)) return bad("method", optarg, "paper or fast");
+            break;
+        case 'i':
+            if (!bench_parse_number(optarg, 1, 1000000, &o->iterations))
+                return bad("iterations", optarg, "in [1, 1000000]");
             break;
         case 'd':
             if (!bench_parse_number(optarg, 0, 1023, &o->device)) return bad("device", optarg, "in [0, 1023]");

@@ -33,6 +33,8 @@ static const struct bad_setting {
     REAL(dt, 0, -0.005, 9.9e-7, 1.1, NAN, END),
     REAL(gravity[0], NAN, INFINITY, 1.1e6, END),
     REAL(gravity[2], -INFINITY, -1.1e6, NAN, END),
+    INTEGER(method, -1, 2, END),
+    REAL(relaxation, 0.99, 2, NAN, END),
     INTEGER(iterations, 0, -1, 1000001, END),
     INTEGER(penalty_period, -1, INT_MIN, END),
     REAL(penalty_mass_factor, -1, 1.1e12, NAN, END),

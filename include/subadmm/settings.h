@@ -24,6 +24,13 @@ typedef enum sadmm_backend {
     SADMM_BACKEND_COUNT
 } sadmm_backend;
 
+/* The iteration that solves the contact problem; both have the same solutions (docs/algorithm.md). */
+typedef enum sadmm_method {
+    SADMM_METHOD_PAPER = 0, /* one penalty weight a body, eqs. (13) to (15) */
+    SADMM_METHOD_FAST,      /* one weight a constraint, from the load it carries, and over-relaxation */
+    SADMM_METHOD_COUNT
+} sadmm_method;
+
 /* What a build and this machine can do. */
 typedef struct sadmm_backend_info {
     sadmm_backend backend;
@@ -43,8 +50,10 @@ typedef struct sadmm_settings {
     double dt;                   /* time step, s, in [1e-6, 1]; default 0.005 */
     double gravity[3];           /* m/s^2, world frame, finite, norm <= 1e6; default (0, 0, -9.81) */
 
+    sadmm_method method;         /* default SADMM_METHOD_PAPER */
     int iterations;              /* iterations a step, in [1, 1000000]; default 100 */
-    int penalty_period;          /* m of eq. (15): iterations between penalty updates, 0 = never; default 30 */
+    double relaxation;           /* FAST: over-relaxation rho, dimensionless, in [1, 2); default 1.8 */
+    int penalty_period;          /* PAPER, as all of penalty_*. m of eq. (15): iterations between penalty updates, 0 = never; default 30 */
     double penalty_mass_factor;  /* M of eq. (13), dimensionless, in [0, 1e12]; default 16 */
     double penalty_offset;       /* c of eq. (13), kg/s^2, in [0, 1e15]; default 1e5. M and c are not both 0 */
     double penalty_ratio_limit;  /* alpha of eq. (15), in [1, 1e6]; default 4 */

@@ -18,6 +18,9 @@
  * else goes through a full 6x6 inverse.
  *
  * An iteration is two sweeps with a barrier after each: bodies (Step 1), constraints (Steps 2-4).
+ *
+ * The method `fast` has one weight B a constraint in place of beta: it comes in through inv_s and C_i (cpu_weights.c), with
+ * beta = 1, and the sweeps go `relaxation` times as far.
  */
 #ifndef SADMM_CPU_H
 #define SADMM_CPU_H
@@ -27,6 +30,7 @@
 #include <stdint.h>
 
 #include "../core/kernels.h"
+#include "../core/math/limit.h"
 #include "cpu_barrier.h"
 #include "cpu_lanes.h"
 
@@ -46,7 +50,7 @@ enum { PACKED6 = 21 };       /* symmetric 6x6: lower triangle, rows first */
  * static body; slots without a point have an error so large that lambda stays 0. */
 struct pair_block {
     vec normal, d;
-    lanes friction, inv_s; /* mu, 1 / (1/beta_a + 1/beta_b) */
+    lanes friction, inv_s; /* mu, 1 / (1/beta_a + 1/beta_b); fast: B / number of dynamic bodies */
     int32_t body_a[LANES], body_b[LANES];
     int32_t pair[LANES];   /* index in the system, -1 for an empty lane */
     int32_t slots;
@@ -82,6 +86,14 @@ struct row_block {
     real error[6], stiffness[6], damping[6], lambda[6];
     real friction;
     bool active[6]; /* a hard row of zeros is no constraint (Sec. III-C) */
+    /* fast: B = diag(weight) + along along^T; per row J A^-1 J^T, and what its multiplier counts for in the load */
+    real weight[6], along[6], response[6], scale[6];
+};
+
+/* fast: sums over an island. */
+struct cpu_island {
+    double energy, mass, speed; /* sum of g . A^-1 g, kg, V in m/s */
+    struct limit_energies limit;
 };
 
 struct sadmm_context {
@@ -124,6 +136,15 @@ struct sadmm_context {
     /* Body -> its wrench rows: offsets (bodies + 2), incident: row index */
     int32_t *offsets, *incident;
     size_t offsets_capacity, incident_capacity;
+
+    /* fast */
+    bool fast;
+    int32_t *label;             /* bodies: the smallest body of its island */
+    struct cpu_island *islands; /* bodies, used at labels */
+    double *A_inverse;          /* bodies x PACKED6 */
+    double *pair_response, *pair_weight; /* pair records: J A^-1 J^T, B in kg */
+    double *body_sums;          /* bodies x 3: terms of the islands' sums */
+    size_t body_sum_capacity, label_capacity, island_capacity, A_inverse_capacity, pair_response_capacity, pair_weight_capacity;
 
     double *thread_max; /* one cache line a thread */
     size_t thread_max_capacity;
@@ -171,6 +192,9 @@ sadmm_status CPU(assemble_contacts)(struct sadmm_context *, struct sadmm_error *
 sadmm_status CPU(assemble_joints)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(assemble_springs)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(init_penalty)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CPU(init_weights)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CPU(update_weights)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CPU(limit_velocity)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
 sadmm_status CPU(factorize)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(update_velocity)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(update_constraints)(struct sadmm_context *, bool measure, struct sadmm_error *);
@@ -185,15 +209,18 @@ sadmm_status CPU(recover_wrenches)(struct sadmm_context *, double *wrench, struc
 /* Sweeps: a thread's share, used by the stepwise entries and by iterate alike. */
 enum cpu_sweep {
     CPU_SWEEP_START,   /* wrenches = J^T lambda of the start values */
+    CPU_SWEEP_RELAX,   /* fast: as ITERATE, but lambda goes `relaxation` times as far */
     CPU_SWEEP_ITERATE, /* Steps 2-4; wrenches = J^T (2 lambda - lambda_prev) */
     CPU_SWEEP_MEASURE  /* Steps 2-4; wrenches = J^T lambda, change = J^T (lambda - lambda_prev); *primal: eq. (16) */
 };
 void CPU(sweep_pairs)(struct sadmm_context *, size_t begin, size_t end, enum cpu_sweep sweep, double *primal);
 void CPU(sweep_row_blocks)(struct sadmm_context *, size_t begin, size_t end, enum cpu_sweep sweep, double *primal);
-/* Step 1 of body blocks [begin, end); `settled`: all but the bodies without constraints. */
-void CPU(sweep_bodies)(struct sadmm_context *, size_t begin, size_t end, bool settled);
+/* Step 1 of body blocks [begin, end), `relaxation` times as far; `settled`: all but the bodies without constraints. */
+void CPU(sweep_bodies)(struct sadmm_context *, size_t begin, size_t end, bool settled, double relaxation);
 /* Largest entry of A v - b - (sum of wrenches), eq. (17), over body blocks [begin, end). */
 double CPU(dual_residual)(const struct sadmm_context *, size_t begin, size_t end);
+/* wrenches = J^T lambda; and at the start of a solve. */
+void CPU(sum_wrenches)(struct sadmm_context *);
 void CPU(start_wrenches)(struct sadmm_context *);
 
 #endif

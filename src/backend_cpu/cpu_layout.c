@@ -89,6 +89,7 @@ sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *syst
     c->plan = *plan;
     c->settings = *settings;
     c->bodies = plan->bodies;
+    c->fast = settings->method == SADMM_METHOD_FAST;
     c->measured = false;
     c->ratio = 1;
     c->pair_block_count = ((size_t)plan->pairs + LANES - 1) / LANES;
@@ -117,6 +118,12 @@ sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *syst
               (!plan->residuals || grow(&c->change, &c->change_capacity, 2 * c->record_count * ROW, sizeof(real))) &&
               grow(&c->offsets, &c->offsets_capacity, n + 2, sizeof(int32_t)) &&
               grow(&c->incident, &c->incident_capacity, 2 * c->record_count, sizeof(int32_t)) &&
+              (!c->fast || (grow(&c->label, &c->label_capacity, n, sizeof(int32_t)) &&
+                            grow(&c->islands, &c->island_capacity, n, sizeof *c->islands) &&
+                            grow(&c->body_sums, &c->body_sum_capacity, 3 * n, sizeof(double)) &&
+                            grow(&c->A_inverse, &c->A_inverse_capacity, n * PACKED6, sizeof(double)) &&
+                            grow(&c->pair_response, &c->pair_response_capacity, c->record_count, sizeof(double)) &&
+                            grow(&c->pair_weight, &c->pair_weight_capacity, c->record_count, sizeof(double)))) &&
               grow(&c->thread_max, &c->thread_max_capacity, (size_t)plan->threads * THREAD_MAX_STRIDE, sizeof(double));
     if (!ok) return sadmm_fail_memory(error, "the cpu backend's step");
     order_pairs(c);

@@ -5,58 +5,20 @@
 #include <string.h>
 
 #include "../core/dense6.h"
-#include "cpu.h"
-
-/* C += row^T row, packed lower triangle. */
-static void add_row(double C[PACKED6], const double row[6])
-{
-    int at = 0;
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j <= i; ++j) C[at++] += row[i] * row[j];
-}
-
-/* Sums over a body's three-row points: J^T J = [ I, -[r]x; [r]x, |r|^2 I - r r^T ] does not depend on the frame. */
-struct arm_sums {
-    double count, r[3], rr[6]; /* rr: xx yy zz xy xz yz */
-};
-
-static void add_arm(struct arm_sums *s, const double r[3])
-{
-    s->count += 1;
-    for (int k = 0; k < 3; ++k) {
-        s->r[k] += r[k];
-        s->rr[k] += r[k] * r[k];
-    }
-    s->rr[3] += r[0] * r[1];
-    s->rr[4] += r[0] * r[2];
-    s->rr[5] += r[1] * r[2];
-}
-
-static void add_arm_sums(double C[PACKED6], const struct arm_sums *s)
-{
-    C[0] += s->count, C[2] += s->count, C[5] += s->count;
-    /* Rows 3-5, columns 0-2: [r]x */
-    C[7] -= s->r[2], C[8] += s->r[1];
-    C[10] += s->r[2], C[12] -= s->r[0];
-    C[15] -= s->r[1], C[16] += s->r[0];
-    C[9] += s->rr[1] + s->rr[2];
-    C[13] -= s->rr[3], C[14] += s->rr[0] + s->rr[2];
-    C[18] -= s->rr[4], C[19] -= s->rr[5], C[20] += s->rr[0] + s->rr[1];
-}
+#include "cpu_rows.h"
 
 static void add_pair(const struct sadmm_context *c, size_t record, int side, struct arm_sums *sums, double C[PACKED6])
 {
     const struct sadmm_contact_set *contacts = c->system->contacts;
-    const struct pair_block *block = &c->pair_blocks[record / (size_t)LANES];
-    const struct sadmm_contact_pair *pair = &contacts->pairs[block->pair[record % (size_t)LANES]];
+    const struct sadmm_contact_pair *pair = cpu_pair(c, record);
     for (int k = 0; k < pair->count; ++k) {
         const struct sadmm_contact_point *point = &contacts->points[pair->first + k];
-        const double *r = side ? point->arm_b : point->arm_a, *n = pair->normal;
+        const double *r = side ? point->arm_b : point->arm_a;
         if (c->plan.contact_rows == 3) {
             add_arm(sums, r);
         } else {
-            double row[6] = {n[0], n[1], n[2], r[1] * n[2] - r[2] * n[1], r[2] * n[0] - r[0] * n[2],
-                             r[0] * n[1] - r[1] * n[0]};
+            double row[6];
+            normal_row(pair->normal, r, row);
             add_row(C, row);
         }
     }
@@ -64,10 +26,9 @@ static void add_pair(const struct sadmm_context *c, size_t record, int side, str
 
 static void add_row_block(const struct row_block *block, int side, double C[PACKED6])
 {
-    const real *J = side ? block->jacobian_b : block->jacobian_a;
     for (int r = 0; r < block->rows; ++r) {
         double row[6];
-        for (int j = 0; j < 6; ++j) row[j] = (double)J[6 * r + j];
+        block_row(block, side, r, row);
         add_row(C, row);
     }
 }
@@ -99,7 +60,7 @@ static void assemble_C(struct sadmm_context *c, int32_t i)
 
 sadmm_status CPU(init_penalty)(struct sadmm_context *c, struct sadmm_error *error)
 {
-    (void)error;
+    if (c->fast) return CPU(init_weights)(c, error);
     CPU_PARALLEL
     {
         size_t begin, end;
@@ -181,8 +142,9 @@ sadmm_status CPU(factorize)(struct sadmm_context *c, struct sadmm_error *error)
         size_t begin, end;
         cpu_share((size_t)c->bodies, cpu_thread(), cpu_threads(), &begin, &end);
         for (size_t i = begin; i < end; ++i) factorize_body(c, i);
-        CPU_BARRIER;
-        cpu_share(c->pair_block_count, cpu_thread(), cpu_threads(), &begin, &end);
+        if (c->fast) begin = end = 0; /* the weights are the pairs' own */
+        else CPU_BARRIER;
+        if (!c->fast) cpu_share(c->pair_block_count, cpu_thread(), cpu_threads(), &begin, &end);
         for (size_t k = begin; k < end; ++k) weigh_pair_block(c, &c->pair_blocks[k]);
     }
     return SADMM_OK;

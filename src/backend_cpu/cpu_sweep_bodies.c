@@ -50,7 +50,7 @@ static size_t first_body(const struct sadmm_context *c, size_t block)
     return body < (size_t)c->bodies ? body : (size_t)c->bodies;
 }
 
-static void update_rigid(struct sadmm_context *c, size_t begin, size_t end, bool settled)
+static void update_rigid(struct sadmm_context *c, size_t begin, size_t end, bool settled, lanes relaxation)
 {
     for (size_t index = begin; index < end; ++index) {
         if (settled && c->offsets[first_body(c, index)] == c->offsets[first_body(c, index + 1)]) continue;
@@ -60,6 +60,8 @@ static void update_rigid(struct sadmm_context *c, size_t begin, size_t end, bool
         block_defect(c, index, state, &linear, &angular);
         vec dw = sym3_times(block->K_inverse, sub(angular, cross(block->sigma, linear)));
         vec dv = add(scale(linear, block->inv_alpha), cross(block->sigma, dw));
+        dv = scale(dv, relaxation);
+        dw = scale(dw, relaxation);
         state[0] += dv.x, state[1] += dv.y, state[2] += dv.z;
         state[3] += dw.x, state[4] += dw.y, state[5] += dw.z;
         store_rows(c->state + index * (size_t)LANES * ROW, state);
@@ -89,14 +91,14 @@ static inline row8 general_defect(const struct sadmm_context *c, size_t i)
     return g;
 }
 
-static void update_general(struct sadmm_context *c, size_t begin, size_t end, bool settled)
+static void update_general(struct sadmm_context *c, size_t begin, size_t end, bool settled, real relaxation)
 {
     for (size_t i = begin; i < end; ++i) {
         if (settled && c->offsets[i] == c->offsets[i + 1]) continue;
         const row8 *H = (const row8 *)c->H_columns + 6 * i;
         row8 g = general_defect(c, i), step = {0};
         for (int k = 0; k < 6; ++k) step += H[k] * g[k];
-        ((row8 *)c->state)[i] += step; /* number 6 of step is 0: 1/beta stays */
+        ((row8 *)c->state)[i] += relaxation * step; /* number 6 of step is 0: 1/beta stays */
     }
 }
 
@@ -112,10 +114,10 @@ static double general_residual(const struct sadmm_context *c, size_t begin, size
 
 /* ---- by blocks, so that both forms share the work the same way -------------------------------------------------- */
 
-void CPU(sweep_bodies)(struct sadmm_context *c, size_t begin, size_t end, bool settled)
+void CPU(sweep_bodies)(struct sadmm_context *c, size_t begin, size_t end, bool settled, double relaxation)
 {
-    if (c->rigid_bodies) update_rigid(c, begin, end, settled);
-    else update_general(c, first_body(c, begin), first_body(c, end), settled);
+    if (c->rigid_bodies) update_rigid(c, begin, end, settled, fill((real)relaxation));
+    else update_general(c, first_body(c, begin), first_body(c, end), settled, (real)relaxation);
 }
 
 double CPU(dual_residual)(const struct sadmm_context *c, size_t begin, size_t end)

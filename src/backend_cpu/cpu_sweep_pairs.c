@@ -36,7 +36,11 @@ static inline lanes frame_max(vec change, vec n)
 static inline lanes larger_inv_beta(const struct sadmm_context *c, const struct pair_block *block)
 {
     lanes out;
-    for (int l = 0; l < LANES; ++l)
+    for (int l = 0; l < LANES && c->fast; ++l) {
+        bool both = block->body_a[l] < c->bodies && block->body_b[l] < c->bodies;
+        out[l] = block->inv_s[l] > 0 ? 1 / ((both ? 2 : 1) * block->inv_s[l]) : 0;
+    }
+    for (int l = 0; l < LANES && !c->fast; ++l)
         out[l] = real_max(c->state[(size_t)block->body_a[l] * ROW + STATE_INV_BETA],
                           c->state[(size_t)block->body_b[l] * ROW + STATE_INV_BETA]);
     return out;
@@ -75,6 +79,7 @@ static inline __attribute__((always_inline)) void sweep_block(struct sadmm_conte
     const struct pair_block *block = &c->pair_blocks[index];
     vec n = block->normal, u = {0}, w = {0};
     lanes mu = block->friction, inv_s = block->inv_s, change_max = {0};
+    lanes relaxation = fill((real)c->settings.relaxation); /* used by RELAX only */
     const lanes zero = {0};
     struct pair_sum next = {0}, change = {0};
 
@@ -98,7 +103,8 @@ static inline __attribute__((always_inline)) void sweep_block(struct sadmm_conte
             lanes t2 = dot(t, t), shrink = pick(t2 > limit * limit, limit / root(t2), fill(1));
             vec lambda = add(scale(n, normal), scale(t, shrink));
             vec delta = sub(lambda, old);
-            slot->lambda = lambda;
+            if (sweep == CPU_SWEEP_RELAX) slot->lambda = add(old, scale(delta, relaxation));
+            else slot->lambda = lambda;
             if (sweep == CPU_SWEEP_MEASURE) {
                 add_to(&next, arm, lambda);
                 add_to(&change, arm, delta);
@@ -118,7 +124,8 @@ static inline __attribute__((always_inline)) void sweep_block(struct sadmm_conte
             }
             lanes y = old - (dot(n, add(u, cross(w, arm))) + slot->error) * inv_s;
             lanes lambda = pick(y > 0, y, zero), delta = lambda - old;
-            slot->lambda = lambda;
+            if (sweep == CPU_SWEEP_RELAX) slot->lambda = old + relaxation * delta;
+            else slot->lambda = lambda;
             if (sweep == CPU_SWEEP_MEASURE) {
                 add_to(&next, arm, scale(n, lambda));
                 add_to(&change, arm, scale(n, delta));
@@ -141,10 +148,12 @@ void CPU(sweep_pairs)(struct sadmm_context *c, size_t begin, size_t end, enum cp
     for (size_t k = begin; k < end; ++k) sweep_block(c, k, rows, kind, primal)
     if (c->plan.contact_rows == 3) {
         if (sweep == CPU_SWEEP_ITERATE) SWEEP(3, CPU_SWEEP_ITERATE);
+        else if (sweep == CPU_SWEEP_RELAX) SWEEP(3, CPU_SWEEP_RELAX);
         else if (sweep == CPU_SWEEP_MEASURE) SWEEP(3, CPU_SWEEP_MEASURE);
         else SWEEP(3, CPU_SWEEP_START);
     } else {
         if (sweep == CPU_SWEEP_ITERATE) SWEEP(1, CPU_SWEEP_ITERATE);
+        else if (sweep == CPU_SWEEP_RELAX) SWEEP(1, CPU_SWEEP_RELAX);
         else if (sweep == CPU_SWEEP_MEASURE) SWEEP(1, CPU_SWEEP_MEASURE);
         else SWEEP(1, CPU_SWEEP_START);
     }

@@ -338,6 +338,9 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
                                     const struct sadmm_plan *plan, const struct sadmm_settings *settings,
                                     struct sadmm_error *error)
 {
+    if (settings->method != SADMM_METHOD_PAPER)
+        return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "settings.method = %d: the cuda backend runs paper only",
+                          (int)settings->method);
     int64_t records = (int64_t)plan->pairs + system->block_count + WARP;
     if (records > INT32_MAX / (4 * ROW))
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%lld constraints: at most %d", (long long)(records - WARP),

@@ -562,6 +562,9 @@ extern "C" sadmm_status CUDA(step_world)(struct sadmm_context *c, const struct s
                                          struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
+    if (settings->method != SADMM_METHOD_PAPER)
+        return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "settings.method = %d: the cuda backend runs paper only",
+                          (int)settings->method);
     CUDA_ENTER(c);
     CUDA_TRY(next_place(c, error));
     if (memcmp(&s->settings, settings, sizeof *settings) != 0) {

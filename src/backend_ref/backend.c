@@ -108,6 +108,29 @@ static sadmm_status recover_wrenches(struct sadmm_context *c, double *wrench, st
     return SADMM_OK;
 }
 
+static bool is_fast(const struct sadmm_context *c) { return c->settings->method == SADMM_METHOD_FAST; }
+
+static sadmm_status init_penalty(struct sadmm_context *c, struct sadmm_error *error)
+{
+    return is_fast(c) ? sadmm_ref_init_weights(c, error) : sadmm_ref_init_penalty(c, error);
+}
+
+static sadmm_status iterate(struct sadmm_context *c, int count, bool measure, struct sadmm_error *error)
+{
+    sadmm_status status = SADMM_OK;
+    if (is_fast(c)) return sadmm_ref_iterate_fast(c, count);
+    for (int i = 0; i < count && status == SADMM_OK; ++i) {
+        status = sadmm_ref_update_velocity(c, error);
+        if (status == SADMM_OK) status = sadmm_ref_update_constraints(c, measure && i + 1 == count, error);
+    }
+    return status;
+}
+
+static sadmm_status measure_residuals(struct sadmm_context *c, struct sadmm_residual *residual, struct sadmm_error *error)
+{
+    return is_fast(c) ? sadmm_ref_measure_fast(c, residual) : sadmm_ref_measure_residuals(c, residual, error);
+}
+
 static const struct sadmm_kernels kernels_ref = {
     .backend = SADMM_BACKEND_REF,
     .precision = SADMM_F64,
@@ -120,13 +143,15 @@ static const struct sadmm_kernels kernels_ref = {
     .assemble_contacts = sadmm_ref_assemble_contacts,
     .assemble_joints = sadmm_ref_assemble_joints,
     .assemble_springs = sadmm_ref_assemble_springs,
-    .init_penalty = sadmm_ref_init_penalty,
+    .init_penalty = init_penalty,
     .factorize = sadmm_ref_factorize,
     .update_velocity = sadmm_ref_update_velocity,
     .update_constraints = sadmm_ref_update_constraints,
-    .iterate = NULL, /* core composes it */
-    .measure_residuals = sadmm_ref_measure_residuals,
+    .update_weights = sadmm_ref_update_weights,
+    .iterate = iterate,
+    .measure_residuals = measure_residuals,
     .update_penalty = sadmm_ref_update_penalty,
+    .limit_velocity = sadmm_ref_limit_velocity,
     .read_solution = read_solution,
     .read_penalty = read_penalty,
     .integrate = integrate,

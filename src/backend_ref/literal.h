@@ -13,6 +13,7 @@
 #define SADMM_BACKEND_REF_LITERAL_H
 
 #include "../core/kernels.h"
+#include "../core/math/limit.h"
 
 /* One side of a constraint: the paper's subscript (i,k) or (j,k). */
 struct ref_side {
@@ -31,6 +32,7 @@ struct ref_constraint {
     double k[6], c[6];               /* soft: (3) */
     bool free_row[6];                /* hard: zero on both bodies (Sec. III-C), carries nothing */
     double lambda[6];
+    double B[36], seen[6];           /* fast: weight (6 x 6), the multiplier that the next Step 1 sees */
 };
 
 struct ref_body {
@@ -40,6 +42,11 @@ struct ref_body {
     double factor[36];               /* Cholesky of A + beta C */
     double v[6];
     double dual[6];                  /* (17), this body's part */
+    /* fast */
+    int32_t label;                   /* the smallest body of its island; that one keeps the island's sums */
+    double island_energy, island_mass;
+    struct limit_energies limit;
+    double impulse[6];               /* sums over the body's constraints */
 };
 
 struct sadmm_context {
@@ -50,6 +57,8 @@ struct sadmm_context {
     size_t body_capacity;
     struct ref_constraint *constraints; /* contact points in order, then blocks in order */
     size_t constraint_capacity, constraint_count;
+    bool settled;                    /* fast: Step 1 ran */
+    double primal;                   /* fast: of the last iteration */
 };
 
 /* assemble.c */
@@ -65,5 +74,12 @@ sadmm_status sadmm_ref_update_velocity(struct sadmm_context *, struct sadmm_erro
 sadmm_status sadmm_ref_update_constraints(struct sadmm_context *, bool measure, struct sadmm_error *);
 sadmm_status sadmm_ref_measure_residuals(struct sadmm_context *, struct sadmm_residual *, struct sadmm_error *);
 sadmm_status sadmm_ref_update_penalty(struct sadmm_context *, double ratio, struct sadmm_error *);
+
+/* fast.c */
+sadmm_status sadmm_ref_init_weights(struct sadmm_context *, struct sadmm_error *);
+sadmm_status sadmm_ref_update_weights(struct sadmm_context *, struct sadmm_error *);
+sadmm_status sadmm_ref_iterate_fast(struct sadmm_context *, int count);
+sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
+sadmm_status sadmm_ref_measure_fast(struct sadmm_context *, struct sadmm_residual *);
 
 #endif

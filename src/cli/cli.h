@@ -51,9 +51,11 @@ bool cli_read_int(const char *option, const char *text, long lo, long hi, long *
 bool cli_read_real(const char *option, const char *text, double lo, double hi, double *out);
 bool cli_read_backend(const char *option, const char *text, sadmm_backend *out);
 bool cli_read_precision(const char *option, const char *text, sadmm_precision *out);
+bool cli_read_method(const char *option, const char *text, sadmm_method *out);
 
 const char *cli_backend_name(sadmm_backend backend);
 const char *cli_precision_name(sadmm_precision precision);
+const char *cli_method_name(sadmm_method method);
 
 /* "subadmm: message" on stderr; returns `code` for `return cli_error(...)`. */
 __attribute__((format(printf, 2, 3))) int cli_error(int code, const char *format, ...);

@@ -5,10 +5,11 @@
 #include "check_runs.h"
 #include "cli.h"
 
-enum { OPTION_STEPS, OPTION_ITERATIONS, OPTION_JSON, OPTION_QUIET };
+enum { OPTION_STEPS, OPTION_METHOD, OPTION_ITERATIONS, OPTION_JSON, OPTION_QUIET };
 
 static const struct cli_option options[] = {
     [OPTION_STEPS] = {"steps", "N", "steps to compare, in [1, 100000] (default 20)"},
+    [OPTION_METHOD] = {"method", "NAME", "paper or fast (default the scene's)"},
     [OPTION_ITERATIONS] = {"iterations", "N", "iterations a step (default the scene's)"},
     [OPTION_JSON] = {"json", "[FILE|-]", "write JSON to FILE, or to standard output (-, the default)"},
     [OPTION_QUIET] = {"quiet", NULL, "no table"},
@@ -16,8 +17,9 @@ static const struct cli_option options[] = {
 
 struct check_options {
     long steps, iterations; /* iterations 0: the scene's */
+    sadmm_method method;
     const char *json;
-    bool quiet;
+    bool quiet, method_given;
 };
 
 static int set_option(void *target, size_t index, const char *value)
@@ -26,6 +28,10 @@ static int set_option(void *target, size_t index, const char *value)
     bool ok = true;
     switch (index) {
     case OPTION_STEPS: ok = cli_read_int("--steps", value, 1, 100000, &o->steps); break;
+    case OPTION_METHOD:
+        ok = cli_read_method("--method", value, &o->method);
+        o->method_given = true;
+        break;
     case OPTION_ITERATIONS: ok = cli_read_int("--iterations", value, 1, 1000000, &o->iterations); break;
     case OPTION_JSON: o->json = value ? value : "-"; break;
     case OPTION_QUIET: o->quiet = true; break;
@@ -221,6 +227,7 @@ static int run(int argc, char **argv)
     int code = cli_parse(&cli_check, argc, argv, set_option, &o, &spec);
     if (code >= 0) return code;
     if (sadmm_scene_open(spec, &scene, &error) != SADMM_OK) return cli_error(CLI_USAGE, "%s", error.message);
+    if (o.method_given) scene.def.settings.method = o.method;
     if (o.iterations > 0) scene.def.settings.iterations = (int)o.iterations;
     return check_scene(&o, spec, &scene);
 }

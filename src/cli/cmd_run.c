@@ -13,8 +13,8 @@
 #include "run_trace.h"
 
 enum {
-    OPTION_BACKEND, OPTION_DEVICE, OPTION_PRECISION, OPTION_STEPS, OPTION_DT, OPTION_ITERATIONS, OPTION_PENALTY_PERIOD,
-    OPTION_THREADS, OPTION_NO_WARM_START, OPTION_CERTIFY, OPTION_EXPLAIN, OPTION_JSON, OPTION_TRACE, OPTION_DUMP,
+    OPTION_BACKEND, OPTION_DEVICE, OPTION_PRECISION, OPTION_STEPS, OPTION_DT, OPTION_METHOD, OPTION_ITERATIONS,
+    OPTION_PENALTY_PERIOD, OPTION_THREADS, OPTION_NO_WARM_START, OPTION_CERTIFY, OPTION_EXPLAIN, OPTION_JSON, OPTION_TRACE, OPTION_DUMP,
     OPTION_QUIET
 };
 
@@ -24,6 +24,7 @@ static const struct cli_option options[] = {
     [OPTION_PRECISION] = {"precision", "P", "f32 or f64 (default the scene's)"},
     [OPTION_STEPS] = {"steps", "N", "number of steps (default the scene's duration / dt)"},
     [OPTION_DT] = {"dt", "S", "time step, s (default the scene's)"},
+    [OPTION_METHOD] = {"method", "NAME", "paper or fast (default the scene's)"},
     [OPTION_ITERATIONS] = {"iterations", "N", "iterations a step (default the scene's)"},
     [OPTION_PENALTY_PERIOD] = {"penalty-period", "N", "iterations between penalty updates, 0 = never"},
     [OPTION_THREADS] = {"threads", "N", "CPU threads, 0 = as many as pay (default)"},
@@ -39,10 +40,11 @@ static const struct cli_option options[] = {
 struct run_options {
     sadmm_backend backend;
     sadmm_precision precision;
+    sadmm_method method;
     long steps, iterations, penalty_period, threads; /* -1: the scene's */
     double dt;                                       /* 0: the scene's */
     long device;
-    bool no_warm_start, certify, explain, quiet, precision_given;
+    bool no_warm_start, certify, explain, quiet, precision_given, method_given;
     const char *json, *trace, *dump_path;
     long dump_step;
 };
@@ -75,6 +77,10 @@ static int set_option(void *target, size_t index, const char *value)
         break;
     case OPTION_STEPS: ok = cli_read_int("--steps", value, 0, 1000000000, &o->steps); break;
     case OPTION_DT: ok = cli_read_real("--dt", value, 1e-6, 1, &o->dt); break;
+    case OPTION_METHOD:
+        ok = cli_read_method("--method", value, &o->method);
+        o->method_given = true;
+        break;
     case OPTION_ITERATIONS: ok = cli_read_int("--iterations", value, 1, 1000000, &o->iterations); break;
     case OPTION_PENALTY_PERIOD: ok = cli_read_int("--penalty-period", value, 0, 1000000, &o->penalty_period); break;
     case OPTION_THREADS: ok = cli_read_int("--threads", value, 0, 1024, &o->threads); break;
@@ -96,6 +102,7 @@ static void apply(const struct run_options *o, struct sadmm_scene *scene)
     scene->def.device = (int)o->device;
     if (o->precision_given) scene->def.precision = o->precision;
     if (o->dt > 0) s->dt = o->dt;
+    if (o->method_given) s->method = o->method;
     if (o->iterations >= 0) s->iterations = (int)o->iterations;
     if (o->penalty_period >= 0) s->penalty_period = (int)o->penalty_period;
     if (o->threads >= 0) s->threads = (int)o->threads;

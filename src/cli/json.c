@@ -60,7 +60,9 @@ json_t *cli_json_settings(const sadmm_settings *s)
     json_t *o = json_object();
     json_object_set_new(o, "dt", cli_json_real(s->dt));
     json_object_set_new(o, "gravity", cli_json_reals(s->gravity, 3));
+    json_object_set_new(o, "method", json_string(cli_method_name(s->method)));
     json_object_set_new(o, "iterations", json_integer(s->iterations));
+    json_object_set_new(o, "relaxation", cli_json_real(s->relaxation));
     json_object_set_new(o, "penalty_period", json_integer(s->penalty_period));
     json_object_set_new(o, "penalty_mass_factor", cli_json_real(s->penalty_mass_factor));
     json_object_set_new(o, "penalty_offset", cli_json_real(s->penalty_offset));

@@ -145,6 +145,10 @@ static const char *const backend_names[SADMM_BACKEND_COUNT] = {
     [SADMM_BACKEND_CUDA] = "cuda",
 };
 static const char *const precision_names[] = {[SADMM_F32] = "f32", [SADMM_F64] = "f64"};
+static const char *const method_names[SADMM_METHOD_COUNT] = {
+    [SADMM_METHOD_PAPER] = "paper",
+    [SADMM_METHOD_FAST] = "fast",
+};
 
 const char *cli_backend_name(sadmm_backend backend)
 {
@@ -154,6 +158,11 @@ const char *cli_backend_name(sadmm_backend backend)
 const char *cli_precision_name(sadmm_precision precision)
 {
     return (unsigned)precision <= SADMM_F64 ? precision_names[precision] : "?";
+}
+
+const char *cli_method_name(sadmm_method method)
+{
+    return (unsigned)method < SADMM_METHOD_COUNT ? method_names[method] : "?";
 }
 
 bool cli_read_backend(const char *option, const char *text, sadmm_backend *out)
@@ -175,5 +184,16 @@ bool cli_read_precision(const char *option, const char *text, sadmm_precision *o
             return true;
         }
     cli_error(CLI_USAGE, "%s '%s': must be f32 or f64", option, text);
+    return false;
+}
+
+bool cli_read_method(const char *option, const char *text, sadmm_method *out)
+{
+    for (int k = 0; k < SADMM_METHOD_COUNT; ++k)
+        if (strcmp(text, method_names[k]) == 0) {
+            *out = (sadmm_method)k;
+            return true;
+        }
+    cli_error(CLI_USAGE, "%s '%s': must be paper or fast", option, text);
     return false;
 }

@@ -78,7 +78,7 @@ json_t *run_record_json(const struct run_record *record, const char *spec, const
     json_object_set_new(o, "scene", json_string(spec));
     set_or_null(o, "backend", record, json_string(cli_backend_name(last->backend)));
     json_object_set_new(o, "precision", json_string(cli_precision_name(scene->def.precision)));
-    json_object_set_new(o, "method", json_string("paper"));
+    json_object_set_new(o, "method", json_string(cli_method_name(scene->def.settings.method)));
     json_object_set_new(o, "bodies", json_integer((json_int_t)record->body_count));
     set_or_null(o, "joints", record, json_integer(last->joints));
     json_object_set_new(o, "contacts", contacts_json(record));
@@ -110,9 +110,9 @@ void run_record_print(const struct run_record *record, const char *spec, const s
     printf("scene          %s, %zu bodies\n", spec, record->body_count);
     printf("steps          %zu of %g s\n", record->steps, scene->def.settings.dt);
     if (record->steps > 0) {
-        printf("backend        %s %s, %d thread%s, %d iterations a step\n", cli_backend_name(last->backend),
+        printf("backend        %s %s, %d thread%s, %d iterations a step (%s)\n", cli_backend_name(last->backend),
                cli_precision_name(last->precision), last->threads, last->threads == 1 ? "" : "s",
-               scene->def.settings.iterations);
+               scene->def.settings.iterations, cli_method_name(scene->def.settings.method));
         printf("contacts       %.1f mean, %d max\n", record->contacts_sum / (double)record->steps,
                record->contacts_max);
         printf("ms per step    %10s %10s\n", "median", "p95");

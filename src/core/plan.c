@@ -56,7 +56,7 @@ bool sadmm_plan_is_gyroscopic(const struct sadmm_rigid *rigid, int32_t count)
 
 static bool may_update_penalty(const struct sadmm_settings *settings)
 {
-    return settings->penalty_period > 0 && settings->penalty_ratio_limit > 1 &&
+    return settings->method == SADMM_METHOD_PAPER && settings->penalty_period > 0 && settings->penalty_ratio_limit > 1 &&
            settings->iterations > settings->penalty_period;
 }
 
@@ -72,6 +72,10 @@ void sadmm_plan_settle(struct sadmm_plan *plan, const struct sadmm_settings *set
     plan->warm_start = settings->warm_start;
     plan->warm = plan->warm_start && mostly_warm;
     plan->penalty_updates = constrained && may_update_penalty(settings) && (settings->penalty_update_warm || !plan->warm);
+    bool fast = constrained && settings->method == SADMM_METHOD_FAST;
+    plan->weight_refresh = fast && !plan->warm;
+    plan->limit = fast && plan->rigid && plan->blocks[SADMM_BLOCK_CONTACT] == 0 && plan->blocks[SADMM_BLOCK_HARD] == 0 &&
+                  plan->blocks[SADMM_BLOCK_SOFT] == 0;
     plan->certificate = settings->certify || settings->certificate_tolerance > 0;
     plan->residuals = constrained && (plan->penalty_updates || settings->measure_residuals ||
                                       settings->residual_tolerance > 0);

@@ -3,16 +3,19 @@
  *     begin            room for this step (the only allocation)
  *     assemble         A bodies, B contacts, C/D hard and soft blocks (classes the plan lacks are not called)
  *     E-H              C_i, beta_i, factor of A_i + beta_i C_i
- *     I-P              iterations in stretches: a stretch ends where someone has to look (penalty update, stop rule, end)
+ *     I-P              iterations in stretches: a stretch ends where someone has to look (penalty update, stop rule, new
+ *                      weights, end)
  *     read_solution
  */
 #include "schedule.h"
 
+#include <limits.h>
 #include <math.h>
 #include <string.h>
 #include <time.h>
 
 #include "certificate.h"
+#include "math/weight.h"
 #include "system_math.h"
 
 double sadmm_clock_ms(void)
@@ -58,6 +61,21 @@ static int until(int done, int period, int limit)
     return left < limit ? left : limit;
 }
 
+/* Weights are taken anew after 5, 10, 20, 40 ... iterations. */
+static bool is_refresh(int done)
+{
+    int at = WEIGHT_FIRST_REFRESH;
+    while (at < done && at <= INT_MAX / 2) at *= 2;
+    return at == done;
+}
+
+static int until_refresh(int done, int limit)
+{
+    int at = WEIGHT_FIRST_REFRESH;
+    while (at <= done && at <= INT_MAX / 2) at *= 2;
+    return at > done && at - done < limit ? at - done : limit;
+}
+
 static bool constrained(const struct sadmm_plan *plan)
 {
     return plan->points > 0 || plan->blocks[SADMM_BLOCK_CONTACT] > 0 || plan->blocks[SADMM_BLOCK_HARD] > 0 ||
@@ -75,10 +93,12 @@ struct sadmm_stretch sadmm_schedule_stretch(const struct sadmm_plan *plan, const
     int budget = sadmm_schedule_budget(plan, settings);
     struct sadmm_stretch next = {.count = budget - done};
     if (plan->penalty_updates) next.count = until(done, settings->penalty_period, next.count);
+    if (plan->weight_refresh) next.count = until_refresh(done, next.count);
     if (stop_rule) next.count = until(done, settings->check_period, next.count);
     int after = done + next.count;
     next.last = after == budget;
     next.update = plan->penalty_updates && !next.last && after % settings->penalty_period == 0;
+    next.refresh = plan->weight_refresh && !next.last && is_refresh(after);
     next.look = stop_rule && (next.last || after % settings->check_period == 0);
     next.measure = plan->residuals && (next.update || (next.last && settings->measure_residuals) ||
                                        (next.look && settings->residual_tolerance > 0));
@@ -135,6 +155,10 @@ static sadmm_status run(const struct sadmm_kernels *k, struct sadmm_context *c, 
                 return SADMM_OK;
             }
         }
+        if (next.refresh) {
+            TRY(k->update_weights(c, error));
+            TRY(k->factorize(c, error));
+        }
         if (next.update) {
             double ratio = sadmm_penalty_ratio(report->residual.primal, report->residual.dual, s->penalty_ratio_limit);
             if (ratio != 1) {
@@ -156,6 +180,7 @@ sadmm_status sadmm_schedule_solve(const struct sadmm_kernels *kernels, struct sa
     report->precision = kernels->precision;
     report->iterations = 0;
     report->converged = false;
+    report->limited = 0;
     report->residual.primal = report->residual.dual = -1;
     report->certificate.ncp_max = report->certificate.ncp_mean = -1;
     report->certificate.momentum_max = report->certificate.siconos = -1;
@@ -166,6 +191,7 @@ sadmm_status sadmm_schedule_solve(const struct sadmm_kernels *kernels, struct sa
     TRY(assemble(kernels, context, plan, error));
     double assembled = sadmm_clock_ms();
     TRY(run(kernels, context, system, settings, plan, report, error));
+    if (plan->limit) TRY(kernels->limit_velocity(context, &report->limited, error));
     TRY(kernels->read_solution(context, error));
     double end = sadmm_clock_ms();
     report->solve_ms = end - start;

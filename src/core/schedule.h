@@ -25,6 +25,7 @@ struct sadmm_stretch {
     bool last;    /* the budget is spent then */
     bool look;    /* the stop rule looks */
     bool update;  /* eq. (15) */
+    bool refresh; /* the weights of method fast are taken anew */
     bool measure; /* the last of them is measured */
 };
 /* The stretch that begins after `done` iterations, done < sadmm_schedule_budget(). */

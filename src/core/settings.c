@@ -7,7 +7,9 @@ sadmm_settings sadmm_settings_default(void)
     sadmm_settings s = {
         .dt = 0.005,
         .gravity = {0, 0, -9.81},
+        .method = SADMM_METHOD_PAPER,
         .iterations = 100,
+        .relaxation = 1.8,
         .penalty_period = 30,
         .penalty_mass_factor = 16,
         .penalty_offset = 1e5,
@@ -80,6 +82,12 @@ sadmm_status sadmm_settings_validate(const struct sadmm_settings *s, struct sadm
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.%s = %g: must be finite and >= 0",
                               nonnegative[i].name, nonnegative[i].value);
 
+    if ((int)s->method < 0 || s->method >= SADMM_METHOD_COUNT)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.method = %d: must be in [0, %d]", (int)s->method,
+                          SADMM_METHOD_COUNT - 1);
+    if (!(s->relaxation >= 1 && s->relaxation < 2))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.relaxation = %g: must be in [1, 2)",
+                          s->relaxation);
     if (s->penalty_period < 0)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.penalty_period = %d: must be >= 0 (0: never)",
                           s->penalty_period);

@@ -41,7 +41,12 @@ static void explain_options(struct text *t, const struct sadmm_plan *plan, const
                              : "gyroscopic   left out: every body has equal principal moments\n");
     line(t, plan->warm_start ? "start        warm: impulses and velocities of the last step\n"
                              : "start        cold: impulses 0, velocities A^-1 b (asked for)\n");
-    if (plan->penalty_updates)
+    if (s->method == SADMM_METHOD_FAST)
+        line(t, "weights      by load, relaxation %g; %s\n", s->relaxation,
+             plan->weight_refresh ? "taken anew during the step, which starts cold"
+             : plan->warm         ? "kept during the step, which starts warm"
+                                  : "kept: no constraints");
+    else if (plan->penalty_updates)
         line(t, "penalty      eq. (13) with M = %g, c = %g kg/s^2; updated (15) every %d iterations\n",
              s->penalty_mass_factor, s->penalty_offset, s->penalty_period);
     else
@@ -72,5 +77,8 @@ size_t sadmm_world_explain(const sadmm_world *world, char *out, size_t size)
     explain_options(&t, plan, &world->step_settings);
     line(&t, "iterations   %d of at most %d%s\n", world->report.iterations, world->step_settings.iterations,
          world->report.iterations == 1 && !plan->points ? ": without constraints Step 1 is exact" : "");
+    if (world->report.limited)
+        line(&t, "limited      %d islands had more energy than contacts can leave them with: too few iterations\n",
+             world->report.limited);
     return t.length;
 }

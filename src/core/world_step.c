@@ -36,7 +36,8 @@ sadmm_status sadmm_world_choose_backend(sadmm_world *world)
 {
     if (world->context) return SADMM_OK;
     int64_t expected = (int64_t)world->dynamic_count * EXPECTED_CONTACTS_PER_BODY;
-    TRY(sadmm_backend_choose(world->def.backend, world->def.precision, expected, &world->kernels, world->why,
+    TRY(sadmm_backend_choose(world->def.backend, world->def.precision, world->def.settings.method, expected,
+                             &world->kernels, world->why,
                              sizeof world->why, &world->error));
     return world->kernels->create(world->def.device, &world->context, &world->error);
 }
@@ -219,6 +220,7 @@ static sadmm_status try_step(sadmm_world *world, sadmm_step_report *report, bool
     report->pairs = (int32_t)world->contacts.pair_count;
     report->iterations = solve.iterations;
     report->converged = solve.converged;
+    report->limited = solve.limited;
     report->residual = solve.residual;
     report->penetration_max = deepest(&world->contacts);
     report->ms.collide = collided - begin;

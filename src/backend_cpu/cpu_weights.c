@@ -1,0 +1,290 @@
+/* Kernels E-G of the method `fast`: one weight a constraint (math/weight.h), shared by the points of a pair, and
+ * C_i = sum J^T B J. beta is 1 then, so that factor and Step 1 are those of the method `paper`.
+ *
+ * In double from the system's raw data; only the impulses are in this precision. Sums over a body go in the order of its
+ * records, sums over an island in the order of bodies. */
+#include "../core/dense6.h"
+#include "../core/islands.h"
+#include "../core/math/weight.h"
+#include "cpu_rows.h"
+
+/* <M, S> of symmetric matrices. */
+static double packed_dot(const double M[PACKED6], const double S[PACKED6])
+{
+    double sum = 0;
+    for (int r = 0, at = 0; r < 6; ++r)
+        for (int k = 0; k <= r; ++k, ++at) sum += (r == k ? 1 : 2) * M[at] * S[at];
+    return sum;
+}
+
+/* x . M x */
+static double packed_form(const double M[PACKED6], const double x[6])
+{
+    double sum = 0;
+    for (int r = 0, at = 0; r < 6; ++r)
+        for (int k = 0; k <= r; ++k, ++at) sum += (r == k ? 1 : 2) * M[at] * x[r] * x[k];
+    return sum;
+}
+
+/* A^-1, packed. A rigid body's is inverted by blocks. */
+static void invert(bool rigid, const double A[PACKED6], double out[PACKED6])
+{
+    if (rigid) {
+        double xx = A[9], yy = A[14], zz = A[20], xy = A[13], xz = A[18], yz = A[19];
+        double c00 = yy * zz - yz * yz, c01 = xz * yz - xy * zz, c02 = xy * yz - xz * yy;
+        double inv = 1 / (xx * c00 + xy * c01 + xz * c02);
+        memset(out, 0, PACKED6 * sizeof *out);
+        out[0] = out[2] = out[5] = 1 / A[0];
+        out[9] = inv * c00, out[13] = inv * c01, out[14] = inv * (xx * zz - xz * xz);
+        out[18] = inv * c02, out[19] = inv * (xy * xz - xx * yz), out[20] = inv * (xx * yy - xy * xy);
+        return;
+    }
+    double M[36], L[36], column[6];
+    for (int r = 0, at = 0; r < 6; ++r)
+        for (int k = 0; k <= r; ++k, ++at) M[6 * r + k] = M[6 * k + r] = A[at];
+    memset(out, 0, PACKED6 * sizeof *out);
+    if (!dense6_cholesky(M, L)) return; /* problems refuse such an A; weights without a response would be no use */
+    for (int k = 0; k < 6; ++k) {
+        double unit[6] = {0};
+        unit[k] = 1;
+        dense6_solve(L, unit, column);
+        for (int r = k; r < 6; ++r) out[r * (r + 1) / 2 + k] = column[r];
+    }
+}
+
+static double body_mass(const struct sadmm_context *c, int32_t i)
+{
+    const double *A = &c->A[(size_t)i * PACKED6];
+    return (A[0] + A[2] + A[5]) / 3;
+}
+
+/* Sum of J^T J over the points of a pair, on one of its bodies. */
+static void pair_rows(const struct sadmm_context *c, const struct sadmm_contact_pair *pair, int side, double S[PACKED6])
+{
+    struct arm_sums sums = {0};
+    memset(S, 0, PACKED6 * sizeof *S);
+    for (int k = 0; k < pair->count; ++k) {
+        const struct sadmm_contact_point *point = &c->system->contacts->points[pair->first + k];
+        const double *r = side ? point->arm_b : point->arm_a;
+        double row[6];
+        if (c->plan.contact_rows == 3) {
+            add_arm(&sums, r);
+        } else {
+            normal_row(pair->normal, r, row);
+            add_row(S, row);
+        }
+    }
+    if (c->plan.contact_rows == 3) add_arm_sums(S, &sums);
+}
+
+/* ---- responses: J A^-1 J^T, 1/kg, once a step -------------------------------------------------------------------- */
+
+/* Mean over a pair's points and rows. */
+static double pair_response(const struct sadmm_context *c, const struct sadmm_contact_pair *pair)
+{
+    const int32_t bodies[2] = {pair->body_a, pair->body_b};
+    double w = 0, S[PACKED6];
+    for (int side = 0; side < 2; ++side) {
+        if (bodies[side] < 0) continue;
+        pair_rows(c, pair, side, S);
+        w += packed_dot(&c->A_inverse[(size_t)bodies[side] * PACKED6], S);
+    }
+    return w / (c->plan.contact_rows * pair->count);
+}
+
+static double length3(const double x[3]) { return sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]); }
+
+/* Of every row; and what a row's multiplier counts for in the block's load: a row that pushes by how much, a row that
+ * only turns by the push that would take as much energy. */
+static void block_response(const struct sadmm_context *c, struct row_block *block)
+{
+    const int32_t bodies[2] = {block->body_a, block->body_b};
+    double inverse_mass = 0;
+    for (int side = 0; side < 2; ++side)
+        if (bodies[side] < c->bodies) inverse_mass += 1 / body_mass(c, bodies[side]);
+    for (int r = 0; r < block->rows; ++r) {
+        double w = 0, push = 0, row[6];
+        for (int side = 0; side < 2; ++side) {
+            if (bodies[side] >= c->bodies) continue;
+            block_row(block, side, r, row);
+            w += packed_form(&c->A_inverse[(size_t)bodies[side] * PACKED6], row);
+            push = fmax(push, length3(row));
+        }
+        block->response[r] = (real)w;
+        block->scale[r] = (real)(push > 0 ? push : sqrt(w / inverse_mass));
+    }
+}
+
+/* ---- weights ----------------------------------------------------------------------------------------------------- */
+
+/* V of every island, kept at its label. `wrenches` hold J^T lambda. */
+static void add_up_islands(struct sadmm_context *c)
+{
+    for (int32_t i = 0; i < c->bodies; ++i) c->islands[i].energy = c->islands[i].mass = 0;
+    for (int32_t i = 0; i < c->bodies; ++i) {
+        struct cpu_island *island = &c->islands[c->label[i]];
+        island->energy += c->body_sums[i];
+        island->mass += body_mass(c, i);
+    }
+    for (int32_t i = 0; i < c->bodies; ++i)
+        if (c->label[i] == i) c->islands[i].speed = weight_speed(c->islands[i].energy, c->islands[i].mass);
+}
+
+static double body_energy(const struct sadmm_context *c, size_t i)
+{
+    double g[6] = {0};
+    for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at)
+        for (int k = 0; k < 6; ++k) g[k] += (double)c->wrenches[(size_t)c->incident[at] * ROW + (size_t)k];
+    return packed_form(&c->A_inverse[i * PACKED6], g);
+}
+
+static const struct cpu_island *island_of(const struct sadmm_context *c, int32_t body_a, int32_t body_b)
+{
+    return &c->islands[c->label[body_a >= 0 && body_a < c->bodies ? body_a : body_b]];
+}
+
+/* Mean size of a pair's impulses. */
+static double pair_load(const struct sadmm_context *c, const struct pair_block *block, int l, int count)
+{
+    double sum = 0;
+    for (int k = 0; k < count; ++k) {
+        if (c->plan.contact_rows == 3) {
+            const vec *f = &((const struct point_slot *)c->slots + block->first + k)->lambda;
+            const double impulse[3] = {(double)f->x[l], (double)f->y[l], (double)f->z[l]};
+            sum += length3(impulse);
+        } else {
+            sum += fabs((double)((const struct normal_slot *)c->slots + block->first + k)->lambda[l]);
+        }
+    }
+    return sum / count;
+}
+
+static void weigh_pair_block(struct sadmm_context *c, size_t index)
+{
+    struct pair_block *block = &c->pair_blocks[index];
+    for (int l = 0; l < LANES; ++l) {
+        if (block->pair[l] < 0) continue;
+        const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[block->pair[l]];
+        const struct cpu_island *island = island_of(c, pair->body_a, pair->body_b);
+        double *B = &c->pair_weight[index * (size_t)LANES + (size_t)l];
+        double load = pair_load(c, block, l, pair->count);
+        *B = weight_mass(load, island->speed, island->mass) +
+             WEIGHT_FLOOR_CONTACT / c->pair_response[index * (size_t)LANES + (size_t)l];
+        block->inv_s[l] = (real)(pair->body_a >= 0 && pair->body_b >= 0 ? *B / 2 : *B);
+    }
+}
+
+/* B = diag(weight) + along along^T */
+static void weigh_row_block(struct sadmm_context *c, struct row_block *block)
+{
+    const struct cpu_island *island = island_of(c, block->body_a, block->body_b);
+    double load2 = 0, lambda2 = 0, w = 0;
+    for (int r = 0; r < block->rows; ++r) {
+        double lambda = (double)block->lambda[r], load = (double)block->scale[r] * lambda;
+        load2 += load * load;
+        lambda2 += lambda * lambda;
+        w += (double)block->response[r] / block->rows;
+    }
+    double mass = weight_mass(sqrt(load2), island->speed, island->mass);
+    double share = load2 > 0 ? mass / load2 : 0; /* B = share lambda lambda^T + phi / w */
+    for (int r = 0; r < block->rows; ++r) {
+        double lambda = (double)block->lambda[r], response = (double)block->response[r];
+        double own = response > 0 ? WEIGHT_FLOOR_BLOCK / response : 0;
+        block->along[r] = 0;
+        switch ((sadmm_block_kind)block->kind) {
+        case SADMM_BLOCK_CONTACT: block->weight[r] = (real)(share * lambda2 + (w > 0 ? WEIGHT_FLOOR_CONTACT / w : 1)); break;
+        case SADMM_BLOCK_HARD:
+            block->weight[r] = (real)own;
+            block->along[r] = (real)(sqrt(share) * lambda);
+            break;
+        case SADMM_BLOCK_SOFT: block->weight[r] = (real)(response > 0 ? share * lambda * lambda + own : 1); break;
+        }
+    }
+}
+
+/* ---- C_i = sum J^T B J ------------------------------------------------------------------------------------------- */
+
+static void add_weighted_row(double C[PACKED6], const double row[6], double weight)
+{
+    int at = 0;
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j <= i; ++j) C[at++] += weight * row[i] * row[j];
+}
+
+static void add_row_block(const struct row_block *block, int side, double C[PACKED6])
+{
+    double row[6], along[6] = {0};
+    for (int r = 0; r < block->rows; ++r) {
+        block_row(block, side, r, row);
+        add_weighted_row(C, row, (double)block->weight[r]);
+        for (int j = 0; j < 6; ++j) along[j] += (double)block->along[r] * row[j];
+    }
+    add_weighted_row(C, along, 1);
+}
+
+static void assemble_C(struct sadmm_context *c, size_t i)
+{
+    double *C = &c->C[i * PACKED6], S[PACKED6];
+    size_t pair_records = c->pair_block_count * (size_t)LANES;
+    memset(C, 0, PACKED6 * sizeof *C);
+    for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) {
+        size_t row = (size_t)c->incident[at];
+        int side = row >= c->record_count;
+        size_t record = side ? row - c->record_count : row;
+        if (record < pair_records) {
+            pair_rows(c, cpu_pair(c, record), side, S);
+            for (int k = 0; k < PACKED6; ++k) C[k] += c->pair_weight[record] * S[k];
+        } else {
+            add_row_block(&c->row_blocks[record - pair_records], side, C);
+        }
+    }
+    c->beta[i] = 1;
+}
+
+/* ---- entries ----------------------------------------------------------------------------------------------------- */
+
+sadmm_status CPU(update_weights)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    (void)error;
+    CPU(sum_wrenches)(c);
+    CPU_PARALLEL
+    {
+        int thread = cpu_thread(), threads = cpu_threads();
+        size_t begin, end;
+        cpu_share((size_t)c->bodies, thread, threads, &begin, &end);
+        for (size_t i = begin; i < end; ++i) c->body_sums[i] = body_energy(c, i);
+        CPU_BARRIER;
+        if (thread == 0) add_up_islands(c);
+        CPU_BARRIER;
+        cpu_share(c->pair_block_count, thread, threads, &begin, &end);
+        for (size_t k = begin; k < end; ++k) weigh_pair_block(c, k);
+        cpu_share(c->row_block_count, thread, threads, &begin, &end);
+        for (size_t k = begin; k < end; ++k) weigh_row_block(c, &c->row_blocks[k]);
+        CPU_BARRIER;
+        cpu_share((size_t)c->bodies, thread, threads, &begin, &end);
+        for (size_t i = begin; i < end; ++i) assemble_C(c, i);
+    }
+    return SADMM_OK;
+}
+
+sadmm_status CPU(init_weights)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    sadmm_islands(c->system, c->label);
+    CPU_PARALLEL
+    {
+        int thread = cpu_thread(), threads = cpu_threads();
+        size_t begin, end;
+        cpu_share((size_t)c->bodies, thread, threads, &begin, &end);
+        for (size_t i = begin; i < end; ++i) invert(c->plan.rigid, &c->A[i * PACKED6], &c->A_inverse[i * PACKED6]);
+        CPU_BARRIER;
+        size_t pair_records = c->pair_block_count * (size_t)LANES;
+        cpu_share(pair_records, thread, threads, &begin, &end);
+        for (size_t k = begin; k < end; ++k)
+            if (c->pair_blocks[k / (size_t)LANES].pair[k % (size_t)LANES] >= 0)
+                c->pair_response[k] = pair_response(c, cpu_pair(c, k));
+        cpu_share(c->row_block_count, thread, threads, &begin, &end);
+        for (size_t k = begin; k < end; ++k) block_response(c, &c->row_blocks[k]);
+    }
+    c->settled = c->measured = false;
+    return CPU(update_weights)(c, error);
+}

@@ -1,0 +1,313 @@
+/* The method `fast` (docs/algorithm.md, section 7) written down plainly: a dense weight B a constraint, C_i = sum J^T B J,
+ * and the relaxed iteration in (v, lambda). As the rest of this backend it takes nothing from the fast ones: rows are
+ * those of the literal Jacobians, islands are found by passing labels on, inverses by dense factors.
+ *
+ * u = -lambda is kept in the sides, where recover_wrenches looks for it. */
+#include <string.h>
+
+#include "../core/dense6.h"
+#include "../core/math/contact.h"
+#include "../core/math/relax.h"
+#include "../core/math/weight.h"
+#include "literal.h"
+
+/* label of a body: the smallest one it is joined with. */
+static void label_islands(struct sadmm_context *c)
+{
+    for (int32_t i = 0; i < c->system->body_count; ++i) c->bodies[i].label = i;
+    for (bool changed = true; changed;) {
+        changed = false;
+        for (size_t k = 0; k < c->constraint_count; ++k) {
+            int32_t a = c->constraints[k].side[0].body, b = c->constraints[k].side[1].body;
+            if (a < 0 || b < 0) continue;
+            int32_t *la = &c->bodies[a].label, *lb = &c->bodies[b].label;
+            if (*la == *lb) continue;
+            *la = *lb = *la < *lb ? *la : *lb;
+            changed = true;
+        }
+    }
+}
+
+static double mass_of(const struct ref_body *body) { return (body->A[0] + body->A[7] + body->A[14]) / 3; }
+
+/* x . A^-1 x */
+static double inverse_form(const struct ref_body *body, const double x[6])
+{
+    double L[36], y[6];
+    dense6_cholesky(body->A, L);
+    dense6_forward(L, x, y);
+    return dense6_dot(y, y);
+}
+
+/* J A^-1 J^T of a row. */
+static double row_response(const struct sadmm_context *c, const struct ref_constraint *constraint, int r)
+{
+    double w = 0;
+    for (int s = 0; s < 2; ++s) {
+        const struct ref_side *side = &constraint->side[s];
+        if (side->body >= 0) w += inverse_form(&c->bodies[side->body], side->J + 6 * r);
+    }
+    return w;
+}
+
+/* What a row's multiplier counts for in the load of its block, in N s of a push. */
+static double row_scale(const struct sadmm_context *c, const struct ref_constraint *constraint, int r)
+{
+    double push = 0, inverse_mass = 0;
+    for (int s = 0; s < 2; ++s) {
+        const struct ref_side *side = &constraint->side[s];
+        if (side->body < 0) continue;
+        const double *J = side->J + 6 * r;
+        push = fmax(push, sqrt(J[0] * J[0] + J[1] * J[1] + J[2] * J[2]));
+        inverse_mass += 1 / mass_of(&c->bodies[side->body]);
+    }
+    return push > 0 ? push : sqrt(row_response(c, constraint, r) / inverse_mass);
+}
+
+static const struct ref_body *island_of(const struct sadmm_context *c, const struct ref_constraint *constraint)
+{
+    int32_t body = constraint->side[0].body >= 0 ? constraint->side[0].body : constraint->side[1].body;
+    return &c->bodies[c->bodies[body].label];
+}
+
+/* Energy and mass of every island, kept at the body that names it. */
+static void add_up_islands(struct sadmm_context *c)
+{
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        c->bodies[i].island_energy = c->bodies[i].island_mass = 0;
+        memset(c->bodies[i].impulse, 0, sizeof c->bodies[i].impulse);
+    }
+    for (size_t k = 0; k < c->constraint_count; ++k) {
+        const struct ref_constraint *constraint = &c->constraints[k];
+        for (int s = 0; s < 2; ++s) {
+            const struct ref_side *side = &constraint->side[s];
+            if (side->body < 0) continue;
+            for (int r = 0; r < constraint->rows; ++r)
+                for (int j = 0; j < 6; ++j)
+                    c->bodies[side->body].impulse[j] += side->J[6 * r + j] * constraint->lambda[r];
+        }
+    }
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        struct ref_body *body = &c->bodies[i], *island = &c->bodies[body->label];
+        island->island_energy += inverse_form(body, body->impulse);
+        island->island_mass += mass_of(body);
+    }
+}
+
+/* The points of a pair share one weight: mean load, mean response. */
+static void weigh_pair(struct sadmm_context *c, const struct sadmm_contact_pair *pair)
+{
+    double load = 0, w = 0;
+    for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
+        const struct ref_constraint *constraint = &c->constraints[k];
+        double lambda2 = 0;
+        for (int r = 0; r < constraint->rows; ++r) {
+            lambda2 += constraint->lambda[r] * constraint->lambda[r];
+            w += row_response(c, constraint, r) / constraint->rows;
+        }
+        load += sqrt(lambda2);
+    }
+    const struct ref_body *island = island_of(c, &c->constraints[pair->first]);
+    double speed = weight_speed(island->island_energy, island->island_mass);
+    double B = weight_mass(load / pair->count, speed, island->island_mass) + WEIGHT_FLOOR_CONTACT / (w / pair->count);
+    for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
+        struct ref_constraint *constraint = &c->constraints[k];
+        memset(constraint->B, 0, sizeof constraint->B);
+        for (int r = 0; r < constraint->rows; ++r) constraint->B[7 * r] = B;
+    }
+}
+
+/* share lambda lambda^T + phi / w: in full for a hard block, its diagonal for a soft one, a scalar for a contact. */
+static void weigh_block(struct sadmm_context *c, struct ref_constraint *constraint)
+{
+    const double *lambda = constraint->lambda;
+    double load2 = 0, lambda2 = 0, mean = 0, w[6];
+    for (int r = 0; r < constraint->rows; ++r) {
+        double load = row_scale(c, constraint, r) * lambda[r];
+        w[r] = row_response(c, constraint, r);
+        load2 += load * load;
+        lambda2 += lambda[r] * lambda[r];
+        mean += w[r] / constraint->rows;
+    }
+    const struct ref_body *island = island_of(c, constraint);
+    double speed = weight_speed(island->island_energy, island->island_mass);
+    double share = load2 > 0 ? weight_mass(sqrt(load2), speed, island->island_mass) / load2 : 0;
+    memset(constraint->B, 0, sizeof constraint->B);
+    for (int r = 0; r < constraint->rows; ++r) {
+        double own = w[r] > 0 ? WEIGHT_FLOOR_BLOCK / w[r] : 0;
+        if (constraint->kind == SADMM_BLOCK_CONTACT)
+            constraint->B[7 * r] = share * lambda2 + (mean > 0 ? WEIGHT_FLOOR_CONTACT / mean : 1);
+        else if (constraint->kind == SADMM_BLOCK_SOFT)
+            constraint->B[7 * r] = w[r] > 0 ? share * lambda[r] * lambda[r] + own : 1;
+        else
+            for (int q = 0; q < constraint->rows; ++q)
+                constraint->B[6 * r + q] = share * lambda[r] * lambda[q] + (q == r ? own : 0);
+    }
+}
+
+/* C_i += J^T B J */
+static void add_to_C(struct sadmm_context *c, const struct ref_constraint *constraint, const struct ref_side *side)
+{
+    double *C = c->bodies[side->body].C;
+    for (int r = 0; r < constraint->rows; ++r)
+        for (int q = 0; q < constraint->rows; ++q)
+            for (int i = 0; i < 6; ++i)
+                for (int j = 0; j < 6; ++j)
+                    C[6 * i + j] += side->J[6 * r + i] * constraint->B[6 * r + q] * side->J[6 * q + j];
+}
+
+sadmm_status sadmm_ref_update_weights(struct sadmm_context *c, struct sadmm_error *error)
+{
+    (void)error;
+    size_t points = c->system->contacts->point_count;
+    add_up_islands(c);
+    for (size_t p = 0; p < c->system->contacts->pair_count; ++p) weigh_pair(c, &c->system->contacts->pairs[p]);
+    for (size_t k = points; k < c->constraint_count; ++k) weigh_block(c, &c->constraints[k]);
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        memset(c->bodies[i].C, 0, sizeof c->bodies[i].C);
+        c->bodies[i].beta = 1;
+    }
+    for (size_t k = 0; k < c->constraint_count; ++k) {
+        struct ref_constraint *constraint = &c->constraints[k];
+        memcpy(constraint->seen, constraint->lambda, sizeof constraint->seen);
+        for (int s = 0; s < 2; ++s)
+            if (constraint->side[s].body >= 0) add_to_C(c, constraint, &constraint->side[s]);
+    }
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_ref_init_weights(struct sadmm_context *c, struct sadmm_error *error)
+{
+    label_islands(c);
+    c->settled = false;
+    return sadmm_ref_update_weights(c, error);
+}
+
+/* A v - b - sum J^T multiplier, by body, into `impulse`. */
+static void momentum_defect(struct sadmm_context *c, bool seen)
+{
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        struct ref_body *body = &c->bodies[i];
+        dense6_mul(body->A, body->v, body->impulse);
+        for (int j = 0; j < 6; ++j) body->impulse[j] -= body->b[j];
+    }
+    for (size_t k = 0; k < c->constraint_count; ++k) {
+        const struct ref_constraint *constraint = &c->constraints[k];
+        const double *multiplier = seen ? constraint->seen : constraint->lambda;
+        for (int s = 0; s < 2; ++s) {
+            const struct ref_side *side = &constraint->side[s];
+            if (side->body < 0) continue;
+            for (int r = 0; r < constraint->rows; ++r)
+                for (int j = 0; j < 6; ++j) c->bodies[side->body].impulse[j] -= side->J[6 * r + j] * multiplier[r];
+        }
+    }
+}
+
+/* v^ = v + (A + C)^-1 (b - A v + sum J^T (2 lambda^ - lambda)) */
+static void step_velocity(struct sadmm_context *c, double relaxation)
+{
+    momentum_defect(c, true);
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        struct ref_body *body = &c->bodies[i];
+        double step[6];
+        dense6_solve(body->factor, body->impulse, step);
+        for (int j = 0; j < 6; ++j) body->v[j] -= relaxation * step[j];
+    }
+}
+
+/* lambda^ = Pi_C( lambda - B (x + e) / n ), n the number of dynamic bodies. */
+static void solve_multiplier(const struct sadmm_context *c, const struct ref_constraint *constraint, double out[6])
+{
+    double x[6] = {0}, step[6] = {0}, n = 0, candidate[3] = {0, 0, 0}, projected[3];
+    for (int s = 0; s < 2; ++s) {
+        const struct ref_side *side = &constraint->side[s];
+        if (side->body < 0) continue;
+        n += 1;
+        for (int r = 0; r < constraint->rows; ++r) x[r] += dense6_dot(side->J + 6 * r, c->bodies[side->body].v);
+    }
+    for (int r = 0; r < constraint->rows; ++r)
+        for (int q = 0; q < constraint->rows; ++q)
+            step[r] += constraint->B[6 * r + q] * (x[q] + constraint->e[q]) / n;
+    memset(out, 0, 6 * sizeof *out);
+    for (int r = 0; r < constraint->rows; ++r) {
+        if (constraint->kind == SADMM_BLOCK_SOFT)
+            out[r] = soft_multiplier(constraint->k[r], constraint->c[r], constraint->e[r], x[r],
+                                     n / constraint->B[7 * r], constraint->lambda[r]);
+        else if (constraint->kind == SADMM_BLOCK_HARD)
+            out[r] = constraint->free_row[r] ? 0 : constraint->lambda[r] - step[r];
+        else
+            candidate[r] = constraint->lambda[r] - step[r];
+    }
+    if (constraint->kind != SADMM_BLOCK_CONTACT) return;
+    contact_project_rows(candidate, constraint->mu, projected);
+    memcpy(out, projected, (size_t)constraint->rows * sizeof *out);
+}
+
+static void step_multipliers(struct sadmm_context *c, double relaxation)
+{
+    c->primal = 0;
+    for (size_t k = 0; k < c->constraint_count; ++k) {
+        struct ref_constraint *constraint = &c->constraints[k];
+        double solved[6];
+        solve_multiplier(c, constraint, solved);
+        for (int r = 0; r < constraint->rows; ++r) {
+            double change = solved[r] - constraint->lambda[r], B = constraint->B[7 * r];
+            if (B > 0) c->primal = fmax(c->primal, fabs(change) / B);
+            constraint->seen[r] = solved[r] + change;
+            constraint->lambda[r] += relaxation * change;
+            for (int s = 0; s < 2; ++s)
+                if (constraint->side[s].body >= 0) constraint->side[s].u[r] = -constraint->lambda[r];
+        }
+    }
+}
+
+sadmm_status sadmm_ref_iterate_fast(struct sadmm_context *c, int count)
+{
+    double relaxation = c->settings->relaxation;
+    for (int i = 0; i < count; ++i) {
+        step_multipliers(c, relax_constraints(i, count) ? relaxation : 1);
+        step_velocity(c, relax_velocity(i, count, c->settled) ? relaxation : 1);
+        c->settled = true;
+    }
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_ref_measure_fast(struct sadmm_context *c, struct sadmm_residual *residual)
+{
+    momentum_defect(c, false);
+    residual->primal = c->primal;
+    residual->dual = 0;
+    for (int32_t i = 0; i < c->system->body_count; ++i)
+        for (int j = 0; j < 6; ++j) residual->dual = fmax(residual->dual, fabs(c->bodies[i].impulse[j]));
+    return SADMM_OK;
+}
+
+/* math/limit.h: twice the energies of the bodies, and the work of the contacts, added up at the islands' names. */
+sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *c, int32_t *limited, struct sadmm_error *error)
+{
+    (void)error;
+    momentum_defect(c, false);
+    for (int32_t i = 0; i < c->system->body_count; ++i) memset(&c->bodies[i].limit, 0, sizeof c->bodies[i].limit);
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        const struct ref_body *body = &c->bodies[i];
+        struct limit_energies *sum = &c->bodies[body->label].limit;
+        double momentum[6];
+        dense6_mul(body->A, body->v, momentum);
+        sum->now += dense6_dot(momentum, body->v) / 2;
+        sum->free += inverse_form(body, body->b) / 2;
+        sum->defect += inverse_form(body, body->impulse) / 2;
+    }
+    for (size_t k = 0; k < c->constraint_count; ++k) {
+        const struct ref_constraint *constraint = &c->constraints[k];
+        int32_t body = constraint->side[0].body >= 0 ? constraint->side[0].body : constraint->side[1].body;
+        c->bodies[c->bodies[body].label].limit.work += fmax(0, -constraint->e[0]) * constraint->lambda[0];
+    }
+    *limited = 0;
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        struct ref_body *body = &c->bodies[i];
+        double factor = limit_factor(&c->bodies[body->label].limit);
+        if (factor < 1 && body->label == i) ++*limited;
+        for (int j = 0; j < 6; ++j) body->v[j] *= factor;
+    }
+    return SADMM_OK;
+}

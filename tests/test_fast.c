@@ -1,0 +1,367 @@
+/* The method `fast`: every table's iterates are the plainly written ones of `ref`, whatever the threads; its weights are
+ * what docs/algorithm.md says; its solutions are certified, in few iterations; and it is safe with too few.
+ */
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "backend_ref/literal.h"
+#include "core/certificate.h"
+#include "core/islands.h"
+#include "core/math/weight.h"
+#include "core/schedule.h"
+#include "core/system_math.h"
+#include "scene_tools.h"
+#include "table_runner.h"
+
+static bool runs_fast(const struct sadmm_kernels *table) { return table->update_weights != NULL; }
+
+static void iterate(struct runner *r, int count, bool measure)
+{
+    CALL(r, r->k->iterate(r->c, count, measure, &r->error));
+}
+
+static void refresh_weights(struct runner *r)
+{
+    CALL(r, r->k->update_weights(r->c, &r->error));
+    CALL(r, r->k->factorize(r->c, &r->error));
+}
+
+/* ---- tables ------------------------------------------------------------------------------------------------------ */
+
+/* Stretches of all lengths, since what is relaxed depends on it; new weights in between. */
+static const int stretches[] = {1, 1, 2, 3, 1, 5, 10, 2, 20, 40};
+enum { STRETCHES = sizeof stretches / sizeof *stretches };
+
+static double largest_impulse(const struct spread *lambda, const struct runner *r)
+{
+    double A[36], b[6], largest = lambda->scale;
+    for (int32_t i = 0; i < r->p->system.body_count; ++i) {
+        sadmm_system_body(&r->p->system, &r->settings, i, A, b);
+        for (int j = 0; j < 6; ++j) largest = fmax(largest, fabs(b[j]));
+    }
+    return largest;
+}
+
+START_TEST(tables_equal_ref)
+{
+    const struct sadmm_kernels *table = tables[_i / SCENES];
+    const struct scene *scene = &scenes[_i % SCENES];
+    if (!runs_fast(table)) return;
+    struct contact_problem *problem = make_problem(scene);
+    struct runner ref, own;
+    struct spread v = {0, 0}, lambda = {0, 0};
+    double worst_primal = 0, worst_dual = 0;
+    runner_start_method(&ref, literal(), scene, problem, 1, SADMM_METHOD_FAST);
+    runner_start_method(&own, table, scene, problem, 2, SADMM_METHOD_FAST);
+    for (int s = 0; s < STRETCHES; ++s) {
+        struct sadmm_residual wanted, got;
+        bool measure = s % 2;
+        iterate(&ref, stretches[s], measure);
+        iterate(&own, stretches[s], measure);
+        compare_solutions(&own, &ref, &v, &lambda);
+        if (measure) {
+            CALL(&ref, ref.k->measure_residuals(ref.c, &wanted, &ref.error));
+            CALL(&own, own.k->measure_residuals(own.c, &got, &own.error));
+            worst_primal = fmax(worst_primal, fabs(got.primal - wanted.primal) / (wanted.primal + 1));
+            worst_dual = fmax(worst_dual, fabs(got.dual - wanted.dual) / (wanted.dual + largest_impulse(&lambda, &ref)));
+        }
+        if (s % 3 == 2) {
+            refresh_weights(&ref);
+            refresh_weights(&own);
+        }
+    }
+    if (ref.plan.limit) {
+        int32_t wanted, got;
+        CALL(&ref, ref.k->limit_velocity(ref.c, &wanted, &ref.error));
+        CALL(&own, own.k->limit_velocity(own.c, &got, &own.error));
+        ck_assert_int_eq(got, wanted);
+        compare_solutions(&own, &ref, &v, &lambda);
+    }
+    if (getenv("FAST_FIGURES"))
+        printf("%-8s f%d %-32s v %.1e lambda %.1e primal %.1e dual %.1e\n", table->variant,
+               table->precision == SADMM_F32 ? 32 : 64, scene->name, relative(v), relative(lambda), worst_primal,
+               worst_dual);
+    double tolerance = scene->tolerance[table->precision];
+    ck_assert_msg(relative(v) <= tolerance, "%s: v differs by %g", scene->name, relative(v));
+    ck_assert_msg(relative(lambda) <= tolerance, "%s: lambda differs by %g", scene->name, relative(lambda));
+    /* m/s of velocities near 1 m/s; momentum against the largest impulse. Both are differences of rounded numbers. */
+    ck_assert_msg(worst_primal <= tolerance, "%s: primal residual differs by %g", scene->name, worst_primal);
+    ck_assert_msg(worst_dual <= tolerance, "%s: dual residual differs by %g", scene->name, worst_dual);
+    runner_stop(&ref);
+    runner_stop(&own);
+    contact_problem_free(problem);
+}
+END_TEST
+
+/* Sums have one order: not one bit may differ. */
+START_TEST(threads_do_not_matter)
+{
+    const struct sadmm_kernels *table = tables[_i / SCENES];
+    const struct scene *scene = &scenes[_i % SCENES];
+    if (!runs_fast(table)) return;
+    struct contact_problem *problem = make_problem(scene);
+    struct runner r[3];
+    for (int t = 0; t < 3; ++t) runner_start_method(&r[t], table, scene, problem, t + 1, SADMM_METHOD_FAST);
+    for (int s = 0; s < STRETCHES; ++s)
+        for (int t = 0; t < 3; ++t) {
+            struct spread v = {0, 0}, lambda = {0, 0};
+            struct sadmm_residual wanted, got;
+            iterate(&r[t], stretches[s], true);
+            CALL(&r[0], table->measure_residuals(r[0].c, &wanted, &r[0].error));
+            CALL(&r[t], table->measure_residuals(r[t].c, &got, &r[t].error));
+            if (s == 6) refresh_weights(&r[t]);
+            compare_solutions(&r[t], &r[0], &v, &lambda);
+            ck_assert(v.difference == 0 && lambda.difference == 0);
+            ck_assert(got.primal == wanted.primal && got.dual == wanted.dual);
+        }
+    for (int t = 0; t < 3; ++t) {
+        struct spread v = {0, 0}, lambda = {0, 0};
+        int32_t limited;
+        if (r[t].plan.limit) CALL(&r[t], table->limit_velocity(r[t].c, &limited, &r[t].error));
+        compare_solutions(&r[t], &r[0], &v, &lambda);
+        ck_assert(v.difference == 0);
+    }
+    for (int t = 0; t < 3; ++t) runner_stop(&r[t]);
+    contact_problem_free(problem);
+}
+END_TEST
+
+/* ---- weights ----------------------------------------------------------------------------------------------------- */
+
+/* A cube of mass m at rest, carried by four points with m g dt / 4 each: g = J^T lambda changes its velocity by V = g dt,
+ * and the load of a point over V is m / 4. Mean response of a point at (h, h, -h): 1/m for the push, and for a torque
+ * [r]x over the moment 2/3 m h^2 on average 2/3 |r|^2 / (2/3 m h^2) = 3/m. So B = m/4 + phi m/4, phi = 3. */
+START_TEST(weight_is_the_mass_carried)
+{
+    struct contact_problem *problem = contact_problem_stack((double[]){2}, 1, 0.5);
+    struct runner r;
+    struct scene warm = scenes[0];
+    warm.warm = true;
+    double impulse = 2 * 9.81 * 0.005 / 4;
+    for (size_t k = 0; k < 4; ++k) problem->contacts.points[k].impulse[2] = impulse;
+    runner_start_method(&r, literal(), &warm, problem, 1, SADMM_METHOD_FAST);
+    for (int k = 0; k < 4; ++k) {
+        /* 1e-9: the least speed, 1e-6 m/s, beside V = 0.05 m/s */
+        ck_assert_double_eq_tol(r.c->constraints[k].B[0], 2.0 / 4 + 3 * 2.0 / 4, 1e-9);
+        ck_assert_double_eq(r.c->constraints[k].B[7], r.c->constraints[k].B[0]);
+    }
+    runner_stop(&r);
+    contact_problem_free(problem);
+}
+END_TEST
+
+/* The weight of a hard block does not depend on the unit of a row: with row and error times s, lambda is 1/s of it, B too
+ * by s^2, and the body moves all the same. */
+START_TEST(blocks_have_no_unit)
+{
+    struct spread v = {0, 0}, lambda = {0, 0};
+    struct contact_problem *problem = make_problem(&scenes[11]), *scaled = contact_problem_copy(problem);
+    for (int32_t k = 0; k < scaled->system.block_count; ++k) {
+        sadmm_problem_block *block = &scaled->blocks[k];
+        if (block->kind != SADMM_BLOCK_HARD) continue;
+        for (int r = 0; r < block->rows; ++r) {
+            double s = 1 + r;
+            block->error[r] *= s;
+            scaled->system.block_lambda[6 * k + r] /= s;
+            for (int j = 0; j < 6; ++j) {
+                block->jacobian_a[6 * r + j] *= s;
+                block->jacobian_b[6 * r + j] *= s;
+            }
+        }
+    }
+    struct runner r[2];
+    runner_start_method(&r[0], literal(), &scenes[11], problem, 1, SADMM_METHOD_FAST);
+    runner_start_method(&r[1], literal(), &scenes[11], scaled, 1, SADMM_METHOD_FAST);
+    iterate(&r[0], 20, false);
+    iterate(&r[1], 20, false);
+    refresh_weights(&r[0]);
+    refresh_weights(&r[1]);
+    iterate(&r[0], 20, false);
+    iterate(&r[1], 20, false);
+    compare_solutions(&r[1], &r[0], &v, &lambda);
+    ck_assert_msg(relative(v) <= 1e-12, "v differs by %g", relative(v)); /* rounding, as between tables */
+    ck_assert(lambda.difference > 0);                                    /* it was scaled */
+    runner_stop(&r[0]);
+    runner_stop(&r[1]);
+    contact_problem_free(problem);
+    contact_problem_free(scaled);
+}
+END_TEST
+
+START_TEST(islands_are_named_by_their_smallest_body)
+{
+    struct contact_problem *p = contact_problem_new();
+    static const int32_t pairs[][2] = {{7, 3}, {5, 6}, {3, 5}, {-1, 2}, {2, 0}, {4, -1}};
+    static const int32_t wanted[] = {0, 1, 0, 3, 4, 3, 3, 3};
+    int32_t label[8];
+    for (int i = 0; i < 8; ++i) contact_problem_box(p, 1, 0.1, 0.1, 0.1, i, 0, 0);
+    for (size_t k = 0; k < sizeof pairs / sizeof *pairs; ++k)
+        contact_problem_touch(p, pairs[k][0], pairs[k][1], (double[]){0, 0, 0}, (double[]){0, 0, 1}, 0, 0.5, 0);
+    sadmm_islands(&p->system, label);
+    for (int i = 0; i < 8; ++i) ck_assert_int_eq(label[i], wanted[i]);
+    contact_problem_free(p);
+}
+END_TEST
+
+/* ---- solutions --------------------------------------------------------------------------------------------------- */
+
+static struct sadmm_solve_report solve_cold(struct contact_problem *problem, sadmm_method method, int iterations,
+                                            double tolerance)
+{
+    const char *reason;
+    const struct sadmm_kernels *k = sadmm_kernels_find(SADMM_BACKEND_CPU, SADMM_F64, &reason);
+    struct sadmm_error error = {SADMM_OK, ""};
+    struct sadmm_solve_report report = {0};
+    struct sadmm_context *c = NULL;
+    sadmm_settings s = sadmm_settings_default();
+    s.method = method;
+    s.iterations = iterations;
+    s.warm_start = false;
+    s.threads = 1;
+    s.certificate_tolerance = tolerance;
+    s.certificate_momentum_tolerance = 1e-2; /* the natural map is what is looked at */
+    s.check_period = 5;
+    struct sadmm_plan plan = sadmm_plan_make(&problem->system, &s);
+    plan.limit = false; /* the problem, not a time step */
+    ck_assert_int_eq(k->create(0, &c, &error), SADMM_OK);
+    sadmm_status status = sadmm_schedule_solve(k, c, &problem->system, &s, &plan, &report, NULL, &error);
+    ck_assert_msg(status == SADMM_OK, "%s", error.message);
+    ck_assert_int_eq(sadmm_certify(&problem->system, &s, &report.certificate, &error), SADMM_OK);
+    k->destroy(c);
+    return report;
+}
+
+/* Cold, to a natural map of 1e-6 m/s, looked at every 5 iterations. Limits: half as many again as measured (35, 70, 70). */
+static const struct {
+    const char *name;
+    struct contact_problem *(*make)(int seed);
+    int limit;
+} cold[] = {
+    {"10 g / 1 kg / 100 kg", stack, 55},
+    {"pyramid, 6 rows", pyramid, 105},
+    {"plates, mu 3", plates, 105},
+};
+
+START_TEST(few_iterations)
+{
+    struct contact_problem *problem = cold[_i].make(0), *other = cold[_i].make(0);
+    struct sadmm_solve_report fast = solve_cold(problem, SADMM_METHOD_FAST, 1000, 1e-6);
+    struct sadmm_solve_report paper = solve_cold(other, SADMM_METHOD_PAPER, 1000, 1e-6);
+    if (getenv("FAST_FIGURES"))
+        printf("%-24s fast %d paper %d%s\n", cold[_i].name, fast.iterations, paper.iterations,
+               paper.converged ? "" : " (not converged)");
+    ck_assert_msg(fast.converged, "%s: natural map %g after %d", cold[_i].name, fast.certificate.ncp_max, fast.iterations);
+    ck_assert_double_le(fast.certificate.ncp_max, 1e-6);
+    ck_assert_msg(fast.iterations <= cold[_i].limit, "%s: %d iterations", cold[_i].name, fast.iterations);
+    ck_assert_int_lt(fast.iterations, paper.iterations);
+    contact_problem_free(problem);
+    contact_problem_free(other);
+}
+END_TEST
+
+/* All kinds of constraints at once, both forms of bodies, with and without friction: it ends at a solution. (Of the random
+ * mixed problems, those that can be solved: the others hold welds against each other.) */
+START_TEST(solutions_are_certified)
+{
+    static const int solvable[] = {8, 9, 10, 11};
+    const struct scene *scene = &scenes[solvable[_i]];
+    struct contact_problem *problem = make_problem(scene), *other = make_problem(scene);
+    struct sadmm_solve_report fast = solve_cold(problem, SADMM_METHOD_FAST, 3000, 1e-9);
+    if (getenv("FAST_FIGURES"))
+        printf("%-32s fast %d paper %d\n", scene->name, fast.iterations,
+               solve_cold(other, SADMM_METHOD_PAPER, 3000, 1e-9).iterations);
+    ck_assert_msg(fast.converged, "%s: natural map %g, momentum %g", scene->name, fast.certificate.ncp_max,
+                  fast.certificate.momentum_max);
+    contact_problem_free(problem);
+    contact_problem_free(other);
+}
+END_TEST
+
+/* ---- in motion --------------------------------------------------------------------------------------------------- */
+
+/* Kinetic and potential energy, the latter above the lowest place a body's centre may reach: the scene's own floor. */
+static double total_energy(const sadmm_world *world, const double gravity[3], double *weight)
+{
+    double energy = 0;
+    *weight = 0;
+    for (int32_t i = 0; i < sadmm_world_body_count(world); ++i) {
+        sadmm_body_id id = body_at(world, i);
+        sadmm_body_def def = body_def(world, id);
+        sadmm_body_state s = body_state(world, id);
+        if (def.type != SADMM_BODY_DYNAMIC) continue;
+        double conjugate[4] = {s.orientation[0], -s.orientation[1], -s.orientation[2], -s.orientation[3]};
+        vec3 w = m3_mul(q_matrix(q_load(conjugate)), v3_load(s.angular_velocity));
+        energy += def.mass * v3_norm2(v3_load(s.linear_velocity)) / 2 - def.mass * v3_dot(v3_load(gravity), v3_load(s.position));
+        energy += (def.inertia[0] * w.x * w.x + def.inertia[1] * w.y * w.y + def.inertia[2] * w.z * w.z) / 2;
+        *weight += def.mass * norm3(gravity);
+    }
+    return energy;
+}
+
+static const struct {
+    const char *spec;
+    double duration, drop; /* s, downward speed at the start in m/s */
+} moving[] = {
+    {"vertical_stacks:1", 1, 0}, {"oblique_stacks:1", 0.5, 0}, {"card_houses:1", 0.5, 0}, {"pyramid:8", 0.5, 0},
+    {"sliding_cubes:50", 0.5, 0}, {"pile:30", 1, 0}, {"burst:2", 0.3, 0}, {"burst:2", 0.2, 100},
+};
+static const int budgets[] = {1, 2, 5, 10};
+
+/* However few the iterations, energy is not made: there is at most 1 % more than at the start, of what the scene turns
+ * over or of its weight times 0.1 m, about the size of its bodies. (So a scene at rest may rise by 1 mm: bodies sink into each
+ * other where iterations are cut short, and pushing them out is work.) */
+START_TEST(too_few_iterations_are_safe)
+{
+    struct sadmm_scene scene = open_scene(moving[_i / 4].spec);
+    scene.def.backend = SADMM_BACKEND_CPU;
+    scene.def.precision = SADMM_F64;
+    scene.def.settings.threads = 1;
+    scene.def.settings.method = SADMM_METHOD_FAST;
+    scene.def.settings.iterations = budgets[_i % 4];
+    sadmm_world *world = build_scene(&scene);
+    for (int32_t i = 0; i < sadmm_world_body_count(world) && moving[_i / 4].drop > 0; ++i) {
+        sadmm_body_state s = body_state(world, body_at(world, i));
+        if (body_def(world, body_at(world, i)).type != SADMM_BODY_DYNAMIC) continue;
+        s.linear_velocity[2] -= moving[_i / 4].drop;
+        MUST(world, sadmm_world_set_body_state(world, body_at(world, i), &s));
+    }
+    double weight, start = total_energy(world, scene.def.settings.gravity, &weight), most = start, least = start;
+    int steps = (int)lround(moving[_i / 4].duration / scene.def.settings.dt), limited = 0;
+    for (int k = 0; k < steps; ++k) {
+        step_world(world, 1);
+        limited += world_report(world).limited;
+        double now = total_energy(world, scene.def.settings.gravity, &weight);
+        most = fmax(most, now);
+        least = fmin(least, now);
+    }
+    double scale = fmax(start - least, 0.1 * weight);
+    if (getenv("FAST_FIGURES"))
+        printf("%-20s %2d iterations: energy %+.2f %% of %g J, limited %d\n", moving[_i / 4].spec, budgets[_i % 4],
+               100 * (most - start) / scale, scale, limited);
+    ck_assert_msg(most - start <= 0.01 * scale, "%s, %d iterations: energy rises by %g J of %g J", moving[_i / 4].spec,
+                  budgets[_i % 4], most - start, scale);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+int main(void)
+{
+    collect_tables();
+    Suite *suite = suite_create("fast");
+    TCase *tables_case = tcase_create("tables"), *weights = tcase_create("weights");
+    TCase *solutions = tcase_create("solutions"), *motion = tcase_create("motion");
+    tcase_add_loop_test(tables_case, tables_equal_ref, 0, table_count * SCENES);
+    tcase_add_loop_test(tables_case, threads_do_not_matter, 0, table_count * SCENES);
+    tcase_add_test(weights, weight_is_the_mass_carried);
+    tcase_add_test(weights, blocks_have_no_unit);
+    tcase_add_test(weights, islands_are_named_by_their_smallest_body);
+    tcase_add_loop_test(solutions, few_iterations, 0, sizeof cold / sizeof *cold);
+    tcase_add_loop_test(solutions, solutions_are_certified, 0, 4);
+    tcase_add_loop_test(motion, too_few_iterations_are_safe, 0, 4 * (int)(sizeof moving / sizeof *moving));
+    TCase *const cases[] = {tables_case, weights, solutions, motion};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
+        tcase_set_timeout(cases[k], 100);
+        suite_add_tcase(suite, cases[k]);
+    }
+    return run_suite(suite);
+}
