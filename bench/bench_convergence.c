@@ -1,6 +1,6 @@
-/* subadmm-bench convergence: how many iterations, and how much time, each method takes to a tolerance on a set of cold problems,
- * and how far from the solution a scene's steps are when they do few. docs/convergence.md says how to read it;
- * bench/convergence.sh regenerates its tables, bench/plot_convergence.py draws the CSV. */
+/* subadmm-bench convergence: how many iterations, and how much time, each method takes to a tolerance on a set of cold
+ * problems, and how far from the solution a scene's steps are when they do few. docs/convergence.md says how to read
+ * it; bench/convergence.sh regenerates its tables, bench/plot_convergence.py draws the CSV. */
 #include <errno.h>
 #include <getopt.h>
 #include <stdlib.h>
@@ -42,10 +42,18 @@ static const struct {
     double seconds, dt;
     bool quick;
 } scenes[] = {
-    {"vertical_stacks", 2, 0, false}, {"oblique_stacks", 2, 0, false},     {"card_houses:1", 1, 0, false},
-    {"sliding_cubes:500", 1, 0, false}, {"pyramid:30", 2, 0, false},       {"pyramid:100", 2, 1.0 / 60, false},
-    {"settled_pile:1000", 1, 0, false}, {"pile:300", 2, 0, false},         {"mixed_pile:200", 2, 0, false},
-    {"sliding_pile:200", 2, 0, false},  {"kicked_cubes", 2, 0, false},     {"burst:3", 1, 0, false},
+    {"vertical_stacks", 2, 0, false},
+    {"oblique_stacks", 2, 0, false},
+    {"card_houses:1", 1, 0, false},
+    {"sliding_cubes:500", 1, 0, false},
+    {"pyramid:30", 2, 0, false},
+    {"pyramid:100", 2, 1.0 / 60, false},
+    {"settled_pile:1000", 1, 0, false},
+    {"pile:300", 2, 0, false},
+    {"mixed_pile:200", 2, 0, false},
+    {"sliding_pile:200", 2, 0, false},
+    {"kicked_cubes", 2, 0, false},
+    {"burst:3", 1, 0, false},
     {"incline", 1, 0, true},
 };
 
@@ -72,7 +80,8 @@ static void measure_problem(struct bench *b, struct set_problem *problem)
     for (int method = 0; method < SADMM_METHOD_COUNT; ++method) {
         if (!wanted_method(b->o, method)) continue;
         progress(b, problem->name, method);
-        report(b, problem->name, cold_convergence(problem, (sadmm_method)method, &b->series, &plan, b->rows, &error), &error);
+        report(b, problem->name, cold_convergence(problem, (sadmm_method)method, &b->series, &plan, b->rows, &error),
+               &error);
     }
     problem_set_free(problem);
 }
@@ -82,7 +91,8 @@ static void measure_cold(struct bench *b)
     struct sadmm_error error = {SADMM_OK, ""};
     struct set_problem problem;
     for (size_t k = 0; k < problem_set_count(); ++k) {
-        if (b->o->problem ? !strstr(problem_set_name(k), b->o->problem) : b->o->quick && !problem_set_quick(k)) continue;
+        if (b->o->problem ? !strstr(problem_set_name(k), b->o->problem) : b->o->quick && !problem_set_quick(k))
+            continue;
         sadmm_status status = problem_set_make(k, &problem, &error);
         report(b, problem_set_name(k), status, &error);
         if (status == SADMM_OK) measure_problem(b, &problem);
@@ -97,14 +107,17 @@ static void measure_cold(struct bench *b)
 static void measure_scene(struct bench *b, const char *spec, double seconds, double dt)
 {
     struct sadmm_error error = {SADMM_OK, ""};
-    struct warm_plan plan = {.scene = spec, .dt = dt, .max_seconds = b->o->max_seconds,
+    struct warm_plan plan = {.scene = spec,
+                             .dt = dt,
+                             .max_seconds = b->o->max_seconds,
                              .seconds = b->o->seconds > 0 ? b->o->seconds : seconds};
     for (int k = 0; k < b->o->budget_count; ++k)
         for (int method = 0; method < SADMM_METHOD_COUNT; ++method) {
             if (!wanted_method(b->o, method)) continue;
             plan.iterations = (int)b->o->budgets[k];
             progress(b, spec, method);
-            report(b, spec, warm_convergence(&plan, (sadmm_method)method, &b->series, (int)b->o->device, b->rows, &error),
+            report(b, spec,
+                   warm_convergence(&plan, (sadmm_method)method, &b->series, (int)b->o->device, b->rows, &error),
                    &error);
         }
 }
@@ -149,23 +162,22 @@ static void measure_backend(struct bench *b, sadmm_backend backend, sadmm_precis
 
 static void usage(FILE *out)
 {
-    fprintf(out,
-            "usage: subadmm-bench convergence [options]\n\n"
-            "  --method paper|fast|both   default both\n"
-            "  --backend ref|cpu|cuda|all all: cpu and cuda; default cpu\n"
-            "  --precision f32|f64|both   default f64; errors are measured in double in both\n"
-            "  --threads N[,N...]         CPU threads, default 1\n"
-            "  --device N                 accelerator, default 0\n"
-            "  --only cold|warm           one half of the measurements\n"
-            "  --problem TEXT             only the cold problems with TEXT in their name\n"
-            "  --fclib FILE.hdf5          one more cold problem; up to 16 times\n"
-            "  --limit N                  most iterations of a cold solve, default 2000\n"
-            "  --scene SPEC               these scenes instead of the default ones; up to 16 times\n"
-            "  --budgets N[,N...]         iterations a step, default 5,10,20,30\n"
-            "  --seconds S                simulated time of a scene, default 1 or 2 by scene\n"
-            "  --max-seconds S            wall time of a scene's run, default 60\n"
-            "  --quick                    a few small problems and one scene\n"
-            "  --csv FILE|-               the rows as CSV\n");
+    fprintf(out, "usage: subadmm-bench convergence [options]\n\n"
+                 "  --method paper|fast|both   default both\n"
+                 "  --backend ref|cpu|cuda|all all: cpu and cuda; default cpu\n"
+                 "  --precision f32|f64|both   default f64; errors are measured in double in both\n"
+                 "  --threads N[,N...]         CPU threads, default 1\n"
+                 "  --device N                 accelerator, default 0\n"
+                 "  --only cold|warm           one half of the measurements\n"
+                 "  --problem TEXT             only the cold problems with TEXT in their name\n"
+                 "  --fclib FILE.hdf5          one more cold problem; up to 16 times\n"
+                 "  --limit N                  most iterations of a cold solve, default 2000\n"
+                 "  --scene SPEC               these scenes instead of the default ones; up to 16 times\n"
+                 "  --budgets N[,N...]         iterations a step, default 5,10,20,30\n"
+                 "  --seconds S                simulated time of a scene, default 1 or 2 by scene\n"
+                 "  --max-seconds S            wall time of a scene's run, default 60\n"
+                 "  --quick                    a few small problems and one scene\n"
+                 "  --csv FILE|-               the rows as CSV\n");
 }
 
 static int bad(const char *option, const char *value, const char *allowed)
@@ -197,14 +209,22 @@ static int check_scenes(const struct options *o)
 static int parse(int argc, char **argv, struct options *o)
 {
     static const struct option longs[] = {
-        {"method", required_argument, NULL, 'M'},    {"backend", required_argument, NULL, 'b'},
-        {"precision", required_argument, NULL, 'p'}, {"threads", required_argument, NULL, 't'},
-        {"device", required_argument, NULL, 'd'},    {"only", required_argument, NULL, 'o'},
-        {"problem", required_argument, NULL, 'P'},   {"fclib", required_argument, NULL, 'F'},
-        {"limit", required_argument, NULL, 'l'},     {"scene", required_argument, NULL, 'S'},
-        {"budgets", required_argument, NULL, 'k'},   {"seconds", required_argument, NULL, 's'},
-        {"max-seconds", required_argument, NULL, 'm'}, {"quick", no_argument, NULL, 'q'},
-        {"csv", required_argument, NULL, 'C'},       {"help", no_argument, NULL, 'h'},
+        {"method", required_argument, NULL, 'M'},
+        {"backend", required_argument, NULL, 'b'},
+        {"precision", required_argument, NULL, 'p'},
+        {"threads", required_argument, NULL, 't'},
+        {"device", required_argument, NULL, 'd'},
+        {"only", required_argument, NULL, 'o'},
+        {"problem", required_argument, NULL, 'P'},
+        {"fclib", required_argument, NULL, 'F'},
+        {"limit", required_argument, NULL, 'l'},
+        {"scene", required_argument, NULL, 'S'},
+        {"budgets", required_argument, NULL, 'k'},
+        {"seconds", required_argument, NULL, 's'},
+        {"max-seconds", required_argument, NULL, 'm'},
+        {"quick", no_argument, NULL, 'q'},
+        {"csv", required_argument, NULL, 'C'},
+        {"help", no_argument, NULL, 'h'},
         {NULL, 0, NULL, 0},
     };
     sadmm_method method;
@@ -270,8 +290,17 @@ static int parse(int argc, char **argv, struct options *o)
 int bench_convergence(int argc, char **argv)
 {
     struct options o = {
-        .backend = SADMM_BACKEND_CPU, .precision = SADMM_F64, .method = -1, .threads = {1}, .thread_count = 1,
-        .budgets = {5, 10, 20, 30}, .budget_count = 4, .limit = 2000, .max_seconds = 60, .cold = true, .warm = true,
+        .backend = SADMM_BACKEND_CPU,
+        .precision = SADMM_F64,
+        .method = -1,
+        .threads = {1},
+        .thread_count = 1,
+        .budgets = {5, 10, 20, 30},
+        .budget_count = 4,
+        .limit = 2000,
+        .max_seconds = 60,
+        .cold = true,
+        .warm = true,
     };
     static const sadmm_backend order[] = {SADMM_BACKEND_REF, SADMM_BACKEND_CPU, SADMM_BACKEND_CUDA};
     int status = parse(argc, argv, &o);

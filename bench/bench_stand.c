@@ -1,5 +1,5 @@
-/* subadmm-bench stand: a scene that is built at rest, over many steps. Whole-step times, deepest penetration, how far any
- * body has moved from where it was put as a share of the smallest body, and whether that counts as standing. */
+/* subadmm-bench stand: a scene that is built at rest, over many steps. Whole-step times, deepest penetration, how far
+ * any body has moved from where it was put as a share of the smallest body, and whether that counts as standing. */
 #include <getopt.h>
 #include <math.h>
 #include <stdio.h>
@@ -33,7 +33,7 @@ struct stand {
     sadmm_world *world;
     struct placed *bodies; /* dynamic ones */
     int body_count;
-    double size;           /* least edge of any dynamic body's box or diameter, m */
+    double size; /* least edge of any dynamic body's box or diameter, m */
     double *ms;
     long done;
     double penetration, drift, worst_drift, ncp;
@@ -144,29 +144,28 @@ static int report(struct stand *s, const struct options *o)
     printf("whole step     %.3f ms median, %.3f 95 %%, %.3f at most\n", s->ms[s->done / 2],
            s->ms[(long)(0.95 * (double)(s->done - 1))], s->ms[s->done - 1]);
     printf("penetration    %.3g m at most\n", s->penetration);
-    printf("drift          %.3g m at most, %.3g m at the end: %.3g of the smallest body (%.3g m)\n", s->worst_drift, s->drift,
-           share, s->size);
+    printf("drift          %.3g m at most, %.3g m at the end: %.3g of the smallest body (%.3g m)\n", s->worst_drift,
+           s->drift, share, s->size);
     printf("certificate    ncp %.3g m/s, momentum %.3g (one step more)\n", s->ncp, s->last.certificate.momentum_max);
-    printf("%s: drift %s %g of the smallest body\n", stands ? "stands" : "does not stand",
-           stands ? "at most" : "above", o->limit);
+    printf("%s: drift %s %g of the smallest body\n", stands ? "stands" : "does not stand", stands ? "at most" : "above",
+           o->limit);
     return stands ? 0 : 1;
 }
 
 static void usage(FILE *out)
 {
-    fprintf(out,
-            "usage: subadmm-bench stand [options]\n\n"
-            "  --scene SPEC          default pyramid:100\n"
-            "  --dt S                default 1/60\n"
-            "  --steps N             default 2000\n"
-            "  --method paper|fast   default fast\n"
-            "  --iterations N        a step, default 10\n"
-            "  --backend NAME        ref, cpu (default) or cuda\n"
-            "  --precision f32|f64   default f32\n"
-            "  --threads N           default 2\n"
-            "  --device N            accelerator, default 0\n"
-            "  --limit X             most drift of what stands, as a share of the smallest body, default 0.1\n\n"
-            "Exit status: 0 it stands, 1 it does not (or something failed).\n");
+    fprintf(out, "usage: subadmm-bench stand [options]\n\n"
+                 "  --scene SPEC          default pyramid:100\n"
+                 "  --dt S                default 1/60\n"
+                 "  --steps N             default 2000\n"
+                 "  --method paper|fast   default fast\n"
+                 "  --iterations N        a step, default 10\n"
+                 "  --backend NAME        ref, cpu (default) or cuda\n"
+                 "  --precision f32|f64   default f32\n"
+                 "  --threads N           default 2\n"
+                 "  --device N            accelerator, default 0\n"
+                 "  --limit X             most drift of what stands, as a share of the smallest body, default 0.1\n\n"
+                 "Exit status: 0 it stands, 1 it does not (or something failed).\n");
 }
 
 static int bad(const char *option, const char *value, const char *allowed)
@@ -178,12 +177,18 @@ static int bad(const char *option, const char *value, const char *allowed)
 static int parse(int argc, char **argv, struct options *o)
 {
     static const struct option longs[] = {
-        {"scene", required_argument, NULL, 'S'},     {"dt", required_argument, NULL, 'T'},
-        {"steps", required_argument, NULL, 's'},     {"method", required_argument, NULL, 'M'},
-        {"iterations", required_argument, NULL, 'i'}, {"backend", required_argument, NULL, 'b'},
-        {"precision", required_argument, NULL, 'p'}, {"threads", required_argument, NULL, 't'},
-        {"device", required_argument, NULL, 'd'},    {"limit", required_argument, NULL, 'l'},
-        {"help", no_argument, NULL, 'h'},            {NULL, 0, NULL, 0},
+        {"scene", required_argument, NULL, 'S'},
+        {"dt", required_argument, NULL, 'T'},
+        {"steps", required_argument, NULL, 's'},
+        {"method", required_argument, NULL, 'M'},
+        {"iterations", required_argument, NULL, 'i'},
+        {"backend", required_argument, NULL, 'b'},
+        {"precision", required_argument, NULL, 'p'},
+        {"threads", required_argument, NULL, 't'},
+        {"device", required_argument, NULL, 'd'},
+        {"limit", required_argument, NULL, 'l'},
+        {"help", no_argument, NULL, 'h'},
+        {NULL, 0, NULL, 0},
     };
     for (int option; (option = getopt_long(argc, argv, "h", longs, NULL)) != -1;) {
         switch (option) {
@@ -198,7 +203,8 @@ static int parse(int argc, char **argv, struct options *o)
             if (!bench_parse_method(optarg, &o->method)) return bad("method", optarg, "paper or fast");
             break;
         case 'i':
-            if (!bench_parse_number(optarg, 1, 1000000, &o->iterations)) return bad("iterations", optarg, "in [1, 1000000]");
+            if (!bench_parse_number(optarg, 1, 1000000, &o->iterations))
+                return bad("iterations", optarg, "in [1, 1000000]");
             break;
         case 'b':
             if (!bench_parse_backend(optarg, &o->backend) || o->backend == SADMM_BACKEND_AUTO)
@@ -228,8 +234,15 @@ static int parse(int argc, char **argv, struct options *o)
 
 int bench_stand(int argc, char **argv)
 {
-    struct options o = {.scene = "pyramid:100", .method = SADMM_METHOD_FAST, .backend = SADMM_BACKEND_CPU,
-                        .precision = SADMM_F32, .threads = 2, .iterations = 10, .steps = 2000, .dt = 1.0 / 60, .limit = 0.1};
+    struct options o = {.scene = "pyramid:100",
+                        .method = SADMM_METHOD_FAST,
+                        .backend = SADMM_BACKEND_CPU,
+                        .precision = SADMM_F32,
+                        .threads = 2,
+                        .iterations = 10,
+                        .steps = 2000,
+                        .dt = 1.0 / 60,
+                        .limit = 0.1};
     struct sadmm_scene scene;
     struct stand s = {.scene = &scene};
     int code = parse(argc, argv, &o);

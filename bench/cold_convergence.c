@@ -28,8 +28,7 @@ struct cold {
 
 static sadmm_status check(struct cold *c, sadmm_status status)
 {
-    return status == SADMM_OK ? status
-                              : sadmm_fail(c->error, status, "%s", sadmm_problem_message(c->problem->problem));
+    return status == SADMM_OK ? status : sadmm_fail(c->error, status, "%s", sadmm_problem_message(c->problem->problem));
 }
 
 /* A cold solve and its errors: infinite when it ended in what is not finite. */
@@ -96,7 +95,8 @@ static bool is_curve_point(int iterations)
     return iterations == 1 || iterations == 2 || iterations == 3 || iterations == 5 || iterations == 7;
 }
 
-/* Of the iteration counts that are tried: as many as take a second or two, so that an error that rises again is seen. */
+/* Of the iteration counts that are tried: as many as take a second or two, so that an error that rises
+ * again is seen. */
 static int density_for(const struct set_problem *problem)
 {
     double work = sadmm_problem_contact_count(problem->problem) + 10.0 * sadmm_problem_block_count(problem->problem);
@@ -116,8 +116,8 @@ sadmm_status cold_convergence(const struct set_problem *problem, sadmm_method me
                               const struct cold_plan *plan, struct rows *rows, struct sadmm_error *error)
 {
     struct sample samples[MOST_SAMPLES];
-    struct cold c = {.problem = problem, .plan = plan, .series = series, .settings = sadmm_settings_default(),
-                     .error = error};
+    struct cold c = {
+        .problem = problem, .plan = plan, .series = series, .settings = sadmm_settings_default(), .error = error};
     int count = 0, density = density_for(problem);
     c.settings.method = method;
     c.settings.dt = problem->dt;

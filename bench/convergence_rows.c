@@ -10,9 +10,20 @@ static const char *const kinds[] = {"count", "curve", "warm"};
 
 struct row row_start(enum row_kind kind, const char *name, sadmm_method method, const struct series *series)
 {
-    struct row row = {.kind = kind, .method = method, .series = *series, .tolerance = NAN, .ncp_max = NAN,
-                      .ncp_balanced = NAN, .momentum_max = NAN, .ms = NAN, .ncp_median = NAN, .ncp_last = NAN,
-                      .settle_s = NAN, .energy_excess = NAN, .penetration = NAN, .status = "ok"};
+    struct row row = {.kind = kind,
+                      .method = method,
+                      .series = *series,
+                      .tolerance = NAN,
+                      .ncp_max = NAN,
+                      .ncp_balanced = NAN,
+                      .momentum_max = NAN,
+                      .ms = NAN,
+                      .ncp_median = NAN,
+                      .ncp_last = NAN,
+                      .settle_s = NAN,
+                      .energy_excess = NAN,
+                      .penetration = NAN,
+                      .status = "ok"};
     snprintf(row.name, sizeof row.name, "%s", name);
     return row;
 }
@@ -30,7 +41,8 @@ static const char *method_name(sadmm_method method) { return method == SADMM_MET
 void rows_write_header(FILE *csv)
 {
     fputs("kind,name,method,backend,precision,threads,runs_on,bodies,contacts,blocks,limit,iterations,tolerance,"
-          "ncp_max,ncp_balanced,momentum_max,ms,ncp_median,ncp_last,settle_s,energy_excess_m,penetration_m,commit,status\n",
+          "ncp_max,ncp_balanced,momentum_max,ms,ncp_median,ncp_last,settle_s,energy_excess_m,penetration_m,commit,"
+          "status\n",
           csv);
 }
 

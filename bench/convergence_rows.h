@@ -29,13 +29,13 @@ struct row {
     sadmm_method method;
     struct series series;
     int bodies, contacts, blocks;
-    int limit;        /* COUNT: iterations that were tried */
-    int iterations;   /* COUNT: needed; CURVE: done; WARM: a step */
-    double tolerance; /* COUNT, m/s */
+    int limit;                                  /* COUNT: iterations that were tried */
+    int iterations;                             /* COUNT: needed; CURVE: done; WARM: a step */
+    double tolerance;                           /* COUNT, m/s */
     double ncp_max, ncp_balanced, momentum_max; /* CURVE, COUNT at its iterations; WARM: medians */
-    double ms;        /* COUNT, CURVE: of the solve; WARM: of a step (median) */
+    double ms;                                  /* COUNT, CURVE: of the solve; WARM: of a step (median) */
     double ncp_median, ncp_last, settle_s, energy_excess, penetration; /* WARM */
-    char status[SADMM_MESSAGE_SIZE]; /* "ok", or why there is nothing */
+    char status[SADMM_MESSAGE_SIZE];                                   /* "ok", or why there is nothing */
 };
 
 /* A row with nothing measured yet. */

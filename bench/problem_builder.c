@@ -122,7 +122,8 @@ static void assemble(const struct problem_builder *builder, size_t i, double A[3
         for (int c = 0; c < 6; ++c) b[r] += A[6 * r + c] * v[c];
 }
 
-static sadmm_status fill(const struct problem_builder *builder, sadmm_problem *problem, double *A, double *b, double *v0)
+static sadmm_status fill(const struct problem_builder *builder, sadmm_problem *problem, double *A, double *b,
+                         double *v0)
 {
     for (size_t i = 0; i < builder->body_count; ++i) assemble(builder, i, A + 36 * i, b + 6 * i, v0 + 6 * i);
     sadmm_status status = sadmm_problem_set_bodies(problem, (int32_t)builder->body_count, A, b, v0);

@@ -10,10 +10,10 @@
 #include "subadmm/problem.h"
 
 struct built_body {
-    double mass;         /* kg */
-    vec3 inertia;        /* principal, kg m^2 */
-    vec3 position;       /* m */
-    quat orientation;    /* principal axes to world */
+    double mass;          /* kg */
+    vec3 inertia;         /* principal, kg m^2 */
+    vec3 position;        /* m */
+    quat orientation;     /* principal axes to world */
     vec3 linear, angular; /* velocity at the start of the step, m/s, rad/s */
 };
 

@@ -4,9 +4,9 @@
 #include <stdlib.h>
 
 #include "bench.h"
+#include "core/math/quat.h"
 #include "core/memory.h"
 #include "core/schedule.h"
-#include "core/math/quat.h"
 #include "problem_set.h"
 #include "scenes/scenes.h"
 
@@ -52,8 +52,7 @@ static sadmm_status weigh(struct warm *w)
         TRY(check(w, sadmm_world_body_at(w->world, i, &id)));
         TRY(check(w, sadmm_world_body_def(w->world, id, &def)));
         if (def.type != SADMM_BODY_DYNAMIC) continue;
-        w->bodies[w->body_count++] =
-            (struct weighed){id, def.mass, {def.inertia[0], def.inertia[1], def.inertia[2]}};
+        w->bodies[w->body_count++] = (struct weighed){id, def.mass, {def.inertia[0], def.inertia[1], def.inertia[2]}};
         w->mass += def.mass;
     }
     return SADMM_OK;
@@ -175,8 +174,8 @@ static sadmm_status run(struct warm *w, const struct warm_plan *plan, struct row
     return SADMM_OK;
 }
 
-sadmm_status warm_convergence(const struct warm_plan *plan, sadmm_method method, const struct series *series, int device,
-                              struct rows *rows, struct sadmm_error *error)
+sadmm_status warm_convergence(const struct warm_plan *plan, sadmm_method method, const struct series *series,
+                              int device, struct rows *rows, struct sadmm_error *error)
 {
     struct sadmm_scene scene;
     struct warm w = {.scene = &scene, .landed = -1, .error = error};

@@ -191,8 +191,8 @@ static double needed(const struct table *table, const char *name, const char *me
     ck_abort_msg("no row for %s by %s to %g", name, method, tolerance);
 }
 
-/* Counts that an independent program (dense, in another language) found for the paper's iteration. On these problems the
- * error falls so steeply where it passes the tolerance that rounding moves a count by one or two. */
+/* Counts that an independent program (dense, in another language) found for the paper's iteration. On these problems
+ * the error falls so steeply where it passes the tolerance that rounding moves a count by one or two. */
 static void expect_known_counts(const struct table *table)
 {
     static const struct {
@@ -207,7 +207,8 @@ static void expect_known_counts(const struct table *table)
     for (size_t k = 0; k < sizeof known / sizeof *known; ++k) {
         double iterations = needed(table, known[k].name, "paper", known[k].tolerance), wanted = known[k].iterations;
         ck_assert_msg(isinf(wanted) ? isinf(iterations) : fabs(iterations - wanted) <= 2 + 0.01 * wanted,
-                      "paper needs %g iterations on %s to %g, not %g", iterations, known[k].name, known[k].tolerance, wanted);
+                      "paper needs %g iterations on %s to %g, not %g", iterations, known[k].name, known[k].tolerance,
+                      wanted);
     }
     /* The reason why there is a second method: light bodies that carry heavy ones. */
     ck_assert_double_lt(needed(table, "stack 10g 1kg 100kg", "fast", 1e-6), 200);
@@ -245,7 +246,7 @@ START_TEST(convergence_measures)
             ++warm;
             ck_assert(is_row(&table, row, "warm", "incline", NULL));
             ck_assert_str_eq(field(&table, row, "status"), "ok");
-            /* Three contacts too many for a block that sticks: solved from the first steps on, and nothing gains energy. */
+            /* A block that sticks: solved from the first steps on, and nothing gains energy. */
             ck_assert(number(&table, row, "ncp_median") < 1e-9 && number(&table, row, "ncp_balanced") < 1e-6);
             ck_assert(number(&table, row, "energy_excess_m") >= 0 && number(&table, row, "energy_excess_m") < 1e-5);
         }

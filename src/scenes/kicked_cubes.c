@@ -1,6 +1,6 @@
-/* Light bodies that are kicked: N heavy cubes of 10 kg in a row, a light one of 10 g on each. Every half second each light
- * cube gets 0.5 m/s, downwards a little, in a direction of its own. It slides v^2 / (2 mu g) = 25 mm and stays on top. A
- * solver that keeps impulses and weights from the step before meets a load that is nothing like the last one.
+/* Light bodies that are kicked: N heavy cubes of 10 kg in a row, a light one of 10 g on each. Every half second each
+ * light cube gets 0.5 m/s, downwards a little, in a direction of its own. It slides v^2 / (2 mu g) = 25 mm and stays on
+ * top. A solver that keeps impulses and weights from the step before meets a load that is nothing like the last one.
  */
 #include <math.h>
 
