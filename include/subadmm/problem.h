@@ -56,6 +56,7 @@ typedef struct sadmm_solve_report {
     sadmm_precision precision;
     int iterations;             /* done */
     bool converged;             /* a stop rule was met (false when none was asked for) */
+    int32_t limited;            /* islands slowed down, see sadmm_step_report; 0 at the problem level */
     sadmm_residual residual;    /* of the last iteration */
     sadmm_certificate certificate;
     double solve_ms;            /* wall time of the solve without the certificate, ms */

@@ -156,6 +156,8 @@ typedef struct sadmm_step_report {
     int32_t pairs;                 /* shape pairs with at least one contact */
     int iterations;                /* done */
     bool converged;                /* a stop rule was met */
+    int32_t limited;               /* method FAST: islands that ended the iterations with more kinetic energy than contacts can
+                                      leave them with and were slowed down to that; not 0: too few iterations */
     double penetration_max;        /* deepest overlap at the start of the step, m, >= 0 */
     sadmm_phase_times ms;          /* the certificate's own time is in `certify_ms`, not in here */
     double certify_ms;

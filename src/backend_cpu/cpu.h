@@ -30,6 +30,7 @@
 #include <stdint.h>
 
 #include "../core/kernels.h"
+#include "../core/math/limit.h"
 #include "cpu_barrier.h"
 #include "cpu_lanes.h"
 
@@ -89,9 +90,10 @@ struct row_block {
     real weight[6], along[6], response[6], scale[6];
 };
 
-/* fast: what the weights of an island's constraints rest on. */
+/* fast: sums over an island. */
 struct cpu_island {
     double energy, mass, speed; /* sum of g . A^-1 g, kg, V in m/s */
+    struct limit_energies limit;
 };
 
 struct sadmm_context {
@@ -141,7 +143,8 @@ struct sadmm_context {
     struct cpu_island *islands; /* bodies, used at labels */
     double *A_inverse;          /* bodies x PACKED6 */
     double *pair_response, *pair_weight; /* pair records: J A^-1 J^T, B in kg */
-    size_t label_capacity, island_capacity, A_inverse_capacity, pair_response_capacity, pair_weight_capacity;
+    double *body_sums;          /* bodies x 3: terms of the islands' sums */
+    size_t body_sum_capacity, label_capacity, island_capacity, A_inverse_capacity, pair_response_capacity, pair_weight_capacity;
 
     double *thread_max; /* one cache line a thread */
     size_t thread_max_capacity;
@@ -191,6 +194,7 @@ sadmm_status CPU(assemble_springs)(struct sadmm_context *, struct sadmm_error *)
 sadmm_status CPU(init_penalty)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(init_weights)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(update_weights)(struct sadmm_context *, int refresh, struct sadmm_error *);
+sadmm_status CPU(limit_velocity)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
 sadmm_status CPU(factorize)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(update_velocity)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(update_constraints)(struct sadmm_context *, bool measure, struct sadmm_error *);
@@ -215,6 +219,8 @@ void CPU(sweep_row_blocks)(struct sadmm_context *, size_t begin, size_t end, enu
 void CPU(sweep_bodies)(struct sadmm_context *, size_t begin, size_t end, bool settled, double relaxation);
 /* Largest entry of A v - b - (sum of wrenches), eq. (17), over body blocks [begin, end). */
 double CPU(dual_residual)(const struct sadmm_context *, size_t begin, size_t end);
+/* wrenches = J^T lambda; and at the start of a solve. */
+void CPU(sum_wrenches)(struct sadmm_context *);
 void CPU(start_wrenches)(struct sadmm_context *);
 
 #endif

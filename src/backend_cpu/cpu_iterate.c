@@ -38,13 +38,18 @@ static void clear_max(struct sadmm_context *c)
     memset(c->thread_max, 0, (size_t)c->plan.threads * THREAD_MAX_STRIDE * sizeof *c->thread_max);
 }
 
-void CPU(start_wrenches)(struct sadmm_context *c)
+void CPU(sum_wrenches)(struct sadmm_context *c)
 {
     CPU_PARALLEL
     {
         double none = 0;
         update_constraints(c, cpu_thread(), cpu_threads(), CPU_SWEEP_START, &none);
     }
+}
+
+void CPU(start_wrenches)(struct sadmm_context *c)
+{
+    CPU(sum_wrenches)(c);
     c->settled = false;
     c->measured = false;
     c->ratio = 1;
@@ -82,6 +87,24 @@ sadmm_status CPU(update_constraints)(struct sadmm_context *c, bool measure, stru
     return SADMM_OK;
 }
 
+/* The method `fast`: constraints first, then bodies (math/relax.h). */
+static void iterate_fast(struct sadmm_context *c, int thread, int threads, int count, bool measure, double *primal)
+{
+    for (int i = 0; i < count; ++i) {
+        bool last = measure && i + 1 == count, settled = c->settled || i > 0;
+        update_constraints(c, thread, threads,
+                           last ? CPU_SWEEP_MEASURE : relax_constraints(i, count) ? CPU_SWEEP_RELAX : CPU_SWEEP_ITERATE,
+                           primal);
+        CPU_BARRIER;
+        if (last) {
+            join_wrenches(c, thread, threads);
+            CPU_BARRIER;
+        }
+        update_bodies(c, thread, threads, settled, relax_velocity(i, count, settled) ? c->settings.relaxation : 1);
+        CPU_BARRIER;
+    }
+}
+
 sadmm_status CPU(iterate)(struct sadmm_context *c, int count, bool measure, struct sadmm_error *error)
 {
     (void)error;
@@ -90,19 +113,16 @@ sadmm_status CPU(iterate)(struct sadmm_context *c, int count, bool measure, stru
     {
         int thread = cpu_thread(), threads = cpu_threads();
         double primal = 0;
-        if (c->measured) {
+        if (c->measured && !c->fast) {
             join_wrenches(c, thread, threads);
             CPU_BARRIER;
         }
-        for (int i = 0; i < count; ++i) {
-            bool last = i + 1 == count, settled = c->settled || i > 0;
-            enum cpu_sweep sweep = last && measure ? CPU_SWEEP_MEASURE
-                                   : c->fast && relax_constraints(i, count) ? CPU_SWEEP_RELAX
-                                                                            : CPU_SWEEP_ITERATE;
-            bool relax = c->fast && relax_velocity(i, count, settled);
-            update_bodies(c, thread, threads, settled, relax ? c->settings.relaxation : 1);
+        if (c->fast) iterate_fast(c, thread, threads, count, measure, &primal);
+        for (int i = 0; i < count && !c->fast; ++i) {
+            bool last = measure && i + 1 == count;
+            update_bodies(c, thread, threads, c->settled || i > 0, 1);
             CPU_BARRIER;
-            update_constraints(c, thread, threads, sweep, &primal);
+            update_constraints(c, thread, threads, last ? CPU_SWEEP_MEASURE : CPU_SWEEP_ITERATE, &primal);
             CPU_BARRIER;
         }
         c->thread_max[thread * THREAD_MAX_STRIDE] = primal;
@@ -119,6 +139,7 @@ sadmm_status CPU(iterate)(struct sadmm_context *c, int count, bool measure, stru
 sadmm_status CPU(measure_residuals)(struct sadmm_context *c, struct sadmm_residual *residual, struct sadmm_error *error)
 {
     (void)error;
+    if (c->fast) CPU(sum_wrenches)(c); /* the last Step 1 saw 2 lambda^ - lambda */
     clear_max(c);
     CPU_PARALLEL
     {

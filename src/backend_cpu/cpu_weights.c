@@ -123,11 +123,11 @@ static void add_up_islands(struct sadmm_context *c)
     for (int32_t i = 0; i < c->bodies; ++i) c->islands[i].energy = c->islands[i].mass = 0;
     for (int32_t i = 0; i < c->bodies; ++i) {
         struct cpu_island *island = &c->islands[c->label[i]];
-        island->energy += c->beta[i];
+        island->energy += c->body_sums[i];
         island->mass += body_mass(c, i);
     }
     for (int32_t i = 0; i < c->bodies; ++i)
-        c->islands[i].speed = weight_speed(c->islands[i].energy, c->islands[i].mass);
+        if (c->label[i] == i) c->islands[i].speed = weight_speed(c->islands[i].energy, c->islands[i].mass);
 }
 
 static double body_energy(const struct sadmm_context *c, size_t i)
@@ -245,7 +245,7 @@ static void assemble_C(struct sadmm_context *c, size_t i)
 sadmm_status CPU(update_weights)(struct sadmm_context *c, int refresh, struct sadmm_error *error)
 {
     (void)error;
-    double floor = weight_floor(refresh, c->plan.warm);
+    double floor = weight_floor(refresh);
     CPU(start_wrenches)(c);
     c->settled = refresh > 0;
     CPU_PARALLEL
@@ -253,7 +253,7 @@ sadmm_status CPU(update_weights)(struct sadmm_context *c, int refresh, struct sa
         int thread = cpu_thread(), threads = cpu_threads();
         size_t begin, end;
         cpu_share((size_t)c->bodies, thread, threads, &begin, &end);
-        for (size_t i = begin; i < end; ++i) c->beta[i] = body_energy(c, i);
+        for (size_t i = begin; i < end; ++i) c->body_sums[i] = body_energy(c, i);
         CPU_BARRIER;
         if (thread == 0) add_up_islands(c);
         CPU_BARRIER;

@@ -151,6 +151,7 @@ static const struct sadmm_kernels kernels_ref = {
     .iterate = iterate,
     .measure_residuals = measure_residuals,
     .update_penalty = sadmm_ref_update_penalty,
+    .limit_velocity = sadmm_ref_limit_velocity,
     .read_solution = read_solution,
     .read_penalty = read_penalty,
     .integrate = integrate,

@@ -159,7 +159,7 @@ static void add_to_C(struct sadmm_context *c, const struct ref_constraint *const
 sadmm_status sadmm_ref_update_weights(struct sadmm_context *c, int refresh, struct sadmm_error *error)
 {
     (void)error;
-    double floor = weight_floor(refresh, c->plan->warm);
+    double floor = weight_floor(refresh);
     size_t points = c->system->contacts->point_count;
     add_up_islands(c);
     for (size_t p = 0; p < c->system->contacts->pair_count; ++p) weigh_pair(c, &c->system->contacts->pairs[p], floor);
@@ -266,8 +266,8 @@ sadmm_status sadmm_ref_iterate_fast(struct sadmm_context *c, int count)
 {
     double relaxation = c->settings->relaxation;
     for (int i = 0; i < count; ++i) {
-        step_velocity(c, relax_velocity(i, count, c->settled) ? relaxation : 1);
         step_multipliers(c, relax_constraints(i, count) ? relaxation : 1);
+        step_velocity(c, relax_velocity(i, count, c->settled) ? relaxation : 1);
         c->settled = true;
     }
     return SADMM_OK;
@@ -280,5 +280,35 @@ sadmm_status sadmm_ref_measure_fast(struct sadmm_context *c, struct sadmm_residu
     residual->dual = 0;
     for (int32_t i = 0; i < c->system->body_count; ++i)
         for (int j = 0; j < 6; ++j) residual->dual = fmax(residual->dual, fabs(c->bodies[i].impulse[j]));
+    return SADMM_OK;
+}
+
+/* math/limit.h: twice the energies of the bodies, and the work of the contacts, added up at the islands' names. */
+sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *c, int32_t *limited, struct sadmm_error *error)
+{
+    (void)error;
+    momentum_defect(c, false);
+    for (int32_t i = 0; i < c->system->body_count; ++i) memset(&c->bodies[i].limit, 0, sizeof c->bodies[i].limit);
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        const struct ref_body *body = &c->bodies[i];
+        struct limit_energies *sum = &c->bodies[body->label].limit;
+        double momentum[6];
+        dense6_mul(body->A, body->v, momentum);
+        sum->now += dense6_dot(momentum, body->v) / 2;
+        sum->free += inverse_form(body, body->b) / 2;
+        sum->defect += inverse_form(body, body->impulse) / 2;
+    }
+    for (size_t k = 0; k < c->constraint_count; ++k) {
+        const struct ref_constraint *constraint = &c->constraints[k];
+        int32_t body = constraint->side[0].body >= 0 ? constraint->side[0].body : constraint->side[1].body;
+        c->bodies[c->bodies[body].label].limit.work += fmax(0, -constraint->e[0]) * constraint->lambda[0];
+    }
+    *limited = 0;
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        struct ref_body *body = &c->bodies[i];
+        double factor = limit_factor(&c->bodies[body->label].limit);
+        if (factor < 1 && body->label == i) ++*limited;
+        for (int j = 0; j < 6; ++j) body->v[j] *= factor;
+    }
     return SADMM_OK;
 }

@@ -13,6 +13,7 @@
 #define SADMM_BACKEND_REF_LITERAL_H
 
 #include "../core/kernels.h"
+#include "../core/math/limit.h"
 
 /* One side of a constraint: the paper's subscript (i,k) or (j,k). */
 struct ref_side {
@@ -44,6 +45,7 @@ struct ref_body {
     /* fast */
     int32_t label;                   /* the smallest body of its island; that one keeps the island's sums */
     double island_energy, island_mass;
+    struct limit_energies limit;
     double impulse[6];               /* sums over the body's constraints */
 };
 
@@ -77,6 +79,7 @@ sadmm_status sadmm_ref_update_penalty(struct sadmm_context *, double ratio, stru
 sadmm_status sadmm_ref_init_weights(struct sadmm_context *, struct sadmm_error *);
 sadmm_status sadmm_ref_update_weights(struct sadmm_context *, int refresh, struct sadmm_error *);
 sadmm_status sadmm_ref_iterate_fast(struct sadmm_context *, int count);
+sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
 sadmm_status sadmm_ref_measure_fast(struct sadmm_context *, struct sadmm_residual *);
 
 #endif

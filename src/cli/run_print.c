@@ -78,7 +78,7 @@ json_t *run_record_json(const struct run_record *record, const char *spec, const
     json_object_set_new(o, "scene", json_string(spec));
     set_or_null(o, "backend", record, json_string(cli_backend_name(last->backend)));
     json_object_set_new(o, "precision", json_string(cli_precision_name(scene->def.precision)));
-    json_object_set_new(o, "method", json_string("paper"));
+    json_object_set_new(o, "method", json_string(cli_method_name(scene->def.settings.method)));
     json_object_set_new(o, "bodies", json_integer((json_int_t)record->body_count));
     set_or_null(o, "joints", record, json_integer(last->joints));
     json_object_set_new(o, "contacts", contacts_json(record));

@@ -9,8 +9,9 @@
  *     repeat: update_velocity; update_constraints(measure)      or, fused: iterate(count, measure)
  *     after a measured iteration: measure_residuals; then update_penalty(ratio); factorize
  *
- * In the method FAST iterate is not optional: what is relaxed depends on how far a stretch still goes (math/relax.h).
- * update_weights(refresh) and factorize may follow a stretch in the place of update_penalty.
+ * In the method FAST iterate is not optional: an iteration is Steps 2-4, then Step 1, and what is relaxed depends on how
+ * far a stretch still goes (math/relax.h). update_weights(refresh) and factorize may follow a stretch in the place of
+ * update_penalty, and limit_velocity ends the step's iterations.
  *
  * `measure` asks the iteration (for `iterate`: its last one) to keep what the residuals and a penalty update need; only
  * allowed when the plan's `residuals` is set.
@@ -50,8 +51,8 @@ struct sadmm_kernels {
     sadmm_status (*assemble_springs)(struct sadmm_context *, struct sadmm_error *);  /* C, D: soft blocks */
 
     sadmm_status (*init_penalty)(struct sadmm_context *, struct sadmm_error *); /* E-G: C_i (14), beta_i (13); FAST: weights */
-    /* FAST, after iterations: weights from the multipliers found by now (math/weight.h); the next Step 1 starts from them
-     * without an extrapolation. `refresh`: 1 for the first time in a step. Then factorize. */
+    /* FAST, after iterations: weights from the multipliers found by now (math/weight.h). `refresh`: 1 for the first time in
+     * a step. Then factorize. */
     sadmm_status (*update_weights)(struct sadmm_context *, int refresh, struct sadmm_error *);
     sadmm_status (*factorize)(struct sadmm_context *, struct sadmm_error *);    /* H: of A_i + beta_i C_i */
 
@@ -61,6 +62,9 @@ struct sadmm_kernels {
 
     sadmm_status (*measure_residuals)(struct sadmm_context *, struct sadmm_residual *, struct sadmm_error *); /* (16), (17) */
     sadmm_status (*update_penalty)(struct sadmm_context *, double ratio, struct sadmm_error *); /* P: beta *= ratio (15) */
+
+    /* FAST, rigid bodies under contacts: slow down islands with more energy than they may have (math/limit.h). */
+    sadmm_status (*limit_velocity)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
 
     /* v and lambda to system->velocity, ->contacts points' impulse, ->block_lambda. */
     sadmm_status (*read_solution)(struct sadmm_context *, struct sadmm_error *);

@@ -68,6 +68,7 @@ struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struc
     plan.warm_start = settings->warm_start;
     plan.warm = plan.warm_start && starts_warm(system);
     plan.weight_refresh = constrained && settings->method == SADMM_METHOD_FAST && !plan.warm;
+    plan.limit = constrained && settings->method == SADMM_METHOD_FAST && plan.rigid && system->block_count == 0;
     plan.penalty_updates = constrained && settings->method == SADMM_METHOD_PAPER && settings->penalty_period > 0 && settings->penalty_ratio_limit > 1 &&
                            settings->iterations > settings->penalty_period &&
                            (settings->penalty_update_warm || !plan.warm);

@@ -147,6 +147,7 @@ sadmm_status sadmm_schedule_solve(const struct sadmm_kernels *kernels, struct sa
     report->precision = kernels->precision;
     report->iterations = 0;
     report->converged = false;
+    report->limited = 0;
     report->residual.primal = report->residual.dual = -1;
     report->certificate.ncp_max = report->certificate.ncp_mean = -1;
     report->certificate.momentum_max = report->certificate.siconos = -1;
@@ -157,6 +158,7 @@ sadmm_status sadmm_schedule_solve(const struct sadmm_kernels *kernels, struct sa
     TRY(assemble(kernels, context, plan, error));
     double assembled = sadmm_clock_ms();
     TRY(run(kernels, context, system, settings, plan, report, error));
+    if (plan->limit) TRY(kernels->limit_velocity(context, &report->limited, error));
     TRY(kernels->read_solution(context, error));
     double end = sadmm_clock_ms();
     report->solve_ms = end - start;

@@ -219,6 +219,7 @@ static sadmm_status try_step(sadmm_world *world, sadmm_step_report *report, bool
     report->pairs = (int32_t)world->contacts.pair_count;
     report->iterations = solve.iterations;
     report->converged = solve.converged;
+    report->limited = solve.limited;
     report->residual = solve.residual;
     report->penetration_max = deepest(&world->contacts);
     report->ms.collide = collided - begin;

@@ -4,8 +4,9 @@
  *
  * An impulse of size `load` changes velocities of its island by about V, so load / V is the mass behind the constraint.
  * Where impulses cancel in g (bodies clamped between each other) V says nothing: m, the mass of the island, is the cap.
- * phi / w, with w the constraint's own response, is what a constraint without a load gets. Double in every precision:
- * it runs a few times a step. */
+ * phi / w, with w the constraint's own response, is what a constraint without a load gets; it starts high, because loads
+ * that have not been found yet are the ones to come, and falls where a step takes its weights anew. Double in every
+ * precision: it runs a few times a step. */
 #ifndef SADMM_MATH_WEIGHT_H
 #define SADMM_MATH_WEIGHT_H
 
@@ -15,24 +16,28 @@
  * 40, ... Changes as late as that are small, and a change disturbs. */
 enum { WEIGHT_FIRST_REFRESH = 5 };
 
-/* phi. The first loads of a step that started cold are no more than guesses: it starts higher and falls with every refresh.
- * `refresh`: 0 at the start. */
-SADMM_INLINE double weight_floor(int refresh, int warm)
+/* phi. `refresh`: 0 at the start of the step. */
+SADMM_INLINE double weight_floor(int refresh)
 {
     double phi = 3;
     int k;
-    if (warm) return 1;
     for (k = 0; k < refresh && phi > 1; ++k) phi *= 0.7;
     return phi > 1 ? phi : 1;
 }
 
+/* Less is rounding of the impulses, and says nothing about loads; m/s. */
+#define WEIGHT_LEAST_SPEED 1e-6
+
 /* V of an island from sum g . A^-1 g over its bodies and its mass, m/s. */
-SADMM_INLINE double weight_speed(double energy, double mass) { return mass > 0 ? sqrt(energy / mass) : 0; }
+SADMM_INLINE double weight_speed(double energy, double mass)
+{
+    return sqrt(energy / mass + WEIGHT_LEAST_SPEED * WEIGHT_LEAST_SPEED);
+}
 
 /* min(load / V, m), kg; load in N s. */
 SADMM_INLINE double weight_mass(double load, double speed, double mass)
 {
-    return load < mass * speed ? load / speed : (load > 0 ? mass : 0);
+    return fmin(load / speed, mass);
 }
 
 #endif

@@ -1,0 +1,127 @@
+/* The method `fast`, after the last iteration: no island keeps more energy than it may have (math/limit.h). */
+#include "cpu_rows.h"
+
+/* x . M x of a rigid body's A or A^-1. */
+static double rigid_form(const double M[PACKED6], const double x[6])
+{
+    return M[0] * (x[0] * x[0] + x[1] * x[1] + x[2] * x[2]) + M[9] * x[3] * x[3] + M[14] * x[4] * x[4] +
+           M[20] * x[5] * x[5] + 2 * (M[13] * x[3] * x[4] + M[18] * x[3] * x[5] + M[19] * x[4] * x[5]);
+}
+
+static void load_b(const struct sadmm_context *c, size_t i, double b[6])
+{
+    if (!c->rigid_bodies) {
+        for (int k = 0; k < 6; ++k) b[k] = (double)c->b[i * ROW + (size_t)k];
+        return;
+    }
+    const struct body_block *block = &c->body_blocks[i / (size_t)LANES];
+    size_t l = i % (size_t)LANES;
+    b[0] = (double)block->b_linear.x[l], b[1] = (double)block->b_linear.y[l], b[2] = (double)block->b_linear.z[l];
+    b[3] = (double)block->b_angular.x[l], b[4] = (double)block->b_angular.y[l], b[5] = (double)block->b_angular.z[l];
+}
+
+static void load_v(const struct sadmm_context *c, size_t i, double v[6])
+{
+    for (int k = 0; k < 6; ++k) v[k] = (double)c->state[i * ROW + (size_t)k];
+}
+
+static void energies(const struct sadmm_context *c, size_t i, double *now, double *free)
+{
+    double b[6], v[6];
+    load_b(c, i, b);
+    load_v(c, i, v);
+    *now = rigid_form(&c->A[i * PACKED6], v) / 2;
+    *free = rigid_form(&c->A_inverse[i * PACKED6], b) / 2;
+}
+
+/* Energy of A v - b - J^T lambda; `wrenches` hold J^T lambda. */
+static double defect(const struct sadmm_context *c, size_t i)
+{
+    const double *A = &c->A[i * PACKED6];
+    double r[6], v[6];
+    load_b(c, i, r);
+    load_v(c, i, v);
+    for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at)
+        for (int k = 0; k < 6; ++k) r[k] += (double)c->wrenches[(size_t)c->incident[at] * ROW + (size_t)k];
+    for (int k = 0; k < 3; ++k) r[k] -= A[0] * v[k];
+    r[3] -= A[9] * v[3] + A[13] * v[4] + A[18] * v[5];
+    r[4] -= A[13] * v[3] + A[14] * v[4] + A[19] * v[5];
+    r[5] -= A[18] * v[3] + A[19] * v[4] + A[20] * v[5];
+    return rigid_form(&c->A_inverse[i * PACKED6], r) / 2;
+}
+
+/* Work of a pair's contacts that push apart. */
+static double pair_work(const struct sadmm_context *c, size_t record)
+{
+    const struct pair_block *block = &c->pair_blocks[record / (size_t)LANES];
+    size_t l = record % (size_t)LANES;
+    double work = 0;
+    for (int k = 0; k < c->system->contacts->pairs[block->pair[l]].count; ++k) {
+        double error, impulse;
+        if (c->plan.contact_rows == 3) {
+            const struct point_slot *slot = (const struct point_slot *)c->slots + block->first + k;
+            error = (double)slot->error[l];
+            impulse = (double)(block->normal.x[l] * slot->lambda.x[l] + block->normal.y[l] * slot->lambda.y[l] +
+                               block->normal.z[l] * slot->lambda.z[l]);
+        } else {
+            const struct normal_slot *slot = (const struct normal_slot *)c->slots + block->first + k;
+            error = (double)slot->error[l];
+            impulse = (double)slot->lambda[l];
+        }
+        work += fmax(0, -error) * impulse;
+    }
+    return work;
+}
+
+/* Sums over islands in the order of bodies, whatever the threads. */
+static bool any_suspect(struct sadmm_context *c)
+{
+    bool any = false;
+    for (int32_t i = 0; i < c->bodies; ++i) memset(&c->islands[i].limit, 0, sizeof c->islands[i].limit);
+    for (int32_t i = 0; i < c->bodies; ++i) {
+        struct limit_energies *sum = &c->islands[c->label[i]].limit;
+        sum->now += c->body_sums[3 * i];
+        sum->free += c->body_sums[3 * i + 1];
+    }
+    for (int32_t i = 0; i < c->bodies; ++i)
+        any = any || (c->label[i] == i && limit_suspects(c->islands[i].limit.now, c->islands[i].limit.free));
+    return any;
+}
+
+static void add_defects_and_work(struct sadmm_context *c)
+{
+    for (int32_t i = 0; i < c->bodies; ++i) c->islands[c->label[i]].limit.defect += c->body_sums[3 * i + 2];
+    for (size_t r = 0; r < c->pair_block_count * (size_t)LANES; ++r) {
+        if (c->pair_blocks[r / (size_t)LANES].pair[r % (size_t)LANES] < 0) continue;
+        const struct sadmm_contact_pair *pair = cpu_pair(c, r);
+        c->islands[c->label[pair->body_a >= 0 ? pair->body_a : pair->body_b]].limit.work += pair_work(c, r);
+    }
+}
+
+sadmm_status CPU(limit_velocity)(struct sadmm_context *c, int32_t *limited, struct sadmm_error *error)
+{
+    (void)error;
+    *limited = 0;
+    CPU_PARALLEL
+    {
+        size_t begin, end;
+        cpu_share((size_t)c->bodies, cpu_thread(), cpu_threads(), &begin, &end);
+        for (size_t i = begin; i < end; ++i) energies(c, i, &c->body_sums[3 * i], &c->body_sums[3 * i + 1]);
+    }
+    if (!any_suspect(c)) return SADMM_OK;
+    CPU(sum_wrenches)(c);
+    CPU_PARALLEL
+    {
+        size_t begin, end;
+        cpu_share((size_t)c->bodies, cpu_thread(), cpu_threads(), &begin, &end);
+        for (size_t i = begin; i < end; ++i) c->body_sums[3 * i + 2] = defect(c, i);
+    }
+    add_defects_and_work(c);
+    for (int32_t i = 0; i < c->bodies; ++i) {
+        double factor = limit_factor(&c->islands[c->label[i]].limit);
+        if (factor == 1) continue;
+        *limited += c->label[i] == i;
+        for (int k = 0; k < 6; ++k) c->state[(size_t)i * ROW + (size_t)k] *= (real)factor;
+    }
+    return SADMM_OK;
+}
