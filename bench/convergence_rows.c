@@ -23,6 +23,7 @@ struct row row_start(enum row_kind kind, const char *name, sadmm_method method, 
                       .settle_s = NAN,
                       .energy_excess = NAN,
                       .penetration = NAN,
+                      .limited = NAN,
                       .status = "ok"};
     snprintf(row.name, sizeof row.name, "%s", name);
     return row;
@@ -41,7 +42,8 @@ static const char *method_name(sadmm_method method) { return method == SADMM_MET
 void rows_write_header(FILE *csv)
 {
     fputs("kind,name,method,backend,precision,threads,runs_on,bodies,contacts,blocks,limit,iterations,tolerance,"
-          "ncp_max,ncp_balanced,momentum_max,ms,ncp_median,ncp_last,settle_s,energy_excess_m,penetration_m,commit,"
+          "ncp_max,ncp_balanced,momentum_max,ms,ncp_median,ncp_last,settle_s,energy_excess_m,penetration_m,limited,"
+          "commit,"
           "status\n",
           csv);
 }
@@ -78,8 +80,8 @@ static void write_row(FILE *out, const struct row *r)
     fprintf(out, ",%d,%d,%d", r->bodies, r->contacts, r->blocks);
     write_integer(out, r->limit);
     write_integer(out, r->iterations);
-    const double numbers[] = {r->tolerance,  r->ncp_max,  r->ncp_balanced, r->momentum_max,  r->ms,
-                              r->ncp_median, r->ncp_last, r->settle_s,     r->energy_excess, r->penetration};
+    const double numbers[] = {r->tolerance, r->ncp_max,  r->ncp_balanced,  r->momentum_max, r->ms,     r->ncp_median,
+                              r->ncp_last,  r->settle_s, r->energy_excess, r->penetration,  r->limited};
     for (size_t k = 0; k < sizeof numbers / sizeof *numbers; ++k) write_number(out, numbers[k]);
     fprintf(out, ",%s,", sadmm_build_commit());
     write_text(out, r->status);
@@ -250,15 +252,16 @@ static void print_warm_row(const struct row *paper, const struct row *fast, FILE
 {
     const struct row *any = paper ? paper : fast;
     struct row none = row_start(ROW_WARM, any->name, any->method, &any->series);
-    char median[64], balanced[64], settle[64], excess[64], ms[64];
+    char median[64], balanced[64], settle[64], excess[64], limited[64], ms[64];
     const struct row *p = paper ? paper : &none, *f = fast ? fast : &none;
     pair_text(p->ncp_median, f->ncp_median, median);
     pair_text(p->ncp_balanced, f->ncp_balanced, balanced);
     pair_text(p->settle_s, f->settle_s, settle);
     pair_text(1e3 * p->energy_excess, 1e3 * f->energy_excess, excess);
+    pair_text(100 * p->limited, 100 * f->limited, limited);
     pair_text(p->ms, f->ms, ms);
-    fprintf(out, "| %-20s | %8d | %4d | %-17s | %-17s | %-13s | %-17s | %-13s |", any->name, any->contacts,
-            any->iterations, median, balanced, settle, excess, ms);
+    fprintf(out, "| %-20s | %8d | %4d | %-17s | %-17s | %-13s | %-17s | %-10s | %-13s |", any->name, any->contacts,
+            any->iterations, median, balanced, settle, excess, limited, ms);
     for (int k = 0; k < 2; ++k)
         if (strcmp((k ? f : p)->status, "ok") != 0) fprintf(out, " %s: %s", k ? "fast" : "paper", (k ? f : p)->status);
     fputs(" |\n", out);
@@ -279,9 +282,10 @@ void rows_print_warm(const struct rows *rows, const struct series *series, FILE 
         if (r->method == SADMM_METHOD_FAST && paper) continue;
         if (!any) {
             print_heading("Warm", series, out);
-            fprintf(out, "| %-20s | %8s | %4s | %-17s | %-17s | %-13s | %-17s | %-13s | |\n", "scene", "contacts", "k",
-                    "median, m/s", "balanced, m/s", "settled, s", "excess, mm", "step, ms");
-            fprintf(out, "|---|---|---|---|---|---|---|---|---|\n");
+            fprintf(out, "| %-20s | %8s | %4s | %-17s | %-17s | %-13s | %-17s | %-10s | %-13s | |\n", "scene",
+                    "contacts", "k", "median, m/s", "balanced, m/s", "settled, s", "excess, mm", "limited, %",
+                    "step, ms");
+            fprintf(out, "|---|---|---|---|---|---|---|---|---|---|\n");
         }
         any = true;
         print_warm_row(paper, fast, out);

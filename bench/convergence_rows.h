@@ -35,6 +35,7 @@ struct row {
     double ncp_max, ncp_balanced, momentum_max; /* CURVE, COUNT at its iterations; WARM: medians */
     double ms;                                  /* COUNT, CURVE: of the solve; WARM: of a step (median) */
     double ncp_median, ncp_last, settle_s, energy_excess, penetration; /* WARM */
+    double limited; /* WARM: share of steps in which an island was slowed down (sadmm_step_report) */
     char status[SADMM_MESSAGE_SIZE];                                   /* "ok", or why there is nothing */
 };
 

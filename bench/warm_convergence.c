@@ -26,6 +26,7 @@ struct warm {
     int window;                             /* the first step of the last quarter */
     sadmm_problem *frozen;
     int body_count, steps, done, landed; /* landed: step, -1: not yet */
+    int limited;                         /* steps in which an island was slowed down */
     double mass, start, work, excess, penetration;
     struct sadmm_error *error;
 };
@@ -112,6 +113,7 @@ static sadmm_status step(struct warm *w)
     TRY(energy(w, &after));
     if (w->landed < 0 && report.contacts > 0) w->landed = w->done;
     w->excess = fmax(w->excess, after - w->start - w->work);
+    w->limited += report.limited > 0;
     w->penetration = fmax(w->penetration, report.penetration_max);
     w->ncp[w->done] = report.certificate.ncp_max;
     if (w->done >= w->window) TRY(balanced_error(w, &w->balanced[w->done]));
@@ -139,6 +141,7 @@ static void summarize(struct warm *w, struct row *row)
     row->ms = median(w->ms, w->done); /* sorts them: nobody needs their order any more */
     row->energy_excess = w->excess / (w->mass * v3_norm(v3_load(w->scene->def.settings.gravity)));
     row->penetration = w->penetration;
+    row->limited = (double)w->limited / w->done;
     if (window <= 0) return;
     row->ncp_median = median(w->ncp + w->window, window);
     row->ncp_balanced = median(w->balanced + w->window, window);

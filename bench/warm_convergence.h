@@ -21,6 +21,7 @@ struct warm_plan {
  *   settle_s              from landing until the natural map stays below 1e-5 m/s; NAN: it does not
  *   energy_excess         the most that kinetic + potential energy exceed those at the start plus what scripted input
  *                         brought in, as a height of all bodies together: energy / (total mass x g), m
+ *   limited               share of all steps in which the method slowed an island down
  * A run that ends in what is not finite is a row with a status that says so, not an error. */
 sadmm_status warm_convergence(const struct warm_plan *plan, sadmm_method method, const struct series *series,
                               int device, struct rows *rows, struct sadmm_error *error);
