@@ -55,6 +55,10 @@ def draw(plt, curves, path, x_label, y_label, columns=5):
         axis.set_title(name, fontsize="small")
         axis.grid(True, which="major", alpha=0.4)
         axis.tick_params(labelsize="x-small")
+        values = sorted({x for points in lines.values() for x, _ in points})
+        axis.xaxis.set_minor_formatter(plt.NullFormatter())
+        if len(values) <= 6:
+            axis.set_xticks(values, [f"{x:g}" for x in values])
     for axis in axes.flat[len(curves):]:
         axis.set_visible(False)
     for axis in axes[:, 0]:
