@@ -1,7 +1,11 @@
+#include <ctype.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#ifdef _OPENMP
+#include <omp.h>
+#endif
 
 #include "bench.h"
 #include "core/schedule.h"
@@ -13,13 +17,15 @@ static const struct {
 } commands[] = {
     {"kernels", bench_kernels, "ns per contact per iteration by backend, precision, threads and size"},
     {"scaling", bench_scaling, "ms per step of growing scenes, CPU by threads against GPU"},
+    {"convergence", bench_convergence, "iterations and time to a tolerance, errors of warm steps: method against method"},
+    {"stand", bench_stand, "does a structure stand for many steps, and what does a step cost"},
 };
 
 static void usage(FILE *out)
 {
     fprintf(out, "usage: subadmm-bench COMMAND [options]\n\n");
     for (size_t k = 0; k < sizeof commands / sizeof *commands; ++k)
-        fprintf(out, "  %-10s %s\n", commands[k].name, commands[k].description);
+        fprintf(out, "  %-11s %s\n", commands[k].name, commands[k].description);
     fprintf(out, "\nsubadmm-bench COMMAND --help lists the options of one.\n");
 }
 
@@ -67,4 +73,37 @@ double bench_memory_bandwidth(int threads)
     free(from);
     free(to);
     return best;
+}
+
+/* "model name" of the first core, else "CPU". */
+static void cpu_name(char *name, size_t size)
+{
+    char line[256];
+    snprintf(name, size, "CPU");
+    FILE *file = fopen("/proc/cpuinfo", "r");
+    if (!file) return;
+    while (fgets(line, sizeof line, file)) {
+        const char *colon = strchr(line, ':');
+        if (strncmp(line, "model name", 10) || !colon) continue;
+        for (++colon; isspace((unsigned char)*colon); ++colon) {}
+        snprintf(name, size, "%.*s", (int)strcspn(colon, "\n"), colon);
+        break;
+    }
+    fclose(file);
+}
+
+int bench_machine_threads(void)
+{
+#ifdef _OPENMP
+    return omp_get_num_procs();
+#else
+    return 1;
+#endif
+}
+
+void bench_runs_on(sadmm_backend backend, char *name, size_t size)
+{
+    sadmm_backend_info info;
+    if (backend != SADMM_BACKEND_CUDA) cpu_name(name, size);
+    else snprintf(name, size, "%.100s", sadmm_backend_query(backend, &info) == SADMM_OK ? info.reason : "?");
 }

@@ -1,16 +1,12 @@
 /* subadmm-bench scaling: whole steps of a scene that grows, on the CPU by threads and on the GPU. Times come from steps
  * without a certificate; the errors beside them from further steps of the same run with it. A size that would take too
  * long is left out, and the row says so. bench/plot_scaling.py draws the CSV. */
-#include <ctype.h>
 #include <errno.h>
 #include <getopt.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 #include "bench.h"
 #include "bench_options.h"
@@ -179,38 +175,12 @@ static bool run_series(const struct options *o, struct series *s, const struct o
     return good;
 }
 
-/* "model name" of the first core, else "CPU". */
-static void cpu_name(char *name, size_t size)
-{
-    char line[256];
-    snprintf(name, size, "CPU");
-    FILE *file = fopen("/proc/cpuinfo", "r");
-    if (!file) return;
-    while (fgets(line, sizeof line, file)) {
-        const char *colon = strchr(line, ':');
-        if (strncmp(line, "model name", 10) || !colon) continue;
-        for (++colon; isspace((unsigned char)*colon); ++colon) {}
-        snprintf(name, size, "%.*s", (int)strcspn(colon, "\n"), colon);
-        break;
-    }
-    fclose(file);
-}
-
-static int machine_threads(void)
-{
-#ifdef _OPENMP
-    return omp_get_num_procs();
-#else
-    return 1;
-#endif
-}
-
 static bool run_cpu(const struct options *o, sadmm_precision precision, const struct output *out, FILE *notes)
 {
     struct series s = {.backend = SADMM_BACKEND_CPU, .precision = precision};
-    int most = machine_threads();
+    int most = bench_machine_threads();
     bool good = true;
-    cpu_name(s.runs_on, sizeof s.runs_on);
+    bench_runs_on(SADMM_BACKEND_CPU, s.runs_on, sizeof s.runs_on);
     for (int t = 0; t < o->thread_count; ++t) {
         if (o->threads[t] > most) {
             fprintf(notes, "cpu, %ld threads: left out, this machine has %d\n", o->threads[t], most);
@@ -235,8 +205,7 @@ static bool run_backend(const struct options *o, sadmm_backend backend, sadmm_pr
     }
     if (backend == SADMM_BACKEND_CPU) return run_cpu(o, precision, out, notes);
     struct series s = {.backend = backend, .precision = precision, .threads = 1};
-    if (backend == SADMM_BACKEND_CUDA) snprintf(s.runs_on, sizeof s.runs_on, "%.100s", info.reason);
-    else cpu_name(s.runs_on, sizeof s.runs_on);
+    bench_runs_on(backend, s.runs_on, sizeof s.runs_on);
     return run_series(o, &s, out);
 }
 

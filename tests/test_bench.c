@@ -11,7 +11,7 @@
 
 static const char command[] = SUBADMM_BENCH; /* the build gives its path */
 
-enum { MAX_TEXT = 1 << 16, MAX_ROWS = 16, COLUMNS = 22 };
+enum { MAX_TEXT = 1 << 18, MAX_ROWS = 512, MAX_COLUMNS = 32 };
 
 /* Run with these arguments; returns the exit code. `out` gets what it writes to both outputs. */
 static int run(const char *arguments, char *out)
@@ -29,14 +29,14 @@ static int run(const char *arguments, char *out)
 
 struct table {
     char text[MAX_TEXT];
-    char *names[COLUMNS], *fields[MAX_ROWS][COLUMNS];
-    int rows;
+    char *names[MAX_COLUMNS], *fields[MAX_ROWS][MAX_COLUMNS];
+    int rows, columns;
 };
 
 /* Cut a line into its fields, quotes taken off ("" inside them is one quote); returns the start of the next line. */
-static char *cut(char *at, char *fields[COLUMNS])
+static char *cut(char *at, char *fields[MAX_COLUMNS], int columns)
 {
-    for (int k = 0; k < COLUMNS; ++k) {
+    for (int k = 0; k < columns; ++k) {
         char *to = fields[k] = at;
         bool quoted = *at == '"';
         for (at += quoted; *at && (quoted || (*at != ',' && *at != '\n')); ++at) {
@@ -45,7 +45,7 @@ static char *cut(char *at, char *fields[COLUMNS])
         }
         char end = *at++;
         *to = 0;
-        ck_assert_msg(end == (k == COLUMNS - 1 ? '\n' : ','), "field %d ends in '%c'", k, end);
+        ck_assert_msg(end == (k == columns - 1 ? '\n' : ','), "field %d ends in '%c'", k, end);
     }
     return at;
 }
@@ -56,16 +56,19 @@ static void read_csv(const char *path, struct table *table)
     ck_assert_ptr_nonnull(file);
     table->text[fread(table->text, 1, MAX_TEXT - 1, file)] = 0;
     fclose(file);
-    char *at = cut(table->text, table->names);
+    table->columns = 1;
+    for (const char *c = table->text; *c != '\n'; ++c) table->columns += *c == ',';
+    ck_assert_int_le(table->columns, MAX_COLUMNS);
+    char *at = cut(table->text, table->names, table->columns);
     for (table->rows = 0; *at; ++table->rows) {
         ck_assert_int_lt(table->rows, MAX_ROWS);
-        at = cut(at, table->fields[table->rows]);
+        at = cut(at, table->fields[table->rows], table->columns);
     }
 }
 
 static const char *field(const struct table *table, int row, const char *name)
 {
-    for (int k = 0; k < COLUMNS; ++k)
+    for (int k = 0; k < table->columns; ++k)
         if (!strcmp(table->names[k], name)) return table->fields[row][k];
     ck_abort_msg("no column \"%s\"", name);
 }
@@ -171,6 +174,110 @@ START_TEST(scaling_says_what_it_skips)
 }
 END_TEST
 
+/* ---- convergence ----------------------------------------------------------------------------------------------- */
+
+static bool is_row(const struct table *table, int row, const char *kind, const char *name, const char *method)
+{
+    return !strcmp(field(table, row, "kind"), kind) && (!name || !strcmp(field(table, row, "name"), name)) &&
+           (!method || !strcmp(field(table, row, "method"), method));
+}
+
+/* Iterations that method needs on that problem. */
+static double needed(const struct table *table, const char *name, const char *method, double tolerance)
+{
+    for (int row = 0; row < table->rows; ++row)
+        if (is_row(table, row, "count", name, method) && number(table, row, "tolerance") == tolerance)
+            return *field(table, row, "iterations") ? number(table, row, "iterations") : INFINITY;
+    ck_abort_msg("no row for %s by %s to %g", name, method, tolerance);
+}
+
+/* Counts that an independent program (dense, in another language) found for the paper's iteration. On these problems
+ * the error falls so steeply where it passes the tolerance that rounding moves a count by one or two. */
+static void expect_known_counts(const struct table *table)
+{
+    static const struct {
+        const char *name;
+        double tolerance, iterations;
+    } known[] = {
+        {"cards", 1e-3, 92},        {"cards", 1e-4, 100},       {"cards", 1e-6, 115},
+        {"stack of 10", 1e-3, 98},  {"stack of 10", 1e-4, 169}, {"stack of 10", 1e-6, 301},
+        {"stack 100kg 1kg 10g", 1e-6, 124}, {"incline, below", 1e-6, 19},
+        {"stack 10g 1kg 100kg", 1e-3, 721}, {"stack 10g 1kg 100kg", 1e-6, INFINITY},
+    };
+    for (size_t k = 0; k < sizeof known / sizeof *known; ++k) {
+        double iterations = needed(table, known[k].name, "paper", known[k].tolerance), wanted = known[k].iterations;
+        ck_assert_msg(isinf(wanted) ? isinf(iterations) : fabs(iterations - wanted) <= 2 + 0.01 * wanted,
+                      "paper needs %g iterations on %s to %g, not %g", iterations, known[k].name, known[k].tolerance,
+                      wanted);
+    }
+    /* The reason why there is a second method: light bodies that carry heavy ones. */
+    ck_assert_double_lt(needed(table, "stack 10g 1kg 100kg", "fast", 1e-6), 200);
+}
+
+START_TEST(convergence_measures)
+{
+    static struct table table;
+    static char out[MAX_TEXT];
+    char arguments[256];
+    int counts = 0, curves = 0, warm = 0;
+    snprintf(arguments, sizeof arguments, "convergence --quick --csv %s", csv_path);
+    int code = run(arguments, out);
+    ck_assert_msg(code == 0, "exit code %d\n%s", code, out);
+    ck_assert_msg(strstr(out, "iterations to 0.0001, paper / fast: geometric mean"), "%s", out);
+    read_csv(csv_path, &table);
+    for (int row = 0; row < table.rows; ++row) {
+        double limit = 2000;
+        ck_assert(*field(&table, row, "runs_on") && *field(&table, row, "commit"));
+        ck_assert_str_eq(field(&table, row, "precision"), "f64");
+        ck_assert(number(&table, row, "bodies") >= 1 && number(&table, row, "contacts") >= 4);
+        if (is_row(&table, row, "count", NULL, NULL)) {
+            bool reached = *field(&table, row, "iterations");
+            ++counts;
+            ck_assert_str_eq(field(&table, row, "status"), reached ? "ok" : "not reached");
+            ck_assert(number(&table, row, "limit") == limit);
+            if (!reached) continue;
+            ck_assert(number(&table, row, "iterations") >= 1 && number(&table, row, "iterations") <= limit);
+            ck_assert(number(&table, row, "ncp_balanced") <= number(&table, row, "tolerance"));
+            ck_assert(number(&table, row, "ms") > 0);
+        } else if (is_row(&table, row, "curve", NULL, NULL)) {
+            ++curves;
+            ck_assert(number(&table, row, "ncp_max") >= 0 && number(&table, row, "ncp_balanced") >= 0);
+        } else {
+            ++warm;
+            ck_assert(is_row(&table, row, "warm", "incline", NULL));
+            ck_assert_str_eq(field(&table, row, "status"), "ok");
+            /* A block that sticks: solved from the first steps on, and nothing gains energy. */
+            ck_assert(number(&table, row, "ncp_median") < 1e-9 && number(&table, row, "ncp_balanced") < 1e-6);
+            ck_assert(number(&table, row, "energy_excess_m") >= 0 && number(&table, row, "energy_excess_m") < 1e-5);
+        }
+    }
+    ck_assert_int_eq(counts, 8 * 2 * 3); /* problems, methods, tolerances */
+    ck_assert_int_ge(curves, 8 * 2 * 10);
+    ck_assert_int_eq(warm, 2 * 4);
+    expect_known_counts(&table);
+}
+END_TEST
+
+/* One problem by one method, with fewer iterations than it needs. */
+START_TEST(convergence_of_one_problem)
+{
+    static struct table table;
+    static char out[MAX_TEXT];
+    char arguments[256];
+    snprintf(arguments, sizeof arguments,
+             "convergence --only cold --method paper --problem cards --limit 50 --precision f32 --csv %s", csv_path);
+    ck_assert_int_eq(run(arguments, out), 0);
+    ck_assert_msg(strstr(out, "> 50 / > 50 / > 50"), "%s", out);
+    read_csv(csv_path, &table);
+    ck_assert_int_eq(table.rows, 9 + 3); /* 1, 2, 3, 5, 7, 10, 20, 30, 50 iterations; three tolerances */
+    for (int row = 0; row < table.rows; ++row) {
+        ck_assert(is_row(&table, row, row < 9 ? "curve" : "count", "cards", "paper"));
+        ck_assert_str_eq(field(&table, row, "precision"), "f32");
+        ck_assert_str_eq(field(&table, row, "status"), row < 9 ? "ok" : "not reached");
+    }
+}
+END_TEST
+
 static const struct {
     const char *arguments, *says;
 } refused[] = {
@@ -190,6 +297,16 @@ static const struct {
     {"scaling --max-seconds nan", "--max-seconds nan: must be"},
     {"scaling --device -1", "--device -1: must be"},
     {"scaling here", "unexpected argument \"here\""},
+    {"convergence --method slow", "--method slow: must be paper, fast or both"},
+    {"convergence --only hot", "--only hot: must be cold or warm"},
+    {"convergence --limit 0", "--limit 0: must be in [1, 1000000]"},
+    {"convergence --budgets 5,0", "--budgets 5,0: must be"},
+    {"convergence --scene nowhere", "must be one of"},
+    {"convergence --seconds 0", "--seconds 0: must be in (0, 3600]"},
+    {"convergence there", "unexpected argument \"there\""},
+    {"stand --steps 0", "--steps 0: must be in [1, 10000000]"},
+    {"stand --scene nowhere", "must be one of"},
+    {"stand --dt 0", "--dt 0: must be in (0, 1]"},
     {"kernels --threads 0", "--threads 0: must be"},
     {"kernels --contacts 1,,2", "--contacts 1,,2: must be"},
     {"kernels --precision f16", "--precision f16: must be"},
@@ -202,6 +319,16 @@ START_TEST(bad_options_are_refused)
     int code = run(refused[_i].arguments, out);
     ck_assert_msg(code == 2 && strstr(out, refused[_i].says), "subadmm-bench %s: exit code %d\n%s",
                   refused[_i].arguments, code, out);
+}
+END_TEST
+
+/* A block that must not creep stands; one sphere that bounces does not. */
+START_TEST(stand_tells_what_stands)
+{
+    static char out[MAX_TEXT];
+    ck_assert_msg(run("stand --scene incline --steps 50 --iterations 30 --threads 1", out) == 0 &&
+                      strstr(out, "\nstands"), "%s", out);
+    ck_assert_msg(run("stand --scene bounce --steps 50", out) == 1 && strstr(out, "\ndoes not stand"), "%s", out);
 }
 END_TEST
 
@@ -221,6 +348,9 @@ int main(void)
     tcase_add_checked_fixture(cases, make_csv, remove_csv);
     tcase_add_test(cases, scaling_measures);
     tcase_add_test(cases, scaling_says_what_it_skips);
+    tcase_add_test(cases, convergence_measures);
+    tcase_add_test(cases, convergence_of_one_problem);
+    tcase_add_test(cases, stand_tells_what_stands);
     tcase_add_loop_test(cases, bad_options_are_refused, 0, sizeof refused / sizeof *refused);
     tcase_add_test(cases, a_file_that_cannot_be_written);
     suite_add_tcase(suite, cases);

@@ -11,7 +11,8 @@
 static const struct sadmm_scene_family *const families[] = {
     &sadmm_family_sliding_cubes, &sadmm_family_vertical_stacks, &sadmm_family_oblique_stacks,
     &sadmm_family_card_houses,   &sadmm_family_pyramid,         &sadmm_family_pile,
-    &sadmm_family_settled_pile,  &sadmm_family_burst,           &sadmm_family_incline,
+    &sadmm_family_mixed_pile,    &sadmm_family_sliding_pile,    &sadmm_family_settled_pile,
+    &sadmm_family_burst,         &sadmm_family_kicked_cubes,    &sadmm_family_incline,
     &sadmm_family_bounce,        &sadmm_family_spin_plate,
 };
 

@@ -1,0 +1,327 @@
+/* subadmm-bench convergence: how many iterations, and how much time, each method takes to a tolerance on a set of cold
+ * problems, and how far from the solution a scene's steps are when they do few. docs/convergence.md says how to read
+ * it; bench/convergence.sh regenerates its tables, bench/plot_convergence.py draws the CSV. */
+#include <errno.h>
+#include <getopt.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bench.h"
+#include "bench_options.h"
+#include "cold_convergence.h"
+#include "scenes/scenes.h"
+#include "warm_convergence.h"
+
+static const char command[] = "convergence";
+
+struct options {
+    sadmm_backend backend; /* AUTO: cpu and cuda */
+    int precision, method; /* -1: both */
+    long threads[BENCH_LIST], budgets[BENCH_LIST], limit, device;
+    int thread_count, budget_count;
+    double seconds; /* 0: each scene's own */
+    double max_seconds;
+    bool cold, warm, quick;
+    const char *problem; /* NULL: all; else those with it in their name */
+    const char *files[BENCH_LIST], *scenes[BENCH_LIST];
+    int file_count, scene_count;
+    const char *csv;
+};
+
+/* What is measured, in what, and where it goes. */
+struct bench {
+    const struct options *o;
+    struct series series;
+    struct rows *rows;
+    bool failed;
+};
+
+/* Simulated seconds and, where it is not the scene's, dt. */
+static const struct {
+    const char *spec;
+    double seconds, dt;
+    bool quick;
+} scenes[] = {
+    {"vertical_stacks", 2, 0, false},
+    {"oblique_stacks", 2, 0, false},
+    {"card_houses:1", 1, 0, false},
+    {"sliding_cubes:500", 1, 0, false},
+    {"pyramid:30", 2, 0, false},
+    {"pyramid:100", 2, 1.0 / 60, false},
+    {"settled_pile:1000", 1, 0, false},
+    {"pile:300", 2, 0, false},
+    {"mixed_pile:200", 2, 0, false},
+    {"sliding_pile:200", 2, 0, false},
+    {"kicked_cubes", 2, 0, false},
+    {"burst:3", 1, 0, false},
+    {"incline", 1, 0, true},
+};
+
+/* ---- measuring ------------------------------------------------------------------------------------------------- */
+
+static void report(struct bench *b, const char *what, sadmm_status status, const struct sadmm_error *error)
+{
+    if (status == SADMM_OK) return;
+    fprintf(stderr, "subadmm-bench %s: %s: %s\n", command, what, error->message);
+    b->failed = true;
+}
+
+static bool wanted_method(const struct options *o, int method) { return o->method < 0 || o->method == method; }
+
+static void progress(const struct bench *b, const char *what, int method)
+{
+    if (!b->o->quick) fprintf(stderr, "%s, %s\n", what, method == SADMM_METHOD_FAST ? "fast" : "paper");
+}
+
+static void measure_problem(struct bench *b, struct set_problem *problem)
+{
+    struct sadmm_error error = {SADMM_OK, ""};
+    struct cold_plan plan = {(int)b->o->limit, b->o->quick ? 1 : 20};
+    for (int method = 0; method < SADMM_METHOD_COUNT; ++method) {
+        if (!wanted_method(b->o, method)) continue;
+        progress(b, problem->name, method);
+        report(b, problem->name, cold_convergence(problem, (sadmm_method)method, &b->series, &plan, b->rows, &error),
+               &error);
+    }
+    problem_set_free(problem);
+}
+
+static void measure_cold(struct bench *b)
+{
+    struct sadmm_error error = {SADMM_OK, ""};
+    struct set_problem problem;
+    for (size_t k = 0; k < problem_set_count(); ++k) {
+        if (b->o->problem ? !strstr(problem_set_name(k), b->o->problem) : b->o->quick && !problem_set_quick(k))
+            continue;
+        sadmm_status status = problem_set_make(k, &problem, &error);
+        report(b, problem_set_name(k), status, &error);
+        if (status == SADMM_OK) measure_problem(b, &problem);
+    }
+    for (int k = 0; k < b->o->file_count; ++k) {
+        sadmm_status status = problem_set_load(b->o->files[k], &problem, &error);
+        report(b, b->o->files[k], status, &error);
+        if (status == SADMM_OK) measure_problem(b, &problem);
+    }
+}
+
+static void measure_scene(struct bench *b, const char *spec, double seconds, double dt)
+{
+    struct sadmm_error error = {SADMM_OK, ""};
+    struct warm_plan plan = {.scene = spec,
+                             .dt = dt,
+                             .max_seconds = b->o->max_seconds,
+                             .seconds = b->o->seconds > 0 ? b->o->seconds : seconds};
+    for (int k = 0; k < b->o->budget_count; ++k)
+        for (int method = 0; method < SADMM_METHOD_COUNT; ++method) {
+            if (!wanted_method(b->o, method)) continue;
+            plan.iterations = (int)b->o->budgets[k];
+            progress(b, spec, method);
+            report(b, spec,
+                   warm_convergence(&plan, (sadmm_method)method, &b->series, (int)b->o->device, b->rows, &error),
+                   &error);
+        }
+}
+
+static void measure_warm(struct bench *b)
+{
+    for (int k = 0; k < b->o->scene_count; ++k) measure_scene(b, b->o->scenes[k], 2, 0);
+    if (b->o->scene_count > 0) return;
+    for (size_t k = 0; k < sizeof scenes / sizeof *scenes; ++k)
+        if (!b->o->quick || scenes[k].quick) measure_scene(b, scenes[k].spec, scenes[k].seconds, scenes[k].dt);
+}
+
+static void measure_series(struct bench *b)
+{
+    if (b->o->cold) measure_cold(b);
+    if (b->o->warm) measure_warm(b);
+    FILE *out = b->rows->csv == stdout ? stderr : stdout;
+    rows_print_cold(b->rows, &b->series, out);
+    rows_print_warm(b->rows, &b->series, out);
+    fflush(out);
+}
+
+/* Not available although asked for by name: a failure. */
+static void measure_backend(struct bench *b, sadmm_backend backend, sadmm_precision precision)
+{
+    sadmm_backend_info info;
+    sadmm_backend_query(backend, &info);
+    if (!info.available[precision]) {
+        fprintf(stderr, "%s in %s: not available: %s\n", info.name, bench_precision_name(precision), info.reason);
+        if (b->o->backend == backend) b->failed = true;
+        return;
+    }
+    b->series = (struct series){.backend = backend, .precision = precision, .threads = 1};
+    bench_runs_on(backend, b->series.runs_on, sizeof b->series.runs_on);
+    for (int t = 0; t < (backend == SADMM_BACKEND_CPU ? b->o->thread_count : 1); ++t) {
+        if (backend == SADMM_BACKEND_CPU) b->series.threads = (int)b->o->threads[t];
+        measure_series(b);
+    }
+}
+
+/* ---- command line ---------------------------------------------------------------------------------------------- */
+
+static void usage(FILE *out)
+{
+    fprintf(out, "usage: subadmm-bench convergence [options]\n\n"
+                 "  --method paper|fast|both   default both\n"
+                 "  --backend ref|cpu|cuda|all all: cpu and cuda; default cpu\n"
+                 "  --precision f32|f64|both   default f64; errors are measured in double in both\n"
+                 "  --threads N[,N...]         CPU threads, default 1\n"
+                 "  --device N                 accelerator, default 0\n"
+                 "  --only cold|warm           one half of the measurements\n"
+                 "  --problem TEXT             only the cold problems with TEXT in their name\n"
+                 "  --fclib FILE.hdf5          one more cold problem; up to 16 times\n"
+                 "  --limit N                  most iterations of a cold solve, default 2000\n"
+                 "  --scene SPEC               these scenes instead of the default ones; up to 16 times\n"
+                 "  --budgets N[,N...]         iterations a step, default 5,10,20,30\n"
+                 "  --seconds S                simulated time of a scene, default 1 or 2 by scene\n"
+                 "  --max-seconds S            wall time of a scene's run, default 60\n"
+                 "  --quick                    a few small problems and one scene\n"
+                 "  --csv FILE|-               the rows as CSV\n");
+}
+
+static int bad(const char *option, const char *value, const char *allowed)
+{
+    return bench_bad_option(command, option, value, allowed);
+}
+
+/* One more of at most BENCH_LIST. */
+static bool append(const char **list, int *count, const char *text)
+{
+    if (*count == BENCH_LIST) return false;
+    list[(*count)++] = text;
+    return true;
+}
+
+static int check_scenes(const struct options *o)
+{
+    struct sadmm_scene scene;
+    struct sadmm_error error;
+    for (int k = 0; k < o->scene_count; ++k)
+        if (sadmm_scene_open(o->scenes[k], &scene, &error) != SADMM_OK) {
+            fprintf(stderr, "subadmm-bench %s: %s\n", command, error.message);
+            return 2;
+        }
+    return 0;
+}
+
+/* 0, 2 for wrong usage, -1 for --help. */
+static int parse(int argc, char **argv, struct options *o)
+{
+    static const struct option longs[] = {
+        {"method", required_argument, NULL, 'M'},
+        {"backend", required_argument, NULL, 'b'},
+        {"precision", required_argument, NULL, 'p'},
+        {"threads", required_argument, NULL, 't'},
+        {"device", required_argument, NULL, 'd'},
+        {"only", required_argument, NULL, 'o'},
+        {"problem", required_argument, NULL, 'P'},
+        {"fclib", required_argument, NULL, 'F'},
+        {"limit", required_argument, NULL, 'l'},
+        {"scene", required_argument, NULL, 'S'},
+        {"budgets", required_argument, NULL, 'k'},
+        {"seconds", required_argument, NULL, 's'},
+        {"max-seconds", required_argument, NULL, 'm'},
+        {"quick", no_argument, NULL, 'q'},
+        {"csv", required_argument, NULL, 'C'},
+        {"help", no_argument, NULL, 'h'},
+        {NULL, 0, NULL, 0},
+    };
+    sadmm_method method;
+    for (int option; (option = getopt_long(argc, argv, "h", longs, NULL)) != -1;) {
+        switch (option) {
+        case 'M':
+            if (!strcmp(optarg, "both")) o->method = -1;
+            else if (bench_parse_method(optarg, &method)) o->method = (int)method;
+            else return bad("method", optarg, "paper, fast or both");
+            break;
+        case 'b':
+            if (!bench_parse_backend(optarg, &o->backend)) return bad("backend", optarg, "ref, cpu, cuda or all");
+            break;
+        case 'p':
+            if (!bench_parse_precision(optarg, &o->precision)) return bad("precision", optarg, "f32, f64 or both");
+            break;
+        case 't':
+            if (!bench_parse_list(optarg, 1, 1024, o->threads, &o->thread_count))
+                return bad("threads", optarg, "up to 16 numbers in [1, 1024]");
+            break;
+        case 'd':
+            if (!bench_parse_number(optarg, 0, 1023, &o->device)) return bad("device", optarg, "in [0, 1023]");
+            break;
+        case 'o':
+            if (strcmp(optarg, "cold") != 0 && strcmp(optarg, "warm") != 0) return bad("only", optarg, "cold or warm");
+            o->cold = !strcmp(optarg, "cold");
+            o->warm = !o->cold;
+            break;
+        case 'P': o->problem = optarg; break;
+        case 'F':
+            if (!append(o->files, &o->file_count, optarg)) return bad("fclib", optarg, "given 16 times at most");
+            break;
+        case 'l':
+            if (!bench_parse_number(optarg, 1, 1000000, &o->limit)) return bad("limit", optarg, "in [1, 1000000]");
+            break;
+        case 'S':
+            if (!append(o->scenes, &o->scene_count, optarg)) return bad("scene", optarg, "given 16 times at most");
+            break;
+        case 'k':
+            if (!bench_parse_list(optarg, 1, 1000000, o->budgets, &o->budget_count))
+                return bad("budgets", optarg, "up to 16 numbers in [1, 1000000]");
+            break;
+        case 's':
+            if (!bench_parse_seconds(optarg, 3600, &o->seconds)) return bad("seconds", optarg, "in (0, 3600]");
+            break;
+        case 'm':
+            if (!bench_parse_seconds(optarg, 86400, &o->max_seconds))
+                return bad("max-seconds", optarg, "in (0, 86400]");
+            break;
+        case 'q': o->quick = true; break;
+        case 'C': o->csv = optarg; break;
+        case 'h': usage(stdout); return -1;
+        default: usage(stderr); return 2;
+        }
+    }
+    if (optind < argc) {
+        fprintf(stderr, "subadmm-bench %s: unexpected argument \"%s\"\n", command, argv[optind]);
+        return 2;
+    }
+    return check_scenes(o);
+}
+
+int bench_convergence(int argc, char **argv)
+{
+    struct options o = {
+        .backend = SADMM_BACKEND_CPU,
+        .precision = SADMM_F64,
+        .method = -1,
+        .threads = {1},
+        .thread_count = 1,
+        .budgets = {5, 10, 20, 30},
+        .budget_count = 4,
+        .limit = 2000,
+        .max_seconds = 60,
+        .cold = true,
+        .warm = true,
+    };
+    static const sadmm_backend order[] = {SADMM_BACKEND_REF, SADMM_BACKEND_CPU, SADMM_BACKEND_CUDA};
+    int status = parse(argc, argv, &o);
+    if (status) return status < 0 ? 0 : status;
+    struct rows rows = {0};
+    struct bench b = {.o = &o, .rows = &rows};
+    bool to_stdout = o.csv && !strcmp(o.csv, "-");
+    if (o.csv && !(rows.csv = to_stdout ? stdout : fopen(o.csv, "w"))) {
+        fprintf(stderr, "subadmm-bench %s: cannot write %s: %s\n", command, o.csv, strerror(errno));
+        return 1;
+    }
+    if (rows.csv) rows_write_header(rows.csv);
+    for (int precision = SADMM_F32; precision <= SADMM_F64; ++precision) {
+        if (o.precision >= 0 && o.precision != precision) continue;
+        for (size_t k = 0; k < sizeof order / sizeof *order; ++k)
+            if (o.backend == SADMM_BACKEND_AUTO ? order[k] != SADMM_BACKEND_REF : order[k] == o.backend)
+                measure_backend(&b, order[k], (sadmm_precision)precision);
+    }
+    bool written = !rows.csv || !ferror(rows.csv);
+    if (rows.csv && !to_stdout && fclose(rows.csv)) written = false;
+    if (!written) fprintf(stderr, "subadmm-bench %s: cannot write %s\n", command, o.csv);
+    rows_free(&rows);
+    return b.failed || !written ? 1 : 0;
+}
