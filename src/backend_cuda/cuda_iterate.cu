@@ -5,8 +5,7 @@
 
 /* Iterations in the graph: enough to hide the launch of one graph behind the run of the one before. */
 enum { GRAPH_ITERATIONS = 16 };
-/* From so many bodies on a thread takes a whole one: 10^6 take 110 us instead of 152, but 10^5 some 2.5 us more. */
-enum { MANY_BODIES = 300000, BODY_THREADS = 128 };
+enum { BODY_THREADS = 128 };
 
 /* ---- kernels -------------------------------------------------------------------------------------------------- */
 
@@ -18,44 +17,35 @@ static __device__ __forceinline__ int32_t thread_index(const cuda_args &args)
     return (int32_t)(block * (unsigned)THREADS + threadIdx.x);
 }
 
-/* Step 1, eight lanes a body: the shortest chain for what does not fill the device many times over. */
-template <bool JOIN> static __global__ void bodies_kernel(const __grid_constant__ cuda_view v,
-                                                          const __grid_constant__ cuda_args args)
+template <int COUNT> static __device__ __forceinline__ void unpack(real (&to)[4 * COUNT], const real4 (&four)[COUNT])
 {
-    int32_t i = thread_index(args) / LANES, r = (int32_t)threadIdx.x % LANES;
-    bool live = i < live_bodies(v), mine = live && r < 6;
-    size_t at = live ? (size_t)v.body_of[i] : 0;
-    body_lane body = load_body(live, r, v.lines + at * (size_t)v.line, v.rigid, v.b + at * ROW, v.state + at * ROW);
-    real g = free_momentum(body);
-    const real ratio = JOIN && args.rescaled ? (real)*v.ratio : (real)1;
-    if (mine) {
-        const int32_t slot = record_slot(r), end = v.offsets[i + 1];
-#pragma unroll 4
-        for (int32_t h = v.offsets[i]; h < end; ++h) {
-            size_t from = (size_t)h * ROW + (size_t)slot;
-            g += JOIN ? v.records[from] + ratio * v.change[from] : v.records[from];
-        }
-    }
-    move_body(&body, g);
-    if (mine) v.state[at * ROW + (size_t)r] = body.v;
+#pragma unroll
+    for (int i = 0; i < COUNT; ++i)
+        to[4 * i] = four[i].x, to[4 * i + 1] = four[i].y, to[4 * i + 2] = four[i].z, to[4 * i + 3] = four[i].w;
 }
-
 template <int COUNT> static __device__ __forceinline__ void load_numbers(real (&to)[4 * COUNT], const solver_real *from)
 {
     real4 four[COUNT];
 #pragma unroll
     for (int i = 0; i < COUNT; ++i) four[i] = ((const real4 *)from)[i];
+    unpack(to, four);
+}
+template <int COUNT>
+static __device__ __forceinline__ void load_numbers_once(real (&to)[4 * COUNT], const solver_real *from)
+{
+    real4 four[COUNT];
 #pragma unroll
-    for (int i = 0; i < COUNT; ++i)
-        to[4 * i] = four[i].x, to[4 * i + 1] = four[i].y, to[4 * i + 2] = four[i].z, to[4 * i + 3] = four[i].w;
+    for (int i = 0; i < COUNT; ++i) four[i] = load_once((const real4 *)from + i);
+    unpack(to, four);
 }
 
-/* Step 1, a thread a body: all of a body's numbers lie side by side and are asked for at once, sixteen bytes at a time. Of very
- * many bodies eight lanes each spend the time on instructions that load and pass around single numbers. The sums are those
- * of free_momentum() and move_body(). */
+/* Step 1, a thread a body: all of a body's numbers lie side by side and are asked for at once, sixteen bytes at a time. (Eight
+ * lanes a body, as in the resident tiers, where latency counts, spend the time on instructions that load and pass around
+ * single numbers.) What is read once makes room in the caches for states and records. The sums are those of
+ * free_momentum() and move_body(). */
 template <bool JOIN, bool RIGID>
 static __global__ void __launch_bounds__(BODY_THREADS)
-    many_bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+    bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     enum { LINE = RIGID ? LINE_RIGID : LINE_GENERAL };
     const unsigned block = args.backward ? gridDim.x - 1 - blockIdx.x : blockIdx.x;
@@ -64,8 +54,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const size_t at = args.in_order ? (size_t)i : (size_t)v.body_of[i];
     const real ratio = JOIN && args.rescaled ? (real)*v.ratio : (real)1;
     real line[LINE], b[ROW], state[ROW], g[6];
-    load_numbers<LINE / 4>(line, v.lines + at * LINE);
-    load_numbers<ROW / 4>(b, v.b + at * ROW);
+    load_numbers_once<LINE / 4>(line, v.lines + at * LINE);
+    load_numbers_once<ROW / 4>(b, v.b + at * ROW);
     load_numbers<ROW / 4>(state, v.state + at * ROW);
 #pragma unroll
     for (int r = 0; r < 6; ++r) {
@@ -308,20 +298,16 @@ static __global__ void dual_kernel(const __grid_constant__ cuda_view v, const __
 
 /* ---- launches ------------------------------------------------------------------------------------------------- */
 
-static sadmm_status launch_bodies(struct sadmm_context *c, bool join, bool many, struct sadmm_error *error)
+static sadmm_status launch_bodies(struct sadmm_context *c, bool join, struct sadmm_error *error)
 {
-    const int64_t bodies = c->view.bodies;
     cuda_args args = {};
     args.rescaled = c->rescaled;
     args.backward = c->backward;
     args.in_order = c->partition.tier == SADMM_CUDA_TIER_GRID || c->partition.tier == SADMM_CUDA_TIER_STREAM;
-    if (!many)
-        return CUDA(launch)(c, join ? bodies_kernel<true> : bodies_kernel<false>, "update_velocity",
-                            blocks_for(bodies * LANES), &args, error);
-    cuda_kernel kernel = c->view.rigid ? (join ? many_bodies_kernel<true, true> : many_bodies_kernel<false, true>)
-                                       : (join ? many_bodies_kernel<true, false> : many_bodies_kernel<false, false>);
-    return CUDA(launch_of)(c, kernel, "update_velocity", (bodies + BODY_THREADS - 1) / BODY_THREADS, BODY_THREADS, &args,
-                           error);
+    cuda_kernel kernel = c->view.rigid ? (join ? bodies_kernel<true, true> : bodies_kernel<false, true>)
+                                       : (join ? bodies_kernel<true, false> : bodies_kernel<false, false>);
+    const int64_t blocks = ((int64_t)c->view.bodies + BODY_THREADS - 1) / BODY_THREADS;
+    return CUDA(launch_of)(c, kernel, "update_velocity", blocks, BODY_THREADS, &args, error);
 }
 
 static int64_t constraint_blocks(const cuda_view *v)
@@ -378,7 +364,7 @@ extern "C" sadmm_status CUDA(update_velocity)(struct sadmm_context *c, struct sa
 {
     CUDA_ENTER(c);
     CUDA_TRY(CUDA(prepare_stepwise)(c, error));
-    CUDA_TRY(launch_bodies(c, c->measured, true, error));
+    CUDA_TRY(launch_bodies(c, c->measured, error));
     c->measured = false;
     c->rescaled = false;
     return SADMM_OK;
@@ -399,7 +385,7 @@ extern "C" sadmm_status CUDA(update_constraints)(struct sadmm_context *c, bool m
 static sadmm_status plain_iterations(struct sadmm_context *c, int count, struct sadmm_error *error)
 {
     for (int i = 0; i < count; ++i) {
-        CUDA_TRY(launch_bodies(c, false, c->view.bodies >= MANY_BODIES, error));
+        CUDA_TRY(launch_bodies(c, false, error));
         CUDA_TRY(launch_constraints(c, false, error));
     }
     return SADMM_OK;
@@ -438,7 +424,7 @@ static sadmm_status stream_iterations(struct sadmm_context *c, int count, bool m
 {
     CUDA_TRY(CUDA(prepare_stepwise)(c, error));
     if (c->measured) {
-        CUDA_TRY(launch_bodies(c, true, c->view.bodies >= MANY_BODIES, error));
+        CUDA_TRY(launch_bodies(c, true, error));
         CUDA_TRY(launch_constraints(c, measure && count == 1, error));
         --count;
     }
@@ -448,7 +434,7 @@ static sadmm_status stream_iterations(struct sadmm_context *c, int count, bool m
         CUDA_CALL(c, cudaGraphLaunch(c->graph, c->stream), "cudaGraphLaunch");
     CUDA_TRY(plain_iterations(c, plain, error));
     if (count > plain) {
-        CUDA_TRY(launch_bodies(c, false, c->view.bodies >= MANY_BODIES, error));
+        CUDA_TRY(launch_bodies(c, false, error));
         CUDA_TRY(launch_constraints(c, true, error));
     }
     return SADMM_OK;

@@ -82,13 +82,13 @@ static __device__ bool finish_body(const cuda_view &v, int32_t i)
     return finite_numbers(next.position, 3) && finite_numbers(next.orientation, 4) && finite_numbers(next.velocity, 6);
 }
 
-/* Impulses of a pair into its points; *depth: the deepest of them. */
-static __device__ bool finish_pair(const cuda_view &v, int32_t p, double *depth)
+/* Impulses of a pair into its points, every v.lanes-th of them from `lane` on; *depth: the deepest. */
+static __device__ bool finish_pair(const cuda_view &v, int32_t p, int32_t lane, double *depth)
 {
     const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
     const vec3 normal = v3_load(pair->normal);
     bool finite = true;
-    for (int32_t k = 0; k < pair->count; ++k) {
+    for (int32_t k = lane; k < pair->count; k += v.lanes) {
         struct sadmm_contact_point *point = &v.step.points[pair->first + k];
         double *start = v.step.start_impulse + 3 * (size_t)(pair->first + k), impulse[3];
         v3_store(point_impulse(v, p, k, normal), impulse);
@@ -102,7 +102,7 @@ static __device__ bool finish_pair(const cuda_view &v, int32_t p, double *depth)
     return finite;
 }
 
-/* Threads for bodies, eight lanes a wrench, threads for pairs: side by side, each of them long. */
+/* Threads for bodies, eight lanes a wrench, threads for points: side by side, each of them long. */
 struct finish_ranges {
     int32_t wrenches, pairs, end;
 };
@@ -111,7 +111,7 @@ static __host__ __device__ inline finish_ranges ranges_of(const cuda_view &v)
     finish_ranges r;
     r.wrenches = (v.bodies + WARP - 1) / WARP * WARP;
     r.pairs = r.wrenches + (v.settings.recover_wrenches ? (LANES * v.bodies + WARP - 1) / WARP * WARP : 0);
-    r.end = r.pairs + v.pair_room;
+    r.end = r.pairs + v.lanes * v.pair_room;
     return r;
 }
 
@@ -132,10 +132,11 @@ static __global__ void __launch_bounds__(STEP_THREADS)
         double wrench[6];
         contact_wrench(v, live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0, lane, wrench);
         if (live) store_wrench(wrench, lane, v.step.wrench + 6 * (size_t)v.body_of[slot]);
-    } else if (i - range.pairs < live_pairs(v)) {
-        const struct sadmm_contact_pair *pair = &v.raw_pairs[i - range.pairs];
+    } else if ((i - range.pairs) / v.lanes < live_pairs(v)) {
+        const int32_t p = (i - range.pairs) / v.lanes;
+        const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
         /* bodies are named first: all of them are below any contact's */
-        if (!finish_pair(v, i - range.pairs, &depth))
+        if (!finish_pair(v, p, (i - range.pairs) % v.lanes, &depth))
             atomicMin(&control->culprit, v.bodies + (pair->body_b >= 0 ? pair->body_b : pair->body_a));
     }
     /* -0 is no depth; a larger one may be there already */
