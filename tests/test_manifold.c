@@ -356,6 +356,31 @@ START_TEST(nearly_parallel_edges_touch_along_a_line)
 }
 END_TEST
 
+/* A card leans with its upper edge just below and beside the end of a lying one: both ends of the line that they have in
+ * common, whichever way the last bit turns. (Half the contacts of a card house begin like that.) */
+START_TEST(edges_side_by_side_touch_at_both_ends)
+{
+    const double tilts[] = {0, 1e-15, -1e-15, 1e-9, -1e-9}, half = 0.03, lean = 0.2923;
+    for (size_t k = 0; k < sizeof tilts / sizeof *tilts; ++k) {
+        struct solid lying = box_at(half, 0.05, 0.0005, 0, 0, 0), leaning = box_at(0.0005, half, 0.05, 0, 0, 0);
+        double up[3] = {-0.0005, 0, 0.05}, corner[3], aside = 1.3e-4, below = 3e-4;
+        turn(&leaning, 0, 1, 0, -lean);
+        apply(leaning.R, up, corner);
+        leaning.x[0] = half + aside - corner[0];
+        leaning.x[2] = -0.0005 - below - corner[2];
+        turn(&leaning, 1, 0, 0, tilts[k]);
+        struct world_manifold m = touch(&lying, &leaning, 4e-4, 0);
+        ck_assert_int_eq(m.count, 2);
+        for (int i = 0; i < 2; ++i) {
+            ck_assert_double_eq_tol(fabs(m.position[i][1]), half, 1e-9);
+            ck_assert_double_eq_tol(m.separation[i], hypot(aside, below), 1e-9); /* turned by 1e-9 on 0.03 m */
+        }
+        ck_assert_double_lt(m.position[0][1] * m.position[1][1], 0);
+        ck_assert_uint_ne(m.feature[0], m.feature[1]);
+    }
+}
+END_TEST
+
 /* Boxes apart with corners nearest: the closest points, along the shortest way. */
 START_TEST(corners_apart_meet_by_their_closest_points)
 {
@@ -907,6 +932,7 @@ int main(void)
     tcase_add_test(boxes, crossing_ridges);
     tcase_add_test(boxes, nearly_parallel_edges_touch_along_a_line);
     tcase_add_test(boxes, corners_apart_meet_by_their_closest_points);
+    tcase_add_test(boxes, edges_side_by_side_touch_at_both_ends);
     tcase_add_test(boxes, swapping_the_two_solids_reverses_the_normal);
     tcase_add_test(boxes, a_rigid_motion_carries_the_manifold_along);
     tcase_add_test(boxes, ids_do_not_depend_on_the_reference);

@@ -219,7 +219,7 @@ SADMM_INLINE void manifold_capsule_box_inside(real radius, real half, vec3 h, ve
 SADMM_INLINE void manifold_segment_outside(real radius, real half, vec3 h, vec3 p, vec3 u, vec3 x, vec3 q, real length,
                                            real flat, real limit, uint32_t first_feature, struct manifold *m)
 {
-    real pa[3], ua[3], ha[3], na[3], closest = length - radius, first = -half, last = half, best_end = (real)1e30;
+    real pa[3], ua[3], ha[3], na[3], xa[3], closest = length - radius, first = -half, last = half, best_end = (real)1e30;
     bool stretch = true;
     int k, e, main_axis = 0;
 
@@ -228,14 +228,16 @@ SADMM_INLINE void manifold_segment_outside(real radius, real half, vec3 h, vec3 
     v3_to_array(u, ua);
     v3_to_array(h, ha);
     v3_to_array(m->normal, na);
+    v3_to_array(x, xa);
     for (k = 1; k < 3; ++k)
         if (real_abs(na[k]) > real_abs(na[main_axis])) main_axis = k;
     m->cache = (uint32_t)(1 + 2 * main_axis + (na[main_axis] > 0));
 
-    /* The slabs in which the closest point lies bound the stretch; its ends count where the box is found in nearly the
-     * same direction. */
+    /* The slabs in which the closest point lies bound the stretch (one beside the box has an edge of it for company all
+     * along); its ends count where the box is found in nearly the same direction. */
     for (k = 0; k < 3; ++k)
-        if (na[k] * na[k] < 1 - MANIFOLD_COS_NEAR * MANIFOLD_COS_NEAR && k != main_axis)
+        if (na[k] * na[k] < 1 - MANIFOLD_COS_NEAR * MANIFOLD_COS_NEAR && k != main_axis &&
+            real_abs(xa[k]) <= ha[k] * (1 + MANIFOLD_SNAP))
             stretch = stretch && segment_slab(pa[k], ua[k], ha[k], &first, &last);
     if (stretch && last - first > MANIFOLD_SNAP * half) {
         for (e = 0; e < 2; ++e) {
