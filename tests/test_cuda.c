@@ -13,7 +13,7 @@
 #include <string.h>
 
 #include "contact_problems.h"
-#include "core/backends.h"
+#include "cuda_suite.h"
 #include "core/schedule.h"
 
 #ifdef CUDA_EMULATED
@@ -37,7 +37,6 @@
 #undef CUDA
 
 static const struct sadmm_kernels *tables[2]; /* by precision */
-static const char *const precision_names[] = {"f32", "f64"};
 
 static const struct sadmm_kernels *literal(void)
 {
@@ -768,39 +767,22 @@ END_TEST
 /* Under sanitizers, on the emulated device, which is slow there: one precision, and some of the scenes. */
 int main(void)
 {
-    const int parts = getenv("SADMM_TEST_SHORT") ? 1 : 2;
-#ifdef CUDA_EMULATED
-    for (int p = 0; p < 2; ++p) tables[p] = &cuda_emulation_tables[p];
-#else
-    const char *reason = "";
-    for (int p = 0; p < 2; ++p) {
-        tables[p] = sadmm_cuda_find((sadmm_precision)p, &reason);
-        if (!tables[p]) {
-            printf("skipped: %s: %s\n", precision_names[p], reason);
-            return 77;
-        }
-    }
-    printf("on %s\n", reason);
-#endif
+    if (!find_cuda_tables(tables)) return TEST_SKIPPED;
+    const int parts = tested_precisions();
     Suite *suite = suite_create("cuda");
-    TCase *tests = tcase_create("cuda");
-    tcase_set_timeout(tests, 300);
-    tcase_add_loop_test(tests, entries_equal_literal, 0, parts * SCENES);
-    tcase_add_loop_test(tests, tiers_equal_stepwise, 0, parts == 2 ? 2 * SCENES : SCENES / 3);
-    tcase_add_loop_test(tests, cluster_sizes, 0, parts);
-    tcase_add_loop_test(tests, tiers_chosen, 0, parts);
-    tcase_add_loop_test(tests, halted_does_nothing, 0, 4);
-    tcase_add_loop_test(tests, runs_repeat, 0, parts);
-    tcase_add_loop_test(tests, contexts_side_by_side, 0, parts);
-    tcase_add_loop_test(tests, no_such_device, 0, parts);
+    for (int p = 0; p < parts; ++p) {
+        add_case(suite, p ? "entries_f64" : "entries_f32", entries_equal_literal, p * SCENES, (p + 1) * SCENES);
+        add_case(suite, p ? "tiers_f64" : "tiers_f32", tiers_equal_stepwise, p * SCENES,
+                 p * SCENES + (parts == 2 ? SCENES : SCENES / 3));
+    }
+    ADD_CASE(suite, cluster_sizes, 0, parts);
+    ADD_CASE(suite, tiers_chosen, 0, parts);
+    ADD_CASE(suite, halted_does_nothing, 0, 4);
+    ADD_CASE(suite, runs_repeat, 0, parts);
+    ADD_CASE(suite, contexts_side_by_side, 0, parts);
+    ADD_CASE(suite, no_such_device, 0, parts);
 #ifdef CUDA_EMULATED
-    tcase_add_loop_test(tests, calls_that_fail, 0, parts);
+    ADD_CASE(suite, calls_that_fail, 0, parts);
 #endif
-    suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_set_fork_status(runner, CK_NOFORK); /* a driver that was started does not survive a fork */
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+    return run_cuda_suite(suite);
 }

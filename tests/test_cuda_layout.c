@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "contact_problems.h"
-#include "core/backends.h"
+#include "cuda_suite.h"
 
 #ifdef CUDA_EMULATED
 #include "emulation_control.h"
@@ -565,31 +565,11 @@ END_TEST
 
 int main(void)
 {
-#ifdef CUDA_EMULATED
-    for (int p = 0; p < 2; ++p) tables[p] = &cuda_emulation_tables[p];
-#else
-    const char *reason = "";
-    for (int p = 0; p < 2; ++p) {
-        tables[p] = sadmm_cuda_find((sadmm_precision)p, &reason);
-        if (!tables[p]) {
-            printf("skipped: %s\n", reason);
-            return 77;
-        }
-    }
-    printf("on %s\n", reason);
-#endif
+    if (!find_cuda_tables(tables)) return TEST_SKIPPED;
     Suite *suite = suite_create("cuda_layout");
-    TCase *tests = tcase_create("cuda_layout");
-    tcase_set_timeout(tests, 300);
-    tcase_add_loop_test(tests, equals_host, 0, 2);
-    tcase_add_loop_test(tests, too_large_parts_halt, 0, 2);
-    tcase_add_loop_test(tests, halted_does_nothing, 0, 2);
-    tcase_add_loop_test(tests, partitions_refused, 0, 2);
-    suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_set_fork_status(runner, CK_NOFORK); /* a driver that was started does not survive a fork */
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+    ADD_CASE(suite, equals_host, 0, 2);
+    ADD_CASE(suite, too_large_parts_halt, 0, 2);
+    ADD_CASE(suite, halted_does_nothing, 0, 2);
+    ADD_CASE(suite, partitions_refused, 0, 2);
+    return run_cuda_suite(suite);
 }

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/backends.h"
+#include "cuda_suite.h"
 #include "core/memory.h"
 #include "core/world_internal.h"
 #include "scene_tools.h"
@@ -451,40 +451,21 @@ END_TEST
 /* Under sanitizers, on the emulated device, which is slow there: one precision, and some of the scenes. */
 int main(void)
 {
-    const int parts = getenv("SADMM_TEST_SHORT") ? 1 : 2;
-#ifdef CUDA_EMULATED
-    for (int p = 0; p < 2; ++p) tables[p] = &cuda_emulation_tables[p];
-#else
-    const char *reason = "";
-    for (int p = 0; p < 2; ++p) {
-        tables[p] = sadmm_cuda_find((sadmm_precision)p, &reason);
-        if (!tables[p]) {
-            printf("skipped: %s: %s\n", p ? "f64" : "f32", reason);
-            return 77;
-        }
-    }
-    printf("on %s\n", reason);
-#endif
+    if (!find_cuda_tables(tables)) return TEST_SKIPPED;
+    const int parts = tested_precisions();
     Suite *suite = suite_create("cuda_step");
-    TCase *tests = tcase_create("cuda_step");
-    tcase_set_timeout(tests, 600);
-    tcase_add_loop_test(tests, resident_steps_equal_steps_by_host, 0, parts * CASES);
-    tcase_add_loop_test(tests, enqueued_steps_equal_single_steps, 0, parts);
-    tcase_add_loop_test(tests, changes_between_steps_equal_those_by_host, 0, parts);
-    tcase_add_loop_test(tests, worlds_come_and_go, 0, parts);
-    tcase_add_loop_test(tests, readings_of_a_resident_step, 0, parts);
-    tcase_add_loop_test(tests, a_step_that_fails_leaves_the_world_before_it, 0, parts);
-    tcase_add_loop_test(tests, tiers_agree, 0, parts);
-    tcase_add_test(tests, worlds_side_by_side);
-    tcase_add_loop_test(tests, lack_of_memory, 0, parts);
+    for (int p = 0; p < parts; ++p)
+        add_case(suite, p ? "resident_f64" : "resident_f32", resident_steps_equal_steps_by_host, p * CASES, (p + 1) * CASES);
+    ADD_CASE(suite, enqueued_steps_equal_single_steps, 0, parts);
+    ADD_CASE(suite, changes_between_steps_equal_those_by_host, 0, parts);
+    ADD_CASE(suite, worlds_come_and_go, 0, parts);
+    ADD_CASE(suite, readings_of_a_resident_step, 0, parts);
+    ADD_CASE(suite, a_step_that_fails_leaves_the_world_before_it, 0, parts);
+    ADD_CASE(suite, tiers_agree, 0, parts);
+    ADD_CASE(suite, worlds_side_by_side, 0, 1);
+    ADD_CASE(suite, lack_of_memory, 0, parts);
 #ifdef CUDA_EMULATED
-    tcase_add_loop_test(tests, calls_that_fail, 0, parts);
+    ADD_CASE(suite, calls_that_fail, 0, parts);
 #endif
-    suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_set_fork_status(runner, CK_NOFORK); /* a driver that was started does not survive a fork */
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+    return run_cuda_suite(suite);
 }
