@@ -37,7 +37,7 @@ SADMM_INLINE double weight_mass(double load, double speed, double mass)
     return fmin(load / speed, mass);
 }
 
-/* The level of an island under contacts, a factor of its weights, from the fifth refresh on:
+/* The level of an island under contacts, a factor of its weights, from the sixth refresh on:
  *
  *     q^2 = sum w |lambda - Pi_C(lambda - (x + e n)/w)|^2 / sum r . A^-1 r,      r = A v - b - J^T lambda
  *
@@ -45,7 +45,7 @@ SADMM_INLINE double weight_mass(double load, double speed, double mass)
  * (masses that differ by decades, in no order) the weights are too large. Where nothing but the contacts is left, impulses
  * move at constant speed along directions that no body feels; then the island stalls, and keeps the weights it has, times
  * what the level rises by: new ones would be felt. */
-enum { WEIGHT_FIRST_LEVEL = 5 };
+enum { WEIGHT_FIRST_LEVEL = 6 };
 #define WEIGHT_LAGS (1 / 3.0)
 #define WEIGHT_STALLS 30.0
 #define WEIGHT_LEVEL_POWER 0.3
