@@ -51,7 +51,7 @@ enum { WEIGHT_FIRST_LEVEL = 6 };
 #define WEIGHT_LEVEL_POWER 0.3
 #define WEIGHT_LEVEL_STEP 4.0
 #define WEIGHT_LEVEL_LEAST 0.1
-#define WEIGHT_LEVEL_MOST 10.0
+#define WEIGHT_LEVEL_MOST 5.0
 
 /* Less than this is rounding, m/s. */
 #define WEIGHT_LEVEL_ROUNDING 1e-12
