@@ -93,6 +93,9 @@ struct row_block {
 /* fast: sums over an island. */
 struct cpu_island {
     double energy, mass, speed; /* sum of g . A^-1 g, kg, V in m/s */
+    double level, scale;        /* math/weight.h; not 0: weights stay, times this */
+    double violation, defect;
+    bool blocks;                /* there are constraints by rows: the level stays 1 */
     struct limit_energies limit;
 };
 
@@ -143,8 +146,11 @@ struct sadmm_context {
     struct cpu_island *islands; /* bodies, used at labels */
     double *A_inverse;          /* bodies x PACKED6 */
     double *pair_response, *pair_weight; /* pair records: J A^-1 J^T, B in kg */
+    double *pair_violation;     /* pair records: terms of the islands' sums */
+    int refreshes;              /* of the weights, in this solve */
     double *body_sums;          /* bodies x 3: terms of the islands' sums */
-    size_t body_sum_capacity, label_capacity, island_capacity, A_inverse_capacity, pair_response_capacity, pair_weight_capacity;
+    size_t body_sum_capacity, label_capacity, island_capacity, A_inverse_capacity, pair_response_capacity, pair_weight_capacity,
+        pair_violation_capacity;
 
     double *thread_max; /* one cache line a thread */
     size_t thread_max_capacity;
@@ -194,6 +200,9 @@ sadmm_status CPU(assemble_springs)(struct sadmm_context *, struct sadmm_error *)
 sadmm_status CPU(init_penalty)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(init_weights)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(update_weights)(struct sadmm_context *, struct sadmm_error *);
+/* A thread's share of what the levels of the islands need; then the levels (cpu_levels.c). `wrenches` hold J^T lambda. */
+void CPU(add_up_imbalance)(struct sadmm_context *, int thread, int threads);
+void CPU(update_levels)(struct sadmm_context *);
 sadmm_status CPU(limit_velocity)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
 sadmm_status CPU(factorize)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(update_velocity)(struct sadmm_context *, struct sadmm_error *);

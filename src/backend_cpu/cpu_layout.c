@@ -123,7 +123,8 @@ sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *syst
                             grow(&c->body_sums, &c->body_sum_capacity, 3 * n, sizeof(double)) &&
                             grow(&c->A_inverse, &c->A_inverse_capacity, n * PACKED6, sizeof(double)) &&
                             grow(&c->pair_response, &c->pair_response_capacity, c->record_count, sizeof(double)) &&
-                            grow(&c->pair_weight, &c->pair_weight_capacity, c->record_count, sizeof(double)))) &&
+                            grow(&c->pair_weight, &c->pair_weight_capacity, c->record_count, sizeof(double)) &&
+                            grow(&c->pair_violation, &c->pair_violation_capacity, c->record_count, sizeof(double)))) &&
               grow(&c->thread_max, &c->thread_max_capacity, (size_t)plan->threads * THREAD_MAX_STRIDE, sizeof(double));
     if (!ok) return sadmm_fail_memory(error, "the cpu backend's step");
     order_pairs(c);

@@ -8,28 +8,11 @@ static double rigid_form(const double M[PACKED6], const double x[6])
            M[20] * x[5] * x[5] + 2 * (M[13] * x[3] * x[4] + M[18] * x[3] * x[5] + M[19] * x[4] * x[5]);
 }
 
-static void load_b(const struct sadmm_context *c, size_t i, double b[6])
-{
-    if (!c->rigid_bodies) {
-        for (int k = 0; k < 6; ++k) b[k] = (double)c->b[i * ROW + (size_t)k];
-        return;
-    }
-    const struct body_block *block = &c->body_blocks[i / (size_t)LANES];
-    size_t l = i % (size_t)LANES;
-    b[0] = (double)block->b_linear.x[l], b[1] = (double)block->b_linear.y[l], b[2] = (double)block->b_linear.z[l];
-    b[3] = (double)block->b_angular.x[l], b[4] = (double)block->b_angular.y[l], b[5] = (double)block->b_angular.z[l];
-}
-
-static void load_v(const struct sadmm_context *c, size_t i, double v[6])
-{
-    for (int k = 0; k < 6; ++k) v[k] = (double)c->state[i * ROW + (size_t)k];
-}
-
 static void energies(const struct sadmm_context *c, size_t i, double *now, double *free)
 {
     double b[6], v[6];
-    load_b(c, i, b);
-    load_v(c, i, v);
+    cpu_load_b(c, i, b);
+    cpu_load_v(c, i, v);
     *now = rigid_form(&c->A[i * PACKED6], v) / 2;
     *free = rigid_form(&c->A_inverse[i * PACKED6], b) / 2;
 }
@@ -39,8 +22,8 @@ static double defect(const struct sadmm_context *c, size_t i)
 {
     const double *A = &c->A[i * PACKED6];
     double r[6], v[6];
-    load_b(c, i, r);
-    load_v(c, i, v);
+    cpu_load_b(c, i, r);
+    cpu_load_v(c, i, v);
     for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at)
         for (int k = 0; k < 6; ++k) r[k] += (double)c->wrenches[(size_t)c->incident[at] * ROW + (size_t)k];
     for (int k = 0; k < 3; ++k) r[k] -= A[0] * v[k];

@@ -62,4 +62,37 @@ static inline const struct sadmm_contact_pair *cpu_pair(const struct sadmm_conte
     return &c->system->contacts->pairs[c->pair_blocks[record / (size_t)LANES].pair[record % (size_t)LANES]];
 }
 
+/* b and v of a body. */
+static inline void cpu_load_b(const struct sadmm_context *c, size_t i, double b[6])
+{
+    if (!c->rigid_bodies) {
+        for (int k = 0; k < 6; ++k) b[k] = (double)c->b[i * ROW + (size_t)k];
+        return;
+    }
+    const struct body_block *block = &c->body_blocks[i / (size_t)LANES];
+    size_t l = i % (size_t)LANES;
+    b[0] = (double)block->b_linear.x[l], b[1] = (double)block->b_linear.y[l], b[2] = (double)block->b_linear.z[l];
+    b[3] = (double)block->b_angular.x[l], b[4] = (double)block->b_angular.y[l], b[5] = (double)block->b_angular.z[l];
+}
+
+static inline void cpu_load_v(const struct sadmm_context *c, size_t i, double v[6])
+{
+    for (int k = 0; k < 6; ++k) v[k] = (double)c->state[i * ROW + (size_t)k];
+}
+
+/* x . M x */
+static inline double packed_form(const double M[PACKED6], const double x[6])
+{
+    double sum = 0;
+    for (int r = 0, at = 0; r < 6; ++r)
+        for (int k = 0; k <= r; ++k, ++at) sum += (r == k ? 1 : 2) * M[at] * x[r] * x[k];
+    return sum;
+}
+
+static inline double cpu_body_mass(const struct sadmm_context *c, int32_t i)
+{
+    const double *A = &c->A[(size_t)i * PACKED6];
+    return (A[0] + A[2] + A[5]) / 3;
+}
+
 #endif

@@ -17,15 +17,6 @@ static double packed_dot(const double M[PACKED6], const double S[PACKED6])
     return sum;
 }
 
-/* x . M x */
-static double packed_form(const double M[PACKED6], const double x[6])
-{
-    double sum = 0;
-    for (int r = 0, at = 0; r < 6; ++r)
-        for (int k = 0; k <= r; ++k, ++at) sum += (r == k ? 1 : 2) * M[at] * x[r] * x[k];
-    return sum;
-}
-
 /* A^-1, packed. A rigid body's is inverted by blocks. */
 static void invert(bool rigid, const double A[PACKED6], double out[PACKED6])
 {
@@ -50,12 +41,6 @@ static void invert(bool rigid, const double A[PACKED6], double out[PACKED6])
         dense6_solve(L, unit, column);
         for (int r = k; r < 6; ++r) out[r * (r + 1) / 2 + k] = column[r];
     }
-}
-
-static double body_mass(const struct sadmm_context *c, int32_t i)
-{
-    const double *A = &c->A[(size_t)i * PACKED6];
-    return (A[0] + A[2] + A[5]) / 3;
 }
 
 /* Sum of J^T J over the points of a pair, on one of its bodies. */
@@ -101,7 +86,7 @@ static void block_response(const struct sadmm_context *c, struct row_block *bloc
     const int32_t bodies[2] = {block->body_a, block->body_b};
     double inverse_mass = 0;
     for (int side = 0; side < 2; ++side)
-        if (bodies[side] < c->bodies) inverse_mass += 1 / body_mass(c, bodies[side]);
+        if (bodies[side] < c->bodies) inverse_mass += 1 / cpu_body_mass(c, bodies[side]);
     for (int r = 0; r < block->rows; ++r) {
         double w = 0, push = 0, row[6];
         for (int side = 0; side < 2; ++side) {
@@ -123,8 +108,8 @@ static void add_up_islands(struct sadmm_context *c)
     for (int32_t i = 0; i < c->bodies; ++i) c->islands[i].energy = c->islands[i].mass = 0;
     for (int32_t i = 0; i < c->bodies; ++i) {
         struct cpu_island *island = &c->islands[c->label[i]];
-        island->energy += c->body_sums[i];
-        island->mass += body_mass(c, i);
+        island->energy += c->body_sums[3 * i];
+        island->mass += cpu_body_mass(c, i);
     }
     for (int32_t i = 0; i < c->bodies; ++i)
         if (c->label[i] == i) c->islands[i].speed = weight_speed(c->islands[i].energy, c->islands[i].mass);
@@ -167,9 +152,9 @@ static void weigh_pair_block(struct sadmm_context *c, size_t index)
         const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[block->pair[l]];
         const struct cpu_island *island = island_of(c, pair->body_a, pair->body_b);
         double *B = &c->pair_weight[index * (size_t)LANES + (size_t)l];
-        double load = pair_load(c, block, l, pair->count);
-        *B = weight_mass(load, island->speed, island->mass) +
-             WEIGHT_FLOOR_CONTACT / c->pair_response[index * (size_t)LANES + (size_t)l];
+        double carried = weight_mass(pair_load(c, block, l, pair->count), island->speed, island->mass);
+        *B = island->scale > 0 ? *B * island->scale
+                               : weight_of_pair(island->level, carried, c->pair_response[index * (size_t)LANES + (size_t)l]);
         block->inv_s[l] = (real)(pair->body_a >= 0 && pair->body_b >= 0 ? *B / 2 : *B);
     }
 }
@@ -246,15 +231,18 @@ static void assemble_C(struct sadmm_context *c, size_t i)
 sadmm_status CPU(update_weights)(struct sadmm_context *c, struct sadmm_error *error)
 {
     (void)error;
+    bool levels = ++c->refreshes >= WEIGHT_FIRST_LEVEL;
     CPU(sum_wrenches)(c);
     CPU_PARALLEL
     {
         int thread = cpu_thread(), threads = cpu_threads();
         size_t begin, end;
         cpu_share((size_t)c->bodies, thread, threads, &begin, &end);
-        for (size_t i = begin; i < end; ++i) c->body_sums[i] = body_energy(c, i);
+        for (size_t i = begin; i < end; ++i) c->body_sums[3 * i] = body_energy(c, i);
+        if (levels) CPU(add_up_imbalance)(c, thread, threads);
         CPU_BARRIER;
         if (thread == 0) add_up_islands(c);
+        if (thread == 0 && levels) CPU(update_levels)(c);
         CPU_BARRIER;
         cpu_share(c->pair_block_count, thread, threads, &begin, &end);
         for (size_t k = begin; k < end; ++k) weigh_pair_block(c, k);
@@ -285,6 +273,11 @@ sadmm_status CPU(init_weights)(struct sadmm_context *c, struct sadmm_error *erro
         cpu_share(c->row_block_count, thread, threads, &begin, &end);
         for (size_t k = begin; k < end; ++k) block_response(c, &c->row_blocks[k]);
     }
+    for (int32_t i = 0; i < c->bodies; ++i) {
+        c->islands[i].level = 1;
+        c->islands[i].scale = 0;
+    }
+    c->refreshes = -1; /* the first weights are none */
     c->settled = c->measured = false;
     return CPU(update_weights)(c, error);
 }

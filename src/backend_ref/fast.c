@@ -64,7 +64,7 @@ static double row_scale(const struct sadmm_context *c, const struct ref_constrai
     return push > 0 ? push : sqrt(row_response(c, constraint, r) / inverse_mass);
 }
 
-static const struct ref_body *island_of(const struct sadmm_context *c, const struct ref_constraint *constraint)
+static struct ref_body *island_of(const struct sadmm_context *c, const struct ref_constraint *constraint)
 {
     int32_t body = constraint->side[0].body >= 0 ? constraint->side[0].body : constraint->side[1].body;
     return &c->bodies[c->bodies[body].label];
@@ -94,22 +94,101 @@ static void add_up_islands(struct sadmm_context *c)
     }
 }
 
+/* A v - b - sum J^T multiplier, by body, into `impulse`. */
+static void momentum_defect(struct sadmm_context *c, bool seen)
+{
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        struct ref_body *body = &c->bodies[i];
+        dense6_mul(body->A, body->v, body->impulse);
+        for (int j = 0; j < 6; ++j) body->impulse[j] -= body->b[j];
+    }
+    for (size_t k = 0; k < c->constraint_count; ++k) {
+        const struct ref_constraint *constraint = &c->constraints[k];
+        const double *multiplier = seen ? constraint->seen : constraint->lambda;
+        for (int s = 0; s < 2; ++s) {
+            const struct ref_side *side = &constraint->side[s];
+            if (side->body < 0) continue;
+            for (int r = 0; r < constraint->rows; ++r)
+                for (int j = 0; j < 6; ++j) c->bodies[side->body].impulse[j] -= side->J[6 * r + j] * multiplier[r];
+        }
+    }
+}
+
+/* x + e of every row. */
+static void slip(const struct sadmm_context *c, const struct ref_constraint *constraint, double u[6])
+{
+    for (int r = 0; r < constraint->rows; ++r) u[r] = constraint->e[r];
+    for (int s = 0; s < 2; ++s) {
+        const struct ref_side *side = &constraint->side[s];
+        if (side->body < 0) continue;
+        for (int r = 0; r < constraint->rows; ++r) u[r] += dense6_dot(side->J + 6 * r, c->bodies[side->body].v);
+    }
+}
+
+/* Mean response of a pair's rows. */
+static double pair_response(const struct sadmm_context *c, const struct sadmm_contact_pair *pair)
+{
+    double w = 0;
+    for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
+        for (int r = 0; r < c->constraints[k].rows; ++r)
+            w += row_response(c, &c->constraints[k], r) / c->constraints[k].rows;
+    return w / pair->count;
+}
+
+/* sum w |lambda - Pi_C(lambda - (x + e n)/w)|^2 over the points of a pair. */
+static double pair_violation(const struct sadmm_context *c, const struct sadmm_contact_pair *pair)
+{
+    double w = pair_response(c, pair), sum = 0;
+    for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
+        const struct ref_constraint *constraint = &c->constraints[k];
+        double u[6], candidate[3] = {0, 0, 0}, projected[3];
+        slip(c, constraint, u);
+        for (int r = 0; r < constraint->rows; ++r) candidate[r] = constraint->lambda[r] - u[r] / w;
+        contact_project_rows(candidate, constraint->mu, projected);
+        for (int r = 0; r < constraint->rows; ++r)
+            sum += w * (constraint->lambda[r] - projected[r]) * (constraint->lambda[r] - projected[r]);
+    }
+    return sum;
+}
+
+static void update_levels(struct sadmm_context *c)
+{
+    const struct sadmm_contact_set *contacts = c->system->contacts;
+    momentum_defect(c, false);
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        c->bodies[i].island_violation = c->bodies[i].island_defect = 0;
+        c->bodies[i].blocks = false;
+    }
+    for (int32_t i = 0; i < c->system->body_count; ++i)
+        c->bodies[c->bodies[i].label].island_defect += inverse_form(&c->bodies[i], c->bodies[i].impulse);
+    for (size_t p = 0; p < contacts->pair_count; ++p)
+        island_of(c, &c->constraints[contacts->pairs[p].first])->island_violation += pair_violation(c, &contacts->pairs[p]);
+    for (size_t k = contacts->point_count; k < c->constraint_count; ++k) island_of(c, &c->constraints[k])->blocks = true;
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        struct ref_body *island = &c->bodies[i];
+        if (island->label != i || island->blocks) continue;
+        double balance = weight_balance(island->island_violation, island->island_defect, island->island_mass);
+        double level = weight_next_level(island->level, balance);
+        island->scale = weight_stalls(balance) ? level / island->level : 0;
+        island->level = level;
+    }
+}
+
 /* The points of a pair share one weight: mean load, mean response. */
 static void weigh_pair(struct sadmm_context *c, const struct sadmm_contact_pair *pair)
 {
-    double load = 0, w = 0;
+    double load = 0;
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
         const struct ref_constraint *constraint = &c->constraints[k];
         double lambda2 = 0;
-        for (int r = 0; r < constraint->rows; ++r) {
-            lambda2 += constraint->lambda[r] * constraint->lambda[r];
-            w += row_response(c, constraint, r) / constraint->rows;
-        }
+        for (int r = 0; r < constraint->rows; ++r) lambda2 += constraint->lambda[r] * constraint->lambda[r];
         load += sqrt(lambda2);
     }
     const struct ref_body *island = island_of(c, &c->constraints[pair->first]);
     double speed = weight_speed(island->island_energy, island->island_mass);
-    double B = weight_mass(load / pair->count, speed, island->island_mass) + WEIGHT_FLOOR_CONTACT / (w / pair->count);
+    double carried = weight_mass(load / pair->count, speed, island->island_mass);
+    double B = island->scale > 0 ? c->constraints[pair->first].B[0] * island->scale
+                                 : weight_of_pair(island->level, carried, pair_response(c, pair));
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
         struct ref_constraint *constraint = &c->constraints[k];
         memset(constraint->B, 0, sizeof constraint->B);
@@ -161,6 +240,7 @@ sadmm_status sadmm_ref_update_weights(struct sadmm_context *c, struct sadmm_erro
     (void)error;
     size_t points = c->system->contacts->point_count;
     add_up_islands(c);
+    if (++c->refreshes >= WEIGHT_FIRST_LEVEL) update_levels(c);
     for (size_t p = 0; p < c->system->contacts->pair_count; ++p) weigh_pair(c, &c->system->contacts->pairs[p]);
     for (size_t k = points; k < c->constraint_count; ++k) weigh_block(c, &c->constraints[k]);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
@@ -179,28 +259,13 @@ sadmm_status sadmm_ref_update_weights(struct sadmm_context *c, struct sadmm_erro
 sadmm_status sadmm_ref_init_weights(struct sadmm_context *c, struct sadmm_error *error)
 {
     label_islands(c);
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        c->bodies[i].level = 1;
+        c->bodies[i].scale = 0;
+    }
+    c->refreshes = -1; /* the first weights are none */
     c->settled = false;
     return sadmm_ref_update_weights(c, error);
-}
-
-/* A v - b - sum J^T multiplier, by body, into `impulse`. */
-static void momentum_defect(struct sadmm_context *c, bool seen)
-{
-    for (int32_t i = 0; i < c->system->body_count; ++i) {
-        struct ref_body *body = &c->bodies[i];
-        dense6_mul(body->A, body->v, body->impulse);
-        for (int j = 0; j < 6; ++j) body->impulse[j] -= body->b[j];
-    }
-    for (size_t k = 0; k < c->constraint_count; ++k) {
-        const struct ref_constraint *constraint = &c->constraints[k];
-        const double *multiplier = seen ? constraint->seen : constraint->lambda;
-        for (int s = 0; s < 2; ++s) {
-            const struct ref_side *side = &constraint->side[s];
-            if (side->body < 0) continue;
-            for (int r = 0; r < constraint->rows; ++r)
-                for (int j = 0; j < 6; ++j) c->bodies[side->body].impulse[j] -= side->J[6 * r + j] * multiplier[r];
-        }
-    }
 }
 
 /* v^ = v + (A + C)^-1 (b - A v + sum J^T (2 lambda^ - lambda)) */

@@ -45,6 +45,8 @@ struct ref_body {
     /* fast */
     int32_t label;                   /* the smallest body of its island; that one keeps the island's sums */
     double island_energy, island_mass;
+    double island_violation, island_defect, level, scale; /* math/weight.h; scale, if not 0: weights stay, times this */
+    bool blocks;                     /* the island has constraints that are no pair's */
     struct limit_energies limit;
     double impulse[6];               /* sums over the body's constraints */
 };
@@ -58,6 +60,7 @@ struct sadmm_context {
     struct ref_constraint *constraints; /* contact points in order, then blocks in order */
     size_t constraint_capacity, constraint_count;
     bool settled;                    /* fast: Step 1 ran */
+    int refreshes;                   /* fast: of the weights, in this solve */
     double primal;                   /* fast: of the last iteration */
 };
 

@@ -61,18 +61,18 @@ static int until(int done, int period, int limit)
     return left < limit ? left : limit;
 }
 
-/* Weights are taken anew after 5, 10, 20, 40 ... iterations. */
+/* Are weights taken anew after `done` iterations? */
 static bool is_refresh(int done)
 {
     int at = WEIGHT_FIRST_REFRESH;
-    while (at < done && at <= INT_MAX / 2) at *= 2;
+    while (at < done && at <= INT_MAX / 2) at = weight_next_refresh(at);
     return at == done;
 }
 
 static int until_refresh(int done, int limit)
 {
     int at = WEIGHT_FIRST_REFRESH;
-    while (at <= done && at <= INT_MAX / 2) at *= 2;
+    while (at <= done && at <= INT_MAX / 2) at = weight_next_refresh(at);
     return at > done && at - done < limit ? at - done : limit;
 }
 

@@ -12,8 +12,10 @@
 #include "real.h"
 
 /* Iterations after which a step that started cold takes its weights anew, from the loads it has found by then: 5, 10, 20,
- * 40, ... Changes as late as that are small, and a change disturbs. */
-enum { WEIGHT_FIRST_REFRESH = 5 };
+ * 40, and from there always half as many again. Changes as late as that are small, and a change disturbs. */
+enum { WEIGHT_FIRST_REFRESH = 5, WEIGHT_DOUBLE_BELOW = 40 };
+
+SADMM_INLINE int weight_next_refresh(int at) { return at < WEIGHT_DOUBLE_BELOW ? 2 * at : at + at / 2; }
 
 /* phi. Contacts: loads that have not been found yet are the ones to come. Joints and springs hold in all directions, loaded or
  * not. */
@@ -33,6 +35,47 @@ SADMM_INLINE double weight_speed(double energy, double mass)
 SADMM_INLINE double weight_mass(double load, double speed, double mass)
 {
     return fmin(load / speed, mass);
+}
+
+/* The level of an island under contacts, a factor of its weights, from the sixth refresh on:
+ *
+ *     q^2 = sum w |lambda - Pi_C(lambda - (x + e n)/w)|^2 / sum r . A^-1 r,      r = A v - b - J^T lambda
+ *
+ * what the contacts miss over what the momentum misses, both energies in J. Near 0.1 is usual. Where the momentum lags behind
+ * (masses that differ by decades, in no order) the weights are too large. Where nothing but the contacts is left, impulses
+ * move at constant speed along directions that no body feels; then the island stalls, and keeps the weights it has, times
+ * what the level rises by: new ones would be felt. */
+enum { WEIGHT_FIRST_LEVEL = 6 };
+#define WEIGHT_LAGS (1 / 3.0)
+#define WEIGHT_STALLS 30.0
+#define WEIGHT_LEVEL_POWER 0.3
+#define WEIGHT_LEVEL_STEP 4.0
+#define WEIGHT_LEVEL_LEAST 0.1
+#define WEIGHT_LEVEL_MOST 5.0
+
+/* Less than this is rounding, m/s. */
+#define WEIGHT_LEVEL_ROUNDING 1e-12
+
+/* q of an island. */
+SADMM_INLINE double weight_balance(double violation, double defect, double mass)
+{
+    double least = WEIGHT_LEVEL_ROUNDING * WEIGHT_LEVEL_ROUNDING * mass;
+    return sqrt((violation + least) / (defect + least));
+}
+
+SADMM_INLINE int weight_stalls(double balance) { return balance > WEIGHT_STALLS; }
+
+SADMM_INLINE double weight_next_level(double level, double balance)
+{
+    double off = weight_stalls(balance) ? balance / WEIGHT_STALLS : fmin(balance / WEIGHT_LAGS, 1);
+    double factor = fmin(fmax(pow(off, WEIGHT_LEVEL_POWER), 1 / WEIGHT_LEVEL_STEP), WEIGHT_LEVEL_STEP);
+    return fmin(fmax(level * factor, WEIGHT_LEVEL_LEAST), WEIGHT_LEVEL_MOST);
+}
+
+/* B of a pair, kg. phi / w does not sink with the level: it is for contacts whose load is not known. */
+SADMM_INLINE double weight_of_pair(double level, double carried, double response)
+{
+    return level * carried + fmax(level, 1) * WEIGHT_FLOOR_CONTACT / response;
 }
 
 #endif

@@ -1,0 +1,126 @@
+/* The method `fast`: levels of the islands (math/weight.h), from what contacts and momentum miss. In double; sums over an
+ * island go in the order of pairs and of bodies. */
+#include "../core/math/weight.h"
+#include "cpu_rows.h"
+
+/* w |lambda - Pi_C(lambda - (x + e n)/w)|^2 of a point; u = x + e n. */
+static double point_violation(const double lambda[3], const double u[3], const double n[3], double friction, double w)
+{
+    double y[3], normal = 0, tangential2 = 0, sum = 0;
+    for (int k = 0; k < 3; ++k) {
+        y[k] = lambda[k] - u[k] / w;
+        normal += y[k] * n[k];
+    }
+    for (int k = 0; k < 3; ++k) {
+        double t = y[k] - normal * n[k];
+        tangential2 += t * t;
+    }
+    double pushed = fmax(normal, 0), limit = friction * pushed;
+    double shrink = tangential2 > limit * limit ? limit / sqrt(tangential2) : 1;
+    for (int k = 0; k < 3; ++k) {
+        double miss = lambda[k] - pushed * n[k] - shrink * (y[k] - normal * n[k]);
+        sum += miss * miss;
+    }
+    return w * sum;
+}
+
+static void cross_add(const double w[3], const double r[3], double sign, double x[3])
+{
+    x[0] += sign * (w[1] * r[2] - w[2] * r[1]);
+    x[1] += sign * (w[2] * r[0] - w[0] * r[2]);
+    x[2] += sign * (w[0] * r[1] - w[1] * r[0]);
+}
+
+static double pair_violation(const struct sadmm_context *c, size_t record)
+{
+    const struct pair_block *block = &c->pair_blocks[record / (size_t)LANES];
+    size_t l = record % (size_t)LANES;
+    const double n[3] = {(double)block->normal.x[l], (double)block->normal.y[l], (double)block->normal.z[l]};
+    const double d[3] = {(double)block->d.x[l], (double)block->d.y[l], (double)block->d.z[l]};
+    double a[6], b[6], sum = 0;
+    cpu_load_v(c, (size_t)block->body_a[l], a);
+    cpu_load_v(c, (size_t)block->body_b[l], b);
+    for (int k = 0; k < c->system->contacts->pairs[block->pair[l]].count; ++k) {
+        double arm[3], lambda[3], error, friction = 0;
+        if (c->plan.contact_rows == 3) {
+            const struct point_slot *slot = (const struct point_slot *)c->slots + block->first + k;
+            arm[0] = (double)slot->arm.x[l], arm[1] = (double)slot->arm.y[l], arm[2] = (double)slot->arm.z[l];
+            lambda[0] = (double)slot->lambda.x[l], lambda[1] = (double)slot->lambda.y[l], lambda[2] = (double)slot->lambda.z[l];
+            error = (double)slot->error[l];
+            friction = (double)block->friction[l];
+        } else {
+            const struct normal_slot *slot = (const struct normal_slot *)c->slots + block->first + k;
+            arm[0] = (double)slot->arm.x[l], arm[1] = (double)slot->arm.y[l], arm[2] = (double)slot->arm.z[l];
+            for (int j = 0; j < 3; ++j) lambda[j] = (double)slot->lambda[l] * n[j];
+            error = (double)slot->error[l];
+        }
+        const double arm_b[3] = {arm[0] + d[0], arm[1] + d[1], arm[2] + d[2]};
+        double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+        cross_add(b + 3, arm_b, 1, u);
+        cross_add(a + 3, arm, -1, u);
+        for (int j = 0; j < 3; ++j) u[j] += error * n[j];
+        sum += point_violation(lambda, u, n, friction, c->pair_response[record]);
+    }
+    return sum;
+}
+
+/* r . A^-1 r, r = b + J^T lambda - A v */
+static double body_defect(const struct sadmm_context *c, size_t i)
+{
+    const double *A = &c->A[i * PACKED6];
+    double r[6], v[6];
+    cpu_load_b(c, i, r);
+    cpu_load_v(c, i, v);
+    for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at)
+        for (int k = 0; k < 6; ++k) r[k] += (double)c->wrenches[(size_t)c->incident[at] * ROW + (size_t)k];
+    for (int j = 0, at = 0; j < 6; ++j)
+        for (int k = 0; k <= j; ++k, ++at) {
+            r[j] -= A[at] * v[k];
+            if (k < j) r[k] -= A[at] * v[j];
+        }
+    return packed_form(&c->A_inverse[i * PACKED6], r);
+}
+
+void CPU(add_up_imbalance)(struct sadmm_context *c, int thread, int threads)
+{
+    size_t begin, end;
+    cpu_share((size_t)c->bodies, thread, threads, &begin, &end);
+    for (size_t i = begin; i < end; ++i) c->body_sums[3 * i + 1] = body_defect(c, i);
+    cpu_share(c->pair_block_count * (size_t)LANES, thread, threads, &begin, &end);
+    for (size_t k = begin; k < end; ++k)
+        if (c->pair_blocks[k / (size_t)LANES].pair[k % (size_t)LANES] >= 0) c->pair_violation[k] = pair_violation(c, k);
+}
+
+static struct cpu_island *island_of(struct sadmm_context *c, int32_t body_a, int32_t body_b)
+{
+    return &c->islands[c->label[body_a >= 0 && body_a < c->bodies ? body_a : body_b]];
+}
+
+static void add_up_islands(struct sadmm_context *c)
+{
+    for (int32_t i = 0; i < c->bodies; ++i) {
+        c->islands[i].violation = c->islands[i].defect = 0;
+        c->islands[i].blocks = false;
+    }
+    for (int32_t i = 0; i < c->bodies; ++i) c->islands[c->label[i]].defect += c->body_sums[3 * i + 1];
+    for (size_t k = 0; k < c->pair_block_count * (size_t)LANES; ++k) {
+        if (c->pair_blocks[k / (size_t)LANES].pair[k % (size_t)LANES] < 0) continue;
+        const struct sadmm_contact_pair *pair = cpu_pair(c, k);
+        island_of(c, pair->body_a, pair->body_b)->violation += c->pair_violation[k];
+    }
+    for (size_t k = 0; k < c->row_block_count; ++k)
+        island_of(c, c->row_blocks[k].body_a, c->row_blocks[k].body_b)->blocks = true;
+}
+
+void CPU(update_levels)(struct sadmm_context *c)
+{
+    add_up_islands(c);
+    for (int32_t i = 0; i < c->bodies; ++i) {
+        struct cpu_island *island = &c->islands[i];
+        if (c->label[i] != i || island->blocks) continue;
+        double balance = weight_balance(island->violation, island->defect, island->mass);
+        double level = weight_next_level(island->level, balance);
+        island->scale = weight_stalls(balance) ? level / island->level : 0;
+        island->level = level;
+    }
+}
