@@ -191,7 +191,10 @@ START_TEST(enqueued_steps_equal_single_steps)
     }
     MUST(queue, sadmm_world_wait(queue));
     expect_same_world(single, queue, "20 steps");
-    ck_assert_int_gt(queue->resident.repeats, 0); /* the first contact changes the plan */
+    sadmm_step_report report;
+    ck_assert_int_eq(sadmm_world_report(queue, &report), SADMM_OK);
+    ck_assert_int_gt(report.repeated, 0); /* the first contact changes the plan */
+    ck_assert_int_eq(report.repeated, queue->resident.repeats); /* loaded once */
     sadmm_world_destroy(single);
     sadmm_world_destroy(queue);
 }

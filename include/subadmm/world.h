@@ -160,6 +160,8 @@ typedef struct sadmm_step_report {
     bool converged;                /* a stop rule was met */
     int32_t limited;               /* method FAST: islands that ended the iterations with more kinetic energy than contacts can
                                       leave them with and were slowed down to that; not 0: too few iterations */
+    int64_t repeated;              /* steps since creation that a backend which runs ahead (CUDA) began with too little room or
+                                      another plan than they needed, and did again with more: nothing is lost but time */
     double penetration_max;        /* deepest overlap at the start of the step, m, >= 0 */
     sadmm_phase_times ms;          /* the certificate's own time is in `certify_ms`, not in here */
     double certify_ms;

@@ -69,8 +69,17 @@ static void frozen_free(struct check_frozen *f)
     sadmm_free(f->start_v);
     sadmm_free(f->start_impulses);
     sadmm_free(f->start_lambda);
-    sadmm_free(f->v);
-    sadmm_free(f->impulses);
+    sadmm_free(f->whole.v);
+    sadmm_free(f->whole.impulses);
+    sadmm_free(f->once.v);
+    sadmm_free(f->once.impulses);
+}
+
+static bool answer_allocate(struct check_answer *a, size_t bodies, size_t contacts)
+{
+    a->v = sadmm_alloc(6 * bodies, sizeof(double));
+    a->impulses = sadmm_alloc(3 * contacts, sizeof(double));
+    return a->v && a->impulses;
 }
 
 static bool frozen_allocate(struct check_frozen *f)
@@ -80,9 +89,8 @@ static bool frozen_allocate(struct check_frozen *f)
     f->start_v = sadmm_alloc(6 * bodies, sizeof(double));
     f->start_impulses = sadmm_alloc(3 * contacts, sizeof(double));
     f->start_lambda = sadmm_alloc(6 * (size_t)sadmm_problem_block_count(f->problem), sizeof(double));
-    f->v = sadmm_alloc(6 * bodies, sizeof(double));
-    f->impulses = sadmm_alloc(3 * contacts, sizeof(double));
-    return f->start_v && f->start_impulses && f->start_lambda && f->v && f->impulses;
+    return answer_allocate(&f->whole, bodies, contacts) && answer_allocate(&f->once, bodies, contacts) && f->start_v &&
+           f->start_impulses && f->start_lambda;
 }
 
 /* From what the step started from, so that every table gets the same problem. */
@@ -112,6 +120,22 @@ static sadmm_status free_speed(const struct check_frozen *f, const struct sadmm_
     return status;
 }
 
+/* The same with one iteration: every kernel once. */
+static sadmm_settings once(const sadmm_settings *settings)
+{
+    sadmm_settings s = *settings;
+    s.iterations = 1;
+    return s;
+}
+
+static bool answer_by_ref(const struct check_frozen *f, const sadmm_settings *settings, struct check_answer *a)
+{
+    if (solve_frozen(f, settings, SADMM_BACKEND_REF, SADMM_F64, a->v, a->impulses) != SADMM_OK) return false;
+    a->v_scale = largest(a->v, 6 * (size_t)sadmm_problem_body_count(f->problem), 0);
+    a->impulse_scale = largest(a->impulses, 3 * (size_t)sadmm_problem_contact_count(f->problem), 0);
+    return true;
+}
+
 static bool freeze(const sadmm_world *world, long step, struct check_frozen *f, struct sadmm_error *error)
 {
     sadmm_settings settings = sadmm_world_settings(world);
@@ -119,14 +143,13 @@ static bool freeze(const sadmm_world *world, long step, struct check_frozen *f, 
     if (sadmm_problem_create(&f->problem) != SADMM_OK) return fail(error, "ref", "out of memory");
     if (sadmm_world_freeze(world, f->problem) != SADMM_OK) return fail(error, "ref", sadmm_world_message(world));
     if (!frozen_allocate(f)) return fail(error, "ref", "out of memory");
-    size_t bodies = (size_t)sadmm_problem_body_count(f->problem),
-           contacts = (size_t)sadmm_problem_contact_count(f->problem);
+    const sadmm_settings one = once(&settings);
     if (sadmm_problem_get_solution(f->problem, f->start_v, f->start_impulses, f->start_lambda) != SADMM_OK ||
-        solve_frozen(f, &settings, SADMM_BACKEND_REF, SADMM_F64, f->v, f->impulses) != SADMM_OK)
+        !answer_by_ref(f, &settings, &f->whole) || !answer_by_ref(f, &one, &f->once))
         return fail(error, "ref", sadmm_problem_message(f->problem));
-    f->v_scale = largest(f->v, 6 * bodies, 0);
-    f->impulse_scale = largest(f->impulses, 3 * contacts, 0);
-    return free_speed(f, &settings, &f->v_scale) == SADMM_OK || fail(error, "ref", sadmm_last_message());
+    if (free_speed(f, &settings, &f->whole.v_scale) != SADMM_OK) return fail(error, "ref", sadmm_last_message());
+    f->once.v_scale = larger(f->once.v_scale, f->whole.v_scale);
+    return true;
 }
 
 /* ---- runs -------------------------------------------------------------------------------------------------------- */
@@ -213,8 +236,10 @@ static bool compare_step(void *data, const sadmm_world *world, long step, struct
     return true;
 }
 
-static bool compare_frozen(const struct check_frozen *f, const struct sadmm_settings *settings, sadmm_backend backend,
-                           sadmm_precision precision, struct check_difference *d, struct sadmm_error *error)
+/* Differences from ref's answer, into the larger of what was there. */
+static bool compare_frozen(const struct check_frozen *f, const struct check_answer *wanted,
+                           const struct sadmm_settings *settings, sadmm_backend backend, sadmm_precision precision,
+                           double *velocity, double *impulse, struct sadmm_error *error)
 {
     size_t v_count = 6 * (size_t)sadmm_problem_body_count(f->problem);
     size_t impulse_count = 3 * (size_t)sadmm_problem_contact_count(f->problem);
@@ -222,10 +247,10 @@ static bool compare_frozen(const struct check_frozen *f, const struct sadmm_sett
     if (!v) return fail(error, "frozen step", "out of memory");
     bool ok = solve_frozen(f, settings, backend, precision, v, impulses) == SADMM_OK;
     if (ok) {
-        double dv = largest_difference(v, f->v, v_count, 0),
-               di = largest_difference(impulses, f->impulses, impulse_count, 0);
-        d->step_velocity = larger(d->step_velocity, f->v_scale > 0 ? dv / f->v_scale : dv);
-        d->step_impulse = larger(d->step_impulse, f->impulse_scale > 0 ? di / f->impulse_scale : di);
+        double dv = largest_difference(v, wanted->v, v_count, 0),
+               di = largest_difference(impulses, wanted->impulses, impulse_count, 0);
+        *velocity = larger(*velocity, wanted->v_scale > 0 ? dv / wanted->v_scale : dv);
+        *impulse = larger(*impulse, wanted->impulse_scale > 0 ? di / wanted->impulse_scale : di);
     } else {
         fail(error, "frozen step", sadmm_problem_message(f->problem));
     }
@@ -241,7 +266,12 @@ bool check_table(const struct check_reference *r, sadmm_backend backend, sadmm_p
     if (!c.states) return fail(error, "states", "out of memory");
     bool ok = run_scene(r->scene, backend, precision, r->steps, compare_step, &c, error);
     sadmm_free(c.states);
-    for (size_t k = 0; ok && k < r->frozen_count; ++k)
-        ok = compare_frozen(&r->frozen[k], &r->scene->def.settings, backend, precision, difference, error);
+    const sadmm_settings *settings = &r->scene->def.settings, one = once(settings);
+    struct check_difference *d = difference;
+    for (size_t k = 0; ok && k < r->frozen_count; ++k) {
+        const struct check_frozen *f = &r->frozen[k];
+        ok = compare_frozen(f, &f->whole, settings, backend, precision, &d->step_velocity, &d->step_impulse, error) &&
+             compare_frozen(f, &f->once, &one, backend, precision, &d->kernel_velocity, &d->kernel_impulse, error);
+    }
     return ok;
 }

@@ -1,9 +1,10 @@
 /* Comparing backends with the literal one (ref, f64) on a scene.
  *
- * Two comparisons. "Run": every table simulates the scene on its own and its states are compared with ref's after every
+ * Three comparisons. "Run": every table simulates the scene on its own and its states are compared with ref's after every
  * step; contact detection and everything else is included, and differences feed on themselves. "One step": the contact
  * problems of some of ref's steps are frozen and every table solves the same problem with the same number of
- * iterations, so that a difference can only come from the solver.
+ * iterations, so that a difference can only come from the solver. "Kernels": of these problems every kernel from assembly to
+ * Step 4 runs once, from identical inputs, so that nothing has been amplified.
  */
 #ifndef SADMM_CLI_CHECK_RUNS_H
 #define SADMM_CLI_CHECK_RUNS_H
@@ -13,12 +14,16 @@
 
 enum { CHECK_MOST_FROZEN = 5 };
 
+struct check_answer {
+    double *v, *impulses;          /* (bodies x 6), (contacts x 3) */
+    double v_scale, impulse_scale; /* largest entry of v and A^-1 b; of impulses */
+};
+
 struct check_frozen {
     sadmm_problem *problem;
     long step;               /* 1 is the first */
     double *start_v, *start_impulses, *start_lambda; /* what the step started from */
-    double *v, *impulses;    /* ref's answer: (bodies x 6), (contacts x 3) */
-    double v_scale, impulse_scale; /* largest entry of v and A^-1 b; of impulses */
+    struct check_answer whole, once; /* ref's, after the step's iterations and after one */
 };
 
 struct check_reference {
@@ -39,6 +44,7 @@ struct check_difference {
     double velocity;         /* m/s, of all steps; angular velocities count times the radius of gyration */
     double step_velocity;    /* relative to v_scale, of all frozen problems */
     double step_impulse;     /* relative to impulse_scale */
+    double kernel_velocity, kernel_impulse; /* the same after one iteration */
 };
 
 /* False with `error` filled. */

@@ -91,6 +91,7 @@ json_t *run_record_json(const struct run_record *record, const char *spec, const
     if (record->steps > 0) json_object_set_new(o, "residual", residual_json(&last->residual));
     else json_object_set_new(o, "residual", json_null());
     json_object_set_new(o, "certificate", certificate_json(record));
+    set_or_null(o, "repeated", record, json_integer(record->last.repeated));
     set_or_null(o, "penetration_max", record, cli_json_real(record->penetration_max));
     json_object_set_new(o, "speed_max_final", cli_json_real(record->speed_max));
     json_object_set_new(o, "displacement_max", cli_json_real(record->displacement_max));
@@ -128,6 +129,8 @@ void run_record_print(const struct run_record *record, const char *spec, const s
     if (record->steps > 0 && c->ncp_max != -1)
         printf("certificate    ncp %.3g m/s (largest of the run %.3g), momentum %.3g (%.3g)\n", c->ncp_max,
                record->ncp_max, c->momentum_max, record->momentum_max);
+    if (record->steps > 0 && last->repeated > 0)
+        printf("repeated       %" PRId64 " steps, which outgrew the room or the plan they were begun with\n", last->repeated);
     if (record->steps > 0) printf("penetration    %.3g m at most\n", record->penetration_max);
     printf("final state    fastest %.3g m/s, moved %.3g m at most, %s, hash %016" PRIx64 "\n", record->speed_max,
            record->displacement_max, record->finite ? "finite" : "NOT FINITE", record->hash);

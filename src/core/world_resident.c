@@ -129,6 +129,7 @@ static void take_report(sadmm_world *world, const struct sadmm_resident_report *
 {
     sadmm_step_report *report = &world->report;
     int64_t steps = done->done - world->resident.done;
+    report->repeated += done->repeats - world->resident.repeats;
     world->resident.repeats = done->repeats;
     if (steps <= 0) return;
     world->resident.done = done->done;
