@@ -176,7 +176,7 @@ CUDA_INLINE int32_t quad_slot(int32_t lane) { return (lane & 1) * QUAD + (lane &
 /* ---- a part ---------------------------------------------------------------------------------------------------- */
 
 template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE> struct part_run {
-    enum { COUNT = POINTS / QUAD, MORE = 8 };
+    enum { COUNT = POINTS / QUAD, MORE = MODE == BLOCK ? 8 : 4 }; /* more take registers, fewer another round */
     const cuda_view &v;
     const cuda_args &args;
     part_memory m;
@@ -389,24 +389,30 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
 
 /* ---- Step 1 ---------------------------------------------------------------------------------------------------- */
 
-/* g and `count` numbers, each a record after the last, one after the other; few are on the way at once. */
+/* g and `count` numbers, each a record after the last, one after the other. The first few are fetched whether they are
+ * there or not; where a lane of the warp has more, the next ones too before the first is added. */
 PART __device__ __forceinline__ real PART_RUN::gather(real g, const solver_real *from, int32_t count, bool more) const
 {
-    real value[MORE];
+    real few[FEW], value[MORE] = {};
 #pragma unroll
-    for (int32_t j = 0; j < FEW; ++j) value[j] = from[j * ROW];
+    for (int32_t j = 0; j < FEW; ++j) few[j] = from[j * ROW];
+    if (more) {
+#pragma unroll
+        for (int32_t j = 0; j < MORE; ++j) value[j] = FEW + j < count ? from[(FEW + j) * ROW] : (real)0;
+    }
 #pragma unroll
     for (int32_t j = 0; j < FEW; ++j)
-        if (j < count) g += value[j];
+        if (j < count) g += few[j];
     if (!more) return g;
-    for (int32_t h = FEW; h < count; h += MORE) {
-#pragma unroll
-        for (int32_t j = 0; j < MORE; ++j) value[j] = h + j < count ? from[(h + j) * ROW] : (real)0;
+    for (int32_t h = FEW;;) {
 #pragma unroll
         for (int32_t j = 0; j < MORE; ++j)
             if (h + j < count) g += value[j];
+        h += MORE;
+        if (h >= count) return g;
+#pragma unroll
+        for (int32_t j = 0; j < MORE; ++j) value[j] = h + j < count ? from[(h + j) * ROW] : (real)0;
     }
-    return g;
 }
 
 PART __device__ __forceinline__ void PART_RUN::publish(int32_t i, real value, int32_t odd)
