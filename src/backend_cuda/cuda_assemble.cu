@@ -69,22 +69,27 @@ static __device__ real4 pack(vec3 a, double w)
     return out;
 }
 
-static __global__ void assemble_contacts_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+/* v.lanes threads a pair, each every v.lanes-th point; the first also what the points share. */
+static __global__ void __launch_bounds__(BODY_THREADS)
+    assemble_contacts_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    int32_t p = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x);
+    const int32_t t = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x), p = t / v.lanes, lane = t % v.lanes;
     if (p >= live_pairs(v)) return;
     const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
     const struct sadmm_contact_point *points = v.raw_points + pair->first;
-    vec3 normal = v3_load(pair->normal), difference = v3(0, 0, 0);
-    bool a = pair->body_a >= 0, b = pair->body_b >= 0;
-    if (a && b && pair->count > 0) difference = v3_sub(v3_load(points[0].arm_b), v3_load(points[0].arm_a));
-    v.normal[p] = pack(normal, pair->friction);
+    const vec3 normal = v3_load(pair->normal);
+    const bool a = pair->body_a >= 0, b = pair->body_b >= 0;
     /* A pair of more points than the step was planned for halts it (cuda_step.h), but not before this. */
     const int32_t count = pair->count <= v.point_slots ? pair->count : v.point_slots;
-    const pair_ends ends = {a ? pair->body_a : v.bodies, b ? pair->body_b : v.bodies, -1, -1};
-    v.difference[p] = pack(difference, count);
-    v.ends[p] = ends;
-    for (int32_t k = 0; k < count; ++k) {
+    if (lane == 0) {
+        vec3 difference = v3(0, 0, 0);
+        if (a && b && pair->count > 0) difference = v3_sub(v3_load(points[0].arm_b), v3_load(points[0].arm_a));
+        const pair_ends ends = {a ? pair->body_a : v.bodies, b ? pair->body_b : v.bodies, -1, -1};
+        v.normal[p] = pack(normal, pair->friction);
+        v.difference[p] = pack(difference, count);
+        v.ends[p] = ends;
+    }
+    for (int32_t k = lane; k < count; k += v.lanes) {
         size_t slot = point_slot(v, p, k);
         vec3 lambda = v.warm_start ? v3_load(points[k].impulse) : v3(0, 0, 0);
         double error = sadmm_contact_e(&v.raw, &v.settings, pair, &points[k]);
@@ -145,7 +150,8 @@ extern "C" sadmm_status CUDA(assemble_contacts)(struct sadmm_context *c, struct 
     cuda_args args = {};
     CUDA_ENTER(c);
     CUDA_TRY(CUDA(launch_of)(c, assemble_contacts_kernel, "assemble_contacts",
-                             ((int64_t)c->view.pair_room + BODY_THREADS - 1) / BODY_THREADS, BODY_THREADS, &args, error));
+                             ((int64_t)c->view.pair_room * c->view.lanes + BODY_THREADS - 1) / BODY_THREADS, BODY_THREADS,
+                             &args, error));
     return c->plan.blocks[SADMM_BLOCK_CONTACT] ? assemble_rows(c, SADMM_BLOCK_CONTACT, error) : SADMM_OK;
 }
 
