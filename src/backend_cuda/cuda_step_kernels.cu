@@ -1,4 +1,6 @@
 /* The step's own kernels (cuda_step.h): start, admit, check, finish, commit, edits. */
+#include <stddef.h>
+
 #include "cuda_double.h"
 
 #include "../core/steady.h"
@@ -33,22 +35,29 @@ static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __
 
 /* ---- start ----------------------------------------------------------------------------------------------------- */
 
+/* What a body brings along, in the order of both structures: position, orientation, velocity. */
+enum { CARRIED = 13, CARRIED_VELOCITY = 7, START_LANES = 16 };
+static_assert(offsetof(struct sadmm_rigid, velocity) == CARRIED_VELOCITY * sizeof(double) &&
+                  offsetof(struct sadmm_collision_body, velocity) == CARRIED_VELOCITY * sizeof(double),
+              "numbers of a body are copied one by one");
+
+/* START_LANES threads a body, a number each: neighbours in memory go to neighbours. */
 static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    int32_t i = (int32_t)(blockIdx.x * (unsigned)STEP_THREADS + threadIdx.x);
+    const int64_t t = (int64_t)blockIdx.x * STEP_THREADS + threadIdx.x, i = t / START_LANES;
+    const int32_t lane = (int32_t)(t % START_LANES);
     if (v.live->halt) return;
-    if (i == 0) {
+    if (t == 0) {
         v.step.control->depth = 0;
         v.step.control->culprit = INT32_MAX;
         v.step.control->stamps[STAMP_START] = nanoseconds();
     }
-    if (i >= v.bodies) return;
-    const struct sadmm_rigid *body = &v.step.before[i];
-    struct sadmm_collision_body *out = &v.step.bodies[v.step.slot_of_body[i]];
-    for (int k = 0; k < 3; ++k) out->position[k] = body->position[k];
-    for (int k = 0; k < 4; ++k) out->orientation[k] = body->orientation[k];
-    for (int k = 0; k < 6; ++k) out->velocity[k] = body->velocity[k];
-    steady_start(body, &v.step.steady_before[i], v.step.start_velocity + 6 * (size_t)i);
+    if (i >= v.bodies || lane >= CARRIED) return;
+    const double number = ((const double *)&v.step.before[i])[lane];
+    ((double *)&v.step.bodies[v.step.slot_of_body[i]])[lane] = number;
+    if (lane < CARRIED_VELOCITY) return;
+    const int32_t k = lane - CARRIED_VELOCITY;
+    v.step.start_velocity[6 * i + k] = steady_start_component(number, &v.step.steady_before[i], k);
 }
 
 /* ---- gates ----------------------------------------------------------------------------------------------------- */
@@ -102,43 +111,48 @@ static __device__ bool finish_pair(const cuda_view &v, int32_t p, int32_t lane, 
     return finite;
 }
 
-/* Threads for bodies, eight lanes a wrench, threads for points: side by side, each of them long. */
+/* Threads for bodies, eight lanes a wrench, v.lanes threads a pair: side by side in one kernel, each of them long. Where
+ * they are so many that registers decide how many run at once, each in a kernel of its own. */
+enum { FINISH_BODIES = 1, FINISH_WRENCHES = 2, FINISH_PAIRS = 4, FINISH_ALL = 7 };
 struct finish_ranges {
     int32_t wrenches, pairs, end;
 };
-static __host__ __device__ inline finish_ranges ranges_of(const cuda_view &v)
+template <int WHAT> static __host__ __device__ inline finish_ranges ranges_of(const cuda_view &v)
 {
+    const bool wrenches = WHAT & FINISH_WRENCHES && v.settings.recover_wrenches;
     finish_ranges r;
-    r.wrenches = (v.bodies + WARP - 1) / WARP * WARP;
-    r.pairs = r.wrenches + (v.settings.recover_wrenches ? (LANES * v.bodies + WARP - 1) / WARP * WARP : 0);
-    r.end = r.pairs + v.lanes * v.pair_room;
+    r.wrenches = WHAT & FINISH_BODIES ? (v.bodies + WARP - 1) / WARP * WARP : 0;
+    r.pairs = r.wrenches + (wrenches ? (LANES * v.bodies + WARP - 1) / WARP * WARP : 0);
+    r.end = r.pairs + (WHAT & FINISH_PAIRS ? v.lanes * v.pair_room : 0);
     return r;
 }
 
 /* Does not look at culprits of this very kernel: which body is named must not depend on who came first. */
+template <int WHAT>
 static __global__ void __launch_bounds__(STEP_THREADS)
     finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     const int32_t i = (int32_t)(blockIdx.x * (unsigned)STEP_THREADS + threadIdx.x);
-    const finish_ranges range = ranges_of(v);
+    const finish_ranges range = ranges_of<WHAT>(v);
     struct cuda_step_control *control = v.step.control;
     double depth = 0;
-    if (i == 0) control->stamps[STAMP_SOLVED] = nanoseconds();
-    if (i < range.wrenches) {
+    if (WHAT & FINISH_BODIES && i == 0) control->stamps[STAMP_SOLVED] = nanoseconds();
+    if (WHAT & FINISH_BODIES && i < range.wrenches) {
         if (i < live_bodies(v) && !finish_body(v, i)) atomicMin(&control->culprit, i);
-    } else if (i < range.pairs) {
+    } else if (WHAT & FINISH_WRENCHES && i < range.pairs) {
         const int32_t slot = (i - range.wrenches) / LANES, lane = i % LANES;
         const bool live = slot < live_bodies(v);
         double wrench[6];
         contact_wrench(v, live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0, lane, wrench);
         if (live) store_wrench(wrench, lane, v.step.wrench + 6 * (size_t)v.body_of[slot]);
-    } else if ((i - range.pairs) / v.lanes < live_pairs(v)) {
+    } else if (WHAT & FINISH_PAIRS && (i - range.pairs) / v.lanes < live_pairs(v)) {
         const int32_t p = (i - range.pairs) / v.lanes;
         const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
         /* bodies are named first: all of them are below any contact's */
         if (!finish_pair(v, p, (i - range.pairs) % v.lanes, &depth))
             atomicMin(&control->culprit, v.bodies + (pair->body_b >= 0 ? pair->body_b : pair->body_a));
     }
+    if (!(WHAT & FINISH_PAIRS)) return;
     /* -0 is no depth; a larger one may be there already */
     unsigned long long bits = depth > 0 ? (unsigned long long)__double_as_longlong(depth) : 0;
     for (int o = WARP / 2; o > 0; o /= 2) {
@@ -185,8 +199,8 @@ sadmm_status CUDA(launch_edits)(struct sadmm_context *c, const struct sadmm_resi
 sadmm_status CUDA(launch_start)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    return CUDA(launch_of)(c, start_step_kernel, "start", (int64_t)c->view.bodies / STEP_THREADS + 1, STEP_THREADS, &args,
-                           error);
+    const int64_t blocks = (int64_t)c->view.bodies * START_LANES / STEP_THREADS + 1;
+    return CUDA(launch_of)(c, start_step_kernel, "start", blocks, STEP_THREADS, &args, error);
 }
 
 sadmm_status CUDA(launch_admit)(struct sadmm_context *c, struct sadmm_error *error)
@@ -195,10 +209,23 @@ sadmm_status CUDA(launch_admit)(struct sadmm_context *c, struct sadmm_error *err
     return CUDA(launch)(c, admit_kernel, "admit", 1, &args, error);
 }
 
+template <int WHAT>
+static sadmm_status launch_finish_of(struct sadmm_context *c, const char *name, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    const int64_t blocks = ((int64_t)ranges_of<WHAT>(c->view).end + STEP_THREADS - 1) / STEP_THREADS;
+    return blocks ? CUDA(launch_of)(c, finish_kernel<WHAT>, name, blocks, STEP_THREADS, &args, error) : SADMM_OK;
+}
+
 sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    int64_t blocks = ((int64_t)ranges_of(c->view).end + STEP_THREADS - 1) / STEP_THREADS;
-    CUDA_TRY(CUDA(launch_of)(c, finish_kernel, "finish", blocks, STEP_THREADS, &args, error));
+    if (c->partition.tier == SADMM_CUDA_TIER_STREAM) {
+        CUDA_TRY(launch_finish_of<FINISH_BODIES>(c, "finish (bodies)", error));
+        CUDA_TRY(launch_finish_of<FINISH_WRENCHES>(c, "finish (wrenches)", error));
+        CUDA_TRY(launch_finish_of<FINISH_PAIRS>(c, "finish (pairs)", error));
+    } else {
+        CUDA_TRY(launch_finish_of<FINISH_ALL>(c, "finish", error));
+    }
     return CUDA(launch)(c, commit_kernel, "commit", 1, &args, error);
 }

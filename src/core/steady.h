@@ -16,10 +16,15 @@ enum { STEADY_STEPS = 3 };
 /* Changes that differ by less than this share are the same. */
 #define STEADY_SHARE 0.25
 
+/* Component k of it, from the velocity's. */
+SADMM_INLINE double steady_start_component(double velocity, const struct sadmm_steady *steady, int k)
+{
+    return velocity + (steady->streak[k / 3] >= STEADY_STEPS ? steady->change[k] : 0);
+}
+
 SADMM_INLINE void steady_start(const struct sadmm_rigid *body, const struct sadmm_steady *steady, double velocity[6])
 {
-    for (int k = 0; k < 6; ++k)
-        velocity[k] = body->velocity[k] + (steady->streak[k / 3] >= STEADY_STEPS ? steady->change[k] : 0);
+    for (int k = 0; k < 6; ++k) velocity[k] = steady_start_component(body->velocity[k], steady, k);
 }
 
 /* The step made `body` into `next`. */
