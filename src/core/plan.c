@@ -36,6 +36,13 @@ static bool pair_is_warm(const struct sadmm_contact_set *contacts, const struct 
     return false;
 }
 
+static bool any_pair_is_warm(const struct sadmm_contact_set *contacts)
+{
+    for (size_t p = 0; p < contacts->pair_count; ++p)
+        if (pair_is_warm(contacts, &contacts->pairs[p])) return true;
+    return false;
+}
+
 /* Does at least half of the constraints start with an impulse? Contacts count by pairs: the points of a pair that are
  * a little apart (the far edge of a leaning card) carry nothing, and do not make a settled scene a cold one. */
 static bool starts_warm(const struct sadmm_system *system)
@@ -60,6 +67,13 @@ static bool may_update_penalty(const struct sadmm_settings *settings)
            settings->iterations > settings->penalty_period;
 }
 
+static bool has_blocks(const struct sadmm_plan *plan)
+{
+    return plan->blocks[SADMM_BLOCK_CONTACT] > 0 || plan->blocks[SADMM_BLOCK_HARD] > 0 || plan->blocks[SADMM_BLOCK_SOFT] > 0;
+}
+
+bool sadmm_plan_is_constrained(const struct sadmm_plan *plan) { return plan->points > 0 || has_blocks(plan); }
+
 bool sadmm_plan_depends_on_warmth(const struct sadmm_settings *settings)
 {
     return may_update_penalty(settings) && settings->warm_start && !settings->penalty_update_warm;
@@ -67,15 +81,13 @@ bool sadmm_plan_depends_on_warmth(const struct sadmm_settings *settings)
 
 void sadmm_plan_settle(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm)
 {
-    bool constrained = plan->points > 0 || plan->blocks[SADMM_BLOCK_CONTACT] > 0 ||
-                       plan->blocks[SADMM_BLOCK_HARD] > 0 || plan->blocks[SADMM_BLOCK_SOFT] > 0;
+    bool constrained = sadmm_plan_is_constrained(plan);
     plan->warm_start = settings->warm_start;
     plan->warm = plan->warm_start && mostly_warm;
     plan->penalty_updates = constrained && may_update_penalty(settings) && (settings->penalty_update_warm || !plan->warm);
     bool fast = constrained && settings->method == SADMM_METHOD_FAST;
     plan->weight_refresh = fast && !plan->warm;
-    plan->limit = fast && plan->rigid && plan->blocks[SADMM_BLOCK_CONTACT] == 0 && plan->blocks[SADMM_BLOCK_HARD] == 0 &&
-                  plan->blocks[SADMM_BLOCK_SOFT] == 0;
+    plan->limit = fast && plan->rigid && !has_blocks(plan);
     plan->certificate = settings->certify || settings->certificate_tolerance > 0;
     plan->residuals = constrained && (plan->penalty_updates || settings->measure_residuals ||
                                       settings->residual_tolerance > 0);
@@ -97,6 +109,8 @@ struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struc
     plan.rigid = system->rigid != NULL;
     plan.gyroscopic = plan.rigid && sadmm_plan_is_gyroscopic(system->rigid, system->body_count);
     sadmm_plan_settle(&plan, settings, settings->warm_start && starts_warm(system));
+    plan.predict = settings->method == SADMM_METHOD_FAST && plan.points > 0 && !has_blocks(&plan) && system->first &&
+                   !(settings->warm_start && any_pair_is_warm(system->contacts));
     plan.threads = sadmm_plan_threads(settings->threads, (size_t)plan.points + 4 * (size_t)system->block_count);
     return plan;
 }

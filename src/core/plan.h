@@ -21,6 +21,7 @@ struct sadmm_plan {
     bool warm_start;        /* take the system's start values */
     bool warm;              /* ... and most constraints have one */
     bool penalty_updates;   /* eq. (15) will run at least once */
+    bool predict;           /* FAST: starts from predicted loads (loads.h); never in steps that a backend makes alone */
     bool weight_refresh;    /* FAST: weights are taken anew during the step */
     bool limit;             /* FAST: energies are limited after the last iteration */
     bool residuals;         /* some iteration is measured */
@@ -41,6 +42,9 @@ bool sadmm_plan_depends_on_warmth(const struct sadmm_settings *settings);
 
 /* Does one of the bodies have unequal principal moments? */
 bool sadmm_plan_is_gyroscopic(const struct sadmm_rigid *rigid, int32_t count);
+
+/* Is there any constraint? */
+bool sadmm_plan_is_constrained(const struct sadmm_plan *plan);
 
 struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struct sadmm_settings *settings);
 

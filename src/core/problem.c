@@ -542,6 +542,7 @@ static struct sadmm_system make_system(const sadmm_problem *problem, struct sadm
         .velocity = problem->velocity,
         .contacts = contacts,
         .errors_given = true,
+        .first = true,
         .block_count = problem->block_count,
         .blocks = problem->blocks,
         .block_lambda = problem->lambda,

@@ -15,6 +15,7 @@
 #include <time.h>
 
 #include "certificate.h"
+#include "loads.h"
 #include "math/weight.h"
 #include "system_math.h"
 
@@ -76,20 +77,14 @@ static int until_refresh(int done, int limit)
     return at > done && at - done < limit ? at - done : limit;
 }
 
-static bool constrained(const struct sadmm_plan *plan)
-{
-    return plan->points > 0 || plan->blocks[SADMM_BLOCK_CONTACT] > 0 || plan->blocks[SADMM_BLOCK_HARD] > 0 ||
-           plan->blocks[SADMM_BLOCK_SOFT] > 0;
-}
-
 int sadmm_schedule_budget(const struct sadmm_plan *plan, const struct sadmm_settings *settings)
 {
-    return constrained(plan) ? settings->iterations : 1;
+    return sadmm_plan_is_constrained(plan) ? settings->iterations : 1;
 }
 
 struct sadmm_stretch sadmm_schedule_stretch(const struct sadmm_plan *plan, const struct sadmm_settings *settings, int done)
 {
-    bool stop_rule = constrained(plan) && (settings->residual_tolerance > 0 || settings->certificate_tolerance > 0);
+    bool stop_rule = sadmm_plan_is_constrained(plan) && (settings->residual_tolerance > 0 || settings->certificate_tolerance > 0);
     int budget = sadmm_schedule_budget(plan, settings);
     struct sadmm_stretch next = {.count = budget - done};
     if (plan->penalty_updates) next.count = until(done, settings->penalty_period, next.count);
@@ -187,7 +182,12 @@ sadmm_status sadmm_schedule_solve(const struct sadmm_kernels *kernels, struct sa
     report->certificate.ncp_worst = report->certificate.momentum_worst = -1;
     report->threads = kernels->backend == SADMM_BACKEND_REF ? 1 : plan->threads;
 
-    TRY(kernels->begin(context, system, plan, settings, error));
+    struct sadmm_plan own = *plan;
+    if (plan->predict) {
+        TRY(sadmm_loads_predict(system, settings, error));
+        own.warm_start = true;
+    }
+    TRY(kernels->begin(context, system, &own, settings, error));
     TRY(assemble(kernels, context, plan, error));
     double assembled = sadmm_clock_ms();
     TRY(run(kernels, context, system, settings, plan, report, error));

@@ -71,6 +71,7 @@ struct sadmm_system {
     double *velocity;                /* (body_count x 6) start in, solution out */
     struct sadmm_contact_set *contacts;
     bool errors_given;               /* points carry e (problem level) instead of a gap */
+    bool first;                      /* no step came before: where there are no impulses, none are known */
     int32_t block_count;
     const struct sadmm_problem_block *blocks;
     double *block_lambda;            /* (block_count x 6) start in, solution out */

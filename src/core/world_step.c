@@ -174,6 +174,7 @@ struct sadmm_system sadmm_world_system(sadmm_world *world)
         .rigid = world->start,
         .velocity = world->velocity,
         .contacts = &world->contacts,
+        .first = !world->stepped,
     };
     return system;
 }
