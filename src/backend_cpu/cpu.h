@@ -45,6 +45,7 @@
 
 enum { STATE_INV_BETA = 6 }; /* slot of a state row */
 enum { PACKED6 = 21 };       /* symmetric 6x6: lower triangle, rows first */
+enum { BODY_SUMS = 4 };      /* weights: energy, kinetic, push, defect; limit: now, free, -, defect */
 
 /* LANES contact pairs; points of all of them in `slots` slots from `first` on. Lanes without a pair point at the
  * static body; slots without a point have an error so large that lambda stays 0. */
@@ -93,6 +94,7 @@ struct row_block {
 /* fast: sums over an island. */
 struct cpu_island {
     double energy, mass, speed; /* sum of g . A^-1 g, kg, V in m/s */
+    double kinetic, push;       /* sum of v . A v; of the sizes of the bodies' impulses */
     double level, scale;        /* math/weight.h; not 0: weights stay, times this */
     double violation, defect;
     bool blocks;                /* there are constraints by rows: the level stays 1 */
@@ -148,9 +150,9 @@ struct sadmm_context {
     double *pair_response, *pair_weight; /* pair records: J A^-1 J^T, B in kg */
     double *pair_violation;     /* pair records: terms of the islands' sums */
     int refreshes;              /* of the weights, in this solve */
-    double *body_sums;          /* bodies x 3: terms of the islands' sums */
-    size_t body_sum_capacity, label_capacity, island_capacity, A_inverse_capacity, pair_response_capacity, pair_weight_capacity,
-        pair_violation_capacity;
+    double *body_sums;          /* bodies x BODY_SUMS: terms of the islands' sums */
+    size_t body_sum_capacity, label_capacity, island_capacity, A_inverse_capacity, pair_response_capacity,
+        pair_weight_capacity, pair_violation_capacity;
 
     double *thread_max; /* one cache line a thread */
     size_t thread_max_capacity;

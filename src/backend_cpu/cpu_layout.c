@@ -120,7 +120,7 @@ sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *syst
               grow(&c->incident, &c->incident_capacity, 2 * c->record_count, sizeof(int32_t)) &&
               (!c->fast || (grow(&c->label, &c->label_capacity, n, sizeof(int32_t)) &&
                             grow(&c->islands, &c->island_capacity, n, sizeof *c->islands) &&
-                            grow(&c->body_sums, &c->body_sum_capacity, 3 * n, sizeof(double)) &&
+                            grow(&c->body_sums, &c->body_sum_capacity, BODY_SUMS * n, sizeof(double)) &&
                             grow(&c->A_inverse, &c->A_inverse_capacity, n * PACKED6, sizeof(double)) &&
                             grow(&c->pair_response, &c->pair_response_capacity, c->record_count, sizeof(double)) &&
                             grow(&c->pair_weight, &c->pair_weight_capacity, c->record_count, sizeof(double)) &&

@@ -45,7 +45,8 @@ static double pair_violation(const struct sadmm_context *c, size_t record)
         if (c->plan.contact_rows == 3) {
             const struct point_slot *slot = (const struct point_slot *)c->slots + block->first + k;
             arm[0] = (double)slot->arm.x[l], arm[1] = (double)slot->arm.y[l], arm[2] = (double)slot->arm.z[l];
-            lambda[0] = (double)slot->lambda.x[l], lambda[1] = (double)slot->lambda.y[l], lambda[2] = (double)slot->lambda.z[l];
+            lambda[0] = (double)slot->lambda.x[l], lambda[1] = (double)slot->lambda.y[l];
+            lambda[2] = (double)slot->lambda.z[l];
             error = (double)slot->error[l];
             friction = (double)block->friction[l];
         } else {
@@ -64,57 +65,35 @@ static double pair_violation(const struct sadmm_context *c, size_t record)
     return sum;
 }
 
-/* r . A^-1 r, r = b + J^T lambda - A v */
-static double body_defect(const struct sadmm_context *c, size_t i)
-{
-    const double *A = &c->A[i * PACKED6];
-    double r[6], v[6];
-    cpu_load_b(c, i, r);
-    cpu_load_v(c, i, v);
-    for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at)
-        for (int k = 0; k < 6; ++k) r[k] += (double)c->wrenches[(size_t)c->incident[at] * ROW + (size_t)k];
-    for (int j = 0, at = 0; j < 6; ++j)
-        for (int k = 0; k <= j; ++k, ++at) {
-            r[j] -= A[at] * v[k];
-            if (k < j) r[k] -= A[at] * v[j];
-        }
-    return packed_form(&c->A_inverse[i * PACKED6], r);
-}
-
 void CPU(add_up_imbalance)(struct sadmm_context *c, int thread, int threads)
 {
     size_t begin, end;
     cpu_share((size_t)c->bodies, thread, threads, &begin, &end);
-    for (size_t i = begin; i < end; ++i) c->body_sums[3 * i + 1] = body_defect(c, i);
+    for (size_t i = begin; i < end; ++i) c->body_sums[BODY_SUMS * i + 3] = cpu_defect_energy(c, i);
     cpu_share(c->pair_block_count * (size_t)LANES, thread, threads, &begin, &end);
     for (size_t k = begin; k < end; ++k)
         if (c->pair_blocks[k / (size_t)LANES].pair[k % (size_t)LANES] >= 0) c->pair_violation[k] = pair_violation(c, k);
 }
 
-static struct cpu_island *island_of(struct sadmm_context *c, int32_t body_a, int32_t body_b)
-{
-    return &c->islands[c->label[body_a >= 0 && body_a < c->bodies ? body_a : body_b]];
-}
-
-static void add_up_islands(struct sadmm_context *c)
+static void add_up_misses(struct sadmm_context *c)
 {
     for (int32_t i = 0; i < c->bodies; ++i) {
         c->islands[i].violation = c->islands[i].defect = 0;
         c->islands[i].blocks = false;
     }
-    for (int32_t i = 0; i < c->bodies; ++i) c->islands[c->label[i]].defect += c->body_sums[3 * i + 1];
+    for (int32_t i = 0; i < c->bodies; ++i) c->islands[c->label[i]].defect += c->body_sums[BODY_SUMS * i + 3];
     for (size_t k = 0; k < c->pair_block_count * (size_t)LANES; ++k) {
         if (c->pair_blocks[k / (size_t)LANES].pair[k % (size_t)LANES] < 0) continue;
         const struct sadmm_contact_pair *pair = cpu_pair(c, k);
-        island_of(c, pair->body_a, pair->body_b)->violation += c->pair_violation[k];
+        cpu_island_of(c, pair->body_a, pair->body_b)->violation += c->pair_violation[k];
     }
     for (size_t k = 0; k < c->row_block_count; ++k)
-        island_of(c, c->row_blocks[k].body_a, c->row_blocks[k].body_b)->blocks = true;
+        cpu_island_of(c, c->row_blocks[k].body_a, c->row_blocks[k].body_b)->blocks = true;
 }
 
 void CPU(update_levels)(struct sadmm_context *c)
 {
-    add_up_islands(c);
+    add_up_misses(c);
     for (int32_t i = 0; i < c->bodies; ++i) {
         struct cpu_island *island = &c->islands[i];
         if (c->label[i] != i || island->blocks) continue;

@@ -17,22 +17,6 @@ static void energies(const struct sadmm_context *c, size_t i, double *now, doubl
     *free = rigid_form(&c->A_inverse[i * PACKED6], b) / 2;
 }
 
-/* Energy of A v - b - J^T lambda; `wrenches` hold J^T lambda. */
-static double defect(const struct sadmm_context *c, size_t i)
-{
-    const double *A = &c->A[i * PACKED6];
-    double r[6], v[6];
-    cpu_load_b(c, i, r);
-    cpu_load_v(c, i, v);
-    for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at)
-        for (int k = 0; k < 6; ++k) r[k] += (double)c->wrenches[(size_t)c->incident[at] * ROW + (size_t)k];
-    for (int k = 0; k < 3; ++k) r[k] -= A[0] * v[k];
-    r[3] -= A[9] * v[3] + A[13] * v[4] + A[18] * v[5];
-    r[4] -= A[13] * v[3] + A[14] * v[4] + A[19] * v[5];
-    r[5] -= A[18] * v[3] + A[19] * v[4] + A[20] * v[5];
-    return rigid_form(&c->A_inverse[i * PACKED6], r) / 2;
-}
-
 /* Work of a pair's contacts that push apart. */
 static double pair_work(const struct sadmm_context *c, size_t record)
 {
@@ -63,8 +47,8 @@ static bool any_suspect(struct sadmm_context *c)
     for (int32_t i = 0; i < c->bodies; ++i) memset(&c->islands[i].limit, 0, sizeof c->islands[i].limit);
     for (int32_t i = 0; i < c->bodies; ++i) {
         struct limit_energies *sum = &c->islands[c->label[i]].limit;
-        sum->now += c->body_sums[3 * i];
-        sum->free += c->body_sums[3 * i + 1];
+        sum->now += c->body_sums[BODY_SUMS * i];
+        sum->free += c->body_sums[BODY_SUMS * i + 1];
     }
     for (int32_t i = 0; i < c->bodies; ++i)
         any = any || (c->label[i] == i && limit_suspects(c->islands[i].limit.now, c->islands[i].limit.free));
@@ -73,11 +57,11 @@ static bool any_suspect(struct sadmm_context *c)
 
 static void add_defects_and_work(struct sadmm_context *c)
 {
-    for (int32_t i = 0; i < c->bodies; ++i) c->islands[c->label[i]].limit.defect += c->body_sums[3 * i + 2];
+    for (int32_t i = 0; i < c->bodies; ++i) c->islands[c->label[i]].limit.defect += c->body_sums[BODY_SUMS * i + 3];
     for (size_t r = 0; r < c->pair_block_count * (size_t)LANES; ++r) {
         if (c->pair_blocks[r / (size_t)LANES].pair[r % (size_t)LANES] < 0) continue;
         const struct sadmm_contact_pair *pair = cpu_pair(c, r);
-        c->islands[c->label[pair->body_a >= 0 ? pair->body_a : pair->body_b]].limit.work += pair_work(c, r);
+        cpu_island_of(c, pair->body_a, pair->body_b)->limit.work += pair_work(c, r);
     }
 }
 
@@ -89,7 +73,7 @@ sadmm_status CPU(limit_velocity)(struct sadmm_context *c, int32_t *limited, stru
     {
         size_t begin, end;
         cpu_share((size_t)c->bodies, cpu_thread(), cpu_threads(), &begin, &end);
-        for (size_t i = begin; i < end; ++i) energies(c, i, &c->body_sums[3 * i], &c->body_sums[3 * i + 1]);
+        for (size_t i = begin; i < end; ++i) energies(c, i, &c->body_sums[BODY_SUMS * i], &c->body_sums[BODY_SUMS * i + 1]);
     }
     if (!any_suspect(c)) return SADMM_OK;
     CPU(sum_wrenches)(c);
@@ -97,7 +81,7 @@ sadmm_status CPU(limit_velocity)(struct sadmm_context *c, int32_t *limited, stru
     {
         size_t begin, end;
         cpu_share((size_t)c->bodies, cpu_thread(), cpu_threads(), &begin, &end);
-        for (size_t i = begin; i < end; ++i) c->body_sums[3 * i + 2] = defect(c, i);
+        for (size_t i = begin; i < end; ++i) c->body_sums[BODY_SUMS * i + 3] = cpu_defect_energy(c, i) / 2;
     }
     add_defects_and_work(c);
     for (int32_t i = 0; i < c->bodies; ++i) {

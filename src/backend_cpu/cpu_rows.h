@@ -89,6 +89,29 @@ static inline double packed_form(const double M[PACKED6], const double x[6])
     return sum;
 }
 
+/* r . A^-1 r, r = b + J^T lambda - A v; `wrenches` hold J^T lambda. */
+static inline double cpu_defect_energy(const struct sadmm_context *c, size_t i)
+{
+    const double *A = &c->A[i * PACKED6];
+    double r[6], v[6];
+    cpu_load_b(c, i, r);
+    cpu_load_v(c, i, v);
+    for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at)
+        for (int k = 0; k < 6; ++k) r[k] += (double)c->wrenches[(size_t)c->incident[at] * ROW + (size_t)k];
+    for (int j = 0, at = 0; j < 6; ++j)
+        for (int k = 0; k <= j; ++k, ++at) {
+            r[j] -= A[at] * v[k];
+            if (k < j) r[k] -= A[at] * v[j];
+        }
+    return packed_form(&c->A_inverse[i * PACKED6], r);
+}
+
+/* The island of a constraint between two bodies, one of which may be the static world. */
+static inline struct cpu_island *cpu_island_of(const struct sadmm_context *c, int32_t body_a, int32_t body_b)
+{
+    return &c->islands[c->label[body_a >= 0 && body_a < c->bodies ? body_a : body_b]];
+}
+
 static inline double cpu_body_mass(const struct sadmm_context *c, int32_t i)
 {
     const double *A = &c->A[(size_t)i * PACKED6];

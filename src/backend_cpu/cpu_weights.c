@@ -103,29 +103,39 @@ static void block_response(const struct sadmm_context *c, struct row_block *bloc
 /* ---- weights ----------------------------------------------------------------------------------------------------- */
 
 /* V of every island, kept at its label. `wrenches` hold J^T lambda. */
-static void add_up_islands(struct sadmm_context *c)
+static void add_up_loads(struct sadmm_context *c)
 {
-    for (int32_t i = 0; i < c->bodies; ++i) c->islands[i].energy = c->islands[i].mass = 0;
+    for (int32_t i = 0; i < c->bodies; ++i)
+        c->islands[i].energy = c->islands[i].mass = c->islands[i].kinetic = c->islands[i].push = 0;
     for (int32_t i = 0; i < c->bodies; ++i) {
         struct cpu_island *island = &c->islands[c->label[i]];
-        island->energy += c->body_sums[3 * i];
+        island->energy += c->body_sums[BODY_SUMS * i];
+        island->kinetic += c->body_sums[BODY_SUMS * i + 1];
+        island->push += c->body_sums[BODY_SUMS * i + 2];
         island->mass += cpu_body_mass(c, i);
     }
-    for (int32_t i = 0; i < c->bodies; ++i)
-        if (c->label[i] == i) c->islands[i].speed = weight_speed(c->islands[i].energy, c->islands[i].mass);
+    for (int32_t i = 0; i < c->bodies; ++i) {
+        struct cpu_island *island = &c->islands[i];
+        if (c->label[i] != i) continue;
+        island->speed = weight_speed(island->energy, island->mass);
+        if (c->plan.warm) island->speed = weight_speed_warm(island->speed, island->push, island->kinetic, island->mass);
+    }
 }
 
-static double body_energy(const struct sadmm_context *c, size_t i)
+/* A body's part of its island's sums. */
+static void add_up_body(const struct sadmm_context *c, size_t i, double sums[BODY_SUMS])
 {
-    double g[6] = {0};
-    for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at)
-        for (int k = 0; k < 6; ++k) g[k] += (double)c->wrenches[(size_t)c->incident[at] * ROW + (size_t)k];
-    return packed_form(&c->A_inverse[i * PACKED6], g);
-}
-
-static const struct cpu_island *island_of(const struct sadmm_context *c, int32_t body_a, int32_t body_b)
-{
-    return &c->islands[c->label[body_a >= 0 && body_a < c->bodies ? body_a : body_b]];
+    double g[6] = {0}, v[6], push = 0;
+    for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) {
+        const real *wrench = &c->wrenches[(size_t)c->incident[at] * ROW];
+        const double f[3] = {(double)wrench[0], (double)wrench[1], (double)wrench[2]};
+        for (int k = 0; k < 6; ++k) g[k] += (double)wrench[k];
+        push += length3(f);
+    }
+    sums[0] = packed_form(&c->A_inverse[i * PACKED6], g);
+    cpu_load_v(c, i, v);
+    sums[1] = packed_form(&c->A[i * PACKED6], v);
+    sums[2] = push;
 }
 
 /* Mean size of a pair's impulses. */
@@ -150,11 +160,11 @@ static void weigh_pair_block(struct sadmm_context *c, size_t index)
     for (int l = 0; l < LANES; ++l) {
         if (block->pair[l] < 0) continue;
         const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[block->pair[l]];
-        const struct cpu_island *island = island_of(c, pair->body_a, pair->body_b);
+        const struct cpu_island *island = cpu_island_of(c, pair->body_a, pair->body_b);
         double *B = &c->pair_weight[index * (size_t)LANES + (size_t)l];
         double carried = weight_mass(pair_load(c, block, l, pair->count), island->speed, island->mass);
-        *B = island->scale > 0 ? *B * island->scale
-                               : weight_of_pair(island->level, carried, c->pair_response[index * (size_t)LANES + (size_t)l]);
+        double response = c->pair_response[index * (size_t)LANES + (size_t)l];
+        *B = island->scale > 0 ? *B * island->scale : weight_of_pair(island->level, carried, response);
         block->inv_s[l] = (real)(pair->body_a >= 0 && pair->body_b >= 0 ? *B / 2 : *B);
     }
 }
@@ -162,7 +172,7 @@ static void weigh_pair_block(struct sadmm_context *c, size_t index)
 /* B = diag(weight) + along along^T */
 static void weigh_row_block(struct sadmm_context *c, struct row_block *block)
 {
-    const struct cpu_island *island = island_of(c, block->body_a, block->body_b);
+    const struct cpu_island *island = cpu_island_of(c, block->body_a, block->body_b);
     double load2 = 0, lambda2 = 0, w = 0;
     for (int r = 0; r < block->rows; ++r) {
         double lambda = (double)block->lambda[r], load = (double)block->scale[r] * lambda;
@@ -177,7 +187,9 @@ static void weigh_row_block(struct sadmm_context *c, struct row_block *block)
         double own = response > 0 ? WEIGHT_FLOOR_BLOCK / response : 0;
         block->along[r] = 0;
         switch ((sadmm_block_kind)block->kind) {
-        case SADMM_BLOCK_CONTACT: block->weight[r] = (real)(share * lambda2 + (w > 0 ? WEIGHT_FLOOR_CONTACT / w : 1)); break;
+        case SADMM_BLOCK_CONTACT:
+            block->weight[r] = (real)(share * lambda2 + (w > 0 ? WEIGHT_FLOOR_CONTACT / w : 1));
+            break;
         case SADMM_BLOCK_HARD:
             block->weight[r] = (real)own;
             block->along[r] = (real)(sqrt(share) * lambda);
@@ -238,10 +250,10 @@ sadmm_status CPU(update_weights)(struct sadmm_context *c, struct sadmm_error *er
         int thread = cpu_thread(), threads = cpu_threads();
         size_t begin, end;
         cpu_share((size_t)c->bodies, thread, threads, &begin, &end);
-        for (size_t i = begin; i < end; ++i) c->body_sums[3 * i] = body_energy(c, i);
+        for (size_t i = begin; i < end; ++i) add_up_body(c, i, &c->body_sums[BODY_SUMS * i]);
         if (levels) CPU(add_up_imbalance)(c, thread, threads);
         CPU_BARRIER;
-        if (thread == 0) add_up_islands(c);
+        if (thread == 0) add_up_loads(c);
         if (thread == 0 && levels) CPU(update_levels)(c);
         CPU_BARRIER;
         cpu_share(c->pair_block_count, thread, threads, &begin, &end);

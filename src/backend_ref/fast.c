@@ -70,28 +70,54 @@ static struct ref_body *island_of(const struct sadmm_context *c, const struct re
     return &c->bodies[c->bodies[body].label];
 }
 
-/* Energy and mass of every island, kept at the body that names it. */
+/* Adds J^T lambda of a constraint's side to `impulse`. */
+static void add_impulse(const struct ref_constraint *constraint, int side, double impulse[6])
+{
+    for (int r = 0; r < constraint->rows; ++r)
+        for (int j = 0; j < 6; ++j) impulse[j] += constraint->side[side].J[6 * r + j] * constraint->lambda[r];
+}
+
+/* Sums over the bodies of every island, kept at the body that names it; `count` constraints from `first` on act as one. */
+static void add_up_group(struct sadmm_context *c, size_t first, size_t count)
+{
+    for (int s = 0; s < 2; ++s) {
+        double impulse[6] = {0};
+        int32_t body = c->constraints[first].side[s].body;
+        if (body < 0) continue;
+        for (size_t k = first; k < first + count; ++k) add_impulse(&c->constraints[k], s, impulse);
+        for (int j = 0; j < 6; ++j) c->bodies[body].impulse[j] += impulse[j];
+        c->bodies[c->bodies[body].label].island_push +=
+            sqrt(impulse[0] * impulse[0] + impulse[1] * impulse[1] + impulse[2] * impulse[2]);
+    }
+}
+
 static void add_up_islands(struct sadmm_context *c)
 {
+    const struct sadmm_contact_set *contacts = c->system->contacts;
     for (int32_t i = 0; i < c->system->body_count; ++i) {
-        c->bodies[i].island_energy = c->bodies[i].island_mass = 0;
-        memset(c->bodies[i].impulse, 0, sizeof c->bodies[i].impulse);
+        struct ref_body *body = &c->bodies[i];
+        body->island_energy = body->island_mass = body->island_kinetic = body->island_push = 0;
+        memset(body->impulse, 0, sizeof body->impulse);
     }
-    for (size_t k = 0; k < c->constraint_count; ++k) {
-        const struct ref_constraint *constraint = &c->constraints[k];
-        for (int s = 0; s < 2; ++s) {
-            const struct ref_side *side = &constraint->side[s];
-            if (side->body < 0) continue;
-            for (int r = 0; r < constraint->rows; ++r)
-                for (int j = 0; j < 6; ++j)
-                    c->bodies[side->body].impulse[j] += side->J[6 * r + j] * constraint->lambda[r];
-        }
-    }
+    for (size_t p = 0; p < contacts->pair_count; ++p)
+        add_up_group(c, (size_t)contacts->pairs[p].first, (size_t)contacts->pairs[p].count);
+    for (size_t k = contacts->point_count; k < c->constraint_count; ++k) add_up_group(c, k, 1);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *body = &c->bodies[i], *island = &c->bodies[body->label];
+        double momentum[6];
+        dense6_mul(body->A, body->v, momentum);
         island->island_energy += inverse_form(body, body->impulse);
+        island->island_kinetic += dense6_dot(momentum, body->v);
         island->island_mass += mass_of(body);
     }
+}
+
+/* V of an island. */
+static double island_speed(const struct sadmm_context *c, const struct ref_body *island)
+{
+    double speed = weight_speed(island->island_energy, island->island_mass);
+    if (!c->plan->warm) return speed;
+    return weight_speed_warm(speed, island->island_push, island->island_kinetic, island->island_mass);
 }
 
 /* A v - b - sum J^T multiplier, by body, into `impulse`. */
@@ -185,7 +211,7 @@ static void weigh_pair(struct sadmm_context *c, const struct sadmm_contact_pair 
         load += sqrt(lambda2);
     }
     const struct ref_body *island = island_of(c, &c->constraints[pair->first]);
-    double speed = weight_speed(island->island_energy, island->island_mass);
+    double speed = island_speed(c, island);
     double carried = weight_mass(load / pair->count, speed, island->island_mass);
     double B = island->scale > 0 ? c->constraints[pair->first].B[0] * island->scale
                                  : weight_of_pair(island->level, carried, pair_response(c, pair));
@@ -209,7 +235,7 @@ static void weigh_block(struct sadmm_context *c, struct ref_constraint *constrai
         mean += w[r] / constraint->rows;
     }
     const struct ref_body *island = island_of(c, constraint);
-    double speed = weight_speed(island->island_energy, island->island_mass);
+    double speed = island_speed(c, island);
     double share = load2 > 0 ? weight_mass(sqrt(load2), speed, island->island_mass) / load2 : 0;
     memset(constraint->B, 0, sizeof constraint->B);
     for (int r = 0; r < constraint->rows; ++r) {

@@ -44,7 +44,7 @@ struct ref_body {
     double dual[6];                  /* (17), this body's part */
     /* fast */
     int32_t label;                   /* the smallest body of its island; that one keeps the island's sums */
-    double island_energy, island_mass;
+    double island_energy, island_mass, island_kinetic, island_push;
     double island_violation, island_defect, level, scale; /* math/weight.h; scale, if not 0: weights stay, times this */
     bool blocks;                     /* the island has constraints that are no pair's */
     struct limit_energies limit;

@@ -4,30 +4,34 @@
 #include <string.h>
 
 #include "dense6.h"
+#include "islands.h"
 #include "memory.h"
 #include "system_math.h"
 
-enum { MOST_SUPPORTS = 64, SWEEPS = 20 };
-/* Stiffness of the supports over the body's mass: a supported body keeps one part in this of its motion. */
+enum { MOST_SUPPORTS = 64 };
+/* Stiffness of supports over the body's mass: a body that is stopped keeps one part in this of its motion. */
 #define STIFF 1e7
-/* Of the largest impulse: less beyond its cone is the supports' softness. */
+/* Impulses outside of their cone by this share of the largest one: the supports' softness and rounding. */
 #define CONE_SLACK 1e-6
+/* Errors up to this share of the motion to be stopped are left to the iteration. */
+#define LEFT_OVER 1e-3
 
 struct predictor {
     struct sadmm_system *system;
     const struct sadmm_settings *settings;
     int32_t *offsets, *incident; /* body -> its pairs: (bodies + 2), twice the pairs */
-    int32_t *depth, *order;      /* contacts between a body and the ground; bodies, nearest first, `reached` of them */
+    int32_t *depth, *order;      /* contacts between a body and the ground, 0: none lead there; bodies, nearest first */
+    int32_t *label;              /* islands */
+    bool *failed;                /* of islands, at their labels */
     double *momentum;            /* bodies x 6: b and what was handed down */
-    int32_t reached;
+    int32_t reached;             /* bodies in `order` */
 };
 
-/* A contact of the body at hand with something nearer to the ground. */
+/* A contact that stops a body. */
 struct support {
     const struct sadmm_contact_pair *pair;
     struct sadmm_contact_point *point;
     vec3 normal, arm, impulse; /* towards the body, from its centre, on it */
-    double error;
 };
 
 static int32_t other_body(const struct sadmm_contact_pair *pair, int32_t i)
@@ -56,7 +60,6 @@ static void find_depths(struct predictor *p)
 {
     const struct sadmm_contact_set *contacts = p->system->contacts;
     for (int32_t i = 0; i < p->system->body_count; ++i) {
-        p->depth[i] = 0;
         for (int32_t at = p->offsets[i]; at < p->offsets[i + 1] && !p->depth[i]; ++at)
             if (other_body(&contacts->pairs[p->incident[at]], i) < 0) p->depth[i] = 1;
         if (p->depth[i]) p->order[p->reached++] = i;
@@ -72,20 +75,10 @@ static void find_depths(struct predictor *p)
     }
 }
 
-/* x + e n of a support, the other side at rest. */
-static vec3 approach(const struct support *s, const double v[6])
-{
-    return v3_madd(v3_add(v3_load(v), v3_cross(v3_load(v + 3), s->arm)), s->error, s->normal);
-}
+static vec3 point_velocity(const double v[6], vec3 arm) { return v3_add(v3_load(v), v3_cross(v3_load(v + 3), arm)); }
 
-static void add_impulse(double g[6], vec3 arm, vec3 impulse, double sign)
-{
-    vec3 torque = v3_cross(arm, impulse);
-    g[0] += sign * impulse.x, g[1] += sign * impulse.y, g[2] += sign * impulse.z;
-    g[3] += sign * torque.x, g[4] += sign * torque.y, g[5] += sign * torque.z;
-}
-
-/* Those that the body would move into with velocity v. */
+/* Contacts with nearer ones that the body would move into with velocity v; -1: one of them lets it come closer, or has to
+ * push it off. */
 static int find_supports(const struct predictor *p, int32_t i, const double v[6], struct support supports[MOST_SUPPORTS])
 {
     const struct sadmm_contact_set *contacts = p->system->contacts;
@@ -101,98 +94,114 @@ static int find_supports(const struct predictor *p, int32_t i, const double v[6]
             s->point = &contacts->points[pair->first + k];
             s->normal = v3_scale(v3_load(pair->normal), is_b ? 1 : -1);
             s->arm = v3_load(is_b ? s->point->arm_b : s->point->arm_a);
-            s->error = sadmm_contact_e(p->system, p->settings, pair, s->point);
-            s->impulse = v3(0, 0, 0);
-            count += v3_dot(s->normal, approach(s, v)) < 0;
+            double closing = -v3_dot(s->normal, point_velocity(v, s->arm));
+            double e = sadmm_contact_e(p->system, p->settings, pair, s->point);
+            if (e < -LEFT_OVER * fabs(closing)) return -1;
+            count += e < LEFT_OVER * closing;
         }
     }
     return count;
 }
 
-/* All supports hold, in all directions: the least impulses that stop the body. False where they would pull or slip. */
-static bool hold(const double A[36], double mass, const double momentum[6], struct support *supports, int count, double v[6])
+static void add_impulse(double g[6], vec3 arm, vec3 impulse)
 {
-    double M[36], L[36], g[6], largest = 0, beta = STIFF * mass;
+    vec3 torque = v3_cross(arm, impulse);
+    g[0] += impulse.x, g[1] += impulse.y, g[2] += impulse.z;
+    g[3] += torque.x, g[4] += torque.y, g[5] += torque.z;
+}
+
+/* The least impulses that stop the body: those of stiff dampers. False where contacts cannot give them. */
+static bool hold(const double A[36], const double momentum[6], struct support *supports, int count, double v[6])
+{
+    static const double axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    double M[36], L[36], largest = 0, stiffness = STIFF * (A[0] + A[7] + A[14]) / 3;
     memcpy(M, A, sizeof M);
-    memcpy(g, momentum, sizeof g);
-    for (int k = 0; k < count; ++k) {
-        vec3 axes[3] = {v3(1, 0, 0), v3(0, 1, 0), v3(0, 0, 1)};
+    for (int k = 0; k < count; ++k)
         for (int axis = 0; axis < 3; ++axis) {
-            vec3 m = v3_cross(supports[k].arm, axes[axis]);
-            const double row[6] = {axes[axis].x, axes[axis].y, axes[axis].z, m.x, m.y, m.z};
+            double row[6] = {0};
+            add_impulse(row, supports[k].arm, v3_load(axes[axis]));
             for (int r = 0; r < 6; ++r)
-                for (int c = 0; c <= r; ++c) M[6 * r + c] += beta * row[r] * row[c];
+                for (int c = 0; c <= r; ++c) M[6 * r + c] += stiffness * row[r] * row[c];
         }
-        add_impulse(g, supports[k].arm, supports[k].normal, -beta * supports[k].error);
-    }
     if (!dense6_cholesky(M, L)) return false;
-    dense6_solve(L, g, v);
+    dense6_solve(L, momentum, v);
     for (int k = 0; k < count; ++k) {
-        supports[k].impulse = v3_scale(approach(&supports[k], v), -beta);
+        supports[k].impulse = v3_scale(point_velocity(v, supports[k].arm), -stiffness);
         largest = fmax(largest, v3_norm(supports[k].impulse));
     }
     for (int k = 0; k < count; ++k) {
-        vec3 kept = contact_project(supports[k].impulse, supports[k].normal, supports[k].pair->friction);
-        if (v3_norm(v3_sub(kept, supports[k].impulse)) > CONE_SLACK * largest) return false;
-        supports[k].impulse = kept;
+        vec3 within = contact_project(supports[k].impulse, supports[k].normal, supports[k].pair->friction);
+        if (v3_norm(v3_sub(within, supports[k].impulse)) > CONE_SLACK * largest) return false;
     }
     return true;
 }
 
-/* Contact by contact, Gauss and Seidel's way. */
-static void sweep(const double factor[36], double v[6], struct support *supports, int count)
+/* Size of v as the speed of what has its energy. */
+static double speed(const double A[36], const double v[6])
 {
-    double response[MOST_SUPPORTS];
-    for (int k = 0; k < count; ++k) {
-        vec3 axes[3] = {v3(1, 0, 0), v3(0, 1, 0), v3(0, 0, 1)};
-        response[k] = 0;
-        for (int axis = 0; axis < 3; ++axis) {
-            double g[6] = {0}, y[6];
-            add_impulse(g, supports[k].arm, axes[axis], 1);
-            dense6_forward(factor, g, y);
-            response[k] += dense6_dot(y, y);
-        }
-        supports[k].impulse = v3(0, 0, 0);
-    }
-    for (int s = 0; s < SWEEPS; ++s)
-        for (int k = 0; k < count; ++k) {
-            vec3 wanted = v3_madd(supports[k].impulse, -1 / response[k], approach(&supports[k], v));
-            vec3 next = contact_project(wanted, supports[k].normal, supports[k].pair->friction);
-            double g[6] = {0}, change[6];
-            add_impulse(g, supports[k].arm, v3_sub(next, supports[k].impulse), 1);
-            dense6_solve(factor, g, change);
-            for (int j = 0; j < 6; ++j) v[j] += change[j];
-            supports[k].impulse = next;
-        }
+    double momentum[6];
+    dense6_mul(A, v, momentum);
+    return sqrt(dense6_dot(momentum, v) / ((A[0] + A[7] + A[14]) / 3));
 }
 
-/* The supports take what the body brings and hand it down. */
-static void settle(struct predictor *p, int32_t i)
+/* A body's supports take what it brings and hand it on. False where they cannot stop it. */
+static bool stop(struct predictor *p, int32_t i)
 {
     struct support supports[MOST_SUPPORTS];
-    double A[36], b[6], factor[36], *momentum = &p->momentum[6 * (size_t)i], *v = &p->system->velocity[6 * (size_t)i];
+    double A[36], b[6], L[36], *momentum = &p->momentum[6 * (size_t)i], *v = &p->system->velocity[6 * (size_t)i];
     sadmm_system_body(p->system, p->settings, i, A, b);
-    if (!dense6_cholesky(A, factor)) return;
-    dense6_solve(factor, momentum, v);
-    int count = p->depth[i] ? find_supports(p, i, v, supports) : 0;
-    if (count == 0) return;
-    double free[6];
-    memcpy(free, v, sizeof free);
-    if (!hold(A, (A[0] + A[7] + A[14]) / 3, momentum, supports, count, v)) {
-        memcpy(v, free, sizeof free);
-        sweep(factor, v, supports, count);
-    }
-    memcpy(free, momentum, sizeof free);
+    if (!dense6_cholesky(A, L)) return false;
+    dense6_solve(L, momentum, v);
+    double before = speed(A, v);
+    int count = find_supports(p, i, v, supports);
+    if (count < 0 || !hold(A, momentum, supports, count, v) || speed(A, v) > LEFT_OVER * before) return false;
     for (int k = 0; k < count; ++k) {
         const struct support *s = &supports[k];
         int32_t other = other_body(s->pair, i);
         bool is_b = s->pair->body_b == i;
         v3_store(is_b ? s->impulse : v3_neg(s->impulse), s->point->impulse);
-        add_impulse(free, s->arm, s->impulse, 1);
         if (other >= 0)
-            add_impulse(&p->momentum[6 * (size_t)other], v3_load(is_b ? s->point->arm_a : s->point->arm_b), s->impulse, -1);
+            add_impulse(&p->momentum[6 * (size_t)other], v3_load(is_b ? s->point->arm_a : s->point->arm_b),
+                        v3_neg(s->impulse));
     }
-    dense6_solve(factor, free, v); /* what was cut off by the cone shows in v */
+    return true;
+}
+
+/* Islands that were not stopped start from nothing. */
+static void forget_failures(struct predictor *p)
+{
+    struct sadmm_system *system = p->system;
+    for (size_t k = 0; k < system->contacts->pair_count; ++k) {
+        const struct sadmm_contact_pair *pair = &system->contacts->pairs[k];
+        if (!p->failed[p->label[pair->body_a >= 0 ? pair->body_a : pair->body_b]]) continue;
+        for (int j = 0; j < pair->count; ++j) memset(system->contacts->points[pair->first + j].impulse, 0, 3 * sizeof(double));
+    }
+    for (int32_t i = 0; i < system->body_count; ++i) {
+        double A[36], b[6], L[36];
+        if (!p->failed[p->label[i]]) continue;
+        sadmm_system_body(system, p->settings, i, A, b);
+        if (dense6_cholesky(A, L)) dense6_solve(L, b, &system->velocity[6 * (size_t)i]);
+    }
+}
+
+static void predict(struct predictor *p)
+{
+    struct sadmm_system *system = p->system;
+    for (size_t k = 0; k < system->contacts->point_count; ++k)
+        memset(system->contacts->points[k].impulse, 0, sizeof system->contacts->points[k].impulse);
+    list_pairs(p);
+    find_depths(p);
+    sadmm_islands(system, p->label);
+    for (int32_t i = 0; i < system->body_count; ++i) {
+        double A[36];
+        sadmm_system_body(system, p->settings, i, A, &p->momentum[6 * (size_t)i]);
+        if (!p->depth[i]) p->failed[p->label[i]] = true;
+    }
+    for (int32_t k = p->reached; k-- > 0;) {
+        int32_t i = p->order[k];
+        if (!p->failed[p->label[i]] && !stop(p, i)) p->failed[p->label[i]] = true;
+    }
+    forget_failures(p);
 }
 
 sadmm_status sadmm_loads_predict(struct sadmm_system *system, const struct sadmm_settings *settings,
@@ -204,24 +213,17 @@ sadmm_status sadmm_loads_predict(struct sadmm_system *system, const struct sadmm
     p.incident = sadmm_alloc(2 * system->contacts->pair_count, sizeof *p.incident);
     p.depth = sadmm_alloc(n, sizeof *p.depth);
     p.order = sadmm_alloc(n, sizeof *p.order);
+    p.label = sadmm_alloc(n, sizeof *p.label);
+    p.failed = sadmm_alloc(n, sizeof *p.failed);
     p.momentum = sadmm_alloc(6 * n, sizeof *p.momentum);
-    bool room = p.offsets && p.incident && p.depth && p.order && p.momentum;
-    if (room) {
-        for (size_t k = 0; k < system->contacts->point_count; ++k)
-            memset(system->contacts->points[k].impulse, 0, sizeof system->contacts->points[k].impulse);
-        list_pairs(&p);
-        find_depths(&p);
-        for (int32_t i = 0; i < system->body_count; ++i) {
-            double A[36];
-            sadmm_system_body(system, settings, i, A, &p.momentum[6 * (size_t)i]);
-            if (!p.depth[i]) settle(&p, i);
-        }
-        for (int32_t k = p.reached; k-- > 0;) settle(&p, p.order[k]);
-    }
+    bool room = p.offsets && p.incident && p.depth && p.order && p.label && p.failed && p.momentum;
+    if (room) predict(&p);
     sadmm_free(p.offsets);
     sadmm_free(p.incident);
     sadmm_free(p.depth);
     sadmm_free(p.order);
+    sadmm_free(p.label);
+    sadmm_free(p.failed);
     sadmm_free(p.momentum);
     return room ? SADMM_OK : sadmm_fail_memory(error, "the loads to start from");
 }

@@ -72,6 +72,22 @@ SADMM_INLINE double weight_next_level(double level, double balance)
     return fmin(fmax(level * factor, WEIGHT_LEVEL_LEAST), WEIGHT_LEVEL_MOST);
 }
 
+/* V of an island in a step that starts warm. Contacts that are solved in part, step by step, are springs of stiffness B
+ * iterations / dt^2, and a pile that is tall buckles on them. `push` / (m V), with `push` the sum of the forces' sizes that its
+ * bodies feel, N s, is twice the bodies that a load passes on its way, and where they are many and at rest V is less and B
+ * more. */
+#define WEIGHT_TALL 20.0
+#define WEIGHT_TALL_MOST 6.0
+/* Over the speed of bodies at rest, the least V. */
+#define WEIGHT_REST 20.0
+
+SADMM_INLINE double weight_speed_warm(double speed, double push, double kinetic, double mass)
+{
+    double tall = push / (mass * speed * WEIGHT_TALL);
+    double least = speed / fmin(fmax(tall * tall, 1), WEIGHT_TALL_MOST);
+    return fmin(fmax(least, WEIGHT_REST * sqrt(kinetic / mass)), speed);
+}
+
 /* B of a pair, kg. phi / w does not sink with the level: it is for contacts whose load is not known. */
 SADMM_INLINE double weight_of_pair(double level, double carried, double response)
 {
