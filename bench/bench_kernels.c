@@ -14,6 +14,7 @@
 
 struct options {
     sadmm_backend backend; /* AUTO: all */
+    sadmm_method method;
     int precision;         /* -1: both */
     int threads[BENCH_LIST], thread_count;
     long contacts[BENCH_LIST];
@@ -98,10 +99,11 @@ static sadmm_status measure(const struct sadmm_kernels *k, struct sadmm_context 
     return SADMM_OK;
 }
 
-static sadmm_status run_row(const struct sadmm_kernels *k, struct lattice *lattice, double seconds, struct row *row,
-                            struct sadmm_error *error)
+static sadmm_status run_row(const struct sadmm_kernels *k, struct lattice *lattice, sadmm_method method, double seconds,
+                            struct row *row, struct sadmm_error *error)
 {
     struct sadmm_settings settings = sadmm_settings_default();
+    settings.method = method;
     settings.threads = row->threads;
     settings.penalty_period = 0;
     lattice_reset(lattice);
@@ -130,6 +132,7 @@ static void usage(FILE *out)
             "usage: subadmm-bench kernels [options]\n\n"
             "  --backend ref|cpu|cuda|all   default all (ref up to 10,000 contacts)\n"
             "  --precision f32|f64|both     default both\n"
+            "  --method paper|fast          default paper; tables that do not have the method are left out\n"
             "  --threads N[,N...]           CPU threads, default 1,2\n"
             "  --contacts N[,N...]          default 1000,10000,100000,1000000\n"
             "  --seconds S                  time spent on each row, default 1\n"
@@ -148,7 +151,8 @@ static int parse(int argc, char **argv, struct options *o)
         {"backend", required_argument, NULL, 'b'},  {"precision", required_argument, NULL, 'p'},
         {"threads", required_argument, NULL, 't'},  {"contacts", required_argument, NULL, 'c'},
         {"seconds", required_argument, NULL, 's'},  {"json", required_argument, NULL, 'j'},
-        {"help", no_argument, NULL, 'h'},           {NULL, 0, NULL, 0},
+        {"method", required_argument, NULL, 'm'},   {"help", no_argument, NULL, 'h'},
+        {NULL, 0, NULL, 0},
     };
     long threads[BENCH_LIST];
     for (int option; (option = getopt_long(argc, argv, "h", longs, NULL)) != -1;) {
@@ -169,6 +173,9 @@ static int parse(int argc, char **argv, struct options *o)
             break;
         case 's':
             if (!bench_parse_seconds(optarg, 600, &o->seconds)) return bad("seconds", optarg, "in (0, 600]");
+            break;
+        case 'm':
+            if (!bench_parse_method(optarg, &o->method)) return bad("method", optarg, "paper or fast");
             break;
         case 'j': o->json = optarg; break;
         case 'h': usage(stdout); return -1;
@@ -222,6 +229,7 @@ int bench_kernels(int argc, char **argv)
         for (size_t index = 0; (k = sadmm_kernels_at(index)) != NULL && status == 0; ++index) {
             if (o.backend != SADMM_BACKEND_AUTO && k->backend != o.backend) continue;
             if (o.precision >= 0 && (int)k->precision != o.precision) continue;
+            if (o.method == SADMM_METHOD_FAST && !k->update_weights) continue;
             if (k->backend == SADMM_BACKEND_REF && o.contacts[size] > 10000 && o.backend != SADMM_BACKEND_REF) continue;
             for (int t = 0; t < (k->backend == SADMM_BACKEND_CPU ? o.thread_count : 1) && status == 0; ++t) {
                 sadmm_backend_info info;
@@ -229,7 +237,7 @@ int bench_kernels(int argc, char **argv)
                 sadmm_backend_query(k->backend, &info);
                 struct row row = {.backend = k->backend, .name = info.name, .variant = k->variant, .precision = k->precision,
                                   .threads = k->backend == SADMM_BACKEND_CPU ? o.threads[t] : 1};
-                if (run_row(k, &lattice, o.seconds, &row, &error) != SADMM_OK) {
+                if (run_row(k, &lattice, o.method, o.seconds, &row, &error) != SADMM_OK) {
                     fprintf(stderr, "subadmm-bench kernels: %s\n", error.message);
                     status = 1;
                     break;
@@ -246,8 +254,9 @@ int bench_kernels(int argc, char **argv)
         }
         lattice_destroy(&lattice);
     }
-    json_t *document = json_pack("{s:s, s:s, s:s, s:o, s:o}", "bench", "kernels", "commit", sadmm_build_commit(), "compiler",
-                                 sadmm_build_compiler(), "memory", bandwidths, "rows", rows);
+    json_t *document = json_pack("{s:s, s:s, s:s, s:s, s:o, s:o}", "bench", "kernels", "method",
+                                 o.method == SADMM_METHOD_FAST ? "fast" : "paper", "commit", sadmm_build_commit(),
+                                 "compiler", sadmm_build_compiler(), "memory", bandwidths, "rows", rows);
     if (status == 0 && o.json && !bench_write_json(document, o.json)) status = 1;
     json_decref(document);
     return status;

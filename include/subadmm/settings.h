@@ -76,9 +76,6 @@ typedef struct sadmm_settings {
 
     double baumgarte;            /* share of penetration beyond the slop removed a step, in [0, 1]; default 0.2 */
     double slop;                 /* penetration left alone, m, in [0, 1]; default 1e-5 */
-    double gap_share;            /* share of a gap within the slop that bodies may close in a step, in [0, 1]; 0: the method's
-                                    own, PAPER 1, FAST 0.003 (docs/algorithm.md, section 7); default 0. Larger gaps are
-                                    closed in one step but for what is left of this one */
     double correction_speed;     /* cap of the corrective normal speed, m/s, in [0, 1e3]; default 1 */
     double restitution_threshold;/* approach speed under which restitution is ignored, m/s, >= 0; default 0.1 */
 

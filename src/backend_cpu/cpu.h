@@ -95,6 +95,7 @@ struct row_block {
 struct cpu_island {
     double energy, mass, speed; /* sum of g . A^-1 g, kg, V in m/s */
     double kinetic, push;       /* sum of v . A v; of the sizes of the bodies' impulses */
+    double tallness;            /* in steps that start warm */
     double level, scale;        /* math/weight.h; not 0: weights stay, times this */
     double violation, defect;
     bool blocks;                /* there are constraints by rows: the level stays 1 */

@@ -74,12 +74,11 @@ static inline void prefetch_bodies(const struct sadmm_context *c, size_t index)
 }
 
 static inline __attribute__((always_inline)) void sweep_block(struct sadmm_context *c, size_t index, int rows,
-                                                              enum cpu_sweep sweep, double *primal)
+                                                              enum cpu_sweep sweep, lanes relaxation, double *primal)
 {
     const struct pair_block *block = &c->pair_blocks[index];
     vec n = block->normal, u = {0}, w = {0};
     lanes mu = block->friction, inv_s = block->inv_s, change_max = {0};
-    lanes relaxation = fill((real)c->settings.relaxation); /* used by RELAX only */
     const lanes zero = {0};
     struct pair_sum next = {0}, change = {0};
 
@@ -144,8 +143,9 @@ static inline __attribute__((always_inline)) void sweep_block(struct sadmm_conte
 
 void CPU(sweep_pairs)(struct sadmm_context *c, size_t begin, size_t end, enum cpu_sweep sweep, double *primal)
 {
+    const lanes relaxation = fill((real)c->settings.relaxation); /* used by RELAX only */
 #define SWEEP(rows, kind) \
-    for (size_t k = begin; k < end; ++k) sweep_block(c, k, rows, kind, primal)
+    for (size_t k = begin; k < end; ++k) sweep_block(c, k, rows, kind, relaxation, primal)
     if (c->plan.contact_rows == 3) {
         if (sweep == CPU_SWEEP_ITERATE) SWEEP(3, CPU_SWEEP_ITERATE);
         else if (sweep == CPU_SWEEP_RELAX) SWEEP(3, CPU_SWEEP_RELAX);

@@ -118,7 +118,9 @@ static void add_up_loads(struct sadmm_context *c)
         struct cpu_island *island = &c->islands[i];
         if (c->label[i] != i) continue;
         island->speed = weight_speed(island->energy, island->mass);
-        if (c->plan.warm) island->speed = weight_speed_warm(island->speed, island->push, island->kinetic, island->mass);
+        if (!c->plan.warm) continue;
+        island->tallness = weight_tallness(island->speed, island->push, island->mass);
+        island->speed = weight_speed_warm(island->speed, island->tallness, island->kinetic, island->mass);
     }
 }
 
@@ -152,6 +154,23 @@ static double pair_load(const struct sadmm_context *c, const struct pair_block *
         }
     }
     return sum / count;
+}
+
+/* The contacts of tall islands close small gaps slowly. */
+static void ease_gaps(struct sadmm_context *c, size_t index)
+{
+    const struct pair_block *block = &c->pair_blocks[index];
+    double slop = c->settings.slop / c->settings.dt;
+    for (int l = 0; l < LANES; ++l) {
+        if (block->pair[l] < 0) continue;
+        const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[block->pair[l]];
+        double tallness = cpu_island_of(c, pair->body_a, pair->body_b)->tallness;
+        for (int k = 0; k < pair->count && tallness > 1; ++k) {
+            real *error = c->plan.contact_rows == 3 ? (real *)&((struct point_slot *)c->slots + block->first + k)->error
+                                                    : (real *)&((struct normal_slot *)c->slots + block->first + k)->error;
+            error[l] = (real)weight_gap_error((double)error[l], tallness, slop);
+        }
+    }
 }
 
 static void weigh_pair_block(struct sadmm_context *c, size_t index)
@@ -244,6 +263,7 @@ sadmm_status CPU(update_weights)(struct sadmm_context *c, struct sadmm_error *er
 {
     (void)error;
     bool levels = ++c->refreshes >= WEIGHT_FIRST_LEVEL;
+    bool eases = c->refreshes == 0 && c->plan.warm && c->plan.rigid; /* world level: gaps, a slop and a step */
     CPU(sum_wrenches)(c);
     CPU_PARALLEL
     {
@@ -258,6 +278,7 @@ sadmm_status CPU(update_weights)(struct sadmm_context *c, struct sadmm_error *er
         CPU_BARRIER;
         cpu_share(c->pair_block_count, thread, threads, &begin, &end);
         for (size_t k = begin; k < end; ++k) weigh_pair_block(c, k);
+        for (size_t k = begin; k < end && eases; ++k) ease_gaps(c, k);
         cpu_share(c->row_block_count, thread, threads, &begin, &end);
         for (size_t k = begin; k < end; ++k) weigh_row_block(c, &c->row_blocks[k]);
         CPU_BARRIER;

@@ -112,12 +112,18 @@ static void add_up_islands(struct sadmm_context *c)
     }
 }
 
+static double island_tallness(const struct ref_body *island)
+{
+    return weight_tallness(weight_speed(island->island_energy, island->island_mass), island->island_push,
+                           island->island_mass);
+}
+
 /* V of an island. */
 static double island_speed(const struct sadmm_context *c, const struct ref_body *island)
 {
     double speed = weight_speed(island->island_energy, island->island_mass);
     if (!c->plan->warm) return speed;
-    return weight_speed_warm(speed, island->island_push, island->island_kinetic, island->island_mass);
+    return weight_speed_warm(speed, island_tallness(island), island->island_kinetic, island->island_mass);
 }
 
 /* A v - b - sum J^T multiplier, by body, into `impulse`. */
@@ -268,6 +274,12 @@ sadmm_status sadmm_ref_update_weights(struct sadmm_context *c, struct sadmm_erro
     add_up_islands(c);
     if (++c->refreshes >= WEIGHT_FIRST_LEVEL) update_levels(c);
     for (size_t p = 0; p < c->system->contacts->pair_count; ++p) weigh_pair(c, &c->system->contacts->pairs[p]);
+    if (c->refreshes == 0 && c->plan->warm && c->plan->rigid)
+        for (size_t k = 0; k < points; ++k) {
+            struct ref_constraint *contact = &c->constraints[k];
+            contact->e[0] = weight_gap_error(contact->e[0], island_tallness(island_of(c, contact)),
+                                             c->settings->slop / c->settings->dt);
+        }
     for (size_t k = points; k < c->constraint_count; ++k) weigh_block(c, &c->constraints[k]);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         memset(c->bodies[i].C, 0, sizeof c->bodies[i].C);

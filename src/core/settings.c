@@ -24,7 +24,6 @@ sadmm_settings sadmm_settings_default(void)
         .recover_wrenches = true,
         .baumgarte = 0.2,
         .slop = 1e-5,
-        .gap_share = 0,
         .correction_speed = 1,
         .restitution_threshold = 0.1,
         .threads = 0,
@@ -51,7 +50,6 @@ sadmm_status sadmm_settings_validate(const struct sadmm_settings *s, struct sadm
         {"penalty_ratio_limit", s->penalty_ratio_limit, 1, 1e6},
         {"baumgarte", s->baumgarte, 0, 1},
         {"slop", s->slop, 0, 1},
-        {"gap_share", s->gap_share, 0, 1},
         {"correction_speed", s->correction_speed, 0, 1e3},
     };
     const struct {

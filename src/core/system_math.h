@@ -56,13 +56,6 @@ SADMM_INLINE vec3 sadmm_contact_velocity(const struct sadmm_contact_pair *pair, 
     return x;
 }
 
-/* The share of a gap within the slop that is closed in a step. */
-SADMM_INLINE double sadmm_gap_share(const struct sadmm_settings *settings)
-{
-    if (settings->gap_share > 0) return settings->gap_share;
-    return settings->method == SADMM_METHOD_FAST ? 0.003 : 1;
-}
-
 /* e along the normal, m/s. */
 SADMM_INLINE double sadmm_contact_e(const struct sadmm_system *system, const struct sadmm_settings *settings,
                                      const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *point)
@@ -82,7 +75,7 @@ SADMM_INLINE double sadmm_contact_e(const struct sadmm_system *system, const str
         approach = v3_dot(v3_load(pair->normal), v3_sub(vb, va));
     }
     return contact_error(point->gap, approach, pair->restitution, settings->dt, settings->baumgarte, settings->slop,
-                         sadmm_gap_share(settings), settings->correction_speed, settings->restitution_threshold);
+                         settings->correction_speed, settings->restitution_threshold);
 }
 
 /* Eq. (15): beta is multiplied by this. A residual of zero on both sides says nothing about the balance: leave the penalty

@@ -4,17 +4,16 @@
 
 #include "vec3.h"
 
-/* e of a contact from its gap (m), in m/s. Apart: the bodies may close the gap in one step and no more; but of a gap within
- * the slop only `gap_share` (method fast: docs/algorithm.md, section 7). Overlapping beyond the slop: Baumgarte's share of it is pushed out each step, with a capped speed. Restitution: an approach
+/* e of a contact from its gap (m), in m/s. Apart: the bodies may close the gap in one step and no more. Overlapping
+ * beyond the slop: Baumgarte's share of it is pushed out each step, with a capped speed. Restitution: an approach
  * faster than the threshold that would touch within the step leaves with `restitution` times its speed.
  * `approach` is the normal velocity at the start of the step (negative: closing). */
 SADMM_INLINE double contact_error(double gap, double approach, double restitution, double dt, double baumgarte,
-                                  double slop, double gap_share, double correction_speed,
-                                    double restitution_threshold)
+                                  double slop, double correction_speed, double restitution_threshold)
 {
     double e;
     if (gap >= 0) {
-        e = fmax(gap_share * gap, gap - (1 - gap_share) * slop) / dt;
+        e = gap / dt;
     } else {
         double depth = -gap - slop;
         e = depth > 0 ? -fmin(baumgarte * depth / dt, correction_speed) : 0.0;

@@ -72,20 +72,34 @@ SADMM_INLINE double weight_next_level(double level, double balance)
     return fmin(fmax(level * factor, WEIGHT_LEVEL_LEAST), WEIGHT_LEVEL_MOST);
 }
 
-/* V of an island in a step that starts warm. Contacts that are solved in part, step by step, are springs of stiffness B
- * iterations / dt^2, and a pile that is tall buckles on them. `push` / (m V), with `push` the sum of the forces' sizes that its
- * bodies feel, N s, is twice the bodies that a load passes on its way, and where they are many and at rest V is less and B
- * more. */
+/* Tall islands in steps that start warm. Contacts that are solved in part, step by step, are springs of stiffness
+ * B iterations / dt^2, on which a tall pile buckles, and gaps, closed in one step, act on them as an integral controller that
+ * excites them. `push`, the sum of the sizes of the impulses that the bodies feel, N s, over m V is twice the number of bodies
+ * that a load passes on its way to the ground. */
 #define WEIGHT_TALL 20.0
 #define WEIGHT_TALL_MOST 6.0
 /* Over the speed of bodies at rest, the least V. */
 #define WEIGHT_REST 20.0
+#define WEIGHT_GAP_LEAST 0.003
 
-SADMM_INLINE double weight_speed_warm(double speed, double push, double kinetic, double mass)
+/* 1 and more. */
+SADMM_INLINE double weight_tallness(double speed, double push, double mass)
 {
-    double tall = push / (mass * speed * WEIGHT_TALL);
-    double least = speed / fmin(fmax(tall * tall, 1), WEIGHT_TALL_MOST);
+    return fmax(push / (mass * speed * WEIGHT_TALL), 1);
+}
+
+/* V: less, and B more, where the island is at rest. */
+SADMM_INLINE double weight_speed_warm(double speed, double tallness, double kinetic, double mass)
+{
+    double least = speed / fmin(tallness * tallness, WEIGHT_TALL_MOST);
     return fmin(fmax(least, WEIGHT_REST * sqrt(kinetic / mass)), speed);
+}
+
+/* e of a contact with a gap: of a gap within the slop, only a share is closed. `slop` over dt, m/s. */
+SADMM_INLINE double weight_gap_error(double error, double tallness, double slop)
+{
+    double square = tallness * tallness, share = fmax(1 / (square * square), WEIGHT_GAP_LEAST);
+    return error > 0 ? fmax(share * error, error - (1 - share) * slop) : error;
 }
 
 /* B of a pair, kg. phi / w does not sink with the level: it is for contacts whose load is not known. */
