@@ -8,13 +8,14 @@
 #include "solve_loop.h"
 
 enum {
-    OPTION_BACKEND, OPTION_PRECISION, OPTION_TOLERANCE, OPTION_MAX_ITERATIONS, OPTION_CHECK_PERIOD, OPTION_LEVEL,
+    OPTION_BACKEND, OPTION_PRECISION, OPTION_METHOD, OPTION_TOLERANCE, OPTION_MAX_ITERATIONS, OPTION_CHECK_PERIOD, OPTION_LEVEL,
     OPTION_MASS_FACTOR, OPTION_PENALTY_PERIOD, OPTION_THREADS, OPTION_SOLUTION, OPTION_JSON, OPTION_QUIET
 };
 
 static const struct cli_option options[] = {
     [OPTION_BACKEND] = {"backend", "NAME", "auto, ref, cpu or cuda (default auto)"},
     [OPTION_PRECISION] = {"precision", "P", "f32 or f64 (default f64)"},
+    [OPTION_METHOD] = {"method", "NAME", "paper or fast (default paper); fast takes no penalty options"},
     [OPTION_TOLERANCE] = {"tolerance", "T", "of siconos' measure (default 1e-8; f32: 1e-6)"},
     [OPTION_MAX_ITERATIONS] = {"max-iterations", "N", "give up after (default 100000)"},
     [OPTION_CHECK_PERIOD] = {"check-period", "N", "iterations between looks at the error (default 100)"},
@@ -49,6 +50,7 @@ static int set_option(void *target, size_t index, const char *value)
     switch (index) {
     case OPTION_BACKEND: ok = cli_read_backend("--backend", value, &o->plan.backend); break;
     case OPTION_PRECISION: ok = cli_read_precision("--precision", value, &o->plan.precision); break;
+    case OPTION_METHOD: ok = cli_read_method("--method", value, &s->method); break;
     case OPTION_TOLERANCE:
         ok = cli_read_real("--tolerance", value, 0, 1, &o->plan.tolerance);
         o->tolerance_given = true;
@@ -98,7 +100,7 @@ static json_t *outcome_json(const char *path, const struct solve_options *o, con
     json_object_set_new(root, "file", json_string(path));
     json_object_set_new(root, "backend", json_string(cli_backend_name(out->report.backend)));
     json_object_set_new(root, "precision", json_string(cli_precision_name(out->report.precision)));
-    json_object_set_new(root, "method", json_string("paper"));
+    json_object_set_new(root, "method", json_string(cli_method_name(o->plan.settings.method)));
     json_object_set_new(root, "bodies", json_integer(s->bodies));
     json_object_set_new(root, "contacts", json_integer(s->contacts));
     json_object_set_new(root, "hard_rows", json_integer(s->hard_rows));
@@ -137,8 +139,11 @@ static void print_outcome(const char *path, const struct solve_options *o, const
            s->hard_rows);
     printf("backend        %s %s, %d thread%s\n", cli_backend_name(out->report.backend),
            cli_precision_name(out->report.precision), out->report.threads, out->report.threads == 1 ? "" : "s");
-    printf("solve          %s after %ld iterations, %.3f ms (penalty offset %.3g kg, %d tried)\n",
-           out->converged ? "converged" : "NOT converged", out->iterations, out->ms, out->level, out->levels_tried);
+    printf("solve          %s after %ld iterations, %.3f ms (%s", out->converged ? "converged" : "NOT converged",
+           out->iterations, out->ms, cli_method_name(o->plan.settings.method));
+    if (o->plan.settings.method == SADMM_METHOD_PAPER)
+        printf(", penalty offset %.3g kg, %d tried", out->level, out->levels_tried);
+    printf(")\n");
     printf("siconos        %.3g (tolerance %g)\n", c->siconos, o->plan.tolerance);
     printf("certificate    ncp %.3g m/s at most, %.3g mean; momentum %.3g\n", c->ncp_max, c->ncp_mean, c->momentum_max);
     printf("velocities u   closing %.3g m/s at most, sliding %.3g m/s at most\n", closing < 0 ? -closing : 0, sliding);

@@ -134,14 +134,19 @@ static sadmm_status advance(struct loop *l, struct lane *lane)
     return keep(l, lane);
 }
 
-/* The first lane alone, until the end or, when the level is open, until it stalls. */
+static bool has_other_lanes(const struct solve_plan *plan)
+{
+    return plan->level <= 0 && plan->settings.method == SADMM_METHOD_PAPER;
+}
+
+/* The first lane alone, until the end or, when there are others, until it stalls. */
 static sadmm_status run_first(struct loop *l)
 {
     struct lane *lane = &l->lanes[0];
     double to_halve = INFINITY;
     int unimproved = 0;
     bool cold = true;
-    while (!finished(l) && (l->plan->level > 0 || unimproved < PATIENCE)) {
+    while (!finished(l) && (!has_other_lanes(l->plan) || unimproved < PATIENCE)) {
         TRY(stretch(l, lane, cold));
         cold = false;
         ++unimproved;

@@ -5,7 +5,8 @@
  * mass-proportional ones stall, but the best level differs by decades from problem to problem (docs/algorithm.md), and
  * updates by eq. (15) help most problems and ruin some. So the loop starts from the mean mass of the bodies with
  * updates. When the measure stalls, other levels without updates start from nothing beside it, and from then on the one
- * runs that will be the first to arrive if it goes on at its present rate.
+ * runs that will be the first to arrive if it goes on at its present rate. The method fast has no level to choose: it takes
+ * its weights anew in every stretch.
  */
 #ifndef SADMM_CLI_SOLVE_LOOP_H
 #define SADMM_CLI_SOLVE_LOOP_H
