@@ -1,9 +1,6 @@
 /* The method `fast`: every table's iterates are the plainly written ones of `ref`, whatever the threads; its weights are
  * what docs/algorithm.md says; its solutions are certified, in few iterations; and it is safe with too few.
  */
-#include <stdio.h>
-#include <stdlib.h>
-
 #include "backend_ref/literal.h"
 #include "core/certificate.h"
 #include "core/islands.h"
@@ -75,10 +72,6 @@ START_TEST(tables_equal_ref)
         ck_assert_int_eq(got, wanted);
         compare_solutions(&own, &ref, &v, &lambda);
     }
-    if (getenv("FAST_FIGURES"))
-        printf("%-8s f%d %-32s v %.1e lambda %.1e primal %.1e dual %.1e\n", table->variant,
-               table->precision == SADMM_F32 ? 32 : 64, scene->name, relative(v), relative(lambda), worst_primal,
-               worst_dual);
     double tolerance = scene->tolerance[table->precision];
     ck_assert_msg(relative(v) <= tolerance, "%s: v differs by %g", scene->name, relative(v));
     ck_assert_msg(relative(lambda) <= tolerance, "%s: lambda differs by %g", scene->name, relative(lambda));
@@ -145,6 +138,90 @@ START_TEST(weight_is_the_mass_carried)
     }
     runner_stop(&r);
     contact_problem_free(problem);
+}
+END_TEST
+
+/* N cubes of 1 kg on top of each other, at rest on exact impulses: the forces that the bodies feel add up to N^2 m g, twice
+ * but for the one at the top, so that a load passes N / 2 bodies; tallness N / 20. Gaps of 1 um under every third cube. */
+static struct contact_problem *tall_stack(int count)
+{
+    double masses[64];
+    for (int i = 0; i < count; ++i) masses[i] = 1;
+    struct contact_problem *problem = contact_problem_stack(masses, count, 0.5);
+    for (int i = 0; i < count; ++i)
+        for (int k = 0; k < 4; ++k) {
+            problem->contacts.points[4 * i + k].impulse[2] = (count - i) * 9.81 * 0.005 / 4;
+            if (i % 3 == 0 && k < 2) problem->contacts.points[4 * i + k].gap = 1e-6;
+        }
+    return problem;
+}
+
+START_TEST(tall_islands_are_stiff)
+{
+    struct contact_problem *problem = tall_stack(30);
+    struct scene warm = scenes[0];
+    struct runner r;
+    warm.warm = true;
+    runner_start_method(&r, literal(), &warm, problem, 1, SADMM_METHOD_FAST);
+    ck_assert(r.plan.warm);
+    double tallness = 30 / 20.0, e = 1e-6 / 0.005;
+    /* as in weight_is_the_mass_carried, with V less by tallness^2; 1e-8: the least speed, and a sum of 30 */
+    ck_assert_double_eq_tol(r.c->constraints[0].B[0], 30.0 / 4 * pow(tallness, 2) + 3.0 / 4, 1e-7);
+    ck_assert_double_eq_tol(r.c->constraints[0].e[0], e / pow(tallness, 4), 1e-9 * e);
+    ck_assert_double_eq(r.c->constraints[2].e[0], 0);
+    runner_stop(&r);
+    /* Cubes that move at a quarter of V: 20 times more than at rest, and no reason for other weights. */
+    for (int i = 0; i < 30; ++i) problem->system.velocity[6 * i] = 9.81 * 0.005 / 4;
+    runner_start_method(&r, literal(), &warm, problem, 1, SADMM_METHOD_FAST);
+    ck_assert_double_eq_tol(r.c->constraints[0].B[0], 30.0 / 4 + 3.0 / 4, 1e-7);
+    runner_stop(&r);
+    contact_problem_free(problem);
+}
+END_TEST
+
+/* The same in every table, whatever the threads. */
+START_TEST(tall_tables_equal_ref)
+{
+    const struct sadmm_kernels *table = tables[_i];
+    if (!runs_fast(table)) return;
+    struct contact_problem *problem = tall_stack(30);
+    struct scene warm = scenes[0];
+    struct spread v = {0, 0}, lambda = {0, 0};
+    struct runner ref, own, three;
+    warm.warm = true;
+    runner_start_method(&ref, literal(), &warm, problem, 1, SADMM_METHOD_FAST);
+    runner_start_method(&own, table, &warm, problem, 1, SADMM_METHOD_FAST);
+    runner_start_method(&three, table, &warm, problem, 3, SADMM_METHOD_FAST);
+    for (int s = 0; s < 5; ++s) {
+        iterate(&ref, 10, false);
+        iterate(&own, 10, false);
+        iterate(&three, 10, false);
+        compare_solutions(&own, &ref, &v, &lambda);
+    }
+    /* v is 1e-4 of what the impulses would make of it: their rounding, 30 bodies deep, over it */
+    double tolerance = table->precision == SADMM_F32 ? 1e-2 : 1e-10;
+    ck_assert_msg(relative(v) <= tolerance, "v differs by %g", relative(v));
+    ck_assert_msg(relative(lambda) <= tolerance, "lambda differs by %g", relative(lambda));
+    v.difference = lambda.difference = 0;
+    compare_solutions(&three, &own, &v, &lambda);
+    ck_assert(v.difference == 0 && lambda.difference == 0);
+    runner_stop(&ref);
+    runner_stop(&own);
+    runner_stop(&three);
+    contact_problem_free(problem);
+}
+END_TEST
+
+/* Gaps within the slop are closed by a share, larger ones but for what is left of that; overlaps are left alone. */
+START_TEST(small_gaps_are_eased)
+{
+    const double slop = 2e-3, share = 1.0 / 16;
+    ck_assert_double_eq(weight_gap_error(1e-3, 1, slop), 1e-3);
+    ck_assert_double_eq(weight_gap_error(-1e-3, 2, slop), -1e-3);
+    ck_assert_double_eq_tol(weight_gap_error(1e-3, 2, slop), share * 1e-3, 1e-18);
+    ck_assert_double_eq_tol(weight_gap_error(slop, 2, slop), share * slop, 1e-18);
+    ck_assert_double_eq_tol(weight_gap_error(1, 2, slop), 1 - (1 - share) * slop, 1e-15);
+    ck_assert_double_eq_tol(weight_gap_error(1e-3, 100, slop), 0.003 * 1e-3, 1e-18);
 }
 END_TEST
 
@@ -245,9 +322,6 @@ START_TEST(few_iterations)
     struct contact_problem *problem = cold[_i].make(0), *other = cold[_i].make(0);
     struct sadmm_solve_report fast = solve_cold(problem, SADMM_METHOD_FAST, 1000, 1e-6);
     struct sadmm_solve_report paper = solve_cold(other, SADMM_METHOD_PAPER, 1000, 1e-6);
-    if (getenv("FAST_FIGURES"))
-        printf("%-24s fast %d paper %d%s\n", cold[_i].name, fast.iterations, paper.iterations,
-               paper.converged ? "" : " (not converged)");
     ck_assert_msg(fast.converged, "%s: natural map %g after %d", cold[_i].name, fast.certificate.ncp_max, fast.iterations);
     ck_assert_double_le(fast.certificate.ncp_max, 1e-6);
     ck_assert_msg(fast.iterations <= cold[_i].limit, "%s: %d iterations", cold[_i].name, fast.iterations);
@@ -265,9 +339,6 @@ START_TEST(solutions_are_certified)
     const struct scene *scene = &scenes[solvable[_i]];
     struct contact_problem *problem = make_problem(scene), *other = make_problem(scene);
     struct sadmm_solve_report fast = solve_cold(problem, SADMM_METHOD_FAST, 3000, 1e-9);
-    if (getenv("FAST_FIGURES"))
-        printf("%-32s fast %d paper %d\n", scene->name, fast.iterations,
-               solve_cold(other, SADMM_METHOD_PAPER, 3000, 1e-9).iterations);
     ck_assert_msg(fast.converged, "%s: natural map %g, momentum %g", scene->name, fast.certificate.ncp_max,
                   fast.certificate.momentum_max);
     contact_problem_free(problem);
@@ -333,9 +404,6 @@ START_TEST(too_few_iterations_are_safe)
         least = fmin(least, now);
     }
     double scale = fmax(start - least, 0.1 * weight);
-    if (getenv("FAST_FIGURES"))
-        printf("%-20s %2d iterations: energy %+.2f %% of %g J, limited %d\n", moving[_i / 4].spec, budgets[_i % 4],
-               100 * (most - start) / scale, scale, limited);
     ck_assert_msg(most - start <= 0.01 * scale, "%s, %d iterations: energy rises by %g J of %g J", moving[_i / 4].spec,
                   budgets[_i % 4], most - start, scale);
     sadmm_world_destroy(world);
@@ -351,6 +419,9 @@ int main(void)
     tcase_add_loop_test(tables_case, tables_equal_ref, 0, table_count * SCENES);
     tcase_add_loop_test(tables_case, threads_do_not_matter, 0, table_count * SCENES);
     tcase_add_test(weights, weight_is_the_mass_carried);
+    tcase_add_test(weights, tall_islands_are_stiff);
+    tcase_add_loop_test(weights, tall_tables_equal_ref, 0, table_count);
+    tcase_add_test(weights, small_gaps_are_eased);
     tcase_add_test(weights, blocks_have_no_unit);
     tcase_add_test(weights, islands_are_named_by_their_smallest_body);
     tcase_add_loop_test(solutions, few_iterations, 0, sizeof cold / sizeof *cold);
