@@ -43,26 +43,36 @@ static void invert(bool rigid, const double A[PACKED6], double out[PACKED6])
     }
 }
 
-/* Sum of J^T J over the points of a pair, on one of its bodies. */
+/* Sums over a pair's points on one of its bodies: of arms where contacts have three rows, else of J^T J. */
+static void pair_arms(const struct sadmm_context *c, const struct sadmm_contact_pair *pair, int side, struct arm_sums *sums)
+{
+    memset(sums, 0, sizeof *sums);
+    for (int k = 0; k < pair->count; ++k) {
+        const struct sadmm_contact_point *point = &c->system->contacts->points[pair->first + k];
+        add_arm(sums, side ? point->arm_b : point->arm_a);
+    }
+}
+
 static void pair_rows(const struct sadmm_context *c, const struct sadmm_contact_pair *pair, int side, double S[PACKED6])
 {
-    struct arm_sums sums = {0};
+    double row[6];
     memset(S, 0, PACKED6 * sizeof *S);
     for (int k = 0; k < pair->count; ++k) {
         const struct sadmm_contact_point *point = &c->system->contacts->points[pair->first + k];
-        const double *r = side ? point->arm_b : point->arm_a;
-        double row[6];
-        if (c->plan.contact_rows == 3) {
-            add_arm(&sums, r);
-        } else {
-            normal_row(pair->normal, r, row);
-            add_row(S, row);
-        }
+        normal_row(pair->normal, side ? point->arm_b : point->arm_a, row);
+        add_row(S, row);
     }
-    if (c->plan.contact_rows == 3) add_arm_sums(S, &sums);
 }
 
 /* ---- responses: J A^-1 J^T, 1/kg, once a step -------------------------------------------------------------------- */
+
+/* <A^-1, sum J^T J> of a rigid body, whose A^-1 has no mixed part. */
+static double rigid_response(const double inverse[PACKED6], const struct arm_sums *s)
+{
+    const double *rr = s->rr;
+    return (inverse[0] + inverse[2] + inverse[5]) * s->count + inverse[9] * (rr[1] + rr[2]) + inverse[14] * (rr[0] + rr[2]) +
+           inverse[20] * (rr[0] + rr[1]) - 2 * (inverse[13] * rr[3] + inverse[18] * rr[4] + inverse[19] * rr[5]);
+}
 
 /* Mean over a pair's points and rows. */
 static double pair_response(const struct sadmm_context *c, const struct sadmm_contact_pair *pair)
@@ -71,8 +81,20 @@ static double pair_response(const struct sadmm_context *c, const struct sadmm_co
     double w = 0, S[PACKED6];
     for (int side = 0; side < 2; ++side) {
         if (bodies[side] < 0) continue;
-        pair_rows(c, pair, side, S);
-        w += packed_dot(&c->A_inverse[(size_t)bodies[side] * PACKED6], S);
+        const double *inverse = &c->A_inverse[(size_t)bodies[side] * PACKED6];
+        struct arm_sums sums;
+        if (c->plan.contact_rows == 3) pair_arms(c, pair, side, &sums);
+        if (c->plan.contact_rows == 3 && c->plan.rigid) {
+            w += rigid_response(inverse, &sums);
+            continue;
+        }
+        if (c->plan.contact_rows == 3) {
+            memset(S, 0, sizeof S);
+            add_arm_sums(S, &sums);
+        } else {
+            pair_rows(c, pair, side, S);
+        }
+        w += packed_dot(inverse, S);
     }
     return w / (c->plan.contact_rows * pair->count);
 }
@@ -238,22 +260,34 @@ static void add_row_block(const struct row_block *block, int side, double C[PACK
     add_weighted_row(C, along, 1);
 }
 
+static void add_weighted_arms(struct arm_sums *to, const struct arm_sums *arms, double weight)
+{
+    to->count += weight * arms->count;
+    for (int k = 0; k < 3; ++k) to->r[k] += weight * arms->r[k];
+    for (int k = 0; k < 6; ++k) to->rr[k] += weight * arms->rr[k];
+}
+
 static void assemble_C(struct sadmm_context *c, size_t i)
 {
     double *C = &c->C[i * PACKED6], S[PACKED6];
     size_t pair_records = c->pair_block_count * (size_t)LANES;
+    struct arm_sums arms, weighted = {0};
     memset(C, 0, PACKED6 * sizeof *C);
     for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) {
         size_t row = (size_t)c->incident[at];
         int side = row >= c->record_count;
         size_t record = side ? row - c->record_count : row;
-        if (record < pair_records) {
+        if (record >= pair_records) {
+            add_row_block(&c->row_blocks[record - pair_records], side, C);
+        } else if (c->plan.contact_rows == 3) {
+            pair_arms(c, cpu_pair(c, record), side, &arms);
+            add_weighted_arms(&weighted, &arms, c->pair_weight[record]);
+        } else {
             pair_rows(c, cpu_pair(c, record), side, S);
             for (int k = 0; k < PACKED6; ++k) C[k] += c->pair_weight[record] * S[k];
-        } else {
-            add_row_block(&c->row_blocks[record - pair_records], side, C);
         }
     }
+    add_arm_sums(C, &weighted);
     c->beta[i] = 1;
 }
 
