@@ -39,8 +39,9 @@ static void explain_options(struct text *t, const struct sadmm_plan *plan, const
 {
     line(t, plan->gyroscopic ? "gyroscopic   implicit midpoint, for bodies of unequal principal moments\n"
                              : "gyroscopic   left out: every body has equal principal moments\n");
-    line(t, plan->warm_start ? "start        warm: impulses and velocities of the last step\n"
-                             : "start        cold: impulses 0, velocities A^-1 b (asked for)\n");
+    line(t, plan->predict    ? "start        loads predicted where they can be, else cold: no step came before\n"
+            : plan->warm_start ? "start        warm: impulses and velocities of the last step\n"
+                               : "start        cold: impulses 0, velocities A^-1 b (asked for)\n");
     if (s->method == SADMM_METHOD_FAST)
         line(t, "weights      by load, relaxation %g; %s\n", s->relaxation,
              plan->weight_refresh ? "taken anew during the step, which starts cold"

@@ -19,8 +19,9 @@
 
 bool sadmm_world_may_reside(const sadmm_world *world)
 {
-    /* A stop rule has to be looked at while a step runs. */
+    /* A stop rule has to be looked at while a step runs; and the loads of a first step are predicted on the host. */
     const sadmm_settings *s = &world->def.settings;
+    if (s->method == SADMM_METHOD_FAST && !world->stepped) return false;
     return world->kernels->resident && s->residual_tolerance <= 0 && s->certificate_tolerance <= 0;
 }
 
