@@ -303,7 +303,7 @@ START_TEST(workspace_is_kept_and_failures_change_nothing)
 {
     sadmm_settings s = sadmm_settings_default();
     struct sadmm_error error;
-    struct sadmm_certificate_workspace workspace = {NULL, 0};
+    struct sadmm_certificate_workspace workspace = {0};
     sadmm_certificate c = sadmm_certificate_none(), first;
     struct contact_problem *p = contact_problem_pyramid(4, 0.5);
     ck_assert(c.ncp_max == -1 && c.ncp_worst == -1 && c.momentum_max == -1 && c.siconos == -1);
@@ -327,6 +327,35 @@ START_TEST(workspace_is_kept_and_failures_change_nothing)
 }
 END_TEST
 
+/* Three boxes side by side on exact impulses, a fourth on top of the last: three islands. Then one impulse is wrong, then a
+ * velocity. */
+START_TEST(islands_above_tolerance)
+{
+    struct sadmm_error error = {SADMM_OK, ""};
+    struct contact_problem *p = contact_problem_new();
+    sadmm_settings s = sadmm_settings_default();
+    sadmm_certificate c;
+    for (int i = 0; i < 4; ++i) {
+        double x = i < 3 ? i : 2, z = i < 3 ? 0 : 0.2;
+        contact_problem_box(p, 1, 0.1, 0.1, 0.1, x, 0, z + 0.1);
+        contact_problem_touch(p, i < 3 ? -1 : 2, i, (double[]){x, 0, z}, (double[]){0, 0, 1}, 0, 0.5, 0);
+        p->contacts.points[i].impulse[2] = (i == 2 ? 2 : 1) * 9.81 * s.dt;
+    }
+    ck_assert_int_eq(sadmm_certify(&p->system, &s, &c, &error), SADMM_OK);
+    ck_assert_int_eq(c.islands_above, -1);
+    s.certificate_tolerance = s.certificate_momentum_tolerance = 1e-9;
+    ck_assert_int_eq(sadmm_certify(&p->system, &s, &c, &error), SADMM_OK);
+    ck_assert_int_eq(c.islands_above, 0);
+    p->contacts.points[3].impulse[2] *= 1.01; /* both boxes of one island */
+    ck_assert_int_eq(sadmm_certify(&p->system, &s, &c, &error), SADMM_OK);
+    ck_assert_int_eq(c.islands_above, 1);
+    p->system.velocity[2] = -1e-6;
+    ck_assert_int_eq(sadmm_certify(&p->system, &s, &c, &error), SADMM_OK);
+    ck_assert_int_eq(c.islands_above, 2);
+    contact_problem_free(p);
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("certificate");
@@ -335,6 +364,7 @@ int main(void)
     tcase_add_test(cases, known_contact_errors);
     tcase_add_test(cases, momentum_error);
     tcase_add_test(cases, siconos_measure);
+    tcase_add_test(cases, islands_above_tolerance);
     tcase_add_test(cases, hard_and_soft_rows);
     tcase_add_test(cases, worst_constraint);
     tcase_add_loop_test(cases, one_value_for_every_form, 1, 5);

@@ -101,6 +101,8 @@ typedef struct sadmm_certificate {
     int64_t momentum_worst;  /* index of that body among the dynamic ones; -1: none */
     double siconos;          /* siconos' global measure for friction contact (gfc3d_compute_error), dimensionless;
                                 -1 when the problem holds soft constraints, which that measure does not know */
+    int64_t islands_above;   /* islands with an error above the settings' certificate tolerances: what a stop rule still
+                                waited for; -1: there is no certificate_tolerance */
 } sadmm_certificate;
 
 #ifdef __cplusplus

@@ -5,11 +5,13 @@
 #include <string.h>
 
 #include "dense6.h"
+#include "islands.h"
 #include "memory.h"
 #include "system_math.h"
 
-/* A body in the workspace: Cholesky factor of A (36), what is left of b + J^T lambda (6), J^T lambda alone (6). */
-enum { FACTOR = 0, IMPULSE = 36, BODY_SIZE = 42 };
+/* A body in the workspace: Cholesky factor of A (36), J^T lambda (6), the largest natural map of its constraints, its
+ * momentum error, and whether its island (by its first body) was counted as above the tolerances. */
+enum { FACTOR = 0, IMPULSE = 36, NATURAL_MAP = 42, MOMENTUM = 43, COUNTED = 44, BODY_SIZE = 45 };
 
 /* Norms and maxima gathered on the way. */
 struct tally {
@@ -30,8 +32,14 @@ static double max_abs6(const double x[6])
     return m;
 }
 
-static void count_constraint(struct tally *t, int64_t index, double error)
+static void count_constraint(struct tally *t, int64_t index, double error, double *bodies, int32_t body_a, int32_t body_b)
 {
+    const int32_t sides[2] = {body_a, body_b};
+    for (int side = 0; side < 2; ++side) {
+        if (sides[side] < 0) continue;
+        double *largest = bodies + BODY_SIZE * (size_t)sides[side] + NATURAL_MAP;
+        *largest = keep_max(error, *largest);
+    }
     if (t->ncp_worst < 0 || (exceeds(error, t->ncp_max) && !isnan(t->ncp_max))) {
         t->ncp_max = error;
         t->ncp_worst = index;
@@ -110,7 +118,7 @@ static void certify_pair(struct tally *tally, const struct sadmm_system *system,
             }
         }
         double w = fmax(weight[0], fmax(weight[1], weight[2]));
-        count_constraint(tally, k, contact_map(tally, l, u, pair->friction, w));
+        count_constraint(tally, k, contact_map(tally, l, u, pair->friction, w), bodies, pair->body_a, pair->body_b);
     }
 }
 
@@ -155,13 +163,29 @@ static void certify_block(struct tally *tally, const struct sadmm_system *system
             }
         }
     }
-    count_constraint(tally, (int64_t)system->contacts->point_count + k, error);
+    count_constraint(tally, (int64_t)system->contacts->point_count + k, error, bodies, block->body_a, block->body_b);
 }
 
 /* siconos divides only by norms above this (gfc3d_compute_error.c, MIN_RELATIVE_SCALING). */
 static double relative(double error, double scale)
 {
     return scale > sqrt(DBL_EPSILON) ? error / scale : error;
+}
+
+static int64_t count_islands_above(double *bodies, size_t count, const int32_t *labels,
+                                   const struct sadmm_settings *settings, double scale)
+{
+    int64_t above = 0;
+    for (size_t i = 0; i < count; ++i) {
+        const double *body = bodies + BODY_SIZE * i;
+        double *counted = bodies + BODY_SIZE * (size_t)labels[i] + COUNTED;
+        if (!exceeds(body[NATURAL_MAP], settings->certificate_tolerance) &&
+            !exceeds(body[MOMENTUM], settings->certificate_momentum_tolerance * scale))
+            continue;
+        above += *counted == 0;
+        *counted = 1;
+    }
+    return above;
 }
 
 sadmm_status sadmm_certify_with(struct sadmm_certificate_workspace *workspace, const struct sadmm_system *system,
@@ -179,7 +203,7 @@ sadmm_status sadmm_certify_with(struct sadmm_certificate_workspace *workspace, c
         sadmm_system_body(system, settings, (int32_t)i, A, b);
         if (!dense6_cholesky(A, body + FACTOR))
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "mass matrix of body %zu: not positive definite", i);
-        memset(body + IMPULSE, 0, 6 * sizeof *body);
+        memset(body + IMPULSE, 0, (BODY_SIZE - IMPULSE) * sizeof *body);
     }
 
     struct tally tally = {.ncp_worst = -1};
@@ -196,6 +220,7 @@ sadmm_status sadmm_certify_with(struct sadmm_certificate_workspace *workspace, c
         dense6_mul(A, system->velocity + 6 * i, Av);
         for (int r = 0; r < 6; ++r) residual[r] = Av[r] - b[r] - impulse[r];
         double largest = max_abs6(residual);
+        bodies[BODY_SIZE * i + MOMENTUM] = largest;
         if (out.momentum_worst < 0 || (exceeds(largest, residual_max) && !isnan(residual_max))) {
             residual_max = largest;
             out.momentum_worst = (int64_t)i;
@@ -214,6 +239,12 @@ sadmm_status sadmm_certify_with(struct sadmm_certificate_workspace *workspace, c
     if (!tally.soft)
         out.siconos = relative(sqrt(residual2), sqrt(keep_max(b2, keep_max(Av2, Jl2)))) +
                       relative(sqrt(tally.map2), sqrt(keep_max(tally.u2, tally.r2)));
+    if (settings && settings->certificate_tolerance > 0) {
+        if (!sadmm_grow((void **)&workspace->labels, &workspace->label_capacity, 0, count, sizeof *workspace->labels))
+            return sadmm_fail_memory(error, "the certificate");
+        sadmm_islands(system, workspace->labels);
+        out.islands_above = count_islands_above(bodies, count, workspace->labels, settings, scale);
+    }
     *certificate = out;
     return SADMM_OK;
 }
@@ -221,7 +252,7 @@ sadmm_status sadmm_certify_with(struct sadmm_certificate_workspace *workspace, c
 sadmm_status sadmm_certify(const struct sadmm_system *system, const struct sadmm_settings *settings,
                            sadmm_certificate *certificate, struct sadmm_error *error)
 {
-    struct sadmm_certificate_workspace workspace = {NULL, 0};
+    struct sadmm_certificate_workspace workspace = {0};
     sadmm_status status = sadmm_certify_with(&workspace, system, settings, certificate, error);
     sadmm_certificate_workspace_free(&workspace);
     return status;
@@ -230,13 +261,14 @@ sadmm_status sadmm_certify(const struct sadmm_system *system, const struct sadmm
 void sadmm_certificate_workspace_free(struct sadmm_certificate_workspace *workspace)
 {
     sadmm_free(workspace->values);
-    workspace->values = NULL;
-    workspace->capacity = 0;
+    sadmm_free(workspace->labels);
+    *workspace = (struct sadmm_certificate_workspace){0};
 }
 
 sadmm_certificate sadmm_certificate_none(void)
 {
     sadmm_certificate none = {
-        .ncp_max = -1, .ncp_mean = -1, .ncp_worst = -1, .momentum_max = -1, .momentum_worst = -1, .siconos = -1};
+        .ncp_max = -1, .ncp_mean = -1, .ncp_worst = -1, .momentum_max = -1, .momentum_worst = -1, .siconos = -1,
+        .islands_above = -1};
     return none;
 }

@@ -30,7 +30,8 @@ sadmm_status sadmm_certify(const struct sadmm_system *system, const struct sadmm
 /* The same without allocating once the workspace has grown. Start it from zero. */
 struct sadmm_certificate_workspace {
     double *values;
-    size_t capacity;
+    int32_t *labels;
+    size_t capacity, label_capacity;
 };
 sadmm_status sadmm_certify_with(struct sadmm_certificate_workspace *workspace, const struct sadmm_system *system,
                                 const struct sadmm_settings *settings, sadmm_certificate *certificate,

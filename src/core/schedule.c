@@ -177,9 +177,7 @@ sadmm_status sadmm_schedule_solve(const struct sadmm_kernels *kernels, struct sa
     report->converged = false;
     report->limited = 0;
     report->residual.primal = report->residual.dual = -1;
-    report->certificate.ncp_max = report->certificate.ncp_mean = -1;
-    report->certificate.momentum_max = report->certificate.siconos = -1;
-    report->certificate.ncp_worst = report->certificate.momentum_worst = -1;
+    report->certificate = sadmm_certificate_none();
     report->threads = kernels->backend == SADMM_BACKEND_REF ? 1 : plan->threads;
 
     struct sadmm_plan own = *plan;

@@ -78,6 +78,8 @@ size_t sadmm_world_explain(const sadmm_world *world, char *out, size_t size)
     explain_options(&t, plan, &world->step_settings);
     line(&t, "iterations   %d of at most %d%s\n", world->report.iterations, world->step_settings.iterations,
          world->report.iterations == 1 && !plan->points ? ": without constraints Step 1 is exact" : "");
+    if (world->report.certificate.islands_above > 0)
+        line(&t, "islands left %lld above the tolerance\n", (long long)world->report.certificate.islands_above);
     if (world->report.repeated)
         line(&t, "repeated     %lld steps so far outgrew the room or the plan they were begun with; nothing is lost\n",
              (long long)world->report.repeated);

@@ -8,6 +8,7 @@
  */
 #include <string.h>
 
+#include "certificate.h"
 #include "memory.h"
 #include "world_internal.h"
 
@@ -156,9 +157,7 @@ static void take_report(sadmm_world *world, const struct sadmm_resident_report *
     report->ms.finish = done->ms.finish;
     report->ms.total = done->ms.total;
     report->certify_ms = 0;
-    report->certificate.ncp_max = report->certificate.ncp_mean = -1;
-    report->certificate.momentum_max = report->certificate.siconos = -1;
-    report->certificate.ncp_worst = report->certificate.momentum_worst = -1;
+    report->certificate = sadmm_certificate_none();
 }
 
 sadmm_status sadmm_world_settle(const sadmm_world *constant)
