@@ -80,7 +80,7 @@ SADMM_INLINE double weight_next_level(double level, double balance)
 #define WEIGHT_TALL_MOST 6.0
 /* Over the speed of bodies at rest, the least V. */
 #define WEIGHT_REST 20.0
-#define WEIGHT_GAP_LEAST 0.003
+#define WEIGHT_GAP_LEAST 0.001
 
 /* 1 and more. */
 SADMM_INLINE double weight_tallness(double speed, double push, double mass)
@@ -98,7 +98,7 @@ SADMM_INLINE double weight_speed_warm(double speed, double tallness, double kine
 /* e of a contact with a gap: of a gap within the slop, only a share is closed. `slop` over dt, m/s. */
 SADMM_INLINE double weight_gap_error(double error, double tallness, double slop)
 {
-    double square = tallness * tallness, share = fmax(1 / (square * square), WEIGHT_GAP_LEAST);
+    double square = tallness * tallness, share = fmax(1 / (square * square * square), WEIGHT_GAP_LEAST);
     return error > 0 ? fmax(share * error, error - (1 - share) * slop) : error;
 }
 
