@@ -216,12 +216,14 @@ END_TEST
 START_TEST(small_gaps_are_eased)
 {
     const double slop = 2e-3, share = 1.0 / 64;
+    ck_assert_double_eq(weight_gap_share(1), 1);
+    ck_assert_double_eq(weight_gap_share(2), share);
+    ck_assert_double_eq(weight_gap_share(100), 0.001);
     ck_assert_double_eq(weight_gap_error(1e-3, 1, slop), 1e-3);
-    ck_assert_double_eq(weight_gap_error(-1e-3, 2, slop), -1e-3);
-    ck_assert_double_eq_tol(weight_gap_error(1e-3, 2, slop), share * 1e-3, 1e-18);
-    ck_assert_double_eq_tol(weight_gap_error(slop, 2, slop), share * slop, 1e-18);
-    ck_assert_double_eq_tol(weight_gap_error(1, 2, slop), 1 - (1 - share) * slop, 1e-15);
-    ck_assert_double_eq_tol(weight_gap_error(1e-3, 100, slop), 0.001 * 1e-3, 1e-18);
+    ck_assert_double_eq(weight_gap_error(-1e-3, share, slop), -1e-3);
+    ck_assert_double_eq_tol(weight_gap_error(1e-3, share, slop), share * 1e-3, 1e-18);
+    ck_assert_double_eq_tol(weight_gap_error(slop, share, slop), share * slop, 1e-18);
+    ck_assert_double_eq_tol(weight_gap_error(1, share, slop), 1 - (1 - share) * slop, 1e-15);
 }
 END_TEST
 

@@ -95,11 +95,17 @@ SADMM_INLINE double weight_speed_warm(double speed, double tallness, double kine
     return fmin(fmax(least, WEIGHT_REST * sqrt(kinetic / mass)), speed);
 }
 
-/* e of a contact with a gap: of a gap within the slop, only a share is closed. `slop` over dt, m/s. */
-SADMM_INLINE double weight_gap_error(double error, double tallness, double slop)
+/* The share of a gap within the slop that a step closes; and e with that, `slop` over dt, m/s. */
+SADMM_INLINE double weight_gap_share(double tallness)
 {
-    double square = tallness * tallness, share = fmax(1 / (square * square * square), WEIGHT_GAP_LEAST);
-    return error > 0 ? fmax(share * error, error - (1 - share) * slop) : error;
+    double square = tallness * tallness;
+    return fmax(1 / (square * square * square), WEIGHT_GAP_LEAST);
+}
+
+SADMM_INLINE double weight_gap_error(double error, double share, double slop)
+{
+    double eased = share * error, beyond = error - (1 - share) * slop;
+    return error <= 0 ? error : eased > beyond ? eased : beyond;
 }
 
 /* B of a pair, kg. phi / w does not sink with the level: it is for contacts whose load is not known. */
