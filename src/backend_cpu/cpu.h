@@ -31,6 +31,7 @@
 
 #include "../core/kernels.h"
 #include "../core/math/limit.h"
+#include "../core/math/packed6.h"
 #include "cpu_barrier.h"
 #include "cpu_lanes.h"
 
@@ -44,7 +45,6 @@
 #define CPU(name) SADMM_JOIN(sadmm_cpu_##name, SADMM_VARIANT)
 
 enum { STATE_INV_BETA = 6 }; /* slot of a state row */
-enum { PACKED6 = 21 };       /* symmetric 6x6: lower triangle, rows first */
 enum { BODY_SUMS = 4 };      /* weights: energy, kinetic, push, defect; limit: now, free, -, defect */
 
 /* LANES contact pairs; points of all of them in `slots` slots from `first` on. Lanes without a pair point at the

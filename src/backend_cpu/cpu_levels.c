@@ -1,35 +1,8 @@
 /* The method `fast`: levels of the islands (math/weight.h), from what contacts and momentum miss. In double; sums over an
  * island go in the order of pairs and of bodies. */
+#include "../core/math/violation.h"
 #include "../core/math/weight.h"
 #include "cpu_rows.h"
-
-/* w |lambda - Pi_C(lambda - (x + e n)/w)|^2 of a point; u = x + e n. */
-static double point_violation(const double lambda[3], const double u[3], const double n[3], double friction, double w)
-{
-    double y[3], normal = 0, tangential2 = 0, sum = 0;
-    for (int k = 0; k < 3; ++k) {
-        y[k] = lambda[k] - u[k] / w;
-        normal += y[k] * n[k];
-    }
-    for (int k = 0; k < 3; ++k) {
-        double t = y[k] - normal * n[k];
-        tangential2 += t * t;
-    }
-    double pushed = fmax(normal, 0), limit = friction * pushed;
-    double shrink = tangential2 > limit * limit ? limit / sqrt(tangential2) : 1;
-    for (int k = 0; k < 3; ++k) {
-        double miss = lambda[k] - pushed * n[k] - shrink * (y[k] - normal * n[k]);
-        sum += miss * miss;
-    }
-    return w * sum;
-}
-
-static void cross_add(const double w[3], const double r[3], double sign, double x[3])
-{
-    x[0] += sign * (w[1] * r[2] - w[2] * r[1]);
-    x[1] += sign * (w[2] * r[0] - w[0] * r[2]);
-    x[2] += sign * (w[0] * r[1] - w[1] * r[0]);
-}
 
 static double pair_violation(const struct sadmm_context *c, size_t record)
 {
@@ -57,10 +30,10 @@ static double pair_violation(const struct sadmm_context *c, size_t record)
         }
         const double arm_b[3] = {arm[0] + d[0], arm[1] + d[1], arm[2] + d[2]};
         double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-        cross_add(b + 3, arm_b, 1, u);
-        cross_add(a + 3, arm, -1, u);
+        add_cross(b + 3, arm_b, 1, u);
+        add_cross(a + 3, arm, -1, u);
         for (int j = 0; j < 3; ++j) u[j] += error * n[j];
-        sum += point_violation(lambda, u, n, friction, c->pair_response[record]);
+        sum += contact_violation(lambda, u, n, friction, c->pair_response[record]);
     }
     return sum;
 }

@@ -15,11 +15,11 @@ static void add_pair(const struct sadmm_context *c, size_t record, int side, str
         const struct sadmm_contact_point *point = &contacts->points[pair->first + k];
         const double *r = side ? point->arm_b : point->arm_a;
         if (c->plan.contact_rows == 3) {
-            add_arm(sums, r);
+            add_arm(sums, r, 1);
         } else {
             double row[6];
             normal_row(pair->normal, r, row);
-            add_row(C, row);
+            packed_add_row(C, row, 1);
         }
     }
 }
@@ -29,7 +29,7 @@ static void add_row_block(const struct row_block *block, int side, double C[PACK
     for (int r = 0; r < block->rows; ++r) {
         double row[6];
         block_row(block, side, r, row);
-        add_row(C, row);
+        packed_add_row(C, row, 1);
     }
 }
 

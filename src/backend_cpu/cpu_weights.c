@@ -8,26 +8,11 @@
 #include "../core/math/weight.h"
 #include "cpu_rows.h"
 
-/* <M, S> of symmetric matrices. */
-static double packed_dot(const double M[PACKED6], const double S[PACKED6])
-{
-    double sum = 0;
-    for (int r = 0, at = 0; r < 6; ++r)
-        for (int k = 0; k <= r; ++k, ++at) sum += (r == k ? 1 : 2) * M[at] * S[at];
-    return sum;
-}
-
 /* A^-1, packed. A rigid body's is inverted by blocks. */
 static void invert(bool rigid, const double A[PACKED6], double out[PACKED6])
 {
     if (rigid) {
-        double xx = A[9], yy = A[14], zz = A[20], xy = A[13], xz = A[18], yz = A[19];
-        double c00 = yy * zz - yz * yz, c01 = xz * yz - xy * zz, c02 = xy * yz - xz * yy;
-        double inv = 1 / (xx * c00 + xy * c01 + xz * c02);
-        memset(out, 0, PACKED6 * sizeof *out);
-        out[0] = out[2] = out[5] = 1 / A[0];
-        out[9] = inv * c00, out[13] = inv * c01, out[14] = inv * (xx * zz - xz * xz);
-        out[18] = inv * c02, out[19] = inv * (xy * xz - xx * yz), out[20] = inv * (xx * yy - xy * xy);
+        packed_invert_rigid(A, out);
         return;
     }
     double M[36], L[36], column[6];
@@ -49,7 +34,7 @@ static void pair_arms(const struct sadmm_context *c, const struct sadmm_contact_
     memset(sums, 0, sizeof *sums);
     for (int k = 0; k < pair->count; ++k) {
         const struct sadmm_contact_point *point = &c->system->contacts->points[pair->first + k];
-        add_arm(sums, side ? point->arm_b : point->arm_a);
+        add_arm(sums, side ? point->arm_b : point->arm_a, 1);
     }
 }
 
@@ -60,19 +45,11 @@ static void pair_rows(const struct sadmm_context *c, const struct sadmm_contact_
     for (int k = 0; k < pair->count; ++k) {
         const struct sadmm_contact_point *point = &c->system->contacts->points[pair->first + k];
         normal_row(pair->normal, side ? point->arm_b : point->arm_a, row);
-        add_row(S, row);
+        packed_add_row(S, row, 1);
     }
 }
 
 /* ---- responses: J A^-1 J^T, 1/kg, once a step -------------------------------------------------------------------- */
-
-/* <A^-1, sum J^T J> of a rigid body, whose A^-1 has no mixed part. */
-static double rigid_response(const double inverse[PACKED6], const struct arm_sums *s)
-{
-    const double *rr = s->rr;
-    return (inverse[0] + inverse[2] + inverse[5]) * s->count + inverse[9] * (rr[1] + rr[2]) + inverse[14] * (rr[0] + rr[2]) +
-           inverse[20] * (rr[0] + rr[1]) - 2 * (inverse[13] * rr[3] + inverse[18] * rr[4] + inverse[19] * rr[5]);
-}
 
 /* Mean over a pair's points and rows. */
 static double pair_response(const struct sadmm_context *c, const struct sadmm_contact_pair *pair)
@@ -85,7 +62,7 @@ static double pair_response(const struct sadmm_context *c, const struct sadmm_co
         struct arm_sums sums;
         if (c->plan.contact_rows == 3) pair_arms(c, pair, side, &sums);
         if (c->plan.contact_rows == 3 && c->plan.rigid) {
-            w += rigid_response(inverse, &sums);
+            w += packed_dot_arms(inverse, &sums);
             continue;
         }
         if (c->plan.contact_rows == 3) {
@@ -221,43 +198,32 @@ static void weigh_row_block(struct sadmm_context *c, struct row_block *block)
         lambda2 += lambda * lambda;
         w += (double)block->response[r] / block->rows;
     }
-    double mass = weight_mass(sqrt(load2), island->speed, island->mass);
-    double share = load2 > 0 ? mass / load2 : 0; /* B = share lambda lambda^T + phi / w */
+    double share = weight_share(load2, island->speed, island->mass);
     for (int r = 0; r < block->rows; ++r) {
         double lambda = (double)block->lambda[r], response = (double)block->response[r];
-        double own = response > 0 ? WEIGHT_FLOOR_BLOCK / response : 0;
         block->along[r] = 0;
         switch ((sadmm_block_kind)block->kind) {
-        case SADMM_BLOCK_CONTACT:
-            block->weight[r] = (real)(share * lambda2 + (w > 0 ? WEIGHT_FLOOR_CONTACT / w : 1));
-            break;
+        case SADMM_BLOCK_CONTACT: block->weight[r] = (real)weight_of_contact_block(share, lambda2, w); break;
         case SADMM_BLOCK_HARD:
-            block->weight[r] = (real)own;
+            block->weight[r] = (real)weight_of_hard_row(response);
             block->along[r] = (real)(sqrt(share) * lambda);
             break;
-        case SADMM_BLOCK_SOFT: block->weight[r] = (real)(response > 0 ? share * lambda * lambda + own : 1); break;
+        case SADMM_BLOCK_SOFT: block->weight[r] = (real)weight_of_soft_row(share, lambda, response); break;
         }
     }
 }
 
 /* ---- C_i = sum J^T B J ------------------------------------------------------------------------------------------- */
 
-static void add_weighted_row(double C[PACKED6], const double row[6], double weight)
-{
-    int at = 0;
-    for (int i = 0; i < 6; ++i)
-        for (int j = 0; j <= i; ++j) C[at++] += weight * row[i] * row[j];
-}
-
 static void add_row_block(const struct row_block *block, int side, double C[PACKED6])
 {
     double row[6], along[6] = {0};
     for (int r = 0; r < block->rows; ++r) {
         block_row(block, side, r, row);
-        add_weighted_row(C, row, (double)block->weight[r]);
+        packed_add_row(C, row, (double)block->weight[r]);
         for (int j = 0; j < 6; ++j) along[j] += (double)block->along[r] * row[j];
     }
-    add_weighted_row(C, along, 1);
+    packed_add_row(C, along, 1);
 }
 
 static void add_weighted_arms(struct arm_sums *to, const struct arm_sums *arms, double weight)

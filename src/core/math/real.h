@@ -21,6 +21,13 @@ typedef SADMM_REAL real;
 #define SADMM_INLINE static inline
 #endif
 
+/* Before a loop over an array of known size, which stays in registers then. */
+#ifdef __CUDA_ARCH__
+#define SADMM_UNROLL _Pragma("unroll")
+#else
+#define SADMM_UNROLL
+#endif
+
 /* sizeof folds at compile time: one source serves both precisions without the preprocessor knowing the type. */
 #define SADMM_EPSILON ((real)(sizeof(real) == 4 ? (double)FLT_EPSILON : DBL_EPSILON))
 

@@ -108,6 +108,25 @@ SADMM_INLINE double weight_gap_error(double error, double share, double slop)
     return error <= 0 ? error : eased > beyond ? eased : beyond;
 }
 
+/* A block of rows, by share = min(load / V, m) / load^2: B = share lambda lambda^T + phi / w, of a contact
+ * share |lambda|^2 + phi / w, of a soft block the diagonal alone. A row nobody feels (w = 0) has no weight. */
+SADMM_INLINE double weight_share(double load2, double speed, double mass)
+{
+    return load2 > 0 ? weight_mass(sqrt(load2), speed, mass) / load2 : 0;
+}
+
+SADMM_INLINE double weight_of_contact_block(double share, double lambda2, double response)
+{
+    return share * lambda2 + (response > 0 ? WEIGHT_FLOOR_CONTACT / response : 1);
+}
+
+SADMM_INLINE double weight_of_hard_row(double response) { return response > 0 ? WEIGHT_FLOOR_BLOCK / response : 0; }
+
+SADMM_INLINE double weight_of_soft_row(double share, double lambda, double response)
+{
+    return response > 0 ? share * lambda * lambda + WEIGHT_FLOOR_BLOCK / response : 1;
+}
+
 /* B of a pair, kg. phi / w does not sink with the level: it is for contacts whose load is not known. */
 SADMM_INLINE double weight_of_pair(double level, double carried, double response)
 {

@@ -1,0 +1,104 @@
+/* Symmetric 6 x 6 matrices as packed lower triangles, rows first. Double in every precision: penalties, weights and
+ * energies are made of them a few times a step. */
+#ifndef SADMM_MATH_PACKED6_H
+#define SADMM_MATH_PACKED6_H
+
+#include "real.h"
+
+enum { PACKED6 = 21 };
+
+/* <M, S> */
+SADMM_INLINE double packed_dot(const double M[PACKED6], const double S[PACKED6])
+{
+    double sum = 0;
+    int at = 0;
+    SADMM_UNROLL
+    for (int r = 0; r < 6; ++r)
+        SADMM_UNROLL
+        for (int k = 0; k <= r; ++k, ++at) sum += (r == k ? 1 : 2) * M[at] * S[at];
+    return sum;
+}
+
+/* x . M x */
+SADMM_INLINE double packed_form(const double M[PACKED6], const double x[6])
+{
+    double sum = 0;
+    int at = 0;
+    SADMM_UNROLL
+    for (int r = 0; r < 6; ++r)
+        SADMM_UNROLL
+        for (int k = 0; k <= r; ++k, ++at) sum += (r == k ? 1 : 2) * M[at] * x[r] * x[k];
+    return sum;
+}
+
+/* C += weight row^T row */
+SADMM_INLINE void packed_add_row(double C[PACKED6], const double row[6], double weight)
+{
+    int at = 0;
+    SADMM_UNROLL
+    for (int i = 0; i < 6; ++i)
+        SADMM_UNROLL
+        for (int j = 0; j <= i; ++j) C[at++] += weight * row[i] * row[j];
+}
+
+/* Weighted sums over a body's three-row points: J^T J = [ I, -[r]x; [r]x, |r|^2 I - r r^T ] does not depend on the
+ * frame. */
+struct arm_sums {
+    double count, r[3], rr[6]; /* rr: xx yy zz xy xz yz */
+};
+
+SADMM_INLINE void add_arm(struct arm_sums *s, const double r[3], double weight)
+{
+    s->count += weight;
+    SADMM_UNROLL
+    for (int k = 0; k < 3; ++k) {
+        s->r[k] += weight * r[k];
+        s->rr[k] += weight * (r[k] * r[k]);
+    }
+    s->rr[3] += weight * (r[0] * r[1]);
+    s->rr[4] += weight * (r[0] * r[2]);
+    s->rr[5] += weight * (r[1] * r[2]);
+}
+
+SADMM_INLINE void add_arm_sums(double C[PACKED6], const struct arm_sums *s)
+{
+    C[0] += s->count, C[2] += s->count, C[5] += s->count;
+    /* Rows 3-5, columns 0-2: [r]x */
+    C[7] -= s->r[2], C[8] += s->r[1];
+    C[10] += s->r[2], C[12] -= s->r[0];
+    C[15] -= s->r[1], C[16] += s->r[0];
+    C[9] += s->rr[1] + s->rr[2];
+    C[13] -= s->rr[3], C[14] += s->rr[0] + s->rr[2];
+    C[18] -= s->rr[4], C[19] -= s->rr[5], C[20] += s->rr[0] + s->rr[1];
+}
+
+/* <A^-1, sum J^T J> of a rigid body, whose A^-1 has no mixed part. */
+SADMM_INLINE double packed_dot_arms(const double inverse[PACKED6], const struct arm_sums *s)
+{
+    const double *rr = s->rr;
+    return (inverse[0] + inverse[2] + inverse[5]) * s->count + inverse[9] * (rr[1] + rr[2]) +
+           inverse[14] * (rr[0] + rr[2]) + inverse[20] * (rr[0] + rr[1]) -
+           2 * (inverse[13] * rr[3] + inverse[18] * rr[4] + inverse[19] * rr[5]);
+}
+
+/* Row of a contact's normal on either body, up to its sign. */
+SADMM_INLINE void normal_row(const double n[3], const double r[3], double row[6])
+{
+    row[0] = n[0], row[1] = n[1], row[2] = n[2];
+    row[3] = r[1] * n[2] - r[2] * n[1], row[4] = r[2] * n[0] - r[0] * n[2], row[5] = r[0] * n[1] - r[1] * n[0];
+}
+
+/* A^-1 of a rigid body, by blocks. */
+SADMM_INLINE void packed_invert_rigid(const double A[PACKED6], double out[PACKED6])
+{
+    double xx = A[9], yy = A[14], zz = A[20], xy = A[13], xz = A[18], yz = A[19];
+    double c00 = yy * zz - yz * yz, c01 = xz * yz - xy * zz, c02 = xy * yz - xz * yy;
+    double inv = 1 / (xx * c00 + xy * c01 + xz * c02);
+    SADMM_UNROLL
+    for (int k = 0; k < PACKED6; ++k) out[k] = 0;
+    out[0] = out[2] = out[5] = 1 / A[0];
+    out[9] = inv * c00, out[13] = inv * c01, out[14] = inv * (xx * zz - xz * xz);
+    out[18] = inv * c02, out[19] = inv * (xy * xz - xx * yz), out[20] = inv * (xx * yy - xy * xy);
+}
+
+#endif
