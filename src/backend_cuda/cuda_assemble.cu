@@ -1,11 +1,35 @@
 /* Kernels A-D: raw bodies, contacts and blocks, as core has them, into this precision's layout. */
 #include "cuda_double.h"
 
+#include "../core/math/packed6.h"
+
 /* ---- bodies --------------------------------------------------------------------------------------------------- */
 
 /* Blocks of few threads: one thread's work is long, and there are many multiprocessors. */
 enum { BODY_THREADS = 64 };
 
+/* A^-1, packed. */
+static __device__ void invert(bool rigid, const double A[36], double out[PACKED])
+{
+    double packed[PACKED], factor[36];
+    for (int r = 0; r < 6; ++r)
+        for (int k = 0; k <= r; ++k) packed[r * (r + 1) / 2 + k] = A[6 * r + k];
+    if (rigid) {
+        packed_invert_rigid(packed, out);
+        return;
+    }
+    for (int k = 0; k < PACKED; ++k) out[k] = 0;
+    if (!dense6_cholesky(A, factor)) return; /* problems refuse such an A; weights without a response would be no use */
+    for (int k = 0; k < 6; ++k) {
+        double unit[6] = {}, column[6];
+        unit[k] = 1;
+        dense6_solve(factor, unit, column);
+        for (int r = k; r < 6; ++r) out[r * (r + 1) / 2 + k] = column[r];
+    }
+}
+
+/* FAST: A^-1 too. */
+template <bool FAST>
 static __global__ void __launch_bounds__(BODY_THREADS)
     assemble_bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
@@ -33,12 +57,17 @@ static __global__ void __launch_bounds__(BODY_THREADS)
             for (int k = 0; k <= r; ++k) line[packed_place(r, k)] = (solver_real)A[6 * r + k];
         for (int k = PACKED; k < LINE_GENERAL_A; ++k) line[k] = 0;
     }
+    if (FAST) {
+        double inverse[PACKED];
+        invert(v.rigid, A, inverse);
+        for (int k = 0; k < PACKED; ++k) v.A_inverse[PACKED * (size_t)i + (size_t)k] = inverse[k];
+    }
 }
 
 static sadmm_status launch_bodies(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    return CUDA(launch_of)(c, assemble_bodies_kernel, "assemble_bodies",
+    return CUDA(launch_of)(c, c->fast ? assemble_bodies_kernel<true> : assemble_bodies_kernel<false>, "assemble_bodies",
                            ((int64_t)c->view.bodies + BODY_THREADS - 1) / BODY_THREADS, BODY_THREADS, &args, error);
 }
 

@@ -47,6 +47,7 @@ static const char *const buffer_names[BUFFER_COUNT] = {
     "sorts",
     "numbers",
     "scalars",
+    "weights",
     "bodies' input",
     "pairs' input",
     "points' input",

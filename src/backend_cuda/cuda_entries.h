@@ -31,12 +31,14 @@ sadmm_status CUDA(assemble_contacts)(struct sadmm_context *, struct sadmm_error 
 sadmm_status CUDA(assemble_joints)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CUDA(assemble_springs)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CUDA(init_penalty)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CUDA(update_weights)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CUDA(factorize)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CUDA(update_velocity)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CUDA(update_constraints)(struct sadmm_context *, bool measure, struct sadmm_error *);
 sadmm_status CUDA(iterate)(struct sadmm_context *, int count, bool measure, struct sadmm_error *);
 sadmm_status CUDA(measure_residuals)(struct sadmm_context *, struct sadmm_residual *, struct sadmm_error *);
 sadmm_status CUDA(update_penalty)(struct sadmm_context *, double ratio, struct sadmm_error *);
+sadmm_status CUDA(limit_velocity)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
 sadmm_status CUDA(read_solution)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CUDA(read_penalty)(struct sadmm_context *, double *beta, struct sadmm_error *);
 sadmm_status CUDA(integrate)(struct sadmm_context *, struct sadmm_rigid *next, struct sadmm_error *);

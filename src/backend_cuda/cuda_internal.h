@@ -23,7 +23,12 @@
  *   CLUSTER  islands packed into clusters of thread blocks, which read each other's velocities from shared memory
  *   GRID     one cooperative launch; velocities go through L2, with a grid barrier an iteration
  *   STREAM   two kernels an iteration, in a CUDA graph: any size
- * BLOCK, CLUSTER and GRID are one kernel (cuda_resident.cu) over a partition into `parts` (cuda_partition.cu).
+ * BLOCK, CLUSTER and GRID are one kernel (cuda_resident.h) over a partition into `parts` (cuda_partition.cu).
+ *
+ * The method `fast` has a weight B of its own for each constraint (cuda_weights.cu) in place of beta, which is 1 then.
+ * Its iteration is Steps 2-4 and then Step 1, relaxed (math/relax.h), by instances of its own of the same kernels;
+ * slots are by island in every tier, since weights rest on sums over islands. It begins with the multipliers: records are not
+ * kept.
  *
  * Launch sizes follow from what the host knows (rooms, tier); kernels read the true counts from `live`, and do nothing
  * once it says halt.
@@ -69,7 +74,12 @@ enum {
     ROW_DAMPING = 84,
     ROW_LAMBDA = 90,
     ROW_FRICTION = 96,
-    ROW_PLANES = 97
+    /* fast: B = diag(weight) + along along^T; per row J A^-1 J^T, and what its multiplier counts for in the load */
+    ROW_WEIGHT = 97,
+    ROW_ALONG = 103,
+    ROW_RESPONSE = 109,
+    ROW_SCALE = 115,
+    ROW_PLANES = 121
 };
 
 struct alignas(16) real4 {
@@ -81,6 +91,17 @@ struct row_about {
     int32_t half_a, half_b;             /* as in pair_ends */
     int32_t active;                     /* bit r: row r exists (a hard row of zeros is no constraint, Sec. III-C) */
 };
+
+/* fast: of an island, at its label. */
+struct cuda_island {
+    double speed, mass;  /* V in m/s; kg */
+    double level, scale; /* math/weight.h; scale not 0: weights stay, times this */
+    double tallness;     /* math/weight.h: in steps that start warm, else 1 */
+    double slow_down;    /* math/limit.h: the factor of its velocities */
+    int64_t blocks;      /* there are constraints by rows: the level stays 1 */
+};
+
+enum { TERMS = 6 }; /* of a body, in sums over islands */
 
 /* What a pair joins. */
 struct alignas(16) pair_ends {
@@ -140,6 +161,15 @@ struct cuda_view {
     struct sadmm_settings settings;
     double *out; /* results in raw order */
     struct cuda_step_view step; /* whole steps alone */
+
+    /* fast */
+    const int32_t *label, *island_bodies; /* of the layout */
+    double *A_inverse;       /* bodies x PACKED */
+    double *terms;           /* slots x TERMS: of bodies, then added up in place */
+    cuda_island *islands;    /* bodies, used at labels */
+    double *weight, *response; /* pairs: B in kg, J A^-1 J^T */
+    solver_real *inv_s;      /* pairs: B / number of dynamic bodies */
+    int32_t *limited;        /* islands slowed down */
 };
 
 /* Where the data of point k of pair p is. */
@@ -168,6 +198,9 @@ struct cuda_args {
     int32_t rescaled;   /* ratio is view.ratio, else 1 */
     int32_t backward;   /* thread blocks in descending order */
     int32_t in_order;   /* slots are raw indices */
+    int32_t settled;    /* fast: Step 1 ran before in this solve */
+    int32_t warm;       /* fast: the step starts warm */
+    int32_t first_stage, last_stage; /* of sums over islands */
     const struct sadmm_resident_edit *edits;
     double factor;
 };
@@ -186,7 +219,7 @@ enum cuda_buffer_name {
     BUFFER_STATE, BUFFER_B, BUFFER_LINES, BUFFER_C, BUFFER_BETA,
     BUFFER_NORMAL, BUFFER_DIFFERENCE, BUFFER_PAIR_ENDS, BUFFER_ARM, BUFFER_LAMBDA,
     BUFFER_ROW_INFO, BUFFER_ROW_DATA, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_EXCHANGE, BUFFER_LIVE, BUFFER_LAYOUT, BUFFER_SORT,
-    BUFFER_NUMBERS, BUFFER_SCALARS,
+    BUFFER_NUMBERS, BUFFER_SCALARS, BUFFER_WEIGHTS,
     BUFFER_RAW_BODIES, BUFFER_RAW_PAIRS, BUFFER_RAW_POINTS, BUFFER_RAW_BLOCKS, BUFFER_OUT,
     BUFFER_WORLD_BODIES, BUFFER_WORLD_STEADY, BUFFER_WORLD_WRENCH, BUFFER_WORLD_VELOCITY, BUFFER_WORLD_IMPULSE,
     BUFFER_WORLD_SLOTS, BUFFER_WORLD_PLACES, BUFFER_WORLD_CONTROL,
@@ -213,6 +246,9 @@ struct sadmm_context {
     bool backward; /* the next sweeps go over bodies and constraints from the last one to the first */
     bool measured; /* records and change are apart: the next Step 1 uses records + ratio change */
     bool rescaled; /* ... by view.ratio; else it is 1 */
+    bool fast;     /* the method */
+    bool settled;  /* fast: Step 1 ran in this solve */
+    int refreshes; /* fast: of the weights, in this solve */
     bool recording; /* a graph of the whole step: nothing is allocated, no graph launched in it */
 
     enum sadmm_cuda_tier wanted;     /* by a test */
@@ -276,7 +312,8 @@ struct device_scope {
     device_scope scope((c)->device);    \
     CUDA_CALL((c), scope.code, "cudaSetDevice")
 
-/* ---- cuda_layout.cu, cuda_assemble.cu, cuda_penalty.cu, cuda_iterate.cu: parts of the entries, launches only ---- */
+/* ---- cuda_layout.cu, cuda_assemble.cu, cuda_penalty.cu, cuda_weights.cu, cuda_iterate.cu: parts of the entries,
+ * launches only ---- */
 
 /* This precision's data for the view's counts and the partition (allocates). */
 sadmm_status CUDA(solver_room)(struct sadmm_context *, struct sadmm_error *error);
@@ -284,6 +321,16 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *, struct sadmm_error *error
 sadmm_status CUDA(enqueue_bodies)(struct sadmm_context *, struct sadmm_error *error);
 /* Penalties and factors at once; in a whole step, also whether it is what was planned for. */
 sadmm_status CUDA(enqueue_penalties)(struct sadmm_context *, struct sadmm_error *error);
+/* fast: the first weights of a solve, or new ones; then C and, for `factor`, H. `planned` as above. */
+sadmm_status CUDA(enqueue_weights)(struct sadmm_context *, bool first, bool factor, bool planned,
+                                   struct sadmm_error *error);
+/* Its last part: C and H from the weights. */
+sadmm_status CUDA(enqueue_weighted_penalties)(struct sadmm_context *, bool factor, bool planned,
+                                              struct sadmm_error *error);
+/* fast: (17), as a maximum with what view.residual[1] is. */
+sadmm_status CUDA(enqueue_momentum_residual)(struct sadmm_context *, struct sadmm_error *error);
+/* fast: slow islands down (math/limit.h); how many, into *view.limited. */
+sadmm_status CUDA(enqueue_limit)(struct sadmm_context *, struct sadmm_error *error);
 /* (16) and (17) of the iteration that was measured, into view.residual. */
 sadmm_status CUDA(enqueue_residuals)(struct sadmm_context *, struct sadmm_error *error);
 /* (15) by view.residual. */
@@ -320,7 +367,7 @@ sadmm_status CUDA(prepare_stepwise)(struct sadmm_context *, struct sadmm_error *
 /* The instance of the resident kernel for a tier (full: there are row blocks, or the last iteration is measured); threads
  * a block at most; bytes of shared memory. */
 cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, enum sadmm_cuda_tier tier, int threads, bool full,
-                                  const char **name);
+                                  bool fast, const char **name);
 int CUDA(resident_threads)(int point_slots);
 size_t CUDA(resident_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies, bool row_blocks);
 /* Let every instance use `bytes` of shared memory a block, and clusters of more than 8 blocks. *clusters: whether both the
@@ -353,6 +400,22 @@ void CUDA(tighten_partition)(const struct sadmm_context *, const struct cuda_fac
 #else
 #define CUDA_DYNAMIC_SHARED(name) extern __shared__ __align__(16) unsigned char name[]
 #endif
+
+enum { ALL_LANES = -1 }; /* of a warp */
+
+/* *out = max(*out, values of the warp). Every lane of the warp comes here. Bit patterns of non-negative doubles order
+ * like the numbers, and a maximum does not depend on the order it is taken in; a NaN survives as the largest pattern.
+ * */
+static __device__ __forceinline__ void reduce_max(double value, unsigned long long *out)
+{
+    /* -0 (what real_abs may give) has the largest pattern but one: it counts as 0. */
+    unsigned long long bits = value == 0 ? 0 : (unsigned long long)__double_as_longlong(value);
+    for (int o = WARP / 2; o > 0; o /= 2) {
+        unsigned long long other = __shfl_xor_sync((unsigned)ALL_LANES, bits, o);
+        bits = other > bits ? other : bits;
+    }
+    if (threadIdx.x % WARP == 0 && bits != 0) atomicMax(out, bits);
+}
 
 static inline int64_t blocks_for(int64_t threads) { return (threads + THREADS - 1) / THREADS; }
 

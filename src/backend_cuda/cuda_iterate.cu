@@ -42,8 +42,8 @@ static __device__ __forceinline__ void load_numbers_once(real (&to)[4 * COUNT], 
 /* Step 1, a thread a body: all of a body's numbers lie side by side and are asked for at once, sixteen bytes at a time. (Eight
  * lanes a body, as in the resident tiers, where latency counts, spend the time on instructions that load and pass around
  * single numbers.) What is read once makes room in the caches for states and records. The sums are those of
- * free_momentum() and move_body(). */
-template <bool JOIN, bool RIGID>
+ * free_momentum() and move_body(). FAST: args.factor times as far. */
+template <bool JOIN, bool RIGID, bool FAST>
 static __global__ void __launch_bounds__(BODY_THREADS)
     bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
@@ -77,9 +77,11 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     }
     const real *H = line_h((const real *)line, RIGID);
 #pragma unroll
-    for (int r = 0; r < 6; ++r)
-        state[r] += product_with_row(H[packed_place(r, 0)], H[packed_place(r, 1)], H[packed_place(r, 2)],
-                                     H[packed_place(r, 3)], H[packed_place(r, 4)], H[packed_place(r, 5)], g);
+    for (int r = 0; r < 6; ++r) {
+        const real step = product_with_row(H[packed_place(r, 0)], H[packed_place(r, 1)], H[packed_place(r, 2)],
+                                           H[packed_place(r, 3)], H[packed_place(r, 4)], H[packed_place(r, 5)], g);
+        state[r] = FAST ? fused((real)args.factor, step, state[r]) : state[r] + step;
+    }
     real4 *out = (real4 *)(v.state + at * ROW);
     const real4 lo = {state[0], state[1], state[2], state[3]}, hi = {state[4], state[5], state[6], state[7]};
     out[0] = lo;
@@ -138,12 +140,15 @@ static __device__ __forceinline__ void store_records(solver_real *records, const
 
 /* A lane's share of a pair: points lane and, where COUNT is 2, lane + 4. The first is loaded whether it is
  * there or not, so that nothing but the states waits for another load. `live`: else nothing is stored. Every lane of the warp comes
- * here. Returns the lane's share of the primal residual. */
-template <int CONTACT_ROWS, int LANES_A_PAIR, int COUNT, bool MEASURE>
-static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t p, int32_t lane, bool live)
+ * here. FAST: relaxed by `over`; records are those of Step 1 in any case. Returns the lane's share of the primal
+ * residual. */
+template <int CONTACT_ROWS, int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
+static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t p, int32_t lane, bool live, real over)
 {
+    enum { SPLIT = MEASURE && !FAST };
     const real4 about = load_once(v.normal + p), between = load_once(v.difference + p);
     const pair_ends ends = load_once(v.ends + p);
+    const real weight = FAST ? v.inv_s[p] : (real)0;
     size_t slot[COUNT];
     real4 point[COUNT];
     vec3 old[COUNT];
@@ -161,7 +166,7 @@ static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t 
     const body_row a = load_row(v.state, ends.body_a), b = load_row(v.state, ends.body_b);
 
     const vec3 normal = xyz(about), difference = xyz(between);
-    const real inv_s = inverse_weight(a.inv_beta, b.inv_beta);
+    const real inv_s = FAST ? weight : inverse_weight(a.inv_beta, b.inv_beta);
     real largest = 0;
     pair_sum next = {}, change = {};
 #pragma unroll
@@ -171,15 +176,17 @@ static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t 
         const vec3 x = relative_velocity(a.motion, arm_a, b.motion, arm_b);
         const vec3 lambda = update_point<CONTACT_ROWS>(normal, about.w, x, point[j].w, inv_s, old[j]);
         const vec3 delta = v3_sub(lambda, old[j]);
-        if (live) store_lambda<CONTACT_ROWS>(v, slot[j], lambda);
-        add_point(&next, j, impulse_of<CONTACT_ROWS>(normal, MEASURE ? lambda : v3_add(lambda, delta)), arm_a, arm_b);
+        if (live) store_lambda<CONTACT_ROWS>(v, slot[j], FAST ? relaxed(lambda, delta, over) : lambda);
+        add_point(&next, j, impulse_of<CONTACT_ROWS>(normal, SPLIT ? lambda : v3_add(lambda, delta)), arm_a, arm_b);
+        if (SPLIT) add_point(&change, j, impulse_of<CONTACT_ROWS>(normal, delta), arm_a, arm_b);
         if (!MEASURE) continue;
-        add_point(&change, j, impulse_of<CONTACT_ROWS>(normal, delta), arm_a, arm_b);
         largest = real_max(largest, largest_row<CONTACT_ROWS>(normal, delta));
     }
     store_records<LANES_A_PAIR>(v.records, ends, lane, live, next);
-    if (MEASURE) store_records<LANES_A_PAIR>(v.change, ends, lane, live, change);
-    return MEASURE ? (double)(largest * real_max(a.inv_beta, b.inv_beta)) : 0;
+    if (SPLIT) store_records<LANES_A_PAIR>(v.change, ends, lane, live, change);
+    if (!MEASURE) return 0;
+    return (double)(largest * (FAST ? inverse_of_weight(inv_s, ends.body_a < v.bodies && ends.body_b < v.bodies)
+                                    : real_max(a.inv_beta, b.inv_beta)));
 }
 
 /* The same for J^T lambda^0. */
@@ -204,6 +211,23 @@ static __device__ __forceinline__ void store_row_records(const cuda_view &v, int
 {
     if (about.half_a >= 0) store_row_record(v, k, about.rows, 0, lambda, records + (size_t)about.half_a * ROW);
     if (about.half_b >= 0) store_row_record(v, k, about.rows, 1, lambda, records + (size_t)about.half_b * ROW);
+}
+
+template <bool MEASURE>
+static __device__ __forceinline__ double sweep_row_block_fast(const cuda_view &v, int32_t k, real over)
+{
+    const row_about about = v.row_info[k];
+    real lambda[6], delta[6], kept[6];
+    load_row_lambda(v, k, lambda);
+    update_row_block_fast(v, k, about, v.state + (size_t)about.body_a * ROW, v.state + (size_t)about.body_b * ROW,
+                          lambda, delta);
+    for (int r = 0; r < 6; ++r) {
+        kept[r] = fused(over, delta[r], lambda[r]);
+        lambda[r] += delta[r];
+    }
+    store_row_lambda(v, k, kept);
+    store_row_records(v, k, about, lambda, v.records);
+    return MEASURE ? row_block_primal_fast(v, k, about, delta) : 0;
 }
 
 template <bool MEASURE> static __device__ __forceinline__ double sweep_row_block(const cuda_view &v, int32_t k)
@@ -239,7 +263,8 @@ static __device__ __forceinline__ void with_pair(const cuda_view &v, int32_t t, 
     if (t / WARP * (WARP / LANES_A_PAIR) < pairs) work(p < pairs ? p : pairs - 1, t % LANES_A_PAIR, p < pairs);
 }
 
-template <int CONTACT_ROWS, int LANES_A_PAIR, int COUNT, bool MEASURE>
+/* FAST: relaxed by args.factor. */
+template <int CONTACT_ROWS, int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
 static __global__ void __launch_bounds__(THREADS)
     constraints_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
@@ -247,9 +272,10 @@ static __global__ void __launch_bounds__(THREADS)
     double primal = 0;
     if (k < 0)
         with_pair<LANES_A_PAIR>(v, t, [&](int32_t p, int32_t lane, bool live) {
-            primal = sweep_pair<CONTACT_ROWS, LANES_A_PAIR, COUNT, MEASURE>(v, p, lane, live);
+            primal = sweep_pair<CONTACT_ROWS, LANES_A_PAIR, COUNT, MEASURE, FAST>(v, p, lane, live, (real)args.factor);
         });
-    else if (k < live_rows(v)) primal = sweep_row_block<MEASURE>(v, k);
+    else if (k < live_rows(v))
+        primal = FAST ? sweep_row_block_fast<MEASURE>(v, k, (real)args.factor) : sweep_row_block<MEASURE>(v, k);
     if (MEASURE) reduce_max(primal, v.residual);
 }
 
@@ -298,14 +324,18 @@ static __global__ void dual_kernel(const __grid_constant__ cuda_view v, const __
 
 /* ---- launches ------------------------------------------------------------------------------------------------- */
 
-static sadmm_status launch_bodies(struct sadmm_context *c, bool join, struct sadmm_error *error)
+/* fast: v goes `relaxation` times as far. */
+static sadmm_status launch_bodies(struct sadmm_context *c, bool join, double relaxation, struct sadmm_error *error)
 {
     cuda_args args = {};
     args.rescaled = c->rescaled;
     args.backward = c->backward;
-    args.in_order = c->partition.tier == SADMM_CUDA_TIER_GRID || c->partition.tier == SADMM_CUDA_TIER_STREAM;
-    cuda_kernel kernel = c->view.rigid ? (join ? bodies_kernel<true, true> : bodies_kernel<false, true>)
-                                       : (join ? bodies_kernel<true, false> : bodies_kernel<false, false>);
+    args.in_order = !slots_by_island(&c->partition);
+    args.factor = relaxation;
+    cuda_kernel kernel =
+        c->fast         ? (c->view.rigid ? bodies_kernel<false, true, true> : bodies_kernel<false, false, true>)
+        : c->view.rigid ? (join ? bodies_kernel<true, true, false> : bodies_kernel<false, true, false>)
+                        : (join ? bodies_kernel<true, false, false> : bodies_kernel<false, false, false>);
     const int64_t blocks = ((int64_t)c->view.bodies + BODY_THREADS - 1) / BODY_THREADS;
     return CUDA(launch_of)(c, kernel, "update_velocity", blocks, BODY_THREADS, &args, error);
 }
@@ -315,29 +345,34 @@ static int64_t constraint_blocks(const cuda_view *v)
     return blocks_for((int64_t)v->lanes * v->pair_room) + blocks_for(v->rows);
 }
 
-template <int CONTACT_ROWS, int LANES_A_PAIR, int COUNT> static cuda_kernel sweep_kernel(bool measure)
+template <int CONTACT_ROWS, int LANES_A_PAIR, int COUNT> static cuda_kernel sweep_kernel(bool measure, bool fast)
 {
-    return measure ? constraints_kernel<CONTACT_ROWS, LANES_A_PAIR, COUNT, true>
-                   : constraints_kernel<CONTACT_ROWS, LANES_A_PAIR, COUNT, false>;
+    return fast ? (measure ? constraints_kernel<CONTACT_ROWS, LANES_A_PAIR, COUNT, true, true>
+                           : constraints_kernel<CONTACT_ROWS, LANES_A_PAIR, COUNT, false, true>)
+                : (measure ? constraints_kernel<CONTACT_ROWS, LANES_A_PAIR, COUNT, true, false>
+                           : constraints_kernel<CONTACT_ROWS, LANES_A_PAIR, COUNT, false, false>);
 }
 
-static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, struct sadmm_error *error)
+/* fast: lambda goes `over` times farther. */
+static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, double over, struct sadmm_error *error)
 {
-    const bool one_row = c->view.contact_rows == 1;
+    const bool one_row = c->view.contact_rows == 1, fast = c->fast;
     cuda_args args = {};
+    args.factor = over;
     args.backward = c->backward;
     c->backward = !c->backward;
-    cuda_kernel kernel = c->view.lanes == 1 ? (one_row ? sweep_kernel<1, 1, 1>(measure) : sweep_kernel<3, 1, 1>(measure))
+    cuda_kernel kernel = c->view.lanes == 1
+                             ? (one_row ? sweep_kernel<1, 1, 1>(measure, fast) : sweep_kernel<3, 1, 1>(measure, fast))
                          : c->facts.point_slots <= 4
-                             ? (one_row ? sweep_kernel<1, 4, 1>(measure) : sweep_kernel<3, 4, 1>(measure))
-                             : (one_row ? sweep_kernel<1, 4, 2>(measure) : sweep_kernel<3, 4, 2>(measure));
+                             ? (one_row ? sweep_kernel<1, 4, 1>(measure, fast) : sweep_kernel<3, 4, 1>(measure, fast))
+                             : (one_row ? sweep_kernel<1, 4, 2>(measure, fast) : sweep_kernel<3, 4, 2>(measure, fast));
     return CUDA(launch)(c, kernel, "update_constraints", constraint_blocks(&c->view), &args, error);
 }
 
 static sadmm_status clear_primal(struct sadmm_context *c, bool measure, struct sadmm_error *error)
 {
     if (!measure) return SADMM_OK;
-    if (!c->view.change && c->view.pair_room + c->view.rows > 0)
+    if (!c->plan.residuals && c->view.pair_room + c->view.rows > 0)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "measure = true: the plan has residuals = false");
     CUDA_CALL(c, cudaMemsetAsync(c->view.residual, 0, sizeof *c->view.residual, c->stream),
               "cudaMemsetAsync(residual)");
@@ -364,7 +399,7 @@ extern "C" sadmm_status CUDA(update_velocity)(struct sadmm_context *c, struct sa
 {
     CUDA_ENTER(c);
     CUDA_TRY(CUDA(prepare_stepwise)(c, error));
-    CUDA_TRY(launch_bodies(c, c->measured, error));
+    CUDA_TRY(launch_bodies(c, c->measured, 1, error));
     c->measured = false;
     c->rescaled = false;
     return SADMM_OK;
@@ -375,18 +410,33 @@ extern "C" sadmm_status CUDA(update_constraints)(struct sadmm_context *c, bool m
     CUDA_ENTER(c);
     CUDA_TRY(CUDA(prepare_stepwise)(c, error));
     CUDA_TRY(clear_primal(c, measure, error));
-    CUDA_TRY(launch_constraints(c, measure, error));
-    c->measured = measure;
+    CUDA_TRY(launch_constraints(c, measure, 0, error));
+    c->measured = measure && !c->fast;
     return SADMM_OK;
 }
 
 /* ---- fused: STREAM -------------------------------------------------------------------------------------------- */
 
+/* fast: Steps 2-4 first, and relaxed as iteration i of `count` is. */
+static sadmm_status fast_iteration(struct sadmm_context *c, int i, int count, bool measure, struct sadmm_error *error)
+{
+    const double relaxation = c->settings.relaxation;
+    CUDA_TRY(launch_constraints(c, measure, relax_constraints(i, count) ? relaxation - 1 : 0, error));
+    CUDA_TRY(launch_bodies(c, false, relax_velocity(i, count, c->settled) ? relaxation : 1, error));
+    c->settled = true;
+    return SADMM_OK;
+}
+
+/* Iterations of which nothing is special: fast, relaxed ones. */
 static sadmm_status plain_iterations(struct sadmm_context *c, int count, struct sadmm_error *error)
 {
     for (int i = 0; i < count; ++i) {
-        CUDA_TRY(launch_bodies(c, false, error));
-        CUDA_TRY(launch_constraints(c, false, error));
+        if (c->fast) {
+            CUDA_TRY(fast_iteration(c, i, count + 1, false, error));
+            continue;
+        }
+        CUDA_TRY(launch_bodies(c, false, 1, error));
+        CUDA_TRY(launch_constraints(c, false, 0, error));
     }
     return SADMM_OK;
 }
@@ -424,18 +474,23 @@ static sadmm_status stream_iterations(struct sadmm_context *c, int count, bool m
 {
     CUDA_TRY(CUDA(prepare_stepwise)(c, error));
     if (c->measured) {
-        CUDA_TRY(launch_bodies(c, true, error));
-        CUDA_TRY(launch_constraints(c, measure && count == 1, error));
+        CUDA_TRY(launch_bodies(c, true, 1, error));
+        CUDA_TRY(launch_constraints(c, measure && count == 1, 0, error));
         --count;
     }
-    int plain = measure && count > 0 ? count - 1 : count;
+    if (c->fast && !c->settled && count > 1) {
+        CUDA_TRY(fast_iteration(c, 0, count, false, error));
+        --count;
+    }
+    int plain = (measure || c->fast) && count > 0 ? count - 1 : count;
     if (plain >= GRAPH_ITERATIONS && !c->recording && !c->graph_valid) CUDA_TRY(make_graph(c, error));
     for (; plain >= GRAPH_ITERATIONS && !c->recording; plain -= GRAPH_ITERATIONS, count -= GRAPH_ITERATIONS)
         CUDA_CALL(c, cudaGraphLaunch(c->graph, c->stream), "cudaGraphLaunch");
     CUDA_TRY(plain_iterations(c, plain, error));
+    if (count > plain && c->fast) return fast_iteration(c, 0, 1, measure, error);
     if (count > plain) {
-        CUDA_TRY(launch_bodies(c, false, error));
-        CUDA_TRY(launch_constraints(c, true, error));
+        CUDA_TRY(launch_bodies(c, false, 1, error));
+        CUDA_TRY(launch_constraints(c, true, 0, error));
     }
     return SADMM_OK;
 }
@@ -452,15 +507,17 @@ static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool
     args.join = c->measured;
     args.rescaled = c->rescaled;
     args.start = c->starting;
+    args.settled = c->settled;
     args.most_bodies = partition->most_bodies;
     args.cluster = partition->cluster;
     cuda_kernel kernel = CUDA(resident_kernel)(c->view.contact_rows, c->facts.point_slots, partition->tier,
-                                               partition->threads, measure || c->view.rows > 0, &name);
+                                               partition->threads, measure || c->view.rows > 0, c->fast, &name);
     if (partition->tier == SADMM_CUDA_TIER_GRID)
         CUDA_CALL(c, cudaMemsetAsync(c->view.barrier, 0, sizeof *c->view.barrier, c->stream),
                   "cudaMemsetAsync(barrier)");
     CUDA_TRY(CUDA(launch_partition)(c, kernel, name, partition, &args, error));
     c->starting = false;
+    c->settled = true;
     return SADMM_OK;
 }
 
@@ -471,7 +528,7 @@ extern "C" sadmm_status CUDA(iterate)(struct sadmm_context *c, int count, bool m
     CUDA_TRY(clear_primal(c, measure, error));
     CUDA_TRY(c->partition.tier == SADMM_CUDA_TIER_STREAM ? stream_iterations(c, count, measure, error)
                                                : resident_iterations(c, count, measure, error));
-    c->measured = measure;
+    c->measured = measure && !c->fast;
     c->rescaled = false;
     return SADMM_OK;
 }
@@ -483,6 +540,7 @@ sadmm_status CUDA(enqueue_residuals)(struct sadmm_context *c, struct sadmm_error
     cuda_args args = {};
     CUDA_CALL(c, cudaMemsetAsync(c->view.residual + 1, 0, sizeof *c->view.residual, c->stream),
               "cudaMemsetAsync(residual)");
+    if (c->fast) return CUDA(enqueue_momentum_residual)(c, error);
     return CUDA(launch)(c, dual_kernel, "measure_residuals", blocks_for((int64_t)c->view.bodies * LANES), &args, error);
 }
 

@@ -99,6 +99,8 @@ sadmm_status CUDA(layout_room)(struct sadmm_context *c, struct sadmm_error *erro
     c->one_block = LAYOUT(one_block_shared)(v->bodies, (int32_t)halves) <= (size_t)c->shared_limit;
     v->live = l->live = &((known *)c->buffers[BUFFER_LIVE].data)->live;
     v->facts = l->facts = &((known *)c->buffers[BUFFER_LIVE].data)->facts;
+    v->label = l->label;
+    v->island_bodies = l->island_bodies;
     v->body_of = l->body_of;
     v->slot_of = l->slot_of;
     v->offsets = l->offsets;
@@ -195,6 +197,24 @@ static sadmm_status raw_room(struct sadmm_context *c, struct sadmm_error *error)
     return SADMM_OK;
 }
 
+/* What only the method `fast` has. */
+static sadmm_status weights_room(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_view *v = &c->view;
+    const size_t n = (size_t)v->bodies, pairs = (size_t)v->pair_room;
+    CUDA_TRY(CUDA(room)(c, BUFFER_WEIGHTS,
+                        (n * (PACKED + TERMS) + 2 * pairs) * sizeof(double) + n * sizeof(cuda_island) +
+                            pairs * sizeof(solver_real),
+                        error));
+    v->A_inverse = (double *)c->buffers[BUFFER_WEIGHTS].data;
+    v->terms = v->A_inverse + n * PACKED;
+    v->weight = v->terms + n * TERMS;
+    v->response = v->weight + pairs;
+    v->islands = (cuda_island *)(v->response + pairs);
+    v->inv_s = (solver_real *)(v->islands + n);
+    return SADMM_OK;
+}
+
 /* This precision's data, once the facts are known. */
 sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *error)
 {
@@ -205,7 +225,7 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
     size_t lanes = (size_t)v->lanes, slots = ((size_t)c->facts.point_slots + lanes - 1) / lanes * lanes * pairs;
     size_t records = 2 * (pairs + (size_t)v->rows) * ROW * real_size;
     size_t points = (size_t)v->points;
-    bool three = v->contact_rows != 1;
+    bool three = v->contact_rows != 1, joins = c->plan.residuals && !c->fast;
     v->rigid = c->plan.rigid;
     v->line = v->rigid ? LINE_RIGID : LINE_GENERAL;
     v->point_slots = c->facts.point_slots;
@@ -224,7 +244,7 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
         {BUFFER_ROW_INFO, rows * sizeof(row_about)},
         {BUFFER_ROW_DATA, rows * ROW_PLANES * real_size},
         {BUFFER_RECORDS, records},
-        {BUFFER_CHANGE, c->plan.residuals ? records : 0},
+        {BUFFER_CHANGE, joins ? records : 0},
         {BUFFER_EXCHANGE, c->partition.tier == SADMM_CUDA_TIER_GRID ? 2 * n * ROW * real_size : 0},
         {BUFFER_SCALARS, 64},
         {BUFFER_OUT, out},
@@ -254,15 +274,16 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
     v->row_info = (row_about *)b[BUFFER_ROW_INFO].data;
     v->row_data = (solver_real *)b[BUFFER_ROW_DATA].data;
     v->records = (solver_real *)b[BUFFER_RECORDS].data;
-    v->change = (solver_real *)(c->plan.residuals ? b[BUFFER_CHANGE].data : none);
+    v->change = (solver_real *)(joins ? b[BUFFER_CHANGE].data : none);
     v->exchange = (solver_real *)b[BUFFER_EXCHANGE].data;
     v->residual = (unsigned long long *)b[BUFFER_SCALARS].data;
     v->ratio = (double *)(v->residual + 2);
+    v->limited = (int32_t *)(v->residual + 3);
     v->barrier = (unsigned *)(v->residual + 4); /* a sector of its own */
     v->out = (double *)b[BUFFER_OUT].data;
     CUDA_CALL(c, cudaMemsetAsync(v->residual, 0, 64, c->stream), "cudaMemsetAsync(scalars)");
     CUDA_CALL(c, cudaMemsetAsync(v->state + n * ROW, 0, ROW * real_size, c->stream), "cudaMemsetAsync(static world)");
-    return SADMM_OK;
+    return c->fast ? weights_room(c, error) : SADMM_OK;
 }
 
 /* ---- begin ------------------------------------------------------------------------------------------------------ */
@@ -330,6 +351,7 @@ static sadmm_status lay_out(struct sadmm_context *c, struct sadmm_error *error)
             known.facts.part_halves, known.facts.part_bodies, partition->most_halves, partition->most_bodies);
     *partition = {};
     partition->tier = SADMM_CUDA_TIER_STREAM;
+    partition->islands = c->fast;
     CUDA_TRY(upload_live(c, HALT_NONE, error));
     return CUDA(enqueue_layout)(c, partition, error);
 }
@@ -338,9 +360,6 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
                                     const struct sadmm_plan *plan, const struct sadmm_settings *settings,
                                     struct sadmm_error *error)
 {
-    if (settings->method != SADMM_METHOD_PAPER)
-        return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "settings.method = %d: the cuda backend runs paper only",
-                          (int)settings->method);
     int64_t records = (int64_t)plan->pairs + system->block_count + WARP;
     if (records > INT32_MAX / (4 * ROW))
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%lld constraints: at most %d", (long long)(records - WARP),
@@ -353,7 +372,8 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
     c->plan = *plan;
     c->settings = *settings;
     c->starting = true;
-    c->placed = c->measured = c->rescaled = false;
+    c->placed = c->measured = c->rescaled = c->settled = false;
+    c->fast = settings->method == SADMM_METHOD_FAST;
     c->refused = 0;
     c->graph_valid = false;
     count(c);
@@ -361,7 +381,7 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
     CUDA_TRY(CUDA(layout_room)(c, error));
     CUDA_TRY(upload_raw(c, error));
     CUDA_TRY(upload_live(c, HALT_NONE, error));
-    bool islands = c->wanted != SADMM_CUDA_TIER_GRID && c->wanted != SADMM_CUDA_TIER_STREAM;
+    bool islands = c->fast || (c->wanted != SADMM_CUDA_TIER_GRID && c->wanted != SADMM_CUDA_TIER_STREAM);
     struct known known;
     CUDA_TRY(CUDA(enqueue_survey)(c, islands, error));
     CUDA_TRY(download_known(c, &known, error));

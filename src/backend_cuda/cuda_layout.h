@@ -3,9 +3,10 @@
  * Facts are on the device, guesses on the host: launches are sized by the room there is, kernels learn the true counts
  * from `cuda_live` and do nothing once a step of the queue has failed.
  *
- * Bodies have slots, so that an island's bodies are neighbours; where islands do not matter (GRID, STREAM) a body's
- * slot is its raw index. Pairs and row blocks keep their raw order: the record of pair p is p, that of row block k is
- * pair_room + k. A half is a constraint as seen by one of its dynamic bodies: 2 record + side (0 on a, 1 on b).
+ * Bodies have slots, so that an island's bodies are neighbours; where islands do not matter (GRID and STREAM in the
+ * method `paper`) a body's slot is its raw index. Pairs and row blocks keep their raw order: the record of pair p is p,
+ * that of row block k is pair_room + k. A half is a constraint as seen by one of its dynamic bodies: 2 record + side (0
+ * on a, 1 on b).
  *
  * Parts, the shares of thread blocks, are ranges of body slots. With C(i) the halves and bodies before slot i, share p
  * of P of the slots [first, last) begins at the first slot i with C(i) - C(first) >= ceil(p (C(last) - C(first)) / P).
@@ -52,6 +53,7 @@ struct cuda_partition {
     int32_t threads;         /* a block */
     int32_t most_halves, most_bodies; /* a part may have; a part with more sets live->halt = HALT_PARTITION */
     size_t shared;           /* bytes a block, for most_halves and most_bodies */
+    bool islands;            /* slots by island in GRID and STREAM too */
 };
 
 /* A layout brought to the host, for tests; arrays of the caller, with room for bodies, bodies, bodies + 1, two a

@@ -68,7 +68,7 @@ static bool take_room(const struct sadmm_context *c, struct cuda_partition *part
         if ((int64_t)CUDA(resident_shared)(partition->tier, partition->threads, (int32_t)middle, rows) <= bytes) low = middle;
         else high = middle - 1;
     }
-    /* A block of one warp keeps all its bodies in registers (cuda_resident.cu). */
+    /* A block of one warp keeps all its bodies in registers (cuda_resident.h). */
     if (partition->threads == WARP) low = smaller(low, WARP / LANES);
     partition->most_bodies = (int32_t)low;
     partition->shared = CUDA(resident_shared)(partition->tier, partition->threads, partition->most_bodies, rows);
@@ -170,8 +170,8 @@ static struct choice choose_cluster_of(const struct sadmm_context *c, const stru
     if (choice.partition.threads > most || !take_room(c, &choice.partition, bound, c->shared_limit))
         return no_choice(too_large);
     int active = 0;
-    cuda_kernel kernel =
-        CUDA(resident_kernel)(c->plan.contact_rows, facts->point_slots, SADMM_CUDA_TIER_CLUSTER, 0, true, &name);
+    cuda_kernel kernel = CUDA(resident_kernel)(c->plan.contact_rows, facts->point_slots, SADMM_CUDA_TIER_CLUSTER, 0,
+                                               true, c->fast, &name);
     *code = CUDA(active_clusters)(c, kernel, &choice.partition, &active);
     if (*code != cudaSuccess || active < 1) return no_choice("the device has no clusters that large");
     const int64_t rounds = up(smaller(clusters, larger(facts->islands, 1)), active);
@@ -216,8 +216,8 @@ static struct choice choose_grid(const struct sadmm_context *c, const struct cud
         choice.partition.threads = (int32_t)threads;
         if (!take_room(c, &choice.partition, bound, c->shared_limit / side_by_side)) continue;
         int resident = 0;
-        cuda_kernel kernel =
-            CUDA(resident_kernel)(c->plan.contact_rows, facts->point_slots, SADMM_CUDA_TIER_GRID, 0, true, &name);
+        cuda_kernel kernel = CUDA(resident_kernel)(c->plan.contact_rows, facts->point_slots, SADMM_CUDA_TIER_GRID, 0,
+                                                   true, c->fast, &name);
         *code = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, (const void *)kernel,
                                                               choice.partition.threads, choice.partition.shared);
         if (*code != cudaSuccess || parts > (int64_t)resident * c->multiprocessors) return no_choice(too_large);
@@ -229,7 +229,7 @@ static struct choice choose_grid(const struct sadmm_context *c, const struct cud
 
 static struct choice choose_stream(void)
 {
-    struct choice choice = {{SADMM_CUDA_TIER_STREAM, 0, 1, THREADS, INT32_MAX, INT32_MAX, 0}, nullptr, 0};
+    struct choice choice = {{SADMM_CUDA_TIER_STREAM, 0, 1, THREADS, INT32_MAX, INT32_MAX, 0, false}, nullptr, 0};
     return choice;
 }
 
@@ -265,6 +265,7 @@ sadmm_status CUDA(choose_partition)(struct sadmm_context *c, const struct cuda_f
     if (code != cudaSuccess) return CUDA(fail)(c, code, "looking for blocks that run side by side", error);
     if (choice.why) return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "the cuda tier asked for: %s", choice.why);
     *partition = choice.partition;
+    partition->islands = c->fast;
     return SADMM_OK;
 }
 

@@ -1,85 +1,44 @@
 /* Kernels E-H and P: C_i (14), beta_i (13), (15), and H = (A_i + beta_i C_i)^-1. In double: they run a few times
  * a step, and H only preconditions (the fixed point of Step 1 does not depend on it). */
-#include "cuda_double.h"
+#include "cuda_body.h"
 #include "cuda_step_check.h"
 
-/* C += row^T row, packed lower triangle. */
-static __device__ __forceinline__ void add_row(double C[PACKED], const double row[6])
-{
-    int at = 0;
-#pragma unroll
-    for (int i = 0; i < 6; ++i)
-#pragma unroll
-        for (int j = 0; j <= i; ++j) C[at++] += row[i] * row[j];
-}
-
-/* Sums over a body's three-row points: J^T J = [ I, -[r]x; [r]x, |r|^2 I - r r^T ] does not depend on the frame. */
-struct arm_sums {
-    double count, rx, ry, rz, xx, yy, zz, xy, xz, yz;
-};
-
-static __device__ __forceinline__ void add_arm(arm_sums *s, const double r[3])
-{
-    double x = r[0], y = r[1], z = r[2];
-    s->count += 1;
-    s->rx += x, s->ry += y, s->rz += z;
-    s->xx += x * x, s->yy += y * y, s->zz += z * z;
-    s->xy += x * y, s->xz += x * z, s->yz += y * z;
-}
-
-static __device__ __forceinline__ void add_arm_sums(double C[PACKED], const arm_sums *s)
-{
-    C[0] += s->count, C[2] += s->count, C[5] += s->count;
-    /* Rows 3-5, columns 0-2: [r]x */
-    C[7] -= s->rz, C[8] += s->ry;
-    C[10] += s->rz, C[12] -= s->rx;
-    C[15] -= s->ry, C[16] += s->rx;
-    C[9] += s->yy + s->zz;
-    C[13] -= s->xy, C[14] += s->xx + s->zz;
-    C[18] -= s->xz, C[19] -= s->yz, C[20] += s->xx + s->yy;
-}
-
+/* WEIGHTED: as the weights of the method `fast` have it, else with B = 1. */
+template <bool WEIGHTED>
 static __device__ void add_pair(const cuda_view &v, int32_t p, int side, arm_sums *sums, double C[PACKED])
 {
     const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
+    const double weight = WEIGHTED ? v.weight[p] : 1;
     for (int32_t k = 0; k < pair->count; ++k) {
         const struct sadmm_contact_point *point = &v.raw_points[pair->first + k];
         const double *r = side ? point->arm_b : point->arm_a;
         if (v.contact_rows == 3) {
-            add_arm(sums, r);
+            add_arm(sums, r, weight);
         } else {
             double row[6];
             sadmm_contact_row(v3_load(pair->normal), r, 1, row);
-            add_row(C, row);
+            packed_add_row(C, row, weight);
         }
     }
 }
 
-static __device__ void add_block(const struct sadmm_problem_block *block, int side, double C[PACKED])
+template <bool WEIGHTED> static __device__ void add_block(const cuda_view &v, int32_t k, int side, double C[PACKED])
 {
+    const struct sadmm_problem_block *block = &v.raw.blocks[k];
     const double *J = side ? block->jacobian_b : block->jacobian_a;
+    double along[6] = {};
     for (int32_t r = 0; r < block->rows; ++r) {
         double row[6];
         for (int j = 0; j < 6; ++j) row[j] = J[6 * r + j];
-        add_row(C, row);
+        packed_add_row(C, row, WEIGHTED ? row_number(v, ROW_WEIGHT + r, k) : 1);
+        if (!WEIGHTED) continue;
+        for (int j = 0; j < 6; ++j) along[j] += row_number(v, ROW_ALONG + r, k) * row[j];
     }
-}
-
-/* ---- a body by its eight lanes --------------------------------------------------------------------------------- */
-
-/* Blocks of few threads: the work of a lane is long, and there are many multiprocessors. */
-enum { BODY_THREADS = 64 };
-
-/* x[k] of the eight lanes added up, in all of them. Every lane of the warp comes here. */
-template <int COUNT> static __device__ __forceinline__ void sum_lanes(double x[COUNT])
-{
-#pragma unroll
-    for (int o = 1; o < LANES; o *= 2)
-#pragma unroll
-        for (int k = 0; k < COUNT; ++k) x[k] += __shfl_xor_sync(0xffffffffu, x[k], o);
+    if (WEIGHTED) packed_add_row(C, along, 1);
 }
 
 /* C_i, in all lanes: each adds up every eighth half. Every lane of the warp comes here. */
+template <bool WEIGHTED>
 static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, int32_t begin, int32_t end, int32_t lane,
                                                       double C[PACKED])
 {
@@ -87,8 +46,8 @@ static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, int32_
     for (int k = 0; k < PACKED; ++k) C[k] = 0;
     for (int32_t at = begin + lane; at < end; at += LANES) {
         int32_t record = v.incident[at] / 2, side = v.incident[at] & 1;
-        if (record < v.pair_room) add_pair(v, record, side, &sums, C);
-        else add_block(&v.raw.blocks[record - v.pair_room], side, C);
+        if (record < v.pair_room) add_pair<WEIGHTED>(v, record, side, &sums, C);
+        else add_block<WEIGHTED>(v, record - v.pair_room, side, C);
     }
     if (v.contact_rows == 1 || v.rows > 0) sum_lanes<PACKED>(C);
     sum_lanes<sizeof sums / sizeof(double)>(&sums.count);
@@ -171,32 +130,17 @@ static __device__ __forceinline__ void factor_body(const cuda_view &v, size_t bo
 
 /* ---- kernels ----------------------------------------------------------------------------------------------------- */
 
-/* Which body a thread is about. */
-struct body_thread {
-    int32_t slot, lane;
-    bool live;
-    size_t body; /* raw */
-};
-
-static __device__ __forceinline__ body_thread body_of_thread(const cuda_view &v)
-{
-    const int32_t t = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x), slot = t / LANES;
-    const bool live = slot < live_bodies(v);
-    body_thread out = {slot, t % LANES, live, live ? (size_t)v.body_of[slot] : 0};
-    return out;
-}
-
 /* PENALTY: C and beta; FACTOR: H from them. */
-template <bool PENALTY, bool FACTOR>
+template <bool PENALTY, bool FACTOR, bool WEIGHTED>
 static __global__ void __launch_bounds__(BODY_THREADS)
     penalty_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     const body_thread t = body_of_thread(v);
     double C[PACKED], beta = 1;
     if (PENALTY) {
-        penalty_matrix(v, t.live ? v.offsets[t.slot] : 0, t.live ? v.offsets[t.slot + 1] : 0, t.lane, C);
+        penalty_matrix<WEIGHTED>(v, t.begin, t.end, t.lane, C);
         if (t.live) {
-            beta = penalty_of(v, v.lines + t.body * (size_t)v.line, C);
+            if (!WEIGHTED) beta = penalty_of(v, v.lines + t.body * (size_t)v.line, C);
             if (t.lane == 0) v.beta[t.body] = beta;
 #pragma unroll
             for (int k = 0; k < PACKED; ++k)
@@ -227,7 +171,7 @@ static __global__ void scale_kernel(const __grid_constant__ cuda_view v, const _
 static sadmm_status launch_bodies(struct sadmm_context *c, cuda_kernel kernel, const char *name, const cuda_args *args,
                                   struct sadmm_error *error)
 {
-    const int64_t threads = (int64_t)c->view.bodies * LANES, blocks = (threads + BODY_THREADS - 1) / BODY_THREADS;
+    const int64_t blocks = body_blocks(c->view.bodies);
     return CUDA(launch_of)(c, kernel, name, args->planned && blocks == 0 ? 1 : blocks, BODY_THREADS, args, error);
 }
 
@@ -239,14 +183,15 @@ extern "C" sadmm_status CUDA(init_penalty)(struct sadmm_context *c, struct sadmm
     c->placed = false;
     c->measured = false;
     c->rescaled = false;
-    return launch_bodies(c, penalty_kernel<true, false>, "init_penalty", &args, error);
+    if (c->fast) return CUDA(enqueue_weights)(c, true, false, false, error);
+    return launch_bodies(c, penalty_kernel<true, false, false>, "init_penalty", &args, error);
 }
 
 extern "C" sadmm_status CUDA(factorize)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
     CUDA_ENTER(c);
-    return launch_bodies(c, penalty_kernel<false, true>, "factorize", &args, error);
+    return launch_bodies(c, penalty_kernel<false, true, false>, "factorize", &args, error);
 }
 
 extern "C" sadmm_status CUDA(update_penalty)(struct sadmm_context *c, double ratio, struct sadmm_error *error)
@@ -265,7 +210,8 @@ sadmm_status CUDA(enqueue_penalties)(struct sadmm_context *c, struct sadmm_error
     args.planned = true;
     c->starting = true;
     c->placed = c->measured = c->rescaled = false;
-    return launch_bodies(c, penalty_kernel<true, true>, "penalties", &args, error);
+    if (c->fast) return CUDA(enqueue_weights)(c, true, true, true, error);
+    return launch_bodies(c, penalty_kernel<true, true, false>, "penalties", &args, error);
 }
 
 sadmm_status CUDA(enqueue_balance)(struct sadmm_context *c, struct sadmm_error *error)
@@ -275,4 +221,13 @@ sadmm_status CUDA(enqueue_balance)(struct sadmm_context *c, struct sadmm_error *
     CUDA_TRY(CUDA(launch)(c, scale_kernel, "update_penalty", blocks_for(c->view.bodies), &args, error));
     c->rescaled = true;
     return SADMM_OK;
+}
+
+sadmm_status CUDA(enqueue_weighted_penalties)(struct sadmm_context *c, bool factor, bool planned,
+                                              struct sadmm_error *error)
+{
+    cuda_args args = {};
+    args.planned = planned;
+    return launch_bodies(c, factor ? penalty_kernel<true, true, true> : penalty_kernel<true, false, true>, "penalties",
+                         &args, error);
 }

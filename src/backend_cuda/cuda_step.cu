@@ -80,6 +80,7 @@ static void view_into(struct sadmm_context *c, int into)
     step->control = buffer<struct cuda_step_control>(c, BUFFER_WORLD_CONTROL);
     step->reports = reports(c);
     step->measured = c->plan.residuals;
+    step->limits = c->plan.limit;
     c->view.raw.rigid = step->before;
     c->view.raw.velocity = step->start_velocity;
     c->view.raw_pairs = set.pairs;
@@ -94,6 +95,7 @@ static void view_counts(struct sadmm_context *c, int64_t pairs)
     struct sadmm_system none = {};
     c->system = nullptr;
     c->settings = s->settings;
+    c->fast = s->settings.method == SADMM_METHOD_FAST;
     v->raw = none;
     v->raw.body_count = s->bodies;
     v->bodies = s->bodies;
@@ -132,7 +134,7 @@ struct side_branch {
 };
 } // namespace
 
-/* schedule.c's iterations, with the ratio of (15) found on the device. */
+/* schedule.c's iterations, with the ratio of (15) found on the device; then the limit. */
 static sadmm_status enqueue_iterations(struct sadmm_context *c, struct sadmm_error *error)
 {
     const int budget = sadmm_schedule_budget(&c->plan, &c->settings);
@@ -145,13 +147,14 @@ static sadmm_status enqueue_iterations(struct sadmm_context *c, struct sadmm_err
             CUDA_TRY(CUDA(enqueue_balance)(c, error));
             CUDA_TRY(CUDA(factorize)(c, error));
         }
+        if (next.refresh) CUDA_TRY(CUDA(enqueue_weights)(c, false, true, false, error));
     }
-    return SADMM_OK;
+    return c->plan.limit ? CUDA(enqueue_limit)(c, error) : SADMM_OK;
 }
 
 static sadmm_status enqueue_step(struct sadmm_context *c, struct sadmm_error *error)
 {
-    const bool islands = c->partition.tier == SADMM_CUDA_TIER_BLOCK || c->partition.tier == SADMM_CUDA_TIER_CLUSTER;
+    const bool islands = slots_by_island(&c->partition);
     CUDA_TRY(CUDA(launch_start)(c, error));
     { /* A, b: beside contact finding */
         side_branch side(c);
@@ -563,9 +566,6 @@ extern "C" sadmm_status CUDA(step_world)(struct sadmm_context *c, const struct s
                                          struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
-    if (settings->method != SADMM_METHOD_PAPER)
-        return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "settings.method = %d: the cuda backend runs paper only",
-                          (int)settings->method);
     CUDA_ENTER(c);
     CUDA_TRY(next_place(c, error));
     if (memcmp(&s->settings, settings, sizeof *settings) != 0) {
@@ -602,6 +602,7 @@ extern "C" sadmm_status CUDA(wait_world)(struct sadmm_context *c, struct sadmm_r
     out->plan.pairs = last->counts.pairs;
     out->plan.points = last->counts.points;
     out->iterations = last->counts.points > 0 ? s->settings.iterations : 1;
+    out->limited = last->limited;
     out->penetration_max = last->depth;
     out->residual.primal = last->primal;
     out->residual.dual = last->dual;

@@ -8,8 +8,9 @@
  *     survey     facts about them; islands                                   (cuda_layout.cu)
  *     layout     slots, halves, parts
  *       beside it  contacts in the solver's form
- *     penalties  C, beta, factors; and: is this what the step was planned for?
- *     iterate    (15), (16), (17) where asked for                            (the kernel table's own kernels)
+ *     penalties  C, beta, factors (fast: weights, C, factors); and: is this what the step was planned for?
+ *     iterate    (15), (16), (17), new weights where asked for               (the kernel table's own kernels)
+ *     limit      fast: islands that have more energy than they may
  *     finish     impulses into the contacts, moved bodies, wrenches
  *     commit     the report; the step counts only if nothing was halted
  *
@@ -39,6 +40,7 @@ struct cuda_step_report {
     struct sadmm_cuda_contact_counts counts;
     struct cuda_facts facts;
     double depth, primal, dual;
+    int32_t limited; /* islands */
     unsigned long long stamps[STAMPS]; /* ns */
 };
 
@@ -74,6 +76,7 @@ struct cuda_step_view {
     struct cuda_step_control *control;
     struct cuda_step_report *reports;     /* pinned: STEPS_AHEAD */
     int32_t measured;                     /* residuals of the last iteration are in view.residual */
+    int32_t limits;                       /* energies are limited: view.limited */
 };
 
 #endif

@@ -182,6 +182,7 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
     report->depth = double_of(control->depth);
     report->primal = v.step.measured ? double_of(v.residual[0]) : -1;
     report->dual = v.step.measured ? double_of(v.residual[1]) : -1;
+    report->limited = v.step.limits ? *v.limited : 0;
     for (int k = 0; k < STAMPS; ++k) report->stamps[k] = control->stamps[k];
 }
 

@@ -6,11 +6,10 @@
 #include <string.h>
 
 #include "../core/math/contact.h"
+#include "../core/math/relax.h"
 #include "cuda_internal.h"
 
 #define CUDA_INLINE static __device__ __forceinline__
-
-enum { ALL_LANES = -1 }; /* of a warp */
 
 /* ---- memory --------------------------------------------------------------------------------------------------- */
 
@@ -214,6 +213,38 @@ CUDA_INLINE void update_row_block(const cuda_view &v, int32_t k, const row_about
     for (int r = 0; r < 6; ++r) delta[r] = lambda[r] - old[r];
 }
 
+/* The same for the method `fast`: B / n in place of 1/s, n the number of dynamic bodies. */
+CUDA_INLINE void update_row_block_fast(const cuda_view &v, int32_t k, const row_about &about, const solver_real *va,
+                                       const solver_real *vb, real lambda[6], real delta[6])
+{
+    const real inv_n = about.body_a < v.bodies && about.body_b < v.bodies ? (real)0.5 : (real)1;
+    real old[6], u[6], along = 0;
+    for (int r = 0; r < 6; ++r) {
+        old[r] = lambda[r];
+        u[r] = 0;
+        if (r >= about.rows) continue;
+        for (int j = 0; j < 6; ++j)
+            u[r] += row_value(v, ROW_J_A + 6 * r + j, k) * va[j] + row_value(v, ROW_J_B + 6 * r + j, k) * vb[j];
+        if (about.kind != SADMM_BLOCK_SOFT) u[r] += row_value(v, ROW_ERROR + r, k);
+        along += row_value(v, ROW_ALONG + r, k) * u[r];
+    }
+    for (int r = 0; r < 6; ++r) {
+        lambda[r] = 0;
+        if (r >= about.rows) continue;
+        const real weight = inv_n * row_value(v, ROW_WEIGHT + r, k);
+        if (about.kind == SADMM_BLOCK_SOFT)
+            lambda[r] = soft_multiplier(row_value(v, ROW_STIFFNESS + r, k), row_value(v, ROW_DAMPING + r, k),
+                                        row_value(v, ROW_ERROR + r, k), u[r], 1 / weight, old[r]);
+        else if (about.active >> r & 1)
+            lambda[r] = old[r] - (weight * u[r] + inv_n * row_value(v, ROW_ALONG + r, k) * along);
+    }
+    if (about.kind == SADMM_BLOCK_CONTACT) {
+        real y[3] = {lambda[0], lambda[1], lambda[2]};
+        contact_project_rows(y, row_value(v, ROW_FRICTION, k), lambda);
+    }
+    for (int r = 0; r < 6; ++r) delta[r] = lambda[r] - old[r];
+}
+
 CUDA_INLINE void load_row_lambda(const cuda_view &v, int32_t k, real lambda[6])
 {
     for (int r = 0; r < 6; ++r) lambda[r] = row_value(v, ROW_LAMBDA + r, k);
@@ -231,6 +262,26 @@ CUDA_INLINE double row_block_primal(const cuda_view &v, const row_about &about, 
     for (int r = 0; r < 6; ++r) largest = real_max(largest, real_abs(delta[r]));
     return (double)(largest * real_max(inv_beta_of(v, about.body_a), inv_beta_of(v, about.body_b)));
 }
+
+/* The same for the method `fast`: |d lambda| / B of each row. */
+CUDA_INLINE double row_block_primal_fast(const cuda_view &v, int32_t k, const row_about &about, const real delta[6])
+{
+    real largest = 0;
+    for (int r = 0; r < about.rows; ++r) {
+        const real along = row_value(v, ROW_ALONG + r, k), B = row_value(v, ROW_WEIGHT + r, k) + along * along;
+        if (about.active >> r & 1) largest = real_max(largest, real_abs(delta[r]) * (1 / B));
+    }
+    return (double)largest;
+}
+
+/* ---- relaxation of the method `fast` (math/relax.h) -------------------------------------------------------------- */
+
+/* lambda^ + over (lambda^ - lambda), over = rho - 1, or 0 where an iteration is plain. */
+CUDA_INLINE vec3 relaxed(vec3 lambda, vec3 delta, real over) { return fused_madd(lambda, over, delta); }
+
+
+/* 1/B of a pair from B / n. */
+CUDA_INLINE real inverse_of_weight(real inv_s, bool both) { return inv_s > 0 ? 1 / ((both ? 2 : 1) * inv_s) : (real)0; }
 
 /* ---- bodies --------------------------------------------------------------------------------------------------- */
 
@@ -270,30 +321,16 @@ CUDA_INLINE real product_with_row(real h0, real h1, real h2, real h3, real h4, r
     return fused(h4, g[4], fused(h2, g[2], h0 * g[0])) + fused(h5, g[5], fused(h3, g[3], h1 * g[1]));
 }
 
-/* v <- v + H g, lane r's component of g being b - A v + J^T E. Every lane of the warp comes here. */
-CUDA_INLINE void move_body(body_lane *body, real g)
+/* v <- v + H g, lane r's component of g being b - A v + J^T E; FAST: `relaxation` times as far. Every lane of the warp
+ * comes here. */
+template <bool FAST> CUDA_INLINE void move_body(body_lane *body, real g, real relaxation)
 {
     real other[6];
 #pragma unroll
     for (int k = 0; k < 6; ++k) other[k] = __shfl_sync((unsigned)ALL_LANES, g, k, LANES);
     const real *H = body->H;
-    body->v += product_with_row(H[0], H[1], H[2], H[3], H[4], H[5], other);
-}
-
-/* ---- reductions ----------------------------------------------------------------------------------------------- */
-
-/* *out = max(*out, values of the warp). Every lane of the warp comes here. Bit patterns of non-negative doubles order
- * like the numbers, and a maximum does not depend on the order it is taken in; a NaN survives as the largest pattern.
- * */
-CUDA_INLINE void reduce_max(double value, unsigned long long *out)
-{
-    /* -0 (what real_abs may give) has the largest pattern but one: it counts as 0. */
-    unsigned long long bits = value == 0 ? 0 : (unsigned long long)__double_as_longlong(value);
-    for (int o = WARP / 2; o > 0; o /= 2) {
-        unsigned long long other = __shfl_xor_sync((unsigned)ALL_LANES, bits, o);
-        bits = other > bits ? other : bits;
-    }
-    if (threadIdx.x % WARP == 0 && bits != 0) atomicMax(out, bits);
+    const real step = product_with_row(H[0], H[1], H[2], H[3], H[4], H[5], other);
+    body->v = FAST ? fused(relaxation, step, body->v) : body->v + step;
 }
 
 #endif

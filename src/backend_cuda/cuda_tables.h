@@ -16,12 +16,14 @@
         .assemble_joints = sadmm_cuda_assemble_joints##suffix, \
         .assemble_springs = sadmm_cuda_assemble_springs##suffix, \
         .init_penalty = sadmm_cuda_init_penalty##suffix,       \
+        .update_weights = sadmm_cuda_update_weights##suffix,   \
         .factorize = sadmm_cuda_factorize##suffix,             \
         .update_velocity = sadmm_cuda_update_velocity##suffix, \
         .update_constraints = sadmm_cuda_update_constraints##suffix, \
         .iterate = sadmm_cuda_iterate##suffix,                 \
         .measure_residuals = sadmm_cuda_measure_residuals##suffix, \
         .update_penalty = sadmm_cuda_update_penalty##suffix,   \
+        .limit_velocity = sadmm_cuda_limit_velocity##suffix,   \
         .read_solution = sadmm_cuda_read_solution##suffix,     \
         .read_penalty = sadmm_cuda_read_penalty##suffix,       \
         .integrate = sadmm_cuda_integrate##suffix,             \

@@ -62,7 +62,7 @@ struct layout_args {
 
 static __host__ __device__ inline bool slots_by_island(const struct cuda_partition *partition)
 {
-    return partition->tier == SADMM_CUDA_TIER_BLOCK || partition->tier == SADMM_CUDA_TIER_CLUSTER;
+    return partition->islands || partition->tier == SADMM_CUDA_TIER_BLOCK || partition->tier == SADMM_CUDA_TIER_CLUSTER;
 }
 
 #ifdef SADMM_CUDA_EMULATED

@@ -147,7 +147,7 @@ static __device__ bool same_pairs(const layout_view &v, const layout_args &args,
         *facts = own;
         *same = v.kept->valid && v.kept->pairs == pairs && v.rows == 0 && kept->tier == now->tier &&
                 kept->parts == now->parts && kept->cluster == now->cluster && kept->most_halves == now->most_halves &&
-                kept->most_bodies == now->most_bodies;
+                kept->most_bodies == now->most_bodies && kept->islands == now->islands;
     }
     __syncthreads();
     if (!*same) return false;

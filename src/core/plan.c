@@ -76,7 +76,9 @@ bool sadmm_plan_is_constrained(const struct sadmm_plan *plan) { return plan->poi
 
 bool sadmm_plan_depends_on_warmth(const struct sadmm_settings *settings)
 {
-    return may_update_penalty(settings) && settings->warm_start && !settings->penalty_update_warm;
+    bool when_cold =
+        settings->method == SADMM_METHOD_FAST || (may_update_penalty(settings) && !settings->penalty_update_warm);
+    return settings->warm_start && when_cold;
 }
 
 void sadmm_plan_settle(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm)

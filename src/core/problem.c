@@ -595,7 +595,7 @@ sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend backend, 
 
     TRY(sadmm_settings_validate(settings, error));
     int64_t constraints = (int64_t)problem->contacts.point_count + problem->block_count;
-    TRY(sadmm_backend_choose(backend, precision, settings->method, constraints, &kernels, NULL, 0, error));
+    TRY(sadmm_backend_choose(backend, precision, constraints, &kernels, NULL, 0, error));
     TRY(find_context(problem, kernels, &context, error));
 
     problem->settings = *settings;

@@ -54,8 +54,8 @@ sadmm_status sadmm_backend_query(sadmm_backend backend, sadmm_backend_info *info
 /* From this many contacts on a step on the GPU is the shorter one (docs/performance.md: 484 contacts, 0.12 against 0.17 ms). */
 enum { AUTO_CUDA_CONTACTS = 500 };
 
-sadmm_status sadmm_backend_choose(sadmm_backend wanted, sadmm_precision precision, sadmm_method method,
-                                  int64_t expected_contacts, const struct sadmm_kernels **out, char *why, size_t why_size,
+sadmm_status sadmm_backend_choose(sadmm_backend wanted, sadmm_precision precision, int64_t expected_contacts,
+                                  const struct sadmm_kernels **out, char *why, size_t why_size,
                                   struct sadmm_error *error)
 {
     const char *reason = "";
@@ -74,8 +74,7 @@ sadmm_status sadmm_backend_choose(sadmm_backend wanted, sadmm_precision precisio
         return SADMM_OK;
     }
     const struct sadmm_kernels *cuda = sadmm_kernels_find(SADMM_BACKEND_CUDA, precision, &reason);
-    bool able = method == SADMM_METHOD_PAPER; /* the cuda backend has no other method yet */
-    if (cuda && able && expected_contacts >= AUTO_CUDA_CONTACTS) {
+    if (cuda && expected_contacts >= AUTO_CUDA_CONTACTS) {
         *out = cuda;
         if (why) snprintf(why, why_size, "cuda: a device is present and the scene is large (%lld contacts expected)",
                           (long long)expected_contacts);
@@ -84,9 +83,7 @@ sadmm_status sadmm_backend_choose(sadmm_backend wanted, sadmm_precision precisio
     *out = sadmm_kernels_find(SADMM_BACKEND_CPU, precision, NULL);
     if (!*out) return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE, "no backend is available");
     if (why) {
-        if (cuda && !able)
-            snprintf(why, why_size, "cpu (%s): cuda does not have this method", (*out)->variant);
-        else if (cuda)
+        if (cuda)
             snprintf(why, why_size, "cpu (%s): too few contacts for the GPU to pay (%lld expected, %d needed)",
                      (*out)->variant, (long long)expected_contacts, AUTO_CUDA_CONTACTS);
         else

@@ -41,6 +41,7 @@ struct sadmm_resident_report {
     int64_t repeats;           /* steps repeated since then because something did not fit */
     struct sadmm_plan plan;
     int iterations;
+    int32_t limited;           /* islands, method FAST */
     double penetration_max;    /* m */
     struct sadmm_residual residual; /* -1: not measured */
     struct {

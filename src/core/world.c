@@ -32,7 +32,7 @@ sadmm_status sadmm_world_create(const sadmm_world_def *def, sadmm_world **out)
         return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "def->device = %d: must be >= 0", def->device);
     /* AUTO is decided at the first step, when the size of the scene is known; unavailable choices fail here. */
     const struct sadmm_kernels *kernels = NULL;
-    status = sadmm_backend_choose(def->backend, def->precision, def->settings.method, 0, &kernels, NULL, 0, NULL);
+    status = sadmm_backend_choose(def->backend, def->precision, 0, &kernels, NULL, 0, NULL);
     if (status != SADMM_OK) return status;
 
     sadmm_world *world = (sadmm_world *)sadmm_alloc(1, sizeof *world);

@@ -148,7 +148,7 @@ static void take_report(sadmm_world *world, const struct sadmm_resident_report *
     report->pairs = done->plan.pairs;
     report->iterations = done->iterations;
     report->converged = false;
-    report->limited = 0;
+    report->limited = done->limited;
     report->penetration_max = done->penetration_max;
     report->residual = done->residual;
     report->ms.collide = done->ms.collide;

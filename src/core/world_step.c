@@ -36,9 +36,8 @@ sadmm_status sadmm_world_choose_backend(sadmm_world *world)
 {
     if (world->context) return SADMM_OK;
     int64_t expected = (int64_t)world->dynamic_count * EXPECTED_CONTACTS_PER_BODY;
-    TRY(sadmm_backend_choose(world->def.backend, world->def.precision, world->def.settings.method, expected,
-                             &world->kernels, world->why,
-                             sizeof world->why, &world->error));
+    TRY(sadmm_backend_choose(world->def.backend, world->def.precision, expected, &world->kernels,
+                             world->why, sizeof world->why, &world->error));
     return world->kernels->create(world->def.device, &world->context, &world->error);
 }
 
