@@ -424,8 +424,10 @@ static sadmm_status lay_out(struct device *d, const struct cuda_partition *parti
 
 static const struct cuda_partition partitions[] = {
     {.tier = SADMM_CUDA_TIER_STREAM},
+    {.tier = SADMM_CUDA_TIER_STREAM, .islands = true},
     {.tier = SADMM_CUDA_TIER_GRID, .parts = 1, .cluster = 1},
     {.tier = SADMM_CUDA_TIER_GRID, .parts = 7, .cluster = 1},
+    {.tier = SADMM_CUDA_TIER_GRID, .parts = 7, .cluster = 1, .islands = true},
     {.tier = SADMM_CUDA_TIER_BLOCK, .parts = 1, .cluster = 1},
     {.tier = SADMM_CUDA_TIER_BLOCK, .parts = 5, .cluster = 1},
     {.tier = SADMM_CUDA_TIER_BLOCK, .parts = 131, .cluster = 1},
@@ -435,6 +437,11 @@ static const struct cuda_partition partitions[] = {
     {.tier = SADMM_CUDA_TIER_GRID, .parts = 167, .cluster = 1},
 };
 enum { PARTITIONS = sizeof partitions / sizeof *partitions };
+
+static bool by_island(const struct cuda_partition *partition)
+{
+    return partition->islands || partition->tier == SADMM_CUDA_TIER_BLOCK || partition->tier == SADMM_CUDA_TIER_CLUSTER;
+}
 
 /* One context goes through all graphs, every layout by all ways, some with threads in the other order. */
 START_TEST(equals_host)
@@ -449,7 +456,7 @@ START_TEST(equals_host)
         for (size_t k = 0; k < PARTITIONS; ++k) {
             struct cuda_partition partition = partitions[k];
             char about[128];
-            host_slots(&h, partition.tier == SADMM_CUDA_TIER_BLOCK || partition.tier == SADMM_CUDA_TIER_CLUSTER);
+            host_slots(&h, by_island(&partition));
             host_parts(&h, &partition);
             partition.most_bodies = h.wanted.facts.part_bodies;
             partition.most_halves = h.wanted.facts.part_halves;
@@ -486,9 +493,10 @@ START_TEST(too_large_parts_halt)
     struct cuda_layout_copy got = copy_new(&h);
     device_new(&d, _i);
     device_begin(&d, p, true);
-    for (size_t k = 1; k < PARTITIONS; ++k) {
+    for (size_t k = 0; k < PARTITIONS; ++k) {
         struct cuda_partition partition = partitions[k];
-        host_slots(&h, partition.tier != SADMM_CUDA_TIER_GRID);
+        if (partition.tier == SADMM_CUDA_TIER_STREAM) continue;
+        host_slots(&h, by_island(&partition));
         host_parts(&h, &partition);
         for (int which = 0; which < 4; ++which) {
             const int way = which / 2 * CUDA_LAYOUT_GENERAL;

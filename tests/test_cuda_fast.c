@@ -1,0 +1,412 @@
+/* The method `fast` on the CUDA backend: its entries against the CPU's from identical inputs, and tiers that must agree
+ * to the last bit, weights, levels and limit included. test_fast.c drives every registered table beside the literal
+ * backend. The same checks run on the emulated device (test_cuda_fast_emulated.c). */
+#include "cuda_runner.h"
+
+/* Stretches of all lengths, since what is relaxed depends on it, 18 and 35 with graphs in the STREAM tier; new weights
+ * in between, often enough for levels. */
+static const int stretches[] = {1, 2, 18, 3, 1, 5, 35, 4};
+enum { STRETCHES = sizeof stretches / sizeof *stretches };
+
+static const struct sadmm_kernels *cpu(void)
+{
+    const char *reason;
+    return sadmm_cpu_find(SADMM_F64, &reason);
+}
+
+static void start(struct runner *r, const struct sadmm_kernels *k, const struct scene *scene, enum sadmm_cuda_tier tier)
+{
+    runner_start_method(r, k, scene, tier, SADMM_METHOD_FAST);
+}
+
+static void refresh_weights(struct runner *r)
+{
+    CALL(r, r->k->update_weights(r->c, &r->error));
+    CALL(r, r->k->factorize(r->c, &r->error));
+}
+
+static void iterate(struct runner *r, int count, bool measure)
+{
+    CALL(r, r->k->iterate(r->c, count, measure, &r->error));
+}
+
+static int32_t limit(struct runner *r)
+{
+    int32_t limited = 0;
+    if (r->plan.limit) CALL(r, r->k->limit_velocity(r->c, &limited, &r->error));
+    return limited;
+}
+
+/* ---- entries against the CPU's ----------------------------------------------------------------------------------- */
+
+/* One pass: weights, factor, an iteration, its residuals, new weights, another iteration. As in test_cuda.c, rounding
+ * of the inputs (6e-8, 1e-16) in sums of some tens of terms, and a condition number of A + C under a hundred. */
+static const double entry_tolerance[2] = {1e-5, 1e-12};
+/* All stretches: what rounding grows to in 71 iterations with nine sets of weights; ten times what was measured. */
+static const double run_tolerance[2] = {2e-5, 1e-13};
+
+/* The largest |v| and |lambda| so far: a velocity on its way to 0 is not measured by itself. */
+struct scales {
+    double v, lambda;
+};
+
+static void compare(struct runner *own, struct runner *wanted, struct scales *scales, double tolerance,
+                    const char *what)
+{
+    runner_read(own);
+    runner_read(wanted);
+    const struct spread v = velocity_spread(own, wanted), lambda = lambda_spread(own, wanted);
+    scales->v = fmax(scales->v, v.scale);
+    scales->lambda = fmax(scales->lambda, lambda.scale);
+    ck_assert_msg(v.difference <= tolerance * scales->v, "%s: v %g", what, v.difference / scales->v);
+    ck_assert_msg(lambda.difference <= tolerance * scales->lambda, "%s: lambda %g", what,
+                  lambda.difference / scales->lambda);
+}
+
+START_TEST(entries_equal_cpu)
+{
+    const struct sadmm_kernels *table = tables[_i / SCENES];
+    const struct scene *scene = &scenes[_i % SCENES];
+    const double tolerance = entry_tolerance[table->precision];
+    struct runner ref, own;
+    struct scales scales = {0, 0};
+    start(&ref, cpu(), scene, SADMM_CUDA_TIER_AUTO);
+    start(&own, table, scene, SADMM_CUDA_TIER_AUTO);
+    const size_t n = (size_t)own.p->system.body_count;
+    double *beta = calloc(n + 1, sizeof *beta);
+    CALL(&own, table->read_penalty(own.c, beta, &own.error));
+    for (size_t i = 0; i < n; ++i) ck_assert_double_eq(beta[i], 1);
+    free(beta);
+
+    iterate(&ref, 1, true);
+    iterate(&own, 1, true);
+    compare(&own, &ref, &scales, tolerance, "iteration");
+    const struct sadmm_residual wanted = runner_residual(&ref), got = runner_residual(&own);
+    /* Differences of multipliers over weights of 0.1 kg and more; of impulses. */
+    ck_assert_msg(fabs(got.primal - wanted.primal) <= tolerance * (wanted.primal + 10 * scales.lambda),
+                  "%s: primal %g, %g", scene->name, got.primal, wanted.primal);
+    ck_assert_msg(fabs(got.dual - wanted.dual) <= tolerance * (wanted.dual + 10 * scales.lambda + 100),
+                  "%s: dual %g, %g", scene->name, got.dual, wanted.dual);
+
+    refresh_weights(&ref);
+    refresh_weights(&own);
+    iterate(&ref, 1, false);
+    iterate(&own, 1, false);
+    compare(&own, &ref, &scales, tolerance, "new weights");
+
+    for (int s = 0; s < STRETCHES; ++s) {
+        iterate(&ref, stretches[s], false);
+        iterate(&own, stretches[s], false);
+        refresh_weights(&ref);
+        refresh_weights(&own);
+    }
+    compare(&own, &ref, &scales, run_tolerance[table->precision], "stretches");
+    ck_assert_int_eq(limit(&own), limit(&ref));
+    compare(&own, &ref, &scales, run_tolerance[table->precision], "limit");
+    runner_stop(&ref);
+    runner_stop(&own);
+}
+END_TEST
+
+/* ---- tiers ------------------------------------------------------------------------------------------------------- */
+
+static void check_equal(struct runner *a, struct runner *b, const struct scene *scene)
+{
+    for (int s = 0; s < STRETCHES; ++s) {
+        const bool measure = s % 2 == 0;
+        char what[128];
+        snprintf(what, sizeof what, "%s, tier %d, stretch %d", scene->name, (int)tier_of(a->k, a->c, NULL), s);
+        iterate(a, stretches[s], measure);
+        iterate(b, stretches[s], measure);
+        check_same(a, b, what);
+        if (measure) {
+            const struct sadmm_residual x = runner_residual(a), y = runner_residual(b);
+            ck_assert_msg(x.primal == y.primal && x.dual == y.dual, "%s: residuals", what);
+        }
+        refresh_weights(a);
+        refresh_weights(b);
+    }
+    ck_assert_int_eq(limit(a), limit(b));
+    check_same(a, b, "after the limit");
+}
+
+/* Every tier against STREAM, from the last thread to the first on the emulated device. */
+START_TEST(tiers_agree)
+{
+    const struct sadmm_kernels *table = tables[_i / SCENES];
+    const struct scene *scene = &scenes[_i % SCENES];
+    for (size_t t = 0; t + 1 < TIERS; ++t) {
+        struct runner stream, fused;
+        if (!device_has(table, tiers[t]) || !(scene->tiers >> tiers[t] & 1)) continue;
+        start(&stream, table, scene, SADMM_CUDA_TIER_STREAM);
+#ifdef CUDA_EMULATED
+        cuda_emulation_descending = t % 2;
+#endif
+        start(&fused, table, scene, tiers[t]);
+        check_equal(&fused, &stream, scene);
+#ifdef CUDA_EMULATED
+        cuda_emulation_descending = 0;
+#endif
+        runner_stop(&stream);
+        runner_stop(&fused);
+    }
+}
+END_TEST
+
+/* More bodies than one thread block adds up: the sums over islands take a launch a stage. Chains of one contact each,
+ * one of them of more than two thousand bodies. */
+static struct contact_problem *chains(void)
+{
+    static const double up[3] = {0, 0, 1};
+    struct contact_problem *p = contact_problem_new();
+    for (int i = 0; i < 4200; ++i) {
+        const int below = i < 2100 ? i - 1 : i % 40 ? i - 1 : -1;
+        contact_problem_box(p, 1 + i % 3, 0.1, 0.1, 0.1, 0, 0, 0.1 + 0.2 * i);
+        contact_problem_touch(p, below, i, (double[3]){0, 0, 0.2 * i}, up, 0, 0.5, 0);
+    }
+    return p;
+}
+
+START_TEST(many_bodies)
+{
+    static const struct scene many = {"chains", chains, RIGID, true, 0};
+    const struct sadmm_kernels *table = tables[_i];
+    struct runner ref, own;
+    struct scales scales = {0, 0};
+    start(&ref, cpu(), &many, SADMM_CUDA_TIER_AUTO);
+    start(&own, table, &many, SADMM_CUDA_TIER_STREAM);
+    iterate(&ref, 2, false);
+    iterate(&own, 2, false);
+    refresh_weights(&ref);
+    refresh_weights(&own);
+    iterate(&ref, 1, false);
+    iterate(&own, 1, false);
+    compare(&own, &ref, &scales, entry_tolerance[table->precision], "chains");
+    ck_assert_int_eq(limit(&own), limit(&ref));
+    runner_stop(&ref);
+    runner_stop(&own);
+}
+END_TEST
+
+/* A column of boxes at rest with the impulses that hold it, and gaps of some um: loads pass 60 bodies, so that warm
+ * steps take larger weights and ease the gaps (math/weight.h). */
+static void start_tall(struct runner *r, const struct sadmm_kernels *k, enum sadmm_cuda_tier tier)
+{
+    static const double up[3] = {0, 0, 1};
+    enum { BOXES = 60 };
+    runner_create(r, k);
+    if (k->backend == SADMM_BACKEND_CUDA) force_tier(k, r->c, tier);
+    r->settings = sadmm_settings_default();
+    r->settings.method = SADMM_METHOD_FAST;
+    r->p = contact_problem_new();
+    for (int i = 0; i < BOXES; ++i) {
+        contact_problem_box(r->p, 1, 0.1, 0.1, 0.1, 0, 0, 0.1 + 0.2 * i);
+        for (int c = 0; c < 4; ++c) {
+            contact_problem_touch(r->p, i - 1, i, (double[3]){c & 1 ? 0.1 : -0.1, c & 2 ? 0.1 : -0.1, 0.2 * i}, up,
+                                  1e-6 * (i + c), 0.5, 0);
+            r->p->contacts.points[4 * i + c].impulse[2] = (BOXES - i) * 9.81 * r->settings.dt / 4;
+        }
+    }
+    r->plan = sadmm_plan_make(&r->p->system, &r->settings);
+    ck_assert(r->plan.warm && r->plan.rigid);
+    CALL(r, k->begin(r->c, &r->p->system, &r->plan, &r->settings, &r->error));
+    runner_assemble(r);
+}
+
+START_TEST(tall_islands)
+{
+    const struct sadmm_kernels *table = tables[_i];
+    struct runner ref, own[TIERS];
+    struct scales scales = {0, 0};
+    start_tall(&ref, cpu(), SADMM_CUDA_TIER_AUTO);
+    iterate(&ref, 3, false);
+    for (size_t t = TIERS; t-- > 0;) {
+        if (!device_has(table, tiers[t])) continue;
+        start_tall(&own[t], table, tiers[t]);
+        iterate(&own[t], 3, false);
+        /* three iterations of an entry's error each, and the weights of heavy columns on light bodies */
+        compare(&own[t], &ref, &scales, 30 * entry_tolerance[table->precision], "tall");
+        if (t + 1 < TIERS) check_same(&own[t], &own[TIERS - 1], "tall, tiers");
+    }
+    for (size_t t = 0; t < TIERS; ++t)
+        if (device_has(table, tiers[t])) runner_stop(&own[t]);
+    runner_stop(&ref);
+}
+END_TEST
+
+/* Between a halt and its end nothing changes, weights included. */
+START_TEST(halted_does_nothing)
+{
+    const struct sadmm_kernels *table = tables[_i];
+    const struct scene *scene = find_scene("pyramid");
+    for (size_t t = 0; t < TIERS; ++t) {
+        struct runner plain, halted;
+        if (!device_has(table, tiers[t])) continue;
+        start(&plain, table, scene, tiers[t]);
+        start(&halted, table, scene, tiers[t]);
+        iterate(&plain, 3, false);
+        iterate(&halted, 3, false);
+        set_halt(&halted, HALT_PARTITION);
+        iterate(&halted, 20, true);
+        ck_assert_int_eq(limit(&halted), 0);
+        set_halt(&halted, HALT_NONE);
+        check_same(&halted, &plain, "halted");
+        for (int k = 0; k < 2; ++k) {
+            struct runner *r = k ? &halted : &plain;
+            refresh_weights(r);
+            if (k) set_halt(r, HALT_PARTITION);
+            if (k) CALL(r, table->factorize(r->c, &r->error));
+            if (k) set_halt(r, HALT_NONE);
+            iterate(r, 4, false);
+        }
+        check_same(&halted, &plain, "after the halt");
+        runner_stop(&plain);
+        runner_stop(&halted);
+    }
+}
+END_TEST
+
+/* ---- solves ------------------------------------------------------------------------------------------------------ */
+
+static struct sadmm_solve_report solve(struct runner *r, const struct scene *scene, int iterations, double tolerance)
+{
+    struct sadmm_solve_report report;
+    r->settings = sadmm_settings_default();
+    r->settings.method = SADMM_METHOD_FAST;
+    r->settings.warm_start = scene->warm;
+    r->settings.measure_residuals = true;
+    r->settings.iterations = iterations;
+    r->settings.certificate_tolerance = tolerance;
+    r->settings.check_period = 20;
+    contact_problem_free(r->p);
+    r->p = make_problem(scene, &r->settings);
+    r->plan = sadmm_plan_make(&r->p->system, &r->settings);
+    CALL(r, sadmm_schedule_solve(r->k, r->c, &r->p->system, &r->settings, &r->plan, &report, NULL, &r->error));
+    return report;
+}
+
+/* Through the schedule, in a fresh context and in one that has seen larger and smaller systems and the other method. */
+START_TEST(runs_repeat)
+{
+    const struct sadmm_kernels *table = tables[_i];
+    struct runner used, fresh;
+    runner_create(&used, table);
+    for (size_t s = 0; s < SCENES; ++s) {
+        used.method = SADMM_METHOD_PAPER;
+        CALL(&used, runner_begin(&used, &scenes[s]));
+        runner_create(&fresh, table);
+        struct sadmm_solve_report a = solve(&fresh, &scenes[s], 45, 0), b = solve(&used, &scenes[s], 45, 0);
+        struct spread v = velocity_spread(&used, &fresh), lambda = lambda_spread(&used, &fresh);
+        ck_assert_msg(v.difference == 0 && lambda.difference == 0, "%s: v %g, lambda %g", scenes[s].name, v.difference,
+                      lambda.difference);
+        ck_assert_int_eq(a.limited, b.limited);
+        runner_stop(&fresh);
+    }
+    runner_stop(&used);
+}
+END_TEST
+
+/* To a certificate, in no more iterations than the CPU (20 are one look). */
+START_TEST(solutions_are_certified)
+{
+    static const char *const names[] = {"pyramid", "towers, frictionless", "octagons, frictionless"};
+    const struct sadmm_kernels *table = tables[_i];
+    for (size_t k = 0; k < sizeof names / sizeof *names; ++k) {
+        struct runner ref, own;
+        runner_create(&ref, cpu());
+        runner_create(&own, table);
+        /* m/s; single precision rounds velocities of some m/s by 1e-7 each */
+        const double tolerance = table->precision == SADMM_F32 ? 1e-5 : 1e-8;
+        struct sadmm_solve_report wanted = solve(&ref, find_scene(names[k]), 600, tolerance),
+                                  got = solve(&own, find_scene(names[k]), 600, tolerance);
+        ck_assert_msg(got.converged && wanted.converged, "%s: %g after %d", names[k], got.certificate.ncp_max,
+                      got.iterations);
+        ck_assert_msg(got.iterations <= wanted.iterations + 20, "%s: %d and %d iterations", names[k], got.iterations,
+                      wanted.iterations);
+        runner_stop(&ref);
+        runner_stop(&own);
+    }
+}
+END_TEST
+
+/* Iterations that end with more energy than contacts can leave: an island is slowed down, here and on the CPU. */
+START_TEST(islands_are_slowed_down)
+{
+    const struct sadmm_kernels *table = tables[_i];
+    int32_t limited = 0;
+    for (size_t s = 0; s < SCENES; ++s) {
+        struct runner ref, own;
+        if (scenes[s].form != RIGID) continue;
+        runner_create(&ref, cpu());
+        runner_create(&own, table);
+        for (int iterations = 1; iterations <= 3; ++iterations) {
+            struct sadmm_solve_report wanted = solve(&ref, &scenes[s], iterations, 0),
+                                      got = solve(&own, &scenes[s], iterations, 0);
+            ck_assert_msg(got.limited == wanted.limited, "%s, %d iterations: %d and %d islands", scenes[s].name,
+                          iterations, got.limited, wanted.limited);
+            limited += got.limited;
+        }
+        runner_stop(&ref);
+        runner_stop(&own);
+    }
+    ck_assert_int_gt(limited, 0);
+}
+END_TEST
+
+#ifdef CUDA_EMULATED
+/* Let runtime calls of a solve fail in turn: always a status and a message, never a leak. */
+START_TEST(calls_that_fail)
+{
+    const struct sadmm_kernels *table = tables[_i];
+    const struct scene *scene = find_scene("pyramid");
+    sadmm_settings settings = sadmm_settings_default();
+    settings.method = SADMM_METHOD_FAST;
+    settings.iterations = 6; /* new weights after 5 */
+    int failed = 0;
+    for (long calls = 0;; ++calls) {
+        struct contact_problem *p = make_problem(scene, &settings);
+        struct sadmm_plan plan = sadmm_plan_make(&p->system, &settings);
+        struct sadmm_solve_report report;
+        struct sadmm_context *c = NULL;
+        struct sadmm_error error = {SADMM_OK, ""};
+        cuda_emulation_calls_left = calls;
+        sadmm_status status = table->create(1, &c, &error);
+        if (status == SADMM_OK)
+            status = sadmm_schedule_solve(table, c, &p->system, &settings, &plan, &report, NULL, &error);
+        const bool reached = cuda_emulation_calls_left < 0;
+        cuda_emulation_calls_left = -1;
+        ck_assert_msg(status == (reached ? SADMM_ERROR_DEVICE : SADMM_OK), "call %ld: %s", calls,
+                      sadmm_status_name(status));
+        failed += reached;
+        table->destroy(c);
+        contact_problem_free(p);
+        ck_assert_msg(cuda_emulation_allocations == 0, "call %ld: %ld left", calls, cuda_emulation_allocations);
+        if (!reached) break;
+    }
+    ck_assert_int_gt(failed, 40);
+}
+END_TEST
+#endif
+
+/* Under sanitizers, on the emulated device, which is slow there: one precision, and some of the scenes. */
+int main(void)
+{
+    if (!find_cuda_tables(tables)) return TEST_SKIPPED;
+    const int parts = tested_precisions();
+    Suite *suite = suite_create("cuda_fast");
+    for (int p = 0; p < parts; ++p) {
+        const int first = p * SCENES, some = first + (parts == 2 ? SCENES : SCENES / 3);
+        add_case(suite, p ? "entries_f64" : "entries_f32", entries_equal_cpu, first, first + SCENES);
+        add_case(suite, p ? "tiers_f64" : "tiers_f32", tiers_agree, first, some);
+    }
+    ADD_CASE(suite, many_bodies, 0, parts);
+    ADD_CASE(suite, tall_islands, 0, parts);
+    ADD_CASE(suite, halted_does_nothing, 0, parts);
+    ADD_CASE(suite, runs_repeat, 0, parts);
+    ADD_CASE(suite, solutions_are_certified, 0, parts);
+    ADD_CASE(suite, islands_are_slowed_down, 0, parts);
+#ifdef CUDA_EMULATED
+    ADD_CASE(suite, calls_that_fail, 0, parts);
+#endif
+    return run_cuda_suite(suite);
+}
