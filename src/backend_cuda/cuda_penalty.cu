@@ -31,8 +31,7 @@ template <bool WEIGHTED> static __device__ void add_block(const cuda_view &v, in
         double row[6];
         for (int j = 0; j < 6; ++j) row[j] = J[6 * r + j];
         packed_add_row(C, row, WEIGHTED ? row_number(v, ROW_WEIGHT + r, k) : 1);
-        if (!WEIGHTED) continue;
-        for (int j = 0; j < 6; ++j) along[j] += row_number(v, ROW_ALONG + r, k) * row[j];
+        for (int j = 0; WEIGHTED && j < 6; ++j) along[j] += row_number(v, ROW_ALONG + r, k) * row[j];
     }
     if (WEIGHTED) packed_add_row(C, along, 1);
 }

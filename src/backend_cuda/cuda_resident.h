@@ -597,27 +597,16 @@ static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view 
     }
 }
 
-/* FULL: with row blocks, or to be measured; both cost registers, and most stretches have neither. */
-template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST>
-static __global__ void __launch_bounds__(most_threads(POINTS, SIZE))
-    resident_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+/* The method `paper`: Step 1, then Steps 2-4. */
+template <int MODE, bool FULL, int SIZE, class Part>
+static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view &v, const cuda_args &args, unsigned *target)
 {
-    CUDA_DYNAMIC_SHARED(memory);
-    if (v.live->halt || nothing_to_do<MODE>(v, args.cluster)) return;
-    part_run<CONTACT_ROWS, POINTS, MODE, FULL, SIZE, FAST> part(v, args, memory);
-    part.load();
-    unsigned target = 0;
-    if (FAST) {
-        iterate_fast<MODE, FULL, SIZE>(part, v, args, &target);
-        part.store(args.count & 1);
-        return;
-    }
     for (int32_t iteration = 1; iteration <= args.count; ++iteration) {
         const int32_t odd = iteration & 1;
         part.move_bodies(odd, 1);
         arrive<MODE, SIZE>(v.barrier);
         if (part.has_moves()) part.momentum = free_momentum(part.own_body);
-        wait<MODE, SIZE>(v.barrier, target += gridDim.x);
+        wait<MODE, SIZE>(v.barrier, *target += gridDim.x);
         if (FULL && args.measure && iteration == args.count)
             reduce_max(part.template update_halves<true>(odd, 0), v.residual);
         else part.template update_halves<false>(odd, 0);
@@ -628,6 +617,20 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE))
         arrive<MODE, SIZE>(v.barrier);
         wait<MODE, SIZE>(v.barrier, 0);
     }
+}
+
+/* FULL: with row blocks, or to be measured; both cost registers, and most stretches have neither. */
+template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST>
+static __global__ void __launch_bounds__(most_threads(POINTS, SIZE))
+    resident_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    CUDA_DYNAMIC_SHARED(memory);
+    if (v.live->halt || nothing_to_do<MODE>(v, args.cluster)) return;
+    part_run<CONTACT_ROWS, POINTS, MODE, FULL, SIZE, FAST> part(v, args, memory);
+    part.load();
+    unsigned target = 0;
+    if (FAST) iterate_fast<MODE, FULL, SIZE>(part, v, args, &target);
+    else iterate_paper<MODE, FULL, SIZE>(part, v, args, &target);
     part.store(args.count & 1);
 }
 

@@ -136,7 +136,7 @@ static __device__ double work_of(const cuda_view &v, int32_t p)
     double work = 0;
     for (int32_t k = 0; k < pair.count; ++k) {
         const point_data point = load_point(v, p, k, pair);
-        work += fmax(0, -point.error) * dot3(pair.normal, point.lambda);
+        work += fmax(0.0, -point.error) * dot3(pair.normal, point.lambda);
     }
     return work;
 }
@@ -212,9 +212,9 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         term[2] = dot_lanes(r, product(t.lane, r, a_inverse)) / 2;
         term[3] = sums[PAIRS];
     }
-    if (WHAT == OF_RESIDUAL || !t.live) return;
+    if (!t.live) return;
 #pragma unroll
-    for (int k = 0; k < TERMS; ++k)
+    for (int k = 0; WHAT != OF_RESIDUAL && k < TERMS; ++k)
         if (k == t.lane) v.terms[(size_t)t.slot * TERMS + (size_t)k] = term[k];
     if (args.start && t.lane == TERMS) {
         const cuda_island fresh = {0, 0, 1, 0, 1, 1, 0};

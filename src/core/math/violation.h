@@ -19,7 +19,7 @@ SADMM_INLINE double contact_violation(const double lambda[3], const double u[3],
         double t = y[k] - normal * n[k];
         tangential2 += t * t;
     }
-    double pushed = fmax(normal, 0), limit = friction * pushed;
+    double pushed = fmax(normal, 0.0), limit = friction * pushed;
     double shrink = tangential2 > limit * limit ? limit / sqrt(tangential2) : 1;
     SADMM_UNROLL
     for (int k = 0; k < 3; ++k) {

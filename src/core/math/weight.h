@@ -67,7 +67,7 @@ SADMM_INLINE int weight_stalls(double balance) { return balance > WEIGHT_STALLS;
 
 SADMM_INLINE double weight_next_level(double level, double balance)
 {
-    double off = weight_stalls(balance) ? balance / WEIGHT_STALLS : fmin(balance / WEIGHT_LAGS, 1);
+    double off = weight_stalls(balance) ? balance / WEIGHT_STALLS : fmin(balance / WEIGHT_LAGS, 1.0);
     double factor = fmin(fmax(pow(off, WEIGHT_LEVEL_POWER), 1 / WEIGHT_LEVEL_STEP), WEIGHT_LEVEL_STEP);
     return fmin(fmax(level * factor, WEIGHT_LEVEL_LEAST), WEIGHT_LEVEL_MOST);
 }
@@ -85,7 +85,7 @@ SADMM_INLINE double weight_next_level(double level, double balance)
 /* 1 and more. */
 SADMM_INLINE double weight_tallness(double speed, double push, double mass)
 {
-    return fmax(push / (mass * speed * WEIGHT_TALL), 1);
+    return fmax(push / (mass * speed * WEIGHT_TALL), 1.0);
 }
 
 /* V: less, and B more, where the island is at rest. */
@@ -130,7 +130,7 @@ SADMM_INLINE double weight_of_soft_row(double share, double lambda, double respo
 /* B of a pair, kg. phi / w does not sink with the level: it is for contacts whose load is not known. */
 SADMM_INLINE double weight_of_pair(double level, double carried, double response)
 {
-    return level * carried + fmax(level, 1) * WEIGHT_FLOOR_CONTACT / response;
+    return level * carried + fmax(level, 1.0) * WEIGHT_FLOOR_CONTACT / response;
 }
 
 #endif
