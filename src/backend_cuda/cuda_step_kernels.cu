@@ -111,48 +111,43 @@ static __device__ bool finish_pair(const cuda_view &v, int32_t p, int32_t lane, 
     return finite;
 }
 
-/* Threads for bodies, eight lanes a wrench, v.lanes threads a pair: side by side in one kernel, each of them long. Where
- * they are so many that registers decide how many run at once, each in a kernel of its own. */
-enum { FINISH_BODIES = 1, FINISH_WRENCHES = 2, FINISH_PAIRS = 4, FINISH_ALL = 7 };
+/* Threads for bodies, eight lanes a wrench, threads for points: side by side, each of them long. */
 struct finish_ranges {
     int32_t wrenches, pairs, end;
 };
-template <int WHAT> static __host__ __device__ inline finish_ranges ranges_of(const cuda_view &v)
+static __host__ __device__ inline finish_ranges ranges_of(const cuda_view &v)
 {
-    const bool wrenches = WHAT & FINISH_WRENCHES && v.settings.recover_wrenches;
     finish_ranges r;
-    r.wrenches = WHAT & FINISH_BODIES ? (v.bodies + WARP - 1) / WARP * WARP : 0;
-    r.pairs = r.wrenches + (wrenches ? (LANES * v.bodies + WARP - 1) / WARP * WARP : 0);
-    r.end = r.pairs + (WHAT & FINISH_PAIRS ? v.lanes * v.pair_room : 0);
+    r.wrenches = (v.bodies + WARP - 1) / WARP * WARP;
+    r.pairs = r.wrenches + (v.settings.recover_wrenches ? (LANES * v.bodies + WARP - 1) / WARP * WARP : 0);
+    r.end = r.pairs + v.lanes * v.pair_room;
     return r;
 }
 
 /* Does not look at culprits of this very kernel: which body is named must not depend on who came first. */
-template <int WHAT>
 static __global__ void __launch_bounds__(STEP_THREADS)
     finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     const int32_t i = (int32_t)(blockIdx.x * (unsigned)STEP_THREADS + threadIdx.x);
-    const finish_ranges range = ranges_of<WHAT>(v);
+    const finish_ranges range = ranges_of(v);
     struct cuda_step_control *control = v.step.control;
     double depth = 0;
-    if (WHAT & FINISH_BODIES && i == 0) control->stamps[STAMP_SOLVED] = nanoseconds();
-    if (WHAT & FINISH_BODIES && i < range.wrenches) {
+    if (i == 0) control->stamps[STAMP_SOLVED] = nanoseconds();
+    if (i < range.wrenches) {
         if (i < live_bodies(v) && !finish_body(v, i)) atomicMin(&control->culprit, i);
-    } else if (WHAT & FINISH_WRENCHES && i < range.pairs) {
+    } else if (i < range.pairs) {
         const int32_t slot = (i - range.wrenches) / LANES, lane = i % LANES;
         const bool live = slot < live_bodies(v);
         double wrench[6];
         contact_wrench(v, live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0, lane, wrench);
         if (live) store_wrench(wrench, lane, v.step.wrench + 6 * (size_t)v.body_of[slot]);
-    } else if (WHAT & FINISH_PAIRS && (i - range.pairs) / v.lanes < live_pairs(v)) {
+    } else if ((i - range.pairs) / v.lanes < live_pairs(v)) {
         const int32_t p = (i - range.pairs) / v.lanes;
         const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
         /* bodies are named first: all of them are below any contact's */
         if (!finish_pair(v, p, (i - range.pairs) % v.lanes, &depth))
             atomicMin(&control->culprit, v.bodies + (pair->body_b >= 0 ? pair->body_b : pair->body_a));
     }
-    if (!(WHAT & FINISH_PAIRS)) return;
     /* -0 is no depth; a larger one may be there already */
     unsigned long long bits = depth > 0 ? (unsigned long long)__double_as_longlong(depth) : 0;
     for (int o = WARP / 2; o > 0; o /= 2) {
@@ -210,23 +205,10 @@ sadmm_status CUDA(launch_admit)(struct sadmm_context *c, struct sadmm_error *err
     return CUDA(launch)(c, admit_kernel, "admit", 1, &args, error);
 }
 
-template <int WHAT>
-static sadmm_status launch_finish_of(struct sadmm_context *c, const char *name, struct sadmm_error *error)
-{
-    cuda_args args = {};
-    const int64_t blocks = ((int64_t)ranges_of<WHAT>(c->view).end + STEP_THREADS - 1) / STEP_THREADS;
-    return blocks ? CUDA(launch_of)(c, finish_kernel<WHAT>, name, blocks, STEP_THREADS, &args, error) : SADMM_OK;
-}
-
 sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    if (c->partition.tier == SADMM_CUDA_TIER_STREAM) {
-        CUDA_TRY(launch_finish_of<FINISH_BODIES>(c, "finish (bodies)", error));
-        CUDA_TRY(launch_finish_of<FINISH_WRENCHES>(c, "finish (wrenches)", error));
-        CUDA_TRY(launch_finish_of<FINISH_PAIRS>(c, "finish (pairs)", error));
-    } else {
-        CUDA_TRY(launch_finish_of<FINISH_ALL>(c, "finish", error));
-    }
+    int64_t blocks = ((int64_t)ranges_of(c->view).end + STEP_THREADS - 1) / STEP_THREADS;
+    CUDA_TRY(CUDA(launch_of)(c, finish_kernel, "finish", blocks, STEP_THREADS, &args, error));
     return CUDA(launch)(c, commit_kernel, "commit", 1, &args, error);
 }
