@@ -170,6 +170,7 @@ struct cuda_view {
     double *weight, *response; /* pairs: B in kg, J A^-1 J^T */
     solver_real *inv_s;      /* pairs: B / number of dynamic bodies */
     int32_t *limited;        /* islands slowed down */
+    int32_t *suspects;       /* not 0: some island may have to be */
 };
 
 /* Where the data of point k of pair p is. */

@@ -279,6 +279,7 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
     v->residual = (unsigned long long *)b[BUFFER_SCALARS].data;
     v->ratio = (double *)(v->residual + 2);
     v->limited = (int32_t *)(v->residual + 3);
+    v->suspects = v->limited + 1;
     v->barrier = (unsigned *)(v->residual + 4); /* a sector of its own */
     v->out = (double *)b[BUFFER_OUT].data;
     CUDA_CALL(c, cudaMemsetAsync(v->residual, 0, 64, c->stream), "cudaMemsetAsync(scalars)");

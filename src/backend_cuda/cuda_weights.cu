@@ -18,7 +18,7 @@ enum { SPREAD = 16 };
 /* Sums of as many bodies as one block has places for take one launch; more take a launch a stage. */
 enum { ONE_BLOCK = 1024, EACH = 4 };
 
-enum what { OF_WEIGHTS, OF_LEVELS, OF_LIMIT, OF_RESIDUAL };
+enum what { OF_WEIGHTS, OF_LEVELS, OF_ENERGY, OF_LIMIT, OF_RESIDUAL };
 
 /* ---- pairs and row blocks in double ------------------------------------------------------------------------------ */
 
@@ -164,17 +164,19 @@ static __device__ __forceinline__ double dot_lanes(double x, double y)
 /* What a body adds to its island's sums:
  *   OF_WEIGHTS  g . A^-1 g, mass, v . A v, push            with g = J^T lambda, push the sum of the forces' sizes
  *   OF_LEVELS   also r . A^-1 r, what its pairs miss       with r = b + g - A v
- *   OF_LIMIT    energy of v, of A^-1 b, of r; work
+ *   OF_ENERGY   energy of v, of A^-1 b
+ *   OF_LIMIT    also energy of r; work                     (nothing where no island is suspected)
  *   OF_RESIDUAL nothing: (17), the largest entry of r */
 template <int WHAT>
 static __global__ void __launch_bounds__(BODY_THREADS)
     terms_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
+    if (WHAT == OF_LIMIT && !*v.suspects) return;
+    if (WHAT == OF_ENERGY && blockIdx.x == 0 && threadIdx.x == 0) *v.limited = *v.suspects = 0;
     const body_thread t = body_of_thread(v);
-    if (WHAT == OF_LIMIT && blockIdx.x == 0 && threadIdx.x == 0) *v.limited = 0;
     enum { PAIRS = 6, PUSH, SUMS };
     double sums[SUMS] = {}, term[TERMS] = {};
-    for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) {
+    for (int32_t at = t.begin + t.lane; WHAT != OF_ENERGY && at < t.end; at += LANES) {
         const int32_t code = v.incident[at], p = code / 2;
         add_half(v, code, sums, &sums[PUSH]);
         if ((WHAT != OF_LEVELS && WHAT != OF_LIMIT) || p >= v.pair_room) continue;
@@ -206,9 +208,11 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         term[4] = dot_lanes(r, product(t.lane, r, a_inverse));
         term[5] = sums[PAIRS];
     }
-    if (WHAT == OF_LIMIT) {
+    if (WHAT == OF_ENERGY || WHAT == OF_LIMIT) {
         term[0] = dot_lanes(velocity, momentum) / 2;
         term[1] = dot_lanes(b, product(t.lane, b, a_inverse)) / 2;
+    }
+    if (WHAT == OF_LIMIT) {
         term[2] = dot_lanes(r, product(t.lane, r, a_inverse)) / 2;
         term[3] = sums[PAIRS];
     }
@@ -260,6 +264,10 @@ static __device__ void finish_island(const cuda_view &v, int32_t s, const place_
     if (place.rank != 0) return;
     const double *sum = v.terms + (size_t)s * TERMS;
     cuda_island *island = &v.islands[place.label];
+    if (WHAT == OF_ENERGY) {
+        if (limit_suspects(sum[0], sum[1])) *v.suspects = 1;
+        return;
+    }
     if (WHAT == OF_LIMIT) {
         const struct limit_energies energies = {sum[0], sum[1], sum[2], sum[3]};
         island->slow_down = limit_factor(&energies);
@@ -295,6 +303,7 @@ static __global__ void __launch_bounds__(ONE_BLOCK)
     const int32_t first = (int32_t)(blockIdx.x * blockDim.x + threadIdx.x), all = (int32_t)(gridDim.x * blockDim.x);
     const int32_t bodies = live_bodies(v);
     const bool one_block = COUNT > 1;
+    if (WHAT == OF_LIMIT && !*v.suspects) return;
     place_in_island place[COUNT];
     int32_t apart = 1;
 #pragma unroll
@@ -447,6 +456,7 @@ static __global__ void weigh_kernel(const __grid_constant__ cuda_view v, const _
 static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     const int32_t s = thread_index();
+    if (!*v.suspects) return;
     if (s < live_bodies(v)) slow_body(v, s, v.islands[v.label[v.body_of[s]]].slow_down);
 }
 
@@ -506,6 +516,8 @@ sadmm_status CUDA(enqueue_momentum_residual)(struct sadmm_context *c, struct sad
 sadmm_status CUDA(enqueue_limit)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
+    CUDA_TRY(launch_terms<OF_ENERGY>(c, false, "energies", error));
+    CUDA_TRY(launch_islands<OF_ENERGY>(c, error));
     CUDA_TRY(launch_terms<OF_LIMIT>(c, false, "terms of the limit", error));
     CUDA_TRY(launch_islands<OF_LIMIT>(c, error));
     if (one_block(&c->view)) return SADMM_OK;
