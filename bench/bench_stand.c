@@ -115,7 +115,10 @@ static sadmm_status run(struct stand *s, const struct options *o)
 {
     s->ms = sadmm_alloc((size_t)o->steps + 1, sizeof *s->ms);
     bool room = s->ms;
-    for (int k = 0; k < PHASES; ++k) room = (s->phases[k] = sadmm_alloc((size_t)o->steps + 1, sizeof *s->phases[k])) && room;
+    for (int k = 0; k < PHASES; ++k) {
+        s->phases[k] = sadmm_alloc((size_t)o->steps + 1, sizeof *s->phases[k]);
+        room = room && s->phases[k];
+    }
     if (!room) return sadmm_fail_memory(&s->error, "the times");
     TRY(remember(s));
     while (s->done < o->steps) {

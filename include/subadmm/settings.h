@@ -53,12 +53,13 @@ typedef struct sadmm_settings {
     sadmm_method method;         /* default SADMM_METHOD_PAPER */
     int iterations;              /* iterations a step, in [1, 1000000]; default 100 */
     double relaxation;           /* FAST: over-relaxation rho, dimensionless, in [1, 2); default 1.8 */
-    int penalty_period;          /* PAPER, as all of penalty_*. m of eq. (15): iterations between penalty updates, 0 = never; default 30 */
+    int penalty_period;          /* PAPER, as all of penalty_*. m of eq. (15): iterations between penalty updates,
+                                    0 = never; default 30 */
     double penalty_mass_factor;  /* M of eq. (13), dimensionless, in [0, 1e12]; default 16 */
     double penalty_offset;       /* c of eq. (13), kg/s^2, in [0, 1e15]; default 1e5. M and c are not both 0 */
     double penalty_ratio_limit;  /* alpha of eq. (15), in [1, 1e6]; default 4 */
-    bool penalty_update_warm;    /* also update in steps that start warm (most constraints carry an impulse); default false:
-                                    there (15) moves the weights of an iteration that has all but converged and keeps
+    bool penalty_update_warm;    /* also update in steps that start warm (most constraints carry an impulse);
+                                    default false: there (15) moves the weights of an iteration that has all but converged and keeps
                                     it from coming to rest (docs/algorithm.md) */
     bool warm_start;             /* start from the previous step's impulses and velocities; default true.
                                     false: impulses start at 0 and velocities at A^-1 b */

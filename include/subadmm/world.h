@@ -56,7 +56,8 @@ typedef struct sadmm_body_def {
     double orientation[4];       /* w x y z, | |q| - 1 | <= 1e-6 (then normalised); default identity */
     double linear_velocity[3];   /* m/s, |v| <= 1e6; 0 for static bodies */
     double angular_velocity[3];  /* rad/s, |w| <= 1e6; 0 for static bodies */
-    int32_t environment;         /* bodies of different environments never meet; >= 0, or -1 (static only): meets all; default 0 (static: -1 is the usual choice) */
+    int32_t environment;         /* bodies of different environments never meet; >= 0, or -1 (static only): meets all;
+                                    default 0 (static: -1 is the usual choice) */
     const char *name;            /* copied, at most 63 bytes; NULL = "" */
 } sadmm_body_def;
 
@@ -158,10 +159,11 @@ typedef struct sadmm_step_report {
     int32_t pairs;                 /* shape pairs with at least one contact */
     int iterations;                /* done */
     bool converged;                /* a stop rule was met */
-    int32_t limited;               /* method FAST: islands that ended the iterations with more kinetic energy than contacts can
-                                      leave them with and were slowed down to that; not 0: too few iterations */
-    int64_t repeated;              /* steps since creation that a backend which runs ahead (CUDA) began with too little room or
-                                      another plan than they needed, and did again with more: nothing is lost but time */
+    int32_t limited;               /* method FAST: islands that ended the iterations with more kinetic energy than
+                                      contacts can leave them with and were slowed down to that; not 0: too few iterations */
+    int64_t repeated;              /* steps since creation that a backend which runs ahead (CUDA) began with too little
+                                      room or another plan than they needed, and did again with more: nothing is lost
+                                      but time */
     double penetration_max;        /* deepest overlap at the start of the step, m, >= 0 */
     sadmm_phase_times ms;          /* the certificate's own time is in `certify_ms`, not in here */
     double certify_ms;

@@ -77,9 +77,9 @@ static void find_depths(struct predictor *p)
 
 static vec3 point_velocity(const double v[6], vec3 arm) { return v3_add(v3_load(v), v3_cross(v3_load(v + 3), arm)); }
 
-/* Contacts with nearer ones that the body would move into with velocity v; -1: one of them lets it come closer, or has to
- * push it off. */
-static int find_supports(const struct predictor *p, int32_t i, const double v[6], struct support supports[MOST_SUPPORTS])
+/* Contacts with nearer ones that the body would move into with velocity v; -1: one of them has to push it off. */
+static int find_supports(const struct predictor *p, int32_t i, const double v[6],
+                         struct support supports[MOST_SUPPORTS])
 {
     const struct sadmm_contact_set *contacts = p->system->contacts;
     int count = 0;
@@ -171,10 +171,11 @@ static bool stop(struct predictor *p, int32_t i)
 static void forget_failures(struct predictor *p)
 {
     struct sadmm_system *system = p->system;
-    for (size_t k = 0; k < system->contacts->pair_count; ++k) {
-        const struct sadmm_contact_pair *pair = &system->contacts->pairs[k];
+    for (size_t at = 0; at < system->contacts->pair_count; ++at) {
+        const struct sadmm_contact_pair *pair = &system->contacts->pairs[at];
         if (!p->failed[p->label[pair->body_a >= 0 ? pair->body_a : pair->body_b]]) continue;
-        for (int j = 0; j < pair->count; ++j) memset(system->contacts->points[pair->first + j].impulse, 0, 3 * sizeof(double));
+        for (int k = 0; k < pair->count; ++k)
+            memset(system->contacts->points[pair->first + k].impulse, 0, 3 * sizeof(double));
     }
     for (int32_t i = 0; i < system->body_count; ++i) {
         double A[36], b[6], L[36];

@@ -73,9 +73,9 @@ SADMM_INLINE double weight_next_level(double level, double balance)
 }
 
 /* Tall islands in steps that start warm. Contacts that are solved in part, step by step, are springs of stiffness
- * B iterations / dt^2, on which a tall pile buckles, and gaps, closed in one step, act on them as an integral controller that
- * excites them. `push`, the sum of the sizes of the impulses that the bodies feel, N s, over m V is twice the number of bodies
- * that a load passes on its way to the ground. */
+ * B iterations / dt^2, on which a tall pile buckles; and gaps, closed in one step, act on them as an integral
+ * controller that excites them. `push`, the sum of the sizes of the impulses that the bodies feel, N s, over m V is
+ * twice the number of bodies that a load passes on its way to the ground. */
 #define WEIGHT_TALL 20.0
 #define WEIGHT_TALL_MOST 6.0
 /* Over the speed of bodies at rest, the least V. */
