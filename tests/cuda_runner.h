@@ -3,15 +3,13 @@
 #ifndef TESTS_CUDA_RUNNER_H
 #define TESTS_CUDA_RUNNER_H
 
-#include <check.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "contact_problems.h"
-#include "cuda_suite.h"
 #include "core/schedule.h"
+#include "cuda_suite.h"
+#include "runner.h"
 
 #ifdef CUDA_EMULATED
 #include "emulation_control.h"
@@ -34,12 +32,6 @@
 #undef CUDA
 
 static const struct sadmm_kernels *tables[2]; /* by precision */
-
-static inline const struct sadmm_kernels *literal(void)
-{
-    const char *reason;
-    return sadmm_ref_find(SADMM_F64, &reason);
-}
 
 /* ---- scenes ---------------------------------------------------------------------------------------------------- */
 
@@ -201,23 +193,6 @@ static inline const struct scene *find_scene(const char *name)
 
 /* ---- one table at work ----------------------------------------------------------------------------------------- */
 
-struct runner {
-    const struct sadmm_kernels *k;
-    struct sadmm_context *c;
-    struct contact_problem *p;
-    struct sadmm_plan plan;
-    sadmm_settings settings;
-    sadmm_method method;
-    struct sadmm_error error;
-};
-
-#define CALL(r, call)                                                                                         \
-    do {                                                                                                      \
-        (r)->error.message[0] = 0;                                                                            \
-        sadmm_status call_status = (call);                                                                    \
-        ck_assert_msg(call_status == SADMM_OK, "%s: %s", sadmm_status_name(call_status), (r)->error.message); \
-    } while (0)
-
 static inline struct contact_problem *make_problem(const struct scene *scene, const sadmm_settings *settings)
 {
     struct contact_problem *p = scene->make();
@@ -234,10 +209,10 @@ static inline void runner_create(struct runner *r, const struct sadmm_kernels *k
     CALL(r, k->create(0, &r->c, &r->error));
 }
 
-static inline sadmm_status runner_begin(struct runner *r, const struct scene *scene)
+static inline sadmm_status runner_begin(struct runner *r, const struct scene *scene, sadmm_method method)
 {
     r->settings = sadmm_settings_default();
-    r->settings.method = r->method;
+    r->settings.method = method;
     r->settings.warm_start = scene->warm;
     r->settings.measure_residuals = true; /* so that every plan has room for them */
     contact_problem_free(r->p);
@@ -246,23 +221,12 @@ static inline sadmm_status runner_begin(struct runner *r, const struct scene *sc
     return r->k->begin(r->c, &r->p->system, &r->plan, &r->settings, &r->error);
 }
 
-static inline void runner_assemble(struct runner *r)
-{
-    CALL(r, r->k->assemble_bodies(r->c, &r->error));
-    if (r->plan.points || r->plan.blocks[SADMM_BLOCK_CONTACT]) CALL(r, r->k->assemble_contacts(r->c, &r->error));
-    if (r->plan.blocks[SADMM_BLOCK_HARD]) CALL(r, r->k->assemble_joints(r->c, &r->error));
-    if (r->plan.blocks[SADMM_BLOCK_SOFT]) CALL(r, r->k->assemble_springs(r->c, &r->error));
-    CALL(r, r->k->init_penalty(r->c, &r->error));
-    CALL(r, r->k->factorize(r->c, &r->error));
-}
-
 static inline void runner_start_method(struct runner *r, const struct sadmm_kernels *k, const struct scene *scene,
                                        enum sadmm_cuda_tier tier, sadmm_method method)
 {
     runner_create(r, k);
-    r->method = method;
     if (k->backend == SADMM_BACKEND_CUDA) force_tier(k, r->c, tier);
-    CALL(r, runner_begin(r, scene));
+    CALL(r, runner_begin(r, scene, method));
     runner_assemble(r);
     if (k->backend == SADMM_BACKEND_CUDA && tier != SADMM_CUDA_TIER_AUTO)
         ck_assert_int_eq(tier_of(k, r->c, NULL), tier);
@@ -272,12 +236,6 @@ static inline void runner_start(struct runner *r, const struct sadmm_kernels *k,
                                 enum sadmm_cuda_tier tier)
 {
     runner_start_method(r, k, scene, tier, SADMM_METHOD_PAPER);
-}
-
-static inline void runner_stop(struct runner *r)
-{
-    r->k->destroy(r->c);
-    contact_problem_free(r->p);
 }
 
 static inline void runner_step(struct runner *r, bool measure)
@@ -296,37 +254,6 @@ static inline struct sadmm_residual runner_residual(struct runner *r)
 static inline void runner_read(struct runner *r) { CALL(r, r->k->read_solution(r->c, &r->error)); }
 
 /* ---- comparing ------------------------------------------------------------------------------------------------- */
-
-struct spread {
-    double difference, scale;
-};
-
-static inline void add(struct spread *s, double got, double wanted)
-{
-    ck_assert_msg(isfinite(got) && isfinite(wanted), "got %g, wanted %g", got, wanted);
-    s->difference = fmax(s->difference, fabs(got - wanted));
-    s->scale = fmax(s->scale, fabs(wanted));
-}
-
-static inline double relative(struct spread s) { return s.difference > 0 ? s.difference / s.scale : 0; }
-
-static inline struct spread velocity_spread(const struct runner *got, const struct runner *wanted)
-{
-    struct spread s = {0, 0};
-    for (int32_t i = 0; i < 6 * wanted->p->system.body_count; ++i)
-        add(&s, got->p->system.velocity[i], wanted->p->system.velocity[i]);
-    return s;
-}
-
-static inline struct spread lambda_spread(const struct runner *got, const struct runner *wanted)
-{
-    struct spread s = {0, 0};
-    const struct sadmm_system *a = &got->p->system, *b = &wanted->p->system;
-    for (size_t k = 0; k < b->contacts->point_count; ++k)
-        for (int i = 0; i < 3; ++i) add(&s, a->contacts->points[k].impulse[i], b->contacts->points[k].impulse[i]);
-    for (int32_t i = 0; i < 6 * b->block_count; ++i) add(&s, a->block_lambda[i], b->block_lambda[i]);
-    return s;
-}
 
 /* Not one bit may differ. */
 static inline void check_same(struct runner *got, struct runner *wanted, const char *what)
@@ -354,7 +281,7 @@ static inline bool device_has(const struct sadmm_kernels *table, enum sadmm_cuda
     struct runner r;
     runner_create(&r, table);
     force_tier(table, r.c, tier);
-    const bool has = runner_begin(&r, &scenes[0]) == SADMM_OK || !strstr(r.error.message, "the device has no clusters");
+    const bool has = runner_begin(&r, &scenes[0], SADMM_METHOD_PAPER) == SADMM_OK || !strstr(r.error.message, "the device has no clusters");
     runner_stop(&r);
     return has;
 #endif
@@ -365,5 +292,36 @@ static inline void set_halt(struct runner *r, enum cuda_halt halt)
     if (r->k->precision == SADMM_F32) CALL(r, SYMBOL(set_halt, f32)(r->c, halt, &r->error));
     else CALL(r, SYMBOL(set_halt, f64)(r->c, halt, &r->error));
 }
+
+#ifdef CUDA_EMULATED
+/* A solve in which runtime calls fail from number `calls` on: a status and a message, never a leak. False: it had fewer. */
+static inline bool solve_fails_at(const struct sadmm_kernels *table, enum sadmm_cuda_tier tier, const struct scene *scene,
+                                  const sadmm_settings *settings, long calls)
+{
+    struct contact_problem *p = make_problem(scene, settings);
+    struct sadmm_plan plan = sadmm_plan_make(&p->system, settings);
+    struct sadmm_solve_report report;
+    struct sadmm_context *c = NULL;
+    struct sadmm_error error = {SADMM_OK, ""};
+    cuda_emulation_calls_left = calls;
+    sadmm_status status = table->create(1, &c, &error);
+    if (status == SADMM_OK) {
+        force_tier(table, c, tier);
+        status = sadmm_schedule_solve(table, c, &p->system, settings, &plan, &report, NULL, &error);
+    } else {
+        ck_assert_ptr_null(c);
+    }
+    const bool reached = cuda_emulation_calls_left < 0;
+    cuda_emulation_calls_left = -1;
+    ck_assert_msg(status == (reached ? SADMM_ERROR_DEVICE : SADMM_OK), "call %ld: %s", calls, sadmm_status_name(status));
+    if (reached)
+        ck_assert_msg(strstr(error.message, "CUDA device 1: ") && strstr(error.message, "launch failure"), "%s",
+                      error.message);
+    table->destroy(c);
+    contact_problem_free(p);
+    ck_assert_msg(cuda_emulation_allocations == 0, "call %ld: %ld left", calls, cuda_emulation_allocations);
+    return reached;
+}
+#endif
 
 #endif

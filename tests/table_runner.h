@@ -3,13 +3,10 @@
 #ifndef TESTS_TABLE_RUNNER_H
 #define TESTS_TABLE_RUNNER_H
 
-#include <check.h>
-#include <math.h>
 #include <string.h>
 
 #include "config.h"
-#include "contact_problems.h"
-#include "core/backends.h"
+#include "runner.h"
 
 /* ---- tables -------------------------------------------------------------------------------------------------- */
 
@@ -44,12 +41,6 @@ static void collect_tables(void)
         CPU_VARIANT(avx2);
     }
 #endif
-}
-
-static const struct sadmm_kernels *literal(void)
-{
-    const char *reason;
-    return sadmm_ref_find(SADMM_F64, &reason);
 }
 
 /* ---- scenes -------------------------------------------------------------------------------------------------- */
@@ -135,22 +126,6 @@ static struct contact_problem *make_problem(const struct scene *scene)
 
 /* ---- one table at work --------------------------------------------------------------------------------------- */
 
-struct runner {
-    const struct sadmm_kernels *k;
-    struct sadmm_context *c;
-    struct contact_problem *p;
-    struct sadmm_plan plan;
-    sadmm_settings settings;
-    struct sadmm_error error;
-};
-
-#define CALL(r, call)                                                                                      \
-    do {                                                                                                   \
-        (r)->error.message[0] = 0;                                                                         \
-        sadmm_status call_status = (call);                                                                 \
-        ck_assert_msg(call_status == SADMM_OK, "%s: %s", sadmm_status_name(call_status), (r)->error.message); \
-    } while (0)
-
 static void runner_start_method(struct runner *r, const struct sadmm_kernels *k, const struct scene *scene,
                                 const struct contact_problem *problem, int threads, sadmm_method method)
 {
@@ -163,12 +138,7 @@ static void runner_start_method(struct runner *r, const struct sadmm_kernels *k,
     r->plan = sadmm_plan_make(&r->p->system, &r->settings);
     CALL(r, k->create(0, &r->c, &r->error));
     CALL(r, k->begin(r->c, &r->p->system, &r->plan, &r->settings, &r->error));
-    CALL(r, k->assemble_bodies(r->c, &r->error));
-    if (r->plan.points || r->plan.blocks[SADMM_BLOCK_CONTACT]) CALL(r, k->assemble_contacts(r->c, &r->error));
-    if (r->plan.blocks[SADMM_BLOCK_HARD]) CALL(r, k->assemble_joints(r->c, &r->error));
-    if (r->plan.blocks[SADMM_BLOCK_SOFT]) CALL(r, k->assemble_springs(r->c, &r->error));
-    CALL(r, k->init_penalty(r->c, &r->error));
-    CALL(r, k->factorize(r->c, &r->error));
+    runner_assemble(r);
 }
 
 static inline void runner_start(struct runner *r, const struct sadmm_kernels *k, const struct scene *scene,
@@ -177,35 +147,13 @@ static inline void runner_start(struct runner *r, const struct sadmm_kernels *k,
     runner_start_method(r, k, scene, problem, threads, SADMM_METHOD_PAPER);
 }
 
-static void runner_stop(struct runner *r)
-{
-    r->k->destroy(r->c);
-    contact_problem_free(r->p);
-}
-
-/* ---- comparing ----------------------------------------------------------------------------------------------- */
-
-struct spread { double difference, scale; };
-
-static void add(struct spread *s, double got, double wanted)
-{
-    ck_assert(isfinite(got) && isfinite(wanted));
-    s->difference = fmax(s->difference, fabs(got - wanted));
-    s->scale = fmax(s->scale, fabs(wanted));
-}
-
-static double relative(struct spread s) { return s.difference > 0 ? s.difference / s.scale : 0; }
-
 /* v and lambda of two runners; the scales only grow, so that a velocity on its way to 0 is not measured by itself. */
 static void compare_solutions(struct runner *got, struct runner *wanted, struct spread *v, struct spread *lambda)
 {
     CALL(got, got->k->read_solution(got->c, &got->error));
     CALL(wanted, wanted->k->read_solution(wanted->c, &wanted->error));
-    const struct sadmm_system *a = &got->p->system, *b = &wanted->p->system;
-    for (int32_t i = 0; i < 6 * b->body_count; ++i) add(v, a->velocity[i], b->velocity[i]);
-    for (size_t k = 0; k < b->contacts->point_count; ++k)
-        for (int i = 0; i < 3; ++i) add(lambda, a->contacts->points[k].impulse[i], b->contacts->points[k].impulse[i]);
-    for (int32_t i = 0; i < 6 * b->block_count; ++i) add(lambda, a->block_lambda[i], b->block_lambda[i]);
+    add_velocities(v, got, wanted);
+    add_multipliers(lambda, got, wanted);
 }
 
 #endif

@@ -127,9 +127,9 @@ START_TEST(tiers_equal_stepwise)
         if (!(scene->tiers >> tiers[t] & 1)) {
             runner_create(&fused, table);
             force_tier(table, fused.c, tiers[t]);
-            ck_assert_int_eq(runner_begin(&fused, scene), SADMM_ERROR_UNSUPPORTED);
+            ck_assert_int_eq(runner_begin(&fused, scene, SADMM_METHOD_PAPER), SADMM_ERROR_UNSUPPORTED);
             force_tier(table, fused.c, SADMM_CUDA_TIER_AUTO); /* and the context stays usable */
-            CALL(&fused, runner_begin(&fused, scene));
+            CALL(&fused, runner_begin(&fused, scene, SADMM_METHOD_PAPER));
             runner_stop(&fused);
             continue;
         }
@@ -182,7 +182,7 @@ START_TEST(cluster_sizes)
             runner_create(&got, table);
             force_tier(table, got.c, SADMM_CUDA_TIER_CLUSTER);
             force_cluster(table, got.c, size);
-            const sadmm_status status = runner_begin(&got, scene);
+            const sadmm_status status = runner_begin(&got, scene, SADMM_METHOD_PAPER);
             if (size < cases[k].from[table->precision]) {
                 ck_assert_msg(status == SADMM_ERROR_UNSUPPORTED, "%s", what);
                 ck_assert_msg(strstr(got.error.message, "an island does not fit") != NULL, "%s", got.error.message);
@@ -234,7 +234,7 @@ START_TEST(tiers_chosen)
     struct runner r;
     runner_create(&r, table);
     for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
-        CALL(&r, runner_begin(&r, cases[k].scene));
+        CALL(&r, runner_begin(&r, cases[k].scene, SADMM_METHOD_PAPER));
         ck_assert_msg(tier_of(table, r.c, NULL) == cases[k].tier, "%s: tier %d", cases[k].scene->name,
                       (int)tier_of(table, r.c, NULL));
     }
@@ -375,35 +375,7 @@ START_TEST(calls_that_fail)
         /* 18 iterations are a graph in the STREAM tier; the others launch once, however many there are. */
         settings.penalty_period = tier == SADMM_CUDA_TIER_STREAM ? 18 : 1;
         settings.iterations = settings.penalty_period + 1;
-        for (long calls = 0;; ++calls) {
-            struct contact_problem *p = make_problem(scene, &settings);
-            struct sadmm_plan plan = sadmm_plan_make(&p->system, &settings);
-            struct sadmm_solve_report report;
-            struct sadmm_context *c = NULL;
-            struct sadmm_error error = {SADMM_OK, ""};
-            cuda_emulation_calls_left = calls;
-            sadmm_status status = table->create(1, &c, &error);
-            if (status == SADMM_OK) {
-                force_tier(table, c, tier);
-                status = sadmm_schedule_solve(table, c, &p->system, &settings, &plan, &report, NULL, &error);
-            } else {
-                ck_assert_ptr_null(c);
-            }
-            bool reached = cuda_emulation_calls_left < 0;
-            cuda_emulation_calls_left = -1;
-            if (reached) {
-                ++failed;
-                ck_assert_msg(status == SADMM_ERROR_DEVICE, "call %ld: %s", calls, sadmm_status_name(status));
-                ck_assert_msg(strstr(error.message, "CUDA device 1: ") && strstr(error.message, "launch failure"), "%s",
-                              error.message);
-            } else {
-                ck_assert_int_eq(status, SADMM_OK);
-            }
-            table->destroy(c);
-            contact_problem_free(p);
-            ck_assert_msg(cuda_emulation_allocations == 0, "call %ld: %ld left", calls, cuda_emulation_allocations);
-            if (!reached) break;
-        }
+        for (long calls = 0; solve_fails_at(table, tier, scene, &settings, calls); ++calls) ++failed;
     }
     ck_assert_int_gt(failed, 100);
 }

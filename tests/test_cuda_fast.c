@@ -292,8 +292,7 @@ START_TEST(runs_repeat)
     struct runner used, fresh;
     runner_create(&used, table);
     for (size_t s = 0; s < SCENES; ++s) {
-        used.method = SADMM_METHOD_PAPER;
-        CALL(&used, runner_begin(&used, &scenes[s]));
+        CALL(&used, runner_begin(&used, &scenes[s], SADMM_METHOD_PAPER));
         runner_create(&fresh, table);
         struct sadmm_solve_report a = solve(&fresh, &scenes[s], 45, 0), b = solve(&used, &scenes[s], 45, 0);
         struct spread v = velocity_spread(&used, &fresh), lambda = lambda_spread(&used, &fresh);
@@ -363,26 +362,7 @@ START_TEST(calls_that_fail)
     settings.method = SADMM_METHOD_FAST;
     settings.iterations = 6; /* new weights after 5 */
     int failed = 0;
-    for (long calls = 0;; ++calls) {
-        struct contact_problem *p = make_problem(scene, &settings);
-        struct sadmm_plan plan = sadmm_plan_make(&p->system, &settings);
-        struct sadmm_solve_report report;
-        struct sadmm_context *c = NULL;
-        struct sadmm_error error = {SADMM_OK, ""};
-        cuda_emulation_calls_left = calls;
-        sadmm_status status = table->create(1, &c, &error);
-        if (status == SADMM_OK)
-            status = sadmm_schedule_solve(table, c, &p->system, &settings, &plan, &report, NULL, &error);
-        const bool reached = cuda_emulation_calls_left < 0;
-        cuda_emulation_calls_left = -1;
-        ck_assert_msg(status == (reached ? SADMM_ERROR_DEVICE : SADMM_OK), "call %ld: %s", calls,
-                      sadmm_status_name(status));
-        failed += reached;
-        table->destroy(c);
-        contact_problem_free(p);
-        ck_assert_msg(cuda_emulation_allocations == 0, "call %ld: %ld left", calls, cuda_emulation_allocations);
-        if (!reached) break;
-    }
+    for (long calls = 0; solve_fails_at(table, SADMM_CUDA_TIER_AUTO, scene, &settings, calls); ++calls) ++failed;
     ck_assert_int_gt(failed, 40);
 }
 END_TEST

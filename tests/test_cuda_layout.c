@@ -1,13 +1,12 @@
 /* The CUDA backend's layout (cuda_layout.h) against a plain construction on the host: facts, slots, lists of halves and
  * every boundary of every part, number for number. On a real device, or skipped; test_cuda_layout_emulated.c runs the
  * same on the emulated one. */
-#include <check.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "contact_problems.h"
 #include "cuda_suite.h"
+#include "runner.h"
 
 #ifdef CUDA_EMULATED
 #include "emulation_control.h"
@@ -391,13 +390,6 @@ struct device {
     struct sadmm_plan plan;
     struct sadmm_error error;
 };
-
-#define CALL(d, call)                                                                                         \
-    do {                                                                                                      \
-        (d)->error.message[0] = 0;                                                                            \
-        sadmm_status call_status = (call);                                                                    \
-        ck_assert_msg(call_status == SADMM_OK, "%s: %s", sadmm_status_name(call_status), (d)->error.message); \
-    } while (0)
 
 static void device_begin(struct device *d, struct contact_problem *p, bool warm)
 {

@@ -2,6 +2,7 @@
 #include "contact_problems.h"
 #include "core/certificate.h"
 #include "core/loads.h"
+#include "core/plan.h"
 #include "core/system_math.h"
 #include "run_suite.h"
 
@@ -79,6 +80,7 @@ START_TEST(others_start_from_nothing)
         for (int i = 0; i < 2; ++i) {
             double A[36], b[6];
             sadmm_system_body(&problems[k]->system, &s, i, A, b);
+            /* of 1 kg: v = b, but for a Cholesky factor's rounding */
             for (int j = 0; j < 3; ++j) ck_assert_double_eq_tol(problems[k]->system.velocity[6 * i + j], b[j], 1e-15);
         }
         contact_problem_free(problems[k]);
@@ -94,6 +96,30 @@ START_TEST(others_start_from_nothing)
 }
 END_TEST
 
+/* Where loads are predicted, and that backends are told to start from them even where nothing else is kept. */
+START_TEST(plans_that_predict)
+{
+    static const double one[] = {1, 1};
+    struct contact_problem *p = contact_problem_stack(one, 2, 0.5);
+    for (int warm = 0; warm < 2; ++warm) {
+        sadmm_settings s = sadmm_settings_default();
+        s.warm_start = warm;
+        s.method = SADMM_METHOD_FAST;
+        p->system.first = true;
+        struct sadmm_plan plan = sadmm_plan_make(&p->system, &s);
+        ck_assert(plan.predict && plan.warm_start && !plan.warm && plan.weight_refresh);
+        p->system.first = false;
+        plan = sadmm_plan_make(&p->system, &s);
+        ck_assert(!plan.predict && plan.warm_start == s.warm_start);
+        p->system.first = true;
+        s.method = SADMM_METHOD_PAPER;
+        plan = sadmm_plan_make(&p->system, &s);
+        ck_assert(!plan.predict && plan.warm_start == s.warm_start);
+    }
+    contact_problem_free(p);
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("loads");
@@ -101,6 +127,7 @@ int main(void)
     tcase_add_test(cases, piles_at_rest_are_solved);
     tcase_add_test(cases, loads_add_up);
     tcase_add_test(cases, others_start_from_nothing);
+    tcase_add_test(cases, plans_that_predict);
     suite_add_tcase(suite, cases);
     return run_suite(suite);
 }

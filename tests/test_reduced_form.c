@@ -181,12 +181,7 @@ START_TEST(contexts_can_be_used_again)
         again.settings = fresh.settings;
         again.plan = fresh.plan;
         CALL(&again, table->begin(again.c, &again.p->system, &again.plan, &again.settings, &again.error));
-        CALL(&again, table->assemble_bodies(again.c, &again.error));
-        if (again.plan.points || again.plan.blocks[0]) CALL(&again, table->assemble_contacts(again.c, &again.error));
-        if (again.plan.blocks[1]) CALL(&again, table->assemble_joints(again.c, &again.error));
-        if (again.plan.blocks[2]) CALL(&again, table->assemble_springs(again.c, &again.error));
-        CALL(&again, table->init_penalty(again.c, &again.error));
-        CALL(&again, table->factorize(again.c, &again.error));
+        runner_assemble(&again);
         for (int i = 0; i < 5; ++i) {
             runner_step(&fresh, true); /* ends measured: the flag must not survive either */
             runner_step(&again, true);

@@ -59,10 +59,11 @@ typedef struct sadmm_settings {
     double penalty_offset;       /* c of eq. (13), kg/s^2, in [0, 1e15]; default 1e5. M and c are not both 0 */
     double penalty_ratio_limit;  /* alpha of eq. (15), in [1, 1e6]; default 4 */
     bool penalty_update_warm;    /* also update in steps that start warm (most constraints carry an impulse);
-                                    default false: there (15) moves the weights of an iteration that has all but converged and keeps
-                                    it from coming to rest (docs/algorithm.md) */
+                                    default false: there (15) moves the weights of an iteration that has all but
+                                    converged and keeps it from coming to rest (docs/algorithm.md) */
     bool warm_start;             /* start from the previous step's impulses and velocities; default true.
-                                    false: impulses start at 0 and velocities at A^-1 b */
+                                    false: impulses start at 0 and velocities at A^-1 b. FAST, either way: problems
+                                    without impulses and first steps start from predicted loads (docs/algorithm.md) */
 
     double residual_tolerance;   /* stop when |r_primal|_inf (m/s) and |r_dual|_inf (N s) are both <= this;
                                     0 = never; finite, >= 0; default 0 */

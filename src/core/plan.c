@@ -113,6 +113,7 @@ struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struc
     sadmm_plan_settle(&plan, settings, settings->warm_start && starts_warm(system));
     plan.predict = settings->method == SADMM_METHOD_FAST && plan.points > 0 && !has_blocks(&plan) && system->first &&
                    !(settings->warm_start && any_pair_is_warm(system->contacts));
+    if (plan.predict) plan.warm_start = true; /* predicted loads are the system's start values then */
     plan.threads = sadmm_plan_threads(settings->threads, (size_t)plan.points + 4 * (size_t)system->block_count);
     return plan;
 }

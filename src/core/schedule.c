@@ -84,7 +84,8 @@ int sadmm_schedule_budget(const struct sadmm_plan *plan, const struct sadmm_sett
 
 struct sadmm_stretch sadmm_schedule_stretch(const struct sadmm_plan *plan, const struct sadmm_settings *settings, int done)
 {
-    bool stop_rule = sadmm_plan_is_constrained(plan) && (settings->residual_tolerance > 0 || settings->certificate_tolerance > 0);
+    bool stop_rule = sadmm_plan_is_constrained(plan) &&
+                     (settings->residual_tolerance > 0 || settings->certificate_tolerance > 0);
     int budget = sadmm_schedule_budget(plan, settings);
     struct sadmm_stretch next = {.count = budget - done};
     if (plan->penalty_updates) next.count = until(done, settings->penalty_period, next.count);
@@ -180,12 +181,8 @@ sadmm_status sadmm_schedule_solve(const struct sadmm_kernels *kernels, struct sa
     report->certificate = sadmm_certificate_none();
     report->threads = kernels->backend == SADMM_BACKEND_REF ? 1 : plan->threads;
 
-    struct sadmm_plan own = *plan;
-    if (plan->predict) {
-        TRY(sadmm_loads_predict(system, settings, error));
-        own.warm_start = true;
-    }
-    TRY(kernels->begin(context, system, &own, settings, error));
+    if (plan->predict) TRY(sadmm_loads_predict(system, settings, error));
+    TRY(kernels->begin(context, system, plan, settings, error));
     TRY(assemble(kernels, context, plan, error));
     double assembled = sadmm_clock_ms();
     TRY(run(kernels, context, system, settings, plan, report, error));
