@@ -28,7 +28,15 @@ static __device__ void invert(bool rigid, const double A[36], double out[PACKED]
     }
 }
 
-/* FAST: A^-1 too. */
+/* x . M x */
+static __device__ double form(const double M[PACKED], const solver_real x[6])
+{
+    double wide[6];
+    for (int k = 0; k < 6; ++k) wide[k] = (double)x[k];
+    return packed_form(M, wide);
+}
+
+/* FAST: A^-1 and the energy of A^-1 b too. */
 template <bool FAST>
 static __global__ void __launch_bounds__(BODY_THREADS)
     assemble_bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
@@ -61,6 +69,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         double inverse[PACKED];
         invert(v.rigid, A, inverse);
         for (int k = 0; k < PACKED; ++k) v.A_inverse[PACKED * (size_t)i + (size_t)k] = inverse[k];
+        v.free_energy[i] = form(inverse, row) / 2;
     }
 }
 

@@ -3,6 +3,7 @@
 #define SADMM_CUDA_BODY_H
 
 #include "cuda_double.h"
+#include "cuda_lanes.h"
 
 #include "../core/math/packed6.h"
 
@@ -31,13 +32,35 @@ static __device__ __forceinline__ body_thread body_of_thread(const cuda_view &v)
     return out;
 }
 
-/* x[k] of the eight lanes added up, in all of them. Every lane of the warp comes here. */
-template <int COUNT> static __device__ __forceinline__ void sum_lanes(double x[COUNT])
+/* What a body's lane r < 6 has of it: rows r of A and A^-1, components r of v and b; 0 in the others. */
+struct body_row {
+    double a[6], a_inverse[6], velocity, b;
+};
+
+static __device__ __forceinline__ body_row row_of_body(const cuda_view &v, const body_thread &t)
 {
+    body_row row = {};
+    if (!t.live || t.lane >= 6) return row;
+    const solver_real *line = v.lines + t.body * (size_t)v.line;
+    const double *inverse = v.A_inverse + t.body * PACKED;
 #pragma unroll
-    for (int o = 1; o < LANES; o *= 2)
+    for (int k = 0; k < 6; ++k) {
+        row.a[k] = (double)line_a(line, v.rigid, t.lane, k);
+        row.a_inverse[k] = inverse[packed_place(t.lane, k)];
+    }
+    row.velocity = (double)v.state[t.body * ROW + (size_t)t.lane];
+    row.b = (double)v.b[t.body * ROW + (size_t)t.lane];
+    return row;
+}
+
+/* x[lane], of six numbers; 0 in the other lanes. */
+static __device__ __forceinline__ double own_number(const double *x, int32_t lane)
+{
+    double own = 0;
 #pragma unroll
-        for (int k = 0; k < COUNT; ++k) x[k] += __shfl_xor_sync(0xffffffffu, x[k], o);
+    for (int k = 0; k < 6; ++k)
+        if (k == lane) own = x[k];
+    return own;
 }
 
 static __device__ __forceinline__ double row_number(const cuda_view &v, int32_t plane, int32_t k)

@@ -94,6 +94,22 @@ sadmm_status CUDA(room)(struct sadmm_context *c, enum cuda_buffer_name name, siz
     return SADMM_OK;
 }
 
+sadmm_status CUDA(clear)(struct sadmm_context *c, enum cuda_scalar scalar, struct sadmm_error *error)
+{
+    const cuda_view *v = &c->view;
+    if (c->cleared & (unsigned)scalar) {
+        c->cleared &= ~(unsigned)scalar;
+        return SADMM_OK;
+    }
+    if (scalar == SCALAR_BARRIER) {
+        CUDA_CALL(c, cudaMemsetAsync(v->barrier, 0, sizeof *v->barrier, c->stream), "cudaMemsetAsync(barrier)");
+    } else {
+        CUDA_CALL(c, cudaMemsetAsync(v->residual + (scalar == SCALAR_DUAL), 0, sizeof *v->residual, c->stream),
+                  "cudaMemsetAsync(residual)");
+    }
+    return SADMM_OK;
+}
+
 sadmm_status CUDA(upload)(struct sadmm_context *c, void *to, enum cuda_buffer_name staging, size_t at, const void *from,
                           size_t bytes, struct sadmm_error *error)
 {
@@ -240,6 +256,7 @@ static sadmm_status open_device(struct sadmm_context *c, struct sadmm_error *err
     CUDA_CALL(c, cudaStreamCreateWithFlags(&c->side, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
     CUDA_CALL(c, cudaEventCreateWithFlags(&c->fork, cudaEventDisableTiming), "cudaEventCreateWithFlags");
     CUDA_CALL(c, cudaEventCreateWithFlags(&c->join, cudaEventDisableTiming), "cudaEventCreateWithFlags");
+    CUDA_CALL(c, cudaEventCreateWithFlags(&c->join_pairs, cudaEventDisableTiming), "cudaEventCreateWithFlags");
     return SADMM_OK;
 }
 
@@ -269,6 +286,7 @@ extern "C" void CUDA(destroy)(struct sadmm_context *c)
         CUDA(step_destroy)(c);
         if (c->graph) (void)cudaGraphExecDestroy(c->graph);
         for (cuda_buffer &buffer : c->buffers) release(&buffer);
+        if (c->join_pairs) (void)cudaEventDestroy(c->join_pairs);
         if (c->join) (void)cudaEventDestroy(c->join);
         if (c->fork) (void)cudaEventDestroy(c->fork);
         if (c->side) (void)cudaStreamDestroy(c->side);

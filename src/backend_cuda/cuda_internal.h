@@ -95,7 +95,7 @@ struct row_about {
 /* fast: of an island, at its label. */
 struct cuda_island {
     double speed, mass;  /* V in m/s; kg */
-    double level, scale; /* math/weight.h; scale not 0: weights stay, times this */
+    double level, scale; /* math/weight.h; scale not 0: weights are those taken last, times this */
     double tallness;     /* math/weight.h: in steps that start warm, else 1 */
     double slow_down;    /* math/limit.h: the factor of its velocities */
     int64_t blocks;      /* there are constraints by rows: the level stays 1 */
@@ -165,9 +165,11 @@ struct cuda_view {
     /* fast */
     const int32_t *label, *island_bodies; /* of the layout */
     double *A_inverse;       /* bodies x PACKED */
-    double *terms;           /* slots x TERMS: of bodies, then added up in place */
+    double *free_energy;     /* bodies: of A^-1 b, J */
+    double *terms;           /* slots x TERMS: of bodies, then added up in place (cuda_islands.h) */
+    unsigned long long *arrivals; /* slots: of terms at places they are added up at; 0 between kernels */
     cuda_island *islands;    /* bodies, used at labels */
-    double *weight, *response; /* pairs: B in kg, J A^-1 J^T */
+    double *weight, *response, *load; /* pairs: B as taken last, kg; J A^-1 J^T, 1/kg; mean |lambda| of points, N s */
     solver_real *inv_s;      /* pairs: B / number of dynamic bodies */
     int32_t *limited;        /* islands slowed down */
     int32_t *suspects;       /* not 0: some island may have to be */
@@ -201,12 +203,15 @@ struct cuda_args {
     int32_t in_order;   /* slots are raw indices */
     int32_t settled;    /* fast: Step 1 ran before in this solve */
     int32_t warm;       /* fast: the step starts warm */
-    int32_t first_stage, last_stage; /* of sums over islands */
+    int32_t limit;      /* fast: islands with too much energy are to be suspected */
     const struct sadmm_resident_edit *edits;
     double factor;
 };
 
 typedef void (*cuda_kernel)(const cuda_view, const cuda_args);
+
+/* Scalars that are 0 before they are used. */
+enum cuda_scalar { SCALAR_PRIMAL = 1, SCALAR_DUAL = 2, SCALAR_BARRIER = 4 };
 
 /* Device or pinned memory that only grows. */
 struct cuda_buffer {
@@ -233,7 +238,7 @@ struct sadmm_context {
     int device;
     cudaStream_t stream;
     cudaStream_t side;        /* of a step's graph: what does not wait for contacts (cuda_step.cu) */
-    cudaEvent_t fork, join;
+    cudaEvent_t fork, join, join_pairs;
     int multiprocessors, shared_limit; /* shared_limit: bytes a block may have */
     bool cooperative, clusters;        /* what the device can launch */
 
@@ -250,6 +255,7 @@ struct sadmm_context {
     bool fast;     /* the method */
     bool settled;  /* fast: Step 1 ran in this solve */
     int refreshes; /* fast: of the weights, in this solve */
+    unsigned cleared; /* enum cuda_scalar: those that a kernel of this step has set to 0 for their first use */
     bool recording; /* a graph of the whole step: nothing is allocated, no graph launched in it */
 
     enum sadmm_cuda_tier wanted;     /* by a test */
@@ -287,6 +293,8 @@ cudaError_t CUDA(active_clusters)(const struct sadmm_context *, cuda_kernel kern
 sadmm_status CUDA(launch_partition)(struct sadmm_context *, cuda_kernel kernel, const char *name,
                                     const struct cuda_partition *partition, const cuda_args *args,
                                     struct sadmm_error *error);
+/* Set a scalar to 0, unless this step has. */
+sadmm_status CUDA(clear)(struct sadmm_context *, enum cuda_scalar scalar, struct sadmm_error *error);
 /* Through pinned memory, asynchronously; the pinned buffer is free again once the stream is idle. */
 sadmm_status CUDA(upload)(struct sadmm_context *, void *to, enum cuda_buffer_name staging, size_t at, const void *from,
                           size_t bytes, struct sadmm_error *error);
@@ -313,7 +321,7 @@ struct device_scope {
     device_scope scope((c)->device);    \
     CUDA_CALL((c), scope.code, "cudaSetDevice")
 
-/* ---- cuda_layout.cu, cuda_assemble.cu, cuda_penalty.cu, cuda_weights.cu, cuda_iterate.cu: parts of the entries,
+/* ---- cuda_layout.cu, cuda_assemble.cu, cuda_penalty.cu, cuda_weights.cu, cuda_limit.cu, cuda_iterate.cu: parts of the entries,
  * launches only ---- */
 
 /* This precision's data for the view's counts and the partition (allocates). */
@@ -322,16 +330,23 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *, struct sadmm_error *error
 sadmm_status CUDA(enqueue_bodies)(struct sadmm_context *, struct sadmm_error *error);
 /* Penalties and factors at once; in a whole step, also whether it is what was planned for. */
 sadmm_status CUDA(enqueue_penalties)(struct sadmm_context *, struct sadmm_error *error);
-/* fast: the first weights of a solve, or new ones; then C and, for `factor`, H. `planned` as above. */
-sadmm_status CUDA(enqueue_weights)(struct sadmm_context *, bool first, bool factor, bool planned,
-                                   struct sadmm_error *error);
-/* Its last part: C and H from the weights. */
-sadmm_status CUDA(enqueue_weighted_penalties)(struct sadmm_context *, bool factor, bool planned,
+/* fast: the first weights of a solve, or new ones; then C and, for `factor`, H. */
+sadmm_status CUDA(enqueue_weights)(struct sadmm_context *, bool first, bool factor, struct sadmm_error *error);
+/* Its parts: loads and responses of pairs (beside what makes slots); islands; weights, C and H from both. `planned` as
+ * above. */
+sadmm_status CUDA(enqueue_pairs)(struct sadmm_context *, bool first, struct sadmm_error *error);
+sadmm_status CUDA(enqueue_islands)(struct sadmm_context *, bool first, struct sadmm_error *error);
+sadmm_status CUDA(enqueue_weighted_penalties)(struct sadmm_context *, bool first, bool factor, bool planned,
                                               struct sadmm_error *error);
 /* fast: (17), as a maximum with what view.residual[1] is. */
 sadmm_status CUDA(enqueue_momentum_residual)(struct sadmm_context *, struct sadmm_error *error);
-/* fast: slow islands down (math/limit.h); how many, into *view.limited. */
-sadmm_status CUDA(enqueue_limit)(struct sadmm_context *, struct sadmm_error *error);
+/* fast: by what islands are to be slowed down (cuda_slow.h), and how many, in *view.limited. `suspected`: the iterations
+ * have looked whether any is. */
+sadmm_status CUDA(enqueue_limit)(struct sadmm_context *, bool suspected, struct sadmm_error *error);
+/* Iterations, as the entry; suspect: for the limit, whether an island may have too much energy, where the tier can tell.
+ * *suspected: it could. */
+sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *, int count, bool measure, bool suspect, bool *suspected,
+                                      struct sadmm_error *error);
 /* (16) and (17) of the iteration that was measured, into view.residual. */
 sadmm_status CUDA(enqueue_residuals)(struct sadmm_context *, struct sadmm_error *error);
 /* (15) by view.residual. */
@@ -345,6 +360,7 @@ sadmm_status CUDA(launch_edits)(struct sadmm_context *, const struct sadmm_resid
 sadmm_status CUDA(launch_start)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_admit)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_finish)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_commit)(struct sadmm_context *, struct sadmm_error *error);
 
 /* ---- cuda_layout.cu -------------------------------------------------------------------------------------------------
  * Counts and rooms in the view, then layout_room (it allocates); then per step, by enqueueing only: survey and layout of

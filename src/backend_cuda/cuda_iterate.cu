@@ -374,9 +374,7 @@ static sadmm_status clear_primal(struct sadmm_context *c, bool measure, struct s
     if (!measure) return SADMM_OK;
     if (!c->plan.residuals && c->view.pair_room + c->view.rows > 0)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "measure = true: the plan has residuals = false");
-    CUDA_CALL(c, cudaMemsetAsync(c->view.residual, 0, sizeof *c->view.residual, c->stream),
-              "cudaMemsetAsync(residual)");
-    return SADMM_OK;
+    return CUDA(clear)(c, SCALAR_PRIMAL, error);
 }
 
 sadmm_status CUDA(prepare_stepwise)(struct sadmm_context *c, struct sadmm_error *error)
@@ -497,7 +495,8 @@ static sadmm_status stream_iterations(struct sadmm_context *c, int count, bool m
 
 /* ---- fused: BLOCK, CLUSTER and GRID ---------------------------------------------------------------------------- */
 
-static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool measure, struct sadmm_error *error)
+static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool measure, bool suspect,
+                                        struct sadmm_error *error)
 {
     const struct cuda_partition *partition = &c->partition;
     const char *name = nullptr;
@@ -508,29 +507,37 @@ static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool
     args.rescaled = c->rescaled;
     args.start = c->starting;
     args.settled = c->settled;
+    args.limit = suspect;
     args.most_bodies = partition->most_bodies;
     args.cluster = partition->cluster;
     cuda_kernel kernel = CUDA(resident_kernel)(c->view.contact_rows, c->facts.point_slots, partition->tier,
                                                partition->threads, measure || c->view.rows > 0, c->fast, &name);
-    if (partition->tier == SADMM_CUDA_TIER_GRID)
-        CUDA_CALL(c, cudaMemsetAsync(c->view.barrier, 0, sizeof *c->view.barrier, c->stream),
-                  "cudaMemsetAsync(barrier)");
+    if (partition->tier == SADMM_CUDA_TIER_GRID) CUDA_TRY(CUDA(clear)(c, SCALAR_BARRIER, error));
     CUDA_TRY(CUDA(launch_partition)(c, kernel, name, partition, &args, error));
     c->starting = false;
     c->settled = true;
     return SADMM_OK;
 }
 
-extern "C" sadmm_status CUDA(iterate)(struct sadmm_context *c, int count, bool measure, struct sadmm_error *error)
+sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *c, int count, bool measure, bool suspect, bool *suspected,
+                                      struct sadmm_error *error)
 {
-    if (count <= 0) return SADMM_OK;
-    CUDA_ENTER(c);
+    const bool stream = c->partition.tier == SADMM_CUDA_TIER_STREAM;
     CUDA_TRY(clear_primal(c, measure, error));
-    CUDA_TRY(c->partition.tier == SADMM_CUDA_TIER_STREAM ? stream_iterations(c, count, measure, error)
-                                               : resident_iterations(c, count, measure, error));
+    CUDA_TRY(stream ? stream_iterations(c, count, measure, error)
+                    : resident_iterations(c, count, measure, suspect, error));
+    *suspected = suspect && !stream;
     c->measured = measure && !c->fast;
     c->rescaled = false;
     return SADMM_OK;
+}
+
+extern "C" sadmm_status CUDA(iterate)(struct sadmm_context *c, int count, bool measure, struct sadmm_error *error)
+{
+    bool suspected;
+    if (count <= 0) return SADMM_OK;
+    CUDA_ENTER(c);
+    return CUDA(enqueue_iterations)(c, count, measure, false, &suspected, error);
 }
 
 /* ---- residuals ------------------------------------------------------------------------------------------------ */
@@ -538,8 +545,7 @@ extern "C" sadmm_status CUDA(iterate)(struct sadmm_context *c, int count, bool m
 sadmm_status CUDA(enqueue_residuals)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    CUDA_CALL(c, cudaMemsetAsync(c->view.residual + 1, 0, sizeof *c->view.residual, c->stream),
-              "cudaMemsetAsync(residual)");
+    CUDA_TRY(CUDA(clear)(c, SCALAR_DUAL, error));
     if (c->fast) return CUDA(enqueue_momentum_residual)(c, error);
     return CUDA(launch)(c, dual_kernel, "measure_residuals", blocks_for((int64_t)c->view.bodies * LANES), &args, error);
 }

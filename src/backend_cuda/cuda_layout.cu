@@ -203,15 +203,19 @@ static sadmm_status weights_room(struct sadmm_context *c, struct sadmm_error *er
     cuda_view *v = &c->view;
     const size_t n = (size_t)v->bodies, pairs = (size_t)v->pair_room;
     CUDA_TRY(CUDA(room)(c, BUFFER_WEIGHTS,
-                        (n * (PACKED + TERMS) + 2 * pairs) * sizeof(double) + n * sizeof(cuda_island) +
+                        (n * (PACKED + TERMS + 2) + 3 * pairs) * sizeof(double) + n * sizeof(cuda_island) +
                             pairs * sizeof(solver_real),
                         error));
     v->A_inverse = (double *)c->buffers[BUFFER_WEIGHTS].data;
-    v->terms = v->A_inverse + n * PACKED;
-    v->weight = v->terms + n * TERMS;
+    v->free_energy = v->A_inverse + n * PACKED;
+    v->terms = v->free_energy + n;
+    v->arrivals = (unsigned long long *)(v->terms + n * TERMS);
+    v->weight = v->terms + n * (TERMS + 1);
     v->response = v->weight + pairs;
-    v->islands = (cuda_island *)(v->response + pairs);
+    v->load = v->response + pairs;
+    v->islands = (cuda_island *)(v->load + pairs);
     v->inv_s = (solver_real *)(v->islands + n);
+    CUDA_CALL(c, cudaMemsetAsync(v->arrivals, 0, n * sizeof *v->arrivals, c->stream), "cudaMemsetAsync(arrivals)");
     return SADMM_OK;
 }
 

@@ -3,12 +3,42 @@
 #include "cuda_body.h"
 #include "cuda_step_check.h"
 
-/* WEIGHTED: as the weights of the method `fast` have it, else with B = 1. */
-template <bool WEIGHTED>
-static __device__ void add_pair(const cuda_view &v, int32_t p, int side, arm_sums *sums, double C[PACKED])
+#include "../core/math/weight.h"
+
+/* ---- weights of the method `fast` -------------------------------------------------------------------------------- */
+
+/* The contacts of tall islands close small gaps slowly. */
+static __device__ void ease_gaps(const cuda_view &v, int32_t p, int32_t count, double tallness)
 {
-    const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
-    const double weight = WEIGHTED ? v.weight[p] : 1;
+    const double slop = v.settings.slop / v.settings.dt, share = weight_gap_share(tallness);
+    for (int32_t k = 0; k < count && share < 1; ++k) {
+        solver_real *error = &v.arm[point_slot(v, p, k)].w;
+        *error = (solver_real)weight_gap_error((double)*error, share, slop);
+    }
+}
+
+/* B of a pair. Both of its halves work it out; the one at its first dynamic body keeps it. */
+static __device__ __forceinline__ double weigh_pair(const cuda_view &v, int32_t p, int side,
+                                                    const struct sadmm_contact_pair *pair, const cuda_island *island,
+                                                    bool first)
+{
+    const double scale = island->scale,
+                 taken = scale > 0 ? v.weight[p]
+                                   : weight_of_pair(island->level, weight_mass(v.load[p], island->speed, island->mass),
+                                                    v.response[p]),
+                 B = scale > 0 ? taken * scale : taken;
+    if (side && pair->body_a >= 0) return B;
+    v.inv_s[p] = (solver_real)(pair->body_a >= 0 && pair->body_b >= 0 ? B / 2 : B);
+    if (!(scale > 0)) v.weight[p] = taken;
+    if (first && v.rigid) ease_gaps(v, p, pair->count, island->tallness); /* world level: gaps, a slop and a step */
+    return B;
+}
+
+/* ---- C ------------------------------------------------------------------------------------------------------------- */
+
+static __device__ void add_pair(const cuda_view &v, const struct sadmm_contact_pair *pair, int side, double weight,
+                                arm_sums *sums, double C[PACKED])
+{
     for (int32_t k = 0; k < pair->count; ++k) {
         const struct sadmm_contact_point *point = &v.raw_points[pair->first + k];
         const double *r = side ? point->arm_b : point->arm_a;
@@ -36,17 +66,24 @@ template <bool WEIGHTED> static __device__ void add_block(const cuda_view &v, in
     if (WEIGHTED) packed_add_row(C, along, 1);
 }
 
-/* C_i, in all lanes: each adds up every eighth half. Every lane of the warp comes here. */
+/* C_i, in all lanes: each adds up every eighth half. WEIGHTED: as the weights of the method `fast` have it, else with
+ * B = 1; `first`: of a solve. Every lane of the warp comes here. */
 template <bool WEIGHTED>
-static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, int32_t begin, int32_t end, int32_t lane,
+static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, const body_thread &t, bool first,
                                                       double C[PACKED])
 {
     arm_sums sums = {};
+    const cuda_island *island = WEIGHTED && t.live ? &v.islands[v.label[t.body]] : nullptr;
     for (int k = 0; k < PACKED; ++k) C[k] = 0;
-    for (int32_t at = begin + lane; at < end; at += LANES) {
-        int32_t record = v.incident[at] / 2, side = v.incident[at] & 1;
-        if (record < v.pair_room) add_pair<WEIGHTED>(v, record, side, &sums, C);
-        else add_block<WEIGHTED>(v, record - v.pair_room, side, C);
+    for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) {
+        const int32_t record = v.incident[at] / 2, side = v.incident[at] & 1;
+        if (record < v.pair_room) {
+            const struct sadmm_contact_pair *pair = &v.raw_pairs[record];
+            const double weight = WEIGHTED ? weigh_pair(v, record, side, pair, island, first) : 1;
+            add_pair(v, pair, side, weight, &sums, C);
+        } else {
+            add_block<WEIGHTED>(v, record - v.pair_room, side, C);
+        }
     }
     if (v.contact_rows == 1 || v.rows > 0) sum_lanes<PACKED>(C);
     sum_lanes<sizeof sums / sizeof(double)>(&sums.count);
@@ -137,7 +174,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const body_thread t = body_of_thread(v);
     double C[PACKED], beta = 1;
     if (PENALTY) {
-        penalty_matrix<WEIGHTED>(v, t.begin, t.end, t.lane, C);
+        penalty_matrix<WEIGHTED>(v, t, args.start, C);
         if (t.live) {
             if (!WEIGHTED) beta = penalty_of(v, v.lines + t.body * (size_t)v.line, C);
             if (t.lane == 0) v.beta[t.body] = beta;
@@ -179,10 +216,11 @@ extern "C" sadmm_status CUDA(init_penalty)(struct sadmm_context *c, struct sadmm
     cuda_args args = {};
     CUDA_ENTER(c);
     c->starting = true;
+    c->cleared = 0;
     c->placed = false;
     c->measured = false;
     c->rescaled = false;
-    if (c->fast) return CUDA(enqueue_weights)(c, true, false, false, error);
+    if (c->fast) return CUDA(enqueue_weights)(c, true, false, error);
     return launch_bodies(c, penalty_kernel<true, false, false>, "init_penalty", &args, error);
 }
 
@@ -207,9 +245,10 @@ sadmm_status CUDA(enqueue_penalties)(struct sadmm_context *c, struct sadmm_error
 {
     cuda_args args = {};
     args.planned = true;
-    c->starting = true;
+    c->starting = !c->fast;
+    c->cleared = SCALAR_PRIMAL | SCALAR_DUAL | SCALAR_BARRIER; /* cuda_step_check.h */
     c->placed = c->measured = c->rescaled = false;
-    if (c->fast) return CUDA(enqueue_weights)(c, true, true, true, error);
+    if (c->fast) return CUDA(enqueue_weighted_penalties)(c, true, true, true, error);
     return launch_bodies(c, penalty_kernel<true, true, false>, "penalties", &args, error);
 }
 
@@ -222,10 +261,11 @@ sadmm_status CUDA(enqueue_balance)(struct sadmm_context *c, struct sadmm_error *
     return SADMM_OK;
 }
 
-sadmm_status CUDA(enqueue_weighted_penalties)(struct sadmm_context *c, bool factor, bool planned,
+sadmm_status CUDA(enqueue_weighted_penalties)(struct sadmm_context *c, bool first, bool factor, bool planned,
                                               struct sadmm_error *error)
 {
     cuda_args args = {};
+    args.start = first;
     args.planned = planned;
     return launch_bodies(c, factor ? penalty_kernel<true, true, true> : penalty_kernel<true, false, true>, "penalties",
                          &args, error);

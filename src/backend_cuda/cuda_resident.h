@@ -18,6 +18,7 @@
 #ifndef SADMM_CUDA_RESIDENT_H
 #define SADMM_CUDA_RESIDENT_H
 
+#include "cuda_slow.h"
 #include "cuda_sweep.h"
 
 enum resident_mode { BLOCK, CLUSTER, GRID };
@@ -231,6 +232,7 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
     __device__ __forceinline__ void publish(int32_t i, real value, int32_t odd);
     __device__ __forceinline__ void move_bodies(int32_t odd, real relaxation);
     template <bool MEASURE> __device__ __forceinline__ double update_halves(int32_t odd, real over);
+    __device__ __forceinline__ void suspect(int32_t odd) const;
     __device__ __forceinline__ void store(int32_t odd);
 };
 
@@ -536,6 +538,26 @@ PART template <bool MEASURE> __device__ __forceinline__ double PART_RUN::update_
     return primal;
 }
 
+/* ---- the limit of energies, of the method `fast` ------------------------------------------------------------------ */
+
+/* Is there a body that has more energy than its free motion? */
+PART __device__ __forceinline__ void PART_RUN::suspect(int32_t odd) const
+{
+    const int32_t in_registers = (int32_t)blockDim.x / LANES;
+    for (int32_t first = 0; warp_has_body(first); first += in_registers) {
+        const int32_t i = first + body, at = i - in_registers;
+        const bool live = i < bodies;
+        double a[6];
+#pragma unroll
+        for (int k = 0; k < 6; ++k)
+            a[k] = first == 0          ? (double)own_body.A[k]
+                   : live && r < 6     ? (double)line_a(m.lines + at * LINE_GENERAL, v.rigid, r, k)
+                                       : 0;
+        suspect_body(v, live && r == 0, live ? (size_t)v.body_of[first_body + i] : 0,
+                     live && r < 6 ? (double)state(odd)[i * ROW + r] : 0, a);
+    }
+}
+
 /* ---- storing --------------------------------------------------------------------------------------------------- */
 
 /* Velocities, records (not FAST) and, from side a (b where a is static), multipliers. */
@@ -632,6 +654,7 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE))
     if (FAST) iterate_fast<MODE, FULL, SIZE>(part, v, args, &target);
     else iterate_paper<MODE, FULL, SIZE>(part, v, args, &target);
     part.store(args.count & 1);
+    if (FAST && args.limit) part.suspect(args.count & 1);
 }
 
 /* ---- instances ------------------------------------------------------------------------------------------------- */

@@ -79,7 +79,7 @@ static __global__ void integrate_kernel(const __grid_constant__ cuda_view v, con
     int32_t i = thread_index();
     if (i >= live_bodies(v)) return;
     double *out = v.out + MOVED * (size_t)i;
-    move_body(v, i, &v.raw.rigid[i], out, out + 3, out + 7);
+    move_body(v, i, &v.raw.rigid[i], (solver_real)1, out, out + 3, out + 7);
 }
 
 extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)

@@ -12,14 +12,14 @@ static __device__ vec3 point_impulse(const cuda_view &v, int32_t p, int32_t k, v
     return v3((double)lambda[0], (double)lambda[v.lambda_stride], (double)lambda[2 * v.lambda_stride]);
 }
 
-/* Q: semi-implicit Euler of body i. */
-static __device__ void move_body(const cuda_view &v, int32_t i, const struct sadmm_rigid *body, double position[3],
-                                 double orientation[4], double velocity[6])
+/* Q: semi-implicit Euler of body i, its velocities times `slow`. */
+static __device__ void move_body(const cuda_view &v, int32_t i, const struct sadmm_rigid *body, solver_real slow,
+                                 double position[3], double orientation[4], double velocity[6])
 {
     const solver_real *state = v.state + (size_t)i * ROW;
     const double dt = v.settings.dt;
-    vec3 linear = v3((double)state[0], (double)state[1], (double)state[2]);
-    vec3 angular = v3((double)state[3], (double)state[4], (double)state[5]);
+    vec3 linear = v3((double)(state[0] * slow), (double)(state[1] * slow), (double)(state[2] * slow));
+    vec3 angular = v3((double)(state[3] * slow), (double)(state[4] * slow), (double)(state[5] * slow));
     v3_store(rigid_move(v3_load(body->position), linear, dt), position);
     q_store(rigid_turn(q_load(body->orientation), angular, dt), orientation);
     v3_store(linear, velocity);

@@ -134,22 +134,26 @@ struct side_branch {
 };
 } // namespace
 
-/* schedule.c's iterations, with the ratio of (15) found on the device; then the limit. */
-static sadmm_status enqueue_iterations(struct sadmm_context *c, struct sadmm_error *error)
+/* schedule.c's iterations, with the ratio of (15) found on the device; then the limit. *measure: the residuals of the last
+ * iteration are wanted. */
+static sadmm_status enqueue_solve(struct sadmm_context *c, bool *measure, struct sadmm_error *error)
 {
     const int budget = sadmm_schedule_budget(&c->plan, &c->settings);
+    bool suspected = false;
+    *measure = false;
     for (int done = 0; done < budget;) {
         const struct sadmm_stretch next = sadmm_schedule_stretch(&c->plan, &c->settings, done);
-        CUDA_TRY(CUDA(iterate)(c, next.count, next.measure, error));
+        CUDA_TRY(CUDA(enqueue_iterations)(c, next.count, next.measure, next.last && c->plan.limit, &suspected, error));
         done += next.count;
-        if (next.measure) CUDA_TRY(CUDA(enqueue_residuals)(c, error));
+        *measure = next.measure && next.last;
+        if (next.measure && !next.last) CUDA_TRY(CUDA(enqueue_residuals)(c, error));
         if (next.update) {
             CUDA_TRY(CUDA(enqueue_balance)(c, error));
             CUDA_TRY(CUDA(factorize)(c, error));
         }
-        if (next.refresh) CUDA_TRY(CUDA(enqueue_weights)(c, false, true, false, error));
+        if (next.refresh) CUDA_TRY(CUDA(enqueue_weights)(c, false, true, error));
     }
-    return c->plan.limit ? CUDA(enqueue_limit)(c, error) : SADMM_OK;
+    return c->plan.limit ? CUDA(enqueue_limit)(c, suspected, error) : SADMM_OK;
 }
 
 static sadmm_status enqueue_step(struct sadmm_context *c, struct sadmm_error *error)
@@ -162,17 +166,34 @@ static sadmm_status enqueue_step(struct sadmm_context *c, struct sadmm_error *er
         CUDA_TRY(CUDA(enqueue_bodies)(c, error));
     }
     CUDA_TRY(enqueue_find(c, error));
-    { /* contacts in the solver's form: beside the layout */
+    { /* contacts in the solver's form, what weights take from pairs: beside the layout, and the islands' sums */
         side_branch side(c);
         CUDA_CALL(c, side.code, "a branch of the step");
         CUDA_TRY(CUDA(assemble_contacts)(c, error));
         CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
+        if (c->fast) {
+            CUDA_TRY(CUDA(enqueue_pairs)(c, true, error));
+            CUDA_CALL(c, cudaEventRecord(c->join_pairs, c->stream), "cudaEventRecord");
+        }
     }
     CUDA_TRY(CUDA(enqueue_survey_and_layout)(c, islands, &c->partition, error));
     CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
+    if (c->fast) {
+        CUDA_TRY(CUDA(enqueue_islands)(c, true, error));
+        CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join_pairs, 0), "cudaStreamWaitEvent");
+    }
     CUDA_TRY(CUDA(enqueue_penalties)(c, error));
-    CUDA_TRY(enqueue_iterations(c, error));
-    return CUDA(launch_finish)(c, error);
+    bool measure;
+    CUDA_TRY(enqueue_solve(c, &measure, error));
+    if (measure) { /* residuals: beside the end */
+        side_branch side(c);
+        CUDA_CALL(c, side.code, "a branch of the step");
+        CUDA_TRY(CUDA(enqueue_residuals)(c, error));
+        CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
+    }
+    CUDA_TRY(CUDA(launch_finish)(c, error));
+    if (measure) CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
+    return CUDA(launch_commit)(c, error);
 }
 
 /* ---- plan ------------------------------------------------------------------------------------------------------ */

@@ -17,13 +17,15 @@ static __device__ __forceinline__ unsigned long long nanoseconds(void)
 }
 
 /* The grid's first thread compares the facts with the plan; what runs now and what was assembled is of no use when they
- * differ. Assembly ends here. */
+ * differ. Assembly ends here, and scalars are 0 for the iterations (enum cuda_scalar). */
 static __device__ __forceinline__ void check_plan(const cuda_view &v)
 {
     if (blockIdx.x > 0 || threadIdx.x > 0) return;
     const struct cuda_facts *facts = v.facts;
     const struct cuda_step_guess guess = v.step.guess;
     v.step.control->stamps[STAMP_ASSEMBLED] = nanoseconds();
+    v.residual[0] = v.residual[1] = 0;
+    *v.barrier = 0;
     if (v.live->halt) return;
     const int32_t pairs = v.live->pairs, rows = pairs == 0 ? 0 : facts->rough > 0 ? 3 : 1;
     const int32_t warm = pairs > 0 && 2 * (int64_t)facts->warm >= pairs;

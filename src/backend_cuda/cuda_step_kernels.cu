@@ -4,6 +4,7 @@
 #include "cuda_double.h"
 
 #include "../core/steady.h"
+#include "cuda_slow.h"
 #include "cuda_solution.h"
 #include "cuda_step_check.h"
 
@@ -84,7 +85,8 @@ static __device__ bool finish_body(const cuda_view &v, int32_t i)
     const struct sadmm_rigid body = v.step.before[i];
     struct sadmm_steady steady = v.step.steady_before[i];
     struct sadmm_rigid next = body;
-    move_body(v, i, &body, next.position, next.orientation, next.velocity);
+    const solver_real slow = v.step.limits ? slow_down(v, i) : (solver_real)1;
+    move_body(v, i, &body, slow, next.position, next.orientation, next.velocity);
     steady_keep(&steady, &body, &next);
     v.step.after[i] = next;
     v.step.steady_after[i] = steady;
@@ -209,6 +211,11 @@ sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *er
 {
     cuda_args args = {};
     int64_t blocks = ((int64_t)ranges_of(c->view).end + STEP_THREADS - 1) / STEP_THREADS;
-    CUDA_TRY(CUDA(launch_of)(c, finish_kernel, "finish", blocks, STEP_THREADS, &args, error));
+    return CUDA(launch_of)(c, finish_kernel, "finish", blocks, STEP_THREADS, &args, error);
+}
+
+sadmm_status CUDA(launch_commit)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
     return CUDA(launch)(c, commit_kernel, "commit", 1, &args, error);
 }

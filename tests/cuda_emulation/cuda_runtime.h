@@ -217,6 +217,8 @@ inline unsigned __ballot_sync(unsigned mask, bool vote)
     return votes;
 }
 template <class T> static inline T __ldcs(const T *from) { return *from; }
+template <class T> static inline T __ldcg(const T *from) { return *from; }
+inline void __threadfence(void) {}
 inline int __popc(unsigned bits) { return __builtin_popcount(bits); }
 inline int __ffs(int bits) { return __builtin_ffs(bits); }
 
@@ -251,6 +253,12 @@ inline int atomicMin(int *to, int value)
 inline int atomicAdd(int *to, int value)
 {
     int before = *to;
+    *to += value;
+    return before;
+}
+inline unsigned long long atomicAdd(unsigned long long *to, unsigned long long value)
+{
+    unsigned long long before = *to;
     *to += value;
     return before;
 }

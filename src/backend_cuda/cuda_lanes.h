@@ -1,0 +1,33 @@
+/* Sums over the eight lanes of a body, in double. */
+#ifndef SADMM_CUDA_LANES_H
+#define SADMM_CUDA_LANES_H
+
+#include "cuda_internal.h"
+
+/* x[k] of the eight lanes added up, in all of them. Every lane of the warp comes here. */
+template <int COUNT> static __device__ __forceinline__ void sum_lanes(double x[COUNT])
+{
+#pragma unroll
+    for (int o = 1; o < LANES; o *= 2)
+#pragma unroll
+        for (int k = 0; k < COUNT; ++k) x[k] += __shfl_xor_sync((unsigned)ALL_LANES, x[k], o);
+}
+
+/* A component of x in each lane: that of M x, by the lane's row of M. Every lane of the warp comes here. */
+static __device__ __forceinline__ double product(double x, const double row[6])
+{
+    double sum = 0;
+#pragma unroll
+    for (int k = 0; k < 6; ++k) sum += row[k] * __shfl_sync((unsigned)ALL_LANES, x, k, LANES);
+    return sum;
+}
+
+/* x . y, a component a lane, in all of them. Every lane of the warp comes here. */
+static __device__ __forceinline__ double dot_lanes(double x, double y)
+{
+    double sum = x * y;
+    sum_lanes<1>(&sum);
+    return sum;
+}
+
+#endif

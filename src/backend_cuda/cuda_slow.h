@@ -1,0 +1,25 @@
+/* The method `fast`: islands that have more energy than they may (math/limit.h, cuda_limit.cu). */
+#ifndef SADMM_CUDA_SLOW_H
+#define SADMM_CUDA_SLOW_H
+
+#include "cuda_lanes.h"
+
+#include "../core/math/limit.h"
+
+/* Say so where a body has more energy than its free motion; `velocity` and `a`: the lane's component of v and row of A.
+ * `speaks`: one lane of each body. Every lane of the warp comes here. */
+static __device__ __forceinline__ void suspect_body(const cuda_view &v, bool speaks, size_t body, double velocity,
+                                                    const double a[6])
+{
+    const double free = speaks ? v.free_energy[body] : 0;
+    const double now = dot_lanes(velocity, product(velocity, a)) / 2;
+    if (speaks && limit_suspects(now, free)) *v.suspects = 1;
+}
+
+/* The factor of body i's velocities. */
+static __device__ __forceinline__ solver_real slow_down(const cuda_view &v, int32_t i)
+{
+    return *v.limited > 0 ? (solver_real)v.islands[v.label[i]].slow_down : (solver_real)1;
+}
+
+#endif
