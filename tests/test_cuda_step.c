@@ -441,6 +441,118 @@ START_TEST(fast_steps_in_the_queue)
 }
 END_TEST
 
+/* Two towers that do not touch each other, or one of them, `lift` above the ground, with a stop rule. */
+static sadmm_world *stopping_towers(int first, int count, double lift, int precision, double tolerance, int check_period)
+{
+    sadmm_world_def def = sadmm_world_def_default();
+    def.backend = SADMM_BACKEND_CPU;
+    def.precision = (sadmm_precision)precision;
+    def.settings.method = SADMM_METHOD_FAST;
+    def.settings.iterations = 60;
+    def.settings.certificate_tolerance = tolerance;
+    def.settings.certificate_momentum_tolerance = precision == SADMM_F32 ? 1e-5 : 1e-6; /* f32: rounding is 1e-6 */
+    def.settings.check_period = check_period;
+    sadmm_world *world = create_world(&def);
+    add_ground(world, 0.5);
+    for (int t = first; t < first + count; ++t)
+        for (int i = 0; i < 3; ++i) /* equal, or the heavier the higher: they land together, and solve apart */
+            add_box(world, 2.0 * t, 0.01 * i, 0.1 + lift + 0.201 * i, 0.1, t == 0 ? 1 : 1 + 20 * i, 0.5);
+    use_device(world, precision, 0);
+    return world;
+}
+
+/* The stop rule of whole steps: in tier BLOCK an island stops when it would stop if it were alone, and then as the host's
+ * look at the certificate has it. */
+START_TEST(islands_stop_by_themselves)
+{
+    const int precision = _i, steps = EMULATED ? 24 : 60;
+    const double tolerance = precision == SADMM_F32 ? 1e-5 : 1e-7;
+    sadmm_world *both = stopping_towers(0, 2, 0.02, precision, tolerance, 3), *alone[2];
+    for (int t = 0; t < 2; ++t) {
+        alone[t] = stopping_towers(t, 1, 0.02, precision, tolerance, 3);
+        sadmm_settings settings = sadmm_world_settings(alone[t]);
+        settings.residual_tolerance = 1e30; /* always met: sends the world through the host */
+        MUST(alone[t], sadmm_world_set_settings(alone[t], &settings));
+    }
+    force_tier(tables[precision], both->context, SADMM_CUDA_TIER_BLOCK);
+    int apart = 0, above = 0;
+    for (int step = 0; step < steps; ++step) {
+        MUST(both, sadmm_world_step(both));
+        sadmm_step_report got = world_report(both), want[2];
+        int64_t left = 0;
+        for (int t = 0; t < 2; ++t) {
+            MUST(alone[t], sadmm_world_step(alone[t]));
+            want[t] = world_report(alone[t]);
+            if (want[t].contacts == 0 && got.contacts > 0) want[t].iterations = 3; /* in the air: until the first look */
+            left += !want[t].converged && want[t].contacts > 0;
+            for (int i = 0; i < 3; ++i) {
+                sadmm_body_state a = body_state(both, body_at(both, 1 + 3 * t + i)), b = body_state(alone[t], body_at(alone[t], 1 + i));
+                ck_assert_msg(memcmp(&a, &b, sizeof a) == 0, "step %d, tower %d, box %d", step, t, i);
+            }
+        }
+        if (step == 0) continue; /* the first step is the host's, which looks at all islands together */
+        ck_assert_int_eq(got.converged, left == 0);
+        ck_assert_int_eq(got.certificate.islands_above, left);
+        ck_assert_int_eq(got.iterations, want[0].iterations > want[1].iterations ? want[0].iterations : want[1].iterations);
+        ck_assert_double_eq_tol(got.iterations_mean, (want[0].iterations + want[1].iterations) / 2.0, 1e-12);
+        apart += want[0].iterations != want[1].iterations;
+        above += left > 0;
+    }
+    ck_assert_int_gt(apart, 0);
+    ck_assert_int_lt(above, steps); /* and some steps did meet it */
+    for (int t = 0; t < 2; ++t) sadmm_world_destroy(alone[t]);
+    sadmm_world_destroy(both);
+}
+END_TEST
+
+/* One island: every tier stops after as many iterations, with the same bits; what stopped meets the tolerance; and a rule that
+ * is looked at only at the end changes nothing. */
+START_TEST(tiers_stop_alike)
+{
+    const int precision = _i, steps = EMULATED ? 8 : 60;
+    const double tolerance = precision == SADMM_F32 ? 1e-5 : 1e-7;
+    sadmm_world *first = stopping_towers(1, 1, 0.001, precision, tolerance, 4), *budget = stopping_towers(1, 1, 0.001, precision, 0, 4),
+                *late = stopping_towers(1, 1, 0.001, precision, 1e-300, 60);
+    sadmm_settings settings = sadmm_world_settings(first);
+    settings.certify = true;
+    MUST(first, sadmm_world_set_settings(first, &settings));
+    int met = 0;
+    for (int step = 0; step < steps; ++step) {
+        MUST(first, sadmm_world_step(first));
+        const sadmm_step_report report = world_report(first);
+        if (!report.converged) continue;
+        ++met;
+        ck_assert_double_le(report.certificate.ncp_max, tolerance * 1.001); /* the device's sums have another order */
+        ck_assert_int_eq(report.certificate.islands_above, 0);
+    }
+    ck_assert_int_gt(met, 0);
+    for (int tier = SADMM_CUDA_TIER_BLOCK; tier <= SADMM_CUDA_TIER_STREAM; ++tier) {
+        sadmm_world *world = stopping_towers(1, 1, 0.001, precision, tolerance, 4);
+        char what[40];
+        snprintf(what, sizeof what, "tier %d", tier);
+        force_tier(tables[precision], world->context, (enum sadmm_cuda_tier)tier);
+        for (int step = 0; step < steps; ++step) {
+            sadmm_status status = sadmm_world_step(world);
+            if (strstr(sadmm_world_message(world), "the device has no clusters")) break;
+            ck_assert_msg(status == SADMM_OK, "tier %d, step %d: %s", tier, step, sadmm_world_message(world));
+        }
+        if (world_report(world).step == steps) {
+            expect_same_world(first, world, what);
+            ck_assert_int_eq(world_report(world).iterations, world_report(first).iterations);
+        }
+        sadmm_world_destroy(world);
+    }
+    step_world(budget, steps);
+    step_world(late, steps);
+    expect_same_world(budget, late, "a look at the end");
+    ck_assert_int_eq(world_report(late).converged, false);
+    ck_assert_int_eq(world_report(late).certificate.islands_above, 1);
+    sadmm_world_destroy(first);
+    sadmm_world_destroy(budget);
+    sadmm_world_destroy(late);
+}
+END_TEST
+
 /* Worlds of two precisions on one device, and one on another device, step by step in turn: each as if it were alone. */
 START_TEST(worlds_side_by_side)
 {
@@ -532,6 +644,8 @@ int main(void)
     ADD_CASE(suite, a_step_that_fails_leaves_the_world_before_it, 0, parts);
     ADD_CASE(suite, tiers_agree, 0, 2 * parts);
     ADD_CASE(suite, fast_steps_in_the_queue, 0, parts);
+    ADD_CASE(suite, islands_stop_by_themselves, 0, parts);
+    ADD_CASE(suite, tiers_stop_alike, 0, parts);
     ADD_CASE(suite, worlds_side_by_side, 0, 1);
     ADD_CASE(suite, lack_of_memory, 0, parts);
 #ifdef CUDA_EMULATED

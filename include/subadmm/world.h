@@ -157,8 +157,11 @@ typedef struct sadmm_step_report {
     int32_t joints;                /* constraint blocks (none yet at the world level) */
     int32_t contacts;              /* contact points of the step */
     int32_t pairs;                 /* shape pairs with at least one contact */
-    int iterations;                /* done */
-    bool converged;                /* a stop rule was met */
+    int iterations;                /* done; with a stop rule on CUDA (below): by the island that did most */
+    double iterations_mean;        /* over islands. The same, but where whole steps are made on CUDA (method FAST, world
+                                      level, settings.certificate_tolerance): there every island is looked at by itself
+                                      and, where islands are small, stops by itself */
+    bool converged;                /* a stop rule was met, by every island */
     int32_t limited;               /* method FAST: islands that ended the iterations with more kinetic energy than
                                       contacts can leave them with and were slowed down to that; not 0: too few iterations */
     int64_t repeated;              /* steps since creation that a backend which runs ahead (CUDA) began with too little
@@ -167,8 +170,10 @@ typedef struct sadmm_step_report {
     double penetration_max;        /* deepest overlap at the start of the step, m, >= 0 */
     sadmm_phase_times ms;          /* the certificate's own time is in `certify_ms`, not in here */
     double certify_ms;
-    sadmm_residual residual;       /* valid if measured (settings or penalty update or tolerance); else -1 */
-    sadmm_certificate certificate; /* valid if settings.certify or a certificate tolerance; else ncp_max = -1 */
+    sadmm_residual residual;       /* valid if measured (settings or penalty update or tolerance); else -1. Not measured
+                                      where islands stop by themselves */
+    sadmm_certificate certificate; /* valid if settings.certify or a certificate tolerance; else ncp_max = -1. Steps made
+                                      on CUDA with a tolerance and without settings.certify: islands_above alone */
 } sadmm_step_report;
 
 /* The report of the last step (zeroed before the first). */

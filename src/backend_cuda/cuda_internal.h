@@ -98,7 +98,16 @@ struct cuda_island {
     double level, scale; /* math/weight.h; scale not 0: weights are those taken last, times this */
     double tallness;     /* math/weight.h: in steps that start warm, else 1 */
     double slow_down;    /* math/limit.h: the factor of its velocities */
-    int64_t blocks;      /* there are constraints by rows: the level stays 1 */
+    int32_t blocks;      /* there are constraints by rows: the level stays 1 */
+    int32_t stopped;     /* iterations after which a look found the tolerances met; 0: not yet */
+};
+
+/* fast: of a step's stop rule (cuda_look.h). */
+enum { LOOKS_KEPT = 3 };     /* the last look's, this one's, the next one's */
+struct cuda_stop {
+    unsigned long long sum;    /* of the iterations of islands that have stopped */
+    int32_t unmet[LOOKS_KEPT]; /* islands that have not, by the number of the look */
+    int32_t last;              /* the most iterations of those that have */
 };
 
 enum { TERMS = 6 }; /* of a body, in sums over islands */
@@ -173,6 +182,7 @@ struct cuda_view {
     solver_real *inv_s;      /* pairs: B / number of dynamic bodies */
     int32_t *limited;        /* islands slowed down */
     int32_t *suspects;       /* not 0: some island may have to be */
+    cuda_stop *stop;
 };
 
 /* Where the data of point k of pair p is. */
@@ -203,6 +213,7 @@ struct cuda_args {
     int32_t in_order;   /* slots are raw indices */
     int32_t settled;    /* fast: Step 1 ran before in this solve */
     int32_t warm;       /* fast: the step starts warm */
+    int32_t looks;      /* fast: of the stop rule, in this step so far */
     int32_t limit;      /* fast: islands with too much energy are to be suspected */
     const struct sadmm_resident_edit *edits;
     double factor;
@@ -255,6 +266,7 @@ struct sadmm_context {
     bool fast;     /* the method */
     bool settled;  /* fast: Step 1 ran in this solve */
     int refreshes; /* fast: of the weights, in this solve */
+    int looks;     /* fast: at the stop rule, in this step */
     unsigned cleared; /* enum cuda_scalar: those that a kernel of this step has set to 0 for their first use */
     bool recording; /* a graph of the whole step: nothing is allocated, no graph launched in it */
 
@@ -321,7 +333,7 @@ struct device_scope {
     device_scope scope((c)->device);    \
     CUDA_CALL((c), scope.code, "cudaSetDevice")
 
-/* ---- cuda_layout.cu, cuda_assemble.cu, cuda_penalty.cu, cuda_weights.cu, cuda_limit.cu, cuda_iterate.cu: parts of the entries,
+/* ---- cuda_layout.cu, cuda_assemble.cu, cuda_penalty.cu, cuda_weights.cu, cuda_limit.cu, cuda_look.cu, cuda_iterate.cu: parts of the entries,
  * launches only ---- */
 
 /* This precision's data for the view's counts and the partition (allocates). */
@@ -343,6 +355,8 @@ sadmm_status CUDA(enqueue_momentum_residual)(struct sadmm_context *, struct sadm
 /* fast: by what islands are to be slowed down (cuda_slow.h), and how many, in *view.limited. `suspected`: the iterations
  * have looked whether any is. */
 sadmm_status CUDA(enqueue_limit)(struct sadmm_context *, bool suspected, struct sadmm_error *error);
+/* fast: a look at the stop rule after `done` iterations of a step. */
+sadmm_status CUDA(enqueue_look)(struct sadmm_context *, int done, struct sadmm_error *error);
 /* Iterations, as the entry; suspect: for the limit, whether an island may have too much energy, where the tier can tell.
  * *suspected: it could. */
 sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *, int count, bool measure, bool suspect, bool *suspected,

@@ -1,16 +1,24 @@
-/* Sums over islands, in the kernel that makes their terms: slots are by island, and a body's place in its island is what the
- * order of a sum depends on. Of SPREAD neighbours that are SPREAD^k apart the one that comes last adds up all of them, in
+/* Sums and maxima over islands, in the kernel that makes their terms: slots are by island, and a body's place in its island is what
+ * the order of a sum depends on. Of SPREAD neighbours that are SPREAD^k apart the one that comes last adds up all of them, in
  * order, and goes on to the next power; so every sum has one order, whatever surrounds the island and whoever comes last. */
 #ifndef SADMM_CUDA_ISLANDS_H
 #define SADMM_CUDA_ISLANDS_H
 
 #include "cuda_body.h"
 
-enum { SPREAD = 16, ARRIVAL_BITS = 5 };
-static_assert(SPREAD < 1 << ARRIVAL_BITS && 32 / 4 * ARRIVAL_BITS <= 64, "a number holds the arrivals of every power");
+enum { SPREAD = 64, AT_ONCE = 16, ARRIVAL_BITS = 7 };
+static_assert(SPREAD < 1 << ARRIVAL_BITS && (32 + 5) / 6 * ARRIVAL_BITS <= 64, "a number holds the arrivals of every power");
 
-/* Terms of a body, term k in lane k, added up over its island. True in the lanes of one body of each island; those have all
+struct add_terms {
+    static __device__ __forceinline__ double join(double a, double b) { return a + b; }
+};
+struct largest_term { /* a NaN stays */
+    static __device__ __forceinline__ double join(double a, double b) { return !(b <= a) ? b : a; }
+};
+
+/* Terms of a body, term k in lane k, added up (or what Join says) over its island. True in the lanes of one body of each island; those have all
  * of the sums in `sum`, and what any body of the island has written before it came here. Every lane of the warp comes here. */
+template <class Join>
 static __device__ __forceinline__ bool add_up_island(const cuda_view &v, const body_thread &t, double term,
                                                      double sum[TERMS])
 {
@@ -41,14 +49,15 @@ static __device__ __forceinline__ bool add_up_island(const cuda_view &v, const b
         rank = begin;
         double *to = v.terms + (size_t)(first + begin) * TERMS;
         if (t.lane >= TERMS) continue;
-        double all[SPREAD];
+        for (int32_t j = 0; j < members; j += AT_ONCE) {
+            double some[AT_ONCE];
 #pragma unroll
-        for (int32_t j = 0; j < SPREAD; ++j)
-            all[j] = j < members ? __ldcg(to + (size_t)j * (size_t)apart * TERMS + t.lane) : 0;
-        term = all[0];
+            for (int32_t k = 0; k < AT_ONCE; ++k)
+                some[k] = j + k < members ? __ldcg(to + (size_t)(j + k) * (size_t)apart * TERMS + t.lane) : 0;
 #pragma unroll
-        for (int32_t j = 1; j < SPREAD; ++j)
-            if (j < members) term += all[j];
+            for (int32_t k = 0; k < AT_ONCE; ++k)
+                if (j + k < members) term = j + k == 0 ? some[k] : Join::join(term, some[k]);
+        }
         to[t.lane] = term;
     }
 #pragma unroll

@@ -1,6 +1,7 @@
 /* The iteration, stepwise (kernels I-O) and as a graph of plain steps, and the residuals (16), (17). */
 #include <string.h>
 
+#include "cuda_look.h"
 #include "cuda_sweep.h"
 
 /* Iterations in the graph: enough to hide the launch of one graph behind the run of the one before. */
@@ -50,7 +51,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     enum { LINE = RIGID ? LINE_RIGID : LINE_GENERAL };
     const unsigned block = args.backward ? gridDim.x - 1 - blockIdx.x : blockIdx.x;
     const int32_t i = (int32_t)(block * (unsigned)BODY_THREADS + threadIdx.x);
-    if (i >= live_bodies(v)) return;
+    if (i >= live_bodies(v) || (FAST && all_stopped(v, args.looks))) return;
     const size_t at = args.in_order ? (size_t)i : (size_t)v.body_of[i];
     const real ratio = JOIN && args.rescaled ? (real)*v.ratio : (real)1;
     real line[LINE], b[ROW], state[ROW], g[6];
@@ -270,6 +271,7 @@ static __global__ void __launch_bounds__(THREADS)
 {
     const int32_t t = thread_index(args), k = t - pair_threads<LANES_A_PAIR>(v);
     double primal = 0;
+    if (FAST && all_stopped(v, args.looks)) return;
     if (k < 0)
         with_pair<LANES_A_PAIR>(v, t, [&](int32_t p, int32_t lane, bool live) {
             primal = sweep_pair<CONTACT_ROWS, LANES_A_PAIR, COUNT, MEASURE, FAST>(v, p, lane, live, (real)args.factor);
@@ -330,6 +332,7 @@ static sadmm_status launch_bodies(struct sadmm_context *c, bool join, double rel
     cuda_args args = {};
     args.rescaled = c->rescaled;
     args.backward = c->backward;
+    args.looks = c->looks;
     args.in_order = !slots_by_island(&c->partition);
     args.factor = relaxation;
     cuda_kernel kernel =
@@ -359,6 +362,7 @@ static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, do
     const bool one_row = c->view.contact_rows == 1, fast = c->fast;
     cuda_args args = {};
     args.factor = over;
+    args.looks = c->looks;
     args.backward = c->backward;
     c->backward = !c->backward;
     cuda_kernel kernel = c->view.lanes == 1
@@ -508,6 +512,7 @@ static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool
     args.start = c->starting;
     args.settled = c->settled;
     args.limit = suspect;
+    args.looks = c->looks;
     args.most_bodies = partition->most_bodies;
     args.cluster = partition->cluster;
     cuda_kernel kernel = CUDA(resident_kernel)(c->view.contact_rows, c->facts.point_slots, partition->tier,

@@ -30,4 +30,15 @@ static __device__ __forceinline__ double dot_lanes(double x, double y)
     return sum;
 }
 
+/* The largest x of the eight lanes, in all of them; a NaN stays. Every lane of the warp comes here. */
+static __device__ __forceinline__ double largest_of_lanes(double x)
+{
+#pragma unroll
+    for (int o = 1; o < LANES; o *= 2) {
+        const double other = __shfl_xor_sync((unsigned)ALL_LANES, x, o);
+        x = !(other <= x) ? other : x;
+    }
+    return x;
+}
+
 #endif

@@ -219,6 +219,8 @@ static sadmm_status weights_room(struct sadmm_context *c, struct sadmm_error *er
     return SADMM_OK;
 }
 
+enum { SCALAR_BYTES = 128 };
+
 /* This precision's data, once the facts are known. */
 sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *error)
 {
@@ -250,7 +252,7 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
         {BUFFER_RECORDS, records},
         {BUFFER_CHANGE, joins ? records : 0},
         {BUFFER_EXCHANGE, c->partition.tier == SADMM_CUDA_TIER_GRID ? 2 * n * ROW * real_size : 0},
-        {BUFFER_SCALARS, 64},
+        {BUFFER_SCALARS, SCALAR_BYTES},
         {BUFFER_OUT, out},
         {PINNED_OUT, out},
     };
@@ -285,8 +287,9 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
     v->limited = (int32_t *)(v->residual + 3);
     v->suspects = v->limited + 1;
     v->barrier = (unsigned *)(v->residual + 4); /* a sector of its own */
+    v->stop = (cuda_stop *)(v->residual + 8);
     v->out = (double *)b[BUFFER_OUT].data;
-    CUDA_CALL(c, cudaMemsetAsync(v->residual, 0, 64, c->stream), "cudaMemsetAsync(scalars)");
+    CUDA_CALL(c, cudaMemsetAsync(v->residual, 0, SCALAR_BYTES, c->stream), "cudaMemsetAsync(scalars)");
     CUDA_CALL(c, cudaMemsetAsync(v->state + n * ROW, 0, ROW * real_size, c->stream), "cudaMemsetAsync(static world)");
     return c->fast ? weights_room(c, error) : SADMM_OK;
 }

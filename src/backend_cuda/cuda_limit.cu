@@ -65,7 +65,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     term[1] = t.live ? v.free_energy[t.body] : 0;
     term[2] = dot_lanes(r, product(r, row.a_inverse)) / 2;
     term[3] = sums[WORK];
-    if (!add_up_island(v, t, own_number(term, t.lane), total) || t.lane != 0) return;
+    if (!add_up_island<add_terms>(v, t, own_number(term, t.lane), total) || t.lane != 0) return;
     const struct limit_energies energies = {total[0], total[1], total[2], total[3]};
     const double factor = limit_factor(&energies);
     v.islands[v.label[t.body]].slow_down = factor;

@@ -18,6 +18,7 @@
 #ifndef SADMM_CUDA_RESIDENT_H
 #define SADMM_CUDA_RESIDENT_H
 
+#include "cuda_look.h"
 #include "cuda_slow.h"
 #include "cuda_sweep.h"
 
@@ -586,12 +587,16 @@ PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
 
 /* ---- the kernel ------------------------------------------------------------------------------------------------ */
 
-/* A block without bodies, or a cluster: there are more than islands, mostly. In the grid everybody comes to the barrier. */
-template <int MODE> static __device__ __forceinline__ bool nothing_to_do(const cuda_view &v, int32_t cluster)
+/* A block without bodies, or a cluster: there are more than islands, mostly. In the grid everybody comes to the barrier. Or the
+ * stop rule is met. */
+template <int MODE, bool FAST>
+static __device__ __forceinline__ bool nothing_to_do(const cuda_view &v, const cuda_args &args)
 {
+    if (FAST && MODE != BLOCK && all_stopped(v, args.looks)) return true;
     if (MODE == GRID) return false;
-    const int32_t first = MODE == BLOCK ? (int32_t)blockIdx.x : (int32_t)blockIdx.x / cluster * cluster;
-    return v.parts[first] == v.parts[first + (MODE == BLOCK ? 1 : cluster)];
+    const int32_t cluster = MODE == BLOCK ? 1 : args.cluster, part = (int32_t)blockIdx.x / cluster * cluster,
+                  first = v.parts[part], end = v.parts[part + cluster];
+    return first == end || (FAST && MODE == BLOCK && part_stopped(v, args.looks, first, end));
 }
 
 /* The method `fast` (math/relax.h): Steps 2-4, then Step 1. An iteration has the barriers of the other method's. */
@@ -647,7 +652,7 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE))
     resident_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     CUDA_DYNAMIC_SHARED(memory);
-    if (v.live->halt || nothing_to_do<MODE>(v, args.cluster)) return;
+    if (v.live->halt || nothing_to_do<MODE, FAST>(v, args)) return;
     part_run<CONTACT_ROWS, POINTS, MODE, FULL, SIZE, FAST> part(v, args, memory);
     part.load();
     unsigned target = 0;

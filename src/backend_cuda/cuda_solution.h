@@ -5,7 +5,7 @@
 #include "cuda_double.h"
 
 /* Multiplier of a point as a world vector on b. */
-static __device__ vec3 point_impulse(const cuda_view &v, int32_t p, int32_t k, vec3 normal)
+static __device__ __forceinline__ vec3 point_impulse(const cuda_view &v, int32_t p, int32_t k, vec3 normal)
 {
     const solver_real *lambda = v.lambda + point_slot(v, p, k);
     if (v.contact_rows == 1) return v3_scale(normal, (double)lambda[0]);
@@ -13,7 +13,7 @@ static __device__ vec3 point_impulse(const cuda_view &v, int32_t p, int32_t k, v
 }
 
 /* Q: semi-implicit Euler of body i, its velocities times `slow`. */
-static __device__ void move_body(const cuda_view &v, int32_t i, const struct sadmm_rigid *body, solver_real slow,
+static __device__ __forceinline__ void move_body(const cuda_view &v, int32_t i, const struct sadmm_rigid *body, solver_real slow,
                                  double position[3], double orientation[4], double velocity[6])
 {
     const solver_real *state = v.state + (size_t)i * ROW;
@@ -26,7 +26,7 @@ static __device__ void move_body(const cuda_view &v, int32_t i, const struct sad
     v3_store(angular, velocity + 3);
 }
 
-static __device__ void add_pair_wrench(const cuda_view &v, int32_t p, int side, double per_dt, double wrench[6])
+static __device__ __forceinline__ void add_pair_wrench(const cuda_view &v, int32_t p, int side, double per_dt, double wrench[6])
 {
     const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
     vec3 normal = v3_load(pair->normal);

@@ -54,6 +54,9 @@ static int64_t generous(int64_t count) { return count + std::min(count / 2, coun
 
 /* ---- the view of a step ---------------------------------------------------------------------------------------- */
 
+/* Is there a stop rule to look at? Then residuals say nothing: islands end at different times. */
+static bool stops(const struct sadmm_context *c) { return c->fast && c->settings.certificate_tolerance > 0; }
+
 /* Everything of the view that depends on which state and set is written. */
 static void view_into(struct sadmm_context *c, int into)
 {
@@ -79,7 +82,7 @@ static void view_into(struct sadmm_context *c, int into)
     step->guess = s->guess;
     step->control = buffer<struct cuda_step_control>(c, BUFFER_WORLD_CONTROL);
     step->reports = reports(c);
-    step->measured = c->plan.residuals;
+    step->measured = c->plan.residuals && !stops(c);
     step->limits = c->plan.limit;
     c->view.raw.rigid = step->before;
     c->view.raw.velocity = step->start_velocity;
@@ -143,8 +146,10 @@ static sadmm_status enqueue_solve(struct sadmm_context *c, bool *measure, struct
     *measure = false;
     for (int done = 0; done < budget;) {
         const struct sadmm_stretch next = sadmm_schedule_stretch(&c->plan, &c->settings, done);
-        CUDA_TRY(CUDA(enqueue_iterations)(c, next.count, next.measure, next.last && c->plan.limit, &suspected, error));
+        CUDA_TRY(CUDA(enqueue_iterations)(c, next.count, next.measure, c->plan.limit && (next.last || next.look),
+                                          &suspected, error));
         done += next.count;
+        if (next.look) CUDA_TRY(CUDA(enqueue_look)(c, done, error));
         *measure = next.measure && next.last;
         if (next.measure && !next.last) CUDA_TRY(CUDA(enqueue_residuals)(c, error));
         if (next.update) {
@@ -623,6 +628,13 @@ extern "C" sadmm_status CUDA(wait_world)(struct sadmm_context *c, struct sadmm_r
     out->plan.pairs = last->counts.pairs;
     out->plan.points = last->counts.points;
     out->iterations = last->counts.points > 0 ? s->settings.iterations : 1;
+    out->iterations_mean = out->iterations;
+    out->islands_above = last->unmet;
+    out->converged = last->unmet == 0;
+    if (out->converged) out->iterations = last->most_iterations;
+    if (last->unmet >= 0 && last->facts.islands > 0)
+        out->iterations_mean = ((double)last->sum_of_iterations + (double)last->unmet * s->settings.iterations) /
+                               last->facts.islands;
     out->limited = last->limited;
     out->penetration_max = last->depth;
     out->residual.primal = last->primal;

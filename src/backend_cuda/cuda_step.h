@@ -9,8 +9,10 @@
  *     layout     slots, halves, parts
  *       beside it  contacts in the solver's form
  *     penalties  C, beta, factors (fast: weights, C, factors); and: is this what the step was planned for?
- *     iterate    (15), (16), (17), new weights where asked for               (the kernel table's own kernels)
+ *     iterate    (15), new weights where asked for                           (the kernel table's own kernels)
+ *       after some   fast: a look at the stop rule
  *     limit      fast: islands that have more energy than they may
+ *       beside what follows  (16), (17)
  *     finish     impulses into the contacts, moved bodies, wrenches
  *     commit     the report; the step counts only if nothing was halted
  *
@@ -41,6 +43,9 @@ struct cuda_step_report {
     struct cuda_facts facts;
     double depth, primal, dual;
     int32_t limited; /* islands */
+    int32_t unmet;   /* islands that the stop rule still waited for; -1: there is none */
+    int32_t most_iterations;   /* of islands that stopped */
+    int64_t sum_of_iterations; /* of all of them */
     unsigned long long stamps[STAMPS]; /* ns */
 };
 

@@ -164,7 +164,7 @@ static __global__ void __launch_bounds__(STEP_THREADS)
 static __device__ double double_of(unsigned long long bits) { return __longlong_as_double((long long)bits); }
 
 /* One thread. */
-static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     if (threadIdx.x > 0) return;
     struct cuda_step_control *control = v.step.control;
@@ -180,6 +180,9 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
     report->primal = v.step.measured ? double_of(v.residual[0]) : -1;
     report->dual = v.step.measured ? double_of(v.residual[1]) : -1;
     report->limited = v.step.limits ? *v.limited : 0;
+    report->unmet = args.looks > 0 ? v.stop->unmet[args.looks % LOOKS_KEPT] : -1;
+    report->most_iterations = args.looks > 0 ? v.stop->last : 0;
+    report->sum_of_iterations = args.looks > 0 ? (int64_t)v.stop->sum : 0;
     for (int k = 0; k < STAMPS; ++k) report->stamps[k] = control->stamps[k];
 }
 
@@ -217,5 +220,6 @@ sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *er
 sadmm_status CUDA(launch_commit)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
+    args.looks = c->looks;
     return CUDA(launch)(c, commit_kernel, "commit", 1, &args, error);
 }

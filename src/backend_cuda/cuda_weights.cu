@@ -97,7 +97,7 @@ static __device__ double violation_of(const cuda_view &v, int32_t p)
 /* What follows from the sums over an island. */
 template <bool LEVELS> static __device__ void weigh_island(cuda_island *island, const double sum[TERMS], const cuda_args &args)
 {
-    const cuda_island fresh = {0, 0, 1, 0, 1, 1, 0};
+    const cuda_island fresh = {0, 0, 1, 0, 1, 1, 0, 0};
     if (args.start) *island = fresh;
     island->speed = weight_speed(sum[0], sum[1]);
     if (args.warm) {
@@ -118,7 +118,11 @@ template <bool LEVELS>
 static __global__ void __launch_bounds__(BODY_THREADS)
     terms_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    if (args.start && blockIdx.x == 0 && threadIdx.x == 0) *v.limited = *v.suspects = 0;
+    if (args.start && blockIdx.x == 0 && threadIdx.x == 0) {
+        const cuda_stop none = {};
+        *v.limited = *v.suspects = 0;
+        *v.stop = none;
+    }
     const body_thread t = body_of_thread(v);
     enum { PAIRS = 6, PUSH, SUMS };
     double sums[SUMS] = {}, term[TERMS] = {}, total[TERMS];
@@ -141,7 +145,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         term[4] = dot_lanes(r, product(r, row.a_inverse));
         term[5] = sums[PAIRS];
     }
-    if (add_up_island(v, t, own_number(term, t.lane), total) && t.lane == 0)
+    if (add_up_island<add_terms>(v, t, own_number(term, t.lane), total) && t.lane == 0)
         weigh_island<LEVELS>(&v.islands[v.label[t.body]], total, args);
 }
 
@@ -221,7 +225,7 @@ sadmm_status CUDA(enqueue_islands)(struct sadmm_context *c, bool first, struct s
 {
     cuda_args args = {};
     if (first) {
-        c->refreshes = 0;
+        c->refreshes = c->looks = 0;
         c->starting = c->settled = false;
     } else {
         ++c->refreshes;

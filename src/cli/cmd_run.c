@@ -14,7 +14,7 @@
 
 enum {
     OPTION_BACKEND, OPTION_DEVICE, OPTION_PRECISION, OPTION_STEPS, OPTION_DT, OPTION_METHOD, OPTION_ITERATIONS,
-    OPTION_PENALTY_PERIOD, OPTION_THREADS, OPTION_NO_WARM_START, OPTION_CERTIFY, OPTION_EXPLAIN, OPTION_JSON, OPTION_TRACE, OPTION_DUMP,
+    OPTION_TOLERANCE, OPTION_CHECK_PERIOD, OPTION_PENALTY_PERIOD, OPTION_THREADS, OPTION_NO_WARM_START, OPTION_CERTIFY, OPTION_EXPLAIN, OPTION_JSON, OPTION_TRACE, OPTION_DUMP,
     OPTION_QUIET
 };
 
@@ -26,6 +26,8 @@ static const struct cli_option options[] = {
     [OPTION_DT] = {"dt", "S", "time step, s (default the scene's)"},
     [OPTION_METHOD] = {"method", "NAME", "paper or fast (default the scene's)"},
     [OPTION_ITERATIONS] = {"iterations", "N", "iterations a step (default the scene's)"},
+    [OPTION_TOLERANCE] = {"tolerance", "T", "end a step's iterations once its true error is below T, m/s (default never)"},
+    [OPTION_CHECK_PERIOD] = {"check-period", "N", "iterations between looks at that (default 10)"},
     [OPTION_PENALTY_PERIOD] = {"penalty-period", "N", "iterations between penalty updates, 0 = never"},
     [OPTION_THREADS] = {"threads", "N", "CPU threads, 0 = as many as pay (default)"},
     [OPTION_NO_WARM_START] = {"no-warm-start", NULL, "start every step from zero impulses"},
@@ -42,7 +44,8 @@ struct run_options {
     sadmm_precision precision;
     sadmm_method method;
     long steps, iterations, penalty_period, threads; /* -1: the scene's */
-    double dt;                                       /* 0: the scene's */
+    long check_period;                               /* 0: the scene's */
+    double dt, tolerance;                            /* 0: the scene's */
     long device;
     bool no_warm_start, certify, explain, quiet, precision_given, method_given;
     const char *json, *trace, *dump_path;
@@ -82,6 +85,8 @@ static int set_option(void *target, size_t index, const char *value)
         o->method_given = true;
         break;
     case OPTION_ITERATIONS: ok = cli_read_int("--iterations", value, 1, 1000000, &o->iterations); break;
+    case OPTION_TOLERANCE: ok = cli_read_real("--tolerance", value, 0, 1, &o->tolerance); break;
+    case OPTION_CHECK_PERIOD: ok = cli_read_int("--check-period", value, 1, 1000000, &o->check_period); break;
     case OPTION_PENALTY_PERIOD: ok = cli_read_int("--penalty-period", value, 0, 1000000, &o->penalty_period); break;
     case OPTION_THREADS: ok = cli_read_int("--threads", value, 0, 1024, &o->threads); break;
     case OPTION_NO_WARM_START: o->no_warm_start = true; break;
@@ -104,6 +109,10 @@ static void apply(const struct run_options *o, struct sadmm_scene *scene)
     if (o->dt > 0) s->dt = o->dt;
     if (o->method_given) s->method = o->method;
     if (o->iterations >= 0) s->iterations = (int)o->iterations;
+    if (o->tolerance > 0) s->certificate_tolerance = o->tolerance;
+    if (o->check_period > 0) s->check_period = (int)o->check_period;
+    /* rounding alone is more than the default in single precision */
+    if (o->tolerance > 0 && scene->def.precision == SADMM_F32) s->certificate_momentum_tolerance = 1e-5;
     if (o->penalty_period >= 0) s->penalty_period = (int)o->penalty_period;
     if (o->threads >= 0) s->threads = (int)o->threads;
     if (o->no_warm_start) s->warm_start = false;

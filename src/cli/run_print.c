@@ -49,6 +49,19 @@ static json_t *certificate_json(const struct run_record *record)
     return o;
 }
 
+/* Who stopped when. */
+static json_t *stop_json(const struct run_record *record, const sadmm_settings *settings)
+{
+    if (record->steps == 0 || !(settings->certificate_tolerance > 0)) return json_null();
+    json_t *o = json_object();
+    json_object_set_new(o, "tolerance", cli_json_real(settings->certificate_tolerance));
+    json_object_set_new(o, "steps_met", json_integer((json_int_t)record->met));
+    json_object_set_new(o, "iterations_mean", cli_json_real(record->iterations_sum / (double)record->steps));
+    json_object_set_new(o, "iterations_last", json_integer(record->last.iterations));
+    json_object_set_new(o, "islands_above_last", json_integer(record->last.certificate.islands_above));
+    return o;
+}
+
 static json_t *contacts_json(const struct run_record *record)
 {
     json_t *o = json_object();
@@ -91,6 +104,7 @@ json_t *run_record_json(const struct run_record *record, const char *spec, const
     if (record->steps > 0) json_object_set_new(o, "residual", residual_json(&last->residual));
     else json_object_set_new(o, "residual", json_null());
     json_object_set_new(o, "certificate", certificate_json(record));
+    json_object_set_new(o, "stop", stop_json(record, &scene->def.settings));
     set_or_null(o, "repeated", record, json_integer(record->last.repeated));
     set_or_null(o, "penetration_max", record, cli_json_real(record->penetration_max));
     json_object_set_new(o, "speed_max_final", cli_json_real(record->speed_max));
@@ -129,6 +143,9 @@ void run_record_print(const struct run_record *record, const char *spec, const s
     if (record->steps > 0 && c->ncp_max != -1)
         printf("certificate    ncp %.3g m/s (largest of the run %.3g), momentum %.3g (%.3g)\n", c->ncp_max,
                record->ncp_max, c->momentum_max, record->momentum_max);
+    if (record->steps > 0 && scene->def.settings.certificate_tolerance > 0)
+        printf("stop rule      met in %zu steps, %.1f iterations in the mean; last step: %d at most, %" PRId64 " islands above\n",
+               record->met, record->iterations_sum / (double)record->steps, last->iterations, c->islands_above);
     if (record->steps > 0 && last->repeated > 0)
         printf("repeated       %" PRId64 " steps, which outgrew the room or the plan they were begun with\n", last->repeated);
     if (record->steps > 0) printf("penetration    %.3g m at most\n", record->penetration_max);

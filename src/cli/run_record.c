@@ -56,6 +56,8 @@ bool run_record_step(struct run_record *record, const sadmm_world *world)
     }
     ++record->steps;
     record->contacts_sum += r->contacts;
+    record->iterations_sum += r->iterations_mean;
+    record->met += r->converged;
     if (r->contacts > record->contacts_max) record->contacts_max = r->contacts;
     record->penetration_max = fmax(record->penetration_max, r->penetration_max);
     if (r->certificate.ncp_max != -1) {

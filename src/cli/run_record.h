@@ -23,6 +23,8 @@ struct run_record {
     int32_t contacts_max;
     double penetration_max;  /* m, over the run */
     double ncp_max, momentum_max; /* over the run; -1: not certified */
+    double iterations_sum;   /* over the steps, of their means over islands */
+    size_t met;              /* steps that met the stop rule */
     sadmm_step_report last;  /* of the last step; zero when steps is 0 */
     double speed_max, displacement_max; /* m/s, m, of the final state */
     bool finite;

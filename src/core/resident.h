@@ -40,7 +40,10 @@ struct sadmm_resident_report {
     int64_t done;              /* steps since the world was loaded */
     int64_t repeats;           /* steps repeated since then because something did not fit */
     struct sadmm_plan plan;
-    int iterations;
+    int iterations;            /* of the island with the most */
+    double iterations_mean;    /* over islands */
+    bool converged;            /* every island met the stop rule */
+    int64_t islands_above;     /* that did not; -1: there was none */
     int32_t limited;           /* islands, method FAST */
     double penetration_max;    /* m */
     struct sadmm_residual residual; /* -1: not measured */

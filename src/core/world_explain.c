@@ -78,6 +78,9 @@ size_t sadmm_world_explain(const sadmm_world *world, char *out, size_t size)
     explain_options(&t, plan, &world->step_settings);
     line(&t, "iterations   %d of at most %d%s\n", world->report.iterations, world->step_settings.iterations,
          world->report.iterations == 1 && !plan->points ? ": without constraints Step 1 is exact" : "");
+    if (world->report.converged || world->report.iterations_mean != world->report.iterations)
+        line(&t, "stopped      by the stop rule%s, after %.1f iterations in the mean of islands\n",
+             world->report.converged ? "" : " in part", world->report.iterations_mean);
     if (world->report.certificate.islands_above > 0)
         line(&t, "islands left %lld above the tolerance\n", (long long)world->report.certificate.islands_above);
     if (world->report.repeated)

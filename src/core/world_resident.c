@@ -20,10 +20,12 @@
 
 bool sadmm_world_may_reside(const sadmm_world *world)
 {
-    /* A stop rule has to be looked at while a step runs; and the loads of a first step are predicted on the host. */
+    /* Of the stop rules a backend looks at the certificate's in the method FAST alone; and the loads of a first step are
+     * predicted on the host. */
     const sadmm_settings *s = &world->def.settings;
-    if (s->method == SADMM_METHOD_FAST && !world->stepped) return false;
-    return world->kernels->resident && s->residual_tolerance <= 0 && s->certificate_tolerance <= 0;
+    const bool fast = s->method == SADMM_METHOD_FAST;
+    if (fast && !world->stepped) return false;
+    return world->kernels->resident && s->residual_tolerance <= 0 && (fast || s->certificate_tolerance <= 0);
 }
 
 /* ---- edits ------------------------------------------------------------------------------------------------------- */
@@ -147,7 +149,8 @@ static void take_report(sadmm_world *world, const struct sadmm_resident_report *
     report->contacts = done->plan.points;
     report->pairs = done->plan.pairs;
     report->iterations = done->iterations;
-    report->converged = false;
+    report->iterations_mean = done->iterations_mean;
+    report->converged = done->converged;
     report->limited = done->limited;
     report->penetration_max = done->penetration_max;
     report->residual = done->residual;
@@ -158,6 +161,7 @@ static void take_report(sadmm_world *world, const struct sadmm_resident_report *
     report->ms.total = done->ms.total;
     report->certify_ms = 0;
     report->certificate = sadmm_certificate_none();
+    report->certificate.islands_above = done->islands_above;
 }
 
 sadmm_status sadmm_world_settle(const sadmm_world *constant)

@@ -219,6 +219,7 @@ static sadmm_status try_step(sadmm_world *world, sadmm_step_report *report, bool
     report->contacts = (int32_t)world->contacts.point_count;
     report->pairs = (int32_t)world->contacts.pair_count;
     report->iterations = solve.iterations;
+    report->iterations_mean = solve.iterations;
     report->converged = solve.converged;
     report->limited = solve.limited;
     report->residual = solve.residual;
