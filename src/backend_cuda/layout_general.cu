@@ -47,7 +47,7 @@ static __global__ void __launch_bounds__(LAYOUT_THREADS)
     if (v.live->halt) return;
     const int32_t pairs = v.live->pairs, records = v.pair_room + v.rows;
     find_facts(v, records, [&](int32_t record, cuda_facts *own) {
-        if (record < records) survey_record(v, record, pairs, args.islands, own);
+        if (record < records) survey_record<false>(v, record, pairs, args.islands, own);
     });
 }
 
@@ -55,7 +55,7 @@ static __global__ void __launch_bounds__(LAYOUT_THREADS)
     bodies_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args args)
 {
     if (v.live->halt) return;
-    find_facts(v, v.bodies, [&](int32_t i, cuda_facts *own) { survey_body(v, i, args.islands, own); });
+    find_facts(v, v.bodies, [&](int32_t i, cuda_facts *own) { survey_body<false>(v, i, args.islands, own); });
 }
 
 /* ---- layout ---------------------------------------------------------------------------------------------------- */

@@ -123,9 +123,9 @@ static __device__ void survey(const layout_view &v, const layout_view &global, b
     for (int32_t i = t; i < v.bodies; i += ONE_BLOCK_THREADS) clear_body(v, i);
     __syncthreads();
     for (int32_t k = t; k < pairs + v.rows; k += ONE_BLOCK_THREADS)
-        survey_record(v, k < pairs ? k : v.pair_room + k - pairs, pairs, islands, &own);
+        survey_record<true>(v, k < pairs ? k : v.pair_room + k - pairs, pairs, islands, &own);
     __syncthreads();
-    for (int32_t base = 0; base < v.bodies; base += ONE_BLOCK_THREADS) survey_body(v, base + t, islands, &own);
+    for (int32_t base = 0; base < v.bodies; base += ONE_BLOCK_THREADS) survey_body<true>(v, base + t, islands, &own);
     gather_facts(v.facts, own);
     /* for a layout that is made by a launch of its own */
     for (int32_t i = t; i < v.bodies; i += ONE_BLOCK_THREADS) {

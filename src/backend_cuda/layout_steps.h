@@ -58,20 +58,24 @@ LAYOUT_INLINE void gather_facts(struct cuda_facts *block, const cuda_facts &own)
 /* ---- islands --------------------------------------------------------------------------------------------------- */
 
 /* Parents only ever get smaller, on the way to the root, so an old one is as good as a new one. Several threads read and
- * write them at once: atomically. */
-LAYOUT_INLINE int32_t parent_of(const int32_t *parents, int32_t i) { return atomicAdd(const_cast<int32_t *>(&parents[i]), 0); }
-
-LAYOUT_INLINE int32_t root_of(const int32_t *parents, int32_t i)
+ * write them at once. SHARED: in a block's memory, atomically; else they are read past the caches of multiprocessors: atomics
+ * on the root of a large island would queue up. */
+template <bool SHARED> LAYOUT_INLINE int32_t parent_of(const int32_t *parents, int32_t i)
 {
-    for (int32_t up = parent_of(parents, i); up != i; up = parent_of(parents, i)) i = up;
+    return SHARED ? atomicAdd(const_cast<int32_t *>(&parents[i]), 0) : *(const volatile int32_t *)&parents[i];
+}
+
+template <bool SHARED> LAYOUT_INLINE int32_t root_of(const int32_t *parents, int32_t i)
+{
+    for (int32_t up = parent_of<SHARED>(parents, i); up != i; up = parent_of<SHARED>(parents, i)) i = up;
     return i;
 }
 
 /* The same, halving the way for those who come later. */
-LAYOUT_INLINE int32_t root_of_halving(int32_t *parents, int32_t i)
+template <bool SHARED> LAYOUT_INLINE int32_t root_of_halving(int32_t *parents, int32_t i)
 {
-    for (int32_t up = parent_of(parents, i); up != i;) {
-        int32_t next = parent_of(parents, up);
+    for (int32_t up = parent_of<SHARED>(parents, i); up != i;) {
+        int32_t next = parent_of<SHARED>(parents, up);
         if (next != up) atomicMin(&parents[i], next); /* i is no root: nobody hooks it now */
         i = up;
         up = next;
@@ -80,15 +84,15 @@ LAYOUT_INLINE int32_t root_of_halving(int32_t *parents, int32_t i)
 }
 
 /* Hook the larger root under the smaller one. */
-LAYOUT_INLINE void join_bodies(int32_t *parents, int32_t a, int32_t b)
+template <bool SHARED> LAYOUT_INLINE void join_bodies(int32_t *parents, int32_t a, int32_t b)
 {
-    a = root_of_halving(parents, a);
-    b = root_of_halving(parents, b);
+    a = root_of_halving<SHARED>(parents, a);
+    b = root_of_halving<SHARED>(parents, b);
     while (a != b) {
         int32_t high = larger(a, b), low = a + b - high, before = atomicCAS(&parents[high], high, low);
         if (before == high) return;
-        a = root_of_halving(parents, before); /* somebody else has hooked it meanwhile */
-        b = root_of_halving(parents, low);
+        a = root_of_halving<SHARED>(parents, before); /* somebody else has hooked it meanwhile */
+        b = root_of_halving<SHARED>(parents, low);
     }
 }
 
@@ -118,6 +122,7 @@ LAYOUT_INLINE void survey_pair(const layout_view &v, const sadmm_contact_pair &p
 }
 
 /* A pair (record < pairs), a row block (record >= pair_room) or none. */
+template <bool SHARED>
 LAYOUT_INLINE void survey_record(const layout_view &v, int32_t record, int32_t pairs, bool islands, cuda_facts *own)
 {
     int32_t body[2] = {-1, -1};
@@ -138,7 +143,7 @@ LAYOUT_INLINE void survey_record(const layout_view &v, int32_t record, int32_t p
         atomicAdd(&v.degree[body[side]], 1);
         ++own->halves;
     }
-    if (islands && body[0] >= 0 && body[1] >= 0) join_bodies(v.label, body[0], body[1]);
+    if (islands && body[0] >= 0 && body[1] >= 0) join_bodies<SHARED>(v.label, body[0], body[1]);
 }
 
 /* The running total is largest when it is complete: the facts do not depend on who comes last. */
@@ -149,13 +154,13 @@ LAYOUT_INLINE void add_to_island(const layout_view &v, int32_t label, int32_t bo
 }
 
 /* Label body i; `own` gets what is known of bodies and islands. Every lane of the warp comes here, i ascending. */
-LAYOUT_INLINE void survey_body(const layout_view &v, int32_t i, bool islands, cuda_facts *own)
+template <bool SHARED> LAYOUT_INLINE void survey_body(const layout_view &v, int32_t i, bool islands, cuda_facts *own)
 {
     const bool live = i < v.bodies;
     const int32_t degree = live ? v.degree[i] : 0;
     own->degree = larger(own->degree, degree);
     if (!islands) return;
-    const int32_t label = live ? root_of(v.label, i) : -1;
+    const int32_t label = live ? root_of<SHARED>(v.label, i) : -1;
     if (live) atomicMin(&v.label[i], label); /* its root: no larger than what is there */
     own->islands += live && label == i;
     /* Neighbours are mostly of one island: those of the first lane's go together. */
