@@ -126,19 +126,26 @@ static struct contact_problem *make_problem(const struct scene *scene)
 
 /* ---- one table at work --------------------------------------------------------------------------------------- */
 
-static void runner_start_method(struct runner *r, const struct sadmm_kernels *k, const struct scene *scene,
-                                const struct contact_problem *problem, int threads, sadmm_method method)
+static void runner_start_settings(struct runner *r, const struct sadmm_kernels *k, const sadmm_settings *settings,
+                                  const struct contact_problem *problem)
 {
     memset(r, 0, sizeof *r);
     r->k = k;
-    r->settings = scene_settings(scene);
-    r->settings.threads = threads;
-    r->settings.method = method;
+    r->settings = *settings;
     r->p = contact_problem_copy(problem);
     r->plan = sadmm_plan_make(&r->p->system, &r->settings);
     CALL(r, k->create(0, &r->c, &r->error));
     CALL(r, k->begin(r->c, &r->p->system, &r->plan, &r->settings, &r->error));
     runner_assemble(r);
+}
+
+static inline void runner_start_method(struct runner *r, const struct sadmm_kernels *k, const struct scene *scene,
+                                       const struct contact_problem *problem, int threads, sadmm_method method)
+{
+    sadmm_settings settings = scene_settings(scene);
+    settings.threads = threads;
+    settings.method = method;
+    runner_start_settings(r, k, &settings, problem);
 }
 
 static inline void runner_start(struct runner *r, const struct sadmm_kernels *k, const struct scene *scene,

@@ -163,7 +163,8 @@ typedef struct sadmm_step_report {
                                       and, where islands are small, stops by itself */
     bool converged;                /* a stop rule was met, by every island */
     int32_t limited;               /* method FAST: islands that ended the iterations with more kinetic energy than
-                                      contacts can leave them with and were slowed down to that; not 0: too few iterations */
+                                      contacts can leave them with, or with fewer than 20 iterations in a bounce that
+                                      they cannot make, and were slowed down; not 0: too few iterations */
     int64_t repeated;              /* steps since creation that a backend which runs ahead (CUDA) began with too little
                                       room or another plan than they needed, and did again with more: nothing is lost
                                       but time */

@@ -45,7 +45,7 @@
 #define CPU(name) SADMM_JOIN(sadmm_cpu_##name, SADMM_VARIANT)
 
 enum { STATE_INV_BETA = 6 }; /* slot of a state row */
-enum { BODY_SUMS = 4 };      /* weights: energy, kinetic, push, defect; limit: now, free, -, defect */
+enum { BODY_SUMS = 4 };      /* weights: energy, kinetic, push, defect; limit: now, free, along, defect */
 
 /* LANES contact pairs; points of all of them in `slots` slots from `first` on. Lanes without a pair point at the
  * static body; slots without a point have an error so large that lambda stays 0. */
@@ -100,6 +100,7 @@ struct cpu_island {
     double violation, defect;
     bool blocks;                /* there are constraints by rows: the level stays 1 */
     struct limit_energies limit;
+    double along; /* v . A v_f / 2 */
 };
 
 struct sadmm_context {

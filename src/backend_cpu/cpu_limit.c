@@ -1,4 +1,5 @@
 /* The method `fast`, after the last iteration: no island keeps more energy than it may have (math/limit.h). */
+#include "../core/dense6.h"
 #include "cpu_rows.h"
 
 /* x . M x of a rigid body's A or A^-1. */
@@ -8,13 +9,15 @@ static double rigid_form(const double M[PACKED6], const double x[6])
            M[20] * x[5] * x[5] + 2 * (M[13] * x[3] * x[4] + M[18] * x[3] * x[5] + M[19] * x[4] * x[5]);
 }
 
-static void energies(const struct sadmm_context *c, size_t i, double *now, double *free)
+/* A body's terms: now, free, along. */
+static void energies(const struct sadmm_context *c, size_t i, double terms[3])
 {
     double b[6], v[6];
     cpu_load_b(c, i, b);
     cpu_load_v(c, i, v);
-    *now = rigid_form(&c->A[i * PACKED6], v) / 2;
-    *free = rigid_form(&c->A_inverse[i * PACKED6], b) / 2;
+    terms[0] = rigid_form(&c->A[i * PACKED6], v) / 2;
+    terms[1] = rigid_form(&c->A_inverse[i * PACKED6], b) / 2;
+    terms[2] = dense6_dot(v, b) / 2;
 }
 
 /* Work of a pair's contacts that push apart. */
@@ -41,17 +44,25 @@ static double pair_work(const struct sadmm_context *c, size_t record)
 }
 
 /* Sums over islands in the order of bodies, whatever the threads. */
-static bool any_suspect(struct sadmm_context *c)
+static bool any_suspect(struct sadmm_context *c, bool few)
 {
     bool any = false;
-    for (int32_t i = 0; i < c->bodies; ++i) memset(&c->islands[i].limit, 0, sizeof c->islands[i].limit);
     for (int32_t i = 0; i < c->bodies; ++i) {
-        struct limit_energies *sum = &c->islands[c->label[i]].limit;
-        sum->now += c->body_sums[BODY_SUMS * i];
-        sum->free += c->body_sums[BODY_SUMS * i + 1];
+        memset(&c->islands[i].limit, 0, sizeof c->islands[i].limit);
+        c->islands[i].along = 0;
     }
-    for (int32_t i = 0; i < c->bodies; ++i)
-        any = any || (c->label[i] == i && limit_suspects(c->islands[i].limit.now, c->islands[i].limit.free));
+    for (int32_t i = 0; i < c->bodies; ++i) {
+        struct cpu_island *sum = &c->islands[c->label[i]];
+        sum->limit.now += c->body_sums[BODY_SUMS * i];
+        sum->limit.free += c->body_sums[BODY_SUMS * i + 1];
+        sum->along += c->body_sums[BODY_SUMS * i + 2];
+    }
+    for (int32_t i = 0; i < c->bodies; ++i) {
+        const struct cpu_island *island = &c->islands[i];
+        if (c->label[i] != i) continue;
+        any = any || limit_suspects(island->limit.now, island->limit.free) ||
+              (few && limit_bounces(island->limit.now, island->limit.free, island->along));
+    }
     return any;
 }
 
@@ -68,14 +79,15 @@ static void add_defects_and_work(struct sadmm_context *c)
 sadmm_status CPU(limit_velocity)(struct sadmm_context *c, int32_t *limited, struct sadmm_error *error)
 {
     (void)error;
+    bool few = limit_few(c->plan.warm, c->settings.iterations);
     *limited = 0;
     CPU_PARALLEL
     {
         size_t begin, end;
         cpu_share((size_t)c->bodies, cpu_thread(), cpu_threads(), &begin, &end);
-        for (size_t i = begin; i < end; ++i) energies(c, i, &c->body_sums[BODY_SUMS * i], &c->body_sums[BODY_SUMS * i + 1]);
+        for (size_t i = begin; i < end; ++i) energies(c, i, &c->body_sums[BODY_SUMS * i]);
     }
-    if (!any_suspect(c)) return SADMM_OK;
+    if (!any_suspect(c, few)) return SADMM_OK;
     CPU(sum_wrenches)(c);
     CPU_PARALLEL
     {
@@ -85,7 +97,9 @@ sadmm_status CPU(limit_velocity)(struct sadmm_context *c, int32_t *limited, stru
     }
     add_defects_and_work(c);
     for (int32_t i = 0; i < c->bodies; ++i) {
-        double factor = limit_factor(&c->islands[c->label[i]].limit);
+        const struct cpu_island *island = &c->islands[c->label[i]];
+        double factor = limit_factor(&island->limit);
+        if (few) factor = fmin(factor, limit_bounce_factor(&island->limit, island->along));
         if (factor == 1) continue;
         *limited += c->label[i] == i;
         for (int k = 0; k < 6; ++k) c->state[(size_t)i * ROW + (size_t)k] *= (real)factor;

@@ -123,7 +123,9 @@ static double island_speed(const struct sadmm_context *c, const struct ref_body 
 {
     double speed = weight_speed(island->island_energy, island->island_mass);
     if (!c->plan->warm) return speed;
-    return weight_speed_warm(speed, island_tallness(island), island->island_kinetic, island->island_mass);
+    double warm = weight_speed_warm(speed, island_tallness(island), island->island_kinetic, island->island_mass);
+    double few = weight_few(c->settings->iterations);
+    return weight_speed_few(speed, warm, few, island->island_kinetic, island->island_mass);
 }
 
 /* A v - b - sum J^T multiplier, by body, into `impulse`. */
@@ -390,7 +392,11 @@ sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *c, int32_t *limited,
 {
     (void)error;
     momentum_defect(c, false);
-    for (int32_t i = 0; i < c->system->body_count; ++i) memset(&c->bodies[i].limit, 0, sizeof c->bodies[i].limit);
+    bool few = limit_few(c->plan->warm, c->settings->iterations);
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        memset(&c->bodies[i].limit, 0, sizeof c->bodies[i].limit);
+        c->bodies[i].along = 0;
+    }
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         const struct ref_body *body = &c->bodies[i];
         struct limit_energies *sum = &c->bodies[body->label].limit;
@@ -399,6 +405,7 @@ sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *c, int32_t *limited,
         sum->now += dense6_dot(momentum, body->v) / 2;
         sum->free += inverse_form(body, body->b) / 2;
         sum->defect += inverse_form(body, body->impulse) / 2;
+        c->bodies[body->label].along += dense6_dot(body->v, body->b) / 2;
     }
     for (size_t k = 0; k < c->constraint_count; ++k) {
         const struct ref_constraint *constraint = &c->constraints[k];
@@ -408,7 +415,9 @@ sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *c, int32_t *limited,
     *limited = 0;
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *body = &c->bodies[i];
-        double factor = limit_factor(&c->bodies[body->label].limit);
+        const struct ref_body *island = &c->bodies[body->label];
+        double factor = limit_factor(&island->limit);
+        if (few) factor = fmin(factor, limit_bounce_factor(&island->limit, island->along));
         if (factor < 1 && body->label == i) ++*limited;
         for (int j = 0; j < 6; ++j) body->v[j] *= factor;
     }

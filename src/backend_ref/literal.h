@@ -48,6 +48,7 @@ struct ref_body {
     double island_violation, island_defect, level, scale; /* math/weight.h; scale, if not 0: weights stay, times this */
     bool blocks;                     /* the island has constraints that are no pair's */
     struct limit_energies limit;
+    double along; /* v . A v_f / 2 of the island */
     double impulse[6];               /* sums over the body's constraints */
 };
 

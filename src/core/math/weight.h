@@ -95,6 +95,25 @@ SADMM_INLINE double weight_speed_warm(double speed, double tallness, double kine
     return fmin(fmax(least, WEIGHT_REST * sqrt(kinetic / mass)), speed);
 }
 
+/* Steps that start warm with fewer iterations than this: the springs above would be softer, and heavy bodies on top
+ * rock on them. B goes up as the iterations go down, except where the island moves: heavy weights are slow. */
+#define WEIGHT_FEW 20
+#define WEIGHT_FEW_MOST 6.0
+/* Over the speed of bodies that move, the least V. */
+#define WEIGHT_MOVING 0.5
+
+/* By how much V is less, 1: not at all. */
+SADMM_INLINE double weight_few(int iterations)
+{
+    return fmin(fmax((double)WEIGHT_FEW / iterations, 1.0), WEIGHT_FEW_MOST);
+}
+
+/* V of such a step; `warm` is what weight_speed_warm made of `speed`. */
+SADMM_INLINE double weight_speed_few(double speed, double warm, double few, double kinetic, double mass)
+{
+    return fmin(fmax(speed / few, WEIGHT_MOVING * sqrt(kinetic / mass)), warm);
+}
+
 /* The share of a gap within the slop that a step closes; and e with that, `slop` over dt, m/s. */
 SADMM_INLINE double weight_gap_share(double tallness)
 {
