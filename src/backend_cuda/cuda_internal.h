@@ -215,6 +215,7 @@ struct cuda_args {
     int32_t warm;       /* fast: the step starts warm */
     int32_t looks;      /* fast: of the stop rule, in this step so far */
     int32_t limit;      /* fast: islands with too much energy are to be suspected */
+    int32_t few;        /* fast: and those that bounce (math/limit.h) */
     const struct sadmm_resident_edit *edits;
     double factor;
 };

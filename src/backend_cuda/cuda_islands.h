@@ -6,8 +6,8 @@
 
 #include "cuda_body.h"
 
-enum { SPREAD = 64, AT_ONCE = 16, ARRIVAL_BITS = 7 };
-static_assert(SPREAD < 1 << ARRIVAL_BITS && (32 + 5) / 6 * ARRIVAL_BITS <= 64, "a number holds the arrivals of every power");
+enum { SPREAD = 16, ARRIVAL_BITS = 5 };
+static_assert(SPREAD < 1 << ARRIVAL_BITS && 32 / 4 * ARRIVAL_BITS <= 64, "a number holds the arrivals of every power");
 
 struct add_terms {
     static __device__ __forceinline__ double join(double a, double b) { return a + b; }
@@ -49,15 +49,14 @@ static __device__ __forceinline__ bool add_up_island(const cuda_view &v, const b
         rank = begin;
         double *to = v.terms + (size_t)(first + begin) * TERMS;
         if (t.lane >= TERMS) continue;
-        for (int32_t j = 0; j < members; j += AT_ONCE) {
-            double some[AT_ONCE];
+        double all[SPREAD];
 #pragma unroll
-            for (int32_t k = 0; k < AT_ONCE; ++k)
-                some[k] = j + k < members ? __ldcg(to + (size_t)(j + k) * (size_t)apart * TERMS + t.lane) : 0;
+        for (int32_t j = 0; j < SPREAD; ++j)
+            all[j] = j < members ? __ldcg(to + (size_t)j * (size_t)apart * TERMS + t.lane) : 0;
+        term = all[0];
 #pragma unroll
-            for (int32_t k = 0; k < AT_ONCE; ++k)
-                if (j + k < members) term = j + k == 0 ? some[k] : Join::join(term, some[k]);
-        }
+        for (int32_t j = 1; j < SPREAD; ++j)
+            if (j < members) term = Join::join(term, all[j]);
         to[t.lane] = term;
     }
 #pragma unroll

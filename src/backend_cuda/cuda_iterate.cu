@@ -4,6 +4,8 @@
 #include "cuda_look.h"
 #include "cuda_sweep.h"
 
+#include "../core/math/limit.h"
+
 /* Iterations in the graph: enough to hide the launch of one graph behind the run of the one before. */
 enum { GRAPH_ITERATIONS = 16 };
 enum { BODY_THREADS = 128 };
@@ -512,6 +514,7 @@ static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool
     args.start = c->starting;
     args.settled = c->settled;
     args.limit = suspect;
+    args.few = limit_few(c->plan.warm, c->settings.iterations);
     args.looks = c->looks;
     args.most_bodies = partition->most_bodies;
     args.cluster = partition->cluster;

@@ -1,7 +1,8 @@
 /* The method `fast`: the limit of energies (math/limit.h) and the momentum residual (17). In double, from this precision's
  * data; once a step, eight lanes a body.
  *
- *   suspect   is there a body with more energy than its free motion has? Else no island has. Resident kernels look themselves
+ *   suspect   is there a body with more energy than its free motion has, or that bounces? Else no island does. Resident
+ *             kernels look themselves
  *   limit     nothing, unless there is one: energies and work, sums over islands (cuda_islands.h), the factor of each
  *             island's velocities. Whole steps apply it where they move bodies (cuda_step_kernels.cu)
  */
@@ -27,11 +28,11 @@ static __device__ double work_of(const cuda_view &v, int32_t p)
 }
 
 static __global__ void __launch_bounds__(BODY_THREADS)
-    suspect_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+    suspect_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     const body_thread t = body_of_thread(v);
     const body_row row = row_of_body(v, t);
-    suspect_body(v, t.live && t.lane == 0, t.body, row.velocity, row.a);
+    suspect_body(v, args.few, t.live && t.lane == 0, t.body, row.velocity, row.b, row.a);
 }
 
 static __global__ void __launch_bounds__(BODY_THREADS)
@@ -45,9 +46,9 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     reduce_max(fabs(row.b + own_number(sums, t.lane) - product(row.velocity, row.a)), v.residual + 1);
 }
 
-/* Terms of a body: energy of v, of A^-1 b, of r = b + g - A v; work. */
+/* Terms of a body: energy of v, of A^-1 b, of r = b + g - A v; work; v . b / 2. */
 static __global__ void __launch_bounds__(BODY_THREADS)
-    limit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+    limit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     if (!*v.suspects) return;
     const body_thread t = body_of_thread(v);
@@ -65,9 +66,11 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     term[1] = t.live ? v.free_energy[t.body] : 0;
     term[2] = dot_lanes(r, product(r, row.a_inverse)) / 2;
     term[3] = sums[WORK];
+    term[4] = dot_lanes(row.velocity, row.b) / 2;
     if (!add_up_island<add_terms>(v, t, own_number(term, t.lane), total) || t.lane != 0) return;
     const struct limit_energies energies = {total[0], total[1], total[2], total[3]};
-    const double factor = limit_factor(&energies);
+    const double allowed = limit_factor(&energies),
+                 factor = args.few ? fmin(allowed, limit_bounce_factor(&energies, total[4])) : allowed;
     v.islands[v.label[t.body]].slow_down = factor;
     if (factor != 1) atomicAdd(v.limited, 1);
 }
@@ -86,6 +89,7 @@ static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __
 static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const char *name, struct sadmm_error *error)
 {
     cuda_args args = {};
+    args.few = limit_few(c->plan.warm, c->settings.iterations);
     return CUDA(launch_of)(c, kernel, name, body_blocks(c->view.bodies), BODY_THREADS, &args, error);
 }
 

@@ -548,14 +548,14 @@ PART __device__ __forceinline__ void PART_RUN::suspect(int32_t odd) const
     for (int32_t first = 0; warp_has_body(first); first += in_registers) {
         const int32_t i = first + body, at = i - in_registers;
         const bool live = i < bodies;
-        double a[6];
+        double a[6], b = first == 0 ? (double)own_body.b : live && r < 6 ? (double)m.b[at * ROW + r] : 0;
 #pragma unroll
         for (int k = 0; k < 6; ++k)
             a[k] = first == 0          ? (double)own_body.A[k]
                    : live && r < 6     ? (double)line_a(m.lines + at * LINE_GENERAL, v.rigid, r, k)
                                        : 0;
-        suspect_body(v, live && r == 0, live ? (size_t)v.body_of[first_body + i] : 0,
-                     live && r < 6 ? (double)state(odd)[i * ROW + r] : 0, a);
+        suspect_body(v, args.few, live && r == 0, live ? (size_t)v.body_of[first_body + i] : 0,
+                     live && r < 6 ? (double)state(odd)[i * ROW + r] : 0, b, a);
     }
 }
 

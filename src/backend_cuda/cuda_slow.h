@@ -6,14 +6,14 @@
 
 #include "../core/math/limit.h"
 
-/* Say so where a body has more energy than its free motion; `velocity` and `a`: the lane's component of v and row of A.
- * `speaks`: one lane of each body. Every lane of the warp comes here. */
-static __device__ __forceinline__ void suspect_body(const cuda_view &v, bool speaks, size_t body, double velocity,
-                                                    const double a[6])
+/* Say so where a body has more energy than its free motion, or, for `few` iterations, bounces. `velocity`, `b` and `a`: the
+ * lane's components and row of A. `speaks`: one lane of each body. Every lane of the warp comes here. */
+static __device__ __forceinline__ void suspect_body(const cuda_view &v, bool few, bool speaks, size_t body,
+                                                    double velocity, double b, const double a[6])
 {
     const double free = speaks ? v.free_energy[body] : 0;
-    const double now = dot_lanes(velocity, product(velocity, a)) / 2;
-    if (speaks && limit_suspects(now, free)) *v.suspects = 1;
+    const double now = dot_lanes(velocity, product(velocity, a)) / 2, along = few ? dot_lanes(velocity, b) / 2 : 0;
+    if (speaks && (limit_suspects(now, free) || (few && limit_bounces(now, free, along)))) *v.suspects = 1;
 }
 
 /* The factor of body i's velocities. */

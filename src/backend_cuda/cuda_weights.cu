@@ -101,8 +101,10 @@ template <bool LEVELS> static __device__ void weigh_island(cuda_island *island, 
     if (args.start) *island = fresh;
     island->speed = weight_speed(sum[0], sum[1]);
     if (args.warm) {
-        island->tallness = weight_tallness(island->speed, sum[3], sum[1]);
-        island->speed = weight_speed_warm(island->speed, island->tallness, sum[2], sum[1]);
+        const double speed = island->speed;
+        island->tallness = weight_tallness(speed, sum[3], sum[1]);
+        island->speed = weight_speed_warm(speed, island->tallness, sum[2], sum[1]);
+        island->speed = weight_speed_few(speed, island->speed, args.factor, sum[2], sum[1]);
     }
     island->mass = sum[1];
     if (!LEVELS || island->blocks) return;
@@ -232,6 +234,7 @@ sadmm_status CUDA(enqueue_islands)(struct sadmm_context *c, bool first, struct s
     }
     args.start = first;
     args.warm = c->plan.warm;
+    args.factor = weight_few(c->settings.iterations);
     const cuda_kernel kernel = c->refreshes >= WEIGHT_FIRST_LEVEL ? terms_kernel<true> : terms_kernel<false>;
     CUDA_TRY(CUDA(launch_of)(c, kernel, "sums over islands", body_blocks(c->view.bodies), BODY_THREADS, &args, error));
     return CUDA(launch)(c, weigh_rows_kernel, "weights of row blocks", blocks_for(c->view.rows), &args, error);

@@ -37,8 +37,9 @@ SADMM_INLINE double limit_factor(const struct limit_energies *e)
     return limit_suspects(e->now, allowed) ? sqrt(allowed / e->now) : 1;
 }
 
-/* What moves with less than this share of the energy of the free motion is left to come to rest by itself. */
-#define LIMIT_STILL 1e-8
+/* What goes along the free motion by less than this share is left to come to rest by itself; rounding of velocities in single
+ * precision is below that. */
+#define LIMIT_STILL 1e-6
 /* The least factor: islands that would be stopped in every step could not find their way out. */
 #define LIMIT_LEAST 0.25
 
