@@ -24,7 +24,7 @@ typedef enum sadmm_backend {
     SADMM_BACKEND_COUNT
 } sadmm_backend;
 
-/* The iteration that solves the contact problem; both have the same solutions (docs/algorithm.md). */
+/* The iteration that solves the contact problem; both have the same solutions (docs/algorithm.md). Default: FAST. */
 typedef enum sadmm_method {
     SADMM_METHOD_PAPER = 0, /* one penalty weight a body, eqs. (13) to (15) */
     SADMM_METHOD_FAST,      /* one weight a constraint, from the load it carries, and over-relaxation */
