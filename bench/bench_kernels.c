@@ -132,7 +132,7 @@ static void usage(FILE *out)
             "usage: subadmm-bench kernels [options]\n\n"
             "  --backend ref|cpu|cuda|all   default all (ref up to 10,000 contacts)\n"
             "  --precision f32|f64|both     default both\n"
-            "  --method paper|fast          default paper; tables that do not have the method are left out\n"
+            "  --method paper|fast          default fast; tables that do not have the method are left out\n"
             "  --threads N[,N...]           CPU threads, default 1,2\n"
             "  --contacts N[,N...]          default 1000,10000,100000,1000000\n"
             "  --seconds S                  time spent on each row, default 1\n"
@@ -202,7 +202,8 @@ static json_t *row_json(const struct row *row)
 int bench_kernels(int argc, char **argv)
 {
     struct options o = {
-        .backend = SADMM_BACKEND_AUTO, .precision = -1, .threads = {1, 2}, .thread_count = 2,
+        .backend = SADMM_BACKEND_AUTO, .precision = -1, .method = SADMM_METHOD_FAST,
+        .threads = {1, 2}, .thread_count = 2,
         .contacts = {1000, 10000, 100000, 1000000}, .contact_count = 4, .seconds = 1,
     };
     int status = parse(argc, argv, &o);

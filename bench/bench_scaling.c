@@ -148,7 +148,7 @@ static bool run_row(const struct options *o, struct series *s, long size, const 
             scene.def.precision = s->precision;
             scene.def.device = (int)o->device;
             scene.def.settings.threads = s->threads;
-            scene.def.settings.method = o->method;
+            sadmm_scene_set_method(&scene, o->method);
             if (o->iterations > 0) scene.def.settings.iterations = (int)o->iterations;
             status = scene_timing_run(&scene, &plan, &row.timing, &error);
         }
@@ -220,8 +220,8 @@ static void usage(FILE *out)
             "  --backend ref|cpu|cuda|all all: cpu and cuda (default)\n"
             "  --threads N[,N...]         CPU threads, default 1,2,4,8,16; more than the machine has are left out\n"
             "  --precision f32|f64|both   default f32\n"
-            "  --method paper|fast        default paper\n"
-            "  --iterations N             a step; default the scene's\n"
+            "  --method paper|fast        default fast\n"
+            "  --iterations N             a step; default the scene's for the method\n"
             "  --device N                 accelerator, default 0\n"
             "  --steps N                  timed steps a row, default 20\n"
             "  --warm-up N                steps before them, default 5\n"
@@ -326,6 +326,7 @@ int bench_scaling(int argc, char **argv)
         .scene = "sliding_cubes",
         .backend = SADMM_BACKEND_AUTO,
         .precision = SADMM_F32,
+        .method = SADMM_METHOD_FAST,
         .sizes = {100, 500, 1000, 2000, 5000, 10000, 100000, 1000000},
         .size_count = 8,
         .threads = {1, 2, 4, 8, 16},

@@ -172,7 +172,7 @@ static void usage(FILE *out)
                  "  --dt S                default 1/60\n"
                  "  --steps N             default 2000\n"
                  "  --method paper|fast   default fast\n"
-                 "  --iterations N        a step, default 10\n"
+                 "  --iterations N        a step, default the scene's for the method\n"
                  "  --backend NAME        ref, cpu (default) or cuda\n"
                  "  --precision f32|f64   default f32\n"
                  "  --threads N           default 2\n"
@@ -253,7 +253,6 @@ int bench_stand(int argc, char **argv)
                         .backend = SADMM_BACKEND_CPU,
                         .precision = SADMM_F32,
                         .threads = 2,
-                        .iterations = 10,
                         .steps = 2000,
                         .dt = 1.0 / 60,
                         .limit = 0.01};
@@ -270,8 +269,8 @@ int bench_stand(int argc, char **argv)
     scene.def.precision = (sadmm_precision)o.precision;
     scene.def.device = (int)o.device;
     settings->dt = o.dt;
-    settings->method = o.method;
-    settings->iterations = (int)o.iterations;
+    sadmm_scene_set_method(&scene, o.method);
+    if (o.iterations > 0) settings->iterations = (int)o.iterations;
     settings->threads = (int)o.threads;
     sadmm_status status = sadmm_scene_build(&scene, &s.world, &s.error);
     if (status == SADMM_OK) status = run(&s, &o);

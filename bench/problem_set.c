@@ -284,7 +284,7 @@ static sadmm_status from_scene(const char *spec, int steps, struct set_problem *
     if (status != SADMM_OK) return status;
     scene.def.backend = SADMM_BACKEND_CPU;
     scene.def.precision = SADMM_F64;
-    scene.def.settings.method = SADMM_METHOD_PAPER;
+    sadmm_scene_set_method(&scene, SADMM_METHOD_PAPER);
     out->dt = scene.def.settings.dt;
     out->penalty_period = scene.def.settings.penalty_period;
     status = sadmm_problem_create(&out->problem);

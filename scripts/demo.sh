@@ -11,7 +11,8 @@ usage: scripts/demo.sh [--help] [ARGUMENT...]
 Installs what is missing (Debian and Ubuntu, as root or by sudo without a password; else says what to install), builds into
 build/ and runs
     subadmm run vertical_stacks --certify
-for 5 s of simulated time. Arguments are added to that command (see: build/src/subadmm run --help).
+for 5 s of simulated time, by the default method. Arguments are added to that command (--method paper: by the paper's
+iteration; see: build/src/subadmm run --help).
 
 JOBS=n  compile with n jobs instead of all cores
 TXT

@@ -213,6 +213,7 @@ static inline sadmm_status runner_begin(struct runner *r, const struct scene *sc
 {
     r->settings = sadmm_settings_default();
     r->settings.method = method;
+    r->settings.iterations = 100; /* more than the penalty period: plans of the method paper have updates */
     r->settings.warm_start = scene->warm;
     r->settings.measure_residuals = true; /* so that every plan has room for them */
     contact_problem_free(r->p);

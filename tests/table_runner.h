@@ -110,6 +110,7 @@ static sadmm_settings scene_settings(const struct scene *scene)
     s.gravity[0] = 9.81 * sin(angle);
     s.gravity[2] = -9.81 * cos(angle);
     s.warm_start = scene->warm;
+    s.iterations = 100;         /* more than the penalty period: plans of the method paper have updates */
     s.measure_residuals = true; /* so that every plan has room for them */
     return s;
 }

@@ -103,8 +103,9 @@ START_TEST(scaling_measures)
     static char out[MAX_TEXT];
     char arguments[256];
     snprintf(arguments, sizeof arguments,
-             "scaling --sizes 100,200 --threads 1,2 --backend cpu --precision f64 --steps 9 --warm-up 3 --csv %s",
-             csv_path);
+             "scaling --sizes 100,200 --threads 1,2 --backend cpu --precision f64 --method %s --steps 9 --warm-up 3 "
+             "--csv %s",
+             _i ? "paper" : "fast", csv_path);
     int code = run(arguments, out);
     ck_assert_msg(code == 0, "exit code %d\n%s", code, out);
     read_csv(csv_path, &table);
@@ -123,7 +124,7 @@ START_TEST(scaling_measures)
         ck_assert(number(&table, row, "bodies") == size);
         ck_assert(number(&table, row, "contacts") == 4 * number(&table, row, "pairs")); /* faces on faces */
         ck_assert(number(&table, row, "contacts") >= 4 * size);
-        ck_assert(number(&table, row, "iterations") == 120);
+        ck_assert(number(&table, row, "iterations") == (_i ? 120 : 20)); /* the scene's for the method */
         ck_assert(number(&table, row, "steps") == 9);
         ck_assert(number(&table, row, "hash_step") == 12);
 
@@ -139,8 +140,9 @@ START_TEST(scaling_measures)
         ck_assert_msg(step > 0.01 && step < 1000, "a step of %g ms", step);
         ck_assert(solver > 0 && solver < step);
 
-        /* The raft in f64: far better than the limits, which are what f32 reaches. */
-        ck_assert(number(&table, row, "ncp_max") >= 0 && number(&table, row, "ncp_max") < 1e-5);
+        /* The raft in f64. Paper: far better than the limits, which are what f32 reaches. Fast: the 13th step of 20
+         * iterations after a cold start; 500 cubes have 5e-5 after 10 steps, 1e-5 after 20. */
+        ck_assert(number(&table, row, "ncp_max") >= 0 && number(&table, row, "ncp_max") < (_i ? 1e-5 : 1e-4));
         ck_assert(number(&table, row, "momentum_max") >= 0 && number(&table, row, "momentum_max") < 1e-2);
     }
     /* The state does not depend on the number of threads, but on the scene. */
@@ -346,7 +348,7 @@ int main(void)
     TCase *cases = tcase_create("bench");
     tcase_set_timeout(cases, 60);
     tcase_add_checked_fixture(cases, make_csv, remove_csv);
-    tcase_add_test(cases, scaling_measures);
+    tcase_add_loop_test(cases, scaling_measures, 0, 2);
     tcase_add_test(cases, scaling_says_what_it_skips);
     tcase_add_test(cases, convergence_measures);
     tcase_add_test(cases, convergence_of_one_problem);

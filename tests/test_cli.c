@@ -150,6 +150,11 @@ static const struct {
     {"run incline --dt 0.01s", 2, "must be a number in"},
     {"run incline --iterations 0", 2, "must be an integer in [1, 1000000]"},
     {"run incline --penalty-period -1", 2, "must be an integer in [0, 1000000]"},
+    {"run incline --penalty-period 5", 2, "--penalty-period 5: takes --method paper"},
+    {"run incline --method slow", 2, "--method 'slow': must be paper or fast"},
+    {"solve x --penalty-offset 5 --method fast", 2, "--penalty-offset: takes --method paper"},
+    {"solve x --penalty-mass-factor 5", 2, "--penalty-mass-factor: takes --method paper"},
+    {"solve x --penalty-period 5", 2, "--penalty-period: takes --method paper"},
     {"run incline --threads 2000", 2, "must be an integer in [0, 1024]"},
     {"run incline --dump-problem x.hdf5", 2, "must be STEP:FILE"},
     {"run incline --dump-problem 0:x.hdf5", 2, "must be an integer in [1,"},
@@ -214,7 +219,7 @@ START_TEST(run_reports)
     ck_assert_str_eq(err, "");
     ck_assert_str_eq(string(r, "scene"), "pyramid:3");
     ck_assert_str_eq(string(r, "backend"), "cpu");
-    ck_assert_str_eq(string(r, "method"), "paper");
+    ck_assert_str_eq(string(r, "method"), "fast");
     ck_assert_double_eq(number(r, "bodies"), 6);
     ck_assert_double_eq(number(r, "joints"), 0);
     ck_assert_double_eq(number(r, "steps"), 12);
@@ -231,6 +236,7 @@ START_TEST(run_reports)
     ck_assert_double_ge(number(r, "certificate.ncp_max"), number(r, "certificate.ncp_mean"));
     ck_assert_double_ge(number(r, "certificate.ncp_max_run"), number(r, "certificate.ncp_max"));
     ck_assert_double_ge(number(r, "certificate.momentum_max_run"), number(r, "certificate.momentum_max"));
+    ck_assert_double_eq(number(r, "limited_steps"), 0); /* it stands */
     ck_assert_double_ge(number(r, "penetration_max"), 0);
     ck_assert_double_ge(number(r, "speed_max_final"), 0);
     /* it stands: what moves, moves less than the 5 % of a box that a collapse takes at once */
@@ -255,7 +261,7 @@ START_TEST(run_reports_null)
     json_decref(r);
     r = run_json("run pyramid:2 --steps 0 --certify --json=-");
     static const char *const unknown[] = {"contacts.mean", "contacts.max", "ms_per_step.total",
-                                          "residual",      "certificate",  "penetration_max",
+                                          "residual",      "certificate",  "penetration_max", "limited_steps",
                                           "backend",       "threads",      "device"};
     for (size_t k = 0; k < sizeof unknown / sizeof *unknown; ++k)
         ck_assert_msg(json_is_null(at(r, unknown[k])), "%s is not null", unknown[k]);
@@ -268,15 +274,19 @@ END_TEST
 START_TEST(run_prints)
 {
     MUST("run pyramid:2 --steps 3 --certify --explain", 0);
-    static const char *const parts[] = {"pyramid:2, 3 bodies", "ms per step", "certificate", "hash", "penalty"};
+    static const char *const parts[] = {"pyramid:2, 3 bodies", "ms per step", "certificate", "hash", "weights",
+                                        "20 iterations a step (fast)"};
     for (size_t k = 0; k < sizeof parts / sizeof *parts; ++k)
         ck_assert_msg(strstr(out, parts[k]) != NULL, "no '%s' in\n%s", parts[k], out);
+    MUST("run pyramid:2 --steps 3 --explain --method paper", 0);
+    ck_assert_ptr_nonnull(strstr(out, "penalty"));
+    ck_assert_ptr_nonnull(strstr(out, "100 iterations a step (paper)"));
     MUST("run pyramid:2 --steps 3 --quiet", 0);
     ck_assert_str_eq(out, "");
     ck_assert_str_eq(err, ""); /* no progress line where nobody watches */
     /* --explain stays out of the JSON */
     json_decref(run_json("run pyramid:2 --steps 3 --explain --json"));
-    ck_assert_ptr_nonnull(strstr(err, "penalty"));
+    ck_assert_ptr_nonnull(strstr(err, "weights"));
     /* to a file: the table is still printed */
     MUST("run pyramid:2 --steps 3 --json r.json", 0);
     ck_assert_ptr_nonnull(strstr(out, "ms per step"));
@@ -333,10 +343,43 @@ START_TEST(same_hash)
 }
 END_TEST
 
+/* A scene's iterations are those of the method; what is asked for goes first. */
+START_TEST(iterations_follow_the_method)
+{
+    static const struct {
+        const char *options, *method, *iterations; /* NULL: as asked for */
+    } cases[] = {
+        {"", "fast", "iterations.fast"},
+        {"--method fast", "fast", "iterations.fast"},
+        {"--method paper", "paper", "iterations.paper"},
+        {"--iterations 7", "fast", NULL},
+        {"--iterations 7 --method paper", "paper", NULL},
+    };
+    static const char *const scenes[] = {"vertical_stacks:1", "card_houses:1", "incline"};
+    char text[256];
+    for (size_t s = 0; s < sizeof scenes / sizeof *scenes; ++s) {
+        snprintf(text, sizeof text, "scenes %s --json -", scenes[s]);
+        json_t *scene = run_json(text);
+        ck_assert_double_gt(number(scene, "iterations.paper"), number(scene, "iterations.fast"));
+        ck_assert_double_eq(number(scene, "settings.iterations"), number(scene, "iterations.fast"));
+        for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
+            snprintf(text, sizeof text, "run %s --steps 1 %s --json -", scenes[s], cases[k].options);
+            json_t *r = run_json(text);
+            ck_assert_str_eq(string(r, "method"), cases[k].method);
+            ck_assert_double_eq(number(r, "iterations"),
+                                cases[k].iterations ? number(scene, cases[k].iterations) : 7);
+            json_decref(r);
+        }
+        json_decref(scene);
+    }
+}
+END_TEST
+
 /* Options reach the simulation. */
 START_TEST(options_matter)
 {
-    static const char *const others[] = {"--iterations 40", "--no-warm-start", "--dt 0.004", "--precision f32"};
+    static const char *const others[] = {"--iterations 40", "--no-warm-start", "--dt 0.004", "--precision f32",
+                                         "--method paper"};
     char text[256], hash[17], other[17];
     hash_of("run pile:20 --backend cpu --precision f64 --steps 100 --iterations 41 --json -", hash);
     for (size_t k = 0; k < sizeof others / sizeof *others; ++k) {
@@ -345,8 +388,8 @@ START_TEST(options_matter)
         hash_of(text, other);
         ck_assert_msg(strcmp(hash, other) != 0, "%s changed nothing", others[k]);
     }
-    hash_of("run pile:20 --backend cpu --steps 100 --no-warm-start --penalty-period 10 --json -", hash);
-    hash_of("run pile:20 --backend cpu --steps 100 --no-warm-start --penalty-period 0 --json -", other);
+    hash_of("run pile:20 --backend cpu --steps 100 --no-warm-start --method paper --penalty-period 10 --json -", hash);
+    hash_of("run pile:20 --backend cpu --steps 100 --no-warm-start --method paper --penalty-period 0 --json -", other);
     ck_assert_str_ne(hash, other);
     json_t *r = run_json("run pile:5 --backend ref --steps 1 --json -");
     ck_assert_str_eq(string(r, "backend"), "ref");
@@ -486,12 +529,14 @@ START_TEST(backends_agree)
 {
     static const char *const scenes[] = {"pyramid:3", "vertical_stacks:1", "bounce"};
     char text[128];
-    snprintf(text, sizeof text, "check %s --steps 10 --json -", scenes[_i]);
+    const char *scene = scenes[_i / 2], *method = _i % 2 ? "paper" : "fast";
+    snprintf(text, sizeof text, "check %s%s --steps 10 --json -", scene, _i % 2 ? " --method paper" : "");
     json_t *r = run_json(text), *tables = at(r, "tables"), *t;
     double counted[4] = {0};
     static const char *const verdicts[] = {"agrees", "DISAGREES", "FAILED", "skipped"};
     static const char *const counts[] = {"agree", "disagree", "failed", "skipped"};
     size_t k;
+    ck_assert_str_eq(string(r, "method"), method);
     ck_assert_uint_eq(json_array_size(tables), 5); /* {ref, cpu, cuda} x {f32, f64} without ref f64 itself */
     json_array_foreach(tables, k, t) {
         for (int v = 0; v < 4; ++v) counted[v] += strcmp(string(t, "verdict"), verdicts[v]) == 0;
@@ -503,7 +548,7 @@ START_TEST(backends_agree)
     ck_assert_uint_eq(json_array_size(at(r, "frozen_steps")), 5);
     ck_assert_double_eq(json_number_value(json_array_get(at(r, "frozen_steps"), 4)), 10);
     json_decref(r);
-    snprintf(text, sizeof text, "check %s --steps 1", scenes[_i]);
+    snprintf(text, sizeof text, "check %s --method %s --steps 1", scene, method);
     MUST(text, 0);
     ck_assert_ptr_nonnull(strstr(out, "0 disagree, 0 failed"));
 }
@@ -523,22 +568,29 @@ START_TEST(dumps_and_solves)
     ck_assert_double_ge(number(r, "certificate.ncp_max"), 0);
     ck_assert_double_gt(number(r, "iterations"), 0);
     ck_assert_double_gt(number(r, "ms"), 0);
+    ck_assert_str_eq(string(r, "method"), "fast");
+    ck_assert(json_is_null(at(r, "penalty")));
     json_decref(r);
-    /* the copy holds the same problem: the same numbers come out; other settings lead to the same v */
+    /* the copy holds the same problem: the same numbers come out; the other method leads to the same v */
     r = run_json("solve p.hdf5 --backend ref --tolerance 1e-11 --json -");
     json_t *copy = run_json("solve s.hdf5 --backend ref --tolerance 1e-11 --json -");
     ck_assert(json_equal(at(r, "v"), at(copy, "v")));
     json_decref(copy);
-    json_t *other = run_json("solve p.hdf5 --tolerance 1e-11 --penalty-offset 5 --penalty-period 0 --json -");
+    json_t *other =
+        run_json("solve p.hdf5 --tolerance 1e-11 --method paper --penalty-offset 5 --penalty-period 0 --json -");
     size_t k;
     json_t *v;
     /* unique velocities, both at 1e-11 of siconos' measure, of a step with dt g = 0.05 m/s */
     json_array_foreach(at(r, "v"), k, v)
         ck_assert_double_le(fabs(json_number_value(v) - json_number_value(json_array_get(at(other, "v"), k))), 1e-8);
+    ck_assert_double_eq(number(other, "penalty.offset_kg"), 5);
     json_decref(other);
     json_decref(r);
-    MUST("solve p.hdf5 --precision f32", 0);
-    ck_assert_ptr_nonnull(strstr(out, "converged"));
+    static const char *const single[] = {"solve p.hdf5 --precision f32", "solve p.hdf5 --precision f32 --method paper"};
+    for (k = 0; k < 2; ++k) {
+        MUST(single[k], 0);
+        ck_assert_ptr_nonnull(strstr(out, "converged"));
+    }
 }
 END_TEST
 
@@ -584,11 +636,12 @@ int main(void)
     tcase_add_test(tests, run_prints);
     tcase_add_test(tests, run_default_steps);
     tcase_add_loop_test(tests, same_hash, 0, 4);
+    tcase_add_test(tests, iterations_follow_the_method);
     tcase_add_test(tests, options_matter);
     tcase_add_test(tests, traces);
     tcase_add_test(tests, scenes_are_told);
     tcase_add_test(tests, backends_are_told);
-    tcase_add_loop_test(tests, backends_agree, 0, 3);
+    tcase_add_loop_test(tests, backends_agree, 0, 6);
 #ifdef SADMM_HAVE_HDF5
     tcase_add_test(tests, dumps_and_solves);
     tcase_add_test(tests, solve_fails_loudly);

@@ -284,6 +284,7 @@ static void solve(struct runner *r, const struct scene *scene)
 {
     struct sadmm_solve_report report;
     r->settings = sadmm_settings_default();
+    r->settings.method = SADMM_METHOD_PAPER;
     r->settings.warm_start = scene->warm;
     r->settings.measure_residuals = true;
     r->settings.iterations = 41; /* three penalty updates where the scene starts cold */
@@ -367,6 +368,7 @@ START_TEST(calls_that_fail)
     const struct sadmm_kernels *table = tables[_i];
     const struct scene *scene = &scenes[0];
     sadmm_settings settings = sadmm_settings_default();
+    settings.method = SADMM_METHOD_PAPER;
     settings.warm_start = false;
     settings.measure_residuals = true;
     int failed = 0;

@@ -394,6 +394,8 @@ struct device {
 static void device_begin(struct device *d, struct contact_problem *p, bool warm)
 {
     d->settings = sadmm_settings_default();
+    d->settings.method = SADMM_METHOD_PAPER; /* fast asks for islands everywhere; here the partition does */
+    d->settings.iterations = 100;
     d->settings.warm_start = warm;
     d->plan = sadmm_plan_make(&p->system, &d->settings);
     CALL(d, d->k->begin(d->c, &p->system, &d->plan, &d->settings, &d->error));

@@ -100,6 +100,7 @@ static sadmm_world *towers_on(int count, int height, double friction, int precis
     sadmm_world_def def = sadmm_world_def_default();
     def.backend = SADMM_BACKEND_CPU;
     def.precision = (sadmm_precision)precision;
+    def.settings.method = SADMM_METHOD_PAPER; /* use_fast for the other one */
     def.settings.iterations = EMULATED ? 23 : 35;
     def.settings.penalty_period = 10;
     sadmm_world *world = create_world(&def);

@@ -487,6 +487,7 @@ static void solve(sadmm_problem *problem, double tolerance)
     sadmm_settings s = sadmm_settings_default();
     sadmm_certificate c = {.siconos = INFINITY};
     s.dt = 1;
+    s.method = SADMM_METHOD_PAPER; /* the penalty below suits problems that are scaled to masses of 1 */
     s.penalty_mass_factor = 0;
     s.penalty_offset = 1;
     s.iterations = 200;

@@ -74,8 +74,9 @@ START_TEST(settings_at_the_ends_of_their_ranges)
 {
     sadmm_settings s = sadmm_settings_default();
     OK(sadmm_settings_validate(&s, NULL));
-    ck_assert(s.dt == 0.005 && s.iterations == 100 && s.penalty_period == 30 && s.penalty_mass_factor == 16 &&
-              s.penalty_offset == 1e5 && s.penalty_ratio_limit == 4 && s.warm_start);
+    ck_assert(s.dt == 0.005 && s.method == SADMM_METHOD_FAST && s.iterations == 20 && s.warm_start);
+    ck_assert(s.penalty_period == 30 && s.penalty_mass_factor == 16 && s.penalty_offset == 1e5 &&
+              s.penalty_ratio_limit == 4);
     s.dt = 1, s.iterations = 1000000, s.penalty_period = 0, s.penalty_mass_factor = 0, s.penalty_offset = 1e15;
     s.penalty_ratio_limit = 1, s.check_period = 1, s.baumgarte = 1, s.slop = 0, s.correction_speed = 0,
     s.threads = 1024;
@@ -424,12 +425,15 @@ END_TEST
 /* The context, its buffers and the certificate, a backend at a time; a second solve of the same size needs none. */
 START_TEST(solves_without_memory)
 {
-    static const struct { sadmm_backend backend; sadmm_precision precision; } runs[] = {
-        {SADMM_BACKEND_REF, SADMM_F64}, {SADMM_BACKEND_CPU, SADMM_F64}, {SADMM_BACKEND_CPU, SADMM_F32}};
+    static const struct { sadmm_backend backend; sadmm_precision precision; sadmm_method method; } runs[] = {
+        {SADMM_BACKEND_REF, SADMM_F64, SADMM_METHOD_PAPER}, {SADMM_BACKEND_CPU, SADMM_F64, SADMM_METHOD_PAPER},
+        {SADMM_BACKEND_CPU, SADMM_F32, SADMM_METHOD_PAPER}, {SADMM_BACKEND_REF, SADMM_F64, SADMM_METHOD_FAST},
+        {SADMM_BACKEND_CPU, SADMM_F64, SADMM_METHOD_FAST}, {SADMM_BACKEND_CPU, SADMM_F32, SADMM_METHOD_FAST}};
     struct kept given;
     sadmm_problem *p = make(&given);
     sadmm_settings s = sadmm_settings_default();
     sadmm_solve_report report;
+    s.method = runs[_i].method;
     s.threads = 2;
     EVERY_ALLOCATION(sadmm_problem_solve(p, runs[_i].backend, runs[_i].precision, &s, &report), 3);
     sadmm_test_fail_allocations_after(0);
@@ -452,7 +456,7 @@ int main(void)
     tcase_add_test(cases, bad_solutions_indices_and_settings);
     tcase_add_test(cases, null_problems);
     tcase_add_test(cases, allocations_that_fail);
-    tcase_add_loop_test(cases, solves_without_memory, 0, 3);
+    tcase_add_loop_test(cases, solves_without_memory, 0, 6);
     suite_add_tcase(suite, cases);
     return run_suite(suite);
 }

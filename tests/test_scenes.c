@@ -19,6 +19,14 @@ START_TEST(every_scene_builds_and_steps)
 
     ck_assert_str_eq(scene.info->name, info->name);
     ck_assert(info->description[0] && info->duration > 0 && scene.duration == info->duration);
+    ck_assert_int_eq(scene.def.settings.method, sadmm_settings_default().method);
+    for (int method = 0; method < SADMM_METHOD_COUNT; ++method) {
+        struct sadmm_scene other = scene;
+        sadmm_scene_set_method(&other, (sadmm_method)method);
+        ck_assert_int_eq(other.def.settings.method, method);
+        ck_assert_int_eq(other.def.settings.iterations, info->iterations[method]);
+        ck_assert_int_ge(other.def.settings.iterations, 1);
+    }
     ck_assert_int_gt(dynamic_bodies(world), 0);
     ck_assert_int_eq(sadmm_scene_before_step(&scene, world, 0, &error), SADMM_OK);
     step_world(world, 1);
@@ -29,7 +37,8 @@ START_TEST(every_scene_builds_and_steps)
 }
 END_TEST
 
-/* Table I: bodies = DoFs / 6, dt, iterations, m (beside the name in the table), contacts on average. */
+/* Table I, by the paper's method: bodies = DoFs / 6, dt, iterations, m (beside the name in the table), contacts on
+ * average. */
 static const struct table_row {
     const char *spec;
     int bodies, dt_ms, iterations, m;
@@ -50,6 +59,7 @@ START_TEST(table_one)
 {
     const struct table_row *row = &table[_i];
     struct sadmm_scene scene = open_scene(row->spec);
+    sadmm_scene_set_method(&scene, SADMM_METHOD_PAPER);
     scene.def.settings.threads = 1; /* others run beside this one */
     sadmm_world *world = build_scene(&scene);
     double sum = 0;
@@ -198,9 +208,10 @@ static const struct {
     { "spin_plate", 100 },
 };
 
-static uint64_t hash_after(const char *spec, int threads, int steps)
+static uint64_t hash_after(const char *spec, sadmm_method method, int threads, int steps)
 {
     struct sadmm_scene scene = open_scene(spec);
+    sadmm_scene_set_method(&scene, method);
     scene.def.backend = SADMM_BACKEND_CPU;
     scene.def.settings.threads = threads;
     sadmm_world *world = build_scene(&scene);
@@ -216,14 +227,15 @@ static uint64_t hash_after(const char *spec, int threads, int steps)
 
 START_TEST(runs_repeat_bit_for_bit)
 {
-    const char *spec = repeatable[_i].spec;
-    int steps = repeatable[_i].steps;
-    uint64_t once = hash_after(spec, 1, steps);
+    const sadmm_method method = (sadmm_method)(_i % SADMM_METHOD_COUNT);
+    const char *spec = repeatable[_i / SADMM_METHOD_COUNT].spec;
+    int steps = repeatable[_i / SADMM_METHOD_COUNT].steps;
+    uint64_t once = hash_after(spec, method, 1, steps);
 
-    ck_assert_msg(once == hash_after(spec, 1, steps), "%s: two runs differ", spec);
-    ck_assert_msg(once == hash_after(spec, 2, steps), "%s: one and two threads differ", spec);
-    ck_assert_msg(once == hash_after(spec, 5, steps), "%s: one and five threads differ", spec);
-    ck_assert_msg(once != hash_after(spec, 1, steps - 1), "%s: the hash does not see the last step", spec);
+    ck_assert_msg(once == hash_after(spec, method, 1, steps), "%s: two runs differ", spec);
+    ck_assert_msg(once == hash_after(spec, method, 2, steps), "%s: one and two threads differ", spec);
+    ck_assert_msg(once == hash_after(spec, method, 5, steps), "%s: one and five threads differ", spec);
+    ck_assert_msg(once != hash_after(spec, method, 1, steps - 1), "%s: the hash does not see the last step", spec);
 }
 END_TEST
 
@@ -303,7 +315,8 @@ int main(void)
     tcase_add_loop_test(cases, settled_piles_have_their_contacts, 0, 5);
     tcase_add_loop_test(cases, burst_grows_in_one_step, 0, 6);
     tcase_add_loop_test(cases, table_one, 0, sizeof table / sizeof table[0]);
-    tcase_add_loop_test(cases, runs_repeat_bit_for_bit, 0, sizeof repeatable / sizeof repeatable[0]);
+    tcase_add_loop_test(cases, runs_repeat_bit_for_bit, 0,
+                         SADMM_METHOD_COUNT * (int)(sizeof repeatable / sizeof repeatable[0]));
     suite_add_tcase(suite, cases);
     return run_suite(suite);
 }

@@ -9,8 +9,8 @@ enum { OPTION_STEPS, OPTION_METHOD, OPTION_ITERATIONS, OPTION_JSON, OPTION_QUIET
 
 static const struct cli_option options[] = {
     [OPTION_STEPS] = {"steps", "N", "steps to compare, in [1, 100000] (default 20)"},
-    [OPTION_METHOD] = {"method", "NAME", "paper or fast (default the scene's)"},
-    [OPTION_ITERATIONS] = {"iterations", "N", "iterations a step (default the scene's)"},
+    [OPTION_METHOD] = {"method", "NAME", "paper or fast (default fast)"},
+    [OPTION_ITERATIONS] = {"iterations", "N", "iterations a step (default the scene's for the method)"},
     [OPTION_JSON] = {"json", "[FILE|-]", "write JSON to FILE, or to standard output (-, the default)"},
     [OPTION_QUIET] = {"quiet", NULL, "no table"},
 };
@@ -126,8 +126,9 @@ static size_t count_rows(const struct row *rows, size_t count, enum verdict verd
 static void print_rows(const char *spec, const struct check_reference *r, const struct row *rows, size_t count)
 {
     const char *reasons[2] = {NULL, NULL};
-    printf("%s, %ld steps, %d iterations; largest difference from ref f64 (<= tolerance)\n\n", spec, r->steps,
-           r->scene->def.settings.iterations);
+    const sadmm_settings *settings = &r->scene->def.settings;
+    printf("%s, %ld steps, %s, %d iterations; largest difference from ref f64 (<= tolerance)\n\n", spec, r->steps,
+           cli_method_name(settings->method), settings->iterations);
     printf("%-10s %-21s %-21s %-21s %-21s %-21s %-21s\n", "", "run: position, m", "run: velocity, m/s",
            "one step: velocity", "one step: impulse", "kernels: velocity", "kernels: impulse");
     for (size_t k = 0; k < count; ++k) {
@@ -190,6 +191,7 @@ static json_t *rows_json(const char *spec, const struct check_reference *r, cons
     for (size_t k = 0; k < r->frozen_count; ++k) json_array_append_new(frozen, json_integer(r->frozen[k].step));
     json_object_set_new(root, "scene", json_string(spec));
     json_object_set_new(root, "steps", json_integer(r->steps));
+    json_object_set_new(root, "method", json_string(cli_method_name(r->scene->def.settings.method)));
     json_object_set_new(root, "iterations", json_integer(r->scene->def.settings.iterations));
     json_object_set_new(root, "frozen_steps", frozen);
     json_object_set_new(root, "agree", json_integer((json_int_t)count_rows(rows, count, AGREES)));
@@ -237,7 +239,7 @@ static int run(int argc, char **argv)
     int code = cli_parse(&cli_check, argc, argv, set_option, &o, &spec);
     if (code >= 0) return code;
     if (sadmm_scene_open(spec, &scene, &error) != SADMM_OK) return cli_error(CLI_USAGE, "%s", error.message);
-    if (o.method_given) scene.def.settings.method = o.method;
+    if (o.method_given) sadmm_scene_set_method(&scene, o.method);
     if (o.iterations > 0) scene.def.settings.iterations = (int)o.iterations;
     return check_scene(&o, spec, &scene);
 }

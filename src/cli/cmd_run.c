@@ -24,11 +24,11 @@ static const struct cli_option options[] = {
     [OPTION_PRECISION] = {"precision", "P", "f32 or f64 (default the scene's)"},
     [OPTION_STEPS] = {"steps", "N", "number of steps (default the scene's duration / dt)"},
     [OPTION_DT] = {"dt", "S", "time step, s (default the scene's)"},
-    [OPTION_METHOD] = {"method", "NAME", "paper or fast (default the scene's)"},
-    [OPTION_ITERATIONS] = {"iterations", "N", "iterations a step (default the scene's)"},
+    [OPTION_METHOD] = {"method", "NAME", "paper or fast (default fast)"},
+    [OPTION_ITERATIONS] = {"iterations", "N", "iterations a step (default the scene's for the method)"},
     [OPTION_TOLERANCE] = {"tolerance", "T", "end a step's iterations once its true error is below T, m/s (default never)"},
     [OPTION_CHECK_PERIOD] = {"check-period", "N", "iterations between looks at that (default 10)"},
-    [OPTION_PENALTY_PERIOD] = {"penalty-period", "N", "iterations between penalty updates, 0 = never"},
+    [OPTION_PENALTY_PERIOD] = {"penalty-period", "N", "paper: iterations between penalty updates, 0 = never"},
     [OPTION_THREADS] = {"threads", "N", "CPU threads, 0 = as many as pay (default)"},
     [OPTION_NO_WARM_START] = {"no-warm-start", NULL, "start every step from zero impulses"},
     [OPTION_CERTIFY] = {"certify", NULL, "measure the true error of every step"},
@@ -107,7 +107,7 @@ static void apply(const struct run_options *o, struct sadmm_scene *scene)
     scene->def.device = (int)o->device;
     if (o->precision_given) scene->def.precision = o->precision;
     if (o->dt > 0) s->dt = o->dt;
-    if (o->method_given) s->method = o->method;
+    if (o->method_given) sadmm_scene_set_method(scene, o->method);
     if (o->iterations >= 0) s->iterations = (int)o->iterations;
     if (o->tolerance > 0) s->certificate_tolerance = o->tolerance;
     if (o->check_period > 0) s->check_period = (int)o->check_period;
@@ -240,6 +240,9 @@ static int run(int argc, char **argv)
     if (code >= 0) return code;
     if (sadmm_scene_open(spec, &scene, &error) != SADMM_OK) return cli_error(CLI_USAGE, "%s", error.message);
     apply(&o, &scene);
+    if (o.penalty_period >= 0 && scene.def.settings.method != SADMM_METHOD_PAPER)
+        return cli_error(CLI_USAGE, "--penalty-period %ld: takes --method paper, %s has no penalty updates",
+                         o.penalty_period, cli_method_name(scene.def.settings.method));
     if (o.steps < 0) o.steps = lround(fmin(scene.duration / scene.def.settings.dt, 1e9));
     if (o.dump_path && o.dump_step > o.steps)
         return cli_error(CLI_USAGE, "--dump-problem STEP %ld: must be in [1, %ld], the steps of this run", o.dump_step,

@@ -17,6 +17,15 @@ static int set_option(void *target, size_t index, const char *value)
     return CLI_DONE;
 }
 
+/* A step, by method. */
+static json_t *iterations_json(const struct sadmm_scene_info *info)
+{
+    json_t *o = json_object();
+    for (int m = 0; m < SADMM_METHOD_COUNT; ++m)
+        json_object_set_new(o, cli_method_name((sadmm_method)m), json_integer(info->iterations[m]));
+    return o;
+}
+
 /* ---- the list ---------------------------------------------------------------------------------------------------- */
 
 static json_t *list_json(void)
@@ -29,6 +38,7 @@ static json_t *list_json(void)
         json_object_set_new(o, "arguments", json_string(info->arguments));
         json_object_set_new(o, "description", json_string(info->description));
         json_object_set_new(o, "duration", cli_json_real(info->duration));
+        json_object_set_new(o, "iterations", iterations_json(info));
         json_array_append_new(array, o);
     }
     return array;
@@ -142,6 +152,7 @@ static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, jso
     json_object_set_new(o, "description", json_string(scene->info->description));
     json_object_set_new(o, "units", json_string(units));
     json_object_set_new(o, "duration", cli_json_real(scene->duration));
+    json_object_set_new(o, "iterations", iterations_json(scene->info));
     json_object_set_new(o, "contact_margin", cli_json_real(scene->def.contact_margin));
     json_object_set_new(o, "friction_of_a_pair", json_string("geometric mean"));
     json_object_set_new(o, "settings", cli_json_settings(&scene->def.settings));
@@ -158,9 +169,10 @@ static int show_scene(const char *spec, const char *destination)
     if (sadmm_scene_open(spec, &scene, &error) != SADMM_OK) return cli_error(CLI_USAGE, "%s", error.message);
     if (sadmm_scene_build(&scene, &world, &error) != SADMM_OK) return cli_error(CLI_FAILED, "%s", error.message);
     if (!destination) {
-        printf("%s%s: %s\n%d bodies, %d shapes, %g s, dt = %g s, %d iterations (--json for all of it)\n",
+        printf("%s%s: %s\n%d bodies, %d shapes, %g s, dt = %g s, %d iterations (paper: %d; --json for all of it)\n",
                scene.info->name, scene.info->arguments, scene.info->description, sadmm_world_body_count(world),
-               sadmm_world_shape_count(world), scene.duration, scene.def.settings.dt, scene.def.settings.iterations);
+               sadmm_world_shape_count(world), scene.duration, scene.def.settings.dt, scene.def.settings.iterations,
+               scene.info->iterations[SADMM_METHOD_PAPER]);
         sadmm_world_destroy(world);
         return CLI_DONE;
     }

@@ -15,13 +15,13 @@ enum {
 static const struct cli_option options[] = {
     [OPTION_BACKEND] = {"backend", "NAME", "auto, ref, cpu or cuda (default auto)"},
     [OPTION_PRECISION] = {"precision", "P", "f32 or f64 (default f64)"},
-    [OPTION_METHOD] = {"method", "NAME", "paper or fast (default paper); fast takes no penalty options"},
+    [OPTION_METHOD] = {"method", "NAME", "paper or fast (default fast)"},
     [OPTION_TOLERANCE] = {"tolerance", "T", "of siconos' measure (default 1e-8; f32: 1e-6)"},
     [OPTION_MAX_ITERATIONS] = {"max-iterations", "N", "give up after (default 100000)"},
     [OPTION_CHECK_PERIOD] = {"check-period", "N", "iterations between looks at the error (default 100)"},
-    [OPTION_LEVEL] = {"penalty-offset", "KG", "c of eq. (13), kg (default: tried automatically from the mean mass)"},
-    [OPTION_MASS_FACTOR] = {"penalty-mass-factor", "M", "M of eq. (13) (default 0)"},
-    [OPTION_PENALTY_PERIOD] = {"penalty-period", "N", "iterations between penalty updates, 0 = never (default 30)"},
+    [OPTION_LEVEL] = {"penalty-offset", "KG", "paper: c of eq. (13), kg (default: tried from the mean mass)"},
+    [OPTION_MASS_FACTOR] = {"penalty-mass-factor", "M", "paper: M of eq. (13) (default 0)"},
+    [OPTION_PENALTY_PERIOD] = {"penalty-period", "N", "paper: iterations between updates, 0 = never (default 30)"},
     [OPTION_THREADS] = {"threads", "N", "CPU threads, 0 = as many as pay (default)"},
     [OPTION_SOLUTION] = {"solution", "FILE", "write a copy of the problem's file with this solution in it"},
     [OPTION_JSON] = {"json", "[FILE|-]", "write JSON to FILE, or to standard output (-, the default)"},
@@ -32,6 +32,7 @@ struct solve_options {
     struct solve_plan plan;
     bool tolerance_given, quiet;
     const char *json, *solution;
+    const char *penalty; /* the last option given that only the method paper has, or NULL */
 };
 
 static bool read_small_int(const char *option, const char *text, long lo, long hi, int *out)
@@ -47,6 +48,8 @@ static int set_option(void *target, size_t index, const char *value)
     struct solve_options *o = target;
     sadmm_settings *s = &o->plan.settings;
     bool ok = true;
+    if (index == OPTION_LEVEL || index == OPTION_MASS_FACTOR || index == OPTION_PENALTY_PERIOD)
+        o->penalty = options[index].name;
     switch (index) {
     case OPTION_BACKEND: ok = cli_read_backend("--backend", value, &o->plan.backend); break;
     case OPTION_PRECISION: ok = cli_read_precision("--precision", value, &o->plan.precision); break;
@@ -93,10 +96,22 @@ static json_t *triples_json(const double *x, int32_t count)
     return array;
 }
 
+/* null where the method has no penalty. */
+static json_t *penalty_json(const struct solve_options *o, const struct solve_outcome *out)
+{
+    if (o->plan.settings.method != SADMM_METHOD_PAPER) return json_null();
+    json_t *penalty = json_object();
+    json_object_set_new(penalty, "mass_factor", cli_json_real(o->plan.settings.penalty_mass_factor));
+    json_object_set_new(penalty, "offset_kg", cli_json_real(out->level));
+    json_object_set_new(penalty, "offsets_tried", json_integer(out->levels_tried));
+    json_object_set_new(penalty, "period", json_integer(o->plan.settings.penalty_period));
+    return penalty;
+}
+
 static json_t *outcome_json(const char *path, const struct solve_options *o, const struct solve_outcome *out,
                             const struct sadmm_global_solution *s)
 {
-    json_t *root = json_object(), *penalty = json_object();
+    json_t *root = json_object();
     json_object_set_new(root, "file", json_string(path));
     json_object_set_new(root, "backend", json_string(cli_backend_name(out->report.backend)));
     json_object_set_new(root, "precision", json_string(cli_precision_name(out->report.precision)));
@@ -109,11 +124,7 @@ static json_t *outcome_json(const char *path, const struct solve_options *o, con
     json_object_set_new(root, "iterations", json_integer(out->iterations));
     json_object_set_new(root, "ms", cli_json_real(out->ms));
     json_object_set_new(root, "threads", json_integer(out->report.threads));
-    json_object_set_new(penalty, "mass_factor", cli_json_real(o->plan.settings.penalty_mass_factor));
-    json_object_set_new(penalty, "offset_kg", cli_json_real(out->level));
-    json_object_set_new(penalty, "offsets_tried", json_integer(out->levels_tried));
-    json_object_set_new(penalty, "period", json_integer(o->plan.settings.penalty_period));
-    json_object_set_new(root, "penalty", penalty);
+    json_object_set_new(root, "penalty", penalty_json(o, out));
     json_object_set_new(root, "certificate", certificate_json(&out->certificate));
     json_object_set_new(root, "u", triples_json(s->u, s->contacts));
     json_object_set_new(root, "r", triples_json(s->r, s->contacts));
@@ -191,6 +202,9 @@ static int run(int argc, char **argv)
     o.plan.settings.penalty_mass_factor = 0;
     int code = cli_parse(&cli_solve, argc, argv, set_option, &o, &path);
     if (code >= 0) return code;
+    if (o.penalty && o.plan.settings.method != SADMM_METHOD_PAPER)
+        return cli_error(CLI_USAGE, "--%s: takes --method paper, %s has no penalty", o.penalty,
+                         cli_method_name(o.plan.settings.method));
     if (!o.tolerance_given) o.plan.tolerance = o.plan.precision == SADMM_F32 ? 1e-6 : 1e-8;
     if (sadmm_fclib_load(path, &problem, &error) != SADMM_OK)
         return cli_error(CLI_FAILED, "%s: %s", path, error.message);

@@ -105,6 +105,7 @@ json_t *run_record_json(const struct run_record *record, const char *spec, const
     else json_object_set_new(o, "residual", json_null());
     json_object_set_new(o, "certificate", certificate_json(record));
     json_object_set_new(o, "stop", stop_json(record, &scene->def.settings));
+    set_or_null(o, "limited_steps", record, json_integer((json_int_t)record->limited_steps));
     set_or_null(o, "repeated", record, json_integer(record->last.repeated));
     set_or_null(o, "penetration_max", record, cli_json_real(record->penetration_max));
     json_object_set_new(o, "speed_max_final", cli_json_real(record->speed_max));
@@ -146,6 +147,9 @@ void run_record_print(const struct run_record *record, const char *spec, const s
     if (record->steps > 0 && scene->def.settings.certificate_tolerance > 0)
         printf("stop rule      met in %zu steps, %.1f iterations in the mean; last step: %d at most, %" PRId64 " islands above\n",
                record->met, record->iterations_sum / (double)record->steps, last->iterations, c->islands_above);
+    if (record->limited_steps > 0)
+        printf("limited        %zu steps slowed islands down to the energy contacts can leave: too few iterations\n",
+               record->limited_steps);
     if (record->steps > 0 && last->repeated > 0)
         printf("repeated       %" PRId64 " steps, which outgrew the room or the plan they were begun with\n", last->repeated);
     if (record->steps > 0) printf("penetration    %.3g m at most\n", record->penetration_max);

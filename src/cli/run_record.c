@@ -55,6 +55,7 @@ bool run_record_step(struct run_record *record, const sadmm_world *world)
         record->ms[k][record->steps] = ms[k];
     }
     ++record->steps;
+    record->limited_steps += r->limited > 0;
     record->contacts_sum += r->contacts;
     record->iterations_sum += r->iterations_mean;
     record->met += r->converged;

@@ -7,8 +7,8 @@ sadmm_settings sadmm_settings_default(void)
     sadmm_settings s = {
         .dt = 0.005,
         .gravity = {0, 0, -9.81},
-        .method = SADMM_METHOD_PAPER,
-        .iterations = 100,
+        .method = SADMM_METHOD_FAST,
+        .iterations = 20,
         .relaxation = 1.8,
         .penalty_period = 30,
         .penalty_mass_factor = 16,

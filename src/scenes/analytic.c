@@ -19,20 +19,14 @@ static sadmm_status fill_incline(const struct sadmm_scene *scene, sadmm_world *w
     return sadmm_place_box(world, sadmm_frame_moved(slope, 0, 0, 0.1), &block, NULL, error);
 }
 
-static void configure_incline(long n, sadmm_world_def *def)
-{
-    (void)n;
-    def->settings.iterations = 100;
-}
-
 const struct sadmm_scene_family sadmm_family_incline = {
     .info = {
         .name = "incline",
         .arguments = "",
         .description = "a block on a slope at 0.99 of its friction angle: it must not creep",
         .duration = 5.0,
+        .iterations = {[SADMM_METHOD_PAPER] = 100, [SADMM_METHOD_FAST] = 20},
     },
-    .configure = configure_incline,
     .fill = fill_incline,
 };
 
@@ -58,7 +52,6 @@ static void configure_bounce(long n, sadmm_world_def *def)
 {
     (void)n;
     def->settings.dt = 0.001; /* the fall ends within v dt = 4 mm of the ground */
-    def->settings.iterations = 50;
 }
 
 const struct sadmm_scene_family sadmm_family_bounce = {
@@ -67,6 +60,7 @@ const struct sadmm_scene_family sadmm_family_bounce = {
         .arguments = "",
         .description = "five spheres with restitution 0 to 1 dropped from 1 m",
         .duration = 3.0,
+        .iterations = {[SADMM_METHOD_PAPER] = 50, [SADMM_METHOD_FAST] = 20},
     },
     .configure = configure_bounce,
     .fill = fill_bounce,
@@ -96,7 +90,6 @@ static void configure_spin_plate(long n, sadmm_world_def *def)
 {
     (void)n;
     def->settings.dt = 0.001;
-    def->settings.iterations = 1; /* nothing to iterate on */
     def->settings.gravity[2] = 0.0;
 }
 
@@ -106,6 +99,7 @@ const struct sadmm_scene_family sadmm_family_spin_plate = {
         .arguments = "",
         .description = "a free plate tumbling at 1000 rad/s without gravity",
         .duration = 10.0,
+        .iterations = {[SADMM_METHOD_PAPER] = 1, [SADMM_METHOD_FAST] = 1}, /* nothing to iterate on */
     },
     .configure = configure_spin_plate,
     .fill = fill_spin_plate,

@@ -84,7 +84,6 @@ static void configure(long n, sadmm_world_def *def)
 {
     (void)n;
     def->settings.dt = 0.005;
-    def->settings.iterations = 100;
     def->settings.penalty_period = 30;
 }
 
@@ -95,6 +94,7 @@ const struct sadmm_scene_family sadmm_family_burst = {
         .description = "a layer of cubes lands on N x N larger ones, all contacts in the same step "
                        "(N in [1, 250], default 10)",
         .duration = 1.0,
+        .iterations = {[SADMM_METHOD_PAPER] = 100, [SADMM_METHOD_FAST] = 30},
     },
     .n_default = 10, .n_min = 1, .n_max = 250,
     .configure = configure,

@@ -96,7 +96,6 @@ static void configure(long n, sadmm_world_def *def)
     (void)n;
     def->contact_margin = 0.3;
     def->settings.dt = 0.001;
-    def->settings.iterations = 300;
     def->settings.penalty_period = 100;
 }
 
@@ -106,6 +105,7 @@ const struct sadmm_scene_family sadmm_family_card_houses = {
         .arguments = "[:N]",
         .description = "N card houses of 66 cards (N in [1, 10000], default 6)",
         .duration = 10.0,
+        .iterations = {[SADMM_METHOD_PAPER] = 300, [SADMM_METHOD_FAST] = 20},
     },
     .n_default = 6, .n_min = 1, .n_max = 10000,
     .configure = configure,

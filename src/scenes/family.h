@@ -6,10 +6,10 @@
 #include "scenes.h"
 
 struct sadmm_scene_family {
-    struct sadmm_scene_info info;
+    struct sadmm_scene_info info; /* why a scene takes more than the default iterations: docs/scenes.md */
     long n_default, n_min, n_max; /* the N of "name:N"; n_max = 0: the scene takes no size */
 
-    /* Fill the settings of the scene (dt, iterations, m, margin) in a default definition. */
+    /* (optional) Fill the settings of the scene (dt, m, margin) in a default definition; iterations are in `info`. */
     void (*configure)(long n, sadmm_world_def *def);
     /* Fill an empty world made from scene->def. */
     sadmm_status (*fill)(const struct sadmm_scene *scene, sadmm_world *world, struct sadmm_error *error);

@@ -55,7 +55,6 @@ static void configure(long n, sadmm_world_def *def)
 {
     (void)n;
     def->settings.dt = 0.005;
-    def->settings.iterations = 100;
     def->settings.penalty_period = 30;
 }
 
@@ -65,6 +64,7 @@ const struct sadmm_scene_family sadmm_family_kicked_cubes = {
         .arguments = "[:N]",
         .description = "N cubes of 10 g on cubes of 10 kg, kicked every half second (N in [1, 100000], default 20)",
         .duration = 3.0,
+        .iterations = {[SADMM_METHOD_PAPER] = 100, [SADMM_METHOD_FAST] = 20},
     },
     .n_default = 20, .n_min = 1, .n_max = 100000,
     .configure = configure,

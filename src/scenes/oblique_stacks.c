@@ -55,7 +55,6 @@ static void configure(long n, sadmm_world_def *def)
 {
     (void)n;
     def->settings.dt = 0.005;
-    def->settings.iterations = 150;
     def->settings.penalty_period = 30;
 }
 
@@ -66,6 +65,7 @@ const struct sadmm_scene_family sadmm_family_oblique_stacks = {
         .description = "N stacks of 10 kg plates on 50 g cubes on a 30 degree slope, friction 3 "
                        "(N in [1, 10000], default 7)",
         .duration = 5.0,
+        .iterations = {[SADMM_METHOD_PAPER] = 150, [SADMM_METHOD_FAST] = 20},
     },
     .n_default = 7, .n_min = 1, .n_max = 10000,
     .configure = configure,

@@ -93,7 +93,6 @@ static void configure(long n, sadmm_world_def *def)
 {
     (void)n;
     def->settings.dt = 0.005;
-    def->settings.iterations = 100;
     def->settings.penalty_period = 30;
 }
 
@@ -103,6 +102,7 @@ const struct sadmm_scene_family sadmm_family_pile = {
         .arguments = "[:N]",
         .description = "N boxes falling into a heap (N in [1, 1000000], default 1000)",
         .duration = 3.0,
+        .iterations = {[SADMM_METHOD_PAPER] = 100, [SADMM_METHOD_FAST] = 60},
     },
     .n_default = 1000, .n_min = 1, .n_max = 1000000,
     .configure = configure,
@@ -115,6 +115,7 @@ const struct sadmm_scene_family sadmm_family_mixed_pile = {
         .arguments = "[:N]",
         .description = "N boxes of 30 g to 30 kg falling into a heap (N in [1, 1000000], default 300)",
         .duration = 3.0,
+        .iterations = {[SADMM_METHOD_PAPER] = 100, [SADMM_METHOD_FAST] = 100},
     },
     .n_default = 300, .n_min = 1, .n_max = 1000000,
     .configure = configure,
@@ -127,6 +128,7 @@ const struct sadmm_scene_family sadmm_family_sliding_pile = {
         .arguments = "[:N]",
         .description = "N boxes falling onto a slope that their heap slides down (N in [1, 1000000], default 300)",
         .duration = 3.0,
+        .iterations = {[SADMM_METHOD_PAPER] = 100, [SADMM_METHOD_FAST] = 60},
     },
     .n_default = 300, .n_min = 1, .n_max = 1000000,
     .configure = configure,

@@ -25,7 +25,6 @@ static void configure(long n, sadmm_world_def *def)
 {
     (void)n;
     def->settings.dt = 0.005;
-    def->settings.iterations = 100;
     def->settings.penalty_period = 30;
 }
 
@@ -35,6 +34,7 @@ const struct sadmm_scene_family sadmm_family_pyramid = {
         .arguments = "[:rows]",
         .description = "a flat pyramid of 1 kg cubes (rows in [1, 300], default 30)",
         .duration = 5.0,
+        .iterations = {[SADMM_METHOD_PAPER] = 100, [SADMM_METHOD_FAST] = 20},
     },
     .n_default = 30, .n_min = 1, .n_max = 300,
     .configure = configure,

@@ -94,8 +94,15 @@ sadmm_status sadmm_scene_open(const char *spec, struct sadmm_scene *scene, struc
     *scene = (struct sadmm_scene){
         .def = sadmm_world_def_default(), .duration = family->info.duration, .info = &family->info, .n = n
     };
-    family->configure(n, &scene->def);
+    if (family->configure) family->configure(n, &scene->def);
+    sadmm_scene_set_method(scene, scene->def.settings.method);
     return SADMM_OK;
+}
+
+void sadmm_scene_set_method(struct sadmm_scene *scene, sadmm_method method)
+{
+    scene->def.settings.method = method;
+    scene->def.settings.iterations = scene->info->iterations[method];
 }
 
 sadmm_status sadmm_scene_build(const struct sadmm_scene *scene, sadmm_world **world, struct sadmm_error *error)

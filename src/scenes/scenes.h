@@ -1,8 +1,9 @@
 /* The scene library: worlds built by name, shared by the command, the benchmarks, the tests and the examples.
  *
  * A scene is named by a spec: "name", or "name:N" where the scene takes a size. Opening a spec parses it and fills the
- * world definition with the scene's own settings; the caller may change that definition (backend, precision, dt,
- * iterations, ...) before the world is built from it.
+ * world definition with the scene's own settings, for the library's default method; the caller may change that
+ * definition (backend, precision, dt, iterations, ...) before the world is built from it. A scene has a number of
+ * iterations for each method: sadmm_scene_set_method sets both.
  */
 #ifndef SADMM_SCENES_H
 #define SADMM_SCENES_H
@@ -22,6 +23,7 @@ struct sadmm_scene_info {
     const char *arguments;   /* what may follow the name: ":N", or "" */
     const char *description; /* one line */
     double duration;         /* s, simulated time the scene is meant to be run for */
+    int iterations[SADMM_METHOD_COUNT]; /* a step, by method */
 };
 
 /* The scenes, index in [0, count); NULL outside. Static storage. */
@@ -39,6 +41,10 @@ struct sadmm_scene {
 /* Parse `spec` and fill `scene`. Errors: INVALID_ARGUMENT (unknown name: the message lists the valid ones; N out of
  * the scene's range). */
 sadmm_status sadmm_scene_open(const char *spec, struct sadmm_scene *scene, struct sadmm_error *error);
+
+/* Solve the scene by `method` in [0, SADMM_METHOD_COUNT): sets the method in scene->def.settings, and the iterations to
+ * the scene's own for it. */
+void sadmm_scene_set_method(struct sadmm_scene *scene, sadmm_method method);
 
 /* Create a world from scene->def and fill it. The caller destroys it. Errors: those of sadmm_world_create and of the
  * calls that add bodies and shapes; *world is NULL after an error. */

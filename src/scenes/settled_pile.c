@@ -70,7 +70,6 @@ static void configure(long n, sadmm_world_def *def)
 {
     (void)n;
     def->settings.dt = 0.005;
-    def->settings.iterations = 100;
     def->settings.penalty_period = 30;
 }
 
@@ -80,6 +79,7 @@ const struct sadmm_scene_family sadmm_family_settled_pile = {
         .arguments = "[:N]",
         .description = "N cubes of 1 kg at rest in up to ten staggered layers (N in [1, 1000000], default 10000)",
         .duration = 2.0,
+        .iterations = {[SADMM_METHOD_PAPER] = 100, [SADMM_METHOD_FAST] = 20},
     },
     .n_default = 10000, .n_min = 1, .n_max = 1000000,
     .configure = configure,

@@ -94,7 +94,6 @@ static void configure(long n, sadmm_world_def *def)
 {
     (void)n;
     def->settings.dt = 0.005;
-    def->settings.iterations = 120;
     def->settings.penalty_period = 30;
 }
 
@@ -104,6 +103,7 @@ const struct sadmm_scene_family sadmm_family_sliding_cubes = {
         .arguments = "[:N]",
         .description = "N cubes of 1 kg in a layered raft that slides down a slope (N in [1, 1000000], default 2000)",
         .duration = 5.0,
+        .iterations = {[SADMM_METHOD_PAPER] = 120, [SADMM_METHOD_FAST] = 20},
     },
     .n_default = 2000, .n_min = 1, .n_max = 1000000,
     .configure = configure,
