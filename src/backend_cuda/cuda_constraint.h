@@ -26,21 +26,56 @@ struct point_data {
     double arm[2][3], lambda[3], error;
 };
 
-static __device__ __forceinline__ point_data load_point(const cuda_view &v, int32_t p, int32_t k, const pair_data &pair)
+/* The same in this precision, as it is in memory; lambda[0] alone where contacts have one row. */
+struct point_numbers {
+    real4 arm;
+    solver_real lambda[3];
+};
+
+static __device__ __forceinline__ point_numbers fetch_point(const cuda_view &v, int32_t p, int32_t k)
 {
     const size_t slot = point_slot(v, p, k);
-    const real4 arm = v.arm[slot];
-    const double r[3] = {(double)arm.x, (double)arm.y, (double)arm.z};
+    point_numbers point;
+    point.arm = v.arm[slot];
+    point.lambda[0] = v.lambda[slot];
+    point.lambda[1] = v.contact_rows == 1 ? 0 : v.lambda[v.lambda_stride + slot];
+    point.lambda[2] = v.contact_rows == 1 ? 0 : v.lambda[2 * v.lambda_stride + slot];
+    return point;
+}
+
+static __device__ __forceinline__ point_data point_of(const cuda_view &v, const point_numbers &numbers,
+                                                      const pair_data &pair)
+{
+    const double r[3] = {(double)numbers.arm.x, (double)numbers.arm.y, (double)numbers.arm.z};
     point_data point;
-    point.error = (double)arm.w;
+    point.error = (double)numbers.arm.w;
 #pragma unroll
     for (int j = 0; j < 3; ++j) {
         point.arm[0][j] = r[j];
         point.arm[1][j] = r[j] + pair.difference[j];
-        point.lambda[j] = v.contact_rows == 1 ? (double)v.lambda[slot] * pair.normal[j]
-                                              : (double)v.lambda[(size_t)j * v.lambda_stride + slot];
+        point.lambda[j] = v.contact_rows == 1 ? (double)numbers.lambda[0] * pair.normal[j] : (double)numbers.lambda[j];
     }
     return point;
+}
+
+static __device__ __forceinline__ point_data load_point(const cuda_view &v, int32_t p, int32_t k, const pair_data &pair)
+{
+    return point_of(v, fetch_point(v, p, k), pair);
+}
+
+/* use(point) for each point of a pair, in order. */
+template <class Use>
+static __device__ __forceinline__ void for_each_point(const cuda_view &v, int32_t p, const pair_data &pair, Use use)
+{
+    for (int32_t first = 0; first < pair.count; first += POINTS_AT_ONCE) {
+        point_numbers numbers[POINTS_AT_ONCE] = {};
+#pragma unroll
+        for (int32_t j = 0; j < POINTS_AT_ONCE; ++j)
+            if (first + j < pair.count) numbers[j] = fetch_point(v, p, first + j);
+#pragma unroll
+        for (int32_t j = 0; j < POINTS_AT_ONCE; ++j)
+            if (first + j < pair.count) use(point_of(v, numbers[j], pair));
+    }
 }
 
 static __device__ __forceinline__ double dot3(const double a[3], const double b[3])
@@ -76,11 +111,14 @@ static __device__ void add_half(const cuda_view &v, int32_t code, double g[6], d
     const pair_data pair = load_pair(v, p);
     const double sign = side ? 1 : -1;
     double force[3] = {};
-    for (int32_t k = 0; k < pair.count; ++k) {
-        const point_data point = load_point(v, p, k, pair);
-        for (int j = 0; j < 3; ++j) force[j] += point.lambda[j];
-        add_cross(side ? point.arm[1] : point.arm[0], point.lambda, sign, g + 3);
-    }
+    for_each_point(v, p, pair, [&](const point_data &point) {
+        double arm[3];
+        for (int j = 0; j < 3; ++j) {
+            arm[j] = side ? point.arm[1][j] : point.arm[0][j];
+            force[j] += point.lambda[j];
+        }
+        add_cross(arm, point.lambda, sign, g + 3);
+    });
     for (int j = 0; j < 3; ++j) g[j] += sign * force[j];
     *push += sqrt(dot3(force, force));
 }

@@ -195,6 +195,10 @@ static __device__ __forceinline__ size_t point_slot(const cuda_view &v, int32_t 
     return v.lanes == 1 ? point_slot<1>(v, p, k) : point_slot<4>(v, p, k);
 }
 
+/* Points of a pair that are fetched before the first of them is used: a thread that waits for memory point by point waits
+ * longest of all. */
+enum { POINTS_AT_ONCE = 4 };
+
 /* This step's counts; 0 when it is halted. */
 static __device__ __forceinline__ int32_t live_bodies(const cuda_view &v) { return v.live->halt ? 0 : v.bodies; }
 static __device__ __forceinline__ int32_t live_pairs(const cuda_view &v) { return v.live->halt ? 0 : v.live->pairs; }

@@ -39,15 +39,25 @@ static __device__ __forceinline__ double weigh_pair(const cuda_view &v, int32_t 
 static __device__ void add_pair(const cuda_view &v, const struct sadmm_contact_pair *pair, int side, double weight,
                                 arm_sums *sums, double C[PACKED])
 {
-    for (int32_t k = 0; k < pair->count; ++k) {
-        const struct sadmm_contact_point *point = &v.raw_points[pair->first + k];
-        const double *r = side ? point->arm_b : point->arm_a;
-        if (v.contact_rows == 3) {
-            add_arm(sums, r, weight);
-        } else {
-            double row[6];
-            sadmm_contact_row(v3_load(pair->normal), r, 1, row);
-            packed_add_row(C, row, weight);
+    const int32_t count = pair->count;
+    const struct sadmm_contact_point *points = v.raw_points + pair->first;
+    for (int32_t first = 0; first < count; first += POINTS_AT_ONCE) {
+        double arms[POINTS_AT_ONCE][3] = {};
+#pragma unroll
+        for (int32_t j = 0; j < POINTS_AT_ONCE; ++j) {
+            const double *r = side ? points[first + j].arm_b : points[first + j].arm_a;
+            for (int i = 0; i < 3 && first + j < count; ++i) arms[j][i] = r[i];
+        }
+#pragma unroll
+        for (int32_t j = 0; j < POINTS_AT_ONCE; ++j) {
+            if (first + j >= count) continue;
+            if (v.contact_rows == 3) {
+                add_arm(sums, arms[j], weight);
+            } else {
+                double row[6];
+                sadmm_contact_row(v3_load(pair->normal), arms[j], 1, row);
+                packed_add_row(C, row, weight);
+            }
         }
     }
 }
