@@ -252,10 +252,10 @@ START_TEST(bounces_are_taken_back)
 {
     const struct limit_energies bounce = {.now = 2, .free = 2}, pushed = {.now = 2, .free = 2, .work = 2};
     ck_assert_double_eq(limit_factor(&bounce), 1);
-    ck_assert_double_eq(limit_bounce_factor(&bounce, 2), 1);
-    ck_assert_double_eq(limit_bounce_factor(&bounce, 1), 0.5);
-    ck_assert_double_eq(limit_bounce_factor(&bounce, -2), 0.25);
-    ck_assert_double_eq(limit_bounce_factor(&pushed, 1), 1);
+    ck_assert_double_eq(limit_bounce_factor(&bounce, 2, 1e-16), 1);
+    ck_assert_double_eq(limit_bounce_factor(&bounce, 1, 1e-16), 0.5);
+    ck_assert_double_eq(limit_bounce_factor(&bounce, -2, 1e-16), 0.25);
+    ck_assert_double_eq(limit_bounce_factor(&pushed, 1, 1e-16), 1);
     ck_assert(limit_few(1, 19) && !limit_few(1, 20) && !limit_few(0, 19));
 }
 END_TEST

@@ -61,7 +61,7 @@ static bool any_suspect(struct sadmm_context *c, bool few)
         const struct cpu_island *island = &c->islands[i];
         if (c->label[i] != i) continue;
         any = any || limit_suspects(island->limit.now, island->limit.free) ||
-              (few && limit_bounces(island->limit.now, island->limit.free, island->along));
+              (few && limit_bounces(island->limit.now, island->limit.free, island->along, (double)SADMM_EPSILON));
     }
     return any;
 }
@@ -99,7 +99,7 @@ sadmm_status CPU(limit_velocity)(struct sadmm_context *c, int32_t *limited, stru
     for (int32_t i = 0; i < c->bodies; ++i) {
         const struct cpu_island *island = &c->islands[c->label[i]];
         double factor = limit_factor(&island->limit);
-        if (few) factor = fmin(factor, limit_bounce_factor(&island->limit, island->along));
+        if (few) factor = fmin(factor, limit_bounce_factor(&island->limit, island->along, (double)SADMM_EPSILON));
         if (factor == 1) continue;
         *limited += c->label[i] == i;
         for (int k = 0; k < 6; ++k) c->state[(size_t)i * ROW + (size_t)k] *= (real)factor;

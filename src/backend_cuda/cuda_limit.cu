@@ -70,7 +70,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     if (!add_up_island<add_terms>(v, t, own_number(term, t.lane), total) || t.lane != 0) return;
     const struct limit_energies energies = {total[0], total[1], total[2], total[3]};
     const double allowed = limit_factor(&energies),
-                 factor = args.few ? fmin(allowed, limit_bounce_factor(&energies, total[4])) : allowed;
+                 factor = args.few ? fmin(allowed, limit_bounce_factor(&energies, total[4], SOLVER_EPSILON)) : allowed;
     v.islands[v.label[t.body]].slow_down = factor;
     if (factor != 1) atomicAdd(v.limited, 1);
 }

@@ -29,25 +29,13 @@ static __device__ __forceinline__ void move_body(const cuda_view &v, int32_t i, 
 static __device__ __forceinline__ void add_pair_wrench(const cuda_view &v, int32_t p, int side, double per_dt, double wrench[6])
 {
     const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
-    const vec3 normal = v3_load(pair->normal);
-    const struct sadmm_contact_point *points = v.raw_points + pair->first;
-    const int32_t count = pair->count;
-    const double sign = side ? per_dt : -per_dt;
-    for (int32_t first = 0; first < count; first += POINTS_AT_ONCE) {
-        vec3 impulse[POINTS_AT_ONCE], arm[POINTS_AT_ONCE];
-#pragma unroll
-        for (int32_t j = 0; j < POINTS_AT_ONCE; ++j) {
-            const bool there = first + j < count;
-            impulse[j] = there ? point_impulse(v, p, first + j, normal) : v3(0, 0, 0);
-            arm[j] = there ? v3_load(side ? points[first + j].arm_b : points[first + j].arm_a) : v3(0, 0, 0);
-        }
-#pragma unroll
-        for (int32_t j = 0; j < POINTS_AT_ONCE; ++j) {
-            if (first + j >= count) continue;
-            const vec3 f = impulse[j], m = v3_cross(arm[j], f);
-            wrench[0] += sign * f.x, wrench[1] += sign * f.y, wrench[2] += sign * f.z;
-            wrench[3] += sign * m.x, wrench[4] += sign * m.y, wrench[5] += sign * m.z;
-        }
+    vec3 normal = v3_load(pair->normal);
+    for (int32_t k = 0; k < pair->count; ++k) {
+        const struct sadmm_contact_point *point = &v.raw_points[pair->first + k];
+        vec3 f = point_impulse(v, p, k, normal), m = v3_cross(v3_load(side ? point->arm_b : point->arm_a), f);
+        double sign = side ? per_dt : -per_dt;
+        wrench[0] += sign * f.x, wrench[1] += sign * f.y, wrench[2] += sign * f.z;
+        wrench[3] += sign * m.x, wrench[4] += sign * m.y, wrench[5] += sign * m.z;
     }
 }
 

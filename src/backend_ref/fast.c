@@ -417,7 +417,7 @@ sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *c, int32_t *limited,
         struct ref_body *body = &c->bodies[i];
         const struct ref_body *island = &c->bodies[body->label];
         double factor = limit_factor(&island->limit);
-        if (few) factor = fmin(factor, limit_bounce_factor(&island->limit, island->along));
+        if (few) factor = fmin(factor, limit_bounce_factor(&island->limit, island->along, DBL_EPSILON));
         if (factor < 1 && body->label == i) ++*limited;
         for (int j = 0; j < 6; ++j) body->v[j] *= factor;
     }

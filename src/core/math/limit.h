@@ -37,9 +37,10 @@ SADMM_INLINE double limit_factor(const struct limit_energies *e)
     return limit_suspects(e->now, allowed) ? sqrt(allowed / e->now) : 1;
 }
 
-/* What goes along the free motion by less than this share is left to come to rest by itself; rounding of velocities in single
- * precision is below that. */
-#define LIMIT_STILL 1e-6
+/* What goes along the free motion by less than this share is left to come to rest by itself; so is what may be
+ * rounding, by epsilon of the solver's precision. */
+#define LIMIT_STILL 1e-8
+#define LIMIT_STILL_ROUNDING 10.0
 /* The least factor: islands that would be stopped in every step could not find their way out. */
 #define LIMIT_LEAST 0.25
 
@@ -47,16 +48,16 @@ SADMM_INLINE double limit_factor(const struct limit_energies *e)
 SADMM_INLINE int limit_few(int warm, int iterations) { return warm && iterations < WEIGHT_FEW; }
 
 /* `along`: v . A v_f / 2, J. */
-SADMM_INLINE int limit_bounces(double now, double free, double along)
+SADMM_INLINE int limit_bounces(double now, double free, double along, double epsilon)
 {
-    return now > (1 + LIMIT_ROUNDING) * along + LIMIT_STILL * free;
+    return now > (1 + LIMIT_ROUNDING) * along + fmax(LIMIT_STILL, LIMIT_STILL_ROUNDING * epsilon) * free;
 }
 
 /* The factor that takes v back to the sphere, 1: none. */
-SADMM_INLINE double limit_bounce_factor(const struct limit_energies *e, double along)
+SADMM_INLINE double limit_bounce_factor(const struct limit_energies *e, double along, double epsilon)
 {
     double factor;
-    if (!limit_bounces(e->now, e->free, along)) return 1;
+    if (!limit_bounces(e->now, e->free, along, epsilon)) return 1;
     factor = (along + sqrt(along * along + 2 * e->now * e->work)) / (2 * e->now);
     return factor > 1 - LIMIT_ROUNDING ? 1 : fmax(factor, LIMIT_LEAST);
 }
