@@ -296,6 +296,33 @@ START_TEST(run_prints)
 }
 END_TEST
 
+/* Who stopped when; nothing without a tolerance. */
+START_TEST(run_stops)
+{
+    json_t *r = run_json("run pyramid:3 --steps 12 --backend cpu --iterations 70 --json -");
+    ck_assert(json_is_null(at(r, "stop")));
+    json_decref(r);
+    r = run_json("run pyramid:3 --steps 12 --backend cpu --iterations 70 --tolerance 1e-6 --check-period 7 --certify --json -");
+    ck_assert_double_eq(number(r, "stop.tolerance"), 1e-6);
+    ck_assert_double_eq(number(r, "stop.steps_met"), 12); /* it stands, from loads that were predicted */
+    ck_assert_double_le(number(r, "certificate.ncp_max_run"), 1e-6);
+    ck_assert_double_ge(number(r, "stop.iterations_mean"), 7);
+    ck_assert_double_lt(number(r, "stop.iterations_mean"), 70);
+    ck_assert_double_eq(fmod(number(r, "stop.iterations_last"), 7), 0);
+    ck_assert_double_eq(number(r, "stop.islands_above_last"), 0);
+    json_decref(r);
+    r = run_json("run pyramid:3 --steps 3 --backend cpu --method paper --iterations 2 --tolerance 1e-12 --json -");
+    ck_assert_double_eq(number(r, "stop.steps_met"), 0);
+    ck_assert_double_eq(number(r, "stop.iterations_mean"), 2);
+    ck_assert_double_eq(number(r, "stop.islands_above_last"), 1);
+    json_decref(r);
+    MUST("run pyramid:3 --steps 3 --backend cpu --tolerance 1e-6", 0);
+    ck_assert_msg(strstr(out, "stop rule      met in 3 steps") != NULL, "%s", out);
+    MUST("run pyramid:3 --steps 1 --tolerance -1", 2);
+    MUST("run pyramid:3 --steps 1 --tolerance 1e-6 --check-period 0", 2);
+}
+END_TEST
+
 /* Duration / dt steps when none are asked for. */
 START_TEST(run_default_steps)
 {
@@ -634,6 +661,7 @@ int main(void)
     tcase_add_test(tests, run_reports);
     tcase_add_test(tests, run_reports_null);
     tcase_add_test(tests, run_prints);
+    tcase_add_test(tests, run_stops);
     tcase_add_test(tests, run_default_steps);
     tcase_add_loop_test(tests, same_hash, 0, 4);
     tcase_add_test(tests, iterations_follow_the_method);
