@@ -548,6 +548,16 @@ START_TEST(tiers_stop_alike)
     expect_same_world(budget, late, "a look at the end");
     ck_assert_int_eq(world_report(late).converged, false);
     ck_assert_int_eq(world_report(late).certificate.islands_above, 1);
+    /* nothing of the rule is left without it */
+    settings = sadmm_world_settings(late);
+    settings.method = SADMM_METHOD_PAPER;
+    settings.certificate_tolerance = 0;
+    MUST(late, sadmm_world_set_settings(late, &settings));
+    step_world(late, 2);
+    ck_assert_int_eq(world_report(late).converged, false);
+    ck_assert_int_eq(world_report(late).certificate.islands_above, -1);
+    ck_assert_int_eq(world_report(late).iterations, settings.iterations);
+    ck_assert_double_eq(world_report(late).iterations_mean, settings.iterations);
     sadmm_world_destroy(first);
     sadmm_world_destroy(budget);
     sadmm_world_destroy(late);

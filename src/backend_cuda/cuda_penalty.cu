@@ -256,6 +256,7 @@ sadmm_status CUDA(enqueue_penalties)(struct sadmm_context *c, struct sadmm_error
     cuda_args args = {};
     args.planned = true;
     c->starting = !c->fast;
+    c->looks = 0;
     c->cleared = SCALAR_PRIMAL | SCALAR_DUAL | SCALAR_BARRIER; /* cuda_step_check.h */
     c->placed = c->measured = c->rescaled = false;
     if (c->fast) return CUDA(enqueue_weighted_penalties)(c, true, true, true, error);
