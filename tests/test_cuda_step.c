@@ -4,6 +4,7 @@
  * equal to the last bit, however the steps were enqueued, planned or repeated. A stop rule that is never met sends a
  * world through the host: `by_host`. The same checks run on the emulated device (test_cuda_step_emulated.c).
  */
+#include <math.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -442,6 +443,35 @@ START_TEST(fast_steps_in_the_queue)
 }
 END_TEST
 
+/* A box of a tower, tall enough to have its gaps eased, is turned: pairs have eight points where the plan has four. The step
+ * is repeated; what ran before that must not reach behind the points there is room for (the address sanitizer tells). */
+START_TEST(more_points_than_planned_in_a_tall_tower)
+{
+    const int precision = _i;
+    sadmm_world *worlds[2];
+    for (int w = 0; w < 2; ++w) {
+        sadmm_world_def def = sadmm_world_def_default();
+        def.backend = SADMM_BACKEND_CPU;
+        def.precision = (sadmm_precision)precision;
+        worlds[w] = create_world(&def);
+        add_ground(worlds[w], 0.5);
+        for (int i = 0; i < 26; ++i) add_box(worlds[w], 0, 0, 0.1 + 0.2 * i, 0.1, 1, 0.5);
+        use_device(worlds[w], precision, 0);
+        if (w == 0) by_host(worlds[w]);
+        step_world(worlds[w], 3);
+        sadmm_body_state state = body_state(worlds[w], body_at(worlds[w], 24));
+        const double half[4] = {cos(0.39269908169872414), 0, 0, sin(0.39269908169872414)}; /* 45 degrees about z */
+        memcpy(state.orientation, half, sizeof half);
+        MUST(worlds[w], sadmm_world_set_body_state(worlds[w], body_at(worlds[w], 24), &state));
+        step_world(worlds[w], 2);
+    }
+    ck_assert_int_eq(world_report(worlds[1]).contacts, 24 * 4 + 2 * 8);
+    ck_assert_int_gt(world_report(worlds[1]).repeated, 0);
+    expect_same_world(worlds[0], worlds[1], "turned");
+    for (int w = 0; w < 2; ++w) sadmm_world_destroy(worlds[w]);
+}
+END_TEST
+
 /* Two towers that do not touch each other, or one of them, `lift` above the ground, with a stop rule. */
 static sadmm_world *stopping_towers(int first, int count, double lift, int precision, double tolerance, int check_period)
 {
@@ -462,23 +492,27 @@ static sadmm_world *stopping_towers(int first, int count, double lift, int preci
     return world;
 }
 
-/* The stop rule of whole steps: in tier BLOCK an island stops when it would stop if it were alone, and then as the host's
+/* The stop rule of whole steps: in every tier an island stops when it would stop if it were alone, and then as the host's
  * look at the certificate has it. */
 START_TEST(islands_stop_by_themselves)
 {
-    const int precision = _i, steps = EMULATED ? 24 : 60;
+    static const enum sadmm_cuda_tier stopping_tiers[] = {SADMM_CUDA_TIER_BLOCK, SADMM_CUDA_TIER_STREAM,
+                                                          SADMM_CUDA_TIER_GRID, SADMM_CUDA_TIER_CLUSTER};
+    const int precision = _i / 4, steps = EMULATED ? 18 : 60;
     const double tolerance = precision == SADMM_F32 ? 1e-5 : 1e-7;
-    sadmm_world *both = stopping_towers(0, 2, 0.02, precision, tolerance, 3), *alone[2];
+    sadmm_world *both = stopping_towers(0, 2, 0.008, precision, tolerance, 3), *alone[2];
     for (int t = 0; t < 2; ++t) {
-        alone[t] = stopping_towers(t, 1, 0.02, precision, tolerance, 3);
+        alone[t] = stopping_towers(t, 1, 0.008, precision, tolerance, 3);
         sadmm_settings settings = sadmm_world_settings(alone[t]);
         settings.residual_tolerance = 1e30; /* always met: sends the world through the host */
         MUST(alone[t], sadmm_world_set_settings(alone[t], &settings));
     }
-    force_tier(tables[precision], both->context, SADMM_CUDA_TIER_BLOCK);
+    force_tier(tables[precision], both->context, stopping_tiers[_i % 4]);
     int apart = 0, above = 0;
     for (int step = 0; step < steps; ++step) {
-        MUST(both, sadmm_world_step(both));
+        sadmm_status status = sadmm_world_step(both);
+        if (strstr(sadmm_world_message(both), "the device has no clusters")) break;
+        ck_assert_msg(status == SADMM_OK, "%s", sadmm_world_message(both));
         sadmm_step_report got = world_report(both), want[2];
         int64_t left = 0;
         for (int t = 0; t < 2; ++t) {
@@ -499,7 +533,7 @@ START_TEST(islands_stop_by_themselves)
         apart += want[0].iterations != want[1].iterations;
         above += left > 0;
     }
-    ck_assert_int_gt(apart, 0);
+    if (world_report(both).step == steps) ck_assert_int_gt(apart, 0);
     ck_assert_int_lt(above, steps); /* and some steps did meet it */
     for (int t = 0; t < 2; ++t) sadmm_world_destroy(alone[t]);
     sadmm_world_destroy(both);
@@ -655,7 +689,8 @@ int main(void)
     ADD_CASE(suite, a_step_that_fails_leaves_the_world_before_it, 0, parts);
     ADD_CASE(suite, tiers_agree, 0, 2 * parts);
     ADD_CASE(suite, fast_steps_in_the_queue, 0, parts);
-    ADD_CASE(suite, islands_stop_by_themselves, 0, parts);
+    ADD_CASE(suite, more_points_than_planned_in_a_tall_tower, 0, parts);
+    ADD_CASE(suite, islands_stop_by_themselves, 0, 4 * parts);
     ADD_CASE(suite, tiers_stop_alike, 0, parts);
     ADD_CASE(suite, worlds_side_by_side, 0, 1);
     ADD_CASE(suite, lack_of_memory, 0, parts);

@@ -132,8 +132,9 @@ SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_s
  * names the body), DEVICE, LIMIT. After an error the world is as before the step and stays usable. */
 SADMM_API sadmm_status sadmm_world_step(sadmm_world *world);
 
-/* Begin a step and return without waiting for it, where the backend can (CUDA without a stop rule, from the second step on
- * in the method FAST); elsewhere the same as sadmm_world_step. Steps run in order, a few of them at a time; states, wrenches and settings set in between take
+/* Begin a step and return without waiting for it, where the backend can (CUDA, from the second step on in the
+ * method FAST; not with a residual_tolerance, nor with a certificate_tolerance in the method PAPER or more than 64 looks a
+ * step); elsewhere the same as sadmm_world_step. Steps run in order, a few of them at a time; states, wrenches and settings set in between take
  * effect at the next one. Getters wait for the steps begun so far.
  * Errors: as sadmm_world_step; they may be those of an earlier step, and then nothing after that step has been done
  * (sadmm_step_report.step counts what has). With settings.certify the step is waited for.
@@ -158,9 +159,9 @@ typedef struct sadmm_step_report {
     int32_t contacts;              /* contact points of the step */
     int32_t pairs;                 /* shape pairs with at least one contact */
     int iterations;                /* done; with a stop rule on CUDA (below): by the island that did most */
-    double iterations_mean;        /* over islands. The same, but where whole steps are made on CUDA (method FAST, world
-                                      level, settings.certificate_tolerance): there every island is looked at by itself
-                                      and, where islands are small, stops by itself */
+    double iterations_mean;        /* over islands. The same, but where whole steps are made on CUDA with a stop rule
+                                      (method FAST, settings.certificate_tolerance, at most 64 looks a step): there every
+                                      island is looked at by itself and stops by itself */
     bool converged;                /* a stop rule was met, by every island */
     int32_t limited;               /* method FAST: islands that ended the iterations with more kinetic energy than
                                       contacts can leave them with, or with fewer than 20 iterations in a bounce that

@@ -106,7 +106,7 @@ struct cuda_island {
 enum { LOOKS_KEPT = 3 };     /* the last look's, this one's, the next one's */
 struct cuda_stop {
     unsigned long long sum;    /* of the iterations of islands that have stopped */
-    int32_t unmet[LOOKS_KEPT]; /* islands that have not, by the number of the look */
+    int32_t unmet[LOOKS_KEPT]; /* islands that had not, by the number of the look */
     int32_t last;              /* the most iterations of those that have */
 };
 

@@ -1,6 +1,7 @@
-/* Sums and maxima over islands, in the kernel that makes their terms: slots are by island, and a body's place in its island is what
- * the order of a sum depends on. Of SPREAD neighbours that are SPREAD^k apart the one that comes last adds up all of them, in
- * order, and goes on to the next power; so every sum has one order, whatever surrounds the island and whoever comes last. */
+/* Sums and maxima over islands, in the kernel that makes their terms: slots are by island, and a body's place in its island
+ * is what the order of a sum depends on. Of SPREAD neighbours that are SPREAD^k apart the one that comes last adds up all of
+ * them, in order, and goes on to the next power; so every sum has one order, whatever surrounds the island and whoever comes
+ * last. */
 #ifndef SADMM_CUDA_ISLANDS_H
 #define SADMM_CUDA_ISLANDS_H
 
@@ -13,11 +14,12 @@ struct add_terms {
     static __device__ __forceinline__ double join(double a, double b) { return a + b; }
 };
 struct largest_term { /* a NaN stays */
-    static __device__ __forceinline__ double join(double a, double b) { return !(b <= a) ? b : a; }
+    static __device__ __forceinline__ double join(double a, double b) { return a != a || b <= a ? a : b; }
 };
 
-/* Terms of a body, term k in lane k, added up (or what Join says) over its island. True in the lanes of one body of each island; those have all
- * of the sums in `sum`, and what any body of the island has written before it came here. Every lane of the warp comes here. */
+/* Terms of a body, term k in lane k, added up (or what Join says) over its island. True in the lanes of one body of each
+ * island; those have all of the sums in `sum`, and see what any body of the island has written before it came here. Every
+ * lane of the warp comes here. */
 template <class Join>
 static __device__ __forceinline__ bool add_up_island(const cuda_view &v, const body_thread &t, double term,
                                                      double sum[TERMS])
@@ -35,16 +37,17 @@ static __device__ __forceinline__ bool add_up_island(const cuda_view &v, const b
         const int32_t members = places < SPREAD ? (int32_t)places : (int32_t)SPREAD;
         const bool alone = !on || members < 2 || apart >= bodies;
         bool last = on;
-        __threadfence(); /* what every lane has written, before its body is counted */
         __syncwarp((unsigned)ALL_LANES);
         if (!alone && t.lane == 0) {
             const unsigned long long one = 1ull << ARRIVAL_BITS * power;
+            __threadfence(); /* what the lanes have written, before their body is counted */
             const unsigned long long before = atomicAdd(&v.arrivals[first + begin], one);
             last = (int32_t)(before >> ARRIVAL_BITS * power & ((1u << ARRIVAL_BITS) - 1)) + 1 == members;
             if (last) atomicAdd(&v.arrivals[first + begin], 0ull - one * (unsigned long long)members);
+            __threadfence(); /* and what the others have */
         }
         on = __shfl_sync((unsigned)ALL_LANES, last, 0, LANES);
-        __threadfence(); /* and what others have */
+        __syncwarp((unsigned)ALL_LANES);
         if (alone || !on) continue;
         rank = begin;
         double *to = v.terms + (size_t)(first + begin) * TERMS;

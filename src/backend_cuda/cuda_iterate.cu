@@ -55,6 +55,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const int32_t i = (int32_t)(block * (unsigned)BODY_THREADS + threadIdx.x);
     if (i >= live_bodies(v) || (FAST && all_stopped(v, args.looks))) return;
     const size_t at = args.in_order ? (size_t)i : (size_t)v.body_of[i];
+    if (FAST && island_stopped(v, args.looks, (int32_t)at)) return;
     const real ratio = JOIN && args.rescaled ? (real)*v.ratio : (real)1;
     real line[LINE], b[ROW], state[ROW], g[6];
     load_numbers_once<LINE / 4>(line, v.lines + at * LINE);
@@ -276,7 +277,8 @@ static __global__ void __launch_bounds__(THREADS)
     if (FAST && all_stopped(v, args.looks)) return;
     if (k < 0)
         with_pair<LANES_A_PAIR>(v, t, [&](int32_t p, int32_t lane, bool live) {
-            primal = sweep_pair<CONTACT_ROWS, LANES_A_PAIR, COUNT, MEASURE, FAST>(v, p, lane, live, (real)args.factor);
+            const bool on = live && !(FAST && pair_stopped(v, args.looks, v.ends[p]));
+            primal = sweep_pair<CONTACT_ROWS, LANES_A_PAIR, COUNT, MEASURE, FAST>(v, p, lane, on, (real)args.factor);
         });
     else if (k < live_rows(v))
         primal = FAST ? sweep_row_block_fast<MEASURE>(v, k, (real)args.factor) : sweep_row_block<MEASURE>(v, k);

@@ -36,7 +36,7 @@ static __device__ __forceinline__ double largest_of_lanes(double x)
 #pragma unroll
     for (int o = 1; o < LANES; o *= 2) {
         const double other = __shfl_xor_sync((unsigned)ALL_LANES, x, o);
-        x = !(other <= x) ? other : x;
+        x = x != x || other <= x ? x : other;
     }
     return x;
 }

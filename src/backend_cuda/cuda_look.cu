@@ -1,7 +1,9 @@
-/* The method `fast`: the stop rule of whole steps. A look finds each island's part of the certificate (core/certificate.c), the
- * natural map of its contacts and its momentum error; an island that meets the tolerances has stopped: tier BLOCK leaves a block
- * out whose islands have all stopped, the other tiers stop with the last island. The scale of the momentum error is the
- * island's own, which is no less strict than the certificate's. In double, eight lanes a body. */
+/* The method `fast`: the stop rule of whole steps. A look finds each island's part of the certificate (core/certificate.c),
+ * the natural map of its contacts and its momentum error. An island that meets the tolerances has stopped, in every tier
+ * after as many iterations as if it were alone: nothing is written to it any more. Tier BLOCK leaves a block out whose islands
+ * have all stopped; the other tiers have nothing left to do once the last island has. The scale of the momentum error is the
+ * island's own, which is no less strict than the certificate's (but for islands where nothing pushes: there the tolerance of
+ * the natural map says what is nothing). In double, eight lanes a body. */
 #include "cuda_constraint.h"
 #include "cuda_islands.h"
 #include "cuda_look.h"
@@ -68,16 +70,16 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     term[0] = largest_of_lanes(map);
     term[1] = largest_of_lanes(fabs(momentum - row.b - g));
     term[2] = largest_of_lanes(largest_term::join(fabs(g), largest_term::join(fabs(momentum), fabs(row.b))));
+    term[2] = fmax(term[2], t.live ? mass_of(v, t.body) * v.settings.certificate_tolerance : 0);
     if (!add_up_island<largest_term>(v, t, own_number(term, t.lane), largest) || t.lane != 0) return;
     const bool met = largest[0] <= v.settings.certificate_tolerance &&
                      largest[1] <= v.settings.certificate_momentum_tolerance * largest[2];
-    int32_t *stopped = &v.islands[v.label[t.body]].stopped, before = *stopped;
+    int32_t *stopped = &v.islands[v.label[t.body]].stopped;
     if (!met) atomicAdd(&v.stop->unmet[args.looks % LOOKS_KEPT], 1);
-    if (met == (before > 0)) return;
-    *stopped = met ? args.count : 0;
-    /* islands of one block go on until all of them have stopped, and one may start again */
-    atomicAdd(&v.stop->sum, met ? (unsigned long long)args.count : 0ull - (unsigned long long)before);
-    if (met) atomicMax(&v.stop->last, args.count);
+    if (!met || *stopped > 0) return;
+    *stopped = args.count;
+    atomicAdd(&v.stop->sum, (unsigned long long)args.count);
+    atomicMax(&v.stop->last, args.count);
 }
 
 sadmm_status CUDA(enqueue_look)(struct sadmm_context *c, int done, struct sadmm_error *error)

@@ -10,11 +10,27 @@ static __device__ __forceinline__ bool all_stopped(const cuda_view &v, int32_t l
     return looks > 0 && v.stop->unmet[looks % LOOKS_KEPT] == 0;
 }
 
-/* Had all islands of the slots [first, end)? */
+/* Had the island of a body? Then it stays as it is, whatever its thread block still does for others: an island's result does
+ * not depend on who is beside it. */
+static __device__ __forceinline__ bool island_stopped(const cuda_view &v, int32_t looks, int32_t body)
+{
+    return looks > 0 && v.islands[v.label[body]].stopped > 0;
+}
+
+static __device__ __forceinline__ bool pair_stopped(const cuda_view &v, int32_t looks, const pair_ends &ends)
+{
+    return looks > 0 && island_stopped(v, looks, ends.body_a < v.bodies ? ends.body_a : ends.body_b);
+}
+
+/* Had all islands of the slots [first, end), which are whole ones? */
 static __device__ __forceinline__ bool part_stopped(const cuda_view &v, int32_t looks, int32_t first, int32_t end)
 {
     bool all = looks > 0;
-    for (int32_t s = first; all && s < end; ++s) all = v.islands[v.label[v.body_of[s]]].stopped > 0;
+    for (int32_t s = first; all && s < end;) {
+        const int32_t label = v.label[v.body_of[s]];
+        all = v.islands[label].stopped > 0;
+        s += v.island_bodies[label];
+    }
     return all;
 }
 

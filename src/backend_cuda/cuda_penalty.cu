@@ -30,7 +30,9 @@ static __device__ __forceinline__ double weigh_pair(const cuda_view &v, int32_t 
     if (side && pair->body_a >= 0) return B;
     v.inv_s[p] = (solver_real)(pair->body_a >= 0 && pair->body_b >= 0 ? B / 2 : B);
     if (!(scale > 0)) v.weight[p] = taken;
-    if (first && v.rigid) ease_gaps(v, p, pair->count, island->tallness); /* world level: gaps, a slop and a step */
+    /* World level: gaps, a slop and a step. More points than the step was planned for halt it, but not before this. */
+    if (first && v.rigid)
+        ease_gaps(v, p, pair->count <= v.point_slots ? pair->count : v.point_slots, island->tallness);
     return B;
 }
 

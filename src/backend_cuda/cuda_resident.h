@@ -561,14 +561,17 @@ PART __device__ __forceinline__ void PART_RUN::suspect(int32_t odd) const
 
 /* ---- storing --------------------------------------------------------------------------------------------------- */
 
-/* Velocities, records (not FAST) and, from side a (b where a is static), multipliers. */
+/* Velocities, records (not FAST) and, from side a (b where a is static), multipliers; nothing of islands that have stopped. */
 PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
 {
-    for (int32_t i = t; i < bodies * ROW; i += (int32_t)blockDim.x)
-        if (i % ROW < 6) v.state[raw_row(i)] = state(odd)[i];
+    for (int32_t i = t; i < bodies * ROW; i += (int32_t)blockDim.x) {
+        if (i % ROW >= 6 || (FAST && island_stopped(v, args.looks, v.body_of[first_body + i / ROW]))) continue;
+        v.state[raw_row(i)] = state(odd)[i];
+    }
     for (int32_t i = t; !FAST && i < halves * ROW; i += (int32_t)blockDim.x)
         v.records[(size_t)first_half * ROW + (size_t)i] = m.records[i];
     if (half >= halves) return;
+    if (FAST && island_stopped(v, args.looks, v.body_of[first_body + own.own])) return;
     const int32_t code = v.incident[first_half + half], p = code / 2;
     if (own.pair) {
         if (code & 1 && v.ends[p].body_a != v.bodies) return;

@@ -18,14 +18,18 @@
         if (try_status != SADMM_OK) return try_status; \
     } while (0)
 
+/* A resident step is enqueued with all of its looks, and those that nobody needs any more take time as well. */
+enum { MOST_LOOKS = 64 };
+
 bool sadmm_world_may_reside(const sadmm_world *world)
 {
     /* Of the stop rules a backend looks at the certificate's in the method FAST alone; and the loads of a first step are
      * predicted on the host. */
     const sadmm_settings *s = &world->def.settings;
-    const bool fast = s->method == SADMM_METHOD_FAST;
+    const bool fast = s->method == SADMM_METHOD_FAST, few_looks = (s->iterations - 1) / s->check_period < MOST_LOOKS;
     if (fast && !world->stepped) return false;
-    return world->kernels->resident && s->residual_tolerance <= 0 && (fast || s->certificate_tolerance <= 0);
+    return world->kernels->resident && s->residual_tolerance <= 0 &&
+           (s->certificate_tolerance <= 0 || (fast && few_looks));
 }
 
 /* ---- edits ------------------------------------------------------------------------------------------------------- */
