@@ -444,7 +444,7 @@ START_TEST(fast_steps_in_the_queue)
 END_TEST
 
 /* A box of a tower, tall enough to have its gaps eased, is turned: pairs have eight points where the plan has four. The step
- * is repeated; what ran before that must not reach behind the points there is room for (the address sanitizer tells). */
+ * is repeated, and is the host's. */
 START_TEST(more_points_than_planned_in_a_tall_tower)
 {
     const int precision = _i;

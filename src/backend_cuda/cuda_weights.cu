@@ -234,7 +234,7 @@ sadmm_status CUDA(enqueue_islands)(struct sadmm_context *c, bool first, struct s
     }
     args.start = first;
     args.warm = c->plan.warm;
-    args.factor = weight_few(c->settings.iterations);
+    args.factor = c->plan.rigid ? weight_few(c->settings.iterations) : 1;
     const cuda_kernel kernel = c->refreshes >= WEIGHT_FIRST_LEVEL ? terms_kernel<true> : terms_kernel<false>;
     CUDA_TRY(CUDA(launch_of)(c, kernel, "sums over islands", body_blocks(c->view.bodies), BODY_THREADS, &args, error));
     return CUDA(launch)(c, weigh_rows_kernel, "weights of row blocks", blocks_for(c->view.rows), &args, error);
