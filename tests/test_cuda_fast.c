@@ -153,8 +153,8 @@ START_TEST(tiers_agree)
 }
 END_TEST
 
-/* More bodies than one thread block adds up: the sums over islands take a launch a stage. Chains of one contact each,
- * one of them of more than two thousand bodies. */
+/* Sums over islands of several powers of sixteen, and islands that begin anywhere: chains of one contact each, one of them
+ * of more than two thousand bodies. */
 static struct contact_problem *chains(void)
 {
     static const double up[3] = {0, 0, 1};

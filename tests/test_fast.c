@@ -180,6 +180,17 @@ START_TEST(tall_islands_are_stiff)
 }
 END_TEST
 
+/* A table's solution is ref's within a tolerance (the spreads say how far off it was), and the same bits by more threads. */
+static void expect_agreement(struct runner *own, struct runner *threads, struct spread *v,
+                             struct spread *lambda, double tolerance)
+{
+    ck_assert_msg(relative(*v) <= tolerance, "v differs by %g", relative(*v));
+    ck_assert_msg(relative(*lambda) <= tolerance, "lambda differs by %g", relative(*lambda));
+    v->difference = lambda->difference = 0;
+    compare_solutions(threads, own, v, lambda);
+    ck_assert(v->difference == 0 && lambda->difference == 0);
+}
+
 /* The same in every table, whatever the threads. */
 START_TEST(tall_tables_equal_ref)
 {
@@ -201,11 +212,7 @@ START_TEST(tall_tables_equal_ref)
     }
     /* v is 1e-4 of what the impulses would make of it: their rounding, 30 bodies deep, over it */
     double tolerance = table->precision == SADMM_F32 ? 1e-2 : 1e-10;
-    ck_assert_msg(relative(v) <= tolerance, "v differs by %g", relative(v));
-    ck_assert_msg(relative(lambda) <= tolerance, "lambda differs by %g", relative(lambda));
-    v.difference = lambda.difference = 0;
-    compare_solutions(&three, &own, &v, &lambda);
-    ck_assert(v.difference == 0 && lambda.difference == 0);
+    expect_agreement(&own, &three, &v, &lambda, tolerance);
     runner_stop(&ref);
     runner_stop(&own);
     runner_stop(&three);
@@ -242,8 +249,9 @@ START_TEST(few_iterations_weigh_more)
         runner_stop(&r);
         contact_problem_free(problem);
     }
-    ck_assert_double_eq(weight_few(5), 4);
-    ck_assert_double_eq(weight_few(1), 6);
+    ck_assert_double_eq(weight_few(1, 5), 4);
+    ck_assert_double_eq(weight_few(1, 1), 6);
+    ck_assert_double_eq(weight_few(0, 5), 1); /* no world: a stretch of a longer solve */
 }
 END_TEST
 
@@ -267,27 +275,24 @@ START_TEST(few_tables_equal_ref)
     const struct sadmm_kernels *table = tables[_i];
     if (!runs_fast(table)) return;
     struct contact_problem *problem = tall_stack(5);
-    sadmm_settings one = few_settings(5, 1), three = few_settings(5, 3);
+    sadmm_settings one_thread = few_settings(5, 1), three_threads = few_settings(5, 3);
     struct spread v = {0, 0}, lambda = {0, 0};
-    struct runner ref, own, other;
+    struct runner ref, own, three;
     int32_t limited[3];
     for (int k = 0; k < 20; ++k) problem->contacts.points[k].impulse[2] *= 3;
-    runner_start_settings(&ref, literal(), &one, problem);
-    runner_start_settings(&own, table, &one, problem);
-    runner_start_settings(&other, table, &three, problem);
-    struct runner *const runners[] = {&ref, &own, &other};
+    runner_start_settings(&ref, literal(), &one_thread, problem);
+    runner_start_settings(&own, table, &one_thread, problem);
+    runner_start_settings(&three, table, &three_threads, problem);
+    struct runner *const runners[] = {&ref, &own, &three};
     for (int k = 0; k < 3; ++k) {
         iterate(runners[k], 5, false);
         CALL(runners[k], runners[k]->k->limit_velocity(runners[k]->c, &limited[k], &runners[k]->error));
         ck_assert_int_eq(limited[k], 1);
     }
     compare_solutions(&own, &ref, &v, &lambda);
-    double tolerance = table->precision == SADMM_F32 ? 1e-4 : 1e-12;
-    ck_assert_msg(relative(v) <= tolerance, "v differs by %g", relative(v));
-    ck_assert_msg(relative(lambda) <= tolerance, "lambda differs by %g", relative(lambda));
-    v.difference = lambda.difference = 0;
-    compare_solutions(&other, &own, &v, &lambda);
-    ck_assert(v.difference == 0 && lambda.difference == 0);
+    /* rounding of five iterations: measured 4e-7 and 2e-15, room for another order of sums */
+    double tolerance = table->precision == SADMM_F32 ? 1e-5 : 1e-12;
+    expect_agreement(&own, &three, &v, &lambda, tolerance);
     for (int k = 0; k < 3; ++k) runner_stop(runners[k]);
     contact_problem_free(problem);
 }
@@ -501,8 +506,8 @@ static const struct {
 };
 enum { RESTING = sizeof resting / sizeof *resting };
 
-/* Few iterations bring what can stand to rest. Measured: 1e-8 m/s and less; without what is done for few iterations
- * 0.03 m/s and more, for good. */
+/* Few iterations bring what can stand to rest. Measured: 3e-7 m/s and less in single precision, 1e-8 in double; without what
+ * is done for few iterations 0.03 m/s and more, for good. 1e-4 is between them. */
 START_TEST(few_iterations_come_to_rest)
 {
     struct sadmm_scene scene = open_scene(resting[_i % RESTING].spec);

@@ -119,7 +119,7 @@ static void add_up_loads(struct sadmm_context *c)
         island->speed = weight_speed(island->energy, island->mass);
         if (!c->plan.warm) continue;
         island->tallness = weight_tallness(island->speed, island->push, island->mass);
-        double speed = island->speed, few = c->plan.rigid ? weight_few(c->settings.iterations) : 1;
+        double speed = island->speed, few = weight_few(c->plan.rigid, c->settings.iterations);
         island->speed = weight_speed_warm(speed, island->tallness, island->kinetic, island->mass);
         island->speed = weight_speed_few(speed, island->speed, few, island->kinetic, island->mass);
     }

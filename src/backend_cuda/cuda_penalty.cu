@@ -228,6 +228,7 @@ extern "C" sadmm_status CUDA(init_penalty)(struct sadmm_context *c, struct sadmm
     cuda_args args = {};
     CUDA_ENTER(c);
     c->starting = true;
+    c->looks = 0;
     c->cleared = 0;
     c->placed = false;
     c->measured = false;

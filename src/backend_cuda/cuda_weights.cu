@@ -227,14 +227,14 @@ sadmm_status CUDA(enqueue_islands)(struct sadmm_context *c, bool first, struct s
 {
     cuda_args args = {};
     if (first) {
-        c->refreshes = c->looks = 0;
+        c->refreshes = 0;
         c->starting = c->settled = false;
     } else {
         ++c->refreshes;
     }
     args.start = first;
     args.warm = c->plan.warm;
-    args.factor = c->plan.rigid ? weight_few(c->settings.iterations) : 1;
+    args.factor = weight_few(c->plan.rigid, c->settings.iterations);
     const cuda_kernel kernel = c->refreshes >= WEIGHT_FIRST_LEVEL ? terms_kernel<true> : terms_kernel<false>;
     CUDA_TRY(CUDA(launch_of)(c, kernel, "sums over islands", body_blocks(c->view.bodies), BODY_THREADS, &args, error));
     return CUDA(launch)(c, weigh_rows_kernel, "weights of row blocks", blocks_for(c->view.rows), &args, error);

@@ -124,7 +124,7 @@ static double island_speed(const struct sadmm_context *c, const struct ref_body 
     double speed = weight_speed(island->island_energy, island->island_mass);
     if (!c->plan->warm) return speed;
     double warm = weight_speed_warm(speed, island_tallness(island), island->island_kinetic, island->island_mass);
-    double few = c->plan->rigid ? weight_few(c->settings->iterations) : 1;
+    double few = weight_few(c->plan->rigid, c->settings->iterations);
     return weight_speed_few(speed, warm, few, island->island_kinetic, island->island_mass);
 }
 

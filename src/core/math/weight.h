@@ -102,11 +102,11 @@ SADMM_INLINE double weight_speed_warm(double speed, double tallness, double kine
 /* Over the speed of bodies that move, the least V. */
 #define WEIGHT_MOVING 0.5
 
-/* By how much V is less, 1: not at all. For steps of a world (rigid systems): a problem that is solved in stretches is no
+/* By how much V is less, 1: not at all. Steps of a world alone (`rigid`): a problem that is solved in short stretches is no
  * row of steps. */
-SADMM_INLINE double weight_few(int iterations)
+SADMM_INLINE double weight_few(int rigid, int iterations)
 {
-    return fmin(fmax((double)WEIGHT_FEW / iterations, 1.0), WEIGHT_FEW_MOST);
+    return rigid ? fmin(fmax((double)WEIGHT_FEW / iterations, 1.0), WEIGHT_FEW_MOST) : 1;
 }
 
 /* V of such a step; `warm` is what weight_speed_warm made of `speed`. */
