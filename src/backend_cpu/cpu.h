@@ -20,7 +20,8 @@
  * An iteration is two sweeps with a barrier after each: bodies (Step 1), constraints (Steps 2-4).
  *
  * The method `fast` has one weight B a constraint in place of beta: it comes in through inv_s and C_i (cpu_weights.c), with
- * beta = 1, and the sweeps go `relaxation` times as far.
+ * beta = 1. Its sweeps pass on changes alone: wrench rows hold J^T d lambda, bodies keep their defect b - A v + J^T lambda
+ * up to date (docs/algorithm.md), and both go `relaxation` times as far.
  */
 #ifndef SADMM_CPU_H
 #define SADMM_CPU_H
@@ -78,6 +79,7 @@ struct body_block {
     lanes inv_alpha;
     vec sigma;       /* beta/alpha S */
     lane_sym3 K_inverse;
+    vec defect_linear, defect_angular; /* fast: b - A v + J^T lambda */
 };
 
 /* A constraint given by Jacobian rows. */
@@ -118,8 +120,9 @@ struct sadmm_context {
     double *beta;                    /* bodies, kg */
     struct body_block *body_blocks;  /* if rigid_bodies */
     real *b, *A_columns, *H_columns; /* else: rows; 6 rows (columns of A, of (A + beta C)^-1) a body */
+    real *defects;                   /* and rows, fast */
     size_t state_capacity, A_capacity, C_capacity, beta_capacity, body_block_capacity, b_capacity, A_column_capacity,
-        H_column_capacity;
+        H_column_capacity, defect_capacity;
 
     /* Geometric contacts */
     struct pair_block *pair_blocks;
@@ -152,6 +155,7 @@ struct sadmm_context {
     double *pair_response, *pair_weight; /* pair records: J A^-1 J^T, B in kg */
     double *pair_violation;     /* pair records: terms of the islands' sums */
     int refreshes;              /* of the weights, in this solve */
+    int exact_since;            /* iterations since the defects were taken */
     double *body_sums;          /* bodies x BODY_SUMS: terms of the islands' sums */
     size_t body_sum_capacity, label_capacity, island_capacity, A_inverse_capacity, pair_response_capacity,
         pair_weight_capacity, pair_violation_capacity;
@@ -222,14 +226,27 @@ sadmm_status CPU(recover_wrenches)(struct sadmm_context *, double *wrench, struc
 /* Sweeps: a thread's share, used by the stepwise entries and by iterate alike. */
 enum cpu_sweep {
     CPU_SWEEP_START,   /* wrenches = J^T lambda of the start values */
-    CPU_SWEEP_RELAX,   /* fast: as ITERATE, but lambda goes `relaxation` times as far */
     CPU_SWEEP_ITERATE, /* Steps 2-4; wrenches = J^T (2 lambda - lambda_prev) */
-    CPU_SWEEP_MEASURE  /* Steps 2-4; wrenches = J^T lambda, change = J^T (lambda - lambda_prev); *primal: eq. (16) */
+    CPU_SWEEP_MEASURE, /* Steps 2-4; wrenches = J^T lambda, change = J^T (lambda - lambda_prev); *primal: eq. (16) */
+    /* fast: Steps 2-4; wrenches = J^T (lambda^ - lambda) */
+    CPU_SWEEP_RELAX,   /* lambda goes `relaxation` times as far as lambda^ */
+    CPU_SWEEP_PLAIN,   /* as far */
+    CPU_SWEEP_PLAIN_MEASURE /* and *primal: eq. (16) */
 };
+static inline bool cpu_sweep_passes_changes(enum cpu_sweep sweep) { return sweep >= CPU_SWEEP_RELAX; }
+static inline bool cpu_sweep_measures(enum cpu_sweep sweep)
+{
+    return sweep == CPU_SWEEP_MEASURE || sweep == CPU_SWEEP_PLAIN_MEASURE;
+}
 void CPU(sweep_pairs)(struct sadmm_context *, size_t begin, size_t end, enum cpu_sweep sweep, double *primal);
 void CPU(sweep_row_blocks)(struct sadmm_context *, size_t begin, size_t end, enum cpu_sweep sweep, double *primal);
-/* Step 1 of body blocks [begin, end), `relaxation` times as far; `settled`: all but the bodies without constraints. */
-void CPU(sweep_bodies)(struct sadmm_context *, size_t begin, size_t end, bool settled, double relaxation);
+/* Step 1 of body blocks [begin, end); `settled`: all but the bodies without constraints. */
+void CPU(sweep_bodies)(struct sadmm_context *, size_t begin, size_t end, bool settled);
+/* The same for the method `fast`: velocities go `velocity` times as far, multipliers have gone `multipliers` times. */
+void CPU(sweep_bodies_fast)(struct sadmm_context *, size_t begin, size_t end, bool settled, double velocity,
+                            double multipliers);
+/* fast: the defects of bodies [begin, end) anew, in double from v and lambda (cpu_defects.c). */
+void CPU(take_defects)(struct sadmm_context *, size_t begin, size_t end);
 /* Largest entry of A v - b - (sum of wrenches), eq. (17), over body blocks [begin, end). */
 double CPU(dual_residual)(const struct sadmm_context *, size_t begin, size_t end);
 /* wrenches = J^T lambda; and at the start of a solve. */

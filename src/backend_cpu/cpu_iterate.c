@@ -3,12 +3,14 @@
 
 #include "../core/math/relax.h"
 #include "cpu.h"
+#include "cpu_flush.h"
 
-static void update_bodies(struct sadmm_context *c, int thread, int threads, bool settled, double relaxation)
+static void update_bodies(struct sadmm_context *c, int thread, int threads, bool settled)
 {
     size_t begin, end;
     cpu_share(c->body_block_count, thread, threads, &begin, &end);
-    CPU(sweep_bodies)(c, begin, end, settled, relaxation);
+    if (c->fast) CPU(sweep_bodies_fast)(c, begin, end, settled, 1, 1);
+    else CPU(sweep_bodies)(c, begin, end, settled);
 }
 
 static void update_constraints(struct sadmm_context *c, int thread, int threads, enum cpu_sweep sweep, double *primal)
@@ -64,7 +66,7 @@ sadmm_status CPU(update_velocity)(struct sadmm_context *c, struct sadmm_error *e
             join_wrenches(c, cpu_thread(), cpu_threads());
             CPU_BARRIER;
         }
-        update_bodies(c, cpu_thread(), cpu_threads(), c->settled, 1);
+        update_bodies(c, cpu_thread(), cpu_threads(), c->settled);
     }
     c->settled = true;
     c->measured = false;
@@ -79,28 +81,44 @@ sadmm_status CPU(update_constraints)(struct sadmm_context *c, bool measure, stru
     CPU_PARALLEL
     {
         double primal = 0;
-        update_constraints(c, cpu_thread(), cpu_threads(), measure ? CPU_SWEEP_MEASURE : CPU_SWEEP_ITERATE, &primal);
+        enum cpu_sweep sweep = c->fast ? (measure ? CPU_SWEEP_PLAIN_MEASURE : CPU_SWEEP_PLAIN)
+                                       : (measure ? CPU_SWEEP_MEASURE : CPU_SWEEP_ITERATE);
+        update_constraints(c, cpu_thread(), cpu_threads(), sweep, &primal);
         c->thread_max[cpu_thread() * THREAD_MAX_STRIDE] = primal;
     }
-    c->measured = measure;
+    c->measured = measure && !c->fast;
     if (measure) c->residual.primal = cpu_reduce_max(c);
     return SADMM_OK;
+}
+
+/* Before iteration i of a stretch? */
+static bool takes_defects(const struct sadmm_context *c, int i)
+{
+    int since = c->exact_since + i;
+    return since > 0 && since % RELAX_DEFECT_PERIOD == 0;
 }
 
 /* The method `fast`: constraints first, then bodies (math/relax.h). */
 static void iterate_fast(struct sadmm_context *c, int thread, int threads, int count, bool measure, double *primal)
 {
+    const double relaxation = c->settings.relaxation;
+    size_t begin, end, first, past;
+    cpu_share(c->body_block_count, thread, threads, &begin, &end);
+    cpu_share((size_t)c->bodies, thread, threads, &first, &past);
     for (int i = 0; i < count; ++i) {
-        bool last = measure && i + 1 == count, settled = c->settled || i > 0;
-        update_constraints(c, thread, threads,
-                           last ? CPU_SWEEP_MEASURE : relax_constraints(i, count) ? CPU_SWEEP_RELAX : CPU_SWEEP_ITERATE,
-                           primal);
-        CPU_BARRIER;
-        if (last) {
-            join_wrenches(c, thread, threads);
+        if (takes_defects(c, i)) {
+            CPU(take_defects)(c, first, past);
             CPU_BARRIER;
         }
-        update_bodies(c, thread, threads, settled, relax_velocity(i, count, settled) ? c->settings.relaxation : 1);
+        bool farther = relax_constraints(i, count), settled = c->settled || i > 0;
+        update_constraints(c, thread, threads,
+                           farther   ? CPU_SWEEP_RELAX
+                           : measure ? CPU_SWEEP_PLAIN_MEASURE
+                                     : CPU_SWEEP_PLAIN,
+                           primal);
+        CPU_BARRIER;
+        CPU(sweep_bodies_fast)(c, begin, end, settled, relax_velocity(i, count, settled) ? relaxation : 1,
+                               farther ? relaxation : 1);
         CPU_BARRIER;
     }
 }
@@ -113,22 +131,25 @@ sadmm_status CPU(iterate)(struct sadmm_context *c, int count, bool measure, stru
     {
         int thread = cpu_thread(), threads = cpu_threads();
         double primal = 0;
-        if (c->measured && !c->fast) {
+        unsigned mode = c->fast ? cpu_flush_tiny() : 0; /* what fast passes on goes to 0 */
+        if (c->measured) {
             join_wrenches(c, thread, threads);
             CPU_BARRIER;
         }
         if (c->fast) iterate_fast(c, thread, threads, count, measure, &primal);
         for (int i = 0; i < count && !c->fast; ++i) {
             bool last = measure && i + 1 == count;
-            update_bodies(c, thread, threads, c->settled || i > 0, 1);
+            update_bodies(c, thread, threads, c->settled || i > 0);
             CPU_BARRIER;
             update_constraints(c, thread, threads, last ? CPU_SWEEP_MEASURE : CPU_SWEEP_ITERATE, &primal);
             CPU_BARRIER;
         }
         c->thread_max[thread * THREAD_MAX_STRIDE] = primal;
+        if (c->fast) cpu_flush_restore(mode);
     }
     c->settled = c->settled || count > 0;
-    c->measured = measure;
+    if (count > 0) c->exact_since = (c->exact_since + count - 1) % RELAX_DEFECT_PERIOD + 1;
+    c->measured = measure && !c->fast;
     c->ratio = 1;
     if (measure) c->residual.primal = cpu_reduce_max(c);
     return SADMM_OK;
@@ -139,7 +160,7 @@ sadmm_status CPU(iterate)(struct sadmm_context *c, int count, bool measure, stru
 sadmm_status CPU(measure_residuals)(struct sadmm_context *c, struct sadmm_residual *residual, struct sadmm_error *error)
 {
     (void)error;
-    if (c->fast) CPU(sum_wrenches)(c); /* the last Step 1 saw 2 lambda^ - lambda */
+    if (c->fast) CPU(sum_wrenches)(c); /* they hold changes */
     clear_max(c);
     CPU_PARALLEL
     {

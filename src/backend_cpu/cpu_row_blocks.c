@@ -28,10 +28,12 @@ static void update_lambda(const struct row_block *block, const real *va, const r
     if (block->kind == SADMM_BLOCK_CONTACT) contact_project_rows(y, block->friction, out);
 }
 
-/* The same with the block's own weights: s lambda has n / B in place of s, n the number of dynamic bodies. */
-static void update_lambda_fast(const struct row_block *block, const real *va, const real *vb, real inv_n, real out[6])
+/* The same with the block's own weights: s lambda has n / B in place of s, n the number of dynamic bodies. And the change
+ * by itself. */
+static void update_lambda_fast(const struct row_block *block, const real *va, const real *vb, real inv_n, real change[6],
+                               real out[6])
 {
-    real u[6], along = 0, y[3];
+    real u[6], along = 0, step[6] = {0};
     for (int r = 0; r < block->rows; ++r) {
         u[r] = row_velocity(block, r, va, vb);
         if (block->kind != SADMM_BLOCK_SOFT) u[r] += block->error[r];
@@ -39,14 +41,14 @@ static void update_lambda_fast(const struct row_block *block, const real *va, co
     }
     for (int r = 0; r < block->rows; ++r) {
         real old = block->lambda[r], weight = inv_n * block->weight[r];
+        step[r] = weight * u[r];
         if (block->kind == SADMM_BLOCK_SOFT)
-            out[r] = soft_multiplier(block->stiffness[r], block->damping[r], block->error[r], u[r], 1 / weight, old);
-        else if (block->kind == SADMM_BLOCK_HARD)
-            out[r] = block->active[r] ? old - (weight * u[r] + inv_n * block->along[r] * along) : 0;
+            change[r] = soft_change(block->stiffness[r], block->damping[r], block->error[r], u[r], 1 / weight, old);
         else
-            y[r] = old - weight * u[r];
+            change[r] = block->active[r] ? -(step[r] + inv_n * block->along[r] * along) : 0;
+        out[r] = old + change[r];
     }
-    if (block->kind == SADMM_BLOCK_CONTACT) contact_project_rows(y, block->friction, out);
+    if (block->kind == SADMM_BLOCK_CONTACT) contact_change_rows(block->lambda, step, block->friction, change, out);
 }
 
 /* J^T lambda on both sides. */
@@ -72,26 +74,22 @@ static void sweep_row_block(struct sadmm_context *c, size_t k, enum cpu_sweep sw
         return;
     }
     const real *va = &c->state[(size_t)block->body_a * ROW], *vb = &c->state[(size_t)block->body_b * ROW];
-    real lambda[6], delta[6], extrapolated[6], inv_beta = real_max(va[STATE_INV_BETA], vb[STATE_INV_BETA]);
+    real lambda[6], delta[6], inv_beta = real_max(va[STATE_INV_BETA], vb[STATE_INV_BETA]);
     bool both = block->body_a < c->bodies && block->body_b < c->bodies;
-    if (c->fast) update_lambda_fast(block, va, vb, both ? (real)0.5 : 1, lambda);
+    if (c->fast) update_lambda_fast(block, va, vb, both ? (real)0.5 : 1, delta, lambda);
     else update_lambda(block, va, vb, va[STATE_INV_BETA] + vb[STATE_INV_BETA], lambda);
-    real relaxation = (real)c->settings.relaxation, largest = 0;
+    real relaxation = (real)c->settings.relaxation, largest = 0, passed[6];
     for (int r = 0; r < block->rows; ++r) {
         real old = block->lambda[r];
-        delta[r] = lambda[r] - old;
-        extrapolated[r] = lambda[r] + delta[r];
+        if (!c->fast) delta[r] = lambda[r] - old;
+        passed[r] = c->fast ? delta[r] : sweep == CPU_SWEEP_MEASURE ? lambda[r] : lambda[r] + delta[r];
         block->lambda[r] = sweep == CPU_SWEEP_RELAX ? old + relaxation * delta[r] : lambda[r];
         if (c->fast) inv_beta = block->active[r] ? 1 / (block->weight[r] + block->along[r] * block->along[r]) : 0;
         largest = real_max(largest, real_abs(delta[r]) * inv_beta);
     }
-    if (sweep != CPU_SWEEP_MEASURE) {
-        write_wrenches(c, c->wrenches, record, block, extrapolated);
-        return;
-    }
-    write_wrenches(c, c->wrenches, record, block, lambda);
-    write_wrenches(c, c->change, record, block, delta);
-    *primal = fmax(*primal, (double)largest);
+    write_wrenches(c, c->wrenches, record, block, passed);
+    if (sweep == CPU_SWEEP_MEASURE) write_wrenches(c, c->change, record, block, delta);
+    if (cpu_sweep_measures(sweep)) *primal = fmax(*primal, (double)largest);
 }
 
 void CPU(sweep_row_blocks)(struct sadmm_context *c, size_t begin, size_t end, enum cpu_sweep sweep, double *primal)

@@ -36,20 +36,27 @@ static inline void cpu_load_v(const struct sadmm_context *c, size_t i, double v[
     for (int k = 0; k < 6; ++k) v[k] = (double)c->state[i * ROW + (size_t)k];
 }
 
-/* r . A^-1 r, r = b + J^T lambda - A v; `wrenches` hold J^T lambda. */
-static inline double cpu_defect_energy(const struct sadmm_context *c, size_t i)
+/* b - A v */
+static inline void cpu_free_momentum(const struct sadmm_context *c, size_t i, double r[6])
 {
     const double *A = &c->A[i * PACKED6];
-    double r[6], v[6];
+    double v[6];
     cpu_load_b(c, i, r);
     cpu_load_v(c, i, v);
-    for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at)
-        for (int k = 0; k < 6; ++k) r[k] += (double)c->wrenches[(size_t)c->incident[at] * ROW + (size_t)k];
     for (int j = 0, at = 0; j < 6; ++j)
         for (int k = 0; k <= j; ++k, ++at) {
             r[j] -= A[at] * v[k];
             if (k < j) r[k] -= A[at] * v[j];
         }
+}
+
+/* r . A^-1 r, r = b + J^T lambda - A v; `wrenches` hold J^T lambda. */
+static inline double cpu_defect_energy(const struct sadmm_context *c, size_t i)
+{
+    double r[6];
+    cpu_free_momentum(c, i, r);
+    for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at)
+        for (int k = 0; k < 6; ++k) r[k] += (double)c->wrenches[(size_t)c->incident[at] * ROW + (size_t)k];
     return packed_form(&c->A_inverse[i * PACKED6], r);
 }
 

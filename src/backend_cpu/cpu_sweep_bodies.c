@@ -1,4 +1,8 @@
-/* Step 1 (kernels I-K), eq. (6) in the reduced form: v <- v + (A + beta C)^-1 (b - A v + sum of wrenches). */
+/* Step 1 (kernels I-K), eq. (6) in the reduced form: v <- v + (A + beta C)^-1 (b - A v + sum of wrenches).
+ *
+ * The method `fast` keeps r = b - A v + J^T lambda of each body, and its wrenches are J^T d lambda, d lambda = lambda^ - lambda:
+ *     d v = (A + C)^-1 (r + 2 sum of wrenches),   v += rho d v,   r += rho (sum of wrenches) - A (rho d v)
+ * Everything on the right goes to 0, and so does its rounding. */
 #include "cpu.h"
 
 /* ---- rigid bodies under three-row contacts: LANES at a time ---------------------------------------------------- */
@@ -22,23 +26,29 @@ static inline void prefetch_wrenches(const struct sadmm_context *c, size_t index
         __builtin_prefetch(c->wrenches + (size_t)c->incident[at] * ROW);
 }
 
-/* b - A v + sum of wrenches of a block; `state` gets the block's state by number. */
-static inline __attribute__((always_inline)) void block_defect(const struct sadmm_context *c, size_t index,
-                                                               lanes state[ROW], vec *linear, vec *angular)
+/* States and sums of a block, by number. */
+static inline __attribute__((always_inline)) void load_block(const row8 *rows, const row8 *sums, lanes state[ROW],
+                                                             lanes g[ROW])
 {
-    const struct body_block *block = &c->body_blocks[index];
-    const row8 *rows = (const row8 *)c->state + index * (size_t)LANES;
-    size_t first = index * (size_t)LANES;
-    row8 sums[LANES];
-    lanes g[ROW];
-    prefetch_wrenches(c, index + 1);
-    for (int l = 0; l < LANES; ++l) sums[l] = wrench_sum(c, first + (size_t)l);
 #define STATE_ROW(l) rows[l]
 #define SUM_ROW(l) sums[l]
     LOAD_ROWS(state, STATE_ROW);
     LOAD_ROWS(g, SUM_ROW);
 #undef STATE_ROW
 #undef SUM_ROW
+}
+
+/* b - A v + sum of wrenches of a block; `state` gets the block's state by number. */
+static inline __attribute__((always_inline)) void block_defect(const struct sadmm_context *c, size_t index,
+                                                               lanes state[ROW], vec *linear, vec *angular)
+{
+    const struct body_block *block = &c->body_blocks[index];
+    const row8 *rows = (const row8 *)c->state + index * (size_t)LANES;
+    row8 sums[LANES];
+    lanes g[ROW];
+    prefetch_wrenches(c, index + 1);
+    for (int l = 0; l < LANES; ++l) sums[l] = wrench_sum(c, index * (size_t)LANES + (size_t)l);
+    load_block(rows, sums, state, g);
     vec v = {state[0], state[1], state[2]}, w = {state[3], state[4], state[5]};
     *linear = add(sub(block->b_linear, scale(v, block->mass)), (vec){g[0], g[1], g[2]});
     *angular = add(sub(block->b_angular, sym3_times(block->inertia, w)), (vec){g[3], g[4], g[5]});
@@ -50,7 +60,7 @@ static size_t first_body(const struct sadmm_context *c, size_t block)
     return body < (size_t)c->bodies ? body : (size_t)c->bodies;
 }
 
-static void update_rigid(struct sadmm_context *c, size_t begin, size_t end, bool settled, lanes relaxation)
+static void update_rigid(struct sadmm_context *c, size_t begin, size_t end, bool settled)
 {
     for (size_t index = begin; index < end; ++index) {
         if (settled && c->offsets[first_body(c, index)] == c->offsets[first_body(c, index + 1)]) continue;
@@ -60,11 +70,37 @@ static void update_rigid(struct sadmm_context *c, size_t begin, size_t end, bool
         block_defect(c, index, state, &linear, &angular);
         vec dw = sym3_times(block->K_inverse, sub(angular, cross(block->sigma, linear)));
         vec dv = add(scale(linear, block->inv_alpha), cross(block->sigma, dw));
-        dv = scale(dv, relaxation);
-        dw = scale(dw, relaxation);
         state[0] += dv.x, state[1] += dv.y, state[2] += dv.z;
         state[3] += dw.x, state[4] += dw.y, state[5] += dw.z;
         store_rows(c->state + index * (size_t)LANES * ROW, state);
+    }
+}
+
+static void update_rigid_fast(struct sadmm_context *c, size_t begin, size_t end, bool settled, lanes velocity,
+                              lanes multipliers)
+{
+    for (size_t index = begin; index < end; ++index) {
+        if (settled && c->offsets[first_body(c, index)] == c->offsets[first_body(c, index + 1)]) continue;
+        struct body_block *block = &c->body_blocks[index];
+        const row8 *rows = (const row8 *)c->state + index * (size_t)LANES;
+        lanes state[ROW], g[ROW];
+        row8 sums[LANES];
+        prefetch_wrenches(c, index + 1);
+        for (int l = 0; l < LANES; ++l) sums[l] = wrench_sum(c, index * (size_t)LANES + (size_t)l);
+        load_block(rows, sums, state, g);
+        vec force = {g[0], g[1], g[2]}, torque = {g[3], g[4], g[5]};
+        vec linear = add(block->defect_linear, add(force, force));
+        vec angular = add(block->defect_angular, add(torque, torque));
+        vec dw = sym3_times(block->K_inverse, sub(angular, cross(block->sigma, linear)));
+        vec dv = add(scale(linear, block->inv_alpha), cross(block->sigma, dw));
+        dv = scale(dv, velocity);
+        dw = scale(dw, velocity);
+        state[0] += dv.x, state[1] += dv.y, state[2] += dv.z;
+        state[3] += dw.x, state[4] += dw.y, state[5] += dw.z;
+        store_rows(c->state + index * (size_t)LANES * ROW, state);
+        block->defect_linear = add(block->defect_linear, sub(scale(force, multipliers), scale(dv, block->mass)));
+        block->defect_angular =
+            add(block->defect_angular, sub(scale(torque, multipliers), sym3_times(block->inertia, dw)));
     }
 }
 
@@ -91,14 +127,30 @@ static inline row8 general_defect(const struct sadmm_context *c, size_t i)
     return g;
 }
 
-static void update_general(struct sadmm_context *c, size_t begin, size_t end, bool settled, real relaxation)
+static void update_general(struct sadmm_context *c, size_t begin, size_t end, bool settled)
 {
     for (size_t i = begin; i < end; ++i) {
         if (settled && c->offsets[i] == c->offsets[i + 1]) continue;
         const row8 *H = (const row8 *)c->H_columns + 6 * i;
         row8 g = general_defect(c, i), step = {0};
         for (int k = 0; k < 6; ++k) step += H[k] * g[k];
-        ((row8 *)c->state)[i] += relaxation * step; /* number 6 of step is 0: 1/beta stays */
+        ((row8 *)c->state)[i] += step; /* number 6 of step is 0: 1/beta stays */
+    }
+}
+
+static void update_general_fast(struct sadmm_context *c, size_t begin, size_t end, bool settled, real velocity,
+                                real multipliers)
+{
+    for (size_t i = begin; i < end; ++i) {
+        if (settled && c->offsets[i] == c->offsets[i + 1]) continue;
+        const row8 *A = (const row8 *)c->A_columns + 6 * i, *H = (const row8 *)c->H_columns + 6 * i;
+        row8 *defect = (row8 *)c->defects + i;
+        row8 sum = wrench_sum(c, i), g = *defect + 2 * sum, step = {0};
+        for (int k = 0; k < 6; ++k) step += H[k] * g[k];
+        step *= velocity;
+        ((row8 *)c->state)[i] += step;
+        *defect += multipliers * sum;
+        for (int k = 0; k < 6; ++k) *defect -= A[k] * step[k];
     }
 }
 
@@ -114,10 +166,18 @@ static double general_residual(const struct sadmm_context *c, size_t begin, size
 
 /* ---- by blocks, so that both forms share the work the same way -------------------------------------------------- */
 
-void CPU(sweep_bodies)(struct sadmm_context *c, size_t begin, size_t end, bool settled, double relaxation)
+void CPU(sweep_bodies)(struct sadmm_context *c, size_t begin, size_t end, bool settled)
 {
-    if (c->rigid_bodies) update_rigid(c, begin, end, settled, fill((real)relaxation));
-    else update_general(c, first_body(c, begin), first_body(c, end), settled, (real)relaxation);
+    if (c->rigid_bodies) update_rigid(c, begin, end, settled);
+    else update_general(c, first_body(c, begin), first_body(c, end), settled);
+}
+
+void CPU(sweep_bodies_fast)(struct sadmm_context *c, size_t begin, size_t end, bool settled, double velocity,
+                            double multipliers)
+{
+    if (c->rigid_bodies) update_rigid_fast(c, begin, end, settled, fill((real)velocity), fill((real)multipliers));
+    else
+        update_general_fast(c, first_body(c, begin), first_body(c, end), settled, (real)velocity, (real)multipliers);
 }
 
 double CPU(dual_residual)(const struct sadmm_context *c, size_t begin, size_t end)

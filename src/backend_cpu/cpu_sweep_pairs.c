@@ -73,6 +73,14 @@ static inline void prefetch_bodies(const struct sadmm_context *c, size_t index)
     }
 }
 
+/* lambda^ - lambda without the rounding of either: where the contact is closed, -step and what the friction cone cuts off
+ * of t. */
+static inline vec exact_change(lane_mask closed, vec old, vec step, vec t, lanes shrink)
+{
+    vec change = sub(scale(t, shrink - 1), step);
+    return (vec){pick(closed, change.x, -old.x), pick(closed, change.y, -old.y), pick(closed, change.z, -old.z)};
+}
+
 static inline __attribute__((always_inline)) void sweep_block(struct sadmm_context *c, size_t index, int rows,
                                                               enum cpu_sweep sweep, lanes relaxation, double *primal)
 {
@@ -95,19 +103,21 @@ static inline __attribute__((always_inline)) void sweep_block(struct sadmm_conte
                 continue;
             }
             vec x = add(u, cross(w, arm)), e = scale(n, slot->error);
-            vec y = sub(old, scale(add(x, e), inv_s));
+            vec step = scale(add(x, e), inv_s), y = sub(old, step);
             /* The strict projection (math/contact.h, contact_project). */
             lanes yn = dot(n, y), normal = pick(yn > 0, yn, zero), limit = mu * normal;
             vec t = sub(y, scale(n, yn));
             lanes t2 = dot(t, t), shrink = pick(t2 > limit * limit, limit / root(t2), fill(1));
             vec lambda = add(scale(n, normal), scale(t, shrink));
-            vec delta = sub(lambda, old);
+            vec delta = cpu_sweep_passes_changes(sweep) ? exact_change(yn > 0, old, step, t, shrink) : sub(lambda, old);
             if (sweep == CPU_SWEEP_RELAX) slot->lambda = add(old, scale(delta, relaxation));
             else slot->lambda = lambda;
-            if (sweep == CPU_SWEEP_MEASURE) {
+            if (cpu_sweep_measures(sweep)) change_max = larger(change_max, frame_max(delta, n));
+            if (cpu_sweep_passes_changes(sweep)) {
+                add_to(&next, arm, delta);
+            } else if (sweep == CPU_SWEEP_MEASURE) {
                 add_to(&next, arm, lambda);
                 add_to(&change, arm, delta);
-                change_max = larger(change_max, frame_max(delta, n));
             } else {
                 add_to(&next, arm, add(lambda, delta));
             }
@@ -121,41 +131,47 @@ static inline __attribute__((always_inline)) void sweep_block(struct sadmm_conte
                 add_to(&next, arm, scale(n, old));
                 continue;
             }
-            lanes y = old - (dot(n, add(u, cross(w, arm))) + slot->error) * inv_s;
-            lanes lambda = pick(y > 0, y, zero), delta = lambda - old;
+            lanes step = (dot(n, add(u, cross(w, arm))) + slot->error) * inv_s, y = old - step;
+            lanes lambda = pick(y > 0, y, zero);
+            lanes delta = lambda - old;
+            if (cpu_sweep_passes_changes(sweep)) delta = pick(y > 0, -step, -old);
             if (sweep == CPU_SWEEP_RELAX) slot->lambda = old + relaxation * delta;
             else slot->lambda = lambda;
-            if (sweep == CPU_SWEEP_MEASURE) {
+            if (cpu_sweep_measures(sweep)) change_max = larger(change_max, magnitude(delta));
+            if (cpu_sweep_passes_changes(sweep)) {
+                add_to(&next, arm, scale(n, delta));
+            } else if (sweep == CPU_SWEEP_MEASURE) {
                 add_to(&next, arm, scale(n, lambda));
                 add_to(&change, arm, scale(n, delta));
-                change_max = larger(change_max, magnitude(delta));
             } else {
                 add_to(&next, arm, scale(n, lambda + delta));
             }
         }
     }
     write_wrenches(c, c->wrenches, index, &next, block->d);
-    if (sweep == CPU_SWEEP_MEASURE) {
-        write_wrenches(c, c->change, index, &change, block->d);
+    if (sweep == CPU_SWEEP_MEASURE) write_wrenches(c, c->change, index, &change, block->d);
+    if (cpu_sweep_measures(sweep))
         *primal = fmax(*primal, (double)horizontal_max(change_max * larger_inv_beta(c, block)));
-    }
 }
 
 void CPU(sweep_pairs)(struct sadmm_context *c, size_t begin, size_t end, enum cpu_sweep sweep, double *primal)
 {
     const lanes relaxation = fill((real)c->settings.relaxation); /* used by RELAX only */
-#define SWEEP(rows, kind) \
-    for (size_t k = begin; k < end; ++k) sweep_block(c, k, rows, kind, relaxation, primal)
-    if (c->plan.contact_rows == 3) {
-        if (sweep == CPU_SWEEP_ITERATE) SWEEP(3, CPU_SWEEP_ITERATE);
-        else if (sweep == CPU_SWEEP_RELAX) SWEEP(3, CPU_SWEEP_RELAX);
-        else if (sweep == CPU_SWEEP_MEASURE) SWEEP(3, CPU_SWEEP_MEASURE);
-        else SWEEP(3, CPU_SWEEP_START);
-    } else {
-        if (sweep == CPU_SWEEP_ITERATE) SWEEP(1, CPU_SWEEP_ITERATE);
-        else if (sweep == CPU_SWEEP_RELAX) SWEEP(1, CPU_SWEEP_RELAX);
-        else if (sweep == CPU_SWEEP_MEASURE) SWEEP(1, CPU_SWEEP_MEASURE);
-        else SWEEP(1, CPU_SWEEP_START);
+#define SWEEP(rows, kind)                                                                                \
+    case kind:                                                                                           \
+        for (size_t k = begin; k < end; ++k) sweep_block(c, k, rows, kind, relaxation, primal);          \
+        break
+#define SWEEPS(rows)                                                                                        \
+    switch (sweep) {                                                                                        \
+        SWEEP(rows, CPU_SWEEP_START);                                                                       \
+        SWEEP(rows, CPU_SWEEP_ITERATE);                                                                     \
+        SWEEP(rows, CPU_SWEEP_MEASURE);                                                                     \
+        SWEEP(rows, CPU_SWEEP_RELAX);                                                                       \
+        SWEEP(rows, CPU_SWEEP_PLAIN);                                                                       \
+        SWEEP(rows, CPU_SWEEP_PLAIN_MEASURE);                                                               \
     }
+    if (c->plan.contact_rows == 3) SWEEPS(3)
+    else SWEEPS(1)
+#undef SWEEPS
 #undef SWEEP
 }

@@ -265,6 +265,7 @@ sadmm_status CPU(update_weights)(struct sadmm_context *c, struct sadmm_error *er
 {
     (void)error;
     bool levels = ++c->refreshes >= WEIGHT_FIRST_LEVEL;
+    c->exact_since = 0;
     bool eases = c->refreshes == 0 && c->plan.warm && c->plan.rigid; /* world level: gaps, a slop and a step */
     CPU(sum_wrenches)(c);
     CPU_PARALLEL
@@ -286,6 +287,7 @@ sadmm_status CPU(update_weights)(struct sadmm_context *c, struct sadmm_error *er
         CPU_BARRIER;
         cpu_share((size_t)c->bodies, thread, threads, &begin, &end);
         for (size_t i = begin; i < end; ++i) assemble_C(c, i);
+        CPU(take_defects)(c, begin, end);
     }
     return SADMM_OK;
 }

@@ -48,10 +48,33 @@ SADMM_INLINE void contact_project_rows(const real in[3], real mu, real out[3])
     out[2] = scale * in[2];
 }
 
+/* lambda^ - lambda and lambda^ = Pi_C(lambda - step), where the one comes out without the rounding of the other: the method
+ * `fast` passes on changes alone. In the contact's frame. */
+SADMM_INLINE void contact_change_rows(const real lambda[3], const real step[3], real mu, real change[3], real projected[3])
+{
+    const real y[3] = {lambda[0] - step[0], lambda[1] - step[1], lambda[2] - step[2]};
+    real limit, t2 = y[1] * y[1] + y[2] * y[2], scale;
+    int closed = y[0] > 0, k;
+    projected[0] = closed ? y[0] : (real)0;
+    limit = mu * projected[0];
+    scale = t2 > limit * limit ? limit / real_sqrt(t2) : (real)1;
+    change[0] = closed ? -step[0] : -lambda[0];
+    for (k = 1; k < 3; ++k) {
+        projected[k] = scale * y[k];
+        change[k] = closed ? (scale - 1) * y[k] - step[k] : -lambda[k];
+    }
+}
+
 /* Soft constraint: lambda = -(k e + c (x - s lambda_old)) / (1 + c s), s = 1/beta_a + 1/beta_b (Step 3, soft). */
 SADMM_INLINE real soft_multiplier(real k, real c, real e, real x, real s, real lambda_old)
 {
     return -(k * e + c * (x - s * lambda_old)) / (1 + c * s);
+}
+
+/* The same minus lambda_old: what is missing of (3). */
+SADMM_INLINE real soft_change(real k, real c, real e, real x, real s, real lambda_old)
+{
+    return -(k * e + c * x + lambda_old) / (1 + c * s);
 }
 
 #endif
