@@ -27,8 +27,9 @@
  *
  * The method `fast` has a weight B of its own for each constraint (cuda_weights.cu) in place of beta, which is 1 then.
  * Its iteration is Steps 2-4 and then Step 1, relaxed (math/relax.h), by instances of its own of the same kernels;
- * slots are by island in every tier, since weights rest on sums over islands. It begins with the multipliers: records are not
- * kept.
+ * slots are by island in every tier, since weights rest on sums over islands. It passes on changes alone: records are
+ * J^T d lambda, and bodies keep their defect b - A v + J^T lambda (docs/algorithm.md). It begins with the multipliers: records
+ * are not kept.
  *
  * Launch sizes follow from what the host knows (rooms, tier); kernels read the true counts from `live`, and do nothing
  * once it says halt.
@@ -135,6 +136,7 @@ struct cuda_view {
 
     solver_real *state; /* (bodies + 1) x ROW: v, w, 1/beta, 0; the last row is the static world, all 0 */
     solver_real *b;     /* bodies x ROW */
+    solver_real *defect; /* fast: bodies x ROW: b - A v + J^T lambda */
     solver_real *lines; /* bodies x line: A and H (cuda_line.h) */
     int32_t line;
     int32_t rigid;      /* how lines are packed */
@@ -153,7 +155,7 @@ struct cuda_view {
     solver_real *row_data; /* ROW_PLANES x row_stride */
 
     /* halves x ROW: a force, 0, torque, 0. After a measured iteration `records` holds J^T lambda and `change`
-     * J^T (lambda - lambda_prev), else `records` holds J^T (2 lambda - lambda_prev). */
+     * J^T (lambda - lambda_prev), else `records` holds J^T (2 lambda - lambda_prev). fast: J^T (lambda^ - lambda). */
     solver_real *records, *change;
 
     const int32_t *offsets, *incident; /* body -> places of its halves; place -> half, ascending for each body */
@@ -216,12 +218,14 @@ struct cuda_args {
     int32_t backward;   /* thread blocks in descending order */
     int32_t in_order;   /* slots are raw indices */
     int32_t settled;    /* fast: Step 1 ran before in this solve */
+    int32_t goes_on;    /* fast: the stretch does not end with these iterations */
     int32_t warm;       /* fast: the step starts warm */
     int32_t looks;      /* fast: of the stop rule, in this step so far */
     int32_t limit;      /* fast: islands with too much energy are to be suspected */
     int32_t few;        /* fast: and those that bounce (math/limit.h) */
     const struct sadmm_resident_edit *edits;
     double factor;
+    double multipliers; /* fast: how many times as far as lambda^ those of this iteration have gone */
 };
 
 typedef void (*cuda_kernel)(const cuda_view, const cuda_args);
@@ -271,6 +275,7 @@ struct sadmm_context {
     bool fast;     /* the method */
     bool settled;  /* fast: Step 1 ran in this solve */
     int refreshes; /* fast: of the weights, in this solve */
+    int exact_since; /* fast: iterations since the defects were taken */
     int looks;     /* fast: at the stop rule, in this step */
     unsigned cleared; /* enum cuda_scalar: those that a kernel of this step has set to 0 for their first use */
     bool recording; /* a graph of the whole step: nothing is allocated, no graph launched in it */
@@ -355,6 +360,8 @@ sadmm_status CUDA(enqueue_pairs)(struct sadmm_context *, bool first, struct sadm
 sadmm_status CUDA(enqueue_islands)(struct sadmm_context *, bool first, struct sadmm_error *error);
 sadmm_status CUDA(enqueue_weighted_penalties)(struct sadmm_context *, bool first, bool factor, bool planned,
                                               struct sadmm_error *error);
+/* fast: the bodies' defects anew. */
+sadmm_status CUDA(enqueue_defects)(struct sadmm_context *, struct sadmm_error *error);
 /* fast: (17), as a maximum with what view.residual[1] is. */
 sadmm_status CUDA(enqueue_momentum_residual)(struct sadmm_context *, struct sadmm_error *error);
 /* fast: by what islands are to be slowed down (cuda_slow.h), and how many, in *view.limited. `suspected`: the iterations

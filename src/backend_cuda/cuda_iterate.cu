@@ -42,10 +42,17 @@ static __device__ __forceinline__ void load_numbers_once(real (&to)[4 * COUNT], 
     unpack(to, four);
 }
 
+static __device__ __forceinline__ void store_numbers(solver_real *to, const real (&from)[ROW])
+{
+    const real4 lo = {from[0], from[1], from[2], from[3]}, hi = {from[4], from[5], from[6], from[7]};
+    ((real4 *)to)[0] = lo;
+    ((real4 *)to)[1] = hi;
+}
+
 /* Step 1, a thread a body: all of a body's numbers lie side by side and are asked for at once, sixteen bytes at a time. (Eight
  * lanes a body, as in the resident tiers, where latency counts, spend the time on instructions that load and pass around
  * single numbers.) What is read once makes room in the caches for states and records. The sums are those of
- * free_momentum() and move_body(). FAST: args.factor times as far. */
+ * free_momentum() and step_of(); FAST: of step_fast() and defect_after(), args.factor times as far. */
 template <bool JOIN, bool RIGID, bool FAST>
 static __global__ void __launch_bounds__(BODY_THREADS)
     bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
@@ -57,15 +64,15 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const size_t at = args.in_order ? (size_t)i : (size_t)v.body_of[i];
     if (FAST && island_stopped(v, args.looks, (int32_t)at)) return;
     const real ratio = JOIN && args.rescaled ? (real)*v.ratio : (real)1;
-    real line[LINE], b[ROW], state[ROW], g[6];
+    real line[LINE], b[ROW], state[ROW], g[6], step[6];
     load_numbers_once<LINE / 4>(line, v.lines + at * LINE);
-    load_numbers_once<ROW / 4>(b, v.b + at * ROW);
+    load_numbers_once<ROW / 4>(b, (FAST ? v.defect : v.b) + at * ROW);
     load_numbers<ROW / 4>(state, v.state + at * ROW);
 #pragma unroll
     for (int r = 0; r < 6; ++r) {
-        g[r] = b[r];
+        g[r] = FAST ? (real)0 : b[r];
 #pragma unroll
-        for (int k = 0; k < 6; ++k) g[r] = fused(-line_a((const real *)line, RIGID, r, k), state[k], g[r]);
+        for (int k = 0; k < 6 && !FAST; ++k) g[r] = fused(-line_a((const real *)line, RIGID, r, k), state[k], g[r]);
     }
     const int32_t end = v.offsets[i + 1];
 #pragma unroll 4
@@ -80,16 +87,25 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         }
     }
     const real *H = line_h((const real *)line, RIGID);
+    real pushed[6];
+#pragma unroll
+    for (int r = 0; r < 6; ++r) pushed[r] = FAST ? fused((real)2, g[r], b[r]) : g[r];
 #pragma unroll
     for (int r = 0; r < 6; ++r) {
-        const real step = product_with_row(H[packed_place(r, 0)], H[packed_place(r, 1)], H[packed_place(r, 2)],
-                                           H[packed_place(r, 3)], H[packed_place(r, 4)], H[packed_place(r, 5)], g);
-        state[r] = FAST ? fused((real)args.factor, step, state[r]) : state[r] + step;
+        step[r] = product_with_row(H[packed_place(r, 0)], H[packed_place(r, 1)], H[packed_place(r, 2)],
+                                   H[packed_place(r, 3)], H[packed_place(r, 4)], H[packed_place(r, 5)], pushed);
+        if (FAST) step[r] = (real)args.factor * step[r];
+        state[r] += step[r];
     }
-    real4 *out = (real4 *)(v.state + at * ROW);
-    const real4 lo = {state[0], state[1], state[2], state[3]}, hi = {state[4], state[5], state[6], state[7]};
-    out[0] = lo;
-    out[1] = hi;
+    store_numbers(v.state + at * ROW, state);
+    if (!FAST) return;
+#pragma unroll
+    for (int r = 0; r < 6; ++r) {
+        b[r] = fused((real)args.multipliers, g[r], b[r]);
+#pragma unroll
+        for (int k = 0; k < 6; ++k) b[r] = fused(-line_a((const real *)line, RIGID, r, k), step[k], b[r]);
+    }
+    store_numbers(v.defect + at * ROW, b);
 }
 
 /* ---- Steps 2-4 of a pair, points in memory ---------------------------------------------------------------------- */
@@ -178,10 +194,11 @@ static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t 
         if (lane + LANES_A_PAIR * j >= count) continue;
         const vec3 arm_a = xyz(point[j]), arm_b = v3_add(arm_a, difference);
         const vec3 x = relative_velocity(a.motion, arm_a, b.motion, arm_b);
-        const vec3 lambda = update_point<CONTACT_ROWS>(normal, about.w, x, point[j].w, inv_s, old[j]);
-        const vec3 delta = v3_sub(lambda, old[j]);
+        const point_change to = update<CONTACT_ROWS, FAST>(normal, about.w, x, point[j].w, inv_s, old[j]);
+        const vec3 lambda = to.lambda, delta = to.delta;
         if (live) store_lambda<CONTACT_ROWS>(v, slot[j], FAST ? relaxed(lambda, delta, over) : lambda);
-        add_point(&next, j, impulse_of<CONTACT_ROWS>(normal, SPLIT ? lambda : v3_add(lambda, delta)), arm_a, arm_b);
+        add_point(&next, j,
+                  impulse_of<CONTACT_ROWS>(normal, FAST ? delta : SPLIT ? lambda : v3_add(lambda, delta)), arm_a, arm_b);
         if (SPLIT) add_point(&change, j, impulse_of<CONTACT_ROWS>(normal, delta), arm_a, arm_b);
         if (!MEASURE) continue;
         largest = real_max(largest, largest_row<CONTACT_ROWS>(normal, delta));
@@ -227,10 +244,9 @@ static __device__ __forceinline__ double sweep_row_block_fast(const cuda_view &v
                           lambda, delta);
     for (int r = 0; r < 6; ++r) {
         kept[r] = fused(over, delta[r], lambda[r]);
-        lambda[r] += delta[r];
     }
     store_row_lambda(v, k, kept);
-    store_row_records(v, k, about, lambda, v.records);
+    store_row_records(v, k, about, delta, v.records);
     return MEASURE ? row_block_primal_fast(v, k, about, delta) : 0;
 }
 
@@ -330,8 +346,9 @@ static __global__ void dual_kernel(const __grid_constant__ cuda_view v, const __
 
 /* ---- launches ------------------------------------------------------------------------------------------------- */
 
-/* fast: v goes `relaxation` times as far. */
-static sadmm_status launch_bodies(struct sadmm_context *c, bool join, double relaxation, struct sadmm_error *error)
+/* fast: v goes `relaxation` times as far, multipliers have gone `multipliers` times. */
+static sadmm_status launch_bodies(struct sadmm_context *c, bool join, double relaxation, double multipliers,
+                                  struct sadmm_error *error)
 {
     cuda_args args = {};
     args.rescaled = c->rescaled;
@@ -339,6 +356,7 @@ static sadmm_status launch_bodies(struct sadmm_context *c, bool join, double rel
     args.looks = c->looks;
     args.in_order = !slots_by_island(&c->partition);
     args.factor = relaxation;
+    args.multipliers = multipliers;
     cuda_kernel kernel =
         c->fast         ? (c->view.rigid ? bodies_kernel<false, true, true> : bodies_kernel<false, false, true>)
         : c->view.rigid ? (join ? bodies_kernel<true, true, false> : bodies_kernel<false, true, false>)
@@ -405,7 +423,7 @@ extern "C" sadmm_status CUDA(update_velocity)(struct sadmm_context *c, struct sa
 {
     CUDA_ENTER(c);
     CUDA_TRY(CUDA(prepare_stepwise)(c, error));
-    CUDA_TRY(launch_bodies(c, c->measured, 1, error));
+    CUDA_TRY(launch_bodies(c, c->measured, 1, 1, error));
     c->measured = false;
     c->rescaled = false;
     return SADMM_OK;
@@ -427,8 +445,10 @@ extern "C" sadmm_status CUDA(update_constraints)(struct sadmm_context *c, bool m
 static sadmm_status fast_iteration(struct sadmm_context *c, int i, int count, bool measure, struct sadmm_error *error)
 {
     const double relaxation = c->settings.relaxation;
-    CUDA_TRY(launch_constraints(c, measure, relax_constraints(i, count) ? relaxation - 1 : 0, error));
-    CUDA_TRY(launch_bodies(c, false, relax_velocity(i, count, c->settled) ? relaxation : 1, error));
+    const bool farther = relax_constraints(i, count);
+    CUDA_TRY(launch_constraints(c, measure, farther ? relaxation - 1 : 0, error));
+    CUDA_TRY(launch_bodies(c, false, relax_velocity(i, count, c->settled) ? relaxation : 1, farther ? relaxation : 1,
+                           error));
     c->settled = true;
     return SADMM_OK;
 }
@@ -441,7 +461,7 @@ static sadmm_status plain_iterations(struct sadmm_context *c, int count, struct 
             CUDA_TRY(fast_iteration(c, i, count + 1, false, error));
             continue;
         }
-        CUDA_TRY(launch_bodies(c, false, 1, error));
+        CUDA_TRY(launch_bodies(c, false, 1, 1, error));
         CUDA_TRY(launch_constraints(c, false, 0, error));
     }
     return SADMM_OK;
@@ -476,26 +496,28 @@ static sadmm_status make_graph(struct sadmm_context *c, struct sadmm_error *erro
     return SADMM_OK;
 }
 
-static sadmm_status stream_iterations(struct sadmm_context *c, int count, bool measure, struct sadmm_error *error)
+/* fast, goes_on: none of them is the stretch's last. */
+static sadmm_status stream_iterations(struct sadmm_context *c, int count, bool measure, bool goes_on,
+                                      struct sadmm_error *error)
 {
     CUDA_TRY(CUDA(prepare_stepwise)(c, error));
     if (c->measured) {
-        CUDA_TRY(launch_bodies(c, true, 1, error));
+        CUDA_TRY(launch_bodies(c, true, 1, 1, error));
         CUDA_TRY(launch_constraints(c, measure && count == 1, 0, error));
         --count;
     }
-    if (c->fast && !c->settled && count > 1) {
-        CUDA_TRY(fast_iteration(c, 0, count, false, error));
+    if (c->fast && !c->settled && (count > 1 || goes_on)) {
+        CUDA_TRY(fast_iteration(c, 0, 2, false, error));
         --count;
     }
-    int plain = (measure || c->fast) && count > 0 ? count - 1 : count;
+    int plain = (measure || (c->fast && !goes_on)) && count > 0 ? count - 1 : count;
     if (plain >= GRAPH_ITERATIONS && !c->recording && !c->graph_valid) CUDA_TRY(make_graph(c, error));
     for (; plain >= GRAPH_ITERATIONS && !c->recording; plain -= GRAPH_ITERATIONS, count -= GRAPH_ITERATIONS)
         CUDA_CALL(c, cudaGraphLaunch(c->graph, c->stream), "cudaGraphLaunch");
     CUDA_TRY(plain_iterations(c, plain, error));
     if (count > plain && c->fast) return fast_iteration(c, 0, 1, measure, error);
     if (count > plain) {
-        CUDA_TRY(launch_bodies(c, false, 1, error));
+        CUDA_TRY(launch_bodies(c, false, 1, 1, error));
         CUDA_TRY(launch_constraints(c, true, 0, error));
     }
     return SADMM_OK;
@@ -503,7 +525,7 @@ static sadmm_status stream_iterations(struct sadmm_context *c, int count, bool m
 
 /* ---- fused: BLOCK, CLUSTER and GRID ---------------------------------------------------------------------------- */
 
-static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool measure, bool suspect,
+static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool measure, bool suspect, bool goes_on,
                                         struct sadmm_error *error)
 {
     const struct cuda_partition *partition = &c->partition;
@@ -515,6 +537,7 @@ static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool
     args.rescaled = c->rescaled;
     args.start = c->starting;
     args.settled = c->settled;
+    args.goes_on = goes_on;
     args.limit = suspect;
     args.few = limit_few(c->plan.warm, c->settings.iterations);
     args.looks = c->looks;
@@ -534,8 +557,18 @@ sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *c, int count, bool m
 {
     const bool stream = c->partition.tier == SADMM_CUDA_TIER_STREAM;
     CUDA_TRY(clear_primal(c, measure, error));
-    CUDA_TRY(stream ? stream_iterations(c, count, measure, error)
-                    : resident_iterations(c, count, measure, suspect, error));
+    while (count > 0) {
+        if (c->fast && c->exact_since == RELAX_DEFECT_PERIOD) {
+            CUDA_TRY(CUDA(enqueue_defects)(c, error));
+            c->exact_since = 0;
+        }
+        const int left = c->fast ? RELAX_DEFECT_PERIOD - c->exact_since : count, now = count < left ? count : left;
+        const bool goes_on = now < count;
+        CUDA_TRY(stream ? stream_iterations(c, now, measure && !goes_on, goes_on, error)
+                        : resident_iterations(c, now, measure && !goes_on, suspect && !goes_on, goes_on, error));
+        c->exact_since += now;
+        count -= now;
+    }
     *suspected = suspect && !stream;
     c->measured = measure && !c->fast;
     c->rescaled = false;

@@ -238,7 +238,7 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
     size_t out = (13 * n + 3 * points + 6 * (size_t)v->rows + 2) * sizeof(double);
     const wanted_room wanted[] = {
         {BUFFER_STATE, (n + 1) * ROW * real_size},
-        {BUFFER_B, n * ROW * real_size},
+        {BUFFER_B, (c->fast ? 2 : 1) * n * ROW * real_size},
         {BUFFER_LINES, n * (size_t)v->line * real_size},
         {BUFFER_C, n * PACKED * sizeof(double)},
         {BUFFER_BETA, n * sizeof(double)},
@@ -268,6 +268,7 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
     cuda_buffer *b = c->buffers;
     v->state = (solver_real *)b[BUFFER_STATE].data;
     v->b = (solver_real *)b[BUFFER_B].data;
+    v->defect = c->fast ? v->b + n * ROW : nullptr;
     v->lines = (solver_real *)b[BUFFER_LINES].data;
     v->C = (double *)b[BUFFER_C].data;
     v->beta = (double *)b[BUFFER_BETA].data;

@@ -50,7 +50,8 @@ struct part_memory {
     solver_real *state;      /* CLUSTER: of even, then of odd iterations; bodies x ROW each, then a row of 0 */
     solver_real *records;    /* halves x ROW, and FEW rows that are read and not used */
     solver_real *row_lambda; /* halves x ROW, when there are row blocks */
-    solver_real *lines, *b;  /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x line, ROW */
+    solver_real *lines, *b;  /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x line, ROW; FAST:
+                                the defect in place of b */
 };
 
 /* One description of the layout for its size and its addresses. */
@@ -180,8 +181,8 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
     int32_t t, r, lane, half; /* thread; component of a body; lane of a quad; the quad's half */
     int32_t first_body, bodies, first_half, halves;
 
-    /* One body for each eight threads is in registers, with where its records are and b - A v; more are in shared
-     * memory. What the loop needs is worked out before it: addresses, and what holds for a whole warp. */
+    /* One body for each eight threads is in registers, with where its records are and b - A v (FAST: what it has gone by in
+     * this iteration); more are in shared memory. What the loop needs is worked out before it: addresses, and what holds for a whole warp. */
     int32_t body;
     const solver_real *gathered; /* component r of the first record */
     int32_t gathered_count;      /* 0 in lanes that have no component */
@@ -190,6 +191,7 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
     real2_pair *own_record;
     body_lane own_body;
     real momentum;
+    real sum, step;
     half_lane<POINTS> own;
 
     __device__ __forceinline__ part_run(const cuda_view &view, const cuda_args &arguments, unsigned char *memory)
@@ -197,7 +199,7 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
           first_body(v.parts[blockIdx.x]), bodies(v.parts[blockIdx.x + 1] - first_body),
           first_half(v.offsets[first_body]), halves(v.offsets[first_body + bodies] - first_half), body(t / LANES),
           gathered(nullptr), gathered_count(0), many(false), moves(warp_has_body(0)), updates(warp_has_half()),
-          own_record(nullptr), own_body(), momentum(0), own()
+          own_record(nullptr), own_body(), momentum(0), sum(0), step(0), own()
     {
         lay_out(&m, memory, MODE == CLUSTER, (int)blockDim.x, args.most_bodies, has_rows());
     }
@@ -231,7 +233,8 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
     __device__ __forceinline__ void store_record(real2_pair *record, real2_pair sum) const;
     __device__ __forceinline__ real gather(real g, const solver_real *from, int32_t count, bool more) const;
     __device__ __forceinline__ void publish(int32_t i, real value, int32_t odd);
-    __device__ __forceinline__ void move_bodies(int32_t odd, real relaxation);
+    __device__ __forceinline__ void move_bodies(int32_t odd);
+    __device__ __forceinline__ void move_bodies_fast(int32_t odd, real relaxation, real multipliers);
     template <bool MEASURE> __device__ __forceinline__ double update_halves(int32_t odd, real over);
     __device__ __forceinline__ void suspect(int32_t odd) const;
     __device__ __forceinline__ void store(int32_t odd);
@@ -254,9 +257,8 @@ static __device__ __noinline__ double update_row_half_fast(const cuda_view &v, i
     update_row_block_fast(v, k, about, side ? other : own, side ? own : other, lambda, delta);
     for (int j = 0; j < 6; ++j) {
         kept[j] = fused(over, delta[j], lambda[j]);
-        lambda[j] += delta[j];
     }
-    store_row_record(v, k, about.rows, side, lambda, record);
+    store_row_record(v, k, about.rows, side, delta, record);
     return row_block_primal_fast(v, k, about, delta);
 }
 
@@ -381,8 +383,8 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
     const int32_t threads = (int32_t)blockDim.x, in_registers = threads / LANES;
     const size_t at = (size_t)(first_body + (body < bodies ? body : 0)),
                  raw = body < bodies ? (size_t)v.body_of[at] : 0;
-    own_body =
-        load_body(body < bodies, r, v.lines + raw * (size_t)v.line, v.rigid, v.b + raw * ROW, v.state + raw * ROW);
+    own_body = load_body(body < bodies, r, v.lines + raw * (size_t)v.line, v.rigid, (FAST ? v.defect : v.b) + raw * ROW,
+                         v.state + raw * ROW);
     gathered = m.records;
     if (body < bodies && r < 6) {
         gathered = m.records + (v.offsets[at] - first_half) * ROW + record_slot(r);
@@ -390,7 +392,7 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
     }
     many = __ballot_sync((unsigned)ALL_LANES, gathered_count > FEW) != 0;
     own_record = (real2_pair *)(m.records + half * ROW + quad_slot(lane));
-    if (moves) momentum = free_momentum(own_body);
+    if (!FAST && moves) momentum = free_momentum(own_body);
     for (int32_t i = t; i < bodies * ROW; i += threads) m.state[i] = v.state[raw_row(i)];
     if (t < ROW) m.state[(MODE == CLUSTER ? 2 : 1) * args.most_bodies * ROW + t] = 0;
     if (bodies > in_registers) {
@@ -399,7 +401,8 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
             m.lines[i / v.line * LINE_GENERAL + i % v.line] =
                 v.lines[(size_t)v.body_of[first_body + in_registers + i / v.line] * (size_t)v.line +
                         (size_t)(i % v.line)];
-        for (int32_t i = t; i < more * ROW; i += threads) m.b[i] = v.b[raw_row(in_registers * ROW + i)];
+        for (int32_t i = t; i < more * ROW; i += threads)
+            m.b[i] = (FAST ? v.defect : v.b)[raw_row(in_registers * ROW + i)];
     }
     own.own = 0;
     own.other = m.state;
@@ -450,11 +453,10 @@ PART __device__ __forceinline__ void PART_RUN::publish(int32_t i, real value, in
     if (MODE == GRID) v.exchange[((size_t)(odd ? v.bodies : 0) + (size_t)(first_body + i)) * ROW + (size_t)r] = value;
 }
 
-/* FAST: `relaxation` times as far. */
-PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd, real relaxation)
+PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd)
 {
     if (has_moves()) {
-        move_body<FAST>(&own_body, gather(momentum, gathered, gathered_count, many), relaxation);
+        own_body.v += step_of(own_body, gather(momentum, gathered, gathered_count, many));
         publish(body, own_body.v, odd);
     }
     if (SIZE == ONE_WARP) return; /* at most one body for each eight threads (cuda_partition.cu) */
@@ -469,8 +471,36 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd, real rel
             const int32_t from = v.offsets[first_body + i], count = v.offsets[first_body + i + 1] - from;
             g = gather(g, m.records + (from - first_half) * ROW + record_slot(r), count, count > FEW);
         }
-        move_body<FAST>(&one, g, relaxation);
-        publish(i, one.v, odd);
+        publish(i, one.v + step_of(one, g), odd);
+    }
+}
+
+/* `relaxation` times as far; multipliers have gone `multipliers` times. The defects of bodies in registers follow
+ * later: nobody waits for them. */
+PART __device__ __forceinline__ void PART_RUN::move_bodies_fast(int32_t odd, real relaxation, real multipliers)
+{
+    if (has_moves()) {
+        sum = gather(0, gathered, gathered_count, many);
+        step = step_fast(own_body, sum, relaxation);
+        own_body.v += step;
+        publish(body, own_body.v, odd);
+    }
+    if (SIZE == ONE_WARP) return; /* at most one body for each eight threads (cuda_partition.cu) */
+    const int32_t in_registers = (int32_t)blockDim.x / LANES;
+    for (int32_t first = in_registers; warp_has_body(first); first += in_registers) {
+        const int32_t i = first + body, at = i - in_registers;
+        const bool live = i < bodies && r < 6;
+        const body_lane one =
+            load_body(i < bodies, r, m.lines + at * LINE_GENERAL, v.rigid, m.b + at * ROW, state(!odd) + i * ROW);
+        real pushed = 0;
+        if (live) {
+            const int32_t from = v.offsets[first_body + i], count = v.offsets[first_body + i + 1] - from;
+            pushed = gather(0, m.records + (from - first_half) * ROW + record_slot(r), count, count > FEW);
+        }
+        const real gone = step_fast(one, pushed, relaxation);
+        publish(i, one.v + gone, odd);
+        const real defect = defect_after(one, pushed, gone, multipliers);
+        if (live) m.b[at * ROW + r] = defect;
     }
 }
 
@@ -497,11 +527,11 @@ PART template <bool MEASURE> __device__ __forceinline__ double PART_RUN::update_
 #pragma unroll
     for (int32_t j = 0; j < COUNT; ++j) {
         const vec3 old = own.lambda[j], x = relative_velocity(other, own.other_arm[j], own_motion, own.own_arm[j]);
-        const vec3 lambda =
-            update_point<CONTACT_ROWS>(own.normal, own.friction, x, own.error[j], own.inv_s[j], old);
-        const vec3 delta = v3_sub(lambda, old);
+        const point_change to = update<CONTACT_ROWS, FAST>(own.normal, own.friction, x, own.error[j], own.inv_s[j], old);
+        const vec3 lambda = to.lambda, delta = to.delta;
         own.lambda[j] = FAST ? relaxed(lambda, delta, over) : lambda;
-        vec3 impulse = impulse_of<CONTACT_ROWS>(own.normal, SPLIT ? lambda : v3_add(lambda, delta));
+        vec3 impulse =
+            impulse_of<CONTACT_ROWS>(own.normal, FAST ? delta : SPLIT ? lambda : v3_add(lambda, delta));
         vec3 moment = fused_cross(own.own_arm[j], impulse);
         force = j == 0 ? impulse : v3_add(force, impulse);
         torque = j == 0 ? moment : v3_add(torque, moment);
@@ -548,25 +578,29 @@ PART __device__ __forceinline__ void PART_RUN::suspect(int32_t odd) const
     for (int32_t first = 0; warp_has_body(first); first += in_registers) {
         const int32_t i = first + body, at = i - in_registers;
         const bool live = i < bodies;
-        double a[6], b = first == 0 ? (double)own_body.b : live && r < 6 ? (double)m.b[at * ROW + r] : 0;
+        const size_t raw = live ? (size_t)v.body_of[first_body + i] : 0;
+        double a[6], b = live && r < 6 ? (double)v.b[raw * ROW + (size_t)r] : 0;
 #pragma unroll
         for (int k = 0; k < 6; ++k)
             a[k] = first == 0          ? (double)own_body.A[k]
                    : live && r < 6     ? (double)line_a(m.lines + at * LINE_GENERAL, v.rigid, r, k)
                                        : 0;
-        suspect_body(v, args.few, live && r == 0, live ? (size_t)v.body_of[first_body + i] : 0,
+        suspect_body(v, args.few, live && r == 0, raw,
                      live && r < 6 ? (double)state(odd)[i * ROW + r] : 0, b, a);
     }
 }
 
 /* ---- storing --------------------------------------------------------------------------------------------------- */
 
-/* Velocities, records (not FAST) and, from side a (b where a is static), multipliers; nothing of islands that have stopped. */
+/* Velocities, records (FAST: defects) and, from side a (b where a is static), multipliers; nothing of islands that have
+ * stopped. */
 PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
 {
+    const int32_t in_registers = (int32_t)blockDim.x / LANES;
     for (int32_t i = t; i < bodies * ROW; i += (int32_t)blockDim.x) {
         if (i % ROW >= 6 || (FAST && island_stopped(v, args.looks, v.body_of[first_body + i / ROW]))) continue;
         v.state[raw_row(i)] = state(odd)[i];
+        if (FAST) v.defect[raw_row(i)] = i < in_registers * ROW ? own_body.b : m.b[i - in_registers * ROW];
     }
     for (int32_t i = t; !FAST && i < halves * ROW; i += (int32_t)blockDim.x)
         v.records[(size_t)first_half * ROW + (size_t)i] = m.records[i];
@@ -613,16 +647,18 @@ static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view 
     }
     const double relaxation = v.settings.relaxation;
     const real over = (real)(relaxation - 1), all = (real)relaxation;
+    const int32_t stretch = args.goes_on ? args.count + 1 : args.count;
     for (int32_t i = 0; i < args.count; ++i) {
         const int32_t odd = i & 1;
-        const real farther = relax_constraints(i, args.count) ? over : (real)0;
+        const bool farther = relax_constraints(i, stretch);
+        const real multipliers = farther ? all : (real)1;
         if (FULL && args.measure && i + 1 == args.count)
-            reduce_max(part.template update_halves<true>(odd, farther), v.residual);
-        else part.template update_halves<false>(odd, farther);
+            reduce_max(part.template update_halves<true>(odd, farther ? over : (real)0), v.residual);
+        else part.template update_halves<false>(odd, farther ? over : (real)0);
         block_barrier<SIZE>();
-        part.move_bodies(!odd, relax_velocity(i, args.count, args.settled || i > 0) ? all : (real)1);
+        part.move_bodies_fast(!odd, relax_velocity(i, stretch, args.settled || i > 0) ? all : (real)1, multipliers);
         arrive<MODE, SIZE>(v.barrier);
-        if (part.has_moves()) part.momentum = free_momentum(part.own_body);
+        if (part.has_moves()) part.own_body.b = defect_after(part.own_body, part.sum, part.step, multipliers);
         wait<MODE, SIZE>(v.barrier, *target += gridDim.x);
     }
 }
@@ -633,7 +669,7 @@ static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view
 {
     for (int32_t iteration = 1; iteration <= args.count; ++iteration) {
         const int32_t odd = iteration & 1;
-        part.move_bodies(odd, 1);
+        part.move_bodies(odd);
         arrive<MODE, SIZE>(v.barrier);
         if (part.has_moves()) part.momentum = free_momentum(part.own_body);
         wait<MODE, SIZE>(v.barrier, *target += gridDim.x);

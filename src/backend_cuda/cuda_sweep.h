@@ -134,15 +134,30 @@ CUDA_INLINE float inverse_sqrt(float x)
 #endif
 CUDA_INLINE double inverse_sqrt(double x) { return rsqrt(x); }
 
-/* contact_project() with one inverse square root for a square root and a division. */
+/* What contact_project() makes of lambda: normal n + scale tangent. `closed`: lambda had a normal part to keep. */
+struct cone_parts {
+    vec3 tangent;
+    real normal, scale;
+    bool closed;
+};
+
+/* With one inverse square root for a square root and a division. */
+CUDA_INLINE cone_parts cone_parts_of(vec3 lambda, vec3 n, real mu)
+{
+    const real ln = fused_dot(n, lambda);
+    cone_parts out;
+    out.closed = ln > 0;
+    out.tangent = fused_madd(lambda, -ln, n);
+    out.normal = out.closed ? ln : (real)0;
+    const real limit = mu * out.normal, t2 = real_max(fused_dot(out.tangent, out.tangent), (real)FLT_MIN);
+    out.scale = t2 > limit * limit ? limit * inverse_sqrt(t2) : (real)1;
+    return out;
+}
+
 CUDA_INLINE vec3 project(vec3 lambda, vec3 n, real mu)
 {
-    real ln = fused_dot(n, lambda);
-    vec3 t = fused_madd(lambda, -ln, n);
-    ln = ln > 0 ? ln : (real)0;
-    real limit = mu * ln, t2 = real_max(fused_dot(t, t), (real)FLT_MIN);
-    real scale = t2 > limit * limit ? limit * inverse_sqrt(t2) : (real)1;
-    return fused_madd(v3_scale(n, ln), scale, t);
+    const cone_parts parts = cone_parts_of(lambda, n, mu);
+    return fused_madd(v3_scale(n, parts.normal), parts.scale, parts.tangent);
 }
 
 /* Steps 2-4 of one point: x = J v, error e. With x, error and inv_s of the other sign the same bits. */
@@ -152,6 +167,37 @@ CUDA_INLINE vec3 update_point(vec3 normal, real friction, vec3 x, real error, re
     if (CONTACT_ROWS == 3) return project(fused_madd(old, -inv_s, fused_madd(x, error, normal)), normal, friction);
     real y = fused(-inv_s, fused_dot(normal, x) + error, old.x);
     return v3(y > 0 ? y : (real)0, 0, 0);
+}
+
+/* The same for the method `fast`: lambda^ and, without the rounding of either, lambda^ - lambda. */
+struct point_change {
+    vec3 lambda, delta;
+};
+template <int CONTACT_ROWS>
+CUDA_INLINE point_change change_point(vec3 normal, real friction, vec3 x, real error, real inv_s, vec3 old)
+{
+    point_change out;
+    if (CONTACT_ROWS == 1) {
+        const real step = inv_s * (fused_dot(normal, x) + error), y = old.x - step;
+        out.lambda = v3(y > 0 ? y : (real)0, 0, 0);
+        out.delta = v3(y > 0 ? -step : -old.x, 0, 0);
+        return out;
+    }
+    const vec3 step = v3_scale(fused_madd(x, error, normal), -inv_s), y = v3_add(old, step);
+    const cone_parts parts = cone_parts_of(y, normal, friction);
+    out.lambda = fused_madd(v3_scale(normal, parts.normal), parts.scale, parts.tangent);
+    out.delta = parts.closed ? fused_madd(step, parts.scale - 1, parts.tangent) : v3_neg(old);
+    return out;
+}
+
+/* Either, by the method. */
+template <int CONTACT_ROWS, bool FAST>
+CUDA_INLINE point_change update(vec3 normal, real friction, vec3 x, real error, real inv_s, vec3 old)
+{
+    if (FAST) return change_point<CONTACT_ROWS>(normal, friction, x, error, inv_s, old);
+    const vec3 lambda = update_point<CONTACT_ROWS>(normal, friction, x, error, inv_s, old);
+    const point_change out = {lambda, v3_sub(lambda, old)};
+    return out;
 }
 
 template <int CONTACT_ROWS> CUDA_INLINE vec3 impulse_of(vec3 normal, vec3 lambda)
@@ -218,31 +264,27 @@ CUDA_INLINE void update_row_block_fast(const cuda_view &v, int32_t k, const row_
                                        const solver_real *vb, real lambda[6], real delta[6])
 {
     const real inv_n = about.body_a < v.bodies && about.body_b < v.bodies ? (real)0.5 : (real)1;
-    real old[6], u[6], along = 0;
+    real u[6], along = 0, old[6], step[6] = {};
     for (int r = 0; r < 6; ++r) {
         old[r] = lambda[r];
-        u[r] = 0;
+        u[r] = delta[r] = 0;
         if (r >= about.rows) continue;
         for (int j = 0; j < 6; ++j)
             u[r] += row_value(v, ROW_J_A + 6 * r + j, k) * va[j] + row_value(v, ROW_J_B + 6 * r + j, k) * vb[j];
         if (about.kind != SADMM_BLOCK_SOFT) u[r] += row_value(v, ROW_ERROR + r, k);
         along += row_value(v, ROW_ALONG + r, k) * u[r];
     }
-    for (int r = 0; r < 6; ++r) {
-        lambda[r] = 0;
-        if (r >= about.rows) continue;
+    for (int r = 0; r < about.rows; ++r) {
         const real weight = inv_n * row_value(v, ROW_WEIGHT + r, k);
+        step[r] = weight * u[r];
         if (about.kind == SADMM_BLOCK_SOFT)
-            lambda[r] = soft_multiplier(row_value(v, ROW_STIFFNESS + r, k), row_value(v, ROW_DAMPING + r, k),
-                                        row_value(v, ROW_ERROR + r, k), u[r], 1 / weight, old[r]);
+            delta[r] = soft_change(row_value(v, ROW_STIFFNESS + r, k), row_value(v, ROW_DAMPING + r, k),
+                                   row_value(v, ROW_ERROR + r, k), u[r], 1 / weight, old[r]);
         else if (about.active >> r & 1)
-            lambda[r] = old[r] - (weight * u[r] + inv_n * row_value(v, ROW_ALONG + r, k) * along);
+            delta[r] = -(step[r] + inv_n * row_value(v, ROW_ALONG + r, k) * along);
+        lambda[r] = old[r] + delta[r];
     }
-    if (about.kind == SADMM_BLOCK_CONTACT) {
-        real y[3] = {lambda[0], lambda[1], lambda[2]};
-        contact_project_rows(y, row_value(v, ROW_FRICTION, k), lambda);
-    }
-    for (int r = 0; r < 6; ++r) delta[r] = lambda[r] - old[r];
+    if (about.kind == SADMM_BLOCK_CONTACT) contact_change_rows(old, step, row_value(v, ROW_FRICTION, k), delta, lambda);
 }
 
 CUDA_INLINE void load_row_lambda(const cuda_view &v, int32_t k, real lambda[6])
@@ -285,7 +327,8 @@ CUDA_INLINE real inverse_of_weight(real inv_s, bool both) { return inv_s > 0 ? 1
 
 /* ---- bodies --------------------------------------------------------------------------------------------------- */
 
-/* Lane r's part of a body: rows r of A and H (which are symmetric), b and v; all 0 in lanes 6 and 7. */
+/* Lane r's part of a body: rows r of A and H (which are symmetric), v, and b or, of the method `fast`, the defect; all 0 in
+ * lanes 6 and 7. */
 struct body_lane {
     real A[6], H[6], b, v;
 };
@@ -321,16 +364,30 @@ CUDA_INLINE real product_with_row(real h0, real h1, real h2, real h3, real h4, r
     return fused(h4, g[4], fused(h2, g[2], h0 * g[0])) + fused(h5, g[5], fused(h3, g[3], h1 * g[1]));
 }
 
-/* v <- v + H g, lane r's component of g being b - A v + J^T E; FAST: `relaxation` times as far. Every lane of the warp
- * comes here. */
-template <bool FAST> CUDA_INLINE void move_body(body_lane *body, real g, real relaxation)
+/* H g, lane r's component of g being b - A v + J^T E. Every lane of the warp comes here. */
+CUDA_INLINE real step_of(const body_lane &body, real g)
 {
     real other[6];
 #pragma unroll
     for (int k = 0; k < 6; ++k) other[k] = __shfl_sync((unsigned)ALL_LANES, g, k, LANES);
-    const real *H = body->H;
-    const real step = product_with_row(H[0], H[1], H[2], H[3], H[4], H[5], other);
-    body->v = FAST ? fused(relaxation, step, body->v) : body->v + step;
+    const real *H = body.H;
+    return product_with_row(H[0], H[1], H[2], H[3], H[4], H[5], other);
+}
+
+/* The method `fast`, with sum = J^T d lambda: v goes by rho H (r + 2 sum), and the defect r with it and with multipliers that
+ * have gone `multipliers` times as far as lambda^. */
+CUDA_INLINE real step_fast(const body_lane &body, real sum, real relaxation)
+{
+    return relaxation * step_of(body, fused((real)2, sum, body.b));
+}
+
+/* Every lane of the warp comes here. */
+CUDA_INLINE real defect_after(const body_lane &body, real sum, real step, real multipliers)
+{
+    real r = fused(multipliers, sum, body.b);
+#pragma unroll
+    for (int k = 0; k < 6; ++k) r = fused(-body.A[k], __shfl_sync((unsigned)ALL_LANES, step, k, LANES), r);
+    return r;
 }
 
 #endif

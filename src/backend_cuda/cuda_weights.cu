@@ -2,8 +2,8 @@
  * precision's data; a few times a step.
  *
  *   pairs    four threads a pair, or one: its load and, the first time, its response. Beside the layout in a whole step
- *   terms    eight lanes a body: what it adds to the sums over its island, the sums (cuda_islands.h), and what follows for
- *            the island. A pair counts at its first dynamic body
+ *   terms    eight lanes a body: its defect, what it adds to the sums over its island, the sums (cuda_islands.h), and what
+ *            follows for the island. A pair counts at its first dynamic body
  *   rows     a thread a row block: B
  *   then C and H (cuda_penalty.cu), where each half of a pair works out B for itself
  */
@@ -142,8 +142,9 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     term[1] = t.live ? mass_of(v, t.body) : 0;
     term[2] = dot_lanes(row.velocity, momentum);
     term[3] = sums[PUSH];
+    const double r = row.b + g - momentum;
+    if (t.live) v.defect[t.body * ROW + (size_t)t.lane] = (solver_real)r;
     if (LEVELS) {
-        const double r = row.b + g - momentum;
         term[4] = dot_lanes(r, product(r, row.a_inverse));
         term[5] = sums[PAIRS];
     }
@@ -232,6 +233,7 @@ sadmm_status CUDA(enqueue_islands)(struct sadmm_context *c, bool first, struct s
     } else {
         ++c->refreshes;
     }
+    c->exact_since = 0;
     args.start = first;
     args.warm = c->plan.warm;
     args.factor = weight_few(c->plan.rigid, c->settings.iterations);
