@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "../core/dense6.h"
+#include "../core/math/contact.h"
 #include "../core/system_terms.h"
 #include "cpu.h"
 
@@ -95,6 +96,11 @@ static void assemble_point(const struct sadmm_context *c, const struct sadmm_con
     }
 }
 
+static real solver_friction(const struct sadmm_context *c, double mu)
+{
+    return (real)(c->fast ? contact_friction_inside(mu, (double)SADMM_EPSILON) : mu);
+}
+
 static void assemble_lane(struct sadmm_context *c, struct pair_block *block, int l)
 {
     static const double zero[3], up[3] = {0, 0, 1};
@@ -107,7 +113,7 @@ static void assemble_lane(struct sadmm_context *c, struct pair_block *block, int
     }
     set_lane(&block->normal, l, pair ? pair->normal : up);
     set_lane(&block->d, l, pair ? d : zero);
-    block->friction[l] = pair ? (real)pair->friction : 0;
+    block->friction[l] = pair ? solver_friction(c, pair->friction) : 0;
     block->inv_s[l] = 0;
     block->body_a[l] = pair ? cpu_body(c, pair->body_a) : c->bodies;
     block->body_b[l] = pair ? cpu_body(c, pair->body_b) : c->bodies;
@@ -124,7 +130,7 @@ static void assemble_row_block(struct sadmm_context *c, size_t k)
     out->rows = in->rows;
     out->body_a = cpu_body(c, in->body_a);
     out->body_b = cpu_body(c, in->body_b);
-    out->friction = (real)in->friction;
+    out->friction = solver_friction(c, in->friction);
     for (int r = 0; r < in->rows; ++r) {
         bool any = false;
         for (int j = 0; j < 6; ++j) {

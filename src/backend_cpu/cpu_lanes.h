@@ -44,6 +44,10 @@ static inline real horizontal_max(lanes a)
     return m;
 }
 
+static inline vec pick_vec(lane_mask mask, vec yes, vec no)
+{
+    return (vec){pick(mask, yes.x, no.x), pick(mask, yes.y, no.y), pick(mask, yes.z, no.z)};
+}
 static inline vec add(vec a, vec b) { return (vec){a.x + b.x, a.y + b.y, a.z + b.z}; }
 static inline vec sub(vec a, vec b) { return (vec){a.x - b.x, a.y - b.y, a.z - b.z}; }
 static inline vec scale(vec a, lanes s) { return (vec){a.x * s, a.y * s, a.z * s}; }

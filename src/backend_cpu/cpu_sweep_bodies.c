@@ -1,7 +1,7 @@
 /* Step 1 (kernels I-K), eq. (6) in the reduced form: v <- v + (A + beta C)^-1 (b - A v + sum of wrenches).
  *
  * The method `fast` keeps r = b - A v + J^T lambda of each body, and its wrenches are J^T d lambda, d lambda = lambda^ - lambda:
- *     d v = (A + C)^-1 (r + 2 sum of wrenches),   v += rho d v,   r += rho (sum of wrenches) - A (rho d v)
+ *     d v = (A + C)^-1 (r + 2 sum of wrenches),   v += rho d v,   r += rho (sum of wrenches) - A (what v has gone by)
  * Everything on the right goes to 0, and so does its rounding. */
 #include "cpu.h"
 
@@ -76,6 +76,14 @@ static void update_rigid(struct sadmm_context *c, size_t begin, size_t end, bool
     }
 }
 
+/* v + step, rounded; what v has gone by in truth. */
+static inline vec move_by(lanes v[3], vec step)
+{
+    vec before = {v[0], v[1], v[2]};
+    v[0] += step.x, v[1] += step.y, v[2] += step.z;
+    return (vec){v[0] - before.x, v[1] - before.y, v[2] - before.z};
+}
+
 static void update_rigid_fast(struct sadmm_context *c, size_t begin, size_t end, bool settled, lanes velocity,
                               lanes multipliers)
 {
@@ -93,10 +101,8 @@ static void update_rigid_fast(struct sadmm_context *c, size_t begin, size_t end,
         vec angular = add(block->defect_angular, add(torque, torque));
         vec dw = sym3_times(block->K_inverse, sub(angular, cross(block->sigma, linear)));
         vec dv = add(scale(linear, block->inv_alpha), cross(block->sigma, dw));
-        dv = scale(dv, velocity);
-        dw = scale(dw, velocity);
-        state[0] += dv.x, state[1] += dv.y, state[2] += dv.z;
-        state[3] += dw.x, state[4] += dw.y, state[5] += dw.z;
+        dv = move_by(state, scale(dv, velocity));
+        dw = move_by(state + 3, scale(dw, velocity));
         store_rows(c->state + index * (size_t)LANES * ROW, state);
         block->defect_linear = add(block->defect_linear, sub(scale(force, multipliers), scale(dv, block->mass)));
         block->defect_angular =
@@ -147,8 +153,9 @@ static void update_general_fast(struct sadmm_context *c, size_t begin, size_t en
         row8 *defect = (row8 *)c->defects + i;
         row8 sum = wrench_sum(c, i), g = *defect + 2 * sum, step = {0};
         for (int k = 0; k < 6; ++k) step += H[k] * g[k];
-        step *= velocity;
-        ((row8 *)c->state)[i] += step;
+        row8 *state = (row8 *)c->state + i, before = *state;
+        *state += velocity * step;
+        step = *state - before;
         *defect += multipliers * sum;
         for (int k = 0; k < 6; ++k) *defect -= A[k] * step[k];
     }

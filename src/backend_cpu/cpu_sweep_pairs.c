@@ -77,8 +77,7 @@ static inline void prefetch_bodies(const struct sadmm_context *c, size_t index)
  * of t. */
 static inline vec exact_change(lane_mask closed, vec old, vec step, vec t, lanes shrink)
 {
-    vec change = sub(scale(t, shrink - 1), step);
-    return (vec){pick(closed, change.x, -old.x), pick(closed, change.y, -old.y), pick(closed, change.z, -old.z)};
+    return pick_vec(closed, sub(scale(t, shrink - 1), step), (vec){-old.x, -old.y, -old.z});
 }
 
 static inline __attribute__((always_inline)) void sweep_block(struct sadmm_context *c, size_t index, int rows,
@@ -109,6 +108,7 @@ static inline __attribute__((always_inline)) void sweep_block(struct sadmm_conte
             vec t = sub(y, scale(n, yn));
             lanes t2 = dot(t, t), shrink = pick(t2 > limit * limit, limit / root(t2), fill(1));
             vec lambda = add(scale(n, normal), scale(t, shrink));
+            if (cpu_sweep_passes_changes(sweep)) lambda = pick_vec((t2 > limit * limit) | ~(yn > 0), lambda, y);
             vec delta = cpu_sweep_passes_changes(sweep) ? exact_change(yn > 0, old, step, t, shrink) : sub(lambda, old);
             if (sweep == CPU_SWEEP_RELAX) slot->lambda = add(old, scale(delta, relaxation));
             else slot->lambda = lambda;

@@ -107,6 +107,11 @@ static __device__ real4 pack(vec3 a, double w)
     return out;
 }
 
+static __device__ double solver_friction(const cuda_view &v, double mu)
+{
+    return v.settings.method == SADMM_METHOD_FAST ? contact_friction_inside(mu, SOLVER_EPSILON) : mu;
+}
+
 /* v.lanes threads a pair, each every v.lanes-th point; the first also what the points share. */
 static __global__ void __launch_bounds__(BODY_THREADS)
     assemble_contacts_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
@@ -123,7 +128,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         vec3 difference = v3(0, 0, 0);
         if (a && b && pair->count > 0) difference = v3_sub(v3_load(points[0].arm_b), v3_load(points[0].arm_a));
         const pair_ends ends = {a ? pair->body_a : v.bodies, b ? pair->body_b : v.bodies, -1, -1};
-        v.normal[p] = pack(normal, pair->friction);
+        v.normal[p] = pack(normal, solver_friction(v, pair->friction));
         v.difference[p] = pack(difference, count);
         v.ends[p] = ends;
     }
@@ -170,7 +175,7 @@ static __global__ void assemble_rows_kernel(const __grid_constant__ cuda_view v,
         store(v, ROW_DAMPING + r, k, used ? block->damping[r] : 0);
         store(v, ROW_LAMBDA + r, k, v.warm_start && active ? v.raw.block_lambda[6 * (size_t)k + (size_t)r] : 0);
     }
-    store(v, ROW_FRICTION, k, block->friction);
+    store(v, ROW_FRICTION, k, solver_friction(v, block->friction));
     v.row_info[k] = about;
 }
 

@@ -40,6 +40,7 @@
 #ifndef SADMM_CUDA_INTERNAL_H
 #define SADMM_CUDA_INTERNAL_H
 
+#include <float.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -51,6 +52,9 @@
 #include "layout_internal.h"
 
 typedef SADMM_REAL solver_real;
+
+/* Of this precision. */
+#define SOLVER_EPSILON (sizeof(solver_real) == sizeof(float) ? (double)FLT_EPSILON : DBL_EPSILON)
 
 #define SADMM_JOIN2(a, b) a##b
 #define SADMM_JOIN(a, b) SADMM_JOIN2(a, b)

@@ -94,8 +94,9 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     for (int r = 0; r < 6; ++r) {
         step[r] = product_with_row(H[packed_place(r, 0)], H[packed_place(r, 1)], H[packed_place(r, 2)],
                                    H[packed_place(r, 3)], H[packed_place(r, 4)], H[packed_place(r, 5)], pushed);
-        if (FAST) step[r] = (real)args.factor * step[r];
-        state[r] += step[r];
+        const real before = state[r];
+        state[r] = FAST ? fused((real)args.factor, step[r], before) : before + step[r];
+        step[r] = state[r] - before;
     }
     store_numbers(v.state + at * ROW, state);
     if (!FAST) return;
@@ -160,10 +161,10 @@ static __device__ __forceinline__ void store_records(solver_real *records, const
 
 /* A lane's share of a pair: points lane and, where COUNT is 2, lane + 4. The first is loaded whether it is
  * there or not, so that nothing but the states waits for another load. `live`: else nothing is stored. Every lane of the warp comes
- * here. FAST: relaxed by `over`; records are those of Step 1 in any case. Returns the lane's share of the primal
+ * here. FAST: lambda goes `farther` times as far; records are those of Step 1 in any case. Returns the lane's share of the primal
  * residual. */
 template <int CONTACT_ROWS, int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
-static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t p, int32_t lane, bool live, real over)
+static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t p, int32_t lane, bool live, real farther)
 {
     enum { SPLIT = MEASURE && !FAST };
     const real4 about = load_once(v.normal + p), between = load_once(v.difference + p);
@@ -196,7 +197,7 @@ static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t 
         const vec3 x = relative_velocity(a.motion, arm_a, b.motion, arm_b);
         const point_change to = update<CONTACT_ROWS, FAST>(normal, about.w, x, point[j].w, inv_s, old[j]);
         const vec3 lambda = to.lambda, delta = to.delta;
-        if (live) store_lambda<CONTACT_ROWS>(v, slot[j], FAST ? relaxed(lambda, delta, over) : lambda);
+        if (live) store_lambda<CONTACT_ROWS>(v, slot[j], FAST ? relaxed(old[j], to, farther) : lambda);
         add_point(&next, j,
                   impulse_of<CONTACT_ROWS>(normal, FAST ? delta : SPLIT ? lambda : v3_add(lambda, delta)), arm_a, arm_b);
         if (SPLIT) add_point(&change, j, impulse_of<CONTACT_ROWS>(normal, delta), arm_a, arm_b);
@@ -235,16 +236,15 @@ static __device__ __forceinline__ void store_row_records(const cuda_view &v, int
 }
 
 template <bool MEASURE>
-static __device__ __forceinline__ double sweep_row_block_fast(const cuda_view &v, int32_t k, real over)
+static __device__ __forceinline__ double sweep_row_block_fast(const cuda_view &v, int32_t k, real farther)
 {
     const row_about about = v.row_info[k];
     real lambda[6], delta[6], kept[6];
     load_row_lambda(v, k, lambda);
+    for (int r = 0; r < 6; ++r) kept[r] = lambda[r];
     update_row_block_fast(v, k, about, v.state + (size_t)about.body_a * ROW, v.state + (size_t)about.body_b * ROW,
                           lambda, delta);
-    for (int r = 0; r < 6; ++r) {
-        kept[r] = fused(over, delta[r], lambda[r]);
-    }
+    for (int r = 0; r < 6; ++r) kept[r] = relaxed(kept[r], lambda[r], delta[r], farther);
     store_row_lambda(v, k, kept);
     store_row_records(v, k, about, delta, v.records);
     return MEASURE ? row_block_primal_fast(v, k, about, delta) : 0;
@@ -283,7 +283,7 @@ static __device__ __forceinline__ void with_pair(const cuda_view &v, int32_t t, 
     if (t / WARP * (WARP / LANES_A_PAIR) < pairs) work(p < pairs ? p : pairs - 1, t % LANES_A_PAIR, p < pairs);
 }
 
-/* FAST: relaxed by args.factor. */
+/* FAST: args.factor times as far. */
 template <int CONTACT_ROWS, int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
 static __global__ void __launch_bounds__(THREADS)
     constraints_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
@@ -378,12 +378,12 @@ template <int CONTACT_ROWS, int LANES_A_PAIR, int COUNT> static cuda_kernel swee
                            : constraints_kernel<CONTACT_ROWS, LANES_A_PAIR, COUNT, false, false>);
 }
 
-/* fast: lambda goes `over` times farther. */
-static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, double over, struct sadmm_error *error)
+/* fast: lambda goes `farther` times as far. */
+static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, double farther, struct sadmm_error *error)
 {
     const bool one_row = c->view.contact_rows == 1, fast = c->fast;
     cuda_args args = {};
-    args.factor = over;
+    args.factor = farther;
     args.looks = c->looks;
     args.backward = c->backward;
     c->backward = !c->backward;
@@ -434,7 +434,7 @@ extern "C" sadmm_status CUDA(update_constraints)(struct sadmm_context *c, bool m
     CUDA_ENTER(c);
     CUDA_TRY(CUDA(prepare_stepwise)(c, error));
     CUDA_TRY(clear_primal(c, measure, error));
-    CUDA_TRY(launch_constraints(c, measure, 0, error));
+    CUDA_TRY(launch_constraints(c, measure, 1, error));
     c->measured = measure && !c->fast;
     return SADMM_OK;
 }
@@ -445,10 +445,9 @@ extern "C" sadmm_status CUDA(update_constraints)(struct sadmm_context *c, bool m
 static sadmm_status fast_iteration(struct sadmm_context *c, int i, int count, bool measure, struct sadmm_error *error)
 {
     const double relaxation = c->settings.relaxation;
-    const bool farther = relax_constraints(i, count);
-    CUDA_TRY(launch_constraints(c, measure, farther ? relaxation - 1 : 0, error));
-    CUDA_TRY(launch_bodies(c, false, relax_velocity(i, count, c->settled) ? relaxation : 1, farther ? relaxation : 1,
-                           error));
+    const double farther = relax_constraints(i, count) ? relaxation : 1;
+    CUDA_TRY(launch_constraints(c, measure, farther, error));
+    CUDA_TRY(launch_bodies(c, false, relax_velocity(i, count, c->settled) ? relaxation : 1, farther, error));
     c->settled = true;
     return SADMM_OK;
 }
@@ -462,7 +461,7 @@ static sadmm_status plain_iterations(struct sadmm_context *c, int count, struct 
             continue;
         }
         CUDA_TRY(launch_bodies(c, false, 1, 1, error));
-        CUDA_TRY(launch_constraints(c, false, 0, error));
+        CUDA_TRY(launch_constraints(c, false, 1, error));
     }
     return SADMM_OK;
 }
@@ -503,7 +502,7 @@ static sadmm_status stream_iterations(struct sadmm_context *c, int count, bool m
     CUDA_TRY(CUDA(prepare_stepwise)(c, error));
     if (c->measured) {
         CUDA_TRY(launch_bodies(c, true, 1, 1, error));
-        CUDA_TRY(launch_constraints(c, measure && count == 1, 0, error));
+        CUDA_TRY(launch_constraints(c, measure && count == 1, 1, error));
         --count;
     }
     if (c->fast && !c->settled && (count > 1 || goes_on)) {
@@ -518,7 +517,7 @@ static sadmm_status stream_iterations(struct sadmm_context *c, int count, bool m
     if (count > plain && c->fast) return fast_iteration(c, 0, 1, measure, error);
     if (count > plain) {
         CUDA_TRY(launch_bodies(c, false, 1, 1, error));
-        CUDA_TRY(launch_constraints(c, true, 0, error));
+        CUDA_TRY(launch_constraints(c, true, 1, error));
     }
     return SADMM_OK;
 }

@@ -235,7 +235,7 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
     __device__ __forceinline__ void publish(int32_t i, real value, int32_t odd);
     __device__ __forceinline__ void move_bodies(int32_t odd);
     __device__ __forceinline__ void move_bodies_fast(int32_t odd, real relaxation, real multipliers);
-    template <bool MEASURE> __device__ __forceinline__ double update_halves(int32_t odd, real over);
+    template <bool MEASURE> __device__ __forceinline__ double update_halves(int32_t odd, real farther);
     __device__ __forceinline__ void suspect(int32_t odd) const;
     __device__ __forceinline__ void store(int32_t odd);
 };
@@ -248,16 +248,14 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
 /* Steps 2-4 of half `code` of a row block, of the method `fast`, into this side's record. */
 static __device__ __noinline__ double update_row_half_fast(const cuda_view &v, int32_t code, const solver_real *own,
                                                            const solver_real *other, solver_real *kept,
-                                                           solver_real *record, real over)
+                                                           solver_real *record, real farther)
 {
     const int32_t k = code / 2 - v.pair_room, side = code & 1;
     const row_about about = v.row_info[k];
     real lambda[6], delta[6];
     for (int j = 0; j < 6; ++j) lambda[j] = kept[j];
     update_row_block_fast(v, k, about, side ? other : own, side ? own : other, lambda, delta);
-    for (int j = 0; j < 6; ++j) {
-        kept[j] = fused(over, delta[j], lambda[j]);
-    }
+    for (int j = 0; j < 6; ++j) kept[j] = relaxed(kept[j], lambda[j], delta[j], farther);
     store_row_record(v, k, about.rows, side, delta, record);
     return row_block_primal_fast(v, k, about, delta);
 }
@@ -481,8 +479,7 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies_fast(int32_t odd, rea
 {
     if (has_moves()) {
         sum = gather(0, gathered, gathered_count, many);
-        step = step_fast(own_body, sum, relaxation);
-        own_body.v += step;
+        step = step_fast(&own_body, sum, relaxation);
         publish(body, own_body.v, odd);
     }
     if (SIZE == ONE_WARP) return; /* at most one body for each eight threads (cuda_partition.cu) */
@@ -490,15 +487,15 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies_fast(int32_t odd, rea
     for (int32_t first = in_registers; warp_has_body(first); first += in_registers) {
         const int32_t i = first + body, at = i - in_registers;
         const bool live = i < bodies && r < 6;
-        const body_lane one =
+        body_lane one =
             load_body(i < bodies, r, m.lines + at * LINE_GENERAL, v.rigid, m.b + at * ROW, state(!odd) + i * ROW);
         real pushed = 0;
         if (live) {
             const int32_t from = v.offsets[first_body + i], count = v.offsets[first_body + i + 1] - from;
             pushed = gather(0, m.records + (from - first_half) * ROW + record_slot(r), count, count > FEW);
         }
-        const real gone = step_fast(one, pushed, relaxation);
-        publish(i, one.v + gone, odd);
+        const real gone = step_fast(&one, pushed, relaxation);
+        publish(i, one.v, odd);
         const real defect = defect_after(one, pushed, gone, multipliers);
         if (live) m.b[at * ROW + r] = defect;
     }
@@ -513,9 +510,9 @@ PART __device__ __forceinline__ void PART_RUN::store_record(real2_pair *record, 
     if (own.pair) *record = sum;
 }
 
-/* The lane's share of the primal residual. FAST: lambda goes `over` times farther; records are those of Step 1 in any
+/* The lane's share of the primal residual. FAST: lambda goes `farther` times as far; records are those of Step 1 in any
  * case. */
-PART template <bool MEASURE> __device__ __forceinline__ double PART_RUN::update_halves(int32_t odd, real over)
+PART template <bool MEASURE> __device__ __forceinline__ double PART_RUN::update_halves(int32_t odd, real farther)
 {
     enum { SPLIT = MEASURE && !FAST };
     double primal = 0;
@@ -529,7 +526,7 @@ PART template <bool MEASURE> __device__ __forceinline__ double PART_RUN::update_
         const vec3 old = own.lambda[j], x = relative_velocity(other, own.other_arm[j], own_motion, own.own_arm[j]);
         const point_change to = update<CONTACT_ROWS, FAST>(own.normal, own.friction, x, own.error[j], own.inv_s[j], old);
         const vec3 lambda = to.lambda, delta = to.delta;
-        own.lambda[j] = FAST ? relaxed(lambda, delta, over) : lambda;
+        own.lambda[j] = FAST ? relaxed(old, to, farther) : lambda;
         vec3 impulse =
             impulse_of<CONTACT_ROWS>(own.normal, FAST ? delta : SPLIT ? lambda : v3_add(lambda, delta));
         vec3 moment = fused_cross(own.own_arm[j], impulse);
@@ -563,7 +560,7 @@ PART template <bool MEASURE> __device__ __forceinline__ double PART_RUN::update_
     }
     if (has_rows() && half < halves && !own.pair && lane == 0)
         primal = FAST ? update_row_half_fast(v, code, own_row, other_row, m.row_lambda + half * ROW,
-                                             m.records + half * ROW, over)
+                                             m.records + half * ROW, farther)
                       : update_row_half(v, code, own_row, other_row, m.row_lambda + half * ROW, m.records + half * ROW,
                                         change);
     return primal;
@@ -646,19 +643,18 @@ static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view 
         wait<MODE, SIZE>(v.barrier, *target += gridDim.x);
     }
     const double relaxation = v.settings.relaxation;
-    const real over = (real)(relaxation - 1), all = (real)relaxation;
+    const real all = (real)relaxation;
     const int32_t stretch = args.goes_on ? args.count + 1 : args.count;
     for (int32_t i = 0; i < args.count; ++i) {
         const int32_t odd = i & 1;
-        const bool farther = relax_constraints(i, stretch);
-        const real multipliers = farther ? all : (real)1;
+        const real farther = relax_constraints(i, stretch) ? all : (real)1;
         if (FULL && args.measure && i + 1 == args.count)
-            reduce_max(part.template update_halves<true>(odd, farther ? over : (real)0), v.residual);
-        else part.template update_halves<false>(odd, farther ? over : (real)0);
+            reduce_max(part.template update_halves<true>(odd, farther), v.residual);
+        else part.template update_halves<false>(odd, farther);
         block_barrier<SIZE>();
-        part.move_bodies_fast(!odd, relax_velocity(i, stretch, args.settled || i > 0) ? all : (real)1, multipliers);
+        part.move_bodies_fast(!odd, relax_velocity(i, stretch, args.settled || i > 0) ? all : (real)1, farther);
         arrive<MODE, SIZE>(v.barrier);
-        if (part.has_moves()) part.own_body.b = defect_after(part.own_body, part.sum, part.step, multipliers);
+        if (part.has_moves()) part.own_body.b = defect_after(part.own_body, part.sum, part.step, farther);
         wait<MODE, SIZE>(v.barrier, *target += gridDim.x);
     }
 }

@@ -6,9 +6,6 @@
 
 #include "../core/math/limit.h"
 
-/* Of this precision. */
-#define SOLVER_EPSILON (sizeof(solver_real) == sizeof(float) ? (double)FLT_EPSILON : DBL_EPSILON)
-
 /* Say so where a body has more energy than its free motion, or, for `few` iterations, bounces. `velocity`, `b` and `a`:
  * the lane's components and row of A. `speaks`: one lane of each body. Every lane of the warp comes here. */
 static __device__ __forceinline__ void suspect_body(const cuda_view &v, bool few, bool speaks, size_t body,

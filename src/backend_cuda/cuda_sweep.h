@@ -185,7 +185,7 @@ CUDA_INLINE point_change change_point(vec3 normal, real friction, vec3 x, real e
     }
     const vec3 step = v3_scale(fused_madd(x, error, normal), -inv_s), y = v3_add(old, step);
     const cone_parts parts = cone_parts_of(y, normal, friction);
-    out.lambda = fused_madd(v3_scale(normal, parts.normal), parts.scale, parts.tangent);
+    out.lambda = parts.scale == 1 ? y : fused_madd(v3_scale(normal, parts.normal), parts.scale, parts.tangent);
     out.delta = parts.closed ? fused_madd(step, parts.scale - 1, parts.tangent) : v3_neg(old);
     return out;
 }
@@ -318,9 +318,15 @@ CUDA_INLINE double row_block_primal_fast(const cuda_view &v, int32_t k, const ro
 
 /* ---- relaxation of the method `fast` (math/relax.h) -------------------------------------------------------------- */
 
-/* lambda^ + over (lambda^ - lambda), over = rho - 1, or 0 where an iteration is plain. */
-CUDA_INLINE vec3 relaxed(vec3 lambda, vec3 delta, real over) { return fused_madd(lambda, over, delta); }
-
+/* Multipliers that go `farther` times as far as lambda^: rho, or 1 where an iteration is plain. */
+CUDA_INLINE vec3 relaxed(vec3 old, const point_change &to, real farther)
+{
+    return farther == 1 ? to.lambda : fused_madd(old, farther, to.delta);
+}
+CUDA_INLINE real relaxed(real old, real lambda, real delta, real farther)
+{
+    return farther == 1 ? lambda : fused(farther, delta, old);
+}
 
 /* 1/B of a pair from B / n. */
 CUDA_INLINE real inverse_of_weight(real inv_s, bool both) { return inv_s > 0 ? 1 / ((both ? 2 : 1) * inv_s) : (real)0; }
@@ -374,11 +380,13 @@ CUDA_INLINE real step_of(const body_lane &body, real g)
     return product_with_row(H[0], H[1], H[2], H[3], H[4], H[5], other);
 }
 
-/* The method `fast`, with sum = J^T d lambda: v goes by rho H (r + 2 sum), and the defect r with it and with multipliers that
- * have gone `multipliers` times as far as lambda^. */
-CUDA_INLINE real step_fast(const body_lane &body, real sum, real relaxation)
+/* The method `fast`, with sum = J^T d lambda: v goes by rho H (r + 2 sum), and the defect r with what v has gone by in truth and
+ * with multipliers that have gone `multipliers` times as far as lambda^. */
+CUDA_INLINE real step_fast(body_lane *body, real sum, real relaxation)
 {
-    return relaxation * step_of(body, fused((real)2, sum, body.b));
+    const real before = body->v;
+    body->v = fused(relaxation, step_of(*body, fused((real)2, sum, body->b)), before);
+    return body->v - before;
 }
 
 /* Every lane of the warp comes here. */

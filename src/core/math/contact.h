@@ -48,6 +48,14 @@ SADMM_INLINE void contact_project_rows(const real in[3], real mu, real out[3])
     out[2] = scale * in[2];
 }
 
+/* mu as the method `fast` takes it, for a precision's epsilon: less by some rounding, so that an impulse at the edge of the cone
+ * is inside whoever computes it, and a contact that sticks there is not off by rounding. */
+#define CONTACT_CONE_ROUNDING 8.0
+SADMM_INLINE double contact_friction_inside(double mu, double epsilon)
+{
+    return mu * (1 - CONTACT_CONE_ROUNDING * epsilon);
+}
+
 /* lambda^ - lambda and lambda^ = Pi_C(lambda - step), where the one comes out without the rounding of the other: the method
  * `fast` passes on changes alone. In the contact's frame. */
 SADMM_INLINE void contact_change_rows(const real lambda[3], const real step[3], real mu, real change[3], real projected[3])
