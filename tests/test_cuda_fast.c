@@ -153,6 +153,29 @@ START_TEST(tiers_agree)
 }
 END_TEST
 
+/* Stretches without new weights between them: what bodies keep from one to the next, and where it is taken anew in the
+ * middle of one, after 128 iterations. */
+START_TEST(stretches_go_on)
+{
+    static const int counts[] = {1, 90, 3, 170}, some[] = {0, 2, 8}; /* 8: row blocks */
+    const struct sadmm_kernels *table = tables[0];
+    const struct scene *scene = &scenes[some[_i]];
+    for (size_t t = 0; t + 1 < TIERS; ++t) {
+        struct runner stream, fused;
+        if (!device_has(table, tiers[t]) || !(scene->tiers >> tiers[t] & 1)) continue;
+        start(&stream, table, scene, SADMM_CUDA_TIER_STREAM);
+        start(&fused, table, scene, tiers[t]);
+        for (size_t k = 0; k < sizeof counts / sizeof *counts; ++k) {
+            iterate(&stream, counts[k], false);
+            iterate(&fused, counts[k], false);
+            check_same(&fused, &stream, scene->name);
+        }
+        runner_stop(&stream);
+        runner_stop(&fused);
+    }
+}
+END_TEST
+
 /* Sums over islands of several powers of sixteen, and islands that begin anywhere: chains of one contact each, one of them
  * of more than two thousand bodies. */
 static struct contact_problem *chains(void)
@@ -379,6 +402,7 @@ int main(void)
         add_case(suite, p ? "entries_f64" : "entries_f32", entries_equal_cpu, first, first + SCENES);
         add_case(suite, p ? "tiers_f64" : "tiers_f32", tiers_agree, first, some);
     }
+    ADD_CASE(suite, stretches_go_on, 0, 3);
     ADD_CASE(suite, many_bodies, 0, parts);
     ADD_CASE(suite, tall_islands, 0, parts);
     ADD_CASE(suite, halted_does_nothing, 0, parts);

@@ -230,14 +230,14 @@ static sadmm_settings few_settings(int iterations, int threads)
     return s;
 }
 
-/* Three cubes on exact impulses: load / V of the lowest contacts is 3/4 kg a point, twice that with half the iterations
+/* Three cubes on exact impulses: load / V of the lowest contacts is 3/4 kg a point, twice that with half the 60 iterations
  * that are not few; less the faster the stack moves by itself. */
 START_TEST(few_iterations_weigh_more)
 {
     static const struct {
         int iterations;
         double speed, factor; /* over V */
-    } cases[] = {{20, 0, 1}, {100, 0, 1}, {10, 0, 2}, {10, 0.5, 2}, {10, 1.6, 1.25}, {10, 4, 1}};
+    } cases[] = {{60, 0, 1}, {100, 0, 1}, {30, 0, 2}, {30, 0.5, 2}, {30, 1.6, 1.25}, {30, 4, 1}};
     for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
         struct contact_problem *problem = tall_stack(3);
         sadmm_settings settings = few_settings(cases[k].iterations, 1);
@@ -249,7 +249,7 @@ START_TEST(few_iterations_weigh_more)
         runner_stop(&r);
         contact_problem_free(problem);
     }
-    ck_assert_double_eq(weight_few(1, 5), 4);
+    ck_assert_double_eq(weight_few(1, 20), 3);
     ck_assert_double_eq(weight_few(1, 1), 6);
     ck_assert_double_eq(weight_few(0, 5), 1); /* no world: a stretch of a longer solve */
 }
@@ -264,7 +264,7 @@ START_TEST(bounces_are_taken_back)
     ck_assert_double_eq(limit_bounce_factor(&bounce, 1, 1e-16), 0.5);
     ck_assert_double_eq(limit_bounce_factor(&bounce, -2, 1e-16), 0.25);
     ck_assert_double_eq(limit_bounce_factor(&pushed, 1, 1e-16), 1);
-    ck_assert(limit_few(1, 19) && !limit_few(1, 20) && !limit_few(0, 19));
+    ck_assert(limit_few(1, 59) && !limit_few(1, 60) && !limit_few(0, 59));
 }
 END_TEST
 
@@ -434,6 +434,32 @@ START_TEST(solutions_are_certified)
 }
 END_TEST
 
+/* Two thousand iterations from wrong impulses, in single precision: the momentum error ends where rounding the impulses puts it,
+ * 8e-8 measured; where defects are never taken anew, at 1.7e-6. 4e-7 is between them. */
+START_TEST(defects_do_not_drift)
+{
+    const struct sadmm_kernels *table = tables[_i];
+    if (!runs_fast(table) || table->precision != SADMM_F32) return;
+    struct contact_problem *problem = plates(0);
+    struct scene warm = scenes[0];
+    struct runner r;
+    struct sadmm_certificate certificate;
+    solve_cold(problem, SADMM_METHOD_FAST, 1000, 1e-9);
+    for (size_t k = 0; k < problem->contacts.point_count; ++k)
+        for (int j = 0; j < 3; ++j) problem->contacts.points[k].impulse[j] *= k % 3 ? 0.5 : 1.5;
+    warm.warm = true;
+    runner_start_method(&r, table, &warm, problem, 1, SADMM_METHOD_FAST);
+    ck_assert(r.plan.warm);
+    for (int s = 0; s < 20; ++s) iterate(&r, 100, false);
+    CALL(&r, table->read_solution(r.c, &r.error));
+    ck_assert_int_eq(sadmm_certify(&r.p->system, &r.settings, &certificate, &r.error), SADMM_OK);
+    ck_assert_msg(certificate.momentum_max <= 4e-7, "momentum %g", certificate.momentum_max);
+    ck_assert_msg(certificate.ncp_max <= 1e-6, "natural map %g", certificate.ncp_max);
+    runner_stop(&r);
+    contact_problem_free(problem);
+}
+END_TEST
+
 /* ---- in motion --------------------------------------------------------------------------------------------------- */
 
 /* Kinetic and potential energy, the latter above the lowest place a body's centre may reach: the scene's own floor. */
@@ -506,6 +532,16 @@ static const struct {
 };
 enum { RESTING = sizeof resting / sizeof *resting };
 
+static double fastest_body(const sadmm_world *world)
+{
+    double fastest = 0;
+    for (int32_t i = 0; i < sadmm_world_body_count(world); ++i) {
+        if (body_def(world, body_at(world, i)).type != SADMM_BODY_DYNAMIC) continue;
+        fastest = fmax(fastest, norm3(body_state(world, body_at(world, i)).linear_velocity));
+    }
+    return fastest;
+}
+
 /* Few iterations bring what can stand to rest. Measured: 3e-7 m/s and less in single precision, 1e-8 in double; without what
  * is done for few iterations 0.03 m/s and more, for good. 1e-4 is between them. */
 START_TEST(few_iterations_come_to_rest)
@@ -518,13 +554,27 @@ START_TEST(few_iterations_come_to_rest)
     scene.def.settings.iterations = resting[_i % RESTING].iterations;
     sadmm_world *world = build_scene(&scene);
     step_world(world, (int)lround(resting[_i % RESTING].duration / scene.def.settings.dt));
-    double fastest = 0;
-    for (int32_t i = 0; i < sadmm_world_body_count(world); ++i) {
-        if (body_def(world, body_at(world, i)).type != SADMM_BODY_DYNAMIC) continue;
-        fastest = fmax(fastest, norm3(body_state(world, body_at(world, i)).linear_velocity));
-    }
+    double fastest = fastest_body(world);
     ck_assert_msg(fastest <= 1e-4, "%s, %d iterations: %g m/s after %g s", resting[_i % RESTING].spec,
                   resting[_i % RESTING].iterations, fastest, resting[_i % RESTING].duration);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+/* What is passed on goes to 0, and its rounding with it: 1e-11 to 1e-10 m/s measured in single precision. If impulses
+ * themselves were added up, 5e-9 to 8e-9: epsilon g dt. 1e-9 is between them. */
+START_TEST(single_precision_rests)
+{
+    static const char *const specs[] = {"vertical_stacks:4", "oblique_stacks:1"};
+    struct sadmm_scene scene = open_scene(specs[_i]);
+    scene.def.backend = SADMM_BACKEND_CPU;
+    scene.def.precision = SADMM_F32;
+    scene.def.settings.threads = 1;
+    scene.def.settings.method = SADMM_METHOD_FAST;
+    scene.def.settings.iterations = 20;
+    sadmm_world *world = build_scene(&scene);
+    step_world(world, 400);
+    ck_assert_msg(fastest_body(world) <= 1e-9, "%s: %g m/s", specs[_i], fastest_body(world));
     sadmm_world_destroy(world);
 }
 END_TEST
@@ -548,8 +598,10 @@ int main(void)
     tcase_add_test(weights, islands_are_named_by_their_smallest_body);
     tcase_add_loop_test(solutions, few_iterations, 0, sizeof cold / sizeof *cold);
     tcase_add_loop_test(solutions, solutions_are_certified, 0, 4);
+    tcase_add_loop_test(solutions, defects_do_not_drift, 0, table_count);
     tcase_add_loop_test(motion, too_few_iterations_are_safe, 0, 4 * (int)(sizeof moving / sizeof *moving));
     tcase_add_loop_test(motion, few_iterations_come_to_rest, 0, 2 * RESTING);
+    tcase_add_loop_test(motion, single_precision_rests, 0, 2);
     TCase *const cases[] = {tables_case, weights, solutions, motion};
     for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
         tcase_set_timeout(cases[k], 100);

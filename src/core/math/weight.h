@@ -97,7 +97,7 @@ SADMM_INLINE double weight_speed_warm(double speed, double tallness, double kine
 
 /* Steps that start warm with fewer iterations than this: the springs above would be softer, and heavy bodies on top
  * rock on them. B goes up as the iterations go down, except where the island moves: heavy weights are slow. */
-#define WEIGHT_FEW 20
+#define WEIGHT_FEW 60
 #define WEIGHT_FEW_MOST 6.0
 /* Over the speed of bodies that move, the least V. */
 #define WEIGHT_MOVING 0.5
