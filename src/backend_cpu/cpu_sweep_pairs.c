@@ -73,13 +73,6 @@ static inline void prefetch_bodies(const struct sadmm_context *c, size_t index)
     }
 }
 
-/* lambda^ - lambda without the rounding of either: where the contact is closed, -step and what the friction cone cuts off
- * of t. */
-static inline vec exact_change(lane_mask closed, vec old, vec step, vec t, lanes shrink)
-{
-    return pick_vec(closed, sub(scale(t, shrink - 1), step), (vec){-old.x, -old.y, -old.z});
-}
-
 static inline __attribute__((always_inline)) void sweep_block(struct sadmm_context *c, size_t index, int rows,
                                                               enum cpu_sweep sweep, lanes relaxation, double *primal)
 {
@@ -108,8 +101,13 @@ static inline __attribute__((always_inline)) void sweep_block(struct sadmm_conte
             vec t = sub(y, scale(n, yn));
             lanes t2 = dot(t, t), shrink = pick(t2 > limit * limit, limit / root(t2), fill(1));
             vec lambda = add(scale(n, normal), scale(t, shrink));
-            if (cpu_sweep_passes_changes(sweep)) lambda = pick_vec((t2 > limit * limit) | ~(yn > 0), lambda, y);
-            vec delta = cpu_sweep_passes_changes(sweep) ? exact_change(yn > 0, old, step, t, shrink) : sub(lambda, old);
+            vec delta = sub(lambda, old);
+            if (cpu_sweep_passes_changes(sweep)) {
+                /* where it sticks, lambda^ - lambda is -step, without the rounding of either */
+                lane_mask moves = (t2 > limit * limit) | (yn <= 0);
+                delta = pick_vec(moves, delta, (vec){-step.x, -step.y, -step.z});
+                lambda = pick_vec(moves, lambda, y);
+            }
             if (sweep == CPU_SWEEP_RELAX) slot->lambda = add(old, scale(delta, relaxation));
             else slot->lambda = lambda;
             if (cpu_sweep_measures(sweep)) change_max = larger(change_max, frame_max(delta, n));

@@ -134,11 +134,10 @@ CUDA_INLINE float inverse_sqrt(float x)
 #endif
 CUDA_INLINE double inverse_sqrt(double x) { return rsqrt(x); }
 
-/* What contact_project() makes of lambda: normal n + scale tangent. `closed`: lambda had a normal part to keep. */
+/* What contact_project() makes of lambda: normal n + scale tangent. */
 struct cone_parts {
     vec3 tangent;
     real normal, scale;
-    bool closed;
 };
 
 /* With one inverse square root for a square root and a division. */
@@ -146,9 +145,8 @@ CUDA_INLINE cone_parts cone_parts_of(vec3 lambda, vec3 n, real mu)
 {
     const real ln = fused_dot(n, lambda);
     cone_parts out;
-    out.closed = ln > 0;
     out.tangent = fused_madd(lambda, -ln, n);
-    out.normal = out.closed ? ln : (real)0;
+    out.normal = ln > 0 ? ln : (real)0;
     const real limit = mu * out.normal, t2 = real_max(fused_dot(out.tangent, out.tangent), (real)FLT_MIN);
     out.scale = t2 > limit * limit ? limit * inverse_sqrt(t2) : (real)1;
     return out;
@@ -169,7 +167,7 @@ CUDA_INLINE vec3 update_point(vec3 normal, real friction, vec3 x, real error, re
     return v3(y > 0 ? y : (real)0, 0, 0);
 }
 
-/* The same for the method `fast`: lambda^ and, without the rounding of either, lambda^ - lambda. */
+/* The same for the method `fast`: lambda^, and lambda^ - lambda, where the contact sticks without the rounding of either. */
 struct point_change {
     vec3 lambda, delta;
 };
@@ -185,8 +183,9 @@ CUDA_INLINE point_change change_point(vec3 normal, real friction, vec3 x, real e
     }
     const vec3 step = v3_scale(fused_madd(x, error, normal), -inv_s), y = v3_add(old, step);
     const cone_parts parts = cone_parts_of(y, normal, friction);
-    out.lambda = parts.scale == 1 ? y : fused_madd(v3_scale(normal, parts.normal), parts.scale, parts.tangent);
-    out.delta = parts.closed ? fused_madd(step, parts.scale - 1, parts.tangent) : v3_neg(old);
+    const bool sticks = parts.scale == 1; /* 0 where lambda^ is */
+    out.lambda = sticks ? y : fused_madd(v3_scale(normal, parts.normal), parts.scale, parts.tangent);
+    out.delta = sticks ? step : v3_sub(out.lambda, old);
     return out;
 }
 

@@ -56,21 +56,15 @@ SADMM_INLINE double contact_friction_inside(double mu, double epsilon)
     return mu * (1 - CONTACT_CONE_ROUNDING * epsilon);
 }
 
-/* lambda^ - lambda and lambda^ = Pi_C(lambda - step), where the one comes out without the rounding of the other: the method
+/* lambda^ = Pi_C(lambda - step) and lambda^ - lambda, where the contact sticks without the rounding of either: the method
  * `fast` passes on changes alone. In the contact's frame. */
 SADMM_INLINE void contact_change_rows(const real lambda[3], const real step[3], real mu, real change[3], real projected[3])
 {
     const real y[3] = {lambda[0] - step[0], lambda[1] - step[1], lambda[2] - step[2]};
-    real limit, t2 = y[1] * y[1] + y[2] * y[2], scale;
-    int closed = y[0] > 0, k;
-    projected[0] = closed ? y[0] : (real)0;
-    limit = mu * projected[0];
-    scale = t2 > limit * limit ? limit / real_sqrt(t2) : (real)1;
-    change[0] = closed ? -step[0] : -lambda[0];
-    for (k = 1; k < 3; ++k) {
-        projected[k] = scale * y[k];
-        change[k] = closed ? (scale - 1) * y[k] - step[k] : -lambda[k];
-    }
+    real limit = mu * y[0];
+    int k, sticks = y[0] > 0 && y[1] * y[1] + y[2] * y[2] <= limit * limit;
+    contact_project_rows(y, mu, projected);
+    for (k = 0; k < 3; ++k) change[k] = sticks ? -step[k] : projected[k] - lambda[k];
 }
 
 /* Soft constraint: lambda = -(k e + c (x - s lambda_old)) / (1 + c s), s = 1/beta_a + 1/beta_b (Step 3, soft). */
