@@ -35,10 +35,11 @@ struct row {
 };
 
 /* The bytes an iteration of the reduced form has to move at least: contact (arm, error, lambda read and written), pair
- * (normal, offset, friction, weight, two indices, both wrenches written and read), body (A, H, b, v read and written). */
-static double bytes_per_iteration(const struct lattice *lattice, size_t real)
+ * (normal, offset, friction, weight, two indices, both wrenches written and read), body (A, H, b, v read and written; fast: the
+ * defect, read and written, in place of b). */
+static double bytes_per_iteration(const struct lattice *lattice, size_t real, sadmm_method method)
 {
-    double contact = 10.0 * (double)real, pair = (8 + 2 * 12) * (double)real + 16, body = (7 + 21 + 6 + 12) * (double)real;
+    double contact = 10.0 * (double)real, pair = (8 + 2 * 12) * (double)real + 16, body = (7 + 21 + (method == SADMM_METHOD_FAST ? 12 : 6) + 12) * (double)real;
     return contact * (double)lattice->contacts.point_count + pair * (double)lattice->contacts.pair_count +
            body * (double)lattice->system.body_count;
 }
@@ -122,7 +123,8 @@ static sadmm_status run_row(const struct sadmm_kernels *k, struct lattice *latti
     if (status == SADMM_OK) status = k->read_solution(context, error);
     if (status == SADMM_OK) status = sadmm_certify(&lattice->system, &settings, &row->certificate, error);
     k->destroy(context);
-    row->gb_per_s = bytes_per_iteration(lattice, k->precision == SADMM_F32 ? 4 : 8) / (row->ns * (double)row->contacts);
+    row->gb_per_s =
+        bytes_per_iteration(lattice, k->precision == SADMM_F32 ? 4 : 8, settings.method) / (row->ns * (double)row->contacts);
     return status;
 }
 

@@ -164,8 +164,9 @@ typedef struct sadmm_step_report {
                                       island is looked at by itself and stops by itself */
     bool converged;                /* a stop rule was met, by every island */
     int32_t limited;               /* method FAST: islands that ended the iterations with more kinetic energy than
-                                      contacts can leave them with, or with fewer than 20 iterations in a bounce that
-                                      they cannot make, and were slowed down; not 0: too few iterations */
+                                      contacts can leave them with, or, with fewer than 60 iterations in a step that starts
+                                      warm, in a bounce that they cannot make, and were slowed down. In a few steps
+                                      after an impact that is no reason for more iterations; in many it is */
     int64_t repeated;              /* steps since creation that a backend which runs ahead (CUDA) began with too little
                                       room or another plan than they needed, and did again with more: nothing is lost
                                       but time */

@@ -9,8 +9,7 @@ static void update_bodies(struct sadmm_context *c, int thread, int threads, bool
 {
     size_t begin, end;
     cpu_share(c->body_block_count, thread, threads, &begin, &end);
-    if (c->fast) CPU(sweep_bodies_fast)(c, begin, end, settled, 1, 1);
-    else CPU(sweep_bodies)(c, begin, end, settled);
+    CPU(sweep_bodies)(c, begin, end, settled);
 }
 
 static void update_constraints(struct sadmm_context *c, int thread, int threads, enum cpu_sweep sweep, double *primal)
@@ -57,9 +56,15 @@ void CPU(start_wrenches)(struct sadmm_context *c)
     c->ratio = 1;
 }
 
+static sadmm_status refuse_fast(const struct sadmm_context *c, struct sadmm_error *error)
+{
+    if (!c->fast) return SADMM_OK;
+    return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "method = fast: its iterations are not taken step by step");
+}
+
 sadmm_status CPU(update_velocity)(struct sadmm_context *c, struct sadmm_error *error)
 {
-    (void)error;
+    if (refuse_fast(c, error) != SADMM_OK) return SADMM_ERROR_UNSUPPORTED;
     CPU_PARALLEL
     {
         if (c->measured) {
@@ -76,17 +81,15 @@ sadmm_status CPU(update_velocity)(struct sadmm_context *c, struct sadmm_error *e
 
 sadmm_status CPU(update_constraints)(struct sadmm_context *c, bool measure, struct sadmm_error *error)
 {
-    (void)error;
+    if (refuse_fast(c, error) != SADMM_OK) return SADMM_ERROR_UNSUPPORTED;
     clear_max(c);
     CPU_PARALLEL
     {
         double primal = 0;
-        enum cpu_sweep sweep = c->fast ? (measure ? CPU_SWEEP_PLAIN_MEASURE : CPU_SWEEP_PLAIN)
-                                       : (measure ? CPU_SWEEP_MEASURE : CPU_SWEEP_ITERATE);
-        update_constraints(c, cpu_thread(), cpu_threads(), sweep, &primal);
+        update_constraints(c, cpu_thread(), cpu_threads(), measure ? CPU_SWEEP_MEASURE : CPU_SWEEP_ITERATE, &primal);
         c->thread_max[cpu_thread() * THREAD_MAX_STRIDE] = primal;
     }
-    c->measured = measure && !c->fast;
+    c->measured = measure;
     if (measure) c->residual.primal = cpu_reduce_max(c);
     return SADMM_OK;
 }

@@ -116,7 +116,8 @@ sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *syst
               grow(&c->pair_blocks, &c->pair_block_capacity, c->pair_block_count, sizeof *c->pair_blocks) &&
               grow(&c->row_blocks, &c->row_block_capacity, c->row_block_count, sizeof *c->row_blocks) &&
               grow(&c->wrenches, &c->wrench_capacity, 2 * c->record_count * ROW, sizeof(real)) &&
-              (!plan->residuals || grow(&c->change, &c->change_capacity, 2 * c->record_count * ROW, sizeof(real))) &&
+              (!plan->residuals || c->fast ||
+               grow(&c->change, &c->change_capacity, 2 * c->record_count * ROW, sizeof(real))) &&
               grow(&c->offsets, &c->offsets_capacity, n + 2, sizeof(int32_t)) &&
               grow(&c->incident, &c->incident_capacity, 2 * c->record_count, sizeof(int32_t)) &&
               (!c->fast || (grow(&c->label, &c->label_capacity, n, sizeof(int32_t)) &&

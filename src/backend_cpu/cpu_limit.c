@@ -1,5 +1,6 @@
 /* The method `fast`, after the last iteration: no island keeps more energy than it may have (math/limit.h). */
 #include "../core/dense6.h"
+#include "../core/math/relax.h"
 #include "cpu_rows.h"
 
 /* x . M x of a rigid body's A or A^-1. */
@@ -104,5 +105,6 @@ sadmm_status CPU(limit_velocity)(struct sadmm_context *c, int32_t *limited, stru
         *limited += c->label[i] == i;
         for (int k = 0; k < 6; ++k) c->state[(size_t)i * ROW + (size_t)k] *= (real)factor;
     }
+    if (*limited > 0) c->exact_since = RELAX_DEFECT_PERIOD; /* defects are taken anew, should anything follow */
     return SADMM_OK;
 }

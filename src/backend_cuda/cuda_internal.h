@@ -347,8 +347,8 @@ struct device_scope {
     device_scope scope((c)->device);    \
     CUDA_CALL((c), scope.code, "cudaSetDevice")
 
-/* ---- cuda_layout.cu, cuda_assemble.cu, cuda_penalty.cu, cuda_weights.cu, cuda_limit.cu, cuda_look.cu, cuda_iterate.cu: parts of the entries,
- * launches only ---- */
+/* ---- cuda_layout.cu, cuda_assemble.cu, cuda_penalty.cu, cuda_weights.cu, cuda_defects.cu, cuda_limit.cu, cuda_look.cu,
+ * cuda_iterate.cu: parts of the entries, launches only ---- */
 
 /* This precision's data for the view's counts and the partition (allocates). */
 sadmm_status CUDA(solver_room)(struct sadmm_context *, struct sadmm_error *error);

@@ -99,14 +99,15 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         step[r] = state[r] - before;
     }
     store_numbers(v.state + at * ROW, state);
-    if (!FAST) return;
+    if (FAST) {
 #pragma unroll
-    for (int r = 0; r < 6; ++r) {
-        b[r] = fused((real)args.multipliers, g[r], b[r]);
+        for (int r = 0; r < 6; ++r) {
+            b[r] = fused((real)args.multipliers, g[r], b[r]);
 #pragma unroll
-        for (int k = 0; k < 6; ++k) b[r] = fused(-line_a((const real *)line, RIGID, r, k), step[k], b[r]);
+            for (int k = 0; k < 6; ++k) b[r] = fused(-line_a((const real *)line, RIGID, r, k), step[k], b[r]);
+        }
+        store_numbers(v.defect + at * ROW, b);
     }
-    store_numbers(v.defect + at * ROW, b);
 }
 
 /* ---- Steps 2-4 of a pair, points in memory ---------------------------------------------------------------------- */
@@ -419,8 +420,15 @@ sadmm_status CUDA(prepare_stepwise)(struct sadmm_context *c, struct sadmm_error 
     return CUDA(launch)(c, kernel, "start_records", constraint_blocks(v), &args, error);
 }
 
+static sadmm_status refuse_fast(const struct sadmm_context *c, struct sadmm_error *error)
+{
+    if (!c->fast) return SADMM_OK;
+    return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "method = fast: its iterations are not taken step by step");
+}
+
 extern "C" sadmm_status CUDA(update_velocity)(struct sadmm_context *c, struct sadmm_error *error)
 {
+    CUDA_TRY(refuse_fast(c, error));
     CUDA_ENTER(c);
     CUDA_TRY(CUDA(prepare_stepwise)(c, error));
     CUDA_TRY(launch_bodies(c, c->measured, 1, 1, error));
@@ -431,11 +439,12 @@ extern "C" sadmm_status CUDA(update_velocity)(struct sadmm_context *c, struct sa
 
 extern "C" sadmm_status CUDA(update_constraints)(struct sadmm_context *c, bool measure, struct sadmm_error *error)
 {
+    CUDA_TRY(refuse_fast(c, error));
     CUDA_ENTER(c);
     CUDA_TRY(CUDA(prepare_stepwise)(c, error));
     CUDA_TRY(clear_primal(c, measure, error));
     CUDA_TRY(launch_constraints(c, measure, 1, error));
-    c->measured = measure && !c->fast;
+    c->measured = measure;
     return SADMM_OK;
 }
 
@@ -565,7 +574,7 @@ sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *c, int count, bool m
         const bool goes_on = now < count;
         CUDA_TRY(stream ? stream_iterations(c, now, measure && !goes_on, goes_on, error)
                         : resident_iterations(c, now, measure && !goes_on, suspect && !goes_on, goes_on, error));
-        c->exact_since += now;
+        if (c->fast) c->exact_since += now;
         count -= now;
     }
     *suspected = suspect && !stream;

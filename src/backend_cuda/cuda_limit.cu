@@ -1,5 +1,4 @@
-/* The method `fast`: the limit of energies (math/limit.h) and the momentum residual (17). In double, from this precision's
- * data; once a step, eight lanes a body.
+/* The method `fast`: the limit of energies (math/limit.h). In double, from this precision's data; once a step, eight lanes a body.
  *
  *   suspect   is there a body with more energy than its free motion has, or that bounces? Else no island does. Resident
  *             kernels look themselves
@@ -10,8 +9,9 @@
 
 #include "cuda_constraint.h"
 #include "cuda_islands.h"
-#include "cuda_look.h"
 #include "cuda_slow.h"
+
+#include "../core/math/relax.h"
 
 /* g = J^T lambda in the first six numbers of a body's eight lanes; what follows them as the caller likes. */
 enum { WORK = 6, PUSH, SUMS };
@@ -34,22 +34,6 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const body_thread t = body_of_thread(v);
     const body_row row = row_of_body(v, t);
     suspect_body(v, args.few, t.live && t.lane == 0, t.body, row.velocity, row.b, row.a);
-}
-
-/* b - A v + J^T lambda of a body. KEEP: as its defect; else the largest number of all. */
-template <bool KEEP>
-static __global__ void __launch_bounds__(BODY_THREADS)
-    defect_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
-{
-    if (KEEP && all_stopped(v, args.looks)) return;
-    const body_thread t = body_of_thread(v);
-    const body_row row = row_of_body(v, t);
-    double sums[SUMS] = {};
-    for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) add_half(v, v.incident[at], sums, &sums[PUSH]);
-    sum_lanes<SUMS>(sums);
-    const double r = row.b + own_number(sums, t.lane) - product(row.velocity, row.a);
-    if (!KEEP) reduce_max(fabs(r), v.residual + 1);
-    else if (t.live) v.defect[t.body * ROW + (size_t)t.lane] = (solver_real)r;
 }
 
 /* Terms of a body: energy of v, of A^-1 b, of r = b + g - A v; work; v . b / 2. */
@@ -96,18 +80,7 @@ static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const ch
 {
     cuda_args args = {};
     args.few = limit_few(c->plan.warm, c->settings.iterations);
-    args.looks = c->looks;
     return CUDA(launch_of)(c, kernel, name, body_blocks(c->view.bodies), BODY_THREADS, &args, error);
-}
-
-sadmm_status CUDA(enqueue_momentum_residual)(struct sadmm_context *c, struct sadmm_error *error)
-{
-    return launch(c, defect_kernel<false>, "momentum residual", error);
-}
-
-sadmm_status CUDA(enqueue_defects)(struct sadmm_context *c, struct sadmm_error *error)
-{
-    return launch(c, defect_kernel<true>, "defects", error);
 }
 
 sadmm_status CUDA(enqueue_limit)(struct sadmm_context *c, bool suspected, struct sadmm_error *error)
@@ -126,5 +99,6 @@ extern "C" sadmm_status CUDA(limit_velocity)(struct sadmm_context *c, int32_t *l
     CUDA_TRY(CUDA(launch)(c, slow_kernel, "limit_velocity", blocks_for(c->view.bodies), &args, error));
     CUDA_TRY(CUDA(download)(c, c->view.limited, sizeof *limited, error));
     memcpy(limited, c->buffers[PINNED_OUT].data, sizeof *limited);
+    if (*limited > 0) c->exact_since = RELAX_DEFECT_PERIOD; /* defects are taken anew, should anything follow */
     return SADMM_OK;
 }

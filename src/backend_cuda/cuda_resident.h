@@ -181,8 +181,8 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
     int32_t t, r, lane, half; /* thread; component of a body; lane of a quad; the quad's half */
     int32_t first_body, bodies, first_half, halves;
 
-    /* One body for each eight threads is in registers, with where its records are and b - A v (FAST: what it has gone by in
-     * this iteration); more are in shared memory. What the loop needs is worked out before it: addresses, and what holds for a whole warp. */
+    /* One body for each eight threads is in registers, with where its records are; more are in shared memory. What the loop
+     * needs is worked out before it: addresses, and what holds for a whole warp. */
     int32_t body;
     const solver_real *gathered; /* component r of the first record */
     int32_t gathered_count;      /* 0 in lanes that have no component */
@@ -190,8 +190,8 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
     bool moves, updates;         /* the warp has bodies, halves */
     real2_pair *own_record;
     body_lane own_body;
-    real momentum;
-    real sum, step;
+    real momentum;               /* b - A v */
+    real sum, step;              /* FAST: J^T d lambda, what v has gone by in this iteration */
     half_lane<POINTS> own;
 
     __device__ __forceinline__ part_run(const cuda_view &view, const cuda_args &arguments, unsigned char *memory)

@@ -50,7 +50,7 @@ SADMM_INLINE void contact_project_rows(const real in[3], real mu, real out[3])
 
 /* mu as the method `fast` takes it, for a precision's epsilon: less by some rounding, so that an impulse at the edge of the cone
  * is inside whoever computes it, and a contact that sticks there is not off by rounding. */
-#define CONTACT_CONE_ROUNDING 8.0
+#define CONTACT_CONE_ROUNDING 4.0
 SADMM_INLINE double contact_friction_inside(double mu, double epsilon)
 {
     return mu * (1 - CONTACT_CONE_ROUNDING * epsilon);
