@@ -198,7 +198,7 @@ static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t 
         const vec3 x = relative_velocity(a.motion, arm_a, b.motion, arm_b);
         const point_change to = update<CONTACT_ROWS, FAST>(normal, about.w, x, point[j].w, inv_s, old[j]);
         const vec3 lambda = to.lambda, delta = to.delta;
-        if (live) store_lambda<CONTACT_ROWS>(v, slot[j], FAST ? relaxed(old[j], to, farther) : lambda);
+        if (live) store_lambda<CONTACT_ROWS>(v, slot[j], FAST ? relaxed(old[j], to, farther == 1, farther) : lambda);
         add_point(&next, j,
                   impulse_of<CONTACT_ROWS>(normal, FAST ? delta : SPLIT ? lambda : v3_add(lambda, delta)), arm_a, arm_b);
         if (SPLIT) add_point(&change, j, impulse_of<CONTACT_ROWS>(normal, delta), arm_a, arm_b);

@@ -235,7 +235,7 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
     __device__ __forceinline__ void publish(int32_t i, real value, int32_t odd);
     __device__ __forceinline__ void move_bodies(int32_t odd);
     __device__ __forceinline__ void move_bodies_fast(int32_t odd, real relaxation, real multipliers);
-    template <bool MEASURE> __device__ __forceinline__ double update_halves(int32_t odd, real farther);
+    template <bool MEASURE, bool PLAIN> __device__ __forceinline__ double update_halves(int32_t odd, real farther);
     __device__ __forceinline__ void suspect(int32_t odd) const;
     __device__ __forceinline__ void store(int32_t odd);
 };
@@ -510,9 +510,10 @@ PART __device__ __forceinline__ void PART_RUN::store_record(real2_pair *record, 
     if (own.pair) *record = sum;
 }
 
-/* The lane's share of the primal residual. FAST: lambda goes `farther` times as far; records are those of Step 1 in any
+/* The lane's share of the primal residual. FAST: lambda goes `farther` times as far, PLAIN: 1; records are those of Step 1 in any
  * case. */
-PART template <bool MEASURE> __device__ __forceinline__ double PART_RUN::update_halves(int32_t odd, real farther)
+PART template <bool MEASURE, bool PLAIN>
+__device__ __forceinline__ double PART_RUN::update_halves(int32_t odd, real farther)
 {
     enum { SPLIT = MEASURE && !FAST };
     double primal = 0;
@@ -526,7 +527,7 @@ PART template <bool MEASURE> __device__ __forceinline__ double PART_RUN::update_
         const vec3 old = own.lambda[j], x = relative_velocity(other, own.other_arm[j], own_motion, own.own_arm[j]);
         const point_change to = update<CONTACT_ROWS, FAST>(own.normal, own.friction, x, own.error[j], own.inv_s[j], old);
         const vec3 lambda = to.lambda, delta = to.delta;
-        own.lambda[j] = FAST ? relaxed(old, to, farther) : lambda;
+        own.lambda[j] = FAST ? relaxed(old, to, PLAIN, farther) : lambda;
         vec3 impulse =
             impulse_of<CONTACT_ROWS>(own.normal, FAST ? delta : SPLIT ? lambda : v3_add(lambda, delta));
         vec3 moment = fused_cross(own.own_arm[j], impulse);
@@ -647,10 +648,11 @@ static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view 
     const int32_t stretch = args.goes_on ? args.count + 1 : args.count;
     for (int32_t i = 0; i < args.count; ++i) {
         const int32_t odd = i & 1;
-        const real farther = relax_constraints(i, stretch) ? all : (real)1;
-        if (FULL && args.measure && i + 1 == args.count)
-            reduce_max(part.template update_halves<true>(odd, farther), v.residual);
-        else part.template update_halves<false>(odd, farther);
+        const bool plain = !relax_constraints(i, stretch);
+        const real farther = plain ? (real)1 : all;
+        if (!plain) part.template update_halves<false, false>(odd, farther);
+        else if (FULL && args.measure) reduce_max(part.template update_halves<true, true>(odd, farther), v.residual);
+        else part.template update_halves<false, true>(odd, farther);
         block_barrier<SIZE>();
         part.move_bodies_fast(!odd, relax_velocity(i, stretch, args.settled || i > 0) ? all : (real)1, farther);
         arrive<MODE, SIZE>(v.barrier);
@@ -670,8 +672,8 @@ static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view
         if (part.has_moves()) part.momentum = free_momentum(part.own_body);
         wait<MODE, SIZE>(v.barrier, *target += gridDim.x);
         if (FULL && args.measure && iteration == args.count)
-            reduce_max(part.template update_halves<true>(odd, 0), v.residual);
-        else part.template update_halves<false>(odd, 0);
+            reduce_max(part.template update_halves<true, true>(odd, 1), v.residual);
+        else part.template update_halves<false, true>(odd, 1);
         block_barrier<SIZE>();
     }
     /* Nobody looks into this block's memory once it is gone. */

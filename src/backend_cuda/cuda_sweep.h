@@ -138,6 +138,7 @@ CUDA_INLINE double inverse_sqrt(double x) { return rsqrt(x); }
 struct cone_parts {
     vec3 tangent;
     real normal, scale;
+    bool slides; /* scale is not 1; so where the normal part is 0 */
 };
 
 /* With one inverse square root for a square root and a division. */
@@ -148,7 +149,8 @@ CUDA_INLINE cone_parts cone_parts_of(vec3 lambda, vec3 n, real mu)
     out.tangent = fused_madd(lambda, -ln, n);
     out.normal = ln > 0 ? ln : (real)0;
     const real limit = mu * out.normal, t2 = real_max(fused_dot(out.tangent, out.tangent), (real)FLT_MIN);
-    out.scale = t2 > limit * limit ? limit * inverse_sqrt(t2) : (real)1;
+    out.slides = t2 > limit * limit;
+    out.scale = out.slides ? limit * inverse_sqrt(t2) : (real)1;
     return out;
 }
 
@@ -183,9 +185,9 @@ CUDA_INLINE point_change change_point(vec3 normal, real friction, vec3 x, real e
     }
     const vec3 step = v3_scale(fused_madd(x, error, normal), -inv_s), y = v3_add(old, step);
     const cone_parts parts = cone_parts_of(y, normal, friction);
-    const bool sticks = parts.scale == 1; /* 0 where lambda^ is */
-    out.lambda = sticks ? y : fused_madd(v3_scale(normal, parts.normal), parts.scale, parts.tangent);
-    out.delta = sticks ? step : v3_sub(out.lambda, old);
+    out.lambda = parts.slides ? fused_madd(v3_scale(normal, parts.normal), parts.scale, parts.tangent) : y;
+    /* what does not wait for the root comes first */
+    out.delta = parts.slides ? fused_madd(fused_madd(v3_neg(old), parts.normal, normal), parts.scale, parts.tangent) : step;
     return out;
 }
 
@@ -318,9 +320,9 @@ CUDA_INLINE double row_block_primal_fast(const cuda_view &v, int32_t k, const ro
 /* ---- relaxation of the method `fast` (math/relax.h) -------------------------------------------------------------- */
 
 /* Multipliers that go `farther` times as far as lambda^: rho, or 1 where an iteration is plain. */
-CUDA_INLINE vec3 relaxed(vec3 old, const point_change &to, real farther)
+CUDA_INLINE vec3 relaxed(vec3 old, const point_change &to, bool plain, real farther)
 {
-    return farther == 1 ? to.lambda : fused_madd(old, farther, to.delta);
+    return plain ? to.lambda : fused_madd(old, farther, to.delta);
 }
 CUDA_INLINE real relaxed(real old, real lambda, real delta, real farther)
 {
