@@ -39,7 +39,8 @@ struct row {
  * defect, read and written, in place of b). */
 static double bytes_per_iteration(const struct lattice *lattice, size_t real, sadmm_method method)
 {
-    double contact = 10.0 * (double)real, pair = (8 + 2 * 12) * (double)real + 16, body = (7 + 21 + (method == SADMM_METHOD_FAST ? 12 : 6) + 12) * (double)real;
+    double contact = 10.0 * (double)real, pair = (8 + 2 * 12) * (double)real + 16;
+    double body = (7 + 21 + (method == SADMM_METHOD_FAST ? 12 : 6) + 12) * (double)real;
     return contact * (double)lattice->contacts.point_count + pair * (double)lattice->contacts.pair_count +
            body * (double)lattice->system.body_count;
 }

@@ -70,7 +70,7 @@ struct launch_state {
     std::vector<fiber> fibers;
     std::vector<std::unique_ptr<unsigned char, void (*)(void *)>> shared; /* by block */
     unsigned threads, first_block;
-    ucontext_t scheduler;
+    ucontext_t scheduler = {}; /* its stack is nobody's to fill in, and the address sanitizer looks at it */
     fiber *current;
     const std::function<void()> *body;
 };
