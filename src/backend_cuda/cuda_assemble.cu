@@ -1,12 +1,10 @@
 /* Kernels A-D: raw bodies, contacts and blocks, as core has them, into this precision's layout. */
 #include "cuda_double.h"
 
-#include "../core/math/packed6.h"
+#include "cuda_half_sums.h"
+#include "cuda_look.h"
 
 /* ---- bodies --------------------------------------------------------------------------------------------------- */
-
-/* Blocks of few threads: one thread's work is long, and there are many multiprocessors. */
-enum { BODY_THREADS = 64 };
 
 /* A^-1, packed. */
 static __device__ void invert(bool rigid, const double A[36], double out[PACKED])
@@ -43,6 +41,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 {
     int32_t i = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x);
     if (i >= v.bodies || v.live->halt) return; /* may run before the step's contacts are known */
+    if (FAST && i == 0) clear_counts(v);
     double A[36], b[6], x[6], factor[36];
     sadmm_system_body(&v.raw, &v.settings, i, A, b);
     if (v.warm_start || !dense6_cholesky(A, factor)) {
@@ -112,36 +111,48 @@ static __device__ double solver_friction(const cuda_view &v, double mu)
     return v.settings.method == SADMM_METHOD_FAST ? contact_friction_inside(mu, SOLVER_EPSILON) : mu;
 }
 
-/* v.lanes threads a pair, each every v.lanes-th point; the first also what the points share. */
+/* v.lanes threads a pair, each every v.lanes-th point; the first also what the points share. FAST: records of halves, too. */
+template <bool FAST>
 static __global__ void __launch_bounds__(BODY_THREADS)
     assemble_contacts_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     const int32_t t = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x), p = t / v.lanes, lane = t % v.lanes;
-    if (p >= live_pairs(v)) return;
-    const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
-    const struct sadmm_contact_point *points = v.raw_points + pair->first;
-    const vec3 normal = v3_load(pair->normal);
-    const bool a = pair->body_a >= 0, b = pair->body_b >= 0;
+    const bool live = p < live_pairs(v);
+    const struct sadmm_contact_pair *pair = &v.raw_pairs[live ? p : 0];
+    if (!FAST && !live) return;
+    const struct sadmm_contact_point *points = v.raw_points + (live ? pair->first : 0);
+    const vec3 normal = live ? v3_load(pair->normal) : v3(0, 0, 0);
+    const bool a = live && pair->body_a >= 0, b = live && pair->body_b >= 0;
     /* A pair of more points than the step was planned for halts it (cuda_step.h), but not before this. */
-    const int32_t count = pair->count <= v.point_slots ? pair->count : v.point_slots;
-    if (lane == 0) {
-        vec3 difference = v3(0, 0, 0);
-        if (a && b && pair->count > 0) difference = v3_sub(v3_load(points[0].arm_b), v3_load(points[0].arm_a));
-        const pair_ends ends = {a ? pair->body_a : v.bodies, b ? pair->body_b : v.bodies, -1, -1};
-        v.normal[p] = pack(normal, solver_friction(v, pair->friction));
-        v.difference[p] = pack(difference, count);
+    const int32_t count = !live ? 0 : pair->count <= v.point_slots ? pair->count : v.point_slots;
+    vec3 between = v3(0, 0, 0);
+    if (a && b && count > 0 && (FAST || lane == 0))
+        between = v3_sub(v3_load(points[0].arm_b), v3_load(points[0].arm_a));
+    const pair_ends ends = {a ? pair->body_a : v.bodies, b ? pair->body_b : v.bodies, -1, -1};
+    const real4 about = pack(normal, live ? solver_friction(v, pair->friction) : 0), difference = pack(between, count);
+    if (live && lane == 0) {
+        v.normal[p] = about;
+        v.difference[p] = difference;
         v.ends[p] = ends;
     }
-    for (int32_t k = lane; k < count; k += v.lanes) {
-        size_t slot = point_slot(v, p, k);
-        vec3 lambda = v.warm_start ? v3_load(points[k].impulse) : v3(0, 0, 0);
-        double error = sadmm_contact_e(&v.raw, &v.settings, pair, &points[k]);
-        v.arm[slot] = pack(v3_load(a ? points[k].arm_a : points[k].arm_b), error);
-        v.lambda[slot] = (solver_real)(v.contact_rows == 1 ? v3_dot(normal, lambda) : lambda.x);
-        if (v.contact_rows == 1) continue;
-        v.lambda[v.lambda_stride + slot] = (solver_real)lambda.y;
-        v.lambda[2 * v.lambda_stride + slot] = (solver_real)lambda.z;
+    struct pair_sums sums = {};
+    rigid_inverse inverse = {};
+    if (FAST && v.rigid && side_of_lane(v, lane) >= 0) { /* asked for early: it is from far away */
+        const int32_t body = lane == 0 ? ends.body_a : lane == 1 ? ends.body_b : v.bodies;
+        if (body < v.bodies) inverse = inverse_of_body(v, body);
     }
+    for (int32_t k = lane; k < count; k += v.lanes) {
+        const size_t slot = point_slot(v, p, k);
+        const vec3 impulse = v.warm_start ? v3_load(points[k].impulse) : v3(0, 0, 0);
+        const double error = sadmm_contact_e(&v.raw, &v.settings, pair, &points[k]);
+        const real4 arm = pack(v3_load(a ? points[k].arm_a : points[k].arm_b), error);
+        const solver_real lambda[3] = {(solver_real)(v.contact_rows == 1 ? v3_dot(normal, impulse) : impulse.x),
+                                       (solver_real)impulse.y, (solver_real)impulse.z};
+        v.arm[slot] = arm;
+        for (int j = 0; j < v.contact_rows; ++j) v.lambda[(size_t)j * v.lambda_stride + slot] = lambda[j];
+        if (FAST) add_point(v, ends, about, difference, arm, lambda, true, &sums);
+    }
+    if (FAST) store_halves(v, live, p, lane, count, ends, difference, true, inverse, &sums);
 }
 
 /* ---- constraints given by Jacobian rows ------------------------------------------------------------------------ */
@@ -192,7 +203,8 @@ extern "C" sadmm_status CUDA(assemble_contacts)(struct sadmm_context *c, struct 
 {
     cuda_args args = {};
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(launch_of)(c, assemble_contacts_kernel, "assemble_contacts",
+    CUDA_TRY(CUDA(launch_of)(c, c->fast ? assemble_contacts_kernel<true> : assemble_contacts_kernel<false>,
+                             "assemble_contacts",
                              ((int64_t)c->view.pair_room * c->view.lanes + BODY_THREADS - 1) / BODY_THREADS, BODY_THREADS,
                              &args, error));
     return c->plan.blocks[SADMM_BLOCK_CONTACT] ? assemble_rows(c, SADMM_BLOCK_CONTACT, error) : SADMM_OK;

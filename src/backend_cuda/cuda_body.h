@@ -2,8 +2,8 @@
 #ifndef SADMM_CUDA_BODY_H
 #define SADMM_CUDA_BODY_H
 
-#include "cuda_double.h"
 #include "cuda_lanes.h"
+#include "cuda_line.h"
 
 #include "../core/math/packed6.h"
 
@@ -32,21 +32,32 @@ static __device__ __forceinline__ body_thread body_of_thread(const cuda_view &v)
     return out;
 }
 
-/* What a body's lane r < 6 has of it: rows r of A and A^-1, components r of v and b; 0 in the others. */
-struct body_row {
-    double a[6], a_inverse[6], velocity, b;
+/* What a body's lane r < 6 has of it: rows r of A and A^-1, components r of v and b; 0 in the others. RIGID: of the rows what is
+ * in the block of 3 x 3 on the diagonal, the rest is 0. */
+template <bool RIGID> struct wide_row {
+    double a[RIGID ? 3 : 6], a_inverse[RIGID ? 3 : 6], velocity, b;
 };
 
-static __device__ __forceinline__ body_row row_of_body(const cuda_view &v, const body_thread &t)
+template <bool RIGID> static __device__ __forceinline__ wide_row<RIGID> row_of_body(const cuda_view &v, const body_thread &t)
 {
-    body_row row = {};
+    wide_row<RIGID> row = {};
     if (!t.live || t.lane >= 6) return row;
     const solver_real *line = v.lines + t.body * (size_t)v.line;
     const double *inverse = v.A_inverse + t.body * PACKED;
+    if (RIGID) {
+        const int32_t r = t.lane % 3;
 #pragma unroll
-    for (int k = 0; k < 6; ++k) {
-        row.a[k] = (double)line_a(line, v.rigid, t.lane, k);
-        row.a_inverse[k] = inverse[packed_place(t.lane, k)];
+        for (int k = 0; k < 3; ++k) {
+            const int32_t place = packed_place(r, k);
+            row.a[k] = t.lane >= 3 ? (double)line[1 + place] : k == r ? (double)line[0] : 0;
+            row.a_inverse[k] = t.lane >= 3 || k == r ? inverse[t.lane >= 3 ? packed_place(r + 3, k + 3) : 0] : 0;
+        }
+    } else {
+#pragma unroll
+        for (int k = 0; k < (RIGID ? 3 : 6); ++k) {
+            row.a[k] = (double)line_a(line, v.rigid, t.lane, k);
+            row.a_inverse[k] = inverse[packed_place(t.lane, k)];
+        }
     }
     row.velocity = (double)v.state[t.body * ROW + (size_t)t.lane];
     row.b = (double)v.b[t.body * ROW + (size_t)t.lane];

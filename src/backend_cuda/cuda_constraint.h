@@ -89,13 +89,14 @@ static __device__ __forceinline__ bool is_dynamic(const cuda_view &v, int32_t bo
 static __device__ __forceinline__ double mass_of(const cuda_view &v, size_t body)
 {
     const solver_real *line = v.lines + body * (size_t)v.line;
+    if (v.rigid) return (double)line[0];
     return ((double)line_a(line, v.rigid, 0, 0) + (double)line_a(line, v.rigid, 1, 1) +
             (double)line_a(line, v.rigid, 2, 2)) /
            3;
 }
 
 /* g += J^T lambda of a half; *push += the size of its force. */
-static __device__ void add_half(const cuda_view &v, int32_t code, double g[6], double *push)
+static inline __device__ void add_half(const cuda_view &v, int32_t code, double g[6], double *push)
 {
     const int32_t side = code & 1, p = code / 2;
     if (p >= v.pair_room) {

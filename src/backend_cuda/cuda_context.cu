@@ -256,7 +256,6 @@ static sadmm_status open_device(struct sadmm_context *c, struct sadmm_error *err
     CUDA_CALL(c, cudaStreamCreateWithFlags(&c->side, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
     CUDA_CALL(c, cudaEventCreateWithFlags(&c->fork, cudaEventDisableTiming), "cudaEventCreateWithFlags");
     CUDA_CALL(c, cudaEventCreateWithFlags(&c->join, cudaEventDisableTiming), "cudaEventCreateWithFlags");
-    CUDA_CALL(c, cudaEventCreateWithFlags(&c->join_pairs, cudaEventDisableTiming), "cudaEventCreateWithFlags");
     return SADMM_OK;
 }
 
@@ -286,7 +285,6 @@ extern "C" void CUDA(destroy)(struct sadmm_context *c)
         CUDA(step_destroy)(c);
         if (c->graph) (void)cudaGraphExecDestroy(c->graph);
         for (cuda_buffer &buffer : c->buffers) release(&buffer);
-        if (c->join_pairs) (void)cudaEventDestroy(c->join_pairs);
         if (c->join) (void)cudaEventDestroy(c->join);
         if (c->fork) (void)cudaEventDestroy(c->fork);
         if (c->side) (void)cudaStreamDestroy(c->side);

@@ -117,6 +117,9 @@ struct cuda_stop {
 
 enum { TERMS = 6 }; /* of a body, in sums over islands */
 
+/* Numbers of a half in half_arms (cuda_half_sums.h): sums over arms, as in arm_sums, then these. */
+enum { HALF_ARMS = 10, HALF_LOAD = HALF_ARMS, HALF_RESPONSE, HALF_NUMBERS };
+
 /* What a pair joins. */
 struct alignas(16) pair_ends {
     int32_t body_a, body_b; /* raw; the static world: `bodies` */
@@ -184,7 +187,9 @@ struct cuda_view {
     double *terms;           /* slots x TERMS: of bodies, then added up in place (cuda_islands.h) */
     unsigned long long *arrivals; /* slots: of terms at places they are added up at; 0 between kernels */
     cuda_island *islands;    /* bodies, used at labels */
-    double *weight, *response, *load; /* pairs: B as taken last, kg; J A^-1 J^T, 1/kg; mean |lambda| of points, N s */
+    double *weight, *response; /* pairs: B as taken last, kg; mean of J A^-1 J^T over points and rows, 1/kg */
+    double *half_wrench;     /* halves of pairs x ROW (cuda_half_sums.h) */
+    solver_real *half_arms;  /* halves of pairs x HALF_NUMBERS */
     solver_real *inv_s;      /* pairs: B / number of dynamic bodies */
     int32_t *limited;        /* islands slowed down */
     int32_t *suspects;       /* not 0: some island may have to be */
@@ -210,6 +215,10 @@ static __device__ __forceinline__ int32_t live_bodies(const cuda_view &v) { retu
 static __device__ __forceinline__ int32_t live_pairs(const cuda_view &v) { return v.live->halt ? 0 : v.live->pairs; }
 static __device__ __forceinline__ int32_t live_rows(const cuda_view &v) { return v.live->halt ? 0 : v.rows; }
 
+/* What an iterating kernel does about energies after its last iteration: it says whether an island may have too much, or it
+ * sees to everything (BLOCK). */
+enum cuda_limit { LIMIT_NONE, LIMIT_SUSPECTS, LIMIT_WHOLE };
+
 /* What differs between launches of a kernel. */
 struct cuda_args {
     int32_t count;      /* iterations, or a kind of block */
@@ -225,7 +234,8 @@ struct cuda_args {
     int32_t goes_on;    /* fast: the stretch does not end with these iterations */
     int32_t warm;       /* fast: the step starts warm */
     int32_t looks;      /* fast: of the stop rule, in this step so far */
-    int32_t limit;      /* fast: islands with too much energy are to be suspected */
+    int32_t begin;      /* fast, BLOCK: weights, C and factors first */
+    int32_t limit;      /* fast: of energies; enum cuda_limit */
     int32_t few;        /* fast: and those that bounce (math/limit.h) */
     const struct sadmm_resident_edit *edits;
     double factor;
@@ -249,7 +259,7 @@ enum cuda_buffer_name {
     BUFFER_STATE, BUFFER_B, BUFFER_LINES, BUFFER_C, BUFFER_BETA,
     BUFFER_NORMAL, BUFFER_DIFFERENCE, BUFFER_PAIR_ENDS, BUFFER_ARM, BUFFER_LAMBDA,
     BUFFER_ROW_INFO, BUFFER_ROW_DATA, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_EXCHANGE, BUFFER_LIVE, BUFFER_LAYOUT, BUFFER_SORT,
-    BUFFER_NUMBERS, BUFFER_SCALARS, BUFFER_WEIGHTS,
+    BUFFER_NUMBERS, BUFFER_SCALARS, BUFFER_WEIGHTS, BUFFER_HALVES,
     BUFFER_RAW_BODIES, BUFFER_RAW_PAIRS, BUFFER_RAW_POINTS, BUFFER_RAW_BLOCKS, BUFFER_OUT,
     BUFFER_WORLD_BODIES, BUFFER_WORLD_STEADY, BUFFER_WORLD_WRENCH, BUFFER_WORLD_VELOCITY, BUFFER_WORLD_IMPULSE,
     BUFFER_WORLD_SLOTS, BUFFER_WORLD_PLACES, BUFFER_WORLD_CONTROL,
@@ -262,7 +272,7 @@ struct sadmm_context {
     int device;
     cudaStream_t stream;
     cudaStream_t side;        /* of a step's graph: what does not wait for contacts (cuda_step.cu) */
-    cudaEvent_t fork, join, join_pairs;
+    cudaEvent_t fork, join;
     int multiprocessors, shared_limit; /* shared_limit: bytes a block may have */
     bool cooperative, clusters;        /* what the device can launch */
 
@@ -281,6 +291,7 @@ struct sadmm_context {
     int refreshes; /* fast: of the weights, in this solve */
     int exact_since; /* fast: iterations since the defects were taken */
     int looks;     /* fast: at the stop rule, in this step */
+    bool ends;     /* fast: of the whole step that is enqueued, the iterating kernels do the ends (cuda_resident_ends.h) */
     unsigned cleared; /* enum cuda_scalar: those that a kernel of this step has set to 0 for their first use */
     bool recording; /* a graph of the whole step: nothing is allocated, no graph launched in it */
 
@@ -354,16 +365,19 @@ struct device_scope {
 sadmm_status CUDA(solver_room)(struct sadmm_context *, struct sadmm_error *error);
 /* A, b and the start velocities: they need no contacts. */
 sadmm_status CUDA(enqueue_bodies)(struct sadmm_context *, struct sadmm_error *error);
-/* Penalties and factors at once; in a whole step, also whether it is what was planned for. */
+/* Of a whole step: penalties and factors at once, and whether it is what was planned for. fast: from islands that were
+ * enqueued, or (c->ends) left to the iterating kernel. */
 sadmm_status CUDA(enqueue_penalties)(struct sadmm_context *, struct sadmm_error *error);
-/* fast: the first weights of a solve, or new ones; then C and, for `factor`, H. */
-sadmm_status CUDA(enqueue_weights)(struct sadmm_context *, bool first, bool factor, struct sadmm_error *error);
-/* Its parts: loads and responses of pairs (beside what makes slots); islands; weights, C and H from both. `planned` as
- * above. */
-sadmm_status CUDA(enqueue_pairs)(struct sadmm_context *, bool first, struct sadmm_error *error);
-sadmm_status CUDA(enqueue_islands)(struct sadmm_context *, bool first, struct sadmm_error *error);
+/* fast: a solve begins: its first weights come next. */
+void CUDA(begin_weights)(struct sadmm_context *);
+/* fast: what weights of islands depend on beside the islands. */
+cuda_args CUDA(weight_args)(const struct sadmm_context *);
+/* fast: islands, and B of row blocks; then B, C and, for `factor`, H. `planned` as above. */
+sadmm_status CUDA(enqueue_islands)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(enqueue_weighted_penalties)(struct sadmm_context *, bool first, bool factor, bool planned,
                                               struct sadmm_error *error);
+/* fast: all of that anew, from the loads there are now. */
+sadmm_status CUDA(enqueue_weights)(struct sadmm_context *, bool factor, struct sadmm_error *error);
 /* fast: the bodies' defects anew. */
 sadmm_status CUDA(enqueue_defects)(struct sadmm_context *, struct sadmm_error *error);
 /* fast: (17), as a maximum with what view.residual[1] is. */
@@ -373,9 +387,8 @@ sadmm_status CUDA(enqueue_momentum_residual)(struct sadmm_context *, struct sadm
 sadmm_status CUDA(enqueue_limit)(struct sadmm_context *, bool suspected, struct sadmm_error *error);
 /* fast: a look at the stop rule after `done` iterations of a step. */
 sadmm_status CUDA(enqueue_look)(struct sadmm_context *, int done, struct sadmm_error *error);
-/* Iterations, as the entry; suspect: for the limit, whether an island may have too much energy, where the tier can tell.
- * *suspected: it could. */
-sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *, int count, bool measure, bool suspect, bool *suspected,
+/* Iterations, as the entry; limit: what is wanted for the limit of energies after the last. */
+sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *, int count, bool measure, enum cuda_limit limit,
                                       struct sadmm_error *error);
 /* (16) and (17) of the iteration that was measured, into view.residual. */
 sadmm_status CUDA(enqueue_residuals)(struct sadmm_context *, struct sadmm_error *error);
@@ -415,6 +428,8 @@ sadmm_status CUDA(prepare_stepwise)(struct sadmm_context *, struct sadmm_error *
  * a block at most; bytes of shared memory. */
 cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, enum sadmm_cuda_tier tier, int threads, bool full,
                                   bool fast, const char **name);
+/* Whether the instance for a partition, without row blocks and not measured, does the ends of a step of `fast`, too. */
+bool CUDA(resident_does_ends)(const struct cuda_partition *);
 int CUDA(resident_threads)(int point_slots);
 size_t CUDA(resident_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies, bool row_blocks);
 /* Let every instance use `bytes` of shared memory a block, and clusters of more than 8 blocks. *clusters: whether both the

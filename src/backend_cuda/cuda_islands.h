@@ -67,4 +67,35 @@ static __device__ __forceinline__ bool add_up_island(const cuda_view &v, const b
     return on;
 }
 
+/* Where the island of a body begins, and its size, in bodies of a thread block. */
+struct island_range {
+    int32_t first, bodies;
+};
+
+/* The same of all islands of a thread block, whose `bodies` bodies are whole islands: `terms` (shared) holds TERMS of each, and
+ * at an island's first body its sums in the end, equal to the last bit. `barrier` is the block's; it comes first and last. */
+template <class Join, class Barrier>
+static __device__ __forceinline__ void add_up_in_block(int32_t bodies, const island_range *range, double *terms,
+                                                       Barrier barrier)
+{
+    for (int32_t apart = 1; apart < bodies; apart *= SPREAD) {
+        barrier();
+        for (int32_t i = (int32_t)threadIdx.x; i < bodies * TERMS; i += (int32_t)blockDim.x) {
+            const island_range island = range[i / TERMS];
+            const int32_t rank = i / TERMS - island.first;
+            if (rank % (apart * SPREAD) != 0) continue;
+            double all[SPREAD];
+#pragma unroll
+            for (int32_t j = 0; j < SPREAD; ++j)
+                all[j] = rank + j * apart < island.bodies ? terms[i + j * apart * TERMS] : 0;
+            double sum = all[0];
+#pragma unroll
+            for (int32_t j = 1; j < SPREAD; ++j)
+                if (rank + j * apart < island.bodies) sum = Join::join(sum, all[j]);
+            terms[i] = sum;
+        }
+    }
+    barrier();
+}
+
 #endif

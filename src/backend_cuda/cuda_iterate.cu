@@ -533,20 +533,21 @@ static sadmm_status stream_iterations(struct sadmm_context *c, int count, bool m
 
 /* ---- fused: BLOCK, CLUSTER and GRID ---------------------------------------------------------------------------- */
 
-static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool measure, bool suspect, bool goes_on,
-                                        struct sadmm_error *error)
+static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool measure, enum cuda_limit limit,
+                                        bool goes_on, struct sadmm_error *error)
 {
     const struct cuda_partition *partition = &c->partition;
     const char *name = nullptr;
-    cuda_args args = {};
+    cuda_args args = CUDA(weight_args)(c); /* of a solve that begins with them */
+    args.begin = c->ends && !c->settled;
     args.count = count;
     args.measure = measure;
     args.join = c->measured;
     args.rescaled = c->rescaled;
-    args.start = c->starting;
+    args.start = c->starting || args.begin;
     args.settled = c->settled;
     args.goes_on = goes_on;
-    args.limit = suspect;
+    args.limit = limit;
     args.few = limit_few(c->plan.warm, c->settings.iterations);
     args.looks = c->looks;
     args.most_bodies = partition->most_bodies;
@@ -560,7 +561,7 @@ static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool
     return SADMM_OK;
 }
 
-sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *c, int count, bool measure, bool suspect, bool *suspected,
+sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *c, int count, bool measure, enum cuda_limit limit,
                                       struct sadmm_error *error)
 {
     const bool stream = c->partition.tier == SADMM_CUDA_TIER_STREAM;
@@ -573,11 +574,10 @@ sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *c, int count, bool m
         const int left = c->fast ? RELAX_DEFECT_PERIOD - c->exact_since : count, now = count < left ? count : left;
         const bool goes_on = now < count;
         CUDA_TRY(stream ? stream_iterations(c, now, measure && !goes_on, goes_on, error)
-                        : resident_iterations(c, now, measure && !goes_on, suspect && !goes_on, goes_on, error));
+                        : resident_iterations(c, now, measure && !goes_on, goes_on ? LIMIT_NONE : limit, goes_on, error));
         if (c->fast) c->exact_since += now;
         count -= now;
     }
-    *suspected = suspect && !stream;
     c->measured = measure && !c->fast;
     c->rescaled = false;
     return SADMM_OK;
@@ -585,10 +585,9 @@ sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *c, int count, bool m
 
 extern "C" sadmm_status CUDA(iterate)(struct sadmm_context *c, int count, bool measure, struct sadmm_error *error)
 {
-    bool suspected;
     if (count <= 0) return SADMM_OK;
     CUDA_ENTER(c);
-    return CUDA(enqueue_iterations)(c, count, measure, false, &suspected, error);
+    return CUDA(enqueue_iterations)(c, count, measure, LIMIT_NONE, error);
 }
 
 /* ---- residuals ------------------------------------------------------------------------------------------------ */

@@ -203,18 +203,20 @@ static sadmm_status weights_room(struct sadmm_context *c, struct sadmm_error *er
     cuda_view *v = &c->view;
     const size_t n = (size_t)v->bodies, pairs = (size_t)v->pair_room;
     CUDA_TRY(CUDA(room)(c, BUFFER_WEIGHTS,
-                        (n * (PACKED + TERMS + 2) + 3 * pairs) * sizeof(double) + n * sizeof(cuda_island) +
+                        (n * (PACKED + TERMS + 2) + 2 * pairs) * sizeof(double) + n * sizeof(cuda_island) +
                             pairs * sizeof(solver_real),
                         error));
+    CUDA_TRY(CUDA(room)(c, BUFFER_HALVES, 2 * pairs * (ROW * sizeof(double) + HALF_NUMBERS * sizeof(solver_real)), error));
     v->A_inverse = (double *)c->buffers[BUFFER_WEIGHTS].data;
     v->free_energy = v->A_inverse + n * PACKED;
     v->terms = v->free_energy + n;
     v->arrivals = (unsigned long long *)(v->terms + n * TERMS);
     v->weight = v->terms + n * (TERMS + 1);
     v->response = v->weight + pairs;
-    v->load = v->response + pairs;
-    v->islands = (cuda_island *)(v->load + pairs);
+    v->islands = (cuda_island *)(v->response + pairs);
     v->inv_s = (solver_real *)(v->islands + n);
+    v->half_wrench = (double *)c->buffers[BUFFER_HALVES].data;
+    v->half_arms = (solver_real *)(v->half_wrench + 2 * pairs * ROW);
     CUDA_CALL(c, cudaMemsetAsync(v->arrivals, 0, n * sizeof *v->arrivals, c->stream), "cudaMemsetAsync(arrivals)");
     return SADMM_OK;
 }

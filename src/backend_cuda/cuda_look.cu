@@ -4,6 +4,7 @@
  * have all stopped; the other tiers have nothing left to do once the last island has. The scale of the momentum error is the
  * island's own, which is no less strict than the certificate's (but for islands where nothing pushes: there the tolerance of
  * the natural map says what is nothing). In double, eight lanes a body. */
+#include "cuda_double.h"
 #include "cuda_constraint.h"
 #include "cuda_islands.h"
 #include "cuda_look.h"
@@ -65,7 +66,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         map = largest_term::join(map, natural_map(v, p));
     }
     sum_lanes<SUMS>(sums);
-    const body_row row = row_of_body(v, t);
+    const wide_row<true> row = row_of_body<true>(v, t); /* worlds alone have a stop rule here */
     const double g = own_number(sums, t.lane), momentum = product(row.velocity, row.a);
     term[0] = largest_of_lanes(map);
     term[1] = largest_of_lanes(fabs(momentum - row.b - g));

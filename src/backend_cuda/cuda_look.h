@@ -4,6 +4,14 @@
 
 #include "cuda_internal.h"
 
+/* Before the first kernel of a solve that counts islands: those slowed down, those that have stopped. */
+static __device__ __forceinline__ void clear_counts(const cuda_view &v)
+{
+    const cuda_stop none = {};
+    *v.limited = *v.suspects = 0;
+    *v.stop = none;
+}
+
 /* Had every island stopped at the last of `looks` looks? */
 static __device__ __forceinline__ bool all_stopped(const cuda_view &v, int32_t looks)
 {

@@ -11,6 +11,11 @@ size_t CUDA(resident_shared)(enum sadmm_cuda_tier tier, int threads, int32_t mos
 
 static const resident_instance paper_instances[] = {METHOD(false, "")};
 
+bool CUDA(resident_does_ends)(const struct cuda_partition *partition)
+{
+    return partition->tier == SADMM_CUDA_TIER_BLOCK && partition->threads <= SMALL_THREADS;
+}
+
 struct instances {
     const resident_instance *first;
     size_t count;

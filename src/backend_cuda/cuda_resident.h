@@ -13,13 +13,15 @@
  * A half of a row block is the work of its quad's first lane; it reads its Jacobians from memory (six rows on two bodies
  * are more than registers hold).
  *
- * On entry and exit everything is in global memory as the stepwise kernels leave it.
+ * On entry and exit everything is in global memory as the stepwise kernels leave it. Before the first iteration and after
+ * the last one of a step, BLOCK may also do what else an island needs (cuda_resident_ends.h).
  */
 #ifndef SADMM_CUDA_RESIDENT_H
 #define SADMM_CUDA_RESIDENT_H
 
 #include "cuda_look.h"
-#include "cuda_slow.h"
+#include "cuda_resident_ends.h"
+#include "cuda_step_check.h"
 #include "cuda_sweep.h"
 
 enum resident_mode { BLOCK, CLUSTER, GRID };
@@ -52,7 +54,13 @@ struct part_memory {
     solver_real *row_lambda; /* halves x ROW, when there are row blocks */
     solver_real *lines, *b;  /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x line, ROW; FAST:
                                 the defect in place of b */
+    int32_t *suspected;      /* a body of the part has too much energy */
+    /* Before the first iteration and after the last one, over what is above (cuda_resident_ends.h): */
+    double *terms;           /* bodies x TERMS */
+    island_range *range;     /* bodies */
 };
+
+enum { SLACK = 16 }; /* the end, with what is to come there aligned */
 
 /* One description of the layout for its size and its addresses. */
 static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *base, bool cluster, int threads,
@@ -65,7 +73,12 @@ static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *
     m->row_lambda = m->records + (halves + FEW) * ROW;
     m->lines = m->row_lambda + (row_blocks ? halves * ROW : 0);
     m->b = m->lines + more * LINE_GENERAL;
-    return (size_t)(m->b + more * ROW - m->state) * sizeof(solver_real);
+    m->terms = (double *)base;
+    m->range = (island_range *)(m->terms + n * TERMS);
+    size_t iterating = (size_t)(m->b + more * ROW - m->state) * sizeof(solver_real),
+           ends = n * (TERMS * sizeof(double) + sizeof(island_range)), used = iterating > ends ? iterating : ends;
+    m->suspected = (int32_t *)(base + used);
+    return used + SLACK;
 }
 
 /* ---- barriers -------------------------------------------------------------------------------------------------- */
@@ -236,7 +249,7 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
     __device__ __forceinline__ void move_bodies(int32_t odd);
     __device__ __forceinline__ void move_bodies_fast(int32_t odd, real relaxation, real multipliers);
     template <bool MEASURE, bool PLAIN> __device__ __forceinline__ double update_halves(int32_t odd, real farther);
-    __device__ __forceinline__ void suspect(int32_t odd) const;
+    __device__ __forceinline__ bool suspect(int32_t odd) const;
     __device__ __forceinline__ void store(int32_t odd);
 };
 
@@ -340,15 +353,17 @@ PART __device__ __forceinline__ void PART_RUN::load_half(void)
 #pragma unroll
     for (int32_t j = 0; j < COUNT; ++j) {
         const int32_t k = lane + QUAD * j;
-        if (k >= count) continue;
-        const size_t slot = point_slot(v, p, k);
+        const bool room = k < v.lanes * ((v.point_slots + v.lanes - 1) / v.lanes); /* in memory: do not wait for the count */
+        const size_t slot = room ? point_slot(v, p, k) : 0;
         const real4 point = v.arm[slot];
+        const vec3 lambda = load_lambda<CONTACT_ROWS>(v, slot);
+        if (k >= count) continue;
         const vec3 arm_a = xyz(point), arm_b = v3_add(arm_a, difference);
         own.own_arm[j] = side ? arm_b : arm_a;
         own.other_arm[j] = side ? arm_a : arm_b;
         own.error[j] = own.sign * point.w;
         own.inv_s[j] = inv_s;
-        own.lambda[j] = load_lambda<CONTACT_ROWS>(v, slot);
+        own.lambda[j] = lambda;
     }
 }
 
@@ -569,23 +584,26 @@ __device__ __forceinline__ double PART_RUN::update_halves(int32_t odd, real fart
 
 /* ---- the limit of energies, of the method `fast` ------------------------------------------------------------------ */
 
-/* Is there a body that has more energy than its free motion? */
-PART __device__ __forceinline__ void PART_RUN::suspect(int32_t odd) const
+/* Is there a body, one of those that this thread speaks for, that has more energy than it may? Of a world: rigid ones. */
+PART __device__ __forceinline__ bool PART_RUN::suspect(int32_t odd) const
 {
+    bool any = false;
     const int32_t in_registers = (int32_t)blockDim.x / LANES;
     for (int32_t first = 0; warp_has_body(first); first += in_registers) {
         const int32_t i = first + body, at = i - in_registers;
         const bool live = i < bodies;
         const size_t raw = live ? (size_t)v.body_of[first_body + i] : 0;
-        double a[6], b = live && r < 6 ? (double)v.b[raw * ROW + (size_t)r] : 0;
+        const double b = live && r < 6 ? (double)v.b[raw * ROW + (size_t)r] : 0;
+        double a[3] = {}; /* of rigid bodies */
 #pragma unroll
-        for (int k = 0; k < 6; ++k)
-            a[k] = first == 0          ? (double)own_body.A[k]
-                   : live && r < 6     ? (double)line_a(m.lines + at * LINE_GENERAL, v.rigid, r, k)
-                                       : 0;
-        suspect_body(v, args.few, live && r == 0, raw,
-                     live && r < 6 ? (double)state(odd)[i * ROW + r] : 0, b, a);
+        for (int k = 0; k < 3; ++k) {
+            if (first == 0) a[k] = (double)(r < 3 ? own_body.A[k] : own_body.A[k + 3]);
+            else if (live && r < 6) a[k] = (double)line_a(m.lines + at * LINE_GENERAL, true, r, r / 3 * 3 + k);
+        }
+        const double velocity = live && r < 6 ? (double)state(odd)[i * ROW + r] : 0;
+        any = suspect_body(v, args.few, live && r == 0, raw, velocity, b, a) || any;
     }
+    return any;
 }
 
 /* ---- storing --------------------------------------------------------------------------------------------------- */
@@ -689,14 +707,38 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE))
     resident_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     CUDA_DYNAMIC_SHARED(memory);
-    if (v.live->halt || nothing_to_do<MODE, FAST>(v, args)) return;
+    /* They take registers, and are for contacts with friction. */
+    constexpr bool ENDS = FAST && MODE == BLOCK && !FULL && SIZE != ANY_SIZE && CONTACT_ROWS == 3;
+    if (v.live->halt || nothing_to_do<MODE, FAST>(v, args)) {
+        if (ENDS && args.begin) stamp_assembled(v);
+        return;
+    }
     part_run<CONTACT_ROWS, POINTS, MODE, FULL, SIZE, FAST> part(v, args, memory);
+    const auto barrier = [] { block_barrier<SIZE>(); };
+    const block_part ends = {part.first_body, part.bodies, part.m.terms, part.m.range, part.m.suspected};
+    if (ENDS && threadIdx.x == 0) *ends.suspected = 0;
+    if constexpr (ENDS) {
+        if (args.begin) {
+            begin_in_block(v, args, ends, barrier);
+            stamp_assembled(v);
+        }
+    }
     part.load();
     unsigned target = 0;
     if (FAST) iterate_fast<MODE, FULL, SIZE>(part, v, args, &target);
     else iterate_paper<MODE, FULL, SIZE>(part, v, args, &target);
     part.store(args.count & 1);
-    if (FAST && args.limit) part.suspect(args.count & 1);
+    if (!FAST || args.limit == LIMIT_NONE) return;
+    const bool suspected = part.suspect(args.count & 1);
+    if (!ENDS || args.limit == LIMIT_SUSPECTS) {
+        if (suspected) *v.suspects = 1;
+        return;
+    }
+    if constexpr (ENDS) {
+        if (suspected) *ends.suspected = 1;
+        block_barrier<SIZE>();
+        if (*ends.suspected) limit_in_block(v, args.few, ends, barrier);
+    }
 }
 
 /* ---- instances ------------------------------------------------------------------------------------------------- */

@@ -6,14 +6,15 @@
 
 #include "../core/math/limit.h"
 
-/* Say so where a body has more energy than its free motion, or, for `few` iterations, bounces. `velocity`, `b` and `a`:
- * the lane's components and row of A. `speaks`: one lane of each body. Every lane of the warp comes here. */
-static __device__ __forceinline__ void suspect_body(const cuda_view &v, bool few, bool speaks, size_t body,
-                                                    double velocity, double b, const double a[6])
+/* Has a body more energy than its free motion, or, for `few` iterations, does it bounce? `velocity`, `b` and `a`: the lane's
+ * components and row of A (three numbers of it for rigid bodies). `speaks`: one lane of each body, the others say no. Every lane of the warp comes here. */
+template <int SIZE>
+static __device__ __forceinline__ bool suspect_body(const cuda_view &v, bool few, bool speaks, size_t body,
+                                                    double velocity, double b, const double (&a)[SIZE])
 {
     const double free = speaks ? v.free_energy[body] : 0;
     const double now = dot_lanes(velocity, product(velocity, a)) / 2, along = few ? dot_lanes(velocity, b) / 2 : 0;
-    if (speaks && (limit_suspects(now, free) || (few && limit_bounces(now, free, along, SOLVER_EPSILON)))) *v.suspects = 1;
+    return speaks && (limit_suspects(now, free) || (few && limit_bounces(now, free, along, SOLVER_EPSILON)));
 }
 
 /* The factor of body i's velocities. */

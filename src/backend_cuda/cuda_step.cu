@@ -137,17 +137,23 @@ struct side_branch {
 };
 } // namespace
 
+/* What the iterating kernels do about energies. With looks an island may have more iterations after them. */
+static enum cuda_limit limit_by_iterations(const struct sadmm_context *c)
+{
+    if (!c->plan.limit || c->partition.tier == SADMM_CUDA_TIER_STREAM) return LIMIT_NONE;
+    return c->ends && !stops(c) ? LIMIT_WHOLE : LIMIT_SUSPECTS;
+}
+
 /* schedule.c's iterations, with the ratio of (15) found on the device; then the limit. *measure: the residuals of the last
  * iteration are wanted. */
 static sadmm_status enqueue_solve(struct sadmm_context *c, bool *measure, struct sadmm_error *error)
 {
     const int budget = sadmm_schedule_budget(&c->plan, &c->settings);
-    bool suspected = false;
+    const enum cuda_limit limit = limit_by_iterations(c);
     *measure = false;
     for (int done = 0; done < budget;) {
         const struct sadmm_stretch next = sadmm_schedule_stretch(&c->plan, &c->settings, done);
-        CUDA_TRY(CUDA(enqueue_iterations)(c, next.count, next.measure, c->plan.limit && (next.last || next.look),
-                                          &suspected, error));
+        CUDA_TRY(CUDA(enqueue_iterations)(c, next.count, next.measure, next.last || next.look ? limit : LIMIT_NONE, error));
         done += next.count;
         if (next.look) CUDA_TRY(CUDA(enqueue_look)(c, done, error));
         *measure = next.measure && next.last;
@@ -156,14 +162,16 @@ static sadmm_status enqueue_solve(struct sadmm_context *c, bool *measure, struct
             CUDA_TRY(CUDA(enqueue_balance)(c, error));
             CUDA_TRY(CUDA(factorize)(c, error));
         }
-        if (next.refresh) CUDA_TRY(CUDA(enqueue_weights)(c, false, true, error));
+        if (next.refresh) CUDA_TRY(CUDA(enqueue_weights)(c, true, error));
     }
-    return c->plan.limit ? CUDA(enqueue_limit)(c, suspected, error) : SADMM_OK;
+    return c->plan.limit && limit != LIMIT_WHOLE ? CUDA(enqueue_limit)(c, limit == LIMIT_SUSPECTS, error) : SADMM_OK;
 }
 
 static sadmm_status enqueue_step(struct sadmm_context *c, struct sadmm_error *error)
 {
     const bool islands = slots_by_island(&c->partition);
+    c->ends = c->fast && !c->plan.residuals && c->view.rows == 0 && c->view.contact_rows == 3 &&
+              CUDA(resident_does_ends)(&c->partition);
     CUDA_TRY(CUDA(launch_start)(c, error));
     { /* A, b: beside contact finding */
         side_branch side(c);
@@ -171,22 +179,14 @@ static sadmm_status enqueue_step(struct sadmm_context *c, struct sadmm_error *er
         CUDA_TRY(CUDA(enqueue_bodies)(c, error));
     }
     CUDA_TRY(enqueue_find(c, error));
-    { /* contacts in the solver's form, what weights take from pairs: beside the layout, and the islands' sums */
+    { /* contacts in the solver's form, what weights take from pairs: beside the layout */
         side_branch side(c);
         CUDA_CALL(c, side.code, "a branch of the step");
         CUDA_TRY(CUDA(assemble_contacts)(c, error));
         CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
-        if (c->fast) {
-            CUDA_TRY(CUDA(enqueue_pairs)(c, true, error));
-            CUDA_CALL(c, cudaEventRecord(c->join_pairs, c->stream), "cudaEventRecord");
-        }
     }
     CUDA_TRY(CUDA(enqueue_survey_and_layout)(c, islands, &c->partition, error));
     CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
-    if (c->fast) {
-        CUDA_TRY(CUDA(enqueue_islands)(c, true, error));
-        CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join_pairs, 0), "cudaStreamWaitEvent");
-    }
     CUDA_TRY(CUDA(enqueue_penalties)(c, error));
     bool measure;
     CUDA_TRY(enqueue_solve(c, &measure, error));

@@ -126,24 +126,27 @@ static __host__ __device__ inline finish_ranges ranges_of(const cuda_view &v)
     return r;
 }
 
-/* Does not look at culprits of this very kernel: which body is named must not depend on who came first. */
+/* Does not look at culprits of this very kernel: which body is named must not depend on who came first. args.planned: nobody
+ * has compared the step with the plan yet. */
 static __global__ void __launch_bounds__(STEP_THREADS)
-    finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+    finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
+    const bool on = !v.live->halt && (!args.planned || as_planned(v));
+    const int32_t bodies = on ? v.bodies : 0, pairs = on ? v.live->pairs : 0;
     const int32_t i = (int32_t)(blockIdx.x * (unsigned)STEP_THREADS + threadIdx.x);
     const finish_ranges range = ranges_of(v);
     struct cuda_step_control *control = v.step.control;
     double depth = 0;
     if (i == 0) control->stamps[STAMP_SOLVED] = nanoseconds();
     if (i < range.wrenches) {
-        if (i < live_bodies(v) && !finish_body(v, i)) atomicMin(&control->culprit, i);
+        if (i < bodies && !finish_body(v, i)) atomicMin(&control->culprit, i);
     } else if (i < range.pairs) {
         const int32_t slot = (i - range.wrenches) / LANES, lane = i % LANES;
-        const bool live = slot < live_bodies(v);
+        const bool live = slot < bodies;
         double wrench[6];
         contact_wrench(v, live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0, lane, wrench);
         if (live) store_wrench(wrench, lane, v.step.wrench + 6 * (size_t)v.body_of[slot]);
-    } else if ((i - range.pairs) / v.lanes < live_pairs(v)) {
+    } else if ((i - range.pairs) / v.lanes < pairs) {
         const int32_t p = (i - range.pairs) / v.lanes;
         const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
         /* bodies are named first: all of them are below any contact's */
@@ -169,6 +172,7 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
     if (threadIdx.x > 0) return;
     struct cuda_step_control *control = v.step.control;
     struct cuda_step_report *report = &v.step.reports[control->sequence % STEPS_AHEAD];
+    if (!v.live->halt && args.planned && !as_planned(v)) v.live->halt = HALT_PLAN;
     if (!v.live->halt && control->culprit != INT32_MAX) v.live->halt = HALT_NON_FINITE;
     control->stamps[STAMP_END] = nanoseconds();
     report->sequence = control->sequence++;
@@ -213,6 +217,7 @@ sadmm_status CUDA(launch_admit)(struct sadmm_context *c, struct sadmm_error *err
 sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
+    args.planned = c->ends;
     int64_t blocks = ((int64_t)ranges_of(c->view).end + STEP_THREADS - 1) / STEP_THREADS;
     return CUDA(launch_of)(c, finish_kernel, "finish", blocks, STEP_THREADS, &args, error);
 }
@@ -220,6 +225,7 @@ sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *er
 sadmm_status CUDA(launch_commit)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
+    args.planned = c->ends;
     args.looks = c->looks;
     return CUDA(launch)(c, commit_kernel, "commit", 1, &args, error);
 }
