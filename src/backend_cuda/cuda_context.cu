@@ -131,9 +131,11 @@ sadmm_status CUDA(download)(struct sadmm_context *c, const void *from, size_t by
 
 /* ---- launches ------------------------------------------------------------------------------------------------- */
 
+enum { MOST_ATTRIBUTES = 2 };
+
 /* Blocks of a partition run side by side in clusters (`cluster` > 1), or all of them (GRID: a cooperative launch). */
-static cudaLaunchConfig_t configure(const struct sadmm_context *c, const struct cuda_partition *partition,
-                                    cudaLaunchAttribute *attribute)
+static cudaLaunchConfig_t configure(const struct sadmm_context *c, const struct cuda_partition *partition, bool early,
+                                    cudaLaunchAttribute attribute[MOST_ATTRIBUTES])
 {
     cudaLaunchConfig_t launch = {};
     launch.gridDim = dim3((unsigned)partition->parts);
@@ -142,32 +144,41 @@ static cudaLaunchConfig_t configure(const struct sadmm_context *c, const struct 
     launch.stream = c->stream;
     launch.attrs = attribute;
     if (partition->tier == SADMM_CUDA_TIER_GRID) {
-        attribute->id = cudaLaunchAttributeCooperative;
-        attribute->val.cooperative = 1;
-        launch.numAttrs = 1;
+        cudaLaunchAttribute *next = &attribute[launch.numAttrs++];
+        next->id = cudaLaunchAttributeCooperative;
+        next->val.cooperative = 1;
     } else if (partition->cluster > 1) {
-        attribute->id = cudaLaunchAttributeClusterDimension;
-        attribute->val.clusterDim.x = (unsigned)partition->cluster;
-        attribute->val.clusterDim.y = attribute->val.clusterDim.z = 1;
-        launch.numAttrs = 1;
+        cudaLaunchAttribute *next = &attribute[launch.numAttrs++];
+        next->id = cudaLaunchAttributeClusterDimension;
+        next->val.clusterDim.x = (unsigned)partition->cluster;
+        next->val.clusterDim.y = next->val.clusterDim.z = 1;
     }
+#ifndef SADMM_CUDA_EMULATED
+    if (early && c->early && c->recording && partition->tier != SADMM_CUDA_TIER_GRID) {
+        cudaLaunchAttribute *next = &attribute[launch.numAttrs++];
+        next->id = cudaLaunchAttributeProgrammaticStreamSerialization;
+        next->val.programmaticStreamSerializationAllowed = 1;
+    }
+#else
+    (void)early;
+#endif
     return launch;
 }
 
 cudaError_t CUDA(active_clusters)(const struct sadmm_context *c, cuda_kernel kernel,
                                   const struct cuda_partition *partition, int *clusters)
 {
-    cudaLaunchAttribute attribute;
-    const cudaLaunchConfig_t launch = configure(c, partition, &attribute);
+    cudaLaunchAttribute attributes[MOST_ATTRIBUTES];
+    const cudaLaunchConfig_t launch = configure(c, partition, false, attributes);
     return cudaOccupancyMaxActiveClusters(clusters, (const void *)kernel, &launch);
 }
 
 sadmm_status CUDA(launch_partition)(struct sadmm_context *c, cuda_kernel kernel, const char *name,
-                                    const struct cuda_partition *partition, const cuda_args *args,
+                                    const struct cuda_partition *partition, bool early, const cuda_args *args,
                                     struct sadmm_error *error)
 {
-    cudaLaunchAttribute attribute;
-    const cudaLaunchConfig_t launch = configure(c, partition, &attribute);
+    cudaLaunchAttribute attributes[MOST_ATTRIBUTES];
+    const cudaLaunchConfig_t launch = configure(c, partition, early, attributes);
     c->kernel = name;
 #ifdef SADMM_CUDA_EMULATED
     cudaError_t code = cuda_emulation_launch(&launch, kernel, c->view, *args);
@@ -185,15 +196,27 @@ sadmm_status CUDA(launch)(struct sadmm_context *c, cuda_kernel kernel, const cha
     return CUDA(launch_of)(c, kernel, name, blocks, THREADS, args, error);
 }
 
-sadmm_status CUDA(launch_of)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
-                             const cuda_args *args, struct sadmm_error *error)
+static sadmm_status launch_blocks(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
+                                  bool early, const cuda_args *args, struct sadmm_error *error)
 {
     struct cuda_partition plain = {};
     if (blocks <= 0) return SADMM_OK;
     plain.parts = (int32_t)blocks;
     plain.cluster = 1;
     plain.threads = threads;
-    return CUDA(launch_partition)(c, kernel, name, &plain, args, error);
+    return CUDA(launch_partition)(c, kernel, name, &plain, early, args, error);
+}
+
+sadmm_status CUDA(launch_of)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
+                             const cuda_args *args, struct sadmm_error *error)
+{
+    return launch_blocks(c, kernel, name, blocks, threads, false, args, error);
+}
+
+sadmm_status CUDA(launch_early)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
+                                const cuda_args *args, struct sadmm_error *error)
+{
+    return launch_blocks(c, kernel, name, blocks, threads, true, args, error);
 }
 
 /* ---- devices -------------------------------------------------------------------------------------------------- */
@@ -251,6 +274,7 @@ static sadmm_status open_device(struct sadmm_context *c, struct sadmm_error *err
     CUDA_CALL(c, cudaDeviceGetAttribute(&clusters, cudaDevAttrClusterLaunch, c->device), "cudaDeviceGetAttribute");
     c->cooperative = cooperative != 0;
     CUDA_CALL(c, CUDA(resident_allow)(c->shared_limit, clusters != 0, &c->clusters), "loading the kernels");
+    c->early = c->clusters && EARLY_ARCH <= CLUSTER_ARCH; /* the same devices, the same code */
     CUDA_CALL(c, LAYOUT(one_block_allow)(c->shared_limit), "loading the kernels");
     CUDA_CALL(c, cudaStreamCreateWithFlags(&c->stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
     CUDA_CALL(c, cudaStreamCreateWithFlags(&c->side, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");

@@ -74,38 +74,56 @@ static __device__ __forceinline__ void add_normals(const cuda_view &v, int32_t c
     });
 }
 
-/* C of a body by the weights, and beta = 1, in all lanes: each weighs every eighth half, and adds up a sum or two over all.
- * `first`: of a solve. CLOSED: as in has_closed_form. Every lane of the warp comes here. */
-template <bool CLOSED>
-static __device__ __forceinline__ void weighted_matrix(const cuda_view &v, const body_thread &t, const cuda_island &island,
-                                                       bool first, double C[PACKED])
+/* Of eight halves of a body, one a lane: which, and from all of their records the lane's numbers. */
+struct eight_halves {
+    int32_t code;                  /* of the lane's own, or -1 */
+    solver_real number[2][LANES];  /* numbers lane and lane + LANES of arm_sums */
+};
+
+/* Those from place `begin` on. Every lane of the warp comes here. */
+static __device__ __forceinline__ eight_halves fetch_halves(const cuda_view &v, const body_thread &t, int32_t begin)
 {
-    const bool three = CLOSED || v.contact_rows == 3, more = t.lane + LANES < HALF_ARMS;
-    double sum[2] = {}; /* numbers lane and lane + LANES of arm_sums */
-    for (int k = 0; k < PACKED; ++k) C[k] = 0;
-    for (int32_t begin = t.begin; __ballot_sync((unsigned)ALL_LANES, begin < t.end) != 0; begin += LANES) {
-        const int32_t at = begin + t.lane, any = at < t.end ? v.incident[at] : -1;
-        const bool rows = !CLOSED && any >= 0 && any >= 2 * v.pair_room;
-        const int32_t code = rows ? -1 : any;
-        if (rows) add_weighted_block(v, any / 2 - v.pair_room, any & 1, C);
-        solver_real number[2][LANES];
+    const bool more = t.lane + LANES < HALF_ARMS;
+    eight_halves out;
+    out.code = begin + t.lane < t.end ? v.incident[begin + t.lane] : -1;
 #pragma unroll
-        for (int j = 0; j < LANES; ++j) {
-            const int32_t other = __shfl_sync((unsigned)ALL_LANES, code, j, LANES);
-            const solver_real *arms = v.half_arms + (size_t)(other < 0 ? 0 : other) * HALF_NUMBERS + t.lane;
-            number[0][j] = three && other >= 0 ? arms[0] : (solver_real)0;
-            number[1][j] = three && other >= 0 && more ? arms[LANES] : (solver_real)0;
-        }
-        const double B = code < 0 ? 0 : weigh_half(v, code, island, first);
-        if (!three && code >= 0) add_normals(v, code, B, C);
+    for (int j = 0; j < LANES; ++j) {
+        const int32_t code = __shfl_sync((unsigned)ALL_LANES, out.code, j, LANES);
+        const bool pair = code >= 0 && code < 2 * v.pair_room && v.contact_rows == 3;
+        const solver_real *arms = v.half_arms + (size_t)(pair ? code : 0) * HALF_NUMBERS + t.lane;
+        out.number[0][j] = pair ? arms[0] : (solver_real)0;
+        out.number[1][j] = pair && more ? arms[LANES] : (solver_real)0;
+    }
+    return out;
+}
+
+/* C of a body by the weights, and beta = 1, in all lanes: each weighs every eighth half, and adds up a sum or two over all.
+ * `halves`: the first of them. `first`: of a solve. CLOSED: as in has_closed_form. Every lane of the warp comes here. */
+template <bool CLOSED>
+static __device__ __forceinline__ void weighted_matrix(const cuda_view &v, const body_thread &t, eight_halves halves,
+                                                       const cuda_island &island, bool first, double C[PACKED])
+{
+    const bool three = CLOSED || v.contact_rows == 3;
+    double sum[2] = {};
+#pragma unroll
+    for (int k = 0; k < PACKED; ++k) C[k] = 0;
+    for (int32_t begin = t.begin;;) {
+        const bool rows = !CLOSED && halves.code >= 0 && halves.code >= 2 * v.pair_room;
+        const double B = halves.code < 0 || rows ? 0 : weigh_half(v, halves.code, island, first);
+        if (rows) add_weighted_block(v, halves.code / 2 - v.pair_room, halves.code & 1, C);
+        else if (!three && halves.code >= 0) add_normals(v, halves.code, B, C);
 #pragma unroll
         for (int j = 0; j < LANES; ++j) {
             const double weight = __shfl_sync((unsigned)ALL_LANES, B, j, LANES);
-            sum[0] = fma(weight, (double)number[0][j], sum[0]);
-            sum[1] = fma(weight, (double)number[1][j], sum[1]);
+            sum[0] = fma(weight, (double)halves.number[0][j], sum[0]);
+            sum[1] = fma(weight, (double)halves.number[1][j], sum[1]);
         }
+        begin += LANES;
+        if (__ballot_sync((unsigned)ALL_LANES, begin < t.end) == 0) break;
+        halves = fetch_halves(v, t, begin);
     }
     if (!three || (!CLOSED && v.rows > 0)) sum_lanes<PACKED>(C);
+    if (!three) return;
     struct arm_sums sums;
     double *in_order = &sums.count;
 #pragma unroll
@@ -180,6 +198,7 @@ static __device__ __forceinline__ void factor_rigid(const cuda_view &v, size_t b
                         fma(qx, w1, fma(-qy, w0, lane == 2 ? by_p : 0)), w0, w1, w2};
     if (!ok) { /* as in factor_body */
         const double diagonal = lane < 3 ? p : lane == 3 ? rxx : lane == 4 ? ryy : rzz;
+#pragma unroll
         for (int i = 0; i < 6; ++i) column[i] = i == lane ? 1 / diagonal : 0;
     }
     store_column(v, body, lane, 1, line_h(line, true), column);

@@ -115,6 +115,10 @@ struct cuda_stop {
     int32_t last;              /* the most iterations of those that have */
 };
 
+/* Of the first devices with clusters of thread blocks, and of those that launch kernels early. */
+#define CLUSTER_ARCH 900
+#define EARLY_ARCH 900
+
 enum { TERMS = 6 }; /* of a body, in sums over islands */
 
 /* Numbers of a half in half_arms (cuda_half_sums.h): sums over arms, as in arm_sums, then these. */
@@ -196,6 +200,14 @@ struct cuda_view {
     cuda_stop *stop;
 };
 
+/* First in kernels that are launched early (launch_early): until all that was enqueued before them has ended. */
+static __device__ __forceinline__ void wait_for_stream(void)
+{
+#if !defined(SADMM_CUDA_EMULATED) && __CUDA_ARCH__ >= EARLY_ARCH
+    asm volatile("griddepcontrol.wait;" ::: "memory");
+#endif
+}
+
 /* Where the data of point k of pair p is. */
 template <int LANES_A_PAIR> static __device__ __forceinline__ size_t point_slot(const cuda_view &v, int32_t p, int32_t k)
 {
@@ -210,9 +222,14 @@ static __device__ __forceinline__ size_t point_slot(const cuda_view &v, int32_t 
  * longest of all. */
 enum { POINTS_AT_ONCE = 4 };
 
-/* This step's counts; 0 when it is halted. */
+/* This step's counts; 0 when it is halted. Both are in one load. */
+static __device__ __forceinline__ int32_t live_pairs(const cuda_view &v)
+{
+    const int4 live = *(const int4 *)v.live;
+    static_assert(sizeof(struct cuda_live) == sizeof(int4), "halt, bodies, pairs, points");
+    return live.x ? 0 : live.z;
+}
 static __device__ __forceinline__ int32_t live_bodies(const cuda_view &v) { return v.live->halt ? 0 : v.bodies; }
-static __device__ __forceinline__ int32_t live_pairs(const cuda_view &v) { return v.live->halt ? 0 : v.live->pairs; }
 static __device__ __forceinline__ int32_t live_rows(const cuda_view &v) { return v.live->halt ? 0 : v.rows; }
 
 /* What an iterating kernel does about energies after its last iteration: it says whether an island may have too much, or it
@@ -274,7 +291,7 @@ struct sadmm_context {
     cudaStream_t side;        /* of a step's graph: what does not wait for contacts (cuda_step.cu) */
     cudaEvent_t fork, join;
     int multiprocessors, shared_limit; /* shared_limit: bytes a block may have */
-    bool cooperative, clusters;        /* what the device can launch */
+    bool cooperative, clusters, early; /* what the device can launch, with the code that was loaded for it */
 
     const struct sadmm_system *system;
     struct sadmm_plan plan;
@@ -323,12 +340,16 @@ sadmm_status CUDA(launch)(struct sadmm_context *, cuda_kernel kernel, const char
 /* The same with blocks of so many threads. */
 sadmm_status CUDA(launch_of)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
                              const cuda_args *args, struct sadmm_error *error);
+/* The same for a kernel that waits itself (wait_for_stream): in a whole step it comes to its multiprocessors while the ones
+ * before it end. */
+sadmm_status CUDA(launch_early)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
+                                const cuda_args *args, struct sadmm_error *error);
 /* How many of the partition's clusters the device runs side by side; 0: clusters that large do not exist. */
 cudaError_t CUDA(active_clusters)(const struct sadmm_context *, cuda_kernel kernel,
                                   const struct cuda_partition *partition, int *clusters);
-/* Launch a kernel on the partition's blocks. */
+/* Launch a kernel on the partition's blocks; `early` as above, but for cooperative launches. */
 sadmm_status CUDA(launch_partition)(struct sadmm_context *, cuda_kernel kernel, const char *name,
-                                    const struct cuda_partition *partition, const cuda_args *args,
+                                    const struct cuda_partition *partition, bool early, const cuda_args *args,
                                     struct sadmm_error *error);
 /* Set a scalar to 0, unless this step has. */
 sadmm_status CUDA(clear)(struct sadmm_context *, enum cuda_scalar scalar, struct sadmm_error *error);

@@ -555,7 +555,7 @@ static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool
     cuda_kernel kernel = CUDA(resident_kernel)(c->view.contact_rows, c->facts.point_slots, partition->tier,
                                                partition->threads, measure || c->view.rows > 0, c->fast, &name);
     if (partition->tier == SADMM_CUDA_TIER_GRID) CUDA_TRY(CUDA(clear)(c, SCALAR_BARRIER, error));
-    CUDA_TRY(CUDA(launch_partition)(c, kernel, name, partition, &args, error));
+    CUDA_TRY(CUDA(launch_partition)(c, kernel, name, partition, true, &args, error));
     c->starting = false;
     c->settled = true;
     return SADMM_OK;

@@ -16,12 +16,14 @@
 template <bool RIGID> static __device__ __forceinline__ bool suspect(const cuda_view &v, const body_thread &t, bool few)
 {
     const wide_row<RIGID> row = row_of_body<RIGID>(v, t);
-    return suspect_body(v, few, t.live && t.lane == 0, t.body, row.velocity, row.b, row.a);
+    const bool speaks = t.live && t.lane == 0;
+    return suspect_body(few, speaks, speaks ? v.free_energy[t.body] : 0, row.velocity, row.b, row.a);
 }
 
 static __global__ void __launch_bounds__(BODY_THREADS)
     suspect_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
+    wait_for_stream();
     const body_thread t = body_of_thread(v);
     if (v.rigid ? suspect<true>(v, t, args.few) : suspect<false>(v, t, args.few)) *v.suspects = 1;
 }
@@ -29,6 +31,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 static __global__ void __launch_bounds__(BODY_THREADS)
     limit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
+    wait_for_stream();
     if (!*v.suspects) return;
     const body_thread t = body_of_thread(v);
     double total[TERMS];
@@ -52,7 +55,7 @@ static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const ch
 {
     cuda_args args = {};
     args.few = limit_few(c->plan.warm, c->settings.iterations);
-    return CUDA(launch_of)(c, kernel, name, body_blocks(c->view.bodies), BODY_THREADS, &args, error);
+    return CUDA(launch_early)(c, kernel, name, body_blocks(c->view.bodies), BODY_THREADS, &args, error);
 }
 
 sadmm_status CUDA(enqueue_limit)(struct sadmm_context *c, bool suspected, struct sadmm_error *error)

@@ -79,12 +79,14 @@ template <bool PENALTY, bool FACTOR, int FORM>
 static __global__ void __launch_bounds__(BODY_THREADS)
     penalty_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
+    wait_for_stream();
     const body_thread t = body_of_thread(v);
     const cuda_island none = {};
     double C[PACKED], beta = 1;
     if (PENALTY) {
         if (FORM == PLAIN) penalty_matrix(v, t, C);
-        else weighted_matrix<FORM == CLOSED>(v, t, t.live ? v.islands[v.label[t.body]] : none, args.start, C);
+        else weighted_matrix<FORM == CLOSED>(v, t, fetch_halves(v, t, t.begin), t.live ? v.islands[v.label[t.body]] : none,
+                                             args.start, C);
         if (t.live) {
             if (FORM == PLAIN) beta = penalty_of(v, v.lines + t.body * (size_t)v.line, C);
             if (t.lane == 0) v.beta[t.body] = beta;
@@ -121,7 +123,7 @@ static sadmm_status launch_bodies(struct sadmm_context *c, cuda_kernel kernel, c
                                   struct sadmm_error *error)
 {
     const int64_t blocks = body_blocks(c->view.bodies);
-    return CUDA(launch_of)(c, kernel, name, args->planned && blocks == 0 ? 1 : blocks, BODY_THREADS, args, error);
+    return CUDA(launch_early)(c, kernel, name, args->planned && blocks == 0 ? 1 : blocks, BODY_THREADS, args, error);
 }
 
 extern "C" sadmm_status CUDA(init_penalty)(struct sadmm_context *c, struct sadmm_error *error)

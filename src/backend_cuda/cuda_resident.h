@@ -28,8 +28,6 @@ enum resident_mode { BLOCK, CLUSTER, GRID };
 
 enum { QUAD = 4 }; /* lanes a half */
 
-#define CLUSTER_ARCH 900 /* of the first devices with clusters of thread blocks */
-
 /* Sizes of blocks an instance is made for: few threads may have all the registers they want, and a single warp needs no
  * barrier (BLOCK alone). */
 enum block_size { ANY_SIZE, SMALL, ONE_WARP };
@@ -206,13 +204,15 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
     real momentum;               /* b - A v */
     real sum, step;              /* FAST: J^T d lambda, what v has gone by in this iteration */
     half_lane<POINTS> own;
+    solver_real own_b;           /* FAST, where there are registers: for suspect(), like the energy of the free motion */
+    double own_free;
 
     __device__ __forceinline__ part_run(const cuda_view &view, const cuda_args &arguments, unsigned char *memory)
         : v(view), args(arguments), t((int32_t)threadIdx.x), r(t % LANES), lane(t % QUAD), half(t / QUAD),
           first_body(v.parts[blockIdx.x]), bodies(v.parts[blockIdx.x + 1] - first_body),
           first_half(v.offsets[first_body]), halves(v.offsets[first_body + bodies] - first_half), body(t / LANES),
           gathered(nullptr), gathered_count(0), many(false), moves(warp_has_body(0)), updates(warp_has_half()),
-          own_record(nullptr), own_body(), momentum(0), sum(0), step(0), own()
+          own_record(nullptr), own_body(), momentum(0), sum(0), step(0), own(), own_b(0), own_free(0)
     {
         lay_out(&m, memory, MODE == CLUSTER, (int)blockDim.x, args.most_bodies, has_rows());
     }
@@ -417,6 +417,10 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
         for (int32_t i = t; i < more * ROW; i += threads)
             m.b[i] = (FAST ? v.defect : v.b)[raw_row(in_registers * ROW + i)];
     }
+    if (FAST && SIZE != ANY_SIZE && args.limit != LIMIT_NONE && body < bodies && r < 6) {
+        own_b = v.b[raw * ROW + (size_t)r];
+        own_free = v.free_energy[raw];
+    }
     own.own = 0;
     own.other = m.state;
     if (half < halves) load_half();
@@ -593,7 +597,9 @@ PART __device__ __forceinline__ bool PART_RUN::suspect(int32_t odd) const
         const int32_t i = first + body, at = i - in_registers;
         const bool live = i < bodies;
         const size_t raw = live ? (size_t)v.body_of[first_body + i] : 0;
-        const double b = live && r < 6 ? (double)v.b[raw * ROW + (size_t)r] : 0;
+        const bool known = SIZE != ANY_SIZE && first == 0, speaks = live && r == 0;
+        const double b = known ? (double)own_b : live && r < 6 ? (double)v.b[raw * ROW + (size_t)r] : 0,
+                     free = known ? own_free : speaks ? v.free_energy[raw] : 0;
         double a[3] = {}; /* of rigid bodies */
 #pragma unroll
         for (int k = 0; k < 3; ++k) {
@@ -601,7 +607,7 @@ PART __device__ __forceinline__ bool PART_RUN::suspect(int32_t odd) const
             else if (live && r < 6) a[k] = (double)line_a(m.lines + at * LINE_GENERAL, true, r, r / 3 * 3 + k);
         }
         const double velocity = live && r < 6 ? (double)state(odd)[i * ROW + r] : 0;
-        any = suspect_body(v, args.few, live && r == 0, raw, velocity, b, a) || any;
+        any = suspect_body(args.few, speaks, free, velocity, b, a) || any;
     }
     return any;
 }
@@ -640,15 +646,15 @@ PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
 
 /* ---- the kernel ------------------------------------------------------------------------------------------------ */
 
-/* A block without bodies, or a cluster: there are more than islands, mostly. In the grid everybody comes to the barrier. Or the
- * stop rule is met. */
+/* The step is halted; or a block without bodies, or a cluster: there are more than islands, mostly. In the grid everybody comes to
+ * the barrier. Or the stop rule is met. */
 template <int MODE, bool FAST>
 static __device__ __forceinline__ bool nothing_to_do(const cuda_view &v, const cuda_args &args)
 {
-    if (FAST && MODE != BLOCK && all_stopped(v, args.looks)) return true;
-    if (MODE == GRID) return false;
     const int32_t cluster = MODE == BLOCK ? 1 : args.cluster, part = (int32_t)blockIdx.x / cluster * cluster,
-                  first = v.parts[part], end = v.parts[part + cluster];
+                  first = v.parts[part], end = v.parts[part + cluster]; /* beside halt: neither load waits for the other */
+    if (v.live->halt || (FAST && MODE != BLOCK && all_stopped(v, args.looks))) return true;
+    if (MODE == GRID) return false;
     return first == end || (FAST && MODE == BLOCK && part_stopped(v, args.looks, first, end));
 }
 
@@ -707,9 +713,10 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE))
     resident_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     CUDA_DYNAMIC_SHARED(memory);
+    wait_for_stream();
     /* They take registers, and are for contacts with friction. */
     constexpr bool ENDS = FAST && MODE == BLOCK && !FULL && SIZE != ANY_SIZE && CONTACT_ROWS == 3;
-    if (v.live->halt || nothing_to_do<MODE, FAST>(v, args)) {
+    if (nothing_to_do<MODE, FAST>(v, args)) {
         if (ENDS && args.begin) stamp_assembled(v);
         return;
     }

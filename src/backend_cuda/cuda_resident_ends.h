@@ -51,10 +51,11 @@ static __device__ __forceinline__ void begin_in_block(const cuda_view &v, const 
     add_up_in_block<add_terms>(part.bodies, part.range, part.terms, barrier);
     for_each_body(v, part, [&](const body_thread &t, int32_t i) {
         const int32_t first = t.live ? part.range[i].first : 0;
+        const eight_halves halves = fetch_halves(v, t, t.begin); /* on their way while the island is weighed */
         cuda_island island;
         double C[PACKED];
         weigh_island<false>(&island, part.terms + first * TERMS, args);
-        weighted_matrix<true>(v, t, island, true, C);
+        weighted_matrix<true>(v, t, halves, island, true, C);
         if (!t.live) return;
         if (i == first && t.lane == 0) v.islands[v.label[t.body]] = island;
         factor_rigid(v, t.body, t.lane, C);

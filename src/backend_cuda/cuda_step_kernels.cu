@@ -131,8 +131,9 @@ static __host__ __device__ inline finish_ranges ranges_of(const cuda_view &v)
 static __global__ void __launch_bounds__(STEP_THREADS)
     finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    const bool on = !v.live->halt && (!args.planned || as_planned(v));
-    const int32_t bodies = on ? v.bodies : 0, pairs = on ? v.live->pairs : 0;
+    wait_for_stream();
+    const bool on = !args.planned || as_planned(v);
+    const int32_t bodies = on ? live_bodies(v) : 0, pairs = on ? live_pairs(v) : 0;
     const int32_t i = (int32_t)(blockIdx.x * (unsigned)STEP_THREADS + threadIdx.x);
     const finish_ranges range = ranges_of(v);
     struct cuda_step_control *control = v.step.control;
@@ -169,6 +170,7 @@ static __device__ double double_of(unsigned long long bits) { return __longlong_
 /* One thread. */
 static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
+    wait_for_stream();
     if (threadIdx.x > 0) return;
     struct cuda_step_control *control = v.step.control;
     struct cuda_step_report *report = &v.step.reports[control->sequence % STEPS_AHEAD];
@@ -219,7 +221,7 @@ sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *er
     cuda_args args = {};
     args.planned = c->ends;
     int64_t blocks = ((int64_t)ranges_of(c->view).end + STEP_THREADS - 1) / STEP_THREADS;
-    return CUDA(launch_of)(c, finish_kernel, "finish", blocks, STEP_THREADS, &args, error);
+    return CUDA(launch_early)(c, finish_kernel, "finish", blocks, STEP_THREADS, &args, error);
 }
 
 sadmm_status CUDA(launch_commit)(struct sadmm_context *c, struct sadmm_error *error)
@@ -227,5 +229,5 @@ sadmm_status CUDA(launch_commit)(struct sadmm_context *c, struct sadmm_error *er
     cuda_args args = {};
     args.planned = c->ends;
     args.looks = c->looks;
-    return CUDA(launch)(c, commit_kernel, "commit", 1, &args, error);
+    return CUDA(launch_early)(c, commit_kernel, "commit", 1, STEP_THREADS, &args, error);
 }

@@ -40,6 +40,7 @@ template <bool LEVELS>
 static __global__ void __launch_bounds__(BODY_THREADS)
     terms_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
+    wait_for_stream();
     const body_thread t = body_of_thread(v);
     double total[TERMS];
     const double term = v.rigid ? terms_of_body<LEVELS, true, true>(v, t) : terms_of_body<LEVELS, false, true>(v, t);
@@ -130,7 +131,7 @@ sadmm_status CUDA(enqueue_islands)(struct sadmm_context *c, struct sadmm_error *
 {
     const cuda_args args = CUDA(weight_args)(c);
     const cuda_kernel kernel = c->refreshes >= WEIGHT_FIRST_LEVEL ? terms_kernel<true> : terms_kernel<false>;
-    CUDA_TRY(CUDA(launch_of)(c, kernel, "sums over islands", body_blocks(c->view.bodies), BODY_THREADS, &args, error));
+    CUDA_TRY(CUDA(launch_early)(c, kernel, "sums over islands", body_blocks(c->view.bodies), BODY_THREADS, &args, error));
     return CUDA(launch)(c, weigh_rows_kernel, "weights of row blocks", blocks_for(c->view.rows), &args, error);
 }
 

@@ -152,12 +152,15 @@ static __device__ bool same_pairs(const layout_view &v, const layout_args &args,
     __syncthreads();
     if (!*same) return false;
     __syncthreads();
+    bool differ = false;
     for (int32_t p = t; p < pairs; p += ONE_BLOCK_THREADS) {
-        const struct sadmm_contact_pair &pair = v.pairs[p];
-        const int32_t a = pair.body_a >= 0 ? pair.body_a : v.bodies, b = pair.body_b >= 0 ? pair.body_b : v.bodies;
-        if (a != v.half_body[2 * p] || b != v.half_body[2 * p + 1]) atomicMin(same, 0);
-        survey_pair(v, pair, &own);
+        const pair_about about = load_about(&v.pairs[p]);
+        const int2 half = *(const int2 *)&v.half_body[2 * p];
+        differ = differ || half.x != (about.bodies.x >= 0 ? about.bodies.x : v.bodies) ||
+                 half.y != (about.bodies.y >= 0 ? about.bodies.y : v.bodies);
+        survey_pair(v, about, v.pairs[p].friction, &own);
     }
+    if (differ) atomicMin(same, 0);
     __syncthreads();
     if (!*same) return false;
     gather_facts(facts, own);

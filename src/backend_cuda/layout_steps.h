@@ -3,6 +3,8 @@
 #ifndef SADMM_CUDA_LAYOUT_STEPS_H
 #define SADMM_CUDA_LAYOUT_STEPS_H
 
+#include <stddef.h>
+
 #include "layout_internal.h"
 
 #define LAYOUT_INLINE static __device__ __forceinline__
@@ -104,21 +106,34 @@ LAYOUT_INLINE void clear_body(const layout_view &v, int32_t i)
     v.degree[i] = v.island_bodies[i] = v.island_halves[i] = 0;
 }
 
-LAYOUT_INLINE bool starts_warm(const layout_view &v, const sadmm_contact_pair &pair)
+LAYOUT_INLINE bool starts_warm(const layout_view &v, int32_t first, int32_t count)
 {
-    for (int32_t k = 0; k < pair.count; ++k) {
-        const double *impulse = v.points[pair.first + k].impulse;
+    for (int32_t k = 0; k < count; ++k) {
+        const double *impulse = v.points[first + k].impulse;
         if (impulse[0] != 0 || impulse[1] != 0 || impulse[2] != 0) return true;
     }
     return false;
 }
 
-/* What may differ between steps of the same pairs. */
-LAYOUT_INLINE void survey_pair(const layout_view &v, const sadmm_contact_pair &pair, cuda_facts *own)
+/* What a pair joins, two numbers at a time: threads ask for neighbours, which are far apart, and what counts is how often. */
+struct pair_about {
+    int2 bodies, points; /* a, b; first, count */
+};
+LAYOUT_INLINE pair_about load_about(const sadmm_contact_pair *pair)
 {
-    own->point_slots = larger(own->point_slots, pair.count);
-    own->rough += pair.friction > 0;
-    if (v.warm_start) own->warm += starts_warm(v, pair);
+    static_assert(offsetof(sadmm_contact_pair, body_b) == 4 && offsetof(sadmm_contact_pair, first) % 8 == 0 &&
+                      offsetof(sadmm_contact_pair, count) == offsetof(sadmm_contact_pair, first) + 4,
+                  "neighbours");
+    const pair_about about = {*(const int2 *)&pair->body_a, *(const int2 *)&pair->first};
+    return about;
+}
+
+/* What may differ between steps of the same pairs. */
+LAYOUT_INLINE void survey_pair(const layout_view &v, const pair_about &about, double friction, cuda_facts *own)
+{
+    own->point_slots = larger(own->point_slots, about.points.y);
+    own->rough += friction > 0;
+    if (v.warm_start) own->warm += starts_warm(v, about.points.x, about.points.y);
 }
 
 /* A pair (record < pairs), a row block (record >= pair_room) or none. */
@@ -127,10 +142,10 @@ LAYOUT_INLINE void survey_record(const layout_view &v, int32_t record, int32_t p
 {
     int32_t body[2] = {-1, -1};
     if (record < pairs) {
-        const sadmm_contact_pair &pair = v.pairs[record];
-        body[0] = pair.body_a;
-        body[1] = pair.body_b;
-        survey_pair(v, pair, own);
+        const pair_about about = load_about(&v.pairs[record]);
+        body[0] = about.bodies.x;
+        body[1] = about.bodies.y;
+        survey_pair(v, about, v.pairs[record].friction, own);
     } else if (record >= v.pair_room) {
         const sadmm_problem_block &block = v.blocks[record - v.pair_room];
         body[0] = block.body_a;
