@@ -123,7 +123,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const struct sadmm_contact_point *points = v.raw_points + (live ? pair->first : 0);
     const vec3 normal = live ? v3_load(pair->normal) : v3(0, 0, 0);
     const bool a = live && pair->body_a >= 0, b = live && pair->body_b >= 0;
-    /* A pair of more points than the step was planned for halts it (cuda_step.h), but not before this. */
+    /* A pair of more points than the step was planned for halts it (cuda_step.h), but later: until then it has as many. */
     const int32_t count = !live ? 0 : pair->count <= v.point_slots ? pair->count : v.point_slots;
     vec3 between = v3(0, 0, 0);
     if (a && b && count > 0 && (FAST || lane == 0))

@@ -26,7 +26,7 @@ sadmm_status CUDA(wait)(struct sadmm_context *c, struct sadmm_error *error)
 
 /* ---- memory --------------------------------------------------------------------------------------------------- */
 
-static const char *const buffer_names[BUFFER_COUNT] = {
+static const char *const buffer_names[] = {
     "states",
     "b",
     "matrices",
@@ -48,6 +48,7 @@ static const char *const buffer_names[BUFFER_COUNT] = {
     "numbers",
     "scalars",
     "weights",
+    "records of halves",
     "bodies' input",
     "pairs' input",
     "points' input",
@@ -69,6 +70,7 @@ static const char *const buffer_names[BUFFER_COUNT] = {
     "staged results",
     "reports",
 };
+static_assert(sizeof buffer_names / sizeof *buffer_names == BUFFER_COUNT, "a name a buffer");
 
 static void release(cuda_buffer *buffer)
 {

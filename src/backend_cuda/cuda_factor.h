@@ -74,6 +74,9 @@ static __device__ __forceinline__ void add_normals(const cuda_view &v, int32_t c
     });
 }
 
+/* Units of rounding by which a diagonal number of C may be short: its own, three entries a row, and those of q q^T / p. */
+#define C_ROUNDING 8.0
+
 /* Of eight halves of a body, one a lane: which, and from all of their records the lane's numbers. */
 struct eight_halves {
     int32_t code;                  /* of the lane's own, or -1 */
@@ -129,6 +132,11 @@ static __device__ __forceinline__ void weighted_matrix(const cuda_view &v, const
 #pragma unroll
     for (int k = 0; k < HALF_ARMS; ++k) in_order[k] = __shfl_sync((unsigned)ALL_LANES, sum[k / LANES], k % LANES, LANES);
     add_arm_sums(C, &sums);
+    /* Sums are in this precision. What is rounded must not make C less: along axes that contacts do not turn about it is 0, and
+     * what is left there is the inertia, of a light body under heavy ones a small part of C. More only slows. */
+    C[9] += C_ROUNDING * SOLVER_EPSILON * C[9];
+    C[14] += C_ROUNDING * SOLVER_EPSILON * C[14];
+    C[20] += C_ROUNDING * SOLVER_EPSILON * C[20];
 }
 
 /* ---- H ----------------------------------------------------------------------------------------------------------- */

@@ -383,7 +383,7 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
     c->plan = *plan;
     c->settings = *settings;
     c->starting = true;
-    c->placed = c->measured = c->rescaled = c->settled = false;
+    c->placed = c->measured = c->rescaled = c->settled = c->ends = false;
     c->fast = settings->method == SADMM_METHOD_FAST;
     c->refused = 0;
     c->graph_valid = false;

@@ -17,8 +17,9 @@ static __device__ double natural_map(const cuda_view &v, int32_t p)
     const mat3 frame = sadmm_contact_frame(pair->normal);
     const int32_t bodies[2] = {pair->body_a, pair->body_b};
     const int rows = pair->friction > 0 ? 3 : 1;
+    const int32_t count = (int32_t)v.difference[p].w; /* as planned for, should the pair have more: nobody has looked yet */
     double worst = 0;
-    for (int32_t k = 0; k < pair->count; ++k) {
+    for (int32_t k = 0; k < count; ++k) {
         const struct sadmm_contact_point *point = &v.raw_points[pair->first + k];
         vec3 velocity = v3(0, 0, 0);
         double weight[3] = {};

@@ -204,15 +204,13 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
     real momentum;               /* b - A v */
     real sum, step;              /* FAST: J^T d lambda, what v has gone by in this iteration */
     half_lane<POINTS> own;
-    solver_real own_b;           /* FAST, where there are registers: for suspect(), like the energy of the free motion */
-    double own_free;
 
     __device__ __forceinline__ part_run(const cuda_view &view, const cuda_args &arguments, unsigned char *memory)
         : v(view), args(arguments), t((int32_t)threadIdx.x), r(t % LANES), lane(t % QUAD), half(t / QUAD),
           first_body(v.parts[blockIdx.x]), bodies(v.parts[blockIdx.x + 1] - first_body),
           first_half(v.offsets[first_body]), halves(v.offsets[first_body + bodies] - first_half), body(t / LANES),
           gathered(nullptr), gathered_count(0), many(false), moves(warp_has_body(0)), updates(warp_has_half()),
-          own_record(nullptr), own_body(), momentum(0), sum(0), step(0), own(), own_b(0), own_free(0)
+          own_record(nullptr), own_body(), momentum(0), sum(0), step(0), own()
     {
         lay_out(&m, memory, MODE == CLUSTER, (int)blockDim.x, args.most_bodies, has_rows());
     }
@@ -417,10 +415,6 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
         for (int32_t i = t; i < more * ROW; i += threads)
             m.b[i] = (FAST ? v.defect : v.b)[raw_row(in_registers * ROW + i)];
     }
-    if (FAST && SIZE != ANY_SIZE && args.limit != LIMIT_NONE && body < bodies && r < 6) {
-        own_b = v.b[raw * ROW + (size_t)r];
-        own_free = v.free_energy[raw];
-    }
     own.own = 0;
     own.other = m.state;
     if (half < halves) load_half();
@@ -597,9 +591,8 @@ PART __device__ __forceinline__ bool PART_RUN::suspect(int32_t odd) const
         const int32_t i = first + body, at = i - in_registers;
         const bool live = i < bodies;
         const size_t raw = live ? (size_t)v.body_of[first_body + i] : 0;
-        const bool known = SIZE != ANY_SIZE && first == 0, speaks = live && r == 0;
-        const double b = known ? (double)own_b : live && r < 6 ? (double)v.b[raw * ROW + (size_t)r] : 0,
-                     free = known ? own_free : speaks ? v.free_energy[raw] : 0;
+        const bool speaks = live && r == 0;
+        const double b = live && r < 6 ? (double)v.b[raw * ROW + (size_t)r] : 0, free = speaks ? v.free_energy[raw] : 0;
         double a[3] = {}; /* of rigid bodies */
 #pragma unroll
         for (int k = 0; k < 3; ++k) {

@@ -12,14 +12,15 @@
  *     iterate    (15), new weights where asked for                           (the kernel table's own kernels)
  *       after some   fast: a look at the stop rule
  *     limit      fast: islands that have more energy than they may
+ *                fast, small islands (c->ends): `iterate` does penalties and limit, too, and the plan is looked at by the last two
  *       beside what follows  (16), (17)
  *     finish     impulses into the contacts, moved bodies, wrenches
  *     commit     the report; the step counts only if nothing was halted
  *
  * The host plans a step from the facts of an earlier one: rooms, tier and partition, rows a contact, warm or cold. All of
  * it goes into a graph that is launched again and again, two of them in turn, because states and contact sets change
- * places at every step. Where a plan does not hold, the step sets cuda_live.halt, what was enqueued behind it does
- * nothing, and the host, when it sees the report, looks at the facts, plans anew and enqueues the same steps again: a
+ * places at every step. Where a plan does not hold, the step sets cuda_live.halt (with c->ends only its last kernel
+ * does: what runs until then keeps to what was planned for), what was enqueued behind it does nothing, and the host, when it sees the report, looks at the facts, plans anew and enqueues the same steps again: a
  * repeated step starts from the same state and gives the same bits. Reports and edits travel through pinned memory, a ring
  * of STEPS_AHEAD, written and read by the device itself.
  */
