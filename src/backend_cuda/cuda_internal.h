@@ -386,8 +386,8 @@ struct device_scope {
 sadmm_status CUDA(solver_room)(struct sadmm_context *, struct sadmm_error *error);
 /* A, b and the start velocities: they need no contacts. */
 sadmm_status CUDA(enqueue_bodies)(struct sadmm_context *, struct sadmm_error *error);
-/* Of a whole step: penalties and factors at once, and whether it is what was planned for. fast: from islands that were
- * enqueued, or (c->ends) left to the iterating kernel. */
+/* Of a whole step: penalties and factors at once, and whether it is what was planned for. fast: islands first; c->ends: all
+ * of it is left to the iterating kernel, and to the last two. */
 sadmm_status CUDA(enqueue_penalties)(struct sadmm_context *, struct sadmm_error *error);
 /* fast: a solve begins: its first weights come next. */
 void CUDA(begin_weights)(struct sadmm_context *);
