@@ -98,13 +98,19 @@ static sadmm_status find_contacts(sadmm_world *world)
     return world->kernels->find_contacts(world->context, world->collision, &input, &world->contacts, &world->error);
 }
 
-static sadmm_status keep_start_impulses(sadmm_world *world)
+/* The starting impulses, which the solve replaces, and the deepest penetration: one pass over the points. */
+static sadmm_status keep_start(sadmm_world *world, double *depth)
 {
+    const struct sadmm_contact_point *points = world->contacts.points;
     size_t count = world->contacts.point_count;
+    double deepest = 0;
     if (!grow(&world->start_impulse, &world->start_impulse_capacity, 3 * count, sizeof *world->start_impulse))
         return sadmm_fail_memory(&world->error, "the step's starting impulses");
-    for (size_t k = 0; k < count; ++k)
-        memcpy(world->start_impulse + 3 * k, world->contacts.points[k].impulse, 3 * sizeof *world->start_impulse);
+    for (size_t k = 0; k < count; ++k) {
+        memcpy(world->start_impulse + 3 * k, points[k].impulse, 3 * sizeof *world->start_impulse);
+        deepest = -points[k].gap > deepest ? -points[k].gap : deepest;
+    }
+    *depth = deepest;
     return SADMM_OK;
 }
 
@@ -159,13 +165,6 @@ static void commit(sadmm_world *world)
     world->contacts_readable = true;
 }
 
-static double deepest(const struct sadmm_contact_set *contacts)
-{
-    double depth = 0;
-    for (size_t k = 0; k < contacts->point_count; ++k) depth = fmax(depth, -contacts->points[k].gap);
-    return depth;
-}
-
 struct sadmm_system sadmm_world_system(sadmm_world *world)
 {
     struct sadmm_system system = {
@@ -181,13 +180,11 @@ struct sadmm_system sadmm_world_system(sadmm_world *world)
 /* Everything that may fail; the report is written on the way. *found: the contacts have been replaced. */
 static sadmm_status try_step(sadmm_world *world, sadmm_step_report *report, bool *found)
 {
-    const struct sadmm_kernels *kernels;
+    const struct sadmm_kernels *kernels = world->kernels;
     const sadmm_settings *settings = &world->def.settings;
     struct sadmm_solve_report solve = {0};
     double begin = sadmm_clock_ms();
 
-    
-    kernels = world->kernels;
     TRY(sadmm_world_gather(world));
     TRY(find_contacts(world));
     *found = true;
@@ -195,7 +192,8 @@ static sadmm_status try_step(sadmm_world *world, sadmm_step_report *report, bool
 
     struct sadmm_system system = sadmm_world_system(world);
     world->plan = sadmm_plan_make(&system, settings);
-    TRY(keep_start_impulses(world));
+    double depth = 0;
+    TRY(keep_start(world, &depth));
     sadmm_status status = sadmm_schedule_solve(kernels, world->context, &system, settings, &world->plan, &solve,
                                                &report->ms, &world->error);
     if (status == SADMM_ERROR_NON_FINITE) return name_culprit(world);
@@ -223,7 +221,7 @@ static sadmm_status try_step(sadmm_world *world, sadmm_step_report *report, bool
     report->converged = solve.converged;
     report->limited = solve.limited;
     report->residual = solve.residual;
-    report->penetration_max = deepest(&world->contacts);
+    report->penetration_max = depth;
     report->ms.collide = collided - begin;
     report->ms.finish = end - solved;
     report->ms.total = end - begin;
