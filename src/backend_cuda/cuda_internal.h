@@ -257,6 +257,7 @@ struct cuda_args {
     const struct sadmm_resident_edit *edits;
     double factor;
     double multipliers; /* fast: how many times as far as lambda^ those of this iteration have gone */
+    solver_real relaxation; /* fast: of the settings, rounded once: a conversion in every iteration would be waited for */
 };
 
 typedef void (*cuda_kernel)(const cuda_view, const cuda_args);

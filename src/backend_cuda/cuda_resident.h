@@ -142,6 +142,40 @@ static __device__ __forceinline__ const solver_real *in_block(const solver_real 
 #endif
 }
 
+/* An address in this block's own memory, in a register: to save one the compiler makes it anew from its parts in every iteration,
+ * and what is loaded from there waits. Blocks of ANY_SIZE have none to spare. */
+template <int SIZE> static __device__ __forceinline__ solver_real *kept_address(solver_real *own)
+{
+#ifndef SADMM_CUDA_EMULATED
+    if (SIZE != ANY_SIZE) {
+        uint32_t at = (uint32_t)__cvta_generic_to_shared(own);
+        asm volatile("" : "+r"(at));
+        return (solver_real *)__cvta_shared_to_generic(at);
+    }
+#endif
+    return own;
+}
+
+/* A number worked out here, not where it is used: the compiler may not move it past this place. */
+#ifdef SADMM_CUDA_EMULATED
+template <int SIZE, typename T> static void keep(T *)
+{
+}
+#else
+template <int SIZE> static __device__ __forceinline__ void keep(int32_t *number)
+{
+    if (SIZE != ANY_SIZE) asm volatile("" : "+r"(*number));
+}
+template <int SIZE> static __device__ __forceinline__ void keep(float *number)
+{
+    if (SIZE != ANY_SIZE) asm volatile("" : "+f"(*number));
+}
+template <int SIZE> static __device__ __forceinline__ void keep(double *number)
+{
+    if (SIZE != ANY_SIZE) asm volatile("" : "+d"(*number));
+}
+#endif
+
 /* ---- halves in registers --------------------------------------------------------------------------------------- */
 
 /* A lane's share of its quad's half: points lane, lane + 4, ... The half on side b sees the relative velocity x; the half
@@ -199,6 +233,8 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
     int32_t gathered_count;      /* 0 in lanes that have no component */
     bool many;                   /* some lane of the warp has more than FEW */
     bool moves, updates;         /* the warp has bodies, halves */
+    const solver_real *own_row;  /* of the half's own body in even iterations */
+    solver_real *own_state;      /* the body's component r, in even iterations */
     real2_pair *own_record;
     body_lane own_body;
     real momentum;               /* b - A v */
@@ -210,7 +246,7 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
           first_body(v.parts[blockIdx.x]), bodies(v.parts[blockIdx.x + 1] - first_body),
           first_half(v.offsets[first_body]), halves(v.offsets[first_body + bodies] - first_half), body(t / LANES),
           gathered(nullptr), gathered_count(0), many(false), moves(warp_has_body(0)), updates(warp_has_half()),
-          own_record(nullptr), own_body(), momentum(0), sum(0), step(0), own()
+          own_row(nullptr), own_state(nullptr), own_record(nullptr), own_body(), momentum(0), sum(0), step(0), own()
     {
         lay_out(&m, memory, MODE == CLUSTER, (int)blockDim.x, args.most_bodies, has_rows());
     }
@@ -243,10 +279,10 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
     __device__ __forceinline__ void load_records(void);
     __device__ __forceinline__ void store_record(real2_pair *record, real2_pair sum) const;
     __device__ __forceinline__ real gather(real g, const solver_real *from, int32_t count, bool more) const;
-    __device__ __forceinline__ void publish(int32_t i, real value, int32_t odd);
+    __device__ __forceinline__ void publish(solver_real *to, int32_t i, real value, int32_t odd);
     __device__ __forceinline__ void move_bodies(int32_t odd);
     __device__ __forceinline__ void move_bodies_fast(int32_t odd, real relaxation, real multipliers);
-    template <bool MEASURE, bool PLAIN> __device__ __forceinline__ double update_halves(int32_t odd, real farther);
+    template <bool MEASURE> __device__ __forceinline__ double update_halves(int32_t odd, real farther, bool plain);
     __device__ __forceinline__ bool suspect(int32_t odd) const;
     __device__ __forceinline__ void store(int32_t odd);
 };
@@ -402,7 +438,7 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
         gathered_count = v.offsets[at + 1] - v.offsets[at];
     }
     many = __ballot_sync((unsigned)ALL_LANES, gathered_count > FEW) != 0;
-    own_record = (real2_pair *)(m.records + half * ROW + quad_slot(lane));
+    own_record = (real2_pair *)kept_address<SIZE>(m.records + half * ROW + quad_slot(lane));
     if (!FAST && moves) momentum = free_momentum(own_body);
     for (int32_t i = t; i < bodies * ROW; i += threads) m.state[i] = v.state[raw_row(i)];
     if (t < ROW) m.state[(MODE == CLUSTER ? 2 : 1) * args.most_bodies * ROW + t] = 0;
@@ -418,6 +454,8 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
     own.own = 0;
     own.other = m.state;
     if (half < halves) load_half();
+    own_row = kept_address<SIZE>(m.state + own.own * ROW);
+    own_state = kept_address<SIZE>(m.state + body * ROW + r);
     if (!FAST && !args.start) load_records();
     else if (!FAST && updates) start_records();
     if (has_rows() && half < halves && !own.pair && lane == 0)
@@ -457,10 +495,11 @@ PART __device__ __forceinline__ real PART_RUN::gather(real g, const solver_real 
     }
 }
 
-PART __device__ __forceinline__ void PART_RUN::publish(int32_t i, real value, int32_t odd)
+/* `to`: component r of body i in even iterations. */
+PART __device__ __forceinline__ void PART_RUN::publish(solver_real *to, int32_t i, real value, int32_t odd)
 {
     if (i >= bodies || r >= 6) return;
-    state(odd)[i * ROW + r] = value;
+    to[MODE == CLUSTER && odd ? args.most_bodies * ROW : 0] = value;
     if (MODE == GRID) v.exchange[((size_t)(odd ? v.bodies : 0) + (size_t)(first_body + i)) * ROW + (size_t)r] = value;
 }
 
@@ -468,7 +507,7 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd)
 {
     if (has_moves()) {
         own_body.v += step_of(own_body, gather(momentum, gathered, gathered_count, many));
-        publish(body, own_body.v, odd);
+        publish(own_state, body, own_body.v, odd);
     }
     if (SIZE == ONE_WARP) return; /* at most one body for each eight threads (cuda_partition.cu) */
     const int32_t in_registers = (int32_t)blockDim.x / LANES;
@@ -482,7 +521,7 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd)
             const int32_t from = v.offsets[first_body + i], count = v.offsets[first_body + i + 1] - from;
             g = gather(g, m.records + (from - first_half) * ROW + record_slot(r), count, count > FEW);
         }
-        publish(i, one.v + step_of(one, g), odd);
+        publish(m.state + i * ROW + r, i, one.v + step_of(one, g), odd);
     }
 }
 
@@ -493,7 +532,7 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies_fast(int32_t odd, rea
     if (has_moves()) {
         sum = gather(0, gathered, gathered_count, many);
         step = step_fast(&own_body, sum, relaxation);
-        publish(body, own_body.v, odd);
+        publish(own_state, body, own_body.v, odd);
     }
     if (SIZE == ONE_WARP) return; /* at most one body for each eight threads (cuda_partition.cu) */
     const int32_t in_registers = (int32_t)blockDim.x / LANES;
@@ -508,7 +547,7 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies_fast(int32_t odd, rea
             pushed = gather(0, m.records + (from - first_half) * ROW + record_slot(r), count, count > FEW);
         }
         const real gone = step_fast(&one, pushed, relaxation);
-        publish(i, one.v, odd);
+        publish(m.state + i * ROW + r, i, one.v, odd);
         const real defect = defect_after(one, pushed, gone, multipliers);
         if (live) m.b[at * ROW + r] = defect;
     }
@@ -523,16 +562,17 @@ PART __device__ __forceinline__ void PART_RUN::store_record(real2_pair *record, 
     if (own.pair) *record = sum;
 }
 
-/* The lane's share of the primal residual. FAST: lambda goes `farther` times as far, PLAIN: 1; records are those of Step 1 in any
+/* The lane's share of the primal residual. FAST: lambda goes `farther` times as far, plain: once; records are those of Step 1 in any
  * case. */
-PART template <bool MEASURE, bool PLAIN>
-__device__ __forceinline__ double PART_RUN::update_halves(int32_t odd, real farther)
+PART template <bool MEASURE>
+__device__ __forceinline__ double PART_RUN::update_halves(int32_t odd, real farther, bool plain)
 {
     enum { SPLIT = MEASURE && !FAST };
     double primal = 0;
     if (!has_updates()) return primal;
-    const solver_real *own_row = state(odd) + own.own * ROW, *other_row = own.other + (odd ? own.other_odd : 0);
-    const body_motion own_motion = load_motion(own_row), other = load_motion(other_row);
+    const solver_real *mine = own_row + (MODE == CLUSTER && odd ? args.most_bodies * ROW : 0),
+                      *others = own.other + (odd ? own.other_odd : 0);
+    const body_motion own_motion = load_motion(mine), other = load_motion(others);
     vec3 force = v3(0, 0, 0), torque = force, change_force = force, change_torque = force;
     real largest = 0;
 #pragma unroll
@@ -540,7 +580,7 @@ __device__ __forceinline__ double PART_RUN::update_halves(int32_t odd, real fart
         const vec3 old = own.lambda[j], x = relative_velocity(other, own.other_arm[j], own_motion, own.own_arm[j]);
         const point_change to = update<CONTACT_ROWS, FAST>(own.normal, own.friction, x, own.error[j], own.inv_s[j], old);
         const vec3 lambda = to.lambda, delta = to.delta;
-        own.lambda[j] = FAST ? relaxed(old, to, PLAIN, farther) : lambda;
+        own.lambda[j] = FAST ? relaxed(old, to, plain, farther) : lambda;
         vec3 impulse =
             impulse_of<CONTACT_ROWS>(own.normal, FAST ? delta : SPLIT ? lambda : v3_add(lambda, delta));
         vec3 moment = fused_cross(own.own_arm[j], impulse);
@@ -573,9 +613,9 @@ __device__ __forceinline__ double PART_RUN::update_halves(int32_t odd, real fart
         }
     }
     if (has_rows() && half < halves && !own.pair && lane == 0)
-        primal = FAST ? update_row_half_fast(v, code, own_row, other_row, m.row_lambda + half * ROW,
+        primal = FAST ? update_row_half_fast(v, code, mine, others, m.row_lambda + half * ROW,
                                              m.records + half * ROW, farther)
-                      : update_row_half(v, code, own_row, other_row, m.row_lambda + half * ROW, m.records + half * ROW,
+                      : update_row_half(v, code, mine, others, m.row_lambda + half * ROW, m.records + half * ROW,
                                         change);
     return primal;
 }
@@ -660,18 +700,20 @@ static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view 
         arrive<MODE, SIZE>(v.barrier);
         wait<MODE, SIZE>(v.barrier, *target += gridDim.x);
     }
-    const double relaxation = v.settings.relaxation;
-    const real all = (real)relaxation;
-    const int32_t stretch = args.goes_on ? args.count + 1 : args.count;
-    for (int32_t i = 0; i < args.count; ++i) {
+    int32_t count = args.count, stretch = args.goes_on ? count + 1 : count, settled = args.settled;
+    /* Were it the launch's constant, and not a choice, it would be fetched in every iteration. */
+    real all = part.bodies > 0 ? args.relaxation : (real)1;
+    keep<SIZE>(&count), keep<SIZE>(&stretch), keep<SIZE>(&settled), keep<SIZE>(&all);
+    for (int32_t i = 0; i < count; ++i) {
         const int32_t odd = i & 1;
         const bool plain = !relax_constraints(i, stretch);
-        const real farther = plain ? (real)1 : all;
-        if (!plain) part.template update_halves<false, false>(odd, farther);
-        else if (FULL && args.measure) reduce_max(part.template update_halves<true, true>(odd, farther), v.residual);
-        else part.template update_halves<false, true>(odd, farther);
+        real farther = plain ? (real)1 : all, bodies_farther = relax_velocity(i, stretch, settled) ? all : (real)1;
+        keep<SIZE>(&farther), keep<SIZE>(&bodies_farther);
+        if (FULL && plain && args.measure) reduce_max(part.template update_halves<true>(odd, farther, true), v.residual);
+        else part.template update_halves<false>(odd, farther, plain);
         block_barrier<SIZE>();
-        part.move_bodies_fast(!odd, relax_velocity(i, stretch, args.settled || i > 0) ? all : (real)1, farther);
+        part.move_bodies_fast(!odd, bodies_farther, farther);
+        settled = 1;
         arrive<MODE, SIZE>(v.barrier);
         if (part.has_moves()) part.own_body.b = defect_after(part.own_body, part.sum, part.step, farther);
         wait<MODE, SIZE>(v.barrier, *target += gridDim.x);
@@ -689,8 +731,8 @@ static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view
         if (part.has_moves()) part.momentum = free_momentum(part.own_body);
         wait<MODE, SIZE>(v.barrier, *target += gridDim.x);
         if (FULL && args.measure && iteration == args.count)
-            reduce_max(part.template update_halves<true, true>(odd, 1), v.residual);
-        else part.template update_halves<false, true>(odd, 1);
+            reduce_max(part.template update_halves<true>(odd, 1, true), v.residual);
+        else part.template update_halves<false>(odd, 1, true);
         block_barrier<SIZE>();
     }
     /* Nobody looks into this block's memory once it is gone. */
