@@ -200,11 +200,21 @@ struct cuda_view {
     cuda_stop *stop;
 };
 
-/* First in kernels that are launched early (launch_early): until all that was enqueued before them has ended. */
+/* Kernels that are launched early (launch_early): until all that was enqueued before has ended. First of all, but for what is
+ * fetched from memory that the kernel before does not write: that one has waited itself, so the others have ended. */
 static __device__ __forceinline__ void wait_for_stream(void)
 {
 #if !defined(SADMM_CUDA_EMULATED) && __CUDA_ARCH__ >= EARLY_ARCH
     asm volatile("griddepcontrol.wait;" ::: "memory");
+#endif
+}
+
+/* The next kernel, where launched early, may come to its multiprocessors and do what it does before it waits. Where this one has
+ * waited. */
+static __device__ __forceinline__ void let_next_begin(void)
+{
+#if !defined(SADMM_CUDA_EMULATED) && __CUDA_ARCH__ >= EARLY_ARCH
+    asm volatile("griddepcontrol.launch_dependents;");
 #endif
 }
 

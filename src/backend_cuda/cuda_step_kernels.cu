@@ -80,35 +80,70 @@ static __global__ void admit_kernel(const __grid_constant__ cuda_view v, const _
 
 /* ---- finish ---------------------------------------------------------------------------------------------------- */
 
-static __device__ bool finish_body(const cuda_view &v, int32_t i)
+/* What is fetched before the iterations have ended. */
+struct body_before {
+    struct sadmm_rigid body;
+    struct sadmm_steady steady;
+};
+
+static __device__ body_before fetch_body(const cuda_view &v, int32_t i)
 {
-    const struct sadmm_rigid body = v.step.before[i];
-    struct sadmm_steady steady = v.step.steady_before[i];
-    struct sadmm_rigid next = body;
+    const body_before before = {v.step.before[i], v.step.steady_before[i]};
+    return before;
+}
+
+static __device__ bool finish_body(const cuda_view &v, int32_t i, const body_before &before)
+{
+    struct sadmm_steady steady = before.steady;
+    struct sadmm_rigid next = before.body;
     const solver_real slow = v.step.limits ? slow_down(v, i) : (solver_real)1;
-    move_body(v, i, &body, slow, next.position, next.orientation, next.velocity);
-    steady_keep(&steady, &body, &next);
+    move_body(v, i, &before.body, slow, next.position, next.orientation, next.velocity);
+    steady_keep(&steady, &before.body, &next);
     v.step.after[i] = next;
     v.step.steady_after[i] = steady;
     return finite_numbers(next.position, 3) && finite_numbers(next.orientation, 4) && finite_numbers(next.velocity, 6);
 }
 
-/* Impulses of a pair into its points, every v.lanes-th of them from `lane` on; *depth: the deepest. */
-static __device__ bool finish_pair(const cuda_view &v, int32_t p, int32_t lane, double *depth)
+struct point_before {
+    double impulse[3], gap;
+};
+
+static __device__ point_before fetch_point(const struct sadmm_contact_point *point)
+{
+    const point_before before = {{point->impulse[0], point->impulse[1], point->impulse[2]}, point->gap};
+    return before;
+}
+
+/* The same of a pair. */
+struct pair_before {
+    int32_t first, count, body; /* points; a body of it */
+    vec3 normal;
+    point_before point;         /* the lane's first */
+};
+
+static __device__ pair_before fetch_pair(const cuda_view &v, int32_t p, int32_t lane)
 {
     const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
-    const vec3 normal = v3_load(pair->normal);
+    pair_before before = {pair->first, pair->count, pair->body_b >= 0 ? pair->body_b : pair->body_a, v3_load(pair->normal), {}};
+    if (lane < before.count) before.point = fetch_point(&v.step.points[before.first + lane]);
+    return before;
+}
+
+/* Impulses of a pair into its points, every v.lanes-th of them from `lane` on; *depth: the deepest. */
+static __device__ bool finish_pair(const cuda_view &v, int32_t p, int32_t lane, const pair_before &pair, double *depth)
+{
     bool finite = true;
-    for (int32_t k = lane; k < pair->count; k += v.lanes) {
-        struct sadmm_contact_point *point = &v.step.points[pair->first + k];
-        double *start = v.step.start_impulse + 3 * (size_t)(pair->first + k), impulse[3];
-        v3_store(point_impulse(v, p, k, normal), impulse);
+    for (int32_t k = lane; k < pair.count; k += v.lanes) {
+        struct sadmm_contact_point *point = &v.step.points[pair.first + k];
+        const point_before before = k == lane ? pair.point : fetch_point(point);
+        double *start = v.step.start_impulse + 3 * (size_t)(pair.first + k), impulse[3];
+        v3_store(point_impulse(v, p, k, pair.normal), impulse);
         finite = finite && finite_numbers(impulse, 3);
         for (int j = 0; j < 3; ++j) {
-            start[j] = point->impulse[j];
+            start[j] = before.impulse[j];
             point->impulse[j] = impulse[j];
         }
-        *depth = fmax(*depth, -point->gap);
+        *depth = fmax(*depth, -before.gap);
     }
     return finite;
 }
@@ -126,33 +161,37 @@ static __host__ __device__ inline finish_ranges ranges_of(const cuda_view &v)
     return r;
 }
 
-/* Does not look at culprits of this very kernel: which body is named must not depend on who came first. args.planned: nobody
- * has compared the step with the plan yet. */
+/* Does not look at culprits of this very kernel: which body is named must not depend on who came first. */
 static __global__ void __launch_bounds__(STEP_THREADS)
-    finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+    finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    wait_for_stream();
-    const bool on = !args.planned || as_planned(v);
-    const int32_t bodies = on ? live_bodies(v) : 0, pairs = on ? live_pairs(v) : 0;
     const int32_t i = (int32_t)(blockIdx.x * (unsigned)STEP_THREADS + threadIdx.x);
     const finish_ranges range = ranges_of(v);
     struct cuda_step_control *control = v.step.control;
     double depth = 0;
+    const bool is_body = i < range.wrenches, is_pair = i >= range.pairs && (i - range.pairs) / v.lanes < live_pairs(v);
+    const int32_t p = (i - range.pairs) / v.lanes, lane = is_pair ? (i - range.pairs) % v.lanes : 0;
+    body_before body = {};
+    pair_before pair = {};
+    if (is_body && i < v.bodies) body = fetch_body(v, i);
+    if (is_pair) pair = fetch_pair(v, p, lane);
+    const bool on = as_planned(v) && !v.live->halt; /* nothing after the layout has another reason to halt */
+
+    wait_for_stream();
+    let_next_begin();
+    const unsigned long long deepest = control->depth; /* of those that have come here */
     if (i == 0) control->stamps[STAMP_SOLVED] = nanoseconds();
-    if (i < range.wrenches) {
-        if (i < bodies && !finish_body(v, i)) atomicMin(&control->culprit, i);
+    if (is_body) {
+        if (on && i < v.bodies && !finish_body(v, i, body)) atomicMin(&control->culprit, i);
     } else if (i < range.pairs) {
-        const int32_t slot = (i - range.wrenches) / LANES, lane = i % LANES;
-        const bool live = slot < bodies;
+        const int32_t slot = (i - range.wrenches) / LANES, of_body = i % LANES;
+        const bool live = on && slot < v.bodies;
         double wrench[6];
-        contact_wrench(v, live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0, lane, wrench);
-        if (live) store_wrench(wrench, lane, v.step.wrench + 6 * (size_t)v.body_of[slot]);
-    } else if ((i - range.pairs) / v.lanes < pairs) {
-        const int32_t p = (i - range.pairs) / v.lanes;
-        const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
+        contact_wrench(v, live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0, of_body, wrench);
+        if (live) store_wrench(wrench, of_body, v.step.wrench + 6 * (size_t)v.body_of[slot]);
+    } else if (on && is_pair) {
         /* bodies are named first: all of them are below any contact's */
-        if (!finish_pair(v, p, (i - range.pairs) % v.lanes, &depth))
-            atomicMin(&control->culprit, v.bodies + (pair->body_b >= 0 ? pair->body_b : pair->body_a));
+        if (!finish_pair(v, p, lane, pair, &depth)) atomicMin(&control->culprit, v.bodies + pair.body);
     }
     /* -0 is no depth; a larger one may be there already */
     unsigned long long bits = depth > 0 ? (unsigned long long)__double_as_longlong(depth) : 0;
@@ -160,7 +199,7 @@ static __global__ void __launch_bounds__(STEP_THREADS)
         unsigned long long other = __shfl_xor_sync(0xffffffffu, bits, o);
         bits = other > bits ? other : bits;
     }
-    if (threadIdx.x % WARP == 0 && bits > control->depth) atomicMax(&control->depth, bits);
+    if (threadIdx.x % WARP == 0 && bits > deepest) atomicMax(&control->depth, bits);
 }
 
 /* ---- commit ---------------------------------------------------------------------------------------------------- */
@@ -170,16 +209,19 @@ static __device__ double double_of(unsigned long long bits) { return __longlong_
 /* One thread. */
 static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
+    const bool planned = as_planned(v);
+    const int32_t halted = v.live->halt;
     wait_for_stream();
     if (threadIdx.x > 0) return;
     struct cuda_step_control *control = v.step.control;
     struct cuda_step_report *report = &v.step.reports[control->sequence % STEPS_AHEAD];
-    if (!v.live->halt && args.planned && !as_planned(v)) v.live->halt = HALT_PLAN;
-    if (!v.live->halt && control->culprit != INT32_MAX) v.live->halt = HALT_NON_FINITE;
+    const int32_t culprit = control->culprit,
+                  halt = halted ? halted : !planned ? HALT_PLAN : culprit != INT32_MAX ? HALT_NON_FINITE : HALT_NONE;
     control->stamps[STAMP_END] = nanoseconds();
+    v.live->halt = halt;
     report->sequence = control->sequence++;
-    report->halt = v.live->halt;
-    report->culprit = control->culprit;
+    report->halt = halt;
+    report->culprit = culprit;
     report->counts = *v.step.counts;
     report->facts = *v.facts;
     report->depth = double_of(control->depth);
@@ -219,7 +261,6 @@ sadmm_status CUDA(launch_admit)(struct sadmm_context *c, struct sadmm_error *err
 sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    args.planned = c->ends;
     int64_t blocks = ((int64_t)ranges_of(c->view).end + STEP_THREADS - 1) / STEP_THREADS;
     return CUDA(launch_early)(c, finish_kernel, "finish", blocks, STEP_THREADS, &args, error);
 }
@@ -227,7 +268,6 @@ sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *er
 sadmm_status CUDA(launch_commit)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    args.planned = c->ends;
     args.looks = c->looks;
     return CUDA(launch_early)(c, commit_kernel, "commit", 1, STEP_THREADS, &args, error);
 }
