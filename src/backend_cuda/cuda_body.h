@@ -23,13 +23,17 @@ struct body_thread {
     int32_t begin, end; /* places of its halves */
 };
 
+static __device__ __forceinline__ body_thread body_of_slot(const cuda_view &v, int32_t slot, bool live)
+{
+    const body_thread out = {slot, (int32_t)threadIdx.x % LANES, live, live ? (size_t)v.body_of[slot] : 0,
+                             live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0};
+    return out;
+}
+
 static __device__ __forceinline__ body_thread body_of_thread(const cuda_view &v)
 {
     const int32_t t = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x), slot = t / LANES;
-    const bool live = slot < live_bodies(v);
-    body_thread out = {slot, t % LANES, live, live ? (size_t)v.body_of[slot] : 0, live ? v.offsets[slot] : 0,
-                       live ? v.offsets[slot + 1] : 0};
-    return out;
+    return body_of_slot(v, slot, slot < live_bodies(v));
 }
 
 /* What a body's lane r < 6 has of it: rows r of A and A^-1, components r of v and b; 0 in the others. RIGID: of the rows what is
@@ -47,10 +51,12 @@ template <bool RIGID> static __device__ __forceinline__ wide_row<RIGID> row_of_b
     if (RIGID) {
         const int32_t r = t.lane % 3;
 #pragma unroll
-        for (int k = 0; k < 3; ++k) {
-            const int32_t place = packed_place(r, k);
-            row.a[k] = t.lane >= 3 ? (double)line[1 + place] : k == r ? (double)line[0] : 0;
-            row.a_inverse[k] = t.lane >= 3 || k == r ? inverse[t.lane >= 3 ? packed_place(r + 3, k + 3) : 0] : 0;
+        for (int k = 0; k < 3; ++k) { /* fetched in any case: what a lane fetches under a condition is waited for one by one */
+            const bool turns = t.lane >= 3, on = turns || k == r;
+            const double a = (double)line[turns ? 1 + packed_place(r, k) : 0],
+                         a_inverse = inverse[turns ? packed_place(r + 3, k + 3) : 0];
+            row.a[k] = on ? a : 0;
+            row.a_inverse[k] = on ? a_inverse : 0;
         }
     } else {
 #pragma unroll

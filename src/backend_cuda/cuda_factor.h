@@ -21,19 +21,26 @@ static __device__ __forceinline__ void ease_gaps(const cuda_view &v, int32_t p, 
     }
 }
 
-/* B of a pair, at half `code`. Both of its halves work it out; the one at its first dynamic body keeps it. */
-static __device__ __forceinline__ double weigh_half(const cuda_view &v, int32_t code, const cuda_island &island, bool first)
+/* Of eight halves of a body, one a lane: which, what its weight is made of, and from all of their records the lane's numbers. */
+struct eight_halves {
+    int32_t code;                  /* of the lane's own, or -1 */
+    pair_ends ends;
+    solver_real load, response;    /* of a pair */
+    solver_real number[2][LANES];  /* numbers lane and lane + LANES of arm_sums */
+};
+
+/* B of the pair of the lane's half. Both of its halves work it out; the one at its first dynamic body keeps it. */
+static __device__ __forceinline__ double weigh_half(const cuda_view &v, const eight_halves &halves, const cuda_island &island,
+                                                    bool first)
 {
-    const int32_t p = code / 2;
-    const solver_real *about = v.half_arms + (size_t)code * HALF_NUMBERS;
-    const double load = (double)about[HALF_LOAD], response = (double)about[HALF_RESPONSE];
-    const pair_ends ends = v.ends[p];
-    const bool a = is_dynamic(v, ends.body_a), both = a && is_dynamic(v, ends.body_b);
+    const int32_t p = halves.code / 2;
+    const double load = (double)halves.load, response = (double)halves.response;
+    const bool a = is_dynamic(v, halves.ends.body_a), both = a && is_dynamic(v, halves.ends.body_b);
     const double scale = island.scale,
                  taken = scale > 0 ? v.weight[p]
                                    : weight_of_pair(island.level, weight_mass(load, island.speed, island.mass), response),
                  B = scale > 0 ? taken * scale : taken;
-    if (code & 1 && a) return B;
+    if (halves.code & 1 && a) return B;
     v.inv_s[p] = (solver_real)(both ? B / 2 : B);
     if (!(scale > 0)) v.weight[p] = taken;
     if (first && v.rigid) ease_gaps(v, p, island.tallness); /* world level: gaps, a slop and a step */
@@ -77,18 +84,18 @@ static __device__ __forceinline__ void add_normals(const cuda_view &v, int32_t c
 /* Units of rounding by which a diagonal number of C may be short: its own, three entries a row, and those of q q^T / p. */
 #define C_ROUNDING 8.0
 
-/* Of eight halves of a body, one a lane: which, and from all of their records the lane's numbers. */
-struct eight_halves {
-    int32_t code;                  /* of the lane's own, or -1 */
-    solver_real number[2][LANES];  /* numbers lane and lane + LANES of arm_sums */
-};
-
 /* Those from place `begin` on. Every lane of the warp comes here. */
 static __device__ __forceinline__ eight_halves fetch_halves(const cuda_view &v, const body_thread &t, int32_t begin)
 {
     const bool more = t.lane + LANES < HALF_ARMS;
+    const pair_ends nobody = {};
     eight_halves out;
     out.code = begin + t.lane < t.end ? v.incident[begin + t.lane] : -1;
+    const bool own = out.code >= 0 && out.code < 2 * v.pair_room;
+    const solver_real *about = v.half_arms + (size_t)(own ? out.code : 0) * HALF_NUMBERS;
+    out.ends = own ? v.ends[out.code / 2] : nobody;
+    out.load = own ? about[HALF_LOAD] : (solver_real)0;
+    out.response = own ? about[HALF_RESPONSE] : (solver_real)0;
 #pragma unroll
     for (int j = 0; j < LANES; ++j) {
         const int32_t code = __shfl_sync((unsigned)ALL_LANES, out.code, j, LANES);
@@ -112,7 +119,7 @@ static __device__ __forceinline__ void weighted_matrix(const cuda_view &v, const
     for (int k = 0; k < PACKED; ++k) C[k] = 0;
     for (int32_t begin = t.begin;;) {
         const bool rows = !CLOSED && halves.code >= 0 && halves.code >= 2 * v.pair_room;
-        const double B = halves.code < 0 || rows ? 0 : weigh_half(v, halves.code, island, first);
+        const double B = halves.code < 0 || rows ? 0 : weigh_half(v, halves, island, first);
         if (rows) add_weighted_block(v, halves.code / 2 - v.pair_room, halves.code & 1, C);
         else if (!three && halves.code >= 0) add_normals(v, halves.code, B, C);
 #pragma unroll

@@ -225,6 +225,7 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
     part_memory m;
     int32_t t, r, lane, half; /* thread; component of a body; lane of a quad; the quad's half */
     int32_t first_body, bodies, first_half, halves;
+    body_thread found; /* the thread's first body */
 
     /* One body for each eight threads is in registers, with where its records are; more are in shared memory. What the loop
      * needs is worked out before it: addresses, and what holds for a whole warp. */
@@ -240,13 +241,19 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
     real momentum;               /* b - A v */
     real sum, step;              /* FAST: J^T d lambda, what v has gone by in this iteration */
     half_lane<POINTS> own;
+    /* Until iterations begin: what the half is, and its pair as it is in memory. */
+    int32_t half_code;
+    pair_ends on;
+    real4 about, between, point[COUNT];
 
     __device__ __forceinline__ part_run(const cuda_view &view, const cuda_args &arguments, unsigned char *memory)
         : v(view), args(arguments), t((int32_t)threadIdx.x), r(t % LANES), lane(t % QUAD), half(t / QUAD),
           first_body(v.parts[blockIdx.x]), bodies(v.parts[blockIdx.x + 1] - first_body),
-          first_half(v.offsets[first_body]), halves(v.offsets[first_body + bodies] - first_half), body(t / LANES),
+          first_half(v.offsets[first_body]), halves(v.offsets[first_body + bodies] - first_half),
+          found(body_of_slot(v, first_body + t / LANES, t / LANES < bodies)), body(t / LANES),
           gathered(nullptr), gathered_count(0), many(false), moves(warp_has_body(0)), updates(warp_has_half()),
-          own_row(nullptr), own_state(nullptr), own_record(nullptr), own_body(), momentum(0), sum(0), step(0), own()
+          own_row(nullptr), own_state(nullptr), own_record(nullptr), own_body(), momentum(0), sum(0), step(0), own(),
+          half_code(half < halves ? v.incident[first_half + half] : 0), on(), about(), between(), point()
     {
         lay_out(&m, memory, MODE == CLUSTER, (int)blockDim.x, args.most_bodies, has_rows());
     }
@@ -273,6 +280,12 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
     __device__ __forceinline__ bool warp_has_half(void) const { return t / WARP * (WARP / QUAD) < halves; }
 
     __device__ __forceinline__ void load(void);
+    /* Where point k of the half's pair is, if there is memory for so many: their number is not waited for. */
+    __device__ __forceinline__ size_t slot_or_first(int32_t k) const
+    {
+        return k < v.lanes * ((v.point_slots + v.lanes - 1) / v.lanes) ? point_slot(v, half_code / 2, k) : 0;
+    }
+    __device__ __forceinline__ void fetch_half(void);
     __device__ __forceinline__ void load_half(void);
     __device__ __forceinline__ void find_other(int32_t other);
     __device__ __forceinline__ void start_records(void);
@@ -362,42 +375,50 @@ PART __device__ __forceinline__ void PART_RUN::find_other(int32_t other)
     }
 }
 
+/* The half's pair as it is in memory; its points' errors and weights may still change. */
+PART __device__ __forceinline__ void PART_RUN::fetch_half(void)
+{
+    const int32_t p = half_code / 2;
+    if (half >= halves || (FULL && p >= v.pair_room)) return;
+    about = v.normal[p];
+    between = v.difference[p];
+    on = v.ends[p];
+#pragma unroll
+    for (int32_t j = 0; j < COUNT; ++j) {
+        const size_t slot = slot_or_first(lane + QUAD * j);
+        point[j] = v.arm[slot];
+        own.lambda[j] = load_lambda<CONTACT_ROWS>(v, slot);
+    }
+}
+
 PART __device__ __forceinline__ void PART_RUN::load_half(void)
 {
-    const int32_t code = v.incident[first_half + half], side = code & 1, p = code / 2;
+    const int32_t side = half_code & 1, p = half_code / 2;
     if (FULL && p >= v.pair_room) {
-        const row_about about = v.row_info[p - v.pair_room];
-        own.own = v.slot_of[side ? about.body_b : about.body_a] - first_body;
-        find_other(side ? about.body_a : about.body_b);
+        const row_about rows = v.row_info[p - v.pair_room];
+        own.own = v.slot_of[side ? rows.body_b : rows.body_a] - first_body;
+        find_other(side ? rows.body_a : rows.body_b);
         return;
     }
-    const real4 about = v.normal[p];
-    const real4 between = v.difference[p];
-    const vec3 difference = xyz(between);
-    const pair_ends on = v.ends[p];
-    const int32_t count = (int32_t)between.w;
     own.pair = true;
-    own.normal = xyz(about);
-    own.friction = about.w;
     own.sign = side ? (real)1 : (real)-1;
     own.own = v.slot_of[side ? on.body_b : on.body_a] - first_body;
     find_other(side ? on.body_a : on.body_b);
     const real inv_s =
         own.sign * (FAST ? v.inv_s[p] : inverse_weight(inv_beta_of(v, on.body_a), inv_beta_of(v, on.body_b)));
+    own.normal = xyz(about);
+    own.friction = about.w;
 #pragma unroll
     for (int32_t j = 0; j < COUNT; ++j) {
         const int32_t k = lane + QUAD * j;
-        const bool room = k < v.lanes * ((v.point_slots + v.lanes - 1) / v.lanes); /* in memory: do not wait for the count */
-        const size_t slot = room ? point_slot(v, p, k) : 0;
-        const real4 point = v.arm[slot];
-        const vec3 lambda = load_lambda<CONTACT_ROWS>(v, slot);
-        if (k >= count) continue;
-        const vec3 arm_a = xyz(point), arm_b = v3_add(arm_a, difference);
-        own.own_arm[j] = side ? arm_b : arm_a;
-        own.other_arm[j] = side ? arm_a : arm_b;
-        own.error[j] = own.sign * point.w;
-        own.inv_s[j] = inv_s;
-        own.lambda[j] = lambda;
+        const real error = FAST ? v.arm[slot_or_first(k)].w : point[j].w;
+        const bool there = k < (int32_t)between.w;
+        const vec3 arm_a = xyz(point[j]), arm_b = v3_add(arm_a, xyz(between)), none = v3(0, 0, 0);
+        own.own_arm[j] = there ? (side ? arm_b : arm_a) : none;
+        own.other_arm[j] = there ? (side ? arm_a : arm_b) : none;
+        own.error[j] = there ? own.sign * error : 0;
+        own.inv_s[j] = there ? inv_s : 0;
+        own.lambda[j] = there ? own.lambda[j] : none;
     }
 }
 
@@ -428,19 +449,18 @@ PART __device__ __forceinline__ void PART_RUN::load_records(void)
 PART __device__ __forceinline__ void PART_RUN::load(void)
 {
     const int32_t threads = (int32_t)blockDim.x, in_registers = threads / LANES;
-    const size_t at = (size_t)(first_body + (body < bodies ? body : 0)),
-                 raw = body < bodies ? (size_t)v.body_of[at] : 0;
-    own_body = load_body(body < bodies, r, v.lines + raw * (size_t)v.line, v.rigid, (FAST ? v.defect : v.b) + raw * ROW,
-                         v.state + raw * ROW);
+    own_body = load_body(found.live, r, v.lines + found.body * (size_t)v.line, v.rigid,
+                         (FAST ? v.defect : v.b) + found.body * ROW, v.state + found.body * ROW);
     gathered = m.records;
-    if (body < bodies && r < 6) {
-        gathered = m.records + (v.offsets[at] - first_half) * ROW + record_slot(r);
-        gathered_count = v.offsets[at + 1] - v.offsets[at];
+    if (found.live && r < 6) {
+        gathered = m.records + (found.begin - first_half) * ROW + record_slot(r);
+        gathered_count = found.end - found.begin;
     }
     many = __ballot_sync((unsigned)ALL_LANES, gathered_count > FEW) != 0;
     own_record = (real2_pair *)kept_address<SIZE>(m.records + half * ROW + quad_slot(lane));
     if (!FAST && moves) momentum = free_momentum(own_body);
-    for (int32_t i = t; i < bodies * ROW; i += threads) m.state[i] = v.state[raw_row(i)];
+    if (found.live) m.state[body * ROW + r] = own_body.v;
+    for (int32_t i = in_registers * ROW + t; i < bodies * ROW; i += threads) m.state[i] = v.state[raw_row(i)];
     if (t < ROW) m.state[(MODE == CLUSTER ? 2 : 1) * args.most_bodies * ROW + t] = 0;
     if (bodies > in_registers) {
         const int32_t more = bodies - in_registers;
@@ -459,7 +479,7 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
     if (!FAST && !args.start) load_records();
     else if (!FAST && updates) start_records();
     if (has_rows() && half < halves && !own.pair && lane == 0)
-        start_row_half(v, v.incident[first_half + half], m.row_lambda + half * ROW, m.records + half * ROW,
+        start_row_half(v, half_code, m.row_lambda + half * ROW, m.records + half * ROW,
                        !FAST && args.start);
     if (FAST && MODE == GRID) /* for the first Steps 2-4 of the others */
         for (int32_t i = t; i < bodies * ROW; i += threads)
@@ -742,9 +762,10 @@ static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view
     }
 }
 
-/* FULL: with row blocks, or to be measured; both cost registers, and most stretches have neither. */
+/* FULL: with row blocks, or to be measured; both cost registers, and most stretches have neither. A multiprocessor holds one block
+ * at least: unless told so the compiler gives a block of one warp fewer registers than it needs. */
 template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST>
-static __global__ void __launch_bounds__(most_threads(POINTS, SIZE))
+static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     resident_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     CUDA_DYNAMIC_SHARED(memory);
@@ -759,16 +780,20 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE))
     const auto barrier = [] { block_barrier<SIZE>(); };
     const block_part ends = {part.first_body, part.bodies, part.m.terms, part.m.range, part.m.suspected};
     if (ENDS && threadIdx.x == 0) *ends.suspected = 0;
-    if constexpr (ENDS) {
-        if (args.begin) {
-            begin_in_block(v, args, ends, barrier);
+    const bool begins = ENDS && args.begin;
+    if constexpr (ENDS)
+        if (begins) store_first_terms(v, ends, part.found);
+    part.fetch_half(); /* on its way while islands are weighed */
+    if constexpr (ENDS)
+        if (begins) {
+            weigh_in_block(v, args, ends, part.found, barrier);
             stamp_assembled(v);
         }
-    }
     part.load();
     unsigned target = 0;
     if (FAST) iterate_fast<MODE, FULL, SIZE>(part, v, args, &target);
     else iterate_paper<MODE, FULL, SIZE>(part, v, args, &target);
+    if (MODE == BLOCK) let_next_begin(); /* after GRID what has come early costs 10 us */
     part.store(args.count & 1);
     if (!FAST || args.limit == LIMIT_NONE) return;
     const bool suspected = part.suspect(args.count & 1);

@@ -346,13 +346,17 @@ CUDA_INLINE body_lane load_body(bool live, int32_t r, const solver_real *line, b
     body_lane body = {};
     if (!live || r >= 6) return body;
     const solver_real *H = line_h(line, rigid);
-#pragma unroll
-    for (int k = 0; k < 6; ++k) {
-        body.A[k] = line_a(line, rigid, r, k);
-        body.H[k] = H[packed_place(r, k)];
-    }
     body.b = b[r];
     body.v = state[r];
+#pragma unroll
+    for (int k = 0; k < 6; ++k) {
+        if (rigid) { /* fetched in any case, as in row_of_body */
+            const bool turns = r >= 3 && k >= 3, on = turns || k == r;
+            const solver_real a = line[turns ? 1 + packed_place(r - 3, k - 3) : 0];
+            body.A[k] = on ? a : (solver_real)0;
+        } else body.A[k] = line[packed_place(r, k)];
+        body.H[k] = H[packed_place(r, k)];
+    }
     return body;
 }
 
