@@ -153,6 +153,32 @@ START_TEST(tiers_agree)
 }
 END_TEST
 
+static void start_unrelaxed(struct runner *r, const struct sadmm_kernels *k, enum sadmm_cuda_tier tier)
+{
+    start(r, k, &scenes[0], tier);
+    r->settings.relaxation = 1;
+    CALL(r, k->begin(r->c, &r->p->system, &r->plan, &r->settings, &r->error));
+    runner_assemble(r);
+}
+
+/* Without over-relaxation every iteration is plain: it keeps the projected multipliers, not the old ones and a change. */
+START_TEST(unrelaxed_tiers_agree)
+{
+    const struct sadmm_kernels *table = tables[_i];
+    for (size_t t = 0; t + 1 < TIERS; ++t) {
+        struct runner stream, fused;
+        if (!device_has(table, tiers[t])) continue;
+        start_unrelaxed(&stream, table, SADMM_CUDA_TIER_STREAM);
+        start_unrelaxed(&fused, table, tiers[t]);
+        iterate(&stream, 20, false);
+        iterate(&fused, 20, false);
+        check_same(&fused, &stream, "unrelaxed");
+        runner_stop(&stream);
+        runner_stop(&fused);
+    }
+}
+END_TEST
+
 /* Stretches without new weights between them: what bodies keep from one to the next, and where it is taken anew in the
  * middle of one, after 128 iterations. The CPU's within the tolerance of all stretches: these are longer, but have one set of
  * weights. */
@@ -409,6 +435,7 @@ int main(void)
         add_case(suite, p ? "entries_f64" : "entries_f32", entries_equal_cpu, first, first + SCENES);
         add_case(suite, p ? "tiers_f64" : "tiers_f32", tiers_agree, first, some);
     }
+    ADD_CASE(suite, unrelaxed_tiers_agree, 0, parts);
     ADD_CASE(suite, stretches_go_on, 0, 3 * parts);
     ADD_CASE(suite, many_bodies, 0, parts);
     ADD_CASE(suite, tall_islands, 0, parts);

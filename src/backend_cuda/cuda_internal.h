@@ -201,7 +201,8 @@ struct cuda_view {
 };
 
 /* Kernels that are launched early (launch_early): until all that was enqueued before has ended. First of all, but for what is
- * fetched from memory that the kernel before does not write: that one has waited itself, so the others have ended. */
+ * fetched from memory that the kernel before does not write: that one has waited itself, or was launched after all others had
+ * ended. */
 static __device__ __forceinline__ void wait_for_stream(void)
 {
 #if !defined(SADMM_CUDA_EMULATED) && __CUDA_ARCH__ >= EARLY_ARCH

@@ -241,7 +241,7 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
     real momentum;               /* b - A v */
     real sum, step;              /* FAST: J^T d lambda, what v has gone by in this iteration */
     half_lane<POINTS> own;
-    /* Until iterations begin: what the half is, and its pair as it is in memory. */
+    /* Until iterations begin (registers): what the half is, and its pair as it is in memory. */
     int32_t half_code;
     pair_ends on;
     real4 about, between, point[COUNT];
@@ -726,7 +726,7 @@ static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view 
     keep<SIZE>(&count), keep<SIZE>(&stretch), keep<SIZE>(&settled), keep<SIZE>(&all);
     for (int32_t i = 0; i < count; ++i) {
         const int32_t odd = i & 1;
-        const bool plain = !relax_constraints(i, stretch);
+        const bool plain = !relax_constraints(i, stretch) || all == 1;
         real farther = plain ? (real)1 : all, bodies_farther = relax_velocity(i, stretch, settled) ? all : (real)1;
         keep<SIZE>(&farther), keep<SIZE>(&bodies_farther);
         if (FULL && plain && args.measure) reduce_max(part.template update_halves<true>(odd, farther, true), v.residual);
@@ -793,7 +793,9 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     unsigned target = 0;
     if (FAST) iterate_fast<MODE, FULL, SIZE>(part, v, args, &target);
     else iterate_paper<MODE, FULL, SIZE>(part, v, args, &target);
-    if (MODE == BLOCK) let_next_begin(); /* after GRID what has come early costs 10 us */
+    /* Not before the last iteration: what has come slows them down. After cooperative launches it costs 10 us, after clusters it
+     * gains nothing. */
+    if (MODE == BLOCK) let_next_begin();
     part.store(args.count & 1);
     if (!FAST || args.limit == LIMIT_NONE) return;
     const bool suspected = part.suspect(args.count & 1);

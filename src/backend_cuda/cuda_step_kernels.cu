@@ -108,13 +108,12 @@ struct point_before {
     double impulse[3], gap;
 };
 
-static __device__ point_before fetch_point(const struct sadmm_contact_point *point)
+static __device__ point_before fetch_before(const struct sadmm_contact_point *point)
 {
     const point_before before = {{point->impulse[0], point->impulse[1], point->impulse[2]}, point->gap};
     return before;
 }
 
-/* The same of a pair. */
 struct pair_before {
     int32_t first, count, body; /* points; a body of it */
     vec3 normal;
@@ -125,7 +124,7 @@ static __device__ pair_before fetch_pair(const cuda_view &v, int32_t p, int32_t 
 {
     const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
     pair_before before = {pair->first, pair->count, pair->body_b >= 0 ? pair->body_b : pair->body_a, v3_load(pair->normal), {}};
-    if (lane < before.count) before.point = fetch_point(&v.step.points[before.first + lane]);
+    if (lane < before.count) before.point = fetch_before(&v.step.points[before.first + lane]);
     return before;
 }
 
@@ -135,7 +134,7 @@ static __device__ bool finish_pair(const cuda_view &v, int32_t p, int32_t lane, 
     bool finite = true;
     for (int32_t k = lane; k < pair.count; k += v.lanes) {
         struct sadmm_contact_point *point = &v.step.points[pair.first + k];
-        const point_before before = k == lane ? pair.point : fetch_point(point);
+        const point_before before = k == lane ? pair.point : fetch_before(point);
         double *start = v.step.start_impulse + 3 * (size_t)(pair.first + k), impulse[3];
         v3_store(point_impulse(v, p, k, pair.normal), impulse);
         finite = finite && finite_numbers(impulse, 3);
@@ -175,7 +174,8 @@ static __global__ void __launch_bounds__(STEP_THREADS)
     pair_before pair = {};
     if (is_body && i < v.bodies) body = fetch_body(v, i);
     if (is_pair) pair = fetch_pair(v, p, lane);
-    const bool on = as_planned(v) && !v.live->halt; /* nothing after the layout has another reason to halt */
+    /* Layout and penalties are the last that halt a step, the latter where it is not as planned; iterations come between. */
+    const bool on = as_planned(v) && !v.live->halt;
 
     wait_for_stream();
     let_next_begin();
