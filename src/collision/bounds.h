@@ -48,11 +48,15 @@ SADMM_INLINE void shape_world_extent(int type, const double size[3], const doubl
     }
 }
 
+/* The part of a motion that goes down, and up. Not by fmin and fmax, which are calls where instructions see NaN in another way. */
+SADMM_INLINE double downward(double way) { return way < 0 ? way : 0; }
+SADMM_INLINE double upward(double way) { return way > 0 ? way : 0; }
+
 /* Farthest that rotation moves a point within the step, m. reach: of the shape from the body's centre of mass. */
 SADMM_INLINE double rotation_sweep(const double angular[3], double reach, double dt)
 {
     double turn = sqrt(angular[0] * angular[0] + angular[1] * angular[1] + angular[2] * angular[2]) * dt;
-    return fmin(turn, 2.0) * reach;
+    return (turn < 2 ? turn : 2) * reach;
 }
 
 /* Distance up to which a pair makes contacts, m. spin: rotation_sweep; fall: acceleration x dt^2, 0 for static ones. */
@@ -60,7 +64,7 @@ SADMM_INLINE double pair_limit(double margin, double thin_a, double thin_b, cons
                                double spin_a, double spin_b, double fall, double dt)
 {
     double x = vb[0] - va[0], y = vb[1] - va[1], z = vb[2] - va[2];
-    return margin * fmin(thin_a, thin_b) + sqrt(x * x + y * y + z * z) * dt + spin_a + spin_b + fall;
+    return margin * (thin_a < thin_b ? thin_a : thin_b) + sqrt(x * x + y * y + z * z) * dt + spin_a + spin_b + fall;
 }
 
 /* Box around a shape for the step: see the top. */
@@ -72,8 +76,8 @@ SADMM_INLINE void shape_box(const double centre[3], const double extent[3], doub
         double e = extent[k] + 0.5 * margin_thickness + spin + fall, sweep = velocity[k] * dt;
         /* rounding favours contact */
         e += 8 * DBL_EPSILON * (fabs(centre[k]) + e);
-        box->lo[k] = centre[k] - e + fmin(sweep, 0.0);
-        box->hi[k] = centre[k] + e + fmax(sweep, 0.0);
+        box->lo[k] = centre[k] - e + downward(sweep);
+        box->hi[k] = centre[k] + e + upward(sweep);
     }
 }
 
@@ -81,8 +85,8 @@ SADMM_INLINE void shape_box(const double centre[3], const double extent[3], doub
 SADMM_INLINE int intervals_meet(double lo_a, double hi_a, double lo_b, double hi_b, double sweep_a, double sweep_b)
 {
     double relative = sweep_b - sweep_a;
-    return lo_a - fmin(sweep_a, 0.0) <= hi_b - fmax(sweep_b, 0.0) + fmax(relative, 0.0) &&
-           lo_b - fmin(sweep_b, 0.0) + fmin(relative, 0.0) <= hi_a - fmax(sweep_a, 0.0);
+    return lo_a - downward(sweep_a) <= hi_b - upward(sweep_b) + upward(relative) &&
+           lo_b - downward(sweep_b) + downward(relative) <= hi_a - upward(sweep_a);
 }
 
 /* Do two shapes whose boxes overlap come together within the step? Two that move alike sweep over the same places and

@@ -94,10 +94,26 @@ static bool reserve_parts(struct sadmm_collision *collision, size_t count)
     return true;
 }
 
-/* Append the parts to `set`. */
+/* Copy share `share` of `shares` of a part into the set, from its pair `to_pair` and point `to_point` on. */
+static void copy_share(struct sadmm_contact_set *set, const struct sadmm_contact_set *part, size_t to_pair, size_t to_point,
+                       size_t share, size_t shares)
+{
+    size_t pair = part->pair_count * share / shares, pair_end = part->pair_count * (share + 1) / shares,
+           point = part->point_count * share / shares, point_end = part->point_count * (share + 1) / shares;
+    if (point < point_end)
+        memcpy(set->points + to_point + point, part->points + point, (point_end - point) * sizeof *set->points);
+    for (; pair < pair_end; ++pair) {
+        set->pairs[to_pair + pair] = part->pairs[pair];
+        set->pairs[to_pair + pair].first += (int32_t)to_point;
+    }
+}
+
+/* Append the parts to `set`; every thread takes a share of each. */
 static bool append_parts(struct sadmm_contact_set *set, const struct sadmm_contact_set *parts, size_t count)
 {
-    size_t pairs = set->pair_count, points = set->point_count;
+    const size_t first_pair = set->pair_count, first_point = set->point_count;
+    const int threads = (int)count + 1;
+    size_t pairs = first_pair, points = first_point;
     for (size_t t = 0; t < count; ++t) {
         pairs += parts[t].pair_count;
         points += parts[t].point_count;
@@ -105,15 +121,19 @@ static bool append_parts(struct sadmm_contact_set *set, const struct sadmm_conta
     if (!sadmm_grow((void **)&set->pairs, &set->pair_capacity, set->pair_count, pairs, sizeof *set->pairs) ||
         !sadmm_grow((void **)&set->points, &set->point_capacity, set->point_count, points, sizeof *set->points))
         return false;
-    for (size_t t = 0; t < count; ++t) {
-        struct sadmm_contact_pair *pair = set->pairs + set->pair_count;
-        if (parts[t].pair_count == 0) continue;
-        memcpy(pair, parts[t].pairs, parts[t].pair_count * sizeof *pair);
-        memcpy(set->points + set->point_count, parts[t].points, parts[t].point_count * sizeof *set->points);
-        for (size_t i = 0; i < parts[t].pair_count; ++i) pair[i].first += (int32_t)set->point_count;
-        set->pair_count += parts[t].pair_count;
-        set->point_count += parts[t].point_count;
+#ifdef _OPENMP
+#pragma omp parallel for schedule(static, 1) num_threads(threads) if (threads > 1)
+#endif
+    for (int share = 0; share < threads; ++share) {
+        size_t to_pair = first_pair, to_point = first_point;
+        for (size_t t = 0; t < count; ++t) {
+            copy_share(set, &parts[t], to_pair, to_point, (size_t)share, (size_t)threads);
+            to_pair += parts[t].pair_count;
+            to_point += parts[t].point_count;
+        }
     }
+    set->pair_count = pairs;
+    set->point_count = points;
     return true;
 }
 

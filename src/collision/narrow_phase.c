@@ -66,7 +66,7 @@ static void emit(const struct sadmm_candidates *c, const struct sadmm_collision_
     pair->count = m->count;
     rotate(pb->R, m->normal, pair->normal);
     pair->friction = pair_friction(input, a, b, pa->friction, pb->friction);
-    pair->restitution = fmax(pa->restitution, pb->restitution);
+    pair->restitution = pa->restitution > pb->restitution ? pa->restitution : pb->restitution;
     pair->cache = m->cache;
     pair->reserved = revision_of_pair(pa->revision, pb->revision);
     for (int k = 0; k < 3; ++k) between[k] = pb->com[k] - pa->com[k];
@@ -122,7 +122,7 @@ bool sadmm_narrow_phase(const struct sadmm_candidates *c, const struct sadmm_col
             before = &old->pairs[next];
 
         limit = pair_limit(input->margin, pa->thin, pb->thin, pa->velocity, pb->velocity, pa->spin, pb->spin,
-                           fmax(pa->fall, pb->fall), input->dt);
+                           pa->fall > pb->fall ? pa->fall : pb->fall, input->dt);
         pose = pair_pose(pa->type == SADMM_SHAPE_PLANE, pa->R, pa->x, pb->R, pb->x);
         pair_manifold(pa->type, v3_load(pa->size), pb->type, v3_load(pb->size), &pose, (real)limit,
                       before ? before->cache : 0, &m);

@@ -22,6 +22,11 @@ int sadmm_plan_threads(int wanted, size_t points)
 #endif
 }
 
+/* A pass takes some 10 ns an item, waking the threads a few us. */
+enum { PASS_ITEMS = 1000 };
+
+int sadmm_pass_threads(int threads, size_t count) { return count < PASS_ITEMS ? 1 : threads; }
+
 static bool any_nonzero(const double *x, int count)
 {
     for (int k = 0; k < count; ++k)
@@ -45,9 +50,12 @@ static bool any_pair_is_warm(const struct sadmm_contact_set *contacts)
 
 /* Does at least half of the constraints start with an impulse? Contacts count by pairs: the points of a pair that are
  * a little apart (the far edge of a leaning card) carry nothing, and do not make a settled scene a cold one. */
-static bool starts_warm(const struct sadmm_system *system)
+static bool starts_warm(const struct sadmm_system *system, int plan_threads)
 {
+    const int threads = sadmm_pass_threads(plan_threads, system->contacts->pair_count);
+    (void)threads; /* unused without OpenMP, here and in other passes */
     size_t total = system->contacts->pair_count + (size_t)system->block_count, warm = 0;
+#pragma omp parallel for schedule(static) num_threads(threads) if (threads > 1) reduction(+ : warm)
     for (size_t p = 0; p < system->contacts->pair_count; ++p)
         warm += pair_is_warm(system->contacts, &system->contacts->pairs[p]);
     for (size_t k = 0; k < (size_t)system->block_count; ++k) warm += any_nonzero(system->block_lambda + 6 * k, 6);
@@ -109,11 +117,11 @@ struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struc
     }
     for (int32_t k = 0; k < system->block_count; ++k) ++plan.blocks[system->blocks[k].kind];
     plan.rigid = system->rigid != NULL;
+    plan.threads = sadmm_plan_threads(settings->threads, (size_t)plan.points + 4 * (size_t)system->block_count);
     plan.gyroscopic = plan.rigid && sadmm_plan_is_gyroscopic(system->rigid, system->body_count);
-    sadmm_plan_settle(&plan, settings, settings->warm_start && starts_warm(system));
+    sadmm_plan_settle(&plan, settings, settings->warm_start && starts_warm(system, plan.threads));
     plan.predict = settings->method == SADMM_METHOD_FAST && plan.points > 0 && !has_blocks(&plan) && system->first &&
                    !(settings->warm_start && any_pair_is_warm(system->contacts));
     if (plan.predict) plan.warm_start = true; /* predicted loads are the system's start values then */
-    plan.threads = sadmm_plan_threads(settings->threads, (size_t)plan.points + 4 * (size_t)system->block_count);
     return plan;
 }

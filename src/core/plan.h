@@ -33,6 +33,9 @@ struct sadmm_plan {
 /* Threads for `points` contact points: as many as `wanted`, or for 0 as many as have enough to do. */
 int sadmm_plan_threads(int wanted, size_t points);
 
+/* Threads for a pass over `count` bodies, pairs or points outside the kernels: those of the plan if there is enough to do. */
+int sadmm_pass_threads(int threads, size_t count);
+
 /* What follows from the settings once the counts and `contact_rows` are in; `mostly_warm`: at least half of the constraints
  * (contacts counted by pairs) carry an impulse. `threads` is left alone. */
 void sadmm_plan_settle(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm);

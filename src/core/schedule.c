@@ -108,9 +108,12 @@ static bool finite_array(const double *x, size_t count)
     return sum == 0;
 }
 
-static bool finite_impulses(const struct sadmm_contact_set *contacts)
+static bool finite_impulses(const struct sadmm_contact_set *contacts, int plan_threads)
 {
+    const int threads = sadmm_pass_threads(plan_threads, contacts->point_count);
     double sum = 0;
+    (void)threads;
+#pragma omp parallel for schedule(static) num_threads(threads) if (threads > 1) reduction(+ : sum)
     for (size_t k = 0; k < contacts->point_count; ++k) {
         const double *impulse = contacts->points[k].impulse;
         sum += (impulse[0] - impulse[0]) + (impulse[1] - impulse[1]) + (impulse[2] - impulse[2]);
@@ -195,7 +198,7 @@ sadmm_status sadmm_schedule_solve(const struct sadmm_kernels *kernels, struct sa
         ms->solve = end - assembled;
     }
     if (!finite_array(system->velocity, 6 * (size_t)system->body_count) ||
-        !finite_array(system->block_lambda, 6 * (size_t)system->block_count) || !finite_impulses(system->contacts))
+        !finite_array(system->block_lambda, 6 * (size_t)system->block_count) || !finite_impulses(system->contacts, plan->threads))
         return sadmm_fail(error, SADMM_ERROR_NON_FINITE, "the solve gave a velocity or multiplier that is not finite");
     return SADMM_OK;
 }

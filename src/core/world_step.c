@@ -41,6 +41,43 @@ sadmm_status sadmm_world_choose_backend(sadmm_world *world)
     return world->kernels->create(world->def.device, &world->context, &world->error);
 }
 
+static bool moves(const struct sadmm_world_body *body) { return body->alive && body->type != SADMM_BODY_STATIC; }
+
+static int32_t count_moving(const sadmm_world *world, size_t begin, size_t end)
+{
+    int32_t count = 0;
+    for (size_t slot = begin; slot < end; ++slot) count += moves(&world->bodies[slot]);
+    return count;
+}
+
+static size_t begin_of(int share, int shares, size_t count) { return count * (size_t)share / (size_t)shares; }
+
+/* Slots [begin, end), whose dynamic bodies are `dynamic` and the following. */
+static void gather_slots(sadmm_world *world, size_t begin, size_t end, int32_t dynamic)
+{
+    for (size_t slot = begin; slot < end; ++slot) {
+        struct sadmm_world_body *body = &world->bodies[slot];
+        struct sadmm_collision_body *out = &world->collision_bodies[slot];
+        memcpy(out->position, body->rigid.position, sizeof out->position);
+        memcpy(out->orientation, body->rigid.orientation, sizeof out->orientation);
+        memcpy(out->velocity, body->rigid.velocity, sizeof out->velocity);
+        out->environment = body->environment;
+        out->system_body = body->system_body = -1;
+        if (!moves(body)) continue;
+        out->system_body = body->system_body = dynamic;
+        world->start[dynamic] = body->rigid;
+        steady_start(&body->rigid, &body->steady, world->velocity + 6 * (size_t)dynamic);
+        memcpy(world->start_velocity + 6 * (size_t)dynamic, world->velocity + 6 * (size_t)dynamic,
+               6 * sizeof *world->velocity);
+        world->slot_of[dynamic++] = (int32_t)slot;
+    }
+}
+
+static int last_threads(const sadmm_world *world) /* by the contacts of the last step */
+{
+    return sadmm_plan_threads(world->def.settings.threads, world->contacts.point_count);
+}
+
 sadmm_status sadmm_world_gather(sadmm_world *world)
 {
     /* One at least: a system without bodies is still one of rigid bodies. */
@@ -53,23 +90,15 @@ sadmm_status sadmm_world_gather(sadmm_world *world)
         !grow(&world->start_velocity, &world->start_velocity_capacity, 6 * n, sizeof *world->start_velocity) ||
         !grow(&world->slot_of, &world->slot_of_capacity, n, sizeof *world->slot_of))
         return sadmm_fail_memory(&world->error, "the step");
-    int32_t dynamic = 0;
-    for (size_t slot = 0; slot < slots; ++slot) {
-        struct sadmm_world_body *body = &world->bodies[slot];
-        struct sadmm_collision_body *out = &world->collision_bodies[slot];
-        memcpy(out->position, body->rigid.position, sizeof out->position);
-        memcpy(out->orientation, body->rigid.orientation, sizeof out->orientation);
-        memcpy(out->velocity, body->rigid.velocity, sizeof out->velocity);
-        out->environment = body->environment;
-        out->system_body = body->system_body = -1;
-        if (!body->alive || body->type == SADMM_BODY_STATIC) continue;
-        out->system_body = body->system_body = dynamic;
-        world->start[dynamic] = body->rigid;
-        steady_start(&body->rigid, &body->steady, world->velocity + 6 * (size_t)dynamic);
-        memcpy(world->start_velocity + 6 * (size_t)dynamic, world->velocity + 6 * (size_t)dynamic,
-               6 * sizeof *world->velocity);
-        world->slot_of[dynamic++] = (int32_t)slot;
-    }
+    /* A share of the slots a thread: how many dynamic bodies are in it, then the bodies. */
+    enum { MOST_SHARES = 64 };
+    const int threads = sadmm_pass_threads(last_threads(world), slots), shares = threads < MOST_SHARES ? threads : MOST_SHARES;
+    int32_t first[MOST_SHARES + 1] = {0};
+#pragma omp parallel for schedule(static, 1) num_threads(shares) if (shares > 1)
+    for (int s = 0; s < shares; ++s) first[s + 1] = count_moving(world, begin_of(s, shares, slots), begin_of(s + 1, shares, slots));
+    for (int s = 0; s < shares; ++s) first[s + 1] += first[s];
+#pragma omp parallel for schedule(static, 1) num_threads(shares) if (shares > 1)
+    for (int s = 0; s < shares; ++s) gather_slots(world, begin_of(s, shares, slots), begin_of(s + 1, shares, slots), first[s]);
     return SADMM_OK;
 }
 
@@ -82,7 +111,7 @@ struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *worl
         .body_count = world->body_slots,
         .dt = world->def.settings.dt,
         .margin = world->def.contact_margin,
-        .threads = sadmm_plan_threads(world->def.settings.threads, world->contacts.point_count), /* of the last step */
+        .threads = last_threads(world),
         .disabled_body_pairs = world->disabled_pairs.keys,
         .disabled_body_pair_count = world->disabled_pairs.count,
         .friction_pairs = world->friction_pairs.keys,
@@ -102,13 +131,17 @@ static sadmm_status find_contacts(sadmm_world *world)
 static sadmm_status keep_start(sadmm_world *world, double *depth)
 {
     const struct sadmm_contact_point *points = world->contacts.points;
-    size_t count = world->contacts.point_count;
+    const size_t count = world->contacts.point_count;
+    const int threads = sadmm_pass_threads(world->plan.threads, count);
     double deepest = 0;
+    (void)threads;
     if (!grow(&world->start_impulse, &world->start_impulse_capacity, 3 * count, sizeof *world->start_impulse))
         return sadmm_fail_memory(&world->error, "the step's starting impulses");
+#pragma omp parallel for schedule(static) num_threads(threads) if (threads > 1) reduction(max : deepest)
     for (size_t k = 0; k < count; ++k) {
         memcpy(world->start_impulse + 3 * k, points[k].impulse, 3 * sizeof *world->start_impulse);
-        deepest = -points[k].gap > deepest ? -points[k].gap : deepest;
+        const double own = points[k].gap < 0 ? -points[k].gap : 0; /* a gap of 0 is 0 deep, not -0 */
+        deepest = own > deepest ? own : deepest;
     }
     *depth = deepest;
     return SADMM_OK;
@@ -155,6 +188,9 @@ static sadmm_status name_culprit(sadmm_world *world)
 
 static void commit(sadmm_world *world)
 {
+    const int threads = sadmm_pass_threads(world->plan.threads, (size_t)world->dynamic_count);
+    (void)threads;
+#pragma omp parallel for schedule(static) num_threads(threads) if (threads > 1)
     for (int32_t i = 0; i < world->dynamic_count; ++i) {
         struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
         steady_keep(&body->steady, &body->rigid, &world->next[i]);
