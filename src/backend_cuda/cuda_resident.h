@@ -793,8 +793,8 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     unsigned target = 0;
     if (FAST) iterate_fast<MODE, FULL, SIZE>(part, v, args, &target);
     else iterate_paper<MODE, FULL, SIZE>(part, v, args, &target);
-    /* Not before the last iteration: what has come slows them down. After cooperative launches it costs 10 us, after clusters it
-     * gains nothing. */
+    /* After the iterations: what has come takes a place beside them. A cooperative launch ends 10 us later for it, and after
+     * clusters it gains nothing. */
     if (MODE == BLOCK) let_next_begin();
     part.store(args.count & 1);
     if (!FAST || args.limit == LIMIT_NONE) return;

@@ -22,7 +22,7 @@ int sadmm_plan_threads(int wanted, size_t points)
 #endif
 }
 
-/* A pass takes some 10 ns an item, waking the threads a few us. */
+/* Fewer are done before other threads have come. */
 enum { PASS_ITEMS = 1000 };
 
 int sadmm_pass_threads(int threads, size_t count) { return count < PASS_ITEMS ? 1 : threads; }
