@@ -8,7 +8,8 @@
 #endif
 
 #include "bench.h"
-#include "core/schedule.h"
+#include "core/base/clock.h"
+#include "core/solve/schedule.h"
 
 static const struct {
     const char *name;

@@ -8,8 +8,9 @@
 
 #include "bench.h"
 #include "bench_options.h"
-#include "core/certificate.h"
-#include "core/schedule.h"
+#include "core/base/clock.h"
+#include "core/solve/certificate.h"
+#include "core/solve/schedule.h"
 #include "lattice.h"
 
 struct options {

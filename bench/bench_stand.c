@@ -8,8 +8,9 @@
 
 #include "bench.h"
 #include "bench_options.h"
-#include "core/memory.h"
-#include "core/schedule.h"
+#include "core/base/clock.h"
+#include "core/base/memory.h"
+#include "core/solve/schedule.h"
 #include "scenes/scenes.h"
 
 static const char command[] = "stand";

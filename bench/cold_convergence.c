@@ -2,7 +2,8 @@
 
 #include <math.h>
 
-#include "core/schedule.h"
+#include "core/base/clock.h"
+#include "core/solve/schedule.h"
 
 enum { MOST_SAMPLES = 1280, MOST_REPEATS = 15 };
 static const double tolerances[] = {1e-3, 1e-4, 1e-6};

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "bench_options.h"
-#include "core/memory.h"
+#include "core/base/memory.h"
 
 static const char *const kinds[] = {"count", "curve", "warm"};
 

@@ -3,7 +3,7 @@
 #ifndef BENCH_LATTICE_H
 #define BENCH_LATTICE_H
 
-#include "core/system.h"
+#include "core/model/system.h"
 
 struct lattice {
     struct sadmm_system system;

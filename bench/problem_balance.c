@@ -1,7 +1,7 @@
 /* v = A^-1 (b + J^T lambda) of a problem's current lambda (problem_set.h). */
-#include "core/dense6.h"
+#include "core/math/dense6.h"
 #include "core/math/vec3.h"
-#include "core/memory.h"
+#include "core/base/memory.h"
 #include "problem_set.h"
 
 /* b's wrench of an impulse at its contact point; a's is the opposite. */

@@ -2,7 +2,7 @@
 
 #include <stdio.h>
 
-#include "core/memory.h"
+#include "core/base/memory.h"
 
 void problem_builder_start(struct problem_builder *builder)
 {

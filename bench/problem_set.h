@@ -4,7 +4,7 @@
 #ifndef BENCH_PROBLEM_SET_H
 #define BENCH_PROBLEM_SET_H
 
-#include "core/error.h"
+#include "core/base/error.h"
 #include "subadmm/problem.h"
 
 struct set_problem {

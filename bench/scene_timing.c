@@ -5,7 +5,8 @@
 #include <string.h>
 
 #include "bench.h"
-#include "core/schedule.h"
+#include "core/base/clock.h"
+#include "core/solve/schedule.h"
 
 enum { TOTAL, COLLIDE, ASSEMBLE, SOLVE, FINISH, SOLVER, COLUMNS };
 

@@ -4,9 +4,10 @@
 #include <stdlib.h>
 
 #include "bench.h"
+#include "core/base/clock.h"
 #include "core/math/quat.h"
-#include "core/memory.h"
-#include "core/schedule.h"
+#include "core/base/memory.h"
+#include "core/solve/schedule.h"
 #include "problem_set.h"
 #include "scenes/scenes.h"
 

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/system_math.h"
+#include "core/model/system_math.h"
 
 static uint64_t random_state = 1;
 

@@ -2,8 +2,8 @@
 #ifndef CONTACT_PROBLEMS_H
 #define CONTACT_PROBLEMS_H
 
-#include "core/plan.h"
-#include "core/system.h"
+#include "core/solve/plan.h"
+#include "core/model/system.h"
 
 /* Owns what its `system` points to. Bodies are rigid and contacts have gaps until contact_problem_raw() is called. */
 struct contact_problem {

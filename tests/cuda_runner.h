@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/schedule.h"
+#include "core/solve/schedule.h"
 #include "cuda_suite.h"
 #include "runner.h"
 

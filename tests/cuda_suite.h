@@ -8,8 +8,8 @@
 
 #include <check.h>
 
-#include "core/backends.h"
-#include "core/kernels.h"
+#include "core/solve/backends.h"
+#include "core/solve/kernels.h"
 #ifdef CUDA_EMULATED
 #include "emulation_control.h"
 #endif

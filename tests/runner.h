@@ -6,8 +6,8 @@
 #include <math.h>
 
 #include "contact_problems.h"
-#include "core/backends.h"
-#include "core/kernels.h"
+#include "core/solve/backends.h"
+#include "core/solve/kernels.h"
 
 struct runner {
     const struct sadmm_kernels *k;

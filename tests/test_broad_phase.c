@@ -9,7 +9,7 @@
 #include "collision/pipeline.h"
 #include "collision/radix_sort.h"
 #include "config.h"
-#include "core/memory.h"
+#include "core/base/memory.h"
 #include "manifold_tools.h"
 
 static const struct sadmm_broad_phase_kind *const kinds[] = {

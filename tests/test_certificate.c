@@ -5,9 +5,9 @@
 #include <string.h>
 
 #include "contact_problems.h"
-#include "core/certificate.h"
-#include "core/memory.h"
-#include "core/system_math.h"
+#include "core/solve/certificate.h"
+#include "core/base/memory.h"
+#include "core/model/system_math.h"
 #include "subadmm/problem.h"
 #include "run_suite.h"
 

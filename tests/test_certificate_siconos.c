@@ -10,8 +10,8 @@
 #include <gfc3d_compute_error.h>
 
 #include "contact_problems.h"
-#include "core/certificate.h"
-#include "core/system_math.h"
+#include "core/solve/certificate.h"
+#include "core/model/system_math.h"
 #include "run_suite.h"
 
 /* Dense matrices are stored by columns; NM_zentry's arguments changed between versions. */

@@ -6,7 +6,7 @@
 
 #include "collision/pipeline.h"
 #include "config.h"
-#include "core/memory.h"
+#include "core/base/memory.h"
 #include "manifold_tools.h"
 
 enum { MAX_SHAPES = 4000 };

@@ -8,8 +8,8 @@
 #include "scene_tools.h"
 
 #include "backend_cuda/collision_device.h"
-#include "core/memory.h"
-#include "core/world_internal.h"
+#include "core/base/memory.h"
+#include "core/world/world_internal.h"
 
 #ifdef SADMM_CUDA_EMULATED
 #include "emulation_control.h"

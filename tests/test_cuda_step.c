@@ -11,8 +11,8 @@
 #include <string.h>
 
 #include "cuda_suite.h"
-#include "core/memory.h"
-#include "core/world_internal.h"
+#include "core/base/memory.h"
+#include "core/world/world_internal.h"
 #include "scene_tools.h"
 
 #ifdef CUDA_EMULATED

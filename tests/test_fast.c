@@ -2,12 +2,12 @@
  * what docs/algorithm.md says; its solutions are certified, in few iterations; and it is safe with too few.
  */
 #include "backend_ref/literal.h"
-#include "core/certificate.h"
-#include "core/islands.h"
+#include "core/solve/certificate.h"
+#include "core/model/islands.h"
 #include "core/math/limit.h"
 #include "core/math/weight.h"
-#include "core/schedule.h"
-#include "core/system_math.h"
+#include "core/solve/schedule.h"
+#include "core/model/system_math.h"
 #include "scene_tools.h"
 #include "table_runner.h"
 

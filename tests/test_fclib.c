@@ -14,7 +14,7 @@
 #include <unistd.h>
 
 #include "core/math/vec3.h"
-#include "core/memory.h"
+#include "core/base/memory.h"
 #include "fclib/fclib.h"
 #include "public_problems.h"
 #include "scenes/scenes.h"

@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/memory.h"
-#include "core/settings.h"
+#include "core/base/memory.h"
+#include "core/model/settings.h"
 #include "subadmm/problem.h"
 #include "run_suite.h"
 

@@ -1,9 +1,9 @@
-/* Predicted loads (core/loads.h): a solution where bodies rest on what is nearer to the ground, and nothing anywhere else. */
+/* Predicted loads (core/solve/loads.h): a solution where bodies rest on what is nearer to the ground, and nothing anywhere else. */
 #include "contact_problems.h"
-#include "core/certificate.h"
-#include "core/loads.h"
-#include "core/plan.h"
-#include "core/system_math.h"
+#include "core/solve/certificate.h"
+#include "core/solve/loads.h"
+#include "core/solve/plan.h"
+#include "core/model/system_math.h"
 #include "run_suite.h"
 
 #include <check.h>

@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "contact_problems.h"
-#include "core/kernels.h"
-#include "core/problem_internal.h"
+#include "core/solve/kernels.h"
+#include "core/solve/problem_internal.h"
 #include "subadmm/problem.h"
 #include "run_suite.h"
 

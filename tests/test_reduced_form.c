@@ -12,8 +12,8 @@
 #include <string.h>
 
 #include "backend_ref/literal.h"
-#include "core/memory.h"
-#include "core/system_math.h"
+#include "core/base/memory.h"
+#include "core/model/system_math.h"
 #include "run_suite.h"
 #include "table_runner.h"
 

@@ -4,7 +4,7 @@
  */
 #include <stddef.h>
 
-#include "core/memory.h"
+#include "core/base/memory.h"
 #include "scene_tools.h"
 
 /* A box on the ground with a pitched one falling onto it: contacts, warm start, an id to spare. */

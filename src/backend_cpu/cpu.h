@@ -30,9 +30,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "../core/kernels.h"
-#include "../core/math/limit.h"
-#include "../core/math/packed6.h"
+#include "core/solve/kernels.h"
+#include "core/math/limit.h"
+#include "core/math/packed6.h"
 #include "cpu_barrier.h"
 #include "cpu_lanes.h"
 

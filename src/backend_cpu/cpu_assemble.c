@@ -1,9 +1,9 @@
 /* Kernels A-D: bodies, contacts, hard and soft blocks from the system's doubles into this precision's layout. */
 #include <string.h>
 
-#include "../core/dense6.h"
-#include "../core/math/contact.h"
-#include "../core/system_terms.h"
+#include "core/math/dense6.h"
+#include "core/math/contact.h"
+#include "core/model/system_terms.h"
 #include "cpu.h"
 
 static void set_lane(vec *v, int l, const double value[3])

@@ -1,5 +1,5 @@
 /* The best variant of the CPU backend this machine can run. */
-#include "../core/backends.h"
+#include "core/solve/backends.h"
 #include "config.h"
 
 #define DECLARE(isa)                                               \

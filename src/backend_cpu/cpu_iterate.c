@@ -1,7 +1,7 @@
 /* The iteration, stepwise and fused: sweeps over bodies and constraints, a barrier after each. */
 #include <string.h>
 
-#include "../core/math/relax.h"
+#include "core/math/relax.h"
 #include "cpu.h"
 #include "cpu_flush.h"
 

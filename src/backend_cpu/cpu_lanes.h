@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "../core/math/real.h"
+#include "core/math/real.h"
 
 enum { LANES = SADMM_VECTOR_BYTES / (int)sizeof(real) };
 /* may_alias: memory is seen as numbers, rows and lanes in turn. */

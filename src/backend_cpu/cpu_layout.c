@@ -1,7 +1,7 @@
 /* begin: room for the step, pairs into lane blocks, and the body -> record list. */
 #include <string.h>
 
-#include "../core/memory.h"
+#include "core/base/memory.h"
 #include "cpu.h"
 
 /* Pairs are sorted by point count inside windows of this many blocks: a block is as deep as its deepest pair, so equal

@@ -1,7 +1,7 @@
 /* The method `fast`: levels of the islands (math/weight.h), from what contacts and momentum miss. In double; sums over an
  * island go in the order of pairs and of bodies. */
-#include "../core/math/violation.h"
-#include "../core/math/weight.h"
+#include "core/math/violation.h"
+#include "core/math/weight.h"
 #include "cpu_rows.h"
 
 static double pair_violation(const struct sadmm_context *c, size_t record)

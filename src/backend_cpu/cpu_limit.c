@@ -1,6 +1,6 @@
 /* The method `fast`, after the last iteration: no island keeps more energy than it may have (math/limit.h). */
-#include "../core/dense6.h"
-#include "../core/math/relax.h"
+#include "core/math/dense6.h"
+#include "core/math/relax.h"
 #include "cpu_rows.h"
 
 /* x . M x of a rigid body's A or A^-1. */

@@ -4,7 +4,7 @@
  * fixed point of Step 1 does not depend on it). Each body gathers over its own constraints. */
 #include <string.h>
 
-#include "../core/dense6.h"
+#include "core/math/dense6.h"
 #include "cpu_rows.h"
 
 static void add_pair(const struct sadmm_context *c, size_t record, int side, struct arm_sums *sums, double C[PACKED6])

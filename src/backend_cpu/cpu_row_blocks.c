@@ -1,7 +1,7 @@
 /* Steps 2-4 of constraints given by Jacobian rows: general contacts, hard and soft blocks. */
 #include <string.h>
 
-#include "../core/math/contact.h"
+#include "core/math/contact.h"
 #include "cpu.h"
 
 /* Row r of J_a v_a + J_b v_b. */

@@ -1,7 +1,7 @@
 /* What the step gives back: v and lambda (double), the moved bodies (Q), the contact wrenches (R, eq. 12). */
 #include <string.h>
 
-#include "../core/system_terms.h"
+#include "core/model/system_terms.h"
 #include "cpu.h"
 
 static void read_pair(struct sadmm_context *c, const struct pair_block *block, int l)

@@ -1,7 +1,5 @@
-#include "../collision/collision.h"
-#include "../core/memory.h"
+#include "core/base/memory.h"
 #include "cpu.h"
-
 
 sadmm_status CPU(create)(int device, struct sadmm_context **out, struct sadmm_error *error)
 {
@@ -20,21 +18,12 @@ void CPU(destroy)(struct sadmm_context *c)
     sadmm_free(c);
 }
 
-static sadmm_status find_contacts(struct sadmm_context *context, struct sadmm_collision *collision,
-                                  const struct sadmm_collision_input *input, struct sadmm_contact_set *contacts,
-                                  struct sadmm_error *error)
-{
-    (void)context;
-    return sadmm_collision_find(collision, input, contacts, error);
-}
-
 const struct sadmm_kernels CPU(kernels) = {
     .backend = SADMM_BACKEND_CPU,
     .precision = sizeof(real) == 4 ? SADMM_F32 : SADMM_F64,
     .variant = SADMM_ISA,
     .create = CPU(create),
     .destroy = CPU(destroy),
-    .find_contacts = find_contacts,
     .begin = CPU(begin),
     .assemble_bodies = CPU(assemble_bodies),
     .assemble_contacts = CPU(assemble_contacts),

@@ -3,9 +3,9 @@
  *
  * In double from the system's raw data; only the impulses are in this precision. Sums over a body go in the order of its
  * records, sums over an island in the order of bodies. */
-#include "../core/dense6.h"
-#include "../core/islands.h"
-#include "../core/math/weight.h"
+#include "core/math/dense6.h"
+#include "core/model/islands.h"
+#include "core/math/weight.h"
 #include "cpu_rows.h"
 
 /* A^-1, packed. A rigid body's is inverted by blocks. */

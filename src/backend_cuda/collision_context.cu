@@ -10,7 +10,7 @@
 
 #include <algorithm>
 
-#include "../core/memory.h"
+#include "core/base/memory.h"
 #include "collision_internal.h"
 #include "collision_parallel.h"
 
@@ -106,11 +106,6 @@ struct sadmm_cuda_collision {
     size_t present_capacity, plane_capacity, radius_capacity;
 };
 
-#define TRY(call)                                      \
-    do {                                               \
-        sadmm_status try_status = (call);              \
-        if (try_status != SADMM_OK) return try_status; \
-    } while (0)
 #define CUDA_CALL(c, call, what)                                                 \
     do {                                                                         \
         cudaError_t try_code = (call);                                           \

@@ -8,7 +8,7 @@
 #ifndef SADMM_CUDA_COLLISION_DEVICE_H
 #define SADMM_CUDA_COLLISION_DEVICE_H
 
-#include "../collision/collision.h"
+#include "collision/collision.h"
 
 struct sadmm_cuda_collision;
 

@@ -5,9 +5,9 @@
 #ifndef SADMM_CUDA_COLLISION_FORMULAS_H
 #define SADMM_CUDA_COLLISION_FORMULAS_H
 
-#include "../collision/contact_carry.h"
-#include "../collision/manifold.h"
-#include "../collision/proxy.h"
+#include "collision/contact_carry.h"
+#include "collision/manifold.h"
+#include "collision/proxy.h"
 
 SADMM_INLINE uint64_t ordered_key(uint32_t a, uint32_t b) { return (uint64_t)a << 32 | b; }
 SADMM_INLINE uint64_t unordered_key(uint32_t a, uint32_t b) { return a < b ? ordered_key(a, b) : ordered_key(b, a); }

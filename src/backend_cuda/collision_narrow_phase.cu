@@ -4,7 +4,7 @@
 /* C headers: an enumerator beside an unsigned number is fine there. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wextra"
-#include "../collision/pair_manifold.h"
+#include "collision/pair_manifold.h"
 #pragma GCC diagnostic pop
 
 /* find_key with seven loads at a time: rounds to memory are what a search takes. */

@@ -5,7 +5,7 @@
 #include "cuda_lanes.h"
 #include "cuda_line.h"
 
-#include "../core/math/packed6.h"
+#include "core/math/packed6.h"
 
 /* Blocks of few threads: the work of a lane is long, and there are many multiprocessors. */
 enum { BODY_THREADS = 64 };

@@ -4,7 +4,7 @@
 
 #include "cuda_body.h"
 
-#include "../core/math/violation.h"
+#include "core/math/violation.h"
 
 struct pair_data {
     double normal[3], difference[3], friction;

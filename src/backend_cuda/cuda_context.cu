@@ -2,8 +2,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "../collision/collision.h"
-#include "../core/memory.h"
+#include "core/base/memory.h"
 #include "cuda_internal.h"
 
 /* ---- errors --------------------------------------------------------------------------------------------------- */
@@ -320,12 +319,6 @@ extern "C" void CUDA(destroy)(struct sadmm_context *c)
     sadmm_free(c);
 }
 
-extern "C" sadmm_status CUDA(find_contacts)(struct sadmm_context *, struct sadmm_collision *collision,
-                                            const struct sadmm_collision_input *input,
-                                            struct sadmm_contact_set *contacts, struct sadmm_error *error)
-{
-    return sadmm_collision_find(collision, input, contacts, error);
-}
 
 extern "C" void CUDA(tune_rooms)(struct sadmm_context *c, int64_t first_room) { c->first_room = first_room; }
 

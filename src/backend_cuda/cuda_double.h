@@ -7,8 +7,8 @@
 #include "cuda_internal.h"
 
 #undef SADMM_REAL /* math/real.h: double */
-#include "../core/dense6.h"
-#include "../core/system_math.h"
+#include "core/math/dense6.h"
+#include "core/model/system_math.h"
 
 static __device__ __forceinline__ int32_t thread_index(void)
 {

@@ -22,8 +22,6 @@ sadmm_status CUDA(lay_out_again)(struct sadmm_context *, const struct cuda_parti
 
 sadmm_status CUDA(create)(int device, struct sadmm_context **out, struct sadmm_error *error);
 void CUDA(destroy)(struct sadmm_context *);
-sadmm_status CUDA(find_contacts)(struct sadmm_context *, struct sadmm_collision *, const struct sadmm_collision_input *,
-                                 struct sadmm_contact_set *, struct sadmm_error *);
 sadmm_status CUDA(begin)(struct sadmm_context *, const struct sadmm_system *, const struct sadmm_plan *,
                          const struct sadmm_settings *, struct sadmm_error *);
 sadmm_status CUDA(assemble_bodies)(struct sadmm_context *, struct sadmm_error *);
@@ -44,7 +42,7 @@ sadmm_status CUDA(read_penalty)(struct sadmm_context *, double *beta, struct sad
 sadmm_status CUDA(integrate)(struct sadmm_context *, struct sadmm_rigid *next, struct sadmm_error *);
 sadmm_status CUDA(recover_wrenches)(struct sadmm_context *, double *wrench, struct sadmm_error *);
 
-/* core/resident.h */
+/* core/solve/resident.h */
 sadmm_status CUDA(load_world)(struct sadmm_context *, const struct sadmm_resident_world *, const struct sadmm_settings *,
                               struct sadmm_error *);
 sadmm_status CUDA(edit_world)(struct sadmm_context *, const struct sadmm_resident_edit *, size_t, struct sadmm_error *);

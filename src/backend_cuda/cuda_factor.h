@@ -6,7 +6,7 @@
 #include "cuda_constraint.h"
 #include "cuda_half_sums.h"
 
-#include "../core/math/weight.h"
+#include "core/math/weight.h"
 
 /* ---- weights of the method `fast` -------------------------------------------------------------------------------- */
 

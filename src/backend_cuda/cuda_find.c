@@ -1,5 +1,5 @@
 /* The CUDA backend's two tables, and whether this machine can run them. */
-#include "../core/backends.h"
+#include "core/solve/backends.h"
 #include "cuda_tables.h"
 #include "cuda_tier.h"
 

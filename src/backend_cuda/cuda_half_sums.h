@@ -7,7 +7,7 @@
 
 #include "cuda_body.h"
 
-#include "../core/math/violation.h"
+#include "core/math/violation.h"
 
 /* Numbers of half_wrench: force and torque, then the force's size; ROW in all. */
 enum { HALF_PUSH = 6 };

@@ -46,7 +46,7 @@
 
 #include <cuda_runtime.h>
 
-#include "../core/kernels.h"
+#include "core/solve/kernels.h"
 #include "cuda_line.h"
 #include "cuda_step.h"
 #include "layout_internal.h"

@@ -4,7 +4,7 @@
 #include "cuda_look.h"
 #include "cuda_sweep.h"
 
-#include "../core/math/limit.h"
+#include "core/math/limit.h"
 
 /* Iterations in the graph: enough to hide the launch of one graph behind the run of the one before. */
 enum { GRAPH_ITERATIONS = 16 };

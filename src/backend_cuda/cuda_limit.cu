@@ -11,7 +11,7 @@
 #include "cuda_energies.h"
 #include "cuda_islands.h"
 
-#include "../core/math/relax.h"
+#include "core/math/relax.h"
 
 template <bool RIGID> static __device__ __forceinline__ bool suspect(const cuda_view &v, const body_thread &t, bool few)
 {

@@ -1,4 +1,4 @@
-/* The method `fast`: the stop rule of whole steps. A look finds each island's part of the certificate (core/certificate.c),
+/* The method `fast`: the stop rule of whole steps. A look finds each island's part of the certificate (core/solve/certificate.c),
  * the natural map of its contacts and its momentum error. An island that meets the tolerances has stopped, in every tier
  * after as many iterations as if it were alone: nothing is written to it any more. Tier BLOCK leaves a block out whose islands
  * have all stopped; the other tiers have nothing left to do once the last island has. The scale of the momentum error is the

@@ -1,5 +1,5 @@
 /* Builds without CUDA: the backend is listed, with the reason why it cannot run. */
-#include "../core/backends.h"
+#include "core/solve/backends.h"
 #include "config.h"
 
 const struct sadmm_kernels *sadmm_cuda_find(sadmm_precision precision, const char **reason)

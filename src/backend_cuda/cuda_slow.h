@@ -4,7 +4,7 @@
 
 #include "cuda_lanes.h"
 
-#include "../core/math/limit.h"
+#include "core/math/limit.h"
 
 /* Has a body more energy than its free motion, `free`, or, for `few` iterations, does it bounce? `velocity`, `b` and `a`: the
  * lane's components and row of A (three numbers of it for rigid bodies). `speaks`: one lane of each body, the others say no.

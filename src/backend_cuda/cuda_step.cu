@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
-#include "../collision/collision.h"
-#include "../core/memory.h"
-#include "../core/schedule.h"
+#include "collision/collision.h"
+#include "core/base/memory.h"
+#include "core/solve/schedule.h"
 #include "collision_device.h"
 #include "cuda_internal.h"
 

@@ -1,4 +1,4 @@
-/* Whole steps on the device (core/resident.h): what the world is there, and how the host follows.
+/* Whole steps on the device (core/solve/resident.h): what the world is there, and how the host follows.
  *
  *     edit       states and wrenches set since the last step                 (when there are any)
  *     start      where a solve starts from; bodies as collision sees them
@@ -27,7 +27,7 @@
 #ifndef SADMM_CUDA_STEP_H
 #define SADMM_CUDA_STEP_H
 
-#include "../core/resident.h"
+#include "core/solve/resident.h"
 #include "collision_device.h"
 #include "cuda_layout.h"
 

@@ -3,7 +3,7 @@
 
 #include "cuda_double.h"
 
-#include "../core/steady.h"
+#include "core/model/steady.h"
 #include "cuda_slow.h"
 #include "cuda_solution.h"
 #include "cuda_step_check.h"

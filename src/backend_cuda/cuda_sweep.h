@@ -5,8 +5,8 @@
 
 #include <string.h>
 
-#include "../core/math/contact.h"
-#include "../core/math/relax.h"
+#include "core/math/contact.h"
+#include "core/math/relax.h"
 #include "cuda_internal.h"
 
 #define CUDA_INLINE static __device__ __forceinline__

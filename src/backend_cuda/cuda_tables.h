@@ -9,7 +9,6 @@
         .variant = "cuda",                                     \
         .create = sadmm_cuda_create##suffix,                   \
         .destroy = sadmm_cuda_destroy##suffix,                 \
-        .find_contacts = sadmm_cuda_find_contacts##suffix,     \
         .begin = sadmm_cuda_begin##suffix,                     \
         .assemble_bodies = sadmm_cuda_assemble_bodies##suffix, \
         .assemble_contacts = sadmm_cuda_assemble_contacts##suffix, \

@@ -2,7 +2,7 @@
 #ifndef SADMM_CUDA_TIER_H
 #define SADMM_CUDA_TIER_H
 
-#include "../core/kernels.h"
+#include "core/solve/kernels.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -6,7 +6,7 @@
 #include "cuda_constraint.h"
 #include "cuda_half_sums.h"
 
-#include "../core/math/weight.h"
+#include "core/math/weight.h"
 
 /* What the contacts of a pair miss. */
 static inline __device__ double violation_of(const cuda_view &v, int32_t p)

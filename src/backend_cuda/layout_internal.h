@@ -19,7 +19,7 @@
 
 #include <cuda_runtime.h>
 
-#include "../core/system.h"
+#include "core/model/system.h"
 #include "cuda_layout.h"
 
 enum { LAYOUT_THREADS = 256, ONE_BLOCK_THREADS = 1024 };

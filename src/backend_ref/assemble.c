@@ -1,8 +1,8 @@
 /* Boxes A-D of the paper's Fig. 4: A_i, b_i, dense Jacobian rows, errors, and the start of the iteration. */
 #include <string.h>
 
-#include "../core/dense6.h"
-#include "../core/system_math.h"
+#include "core/math/dense6.h"
+#include "core/model/system_math.h"
 #include "literal.h"
 
 sadmm_status sadmm_ref_assemble_bodies(struct sadmm_context *c, struct sadmm_error *error)

@@ -1,10 +1,9 @@
 /* The kernel table of the literal backend, its context, and what surrounds the iteration. */
 #include <string.h>
 
-#include "../collision/collision.h"
-#include "../core/backends.h"
-#include "../core/memory.h"
-#include "../core/system_math.h"
+#include "core/solve/backends.h"
+#include "core/base/memory.h"
+#include "core/model/system_math.h"
 #include "literal.h"
 
 static sadmm_status create(int device, struct sadmm_context **out, struct sadmm_error *error)
@@ -20,14 +19,6 @@ static void destroy(struct sadmm_context *c)
     sadmm_free(c->bodies);
     sadmm_free(c->constraints);
     sadmm_free(c);
-}
-
-static sadmm_status find_contacts(struct sadmm_context *c, struct sadmm_collision *collision,
-                                  const struct sadmm_collision_input *input, struct sadmm_contact_set *contacts,
-                                  struct sadmm_error *error)
-{
-    (void)c;
-    return sadmm_collision_find(collision, input, contacts, error);
 }
 
 static sadmm_status begin(struct sadmm_context *c, const struct sadmm_system *system, const struct sadmm_plan *plan,
@@ -137,7 +128,6 @@ static const struct sadmm_kernels kernels_ref = {
     .variant = "literal",
     .create = create,
     .destroy = destroy,
-    .find_contacts = find_contacts,
     .begin = begin,
     .assemble_bodies = sadmm_ref_assemble_bodies,
     .assemble_contacts = sadmm_ref_assemble_contacts,

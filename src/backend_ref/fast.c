@@ -5,10 +5,10 @@
  * u = -lambda is kept in the sides, where recover_wrenches looks for it. */
 #include <string.h>
 
-#include "../core/dense6.h"
-#include "../core/math/contact.h"
-#include "../core/math/relax.h"
-#include "../core/math/weight.h"
+#include "core/math/dense6.h"
+#include "core/math/contact.h"
+#include "core/math/relax.h"
+#include "core/math/weight.h"
 #include "literal.h"
 
 /* label of a body: the smallest one it is joined with. */

@@ -1,8 +1,8 @@
 /* Boxes E-P of the paper's Fig. 4: penalty weights, Steps 1-4, residuals. Numbers in brackets are its equations. */
 #include <string.h>
 
-#include "../core/dense6.h"
-#include "../core/math/contact.h"
+#include "core/math/dense6.h"
+#include "core/math/contact.h"
 #include "literal.h"
 
 /* (14): C_i = sum_k J_{i,k}^T J_{i,k}, and (13): beta_i = M Tr(A_i) / Tr(C_i) + c, c in kg. A body without (non-zero)

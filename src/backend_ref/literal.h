@@ -12,8 +12,8 @@
 #ifndef SADMM_BACKEND_REF_LITERAL_H
 #define SADMM_BACKEND_REF_LITERAL_H
 
-#include "../core/kernels.h"
-#include "../core/math/limit.h"
+#include "core/solve/kernels.h"
+#include "core/math/limit.h"
 
 /* One side of a constraint: the paper's subscript (i,k) or (j,k). */
 struct ref_side {

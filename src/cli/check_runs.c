@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/memory.h"
+#include "core/base/memory.h"
 
 enum { STATE = 13 }; /* numbers of a body's state: check_reference.states */
 

@@ -7,7 +7,7 @@
 #include <unistd.h>
 
 #include "cli.h"
-#include "core/memory.h"
+#include "core/base/memory.h"
 #include "fclib/fclib.h"
 #include "run_record.h"
 #include "run_trace.h"

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/memory.h"
+#include "core/base/memory.h"
 
 bool run_record_start(struct run_record *record, const sadmm_world *world)
 {

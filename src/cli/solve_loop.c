@@ -3,7 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/memory.h"
+#include "core/base/error.h"
+#include "core/base/memory.h"
 
 /* The lanes: levels as multiples of the first one. Lane 0 has penalty updates. */
 static const double factors[] = {1, 1, 10, 0.1, 100, 0.01, 1e3, 1e-3};
@@ -29,12 +30,6 @@ struct loop {
     bool exhausted;         /* the solver itself has no more iterations to make */
     struct sadmm_error *error;
 };
-
-#define TRY(call)                                      \
-    do {                                               \
-        sadmm_status try_status = (call);              \
-        if (try_status != SADMM_OK) return try_status; \
-    } while (0)
 
 /* ---- solutions --------------------------------------------------------------------------------------------------- */
 

@@ -9,7 +9,7 @@
 #ifndef SADMM_COLLISION_BOUNDS_H
 #define SADMM_COLLISION_BOUNDS_H
 
-#include "../core/math/real.h"
+#include "core/math/real.h"
 #include "subadmm/world.h"
 
 struct sadmm_box3 { double lo[3], hi[3]; };

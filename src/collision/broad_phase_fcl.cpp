@@ -22,7 +22,7 @@
 #include <fcl/geometry/shape/sphere.h>
 #include <fcl/narrowphase/collision_object.h>
 
-#include "../core/memory.h"
+#include "core/base/memory.h"
 
 namespace {
 

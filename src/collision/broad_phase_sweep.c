@@ -7,7 +7,7 @@
  */
 #include "broad_phase.h"
 
-#include "../core/memory.h"
+#include "core/base/memory.h"
 
 struct interval {
     double lo, hi;

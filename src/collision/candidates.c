@@ -6,7 +6,7 @@
 #include <omp.h>
 #endif
 
-#include "../core/memory.h"
+#include "core/base/memory.h"
 #include "radix_sort.h"
 
 enum { SLOT_PRESENT = 1, SLOT_LEFT = 2 /* its box left the larger one, or the entry changed */ };

@@ -12,7 +12,7 @@
 #include <omp.h>
 #endif
 
-#include "../core/memory.h"
+#include "core/base/memory.h"
 #include "config.h"
 #include "pipeline.h"
 #include "narrow_phase.h"
@@ -50,14 +50,6 @@ sadmm_status sadmm_collision_create_with(const struct sadmm_broad_phase_kind *ki
 sadmm_status sadmm_collision_create(struct sadmm_collision **out, struct sadmm_error *error)
 {
     return sadmm_collision_create_with(sadmm_broad_phase_default(), out, error);
-}
-
-void sadmm_contact_set_free(struct sadmm_contact_set *contacts)
-{
-    if (!contacts) return;
-    sadmm_free(contacts->pairs);
-    sadmm_free(contacts->points);
-    memset(contacts, 0, sizeof *contacts);
 }
 
 void sadmm_collision_destroy(struct sadmm_collision *collision)

@@ -8,8 +8,8 @@
 #define SADMM_COLLISION_COLLISION_H
 
 #include "subadmm/world.h"
-#include "../core/error.h"
-#include "../core/system.h"
+#include "core/base/error.h"
+#include "core/base/contact_set.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -64,8 +64,6 @@ void sadmm_collision_undo(struct sadmm_collision *collision, struct sadmm_contac
 
 /* "fcl" or "sweep". */
 const char *sadmm_collision_broad_phase_name(void);
-
-void sadmm_contact_set_free(struct sadmm_contact_set *contacts);
 
 #ifdef __cplusplus
 }

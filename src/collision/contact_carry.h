@@ -7,7 +7,7 @@
 #ifndef SADMM_COLLISION_CONTACT_CARRY_H
 #define SADMM_COLLISION_CONTACT_CARRY_H
 
-#include "../core/math/real.h"
+#include "core/math/real.h"
 
 /* One word from two revisions: a change of either always shows, of both together as well while the revisions are
  * less than some ten thousand apart (the multipliers have no shorter relation). */

@@ -19,7 +19,7 @@
 #ifndef SADMM_COLLISION_MANIFOLD_H
 #define SADMM_COLLISION_MANIFOLD_H
 
-#include "../core/math/vec3.h"
+#include "core/math/vec3.h"
 
 enum { SADMM_MANIFOLD_POINTS = 8 };
 

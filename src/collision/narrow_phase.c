@@ -1,6 +1,6 @@
 #include "narrow_phase.h"
 
-#include "../core/memory.h"
+#include "core/base/memory.h"
 #include "contact_carry.h"
 #include "pair_manifold.h"
 

@@ -2,7 +2,7 @@
 #ifndef SADMM_COLLISION_PROXY_H
 #define SADMM_COLLISION_PROXY_H
 
-#include "../core/math/quat.h"
+#include "core/math/quat.h"
 #include "bounds.h"
 #include "collision.h"
 

@@ -7,15 +7,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "core/memory.h"
+#include "core/base/error.h"
+#include "core/base/memory.h"
 #include "global_problem.h"
 #include "h5.h"
-
-#define TRY(call)                                 \
-    do {                                          \
-        sadmm_status try_status = (call);         \
-        if (try_status != SADMM_OK) return try_status; \
-    } while (0)
 
 enum { NAME_SIZE = 64, LARGEST = INT32_MAX - 1 };
 

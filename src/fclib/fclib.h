@@ -18,7 +18,7 @@
 
 #include <stdbool.h>
 
-#include "core/error.h"
+#include "core/base/error.h"
 #include "subadmm/problem.h"
 
 #ifdef __cplusplus

@@ -2,8 +2,8 @@
 
 #include <string.h>
 
-#include "core/memory.h"
-#include "core/system_math.h"
+#include "core/base/memory.h"
+#include "core/model/system_math.h"
 
 /* ---- sparse matrices --------------------------------------------------------------------------------------------- */
 

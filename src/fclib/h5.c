@@ -4,7 +4,7 @@
 #include <pthread.h>
 #include <string.h>
 
-#include "core/memory.h"
+#include "core/base/memory.h"
 
 /* libhdf5 is usually built without thread safety, and its error printing is a setting of the whole process. */
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;

@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "core/error.h"
+#include "core/base/error.h"
 
 /* Between begin and end this thread holds the module's lock and HDF5 prints nothing. */
 struct sadmm_h5_session {

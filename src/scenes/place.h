@@ -2,7 +2,7 @@
 #ifndef SADMM_SCENES_PLACE_H
 #define SADMM_SCENES_PLACE_H
 
-#include "core/error.h"
+#include "core/base/error.h"
 #include "subadmm/world.h"
 
 /* A frame in the world that a part of a scene is laid out in (a slope, a turned house). */

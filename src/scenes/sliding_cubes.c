@@ -12,7 +12,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/memory.h"
+#include "core/base/memory.h"
 #include "family.h"
 #include "place.h"
 

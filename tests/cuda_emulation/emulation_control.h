@@ -2,7 +2,7 @@
 #ifndef SADMM_EMULATION_CONTROL_H
 #define SADMM_EMULATION_CONTROL_H
 
-#include "core/kernels.h"
+#include "core/solve/kernels.h"
 #include "backend_cuda/cuda_tier.h"
 
 #ifdef __cplusplus

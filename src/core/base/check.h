@@ -1,0 +1,12 @@
+/* Checks of input values: the message names the argument, its value and the allowed range. */
+#ifndef SADMM_CORE_BASE_CHECK_H
+#define SADMM_CORE_BASE_CHECK_H
+
+#include "error.h"
+
+sadmm_status sadmm_check_vector(const char *name, const double *x, int count, double limit, struct sadmm_error *error);
+sadmm_status sadmm_check_range(const char *name, double x, double low, double high, struct sadmm_error *error);
+/* Unit within 1e-6; normalised into `out`. */
+sadmm_status sadmm_check_orientation(const char *name, const double q[4], double out[4], struct sadmm_error *error);
+
+#endif

@@ -1,0 +1,47 @@
+/* Contacts of a step: what collision finds, the solver solves and the next step starts from. In double, on the host. */
+#ifndef SADMM_CORE_BASE_CONTACT_SET_H
+#define SADMM_CORE_BASE_CONTACT_SET_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { SADMM_MAX_POINTS = 8 };
+
+/* Contacts of one pair of shapes: one normal, up to SADMM_MAX_POINTS points. */
+struct sadmm_contact_pair {
+    int32_t body_a, body_b;   /* system body or -1 */
+    int32_t shape_a, shape_b; /* world shape slot (world level), else -1 */
+    int32_t first, count;     /* points */
+    double normal[3];         /* unit, from a to b */
+    double friction;          /* mu */
+    double restitution;
+    uint32_t cache;           /* narrow phase: separating or reference axis of the last step, 0 = none */
+    uint32_t reserved;
+};
+
+struct sadmm_contact_point {
+    double arm_a[3], arm_b[3]; /* from the centre of mass, m, world; arm_a is 0 when a is -1 (same for b) */
+    double gap;                /* m (world level) */
+    double error;              /* e, m/s: given at the problem level; at the world level see math/contact.h */
+    double impulse[3];         /* lambda on b, world frame, N s: warm start in, solution out */
+    uint32_t feature;
+    uint32_t reserved;
+};
+
+/* A contact set that grows. Order: pairs by (shape_a, shape_b), points in pair order: point index = contact index. */
+struct sadmm_contact_set {
+    struct sadmm_contact_pair *pairs;
+    struct sadmm_contact_point *points;
+    size_t pair_count, pair_capacity, point_count, point_capacity;
+};
+
+void sadmm_contact_set_free(struct sadmm_contact_set *contacts);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,48 @@
+/* The velocity a solve starts from.
+ *
+ * A contact that slides holds its impulse at the cone's edge whatever the velocity does, so a step's change of speed has
+ * to come from the momentum balance alone, by a factor m / (m + J^T beta J) an iteration: a few per cent of it are still
+ * missing after a hundred. Where the last steps changed a body's velocity by the same amount (sliding under gravity or
+ * friction), the next one starts from that change and nothing is missing. Only after three such steps: with few
+ * iterations velocities jitter, and following the jitter would feed it.
+ */
+#ifndef SADMM_CORE_MODEL_STEADY_H
+#define SADMM_CORE_MODEL_STEADY_H
+
+#include "core/math/real.h"
+#include "system.h"
+
+enum { STEADY_STEPS = 3 };
+/* Changes that differ by less than this share are the same. */
+#define STEADY_SHARE 0.25
+
+/* Component k of it, from the velocity's. */
+SADMM_INLINE double steady_start_component(double velocity, const struct sadmm_steady *steady, int k)
+{
+    return velocity + (steady->streak[k / 3] >= STEADY_STEPS ? steady->change[k] : 0);
+}
+
+SADMM_INLINE void steady_start(const struct sadmm_rigid *body, const struct sadmm_steady *steady, double velocity[6])
+{
+    for (int k = 0; k < 6; ++k) velocity[k] = steady_start_component(body->velocity[k], steady, k);
+}
+
+/* The step made `body` into `next`. */
+SADMM_INLINE void steady_keep(struct sadmm_steady *steady, const struct sadmm_rigid *body,
+                              const struct sadmm_rigid *next)
+{
+    for (int part = 0; part < 2; ++part) {
+        double size = 0, differs = 0;
+        for (int k = 3 * part; k < 3 * part + 3; ++k) {
+            double change = next->velocity[k] - body->velocity[k], difference = change - steady->change[k];
+            size += change * change;
+            differs += difference * difference;
+            steady->change[k] = change;
+        }
+        bool same = differs <= STEADY_SHARE * STEADY_SHARE * size;
+        int32_t before = steady->streak[part];
+        steady->streak[part] = same ? (before < STEADY_STEPS ? before + 1 : STEADY_STEPS) : 0;
+    }
+}
+
+#endif

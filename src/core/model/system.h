@@ -1,0 +1,54 @@
+/* The contact problem of one step as core and the backends share it on the host, in double.
+ *
+ * Bodies are the dynamic ones only, numbered 0..body_count-1; -1 is the static world. There are two ways to give them:
+ * `rigid` (world level: A and b follow from the state, see math/rigid.h) or `A` and `b` (problem level).
+ * The certificate and every backend read the same raw data through the same inline formulas.
+ */
+#ifndef SADMM_CORE_MODEL_SYSTEM_H
+#define SADMM_CORE_MODEL_SYSTEM_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/base/contact_set.h"
+#include "subadmm/problem.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A dynamic rigid body at the start of a step. */
+struct sadmm_rigid {
+    double position[3];     /* m, world */
+    double orientation[4];  /* w x y z */
+    double velocity[6];     /* m/s, rad/s, world */
+    double mass;            /* kg */
+    double inertia[3];      /* principal, kg m^2 */
+    double wrench[6];       /* external, N, N m, world */
+};
+
+/* What is remembered of a body's last steps (steady.h). */
+struct sadmm_steady {
+    double change[6];  /* of the velocity in the last step */
+    int32_t streak[2]; /* steps in a row with nearly the same change: linear, angular */
+};
+
+struct sadmm_system {
+    int32_t body_count;
+    const struct sadmm_rigid *rigid; /* (body_count) or NULL */
+    const double *A;                 /* (body_count x 36), when rigid is NULL */
+    const double *b;                 /* (body_count x 6), when rigid is NULL */
+    double *velocity;                /* (body_count x 6) start in, solution out */
+    struct sadmm_contact_set *contacts;
+    bool errors_given;               /* points carry e (problem level) instead of a gap */
+    bool first;                      /* no step came before: where there are no impulses, none are known */
+    int32_t block_count;
+    const struct sadmm_problem_block *blocks;
+    double *block_lambda;            /* (block_count x 6) start in, solution out */
+};
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,274 @@
+#include "certificate.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "core/math/dense6.h"
+#include "core/model/islands.h"
+#include "core/base/memory.h"
+#include "core/model/system_math.h"
+
+/* A body in the workspace: Cholesky factor of A (36), J^T lambda (6), the largest natural map of its constraints, its
+ * momentum error, and whether its island (by its first body) was counted as above the tolerances. */
+enum { FACTOR = 0, IMPULSE = 36, NATURAL_MAP = 42, MOMENTUM = 43, COUNTED = 44, BODY_SIZE = 45 };
+
+/* Norms and maxima gathered on the way. */
+struct tally {
+    double ncp_max, ncp_sum;
+    int64_t ncp_worst, count;
+    double u2, r2, map2; /* siconos: |u|^2, |r|^2, |r - P_K(r - u^)|^2 */
+    bool soft;
+};
+
+/* max that keeps a NaN: a solution that is not finite must not look good. */
+static bool exceeds(double x, double best) { return !(x <= best); }
+static double keep_max(double a, double b) { return isnan(a) || b <= a ? a : b; }
+
+static double max_abs6(const double x[6])
+{
+    double m = 0;
+    for (int i = 0; i < 6; ++i) m = keep_max(m, fabs(x[i]));
+    return m;
+}
+
+static void count_constraint(struct tally *t, int64_t index, double error, double *bodies, int32_t body_a, int32_t body_b)
+{
+    const int32_t sides[2] = {body_a, body_b};
+    for (int side = 0; side < 2; ++side) {
+        if (sides[side] < 0) continue;
+        double *largest = bodies + BODY_SIZE * (size_t)sides[side] + NATURAL_MAP;
+        *largest = keep_max(error, *largest);
+    }
+    if (t->ncp_worst < 0 || (exceeds(error, t->ncp_max) && !isnan(t->ncp_max))) {
+        t->ncp_max = error;
+        t->ncp_worst = index;
+    }
+    t->ncp_sum += error;
+    ++t->count;
+}
+
+/* Diagonal entry J A^-1 J^T of one row on one body: |L^-1 J^T|^2. */
+static double row_weight(const double *body, const double row[6])
+{
+    double y[6];
+    dense6_forward(body + FACTOR, row, y);
+    return dense6_dot(y, y);
+}
+
+static void add_impulse(double *body, const double row[6], double lambda)
+{
+    for (int i = 0; i < 6; ++i) body[IMPULSE + i] += row[i] * lambda;
+}
+
+/* Euclidean projection on the Coulomb cone |t| <= mu n: this one is siconos' K, not the local solver's. */
+static void project_cone(const double r[3], double mu, double out[3])
+{
+    double t = hypot(r[1], r[2]);
+    if (mu * t <= -r[0]) {
+        out[0] = out[1] = out[2] = 0;
+    } else if (t <= mu * r[0]) {
+        memcpy(out, r, 3 * sizeof *out);
+    } else {
+        double n = (mu * t + r[0]) / (mu * mu + 1), s = mu * n / t;
+        out[0] = n, out[1] = s * r[1], out[2] = s * r[2];
+    }
+}
+
+/* One contact in its frame: lambda and u = x + e, rows (n, t, t). */
+static double contact_map(struct tally *tally, const double lambda[3], const double u[3], double mu, double w)
+{
+    double y[3], p[3], error2 = 0;
+    for (int i = 0; i < 3; ++i) y[i] = lambda[i] - u[i] / w;
+    contact_project_rows(y, mu, p);
+    for (int i = 0; i < 3; ++i) error2 += (lambda[i] - p[i]) * (lambda[i] - p[i]);
+
+    /* siconos' fc3d_unitary_compute_and_add_error: natural map with rho = 1 of the modified velocity. */
+    double modified[3] = {lambda[0] - u[0] - mu * hypot(u[1], u[2]), lambda[1] - u[1], lambda[2] - u[2]};
+    project_cone(modified, mu, p);
+    for (int i = 0; i < 3; ++i) {
+        tally->u2 += u[i] * u[i];
+        tally->r2 += lambda[i] * lambda[i];
+        tally->map2 += (lambda[i] - p[i]) * (lambda[i] - p[i]);
+    }
+    return sqrt(error2) * w;
+}
+
+static void certify_pair(struct tally *tally, const struct sadmm_system *system, const struct sadmm_settings *settings,
+                         const struct sadmm_contact_pair *pair, double *bodies)
+{
+    mat3 frame = sadmm_contact_frame(pair->normal);
+    int rows = pair->friction > 0 ? 3 : 1;
+    for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
+        const struct sadmm_contact_point *point = &system->contacts->points[k];
+        vec3 lambda = m3_mul(frame, v3_load(point->impulse));
+        vec3 x = m3_mul(frame, sadmm_contact_velocity(pair, point, system->velocity));
+        const double l[3] = {lambda.x, lambda.y, lambda.z};
+        const double u[3] = {x.x + sadmm_contact_e(system, settings, pair, point), x.y, x.z};
+        double weight[3] = {0, 0, 0};
+        for (int side = 0; side < 2; ++side) {
+            int32_t index = side ? pair->body_b : pair->body_a;
+            if (index < 0) continue;
+            double *body = bodies + BODY_SIZE * (size_t)index;
+            for (int i = 0; i < 3; ++i) {
+                double row[6];
+                sadmm_contact_row(frame.r[i], side ? point->arm_b : point->arm_a, side ? 1 : -1, row);
+                if (i < rows) weight[i] += row_weight(body, row);
+                add_impulse(body, row, l[i]);
+            }
+        }
+        double w = fmax(weight[0], fmax(weight[1], weight[2]));
+        count_constraint(tally, k, contact_map(tally, l, u, pair->friction, w), bodies, pair->body_a, pair->body_b);
+    }
+}
+
+static void certify_block(struct tally *tally, const struct sadmm_system *system, int32_t k, double *bodies)
+{
+    const struct sadmm_problem_block *block = &system->blocks[k];
+    const double *lambda = system->block_lambda + 6 * (size_t)k;
+    double x[6] = {0}, weight[6] = {0};
+    for (int side = 0; side < 2; ++side) {
+        int32_t index = side ? block->body_b : block->body_a;
+        if (index < 0) continue;
+        const double *jacobian = side ? block->jacobian_b : block->jacobian_a;
+        double *body = bodies + BODY_SIZE * (size_t)index;
+        for (int r = 0; r < block->rows; ++r) {
+            const double *row = jacobian + 6 * r;
+            x[r] += dense6_dot(row, system->velocity + 6 * (size_t)index);
+            weight[r] += row_weight(body, row);
+            add_impulse(body, row, lambda[r]);
+        }
+    }
+
+    double error = 0;
+    if (block->kind == SADMM_BLOCK_CONTACT) {
+        double u[3] = {x[0] + block->error[0], x[1] + block->error[1], x[2] + block->error[2]};
+        double w = block->friction > 0 ? fmax(weight[0], fmax(weight[1], weight[2])) : weight[0];
+        error = contact_map(tally, lambda, u, block->friction, w);
+    } else {
+        for (int r = 0; r < block->rows; ++r) {
+            if (block->kind == SADMM_BLOCK_HARD) {
+                if (weight[r] == 0) continue; /* a free row: zero on both bodies */
+                double u = x[r] + block->error[r];
+                error = keep_max(error, fabs(u));
+                /* K is the whole line for a hard row: r - P_K(r - u) = u. */
+                tally->u2 += u * u;
+                tally->r2 += lambda[r] * lambda[r];
+                tally->map2 += u * u;
+            } else {
+                double c = block->damping[r];
+                double gap = lambda[r] + block->stiffness[r] * block->error[r] + c * x[r];
+                error = keep_max(error, fabs(gap) * weight[r] / (1 + c * weight[r]));
+                tally->soft = true;
+            }
+        }
+    }
+    count_constraint(tally, (int64_t)system->contacts->point_count + k, error, bodies, block->body_a, block->body_b);
+}
+
+/* siconos divides only by norms above this (gfc3d_compute_error.c, MIN_RELATIVE_SCALING). */
+static double relative(double error, double scale)
+{
+    return scale > sqrt(DBL_EPSILON) ? error / scale : error;
+}
+
+static int64_t count_islands_above(double *bodies, size_t count, const int32_t *labels,
+                                   const struct sadmm_settings *settings, double scale)
+{
+    int64_t above = 0;
+    for (size_t i = 0; i < count; ++i) {
+        const double *body = bodies + BODY_SIZE * i;
+        double *counted = bodies + BODY_SIZE * (size_t)labels[i] + COUNTED;
+        if (!exceeds(body[NATURAL_MAP], settings->certificate_tolerance) &&
+            !exceeds(body[MOMENTUM], settings->certificate_momentum_tolerance * scale))
+            continue;
+        above += *counted == 0;
+        *counted = 1;
+    }
+    return above;
+}
+
+sadmm_status sadmm_certify_with(struct sadmm_certificate_workspace *workspace, const struct sadmm_system *system,
+                                const struct sadmm_settings *settings, sadmm_certificate *certificate,
+                                struct sadmm_error *error)
+{
+    size_t count = (size_t)system->body_count;
+    if (!sadmm_grow((void **)&workspace->values, &workspace->capacity, 0, BODY_SIZE * count, sizeof(double)))
+        return sadmm_fail_memory(error, "the certificate");
+    double *bodies = workspace->values;
+    double A[36], b[6];
+
+    for (size_t i = 0; i < count; ++i) {
+        double *body = bodies + BODY_SIZE * i;
+        sadmm_system_body(system, settings, (int32_t)i, A, b);
+        if (!dense6_cholesky(A, body + FACTOR))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "mass matrix of body %zu: not positive definite", i);
+        memset(body + IMPULSE, 0, (BODY_SIZE - IMPULSE) * sizeof *body);
+    }
+
+    struct tally tally = {.ncp_worst = -1};
+    for (size_t p = 0; p < system->contacts->pair_count; ++p)
+        certify_pair(&tally, system, settings, &system->contacts->pairs[p], bodies);
+    for (int32_t k = 0; k < system->block_count; ++k) certify_block(&tally, system, k, bodies);
+
+    sadmm_certificate out = sadmm_certificate_none();
+    double residual_max = -1, scale = 0, residual2 = 0, Av2 = 0, b2 = 0, Jl2 = 0;
+    for (size_t i = 0; i < count; ++i) {
+        const double *impulse = bodies + BODY_SIZE * i + IMPULSE;
+        double Av[6], residual[6];
+        sadmm_system_body(system, settings, (int32_t)i, A, b);
+        dense6_mul(A, system->velocity + 6 * i, Av);
+        for (int r = 0; r < 6; ++r) residual[r] = Av[r] - b[r] - impulse[r];
+        double largest = max_abs6(residual);
+        bodies[BODY_SIZE * i + MOMENTUM] = largest;
+        if (out.momentum_worst < 0 || (exceeds(largest, residual_max) && !isnan(residual_max))) {
+            residual_max = largest;
+            out.momentum_worst = (int64_t)i;
+        }
+        scale = keep_max(scale, keep_max(max_abs6(b), keep_max(max_abs6(Av), max_abs6(impulse))));
+        residual2 += dense6_dot(residual, residual);
+        Av2 += dense6_dot(Av, Av);
+        b2 += dense6_dot(b, b);
+        Jl2 += dense6_dot(impulse, impulse);
+    }
+
+    out.momentum_max = scale > 0 ? residual_max / scale : (isnan(scale) ? scale : 0);
+    out.ncp_max = tally.ncp_max;
+    out.ncp_mean = tally.count ? tally.ncp_sum / (double)tally.count : 0;
+    out.ncp_worst = tally.ncp_worst;
+    if (!tally.soft)
+        out.siconos = relative(sqrt(residual2), sqrt(keep_max(b2, keep_max(Av2, Jl2)))) +
+                      relative(sqrt(tally.map2), sqrt(keep_max(tally.u2, tally.r2)));
+    if (settings && settings->certificate_tolerance > 0) {
+        if (!sadmm_grow((void **)&workspace->labels, &workspace->label_capacity, 0, count, sizeof *workspace->labels))
+            return sadmm_fail_memory(error, "the certificate");
+        sadmm_islands(system, workspace->labels);
+        out.islands_above = count_islands_above(bodies, count, workspace->labels, settings, scale);
+    }
+    *certificate = out;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_certify(const struct sadmm_system *system, const struct sadmm_settings *settings,
+                           sadmm_certificate *certificate, struct sadmm_error *error)
+{
+    struct sadmm_certificate_workspace workspace = {0};
+    sadmm_status status = sadmm_certify_with(&workspace, system, settings, certificate, error);
+    sadmm_certificate_workspace_free(&workspace);
+    return status;
+}
+
+void sadmm_certificate_workspace_free(struct sadmm_certificate_workspace *workspace)
+{
+    sadmm_free(workspace->values);
+    sadmm_free(workspace->labels);
+    *workspace = (struct sadmm_certificate_workspace){0};
+}
+
+sadmm_certificate sadmm_certificate_none(void)
+{
+    sadmm_certificate none = {
+        .ncp_max = -1, .ncp_mean = -1, .ncp_worst = -1, .momentum_max = -1, .momentum_worst = -1, .siconos = -1,
+        .islands_above = -1};
+    return none;
+}

@@ -1,0 +1,127 @@
+#include "plan.h"
+
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+#include "core/math/rigid.h"
+
+/* An iteration of this many contacts takes some 3 us: about what two barriers cost. */
+enum { POINTS_PER_THREAD = 1500 };
+
+int sadmm_plan_threads(int wanted, size_t points)
+{
+#ifdef _OPENMP
+    if (wanted > 0) return wanted;
+    size_t busy = points / POINTS_PER_THREAD + 1, all = (size_t)omp_get_max_threads();
+    return (int)(busy < all ? busy : all);
+#else
+    (void)wanted;
+    (void)points;
+    return 1;
+#endif
+}
+
+/* Fewer are done before other threads have come. */
+enum { PASS_ITEMS = 1000 };
+
+int sadmm_pass_threads(int threads, size_t count) { return count < PASS_ITEMS ? 1 : threads; }
+
+static bool any_nonzero(const double *x, int count)
+{
+    for (int k = 0; k < count; ++k)
+        if (x[k] != 0) return true;
+    return false;
+}
+
+static bool pair_is_warm(const struct sadmm_contact_set *contacts, const struct sadmm_contact_pair *pair)
+{
+    for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
+        if (any_nonzero(contacts->points[k].impulse, 3)) return true;
+    return false;
+}
+
+static bool any_pair_is_warm(const struct sadmm_contact_set *contacts)
+{
+    for (size_t p = 0; p < contacts->pair_count; ++p)
+        if (pair_is_warm(contacts, &contacts->pairs[p])) return true;
+    return false;
+}
+
+/* Does at least half of the constraints start with an impulse? Contacts count by pairs: the points of a pair that are
+ * a little apart (the far edge of a leaning card) carry nothing, and do not make a settled scene a cold one. */
+static bool starts_warm(const struct sadmm_system *system, int plan_threads)
+{
+    const int threads = sadmm_pass_threads(plan_threads, system->contacts->pair_count);
+    (void)threads; /* unused without OpenMP, here and in other passes */
+    size_t total = system->contacts->pair_count + (size_t)system->block_count, warm = 0;
+#pragma omp parallel for schedule(static) num_threads(threads) if (threads > 1) reduction(+ : warm)
+    for (size_t p = 0; p < system->contacts->pair_count; ++p)
+        warm += pair_is_warm(system->contacts, &system->contacts->pairs[p]);
+    for (size_t k = 0; k < (size_t)system->block_count; ++k) warm += any_nonzero(system->block_lambda + 6 * k, 6);
+    return total > 0 && 2 * warm >= total;
+}
+
+bool sadmm_plan_is_gyroscopic(const struct sadmm_rigid *rigid, int32_t count)
+{
+    for (int32_t i = 0; i < count; ++i)
+        if (!rigid_is_isotropic(v3_load(rigid[i].inertia))) return true;
+    return false;
+}
+
+static bool may_update_penalty(const struct sadmm_settings *settings)
+{
+    return settings->method == SADMM_METHOD_PAPER && settings->penalty_period > 0 && settings->penalty_ratio_limit > 1 &&
+           settings->iterations > settings->penalty_period;
+}
+
+static bool has_blocks(const struct sadmm_plan *plan)
+{
+    return plan->blocks[SADMM_BLOCK_CONTACT] > 0 || plan->blocks[SADMM_BLOCK_HARD] > 0 || plan->blocks[SADMM_BLOCK_SOFT] > 0;
+}
+
+bool sadmm_plan_is_constrained(const struct sadmm_plan *plan) { return plan->points > 0 || has_blocks(plan); }
+
+bool sadmm_plan_depends_on_warmth(const struct sadmm_settings *settings)
+{
+    bool when_cold =
+        settings->method == SADMM_METHOD_FAST || (may_update_penalty(settings) && !settings->penalty_update_warm);
+    return settings->warm_start && when_cold;
+}
+
+void sadmm_plan_settle(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm)
+{
+    bool constrained = sadmm_plan_is_constrained(plan);
+    plan->warm_start = settings->warm_start;
+    plan->warm = plan->warm_start && mostly_warm;
+    plan->penalty_updates = constrained && may_update_penalty(settings) && (settings->penalty_update_warm || !plan->warm);
+    bool fast = constrained && settings->method == SADMM_METHOD_FAST;
+    plan->weight_refresh = fast && !plan->warm;
+    plan->limit = fast && plan->rigid && !has_blocks(plan);
+    plan->certificate = settings->certify || settings->certificate_tolerance > 0;
+    plan->residuals = constrained && (plan->penalty_updates || settings->measure_residuals ||
+                                      settings->residual_tolerance > 0);
+    plan->wrenches = settings->recover_wrenches;
+}
+
+struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struct sadmm_settings *settings)
+{
+    struct sadmm_plan plan = {0};
+    plan.bodies = system->body_count;
+    plan.pairs = (int32_t)system->contacts->pair_count;
+    plan.points = (int32_t)system->contacts->point_count;
+    if (plan.points > 0) {
+        plan.contact_rows = 1;
+        for (size_t p = 0; p < system->contacts->pair_count && plan.contact_rows == 1; ++p)
+            if (system->contacts->pairs[p].friction > 0) plan.contact_rows = 3;
+    }
+    for (int32_t k = 0; k < system->block_count; ++k) ++plan.blocks[system->blocks[k].kind];
+    plan.rigid = system->rigid != NULL;
+    plan.threads = sadmm_plan_threads(settings->threads, (size_t)plan.points + 4 * (size_t)system->block_count);
+    plan.gyroscopic = plan.rigid && sadmm_plan_is_gyroscopic(system->rigid, system->body_count);
+    sadmm_plan_settle(&plan, settings, settings->warm_start && starts_warm(system, plan.threads));
+    plan.predict = settings->method == SADMM_METHOD_FAST && plan.points > 0 && !has_blocks(&plan) && system->first &&
+                   !(settings->warm_start && any_pair_is_warm(system->contacts));
+    if (plan.predict) plan.warm_start = true; /* predicted loads are the system's start values then */
+    return plan;
+}

@@ -1,0 +1,57 @@
+/* The plan: what this step needs, found once from what the scene contains. Backends specialise on it. */
+#ifndef SADMM_CORE_SOLVE_PLAN_H
+#define SADMM_CORE_SOLVE_PLAN_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "core/model/system.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+struct sadmm_plan {
+    int32_t bodies;         /* dynamic */
+    int32_t pairs, points;  /* contacts given by geometry */
+    int32_t blocks[3];      /* constraints given by Jacobians, by sadmm_block_kind */
+    int contact_rows;       /* rows of a geometric contact: 0 no contact, 1 every mu is 0, 3 otherwise */
+    bool rigid;             /* A is (m I, world inertia) */
+    bool gyroscopic;        /* some body has unequal principal moments (world level) */
+    bool warm_start;        /* take the system's start values */
+    bool warm;              /* ... and most constraints have one */
+    bool penalty_updates;   /* eq. (15) will run at least once */
+    bool predict;           /* FAST: starts from predicted loads (loads.h); never in steps that a backend makes alone */
+    bool weight_refresh;    /* FAST: weights are taken anew during the step */
+    bool limit;             /* FAST: energies are limited after the last iteration */
+    bool residuals;         /* some iteration is measured */
+    bool wrenches;          /* eq. (12) a body */
+    bool certificate;
+    int threads;            /* resolved, >= 1 */
+};
+
+/* Threads for `points` contact points: as many as `wanted`, or for 0 as many as have enough to do. */
+int sadmm_plan_threads(int wanted, size_t points);
+
+/* Threads for a pass over `count` bodies, pairs or points outside the kernels: those of the plan if there is enough to do. */
+int sadmm_pass_threads(int threads, size_t count);
+
+/* What follows from the settings once the counts and `contact_rows` are in; `mostly_warm`: at least half of the constraints
+ * (contacts counted by pairs) carry an impulse. `threads` is left alone. */
+void sadmm_plan_settle(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm);
+
+/* Does the number of warm constraints decide anything in a plan with contacts? */
+bool sadmm_plan_depends_on_warmth(const struct sadmm_settings *settings);
+
+/* Does one of the bodies have unequal principal moments? */
+bool sadmm_plan_is_gyroscopic(const struct sadmm_rigid *rigid, int32_t count);
+
+/* Is there any constraint? */
+bool sadmm_plan_is_constrained(const struct sadmm_plan *plan);
+
+struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struct sadmm_settings *settings);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

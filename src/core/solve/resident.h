@@ -1,0 +1,78 @@
+/* Whole steps on a backend that keeps the world itself: state, contacts and impulses stay in its memory from step to
+ * step, and the host only says "go on". Optional (kernels.h, `resident`); core/world/resident.c is the caller.
+ *
+ * Steps are enqueued: `step` may return before the step has run. Steps run in order. A step that fails leaves the world
+ * as it was before it, and those enqueued after it do not run; `wait` tells. What a step could not know when it was
+ * enqueued (how many contacts there will be) is no failure: the backend repeats the step with more room.
+ */
+#ifndef SADMM_CORE_SOLVE_RESIDENT_H
+#define SADMM_CORE_SOLVE_RESIDENT_H
+
+#include "core/base/error.h"
+#include "plan.h"
+#include "core/model/system.h"
+
+struct sadmm_context;
+struct sadmm_collision_input;
+
+/* A world, from the host. */
+struct sadmm_resident_world {
+    const struct sadmm_collision_input *input; /* shapes, bodies by slot, overrides */
+    int32_t body_count;                        /* dynamic bodies */
+    const struct sadmm_rigid *rigid;           /* (body_count) */
+    const struct sadmm_steady *steady;         /* (body_count) */
+    const int32_t *slot_of;                    /* (body_count) body slot */
+    const struct sadmm_contact_set *contacts;  /* of the last step, with impulses */
+};
+
+enum { SADMM_EDIT_STATE = 1, SADMM_EDIT_WRENCH = 2 };
+
+/* A change of a dynamic body between two steps. */
+struct sadmm_resident_edit {
+    int32_t body;
+    uint32_t what;                             /* SADMM_EDIT_... bits */
+    double position[3], orientation[4], velocity[6]; /* STATE */
+    double wrench[6];                          /* WRENCH */
+};
+
+/* The last step that was done. */
+struct sadmm_resident_report {
+    int64_t done;              /* steps since the world was loaded */
+    int64_t repeats;           /* steps repeated since then because something did not fit */
+    struct sadmm_plan plan;
+    int iterations;            /* of the island with the most */
+    double iterations_mean;    /* over islands */
+    bool converged;            /* every island met the stop rule */
+    int64_t islands_above;     /* that did not; -1: there was none */
+    int32_t limited;           /* islands, method FAST */
+    double penetration_max;    /* m */
+    struct sadmm_residual residual; /* -1: not measured */
+    struct {
+        double total, collide, assemble, solve, finish;
+    } ms;                      /* on the backend's own clock */
+    int32_t culprit;           /* NON_FINITE: a body that is not finite, -1: unknown */
+};
+
+struct sadmm_resident_kernels {
+    /* Take over a world. Everything the backend kept before is forgotten. */
+    sadmm_status (*load)(struct sadmm_context *, const struct sadmm_resident_world *, const struct sadmm_settings *,
+                         struct sadmm_error *);
+    /* Changes to bodies before the next step; `edits` is free again on return. */
+    sadmm_status (*edit)(struct sadmm_context *, const struct sadmm_resident_edit *edits, size_t count,
+                         struct sadmm_error *);
+    /* Enqueue a step. An error is this step's, or an earlier one's: then `wait` says how far the world has got. */
+    sadmm_status (*step)(struct sadmm_context *, const struct sadmm_settings *, struct sadmm_error *);
+    /* Until all enqueued steps have run. The report is filled also when a step has failed. */
+    sadmm_status (*wait)(struct sadmm_context *, struct sadmm_resident_report *, struct sadmm_error *);
+    /* The world after the last step done; any pointer may be NULL. Nothing may be enqueued. */
+    sadmm_status (*read_bodies)(struct sadmm_context *, struct sadmm_rigid *rigid, struct sadmm_steady *steady,
+                                double *wrench /* (bodies x 6) */, struct sadmm_error *);
+    /* Contacts of the last step done, with its impulses. Nothing may be enqueued. */
+    sadmm_status (*read_contacts)(struct sadmm_context *, struct sadmm_contact_set *contacts, struct sadmm_error *);
+    /* What the last step done started from: bodies, velocities (bodies x 6, m/s and rad/s) and impulses (points x 3, N s);
+     * any pointer may be NULL. Nothing may be enqueued. */
+    sadmm_status (*read_start)(struct sadmm_context *, struct sadmm_rigid *rigid, double *velocity, double *impulse,
+                               struct sadmm_error *);
+};
+
+#endif

@@ -1,0 +1,269 @@
+/* Bodies of a world. */
+#include <math.h>
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "world_internal.h"
+
+static const double POSITION_LIMIT = 1e9, VELOCITY_LIMIT = 1e6, WRENCH_LIMIT = 1e15;
+
+sadmm_body_def sadmm_body_def_default(void)
+{
+    sadmm_body_def def = {.type = SADMM_BODY_DYNAMIC, .orientation = {1, 0, 0, 0}};
+    return def;
+}
+
+static sadmm_status check_inertia(const double inertia[3], struct sadmm_error *error)
+{
+    for (int k = 0; k < 3; ++k) {
+        double others = inertia[(k + 1) % 3] + inertia[(k + 2) % 3];
+        if (!(inertia[k] > 0 && inertia[k] <= 1e24))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->inertia[%d] = %g: must be in (0, 1e24] kg m^2", k,
+                              inertia[k]);
+        if (!(inertia[k] <= others * (1 + 1e-9)))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                              "def->inertia[%d] = %g: must be at most the sum of the other two, %g (no rigid body has more)",
+                              k, inertia[k], others);
+    }
+    return SADMM_OK;
+}
+
+static sadmm_status check_motion(const char *linear_name, const char *angular_name, const double linear[3],
+                                 const double angular[3], sadmm_body_type type, struct sadmm_error *error)
+{
+    double limit = type == SADMM_BODY_STATIC ? 0 : VELOCITY_LIMIT;
+    TRY(sadmm_check_vector(linear_name, linear, 3, limit, error));
+    return sadmm_check_vector(angular_name, angular, 3, limit, error);
+}
+
+static sadmm_status check_def(const sadmm_body_def *def, double orientation[4], struct sadmm_error *error)
+{
+    if (def->type != SADMM_BODY_DYNAMIC && def->type != SADMM_BODY_STATIC)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->type = %d: must be SADMM_BODY_DYNAMIC or _STATIC",
+                          (int)def->type);
+    if (def->type == SADMM_BODY_DYNAMIC) {
+        TRY(sadmm_check_range("def->mass", def->mass, 1e-9, 1e12, error));
+        TRY(check_inertia(def->inertia, error));
+    }
+    TRY(sadmm_check_vector("def->position", def->position, 3, POSITION_LIMIT, error));
+    TRY(sadmm_check_orientation("def->orientation", def->orientation, orientation, error));
+    TRY(check_motion("def->linear_velocity", "def->angular_velocity", def->linear_velocity, def->angular_velocity,
+                     def->type, error));
+    int32_t lowest = def->type == SADMM_BODY_STATIC ? -1 : 0;
+    if (def->environment < lowest)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->environment = %d: must be >= %d", def->environment,
+                          lowest);
+    return SADMM_OK;
+}
+
+static bool alive(const sadmm_world *world, size_t slot)
+{
+    return world->bodies[slot].alive;
+}
+
+/* The lowest dead slot, or a new one. */
+static size_t free_slot(sadmm_world *world)
+{
+    if ((size_t)world->body_count == world->body_slots) return world->body_slots;
+    return sadmm_slot_free(&world->body_marks, world, alive);
+}
+
+sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def, sadmm_body_id *id)
+{
+    struct sadmm_error *error = &world->error;
+    double orientation[4];
+    if (!def || !id) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def or id is NULL");
+    TRY(check_def(def, orientation, error));
+    TRY(sadmm_world_take_back(world));
+    size_t slot = free_slot(world);
+    if (slot >= (size_t)1 << 27)
+        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d bodies: a world holds at most 2^27", world->body_count);
+    if (!sadmm_grow((void **)&world->bodies, &world->body_capacity, world->body_slots, slot + 1, sizeof *world->bodies))
+        return sadmm_fail_memory(error, "a body");
+
+    struct sadmm_world_body *body = &world->bodies[slot];
+    uint32_t generation = slot < world->body_slots ? body->generation : 1;
+    memset(body, 0, sizeof *body);
+    body->alive = true;
+    body->generation = generation;
+    body->type = def->type;
+    body->environment = def->environment;
+    body->system_body = -1;
+    struct sadmm_rigid *rigid = &body->rigid;
+    memcpy(rigid->position, def->position, sizeof rigid->position);
+    memcpy(rigid->orientation, orientation, sizeof rigid->orientation);
+    if (def->type == SADMM_BODY_DYNAMIC) {
+        rigid->mass = def->mass;
+        memcpy(rigid->inertia, def->inertia, sizeof rigid->inertia);
+        memcpy(rigid->velocity, def->linear_velocity, sizeof def->linear_velocity);
+        memcpy(rigid->velocity + 3, def->angular_velocity, sizeof def->angular_velocity);
+        ++world->dynamic_count;
+    }
+    if (def->name) strncpy(body->name, def->name, SADMM_NAME_SIZE - 1);
+    if (slot == world->body_slots) ++world->body_slots;
+    sadmm_slot_taken(&world->body_marks, slot);
+    ++world->body_count;
+    id->slot = (uint32_t)slot + 1;
+    id->generation = generation;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id)
+{
+    struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", &world->error);
+    if (!body) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_world_take_back(world));
+    for (size_t s = body->first_shape; body->shape_count > 0; ++s)
+        if (world->shapes[s].alive && world->shapes[s].body == (int32_t)id.slot - 1) sadmm_world_kill_shape(world, s);
+    sadmm_pair_table_forget(&world->disabled_pairs, id.slot - 1);
+    body->alive = false;
+    ++body->generation;
+    --world->body_count;
+    sadmm_slot_freed(&world->body_marks, id.slot - 1);
+    if (body->type == SADMM_BODY_DYNAMIC) --world->dynamic_count;
+    world->contacts_readable = false;
+    return SADMM_OK;
+}
+
+int32_t sadmm_world_body_count(const sadmm_world *world)
+{
+    return world->body_count;
+}
+
+sadmm_status sadmm_world_body_at(const sadmm_world *world, int32_t index, sadmm_body_id *id)
+{
+    struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    if (!id) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "id is NULL");
+    if (index < 0 || index >= world->body_count)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index, world->body_count);
+    size_t slot = (size_t)index;
+    if ((size_t)world->body_count < world->body_slots)
+        slot = sadmm_slot_at((struct sadmm_slot_marks *)&world->body_marks, index, world, alive);
+    id->slot = (uint32_t)slot + 1;
+    id->generation = world->bodies[slot].generation;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_body_state(const sadmm_world *world, sadmm_body_id id, sadmm_body_state *state)
+{
+    struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
+    if (!body) return SADMM_ERROR_STALE_ID;
+    if (!state) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "state is NULL");
+    TRY(sadmm_world_pull_bodies(world));
+    memcpy(state->position, body->rigid.position, sizeof state->position);
+    memcpy(state->orientation, body->rigid.orientation, sizeof state->orientation);
+    memcpy(state->linear_velocity, body->rigid.velocity, sizeof state->linear_velocity);
+    memcpy(state->angular_velocity, body->rigid.velocity + 3, sizeof state->angular_velocity);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, const sadmm_body_state *state)
+{
+    struct sadmm_error *error = &world->error;
+    struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
+    double orientation[4];
+    if (!body) return SADMM_ERROR_STALE_ID;
+    if (!state) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "state is NULL");
+    TRY(sadmm_check_vector("state->position", state->position, 3, POSITION_LIMIT, error));
+    TRY(sadmm_check_orientation("state->orientation", state->orientation, orientation, error));
+    TRY(check_motion("state->linear_velocity", "state->angular_velocity", state->linear_velocity, state->angular_velocity,
+                     body->type, error));
+    /* A static body is part of what the backend was given once. */
+    TRY(body->system_body < 0 ? sadmm_world_take_back(world) : sadmm_world_edit_room(world));
+    memcpy(body->rigid.position, state->position, sizeof state->position);
+    memcpy(body->rigid.orientation, orientation, sizeof orientation);
+    memcpy(body->rigid.velocity, state->linear_velocity, sizeof state->linear_velocity);
+    memcpy(body->rigid.velocity + 3, state->angular_velocity, sizeof state->angular_velocity);
+    sadmm_world_edit(world, body, SADMM_EDIT_STATE);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_body_def(const sadmm_world *world, sadmm_body_id id, sadmm_body_def *def)
+{
+    struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
+    if (!body) return SADMM_ERROR_STALE_ID;
+    if (!def) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def is NULL");
+    TRY(sadmm_world_pull_bodies(world));
+    memset(def, 0, sizeof *def);
+    def->type = body->type;
+    def->mass = body->rigid.mass;
+    memcpy(def->inertia, body->rigid.inertia, sizeof def->inertia);
+    memcpy(def->position, body->rigid.position, sizeof def->position);
+    memcpy(def->orientation, body->rigid.orientation, sizeof def->orientation);
+    memcpy(def->linear_velocity, body->rigid.velocity, sizeof def->linear_velocity);
+    memcpy(def->angular_velocity, body->rigid.velocity + 3, sizeof def->angular_velocity);
+    def->environment = body->environment;
+    def->name = body->name;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, const double force[3], const double torque[3])
+{
+    struct sadmm_error *error = &world->error;
+    struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
+    if (!body) return SADMM_ERROR_STALE_ID;
+    if (!force || !torque) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "force or torque is NULL");
+    TRY(sadmm_check_vector("force", force, 3, WRENCH_LIMIT, error));
+    TRY(sadmm_check_vector("torque", torque, 3, WRENCH_LIMIT, error));
+    TRY(body->system_body < 0 ? sadmm_world_take_back(world) : sadmm_world_edit_room(world));
+    memcpy(body->rigid.wrench, force, 3 * sizeof *force);
+    memcpy(body->rigid.wrench + 3, torque, 3 * sizeof *torque);
+    sadmm_world_edit(world, body, SADMM_EDIT_WRENCH);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_body_contact_wrench(const sadmm_world *world, sadmm_body_id id, double wrench[6])
+{
+    struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
+    if (!body) return SADMM_ERROR_STALE_ID;
+    if (!wrench) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "wrench is NULL");
+    TRY(sadmm_world_pull_bodies(world));
+    if (!world->stepped || !world->step_settings.recover_wrenches)
+        return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE,
+                          "contact wrenches: there was no step yet, or settings.recover_wrenches was false");
+    if (body->type == SADMM_BODY_STATIC)
+        return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE, "contact wrenches are kept for dynamic bodies only");
+    memcpy(wrench, body->contact_wrench, sizeof body->contact_wrench);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_set_body_pair_contact(sadmm_world *world, sadmm_body_id a, sadmm_body_id b, bool enabled)
+{
+    struct sadmm_error *error = &world->error;
+    if (!sadmm_world_find_body(world, a, "a", error) || !sadmm_world_find_body(world, b, "b", error))
+        return SADMM_ERROR_STALE_ID;
+    if (a.slot == b.slot) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "a and b are the same body");
+    TRY(sadmm_world_take_back(world));
+    uint64_t key = sadmm_pair_key(a.slot - 1, b.slot - 1);
+    if (!enabled) return sadmm_pair_table_set(&world->disabled_pairs, key, 0, error);
+    sadmm_pair_table_remove(&world->disabled_pairs, key);
+    return SADMM_OK;
+}
+
+/* ---- inertia of solids ---------------------------------------------------------------------------------------- */
+
+void sadmm_box_inertia(double mass, const double h[3], double inertia[3])
+{
+    inertia[0] = mass / 3 * (h[1] * h[1] + h[2] * h[2]);
+    inertia[1] = mass / 3 * (h[0] * h[0] + h[2] * h[2]);
+    inertia[2] = mass / 3 * (h[0] * h[0] + h[1] * h[1]);
+}
+
+void sadmm_sphere_inertia(double mass, double radius, double inertia[3])
+{
+    inertia[0] = inertia[1] = inertia[2] = 0.4 * mass * radius * radius;
+}
+
+/* A cylinder of length 2 h and two half balls, by their shares of the volume. */
+void sadmm_capsule_inertia(double mass, double r, double h, double inertia[3])
+{
+    double cylinder = 2 * h, balls = 4.0 / 3.0 * r;
+    double mc = mass * cylinder / (cylinder + balls), mb = mass - mc;
+    double ball_axis = 0.4 * mb * r * r;
+    double ball_side = ball_axis + mb * (h * h + 0.75 * h * r);
+    inertia[2] = 0.5 * mc * r * r + ball_axis;
+    inertia[0] = inertia[1] = mc * (3 * r * r + cylinder * cylinder) / 12 + ball_side;
+}

@@ -1,0 +1,125 @@
+/* What a world gives out of its last step: contacts and the frozen problem. */
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "core/model/system_math.h"
+#include "world_internal.h"
+
+int32_t sadmm_world_contact_count(const sadmm_world *world)
+{
+    if (sadmm_world_settle(world) != SADMM_OK) return 0;
+    if (world->resident.contacts_behind) return world->contacts_readable ? world->report.contacts : 0;
+    return world->contacts_readable ? (int32_t)world->contacts.point_count : 0;
+}
+
+static sadmm_shape_id shape_id(const sadmm_world *world, int32_t slot)
+{
+    sadmm_shape_id id = {(uint32_t)slot + 1, world->shape_generations[slot]};
+    return id;
+}
+
+static sadmm_body_id body_of(const sadmm_world *world, int32_t shape)
+{
+    int32_t slot = world->shapes[shape].body;
+    sadmm_body_id id = {(uint32_t)slot + 1, world->bodies[slot].generation};
+    return id;
+}
+
+/* Pairs are in point order: the pair of a point by bisection. */
+static size_t pair_of(const struct sadmm_contact_set *contacts, int32_t point)
+{
+    size_t low = 0, high = contacts->pair_count;
+    while (high - low > 1) {
+        size_t middle = low + (high - low) / 2;
+        if (contacts->pairs[middle].first <= point)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+static void read_contact(const sadmm_world *world, const struct sadmm_contact_pair *pair, int32_t index, sadmm_contact *out)
+{
+    const struct sadmm_contact_point *point = &world->contacts.points[index];
+    int32_t body = pair->body_b >= 0 ? pair->body_b : pair->body_a;
+    const double *arm = pair->body_b >= 0 ? point->arm_b : point->arm_a;
+    out->shape_a = shape_id(world, pair->shape_a);
+    out->shape_b = shape_id(world, pair->shape_b);
+    out->body_a = body_of(world, pair->shape_a);
+    out->body_b = body_of(world, pair->shape_b);
+    for (int k = 0; k < 3; ++k) {
+        out->position[k] = world->start[body].position[k] + arm[k];
+        out->normal[k] = pair->normal[k];
+        out->impulse[k] = point->impulse[k];
+        out->force[k] = point->impulse[k] / world->step_settings.dt;
+    }
+    out->gap = point->gap;
+    out->friction = pair->friction;
+    out->feature = point->feature;
+}
+
+sadmm_status sadmm_world_contacts(const sadmm_world *world, int32_t first, int32_t count, sadmm_contact *contacts)
+{
+    int32_t total = sadmm_world_contact_count(world);
+    struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    if (first < 0 || count < 0 || first > total - count)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "[first, first + count) = [%d, %lld): must be in [0, %d)", first,
+                          (long long)first + count, total);
+    if (count == 0) return SADMM_OK;
+    if (!contacts) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "contacts is NULL");
+    TRY(sadmm_world_pull_contacts(world));
+    size_t p = pair_of(&world->contacts, first);
+    for (int32_t k = first; k < first + count; ++k) {
+        while (k >= world->contacts.pairs[p].first + world->contacts.pairs[p].count) ++p;
+        read_contact(world, &world->contacts.pairs[p], k, &contacts[k - first]);
+    }
+    return SADMM_OK;
+}
+
+static sadmm_status freeze(const sadmm_world *world, sadmm_problem *problem, double *A, double *b, double *v,
+                           sadmm_problem_contact *contacts)
+{
+    size_t n = (size_t)world->plan.bodies;
+    struct sadmm_system system = {.body_count = world->plan.bodies, .rigid = world->start};
+    for (size_t i = 0; i < n; ++i) {
+        sadmm_system_body(&system, &world->step_settings, (int32_t)i, A + 36 * i, b + 6 * i);
+        memcpy(v + 6 * i, world->start_velocity + 6 * i, 6 * sizeof *v);
+    }
+    for (size_t p = 0; p < world->contacts.pair_count; ++p) {
+        const struct sadmm_contact_pair *pair = &world->contacts.pairs[p];
+        for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
+            const struct sadmm_contact_point *point = &world->contacts.points[k];
+            sadmm_problem_contact *contact = &contacts[k];
+            contact->body_a = pair->body_a;
+            contact->body_b = pair->body_b;
+            memcpy(contact->normal, pair->normal, sizeof contact->normal);
+            memcpy(contact->arm_a, point->arm_a, sizeof contact->arm_a);
+            memcpy(contact->arm_b, point->arm_b, sizeof contact->arm_b);
+            contact->error = sadmm_contact_e(&system, &world->step_settings, pair, point);
+            contact->friction = pair->friction;
+        }
+    }
+    sadmm_status status = sadmm_problem_set_bodies(problem, world->plan.bodies, A, b, v);
+    if (status != SADMM_OK) return status;
+    return sadmm_problem_set_contacts(problem, (int32_t)world->contacts.point_count, contacts, world->start_impulse);
+}
+
+sadmm_status sadmm_world_freeze(const sadmm_world *world, sadmm_problem *problem)
+{
+    struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    if (!problem) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "problem is NULL");
+    TRY(sadmm_world_pull_contacts(world));
+    if (!world->stepped || !world->contacts_readable)
+        return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE,
+                          "there is no step to freeze: none was made yet, or something was removed since");
+    size_t n = (size_t)world->plan.bodies, k = world->contacts.point_count;
+    double *A = (double *)sadmm_alloc(48 * n, sizeof *A);
+    sadmm_problem_contact *contacts = (sadmm_problem_contact *)sadmm_alloc(k, sizeof *contacts);
+    sadmm_status status = A && contacts ? freeze(world, problem, A, A + 36 * n, A + 42 * n, contacts)
+                                        : sadmm_fail_memory(error, "the frozen problem");
+    if (status != SADMM_OK && A && contacts) sadmm_fail(error, status, "%s", sadmm_problem_message(problem));
+    sadmm_free(A);
+    sadmm_free(contacts);
+    return status;
+}

@@ -1,0 +1,111 @@
+/* The world as a step reads it: dynamic bodies in slot order, bodies and shapes as collision sees them, the system. */
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "core/model/steady.h"
+#include "world_internal.h"
+
+static bool grow(void *array, size_t *capacity, size_t needed, size_t size)
+{
+    return sadmm_grow((void **)array, capacity, 0, needed, size);
+}
+
+static bool moves(const struct sadmm_world_body *body) { return body->alive && body->type != SADMM_BODY_STATIC; }
+
+static int32_t count_moving(const sadmm_world *world, size_t begin, size_t end)
+{
+    int32_t count = 0;
+    for (size_t slot = begin; slot < end; ++slot) count += moves(&world->bodies[slot]);
+    return count;
+}
+
+static size_t begin_of(int share, int shares, size_t count) { return count * (size_t)share / (size_t)shares; }
+
+/* Slots [begin, end), whose dynamic bodies are `dynamic` and the following. */
+static void gather_slots(sadmm_world *world, size_t begin, size_t end, int32_t dynamic)
+{
+    for (size_t slot = begin; slot < end; ++slot) {
+        struct sadmm_world_body *body = &world->bodies[slot];
+        struct sadmm_collision_body *out = &world->collision_bodies[slot];
+        memcpy(out->position, body->rigid.position, sizeof out->position);
+        memcpy(out->orientation, body->rigid.orientation, sizeof out->orientation);
+        memcpy(out->velocity, body->rigid.velocity, sizeof out->velocity);
+        out->environment = body->environment;
+        out->system_body = body->system_body = -1;
+        if (!moves(body)) continue;
+        out->system_body = body->system_body = dynamic;
+        world->start[dynamic] = body->rigid;
+        steady_start(&body->rigid, &body->steady, world->velocity + 6 * (size_t)dynamic);
+        memcpy(world->start_velocity + 6 * (size_t)dynamic, world->velocity + 6 * (size_t)dynamic,
+               6 * sizeof *world->velocity);
+        world->slot_of[dynamic++] = (int32_t)slot;
+    }
+}
+
+static int last_threads(const sadmm_world *world) /* by the contacts of the last step */
+{
+    return sadmm_plan_threads(world->def.settings.threads, world->contacts.point_count);
+}
+
+sadmm_status sadmm_world_gather(sadmm_world *world)
+{
+    /* One at least: a system without bodies is still one of rigid bodies. */
+    size_t n = (size_t)world->dynamic_count + 1, slots = world->body_slots;
+    if (!grow(&world->collision_bodies, &world->collision_body_capacity, slots, sizeof *world->collision_bodies) ||
+        !grow(&world->start, &world->start_capacity, n, sizeof *world->start) ||
+        !grow(&world->next, &world->next_capacity, n, sizeof *world->next) ||
+        !grow(&world->velocity, &world->velocity_capacity, 6 * n, sizeof *world->velocity) ||
+        !grow(&world->wrench, &world->wrench_capacity, 6 * n, sizeof *world->wrench) ||
+        !grow(&world->start_velocity, &world->start_velocity_capacity, 6 * n, sizeof *world->start_velocity) ||
+        !grow(&world->slot_of, &world->slot_of_capacity, n, sizeof *world->slot_of))
+        return sadmm_fail_memory(&world->error, "the step");
+    /* A share of the slots a thread: how many dynamic bodies are in it, then the bodies. */
+    enum { MOST_SHARES = 64 };
+    const int threads = sadmm_pass_threads(last_threads(world), slots), shares = threads < MOST_SHARES ? threads : MOST_SHARES;
+    int32_t first[MOST_SHARES + 1] = {0};
+#pragma omp parallel for schedule(static, 1) num_threads(shares) if (shares > 1)
+    for (int s = 0; s < shares; ++s) first[s + 1] = count_moving(world, begin_of(s, shares, slots), begin_of(s + 1, shares, slots));
+    for (int s = 0; s < shares; ++s) first[s + 1] += first[s];
+#pragma omp parallel for schedule(static, 1) num_threads(shares) if (shares > 1)
+    for (int s = 0; s < shares; ++s) gather_slots(world, begin_of(s, shares, slots), begin_of(s + 1, shares, slots), first[s]);
+    return SADMM_OK;
+}
+
+struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *world)
+{
+    struct sadmm_collision_input input = {
+        .shapes = world->shapes,
+        .shape_count = world->shape_slots,
+        .bodies = world->collision_bodies,
+        .body_count = world->body_slots,
+        .dt = world->def.settings.dt,
+        .margin = world->def.contact_margin,
+        .threads = last_threads(world),
+        .disabled_body_pairs = world->disabled_pairs.keys,
+        .disabled_body_pair_count = world->disabled_pairs.count,
+        .friction_pairs = world->friction_pairs.keys,
+        .friction_values = world->friction_pairs.values,
+        .friction_pair_count = world->friction_pairs.count,
+    };
+    return input;
+}
+
+struct sadmm_system sadmm_world_system(sadmm_world *world)
+{
+    struct sadmm_system system = {
+        .body_count = world->dynamic_count,
+        .rigid = world->start,
+        .velocity = world->velocity,
+        .contacts = &world->contacts,
+        .first = !world->stepped,
+    };
+    return system;
+}
+
+sadmm_status sadmm_world_not_finite(sadmm_world *world, int32_t body)
+{
+    int32_t slot = world->slot_of[body];
+    return sadmm_fail(&world->error, SADMM_ERROR_NON_FINITE,
+                      "the step made body (slot %d, generation %u, \"%s\") not finite; the world is as before it", slot + 1,
+                      world->bodies[slot].generation, world->bodies[slot].name);
+}

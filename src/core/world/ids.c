@@ -1,0 +1,25 @@
+/* From an id to the live object it names. */
+#include "world_internal.h"
+
+struct sadmm_world_body *sadmm_world_find_body(const sadmm_world *world, sadmm_body_id id, const char *argument,
+                                               struct sadmm_error *error)
+{
+    if (id.slot >= 1 && id.slot <= world->body_slots) {
+        struct sadmm_world_body *body = &world->bodies[id.slot - 1];
+        if (body->alive && body->generation == id.generation) return body;
+    }
+    sadmm_fail(error, SADMM_ERROR_STALE_ID, "%s = (slot %u, generation %u): no such body (any more)", argument, id.slot,
+               id.generation);
+    return NULL;
+}
+
+struct sadmm_shape *sadmm_world_find_shape(const sadmm_world *world, sadmm_shape_id id, const char *argument,
+                                           struct sadmm_error *error)
+{
+    if (id.slot >= 1 && id.slot <= world->shape_slots && world->shapes[id.slot - 1].alive &&
+        world->shape_generations[id.slot - 1] == id.generation)
+        return &world->shapes[id.slot - 1];
+    sadmm_fail(error, SADMM_ERROR_STALE_ID, "%s = (slot %u, generation %u): no such shape (any more)", argument, id.slot,
+               id.generation);
+    return NULL;
+}

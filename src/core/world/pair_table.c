@@ -1,0 +1,59 @@
+#include "pair_table.h"
+
+#include <string.h>
+
+#include "core/base/memory.h"
+
+uint64_t sadmm_pair_key(size_t a, size_t b)
+{
+    return a < b ? (uint64_t)a << 32 | (uint64_t)b : (uint64_t)b << 32 | (uint64_t)a;
+}
+
+bool sadmm_pair_table_find(const struct sadmm_pair_table *table, uint64_t key, size_t *at)
+{
+    size_t low = 0, high = table->count;
+    while (low < high) {
+        size_t middle = low + (high - low) / 2;
+        if (table->keys[middle] < key)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    *at = low;
+    return low < table->count && table->keys[low] == key;
+}
+
+sadmm_status sadmm_pair_table_set(struct sadmm_pair_table *table, uint64_t key, double value, struct sadmm_error *error)
+{
+    size_t at, count = table->count;
+    if (!sadmm_pair_table_find(table, key, &at)) {
+        if (!sadmm_grow((void **)&table->keys, &table->key_capacity, count, count + 1, sizeof *table->keys) ||
+            !sadmm_grow((void **)&table->values, &table->value_capacity, count, count + 1, sizeof *table->values))
+            return sadmm_fail_memory(error, "a pair override");
+        memmove(table->keys + at + 1, table->keys + at, (count - at) * sizeof *table->keys);
+        memmove(table->values + at + 1, table->values + at, (count - at) * sizeof *table->values);
+        table->keys[at] = key;
+        ++table->count;
+    }
+    table->values[at] = value;
+    return SADMM_OK;
+}
+
+static void remove_at(struct sadmm_pair_table *table, size_t at)
+{
+    size_t rest = --table->count - at;
+    memmove(table->keys + at, table->keys + at + 1, rest * sizeof *table->keys);
+    memmove(table->values + at, table->values + at + 1, rest * sizeof *table->values);
+}
+
+void sadmm_pair_table_remove(struct sadmm_pair_table *table, uint64_t key)
+{
+    size_t at;
+    if (sadmm_pair_table_find(table, key, &at)) remove_at(table, at);
+}
+
+void sadmm_pair_table_forget(struct sadmm_pair_table *table, uint32_t slot)
+{
+    for (size_t k = table->count; k-- > 0;)
+        if (table->keys[k] >> 32 == slot || (uint32_t)table->keys[k] == slot) remove_at(table, k);
+}

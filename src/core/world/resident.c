@@ -1,0 +1,226 @@
+/* A world that a backend keeps (resident.h): steps are enqueued there, and the host's copy follows on demand.
+ *
+ *     loaded           the backend has the world. States and wrenches set meanwhile are remembered as edits and go along
+ *                      with the next step; any other change first takes the world back, and the next step loads it anew.
+ *     running          steps were enqueued whose end nobody has waited for
+ *     bodies_behind,   the host's bodies, or contacts with everything else about the last step, are older than the
+ *     contacts_behind  backend's: getters pull them, once
+ */
+#include <string.h>
+
+#include "core/base/clock.h"
+#include "core/solve/certificate.h"
+#include "core/base/memory.h"
+#include "world_internal.h"
+
+/* A resident step is enqueued with all of its looks, and those that nobody needs any more take time as well. */
+enum { MOST_LOOKS = 64 };
+
+bool sadmm_world_may_reside(const sadmm_world *world)
+{
+    /* Of the stop rules a backend looks at the certificate's in the method FAST alone; and the loads of a first step are
+     * predicted on the host. */
+    const sadmm_settings *s = &world->def.settings;
+    const bool fast = s->method == SADMM_METHOD_FAST, few_looks = (s->iterations - 1) / s->check_period < MOST_LOOKS;
+    if (fast && !world->stepped) return false;
+    return world->kernels->resident && s->residual_tolerance <= 0 &&
+           (s->certificate_tolerance <= 0 || (fast && few_looks));
+}
+
+/* ---- edits ------------------------------------------------------------------------------------------------------- */
+
+sadmm_status sadmm_world_edit_room(sadmm_world *world)
+{
+    if (!world->resident.loaded) return SADMM_OK;
+    if (!sadmm_grow((void **)&world->resident.edits, &world->resident.edit_capacity, world->resident.edit_count,
+                    world->resident.edit_count + 1, sizeof *world->resident.edits))
+        return sadmm_fail_memory(&world->error, "a change of a body");
+    return SADMM_OK;
+}
+
+void sadmm_world_edit(sadmm_world *world, const struct sadmm_world_body *body, uint32_t what)
+{
+    if (!world->resident.loaded) return;
+    struct sadmm_resident_edit *edit = &world->resident.edits[world->resident.edit_count++];
+    edit->body = body->system_body;
+    edit->what = what;
+    memcpy(edit->position, body->rigid.position, sizeof edit->position);
+    memcpy(edit->orientation, body->rigid.orientation, sizeof edit->orientation);
+    memcpy(edit->velocity, body->rigid.velocity, sizeof edit->velocity);
+    memcpy(edit->wrench, body->rigid.wrench, sizeof edit->wrench);
+}
+
+static void apply(struct sadmm_rigid *rigid, const struct sadmm_resident_edit *edit)
+{
+    if (edit->what & SADMM_EDIT_STATE) {
+        memcpy(rigid->position, edit->position, sizeof rigid->position);
+        memcpy(rigid->orientation, edit->orientation, sizeof rigid->orientation);
+        memcpy(rigid->velocity, edit->velocity, sizeof rigid->velocity);
+    }
+    if (edit->what & SADMM_EDIT_WRENCH) memcpy(rigid->wrench, edit->wrench, sizeof rigid->wrench);
+}
+
+/* ---- to the backend ---------------------------------------------------------------------------------------------- */
+
+static sadmm_status load(sadmm_world *world)
+{
+    size_t n = (size_t)world->dynamic_count;
+    TRY(sadmm_world_gather(world));
+    if (!sadmm_grow((void **)&world->resident.steady, &world->resident.steady_capacity, 0, n + 1,
+                    sizeof *world->resident.steady))
+        return sadmm_fail_memory(&world->error, "the step");
+    for (size_t i = 0; i < n; ++i) world->resident.steady[i] = world->bodies[world->slot_of[i]].steady;
+    struct sadmm_collision_input input = sadmm_world_collision_input(world);
+    struct sadmm_resident_world whole = {
+        .input = &input,
+        .body_count = world->dynamic_count,
+        .rigid = world->start,
+        .steady = world->resident.steady,
+        .slot_of = world->slot_of,
+        .contacts = &world->contacts,
+    };
+    TRY(world->kernels->resident->load(world->context, &whole, &world->def.settings, &world->error));
+    world->resident.loaded = true;
+    world->resident.done = world->resident.repeats = 0;
+    world->resident.edit_count = 0;
+    return SADMM_OK;
+}
+
+static sadmm_status certify(sadmm_world *world)
+{
+    TRY(sadmm_world_pull_bodies(world));
+    TRY(sadmm_world_pull_contacts(world));
+    struct sadmm_system system = sadmm_world_system(world);
+    double begin = sadmm_clock_ms();
+    TRY(sadmm_certify_with(&world->certificate_workspace, &system, &world->step_settings, &world->report.certificate,
+                           &world->error));
+    world->report.certify_ms = sadmm_clock_ms() - begin;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_resident_step(sadmm_world *world, bool wait)
+{
+    const struct sadmm_resident_kernels *backend = world->kernels->resident;
+    const sadmm_settings *settings = &world->def.settings;
+    double begin = sadmm_clock_ms();
+    bool other = memcmp(&world->step_settings, settings, sizeof *settings) != 0;
+    if (other) TRY(sadmm_world_settle(world));
+    if (!world->resident.loaded) TRY(load(world));
+    if (world->resident.edit_count > 0) {
+        TRY(backend->edit(world->context, world->resident.edits, world->resident.edit_count, &world->error));
+        world->resident.edit_count = 0;
+        world->resident.bodies_behind = true;
+    }
+    world->step_settings = *settings;
+    sadmm_status status = backend->step(world->context, settings, &world->error);
+    world->resident.running = true;
+    if (status != SADMM_OK) { /* of this step or an earlier one: how far the world has got */
+        struct sadmm_error kept = world->error;
+        sadmm_status waited = sadmm_world_settle(world);
+        if (waited == SADMM_OK) world->error = kept;
+        return waited == SADMM_OK ? status : waited;
+    }
+    if (!wait && !settings->certify) return SADMM_OK;
+    TRY(sadmm_world_settle(world));
+    world->report.ms.total = sadmm_clock_ms() - begin; /* what the caller waited */
+    return settings->certify ? certify(world) : SADMM_OK;
+}
+
+/* ---- from the backend -------------------------------------------------------------------------------------------- */
+
+static void take_report(sadmm_world *world, const struct sadmm_resident_report *done)
+{
+    sadmm_step_report *report = &world->report;
+    int64_t steps = done->done - world->resident.done;
+    report->repeated += done->repeats - world->resident.repeats;
+    world->resident.repeats = done->repeats;
+    if (steps <= 0) return;
+    world->resident.done = done->done;
+    world->resident.bodies_behind = world->resident.contacts_behind = true;
+    world->stepped = world->contacts_readable = true;
+    world->plan = done->plan;
+    report->step += steps;
+    for (int64_t k = 0; k < steps; ++k) report->time += world->step_settings.dt;
+    report->backend = world->kernels->backend;
+    report->precision = world->kernels->precision;
+    report->threads = done->plan.threads;
+    report->bodies = done->plan.bodies;
+    report->contacts = done->plan.points;
+    report->pairs = done->plan.pairs;
+    report->iterations = done->iterations;
+    report->iterations_mean = done->iterations_mean;
+    report->converged = done->converged;
+    report->limited = done->limited;
+    report->penetration_max = done->penetration_max;
+    report->residual = done->residual;
+    report->ms.collide = done->ms.collide;
+    report->ms.assemble = done->ms.assemble;
+    report->ms.solve = done->ms.solve;
+    report->ms.finish = done->ms.finish;
+    report->ms.total = done->ms.total;
+    report->certify_ms = 0;
+    report->certificate = sadmm_certificate_none();
+    report->certificate.islands_above = done->islands_above;
+}
+
+sadmm_status sadmm_world_settle(const sadmm_world *constant)
+{
+    sadmm_world *world = (sadmm_world *)constant; /* what is known of it changes, not the world */
+    struct sadmm_resident_report report = {.culprit = -1};
+    if (!world->resident.running) return SADMM_OK;
+    world->resident.running = false;
+    sadmm_status status = world->kernels->resident->wait(world->context, &report, &world->error);
+    take_report(world, &report);
+    if (status != SADMM_OK) world->contacts_readable = false;
+    return status == SADMM_ERROR_NON_FINITE && report.culprit >= 0 ? sadmm_world_not_finite(world, report.culprit)
+                                                                   : status;
+}
+
+sadmm_status sadmm_world_pull_bodies(const sadmm_world *constant)
+{
+    sadmm_world *world = (sadmm_world *)constant;
+    TRY(sadmm_world_settle(world));
+    if (!world->resident.bodies_behind) return SADMM_OK;
+    TRY(world->kernels->resident->read_bodies(world->context, world->next, world->resident.steady,
+                                              world->plan.wrenches ? world->wrench : NULL, &world->error));
+    for (int32_t i = 0; i < world->dynamic_count; ++i) {
+        struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
+        body->rigid = world->next[i];
+        body->steady = world->resident.steady[i];
+        if (world->plan.wrenches)
+            memcpy(body->contact_wrench, world->wrench + 6 * (size_t)i, sizeof body->contact_wrench);
+    }
+    for (size_t k = 0; k < world->resident.edit_count; ++k)
+        apply(&world->bodies[world->slot_of[world->resident.edits[k].body]].rigid, &world->resident.edits[k]);
+    world->resident.bodies_behind = false;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_pull_contacts(const sadmm_world *constant)
+{
+    sadmm_world *world = (sadmm_world *)constant;
+    const struct sadmm_resident_kernels *backend = world->kernels ? world->kernels->resident : NULL;
+    TRY(sadmm_world_settle(world));
+    if (!world->resident.contacts_behind) return SADMM_OK;
+    size_t count = (size_t)world->report.contacts;
+    if (!sadmm_grow((void **)&world->start_impulse, &world->start_impulse_capacity, 0, 3 * count,
+                    sizeof *world->start_impulse))
+        return sadmm_fail_memory(&world->error, "the step's starting impulses");
+    TRY(backend->read_contacts(world->context, &world->contacts, &world->error));
+    TRY(backend->read_start(world->context, world->start, world->start_velocity, world->start_impulse, &world->error));
+    TRY(backend->read_bodies(world->context, world->next, NULL, NULL, &world->error));
+    for (size_t i = 0; i < (size_t)world->dynamic_count; ++i)
+        memcpy(world->velocity + 6 * i, world->next[i].velocity, 6 * sizeof *world->velocity);
+    world->resident.contacts_behind = false;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_take_back(sadmm_world *world)
+{
+    if (!world->resident.loaded) return SADMM_OK;
+    TRY(sadmm_world_pull_bodies(world));
+    TRY(sadmm_world_pull_contacts(world));
+    world->resident.loaded = false;
+    world->resident.edit_count = 0;
+    return SADMM_OK;
+}

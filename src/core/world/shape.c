@@ -1,0 +1,173 @@
+/* Shapes of a world. */
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "world_internal.h"
+
+sadmm_shape_def sadmm_shape_def_default(void)
+{
+    sadmm_shape_def def = {
+        .type = SADMM_SHAPE_SPHERE,
+        .orientation = {1, 0, 0, 0},
+        .friction = 0.5,
+        .category = 1,
+        .mask = UINT32_MAX,
+    };
+    return def;
+}
+
+static bool alive(const sadmm_world *world, size_t slot)
+{
+    return world->shapes[slot].alive;
+}
+
+static int size_entries(sadmm_shape_type type)
+{
+    switch (type) {
+    case SADMM_SHAPE_SPHERE: return 1;
+    case SADMM_SHAPE_CAPSULE: return 2;
+    case SADMM_SHAPE_BOX: return 3;
+    default: return 0;
+    }
+}
+
+static sadmm_status check_def(const struct sadmm_world_body *body, const sadmm_shape_def *def, double orientation[4],
+                              struct sadmm_error *error)
+{
+    if ((unsigned)def->type >= SADMM_SHAPE_TYPE_COUNT)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->type = %d: must be in [0, %d)", (int)def->type,
+                          SADMM_SHAPE_TYPE_COUNT);
+    if (def->type == SADMM_SHAPE_PLANE && body->type != SADMM_BODY_STATIC)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->type = SADMM_SHAPE_PLANE: only static bodies may have planes");
+    for (int k = 0; k < size_entries(def->type); ++k)
+        if (!(def->size[k] >= 1e-6 && def->size[k] <= 1e6))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->size[%d] = %g: must be in [1e-6, 1e6] m", k,
+                              def->size[k]);
+    TRY(sadmm_check_vector("def->position", def->position, 3, 1e6, error));
+    TRY(sadmm_check_orientation("def->orientation", def->orientation, orientation, error));
+    TRY(sadmm_check_range("def->friction", def->friction, 0, 1e6, error));
+    return sadmm_check_range("def->restitution", def->restitution, 0, 1, error);
+}
+
+sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, const sadmm_shape_def *def, sadmm_shape_id *id)
+{
+    struct sadmm_error *error = &world->error;
+    struct sadmm_world_body *body = sadmm_world_find_body(world, body_id, "body", error);
+    double orientation[4];
+    if (!body) return SADMM_ERROR_STALE_ID;
+    if (!def) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def is NULL");
+    TRY(check_def(body, def, orientation, error));
+    TRY(sadmm_world_take_back(world));
+
+    size_t slot = world->shape_slots;
+    if ((size_t)world->shape_count < world->shape_slots) slot = sadmm_slot_free(&world->shape_marks, world, alive);
+    if (slot >= (size_t)1 << 28)
+        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d shapes: a world holds at most 2^28", world->shape_count);
+    if (!sadmm_grow((void **)&world->shapes, &world->shape_capacity, world->shape_slots, slot + 1, sizeof *world->shapes) ||
+        !sadmm_grow((void **)&world->shape_generations, &world->shape_generation_capacity, world->shape_slots, slot + 1,
+                    sizeof *world->shape_generations))
+        return sadmm_fail_memory(error, "a shape");
+
+    struct sadmm_shape *shape = &world->shapes[slot];
+    if (slot == world->shape_slots) {
+        ++world->shape_slots;
+        world->shape_generations[slot] = 1;
+    }
+    memset(shape, 0, sizeof *shape);
+    shape->type = def->type;
+    memcpy(shape->size, def->size, sizeof shape->size);
+    memcpy(shape->position, def->position, sizeof shape->position);
+    memcpy(shape->orientation, orientation, sizeof orientation);
+    shape->friction = def->friction;
+    shape->restitution = def->restitution;
+    shape->category = def->category;
+    shape->mask = def->mask;
+    shape->body = (int32_t)body_id.slot - 1;
+    shape->alive = true;
+    shape->revision = ++world->shape_revisions;
+    ++world->shape_count;
+    sadmm_slot_taken(&world->shape_marks, slot);
+    if (body->shape_count++ == 0 || slot < body->first_shape) body->first_shape = slot;
+    if (id) {
+        id->slot = (uint32_t)slot + 1;
+        id->generation = world->shape_generations[slot];
+    }
+    return SADMM_OK;
+}
+
+void sadmm_world_kill_shape(sadmm_world *world, size_t slot)
+{
+    world->shapes[slot].alive = false;
+    ++world->shape_generations[slot];
+    --world->shape_count;
+    --world->bodies[world->shapes[slot].body].shape_count;
+    sadmm_slot_freed(&world->shape_marks, slot);
+    sadmm_pair_table_forget(&world->friction_pairs, (uint32_t)slot);
+    world->contacts_readable = false;
+}
+
+sadmm_status sadmm_world_remove_shape(sadmm_world *world, sadmm_shape_id id)
+{
+    if (!sadmm_world_find_shape(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_world_take_back(world));
+    sadmm_world_kill_shape(world, id.slot - 1);
+    return SADMM_OK;
+}
+
+int32_t sadmm_world_shape_count(const sadmm_world *world)
+{
+    return world->shape_count;
+}
+
+sadmm_status sadmm_world_shape_at(const sadmm_world *world, int32_t index, sadmm_shape_id *id)
+{
+    struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    if (!id) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "id is NULL");
+    if (index < 0 || index >= world->shape_count)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index, world->shape_count);
+    size_t slot = (size_t)index;
+    if ((size_t)world->shape_count < world->shape_slots)
+        slot = sadmm_slot_at((struct sadmm_slot_marks *)&world->shape_marks, index, world, alive);
+    id->slot = (uint32_t)slot + 1;
+    id->generation = world->shape_generations[slot];
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_shape_def(const sadmm_world *world, sadmm_shape_id id, sadmm_shape_def *def, sadmm_body_id *body)
+{
+    struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    const struct sadmm_shape *shape = sadmm_world_find_shape(world, id, "id", error);
+    if (!shape) return SADMM_ERROR_STALE_ID;
+    if (!def) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def is NULL");
+    memset(def, 0, sizeof *def);
+    def->type = shape->type;
+    memcpy(def->size, shape->size, sizeof def->size);
+    memcpy(def->position, shape->position, sizeof def->position);
+    memcpy(def->orientation, shape->orientation, sizeof def->orientation);
+    def->friction = shape->friction;
+    def->restitution = shape->restitution;
+    def->category = shape->category;
+    def->mask = shape->mask;
+    if (body) {
+        body->slot = (uint32_t)shape->body + 1;
+        body->generation = world->bodies[shape->body].generation;
+    }
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_shape_id a, sadmm_shape_id b, double friction)
+{
+    struct sadmm_error *error = &world->error;
+    if (!sadmm_world_find_shape(world, a, "a", error) || !sadmm_world_find_shape(world, b, "b", error))
+        return SADMM_ERROR_STALE_ID;
+    if (a.slot == b.slot) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "a and b are the same shape");
+    uint64_t key = sadmm_pair_key(a.slot - 1, b.slot - 1);
+    if (friction == -1) {
+        TRY(sadmm_world_take_back(world));
+        sadmm_pair_table_remove(&world->friction_pairs, key);
+        return SADMM_OK;
+    }
+    TRY(sadmm_check_range("friction (or -1 for the geometric mean)", friction, 0, 1e6, error));
+    TRY(sadmm_world_take_back(world));
+    return sadmm_pair_table_set(&world->friction_pairs, key, friction, error);
+}

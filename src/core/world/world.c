@@ -1,0 +1,81 @@
+/* World level: creation, settings. Bodies, shapes, the step and its read-outs are in the files beside this one. */
+#include "subadmm/world.h"
+
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "core/solve/registry.h"
+#include "core/model/settings.h"
+#include "world_internal.h"
+
+sadmm_world_def sadmm_world_def_default(void)
+{
+    sadmm_world_def def = {
+        .backend = SADMM_BACKEND_AUTO,
+        .precision = SADMM_F64,
+        .device = 0,
+        .contact_margin = 0.02,
+        .settings = sadmm_settings_default(),
+    };
+    return def;
+}
+
+sadmm_status sadmm_world_create(const sadmm_world_def *def, sadmm_world **out)
+{
+    if (!out) return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "out is NULL");
+    *out = NULL;
+    if (!def) return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "def is NULL");
+    sadmm_status status = sadmm_settings_validate(&def->settings, NULL);
+    if (status == SADMM_OK) status = sadmm_check_range("def->contact_margin", def->contact_margin, 0, 1, NULL);
+    if (status != SADMM_OK) return status;
+    if (def->device < 0)
+        return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "def->device = %d: must be >= 0", def->device);
+    /* AUTO is decided at the first step, when the size of the scene is known; unavailable choices fail here. */
+    const struct sadmm_kernels *kernels = NULL;
+    status = sadmm_backend_choose(def->backend, def->precision, 0, &kernels, NULL, 0, NULL);
+    if (status != SADMM_OK) return status;
+
+    sadmm_world *world = (sadmm_world *)sadmm_alloc(1, sizeof *world);
+    if (!world) return sadmm_fail_memory(NULL, "the world");
+    world->def = *def;
+    status = sadmm_collision_create(&world->collision, NULL);
+    if (status != SADMM_OK) {
+        sadmm_free(world);
+        return status;
+    }
+    *out = world;
+    return SADMM_OK;
+}
+
+void sadmm_world_destroy(sadmm_world *world)
+{
+    if (!world) return;
+    if (world->context) world->kernels->destroy(world->context);
+    sadmm_collision_destroy(world->collision);
+    sadmm_contact_set_free(&world->contacts);
+    sadmm_certificate_workspace_free(&world->certificate_workspace);
+    void *blocks[] = {world->bodies, world->shapes, world->shape_generations, world->disabled_pairs.keys,
+                      world->disabled_pairs.values, world->friction_pairs.keys, world->friction_pairs.values,
+                      world->collision_bodies, world->start, world->next, world->velocity, world->wrench,
+                      world->start_velocity, world->start_impulse, world->slot_of,
+                      world->resident.steady, world->resident.edits};
+    for (size_t i = 0; i < sizeof blocks / sizeof *blocks; ++i) sadmm_free(blocks[i]);
+    sadmm_free(world);
+}
+
+const char *sadmm_world_message(const sadmm_world *world)
+{
+    return world ? world->error.message : "";
+}
+
+sadmm_status sadmm_world_set_settings(sadmm_world *world, const sadmm_settings *settings)
+{
+    sadmm_status status = sadmm_settings_validate(settings, &world->error);
+    if (status == SADMM_OK) world->def.settings = *settings;
+    return status;
+}
+
+sadmm_settings sadmm_world_settings(const sadmm_world *world)
+{
+    return world->def.settings;
+}

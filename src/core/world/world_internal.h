@@ -1,0 +1,126 @@
+/* A world's insides, shared by the files of this folder. */
+#ifndef SADMM_CORE_WORLD_INTERNAL_H
+#define SADMM_CORE_WORLD_INTERNAL_H
+
+#include "collision/collision.h"
+#include "core/base/check.h"
+#include "core/base/error.h"
+#include "core/solve/certificate.h"
+#include "core/solve/kernels.h"
+#include "core/solve/schedule.h"
+#include "pair_table.h"
+#include "slots.h"
+#include "subadmm/world.h"
+
+enum { SADMM_NAME_SIZE = 64, SADMM_WHY_SIZE = 256 };
+
+/* A body slot. Dynamic bodies are numbered in slot order for the solver at every step. */
+struct sadmm_world_body {
+    bool alive;
+    uint32_t generation; /* of the next id when dead, of the current one when alive */
+    sadmm_body_type type;
+    int32_t environment;
+    int32_t system_body; /* in the last step, -1: static or not there */
+    struct sadmm_rigid rigid;
+    int32_t shape_count;
+    size_t first_shape;  /* none of its shapes is in a lower slot */
+    double contact_wrench[6];
+    struct sadmm_steady steady;
+    char name[SADMM_NAME_SIZE];
+};
+
+struct sadmm_world {
+    sadmm_world_def def; /* settings inside are the current ones */
+    struct sadmm_error error;
+
+    struct sadmm_world_body *bodies;
+    size_t body_slots, body_capacity;
+    int32_t body_count, dynamic_count;
+    struct sadmm_slot_marks body_marks;
+    struct sadmm_shape *shapes;
+    uint32_t *shape_generations;
+    size_t shape_slots, shape_capacity, shape_generation_capacity;
+    int32_t shape_count;
+    struct sadmm_slot_marks shape_marks;
+    uint32_t shape_revisions;
+    struct sadmm_pair_table disabled_pairs, friction_pairs;
+
+    /* The last step: everything freeze, contacts and the next warm start need. */
+    struct sadmm_collision *collision;
+    struct sadmm_contact_set contacts;
+    bool contacts_readable;
+    struct sadmm_collision_body *collision_bodies; /* by slot */
+    struct sadmm_rigid *start, *next;              /* dynamic bodies: before and after the step */
+    double *velocity, *wrench;                     /* dynamic bodies x 6 */
+    double *start_velocity;                        /* dynamic bodies x 6: the warm start */
+    double *start_impulse;                         /* points x 3: the warm start */
+    int32_t *slot_of;                              /* dynamic body -> slot */
+    size_t collision_body_capacity, start_capacity, next_capacity, velocity_capacity, wrench_capacity,
+        start_velocity_capacity, start_impulse_capacity, slot_of_capacity;
+    struct sadmm_plan plan;
+    sadmm_settings step_settings;
+    bool stepped;
+
+    /* Where a backend keeps the world (resident.c). */
+    struct {
+        bool loaded;         /* the backend has the world; nothing but states and wrenches has changed since */
+        bool running;        /* steps were enqueued and not waited for */
+        bool bodies_behind;  /* the bodies above are older than the backend's */
+        bool contacts_behind;
+        int64_t done, repeats; /* steps since it was loaded, as far as known; repeated ones */
+        struct sadmm_steady *steady; /* dynamic bodies */
+        struct sadmm_resident_edit *edits; /* since the last step was enqueued */
+        size_t steady_capacity, edit_count, edit_capacity;
+    } resident;
+
+    const struct sadmm_kernels *kernels; /* chosen at the first step */
+    struct sadmm_context *context;
+    char why[SADMM_WHY_SIZE];
+    struct sadmm_certificate_workspace certificate_workspace;
+    sadmm_step_report report;
+};
+
+/* ---- gather.c ---- */
+
+/* Dynamic bodies in slot order into the arrays of the last step, and all bodies as collision sees them. */
+sadmm_status sadmm_world_gather(sadmm_world *world);
+struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *world);
+struct sadmm_system sadmm_world_system(sadmm_world *world);
+/* SADMM_ERROR_NON_FINITE that names a dynamic body. */
+sadmm_status sadmm_world_not_finite(sadmm_world *world, int32_t body);
+
+/* ---- step.c ---- */
+
+/* The choice of the kernels, at the first step. */
+sadmm_status sadmm_world_choose_backend(sadmm_world *world);
+
+/* ---- resident.c ---- */
+
+/* Can this step be made by a backend that keeps the world? */
+bool sadmm_world_may_reside(const sadmm_world *world);
+/* Enqueue a step; `wait`: until it is done, with its report. */
+sadmm_status sadmm_world_resident_step(sadmm_world *world, bool wait);
+/* Until every enqueued step is done. The error of a step that failed is returned once. */
+sadmm_status sadmm_world_settle(const sadmm_world *world);
+/* Bring the bodies (or contacts and everything else) of the last step back, where the backend is ahead. */
+sadmm_status sadmm_world_pull_bodies(const sadmm_world *world);
+sadmm_status sadmm_world_pull_contacts(const sadmm_world *world);
+/* Both, and from here on the host's world is the one that counts: before anything but a state or a wrench is changed. */
+sadmm_status sadmm_world_take_back(sadmm_world *world);
+/* Remember a change of a body for the backend. Makes room only: nothing can fail once the body has been changed. */
+sadmm_status sadmm_world_edit_room(sadmm_world *world);
+void sadmm_world_edit(sadmm_world *world, const struct sadmm_world_body *body, uint32_t what);
+
+/* ---- ids.c ---- */
+
+/* The slot of a live object, or NULL with SADMM_ERROR_STALE_ID set on `error`. */
+struct sadmm_world_body *sadmm_world_find_body(const sadmm_world *world, sadmm_body_id id, const char *argument,
+                                               struct sadmm_error *error);
+struct sadmm_shape *sadmm_world_find_shape(const sadmm_world *world, sadmm_shape_id id, const char *argument,
+                                           struct sadmm_error *error);
+
+/* ---- shape.c ---- */
+
+void sadmm_world_kill_shape(sadmm_world *world, size_t slot);
+
+#endif
