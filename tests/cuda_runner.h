@@ -18,17 +18,17 @@
 #define tier_of cuda_emulation_tier_of
 #define SYMBOL(name, precision) sadmm_cuda_##name##_emulated_##precision
 #else
-#include "backend_cuda/cuda_tier.h"
+#include "backend_cuda/graph/tier.h"
 #define force_tier sadmm_cuda_force_tier
 #define force_cluster sadmm_cuda_force_cluster
 #define tier_of sadmm_cuda_tier_of
 #define SYMBOL(name, precision) sadmm_cuda_##name##_##precision
 #endif
 #define CUDA(name) SYMBOL(name, f32)
-#include "backend_cuda/cuda_entries.h"
+#include "backend_cuda/device/entries.h"
 #undef CUDA
 #define CUDA(name) SYMBOL(name, f64)
-#include "backend_cuda/cuda_entries.h"
+#include "backend_cuda/device/entries.h"
 #undef CUDA
 
 static const struct sadmm_kernels *tables[2]; /* by precision */

@@ -7,7 +7,7 @@
  */
 #include "scene_tools.h"
 
-#include "backend_cuda/collision_device.h"
+#include "backend_cuda/collide/pipeline.h"
 #include "core/base/memory.h"
 #include "core/world/world_internal.h"
 

@@ -1,4 +1,4 @@
-/* The CUDA backend's layout (cuda_layout.h) against a plain construction on the host: facts, slots, lists of halves and
+/* The CUDA backend's layout (graph/layout.h) against a plain construction on the host: facts, slots, lists of halves and
  * every boundary of every part, number for number. On a real device, or skipped; test_cuda_layout_emulated.c runs the
  * same on the emulated one. */
 #include <stdio.h>
@@ -11,19 +11,19 @@
 #ifdef CUDA_EMULATED
 #include "emulation_control.h"
 #define CUDA(name) sadmm_cuda_##name##_emulated_f32
-#include "backend_cuda/cuda_entries.h"
+#include "backend_cuda/device/entries.h"
 #undef CUDA
 #define CUDA(name) sadmm_cuda_##name##_emulated_f64
-#include "backend_cuda/cuda_entries.h"
+#include "backend_cuda/device/entries.h"
 #undef CUDA
 #define LAY_OUT_F32 sadmm_cuda_lay_out_again_emulated_f32
 #define LAY_OUT_F64 sadmm_cuda_lay_out_again_emulated_f64
 #else
 #define CUDA(name) sadmm_cuda_##name##_f32
-#include "backend_cuda/cuda_entries.h"
+#include "backend_cuda/device/entries.h"
 #undef CUDA
 #define CUDA(name) sadmm_cuda_##name##_f64
-#include "backend_cuda/cuda_entries.h"
+#include "backend_cuda/device/entries.h"
 #undef CUDA
 #define LAY_OUT_F32 sadmm_cuda_lay_out_again_f32
 #define LAY_OUT_F64 sadmm_cuda_lay_out_again_f64

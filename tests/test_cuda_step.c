@@ -1,4 +1,4 @@
-/* Whole steps on the device (backend_cuda/cuda_step.h) against the same kernels driven by the host, step by step.
+/* Whole steps on the device (backend_cuda/step/step.h) against the same kernels driven by the host, step by step.
  *
  * Contacts are the same bits on both sides, and so are the solver's kernels: everything that can be read of a world must be
  * equal to the last bit, however the steps were enqueued, planned or repeated. A stop rule that is never met sends a
@@ -21,7 +21,7 @@
 #define tier_of cuda_emulation_tier_of
 #define tune_rooms cuda_emulation_tune_rooms
 #else
-#include "backend_cuda/cuda_tier.h"
+#include "backend_cuda/graph/tier.h"
 #define force_tier sadmm_cuda_force_tier
 #define tier_of sadmm_cuda_tier_of
 #define tune_rooms sadmm_cuda_tune_rooms

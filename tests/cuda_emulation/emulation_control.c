@@ -1,12 +1,12 @@
 #include "emulation_control.h"
 
-#include "backend_cuda/cuda_tables.h"
+#include "backend_cuda/device/tables.h"
 
 #define CUDA(name) sadmm_cuda_##name##_emulated_f32
-#include "backend_cuda/cuda_entries.h"
+#include "backend_cuda/device/entries.h"
 #undef CUDA
 #define CUDA(name) sadmm_cuda_##name##_emulated_f64
-#include "backend_cuda/cuda_entries.h"
+#include "backend_cuda/device/entries.h"
 #undef CUDA
 
 int cuda_emulation_descending;

@@ -1,0 +1,394 @@
+/* Candidates: from shapes and bodies to the pairs whose boxes overlap.
+ *
+ * The hierarchy is Karras' (Maximizing Parallelism in the Construction of BVHs, Octrees, and k-d Trees, HPG 2012) over
+ * sorted keys, ties broken by position. An inner node i covers a range of leaves that begins or ends at i; the right
+ * child of a node split after leaf r is numbered r + 1. The node after a subtree whose last leaf is r is therefore
+ * either inner node r + 1 or leaf r + 1, and the keys around r tell which: walks need no stack (the observation is
+ * Prokopenko and Lebrun-Grandie's, Revising Apetrei's Bounding Volume Hierarchy Construction Algorithm to Allow
+ * Stackless Traversal).
+ */
+#include "view.h"
+#include "backend_cuda/device/parallel.h"
+
+/* ---- place ----------------------------------------------------------------------------------------------------- */
+
+/* Two zero bits after each of the low 21. */
+static __device__ uint64_t spread(uint64_t x)
+{
+    x = (x | x << 32) & 0x001f00000000ffffu;
+    x = (x | x << 16) & 0x001f0000ff0000ffu;
+    x = (x | x << 8) & 0x100f00f00f00f00fu;
+    x = (x | x << 4) & 0x10c30c30c30c30c3u;
+    return (x | x << 2) & 0x1249249249249249u;
+}
+
+static __device__ uint64_t morton(const struct collision_grid &layout, const double x[3])
+{
+    const double most = (double)((1 << MORTON_BITS) - 1);
+    uint64_t code = 0;
+    for (int k = 0; k < 3; ++k) {
+        double cell = (x[k] - layout.origin[k]) * layout.scale;
+        /* what is far away, and what is no number, goes to the edge */
+        uint64_t at = cell > 0 ? (uint64_t)(cell < most ? cell : most) : 0;
+        code |= spread(at) << k;
+    }
+    return code;
+}
+
+struct grid_sample {
+    double samples[3][GRID_SAMPLES], bounds[2][3];
+};
+
+/* The grid covers three times what holds nine in ten of a sample of the movers: a body far away must not spoil it. One
+ * block; a thread takes an axis of the body of its share of the slots and finds the rank by comparing with all. */
+static __global__ void __launch_bounds__(3 * GRID_SAMPLES) grid_kernel(const __grid_constant__ collision_view v)
+{
+    COLLISION_SHARED(grid_sample, shared);
+    const int t = (int)threadIdx.x % GRID_SAMPLES, axis = (int)threadIdx.x / GRID_SAMPLES;
+    const int32_t slot = (int32_t)((int64_t)v.body_count * t / GRID_SAMPLES);
+    const bool stands = v.body_count <= t || v.bodies[slot].system_body < 0;
+    const double here = stands ? HUGE_VAL : v.bodies[slot].position[axis]; /* sorts to the end */
+    shared.samples[axis][t] = here;
+    if (t < 2) shared.bounds[t][axis] = 0;
+    __syncthreads();
+    int rank = 0, count = 0;
+    for (int other = 0; other < GRID_SAMPLES; ++other) {
+        const double there = shared.samples[axis][other];
+        count += there < HUGE_VAL;
+        rank += there < here || (there == here && other < t);
+    }
+    if (!stands && rank == count / 20) shared.bounds[0][axis] = here;
+    if (!stands && rank == count - 1 - count / 20) shared.bounds[1][axis] = here;
+    __syncthreads();
+    if (threadIdx.x > 0) return;
+    double range = 0;
+    for (int k = 0; k < 3; ++k) range = fmax(range, shared.bounds[1][k] - shared.bounds[0][k]);
+    for (int k = 0; k < 3; ++k)
+        v.grid->origin[k] = 0.5 * (shared.bounds[0][k] + shared.bounds[1][k]) - 1.5 * range;
+    v.grid->scale = range > 0 && range < HUGE_VAL ? (double)(1 << MORTON_BITS) / (3 * range) : 0;
+}
+
+/* The first kernel of a find also resets the counter of the candidates. */
+static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __grid_constant__ collision_view v)
+{
+    const int64_t i = collision_thread(PLACE_THREADS);
+    if (halted(v)) return;
+    if (i == 0) *v.candidate_count = 0;
+    if (i >= v.leaf_count + v.plane_count) return;
+    const uint32_t slot = v.present[i];
+    const struct sadmm_shape &shape = v.shapes[slot];
+    const struct sadmm_collision_body &body = v.bodies[shape.body];
+    const bool moves = body.system_body >= 0;
+    struct sadmm_proxy proxy;
+    struct collision_leaf leaf;
+    struct collision_filter filter;
+
+    proxy_place(&shape, &body, v.step.dt, v.step.margin, v.step.acceleration, &proxy, &leaf.box);
+    v.proxies[slot] = proxy;
+    filter.category = shape.category;
+    filter.mask = shape.mask;
+    filter.body = shape.body;
+    filter.kind = (int32_t)shape.type | (moves ? FILTER_MOVES : 0);
+    v.filters[slot] = filter;
+    if (i >= v.leaf_count) return;
+
+    leaf.slot = (int32_t)slot;
+    leaf.reserved = 0;
+    leaf.group_low = body.environment < 0 ? INT32_MIN : body.environment;
+    leaf.group_high = body.environment < 0 ? INT32_MAX : body.environment;
+    v.placed[slot] = leaf;
+
+    const uint64_t group = body.environment < 0 ? 0 : (uint64_t)body.environment;
+    const int rest = LEAF_CLASS_SHIFT - v.group_bits;
+    uint64_t key = shape_radius(proxy.type, proxy.size) >= v.large ? LEAF_LARGE : 0;
+    if (!moves) key = LEAF_STATIC;
+    v.leaf_keys[i] = key << LEAF_CLASS_SHIFT | group << rest | morton(*v.grid, proxy.x) >> (3 * MORTON_BITS - rest);
+    v.leaf_slots[i] = slot;
+}
+
+/* ---- tree ------------------------------------------------------------------------------------------------------ */
+
+/* Length of the prefix that leaves i and j have in common, positions included; -1 when j is none. */
+static __device__ __forceinline__ int common(const collision_view &v, int32_t i, int32_t j)
+{
+    if (j < 0 || j >= v.leaf_count) return -1;
+    uint64_t difference = v.leaf_keys[i] ^ v.leaf_keys[j];
+    return difference ? leading_zeros(difference) : 64 + leading_zeros((uint64_t)(uint32_t)(i ^ j));
+}
+
+/* The node after a subtree whose last leaf is r. */
+static __device__ __forceinline__ int32_t node_after(const collision_view &v, int32_t r)
+{
+    const int32_t first_leaf = v.leaf_count - 1;
+    if (r == v.leaf_count - 1) return -1;
+    return common(v, r + 1, r + 2) > common(v, r, r + 1) ? r + 1 : first_leaf + r + 1;
+}
+
+static __global__ void __launch_bounds__(COLLISION_THREADS) build_kernel(const __grid_constant__ collision_view v)
+{
+    const int64_t thread = collision_thread(COLLISION_THREADS);
+    if (thread >= v.leaf_count) return;
+    const int32_t i = (int32_t)thread, first_leaf = v.leaf_count - 1;
+
+    const struct collision_leaf leaf = v.placed[v.leaf_slots[i]];
+    struct collision_node node;
+    for (int k = 0; k < 3; ++k) {
+        node.lo[k] = round_down(leaf.box.lo[k]);
+        node.hi[k] = round_up(leaf.box.hi[k]);
+    }
+    node.child = leaf.slot;
+    node.next = node_after(v, i);
+    v.nodes[first_leaf + i] = node;
+    v.groups[first_leaf + i] = {leaf.group_low, leaf.group_high};
+    if (i == 0) v.parents[0] = -1;
+    if (i >= first_leaf) return;
+
+    /* the range: from i towards the neighbour with more in common, as far as more is shared than with the other one */
+    const int32_t d = common(v, i, i + 1) > common(v, i, i - 1) ? 1 : -1;
+    const int least = common(v, i, i - d);
+    int32_t reach = 2, length = 0;
+    while (common(v, i, i + reach * d) > least) reach *= 2;
+    for (int32_t step = reach / 2; step > 0; step /= 2)
+        if (common(v, i, i + (length + step) * d) > least) length += step;
+    const int32_t j = i + length * d, low = i < j ? i : j, high = i < j ? j : i;
+
+    /* the split: the last leaf that shares more with the first one than the whole range does */
+    const int shared = common(v, low, high);
+    int32_t split = 0, span = high - low;
+    for (int32_t step = span; step > 1;) {
+        step = (step + 1) / 2;
+        if (split + step < span && common(v, low, low + split + step) > shared) split += step;
+    }
+    split += low;
+    const int32_t left = split == low ? first_leaf + split : split;
+    const int32_t right = split + 1 == high ? first_leaf + split + 1 : split + 1;
+    v.nodes[i].child = left;
+    v.nodes[i].next = node_after(v, high);
+    v.parents[left] = i;
+    v.parents[right] = i;
+    v.arrivals[i] = 0;
+}
+
+/* Boxes from the leaves up: of two children the one that arrives last goes on. Smallest and largest do not depend on
+ * the order. A node's right child is the node after its left one. */
+static __global__ void __launch_bounds__(COLLISION_THREADS) refit_kernel(const __grid_constant__ collision_view v)
+{
+    const int64_t thread = collision_thread(COLLISION_THREADS);
+    if (thread >= v.leaf_count) return;
+    for (int32_t at = v.parents[v.leaf_count - 1 + thread]; at >= 0; at = v.parents[at]) {
+        if (arrive(&v.arrivals[at]) == 0) return;
+        struct collision_node *node = &v.nodes[at];
+        const int32_t child = node->child;
+        const struct collision_node left = v.nodes[child], right = v.nodes[left.next];
+        for (int k = 0; k < 3; ++k) {
+            node->lo[k] = fminf(left.lo[k], right.lo[k]);
+            node->hi[k] = fmaxf(left.hi[k], right.hi[k]);
+        }
+        if (v.group_bits == 0) continue;
+        const struct collision_groups a = v.groups[child], b = v.groups[left.next];
+        v.groups[at] = {a.low < b.low ? a.low : b.low, a.high > b.high ? a.high : b.high};
+    }
+}
+
+/* ---- pairs ----------------------------------------------------------------------------------------------------- */
+
+/* What a radix sort of all the room needs. */
+static __global__ void __launch_bounds__(COLLISION_THREADS) clear_kernel(const __grid_constant__ collision_view v)
+{
+    const int64_t i = collision_thread(COLLISION_THREADS);
+    if (i < v.candidate_room) v.found[i] = ~UINT64_C(0);
+}
+
+static __device__ bool may_meet(const collision_view &v, const collision_filter &a, const collision_filter &b)
+{
+    if (a.body == b.body || !(a.category & b.mask) || !(b.category & a.mask)) return false;
+    if (!((a.kind | b.kind) & FILTER_MOVES)) return false;
+    return v.disabled_count == 0 ||
+           find_key(v.disabled_pairs, v.disabled_count, unordered_key((uint32_t)a.body, (uint32_t)b.body)) < 0;
+}
+
+static __device__ __forceinline__ bool leaves_overlap(const struct collision_leaf &a, const struct collision_leaf &b)
+{
+    return a.group_low <= b.group_high && b.group_low <= a.group_high && boxes_overlap(&a.box, &b.box);
+}
+
+/* Of leaves that overlap. */
+static __device__ __forceinline__ bool leaves_meet(const collision_view &v, const struct collision_leaf &a,
+                                                   const struct collision_leaf &b)
+{
+    return boxes_meet(&a.box, v.proxies[a.slot].velocity, &b.box, v.proxies[b.slot].velocity, v.step.dt);
+}
+
+/* The shape of the lower (type, slot) comes first. */
+static __device__ __forceinline__ uint64_t candidate_key(const collision_view &v, uint32_t a, int32_t kind_a,
+                                                         uint32_t b, int32_t kind_b)
+{
+    const int type_a = kind_a & FILTER_TYPE, type_b = kind_b & FILTER_TYPE;
+    const bool ordered = type_a < type_b || (type_a == type_b && a < b);
+    return (uint64_t)(ordered ? a : b) << v.slot_bits | (ordered ? b : a);
+}
+
+static __device__ __forceinline__ void store_candidate(const collision_view &v, unsigned long long at, uint64_t key)
+{
+    if (at < (unsigned)v.candidate_room) v.found[at] = key;
+}
+
+/* Candidates of a thread on their way to memory. */
+enum { BATCH = 16 };
+struct batch {
+    uint64_t keys[BATCH];
+    unsigned count;
+};
+
+static __device__ void write_batch(const collision_view &v, const struct batch &out, unsigned long long first)
+{
+    for (unsigned i = 0; i < out.count; ++i) store_candidate(v, first + i, out.keys[i]);
+}
+
+static __device__ void add(const collision_view &v, struct batch *out, uint64_t key)
+{
+    if (out->count == BATCH) {
+        write_batch(v, *out, reserve(v.candidate_count, out->count));
+        out->count = 0;
+    }
+    out->keys[out->count++] = key;
+}
+
+/* What is left, by all threads of a warp together. */
+static __device__ void finish_batches(const collision_view &v, const struct batch &out)
+{
+    write_batch(v, out, reserve_by_warp(v.candidate_count, out.count));
+}
+
+/* The planes that a mover meets: those of every group, and those of its own. */
+static __device__ void add_planes(const collision_view &v, struct batch *out, const struct collision_filter &own,
+                                  const struct collision_leaf &leaf)
+{
+    const uint32_t slot = (uint32_t)leaf.slot;
+    if (v.plane_count == 0 || !(own.kind & FILTER_MOVES)) return;
+    const double reach = proxy_plane_reach(&v.proxies[slot], v.step.margin);
+    const bool grouped = v.shared_planes < v.plane_count && leaf.group_low == leaf.group_high;
+    for (int pass = 0; pass < (grouped ? 2 : 1); ++pass) {
+        const uint64_t group = pass == 0 ? 0 : (uint64_t)leaf.group_low + 1;
+        int64_t i = pass == 0 ? 0 : lower_bound(v.planes, v.plane_count, group << 32);
+        for (; i < v.plane_count && v.planes[i] >> 32 == group; ++i) {
+            const uint32_t plane = (uint32_t)v.planes[i];
+            if (may_meet(v, v.filters[plane], own) && proxy_plane_meets(&v.proxies[plane], &leaf.box, reach))
+                add(v, out, (uint64_t)plane << v.slot_bits | slot);
+        }
+    }
+}
+
+static __device__ __forceinline__ bool nodes_meet(const struct collision_node &a, const struct collision_node &b)
+{
+    return a.lo[0] <= b.hi[0] && b.lo[0] <= a.hi[0] && a.lo[1] <= b.hi[1] && b.lo[1] <= a.hi[1] && a.lo[2] <= b.hi[2] &&
+           b.lo[2] <= a.hi[2];
+}
+
+/* One leaf against the planes and the later leaves of the tree. Static leaves come last and do not meet each other. */
+static __device__ void walk(const collision_view &v, int32_t i, struct batch *out)
+{
+    const int32_t first_leaf = v.leaf_count - 1;
+    const struct collision_node start = v.nodes[first_leaf + i];
+    const struct collision_filter own = v.filters[start.child];
+    const bool grouped = v.group_bits > 0;
+    if (!(own.kind & FILTER_MOVES)) return;
+    const struct collision_leaf leaf = v.placed[start.child];
+    add_planes(v, out, own, leaf);
+    for (int32_t at = start.next; at >= 0;) {
+        const struct collision_node node = v.nodes[at];
+        bool meet = nodes_meet(start, node);
+        count_visit();
+        if (meet && grouped) {
+            const struct collision_groups groups = v.groups[at];
+            meet = leaf.group_low <= groups.high && groups.low <= leaf.group_high;
+        }
+        if (meet && at < first_leaf) {
+            at = node.child;
+            continue;
+        }
+        if (meet && leaves_overlap(leaf, v.placed[node.child]) && leaves_meet(v, leaf, v.placed[node.child])) {
+            const struct collision_filter other = v.filters[node.child];
+            if (may_meet(v, own, other))
+                add(v, out, candidate_key(v, (uint32_t)leaf.slot, own.kind, (uint32_t)node.child, other.kind));
+        }
+        at = node.next;
+    }
+}
+
+static __global__ void __launch_bounds__(COLLISION_THREADS) walk_kernel(const __grid_constant__ collision_view v)
+{
+    const int64_t thread = collision_thread(COLLISION_THREADS);
+    struct batch out;
+    if (halted(v)) return;
+    out.count = 0;
+    if (thread < v.leaf_count) walk(v, (int32_t)thread, &out);
+    finish_batches(v, out);
+}
+
+/* All pairs, in tiles: TILE_ROWS leaves, one a thread, against TILE_COLUMNS others, which lie in shared memory; later
+ * ones only. A row's first block has the planes instead. */
+struct tile {
+    struct collision_leaf leaves[TILE_COLUMNS];
+    struct collision_filter filters[TILE_COLUMNS];
+};
+
+static __global__ void __launch_bounds__(TILE_ROWS) tiles_kernel(const __grid_constant__ collision_view v)
+{
+    COLLISION_SHARED(tile, others);
+    const int32_t t = (int32_t)threadIdx.x, columns = tile_columns(v.leaf_count);
+    const int32_t row = (int32_t)blockIdx.x / columns, column = (int32_t)blockIdx.x % columns - 1;
+    const int32_t i = row * TILE_ROWS + t, first = column * TILE_COLUMNS;
+    struct collision_leaf leaf;
+    struct collision_filter own;
+    if (halted(v) || (column >= 0 && first + TILE_COLUMNS - 1 <= row * TILE_ROWS)) return;
+    if (i < v.leaf_count) {
+        const uint32_t slot = v.present[i];
+        leaf = v.placed[slot];
+        own = v.filters[slot];
+    }
+    if (column < 0) {
+        struct batch out;
+        out.count = 0;
+        if (i < v.leaf_count) add_planes(v, &out, own, leaf);
+        finish_batches(v, out);
+        return;
+    }
+
+    const int32_t count = v.leaf_count - first < TILE_COLUMNS ? v.leaf_count - first : TILE_COLUMNS;
+    if (t < count) {
+        const uint32_t slot = v.present[first + t];
+        others.leaves[t] = v.placed[slot];
+        others.filters[t] = v.filters[slot];
+    }
+    __syncthreads();
+    uint64_t hits = 0;
+    if (i < v.leaf_count) {
+        for (int32_t j = 0; j < count; ++j) {
+            const struct collision_leaf other = others.leaves[j];
+            hits |= (uint64_t)leaves_overlap(leaf, other) << j;
+        }
+        if (i >= first) hits &= i - first < TILE_COLUMNS - 1 ? ~UINT64_C(0) << (i - first + 1) : 0;
+        for (uint64_t left = hits; left; left &= left - 1) {
+            const int j = trailing_zeros(left);
+            if (!may_meet(v, own, others.filters[j]) || !leaves_meet(v, leaf, others.leaves[j])) hits ^= left & (0 - left);
+        }
+    }
+    unsigned long long at = reserve_by_warp(v.candidate_count, (unsigned)bits_set(hits));
+    for (; hits; hits &= hits - 1) {
+        const int j = trailing_zeros(hits);
+        store_candidate(v, at++, candidate_key(v, (uint32_t)leaf.slot, own.kind, (uint32_t)others.leaves[j].slot,
+                                               others.filters[j].kind));
+    }
+}
+
+void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels)
+{
+    kernels->grid = {grid_kernel, 3 * GRID_SAMPLES, sizeof(struct grid_sample), "grid of the tree"};
+    kernels->place = {place_kernel, PLACE_THREADS, 0, "placing of the shapes"};
+    kernels->build = {build_kernel, COLLISION_THREADS, 0, "build of the tree"};
+    kernels->refit = {refit_kernel, COLLISION_THREADS, 0, "boxes of the tree"};
+    kernels->clear = {clear_kernel, COLLISION_THREADS, 0, "reset of the candidates"};
+    kernels->walk = {walk_kernel, COLLISION_THREADS, 0, "candidates by the tree"};
+    kernels->tiles = {tiles_kernel, TILE_ROWS, sizeof(struct tile), "candidates of all pairs"};
+}

@@ -1,0 +1,149 @@
+/* Manifolds to contacts: world terms, and the last step's impulses by feature. Eight threads take a candidate, one a
+ * point; the first one writes the pair as well. */
+#include "view.h"
+
+static __device__ double pair_friction(const collision_view &v, uint32_t a, uint32_t b, double mu_a, double mu_b)
+{
+    if (v.friction_count > 0) {
+        const int64_t at = find_key(v.friction_pairs, v.friction_count, unordered_key(a, b));
+        if (at >= 0) return v.friction_values[at];
+    }
+    return mu_a == mu_b ? mu_a : sqrt(mu_a * mu_b);
+}
+
+/* total: of all candidates. */
+static __device__ void emit_counts(const collision_view &v, uint64_t total)
+{
+    v.after.counts->candidates = (int64_t)*v.candidate_count;
+    v.after.counts->pairs = (int32_t)(total >> 32);
+    v.after.counts->points = (int32_t)(uint32_t)total;
+}
+
+/* Point `lane` of candidate i; place: pairs << 32 | points before it. */
+static __device__ void emit_point(const collision_view &v, int64_t i, int32_t lane, uint64_t place)
+{
+    const int32_t count = v.sizes[i], at = (int32_t)(place >> 32), first = (int32_t)(uint32_t)place;
+    if (lane >= count) return;
+
+    const uint64_t key = v.candidates[i];
+    const uint32_t a = (uint32_t)(key >> v.slot_bits), b = (uint32_t)(key & ((UINT64_C(1) << v.slot_bits) - 1));
+    const struct sadmm_proxy *pa = &v.proxies[a], *pb = &v.proxies[b];
+    const struct manifold *m = &v.manifolds[i];
+    const double friction = pair_friction(v, a, b, pa->friction, pb->friction);
+    double normal[3];
+    rotate_to_world(pb->R, m->normal, normal);
+
+    if (lane == 0) {
+        struct sadmm_contact_pair pair;
+        pair.body_a = pa->system_body;
+        pair.body_b = pb->system_body;
+        pair.shape_a = (int32_t)a;
+        pair.shape_b = (int32_t)b;
+        pair.first = first;
+        pair.count = count;
+        for (int k = 0; k < 3; ++k) pair.normal[k] = normal[k];
+        pair.friction = friction;
+        pair.restitution = fmax(pa->restitution, pb->restitution);
+        pair.cache = m->cache;
+        pair.reserved = revision_of_pair(pa->revision, pb->revision);
+        v.after.pairs[at] = pair;
+        v.after.keys[at] = ordered_key(a, b);
+    }
+
+    const struct manifold_point from = m->points[lane];
+    struct sadmm_contact_point point;
+    double p[3];
+    rotate_to_world(pb->R, from.position, p);
+    for (int k = 0; k < 3; ++k) {
+        const double arm = p[k] + pb->arm[k], between = pb->com[k] - pa->com[k];
+        point.arm_b[k] = pb->system_body >= 0 ? arm : 0;
+        point.arm_a[k] = pa->system_body >= 0 ? arm + between : 0;
+        point.impulse[k] = 0;
+    }
+    point.gap = from.separation;
+    point.error = 0;
+    point.feature = from.feature;
+    point.reserved = 0;
+    const int32_t match = v.matches[i];
+    if (match >= 0) {
+        const struct sadmm_contact_pair *old = &v.before.pairs[match];
+        const int32_t old_first = old->first, old_count = old->count;
+        /* a feature occurs once; most are where they were */
+        for (int32_t n = 0; n < old_count; ++n) {
+            const int32_t k = lane + n < old_count ? lane + n : (lane + n) % old_count;
+            const struct sadmm_contact_point *before = &v.before.points[old_first + k];
+            if (before->feature != from.feature) continue;
+            impulse_carry(old->normal, before->impulse, normal, friction, point.impulse);
+            break;
+        }
+    }
+    v.after.points[first + lane] = point;
+}
+
+static __global__ void __launch_bounds__(COLLISION_THREADS) emit_kernel(const __grid_constant__ collision_view v)
+{
+    const int64_t thread = collision_thread(COLLISION_THREADS), i = thread / POINT_LANES;
+    if (halted(v)) return;
+    const uint64_t total = v.places[v.candidate_room];
+    if (thread == 0) emit_counts(v, total);
+    if (i >= usable_candidates(v) || (int32_t)(uint32_t)total > v.point_room) return;
+    emit_point(v, i, (int32_t)(thread % POINT_LANES), v.places[i]);
+}
+
+/* ---- few candidates: every block adds up all sizes ------------------------------------------------------------- */
+
+enum { SIZES_A_WORD = 4, EMIT_WARPS = EMIT_CANDIDATES * POINT_LANES / 32 };
+
+/* Of four sizes of at most 8: pairs << 32 | points. */
+static __device__ __forceinline__ uint64_t sum_sizes(uint32_t sizes)
+{
+    const uint32_t any = (sizes | sizes >> 1 | sizes >> 2 | sizes >> 3) & 0x01010101u;
+    return (uint64_t)(any * 0x01010101u >> 24) << 32 | sizes * 0x01010101u >> 24;
+}
+
+struct emit_sums {
+    uint64_t before[EMIT_WARPS], all[EMIT_WARPS];
+};
+
+static __global__ void __launch_bounds__(EMIT_CANDIDATES *POINT_LANES)
+emit_few_kernel(const __grid_constant__ collision_view v)
+{
+    COLLISION_SHARED(emit_sums, shared);
+    const int32_t t = (int32_t)threadIdx.x, first = (int32_t)blockIdx.x * EMIT_CANDIDATES;
+    const int32_t i = first + t / POINT_LANES, found = usable_candidates(v);
+    const uint32_t *const sizes = (const uint32_t *)v.sizes;
+    uint64_t before = 0, all = 0;
+    if (halted(v) || (first >= found && first > 0)) return;
+    for (int32_t k = t; k < (found + SIZES_A_WORD - 1) / SIZES_A_WORD; k += EMIT_CANDIDATES * POINT_LANES) {
+        const uint64_t sum = sum_sizes(sizes[k]);
+        all += sum;
+        if (k < first / SIZES_A_WORD) before += sum;
+    }
+    for (int bits = 1; bits < 32; bits *= 2) {
+        before += __shfl_xor_sync(0xffffffffu, before, bits);
+        all += __shfl_xor_sync(0xffffffffu, all, bits);
+    }
+    if (t % 32 == 0) {
+        shared.before[t / 32] = before;
+        shared.all[t / 32] = all;
+    }
+    __syncthreads();
+    before = all = 0;
+    for (int k = 0; k < EMIT_WARPS; ++k) {
+        before += shared.before[k];
+        all += shared.all[k];
+    }
+    if (t == 0 && first == 0) emit_counts(v, all);
+    if (i >= found || (int32_t)(uint32_t)all > v.point_room) return;
+    for (int32_t k = first; k < i; k += SIZES_A_WORD) {
+        const uint32_t word = sizes[k / SIZES_A_WORD];
+        before += sum_sizes(i - k < SIZES_A_WORD ? word & ((UINT32_C(1) << 8 * (i - k)) - 1) : word);
+    }
+    emit_point(v, i, t % POINT_LANES, before);
+}
+
+void COLLISION(matching_kernels)(struct collision_kernels *kernels)
+{
+    kernels->emit = {emit_kernel, COLLISION_THREADS, 0, "contacts"};
+    kernels->emit_few = {emit_few_kernel, EMIT_CANDIDATES * POINT_LANES, sizeof(struct emit_sums), "contacts"};
+}

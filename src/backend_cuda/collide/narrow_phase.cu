@@ -1,0 +1,63 @@
+/* Candidates to manifolds: the last step's pair, for its cache, then the pair's manifold in the frame of b. */
+#include "view.h"
+
+/* C headers: an enumerator beside an unsigned number is fine there. */
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wextra"
+#include "collision/pair_manifold.h"
+#pragma GCC diagnostic pop
+
+/* find_key with seven loads at a time: rounds to memory are what a search takes. */
+static __device__ int64_t find_key_in_eighths(const uint64_t *keys, int64_t count, uint64_t key)
+{
+    int64_t low = 0, length = count; /* the first key >= `key` is in [low, low + length] */
+    while (length > 7) {
+        const int64_t step = length / 8;
+        int smaller = 0;
+        for (int k = 1; k < 8; ++k) smaller += keys[low + k * step - 1] < key;
+        low += smaller * step;
+        length = smaller < 7 ? step - 1 : length - 7 * step;
+    }
+    int smaller = 0;
+    bool there = false;
+    for (int k = 0; k < 7; ++k) smaller += k < length && keys[low + k] < key;
+    low += smaller;
+    if (low < count) there = keys[low] == key;
+    return there ? low : -1;
+}
+
+static __global__ void __launch_bounds__(NARROW_THREADS) narrow_kernel(const __grid_constant__ collision_view v)
+{
+    const int64_t i = collision_thread(NARROW_THREADS);
+    if (i >= (int64_t)v.candidate_room + SIZES_BEYOND) return;
+    if (i >= usable_candidates(v)) {
+        v.sizes[i] = 0;
+        return;
+    }
+    const uint64_t key = v.candidates[i];
+    const uint32_t a = (uint32_t)(key >> v.slot_bits), b = (uint32_t)(key & ((UINT64_C(1) << v.slot_bits) - 1));
+    const struct sadmm_proxy *pa = &v.proxies[a], *pb = &v.proxies[b];
+    int64_t before = find_key_in_eighths(v.before.keys, v.before.counts->pairs, ordered_key(a, b));
+    if (before >= 0 && v.before.pairs[before].reserved != revision_of_pair(pa->revision, pb->revision)) before = -1;
+
+    const double limit = pair_limit(v.step.margin, pa->thin, pb->thin, pa->velocity, pb->velocity, pa->spin, pb->spin,
+                                    fmax(pa->fall, pb->fall), v.step.dt);
+    const struct pair_pose pose = pair_pose(pa->type == SADMM_SHAPE_PLANE, pa->R, pa->x, pb->R, pb->x);
+    struct manifold m;
+    pair_manifold(pa->type, v3_load(pa->size), pb->type, v3_load(pb->size), &pose, (real)limit,
+                  before >= 0 ? v.before.pairs[before].cache : 0, &m);
+
+    v.sizes[i] = (uint8_t)m.count;
+    if (m.count == 0) return;
+    v.matches[i] = (int32_t)before;
+    struct manifold *out = &v.manifolds[i];
+    out->normal = m.normal;
+    out->count = m.count;
+    out->cache = m.cache;
+    for (int k = 0; k < m.count; ++k) out->points[k] = m.points[k];
+}
+
+void COLLISION(narrow_phase_kernels)(struct collision_kernels *kernels)
+{
+    kernels->narrow = {narrow_kernel, NARROW_THREADS, 0, "narrow phase"};
+}

@@ -1,0 +1,50 @@
+/* Contact finding on a CUDA device: the interface.
+ *
+ * A pipeline keeps two sets of contacts on the device, in core's own structs: the current one and the one before it.
+ * The solver may write impulses into the current one in place; the next find carries them over. All entries may be
+ * called with any device current and leave it so. `stream` is a cudaStream_t of the pipeline's device; one after
+ * another, the calls on a pipeline are ordered by the caller. There is no global state: pipelines are independent.
+ */
+#ifndef SADMM_CUDA_COLLIDE_PIPELINE_H
+#define SADMM_CUDA_COLLIDE_PIPELINE_H
+
+#include "collision/collision.h"
+
+struct sadmm_cuda_collision;
+
+struct sadmm_cuda_contact_counts {
+    int64_t candidates; /* pairs of shapes whose boxes overlap */
+    int32_t pairs, points;
+};
+
+/* The current set. Device memory, valid until the second find from now on, an upload or destroy. */
+struct sadmm_cuda_contacts {
+    struct sadmm_contact_pair *pairs;
+    struct sadmm_contact_point *points;
+    const struct sadmm_cuda_contact_counts *device_counts; /* the same numbers, on the device */
+    struct sadmm_cuda_contact_counts counts;
+};
+
+struct sadmm_cuda_collision_stats {
+    int64_t finds;       /* that succeeded */
+    int64_t repeats;     /* stages repeated because something did not fit */
+    int64_t allocations; /* of device and pinned memory, since creation */
+    int64_t candidate_room, point_room;
+    int64_t visits;      /* of nodes of the tree; counted on the emulated device only */
+};
+
+/* For tests and measurements; 0: the default. */
+struct sadmm_cuda_collision_tuning {
+    int32_t tree_from;  /* shapes; below, all pairs are tested */
+    int64_t radix_from; /* room for candidates; below, they are ranked by counting */
+    int64_t first_room; /* the next find starts with room for so many candidates and points, whatever is allocated */
+};
+
+#ifdef SADMM_CUDA_EMULATED
+#define COLLISION(name) sadmm_cuda_collision_##name##_emulated
+#else
+#define COLLISION(name) sadmm_cuda_collision_##name
+#endif
+#include "entries.h"
+
+#endif

@@ -1,0 +1,188 @@
+/* Contact finding on the device: the kernels' view, the pipeline's insides.
+ *
+ *   grid     where the Morton grid lies, from a sample of the bodies               one block
+ *   place    pose, box and filter of every shape                                   a thread a shape
+ *   tree     Morton codes, radix sort, Karras' hierarchy, boxes bottom up          (few shapes: not needed)
+ *   pairs    candidates: boxes overlap and the pair may meet                       a thread a shape, or tiles of pairs
+ *   sort     candidates by (slot of a, slot of b), the host's order
+ *   narrow   the last step's pair (a search), manifold into slots[candidate]       a thread a candidate
+ *   scan     where each candidate's contacts go                                    (few candidates: by emit itself)
+ *   emit     pairs and points in world terms, the last step's impulses             eight threads a candidate
+ *
+ * Candidates are appended in any order (an integer counter) and then sorted: keys are unique, so the result does not
+ * depend on timing. The counter also counts what does not fit, hence a stage that lacks room says exactly how much it
+ * needs: the kernels after it do nothing, the host, which reads the counts once at the end of the stage, makes room and
+ * repeats it. Launches are sized by the room there is (the host does not know the counts).
+ *
+ * Small scenes are a matter of latency, not of work: few launches, and blocks so small that they spread over the whole
+ * chip. With little room a candidate's place in the order is found by counting the smaller ones, and emit adds up the
+ * contacts before its own: two launches where a radix sort and a scan need some eight. With more room the sort takes
+ * all of it; unused candidates are all ones and go to the end.
+ *
+ * Double throughout, with the host pipeline's own inline formulas (collide/formulas.h, pair_manifold.h).
+ */
+#ifndef SADMM_CUDA_COLLIDE_VIEW_H
+#define SADMM_CUDA_COLLIDE_VIEW_H
+
+#include <cuda_runtime.h>
+
+#include "pipeline.h"
+#include "formulas.h"
+
+enum {
+    COLLISION_THREADS = 256, /* a block */
+    GRID_SAMPLES = 128,
+    PLACE_THREADS = 32,      /* every access is a sector a thread: what counts is how many multiprocessors share them */
+    NARROW_THREADS = 32,     /* long chains of arithmetic, many registers */
+    TILE_ROWS = 128,         /* all pairs: leaves of a block, one a thread, ... */
+    TILE_COLUMNS = 64,       /* ... and later ones that each is tested against, a bit each */
+    RANK_KEYS = 32,          /* sort by counting: keys of a block, ... */
+    RANK_SHARES = 8,         /* ... into how many shares the others are split, ... */
+    RANK_CHUNK = 1024,       /* ... and how many are staged at a time */
+    EMIT_CANDIDATES = 32,    /* of a block */
+    POINT_LANES = SADMM_MANIFOLD_POINTS,
+    MORTON_BITS = 21         /* an axis */
+};
+
+/* A shape that is no plane. */
+struct alignas(16) collision_leaf {
+    struct sadmm_box3 box;
+    int32_t slot, reserved;
+    int32_t group_low, group_high; /* a leaf that meets every group spans all */
+};
+
+/* A leaf or an inner node of the tree. Inner nodes come first: [0, leaves - 1), then leaves in tree order. A walk goes
+ * to `child` where boxes and groups meet, else to `next`: the node after the whole subtree, -1 at the end. It needs
+ * no stack, and a walk that starts at a leaf's `next` sees later leaves only. Boxes are rounded outwards, so that a node
+ * is one sector of memory; whether two leaves meet is decided by their own boxes. */
+struct alignas(32) collision_node {
+    float lo[3], hi[3];
+    int32_t child; /* inner node: its left child; leaf: the slot */
+    int32_t next;
+};
+
+/* Of the leaves below a node. Looked at only where there are several groups. */
+struct alignas(8) collision_groups {
+    int32_t low, high;
+};
+
+/* What decides whether two shapes may meet at all; by slot. */
+struct alignas(16) collision_filter {
+    uint32_t category, mask;
+    int32_t body;
+    int32_t kind; /* type, + FILTER_MOVES */
+};
+enum { FILTER_TYPE = 0xff, FILTER_MOVES = 0x100 };
+
+/* Key of a leaf: class, group, then as much of the Morton code as fits. Small movers come first, large ones and
+ * static shapes last: a walk looks for later leaves only, so that no single thread finds everything that a large
+ * shape touches. */
+enum { LEAF_CLASS_SHIFT = 62, LEAF_LARGE = 1, LEAF_STATIC = 2 };
+
+/* Where the Morton grid lies. Only speed depends on it. */
+struct collision_grid {
+    double origin[3], scale;
+};
+
+/* Numbers of the step. */
+struct collision_step {
+    double dt, margin, acceleration;
+};
+
+struct collision_set {
+    struct sadmm_contact_pair *pairs;
+    struct sadmm_contact_point *points;
+    uint64_t *keys; /* of the pairs: slot of a << 32 | slot of b */
+    struct sadmm_cuda_contact_counts *counts;
+};
+
+/* What kernels see: device memory. */
+struct collision_view {
+    const struct sadmm_shape *shapes;              /* by slot */
+    const struct sadmm_collision_body *bodies;     /* by body slot */
+    const uint32_t *present;                       /* slots: leaves, then planes */
+    const uint64_t *planes;                        /* (group + 1) << 32 | slot, sorted */
+    const uint64_t *disabled_pairs, *friction_pairs;
+    const double *friction_values;
+    int32_t leaf_count, plane_count, disabled_count, friction_count;
+    int32_t shared_planes;                         /* the first ones: of group -1 */
+    struct collision_step step;
+    int32_t group_bits;                            /* of the leaf keys */
+    double large;                                  /* radius from which a mover is large, m */
+    int32_t body_count;                            /* slots */
+    struct collision_grid *grid;                   /* of this step */
+    const int32_t *halt;                           /* not NULL and not 0: do nothing */
+
+    struct sadmm_proxy *proxies;                   /* by slot */
+    struct collision_filter *filters;              /* by slot */
+    struct collision_leaf *placed;                 /* by slot */
+    uint64_t *leaf_keys;                           /* by leaf; sorted: tree order */
+    uint32_t *leaf_slots;
+    struct collision_node *nodes;                  /* 2 leaves - 1 */
+    struct collision_groups *groups;               /* of nodes */
+    int32_t *parents;                              /* of nodes; -1: the root */
+    int32_t *arrivals;                             /* at inner nodes, bottom up */
+
+    unsigned long long *candidate_count;           /* found, whether they fit or not */
+    uint64_t *found;                               /* candidates as they come: slot of a << slot_bits | slot of b */
+    uint64_t *candidates;                          /* sorted */
+    int32_t candidate_room;
+    int32_t slot_bits;
+    struct manifold *manifolds;                    /* by candidate; points beyond `count` are not written */
+    int32_t *matches;                              /* by candidate: pair of the last step, or -1 */
+    uint8_t *sizes;                                /* points by candidate; 0 beyond the last, SIZES_BEYOND of them */
+    uint64_t *places;                              /* exclusive sums of pairs << 32 | points */
+
+    struct collision_set before, after;
+    int32_t point_room;
+};
+
+static __device__ __forceinline__ bool halted(const collision_view &v) { return v.halt && *v.halt != 0; }
+
+/* Candidates that the kernels after the pairs stage work on: none when they did not all fit. */
+static __device__ __forceinline__ int32_t usable_candidates(const collision_view &v)
+{
+    unsigned long long found = *v.candidate_count;
+    if (halted(v)) return 0;
+    return found <= (unsigned long long)v.candidate_room ? (int32_t)found : 0;
+}
+
+static __device__ __forceinline__ int64_t collision_thread(int block)
+{
+    return (int64_t)blockIdx.x * block + threadIdx.x;
+}
+
+/* Blocks of a row of tiles: the first has the planes. */
+static __host__ __device__ __forceinline__ int32_t tile_columns(int32_t leaves)
+{
+    return 1 + (leaves + TILE_COLUMNS - 1) / TILE_COLUMNS;
+}
+
+/* Sizes are read in words of four; and one more than there is room for is scanned: its place is the sum of all. */
+enum { SIZES_BEYOND = 4 };
+
+/* A kernel's shared memory: one struct. */
+#ifdef SADMM_CUDA_EMULATED
+#define COLLISION_SHARED(type, name) struct type &name = *(struct type *)cuda_emulation_shared()
+#else
+#define COLLISION_SHARED(type, name) __shared__ struct type name
+#endif
+
+/* A kernel and how it is launched. */
+struct collision_launch {
+    void (*kernel)(const collision_view);
+    int threads;   /* a block */
+    size_t shared; /* bytes; what the emulated device must be told */
+    const char *name;
+};
+
+/* The kernels, each beside what it does. */
+struct collision_kernels {
+    struct collision_launch grid, place, build, refit, clear, walk, tiles, rank, narrow, emit, emit_few;
+};
+void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels);
+void COLLISION(sort_kernels)(struct collision_kernels *kernels);
+void COLLISION(narrow_phase_kernels)(struct collision_kernels *kernels);
+void COLLISION(matching_kernels)(struct collision_kernels *kernels);
+
+#endif

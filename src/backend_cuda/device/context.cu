@@ -1,0 +1,336 @@
+/* A context: device, stream, buffers that only grow, launches, errors. */
+#include <stdio.h>
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "context.h"
+
+/* ---- errors --------------------------------------------------------------------------------------------------- */
+
+sadmm_status CUDA(fail)(struct sadmm_context *c, cudaError_t code, const char *what, struct sadmm_error *error)
+{
+    (void)cudaGetLastError(); /* an error that does not last must not be found by the next call */
+    return sadmm_fail(error, code == cudaErrorMemoryAllocation ? SADMM_ERROR_OUT_OF_MEMORY : SADMM_ERROR_DEVICE,
+                      "CUDA device %d: %s: %s", c->device, what, cudaGetErrorString(code));
+}
+
+sadmm_status CUDA(wait)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cudaError_t code = cudaStreamSynchronize(c->stream);
+    if (code == cudaSuccess) return SADMM_OK;
+    char what[160];
+    snprintf(what, sizeof what, "kernel %s (the last one launched, or one before it)", c->kernel ? c->kernel : "none");
+    return CUDA(fail)(c, code, what, error);
+}
+
+/* ---- memory --------------------------------------------------------------------------------------------------- */
+
+static const char *const buffer_names[] = {
+    "states",
+    "b",
+    "matrices",
+    "C",
+    "penalties",
+    "normals",
+    "arms between bodies",
+    "pairs' ends",
+    "arms",
+    "impulses",
+    "row blocks",
+    "row blocks' data",
+    "wrench records",
+    "changes of wrench records",
+    "exchanged velocities",
+    "live counts",
+    "layout",
+    "sorts",
+    "numbers",
+    "scalars",
+    "weights",
+    "records of halves",
+    "bodies' input",
+    "pairs' input",
+    "points' input",
+    "blocks' input",
+    "results",
+    "world's bodies",
+    "world's changes of velocity",
+    "world's wrenches",
+    "world's starting velocities",
+    "world's starting impulses",
+    "world's body slots",
+    "world's places of bodies",
+    "control of a step",
+    "staged counts",
+    "staged bodies",
+    "staged pairs",
+    "staged points",
+    "staged blocks",
+    "staged results",
+    "reports",
+};
+static_assert(sizeof buffer_names / sizeof *buffer_names == BUFFER_COUNT, "a name a buffer");
+
+static void release(cuda_buffer *buffer)
+{
+    if (buffer->data) (void)(buffer->pinned ? cudaFreeHost(buffer->data) : cudaFree(buffer->data));
+    buffer->data = nullptr;
+    buffer->capacity = 0;
+}
+
+sadmm_status CUDA(room)(struct sadmm_context *c, enum cuda_buffer_name name, size_t bytes, struct sadmm_error *error)
+{
+    cuda_buffer *buffer = &c->buffers[name];
+    if (bytes <= buffer->capacity && buffer->data) return SADMM_OK;
+    size_t wanted = buffer->capacity + buffer->capacity / 2;
+    if (wanted < bytes) wanted = bytes;
+    if (wanted < 256) wanted = 256;
+    char what[96];
+    snprintf(what, sizeof what, "allocation of %zu bytes for the cuda backend's %s", wanted, buffer_names[name]);
+    if (sadmm_test_allocation_fails()) return CUDA(fail)(c, cudaErrorMemoryAllocation, what, error);
+    release(buffer);
+    buffer->pinned = name >= PINNED_LIVE;
+    CUDA_CALL(c, buffer->pinned ? cudaMallocHost(&buffer->data, wanted) : cudaMalloc(&buffer->data, wanted), what);
+    buffer->capacity = wanted;
+    return SADMM_OK;
+}
+
+sadmm_status CUDA(clear)(struct sadmm_context *c, enum cuda_scalar scalar, struct sadmm_error *error)
+{
+    const cuda_view *v = &c->view;
+    if (c->cleared & (unsigned)scalar) {
+        c->cleared &= ~(unsigned)scalar;
+        return SADMM_OK;
+    }
+    if (scalar == SCALAR_BARRIER) {
+        CUDA_CALL(c, cudaMemsetAsync(v->barrier, 0, sizeof *v->barrier, c->stream), "cudaMemsetAsync(barrier)");
+    } else {
+        CUDA_CALL(c, cudaMemsetAsync(v->residual + (scalar == SCALAR_DUAL), 0, sizeof *v->residual, c->stream),
+                  "cudaMemsetAsync(residual)");
+    }
+    return SADMM_OK;
+}
+
+sadmm_status CUDA(upload)(struct sadmm_context *c, void *to, enum cuda_buffer_name staging, size_t at, const void *from,
+                          size_t bytes, struct sadmm_error *error)
+{
+    if (bytes == 0) return SADMM_OK;
+    unsigned char *staged = (unsigned char *)c->buffers[staging].data + at;
+    memcpy(staged, from, bytes);
+    CUDA_CALL(c, cudaMemcpyAsync(to, staged, bytes, cudaMemcpyHostToDevice, c->stream),
+              "cudaMemcpyAsync to the device");
+    return SADMM_OK;
+}
+
+sadmm_status CUDA(download)(struct sadmm_context *c, const void *from, size_t bytes, struct sadmm_error *error)
+{
+    if (bytes > 0)
+        CUDA_CALL(c, cudaMemcpyAsync(c->buffers[PINNED_OUT].data, from, bytes, cudaMemcpyDeviceToHost, c->stream),
+                  "cudaMemcpyAsync from the device");
+    return CUDA(wait)(c, error);
+}
+
+/* ---- launches ------------------------------------------------------------------------------------------------- */
+
+enum { MOST_ATTRIBUTES = 2 };
+
+/* Blocks of a partition run side by side in clusters (`cluster` > 1), or all of them (GRID: a cooperative launch). */
+static cudaLaunchConfig_t configure(const struct sadmm_context *c, const struct cuda_partition *partition, bool early,
+                                    cudaLaunchAttribute attribute[MOST_ATTRIBUTES])
+{
+    cudaLaunchConfig_t launch = {};
+    launch.gridDim = dim3((unsigned)partition->parts);
+    launch.blockDim = dim3((unsigned)partition->threads);
+    launch.dynamicSmemBytes = partition->shared;
+    launch.stream = c->stream;
+    launch.attrs = attribute;
+    if (partition->tier == SADMM_CUDA_TIER_GRID) {
+        cudaLaunchAttribute *next = &attribute[launch.numAttrs++];
+        next->id = cudaLaunchAttributeCooperative;
+        next->val.cooperative = 1;
+    } else if (partition->cluster > 1) {
+        cudaLaunchAttribute *next = &attribute[launch.numAttrs++];
+        next->id = cudaLaunchAttributeClusterDimension;
+        next->val.clusterDim.x = (unsigned)partition->cluster;
+        next->val.clusterDim.y = next->val.clusterDim.z = 1;
+    }
+#ifndef SADMM_CUDA_EMULATED
+    if (early && c->early && c->recording && partition->tier != SADMM_CUDA_TIER_GRID) {
+        cudaLaunchAttribute *next = &attribute[launch.numAttrs++];
+        next->id = cudaLaunchAttributeProgrammaticStreamSerialization;
+        next->val.programmaticStreamSerializationAllowed = 1;
+    }
+#else
+    (void)early;
+#endif
+    return launch;
+}
+
+cudaError_t CUDA(active_clusters)(const struct sadmm_context *c, cuda_kernel kernel,
+                                  const struct cuda_partition *partition, int *clusters)
+{
+    cudaLaunchAttribute attributes[MOST_ATTRIBUTES];
+    const cudaLaunchConfig_t launch = configure(c, partition, false, attributes);
+    return cudaOccupancyMaxActiveClusters(clusters, (const void *)kernel, &launch);
+}
+
+sadmm_status CUDA(launch_partition)(struct sadmm_context *c, cuda_kernel kernel, const char *name,
+                                    const struct cuda_partition *partition, bool early, const cuda_args *args,
+                                    struct sadmm_error *error)
+{
+    cudaLaunchAttribute attributes[MOST_ATTRIBUTES];
+    const cudaLaunchConfig_t launch = configure(c, partition, early, attributes);
+    c->kernel = name;
+#ifdef SADMM_CUDA_EMULATED
+    cudaError_t code = cuda_emulation_launch(&launch, kernel, c->view, *args);
+#else
+    void *parameters[] = {&c->view, const_cast<cuda_args *>(args)};
+    cudaError_t code = cudaLaunchKernelExC(&launch, (const void *)kernel, parameters);
+#endif
+    CUDA_CALL(c, code, name);
+    return SADMM_OK;
+}
+
+sadmm_status CUDA(launch)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
+                          const cuda_args *args, struct sadmm_error *error)
+{
+    return CUDA(launch_of)(c, kernel, name, blocks, THREADS, args, error);
+}
+
+static sadmm_status launch_blocks(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
+                                  bool early, const cuda_args *args, struct sadmm_error *error)
+{
+    struct cuda_partition plain = {};
+    if (blocks <= 0) return SADMM_OK;
+    plain.parts = (int32_t)blocks;
+    plain.cluster = 1;
+    plain.threads = threads;
+    return CUDA(launch_partition)(c, kernel, name, &plain, early, args, error);
+}
+
+sadmm_status CUDA(launch_of)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
+                             const cuda_args *args, struct sadmm_error *error)
+{
+    return launch_blocks(c, kernel, name, blocks, threads, false, args, error);
+}
+
+sadmm_status CUDA(launch_early)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
+                                const cuda_args *args, struct sadmm_error *error)
+{
+    return launch_blocks(c, kernel, name, blocks, threads, true, args, error);
+}
+
+/* ---- devices -------------------------------------------------------------------------------------------------- */
+
+struct probe_result {
+    bool found;
+    char about[512];
+};
+
+static probe_result probe(void)
+{
+    probe_result result = {false, ""};
+    int count = 0;
+    cudaError_t code = cudaGetDeviceCount(&count);
+    if (code != cudaSuccess || count == 0) {
+        (void)cudaGetLastError();
+        snprintf(result.about, sizeof result.about, "no CUDA device: %s",
+                 code != cudaSuccess ? cudaGetErrorString(code) : "the driver lists none");
+        return result;
+    }
+    cudaDeviceProp properties;
+    code = cudaGetDeviceProperties(&properties, 0);
+    if (code != cudaSuccess) {
+        (void)cudaGetLastError();
+        snprintf(result.about, sizeof result.about, "CUDA device 0 does not answer: %s", cudaGetErrorString(code));
+        return result;
+    }
+    result.found = true;
+    snprintf(result.about, sizeof result.about, "%s, compute capability %d.%d, %d multiprocessors; %d device%s",
+             properties.name, properties.major, properties.minor, properties.multiProcessorCount, count,
+             count == 1 ? "" : "s");
+    return result;
+}
+
+extern "C" bool CUDA(probe)(const char **about)
+{
+    static const probe_result result = probe(); /* once a process: starting the driver takes a while */
+    *about = result.about;
+    return result.found;
+}
+
+static sadmm_status open_device(struct sadmm_context *c, struct sadmm_error *error)
+{
+    int cooperative = 0, clusters = 0, count = 0;
+    CUDA_CALL(c, cudaGetDeviceCount(&count), "cudaGetDeviceCount");
+    if (c->device < 0 || c->device >= count)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "device = %d: must be in [0, %d]", c->device, count - 1);
+    CUDA_ENTER(c);
+    CUDA_CALL(c, cudaDeviceGetAttribute(&c->multiprocessors, cudaDevAttrMultiProcessorCount, c->device),
+              "cudaDeviceGetAttribute");
+    CUDA_CALL(c, cudaDeviceGetAttribute(&c->shared_limit, cudaDevAttrMaxSharedMemoryPerBlockOptin, c->device),
+              "cudaDeviceGetAttribute");
+    CUDA_CALL(c, cudaDeviceGetAttribute(&cooperative, cudaDevAttrCooperativeLaunch, c->device),
+              "cudaDeviceGetAttribute");
+    CUDA_CALL(c, cudaDeviceGetAttribute(&clusters, cudaDevAttrClusterLaunch, c->device), "cudaDeviceGetAttribute");
+    c->cooperative = cooperative != 0;
+    CUDA_CALL(c, CUDA(resident_allow)(c->shared_limit, clusters != 0, &c->clusters), "loading the kernels");
+    c->early = c->clusters && EARLY_ARCH <= CLUSTER_ARCH; /* the same devices, the same code */
+    CUDA_CALL(c, LAYOUT(one_block_allow)(c->shared_limit), "loading the kernels");
+    CUDA_CALL(c, cudaStreamCreateWithFlags(&c->stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
+    CUDA_CALL(c, cudaStreamCreateWithFlags(&c->side, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
+    CUDA_CALL(c, cudaEventCreateWithFlags(&c->fork, cudaEventDisableTiming), "cudaEventCreateWithFlags");
+    CUDA_CALL(c, cudaEventCreateWithFlags(&c->join, cudaEventDisableTiming), "cudaEventCreateWithFlags");
+    return SADMM_OK;
+}
+
+/* ---- entries -------------------------------------------------------------------------------------------------- */
+
+extern "C" sadmm_status CUDA(create)(int device, struct sadmm_context **out, struct sadmm_error *error)
+{
+    struct sadmm_context *c = (struct sadmm_context *)sadmm_alloc(1, sizeof *c);
+    *out = nullptr;
+    if (!c) return sadmm_fail_memory(error, "the cuda backend's context");
+    c->device = device;
+    sadmm_status status = open_device(c, error);
+    if (status != SADMM_OK) {
+        CUDA(destroy)(c);
+        return status;
+    }
+    *out = c;
+    return SADMM_OK;
+}
+
+extern "C" void CUDA(destroy)(struct sadmm_context *c)
+{
+    if (!c) return;
+    if (c->stream) { /* a device was opened; after a device error these calls fail, and there is nothing left to free */
+        device_scope scope(c->device);
+        (void)cudaStreamSynchronize(c->stream);
+        CUDA(step_destroy)(c);
+        if (c->graph) (void)cudaGraphExecDestroy(c->graph);
+        for (cuda_buffer &buffer : c->buffers) release(&buffer);
+        if (c->join) (void)cudaEventDestroy(c->join);
+        if (c->fork) (void)cudaEventDestroy(c->fork);
+        if (c->side) (void)cudaStreamDestroy(c->side);
+        (void)cudaStreamDestroy(c->stream);
+        (void)cudaGetLastError();
+    }
+    sadmm_free(c);
+}
+
+
+extern "C" void CUDA(tune_rooms)(struct sadmm_context *c, int64_t first_room) { c->first_room = first_room; }
+
+extern "C" void CUDA(set_tier)(struct sadmm_context *c, enum sadmm_cuda_tier tier)
+{
+    c->wanted = tier;
+}
+
+extern "C" void CUDA(set_cluster)(struct sadmm_context *c, int blocks) { c->wanted_cluster = blocks; }
+
+extern "C" enum sadmm_cuda_tier CUDA(get_tier)(const struct sadmm_context *c, int32_t *blocks)
+{
+    if (blocks) *blocks = c->partition.parts;
+    return c->partition.tier;
+}

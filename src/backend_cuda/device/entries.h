@@ -1,0 +1,59 @@
+/* The entries of the kernel table for one precision, in C: CUDA(name) is set by the includer. */
+#include "backend_cuda/graph/layout.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Whether a device can be used; *about (static storage): what was found, or why not. */
+bool CUDA(probe)(const char **about);
+/* Whole steps: room for so many candidates and points at first; 0: as likely (tests). */
+void CUDA(tune_rooms)(struct sadmm_context *, int64_t first_room);
+void CUDA(set_tier)(struct sadmm_context *, enum sadmm_cuda_tier tier);
+/* For tests: blocks a cluster where there are clusters (0: as likely the fastest); what `live` says from now on. */
+void CUDA(set_cluster)(struct sadmm_context *, int blocks);
+sadmm_status CUDA(set_halt)(struct sadmm_context *, enum cuda_halt, struct sadmm_error *);
+enum sadmm_cuda_tier CUDA(get_tier)(const struct sadmm_context *, int32_t *blocks);
+
+/* For tests: survey and layout of the last begin's system once more, for this partition, halted from the start or not;
+ * `way`: of enum cuda_layout_way. */
+sadmm_status CUDA(lay_out_again)(struct sadmm_context *, const struct cuda_partition *, enum cuda_halt, int way,
+                                 struct cuda_layout_copy *, struct sadmm_error *);
+
+sadmm_status CUDA(create)(int device, struct sadmm_context **out, struct sadmm_error *error);
+void CUDA(destroy)(struct sadmm_context *);
+sadmm_status CUDA(begin)(struct sadmm_context *, const struct sadmm_system *, const struct sadmm_plan *,
+                         const struct sadmm_settings *, struct sadmm_error *);
+sadmm_status CUDA(assemble_bodies)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CUDA(assemble_contacts)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CUDA(assemble_joints)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CUDA(assemble_springs)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CUDA(init_penalty)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CUDA(update_weights)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CUDA(factorize)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CUDA(update_velocity)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CUDA(update_constraints)(struct sadmm_context *, bool measure, struct sadmm_error *);
+sadmm_status CUDA(iterate)(struct sadmm_context *, int count, bool measure, struct sadmm_error *);
+sadmm_status CUDA(measure_residuals)(struct sadmm_context *, struct sadmm_residual *, struct sadmm_error *);
+sadmm_status CUDA(update_penalty)(struct sadmm_context *, double ratio, struct sadmm_error *);
+sadmm_status CUDA(limit_velocity)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
+sadmm_status CUDA(read_solution)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CUDA(read_penalty)(struct sadmm_context *, double *beta, struct sadmm_error *);
+sadmm_status CUDA(integrate)(struct sadmm_context *, struct sadmm_rigid *next, struct sadmm_error *);
+sadmm_status CUDA(recover_wrenches)(struct sadmm_context *, double *wrench, struct sadmm_error *);
+
+/* core/solve/resident.h */
+sadmm_status CUDA(load_world)(struct sadmm_context *, const struct sadmm_resident_world *, const struct sadmm_settings *,
+                              struct sadmm_error *);
+sadmm_status CUDA(edit_world)(struct sadmm_context *, const struct sadmm_resident_edit *, size_t, struct sadmm_error *);
+sadmm_status CUDA(step_world)(struct sadmm_context *, const struct sadmm_settings *, struct sadmm_error *);
+sadmm_status CUDA(wait_world)(struct sadmm_context *, struct sadmm_resident_report *, struct sadmm_error *);
+sadmm_status CUDA(read_bodies)(struct sadmm_context *, struct sadmm_rigid *, struct sadmm_steady *, double *wrench,
+                               struct sadmm_error *);
+sadmm_status CUDA(read_contacts)(struct sadmm_context *, struct sadmm_contact_set *, struct sadmm_error *);
+sadmm_status CUDA(read_start)(struct sadmm_context *, struct sadmm_rigid *, double *velocity, double *impulse,
+                              struct sadmm_error *);
+
+#ifdef __cplusplus
+}
+#endif

@@ -1,0 +1,41 @@
+/* One precision's kernel table, from device/entries.h's symbols with a suffix. */
+#ifndef SADMM_CUDA_DEVICE_TABLES_H
+#define SADMM_CUDA_DEVICE_TABLES_H
+
+#define CUDA_TABLE(suffix, floats)                             \
+    {                                                          \
+        .backend = SADMM_BACKEND_CUDA,                         \
+        .precision = floats,                                   \
+        .variant = "cuda",                                     \
+        .create = sadmm_cuda_create##suffix,                   \
+        .destroy = sadmm_cuda_destroy##suffix,                 \
+        .begin = sadmm_cuda_begin##suffix,                     \
+        .assemble_bodies = sadmm_cuda_assemble_bodies##suffix, \
+        .assemble_contacts = sadmm_cuda_assemble_contacts##suffix, \
+        .assemble_joints = sadmm_cuda_assemble_joints##suffix, \
+        .assemble_springs = sadmm_cuda_assemble_springs##suffix, \
+        .init_penalty = sadmm_cuda_init_penalty##suffix,       \
+        .update_weights = sadmm_cuda_update_weights##suffix,   \
+        .factorize = sadmm_cuda_factorize##suffix,             \
+        .update_velocity = sadmm_cuda_update_velocity##suffix, \
+        .update_constraints = sadmm_cuda_update_constraints##suffix, \
+        .iterate = sadmm_cuda_iterate##suffix,                 \
+        .measure_residuals = sadmm_cuda_measure_residuals##suffix, \
+        .update_penalty = sadmm_cuda_update_penalty##suffix,   \
+        .limit_velocity = sadmm_cuda_limit_velocity##suffix,   \
+        .read_solution = sadmm_cuda_read_solution##suffix,     \
+        .read_penalty = sadmm_cuda_read_penalty##suffix,       \
+        .integrate = sadmm_cuda_integrate##suffix,             \
+        .recover_wrenches = sadmm_cuda_recover_wrenches##suffix, \
+        .resident = &(const struct sadmm_resident_kernels){    \
+            .load = sadmm_cuda_load_world##suffix,             \
+            .edit = sadmm_cuda_edit_world##suffix,             \
+            .step = sadmm_cuda_step_world##suffix,             \
+            .wait = sadmm_cuda_wait_world##suffix,             \
+            .read_bodies = sadmm_cuda_read_bodies##suffix,     \
+            .read_contacts = sadmm_cuda_read_contacts##suffix, \
+            .read_start = sadmm_cuda_read_start##suffix,       \
+        },                                                     \
+    }
+
+#endif

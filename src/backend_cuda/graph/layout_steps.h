@@ -1,0 +1,251 @@
+/* What a thread, a warp or a block does in the layout (graph/layout_view.h): shared by the kernels of any size and the
+ * one for small scenes. The view's arrays may be in global or shared memory. */
+#ifndef SADMM_CUDA_GRAPH_LAYOUT_STEPS_H
+#define SADMM_CUDA_GRAPH_LAYOUT_STEPS_H
+
+#include <stddef.h>
+
+#include "layout_view.h"
+
+#define LAYOUT_INLINE static __device__ __forceinline__
+
+enum { LAYOUT_WARP = 32 };
+#define WHOLE_WARP 0xffffffffu
+
+LAYOUT_INLINE int32_t larger(int32_t a, int32_t b) { return a > b ? a : b; }
+
+/* ---- reductions ------------------------------------------------------------------------------------------------ */
+
+LAYOUT_INLINE int32_t warp_sum(int32_t value)
+{
+    for (int o = LAYOUT_WARP / 2; o > 0; o /= 2) value += __shfl_xor_sync(WHOLE_WARP, value, o);
+    return value;
+}
+
+LAYOUT_INLINE int32_t warp_max(int32_t value)
+{
+    for (int o = LAYOUT_WARP / 2; o > 0; o /= 2) value = larger(value, __shfl_xor_sync(WHOLE_WARP, value, o));
+    return value;
+}
+
+/* Of one thread, block or launch into what is known so far. */
+LAYOUT_INLINE void merge_facts(struct cuda_facts *to, const cuda_facts &own)
+{
+    if (own.islands) atomicAdd(&to->islands, own.islands);
+    if (own.halves) atomicAdd(&to->halves, own.halves);
+    if (own.rough) atomicAdd(&to->rough, own.rough);
+    if (own.warm) atomicAdd(&to->warm, own.warm);
+    if (own.island_bodies) atomicMax(&to->island_bodies, own.island_bodies);
+    if (own.island_halves) atomicMax(&to->island_halves, own.island_halves);
+    if (own.degree) atomicMax(&to->degree, own.degree);
+    if (own.point_slots) atomicMax(&to->point_slots, own.point_slots);
+}
+
+/* Facts of the block's threads into *block (shared memory, 0 before). Every thread comes here. */
+LAYOUT_INLINE void gather_facts(struct cuda_facts *block, const cuda_facts &own)
+{
+    cuda_facts warp = {};
+    warp.islands = warp_sum(own.islands);
+    warp.halves = warp_sum(own.halves);
+    warp.rough = warp_sum(own.rough);
+    warp.warm = warp_sum(own.warm);
+    warp.island_bodies = warp_max(own.island_bodies);
+    warp.island_halves = warp_max(own.island_halves);
+    warp.degree = warp_max(own.degree);
+    warp.point_slots = warp_max(own.point_slots);
+    if (threadIdx.x % LAYOUT_WARP == 0) merge_facts(block, warp);
+    __syncthreads();
+}
+
+/* ---- islands --------------------------------------------------------------------------------------------------- */
+
+/* Parents only ever get smaller, on the way to the root, so an old one is as good as a new one. Several threads read and
+ * write them at once. SHARED: in a block's memory, atomically; else they are read past the caches of multiprocessors: atomics
+ * on the root of a large island would queue up. */
+template <bool SHARED> LAYOUT_INLINE int32_t parent_of(const int32_t *parents, int32_t i)
+{
+    return SHARED ? atomicAdd(const_cast<int32_t *>(&parents[i]), 0) : *(const volatile int32_t *)&parents[i];
+}
+
+template <bool SHARED> LAYOUT_INLINE int32_t root_of(const int32_t *parents, int32_t i)
+{
+    for (int32_t up = parent_of<SHARED>(parents, i); up != i; up = parent_of<SHARED>(parents, i)) i = up;
+    return i;
+}
+
+/* The same, halving the way for those who come later. */
+template <bool SHARED> LAYOUT_INLINE int32_t root_of_halving(int32_t *parents, int32_t i)
+{
+    for (int32_t up = parent_of<SHARED>(parents, i); up != i;) {
+        int32_t next = parent_of<SHARED>(parents, up);
+        if (next != up) atomicMin(&parents[i], next); /* i is no root: nobody hooks it now */
+        i = up;
+        up = next;
+    }
+    return i;
+}
+
+/* Hook the larger root under the smaller one. */
+template <bool SHARED> LAYOUT_INLINE void join_bodies(int32_t *parents, int32_t a, int32_t b)
+{
+    a = root_of_halving<SHARED>(parents, a);
+    b = root_of_halving<SHARED>(parents, b);
+    while (a != b) {
+        int32_t high = larger(a, b), low = a + b - high, before = atomicCAS(&parents[high], high, low);
+        if (before == high) return;
+        a = root_of_halving<SHARED>(parents, before); /* somebody else has hooked it meanwhile */
+        b = root_of_halving<SHARED>(parents, low);
+    }
+}
+
+/* ---- survey ---------------------------------------------------------------------------------------------------- */
+
+LAYOUT_INLINE void clear_body(const layout_view &v, int32_t i)
+{
+    v.label[i] = i;
+    v.degree[i] = v.island_bodies[i] = v.island_halves[i] = 0;
+}
+
+LAYOUT_INLINE bool starts_warm(const layout_view &v, int32_t first, int32_t count)
+{
+    for (int32_t k = 0; k < count; ++k) {
+        const double *impulse = v.points[first + k].impulse;
+        if (impulse[0] != 0 || impulse[1] != 0 || impulse[2] != 0) return true;
+    }
+    return false;
+}
+
+/* What a pair joins, two numbers at a time: threads ask for neighbours, which are far apart, and what counts is how often. */
+struct pair_about {
+    int2 bodies, points; /* a, b; first, count */
+};
+LAYOUT_INLINE pair_about load_about(const sadmm_contact_pair *pair)
+{
+    static_assert(offsetof(sadmm_contact_pair, body_b) == 4 && offsetof(sadmm_contact_pair, first) % 8 == 0 &&
+                      offsetof(sadmm_contact_pair, count) == offsetof(sadmm_contact_pair, first) + 4,
+                  "neighbours");
+    const pair_about about = {*(const int2 *)&pair->body_a, *(const int2 *)&pair->first};
+    return about;
+}
+
+/* What may differ between steps of the same pairs. */
+LAYOUT_INLINE void survey_pair(const layout_view &v, const pair_about &about, double friction, cuda_facts *own)
+{
+    own->point_slots = larger(own->point_slots, about.points.y);
+    own->rough += friction > 0;
+    if (v.warm_start) own->warm += starts_warm(v, about.points.x, about.points.y);
+}
+
+/* A pair (record < pairs), a row block (record >= pair_room) or none. */
+template <bool SHARED>
+LAYOUT_INLINE void survey_record(const layout_view &v, int32_t record, int32_t pairs, bool islands, cuda_facts *own)
+{
+    int32_t body[2] = {-1, -1};
+    if (record < pairs) {
+        const pair_about about = load_about(&v.pairs[record]);
+        body[0] = about.bodies.x;
+        body[1] = about.bodies.y;
+        survey_pair(v, about, v.pairs[record].friction, own);
+    } else if (record >= v.pair_room) {
+        const sadmm_problem_block &block = v.blocks[record - v.pair_room];
+        body[0] = block.body_a;
+        body[1] = block.body_b;
+    }
+    for (int side = 0; side < 2; ++side) {
+        bool is_half = body[side] >= 0;
+        v.half_body[2 * record + side] = is_half ? body[side] : v.bodies;
+        if (!is_half) continue;
+        atomicAdd(&v.degree[body[side]], 1);
+        ++own->halves;
+    }
+    if (islands && body[0] >= 0 && body[1] >= 0) join_bodies<SHARED>(v.label, body[0], body[1]);
+}
+
+/* The running total is largest when it is complete: the facts do not depend on who comes last. */
+LAYOUT_INLINE void add_to_island(const layout_view &v, int32_t label, int32_t bodies, int32_t halves, cuda_facts *own)
+{
+    own->island_bodies = larger(own->island_bodies, atomicAdd(&v.island_bodies[label], bodies) + bodies);
+    own->island_halves = larger(own->island_halves, atomicAdd(&v.island_halves[label], halves) + halves);
+}
+
+/* Label body i; `own` gets what is known of bodies and islands. Every lane of the warp comes here, i ascending. */
+template <bool SHARED> LAYOUT_INLINE void survey_body(const layout_view &v, int32_t i, bool islands, cuda_facts *own)
+{
+    const bool live = i < v.bodies;
+    const int32_t degree = live ? v.degree[i] : 0;
+    own->degree = larger(own->degree, degree);
+    if (!islands) return;
+    const int32_t label = live ? root_of<SHARED>(v.label, i) : -1;
+    if (live) atomicMin(&v.label[i], label); /* its root: no larger than what is there */
+    own->islands += live && label == i;
+    /* Neighbours are mostly of one island: those of the first lane's go together. */
+    const bool together = label == __shfl_sync(WHOLE_WARP, label, 0, LAYOUT_WARP);
+    const int32_t bodies = warp_sum(together), halves = warp_sum(together ? degree : 0);
+    if (!live) return;
+    if (i % LAYOUT_WARP == 0) add_to_island(v, label, bodies, halves, own);
+    else if (!together) add_to_island(v, label, 1, degree, own);
+}
+
+/* ---- parts ----------------------------------------------------------------------------------------------------- */
+
+/* First slot of share p of P of the slots [first, last). */
+LAYOUT_INLINE int32_t share_begin(const int32_t *offsets, int32_t first, int32_t last, int32_t p, int32_t P)
+{
+    const int64_t before = (int64_t)offsets[first] + first, all = (int64_t)offsets[last] + last - before;
+    const int64_t target = before + (p * all + P - 1) / P;
+    while (first < last) {
+        int32_t middle = first + (last - first) / 2;
+        if ((int64_t)offsets[middle] + middle < target) first = middle + 1;
+        else last = middle;
+    }
+    return first;
+}
+
+/* The first slot from s on where an island begins. An island's first body, in slots as in raw order, is its label. */
+LAYOUT_INLINE int32_t island_from(const layout_view &v, int32_t s)
+{
+    if (s == v.bodies) return s;
+    const int32_t label = v.label[v.body_of[s]], head = v.slot_of[label];
+    return head == s ? s : head + v.island_bodies[label];
+}
+
+LAYOUT_INLINE int32_t part_begin(const layout_view &v, const cuda_partition &partition, int32_t p)
+{
+    const int32_t n = v.bodies, each = partition.cluster, clusters = partition.parts / each;
+    if (partition.tier == SADMM_CUDA_TIER_GRID) return share_begin(v.offsets, 0, n, p, partition.parts);
+    const int32_t first = island_from(v, share_begin(v.offsets, 0, n, p / each, clusters));
+    if (p % each == 0) return first;
+    const int32_t last = island_from(v, share_begin(v.offsets, 0, n, p / each + 1, clusters));
+    return share_begin(v.offsets, first, last, p % each, each);
+}
+
+/* Parts, their largest, and whether all fit. Every thread of the one block (of `threads`) comes here; `most` (shared):
+ * two numbers. */
+LAYOUT_INLINE void make_parts(const layout_view &v, const cuda_partition &partition, int32_t threads, int32_t *most)
+{
+    const int32_t t = (int32_t)threadIdx.x;
+    int32_t halves = 0, bodies = 0;
+    if (t < 2) most[t] = 0;
+    __syncthreads();
+    for (int32_t p = t; p <= partition.parts; p += threads) {
+        const int32_t begin = part_begin(v, partition, p);
+        v.parts[p] = begin;
+        if (p == partition.parts) continue;
+        const int32_t end = part_begin(v, partition, p + 1);
+        halves = larger(halves, v.offsets[end] - v.offsets[begin]);
+        bodies = larger(bodies, end - begin);
+    }
+    halves = warp_max(halves);
+    bodies = warp_max(bodies);
+    if (t % LAYOUT_WARP == 0) {
+        atomicMax(&most[0], halves);
+        atomicMax(&most[1], bodies);
+    }
+    __syncthreads();
+    if (t > 0) return;
+    v.facts->part_halves = most[0];
+    v.facts->part_bodies = most[1];
+    if (most[0] > partition.most_halves || most[1] > partition.most_bodies) v.live->halt = HALT_PARTITION;
+}
+
+#endif

@@ -1,0 +1,112 @@
+/* The layout (graph/layout.h) of a step, made on the device from core's own pairs and blocks: compiled once, for both
+ * precisions.
+ *
+ *   survey    a thread a record: facts of the pairs, the body of every half, degrees, islands joined
+ *             a thread a body: islands labelled by their smallest body, facts of the bodies
+ *   layout    bodies sorted by label (where islands matter), halves sorted by slot, both stably; where a body's halves
+ *             begin; parts
+ *
+ * Islands are a union-find forest whose roots are only ever hooked under smaller ones (Jaiganesh and Burtscher, A
+ * High-Performance Connected Components Implementation for GPUs, HPDC 2018): whatever the timing, an island's root ends
+ * up to be its smallest body.
+ *
+ * A small scene takes one kernel of one block for both stages, its arrays in shared memory (graph/layout_small.cu): a launch
+ * costs as much as such a stage. Both ways give the same layout. The functions below only enqueue, so that they can be
+ * captured into a graph.
+ */
+#ifndef SADMM_CUDA_GRAPH_LAYOUT_VIEW_H
+#define SADMM_CUDA_GRAPH_LAYOUT_VIEW_H
+
+#include <cuda_runtime.h>
+
+#include "core/model/system.h"
+#include "layout.h"
+
+enum { LAYOUT_THREADS = 256, ONE_BLOCK_THREADS = 1024 };
+
+/* What the arrays hold, so that a scene whose pairs are still the same keeps them (one_block). */
+struct layout_kept {
+    int32_t valid, pairs;
+    struct cuda_partition partition;
+};
+
+/* Device memory. A half that is none (no pair, a static side) has body and slot `bodies`. */
+struct layout_view {
+    struct cuda_live *live;
+    struct cuda_facts *facts;
+    const struct sadmm_contact_pair *pairs;
+    const struct sadmm_contact_point *points;
+    const struct sadmm_problem_block *blocks;
+    int32_t bodies, pair_room, rows; /* as in cuda_view */
+    int32_t warm_start;
+    int32_t most_blocks; /* that run at once */
+
+    int32_t *label, *degree;                 /* by raw body; label: its island's smallest body */
+    int32_t *island_bodies, *island_halves;  /* by label */
+    int32_t *half_body, *half_slot, *sorted; /* 2 (pair_room + rows): raw body, slot, slots sorted */
+    int32_t *sorted_label;                   /* bodies */
+    const int32_t *numbers;                  /* 0, 1, ...: at least as many as halves or bodies */
+    void *temp;                              /* of the sorts */
+    size_t temp_bytes;
+
+    int32_t *body_of, *slot_of, *offsets, *incident, *parts;
+    struct layout_kept *kept;
+};
+
+/* Which stages, and what of them. */
+struct layout_args {
+    int32_t survey, layout; /* of one_block: which */
+    int32_t islands;        /* survey: look for them; layout: slots by island */
+    struct cuda_partition partition;
+};
+
+static __host__ __device__ inline bool slots_by_island(const struct cuda_partition *partition)
+{
+    return partition->islands || partition->tier == SADMM_CUDA_TIER_BLOCK || partition->tier == SADMM_CUDA_TIER_CLUSTER;
+}
+
+#ifdef SADMM_CUDA_EMULATED
+#define LAYOUT(name) sadmm_cuda_layout_##name##_emulated
+#else
+#define LAYOUT(name) sadmm_cuda_layout_##name
+#endif
+
+/* On failure *kernel tells what was launched; after success, what was launched last. */
+cudaError_t LAYOUT(survey)(const struct layout_view *, bool islands, cudaStream_t stream, const char **kernel);
+cudaError_t LAYOUT(make)(const struct layout_view *, const struct cuda_partition *, cudaStream_t stream,
+                         const char **kernel);
+/* Either or both by one block: survey, and a layout where there is a partition. `shared`: bytes it takes, SIZE_MAX:
+ * such a scene is too large. `allow`: let it take so many. */
+size_t LAYOUT(one_block_shared)(int32_t bodies, int32_t halves);
+cudaError_t LAYOUT(one_block_allow)(int bytes);
+cudaError_t LAYOUT(one_block)(const struct layout_view *, bool survey, bool islands, const struct cuda_partition *,
+                              cudaStream_t stream, const char **kernel);
+/* What view.temp has to hold. */
+cudaError_t LAYOUT(temp_bytes)(int32_t bodies, int32_t halves, size_t *bytes);
+/* view.numbers */
+cudaError_t LAYOUT(number)(int32_t *numbers, int32_t count, cudaStream_t stream, const char **kernel);
+
+/* Shared memory of a block, sized at launch. */
+#ifdef SADMM_CUDA_EMULATED
+#define LAYOUT_SHARED(name) unsigned char *const name = cuda_emulation_shared()
+#else
+#define LAYOUT_SHARED(name) extern __shared__ __align__(16) unsigned char name[]
+#endif
+
+typedef void (*layout_kernel)(const layout_view, const layout_args);
+
+static inline cudaError_t layout_launch(layout_kernel kernel, int64_t blocks, int threads, size_t shared,
+                                        const layout_view *view, const layout_args *args, cudaStream_t stream)
+{
+    if (blocks <= 0) return cudaSuccess;
+#ifdef SADMM_CUDA_EMULATED
+    (void)stream;
+    return cuda_emulation_launch(kernel, (unsigned)blocks, (unsigned)threads, shared, *view, *args);
+#else
+    void *parameters[] = {const_cast<layout_view *>(view), const_cast<layout_args *>(args)};
+    return cudaLaunchKernel((const void *)kernel, dim3((unsigned)blocks), dim3((unsigned)threads), parameters, shared,
+                            stream);
+#endif
+}
+
+#endif

@@ -1,0 +1,79 @@
+/* The method `fast`: the limit of energies (math/limit.h). In double, from this precision's data; once a step, eight lanes a body.
+ *
+ *   suspect   is there a body with more energy than its free motion has, or that bounces? Else no island does. Resident
+ *             kernels look themselves, those of tier BLOCK see to the rest too
+ *   limit     nothing, unless there is one: energies and work, sums over islands (weight/island_sums.h), the factor of each
+ *             island's velocities. Whole steps apply it where they move bodies (step/kernels.cu)
+ */
+#include <string.h>
+
+#include "backend_cuda/device/double.h"
+#include "energies.h"
+#include "backend_cuda/weight/island_sums.h"
+
+#include "core/math/relax.h"
+
+template <bool RIGID> static __device__ __forceinline__ bool suspect(const cuda_view &v, const body_thread &t, bool few)
+{
+    const wide_row<RIGID> row = row_of_body<RIGID>(v, t);
+    const bool speaks = t.live && t.lane == 0;
+    return suspect_body(few, speaks, speaks ? v.free_energy[t.body] : 0, row.velocity, row.b, row.a);
+}
+
+static __global__ void __launch_bounds__(BODY_THREADS)
+    suspect_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    wait_for_stream();
+    const body_thread t = body_of_thread(v);
+    if (v.rigid ? suspect<true>(v, t, args.few) : suspect<false>(v, t, args.few)) *v.suspects = 1;
+}
+
+static __global__ void __launch_bounds__(BODY_THREADS)
+    limit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    wait_for_stream();
+    if (!*v.suspects) return;
+    const body_thread t = body_of_thread(v);
+    double total[TERMS];
+    const double term = v.rigid ? energies_of_body<true>(v, t) : energies_of_body<false>(v, t);
+    if (add_up_island<add_terms>(v, t, term, total) && t.lane == 0)
+        limit_island(v, &v.islands[v.label[t.body]], total, args.few);
+}
+
+static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    const int32_t i = thread_index();
+    if (i >= live_bodies(v)) return;
+    const solver_real factor = slow_down(v, i);
+    solver_real *state = v.state + (size_t)i * ROW;
+    for (int k = 0; factor != 1 && k < 6; ++k) state[k] *= factor;
+}
+
+/* ---- launches ---------------------------------------------------------------------------------------------------- */
+
+static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const char *name, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    args.few = limit_few(c->plan.warm, c->settings.iterations);
+    return CUDA(launch_early)(c, kernel, name, body_blocks(c->view.bodies), BODY_THREADS, &args, error);
+}
+
+sadmm_status CUDA(enqueue_limit)(struct sadmm_context *c, bool suspected, struct sadmm_error *error)
+{
+    if (!suspected) CUDA_TRY(launch(c, suspect_kernel, "energies", error));
+    return launch(c, limit_kernel, "limit", error);
+}
+
+/* ---- entries ----------------------------------------------------------------------------------------------------- */
+
+extern "C" sadmm_status CUDA(limit_velocity)(struct sadmm_context *c, int32_t *limited, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    CUDA_ENTER(c);
+    CUDA_TRY(CUDA(enqueue_limit)(c, false, error));
+    CUDA_TRY(CUDA(launch)(c, slow_kernel, "limit_velocity", blocks_for(c->view.bodies), &args, error));
+    CUDA_TRY(CUDA(download)(c, c->view.limited, sizeof *limited, error));
+    memcpy(limited, c->buffers[PINNED_OUT].data, sizeof *limited);
+    if (*limited > 0) c->exact_since = RELAX_DEFECT_PERIOD; /* defects are taken anew, should anything follow */
+    return SADMM_OK;
+}

@@ -1,0 +1,93 @@
+/* The method `fast`: the stop rule of whole steps. A look finds each island's part of the certificate (core/solve/certificate.c),
+ * the natural map of its contacts and its momentum error. An island that meets the tolerances has stopped, in every tier
+ * after as many iterations as if it were alone: nothing is written to it any more. Tier BLOCK leaves a block out whose islands
+ * have all stopped; the other tiers have nothing left to do once the last island has. The scale of the momentum error is the
+ * island's own, which is no less strict than the certificate's (but for islands where nothing pushes: there the tolerance of
+ * the natural map says what is nothing). In double, eight lanes a body. */
+#include "backend_cuda/device/double.h"
+#include "backend_cuda/weight/constraint.h"
+#include "backend_cuda/weight/island_sums.h"
+#include "stop_rule.h"
+#include "backend_cuda/step/solution.h"
+
+/* The largest natural map of a pair's points, m/s. */
+static __device__ double natural_map(const cuda_view &v, int32_t p)
+{
+    const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
+    const mat3 frame = sadmm_contact_frame(pair->normal);
+    const int32_t bodies[2] = {pair->body_a, pair->body_b};
+    const int rows = pair->friction > 0 ? 3 : 1;
+    const int32_t count = (int32_t)v.difference[p].w; /* as planned for, should the pair have more: nobody has looked yet */
+    double worst = 0;
+    for (int32_t k = 0; k < count; ++k) {
+        const struct sadmm_contact_point *point = &v.raw_points[pair->first + k];
+        vec3 velocity = v3(0, 0, 0);
+        double weight[3] = {};
+        for (int side = 0; side < 2; ++side) {
+            if (bodies[side] < 0) continue;
+            const solver_real *state = v.state + (size_t)bodies[side] * ROW;
+            const double *arm = side ? point->arm_b : point->arm_a, *inverse = v.A_inverse + (size_t)bodies[side] * PACKED;
+            const vec3 turn = v3((double)state[3], (double)state[4], (double)state[5]),
+                       at_point = v3_add(v3((double)state[0], (double)state[1], (double)state[2]),
+                                         v3_cross(turn, v3_load(arm)));
+            velocity = side ? v3_add(velocity, at_point) : v3_sub(velocity, at_point);
+            for (int i = 0; i < rows; ++i) {
+                double row[6];
+                sadmm_contact_row(frame.r[i], arm, 1, row);
+                weight[i] += packed_form(inverse, row);
+            }
+        }
+        const vec3 impulse = m3_mul(frame, point_impulse(v, p, k, frame.r[0])), x = m3_mul(frame, velocity);
+        const double w = fmax(weight[0], fmax(weight[1], weight[2])),
+                     e = sadmm_contact_e(&v.raw, &v.settings, pair, point),
+                     lambda[3] = {impulse.x, impulse.y, impulse.z}, u[3] = {x.x + e, x.y, x.z};
+        double y[3], inside[3], missed = 0;
+        for (int i = 0; i < 3; ++i) y[i] = lambda[i] - u[i] / w;
+        contact_project_rows(y, pair->friction, inside);
+        for (int i = 0; i < 3; ++i) missed += (lambda[i] - inside[i]) * (lambda[i] - inside[i]);
+        worst = largest_term::join(worst, w * sqrt(missed));
+    }
+    return worst;
+}
+
+/* Terms of a body: natural map of the pairs that count here (at their first dynamic body); momentum error, and the largest of
+ * what it is made of. args.looks: this look's number, from 1; args.count: iterations done. */
+static __global__ void __launch_bounds__(BODY_THREADS)
+    look_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    if (blockIdx.x == 0 && threadIdx.x == 0) v.stop->unmet[(args.looks + 1) % LOOKS_KEPT] = 0;
+    if (args.looks > 1 && all_stopped(v, args.looks - 1)) return;
+    const body_thread t = body_of_thread(v);
+    enum { MAP = 6, PUSH, SUMS };
+    double sums[SUMS] = {}, map = 0, term[TERMS] = {}, largest[TERMS];
+    for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) {
+        const int32_t code = v.incident[at], p = code / 2;
+        add_half(v, code, sums, &sums[PUSH]);
+        if (code & 1 && is_dynamic(v, v.ends[p].body_a)) continue; /* counted there */
+        map = largest_term::join(map, natural_map(v, p));
+    }
+    sum_lanes<SUMS>(sums);
+    const wide_row<true> row = row_of_body<true>(v, t); /* worlds alone have a stop rule here */
+    const double g = own_number(sums, t.lane), momentum = product(row.velocity, row.a);
+    term[0] = largest_of_lanes(map);
+    term[1] = largest_of_lanes(fabs(momentum - row.b - g));
+    term[2] = largest_of_lanes(largest_term::join(fabs(g), largest_term::join(fabs(momentum), fabs(row.b))));
+    term[2] = fmax(term[2], t.live ? mass_of(v, t.body) * v.settings.certificate_tolerance : 0);
+    if (!add_up_island<largest_term>(v, t, own_number(term, t.lane), largest) || t.lane != 0) return;
+    const bool met = largest[0] <= v.settings.certificate_tolerance &&
+                     largest[1] <= v.settings.certificate_momentum_tolerance * largest[2];
+    int32_t *stopped = &v.islands[v.label[t.body]].stopped;
+    if (!met) atomicAdd(&v.stop->unmet[args.looks % LOOKS_KEPT], 1);
+    if (!met || *stopped > 0) return;
+    *stopped = args.count;
+    atomicAdd(&v.stop->sum, (unsigned long long)args.count);
+    atomicMax(&v.stop->last, args.count);
+}
+
+sadmm_status CUDA(enqueue_look)(struct sadmm_context *c, int done, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    args.looks = ++c->looks;
+    args.count = done;
+    return CUDA(launch_of)(c, look_kernel, "look", body_blocks(c->view.bodies), BODY_THREADS, &args, error);
+}

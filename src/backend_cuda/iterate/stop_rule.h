@@ -1,0 +1,45 @@
+/* The method `fast`: what the stop rule of a step has found (iterate/stop_rule.cu). */
+#ifndef SADMM_CUDA_ITERATE_STOP_RULE_H
+#define SADMM_CUDA_ITERATE_STOP_RULE_H
+
+#include "backend_cuda/device/context.h"
+
+/* Before the first kernel of a solve that counts islands: those slowed down, those that have stopped. */
+static __device__ __forceinline__ void clear_counts(const cuda_view &v)
+{
+    const cuda_stop none = {};
+    *v.limited = *v.suspects = 0;
+    *v.stop = none;
+}
+
+/* Had every island stopped at the last of `looks` looks? */
+static __device__ __forceinline__ bool all_stopped(const cuda_view &v, int32_t looks)
+{
+    return looks > 0 && v.stop->unmet[looks % LOOKS_KEPT] == 0;
+}
+
+/* Had the island of a body? Then it stays as it is, whatever its thread block still does for others: an island's result does
+ * not depend on who is beside it. */
+static __device__ __forceinline__ bool island_stopped(const cuda_view &v, int32_t looks, int32_t body)
+{
+    return looks > 0 && v.islands[v.label[body]].stopped > 0;
+}
+
+static __device__ __forceinline__ bool pair_stopped(const cuda_view &v, int32_t looks, const pair_ends &ends)
+{
+    return looks > 0 && island_stopped(v, looks, ends.body_a < v.bodies ? ends.body_a : ends.body_b);
+}
+
+/* Had all islands of the slots [first, end), which are whole ones? */
+static __device__ __forceinline__ bool part_stopped(const cuda_view &v, int32_t looks, int32_t first, int32_t end)
+{
+    bool all = looks > 0;
+    for (int32_t s = first; all && s < end;) {
+        const int32_t label = v.label[v.body_of[s]];
+        all = v.islands[label].stopped > 0;
+        s += v.island_bodies[label];
+    }
+    return all;
+}
+
+#endif

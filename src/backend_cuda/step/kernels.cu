@@ -1,0 +1,273 @@
+/* The step's own kernels (step/step.h): start, admit, check, finish, commit, edits. */
+#include <stddef.h>
+
+#include "backend_cuda/device/double.h"
+
+#include "core/model/steady.h"
+#include "backend_cuda/iterate/slow.h"
+#include "solution.h"
+#include "plan_check.h"
+
+static __device__ __forceinline__ bool finite_numbers(const double *x, int count)
+{
+    double sum = 0;
+    for (int k = 0; k < count; ++k) sum += x[k] - x[k];
+    return sum == 0;
+}
+
+enum { STEP_THREADS = 64 }; /* a block: few, for long work and many multiprocessors */
+
+/* ---- edits ----------------------------------------------------------------------------------------------------- */
+
+static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    int32_t i = thread_index();
+    if (i >= args.count || v.live->halt) return;
+    const struct sadmm_resident_edit *edit = &args.edits[i];
+    struct sadmm_rigid *body = const_cast<struct sadmm_rigid *>(&v.step.before[edit->body]);
+    if (edit->what & SADMM_EDIT_STATE) {
+        for (int k = 0; k < 3; ++k) body->position[k] = edit->position[k];
+        for (int k = 0; k < 4; ++k) body->orientation[k] = edit->orientation[k];
+        for (int k = 0; k < 6; ++k) body->velocity[k] = edit->velocity[k];
+    }
+    if (edit->what & SADMM_EDIT_WRENCH)
+        for (int k = 0; k < 6; ++k) body->wrench[k] = edit->wrench[k];
+}
+
+/* ---- start ----------------------------------------------------------------------------------------------------- */
+
+/* What a body brings along, in the order of both structures: position, orientation, velocity. */
+enum { CARRIED = 13, CARRIED_VELOCITY = 7, START_LANES = 16 };
+static_assert(offsetof(struct sadmm_rigid, velocity) == CARRIED_VELOCITY * sizeof(double) &&
+                  offsetof(struct sadmm_collision_body, velocity) == CARRIED_VELOCITY * sizeof(double),
+              "numbers of a body are copied one by one");
+
+/* START_LANES threads a body, a number each: neighbours in memory go to neighbours. */
+static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    const int64_t t = (int64_t)blockIdx.x * STEP_THREADS + threadIdx.x, i = t / START_LANES;
+    const int32_t lane = (int32_t)(t % START_LANES);
+    if (v.live->halt) return;
+    if (t == 0) {
+        v.step.control->depth = 0;
+        v.step.control->culprit = INT32_MAX;
+        v.step.control->stamps[STAMP_START] = nanoseconds();
+    }
+    if (i >= v.bodies || lane >= CARRIED) return;
+    const double number = ((const double *)&v.step.before[i])[lane];
+    ((double *)&v.step.bodies[v.step.slot_of_body[i]])[lane] = number;
+    if (lane < CARRIED_VELOCITY) return;
+    const int32_t k = lane - CARRIED_VELOCITY;
+    v.step.start_velocity[6 * i + k] = steady_start_component(number, &v.step.steady_before[i], k);
+}
+
+/* ---- gates ----------------------------------------------------------------------------------------------------- */
+
+/* One thread. What was found is this step's when it fits. */
+static __global__ void admit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    if (threadIdx.x > 0 || v.live->halt) return;
+    const struct sadmm_cuda_contact_counts counts = *v.step.counts;
+    v.step.control->stamps[STAMP_FOUND] = nanoseconds();
+    if (counts.candidates > v.step.candidate_room || counts.points > v.step.point_room || counts.pairs > v.pair_room) {
+        v.live->halt = HALT_ROOM;
+        return;
+    }
+    v.live->bodies = v.bodies;
+    v.live->pairs = counts.pairs;
+    v.live->points = counts.points;
+}
+
+/* ---- finish ---------------------------------------------------------------------------------------------------- */
+
+/* What is fetched before the iterations have ended. */
+struct body_before {
+    struct sadmm_rigid body;
+    struct sadmm_steady steady;
+};
+
+static __device__ body_before fetch_body(const cuda_view &v, int32_t i)
+{
+    const body_before before = {v.step.before[i], v.step.steady_before[i]};
+    return before;
+}
+
+static __device__ bool finish_body(const cuda_view &v, int32_t i, const body_before &before)
+{
+    struct sadmm_steady steady = before.steady;
+    struct sadmm_rigid next = before.body;
+    const solver_real slow = v.step.limits ? slow_down(v, i) : (solver_real)1;
+    move_body(v, i, &before.body, slow, next.position, next.orientation, next.velocity);
+    steady_keep(&steady, &before.body, &next);
+    v.step.after[i] = next;
+    v.step.steady_after[i] = steady;
+    return finite_numbers(next.position, 3) && finite_numbers(next.orientation, 4) && finite_numbers(next.velocity, 6);
+}
+
+struct point_before {
+    double impulse[3], gap;
+};
+
+static __device__ point_before fetch_before(const struct sadmm_contact_point *point)
+{
+    const point_before before = {{point->impulse[0], point->impulse[1], point->impulse[2]}, point->gap};
+    return before;
+}
+
+struct pair_before {
+    int32_t first, count, body; /* points; a body of it */
+    vec3 normal;
+    point_before point;         /* the lane's first */
+};
+
+static __device__ pair_before fetch_pair(const cuda_view &v, int32_t p, int32_t lane)
+{
+    const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
+    pair_before before = {pair->first, pair->count, pair->body_b >= 0 ? pair->body_b : pair->body_a, v3_load(pair->normal), {}};
+    if (lane < before.count) before.point = fetch_before(&v.step.points[before.first + lane]);
+    return before;
+}
+
+/* Impulses of a pair into its points, every v.lanes-th of them from `lane` on; *depth: the deepest. */
+static __device__ bool finish_pair(const cuda_view &v, int32_t p, int32_t lane, const pair_before &pair, double *depth)
+{
+    bool finite = true;
+    for (int32_t k = lane; k < pair.count; k += v.lanes) {
+        struct sadmm_contact_point *point = &v.step.points[pair.first + k];
+        const point_before before = k == lane ? pair.point : fetch_before(point);
+        double *start = v.step.start_impulse + 3 * (size_t)(pair.first + k), impulse[3];
+        v3_store(point_impulse(v, p, k, pair.normal), impulse);
+        finite = finite && finite_numbers(impulse, 3);
+        for (int j = 0; j < 3; ++j) {
+            start[j] = before.impulse[j];
+            point->impulse[j] = impulse[j];
+        }
+        *depth = fmax(*depth, -before.gap);
+    }
+    return finite;
+}
+
+/* Threads for bodies, eight lanes a wrench, threads for points: side by side, each of them long. */
+struct finish_ranges {
+    int32_t wrenches, pairs, end;
+};
+static __host__ __device__ inline finish_ranges ranges_of(const cuda_view &v)
+{
+    finish_ranges r;
+    r.wrenches = (v.bodies + WARP - 1) / WARP * WARP;
+    r.pairs = r.wrenches + (v.settings.recover_wrenches ? (LANES * v.bodies + WARP - 1) / WARP * WARP : 0);
+    r.end = r.pairs + v.lanes * v.pair_room;
+    return r;
+}
+
+/* Does not look at culprits of this very kernel: which body is named must not depend on who came first. */
+static __global__ void __launch_bounds__(STEP_THREADS)
+    finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    const int32_t i = (int32_t)(blockIdx.x * (unsigned)STEP_THREADS + threadIdx.x);
+    const finish_ranges range = ranges_of(v);
+    struct cuda_step_control *control = v.step.control;
+    double depth = 0;
+    const bool is_body = i < range.wrenches, is_pair = i >= range.pairs && (i - range.pairs) / v.lanes < live_pairs(v);
+    const int32_t p = (i - range.pairs) / v.lanes, lane = is_pair ? (i - range.pairs) % v.lanes : 0;
+    body_before body = {};
+    pair_before pair = {};
+    if (is_body && i < v.bodies) body = fetch_body(v, i);
+    if (is_pair) pair = fetch_pair(v, p, lane);
+    /* Layout and penalties are the last that halt a step, the latter where it is not as planned; iterations come between. */
+    const bool on = as_planned(v) && !v.live->halt;
+
+    wait_for_stream();
+    let_next_begin();
+    const unsigned long long deepest = control->depth; /* of those that have come here */
+    if (i == 0) control->stamps[STAMP_SOLVED] = nanoseconds();
+    if (is_body) {
+        if (on && i < v.bodies && !finish_body(v, i, body)) atomicMin(&control->culprit, i);
+    } else if (i < range.pairs) {
+        const int32_t slot = (i - range.wrenches) / LANES, of_body = i % LANES;
+        const bool live = on && slot < v.bodies;
+        double wrench[6];
+        contact_wrench(v, live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0, of_body, wrench);
+        if (live) store_wrench(wrench, of_body, v.step.wrench + 6 * (size_t)v.body_of[slot]);
+    } else if (on && is_pair) {
+        /* bodies are named first: all of them are below any contact's */
+        if (!finish_pair(v, p, lane, pair, &depth)) atomicMin(&control->culprit, v.bodies + pair.body);
+    }
+    /* -0 is no depth; a larger one may be there already */
+    unsigned long long bits = depth > 0 ? (unsigned long long)__double_as_longlong(depth) : 0;
+    for (int o = WARP / 2; o > 0; o /= 2) {
+        unsigned long long other = __shfl_xor_sync(0xffffffffu, bits, o);
+        bits = other > bits ? other : bits;
+    }
+    if (threadIdx.x % WARP == 0 && bits > deepest) atomicMax(&control->depth, bits);
+}
+
+/* ---- commit ---------------------------------------------------------------------------------------------------- */
+
+static __device__ double double_of(unsigned long long bits) { return __longlong_as_double((long long)bits); }
+
+/* One thread. */
+static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    const bool planned = as_planned(v);
+    const int32_t halted = v.live->halt;
+    wait_for_stream();
+    if (threadIdx.x > 0) return;
+    struct cuda_step_control *control = v.step.control;
+    struct cuda_step_report *report = &v.step.reports[control->sequence % STEPS_AHEAD];
+    const int32_t culprit = control->culprit,
+                  halt = halted ? halted : !planned ? HALT_PLAN : culprit != INT32_MAX ? HALT_NON_FINITE : HALT_NONE;
+    control->stamps[STAMP_END] = nanoseconds();
+    v.live->halt = halt;
+    report->sequence = control->sequence++;
+    report->halt = halt;
+    report->culprit = culprit;
+    report->counts = *v.step.counts;
+    report->facts = *v.facts;
+    report->depth = double_of(control->depth);
+    report->primal = v.step.measured ? double_of(v.residual[0]) : -1;
+    report->dual = v.step.measured ? double_of(v.residual[1]) : -1;
+    report->limited = v.step.limits ? *v.limited : 0;
+    report->unmet = args.looks > 0 ? v.stop->unmet[args.looks % LOOKS_KEPT] : -1;
+    report->most_iterations = args.looks > 0 ? v.stop->last : 0;
+    report->sum_of_iterations = args.looks > 0 ? (int64_t)v.stop->sum : 0;
+    for (int k = 0; k < STAMPS; ++k) report->stamps[k] = control->stamps[k];
+}
+
+/* ---- launches -------------------------------------------------------------------------------------------------- */
+
+sadmm_status CUDA(launch_edits)(struct sadmm_context *c, const struct sadmm_resident_edit *edits, size_t count,
+                                struct sadmm_error *error)
+{
+    cuda_args args = {};
+    args.count = (int32_t)count;
+    args.edits = edits;
+    return CUDA(launch)(c, edit_kernel, "edit", blocks_for((int64_t)count), &args, error);
+}
+
+sadmm_status CUDA(launch_start)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    const int64_t blocks = (int64_t)c->view.bodies * START_LANES / STEP_THREADS + 1;
+    return CUDA(launch_of)(c, start_step_kernel, "start", blocks, STEP_THREADS, &args, error);
+}
+
+sadmm_status CUDA(launch_admit)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    return CUDA(launch)(c, admit_kernel, "admit", 1, &args, error);
+}
+
+sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    int64_t blocks = ((int64_t)ranges_of(c->view).end + STEP_THREADS - 1) / STEP_THREADS;
+    return CUDA(launch_early)(c, finish_kernel, "finish", blocks, STEP_THREADS, &args, error);
+}
+
+sadmm_status CUDA(launch_commit)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    args.looks = c->looks;
+    return CUDA(launch_early)(c, commit_kernel, "commit", 1, STEP_THREADS, &args, error);
+}

@@ -1,0 +1,124 @@
+/* What a step gives back, in raw order and double: v and lambda, beta, the moved bodies (Q), contact wrenches (R). */
+#include "backend_cuda/device/double.h"
+#include "solution.h"
+
+static __device__ double row_multiplier(const cuda_view &v, int32_t k, int r)
+{
+    return (double)v.row_data[(size_t)(ROW_LAMBDA + r) * (size_t)v.row_stride + (size_t)k];
+}
+
+/* ---- v and lambda ---------------------------------------------------------------------------------------------- */
+
+/* out: velocities (bodies x 6), impulses (points x 3), multipliers (blocks x 6). One thread a body, pair or block. */
+static __global__ void read_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    int32_t i = thread_index();
+    double *impulses = v.out + 6 * (size_t)v.bodies, *multipliers = impulses + 3 * (size_t)v.points;
+    if (i < v.bodies) {
+        if (i >= live_bodies(v)) return;
+        double *out = v.out + 6 * (size_t)i;
+        for (int k = 0; k < 6; ++k) out[k] = (double)v.state[(size_t)i * ROW + (size_t)k];
+        return;
+    }
+    i -= v.bodies;
+    if (i < v.pair_room) {
+        if (i >= live_pairs(v)) return;
+        const struct sadmm_contact_pair *pair = &v.raw_pairs[i];
+        vec3 normal = v3_load(pair->normal);
+        for (int32_t k = 0; k < pair->count; ++k)
+            v3_store(point_impulse(v, i, k, normal), impulses + 3 * (size_t)(pair->first + k));
+        return;
+    }
+    i -= v.pair_room;
+    if (i < live_rows(v))
+        for (int r = 0; r < 6; ++r) multipliers[6 * (size_t)i + (size_t)r] = row_multiplier(v, i, r);
+}
+
+extern "C" sadmm_status CUDA(read_solution)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    const struct sadmm_system *system = c->system;
+    const cuda_view *v = &c->view;
+    size_t n = (size_t)v->bodies, points = (size_t)c->plan.points, rows = (size_t)v->rows;
+    cuda_args args = {};
+    CUDA_ENTER(c);
+    CUDA_TRY(CUDA(launch)(c, read_kernel, "read_solution", blocks_for((int64_t)v->bodies + v->pair_room + v->rows), &args, error));
+    CUDA_TRY(CUDA(download)(c, v->out, (6 * n + 3 * points + 6 * rows) * sizeof(double), error));
+    const double *from = (const double *)c->buffers[PINNED_OUT].data;
+    if (n > 0) memcpy(system->velocity, from, 6 * n * sizeof *from);
+    from += 6 * n;
+    for (size_t k = 0; k < points; ++k, from += 3) memcpy(system->contacts->points[k].impulse, from, 3 * sizeof *from);
+    if (rows > 0) memcpy(system->block_lambda, from, 6 * rows * sizeof *from);
+    return SADMM_OK;
+}
+
+/* ---- beta ------------------------------------------------------------------------------------------------------ */
+
+static __global__ void read_penalty_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    int32_t i = thread_index();
+    if (i < live_bodies(v)) v.out[i] = v.beta[i];
+}
+
+extern "C" sadmm_status CUDA(read_penalty)(struct sadmm_context *c, double *beta, struct sadmm_error *error)
+{
+    size_t bytes = (size_t)c->view.bodies * sizeof *beta;
+    cuda_args args = {};
+    CUDA_ENTER(c);
+    CUDA_TRY(CUDA(launch)(c, read_penalty_kernel, "read_penalty", blocks_for(c->view.bodies), &args, error));
+    CUDA_TRY(CUDA(download)(c, c->view.out, bytes, error));
+    if (bytes > 0) memcpy(beta, c->buffers[PINNED_OUT].data, bytes);
+    return SADMM_OK;
+}
+
+/* ---- Q: semi-implicit Euler ------------------------------------------------------------------------------------ */
+
+enum { MOVED = 13 }; /* position, orientation, velocity */
+
+static __global__ void integrate_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    int32_t i = thread_index();
+    if (i >= live_bodies(v)) return;
+    double *out = v.out + MOVED * (size_t)i;
+    move_body(v, i, &v.raw.rigid[i], (solver_real)1, out, out + 3, out + 7);
+}
+
+extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)
+{
+    size_t n = (size_t)c->view.bodies;
+    cuda_args args = {};
+    if (!c->plan.rigid)
+        return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "integrate: the system gives A and b, not rigid bodies");
+    CUDA_ENTER(c);
+    CUDA_TRY(CUDA(launch)(c, integrate_kernel, "integrate", blocks_for(c->view.bodies), &args, error));
+    CUDA_TRY(CUDA(download)(c, c->view.out, MOVED * n * sizeof(double), error));
+    const double *from = (const double *)c->buffers[PINNED_OUT].data;
+    for (size_t i = 0; i < n; ++i, from += MOVED) {
+        next[i] = c->system->rigid[i];
+        memcpy(next[i].position, from, sizeof next[i].position);
+        memcpy(next[i].orientation, from + 3, sizeof next[i].orientation);
+        memcpy(next[i].velocity, from + 7, sizeof next[i].velocity);
+    }
+    return SADMM_OK;
+}
+
+/* ---- R: (12) with lambda = -u, J^T lambda / dt summed over a body's contacts in their order --------------------- */
+
+static __global__ void wrench_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    int32_t slot = thread_index() / LANES, lane = (int32_t)threadIdx.x % LANES;
+    bool live = slot < live_bodies(v);
+    double wrench[6];
+    contact_wrench(v, live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0, lane, wrench);
+    if (live) store_wrench(wrench, lane, v.out + 6 * (size_t)v.body_of[slot]);
+}
+
+extern "C" sadmm_status CUDA(recover_wrenches)(struct sadmm_context *c, double *wrench, struct sadmm_error *error)
+{
+    size_t bytes = 6 * (size_t)c->view.bodies * sizeof *wrench;
+    cuda_args args = {};
+    CUDA_ENTER(c);
+    CUDA_TRY(CUDA(launch)(c, wrench_kernel, "recover_wrenches", blocks_for((int64_t)c->view.bodies * LANES), &args, error));
+    CUDA_TRY(CUDA(download)(c, c->view.out, bytes, error));
+    if (bytes > 0) memcpy(wrench, c->buffers[PINNED_OUT].data, bytes);
+    return SADMM_OK;
+}

@@ -1,0 +1,66 @@
+/* What a body or a pair gives back, in double. */
+#ifndef SADMM_CUDA_STEP_SOLUTION_H
+#define SADMM_CUDA_STEP_SOLUTION_H
+
+#include "backend_cuda/device/double.h"
+
+/* Multiplier of a point as a world vector on b. */
+static __device__ __forceinline__ vec3 point_impulse(const cuda_view &v, int32_t p, int32_t k, vec3 normal)
+{
+    const solver_real *lambda = v.lambda + point_slot(v, p, k);
+    if (v.contact_rows == 1) return v3_scale(normal, (double)lambda[0]);
+    return v3((double)lambda[0], (double)lambda[v.lambda_stride], (double)lambda[2 * v.lambda_stride]);
+}
+
+/* Q: semi-implicit Euler of body i, its velocities times `slow`. */
+static __device__ __forceinline__ void move_body(const cuda_view &v, int32_t i, const struct sadmm_rigid *body, solver_real slow,
+                                 double position[3], double orientation[4], double velocity[6])
+{
+    const solver_real *state = v.state + (size_t)i * ROW;
+    const double dt = v.settings.dt;
+    vec3 linear = v3((double)(state[0] * slow), (double)(state[1] * slow), (double)(state[2] * slow));
+    vec3 angular = v3((double)(state[3] * slow), (double)(state[4] * slow), (double)(state[5] * slow));
+    v3_store(rigid_move(v3_load(body->position), linear, dt), position);
+    q_store(rigid_turn(q_load(body->orientation), angular, dt), orientation);
+    v3_store(linear, velocity);
+    v3_store(angular, velocity + 3);
+}
+
+static __device__ __forceinline__ void add_pair_wrench(const cuda_view &v, int32_t p, int side, double per_dt, double wrench[6])
+{
+    const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
+    vec3 normal = v3_load(pair->normal);
+    for (int32_t k = 0; k < pair->count; ++k) {
+        const struct sadmm_contact_point *point = &v.raw_points[pair->first + k];
+        vec3 f = point_impulse(v, p, k, normal), m = v3_cross(v3_load(side ? point->arm_b : point->arm_a), f);
+        double sign = side ? per_dt : -per_dt;
+        wrench[0] += sign * f.x, wrench[1] += sign * f.y, wrench[2] += sign * f.z;
+        wrench[3] += sign * m.x, wrench[4] += sign * m.y, wrench[5] += sign * m.z;
+    }
+}
+
+/* R: (12) with lambda = -u, J^T lambda / dt over the halves [begin, end) of a body, by eight lanes that take every eighth
+ * half each; the sum is in all of them. Every lane of the warp comes here. */
+static __device__ __forceinline__ void contact_wrench(const cuda_view &v, int32_t begin, int32_t end, int32_t lane,
+                                                      double wrench[6])
+{
+    const double per_dt = 1 / v.settings.dt;
+    for (int k = 0; k < 6; ++k) wrench[k] = 0;
+    for (int32_t at = begin + lane; at < end; at += LANES) {
+        int32_t record = v.incident[at] / 2, side = v.incident[at] & 1;
+        if (record < v.pair_room) add_pair_wrench(v, record, side, per_dt, wrench); /* contacts given by geometry only */
+    }
+#pragma unroll
+    for (int o = 1; o < LANES; o *= 2)
+#pragma unroll
+        for (int k = 0; k < 6; ++k) wrench[k] += __shfl_xor_sync(0xffffffffu, wrench[k], o);
+}
+
+static __device__ __forceinline__ void store_wrench(const double wrench[6], int32_t lane, double *out)
+{
+#pragma unroll
+    for (int k = 0; k < 6; ++k)
+        if (k == lane) out[k] = wrench[k];
+}
+
+#endif

@@ -1,0 +1,127 @@
+/* Constraints of the method `fast` in double, from this precision's data: what weights, levels and energies are made of. */
+#ifndef SADMM_CUDA_WEIGHT_CONSTRAINT_H
+#define SADMM_CUDA_WEIGHT_CONSTRAINT_H
+
+#include "backend_cuda/device/body.h"
+
+#include "core/math/violation.h"
+
+struct pair_data {
+    double normal[3], difference[3], friction;
+    int32_t count;
+};
+
+static __device__ __forceinline__ pair_data load_pair(const cuda_view &v, int32_t p)
+{
+    const real4 about = v.normal[p], between = v.difference[p];
+    const pair_data pair = {{(double)about.x, (double)about.y, (double)about.z},
+                            {(double)between.x, (double)between.y, (double)between.z},
+                            (double)about.w,
+                            (int32_t)between.w};
+    return pair;
+}
+
+/* Arms are of use on dynamic sides only. */
+struct point_data {
+    double arm[2][3], lambda[3], error;
+};
+
+/* The same in this precision, as it is in memory; lambda[0] alone where contacts have one row. */
+struct point_numbers {
+    real4 arm;
+    solver_real lambda[3];
+};
+
+static __device__ __forceinline__ point_numbers fetch_point(const cuda_view &v, int32_t p, int32_t k)
+{
+    const size_t slot = point_slot(v, p, k);
+    point_numbers point;
+    point.arm = v.arm[slot];
+    point.lambda[0] = v.lambda[slot];
+    point.lambda[1] = v.contact_rows == 1 ? 0 : v.lambda[v.lambda_stride + slot];
+    point.lambda[2] = v.contact_rows == 1 ? 0 : v.lambda[2 * v.lambda_stride + slot];
+    return point;
+}
+
+static __device__ __forceinline__ point_data point_of(const cuda_view &v, const point_numbers &numbers,
+                                                      const pair_data &pair)
+{
+    const double r[3] = {(double)numbers.arm.x, (double)numbers.arm.y, (double)numbers.arm.z};
+    point_data point;
+    point.error = (double)numbers.arm.w;
+#pragma unroll
+    for (int j = 0; j < 3; ++j) {
+        point.arm[0][j] = r[j];
+        point.arm[1][j] = r[j] + pair.difference[j];
+        point.lambda[j] = v.contact_rows == 1 ? (double)numbers.lambda[0] * pair.normal[j] : (double)numbers.lambda[j];
+    }
+    return point;
+}
+
+static __device__ __forceinline__ point_data load_point(const cuda_view &v, int32_t p, int32_t k, const pair_data &pair)
+{
+    return point_of(v, fetch_point(v, p, k), pair);
+}
+
+/* use(point) for each point of a pair, in order. */
+template <class Use>
+static __device__ __forceinline__ void for_each_point(const cuda_view &v, int32_t p, const pair_data &pair, Use use)
+{
+    for (int32_t first = 0; first < pair.count; first += POINTS_AT_ONCE) {
+        point_numbers numbers[POINTS_AT_ONCE] = {};
+#pragma unroll
+        for (int32_t j = 0; j < POINTS_AT_ONCE; ++j)
+            if (first + j < pair.count) numbers[j] = fetch_point(v, p, first + j);
+#pragma unroll
+        for (int32_t j = 0; j < POINTS_AT_ONCE; ++j)
+            if (first + j < pair.count) use(point_of(v, numbers[j], pair));
+    }
+}
+
+static __device__ __forceinline__ double dot3(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static __device__ __forceinline__ bool is_dynamic(const cuda_view &v, int32_t body) { return body < v.bodies; }
+
+/* (A_0 + A_1 + A_2) / 3 */
+static __device__ __forceinline__ double mass_of(const cuda_view &v, size_t body)
+{
+    const solver_real *line = v.lines + body * (size_t)v.line;
+    if (v.rigid) return (double)line[0];
+    return ((double)line_a(line, v.rigid, 0, 0) + (double)line_a(line, v.rigid, 1, 1) +
+            (double)line_a(line, v.rigid, 2, 2)) /
+           3;
+}
+
+/* g += J^T lambda of a half; *push += the size of its force. */
+static inline __device__ void add_half(const cuda_view &v, int32_t code, double g[6], double *push)
+{
+    const int32_t side = code & 1, p = code / 2;
+    if (p >= v.pair_room) {
+        const int32_t k = p - v.pair_room, jacobian = side ? ROW_J_B : ROW_J_A;
+        double wrench[6] = {};
+        for (int r = 0; r < v.row_info[k].rows; ++r)
+            for (int j = 0; j < 6; ++j)
+                wrench[j] += row_number(v, jacobian + 6 * r + j, k) * row_number(v, ROW_LAMBDA + r, k);
+        for (int j = 0; j < 6; ++j) g[j] += wrench[j];
+        *push += sqrt(dot3(wrench, wrench));
+        return;
+    }
+    const pair_data pair = load_pair(v, p);
+    const double sign = side ? 1 : -1;
+    double force[3] = {};
+    for_each_point(v, p, pair, [&](const point_data &point) {
+        double arm[3];
+        for (int j = 0; j < 3; ++j) {
+            arm[j] = side ? point.arm[1][j] : point.arm[0][j];
+            force[j] += point.lambda[j];
+        }
+        add_cross(arm, point.lambda, sign, g + 3);
+    });
+    for (int j = 0; j < 3; ++j) g[j] += sign * force[j];
+    *push += sqrt(dot3(force, force));
+}
+
+#endif

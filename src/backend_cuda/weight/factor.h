@@ -1,0 +1,256 @@
+/* H = (A + beta C)^-1 of a body, and B and C of the method `fast`. In double; eight lanes a body. H only preconditions: the
+ * fixed point of Step 1 does not depend on it. */
+#ifndef SADMM_CUDA_WEIGHT_FACTOR_H
+#define SADMM_CUDA_WEIGHT_FACTOR_H
+
+#include "constraint.h"
+#include "backend_cuda/assemble/half_sums.h"
+
+#include "core/math/weight.h"
+
+/* ---- weights of the method `fast` -------------------------------------------------------------------------------- */
+
+/* The contacts of tall islands close small gaps slowly. */
+static __device__ __forceinline__ void ease_gaps(const cuda_view &v, int32_t p, double tallness)
+{
+    const double slop = v.settings.slop / v.settings.dt, share = weight_gap_share(tallness);
+    const int32_t count = share < 1 ? (int32_t)v.difference[p].w : 0;
+    for (int32_t k = 0; k < count; ++k) {
+        solver_real *error = &v.arm[point_slot(v, p, k)].w;
+        *error = (solver_real)weight_gap_error((double)*error, share, slop);
+    }
+}
+
+/* Of eight halves of a body, one a lane: which, what its weight is made of, and from all of their records the lane's numbers. */
+struct eight_halves {
+    int32_t code;                  /* of the lane's own, or -1 */
+    pair_ends ends;
+    solver_real load, response;    /* of a pair */
+    solver_real number[2][LANES];  /* numbers lane and lane + LANES of arm_sums */
+};
+
+/* B of the pair of the lane's half. Both of its halves work it out; the one at its first dynamic body keeps it. */
+static __device__ __forceinline__ double weigh_half(const cuda_view &v, const eight_halves &halves, const cuda_island &island,
+                                                    bool first)
+{
+    const int32_t p = halves.code / 2;
+    const double load = (double)halves.load, response = (double)halves.response;
+    const bool a = is_dynamic(v, halves.ends.body_a), both = a && is_dynamic(v, halves.ends.body_b);
+    const double scale = island.scale,
+                 taken = scale > 0 ? v.weight[p]
+                                   : weight_of_pair(island.level, weight_mass(load, island.speed, island.mass), response),
+                 B = scale > 0 ? taken * scale : taken;
+    if (halves.code & 1 && a) return B;
+    v.inv_s[p] = (solver_real)(both ? B / 2 : B);
+    if (!(scale > 0)) v.weight[p] = taken;
+    if (first && v.rigid) ease_gaps(v, p, island.tallness); /* world level: gaps, a slop and a step */
+    return B;
+}
+
+/* Are bodies rigid, and have contacts of three rows alone? Then A + C is inverted in closed form (factor_rigid). */
+static __host__ __device__ __forceinline__ bool has_closed_form(const cuda_view &v)
+{
+    return v.rigid && v.contact_rows == 3 && v.rows == 0;
+}
+
+/* ---- C ----------------------------------------------------------------------------------------------------------- */
+
+static inline __device__ void add_weighted_block(const cuda_view &v, int32_t k, int32_t side, double C[PACKED])
+{
+    const struct sadmm_problem_block *block = &v.raw.blocks[k];
+    const double *J = side ? block->jacobian_b : block->jacobian_a;
+    double along[6] = {};
+    for (int32_t r = 0; r < block->rows; ++r) {
+        double row[6];
+        for (int j = 0; j < 6; ++j) row[j] = J[6 * r + j];
+        packed_add_row(C, row, row_number(v, ROW_WEIGHT + r, k));
+        for (int j = 0; j < 6; ++j) along[j] += row_number(v, ROW_ALONG + r, k) * row[j];
+    }
+    packed_add_row(C, along, 1);
+}
+
+/* B of a half's points into C, where contacts have one row. */
+static __device__ __forceinline__ void add_normals(const cuda_view &v, int32_t code, double B, double C[PACKED])
+{
+    const int32_t side = code & 1, p = code / 2;
+    const pair_data pair = load_pair(v, p);
+    for_each_point(v, p, pair, [&](const point_data &point) {
+        double row[6];
+        normal_row(pair.normal, side ? point.arm[1] : point.arm[0], row);
+        packed_add_row(C, row, B);
+    });
+}
+
+/* Units of rounding by which a diagonal number of C may be short: its own, three entries a row, and those of q q^T / p. */
+#define C_ROUNDING 8.0
+
+/* Those from place `begin` on. Every lane of the warp comes here. */
+static __device__ __forceinline__ eight_halves fetch_halves(const cuda_view &v, const body_thread &t, int32_t begin)
+{
+    const bool more = t.lane + LANES < HALF_ARMS;
+    const pair_ends nobody = {};
+    eight_halves out;
+    out.code = begin + t.lane < t.end ? v.incident[begin + t.lane] : -1;
+    const bool own = out.code >= 0 && out.code < 2 * v.pair_room;
+    const solver_real *about = v.half_arms + (size_t)(own ? out.code : 0) * HALF_NUMBERS;
+    out.ends = own ? v.ends[out.code / 2] : nobody;
+    out.load = own ? about[HALF_LOAD] : (solver_real)0;
+    out.response = own ? about[HALF_RESPONSE] : (solver_real)0;
+#pragma unroll
+    for (int j = 0; j < LANES; ++j) {
+        const int32_t code = __shfl_sync((unsigned)ALL_LANES, out.code, j, LANES);
+        const bool pair = code >= 0 && code < 2 * v.pair_room && v.contact_rows == 3;
+        const solver_real *arms = v.half_arms + (size_t)(pair ? code : 0) * HALF_NUMBERS + t.lane;
+        out.number[0][j] = pair ? arms[0] : (solver_real)0;
+        out.number[1][j] = pair && more ? arms[LANES] : (solver_real)0;
+    }
+    return out;
+}
+
+/* C of a body by the weights, and beta = 1, in all lanes: each weighs every eighth half, and adds up a sum or two over all.
+ * `halves`: the first of them. `first`: of a solve. CLOSED: as in has_closed_form. Every lane of the warp comes here. */
+template <bool CLOSED>
+static __device__ __forceinline__ void weighted_matrix(const cuda_view &v, const body_thread &t, eight_halves halves,
+                                                       const cuda_island &island, bool first, double C[PACKED])
+{
+    const bool three = CLOSED || v.contact_rows == 3;
+    double sum[2] = {};
+#pragma unroll
+    for (int k = 0; k < PACKED; ++k) C[k] = 0;
+    for (int32_t begin = t.begin;;) {
+        const bool rows = !CLOSED && halves.code >= 0 && halves.code >= 2 * v.pair_room;
+        const double B = halves.code < 0 || rows ? 0 : weigh_half(v, halves, island, first);
+        if (rows) add_weighted_block(v, halves.code / 2 - v.pair_room, halves.code & 1, C);
+        else if (!three && halves.code >= 0) add_normals(v, halves.code, B, C);
+#pragma unroll
+        for (int j = 0; j < LANES; ++j) {
+            const double weight = __shfl_sync((unsigned)ALL_LANES, B, j, LANES);
+            sum[0] = fma(weight, (double)halves.number[0][j], sum[0]);
+            sum[1] = fma(weight, (double)halves.number[1][j], sum[1]);
+        }
+        begin += LANES;
+        if (__ballot_sync((unsigned)ALL_LANES, begin < t.end) == 0) break;
+        halves = fetch_halves(v, t, begin);
+    }
+    if (!three || (!CLOSED && v.rows > 0)) sum_lanes<PACKED>(C);
+    if (!three) return;
+    struct arm_sums sums;
+    double *in_order = &sums.count;
+#pragma unroll
+    for (int k = 0; k < HALF_ARMS; ++k) in_order[k] = __shfl_sync((unsigned)ALL_LANES, sum[k / LANES], k % LANES, LANES);
+    add_arm_sums(C, &sums);
+    /* Sums are in this precision. What is rounded must not make C less: along axes that contacts do not turn about it is 0, and
+     * what is left there is the inertia, of a light body under heavy ones a small part of C. More only slows. */
+    C[9] += C_ROUNDING * SOLVER_EPSILON * C[9];
+    C[14] += C_ROUNDING * SOLVER_EPSILON * C[14];
+    C[20] += C_ROUNDING * SOLVER_EPSILON * C[20];
+}
+
+/* ---- H ----------------------------------------------------------------------------------------------------------- */
+
+/* L of M = L L^T in place, packed, and 1 / L's diagonal; false: a pivot is lost to rounding. */
+static __device__ __forceinline__ bool packed_cholesky(double M[PACKED], double inverse[6])
+{
+    bool ok = true;
+#pragma unroll
+    for (int j = 0; j < 6; ++j) {
+        const int at = j * (j + 1) / 2;
+        double d = M[at + j], whole = d;
+#pragma unroll
+        for (int k = 0; k < j; ++k) d -= M[at + k] * M[at + k];
+        ok = ok && d > 4 * DBL_EPSILON * whole && d <= DBL_MAX;
+        inverse[j] = 1 / sqrt(d);
+        M[at + j] = d * inverse[j];
+#pragma unroll
+        for (int i = j + 1; i < 6; ++i) {
+            const int row = i * (i + 1) / 2;
+            double s = M[row + j];
+#pragma unroll
+            for (int k = 0; k < j; ++k) s -= M[row + k] * M[at + k];
+            M[row + j] = s * inverse[j];
+        }
+    }
+    return ok;
+}
+
+/* A column of H into the lower triangle, 1/beta, and what H has unused. */
+static __device__ __forceinline__ void store_column(const cuda_view &v, size_t body, int32_t lane, double beta, solver_real *H,
+                                                    const double x[6])
+{
+#pragma unroll
+    for (int i = 0; i < 6; ++i)
+        if (lane <= i) H[i * (i + 1) / 2 + lane] = (solver_real)x[i];
+    if (lane == 6)
+        for (int k = PACKED; k < LINE_H; ++k) H[k] = 0;
+    if (lane == 7) v.state[body * ROW + STATE_INV_BETA] = (solver_real)(1 / beta);
+}
+
+/* H where it has a closed form. A + C = [p I, -[q]x; [q]x, R] with [q]x u = q x u; by eliminating the linear part, a column a lane: in
+ *
+ *     p t - q x w = f,   q x t + R w = g        S w = g - q x f / p,   S = R - (|q|^2 I - q q^T) / p,   t = (f + q x w) / p
+ *
+ * S = L D L^T. */
+static __device__ __forceinline__ void factor_rigid(const cuda_view &v, size_t body, int32_t lane, const double C[PACKED])
+{
+    solver_real *line = v.lines + body * (size_t)v.line;
+    const double p = (double)line[0] + C[0], x = C[16], y = C[8], z = C[10], by_p = 1 / p;
+    const double rxx = (double)line[1] + C[9], rxy = (double)line[2] + C[13], ryy = (double)line[3] + C[14],
+                 rxz = (double)line[4] + C[18], ryz = (double)line[5] + C[19], rzz = (double)line[6] + C[20];
+    const double qx = x * by_p, qy = y * by_p, qz = z * by_p;
+    const double sxx = fma(-qz, z, fma(-qy, y, rxx)), syy = fma(-qz, z, fma(-qx, x, ryy)),
+                 szz = fma(-qy, y, fma(-qx, x, rzz)), sxy = fma(qx, y, rxy), sxz = fma(qx, z, rxz), syz = fma(qy, z, ryz);
+    const double d0 = 1 / sxx, l1 = sxy * d0, l2 = sxz * d0, left = fma(-l1, sxy, syy), d1 = 1 / left,
+                 cross = fma(-l1, sxz, syz), l3 = cross * d1, last = fma(-l3, cross, fma(-l2, sxz, szz)), d2 = 1 / last;
+    const bool ok = p > 0 && sxx > 4 * DBL_EPSILON * rxx && left > 4 * DBL_EPSILON * ryy && last > 4 * DBL_EPSILON * rzz &&
+                    p <= DBL_MAX && sxx <= DBL_MAX && left <= DBL_MAX && last <= DBL_MAX;
+    /* g - q x f / p with f or g the unit vector of the lane */
+    const double g0 = lane == 1 ? qz : lane == 2 ? -qy : lane == 3 ? 1 : 0,
+                 g1 = lane == 0 ? -qz : lane == 2 ? qx : lane == 4 ? 1 : 0,
+                 g2 = lane == 0 ? qy : lane == 1 ? -qx : lane == 5 ? 1 : 0;
+    const double y1 = fma(-l1, g0, g1), y2 = fma(-l3, y1, fma(-l2, g0, g2));
+    const double w2 = y2 * d2, w1 = fma(-l3, w2, y1 * d1), w0 = fma(-l2, w2, fma(-l1, w1, g0 * d0));
+    double column[6] = {fma(qy, w2, fma(-qz, w1, lane == 0 ? by_p : 0)), fma(qz, w0, fma(-qx, w2, lane == 1 ? by_p : 0)),
+                        fma(qx, w1, fma(-qy, w0, lane == 2 ? by_p : 0)), w0, w1, w2};
+    if (!ok) { /* as in factor_body */
+        const double diagonal = lane < 3 ? p : lane == 3 ? rxx : lane == 4 ? ryy : rzz;
+#pragma unroll
+        for (int i = 0; i < 6; ++i) column[i] = i == lane ? 1 / diagonal : 0;
+    }
+    store_column(v, body, lane, 1, line_h(line, true), column);
+}
+
+/* H = (A + beta C)^-1, a column a lane, and 1/beta. */
+static __device__ __forceinline__ void factor_body(const cuda_view &v, size_t body, int32_t lane, double beta,
+                                                   const double C[PACKED])
+{
+    solver_real *line = v.lines + body * (size_t)v.line, *H = line_h(line, v.rigid);
+    double M[PACKED], diagonal[6], inverse[6], x[6];
+#pragma unroll
+    for (int r = 0; r < 6; ++r) {
+#pragma unroll
+        for (int k = 0; k <= r; ++k)
+            M[r * (r + 1) / 2 + k] = (double)line_a(line, v.rigid, r, k) + beta * C[r * (r + 1) / 2 + k];
+        diagonal[r] = M[r * (r + 1) / 2 + r];
+    }
+    const bool ok = packed_cholesky(M, inverse);
+#pragma unroll
+    for (int i = 0; i < 6; ++i) { /* L y = e_lane */
+        double s = i == lane ? 1 : 0;
+#pragma unroll
+        for (int k = 0; k < i; ++k) s -= M[i * (i + 1) / 2 + k] * x[k];
+        x[i] = s * inverse[i];
+    }
+#pragma unroll
+    for (int i = 5; i >= 0; --i) { /* L^T x = y */
+        double s = x[i];
+#pragma unroll
+        for (int k = i + 1; k < 6; ++k) s -= M[k * (k + 1) / 2 + i] * x[k];
+        x[i] = s * inverse[i];
+    }
+#pragma unroll
+    for (int i = 0; i < 6; ++i) /* A rounded to f32 stays positive definite unless the problem is beyond f32: then keep the diagonal. */
+        if (!ok) x[i] = i == lane ? 1 / diagonal[i] : 0;
+    store_column(v, body, lane, beta, H, x);
+}
+
+#endif

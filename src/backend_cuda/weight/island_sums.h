@@ -1,0 +1,101 @@
+/* Sums and maxima over islands, in the kernel that makes their terms: slots are by island, and a body's place in its island
+ * is what the order of a sum depends on. Of SPREAD neighbours that are SPREAD^k apart the one that comes last adds up all of
+ * them, in order, and goes on to the next power; so every sum has one order, whatever surrounds the island and whoever comes
+ * last. */
+#ifndef SADMM_CUDA_WEIGHT_ISLAND_SUMS_H
+#define SADMM_CUDA_WEIGHT_ISLAND_SUMS_H
+
+#include "backend_cuda/device/body.h"
+
+enum { SPREAD = 16, ARRIVAL_BITS = 5 };
+static_assert(SPREAD < 1 << ARRIVAL_BITS && 32 / 4 * ARRIVAL_BITS <= 64, "a number holds the arrivals of every power");
+
+struct add_terms {
+    static __device__ __forceinline__ double join(double a, double b) { return a + b; }
+};
+struct largest_term { /* a NaN stays */
+    static __device__ __forceinline__ double join(double a, double b) { return a != a || b <= a ? a : b; }
+};
+
+/* Terms of a body, term k in lane k, added up (or what Join says) over its island. True in the lanes of one body of each
+ * island; those have all of the sums in `sum`, and see what any body of the island has written before it came here. Every
+ * lane of the warp comes here. */
+template <class Join>
+static __device__ __forceinline__ bool add_up_island(const cuda_view &v, const body_thread &t, double term,
+                                                     double sum[TERMS])
+{
+    const int32_t label = t.live ? v.label[t.body] : 0, first = t.live ? v.slot_of[label] : 0,
+                  bodies = t.live ? v.island_bodies[label] : 0;
+    int32_t rank = t.slot - first;
+    bool on = t.live;
+    double *own = v.terms + (size_t)t.slot * TERMS;
+    if (on && t.lane < TERMS) own[t.lane] = term;
+    int32_t power = 0;
+    for (int64_t apart = 1; __ballot_sync((unsigned)ALL_LANES, on && apart < bodies) != 0; apart *= SPREAD, ++power) {
+        const int32_t begin = (int32_t)(rank / (apart * SPREAD) * (apart * SPREAD));
+        const int64_t places = (bodies - begin + apart - 1) / apart;
+        const int32_t members = places < SPREAD ? (int32_t)places : (int32_t)SPREAD;
+        const bool alone = !on || members < 2 || apart >= bodies;
+        bool last = on;
+        __syncwarp((unsigned)ALL_LANES);
+        if (!alone && t.lane == 0) {
+            const unsigned long long one = 1ull << ARRIVAL_BITS * power;
+            __threadfence(); /* what the lanes have written, before their body is counted */
+            const unsigned long long before = atomicAdd(&v.arrivals[first + begin], one);
+            last = (int32_t)(before >> ARRIVAL_BITS * power & ((1u << ARRIVAL_BITS) - 1)) + 1 == members;
+            if (last) atomicAdd(&v.arrivals[first + begin], 0ull - one * (unsigned long long)members);
+            __threadfence(); /* and what the others have */
+        }
+        on = __shfl_sync((unsigned)ALL_LANES, last, 0, LANES);
+        __syncwarp((unsigned)ALL_LANES);
+        if (alone || !on) continue;
+        rank = begin;
+        double *to = v.terms + (size_t)(first + begin) * TERMS;
+        if (t.lane >= TERMS) continue;
+        double all[SPREAD];
+#pragma unroll
+        for (int32_t j = 0; j < SPREAD; ++j)
+            all[j] = j < members ? __ldcg(to + (size_t)j * (size_t)apart * TERMS + t.lane) : 0;
+        term = all[0];
+#pragma unroll
+        for (int32_t j = 1; j < SPREAD; ++j)
+            if (j < members) term = Join::join(term, all[j]);
+        to[t.lane] = term;
+    }
+#pragma unroll
+    for (int k = 0; k < TERMS; ++k) sum[k] = __shfl_sync((unsigned)ALL_LANES, term, k, LANES);
+    return on;
+}
+
+/* Where the island of a body begins, and its size, in bodies of a thread block. */
+struct island_range {
+    int32_t first, bodies;
+};
+
+/* The same of all islands of a thread block, whose `bodies` bodies are whole islands: `terms` (shared) holds TERMS of each, and
+ * at an island's first body its sums in the end, equal to the last bit. `barrier` is the block's; it comes first and last. */
+template <class Join, class Barrier>
+static __device__ __forceinline__ void add_up_in_block(int32_t bodies, const island_range *range, double *terms,
+                                                       Barrier barrier)
+{
+    for (int32_t apart = 1; apart < bodies; apart *= SPREAD) {
+        barrier();
+        for (int32_t i = (int32_t)threadIdx.x; i < bodies * TERMS; i += (int32_t)blockDim.x) {
+            const island_range island = range[i / TERMS];
+            const int32_t rank = i / TERMS - island.first;
+            if (rank % (apart * SPREAD) != 0) continue;
+            double all[SPREAD];
+#pragma unroll
+            for (int32_t j = 0; j < SPREAD; ++j)
+                all[j] = rank + j * apart < island.bodies ? terms[i + j * apart * TERMS] : 0;
+            double sum = all[0];
+#pragma unroll
+            for (int32_t j = 1; j < SPREAD; ++j)
+                if (rank + j * apart < island.bodies) sum = Join::join(sum, all[j]);
+            terms[i] = sum;
+        }
+    }
+    barrier();
+}
+
+#endif

@@ -1,0 +1,198 @@
+/* Kernels E-H and P: C_i (14), beta_i (13), (15), and H = (A_i + beta_i C_i)^-1. In double: they run a few times
+ * a step, and H only preconditions (the fixed point of Step 1 does not depend on it). */
+#include "backend_cuda/device/double.h"
+#include "factor.h"
+#include "backend_cuda/step/plan_check.h"
+
+/* ---- C ------------------------------------------------------------------------------------------------------------- */
+
+static __device__ void add_pair(const cuda_view &v, const struct sadmm_contact_pair *pair, int side,
+                                arm_sums *sums, double C[PACKED])
+{
+    const int32_t count = pair->count;
+    const struct sadmm_contact_point *points = v.raw_points + pair->first;
+    for (int32_t first = 0; first < count; first += POINTS_AT_ONCE) {
+        double arms[POINTS_AT_ONCE][3] = {};
+#pragma unroll
+        for (int32_t j = 0; j < POINTS_AT_ONCE; ++j) {
+            const double *r = side ? points[first + j].arm_b : points[first + j].arm_a;
+            for (int i = 0; i < 3 && first + j < count; ++i) arms[j][i] = r[i];
+        }
+#pragma unroll
+        for (int32_t j = 0; j < POINTS_AT_ONCE; ++j) {
+            if (first + j >= count) continue;
+            if (v.contact_rows == 3) {
+                add_arm(sums, arms[j], 1);
+            } else {
+                double row[6];
+                sadmm_contact_row(v3_load(pair->normal), arms[j], 1, row);
+                packed_add_row(C, row, 1);
+            }
+        }
+    }
+}
+
+static __device__ void add_block(const cuda_view &v, int32_t k, int side, double C[PACKED])
+{
+    const struct sadmm_problem_block *block = &v.raw.blocks[k];
+    const double *J = side ? block->jacobian_b : block->jacobian_a;
+    for (int32_t r = 0; r < block->rows; ++r) {
+        double row[6];
+        for (int j = 0; j < 6; ++j) row[j] = J[6 * r + j];
+        packed_add_row(C, row, 1);
+    }
+}
+
+/* C of a body with B = 1, in all lanes: each adds up every eighth half. From the raw contacts. Every lane of the warp comes
+ * here. */
+static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, const body_thread &t, double C[PACKED])
+{
+    arm_sums sums = {};
+    for (int k = 0; k < PACKED; ++k) C[k] = 0;
+    for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) {
+        const int32_t record = v.incident[at] / 2, side = v.incident[at] & 1;
+        if (record < v.pair_room) add_pair(v, &v.raw_pairs[record], side, &sums, C);
+        else add_block(v, record - v.pair_room, side, C);
+    }
+    if (v.contact_rows == 1 || v.rows > 0) sum_lanes<PACKED>(C);
+    sum_lanes<sizeof sums / sizeof(double)>(&sums.count);
+    add_arm_sums(C, &sums);
+}
+
+/* (13). dt^2: c is given in the paper's time-scaled units. Without constraints beta does not matter. */
+static __device__ __forceinline__ double penalty_of(const cuda_view &v, const solver_real *line, const double C[PACKED])
+{
+    const struct sadmm_settings *s = &v.settings;
+    double trace_A = 0, trace_C = C[0] + C[2] + C[5] + C[9] + C[14] + C[20];
+#pragma unroll
+    for (int k = 0; k < 6; ++k) trace_A += (double)line_a(line, v.rigid, k, k);
+    return trace_C > 0 ? s->penalty_mass_factor * trace_A / trace_C + s->penalty_offset * s->dt * s->dt : 1;
+}
+
+/* ---- kernels ----------------------------------------------------------------------------------------------------- */
+
+/* By which B C is made, and how H is: that of `paper`; the weights of `fast`; those, and H in closed form. */
+enum penalty_form { PLAIN, WEIGHTED, CLOSED };
+
+/* PENALTY: C and beta; FACTOR: H from them. */
+template <bool PENALTY, bool FACTOR, int FORM>
+static __global__ void __launch_bounds__(BODY_THREADS)
+    penalty_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    wait_for_stream();
+    const body_thread t = body_of_thread(v);
+    const cuda_island none = {};
+    double C[PACKED], beta = 1;
+    if (PENALTY) {
+        if (FORM == PLAIN) penalty_matrix(v, t, C);
+        else weighted_matrix<FORM == CLOSED>(v, t, fetch_halves(v, t, t.begin), t.live ? v.islands[v.label[t.body]] : none,
+                                             args.start, C);
+        if (t.live) {
+            if (FORM == PLAIN) beta = penalty_of(v, v.lines + t.body * (size_t)v.line, C);
+            if (t.lane == 0) v.beta[t.body] = beta;
+#pragma unroll
+            for (int k = 0; k < PACKED; ++k)
+                if (k % LANES == t.lane) v.C[t.body * PACKED + (size_t)k] = C[k];
+        }
+    } else if (t.live) {
+        beta = v.beta[t.body];
+        for (int k = 0; k < PACKED; ++k) C[k] = v.C[t.body * PACKED + (size_t)k];
+    }
+    if (FACTOR && t.live && FORM == CLOSED) factor_rigid(v, t.body, t.lane, C);
+    else if (FACTOR && t.live) factor_body(v, t.body, t.lane, beta, C);
+    if (args.planned) check_plan(v);
+}
+
+static __global__ void scale_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    int32_t i = thread_index();
+    if (i >= live_bodies(v)) return;
+    double ratio = args.factor;
+    if (args.measure) /* by the residuals */
+        ratio = sadmm_penalty_ratio(__longlong_as_double((long long)v.residual[0]),
+                                    __longlong_as_double((long long)v.residual[1]), v.settings.penalty_ratio_limit);
+    v.beta[i] *= ratio;
+    if (i == 0) *v.ratio = ratio;
+}
+
+/* ---- entries --------------------------------------------------------------------------------------------------- */
+
+static bool closed_form(const struct sadmm_context *c) { return c->fast && has_closed_form(c->view); }
+
+static sadmm_status launch_bodies(struct sadmm_context *c, cuda_kernel kernel, const char *name, const cuda_args *args,
+                                  struct sadmm_error *error)
+{
+    const int64_t blocks = body_blocks(c->view.bodies);
+    return CUDA(launch_early)(c, kernel, name, args->planned && blocks == 0 ? 1 : blocks, BODY_THREADS, args, error);
+}
+
+extern "C" sadmm_status CUDA(init_penalty)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    CUDA_ENTER(c);
+    c->starting = true;
+    c->looks = 0;
+    c->cleared = 0;
+    c->placed = false;
+    c->measured = false;
+    c->rescaled = false;
+    if (c->fast) {
+        CUDA(begin_weights)(c);
+        CUDA_TRY(CUDA(enqueue_islands)(c, error));
+        return CUDA(enqueue_weighted_penalties)(c, true, false, false, error);
+    }
+    return launch_bodies(c, penalty_kernel<true, false, PLAIN>, "init_penalty", &args, error);
+}
+
+extern "C" sadmm_status CUDA(factorize)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    CUDA_ENTER(c);
+    const cuda_kernel kernel = closed_form(c) ? penalty_kernel<false, true, CLOSED> : penalty_kernel<false, true, PLAIN>;
+    return launch_bodies(c, kernel, "factorize", &args, error);
+}
+
+extern "C" sadmm_status CUDA(update_penalty)(struct sadmm_context *c, double ratio, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    args.factor = ratio;
+    CUDA_ENTER(c);
+    CUDA_TRY(CUDA(launch)(c, scale_kernel, "update_penalty", blocks_for(c->view.bodies), &args, error));
+    c->rescaled = true;
+    return SADMM_OK;
+}
+
+sadmm_status CUDA(enqueue_penalties)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    args.planned = true;
+    c->starting = !c->fast;
+    c->looks = 0;
+    c->cleared = c->ends ? 0 : SCALAR_PRIMAL | SCALAR_DUAL | SCALAR_BARRIER; /* step/plan_check.h */
+    c->placed = c->measured = c->rescaled = false;
+    if (!c->fast) return launch_bodies(c, penalty_kernel<true, true, PLAIN>, "penalties", &args, error);
+    CUDA(begin_weights)(c);
+    if (c->ends) return SADMM_OK;
+    CUDA_TRY(CUDA(enqueue_islands)(c, error));
+    return CUDA(enqueue_weighted_penalties)(c, true, true, true, error);
+}
+
+sadmm_status CUDA(enqueue_balance)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    args.measure = 1;
+    CUDA_TRY(CUDA(launch)(c, scale_kernel, "update_penalty", blocks_for(c->view.bodies), &args, error));
+    c->rescaled = true;
+    return SADMM_OK;
+}
+
+sadmm_status CUDA(enqueue_weighted_penalties)(struct sadmm_context *c, bool first, bool factor, bool planned,
+                                              struct sadmm_error *error)
+{
+    cuda_args args = {};
+    args.start = first;
+    args.planned = planned;
+    const cuda_kernel kernel = closed_form(c) ? (factor ? penalty_kernel<true, true, CLOSED> : penalty_kernel<true, false, CLOSED>)
+                                              : (factor ? penalty_kernel<true, true, WEIGHTED> : penalty_kernel<true, false, WEIGHTED>);
+    return launch_bodies(c, kernel, "penalties", &args, error);
+}
