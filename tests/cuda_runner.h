@@ -308,7 +308,7 @@ static inline bool solve_fails_at(const struct sadmm_kernels *table, enum sadmm_
     sadmm_status status = table->create(1, &c, &error);
     if (status == SADMM_OK) {
         force_tier(table, c, tier);
-        status = sadmm_schedule_solve(table, c, &p->system, settings, &plan, &report, NULL, &error);
+        status = sadmm_schedule_solve(table, c, &p->system, settings, &plan, &report, &error);
     } else {
         ck_assert_ptr_null(c);
     }

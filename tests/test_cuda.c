@@ -292,7 +292,7 @@ static void solve(struct runner *r, const struct scene *scene)
     contact_problem_free(r->p);
     r->p = make_problem(scene, &r->settings);
     r->plan = sadmm_plan_make(&r->p->system, &r->settings);
-    CALL(r, sadmm_schedule_solve(r->k, r->c, &r->p->system, &r->settings, &r->plan, &report, NULL, &r->error));
+    CALL(r, sadmm_schedule_solve(r->k, r->c, &r->p->system, &r->settings, &r->plan, &report, &r->error));
 }
 
 static void check_same_solution(struct runner *a, struct runner *b, const char *what)

@@ -337,7 +337,7 @@ static struct sadmm_solve_report solve(struct runner *r, const struct scene *sce
     contact_problem_free(r->p);
     r->p = make_problem(scene, &r->settings);
     r->plan = sadmm_plan_make(&r->p->system, &r->settings);
-    CALL(r, sadmm_schedule_solve(r->k, r->c, &r->p->system, &r->settings, &r->plan, &report, NULL, &r->error));
+    CALL(r, sadmm_schedule_solve(r->k, r->c, &r->p->system, &r->settings, &r->plan, &report, &r->error));
     return report;
 }
 

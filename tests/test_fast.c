@@ -404,7 +404,7 @@ static struct sadmm_solve_report solve_cold(struct contact_problem *problem, sad
     struct sadmm_plan plan = sadmm_plan_make(&problem->system, &s);
     plan.limit = false; /* the problem, not a time step */
     ck_assert_int_eq(k->create(0, &c, &error), SADMM_OK);
-    sadmm_status status = sadmm_schedule_solve(k, c, &problem->system, &s, &plan, &report, NULL, &error);
+    sadmm_status status = sadmm_schedule_solve(k, c, &problem->system, &s, &plan, &report, &error);
     ck_assert_msg(status == SADMM_OK, "%s", error.message);
     ck_assert_int_eq(sadmm_certify(&problem->system, &s, &report.certificate, &error), SADMM_OK);
     k->destroy(c);

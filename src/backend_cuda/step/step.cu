@@ -5,7 +5,7 @@
 
 #include "collision/collision.h"
 #include "core/base/memory.h"
-#include "core/solve/schedule.h"
+#include "core/solve/stages.h"
 #include "backend_cuda/collide/pipeline.h"
 #include "backend_cuda/device/context.h"
 
@@ -144,61 +144,89 @@ static enum cuda_limit limit_by_iterations(const struct sadmm_context *c)
     return c->ends && !stops(c) ? LIMIT_WHOLE : LIMIT_SUSPECTS;
 }
 
-/* schedule.c's iterations, with the ratio of (15) found on the device; then the limit. *measure: the residuals of the last
- * iteration are wanted. */
-static sadmm_status enqueue_solve(struct sadmm_context *c, bool *measure, struct sadmm_error *error)
+/* A and b of the bodies: beside contact finding, of which they need nothing. */
+static sadmm_status record_gather(struct sadmm_context *c, struct sadmm_error *error)
 {
-    const int budget = sadmm_schedule_budget(&c->plan, &c->settings);
-    const enum cuda_limit limit = limit_by_iterations(c);
-    *measure = false;
-    for (int done = 0; done < budget;) {
-        const struct sadmm_stretch next = sadmm_schedule_stretch(&c->plan, &c->settings, done);
-        CUDA_TRY(CUDA(enqueue_iterations)(c, next.count, next.measure, next.last || next.look ? limit : LIMIT_NONE, error));
-        done += next.count;
-        if (next.look) CUDA_TRY(CUDA(enqueue_look)(c, done, error));
-        *measure = next.measure && next.last;
-        if (next.measure && !next.last) CUDA_TRY(CUDA(enqueue_residuals)(c, error));
-        if (next.update) {
-            CUDA_TRY(CUDA(enqueue_balance)(c, error));
-            CUDA_TRY(CUDA(factorize)(c, error));
-        }
-        if (next.refresh) CUDA_TRY(CUDA(enqueue_weights)(c, true, error));
-    }
-    return c->plan.limit && limit != LIMIT_WHOLE ? CUDA(enqueue_limit)(c, limit == LIMIT_SUSPECTS, error) : SADMM_OK;
+    CUDA_TRY(CUDA(launch_start)(c, error));
+    side_branch side(c);
+    CUDA_CALL(c, side.code, "a branch of the step");
+    return CUDA(enqueue_bodies)(c, error);
 }
 
-static sadmm_status enqueue_step(struct sadmm_context *c, struct sadmm_error *error)
+/* Facts and layout; beside them contacts in the solver's form, and what weights take from pairs. */
+static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *error)
 {
-    const bool islands = slots_by_island(&c->partition);
-    c->ends = c->fast && !c->plan.residuals && c->view.rows == 0 && c->view.contact_rows == 3 &&
-              CUDA(resident_does_ends)(&c->partition);
-    CUDA_TRY(CUDA(launch_start)(c, error));
-    { /* A, b: beside contact finding */
-        side_branch side(c);
-        CUDA_CALL(c, side.code, "a branch of the step");
-        CUDA_TRY(CUDA(enqueue_bodies)(c, error));
-    }
-    CUDA_TRY(enqueue_find(c, error));
-    { /* contacts in the solver's form, what weights take from pairs: beside the layout */
+    {
         side_branch side(c);
         CUDA_CALL(c, side.code, "a branch of the step");
         CUDA_TRY(CUDA(assemble_contacts)(c, error));
         CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
     }
-    CUDA_TRY(CUDA(enqueue_survey_and_layout)(c, islands, &c->partition, error));
+    CUDA_TRY(CUDA(enqueue_survey_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
     CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
-    CUDA_TRY(CUDA(enqueue_penalties)(c, error));
-    bool measure;
-    CUDA_TRY(enqueue_solve(c, &measure, error));
-    if (measure) { /* residuals: beside the end */
+    return SADMM_OK;
+}
+
+/* The end of the step, wrenches included; beside it the residuals of the last iteration, where they are wanted. */
+static sadmm_status record_finish(struct sadmm_context *c, bool residuals, struct sadmm_error *error)
+{
+    if (residuals) {
         side_branch side(c);
         CUDA_CALL(c, side.code, "a branch of the step");
         CUDA_TRY(CUDA(enqueue_residuals)(c, error));
         CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
     }
     CUDA_TRY(CUDA(launch_finish)(c, error));
-    if (measure) CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
-    return CUDA(launch_commit)(c, error);
+    if (residuals) CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
+    return SADMM_OK;
+}
+
+/* *residuals: those of the last iteration are wanted. */
+static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_stage *stage, bool *residuals,
+                                 struct sadmm_error *error)
+{
+    const enum cuda_limit limit = limit_by_iterations(c);
+    switch (stage->kind) {
+    case SADMM_STAGE_GATHER: return record_gather(c, error);
+    case SADMM_STAGE_FIND: return enqueue_find(c, error);
+    case SADMM_STAGE_PLAN: return record_plan(c, error);
+    case SADMM_STAGE_PENALTY: return CUDA(enqueue_penalties)(c, error);
+    case SADMM_STAGE_ITERATE:
+        return CUDA(enqueue_iterations)(c, stage->count, stage->measure, stage->last || stage->checked ? limit : LIMIT_NONE,
+                                        error);
+    case SADMM_STAGE_RESIDUALS:
+        *residuals = stage->last;
+        return stage->last ? SADMM_OK : CUDA(enqueue_residuals)(c, error);
+    case SADMM_STAGE_CHECK: return CUDA(enqueue_look)(c, stage->done, error);
+    case SADMM_STAGE_REWEIGH: return CUDA(enqueue_weights)(c, true, error);
+    case SADMM_STAGE_BALANCE: /* the ratio of (15) is found on the device */
+        CUDA_TRY(CUDA(enqueue_balance)(c, error));
+        return CUDA(factorize)(c, error);
+    case SADMM_STAGE_LIMIT:
+        return limit == LIMIT_WHOLE ? SADMM_OK : CUDA(enqueue_limit)(c, limit == LIMIT_SUSPECTS, error);
+    case SADMM_STAGE_INTEGRATE: return record_finish(c, *residuals, error);
+    case SADMM_STAGE_COMMIT: return CUDA(launch_commit)(c, error);
+    case SADMM_STAGE_BODIES:   /* beside FIND */
+    case SADMM_STAGE_CONTACTS: /* beside PLAN */
+    case SADMM_STAGE_SOLUTION: /* INTEGRATE reads it where it is, */
+    case SADMM_STAGE_WRENCHES: /* and adds up wrenches */
+    case SADMM_STAGE_CERTIFY:  /* by the host, afterwards */
+    case SADMM_STAGE_PREDICT:  /* worlds are not loaded before their first step, */
+    case SADMM_STAGE_HARD:     /* and have no blocks */
+    case SADMM_STAGE_SOFT:
+    default: return SADMM_OK;
+    }
+}
+
+static sadmm_status enqueue_step(struct sadmm_context *c, struct sadmm_error *error)
+{
+    struct sadmm_stages stages = sadmm_stages_of(&c->plan, &c->settings, true);
+    struct sadmm_stage stage;
+    bool residuals = false;
+    c->ends = c->fast && !c->plan.residuals && c->view.rows == 0 && c->view.contact_rows == 3 &&
+              CUDA(resident_does_ends)(&c->partition);
+    while (sadmm_stages_next(&stages, &stage)) CUDA_TRY(record_stage(c, &stage, &residuals, error));
+    return SADMM_OK;
 }
 
 /* ---- plan ------------------------------------------------------------------------------------------------------ */

@@ -597,7 +597,7 @@ sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend backend, 
     problem->plan = sadmm_plan_make(&problem->system, &problem->settings);
     save_solution(problem);
     sadmm_status status = sadmm_schedule_solve(kernels, *context, &problem->system, &problem->settings, &problem->plan,
-                                               &done, NULL, error);
+                                               &done, error);
     if (status == SADMM_OK && report)
         status = sadmm_certify_with(&problem->scratch->certificate, &problem->system, &problem->settings,
                                     &done.certificate, error);

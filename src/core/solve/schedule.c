@@ -1,91 +1,64 @@
-/* A solve, from the raw system to (v, lambda): the paper's Fig. 4 without collision detection and integration.
- *
- *     begin            room for this step (the only allocation)
- *     assemble         A bodies, B contacts, C/D hard and soft blocks (classes the plan lacks are not called)
- *     E-H              C_i, beta_i, factor of A_i + beta_i C_i
- *     I-P              iterations in stretches: a stretch ends where someone has to look (penalty update, stop rule, new
- *                      weights, end)
- *     read_solution
- */
+/* The host's executor of a solve's stages (stages.h): each stage is an entry of the kernel table, or two. */
 #include "schedule.h"
-
-#include <limits.h>
-#include <math.h>
-#include <string.h>
 
 #include "certificate.h"
 #include "core/base/clock.h"
-#include "loads.h"
-#include "core/math/weight.h"
 #include "core/model/system_math.h"
+#include "loads.h"
 
-static sadmm_status assemble(const struct sadmm_kernels *k, struct sadmm_context *c, const struct sadmm_plan *plan,
-                             struct sadmm_error *error)
+static sadmm_status assemble_bodies(struct sadmm_solve *s)
 {
-    TRY(k->assemble_bodies(c, error));
-    if (plan->points || plan->blocks[SADMM_BLOCK_CONTACT]) TRY(k->assemble_contacts(c, error));
-    if (plan->blocks[SADMM_BLOCK_HARD]) TRY(k->assemble_joints(c, error));
-    if (plan->blocks[SADMM_BLOCK_SOFT]) TRY(k->assemble_springs(c, error));
-    TRY(k->init_penalty(c, error));
-    return k->factorize(c, error);
+    TRY(s->kernels->begin(s->context, s->system, s->plan, s->settings, s->error));
+    return s->kernels->assemble_bodies(s->context, s->error);
 }
 
-static sadmm_status iterate(const struct sadmm_kernels *k, struct sadmm_context *c, int count, bool measure,
-                            struct sadmm_error *error)
+static sadmm_status init_penalty(struct sadmm_solve *s)
 {
-    if (k->iterate) return k->iterate(c, count, measure, error);
+    TRY(s->kernels->init_penalty(s->context, s->error));
+    return s->kernels->factorize(s->context, s->error);
+}
+
+static sadmm_status iterate(struct sadmm_solve *s, int count, bool measure)
+{
+    const struct sadmm_kernels *k = s->kernels;
+    if (k->iterate) return k->iterate(s->context, count, measure, s->error);
     for (int i = 0; i < count; ++i) {
-        TRY(k->update_velocity(c, error));
-        TRY(k->update_constraints(c, measure && i + 1 == count, error));
+        TRY(k->update_velocity(s->context, s->error));
+        TRY(k->update_constraints(s->context, measure && i + 1 == count, s->error));
     }
     return SADMM_OK;
 }
 
-/* Iterations until the next multiple of `period` (0: none) after `done`, at most `limit`. */
-static int until(int done, int period, int limit)
+/* Is the stop rule met? Comparisons are written so that NaN fails them. */
+static sadmm_status check_convergence(struct sadmm_solve *s, bool *met)
 {
-    if (period <= 0) return limit;
-    int left = period - done % period;
-    return left < limit ? left : limit;
+    const struct sadmm_settings *settings = s->settings;
+    const struct sadmm_residual *residual = &s->report->residual;
+    *met = true;
+    if (settings->residual_tolerance > 0)
+        *met = residual->primal <= settings->residual_tolerance && residual->dual <= settings->residual_tolerance;
+    if (!*met || settings->certificate_tolerance <= 0) return SADMM_OK;
+    const sadmm_certificate *certificate = &s->report->certificate;
+    TRY(s->kernels->read_solution(s->context, s->error));
+    TRY(sadmm_certify(s->system, settings, &s->report->certificate, s->error));
+    *met = certificate->ncp_max <= settings->certificate_tolerance &&
+           certificate->momentum_max <= settings->certificate_momentum_tolerance;
+    return SADMM_OK;
 }
 
-/* Are weights taken anew after `done` iterations? */
-static bool is_refresh(int done)
+static sadmm_status reweigh(struct sadmm_solve *s)
 {
-    int at = WEIGHT_FIRST_REFRESH;
-    while (at < done && at <= INT_MAX / 2) at = weight_next_refresh(at);
-    return at == done;
+    TRY(s->kernels->update_weights(s->context, s->error));
+    return s->kernels->factorize(s->context, s->error);
 }
 
-static int until_refresh(int done, int limit)
+static sadmm_status balance_penalty(struct sadmm_solve *s)
 {
-    int at = WEIGHT_FIRST_REFRESH;
-    while (at <= done && at <= INT_MAX / 2) at = weight_next_refresh(at);
-    return at > done && at - done < limit ? at - done : limit;
-}
-
-int sadmm_schedule_budget(const struct sadmm_plan *plan, const struct sadmm_settings *settings)
-{
-    return sadmm_plan_is_constrained(plan) ? settings->iterations : 1;
-}
-
-struct sadmm_stretch sadmm_schedule_stretch(const struct sadmm_plan *plan, const struct sadmm_settings *settings, int done)
-{
-    bool stop_rule = sadmm_plan_is_constrained(plan) &&
-                     (settings->residual_tolerance > 0 || settings->certificate_tolerance > 0);
-    int budget = sadmm_schedule_budget(plan, settings);
-    struct sadmm_stretch next = {.count = budget - done};
-    if (plan->penalty_updates) next.count = until(done, settings->penalty_period, next.count);
-    if (plan->weight_refresh) next.count = until_refresh(done, next.count);
-    if (stop_rule) next.count = until(done, settings->check_period, next.count);
-    int after = done + next.count;
-    next.last = after == budget;
-    next.update = plan->penalty_updates && !next.last && after % settings->penalty_period == 0;
-    next.refresh = plan->weight_refresh && !next.last && is_refresh(after);
-    next.look = stop_rule && (next.last || after % settings->check_period == 0);
-    next.measure = plan->residuals && (next.update || (next.last && settings->measure_residuals) ||
-                                       (next.look && settings->residual_tolerance > 0));
-    return next;
+    const struct sadmm_residual *residual = &s->report->residual;
+    const double ratio = sadmm_penalty_ratio(residual->primal, residual->dual, s->settings->penalty_ratio_limit);
+    if (ratio == 1) return SADMM_OK;
+    TRY(s->kernels->update_penalty(s->context, ratio, s->error));
+    return s->kernels->factorize(s->context, s->error);
 }
 
 static bool finite_array(const double *x, size_t count)
@@ -108,84 +81,63 @@ static bool finite_impulses(const struct sadmm_contact_set *contacts, int plan_t
     return sum == 0;
 }
 
-static sadmm_status certificate_met(const struct sadmm_kernels *k, struct sadmm_context *c, struct sadmm_system *system,
-                                    const struct sadmm_settings *s, struct sadmm_solve_report *report, bool *met,
-                                    struct sadmm_error *error)
+static sadmm_status read_solution(struct sadmm_solve *s)
 {
-    TRY(k->read_solution(c, error));
-    TRY(sadmm_certify(system, s, &report->certificate, error));
-    *met = report->certificate.ncp_max <= s->certificate_tolerance &&
-           report->certificate.momentum_max <= s->certificate_momentum_tolerance;
+    const struct sadmm_system *system = s->system;
+    TRY(s->kernels->read_solution(s->context, s->error));
+    if (!finite_array(system->velocity, 6 * (size_t)system->body_count) ||
+        !finite_array(system->block_lambda, 6 * (size_t)system->block_count) ||
+        !finite_impulses(system->contacts, s->plan->threads))
+        return sadmm_fail(s->error, SADMM_ERROR_NON_FINITE, "the solve gave a velocity or multiplier that is not finite");
     return SADMM_OK;
 }
 
-static sadmm_status run(const struct sadmm_kernels *k, struct sadmm_context *c, struct sadmm_system *system,
-                        const struct sadmm_settings *s, const struct sadmm_plan *plan,
-                        struct sadmm_solve_report *report, struct sadmm_error *error)
+sadmm_status sadmm_solve_stage(struct sadmm_solve *s, struct sadmm_stages *stages, const struct sadmm_stage *stage)
 {
-    int budget = sadmm_schedule_budget(plan, s);
-    for (int done = 0; done < budget;) {
-        struct sadmm_stretch next = sadmm_schedule_stretch(plan, s, done);
-        TRY(iterate(k, c, next.count, next.measure, error));
-        done += next.count;
-        report->iterations = done;
-        if (next.measure) TRY(k->measure_residuals(c, &report->residual, error));
-        if (next.look) {
-            bool met = true;
-            if (s->residual_tolerance > 0)
-                met = report->residual.primal <= s->residual_tolerance && report->residual.dual <= s->residual_tolerance;
-            if (met && s->certificate_tolerance > 0)
-                TRY(certificate_met(k, c, system, s, report, &met, error));
-            if (met) {
-                report->converged = true;
-                return SADMM_OK;
-            }
-        }
-        if (next.refresh) {
-            TRY(k->update_weights(c, error));
-            TRY(k->factorize(c, error));
-        }
-        if (next.update) {
-            double ratio = sadmm_penalty_ratio(report->residual.primal, report->residual.dual, s->penalty_ratio_limit);
-            if (ratio != 1) {
-                TRY(k->update_penalty(c, ratio, error));
-                TRY(k->factorize(c, error));
-            }
-        }
+    const struct sadmm_kernels *k = s->kernels;
+    switch (stage->kind) {
+    case SADMM_STAGE_PREDICT: return sadmm_loads_predict(s->system, s->settings, s->error);
+    case SADMM_STAGE_BODIES: return assemble_bodies(s);
+    case SADMM_STAGE_CONTACTS: return k->assemble_contacts(s->context, s->error);
+    case SADMM_STAGE_HARD: return k->assemble_joints(s->context, s->error);
+    case SADMM_STAGE_SOFT: return k->assemble_springs(s->context, s->error);
+    case SADMM_STAGE_PENALTY: return init_penalty(s);
+    case SADMM_STAGE_ITERATE: s->report->iterations = stage->done; return iterate(s, stage->count, stage->measure);
+    case SADMM_STAGE_RESIDUALS: return k->measure_residuals(s->context, &s->report->residual, s->error);
+    case SADMM_STAGE_CHECK:
+        TRY(check_convergence(s, &s->report->converged));
+        stages->stopped = s->report->converged;
+        return SADMM_OK;
+    case SADMM_STAGE_REWEIGH: return reweigh(s);
+    case SADMM_STAGE_BALANCE: return balance_penalty(s);
+    case SADMM_STAGE_LIMIT: return k->limit_velocity(s->context, &s->report->limited, s->error);
+    case SADMM_STAGE_SOLUTION: return read_solution(s);
+    default: return SADMM_OK; /* the world's */
     }
-    return SADMM_OK;
+}
+
+sadmm_solve_report sadmm_solve_report_empty(const struct sadmm_kernels *kernels, const struct sadmm_plan *plan)
+{
+    sadmm_solve_report report = {
+        .backend = kernels->backend,
+        .precision = kernels->precision,
+        .residual = {.primal = -1, .dual = -1},
+        .certificate = sadmm_certificate_none(),
+        .threads = kernels->backend == SADMM_BACKEND_REF ? 1 : plan->threads,
+    };
+    return report;
 }
 
 sadmm_status sadmm_schedule_solve(const struct sadmm_kernels *kernels, struct sadmm_context *context,
                                   struct sadmm_system *system, const struct sadmm_settings *settings,
-                                  const struct sadmm_plan *plan, struct sadmm_solve_report *report,
-                                  struct sadmm_phase_times *ms, struct sadmm_error *error)
+                                  const struct sadmm_plan *plan, struct sadmm_solve_report *report, struct sadmm_error *error)
 {
-    double start = sadmm_clock_ms();
-    report->backend = kernels->backend;
-    report->precision = kernels->precision;
-    report->iterations = 0;
-    report->converged = false;
-    report->limited = 0;
-    report->residual.primal = report->residual.dual = -1;
-    report->certificate = sadmm_certificate_none();
-    report->threads = kernels->backend == SADMM_BACKEND_REF ? 1 : plan->threads;
-
-    if (plan->predict) TRY(sadmm_loads_predict(system, settings, error));
-    TRY(kernels->begin(context, system, plan, settings, error));
-    TRY(assemble(kernels, context, plan, error));
-    double assembled = sadmm_clock_ms();
-    TRY(run(kernels, context, system, settings, plan, report, error));
-    if (plan->limit) TRY(kernels->limit_velocity(context, &report->limited, error));
-    TRY(kernels->read_solution(context, error));
-    double end = sadmm_clock_ms();
-    report->solve_ms = end - start;
-    if (ms) {
-        ms->assemble = assembled - start;
-        ms->solve = end - assembled;
-    }
-    if (!finite_array(system->velocity, 6 * (size_t)system->body_count) ||
-        !finite_array(system->block_lambda, 6 * (size_t)system->block_count) || !finite_impulses(system->contacts, plan->threads))
-        return sadmm_fail(error, SADMM_ERROR_NON_FINITE, "the solve gave a velocity or multiplier that is not finite");
+    struct sadmm_solve solve = {kernels, context, system, settings, plan, report, error};
+    struct sadmm_stages stages = sadmm_stages_of(plan, settings, false);
+    struct sadmm_stage stage;
+    const double begin = sadmm_clock_ms();
+    *report = sadmm_solve_report_empty(kernels, plan);
+    while (sadmm_stages_next(&stages, &stage)) TRY(sadmm_solve_stage(&solve, &stages, &stage));
+    report->solve_ms = sadmm_clock_ms() - begin;
     return SADMM_OK;
 }

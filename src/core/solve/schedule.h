@@ -1,37 +1,39 @@
-/* The schedule of a solve: the order of the kernel table's entries, penalty updates and stop rules. */
+/* A solve by the host: the stages of stages.h, through a backend's kernel table. */
 #ifndef SADMM_CORE_SOLVE_SCHEDULE_H
 #define SADMM_CORE_SOLVE_SCHEDULE_H
 
 #include "kernels.h"
-#include "subadmm/world.h"
+#include "stages.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-/* Solve `system` with one backend: assembly, iterations, solution back into `system`. Fills report->iterations,
- * converged, residual (-1 when not measured), solve_ms (assembly and iterations), certificate (only when a certificate
- * tolerance made it necessary, else ncp_max = -1). `ms` (may be NULL) receives assemble and solve, in ms.
- * A solution that is not finite gives SADMM_ERROR_NON_FINITE; the system's start values are gone then: callers that
- * promise to keep them keep a copy. */
+/* What the stages of one solve work on. */
+struct sadmm_solve {
+    const struct sadmm_kernels *kernels;
+    struct sadmm_context *context;
+    struct sadmm_system *system;
+    const struct sadmm_settings *settings;
+    const struct sadmm_plan *plan;
+    struct sadmm_solve_report *report;
+    struct sadmm_error *error;
+};
+
+/* What a solve's report says before the first stage: not converged, residuals -1, ncp_max -1. */
+sadmm_solve_report sadmm_solve_report_empty(const struct sadmm_kernels *kernels, const struct sadmm_plan *plan);
+
+/* One stage of a solve; nothing for those of a world. A solution that is not finite gives SADMM_ERROR_NON_FINITE; the
+ * system's start values are gone then: callers that promise to keep them keep a copy. */
+sadmm_status sadmm_solve_stage(struct sadmm_solve *solve, struct sadmm_stages *stages, const struct sadmm_stage *stage);
+
+/* All stages of a solve. Fills `report` but for the final certificate: iterations, converged, residual (-1 when not
+ * measured), solve_ms (assembly and iterations), certificate (where a certificate tolerance made it necessary, else
+ * ncp_max = -1). */
 sadmm_status sadmm_schedule_solve(const struct sadmm_kernels *kernels, struct sadmm_context *context,
                                   struct sadmm_system *system, const struct sadmm_settings *settings,
                                   const struct sadmm_plan *plan, struct sadmm_solve_report *report,
-                                  struct sadmm_phase_times *ms, struct sadmm_error *error);
-
-/* Iterations into which nobody has to look, and what comes after them. */
-struct sadmm_stretch {
-    int count;
-    bool last;    /* the budget is spent then */
-    bool look;    /* the stop rule looks */
-    bool update;  /* eq. (15) */
-    bool refresh; /* the weights of method fast are taken anew */
-    bool measure; /* the last of them is measured */
-};
-/* The stretch that begins after `done` iterations, done < sadmm_schedule_budget(). */
-struct sadmm_stretch sadmm_schedule_stretch(const struct sadmm_plan *plan, const struct sadmm_settings *settings, int done);
-/* Iterations of a solve that nobody stops: without constraints Step 1 is exact at once, v = A^-1 b. */
-int sadmm_schedule_budget(const struct sadmm_plan *plan, const struct sadmm_settings *settings);
+                                  struct sadmm_error *error);
 
 #ifdef __cplusplus
 }

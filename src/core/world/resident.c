@@ -130,37 +130,15 @@ sadmm_status sadmm_world_resident_step(sadmm_world *world, bool wait)
 
 static void take_report(sadmm_world *world, const struct sadmm_resident_report *done)
 {
-    sadmm_step_report *report = &world->report;
     int64_t steps = done->done - world->resident.done;
-    report->repeated += done->repeats - world->resident.repeats;
+    world->report.repeated += done->repeats - world->resident.repeats;
     world->resident.repeats = done->repeats;
     if (steps <= 0) return;
     world->resident.done = done->done;
     world->resident.bodies_behind = world->resident.contacts_behind = true;
     world->stepped = world->contacts_readable = true;
     world->plan = done->plan;
-    report->step += steps;
-    for (int64_t k = 0; k < steps; ++k) report->time += world->step_settings.dt;
-    report->backend = world->kernels->backend;
-    report->precision = world->kernels->precision;
-    report->threads = done->plan.threads;
-    report->bodies = done->plan.bodies;
-    report->contacts = done->plan.points;
-    report->pairs = done->plan.pairs;
-    report->iterations = done->iterations;
-    report->iterations_mean = done->iterations_mean;
-    report->converged = done->converged;
-    report->limited = done->limited;
-    report->penetration_max = done->penetration_max;
-    report->residual = done->residual;
-    report->ms.collide = done->ms.collide;
-    report->ms.assemble = done->ms.assemble;
-    report->ms.solve = done->ms.solve;
-    report->ms.finish = done->ms.finish;
-    report->ms.total = done->ms.total;
-    report->certify_ms = 0;
-    report->certificate = sadmm_certificate_none();
-    report->certificate.islands_above = done->islands_above;
+    sadmm_world_report_steps(world, steps, done);
 }
 
 sadmm_status sadmm_world_settle(const sadmm_world *constant)

@@ -1,14 +1,5 @@
-/* One time step: the whole of the paper's Fig. 4, seen from above.
- *
- *     gather        dynamic bodies in slot order -> rigid[], collision bodies (gather.c)
- *     find_contacts broad phase, pair manifolds, matching with the last step
- *     plan          what this step needs (plan.c)
- *     solve         assembly, iterations (schedule.c)
- *     finish        integrate (Q), wrenches (R)
- *     certify       if asked for
- *     commit        states back into the slots; nothing before this line changes a body
- *
- * A backend that keeps the world runs the same schedule on its own (resident.c).
+/* A step by the host: the stages of core/solve/stages.h, one after the other. Nothing before COMMIT changes a body. A backend
+ * that keeps the world goes through the same list on its own (resident.c).
  */
 #include <math.h>
 #include <string.h>
@@ -104,74 +95,107 @@ static void commit(sadmm_world *world)
     world->contacts_readable = true;
 }
 
-/* Everything that may fail; the report is written on the way. *found: the contacts have been replaced. */
-static sadmm_status try_step(sadmm_world *world, sadmm_step_report *report, bool *found)
+/* A step made by the host, while it is made. */
+struct host_step {
+    sadmm_world *world;
+    struct sadmm_system system;
+    struct sadmm_solve solve;
+    sadmm_solve_report report;
+    struct sadmm_stages stages;
+    bool found;   /* the contacts have been replaced */
+    double depth; /* deepest penetration, m */
+    double ms[SADMM_PHASE_COUNT];
+};
+
+static sadmm_status make_plan(struct host_step *step)
 {
-    const struct sadmm_kernels *kernels = world->kernels;
-    const sadmm_settings *settings = &world->def.settings;
-    struct sadmm_solve_report solve = {0};
-    double begin = sadmm_clock_ms();
+    sadmm_world *world = step->world;
+    step->found = true;
+    step->system = sadmm_world_system(world);
+    world->plan = sadmm_plan_make(&step->system, &world->def.settings);
+    step->report = sadmm_solve_report_empty(world->kernels, &world->plan);
+    return keep_start(world, &step->depth);
+}
 
-    TRY(sadmm_world_gather(world));
-    TRY(find_contacts(world));
-    *found = true;
-    double collided = sadmm_clock_ms();
+static sadmm_status solve_stage(struct host_step *step, const struct sadmm_stage *stage)
+{
+    sadmm_status status = sadmm_solve_stage(&step->solve, &step->stages, stage);
+    return status == SADMM_ERROR_NON_FINITE ? name_culprit(step->world) : status;
+}
 
-    struct sadmm_system system = sadmm_world_system(world);
-    world->plan = sadmm_plan_make(&system, settings);
-    double depth = 0;
-    TRY(keep_start(world, &depth));
-    sadmm_status status = sadmm_schedule_solve(kernels, world->context, &system, settings, &world->plan, &solve,
-                                               &report->ms, &world->error);
-    if (status == SADMM_ERROR_NON_FINITE) return name_culprit(world);
-    TRY(status);
-    double solved = sadmm_clock_ms();
+static sadmm_status integrate(sadmm_world *world)
+{
+    TRY(world->kernels->integrate(world->context, world->next, &world->error));
+    return check_next(world);
+}
 
-    TRY(kernels->integrate(world->context, world->next, &world->error));
-    TRY(check_next(world));
-    if (world->plan.wrenches) TRY(kernels->recover_wrenches(world->context, world->wrench, &world->error));
-    double end = sadmm_clock_ms();
+static sadmm_status run_stage(struct host_step *step, const struct sadmm_stage *stage)
+{
+    sadmm_world *world = step->world;
+    switch (stage->kind) {
+    case SADMM_STAGE_GATHER: return sadmm_world_gather(world);
+    case SADMM_STAGE_FIND: return find_contacts(world);
+    case SADMM_STAGE_PLAN: return make_plan(step);
+    case SADMM_STAGE_INTEGRATE: return integrate(world);
+    case SADMM_STAGE_WRENCHES: return world->kernels->recover_wrenches(world->context, world->wrench, &world->error);
+    case SADMM_STAGE_CERTIFY:
+        return sadmm_certify_with(&world->certificate_workspace, &step->system, &world->def.settings,
+                                  &step->report.certificate, &world->error);
+    case SADMM_STAGE_COMMIT: commit(world); return SADMM_OK;
+    default: return solve_stage(step, stage);
+    }
+}
 
-    report->certificate = solve.certificate;
-    if (world->plan.certificate)
-        TRY(sadmm_certify_with(&world->certificate_workspace, &system, settings, &report->certificate, &world->error));
-    report->certify_ms = world->plan.certificate ? sadmm_clock_ms() - end : 0;
-
-    report->backend = solve.backend;
-    report->precision = solve.precision;
-    report->threads = solve.threads;
-    report->bodies = world->dynamic_count;
-    report->contacts = (int32_t)world->contacts.point_count;
-    report->pairs = (int32_t)world->contacts.pair_count;
-    report->iterations = solve.iterations;
-    report->iterations_mean = solve.iterations;
-    report->converged = solve.converged;
-    report->limited = solve.limited;
-    report->residual = solve.residual;
-    report->penetration_max = depth;
-    report->ms.collide = collided - begin;
-    report->ms.finish = end - solved;
-    report->ms.total = end - begin;
+static sadmm_status run_stages(struct host_step *step)
+{
+    struct sadmm_stage stage;
+    double before = sadmm_clock_ms();
+    while (sadmm_stages_next(&step->stages, &stage)) {
+        TRY(run_stage(step, &stage));
+        const double now = sadmm_clock_ms();
+        step->ms[sadmm_stage_phase(stage.kind)] += now - before;
+        before = now;
+    }
     return SADMM_OK;
 }
 
-/* A step made by the host, kernel by kernel. */
+static void report_step(const struct host_step *step)
+{
+    const sadmm_solve_report *solved = &step->report;
+    const double *ms = step->ms;
+    struct sadmm_resident_report done = {
+        .plan = step->world->plan,
+        .iterations = solved->iterations,
+        .iterations_mean = solved->iterations,
+        .converged = solved->converged,
+        .limited = solved->limited,
+        .penetration_max = step->depth,
+        .residual = solved->residual,
+        .ms = {.collide = ms[SADMM_PHASE_COLLIDE], .assemble = ms[SADMM_PHASE_ASSEMBLE],
+               .solve = ms[SADMM_PHASE_SOLVE], .finish = ms[SADMM_PHASE_FINISH]},
+    };
+    done.plan.threads = solved->threads;
+    for (int phase = 0; phase < SADMM_PHASE_COUNT; ++phase) done.ms.total += phase == SADMM_PHASE_CERTIFY ? 0 : ms[phase];
+    sadmm_world_report_steps(step->world, 1, &done);
+    step->world->report.certificate = solved->certificate;
+    step->world->report.certify_ms = ms[SADMM_PHASE_CERTIFY];
+}
+
+/* A step made by the host, stage by stage. */
 static sadmm_status host_step(sadmm_world *world)
 {
-    sadmm_step_report report = world->report;
-    bool found = false;
+    struct host_step step = {.world = world, .stages = sadmm_stages_of(&world->plan, &world->def.settings, true)};
     TRY(sadmm_world_take_back(world));
-    sadmm_status status = try_step(world, &report, &found);
+    step.solve = (struct sadmm_solve){world->kernels, world->context, &step.system, &world->def.settings,
+                                      &world->plan, &step.report, &world->error};
+    sadmm_status status = run_stages(&step);
     if (status != SADMM_OK) {
         world->contacts_readable = false;
-        if (found) sadmm_collision_undo(world->collision, &world->contacts);
+        if (step.found) sadmm_collision_undo(world->collision, &world->contacts);
         return status;
     }
-    commit(world);
     world->step_settings = world->def.settings;
-    report.step = world->report.step + 1;
-    report.time = world->report.time + world->def.settings.dt;
-    world->report = report;
+    report_step(&step);
     return SADMM_OK;
 }
 

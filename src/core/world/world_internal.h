@@ -89,6 +89,11 @@ struct sadmm_system sadmm_world_system(sadmm_world *world);
 /* SADMM_ERROR_NON_FINITE that names a dynamic body. */
 sadmm_status sadmm_world_not_finite(sadmm_world *world, int32_t body);
 
+/* ---- report.c ---- */
+
+/* `steps` more steps have been done; `done` is what the last of them was like. */
+void sadmm_world_report_steps(sadmm_world *world, int64_t steps, const struct sadmm_resident_report *done);
+
 /* ---- step.c ---- */
 
 /* The choice of the kernels, at the first step. */

@@ -1,0 +1,106 @@
+#include "stages.h"
+
+#include <limits.h>
+
+#include "core/math/weight.h"
+
+struct sadmm_stages sadmm_stages_of(const struct sadmm_plan *plan, const struct sadmm_settings *settings, bool world)
+{
+    struct sadmm_stages stages = {.plan = plan, .settings = settings, .world = world};
+    return stages;
+}
+
+int sadmm_stages_budget(const struct sadmm_plan *plan, const struct sadmm_settings *settings)
+{
+    return sadmm_plan_is_constrained(plan) ? settings->iterations : 1;
+}
+
+/* Iterations until the next multiple of `period` after `done`, at most `limit`. */
+static int until(int done, int period, int limit)
+{
+    int left = period - done % period;
+    return left < limit ? left : limit;
+}
+
+/* The first refresh of the weights after `done` iterations, INT_MAX: none. */
+static int next_refresh(int done)
+{
+    int at = WEIGHT_FIRST_REFRESH;
+    while (at <= done && at <= INT_MAX / 2) at = weight_next_refresh(at);
+    return at > done ? at : INT_MAX;
+}
+
+/* The batch of iterations that begins now, and what comes after it. Returns its iterations. */
+static int begin_batch(struct sadmm_stages *s)
+{
+    const struct sadmm_plan *plan = s->plan;
+    const struct sadmm_settings *settings = s->settings;
+    const bool has_stop_rule = sadmm_plan_is_constrained(plan) &&
+                               (settings->residual_tolerance > 0 || settings->certificate_tolerance > 0);
+    const int budget = sadmm_stages_budget(plan, settings), done = s->batch.done;
+    const int refresh = plan->weight_refresh ? next_refresh(done) : INT_MAX;
+    int count = budget - done;
+    if (plan->penalty_updates) count = until(done, settings->penalty_period, count);
+    if (refresh - done < count) count = refresh - done;
+    if (has_stop_rule) count = until(done, settings->check_period, count);
+    const int after = done + count;
+    s->batch.done = after;
+    s->batch.last = after == budget;
+    s->batch.check = has_stop_rule && (s->batch.last || after % settings->check_period == 0);
+    s->batch.reweigh = !s->batch.last && after == refresh;
+    s->batch.balance = plan->penalty_updates && !s->batch.last && after % settings->penalty_period == 0;
+    s->batch.measure = plan->residuals && (s->batch.balance || (s->batch.last && settings->measure_residuals) ||
+                                           (s->batch.check && settings->residual_tolerance > 0));
+    return count;
+}
+
+static bool is_needed(const struct sadmm_stages *s, enum sadmm_stage_kind kind)
+{
+    const struct sadmm_plan *plan = s->plan;
+    switch (kind) {
+    case SADMM_STAGE_GATHER:
+    case SADMM_STAGE_FIND:
+    case SADMM_STAGE_PLAN:
+    case SADMM_STAGE_INTEGRATE:
+    case SADMM_STAGE_COMMIT: return s->world;
+    case SADMM_STAGE_WRENCHES: return s->world && plan->wrenches;
+    case SADMM_STAGE_CERTIFY: return s->world && plan->certificate;
+    case SADMM_STAGE_PREDICT: return plan->predict;
+    case SADMM_STAGE_CONTACTS: return plan->points > 0 || plan->blocks[SADMM_BLOCK_CONTACT] > 0;
+    case SADMM_STAGE_HARD: return plan->blocks[SADMM_BLOCK_HARD] > 0;
+    case SADMM_STAGE_SOFT: return plan->blocks[SADMM_BLOCK_SOFT] > 0;
+    case SADMM_STAGE_RESIDUALS: return s->batch.measure;
+    case SADMM_STAGE_CHECK: return s->batch.check;
+    case SADMM_STAGE_REWEIGH: return s->batch.reweigh && !s->stopped;
+    case SADMM_STAGE_BALANCE: return s->batch.balance && !s->stopped;
+    case SADMM_STAGE_LIMIT: return plan->limit;
+    default: return true;
+    }
+}
+
+enum sadmm_phase sadmm_stage_phase(enum sadmm_stage_kind kind)
+{
+    if (kind <= SADMM_STAGE_FIND) return SADMM_PHASE_COLLIDE;
+    if (kind == SADMM_STAGE_PLAN || kind == SADMM_STAGE_COMMIT) return SADMM_PHASE_OTHER;
+    if (kind <= SADMM_STAGE_PENALTY) return SADMM_PHASE_ASSEMBLE;
+    if (kind <= SADMM_STAGE_SOLUTION) return SADMM_PHASE_SOLVE;
+    return kind == SADMM_STAGE_CERTIFY ? SADMM_PHASE_CERTIFY : SADMM_PHASE_FINISH;
+}
+
+bool sadmm_stages_next(struct sadmm_stages *s, struct sadmm_stage *stage)
+{
+    while (s->next < SADMM_STAGE_COUNT) {
+        const enum sadmm_stage_kind kind = (enum sadmm_stage_kind)s->next++;
+        const int count = kind == SADMM_STAGE_ITERATE ? begin_batch(s) : 0;
+        if (kind == SADMM_STAGE_BALANCE && !s->batch.last && !s->stopped) s->next = SADMM_STAGE_ITERATE;
+        if (!is_needed(s, kind)) continue;
+        stage->kind = kind;
+        stage->count = count;
+        stage->measure = s->batch.measure;
+        stage->done = s->batch.done;
+        stage->last = s->batch.last;
+        stage->checked = s->batch.check;
+        return true;
+    }
+    return false;
+}

@@ -1,0 +1,82 @@
+/* The schedule of a step: the paper's Fig. 4 as a list of stages, in order. It exists once.
+ *
+ *     step = GATHER FIND PLAN  solve  INTEGRATE WRENCHES CERTIFY COMMIT     (world level)
+ *     solve = PREDICT BODIES CONTACTS HARD SOFT PENALTY  iterations  LIMIT SOLUTION
+ *     iterations = { ITERATE RESIDUALS CHECK REWEIGH BALANCE } until the budget is spent or a check is met
+ *
+ * What the plan and the settings do not ask for is not in the list. Whoever executes it goes through it one stage after the
+ * other: hosts run each stage (schedule.c, world/step.c), the CUDA backend records it into its graph. An executor may begin
+ * a stage before its turn where all that the stage reads is there.
+ */
+#ifndef SADMM_CORE_SOLVE_STAGES_H
+#define SADMM_CORE_SOLVE_STAGES_H
+
+#include "plan.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum sadmm_stage_kind {
+    SADMM_STAGE_GATHER,    /* -    bodies and start values of the step */
+    SADMM_STAGE_FIND,      /* -    contacts */
+    SADMM_STAGE_PLAN,      /* -    what this step needs, found from its contacts */
+    SADMM_STAGE_PREDICT,   /* -    FAST: loads to start from (loads.h) */
+    SADMM_STAGE_BODIES,    /* A    A_i, b_i */
+    SADMM_STAGE_CONTACTS,  /* B    contacts in the solver's form */
+    SADMM_STAGE_HARD,      /* C, D hard blocks */
+    SADMM_STAGE_SOFT,      /* C, D soft blocks */
+    SADMM_STAGE_PENALTY,   /* E-H  C_i, beta_i (FAST: weights) and the factors of A_i + beta_i C_i */
+    SADMM_STAGE_ITERATE,   /* I-O  Steps 1-4, `count` times */
+    SADMM_STAGE_RESIDUALS, /* N    eqs. (16), (17) of the last iteration */
+    SADMM_STAGE_CHECK,     /* -    convergence: where the stop rule is met, no iteration follows */
+    SADMM_STAGE_REWEIGH,   /* -    FAST: weights from the multipliers found so far; factors */
+    SADMM_STAGE_BALANCE,   /* P    eq. (15), and where it changes the penalty factors */
+    SADMM_STAGE_LIMIT,     /* -    FAST: islands with more energy than they may have (math/limit.h) */
+    SADMM_STAGE_SOLUTION,  /* -    velocities and multipliers to where the caller reads them */
+    SADMM_STAGE_INTEGRATE, /* Q    states after dt */
+    SADMM_STAGE_WRENCHES,  /* R    eq. (12) */
+    SADMM_STAGE_CERTIFY,   /* -    the true error, from the raw data */
+    SADMM_STAGE_COMMIT,    /* -    the step is made; nothing before changes the world */
+    SADMM_STAGE_COUNT
+};
+
+struct sadmm_stage {
+    enum sadmm_stage_kind kind;
+    int count;    /* ITERATE: iterations */
+    bool measure; /* ITERATE: the last of them keeps what RESIDUALS and BALANCE need */
+    int done;     /* iterations that are done after this stage */
+    bool last;    /* ITERATE to BALANCE: the budget is spent, no iteration follows */
+    bool checked; /* ITERATE: a CHECK follows before any other iteration */
+};
+
+/* Where in the list an executor is. */
+struct sadmm_stages {
+    const struct sadmm_plan *plan;         /* read after PLAN */
+    const struct sadmm_settings *settings;
+    bool world;                            /* a step; else a solve alone */
+    bool stopped;                          /* set by the executor: a check was met */
+    int next;                              /* enum sadmm_stage_kind */
+    struct {                               /* the iterations up to the next stage that needs their result */
+        int done;
+        bool last, measure, check, reweigh, balance;
+    } batch;
+};
+
+struct sadmm_stages sadmm_stages_of(const struct sadmm_plan *plan, const struct sadmm_settings *settings, bool world);
+
+/* The next stage; false: there is none. */
+bool sadmm_stages_next(struct sadmm_stages *stages, struct sadmm_stage *stage);
+
+/* What a stage's time counts as. */
+enum sadmm_phase { SADMM_PHASE_COLLIDE, SADMM_PHASE_ASSEMBLE, SADMM_PHASE_SOLVE, SADMM_PHASE_FINISH, SADMM_PHASE_CERTIFY,
+                   SADMM_PHASE_OTHER, SADMM_PHASE_COUNT };
+enum sadmm_phase sadmm_stage_phase(enum sadmm_stage_kind kind);
+
+/* Iterations of a solve that nobody stops: without constraints Step 1 is exact at once, v = A^-1 b. */
+int sadmm_stages_budget(const struct sadmm_plan *plan, const struct sadmm_settings *settings);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

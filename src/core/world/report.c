@@ -1,0 +1,29 @@
+/* What is reported of steps, whoever made them. */
+#include "world_internal.h"
+
+void sadmm_world_report_steps(sadmm_world *world, int64_t steps, const struct sadmm_resident_report *done)
+{
+    sadmm_step_report *report = &world->report;
+    report->step += steps;
+    for (int64_t k = 0; k < steps; ++k) report->time += world->step_settings.dt;
+    report->backend = world->kernels->backend;
+    report->precision = world->kernels->precision;
+    report->threads = done->plan.threads;
+    report->bodies = done->plan.bodies;
+    report->contacts = done->plan.points;
+    report->pairs = done->plan.pairs;
+    report->iterations = done->iterations;
+    report->iterations_mean = done->iterations_mean;
+    report->converged = done->converged;
+    report->limited = done->limited;
+    report->penetration_max = done->penetration_max;
+    report->residual = done->residual;
+    report->ms.collide = done->ms.collide;
+    report->ms.assemble = done->ms.assemble;
+    report->ms.solve = done->ms.solve;
+    report->ms.finish = done->ms.finish;
+    report->ms.total = done->ms.total;
+    report->certify_ms = 0;
+    report->certificate = sadmm_certificate_none();
+    report->certificate.islands_above = done->islands_above;
+}
