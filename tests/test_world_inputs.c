@@ -340,10 +340,13 @@ START_TEST(bad_states_and_wrenches_are_refused)
                    "linear_velocity");
     state = good, state.angular_velocity[0] = -1.01e6;
     expect_refused(w.world, sadmm_world_set_body_state(w.world, w.high, &state), SADMM_ERROR_INVALID_ARGUMENT,
-                   "angular_velocity");
+                   "state->angular_velocity[0] = -1.01e+06: must be in [-1e+06, 1e+06]");
     state = body_state(w.world, w.ground), state.linear_velocity[0] = 1; /* static */
     expect_refused(w.world, sadmm_world_set_body_state(w.world, w.ground, &state), SADMM_ERROR_INVALID_ARGUMENT,
-                   "linear_velocity");
+                   "state->linear_velocity[0] = 1: must be 0, for the body is static");
+    state.linear_velocity[0] = 0, state.angular_velocity[2] = -2;
+    expect_refused(w.world, sadmm_world_set_body_state(w.world, w.ground, &state), SADMM_ERROR_INVALID_ARGUMENT,
+                   "state->angular_velocity[2] = -2: must be 0, for the body is static");
     expect_refused(w.world, sadmm_world_set_body_state(w.world, w.high, NULL), SADMM_ERROR_INVALID_ARGUMENT, "state");
 
     expect_refused(w.world, sadmm_world_set_body_wrench(w.world, w.high, nan, zero), SADMM_ERROR_INVALID_ARGUMENT, "force");

@@ -6,8 +6,8 @@ sadmm_status sadmm_check_vector(const char *name, const double *x, int count, do
 {
     for (int k = 0; k < count; ++k)
         if (!(fabs(x[k]) <= limit))
-            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s[%d] = %g: must be finite and within +-%g", name, k,
-                              x[k], limit);
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s[%d] = %g: must be in [-%g, %g]", name, k, x[k], limit,
+                              limit);
     return SADMM_OK;
 }
 

@@ -31,9 +31,14 @@ static sadmm_status check_inertia(const double inertia[3], struct sadmm_error *e
 static sadmm_status check_motion(const char *linear_name, const char *angular_name, const double linear[3],
                                  const double angular[3], sadmm_body_type type, struct sadmm_error *error)
 {
-    double limit = type == SADMM_BODY_STATIC ? 0 : VELOCITY_LIMIT;
-    TRY(sadmm_check_vector(linear_name, linear, 3, limit, error));
-    return sadmm_check_vector(angular_name, angular, 3, limit, error);
+    for (int k = 0; k < 6 && type == SADMM_BODY_STATIC; ++k) {
+        double x = k < 3 ? linear[k] : angular[k - 3];
+        if (!(x == 0))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s[%d] = %g: must be 0, for the body is static",
+                              k < 3 ? linear_name : angular_name, k % 3, x);
+    }
+    TRY(sadmm_check_vector(linear_name, linear, 3, VELOCITY_LIMIT, error));
+    return sadmm_check_vector(angular_name, angular, 3, VELOCITY_LIMIT, error);
 }
 
 static sadmm_status check_def(const sadmm_body_def *def, double orientation[4], struct sadmm_error *error)
