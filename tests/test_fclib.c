@@ -555,14 +555,15 @@ START_TEST(writes_solutions)
     solve(problem, 1e-9);
     solve(original, 1e-9);
 
-    /* a copy; a new file, from geometry; in place, twice */
+    /* a copy; a copy over a file with another solution; a new file, from geometry */
     ck_assert_int_eq(sadmm_fclib_save_solution(problem, path_of("p.hdf5"), path_of("copy.hdf5"), &error), SADMM_OK);
     ck_assert_int_eq(sadmm_fclib_save_solution(original, NULL, path_of("new.hdf5"), &error), SADMM_OK);
-    ck_assert_int_eq(sadmm_fclib_save_solution(problem, path_of("p.hdf5"), path_of("p.hdf5"), &error), SADMM_OK);
-    ck_assert_int_eq(sadmm_fclib_save_solution(problem, path_of("p.hdf5"), path_of("p.hdf5"), &error), SADMM_OK);
+    ck_assert_int_eq(sadmm_fclib_save_solution(problem, path_of("copy.hdf5"), path_of("again.hdf5"), &error), SADMM_OK);
+    ck_assert_int_eq(sadmm_fclib_save_solution(problem, path_of("p.hdf5"), path_of("again.hdf5"), &error), SADMM_OK);
+    ck_assert_int_eq(sadmm_fclib_save_solution(problem, path_of("again.hdf5"), path_of("copy.hdf5"), &error), SADMM_OK);
     expect_solution(path_of("copy.hdf5"), 8, 6, 3 + 4);
+    expect_solution(path_of("again.hdf5"), 8, 6, 3 + 4);
     expect_solution(path_of("new.hdf5"), 8, 6, 3 + 4);
-    expect_solution(path_of("p.hdf5"), 8, 6, 3 + 4);
     hid_t file = H5Fopen(path_of("copy.hdf5"), H5F_ACC_RDONLY, H5P_DEFAULT);
     ck_assert_int_gt(H5Lexists(file, "/fclib_global/info", H5P_DEFAULT), 0); /* the rest is kept */
     H5Fclose(file);
@@ -572,7 +573,13 @@ START_TEST(writes_solutions)
     ck_assert_int_eq(sadmm_fclib_save_solution(other, path_of("p.hdf5"), path_of("bad.hdf5"), &error), SADMM_ERROR_IO);
     ck_assert_int_eq(sadmm_fclib_save_solution(problem, path_of("none.hdf5"), path_of("bad.hdf5"), &error),
                      SADMM_ERROR_IO);
-    ck_assert_int_eq(files_in_folder(), 3); /* and nothing half done is left */
+    /* a file onto itself, by another name: it stays */
+    ck_assert_int_eq(link(path_of("p.hdf5"), path_of("link.hdf5")), 0);
+    ck_assert_int_eq(sadmm_fclib_save_solution(problem, path_of("p.hdf5"), path_of("link.hdf5"), &error),
+                     SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(error.message, "must be another file"));
+    sadmm_problem_destroy(load(path_of("link.hdf5")));
+    ck_assert_int_eq(files_in_folder(), 5); /* and nothing half done is left */
     sadmm_problem_destroy(original);
     sadmm_problem_destroy(problem);
     sadmm_problem_destroy(other);
@@ -724,6 +731,106 @@ static void unwritten(hid_t f) { put_empty(f, "/fclib_global/vectors/f", DOFS, f
 static void terabytes(hid_t f) { put_empty(f, "/fclib_global/H/x", (hsize_t)1 << 40, true); }
 static void terabytes_unwritten(hid_t f) { put_empty(f, "/fclib_global/H/x", (hsize_t)1 << 40, false); }
 
+/* HDF5 unpacks whole chunks: one of 2 GB, of which 18 numbers are the dataset, packed to nothing. */
+static void huge_chunk(hid_t f)
+{
+    const hsize_t count = DOFS, most = H5S_UNLIMITED, chunk = (hsize_t)1 << 28;
+    hid_t space = H5Screate_simple(1, &count, &most), list = H5Pcreate(H5P_DATASET_CREATE);
+    char packed[64] = {0}; /* what the chunk holds is never looked at */
+    H5Pset_chunk(list, 1, &chunk);
+    H5Pset_deflate(list, 9);
+    drop(f, "/fclib_global/vectors/f");
+    hid_t set = H5Dcreate2(f, "/fclib_global/vectors/f", H5T_IEEE_F64LE, space, H5P_DEFAULT, list, H5P_DEFAULT);
+    ck_assert_int_ge(set, 0);
+    const hsize_t first = 0;
+    ck_assert_int_ge(H5Dwrite_chunk(set, H5P_DEFAULT, 0, &first, sizeof packed, packed), 0);
+    H5Dclose(set);
+    H5Sclose(space);
+    H5Pclose(list);
+}
+
+/* Floating point numbers of 1 MB each. */
+static void wide_numbers(hid_t f)
+{
+    const hsize_t count = CONTACTS;
+    hid_t type = H5Tcopy(H5T_IEEE_F64LE), space = H5Screate_simple(1, &count, NULL);
+    ck_assert_int_ge(H5Tset_size(type, 1 << 20), 0);
+    drop(f, MU);
+    hid_t set = H5Dcreate2(f, MU, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    ck_assert_int_ge(set, 0);
+    char *data = calloc(CONTACTS, 1 << 20);
+    ck_assert_int_ge(H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data), 0);
+    free(data);
+    H5Dclose(set);
+    H5Sclose(space);
+    H5Tclose(type);
+}
+
+static void put_typed(hid_t f, hid_t type)
+{
+    const hsize_t count = CONTACTS;
+    hid_t space = H5Screate_simple(1, &count, NULL);
+    const char *const texts[CONTACTS] = {"0.5", "0.5"};
+    drop(f, MU);
+    hid_t set = H5Dcreate2(f, MU, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    ck_assert_int_ge(set, 0);
+    ck_assert_int_ge(H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, texts), 0);
+    H5Dclose(set);
+    H5Sclose(space);
+}
+static void strings(hid_t f)
+{
+    hid_t type = H5Tcopy(H5T_C_S1);
+    H5Tset_size(type, H5T_VARIABLE);
+    put_typed(f, type);
+    H5Tclose(type);
+}
+static void references(hid_t f) { put_typed(f, H5T_STD_REF_OBJ); }
+
+/* Groups that hold each other and themselves. */
+static void group_cycle(hid_t f)
+{
+    drop(f, "/fclib_global/vectors");
+    H5Lcreate_hard(f, "/fclib_global", f, "/fclib_global/vectors", H5P_DEFAULT, H5P_DEFAULT);
+    H5Lcreate_hard(f, "/", f, "/fclib_global/f", H5P_DEFAULT, H5P_DEFAULT);
+}
+static void soft_cycle(hid_t f)
+{
+    drop(f, "/fclib_global/M");
+    H5Lcreate_soft("/fclib_global/N", f, "/fclib_global/M", H5P_DEFAULT, H5P_DEFAULT);
+    H5Lcreate_soft("/fclib_global/M", f, "/fclib_global/N", H5P_DEFAULT, H5P_DEFAULT);
+}
+
+/* Vectors as long as the sizes say, packed to almost nothing; the matrices are next to empty. Before 60 GB of blocks are
+ * asked for. */
+static void put_zeros(hid_t f, const char *name, hsize_t count)
+{
+    hsize_t chunk = 1 << 20;
+    hid_t space = H5Screate_simple(1, &count, NULL), list = H5Pcreate(H5P_DATASET_CREATE);
+    H5Pset_chunk(list, 1, &chunk);
+    H5Pset_deflate(list, 1);
+    drop(f, name);
+    hid_t set = H5Dcreate2(f, name, H5T_IEEE_F32LE, space, H5P_DEFAULT, list, H5P_DEFAULT);
+    double *zeros = calloc(count, sizeof *zeros);
+    ck_assert_int_ge(H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, zeros), 0);
+    free(zeros);
+    H5Dclose(set);
+    H5Sclose(space);
+    H5Pclose(list);
+}
+enum { MANY = 1 << 22 };
+static void many_hard_rows(hid_t f)
+{
+    const double one = 1;
+    const int zero = 0;
+    drop(f, "/fclib_global/G"), put_int(f, "/fclib_global/G/m", DOFS), put_int(f, "/fclib_global/G/n", MANY);
+    put_int(f, "/fclib_global/G/nz", 1), put_ints(f, "/fclib_global/G/i", 1, &zero);
+    put_ints(f, "/fclib_global/G/p", 1, &zero), put_reals(f, "/fclib_global/G/x", 1, &one);
+    put_zeros(f, "/fclib_global/vectors/b", MANY);
+}
+static void few_contacts_in_H(hid_t f) { replace_int(f, "/fclib_global/H/nz", 0); }
+static void few_entries_in_M(hid_t f) { replace_int(f, "/fclib_global/M/nz", 17); }
+
 static void external_link(hid_t f)
 {
     drop(f, "/fclib_global/vectors/f");
@@ -800,6 +907,15 @@ static const struct {
     {unwritten, SADMM_ERROR_IO, "only 0 bytes"},
     {terabytes, SADMM_ERROR_IO, "announces 1099511627776 values"},
     {terabytes_unwritten, SADMM_ERROR_IO, "announces 1099511627776 values"},
+    {huge_chunk, SADMM_ERROR_IO, "vectors/f: announces 268435456 values, but only 64 bytes"},
+    {wide_numbers, SADMM_ERROR_IO, "vectors/mu: numbers of 1048576 bytes: must be of 16 at most"},
+    {strings, SADMM_ERROR_IO, "vectors/mu: must hold floating point"},
+    {references, SADMM_ERROR_IO, "vectors/mu: must hold floating point"},
+    {group_cycle, SADMM_ERROR_IO, "vectors/f: cannot open as a dataset"},
+    {soft_cycle, SADMM_ERROR_IO, "/fclib_global/M/m: missing"},
+    {many_hard_rows, SADMM_ERROR_UNSUPPORTED, "G has 1 entries that are not 0, in 4194304 columns"},
+    {few_contacts_in_H, SADMM_ERROR_UNSUPPORTED, "H has 0 entries that are not 0, for 2 contacts"},
+    {few_entries_in_M, SADMM_ERROR_INVALID_ARGUMENT, "M has 17 entries that are not 0, 18 rows"},
     {external_link, SADMM_ERROR_IO, "vectors/f: missing"},
     {external_group, SADMM_ERROR_IO, "vectors/f: missing"},
     {external_data, SADMM_ERROR_IO, "another file"},
@@ -833,13 +949,41 @@ START_TEST(refuses_what_is_no_file)
     sadmm_problem *problem;
     write_file(path_of("text"), "not HDF5 at all\n", 16);
     write_file(path_of("empty"), "", 0);
-    const char *const paths[] = {path_of("text"), path_of("empty"), path_of("missing"), folder, ""};
-    for (size_t k = 0; k < sizeof paths / sizeof *paths; ++k) {
-        ck_assert_int_eq(sadmm_fclib_load(paths[k], &problem, &error), SADMM_ERROR_IO);
+    ck_assert_int_eq(mkfifo(path_of("pipe"), 0600), 0); /* nobody ever writes into it */
+    static const struct {
+        const char *name, *says;
+    } files[] = {{"text", "cannot open as HDF5"}, {"empty", "cannot open as HDF5"}, {"missing", "No such file"},
+                 {"", "is not a file"},           {"pipe", "is not a file"},        {"text/x", "Not a directory"}};
+    for (size_t k = 0; k < sizeof files / sizeof *files; ++k) {
+        ck_assert_int_eq(sadmm_fclib_load(path_of(files[k].name), &problem, &error), SADMM_ERROR_IO);
+        ck_assert_msg(strstr(error.message, files[k].says) != NULL, "'%s' does not say '%s'", error.message, files[k].says);
         ck_assert_ptr_null(problem);
     }
+    ck_assert_int_eq(sadmm_fclib_load("/dev/zero", &problem, &error), SADMM_ERROR_IO);
+    ck_assert_int_eq(sadmm_fclib_load("", &problem, &error), SADMM_ERROR_IO);
     ck_assert_int_eq(sadmm_fclib_load(NULL, &problem, &error), SADMM_ERROR_INVALID_ARGUMENT);
     ck_assert_int_eq(sadmm_fclib_load(path_of("text"), NULL, &error), SADMM_ERROR_INVALID_ARGUMENT);
+}
+END_TEST
+
+/* Other programs' files, and the first bytes of an HDF5 file before anything else. */
+START_TEST(refuses_foreign)
+{
+    static const char *const beginnings[] = {"\x89PNG\r\n\x1a\n", "\x1f\x8b\x08", "CDF\001", "\x0e\x03\x13\x01",
+                                             "PK\003\004", "\x7f" "ELF", "{\"steps\": 3}",
+                                             "\x89HDF\r\n\x1a\n"};
+    static char data[4096];
+    for (size_t k = 0; k < sizeof beginnings / sizeof *beginnings; ++k)
+        for (int fill = 0; fill < 256; fill += 51) {
+            struct sadmm_error error = {0};
+            sadmm_problem *problem;
+            memset(data, fill, sizeof data);
+            memcpy(data, beginnings[k], strlen(beginnings[k]));
+            write_file(path_of("foreign"), data, sizeof data);
+            ck_assert_int_eq(sadmm_fclib_load(path_of("foreign"), &problem, &error), SADMM_ERROR_IO);
+            ck_assert_msg(strstr(error.message, "cannot open as HDF5") != NULL, "%s", error.message);
+            ck_assert_ptr_null(problem);
+        }
 }
 END_TEST
 
@@ -961,6 +1105,7 @@ int main(void)
     tcase_add_test(tests, world_to_file);
     tcase_add_loop_test(tests, refuses_malformed, 0, REFUSAL_COUNT);
     tcase_add_test(tests, refuses_what_is_no_file);
+    tcase_add_test(tests, refuses_foreign);
     tcase_add_test(tests, refuses_truncated);
     tcase_add_test(tests, survives_damage);
     tcase_add_test(tests, restores_error_printing);

@@ -251,36 +251,29 @@ static sadmm_status check_same_sizes(hid_t file, const struct sadmm_global_solut
                       rows, columns, hard, 6 * s->bodies, 3 * s->contacts, s->hard_rows);
 }
 
-/* ---- files that appear whole or not at all ----------------------------------------------------------------------- */
+/* ---- files ------------------------------------------------------------------------------------------------------- */
 
-/* A name beside `path` that nobody uses, for sadmm_free. */
-static sadmm_status beside(const char *path, char **out, struct sadmm_error *error)
+/* HDF5 writes to files only. */
+static sadmm_status check_target(const char *path, struct sadmm_error *error)
 {
     struct stat info;
-    size_t size = strlen(path) + 48;
-    *out = NULL;
-    if (stat(path, &info) == 0 && !S_ISREG(info.st_mode))
-        return sadmm_fail(error, SADMM_ERROR_IO, "%.200s: exists and is not a file", path);
-    char *name = sadmm_alloc(size, 1);
-    if (!name) return sadmm_fail_memory(error, "a file name");
-    for (int attempt = 0; attempt < 100; ++attempt) {
-        snprintf(name, size, "%s.%ld-%d.part", path, (long)getpid(), attempt);
-        if (lstat(name, &info) != 0 && errno == ENOENT) {
-            *out = name;
-            return SADMM_OK;
-        }
-    }
-    sadmm_free(name);
-    return sadmm_fail(error, SADMM_ERROR_IO, "%.200s: cannot be written there", path);
+    if (stat(path, &info) != 0 || S_ISREG(info.st_mode)) return SADMM_OK;
+    return sadmm_fail(error, SADMM_ERROR_IO, "exists and is not a file");
 }
 
-static sadmm_status publish(char *temporary, const char *path, sadmm_status status, struct sadmm_error *error)
+/* Nothing is left of a file that could not be written. */
+static sadmm_status finish(const char *path, sadmm_status status)
 {
-    if (status == SADMM_OK && rename(temporary, path) != 0)
-        status = sadmm_fail(error, SADMM_ERROR_IO, "%.200s: %s", path, strerror(errno));
-    if (status != SADMM_OK) unlink(temporary);
-    sadmm_free(temporary);
+    if (status != SADMM_OK) unlink(path);
     return status;
+}
+
+static sadmm_status check_different(const char *source, const char *path, struct sadmm_error *error)
+{
+    struct stat from, to;
+    if (stat(source, &from) != 0) return sadmm_fail(error, SADMM_ERROR_IO, "%.200s: %s", source, strerror(errno));
+    if (stat(path, &to) != 0 || from.st_dev != to.st_dev || from.st_ino != to.st_ino) return SADMM_OK;
+    return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "path is source (%.200s): must be another file", source);
 }
 
 static sadmm_status copy_file(const char *from, const char *to, struct sadmm_error *error)
@@ -289,9 +282,9 @@ static sadmm_status copy_file(const char *from, const char *to, struct sadmm_err
     size_t count;
     FILE *in = fopen(from, "rb");
     if (!in) return sadmm_fail(error, SADMM_ERROR_IO, "%.200s: %s", from, strerror(errno));
-    FILE *out = fopen(to, "wbx");
+    FILE *out = fopen(to, "wb");
     if (!out) {
-        sadmm_fail(error, SADMM_ERROR_IO, "%.200s: %s", to, strerror(errno));
+        sadmm_fail(error, SADMM_ERROR_IO, "cannot create the file: %s", strerror(errno));
         fclose(in);
         return SADMM_ERROR_IO;
     }
@@ -300,7 +293,7 @@ static sadmm_status copy_file(const char *from, const char *to, struct sadmm_err
     if (ferror(in)) ok = false;
     fclose(in);
     if (fclose(out) != 0) ok = false;
-    return ok ? SADMM_OK : sadmm_fail(error, SADMM_ERROR_IO, "%.120s: copying to %.120s failed", from, to);
+    return ok ? SADMM_OK : sadmm_fail(error, SADMM_ERROR_IO, "%.200s: could not be copied", from);
 }
 
 /* Write what is not NULL into `file_name`: a new file, or (edit) the copy of a problem file. */
@@ -327,15 +320,11 @@ sadmm_status sadmm_fclib_save(const sadmm_problem *problem, const char *path, co
                               struct sadmm_error *error)
 {
     struct sadmm_global_problem global;
-    char *temporary;
     if (!problem || !path)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s is NULL", problem ? "path" : "problem");
     TRY(sadmm_global_from_problem(problem, &global, error));
-    sadmm_status status = beside(path, &temporary, error);
-    if (status == SADMM_OK) {
-        status = write_file(temporary, false, &global, title ? title : "", NULL, error);
-        status = publish(temporary, path, status, error);
-    }
+    sadmm_status status = check_target(path, error);
+    if (status == SADMM_OK) status = finish(path, write_file(path, false, &global, title ? title : "", NULL, error));
     sadmm_global_problem_free(&global);
     return status;
 }
@@ -345,16 +334,17 @@ sadmm_status sadmm_fclib_save_solution(const sadmm_problem *problem, const char 
 {
     struct sadmm_global_problem global = {0};
     struct sadmm_global_solution solution = {0};
-    char *temporary;
     if (!problem || !path)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s is NULL", problem ? "path" : "problem");
+    TRY(check_target(path, error));
+    if (source) TRY(check_different(source, path, error));
     sadmm_status status = sadmm_global_solution_from_problem(problem, &solution, error);
     if (status == SADMM_OK && !source) status = sadmm_global_from_problem(problem, &global, error);
-    if (status == SADMM_OK && (status = beside(path, &temporary, error)) == SADMM_OK) {
-        if (source) status = copy_file(source, temporary, error);
+    if (status == SADMM_OK) {
+        if (source) status = copy_file(source, path, error);
         if (status == SADMM_OK)
-            status = write_file(temporary, source != NULL, source ? NULL : &global, "", &solution, error);
-        status = publish(temporary, path, status, error);
+            status = write_file(path, source != NULL, source ? NULL : &global, "", &solution, error);
+        finish(path, status);
     }
     sadmm_global_problem_free(&global);
     sadmm_global_solution_free(&solution);

@@ -34,14 +34,14 @@ bool sadmm_fclib_available(void);
  * ranges), OUT_OF_MEMORY, UNAVAILABLE. */
 sadmm_status sadmm_fclib_load(const char *path, sadmm_problem **out, struct sadmm_error *error);
 
-/* Write a problem (not its current solution), with a title. The file appears complete or not at all, and replaces an
- * existing one. Errors: IO, UNSUPPORTED (soft blocks), OUT_OF_MEMORY, UNAVAILABLE. */
+/* Write a problem (not its current solution), with a title, over what is at `path`; a file that could not be written
+ * is removed. Errors: IO, UNSUPPORTED (soft blocks), OUT_OF_MEMORY, UNAVAILABLE. */
 sadmm_status sadmm_fclib_save(const sadmm_problem *problem, const char *path, const char *title,
                               struct sadmm_error *error);
 
 /* Write the problem's current (v, u, r, l) as /solution into `path`: a copy of `source` (the file the problem was
- * loaded from; all else in it is kept), or, when source is NULL, a new file with the problem itself. `source` may equal
- * `path`. Errors: those of load and save; IO when the sizes in `source` are not the problem's. */
+ * loaded from; all else in it is kept), or, when source is NULL, a new file with the problem itself. Errors: those of
+ * load and save; INVALID_ARGUMENT when both are one file; IO when the sizes in `source` are not the problem's. */
 sadmm_status sadmm_fclib_save_solution(const sadmm_problem *problem, const char *source, const char *path,
                                        struct sadmm_error *error);
 

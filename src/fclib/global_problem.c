@@ -292,15 +292,40 @@ static sadmm_status gather_blocks(const struct sadmm_global_problem *g, sadmm_pr
     return SADMM_OK;
 }
 
+static size_t count_nonzero(const struct sadmm_triplets *m)
+{
+    size_t count = 0;
+    for (size_t e = 0; e < m->count; ++e) count += m->value[e] != 0;
+    return count;
+}
+
+/* Before anything is allocated by the sizes: a matrix that has fewer entries than it must have is no reason to. */
+static sadmm_status check_counts(const struct sadmm_global_problem *g, struct sadmm_error *error)
+{
+    size_t M = count_nonzero(&g->M), H = count_nonzero(&g->H), G = count_nonzero(&g->G);
+    if (M < 6 * (size_t)g->bodies)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "M has %zu entries that are not 0, %d rows: must have one in each", M, 6 * g->bodies);
+    if (H < (size_t)g->contacts)
+        return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED,
+                          "H has %zu entries that are not 0, for %d contacts: some act on no body", H, g->contacts);
+    if (G < (size_t)g->hard_rows)
+        return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED,
+                          "G has %zu entries that are not 0, in %d columns: some act on no body", G, g->hard_rows);
+    return SADMM_OK;
+}
+
 sadmm_status sadmm_global_to_problem(const struct sadmm_global_problem *g, sadmm_problem **out,
                                      struct sadmm_error *error)
 {
     sadmm_problem *problem = NULL;
     *out = NULL;
+    sadmm_status status = check_counts(g, error);
+    if (status != SADMM_OK) return status;
     double *A = sadmm_alloc(36 * (size_t)g->bodies, sizeof *A);
     sadmm_problem_block *blocks = sadmm_alloc((size_t)g->contacts + (size_t)g->hard_rows, sizeof *blocks);
     int32_t count = 0;
-    sadmm_status status = A && blocks ? SADMM_OK : sadmm_fail_memory(error, "the blocks of a problem");
+    if (!A || !blocks) status = sadmm_fail_memory(error, "the blocks of a problem");
     if (status == SADMM_OK) status = gather_bodies(g, A, error);
     if (status == SADMM_OK) status = gather_blocks(g, blocks, &count, error);
     if (status == SADMM_OK) {

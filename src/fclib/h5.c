@@ -1,8 +1,10 @@
 #include "h5.h"
 
+#include <errno.h>
 #include <math.h>
 #include <pthread.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "core/base/memory.h"
 
@@ -40,9 +42,13 @@ static herr_t keep_first(unsigned depth, const H5E_error2_t *e, void *data)
 /* Fail with what HDF5 says was the innermost reason. Before any other call of HDF5: those forget it. */
 static sadmm_status fail_h5(struct sadmm_error *error, const char *name, const char *what)
 {
+    static const char system_says[] = "error message = '"; /* among the time, the file's name and more */
     const char *reason = NULL;
     H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keep_first, &reason);
-    sadmm_fail(error, SADMM_ERROR_IO, "%.140s: %s (%.100s)", name, what, reason ? reason : "no reason given by HDF5");
+    const char *system = reason ? strstr(reason, system_says) : NULL;
+    if (system) reason = system + strlen(system_says);
+    sadmm_fail(error, SADMM_ERROR_IO, "%.140s: %s (%.*s)", name, what, system ? (int)strcspn(reason, "'") : 100,
+               reason ? reason : "no reason given by HDF5");
     H5Eclear2(H5E_DEFAULT);
     return SADMM_ERROR_IO;
 }
@@ -51,18 +57,22 @@ static sadmm_status fail_h5(struct sadmm_error *error, const char *name, const c
 
 sadmm_status sadmm_h5_open(const char *path, enum sadmm_h5_mode mode, hid_t *file, struct sadmm_error *error)
 {
+    struct stat info;
+    /* HDF5 would wait for the other end of a pipe. */
+    if (mode != SADMM_H5_CREATE && stat(path, &info) != 0) return sadmm_fail(error, SADMM_ERROR_IO, "%s", strerror(errno));
+    if (mode != SADMM_H5_CREATE && !S_ISREG(info.st_mode)) return sadmm_fail(error, SADMM_ERROR_IO, "is not a file");
     hid_t access = H5Pcreate(H5P_FILE_ACCESS);
-    if (access < 0) return fail_h5(error, path, "no file access list");
+    if (access < 0) return fail_h5(error, "file", "no file access list");
     /* Closing the file closes what an error path left open in it. */
     H5Pset_fclose_degree(access, H5F_CLOSE_STRONG);
 #if H5_VERSION_GE(1, 10, 7) && !(H5_VERS_MAJOR == 1 && H5_VERS_MINOR == 12 && H5_VERS_RELEASE == 0)
     H5Pset_file_locking(access, true, true); /* file systems without locks are fine */
 #endif
-    if (mode == SADMM_H5_CREATE) *file = H5Fcreate(path, H5F_ACC_EXCL, H5P_DEFAULT, access);
+    if (mode == SADMM_H5_CREATE) *file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, access);
     else *file = H5Fopen(path, mode == SADMM_H5_EDIT ? H5F_ACC_RDWR : H5F_ACC_RDONLY, access);
     sadmm_status status = SADMM_OK;
     if (*file < 0)
-        status = fail_h5(error, path, mode == SADMM_H5_CREATE ? "cannot create the file" : "cannot open as HDF5");
+        status = fail_h5(error, "file", mode == SADMM_H5_CREATE ? "cannot create the file" : "cannot open as HDF5");
     H5Pclose(access);
     return status;
 }
@@ -114,8 +124,18 @@ bool sadmm_h5_exists(hid_t file, const char *name)
 
 /* ---- reading ----------------------------------------------------------------------------------------------------- */
 
-/* Deflate cannot shrink data by more than 1032 times; a header that promises more lies about the data's size. */
-enum { MOST_COMPRESSION = 1100 };
+/* Deflate cannot shrink data by more than 1032 times; a header that promises more lies about the data's size. No
+ * machine has numbers of more bytes. */
+enum { MOST_COMPRESSION = 1100, MOST_BYTES = 16, MOST_DIMENSIONS = 32 };
+
+/* The elements of a chunk: HDF5 unpacks whole ones, also where the dataset is smaller. 0: not in chunks. */
+static hsize_t chunk_elements(hid_t list, H5D_layout_t layout)
+{
+    hsize_t size[MOST_DIMENSIONS], count = 1;
+    int rank = layout == H5D_CHUNKED ? H5Pget_chunk(list, MOST_DIMENSIONS, size) : 0;
+    for (int k = 0; k < rank; ++k) count *= size[k]; /* below 2^32, which HDF5 checks */
+    return rank > 0 ? count : 0;
+}
 
 /* The elements of a dataset if it is one we read: plain numbers, stored in this file, written. -1 with a message. */
 static int64_t check_dataset(hid_t file, hid_t dataset, H5T_class_t class, const char *name, int64_t expected,
@@ -127,26 +147,30 @@ static int64_t check_dataset(hid_t file, hid_t dataset, H5T_class_t class, const
     H5D_layout_t layout = list >= 0 ? H5Pget_layout(list) : H5D_LAYOUT_ERROR;
     size_t size = type >= 0 ? H5Tget_size(type) : 0;
     int external = list >= 0 ? H5Pget_external_count(list) : -1;
+    hsize_t unpacked = list >= 0 ? chunk_elements(list, layout) : 0;
     H5T_class_t found = type >= 0 ? H5Tget_class(type) : H5T_NO_CLASS;
     H5Fget_filesize(file, &file_size);
     if (type >= 0) H5Tclose(type);
     if (space >= 0) H5Sclose(space);
     if (list >= 0) H5Pclose(list);
+    if (count > 0 && (hsize_t)count > unpacked) unpacked = (hsize_t)count;
 
     if (count < 0 || size == 0 || layout == H5D_LAYOUT_ERROR || external < 0) {
         fail_h5(error, name, "unreadable header");
     } else if (found != class) {
         sadmm_fail(error, SADMM_ERROR_IO, "%s: must hold %s", name,
                    class == H5T_FLOAT ? "floating point numbers" : "integers");
+    } else if (size > MOST_BYTES) {
+        sadmm_fail(error, SADMM_ERROR_IO, "%s: numbers of %zu bytes: must be of %d at most", name, size, MOST_BYTES);
     } else if (external > 0 || layout == H5D_VIRTUAL) {
         sadmm_fail(error, SADMM_ERROR_IO, "%s: its data is in another file, which is not read", name);
     } else if (expected >= 0 && count != expected) {
         sadmm_fail(error, SADMM_ERROR_IO, "%s: holds %lld values, %lld expected", name, (long long)count,
                    (long long)expected);
     } else if (stored > file_size || (stored == 0 && count > 0) ||
-               (hsize_t)count / MOST_COMPRESSION > stored / size + 1) {
-        sadmm_fail(error, SADMM_ERROR_IO, "%s: announces %lld values, but only %llu bytes of data are in the file",
-                   name, (long long)count, (unsigned long long)stored);
+               (count > 0 && unpacked / MOST_COMPRESSION > stored / size + 1)) {
+        sadmm_fail(error, SADMM_ERROR_IO, "%s: announces %llu values, but only %llu bytes of data are in the file",
+                   name, (unsigned long long)unpacked, (unsigned long long)stored);
     } else {
         return (int64_t)count;
     }

@@ -19,6 +19,7 @@ void sadmm_h5_end(const struct sadmm_h5_session *session);
 
 enum sadmm_h5_mode { SADMM_H5_READ, SADMM_H5_EDIT, SADMM_H5_CREATE };
 
+/* CREATE writes over what is there. Errors: IO. */
 sadmm_status sadmm_h5_open(const char *path, enum sadmm_h5_mode mode, hid_t *file, struct sadmm_error *error);
 /* Errors: IO when what was written could not be flushed. */
 sadmm_status sadmm_h5_close(hid_t file, struct sadmm_error *error);
