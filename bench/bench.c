@@ -8,6 +8,8 @@
 #endif
 
 #include "bench.h"
+#include "cli/interrupt.h"
+#include "cli/output.h"
 #include "core/base/clock.h"
 #include "core/solve/schedule.h"
 
@@ -27,28 +29,45 @@ static void usage(FILE *out)
     fprintf(out, "usage: subadmm-bench COMMAND [options]\n\n");
     for (size_t k = 0; k < sizeof commands / sizeof *commands; ++k)
         fprintf(out, "  %-11s %s\n", commands[k].name, commands[k].description);
-    fprintf(out, "\nsubadmm-bench COMMAND --help lists the options of one.\n");
+    fprintf(out, "\nsubadmm-bench help COMMAND lists the options of one.\n"
+                 "Exit status: 0 done; 1 something failed or could not be written; 2 wrong usage; 130 or 143:\n"
+                 "interrupted (SIGINT, SIGTERM), with what was measured until then.\n");
 }
 
-int main(int argc, char **argv)
+static bool asks_for_help(const char *text)
 {
-    if (argc >= 2 && (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h"))) {
+    return !strcmp(text, "help") || !strcmp(text, "--help") || !strcmp(text, "-h");
+}
+
+static int run_command(int argc, char **argv)
+{
+    static char option[] = "--help";
+    if (argc > 2 && asks_for_help(argv[1]) && !asks_for_help(argv[2])) /* help COMMAND: COMMAND --help */
+        return run_command(3, (char *[]){argv[0], argv[2], option, NULL});
+    if (argc >= 2 && asks_for_help(argv[1])) {
         usage(stdout);
         return 0;
     }
     for (size_t k = 0; argc >= 2 && k < sizeof commands / sizeof *commands; ++k)
-        if (!strcmp(argv[1], commands[k].name)) return commands[k].run(argc - 1, argv + 1);
+        if (!strcmp(argv[1], commands[k].name)) {
+            char name[64]; /* getopt's messages begin with it */
+            snprintf(name, sizeof name, "subadmm-bench %s", commands[k].name);
+            argv[1] = name;
+            return commands[k].run(argc - 1, argv + 1);
+        }
     if (argc >= 2) fprintf(stderr, "subadmm-bench: unknown command \"%s\"\n", argv[1]);
     usage(stderr);
     return 2;
 }
 
-bool bench_write_json(json_t *json, const char *path)
+int main(int argc, char **argv)
 {
-    int failed = strcmp(path, "-") ? json_dump_file(json, path, JSON_INDENT(2)) : json_dumpf(json, stdout, JSON_INDENT(2));
-    if (!strcmp(path, "-")) putchar('\n');
-    if (failed) fprintf(stderr, "subadmm-bench: cannot write %s\n", path);
-    return !failed;
+    outputs_begin("subadmm-bench");
+    interrupts_expect(); /* all of them look */
+    interrupts_begin();
+    int code = outputs_end(run_command(argc, argv));
+    if (interrupted()) fprintf(stderr, "subadmm-bench: interrupted\n");
+    return interrupted_status(code);
 }
 
 int bench_compare_doubles(const void *a, const void *b)

@@ -4,17 +4,12 @@
 
 #include <stdbool.h>
 
-#include <jansson.h>
-
 #include "subadmm/settings.h"
 
 int bench_kernels(int argc, char **argv);
 int bench_scaling(int argc, char **argv);
 int bench_convergence(int argc, char **argv);
 int bench_stand(int argc, char **argv);
-
-/* Write to a file, or to standard output for "-"; false (with a message on standard error) when that fails. */
-bool bench_write_json(json_t *json, const char *path);
 
 /* Measured bandwidth of memory with that many threads, GB/s (copy, read + write counted). */
 double bench_memory_bandwidth(int threads);

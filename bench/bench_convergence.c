@@ -1,13 +1,14 @@
 /* subadmm-bench convergence: how many iterations, and how much time, each method takes to a tolerance on a set of cold
  * problems, and how far from the solution a scene's steps are when they do few. docs/convergence.md says how to read
  * it; bench/convergence.sh regenerates its tables, bench/plot_convergence.py draws the CSV. */
-#include <errno.h>
 #include <getopt.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "bench.h"
 #include "bench_options.h"
+#include "cli/interrupt.h"
+#include "cli/output.h"
 #include "cold_convergence.h"
 #include "scenes/scenes.h"
 #include "warm_convergence.h"
@@ -78,7 +79,7 @@ static void measure_problem(struct bench *b, struct set_problem *problem)
     struct sadmm_error error = {SADMM_OK, ""};
     struct cold_plan plan = {(int)b->o->limit, b->o->quick ? 1 : 20};
     for (int method = 0; method < SADMM_METHOD_COUNT; ++method) {
-        if (!wanted_method(b->o, method)) continue;
+        if (!wanted_method(b->o, method) || interrupted()) continue;
         progress(b, problem->name, method);
         report(b, problem->name, cold_convergence(problem, (sadmm_method)method, &b->series, &plan, b->rows, &error),
                &error);
@@ -90,14 +91,14 @@ static void measure_cold(struct bench *b)
 {
     struct sadmm_error error = {SADMM_OK, ""};
     struct set_problem problem;
-    for (size_t k = 0; k < problem_set_count(); ++k) {
+    for (size_t k = 0; k < problem_set_count() && !interrupted(); ++k) {
         if (b->o->problem ? !strstr(problem_set_name(k), b->o->problem) : b->o->quick && !problem_set_quick(k))
             continue;
         sadmm_status status = problem_set_make(k, &problem, &error);
         report(b, problem_set_name(k), status, &error);
         if (status == SADMM_OK) measure_problem(b, &problem);
     }
-    for (int k = 0; k < b->o->file_count; ++k) {
+    for (int k = 0; k < b->o->file_count && !interrupted(); ++k) {
         sadmm_status status = problem_set_load(b->o->files[k], &problem, &error);
         report(b, b->o->files[k], status, &error);
         if (status == SADMM_OK) measure_problem(b, &problem);
@@ -113,7 +114,7 @@ static void measure_scene(struct bench *b, const char *spec, double seconds, dou
                              .seconds = b->o->seconds > 0 ? b->o->seconds : seconds};
     for (int k = 0; k < b->o->budget_count; ++k)
         for (int method = 0; method < SADMM_METHOD_COUNT; ++method) {
-            if (!wanted_method(b->o, method)) continue;
+            if (!wanted_method(b->o, method) || interrupted()) continue;
             plan.iterations = (int)b->o->budgets[k];
             progress(b, spec, method);
             report(b, spec,
@@ -134,7 +135,7 @@ static void measure_series(struct bench *b)
 {
     if (b->o->cold) measure_cold(b);
     if (b->o->warm) measure_warm(b);
-    FILE *out = b->rows->csv == stdout ? stderr : stdout;
+    FILE *out = outputs_on_stdout() ? stderr : stdout;
     rows_print_cold(b->rows, &b->series, out);
     rows_print_warm(b->rows, &b->series, out);
     fflush(out);
@@ -152,7 +153,7 @@ static void measure_backend(struct bench *b, sadmm_backend backend, sadmm_precis
     }
     b->series = (struct series){.backend = backend, .precision = precision, .threads = 1};
     bench_runs_on(backend, b->series.runs_on, sizeof b->series.runs_on);
-    for (int t = 0; t < (backend == SADMM_BACKEND_CPU ? b->o->thread_count : 1); ++t) {
+    for (int t = 0; t < (backend == SADMM_BACKEND_CPU ? b->o->thread_count : 1) && !interrupted(); ++t) {
         if (backend == SADMM_BACKEND_CPU) b->series.threads = (int)b->o->threads[t];
         measure_series(b);
     }
@@ -307,21 +308,17 @@ int bench_convergence(int argc, char **argv)
     if (status) return status < 0 ? 0 : status;
     struct rows rows = {0};
     struct bench b = {.o = &o, .rows = &rows};
-    bool to_stdout = o.csv && !strcmp(o.csv, "-");
-    if (o.csv && !(rows.csv = to_stdout ? stdout : fopen(o.csv, "w"))) {
-        fprintf(stderr, "subadmm-bench %s: cannot write %s: %s\n", command, o.csv, strerror(errno));
-        return 1;
-    }
-    if (rows.csv) rows_write_header(rows.csv);
+    struct output *csv = NULL;
+    for (int k = 0; k < o.file_count; ++k) outputs_protect(o.files[k]);
+    if (o.csv && (status = output_open("--csv", o.csv, OUTPUT_STREAM, &csv)) != 0) return status;
+    if (csv) rows_write_header(rows.csv = output_stream(csv));
     for (int precision = SADMM_F32; precision <= SADMM_F64; ++precision) {
         if (o.precision >= 0 && o.precision != precision) continue;
         for (size_t k = 0; k < sizeof order / sizeof *order; ++k)
             if (o.backend == SADMM_BACKEND_AUTO ? order[k] != SADMM_BACKEND_REF : order[k] == o.backend)
                 measure_backend(&b, order[k], (sadmm_precision)precision);
     }
-    bool written = !rows.csv || !ferror(rows.csv);
-    if (rows.csv && !to_stdout && fclose(rows.csv)) written = false;
-    if (!written) fprintf(stderr, "subadmm-bench %s: cannot write %s\n", command, o.csv);
+    status = output_close(csv);
     rows_free(&rows);
-    return b.failed || !written ? 1 : 0;
+    return b.failed ? 1 : status;
 }

@@ -1,6 +1,7 @@
 /* subadmm-bench kernels: the cost of one iteration (Step 1 included) per contact, and how much of memory's bandwidth it
  * uses. The problem is the lattice of lattice.h; the solve is checked by its certificate, printed beside the time. */
 #include <getopt.h>
+#include <jansson.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,6 +9,8 @@
 
 #include "bench.h"
 #include "bench_options.h"
+#include "cli/interrupt.h"
+#include "cli/output.h"
 #include "core/base/clock.h"
 #include "core/solve/certificate.h"
 #include "core/solve/schedule.h"
@@ -87,13 +90,13 @@ static sadmm_status measure(const struct sadmm_kernels *k, struct sadmm_context 
     if (batch < 10) batch = 10;
     if (batch > 100000) batch = 100000;
     begin = sadmm_clock_ms();
-    while (status == SADMM_OK && batches < MAX_BATCHES && (batches < 3 || sadmm_clock_ms() - begin < seconds * 1e3)) {
+    while (status == SADMM_OK && !interrupted() && batches < MAX_BATCHES && (batches < 3 || sadmm_clock_ms() - begin < seconds * 1e3)) {
         double start = sadmm_clock_ms();
         status = iterate(k, c, batch, beta, error);
         times[batches++] = (sadmm_clock_ms() - start) / batch;
         row->iterations += batch;
     }
-    if (status != SADMM_OK) return status;
+    if (status != SADMM_OK || batches == 0) return status;
     row->iterations += 4;
     qsort(times, (size_t)batches, sizeof *times, bench_compare_doubles);
     double median = times[batches / 2];
@@ -212,10 +215,12 @@ int bench_kernels(int argc, char **argv)
     };
     int status = parse(argc, argv, &o);
     if (status) return status < 0 ? 0 : status;
-    bool quiet = o.json && !strcmp(o.json, "-");
+    struct output *json = NULL;
+    if (o.json && (status = output_open("--json", o.json, OUTPUT_STREAM, &json)) != 0) return status;
+    bool quiet = outputs_on_stdout();
     json_t *rows = json_array(), *bandwidths = json_array();
     double bandwidth[BENCH_LIST];
-    for (int t = 0; t < o.thread_count; ++t) {
+    for (int t = 0; t < o.thread_count && !interrupted(); ++t) {
         bandwidth[t] = bench_memory_bandwidth(o.threads[t]);
         json_array_append_new(bandwidths, json_pack("{s:i, s:f}", "threads", o.threads[t], "gb_per_s", bandwidth[t]));
         if (!quiet) printf("memory, %d thread%s: %.1f GB/s (copy)\n", o.threads[t], o.threads[t] == 1 ? "" : "s", bandwidth[t]);
@@ -223,7 +228,7 @@ int bench_kernels(int argc, char **argv)
     if (!quiet)
         printf("%-5s %-8s %-4s %7s %9s %11s %8s %7s %10s\n", "", "variant", "", "threads", "contacts", "ns/cont/it", "GB/s",
                "of mem", "ncp_max");
-    for (int size = 0; size < o.contact_count && status == 0; ++size) {
+    for (int size = 0; size < o.contact_count && status == 0 && !interrupted(); ++size) {
         struct lattice lattice;
         if (!lattice_create(&lattice, o.contacts[size])) {
             fprintf(stderr, "subadmm-bench kernels: out of memory at %ld contacts\n", o.contacts[size]);
@@ -231,7 +236,7 @@ int bench_kernels(int argc, char **argv)
             break;
         }
         const struct sadmm_kernels *k;
-        for (size_t index = 0; (k = sadmm_kernels_at(index)) != NULL && status == 0; ++index) {
+        for (size_t index = 0; (k = sadmm_kernels_at(index)) != NULL && status == 0 && !interrupted(); ++index) {
             if (o.backend != SADMM_BACKEND_AUTO && k->backend != o.backend) continue;
             if (o.precision >= 0 && (int)k->precision != o.precision) continue;
             if (o.method == SADMM_METHOD_FAST && !k->update_weights) continue;
@@ -247,6 +252,7 @@ int bench_kernels(int argc, char **argv)
                     status = 1;
                     break;
                 }
+                if (interrupted()) break;
                 row.share = k->backend == SADMM_BACKEND_CUDA ? 0 : row.gb_per_s / bandwidth[t];
                 if (!quiet) {
                     printf("%-5s %-8s %-4s %7d %9ld %11.2f %8.2f %6.0f%% %10.1e\n", row.name, row.variant,
@@ -259,10 +265,20 @@ int bench_kernels(int argc, char **argv)
         }
         lattice_destroy(&lattice);
     }
-    json_t *document = json_pack("{s:s, s:s, s:s, s:s, s:o, s:o}", "bench", "kernels", "method",
-                                 o.method == SADMM_METHOD_FAST ? "fast" : "paper", "commit", sadmm_build_commit(),
+    json_t *document = json_pack("{s:s, s:s, s:b, s:s, s:s, s:o, s:o}", "bench", "kernels", "method",
+                                 o.method == SADMM_METHOD_FAST ? "fast" : "paper", "interrupted", interrupted() != 0, "commit", sadmm_build_commit(),
                                  "compiler", sadmm_build_compiler(), "memory", bandwidths, "rows", rows);
-    if (status == 0 && o.json && !bench_write_json(document, o.json)) status = 1;
+    if (status == 0 && json) {
+        FILE *stream = output_stream(json);
+        bool complete = json_dumpf(document, stream, JSON_INDENT(2)) == 0;
+        putc('\n', stream);
+        if (complete || ferror(stream)) {
+            status = output_close(json);
+        } else {
+            fprintf(stderr, "subadmm-bench kernels: out of memory for the JSON\n");
+            status = 1;
+        }
+    }
     json_decref(document);
     return status;
 }

@@ -1,7 +1,6 @@
 /* subadmm-bench scaling: whole steps of a scene that grows, on the CPU by threads and on the GPU. Times come from steps
  * without a certificate; the errors beside them from further steps of the same run with it. A size that would take too
  * long is left out, and the row says so. bench/plot_scaling.py draws the CSV. */
-#include <errno.h>
 #include <getopt.h>
 #include <inttypes.h>
 #include <stdio.h>
@@ -10,6 +9,8 @@
 
 #include "bench.h"
 #include "bench_options.h"
+#include "cli/interrupt.h"
+#include "cli/output.h"
 #include "scene_timing.h"
 
 static const char command[] = "scaling";
@@ -42,9 +43,9 @@ struct row {
     char status[SADMM_MESSAGE_SIZE]; /* "ok", "skipped: why" or "failed: why" */
 };
 
-/* ---- output ---------------------------------------------------------------------------------------------------- */
+/* ---- the rows ---------------------------------------------------------------------------------------------------- */
 
-struct output {
+struct sinks {
     FILE *table; /* NULL: not wanted */
     FILE *csv;
 };
@@ -65,7 +66,7 @@ static void write_text(FILE *out, const char *text)
     putc('"', out);
 }
 
-static void write_header(const struct output *out, const struct options *o)
+static void write_header(const struct sinks *out, const struct options *o)
 {
     if (out->csv)
         fputs(
@@ -102,13 +103,13 @@ static void write_csv(FILE *out, const struct row *row)
     putc('\n', out);
 }
 
-static void write_row(const struct output *out, const struct row *row)
+static void write_row(const struct sinks *out, const struct row *row)
 {
     const struct scene_timing *t = &row->timing;
     const struct series *s = row->series;
     if (out->csv) {
         write_csv(out->csv, row);
-        fflush(out->csv); /* a run that is broken off leaves what it measured */
+        fflush(out->csv); /* for who watches */
     }
     if (!out->table) return;
     fprintf(out->table, "%-24s %-5s %4d %-4s ", row->scene, backend_name(s->backend), s->threads,
@@ -128,7 +129,7 @@ static void write_row(const struct output *out, const struct row *row)
 /* ---- rows ------------------------------------------------------------------------------------------------------ */
 
 /* False: something failed (what is skipped has not failed). */
-static bool run_row(const struct options *o, struct series *s, long size, const struct output *out)
+static bool run_row(const struct options *o, struct series *s, long size, const struct sinks *out)
 {
     struct scene_timing_plan plan = {(int)o->warm_up, (int)o->steps, (int)o->certified, o->max_seconds};
     struct sadmm_scene scene;
@@ -163,19 +164,19 @@ static bool run_row(const struct options *o, struct series *s, long size, const 
             s->least_s = row.timing.build_s + step_s * (double)(o->warm_up + 1 + o->certified);
         }
     }
-    write_row(out, &row);
-    return status == SADMM_OK;
+    if (!interrupted()) write_row(out, &row);
+    return status == SADMM_OK && !(out->csv && ferror(out->csv));
 }
 
-static bool run_series(const struct options *o, struct series *s, const struct output *out)
+static bool run_series(const struct options *o, struct series *s, const struct sinks *out)
 {
     bool good = true;
-    for (int k = 0; k < o->size_count; ++k)
+    for (int k = 0; k < o->size_count && !interrupted(); ++k)
         if (!run_row(o, s, o->sizes[k], out)) good = false;
     return good;
 }
 
-static bool run_cpu(const struct options *o, sadmm_precision precision, const struct output *out, FILE *notes)
+static bool run_cpu(const struct options *o, sadmm_precision precision, const struct sinks *out, FILE *notes)
 {
     struct series s = {.backend = SADMM_BACKEND_CPU, .precision = precision};
     int most = bench_machine_threads();
@@ -195,7 +196,7 @@ static bool run_cpu(const struct options *o, sadmm_precision precision, const st
 
 /* False: not available although asked for by name, or something failed. */
 static bool run_backend(const struct options *o, sadmm_backend backend, sadmm_precision precision,
-                        const struct output *out, FILE *notes)
+                        const struct sinks *out, FILE *notes)
 {
     sadmm_backend_info info;
     if (sadmm_backend_query(backend, &info) != SADMM_OK) return false;
@@ -339,26 +340,18 @@ int bench_scaling(int argc, char **argv)
     static const sadmm_backend order[] = {SADMM_BACKEND_REF, SADMM_BACKEND_CPU, SADMM_BACKEND_CUDA};
     int status = parse(argc, argv, &o);
     if (status) return status < 0 ? 0 : status;
-    bool to_stdout = o.csv && !strcmp(o.csv, "-");
-    struct output out = {.table = to_stdout ? NULL : stdout, .csv = to_stdout ? stdout : NULL};
-    if (o.csv && !to_stdout && !(out.csv = fopen(o.csv, "w"))) {
-        fprintf(stderr, "subadmm-bench %s: cannot write %s: %s\n", command, o.csv, strerror(errno));
-        return 1;
-    }
+    struct output *csv = NULL;
+    if (o.csv && (status = output_open("--csv", o.csv, OUTPUT_STREAM, &csv)) != 0) return status;
+    struct sinks out = {.table = outputs_on_stdout() ? NULL : stdout, .csv = csv ? output_stream(csv) : NULL};
     write_header(&out, &o);
     for (int precision = SADMM_F32; precision <= SADMM_F64; ++precision) {
         if (o.precision >= 0 && o.precision != precision) continue;
         for (size_t k = 0; k < sizeof order / sizeof *order; ++k) {
             bool wanted = o.backend == SADMM_BACKEND_AUTO ? order[k] != SADMM_BACKEND_REF : order[k] == o.backend;
-            if (wanted && !run_backend(&o, order[k], (sadmm_precision)precision, &out, to_stdout ? stderr : stdout))
+            if (wanted && !run_backend(&o, order[k], (sadmm_precision)precision, &out, out.table ? out.table : stderr))
                 status = 1;
         }
     }
-    bool written = !out.csv || !ferror(out.csv);
-    if (out.csv && !to_stdout && fclose(out.csv)) written = false;
-    if (!written) {
-        fprintf(stderr, "subadmm-bench %s: cannot write %s\n", command, o.csv);
-        status = 1;
-    }
-    return status;
+    int written = output_close(csv);
+    return status ? status : written;
 }

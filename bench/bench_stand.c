@@ -8,6 +8,7 @@
 
 #include "bench.h"
 #include "bench_options.h"
+#include "cli/interrupt.h"
 #include "core/base/clock.h"
 #include "core/base/memory.h"
 #include "core/solve/schedule.h"
@@ -122,7 +123,7 @@ static sadmm_status run(struct stand *s, const struct options *o)
     }
     if (!room) return sadmm_fail_memory(&s->error, "the times");
     TRY(remember(s));
-    while (s->done < o->steps) {
+    while (s->done < o->steps && !(interrupted() && s->done > 0)) {
         TRY(step(s));
         if (s->done % 100 == 0) TRY(measure_drift(s));
     }

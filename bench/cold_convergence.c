@@ -2,6 +2,7 @@
 
 #include <math.h>
 
+#include "cli/interrupt.h"
 #include "core/base/clock.h"
 #include "core/solve/schedule.h"
 
@@ -131,14 +132,14 @@ sadmm_status cold_convergence(const struct set_problem *problem, sadmm_method me
     row.contacts = sadmm_problem_contact_count(problem->problem);
     row.blocks = sadmm_problem_block_count(problem->problem);
     row.limit = plan->limit;
-    for (int k = 1; k <= plan->limit && count < MOST_SAMPLES; k = next_sample(k, density), ++count) {
+    for (int k = 1; k <= plan->limit && count < MOST_SAMPLES && !interrupted(); k = next_sample(k, density), ++count) {
         TRY(solve(&c, k, &samples[count]));
         if (!is_curve_point(k)) continue;
         TRY(time_solve(&c, &samples[count]));
         TRY(add(&c, rows, &row, &samples[count]));
     }
     row.kind = ROW_COUNT;
-    for (size_t t = 0; t < sizeof tolerances / sizeof *tolerances; ++t) {
+    for (size_t t = 0; t < sizeof tolerances / sizeof *tolerances && !interrupted(); ++t) {
         int first = count; /* of those that stay below */
         while (first > 0 && below(&samples[first - 1], tolerances[t])) --first;
         struct sample reached = first < count ? samples[first] : (struct sample){0, NAN, NAN, NAN, NAN};

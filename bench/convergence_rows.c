@@ -86,7 +86,7 @@ static void write_row(FILE *out, const struct row *r)
     fprintf(out, ",%s,", sadmm_build_commit());
     write_text(out, r->status);
     putc('\n', out);
-    fflush(out); /* a run that is broken off leaves what it measured */
+    fflush(out); /* for who watches */
 }
 
 bool rows_add(struct rows *rows, const struct row *row)

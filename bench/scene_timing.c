@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "bench.h"
+#include "cli/interrupt.h"
 #include "core/base/clock.h"
 #include "core/solve/schedule.h"
 
@@ -35,7 +36,7 @@ static sadmm_status step(struct stopwatch *w, sadmm_step_report *report, struct 
 
 static bool time_is_over(const struct stopwatch *w, double seconds)
 {
-    return sadmm_clock_ms() - w->begin > 1e3 * seconds;
+    return interrupted() || sadmm_clock_ms() - w->begin > 1e3 * seconds;
 }
 
 static double median(double *values, int count)
@@ -72,7 +73,7 @@ static sadmm_status certify_steps(struct stopwatch *w, int count, struct sadmm_e
     sadmm_step_report report;
     settings.certify = true;
     sadmm_status status = fail(w->world, sadmm_world_set_settings(w->world, &settings), error);
-    for (; w->timing->certified < count && status == SADMM_OK; ++w->timing->certified) {
+    for (; w->timing->certified < count && status == SADMM_OK && !interrupted(); ++w->timing->certified) {
         status = step(w, &report, error);
         if (status != SADMM_OK) break;
         w->timing->ncp_max = fmax(w->timing->ncp_max, report.certificate.ncp_max);

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "bench.h"
+#include "cli/interrupt.h"
 #include "core/base/clock.h"
 #include "core/math/quat.h"
 #include "core/base/memory.h"
@@ -161,7 +162,7 @@ static sadmm_status run(struct warm *w, const struct warm_plan *plan, struct row
     w->momentum = sadmm_alloc((size_t)w->steps, sizeof *w->momentum);
     w->ms = sadmm_alloc((size_t)w->steps, sizeof *w->ms);
     if (!w->ncp || !w->balanced || !w->momentum || !w->ms) return sadmm_fail_memory(w->error, "the steps");
-    while (w->done < w->steps) {
+    while (w->done < w->steps && !interrupted()) {
         sadmm_status status = step(w);
         if (status == SADMM_ERROR_NON_FINITE || status == SADMM_ERROR_LIMIT) {
             snprintf(row->status, sizeof row->status, "failed at step %d: %.250s", w->done + 1, w->error->message);
@@ -204,7 +205,7 @@ sadmm_status warm_convergence(const struct warm_plan *plan, sadmm_method method,
         row.bodies = report.bodies;
         row.contacts = report.contacts;
     }
-    if (status == SADMM_OK && !rows_add(rows, &row)) status = sadmm_fail_memory(error, "the rows");
+    if (status == SADMM_OK && !interrupted() && !rows_add(rows, &row)) status = sadmm_fail_memory(error, "the rows");
     sadmm_world_destroy(w.world);
     sadmm_free(w.bodies);
     sadmm_free(w.ncp);

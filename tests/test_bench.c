@@ -285,6 +285,9 @@ static const struct {
 } refused[] = {
     {"", "usage: subadmm-bench COMMAND"},
     {"fly", "unknown command \"fly\""},
+    {"scaling --fly", "subadmm-bench scaling: unrecognized option '--fly'"},
+    {"kernels --seconds", "subadmm-bench kernels: option '--seconds' requires an argument"},
+    {"stand -x", "subadmm-bench stand: invalid option -- 'x'"},
     {"scaling --sizes 0", "--sizes 0: must be up to 16 numbers"},
     {"scaling --sizes 10,x", "--sizes 10,x: must be"},
     {"scaling --sizes 200,100", "--sizes 200,100: must be ascending"},
@@ -334,11 +337,23 @@ START_TEST(stand_tells_what_stands)
 }
 END_TEST
 
-START_TEST(a_file_that_cannot_be_written)
+START_TEST(helps)
 {
+    static const struct {
+        const char *arguments, *says;
+    } asked[] = {
+        {"-h", "usage: subadmm-bench COMMAND"},         {"--help", "usage: subadmm-bench COMMAND"},
+        {"help", "usage: subadmm-bench COMMAND"},       {"help -h", "usage: subadmm-bench COMMAND"},
+        {"help scaling", "usage: subadmm-bench scaling"}, {"kernels -h", "usage: subadmm-bench kernels"},
+        {"--help stand", "usage: subadmm-bench stand"}, {"convergence --help", "usage: subadmm-bench convergence"},
+    };
     static char out[MAX_TEXT];
-    ck_assert_int_eq(run("scaling --sizes 10 --threads 1 --backend cpu --csv /nowhere/x.csv", out), 1);
-    ck_assert_msg(strstr(out, "cannot write /nowhere/x.csv"), "%s", out);
+    for (size_t k = 0; k < sizeof asked / sizeof *asked; ++k) {
+        int code = run(asked[k].arguments, out);
+        ck_assert_msg(code == 0 && strstr(out, asked[k].says), "subadmm-bench %s: exit code %d\n%s", asked[k].arguments,
+                      code, out);
+    }
+    ck_assert_int_eq(run("help fly", out), 2);
 }
 END_TEST
 
@@ -354,7 +369,7 @@ int main(void)
     tcase_add_test(cases, convergence_of_one_problem);
     tcase_add_test(cases, stand_tells_what_stands);
     tcase_add_loop_test(cases, bad_options_are_refused, 0, sizeof refused / sizeof *refused);
-    tcase_add_test(cases, a_file_that_cannot_be_written);
+    tcase_add_test(cases, helps);
     suite_add_tcase(suite, cases);
     return run_suite(suite);
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/base/memory.h"
+#include "interrupt.h"
 
 enum { STATE = 13 }; /* numbers of a body's state: check_reference.states */
 
@@ -166,7 +167,7 @@ static bool run_scene(const struct sadmm_scene *scene, sadmm_backend backend, sa
     own.def.precision = precision;
     if (sadmm_scene_build(&own, &world, error) != SADMM_OK) return false;
     bool ok = true;
-    for (long step = 0; ok && step < steps; ++step) {
+    for (long step = 0; ok && step < steps && !interrupted(); ++step) {
         if (sadmm_scene_before_step(&own, world, step, error) != SADMM_OK) ok = false;
         else if (sadmm_world_step(world) != SADMM_OK) ok = fail(error, "step", sadmm_world_message(world));
         else ok = visit(data, world, step, error);
@@ -268,7 +269,7 @@ bool check_table(const struct check_reference *r, sadmm_backend backend, sadmm_p
     sadmm_free(c.states);
     const sadmm_settings *settings = &r->scene->def.settings, one = once(settings);
     struct check_difference *d = difference;
-    for (size_t k = 0; ok && k < r->frozen_count; ++k) {
+    for (size_t k = 0; ok && k < r->frozen_count && !interrupted(); ++k) {
         const struct check_frozen *f = &r->frozen[k];
         ok = compare_frozen(f, &f->whole, settings, backend, precision, &d->step_velocity, &d->step_impulse, error) &&
              compare_frozen(f, &f->once, &one, backend, precision, &d->kernel_velocity, &d->kernel_impulse, error);

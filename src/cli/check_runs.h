@@ -47,7 +47,7 @@ struct check_difference {
     double kernel_velocity, kernel_impulse; /* the same after one iteration */
 };
 
-/* False with `error` filled. */
+/* False with `error` filled. An interrupt ends both of these early; what they give is then not to be used. */
 bool check_reference_make(struct check_reference *reference, const struct sadmm_scene *scene, long steps,
                           struct sadmm_error *error);
 void check_reference_free(struct check_reference *reference);

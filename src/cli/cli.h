@@ -10,9 +10,10 @@
 #include <stdio.h>
 
 #include "core/base/error.h"
+#include "output.h"
 #include "subadmm/subadmm.h"
 
-/* Exit codes. */
+/* Exit codes; an interrupted run has its own (interrupt.h). */
 enum { CLI_DONE = 0, CLI_FAILED = 1, CLI_USAGE = 2 };
 
 /* ---- subcommands and their options (options.c) ------------------------------------------------------------------- */
@@ -53,6 +54,9 @@ bool cli_read_backend(const char *option, const char *text, sadmm_backend *out);
 bool cli_read_precision(const char *option, const char *text, sadmm_precision *out);
 bool cli_read_method(const char *option, const char *text, sadmm_method *out);
 
+/* The name of an output, "-" where none is given. False when the option was given before: nothing is dropped in silence. */
+bool cli_read_output(const char *option, const char *text, const char **out);
+
 const char *cli_backend_name(sadmm_backend backend);
 const char *cli_precision_name(sadmm_precision precision);
 const char *cli_method_name(sadmm_method method);
@@ -71,7 +75,9 @@ json_t *cli_json_device(sadmm_backend backend);
 void cli_json_add_build(json_t *object);
 json_t *cli_json_settings(const sadmm_settings *settings);
 
-/* Write to a file, or to stdout for "-", and release `object`. Returns an exit code. */
-int cli_write_json(json_t *object, const char *destination);
+/* The output of --json; NULL where `name` is. Returns an exit code. */
+int cli_open_json(const char *name, struct output **output);
+/* Write, close the output and release `object`. Returns an exit code. */
+int cli_write_json(json_t *object, struct output *output);
 
 #endif

@@ -10,8 +10,7 @@ static const struct cli_option options[] = {
 static int set_option(void *target, size_t index, const char *value)
 {
     (void)index;
-    *(const char **)target = value ? value : "-";
-    return CLI_DONE;
+    return cli_read_output("--json", value, target) ? CLI_DONE : CLI_USAGE;
 }
 
 static json_t *backends_json(void)
@@ -35,9 +34,11 @@ static json_t *backends_json(void)
 
 static int run(int argc, char **argv)
 {
-    const char *json = NULL;
-    int code = cli_parse(&cli_backends, argc, argv, set_option, &json, NULL);
+    const char *name = NULL;
+    struct output *json;
+    int code = cli_parse(&cli_backends, argc, argv, set_option, &name, NULL);
     if (code >= 0) return code;
+    if ((code = cli_open_json(name, &json)) != CLI_DONE) return code;
     if (json) return cli_write_json(backends_json(), json);
     printf("%-8s %-5s %-5s %s\n", "backend", "f32", "f64", "");
     for (int k = SADMM_BACKEND_REF; k < SADMM_BACKEND_COUNT; ++k) {

@@ -1,9 +1,9 @@
 /* subadmm check: do all backends and precisions of this machine compute what the literal one computes? */
 #include <math.h>
-#include <string.h>
 
 #include "check_runs.h"
 #include "cli.h"
+#include "interrupt.h"
 
 enum { OPTION_STEPS, OPTION_METHOD, OPTION_ITERATIONS, OPTION_JSON, OPTION_QUIET };
 
@@ -33,7 +33,7 @@ static int set_option(void *target, size_t index, const char *value)
         o->method_given = true;
         break;
     case OPTION_ITERATIONS: ok = cli_read_int("--iterations", value, 1, 1000000, &o->iterations); break;
-    case OPTION_JSON: o->json = value ? value : "-"; break;
+    case OPTION_JSON: ok = cli_read_output("--json", value, &o->json); break;
     case OPTION_QUIET: o->quiet = true; break;
     }
     return ok ? CLI_DONE : CLI_USAGE;
@@ -106,12 +106,16 @@ static void compare(const struct check_reference *r, struct row *row)
         return;
     }
     row->tolerances = tolerances_of(row->precision, r);
-    if (!check_table(r, row->backend, row->precision, &row->difference, &error)) {
+    bool compared = check_table(r, row->backend, row->precision, &row->difference, &error);
+    if (interrupted()) { /* the reference, too, may be that of fewer steps */
+        row->verdict = SKIPPED;
+        snprintf(row->note, sizeof row->note, "interrupted");
+    } else if (!compared) {
         row->verdict = FAILED;
         snprintf(row->note, sizeof row->note, "%s", error.message);
-        return;
+    } else {
+        row->verdict = within(&row->difference, &row->tolerances) ? AGREES : DISAGREES;
     }
-    row->verdict = within(&row->difference, &row->tolerances) ? AGREES : DISAGREES;
 }
 
 /* ---- reports ----------------------------------------------------------------------------------------------------- */
@@ -198,6 +202,7 @@ static json_t *rows_json(const char *spec, const struct check_reference *r, cons
     json_object_set_new(root, "disagree", json_integer((json_int_t)count_rows(rows, count, DISAGREES)));
     json_object_set_new(root, "failed", json_integer((json_int_t)count_rows(rows, count, FAILED)));
     json_object_set_new(root, "skipped", json_integer((json_int_t)count_rows(rows, count, SKIPPED)));
+    json_object_set_new(root, "interrupted", json_boolean(interrupted() != 0));
     json_object_set_new(root, "tables", array);
     cli_json_add_build(root);
     return root;
@@ -205,12 +210,14 @@ static json_t *rows_json(const char *spec, const struct check_reference *r, cons
 
 /* ---- the command ------------------------------------------------------------------------------------------------- */
 
-static int check_scene(const struct check_options *o, const char *spec, const struct sadmm_scene *scene)
+static int check_scene(const struct check_options *o, const char *spec, const struct sadmm_scene *scene,
+                       struct output *json)
 {
     struct check_reference reference;
     struct sadmm_error error = {0};
     struct row rows[MOST_ROWS];
     size_t count = 0;
+    bool table = !o->quiet && !outputs_on_stdout();
     if (!check_reference_make(&reference, scene, o->steps, &error))
         return cli_error(CLI_FAILED, "%s with ref: %s", spec, error.message);
     for (int backend = SADMM_BACKEND_REF; backend < SADMM_BACKEND_COUNT; ++backend)
@@ -221,9 +228,9 @@ static int check_scene(const struct check_options *o, const char *spec, const st
         }
     bool ok = count_rows(rows, count, DISAGREES) + count_rows(rows, count, FAILED) == 0;
     int code = ok ? CLI_DONE : CLI_FAILED;
-    if (!o->quiet && !(o->json && strcmp(o->json, "-") == 0)) print_rows(spec, &reference, rows, count);
-    if (o->json) {
-        int written = cli_write_json(rows_json(spec, &reference, rows, count), o->json);
+    if (table) print_rows(spec, &reference, rows, count);
+    if (json) {
+        int written = cli_write_json(rows_json(spec, &reference, rows, count), json);
         if (code == CLI_DONE) code = written;
     }
     check_reference_free(&reference);
@@ -235,13 +242,16 @@ static int run(int argc, char **argv)
     struct check_options o = {.steps = 20};
     struct sadmm_scene scene;
     struct sadmm_error error = {0};
+    struct output *json;
     const char *spec;
     int code = cli_parse(&cli_check, argc, argv, set_option, &o, &spec);
     if (code >= 0) return code;
     if (sadmm_scene_open(spec, &scene, &error) != SADMM_OK) return cli_error(CLI_USAGE, "%s", error.message);
     if (o.method_given) sadmm_scene_set_method(&scene, o.method);
     if (o.iterations > 0) scene.def.settings.iterations = (int)o.iterations;
-    return check_scene(&o, spec, &scene);
+    interrupts_expect();
+    if ((code = cli_open_json(o.json, &json)) != CLI_DONE) return code;
+    return check_scene(&o, spec, &scene, json);
 }
 
 const struct cli_command cli_check = {

@@ -9,6 +9,7 @@
 #include "cli.h"
 #include "core/base/memory.h"
 #include "fclib/fclib.h"
+#include "interrupt.h"
 #include "run_record.h"
 #include "run_trace.h"
 
@@ -34,9 +35,17 @@ static const struct cli_option options[] = {
     [OPTION_CERTIFY] = {"certify", NULL, "measure the true error of every step"},
     [OPTION_EXPLAIN] = {"explain", NULL, "say what the last step ran, what it left out and why"},
     [OPTION_JSON] = {"json", "[FILE|-]", "write JSON to FILE, or to standard output (-, the default)"},
-    [OPTION_TRACE] = {"trace", "FILE", "write every body's state after every step as CSV"},
-    [OPTION_DUMP] = {"dump-problem", "STEP:FILE", "write the contact problem of a step (1 is the first) as FCLIB HDF5"},
+    [OPTION_TRACE] = {"trace", "FILE", "write every body's state after every step as CSV (-: to standard output)"},
+    [OPTION_DUMP] = {"dump-problem", "STEP:FILE", "write the contact problem of a step (1: the first) as FCLIB HDF5; up to 16"},
     [OPTION_QUIET] = {"quiet", NULL, "no progress, no table"},
+};
+
+enum { MOST_DUMPS = 16 };
+
+struct run_dump {
+    long step;
+    const char *path;
+    struct output *output;
 };
 
 struct run_options {
@@ -48,8 +57,9 @@ struct run_options {
     double dt, tolerance;                            /* 0: the scene's */
     long device;
     bool no_warm_start, certify, explain, quiet, precision_given, method_given;
-    const char *json, *trace, *dump_path;
-    long dump_step;
+    const char *json, *trace;
+    struct run_dump dumps[MOST_DUMPS];
+    size_t dump_count;
 };
 
 static bool read_dump(struct run_options *o, const char *value)
@@ -61,10 +71,15 @@ static bool read_dump(struct run_options *o, const char *value)
         cli_error(CLI_USAGE, "--dump-problem '%s': must be STEP:FILE", value);
         return false;
     }
+    if (o->dump_count == MOST_DUMPS) {
+        cli_error(CLI_USAGE, "--dump-problem '%s': must be one of %d at most", value, MOST_DUMPS);
+        return false;
+    }
+    struct run_dump *dump = &o->dumps[o->dump_count++];
     memcpy(step, value, length);
     step[length] = 0;
-    o->dump_path = colon + 1;
-    return cli_read_int("--dump-problem STEP", step, 1, LONG_MAX, &o->dump_step);
+    dump->path = colon + 1;
+    return cli_read_int("--dump-problem STEP", step, 1, LONG_MAX, &dump->step);
 }
 
 static int set_option(void *target, size_t index, const char *value)
@@ -92,8 +107,8 @@ static int set_option(void *target, size_t index, const char *value)
     case OPTION_NO_WARM_START: o->no_warm_start = true; break;
     case OPTION_CERTIFY: o->certify = true; break;
     case OPTION_EXPLAIN: o->explain = true; break;
-    case OPTION_JSON: o->json = value ? value : "-"; break;
-    case OPTION_TRACE: o->trace = value; break;
+    case OPTION_JSON: ok = cli_read_output("--json", value, &o->json); break;
+    case OPTION_TRACE: ok = cli_read_output("--trace", value, &o->trace); break;
     case OPTION_DUMP: ok = read_dump(o, value); break;
     case OPTION_QUIET: o->quiet = true; break;
     }
@@ -145,18 +160,35 @@ static void show_progress(struct progress *p, const struct run_record *record, l
 
 /* ---- the run ----------------------------------------------------------------------------------------------------- */
 
-static int dump_problem(const struct run_options *o, const char *spec, const sadmm_world *world)
+/* Errors are the run's: record->failure. */
+static int dump_problem(struct run_dump *dump, const char *spec, const sadmm_world *world, struct run_record *record)
 {
     char title[160];
     struct sadmm_error error = {0};
     sadmm_problem *problem = NULL;
-    snprintf(title, sizeof title, "%s, step %ld", spec, o->dump_step);
-    if (sadmm_problem_create(&problem) != SADMM_OK) return cli_error(CLI_FAILED, "%s", sadmm_last_message());
-    int code = CLI_DONE;
-    if (sadmm_world_freeze(world, problem) != SADMM_OK) code = cli_error(CLI_FAILED, "%s", sadmm_world_message(world));
-    else if (sadmm_fclib_save(problem, o->dump_path, title, &error) != SADMM_OK)
-        code = cli_error(CLI_FAILED, "%s", error.message);
+    snprintf(title, sizeof title, "%s, step %ld", spec, dump->step);
+    sadmm_status status = sadmm_problem_create(&problem);
+    if (status != SADMM_OK) sadmm_fail_memory(&error, "the problem of a step");
+    else if ((status = sadmm_world_freeze(world, problem)) != SADMM_OK)
+        sadmm_fail(&error, status, "%s", sadmm_world_message(world));
+    else status = sadmm_fclib_save(problem, output_path(dump->output), title, &error);
     sadmm_problem_destroy(problem);
+    if (status != SADMM_OK) {
+        snprintf(record->failure, sizeof record->failure, "--dump-problem %.80s: %.200s", dump->path, error.message);
+        return CLI_FAILED;
+    }
+    int code = output_close(dump->output);
+    if (code != CLI_DONE)
+        snprintf(record->failure, sizeof record->failure, "--dump-problem %.200s could not be written", dump->path);
+    return code;
+}
+
+static int dump_problems(struct run_options *o, long step, const char *spec, const sadmm_world *world,
+                         struct run_record *record)
+{
+    int code = CLI_DONE;
+    for (size_t k = 0; k < o->dump_count && code == CLI_DONE; ++k)
+        if (o->dumps[k].step == step) code = dump_problem(&o->dumps[k], spec, world, record);
     return code;
 }
 
@@ -168,14 +200,25 @@ static bool prepare_last_step(sadmm_world *world)
     return sadmm_world_set_settings(world, &s) == SADMM_OK;
 }
 
-static int step_all(const struct run_options *o, const char *spec, const struct sadmm_scene *scene, sadmm_world *world,
-                    struct run_record *record, FILE *trace)
+/* After a step, or before the first. */
+static int trace_step(struct run_record *record, const sadmm_world *world, double time, struct output *trace)
+{
+    if (!trace) return CLI_DONE;
+    FILE *stream = output_stream(trace);
+    if (!run_trace_step(stream, record, world, time)) return CLI_FAILED;
+    if (!ferror(stream)) return CLI_DONE;
+    snprintf(record->failure, sizeof record->failure, "step %zu: the trace could not be written", record->steps);
+    return CLI_FAILED;
+}
+
+static int step_all(struct run_options *o, const char *spec, const struct sadmm_scene *scene, sadmm_world *world,
+                    struct run_record *record, struct output *trace)
 {
     struct progress progress = {0};
     bool watched = !o->quiet && isatty(STDERR_FILENO);
-    int code = CLI_DONE;
-    if (trace && !run_trace_step(trace, record, world, 0)) code = CLI_FAILED;
-    for (long step = 0; code == CLI_DONE && step < o->steps; ++step) {
+    if (trace) run_trace_begin(output_stream(trace));
+    int code = trace_step(record, world, 0, trace);
+    for (long step = 0; code == CLI_DONE && step < o->steps && !interrupted(); ++step) {
         struct sadmm_error error = {0};
         if (sadmm_scene_before_step(scene, world, step, &error) != SADMM_OK) {
             snprintf(record->failure, sizeof record->failure, "%s", error.message);
@@ -183,11 +226,11 @@ static int step_all(const struct run_options *o, const char *spec, const struct 
         } else if ((step + 1 == o->steps && !prepare_last_step(world)) || sadmm_world_step(world) != SADMM_OK) {
             snprintf(record->failure, sizeof record->failure, "step %ld: %.280s", step + 1, sadmm_world_message(world));
             code = CLI_FAILED;
-        } else if (!run_record_step(record, world) ||
-                   (trace && !run_trace_step(trace, record, world, record->last.time))) {
+        } else if (!run_record_step(record, world)) {
             code = CLI_FAILED;
-        } else if (o->dump_path && step + 1 == o->dump_step) {
-            code = dump_problem(o, spec, world);
+        } else {
+            code = trace_step(record, world, record->last.time, trace);
+            if (code == CLI_DONE) code = dump_problems(o, step + 1, spec, world, record);
         }
         if (watched) show_progress(&progress, record, o->steps);
     }
@@ -195,38 +238,73 @@ static int step_all(const struct run_options *o, const char *spec, const struct 
     return code;
 }
 
-/* After the step; to stderr when standard output carries the JSON. */
-static void explain(const struct run_options *o, const sadmm_world *world)
+/* After the step; to stderr when standard output carries something else. */
+static void explain(const sadmm_world *world, FILE *out)
 {
     size_t size = sadmm_world_explain(world, NULL, 0) + 1;
     char *text = sadmm_alloc(size, 1);
     if (!text) return;
     sadmm_world_explain(world, text, size);
-    FILE *out = o->json && strcmp(o->json, "-") == 0 ? stderr : stdout;
     fprintf(out, "%s%s", text, size > 1 && text[size - 2] != '\n' ? "\n" : "");
     sadmm_free(text);
 }
 
-static int run_world(const struct run_options *o, const char *spec, const struct sadmm_scene *scene, sadmm_world *world)
+/* What was not reached is not written. */
+static void say_missing_dumps(const struct run_options *o, const struct run_record *record)
+{
+    for (size_t k = 0; k < o->dump_count; ++k)
+        if (o->dumps[k].step > (long)record->steps)
+            cli_error(CLI_FAILED, "--dump-problem %ld:%s: not written, the run ended after step %zu", o->dumps[k].step,
+                      o->dumps[k].path, record->steps);
+}
+
+static int run_world(struct run_options *o, const char *spec, const struct sadmm_scene *scene, sadmm_world *world,
+                     struct output *json, struct output *trace)
 {
     struct run_record record = {0};
-    FILE *trace = NULL;
+    bool mixed = outputs_on_stdout();
     int code = run_record_start(&record, world) ? CLI_DONE : CLI_FAILED;
-    if (code == CLI_DONE && o->trace && !(trace = run_trace_open(o->trace))) code = CLI_FAILED;
     if (code == CLI_DONE) {
         code = step_all(o, spec, scene, world, &record, trace);
         if (*record.failure) cli_error(CLI_FAILED, "%s", record.failure);
+        say_missing_dumps(o, &record);
         if (!run_record_finish(&record, world) || !record.finite) code = CLI_FAILED;
-        if (o->explain) explain(o, world);
-        if (!o->quiet && !(o->json && strcmp(o->json, "-") == 0)) run_record_print(&record, spec, scene);
-        if (o->json) {
-            int written = cli_write_json(run_record_json(&record, spec, scene), o->json);
-            if (code == CLI_DONE) code = written;
-        }
+        if (o->explain) explain(world, mixed ? stderr : stdout);
+        if (!o->quiet && !mixed) run_record_print(&record, spec, scene);
+        /* A step that failed ends the run: its trace is whole. */
+        int traced = output_close(trace);
+        int written = json ? cli_write_json(run_record_json(&record, spec, scene), json) : CLI_DONE;
+        if (code == CLI_DONE) code = traced != CLI_DONE ? traced : written;
     }
-    if (trace && !run_trace_close(trace, o->trace)) code = CLI_FAILED;
     run_record_free(&record);
     return code;
+}
+
+static int open_outputs(struct run_options *o, struct output **json, struct output **trace)
+{
+    struct sadmm_error error = {0};
+    *trace = NULL;
+    if (o->dump_count > 0 && !sadmm_fclib_available()) {
+        sadmm_fclib_save(NULL, NULL, NULL, &error);
+        return cli_error(CLI_FAILED, "--dump-problem: %s", error.message);
+    }
+    int code = cli_open_json(o->json, json);
+    if (code == CLI_DONE && o->trace) code = output_open("--trace", o->trace, OUTPUT_STREAM, trace);
+    for (size_t k = 0; k < o->dump_count && code == CLI_DONE; ++k)
+        code = output_open("--dump-problem", o->dumps[k].path, OUTPUT_FILE, &o->dumps[k].output);
+    return code;
+}
+
+static int check_options(const struct run_options *o, const struct sadmm_scene *scene)
+{
+    if (o->penalty_period >= 0 && scene->def.settings.method != SADMM_METHOD_PAPER)
+        return cli_error(CLI_USAGE, "--penalty-period %ld: takes --method paper, %s has no penalty updates",
+                         o->penalty_period, cli_method_name(scene->def.settings.method));
+    for (size_t k = 0; k < o->dump_count; ++k)
+        if (o->dumps[k].step > o->steps)
+            return cli_error(CLI_USAGE, "--dump-problem STEP %ld: must be in [1, %ld], the steps of this run",
+                             o->dumps[k].step, o->steps);
+    return CLI_DONE;
 }
 
 static int run(int argc, char **argv)
@@ -234,25 +312,19 @@ static int run(int argc, char **argv)
     struct run_options o = {.steps = -1, .iterations = -1, .penalty_period = -1, .threads = -1};
     struct sadmm_scene scene;
     struct sadmm_error error = {0};
+    struct output *json, *trace;
     sadmm_world *world = NULL;
     const char *spec;
     int code = cli_parse(&cli_run, argc, argv, set_option, &o, &spec);
     if (code >= 0) return code;
     if (sadmm_scene_open(spec, &scene, &error) != SADMM_OK) return cli_error(CLI_USAGE, "%s", error.message);
     apply(&o, &scene);
-    if (o.penalty_period >= 0 && scene.def.settings.method != SADMM_METHOD_PAPER)
-        return cli_error(CLI_USAGE, "--penalty-period %ld: takes --method paper, %s has no penalty updates",
-                         o.penalty_period, cli_method_name(scene.def.settings.method));
     if (o.steps < 0) o.steps = lround(fmin(scene.duration / scene.def.settings.dt, 1e9));
-    if (o.dump_path && o.dump_step > o.steps)
-        return cli_error(CLI_USAGE, "--dump-problem STEP %ld: must be in [1, %ld], the steps of this run", o.dump_step,
-                         o.steps);
-    if (o.dump_path && !sadmm_fclib_available()) {
-        sadmm_fclib_save(NULL, o.dump_path, NULL, &error);
-        return cli_error(CLI_FAILED, "%s", error.message);
-    }
+    if ((code = check_options(&o, &scene)) != CLI_DONE) return code;
+    interrupts_expect();
+    if ((code = open_outputs(&o, &json, &trace)) != CLI_DONE) return code;
     if (sadmm_scene_build(&scene, &world, &error) != SADMM_OK) return cli_error(CLI_FAILED, "%s", error.message);
-    code = run_world(&o, spec, &scene, world);
+    code = run_world(&o, spec, &scene, world, json, trace);
     sadmm_world_destroy(world);
     return code;
 }

@@ -1,5 +1,4 @@
 /* subadmm scenes: the list, or one whole scene as JSON so that another program can rebuild it. */
-#include <string.h>
 
 #include "cli.h"
 #include "scenes/scenes.h"
@@ -13,8 +12,7 @@ static const struct cli_option options[] = {
 static int set_option(void *target, size_t index, const char *value)
 {
     (void)index;
-    *(const char **)target = value ? value : "-";
-    return CLI_DONE;
+    return cli_read_output("--json", value, target) ? CLI_DONE : CLI_USAGE;
 }
 
 /* A step, by method. */
@@ -161,14 +159,14 @@ static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, jso
     return o;
 }
 
-static int show_scene(const char *spec, const char *destination)
+static int show_scene(const char *spec, struct output *json)
 {
     struct sadmm_scene scene;
     struct sadmm_error error = {0};
     sadmm_world *world = NULL;
     if (sadmm_scene_open(spec, &scene, &error) != SADMM_OK) return cli_error(CLI_USAGE, "%s", error.message);
     if (sadmm_scene_build(&scene, &world, &error) != SADMM_OK) return cli_error(CLI_FAILED, "%s", error.message);
-    if (!destination) {
+    if (!json) {
         printf("%s%s: %s\n%d bodies, %d shapes, %g s, dt = %g s, %d iterations (paper: %d; --json for all of it)\n",
                scene.info->name, scene.info->arguments, scene.info->description, sadmm_world_body_count(world),
                sadmm_world_shape_count(world), scene.duration, scene.def.settings.dt, scene.def.settings.iterations,
@@ -179,7 +177,7 @@ static int show_scene(const char *spec, const char *destination)
     json_t *bodies = json_array();
     int code;
     if (add_bodies(world, bodies) == SADMM_OK && add_shapes(world, bodies) == SADMM_OK) {
-        code = cli_write_json(scene_json(spec, &scene, bodies), destination);
+        code = cli_write_json(scene_json(spec, &scene, bodies), json);
     } else {
         json_decref(bodies);
         code = cli_error(CLI_FAILED, "%s", sadmm_world_message(world));
@@ -190,9 +188,11 @@ static int show_scene(const char *spec, const char *destination)
 
 static int run(int argc, char **argv)
 {
-    const char *json = NULL, *operands[1];
-    int code = cli_parse(&cli_scenes, argc, argv, set_option, &json, operands);
+    const char *name = NULL, *operands[1];
+    struct output *json;
+    int code = cli_parse(&cli_scenes, argc, argv, set_option, &name, operands);
     if (code >= 0) return code;
+    if ((code = cli_open_json(name, &json)) != CLI_DONE) return code;
     if (operands[0]) return show_scene(operands[0], json);
     if (json) return cli_write_json(list_json(), json);
     list_text();

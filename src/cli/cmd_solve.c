@@ -1,10 +1,10 @@
 /* subadmm solve: one contact problem from a file, to a tolerance. */
 #include <math.h>
-#include <string.h>
 
 #include "cli.h"
 #include "fclib/fclib.h"
 #include "fclib/global_problem.h"
+#include "interrupt.h"
 #include "solve_loop.h"
 
 enum {
@@ -68,8 +68,8 @@ static int set_option(void *target, size_t index, const char *value)
         break;
     case OPTION_PENALTY_PERIOD: ok = read_small_int("--penalty-period", value, 0, 1000000, &s->penalty_period); break;
     case OPTION_THREADS: ok = read_small_int("--threads", value, 0, 1024, &s->threads); break;
-    case OPTION_SOLUTION: o->solution = value; break;
-    case OPTION_JSON: o->json = value ? value : "-"; break;
+    case OPTION_SOLUTION: ok = cli_read_output("--solution", value, &o->solution); break;
+    case OPTION_JSON: ok = cli_read_output("--json", value, &o->json); break;
     case OPTION_QUIET: o->quiet = true; break;
     }
     return ok ? CLI_DONE : CLI_USAGE;
@@ -120,6 +120,7 @@ static json_t *outcome_json(const char *path, const struct solve_options *o, con
     json_object_set_new(root, "contacts", json_integer(s->contacts));
     json_object_set_new(root, "hard_rows", json_integer(s->hard_rows));
     json_object_set_new(root, "converged", json_boolean(out->converged));
+    json_object_set_new(root, "interrupted", json_boolean(interrupted() != 0));
     json_object_set_new(root, "tolerance", cli_json_real(o->plan.tolerance));
     json_object_set_new(root, "iterations", json_integer(out->iterations));
     json_object_set_new(root, "ms", cli_json_real(out->ms));
@@ -150,41 +151,54 @@ static void print_outcome(const char *path, const struct solve_options *o, const
            s->hard_rows);
     printf("backend        %s %s, %d thread%s\n", cli_backend_name(out->report.backend),
            cli_precision_name(out->report.precision), out->report.threads, out->report.threads == 1 ? "" : "s");
-    printf("solve          %s after %ld iterations, %.3f ms (%s", out->converged ? "converged" : "NOT converged",
+    printf("solve          %s after %ld iterations, %.3f ms (%s",
+           out->converged  ? "converged"
+           : interrupted() ? "interrupted"
+                           : "NOT converged",
            out->iterations, out->ms, cli_method_name(o->plan.settings.method));
     if (o->plan.settings.method == SADMM_METHOD_PAPER)
         printf(", penalty offset %.3g kg, %d tried", out->level, out->levels_tried);
     printf(")\n");
     printf("siconos        %.3g (tolerance %g)\n", c->siconos, o->plan.tolerance);
-    printf("certificate    ncp %.3g m/s at most, %.3g mean; momentum %.3g\n", c->ncp_max, c->ncp_mean, c->momentum_max);
+    if (solve_is_measured(c))
+        printf("certificate    ncp %.3g m/s at most, %.3g mean; momentum %.3g\n", c->ncp_max, c->ncp_mean,
+               c->momentum_max);
+    else printf("certificate    cannot be computed: the numbers overflow\n");
     printf("velocities u   closing %.3g m/s at most, sliding %.3g m/s at most\n", closing < 0 ? -closing : 0, sliding);
     printf("impulses r     normal %.3g N s at most\n", largest);
 }
 
 /* ---- the solve --------------------------------------------------------------------------------------------------- */
 
-static int solve_problem(sadmm_problem *problem, const char *path, const struct solve_options *o)
+static int say_unsolved(const char *path, const struct solve_options *o, const struct solve_outcome *out)
+{
+    if (!solve_is_measured(&out->certificate))
+        return cli_error(CLI_FAILED,
+                         "%s: not converged: after %ld iterations the error of the solution is not a finite number; "
+                         "numbers of the problem are too large or too small",
+                         path, out->iterations);
+    return cli_error(CLI_FAILED, "%s: not converged: siconos' measure is %.3g after %ld iterations, %g was asked for",
+                     path, out->certificate.siconos, out->iterations, o->plan.tolerance);
+}
+
+static int solve_problem(sadmm_problem *problem, const char *path, const struct solve_options *o, struct output *json,
+                         struct output *file)
 {
     struct solve_outcome out;
     struct sadmm_global_solution solution;
     struct sadmm_error error = {0};
+    bool table = !o->quiet && !outputs_on_stdout();
     if (solve_loop(problem, &o->plan, &out, &error) != SADMM_OK ||
         sadmm_global_solution_from_problem(problem, &solution, &error) != SADMM_OK)
         return cli_error(CLI_FAILED, "%s: %s", path, error.message);
-    int code = CLI_DONE;
-    if (!out.converged)
-        code =
-            cli_error(CLI_FAILED, "%s: not converged: siconos' measure is %.3g after %ld iterations, %g was asked for",
-                      path, out.certificate.siconos, out.iterations, o->plan.tolerance);
-    if (!o->quiet && !(o->json && strcmp(o->json, "-") == 0)) print_outcome(path, o, &out, &solution);
-    if (o->json) {
-        int written = cli_write_json(outcome_json(path, o, &out, &solution), o->json);
-        if (code == CLI_DONE) code = written;
-    }
-    if (o->solution && sadmm_fclib_save_solution(problem, path, o->solution, &error) != SADMM_OK)
-        code = cli_error(CLI_FAILED, "%s", error.message);
+    int code = out.converged ? CLI_DONE : say_unsolved(path, o, &out), written[2] = {CLI_DONE, CLI_DONE};
+    if (table) print_outcome(path, o, &out, &solution);
+    if (json) written[0] = cli_write_json(outcome_json(path, o, &out, &solution), json);
+    if (file && sadmm_fclib_save_solution(problem, path, output_path(file), &error) != SADMM_OK)
+        written[1] = cli_error(CLI_FAILED, "--solution %s: %s", o->solution, error.message);
+    else written[1] = output_close(file);
     sadmm_global_solution_free(&solution);
-    return code;
+    return code == CLI_DONE && (written[0] != CLI_DONE || written[1] != CLI_DONE) ? CLI_FAILED : code;
 }
 
 static int run(int argc, char **argv)
@@ -197,6 +211,7 @@ static int run(int argc, char **argv)
     };
     struct sadmm_error error = {0};
     sadmm_problem *problem = NULL;
+    struct output *json, *file = NULL;
     const char *path;
     o.plan.settings.dt = 1; /* the problem has no time step: offsets are in kg as they are */
     o.plan.settings.penalty_mass_factor = 0;
@@ -206,9 +221,13 @@ static int run(int argc, char **argv)
         return cli_error(CLI_USAGE, "--%s: takes --method paper, %s has no penalty", o.penalty,
                          cli_method_name(o.plan.settings.method));
     if (!o.tolerance_given) o.plan.tolerance = o.plan.precision == SADMM_F32 ? 1e-6 : 1e-8;
+    interrupts_expect();
+    outputs_protect(path);
+    if ((code = cli_open_json(o.json, &json)) != CLI_DONE) return code;
+    if (o.solution && (code = output_open("--solution", o.solution, OUTPUT_FILE, &file)) != CLI_DONE) return code;
     if (sadmm_fclib_load(path, &problem, &error) != SADMM_OK)
         return cli_error(CLI_FAILED, "%s: %s", path, error.message);
-    code = solve_problem(problem, path, &o);
+    code = solve_problem(problem, path, &o, json, file);
     sadmm_problem_destroy(problem);
     return code;
 }

@@ -1,4 +1,3 @@
-#include <errno.h>
 #include <math.h>
 #include <string.h>
 #include <sys/utsname.h>
@@ -80,21 +79,19 @@ json_t *cli_json_settings(const sadmm_settings *s)
     return o;
 }
 
-int cli_write_json(json_t *object, const char *destination)
+int cli_open_json(const char *name, struct output **output)
 {
-    bool to_stdout = strcmp(destination, "-") == 0;
-    FILE *file = to_stdout ? stdout : fopen(destination, "w");
-    if (!file) {
-        json_decref(object);
-        return cli_error(CLI_FAILED, "%s: %s", destination, strerror(errno));
-    }
-    bool ok = json_dumpf(object, file, JSON_INDENT(2) | JSON_REAL_PRECISION(17)) == 0 && fputc('\n', file) != EOF;
+    *output = NULL;
+    return name ? output_open("--json", name, OUTPUT_STREAM, output) : CLI_DONE;
+}
+
+int cli_write_json(json_t *object, struct output *output)
+{
+    FILE *stream = output_stream(output);
+    bool complete = json_dumpf(object, stream, JSON_INDENT(2) | JSON_REAL_PRECISION(17)) == 0;
     json_decref(object);
-    if (to_stdout) {
-        if (fflush(file) != 0) ok = false;
-    } else if (fclose(file) != 0) {
-        ok = false;
-    }
-    return ok ? CLI_DONE
-              : cli_error(CLI_FAILED, "%s could not be written", to_stdout ? "standard output" : destination);
+    fputc('\n', stream);
+    if (complete || ferror(stream)) return output_close(output);
+    output_drop(output);
+    return cli_error(CLI_FAILED, "out of memory for the JSON");
 }

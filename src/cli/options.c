@@ -7,7 +7,7 @@
 
 #include "cli.h"
 
-enum { MOST_OPTIONS = 32, HELP_COLUMN = 28 };
+enum { MOST_OPTIONS = 32, HELP_COLUMN = 28, FIRST_VALUE = 1000 /* of an option, for getopt: no character */ };
 
 int cli_error(int code, const char *format, ...)
 {
@@ -38,7 +38,7 @@ void cli_print_help(const struct cli_command *command)
         int width = printf("  --%s%s%s", o->name, o->value ? " " : "", o->value ? o->value : "");
         printf("%*s%s\n", width < HELP_COLUMN ? HELP_COLUMN - width : 1, "", o->help);
     }
-    printf("  --help%*sthis text\n", HELP_COLUMN - 8, "");
+    printf("  -h, --help%*sthis text\n", HELP_COLUMN - 12, "");
 }
 
 /* ---- parsing ----------------------------------------------------------------------------------------------------- */
@@ -59,6 +59,7 @@ static void fill_getopt(const struct cli_command *command, struct option *option
         options[k].has_arg = !o->value ? no_argument : value_is_optional(o) ? optional_argument : required_argument;
     }
     options[command->option_count].name = "help";
+    for (size_t k = 0; k <= command->option_count; ++k) options[k].val = FIRST_VALUE + (int)k;
 }
 
 static int take_operands(const struct cli_command *command, int argc, char **argv, const char **operands)
@@ -78,20 +79,23 @@ int cli_parse(const struct cli_command *command, int argc, char **argv, cli_set_
               const char **operands)
 {
     struct option options[MOST_OPTIONS + 2] = {{0}};
-    int index, code;
+    int code;
     fill_getopt(command, options);
     optind = 1;
     opterr = 0;
     for (;;) {
         int at = optind;
-        index = -1;
-        int found = getopt_long(argc, argv, ":", options, &index);
+        int found = getopt_long(argc, argv, ":h", options, NULL);
         if (found == -1) break;
         if (found == ':')
-            return cli_error(CLI_USAGE, "%s: option '%s' needs a value", command->name, argv[optind - 1]);
+            return cli_error(CLI_USAGE, "%s: option '%s' needs a value, %s", command->name, argv[optind - 1],
+                             command->options[optopt - FIRST_VALUE].value);
+        if (found == '?' && optopt >= FIRST_VALUE)
+            return cli_error(CLI_USAGE, "%s: option '%s' takes no value", command->name, argv[optind - 1]);
         if (found == '?') /* a bad short option leaves optind on its word until the word is used up */
             return unknown_option(command, optopt && optind == at ? argv[at] : argv[optind - 1]);
-        if ((size_t)index == command->option_count) {
+        size_t index = found == 'h' ? command->option_count : (size_t)(found - FIRST_VALUE);
+        if (index == command->option_count) {
             cli_print_help(command);
             return CLI_DONE;
         }
@@ -100,7 +104,7 @@ int cli_parse(const struct cli_command *command, int argc, char **argv, cli_set_
         if (!value && value_is_optional(&command->options[index]) && optind < argc &&
             (argv[optind][0] != '-' || argv[optind][1] == 0))
             value = argv[optind++];
-        if ((code = set(target, (size_t)index, value)) != CLI_DONE) return code;
+        if ((code = set(target, index, value)) != CLI_DONE) return code;
     }
     return take_operands(command, argc, argv, operands);
 }
@@ -136,6 +140,14 @@ bool cli_read_real(const char *option, const char *text, double lo, double hi, d
     }
     cli_error(CLI_USAGE, "%s '%s': must be a number in [%g, %g]", option, text, lo, hi);
     return false;
+}
+
+bool cli_read_output(const char *option, const char *text, const char **out)
+{
+    const char *before = *out;
+    *out = text ? text : "-";
+    if (before) cli_error(CLI_USAGE, "%s '%s': must be given once, and was before with '%s'", option, *out, before);
+    return !before;
 }
 
 static const char *const backend_names[SADMM_BACKEND_COUNT] = {

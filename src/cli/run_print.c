@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "interrupt.h"
 #include "run_record.h"
 
 static const char *const phase_names[RUN_PHASES] = {
@@ -111,6 +112,7 @@ json_t *run_record_json(const struct run_record *record, const char *spec, const
     json_object_set_new(o, "speed_max_final", cli_json_real(record->speed_max));
     json_object_set_new(o, "displacement_max", cli_json_real(record->displacement_max));
     json_object_set_new(o, "state_hash", json_string(hash));
+    json_object_set_new(o, "interrupted", json_boolean(interrupted() != 0));
     json_object_set_new(o, "finite", json_boolean(record->finite));
     json_object_set_new(o, "error", *record->failure ? json_string(record->failure) : json_null());
     cli_json_add_build(o);
@@ -124,7 +126,7 @@ void run_record_print(const struct run_record *record, const char *spec, const s
     const sadmm_step_report *last = &record->last;
     const sadmm_certificate *c = &last->certificate;
     printf("scene          %s, %zu bodies\n", spec, record->body_count);
-    printf("steps          %zu of %g s\n", record->steps, scene->def.settings.dt);
+    printf("steps          %zu of %g s%s\n", record->steps, scene->def.settings.dt, interrupted() ? ", interrupted" : "");
     if (record->steps > 0) {
         printf("backend        %s %s, %d thread%s, %d iterations a step (%s)\n", cli_backend_name(last->backend),
                cli_precision_name(last->precision), last->threads, last->threads == 1 ? "" : "s",

@@ -1,14 +1,8 @@
 #include "run_trace.h"
 
-#include <errno.h>
-#include <string.h>
-
-FILE *run_trace_open(const char *path)
+void run_trace_begin(FILE *trace)
 {
-    FILE *trace = fopen(path, "w");
-    if (!trace) cli_error(CLI_FAILED, "%s: %s", path, strerror(errno));
-    else fputs("step,time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz\n", trace);
-    return trace;
+    fputs("step,time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz\n", trace);
 }
 
 static void put(FILE *trace, const double *x, size_t count)
@@ -32,12 +26,4 @@ bool run_trace_step(FILE *trace, const struct run_record *record, const sadmm_wo
         fputc('\n', trace);
     }
     return true;
-}
-
-bool run_trace_close(FILE *trace, const char *path)
-{
-    bool ok = !ferror(trace);
-    if (fclose(trace) != 0) ok = false;
-    if (!ok) cli_error(CLI_FAILED, "%s could not be written", path);
-    return ok;
 }

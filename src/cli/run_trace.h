@@ -4,10 +4,8 @@
 
 #include "run_record.h"
 
-/* NULL, with a message on stderr, when the file cannot be made. */
-FILE *run_trace_open(const char *path);
+void run_trace_begin(FILE *trace);
+/* False, with a message on stderr, when a state cannot be read. */
 bool run_trace_step(FILE *trace, const struct run_record *record, const sadmm_world *world, double time);
-/* False when something could not be written. */
-bool run_trace_close(FILE *trace, const char *path);
 
 #endif

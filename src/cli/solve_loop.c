@@ -5,6 +5,7 @@
 
 #include "core/base/error.h"
 #include "core/base/memory.h"
+#include "interrupt.h"
 
 /* The lanes: levels as multiples of the first one. Lane 0 has penalty updates. */
 static const double factors[] = {1, 1, 10, 0.1, 100, 0.01, 1e3, 1e-3};
@@ -27,7 +28,7 @@ struct loop {
     struct solve_outcome *out;
     struct lane lanes[LANES];
     struct lane best;       /* the best solution of all */
-    bool exhausted;         /* the solver itself has no more iterations to make */
+    bool exhausted;         /* further iterations lead nowhere */
     struct sadmm_error *error;
 };
 
@@ -79,7 +80,9 @@ static sadmm_status mean_mass(struct loop *l, double *mass)
 
 static bool finished(const struct loop *l)
 {
-    return l->out->converged || l->exhausted || l->out->iterations >= l->plan->max_iterations;
+    const struct solve_outcome *out = l->out;
+    if (interrupted() && out->iterations > 0) return true; /* there is a solution to report */
+    return out->converged || l->exhausted || out->iterations >= l->plan->max_iterations;
 }
 
 /* One stretch on what is in the problem; `cold`: from nothing. */
@@ -101,12 +104,15 @@ static sadmm_status stretch(struct loop *l, struct lane *lane, bool cold)
     out->level = lane->level;
     out->iterations += out->report.iterations;
     out->ms += out->report.solve_ms;
-    out->converged = c.siconos <= l->plan->tolerance;
-    l->exhausted = out->report.iterations < s.iterations; /* without constraints one iteration is exact */
-    if (cold || c.siconos < lane->measure) lane->measure = c.siconos;
-    if (first || c.siconos < l->best.measure) {
+    bool measured = solve_is_measured(&c);
+    double measure = measured ? c.siconos : INFINITY;
+    out->converged = measure <= l->plan->tolerance;
+    /* Without constraints one iteration is exact; and what has overflowed does not come back. */
+    l->exhausted = !measured || out->report.iterations < s.iterations;
+    if (cold || measure < lane->measure) lane->measure = measure;
+    if (first || measure < l->best.measure) {
         out->certificate = c;
-        l->best.measure = c.siconos;
+        l->best.measure = measure;
         TRY(keep(l, &l->best));
     }
     return SADMM_OK;
@@ -181,6 +187,11 @@ static sadmm_status run(struct loop *l)
     }
     while (!finished(l)) TRY(advance(l, choose(l)));
     return restore(l, &l->best);
+}
+
+bool solve_is_measured(const sadmm_certificate *c)
+{
+    return isfinite(c->siconos) && isfinite(c->ncp_max) && isfinite(c->ncp_mean) && isfinite(c->momentum_max);
 }
 
 sadmm_status solve_loop(sadmm_problem *problem, const struct solve_plan *plan, struct solve_outcome *out,

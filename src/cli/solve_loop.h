@@ -24,7 +24,7 @@ struct solve_plan {
 };
 
 struct solve_outcome {
-    bool converged;
+    bool converged;           /* to the tolerance, and the other errors of the certificate are finite */
     long iterations;
     double ms;                /* solving, without the certificates */
     double level;             /* kg, the last one used */
@@ -33,8 +33,11 @@ struct solve_outcome {
     sadmm_certificate certificate; /* of the solution left in the problem: the best one seen */
 };
 
-/* Errors: those of sadmm_problem_solve; `error` holds the message. */
+/* An interrupt ends it after the stretch under way. Errors: those of sadmm_problem_solve; `error` holds the message. */
 sadmm_status solve_loop(sadmm_problem *problem, const struct solve_plan *plan, struct solve_outcome *outcome,
                         struct sadmm_error *error);
+
+/* Are its errors finite numbers? They need not be, where those of the problem are huge: such a solution is none. */
+bool solve_is_measured(const sadmm_certificate *certificate);
 
 #endif
