@@ -140,11 +140,13 @@ SADMM_INLINE int box_clip_face(const real hr[3], const real hi[3], const real R[
 SADMM_INLINE void box_face_manifold(const struct box_pair *b, int axis, int negative, struct manifold *m)
 {
     real sg = negative ? (real)-1 : (real)1;
+    /* as the separation of the axis was judged: faces that touch keep their points, whatever their rounding says */
+    real limit = b->limit + b->slack;
     int i, j;
     m->count = 0;
     m->normal = box_axis_direction(b, axis, negative);
     if (axis < 3) {
-        box_clip_face(b->h1, b->h2, b->R, b->t, axis, sg, b->limit, 0, m);
+        box_clip_face(b->h1, b->h2, b->R, b->t, axis, sg, limit, 0, m);
     } else {
         /* in the frame of 2 the normal from 1 to 2 looks out of 1: the reference side of 2 is opposite */
         real RT[3][3], t[3];
@@ -152,7 +154,7 @@ SADMM_INLINE void box_face_manifold(const struct box_pair *b, int axis, int nega
             for (j = 0; j < 3; ++j) RT[i][j] = b->R[j][i];
             t[i] = -b->t2[i];
         }
-        box_clip_face(b->h2, b->h1, RT, t, axis - 3, -sg, b->limit, 1, m);
+        box_clip_face(b->h2, b->h1, RT, t, axis - 3, -sg, limit, 1, m);
         for (i = 0; i < m->count; ++i) {
             real p[3], q[3];
             v3_to_array(m->points[i].position, p);
