@@ -320,6 +320,7 @@ static void fill_scene(struct scene *s, struct random *r, int environments)
             body->orientation[3] = sin(0.5 * i) * R[6];
             for (int k = 0; k < 3; ++k) body->position[k] = random_in(r, -0.5, 0.5);
             for (int k = 0; k < 6; ++k) body->velocity[k] = still ? 0 : random_in(r, -1, 1);
+            for (int k = 0; k < 2; ++k) body->acceleration[k] = still || i % 3 ? 0 : random_in(r, 0, 200);
         }
     }
     s->input = (struct sadmm_collision_input){
@@ -330,7 +331,7 @@ static void fill_scene(struct scene *s, struct random *r, int environments)
         .dt = 0.005,
         .margin = 0.02,
         .threads = 1,
-        .acceleration = 9.81,
+        .gravity = 9.81,
     };
 }
 
@@ -342,7 +343,7 @@ static bool may_touch(const struct scene *s, const struct sadmm_candidates *c, u
     if (p->system_body < 0 && q->system_body < 0) return false;
     if (p->environment != q->environment && p->environment >= 0 && q->environment >= 0) return false;
     if (!(a->category & b->mask) || !(b->category & a->mask)) return false;
-    return sadmm_candidate_meets(c, s->input.margin, s->input.dt, i, j);
+    return sadmm_candidate_meets(c, &s->input, i, j);
 }
 
 /* Boxes in straight motion against 400 moments of the step: what overlaps at one of them meets; and of two that move alike
@@ -362,7 +363,7 @@ START_TEST(boxes_meet_when_they_come_together)
                 extent[k] = random_in(&r, 0.05, 0.3);
                 velocity[s][k] = s && trial % 2 ? velocity[0][k] : random_in(&r, -100, 100);
             }
-            shape_box(centre[s], extent, 0, velocity[s], 0, 0, dt, &box[s]);
+            shape_box(centre[s], extent, 0, velocity[s], 0, dt, &box[s]);
             memcpy(half[s], extent, sizeof extent);
         }
         bool touch = false;
@@ -386,8 +387,71 @@ START_TEST(boxes_meet_when_they_come_together)
 }
 END_TEST
 
-/* Over many steps with moves small and large, deaths, births and changes of shapes: the list holds every pair that
- * meets, in order, once. */
+static void random_direction(struct random *r, double size, double out[3])
+{
+    double R[9];
+    random_rotation(r, R);
+    for (int k = 0; k < 3; ++k) out[k] = size * R[k];
+}
+
+/* Balls of all sizes, and a plane now and then, with velocities, forces of their own and gravity. Each is held against
+ * gravity and against its force, or not, and goes as far within the step as it then does: what touches on the way is
+ * within the limit of the pair, and its boxes meet. */
+START_TEST(what_accelerations_bring_together_is_foreseen)
+{
+    struct random r = {11};
+    int touches = 0, by_acceleration = 0;
+    for (int trial = 0; trial < 40000; ++trial) {
+        const double dt = random_in(&r, 0.001, 0.02), margin = trial % 3 ? 0.02 : 0;
+        const double gravity = trial % 5 ? random_in(&r, 0, 20) : 0;
+        const bool plane = trial % 4 == 0;
+        struct sadmm_shape shape[2] = {{.type = plane ? SADMM_SHAPE_PLANE : SADMM_SHAPE_SPHERE}, {.type = SADMM_SHAPE_SPHERE}};
+        struct sadmm_collision_body body[2] = {{.system_body = plane ? -1 : 0}, {.system_body = 1}};
+        struct sadmm_proxy proxy[2];
+        struct sadmm_box3 box[2];
+        double g[3], way[3] = {0, 0, 0}, velocity[3], gap = random_in(&r, 0, 1) * dt * dt * 20, height = gap;
+        random_direction(&r, gravity, g);
+        for (int s = 0; s < 2; ++s) {
+            const double force[3] = {random_in(&r, -1, 1), random_in(&r, -1, 1), trial % 2 ? random_in(&r, -20, 20) : 0};
+            const bool moves = body[s].system_body >= 0, falls = random_unit(&r) < 0.7, driven = random_unit(&r) < 0.7;
+            shape[s].size[0] = pow(10, random_in(&r, -4, -1));
+            shape[s].orientation[0] = body[s].orientation[0] = 1;
+            body[s].acceleration[0] = moves ? sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]) : 0;
+            for (int k = 0; k < 3; ++k) {
+                body[s].velocity[k] = moves && trial % 2 ? random_in(&r, -0.02, 0.02) : 0;
+                velocity[k] = body[s].velocity[k] + (moves ? (falls ? g[k] : 0) + (driven ? force[k] : 0) : 0) * dt;
+                way[k] = velocity[k] * dt - way[k];
+            }
+            height += s || !plane ? shape[s].size[0] : 0;
+        }
+        body[1].position[2] = height; /* above, as seen from the first */
+        for (int s = 0; s < 2; ++s) proxy_place(&shape[s], &body[s], dt, margin, gravity, &proxy[s], &box[s]);
+
+        bool touch = false, touch_without = false;
+        for (int moment = 0; moment <= 50 && !touch; ++moment) {
+            const double t = moment / 50.0, x = t * way[0], y = t * way[1], z = height + t * way[2];
+            const double sum = height - gap;
+            touch = plane ? z <= sum : x * x + y * y + z * z <= sum * sum;
+            const double w = height + t * dt * (body[1].velocity[2] - body[0].velocity[2]);
+            touch_without = touch_without || w <= sum + margin * fmin(proxy[0].thin, proxy[1].thin);
+        }
+        if (!touch) continue;
+        ck_assert_double_le(gap, proxy_limit(&proxy[0], &proxy[1], margin, gravity, dt));
+        if (plane)
+            ck_assert(proxy_plane_meets(&proxy[0], &box[1], proxy_plane_reach(&proxy[1], margin, fall_of(gravity, dt))));
+        else
+            ck_assert(boxes_overlap(&box[0], &box[1]) &&
+                      boxes_meet(&box[0], proxy[0].velocity, &box[1], proxy[1].velocity, dt));
+        ++touches;
+        by_acceleration += !touch_without;
+    }
+    ck_assert_int_gt(touches, 3000);
+    ck_assert_int_gt(by_acceleration, 1000);
+}
+END_TEST
+
+/* Over many steps with moves small and large, other forces, another gravity and time step, deaths, births and changes of
+ * shapes: the list holds every pair that meets, in order, once. */
 START_TEST(the_list_of_candidates_is_complete_at_every_step)
 {
     struct random r = {400};
@@ -405,7 +469,10 @@ START_TEST(the_list_of_candidates_is_complete_at_every_step)
             if (body->system_body < 0 && random_unit(&r) > 0.01) continue; /* static bodies may be placed anew */
             if (step % 8 > 5 && i % 50) continue;                          /* steps in which little moves */
             for (int k = 0; k < 3; ++k) body->position[k] += stride * random_in(&r, -1, 1);
+            if (body->system_body >= 0 && random_unit(&r) < 0.05) body->acceleration[step % 2] = random_in(&r, 0, 1000);
         }
+        s.input.gravity = (const double[]){9.81, 9.81, 400, 0, 9.81, 9.81, 9.81}[step % 7];
+        s.input.dt = step % 16 < 11 ? 0.005 : 0.01;
         for (int i = 0; i < COUNT; ++i) {
             struct sadmm_shape *shape = &s.shapes[i];
             if (random_unit(&r) > 0.005 || step % 4 == 2) continue;
@@ -478,6 +545,7 @@ int main(void)
     suite_add_tcase(suite, trees);
     tcase_set_timeout(candidates, 60);
     tcase_add_test(candidates, boxes_meet_when_they_come_together);
+    tcase_add_test(candidates, what_accelerations_bring_together_is_foreseen);
     tcase_add_loop_test(candidates, the_list_of_candidates_is_complete_at_every_step, 0, 2 * KINDS);
     tcase_add_loop_test(candidates, rest_costs_no_broad_phase, 0, KINDS);
     suite_add_tcase(suite, candidates);

@@ -467,7 +467,7 @@ START_TEST(a_fall_from_rest_is_foreseen)
     add_shape(s, add_body(s, true, 0, 0, 0.0005 + 0.0001), SADMM_SHAPE_BOX, 0.05, 0.03, 0.0005);
     find(s);
     ck_assert_uint_eq(s->contacts.point_count, 0);
-    s->input.acceleration = 9.81;
+    s->input.gravity = 9.81;
     find(s);
     ck_assert_uint_eq(s->contacts.point_count, 4);
     free_scene(s);

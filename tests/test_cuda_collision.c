@@ -271,7 +271,7 @@ static struct soup soup_new(const struct soup_kind *kind, uint64_t number)
     s.input.dt = 0.01;
     s.input.margin = 0.02;
     s.input.threads = 1;
-    s.input.acceleration = 9.81;
+    s.input.gravity = 9.81;
     s.input.disabled_body_pairs = s.disabled;
     s.input.friction_pairs = s.friction;
     s.input.friction_values = s.values;

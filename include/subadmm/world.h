@@ -29,7 +29,9 @@ typedef struct sadmm_world_def {
     sadmm_precision precision;  /* default F64 */
     int device;                 /* accelerator index, >= 0; default 0 */
     double contact_margin;      /* speculative margin as a share of the thinner shape's smallest extent, in [0, 1];
-                                   default 0.02. Contacts within margin + the distance closed in one step are made */
+                                   default 0.02. Contacts are made within the margin, or what gravity and the wrenches
+                                   on the two bodies can close in one step (acceleration x dt^2) where that is more, +
+                                   the distance that their velocities close in it */
     sadmm_settings settings;
 } sadmm_world_def;
 

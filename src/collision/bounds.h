@@ -1,10 +1,14 @@
 /* How far shapes reach: extents, boxes around them, and the distance within which a pair makes contacts. In double on
  * every backend, so that all of them see the same pairs.
  *
- * A pair makes contacts up to   margin x thinner extent + what the two may close within the step.
- * The box of a shape covers its own part of that: half the margin, its sweep along its velocity, and the reach of its
- * rotation and of the external acceleration in every direction. Shapes are a pair when their boxes overlap, and overlap
- * still when the one is swept along the velocity it has relative to the other.
+ * A pair makes contacts up to   max(margin x thinner extent, fall) + what the velocities may close within the step.
+ * The fall is what external accelerations add to that: velocities come first (semi-implicit Euler), so that a body moves
+ * by the whole of a dt^2 in the step in which it lets go. Gravity counts once, as one body of a pair may be held while
+ * the other falls; the forces and torques on the two bodies count both. Joints will add theirs.
+ * The box of a shape covers its own part: half the margin, or half the fall by gravity and its own part of the rest,
+ * whichever is more; its sweep along its velocity; and the reach of its rotation. Two such parts are never less than
+ * what the pair asks for. Shapes are a pair when their boxes overlap, and overlap still when the one is swept along the
+ * velocity it has relative to the other.
  */
 #ifndef SADMM_COLLISION_BOUNDS_H
 #define SADMM_COLLISION_BOUNDS_H
@@ -59,21 +63,46 @@ SADMM_INLINE double rotation_sweep(const double angular[3], double reach, double
     return (turn < 2 ? turn : 2) * reach;
 }
 
-/* Distance up to which a pair makes contacts, m. spin: rotation_sweep; fall: acceleration x dt^2, 0 for static ones. */
+/* Size of gravity, m/s^2. */
+SADMM_INLINE double gravity_size(const double gravity[3])
+{
+    return sqrt(gravity[0] * gravity[0] + gravity[1] * gravity[1] + gravity[2] * gravity[2]);
+}
+
+/* Farthest that an acceleration moves what was at rest, or held, within the step, m. */
+SADMM_INLINE double fall_of(double acceleration, double dt) { return acceleration * dt * dt; }
+
+/* Farthest that the force and the torque on its body move a point of a shape, beyond its velocity, m. acceleration:
+ * m/s^2, rad/s^2; reach as above. */
+SADMM_INLINE double own_fall(const double acceleration[2], double reach, double dt)
+{
+    double turn = fall_of(acceleration[1], dt);
+    return fall_of(acceleration[0], dt) + (turn < 2 ? turn : 2) * reach;
+}
+
+/* Distance up to which a pair makes contacts, m. spin: rotation_sweep; fall: own_fall; gravity: fall_of it. */
 SADMM_INLINE double pair_limit(double margin, double thin_a, double thin_b, const double va[3], const double vb[3],
-                               double spin_a, double spin_b, double fall, double dt)
+                               double spin_a, double spin_b, double fall_a, double fall_b, double gravity, double dt)
 {
     double x = vb[0] - va[0], y = vb[1] - va[1], z = vb[2] - va[2];
-    return margin * (thin_a < thin_b ? thin_a : thin_b) + sqrt(x * x + y * y + z * z) * dt + spin_a + spin_b + fall;
+    double least = margin * (thin_a < thin_b ? thin_a : thin_b), fall = gravity + fall_a + fall_b;
+    return (least > fall ? least : fall) + sqrt(x * x + y * y + z * z) * dt + spin_a + spin_b;
+}
+
+/* A shape's part of max(margin x thinner extent, fall), m. */
+SADMM_INLINE double shape_reach(double margin, double thin, double fall, double gravity)
+{
+    double least = 0.5 * (margin * thin), most = 0.5 * gravity + fall;
+    return least > most ? least : most;
 }
 
 /* Box around a shape for the step: see the top. */
-SADMM_INLINE void shape_box(const double centre[3], const double extent[3], double margin_thickness,
-                            const double velocity[3], double spin, double fall, double dt, struct sadmm_box3 *box)
+SADMM_INLINE void shape_box(const double centre[3], const double extent[3], double reach, const double velocity[3],
+                            double spin, double dt, struct sadmm_box3 *box)
 {
     int k;
     for (k = 0; k < 3; ++k) {
-        double e = extent[k] + 0.5 * margin_thickness + spin + fall, sweep = velocity[k] * dt;
+        double e = extent[k] + reach + spin, sweep = velocity[k] * dt;
         /* rounding favours contact */
         e += 8 * DBL_EPSILON * (fabs(centre[k]) + e);
         box->lo[k] = centre[k] - e + downward(sweep);

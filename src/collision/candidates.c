@@ -119,7 +119,7 @@ static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision
     now.group = body->environment;
     now.alive = true;
     now.moves = body->system_body >= 0;
-    proxy_place(shape, body, input->dt, input->margin, input->acceleration, &c->proxies[slot], &c->boxes[slot]);
+    proxy_place(shape, body, input->dt, input->margin, input->gravity, &c->proxies[slot], &c->boxes[slot]);
     same = seen->alive && seen->revision == now.revision && seen->body == now.body && seen->group == now.group &&
            seen->moves == now.moves && !renew;
     c->state[slot] = SLOT_PRESENT;
@@ -139,12 +139,14 @@ static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision
     }
 }
 
-bool sadmm_candidate_meets(const struct sadmm_candidates *c, double margin, double dt, uint32_t a, uint32_t b)
+bool sadmm_candidate_meets(const struct sadmm_candidates *c, const struct sadmm_collision_input *input, uint32_t a,
+                           uint32_t b)
 {
     if (c->proxies[a].type == SADMM_SHAPE_PLANE)
-        return proxy_plane_meets(&c->proxies[a], &c->boxes[b], proxy_plane_reach(&c->proxies[b], margin));
+        return proxy_plane_meets(&c->proxies[a], &c->boxes[b],
+                                 proxy_plane_reach(&c->proxies[b], input->margin, fall_of(input->gravity, input->dt)));
     return boxes_overlap(&c->boxes[a], &c->boxes[b]) &&
-           boxes_meet(&c->boxes[a], c->proxies[a].velocity, &c->boxes[b], c->proxies[b].velocity, dt);
+           boxes_meet(&c->boxes[a], c->proxies[a].velocity, &c->boxes[b], c->proxies[b].velocity, input->dt);
 }
 
 /* Things that do not change while the shapes stay what they are. */
@@ -222,7 +224,8 @@ static bool plane_pairs(struct sadmm_candidates *c, const struct sadmm_collision
             uint32_t slot = only_changed ? c->changed[i] : (uint32_t)c->movers[i];
             const struct sadmm_broad_entry *e = &c->entries[slot];
             if (!e->present || !e->moves || (group >= 0 && e->group != group)) continue;
-            if (proxy_plane_meets(&c->proxies[plane], &e->box, proxy_plane_reach(&c->proxies[slot], input->margin)) &&
+            if (proxy_plane_meets(&c->proxies[plane], &e->box,
+                                  proxy_plane_reach(&c->proxies[slot], input->margin, c->gravity_fall)) &&
                 !sadmm_pair_list_add(&c->found, plane, slot))
                 return false;
         }
@@ -292,7 +295,10 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
 {
     /* Slots never go away; should a caller drop some, they count as dead. */
     size_t slots = input->shape_count > c->slot_count ? input->shape_count : c->slot_count, present = 0;
-    bool renew = !c->broad_phase_valid || !(c->margin == input->margin), few, plane_changed = false;
+    const double gravity_fall = fall_of(input->gravity, input->dt);
+    /* Planes have no box that could leave a larger one: what they reach must not grow unnoticed. */
+    bool renew = !c->broad_phase_valid || !(c->margin == input->margin) || gravity_fall > c->gravity_fall;
+    bool few, plane_changed = false;
     sadmm_status status;
     (void)threads; /* unused without OpenMP */
 
@@ -324,6 +330,7 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
     few = c->list_valid && !renew && !plane_changed && c->kind->pairs_of && c->changed_count * FEW < present;
     c->broad_phase_valid = c->list_valid = false;
     c->margin = input->margin;
+    if (renew) c->gravity_fall = gravity_fall;
     status = c->kind->update(c->broad_phase, c->entries, slots, c->changed, c->changed_count, error);
     if (status != SADMM_OK) return status;
     c->broad_phase_valid = true;

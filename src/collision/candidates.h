@@ -27,6 +27,7 @@ struct sadmm_candidates {
     bool broad_phase_valid; /* it holds every present entry */
     bool list_valid;
     double margin; /* of the last update */
+    double gravity_fall; /* the list holds every pair with a plane up to this fall by gravity, m */
 
     /* by shape slot */
     struct sadmm_proxy *proxies;
@@ -57,6 +58,7 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
                                      struct sadmm_error *error);
 
 /* Do the two shapes of a pair in the list come together within this step, as far as their boxes tell (bounds.h)? */
-bool sadmm_candidate_meets(const struct sadmm_candidates *c, double margin, double dt, uint32_t a, uint32_t b);
+bool sadmm_candidate_meets(const struct sadmm_candidates *c, const struct sadmm_collision_input *input, uint32_t a,
+                           uint32_t b);
 
 #endif

@@ -29,6 +29,7 @@ struct sadmm_shape {
 /* What a world body slot looks like to collision. */
 struct sadmm_collision_body {
     double position[3], orientation[4], velocity[6]; /* velocity 0 for static bodies */
+    double acceleration[2]; /* sizes of what its own force and torque give it, m/s^2, rad/s^2; 0 for static bodies */
     int32_t system_body;  /* index among dynamic bodies, -1 for static */
     int32_t environment;  /* -1: meets all */
 };
@@ -44,8 +45,7 @@ struct sadmm_collision_input {
     /* Pair overrides, both sorted by key = (low slot << 32) | high slot. */
     const uint64_t *disabled_body_pairs; size_t disabled_body_pair_count;      /* body slots */
     const uint64_t *friction_pairs; const double *friction_values; size_t friction_pair_count; /* shape slots */
-    double acceleration; /* bound on what gravity and the like add to a velocity, m/s^2: a body at rest just outside the
-                            margin falls acceleration x dt^2 in its first step. 0: not counted */
+    double gravity; /* its size, m/s^2: a body at rest just outside the margin falls gravity x dt^2 in its first step */
 };
 
 struct sadmm_collision;

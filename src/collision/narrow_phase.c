@@ -111,7 +111,7 @@ bool sadmm_narrow_phase(const struct sadmm_candidates *c, const struct sadmm_col
         double limit;
         size_t at;
 
-        if (!sadmm_candidate_meets(c, input->margin, input->dt, a, b)) continue;
+        if (!sadmm_candidate_meets(c, input, a, b)) continue;
         if (input->disabled_body_pair_count &&
             find_key(input->disabled_body_pairs, input->disabled_body_pair_count,
                      unordered_key((uint32_t)pa->body, (uint32_t)pb->body), &at))
@@ -121,8 +121,7 @@ bool sadmm_narrow_phase(const struct sadmm_candidates *c, const struct sadmm_col
             old->pairs[next].reserved == revision_of_pair(pa->revision, pb->revision))
             before = &old->pairs[next];
 
-        limit = pair_limit(input->margin, pa->thin, pb->thin, pa->velocity, pb->velocity, pa->spin, pb->spin,
-                           pa->fall > pb->fall ? pa->fall : pb->fall, input->dt);
+        limit = proxy_limit(pa, pb, input->margin, input->gravity, input->dt);
         pose = pair_pose(pa->type == SADMM_SHAPE_PLANE, pa->R, pa->x, pb->R, pb->x);
         pair_manifold(pa->type, v3_load(pa->size), pb->type, v3_load(pb->size), &pose, (real)limit,
                       before ? before->cache : 0, &m);

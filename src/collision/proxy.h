@@ -12,22 +12,22 @@ struct sadmm_proxy {
     double arm[3];      /* centre relative to the body's centre of mass, m, world */
     double com[3];      /* of the body */
     double velocity[3]; /* of the body, m/s */
-    double spin, fall;  /* reach of rotation and of acceleration within the step, m */
+    double spin, fall;  /* reach of rotation, and of the force and torque on the body, within the step, m */
     double thin;        /* smallest extent, m */
     double friction, restitution;
     int32_t type, body, system_body;
     uint32_t revision;
 };
 
-/* `box` is left alone for a plane. */
+/* `box` is left alone for a plane. gravity: its size, m/s^2. */
 SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadmm_collision_body *body, double dt,
-                              double margin, double acceleration, struct sadmm_proxy *p, struct sadmm_box3 *box)
+                              double margin, double gravity, struct sadmm_proxy *p, struct sadmm_box3 *box)
 {
     quat q_body = q_load(body->orientation), q = q_normalize(q_mul(q_body, q_load(shape->orientation)));
     mat3 R = q_matrix(q);
     vec3 arm = m3_mul(q_matrix(q_body), v3_load(shape->position));
     bool moves = body->system_body >= 0;
-    double extent[3];
+    double extent[3], reach;
     int i;
 
     for (i = 0; i < 3; ++i) v3_store(R.r[i], p->R + 3 * i);
@@ -38,9 +38,9 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
         p->size[i] = shape->size[i];
         p->velocity[i] = moves ? body->velocity[i] : 0;
     }
-    p->spin = moves ? rotation_sweep(body->velocity + 3, v3_norm(arm) + shape_radius((int)shape->type, shape->size), dt)
-                    : 0;
-    p->fall = moves ? acceleration * dt * dt : 0;
+    reach = v3_norm(arm) + shape_radius((int)shape->type, shape->size);
+    p->spin = moves ? rotation_sweep(body->velocity + 3, reach, dt) : 0;
+    p->fall = moves ? own_fall(body->acceleration, reach, dt) : 0;
     p->thin = shape_thickness((int)shape->type, shape->size);
     p->friction = shape->friction;
     p->restitution = shape->restitution;
@@ -50,11 +50,22 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
     p->revision = shape->revision;
     if (shape->type == SADMM_SHAPE_PLANE) return;
     shape_world_extent(p->type, p->size, p->R, extent);
-    shape_box(p->x, extent, margin * p->thin, p->velocity, p->spin, p->fall, dt, box);
+    shape_box(p->x, extent, shape_reach(margin, p->thin, p->fall, fall_of(gravity, dt)), p->velocity, p->spin, dt, box);
 }
 
-/* Half the margin of a pair with a plane, m: the share that is not in the other shape's box. */
-SADMM_INLINE double proxy_plane_reach(const struct sadmm_proxy *p, double margin) { return 0.5 * margin * p->thin; }
+/* A plane's own part of what a pair with it reaches, m: what is not in the other shape's box. gravity: fall_of it. */
+SADMM_INLINE double proxy_plane_reach(const struct sadmm_proxy *p, double margin, double gravity)
+{
+    return shape_reach(margin, p->thin, 0, gravity);
+}
+
+/* pair_limit of two shapes. */
+SADMM_INLINE double proxy_limit(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double margin, double gravity,
+                                double dt)
+{
+    return pair_limit(margin, a->thin, b->thin, a->velocity, b->velocity, a->spin, b->spin, a->fall, b->fall,
+                      fall_of(gravity, dt), dt);
+}
 
 /* Does the box come within `reach` of the plane? */
 SADMM_INLINE bool proxy_plane_meets(const struct sadmm_proxy *plane, const struct sadmm_box3 *box, double reach)

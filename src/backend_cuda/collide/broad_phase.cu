@@ -83,7 +83,7 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
     struct collision_leaf leaf;
     struct collision_filter filter;
 
-    proxy_place(&shape, &body, v.step.dt, v.step.margin, v.step.acceleration, &proxy, &leaf.box);
+    proxy_place(&shape, &body, v.step.dt, v.step.margin, v.step.gravity, &proxy, &leaf.box);
     v.proxies[slot] = proxy;
     filter.category = shape.category;
     filter.mask = shape.mask;
@@ -266,7 +266,7 @@ static __device__ void add_planes(const collision_view &v, struct batch *out, co
 {
     const uint32_t slot = (uint32_t)leaf.slot;
     if (v.plane_count == 0 || !(own.kind & FILTER_MOVES)) return;
-    const double reach = proxy_plane_reach(&v.proxies[slot], v.step.margin);
+    const double reach = proxy_plane_reach(&v.proxies[slot], v.step.margin, fall_of(v.step.gravity, v.step.dt));
     const bool grouped = v.shared_planes < v.plane_count && leaf.group_low == leaf.group_high;
     for (int pass = 0; pass < (grouped ? 2 : 1); ++pass) {
         const uint64_t group = pass == 0 ? 0 : (uint64_t)leaf.group_low + 1;

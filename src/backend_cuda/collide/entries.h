@@ -42,8 +42,8 @@ sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *collision, void *st
                                 struct sadmm_error *error);
 /* A set's pointers; counts are not filled. */
 struct sadmm_cuda_contacts COLLISION(set)(const struct sadmm_cuda_collision *collision, int which);
-/* Another time step than at attach, from the next enqueue on. */
-void COLLISION(set_time_step)(struct sadmm_cuda_collision *collision, double dt);
+/* Another time step (s) and size of gravity (m/s^2) than at attach, from the next enqueue on. */
+void COLLISION(set_step)(struct sadmm_cuda_collision *collision, double dt, double gravity);
 /* Which set is the current one, and with how much in it, after enqueued finds. */
 void COLLISION(settle)(struct sadmm_cuda_collision *collision, int current, struct sadmm_cuda_contact_counts counts);
 int COLLISION(current)(const struct sadmm_cuda_collision *collision);

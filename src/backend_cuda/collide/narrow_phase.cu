@@ -40,8 +40,7 @@ static __global__ void __launch_bounds__(NARROW_THREADS) narrow_kernel(const __g
     int64_t before = find_key_in_eighths(v.before.keys, v.before.counts->pairs, ordered_key(a, b));
     if (before >= 0 && v.before.pairs[before].reserved != revision_of_pair(pa->revision, pb->revision)) before = -1;
 
-    const double limit = pair_limit(v.step.margin, pa->thin, pb->thin, pa->velocity, pb->velocity, pa->spin, pb->spin,
-                                    fmax(pa->fall, pb->fall), v.step.dt);
+    const double limit = proxy_limit(pa, pb, v.step.margin, v.step.gravity, v.step.dt);
     const struct pair_pose pose = pair_pose(pa->type == SADMM_SHAPE_PLANE, pa->R, pa->x, pb->R, pb->x);
     struct manifold m;
     pair_manifold(pa->type, v3_load(pa->size), pb->type, v3_load(pb->size), &pose, (real)limit,

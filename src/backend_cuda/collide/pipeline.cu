@@ -345,7 +345,7 @@ static sadmm_status take_input(struct sadmm_cuda_collision *c, const struct sadm
     v->friction_count = (int32_t)input->friction_pair_count;
     v->step.dt = input->dt;
     v->step.margin = input->margin;
-    v->step.acceleration = input->acceleration;
+    v->step.gravity = input->gravity;
     for (v->slot_bits = 1; input->shape_count >> v->slot_bits; ++v->slot_bits) {}
     return SADMM_OK;
 }
@@ -787,7 +787,11 @@ extern "C" struct sadmm_cuda_contacts COLLISION(set)(const struct sadmm_cuda_col
     return out;
 }
 
-extern "C" void COLLISION(set_time_step)(struct sadmm_cuda_collision *c, double dt) { c->view.step.dt = dt; }
+extern "C" void COLLISION(set_step)(struct sadmm_cuda_collision *c, double dt, double gravity)
+{
+    c->view.step.dt = dt;
+    c->view.step.gravity = gravity;
+}
 
 extern "C" void COLLISION(settle)(struct sadmm_cuda_collision *c, int current,
                                   struct sadmm_cuda_contact_counts counts)

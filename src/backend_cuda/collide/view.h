@@ -86,7 +86,7 @@ struct collision_grid {
 
 /* Numbers of the step. */
 struct collision_step {
-    double dt, margin, acceleration;
+    double dt, margin, gravity;
 };
 
 struct collision_set {

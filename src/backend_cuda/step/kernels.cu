@@ -36,8 +36,9 @@ static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __
 
 /* ---- start ----------------------------------------------------------------------------------------------------- */
 
-/* What a body brings along, in the order of both structures: position, orientation, velocity. */
-enum { CARRIED = 13, CARRIED_VELOCITY = 7, START_LANES = 16 };
+/* What a body brings along, in the order of both structures: position, orientation, velocity. Then, by a lane each, what
+ * its wrench gives it. */
+enum { CARRIED = 13, CARRIED_VELOCITY = 7, LANE_FORCE = CARRIED, LANE_TORQUE, START_LANES = 16 };
 static_assert(offsetof(struct sadmm_rigid, velocity) == CARRIED_VELOCITY * sizeof(double) &&
                   offsetof(struct sadmm_collision_body, velocity) == CARRIED_VELOCITY * sizeof(double),
               "numbers of a body are copied one by one");
@@ -53,9 +54,16 @@ static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, co
         v.step.control->culprit = INT32_MAX;
         v.step.control->stamps[STAMP_START] = nanoseconds();
     }
-    if (i >= v.bodies || lane >= CARRIED) return;
-    const double number = ((const double *)&v.step.before[i])[lane];
-    ((double *)&v.step.bodies[v.step.slot_of_body[i]])[lane] = number;
+    if (i >= v.bodies) return;
+    const struct sadmm_rigid *body = &v.step.before[i];
+    struct sadmm_collision_body *out = &v.step.bodies[v.step.slot_of_body[i]];
+    if (lane == LANE_FORCE) out->acceleration[0] = rigid_acceleration(body->mass, v3_load(body->wrench));
+    if (lane == LANE_TORQUE)
+        out->acceleration[1] = rigid_angular_acceleration(q_load(body->orientation), v3_load(body->inertia),
+                                                          v3_load(body->wrench + 3));
+    if (lane >= CARRIED) return;
+    const double number = ((const double *)body)[lane];
+    ((double *)out)[lane] = number;
     if (lane < CARRIED_VELOCITY) return;
     const int32_t k = lane - CARRIED_VELOCITY;
     v.step.start_velocity[6 * i + k] = steady_start_component(number, &v.step.steady_before[i], k);

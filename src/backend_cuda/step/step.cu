@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "collision/bounds.h"
 #include "collision/collision.h"
 #include "core/base/memory.h"
 #include "core/solve/stages.h"
@@ -626,7 +627,7 @@ extern "C" sadmm_status CUDA(step_world)(struct sadmm_context *c, const struct s
         CUDA_TRY(see_all(c, error));
         s->settings = *settings;
         s->planned = false;
-        COLLISION(set_time_step)(s->collision, settings->dt);
+        COLLISION(set_step)(s->collision, settings->dt, gravity_size(settings->gravity));
     }
     if (!s->planned) CUDA_TRY(see_all(c, error));
     CUDA_TRY(launch_edits_of(c, s->enqueued, error));

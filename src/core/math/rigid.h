@@ -81,6 +81,16 @@ SADMM_INLINE vec3 rigid_angular_momentum(quat q, vec3 inertia, vec3 w_world, rea
     return m3_mul(R, v3(inertia.x * w.x, inertia.y * w.y, inertia.z * w.z));
 }
 
+/* Sizes of the accelerations that a force (N) and a torque (N m, world frame) give by themselves, m/s^2 and rad/s^2. */
+SADMM_INLINE real rigid_acceleration(real mass, vec3 force) { return v3_norm(force) / mass; }
+SADMM_INLINE real rigid_angular_acceleration(quat q, vec3 inertia, vec3 torque)
+{
+    vec3 t;
+    if (v3_max_abs(torque) == 0) return 0;
+    t = m3_tmul(q_matrix(q), torque);
+    return v3_norm(v3(t.x / inertia.x, t.y / inertia.y, t.z / inertia.z));
+}
+
 /* Semi-implicit Euler: the pose moves with the end-of-step velocity. */
 SADMM_INLINE vec3 rigid_move(vec3 x, vec3 v, real dt) { return v3_madd(x, dt, v); }
 SADMM_INLINE quat rigid_turn(quat q, vec3 w, real dt) { return q_normalize(q_mul(q_exp(v3_scale(w, dt)), q)); }

@@ -1,7 +1,9 @@
 /* The world as a step reads it: dynamic bodies in slot order, bodies and shapes as collision sees them, the system. */
 #include <string.h>
 
+#include "collision/bounds.h"
 #include "core/base/memory.h"
+#include "core/math/rigid.h"
 #include "core/model/steady.h"
 #include "world_internal.h"
 
@@ -30,9 +32,14 @@ static void gather_slots(sadmm_world *world, size_t begin, size_t end, int32_t d
         memcpy(out->position, body->rigid.position, sizeof out->position);
         memcpy(out->orientation, body->rigid.orientation, sizeof out->orientation);
         memcpy(out->velocity, body->rigid.velocity, sizeof out->velocity);
+        out->acceleration[0] = out->acceleration[1] = 0;
         out->environment = body->environment;
         out->system_body = body->system_body = -1;
         if (!moves(body)) continue;
+        const struct sadmm_rigid *rigid = &body->rigid;
+        out->acceleration[0] = rigid_acceleration(rigid->mass, v3_load(rigid->wrench));
+        out->acceleration[1] = rigid_angular_acceleration(q_load(rigid->orientation), v3_load(rigid->inertia),
+                                                          v3_load(rigid->wrench + 3));
         out->system_body = body->system_body = dynamic;
         world->start[dynamic] = body->rigid;
         steady_start(&body->rigid, &body->steady, world->velocity + 6 * (size_t)dynamic);
@@ -86,6 +93,7 @@ struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *worl
         .friction_pairs = world->friction_pairs.keys,
         .friction_values = world->friction_pairs.values,
         .friction_pair_count = world->friction_pairs.count,
+        .gravity = gravity_size(world->def.settings.gravity),
     };
     return input;
 }
