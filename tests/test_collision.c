@@ -121,6 +121,7 @@ static void copy_set(struct sadmm_contact_set *to, const struct sadmm_contact_se
     if (from->point_count) memcpy(to->points, from->points, from->point_count * sizeof *to->points);
     to->pair_count = from->pair_count;
     to->point_count = from->point_count;
+    to->dt = from->dt;
 }
 
 /* Bit for bit. */
@@ -589,6 +590,57 @@ START_TEST(a_reused_slot_inherits_nothing)
 }
 END_TEST
 
+/* A cube that has sunk into a thin slab until its centre is below the slab's is still pushed up; one that was put there is
+ * not. */
+START_TEST(a_pose_that_is_set_forgets_the_axis)
+{
+    for (int which = 0; which < 3; ++which) {
+        struct scene *s = make_scene(NULL);
+        int32_t slab = add_shape(s, add_body(s, false, 0, 0, 0), SADMM_SHAPE_BOX, 0.5, 0.5, 0.002);
+        int32_t cube = add_box(s, 0.05, 0, 0, 0.0515);
+        for (int step = 0; step < 4; ++step) {
+            find(s);
+            s->bodies[s->shapes[cube].body].position[2] -= 0.0171;
+        }
+        find(s);
+        ck_assert_double_gt(pair_of(s, slab, cube)->normal[2], 0.9);
+        put_impulses(s);
+        if (which != 1) s->bodies[s->shapes[slab].body].placed += 1;
+        if (which != 0) s->bodies[s->shapes[cube].body].placed += 3;
+        find(s);
+        ck_assert_double_lt(pair_of(s, slab, cube)->normal[2], -0.9);
+        free_scene(s);
+    }
+}
+END_TEST
+
+/* What carries over are forces: impulses go with the length of the step, and are the same bits where it stays. */
+START_TEST(impulses_go_with_the_time_step)
+{
+    struct scene *s = make_scene(NULL);
+    add_ground(s);
+    add_box(s, 0.05, 0, 0, 0.05);
+    find(s);
+    put_impulses(s);
+    for (int step = 0; step < 4; ++step) {
+        const double ratio = (const double[]){1, 2, 0.1, 1}[step];
+        struct sadmm_contact_set before;
+        copy_set(&before, &s->contacts);
+        s->input.dt *= ratio;
+        find(s);
+        ck_assert_uint_eq(s->contacts.point_count, 4);
+        for (int i = 0; i < 4; ++i)
+            for (int k = 0; k < 3; ++k) {
+                const double now = s->contacts.points[i].impulse[k], old = before.points[i].impulse[k];
+                if (ratio == 1) ck_assert_double_eq(now, old);
+                ck_assert_double_eq_tol(now, ratio * old, 1e-15); /* rounding */
+            }
+        sadmm_contact_set_free(&before);
+    }
+    free_scene(s);
+}
+END_TEST
+
 START_TEST(a_find_can_be_undone)
 {
     struct scene *s = make_scene(NULL);
@@ -820,6 +872,8 @@ int main(void)
     tcase_add_test(cases, impulses_carry_over_by_feature);
     tcase_add_test(cases, impulses_follow_the_normal);
     tcase_add_test(cases, a_reused_slot_inherits_nothing);
+    tcase_add_test(cases, a_pose_that_is_set_forgets_the_axis);
+    tcase_add_test(cases, impulses_go_with_the_time_step);
     tcase_add_test(cases, a_find_can_be_undone);
     tcase_add_loop_test(cases, lack_of_memory_changes_nothing, 0, 2);
     tcase_add_loop_test(cases, the_steady_state_allocates_nothing, 0, 2);

@@ -70,7 +70,7 @@ static void check_same(const struct sadmm_contact_set *host, const struct sadmm_
                       "%s: pair %zu is %d-%d instead of %d-%d", about, i, q->shape_a, q->shape_b, p->shape_a,
                       p->shape_b);
         ck_assert_msg(p->body_a == q->body_a && p->body_b == q->body_b && p->first == q->first &&
-                          p->count == q->count && p->cache == q->cache && p->reserved == q->reserved,
+                          p->count == q->count && p->cache == q->cache && p->revision == q->revision && p->placed == q->placed,
                       "%s: pair %zu (shapes %d-%d): %d points from %d, cache %u instead of %d from %d, cache %u", about,
                       i, p->shape_a, p->shape_b, q->count, q->first, q->cache, p->count, p->first, p->cache);
         ck_assert_msg(same_numbers(p->normal, q->normal, 3) && same_numbers(&p->friction, &q->friction, 1) &&

@@ -47,7 +47,7 @@ SADMM_API sadmm_status sadmm_backend_query(sadmm_backend backend, sadmm_backend_
  * Symbols are the paper's (Sec. III-D). "kg/s^2" values are the paper's time-scaled units; the solver works
  * in impulses and converts (beta_impulse = dt^2 beta_paper, docs/algorithm.md). */
 typedef struct sadmm_settings {
-    double dt;                   /* time step, s, in [1e-6, 1]; default 0.005 */
+    double dt;                   /* time step, s, in [1e-6, 1]; default 0.005. It may change from step to step */
     double gravity[3];           /* m/s^2, world frame, finite, norm <= 1e6; default (0, 0, -9.81) */
 
     sadmm_method method;         /* default SADMM_METHOD_FAST: the same solutions in fewer iterations that cost the same

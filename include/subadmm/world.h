@@ -42,7 +42,8 @@ SADMM_API sadmm_status sadmm_world_create(const sadmm_world_def *def, sadmm_worl
 SADMM_API void sadmm_world_destroy(sadmm_world *world); /* NULL is fine */
 SADMM_API const char *sadmm_world_message(const sadmm_world *world);
 
-/* Replace or read the settings; they take effect at the next step. Errors: INVALID_ARGUMENT (nothing changes). */
+/* Replace or read the settings; they take effect at the next step. Steps of another length (dt) go on with the forces of
+ * the last one. Errors: INVALID_ARGUMENT (nothing changes). */
 SADMM_API sadmm_status sadmm_world_set_settings(sadmm_world *world, const sadmm_settings *settings);
 SADMM_API sadmm_settings sadmm_world_settings(const sadmm_world *world);
 
@@ -79,6 +80,8 @@ typedef struct sadmm_body_state {
 } sadmm_body_state;
 
 SADMM_API sadmm_status sadmm_world_body_state(const sadmm_world *world, sadmm_body_id id, sadmm_body_state *state);
+/* A pose other than the body has is a jump: the body's contacts are found as those of bodies that never touched before,
+ * without what was known of the side they came from. Velocities may be set with the pose that was read. */
 SADMM_API sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, const sadmm_body_state *state);
 /* Read back the definition (mass, inertia, type, name; the name stays valid until the body is removed) with the current state. */
 SADMM_API sadmm_status sadmm_world_body_def(const sadmm_world *world, sadmm_body_id id, sadmm_body_def *def);
@@ -129,6 +132,11 @@ SADMM_API sadmm_status sadmm_world_shape_def(const sadmm_world *world, sadmm_sha
 SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_shape_id a, sadmm_shape_id b, double friction);
 
 /* ---- stepping ---------------------------------------------------------------------------------------------- */
+
+/* Beside bodies and shapes a world keeps from step to step: the impulse of every contact (by shapes and feature), the axis
+ * and side of every pair of shapes, and how steadily each body accelerates. The next step starts there, a world's first step
+ * from nothing. So the same states, reached in another way or set again, go on alike but not bit for bit; a run that is to
+ * be repeated bit for bit begins with a new world. */
 
 /* One time step of settings.dt. Errors: OUT_OF_MEMORY, NON_FINITE (state rolled back to before the step, message
  * names the body), DEVICE, LIMIT. After an error the world is as before the step and stays usable. */

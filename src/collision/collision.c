@@ -144,6 +144,7 @@ static bool find_in_threads(struct sadmm_collision *collision, const struct sadm
         out->pair_count = out->point_count = 0;
         ok = sadmm_narrow_phase(c, input, begin, end, old, out) && ok;
     }
+    collision->spare.dt = input->dt;
     return ok && append_parts(&collision->spare, collision->parts, (size_t)threads - 1);
 }
 

@@ -68,7 +68,9 @@ static void emit(const struct sadmm_candidates *c, const struct sadmm_collision_
     pair->friction = pair_friction(input, a, b, pa->friction, pb->friction);
     pair->restitution = pa->restitution > pb->restitution ? pa->restitution : pb->restitution;
     pair->cache = m->cache;
-    pair->reserved = revision_of_pair(pa->revision, pb->revision);
+    pair->revision = word_of_pair(pa->revision, pb->revision);
+    pair->placed = word_of_pair(pa->placed, pb->placed);
+    pair->reserved = 0;
     for (int k = 0; k < 3; ++k) between[k] = pb->com[k] - pa->com[k];
 
     for (int i = 0; i < m->count; ++i) {
@@ -90,7 +92,8 @@ static void emit(const struct sadmm_candidates *c, const struct sadmm_collision_
         for (int32_t j = 0; j < old->count; ++j) {
             const struct sadmm_contact_point *before = &old_set->points[old->first + j];
             if (before->feature != from->feature) continue;
-            impulse_carry(old->normal, before->impulse, pair->normal, pair->friction, point->impulse);
+            impulse_carry(old->normal, before->impulse, pair->normal, pair->friction,
+                          step_ratio(input->dt, old_set->dt), point->impulse);
             break;
         }
     }
@@ -118,13 +121,13 @@ bool sadmm_narrow_phase(const struct sadmm_candidates *c, const struct sadmm_col
             continue;
         while (next < old->pair_count && pair_key_of(&old->pairs[next]) < key) ++next;
         if (next < old->pair_count && pair_key_of(&old->pairs[next]) == key &&
-            old->pairs[next].reserved == revision_of_pair(pa->revision, pb->revision))
+            old->pairs[next].revision == word_of_pair(pa->revision, pb->revision))
             before = &old->pairs[next];
 
         limit = proxy_limit(pa, pb, input->margin, input->gravity, input->dt);
         pose = pair_pose(pa->type == SADMM_SHAPE_PLANE, pa->R, pa->x, pb->R, pb->x);
         pair_manifold(pa->type, v3_load(pa->size), pb->type, v3_load(pb->size), &pose, (real)limit,
-                      before ? before->cache : 0, &m);
+                      before && before->placed == word_of_pair(pa->placed, pb->placed) ? before->cache : 0, &m);
         if (m.count == 0) continue;
         if (!sadmm_grow((void **)&out->pairs, &out->pair_capacity, out->pair_count, out->pair_count + 1,
                         sizeof *out->pairs) ||

@@ -16,7 +16,7 @@ struct sadmm_proxy {
     double thin;        /* smallest extent, m */
     double friction, restitution;
     int32_t type, body, system_body;
-    uint32_t revision;
+    uint32_t revision, placed;
 };
 
 /* `box` is left alone for a plane. gravity: its size, m/s^2. */
@@ -48,6 +48,7 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
     p->body = shape->body;
     p->system_body = body->system_body;
     p->revision = shape->revision;
+    p->placed = body->placed;
     if (shape->type == SADMM_SHAPE_PLANE) return;
     shape_world_extent(p->type, p->size, p->R, extent);
     shape_box(p->x, extent, shape_reach(margin, p->thin, p->fall, fall_of(gravity, dt)), p->velocity, p->spin, dt, box);

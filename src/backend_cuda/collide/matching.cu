@@ -17,6 +17,7 @@ static __device__ void emit_counts(const collision_view &v, uint64_t total)
     v.after.counts->candidates = (int64_t)*v.candidate_count;
     v.after.counts->pairs = (int32_t)(total >> 32);
     v.after.counts->points = (int32_t)(uint32_t)total;
+    v.after.counts->dt = v.step.dt;
 }
 
 /* Point `lane` of candidate i; place: pairs << 32 | points before it. */
@@ -45,7 +46,9 @@ static __device__ void emit_point(const collision_view &v, int64_t i, int32_t la
         pair.friction = friction;
         pair.restitution = fmax(pa->restitution, pb->restitution);
         pair.cache = m->cache;
-        pair.reserved = revision_of_pair(pa->revision, pb->revision);
+        pair.revision = word_of_pair(pa->revision, pb->revision);
+        pair.placed = word_of_pair(pa->placed, pb->placed);
+        pair.reserved = 0;
         v.after.pairs[at] = pair;
         v.after.keys[at] = ordered_key(a, b);
     }
@@ -73,7 +76,8 @@ static __device__ void emit_point(const collision_view &v, int64_t i, int32_t la
             const int32_t k = lane + n < old_count ? lane + n : (lane + n) % old_count;
             const struct sadmm_contact_point *before = &v.before.points[old_first + k];
             if (before->feature != from.feature) continue;
-            impulse_carry(old->normal, before->impulse, normal, friction, point.impulse);
+            impulse_carry(old->normal, before->impulse, normal, friction,
+                          step_ratio(v.step.dt, v.before.counts->dt), point.impulse);
             break;
         }
     }

@@ -55,6 +55,7 @@ static const double LARGE = 8;
 
 struct contact_counts {
     int32_t pairs, points;
+    double dt;
 };
 
 namespace {
@@ -639,6 +640,7 @@ extern "C" sadmm_status COLLISION(upload)(struct sadmm_cuda_collision *c, void *
     counts->candidates = (int64_t)set->pair_count;
     counts->pairs = (int32_t)set->pair_count;
     counts->points = (int32_t)set->point_count;
+    counts->dt = set->dt;
     for (size_t i = 0; i < set->pair_count; ++i)
         keys[i] = ordered_key((uint32_t)set->pairs[i].shape_a, (uint32_t)set->pairs[i].shape_b);
     if (set->pair_count > 0) memcpy(in<void>(c, PINNED_PAIRS), set->pairs, set->pair_count * sizeof *set->pairs);
@@ -650,6 +652,7 @@ extern "C" sadmm_status COLLISION(upload)(struct sadmm_cuda_collision *c, void *
     c->current = which;
     c->counts[which].pairs = counts->pairs;
     c->counts[which].points = counts->points;
+    c->counts[which].dt = counts->dt;
     return SADMM_OK;
 }
 
@@ -668,6 +671,7 @@ extern "C" sadmm_status COLLISION(find)(struct sadmm_cuda_collision *c, void *st
     c->current = 1 - c->current;
     c->counts[c->current].pairs = counts.pairs;
     c->counts[c->current].points = counts.points;
+    c->counts[c->current].dt = counts.dt;
     c->can_undo = true;
     ++c->stats.finds;
     if (out) {
@@ -702,6 +706,7 @@ extern "C" sadmm_status COLLISION(download)(struct sadmm_cuda_collision *c, void
     if (points > 0) memcpy(contacts->points, in<void>(c, PINNED_POINTS), points * sizeof *contacts->points);
     contacts->pair_count = pairs;
     contacts->point_count = points;
+    contacts->dt = counts.dt;
     return SADMM_OK;
 }
 
@@ -799,6 +804,7 @@ extern "C" void COLLISION(settle)(struct sadmm_cuda_collision *c, int current,
     c->current = current;
     c->counts[current].pairs = counts.pairs;
     c->counts[current].points = counts.points;
+    c->counts[current].dt = counts.dt;
     c->can_undo = false;
     c->pending = false;
 }

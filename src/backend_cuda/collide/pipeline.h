@@ -15,6 +15,7 @@ struct sadmm_cuda_collision;
 struct sadmm_cuda_contact_counts {
     int64_t candidates; /* pairs of shapes whose boxes overlap */
     int32_t pairs, points;
+    double dt;          /* of the step that the impulses are for, s; 0: of none */
 };
 
 /* The current set. Device memory, valid until the second find from now on, an upload or destroy. */

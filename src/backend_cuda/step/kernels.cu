@@ -26,6 +26,8 @@ static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __
     const struct sadmm_resident_edit *edit = &args.edits[i];
     struct sadmm_rigid *body = const_cast<struct sadmm_rigid *>(&v.step.before[edit->body]);
     if (edit->what & SADMM_EDIT_STATE) {
+        steady_place(const_cast<struct sadmm_steady *>(&v.step.steady_before[edit->body]), body, edit->position,
+                     edit->orientation);
         for (int k = 0; k < 3; ++k) body->position[k] = edit->position[k];
         for (int k = 0; k < 4; ++k) body->orientation[k] = edit->orientation[k];
         for (int k = 0; k < 6; ++k) body->velocity[k] = edit->velocity[k];
@@ -37,8 +39,8 @@ static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __
 /* ---- start ----------------------------------------------------------------------------------------------------- */
 
 /* What a body brings along, in the order of both structures: position, orientation, velocity. Then, by a lane each, what
- * its wrench gives it. */
-enum { CARRIED = 13, CARRIED_VELOCITY = 7, LANE_FORCE = CARRIED, LANE_TORQUE, START_LANES = 16 };
+ * its wrench gives it and how often it was placed. */
+enum { CARRIED = 13, CARRIED_VELOCITY = 7, LANE_FORCE = CARRIED, LANE_TORQUE, LANE_PLACED, START_LANES };
 static_assert(offsetof(struct sadmm_rigid, velocity) == CARRIED_VELOCITY * sizeof(double) &&
                   offsetof(struct sadmm_collision_body, velocity) == CARRIED_VELOCITY * sizeof(double),
               "numbers of a body are copied one by one");
@@ -61,12 +63,13 @@ static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, co
     if (lane == LANE_TORQUE)
         out->acceleration[1] = rigid_angular_acceleration(q_load(body->orientation), v3_load(body->inertia),
                                                           v3_load(body->wrench + 3));
+    if (lane == LANE_PLACED) out->placed = v.step.steady_before[i].placed;
     if (lane >= CARRIED) return;
     const double number = ((const double *)body)[lane];
     ((double *)out)[lane] = number;
     if (lane < CARRIED_VELOCITY) return;
     const int32_t k = lane - CARRIED_VELOCITY;
-    v.step.start_velocity[6 * i + k] = steady_start_component(number, &v.step.steady_before[i], k);
+    v.step.start_velocity[6 * i + k] = steady_start_component(number, &v.step.steady_before[i], v.settings.dt, k);
 }
 
 /* ---- gates ----------------------------------------------------------------------------------------------------- */
@@ -106,7 +109,7 @@ static __device__ bool finish_body(const cuda_view &v, int32_t i, const body_bef
     struct sadmm_rigid next = before.body;
     const solver_real slow = v.step.limits ? slow_down(v, i) : (solver_real)1;
     move_body(v, i, &before.body, slow, next.position, next.orientation, next.velocity);
-    steady_keep(&steady, &before.body, &next);
+    steady_keep(&steady, &before.body, &next, v.settings.dt);
     v.step.after[i] = next;
     v.step.steady_after[i] = steady;
     return finite_numbers(next.position, 3) && finite_numbers(next.orientation, 4) && finite_numbers(next.velocity, 6);

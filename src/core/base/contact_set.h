@@ -20,6 +20,7 @@ struct sadmm_contact_pair {
     double friction;          /* mu */
     double restitution;
     uint32_t cache;           /* narrow phase: separating or reference axis of the last step, 0 = none */
+    uint32_t revision, placed; /* of the two shapes, and of their bodies' poses (collision/contact_carry.h) */
     uint32_t reserved;
 };
 
@@ -37,6 +38,7 @@ struct sadmm_contact_set {
     struct sadmm_contact_pair *pairs;
     struct sadmm_contact_point *points;
     size_t pair_count, pair_capacity, point_count, point_capacity;
+    double dt; /* of the step that its impulses are for, s; 0: of none */
 };
 
 void sadmm_contact_set_free(struct sadmm_contact_set *contacts);

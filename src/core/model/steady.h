@@ -1,15 +1,16 @@
-/* The velocity a solve starts from.
+/* What is remembered of a body from step to step: the velocity a solve starts from, and whether its pose was set.
  *
  * A contact that slides holds its impulse at the cone's edge whatever the velocity does, so a step's change of speed has
  * to come from the momentum balance alone, by a factor m / (m + J^T beta J) an iteration: a few per cent of it are still
  * missing after a hundred. Where the last steps changed a body's velocity by the same amount (sliding under gravity or
  * friction), the next one starts from that change and nothing is missing. Only after three such steps: with few
- * iterations velocities jitter, and following the jitter would feed it.
+ * iterations velocities jitter, and following the jitter would feed it. What stays the same is the acceleration: a change
+ * counts by the length of its step. A pose that is set ends a streak: the body is where other contacts are.
  */
 #ifndef SADMM_CORE_MODEL_STEADY_H
 #define SADMM_CORE_MODEL_STEADY_H
 
-#include "core/math/real.h"
+#include "core/math/step.h"
 #include "system.h"
 
 enum { STEADY_STEPS = 3 };
@@ -17,24 +18,41 @@ enum { STEADY_STEPS = 3 };
 #define STEADY_SHARE 0.25
 
 /* Component k of it, from the velocity's. */
-SADMM_INLINE double steady_start_component(double velocity, const struct sadmm_steady *steady, int k)
+SADMM_INLINE double steady_start_component(double velocity, const struct sadmm_steady *steady, double dt, int k)
 {
-    return velocity + (steady->streak[k / 3] >= STEADY_STEPS ? steady->change[k] : 0);
+    return velocity + (steady->streak[k / 3] >= STEADY_STEPS ? step_ratio(dt, steady->dt) * steady->change[k] : 0);
 }
 
-SADMM_INLINE void steady_start(const struct sadmm_rigid *body, const struct sadmm_steady *steady, double velocity[6])
+SADMM_INLINE void steady_start(const struct sadmm_rigid *body, const struct sadmm_steady *steady, double dt,
+                               double velocity[6])
 {
-    for (int k = 0; k < 6; ++k) velocity[k] = steady_start_component(body->velocity[k], steady, k);
+    for (int k = 0; k < 6; ++k) velocity[k] = steady_start_component(body->velocity[k], steady, dt, k);
 }
 
-/* The step made `body` into `next`. */
+/* Components of an orientation that was read and is set again: it is made a unit quaternion once more. */
+#define STEADY_ROUNDING (8 * DBL_EPSILON)
+
+/* A pose is set before the next step. The one that the body has already changes nothing. */
+SADMM_INLINE void steady_place(struct sadmm_steady *steady, const struct sadmm_rigid *body, const double position[3],
+                               const double orientation[4])
+{
+    bool same = true;
+    for (int k = 0; k < 3; ++k) same = same && position[k] == body->position[k];
+    for (int k = 0; k < 4; ++k) same = same && fabs(orientation[k] - body->orientation[k]) <= STEADY_ROUNDING;
+    if (same) return;
+    ++steady->placed;
+    steady->streak[0] = steady->streak[1] = 0;
+}
+
+/* The step of length dt made `body` into `next`. */
 SADMM_INLINE void steady_keep(struct sadmm_steady *steady, const struct sadmm_rigid *body,
-                              const struct sadmm_rigid *next)
+                              const struct sadmm_rigid *next, double dt)
 {
+    double ratio = step_ratio(dt, steady->dt);
     for (int part = 0; part < 2; ++part) {
         double size = 0, differs = 0;
         for (int k = 3 * part; k < 3 * part + 3; ++k) {
-            double change = next->velocity[k] - body->velocity[k], difference = change - steady->change[k];
+            double change = next->velocity[k] - body->velocity[k], difference = change - ratio * steady->change[k];
             size += change * change;
             differs += difference * difference;
             steady->change[k] = change;
@@ -43,6 +61,7 @@ SADMM_INLINE void steady_keep(struct sadmm_steady *steady, const struct sadmm_ri
         int32_t before = steady->streak[part];
         steady->streak[part] = same ? (before < STEADY_STEPS ? before + 1 : STEADY_STEPS) : 0;
     }
+    steady->dt = dt;
 }
 
 #endif

@@ -31,7 +31,10 @@ struct sadmm_rigid {
 /* What is remembered of a body's last steps (steady.h). */
 struct sadmm_steady {
     double change[6];  /* of the velocity in the last step */
-    int32_t streak[2]; /* steps in a row with nearly the same change: linear, angular */
+    double dt;         /* of that step, s; 0: there was none */
+    int32_t streak[2]; /* steps in a row with nearly the same acceleration: linear, angular */
+    uint32_t placed;   /* how often its pose was set to another one */
+    uint32_t reserved;
 };
 
 struct sadmm_system {

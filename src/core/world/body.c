@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "core/base/memory.h"
+#include "core/model/steady.h"
 #include "world_internal.h"
 
 static const double POSITION_LIMIT = 1e9, VELOCITY_LIMIT = 1e6, WRENCH_LIMIT = 1e15;
@@ -176,6 +177,7 @@ sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, co
                      body->type, error));
     /* A static body is part of what the backend was given once. */
     TRY(body->system_body < 0 ? sadmm_world_take_back(world) : sadmm_world_edit_room(world));
+    steady_place(&body->steady, &body->rigid, state->position, orientation);
     memcpy(body->rigid.position, state->position, sizeof state->position);
     memcpy(body->rigid.orientation, orientation, sizeof orientation);
     memcpy(body->rigid.velocity, state->linear_velocity, sizeof state->linear_velocity);

@@ -33,6 +33,7 @@ static void gather_slots(sadmm_world *world, size_t begin, size_t end, int32_t d
         memcpy(out->orientation, body->rigid.orientation, sizeof out->orientation);
         memcpy(out->velocity, body->rigid.velocity, sizeof out->velocity);
         out->acceleration[0] = out->acceleration[1] = 0;
+        out->placed = body->steady.placed;
         out->environment = body->environment;
         out->system_body = body->system_body = -1;
         if (!moves(body)) continue;
@@ -42,7 +43,7 @@ static void gather_slots(sadmm_world *world, size_t begin, size_t end, int32_t d
                                                           v3_load(rigid->wrench + 3));
         out->system_body = body->system_body = dynamic;
         world->start[dynamic] = body->rigid;
-        steady_start(&body->rigid, &body->steady, world->velocity + 6 * (size_t)dynamic);
+        steady_start(&body->rigid, &body->steady, world->def.settings.dt, world->velocity + 6 * (size_t)dynamic);
         memcpy(world->start_velocity + 6 * (size_t)dynamic, world->velocity + 6 * (size_t)dynamic,
                6 * sizeof *world->velocity);
         world->slot_of[dynamic++] = (int32_t)slot;

@@ -11,6 +11,7 @@
 #include "core/base/clock.h"
 #include "core/solve/certificate.h"
 #include "core/base/memory.h"
+#include "core/model/steady.h"
 #include "world_internal.h"
 
 /* A resident step is enqueued with all of its looks, and those that nobody needs any more take time as well. */
@@ -50,9 +51,11 @@ void sadmm_world_edit(sadmm_world *world, const struct sadmm_world_body *body, u
     memcpy(edit->wrench, body->rigid.wrench, sizeof edit->wrench);
 }
 
-static void apply(struct sadmm_rigid *rigid, const struct sadmm_resident_edit *edit)
+static void apply(struct sadmm_world_body *body, const struct sadmm_resident_edit *edit)
 {
+    struct sadmm_rigid *rigid = &body->rigid;
     if (edit->what & SADMM_EDIT_STATE) {
+        steady_place(&body->steady, rigid, edit->position, edit->orientation);
         memcpy(rigid->position, edit->position, sizeof rigid->position);
         memcpy(rigid->orientation, edit->orientation, sizeof rigid->orientation);
         memcpy(rigid->velocity, edit->velocity, sizeof rigid->velocity);
@@ -65,6 +68,7 @@ static void apply(struct sadmm_rigid *rigid, const struct sadmm_resident_edit *e
 static sadmm_status load(sadmm_world *world)
 {
     size_t n = (size_t)world->dynamic_count;
+    world->contacts_readable = false; /* what they are read with is the next step's from here on */
     TRY(sadmm_world_gather(world));
     if (!sadmm_grow((void **)&world->resident.steady, &world->resident.steady_capacity, 0, n + 1,
                     sizeof *world->resident.steady))
@@ -169,7 +173,7 @@ sadmm_status sadmm_world_pull_bodies(const sadmm_world *constant)
             memcpy(body->contact_wrench, world->wrench + 6 * (size_t)i, sizeof body->contact_wrench);
     }
     for (size_t k = 0; k < world->resident.edit_count; ++k)
-        apply(&world->bodies[world->slot_of[world->resident.edits[k].body]].rigid, &world->resident.edits[k]);
+        apply(&world->bodies[world->slot_of[world->resident.edits[k].body]], &world->resident.edits[k]);
     world->resident.bodies_behind = false;
     return SADMM_OK;
 }

@@ -87,7 +87,7 @@ static void commit(sadmm_world *world)
 #pragma omp parallel for schedule(static) num_threads(threads) if (threads > 1)
     for (int32_t i = 0; i < world->dynamic_count; ++i) {
         struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
-        steady_keep(&body->steady, &body->rigid, &world->next[i]);
+        steady_keep(&body->steady, &body->rigid, &world->next[i], world->def.settings.dt);
         body->rigid = world->next[i];
         if (world->plan.wrenches) memcpy(body->contact_wrench, world->wrench + 6 * (size_t)i, sizeof body->contact_wrench);
     }
