@@ -356,6 +356,38 @@ START_TEST(nearly_parallel_edges_touch_along_a_line)
 }
 END_TEST
 
+/* A corner of one box over the inside of a face of the other, and the last step's axis an edge axis that is nearly as good:
+ * the edges do not cross, and the corner lies on no edge of the other box. The normal is still one along which the boxes are
+ * as far apart as along the best. */
+START_TEST(a_corner_over_a_face_has_the_normal_of_the_face)
+{
+    struct random r = {41};
+    int contacts = 0;
+    for (int n = 0; n < 20000; ++n) {
+        struct solid a = box_at(0.05, 0.05, 0.05, 0, 0, 0), b = box_at(0.05, 0.04, 0.03, 0, 0, 0);
+        double axis[3];
+        random_rotation(&r, a.R);
+        random_rotation(&r, b.R);
+        spread_direction(n, 20000, b.x);
+        for (int k = 0; k < 3; ++k) b.x[k] *= 0.08;
+        uint32_t cache = 0;
+        for (int step = 0; step < 6; ++step) {
+            for (int k = 0; k < 3; ++k) b.x[k] += random_in(&r, -2e-3, 2e-3);
+            double gap = box_separation(&a, &b, axis);
+            for (int k = 0; k < 3; ++k) b.x[k] += axis[k] * (2e-4 - gap);
+            struct world_manifold m = touch(&a, &b, 2e-3, cache);
+            double best = box_separation(&a, &b, NULL);
+            cache = m.count ? m.cache : 0;
+            if (best <= 0 || m.count == 0) continue;
+            ++contacts;
+            /* twice: the cached axis, and a face for an edge axis */
+            ck_assert_double_ge(separation_along(&a, &b, m.normal), best - 2 * choice(&a, &b, 0));
+        }
+    }
+    ck_assert_int_gt(contacts, 20000);
+}
+END_TEST
+
 /* A card leans with its upper edge just below and beside the end of a lying one: both ends of the line that they have in
  * common, whichever way the last bit turns. (Half the contacts of a card house begin like that.) */
 START_TEST(edges_side_by_side_touch_at_both_ends)
@@ -932,6 +964,7 @@ int main(void)
     tcase_add_test(boxes, crossing_ridges);
     tcase_add_test(boxes, nearly_parallel_edges_touch_along_a_line);
     tcase_add_test(boxes, corners_apart_meet_by_their_closest_points);
+    tcase_add_test(boxes, a_corner_over_a_face_has_the_normal_of_the_face);
     tcase_add_test(boxes, edges_side_by_side_touch_at_both_ends);
     tcase_add_test(boxes, swapping_the_two_solids_reverses_the_normal);
     tcase_add_test(boxes, a_rigid_motion_carries_the_manifold_along);

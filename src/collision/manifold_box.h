@@ -206,6 +206,20 @@ SADMM_INLINE int box_axis_manifold(const struct box_pair *b, int axis, int negat
     return m->count;
 }
 
+/* Boxes apart whose closest features are a corner of 1 and the inside of the best face, one of 2? (That corner is on no
+ * edge of 2, where box_corner_manifold looks.) */
+SADMM_INLINE bool box_corner_over_face(const struct box_pair *b, const struct box_axes *axes)
+{
+    int face = axes->best_face - 3, k, j;
+    real n[3], x[3];
+    if (face < 0) return false;
+    v3_to_array(box_axis_direction(b, axes->best_face, axes->negative[axes->best_face]), n);
+    for (k = 0; k < 3; ++k) x[k] = (n[k] > 0 ? b->h1[k] : -b->h1[k]) - b->t[k];
+    for (j = 0; j < 3; ++j)
+        if (j != face && real_abs(x[0] * b->R[0][j] + x[1] * b->R[1][j] + x[2] * b->R[2][j]) > b->h2[j]) return false;
+    return true;
+}
+
 SADMM_INLINE void manifold_box_box(vec3 half1, vec3 half2, const struct pair_pose *pose, real limit, uint32_t cache,
                                    struct manifold *m)
 {
@@ -234,7 +248,9 @@ SADMM_INLINE void manifold_box_box(vec3 half1, vec3 half2, const struct pair_pos
     if (m->count > 0 && use_edge) s = m->points[m->count - 1].separation;
     if (m->count == 0 || (!crossing && s > 0)) {
         if (s > 0) {
-            box_corner_manifold(&b, box_axis_direction(&b, axis, negative), m);
+            if (box_corner_over_face(&b, &axes))
+                box_axis_manifold(&b, axes.best_face, axes.negative[axes.best_face], &crossing, m);
+            else box_corner_manifold(&b, box_axis_direction(&b, axis, negative), m);
         } else {
             /* the preferred axis has no points: then a better one, which was not preferred, has */
             int best = axes.best_face;
