@@ -356,9 +356,9 @@ START_TEST(nearly_parallel_edges_touch_along_a_line)
 }
 END_TEST
 
-/* A corner of one box over the inside of a face of the other, and the last step's axis an edge axis that is nearly as good:
- * the edges do not cross, and the corner lies on no edge of the other box. The normal is still one along which the boxes are
- * as far apart as along the best. */
+/* A corner of one box over the inside of a face of the other, and the last step's axis an edge axis that is nearly as
+ * good: the edges do not cross, and the corner lies on no edge of the other box. The normal is still one along which
+ * the boxes are as far apart as along the best. */
 START_TEST(a_corner_over_a_face_has_the_normal_of_the_face)
 {
     struct random r = {41};

@@ -9,9 +9,11 @@
  *
  * limit: points with separation <= limit are kept; a deep manifold is never dropped, and rounding favours contact.
  *
- * cache: the axis the pair used in its last step, 0 at first. Where two axes are nearly as good (apex of a house of
- * cards, a body past the midplane of a thin one) the cached axis and side stay unless clearly beaten; otherwise the
- * normal would flip from step to step.
+ * cache: the axis the pair used in its last step and the direction of the normal along it, 0: none. Where two axes
+ * are nearly as good (apex of a house of cards, a body past the midplane of a thin one) the cached axis and side stay
+ * unless clearly beaten; otherwise the normal would flip from step to step. A direction is cached as something that
+ * still is the same when the bodies have turned a little: the side of a face, which turns with its body, or else a
+ * vector in the frame of b. The sign of a cross product of two edges is none: it changes where they become parallel.
  *
  * feature: which features of the two shapes make the point. Ids do not depend on which box was the reference, so that
  * impulses survive a change of it. A feature occurs once in a manifold.
@@ -53,6 +55,10 @@ struct pair_pose {
 #define MANIFOLD_FLAT ((real)1e-4)
 /* cos 8 degrees: axes within this angle are the same direction for the choice of an axis. */
 #define MANIFOLD_COS_NEAR ((real)0.99026806874157036)
+/* cos 45 degrees: an axis that has turned by more since the last step is another one. */
+#define MANIFOLD_COS_SAME ((real)0.70710678118654752)
+/* cos 26 degrees: directions within this angle of the opposite of the last normal are the other side. */
+#define MANIFOLD_COS_OPPOSITE ((real)0.9)
 
 SADMM_INLINE void manifold_add(struct manifold *m, vec3 position, real separation, uint32_t feature)
 {
@@ -74,6 +80,26 @@ SADMM_INLINE vec3 m3_column(const mat3 *m, int j)
 {
     return j == 0 ? v3(m->r[0].x, m->r[1].x, m->r[2].x)
                   : (j == 1 ? v3(m->r[0].y, m->r[1].y, m->r[2].y) : v3(m->r[0].z, m->r[1].z, m->r[2].z));
+}
+
+/* A direction (unit) in the upper 27 bits of a cache word: 9 bits a coordinate, to 0.2 degrees. */
+enum { MANIFOLD_DIRECTION_SHIFT = 5 };
+
+SADMM_INLINE uint32_t manifold_direction_bits(vec3 n)
+{
+    const real scale = 255, middle = (real)256.5; /* from below: rounds to the nearest, in [1, 511] */
+    uint32_t x = (uint32_t)(int32_t)(middle + scale * n.x), y = (uint32_t)(int32_t)(middle + scale * n.y),
+             z = (uint32_t)(int32_t)(middle + scale * n.z);
+    return (x | y << 9 | z << 18) << MANIFOLD_DIRECTION_SHIFT;
+}
+
+/* The direction in a cache word, unit but for the rounding to 9 bits. */
+SADMM_INLINE vec3 manifold_cached_direction(uint32_t cache)
+{
+    uint32_t bits = cache >> MANIFOLD_DIRECTION_SHIFT;
+    const real unit = (real)1 / 255;
+    return v3(unit * (real)((int32_t)(bits & 511) - 256), unit * (real)((int32_t)(bits >> 9 & 511) - 256),
+              unit * (real)((int32_t)(bits >> 18 & 511) - 256));
 }
 
 SADMM_INLINE void v3_to_array(vec3 v, real a[3]) { a[0] = v.x; a[1] = v.y; a[2] = v.z; }

@@ -9,7 +9,8 @@
  * Choice of the axis. The largest separation wins, but
  *   - the cached axis stays unless beaten by 10 % of the depth plus 0.5 % of the thinner box: at the apex of two
  *     cards the two inner faces are equally good and tens of degrees apart;
- *   - the cached side stays, also past the midplane, until the boxes are apart;
+ *   - the cached side stays, also past the midplane, until the boxes are apart: an axis they overlap along is not
+ *     taken in the direction opposite to the cached one. Where they are apart the axis that says so has its true side;
  *   - an edge axis within 8 degrees of a face must beat that face by 5 % of the depth and 0.5 % of the thinner box
  *     (faces at rest have no depth to speak of): points of a face are worth more;
  *   - an edge axis is charged with its rounding error, which grows as the edges become parallel.
@@ -25,9 +26,9 @@
 struct box_axes {
     real separation[6];
     int negative[6];
-    int cached, cached_negative; /* axis of the last step, -1: none */
+    int cached;                  /* axis of the last step, -1: none */
     bool past;                   /* maybe past the midplane: sides follow the cached one */
-    vec3 n_cached;
+    vec3 n_cached;               /* the normal of the last step, turned with the boxes */
     int best_face;               /* of largest separation */
     int face, edge;              /* the ones to choose from; edge -1: none can win */
     int edge_negative;
@@ -58,6 +59,29 @@ SADMM_INLINE real box_bonus(const struct box_axes *axes, real separation)
     return MANIFOLD_KEEP_DEPTH * real_max(0, -separation) + axes->keep;
 }
 
+/* The axis and the normal of the last step as they are now that the boxes have turned. A pair of edges that are nearly
+ * parallel has an axis that turns much faster than they do: then the normal stays what it was, and no axis is cached.
+ */
+SADMM_INLINE void box_recall(const struct box_pair *b, uint32_t cache, struct box_axes *axes)
+{
+    axes->cached = (int)(cache & BOX_AXIS_MASK) - 1;
+    axes->past = false;
+    axes->n_cached = v3(0, 0, 0);
+    if (axes->cached < 0) return;
+    if (axes->cached < 6) {
+        axes->n_cached = box_axis_direction(b, axes->cached, (cache & BOX_AXIS_NEGATIVE) != 0);
+    } else {
+        vec3 n = manifold_cached_direction(cache), now = box_axis_direction(b, axes->cached, 0);
+        real along = v3_dot(n, now);
+        axes->n_cached = along < 0 ? v3_neg(now) : now;
+        if (real_abs(along) < MANIFOLD_COS_SAME) {
+            axes->n_cached = n;
+            axes->cached = -1;
+        }
+    }
+    axes->past = v3_dot(axes->n_cached, v3_from_array(b->t)) < (real)0.5 * b->thin;
+}
+
 /* Face axes; false when one separates the boxes. */
 SADMM_INLINE bool box_test_faces(struct box_pair *b, struct box_axes *axes)
 {
@@ -77,15 +101,11 @@ SADMM_INLINE bool box_test_faces(struct box_pair *b, struct box_axes *axes)
         if (s[3 + j] > reject) return false;
         axes->negative[3 + j] = b->t2[j] < 0;
     }
-    if (axes->cached >= 0) {
-        axes->n_cached = box_axis_direction(b, axes->cached, axes->cached_negative);
-        axes->past = v3_dot(axes->n_cached, v3_from_array(b->t)) < (real)0.5 * b->thin;
-    }
     if (axes->past)
         for (axis = 0; axis < 6; ++axis) {
             real d = axis < 3 ? b->t[axis] : b->t2[axis - 3];
             real c = v3_dot(box_axis_direction(b, axis, 0), axes->n_cached);
-            if (real_abs(c) > (real)0.9 && c * d < 0) {
+            if (s[axis] <= 0 && real_abs(c) > MANIFOLD_COS_OPPOSITE && c * d < 0) {
                 s[axis] -= 2 * real_abs(d);
                 axes->negative[axis] = c < 0;
             }
@@ -123,9 +143,9 @@ SADMM_INLINE bool box_test_edges(const struct box_pair *b, struct box_axes *axes
             s /= length;
             if (s > b->limit) return false;
             negative = d < 0;
-            if (axes->past) {
+            if (axes->past && s <= 0) {
                 real c = v3_dot(box_edge_axis(b, i, j), axes->n_cached);
-                if (real_abs(c) > (real)0.9 * length && c * d < 0) {
+                if (real_abs(c) > MANIFOLD_COS_OPPOSITE * length && c * d < 0) {
                     s -= 2 * real_abs(d) / length;
                     negative = c < 0;
                 }
@@ -199,10 +219,14 @@ SADMM_INLINE void box_vertex_manifold(const struct box_pair *b, int axis, int ne
 SADMM_INLINE int box_axis_manifold(const struct box_pair *b, int axis, int negative, bool *crossing,
                                    struct manifold *m)
 {
-    m->cache = (uint32_t)(axis + 1) | (negative ? BOX_AXIS_NEGATIVE : 0u);
     *crossing = true;
-    if (axis < 6) box_face_manifold(b, axis, negative, m);
-    else *crossing = box_edge_manifold(b, axis, negative, m);
+    if (axis < 6) {
+        m->cache = (uint32_t)(axis + 1) | (negative ? BOX_AXIS_NEGATIVE : 0u);
+        box_face_manifold(b, axis, negative, m);
+    } else {
+        *crossing = box_edge_manifold(b, axis, negative, m);
+        m->cache = (uint32_t)(axis + 1) | manifold_direction_bits(m->normal);
+    }
     return m->count;
 }
 
@@ -230,10 +254,7 @@ SADMM_INLINE void manifold_box_box(vec3 half1, vec3 half2, const struct pair_pos
     real s;
 
     box_pair_make(half1, half2, pose, limit, &b);
-    axes.cached = (int)(cache & BOX_AXIS_MASK) - 1;
-    axes.cached_negative = (cache & BOX_AXIS_NEGATIVE) != 0;
-    axes.past = false;
-    axes.n_cached = v3(0, 0, 0);
+    box_recall(&b, cache, &axes);
     axes.edge = -1;
     axes.edge_negative = 0;
     axes.s_edge = -(real)1e30;

@@ -6,8 +6,8 @@
 
 #include "manifold_box_round.h"
 
-/* cache: 1 + axis, axis 0-2 faces of 1, 3-5 faces of 2, 6-14 edge pairs 6 + 3 i + j; bit 16: normal (1 to 2) along
- * the negative axis. */
+/* cache: 1 + axis, axis 0-2 faces of 1, 3-5 faces of 2, 6-14 edge pairs 6 + 3 i + j. Faces: 16 when the normal (1 to 2)
+ * is along the negative axis. Edge pairs: the normal itself, in the frame of 1 (manifold_direction_bits). */
 enum { BOX_AXIS_MASK = 15, BOX_AXIS_NEGATIVE = 16 };
 
 struct box_pair {

@@ -9,7 +9,9 @@
 
 #include "manifold_round.h"
 
-/* cache of these pairs: 1 + 2 axis + (1 if the outward side is negative); capsule edges: 7 + axis, + 8 if negative. */
+/* cache of these pairs: 1 + 2 axis + (1 if the outward side is negative); edges of the box against a capsule: 7 + axis
+ * and the outward normal (manifold_direction_bits). */
+enum { BOX_ROUND_MASK = 31 };
 
 /* Separation of the interval [lo, hi] from the slab |x| <= h on the positive and on the negative side. */
 SADMM_INLINE real slab_separation(real lo, real hi, real h, int negative) { return negative ? -hi - h : lo - h; }
@@ -21,12 +23,20 @@ SADMM_INLINE vec3 box_clamp(vec3 p, vec3 h)
     return v3(real_clamp(p.x, -h.x, h.x), real_clamp(p.y, -h.y, h.y), real_clamp(p.z, -h.z, h.z));
 }
 
+/* The outward normal of the last step, 0 without one. */
+SADMM_INLINE vec3 box_round_recall(uint32_t cache)
+{
+    int code = (int)(cache & BOX_ROUND_MASK);
+    if (code == 0) return v3(0, 0, 0);
+    return code < 7 ? v3_axis((code - 1) / 2, (code - 1) % 2 ? (real)-1 : (real)1) : manifold_cached_direction(cache);
+}
+
 /* Face of least depth of the interval box [lo, hi] (the round shape's core) in the box; 1 + 2 axis + negative. */
 SADMM_INLINE int box_core_face(const real lo[3], const real hi[3], const real h[3], real thin, uint32_t cache,
-                               real *separation)
+                               const real n_cached[3], real *separation)
 {
     int k, side, best = 1;
-    real s_best = slab_separation(lo[0], hi[0], h[0], 0), kept;
+    real s_best = slab_separation(lo[0], hi[0], h[0], 0);
     for (k = 0; k < 3; ++k)
         for (side = 0; side < 2; ++side) {
             real s = slab_separation(lo[k], hi[k], h[k], side);
@@ -35,12 +45,17 @@ SADMM_INLINE int box_core_face(const real lo[3], const real hi[3], const real h[
                 best = 1 + 2 * k + side;
             }
         }
+    /* the cached side when the axis is much like the cached one: past the midplane the other is nearer but wrong */
+    k = (best - 1) / 2;
+    if (real_abs(n_cached[k]) > MANIFOLD_COS_OPPOSITE) {
+        side = n_cached[k] < 0;
+        best = 1 + 2 * k + side;
+        s_best = slab_separation(lo[k], hi[k], h[k], side);
+    }
     if (cache >= 1 && cache <= 6) {
         int c = (int)cache - 1;
-        kept = slab_separation(lo[c / 2], hi[c / 2], h[c / 2], c % 2);
-        /* the cached side, too, when it is the same axis: past the midplane the other side is nearer but wrong */
-        if ((best - 1) / 2 == c / 2 ||
-            kept >= s_best - MANIFOLD_KEEP_DEPTH * real_abs(kept) - MANIFOLD_KEEP_EXTENT * thin) {
+        real kept = slab_separation(lo[c / 2], hi[c / 2], h[c / 2], c % 2);
+        if (kept >= s_best - MANIFOLD_KEEP_DEPTH * real_abs(kept) - MANIFOLD_KEEP_EXTENT * thin) {
             best = (int)cache;
             s_best = kept;
         }
@@ -54,11 +69,12 @@ SADMM_INLINE void manifold_sphere_box(real radius, vec3 h, const struct pair_pos
 {
     vec3 c = pose->t, q = box_clamp(c, h), d = v3_sub(q, c);
     real size = radius + v3_max_abs(h), length = v3_norm(d);
-    real p[3], hh[3], s;
+    real p[3], hh[3], n_cached[3], s;
     int face;
     v3_to_array(c, p);
     v3_to_array(h, hh);
-    face = box_core_face(p, p, hh, 2 * real_min(radius, real_min(h.x, real_min(h.y, h.z))), cache, &s);
+    v3_to_array(box_round_recall(cache), n_cached);
+    face = box_core_face(p, p, hh, 2 * real_min(radius, real_min(h.x, real_min(h.y, h.z))), cache, n_cached, &s);
     m->cache = (uint32_t)face;
     if (length > 16 * SADMM_EPSILON * size) {
         real separation = length - radius;
@@ -142,18 +158,19 @@ SADMM_INLINE void manifold_capsule_box_inside(real radius, real half, vec3 h, ve
 {
     real pa[3], ua[3], ha[3], lo[3], hi[3], s_face, s_edge = -(real)1e30, first = -half, last = half;
     real thin = 2 * real_min(radius, real_min(h.x, real_min(h.y, h.z)));
-    vec3 n_edge = v3(0, 0, 1), n, n_kept = v3(0, 0, 0);
-    int k, face, edge = -1, edge_cache = 0;
+    real n_cached[3];
+    vec3 n_edge = v3(0, 0, 1), n;
+    int k, face, edge = -1;
 
     v3_to_array(p, pa);
     v3_to_array(u, ua);
     v3_to_array(h, ha);
+    v3_to_array(box_round_recall(cache), n_cached);
     for (k = 0; k < 3; ++k) {
         lo[k] = pa[k] - half * real_abs(ua[k]);
         hi[k] = pa[k] + half * real_abs(ua[k]);
     }
-    face = box_core_face(lo, hi, ha, thin, cache, &s_face);
-    if (cache >= 1 && cache <= 6) n_kept = v3_axis(((int)cache - 1) / 2, (cache - 1) % 2 ? (real)-1 : (real)1);
+    face = box_core_face(lo, hi, ha, thin, cache, n_cached, &s_face);
     for (k = 0; k < 3; ++k) {
         int i = (k + 1) % 3, j = (k + 2) % 3, negative;
         real ci = ua[j], cj = -ua[i], length2 = ci * ci + cj * cj, d, r, s, inverse, along;
@@ -161,21 +178,17 @@ SADMM_INLINE void manifold_capsule_box_inside(real radius, real half, vec3 h, ve
         inverse = 1 / real_sqrt(length2);
         d = (ci * pa[i] + cj * pa[j]) * inverse;
         r = (real_abs(ci) * ha[i] + real_abs(cj) * ha[j]) * inverse;
-        negative = d < 0;
-        if (cache == (uint32_t)(7 + k)) negative = 0;
-        if (cache == (uint32_t)(15 + k)) negative = 1;
-        /* an axis much like the cached face keeps its side too */
-        along = v3_dot(n_kept, v3_add(v3_axis(i, ci * inverse), v3_axis(j, cj * inverse)));
-        if (real_abs(along) > (real)0.9) negative = along < 0;
+        along = (n_cached[i] * ci + n_cached[j] * cj) * inverse;
+        /* an axis much like the cached one keeps its side, as faces do */
+        negative = real_abs(along) > MANIFOLD_COS_OPPOSITE ? along < 0 : d < 0;
         s = (negative ? -d : d) - r;
-        if (cache == (uint32_t)(7 + k) || cache == (uint32_t)(15 + k))
+        if ((cache & BOX_ROUND_MASK) == (uint32_t)(7 + k) && real_abs(along) >= MANIFOLD_COS_SAME)
             s += MANIFOLD_KEEP_DEPTH * real_abs(s) + MANIFOLD_KEEP_EXTENT * thin;
         if (s > s_edge) {
             vec3 axis;
             real out = negative ? -inverse : inverse;
             s_edge = s;
             edge = k;
-            edge_cache = 7 + k + (negative ? 8 : 0);
             axis = v3_add(v3_axis(i, ci * out), v3_axis(j, cj * out));
             n_edge = axis;
         }
@@ -191,7 +204,7 @@ SADMM_INLINE void manifold_capsule_box_inside(real radius, real half, vec3 h, ve
         e = edge == 0 ? v3(0, e.y, e.z) : (edge == 1 ? v3(e.x, 0, e.z) : v3(e.x, e.y, 0));
         segments_closest(p, u, half, e, axis, ha[edge], &s, &t);
         m->normal = v3_neg(n_edge);
-        m->cache = (uint32_t)edge_cache;
+        m->cache = (uint32_t)(7 + edge) | manifold_direction_bits(n_edge);
         qa = v3_madd(segment_at(p, s, u), radius, m->normal);
         qb = v3_madd(e, t, axis);
         manifold_add_between(m, qa, qb, 3);

@@ -75,7 +75,7 @@ SADMM_INLINE real manifold_capsule_section(const struct manifold *m, vec3 ca, ve
 }
 
 /* Two capsules side by side touch along a line: both ends of the common stretch. Otherwise the closest points.
- * cache: 1 or 2, the side of a on which b was along (axis of a) x (axis of b); it stays when the axes cross. */
+ * cache: 1 and the normal (manifold_direction_bits), whose side stays when the axes cross. */
 SADMM_INLINE void manifold_capsule_capsule(real ra, real ha, real rb, real hb, const struct pair_pose *pose,
                                            real limit, uint32_t cache, struct manifold *m)
 {
@@ -88,13 +88,13 @@ SADMM_INLINE void manifold_capsule_capsule(real ra, real ha, real rb, real hb, c
     cb = v3_scale(w, t);
     d = v3_sub(cb, ca);
     if (sin2 > (real)1e-6) {
-        real side = v3_dot(cross, d);
+        vec3 n_cached = cache ? manifold_cached_direction(cache) : cross;
         bool crossing = real_abs(s) < ha && real_abs(t) < hb && v3_norm2(d) < (real)0.25 * radii * radii;
-        fallback = v3_scale(cross, (cache == 2 ? -1 : 1) / real_sqrt(sin2));
-        if (crossing && ((cache == 1 && side < 0) || (cache == 2 && side > 0))) d = v3_neg(d);
+        fallback = v3_scale(cross, (v3_dot(cross, n_cached) < 0 ? -1 : 1) / real_sqrt(sin2));
+        if (crossing && cache && v3_dot(d, n_cached) < 0) d = v3_neg(d);
     }
     direction_or(d, radii + ha + hb, fallback, &m->normal);
-    if (sin2 > (real)1e-6) m->cache = v3_dot(m->normal, cross) < 0 ? 2 : 1;
+    m->cache = 1 | manifold_direction_bits(m->normal);
 
     closest = v3_dot(m->normal, v3_sub(cb, ca)) - radii;
     if (closest > limit) return;

@@ -19,7 +19,7 @@ struct sadmm_contact_pair {
     double normal[3];         /* unit, from a to b */
     double friction;          /* mu */
     double restitution;
-    uint32_t cache;           /* narrow phase: separating or reference axis of the last step, 0 = none */
+    uint32_t cache;           /* narrow phase: axis and side of the last step (collision/manifold.h), 0 = none */
     uint32_t revision, placed; /* of the two shapes, and of their bodies' poses (collision/contact_carry.h) */
     uint32_t reserved;
 };
