@@ -3,14 +3,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 #include "bench.h"
 #include "cli/interrupt.h"
 #include "cli/output.h"
 #include "core/base/clock.h"
+#include "core/base/parallel.h"
 #include "core/solve/schedule.h"
 
 static const struct {
@@ -76,22 +74,38 @@ int bench_compare_doubles(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+struct copy {
+    double *from, *to;
+    size_t count;
+    bool first; /* of the repeats: pages are touched by the thread that uses them */
+};
+
+static void copy_share(void *argument, int thread, int threads)
+{
+    const struct copy *c = argument;
+    double *from = c->from, *to = c->to;
+    size_t begin, end;
+    sadmm_share(c->count, thread, threads, &begin, &end);
+    for (size_t k = begin; k < end && c->first; ++k) from[k] = (double)k;
+    for (size_t k = begin; k < end; ++k) to[k] = from[k];
+}
+
 double bench_memory_bandwidth(int threads)
 {
     size_t count = (size_t)1 << 25; /* 256 MB each: out of every cache */
-    double *from = malloc(count * sizeof *from), *to = malloc(count * sizeof *to), best = 0;
-    (void)threads;
-    if (from && to) {
+    struct copy copy = {malloc(count * sizeof(double)), malloc(count * sizeof(double)), count, true};
+    double best = 0;
+    if (copy.from && copy.to) {
         for (int repeat = 0; repeat < 5; ++repeat) {
             double begin = sadmm_clock_ms();
-#pragma omp parallel for num_threads(threads) schedule(static)
-            for (size_t k = 0; k < count; ++k) to[k] = repeat ? from[k] : (from[k] = (double)k);
+            copy.first = repeat == 0;
+            sadmm_parallel(NULL, threads, copy_share, &copy);
             double rate = 16e-6 * (double)count / (sadmm_clock_ms() - begin);
-            if (repeat && rate > best) best = rate;
+            if (!copy.first && rate > best) best = rate;
         }
     }
-    free(from);
-    free(to);
+    free(copy.from);
+    free(copy.to);
     return best;
 }
 
@@ -112,14 +126,7 @@ static void cpu_name(char *name, size_t size)
     fclose(file);
 }
 
-int bench_machine_threads(void)
-{
-#ifdef _OPENMP
-    return omp_get_num_procs();
-#else
-    return 1;
-#endif
-}
+int bench_machine_threads(void) { return sadmm_processors(); }
 
 void bench_runs_on(sadmm_backend backend, char *name, size_t size)
 {

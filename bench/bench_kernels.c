@@ -12,6 +12,7 @@
 #include "cli/interrupt.h"
 #include "cli/output.h"
 #include "core/base/clock.h"
+#include "core/base/parallel.h"
 #include "core/solve/certificate.h"
 #include "core/solve/schedule.h"
 #include "lattice.h"
@@ -105,6 +106,7 @@ static sadmm_status measure(const struct sadmm_kernels *k, struct sadmm_context 
     return SADMM_OK;
 }
 
+/* On as many threads as asked for, whether or not they pay. */
 static sadmm_status run_row(const struct sadmm_kernels *k, struct lattice *lattice, sadmm_method method, double seconds,
                             struct row *row, struct sadmm_error *error)
 {
@@ -113,6 +115,7 @@ static sadmm_status run_row(const struct sadmm_kernels *k, struct lattice *latti
     settings.threads = row->threads;
     settings.penalty_period = 0;
     lattice_reset(lattice);
+    sadmm_test_force_threads(true);
     struct sadmm_plan plan = sadmm_plan_make(&lattice->system, &settings);
     struct sadmm_context *context = NULL;
     sadmm_status status = k->create(0, &context, error);

@@ -219,7 +219,7 @@ static void usage(FILE *out)
             "  --scene NAME               a scene that takes a size, default sliding_cubes\n"
             "  --sizes N[,N...]           ascending; default 100,500,1000,2000,5000,10000,100000,1000000\n"
             "  --backend ref|cpu|cuda|all all: cpu and cuda (default)\n"
-            "  --threads N[,N...]         CPU threads, default 1,2,4,8,16; more than the machine has are left out\n"
+            "  --threads N[,N...]         CPU threads at most, default 1,2,4,8,16; more than the machine has are left out\n"
             "  --precision f32|f64|both   default f32\n"
             "  --method paper|fast        default fast\n"
             "  --iterations N             a step; default the scene's for the method\n"

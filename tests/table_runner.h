@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "config.h"
+#include "core/base/parallel.h"
 #include "runner.h"
 
 /* ---- tables -------------------------------------------------------------------------------------------------- */
@@ -134,6 +135,7 @@ static void runner_start_settings(struct runner *r, const struct sadmm_kernels *
     r->k = k;
     r->settings = *settings;
     r->p = contact_problem_copy(problem);
+    sadmm_test_force_threads(true); /* the problems are too small for more than one */
     r->plan = sadmm_plan_make(&r->p->system, &r->settings);
     CALL(r, k->create(0, &r->c, &r->error));
     CALL(r, k->begin(r->c, &r->p->system, &r->plan, &r->settings, &r->error));

@@ -7,6 +7,7 @@
 #include "collision/pipeline.h"
 #include "config.h"
 #include "core/base/memory.h"
+#include "core/base/parallel.h"
 #include "manifold_tools.h"
 
 enum { MAX_SHAPES = 4000 };
@@ -748,6 +749,7 @@ START_TEST(contacts_depend_on_the_present_alone)
     enum { OTHERS = sizeof others / sizeof others[0] };
     const int threads[] = {7, 1, 2, 3};
     struct random r = {1000};
+    sadmm_test_force_threads(true);
     fill_pile(reference, 1500, 77, 1 + 2 * _i);
     for (int o = 0; o < OTHERS; ++o) {
         fill_pile(others[o], 1500, 77, 1 + 2 * _i);

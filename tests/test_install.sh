@@ -1,6 +1,6 @@
 #!/bin/sh
 # The installed tree works for a user: pkg-config finds it, a program links with the shared and with the static library,
-# in C and in C++, and runs; the shared library exports sadmm_ symbols only.
+# in C and in C++, and runs; the shared library exports sadmm_ symbols only and stays loaded.
 # usage: test_install.sh BUILD_FOLDER PROGRAM.c
 set -eu
 
@@ -37,6 +37,10 @@ link() {
     cp "$library/libsubadmm.a" "$folder/static"
     link static_c ${CC:-cc} $flags -std=c11 "$program" -L"$folder/static" $(pkg-config --static --libs subadmm)
 }
+if ! readelf -d "$library/libsubadmm.so" | grep -q NODELETE; then
+    echo "the shared library could be unloaded under its threads"
+    exit 1
+fi
 if ldd "$folder/static_c" | grep -q libsubadmm; then
     echo "the static program needs the shared library"
     exit 1

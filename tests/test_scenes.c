@@ -1,4 +1,5 @@
 /* The scene library: what it promises about bodies and contacts, repeatability, bad specs. */
+#include "core/base/parallel.h"
 #include "scene_tools.h"
 
 static int32_t dynamic_bodies(const sadmm_world *world)
@@ -214,6 +215,7 @@ static uint64_t hash_after(const char *spec, sadmm_method method, int threads, i
     sadmm_scene_set_method(&scene, method);
     scene.def.backend = SADMM_BACKEND_CPU;
     scene.def.settings.threads = threads;
+    sadmm_test_force_threads(true); /* also where so many do not pay */
     sadmm_world *world = build_scene(&scene);
     for (int i = 0; i < steps; ++i) {
         struct sadmm_error error = { 0 };

@@ -13,6 +13,7 @@
 #define SUBADMM_PROBLEM_H
 
 #include "settings.h"
+#include "tasks.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -60,7 +61,7 @@ typedef struct sadmm_solve_report {
     sadmm_residual residual;    /* of the last iteration */
     sadmm_certificate certificate;
     double solve_ms;            /* wall time of the solve without the certificate, ms */
-    int threads;                /* CPU threads used */
+    int threads;                /* CPU threads that worked on the solve: the most at a time */
 } sadmm_solve_report;
 
 /* Create an empty problem. Errors: OUT_OF_MEMORY, INVALID_ARGUMENT (out NULL). */
@@ -93,6 +94,10 @@ SADMM_API int32_t sadmm_problem_block_count(const sadmm_problem *problem);
 SADMM_API sadmm_status sadmm_problem_get_bodies(const sadmm_problem *problem, double *A, double *b, double *v0);
 SADMM_API sadmm_status sadmm_problem_get_contact(const sadmm_problem *problem, int32_t index, sadmm_problem_contact *contact);
 SADMM_API sadmm_status sadmm_problem_get_block(const sadmm_problem *problem, int32_t index, sadmm_problem_block *block);
+
+/* Threads of the host to work on solves (tasks.h); NULL or all zero: OpenMP's, the default. Errors: INVALID_ARGUMENT (nothing
+ * changes), OUT_OF_MEMORY. */
+SADMM_API sadmm_status sadmm_problem_set_tasks(sadmm_problem *problem, const sadmm_tasks *tasks);
 
 /* Solve. The solution replaces the initial values, so that solving again continues from there (when
  * settings->warm_start). gravity, dt (but for the unit of penalty_offset) and stabilisation are not used: they are

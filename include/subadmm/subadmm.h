@@ -5,6 +5,7 @@
 #include "problem.h"
 #include "settings.h"
 #include "status.h"
+#include "tasks.h"
 #include "world.h"
 
 #endif

@@ -6,6 +6,10 @@
  *
  * A world is owned by one thread at a time; different worlds may be stepped on different threads. Ids are small
  * values with a generation: an id of a destroyed object gives SADMM_ERROR_STALE_ID, never another object.
+ *
+ * After a fork, while no call was running, parent and child each have a world of their own (not on CUDA, whose devices do
+ * not survive one). Threads do not survive it either: a child of a process that has stepped or solved on OpenMP's threads
+ * steps and solves on one, with the same results, and so do worlds and problems in it that have the parent's `tasks`.
  */
 #ifndef SUBADMM_WORLD_H
 #define SUBADMM_WORLD_H
@@ -32,6 +36,7 @@ typedef struct sadmm_world_def {
                                    default 0.02. Contacts are made within the margin, or what gravity and the wrenches
                                    on the two bodies can close in one step (acceleration x dt^2) where that is more, +
                                    the distance that their velocities close in it */
+    sadmm_tasks tasks;          /* threads of the host to work on steps; default all zero: OpenMP's (tasks.h) */
     sadmm_settings settings;
 } sadmm_world_def;
 
@@ -161,7 +166,7 @@ typedef struct sadmm_phase_times { double total, collide, assemble, solve, finis
 typedef struct sadmm_step_report {
     sadmm_backend backend;
     sadmm_precision precision;
-    int threads;
+    int threads;                   /* CPU threads that worked on the step: the most at a time */
     int64_t step;                  /* steps done since creation */
     double time;                   /* simulated time after the step, s */
     int32_t bodies;                /* dynamic bodies */

@@ -1,4 +1,4 @@
-/* The CPU backend: reduced form (docs/algorithm.md) on OpenMP threads and SIMD lanes.
+/* The CPU backend: reduced form (docs/algorithm.md) on threads (core/parallel.h) and SIMD lanes.
  *
  * These sources are compiled once per precision (SADMM_REAL) and instruction set (SADMM_VARIANT, SADMM_VECTOR_BYTES);
  * cpu_find.c picks the best table the machine can run.
@@ -30,15 +30,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "core/base/barrier.h"
+#include "core/base/parallel.h"
 #include "core/solve/kernels.h"
 #include "core/math/limit.h"
 #include "core/math/packed6.h"
-#include "cpu_barrier.h"
 #include "cpu_lanes.h"
-
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 #define SADMM_JOIN2(a, b) a##b
 #define SADMM_JOIN(a, b) SADMM_JOIN2(a, b)
@@ -109,7 +106,7 @@ struct sadmm_context {
     const struct sadmm_system *system;
     struct sadmm_plan plan;
     struct sadmm_settings settings;
-    struct cpu_barrier barrier;
+    struct sadmm_barrier barrier;
 
     /* Bodies; index `bodies` is the static world: state and 1/beta 0, never written. Rows are padded to whole blocks. */
     int32_t bodies;
@@ -166,27 +163,13 @@ struct sadmm_context {
 
 enum { THREAD_MAX_STRIDE = 8 };
 
-/* Share `thread` of `threads` of [0, count): contiguous, sizes differ by at most one. */
-static inline void cpu_share(size_t count, int thread, int threads, size_t *begin, size_t *end)
+/* The function's work on the context, or on an argument that holds it, by the plan's threads. */
+static inline void cpu_parallel(const struct sadmm_context *c, sadmm_parallel_function *function, void *argument)
 {
-    size_t base = count / (size_t)threads, extra = count % (size_t)threads, t = (size_t)thread;
-    *begin = t * base + (t < extra ? t : extra);
-    *end = *begin + base + (t < extra ? 1 : 0);
+    sadmm_parallel(c->system->team, c->plan.threads, function, argument);
 }
 
-#ifdef _OPENMP
-/* Works on the context `c`. */
-#define CPU_PARALLEL _Pragma("omp parallel num_threads(c->plan.threads)")
-static inline int cpu_thread(void) { return omp_get_thread_num(); }
-static inline int cpu_threads(void) { return omp_get_num_threads(); }
-#else
-#define CPU_PARALLEL
-static inline int cpu_thread(void) { return 0; }
-static inline int cpu_threads(void) { return 1; }
-#endif
-#define CPU_BARRIER cpu_barrier_wait(&c->barrier, cpu_threads())
-
-/* The larger of the threads' maxima. */
+/* The largest of the threads' maxima: 0 of those that did not run. */
 static inline double cpu_reduce_max(const struct sadmm_context *c)
 {
     double largest = 0;

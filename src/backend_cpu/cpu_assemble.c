@@ -57,16 +57,19 @@ static void clear_padding(struct sadmm_context *c)
         memset(&c->body_blocks[c->body_block_count - 1], 0, sizeof *c->body_blocks);
 }
 
+static void assemble_body_share(void *context, int thread, int threads)
+{
+    struct sadmm_context *c = (struct sadmm_context *)context;
+    size_t begin, end;
+    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    for (size_t i = begin; i < end; ++i) assemble_body(c, (int32_t)i);
+}
+
 sadmm_status CPU(assemble_bodies)(struct sadmm_context *c, struct sadmm_error *error)
 {
     (void)error;
     clear_padding(c);
-    CPU_PARALLEL
-    {
-        size_t begin, end;
-        cpu_share((size_t)c->bodies, cpu_thread(), cpu_threads(), &begin, &end);
-        for (size_t i = begin; i < end; ++i) assemble_body(c, (int32_t)i);
-    }
+    cpu_parallel(c, assemble_body_share, c);
     return SADMM_OK;
 }
 
@@ -152,16 +155,19 @@ static void assemble_row_blocks(struct sadmm_context *c, enum sadmm_block_kind k
         if (c->system->blocks[k].kind == kind) assemble_row_block(c, k);
 }
 
+static void assemble_pair_share(void *context, int thread, int threads)
+{
+    struct sadmm_context *c = (struct sadmm_context *)context;
+    size_t begin, end;
+    sadmm_share(c->pair_block_count, thread, threads, &begin, &end);
+    for (size_t k = begin; k < end; ++k)
+        for (int l = 0; l < LANES; ++l) assemble_lane(c, &c->pair_blocks[k], l);
+}
+
 sadmm_status CPU(assemble_contacts)(struct sadmm_context *c, struct sadmm_error *error)
 {
     (void)error;
-    CPU_PARALLEL
-    {
-        size_t begin, end;
-        cpu_share(c->pair_block_count, cpu_thread(), cpu_threads(), &begin, &end);
-        for (size_t k = begin; k < end; ++k)
-            for (int l = 0; l < LANES; ++l) assemble_lane(c, &c->pair_blocks[k], l);
-    }
+    cpu_parallel(c, assemble_pair_share, c);
     assemble_row_blocks(c, SADMM_BLOCK_CONTACT);
     return SADMM_OK;
 }

@@ -24,7 +24,7 @@ DECLARE(generic);
 #ifdef SADMM_HAVE_OPENMP
 #define THREADS "OpenMP"
 #else
-#define THREADS "one thread (built without OpenMP)"
+#define THREADS "one thread or the host's tasks (built without OpenMP)"
 #endif
 
 const struct sadmm_kernels *sadmm_cpu_find(sadmm_precision precision, const char **reason)

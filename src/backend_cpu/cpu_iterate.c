@@ -8,7 +8,7 @@
 static void update_bodies(struct sadmm_context *c, int thread, int threads, bool settled)
 {
     size_t begin, end;
-    cpu_share(c->body_block_count, thread, threads, &begin, &end);
+    sadmm_share(c->body_block_count, thread, threads, &begin, &end);
     CPU(sweep_bodies)(c, begin, end, settled);
 }
 
@@ -16,11 +16,11 @@ static void update_constraints(struct sadmm_context *c, int thread, int threads,
 {
     size_t begin, end;
     if (c->pair_block_count) {
-        cpu_share(c->pair_block_count, thread, threads, &begin, &end);
+        sadmm_share(c->pair_block_count, thread, threads, &begin, &end);
         CPU(sweep_pairs)(c, begin, end, sweep, primal);
     }
     if (c->row_block_count) {
-        cpu_share(c->row_block_count, thread, threads, &begin, &end);
+        sadmm_share(c->row_block_count, thread, threads, &begin, &end);
         CPU(sweep_row_blocks)(c, begin, end, sweep, primal);
     }
 }
@@ -30,7 +30,7 @@ static void join_wrenches(struct sadmm_context *c, int thread, int threads)
 {
     size_t begin, end;
     real ratio = (real)c->ratio;
-    cpu_share(2 * c->record_count, thread, threads, &begin, &end);
+    sadmm_share(2 * c->record_count, thread, threads, &begin, &end);
     for (size_t at = begin * ROW; at < end * ROW; ++at) c->wrenches[at] += ratio * c->change[at];
 }
 
@@ -39,14 +39,13 @@ static void clear_max(struct sadmm_context *c)
     memset(c->thread_max, 0, (size_t)c->plan.threads * THREAD_MAX_STRIDE * sizeof *c->thread_max);
 }
 
-void CPU(sum_wrenches)(struct sadmm_context *c)
+static void sum_share(void *context, int thread, int threads)
 {
-    CPU_PARALLEL
-    {
-        double none = 0;
-        update_constraints(c, cpu_thread(), cpu_threads(), CPU_SWEEP_START, &none);
-    }
+    double none = 0;
+    update_constraints((struct sadmm_context *)context, thread, threads, CPU_SWEEP_START, &none);
 }
+
+void CPU(sum_wrenches)(struct sadmm_context *c) { cpu_parallel(c, sum_share, c); }
 
 void CPU(start_wrenches)(struct sadmm_context *c)
 {
@@ -62,33 +61,46 @@ static sadmm_status refuse_fast(const struct sadmm_context *c, struct sadmm_erro
     return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "method = fast: its iterations are not taken step by step");
 }
 
+static void velocity_share(void *context, int thread, int threads)
+{
+    struct sadmm_context *c = (struct sadmm_context *)context;
+    if (c->measured) {
+        join_wrenches(c, thread, threads);
+        sadmm_barrier_wait(&c->barrier, threads);
+    }
+    update_bodies(c, thread, threads, c->settled);
+}
+
 sadmm_status CPU(update_velocity)(struct sadmm_context *c, struct sadmm_error *error)
 {
     if (refuse_fast(c, error) != SADMM_OK) return SADMM_ERROR_UNSUPPORTED;
-    CPU_PARALLEL
-    {
-        if (c->measured) {
-            join_wrenches(c, cpu_thread(), cpu_threads());
-            CPU_BARRIER;
-        }
-        update_bodies(c, cpu_thread(), cpu_threads(), c->settled);
-    }
+    cpu_parallel(c, velocity_share, c);
     c->settled = true;
     c->measured = false;
     c->ratio = 1;
     return SADMM_OK;
 }
 
+/* Iterations, or a part of one. */
+struct stretch {
+    struct sadmm_context *c;
+    int count;
+    bool measure;
+};
+
+static void constraints_share(void *argument, int thread, int threads)
+{
+    const struct stretch *s = (const struct stretch *)argument;
+    double primal = 0;
+    update_constraints(s->c, thread, threads, s->measure ? CPU_SWEEP_MEASURE : CPU_SWEEP_ITERATE, &primal);
+    s->c->thread_max[thread * THREAD_MAX_STRIDE] = primal;
+}
+
 sadmm_status CPU(update_constraints)(struct sadmm_context *c, bool measure, struct sadmm_error *error)
 {
     if (refuse_fast(c, error) != SADMM_OK) return SADMM_ERROR_UNSUPPORTED;
     clear_max(c);
-    CPU_PARALLEL
-    {
-        double primal = 0;
-        update_constraints(c, cpu_thread(), cpu_threads(), measure ? CPU_SWEEP_MEASURE : CPU_SWEEP_ITERATE, &primal);
-        c->thread_max[cpu_thread() * THREAD_MAX_STRIDE] = primal;
-    }
+    cpu_parallel(c, constraints_share, &(struct stretch){c, 1, measure});
     c->measured = measure;
     if (measure) c->residual.primal = cpu_reduce_max(c);
     return SADMM_OK;
@@ -106,12 +118,12 @@ static void iterate_fast(struct sadmm_context *c, int thread, int threads, int c
 {
     const double relaxation = c->settings.relaxation;
     size_t begin, end, first, past;
-    cpu_share(c->body_block_count, thread, threads, &begin, &end);
-    cpu_share((size_t)c->bodies, thread, threads, &first, &past);
+    sadmm_share(c->body_block_count, thread, threads, &begin, &end);
+    sadmm_share((size_t)c->bodies, thread, threads, &first, &past);
     for (int i = 0; i < count; ++i) {
         if (takes_defects(c, i)) {
             CPU(take_defects)(c, first, past);
-            CPU_BARRIER;
+            sadmm_barrier_wait(&c->barrier, threads);
         }
         bool farther = relax_constraints(i, count), settled = c->settled || i > 0;
         update_constraints(c, thread, threads,
@@ -119,43 +131,54 @@ static void iterate_fast(struct sadmm_context *c, int thread, int threads, int c
                            : measure ? CPU_SWEEP_PLAIN_MEASURE
                                      : CPU_SWEEP_PLAIN,
                            primal);
-        CPU_BARRIER;
+        sadmm_barrier_wait(&c->barrier, threads);
         CPU(sweep_bodies_fast)(c, begin, end, settled, relax_velocity(i, count, settled) ? relaxation : 1,
                                farther ? relaxation : 1);
-        CPU_BARRIER;
+        sadmm_barrier_wait(&c->barrier, threads);
     }
+}
+
+static void iterate_share(void *argument, int thread, int threads)
+{
+    const struct stretch *s = (const struct stretch *)argument;
+    struct sadmm_context *c = s->c;
+    double primal = 0;
+    unsigned mode = c->fast ? cpu_flush_tiny() : 0; /* what fast passes on goes to 0 */
+    if (c->measured) {
+        join_wrenches(c, thread, threads);
+        sadmm_barrier_wait(&c->barrier, threads);
+    }
+    if (c->fast) iterate_fast(c, thread, threads, s->count, s->measure, &primal);
+    for (int i = 0; i < s->count && !c->fast; ++i) {
+        bool last = s->measure && i + 1 == s->count;
+        update_bodies(c, thread, threads, c->settled || i > 0);
+        sadmm_barrier_wait(&c->barrier, threads);
+        update_constraints(c, thread, threads, last ? CPU_SWEEP_MEASURE : CPU_SWEEP_ITERATE, &primal);
+        sadmm_barrier_wait(&c->barrier, threads);
+    }
+    c->thread_max[thread * THREAD_MAX_STRIDE] = primal;
+    if (c->fast) cpu_flush_restore(mode);
 }
 
 sadmm_status CPU(iterate)(struct sadmm_context *c, int count, bool measure, struct sadmm_error *error)
 {
     (void)error;
     clear_max(c);
-    CPU_PARALLEL
-    {
-        int thread = cpu_thread(), threads = cpu_threads();
-        double primal = 0;
-        unsigned mode = c->fast ? cpu_flush_tiny() : 0; /* what fast passes on goes to 0 */
-        if (c->measured) {
-            join_wrenches(c, thread, threads);
-            CPU_BARRIER;
-        }
-        if (c->fast) iterate_fast(c, thread, threads, count, measure, &primal);
-        for (int i = 0; i < count && !c->fast; ++i) {
-            bool last = measure && i + 1 == count;
-            update_bodies(c, thread, threads, c->settled || i > 0);
-            CPU_BARRIER;
-            update_constraints(c, thread, threads, last ? CPU_SWEEP_MEASURE : CPU_SWEEP_ITERATE, &primal);
-            CPU_BARRIER;
-        }
-        c->thread_max[thread * THREAD_MAX_STRIDE] = primal;
-        if (c->fast) cpu_flush_restore(mode);
-    }
+    cpu_parallel(c, iterate_share, &(struct stretch){c, count, measure});
     c->settled = c->settled || count > 0;
     if (count > 0) c->exact_since = (c->exact_since + count - 1) % RELAX_DEFECT_PERIOD + 1;
     c->measured = measure && !c->fast;
     c->ratio = 1;
     if (measure) c->residual.primal = cpu_reduce_max(c);
     return SADMM_OK;
+}
+
+static void dual_share(void *context, int thread, int threads)
+{
+    struct sadmm_context *c = (struct sadmm_context *)context;
+    size_t begin, end;
+    sadmm_share(c->body_block_count, thread, threads, &begin, &end);
+    c->thread_max[thread * THREAD_MAX_STRIDE] = CPU(dual_residual)(c, begin, end);
 }
 
 /* Eqs. (16) and (17) after a measured iteration. The primal part was taken in the sweep; the dual one is the momentum
@@ -165,12 +188,7 @@ sadmm_status CPU(measure_residuals)(struct sadmm_context *c, struct sadmm_residu
     (void)error;
     if (c->fast) CPU(sum_wrenches)(c); /* they hold changes */
     clear_max(c);
-    CPU_PARALLEL
-    {
-        size_t begin, end;
-        cpu_share(c->body_block_count, cpu_thread(), cpu_threads(), &begin, &end);
-        c->thread_max[cpu_thread() * THREAD_MAX_STRIDE] = CPU(dual_residual)(c, begin, end);
-    }
+    cpu_parallel(c, dual_share, c);
     residual->primal = c->residual.primal;
     residual->dual = cpu_reduce_max(c);
     return SADMM_OK;

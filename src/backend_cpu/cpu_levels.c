@@ -41,9 +41,9 @@ static double pair_violation(const struct sadmm_context *c, size_t record)
 void CPU(add_up_imbalance)(struct sadmm_context *c, int thread, int threads)
 {
     size_t begin, end;
-    cpu_share((size_t)c->bodies, thread, threads, &begin, &end);
+    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) c->body_sums[BODY_SUMS * i + 3] = cpu_defect_energy(c, i);
-    cpu_share(c->pair_block_count * (size_t)LANES, thread, threads, &begin, &end);
+    sadmm_share(c->pair_block_count * (size_t)LANES, thread, threads, &begin, &end);
     for (size_t k = begin; k < end; ++k)
         if (c->pair_blocks[k / (size_t)LANES].pair[k % (size_t)LANES] >= 0) c->pair_violation[k] = pair_violation(c, k);
 }

@@ -77,25 +77,31 @@ static void add_defects_and_work(struct sadmm_context *c)
     }
 }
 
+static void energies_share(void *context, int thread, int threads)
+{
+    struct sadmm_context *c = (struct sadmm_context *)context;
+    size_t begin, end;
+    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    for (size_t i = begin; i < end; ++i) energies(c, i, &c->body_sums[BODY_SUMS * i]);
+}
+
+static void defects_share(void *context, int thread, int threads)
+{
+    struct sadmm_context *c = (struct sadmm_context *)context;
+    size_t begin, end;
+    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    for (size_t i = begin; i < end; ++i) c->body_sums[BODY_SUMS * i + 3] = cpu_defect_energy(c, i) / 2;
+}
+
 sadmm_status CPU(limit_velocity)(struct sadmm_context *c, int32_t *limited, struct sadmm_error *error)
 {
     (void)error;
     bool few = limit_few(c->plan.warm, c->settings.iterations);
     *limited = 0;
-    CPU_PARALLEL
-    {
-        size_t begin, end;
-        cpu_share((size_t)c->bodies, cpu_thread(), cpu_threads(), &begin, &end);
-        for (size_t i = begin; i < end; ++i) energies(c, i, &c->body_sums[BODY_SUMS * i]);
-    }
+    cpu_parallel(c, energies_share, c);
     if (!any_suspect(c, few)) return SADMM_OK;
     CPU(sum_wrenches)(c);
-    CPU_PARALLEL
-    {
-        size_t begin, end;
-        cpu_share((size_t)c->bodies, cpu_thread(), cpu_threads(), &begin, &end);
-        for (size_t i = begin; i < end; ++i) c->body_sums[BODY_SUMS * i + 3] = cpu_defect_energy(c, i) / 2;
-    }
+    cpu_parallel(c, defects_share, c);
     add_defects_and_work(c);
     for (int32_t i = 0; i < c->bodies; ++i) {
         const struct cpu_island *island = &c->islands[c->label[i]];

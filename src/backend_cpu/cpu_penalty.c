@@ -58,15 +58,18 @@ static void assemble_C(struct sadmm_context *c, int32_t i)
     c->beta[i] = trace_C > 0 ? s->penalty_mass_factor * trace_A / trace_C + s->penalty_offset * s->dt * s->dt : 1;
 }
 
+static void assemble_C_share(void *context, int thread, int threads)
+{
+    struct sadmm_context *c = (struct sadmm_context *)context;
+    size_t begin, end;
+    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    for (size_t i = begin; i < end; ++i) assemble_C(c, (int32_t)i);
+}
+
 sadmm_status CPU(init_penalty)(struct sadmm_context *c, struct sadmm_error *error)
 {
     if (c->fast) return CPU(init_weights)(c, error);
-    CPU_PARALLEL
-    {
-        size_t begin, end;
-        cpu_share((size_t)c->bodies, cpu_thread(), cpu_threads(), &begin, &end);
-        for (size_t i = begin; i < end; ++i) assemble_C(c, (int32_t)i);
-    }
+    cpu_parallel(c, assemble_C_share, c);
     CPU(start_wrenches)(c);
     return SADMM_OK;
 }
@@ -134,19 +137,22 @@ static void weigh_pair_block(struct sadmm_context *c, struct pair_block *block)
     }
 }
 
+static void factorize_share(void *context, int thread, int threads)
+{
+    struct sadmm_context *c = (struct sadmm_context *)context;
+    size_t begin, end;
+    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    for (size_t i = begin; i < end; ++i) factorize_body(c, i);
+    if (c->fast) return; /* the weights are the pairs' own */
+    sadmm_barrier_wait(&c->barrier, threads);
+    sadmm_share(c->pair_block_count, thread, threads, &begin, &end);
+    for (size_t k = begin; k < end; ++k) weigh_pair_block(c, &c->pair_blocks[k]);
+}
+
 sadmm_status CPU(factorize)(struct sadmm_context *c, struct sadmm_error *error)
 {
     (void)error;
-    CPU_PARALLEL
-    {
-        size_t begin, end;
-        cpu_share((size_t)c->bodies, cpu_thread(), cpu_threads(), &begin, &end);
-        for (size_t i = begin; i < end; ++i) factorize_body(c, i);
-        if (c->fast) begin = end = 0; /* the weights are the pairs' own */
-        else CPU_BARRIER;
-        if (!c->fast) cpu_share(c->pair_block_count, cpu_thread(), cpu_threads(), &begin, &end);
-        for (size_t k = begin; k < end; ++k) weigh_pair_block(c, &c->pair_blocks[k]);
-    }
+    cpu_parallel(c, factorize_share, c);
     return SADMM_OK;
 }
 

@@ -20,35 +20,47 @@ static void read_pair(struct sadmm_context *c, const struct pair_block *block, i
     }
 }
 
+static void read_share(void *context, int thread, int threads)
+{
+    struct sadmm_context *c = (struct sadmm_context *)context;
+    size_t begin, end;
+    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    for (size_t i = begin; i < end; ++i)
+        for (int k = 0; k < 6; ++k) c->system->velocity[6 * i + (size_t)k] = (double)c->state[i * ROW + (size_t)k];
+    sadmm_share(c->pair_block_count, thread, threads, &begin, &end);
+    for (size_t k = begin; k < end; ++k)
+        for (int l = 0; l < LANES; ++l)
+            if (c->pair_blocks[k].pair[l] >= 0) read_pair(c, &c->pair_blocks[k], l);
+}
+
 sadmm_status CPU(read_solution)(struct sadmm_context *c, struct sadmm_error *error)
 {
     (void)error;
-    CPU_PARALLEL
-    {
-        size_t begin, end;
-        cpu_share((size_t)c->bodies, cpu_thread(), cpu_threads(), &begin, &end);
-        for (size_t i = begin; i < end; ++i)
-            for (int k = 0; k < 6; ++k) c->system->velocity[6 * i + (size_t)k] = (double)c->state[i * ROW + (size_t)k];
-        cpu_share(c->pair_block_count, cpu_thread(), cpu_threads(), &begin, &end);
-        for (size_t k = begin; k < end; ++k)
-            for (int l = 0; l < LANES; ++l)
-                if (c->pair_blocks[k].pair[l] >= 0) read_pair(c, &c->pair_blocks[k], l);
-    }
+    cpu_parallel(c, read_share, c);
     for (size_t k = 0; k < c->row_block_count; ++k)
         for (int r = 0; r < 6; ++r) c->system->block_lambda[6 * k + (size_t)r] = (double)c->row_blocks[k].lambda[r];
     return SADMM_OK;
 }
 
+struct integration {
+    const struct sadmm_context *c;
+    struct sadmm_rigid *next;
+};
+
+static void integrate_share(void *argument, int thread, int threads)
+{
+    const struct integration *in = (const struct integration *)argument;
+    const struct sadmm_context *c = in->c;
+    size_t begin, end;
+    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    for (size_t i = begin; i < end; ++i)
+        sadmm_rigid_advance(&c->system->rigid[i], &c->system->velocity[6 * i], c->settings.dt, &in->next[i]);
+}
+
 sadmm_status CPU(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)
 {
     (void)error;
-    CPU_PARALLEL
-    {
-        size_t begin, end;
-        cpu_share((size_t)c->bodies, cpu_thread(), cpu_threads(), &begin, &end);
-        for (size_t i = begin; i < end; ++i)
-            sadmm_rigid_advance(&c->system->rigid[i], &c->system->velocity[6 * i], c->settings.dt, &next[i]);
-    }
+    cpu_parallel(c, integrate_share, &(struct integration){c, next});
     return SADMM_OK;
 }
 
@@ -77,14 +89,22 @@ static void body_wrench(const struct sadmm_context *c, size_t i, double wrench[6
     }
 }
 
+struct recovery {
+    const struct sadmm_context *c;
+    double *wrench;
+};
+
+static void recover_share(void *argument, int thread, int threads)
+{
+    const struct recovery *r = (const struct recovery *)argument;
+    size_t begin, end;
+    sadmm_share((size_t)r->c->bodies, thread, threads, &begin, &end);
+    for (size_t i = begin; i < end; ++i) body_wrench(r->c, i, r->wrench + 6 * i);
+}
+
 sadmm_status CPU(recover_wrenches)(struct sadmm_context *c, double *wrench, struct sadmm_error *error)
 {
     (void)error;
-    CPU_PARALLEL
-    {
-        size_t begin, end;
-        cpu_share((size_t)c->bodies, cpu_thread(), cpu_threads(), &begin, &end);
-        for (size_t i = begin; i < end; ++i) body_wrench(c, i, wrench + 6 * i);
-    }
+    cpu_parallel(c, recover_share, &(struct recovery){c, wrench});
     return SADMM_OK;
 }

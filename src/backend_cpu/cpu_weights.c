@@ -261,55 +261,60 @@ static void assemble_C(struct sadmm_context *c, size_t i)
 
 /* ---- entries ----------------------------------------------------------------------------------------------------- */
 
+static void update_share(void *context, int thread, int threads)
+{
+    struct sadmm_context *c = (struct sadmm_context *)context;
+    const bool levels = c->refreshes >= WEIGHT_FIRST_LEVEL;
+    const bool eases = c->refreshes == 0 && c->plan.warm && c->plan.rigid; /* world level: gaps, a slop and a step */
+    size_t begin, end;
+    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    for (size_t i = begin; i < end; ++i) add_up_body(c, i, &c->body_sums[BODY_SUMS * i]);
+    if (levels) CPU(add_up_imbalance)(c, thread, threads);
+    sadmm_barrier_wait(&c->barrier, threads);
+    if (thread == 0) add_up_loads(c);
+    if (thread == 0 && levels) CPU(update_levels)(c);
+    sadmm_barrier_wait(&c->barrier, threads);
+    sadmm_share(c->pair_block_count, thread, threads, &begin, &end);
+    for (size_t k = begin; k < end; ++k) weigh_pair_block(c, k);
+    for (size_t k = begin; k < end && eases; ++k) ease_gaps(c, k);
+    sadmm_share(c->row_block_count, thread, threads, &begin, &end);
+    for (size_t k = begin; k < end; ++k) weigh_row_block(c, &c->row_blocks[k]);
+    sadmm_barrier_wait(&c->barrier, threads);
+    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    for (size_t i = begin; i < end; ++i) assemble_C(c, i);
+    CPU(take_defects)(c, begin, end);
+}
+
 sadmm_status CPU(update_weights)(struct sadmm_context *c, struct sadmm_error *error)
 {
     (void)error;
-    bool levels = ++c->refreshes >= WEIGHT_FIRST_LEVEL;
+    ++c->refreshes;
     c->exact_since = 0;
-    bool eases = c->refreshes == 0 && c->plan.warm && c->plan.rigid; /* world level: gaps, a slop and a step */
     CPU(sum_wrenches)(c);
-    CPU_PARALLEL
-    {
-        int thread = cpu_thread(), threads = cpu_threads();
-        size_t begin, end;
-        cpu_share((size_t)c->bodies, thread, threads, &begin, &end);
-        for (size_t i = begin; i < end; ++i) add_up_body(c, i, &c->body_sums[BODY_SUMS * i]);
-        if (levels) CPU(add_up_imbalance)(c, thread, threads);
-        CPU_BARRIER;
-        if (thread == 0) add_up_loads(c);
-        if (thread == 0 && levels) CPU(update_levels)(c);
-        CPU_BARRIER;
-        cpu_share(c->pair_block_count, thread, threads, &begin, &end);
-        for (size_t k = begin; k < end; ++k) weigh_pair_block(c, k);
-        for (size_t k = begin; k < end && eases; ++k) ease_gaps(c, k);
-        cpu_share(c->row_block_count, thread, threads, &begin, &end);
-        for (size_t k = begin; k < end; ++k) weigh_row_block(c, &c->row_blocks[k]);
-        CPU_BARRIER;
-        cpu_share((size_t)c->bodies, thread, threads, &begin, &end);
-        for (size_t i = begin; i < end; ++i) assemble_C(c, i);
-        CPU(take_defects)(c, begin, end);
-    }
+    cpu_parallel(c, update_share, c);
     return SADMM_OK;
+}
+
+static void respond_share(void *context, int thread, int threads)
+{
+    struct sadmm_context *c = (struct sadmm_context *)context;
+    size_t begin, end;
+    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    for (size_t i = begin; i < end; ++i) invert(c->plan.rigid, &c->A[i * PACKED6], &c->A_inverse[i * PACKED6]);
+    sadmm_barrier_wait(&c->barrier, threads);
+    size_t pair_records = c->pair_block_count * (size_t)LANES;
+    sadmm_share(pair_records, thread, threads, &begin, &end);
+    for (size_t k = begin; k < end; ++k)
+        if (c->pair_blocks[k / (size_t)LANES].pair[k % (size_t)LANES] >= 0)
+            c->pair_response[k] = pair_response(c, cpu_pair(c, k));
+    sadmm_share(c->row_block_count, thread, threads, &begin, &end);
+    for (size_t k = begin; k < end; ++k) block_response(c, &c->row_blocks[k]);
 }
 
 sadmm_status CPU(init_weights)(struct sadmm_context *c, struct sadmm_error *error)
 {
     sadmm_islands(c->system, c->label);
-    CPU_PARALLEL
-    {
-        int thread = cpu_thread(), threads = cpu_threads();
-        size_t begin, end;
-        cpu_share((size_t)c->bodies, thread, threads, &begin, &end);
-        for (size_t i = begin; i < end; ++i) invert(c->plan.rigid, &c->A[i * PACKED6], &c->A_inverse[i * PACKED6]);
-        CPU_BARRIER;
-        size_t pair_records = c->pair_block_count * (size_t)LANES;
-        cpu_share(pair_records, thread, threads, &begin, &end);
-        for (size_t k = begin; k < end; ++k)
-            if (c->pair_blocks[k / (size_t)LANES].pair[k % (size_t)LANES] >= 0)
-                c->pair_response[k] = pair_response(c, cpu_pair(c, k));
-        cpu_share(c->row_block_count, thread, threads, &begin, &end);
-        for (size_t k = begin; k < end; ++k) block_response(c, &c->row_blocks[k]);
-    }
+    cpu_parallel(c, respond_share, c);
     for (int32_t i = 0; i < c->bodies; ++i) {
         c->islands[i].level = 1;
         c->islands[i].scale = 0;

@@ -2,11 +2,8 @@
 
 #include <string.h>
 
-#ifdef _OPENMP
-#include <omp.h>
-#endif
-
 #include "core/base/memory.h"
+#include "core/base/parallel.h"
 #include "radix_sort.h"
 
 enum { SLOT_PRESENT = 1, SLOT_LEFT = 2 /* its box left the larger one, or the entry changed */ };
@@ -137,6 +134,20 @@ static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision
     } else {
         enlarge(&c->boxes[slot], &c->proxies[slot], input->dt, &entry->box);
     }
+}
+
+struct slot_update {
+    struct sadmm_candidates *candidates;
+    const struct sadmm_collision_input *input;
+    bool renew;
+};
+
+static void update_share(void *argument, int thread, int threads)
+{
+    const struct slot_update *update = (const struct slot_update *)argument;
+    size_t begin, end;
+    sadmm_share(update->candidates->slot_count, thread, threads, &begin, &end);
+    for (size_t slot = begin; slot < end; ++slot) update_slot(update->candidates, update->input, slot, update->renew);
 }
 
 bool sadmm_candidate_meets(const struct sadmm_candidates *c, const struct sadmm_collision_input *input, uint32_t a,
@@ -300,7 +311,6 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
     bool renew = !c->broad_phase_valid || !(c->margin == input->margin) || gravity_fall > c->gravity_fall;
     bool few, plane_changed = false;
     sadmm_status status;
-    (void)threads; /* unused without OpenMP */
 
     if (!make_room(c, slots)) return sadmm_fail_memory(error, "collision shapes");
     if (slots > c->slot_count) {
@@ -309,10 +319,8 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
     }
     c->slot_count = slots;
 
-#ifdef _OPENMP
-#pragma omp parallel for schedule(static) num_threads(threads) if (threads > 1 && slots > 256)
-#endif
-    for (size_t slot = 0; slot < slots; ++slot) update_slot(c, input, slot, renew);
+    struct slot_update update = {c, input, renew};
+    sadmm_parallel(input->team, threads, update_share, &update);
 
     c->changed_count = c->plane_count = 0;
     for (size_t slot = 0; slot < slots; ++slot) {

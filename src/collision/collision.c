@@ -6,13 +6,11 @@
  */
 #include "collision.h"
 
+#include <stdatomic.h>
 #include <string.h>
 
-#ifdef _OPENMP
-#include <omp.h>
-#endif
-
 #include "core/base/memory.h"
+#include "core/base/parallel.h"
 #include "config.h"
 #include "pipeline.h"
 #include "narrow_phase.h"
@@ -64,15 +62,8 @@ void sadmm_collision_destroy(struct sadmm_collision *collision)
 
 static int thread_count(const struct sadmm_collision_input *input, size_t pairs)
 {
-#ifdef _OPENMP
-    size_t wanted = input->threads > 0 ? (size_t)input->threads : (size_t)omp_get_max_threads();
-    size_t useful = pairs / PAIRS_PER_THREAD + 1;
-    return (int)(wanted < useful ? wanted : useful);
-#else
-    (void)input;
-    (void)pairs;
-    return 1;
-#endif
+    const size_t wanted = input->threads > 1 ? (size_t)input->threads : 1, useful = pairs / PAIRS_PER_THREAD + 1;
+    return (int)(wanted < useful || sadmm_test_forces_threads() ? wanted : useful);
 }
 
 static bool reserve_parts(struct sadmm_collision *collision, size_t count)
@@ -100,12 +91,28 @@ static void copy_share(struct sadmm_contact_set *set, const struct sadmm_contact
     }
 }
 
-/* Append the parts to `set`; every thread takes a share of each. */
-static bool append_parts(struct sadmm_contact_set *set, const struct sadmm_contact_set *parts, size_t count)
+struct appending {
+    struct sadmm_contact_set *set;
+    const struct sadmm_contact_set *parts;
+    size_t count;
+};
+
+static void append_share(void *argument, int thread, int threads)
 {
-    const size_t first_pair = set->pair_count, first_point = set->point_count;
-    const int threads = (int)count + 1;
-    size_t pairs = first_pair, points = first_point;
+    const struct appending *a = (const struct appending *)argument;
+    size_t to_pair = a->set->pair_count, to_point = a->set->point_count;
+    for (size_t p = 0; p < a->count; ++p) {
+        copy_share(a->set, &a->parts[p], to_pair, to_point, (size_t)thread, (size_t)threads);
+        to_pair += a->parts[p].pair_count;
+        to_point += a->parts[p].point_count;
+    }
+}
+
+/* Append the parts to `set`; every thread takes a share of each. */
+static bool append_parts(struct sadmm_contact_set *set, struct sadmm_team *team, const struct sadmm_contact_set *parts,
+                         size_t count)
+{
+    size_t pairs = set->pair_count, points = set->point_count;
     for (size_t t = 0; t < count; ++t) {
         pairs += parts[t].pair_count;
         points += parts[t].point_count;
@@ -113,39 +120,37 @@ static bool append_parts(struct sadmm_contact_set *set, const struct sadmm_conta
     if (!sadmm_grow((void **)&set->pairs, &set->pair_capacity, set->pair_count, pairs, sizeof *set->pairs) ||
         !sadmm_grow((void **)&set->points, &set->point_capacity, set->point_count, points, sizeof *set->points))
         return false;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(static, 1) num_threads(threads) if (threads > 1)
-#endif
-    for (int share = 0; share < threads; ++share) {
-        size_t to_pair = first_pair, to_point = first_point;
-        for (size_t t = 0; t < count; ++t) {
-            copy_share(set, &parts[t], to_pair, to_point, (size_t)share, (size_t)threads);
-            to_pair += parts[t].pair_count;
-            to_point += parts[t].point_count;
-        }
-    }
+    struct appending appending = {set, parts, count};
+    sadmm_parallel(team, (int)count + 1, append_share, &appending);
     set->pair_count = pairs;
     set->point_count = points;
     return true;
 }
 
+struct finding {
+    struct sadmm_collision *collision;
+    const struct sadmm_collision_input *input;
+    const struct sadmm_contact_set *old;
+    atomic_bool failed;
+};
+
+static void find_share(void *argument, int thread, int threads)
+{
+    struct finding *f = (struct finding *)argument;
+    struct sadmm_contact_set *out = thread == 0 ? &f->collision->spare : &f->collision->parts[thread - 1];
+    size_t begin, end;
+    sadmm_share(f->collision->candidates.list.count, thread, threads, &begin, &end);
+    out->pair_count = out->point_count = 0;
+    if (!sadmm_narrow_phase(&f->collision->candidates, f->input, begin, end, f->old, out)) atomic_store(&f->failed, true);
+}
+
 static bool find_in_threads(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
                             const struct sadmm_contact_set *old, int threads)
 {
-    const struct sadmm_candidates *c = &collision->candidates;
-    size_t count = c->list.count;
-    bool ok = true;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(static, 1) num_threads(threads) reduction(&& : ok) if (threads > 1)
-#endif
-    for (int t = 0; t < threads; ++t) {
-        struct sadmm_contact_set *out = t == 0 ? &collision->spare : &collision->parts[t - 1];
-        size_t begin = count * (size_t)t / (size_t)threads, end = count * ((size_t)t + 1) / (size_t)threads;
-        out->pair_count = out->point_count = 0;
-        ok = sadmm_narrow_phase(c, input, begin, end, old, out) && ok;
-    }
+    struct finding finding = {.collision = collision, .input = input, .old = old};
+    const int ran = sadmm_parallel(input->team, threads, find_share, &finding);
     collision->spare.dt = input->dt;
-    return ok && append_parts(&collision->spare, collision->parts, (size_t)threads - 1);
+    return !atomic_load(&finding.failed) && append_parts(&collision->spare, input->team, collision->parts, (size_t)ran - 1);
 }
 
 sadmm_status sadmm_collision_find(struct sadmm_collision *collision, const struct sadmm_collision_input *input,

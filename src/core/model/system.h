@@ -37,7 +37,10 @@ struct sadmm_steady {
     uint32_t reserved;
 };
 
+struct sadmm_team;
+
 struct sadmm_system {
+    struct sadmm_team *team;         /* whose threads work on it (parallel.h); NULL: OpenMP's */
     int32_t body_count;
     const struct sadmm_rigid *rigid; /* (body_count) or NULL */
     const double *A;                 /* (body_count x 36), when rigid is NULL */

@@ -1,31 +1,23 @@
 #include "plan.h"
 
-#ifdef _OPENMP
-#include <omp.h>
-#endif
-
+#include "core/base/parallel.h"
 #include "core/math/rigid.h"
 
 /* An iteration of this many contacts takes some 3 us: about what two barriers cost. */
 enum { POINTS_PER_THREAD = 1500 };
 
-int sadmm_plan_threads(int wanted, size_t points)
+int sadmm_plan_threads(const struct sadmm_team *team, int wanted, size_t points)
 {
-#ifdef _OPENMP
-    if (wanted > 0) return wanted;
-    size_t busy = points / POINTS_PER_THREAD + 1, all = (size_t)omp_get_max_threads();
-    return (int)(busy < all ? busy : all);
-#else
-    (void)wanted;
-    (void)points;
-    return 1;
-#endif
+    return sadmm_team_threads(team, wanted, points / POINTS_PER_THREAD + 1);
 }
 
 /* Fewer are done before other threads have come. */
 enum { PASS_ITEMS = 1000 };
 
-int sadmm_pass_threads(int threads, size_t count) { return count < PASS_ITEMS ? 1 : threads; }
+int sadmm_pass_threads(int threads, size_t count)
+{
+    return count < PASS_ITEMS && !sadmm_test_forces_threads() ? 1 : threads;
+}
 
 static bool any_nonzero(const double *x, int count)
 {
@@ -48,16 +40,30 @@ static bool any_pair_is_warm(const struct sadmm_contact_set *contacts)
     return false;
 }
 
+struct warm_count {
+    const struct sadmm_contact_set *contacts;
+    size_t warm[SADMM_MOST_THREADS]; /* by each member */
+};
+
+static void count_warm(void *argument, int thread, int threads)
+{
+    struct warm_count *count = (struct warm_count *)argument;
+    size_t begin, end, warm = 0;
+    sadmm_share(count->contacts->pair_count, thread, threads, &begin, &end);
+    for (size_t p = begin; p < end; ++p) warm += pair_is_warm(count->contacts, &count->contacts->pairs[p]);
+    count->warm[thread] = warm;
+}
+
 /* Does at least half of the constraints start with an impulse? Contacts count by pairs: the points of a pair that are
  * a little apart (the far edge of a leaning card) carry nothing, and do not make a settled scene a cold one. */
 static bool starts_warm(const struct sadmm_system *system, int plan_threads)
 {
-    const int threads = sadmm_pass_threads(plan_threads, system->contacts->pair_count);
-    (void)threads; /* unused without OpenMP, here and in other passes */
+    struct warm_count count;
     size_t total = system->contacts->pair_count + (size_t)system->block_count, warm = 0;
-#pragma omp parallel for schedule(static) num_threads(threads) if (threads > 1) reduction(+ : warm)
-    for (size_t p = 0; p < system->contacts->pair_count; ++p)
-        warm += pair_is_warm(system->contacts, &system->contacts->pairs[p]);
+    count.contacts = system->contacts;
+    const int ran = sadmm_parallel(system->team, sadmm_pass_threads(plan_threads, system->contacts->pair_count), count_warm,
+                                   &count);
+    for (int t = 0; t < ran; ++t) warm += count.warm[t];
     for (size_t k = 0; k < (size_t)system->block_count; ++k) warm += any_nonzero(system->block_lambda + 6 * k, 6);
     return total > 0 && 2 * warm >= total;
 }
@@ -117,7 +123,7 @@ struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struc
     }
     for (int32_t k = 0; k < system->block_count; ++k) ++plan.blocks[system->blocks[k].kind];
     plan.rigid = system->rigid != NULL;
-    plan.threads = sadmm_plan_threads(settings->threads, (size_t)plan.points + 4 * (size_t)system->block_count);
+    plan.threads = sadmm_plan_threads(system->team, settings->threads, (size_t)plan.points + 4 * (size_t)system->block_count);
     plan.gyroscopic = plan.rigid && sadmm_plan_is_gyroscopic(system->rigid, system->body_count);
     sadmm_plan_settle(&plan, settings, settings->warm_start && starts_warm(system, plan.threads));
     plan.predict = settings->method == SADMM_METHOD_FAST && plan.points > 0 && !has_blocks(&plan) && system->first &&

@@ -27,11 +27,11 @@ struct sadmm_plan {
     bool residuals;         /* some iteration is measured */
     bool wrenches;          /* eq. (12) a body */
     bool certificate;
-    int threads;            /* resolved, >= 1 */
+    int threads;            /* at most, >= 1 */
 };
 
-/* Threads for `points` contact points: as many as `wanted`, or for 0 as many as have enough to do. */
-int sadmm_plan_threads(int wanted, size_t points);
+/* Threads for `points` contact points: as many as have enough to do, at most `wanted` (0: any number). `team` may be NULL. */
+int sadmm_plan_threads(const struct sadmm_team *team, int wanted, size_t points);
 
 /* Threads for a pass over `count` bodies, pairs or points outside the kernels: those of the plan if there is enough to do. */
 int sadmm_pass_threads(int threads, size_t count);

@@ -15,6 +15,7 @@
 #include "certificate.h"
 #include "core/math/dense6.h"
 #include "core/base/memory.h"
+#include "core/base/parallel.h"
 #include "problem_internal.h"
 #include "registry.h"
 #include "schedule.h"
@@ -30,6 +31,7 @@ struct scratch {
 };
 
 struct sadmm_problem {
+    struct sadmm_team team;
     int32_t body_count;
     double *A, *b;               /* (bodies x 36), (bodies x 6) */
     double *velocity;            /* (bodies x 6) */
@@ -569,6 +571,12 @@ static void restore_solution(sadmm_problem *problem)
     copy_values(problem->lambda, problem->saved + bodies + points, 6 * (size_t)problem->block_count);
 }
 
+sadmm_status sadmm_problem_set_tasks(sadmm_problem *problem, const sadmm_tasks *tasks)
+{
+    TRY(check_problem(problem));
+    return sadmm_team_init(&problem->team, tasks, "tasks", &problem->scratch->error);
+}
+
 /* The kept context for a table, made when missing. */
 static sadmm_status find_context(sadmm_problem *problem, const struct sadmm_kernels *kernels,
                                  struct sadmm_context ***context, struct sadmm_error *error)
@@ -594,6 +602,8 @@ sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend backend, 
 
     problem->settings = *settings;
     problem->system = make_system(problem, &problem->contacts);
+    problem->system.team = &problem->team;
+    problem->team.ran = 1;
     problem->plan = sadmm_plan_make(&problem->system, &problem->settings);
     save_solution(problem);
     sadmm_status status = sadmm_schedule_solve(kernels, *context, &problem->system, &problem->settings, &problem->plan,

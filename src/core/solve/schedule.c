@@ -3,6 +3,7 @@
 
 #include "certificate.h"
 #include "core/base/clock.h"
+#include "core/base/parallel.h"
 #include "core/model/system_math.h"
 #include "loads.h"
 
@@ -68,17 +69,31 @@ static bool finite_array(const double *x, size_t count)
     return sum == 0;
 }
 
-static bool finite_impulses(const struct sadmm_contact_set *contacts, int plan_threads)
+struct impulse_check {
+    const struct sadmm_contact_set *contacts;
+    double sum[SADMM_MOST_THREADS]; /* of each member */
+};
+
+static void check_impulses(void *argument, int thread, int threads)
 {
-    const int threads = sadmm_pass_threads(plan_threads, contacts->point_count);
+    struct impulse_check *check = (struct impulse_check *)argument;
+    size_t begin, end;
     double sum = 0;
-    (void)threads;
-#pragma omp parallel for schedule(static) num_threads(threads) if (threads > 1) reduction(+ : sum)
-    for (size_t k = 0; k < contacts->point_count; ++k) {
-        const double *impulse = contacts->points[k].impulse;
+    sadmm_share(check->contacts->point_count, thread, threads, &begin, &end);
+    for (size_t k = begin; k < end; ++k) {
+        const double *impulse = check->contacts->points[k].impulse;
         sum += (impulse[0] - impulse[0]) + (impulse[1] - impulse[1]) + (impulse[2] - impulse[2]);
     }
-    return sum == 0;
+    check->sum[thread] = sum;
+}
+
+static bool finite_impulses(const struct sadmm_system *system, int plan_threads)
+{
+    struct impulse_check check;
+    check.contacts = system->contacts;
+    const int ran = sadmm_parallel(system->team, sadmm_pass_threads(plan_threads, system->contacts->point_count),
+                                   check_impulses, &check);
+    return finite_array(check.sum, (size_t)ran);
 }
 
 static sadmm_status read_solution(struct sadmm_solve *s)
@@ -87,7 +102,7 @@ static sadmm_status read_solution(struct sadmm_solve *s)
     TRY(s->kernels->read_solution(s->context, s->error));
     if (!finite_array(system->velocity, 6 * (size_t)system->body_count) ||
         !finite_array(system->block_lambda, 6 * (size_t)system->block_count) ||
-        !finite_impulses(system->contacts, s->plan->threads))
+        !finite_impulses(system, s->plan->threads))
         return sadmm_fail(s->error, SADMM_ERROR_NON_FINITE, "the solve gave a velocity or multiplier that is not finite");
     return SADMM_OK;
 }
@@ -116,14 +131,14 @@ sadmm_status sadmm_solve_stage(struct sadmm_solve *s, struct sadmm_stages *stage
     }
 }
 
-sadmm_solve_report sadmm_solve_report_empty(const struct sadmm_kernels *kernels, const struct sadmm_plan *plan)
+sadmm_solve_report sadmm_solve_report_empty(const struct sadmm_kernels *kernels)
 {
     sadmm_solve_report report = {
         .backend = kernels->backend,
         .precision = kernels->precision,
         .residual = {.primal = -1, .dual = -1},
         .certificate = sadmm_certificate_none(),
-        .threads = kernels->backend == SADMM_BACKEND_REF ? 1 : plan->threads,
+        .threads = 1,
     };
     return report;
 }
@@ -136,8 +151,9 @@ sadmm_status sadmm_schedule_solve(const struct sadmm_kernels *kernels, struct sa
     struct sadmm_stages stages = sadmm_stages_of(plan, settings, false);
     struct sadmm_stage stage;
     const double begin = sadmm_clock_ms();
-    *report = sadmm_solve_report_empty(kernels, plan);
+    *report = sadmm_solve_report_empty(kernels);
     while (sadmm_stages_next(&stages, &stage)) TRY(sadmm_solve_stage(&solve, &stages, &stage));
     report->solve_ms = sadmm_clock_ms() - begin;
+    if (system->team) report->threads = system->team->ran;
     return SADMM_OK;
 }

@@ -21,7 +21,7 @@ struct sadmm_solve {
 };
 
 /* What a solve's report says before the first stage: not converged, residuals -1, ncp_max -1. */
-sadmm_solve_report sadmm_solve_report_empty(const struct sadmm_kernels *kernels, const struct sadmm_plan *plan);
+sadmm_solve_report sadmm_solve_report_empty(const struct sadmm_kernels *kernels);
 
 /* One stage of a solve; nothing for those of a world. A solution that is not finite gives SADMM_ERROR_NON_FINITE; the
  * system's start values are gone then: callers that promise to keep them keep a copy. */

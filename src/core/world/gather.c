@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "collision/bounds.h"
+#include "core/base/barrier.h"
 #include "core/base/memory.h"
 #include "core/math/rigid.h"
 #include "core/model/steady.h"
@@ -20,8 +21,6 @@ static int32_t count_moving(const sadmm_world *world, size_t begin, size_t end)
     for (size_t slot = begin; slot < end; ++slot) count += moves(&world->bodies[slot]);
     return count;
 }
-
-static size_t begin_of(int share, int shares, size_t count) { return count * (size_t)share / (size_t)shares; }
 
 /* Slots [begin, end), whose dynamic bodies are `dynamic` and the following. */
 static void gather_slots(sadmm_world *world, size_t begin, size_t end, int32_t dynamic)
@@ -52,7 +51,25 @@ static void gather_slots(sadmm_world *world, size_t begin, size_t end, int32_t d
 
 static int last_threads(const sadmm_world *world) /* by the contacts of the last step */
 {
-    return sadmm_plan_threads(world->def.settings.threads, world->contacts.point_count);
+    return sadmm_plan_threads(&world->team, world->def.settings.threads, world->contacts.point_count);
+}
+
+struct gathering {
+    sadmm_world *world;
+    struct sadmm_barrier barrier;
+    int32_t moving[SADMM_MOST_THREADS]; /* dynamic bodies in each member's share of the slots */
+};
+
+static void gather_share(void *argument, int thread, int threads)
+{
+    struct gathering *g = (struct gathering *)argument;
+    size_t begin, end;
+    int32_t first = 0;
+    sadmm_share(g->world->body_slots, thread, threads, &begin, &end);
+    g->moving[thread] = count_moving(g->world, begin, end);
+    sadmm_barrier_wait(&g->barrier, threads);
+    for (int t = 0; t < thread; ++t) first += g->moving[t];
+    gather_slots(g->world, begin, end, first);
 }
 
 sadmm_status sadmm_world_gather(sadmm_world *world)
@@ -67,15 +84,10 @@ sadmm_status sadmm_world_gather(sadmm_world *world)
         !grow(&world->start_velocity, &world->start_velocity_capacity, 6 * n, sizeof *world->start_velocity) ||
         !grow(&world->slot_of, &world->slot_of_capacity, n, sizeof *world->slot_of))
         return sadmm_fail_memory(&world->error, "the step");
-    /* A share of the slots a thread: how many dynamic bodies are in it, then the bodies. */
-    enum { MOST_SHARES = 64 };
-    const int threads = sadmm_pass_threads(last_threads(world), slots), shares = threads < MOST_SHARES ? threads : MOST_SHARES;
-    int32_t first[MOST_SHARES + 1] = {0};
-#pragma omp parallel for schedule(static, 1) num_threads(shares) if (shares > 1)
-    for (int s = 0; s < shares; ++s) first[s + 1] = count_moving(world, begin_of(s, shares, slots), begin_of(s + 1, shares, slots));
-    for (int s = 0; s < shares; ++s) first[s + 1] += first[s];
-#pragma omp parallel for schedule(static, 1) num_threads(shares) if (shares > 1)
-    for (int s = 0; s < shares; ++s) gather_slots(world, begin_of(s, shares, slots), begin_of(s + 1, shares, slots), first[s]);
+    struct gathering g;
+    g.world = world;
+    g.barrier = (struct sadmm_barrier){0};
+    sadmm_parallel(&world->team, sadmm_pass_threads(last_threads(world), slots), gather_share, &g);
     return SADMM_OK;
 }
 
@@ -102,6 +114,7 @@ struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *worl
 struct sadmm_system sadmm_world_system(sadmm_world *world)
 {
     struct sadmm_system system = {
+        .team = &world->team,
         .body_count = world->dynamic_count,
         .rigid = world->start,
         .velocity = world->velocity,

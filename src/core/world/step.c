@@ -25,27 +25,43 @@ sadmm_status sadmm_world_choose_backend(sadmm_world *world)
 static sadmm_status find_contacts(sadmm_world *world)
 {
     struct sadmm_collision_input input = sadmm_world_collision_input(world);
+    input.team = &world->team;
     return sadmm_collision_find(world->collision, &input, &world->contacts, &world->error);
+}
+
+struct start_keeping {
+    sadmm_world *world;
+    double deepest[SADMM_MOST_THREADS]; /* of each member's points */
+};
+
+static void keep_share(void *argument, int thread, int threads)
+{
+    struct start_keeping *keeping = (struct start_keeping *)argument;
+    sadmm_world *world = keeping->world;
+    const struct sadmm_contact_point *points = world->contacts.points;
+    size_t begin, end;
+    double deepest = 0;
+    sadmm_share(world->contacts.point_count, thread, threads, &begin, &end);
+    for (size_t k = begin; k < end; ++k) {
+        memcpy(world->start_impulse + 3 * k, points[k].impulse, 3 * sizeof *world->start_impulse);
+        const double own = points[k].gap < 0 ? -points[k].gap : 0; /* a gap of 0 is 0 deep, not -0 */
+        deepest = own > deepest ? own : deepest;
+    }
+    keeping->deepest[thread] = deepest;
 }
 
 /* The starting impulses, which the solve replaces, and the deepest penetration: one pass over the points. */
 static sadmm_status keep_start(sadmm_world *world, double *depth)
 {
-    const struct sadmm_contact_point *points = world->contacts.points;
     const size_t count = world->contacts.point_count;
-    const int threads = sadmm_pass_threads(world->plan.threads, count);
-    double deepest = 0;
-    (void)threads;
+    struct start_keeping keeping;
     if (!sadmm_grow((void **)&world->start_impulse, &world->start_impulse_capacity, 0, 3 * count,
                     sizeof *world->start_impulse))
         return sadmm_fail_memory(&world->error, "the step's starting impulses");
-#pragma omp parallel for schedule(static) num_threads(threads) if (threads > 1) reduction(max : deepest)
-    for (size_t k = 0; k < count; ++k) {
-        memcpy(world->start_impulse + 3 * k, points[k].impulse, 3 * sizeof *world->start_impulse);
-        const double own = points[k].gap < 0 ? -points[k].gap : 0; /* a gap of 0 is 0 deep, not -0 */
-        deepest = own > deepest ? own : deepest;
-    }
-    *depth = deepest;
+    keeping.world = world;
+    const int ran = sadmm_parallel(&world->team, sadmm_pass_threads(world->plan.threads, count), keep_share, &keeping);
+    *depth = 0;
+    for (int t = 0; t < ran; ++t) *depth = keeping.deepest[t] > *depth ? keeping.deepest[t] : *depth;
     return SADMM_OK;
 }
 
@@ -80,17 +96,23 @@ static sadmm_status name_culprit(sadmm_world *world)
     return SADMM_ERROR_NON_FINITE;
 }
 
-static void commit(sadmm_world *world)
+static void commit_share(void *argument, int thread, int threads)
 {
-    const int threads = sadmm_pass_threads(world->plan.threads, (size_t)world->dynamic_count);
-    (void)threads;
-#pragma omp parallel for schedule(static) num_threads(threads) if (threads > 1)
-    for (int32_t i = 0; i < world->dynamic_count; ++i) {
+    sadmm_world *world = (sadmm_world *)argument;
+    size_t begin, end;
+    sadmm_share((size_t)world->dynamic_count, thread, threads, &begin, &end);
+    for (size_t i = begin; i < end; ++i) {
         struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
         steady_keep(&body->steady, &body->rigid, &world->next[i], world->def.settings.dt);
         body->rigid = world->next[i];
-        if (world->plan.wrenches) memcpy(body->contact_wrench, world->wrench + 6 * (size_t)i, sizeof body->contact_wrench);
+        if (world->plan.wrenches) memcpy(body->contact_wrench, world->wrench + 6 * i, sizeof body->contact_wrench);
     }
+}
+
+static void commit(sadmm_world *world)
+{
+    const int threads = sadmm_pass_threads(world->plan.threads, (size_t)world->dynamic_count);
+    sadmm_parallel(&world->team, threads, commit_share, world);
     world->stepped = true;
     world->contacts_readable = true;
 }
@@ -113,7 +135,7 @@ static sadmm_status make_plan(struct host_step *step)
     step->found = true;
     step->system = sadmm_world_system(world);
     world->plan = sadmm_plan_make(&step->system, &world->def.settings);
-    step->report = sadmm_solve_report_empty(world->kernels, &world->plan);
+    step->report = sadmm_solve_report_empty(world->kernels);
     return keep_start(world, &step->depth);
 }
 
@@ -174,7 +196,7 @@ static void report_step(const struct host_step *step)
         .ms = {.collide = ms[SADMM_PHASE_COLLIDE], .assemble = ms[SADMM_PHASE_ASSEMBLE],
                .solve = ms[SADMM_PHASE_SOLVE], .finish = ms[SADMM_PHASE_FINISH]},
     };
-    done.plan.threads = solved->threads;
+    done.plan.threads = step->world->team.ran;
     for (int phase = 0; phase < SADMM_PHASE_COUNT; ++phase) done.ms.total += phase == SADMM_PHASE_CERTIFY ? 0 : ms[phase];
     sadmm_world_report_steps(step->world, 1, &done);
     step->world->report.certificate = solved->certificate;
@@ -186,6 +208,7 @@ static sadmm_status host_step(sadmm_world *world)
 {
     struct host_step step = {.world = world, .stages = sadmm_stages_of(&world->plan, &world->def.settings, true)};
     TRY(sadmm_world_take_back(world));
+    world->team.ran = 1;
     step.solve = (struct sadmm_solve){world->kernels, world->context, &step.system, &world->def.settings,
                                       &world->plan, &step.report, &world->error};
     sadmm_status status = run_stages(&step);

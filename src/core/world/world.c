@@ -27,6 +27,8 @@ sadmm_status sadmm_world_create(const sadmm_world_def *def, sadmm_world **out)
     if (!def) return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "def is NULL");
     sadmm_status status = sadmm_settings_validate(&def->settings, NULL);
     if (status == SADMM_OK) status = sadmm_check_range("def->contact_margin", def->contact_margin, 0, 1, NULL);
+    struct sadmm_team team;
+    if (status == SADMM_OK) status = sadmm_team_init(&team, &def->tasks, "def->tasks", NULL);
     if (status != SADMM_OK) return status;
     if (def->device < 0)
         return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "def->device = %d: must be >= 0", def->device);
@@ -38,6 +40,7 @@ sadmm_status sadmm_world_create(const sadmm_world_def *def, sadmm_world **out)
     sadmm_world *world = (sadmm_world *)sadmm_alloc(1, sizeof *world);
     if (!world) return sadmm_fail_memory(NULL, "the world");
     world->def = *def;
+    world->team = team;
     status = sadmm_collision_create(&world->collision, NULL);
     if (status != SADMM_OK) {
         sadmm_free(world);

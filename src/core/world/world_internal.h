@@ -5,6 +5,7 @@
 #include "collision/collision.h"
 #include "core/base/check.h"
 #include "core/base/error.h"
+#include "core/base/parallel.h"
 #include "core/solve/certificate.h"
 #include "core/solve/kernels.h"
 #include "core/solve/schedule.h"
@@ -32,6 +33,7 @@ struct sadmm_world_body {
 struct sadmm_world {
     sadmm_world_def def; /* settings inside are the current ones */
     struct sadmm_error error;
+    struct sadmm_team team;
 
     struct sadmm_world_body *bodies;
     size_t body_slots, body_capacity;

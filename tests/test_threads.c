@@ -1,0 +1,435 @@
+/* Threads: how many work, whose they are, and that the library gets along with what happens to the process: forks, limits,
+ * unloading. That results do not depend on their number is also in test_fast, test_reduced_form, test_collision and
+ * test_scenes, kernel by kernel and scene by scene. */
+#include <dlfcn.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "core/base/barrier.h"
+#include "core/base/parallel.h"
+#include "scene_tools.h"
+#include "task_pool.h"
+
+#ifdef _OPENMP
+enum { HAVE_OPENMP = 1 };
+#else
+enum { HAVE_OPENMP = 0 };
+#endif
+
+static sadmm_world *open_world(const char *spec, int threads, const struct pool *pool)
+{
+    struct sadmm_scene scene = open_scene(spec);
+    scene.def.backend = SADMM_BACKEND_CPU;
+    scene.def.settings.threads = threads;
+    if (pool) scene.def.tasks = pool_tasks((struct pool *)pool, threads > 0 ? threads : 1);
+    return build_scene(&scene);
+}
+
+static uint64_t hash_of(const char *spec, int threads, const struct pool *pool, int steps)
+{
+    sadmm_world *world = open_world(spec, threads, pool);
+    step_world(world, steps);
+    uint64_t hash = sadmm_world_state_hash(world);
+    sadmm_world_destroy(world);
+    return hash;
+}
+
+static int threads_of(const char *spec, int threads)
+{
+    sadmm_world *world = open_world(spec, threads, NULL);
+    step_world(world, 2); /* the first one does not know yet how many contacts there will be */
+    int ran = world_report(world).threads;
+    sadmm_world_destroy(world);
+    return ran;
+}
+
+/* ---- regions ----------------------------------------------------------------------------------------------------- */
+
+enum { ITEMS = 1000 };
+struct rounds {
+    struct sadmm_barrier barrier;
+    int values[2][ITEMS];
+    atomic_int calls[SADMM_MOST_THREADS], members;
+};
+
+/* Every round moves values by one place, so that each member reads what its neighbour wrote the round before. */
+static void go_round(void *argument, int thread, int threads)
+{
+    struct rounds *r = (struct rounds *)argument;
+    size_t begin, end;
+    sadmm_share(ITEMS, thread, threads, &begin, &end);
+    for (int round = 0; round < 20; ++round) {
+        for (size_t i = begin; i < end; ++i) r->values[(round + 1) % 2][i] = r->values[round % 2][(i + 1) % ITEMS];
+        sadmm_barrier_wait(&r->barrier, threads);
+    }
+    atomic_fetch_add(&r->calls[thread], 1);
+    atomic_store(&r->members, threads);
+}
+
+static void expect_region(struct sadmm_team *team, int threads)
+{
+    static struct rounds r;
+    memset(&r, 0, sizeof r);
+    for (int i = 0; i < ITEMS; ++i) r.values[0][i] = i;
+    int ran = sadmm_parallel(team, threads, go_round, &r);
+    ck_assert_int_ge(ran, 1);
+    ck_assert_int_le(ran, threads);
+    ck_assert_int_eq(atomic_load(&r.members), ran);
+    for (int t = 0; t < threads; ++t) ck_assert_int_eq(atomic_load(&r.calls[t]), t < ran);
+    for (int i = 0; i < ITEMS; ++i) ck_assert_int_eq(r.values[0][i], (i + 20) % ITEMS);
+}
+
+START_TEST(openmp_gives_what_is_asked_for)
+{
+    struct sadmm_team team = {.ran = 0};
+    for (int threads = 1; threads <= 9; threads += 2) {
+        expect_region(&team, threads);
+        ck_assert_int_eq(team.ran, HAVE_OPENMP ? threads : 1);
+    }
+    expect_region(NULL, 4);
+}
+END_TEST
+
+START_TEST(a_pool_gives_what_it_can)
+{
+    struct pool pool;
+    struct sadmm_team team;
+    pool_start(&pool, (enum pool_kind)_i, 3);
+    sadmm_tasks tasks = pool_tasks(&pool, 4);
+    ck_assert_int_eq(sadmm_team_init(&team, &tasks, "tasks", NULL), SADMM_OK);
+    for (int i = 0; i < 50; ++i) expect_region(&team, 1 + i % 5);
+    ck_assert_int_gt(pool.enqueued, 0);
+    /* None of these has a thread that could come in time. */
+    if (_i == POOL_INLINE || _i == POOL_QUIET || _i == POOL_REFUSING || _i == POOL_LAZY) ck_assert_int_eq(team.ran, 1);
+    /* How soon threads come is the machine's to say; that they come at all is asked for. */
+    for (int i = 0; _i == POOL_PROMPT && team.ran < 4; ++i) expect_region(&team, 4);
+    pool_stop(&pool);
+}
+END_TEST
+
+/* Two threads whose pool runs the other one's tasks while they hand out theirs: neither may wait for the other then. */
+static void *many_regions(void *argument)
+{
+    static _Thread_local struct rounds r;
+    struct sadmm_team team;
+    ck_assert_int_eq(sadmm_team_init(&team, (const sadmm_tasks *)argument, "tasks", NULL), SADMM_OK);
+    for (int i = 0; i < 2000; ++i) {
+        memset(&r.calls, 0, sizeof r.calls);
+        sadmm_parallel(&team, 4, go_round, &r);
+    }
+    return NULL;
+}
+
+START_TEST(handing_out_waits_for_nobody)
+{
+    struct pool pool;
+    pthread_t other;
+    pool_start(&pool, POOL_HELPFUL, 0);
+    sadmm_tasks tasks = pool_tasks(&pool, 4);
+    ck_assert_int_eq(pthread_create(&other, NULL, many_regions, &tasks), 0);
+    many_regions(&tasks);
+    pthread_join(other, NULL);
+    pool_stop(&pool);
+}
+END_TEST
+
+/* ---- how many ---------------------------------------------------------------------------------------------------- */
+
+/* 500 contacts are no work for two; 9,000 are some for six. */
+START_TEST(threads_are_an_upper_bound)
+{
+    int processors = sadmm_processors();
+    ck_assert_int_eq(threads_of("sliding_cubes:100", 64), 1);
+    ck_assert_int_eq(threads_of("sliding_cubes:1000", 1), 1);
+    ck_assert_int_eq(threads_of("sliding_cubes:1000", 2), processors < 2 ? 1 : 2);
+    ck_assert_int_le(threads_of("sliding_cubes:1000", 64), processors);
+    sadmm_test_force_threads(true);
+    ck_assert_int_eq(threads_of("sliding_cubes:100", 5), HAVE_OPENMP ? 5 : 1);
+    sadmm_test_force_threads(false);
+}
+END_TEST
+
+START_TEST(a_pool_bounds_them_too)
+{
+    struct pool pool;
+    pool_start(&pool, POOL_PLAIN, 2);
+    const sadmm_tasks tasks = pool_tasks(&pool, 3);
+    struct sadmm_team team;
+    ck_assert_int_eq(sadmm_team_init(&team, &tasks, "tasks", NULL), SADMM_OK);
+    ck_assert_int_eq(sadmm_team_threads(&team, 0, 100), 3);
+    ck_assert_int_eq(sadmm_team_threads(&team, 2, 100), 2);
+    ck_assert_int_eq(sadmm_team_threads(&team, 8, 100), 3);
+    ck_assert_int_eq(sadmm_team_threads(&team, 8, 2), 2);
+    ck_assert_int_eq(sadmm_team_threads(&team, 0, SIZE_MAX), 3);
+    sadmm_test_force_threads(true);
+    ck_assert_int_eq(sadmm_team_threads(&team, 8, 1), 3);
+    sadmm_test_force_threads(false);
+    pool_stop(&pool);
+}
+END_TEST
+
+/* ---- tasks of the host ------------------------------------------------------------------------------------------- */
+
+START_TEST(any_pool_gives_the_same_bits)
+{
+    static const char *const specs[] = {"vertical_stacks:4", "pile:40"};
+    struct pool pool;
+    sadmm_test_force_threads(true);
+    pool_start(&pool, (enum pool_kind)(_i % POOL_KINDS), 2);
+    const char *spec = specs[_i / POOL_KINDS];
+    ck_assert(hash_of(spec, 3, &pool, 40) == hash_of(spec, 1, NULL, 40));
+    ck_assert_int_gt(pool.enqueued, 0);
+    pool_stop(&pool);
+}
+END_TEST
+
+START_TEST(the_report_counts_tasks_that_came)
+{
+    struct pool pool;
+    sadmm_test_force_threads(true);
+    pool_start(&pool, POOL_PROMPT, 2);
+    sadmm_world *world = open_world("vertical_stacks:4", 3, &pool);
+    do {
+        step_world(world, 1);
+        ck_assert_int_le(world_report(world).threads, 3);
+    } while (world_report(world).threads < 3); /* that it happens is up to the machine: the test's time limit */
+    sadmm_world_destroy(world);
+    pool_stop(&pool);
+    pool_start(&pool, POOL_LAZY, 2);
+    world = open_world("vertical_stacks:4", 3, &pool);
+    step_world(world, 3);
+    ck_assert_int_eq(world_report(world).threads, 1);
+    sadmm_world_destroy(world);
+    pool_stop(&pool);
+}
+END_TEST
+
+struct stepping {
+    struct pool *pool;
+    uint64_t hash;
+};
+
+static void step_in_task(void *argument)
+{
+    struct stepping *s = (struct stepping *)argument;
+    sadmm_test_force_threads(true);
+    s->hash = hash_of("vertical_stacks:4", 3, s->pool, 20);
+}
+
+/* Every thread of the pool is in a step that hands tasks to the same pool. */
+START_TEST(tasks_may_step_worlds)
+{
+    enum { WORLDS = 8 };
+    struct pool pool;
+    struct stepping steps[WORLDS];
+    void *names[WORLDS];
+    pool_start(&pool, POOL_PLAIN, 3);
+    for (int i = 0; i < WORLDS; ++i) {
+        steps[i] = (struct stepping){&pool, 0};
+        names[i] = pool_enqueue(&pool, step_in_task, &steps[i]);
+    }
+    for (int i = 0; i < WORLDS; ++i) pool_wait(&pool, names[i]);
+    pool_stop(&pool);
+    for (int i = 0; i < WORLDS; ++i) ck_assert(steps[i].hash == hash_of("vertical_stacks:4", 1, NULL, 20));
+}
+END_TEST
+
+/* A problem: the same solution, and callbacks that are taken back. */
+START_TEST(problems_take_tasks)
+{
+    struct pool pool;
+    sadmm_problem *problem;
+    sadmm_settings settings = sadmm_settings_default();
+    sadmm_world *world = open_world("pile:40", 1, NULL);
+    step_world(world, 100);
+    ck_assert_int_eq(sadmm_problem_create(&problem), SADMM_OK);
+    pool_start(&pool, POOL_PROMPT, 2);
+    const sadmm_tasks tasks = pool_tasks(&pool, 3);
+    double *velocities[3];
+    settings.threads = 3;
+    sadmm_test_force_threads(true);
+    for (int run = 0; run < 3; ++run) {
+        sadmm_solve_report report;
+        ck_assert_int_eq(sadmm_world_freeze(world, problem), SADMM_OK);
+        ck_assert_int_gt(sadmm_problem_contact_count(problem), 0);
+        ck_assert_int_eq(sadmm_problem_set_tasks(problem, run == 1 ? &tasks : NULL), SADMM_OK);
+        ck_assert_int_eq(sadmm_problem_solve(problem, SADMM_BACKEND_CPU, SADMM_F64, &settings, &report), SADMM_OK);
+        if (run != 1) ck_assert_int_eq(report.threads, HAVE_OPENMP ? 3 : 1);
+        velocities[run] = malloc(6 * (size_t)sadmm_problem_body_count(problem) * sizeof(double));
+        ck_assert_int_eq(sadmm_problem_get_solution(problem, velocities[run], NULL, NULL), SADMM_OK);
+        ck_assert((pool.enqueued > 0) == (run > 0));
+        if (run == 1) pool_stop(&pool); /* whoever calls it later hangs, or worse */
+    }
+    for (int run = 1; run < 3; ++run)
+        ck_assert_mem_eq(velocities[0], velocities[run], 6 * (size_t)sadmm_problem_body_count(problem) * sizeof(double));
+    for (int run = 0; run < 3; ++run) free(velocities[run]);
+    sadmm_problem_destroy(problem);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+START_TEST(bad_callbacks_are_refused)
+{
+    struct pool pool;
+    const sadmm_tasks bad[] = {{pool_enqueue, NULL, &pool, 2},
+                               {NULL, pool_wait, &pool, 2},
+                               {pool_enqueue, pool_wait, &pool, 0},
+                               {pool_enqueue, pool_wait, &pool, 1025}};
+    static const char *const messages[] = {"wait = NULL: must be given with", "enqueue = NULL: must be given with",
+                                           "threads = 0: must be in [1, 1024]", "threads = 1025: must be in [1, 1024]"};
+    sadmm_problem *problem;
+    ck_assert_int_eq(sadmm_problem_create(&problem), SADMM_OK);
+    for (size_t k = 0; k < sizeof bad / sizeof *bad; ++k) {
+        sadmm_world_def def = sadmm_world_def_default();
+        sadmm_world *world;
+        def.tasks = bad[k];
+        ck_assert_int_eq(sadmm_world_create(&def, &world), SADMM_ERROR_INVALID_ARGUMENT);
+        ck_assert_msg(strstr(sadmm_last_message(), messages[k]) && strstr(sadmm_last_message(), "def->tasks."), "%s",
+                      sadmm_last_message());
+        ck_assert_int_eq(sadmm_problem_set_tasks(problem, &bad[k]), SADMM_ERROR_INVALID_ARGUMENT);
+        ck_assert_msg(strstr(sadmm_problem_message(problem), messages[k]), "%s", sadmm_problem_message(problem));
+    }
+    ck_assert_int_eq(sadmm_problem_set_tasks(NULL, NULL), SADMM_ERROR_INVALID_ARGUMENT);
+    sadmm_problem_destroy(problem);
+}
+END_TEST
+
+/* ---- what happens to a process ----------------------------------------------------------------------------------- */
+
+/* A child's exit status. */
+static int status_of(pid_t child)
+{
+    int status;
+    ck_assert_int_eq(waitpid(child, &status, 0), child);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+/* 0: twenty steps on a single thread, to the state that was expected, without a word to the pool. */
+static int child_steps(sadmm_world *world, const struct pool *pool, uint64_t expected)
+{
+    const int enqueued = pool->enqueued;
+    alarm(60); /* instead of a hang */
+    for (int i = 0; i < 20; ++i)
+        if (sadmm_world_step(world) != SADMM_OK) return 1;
+    if (sadmm_world_state_hash(world) != expected) return 2;
+    return world_report(world).threads == 1 && pool->enqueued == enqueued ? 0 : 3;
+}
+
+/* OpenMP's threads stay with the parent; so do those of a pool. */
+START_TEST(a_forked_child_goes_on_alone)
+{
+    struct pool pool = {.enqueued = 0};
+    const char *spec = "vertical_stacks:4";
+    const uint64_t expected = hash_of(spec, 1, NULL, 25);
+    sadmm_test_force_threads(true);
+    if (_i) pool_start(&pool, POOL_PLAIN, 2);
+    sadmm_world *world = open_world(spec, 3, _i ? &pool : NULL);
+    step_world(world, 5);
+    pid_t child = fork();
+    ck_assert_int_ge(child, 0);
+    if (child == 0) _exit(child_steps(world, &pool, expected));
+    ck_assert_int_eq(status_of(child), 0);
+    step_world(world, 20);
+    ck_assert(sadmm_world_state_hash(world) == expected);
+    ck_assert(_i || world_report(world).threads == (HAVE_OPENMP ? 3 : 1));
+    sadmm_world_destroy(world);
+    if (_i) pool_stop(&pool);
+}
+END_TEST
+
+static int child_takes_new_pool(uint64_t expected)
+{
+    struct pool pool;
+    alarm(60);
+    pool_start(&pool, POOL_PLAIN, 2);
+    if (hash_of("vertical_stacks:4", 3, &pool, 5) != expected) return 1;
+    return pool.enqueued > 0 ? 0 : 2;
+}
+
+/* A pool that the child made itself is as good as any. Sanitizers allow no threads after a fork with threads: the parent has
+ * none here. */
+START_TEST(a_forked_child_may_have_a_pool)
+{
+    const uint64_t expected = hash_of("vertical_stacks:4", 1, NULL, 5);
+    sadmm_test_force_threads(true);
+    pid_t child = fork();
+    ck_assert_int_ge(child, 0);
+    if (child == 0) _exit(child_takes_new_pool(expected));
+    ck_assert_int_eq(status_of(child), 0);
+}
+END_TEST
+
+/* The sanitizers' own memory does not fit under a limit. */
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+
+static int limited_steps(uint64_t expected)
+{
+    FILE *file = fopen("/proc/self/statm", "r");
+    unsigned long pages;
+    pthread_attr_t usual;
+    size_t stack;
+    if (!file || fscanf(file, "%lu", &pages) != 1) return 4;
+    fclose(file);
+    if (pthread_attr_init(&usual) != 0 || pthread_attr_getstacksize(&usual, &stack) != 0) return 4;
+    rlim_t bytes = (rlim_t)pages * (rlim_t)sysconf(_SC_PAGESIZE) + 24 * (rlim_t)stack; /* 63 are asked for */
+    const struct rlimit limit = {bytes, bytes};
+    if (setrlimit(RLIMIT_AS, &limit) != 0) return 5;
+    sadmm_test_force_threads(true);
+    sadmm_world *world = open_world("vertical_stacks:4", 64, NULL);
+    step_world(world, 20);
+    if (sadmm_world_state_hash(world) != expected) return 2;
+    const int ran = world_report(world).threads;
+    return HAVE_OPENMP ? ran > 1 && ran < 64 ? 0 : 3 : 0;
+}
+
+/* Threads that cannot be made are not waited for, and end nobody. */
+START_TEST(a_limited_process_takes_fewer)
+{
+    const uint64_t expected = hash_of("vertical_stacks:4", 1, NULL, 20);
+    pid_t child = fork();
+    ck_assert_int_ge(child, 0);
+    if (child == 0) _exit(limited_steps(expected));
+    ck_assert_int_eq(status_of(child), 0);
+}
+END_TEST
+
+#endif
+
+/* Threads of a pool sleep in the library's code, or return to it: it stays where it is. */
+START_TEST(the_library_stays_loaded)
+{
+    void *library = dlopen(SUBADMM_LIBRARY, RTLD_NOW | RTLD_LOCAL);
+    ck_assert_msg(library != NULL, "%s", dlerror());
+    ck_assert_ptr_nonnull(dlsym(library, "sadmm_world_step"));
+    ck_assert_int_eq(dlclose(library), 0);
+    ck_assert_ptr_nonnull(dlopen(SUBADMM_LIBRARY, RTLD_NOW | RTLD_NOLOAD));
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("threads");
+    TCase *cases = tcase_create("threads");
+    suite_add_tcase(suite, cases);
+    tcase_set_timeout(cases, 30);
+    tcase_add_test(cases, openmp_gives_what_is_asked_for);
+    tcase_add_loop_test(cases, a_pool_gives_what_it_can, 0, POOL_KINDS);
+    tcase_add_test(cases, handing_out_waits_for_nobody);
+    tcase_add_test(cases, threads_are_an_upper_bound);
+    tcase_add_test(cases, a_pool_bounds_them_too);
+    tcase_add_loop_test(cases, any_pool_gives_the_same_bits, 0, 2 * POOL_KINDS);
+    tcase_add_test(cases, the_report_counts_tasks_that_came);
+    tcase_add_test(cases, tasks_may_step_worlds);
+    tcase_add_test(cases, problems_take_tasks);
+    tcase_add_test(cases, bad_callbacks_are_refused);
+    tcase_add_loop_test(cases, a_forked_child_goes_on_alone, 0, 2);
+    tcase_add_test(cases, a_forked_child_may_have_a_pool);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    tcase_add_test(cases, a_limited_process_takes_fewer);
+#endif
+    tcase_add_test(cases, the_library_stays_loaded);
+    return run_suite(suite);
+}
