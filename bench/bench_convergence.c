@@ -167,7 +167,7 @@ static void usage(FILE *out)
                  "  --method paper|fast|both   default both\n"
                  "  --backend ref|cpu|cuda|all all: cpu and cuda; default cpu\n"
                  "  --precision f32|f64|both   default f64; errors are measured in double in both\n"
-                 "  --threads N[,N...]         CPU threads, default 1\n"
+                 "  --threads N[,N...]         CPU threads at most, default 1\n"
                  "  --device N                 accelerator, default 0\n"
                  "  --only cold|warm           one half of the measurements\n"
                  "  --problem TEXT             only the cold problems with TEXT in their name\n"

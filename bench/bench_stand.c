@@ -177,7 +177,7 @@ static void usage(FILE *out)
                  "  --iterations N        a step, default the scene's for the method\n"
                  "  --backend NAME        ref, cpu (default) or cuda\n"
                  "  --precision f32|f64   default f32\n"
-                 "  --threads N           default 2\n"
+                 "  --threads N           at most, default 2\n"
                  "  --device N            accelerator, default 0\n"
                  "  --limit X             most drift and penetration of what stands, as a share of the smallest body,\n"
                  "                        default 0.01\n\n"

@@ -348,12 +348,12 @@ static void hash_of(const char *arguments, char hash[17])
 /* The hash is of the state: equal for any number of threads and from run to run, different for different states. */
 START_TEST(same_hash)
 {
-    static const char *const scenes[] = {"pyramid:6", "pile:60"};
+    static const char *const scenes[] = {"pyramid:6", "sliding_cubes:500"}; /* the second has work for two threads */
     static const char *const precisions[] = {"f32", "f64"};
     char text[256], hash[4][17];
     const char *scene = scenes[_i / 2], *precision = precisions[_i % 2];
-    const char *const variants[] = {"--steps 60 --threads 1", "--steps 60 --threads 2", "--steps 60 --threads 2",
-                                    "--steps 59 --threads 1"};
+    const char *const variants[] = {"--steps 20 --threads 1", "--steps 20 --threads 2", "--steps 20 --threads 2",
+                                    "--steps 19 --threads 1"};
     for (int k = 0; k < 4; ++k) {
         snprintf(text, sizeof text, "run %s --backend cpu --precision %s %s --json -", scene, precision, variants[k]);
         hash_of(text, hash[k]);
@@ -362,12 +362,37 @@ START_TEST(same_hash)
     ck_assert_str_eq(hash[0], hash[2]);
     ck_assert_str_ne(hash[0], hash[3]);
     /* measuring changes nothing */
-    snprintf(text, sizeof text, "run %s --backend cpu --precision %s --steps 60 --certify --trace t.csv --json -",
+    snprintf(text, sizeof text, "run %s --backend cpu --precision %s --steps 20 --certify --trace t.csv --json -",
              scene, precision);
     hash_of(text, hash[3]);
     ck_assert_str_eq(hash[0], hash[3]);
 }
 END_TEST
+
+/* The sanitizers' own memory does not fit under a limit. */
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+
+/* 64 stacks of 8 MB do not fit: fewer threads run, and nobody ends the process. */
+START_TEST(threads_that_cannot_be_made)
+{
+    static const char arguments[] = "run %s --steps 30 --backend cpu --threads %d --json -";
+    static const char *const scenes[] = {"pile:150", "sliding_cubes:500"};
+    char text[256], limited[512], wanted[17];
+    snprintf(text, sizeof text, arguments, scenes[_i], 1);
+    hash_of(text, wanted);
+    snprintf(text, sizeof text, arguments, scenes[_i], 64);
+    snprintf(limited, sizeof limited, "cd %s && ulimit -s 8192 && ulimit -v 400000 && %s %s >out 2>err", folder, command, text);
+    ck_assert_int_eq(system(limited), 0);
+    free(out);
+    out = read_text("out");
+    json_t *r = parse(out);
+    ck_assert_str_eq(string(r, "state_hash"), wanted);
+    ck_assert(number(r, "threads") < 64);
+    json_decref(r);
+}
+END_TEST
+
+#endif
 
 /* A scene's iterations are those of the method; what is asked for goes first. */
 START_TEST(iterations_follow_the_method)
@@ -712,6 +737,9 @@ int main(void)
     tcase_add_test(tests, run_stops);
     tcase_add_test(tests, run_default_steps);
     tcase_add_loop_test(tests, same_hash, 0, 4);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    tcase_add_loop_test(tests, threads_that_cannot_be_made, 0, 2);
+#endif
     tcase_add_test(tests, iterations_follow_the_method);
     tcase_add_test(tests, options_matter);
     tcase_add_test(tests, traces);

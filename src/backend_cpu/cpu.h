@@ -1,4 +1,4 @@
-/* The CPU backend: reduced form (docs/algorithm.md) on threads (core/parallel.h) and SIMD lanes.
+/* The CPU backend: reduced form (docs/algorithm.md) on threads (core/base/parallel.h) and SIMD lanes.
  *
  * These sources are compiled once per precision (SADMM_REAL) and instruction set (SADMM_VARIANT, SADMM_VECTOR_BYTES);
  * cpu_find.c picks the best table the machine can run.

@@ -22,7 +22,7 @@ static const struct cli_option options[] = {
     [OPTION_LEVEL] = {"penalty-offset", "KG", "paper: c of eq. (13), kg (default: tried from the mean mass)"},
     [OPTION_MASS_FACTOR] = {"penalty-mass-factor", "M", "paper: M of eq. (13) (default 0)"},
     [OPTION_PENALTY_PERIOD] = {"penalty-period", "N", "paper: iterations between updates, 0 = never (default 30)"},
-    [OPTION_THREADS] = {"threads", "N", "CPU threads, 0 = as many as pay (default)"},
+    [OPTION_THREADS] = {"threads", "N", "CPU threads at most, 0 = as many as pay (default)"},
     [OPTION_SOLUTION] = {"solution", "FILE", "write a copy of the problem's file with this solution in it"},
     [OPTION_JSON] = {"json", "[FILE|-]", "write JSON to FILE, or to standard output (-, the default)"},
     [OPTION_QUIET] = {"quiet", NULL, "no table"},
