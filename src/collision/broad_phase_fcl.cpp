@@ -49,6 +49,8 @@ struct Proxy : fcl::CollisionObject<double> {
 constexpr size_t moves_before_rebuild = 32;
 
 struct Group {
+    explicit Group(int32_t id_) : id(id_) {}
+    const int32_t id;
     Tree moving, fixed;
     size_t moves = 0; /* since the moving tree was built */
     /* objects of the update at hand */
@@ -76,13 +78,13 @@ bool record(fcl::CollisionObject<double> *a, fcl::CollisionObject<double> *b, vo
 struct sadmm_broad_phase {
     std::shared_ptr<fcl::CollisionGeometry<double>> geometry;
     std::vector<std::unique_ptr<Proxy>> proxies; /* by slot, null when absent */
-    std::unordered_map<int32_t, std::unique_ptr<Group>> groups;
+    std::unordered_map<int32_t, std::unique_ptr<Group>> groups; /* those that hold something */
     std::vector<Group *> touched;
 
     Group &group(int32_t id)
     {
         std::unique_ptr<Group> &g = groups[id];
-        if (!g) g.reset(new Group);
+        if (!g) g.reset(new Group(id));
         return *g;
     }
     void touch(Group &g)
@@ -150,6 +152,10 @@ void sadmm_broad_phase::apply(const sadmm_broad_entry *entries, size_t count, co
         g->added_fixed.clear();
         g->touched = false;
     }
+    /* Ids may be used once and never again: what is kept must not grow with them. */
+    for (Group *g : touched)
+        if (g->moving.size() + g->fixed.size() == 0) groups.erase(g->id);
+    touched.clear();
 }
 
 namespace {
@@ -222,7 +228,7 @@ sadmm_status fcl_pairs_of(sadmm_broad_phase *bp, const sadmm_broad_entry *entrie
             Proxy *proxy = slots[k] < bp->proxies.size() ? bp->proxies[slots[k]].get() : nullptr;
             if (!proxy) continue;
             if (proxy->group >= 0) {
-                Group &g = bp->group(proxy->group);
+                Group &g = *bp->groups.find(proxy->group)->second;
                 g.moving.collide(proxy, &query, record);
                 if (proxy->moves && !query.failed) g.fixed.collide(proxy, &query, record);
                 if (proxy->moves && !query.failed && shared != bp->groups.end())
