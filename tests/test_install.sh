@@ -33,9 +33,8 @@ link() {
     flags="-Wall -Wextra -Werror $(pkg-config --cflags subadmm)"
     link shared_c ${CC:-cc} $flags -std=c11 "$program" $(pkg-config --libs subadmm)
     link shared_c++ ${CXX:-c++} $flags -std=c++17 -x c++ "$program" -x none $(pkg-config --libs subadmm)
-    mkdir "$folder/static"
-    cp "$library/libsubadmm.a" "$folder/static"
-    link static_c ${CC:-cc} $flags -std=c11 "$program" -L"$folder/static" $(pkg-config --static --libs subadmm)
+    # As docs/building.md says, with both libraries in one folder.
+    link static_c ${CC:-cc} $flags -std=c11 "$program" $(pkg-config --static --libs subadmm | sed 's/-lsubadmm/-l:libsubadmm.a/')
 }
 if ! readelf -d "$library/libsubadmm.so" | grep -q NODELETE; then
     echo "the shared library could be unloaded under its threads"
@@ -45,6 +44,7 @@ if ldd "$folder/static_c" | grep -q libsubadmm; then
     echo "the static program needs the shared library"
     exit 1
 fi
+nm "$folder/static_c" | grep -q ' [Tt] sadmm_world_step$' || { echo "the static library is not in the program"; exit 1; }
 
 foreign=$(nm -D --defined-only "$library/libsubadmm.so" | awk '$2 ~ /[TDBRVW]/ { print $3 }' | sed 's/@.*//' |
     grep -v '^sadmm_' || true)
