@@ -1,6 +1,7 @@
 #include "settings.h"
 
 #include <math.h>
+#include <string.h>
 
 sadmm_settings sadmm_settings_default(void)
 {
@@ -109,4 +110,30 @@ sadmm_status sadmm_settings_validate(const struct sadmm_settings *s, struct sadm
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.gravity: norm = %g: must be <= 1e6 m/s^2",
                           norm);
     return SADMM_OK;
+}
+
+/* ---- equality ------------------------------------------------------------------------------------------------- */
+
+/* Every member, and which of them are arrays of three. */
+#define MEMBERS(ONE, THREE)                                                                                      \
+    ONE(dt) THREE(gravity)                                                                                       \
+    ONE(method) ONE(iterations) ONE(relaxation) ONE(penalty_period) ONE(penalty_mass_factor) ONE(penalty_offset) \
+    ONE(penalty_ratio_limit) ONE(penalty_update_warm) ONE(warm_start)                                            \
+    ONE(residual_tolerance) ONE(certificate_tolerance) ONE(certificate_momentum_tolerance) ONE(check_period)     \
+    ONE(measure_residuals) ONE(certify) ONE(recover_wrenches)                                                    \
+    ONE(baumgarte) ONE(slop) ONE(correction_speed) ONE(restitution_threshold)                                    \
+    ONE(threads)
+
+/* A struct with too few initialisers is an error here: no new member can be left out of the list. */
+#pragma GCC diagnostic push
+#pragma GCC diagnostic error "-Wmissing-field-initializers"
+#define ZERO(member) 0,
+#define ZEROS(member) {0, 0, 0},
+_Static_assert(sizeof((sadmm_settings){MEMBERS(ZERO, ZEROS)}) == sizeof(sadmm_settings), "every member is listed");
+#pragma GCC diagnostic pop
+
+bool sadmm_settings_equal(const struct sadmm_settings *a, const struct sadmm_settings *b)
+{
+#define SAME(member) && memcmp(&a->member, &b->member, sizeof a->member) == 0
+    return true MEMBERS(SAME, SAME);
 }
