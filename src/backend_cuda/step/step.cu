@@ -193,11 +193,11 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
     case SADMM_STAGE_PLAN: return record_plan(c, error);
     case SADMM_STAGE_PENALTY: return CUDA(enqueue_penalties)(c, error);
     case SADMM_STAGE_ITERATE:
-        return CUDA(enqueue_iterations)(c, stage->count, stage->measure, stage->last || stage->checked ? limit : LIMIT_NONE,
-                                        error);
-    case SADMM_STAGE_RESIDUALS:
+        return CUDA(enqueue_iterations)(c, stage->count, stage->measure && (stage->last || !stops(c)),
+                                        stage->last || stage->checked ? limit : LIMIT_NONE, error);
+    case SADMM_STAGE_RESIDUALS: /* not reported where islands stop by themselves */
         *residuals = stage->last;
-        return stage->last ? SADMM_OK : CUDA(enqueue_residuals)(c, error);
+        return stage->last || stops(c) ? SADMM_OK : CUDA(enqueue_residuals)(c, error);
     case SADMM_STAGE_CHECK: return CUDA(enqueue_look)(c, stage->done, error);
     case SADMM_STAGE_REWEIGH: return CUDA(enqueue_weights)(c, true, error);
     case SADMM_STAGE_BALANCE: /* the ratio of (15) is found on the device */

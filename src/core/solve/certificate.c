@@ -166,9 +166,11 @@ static void certify_block(struct tally *tally, const struct sadmm_system *system
     count_constraint(tally, (int64_t)system->contacts->point_count + k, error, bodies, block->body_a, block->body_b);
 }
 
-/* siconos divides only by norms above this (gfc3d_compute_error.c, MIN_RELATIVE_SCALING). */
+/* siconos divides only by norms above this (gfc3d_compute_error.c, MIN_RELATIVE_SCALING). A scale that has overflowed would
+ * make every error small. */
 static double relative(double error, double scale)
 {
+    if (!isfinite(scale)) return NAN;
     return scale > sqrt(DBL_EPSILON) ? error / scale : error;
 }
 
@@ -232,7 +234,7 @@ sadmm_status sadmm_certify_with(struct sadmm_certificate_workspace *workspace, c
         Jl2 += dense6_dot(impulse, impulse);
     }
 
-    out.momentum_max = scale > 0 ? residual_max / scale : (isnan(scale) ? scale : 0);
+    out.momentum_max = !isfinite(scale) ? NAN : scale > 0 ? residual_max / scale : 0;
     out.ncp_max = tally.ncp_max;
     out.ncp_mean = tally.count ? tally.ncp_sum / (double)tally.count : 0;
     out.ncp_worst = tally.ncp_worst;
@@ -263,6 +265,11 @@ void sadmm_certificate_workspace_free(struct sadmm_certificate_workspace *worksp
     sadmm_free(workspace->values);
     sadmm_free(workspace->labels);
     *workspace = (struct sadmm_certificate_workspace){0};
+}
+
+bool sadmm_certificate_is_finite(const sadmm_certificate *c)
+{
+    return isfinite(c->ncp_max) && isfinite(c->ncp_mean) && isfinite(c->momentum_max) && isfinite(c->siconos);
 }
 
 sadmm_certificate sadmm_certificate_none(void)

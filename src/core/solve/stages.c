@@ -49,7 +49,9 @@ static int begin_batch(struct sadmm_stages *s)
     s->batch.check = has_stop_rule && (s->batch.last || after % settings->check_period == 0);
     s->batch.reweigh = !s->batch.last && after == refresh;
     s->batch.balance = plan->penalty_updates && !s->batch.last && after % settings->penalty_period == 0;
-    s->batch.measure = plan->residuals && (s->batch.balance || (s->batch.last && settings->measure_residuals) ||
+    /* Asked for, they are those of the last iteration, and any check may end the iterations. */
+    const bool may_end = s->batch.last || s->batch.check;
+    s->batch.measure = plan->residuals && (s->batch.balance || (may_end && settings->measure_residuals) ||
                                            (s->batch.check && settings->residual_tolerance > 0));
     return count;
 }
