@@ -252,7 +252,7 @@ static sadmm_problem *load(const char *path)
     return problem;
 }
 
-static void expect_sample_bodies(const sadmm_problem *problem, const struct sample *s)
+static void expect_sample_bodies(sadmm_problem *problem, const struct sample *s)
 {
     double A[3 * 36], b[DOFS];
     ck_assert_int_eq(sadmm_problem_body_count(problem), 3);
@@ -265,7 +265,7 @@ static void expect_sample_bodies(const sadmm_problem *problem, const struct samp
 }
 
 /* Block `index`: `rows` columns of `matrix` (n wide) from `first` on, between bodies a < b. */
-static void expect_block(const sadmm_problem *problem, int index, sadmm_block_kind kind, const double *matrix, int n,
+static void expect_block(sadmm_problem *problem, int index, sadmm_block_kind kind, const double *matrix, int n,
                          int first, int rows, int a, int b, const double *e)
 {
     sadmm_problem_block block;
@@ -311,7 +311,7 @@ END_TEST
 
 /* ---- writing ----------------------------------------------------------------------------------------------------- */
 
-static void save(const sadmm_problem *problem, const char *path)
+static void save(sadmm_problem *problem, const char *path)
 {
     struct sadmm_error error = {0};
     ck_assert_msg(sadmm_fclib_save(problem, path, "a title", &error) == SADMM_OK, "%s", error.message);
@@ -408,7 +408,7 @@ START_TEST(writes_the_layout)
 }
 END_TEST
 
-static void expect_same_problem(const sadmm_problem *p, const sadmm_problem *q)
+static void expect_same_problem(sadmm_problem *p, sadmm_problem *q)
 {
     double A[2][36 * RANDOM_BODIES] = {{0}}, b[2][6 * RANDOM_BODIES] = {{0}};
     ck_assert_int_eq(sadmm_problem_body_count(p), sadmm_problem_body_count(q));

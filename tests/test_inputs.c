@@ -125,7 +125,7 @@ static sadmm_problem *make(struct kept *given)
     return p;
 }
 
-static void check_kept(const sadmm_problem *p, const struct kept *given)
+static void check_kept(sadmm_problem *p, const struct kept *given)
 {
     struct kept now;
     memset(&now, 0, sizeof now);
@@ -220,7 +220,7 @@ START_TEST(bad_contacts)
     BAD(arm_b[2], INFINITY, "contacts[1].arm_b[2] = inf");
     BAD(error, NAN, "contacts[1].error = nan");
     BAD(error, -INFINITY, "contacts[1].error = -inf");
-    BAD(friction, -0.1, "contacts[1].friction = -0.1: must be finite and >= 0");
+    BAD(friction, -0.1, "contacts[1].friction = -0.1: must be in [0, 1e+60]");
     BAD(friction, NAN, "contacts[1].friction = nan");
     BAD(friction, INFINITY, "contacts[1].friction = inf");
 #undef BAD

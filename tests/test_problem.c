@@ -542,7 +542,7 @@ START_TEST(overflow_is_reported_and_undone)
     sadmm_settings s = method_settings();
     sadmm_solve_report report;
     sadmm_problem *p;
-    for (int i = 0; i < 6; ++i) A[7 * i] = 1e-3, b[i] = 1.7e308; /* v = A^-1 b is beyond double */
+    for (int i = 0; i < 6; ++i) A[7 * i] = 1e-300, b[i] = 1e60; /* v = A^-1 b is beyond double */
     OK(sadmm_problem_create(&p));
     OK(sadmm_problem_set_bodies(p, 1, A, b, v0));
     sadmm_problem_contact c = {.body_a = -1, .body_b = 0, .normal = {0, 0, 1}, .friction = 0.5};
@@ -559,8 +559,70 @@ START_TEST(overflow_is_reported_and_undone)
     ck_assert(memcmp(v, v0, sizeof v) == 0 && memcmp(r, r0, sizeof r) == 0 && memcmp(l, l0, sizeof l) == 0);
 
     memset(b, 0, sizeof b); /* and the problem can still be used */
+    for (int i = 0; i < 6; ++i) A[7 * i] = 1e-3;
     OK(sadmm_problem_set_bodies(p, 1, A, b, v0));
     OK(sadmm_problem_solve(p, table->backend, table->precision, &s, &report));
+    sadmm_problem_destroy(p);
+}
+END_TEST
+
+/* Numbers so large that a certificate of them could not be computed are refused by name; a solution that gets there all
+ * the same is NaN in the certificate, not small, and does not count as converged. */
+START_TEST(what_overflows_is_not_solved)
+{
+    const struct sadmm_kernels *table = tables[_i];
+    double A[36] = {0}, b[6] = {0};
+    sadmm_settings s = method_settings();
+    sadmm_solve_report report;
+    sadmm_certificate certificate;
+    sadmm_problem_block block = {.kind = SADMM_BLOCK_CONTACT, .rows = 3, .body_a = -1, .body_b = 0};
+    sadmm_problem *p;
+    if (table->precision == SADMM_F32) return; /* 1e200 is not finite there: the solve says so */
+    for (int i = 0; i < 6; ++i) A[7 * i] = 1e-140;
+    b[0] = 1e60; /* v = A^-1 b = 1e200 m/s, along the contact, which is apart */
+    OK(sadmm_problem_create(&p));
+    OK(sadmm_problem_set_bodies(p, 1, A, b, NULL));
+    for (int r = 0; r < 3; ++r) block.jacobian_b[6 * r + (r + 2) % 3] = 1;
+    block.jacobian_b[7] = 1e308;
+    ck_assert_int_eq(sadmm_problem_set_blocks(p, 1, &block, NULL), SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert_msg(strstr(sadmm_problem_message(p), "blocks[0].jacobian_b[7] = 1e+308: must be finite and within +-1e+60"),
+                  "%s", sadmm_problem_message(p));
+
+    const sadmm_problem_contact apart = {.body_a = -1, .body_b = 0, .normal = {0, 0, 1}, .error = 1, .friction = 0.5};
+    OK(sadmm_problem_set_contacts(p, 1, &apart, NULL));
+    s.residual_tolerance = 1e50; /* rounding of 1e60 is below */
+    OK(sadmm_problem_solve(p, table->backend, table->precision, &s, &report));
+    ck_assert(report.residual.primal <= s.residual_tolerance && report.residual.dual <= s.residual_tolerance);
+    ck_assert(!(report.certificate.siconos <= 1e300)); /* |u|^2 = 1e400 */
+    ck_assert(!report.converged);
+    OK(sadmm_problem_certify(p, &certificate));
+    ck_assert(!(certificate.siconos <= 1e300));
+    sadmm_problem_destroy(p);
+}
+END_TEST
+
+START_TEST(devices)
+{
+    sadmm_problem *p = stack_problem(NULL, 0.5);
+    sadmm_settings s = method_settings();
+    sadmm_solve_report first, second;
+    ck_assert_int_eq(sadmm_problem_set_device(p, -1), SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert_str_eq(sadmm_problem_message(p), "device = -1: must be >= 0");
+    /* Hosts have no devices to choose from, and what was kept is given up and made anew. */
+    s.warm_start = false;
+    OK(sadmm_problem_solve(p, SADMM_BACKEND_CPU, SADMM_F64, &s, &first));
+    OK(sadmm_problem_set_device(p, 3));
+    OK(sadmm_problem_solve(p, SADMM_BACKEND_CPU, SADMM_F64, &s, &second));
+    ck_assert(first.certificate.ncp_max == second.certificate.ncp_max);
+    sadmm_backend_info info;
+    OK(sadmm_backend_query(SADMM_BACKEND_CUDA, &info));
+    if (info.available[SADMM_F64]) { /* the index is looked at where there is something to choose from */
+        OK(sadmm_problem_set_device(p, 0));
+        OK(sadmm_problem_solve(p, SADMM_BACKEND_CUDA, SADMM_F64, &s, &second));
+        OK(sadmm_problem_set_device(p, 1000));
+        ck_assert_int_eq(sadmm_problem_solve(p, SADMM_BACKEND_CUDA, SADMM_F64, &s, &second), SADMM_ERROR_INVALID_ARGUMENT);
+        ck_assert_msg(strstr(sadmm_problem_message(p), "device = 1000") != NULL, "%s", sadmm_problem_message(p));
+    }
     sadmm_problem_destroy(p);
 }
 END_TEST
@@ -702,6 +764,8 @@ static void add_case(Suite *suite, const char *name, void (*use_method)(void))
     tcase_add_loop_test(cases, stop_rules_and_report, 0, table_count);
     tcase_add_loop_test(cases, free_bodies, 0, table_count);
     tcase_add_loop_test(cases, overflow_is_reported_and_undone, 0, table_count);
+    tcase_add_loop_test(cases, what_overflows_is_not_solved, 0, table_count);
+    tcase_add_test(cases, devices);
     tcase_add_test(cases, backends);
     suite_add_tcase(suite, cases);
 }

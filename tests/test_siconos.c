@@ -42,7 +42,7 @@ static double norm(const double *x, size_t count)
     return sqrt(sum);
 }
 
-static GlobalFrictionContactProblem *make_siconos(const sadmm_problem *problem)
+static GlobalFrictionContactProblem *make_siconos(sadmm_problem *problem)
 {
     struct sadmm_global_problem g;
     struct sadmm_error error = {0};
@@ -76,14 +76,14 @@ static double siconos_error(GlobalFrictionContactProblem *s, const struct sadmm_
     return error;
 }
 
-static sadmm_certificate certify(const sadmm_problem *problem)
+static sadmm_certificate certify(sadmm_problem *problem)
 {
     sadmm_certificate c;
     ck_assert_int_eq(sadmm_problem_certify(problem, &c), SADMM_OK);
     return c;
 }
 
-static struct sadmm_global_solution solution_of(const sadmm_problem *problem)
+static struct sadmm_global_solution solution_of(sadmm_problem *problem)
 {
     struct sadmm_global_solution x;
     struct sadmm_error error = {0};

@@ -316,7 +316,7 @@ static sadmm_status write_file(const char *file_name, bool edit, const struct sa
     return status;
 }
 
-sadmm_status sadmm_fclib_save(const sadmm_problem *problem, const char *path, const char *title,
+sadmm_status sadmm_fclib_save(sadmm_problem *problem, const char *path, const char *title,
                               struct sadmm_error *error)
 {
     struct sadmm_global_problem global;
@@ -329,7 +329,7 @@ sadmm_status sadmm_fclib_save(const sadmm_problem *problem, const char *path, co
     return status;
 }
 
-sadmm_status sadmm_fclib_save_solution(const sadmm_problem *problem, const char *source, const char *path,
+sadmm_status sadmm_fclib_save_solution(sadmm_problem *problem, const char *source, const char *path,
                                        struct sadmm_error *error)
 {
     struct sadmm_global_problem global = {0};

@@ -36,13 +36,13 @@ sadmm_status sadmm_fclib_load(const char *path, sadmm_problem **out, struct sadm
 
 /* Write a problem (not its current solution), with a title, over what is at `path`; a file that could not be written
  * is removed. Errors: IO, UNSUPPORTED (soft blocks), OUT_OF_MEMORY, UNAVAILABLE. */
-sadmm_status sadmm_fclib_save(const sadmm_problem *problem, const char *path, const char *title,
+sadmm_status sadmm_fclib_save(sadmm_problem *problem, const char *path, const char *title,
                               struct sadmm_error *error);
 
 /* Write the problem's current (v, u, r, l) as /solution into `path`: a copy of `source` (the file the problem was
  * loaded from; all else in it is kept), or, when source is NULL, a new file with the problem itself. Errors: those of
  * load and save; INVALID_ARGUMENT when both are one file; IO when the sizes in `source` are not the problem's. */
-sadmm_status sadmm_fclib_save_solution(const sadmm_problem *problem, const char *source, const char *path,
+sadmm_status sadmm_fclib_save_solution(sadmm_problem *problem, const char *source, const char *path,
                                        struct sadmm_error *error);
 
 #ifdef __cplusplus

@@ -20,14 +20,14 @@ sadmm_status sadmm_fclib_load(const char *path, sadmm_problem **out, struct sadm
     return missing(error);
 }
 
-sadmm_status sadmm_fclib_save(const sadmm_problem *problem, const char *path, const char *title,
+sadmm_status sadmm_fclib_save(sadmm_problem *problem, const char *path, const char *title,
                               struct sadmm_error *error)
 {
     (void)problem, (void)path, (void)title;
     return missing(error);
 }
 
-sadmm_status sadmm_fclib_save_solution(const sadmm_problem *problem, const char *source, const char *path,
+sadmm_status sadmm_fclib_save_solution(sadmm_problem *problem, const char *source, const char *path,
                                        struct sadmm_error *error)
 {
     (void)problem, (void)source, (void)path;

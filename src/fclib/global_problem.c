@@ -48,7 +48,7 @@ struct sizes {
     int64_t contacts, hard_rows;    /* of the form */
 };
 
-static sadmm_status measure(const sadmm_problem *problem, struct sizes *s, struct sadmm_error *error)
+static sadmm_status measure(sadmm_problem *problem, struct sizes *s, struct sadmm_error *error)
 {
     s->bodies = sadmm_problem_body_count(problem);
     s->points = sadmm_problem_contact_count(problem);
@@ -131,7 +131,7 @@ static bool add_block(const sadmm_problem_block *block, int32_t *contact, int32_
            add_rows(m, block->body_b, block->jacobian_b, block->rows, first);
 }
 
-static sadmm_status fill(const sadmm_problem *problem, const struct sizes *s, struct sadmm_global_problem *g,
+static sadmm_status fill(sadmm_problem *problem, const struct sizes *s, struct sadmm_global_problem *g,
                          struct sadmm_error *error)
 {
     size_t n = (size_t)s->bodies;
@@ -156,7 +156,7 @@ static sadmm_status fill(const sadmm_problem *problem, const struct sizes *s, st
     return room ? SADMM_OK : sadmm_fail_memory(error, "the matrix form of a problem");
 }
 
-sadmm_status sadmm_global_from_problem(const sadmm_problem *problem, struct sadmm_global_problem *g,
+sadmm_status sadmm_global_from_problem(sadmm_problem *problem, struct sadmm_global_problem *g,
                                        struct sadmm_error *error)
 {
     struct sizes s;
@@ -373,7 +373,7 @@ static void contact_solution(const sadmm_problem_contact *contact, const double 
     v3_store(m3_mul(frame, v3_load(impulse)), r);
 }
 
-static sadmm_status fill_solution(const sadmm_problem *problem, const struct sizes *s,
+static sadmm_status fill_solution(sadmm_problem *problem, const struct sizes *s,
                                   struct sadmm_global_solution *solution, double *impulses, double *lambda)
 {
     int32_t contact = 0, hard = 0;
@@ -404,7 +404,7 @@ static sadmm_status fill_solution(const sadmm_problem *problem, const struct siz
     return status;
 }
 
-sadmm_status sadmm_global_solution_from_problem(const sadmm_problem *problem, struct sadmm_global_solution *solution,
+sadmm_status sadmm_global_solution_from_problem(sadmm_problem *problem, struct sadmm_global_solution *solution,
                                                 struct sadmm_error *error)
 {
     struct sizes s;

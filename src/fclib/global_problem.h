@@ -49,7 +49,7 @@ void sadmm_global_problem_free(struct sadmm_global_problem *global);
 /* Columns in the order of the constraints: contacts given by geometry (in the frame n, t1, t2 of v3_tangents), then
  * CONTACT blocks, each kind in its own order; HARD blocks row by row. Errors: UNSUPPORTED (a SOFT block: the form has
  * no place for it), LIMIT (an index past 2^31 - 1), OUT_OF_MEMORY. `global` is freed after an error. */
-sadmm_status sadmm_global_from_problem(const sadmm_problem *problem, struct sadmm_global_problem *global,
+sadmm_status sadmm_global_from_problem(sadmm_problem *problem, struct sadmm_global_problem *global,
                                        struct sadmm_error *error);
 
 /* The inverse: every contact becomes a CONTACT block; neighbouring columns of G that act on the same bodies become one
@@ -69,7 +69,7 @@ struct sadmm_global_solution {
 };
 
 /* Errors: UNSUPPORTED (a SOFT block), OUT_OF_MEMORY. */
-sadmm_status sadmm_global_solution_from_problem(const sadmm_problem *problem, struct sadmm_global_solution *solution,
+sadmm_status sadmm_global_solution_from_problem(sadmm_problem *problem, struct sadmm_global_solution *solution,
                                                 struct sadmm_error *error);
 void sadmm_global_solution_free(struct sadmm_global_solution *solution);
 

@@ -2,10 +2,18 @@
 
 #include <math.h>
 
+sadmm_status sadmm_check_given(const void *pointer, const char *name, struct sadmm_error *error)
+{
+    if (pointer) return SADMM_OK;
+    return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s = NULL: must be given", name);
+}
+
 sadmm_status sadmm_check_vector(const char *name, const double *x, int count, double limit, struct sadmm_error *error)
 {
     for (int k = 0; k < count; ++k)
-        if (!(fabs(x[k]) <= limit))
+        if (isinf(limit) && !isfinite(x[k]))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s[%d] = %g: must be finite", name, k, x[k]);
+        else if (!(fabs(x[k]) <= limit))
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s[%d] = %g: must be in [-%g, %g]", name, k, x[k], limit,
                               limit);
     return SADMM_OK;

@@ -4,6 +4,8 @@
 
 #include "error.h"
 
+sadmm_status sadmm_check_given(const void *pointer, const char *name, struct sadmm_error *error);
+/* Finite and within +-limit, which may be infinite. */
 sadmm_status sadmm_check_vector(const char *name, const double *x, int count, double limit, struct sadmm_error *error);
 sadmm_status sadmm_check_range(const char *name, double x, double low, double high, struct sadmm_error *error);
 /* Unit within 1e-6; normalised into `out`. */

@@ -14,6 +14,7 @@
 
 #include "certificate.h"
 #include "core/math/dense6.h"
+#include "core/base/check.h"
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
 #include "problem_internal.h"
@@ -23,15 +24,14 @@
 #include "core/model/system.h"
 
 enum { MAX_BODIES = 1 << 27, MAX_CONSTRAINTS = 1 << 28 };
-
-/* What calls on a const problem may still write. */
-struct scratch {
-    struct sadmm_error error;
-    struct sadmm_certificate_workspace certificate;
-};
+/* Of the numbers of A, b and the constraints: J A^-1 J^T lambda of rows, masses and multipliers of 1e60, 1e-60 and 1e60
+ * is 1e240, within double's 1e308. */
+static const double VALUE_LIMIT = 1e60;
 
 struct sadmm_problem {
     struct sadmm_team team;
+    struct sadmm_error error;
+    struct sadmm_certificate_workspace certificate;
     int32_t body_count;
     double *A, *b;               /* (bodies x 36), (bodies x 6) */
     double *velocity;            /* (bodies x 6) */
@@ -42,13 +42,13 @@ struct sadmm_problem {
 
     double *saved;               /* velocity, impulses (points x 3), lambda before a solve */
     size_t saved_capacity;
+    int device;
     struct sadmm_context *contexts[SADMM_BACKEND_COUNT][2];
     const struct sadmm_kernels *tables[SADMM_BACKEND_COUNT][2];
 
     struct sadmm_system system;  /* of the last solve: a context keeps pointers to these three */
     struct sadmm_plan plan;
     struct sadmm_settings settings;
-    struct scratch *scratch;
 };
 
 #define REFUSE(...) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, __VA_ARGS__)
@@ -56,16 +56,10 @@ struct sadmm_problem {
 
 sadmm_status sadmm_problem_create(sadmm_problem **out)
 {
-    if (!out) return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "out = NULL: must be given");
+    TRY(sadmm_check_given(out, "out", NULL));
     *out = NULL;
     sadmm_problem *problem = sadmm_alloc(1, sizeof *problem);
-    struct scratch *scratch = sadmm_alloc(1, sizeof *scratch);
-    if (!problem || !scratch) {
-        sadmm_free(problem);
-        sadmm_free(scratch);
-        return sadmm_fail_memory(NULL, "a problem");
-    }
-    problem->scratch = scratch;
+    if (!problem) return sadmm_fail_memory(NULL, "a problem");
     *out = problem;
     return SADMM_OK;
 }
@@ -89,32 +83,37 @@ static void free_bodies(sadmm_problem *problem)
     sadmm_free(problem->velocity);
 }
 
+static void destroy_contexts(sadmm_problem *problem)
+{
+    for (int backend = 0; backend < SADMM_BACKEND_COUNT; ++backend)
+        for (int precision = 0; precision < 2; ++precision) {
+            struct sadmm_context **context = &problem->contexts[backend][precision];
+            if (*context) problem->tables[backend][precision]->destroy(*context);
+            *context = NULL;
+        }
+}
+
 void sadmm_problem_destroy(sadmm_problem *problem)
 {
     if (!problem) return;
-    for (int backend = 0; backend < SADMM_BACKEND_COUNT; ++backend)
-        for (int precision = 0; precision < 2; ++precision)
-            if (problem->contexts[backend][precision])
-                problem->tables[backend][precision]->destroy(problem->contexts[backend][precision]);
+    destroy_contexts(problem);
     free_constraints(problem);
     free_bodies(problem);
     sadmm_free(problem->saved);
-    sadmm_certificate_workspace_free(&problem->scratch->certificate);
-    sadmm_free(problem->scratch);
+    sadmm_certificate_workspace_free(&problem->certificate);
     sadmm_free(problem);
 }
 
 const char *sadmm_problem_message(const sadmm_problem *problem)
 {
-    return problem ? problem->scratch->error.message : "";
+    return problem ? problem->error.message : "";
 }
 
 /* ---- checks -------------------------------------------------------------------------------------------------- */
 
 static sadmm_status check_problem(const sadmm_problem *problem)
 {
-    if (problem) return SADMM_OK;
-    return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "problem = NULL: must be given");
+    return sadmm_check_given(problem, "problem", NULL);
 }
 
 static sadmm_status check_count(const char *what, int32_t count, int32_t limit, struct sadmm_error *error)
@@ -125,7 +124,19 @@ static sadmm_status check_count(const char *what, int32_t count, int32_t limit, 
     return SADMM_OK;
 }
 
-/* `values` (count x width), finite; NULL is fine. */
+static bool in_range(double x) { return fabs(x) <= VALUE_LIMIT; } /* NaN is not */
+
+/* `values` (count x width), data of the problem; NULL is fine. */
+static sadmm_status check_data(const char *name, const double *values, int32_t count, int width, struct sadmm_error *error)
+{
+    for (size_t i = 0; values && i < (size_t)count * (size_t)width; ++i)
+        if (!in_range(values[i]))
+            REFUSE("%s[%zu][%zu] = %g: must be finite and within +-%g", name, i / (size_t)width, i % (size_t)width,
+                   values[i], VALUE_LIMIT);
+    return SADMM_OK;
+}
+
+/* `values` (count x width), a start or a solution, which may be anything finite; NULL is fine. */
 static sadmm_status check_values(const char *name, const double *values, int32_t count, int width,
                                  struct sadmm_error *error)
 {
@@ -140,15 +151,22 @@ static sadmm_status check_vector(const char *array, int32_t index, const char *f
                                  double least, struct sadmm_error *error)
 {
     for (int i = 0; i < size; ++i) {
-        if (!isfinite(x[i])) REFUSE("%s[%d].%s[%d] = %g: must be finite", array, index, field, i, x[i]);
+        if (!in_range(x[i]))
+            REFUSE("%s[%d].%s[%d] = %g: must be finite and within +-%g", array, index, field, i, x[i], VALUE_LIMIT);
         if (x[i] < least) REFUSE("%s[%d].%s[%d] = %g: must be >= %g", array, index, field, i, x[i], least);
     }
     return SADMM_OK;
 }
 
+static sadmm_status check_number(const char *array, int32_t index, const char *field, double x, struct sadmm_error *error)
+{
+    if (!in_range(x)) REFUSE("%s[%d].%s = %g: must be finite and within +-%g", array, index, field, x, VALUE_LIMIT);
+    return SADMM_OK;
+}
+
 static sadmm_status check_friction(const char *array, int32_t index, double mu, struct sadmm_error *error)
 {
-    if (!(mu >= 0) || isinf(mu)) REFUSE("%s[%d].friction = %g: must be finite and >= 0", array, index, mu);
+    if (!(mu >= 0) || !in_range(mu)) REFUSE("%s[%d].friction = %g: must be in [0, %g]", array, index, mu, VALUE_LIMIT);
     return SADMM_OK;
 }
 
@@ -200,12 +218,12 @@ sadmm_status sadmm_problem_set_bodies(sadmm_problem *problem, int32_t count, con
                                       const double *v0)
 {
     TRY(check_problem(problem));
-    struct sadmm_error *error = &problem->scratch->error;
+    struct sadmm_error *error = &problem->error;
     TRY(check_count("bodies", count, MAX_BODIES, error));
     if (count > 0 && !A) REFUSE("A = NULL: must be given for %d bodies", count);
     if (count > 0 && !b) REFUSE("b = NULL: must be given for %d bodies", count);
-    TRY(check_values("A", A, count, 36, error));
-    TRY(check_values("b", b, count, 6, error));
+    TRY(check_data("A", A, count, 36, error));
+    TRY(check_data("b", b, count, 6, error));
     TRY(check_values("v0", v0, count, 6, error));
     for (int32_t i = 0; i < count; ++i) TRY(check_mass(i, A + 36 * (size_t)i, error));
     TRY(reserve_saved(problem, count, 0, 0, error));
@@ -255,7 +273,7 @@ static sadmm_status check_contact(int32_t index, const sadmm_problem_contact *co
     if (!(fabs(length - 1) <= 1e-6)) REFUSE("contacts[%d].normal: length = %g: must be 1 within 1e-6", index, length);
     if (contact->body_a >= 0) TRY(check_vector("contacts", index, "arm_a", contact->arm_a, 3, -HUGE_VAL, error));
     if (contact->body_b >= 0) TRY(check_vector("contacts", index, "arm_b", contact->arm_b, 3, -HUGE_VAL, error));
-    if (!isfinite(contact->error)) REFUSE("contacts[%d].error = %g: must be finite", index, contact->error);
+    TRY(check_number("contacts", index, "error", contact->error, error));
     return check_friction("contacts", index, contact->friction, error);
 }
 
@@ -300,7 +318,7 @@ sadmm_status sadmm_problem_set_contacts(sadmm_problem *problem, int32_t count, c
                                         const double *impulses0)
 {
     TRY(check_problem(problem));
-    struct sadmm_error *error = &problem->scratch->error;
+    struct sadmm_error *error = &problem->error;
     TRY(check_count("contacts", count, MAX_CONSTRAINTS, error));
     if (count > 0 && !contacts) REFUSE("contacts = NULL: must be given for %d contacts", count);
     for (int32_t k = 0; k < count; ++k) TRY(check_contact(k, &contacts[k], problem->body_count, error));
@@ -410,7 +428,7 @@ sadmm_status sadmm_problem_set_blocks(sadmm_problem *problem, int32_t count, con
                                       const double *lambda0)
 {
     TRY(check_problem(problem));
-    struct sadmm_error *error = &problem->scratch->error;
+    struct sadmm_error *error = &problem->error;
     TRY(check_count("blocks", count, MAX_CONSTRAINTS, error));
     if (count > 0 && !blocks) REFUSE("blocks = NULL: must be given for %d blocks", count);
     for (int32_t k = 0; k < count; ++k) TRY(check_block(k, &blocks[k], problem->body_count, error));
@@ -459,19 +477,18 @@ sadmm_status sadmm_problem_get_bodies(const sadmm_problem *problem, double *A, d
     return SADMM_OK;
 }
 
-static sadmm_status check_index(const sadmm_problem *problem, int32_t index, int32_t count, const void *out)
+static sadmm_status check_index(sadmm_problem *problem, int32_t index, int32_t count, const char *name, const void *out)
 {
-    struct sadmm_error *error = &problem->scratch->error;
+    struct sadmm_error *error = &problem->error;
     if (index < 0 || index >= count) REFUSE("index = %d: must be in [0, %d]", index, count - 1);
-    if (!out) REFUSE("the result's address = NULL: must be given");
-    return SADMM_OK;
+    return sadmm_check_given(out, name, error);
 }
 
-sadmm_status sadmm_problem_get_contact(const sadmm_problem *problem, int32_t index, sadmm_problem_contact *contact)
+sadmm_status sadmm_problem_get_contact(sadmm_problem *problem, int32_t index, sadmm_problem_contact *contact)
 {
     TRY(check_problem(problem));
     const struct sadmm_contact_set *set = &problem->contacts;
-    TRY(check_index(problem, index, (int32_t)set->point_count, contact));
+    TRY(check_index(problem, index, (int32_t)set->point_count, "contact", contact));
 
     size_t low = 0, high = set->pair_count; /* the last pair whose first point is <= index */
     while (high - low > 1) {
@@ -491,10 +508,10 @@ sadmm_status sadmm_problem_get_contact(const sadmm_problem *problem, int32_t ind
     return SADMM_OK;
 }
 
-sadmm_status sadmm_problem_get_block(const sadmm_problem *problem, int32_t index, sadmm_problem_block *block)
+sadmm_status sadmm_problem_get_block(sadmm_problem *problem, int32_t index, sadmm_problem_block *block)
 {
     TRY(check_problem(problem));
-    TRY(check_index(problem, index, problem->block_count, block));
+    TRY(check_index(problem, index, problem->block_count, "block", block));
     *block = problem->blocks[index];
     return SADMM_OK;
 }
@@ -514,7 +531,7 @@ sadmm_status sadmm_problem_set_solution(sadmm_problem *problem, const double *ve
                                         const double *block_lambda)
 {
     TRY(check_problem(problem));
-    struct sadmm_error *error = &problem->scratch->error;
+    struct sadmm_error *error = &problem->error;
     int32_t points = (int32_t)problem->contacts.point_count;
     TRY(check_values("velocities", velocities, problem->body_count, 6, error));
     TRY(check_values("impulses", impulses, points, 3, error));
@@ -546,25 +563,28 @@ static struct sadmm_system make_system(const sadmm_problem *problem, struct sadm
     return system;
 }
 
-sadmm_status sadmm_problem_certify(const sadmm_problem *problem, sadmm_certificate *certificate)
+sadmm_status sadmm_problem_certify(sadmm_problem *problem, sadmm_certificate *certificate)
 {
     TRY(check_problem(problem));
-    struct sadmm_error *error = &problem->scratch->error;
-    if (!certificate) REFUSE("certificate = NULL: must be given");
+    struct sadmm_error *error = &problem->error;
+    TRY(sadmm_check_given(certificate, "certificate", error));
     struct sadmm_contact_set contacts = problem->contacts; /* the certificate only reads it */
     struct sadmm_system system = make_system(problem, &contacts);
-    return sadmm_certify_with(&problem->scratch->certificate, &system, NULL, certificate, error);
+    return sadmm_certify_with(&problem->certificate, &system, NULL, certificate, error);
 }
 
+/* `saved` holds velocities, impulses and multipliers one after the other; an empty problem has none. */
 static void save_solution(sadmm_problem *problem)
 {
     size_t bodies = 6 * (size_t)problem->body_count, points = 3 * problem->contacts.point_count;
+    if (!problem->saved) return;
     sadmm_problem_get_solution(problem, problem->saved, problem->saved + bodies, problem->saved + bodies + points);
 }
 
 static void restore_solution(sadmm_problem *problem)
 {
     size_t bodies = 6 * (size_t)problem->body_count, points = 3 * problem->contacts.point_count;
+    if (!problem->saved) return;
     copy_values(problem->velocity, problem->saved, bodies);
     for (size_t k = 0; k < problem->contacts.point_count; ++k)
         memcpy(problem->contacts.points[k].impulse, problem->saved + bodies + 3 * k, 3 * sizeof(double));
@@ -583,14 +603,24 @@ static sadmm_status find_context(sadmm_problem *problem, const struct sadmm_kern
 {
     *context = &problem->contexts[kernels->backend][kernels->precision];
     problem->tables[kernels->backend][kernels->precision] = kernels;
-    return **context ? SADMM_OK : kernels->create(0, *context, error);
+    return **context ? SADMM_OK : kernels->create(problem->device, *context, error);
+}
+
+sadmm_status sadmm_problem_set_device(sadmm_problem *problem, int device)
+{
+    TRY(check_problem(problem));
+    struct sadmm_error *error = &problem->error;
+    if (device < 0) REFUSE("device = %d: must be >= 0", device);
+    if (device != problem->device) destroy_contexts(problem);
+    problem->device = device;
+    return SADMM_OK;
 }
 
 sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend backend, sadmm_precision precision,
                                  const sadmm_settings *settings, sadmm_solve_report *report)
 {
     TRY(check_problem(problem));
-    struct sadmm_error *error = &problem->scratch->error;
+    struct sadmm_error *error = &problem->error;
     const struct sadmm_kernels *kernels;
     struct sadmm_context **context;
     struct sadmm_solve_report done = {0};
@@ -609,7 +639,7 @@ sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend backend, 
     sadmm_status status = sadmm_schedule_solve(kernels, *context, &problem->system, &problem->settings, &problem->plan,
                                                &done, error);
     if (status == SADMM_OK && report)
-        status = sadmm_certify_with(&problem->scratch->certificate, &problem->system, &problem->settings,
+        status = sadmm_certify_with(&problem->certificate, &problem->system, &problem->settings,
                                     &done.certificate, error);
     if (status != SADMM_OK) {
         restore_solution(problem);
@@ -619,6 +649,7 @@ sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend backend, 
         }
         return status;
     }
+    done.converged = done.converged && sadmm_certificate_is_finite(&done.certificate);
     if (report) *report = done;
     return SADMM_OK;
 }

@@ -4,6 +4,7 @@
 
 #include "backends.h"
 #include "config.h"
+#include "core/base/check.h"
 
 /* The one list: a backend is registered by adding its line here (backends.h declares the functions). */
 static const struct {
@@ -17,12 +18,12 @@ static const struct {
 
 const struct sadmm_kernels *sadmm_kernels_find(sadmm_backend backend, sadmm_precision precision, const char **reason)
 {
-    static const char *no_reason;
+    const char *unused;
     if ((unsigned)backend >= SADMM_BACKEND_COUNT || !backends[backend].find || (unsigned)precision > SADMM_F64) {
         if (reason) *reason = "no such backend or precision";
         return NULL;
     }
-    return backends[backend].find(precision, reason ? reason : &no_reason);
+    return backends[backend].find(precision, reason ? reason : &unused);
 }
 
 const struct sadmm_kernels *sadmm_kernels_at(size_t index)
@@ -37,7 +38,7 @@ const struct sadmm_kernels *sadmm_kernels_at(size_t index)
 
 sadmm_status sadmm_backend_query(sadmm_backend backend, sadmm_backend_info *info)
 {
-    if (!info) return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "info is NULL");
+    TRY(sadmm_check_given(info, "info", NULL));
     if (backend < SADMM_BACKEND_REF || backend >= SADMM_BACKEND_COUNT)
         return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "backend = %d: must be in [%d, %d]", (int)backend,
                           SADMM_BACKEND_REF, SADMM_BACKEND_COUNT - 1);
