@@ -63,8 +63,7 @@ static sadmm_status time_steps(struct stopwatch *w, const struct scene_timing_pl
     double *medians[COLUMNS] = {&t->ms.total, &t->ms.collide, &t->ms.assemble,
                                 &t->ms.solve, &t->ms.finish,  &t->solver_ms};
     for (int k = 0; k < COLUMNS; ++k) *medians[k] = median(times + k * plan->steps, t->steps);
-    t->state_hash = sadmm_world_state_hash(w->world);
-    return SADMM_OK;
+    return fail(w->world, sadmm_world_state_hash(w->world, &t->state_hash), error);
 }
 
 static sadmm_status certify_steps(struct stopwatch *w, int count, struct sadmm_error *error)

@@ -50,11 +50,18 @@ static inline void step_world(sadmm_world *world, int steps)
     for (int i = 0; i < steps; ++i) MUST(world, sadmm_world_step(world));
 }
 
-static inline sadmm_step_report world_report(const sadmm_world *world)
+static inline sadmm_step_report world_report(sadmm_world *world)
 {
     sadmm_step_report report;
     MUST(world, sadmm_world_report(world, &report));
     return report;
+}
+
+static inline uint64_t state_hash(sadmm_world *world)
+{
+    uint64_t hash;
+    MUST(world, sadmm_world_state_hash(world, &hash));
+    return hash;
 }
 
 /* One more step, with its certificate. */
@@ -69,7 +76,7 @@ static inline sadmm_certificate certified_step(sadmm_world *world)
     return world_report(world).certificate;
 }
 
-static inline sadmm_body_state body_state(const sadmm_world *world, sadmm_body_id id)
+static inline sadmm_body_state body_state(sadmm_world *world, sadmm_body_id id)
 {
     sadmm_body_state state;
     MUST(world, sadmm_world_body_state(world, id, &state));
@@ -77,14 +84,14 @@ static inline sadmm_body_state body_state(const sadmm_world *world, sadmm_body_i
 }
 
 /* The index-th body in order of creation. */
-static inline sadmm_body_id body_at(const sadmm_world *world, int32_t index)
+static inline sadmm_body_id body_at(sadmm_world *world, int32_t index)
 {
     sadmm_body_id id;
     MUST(world, sadmm_world_body_at(world, index, &id));
     return id;
 }
 
-static inline sadmm_body_def body_def(const sadmm_world *world, sadmm_body_id id)
+static inline sadmm_body_def body_def(sadmm_world *world, sadmm_body_id id)
 {
     sadmm_body_def def;
     MUST(world, sadmm_world_body_def(world, id, &def));
@@ -92,7 +99,7 @@ static inline sadmm_body_def body_def(const sadmm_world *world, sadmm_body_id id
 }
 
 /* States of all bodies, static ones included, in order of creation; the caller frees them. */
-static inline sadmm_body_state *all_states(const sadmm_world *world)
+static inline sadmm_body_state *all_states(sadmm_world *world)
 {
     int32_t count = sadmm_world_body_count(world);
     sadmm_body_state *states = malloc((size_t)count * sizeof *states);
@@ -111,7 +118,7 @@ static inline double norm3(const double a[3])
 }
 
 /* Fastest body: linear speed, m/s. */
-static inline double top_speed(const sadmm_world *world)
+static inline double top_speed(sadmm_world *world)
 {
     double top = 0;
     for (int32_t i = 0; i < sadmm_world_body_count(world); ++i)
@@ -120,7 +127,7 @@ static inline double top_speed(const sadmm_world *world)
 }
 
 /* The farthest any body has moved from `from` (all_states at an earlier time), m. */
-static inline double top_drift(const sadmm_world *world, const sadmm_body_state *from)
+static inline double top_drift(sadmm_world *world, const sadmm_body_state *from)
 {
     double top = 0;
     for (int32_t i = 0; i < sadmm_world_body_count(world); ++i)

@@ -56,7 +56,7 @@ static inline sadmm_world *run_standing(const struct standing_case *limits)
 }
 
 /* Every third body after the ground is the top of a stack of three 0.3 m cubes: it stands at 0.75 m, level. */
-static inline void expect_vertical_stacks(const sadmm_world *world)
+static inline void expect_vertical_stacks(sadmm_world *world)
 {
     for (int32_t i = 1; i < sadmm_world_body_count(world); ++i) {
         sadmm_body_state state = body_state(world, body_at(world, i));

@@ -301,7 +301,7 @@ struct momenta {
 };
 
 /* Of bodies whose principal moments are all equal. */
-static struct momenta momenta_of(const sadmm_world *world)
+static struct momenta momenta_of(sadmm_world *world)
 {
     struct momenta sum = { 0 };
     for (int32_t k = 0; k < sadmm_world_body_count(world); ++k) {

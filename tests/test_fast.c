@@ -481,7 +481,7 @@ END_TEST
 /* ---- in motion --------------------------------------------------------------------------------------------------- */
 
 /* Kinetic and potential energy, the latter above the lowest place a body's centre may reach: the scene's own floor. */
-static double total_energy(const sadmm_world *world, const double gravity[3], double *weight)
+static double total_energy(sadmm_world *world, const double gravity[3], double *weight)
 {
     double energy = 0;
     *weight = 0;
@@ -550,7 +550,7 @@ static const struct {
 };
 enum { RESTING = sizeof resting / sizeof *resting };
 
-static double fastest_body(const sadmm_world *world)
+static double fastest_body(sadmm_world *world)
 {
     double fastest = 0;
     for (int32_t i = 0; i < sadmm_world_body_count(world); ++i) {

@@ -2,7 +2,7 @@
 #include "core/base/parallel.h"
 #include "scene_tools.h"
 
-static int32_t dynamic_bodies(const sadmm_world *world)
+static int32_t dynamic_bodies(sadmm_world *world)
 {
     int32_t count = 0;
     for (int32_t i = 0; i < sadmm_world_body_count(world); ++i)
@@ -16,7 +16,7 @@ START_TEST(every_scene_builds_and_steps)
     struct sadmm_scene scene = open_scene(info->name);
     sadmm_world *world = build_scene(&scene);
     struct sadmm_error error = { 0 };
-    uint64_t start = sadmm_world_state_hash(world);
+    uint64_t start = state_hash(world);
 
     ck_assert_str_eq(scene.info->name, info->name);
     ck_assert(info->description[0] && info->duration > 0 && scene.duration == info->duration);
@@ -31,7 +31,7 @@ START_TEST(every_scene_builds_and_steps)
     ck_assert_int_gt(dynamic_bodies(world), 0);
     ck_assert_int_eq(sadmm_scene_before_step(&scene, world, 0, &error), SADMM_OK);
     step_world(world, 1);
-    ck_assert(sadmm_world_state_hash(world) != start);
+    ck_assert(state_hash(world) != start);
     /* Scenes are laid out without overlaps: touching faces may overlap by rounding only. */
     ck_assert_double_lt(world_report(world).penetration_max, 1e-12);
     sadmm_world_destroy(world);
@@ -98,7 +98,7 @@ END_TEST
 
 /* Contacts of the next step, from the geometry alone: every pair of bodies is looked at. For cubes that are not turned,
  * above a ground at z = 0 (body 0): faces that lie over each other within reach make four. */
-static int32_t count_by_hand(const sadmm_world *world, const sadmm_world_def *def)
+static int32_t count_by_hand(sadmm_world *world, const sadmm_world_def *def)
 {
     int32_t n = sadmm_world_body_count(world), count = 0;
     sadmm_body_state *states = all_states(world);
@@ -222,7 +222,7 @@ static uint64_t hash_after(const char *spec, sadmm_method method, int threads, i
         ck_assert_int_eq(sadmm_scene_before_step(&scene, world, i, &error), SADMM_OK);
         step_world(world, 1);
     }
-    uint64_t hash = sadmm_world_state_hash(world);
+    uint64_t hash = state_hash(world);
     sadmm_world_destroy(world);
     return hash;
 }

@@ -78,7 +78,7 @@ static void expect_equal_future(sadmm_world *a, sadmm_world *b)
     for (int i = 0; i < 30; ++i) {
         step_world(a, 1);
         step_world(b, 1);
-        ck_assert_uint_eq(sadmm_world_state_hash(a), sadmm_world_state_hash(b));
+        ck_assert_uint_eq(state_hash(a), state_hash(b));
         ck_assert_int_eq(world_report(a).contacts, world_report(b).contacts);
     }
     ck_assert_int_gt(world_report(a).contacts, 0);
@@ -104,7 +104,7 @@ struct bad_number {
 #define BODY(field, ...) { #field, offsetof(sadmm_body_def, field), { __VA_ARGS__ } }
 static const struct bad_number bad_body[] = {
     BODY(mass, 0), BODY(mass, NAN, INFINITY, -INFINITY, -1, 0.99e-9), BODY(mass, 1.01e12),
-    BODY(inertia[0], 0), BODY(inertia[1], NAN, INFINITY, -1), BODY(inertia[2], 1, 1e300), /* 1: more than the other two */
+    BODY(inertia[0], 0), BODY(inertia[1], NAN, INFINITY, -1, 5e-324, 0.99e-24), BODY(inertia[2], 1, 1e300), /* 1: more than the other two */
     BODY(position[0], NAN, INFINITY, -INFINITY, 1.01e9, -1e300), BODY(position[2], NAN),
     BODY(orientation, 0), /* all 0 */
     BODY(orientation[0], NAN, INFINITY, 1.00001, 0.99999, -2), BODY(orientation[3], 1e-2, NAN),
@@ -329,7 +329,7 @@ START_TEST(bad_states_and_wrenches_are_refused)
 
     state = good, state.position[1] = NAN;
     expect_refused(w.world, sadmm_world_set_body_state(w.world, w.high, &state), SADMM_ERROR_INVALID_ARGUMENT, "position");
-    state = good, state.position[1] = 1.01e9;
+    state = good, state.position[1] = -INFINITY;
     expect_refused(w.world, sadmm_world_set_body_state(w.world, w.high, &state), SADMM_ERROR_INVALID_ARGUMENT, "position");
     state = good, memset(state.orientation, 0, sizeof state.orientation);
     expect_refused(w.world, sadmm_world_set_body_state(w.world, w.high, &state), SADMM_ERROR_INVALID_ARGUMENT, "orientation");
@@ -338,7 +338,7 @@ START_TEST(bad_states_and_wrenches_are_refused)
     state = good, state.linear_velocity[2] = INFINITY;
     expect_refused(w.world, sadmm_world_set_body_state(w.world, w.high, &state), SADMM_ERROR_INVALID_ARGUMENT,
                    "linear_velocity");
-    state = good, state.angular_velocity[0] = -1.01e6;
+    state = good, state.angular_velocity[0] = NAN;
     expect_refused(w.world, sadmm_world_set_body_state(w.world, w.high, &state), SADMM_ERROR_INVALID_ARGUMENT,
                    "state->angular_velocity[0] = -1.01e+06: must be in [-1e+06, 1e+06]");
     state = body_state(w.world, w.ground), state.linear_velocity[0] = 1; /* static */
@@ -483,12 +483,12 @@ START_TEST(missing_outputs_are_refused)
     sadmm_body_id body = { 7, 7 };
     step_world(w.world, 1);
     step_world(other.world, 1);
-    expect_refused(w.world, sadmm_world_body_at(w.world, 0, NULL), invalid, "id is NULL");
-    expect_refused(w.world, sadmm_world_shape_at(w.world, 0, NULL), invalid, "id is NULL");
-    expect_refused(w.world, sadmm_world_body_state(w.world, w.low, NULL), invalid, "state is NULL");
-    expect_refused(w.world, sadmm_world_body_def(w.world, w.low, NULL), invalid, "def is NULL");
-    expect_refused(w.world, sadmm_world_body_contact_wrench(w.world, w.low, NULL), invalid, "wrench is NULL");
-    expect_refused(w.world, sadmm_world_shape_def(w.world, w.low_shape, NULL, &body), invalid, "def is NULL");
+    expect_refused(w.world, sadmm_world_body_at(w.world, 0, NULL), invalid, "id = NULL");
+    expect_refused(w.world, sadmm_world_shape_at(w.world, 0, NULL), invalid, "id = NULL");
+    expect_refused(w.world, sadmm_world_body_state(w.world, w.low, NULL), invalid, "state = NULL");
+    expect_refused(w.world, sadmm_world_body_def(w.world, w.low, NULL), invalid, "def = NULL");
+    expect_refused(w.world, sadmm_world_body_contact_wrench(w.world, w.low, NULL), invalid, "wrench = NULL");
+    expect_refused(w.world, sadmm_world_shape_def(w.world, w.low_shape, NULL, &body), invalid, "def = NULL");
     ck_assert(body.slot == 7 && body.generation == 7);
     expect_equal_future(w.world, other.world);
     sadmm_world_destroy(w.world);
@@ -592,24 +592,25 @@ END_TEST
 
 /* ---- a step that fails ---- */
 
-/* A body with moments of 1e-300 kg m^2 is valid and turned by 1e15 N m; the other two must not suffer. */
+/* A body is set to turn at 1e200 rad/s, the square of which is no number; the other two must not suffer. */
 START_TEST(a_step_that_is_not_finite_is_rolled_back)
 {
     struct small_world w = make_small(), other = make_small();
-    const double zero[3] = { 0 }, torque[3] = { 1e15, 0, 0 };
     sadmm_body_def def = box_body(9);
     sadmm_body_id feather;
+    sadmm_body_state state;
 
     step_world(w.world, 5);
     step_world(other.world, 5);
-    for (int k = 0; k < 3; ++k) def.inertia[k] = 1e-300;
     def.name = "feather";
     MUST(w.world, sadmm_world_add_body(w.world, &def, &feather));
-    MUST(w.world, sadmm_world_set_body_wrench(w.world, feather, zero, torque)); /* 1e313 rad/s */
-    uint64_t before = sadmm_world_state_hash(w.world);
+    state = body_state(w.world, feather);
+    state.angular_velocity[0] = 1e200;
+    MUST(w.world, sadmm_world_set_body_state(w.world, feather, &state));
+    uint64_t before = state_hash(w.world);
     for (int i = 0; i < 3; ++i) {
         expect_refused(w.world, sadmm_world_step(w.world), SADMM_ERROR_NON_FINITE, "feather");
-        ck_assert_uint_eq(sadmm_world_state_hash(w.world), before);
+        ck_assert_uint_eq(state_hash(w.world), before);
         ck_assert_int_eq(world_report(w.world).step, 5);
     }
     MUST(w.world, sadmm_world_remove_body(w.world, feather));
@@ -663,7 +664,7 @@ START_TEST(scenes_without_memory)
         ck_assert_ptr_null(world);
     }
     ck_assert_int_gt(n, 3);
-    ck_assert_uint_eq(sadmm_world_state_hash(world), sadmm_world_state_hash(other));
+    ck_assert_uint_eq(state_hash(world), state_hash(other));
     sadmm_world_destroy(world);
     sadmm_world_destroy(other);
 }
@@ -672,13 +673,13 @@ END_TEST
 /* A call repeated with ever more memory until it passes. */
 #define UNTIL_MEMORY_LASTS(world, n, call)                                                       \
     for ((n) = 0;; ++(n)) {                                                                      \
-        uint64_t hash_before = sadmm_world_state_hash(world);                                    \
+        uint64_t hash_before = state_hash(world);                                    \
         sadmm_test_fail_allocations_after(n);                                                    \
         sadmm_status memory_status = (call);                                                     \
         sadmm_test_fail_allocations_after(-1);                                                   \
         if (memory_status == SADMM_OK) break;                                                    \
         expect_out_of_memory(world, memory_status);                                              \
-        ck_assert_uint_eq(sadmm_world_state_hash(world), hash_before);                           \
+        ck_assert_uint_eq(state_hash(world), hash_before);                           \
         ck_assert_msg((n) < 10000, "%s: never succeeds", #call);                                 \
     }
 
@@ -727,7 +728,7 @@ START_TEST(steps_without_memory)
         UNTIL_MEMORY_LASTS(w.world, n, sadmm_world_step(w.world));
         failures += n;
         step_world(other.world, 1);
-        ck_assert_uint_eq(sadmm_world_state_hash(w.world), sadmm_world_state_hash(other.world));
+        ck_assert_uint_eq(state_hash(w.world), state_hash(other.world));
         ck_assert_int_eq(world_report(w.world).step, i + 1);
         if (i == 10) { /* more bodies: everything has to grow in the middle of the run */
             for (int k = 0; k < 50; ++k) {

@@ -4,8 +4,14 @@
  * (of the centre of mass) and angular velocity. A body's own frame has its origin at the centre of mass and its
  * axes along the principal axes of inertia.
  *
- * A world is owned by one thread at a time; different worlds may be stepped on different threads. Ids are small
- * values with a generation: an id of a destroyed object gives SADMM_ERROR_STALE_ID, never another object.
+ * Threads: a world is used by one thread at a time, also where it is only read, because calls that read it may wait for
+ * steps, fetch what a device holds and leave a message: they take a world that is not const. The few that take a const one
+ * only read it, and may run on several threads at once while no other call is made on it. Different worlds are
+ * independent.
+ *
+ * Errors, of every call besides its own: INVALID_ARGUMENT where a pointer is NULL that may not be. Calls that wait for
+ * steps (all that read what a step changes) also return the error of a step begun with sadmm_world_step_async, once.
+ * Ids are small values with a generation: an id of a destroyed object gives SADMM_ERROR_STALE_ID, never another object.
  *
  * After a fork, while no call was running, parent and child each have a world of their own (not on CUDA, whose devices do
  * not survive one). Threads do not survive it either: a child of a process that has stepped or solved on OpenMP's threads
@@ -45,10 +51,12 @@ SADMM_API sadmm_world_def sadmm_world_def_default(void);
 /* Errors: INVALID_ARGUMENT, UNAVAILABLE, OUT_OF_MEMORY (message: sadmm_last_message). */
 SADMM_API sadmm_status sadmm_world_create(const sadmm_world_def *def, sadmm_world **out);
 SADMM_API void sadmm_world_destroy(sadmm_world *world); /* NULL is fine */
+/* The message of the last failed call on this world, "" when none failed or world is NULL; valid until the next call. */
 SADMM_API const char *sadmm_world_message(const sadmm_world *world);
 
 /* Replace or read the settings; they take effect at the next step. Steps of another length (dt) go on with the forces of
- * the last one. Errors: INVALID_ARGUMENT (nothing changes). */
+ * the last one. Errors: INVALID_ARGUMENT (nothing changes). The settings of NULL are the default
+ * ones. */
 SADMM_API sadmm_status sadmm_world_set_settings(sadmm_world *world, const sadmm_settings *settings);
 SADMM_API sadmm_settings sadmm_world_settings(const sadmm_world *world);
 
@@ -59,7 +67,8 @@ typedef enum sadmm_body_type { SADMM_BODY_DYNAMIC = 0, SADMM_BODY_STATIC } sadmm
 typedef struct sadmm_body_def {
     sadmm_body_type type;        /* default DYNAMIC */
     double mass;                 /* kg, in [1e-9, 1e12]; ignored for static bodies; no default (must be set) */
-    double inertia[3];           /* principal moments, kg m^2, > 0, each <= the sum of the other two (relative 1e-9) */
+    double inertia[3];           /* principal moments, kg m^2, in [1e-24, 1e24], each <= the sum of the other two (relative
+                                    1e-9), the largest <= 1e6 (F32) or 1e12 (F64) times the smallest */
     double position[3];          /* centre of mass, m, |x| <= 1e9 */
     double orientation[4];       /* w x y z, | |q| - 1 | <= 1e-6 (then normalised); default identity */
     double linear_velocity[3];   /* m/s, |v| <= 1e6; 0 for static bodies */
@@ -73,9 +82,9 @@ SADMM_API sadmm_body_def sadmm_body_def_default(void);
 SADMM_API sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def, sadmm_body_id *id);
 /* Destroys its shapes too. */
 SADMM_API sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id);
-SADMM_API int32_t sadmm_world_body_count(const sadmm_world *world);      /* all, static ones included */
+SADMM_API int32_t sadmm_world_body_count(const sadmm_world *world);      /* all, static ones included; of NULL: 0 */
 /* The index-th live body in order of creation slot, index in [0, body_count). */
-SADMM_API sadmm_status sadmm_world_body_at(const sadmm_world *world, int32_t index, sadmm_body_id *id);
+SADMM_API sadmm_status sadmm_world_body_at(sadmm_world *world, int32_t index, sadmm_body_id *id);
 
 typedef struct sadmm_body_state {
     double position[3];          /* m */
@@ -84,22 +93,26 @@ typedef struct sadmm_body_state {
     double angular_velocity[3];  /* rad/s, world frame */
 } sadmm_body_state;
 
-SADMM_API sadmm_status sadmm_world_body_state(const sadmm_world *world, sadmm_body_id id, sadmm_body_state *state);
-/* A pose other than the body has is a jump: the body's contacts are found as those of bodies that never touched before,
+SADMM_API sadmm_status sadmm_world_body_state(sadmm_world *world, sadmm_body_id id, sadmm_body_state *state);
+/* Any finite position and velocity is taken, so that what a step made can be set again; the orientation as in the
+ * definition, velocities 0 for static bodies. Contacts lose accuracy beyond the ranges of the definition.
+ * A pose other than the body has is a jump: the body's contacts are found as those of bodies that never touched before,
  * without what was known of the side they came from. Velocities may be set with the pose that was read. */
 SADMM_API sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, const sadmm_body_state *state);
-/* Read back the definition (mass, inertia, type, name; the name stays valid until the body is removed) with the current state. */
-SADMM_API sadmm_status sadmm_world_body_def(const sadmm_world *world, sadmm_body_id id, sadmm_body_def *def);
-/* External force (N) at the centre of mass and torque (N m), world frame; kept until set again. */
+/* Read back the definition (mass, inertia, type, name) with the current state. The name is the world's own: it stays where
+ * it is, and valid, until the body is removed or the world destroyed. */
+SADMM_API sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id, sadmm_body_def *def);
+/* External force (N) at the centre of mass and torque (N m), world frame, each component within +-1e15; kept until set
+ * again. Errors: STALE_ID, INVALID_ARGUMENT (range; a static body, which nothing moves). */
 SADMM_API sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, const double force[3],
                                                    const double torque[3]);
 /* Sum of the contact wrenches of the last step on the body: force (N), then torque about its centre of mass
  * (N m), world frame (eq. 12). Errors: STALE_ID, UNAVAILABLE when settings.recover_wrenches was false. */
-SADMM_API sadmm_status sadmm_world_body_contact_wrench(const sadmm_world *world, sadmm_body_id id, double wrench[6]);
+SADMM_API sadmm_status sadmm_world_body_contact_wrench(sadmm_world *world, sadmm_body_id id, double wrench[6]);
 /* Turn contact between two bodies off or on again (default on). */
 SADMM_API sadmm_status sadmm_world_set_body_pair_contact(sadmm_world *world, sadmm_body_id a, sadmm_body_id b, bool enabled);
 
-/* Principal inertia of solid bodies with their axes along the shape's, kg m^2.
+/* Principal inertia of solid bodies with their axes along the shape's, kg m^2. With a NULL pointer nothing is done.
  * box: half extents (m). capsule: radius and half length of the segment (m), axis z. */
 SADMM_API void sadmm_box_inertia(double mass, const double half_extents[3], double inertia[3]);
 SADMM_API void sadmm_sphere_inertia(double mass, double radius, double inertia[3]);
@@ -129,9 +142,9 @@ SADMM_API sadmm_shape_def sadmm_shape_def_default(void);
 SADMM_API sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body, const sadmm_shape_def *def,
                                              sadmm_shape_id *id /* may be NULL */);
 SADMM_API sadmm_status sadmm_world_remove_shape(sadmm_world *world, sadmm_shape_id id);
-SADMM_API int32_t sadmm_world_shape_count(const sadmm_world *world);
-SADMM_API sadmm_status sadmm_world_shape_at(const sadmm_world *world, int32_t index, sadmm_shape_id *id);
-SADMM_API sadmm_status sadmm_world_shape_def(const sadmm_world *world, sadmm_shape_id id, sadmm_shape_def *def,
+SADMM_API int32_t sadmm_world_shape_count(const sadmm_world *world); /* of NULL: 0 */
+SADMM_API sadmm_status sadmm_world_shape_at(sadmm_world *world, int32_t index, sadmm_shape_id *id);
+SADMM_API sadmm_status sadmm_world_shape_def(sadmm_world *world, sadmm_shape_id id, sadmm_shape_def *def,
                                              sadmm_body_id *body /* may be NULL */);
 /* Override the pair's friction (mu >= 0), or give -1 to return to the geometric mean. */
 SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_shape_id a, sadmm_shape_id b, double friction);
@@ -195,7 +208,7 @@ typedef struct sadmm_step_report {
 } sadmm_step_report;
 
 /* The report of the last step (zeroed before the first). */
-SADMM_API sadmm_status sadmm_world_report(const sadmm_world *world, sadmm_step_report *report);
+SADMM_API sadmm_status sadmm_world_report(sadmm_world *world, sadmm_step_report *report);
 
 typedef struct sadmm_contact {
     sadmm_body_id body_a, body_b;
@@ -209,20 +222,26 @@ typedef struct sadmm_contact {
     uint32_t feature;     /* id of the touching features, stable from step to step within a shape pair */
 } sadmm_contact;
 
-SADMM_API int32_t sadmm_world_contact_count(const sadmm_world *world); /* of the last step */
+/* Contacts of the last step that was done, 0 where there was none, world is NULL, or something was removed since. A step
+ * that failed changes nothing here; but where a backend keeps the world (CUDA) and the contacts were not read before it,
+ * they are lost with it (0). Waits for steps; the error of one is left for the next call that returns a status. */
+SADMM_API int32_t sadmm_world_contact_count(sadmm_world *world);
 /* Copy contacts [first, first + count) of the last step. Errors: INVALID_ARGUMENT (range). */
-SADMM_API sadmm_status sadmm_world_contacts(const sadmm_world *world, int32_t first, int32_t count, sadmm_contact *contacts);
+SADMM_API sadmm_status sadmm_world_contacts(sadmm_world *world, int32_t first, int32_t count, sadmm_contact *contacts);
 
-/* 64-bit hash of all live bodies' poses and velocities (bit patterns, in slot order). */
-SADMM_API uint64_t sadmm_world_state_hash(const sadmm_world *world);
+/* 64-bit hash of all live bodies' poses and velocities (bit patterns, in slot order). Nothing is written after an error.
+ * Errors: those of the steps waited for, OUT_OF_MEMORY, DEVICE. */
+SADMM_API sadmm_status sadmm_world_state_hash(sadmm_world *world, uint64_t *hash);
 
 /* What the last step ran, what it left out and why, as text lines. Writes at most `size` bytes with the final 0 and
- * returns the full length. Before the first step: the choice of backend only. */
-SADMM_API size_t sadmm_world_explain(const sadmm_world *world, char *text, size_t size);
+ * returns the full length; `text` may be NULL with a size of 0. Before the first step: the choice of backend only. Of
+ * a NULL world: "", 0. Waits for steps; the error of one is left for the next call that returns a status. */
+SADMM_API size_t sadmm_world_explain(sadmm_world *world, char *text, size_t size);
 
 /* Freeze the contact problem of the last step (bodies, contacts, its starting values) into `problem`. The k-th
- * dynamic body in slot order is body k. Errors: UNAVAILABLE before the first step, OUT_OF_MEMORY. */
-SADMM_API sadmm_status sadmm_world_freeze(const sadmm_world *world, sadmm_problem *problem);
+ * dynamic body in slot order is body k. Errors: UNAVAILABLE where sadmm_world_contact_count says that there is no step
+ * to read, OUT_OF_MEMORY. */
+SADMM_API sadmm_status sadmm_world_freeze(sadmm_world *world, sadmm_problem *problem);
 
 #ifdef __cplusplus
 }

@@ -32,7 +32,7 @@ static double largest_difference(const double *a, const double *b, size_t count,
     return start;
 }
 
-static bool read_gyration(const sadmm_world *world, size_t count, double *gyration)
+static bool read_gyration(sadmm_world *world, size_t count, double *gyration)
 {
     for (size_t k = 0; k < count; ++k) {
         sadmm_body_id id;
@@ -45,7 +45,7 @@ static bool read_gyration(const sadmm_world *world, size_t count, double *gyrati
     return true;
 }
 
-static bool read_states(const sadmm_world *world, size_t count, const double *gyration, double *states)
+static bool read_states(sadmm_world *world, size_t count, const double *gyration, double *states)
 {
     for (size_t k = 0; k < count; ++k) {
         sadmm_body_id id;
@@ -137,7 +137,7 @@ static bool answer_by_ref(const struct check_frozen *f, const sadmm_settings *se
     return true;
 }
 
-static bool freeze(const sadmm_world *world, long step, struct check_frozen *f, struct sadmm_error *error)
+static bool freeze(sadmm_world *world, long step, struct check_frozen *f, struct sadmm_error *error)
 {
     sadmm_settings settings = sadmm_world_settings(world);
     f->step = step;
@@ -156,7 +156,7 @@ static bool freeze(const sadmm_world *world, long step, struct check_frozen *f, 
 /* ---- runs -------------------------------------------------------------------------------------------------------- */
 
 /* Called after every step (0 is the first); false stops the run with `error` filled. */
-typedef bool (*step_visitor)(void *data, const sadmm_world *world, long step, struct sadmm_error *error);
+typedef bool (*step_visitor)(void *data, sadmm_world *world, long step, struct sadmm_error *error);
 
 static bool run_scene(const struct sadmm_scene *scene, sadmm_backend backend, sadmm_precision precision, long steps,
                       step_visitor visit, void *data, struct sadmm_error *error)
@@ -176,7 +176,7 @@ static bool run_scene(const struct sadmm_scene *scene, sadmm_backend backend, sa
     return ok;
 }
 
-static bool record_reference(void *data, const sadmm_world *world, long step, struct sadmm_error *error)
+static bool record_reference(void *data, sadmm_world *world, long step, struct sadmm_error *error)
 {
     struct check_reference *r = data;
     if (step == 0) {
@@ -223,7 +223,7 @@ struct comparison {
     struct check_difference *difference;
 };
 
-static bool compare_step(void *data, const sadmm_world *world, long step, struct sadmm_error *error)
+static bool compare_step(void *data, sadmm_world *world, long step, struct sadmm_error *error)
 {
     const struct comparison *c = data;
     const struct check_reference *r = c->reference;

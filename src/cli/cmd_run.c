@@ -161,7 +161,7 @@ static void show_progress(struct progress *p, const struct run_record *record, l
 /* ---- the run ----------------------------------------------------------------------------------------------------- */
 
 /* Errors are the run's: record->failure. */
-static int dump_problem(struct run_dump *dump, const char *spec, const sadmm_world *world, struct run_record *record)
+static int dump_problem(struct run_dump *dump, const char *spec, sadmm_world *world, struct run_record *record)
 {
     char title[160];
     struct sadmm_error error = {0};
@@ -239,7 +239,7 @@ static int step_all(struct run_options *o, const char *spec, const struct sadmm_
 }
 
 /* After the step; to stderr when standard output carries something else. */
-static void explain(const sadmm_world *world, FILE *out)
+static void explain(sadmm_world *world, FILE *out)
 {
     size_t size = sadmm_world_explain(world, NULL, 0) + 1;
     char *text = sadmm_alloc(size, 1);

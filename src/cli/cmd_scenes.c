@@ -95,7 +95,7 @@ static json_t *body_json(int32_t index, const sadmm_body_def *body)
     return o;
 }
 
-static sadmm_status add_bodies(const sadmm_world *world, json_t *bodies)
+static sadmm_status add_bodies(sadmm_world *world, json_t *bodies)
 {
     for (int32_t k = 0; k < sadmm_world_body_count(world); ++k) {
         sadmm_body_id id;
@@ -109,7 +109,7 @@ static sadmm_status add_bodies(const sadmm_world *world, json_t *bodies)
 }
 
 /* The entry of a body in the array: bodies are listed in order of their slots. */
-static json_t *find_body(const sadmm_world *world, json_t *bodies, sadmm_body_id wanted)
+static json_t *find_body(sadmm_world *world, json_t *bodies, sadmm_body_id wanted)
 {
     int32_t lo = 0, hi = sadmm_world_body_count(world) - 1;
     while (lo <= hi) {
@@ -123,7 +123,7 @@ static json_t *find_body(const sadmm_world *world, json_t *bodies, sadmm_body_id
     return NULL;
 }
 
-static sadmm_status add_shapes(const sadmm_world *world, json_t *bodies)
+static sadmm_status add_shapes(sadmm_world *world, json_t *bodies)
 {
     for (int32_t k = 0; k < sadmm_world_shape_count(world); ++k) {
         sadmm_shape_id id;

@@ -6,7 +6,7 @@
 
 #include "core/base/memory.h"
 
-bool run_record_start(struct run_record *record, const sadmm_world *world)
+bool run_record_start(struct run_record *record, sadmm_world *world)
 {
     int32_t count = sadmm_world_body_count(world);
     memset(record, 0, sizeof *record);
@@ -38,7 +38,7 @@ static double larger(double a, double b)
     return a > b || isnan(a) ? a : b;
 }
 
-bool run_record_step(struct run_record *record, const sadmm_world *world)
+bool run_record_step(struct run_record *record, sadmm_world *world)
 {
     sadmm_step_report *r = &record->last;
     if (sadmm_world_report(world, r) != SADMM_OK) {
@@ -73,7 +73,7 @@ static double norm3(const double x[3])
     return sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
 }
 
-bool run_record_finish(struct run_record *record, const sadmm_world *world)
+bool run_record_finish(struct run_record *record, sadmm_world *world)
 {
     record->finite = true;
     for (size_t k = 0; k < record->body_count; ++k) {
@@ -91,8 +91,9 @@ bool run_record_finish(struct run_record *record, const sadmm_world *world)
         record->speed_max = fmax(record->speed_max, speed);
         record->displacement_max = fmax(record->displacement_max, distance);
     }
-    record->hash = sadmm_world_state_hash(world);
-    return true;
+    if (sadmm_world_state_hash(world, &record->hash) == SADMM_OK) return true;
+    cli_error(CLI_FAILED, "%s", sadmm_world_message(world));
+    return false;
 }
 
 void run_record_free(struct run_record *record)

@@ -34,9 +34,9 @@ struct run_record {
 };
 
 /* False (with a message on stderr) when memory ran out or a state cannot be read. */
-bool run_record_start(struct run_record *record, const sadmm_world *world);
-bool run_record_step(struct run_record *record, const sadmm_world *world);
-bool run_record_finish(struct run_record *record, const sadmm_world *world);
+bool run_record_start(struct run_record *record, sadmm_world *world);
+bool run_record_step(struct run_record *record, sadmm_world *world);
+bool run_record_finish(struct run_record *record, sadmm_world *world);
 void run_record_free(struct run_record *record);
 
 /* Of `count` > 0 values: the median, and the value that 95 % of them do not exceed. Sorts a copy: memory may run out

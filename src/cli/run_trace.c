@@ -10,7 +10,7 @@ static void put(FILE *trace, const double *x, size_t count)
     for (size_t k = 0; k < count; ++k) fprintf(trace, ",%.17g", x[k]);
 }
 
-bool run_trace_step(FILE *trace, const struct run_record *record, const sadmm_world *world, double time)
+bool run_trace_step(FILE *trace, const struct run_record *record, sadmm_world *world, double time)
 {
     for (size_t k = 0; k < record->body_count; ++k) {
         sadmm_body_state s;

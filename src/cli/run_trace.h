@@ -6,6 +6,6 @@
 
 void run_trace_begin(FILE *trace);
 /* False, with a message on stderr, when a state cannot be read. */
-bool run_trace_step(FILE *trace, const struct run_record *record, const sadmm_world *world, double time);
+bool run_trace_step(FILE *trace, const struct run_record *record, sadmm_world *world, double time);
 
 #endif

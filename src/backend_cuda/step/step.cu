@@ -6,6 +6,7 @@
 #include "collision/bounds.h"
 #include "collision/collision.h"
 #include "core/base/memory.h"
+#include "core/model/settings.h"
 #include "core/solve/stages.h"
 #include "backend_cuda/collide/pipeline.h"
 #include "backend_cuda/device/context.h"
@@ -623,7 +624,7 @@ extern "C" sadmm_status CUDA(step_world)(struct sadmm_context *c, const struct s
     struct cuda_step *s = c->step;
     CUDA_ENTER(c);
     CUDA_TRY(next_place(c, error));
-    if (memcmp(&s->settings, settings, sizeof *settings) != 0) {
+    if (!sadmm_settings_equal(&s->settings, settings)) {
         CUDA_TRY(see_all(c, error));
         s->settings = *settings;
         s->planned = false;

@@ -7,6 +7,8 @@
 #include "world_internal.h"
 
 static const double POSITION_LIMIT = 1e9, VELOCITY_LIMIT = 1e6, WRENCH_LIMIT = 1e15;
+/* Of a state that is set: whatever a step can make. */
+static const double ANY = HUGE_VAL;
 
 sadmm_body_def sadmm_body_def_default(void)
 {
@@ -14,23 +16,38 @@ sadmm_body_def sadmm_body_def_default(void)
     return def;
 }
 
-static sadmm_status check_inertia(const double inertia[3], struct sadmm_error *error)
+/* The moments of all solids within the ranges of mass and size are 4e-22 (a ball of 1e-9 kg, 1e-6 m) to 7e23 kg m^2; an
+ * arm of 1e6 m on the smallest, 1e12 / 1e-24, is still a number in single precision. */
+static const double INERTIA_MIN = 1e-24, INERTIA_MAX = 1e24;
+
+/* World-frame moments are sums of all three, so that the smallest is known to (unit roundoff x ratio): it and the velocity
+ * about its axis are lost to 1 % at these ratios, wholly at some 100 times these. */
+static double inertia_ratio_limit(sadmm_precision precision) { return precision == SADMM_F32 ? 1e6 : 1e12; }
+
+static sadmm_status check_inertia(const double inertia[3], sadmm_precision precision, struct sadmm_error *error)
 {
+    for (int k = 0; k < 3; ++k)
+        if (!(inertia[k] >= INERTIA_MIN && inertia[k] <= INERTIA_MAX))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->inertia[%d] = %g: must be in [%g, %g] kg m^2", k,
+                              inertia[k], INERTIA_MIN, INERTIA_MAX);
     for (int k = 0; k < 3; ++k) {
         double others = inertia[(k + 1) % 3] + inertia[(k + 2) % 3];
-        if (!(inertia[k] > 0 && inertia[k] <= 1e24))
-            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->inertia[%d] = %g: must be in (0, 1e24] kg m^2", k,
-                              inertia[k]);
         if (!(inertia[k] <= others * (1 + 1e-9)))
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                               "def->inertia[%d] = %g: must be at most the sum of the other two, %g (no rigid body has more)",
                               k, inertia[k], others);
     }
+    double least = fmin(inertia[0], fmin(inertia[1], inertia[2])), most = fmax(inertia[0], fmax(inertia[1], inertia[2]));
+    if (!(most <= inertia_ratio_limit(precision) * least))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "def->inertia = (%g, %g, %g): the largest must be at most %g times the smallest in %s precision, "
+                          "which cannot tell more apart", inertia[0], inertia[1], inertia[2],
+                          inertia_ratio_limit(precision), precision == SADMM_F32 ? "single" : "double");
     return SADMM_OK;
 }
 
 static sadmm_status check_motion(const char *linear_name, const char *angular_name, const double linear[3],
-                                 const double angular[3], sadmm_body_type type, struct sadmm_error *error)
+                                 const double angular[3], sadmm_body_type type, double limit, struct sadmm_error *error)
 {
     for (int k = 0; k < 6 && type == SADMM_BODY_STATIC; ++k) {
         double x = k < 3 ? linear[k] : angular[k - 3];
@@ -38,23 +55,24 @@ static sadmm_status check_motion(const char *linear_name, const char *angular_na
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s[%d] = %g: must be 0, for the body is static",
                               k < 3 ? linear_name : angular_name, k % 3, x);
     }
-    TRY(sadmm_check_vector(linear_name, linear, 3, VELOCITY_LIMIT, error));
-    return sadmm_check_vector(angular_name, angular, 3, VELOCITY_LIMIT, error);
+    TRY(sadmm_check_vector(linear_name, linear, 3, limit, error));
+    return sadmm_check_vector(angular_name, angular, 3, limit, error);
 }
 
-static sadmm_status check_def(const sadmm_body_def *def, double orientation[4], struct sadmm_error *error)
+static sadmm_status check_def(const sadmm_body_def *def, sadmm_precision precision, double orientation[4],
+                              struct sadmm_error *error)
 {
     if (def->type != SADMM_BODY_DYNAMIC && def->type != SADMM_BODY_STATIC)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->type = %d: must be SADMM_BODY_DYNAMIC or _STATIC",
                           (int)def->type);
     if (def->type == SADMM_BODY_DYNAMIC) {
         TRY(sadmm_check_range("def->mass", def->mass, 1e-9, 1e12, error));
-        TRY(check_inertia(def->inertia, error));
+        TRY(check_inertia(def->inertia, precision, error));
     }
     TRY(sadmm_check_vector("def->position", def->position, 3, POSITION_LIMIT, error));
     TRY(sadmm_check_orientation("def->orientation", def->orientation, orientation, error));
     TRY(check_motion("def->linear_velocity", "def->angular_velocity", def->linear_velocity, def->angular_velocity,
-                     def->type, error));
+                     def->type, VELOCITY_LIMIT, error));
     int32_t lowest = def->type == SADMM_BODY_STATIC ? -1 : 0;
     if (def->environment < lowest)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->environment = %d: must be >= %d", def->environment,
@@ -74,18 +92,37 @@ static size_t free_slot(sadmm_world *world)
     return sadmm_slot_free(&world->body_marks, world, alive);
 }
 
+/* A copy of `given`, cut to what fits. */
+static sadmm_status copy_name(const char *given, char **name, struct sadmm_error *error)
+{
+    size_t length = 0;
+    *name = NULL;
+    while (given && length < SADMM_NAME_SIZE - 1 && given[length]) ++length;
+    if (length == 0) return SADMM_OK;
+    *name = (char *)sadmm_alloc(length + 1, 1);
+    if (!*name) return sadmm_fail_memory(error, "a body's name");
+    memcpy(*name, given, length);
+    return SADMM_OK;
+}
+
+const char *sadmm_world_body_name(const struct sadmm_world_body *body) { return body->name ? body->name : ""; }
+
 sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def, sadmm_body_id *id)
 {
+    TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
     double orientation[4];
-    if (!def || !id) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def or id is NULL");
-    TRY(check_def(def, orientation, error));
+    char *name;
+    TRY(sadmm_check_given(def, "def", error));
+    TRY(sadmm_check_given(id, "id", error));
+    TRY(check_def(def, world->def.precision, orientation, error));
     TRY(sadmm_world_take_back(world));
     size_t slot = free_slot(world);
     if (slot >= (size_t)1 << 27)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d bodies: a world holds at most 2^27", world->body_count);
     if (!sadmm_grow((void **)&world->bodies, &world->body_capacity, world->body_slots, slot + 1, sizeof *world->bodies))
         return sadmm_fail_memory(error, "a body");
+    TRY(copy_name(def->name, &name, error));
 
     struct sadmm_world_body *body = &world->bodies[slot];
     uint32_t generation = slot < world->body_slots ? body->generation : 1;
@@ -105,7 +142,7 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def,
         memcpy(rigid->velocity + 3, def->angular_velocity, sizeof def->angular_velocity);
         ++world->dynamic_count;
     }
-    if (def->name) strncpy(body->name, def->name, SADMM_NAME_SIZE - 1);
+    body->name = name;
     if (slot == world->body_slots) ++world->body_slots;
     sadmm_slot_taken(&world->body_marks, slot);
     ++world->body_count;
@@ -116,12 +153,15 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def,
 
 sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id)
 {
+    TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", &world->error);
     if (!body) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_world_take_back(world));
     for (size_t s = body->first_shape; body->shape_count > 0; ++s)
         if (world->shapes[s].alive && world->shapes[s].body == (int32_t)id.slot - 1) sadmm_world_kill_shape(world, s);
     sadmm_pair_table_forget(&world->disabled_pairs, id.slot - 1);
+    sadmm_free(body->name);
+    body->name = NULL;
     body->alive = false;
     ++body->generation;
     --world->body_count;
@@ -133,29 +173,31 @@ sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id)
 
 int32_t sadmm_world_body_count(const sadmm_world *world)
 {
-    return world->body_count;
+    return world ? world->body_count : 0;
 }
 
-sadmm_status sadmm_world_body_at(const sadmm_world *world, int32_t index, sadmm_body_id *id)
+sadmm_status sadmm_world_body_at(sadmm_world *world, int32_t index, sadmm_body_id *id)
 {
-    struct sadmm_error *error = (struct sadmm_error *)&world->error;
-    if (!id) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "id is NULL");
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    TRY(sadmm_check_given(id, "id", error));
     if (index < 0 || index >= world->body_count)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index, world->body_count);
     size_t slot = (size_t)index;
     if ((size_t)world->body_count < world->body_slots)
-        slot = sadmm_slot_at((struct sadmm_slot_marks *)&world->body_marks, index, world, alive);
+        slot = sadmm_slot_at(&world->body_marks, index, world, alive);
     id->slot = (uint32_t)slot + 1;
     id->generation = world->bodies[slot].generation;
     return SADMM_OK;
 }
 
-sadmm_status sadmm_world_body_state(const sadmm_world *world, sadmm_body_id id, sadmm_body_state *state)
+sadmm_status sadmm_world_body_state(sadmm_world *world, sadmm_body_id id, sadmm_body_state *state)
 {
-    struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
     const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
-    if (!state) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "state is NULL");
+    TRY(sadmm_check_given(state, "state", error));
     TRY(sadmm_world_pull_bodies(world));
     memcpy(state->position, body->rigid.position, sizeof state->position);
     memcpy(state->orientation, body->rigid.orientation, sizeof state->orientation);
@@ -166,15 +208,16 @@ sadmm_status sadmm_world_body_state(const sadmm_world *world, sadmm_body_id id, 
 
 sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, const sadmm_body_state *state)
 {
+    TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
     struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     double orientation[4];
     if (!body) return SADMM_ERROR_STALE_ID;
-    if (!state) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "state is NULL");
-    TRY(sadmm_check_vector("state->position", state->position, 3, POSITION_LIMIT, error));
+    TRY(sadmm_check_given(state, "state", error));
+    TRY(sadmm_check_vector("state->position", state->position, 3, ANY, error));
     TRY(sadmm_check_orientation("state->orientation", state->orientation, orientation, error));
     TRY(check_motion("state->linear_velocity", "state->angular_velocity", state->linear_velocity, state->angular_velocity,
-                     body->type, error));
+                     body->type, ANY, error));
     /* A static body is part of what the backend was given once. */
     TRY(body->system_body < 0 ? sadmm_world_take_back(world) : sadmm_world_edit_room(world));
     steady_place(&body->steady, &body->rigid, state->position, orientation);
@@ -186,12 +229,13 @@ sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, co
     return SADMM_OK;
 }
 
-sadmm_status sadmm_world_body_def(const sadmm_world *world, sadmm_body_id id, sadmm_body_def *def)
+sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id, sadmm_body_def *def)
 {
-    struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
     const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
-    if (!def) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def is NULL");
+    TRY(sadmm_check_given(def, "def", error));
     TRY(sadmm_world_pull_bodies(world));
     memset(def, 0, sizeof *def);
     def->type = body->type;
@@ -202,16 +246,22 @@ sadmm_status sadmm_world_body_def(const sadmm_world *world, sadmm_body_id id, sa
     memcpy(def->linear_velocity, body->rigid.velocity, sizeof def->linear_velocity);
     memcpy(def->angular_velocity, body->rigid.velocity + 3, sizeof def->angular_velocity);
     def->environment = body->environment;
-    def->name = body->name;
+    def->name = sadmm_world_body_name(body);
     return SADMM_OK;
 }
 
 sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, const double force[3], const double torque[3])
 {
+    TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
     struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
-    if (!force || !torque) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "force or torque is NULL");
+    TRY(sadmm_check_given(force, "force", error));
+    TRY(sadmm_check_given(torque, "torque", error));
+    if (body->type == SADMM_BODY_STATIC)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "id = (slot %u, generation %u): is static, and must be dynamic: no wrench moves it", id.slot,
+                          id.generation);
     TRY(sadmm_check_vector("force", force, 3, WRENCH_LIMIT, error));
     TRY(sadmm_check_vector("torque", torque, 3, WRENCH_LIMIT, error));
     TRY(body->system_body < 0 ? sadmm_world_take_back(world) : sadmm_world_edit_room(world));
@@ -221,12 +271,13 @@ sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, c
     return SADMM_OK;
 }
 
-sadmm_status sadmm_world_body_contact_wrench(const sadmm_world *world, sadmm_body_id id, double wrench[6])
+sadmm_status sadmm_world_body_contact_wrench(sadmm_world *world, sadmm_body_id id, double wrench[6])
 {
-    struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
     const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
     if (!body) return SADMM_ERROR_STALE_ID;
-    if (!wrench) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "wrench is NULL");
+    TRY(sadmm_check_given(wrench, "wrench", error));
     TRY(sadmm_world_pull_bodies(world));
     if (!world->stepped || !world->step_settings.recover_wrenches)
         return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE,
@@ -239,6 +290,7 @@ sadmm_status sadmm_world_body_contact_wrench(const sadmm_world *world, sadmm_bod
 
 sadmm_status sadmm_world_set_body_pair_contact(sadmm_world *world, sadmm_body_id a, sadmm_body_id b, bool enabled)
 {
+    TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
     if (!sadmm_world_find_body(world, a, "a", error) || !sadmm_world_find_body(world, b, "b", error))
         return SADMM_ERROR_STALE_ID;
@@ -254,6 +306,7 @@ sadmm_status sadmm_world_set_body_pair_contact(sadmm_world *world, sadmm_body_id
 
 void sadmm_box_inertia(double mass, const double h[3], double inertia[3])
 {
+    if (!h || !inertia) return;
     inertia[0] = mass / 3 * (h[1] * h[1] + h[2] * h[2]);
     inertia[1] = mass / 3 * (h[0] * h[0] + h[2] * h[2]);
     inertia[2] = mass / 3 * (h[0] * h[0] + h[1] * h[1]);
@@ -261,12 +314,14 @@ void sadmm_box_inertia(double mass, const double h[3], double inertia[3])
 
 void sadmm_sphere_inertia(double mass, double radius, double inertia[3])
 {
+    if (!inertia) return;
     inertia[0] = inertia[1] = inertia[2] = 0.4 * mass * radius * radius;
 }
 
 /* A cylinder of length 2 h and two half balls, by their shares of the volume. */
 void sadmm_capsule_inertia(double mass, double r, double h, double inertia[3])
 {
+    if (!inertia) return;
     double cylinder = 2 * h, balls = 4.0 / 3.0 * r;
     double mc = mass * cylinder / (cylinder + balls), mb = mass - mc;
     double ball_axis = 0.4 * mb * r * r;

@@ -5,11 +5,17 @@
 #include "core/model/system_math.h"
 #include "world_internal.h"
 
-int32_t sadmm_world_contact_count(const sadmm_world *world)
+static int32_t readable_contacts(const sadmm_world *world)
 {
-    if (sadmm_world_settle(world) != SADMM_OK) return 0;
-    if (world->resident.contacts_behind) return world->contacts_readable ? world->report.contacts : 0;
-    return world->contacts_readable ? (int32_t)world->contacts.point_count : 0;
+    if (!world->contacts_readable) return 0;
+    return world->resident.contacts_behind ? world->report.contacts : (int32_t)world->contacts.point_count;
+}
+
+int32_t sadmm_world_contact_count(sadmm_world *world)
+{
+    if (!world) return 0;
+    sadmm_world_settle_quietly(world);
+    return readable_contacts(world);
 }
 
 static sadmm_shape_id shape_id(const sadmm_world *world, int32_t slot)
@@ -49,7 +55,7 @@ static void read_contact(const sadmm_world *world, const struct sadmm_contact_pa
     out->body_a = body_of(world, pair->shape_a);
     out->body_b = body_of(world, pair->shape_b);
     for (int k = 0; k < 3; ++k) {
-        out->position[k] = world->start[body].position[k] + arm[k];
+        out->position[k] = world->start.rigid[body].position[k] + arm[k];
         out->normal[k] = pair->normal[k];
         out->impulse[k] = point->impulse[k];
         out->force[k] = point->impulse[k] / world->step_settings.dt;
@@ -59,15 +65,17 @@ static void read_contact(const sadmm_world *world, const struct sadmm_contact_pa
     out->feature = point->feature;
 }
 
-sadmm_status sadmm_world_contacts(const sadmm_world *world, int32_t first, int32_t count, sadmm_contact *contacts)
+sadmm_status sadmm_world_contacts(sadmm_world *world, int32_t first, int32_t count, sadmm_contact *contacts)
 {
-    int32_t total = sadmm_world_contact_count(world);
-    struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    TRY(sadmm_check_given(world, "world", NULL));
+    TRY(sadmm_world_settle(world));
+    int32_t total = readable_contacts(world);
+    struct sadmm_error *error = &world->error;
     if (first < 0 || count < 0 || first > total - count)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "[first, first + count) = [%d, %lld): must be in [0, %d)", first,
                           (long long)first + count, total);
     if (count == 0) return SADMM_OK;
-    if (!contacts) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "contacts is NULL");
+    TRY(sadmm_check_given(contacts, "contacts", error));
     TRY(sadmm_world_pull_contacts(world));
     size_t p = pair_of(&world->contacts, first);
     for (int32_t k = first; k < first + count; ++k) {
@@ -81,10 +89,10 @@ static sadmm_status freeze(const sadmm_world *world, sadmm_problem *problem, dou
                            sadmm_problem_contact *contacts)
 {
     size_t n = (size_t)world->plan.bodies;
-    struct sadmm_system system = {.body_count = world->plan.bodies, .rigid = world->start};
+    struct sadmm_system system = {.body_count = world->plan.bodies, .rigid = world->start.rigid};
     for (size_t i = 0; i < n; ++i) {
         sadmm_system_body(&system, &world->step_settings, (int32_t)i, A + 36 * i, b + 6 * i);
-        memcpy(v + 6 * i, world->start_velocity + 6 * i, 6 * sizeof *v);
+        memcpy(v + 6 * i, world->start.velocity + 6 * i, 6 * sizeof *v);
     }
     for (size_t p = 0; p < world->contacts.pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &world->contacts.pairs[p];
@@ -102,13 +110,14 @@ static sadmm_status freeze(const sadmm_world *world, sadmm_problem *problem, dou
     }
     sadmm_status status = sadmm_problem_set_bodies(problem, world->plan.bodies, A, b, v);
     if (status != SADMM_OK) return status;
-    return sadmm_problem_set_contacts(problem, (int32_t)world->contacts.point_count, contacts, world->start_impulse);
+    return sadmm_problem_set_contacts(problem, (int32_t)world->contacts.point_count, contacts, world->start.impulse);
 }
 
-sadmm_status sadmm_world_freeze(const sadmm_world *world, sadmm_problem *problem)
+sadmm_status sadmm_world_freeze(sadmm_world *world, sadmm_problem *problem)
 {
-    struct sadmm_error *error = (struct sadmm_error *)&world->error;
-    if (!problem) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "problem is NULL");
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    TRY(sadmm_check_given(problem, "problem", error));
     TRY(sadmm_world_pull_contacts(world));
     if (!world->stepped || !world->contacts_readable)
         return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE,

@@ -63,12 +63,15 @@ static void explain_options(struct text *t, const struct sadmm_plan *plan, const
     line(t, plan->certificate ? "certificate  computed\n" : "certificate  left out: not asked for\n");
 }
 
-size_t sadmm_world_explain(const sadmm_world *world, char *out, size_t size)
+size_t sadmm_world_explain(sadmm_world *world, char *out, size_t size)
 {
     struct text t = {out, out ? size : 0, 0};
+    if (out && size > 0) out[0] = 0;
+    if (!world) return 0;
     const struct sadmm_plan *plan = &world->plan;
     line(&t, "backend      %s\n", world->why[0] ? world->why : "chosen at the first step");
-    if (sadmm_world_settle(world) != SADMM_OK || !world->stepped) return t.length;
+    sadmm_world_settle_quietly(world);
+    if (!world->stepped) return t.length;
     line(&t, "precision    %s, %d thread%s\n", world->report.precision == SADMM_F32 ? "f32" : "f64", world->report.threads,
          world->report.threads == 1 ? "" : "s");
     if (world->resident.loaded) line(&t, "world        kept by the backend: contacts are found there, the host reads on demand\n");

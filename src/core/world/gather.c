@@ -41,9 +41,9 @@ static void gather_slots(sadmm_world *world, size_t begin, size_t end, int32_t d
         out->acceleration[1] = rigid_angular_acceleration(q_load(rigid->orientation), v3_load(rigid->inertia),
                                                           v3_load(rigid->wrench + 3));
         out->system_body = body->system_body = dynamic;
-        world->start[dynamic] = body->rigid;
+        world->start.rigid[dynamic] = body->rigid;
         steady_start(&body->rigid, &body->steady, world->def.settings.dt, world->velocity + 6 * (size_t)dynamic);
-        memcpy(world->start_velocity + 6 * (size_t)dynamic, world->velocity + 6 * (size_t)dynamic,
+        memcpy(world->start.velocity + 6 * (size_t)dynamic, world->velocity + 6 * (size_t)dynamic,
                6 * sizeof *world->velocity);
         world->slot_of[dynamic++] = (int32_t)slot;
     }
@@ -77,11 +77,11 @@ sadmm_status sadmm_world_gather(sadmm_world *world)
     /* One at least: a system without bodies is still one of rigid bodies. */
     size_t n = (size_t)world->dynamic_count + 1, slots = world->body_slots;
     if (!grow(&world->collision_bodies, &world->collision_body_capacity, slots, sizeof *world->collision_bodies) ||
-        !grow(&world->start, &world->start_capacity, n, sizeof *world->start) ||
+        !grow(&world->start.rigid, &world->start.rigid_capacity, n, sizeof *world->start.rigid) ||
         !grow(&world->next, &world->next_capacity, n, sizeof *world->next) ||
         !grow(&world->velocity, &world->velocity_capacity, 6 * n, sizeof *world->velocity) ||
         !grow(&world->wrench, &world->wrench_capacity, 6 * n, sizeof *world->wrench) ||
-        !grow(&world->start_velocity, &world->start_velocity_capacity, 6 * n, sizeof *world->start_velocity) ||
+        !grow(&world->start.velocity, &world->start.velocity_capacity, 6 * n, sizeof *world->start.velocity) ||
         !grow(&world->slot_of, &world->slot_of_capacity, n, sizeof *world->slot_of))
         return sadmm_fail_memory(&world->error, "the step");
     struct gathering g;
@@ -89,6 +89,13 @@ sadmm_status sadmm_world_gather(sadmm_world *world)
     g.barrier = (struct sadmm_barrier){0};
     sadmm_parallel(&world->team, sadmm_pass_threads(last_threads(world), slots), gather_share, &g);
     return SADMM_OK;
+}
+
+void sadmm_world_swap_starts(sadmm_world *world)
+{
+    const struct sadmm_step_start start = world->start;
+    world->start = world->last_start;
+    world->last_start = start;
 }
 
 struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *world)
@@ -116,7 +123,7 @@ struct sadmm_system sadmm_world_system(sadmm_world *world)
     struct sadmm_system system = {
         .team = &world->team,
         .body_count = world->dynamic_count,
-        .rigid = world->start,
+        .rigid = world->start.rigid,
         .velocity = world->velocity,
         .contacts = &world->contacts,
         .first = !world->stepped,
@@ -129,5 +136,5 @@ sadmm_status sadmm_world_not_finite(sadmm_world *world, int32_t body)
     int32_t slot = world->slot_of[body];
     return sadmm_fail(&world->error, SADMM_ERROR_NON_FINITE,
                       "the step made body (slot %d, generation %u, \"%s\") not finite; the world is as before it", slot + 1,
-                      world->bodies[slot].generation, world->bodies[slot].name);
+                      world->bodies[slot].generation, sadmm_world_body_name(&world->bodies[slot]));
 }

@@ -9,9 +9,10 @@
 #include <string.h>
 
 #include "core/base/clock.h"
-#include "core/solve/certificate.h"
 #include "core/base/memory.h"
+#include "core/model/settings.h"
 #include "core/model/steady.h"
+#include "core/solve/certificate.h"
 #include "world_internal.h"
 
 /* A resident step is enqueued with all of its looks, and those that nobody needs any more take time as well. */
@@ -65,11 +66,14 @@ static void apply(struct sadmm_world_body *body, const struct sadmm_resident_edi
 
 /* ---- to the backend ---------------------------------------------------------------------------------------------- */
 
+/* The world as it is now. What the last step started from stays: it can be read until a step is done. */
 static sadmm_status load(sadmm_world *world)
 {
     size_t n = (size_t)world->dynamic_count;
-    world->contacts_readable = false; /* what they are read with is the next step's from here on */
-    TRY(sadmm_world_gather(world));
+    sadmm_world_swap_starts(world);
+    sadmm_status status = sadmm_world_gather(world);
+    sadmm_world_swap_starts(world);
+    TRY(status);
     if (!sadmm_grow((void **)&world->resident.steady, &world->resident.steady_capacity, 0, n + 1,
                     sizeof *world->resident.steady))
         return sadmm_fail_memory(&world->error, "the step");
@@ -78,7 +82,7 @@ static sadmm_status load(sadmm_world *world)
     struct sadmm_resident_world whole = {
         .input = &input,
         .body_count = world->dynamic_count,
-        .rigid = world->start,
+        .rigid = world->last_start.rigid,
         .steady = world->resident.steady,
         .slot_of = world->slot_of,
         .contacts = &world->contacts,
@@ -102,12 +106,22 @@ static sadmm_status certify(sadmm_world *world)
     return SADMM_OK;
 }
 
+/* An error that a call without a status has left. */
+static sadmm_status take_failed(sadmm_world *world)
+{
+    struct sadmm_error failed = world->resident.failed;
+    if (failed.status == SADMM_OK) return SADMM_OK;
+    world->resident.failed.status = SADMM_OK;
+    return sadmm_fail(&world->error, failed.status, "%s", failed.message);
+}
+
 sadmm_status sadmm_world_resident_step(sadmm_world *world, bool wait)
 {
     const struct sadmm_resident_kernels *backend = world->kernels->resident;
     const sadmm_settings *settings = &world->def.settings;
     double begin = sadmm_clock_ms();
-    bool other = memcmp(&world->step_settings, settings, sizeof *settings) != 0;
+    TRY(take_failed(world));
+    bool other = !sadmm_settings_equal(&world->resident.settings, settings);
     if (other) TRY(sadmm_world_settle(world));
     if (!world->resident.loaded) TRY(load(world));
     if (world->resident.edit_count > 0) {
@@ -115,7 +129,7 @@ sadmm_status sadmm_world_resident_step(sadmm_world *world, bool wait)
         world->resident.edit_count = 0;
         world->resident.bodies_behind = true;
     }
-    world->step_settings = *settings;
+    world->resident.settings = *settings;
     sadmm_status status = backend->step(world->context, settings, &world->error);
     world->resident.running = true;
     if (status != SADMM_OK) { /* of this step or an earlier one: how far the world has got */
@@ -142,25 +156,36 @@ static void take_report(sadmm_world *world, const struct sadmm_resident_report *
     world->resident.bodies_behind = world->resident.contacts_behind = true;
     world->stepped = world->contacts_readable = true;
     world->plan = done->plan;
+    world->step_settings = world->resident.settings;
     sadmm_world_report_steps(world, steps, done);
 }
 
-sadmm_status sadmm_world_settle(const sadmm_world *constant)
+static sadmm_status wait_for_steps(sadmm_world *world)
 {
-    sadmm_world *world = (sadmm_world *)constant; /* what is known of it changes, not the world */
     struct sadmm_resident_report report = {.culprit = -1};
     if (!world->resident.running) return SADMM_OK;
     world->resident.running = false;
     sadmm_status status = world->kernels->resident->wait(world->context, &report, &world->error);
     take_report(world, &report);
-    if (status != SADMM_OK) world->contacts_readable = false;
+    /* The step that failed may have written over what the last one started from: only a copy on the host is left. */
+    if (status != SADMM_OK && world->resident.contacts_behind) world->contacts_readable = false;
     return status == SADMM_ERROR_NON_FINITE && report.culprit >= 0 ? sadmm_world_not_finite(world, report.culprit)
                                                                    : status;
 }
 
-sadmm_status sadmm_world_pull_bodies(const sadmm_world *constant)
+sadmm_status sadmm_world_settle(sadmm_world *world)
 {
-    sadmm_world *world = (sadmm_world *)constant;
+    TRY(take_failed(world));
+    return wait_for_steps(world);
+}
+
+void sadmm_world_settle_quietly(sadmm_world *world)
+{
+    if (world->resident.failed.status == SADMM_OK && wait_for_steps(world) != SADMM_OK) world->resident.failed = world->error;
+}
+
+sadmm_status sadmm_world_pull_bodies(sadmm_world *world)
+{
     TRY(sadmm_world_settle(world));
     if (!world->resident.bodies_behind) return SADMM_OK;
     TRY(world->kernels->resident->read_bodies(world->context, world->next, world->resident.steady,
@@ -178,20 +203,21 @@ sadmm_status sadmm_world_pull_bodies(const sadmm_world *constant)
     return SADMM_OK;
 }
 
-sadmm_status sadmm_world_pull_contacts(const sadmm_world *constant)
+sadmm_status sadmm_world_pull_contacts(sadmm_world *world)
 {
-    sadmm_world *world = (sadmm_world *)constant;
     const struct sadmm_resident_kernels *backend = world->kernels ? world->kernels->resident : NULL;
     TRY(sadmm_world_settle(world));
     if (!world->resident.contacts_behind) return SADMM_OK;
-    size_t count = (size_t)world->report.contacts;
-    if (!sadmm_grow((void **)&world->start_impulse, &world->start_impulse_capacity, 0, 3 * count,
-                    sizeof *world->start_impulse))
+    size_t count = (size_t)world->report.contacts, n = (size_t)world->dynamic_count;
+    struct sadmm_step_start *start = &world->start;
+    if (!sadmm_grow((void **)&start->rigid, &start->rigid_capacity, 0, n + 1, sizeof *start->rigid) ||
+        !sadmm_grow((void **)&start->velocity, &start->velocity_capacity, 0, 6 * (n + 1), sizeof *start->velocity) ||
+        !sadmm_grow((void **)&start->impulse, &start->impulse_capacity, 0, 3 * count, sizeof *start->impulse))
         return sadmm_fail_memory(&world->error, "the step's starting impulses");
     TRY(backend->read_contacts(world->context, &world->contacts, &world->error));
-    TRY(backend->read_start(world->context, world->start, world->start_velocity, world->start_impulse, &world->error));
+    TRY(backend->read_start(world->context, start->rigid, start->velocity, start->impulse, &world->error));
     TRY(backend->read_bodies(world->context, world->next, NULL, NULL, &world->error));
-    for (size_t i = 0; i < (size_t)world->dynamic_count; ++i)
+    for (size_t i = 0; i < n; ++i)
         memcpy(world->velocity + 6 * i, world->next[i].velocity, 6 * sizeof *world->velocity);
     world->resident.contacts_behind = false;
     return SADMM_OK;

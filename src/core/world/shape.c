@@ -51,11 +51,12 @@ static sadmm_status check_def(const struct sadmm_world_body *body, const sadmm_s
 
 sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, const sadmm_shape_def *def, sadmm_shape_id *id)
 {
+    TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
     struct sadmm_world_body *body = sadmm_world_find_body(world, body_id, "body", error);
     double orientation[4];
     if (!body) return SADMM_ERROR_STALE_ID;
-    if (!def) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def is NULL");
+    TRY(sadmm_check_given(def, "def", error));
     TRY(check_def(body, def, orientation, error));
     TRY(sadmm_world_take_back(world));
 
@@ -108,6 +109,7 @@ void sadmm_world_kill_shape(sadmm_world *world, size_t slot)
 
 sadmm_status sadmm_world_remove_shape(sadmm_world *world, sadmm_shape_id id)
 {
+    TRY(sadmm_check_given(world, "world", NULL));
     if (!sadmm_world_find_shape(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_world_take_back(world));
     sadmm_world_kill_shape(world, id.slot - 1);
@@ -116,29 +118,31 @@ sadmm_status sadmm_world_remove_shape(sadmm_world *world, sadmm_shape_id id)
 
 int32_t sadmm_world_shape_count(const sadmm_world *world)
 {
-    return world->shape_count;
+    return world ? world->shape_count : 0;
 }
 
-sadmm_status sadmm_world_shape_at(const sadmm_world *world, int32_t index, sadmm_shape_id *id)
+sadmm_status sadmm_world_shape_at(sadmm_world *world, int32_t index, sadmm_shape_id *id)
 {
-    struct sadmm_error *error = (struct sadmm_error *)&world->error;
-    if (!id) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "id is NULL");
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    TRY(sadmm_check_given(id, "id", error));
     if (index < 0 || index >= world->shape_count)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index, world->shape_count);
     size_t slot = (size_t)index;
     if ((size_t)world->shape_count < world->shape_slots)
-        slot = sadmm_slot_at((struct sadmm_slot_marks *)&world->shape_marks, index, world, alive);
+        slot = sadmm_slot_at(&world->shape_marks, index, world, alive);
     id->slot = (uint32_t)slot + 1;
     id->generation = world->shape_generations[slot];
     return SADMM_OK;
 }
 
-sadmm_status sadmm_world_shape_def(const sadmm_world *world, sadmm_shape_id id, sadmm_shape_def *def, sadmm_body_id *body)
+sadmm_status sadmm_world_shape_def(sadmm_world *world, sadmm_shape_id id, sadmm_shape_def *def, sadmm_body_id *body)
 {
-    struct sadmm_error *error = (struct sadmm_error *)&world->error;
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
     const struct sadmm_shape *shape = sadmm_world_find_shape(world, id, "id", error);
     if (!shape) return SADMM_ERROR_STALE_ID;
-    if (!def) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def is NULL");
+    TRY(sadmm_check_given(def, "def", error));
     memset(def, 0, sizeof *def);
     def->type = shape->type;
     memcpy(def->size, shape->size, sizeof def->size);
@@ -157,6 +161,7 @@ sadmm_status sadmm_world_shape_def(const sadmm_world *world, sadmm_shape_id id, 
 
 sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_shape_id a, sadmm_shape_id b, double friction)
 {
+    TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
     if (!sadmm_world_find_shape(world, a, "a", error) || !sadmm_world_find_shape(world, b, "b", error))
         return SADMM_ERROR_STALE_ID;

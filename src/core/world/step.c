@@ -43,7 +43,7 @@ static void keep_share(void *argument, int thread, int threads)
     double deepest = 0;
     sadmm_share(world->contacts.point_count, thread, threads, &begin, &end);
     for (size_t k = begin; k < end; ++k) {
-        memcpy(world->start_impulse + 3 * k, points[k].impulse, 3 * sizeof *world->start_impulse);
+        memcpy(world->start.impulse + 3 * k, points[k].impulse, 3 * sizeof *world->start_impulse);
         const double own = points[k].gap < 0 ? -points[k].gap : 0; /* a gap of 0 is 0 deep, not -0 */
         deepest = own > deepest ? own : deepest;
     }
@@ -55,8 +55,8 @@ static sadmm_status keep_start(sadmm_world *world, double *depth)
 {
     const size_t count = world->contacts.point_count;
     struct start_keeping keeping;
-    if (!sadmm_grow((void **)&world->start_impulse, &world->start_impulse_capacity, 0, 3 * count,
-                    sizeof *world->start_impulse))
+    if (!sadmm_grow((void **)&world->start.impulse, &world->start.impulse_capacity, 0, 3 * count,
+                    sizeof *world->start.impulse))
         return sadmm_fail_memory(&world->error, "the step's starting impulses");
     keeping.world = world;
     const int ran = sadmm_parallel(&world->team, sadmm_pass_threads(world->plan.threads, count), keep_share, &keeping);
@@ -189,7 +189,7 @@ static void report_step(const struct host_step *step)
         .plan = step->world->plan,
         .iterations = solved->iterations,
         .iterations_mean = solved->iterations,
-        .converged = solved->converged,
+        .converged = solved->converged && sadmm_certificate_is_finite(&solved->certificate),
         .limited = solved->limited,
         .penetration_max = step->depth,
         .residual = solved->residual,
@@ -209,11 +209,14 @@ static sadmm_status host_step(sadmm_world *world)
     struct host_step step = {.world = world, .stages = sadmm_stages_of(&world->plan, &world->def.settings, true)};
     TRY(sadmm_world_take_back(world));
     world->team.ran = 1;
+    const struct sadmm_plan last_plan = world->plan;
     step.solve = (struct sadmm_solve){world->kernels, world->context, &step.system, &world->def.settings,
                                       &world->plan, &step.report, &world->error};
+    sadmm_world_swap_starts(world);
     sadmm_status status = run_stages(&step);
-    if (status != SADMM_OK) {
-        world->contacts_readable = false;
+    if (status != SADMM_OK) { /* what can be read of the last step is as before */
+        sadmm_world_swap_starts(world);
+        world->plan = last_plan;
         if (step.found) sadmm_collision_undo(world->collision, &world->contacts);
         return status;
     }
@@ -224,21 +227,28 @@ static sadmm_status host_step(sadmm_world *world)
 
 sadmm_status sadmm_world_step(sadmm_world *world)
 {
+    TRY(sadmm_check_given(world, "world", NULL));
     TRY(sadmm_world_choose_backend(world));
     return sadmm_world_may_reside(world) ? sadmm_world_resident_step(world, true) : host_step(world);
 }
 
 sadmm_status sadmm_world_step_async(sadmm_world *world)
 {
+    TRY(sadmm_check_given(world, "world", NULL));
     TRY(sadmm_world_choose_backend(world));
     return sadmm_world_may_reside(world) ? sadmm_world_resident_step(world, false) : host_step(world);
 }
 
-sadmm_status sadmm_world_wait(sadmm_world *world) { return sadmm_world_settle(world); }
-
-sadmm_status sadmm_world_report(const sadmm_world *world, sadmm_step_report *report)
+sadmm_status sadmm_world_wait(sadmm_world *world)
 {
-    if (!report) return sadmm_fail((struct sadmm_error *)&world->error, SADMM_ERROR_INVALID_ARGUMENT, "report is NULL");
+    TRY(sadmm_check_given(world, "world", NULL));
+    return sadmm_world_settle(world);
+}
+
+sadmm_status sadmm_world_report(sadmm_world *world, sadmm_step_report *report)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    TRY(sadmm_check_given(report, "report", &world->error));
     TRY(sadmm_world_settle(world));
     *report = world->report;
     return SADMM_OK;
@@ -258,10 +268,12 @@ static uint64_t hash_doubles(uint64_t hash, const double *x, int count)
     return hash;
 }
 
-uint64_t sadmm_world_state_hash(const sadmm_world *world)
+sadmm_status sadmm_world_state_hash(sadmm_world *world, uint64_t *out)
 {
     uint64_t hash = UINT64_C(0xcbf29ce484222325);
-    if (sadmm_world_pull_bodies(world) != SADMM_OK) return 0;
+    TRY(sadmm_check_given(world, "world", NULL));
+    TRY(sadmm_check_given(out, "hash", &world->error));
+    TRY(sadmm_world_pull_bodies(world));
     for (size_t slot = 0; slot < world->body_slots; ++slot) {
         const struct sadmm_world_body *body = &world->bodies[slot];
         if (!body->alive) continue;
@@ -269,5 +281,6 @@ uint64_t sadmm_world_state_hash(const sadmm_world *world)
         hash = hash_doubles(hash, body->rigid.orientation, 4);
         hash = hash_doubles(hash, body->rigid.velocity, 6);
     }
-    return hash;
+    *out = hash;
+    return SADMM_OK;
 }

@@ -22,10 +22,11 @@ sadmm_world_def sadmm_world_def_default(void)
 
 sadmm_status sadmm_world_create(const sadmm_world_def *def, sadmm_world **out)
 {
-    if (!out) return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "out is NULL");
+    sadmm_status status = sadmm_check_given(out, "out", NULL);
+    if (status != SADMM_OK) return status;
     *out = NULL;
-    if (!def) return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "def is NULL");
-    sadmm_status status = sadmm_settings_validate(&def->settings, NULL);
+    status = sadmm_check_given(def, "def", NULL);
+    if (status == SADMM_OK) status = sadmm_settings_validate(&def->settings, NULL);
     if (status == SADMM_OK) status = sadmm_check_range("def->contact_margin", def->contact_margin, 0, 1, NULL);
     struct sadmm_team team;
     if (status == SADMM_OK) status = sadmm_team_init(&team, &def->tasks, "def->tasks", NULL);
@@ -57,11 +58,12 @@ void sadmm_world_destroy(sadmm_world *world)
     sadmm_collision_destroy(world->collision);
     sadmm_contact_set_free(&world->contacts);
     sadmm_certificate_workspace_free(&world->certificate_workspace);
+    for (size_t slot = 0; slot < world->body_slots; ++slot) sadmm_free(world->bodies[slot].name);
     void *blocks[] = {world->bodies, world->shapes, world->shape_generations, world->disabled_pairs.keys,
                       world->disabled_pairs.values, world->friction_pairs.keys, world->friction_pairs.values,
-                      world->collision_bodies, world->start, world->next, world->velocity, world->wrench,
-                      world->start_velocity, world->start_impulse, world->slot_of,
-                      world->resident.steady, world->resident.edits};
+                      world->collision_bodies, world->start.rigid, world->start.velocity, world->start.impulse,
+                      world->last_start.rigid, world->last_start.velocity, world->last_start.impulse, world->next,
+                      world->velocity, world->wrench, world->slot_of, world->resident.steady, world->resident.edits};
     for (size_t i = 0; i < sizeof blocks / sizeof *blocks; ++i) sadmm_free(blocks[i]);
     sadmm_free(world);
 }
@@ -73,12 +75,13 @@ const char *sadmm_world_message(const sadmm_world *world)
 
 sadmm_status sadmm_world_set_settings(sadmm_world *world, const sadmm_settings *settings)
 {
-    sadmm_status status = sadmm_settings_validate(settings, &world->error);
+    sadmm_status status = sadmm_check_given(world, "world", NULL);
+    if (status == SADMM_OK) status = sadmm_settings_validate(settings, &world->error);
     if (status == SADMM_OK) world->def.settings = *settings;
     return status;
 }
 
 sadmm_settings sadmm_world_settings(const sadmm_world *world)
 {
-    return world->def.settings;
+    return world ? world->def.settings : sadmm_settings_default();
 }

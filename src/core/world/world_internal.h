@@ -13,7 +13,7 @@
 #include "slots.h"
 #include "subadmm/world.h"
 
-enum { SADMM_NAME_SIZE = 64, SADMM_WHY_SIZE = 256 };
+enum { SADMM_NAME_SIZE = 64, SADMM_WHY_SIZE = 256 }; /* a name is cut to what fits, with its final 0 */
 
 /* A body slot. Dynamic bodies are numbered in slot order for the solver at every step. */
 struct sadmm_world_body {
@@ -27,7 +27,15 @@ struct sadmm_world_body {
     size_t first_shape;  /* none of its shapes is in a lower slot */
     double contact_wrench[6];
     struct sadmm_steady steady;
-    char name[SADMM_NAME_SIZE];
+    char *name;          /* a block of its own, so that it stays where it is when slots are added; NULL: none */
+};
+
+/* What the last step started from, for contacts, freeze and the certificate. */
+struct sadmm_step_start {
+    struct sadmm_rigid *rigid; /* dynamic bodies */
+    double *velocity;          /* dynamic bodies x 6: the warm start */
+    double *impulse;           /* points x 3: the warm start */
+    size_t rigid_capacity, velocity_capacity, impulse_capacity;
 };
 
 struct sadmm_world {
@@ -52,13 +60,11 @@ struct sadmm_world {
     struct sadmm_contact_set contacts;
     bool contacts_readable;
     struct sadmm_collision_body *collision_bodies; /* by slot */
-    struct sadmm_rigid *start, *next;              /* dynamic bodies: before and after the step */
+    struct sadmm_step_start start, last_start;     /* of the step at hand; a failing step swaps it back */
+    struct sadmm_rigid *next;                      /* dynamic bodies after the step */
     double *velocity, *wrench;                     /* dynamic bodies x 6 */
-    double *start_velocity;                        /* dynamic bodies x 6: the warm start */
-    double *start_impulse;                         /* points x 3: the warm start */
     int32_t *slot_of;                              /* dynamic body -> slot */
-    size_t collision_body_capacity, start_capacity, next_capacity, velocity_capacity, wrench_capacity,
-        start_velocity_capacity, start_impulse_capacity, slot_of_capacity;
+    size_t collision_body_capacity, next_capacity, velocity_capacity, wrench_capacity, slot_of_capacity;
     struct sadmm_plan plan;
     sadmm_settings step_settings;
     bool stepped;
@@ -67,8 +73,10 @@ struct sadmm_world {
     struct {
         bool loaded;         /* the backend has the world; nothing but states and wrenches has changed since */
         bool running;        /* steps were enqueued and not waited for */
+        struct sadmm_error failed; /* of a step that a call without a status waited for; SADMM_OK: none */
         bool bodies_behind;  /* the bodies above are older than the backend's */
         bool contacts_behind;
+        sadmm_settings settings; /* of the steps enqueued */
         int64_t done, repeats; /* steps since it was loaded, as far as known; repeated ones */
         struct sadmm_steady *steady; /* dynamic bodies */
         struct sadmm_resident_edit *edits; /* since the last step was enqueued */
@@ -84,8 +92,10 @@ struct sadmm_world {
 
 /* ---- gather.c ---- */
 
-/* Dynamic bodies in slot order into the arrays of the last step, and all bodies as collision sees them. */
+/* Dynamic bodies in slot order into `start` and what else a step works on, and all bodies as collision sees them. */
 sadmm_status sadmm_world_gather(sadmm_world *world);
+/* Exchange `start` and `last_start`. */
+void sadmm_world_swap_starts(sadmm_world *world);
 struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *world);
 struct sadmm_system sadmm_world_system(sadmm_world *world);
 /* SADMM_ERROR_NON_FINITE that names a dynamic body. */
@@ -108,10 +118,12 @@ bool sadmm_world_may_reside(const sadmm_world *world);
 /* Enqueue a step; `wait`: until it is done, with its report. */
 sadmm_status sadmm_world_resident_step(sadmm_world *world, bool wait);
 /* Until every enqueued step is done. The error of a step that failed is returned once. */
-sadmm_status sadmm_world_settle(const sadmm_world *world);
+sadmm_status sadmm_world_settle(sadmm_world *world);
+/* The same for calls that return no status: the error stays for the next one that does. */
+void sadmm_world_settle_quietly(sadmm_world *world);
 /* Bring the bodies (or contacts and everything else) of the last step back, where the backend is ahead. */
-sadmm_status sadmm_world_pull_bodies(const sadmm_world *world);
-sadmm_status sadmm_world_pull_contacts(const sadmm_world *world);
+sadmm_status sadmm_world_pull_bodies(sadmm_world *world);
+sadmm_status sadmm_world_pull_contacts(sadmm_world *world);
 /* Both, and from here on the host's world is the one that counts: before anything but a state or a wrench is changed. */
 sadmm_status sadmm_world_take_back(sadmm_world *world);
 /* Remember a change of a body for the backend. Makes room only: nothing can fail once the body has been changed. */
@@ -120,6 +132,8 @@ void sadmm_world_edit(sadmm_world *world, const struct sadmm_world_body *body, u
 
 /* ---- ids.c ---- */
 
+/* "" where it has none. */
+const char *sadmm_world_body_name(const struct sadmm_world_body *body);
 /* The slot of a live object, or NULL with SADMM_ERROR_STALE_ID set on `error`. */
 struct sadmm_world_body *sadmm_world_find_body(const sadmm_world *world, sadmm_body_id id, const char *argument,
                                                struct sadmm_error *error);

@@ -1,0 +1,264 @@
+/* Every exported function takes NULL for every pointer: refused by name where the pointer is needed, a documented answer
+ * where there is no status to return. The list of functions is the shared library's own, so that none can be left out. */
+#include <check.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "run_suite.h"
+#include "subadmm/subadmm.h"
+
+static sadmm_world *world;
+static sadmm_problem *problem;
+static sadmm_body_id body;
+static sadmm_shape_id shape;
+
+/* The call is refused, and the message names the argument. */
+#define REFUSES(name, call)                                                                              \
+    do {                                                                                                 \
+        ck_assert_msg((call) == SADMM_ERROR_INVALID_ARGUMENT, "%s: not refused", #call);                 \
+        ck_assert_msg(strstr(sadmm_last_message(), name " = NULL: must be given") != NULL, "%s: \"%s\"", \
+                      #call, sadmm_last_message());                                                      \
+    } while (0)
+
+static void on_worlds(void)
+{
+    sadmm_world *out;
+    sadmm_world_def def = sadmm_world_def_default();
+    REFUSES("out", sadmm_world_create(&def, NULL));
+    REFUSES("def", sadmm_world_create(NULL, &out));
+    ck_assert_ptr_null(out);
+    sadmm_world_destroy(NULL);
+    ck_assert_str_eq(sadmm_world_message(NULL), "");
+    sadmm_settings settings = sadmm_world_settings(NULL);
+    ck_assert(settings.dt == sadmm_settings_default().dt && settings.iterations == sadmm_settings_default().iterations);
+    REFUSES("world", sadmm_world_set_settings(NULL, &settings));
+    REFUSES("settings", sadmm_world_set_settings(world, NULL));
+}
+
+static void on_bodies(void)
+{
+    const double three[3] = {0};
+    double six[6];
+    sadmm_body_def def = sadmm_body_def_default();
+    sadmm_body_state state;
+    sadmm_body_id id;
+    def.type = SADMM_BODY_STATIC;
+    REFUSES("world", sadmm_world_add_body(NULL, &def, &id));
+    REFUSES("def", sadmm_world_add_body(world, NULL, &id));
+    REFUSES("id", sadmm_world_add_body(world, &def, NULL));
+    REFUSES("world", sadmm_world_remove_body(NULL, body));
+    ck_assert_int_eq(sadmm_world_body_count(NULL), 0);
+    REFUSES("world", sadmm_world_body_at(NULL, 0, &id));
+    REFUSES("id", sadmm_world_body_at(world, 0, NULL));
+    REFUSES("world", sadmm_world_body_state(NULL, body, &state));
+    REFUSES("state", sadmm_world_body_state(world, body, NULL));
+    REFUSES("world", sadmm_world_set_body_state(NULL, body, &state));
+    REFUSES("state", sadmm_world_set_body_state(world, body, NULL));
+    REFUSES("world", sadmm_world_body_def(NULL, body, &def));
+    REFUSES("def", sadmm_world_body_def(world, body, NULL));
+    REFUSES("world", sadmm_world_set_body_wrench(NULL, body, three, three));
+    REFUSES("force", sadmm_world_set_body_wrench(world, body, NULL, three));
+    REFUSES("torque", sadmm_world_set_body_wrench(world, body, three, NULL));
+    REFUSES("world", sadmm_world_body_contact_wrench(NULL, body, six));
+    REFUSES("wrench", sadmm_world_body_contact_wrench(world, body, NULL));
+    REFUSES("world", sadmm_world_set_body_pair_contact(NULL, body, body, true));
+}
+
+static void on_shapes(void)
+{
+    sadmm_shape_def def = sadmm_shape_def_default();
+    sadmm_shape_id id;
+    REFUSES("world", sadmm_world_add_shape(NULL, body, &def, &id));
+    REFUSES("def", sadmm_world_add_shape(world, body, NULL, &id));
+    REFUSES("world", sadmm_world_remove_shape(NULL, shape));
+    ck_assert_int_eq(sadmm_world_shape_count(NULL), 0);
+    REFUSES("world", sadmm_world_shape_at(NULL, 0, &id));
+    REFUSES("id", sadmm_world_shape_at(world, 0, NULL));
+    REFUSES("world", sadmm_world_shape_def(NULL, shape, &def, NULL));
+    REFUSES("def", sadmm_world_shape_def(world, shape, NULL, NULL));
+    ck_assert_int_eq(sadmm_world_shape_def(world, shape, &def, NULL), SADMM_OK); /* body may be NULL */
+    REFUSES("world", sadmm_world_set_pair_friction(NULL, shape, shape, 1));
+}
+
+static void on_steps(void)
+{
+    sadmm_step_report report;
+    sadmm_contact contact;
+    uint64_t hash;
+    char text[4] = "abc";
+    REFUSES("world", sadmm_world_step(NULL));
+    REFUSES("world", sadmm_world_step_async(NULL));
+    REFUSES("world", sadmm_world_wait(NULL));
+    REFUSES("world", sadmm_world_report(NULL, &report));
+    REFUSES("report", sadmm_world_report(world, NULL));
+    ck_assert_int_eq(sadmm_world_contact_count(NULL), 0);
+    REFUSES("world", sadmm_world_contacts(NULL, 0, 1, &contact));
+    ck_assert_int_gt(sadmm_world_contact_count(world), 0);
+    REFUSES("contacts", sadmm_world_contacts(world, 0, 1, NULL));
+    REFUSES("world", sadmm_world_state_hash(NULL, &hash));
+    REFUSES("hash", sadmm_world_state_hash(world, NULL));
+    ck_assert_uint_eq(sadmm_world_explain(NULL, text, sizeof text), 0);
+    ck_assert_str_eq(text, "");
+    ck_assert_uint_eq(sadmm_world_explain(NULL, NULL, 0), 0);
+    ck_assert_uint_gt(sadmm_world_explain(world, NULL, 0), 100);
+    ck_assert_uint_gt(sadmm_world_explain(world, NULL, 100), 100); /* no text: nothing is written, whatever the size */
+    REFUSES("world", sadmm_world_freeze(NULL, problem));
+    REFUSES("problem", sadmm_world_freeze(world, NULL));
+}
+
+static void on_problems(void)
+{
+    double x[36] = {0};
+    sadmm_problem_contact contact = {.body_a = -1, .normal = {1, 0, 0}};
+    sadmm_problem_block block = {.kind = SADMM_BLOCK_HARD, .rows = 1, .body_a = -1, .jacobian_b = {1}};
+    sadmm_certificate certificate;
+    sadmm_settings settings = sadmm_settings_default();
+    REFUSES("out", sadmm_problem_create(NULL));
+    sadmm_problem_destroy(NULL);
+    ck_assert_str_eq(sadmm_problem_message(NULL), "");
+    for (int i = 0; i < 6; ++i) x[7 * i] = 1;
+    REFUSES("problem", sadmm_problem_set_bodies(NULL, 1, x, x, x));
+    REFUSES("A", sadmm_problem_set_bodies(problem, 1, NULL, x, x));
+    REFUSES("b", sadmm_problem_set_bodies(problem, 1, x, NULL, x));
+    ck_assert_int_eq(sadmm_problem_set_bodies(problem, 1, x, x, NULL), SADMM_OK);
+    REFUSES("problem", sadmm_problem_set_contacts(NULL, 1, &contact, x));
+    REFUSES("contacts", sadmm_problem_set_contacts(problem, 1, NULL, x));
+    ck_assert_int_eq(sadmm_problem_set_contacts(problem, 1, &contact, NULL), SADMM_OK);
+    REFUSES("problem", sadmm_problem_set_blocks(NULL, 1, &block, x));
+    REFUSES("blocks", sadmm_problem_set_blocks(problem, 1, NULL, x));
+    ck_assert_int_eq(sadmm_problem_set_blocks(problem, 1, &block, NULL), SADMM_OK);
+    ck_assert(sadmm_problem_body_count(NULL) == 0 && sadmm_problem_contact_count(NULL) == 0 &&
+              sadmm_problem_block_count(NULL) == 0);
+    REFUSES("problem", sadmm_problem_get_bodies(NULL, x, x, x));
+    ck_assert_int_eq(sadmm_problem_get_bodies(problem, NULL, NULL, NULL), SADMM_OK);
+    REFUSES("problem", sadmm_problem_get_contact(NULL, 0, &contact));
+    REFUSES("contact", sadmm_problem_get_contact(problem, 0, NULL));
+    REFUSES("problem", sadmm_problem_get_block(NULL, 0, &block));
+    REFUSES("block", sadmm_problem_get_block(problem, 0, NULL));
+    REFUSES("problem", sadmm_problem_set_device(NULL, 0));
+    REFUSES("problem", sadmm_problem_solve(NULL, SADMM_BACKEND_CPU, SADMM_F64, &settings, NULL));
+    REFUSES("settings", sadmm_problem_solve(problem, SADMM_BACKEND_CPU, SADMM_F64, NULL, NULL));
+    ck_assert_int_eq(sadmm_problem_solve(problem, SADMM_BACKEND_CPU, SADMM_F64, &settings, NULL), SADMM_OK);
+    REFUSES("problem", sadmm_problem_get_solution(NULL, x, x, x));
+    ck_assert_int_eq(sadmm_problem_get_solution(problem, NULL, NULL, NULL), SADMM_OK);
+    REFUSES("problem", sadmm_problem_set_solution(NULL, x, x, x));
+    ck_assert_int_eq(sadmm_problem_set_solution(problem, NULL, NULL, NULL), SADMM_OK);
+    REFUSES("problem", sadmm_problem_certify(NULL, &certificate));
+    REFUSES("certificate", sadmm_problem_certify(problem, NULL));
+}
+
+static void on_others(void)
+{
+    double inertia[3] = {7, 7, 7};
+    const double half[3] = {1, 1, 1};
+    REFUSES("info", sadmm_backend_query(SADMM_BACKEND_REF, NULL));
+    sadmm_box_inertia(1, NULL, inertia);
+    sadmm_box_inertia(1, half, NULL);
+    sadmm_sphere_inertia(1, 1, NULL);
+    sadmm_capsule_inertia(1, 1, 1, NULL);
+    for (int k = 0; k < 3; ++k) ck_assert(inertia[k] == 7);
+}
+
+/* By the function that passes NULL to them; those without a pointer have none. */
+#define P(name) "sadmm_problem_" #name
+#define W(name) "sadmm_world_" #name
+static const struct {
+    void (*pass_null)(void);
+    const char *names[24];
+} functions[] = {
+    {on_worlds, {W(create), W(destroy), W(message), W(settings), W(set_settings)}},
+    {on_bodies,
+     {W(add_body), W(remove_body), W(body_count), W(body_at), W(body_state), W(set_body_state), W(body_def),
+      W(set_body_wrench), W(body_contact_wrench), W(set_body_pair_contact)}},
+    {on_shapes,
+     {W(add_shape), W(remove_shape), W(shape_count), W(shape_at), W(shape_def), W(set_pair_friction)}},
+    {on_steps,
+     {W(step), W(step_async), W(wait), W(report), W(contact_count), W(contacts), W(state_hash), W(explain), W(freeze)}},
+    {on_problems,
+     {P(create), P(destroy), P(message), P(set_bodies), P(set_contacts), P(set_blocks), P(body_count), P(contact_count),
+      P(block_count), P(get_bodies), P(get_contact), P(get_block), P(set_device), P(solve), P(get_solution),
+      P(set_solution), P(certify)}},
+    {on_others, {"sadmm_backend_query", "sadmm_box_inertia", "sadmm_sphere_inertia", "sadmm_capsule_inertia"}},
+    {NULL,
+     {"sadmm_settings_default", W(def_default), "sadmm_body_def_default", "sadmm_shape_def_default", "sadmm_status_name",
+      "sadmm_last_message", "sadmm_version", "sadmm_build_commit", "sadmm_build_compiler"}},
+};
+enum { GROUPS = sizeof functions / sizeof *functions };
+
+static void start(void)
+{
+    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_body_def ball = sadmm_body_def_default(), floor = ball;
+    sadmm_shape_def sphere = sadmm_shape_def_default(), plane = sphere;
+    sadmm_body_id ground;
+    def.backend = SADMM_BACKEND_CPU;
+    ball.mass = 1;
+    sadmm_sphere_inertia(1, 0.1, ball.inertia);
+    ball.position[2] = 0.1;
+    floor.type = SADMM_BODY_STATIC;
+    floor.environment = -1;
+    sphere.size[0] = 0.1;
+    plane.type = SADMM_SHAPE_PLANE;
+    ck_assert_int_eq(sadmm_problem_create(&problem), SADMM_OK);
+    ck_assert_int_eq(sadmm_world_create(&def, &world), SADMM_OK);
+    ck_assert_int_eq(sadmm_world_add_body(world, &floor, &ground), SADMM_OK);
+    ck_assert_int_eq(sadmm_world_add_shape(world, ground, &plane, NULL), SADMM_OK); /* id may be NULL */
+    ck_assert_int_eq(sadmm_world_add_body(world, &ball, &body), SADMM_OK);
+    ck_assert_int_eq(sadmm_world_add_shape(world, body, &sphere, &shape), SADMM_OK);
+    ck_assert_int_eq(sadmm_world_step(world), SADMM_OK);
+}
+
+/* And nothing has changed: a world that was asked nothing goes on to the same state. */
+START_TEST(null_is_refused)
+{
+    uint64_t hash, other;
+    start();
+    if (functions[_i].pass_null) functions[_i].pass_null();
+    ck_assert_int_eq(sadmm_world_step(world), SADMM_OK);
+    ck_assert_int_eq(sadmm_world_state_hash(world, &hash), SADMM_OK);
+    sadmm_world_destroy(world);
+    sadmm_problem_destroy(problem);
+    start();
+    ck_assert_int_eq(sadmm_world_step(world), SADMM_OK);
+    ck_assert_int_eq(sadmm_world_state_hash(world, &other), SADMM_OK);
+    ck_assert_uint_eq(hash, other);
+    sadmm_world_destroy(world);
+    sadmm_problem_destroy(problem);
+}
+END_TEST
+
+static bool is_listed(const char *name)
+{
+    for (int g = 0; g < GROUPS; ++g)
+        for (int k = 0; k < 24 && functions[g].names[k]; ++k)
+            if (strcmp(functions[g].names[k], name) == 0) return true;
+    return false;
+}
+
+START_TEST(every_exported_function_is_listed)
+{
+    char line[256], name[200], type;
+    int exported = 0, listed = 0;
+    FILE *symbols = popen("nm -D --defined-only '" SUBADMM_LIBRARY "'", "r");
+    ck_assert_ptr_nonnull(symbols);
+    while (fgets(line, sizeof line, symbols))
+        if (sscanf(line, "%*s %c %199[^@\n]", &type, name) == 2 && strncmp(name, "sadmm_", 6) == 0) {
+            ck_assert_msg(is_listed(name), "%s: exported, and nothing here passes NULL to it", name);
+            ++exported;
+        }
+    pclose(symbols);
+    for (int g = 0; g < GROUPS; ++g)
+        for (int k = 0; k < 24 && functions[g].names[k]; ++k) ++listed;
+    ck_assert_int_eq(exported, listed);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("null");
+    TCase *cases = tcase_create("null");
+    tcase_add_loop_test(cases, null_is_refused, 0, GROUPS);
+    tcase_add_test(cases, every_exported_function_is_listed);
+    suite_add_tcase(suite, cases);
+    return run_suite(suite);
+}

@@ -1,0 +1,299 @@
+/* What the header says about calls on a world: what stays valid, what a failed step leaves, what may be set. */
+#include <malloc.h>
+
+#include "core/model/settings.h"
+#include "scene_tools.h"
+
+static const double ZERO[3] = {0, 0, 0};
+
+static sadmm_body_def ball_def(double z)
+{
+    sadmm_body_def def = sadmm_body_def_default();
+    def.mass = 1;
+    sadmm_sphere_inertia(1, 0.1, def.inertia);
+    def.position[2] = z;
+    return def;
+}
+
+static sadmm_body_id add_ball(sadmm_world *world, const sadmm_body_def *def)
+{
+    sadmm_shape_def sphere = sadmm_shape_def_default();
+    sadmm_body_id id;
+    sphere.size[0] = 0.1;
+    MUST(world, sadmm_world_add_body(world, def, &id));
+    MUST(world, sadmm_world_add_shape(world, id, &sphere, NULL));
+    return id;
+}
+
+/* A plane, and a ball that rests on it. */
+static sadmm_world *ground_and_ball(sadmm_backend backend, sadmm_precision precision, sadmm_body_id *ground, sadmm_body_id *ball)
+{
+    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_body_def floor = sadmm_body_def_default(), resting = ball_def(0.1);
+    sadmm_shape_def plane = sadmm_shape_def_default();
+    def.backend = backend;
+    def.precision = precision;
+    floor.type = SADMM_BODY_STATIC;
+    floor.environment = -1;
+    plane.type = SADMM_SHAPE_PLANE;
+    sadmm_world *world = create_world(&def);
+    MUST(world, sadmm_world_add_body(world, &floor, ground));
+    MUST(world, sadmm_world_add_shape(world, *ground, &plane, NULL));
+    *ball = add_ball(world, &resting);
+    return world;
+}
+
+#define REFUSED(world, call, part)                                                                    \
+    do {                                                                                              \
+        ck_assert_int_eq(call, SADMM_ERROR_INVALID_ARGUMENT);                                         \
+        ck_assert_msg(strstr(sadmm_world_message(world), part), "%s", sadmm_world_message(world));    \
+    } while (0)
+
+/* ---- names ------------------------------------------------------------------------------------------------------- */
+
+/* Read once, and good while bodies come by the thousand, also as the name of others. */
+START_TEST(names_stay_where_they_are)
+{
+    sadmm_world_def def = sadmm_world_def_default();
+    sadmm_world *world = create_world(&def);
+    sadmm_body_def first = ball_def(0), read;
+    sadmm_body_id id, other;
+    first.name = "the first of many";
+    MUST(world, sadmm_world_add_body(world, &first, &id));
+    MUST(world, sadmm_world_body_def(world, id, &read));
+    const char *name = read.name;
+    for (int k = 0; k < 3000; ++k) {
+        MUST(world, sadmm_world_add_body(world, &read, &other)); /* with the world's own pointer */
+        if (k % 3 == 0) MUST(world, sadmm_world_remove_body(world, other));
+    }
+    ck_assert_str_eq(name, "the first of many");
+    MUST(world, sadmm_world_body_def(world, id, &read));
+    ck_assert_ptr_eq(name, read.name);
+    ck_assert_str_eq(body_def(world, body_at(world, 2000)).name, "the first of many");
+    first.name = NULL;
+    MUST(world, sadmm_world_add_body(world, &first, &other));
+    ck_assert_str_eq(body_def(world, other).name, "");
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+/* ---- a step that fails --------------------------------------------------------------------------------------------- */
+
+/* Contacts, the frozen problem, the plan and the report are those of the last step that was done. */
+START_TEST(a_failed_step_leaves_what_can_be_read)
+{
+    sadmm_body_id ground, ball;
+    sadmm_world *world = ground_and_ball(_i ? SADMM_BACKEND_REF : SADMM_BACKEND_CPU, SADMM_F64, &ground, &ball);
+    sadmm_contact contacts[2][4];
+    sadmm_problem *frozen[2];
+    char text[2][2000];
+    double A[2][36], b[2][6], v[2][6];
+    step_world(world, 3);
+    sadmm_settings settings = sadmm_world_settings(world);
+    for (int pass = 0; pass < 2; ++pass) {
+        if (pass) { /* another body, other settings, and a spin whose square is no number */
+            sadmm_body_def spinning = ball_def(5);
+            spinning.name = "top";
+            sadmm_body_id top = add_ball(world, &spinning);
+            sadmm_body_state state = body_state(world, top);
+            state.angular_velocity[1] = 1e200;
+            MUST(world, sadmm_world_set_body_state(world, top, &state));
+            settings.dt *= 2;
+            MUST(world, sadmm_world_set_settings(world, &settings));
+            ck_assert_int_eq(sadmm_world_step(world), SADMM_ERROR_NON_FINITE);
+        }
+        ck_assert_int_eq(sadmm_problem_create(&frozen[pass]), SADMM_OK);
+        ck_assert_int_eq(sadmm_world_contact_count(world), 1);
+        memset(contacts[pass], 0, sizeof contacts[pass]);
+        MUST(world, sadmm_world_contacts(world, 0, 1, contacts[pass]));
+        MUST(world, sadmm_world_freeze(world, frozen[pass]));
+        ck_assert_int_eq(sadmm_problem_body_count(frozen[pass]), 1);
+        ck_assert_int_eq(sadmm_problem_get_bodies(frozen[pass], A[pass], b[pass], v[pass]), SADMM_OK);
+        sadmm_world_explain(world, text[pass], sizeof text[pass]);
+        ck_assert_int_eq(world_report(world).contacts, 1);
+        ck_assert_int_eq(world_report(world).step, 3);
+    }
+    ck_assert_int_eq(memcmp(contacts[0], contacts[1], sizeof contacts[0]), 0);
+    ck_assert(contacts[0][0].impulse[2] > 0);
+    ck_assert(memcmp(A[0], A[1], sizeof A[0]) == 0 && memcmp(b[0], b[1], sizeof b[0]) == 0 && memcmp(v[0], v[1], sizeof v[0]) == 0);
+    ck_assert_str_eq(text[0], text[1]);
+    for (int pass = 0; pass < 2; ++pass) sadmm_problem_destroy(frozen[pass]);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+/* ---- states, wrenches, inertias -------------------------------------------------------------------------------------- */
+
+/* What a step made can be set, however far and fast it is, and gives the same next step. */
+START_TEST(what_was_read_can_be_set)
+{
+    sadmm_body_id ground, ball;
+    const double push[3] = {1e15, 0, 0};
+    sadmm_world *world = ground_and_ball(_i ? SADMM_BACKEND_REF : SADMM_BACKEND_CPU, SADMM_F64, &ground, &ball);
+    MUST(world, sadmm_world_set_body_wrench(world, ball, push, ZERO));
+    step_world(world, 3);
+    MUST(world, sadmm_world_set_body_wrench(world, ball, ZERO, ZERO));
+    sadmm_body_state state = body_state(world, ball);
+    ck_assert(state.linear_velocity[0] > 1e6 && state.position[0] > 1e9); /* beyond what a definition may have */
+    uint64_t before = state_hash(world);
+    MUST(world, sadmm_world_set_body_state(world, ball, &state));
+    ck_assert_uint_eq(state_hash(world), before);
+    step_world(world, 1);
+
+    /* The largest numbers there are: taken, and a step with them succeeds or says so. */
+    state.position[1] = state.linear_velocity[1] = state.angular_velocity[2] = 1.7e308;
+    MUST(world, sadmm_world_set_body_state(world, ball, &state));
+    before = state_hash(world);
+    sadmm_status status = sadmm_world_step(world);
+    ck_assert(status == SADMM_OK || (status == SADMM_ERROR_NON_FINITE && state_hash(world) == before));
+    state.position[1] = INFINITY;
+    REFUSED(world, sadmm_world_set_body_state(world, ball, &state), "state->position[1] = inf: must be finite");
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+START_TEST(wrenches_on_static_bodies_are_refused)
+{
+    sadmm_body_id ground, ball;
+    const double push[3] = {1, 0, 0};
+    sadmm_world *world = ground_and_ball(SADMM_BACKEND_CPU, SADMM_F64, &ground, &ball);
+    REFUSED(world, sadmm_world_set_body_wrench(world, ground, push, ZERO), "is static, and must be dynamic");
+    REFUSED(world, sadmm_world_set_body_wrench(world, ground, ZERO, ZERO), "static");
+    MUST(world, sadmm_world_set_body_wrench(world, ball, push, ZERO));
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+/* Inertias at the ends of their ranges make steps, in both methods and with a certificate; beyond they are refused. */
+START_TEST(inertias_that_are_taken_can_be_stepped)
+{
+    const sadmm_precision precision = _i % 2 ? SADMM_F32 : SADMM_F64;
+    const double ratio = precision == SADMM_F32 ? 1e6 : 1e12;
+    const struct { double scale, ratio; } ends[] = {{1, ratio}, {1e-24 * ratio, ratio}, {1e-24, 1}, {1e24, 1}, {1e24, ratio}};
+    for (size_t k = 0; k < sizeof ends / sizeof *ends; ++k)
+        for (int method = 0; method < SADMM_METHOD_COUNT; ++method) {
+            sadmm_body_id ground, ball, thin;
+            sadmm_world *world = ground_and_ball(SADMM_BACKEND_CPU, precision, &ground, &ball);
+            sadmm_settings settings = sadmm_world_settings(world);
+            settings.method = (sadmm_method)method;
+            settings.certify = true;
+            MUST(world, sadmm_world_set_settings(world, &settings));
+            sadmm_body_def def = ball_def(0.5);
+            for (int j = 0; j < 3; ++j) def.inertia[j] = ends[k].scale;
+            def.inertia[2] /= ends[k].ratio;
+            const double turned[4] = {0.56771830021180747, -0.18190050800876933, 0.56771830021180747, 0.56771830021180747};
+            memcpy(def.orientation, turned, sizeof turned);
+            MUST(world, sadmm_world_add_body(world, &def, &thin));
+            step_world(world, 2);
+            sadmm_certificate certificate = world_report(world).certificate;
+            ck_assert(isfinite(certificate.ncp_max) && isfinite(certificate.momentum_max));
+            sadmm_world_destroy(world);
+        }
+    sadmm_body_id ground, ball, id;
+    sadmm_world *world = ground_and_ball(SADMM_BACKEND_CPU, precision, &ground, &ball);
+    sadmm_body_def def = ball_def(0.5);
+    def.inertia[0] = def.inertia[1] = 1, def.inertia[2] = 0.99 / ratio;
+    REFUSED(world, sadmm_world_add_body(world, &def, &id), "times the smallest");
+    ck_assert_ptr_nonnull(strstr(sadmm_world_message(world), precision == SADMM_F32 ? "1e+06" : "1e+12"));
+    for (int j = 0; j < 3; ++j) def.inertia[j] = 5e-324;
+    REFUSED(world, sadmm_world_add_body(world, &def, &id), "must be in [1e-24, 1e+24] kg m^2");
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+/* ---- reports --------------------------------------------------------------------------------------------------------- */
+
+/* Asked for, the residuals are those of the last iteration, whatever ended it; and nothing else changes. */
+START_TEST(residuals_are_measured_when_a_stop_rule_ends_the_step)
+{
+    uint64_t hashes[2];
+    for (int measured = 0; measured < 2; ++measured) {
+        sadmm_body_id ground, ball;
+        sadmm_world *world = ground_and_ball(SADMM_BACKEND_CPU, SADMM_F64, &ground, &ball);
+        sadmm_settings settings = sadmm_world_settings(world);
+        settings.method = _i ? SADMM_METHOD_PAPER : SADMM_METHOD_FAST;
+        settings.iterations = 500;
+        settings.measure_residuals = measured;
+        settings.certificate_tolerance = 1e-3;
+        MUST(world, sadmm_world_set_settings(world, &settings));
+        step_world(world, 1);
+        sadmm_step_report report = world_report(world);
+        ck_assert(report.converged && report.iterations < settings.iterations);
+        if (measured) ck_assert(report.residual.primal >= 0 && report.residual.dual >= 0);
+        else ck_assert(report.residual.primal == -1 && report.residual.dual == -1);
+        hashes[measured] = state_hash(world);
+        sadmm_world_destroy(world);
+    }
+    ck_assert_uint_eq(hashes[0], hashes[1]);
+}
+END_TEST
+
+/* ---- memory ---------------------------------------------------------------------------------------------------------- */
+
+static size_t bytes_in_use(void) { return mallinfo2().uordblks; }
+
+/* Environments come and go, each id used once: what is kept does not grow with the ids. */
+START_TEST(environments_leave_nothing_behind)
+{
+    sadmm_body_id ground, ball;
+    sadmm_world *world = ground_and_ball(SADMM_BACKEND_CPU, SADMM_F64, &ground, &ball);
+    sadmm_body_def def = ball_def(0.1);
+    size_t after_some = 0;
+    const int32_t some = 50, many = 1050;
+    for (int32_t k = 1; k <= many; ++k) {
+        def.environment = k;
+        sadmm_body_id id = add_ball(world, &def);
+        step_world(world, 1);
+        ck_assert_int_eq(sadmm_world_contact_count(world), 2);
+        MUST(world, sadmm_world_remove_body(world, id));
+        if (k == some) after_some = bytes_in_use();
+    }
+    /* A thousand of the smallest conceivable leaks are 16 kB. */
+    if (after_some > 0) ck_assert_msg(bytes_in_use() < after_some + 8192, "%zu bytes, then %zu", after_some, bytes_in_use());
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+/* ---- settings -------------------------------------------------------------------------------------------------------- */
+
+/* Members count, padding does not. */
+START_TEST(settings_are_compared_by_their_members)
+{
+    const sadmm_settings given = sadmm_settings_default();
+    sadmm_settings a, b;
+    memset(&a, 0x00, sizeof a);
+    memset(&b, 0xff, sizeof b);
+#define BOTH(member) memcpy(&a.member, &given.member, sizeof given.member), memcpy(&b.member, &given.member, sizeof given.member)
+    BOTH(dt), BOTH(gravity), BOTH(method), BOTH(iterations), BOTH(relaxation), BOTH(penalty_period);
+    BOTH(penalty_mass_factor), BOTH(penalty_offset), BOTH(penalty_ratio_limit), BOTH(penalty_update_warm), BOTH(warm_start);
+    BOTH(residual_tolerance), BOTH(certificate_tolerance), BOTH(certificate_momentum_tolerance), BOTH(check_period);
+    BOTH(measure_residuals), BOTH(certify), BOTH(recover_wrenches), BOTH(baumgarte), BOTH(slop), BOTH(correction_speed);
+    BOTH(restitution_threshold), BOTH(threads);
+    ck_assert(memcmp(&a, &b, sizeof a) != 0); /* there is padding */
+    ck_assert(sadmm_settings_equal(&a, &b));
+    /* Every other byte belongs to a member, and one changed bit of it makes a difference. */
+    for (size_t byte = 0; byte < sizeof a; ++byte) {
+        if (((unsigned char *)&a)[byte] != ((unsigned char *)&b)[byte]) continue;
+        sadmm_settings c = a;
+        memcpy(&c, &a, sizeof c);
+        ((unsigned char *)&c)[byte] ^= 1;
+        ck_assert_msg(!sadmm_settings_equal(&a, &c), "byte %zu", byte);
+    }
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("world_contract");
+    TCase *cases = tcase_create("world_contract");
+    tcase_add_test(cases, names_stay_where_they_are);
+    tcase_add_loop_test(cases, a_failed_step_leaves_what_can_be_read, 0, 2);
+    tcase_add_loop_test(cases, what_was_read_can_be_set, 0, 2);
+    tcase_add_test(cases, wrenches_on_static_bodies_are_refused);
+    tcase_add_loop_test(cases, inertias_that_are_taken_can_be_stepped, 0, 2);
+    tcase_add_loop_test(cases, residuals_are_measured_when_a_stop_rule_ends_the_step, 0, 2);
+    tcase_add_test(cases, environments_leave_nothing_behind);
+    tcase_add_test(cases, settings_are_compared_by_their_members);
+    suite_add_tcase(suite, cases);
+    return run_suite(suite);
+}
