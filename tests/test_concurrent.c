@@ -17,12 +17,19 @@ static void *create_and_step(void *hash)
         def.settings.threads = 1;
         sadmm_world *world = create_world(&def);
         sadmm_body_def ball = sadmm_body_def_default();
+        sadmm_shape_def sphere = sadmm_shape_def_default();
         sadmm_body_id id;
         ball.mass = 1;
         ball.name = "ball";
         sadmm_sphere_inertia(1, 0.1, ball.inertia);
-        MUST(world, sadmm_world_add_body(world, &ball, &id));
+        sphere.size[0] = 0.1;
+        for (int i = 0; i < 3; ++i) { /* in a row, touching */
+            ball.position[0] = 0.2 * i;
+            MUST(world, sadmm_world_add_body(world, &ball, &id));
+            MUST(world, sadmm_world_add_shape(world, id, &sphere, NULL));
+        }
         step_world(world, 2);
+        ck_assert_int_eq(sadmm_world_contact_count(world), 2);
         *(uint64_t *)hash = state_hash(world);
         ck_assert_int_eq(sadmm_backend_query(SADMM_BACKEND_CPU, &info), SADMM_OK);
         sadmm_world_destroy(world);

@@ -239,8 +239,8 @@ SADMM_API sadmm_status sadmm_world_state_hash(sadmm_world *world, uint64_t *hash
 SADMM_API size_t sadmm_world_explain(sadmm_world *world, char *text, size_t size);
 
 /* Freeze the contact problem of the last step (bodies, contacts, its starting values) into `problem`. The k-th
- * dynamic body in slot order is body k. Errors: UNAVAILABLE where sadmm_world_contact_count says that there is no step
- * to read, OUT_OF_MEMORY. */
+ * dynamic body in slot order is body k. Errors: UNAVAILABLE before the first step, after a removal, and where a failed
+ * step took the last one's contacts along (sadmm_world_contact_count); OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_freeze(sadmm_world *world, sadmm_problem *problem);
 
 #ifdef __cplusplus
