@@ -44,7 +44,7 @@ if ldd "$folder/static_c" | grep -q libsubadmm; then
     echo "the static program needs the shared library"
     exit 1
 fi
-nm "$folder/static_c" | grep -q ' [Tt] sadmm_world_step$' || { echo "the static library is not in the program"; exit 1; }
+nm "$folder/static_c" | grep -q ' [Tt] sadmm_problem_create$' || { echo "the static library is not in the program"; exit 1; }
 
 foreign=$(nm -D --defined-only "$library/libsubadmm.so" | awk '$2 ~ /[TDBRVW]/ { print $3 }' | sed 's/@.*//' |
     grep -v '^sadmm_' || true)
