@@ -183,7 +183,7 @@ static int dump_problem(struct run_dump *dump, const char *spec, sadmm_world *wo
     return code;
 }
 
-static int dump_problems(struct run_options *o, long step, const char *spec, const sadmm_world *world,
+static int dump_problems(struct run_options *o, long step, const char *spec, sadmm_world *world,
                          struct run_record *record)
 {
     int code = CLI_DONE;
@@ -201,7 +201,7 @@ static bool prepare_last_step(sadmm_world *world)
 }
 
 /* After a step, or before the first. */
-static int trace_step(struct run_record *record, const sadmm_world *world, double time, struct output *trace)
+static int trace_step(struct run_record *record, sadmm_world *world, double time, struct output *trace)
 {
     if (!trace) return CLI_DONE;
     FILE *stream = output_stream(trace);
