@@ -36,7 +36,7 @@ static inline sadmm_body_id between_box(sadmm_world *world, bool moves, double x
     return id;
 }
 
-static inline double height_of(const sadmm_world *world, sadmm_body_id id) { return body_state(world, id).position[2]; }
+static inline double height_of(sadmm_world *world, sadmm_body_id id) { return body_state(world, id).position[2]; }
 
 static inline void place(sadmm_world *world, sadmm_body_id id, double x, double y, double z)
 {
