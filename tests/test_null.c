@@ -136,6 +136,8 @@ static void on_problems(void)
     REFUSES("problem", sadmm_problem_get_block(NULL, 0, &block));
     REFUSES("block", sadmm_problem_get_block(problem, 0, NULL));
     REFUSES("problem", sadmm_problem_set_device(NULL, 0));
+    REFUSES("problem", sadmm_problem_set_tasks(NULL, NULL));
+    ck_assert_int_eq(sadmm_problem_set_tasks(problem, NULL), SADMM_OK); /* the default */
     REFUSES("problem", sadmm_problem_solve(NULL, SADMM_BACKEND_CPU, SADMM_F64, &settings, NULL));
     REFUSES("settings", sadmm_problem_solve(problem, SADMM_BACKEND_CPU, SADMM_F64, NULL, NULL));
     ck_assert_int_eq(sadmm_problem_solve(problem, SADMM_BACKEND_CPU, SADMM_F64, &settings, NULL), SADMM_OK);
@@ -176,8 +178,8 @@ static const struct {
      {W(step), W(step_async), W(wait), W(report), W(contact_count), W(contacts), W(state_hash), W(explain), W(freeze)}},
     {on_problems,
      {P(create), P(destroy), P(message), P(set_bodies), P(set_contacts), P(set_blocks), P(body_count), P(contact_count),
-      P(block_count), P(get_bodies), P(get_contact), P(get_block), P(set_device), P(solve), P(get_solution),
-      P(set_solution), P(certify)}},
+      P(block_count), P(get_bodies), P(get_contact), P(get_block), P(set_device), P(set_tasks), P(solve),
+      P(get_solution), P(set_solution), P(certify)}},
     {on_others, {"sadmm_backend_query", "sadmm_box_inertia", "sadmm_sphere_inertia", "sadmm_capsule_inertia"}},
     {NULL,
      {"sadmm_settings_default", W(def_default), "sadmm_body_def_default", "sadmm_shape_def_default", "sadmm_status_name",

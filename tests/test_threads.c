@@ -32,7 +32,7 @@ static uint64_t hash_of(const char *spec, int threads, const struct pool *pool, 
 {
     sadmm_world *world = open_world(spec, threads, pool);
     step_world(world, steps);
-    uint64_t hash = sadmm_world_state_hash(world);
+    uint64_t hash = state_hash(world);
     sadmm_world_destroy(world);
     return hash;
 }
@@ -314,7 +314,7 @@ static int child_steps(sadmm_world *world, const struct pool *pool, uint64_t exp
     alarm(60); /* instead of a hang */
     for (int i = 0; i < 20; ++i)
         if (sadmm_world_step(world) != SADMM_OK) return 1;
-    if (sadmm_world_state_hash(world) != expected) return 2;
+    if (state_hash(world) != expected) return 2;
     return world_report(world).threads == 1 && pool->enqueued == enqueued ? 0 : 3;
 }
 
@@ -333,7 +333,7 @@ START_TEST(a_forked_child_goes_on_alone)
     if (child == 0) _exit(child_steps(world, &pool, expected));
     ck_assert_int_eq(status_of(child), 0);
     step_world(world, 20);
-    ck_assert(sadmm_world_state_hash(world) == expected);
+    ck_assert(state_hash(world) == expected);
     ck_assert(_i || world_report(world).threads == (HAVE_OPENMP ? 3 : 1));
     sadmm_world_destroy(world);
     if (_i) pool_stop(&pool);
@@ -381,7 +381,7 @@ static int limited_steps(uint64_t expected)
     sadmm_test_force_threads(true);
     sadmm_world *world = open_world("vertical_stacks:4", 64, NULL);
     step_world(world, 20);
-    if (sadmm_world_state_hash(world) != expected) return 2;
+    if (state_hash(world) != expected) return 2;
     const int ran = world_report(world).threads;
     return HAVE_OPENMP ? ran > 1 && ran < 64 ? 0 : 3 : 0;
 }

@@ -594,7 +594,7 @@ static void restore_solution(sadmm_problem *problem)
 sadmm_status sadmm_problem_set_tasks(sadmm_problem *problem, const sadmm_tasks *tasks)
 {
     TRY(check_problem(problem));
-    return sadmm_team_init(&problem->team, tasks, "tasks", &problem->scratch->error);
+    return sadmm_team_init(&problem->team, tasks, "tasks", &problem->error);
 }
 
 /* The kept context for a table, made when missing. */

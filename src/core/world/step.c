@@ -43,7 +43,7 @@ static void keep_share(void *argument, int thread, int threads)
     double deepest = 0;
     sadmm_share(world->contacts.point_count, thread, threads, &begin, &end);
     for (size_t k = begin; k < end; ++k) {
-        memcpy(world->start.impulse + 3 * k, points[k].impulse, 3 * sizeof *world->start_impulse);
+        memcpy(world->start.impulse + 3 * k, points[k].impulse, 3 * sizeof *world->start.impulse);
         const double own = points[k].gap < 0 ? -points[k].gap : 0; /* a gap of 0 is 0 deep, not -0 */
         deepest = own > deepest ? own : deepest;
     }
