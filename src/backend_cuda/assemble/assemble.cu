@@ -143,13 +143,13 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     }
     for (int32_t k = lane; k < count; k += v.lanes) {
         const size_t slot = point_slot(v, p, k);
-        const vec3 impulse = v.warm_start ? v3_load(points[k].impulse) : v3(0, 0, 0);
+        vec3 impulse = v.warm_start ? v3_load(points[k].impulse) : v3(0, 0, 0);
+        if (v.contact_rows == 1) impulse = v3_scale(normal, v3_dot(normal, impulse)); /* the row there is */
         const double error = sadmm_contact_e(&v.raw, &v.settings, pair, &points[k]);
         const real4 arm = pack(v3_load(a ? points[k].arm_a : points[k].arm_b), error);
-        const solver_real lambda[3] = {(solver_real)(v.contact_rows == 1 ? v3_dot(normal, impulse) : impulse.x),
-                                       (solver_real)impulse.y, (solver_real)impulse.z};
+        const solver_real lambda[3] = {(solver_real)impulse.x, (solver_real)impulse.y, (solver_real)impulse.z};
         v.arm[slot] = arm;
-        for (int j = 0; j < v.contact_rows; ++j) v.lambda[(size_t)j * v.lambda_stride + slot] = lambda[j];
+        for (int j = 0; j < 3; ++j) v.lambda[(size_t)j * v.lambda_stride + slot] = lambda[j];
         if (FAST) add_point(v, ends, about, difference, arm, lambda, true, &sums);
     }
     if (FAST) store_halves(v, live, p, lane, count, ends, difference, true, inverse, &sums);

@@ -55,7 +55,7 @@ static __device__ __forceinline__ void add_point(const cuda_view &v, const pair_
     double impulse[3], square = 0;
 #pragma unroll
     for (int j = 0; j < 3; ++j) {
-        impulse[j] = v.contact_rows == 1 ? (double)lambda[0] * n[j] : (double)lambda[j];
+        impulse[j] = (double)lambda[j];
         square += impulse[j] * impulse[j];
         sums->force[j] += impulse[j];
     }

@@ -142,7 +142,7 @@ struct cuda_view {
     int32_t rows;        /* row blocks: exact, known to the host */
     int32_t points;      /* room */
     int32_t row_stride;
-    int32_t contact_rows;
+    int32_t contact_rows; /* of C, B and the response: 1 where no contact has friction (the iteration has 3 in any case) */
     int32_t warm_start;
 
     solver_real *state; /* (bodies + 1) x ROW: v, w, 1/beta, 0; the last row is the static world, all 0 */
@@ -159,7 +159,7 @@ struct cuda_view {
     real4 *difference;  /* pairs: x_a - x_b, number of points */
     pair_ends *ends;    /* pairs */
     real4 *arm;         /* points: r_a (r_b when a is static), e */
-    solver_real *lambda; /* points: a plane for each of x, y, z; for the normal component alone when a contact has one row */
+    solver_real *lambda; /* points: a plane for each of x, y, z */
     size_t lambda_stride; /* from plane to plane */
 
     row_about *row_info;
@@ -458,8 +458,8 @@ sadmm_status CUDA(enqueue_survey_and_layout)(struct sadmm_context *, bool island
 sadmm_status CUDA(prepare_stepwise)(struct sadmm_context *, struct sadmm_error *error);
 /* The instance of the resident kernel for a tier (full: there are row blocks, or the last iteration is measured); threads
  * a block at most; bytes of shared memory. */
-cuda_kernel CUDA(resident_kernel)(int contact_rows, int point_slots, enum sadmm_cuda_tier tier, int threads, bool full,
-                                  bool fast, const char **name);
+cuda_kernel CUDA(resident_kernel)(int point_slots, enum sadmm_cuda_tier tier, int threads, bool full, bool fast,
+                                  const char **name);
 /* Whether the instance for a partition, without row blocks and not measured, does the ends of a step of `fast`, too. */
 bool CUDA(resident_does_ends)(const struct cuda_partition *);
 int CUDA(resident_threads)(int point_slots);

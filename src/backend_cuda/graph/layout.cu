@@ -233,7 +233,7 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
     size_t lanes = (size_t)v->lanes, slots = ((size_t)c->facts.point_slots + lanes - 1) / lanes * lanes * pairs;
     size_t records = 2 * (pairs + (size_t)v->rows) * ROW * real_size;
     size_t points = (size_t)v->points;
-    bool three = v->contact_rows != 1, joins = c->plan.residuals && !c->fast;
+    bool joins = c->plan.residuals && !c->fast;
     v->rigid = c->plan.rigid;
     v->line = v->rigid ? LINE_RIGID : LINE_GENERAL;
     v->point_slots = c->facts.point_slots;
@@ -248,7 +248,7 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
         {BUFFER_DIFFERENCE, pairs * sizeof(real4)},
         {BUFFER_PAIR_ENDS, pairs * sizeof(pair_ends)},
         {BUFFER_ARM, slots * sizeof(real4)},
-        {BUFFER_LAMBDA, slots * (three ? 3 : 1) * real_size},
+        {BUFFER_LAMBDA, 3 * slots * real_size},
         {BUFFER_ROW_INFO, rows * sizeof(row_about)},
         {BUFFER_ROW_DATA, rows * ROW_PLANES * real_size},
         {BUFFER_RECORDS, records},

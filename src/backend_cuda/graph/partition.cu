@@ -170,8 +170,7 @@ static struct choice choose_cluster_of(const struct sadmm_context *c, const stru
     if (choice.partition.threads > most || !take_room(c, &choice.partition, bound, c->shared_limit))
         return no_choice(too_large);
     int active = 0;
-    cuda_kernel kernel = CUDA(resident_kernel)(c->plan.contact_rows, facts->point_slots, SADMM_CUDA_TIER_CLUSTER, 0,
-                                               true, c->fast, &name);
+    cuda_kernel kernel = CUDA(resident_kernel)(facts->point_slots, SADMM_CUDA_TIER_CLUSTER, 0, true, c->fast, &name);
     *code = CUDA(active_clusters)(c, kernel, &choice.partition, &active);
     if (*code != cudaSuccess || active < 1) return no_choice("the device has no clusters that large");
     const int64_t rounds = up(smaller(clusters, larger(facts->islands, 1)), active);
@@ -216,8 +215,7 @@ static struct choice choose_grid(const struct sadmm_context *c, const struct cud
         choice.partition.threads = (int32_t)threads;
         if (!take_room(c, &choice.partition, bound, c->shared_limit / side_by_side)) continue;
         int resident = 0;
-        cuda_kernel kernel = CUDA(resident_kernel)(c->plan.contact_rows, facts->point_slots, SADMM_CUDA_TIER_GRID, 0,
-                                                   true, c->fast, &name);
+        cuda_kernel kernel = CUDA(resident_kernel)(facts->point_slots, SADMM_CUDA_TIER_GRID, 0, true, c->fast, &name);
         *code = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, (const void *)kernel,
                                                               choice.partition.threads, choice.partition.shared);
         if (*code != cudaSuccess || parts > (int64_t)resident * c->multiprocessors) return no_choice(too_large);

@@ -164,7 +164,7 @@ static __device__ __forceinline__ void store_records(solver_real *records, const
  * there or not, so that nothing but the states waits for another load. `live`: else nothing is stored. Every lane of the warp comes
  * here. FAST: lambda goes `farther` times as far; records are those of Step 1 in any case. Returns the lane's share of the primal
  * residual. */
-template <int CONTACT_ROWS, int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
+template <int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
 static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t p, int32_t lane, bool live, real farther)
 {
     enum { SPLIT = MEASURE && !FAST };
@@ -176,14 +176,14 @@ static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t 
     vec3 old[COUNT];
     slot[0] = point_slot<LANES_A_PAIR>(v, p, lane);
     point[0] = load_once(v.arm + slot[0]);
-    old[0] = load_lambda<CONTACT_ROWS>(v, slot[0]);
+    old[0] = load_lambda(v, slot[0]);
     const int32_t count = (int32_t)between.w;
 #pragma unroll
     for (int32_t j = 1; j < COUNT; ++j) {
         if (lane + LANES_A_PAIR * j >= count) continue;
         slot[j] = point_slot<LANES_A_PAIR>(v, p, lane + LANES_A_PAIR * j);
         point[j] = load_once(v.arm + slot[j]);
-        old[j] = load_lambda<CONTACT_ROWS>(v, slot[j]);
+        old[j] = load_lambda(v, slot[j]);
     }
     const body_row a = load_row(v.state, ends.body_a), b = load_row(v.state, ends.body_b);
 
@@ -196,14 +196,14 @@ static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t 
         if (lane + LANES_A_PAIR * j >= count) continue;
         const vec3 arm_a = xyz(point[j]), arm_b = v3_add(arm_a, difference);
         const vec3 x = relative_velocity(a.motion, arm_a, b.motion, arm_b);
-        const point_change to = update<CONTACT_ROWS, FAST>(normal, about.w, x, point[j].w, inv_s, old[j]);
+        const point_change to = update<FAST>(normal, about.w, x, point[j].w, inv_s, old[j]);
         const vec3 lambda = to.lambda, delta = to.delta;
-        if (live) store_lambda<CONTACT_ROWS>(v, slot[j], FAST ? relaxed(old[j], to, farther == 1, farther) : lambda);
+        if (live) store_lambda(v, slot[j], FAST ? relaxed(old[j], to, farther == 1, farther) : lambda);
         add_point(&next, j,
-                  impulse_of<CONTACT_ROWS>(normal, FAST ? delta : SPLIT ? lambda : v3_add(lambda, delta)), arm_a, arm_b);
-        if (SPLIT) add_point(&change, j, impulse_of<CONTACT_ROWS>(normal, delta), arm_a, arm_b);
+                  FAST ? delta : SPLIT ? lambda : v3_add(lambda, delta), arm_a, arm_b);
+        if (SPLIT) add_point(&change, j, delta, arm_a, arm_b);
         if (!MEASURE) continue;
-        largest = real_max(largest, largest_row<CONTACT_ROWS>(normal, delta));
+        largest = real_max(largest, largest_row(normal, delta));
     }
     store_records<LANES_A_PAIR>(v.records, ends, lane, live, next);
     if (SPLIT) store_records<LANES_A_PAIR>(v.change, ends, lane, live, change);
@@ -213,16 +213,15 @@ static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t 
 }
 
 /* The same for J^T lambda^0. */
-template <int CONTACT_ROWS, int LANES_A_PAIR>
+template <int LANES_A_PAIR>
 static __device__ __forceinline__ void start_pair(const cuda_view &v, int32_t p, int32_t lane, bool live)
 {
-    const vec3 normal = xyz(v.normal[p]);
     const real4 between = v.difference[p];
     pair_sum sum = {};
     for (int32_t k = lane; k < (int32_t)between.w; k += LANES_A_PAIR) {
         size_t slot = point_slot<LANES_A_PAIR>(v, p, k);
-        vec3 arm = xyz(v.arm[slot]), lambda = load_lambda<CONTACT_ROWS>(v, slot);
-        add_point(&sum, k / LANES_A_PAIR, impulse_of<CONTACT_ROWS>(normal, lambda), arm, v3_add(arm, xyz(between)));
+        vec3 arm = xyz(v.arm[slot]), lambda = load_lambda(v, slot);
+        add_point(&sum, k / LANES_A_PAIR, lambda, arm, v3_add(arm, xyz(between)));
     }
     store_records<LANES_A_PAIR>(v.records, v.ends[p], lane, live, sum);
 }
@@ -285,7 +284,7 @@ static __device__ __forceinline__ void with_pair(const cuda_view &v, int32_t t, 
 }
 
 /* FAST: args.factor times as far. */
-template <int CONTACT_ROWS, int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
+template <int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
 static __global__ void __launch_bounds__(THREADS)
     constraints_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
@@ -295,7 +294,7 @@ static __global__ void __launch_bounds__(THREADS)
     if (k < 0)
         with_pair<LANES_A_PAIR>(v, t, [&](int32_t p, int32_t lane, bool live) {
             const bool on = live && !(FAST && pair_stopped(v, args.looks, v.ends[p]));
-            primal = sweep_pair<CONTACT_ROWS, LANES_A_PAIR, COUNT, MEASURE, FAST>(v, p, lane, on, (real)args.factor);
+            primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v, p, lane, on, (real)args.factor);
         });
     else if (k < live_rows(v))
         primal = FAST ? sweep_row_block_fast<MEASURE>(v, k, (real)args.factor) : sweep_row_block<MEASURE>(v, k);
@@ -303,13 +302,13 @@ static __global__ void __launch_bounds__(THREADS)
 }
 
 /* J^T lambda^0. */
-template <int CONTACT_ROWS, int LANES_A_PAIR>
+template <int LANES_A_PAIR>
 static __global__ void start_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     const int32_t t = thread_index(args), k = t - pair_threads<LANES_A_PAIR>(v);
     if (k < 0) {
         with_pair<LANES_A_PAIR>(v, t, [&](int32_t p, int32_t lane, bool live) {
-            start_pair<CONTACT_ROWS, LANES_A_PAIR>(v, p, lane, live);
+            start_pair<LANES_A_PAIR>(v, p, lane, live);
         });
     } else if (k < live_rows(v)) {
         real lambda[6];
@@ -371,28 +370,25 @@ static int64_t constraint_blocks(const cuda_view *v)
     return blocks_for((int64_t)v->lanes * v->pair_room) + blocks_for(v->rows);
 }
 
-template <int CONTACT_ROWS, int LANES_A_PAIR, int COUNT> static cuda_kernel sweep_kernel(bool measure, bool fast)
+template <int LANES_A_PAIR, int COUNT> static cuda_kernel sweep_kernel(bool measure, bool fast)
 {
-    return fast ? (measure ? constraints_kernel<CONTACT_ROWS, LANES_A_PAIR, COUNT, true, true>
-                           : constraints_kernel<CONTACT_ROWS, LANES_A_PAIR, COUNT, false, true>)
-                : (measure ? constraints_kernel<CONTACT_ROWS, LANES_A_PAIR, COUNT, true, false>
-                           : constraints_kernel<CONTACT_ROWS, LANES_A_PAIR, COUNT, false, false>);
+    return fast ? (measure ? constraints_kernel<LANES_A_PAIR, COUNT, true, true>
+                           : constraints_kernel<LANES_A_PAIR, COUNT, false, true>)
+                : (measure ? constraints_kernel<LANES_A_PAIR, COUNT, true, false>
+                           : constraints_kernel<LANES_A_PAIR, COUNT, false, false>);
 }
 
 /* fast: lambda goes `farther` times as far. */
 static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, double farther, struct sadmm_error *error)
 {
-    const bool one_row = c->view.contact_rows == 1, fast = c->fast;
     cuda_args args = {};
     args.factor = farther;
     args.looks = c->looks;
     args.backward = c->backward;
     c->backward = !c->backward;
-    cuda_kernel kernel = c->view.lanes == 1
-                             ? (one_row ? sweep_kernel<1, 1, 1>(measure, fast) : sweep_kernel<3, 1, 1>(measure, fast))
-                         : c->facts.point_slots <= 4
-                             ? (one_row ? sweep_kernel<1, 4, 1>(measure, fast) : sweep_kernel<3, 4, 1>(measure, fast))
-                             : (one_row ? sweep_kernel<1, 4, 2>(measure, fast) : sweep_kernel<3, 4, 2>(measure, fast));
+    cuda_kernel kernel = c->view.lanes == 1            ? sweep_kernel<1, 1>(measure, c->fast)
+                         : c->facts.point_slots <= 4 ? sweep_kernel<4, 1>(measure, c->fast)
+                                                     : sweep_kernel<4, 2>(measure, c->fast);
     return CUDA(launch)(c, kernel, "update_constraints", constraint_blocks(&c->view), &args, error);
 }
 
@@ -407,7 +403,6 @@ static sadmm_status clear_primal(struct sadmm_context *c, bool measure, struct s
 sadmm_status CUDA(prepare_stepwise)(struct sadmm_context *c, struct sadmm_error *error)
 {
     const cuda_view *v = &c->view;
-    const bool one_row = v->contact_rows == 1;
     cuda_args args = {};
     if (!c->placed)
         CUDA_TRY(CUDA(launch)(c, place_kernel, "place_records", blocks_for(2 * ((int64_t)v->pair_room + v->rows)), &args,
@@ -415,9 +410,7 @@ sadmm_status CUDA(prepare_stepwise)(struct sadmm_context *c, struct sadmm_error 
     c->placed = true;
     if (!c->starting) return SADMM_OK;
     c->starting = false;
-    cuda_kernel kernel = v->lanes == 1 ? (one_row ? start_kernel<1, 1> : start_kernel<3, 1>)
-                                       : (one_row ? start_kernel<1, 4> : start_kernel<3, 4>);
-    return CUDA(launch)(c, kernel, "start_records", constraint_blocks(v), &args, error);
+    return CUDA(launch)(c, v->lanes == 1 ? start_kernel<1> : start_kernel<4>, "start_records", constraint_blocks(v), &args, error);
 }
 
 static sadmm_status refuse_fast(const struct sadmm_context *c, struct sadmm_error *error)
@@ -553,8 +546,8 @@ static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool
     args.relaxation = (solver_real)c->settings.relaxation;
     args.most_bodies = partition->most_bodies;
     args.cluster = partition->cluster;
-    cuda_kernel kernel = CUDA(resident_kernel)(c->view.contact_rows, c->facts.point_slots, partition->tier,
-                                               partition->threads, measure || c->view.rows > 0, c->fast, &name);
+    cuda_kernel kernel = CUDA(resident_kernel)(c->facts.point_slots, partition->tier, partition->threads,
+                                               measure || c->view.rows > 0, c->fast, &name);
     if (partition->tier == SADMM_CUDA_TIER_GRID) CUDA_TRY(CUDA(clear)(c, SCALAR_BARRIER, error));
     CUDA_TRY(CUDA(launch_partition)(c, kernel, name, partition, true, &args, error));
     c->starting = false;

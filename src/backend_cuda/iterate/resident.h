@@ -218,7 +218,7 @@ CUDA_INLINE int32_t quad_slot(int32_t lane) { return (lane & 1) * QUAD + (lane &
 
 /* ---- a part ---------------------------------------------------------------------------------------------------- */
 
-template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST> struct part_run {
+template <int POINTS, int MODE, bool FULL, int SIZE, bool FAST> struct part_run {
     enum { COUNT = POINTS / QUAD, MORE = MODE == BLOCK ? 8 : 4 }; /* more take registers, fewer another round */
     const cuda_view &v;
     const cuda_args &args;
@@ -300,8 +300,8 @@ template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST
     __device__ __forceinline__ void store(int32_t odd);
 };
 
-#define PART template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST>
-#define PART_RUN part_run<CONTACT_ROWS, POINTS, MODE, FULL, SIZE, FAST>
+#define PART template <int POINTS, int MODE, bool FULL, int SIZE, bool FAST>
+#define PART_RUN part_run<POINTS, MODE, FULL, SIZE, FAST>
 
 /* ---- row blocks, out of line: few systems have them ------------------------------------------------------------ */
 
@@ -387,7 +387,7 @@ PART __device__ __forceinline__ void PART_RUN::fetch_half(void)
     for (int32_t j = 0; j < COUNT; ++j) {
         const size_t slot = slot_or_first(lane + QUAD * j);
         point[j] = v.arm[slot];
-        own.lambda[j] = load_lambda<CONTACT_ROWS>(v, slot);
+        own.lambda[j] = load_lambda(v, slot);
     }
 }
 
@@ -428,7 +428,7 @@ PART __device__ __forceinline__ void PART_RUN::start_records(void)
     vec3 force = v3(0, 0, 0), torque = force;
 #pragma unroll
     for (int32_t j = 0; j < COUNT; ++j) {
-        vec3 impulse = impulse_of<CONTACT_ROWS>(own.normal, own.lambda[j]),
+        vec3 impulse = own.lambda[j],
              moment = fused_cross(own.own_arm[j], impulse);
         force = j == 0 ? impulse : v3_add(force, impulse);
         torque = j == 0 ? moment : v3_add(torque, moment);
@@ -598,22 +598,22 @@ __device__ __forceinline__ double PART_RUN::update_halves(int32_t odd, real fart
 #pragma unroll
     for (int32_t j = 0; j < COUNT; ++j) {
         const vec3 old = own.lambda[j], x = relative_velocity(other, own.other_arm[j], own_motion, own.own_arm[j]);
-        const point_change to = update<CONTACT_ROWS, FAST>(own.normal, own.friction, x, own.error[j], own.inv_s[j], old);
+        const point_change to = update<FAST>(own.normal, own.friction, x, own.error[j], own.inv_s[j], old);
         const vec3 lambda = to.lambda, delta = to.delta;
         own.lambda[j] = FAST ? relaxed(old, to, plain, farther) : lambda;
         vec3 impulse =
-            impulse_of<CONTACT_ROWS>(own.normal, FAST ? delta : SPLIT ? lambda : v3_add(lambda, delta));
+            FAST ? delta : SPLIT ? lambda : v3_add(lambda, delta);
         vec3 moment = fused_cross(own.own_arm[j], impulse);
         force = j == 0 ? impulse : v3_add(force, impulse);
         torque = j == 0 ? moment : v3_add(torque, moment);
         if (SPLIT) {
-            impulse = impulse_of<CONTACT_ROWS>(own.normal, delta);
+            impulse = delta;
             moment = fused_cross(own.own_arm[j], impulse);
             change_force = j == 0 ? impulse : v3_add(change_force, impulse);
             change_torque = j == 0 ? moment : v3_add(change_torque, moment);
         }
         if (!MEASURE) continue;
-        largest = real_max(largest, largest_row<CONTACT_ROWS>(own.normal, delta));
+        largest = real_max(largest, largest_row(own.normal, delta));
     }
     store_record(own_record, sum_quad(lane, force, torque));
     if (!MEASURE && !has_rows()) return primal;
@@ -688,7 +688,7 @@ PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
 #pragma unroll
         for (int32_t j = 0; j < COUNT; ++j) {
             const int32_t k = lane + QUAD * j;
-            if (k < count) store_lambda<CONTACT_ROWS>(v, point_slot(v, p, k), own.lambda[j]);
+            if (k < count) store_lambda(v, point_slot(v, p, k), own.lambda[j]);
         }
     } else if (FULL && lane == 0) {
         const int32_t k = p - v.pair_room;
@@ -764,19 +764,19 @@ static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view
 
 /* FULL: with row blocks, or to be measured; both cost registers, and most stretches have neither. A multiprocessor holds one block
  * at least: unless told so the compiler gives a block of one warp fewer registers than it needs. */
-template <int CONTACT_ROWS, int POINTS, int MODE, bool FULL, int SIZE, bool FAST>
+template <int POINTS, int MODE, bool FULL, int SIZE, bool FAST>
 static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     resident_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     CUDA_DYNAMIC_SHARED(memory);
     wait_for_stream();
-    /* They take registers, and are for contacts with friction. */
-    constexpr bool ENDS = FAST && MODE == BLOCK && !FULL && SIZE != ANY_SIZE && CONTACT_ROWS == 3;
+    /* They take registers. */
+    constexpr bool ENDS = FAST && MODE == BLOCK && !FULL && SIZE != ANY_SIZE;
     if (nothing_to_do<MODE, FAST>(v, args)) {
         if (ENDS && args.begin) stamp_assembled(v);
         return;
     }
-    part_run<CONTACT_ROWS, POINTS, MODE, FULL, SIZE, FAST> part(v, args, memory);
+    part_run<POINTS, MODE, FULL, SIZE, FAST> part(v, args, memory);
     const auto barrier = [] { block_barrier<SIZE>(); };
     const block_part ends = {part.first_body, part.bodies, part.m.terms, part.m.range, part.m.suspected};
     if (ENDS && threadIdx.x == 0) *ends.suspected = 0;
@@ -813,42 +813,34 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
 /* ---- instances ------------------------------------------------------------------------------------------------- */
 
 struct resident_instance {
-    int contact_rows, points;
-    enum sadmm_cuda_tier tier;
+    int points;
     bool full;
     int size;
+    bool fast;
     cuda_kernel kernel;
     const char *name;
 };
 
-#define INSTANCE(rows, points, mode, full, size, fast, name)                                                    \
-    {rows, points, SADMM_CUDA_TIER_##mode, full, size, resident_kernel<rows, points, mode, full, size, fast>, \
-     "iterate (" name ")"}
-#define INSTANCES(rows, points, mode, fast, name)                        \
-    INSTANCE(rows, points, mode, false, ANY_SIZE, fast, name),           \
-        INSTANCE(rows, points, mode, false, SMALL, fast, name ", small"), \
-        INSTANCE(rows, points, mode, true, ANY_SIZE, fast, name ", full")
-/* All of a method, which has a source of its own: they take long to compile. Boxes on boxes touch in up to 8 points,
- * mostly 4: with 4 a lane needs fewer registers. */
-#define METHOD(fast, name)                                                          \
-    INSTANCE(3, 4, BLOCK, false, ONE_WARP, fast, name "warp, 3 rows, 4 points"),    \
-        INSTANCE(3, 8, BLOCK, false, ONE_WARP, fast, name "warp, 3 rows, 8 points"), \
-        INSTANCE(1, 4, BLOCK, false, ONE_WARP, fast, name "warp, 1 row, 4 points"), \
-        INSTANCE(1, 8, BLOCK, false, ONE_WARP, fast, name "warp, 1 row, 8 points"), \
-        INSTANCES(3, 4, BLOCK, fast, name "block, 3 rows, 4 points"),               \
-        INSTANCES(3, 8, BLOCK, fast, name "block, 3 rows, 8 points"),               \
-        INSTANCES(1, 4, BLOCK, fast, name "block, 1 row, 4 points"),                \
-        INSTANCES(1, 8, BLOCK, fast, name "block, 1 row, 8 points"),                \
-        INSTANCES(3, 4, CLUSTER, fast, name "cluster, 3 rows, 4 points"),           \
-        INSTANCES(3, 8, CLUSTER, fast, name "cluster, 3 rows, 8 points"),           \
-        INSTANCES(1, 4, CLUSTER, fast, name "cluster, 1 row, 4 points"),            \
-        INSTANCES(1, 8, CLUSTER, fast, name "cluster, 1 row, 8 points"),            \
-        INSTANCES(3, 4, GRID, fast, name "grid, 3 rows, 4 points"),                 \
-        INSTANCES(3, 8, GRID, fast, name "grid, 3 rows, 8 points"),                 \
-        INSTANCES(1, 4, GRID, fast, name "grid, 1 row, 4 points"),                  \
-        INSTANCES(1, 8, GRID, fast, name "grid, 1 row, 8 points")
+/* All of a mode, which has a source of its own: they take long to compile. */
+struct resident_instances {
+    const resident_instance *first;
+    size_t count;
+};
+resident_instances CUDA(block_instances)(void);
+resident_instances CUDA(cluster_instances)(void);
+resident_instances CUDA(grid_instances)(void);
 
-/* Those of the method `fast` (iterate/resident_fast.cu). */
-const resident_instance *CUDA(fast_instances)(size_t *count);
+#define INSTANCE(points, mode, full, size, fast, name) \
+    {points, full, size, fast, resident_kernel<points, mode, full, size, fast>, "iterate (" name ")"}
+/* Boxes on boxes touch in up to 8 points, mostly 4: with 4 a lane needs fewer registers. */
+#define OF_SIZES(points, mode, fast, name)                        \
+    INSTANCE(points, mode, false, ANY_SIZE, fast, name),          \
+        INSTANCE(points, mode, false, SMALL, fast, name ", small"), \
+        INSTANCE(points, mode, true, ANY_SIZE, fast, name ", full")
+#define OF_MODE(mode, name)                                      \
+    OF_SIZES(4, mode, false, name ", 4 points"),                 \
+        OF_SIZES(8, mode, false, name ", 8 points"),             \
+        OF_SIZES(4, mode, true, "fast, " name ", 4 points"),     \
+        OF_SIZES(8, mode, true, "fast, " name ", 8 points")
 
 #endif

@@ -37,7 +37,7 @@ static __device__ double natural_map(const cuda_view &v, int32_t p)
                 weight[i] += packed_form(inverse, row);
             }
         }
-        const vec3 impulse = m3_mul(frame, point_impulse(v, p, k, frame.r[0])), x = m3_mul(frame, velocity);
+        const vec3 impulse = m3_mul(frame, point_impulse(v, p, k)), x = m3_mul(frame, velocity);
         const double w = fmax(weight[0], fmax(weight[1], weight[2])),
                      e = sadmm_contact_e(&v.raw, &v.settings, pair, point),
                      lambda[3] = {impulse.x, impulse.y, impulse.z}, u[3] = {x.x + e, x.y, x.z};

@@ -106,17 +106,16 @@ CUDA_INLINE vec3 relative_velocity(const body_motion &a, vec3 arm_a, const body_
     return v3_add(v3_sub(b.linear, a.linear), v3_sub(fused_cross(b.angular, arm_b), fused_cross(a.angular, arm_a)));
 }
 
-/* Multipliers of a point: a world vector, or its normal component alone in x when a contact has one row. */
-template <int CONTACT_ROWS> CUDA_INLINE vec3 load_lambda(const cuda_view &v, size_t slot)
+/* Multipliers of a point, a world vector. Without friction it is along the normal, since the projection's disc is a point. */
+CUDA_INLINE vec3 load_lambda(const cuda_view &v, size_t slot)
 {
     const solver_real *lambda = v.lambda + slot;
-    return CONTACT_ROWS == 3 ? v3(lambda[0], lambda[v.lambda_stride], lambda[2 * v.lambda_stride]) : v3(lambda[0], 0, 0);
+    return v3(lambda[0], lambda[v.lambda_stride], lambda[2 * v.lambda_stride]);
 }
 
-template <int CONTACT_ROWS> CUDA_INLINE void store_lambda(const cuda_view &v, size_t slot, vec3 lambda)
+CUDA_INLINE void store_lambda(const cuda_view &v, size_t slot, vec3 lambda)
 {
     v.lambda[slot] = lambda.x;
-    if (CONTACT_ROWS == 1) return;
     v.lambda[v.lambda_stride + slot] = lambda.y;
     v.lambda[2 * v.lambda_stride + slot] = lambda.z;
 }
@@ -161,28 +160,18 @@ CUDA_INLINE vec3 project(vec3 lambda, vec3 n, real mu)
 }
 
 /* Steps 2-4 of one point: x = J v, error e. With x, error and inv_s of the other sign the same bits. */
-template <int CONTACT_ROWS>
 CUDA_INLINE vec3 update_point(vec3 normal, real friction, vec3 x, real error, real inv_s, vec3 old)
 {
-    if (CONTACT_ROWS == 3) return project(fused_madd(old, -inv_s, fused_madd(x, error, normal)), normal, friction);
-    real y = fused(-inv_s, fused_dot(normal, x) + error, old.x);
-    return v3(y > 0 ? y : (real)0, 0, 0);
+    return project(fused_madd(old, -inv_s, fused_madd(x, error, normal)), normal, friction);
 }
 
 /* The same for the method `fast`: lambda^, and lambda^ - lambda, where the contact sticks without the rounding of either. */
 struct point_change {
     vec3 lambda, delta;
 };
-template <int CONTACT_ROWS>
 CUDA_INLINE point_change change_point(vec3 normal, real friction, vec3 x, real error, real inv_s, vec3 old)
 {
     point_change out;
-    if (CONTACT_ROWS == 1) {
-        const real step = inv_s * (fused_dot(normal, x) + error), y = old.x - step;
-        out.lambda = v3(y > 0 ? y : (real)0, 0, 0);
-        out.delta = v3(y > 0 ? -step : -old.x, 0, 0);
-        return out;
-    }
     const vec3 step = v3_scale(fused_madd(x, error, normal), -inv_s), y = v3_add(old, step);
     const cone_parts parts = cone_parts_of(y, normal, friction);
     out.lambda = parts.slides ? fused_madd(v3_scale(normal, parts.normal), parts.scale, parts.tangent) : y;
@@ -192,24 +181,17 @@ CUDA_INLINE point_change change_point(vec3 normal, real friction, vec3 x, real e
 }
 
 /* Either, by the method. */
-template <int CONTACT_ROWS, bool FAST>
-CUDA_INLINE point_change update(vec3 normal, real friction, vec3 x, real error, real inv_s, vec3 old)
+template <bool FAST> CUDA_INLINE point_change update(vec3 normal, real friction, vec3 x, real error, real inv_s, vec3 old)
 {
-    if (FAST) return change_point<CONTACT_ROWS>(normal, friction, x, error, inv_s, old);
-    const vec3 lambda = update_point<CONTACT_ROWS>(normal, friction, x, error, inv_s, old);
+    if (FAST) return change_point(normal, friction, x, error, inv_s, old);
+    const vec3 lambda = update_point(normal, friction, x, error, inv_s, old);
     const point_change out = {lambda, v3_sub(lambda, old)};
     return out;
 }
 
-template <int CONTACT_ROWS> CUDA_INLINE vec3 impulse_of(vec3 normal, vec3 lambda)
-{
-    return CONTACT_ROWS == 3 ? lambda : v3_scale(normal, lambda.x);
-}
-
 /* Largest |d lambda| over the rows of the contact. */
-template <int CONTACT_ROWS> CUDA_INLINE real largest_row(vec3 normal, vec3 delta)
+CUDA_INLINE real largest_row(vec3 normal, vec3 delta)
 {
-    if (CONTACT_ROWS == 1) return real_abs(delta.x);
     vec3 t1, t2;
     v3_tangents(normal, &t1, &t2);
     return real_max(real_abs(v3_dot(delta, normal)), real_max(real_abs(v3_dot(delta, t1)), real_abs(v3_dot(delta, t2))));

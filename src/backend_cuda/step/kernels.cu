@@ -127,14 +127,13 @@ static __device__ point_before fetch_before(const struct sadmm_contact_point *po
 
 struct pair_before {
     int32_t first, count, body; /* points; a body of it */
-    vec3 normal;
     point_before point;         /* the lane's first */
 };
 
 static __device__ pair_before fetch_pair(const cuda_view &v, int32_t p, int32_t lane)
 {
     const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
-    pair_before before = {pair->first, pair->count, pair->body_b >= 0 ? pair->body_b : pair->body_a, v3_load(pair->normal), {}};
+    pair_before before = {pair->first, pair->count, pair->body_b >= 0 ? pair->body_b : pair->body_a, {}};
     if (lane < before.count) before.point = fetch_before(&v.step.points[before.first + lane]);
     return before;
 }
@@ -147,7 +146,7 @@ static __device__ bool finish_pair(const cuda_view &v, int32_t p, int32_t lane, 
         struct sadmm_contact_point *point = &v.step.points[pair.first + k];
         const point_before before = k == lane ? pair.point : fetch_before(point);
         double *start = v.step.start_impulse + 3 * (size_t)(pair.first + k), impulse[3];
-        v3_store(point_impulse(v, p, k, pair.normal), impulse);
+        v3_store(point_impulse(v, p, k), impulse);
         finite = finite && finite_numbers(impulse, 3);
         for (int j = 0; j < 3; ++j) {
             start[j] = before.impulse[j];

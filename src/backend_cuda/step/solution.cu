@@ -24,9 +24,8 @@ static __global__ void read_kernel(const __grid_constant__ cuda_view v, const __
     if (i < v.pair_room) {
         if (i >= live_pairs(v)) return;
         const struct sadmm_contact_pair *pair = &v.raw_pairs[i];
-        vec3 normal = v3_load(pair->normal);
         for (int32_t k = 0; k < pair->count; ++k)
-            v3_store(point_impulse(v, i, k, normal), impulses + 3 * (size_t)(pair->first + k));
+            v3_store(point_impulse(v, i, k), impulses + 3 * (size_t)(pair->first + k));
         return;
     }
     i -= v.pair_room;

@@ -5,10 +5,9 @@
 #include "backend_cuda/device/double.h"
 
 /* Multiplier of a point as a world vector on b. */
-static __device__ __forceinline__ vec3 point_impulse(const cuda_view &v, int32_t p, int32_t k, vec3 normal)
+static __device__ __forceinline__ vec3 point_impulse(const cuda_view &v, int32_t p, int32_t k)
 {
     const solver_real *lambda = v.lambda + point_slot(v, p, k);
-    if (v.contact_rows == 1) return v3_scale(normal, (double)lambda[0]);
     return v3((double)lambda[0], (double)lambda[v.lambda_stride], (double)lambda[2 * v.lambda_stride]);
 }
 
@@ -29,10 +28,9 @@ static __device__ __forceinline__ void move_body(const cuda_view &v, int32_t i, 
 static __device__ __forceinline__ void add_pair_wrench(const cuda_view &v, int32_t p, int side, double per_dt, double wrench[6])
 {
     const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
-    vec3 normal = v3_load(pair->normal);
     for (int32_t k = 0; k < pair->count; ++k) {
         const struct sadmm_contact_point *point = &v.raw_points[pair->first + k];
-        vec3 f = point_impulse(v, p, k, normal), m = v3_cross(v3_load(side ? point->arm_b : point->arm_a), f);
+        vec3 f = point_impulse(v, p, k), m = v3_cross(v3_load(side ? point->arm_b : point->arm_a), f);
         double sign = side ? per_dt : -per_dt;
         wrench[0] += sign * f.x, wrench[1] += sign * f.y, wrench[2] += sign * f.z;
         wrench[3] += sign * m.x, wrench[4] += sign * m.y, wrench[5] += sign * m.z;

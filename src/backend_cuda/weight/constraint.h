@@ -26,7 +26,7 @@ struct point_data {
     double arm[2][3], lambda[3], error;
 };
 
-/* The same in this precision, as it is in memory; lambda[0] alone where contacts have one row. */
+/* The same in this precision, as it is in memory. */
 struct point_numbers {
     real4 arm;
     solver_real lambda[3];
@@ -38,13 +38,12 @@ static __device__ __forceinline__ point_numbers fetch_point(const cuda_view &v, 
     point_numbers point;
     point.arm = v.arm[slot];
     point.lambda[0] = v.lambda[slot];
-    point.lambda[1] = v.contact_rows == 1 ? 0 : v.lambda[v.lambda_stride + slot];
-    point.lambda[2] = v.contact_rows == 1 ? 0 : v.lambda[2 * v.lambda_stride + slot];
+    point.lambda[1] = v.lambda[v.lambda_stride + slot];
+    point.lambda[2] = v.lambda[2 * v.lambda_stride + slot];
     return point;
 }
 
-static __device__ __forceinline__ point_data point_of(const cuda_view &v, const point_numbers &numbers,
-                                                      const pair_data &pair)
+static __device__ __forceinline__ point_data point_of(const point_numbers &numbers, const pair_data &pair)
 {
     const double r[3] = {(double)numbers.arm.x, (double)numbers.arm.y, (double)numbers.arm.z};
     point_data point;
@@ -53,14 +52,14 @@ static __device__ __forceinline__ point_data point_of(const cuda_view &v, const 
     for (int j = 0; j < 3; ++j) {
         point.arm[0][j] = r[j];
         point.arm[1][j] = r[j] + pair.difference[j];
-        point.lambda[j] = v.contact_rows == 1 ? (double)numbers.lambda[0] * pair.normal[j] : (double)numbers.lambda[j];
+        point.lambda[j] = (double)numbers.lambda[j];
     }
     return point;
 }
 
 static __device__ __forceinline__ point_data load_point(const cuda_view &v, int32_t p, int32_t k, const pair_data &pair)
 {
-    return point_of(v, fetch_point(v, p, k), pair);
+    return point_of(fetch_point(v, p, k), pair);
 }
 
 /* use(point) for each point of a pair, in order. */
@@ -74,7 +73,7 @@ static __device__ __forceinline__ void for_each_point(const cuda_view &v, int32_
             if (first + j < pair.count) numbers[j] = fetch_point(v, p, first + j);
 #pragma unroll
         for (int32_t j = 0; j < POINTS_AT_ONCE; ++j)
-            if (first + j < pair.count) use(point_of(v, numbers[j], pair));
+            if (first + j < pair.count) use(point_of(numbers[j], pair));
     }
 }
 

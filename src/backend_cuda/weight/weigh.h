@@ -23,7 +23,7 @@ static inline __device__ double violation_of(const cuda_view &v, int32_t p)
         for (int j = 0; j < 3; ++j) u[j] = velocity[1][j] - velocity[0][j] + point.error * pair.normal[j];
         add_cross(velocity[1] + 3, point.arm[1], 1, u);
         add_cross(velocity[0] + 3, point.arm[0], -1, u);
-        sum += contact_violation(point.lambda, u, pair.normal, v.contact_rows == 1 ? 0 : pair.friction, v.response[p]);
+        sum += contact_violation(point.lambda, u, pair.normal, pair.friction, v.response[p]);
     }
     return sum;
 }

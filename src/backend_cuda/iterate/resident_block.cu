@@ -1,0 +1,16 @@
+/* The fused iteration (resident.h) of tier BLOCK: its instances. */
+#include "resident.h"
+
+static const resident_instance instances[] = {
+    INSTANCE(4, BLOCK, false, ONE_WARP, false, "warp, 4 points"),
+    INSTANCE(8, BLOCK, false, ONE_WARP, false, "warp, 8 points"),
+    INSTANCE(4, BLOCK, false, ONE_WARP, true, "fast, warp, 4 points"),
+    INSTANCE(8, BLOCK, false, ONE_WARP, true, "fast, warp, 8 points"),
+    OF_MODE(BLOCK, "block"),
+};
+
+resident_instances CUDA(block_instances)(void)
+{
+    const resident_instances all = {instances, sizeof instances / sizeof *instances};
+    return all;
+}
