@@ -128,7 +128,7 @@ enum { HALF_ARMS = 10, HALF_LOAD = HALF_ARMS, HALF_RESPONSE, HALF_NUMBERS };
 struct alignas(16) pair_ends {
     int32_t body_a, body_b; /* raw; the static world: `bodies` */
     int32_t half_a, half_b; /* places of its halves in `incident`, and of their records; of the static world: -1.
-                               For the stepwise kernels alone (prepare_stepwise) */
+                               For the stepwise kernels alone (streamed.cu) */
 };
 
 /* What kernels see. Pointers are device memory. Arrays over bodies are in raw order; offsets, parts and the states of
@@ -451,11 +451,12 @@ sadmm_status CUDA(enqueue_layout)(struct sadmm_context *, const struct cuda_part
 sadmm_status CUDA(enqueue_survey_and_layout)(struct sadmm_context *, bool islands, const struct cuda_partition *,
                                              struct sadmm_error *error);
 
-/* ---- iterate/iterate.cu, iterate/resident.cu ---- */
+/* ---- iterate/streamed.cu, iterate/resident.cu ---- */
 
-/* Everything the stepwise kernels take for granted: where records go, J^T lambda^0 at the start. The resident kernel makes
- * its own. */
-sadmm_status CUDA(prepare_stepwise)(struct sadmm_context *, struct sadmm_error *error);
+/* STREAM. fast, goes_on: none of them is the stretch's last. */
+sadmm_status CUDA(stream_iterations)(struct sadmm_context *, int count, bool measure, bool goes_on, struct sadmm_error *error);
+/* Before a measured iteration: its primal residual. */
+sadmm_status CUDA(clear_primal)(struct sadmm_context *, bool measure, struct sadmm_error *error);
 /* The instance of the resident kernel for a tier (full: there are row blocks, or the last iteration is measured); threads
  * a block at most; bytes of shared memory. */
 cuda_kernel CUDA(resident_kernel)(int point_slots, enum sadmm_cuda_tier tier, int threads, bool full, bool fast,

@@ -1,0 +1,160 @@
+/* The resident kernel (resident.h): what instances there are, the shared memory of a thread block, and how blocks meet. */
+#ifndef SADMM_CUDA_ITERATE_RESIDENT_MEMORY_H
+#define SADMM_CUDA_ITERATE_RESIDENT_MEMORY_H
+
+#include "resident_ends.h"
+#include "sweep.h"
+
+enum resident_mode { BLOCK, CLUSTER, GRID };
+
+enum { QUAD = 4 }; /* lanes a half */
+
+/* Sizes of blocks an instance is made for: few threads may have all the registers they want, and a single warp needs no
+ * barrier (BLOCK alone). */
+enum block_size { ANY_SIZE, SMALL, ONE_WARP };
+enum { SMALL_THREADS = sizeof(solver_real) == sizeof(float) ? 512 : 256 };
+
+static constexpr int most_threads(int points, int size)
+{
+    if (size == ONE_WARP) return WARP;
+    if (size == SMALL) return SMALL_THREADS;
+    return sizeof(solver_real) == sizeof(float) ? (points == 4 ? 1024 : 768) : (points == 4 ? 512 : 384);
+}
+
+/* Records of a body that are fetched at once, whether it has them or not. */
+enum { FEW = 4 };
+
+/* ---- shared memory --------------------------------------------------------------------------------------------- */
+
+/* The same in every block of a launch: blocks of a cluster look into each other's memory. */
+struct part_memory {
+    solver_real *state;      /* CLUSTER: of even, then of odd iterations; bodies x ROW each, then a row of 0 */
+    solver_real *records;    /* halves x ROW, and FEW rows that are read and not used */
+    solver_real *row_lambda; /* halves x ROW, when there are row blocks */
+    solver_real *lines, *b;  /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x line, ROW; FAST:
+                                the defect in place of b */
+    int32_t *suspected;      /* a body of the part has too much energy */
+    /* Before the first iteration and after the last one, over what is above (iterate/resident_ends.h): */
+    double *terms;           /* bodies x TERMS */
+    island_range *range;     /* bodies */
+};
+
+enum { SLACK = 16 }; /* the end, with what is to come there aligned */
+
+/* One description of the layout for its size and its addresses. */
+static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *base, bool cluster, int threads,
+                                                 int32_t bodies, bool row_blocks)
+{
+    size_t n = (size_t)bodies, halves = (size_t)(threads / QUAD), first = (size_t)(threads / LANES);
+    size_t more = n > first ? n - first : 0;
+    m->state = (solver_real *)base;
+    m->records = m->state + ((cluster ? 2 * n : n) + 1) * ROW;
+    m->row_lambda = m->records + (halves + FEW) * ROW;
+    m->lines = m->row_lambda + (row_blocks ? halves * ROW : 0);
+    m->b = m->lines + more * LINE_GENERAL;
+    m->terms = (double *)base;
+    m->range = (island_range *)(m->terms + n * TERMS);
+    size_t iterating = (size_t)(m->b + more * ROW - m->state) * sizeof(solver_real),
+           ends = n * (TERMS * sizeof(double) + sizeof(island_range)), used = iterating > ends ? iterating : ends;
+    m->suspected = (int32_t *)(base + used);
+    return used + SLACK;
+}
+
+/* ---- barriers -------------------------------------------------------------------------------------------------- */
+
+/* Between the two halves of a barrier a thread may do what concerns nobody else. */
+template <int MODE, int SIZE> static __device__ __forceinline__ void arrive(unsigned *arrivals)
+{
+#ifdef SADMM_CUDA_EMULATED
+    (void)arrivals;
+#else
+    if (MODE == GRID) {
+        /* One thread of a block speaks for it: its release and acquire, with the block's own barriers around them, order
+         * every thread's writes before every thread's reads. */
+        __syncthreads();
+        if (threadIdx.x == 0) asm volatile("red.release.gpu.global.add.u32 [%0], 1;" ::"l"(arrivals) : "memory");
+    }
+#if __CUDA_ARCH__ >= CLUSTER_ARCH
+    if (MODE == CLUSTER) asm volatile("barrier.cluster.arrive.release.aligned;" ::: "memory");
+#endif
+#endif
+}
+
+/* Of the block's own. */
+template <int SIZE> static __device__ __forceinline__ void block_barrier(void)
+{
+    if (SIZE == ONE_WARP) __syncwarp((unsigned)ALL_LANES);
+    else __syncthreads();
+}
+
+/* `target`: arrivals in all when every block has come. */
+template <int MODE, int SIZE> static __device__ __forceinline__ void wait(const unsigned *arrivals, unsigned target)
+{
+#ifdef SADMM_CUDA_EMULATED
+    (void)arrivals;
+    (void)target;
+    if (MODE == BLOCK) block_barrier<SIZE>();
+    else cuda_emulation_barrier_together();
+#else
+    if (MODE == GRID && threadIdx.x == 0) {
+        unsigned now;
+        do asm volatile("ld.acquire.gpu.global.u32 %0, [%1];" : "=r"(now) : "l"(arrivals) : "memory");
+        while ((int)(now - target) < 0);
+    }
+    if (MODE != CLUSTER) block_barrier<SIZE>();
+#if __CUDA_ARCH__ >= CLUSTER_ARCH
+    if (MODE == CLUSTER) asm volatile("barrier.cluster.wait.acquire.aligned;" ::: "memory");
+#endif
+#endif
+}
+
+/* The same address in the shared memory of another block of the cluster. */
+static __device__ __forceinline__ const solver_real *in_block(const solver_real *own, unsigned rank)
+{
+#ifdef SADMM_CUDA_EMULATED
+    return (const solver_real *)cuda_emulation_in_block(own, rank);
+#elif __CUDA_ARCH__ >= CLUSTER_ARCH
+    const solver_real *other;
+    asm("mapa.u64 %0, %1, %2;" : "=l"(other) : "l"(own), "r"(rank));
+    return other;
+#else
+    (void)rank;
+    return own;
+#endif
+}
+
+/* An address in this block's own memory, in a register: to save one the compiler makes it anew from its parts in every iteration,
+ * and what is loaded from there waits. Blocks of ANY_SIZE have none to spare. */
+template <int SIZE> static __device__ __forceinline__ solver_real *kept_address(solver_real *own)
+{
+#ifndef SADMM_CUDA_EMULATED
+    if (SIZE != ANY_SIZE) {
+        uint32_t at = (uint32_t)__cvta_generic_to_shared(own);
+        asm volatile("" : "+r"(at));
+        return (solver_real *)__cvta_shared_to_generic(at);
+    }
+#endif
+    return own;
+}
+
+/* A number worked out here, not where it is used: the compiler may not move it past this place. */
+#ifdef SADMM_CUDA_EMULATED
+template <int SIZE, typename T> static void keep(T *)
+{
+}
+#else
+template <int SIZE> static __device__ __forceinline__ void keep(int32_t *number)
+{
+    if (SIZE != ANY_SIZE) asm volatile("" : "+r"(*number));
+}
+template <int SIZE> static __device__ __forceinline__ void keep(float *number)
+{
+    if (SIZE != ANY_SIZE) asm volatile("" : "+f"(*number));
+}
+template <int SIZE> static __device__ __forceinline__ void keep(double *number)
+{
+    if (SIZE != ANY_SIZE) asm volatile("" : "+d"(*number));
+}
+#endif
+
+#endif

@@ -1,0 +1,185 @@
+/* The resident kernel (resident.h): Step 1 and Steps 2-4 of a part, and which of its bodies have too much energy. */
+#ifndef SADMM_CUDA_ITERATE_RESIDENT_STEPS_H
+#define SADMM_CUDA_ITERATE_RESIDENT_STEPS_H
+
+#include "resident_part.h"
+
+/* ---- Step 1 ---------------------------------------------------------------------------------------------------- */
+
+/* g and `count` numbers, each a record after the last, one after the other. The first few are fetched whether they are
+ * there or not; where a lane of the warp has more, the next ones too before the first is added. */
+PART __device__ __forceinline__ real PART_RUN::gather(real g, const solver_real *from, int32_t count, bool more) const
+{
+    real few[FEW], value[MORE] = {};
+#pragma unroll
+    for (int32_t j = 0; j < FEW; ++j) few[j] = from[j * ROW];
+    if (more) {
+#pragma unroll
+        for (int32_t j = 0; j < MORE; ++j) value[j] = FEW + j < count ? from[(FEW + j) * ROW] : (real)0;
+    }
+#pragma unroll
+    for (int32_t j = 0; j < FEW; ++j)
+        if (j < count) g += few[j];
+    if (!more) return g;
+    for (int32_t h = FEW;;) {
+#pragma unroll
+        for (int32_t j = 0; j < MORE; ++j)
+            if (h + j < count) g += value[j];
+        h += MORE;
+        if (h >= count) return g;
+#pragma unroll
+        for (int32_t j = 0; j < MORE; ++j) value[j] = h + j < count ? from[(h + j) * ROW] : (real)0;
+    }
+}
+
+/* `to`: component r of body i in even iterations. */
+PART __device__ __forceinline__ void PART_RUN::publish(solver_real *to, int32_t i, real value, int32_t odd)
+{
+    if (i >= bodies || r >= 6) return;
+    to[MODE == CLUSTER && odd ? args.most_bodies * ROW : 0] = value;
+    if (MODE == GRID) v.exchange[((size_t)(odd ? v.bodies : 0) + (size_t)(first_body + i)) * ROW + (size_t)r] = value;
+}
+
+PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd)
+{
+    if (has_moves()) {
+        own_body.v += step_of(own_body, gather(momentum, gathered, gathered_count, many));
+        publish(own_state, body, own_body.v, odd);
+    }
+    if (SIZE == ONE_WARP) return; /* at most one body for each eight threads (graph/partition.cu) */
+    const int32_t in_registers = (int32_t)blockDim.x / LANES;
+    for (int32_t first = in_registers; warp_has_body(first); first += in_registers) {
+        const int32_t i = first + body, at = i - in_registers;
+        const bool live = i < bodies;
+        body_lane one =
+            load_body(live, r, m.lines + at * LINE_GENERAL, v.rigid, m.b + at * ROW, state(!odd) + i * ROW);
+        real g = free_momentum(one);
+        if (live && r < 6) {
+            const int32_t from = v.offsets[first_body + i], count = v.offsets[first_body + i + 1] - from;
+            g = gather(g, m.records + (from - first_half) * ROW + record_slot(r), count, count > FEW);
+        }
+        publish(m.state + i * ROW + r, i, one.v + step_of(one, g), odd);
+    }
+}
+
+/* `relaxation` times as far; multipliers have gone `multipliers` times. The defects of bodies in registers follow
+ * later: nobody waits for them. */
+PART __device__ __forceinline__ void PART_RUN::move_bodies_fast(int32_t odd, real relaxation, real multipliers)
+{
+    if (has_moves()) {
+        sum = gather(0, gathered, gathered_count, many);
+        step = step_fast(&own_body, sum, relaxation);
+        publish(own_state, body, own_body.v, odd);
+    }
+    if (SIZE == ONE_WARP) return; /* at most one body for each eight threads (graph/partition.cu) */
+    const int32_t in_registers = (int32_t)blockDim.x / LANES;
+    for (int32_t first = in_registers; warp_has_body(first); first += in_registers) {
+        const int32_t i = first + body, at = i - in_registers;
+        const bool live = i < bodies && r < 6;
+        body_lane one =
+            load_body(i < bodies, r, m.lines + at * LINE_GENERAL, v.rigid, m.b + at * ROW, state(!odd) + i * ROW);
+        real pushed = 0;
+        if (live) {
+            const int32_t from = v.offsets[first_body + i], count = v.offsets[first_body + i + 1] - from;
+            pushed = gather(0, m.records + (from - first_half) * ROW + record_slot(r), count, count > FEW);
+        }
+        const real gone = step_fast(&one, pushed, relaxation);
+        publish(m.state + i * ROW + r, i, one.v, odd);
+        const real defect = defect_after(one, pushed, gone, multipliers);
+        if (live) m.b[at * ROW + r] = defect;
+    }
+}
+
+/* ---- Steps 2-4 ------------------------------------------------------------------------------------------------- */
+
+PART __device__ __forceinline__ void PART_RUN::store_record(real2_pair *record, real2_pair sum) const
+{
+    sum.x *= own.sign;
+    sum.y *= own.sign;
+    if (own.pair) *record = sum;
+}
+
+/* The lane's share of the primal residual. FAST: lambda goes `farther` times as far, plain: once; records are those of Step 1 in any
+ * case. */
+PART template <bool MEASURE>
+__device__ __forceinline__ double PART_RUN::update_halves(int32_t odd, real farther, bool plain)
+{
+    enum { SPLIT = MEASURE && !FAST };
+    double primal = 0;
+    if (!has_updates()) return primal;
+    const solver_real *mine = own_row + (MODE == CLUSTER && odd ? args.most_bodies * ROW : 0),
+                      *others = own.other + (odd ? own.other_odd : 0);
+    const body_motion own_motion = load_motion(mine), other = load_motion(others);
+    vec3 force = v3(0, 0, 0), torque = force, change_force = force, change_torque = force;
+    real largest = 0;
+#pragma unroll
+    for (int32_t j = 0; j < COUNT; ++j) {
+        const vec3 old = own.lambda[j], x = relative_velocity(other, own.other_arm[j], own_motion, own.own_arm[j]);
+        const point_change to = update<FAST>(own.normal, own.friction, x, own.error[j], own.inv_s[j], old);
+        const vec3 lambda = to.lambda, delta = to.delta;
+        own.lambda[j] = FAST ? relaxed(old, to, plain, farther) : lambda;
+        vec3 impulse =
+            FAST ? delta : SPLIT ? lambda : v3_add(lambda, delta);
+        vec3 moment = fused_cross(own.own_arm[j], impulse);
+        force = j == 0 ? impulse : v3_add(force, impulse);
+        torque = j == 0 ? moment : v3_add(torque, moment);
+        if (SPLIT) {
+            impulse = delta;
+            moment = fused_cross(own.own_arm[j], impulse);
+            change_force = j == 0 ? impulse : v3_add(change_force, impulse);
+            change_torque = j == 0 ? moment : v3_add(change_torque, moment);
+        }
+        if (!MEASURE) continue;
+        largest = real_max(largest, largest_row(own.normal, delta));
+    }
+    store_record(own_record, sum_quad(lane, force, torque));
+    if (!MEASURE && !has_rows()) return primal;
+
+    const int32_t code = half < halves ? v.incident[first_half + half] : 0;
+    solver_real *change = SPLIT ? v.change + (size_t)(first_half + half) * ROW : nullptr;
+    if (FAST && MEASURE && own.pair) {
+        const pair_ends on = v.ends[code / 2];
+        primal =
+            (double)(largest * inverse_of_weight(real_abs(own.inv_s[0]), on.body_a < v.bodies && on.body_b < v.bodies));
+    }
+    if (SPLIT) {
+        store_record((real2_pair *)(change + quad_slot(lane)), sum_quad(lane, change_force, change_torque));
+        if (own.pair) {
+            const pair_ends on = v.ends[code / 2];
+            primal = (double)(largest * real_max(inv_beta_of(v, on.body_a), inv_beta_of(v, on.body_b)));
+        }
+    }
+    if (has_rows() && half < halves && !own.pair && lane == 0)
+        primal = FAST ? update_row_half_fast(v, code, mine, others, m.row_lambda + half * ROW,
+                                             m.records + half * ROW, farther)
+                      : update_row_half(v, code, mine, others, m.row_lambda + half * ROW, m.records + half * ROW,
+                                        change);
+    return primal;
+}
+
+/* ---- the limit of energies, of the method `fast` ------------------------------------------------------------------ */
+
+/* Is there a body, one of those that this thread speaks for, that has more energy than it may? Of a world: rigid ones. */
+PART __device__ __forceinline__ bool PART_RUN::suspect(int32_t odd) const
+{
+    bool any = false;
+    const int32_t in_registers = (int32_t)blockDim.x / LANES;
+    for (int32_t first = 0; warp_has_body(first); first += in_registers) {
+        const int32_t i = first + body, at = i - in_registers;
+        const bool live = i < bodies;
+        const size_t raw = live ? (size_t)v.body_of[first_body + i] : 0;
+        const bool speaks = live && r == 0;
+        const double b = live && r < 6 ? (double)v.b[raw * ROW + (size_t)r] : 0, free = speaks ? v.free_energy[raw] : 0;
+        double a[3] = {}; /* of rigid bodies */
+#pragma unroll
+        for (int k = 0; k < 3; ++k) {
+            if (first == 0) a[k] = (double)(r < 3 ? own_body.A[k] : own_body.A[k + 3]);
+            else if (live && r < 6) a[k] = (double)line_a(m.lines + at * LINE_GENERAL, true, r, r / 3 * 3 + k);
+        }
+        const double velocity = live && r < 6 ? (double)state(odd)[i * ROW + r] : 0;
+        any = suspect_body(args.few, speaks, free, velocity, b, a) || any;
+    }
+    return any;
+}
+
+#endif

@@ -1,0 +1,165 @@
+/* Steps 2-4 with everything in memory (streamed.cu): a pair by one lane or four, a row block by a thread. */
+#ifndef SADMM_CUDA_ITERATE_STREAMED_SWEEP_H
+#define SADMM_CUDA_ITERATE_STREAMED_SWEEP_H
+
+#include "sweep.h"
+
+/* ---- Steps 2-4 of a pair, points in memory ---------------------------------------------------------------------- */
+
+/* What points of a pair add up to: force on b, torque on b and, against it, on a. */
+struct pair_sum {
+    vec3 force, torque_a, torque_b;
+};
+
+/* The j-th point of a lane; absent ones are not added. */
+static __device__ __forceinline__ void add_point(pair_sum *sum, int32_t j, vec3 impulse, vec3 arm_a, vec3 arm_b)
+{
+    vec3 torque_a = fused_cross(arm_a, impulse), torque_b = fused_cross(arm_b, impulse);
+    sum->force = j == 0 ? impulse : v3_add(sum->force, impulse);
+    sum->torque_a = j == 0 ? torque_a : v3_add(sum->torque_a, torque_a);
+    sum->torque_b = j == 0 ? torque_b : v3_add(sum->torque_b, torque_b);
+}
+
+static __device__ __forceinline__ vec3 exchange(vec3 value, int lanes)
+{
+    const unsigned all = (unsigned)ALL_LANES;
+    return v3(__shfl_xor_sync(all, value.x, lanes), __shfl_xor_sync(all, value.y, lanes),
+              __shfl_xor_sync(all, value.z, lanes));
+}
+
+/* The sums of a pair's lanes, added as (q_0 + q_1) + (q_2 + q_3), into the records of its halves. Of four lanes, 0 and 1
+ * end up with force and torque on a, 2 and 3 on b. Every lane of the warp comes here. */
+template <int LANES_A_PAIR>
+static __device__ __forceinline__ void store_records(solver_real *records, const pair_ends &ends, int32_t lane,
+                                                     bool live, const pair_sum &q)
+{
+    real4 *out = (real4 *)records;
+    if (LANES_A_PAIR == 1) {
+        if (live && ends.half_a >= 0) {
+            out[2 * (size_t)ends.half_a] = pack(v3_neg(q.force), 0);
+            out[2 * (size_t)ends.half_a + 1] = pack(v3_neg(q.torque_a), 0);
+        }
+        if (live && ends.half_b >= 0) {
+            out[2 * (size_t)ends.half_b] = pack(q.force, 0);
+            out[2 * (size_t)ends.half_b + 1] = pack(q.torque_b, 0);
+        }
+        return;
+    }
+    const bool odd = lane & 1, on_b = lane & 2;
+    const int32_t half = on_b ? ends.half_b : ends.half_a;
+    /* Even lanes keep the force, odd ones the torques. */
+    const vec3 kept = v3_add(odd ? q.torque_a : q.force, exchange(odd ? q.force : q.torque_a, 1));
+    const vec3 torque_b = v3_add(q.torque_b, exchange(q.torque_b, 1));
+    const vec3 sum = v3_add(odd && on_b ? torque_b : kept, exchange(odd && !on_b ? torque_b : kept, 2));
+    if (live && half >= 0) out[2 * (size_t)half + (odd ? 1 : 0)] = pack(on_b ? sum : v3_neg(sum), 0);
+}
+
+/* A lane's share of a pair: points lane and, where COUNT is 2, lane + 4. The first is loaded whether it is
+ * there or not, so that nothing but the states waits for another load. `live`: else nothing is stored. Every lane of the warp comes
+ * here. FAST: lambda goes `farther` times as far; records are those of Step 1 in any case. Returns the lane's share of the primal
+ * residual. */
+template <int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
+static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t p, int32_t lane, bool live, real farther)
+{
+    enum { SPLIT = MEASURE && !FAST };
+    const real4 about = load_once(v.normal + p), between = load_once(v.difference + p);
+    const pair_ends ends = load_once(v.ends + p);
+    const real weight = FAST ? v.inv_s[p] : (real)0;
+    size_t slot[COUNT];
+    real4 point[COUNT];
+    vec3 old[COUNT];
+    slot[0] = point_slot<LANES_A_PAIR>(v, p, lane);
+    point[0] = load_once(v.arm + slot[0]);
+    old[0] = load_lambda(v, slot[0]);
+    const int32_t count = (int32_t)between.w;
+#pragma unroll
+    for (int32_t j = 1; j < COUNT; ++j) {
+        if (lane + LANES_A_PAIR * j >= count) continue;
+        slot[j] = point_slot<LANES_A_PAIR>(v, p, lane + LANES_A_PAIR * j);
+        point[j] = load_once(v.arm + slot[j]);
+        old[j] = load_lambda(v, slot[j]);
+    }
+    const body_row a = load_row(v.state, ends.body_a), b = load_row(v.state, ends.body_b);
+
+    const vec3 normal = xyz(about), difference = xyz(between);
+    const real inv_s = FAST ? weight : inverse_weight(a.inv_beta, b.inv_beta);
+    real largest = 0;
+    pair_sum next = {}, change = {};
+#pragma unroll
+    for (int32_t j = 0; j < COUNT; ++j) {
+        if (lane + LANES_A_PAIR * j >= count) continue;
+        const vec3 arm_a = xyz(point[j]), arm_b = v3_add(arm_a, difference);
+        const vec3 x = relative_velocity(a.motion, arm_a, b.motion, arm_b);
+        const point_change to = update<FAST>(normal, about.w, x, point[j].w, inv_s, old[j]);
+        const vec3 lambda = to.lambda, delta = to.delta;
+        if (live) store_lambda(v, slot[j], FAST ? relaxed(old[j], to, farther == 1, farther) : lambda);
+        add_point(&next, j,
+                  FAST ? delta : SPLIT ? lambda : v3_add(lambda, delta), arm_a, arm_b);
+        if (SPLIT) add_point(&change, j, delta, arm_a, arm_b);
+        if (!MEASURE) continue;
+        largest = real_max(largest, largest_row(normal, delta));
+    }
+    store_records<LANES_A_PAIR>(v.records, ends, lane, live, next);
+    if (SPLIT) store_records<LANES_A_PAIR>(v.change, ends, lane, live, change);
+    if (!MEASURE) return 0;
+    return (double)(largest * (FAST ? inverse_of_weight(inv_s, ends.body_a < v.bodies && ends.body_b < v.bodies)
+                                    : real_max(a.inv_beta, b.inv_beta)));
+}
+
+/* The same for J^T lambda^0. */
+template <int LANES_A_PAIR>
+static __device__ __forceinline__ void start_pair(const cuda_view &v, int32_t p, int32_t lane, bool live)
+{
+    const real4 between = v.difference[p];
+    pair_sum sum = {};
+    for (int32_t k = lane; k < (int32_t)between.w; k += LANES_A_PAIR) {
+        size_t slot = point_slot<LANES_A_PAIR>(v, p, k);
+        vec3 arm = xyz(v.arm[slot]), lambda = load_lambda(v, slot);
+        add_point(&sum, k / LANES_A_PAIR, lambda, arm, v3_add(arm, xyz(between)));
+    }
+    store_records<LANES_A_PAIR>(v.records, v.ends[p], lane, live, sum);
+}
+
+/* ---- row blocks ------------------------------------------------------------------------------------------------- */
+
+static __device__ __forceinline__ void store_row_records(const cuda_view &v, int32_t k, const row_about &about,
+                                                         const real lambda[6], solver_real *records)
+{
+    if (about.half_a >= 0) store_row_record(v, k, about.rows, 0, lambda, records + (size_t)about.half_a * ROW);
+    if (about.half_b >= 0) store_row_record(v, k, about.rows, 1, lambda, records + (size_t)about.half_b * ROW);
+}
+
+template <bool MEASURE>
+static __device__ __forceinline__ double sweep_row_block_fast(const cuda_view &v, int32_t k, real farther)
+{
+    const row_about about = v.row_info[k];
+    real lambda[6], delta[6], kept[6];
+    load_row_lambda(v, k, lambda);
+    for (int r = 0; r < 6; ++r) kept[r] = lambda[r];
+    update_row_block_fast(v, k, about, v.state + (size_t)about.body_a * ROW, v.state + (size_t)about.body_b * ROW,
+                          lambda, delta);
+    for (int r = 0; r < 6; ++r) kept[r] = relaxed(kept[r], lambda[r], delta[r], farther);
+    store_row_lambda(v, k, kept);
+    store_row_records(v, k, about, delta, v.records);
+    return MEASURE ? row_block_primal_fast(v, k, about, delta) : 0;
+}
+
+template <bool MEASURE> static __device__ __forceinline__ double sweep_row_block(const cuda_view &v, int32_t k)
+{
+    const row_about about = v.row_info[k];
+    real lambda[6], delta[6];
+    load_row_lambda(v, k, lambda);
+    update_row_block(v, k, about, v.state + (size_t)about.body_a * ROW, v.state + (size_t)about.body_b * ROW, lambda,
+                     delta);
+    store_row_lambda(v, k, lambda);
+    if (MEASURE) {
+        store_row_records(v, k, about, lambda, v.records);
+        store_row_records(v, k, about, delta, v.change);
+    } else {
+        for (int r = 0; r < 6; ++r) lambda[r] += delta[r];
+        store_row_records(v, k, about, lambda, v.records);
+    }
+    return MEASURE ? row_block_primal(v, about, delta) : 0;
+}
+
+#endif
