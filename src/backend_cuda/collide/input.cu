@@ -1,0 +1,147 @@
+/* What contact finding starts from: shapes, bodies, overrides, which shapes there are.
+ *
+ * What rarely changes is kept in pinned memory as it was last uploaded, and uploaded again only when it differs.
+ */
+#include <math.h>
+#include <string.h>
+
+#include <algorithm>
+
+#include "memory.h"
+
+/* A mover of this many median radii is large. */
+static const double LARGE = 8;
+
+/* Bring one of the input buffers up to date. `changed`: no need to compare. */
+static sadmm_status upload_input(struct sadmm_cuda_collision *c, int name, const void *data, size_t count, size_t size,
+                                 bool changed, struct sadmm_error *error)
+{
+    const int staged = name + INPUTS;
+    const size_t bytes = count * size;
+    size_t *uploaded = &c->input_bytes[name - SHAPES];
+    if (!changed && *uploaded == bytes && (bytes == 0 || memcmp(in<void>(c, staged), data, bytes) == 0))
+        return SADMM_OK;
+    *uploaded = SIZE_MAX;
+    TRY(room(c, name, count, size, error));
+    TRY(room(c, staged, count, size, error));
+    if (bytes > 0) memcpy(in<void>(c, staged), data, bytes);
+    TRY(copy(c, in<void>(c, name), in<void>(c, staged), bytes, true, error));
+    *uploaded = bytes;
+    return SADMM_OK;
+}
+
+/* A slot's revision changes with everything that matters. */
+static bool shapes_changed(const struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input)
+{
+    const struct sadmm_shape *before = in<struct sadmm_shape>(c, PINNED_SHAPES);
+    if (c->input_bytes[0] != input->shape_count * sizeof *before) return true;
+    for (size_t slot = 0; slot < input->shape_count; ++slot) {
+        const struct sadmm_shape *now = &input->shapes[slot], *old = &before[slot];
+        if (now->alive != old->alive || now->revision != old->revision || now->body != old->body)
+            return true;
+    }
+    return false;
+}
+
+static bool grow(void *array, size_t *capacity, size_t needed, size_t size)
+{
+    return sadmm_grow((void **)array, capacity, 0, needed, size);
+}
+
+/* The list of shapes: leaves, then planes; and from which radius a mover is large. */
+static sadmm_status list_shapes(struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input,
+                                struct sadmm_error *error)
+{
+    struct collision_view *v = &c->view;
+    size_t leaves = 0, planes = 0;
+    if (!grow(&c->present, &c->present_capacity, input->shape_count, sizeof *c->present) ||
+        !grow(&c->radii, &c->radius_capacity, input->shape_count, sizeof *c->radii))
+        return sadmm_fail_memory(error, "collision's list of shapes");
+    for (size_t slot = 0; slot < input->shape_count; ++slot) {
+        const struct sadmm_shape *shape = &input->shapes[slot];
+        if (!shape->alive || shape->type == SADMM_SHAPE_PLANE) continue;
+        c->radii[leaves] = shape_radius((int)shape->type, shape->size);
+        c->present[leaves++] = (uint32_t)slot;
+    }
+    for (size_t slot = 0; slot < input->shape_count; ++slot)
+        if (input->shapes[slot].alive && input->shapes[slot].type == SADMM_SHAPE_PLANE)
+            c->present[leaves + planes++] = (uint32_t)slot;
+    if (!grow(&c->planes, &c->plane_capacity, planes, sizeof *c->planes))
+        return sadmm_fail_memory(error, "collision's list of planes");
+    v->leaf_count = (int32_t)leaves;
+    v->plane_count = (int32_t)planes;
+    v->large = HUGE_VAL;
+    if (leaves > 0) {
+        std::nth_element(c->radii, c->radii + leaves / 2, c->radii + leaves);
+        v->large = LARGE * c->radii[leaves / 2];
+    }
+    return SADMM_OK;
+}
+
+/* Planes by group; bodies, and with them groups, may be others without any change of a shape. */
+static sadmm_status list_planes(struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input,
+                                struct sadmm_error *error)
+{
+    struct collision_view *v = &c->view;
+    const size_t count = (size_t)v->plane_count;
+    v->shared_planes = 0;
+    for (size_t i = 0; i < count; ++i) {
+        const uint32_t slot = c->present[(size_t)v->leaf_count + i];
+        const int32_t group = input->bodies[input->shapes[slot].body].environment;
+        c->planes[i] = group < 0 ? slot : ordered_key((uint32_t)group + 1, slot);
+        if (group < 0) ++v->shared_planes;
+    }
+    std::sort(c->planes, c->planes + count);
+    return upload_input(c, PLANES, c->planes, count, sizeof *c->planes, false, error);
+}
+
+static int32_t group_bits(const struct sadmm_collision_input *input)
+{
+    int32_t last = 0, bits = 0;
+    for (size_t i = 0; i < input->body_count; ++i) last = std::max(last, input->bodies[i].environment);
+    while (last >> bits) ++bits;
+    return bits;
+}
+
+sadmm_status COLLISION(take_input)(struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input,
+                                   const struct sadmm_collision_body *bodies, struct sadmm_error *error)
+{
+    struct collision_view *v = &c->view;
+    if (input->shape_count > (size_t)INT32_MAX / 2 || input->body_count > (size_t)INT32_MAX ||
+        input->disabled_body_pair_count > (size_t)INT32_MAX || input->friction_pair_count > (size_t)INT32_MAX)
+        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%zu shapes, %zu bodies: at most %d and %d can be indexed",
+                          input->shape_count, input->body_count, (int)(INT32_MAX / 2), (int)INT32_MAX);
+    if (shapes_changed(c, input)) {
+        c->input_bytes[0] = SIZE_MAX;
+        TRY(list_shapes(c, input, error));
+        TRY(upload_input(c, PRESENT, c->present, (size_t)(v->leaf_count + v->plane_count), sizeof *c->present, true,
+                         error));
+        TRY(upload_input(c, SHAPES, input->shapes, input->shape_count, sizeof *input->shapes, true, error));
+    }
+    if (!bodies) TRY(upload_input(c, BODIES, input->bodies, input->body_count, sizeof *input->bodies, true, error));
+    TRY(list_planes(c, input, error));
+    TRY(upload_input(c, DISABLED_PAIRS, input->disabled_body_pairs, input->disabled_body_pair_count,
+                     sizeof *input->disabled_body_pairs, false, error));
+    TRY(upload_input(c, FRICTION_PAIRS, input->friction_pairs, input->friction_pair_count,
+                     sizeof *input->friction_pairs, false, error));
+    TRY(upload_input(c, FRICTION_VALUES, input->friction_values, input->friction_pair_count,
+                     sizeof *input->friction_values, false, error));
+
+    v->shapes = in<struct sadmm_shape>(c, SHAPES);
+    v->bodies = bodies ? bodies : in<struct sadmm_collision_body>(c, BODIES);
+    v->body_count = (int32_t)input->body_count;
+    v->group_bits = group_bits(input);
+    v->halt = nullptr;
+    v->present = in<uint32_t>(c, PRESENT);
+    v->planes = in<uint64_t>(c, PLANES);
+    v->disabled_pairs = in<uint64_t>(c, DISABLED_PAIRS);
+    v->friction_pairs = in<uint64_t>(c, FRICTION_PAIRS);
+    v->friction_values = in<double>(c, FRICTION_VALUES);
+    v->disabled_count = (int32_t)input->disabled_body_pair_count;
+    v->friction_count = (int32_t)input->friction_pair_count;
+    v->step.dt = input->dt;
+    v->step.margin = input->margin;
+    v->step.gravity = input->gravity;
+    for (v->slot_bits = 1; input->shape_count >> v->slot_bits; ++v->slot_bits) {}
+    return SADMM_OK;
+}

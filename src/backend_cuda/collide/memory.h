@@ -1,0 +1,228 @@
+/* The pipeline (pipeline.h) on the host's side: what it keeps, buffers that only grow, launches. */
+#ifndef SADMM_CUDA_COLLIDE_MEMORY_H
+#define SADMM_CUDA_COLLIDE_MEMORY_H
+
+#include <stdio.h>
+
+#include "core/base/memory.h"
+#include "view.h"
+
+/* Memory of the device or pinned memory of the host. */
+struct collision_buffer {
+    void *data;
+    size_t capacity; /* bytes */
+};
+
+enum buffer_name {
+    /* device */
+    PROXIES, FILTERS, PLACED, LEAF_KEYS, LEAF_KEYS_2, LEAF_SLOTS, LEAF_SLOTS_2, NODES, GROUPS, PARENTS, ARRIVALS,
+    COUNTER, GRID, CANDIDATES, CANDIDATES_2, MANIFOLDS, MATCHES, SIZES, PLACES, TEMP,
+    PAIRS, POINTS, PAIR_KEYS, COUNTS, PAIRS_2, POINTS_2, PAIR_KEYS_2, COUNTS_2,
+    SHAPES, BODIES, PRESENT, PLANES, DISABLED_PAIRS, FRICTION_PAIRS, FRICTION_VALUES,
+    /* pinned: first what was uploaded to the last buffers above, in their order */
+    PINNED_SHAPES, PINNED_BODIES, PINNED_PRESENT, PINNED_PLANES, PINNED_DISABLED_PAIRS, PINNED_FRICTION_PAIRS,
+    PINNED_FRICTION_VALUES, PINNED_PAIRS, PINNED_POINTS, PINNED_PAIR_KEYS, PINNED_COUNTS,
+    BUFFERS
+};
+enum { SET_BUFFERS = COUNTS_2 - COUNTS, INPUTS = PINNED_SHAPES - SHAPES };
+
+static const char *const buffer_names[BUFFERS] = {
+    "placed shapes", "filters", "boxes", "tree keys", "sorted tree keys", "leaves", "sorted leaves", "tree", "groups",
+    "parents", "arrivals", "counter", "grid", "candidates", "sorted candidates", "manifolds", "matches", "sizes",
+    "places", "sort",
+    "contact pairs", "contact points", "contact keys", "contact counts",
+    "contact pairs", "contact points", "contact keys", "contact counts",
+    "shapes", "bodies", "list of shapes", "planes", "disabled pairs", "friction pairs", "friction values",
+    "staged shapes", "staged bodies", "staged list of shapes", "staged planes", "staged disabled pairs",
+    "staged friction pairs", "staged friction values", "staged contact pairs", "staged contact points",
+    "staged contact keys", "staged contact counts",
+};
+
+/* As on the host: contact points are indexed by 32 bits. */
+static const int64_t MOST_CANDIDATES = INT32_MAX / SADMM_MAX_POINTS;
+
+struct contact_counts {
+    int32_t pairs, points;
+    double dt;
+};
+
+namespace {
+
+/* The device is current while this lives; then the caller's again. Internal linkage: the emulated build has its own. */
+class current_device {
+public:
+    cudaError_t code;
+    explicit current_device(int device) : before(device)
+    {
+        code = cudaGetDevice(&before);
+        if (code == cudaSuccess && before != device) code = cudaSetDevice(device);
+    }
+    ~current_device() { (void)cudaSetDevice(before); }
+    current_device(const current_device &) = delete;
+    current_device &operator=(const current_device &) = delete;
+
+private:
+    int before;
+};
+
+} // namespace
+
+struct sadmm_cuda_collision {
+    int device;
+    struct collision_kernels kernels;
+    struct collision_view view;
+    struct collision_buffer buffers[BUFFERS];
+    size_t input_bytes[INPUTS]; /* as uploaded; SIZE_MAX: not */
+
+    int current;                /* of the two sets */
+    struct contact_counts counts[2];
+    bool can_undo;
+
+    cudaStream_t stream;        /* where work is pending */
+    bool pending;
+    const char *kernel;         /* launched last: what an asynchronous error is about, or what ran before it */
+
+    int32_t tree_from;
+    int64_t radix_from;
+    int64_t candidate_room, point_room;
+    int temp_leaves, temp_candidates; /* what TEMP is large enough for */
+    struct sadmm_cuda_collision_stats stats;
+
+    /* host arrays, made when shapes change */
+    uint32_t *present;
+    uint64_t *planes;
+    double *radii;
+    size_t present_capacity, plane_capacity, radius_capacity;
+};
+
+#define CUDA_CALL(c, call, what)                                                 \
+    do {                                                                         \
+        cudaError_t try_code = (call);                                           \
+        if (try_code != cudaSuccess) return fail((c), try_code, (what), error);  \
+    } while (0)
+#define ENTER(c)                          \
+    current_device scope((c)->device);    \
+    CUDA_CALL((c), scope.code, "cudaSetDevice")
+
+/* ---- errors, memory, launches ---------------------------------------------------------------------------------- */
+
+static inline sadmm_status fail(const struct sadmm_cuda_collision *c, cudaError_t code, const char *what,
+                         struct sadmm_error *error)
+{
+    (void)cudaGetLastError(); /* an error that does not last must not be found by the next call */
+    return sadmm_fail(error, code == cudaErrorMemoryAllocation ? SADMM_ERROR_OUT_OF_MEMORY : SADMM_ERROR_DEVICE,
+                      "CUDA device %d: %s: %s", c->device, what, cudaGetErrorString(code));
+}
+
+static inline sadmm_status wait(struct sadmm_cuda_collision *c, struct sadmm_error *error)
+{
+    cudaError_t code = cudaStreamSynchronize(c->stream);
+    if (code == cudaSuccess) {
+        c->pending = false;
+        return SADMM_OK;
+    }
+    char what[160];
+    snprintf(what, sizeof what, "kernel %s (the last one launched, or one before it)", c->kernel ? c->kernel : "none");
+    return fail(c, code, what, error);
+}
+
+/* From here on there may be work on the stream; what an earlier entry left there is done. */
+static inline sadmm_status begin_work(struct sadmm_cuda_collision *c, void *stream, struct sadmm_error *error)
+{
+    if (c->pending) TRY(wait(c, error));
+    c->stream = (cudaStream_t)stream;
+    c->pending = true;
+    return SADMM_OK;
+}
+
+static inline void release(struct sadmm_cuda_collision *c, int name)
+{
+    struct collision_buffer *b = &c->buffers[name];
+    if (b->data) (void)(name >= PINNED_SHAPES ? cudaFreeHost(b->data) : cudaFree(b->data));
+    b->data = nullptr;
+    b->capacity = 0;
+}
+
+/* At least count x size bytes; what the buffer held is lost when it grows. */
+static inline sadmm_status room(struct sadmm_cuda_collision *c, int name, size_t count, size_t size, struct sadmm_error *error)
+{
+    struct collision_buffer *b = &c->buffers[name];
+    size_t bytes = count * size, wanted = b->capacity + b->capacity / 2;
+    if (b->data && bytes <= b->capacity) return SADMM_OK;
+    if (wanted < bytes) wanted = bytes;
+    if (wanted < 256) wanted = 256;
+    char what[96];
+    snprintf(what, sizeof what, "allocation of %zu bytes for collision's %s", wanted, buffer_names[name]);
+    if (sadmm_test_allocation_fails()) return fail(c, cudaErrorMemoryAllocation, what, error);
+    release(c, name);
+    CUDA_CALL(c, name >= PINNED_SHAPES ? cudaMallocHost(&b->data, wanted) : cudaMalloc(&b->data, wanted), what);
+    b->capacity = wanted;
+    ++c->stats.allocations;
+    /* Sets are copied whole when they grow, and the grid is read where there is no tree. */
+    if (name == GRID || (name >= PAIRS && name < SHAPES))
+        CUDA_CALL(c, cudaMemsetAsync(b->data, 0, wanted, c->stream), what);
+    return SADMM_OK;
+}
+
+template <class T> static T *in(const struct sadmm_cuda_collision *c, int name) { return (T *)c->buffers[name].data; }
+
+#ifdef SADMM_CUDA_EMULATED
+struct emulated_call {
+    void (*kernel)(const collision_view);
+    struct collision_view view;
+};
+static inline void run_emulated(const emulated_call call, const int) { call.kernel(call.view); }
+#endif
+
+static inline sadmm_status launch(struct sadmm_cuda_collision *c, const struct collision_launch &what, int64_t threads,
+                           struct sadmm_error *error)
+{
+    const unsigned blocks = (unsigned)((threads + what.threads - 1) / what.threads);
+    if (threads <= 0) return SADMM_OK;
+    c->kernel = what.name;
+#ifdef SADMM_CUDA_EMULATED
+    const emulated_call call = {what.kernel, c->view};
+    cudaError_t code = cuda_emulation_launch(run_emulated, blocks, (unsigned)what.threads, what.shared, call, 0);
+#else
+    const dim3 grid(blocks), threads_a_block((unsigned)what.threads);
+    void *parameters[] = {&c->view};
+    cudaError_t code = cudaLaunchKernel((const void *)what.kernel, grid, threads_a_block, parameters, 0, c->stream);
+#endif
+    CUDA_CALL(c, code, what.name);
+    return SADMM_OK;
+}
+
+static inline sadmm_status copy(struct sadmm_cuda_collision *c, void *to, const void *from, size_t bytes, bool to_device,
+                         struct sadmm_error *error)
+{
+    const auto kind = to_device ? cudaMemcpyHostToDevice : cudaMemcpyDeviceToHost;
+    if (bytes > 0)
+        CUDA_CALL(c, cudaMemcpyAsync(to, from, bytes, kind, c->stream),
+                  to_device ? "cudaMemcpyAsync to the device" : "cudaMemcpyAsync from the device");
+    return SADMM_OK;
+}
+
+/* One of the two sets. */
+static inline struct collision_set set_of(const struct sadmm_cuda_collision *c, int which)
+{
+    const int shift = which * SET_BUFFERS;
+    struct collision_set set;
+    set.pairs = in<struct sadmm_contact_pair>(c, PAIRS + shift);
+    set.points = in<struct sadmm_contact_point>(c, POINTS + shift);
+    set.keys = in<uint64_t>(c, PAIR_KEYS + shift);
+    set.counts = in<struct sadmm_cuda_contact_counts>(c, COUNTS + shift);
+    return set;
+}
+
+/* ---- parts of a find ------------------------------------------------------------------------------------------- */
+
+/* The step's input, uploaded where it changed. `bodies`: on the device already; NULL: the input's. */
+sadmm_status COLLISION(take_input)(struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input,
+                                   const struct sadmm_collision_body *bodies, struct sadmm_error *error);
+/* Everything after the input, repeated until everything fits; `counts` of the new set. */
+sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots, struct sadmm_cuda_contact_counts *counts,
+                                   struct sadmm_error *error);
+sadmm_status COLLISION(make_set_room)(struct sadmm_cuda_collision *c, int which, size_t pairs, size_t points,
+                                      struct sadmm_error *error);
+
+#endif

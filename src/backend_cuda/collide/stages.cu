@@ -1,0 +1,292 @@
+/* The stages of a find: rooms and launches, repeated until everything fits, or enqueued once in the room there is. */
+#include <algorithm>
+
+#include "backend_cuda/device/parallel.h"
+#include "memory.h"
+
+/* ---- stages ---------------------------------------------------------------------------------------------------- */
+
+static sadmm_status make_shape_room(struct sadmm_cuda_collision *c, size_t slots, bool tree, struct sadmm_error *error)
+{
+    struct collision_view *v = &c->view;
+    const size_t leaves = (size_t)v->leaf_count;
+    TRY(room(c, PROXIES, slots, sizeof *v->proxies, error));
+    TRY(room(c, FILTERS, slots, sizeof *v->filters, error));
+    TRY(room(c, PLACED, slots, sizeof *v->placed, error));
+    TRY(room(c, LEAF_KEYS, leaves, sizeof *v->leaf_keys, error));
+    TRY(room(c, LEAF_SLOTS, leaves, sizeof *v->leaf_slots, error));
+    if (tree) {
+        TRY(room(c, LEAF_KEYS_2, leaves, sizeof *v->leaf_keys, error));
+        TRY(room(c, LEAF_SLOTS_2, leaves, sizeof *v->leaf_slots, error));
+        TRY(room(c, NODES, 2 * leaves, sizeof *v->nodes, error));
+        TRY(room(c, GROUPS, 2 * leaves, sizeof *v->groups, error));
+        TRY(room(c, PARENTS, 2 * leaves, sizeof *v->parents, error));
+        TRY(room(c, ARRIVALS, leaves, sizeof *v->arrivals, error));
+    }
+    TRY(room(c, COUNTER, 1, sizeof *v->candidate_count, error));
+    TRY(room(c, GRID, 1, sizeof *v->grid, error));
+    v->proxies = in<struct sadmm_proxy>(c, PROXIES);
+    v->filters = in<struct collision_filter>(c, FILTERS);
+    v->placed = in<struct collision_leaf>(c, PLACED);
+    v->leaf_keys = in<uint64_t>(c, LEAF_KEYS);
+    v->leaf_slots = in<uint32_t>(c, LEAF_SLOTS);
+    v->nodes = in<struct collision_node>(c, NODES);
+    v->groups = in<struct collision_groups>(c, GROUPS);
+    v->parents = in<int32_t>(c, PARENTS);
+    v->arrivals = in<int32_t>(c, ARRIVALS);
+    v->candidate_count = in<unsigned long long>(c, COUNTER);
+    v->grid = in<struct collision_grid>(c, GRID);
+    return SADMM_OK;
+}
+
+sadmm_status COLLISION(make_set_room)(struct sadmm_cuda_collision *c, int which, size_t pairs, size_t points,
+                                      struct sadmm_error *error)
+{
+    const int shift = which * SET_BUFFERS;
+    TRY(room(c, PAIRS + shift, pairs, sizeof(struct sadmm_contact_pair), error));
+    TRY(room(c, POINTS + shift, points, sizeof(struct sadmm_contact_point), error));
+    TRY(room(c, PAIR_KEYS + shift, pairs, sizeof(uint64_t), error));
+    if (in<void>(c, COUNTS + shift)) return SADMM_OK;
+    TRY(room(c, COUNTS + shift, 1, sizeof(struct sadmm_cuda_contact_counts), error));
+    CUDA_CALL(c, cudaMemsetAsync(in<void>(c, COUNTS + shift), 0, sizeof(struct sadmm_cuda_contact_counts), c->stream),
+              "cudaMemsetAsync(counts)");
+    return SADMM_OK;
+}
+
+static sadmm_status make_candidate_room(struct sadmm_cuda_collision *c, struct sadmm_error *error)
+{
+    struct collision_view *v = &c->view;
+    const size_t candidates = (size_t)c->candidate_room;
+    TRY(room(c, CANDIDATES, candidates, sizeof *v->candidates, error));
+    TRY(room(c, CANDIDATES_2, candidates, sizeof *v->candidates, error));
+    TRY(room(c, MANIFOLDS, candidates, sizeof *v->manifolds, error));
+    TRY(room(c, MATCHES, candidates, sizeof *v->matches, error));
+    TRY(room(c, SIZES, candidates + SIZES_BEYOND, sizeof *v->sizes, error));
+    TRY(room(c, PLACES, candidates + 1, sizeof *v->places, error));
+    v->found = in<uint64_t>(c, CANDIDATES);
+    v->manifolds = in<struct manifold>(c, MANIFOLDS);
+    v->matches = in<int32_t>(c, MATCHES);
+    v->sizes = in<uint8_t>(c, SIZES);
+    v->places = in<uint64_t>(c, PLACES);
+    v->candidate_room = (int32_t)c->candidate_room;
+    v->point_room = (int32_t)c->point_room;
+    return SADMM_OK;
+}
+
+/* From the other set into this one. */
+static void use_sets(struct sadmm_cuda_collision *c, int into)
+{
+    c->view.before = set_of(c, 1 - into);
+    c->view.after = set_of(c, into);
+}
+
+/* Memory that sorts and scans of these sizes need. */
+static sadmm_status make_temp_room(struct sadmm_cuda_collision *c, int leaves, int candidates,
+                                   struct sadmm_error *error)
+{
+    uint64_t *none[2] = {nullptr, nullptr};
+    uint32_t *no_values[2] = {nullptr, nullptr};
+    size_t most = 0, bytes = 0;
+    int unused;
+    if (leaves <= c->temp_leaves && candidates <= c->temp_candidates) return SADMM_OK;
+    leaves = std::max(leaves, c->temp_leaves);
+    candidates = std::max(candidates, c->temp_candidates);
+    CUDA_CALL(c, COLLISION(sort)(nullptr, &bytes, none, no_values, leaves, 64, &unused, c->stream),
+              "sizing of the leaf sort");
+    most = std::max(most, bytes);
+    CUDA_CALL(c, COLLISION(sort)(nullptr, &bytes, none, nullptr, candidates, 64, &unused, c->stream),
+              "sizing of the candidate sort");
+    most = std::max(most, bytes);
+    CUDA_CALL(c, COLLISION(sum)(nullptr, &bytes, nullptr, nullptr, candidates + 1, c->stream), "sizing of the scan");
+    most = std::max(most, bytes);
+    TRY(room(c, TEMP, most, 1, error));
+    c->temp_leaves = leaves;
+    c->temp_candidates = candidates;
+    return SADMM_OK;
+}
+
+static sadmm_status build_tree(struct sadmm_cuda_collision *c, struct sadmm_error *error)
+{
+    struct collision_view *v = &c->view;
+    uint64_t *const keys[2] = {in<uint64_t>(c, LEAF_KEYS), in<uint64_t>(c, LEAF_KEYS_2)};
+    uint32_t *const slots[2] = {in<uint32_t>(c, LEAF_SLOTS), in<uint32_t>(c, LEAF_SLOTS_2)};
+    size_t bytes = c->buffers[TEMP].capacity;
+    int at = 0;
+    v->leaf_keys = keys[0];
+    v->leaf_slots = slots[0];
+    c->kernel = "leaf sort";
+    CUDA_CALL(c, COLLISION(sort)(in<void>(c, TEMP), &bytes, keys, slots, v->leaf_count, 64, &at, c->stream), c->kernel);
+    v->leaf_keys = keys[at];
+    v->leaf_slots = slots[at];
+    TRY(launch(c, c->kernels.build, v->leaf_count, error));
+    return launch(c, c->kernels.refit, v->leaf_count, error);
+}
+
+static bool ranked(const struct sadmm_cuda_collision *c) { return c->view.candidate_room < c->radix_from; }
+
+static sadmm_status sort_candidates(struct sadmm_cuda_collision *c, struct sadmm_error *error)
+{
+    struct collision_view *v = &c->view;
+    uint64_t *const keys[2] = {v->found, in<uint64_t>(c, CANDIDATES_2)};
+    size_t bytes = c->buffers[TEMP].capacity;
+    int at = 0;
+    v->candidates = keys[1];
+    if (ranked(c)) return launch(c, c->kernels.rank, (int64_t)v->candidate_room * RANK_SHARES, error);
+    c->kernel = "candidate sort";
+    CUDA_CALL(c, COLLISION(sort)(in<void>(c, TEMP), &bytes, keys, nullptr, v->candidate_room, 2 * v->slot_bits, &at,
+                                 c->stream), c->kernel);
+    v->candidates = keys[at];
+    return SADMM_OK;
+}
+
+static sadmm_status find_candidates(struct sadmm_cuda_collision *c, bool tree, struct sadmm_error *error)
+{
+    const struct collision_view *v = &c->view;
+    if (!ranked(c)) TRY(launch(c, c->kernels.clear, v->candidate_room, error));
+    if (tree) {
+        TRY(launch(c, c->kernels.walk, v->leaf_count, error));
+    } else {
+        const int64_t rows = (v->leaf_count + TILE_ROWS - 1) / TILE_ROWS;
+        TRY(launch(c, c->kernels.tiles, rows * TILE_ROWS * tile_columns(v->leaf_count), error));
+    }
+    return sort_candidates(c, error);
+}
+
+static sadmm_status make_contacts(struct sadmm_cuda_collision *c, struct sadmm_error *error)
+{
+    struct collision_view *v = &c->view;
+    const int64_t lanes = (int64_t)v->candidate_room * POINT_LANES;
+    size_t bytes = c->buffers[TEMP].capacity;
+    TRY(launch(c, c->kernels.narrow, (int64_t)v->candidate_room + SIZES_BEYOND, error));
+    if (ranked(c)) return launch(c, c->kernels.emit_few, lanes, error);
+    c->kernel = "scan of the contacts";
+    CUDA_CALL(c, COLLISION(sum)(in<void>(c, TEMP), &bytes, v->sizes, v->places, v->candidate_room + 1, c->stream),
+              c->kernel);
+    return launch(c, c->kernels.emit, lanes, error);
+}
+
+/* Places, and with them the tree where it pays. */
+static sadmm_status place_shapes(struct sadmm_cuda_collision *c, bool tree, struct sadmm_error *error)
+{
+    const struct collision_view *v = &c->view;
+    c->view.leaf_keys = in<uint64_t>(c, LEAF_KEYS);
+    c->view.leaf_slots = in<uint32_t>(c, LEAF_SLOTS);
+    if (tree) TRY(launch(c, c->kernels.grid, 1, error));
+    TRY(launch(c, c->kernels.place, std::max(v->leaf_count + v->plane_count, 1), error));
+    return tree ? build_tree(c, error) : SADMM_OK;
+}
+
+/* More than needed, so that a growing number of contacts does not repeat every step. */
+static int64_t generous(int64_t needed, int64_t most) { return std::min(needed + needed / 4, most); }
+
+sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots, struct sadmm_cuda_contact_counts *counts,
+                                   struct sadmm_error *error)
+{
+    struct collision_view *v = &c->view;
+    const bool tree = v->leaf_count >= c->tree_from;
+    struct sadmm_cuda_contact_counts *const staged = in<struct sadmm_cuda_contact_counts>(c, PINNED_COUNTS);
+    const int64_t first = std::max((int64_t)1024, (int64_t)8 * v->leaf_count);
+    if (c->candidate_room == 0) c->candidate_room = std::min(first, MOST_CANDIDATES);
+    if (c->point_room == 0) c->point_room = c->candidate_room;
+
+    TRY(make_shape_room(c, slots, tree, error));
+    TRY(make_temp_room(c, v->leaf_count, (int)c->candidate_room, error));
+    TRY(COLLISION(make_set_room)(c, c->current, 0, 0, error));
+    TRY(place_shapes(c, tree, error));
+    for (;;) {
+        TRY(make_candidate_room(c, error));
+        TRY(COLLISION(make_set_room)(c, 1 - c->current, (size_t)c->candidate_room, (size_t)c->point_room, error));
+        use_sets(c, 1 - c->current);
+        TRY(make_temp_room(c, v->leaf_count, (int)c->candidate_room, error));
+        TRY(find_candidates(c, tree, error));
+        TRY(make_contacts(c, error));
+        TRY(copy(c, staged, v->after.counts, sizeof *staged, false, error));
+        TRY(wait(c, error));
+        c->pending = true;
+        *counts = *staged;
+        if (counts->candidates > MOST_CANDIDATES)
+            return sadmm_fail(error, SADMM_ERROR_LIMIT, "%lld pairs of shapes may touch: at most %d can be indexed",
+                              (long long)counts->candidates, (int)MOST_CANDIDATES);
+        if (counts->candidates > c->candidate_room) c->candidate_room = generous(counts->candidates, MOST_CANDIDATES);
+        else if (counts->points > c->point_room) c->point_room = generous(counts->points, INT32_MAX);
+        else return SADMM_OK;
+        ++c->stats.repeats;
+        CUDA_CALL(c, cudaMemsetAsync(v->candidate_count, 0, sizeof *v->candidate_count, c->stream),
+                  "cudaMemsetAsync(counter)");
+    }
+}
+
+/* ---- enqueued finds -------------------------------------------------------------------------------------------- */
+
+extern "C" sadmm_status COLLISION(attach)(struct sadmm_cuda_collision *c, void *stream,
+                                          const struct sadmm_collision_input *input,
+                                          const struct sadmm_collision_body *bodies, const int32_t *halt,
+                                          struct sadmm_error *error)
+{
+    c->can_undo = false;
+    ENTER(c);
+    TRY(begin_work(c, stream, error));
+    TRY(COLLISION(take_input)(c, input, bodies, error));
+    c->view.halt = halt;
+    return make_shape_room(c, input->shape_count, c->view.leaf_count >= c->tree_from, error);
+}
+
+/* Grow a buffer and keep what it holds. */
+static sadmm_status keep_room(struct sadmm_cuda_collision *c, int name, size_t count, size_t size,
+                              struct sadmm_error *error)
+{
+    struct collision_buffer old = c->buffers[name];
+    if (!old.data || count * size <= old.capacity) return room(c, name, count, size, error);
+    c->buffers[name].data = nullptr; /* the capacity stays: growth is by half at least */
+    sadmm_status status = room(c, name, count, size, error);
+    if (status == SADMM_OK) {
+        cudaError_t code = cudaMemcpyAsync(in<void>(c, name), old.data, old.capacity, cudaMemcpyDeviceToDevice, c->stream);
+        if (code == cudaSuccess) code = cudaStreamSynchronize(c->stream);
+        if (code != cudaSuccess) status = fail(c, code, "cudaMemcpyAsync on the device", error);
+    }
+    if (status != SADMM_OK) {
+        release(c, name);
+        c->buffers[name] = old;
+        return status;
+    }
+    (void)cudaFree(old.data);
+    return SADMM_OK;
+}
+
+extern "C" sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *c, int64_t *candidates, int64_t *points,
+                                           struct sadmm_error *error)
+{
+    const int64_t likely = std::max((int64_t)1024, (int64_t)8 * c->view.leaf_count);
+    ENTER(c);
+    TRY(wait(c, error));
+    if (*candidates > MOST_CANDIDATES)
+        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%lld pairs of shapes may touch: at most %d can be indexed",
+                          (long long)*candidates, (int)MOST_CANDIDATES);
+    const int64_t first_points = c->point_room > 0 ? c->point_room : *points > 0 ? 1 : likely;
+    c->candidate_room = std::max(c->candidate_room, *candidates > 0 ? *candidates : std::min(likely, MOST_CANDIDATES));
+    c->point_room = std::max(first_points, *points);
+    TRY(make_candidate_room(c, error));
+    TRY(make_temp_room(c, c->view.leaf_count, (int)c->candidate_room, error));
+    for (int which = 0; which < 2; ++which) {
+        const int shift = which * SET_BUFFERS;
+        TRY(keep_room(c, PAIRS + shift, (size_t)c->candidate_room, sizeof(struct sadmm_contact_pair), error));
+        TRY(keep_room(c, PAIR_KEYS + shift, (size_t)c->candidate_room, sizeof(uint64_t), error));
+        TRY(keep_room(c, POINTS + shift, (size_t)c->point_room, sizeof(struct sadmm_contact_point), error));
+        TRY(COLLISION(make_set_room)(c, which, 0, 0, error));
+    }
+    *candidates = c->candidate_room;
+    *points = c->point_room;
+    return SADMM_OK;
+}
+
+extern "C" sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *c, void *stream, int into,
+                                           struct sadmm_error *error)
+{
+    const bool tree = c->view.leaf_count >= c->tree_from;
+    c->stream = (cudaStream_t)stream;
+    c->pending = true;
+    use_sets(c, into);
+    TRY(place_shapes(c, tree, error));
+    TRY(find_candidates(c, tree, error));
+    return make_contacts(c, error);
+}
