@@ -11,7 +11,7 @@
 
 /* Numbers of half_wrench: force and torque, then the force's size; ROW in all. */
 enum { HALF_PUSH = 6 };
-/* Those of half_arms (device/context.h) are in this precision, and sums only where contacts have three rows: else C depends on
+/* Those of half_arms (device/view.h) are in this precision, and sums only where contacts have three rows: else C depends on
  * normals. */
 static_assert(sizeof(struct arm_sums) == HALF_ARMS * sizeof(double), "numbers are taken one by one");
 

@@ -1,4 +1,4 @@
-/* How the CUDA backend's fused entry runs (device/context.h), and how tests choose it. */
+/* How the CUDA backend's fused entry runs (device/view.h), and how tests choose it. */
 #ifndef SADMM_CUDA_GRAPH_TIER_H
 #define SADMM_CUDA_GRAPH_TIER_H
 

@@ -1,4 +1,4 @@
-/* The fused iteration as one kernel whose state stays on the chip: tiers BLOCK, CLUSTER and GRID (device/context.h).
+/* The fused iteration as one kernel whose state stays on the chip: tiers BLOCK, CLUSTER and GRID (device/view.h).
  *
  * A thread block owns a part: a range of bodies and the halves of their constraints. Four lanes (a quad) take a half, one
  * contact point each (points k and k + 4 where pairs have up to 8), and keep it in registers through all iterations. The

@@ -1,0 +1,299 @@
+/* The CUDA backend: reduced form (docs/algorithm.md), one source for both precisions (SADMM_REAL, SADMM_VARIANT).
+ *
+ * Units of work
+ *   - Points of a contact pair share normal, friction and bodies. With r_a, r_b = r_a + (x_a - x_b) a point's relative
+ *     velocity is (v_b - v_a) + (w_b x r_b - w_a x r_a), and the pair's wrench on b is f = sum E_k, tau = sum r_b x E_k
+ *     (E = 2 lambda - lambda_prev), on a -f, -sum r_a x E_k.
+ *   - A "half" is one constraint as seen by one of its dynamic bodies: 2 record + side (0: on a, 1: on b); its record is
+ *     the wrench on that body. Bodies gather the records of their halves over a CSR list in a fixed order. No float
+ *     atomics: a result does not depend on timing, thread count, grid size or tier, bit for bit (the sources are
+ *     compiled without contraction of a * b + c for the same reason).
+ *   - Sums over a pair's points, p_0 to p_7: q_j = p_j + p_{j+4} (p_j alone where there is no p_{j+4}, 0 where there is
+ *     no p_j), then (q_0 + q_1) + (q_2 + q_3): four lanes of a warp make it in two exchanges.
+ *   - Records are in the order of the bodies' lists, so that a body reads its own one after the other; whoever writes them
+ *     knows where they go. Points are stored pair by pair, four lanes a pair (point_slot).
+ *   - Eight lanes take a body: lane r < 6 owns component r of A v, of the gathered sum and of H g, H = (A + beta C)^-1.
+ *
+ * Order. Bodies are numbered by island, stably, where islands matter: "slots" (graph/layout.h). Pairs and row blocks keep
+ * their raw order. Static bodies join nothing and share the state row after the last body, which is 0. Within a body's
+ * list records ascend, so that the sums are the same in every tier.
+ *
+ * Tiers of the fused entry
+ *   BLOCK    islands packed into thread blocks, everything on the chip; only __syncthreads
+ *   CLUSTER  islands packed into clusters of thread blocks, which read each other's velocities from shared memory
+ *   GRID     one cooperative launch; velocities go through L2, with a grid barrier an iteration
+ *   STREAM   two kernels an iteration, in a CUDA graph: any size
+ * BLOCK, CLUSTER and GRID are one kernel (iterate/resident.h) over a partition into `parts` (graph/partition.cu).
+ *
+ * The method `fast` has a weight B of its own for each constraint (weight/weights.cu) in place of beta, which is 1 then.
+ * Its iteration is Steps 2-4 and then Step 1, relaxed (math/relax.h), by instances of its own of the same kernels;
+ * slots are by island in every tier, since weights rest on sums over islands. It passes on changes alone: records are
+ * J^T d lambda, and bodies keep their defect b - A v + J^T lambda (docs/algorithm.md). It begins with the multipliers: records
+ * are not kept.
+ *
+ * Launch sizes follow from what the host knows (rooms, tier); kernels read the true counts from `live`, and do nothing
+ * once it says halt.
+ *
+ * Raw data (bodies, contact pairs and points, blocks as core has them, in double) is turned into this layout on the device.
+ * In a whole step contact finding leaves it there; for a solve alone the host copies it.
+ */
+#ifndef SADMM_CUDA_DEVICE_VIEW_H
+#define SADMM_CUDA_DEVICE_VIEW_H
+
+#include <float.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cuda_runtime.h>
+
+#include "core/solve/kernels.h"
+#include "line.h"
+#include "backend_cuda/step/step.h"
+#include "backend_cuda/graph/layout_view.h"
+
+typedef SADMM_REAL solver_real;
+
+/* Of this precision. */
+#define SOLVER_EPSILON (sizeof(solver_real) == sizeof(float) ? (double)FLT_EPSILON : DBL_EPSILON)
+
+#define SADMM_JOIN2(a, b) a##b
+#define SADMM_JOIN(a, b) SADMM_JOIN2(a, b)
+/* A symbol of this precision, e.g. sadmm_cuda_begin_f32. */
+#define CUDA(name) SADMM_JOIN(sadmm_cuda_##name, SADMM_VARIANT)
+
+enum {
+    ROW = 8,              /* a wrench or a body's state: 6 used, 32 bytes in f32 */
+    STATE_INV_BETA = 6,   /* slot of a state row */
+    PACKED = 21,          /* lower triangle, rows first */
+    THREADS = 256,        /* a block, everywhere */
+    WARP = 32,
+    LANES = 8             /* threads a body */
+};
+
+/* Planes of the row blocks' data, each row_stride long. */
+enum {
+    ROW_J_A = 0,
+    ROW_J_B = 36,
+    ROW_ERROR = 72,
+    ROW_STIFFNESS = 78,
+    ROW_DAMPING = 84,
+    ROW_LAMBDA = 90,
+    ROW_FRICTION = 96,
+    /* fast: B = diag(weight) + along along^T; per row J A^-1 J^T, and what its multiplier counts for in the load */
+    ROW_WEIGHT = 97,
+    ROW_ALONG = 103,
+    ROW_RESPONSE = 109,
+    ROW_SCALE = 115,
+    ROW_PLANES = 121
+};
+
+struct alignas(16) real4 {
+    solver_real x, y, z, w;
+};
+
+struct row_about {
+    int32_t kind, rows, body_a, body_b; /* raw; the static world: `bodies` */
+    int32_t half_a, half_b;             /* as in pair_ends */
+    int32_t active;                     /* bit r: row r exists (a hard row of zeros is no constraint, Sec. III-C) */
+};
+
+/* fast: of an island, at its label. */
+struct cuda_island {
+    double speed, mass;  /* V in m/s; kg */
+    double level, scale; /* math/weight.h; scale not 0: weights are those taken last, times this */
+    double tallness;     /* math/weight.h: in steps that start warm, else 1 */
+    double slow_down;    /* math/limit.h: the factor of its velocities */
+    int32_t blocks;      /* there are constraints by rows: the level stays 1 */
+    int32_t stopped;     /* iterations after which a look found the tolerances met; 0: not yet */
+};
+
+/* fast: of a step's stop rule (iterate/stop_rule.h). */
+enum { LOOKS_KEPT = 3 };     /* the last look's, this one's, the next one's */
+struct cuda_stop {
+    unsigned long long sum;    /* of the iterations of islands that have stopped */
+    int32_t unmet[LOOKS_KEPT]; /* islands that had not, by the number of the look */
+    int32_t last;              /* the most iterations of those that have */
+};
+
+/* Of the first devices with clusters of thread blocks, and of those that launch kernels early. */
+#define CLUSTER_ARCH 900
+#define EARLY_ARCH 900
+
+enum { TERMS = 6 }; /* of a body, in sums over islands */
+
+/* Numbers of a half in half_arms (assemble/half_sums.h): sums over arms, as in arm_sums, then these. */
+enum { HALF_ARMS = 10, HALF_LOAD = HALF_ARMS, HALF_RESPONSE, HALF_NUMBERS };
+
+/* What a pair joins. */
+struct alignas(16) pair_ends {
+    int32_t body_a, body_b; /* raw; the static world: `bodies` */
+    int32_t half_a, half_b; /* places of its halves in `incident`, and of their records; of the static world: -1.
+                               For the stepwise kernels alone (streamed.cu) */
+};
+
+/* What kernels see. Pointers are device memory. Arrays over bodies are in raw order; offsets, parts and the states of
+ * resident blocks count bodies in slots (graph/layout.h). */
+struct cuda_view {
+    struct cuda_live *live;
+    struct cuda_facts *facts;
+    int32_t bodies;      /* exact, known to the host (state row `bodies` is the static world) */
+    int32_t pair_room;   /* multiple of 32. The number of pair p as a constraint is p, of row block k pair_room + k */
+    int32_t lanes;       /* threads a pair: 4, or 1 where no pair has more than one point */
+    int32_t rows;        /* row blocks: exact, known to the host */
+    int32_t points;      /* room */
+    int32_t row_stride;
+    int32_t contact_rows; /* of C, B and the response: 1 where no contact has friction (the iteration has 3 in any case) */
+    int32_t warm_start;
+
+    solver_real *state; /* (bodies + 1) x ROW: v, w, 1/beta, 0; the last row is the static world, all 0 */
+    solver_real *b;     /* bodies x ROW */
+    solver_real *defect; /* fast: bodies x ROW: b - A v + J^T lambda */
+    solver_real *lines; /* bodies x line: A and H (device/line.h) */
+    int32_t line;
+    int32_t rigid;      /* how lines are packed */
+    int32_t point_slots; /* a pair has room for */
+    double *C;          /* bodies x PACKED */
+    double *beta;       /* bodies, kg */
+
+    real4 *normal;      /* pairs: n, mu */
+    real4 *difference;  /* pairs: x_a - x_b, number of points */
+    pair_ends *ends;    /* pairs */
+    real4 *arm;         /* points: r_a (r_b when a is static), e */
+    solver_real *lambda; /* points: a plane for each of x, y, z */
+    size_t lambda_stride; /* from plane to plane */
+
+    row_about *row_info;
+    solver_real *row_data; /* ROW_PLANES x row_stride */
+
+    /* halves x ROW: a force, 0, torque, 0. After a measured iteration `records` holds J^T lambda and `change`
+     * J^T (lambda - lambda_prev), else `records` holds J^T (2 lambda - lambda_prev). fast: J^T (lambda^ - lambda). */
+    solver_real *records, *change;
+
+    const int32_t *offsets, *incident; /* body -> places of its halves; place -> half, ascending for each body */
+    const int32_t *body_of, *slot_of;  /* slot -> raw body, raw body -> slot */
+    const int32_t *parts;              /* first body slot of each part, and the end */
+    solver_real *exchange;             /* GRID: velocities of even and of odd iterations, bodies x ROW each */
+    unsigned *barrier;                 /* arrivals at the grid barrier since launch */
+    unsigned long long *residual;      /* primal, dual: bit patterns of doubles >= 0, which order like the numbers */
+    double *ratio;                     /* of (15), the last time */
+
+    struct sadmm_system raw;           /* rigid, A, b, velocity, blocks, block_lambda */
+    const struct sadmm_contact_pair *raw_pairs;
+    const struct sadmm_contact_point *raw_points;
+    struct sadmm_settings settings;
+    double *out; /* results in raw order */
+    struct cuda_step_view step; /* whole steps alone */
+
+    /* fast */
+    const int32_t *label, *island_bodies; /* of the layout */
+    double *A_inverse;       /* bodies x PACKED */
+    double *free_energy;     /* bodies: of A^-1 b, J */
+    double *terms;           /* slots x TERMS: of bodies, then added up in place (weight/island_sums.h) */
+    unsigned long long *arrivals; /* slots: of terms at places they are added up at; 0 between kernels */
+    cuda_island *islands;    /* bodies, used at labels */
+    double *weight, *response; /* pairs: B as taken last, kg; mean of J A^-1 J^T over points and rows, 1/kg */
+    double *half_wrench;     /* halves of pairs x ROW (assemble/half_sums.h) */
+    solver_real *half_arms;  /* halves of pairs x HALF_NUMBERS */
+    solver_real *inv_s;      /* pairs: B / number of dynamic bodies */
+    int32_t *limited;        /* islands slowed down */
+    int32_t *suspects;       /* not 0: some island may have to be */
+    cuda_stop *stop;
+};
+
+/* Kernels that are launched early (launch_early): until all that was enqueued before has ended. First of all, but for what is
+ * fetched from memory that the kernel before does not write: that one has waited itself, or was launched after all others had
+ * ended. */
+static __device__ __forceinline__ void wait_for_stream(void)
+{
+#if !defined(SADMM_CUDA_EMULATED) && __CUDA_ARCH__ >= EARLY_ARCH
+    asm volatile("griddepcontrol.wait;" ::: "memory");
+#endif
+}
+
+/* The next kernel, where launched early, may come to its multiprocessors and do what it does before it waits. Where this one has
+ * waited. */
+static __device__ __forceinline__ void let_next_begin(void)
+{
+#if !defined(SADMM_CUDA_EMULATED) && __CUDA_ARCH__ >= EARLY_ARCH
+    asm volatile("griddepcontrol.launch_dependents;");
+#endif
+}
+
+/* Where the data of point k of pair p is. */
+template <int LANES_A_PAIR> static __device__ __forceinline__ size_t point_slot(const cuda_view &v, int32_t p, int32_t k)
+{
+    return (size_t)(k / LANES_A_PAIR * LANES_A_PAIR) * (size_t)v.pair_room + (size_t)p * LANES_A_PAIR + (size_t)(k % LANES_A_PAIR);
+}
+static __device__ __forceinline__ size_t point_slot(const cuda_view &v, int32_t p, int32_t k)
+{
+    return v.lanes == 1 ? point_slot<1>(v, p, k) : point_slot<4>(v, p, k);
+}
+
+/* Points of a pair that are fetched before the first of them is used: a thread that waits for memory point by point waits
+ * longest of all. */
+enum { POINTS_AT_ONCE = 4 };
+
+/* This step's counts; 0 when it is halted. Both are in one load. */
+static __device__ __forceinline__ int32_t live_pairs(const cuda_view &v)
+{
+    const int4 live = *(const int4 *)v.live;
+    static_assert(sizeof(struct cuda_live) == sizeof(int4), "halt, bodies, pairs, points");
+    return live.x ? 0 : live.z;
+}
+static __device__ __forceinline__ int32_t live_bodies(const cuda_view &v) { return v.live->halt ? 0 : v.bodies; }
+static __device__ __forceinline__ int32_t live_rows(const cuda_view &v) { return v.live->halt ? 0 : v.rows; }
+
+/* What an iterating kernel does about energies after its last iteration: it says whether an island may have too much, or it
+ * sees to everything (BLOCK). */
+enum cuda_limit { LIMIT_NONE, LIMIT_SUSPECTS, LIMIT_WHOLE };
+
+/* What differs between launches of a kernel. */
+struct cuda_args {
+    int32_t count;      /* iterations, or a kind of block */
+    int32_t measure;
+    int32_t join;       /* the first Step 1 takes records + ratio change */
+    int32_t start;      /* the first Step 1 takes J^T lambda^0, whatever the records are */
+    int32_t most_bodies, cluster; /* of the partition */
+    int32_t planned;    /* a whole step: compare with the plan */
+    int32_t rescaled;   /* ratio is view.ratio, else 1 */
+    int32_t backward;   /* thread blocks in descending order */
+    int32_t in_order;   /* slots are raw indices */
+    int32_t settled;    /* fast: Step 1 ran before in this solve */
+    int32_t goes_on;    /* fast: the stretch does not end with these iterations */
+    int32_t warm;       /* fast: the step starts warm */
+    int32_t looks;      /* fast: of the stop rule, in this step so far */
+    int32_t begin;      /* fast, BLOCK: weights, C and factors first */
+    int32_t limit;      /* fast: of energies; enum cuda_limit */
+    int32_t few;        /* fast: and those that bounce (math/limit.h) */
+    const struct sadmm_resident_edit *edits;
+    double factor;
+    double multipliers; /* fast: how many times as far as lambda^ those of this iteration have gone */
+    solver_real relaxation; /* fast: of the settings, rounded once: a conversion in every iteration would be waited for */
+};
+
+typedef void (*cuda_kernel)(const cuda_view, const cuda_args);
+
+/* Shared memory of a block, sized at launch. */
+#ifdef SADMM_CUDA_EMULATED
+#define CUDA_DYNAMIC_SHARED(name) unsigned char *const name = cuda_emulation_shared()
+#else
+#define CUDA_DYNAMIC_SHARED(name) extern __shared__ __align__(16) unsigned char name[]
+#endif
+
+enum { ALL_LANES = -1 }; /* of a warp */
+
+/* *out = max(*out, values of the warp). Every lane of the warp comes here. Bit patterns of non-negative doubles order
+ * like the numbers, and a maximum does not depend on the order it is taken in; a NaN survives as the largest pattern.
+ * */
+static __device__ __forceinline__ void reduce_max(double value, unsigned long long *out)
+{
+    /* -0 (what real_abs may give) has the largest pattern but one: it counts as 0. */
+    unsigned long long bits = value == 0 ? 0 : (unsigned long long)__double_as_longlong(value);
+    for (int o = WARP / 2; o > 0; o /= 2) {
+        unsigned long long other = __shfl_xor_sync((unsigned)ALL_LANES, bits, o);
+        bits = other > bits ? other : bits;
+    }
+    if (threadIdx.x % WARP == 0 && bits != 0) atomicMax(out, bits);
+}
+
+#endif
