@@ -179,10 +179,18 @@ static sadmm_status check_body_pair(const char *array, int32_t index, int32_t a,
     return SADMM_OK;
 }
 
-/* Symmetric to 1e-9 of the diagonal's scale (room for a file's decimals) and positive definite. */
+/* What is kept of a mass matrix that is symmetric but for its decimals; of a symmetric one every bit. */
+static void symmetric_part(const double A[36], double mean[36])
+{
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j <= i; ++j)
+            mean[6 * i + j] = mean[6 * j + i] = A[6 * i + j] + 0.5 * (A[6 * j + i] - A[6 * i + j]);
+}
+
+/* Symmetric to 1e-9 of the diagonal's scale (room for a file's decimals), and what is kept of it positive definite. */
 static sadmm_status check_mass(int32_t index, const double A[36], struct sadmm_error *error)
 {
-    double L[36];
+    double mean[36], L[36];
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < i; ++j) {
             double scale = sqrt(fabs(A[7 * i])) * sqrt(fabs(A[7 * j]));
@@ -190,7 +198,8 @@ static sadmm_status check_mass(int32_t index, const double A[36], struct sadmm_e
                 REFUSE("A[%d]: entries (%d, %d) = %g and (%d, %d) = %g: must be symmetric", index, i, j, A[6 * i + j],
                        j, i, A[6 * j + i]);
         }
-    if (!dense6_cholesky(A, L)) REFUSE("A[%d]: must be positive definite, and is not to double precision", index);
+    symmetric_part(A, mean);
+    if (!dense6_cholesky(mean, L)) REFUSE("A[%d]: must be positive definite, and is not to double precision", index);
     return SADMM_OK;
 }
 
@@ -239,10 +248,8 @@ sadmm_status sadmm_problem_set_bodies(sadmm_problem *problem, int32_t count, con
         return sadmm_fail_memory(error, "the problem's bodies");
     }
     for (size_t k = 0; k < n; ++k) {
-        const double *given = A + 36 * k;
         double *mean = new_A + 36 * k, L[36];
-        for (int i = 0; i < 6; ++i)
-            for (int j = 0; j < 6; ++j) mean[6 * i + j] = 0.5 * given[6 * i + j] + 0.5 * given[6 * j + i];
+        symmetric_part(A + 36 * k, mean);
         memcpy(new_b + 6 * k, b + 6 * k, 6 * sizeof(double));
         if (v0) {
             memcpy(velocity + 6 * k, v0 + 6 * k, 6 * sizeof(double));
@@ -576,6 +583,7 @@ sadmm_status sadmm_problem_certify(sadmm_problem *problem, sadmm_certificate *ce
 /* `saved` holds velocities, impulses and multipliers one after the other; an empty problem has none. */
 static void save_solution(sadmm_problem *problem)
 {
+    if (!problem->saved) return; /* nothing was ever set */
     size_t bodies = 6 * (size_t)problem->body_count, points = 3 * problem->contacts.point_count;
     if (!problem->saved) return;
     sadmm_problem_get_solution(problem, problem->saved, problem->saved + bodies, problem->saved + bodies + points);
@@ -583,6 +591,7 @@ static void save_solution(sadmm_problem *problem)
 
 static void restore_solution(sadmm_problem *problem)
 {
+    if (!problem->saved) return; /* nothing was ever set */
     size_t bodies = 6 * (size_t)problem->body_count, points = 3 * problem->contacts.point_count;
     if (!problem->saved) return;
     copy_values(problem->velocity, problem->saved, bodies);
