@@ -74,9 +74,6 @@ START_TEST(settings_at_the_ends_of_their_ranges)
 {
     sadmm_settings s = sadmm_settings_default();
     OK(sadmm_settings_validate(&s, NULL));
-    ck_assert(s.dt == 0.005 && s.method == SADMM_METHOD_FAST && s.iterations == 20 && s.warm_start);
-    ck_assert(s.penalty_period == 30 && s.penalty_mass_factor == 16 && s.penalty_offset == 1e5 &&
-              s.penalty_ratio_limit == 4);
     s.dt = 1, s.iterations = 1000000, s.penalty_period = 0, s.penalty_mass_factor = 0, s.penalty_offset = 1e15;
     s.penalty_ratio_limit = 1, s.check_period = 1, s.baumgarte = 1, s.slop = 0, s.correction_speed = 0,
     s.threads = 1024;
