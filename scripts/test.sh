@@ -5,7 +5,8 @@ set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 
 steps=(plain asan tsan minimal cuda)
-more_steps=(gpu) # only when asked for
+slow_steps=(fuzz) # with --slow
+more_steps=(gpu)  # only when asked for
 
 usage() {
     cat <<TXT
@@ -15,14 +16,17 @@ Installs what is missing (Debian and Ubuntu, as root or by sudo without a passwo
     plain    every feature but CUDA, warnings are errors, the whole suite
     asan     address and undefined-behaviour sanitizers, the whole suite
     tsan     thread sanitizer, the tests of suite 'threads'
-    minimal  by clang, no optional feature, no instruction set beyond the compiler's default, the whole suite
+    minimal  by clang, no optional feature, no instruction set beyond the compiler's default, the whole suite without the
+             emulated CUDA device, which plain and asan have
     cuda     when nvcc is found: the CUDA backend compiles; its tests run where there is a GPU, and are counted as skipped
-             where there is none
+             where there is none. There the code is for one architecture and not optimised, since nothing runs it
+with --slow:
+    fuzz     by clang: libFuzzer on each of tests/fuzz, a fixed number of inputs, the same ones every time
 and, when asked for by --only, on a machine with a GPU:
     gpu      the tests of suite 'gpu' under compute-sanitizer: memcheck, initcheck, synccheck, racecheck
 The last line sums up the checks of all steps. Exit status 0: nothing failed.
 
---slow       run the tests of suite 'slow' too (in step plain)
+--slow       run the tests of suite 'slow' (in step plain) and step fuzz too; compile CUDA for all architectures
 --only STEP  this step only; may be given more than once
 JOBS=n       compile and test with n jobs instead of all cores
 
@@ -36,7 +40,7 @@ while (($#)); do
     case $1 in
         --slow) slow=true ;;
         --only)
-            [[ " ${steps[*]} ${more_steps[*]} " == *" ${2:-} "* ]] || fail "--only ${2:-}: must be one of ${steps[*]} ${more_steps[*]}"
+            [[ " ${steps[*]} ${slow_steps[*]} ${more_steps[*]} " == *" ${2:-} "* ]] || fail "--only ${2:-}: must be one of ${steps[*]} ${slow_steps[*]} ${more_steps[*]}"
             only+=("$2")
             shift
             ;;
@@ -45,6 +49,7 @@ while (($#)); do
     esac
     shift
 done
+$slow && steps+=("${slow_steps[@]}")
 ((${#only[@]})) && steps=("${only[@]}")
 
 install_packages "${packages_to_test[@]}"
@@ -119,7 +124,7 @@ step_tsan() {
 step_minimal() {
     say "minimal: by clang, no FCL, CUDA, HDF5 or OpenMP, no instruction set beyond the compiler's default"
     CC=clang CXX=clang++ build minimal -Dwerror=true -Dtests=enabled -Dcli=enabled -Dbench=enabled -Dfcl=disabled -Dcuda=disabled \
-        -Dhdf5=disabled -Dopenmp=disabled -Dsiconos=disabled -Dcpu_isas=baseline || return 1
+        -Dhdf5=disabled -Dopenmp=disabled -Dsiconos=disabled -Dcpu_isas=baseline -Demulated_cuda=disabled || return 1
     run_tests minimal --no-suite slow
 }
 
@@ -130,13 +135,29 @@ step_cuda() {
         return
     fi
     say "cuda: the CUDA backend"
-    build cuda "${features[@]}" -Dcuda=enabled || return 1
     if command -v nvidia-smi >/dev/null && nvidia-smi -L 2>/dev/null | grep -q GPU; then
+        build cuda "${features[@]}" -Dcuda=enabled || return 1
         run_tests cuda --no-suite slow
-    else
-        echo "no GPU here: the tests of suite 'gpu' say so and are skipped"
-        run_tests cuda --suite gpu
+        return
     fi
+    # It compiles and links, and its tests say what is missing; what all steps before this one test is left out.
+    local archs=90 rebuild=()
+    $slow && archs=80,90
+    echo "no GPU here: compiled for sm_${archs/,/ and sm_}, and the tests of suite 'gpu' are skipped"
+    configure "$project/build-cuda-compile" -Dwerror=true -Dcuda=enabled -Dgpu_archs="$archs" -Dcpu_isas=baseline \
+        -Demulated_cuda=disabled -Dfcl=disabled -Dhdf5=disabled -Dsiconos=disabled -Dcli=disabled -Dbench=disabled \
+        -Dtests=enabled || return 1
+    # What is not run need not be fast: most of the time is the assembler's.
+    NVCC_APPEND_FLAGS="-Xptxas=-O0 ${NVCC_APPEND_FLAGS:-}" ninja -C "$project/build-cuda-compile" -j "$jobs" --quiet \
+        src/libsubadmm.a || return 1
+    run_tests cuda-compile --suite gpu
+}
+
+step_fuzz() {
+    say "fuzz: libFuzzer"
+    build fuzz --native-file "$project/presets/fuzz.ini" -Dtests=enabled -Demulated_cuda=disabled || return 1
+    local launcher=("${unrandomised[@]}")
+    run_tests fuzz --suite fuzz
 }
 
 step_gpu() {

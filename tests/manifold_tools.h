@@ -2,7 +2,9 @@
 #ifndef SADMM_TESTS_MANIFOLD_TOOLS_H
 #define SADMM_TESTS_MANIFOLD_TOOLS_H
 
+#ifndef ck_assert /* a program without Check brings its own */
 #include <check.h>
+#endif
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>

@@ -1,0 +1,12 @@
+#!/bin/sh
+# usage: search.sh FUZZER CORPUS RUNS: that many inputs, the same ones every time. What it finds besides failures is not kept;
+# an input that fails is, in the folder this is started in, as FUZZER-crash-*.
+set -eu
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+mkdir "$scratch/new"
+status=0
+"$1" -seed=1 -runs="$3" -max_len=2048 -timeout=60 -rss_limit_mb=2048 -artifact_prefix="$(basename "$1")-" -print_final_stats=1 \
+    "$scratch/new" "$2" >"$scratch/log" 2>&1 || status=$?
+tail -n 60 "$scratch/log"
+exit $status
