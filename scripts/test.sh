@@ -155,8 +155,9 @@ step_cuda() {
 
 step_fuzz() {
     say "fuzz: libFuzzer"
-    build fuzz --native-file "$project/presets/fuzz.ini" -Dtests=enabled -Demulated_cuda=disabled || return 1
-    local launcher=("${unrandomised[@]}")
+    # Only what the tests of this suite need is built.
+    configure "$project/build-fuzz" --native-file "$project/presets/fuzz.ini" -Dtests=enabled -Dwerror=true || return 1
+    local launcher=("${unrandomised[@]}") rebuild=()
     run_tests fuzz --suite fuzz
 }
 
