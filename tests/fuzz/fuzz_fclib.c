@@ -167,7 +167,7 @@ static void write_content(const char *path, const struct content *c)
 
 /* ---- reading it -------------------------------------------------------------------------------------------------- */
 
-static void must_be_the_same(const sadmm_problem *a, const sadmm_problem *b)
+static void must_be_the_same(sadmm_problem *a, sadmm_problem *b)
 {
     double A[2][36 * MAX_BODIES], f[2][6 * MAX_BODIES];
     int32_t bodies = sadmm_problem_body_count(a), blocks = sadmm_problem_block_count(a);

@@ -30,7 +30,7 @@ struct picture {
     sadmm_problem_block block[MAX_BLOCKS];
 };
 
-static void look(const sadmm_problem *problem, struct picture *p)
+static void look(sadmm_problem *problem, struct picture *p)
 {
     memset(p, 0, sizeof *p);
     p->bodies = sadmm_problem_body_count(problem);
