@@ -55,8 +55,9 @@ SADMM_API void sadmm_world_destroy(sadmm_world *world); /* NULL is fine */
 SADMM_API const char *sadmm_world_message(const sadmm_world *world);
 
 /* Replace or read the settings; they take effect at the next step. Steps of another length (dt) go on with the forces of
- * the last one. Errors: INVALID_ARGUMENT (nothing changes). The settings of NULL are the default
- * ones. */
+ * the last one. Numbers (dt, gravity, relaxation, penalties, tolerances, error correction) may change at every step; where steps
+ * run ahead (sadmm_world_step_async), a change of anything else, e.g. of iterations, waits for the steps begun.
+ * Errors: INVALID_ARGUMENT (nothing changes). The settings of NULL are the default ones. */
 SADMM_API sadmm_status sadmm_world_set_settings(sadmm_world *world, const sadmm_settings *settings);
 SADMM_API sadmm_settings sadmm_world_settings(const sadmm_world *world);
 
@@ -157,7 +158,16 @@ SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_s
  * be repeated bit for bit begins with a new world. */
 
 /* One time step of settings.dt. Errors: OUT_OF_MEMORY, NON_FINITE (state rolled back to before the step, message
- * names the body), DEVICE, LIMIT. After an error the world is as before the step and stays usable. */
+ * names the body), DEVICE, LIMIT. After an error the world is as before the step and stays usable.
+ *
+ * DEVICE: a call of the device failed; any function that waits for steps begun may return it, once. Everything the world had
+ * on the device is given up, and the next step begins there anew. Where the device still answers (a call failed, not the
+ * device) nothing is lost: the world is as after the last step done. Where it does not, the host's copy counts: bodies as they
+ * were when a function that reads states (sadmm_world_body_state, _body_def, _body_contact_wrench, _state_hash) was called
+ * last, impulses to start from as when contacts were, and every state and wrench set since; time and sadmm_step_report.step go
+ * back to that step, which the message names. All functions but steps go on with it; a step says DEVICE as long as the device
+ * does not answer (CUDA: after a fault of a kernel, until the process ends or resets the device, which is for the program to
+ * do, once every world of the device has returned the error). */
 SADMM_API sadmm_status sadmm_world_step(sadmm_world *world);
 
 /* Begin a step and return without waiting for it, where the backend can: CUDA, in the method FAST from the second step on;

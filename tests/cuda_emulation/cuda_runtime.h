@@ -334,6 +334,7 @@ inline cudaGraph_t capture; /* what is recorded, when a stream is being captured
 /* The call of this thread that cuda_emulation_fail_after() chose fails. */
 inline bool fails(void)
 {
+    if (cuda_emulation_lost) return true;
     if (cuda_emulation_calls_left < 0) return false;
     return cuda_emulation_calls_left-- == 0;
 }
@@ -464,6 +465,7 @@ inline cudaError_t cudaStreamDestroy(cudaStream_t stream)
 }
 inline cudaError_t cudaStreamSynchronize(cudaStream_t)
 {
+    ++cuda_emulation_waits;
     CUDA_EMULATION_CALL;
     return cudaSuccess;
 }
@@ -484,6 +486,7 @@ inline cudaError_t cudaStreamWaitEvent(cudaStream_t, cudaEvent_t, unsigned)
 }
 inline cudaError_t cudaEventSynchronize(cudaEvent_t)
 {
+    ++cuda_emulation_waits;
     CUDA_EMULATION_CALL;
     return cudaSuccess;
 }
@@ -510,6 +513,7 @@ inline cudaError_t cudaGraphInstantiate(cudaGraphExec_t *out, cudaGraph_t graph,
 {
     CUDA_EMULATION_CALL;
     *out = new std::vector<std::function<bool()>>(*graph);
+    ++cuda_emulation_graphs_made;
     ++cuda_emulation_allocations;
     return cudaSuccess;
 }

@@ -11,7 +11,9 @@
 
 int cuda_emulation_descending;
 long cuda_emulation_calls_left = -1;
+int cuda_emulation_lost;
 long cuda_emulation_allocations;
+long cuda_emulation_graphs_made, cuda_emulation_waits;
 
 const struct sadmm_kernels cuda_emulation_tables[2] = {
     [SADMM_F32] = CUDA_TABLE(_emulated_f32, SADMM_F32),

@@ -43,7 +43,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     if (i >= v.bodies || v.live->halt) return; /* may run before the step's contacts are known */
     if (FAST && i == 0) clear_counts(v);
     double A[36], b[6], x[6], factor[36];
-    sadmm_system_body(&v.raw, &v.settings, i, A, b);
+    const struct sadmm_settings settings = *v.settings;
+    sadmm_system_body(&v.raw, &settings, i, A, b);
     if (v.warm_start || !dense6_cholesky(A, factor)) {
         for (int k = 0; k < 6; ++k) x[k] = v.raw.velocity[6 * (size_t)i + (size_t)k];
     } else {
@@ -108,7 +109,7 @@ static __device__ real4 pack(vec3 a, double w)
 
 static __device__ double solver_friction(const cuda_view &v, double mu)
 {
-    return v.settings.method == SADMM_METHOD_FAST ? contact_friction_inside(mu, SOLVER_EPSILON) : mu;
+    return v.fast ? contact_friction_inside(mu, SOLVER_EPSILON) : mu;
 }
 
 /* v.lanes threads a pair, each every v.lanes-th point; the first also what the points share. FAST: records of halves, too. */
@@ -120,6 +121,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const bool live = p < live_pairs(v);
     const struct sadmm_contact_pair *pair = &v.raw_pairs[live ? p : 0];
     if (!FAST && !live) return;
+    const struct sadmm_settings settings = *v.settings; /* those that count are fetched here, not where they are needed */
     const struct sadmm_contact_point *points = v.raw_points + (live ? pair->first : 0);
     const vec3 normal = live ? v3_load(pair->normal) : v3(0, 0, 0);
     const bool a = live && pair->body_a >= 0, b = live && pair->body_b >= 0;
@@ -145,7 +147,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         const size_t slot = point_slot(v, p, k);
         vec3 impulse = v.warm_start ? v3_load(points[k].impulse) : v3(0, 0, 0);
         if (v.contact_rows == 1) impulse = v3_scale(normal, v3_dot(normal, impulse)); /* the row there is */
-        const double error = sadmm_contact_e(&v.raw, &v.settings, pair, &points[k]);
+        const double error = sadmm_contact_e(&v.raw, &settings, pair, &points[k]);
         const real4 arm = pack(v3_load(a ? points[k].arm_a : points[k].arm_b), error);
         const solver_real lambda[3] = {(solver_real)impulse.x, (solver_real)impulse.y, (solver_real)impulse.z};
         v.arm[slot] = arm;

@@ -75,6 +75,7 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
     if (halted(v)) return;
     if (i == 0) *v.candidate_count = 0;
     if (i >= v.leaf_count + v.plane_count) return;
+    const struct collision_step step = step_of(v);
     const uint32_t slot = v.present[i];
     const struct sadmm_shape &shape = v.shapes[slot];
     const struct sadmm_collision_body &body = v.bodies[shape.body];
@@ -83,7 +84,7 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
     struct collision_leaf leaf;
     struct collision_filter filter;
 
-    proxy_place(&shape, &body, v.step.dt, v.step.margin, v.step.gravity, &proxy, &leaf.box);
+    proxy_place(&shape, &body, step.dt, step.margin, step.gravity, &proxy, &leaf.box);
     v.proxies[slot] = proxy;
     filter.category = shape.category;
     filter.mask = shape.mask;
@@ -214,9 +215,9 @@ static __device__ __forceinline__ bool leaves_overlap(const struct collision_lea
 
 /* Of leaves that overlap. */
 static __device__ __forceinline__ bool leaves_meet(const collision_view &v, const struct collision_leaf &a,
-                                                   const struct collision_leaf &b)
+                                                   const struct collision_leaf &b, double dt)
 {
-    return boxes_meet(&a.box, v.proxies[a.slot].velocity, &b.box, v.proxies[b.slot].velocity, v.step.dt);
+    return boxes_meet(&a.box, v.proxies[a.slot].velocity, &b.box, v.proxies[b.slot].velocity, dt);
 }
 
 /* The shape of the lower (type, slot) comes first. */
@@ -261,12 +262,12 @@ static __device__ void finish_batches(const collision_view &v, const struct batc
 }
 
 /* The planes that a mover meets: those of every group, and those of its own. */
-static __device__ void add_planes(const collision_view &v, struct batch *out, const struct collision_filter &own,
-                                  const struct collision_leaf &leaf)
+static __device__ void add_planes(const collision_view &v, const struct collision_step &step, struct batch *out,
+                                  const struct collision_filter &own, const struct collision_leaf &leaf)
 {
     const uint32_t slot = (uint32_t)leaf.slot;
     if (v.plane_count == 0 || !(own.kind & FILTER_MOVES)) return;
-    const double reach = proxy_plane_reach(&v.proxies[slot], v.step.margin, fall_of(v.step.gravity, v.step.dt));
+    const double reach = proxy_plane_reach(&v.proxies[slot], step.margin, fall_of(step.gravity, step.dt));
     const bool grouped = v.shared_planes < v.plane_count && leaf.group_low == leaf.group_high;
     for (int pass = 0; pass < (grouped ? 2 : 1); ++pass) {
         const uint64_t group = pass == 0 ? 0 : (uint64_t)leaf.group_low + 1;
@@ -294,7 +295,8 @@ static __device__ void walk(const collision_view &v, int32_t i, struct batch *ou
     const bool grouped = v.group_bits > 0;
     if (!(own.kind & FILTER_MOVES)) return;
     const struct collision_leaf leaf = v.placed[start.child];
-    add_planes(v, out, own, leaf);
+    const struct collision_step step = step_of(v);
+    add_planes(v, step, out, own, leaf);
     for (int32_t at = start.next; at >= 0;) {
         const struct collision_node node = v.nodes[at];
         bool meet = nodes_meet(start, node);
@@ -307,7 +309,7 @@ static __device__ void walk(const collision_view &v, int32_t i, struct batch *ou
             at = node.child;
             continue;
         }
-        if (meet && leaves_overlap(leaf, v.placed[node.child]) && leaves_meet(v, leaf, v.placed[node.child])) {
+        if (meet && leaves_overlap(leaf, v.placed[node.child]) && leaves_meet(v, leaf, v.placed[node.child], step.dt)) {
             const struct collision_filter other = v.filters[node.child];
             if (may_meet(v, own, other))
                 add(v, out, candidate_key(v, (uint32_t)leaf.slot, own.kind, (uint32_t)node.child, other.kind));
@@ -342,6 +344,7 @@ static __global__ void __launch_bounds__(TILE_ROWS) tiles_kernel(const __grid_co
     struct collision_leaf leaf;
     struct collision_filter own;
     if (halted(v) || (column >= 0 && first + TILE_COLUMNS - 1 <= row * TILE_ROWS)) return;
+    const struct collision_step step = step_of(v);
     if (i < v.leaf_count) {
         const uint32_t slot = v.present[i];
         leaf = v.placed[slot];
@@ -350,7 +353,7 @@ static __global__ void __launch_bounds__(TILE_ROWS) tiles_kernel(const __grid_co
     if (column < 0) {
         struct batch out;
         out.count = 0;
-        if (i < v.leaf_count) add_planes(v, &out, own, leaf);
+        if (i < v.leaf_count) add_planes(v, step, &out, own, leaf);
         finish_batches(v, out);
         return;
     }
@@ -371,7 +374,7 @@ static __global__ void __launch_bounds__(TILE_ROWS) tiles_kernel(const __grid_co
         if (i >= first) hits &= i - first < TILE_COLUMNS - 1 ? ~UINT64_C(0) << (i - first + 1) : 0;
         for (uint64_t left = hits; left; left &= left - 1) {
             const int j = trailing_zeros(left);
-            if (!may_meet(v, own, others.filters[j]) || !leaves_meet(v, leaf, others.leaves[j])) hits ^= left & (0 - left);
+            if (!may_meet(v, own, others.filters[j]) || !leaves_meet(v, leaf, others.leaves[j], step.dt)) hits ^= left & (0 - left);
         }
     }
     unsigned long long at = reserve_by_warp(v.candidate_count, (unsigned)bits_set(hits));

@@ -27,11 +27,12 @@ sadmm_status COLLISION(download)(struct sadmm_cuda_collision *collision, void *s
 /* ---- for steps that are enqueued: no host in between ---- */
 
 /* Take what a find takes from the host, once; `bodies` (by body slot) will be on the device, written before each
- * enqueued find, and are as input->bodies now. `halt`, on the device: while it is not 0, enqueued finds do nothing.
+ * enqueued find, and are as input->bodies now. `halt`, on the device: while it is not 0, enqueued finds do nothing. `settings`, on
+ * the device: time step and gravity, in the place of the input's.
  * Everything enqueued earlier must be done. The current set stays. */
 sadmm_status COLLISION(attach)(struct sadmm_cuda_collision *collision, void *stream,
                                const struct sadmm_collision_input *input, const struct sadmm_collision_body *bodies,
-                               const int32_t *halt, struct sadmm_error *error);
+                               const int32_t *halt, const struct sadmm_settings *settings, struct sadmm_error *error);
 /* Room for so many candidates and points in both sets, which keep what they hold. 0: what a scene of this size is likely
  * to need. Everything enqueued must be done. *candidates and *points: what there is room for now, at least as much. */
 sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *collision, int64_t *candidates, int64_t *points,
@@ -42,8 +43,6 @@ sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *collision, void *st
                                 struct sadmm_error *error);
 /* A set's pointers; counts are not filled. */
 struct sadmm_cuda_contacts COLLISION(set)(const struct sadmm_cuda_collision *collision, int which);
-/* Another time step (s) and size of gravity (m/s^2) than at attach, from the next enqueue on. */
-void COLLISION(set_step)(struct sadmm_cuda_collision *collision, double dt, double gravity);
 /* Which set is the current one, and with how much in it, after enqueued finds. */
 void COLLISION(settle)(struct sadmm_cuda_collision *collision, int current, struct sadmm_cuda_contact_counts counts);
 int COLLISION(current)(const struct sadmm_cuda_collision *collision);

@@ -17,7 +17,7 @@ static __device__ void emit_counts(const collision_view &v, uint64_t total)
     v.after.counts->candidates = (int64_t)*v.candidate_count;
     v.after.counts->pairs = (int32_t)(total >> 32);
     v.after.counts->points = (int32_t)(uint32_t)total;
-    v.after.counts->dt = v.step.dt;
+    v.after.counts->dt = step_of(v).dt;
 }
 
 /* Point `lane` of candidate i; place: pairs << 32 | points before it. */
@@ -77,7 +77,7 @@ static __device__ void emit_point(const collision_view &v, int64_t i, int32_t la
             const struct sadmm_contact_point *before = &v.before.points[old_first + k];
             if (before->feature != from.feature) continue;
             impulse_carry(old->normal, before->impulse, normal, friction,
-                          step_ratio(v.step.dt, v.before.counts->dt), point.impulse);
+                          step_ratio(step_of(v).dt, v.before.counts->dt), point.impulse);
             break;
         }
     }

@@ -34,6 +34,7 @@ static __global__ void __launch_bounds__(NARROW_THREADS) narrow_kernel(const __g
         v.sizes[i] = 0;
         return;
     }
+    const struct collision_step step = step_of(v);
     const uint64_t key = v.candidates[i];
     const uint32_t a = (uint32_t)(key >> v.slot_bits), b = (uint32_t)(key & ((UINT64_C(1) << v.slot_bits) - 1));
     const struct sadmm_proxy *pa = &v.proxies[a], *pb = &v.proxies[b];
@@ -41,7 +42,7 @@ static __global__ void __launch_bounds__(NARROW_THREADS) narrow_kernel(const __g
     if (before >= 0 && v.before.pairs[before].revision != word_of_pair(pa->revision, pb->revision)) before = -1;
 
     const bool in_place = before >= 0 && v.before.pairs[before].placed == word_of_pair(pa->placed, pb->placed);
-    const double limit = proxy_limit(pa, pb, v.step.margin, v.step.gravity, v.step.dt);
+    const double limit = proxy_limit(pa, pb, step.margin, step.gravity, step.dt);
     const struct pair_pose pose = pair_pose(pa->type == SADMM_SHAPE_PLANE, pa->R, pa->x, pb->R, pb->x);
     struct manifold m;
     pair_manifold(pa->type, v3_load(pa->size), pb->type, v3_load(pb->size), &pose, (real)limit,

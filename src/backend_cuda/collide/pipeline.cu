@@ -154,12 +154,6 @@ extern "C" struct sadmm_cuda_contacts COLLISION(set)(const struct sadmm_cuda_col
     return out;
 }
 
-extern "C" void COLLISION(set_step)(struct sadmm_cuda_collision *c, double dt, double gravity)
-{
-    c->view.step.dt = dt;
-    c->view.step.gravity = gravity;
-}
-
 extern "C" void COLLISION(settle)(struct sadmm_cuda_collision *c, int current,
                                   struct sadmm_cuda_contact_counts counts)
 {

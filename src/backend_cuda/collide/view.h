@@ -112,6 +112,7 @@ struct collision_view {
     int32_t body_count;                            /* slots */
     struct collision_grid *grid;                   /* of this step */
     const int32_t *halt;                           /* not NULL and not 0: do nothing */
+    const struct sadmm_settings *settings;         /* not NULL: have the time step and gravity (step_of) */
 
     struct sadmm_proxy *proxies;                   /* by slot */
     struct collision_filter *filters;              /* by slot */
@@ -138,6 +139,16 @@ struct collision_view {
 };
 
 static __device__ __forceinline__ bool halted(const collision_view &v) { return v.halt && *v.halt != 0; }
+
+/* To be fetched early: some of it may have to come from memory. */
+static __device__ __forceinline__ collision_step step_of(const collision_view &v)
+{
+    struct collision_step step = v.step;
+    if (!v.settings) return step;
+    step.dt = v.settings->dt;
+    step.gravity = gravity_size(v.settings->gravity);
+    return step;
+}
 
 /* Candidates that the kernels after the pairs stage work on: none when they did not all fit. */
 static __device__ __forceinline__ int32_t usable_candidates(const collision_view &v)

@@ -46,6 +46,7 @@ static const char *const buffer_names[] = {
     "sorts",
     "numbers",
     "scalars",
+    "settings",
     "weights",
     "records of halves",
     "bodies' input",
@@ -62,6 +63,7 @@ static const char *const buffer_names[] = {
     "world's places of bodies",
     "control of a step",
     "staged counts",
+    "staged settings",
     "staged bodies",
     "staged pairs",
     "staged points",
@@ -128,6 +130,28 @@ sadmm_status CUDA(download)(struct sadmm_context *c, const void *from, size_t by
         CUDA_CALL(c, cudaMemcpyAsync(c->buffers[PINNED_OUT].data, from, bytes, cudaMemcpyDeviceToHost, c->stream),
                   "cudaMemcpyAsync from the device");
     return CUDA(wait)(c, error);
+}
+
+void CUDA(plan_settings)(struct sadmm_context *c, const struct sadmm_settings *settings)
+{
+    c->settings = *settings;
+    c->fast = settings->method == SADMM_METHOD_FAST;
+    c->view.fast = c->fast;
+    c->view.wrenches = settings->recover_wrenches;
+}
+
+sadmm_status CUDA(use_settings)(struct sadmm_context *c, const struct sadmm_settings *settings, struct sadmm_error *error)
+{
+    double numbers[SADMM_SETTING_NUMBERS];
+    CUDA_TRY(CUDA(room)(c, BUFFER_SETTINGS, sizeof *settings, error));
+    CUDA_TRY(CUDA(room)(c, PINNED_SETTINGS, sizeof *settings, error));
+    CUDA(plan_settings)(c, settings);
+    c->view.settings = (const struct sadmm_settings *)c->buffers[BUFFER_SETTINGS].data;
+    sadmm_settings_numbers(settings, numbers);
+    if (memcmp(c->numbers, numbers, sizeof numbers) == 0) return SADMM_OK;
+    CUDA_TRY(CUDA(upload)(c, c->buffers[BUFFER_SETTINGS].data, PINNED_SETTINGS, 0, settings, sizeof *settings, error));
+    memcpy(c->numbers, numbers, sizeof numbers);
+    return SADMM_OK;
 }
 
 /* ---- launches ------------------------------------------------------------------------------------------------- */

@@ -2,6 +2,7 @@
 #ifndef SADMM_CUDA_DEVICE_CONTEXT_H
 #define SADMM_CUDA_DEVICE_CONTEXT_H
 
+#include "core/model/settings.h"
 #include "view.h"
 
 /* Scalars that are 0 before they are used. */
@@ -19,12 +20,12 @@ enum cuda_buffer_name {
     BUFFER_STATE, BUFFER_B, BUFFER_LINES, BUFFER_C, BUFFER_BETA,
     BUFFER_NORMAL, BUFFER_DIFFERENCE, BUFFER_PAIR_ENDS, BUFFER_ARM, BUFFER_LAMBDA,
     BUFFER_ROW_INFO, BUFFER_ROW_DATA, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_EXCHANGE, BUFFER_LIVE, BUFFER_LAYOUT, BUFFER_SORT,
-    BUFFER_NUMBERS, BUFFER_SCALARS, BUFFER_WEIGHTS, BUFFER_HALVES,
+    BUFFER_NUMBERS, BUFFER_SCALARS, BUFFER_SETTINGS, BUFFER_WEIGHTS, BUFFER_HALVES,
     BUFFER_RAW_BODIES, BUFFER_RAW_PAIRS, BUFFER_RAW_POINTS, BUFFER_RAW_BLOCKS, BUFFER_OUT,
     BUFFER_WORLD_BODIES, BUFFER_WORLD_STEADY, BUFFER_WORLD_WRENCH, BUFFER_WORLD_VELOCITY, BUFFER_WORLD_IMPULSE,
     BUFFER_WORLD_SLOTS, BUFFER_WORLD_PLACES, BUFFER_WORLD_CONTROL,
     /* pinned */
-    PINNED_LIVE, PINNED_BODIES, PINNED_PAIRS, PINNED_POINTS, PINNED_BLOCKS, PINNED_OUT, PINNED_REPORTS,
+    PINNED_LIVE, PINNED_SETTINGS, PINNED_BODIES, PINNED_PAIRS, PINNED_POINTS, PINNED_BLOCKS, PINNED_OUT, PINNED_REPORTS,
     BUFFER_COUNT
 };
 
@@ -39,6 +40,7 @@ struct sadmm_context {
     const struct sadmm_system *system;
     struct sadmm_plan plan;
     struct sadmm_settings settings;
+    double numbers[SADMM_SETTING_NUMBERS]; /* of the settings that are, or will be, in BUFFER_SETTINGS; dt = 0: unknown */
     cuda_view view;
     cuda_buffer buffers[BUFFER_COUNT];
     bool starting; /* no iteration yet: the next Step 1 uses J^T lambda^0, which `records` may not hold yet */
@@ -102,6 +104,10 @@ sadmm_status CUDA(upload)(struct sadmm_context *, void *to, enum cuda_buffer_nam
 /* The first `bytes` of view.out into PINNED_OUT, and wait. */
 sadmm_status CUDA(download)(struct sadmm_context *, const void *from, size_t bytes, struct sadmm_error *error);
 sadmm_status CUDA(wait)(struct sadmm_context *, struct sadmm_error *error);
+/* The settings that are no numbers: from the next launch, or recording, on. */
+void CUDA(plan_settings)(struct sadmm_context *, const struct sadmm_settings *settings);
+/* All of them, the numbers into device memory. Nothing may be enqueued. */
+sadmm_status CUDA(use_settings)(struct sadmm_context *, const struct sadmm_settings *settings, struct sadmm_error *error);
 
 /* The context's device is current while this lives; then the caller's again. (Unnamed: a test program links these sources
  * twice, for a device and emulated, and each must keep its own.) */

@@ -29,7 +29,6 @@
         .recover_wrenches = sadmm_cuda_recover_wrenches##suffix, \
         .resident = &(const struct sadmm_resident_kernels){    \
             .load = sadmm_cuda_load_world##suffix,             \
-            .edit = sadmm_cuda_edit_world##suffix,             \
             .step = sadmm_cuda_step_world##suffix,             \
             .wait = sadmm_cuda_wait_world##suffix,             \
             .read_bodies = sadmm_cuda_read_bodies##suffix,     \

@@ -180,7 +180,9 @@ struct cuda_view {
     struct sadmm_system raw;           /* rigid, A, b, velocity, blocks, block_lambda */
     const struct sadmm_contact_pair *raw_pairs;
     const struct sadmm_contact_point *raw_points;
-    struct sadmm_settings settings;
+    const struct sadmm_settings *settings; /* its numbers alone (core/model/settings.h): they may be others at every step.
+                                              Fetched early, for a kernel waits for them as for other memory */
+    int32_t fast, wrenches; /* of the rest of the settings: the method; recover_wrenches */
     double *out; /* results in raw order */
     struct cuda_step_view step; /* whole steps alone */
 
@@ -265,11 +267,13 @@ struct cuda_args {
     int32_t begin;      /* fast, BLOCK: weights, C and factors first */
     int32_t limit;      /* fast: of energies; enum cuda_limit */
     int32_t few;        /* fast: and those that bounce (math/limit.h) */
+    int32_t relax;      /* fast, STREAM: bits of enum cuda_relax */
     const struct sadmm_resident_edit *edits;
     double factor;
-    double multipliers; /* fast: how many times as far as lambda^ those of this iteration have gone */
-    solver_real relaxation; /* fast: of the settings, rounded once: a conversion in every iteration would be waited for */
 };
+
+/* fast: what goes as many times as far as the settings' relaxation says; else once. */
+enum cuda_relax { RELAX_VELOCITY = 1, RELAX_MULTIPLIERS = 2 };
 
 typedef void (*cuda_kernel)(const cuda_view, const cuda_args);
 

@@ -310,7 +310,6 @@ static void count(struct sadmm_context *c)
     v->row_stride = (v->rows + WARP - 1) / WARP * WARP;
     v->contact_rows = c->plan.contact_rows;
     v->warm_start = c->plan.warm_start;
-    v->settings = c->settings;
 }
 
 static sadmm_status upload_live(struct sadmm_context *c, enum cuda_halt halt, struct sadmm_error *error)
@@ -381,12 +380,11 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
     CUDA_TRY(CUDA(wait)(c, error)); /* the staging buffers are about to be written */
     c->system = system;
     c->plan = *plan;
-    c->settings = *settings;
     c->starting = true;
     c->placed = c->measured = c->rescaled = c->settled = c->ends = false;
-    c->fast = settings->method == SADMM_METHOD_FAST;
     c->refused = 0;
     c->graph_valid = false;
+    CUDA_TRY(CUDA(use_settings)(c, settings, error));
     count(c);
     CUDA_TRY(raw_room(c, error));
     CUDA_TRY(CUDA(layout_room)(c, error));

@@ -24,7 +24,6 @@ static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool
     args.limit = limit;
     args.few = limit_few(c->plan.warm, c->settings.iterations);
     args.looks = c->looks;
-    args.relaxation = (solver_real)c->settings.relaxation;
     args.most_bodies = partition->most_bodies;
     args.cluster = partition->cluster;
     cuda_kernel kernel = CUDA(resident_kernel)(c->facts.point_slots, partition->tier, partition->threads,

@@ -39,7 +39,7 @@ static __device__ __forceinline__ bool nothing_to_do(const cuda_view &v, const c
 
 /* The method `fast` (math/relax.h): Steps 2-4, then Step 1. An iteration has the barriers of the other method's. */
 template <int MODE, bool FULL, int SIZE, class Part>
-static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view &v, const cuda_args &args,
+static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view &v, const cuda_args &args, real relaxation,
                                                     unsigned *target)
 {
     if (MODE != BLOCK) { /* others look at the velocities that were loaded */
@@ -48,7 +48,7 @@ static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view 
     }
     int32_t count = args.count, stretch = args.goes_on ? count + 1 : count, settled = args.settled;
     /* Were it the launch's constant, and not a choice, it would be fetched in every iteration. */
-    real all = part.bodies > 0 ? args.relaxation : (real)1;
+    real all = part.bodies > 0 ? relaxation : (real)1;
     keep<SIZE>(&count), keep<SIZE>(&stretch), keep<SIZE>(&settled), keep<SIZE>(&all);
     for (int32_t i = 0; i < count; ++i) {
         const int32_t odd = i & 1;
@@ -115,9 +115,10 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
             weigh_in_block(v, args, ends, part.found, barrier);
             stamp_assembled(v);
         }
+    const real relaxation = FAST ? (real)v.settings->relaxation : (real)1; /* on its way with what is loaded */
     part.load();
     unsigned target = 0;
-    if (FAST) iterate_fast<MODE, FULL, SIZE>(part, v, args, &target);
+    if (FAST) iterate_fast<MODE, FULL, SIZE>(part, v, args, relaxation, &target);
     else iterate_paper<MODE, FULL, SIZE>(part, v, args, &target);
     /* After the iterations: what has come takes a place beside them. A cooperative launch ends 10 us later for it, and after
      * clusters it gains nothing. */

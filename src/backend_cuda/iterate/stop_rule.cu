@@ -17,6 +17,7 @@ static __device__ double natural_map(const cuda_view &v, int32_t p)
     const mat3 frame = sadmm_contact_frame(pair->normal);
     const int32_t bodies[2] = {pair->body_a, pair->body_b};
     const int rows = pair->friction > 0 ? 3 : 1;
+    const struct sadmm_settings settings = *v.settings;
     const int32_t count = (int32_t)v.difference[p].w; /* as planned for, should the pair have more: nobody has looked yet */
     double worst = 0;
     for (int32_t k = 0; k < count; ++k) {
@@ -39,7 +40,7 @@ static __device__ double natural_map(const cuda_view &v, int32_t p)
         }
         const vec3 impulse = m3_mul(frame, point_impulse(v, p, k)), x = m3_mul(frame, velocity);
         const double w = fmax(weight[0], fmax(weight[1], weight[2])),
-                     e = sadmm_contact_e(&v.raw, &v.settings, pair, point),
+                     e = sadmm_contact_e(&v.raw, &settings, pair, point),
                      lambda[3] = {impulse.x, impulse.y, impulse.z}, u[3] = {x.x + e, x.y, x.z};
         double y[3], inside[3], missed = 0;
         for (int i = 0; i < 3; ++i) y[i] = lambda[i] - u[i] / w;
@@ -72,10 +73,10 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     term[0] = largest_of_lanes(map);
     term[1] = largest_of_lanes(fabs(momentum - row.b - g));
     term[2] = largest_of_lanes(largest_term::join(fabs(g), largest_term::join(fabs(momentum), fabs(row.b))));
-    term[2] = fmax(term[2], t.live ? mass_of(v, t.body) * v.settings.certificate_tolerance : 0);
+    term[2] = fmax(term[2], t.live ? mass_of(v, t.body) * v.settings->certificate_tolerance : 0);
     if (!add_up_island<largest_term>(v, t, own_number(term, t.lane), largest) || t.lane != 0) return;
-    const bool met = largest[0] <= v.settings.certificate_tolerance &&
-                     largest[1] <= v.settings.certificate_momentum_tolerance * largest[2];
+    const bool met = largest[0] <= v.settings->certificate_tolerance &&
+                     largest[1] <= v.settings->certificate_momentum_tolerance * largest[2];
     int32_t *stopped = &v.islands[v.label[t.body]].stopped;
     if (!met) atomicAdd(&v.stop->unmet[args.looks % LOOKS_KEPT], 1);
     if (!met || *stopped > 0) return;

@@ -45,10 +45,17 @@ static __device__ __forceinline__ void store_numbers(solver_real *to, const real
     ((real4 *)to)[1] = hi;
 }
 
+/* How far a part of the iteration goes. */
+template <bool FAST>
+static __device__ __forceinline__ real relaxed(const cuda_view &v, const cuda_args &args, enum cuda_relax what)
+{
+    return FAST && args.relax & what ? (real)v.settings->relaxation : (real)1;
+}
+
 /* Step 1, a thread a body: all of a body's numbers lie side by side and are asked for at once, sixteen bytes at a time. (Eight
  * lanes a body, as in the resident tiers, where latency counts, spend the time on instructions that load and pass around
  * single numbers.) What is read once makes room in the caches for states and records. The sums are those of
- * free_momentum() and step_of(); FAST: of step_fast() and defect_after(), args.factor times as far. */
+ * free_momentum() and step_of(); FAST: of step_fast() and defect_after(), as far as args.relax says. */
 template <bool JOIN, bool RIGID, bool FAST>
 static __global__ void __launch_bounds__(BODY_THREADS)
     bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
@@ -59,7 +66,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     if (i >= live_bodies(v) || (FAST && all_stopped(v, args.looks))) return;
     const size_t at = args.in_order ? (size_t)i : (size_t)v.body_of[i];
     if (FAST && island_stopped(v, args.looks, (int32_t)at)) return;
-    const real ratio = JOIN && args.rescaled ? (real)*v.ratio : (real)1;
+    const real ratio = JOIN && args.rescaled ? (real)*v.ratio : (real)1, farther = relaxed<FAST>(v, args, RELAX_VELOCITY),
+               multipliers = relaxed<FAST>(v, args, RELAX_MULTIPLIERS);
     real line[LINE], b[ROW], state[ROW], g[6], step[6];
     load_numbers_once<LINE / 4>(line, v.lines + at * LINE);
     load_numbers_once<ROW / 4>(b, (FAST ? v.defect : v.b) + at * ROW);
@@ -91,14 +99,14 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         step[r] = product_with_row(H[packed_place(r, 0)], H[packed_place(r, 1)], H[packed_place(r, 2)],
                                    H[packed_place(r, 3)], H[packed_place(r, 4)], H[packed_place(r, 5)], pushed);
         const real before = state[r];
-        state[r] = FAST ? fused((real)args.factor, step[r], before) : before + step[r];
+        state[r] = FAST ? fused(farther, step[r], before) : before + step[r];
         step[r] = state[r] - before;
     }
     store_numbers(v.state + at * ROW, state);
     if (FAST) {
 #pragma unroll
         for (int r = 0; r < 6; ++r) {
-            b[r] = fused((real)args.multipliers, g[r], b[r]);
+            b[r] = fused(multipliers, g[r], b[r]);
 #pragma unroll
             for (int k = 0; k < 6; ++k) b[r] = fused(-line_a((const real *)line, RIGID, r, k), step[k], b[r]);
         }
@@ -121,7 +129,7 @@ static __device__ __forceinline__ void with_pair(const cuda_view &v, int32_t t, 
     if (t / WARP * (WARP / LANES_A_PAIR) < pairs) work(p < pairs ? p : pairs - 1, t % LANES_A_PAIR, p < pairs);
 }
 
-/* FAST: args.factor times as far. */
+/* FAST: as far as args.relax says. */
 template <int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
 static __global__ void __launch_bounds__(THREADS)
     constraints_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
@@ -129,13 +137,14 @@ static __global__ void __launch_bounds__(THREADS)
     const int32_t t = thread_index(args), k = t - pair_threads<LANES_A_PAIR>(v);
     double primal = 0;
     if (FAST && all_stopped(v, args.looks)) return;
+    const real farther = relaxed<FAST>(v, args, RELAX_MULTIPLIERS);
     if (k < 0)
         with_pair<LANES_A_PAIR>(v, t, [&](int32_t p, int32_t lane, bool live) {
             const bool on = live && !(FAST && pair_stopped(v, args.looks, v.ends[p]));
-            primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v, p, lane, on, (real)args.factor);
+            primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v, p, lane, on, farther);
         });
     else if (k < live_rows(v))
-        primal = FAST ? sweep_row_block_fast<MEASURE>(v, k, (real)args.factor) : sweep_row_block<MEASURE>(v, k);
+        primal = FAST ? sweep_row_block_fast<MEASURE>(v, k, farther) : sweep_row_block<MEASURE>(v, k);
     if (MEASURE) reduce_max(primal, v.residual);
 }
 
@@ -167,17 +176,15 @@ static __global__ void place_kernel(const __grid_constant__ cuda_view v, const _
 
 /* ---- launches ------------------------------------------------------------------------------------------------- */
 
-/* fast: v goes `relaxation` times as far, multipliers have gone `multipliers` times. */
-static sadmm_status launch_bodies(struct sadmm_context *c, bool join, double relaxation, double multipliers,
-                                  struct sadmm_error *error)
+/* relax: of enum cuda_relax. */
+static sadmm_status launch_bodies(struct sadmm_context *c, bool join, int relax, struct sadmm_error *error)
 {
     cuda_args args = {};
     args.rescaled = c->rescaled;
     args.backward = c->backward;
     args.looks = c->looks;
     args.in_order = !slots_by_island(&c->partition);
-    args.factor = relaxation;
-    args.multipliers = multipliers;
+    args.relax = relax;
     cuda_kernel kernel =
         c->fast         ? (c->view.rigid ? bodies_kernel<false, true, true> : bodies_kernel<false, false, true>)
         : c->view.rigid ? (join ? bodies_kernel<true, true, false> : bodies_kernel<false, true, false>)
@@ -199,11 +206,10 @@ template <int LANES_A_PAIR, int COUNT> static cuda_kernel sweep_kernel(bool meas
                            : constraints_kernel<LANES_A_PAIR, COUNT, false, false>);
 }
 
-/* fast: lambda goes `farther` times as far. */
-static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, double farther, struct sadmm_error *error)
+static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, int relax, struct sadmm_error *error)
 {
     cuda_args args = {};
-    args.factor = farther;
+    args.relax = relax;
     args.looks = c->looks;
     args.backward = c->backward;
     c->backward = !c->backward;
@@ -246,7 +252,7 @@ extern "C" sadmm_status CUDA(update_velocity)(struct sadmm_context *c, struct sa
     CUDA_TRY(refuse_fast(c, error));
     CUDA_ENTER(c);
     CUDA_TRY(prepare_stepwise(c, error));
-    CUDA_TRY(launch_bodies(c, c->measured, 1, 1, error));
+    CUDA_TRY(launch_bodies(c, c->measured, 0, error));
     c->measured = false;
     c->rescaled = false;
     return SADMM_OK;
@@ -258,7 +264,7 @@ extern "C" sadmm_status CUDA(update_constraints)(struct sadmm_context *c, bool m
     CUDA_ENTER(c);
     CUDA_TRY(prepare_stepwise(c, error));
     CUDA_TRY(CUDA(clear_primal)(c, measure, error));
-    CUDA_TRY(launch_constraints(c, measure, 1, error));
+    CUDA_TRY(launch_constraints(c, measure, 0, error));
     c->measured = measure;
     return SADMM_OK;
 }
@@ -268,10 +274,9 @@ extern "C" sadmm_status CUDA(update_constraints)(struct sadmm_context *c, bool m
 /* fast: Steps 2-4 first, and relaxed as iteration i of `count` is. */
 static sadmm_status fast_iteration(struct sadmm_context *c, int i, int count, bool measure, struct sadmm_error *error)
 {
-    const double relaxation = c->settings.relaxation;
-    const double farther = relax_constraints(i, count) ? relaxation : 1;
-    CUDA_TRY(launch_constraints(c, measure, farther, error));
-    CUDA_TRY(launch_bodies(c, false, relax_velocity(i, count, c->settled) ? relaxation : 1, farther, error));
+    const int multipliers = relax_constraints(i, count) ? RELAX_MULTIPLIERS : 0;
+    CUDA_TRY(launch_constraints(c, measure, multipliers, error));
+    CUDA_TRY(launch_bodies(c, false, multipliers | (relax_velocity(i, count, c->settled) ? RELAX_VELOCITY : 0), error));
     c->settled = true;
     return SADMM_OK;
 }
@@ -284,8 +289,8 @@ static sadmm_status plain_iterations(struct sadmm_context *c, int count, struct 
             CUDA_TRY(fast_iteration(c, i, count + 1, false, error));
             continue;
         }
-        CUDA_TRY(launch_bodies(c, false, 1, 1, error));
-        CUDA_TRY(launch_constraints(c, false, 1, error));
+        CUDA_TRY(launch_bodies(c, false, 0, error));
+        CUDA_TRY(launch_constraints(c, false, 0, error));
     }
     return SADMM_OK;
 }
@@ -324,8 +329,8 @@ sadmm_status CUDA(stream_iterations)(struct sadmm_context *c, int count, bool me
 {
     CUDA_TRY(prepare_stepwise(c, error));
     if (c->measured) {
-        CUDA_TRY(launch_bodies(c, true, 1, 1, error));
-        CUDA_TRY(launch_constraints(c, measure && count == 1, 1, error));
+        CUDA_TRY(launch_bodies(c, true, 0, error));
+        CUDA_TRY(launch_constraints(c, measure && count == 1, 0, error));
         --count;
     }
     if (c->fast && !c->settled && (count > 1 || goes_on)) {
@@ -339,8 +344,8 @@ sadmm_status CUDA(stream_iterations)(struct sadmm_context *c, int count, bool me
     CUDA_TRY(plain_iterations(c, plain, error));
     if (count > plain && c->fast) return fast_iteration(c, 0, 1, measure, error);
     if (count > plain) {
-        CUDA_TRY(launch_bodies(c, false, 1, 1, error));
-        CUDA_TRY(launch_constraints(c, true, 1, error));
+        CUDA_TRY(launch_bodies(c, false, 0, error));
+        CUDA_TRY(launch_constraints(c, true, 0, error));
     }
     return SADMM_OK;
 }

@@ -19,22 +19,32 @@ enum { STEP_THREADS = 64 }; /* a block: few, for long work and many multiprocess
 
 /* ---- edits ----------------------------------------------------------------------------------------------------- */
 
+/* A thread an edit: no two have the same kind and target. */
 static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     int32_t i = thread_index();
     if (i >= args.count || v.live->halt) return;
     const struct sadmm_resident_edit *edit = &args.edits[i];
-    struct sadmm_rigid *body = const_cast<struct sadmm_rigid *>(&v.step.before[edit->body]);
-    if (edit->what & SADMM_EDIT_STATE) {
-        steady_place(const_cast<struct sadmm_steady *>(&v.step.steady_before[edit->body]), body, edit->position,
-                     edit->orientation);
-        for (int k = 0; k < 3; ++k) body->position[k] = edit->position[k];
-        for (int k = 0; k < 4; ++k) body->orientation[k] = edit->orientation[k];
-        for (int k = 0; k < 6; ++k) body->velocity[k] = edit->velocity[k];
+    const double *values = edit->values;
+    if (edit->kind == SADMM_EDIT_SETTINGS) {
+        struct sadmm_settings *settings = const_cast<struct sadmm_settings *>(v.settings);
+        int k = 0;
+#define PUT(name) settings->name = values[k++];
+        SADMM_EACH_SETTING_NUMBER(PUT)
+#undef PUT
+        return;
     }
-    if (edit->what & SADMM_EDIT_WRENCH)
-        for (int k = 0; k < 6; ++k) body->wrench[k] = edit->wrench[k];
+    struct sadmm_rigid *body = const_cast<struct sadmm_rigid *>(&v.step.before[edit->target]);
+    if (edit->kind == SADMM_EDIT_STATE) {
+        steady_place(const_cast<struct sadmm_steady *>(&v.step.steady_before[edit->target]), body, values, values + 3);
+        for (int k = 0; k < 3; ++k) body->position[k] = values[k];
+        for (int k = 0; k < 4; ++k) body->orientation[k] = values[3 + k];
+        for (int k = 0; k < 6; ++k) body->velocity[k] = values[7 + k];
+    } else {
+        for (int k = 0; k < 6; ++k) body->wrench[k] = values[k];
+    }
 }
+static_assert((int)SADMM_EDIT_VALUES >= (int)SADMM_SETTING_NUMBERS && (int)SADMM_EDIT_VALUES >= 13, "every kind has room");
 
 /* ---- start ----------------------------------------------------------------------------------------------------- */
 
@@ -69,7 +79,7 @@ static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, co
     ((double *)out)[lane] = number;
     if (lane < CARRIED_VELOCITY) return;
     const int32_t k = lane - CARRIED_VELOCITY;
-    v.step.start_velocity[6 * i + k] = steady_start_component(number, &v.step.steady_before[i], v.settings.dt, k);
+    v.step.start_velocity[6 * i + k] = steady_start_component(number, &v.step.steady_before[i], v.settings->dt, k);
 }
 
 /* ---- gates ----------------------------------------------------------------------------------------------------- */
@@ -109,7 +119,7 @@ static __device__ bool finish_body(const cuda_view &v, int32_t i, const body_bef
     struct sadmm_rigid next = before.body;
     const solver_real slow = v.step.limits ? slow_down(v, i) : (solver_real)1;
     move_body(v, i, &before.body, slow, next.position, next.orientation, next.velocity);
-    steady_keep(&steady, &before.body, &next, v.settings.dt);
+    steady_keep(&steady, &before.body, &next, v.settings->dt);
     v.step.after[i] = next;
     v.step.steady_after[i] = steady;
     return finite_numbers(next.position, 3) && finite_numbers(next.orientation, 4) && finite_numbers(next.velocity, 6);
@@ -165,7 +175,7 @@ static __host__ __device__ inline finish_ranges ranges_of(const cuda_view &v)
 {
     finish_ranges r;
     r.wrenches = (v.bodies + WARP - 1) / WARP * WARP;
-    r.pairs = r.wrenches + (v.settings.recover_wrenches ? (LANES * v.bodies + WARP - 1) / WARP * WARP : 0);
+    r.pairs = r.wrenches + (v.wrenches ? (LANES * v.bodies + WARP - 1) / WARP * WARP : 0);
     r.end = r.pairs + v.lanes * v.pair_room;
     return r;
 }

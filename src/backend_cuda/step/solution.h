@@ -16,7 +16,7 @@ static __device__ __forceinline__ void move_body(const cuda_view &v, int32_t i, 
                                  double position[3], double orientation[4], double velocity[6])
 {
     const solver_real *state = v.state + (size_t)i * ROW;
-    const double dt = v.settings.dt;
+    const double dt = v.settings->dt;
     vec3 linear = v3((double)(state[0] * slow), (double)(state[1] * slow), (double)(state[2] * slow));
     vec3 angular = v3((double)(state[3] * slow), (double)(state[4] * slow), (double)(state[5] * slow));
     v3_store(rigid_move(v3_load(body->position), linear, dt), position);
@@ -42,7 +42,7 @@ static __device__ __forceinline__ void add_pair_wrench(const cuda_view &v, int32
 static __device__ __forceinline__ void contact_wrench(const cuda_view &v, int32_t begin, int32_t end, int32_t lane,
                                                       double wrench[6])
 {
-    const double per_dt = 1 / v.settings.dt;
+    const double per_dt = 1 / v.settings->dt;
     for (int k = 0; k < 6; ++k) wrench[k] = 0;
     for (int32_t at = begin + lane; at < end; at += LANES) {
         int32_t record = v.incident[at] / 2, side = v.incident[at] & 1;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "collision/bounds.h"
 #include "collision/collision.h"
 #include "core/base/memory.h"
 #include "core/model/settings.h"
@@ -14,6 +13,7 @@
 /* Of a step that was enqueued, until its report has been seen. */
 struct queued_step {
     cudaEvent_t done;
+    struct sadmm_settings settings;
     struct sadmm_resident_edit *edits; /* pinned */
     size_t edit_count, edit_capacity;
 };
@@ -25,7 +25,6 @@ struct cuda_step {
     bool planned;               /* rooms, partition and guess are for the world as it is */
     bool recorded;              /* and so are the graphs */
     cudaGraphExec_t graphs[2];  /* by the set that is written */
-    struct sadmm_settings settings;
     struct cuda_step_guess guess;
     int64_t candidate_room, point_room;
 
@@ -34,7 +33,9 @@ struct cuda_step {
     int64_t enqueued, seen;
     int into;                   /* set and state the next step writes */
 
-    struct cuda_step_report last; /* of the last step that was done */
+    struct cuda_step_report last; /* of the last step that was done, */
+    struct sadmm_settings last_settings;
+    double time;                  /* simulated until after it, s */
     int64_t done, repeats;
     int64_t misfit;             /* the last step that its partition did not fit; -1: none */
     int32_t culprit;
@@ -99,8 +100,6 @@ static void view_counts(struct sadmm_context *c, int64_t pairs)
     cuda_view *v = &c->view;
     struct sadmm_system none = {};
     c->system = nullptr;
-    c->settings = s->settings;
-    c->fast = s->settings.method == SADMM_METHOD_FAST;
     v->raw = none;
     v->raw.body_count = s->bodies;
     v->bodies = s->bodies;
@@ -108,8 +107,7 @@ static void view_counts(struct sadmm_context *c, int64_t pairs)
     v->rows = 0;
     v->row_stride = 0;
     v->contact_rows = s->guess.contact_rows == 1 ? 1 : 3;
-    v->warm_start = s->settings.warm_start;
-    v->settings = s->settings;
+    v->warm_start = c->settings.warm_start;
 }
 
 /* ---- a step, launch by launch ---------------------------------------------------------------------------------- */
@@ -293,7 +291,7 @@ static struct sadmm_plan plan_of(const struct sadmm_context *c, const struct loo
     plan.rigid = true;
     plan.gyroscopic = c->plan.gyroscopic; /* since load */
     plan.threads = 1;
-    sadmm_plan_settle(&plan, &s->settings, plan.pairs > 0 && 2 * (int64_t)seen->facts.warm >= plan.pairs);
+    sadmm_plan_settle(&plan, &c->settings, plan.pairs > 0 && 2 * (int64_t)seen->facts.warm >= plan.pairs);
     return plan;
 }
 
@@ -323,7 +321,7 @@ static sadmm_status make_plan(struct sadmm_context *c, struct sadmm_error *error
     c->plan = plan_of(c, &seen);
     s->guess.contact_rows = c->plan.contact_rows;
     s->guess.point_slots = seen.facts.point_slots <= 1 ? 1 : seen.facts.point_slots <= 4 ? 4 : SADMM_MAX_POINTS;
-    s->guess.warm = sadmm_plan_depends_on_warmth(&s->settings) ? c->plan.warm : -1;
+    s->guess.warm = sadmm_plan_depends_on_warmth(&c->settings) ? c->plan.warm : -1;
     view_counts(c, generous(seen.counts.pairs));
     c->view.points = 0; /* results are read elsewhere */
     seen.facts.point_slots = s->guess.point_slots;
@@ -345,9 +343,9 @@ static sadmm_status record_graph(struct sadmm_context *c, int into, struct sadmm
     struct cuda_step *s = c->step;
     cudaGraph_t graph = nullptr;
     const int next = s->into;
+    CUDA_CALL(c, cudaStreamBeginCapture(c->stream, cudaStreamCaptureModeThreadLocal), "cudaStreamBeginCapture");
     s->into = into;
     view_into(c, into);
-    CUDA_CALL(c, cudaStreamBeginCapture(c->stream, cudaStreamCaptureModeThreadLocal), "cudaStreamBeginCapture");
     c->recording = true;
     sadmm_status status = enqueue_step(c, error);
     c->recording = false;
@@ -401,17 +399,11 @@ static sadmm_status launch_step(struct sadmm_context *c, int64_t sequence, struc
     return SADMM_OK;
 }
 
-/* Forget the steps from `first` to `end`, which have not been done; what was set before them stays set. */
-static sadmm_status drop_steps(struct sadmm_context *c, int64_t first, int64_t end, struct sadmm_error *error)
+/* Forget the steps from `first` to `end`, which have not been done, and their edits: the caller gives these again. */
+static void drop_steps(struct sadmm_context *c, int64_t first, int64_t end)
 {
-    struct cuda_step *s = c->step;
-    for (int64_t sequence = first; sequence <= end; ++sequence) {
-        if (sequence - first >= STEPS_AHEAD) break; /* the next step's place is the first one's */
-        CUDA_TRY(launch_edits_of(c, sequence, error));
-    }
-    CUDA_TRY(CUDA(wait)(c, error));
-    for (struct queued_step &q : s->queue) q.edit_count = 0;
-    return SADMM_OK;
+    for (int64_t sequence = first; sequence < end; ++sequence) slot_of(c->step, sequence)->edit_count = 0;
+    memset(c->numbers, 0, sizeof c->numbers);
 }
 
 /* Repeat the steps from `first` to `end`. */
@@ -422,8 +414,8 @@ static sadmm_status repeat_steps(struct sadmm_context *c, int64_t first, int64_t
         sadmm_status status = launch_edits_of(c, sequence, error);
         if (status == SADMM_OK) status = prepare(c, error);
         if (status == SADMM_OK) status = launch_step(c, sequence, error);
-        if (status != SADMM_OK) { /* no memory: these steps are lost, what was set is not */
-            (void)drop_steps(c, sequence, end, nullptr);
+        if (status != SADMM_OK) { /* no memory: this step and those behind it are lost */
+            drop_steps(c, sequence, end);
             return status;
         }
         s->enqueued = sequence + 1;
@@ -448,7 +440,7 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
     CUDA_TRY(CUDA(wait)(c, error));
     if (report->halt == HALT_NON_FINITE) {
         s->culprit = report->culprit >= s->bodies ? report->culprit - s->bodies : report->culprit;
-        CUDA_TRY(drop_steps(c, first, end, error));
+        drop_steps(c, first, end);
         return sadmm_fail(error, SADMM_ERROR_NON_FINITE, "the solve gave a velocity or multiplier that is not finite");
     }
     ++s->repeats;
@@ -471,7 +463,10 @@ static sadmm_status see_step(struct sadmm_context *c, struct sadmm_error *error)
     const struct cuda_step_report report = reports(c)[s->seen % STEPS_AHEAD]; /* a copy: recover() reuses the place */
     if (report.halt != HALT_NONE) return recover(c, s->seen, &report, error);
     s->last = report;
-    slot_of(s, s->seen)->edit_count = 0;
+    struct queued_step *q = slot_of(s, s->seen);
+    q->edit_count = 0;
+    s->last_settings = q->settings;
+    s->time += q->settings.dt;
     ++s->seen;
     ++s->done;
     /* A plan with far too much room wastes launches. */
@@ -541,12 +536,14 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     struct cuda_step *s = c->step;
     s->bodies = (int32_t)n;
     s->slots = (int32_t)slots;
-    s->settings = *settings;
+    s->last_settings = *settings;
+    s->time = world->time;
     s->planned = s->recorded = false;
     s->enqueued = s->seen = s->done = s->repeats = 0;
     s->culprit = -1;
     for (struct queued_step &q : s->queue) q.edit_count = 0;
     memset(&s->last, 0, sizeof s->last);
+    CUDA_TRY(CUDA(use_settings)(c, settings, error));
     CUDA_TRY(CUDA(room)(c, BUFFER_WORLD_BODIES, 2 * n * sizeof *world->rigid, error));
     CUDA_TRY(CUDA(room)(c, BUFFER_WORLD_STEADY, 2 * n * sizeof *world->steady, error));
     CUDA_TRY(CUDA(room)(c, BUFFER_WORLD_WRENCH, 12 * n * sizeof(double), error));
@@ -579,7 +576,8 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     c->refused = 0;
     s->misfit = -1;
     CUDA_TRY(COLLISION(attach)(s->collision, c->stream, world->input,
-                               buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES), &c->view.live->halt, error));
+                               buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES), &c->view.live->halt,
+                               c->view.settings, error));
     view_into(c, s->into);
     return CUDA(wait)(c, error);
 }
@@ -594,46 +592,61 @@ static sadmm_status next_place(struct sadmm_context *c, struct sadmm_error *erro
     return SADMM_OK;
 }
 
-extern "C" sadmm_status CUDA(edit_world)(struct sadmm_context *c, const struct sadmm_resident_edit *edits, size_t count,
-                                         struct sadmm_error *error)
+/* The edits of a step, and the settings' numbers where the device has others, into its place in the queue. */
+static sadmm_status take_edits(struct sadmm_context *c, struct queued_step *q, const struct sadmm_settings *settings,
+                               const struct sadmm_resident_edit *edits, size_t count, struct sadmm_error *error)
 {
-    struct cuda_step *s = c->step;
-    CUDA_ENTER(c);
-    CUDA_TRY(next_place(c, error));
-    struct queued_step *q = slot_of(s, s->enqueued);
-    const size_t total = q->edit_count + count;
+    struct sadmm_resident_edit numbers = {SADMM_EDIT_SETTINGS, 0, {}};
+    sadmm_settings_numbers(settings, numbers.values);
+    const bool other = memcmp(numbers.values, c->numbers, sizeof c->numbers) != 0;
+    const size_t total = count + other;
     if (total > q->edit_capacity) {
-        struct sadmm_resident_edit *larger = nullptr;
-        size_t capacity = std::max(2 * q->edit_capacity, total);
+        const size_t capacity = std::max(2 * q->edit_capacity, total);
         if (sadmm_test_allocation_fails())
             return CUDA(fail)(c, cudaErrorMemoryAllocation, "allocation of changes of bodies", error);
-        CUDA_CALL(c, cudaMallocHost((void **)&larger, capacity * sizeof *larger), "allocation of changes of bodies");
-        if (q->edit_count > 0) memcpy(larger, q->edits, q->edit_count * sizeof *larger);
         if (q->edits) (void)cudaFreeHost(q->edits);
-        q->edits = larger;
+        q->edits = nullptr;
+        q->edit_capacity = 0;
+        CUDA_CALL(c, cudaMallocHost((void **)&q->edits, capacity * sizeof *q->edits), "allocation of changes of bodies");
         q->edit_capacity = capacity;
     }
-    if (count > 0) memcpy(q->edits + q->edit_count, edits, count * sizeof *edits);
+    if (count > 0) memcpy(q->edits, edits, count * sizeof *edits);
+    if (other) q->edits[count] = numbers;
+    memcpy(c->numbers, numbers.values, sizeof c->numbers);
+    q->settings = *settings;
     q->edit_count = total;
     return SADMM_OK;
 }
 
+static sadmm_status enqueue_next(struct sadmm_context *c, struct queued_step *q, const struct sadmm_settings *settings,
+                                 const struct sadmm_resident_edit *edits, size_t count, struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    CUDA_TRY(take_edits(c, q, settings, edits, count, error));
+    CUDA_TRY(launch_edits_of(c, s->enqueued, error));
+    CUDA_TRY(prepare(c, error));
+    return launch_step(c, s->enqueued, error);
+}
+
 extern "C" sadmm_status CUDA(step_world)(struct sadmm_context *c, const struct sadmm_settings *settings,
+                                         const struct sadmm_resident_edit *edits, size_t count,
                                          struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
     CUDA_ENTER(c);
     CUDA_TRY(next_place(c, error));
-    if (!sadmm_settings_equal(&s->settings, settings)) {
+    if (!sadmm_settings_same_but_numbers(&c->settings, settings)) {
         CUDA_TRY(see_all(c, error));
-        s->settings = *settings;
         s->planned = false;
-        COLLISION(set_step)(s->collision, settings->dt, gravity_size(settings->gravity));
     }
     if (!s->planned) CUDA_TRY(see_all(c, error));
-    CUDA_TRY(launch_edits_of(c, s->enqueued, error));
-    CUDA_TRY(prepare(c, error));
-    CUDA_TRY(launch_step(c, s->enqueued, error));
+    CUDA(plan_settings)(c, settings);
+    struct queued_step *q = slot_of(s, s->enqueued);
+    sadmm_status status = enqueue_next(c, q, settings, edits, count, error);
+    if (status != SADMM_OK) {
+        drop_steps(c, s->enqueued, s->enqueued + 1);
+        return status;
+    }
     ++s->enqueued;
     return SADMM_OK;
 }
@@ -649,21 +662,31 @@ extern "C" sadmm_status CUDA(wait_world)(struct sadmm_context *c, struct sadmm_r
     struct cuda_step *s = c->step;
     CUDA_ENTER(c);
     sadmm_status status = see_all(c, error);
+    /* Where some steps could not be repeated the ones before them still run. */
+    while (status != SADMM_OK && status != SADMM_ERROR_DEVICE && s->seen < s->enqueued) {
+        struct sadmm_error later;
+        if (see_step(c, &later) != SADMM_ERROR_DEVICE) continue;
+        *error = later;
+        status = SADMM_ERROR_DEVICE;
+    }
     const struct cuda_step_report *last = &s->last;
+    const struct sadmm_settings *settings = &s->last_settings;
     COLLISION(settle)(s->collision, 1 - s->into, last->counts);
     out->done = s->done;
+    out->time = s->time;
+    out->settings = *settings;
     out->repeats = s->repeats;
     out->culprit = s->culprit;
     out->plan = c->plan;
     out->plan.pairs = last->counts.pairs;
     out->plan.points = last->counts.points;
-    out->iterations = last->counts.points > 0 ? s->settings.iterations : 1;
+    out->iterations = last->counts.points > 0 ? settings->iterations : 1;
     out->iterations_mean = out->iterations;
     out->islands_above = last->unmet;
     out->converged = last->unmet == 0;
     if (out->converged) out->iterations = last->most_iterations;
     if (last->unmet >= 0 && last->facts.islands > 0)
-        out->iterations_mean = ((double)last->sum_of_iterations + (double)last->unmet * s->settings.iterations) /
+        out->iterations_mean = ((double)last->sum_of_iterations + (double)last->unmet * settings->iterations) /
                                last->facts.islands;
     out->limited = last->limited;
     out->penetration_max = last->depth;

@@ -1,6 +1,6 @@
 /* Whole steps on the device (core/solve/resident.h): what the world is there, and how the host follows.
  *
- *     edit       states and wrenches set since the last step                 (when there are any)
+ *     edit       states, wrenches and settings' numbers set since the last step  (when there are any)
  *     start      where a solve starts from; bodies as collision sees them
  *     find       contacts, from one set into the other                       (collide/view.h)
  *       beside it  A, b of the bodies
@@ -21,7 +21,8 @@
  * it goes into a graph that is launched again and again, two of them in turn, because states and contact sets change
  * places at every step. Where a plan does not hold, the step sets cuda_live.halt (with c->ends only its last kernel
  * does: what runs until then keeps to what was planned for), what was enqueued behind it does nothing, and the host, when it sees the report, looks at the facts, plans anew and enqueues the same steps again: a
- * repeated step starts from the same state and gives the same bits. Reports and edits travel through pinned memory, a ring
+ * repeated step starts from the same state, settings included, and gives the same bits. The settings' numbers are data in
+ * device memory, so that a change of them is an edit like others: nothing is recorded anew or waited for. Reports and edits travel through pinned memory, a ring
  * of STEPS_AHEAD, written and read by the device itself.
  */
 #ifndef SADMM_CUDA_STEP_STEP_H

@@ -13,7 +13,7 @@
 /* The contacts of tall islands close small gaps slowly. */
 static __device__ __forceinline__ void ease_gaps(const cuda_view &v, int32_t p, double tallness)
 {
-    const double slop = v.settings.slop / v.settings.dt, share = weight_gap_share(tallness);
+    const double slop = v.settings->slop / v.settings->dt, share = weight_gap_share(tallness);
     const int32_t count = share < 1 ? (int32_t)v.difference[p].w : 0;
     for (int32_t k = 0; k < count; ++k) {
         solver_real *error = &v.arm[point_slot(v, p, k)].w;

@@ -62,7 +62,7 @@ static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, const 
 /* (13). dt^2: c is given in the paper's time-scaled units. Without constraints beta does not matter. */
 static __device__ __forceinline__ double penalty_of(const cuda_view &v, const solver_real *line, const double C[PACKED])
 {
-    const struct sadmm_settings *s = &v.settings;
+    const struct sadmm_settings *s = v.settings;
     double trace_A = 0, trace_C = C[0] + C[2] + C[5] + C[9] + C[14] + C[20];
 #pragma unroll
     for (int k = 0; k < 6; ++k) trace_A += (double)line_a(line, v.rigid, k, k);
@@ -110,7 +110,7 @@ static __global__ void scale_kernel(const __grid_constant__ cuda_view v, const _
     double ratio = args.factor;
     if (args.measure) /* by the residuals */
         ratio = sadmm_penalty_ratio(__longlong_as_double((long long)v.residual[0]),
-                                    __longlong_as_double((long long)v.residual[1]), v.settings.penalty_ratio_limit);
+                                    __longlong_as_double((long long)v.residual[1]), v.settings->penalty_ratio_limit);
     v.beta[i] *= ratio;
     if (i == 0) *v.ratio = ratio;
 }

@@ -136,4 +136,35 @@ bool sadmm_settings_equal(const struct sadmm_settings *a, const struct sadmm_set
 {
 #define SAME(member) && memcmp(&a->member, &b->member, sizeof a->member) == 0
     return true MEMBERS(SAME, SAME);
+#undef SAME
+}
+
+/* ---- numbers, and the rest ------------------------------------------------------------------------------------- */
+
+void sadmm_settings_numbers(const sadmm_settings *s, double numbers[SADMM_SETTING_NUMBERS])
+{
+    int k = 0;
+#define TAKE(name) numbers[k++] = s->name;
+    SADMM_EACH_SETTING_NUMBER(TAKE)
+#undef TAKE
+}
+
+/* A setting that nobody named a number belongs to it. `threads` are a host's. */
+static sadmm_settings without_numbers(const sadmm_settings *s)
+{
+    sadmm_settings rest = *s;
+#define DROP(name) rest.name = 0;
+    SADMM_EACH_SETTING_NUMBER(DROP)
+#undef DROP
+    rest.penalty_ratio_limit = s->penalty_ratio_limit > 1;
+    rest.certificate_tolerance = s->certificate_tolerance > 0;
+    rest.residual_tolerance = s->residual_tolerance > 0;
+    rest.threads = 0;
+    return rest;
+}
+
+bool sadmm_settings_same_but_numbers(const sadmm_settings *a, const sadmm_settings *b)
+{
+    const sadmm_settings rest_a = without_numbers(a), rest_b = without_numbers(b);
+    return sadmm_settings_equal(&rest_a, &rest_b);
 }

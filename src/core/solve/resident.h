@@ -4,6 +4,10 @@
  * Steps are enqueued: `step` may return before the step has run. Steps run in order. A step that fails leaves the world
  * as it was before it, and those enqueued after it do not run; `wait` tells. What a step could not know when it was
  * enqueued (how many contacts there will be) is no failure: the backend repeats the step with more room.
+ *
+ * What may change from step to step without loading the world anew are edits: a kind, a target and numbers, in the
+ * backend's memory before the step that they come with. So are the settings' numbers. A step that was not done has taken
+ * none of its edits: the caller gives them again.
  */
 #ifndef SADMM_CORE_SOLVE_RESIDENT_H
 #define SADMM_CORE_SOLVE_RESIDENT_H
@@ -23,21 +27,29 @@ struct sadmm_resident_world {
     const struct sadmm_steady *steady;         /* (body_count) */
     const int32_t *slot_of;                    /* (body_count) body slot */
     const struct sadmm_contact_set *contacts;  /* of the last step, with impulses */
+    double time;                               /* simulated until now, s */
 };
 
-enum { SADMM_EDIT_STATE = 1, SADMM_EDIT_WRENCH = 2 };
+enum sadmm_edit_kind {
+    SADMM_EDIT_STATE,    /* target: a dynamic body; position (3), orientation (4), velocity (6) */
+    SADMM_EDIT_WRENCH,   /* target: a dynamic body; force, torque (6) */
+    SADMM_EDIT_SETTINGS, /* sadmm_settings_numbers(): a backend's own, from what `step` is given */
+    SADMM_EDIT_KINDS
+};
+enum { SADMM_EDIT_VALUES = 14, SADMM_BODY_EDITS = 2 /* the kinds of a body, the first ones */ };
 
-/* A change of a dynamic body between two steps. */
+/* A change between two steps. There is at most one of a kind and target, so that their order does not matter. */
 struct sadmm_resident_edit {
-    int32_t body;
-    uint32_t what;                             /* SADMM_EDIT_... bits */
-    double position[3], orientation[4], velocity[6]; /* STATE */
-    double wrench[6];                          /* WRENCH */
+    int32_t kind; /* enum sadmm_edit_kind */
+    int32_t target;
+    double values[SADMM_EDIT_VALUES];
 };
 
 /* The last step that was done. */
 struct sadmm_resident_report {
     int64_t done;              /* steps since the world was loaded */
+    double time;               /* simulated until after it, s */
+    sadmm_settings settings;   /* it was made with; before the first one: those of load */
     int64_t repeats;           /* steps repeated since then because something did not fit */
     struct sadmm_plan plan;
     int iterations;            /* of the island with the most */
@@ -57,12 +69,13 @@ struct sadmm_resident_kernels {
     /* Take over a world. Everything the backend kept before is forgotten. */
     sadmm_status (*load)(struct sadmm_context *, const struct sadmm_resident_world *, const struct sadmm_settings *,
                          struct sadmm_error *);
-    /* Changes to bodies before the next step; `edits` is free again on return. */
-    sadmm_status (*edit)(struct sadmm_context *, const struct sadmm_resident_edit *edits, size_t count,
-                         struct sadmm_error *);
-    /* Enqueue a step. An error is this step's, or an earlier one's: then `wait` says how far the world has got. */
-    sadmm_status (*step)(struct sadmm_context *, const struct sadmm_settings *, struct sadmm_error *);
-    /* Until all enqueued steps have run. The report is filled also when a step has failed. */
+    /* Enqueue a step, with edits before it (free again on return). An error is this step's, or an earlier one's: then `wait`
+     * says how far the world has got. Numbers of the settings (settings.h) may change at every step; where the rest of them
+     * does, the backend may wait for the steps before. */
+    sadmm_status (*step)(struct sadmm_context *, const struct sadmm_settings *, const struct sadmm_resident_edit *edits,
+                         size_t count, struct sadmm_error *);
+    /* Until all enqueued steps have run. The report is filled also when a step has failed; after any error but
+     * SADMM_ERROR_DEVICE nothing is enqueued any more. */
     sadmm_status (*wait)(struct sadmm_context *, struct sadmm_resident_report *, struct sadmm_error *);
     /* The world after the last step done; any pointer may be NULL. Nothing may be enqueued. */
     sadmm_status (*read_bodies)(struct sadmm_context *, struct sadmm_rigid *rigid, struct sadmm_steady *steady,

@@ -219,7 +219,7 @@ sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, co
     TRY(check_motion("state->linear_velocity", "state->angular_velocity", state->linear_velocity, state->angular_velocity,
                      body->type, ANY, error));
     /* A static body is part of what the backend was given once. */
-    TRY(body->system_body < 0 ? sadmm_world_take_back(world) : sadmm_world_edit_room(world));
+    if (body->system_body < 0) TRY(sadmm_world_take_back(world));
     steady_place(&body->steady, &body->rigid, state->position, orientation);
     memcpy(body->rigid.position, state->position, sizeof state->position);
     memcpy(body->rigid.orientation, orientation, sizeof orientation);
@@ -264,7 +264,7 @@ sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, c
                           id.generation);
     TRY(sadmm_check_vector("force", force, 3, WRENCH_LIMIT, error));
     TRY(sadmm_check_vector("torque", torque, 3, WRENCH_LIMIT, error));
-    TRY(body->system_body < 0 ? sadmm_world_take_back(world) : sadmm_world_edit_room(world));
+    if (body->system_body < 0) TRY(sadmm_world_take_back(world));
     memcpy(body->rigid.wrench, force, 3 * sizeof *force);
     memcpy(body->rigid.wrench + 3, torque, 3 * sizeof *torque);
     sadmm_world_edit(world, body, SADMM_EDIT_WRENCH);

@@ -5,7 +5,7 @@ void sadmm_world_report_steps(sadmm_world *world, int64_t steps, const struct sa
 {
     sadmm_step_report *report = &world->report;
     report->step += steps;
-    for (int64_t k = 0; k < steps; ++k) report->time += world->step_settings.dt;
+    report->time = done->time;
     report->backend = world->kernels->backend;
     report->precision = world->kernels->precision;
     report->threads = done->plan.threads;

@@ -1,16 +1,18 @@
 /* A world that a backend keeps (resident.h): steps are enqueued there, and the host's copy follows on demand.
  *
- *     loaded           the backend has the world. States and wrenches set meanwhile are remembered as edits and go along
- *                      with the next step; any other change first takes the world back, and the next step loads it anew.
+ *     loaded           the backend has the world. States and wrenches set meanwhile are edits, which go along with the next
+ *                      step; any other change first takes the world back, and the next step loads it anew.
  *     running          steps were enqueued whose end nobody has waited for
  *     bodies_behind,   the host's bodies, or contacts with everything else about the last step, are older than the
  *     contacts_behind  backend's: getters pull them, once
+ *
+ * What was set is in the host's bodies at once, however far behind they are; `set_at` tells a pull that it is newer than what
+ * the backend has. So the host's world is a whole one at any time, and what is left when a device is lost.
  */
 #include <string.h>
 
 #include "core/base/clock.h"
 #include "core/base/memory.h"
-#include "core/model/settings.h"
 #include "core/model/steady.h"
 #include "core/solve/certificate.h"
 #include "world_internal.h"
@@ -31,37 +33,68 @@ bool sadmm_world_may_reside(const sadmm_world *world)
 
 /* ---- edits ------------------------------------------------------------------------------------------------------- */
 
-sadmm_status sadmm_world_edit_room(sadmm_world *world)
+/* The body itself holds what was set last; of a kind the next step takes it along once, however often it was set. */
+static void mark(sadmm_world *world, struct sadmm_world_body *body, uint32_t kinds)
 {
-    if (!world->resident.loaded) return SADMM_OK;
-    if (!sadmm_grow((void **)&world->resident.edits, &world->resident.edit_capacity, world->resident.edit_count,
-                    world->resident.edit_count + 1, sizeof *world->resident.edits))
-        return sadmm_fail_memory(&world->error, "a change of a body");
-    return SADMM_OK;
+    if (kinds && !body->edits)
+        world->resident.edited[world->resident.edited_count++] = (uint32_t)(body - world->bodies);
+    body->edits |= kinds;
 }
 
-void sadmm_world_edit(sadmm_world *world, const struct sadmm_world_body *body, uint32_t what)
+void sadmm_world_edit(sadmm_world *world, struct sadmm_world_body *body, enum sadmm_edit_kind kind)
 {
     if (!world->resident.loaded) return;
-    struct sadmm_resident_edit *edit = &world->resident.edits[world->resident.edit_count++];
-    edit->body = body->system_body;
-    edit->what = what;
-    memcpy(edit->position, body->rigid.position, sizeof edit->position);
-    memcpy(edit->orientation, body->rigid.orientation, sizeof edit->orientation);
-    memcpy(edit->velocity, body->rigid.velocity, sizeof edit->velocity);
-    memcpy(edit->wrench, body->rigid.wrench, sizeof edit->wrench);
+    mark(world, body, UINT32_C(1) << kind);
+    body->set_at[kind] = world->resident.enqueued;
 }
 
-static void apply(struct sadmm_world_body *body, const struct sadmm_resident_edit *edit)
+/* What was set for steps that have not been done goes along with the next one. */
+static void edit_again(sadmm_world *world)
 {
-    struct sadmm_rigid *rigid = &body->rigid;
-    if (edit->what & SADMM_EDIT_STATE) {
-        steady_place(&body->steady, rigid, edit->position, edit->orientation);
-        memcpy(rigid->position, edit->position, sizeof rigid->position);
-        memcpy(rigid->orientation, edit->orientation, sizeof rigid->orientation);
-        memcpy(rigid->velocity, edit->velocity, sizeof rigid->velocity);
+    const int64_t done = world->resident.done;
+    for (int32_t i = 0; i < world->dynamic_count; ++i) {
+        struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
+        for (int kind = 0; kind < SADMM_BODY_EDITS; ++kind) {
+            if (body->set_at[kind] < done) continue;
+            mark(world, body, UINT32_C(1) << kind);
+            body->set_at[kind] = done;
+        }
     }
-    if (edit->what & SADMM_EDIT_WRENCH) memcpy(rigid->wrench, edit->wrench, sizeof rigid->wrench);
+}
+
+static void forget_edits(sadmm_world *world)
+{
+    for (size_t k = 0; k < world->resident.edited_count; ++k) world->bodies[world->resident.edited[k]].edits = 0;
+    world->resident.edited_count = 0;
+}
+
+static void put_edit(struct sadmm_resident_edit *edit, const struct sadmm_world_body *body, enum sadmm_edit_kind kind)
+{
+    const struct sadmm_rigid *rigid = &body->rigid;
+    memset(edit, 0, sizeof *edit);
+    edit->kind = kind;
+    edit->target = body->system_body;
+    if (kind == SADMM_EDIT_STATE) {
+        memcpy(edit->values, rigid->position, sizeof rigid->position);
+        memcpy(edit->values + 3, rigid->orientation, sizeof rigid->orientation);
+        memcpy(edit->values + 7, rigid->velocity, sizeof rigid->velocity);
+    } else {
+        memcpy(edit->values, rigid->wrench, sizeof rigid->wrench);
+    }
+}
+
+static sadmm_status list_edits(sadmm_world *world, size_t *count)
+{
+    *count = 0;
+    if (!sadmm_grow((void **)&world->resident.edits, &world->resident.edit_capacity, 0,
+                    SADMM_BODY_EDITS * world->resident.edited_count, sizeof *world->resident.edits))
+        return sadmm_fail_memory(&world->error, "changes of bodies");
+    for (size_t k = 0; k < world->resident.edited_count; ++k) {
+        const struct sadmm_world_body *body = &world->bodies[world->resident.edited[k]];
+        for (int kind = 0; kind < SADMM_BODY_EDITS; ++kind)
+            if (body->edits >> kind & 1) put_edit(&world->resident.edits[(*count)++], body, (enum sadmm_edit_kind)kind);
+    }
+    return SADMM_OK;
 }
 
 /* ---- to the backend ---------------------------------------------------------------------------------------------- */
@@ -75,9 +108,16 @@ static sadmm_status load(sadmm_world *world)
     sadmm_world_swap_starts(world);
     TRY(status);
     if (!sadmm_grow((void **)&world->resident.steady, &world->resident.steady_capacity, 0, n + 1,
-                    sizeof *world->resident.steady))
+                    sizeof *world->resident.steady) ||
+        !sadmm_grow((void **)&world->resident.edited, &world->resident.edited_capacity, 0, n + 1,
+                    sizeof *world->resident.edited))
         return sadmm_fail_memory(&world->error, "the step");
-    for (size_t i = 0; i < n; ++i) world->resident.steady[i] = world->bodies[world->slot_of[i]].steady;
+    for (size_t i = 0; i < n; ++i) {
+        struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
+        world->resident.steady[i] = body->steady;
+        body->edits = 0;
+        for (int kind = 0; kind < SADMM_BODY_EDITS; ++kind) body->set_at[kind] = -1;
+    }
     struct sadmm_collision_input input = sadmm_world_collision_input(world);
     struct sadmm_resident_world whole = {
         .input = &input,
@@ -86,11 +126,14 @@ static sadmm_status load(sadmm_world *world)
         .steady = world->resident.steady,
         .slot_of = world->slot_of,
         .contacts = &world->contacts,
+        .time = world->report.time,
     };
     TRY(world->kernels->resident->load(world->context, &whole, &world->def.settings, &world->error));
     world->resident.loaded = true;
-    world->resident.done = world->resident.repeats = 0;
-    world->resident.edit_count = 0;
+    world->resident.enqueued = world->resident.done = world->resident.repeats = 0;
+    world->resident.edited_count = 0;
+    world->resident.kept_step = world->report.step;
+    world->resident.kept_time = world->report.time;
     return SADMM_OK;
 }
 
@@ -115,33 +158,34 @@ static sadmm_status take_failed(sadmm_world *world)
     return sadmm_fail(&world->error, failed.status, "%s", failed.message);
 }
 
-sadmm_status sadmm_world_resident_step(sadmm_world *world, bool wait)
+static sadmm_status settle(sadmm_world *world, sadmm_status status);
+
+/* Load the world if need be, and enqueue a step. */
+static sadmm_status enqueue(sadmm_world *world)
 {
     const struct sadmm_resident_kernels *backend = world->kernels->resident;
-    const sadmm_settings *settings = &world->def.settings;
+    size_t count;
+    if (!world->resident.loaded) TRY(load(world));
+    TRY(list_edits(world, &count));
+    sadmm_status status =
+        backend->step(world->context, &world->def.settings, world->resident.edits, count, &world->error);
+    world->resident.running = true;
+    if (status != SADMM_OK) return settle(world, status); /* of this step or an earlier one: how far has the world got? */
+    ++world->resident.enqueued;
+    forget_edits(world);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_resident_step(sadmm_world *world, bool wait)
+{
+    const bool certified = world->def.settings.certify;
     double begin = sadmm_clock_ms();
     TRY(take_failed(world));
-    bool other = !sadmm_settings_equal(&world->resident.settings, settings);
-    if (other) TRY(sadmm_world_settle(world));
-    if (!world->resident.loaded) TRY(load(world));
-    if (world->resident.edit_count > 0) {
-        TRY(backend->edit(world->context, world->resident.edits, world->resident.edit_count, &world->error));
-        world->resident.edit_count = 0;
-        world->resident.bodies_behind = true;
-    }
-    world->resident.settings = *settings;
-    sadmm_status status = backend->step(world->context, settings, &world->error);
-    world->resident.running = true;
-    if (status != SADMM_OK) { /* of this step or an earlier one: how far the world has got */
-        struct sadmm_error kept = world->error;
-        sadmm_status waited = sadmm_world_settle(world);
-        if (waited == SADMM_OK) world->error = kept;
-        return waited == SADMM_OK ? status : waited;
-    }
-    if (!wait && !settings->certify) return SADMM_OK;
+    TRY(sadmm_world_contain(world, enqueue(world)));
+    if (!wait && !certified) return SADMM_OK;
     TRY(sadmm_world_settle(world));
     world->report.ms.total = sadmm_clock_ms() - begin; /* what the caller waited */
-    return settings->certify ? certify(world) : SADMM_OK;
+    return certified ? certify(world) : SADMM_OK;
 }
 
 /* ---- from the backend -------------------------------------------------------------------------------------------- */
@@ -156,57 +200,58 @@ static void take_report(sadmm_world *world, const struct sadmm_resident_report *
     world->resident.bodies_behind = world->resident.contacts_behind = true;
     world->stepped = world->contacts_readable = true;
     world->plan = done->plan;
-    world->step_settings = world->resident.settings;
+    world->step_settings = done->settings;
     sadmm_world_report_steps(world, steps, done);
 }
 
-static sadmm_status wait_for_steps(sadmm_world *world)
+/* `status`: of the call before, or SADMM_OK. The error of a step that failed is returned once. */
+static sadmm_status settle(sadmm_world *world, sadmm_status status)
 {
     struct sadmm_resident_report report = {.culprit = -1};
-    if (!world->resident.running) return SADMM_OK;
+    if (!world->resident.running) return status;
     world->resident.running = false;
-    sadmm_status status = world->kernels->resident->wait(world->context, &report, &world->error);
+    const struct sadmm_error before = world->error;
+    const sadmm_status waited = world->kernels->resident->wait(world->context, &report, &world->error);
+    if (waited == SADMM_OK) world->error = before;
+    else status = waited;
     take_report(world, &report);
-    /* The step that failed may have written over what the last one started from: only a copy on the host is left. */
-    if (status != SADMM_OK && world->resident.contacts_behind) world->contacts_readable = false;
+    if (status != SADMM_OK) {
+        /* The step that failed may have written over what the last one started from: only a copy on the host is left. */
+        if (world->resident.contacts_behind) world->contacts_readable = false;
+        edit_again(world);
+    }
+    world->resident.enqueued = world->resident.done;
     return status == SADMM_ERROR_NON_FINITE && report.culprit >= 0 ? sadmm_world_not_finite(world, report.culprit)
                                                                    : status;
 }
 
-sadmm_status sadmm_world_settle(sadmm_world *world)
+/* The backend does not change wrenches, nor a state that was set after the last step. */
+static sadmm_status pull_bodies(sadmm_world *world)
 {
-    TRY(take_failed(world));
-    return wait_for_steps(world);
-}
-
-void sadmm_world_settle_quietly(sadmm_world *world)
-{
-    if (world->resident.failed.status == SADMM_OK && wait_for_steps(world) != SADMM_OK) world->resident.failed = world->error;
-}
-
-sadmm_status sadmm_world_pull_bodies(sadmm_world *world)
-{
-    TRY(sadmm_world_settle(world));
+    TRY(settle(world, SADMM_OK));
     if (!world->resident.bodies_behind) return SADMM_OK;
     TRY(world->kernels->resident->read_bodies(world->context, world->next, world->resident.steady,
                                               world->plan.wrenches ? world->wrench : NULL, &world->error));
     for (int32_t i = 0; i < world->dynamic_count; ++i) {
         struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
-        body->rigid = world->next[i];
+        memcpy(world->next[i].wrench, body->rigid.wrench, sizeof body->rigid.wrench);
         body->steady = world->resident.steady[i];
+        if (body->set_at[SADMM_EDIT_STATE] < world->resident.done) body->rigid = world->next[i];
+        else steady_place(&body->steady, &world->next[i], body->rigid.position, body->rigid.orientation);
         if (world->plan.wrenches)
             memcpy(body->contact_wrench, world->wrench + 6 * (size_t)i, sizeof body->contact_wrench);
     }
-    for (size_t k = 0; k < world->resident.edit_count; ++k)
-        apply(&world->bodies[world->slot_of[world->resident.edits[k].body]], &world->resident.edits[k]);
     world->resident.bodies_behind = false;
+    world->resident.kept_step = world->report.step;
+    world->resident.kept_time = world->report.time;
     return SADMM_OK;
 }
 
-sadmm_status sadmm_world_pull_contacts(sadmm_world *world)
+/* Contacts last: they are the old ones until all is there. */
+static sadmm_status pull_contacts(sadmm_world *world)
 {
     const struct sadmm_resident_kernels *backend = world->kernels ? world->kernels->resident : NULL;
-    TRY(sadmm_world_settle(world));
+    TRY(settle(world, SADMM_OK));
     if (!world->resident.contacts_behind) return SADMM_OK;
     size_t count = (size_t)world->report.contacts, n = (size_t)world->dynamic_count;
     struct sadmm_step_start *start = &world->start;
@@ -214,21 +259,84 @@ sadmm_status sadmm_world_pull_contacts(sadmm_world *world)
         !sadmm_grow((void **)&start->velocity, &start->velocity_capacity, 0, 6 * (n + 1), sizeof *start->velocity) ||
         !sadmm_grow((void **)&start->impulse, &start->impulse_capacity, 0, 3 * count, sizeof *start->impulse))
         return sadmm_fail_memory(&world->error, "the step's starting impulses");
-    TRY(backend->read_contacts(world->context, &world->contacts, &world->error));
     TRY(backend->read_start(world->context, start->rigid, start->velocity, start->impulse, &world->error));
     TRY(backend->read_bodies(world->context, world->next, NULL, NULL, &world->error));
+    TRY(backend->read_contacts(world->context, &world->contacts, &world->error));
     for (size_t i = 0; i < n; ++i)
         memcpy(world->velocity + 6 * i, world->next[i].velocity, 6 * sizeof *world->velocity);
     world->resident.contacts_behind = false;
     return SADMM_OK;
 }
 
-sadmm_status sadmm_world_take_back(sadmm_world *world)
+static sadmm_status take_back(sadmm_world *world)
 {
     if (!world->resident.loaded) return SADMM_OK;
-    TRY(sadmm_world_pull_bodies(world));
-    TRY(sadmm_world_pull_contacts(world));
+    TRY(pull_bodies(world));
+    TRY(pull_contacts(world));
     world->resident.loaded = false;
-    world->resident.edit_count = 0;
+    forget_edits(world);
     return SADMM_OK;
+}
+
+/* ---- a device that fails ----------------------------------------------------------------------------------------- */
+
+/* A call may fail and the next one succeed: then nothing is lost. Steps whose end the backend cannot tell have not been
+ * done. */
+static bool save(sadmm_world *world)
+{
+    world->resident.running = true;
+    return settle(world, SADMM_OK) != SADMM_ERROR_DEVICE && take_back(world) == SADMM_OK;
+}
+
+/* The steps after the bodies were read last are lost; what was set since then is in the bodies. */
+static void fall_back(sadmm_world *world)
+{
+    world->contacts_readable = world->contacts_readable && !world->resident.bodies_behind && !world->resident.contacts_behind;
+    world->report.step = world->resident.kept_step;
+    world->report.time = world->resident.kept_time;
+    world->stepped = world->report.step > 0;
+    world->resident.loaded = world->resident.running = false;
+    world->resident.bodies_behind = world->resident.contacts_behind = false;
+    forget_edits(world);
+}
+
+sadmm_status sadmm_world_contain(sadmm_world *world, sadmm_status status)
+{
+    if (status != SADMM_ERROR_DEVICE || !world->context) return status;
+    const struct sadmm_error cause = world->error;
+    if (world->resident.loaded && !save(world)) fall_back(world);
+    world->kernels->destroy(world->context);
+    world->context = NULL;
+    return sadmm_fail(&world->error, SADMM_ERROR_DEVICE, "%s; the world is as after step %lld", cause.message,
+                      (long long)world->report.step);
+}
+
+sadmm_status sadmm_world_settle(sadmm_world *world)
+{
+    TRY(take_failed(world));
+    return sadmm_world_contain(world, settle(world, SADMM_OK));
+}
+
+void sadmm_world_settle_quietly(sadmm_world *world)
+{
+    if (world->resident.failed.status != SADMM_OK) return;
+    if (sadmm_world_contain(world, settle(world, SADMM_OK)) != SADMM_OK) world->resident.failed = world->error;
+}
+
+sadmm_status sadmm_world_pull_bodies(sadmm_world *world)
+{
+    TRY(take_failed(world));
+    return sadmm_world_contain(world, pull_bodies(world));
+}
+
+sadmm_status sadmm_world_pull_contacts(sadmm_world *world)
+{
+    TRY(take_failed(world));
+    return sadmm_world_contain(world, pull_contacts(world));
+}
+
+sadmm_status sadmm_world_take_back(sadmm_world *world)
+{
+    TRY(take_failed(world));
+    return sadmm_world_contain(world, take_back(world));
 }

@@ -15,11 +15,15 @@ enum { EXPECTED_CONTACTS_PER_BODY = 8 };
 
 sadmm_status sadmm_world_choose_backend(sadmm_world *world)
 {
+    const bool chosen = world->kernels != NULL; /* and its context was given up, after an error of its device */
     if (world->context) return SADMM_OK;
     int64_t expected = (int64_t)world->dynamic_count * EXPECTED_CONTACTS_PER_BODY;
-    TRY(sadmm_backend_choose(world->def.backend, world->def.precision, expected, &world->kernels,
-                             world->why, sizeof world->why, &world->error));
-    return world->kernels->create(world->def.device, &world->context, &world->error);
+    if (!chosen)
+        TRY(sadmm_backend_choose(world->def.backend, world->def.precision, expected, &world->kernels, world->why,
+                                 sizeof world->why, &world->error));
+    sadmm_status status = world->kernels->create(world->def.device, &world->context, &world->error);
+    if (status != SADMM_OK && !chosen) world->kernels = NULL;
+    return status;
 }
 
 static sadmm_status find_contacts(sadmm_world *world)
@@ -187,6 +191,7 @@ static void report_step(const struct host_step *step)
     const double *ms = step->ms;
     struct sadmm_resident_report done = {
         .plan = step->world->plan,
+        .time = step->world->report.time + step->world->def.settings.dt,
         .iterations = solved->iterations,
         .iterations_mean = solved->iterations,
         .converged = solved->converged && sadmm_certificate_is_finite(&solved->certificate),
@@ -218,7 +223,7 @@ static sadmm_status host_step(sadmm_world *world)
         sadmm_world_swap_starts(world);
         world->plan = last_plan;
         if (step.found) sadmm_collision_undo(world->collision, &world->contacts);
-        return status;
+        return sadmm_world_contain(world, status);
     }
     world->step_settings = world->def.settings;
     report_step(&step);

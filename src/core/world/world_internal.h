@@ -28,6 +28,8 @@ struct sadmm_world_body {
     double contact_wrench[6];
     struct sadmm_steady steady;
     char *name;          /* a block of its own, so that it stays where it is when slots are added; NULL: none */
+    uint32_t edits;                   /* bit of enum sadmm_edit_kind: no step has taken that along yet */
+    int64_t set_at[SADMM_BODY_EDITS]; /* steps enqueued since the world was loaded, when that was set; -1: before */
 };
 
 /* What the last step started from, for contacts, freeze and the certificate. */
@@ -76,11 +78,13 @@ struct sadmm_world {
         struct sadmm_error failed; /* of a step that a call without a status waited for; SADMM_OK: none */
         bool bodies_behind;  /* the bodies above are older than the backend's */
         bool contacts_behind;
-        sadmm_settings settings; /* of the steps enqueued */
-        int64_t done, repeats; /* steps since it was loaded, as far as known; repeated ones */
+        int64_t enqueued, done, repeats; /* steps since it was loaded: begun, done as far as known, repeated */
+        int64_t kept_step;   /* steps and time of the bodies above */
+        double kept_time;
         struct sadmm_steady *steady; /* dynamic bodies */
-        struct sadmm_resident_edit *edits; /* since the last step was enqueued */
-        size_t steady_capacity, edit_count, edit_capacity;
+        uint32_t *edited;    /* slots of bodies with `edits`; room for all dynamic ones */
+        struct sadmm_resident_edit *edits; /* for the backend, when a step is enqueued */
+        size_t steady_capacity, edited_count, edited_capacity, edit_capacity;
     } resident;
 
     const struct sadmm_kernels *kernels; /* chosen at the first step */
@@ -126,9 +130,11 @@ sadmm_status sadmm_world_pull_bodies(sadmm_world *world);
 sadmm_status sadmm_world_pull_contacts(sadmm_world *world);
 /* Both, and from here on the host's world is the one that counts: before anything but a state or a wrench is changed. */
 sadmm_status sadmm_world_take_back(sadmm_world *world);
-/* Remember a change of a body for the backend. Makes room only: nothing can fail once the body has been changed. */
-sadmm_status sadmm_world_edit_room(sadmm_world *world);
-void sadmm_world_edit(sadmm_world *world, const struct sadmm_world_body *body, uint32_t what);
+/* A dynamic body's state or wrench has been set: the next step takes it along. */
+void sadmm_world_edit(sadmm_world *world, struct sadmm_world_body *body, enum sadmm_edit_kind kind);
+/* Passes `status` on. After SADMM_ERROR_DEVICE the backend's context is given up, the host's world counts again, and the next
+ * step begins with a new context. */
+sadmm_status sadmm_world_contain(sadmm_world *world, sadmm_status status);
 
 /* ---- ids.c ---- */
 

@@ -1,0 +1,375 @@
+/* What changes between steps on a backend that keeps the world: states, wrenches and settings that are set while steps run
+ * ahead, and a device that fails. Everything must be equal, to the last bit, to what the same kernels give when the host drives
+ * them step by step (test_cuda_step.c). The same checks run on the emulated device (test_cuda_changes_emulated.c).
+ */
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+
+#include "cuda_worlds.h"
+
+static sadmm_world *small_world(int precision, int fast)
+{
+    sadmm_world *world = towers(3, 2, 0.5, precision);
+    if (fast) use_fast(world, 12);
+    return world;
+}
+
+static void set_wrench(sadmm_world *world, int body, double x, double z)
+{
+    const double force[3] = {x, 0.3, z}, torque[3] = {0.01, 0, 0.1 * x};
+    MUST(world, sadmm_world_set_body_wrench(world, body_at(world, body), force, torque));
+}
+
+static void set_state(sadmm_world *world, int body, double x, double spin)
+{
+    sadmm_body_state state = {{x, 0.02, 0.5 + 0.3 * body}, {1, 0, 0, 0}, {0.1, 0, -0.4}, {0, spin, 0}};
+    MUST(world, sadmm_world_set_body_state(world, body_at(world, body), &state));
+}
+
+/* ---- edits ------------------------------------------------------------------------------------------------------- */
+
+/* Several changes of one body before a step: the last one counts, of states and of wrenches, and neither disturbs the other. */
+static void edit_often(sadmm_world *world, int step)
+{
+    set_wrench(world, 1, 300, 400);
+    set_wrench(world, 2, -1, step);
+    if (step % 3 == 1) {
+        set_state(world, 3, 5, 20);
+        set_wrench(world, 3, 70, 7);
+        set_state(world, 3, 6, -9);
+        set_state(world, 3, 1.01 + 0.01 * step, 0.5);
+        set_wrench(world, 3, 0.5, 1);
+    }
+    set_wrench(world, 1, -200, 100);
+    set_wrench(world, 1, 0.4, 0.1 * step);
+}
+
+static void expect_last_edit_wins(int precision)
+{
+    sadmm_world *host = small_world(precision, 1), *device = small_world(precision, 1), *queue = small_world(precision, 1);
+    sadmm_world *worlds[] = {host, device, queue};
+    by_host(host);
+    for (int step = 0; step < 12; ++step) {
+        for (int w = 0; w < 3; ++w) {
+            edit_often(worlds[w], step);
+            MUST(worlds[w], w == 2 ? sadmm_world_step_async(worlds[w]) : sadmm_world_step(worlds[w]));
+        }
+        if (step % 4 == 3) expect_same_world(host, device, "single steps");
+    }
+    expect_same_world(host, device, "single steps");
+    expect_same_world(host, queue, "enqueued steps");
+    for (int w = 0; w < 3; ++w) sadmm_world_destroy(worlds[w]);
+}
+
+/* Whatever the order that threads come in. */
+START_TEST(the_last_change_of_a_body_counts)
+{
+#ifdef CUDA_EMULATED
+    for (cuda_emulation_descending = 1; cuda_emulation_descending >= 0; --cuda_emulation_descending)
+        expect_last_edit_wins(_i);
+    cuda_emulation_descending = 0;
+#else
+    expect_last_edit_wins(_i);
+#endif
+}
+END_TEST
+
+/* However often a body is set, the step takes one change of a kind along. */
+START_TEST(changes_of_a_body_do_not_pile_up)
+{
+    sadmm_world *world = small_world(_i, 0);
+    step_world(world, 2);
+    for (int k = 0; k < 100000; ++k) {
+        set_wrench(world, 1, k, 1);
+        if (k % 100 == 0) set_state(world, 1 + k % 3, 0.1, 0.2);
+    }
+    ck_assert_uint_eq(world->resident.edited_count, 3);
+    step_world(world, 1);
+    ck_assert_uint_le(world->resident.edit_capacity, 64);
+    ck_assert_uint_eq(world->resident.edited_count, 0);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+/* Getters between changes and steps, waited for or not: they give what was set, and the rest as the last step left it. */
+START_TEST(reading_between_changes)
+{
+    const int precision = _i;
+    sadmm_world *host = small_world(precision, 0), *queue = small_world(precision, 0), *worlds[] = {host, queue};
+    by_host(host);
+    for (int step = 0; step < 14; ++step) {
+        for (int w = 0; w < 2; ++w) {
+            if (step % 2) set_wrench(worlds[w], 2, 0.3 * step, 1);
+            if (step % 5 == 2) set_state(worlds[w], 4, 1 + 0.01 * step, 1);
+        }
+        if (step % 3 == 0) { /* bodies read while a change waits for its step, and another one after that */
+            for (int i = 1; i < sadmm_world_body_count(host); ++i) {
+                sadmm_body_state a = body_state(host, body_at(host, i)), b = body_state(queue, body_at(queue, i));
+                ck_assert_msg(memcmp(&a, &b, sizeof a) == 0, "step %d, body %d: z %.17g, %.17g", step, i, a.position[2],
+                              b.position[2]);
+            }
+            for (int w = 0; w < 2; ++w) set_state(worlds[w], 5, 0.52, -1);
+        }
+        for (int w = 0; w < 2; ++w) {
+            if (step % 5 == 2) set_wrench(worlds[w], 4, 1, 2);
+            MUST(worlds[w], sadmm_world_step_async(worlds[w]));
+        }
+        /* while the step may still run */
+        for (int w = 0; w < 2 && step % 4 == 1; ++w) set_state(worlds[w], 6, 0.5, 0.1 * step);
+        if (step % 4 == 1) ck_assert(sadmm_world_state_hash(host) == sadmm_world_state_hash(queue));
+    }
+    expect_same_world(host, queue, "14 steps");
+    for (int w = 0; w < 2; ++w) sadmm_world_destroy(worlds[w]);
+}
+END_TEST
+
+/* ---- settings ---------------------------------------------------------------------------------------------------- */
+
+/* Every number of the settings changes, a few at every step. */
+static void change_numbers(sadmm_world *world, int step)
+{
+    sadmm_settings s = sadmm_world_settings(world);
+    s.gravity[0] = 0.1 * (step % 4);
+    s.gravity[2] = -9.81 + 0.2 * (step % 3);
+    if (step % 2) s.dt = 0.004 + 0.0005 * (step % 5);
+    if (step % 3 == 1) s.relaxation = 1.6 + 0.02 * step;
+    if (step % 4 == 2) s.baumgarte = 0.1 + 0.01 * step;
+    if (step % 4 == 3) s.slop = 1e-5 * step;
+    if (step % 5 == 1) s.correction_speed = 0.5 + 0.02 * step;
+    if (step % 5 == 2) s.restitution_threshold = 0.2 + 0.01 * step;
+    s.penalty_mass_factor = 16 + step % 2;
+    s.penalty_offset = 1e5 + 1e3 * (step % 3);
+    s.penalty_ratio_limit = 4 + step % 2;
+    if (s.certificate_tolerance > 0) {
+        s.certificate_tolerance = 1e-5 * (1 + step % 3);
+        s.certificate_momentum_tolerance = 1e-5 * (1 + step % 2);
+    }
+    MUST(world, sadmm_world_set_settings(world, &s));
+}
+
+/* In both methods, with new weights and penalties in steps that start cold, a stop rule, and every tier: as by the host, which
+ * stops all islands together: there is one. */
+START_TEST(numbers_of_the_settings_change_at_every_step)
+{
+    enum { PAPER_COLD, PAPER, FAST_COLD, FAST, STOPPING, CASES_OF_SETTINGS };
+    const int precision = _i / 2, stream = _i % 2;
+    for (int at = 0; at < CASES_OF_SETTINGS; ++at) {
+        sadmm_world *worlds[2];
+        for (int w = 0; w < 2; ++w) {
+            worlds[w] = towers(1, 2, 0.5, precision);
+            sadmm_settings s = sadmm_world_settings(worlds[w]);
+            s.method = at < FAST_COLD ? SADMM_METHOD_PAPER : SADMM_METHOD_FAST;
+            s.iterations = 24;
+            s.penalty_period = 8;
+            s.warm_start = at != PAPER_COLD && at != FAST_COLD;
+            s.check_period = 6;
+            s.certificate_tolerance = at == STOPPING ? 1e-5 : 0;
+            s.residual_tolerance = w == 0 ? 1e-300 : 0; /* sends the world through the host */
+            if (w == 0 && at != STOPPING) s.check_period = 1000000;
+            MUST(worlds[w], sadmm_world_set_settings(worlds[w], &s));
+            if (stream) force_tier(tables[precision], worlds[w]->context, SADMM_CUDA_TIER_STREAM);
+        }
+        for (int step = 0; step < 14; ++step) {
+            for (int w = 0; w < 2; ++w) {
+                change_numbers(worlds[w], step);
+                MUST(worlds[w], sadmm_world_step_async(worlds[w]));
+            }
+            if (step % 5 != 4) continue;
+            char what[60];
+            snprintf(what, sizeof what, "case %d, step %d", at, step);
+            expect_same_world(worlds[0], worlds[1], what);
+            ck_assert(worlds[1]->resident.loaded && !worlds[0]->resident.loaded);
+        }
+        for (int w = 0; w < 2; ++w) sadmm_world_destroy(worlds[w]);
+    }
+}
+END_TEST
+
+/* A step that is done again, with those behind it, has its own numbers. */
+START_TEST(steps_done_again_have_their_own_settings)
+{
+    const int precision = _i;
+    sadmm_world *host = small_world(precision, 0), *queue = small_world(precision, 0);
+    by_host(host);
+    tune_rooms(tables[precision], queue->context, 1);
+    for (int step = 0; step < 20; ++step) { /* contacts come in the first ones */
+        change_numbers(host, step);
+        change_numbers(queue, step);
+        MUST(host, sadmm_world_step(host));
+        MUST(queue, sadmm_world_step_async(queue));
+    }
+    expect_same_world(host, queue, "20 steps");
+    ck_assert_int_gt(world_report(queue).repeated, 0);
+    sadmm_world_destroy(host);
+    sadmm_world_destroy(queue);
+}
+END_TEST
+
+#ifdef CUDA_EMULATED
+/* Nothing is recorded anew, loaded or waited for when a number changes; other settings may wait and record. */
+START_TEST(a_change_of_numbers_costs_no_wait)
+{
+    const int precision = _i;
+    sadmm_world *world = small_world(precision, 1);
+    step_world(world, 12); /* at rest: the plan stays as it is */
+    const int64_t repeated = world_report(world).repeated;
+    const long graphs = cuda_emulation_graphs_made, waits = cuda_emulation_waits;
+    for (int step = 0; step < 4; ++step) {
+        sadmm_settings s = sadmm_world_settings(world);
+        s.gravity[2] -= 0.01;
+        s.dt = 0.0049 + 1e-5 * step;
+        s.relaxation = 1.7 + 0.01 * step;
+        s.slop *= 1.1;
+        MUST(world, sadmm_world_set_settings(world, &s));
+        set_wrench(world, 1, 0, 0.1);
+        MUST(world, sadmm_world_step_async(world));
+    }
+    ck_assert_int_eq(cuda_emulation_graphs_made, graphs);
+    ck_assert_int_eq(cuda_emulation_waits, waits);
+    ck_assert_int_eq(world_report(world).repeated, repeated);
+    ck_assert_int_eq(cuda_emulation_graphs_made, graphs);
+    ck_assert_int_eq(world->resident.enqueued, 15); /* loaded once: the first step was the host's */
+    sadmm_settings s = sadmm_world_settings(world);
+    s.iterations += 3;
+    MUST(world, sadmm_world_set_settings(world, &s));
+    step_world(world, 1);
+    ck_assert_int_eq(cuda_emulation_graphs_made, graphs + 2);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+/* ---- a device that fails ----------------------------------------------------------------------------------------- */
+
+enum { FAILING_STEPS = 6 };
+
+static void change_before(sadmm_world *world, int64_t step)
+{
+    sadmm_settings s = sadmm_world_settings(world);
+    s.gravity[0] = step % 3 == 0 ? 0.1 : 0;
+    MUST(world, sadmm_world_set_settings(world, &s));
+    set_wrench(world, 1, 0.2, 0.3 * (double)step);
+}
+
+/* Steps in pairs, readings between them, and a body that is moved: until `FAILING_STEPS` are done, whatever fails. Returns how
+ * many calls failed. */
+static int go_on_to_the_end(sadmm_world *world, const char *what)
+{
+    for (int failed = 0;;) {
+        sadmm_step_report report;
+        sadmm_status status = sadmm_world_report(world, &report);
+        if (status == SADMM_OK && report.step >= FAILING_STEPS) return failed;
+        if (status == SADMM_OK) {
+            change_before(world, report.step);
+            if (report.step == 2) set_state(world, 3, 0.7, 0.2);
+            status = sadmm_world_step_async(world);
+        }
+        if (status == SADMM_OK && report.step + 1 < FAILING_STEPS && report.step != 1) {
+            change_before(world, report.step + 1);
+            status = sadmm_world_step_async(world);
+        }
+        if (status == SADMM_OK && report.step % 4 == 0) {
+            int32_t count = sadmm_world_contact_count(world);
+            sadmm_contact contacts[64];
+            status = sadmm_world_contacts(world, 0, count < 64 ? count : 64, contacts);
+        }
+        if (status == SADMM_OK) {
+            sadmm_body_state state;
+            status = sadmm_world_body_state(world, body_at(world, 1), &state);
+        }
+        if (status == SADMM_OK) continue;
+        ++failed;
+        ck_assert_msg(status == SADMM_ERROR_DEVICE, "%s: %s: %s", what, sadmm_status_name(status), sadmm_world_message(world));
+        ck_assert_msg(strstr(sadmm_world_message(world), "CUDA device 0: ") != NULL, "%s", sadmm_world_message(world));
+        ck_assert_msg(failed <= 1, "%s: fails again: %s", what, sadmm_world_message(world));
+    }
+}
+
+/* Any one call of the runtime fails: the world goes on from the last step done, to the same bits. */
+START_TEST(a_call_that_fails_loses_nothing)
+{
+    const int precision = _i / 2, fast = _i % 2;
+    sadmm_world *plain = small_world(precision, fast);
+    ck_assert_int_eq(go_on_to_the_end(plain, "nothing"), 0);
+    int failed = 0;
+    for (long calls = _i;; calls += 1 + calls / 12) {
+        sadmm_world *world = small_world(precision, fast);
+        char what[40];
+        snprintf(what, sizeof what, "call %ld", calls);
+        cuda_emulation_calls_left = calls;
+        failed += go_on_to_the_end(world, what);
+        const bool reached = cuda_emulation_calls_left < 0;
+        cuda_emulation_calls_left = -1;
+        expect_same_world(plain, world, what);
+        sadmm_world_destroy(world);
+        if (!reached) break;
+    }
+    ck_assert_int_gt(failed, 20);
+    sadmm_world_destroy(plain);
+    ck_assert_int_eq(cuda_emulation_allocations, 0);
+}
+END_TEST
+
+static void expect_lost(sadmm_world *world, sadmm_status status)
+{
+    ck_assert_msg(status == SADMM_ERROR_DEVICE, "%s: %s", sadmm_status_name(status), sadmm_world_message(world));
+    ck_assert_msg(strstr(sadmm_world_message(world), "CUDA device 0: ") != NULL, "%s", sadmm_world_message(world));
+}
+
+/* The device is lost while steps run ahead: every step says so, everything that the host had read is there, and what was set; and
+ * when the device is back, the world goes on from there. */
+START_TEST(a_device_that_is_lost)
+{
+    const int precision = _i / 2, all_read = _i % 2;
+    sadmm_world *plain = small_world(precision, 1), *world = small_world(precision, 1);
+    step_world(plain, 5);
+    step_world(world, 5);
+    sadmm_contact first;
+    if (all_read) MUST(world, sadmm_world_contacts(world, 0, 1, &first));
+    const uint64_t read = sadmm_world_state_hash(world);
+    ck_assert(sadmm_world_state_hash(plain) == read);
+    for (int step = 0; step < 2; ++step) MUST(world, sadmm_world_step_async(world));
+    set_wrench(world, 2, 1, 2);
+    cuda_emulation_lost = 1;
+    expect_lost(world, sadmm_world_wait(world));
+    ck_assert_msg(strstr(sadmm_world_message(world), "after step 5") != NULL, "%s", sadmm_world_message(world));
+    ck_assert_int_eq(sadmm_world_wait(world), SADMM_OK); /* once */
+    ck_assert(sadmm_world_state_hash(world) == read);
+    ck_assert_int_eq(world_report(world).step, 5);
+    ck_assert_double_eq(world_report(world).time, world_report(plain).time);
+    for (int k = 0; k < 3; ++k) {
+        expect_lost(world, k == 1 ? sadmm_world_step_async(world) : sadmm_world_step(world));
+        ck_assert(sadmm_world_state_hash(world) == read);
+    }
+    set_state(world, 4, 0.3, 1);
+    ck_assert_double_eq(body_state(world, body_at(world, 4)).position[0], 0.3);
+    cuda_emulation_lost = 0;
+    set_wrench(plain, 2, 1, 2);
+    set_state(plain, 4, 0.3, 1);
+    step_world(plain, 4);
+    step_world(world, 4);
+    if (all_read) expect_same_world(plain, world, "after the loss");
+    ck_assert_int_eq(world_report(world).step, 9);
+    sadmm_world_destroy(plain);
+    sadmm_world_destroy(world);
+}
+END_TEST
+#endif
+
+int main(void)
+{
+    if (!find_cuda_tables(tables)) return TEST_SKIPPED;
+    const int parts = tested_precisions();
+    Suite *suite = suite_create("cuda_changes");
+    ADD_CASE(suite, the_last_change_of_a_body_counts, 0, parts);
+    ADD_CASE(suite, changes_of_a_body_do_not_pile_up, 0, parts);
+    ADD_CASE(suite, reading_between_changes, 0, parts);
+    ADD_CASE(suite, numbers_of_the_settings_change_at_every_step, 0, 2 * parts);
+    ADD_CASE(suite, steps_done_again_have_their_own_settings, 0, parts);
+#ifdef CUDA_EMULATED
+    ADD_CASE(suite, a_change_of_numbers_costs_no_wait, 0, parts);
+    ADD_CASE(suite, a_call_that_fails_loses_nothing, 0, 2 * parts);
+    ADD_CASE(suite, a_device_that_is_lost, 0, 2 * parts);
+#endif
+    return run_cuda_suite(suite);
+}
