@@ -1,6 +1,7 @@
 /* The method `fast` on the CUDA backend: its entries against the CPU's from identical inputs, and tiers that must agree
  * to the last bit, weights, levels and limit included. test_fast.c drives every registered table beside the literal
  * backend. The same checks run on the emulated device (test_cuda_fast_emulated.c). */
+#include "core/solve/certificate.h"
 #include "cuda_runner.h"
 
 /* Stretches of all lengths, since what is relaxed depends on it, 18 and 35 with graphs in the STREAM tier; new weights
@@ -384,6 +385,64 @@ START_TEST(solutions_are_certified)
 }
 END_TEST
 
+static int32_t look(struct runner *r, int done)
+{
+    int32_t unmet = -1;
+    if (r->k->precision == SADMM_F32) CALL(r, SYMBOL(look, f32)(r->c, done, &unmet, &r->error));
+    else CALL(r, SYMBOL(look, f64)(r->c, done, &unmet, &r->error));
+    return unmet;
+}
+
+/* The stop rule asks for the natural map alone: what is nothing in momentum an island of a step decides for itself. */
+static void start_with_rule(struct runner *r, const struct sadmm_kernels *k, const struct scene *scene, enum sadmm_cuda_tier tier)
+{
+    start(r, k, scene, tier);
+    r->settings.certificate_tolerance = 1e-3;
+    r->settings.certificate_momentum_tolerance = 1e30;
+    CALL(r, k->begin(r->c, &r->p->system, &r->plan, &r->settings, &r->error));
+    runner_assemble(r);
+}
+
+/* Looks of every tier find as many islands above the tolerance as the certificate does, whatever their constraints are, row blocks
+ * included; and islands that met it stay as they are. */
+START_TEST(looks_find_what_the_certificate_does)
+{
+    static const int counts[] = {1, 4, 15, 40, 120};
+    const struct sadmm_kernels *table = tables[_i / SCENES];
+    const struct scene *scene = &scenes[_i % SCENES];
+    int32_t most = 0;
+    for (size_t t = TIERS; t-- > 0;) {
+        struct runner stream, own;
+        if (!device_has(table, tiers[t]) || !(scene->tiers >> tiers[t] & 1)) continue;
+        start_with_rule(&stream, table, scene, SADMM_CUDA_TIER_STREAM);
+        start_with_rule(&own, table, scene, tiers[t]);
+        int32_t unmet = 0;
+        for (int k = 0, done = 0; k < (int)(sizeof counts / sizeof *counts); ++k) {
+            sadmm_certificate certificate;
+            char what[100];
+            iterate(&stream, counts[k], false);
+            iterate(&own, counts[k], false);
+            done += counts[k];
+            snprintf(what, sizeof what, "%s, tier %d, %d iterations", scene->name, (int)tiers[t], done);
+            unmet = look(&own, done);
+            ck_assert_int_eq(unmet, look(&stream, done));
+            check_same(&own, &stream, what);
+            CALL(&own, sadmm_certify(&own.p->system, &own.settings, &certificate, &own.error));
+            ck_assert_msg(unmet == certificate.islands_above, "%s: %d islands, the certificate has %lld", what, unmet,
+                          (long long)certificate.islands_above);
+            most = unmet > most ? unmet : most;
+        }
+        if (unmet == 0) { /* all have stopped */
+            iterate(&own, 9, false);
+            check_same(&own, &stream, "after the last island has stopped");
+        }
+        runner_stop(&stream);
+        runner_stop(&own);
+    }
+    if (strncmp(scene->name, "mixed", 5) == 0 || strncmp(scene->name, "towers", 6) == 0) ck_assert_int_gt(most, 0);
+}
+END_TEST
+
 /* Iterations that end with more energy than contacts can leave: an island is slowed down, here and on the CPU. */
 START_TEST(islands_are_slowed_down)
 {
@@ -433,6 +492,7 @@ int main(void)
     for (int p = 0; p < parts; ++p) {
         const int first = p * SCENES, some = first + (parts == 2 ? SCENES : SCENES / 3);
         add_case(suite, p ? "entries_f64" : "entries_f32", entries_equal_cpu, first, first + SCENES);
+        add_case(suite, p ? "looks_f64" : "looks_f32", looks_find_what_the_certificate_does, first, some);
         add_case(suite, p ? "tiers_f64" : "tiers_f32", tiers_agree, first, some);
     }
     ADD_CASE(suite, unrelaxed_tiers_agree, 0, parts);

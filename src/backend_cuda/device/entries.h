@@ -15,6 +15,9 @@ void CUDA(set_cluster)(struct sadmm_context *, int blocks);
 sadmm_status CUDA(set_halt)(struct sadmm_context *, enum cuda_halt, struct sadmm_error *);
 enum sadmm_cuda_tier CUDA(get_tier)(const struct sadmm_context *, int32_t *blocks);
 
+/* For tests: a look at the stop rule after `done` iterations of a solve; *unmet: islands that do not meet it yet. */
+sadmm_status CUDA(look)(struct sadmm_context *, int done, int32_t *unmet, struct sadmm_error *);
+
 /* For tests: survey and layout of the last begin's system once more, for this partition, halted from the start or not;
  * `way`: of enum cuda_layout_way. */
 sadmm_status CUDA(lay_out_again)(struct sadmm_context *, const struct cuda_partition *, enum cuda_halt, int way,

@@ -4,11 +4,23 @@
  * have all stopped; the other tiers have nothing left to do once the last island has. The scale of the momentum error is the
  * island's own, which is no less strict than the certificate's (but for islands where nothing pushes: there the tolerance of
  * the natural map says what is nothing). In double, eight lanes a body. */
+#include <string.h>
+
 #include "backend_cuda/device/double.h"
 #include "backend_cuda/weight/constraint.h"
 #include "backend_cuda/weight/island_sums.h"
 #include "stop_rule.h"
 #include "backend_cuda/step/solution.h"
+
+/* Of a contact in its frame, with u = x + e and the response w. */
+static __device__ double map_of_contact(const double lambda[3], const double u[3], double friction, double w)
+{
+    double y[3], inside[3], missed = 0;
+    for (int i = 0; i < 3; ++i) y[i] = lambda[i] - u[i] / w;
+    contact_project_rows(y, friction, inside);
+    for (int i = 0; i < 3; ++i) missed += (lambda[i] - inside[i]) * (lambda[i] - inside[i]);
+    return w * sqrt(missed);
+}
 
 /* The largest natural map of a pair's points, m/s. */
 static __device__ double natural_map(const cuda_view &v, int32_t p)
@@ -42,17 +54,44 @@ static __device__ double natural_map(const cuda_view &v, int32_t p)
         const double w = fmax(weight[0], fmax(weight[1], weight[2])),
                      e = sadmm_contact_e(&v.raw, &settings, pair, point),
                      lambda[3] = {impulse.x, impulse.y, impulse.z}, u[3] = {x.x + e, x.y, x.z};
-        double y[3], inside[3], missed = 0;
-        for (int i = 0; i < 3; ++i) y[i] = lambda[i] - u[i] / w;
-        contact_project_rows(y, pair->friction, inside);
-        for (int i = 0; i < 3; ++i) missed += (lambda[i] - inside[i]) * (lambda[i] - inside[i]);
-        worst = largest_term::join(worst, w * sqrt(missed));
+        worst = largest_term::join(worst, map_of_contact(lambda, u, pair->friction, w));
     }
     return worst;
 }
 
-/* Terms of a body: natural map of the pairs that count here (at their first dynamic body); momentum error, and the largest of
+/* The same of the rows of a block. */
+static __device__ double natural_map_of_rows(const cuda_view &v, int32_t k)
+{
+    const struct sadmm_problem_block *block = &v.raw.blocks[k];
+    const int32_t bodies[2] = {block->body_a, block->body_b};
+    double x[6] = {}, weight[6] = {}, lambda[6] = {}, worst = 0;
+    for (int r = 0; r < block->rows; ++r) {
+        lambda[r] = row_number(v, ROW_LAMBDA + r, k);
+        for (int side = 0; side < 2; ++side) {
+            if (bodies[side] < 0) continue;
+            const double *row = (side ? block->jacobian_b : block->jacobian_a) + 6 * r;
+            const solver_real *state = v.state + (size_t)bodies[side] * ROW;
+            for (int j = 0; j < 6; ++j) x[r] += row[j] * (double)state[j];
+            weight[r] += packed_form(v.A_inverse + (size_t)bodies[side] * PACKED, row);
+        }
+    }
+    if (block->kind == SADMM_BLOCK_CONTACT) {
+        const double u[3] = {x[0] + block->error[0], x[1] + block->error[1], x[2] + block->error[2]},
+                     w = block->friction > 0 ? fmax(weight[0], fmax(weight[1], weight[2])) : weight[0];
+        return map_of_contact(lambda, u, block->friction, w);
+    }
+    for (int r = 0; r < block->rows; ++r) {
+        const double c = block->damping[r], spring = lambda[r] + block->stiffness[r] * block->error[r] + c * x[r];
+        double missed = fabs(spring) * weight[r] / (1 + c * weight[r]);
+        if (block->kind == SADMM_BLOCK_HARD) missed = weight[r] == 0 ? 0 : fabs(x[r] + block->error[r]);
+        worst = largest_term::join(worst, missed);
+    }
+    return worst;
+}
+
+/* Terms of a body: natural map of the constraints that count here (at their first dynamic body); momentum error, and the largest of
  * what it is made of. args.looks: this look's number, from 1; args.count: iterations done. */
+template <bool RIGID>
 static __global__ void __launch_bounds__(BODY_THREADS)
     look_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
@@ -64,11 +103,12 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) {
         const int32_t code = v.incident[at], p = code / 2;
         add_half(v, code, sums, &sums[PUSH]);
-        if (code & 1 && is_dynamic(v, v.ends[p].body_a)) continue; /* counted there */
-        map = largest_term::join(map, natural_map(v, p));
+        const int32_t k = p - v.pair_room; /* a block of rows, or a pair */
+        if (code & 1 && is_dynamic(v, k < 0 ? v.ends[p].body_a : v.row_info[k].body_a)) continue; /* counted there */
+        map = largest_term::join(map, k < 0 ? natural_map(v, p) : natural_map_of_rows(v, k));
     }
     sum_lanes<SUMS>(sums);
-    const wide_row<true> row = row_of_body<true>(v, t); /* worlds alone have a stop rule here */
+    const wide_row<RIGID> row = row_of_body<RIGID>(v, t);
     const double g = own_number(sums, t.lane), momentum = product(row.velocity, row.a);
     term[0] = largest_of_lanes(map);
     term[1] = largest_of_lanes(fabs(momentum - row.b - g));
@@ -90,5 +130,15 @@ sadmm_status CUDA(enqueue_look)(struct sadmm_context *c, int done, struct sadmm_
     cuda_args args = {};
     args.looks = ++c->looks;
     args.count = done;
-    return CUDA(launch_of)(c, look_kernel, "look", body_blocks(c->view.bodies), BODY_THREADS, &args, error);
+    return CUDA(launch_of)(c, c->view.rigid ? look_kernel<true> : look_kernel<false>, "look", body_blocks(c->view.bodies),
+                           BODY_THREADS, &args, error);
+}
+
+extern "C" sadmm_status CUDA(look)(struct sadmm_context *c, int done, int32_t *unmet, struct sadmm_error *error)
+{
+    CUDA_ENTER(c);
+    CUDA_TRY(CUDA(enqueue_look)(c, done, error));
+    CUDA_TRY(CUDA(download)(c, &c->view.stop->unmet[c->looks % LOOKS_KEPT], sizeof *unmet, error));
+    memcpy(unmet, c->buffers[PINNED_OUT].data, sizeof *unmet);
+    return SADMM_OK;
 }

@@ -30,6 +30,11 @@ static __device__ __forceinline__ bool pair_stopped(const cuda_view &v, int32_t 
     return looks > 0 && island_stopped(v, looks, ends.body_a < v.bodies ? ends.body_a : ends.body_b);
 }
 
+static __device__ __forceinline__ bool rows_stopped(const cuda_view &v, int32_t looks, const row_about &rows)
+{
+    return looks > 0 && island_stopped(v, looks, rows.body_a < v.bodies ? rows.body_a : rows.body_b);
+}
+
 /* Had all islands of the slots [first, end), which are whole ones? */
 static __device__ __forceinline__ bool part_stopped(const cuda_view &v, int32_t looks, int32_t first, int32_t end)
 {

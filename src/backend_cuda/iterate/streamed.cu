@@ -143,7 +143,7 @@ static __global__ void __launch_bounds__(THREADS)
             const bool on = live && !(FAST && pair_stopped(v, args.looks, v.ends[p]));
             primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v, p, lane, on, farther);
         });
-    else if (k < live_rows(v))
+    else if (k < live_rows(v) && !(FAST && rows_stopped(v, args.looks, v.row_info[k])))
         primal = FAST ? sweep_row_block_fast<MEASURE>(v, k, farther) : sweep_row_block<MEASURE>(v, k);
     if (MEASURE) reduce_max(primal, v.residual);
 }
