@@ -354,6 +354,31 @@ START_TEST(a_device_that_is_lost)
     sadmm_world_destroy(world);
 }
 END_TEST
+
+/* It does not come back: the world goes on elsewhere. */
+START_TEST(a_world_moves_to_another_backend)
+{
+    const int precision = _i;
+    sadmm_world *world = small_world(precision, 1);
+    step_world(world, 12);
+    const sadmm_body_state before = body_state(world, body_at(world, 2));
+    const int32_t contacts = sadmm_world_contact_count(world);
+    MUST(world, sadmm_world_step_async(world));
+    cuda_emulation_lost = 1;
+    expect_lost(world, sadmm_world_set_backend(world, SADMM_BACKEND_CPU, (sadmm_precision)precision, 0));
+    MUST(world, sadmm_world_set_backend(world, SADMM_BACKEND_CPU, (sadmm_precision)precision, 0));
+    step_world(world, 10);
+    cuda_emulation_lost = 0;
+    ck_assert_int_eq(world_report(world).backend, SADMM_BACKEND_CPU);
+    ck_assert_int_eq(world_report(world).step, 22);
+    ck_assert_int_eq(world_report(world).contacts, contacts);
+    const sadmm_body_state after = body_state(world, body_at(world, 2));
+    ck_assert_double_eq_tol(after.position[2], before.position[2], 1e-3); /* it rests, or nearly so */
+    ck_assert_int_eq(sadmm_world_set_backend(world, SADMM_BACKEND_CPU, SADMM_F64, -1), SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert_int_eq(sadmm_world_set_backend(world, SADMM_BACKEND_COUNT, SADMM_F64, 0), SADMM_ERROR_INVALID_ARGUMENT);
+    sadmm_world_destroy(world);
+}
+END_TEST
 #endif
 
 int main(void)
@@ -370,6 +395,7 @@ int main(void)
     ADD_CASE(suite, a_change_of_numbers_costs_no_wait, 0, parts);
     ADD_CASE(suite, a_call_that_fails_loses_nothing, 0, 2 * parts);
     ADD_CASE(suite, a_device_that_is_lost, 0, 2 * parts);
+    ADD_CASE(suite, a_world_moves_to_another_backend, 0, parts);
 #endif
     return run_cuda_suite(suite);
 }

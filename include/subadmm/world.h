@@ -61,6 +61,12 @@ SADMM_API const char *sadmm_world_message(const sadmm_world *world);
 SADMM_API sadmm_status sadmm_world_set_settings(sadmm_world *world, const sadmm_settings *settings);
 SADMM_API sadmm_settings sadmm_world_settings(const sadmm_world *world);
 
+/* Let another backend, precision or device (as in sadmm_world_def) make the steps from the next one on; the world goes on
+ * from where it is, with its impulses. Steps begun are waited for. Errors: as sadmm_world_create, and those of the steps begun
+ * (nothing changes; after a lost device's DEVICE, ask once more). */
+SADMM_API sadmm_status sadmm_world_set_backend(sadmm_world *world, sadmm_backend backend, sadmm_precision precision,
+                                               int device);
+
 /* ---- bodies ------------------------------------------------------------------------------------------------ */
 
 typedef enum sadmm_body_type { SADMM_BODY_DYNAMIC = 0, SADMM_BODY_STATIC } sadmm_body_type;
@@ -167,7 +173,7 @@ SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_s
  * last, impulses to start from as when contacts were, and every state and wrench set since; time and sadmm_step_report.step go
  * back to that step, which the message names. All functions but steps go on with it; a step says DEVICE as long as the device
  * does not answer (CUDA: after a fault of a kernel, until the process ends or resets the device, which is for the program to
- * do, once every world of the device has returned the error). */
+ * do, once every world of the device has returned the error). sadmm_world_set_backend takes the world elsewhere. */
 SADMM_API sadmm_status sadmm_world_step(sadmm_world *world);
 
 /* Begin a step and return without waiting for it, where the backend can: CUDA, in the method FAST from the second step on;

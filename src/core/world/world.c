@@ -82,6 +82,22 @@ sadmm_status sadmm_world_set_settings(sadmm_world *world, const sadmm_settings *
     return status;
 }
 
+sadmm_status sadmm_world_set_backend(sadmm_world *world, sadmm_backend backend, sadmm_precision precision, int device)
+{
+    const struct sadmm_kernels *kernels = NULL;
+    if (device < 0) return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT, "device = %d: must be >= 0", device);
+    TRY(sadmm_backend_choose(backend, precision, 0, &kernels, NULL, 0, &world->error));
+    TRY(sadmm_world_take_back(world));
+    if (world->context) world->kernels->destroy(world->context);
+    world->context = NULL;
+    world->kernels = NULL; /* chosen at the next step */
+    world->why[0] = 0;
+    world->def.backend = backend;
+    world->def.precision = precision;
+    world->def.device = device;
+    return SADMM_OK;
+}
+
 sadmm_settings sadmm_world_settings(const sadmm_world *world)
 {
     return world ? world->def.settings : sadmm_settings_default();
