@@ -142,6 +142,50 @@ static void check_kept(sadmm_problem *p, const struct kept *given)
         check_kept(p, &given);                                                                          \
     } while (0)
 
+/* Numbers may change from step to step; everything else is part of what a step consists of. */
+START_TEST(settings_are_numbers_or_not)
+{
+    const sadmm_settings plain = sadmm_settings_default();
+    double before[SADMM_SETTING_NUMBERS], after[SADMM_SETTING_NUMBERS];
+    sadmm_settings_numbers(&plain, before);
+    int at = 0;
+#define CHANGE(name)                                                                                   \
+    do {                                                                                               \
+        sadmm_settings s = plain;                                                                      \
+        s.name += 1;                                                                                   \
+        if (!strcmp(#name, "certificate_tolerance")) s.name = 0;                                       \
+        ck_assert_msg(sadmm_settings_same_but_numbers(&plain, &s), "%s", #name);                       \
+        sadmm_settings_numbers(&s, after);                                                             \
+        for (int k = 0; k < SADMM_SETTING_NUMBERS; ++k)                                                \
+            ck_assert_msg((before[k] != after[k]) == (k == at && before[k] != s.name), "%s", #name);   \
+        ++at;                                                                                          \
+    } while (0);
+    SADMM_EACH_SETTING_NUMBER(CHANGE)
+#undef CHANGE
+    static const size_t others[] = {offsetof(sadmm_settings, method), offsetof(sadmm_settings, iterations),
+                                    offsetof(sadmm_settings, penalty_period), offsetof(sadmm_settings, check_period),
+                                    offsetof(sadmm_settings, penalty_update_warm), offsetof(sadmm_settings, warm_start),
+                                    offsetof(sadmm_settings, measure_residuals), offsetof(sadmm_settings, certify),
+                                    offsetof(sadmm_settings, recover_wrenches)};
+    for (size_t k = 0; k < sizeof others / sizeof *others; ++k) {
+        sadmm_settings s = plain;
+        *((unsigned char *)&s + others[k]) ^= 1; /* of a bool or an int: another value */
+        ck_assert_msg(!sadmm_settings_same_but_numbers(&plain, &s), "setting %zu", k);
+    }
+    sadmm_settings s = plain, t = plain;
+    s.penalty_ratio_limit = 1; /* no update */
+    ck_assert(!sadmm_settings_same_but_numbers(&plain, &s));
+    s = plain;
+    s.certificate_tolerance = 1e-3;
+    ck_assert(!sadmm_settings_same_but_numbers(&plain, &s));
+    t.certificate_tolerance = 2e-3;
+    ck_assert(sadmm_settings_same_but_numbers(&t, &s));
+    s = plain;
+    s.residual_tolerance = 1e-3;
+    ck_assert(!sadmm_settings_same_but_numbers(&plain, &s));
+}
+END_TEST
+
 START_TEST(bad_bodies)
 {
     struct kept given;
@@ -447,6 +491,7 @@ int main(void)
     TCase *cases = tcase_create("inputs");
     tcase_add_loop_test(cases, settings_out_of_range, 0, sizeof bad_settings / sizeof *bad_settings);
     tcase_add_test(cases, settings_at_the_ends_of_their_ranges);
+    tcase_add_test(cases, settings_are_numbers_or_not);
     tcase_add_test(cases, bad_bodies);
     tcase_add_test(cases, bad_contacts);
     tcase_add_test(cases, bad_blocks);
