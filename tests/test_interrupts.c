@@ -13,6 +13,8 @@ static pid_t start(const char *script)
     snprintf(text, sizeof text, "exec %s" LOGGED, script);
     signal(SIGINT, SIG_DFL);
     signal(SIGTERM, SIG_DFL);
+    signal(SIGHUP, SIG_DFL); /* whoever started the tests may ignore it (nohup) */
+    signal(SIGPIPE, SIG_DFL);
     execl("/bin/sh", "sh", "-c", text, (char *)NULL);
     _exit(127);
 }
@@ -120,7 +122,7 @@ START_TEST(other_runs_report_too)
         free(text);
     }
 #ifdef SADMM_HAVE_HDF5
-    ck_assert_int_eq(sh("$S solve s.hdf5 --quiet"), 0); /* what it has is a file */
+    ck_assert_int_eq(sh("$S solve s.hdf5 --tolerance 1 --quiet"), 0); /* what it has is a file */
 #endif
     ck_assert_int_eq(sh("test -z \"$(find . -name '.*.part')\""), 0);
 }

@@ -33,6 +33,7 @@ static void on_worlds(void)
     ck_assert(settings.dt == sadmm_settings_default().dt && settings.iterations == sadmm_settings_default().iterations);
     REFUSES("world", sadmm_world_set_settings(NULL, &settings));
     REFUSES("settings", sadmm_world_set_settings(world, NULL));
+    REFUSES("world", sadmm_world_set_backend(NULL, SADMM_BACKEND_CPU, SADMM_F64, 0));
 }
 
 static void on_bodies(void)
@@ -168,7 +169,7 @@ static const struct {
     void (*pass_null)(void);
     const char *names[24];
 } functions[] = {
-    {on_worlds, {W(create), W(destroy), W(message), W(settings), W(set_settings)}},
+    {on_worlds, {W(create), W(destroy), W(message), W(settings), W(set_settings), W(set_backend)}},
     {on_bodies,
      {W(add_body), W(remove_body), W(body_count), W(body_at), W(body_state), W(set_body_state), W(body_def),
       W(set_body_wrench), W(body_contact_wrench), W(set_body_pair_contact)}},

@@ -132,7 +132,7 @@ sadmm_status COLLISION(take_input)(struct sadmm_cuda_collision *c, const struct 
     v->body_count = (int32_t)input->body_count;
     v->group_bits = group_bits(input);
     v->halt = nullptr;
-    v->settings = nullptr;
+    v->dt = v->gravity = nullptr;
     v->present = in<uint32_t>(c, PRESENT);
     v->planes = in<uint64_t>(c, PLANES);
     v->disabled_pairs = in<uint64_t>(c, DISABLED_PAIRS);

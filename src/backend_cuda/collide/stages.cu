@@ -221,14 +221,15 @@ sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots,
 extern "C" sadmm_status COLLISION(attach)(struct sadmm_cuda_collision *c, void *stream,
                                           const struct sadmm_collision_input *input,
                                           const struct sadmm_collision_body *bodies, const int32_t *halt,
-                                          const struct sadmm_settings *settings, struct sadmm_error *error)
+                                          const double *dt, const double *gravity, struct sadmm_error *error)
 {
     c->can_undo = false;
     ENTER(c);
     TRY(begin_work(c, stream, error));
     TRY(COLLISION(take_input)(c, input, bodies, error));
     c->view.halt = halt;
-    c->view.settings = settings;
+    c->view.dt = dt;
+    c->view.gravity = gravity;
     return make_shape_room(c, input->shape_count, c->view.leaf_count >= c->tree_from, error);
 }
 

@@ -112,7 +112,7 @@ struct collision_view {
     int32_t body_count;                            /* slots */
     struct collision_grid *grid;                   /* of this step */
     const int32_t *halt;                           /* not NULL and not 0: do nothing */
-    const struct sadmm_settings *settings;         /* not NULL: have the time step and gravity (step_of) */
+    const double *dt, *gravity;                    /* not NULL: of the step, in the place of step's (step_of) */
 
     struct sadmm_proxy *proxies;                   /* by slot */
     struct collision_filter *filters;              /* by slot */
@@ -144,9 +144,9 @@ static __device__ __forceinline__ bool halted(const collision_view &v) { return 
 static __device__ __forceinline__ collision_step step_of(const collision_view &v)
 {
     struct collision_step step = v.step;
-    if (!v.settings) return step;
-    step.dt = v.settings->dt;
-    step.gravity = gravity_size(v.settings->gravity);
+    if (!v.dt) return step;
+    step.dt = *v.dt;
+    step.gravity = *v.gravity;
     return step;
 }
 

@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "collision/bounds.h"
 #include "core/base/memory.h"
 #include "context.h"
 
@@ -143,13 +144,14 @@ void CUDA(plan_settings)(struct sadmm_context *c, const struct sadmm_settings *s
 sadmm_status CUDA(use_settings)(struct sadmm_context *c, const struct sadmm_settings *settings, struct sadmm_error *error)
 {
     double numbers[SADMM_SETTING_NUMBERS];
-    CUDA_TRY(CUDA(room)(c, BUFFER_SETTINGS, sizeof *settings, error));
-    CUDA_TRY(CUDA(room)(c, PINNED_SETTINGS, sizeof *settings, error));
+    const struct cuda_settings kept = {*settings, gravity_size(settings->gravity)};
+    CUDA_TRY(CUDA(room)(c, BUFFER_SETTINGS, sizeof kept, error));
+    CUDA_TRY(CUDA(room)(c, PINNED_SETTINGS, sizeof kept, error));
     CUDA(plan_settings)(c, settings);
-    c->view.settings = (const struct sadmm_settings *)c->buffers[BUFFER_SETTINGS].data;
+    c->view.settings = &((const struct cuda_settings *)c->buffers[BUFFER_SETTINGS].data)->settings;
     sadmm_settings_numbers(settings, numbers);
     if (memcmp(c->numbers, numbers, sizeof numbers) == 0) return SADMM_OK;
-    CUDA_TRY(CUDA(upload)(c, c->buffers[BUFFER_SETTINGS].data, PINNED_SETTINGS, 0, settings, sizeof *settings, error));
+    CUDA_TRY(CUDA(upload)(c, c->buffers[BUFFER_SETTINGS].data, PINNED_SETTINGS, 0, &kept, sizeof kept, error));
     memcpy(c->numbers, numbers, sizeof numbers);
     return SADMM_OK;
 }

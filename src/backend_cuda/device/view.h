@@ -133,6 +133,12 @@ struct alignas(16) pair_ends {
 
 /* What kernels see. Pointers are device memory. Arrays over bodies are in raw order; offsets, parts and the states of
  * resident blocks count bodies in slots (graph/layout.h). */
+/* What BUFFER_SETTINGS holds. */
+struct cuda_settings {
+    struct sadmm_settings settings; /* numbers alone count */
+    double gravity;                 /* size of it, m/s^2 */
+};
+
 struct cuda_view {
     struct cuda_live *live;
     struct cuda_facts *facts;

@@ -3,6 +3,8 @@
 
 #include "backend_cuda/device/double.h"
 
+#include "collision/bounds.h"
+
 #include "core/model/steady.h"
 #include "backend_cuda/iterate/slow.h"
 #include "solution.h"
@@ -27,11 +29,13 @@ static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __
     const struct sadmm_resident_edit *edit = &args.edits[i];
     const double *values = edit->values;
     if (edit->kind == SADMM_EDIT_SETTINGS) {
-        struct sadmm_settings *settings = const_cast<struct sadmm_settings *>(v.settings);
+        struct cuda_settings *kept = (struct cuda_settings *)v.settings; /* its first member */
+        struct sadmm_settings *settings = &kept->settings;
         int k = 0;
 #define PUT(name) settings->name = values[k++];
         SADMM_EACH_SETTING_NUMBER(PUT)
 #undef PUT
+        kept->gravity = gravity_size(settings->gravity);
         return;
     }
     struct sadmm_rigid *body = const_cast<struct sadmm_rigid *>(&v.step.before[edit->target]);

@@ -575,9 +575,10 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     s->candidate_room = s->point_room = c->first_room;
     c->refused = 0;
     s->misfit = -1;
+    const struct cuda_settings *kept = buffer<struct cuda_settings>(c, BUFFER_SETTINGS);
     CUDA_TRY(COLLISION(attach)(s->collision, c->stream, world->input,
                                buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES), &c->view.live->halt,
-                               c->view.settings, error));
+                               &kept->settings.dt, &kept->gravity, error));
     view_into(c, s->into);
     return CUDA(wait)(c, error);
 }

@@ -82,7 +82,10 @@ SADMM_INLINE vec3 rigid_angular_momentum(quat q, vec3 inertia, vec3 w_world, rea
 }
 
 /* Sizes of the accelerations that a force (N) and a torque (N m, world frame) give by themselves, m/s^2 and rad/s^2. */
-SADMM_INLINE real rigid_acceleration(real mass, vec3 force) { return v3_norm(force) / mass; }
+SADMM_INLINE real rigid_acceleration(real mass, vec3 force)
+{
+    return v3_max_abs(force) == 0 ? 0 : v3_norm(force) / mass; /* most bodies have none */
+}
 SADMM_INLINE real rigid_angular_acceleration(quat q, vec3 inertia, vec3 torque)
 {
     vec3 t;

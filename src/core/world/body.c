@@ -1,5 +1,6 @@
 /* Bodies of a world. */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "core/base/memory.h"
@@ -24,6 +25,30 @@ static const double INERTIA_MIN = 1e-24, INERTIA_MAX = 1e24;
  * about its axis are lost to 1 % at these ratios, wholly at some 100 times these. */
 static double inertia_ratio_limit(sadmm_precision precision) { return precision == SADMM_F32 ? 1e6 : 1e12; }
 
+static sadmm_status check_inertia_ratio(const char *name, const double inertia[3], sadmm_precision precision,
+                                        struct sadmm_error *error)
+{
+    double least = fmin(inertia[0], fmin(inertia[1], inertia[2])), most = fmax(inertia[0], fmax(inertia[1], inertia[2]));
+    if (!(most <= inertia_ratio_limit(precision) * least))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "%s = (%g, %g, %g): the largest must be at most %g times the smallest in %s precision, "
+                          "which cannot tell more apart", name, inertia[0], inertia[1], inertia[2],
+                          inertia_ratio_limit(precision), precision == SADMM_F32 ? "single" : "double");
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_check_inertias(sadmm_world *world, sadmm_precision precision)
+{
+    for (size_t slot = 0; slot < world->body_slots; ++slot) {
+        const struct sadmm_world_body *body = &world->bodies[slot];
+        char name[96];
+        if (!body->alive || body->type != SADMM_BODY_DYNAMIC) continue;
+        snprintf(name, sizeof name, "inertia of body (slot %zu, generation %u)", slot + 1, body->generation);
+        TRY(check_inertia_ratio(name, body->rigid.inertia, precision, &world->error));
+    }
+    return SADMM_OK;
+}
+
 static sadmm_status check_inertia(const double inertia[3], sadmm_precision precision, struct sadmm_error *error)
 {
     for (int k = 0; k < 3; ++k)
@@ -37,13 +62,7 @@ static sadmm_status check_inertia(const double inertia[3], sadmm_precision preci
                               "def->inertia[%d] = %g: must be at most the sum of the other two, %g (no rigid body has more)",
                               k, inertia[k], others);
     }
-    double least = fmin(inertia[0], fmin(inertia[1], inertia[2])), most = fmax(inertia[0], fmax(inertia[1], inertia[2]));
-    if (!(most <= inertia_ratio_limit(precision) * least))
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "def->inertia = (%g, %g, %g): the largest must be at most %g times the smallest in %s precision, "
-                          "which cannot tell more apart", inertia[0], inertia[1], inertia[2],
-                          inertia_ratio_limit(precision), precision == SADMM_F32 ? "single" : "double");
-    return SADMM_OK;
+    return check_inertia_ratio("def->inertia", inertia, precision, error);
 }
 
 static sadmm_status check_motion(const char *linear_name, const char *angular_name, const double linear[3],

@@ -85,8 +85,10 @@ sadmm_status sadmm_world_set_settings(sadmm_world *world, const sadmm_settings *
 sadmm_status sadmm_world_set_backend(sadmm_world *world, sadmm_backend backend, sadmm_precision precision, int device)
 {
     const struct sadmm_kernels *kernels = NULL;
+    TRY(sadmm_check_given(world, "world", NULL));
     if (device < 0) return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT, "device = %d: must be >= 0", device);
     TRY(sadmm_backend_choose(backend, precision, 0, &kernels, NULL, 0, &world->error));
+    TRY(sadmm_world_check_inertias(world, precision));
     TRY(sadmm_world_take_back(world));
     if (world->context) world->kernels->destroy(world->context);
     world->context = NULL;

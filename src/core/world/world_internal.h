@@ -146,6 +146,11 @@ struct sadmm_world_body *sadmm_world_find_body(const sadmm_world *world, sadmm_b
 struct sadmm_shape *sadmm_world_find_shape(const sadmm_world *world, sadmm_shape_id id, const char *argument,
                                            struct sadmm_error *error);
 
+/* ---- body.c ---- */
+
+/* INVALID_ARGUMENT where a body's moments of inertia lie further apart than the precision can tell. */
+sadmm_status sadmm_world_check_inertias(sadmm_world *world, sadmm_precision precision);
+
 /* ---- shape.c ---- */
 
 void sadmm_world_kill_shape(sadmm_world *world, size_t slot);
