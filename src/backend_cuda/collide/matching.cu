@@ -11,17 +11,27 @@ static __device__ double pair_friction(const collision_view &v, uint32_t a, uint
     return mu_a == mu_b ? mu_a : sqrt(mu_a * mu_b);
 }
 
+/* Time steps of this set and of the one before; fetched first, so that nothing waits for them later. */
+struct step_lengths {
+    double now, before;
+};
+static __device__ step_lengths lengths_of(const collision_view &v)
+{
+    const step_lengths lengths = {step_of(v).dt, v.before.counts->dt};
+    return lengths;
+}
+
 /* total: of all candidates. */
-static __device__ void emit_counts(const collision_view &v, uint64_t total)
+static __device__ void emit_counts(const collision_view &v, uint64_t total, double dt)
 {
     v.after.counts->candidates = (int64_t)*v.candidate_count;
     v.after.counts->pairs = (int32_t)(total >> 32);
     v.after.counts->points = (int32_t)(uint32_t)total;
-    v.after.counts->dt = step_of(v).dt;
+    v.after.counts->dt = dt;
 }
 
 /* Point `lane` of candidate i; place: pairs << 32 | points before it. */
-static __device__ void emit_point(const collision_view &v, int64_t i, int32_t lane, uint64_t place)
+static __device__ void emit_point(const collision_view &v, const step_lengths &dt, int64_t i, int32_t lane, uint64_t place)
 {
     const int32_t count = v.sizes[i], at = (int32_t)(place >> 32), first = (int32_t)(uint32_t)place;
     if (lane >= count) return;
@@ -76,8 +86,7 @@ static __device__ void emit_point(const collision_view &v, int64_t i, int32_t la
             const int32_t k = lane + n < old_count ? lane + n : (lane + n) % old_count;
             const struct sadmm_contact_point *before = &v.before.points[old_first + k];
             if (before->feature != from.feature) continue;
-            impulse_carry(old->normal, before->impulse, normal, friction,
-                          step_ratio(step_of(v).dt, v.before.counts->dt), point.impulse);
+            impulse_carry(old->normal, before->impulse, normal, friction, step_ratio(dt.now, dt.before), point.impulse);
             break;
         }
     }
@@ -88,10 +97,11 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) emit_kernel(const __
 {
     const int64_t thread = collision_thread(COLLISION_THREADS), i = thread / POINT_LANES;
     if (halted(v)) return;
+    const step_lengths dt = lengths_of(v);
     const uint64_t total = v.places[v.candidate_room];
-    if (thread == 0) emit_counts(v, total);
+    if (thread == 0) emit_counts(v, total, dt.now);
     if (i >= usable_candidates(v) || (int32_t)(uint32_t)total > v.point_room) return;
-    emit_point(v, i, (int32_t)(thread % POINT_LANES), v.places[i]);
+    emit_point(v, dt, i, (int32_t)(thread % POINT_LANES), v.places[i]);
 }
 
 /* ---- few candidates: every block adds up all sizes ------------------------------------------------------------- */
@@ -117,6 +127,7 @@ emit_few_kernel(const __grid_constant__ collision_view v)
     const int32_t i = first + t / POINT_LANES, found = usable_candidates(v);
     const uint32_t *const sizes = (const uint32_t *)v.sizes;
     uint64_t before = 0, all = 0;
+    const step_lengths dt = lengths_of(v);
     if (halted(v) || (first >= found && first > 0)) return;
     for (int32_t k = t; k < (found + SIZES_A_WORD - 1) / SIZES_A_WORD; k += EMIT_CANDIDATES * POINT_LANES) {
         const uint64_t sum = sum_sizes(sizes[k]);
@@ -137,13 +148,13 @@ emit_few_kernel(const __grid_constant__ collision_view v)
         before += shared.before[k];
         all += shared.all[k];
     }
-    if (t == 0 && first == 0) emit_counts(v, all);
+    if (t == 0 && first == 0) emit_counts(v, all, dt.now);
     if (i >= found || (int32_t)(uint32_t)all > v.point_room) return;
     for (int32_t k = first; k < i; k += SIZES_A_WORD) {
         const uint32_t word = sizes[k / SIZES_A_WORD];
         before += sum_sizes(i - k < SIZES_A_WORD ? word & ((UINT32_C(1) << 8 * (i - k)) - 1) : word);
     }
-    emit_point(v, i, t % POINT_LANES, before);
+    emit_point(v, dt, i, t % POINT_LANES, before);
 }
 
 void COLLISION(matching_kernels)(struct collision_kernels *kernels)

@@ -39,14 +39,15 @@ static __global__ void __launch_bounds__(NARROW_THREADS) narrow_kernel(const __g
     const uint32_t a = (uint32_t)(key >> v.slot_bits), b = (uint32_t)(key & ((UINT64_C(1) << v.slot_bits) - 1));
     const struct sadmm_proxy *pa = &v.proxies[a], *pb = &v.proxies[b];
     int64_t before = find_key_in_eighths(v.before.keys, v.before.counts->pairs, ordered_key(a, b));
-    if (before >= 0 && v.before.pairs[before].revision != word_of_pair(pa->revision, pb->revision)) before = -1;
-
-    const bool in_place = before >= 0 && v.before.pairs[before].placed == word_of_pair(pa->placed, pb->placed);
+    const struct sadmm_contact_pair *old = &v.before.pairs[before >= 0 ? before : 0];
+    const uint32_t revision = old->revision, placed = old->placed, cache = old->cache; /* at once, not one for the other */
+    if (revision != word_of_pair(pa->revision, pb->revision)) before = -1;
+    const bool in_place = before >= 0 && placed == word_of_pair(pa->placed, pb->placed);
     const double limit = proxy_limit(pa, pb, step.margin, step.gravity, step.dt);
     const struct pair_pose pose = pair_pose(pa->type == SADMM_SHAPE_PLANE, pa->R, pa->x, pb->R, pb->x);
     struct manifold m;
     pair_manifold(pa->type, v3_load(pa->size), pb->type, v3_load(pb->size), &pose, (real)limit,
-                  in_place ? v.before.pairs[before].cache : 0, &m);
+                  in_place ? cache : 0, &m);
 
     v.sizes[i] = (uint8_t)m.count;
     if (m.count == 0) return;

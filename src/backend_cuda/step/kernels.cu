@@ -71,19 +71,25 @@ static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, co
         v.step.control->stamps[STAMP_START] = nanoseconds();
     }
     if (i >= v.bodies) return;
+    /* Every lane fetches all that any of them needs, before it is told apart: one wait for memory, not one a kind of lane. */
     const struct sadmm_rigid *body = &v.step.before[i];
-    struct sadmm_collision_body *out = &v.step.bodies[v.step.slot_of_body[i]];
-    if (lane == LANE_FORCE) out->acceleration[0] = rigid_acceleration(body->mass, v3_load(body->wrench));
+    const struct sadmm_steady *steady = &v.step.steady_before[i];
+    const int32_t slot = v.step.slot_of_body[i], k = lane >= CARRIED_VELOCITY && lane < CARRIED ? lane - CARRIED_VELOCITY : 0;
+    const double number = ((const double *)body)[lane < CARRIED ? lane : 0], dt = v.settings->dt, last_dt = steady->dt,
+                 change = steady->change[k];
+    const int32_t streak = steady->streak[k / 3];
+    const uint32_t placed = steady->placed;
+    const vec3 force = v3_load(body->wrench), torque = v3_load(body->wrench + 3);
+    struct sadmm_collision_body *out = &v.step.bodies[slot];
+    if (lane < CARRIED) ((double *)out)[lane] = number;
+    if (lane >= CARRIED_VELOCITY && lane < CARRIED)
+        v.step.start_velocity[6 * i + k] = steady_velocity(number, streak, change, step_ratio(dt, last_dt));
+    if (lane == LANE_FORCE) out->acceleration[0] = v3_max_abs(force) == 0 ? 0 : rigid_acceleration(body->mass, force);
     if (lane == LANE_TORQUE)
-        out->acceleration[1] = rigid_angular_acceleration(q_load(body->orientation), v3_load(body->inertia),
-                                                          v3_load(body->wrench + 3));
-    if (lane == LANE_PLACED) out->placed = v.step.steady_before[i].placed;
-    if (lane >= CARRIED) return;
-    const double number = ((const double *)body)[lane];
-    ((double *)out)[lane] = number;
-    if (lane < CARRIED_VELOCITY) return;
-    const int32_t k = lane - CARRIED_VELOCITY;
-    v.step.start_velocity[6 * i + k] = steady_start_component(number, &v.step.steady_before[i], v.settings->dt, k);
+        out->acceleration[1] = v3_max_abs(torque) == 0
+                                   ? 0
+                                   : rigid_angular_acceleration(q_load(body->orientation), v3_load(body->inertia), torque);
+    if (lane == LANE_PLACED) out->placed = placed;
 }
 
 /* ---- gates ----------------------------------------------------------------------------------------------------- */
@@ -117,13 +123,13 @@ static __device__ body_before fetch_body(const cuda_view &v, int32_t i)
     return before;
 }
 
-static __device__ bool finish_body(const cuda_view &v, int32_t i, const body_before &before)
+static __device__ bool finish_body(const cuda_view &v, int32_t i, const body_before &before, double dt)
 {
     struct sadmm_steady steady = before.steady;
     struct sadmm_rigid next = before.body;
     const solver_real slow = v.step.limits ? slow_down(v, i) : (solver_real)1;
-    move_body(v, i, &before.body, slow, next.position, next.orientation, next.velocity);
-    steady_keep(&steady, &before.body, &next, v.settings->dt);
+    move_body(v, i, &before.body, slow, dt, next.position, next.orientation, next.velocity);
+    steady_keep(&steady, &before.body, &next, dt);
     v.step.after[i] = next;
     v.step.steady_after[i] = steady;
     return finite_numbers(next.position, 3) && finite_numbers(next.orientation, 4) && finite_numbers(next.velocity, 6);
@@ -192,6 +198,7 @@ static __global__ void __launch_bounds__(STEP_THREADS)
     const finish_ranges range = ranges_of(v);
     struct cuda_step_control *control = v.step.control;
     double depth = 0;
+    const double dt = v.settings->dt;
     const bool is_body = i < range.wrenches, is_pair = i >= range.pairs && (i - range.pairs) / v.lanes < live_pairs(v);
     const int32_t p = (i - range.pairs) / v.lanes, lane = is_pair ? (i - range.pairs) % v.lanes : 0;
     body_before body = {};
@@ -206,12 +213,12 @@ static __global__ void __launch_bounds__(STEP_THREADS)
     const unsigned long long deepest = control->depth; /* of those that have come here */
     if (i == 0) control->stamps[STAMP_SOLVED] = nanoseconds();
     if (is_body) {
-        if (on && i < v.bodies && !finish_body(v, i, body)) atomicMin(&control->culprit, i);
+        if (on && i < v.bodies && !finish_body(v, i, body, dt)) atomicMin(&control->culprit, i);
     } else if (i < range.pairs) {
         const int32_t slot = (i - range.wrenches) / LANES, of_body = i % LANES;
         const bool live = on && slot < v.bodies;
         double wrench[6];
-        contact_wrench(v, live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0, of_body, wrench);
+        contact_wrench(v, live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0, of_body, 1 / dt, wrench);
         if (live) store_wrench(wrench, of_body, v.step.wrench + 6 * (size_t)v.body_of[slot]);
     } else if (on && is_pair) {
         /* bodies are named first: all of them are below any contact's */

@@ -78,7 +78,7 @@ static __global__ void integrate_kernel(const __grid_constant__ cuda_view v, con
     int32_t i = thread_index();
     if (i >= live_bodies(v)) return;
     double *out = v.out + MOVED * (size_t)i;
-    move_body(v, i, &v.raw.rigid[i], (solver_real)1, out, out + 3, out + 7);
+    move_body(v, i, &v.raw.rigid[i], (solver_real)1, v.settings->dt, out, out + 3, out + 7);
 }
 
 extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)
@@ -107,7 +107,7 @@ static __global__ void wrench_kernel(const __grid_constant__ cuda_view v, const 
     int32_t slot = thread_index() / LANES, lane = (int32_t)threadIdx.x % LANES;
     bool live = slot < live_bodies(v);
     double wrench[6];
-    contact_wrench(v, live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0, lane, wrench);
+    contact_wrench(v, live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0, lane, 1 / v.settings->dt, wrench);
     if (live) store_wrench(wrench, lane, v.out + 6 * (size_t)v.body_of[slot]);
 }
 

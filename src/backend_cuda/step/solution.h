@@ -11,12 +11,11 @@ static __device__ __forceinline__ vec3 point_impulse(const cuda_view &v, int32_t
     return v3((double)lambda[0], (double)lambda[v.lambda_stride], (double)lambda[2 * v.lambda_stride]);
 }
 
-/* Q: semi-implicit Euler of body i, its velocities times `slow`. */
-static __device__ __forceinline__ void move_body(const cuda_view &v, int32_t i, const struct sadmm_rigid *body, solver_real slow,
+/* Q: semi-implicit Euler of body i, its velocities times `slow`. dt: the settings', fetched early. */
+static __device__ __forceinline__ void move_body(const cuda_view &v, int32_t i, const struct sadmm_rigid *body, solver_real slow, double dt,
                                  double position[3], double orientation[4], double velocity[6])
 {
     const solver_real *state = v.state + (size_t)i * ROW;
-    const double dt = v.settings->dt;
     vec3 linear = v3((double)(state[0] * slow), (double)(state[1] * slow), (double)(state[2] * slow));
     vec3 angular = v3((double)(state[3] * slow), (double)(state[4] * slow), (double)(state[5] * slow));
     v3_store(rigid_move(v3_load(body->position), linear, dt), position);
@@ -38,11 +37,10 @@ static __device__ __forceinline__ void add_pair_wrench(const cuda_view &v, int32
 }
 
 /* R: (12) with lambda = -u, J^T lambda / dt over the halves [begin, end) of a body, by eight lanes that take every eighth
- * half each; the sum is in all of them. Every lane of the warp comes here. */
+ * half each; the sum is in all of them. per_dt: 1 / dt. Warp-collective. */
 static __device__ __forceinline__ void contact_wrench(const cuda_view &v, int32_t begin, int32_t end, int32_t lane,
-                                                      double wrench[6])
+                                                      double per_dt, double wrench[6])
 {
-    const double per_dt = 1 / v.settings->dt;
     for (int k = 0; k < 6; ++k) wrench[k] = 0;
     for (int32_t at = begin + lane; at < end; at += LANES) {
         int32_t record = v.incident[at] / 2, side = v.incident[at] & 1;

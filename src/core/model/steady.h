@@ -17,16 +17,18 @@ enum { STEADY_STEPS = 3 };
 /* Changes that differ by less than this share are the same. */
 #define STEADY_SHARE 0.25
 
-/* Component k of it, from the velocity's. */
-SADMM_INLINE double steady_start_component(double velocity, const struct sadmm_steady *steady, double dt, int k)
+/* A component of it, from the velocity's; ratio: step_ratio. */
+SADMM_INLINE double steady_velocity(double velocity, int32_t streak, double change, double ratio)
 {
-    return velocity + (steady->streak[k / 3] >= STEADY_STEPS ? step_ratio(dt, steady->dt) * steady->change[k] : 0);
+    return velocity + (streak >= STEADY_STEPS ? ratio * change : 0);
 }
 
 SADMM_INLINE void steady_start(const struct sadmm_rigid *body, const struct sadmm_steady *steady, double dt,
                                double velocity[6])
 {
-    for (int k = 0; k < 6; ++k) velocity[k] = steady_start_component(body->velocity[k], steady, dt, k);
+    const double ratio = step_ratio(dt, steady->dt);
+    for (int k = 0; k < 6; ++k)
+        velocity[k] = steady_velocity(body->velocity[k], steady->streak[k / 3], steady->change[k], ratio);
 }
 
 /* Components of an orientation that was read and is set again: it is made a unit quaternion once more. */
