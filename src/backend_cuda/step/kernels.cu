@@ -71,30 +71,26 @@ static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, co
         v.step.control->stamps[STAMP_START] = nanoseconds();
     }
     if (i >= v.bodies) return;
-    /* Every lane fetches what it may need before lanes are told apart: one wait for memory, not one a kind of lane. Of the
-     * wrench each fetches one number; that it is 0, as mostly, is known without the others. */
+    /* Every lane fetches all that any of them needs, before it is told apart: one wait for memory, not one a kind of lane. */
     const struct sadmm_rigid *body = &v.step.before[i];
     const struct sadmm_steady *steady = &v.step.steady_before[i];
-    const bool carries = lane < CARRIED, moves = carries && lane >= CARRIED_VELOCITY;
-    const int32_t slot = v.step.slot_of_body[i], k = moves ? lane - CARRIED_VELOCITY : 0;
-    const double number = ((const double *)body)[carries ? lane : 0], part = body->wrench[lane % 6], dt = v.settings->dt,
-                 last_dt = steady->dt, change = steady->change[k];
+    const int32_t slot = v.step.slot_of_body[i], k = lane >= CARRIED_VELOCITY && lane < CARRIED ? lane - CARRIED_VELOCITY : 0;
+    const double number = ((const double *)body)[lane < CARRIED ? lane : 0], dt = v.settings->dt, last_dt = steady->dt,
+                 change = steady->change[k];
     const int32_t streak = steady->streak[k / 3];
     const uint32_t placed = steady->placed;
+    const vec3 force = v3_load(body->wrench), torque = v3_load(body->wrench + 3);
     struct sadmm_collision_body *out = &v.step.bodies[slot];
-    const unsigned lanes = (1u << START_LANES) - 1, first = threadIdx.x % WARP / START_LANES * START_LANES,
-                   acting = __ballot_sync(lanes << first, part != 0) >> first;
-    if (carries) ((double *)out)[lane] = number;
-    if (moves) v.step.start_velocity[6 * i + k] = steady_velocity(number, streak, change, step_ratio(dt, last_dt));
-    if (lane == LANE_FORCE)
-        out->acceleration[0] = (acting & 7) ? rigid_acceleration(body->mass, v3_load(body->wrench)) : 0;
+    if (lane < CARRIED) ((double *)out)[lane] = number;
+    if (lane >= CARRIED_VELOCITY && lane < CARRIED)
+        v.step.start_velocity[6 * i + k] = steady_velocity(number, streak, change, step_ratio(dt, last_dt));
+    if (lane == LANE_FORCE) out->acceleration[0] = v3_max_abs(force) == 0 ? 0 : rigid_acceleration(body->mass, force);
     if (lane == LANE_TORQUE)
-        out->acceleration[1] = (acting & 7 << 3) ? rigid_angular_acceleration(q_load(body->orientation), v3_load(body->inertia),
-                                                                             v3_load(body->wrench + 3))
-                                                : 0;
+        out->acceleration[1] = v3_max_abs(torque) == 0
+                                   ? 0
+                                   : rigid_angular_acceleration(q_load(body->orientation), v3_load(body->inertia), torque);
     if (lane == LANE_PLACED) out->placed = placed;
 }
-static_assert(WARP % START_LANES == 0, "a body's lanes are in one warp");
 
 /* ---- gates ----------------------------------------------------------------------------------------------------- */
 
@@ -202,7 +198,7 @@ static __global__ void __launch_bounds__(STEP_THREADS)
     const finish_ranges range = ranges_of(v);
     struct cuda_step_control *control = v.step.control;
     double depth = 0;
-    const double dt = v.settings->dt, per_dt = 1 / dt;
+    const double dt = v.settings->dt;
     const bool is_body = i < range.wrenches, is_pair = i >= range.pairs && (i - range.pairs) / v.lanes < live_pairs(v);
     const int32_t p = (i - range.pairs) / v.lanes, lane = is_pair ? (i - range.pairs) % v.lanes : 0;
     body_before body = {};
@@ -222,7 +218,7 @@ static __global__ void __launch_bounds__(STEP_THREADS)
         const int32_t slot = (i - range.wrenches) / LANES, of_body = i % LANES;
         const bool live = on && slot < v.bodies;
         double wrench[6];
-        contact_wrench(v, live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0, of_body, per_dt, wrench);
+        contact_wrench(v, live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0, of_body, 1 / dt, wrench);
         if (live) store_wrench(wrench, of_body, v.step.wrench + 6 * (size_t)v.body_of[slot]);
     } else if (on && is_pair) {
         /* bodies are named first: all of them are below any contact's */
