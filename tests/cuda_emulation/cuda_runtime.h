@@ -19,7 +19,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <ucontext.h>
 
 #include <algorithm>
 #include <functional>
@@ -28,6 +27,7 @@
 #include <vector>
 
 #include "emulation_control.h"
+#include "fiber.h"
 
 #define __global__
 #define __device__
@@ -58,7 +58,7 @@ enum { WARP_SIZE = 32, STACK = 128 * 1024 };
 enum waiting { NOT, AT_WARP, AT_BLOCK, AT_ALL };
 
 struct fiber {
-    ucontext_t context;
+    flow own;
     unsigned block, thread;
     waiting at;
     bool done;
@@ -70,7 +70,7 @@ struct launch_state {
     std::vector<fiber> fibers;
     std::vector<std::unique_ptr<unsigned char, void (*)(void *)>> shared; /* by block */
     unsigned threads, first_block;
-    ucontext_t scheduler = {}; /* its stack is nobody's to fill in, and the address sanitizer looks at it */
+    flow scheduler;
     fiber *current;
     const std::function<void()> *body;
 };
@@ -82,14 +82,15 @@ inline void give_way(waiting at)
 {
     fiber *self = running->current;
     self->at = at;
-    swapcontext(&self->context, &running->scheduler);
+    flow_switch(&self->own, &running->scheduler);
 }
 
 inline void fiber_main(void)
 {
+    flow_begin(&running->scheduler);
     (*running->body)();
     running->current->done = true;
-    /* returns to the scheduler (uc_link) */
+    flow_switch(&running->current->own, &running->scheduler, true);
 }
 
 inline unsigned char *poisoned(size_t bytes)
@@ -124,11 +125,7 @@ inline bool run_blocks(const std::function<void()> &body, unsigned first, unsign
         fiber &f = l.fibers[i];
         f.block = first + (unsigned)(i / threads);
         f.thread = (unsigned)(i % threads);
-        getcontext(&f.context);
-        f.context.uc_stack.ss_sp = stacks[i].get();
-        f.context.uc_stack.ss_size = STACK;
-        f.context.uc_link = &l.scheduler;
-        makecontext(&f.context, fiber_main, 0);
+        flow_prepare(&f.own, stacks[i].get(), STACK, fiber_main);
     }
     size_t left = l.fibers.size();
     while (left > 0) {
@@ -139,7 +136,7 @@ inline bool run_blocks(const std::function<void()> &body, unsigned first, unsign
             l.current = &f;
             threadIdx.x = f.thread;
             blockIdx.x = f.block;
-            swapcontext(&l.scheduler, &f.context);
+            flow_switch(&l.scheduler, &f.own);
             moved = true;
             if (f.done) --left;
         }
