@@ -288,10 +288,10 @@ static inline bool device_has(const struct sadmm_kernels *table, enum sadmm_cuda
 #endif
 }
 
-static inline void set_halt(struct runner *r, enum cuda_halt halt)
+static inline void set_abort(struct runner *r, enum cuda_abort abort_code)
 {
-    if (r->k->precision == SADMM_F32) CALL(r, SYMBOL(set_halt, f32)(r->c, halt, &r->error));
-    else CALL(r, SYMBOL(set_halt, f64)(r->c, halt, &r->error));
+    if (r->k->precision == SADMM_F32) CALL(r, SYMBOL(set_abort, f32)(r->c, abort_code, &r->error));
+    else CALL(r, SYMBOL(set_abort, f64)(r->c, abort_code, &r->error));
 }
 
 #ifdef CUDA_EMULATED

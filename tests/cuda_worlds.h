@@ -13,12 +13,12 @@
 #include "emulation_control.h"
 #define force_tier cuda_emulation_force_tier
 #define tier_of cuda_emulation_tier_of
-#define tune_rooms cuda_emulation_tune_rooms
+#define tune_capacities cuda_emulation_tune_capacities
 #else
 #include "backend_cuda/graph/tier.h"
 #define force_tier sadmm_cuda_force_tier
 #define tier_of sadmm_cuda_tier_of
-#define tune_rooms sadmm_cuda_tune_rooms
+#define tune_capacities sadmm_cuda_tune_capacities
 #endif
 
 static const struct sadmm_kernels *tables[2]; /* by precision */

@@ -227,7 +227,7 @@ START_TEST(the_order_of_insertion_does_not_matter)
 }
 END_TEST
 
-/* Memory runs out at every place in turn: an error each time, and after it the broad phase takes everything anew. */
+/* Memory runs out at every place in turn: an error each time, and after it the broad phase takes everything again. */
 START_TEST(broad_phases_survive_lack_of_memory)
 {
     const struct sadmm_broad_phase_kind *kind = kinds[_i];
@@ -466,7 +466,7 @@ START_TEST(the_list_of_candidates_is_complete_at_every_step)
         double stride = (const double[]){1e-5, 1e-3, 0, 0.02}[step % 4];
         for (int i = 0; i < COUNT / 2; ++i) {
             struct sadmm_collision_body *body = &s.bodies[i];
-            if (body->system_body < 0 && random_unit(&r) > 0.01) continue; /* static bodies may be placed anew */
+            if (body->system_body < 0 && random_unit(&r) > 0.01) continue; /* static bodies may be placed again */
             if (step % 8 > 5 && i % 50) continue;                          /* steps in which little moves */
             for (int k = 0; k < 3; ++k) body->position[k] += stride * random_in(&r, -1, 1);
             if (body->system_body >= 0 && random_unit(&r) < 0.05) body->acceleration[step % 2] = random_in(&r, 0, 1000);

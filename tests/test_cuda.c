@@ -119,7 +119,7 @@ START_TEST(tiers_equal_stepwise)
 {
     const struct sadmm_kernels *table = tables[_i / SCENES];
     const struct scene *scene = &scenes[_i % SCENES];
-    static const int stretches[] = {1, 2, 34, 7};
+    static const int batches[] = {1, 2, 34, 7};
     for (size_t t = 0; t < TIERS; ++t) {
         struct runner step, fused;
         char what[128];
@@ -135,11 +135,11 @@ START_TEST(tiers_equal_stepwise)
         }
         runner_start(&step, table, scene, SADMM_CUDA_TIER_STREAM);
         runner_start(&fused, table, scene, tiers[t]);
-        for (size_t s = 0; s < sizeof stretches / sizeof *stretches; ++s) {
+        for (size_t s = 0; s < sizeof batches / sizeof *batches; ++s) {
             bool measure = s % 2 == 0;
-            for (int i = 1; i <= stretches[s]; ++i) runner_step(&step, measure && i == stretches[s]);
-            CALL(&fused, table->iterate(fused.c, stretches[s], measure, &fused.error));
-            snprintf(what, sizeof what, "%s, tier %d, stretch %zu", scene->name, (int)tiers[t], s);
+            for (int i = 1; i <= batches[s]; ++i) runner_step(&step, measure && i == batches[s]);
+            CALL(&fused, table->iterate(fused.c, batches[s], measure, &fused.error));
+            snprintf(what, sizeof what, "%s, tier %d, batch %zu", scene->name, (int)tiers[t], s);
             if (measure) {
                 struct sadmm_residual wanted = runner_residual(&step), got = runner_residual(&fused);
                 ck_assert_msg(got.primal == wanted.primal && got.dual == wanted.dual, "%s: residuals", what);
@@ -242,38 +242,38 @@ START_TEST(tiers_chosen)
 }
 END_TEST
 
-/* Between a halt and its end an iteration changes nothing, in any tier. */
-START_TEST(halted_does_nothing)
+/* Between a abort_code and its end an iteration changes nothing, in any tier. */
+START_TEST(aborted_does_nothing)
 {
     static const char *const names[] = {"mixed", "large"};
     const struct sadmm_kernels *table = tables[_i / 2];
     const struct scene *scene = find_scene(names[_i % 2]);
     for (size_t t = 0; t < TIERS; ++t) {
-        struct runner plain, halted;
+        struct runner plain, aborted;
         if (!device_has(table, tiers[t]) || !(scene->tiers >> tiers[t] & 1)) continue;
         runner_start(&plain, table, scene, tiers[t]);
-        runner_start(&halted, table, scene, tiers[t]);
+        runner_start(&aborted, table, scene, tiers[t]);
         CALL(&plain, table->iterate(plain.c, 3, false, &plain.error));
-        CALL(&halted, table->iterate(halted.c, 3, false, &halted.error));
-        set_halt(&halted, HALT_PARTITION);
-        CALL(&halted, table->iterate(halted.c, 20, false, &halted.error)); /* 20: STREAM launches its graph */
-        runner_step(&halted, false);
-        set_halt(&halted, HALT_NONE);
-        check_same(&halted, &plain, "halted");
+        CALL(&aborted, table->iterate(aborted.c, 3, false, &aborted.error));
+        set_abort(&aborted, ABORT_PARTITION);
+        CALL(&aborted, table->iterate(aborted.c, 20, false, &aborted.error)); /* 20: STREAM launches its graph */
+        runner_step(&aborted, false);
+        set_abort(&aborted, ABORT_NONE);
+        check_same(&aborted, &plain, "aborted");
         CALL(&plain, table->iterate(plain.c, 4, true, &plain.error));
-        CALL(&halted, table->iterate(halted.c, 4, true, &halted.error));
-        check_same(&halted, &plain, "after the halt");
-        const struct sadmm_residual wanted = runner_residual(&plain), got = runner_residual(&halted);
+        CALL(&aborted, table->iterate(aborted.c, 4, true, &aborted.error));
+        check_same(&aborted, &plain, "after the abort_code");
+        const struct sadmm_residual wanted = runner_residual(&plain), got = runner_residual(&aborted);
         ck_assert(got.primal == wanted.primal && got.dual == wanted.dual);
-        /* A measured iteration that is halted measures nothing. */
-        set_halt(&halted, HALT_NON_FINITE);
-        CALL(&halted, table->iterate(halted.c, 2, true, &halted.error));
-        const struct sadmm_residual none = runner_residual(&halted);
+        /* A measured iteration that is aborted measures nothing. */
+        set_abort(&aborted, ABORT_NON_FINITE);
+        CALL(&aborted, table->iterate(aborted.c, 2, true, &aborted.error));
+        const struct sadmm_residual none = runner_residual(&aborted);
         ck_assert(none.primal == 0 && none.dual == 0);
-        set_halt(&halted, HALT_NONE);
-        check_same(&halted, &plain, "halted and measured");
+        set_abort(&aborted, ABORT_NONE);
+        check_same(&aborted, &plain, "aborted and measured");
         runner_stop(&plain);
-        runner_stop(&halted);
+        runner_stop(&aborted);
     }
 }
 END_TEST
@@ -399,7 +399,7 @@ int main(void)
     }
     ADD_CASE(suite, cluster_sizes, 0, parts);
     ADD_CASE(suite, tiers_chosen, 0, parts);
-    ADD_CASE(suite, halted_does_nothing, 0, 4);
+    ADD_CASE(suite, aborted_does_nothing, 0, 4);
     ADD_CASE(suite, runs_repeat, 0, parts);
     ADD_CASE(suite, contexts_side_by_side, 0, parts);
     ADD_CASE(suite, no_such_device, 0, parts);

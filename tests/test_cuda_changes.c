@@ -193,7 +193,7 @@ START_TEST(steps_done_again_have_their_own_settings)
     const int precision = _i;
     sadmm_world *host = small_world(precision, 0), *queue = small_world(precision, 0);
     by_host(host);
-    tune_rooms(tables[precision], queue->context, 1);
+    tune_capacities(tables[precision], queue->context, 1);
     for (int step = 0; step < 20; ++step) { /* contacts come in the first ones */
         change_numbers(host, step);
         change_numbers(queue, step);
@@ -208,7 +208,7 @@ START_TEST(steps_done_again_have_their_own_settings)
 END_TEST
 
 #ifdef CUDA_EMULATED
-/* Nothing is recorded anew, loaded or waited for when a number changes; other settings may wait and record. */
+/* Nothing is recorded again, loaded or waited for when a number changes; other settings may wait and record. */
 START_TEST(a_change_of_numbers_costs_no_wait)
 {
     const int precision = _i;

@@ -447,15 +447,15 @@ START_TEST(room_grows)
     struct soup s = soup_new(kind, 3);
     struct both b = both_new(0);
     const bool radix = _i / SOUPS;
-    struct sadmm_cuda_collision_tuning tight = {.tree_from = kind->tree_from, .radix_from = radix, .first_room = 1};
+    struct sadmm_cuda_collision_tuning tight = {.tree_from = kind->tree_from, .radix_from = radix, .first_capacity = 1};
     COLLISION(tune)(b.device, &tight);
     struct sadmm_cuda_contacts out = both_find(&b, &s.input, kind->name);
     struct sadmm_cuda_collision_stats first = COLLISION(stats)(b.device);
     ck_assert_int_gt(out.counts.points, 1);
     ck_assert_int_ge(first.repeats, 1);
     ck_assert_int_le(first.repeats, 2); /* each kind of room once: the counts are exact */
-    ck_assert_int_ge(first.candidate_room, out.counts.candidates);
-    ck_assert_int_ge(first.point_room, out.counts.points);
+    ck_assert_int_ge(first.candidate_capacity, out.counts.candidates);
+    ck_assert_int_ge(first.point_capacity, out.counts.points);
 
     both_find(&b, &s.input, kind->name); /* the other set */
     struct sadmm_cuda_collision_stats second = COLLISION(stats)(b.device);
@@ -475,7 +475,7 @@ START_TEST(room_grows_later)
     const struct soup_kind *kind = &soups[6];
     struct soup s = soup_new(kind, 4);
     struct both b = both_new(kind->tree_from);
-    struct sadmm_cuda_collision_tuning tight = {.tree_from = kind->tree_from, .first_room = 2};
+    struct sadmm_cuda_collision_tuning tight = {.tree_from = kind->tree_from, .first_capacity = 2};
     both_find(&b, &s.input, "first");
     random_impulses(&b.host_set);
     both_start_from(&b, &b.host_set);
@@ -680,7 +680,8 @@ START_TEST(calls_that_fail)
     later.input.dt = 0.02;
     for (calls = 0;; ++calls) {
         struct sadmm_error error = {0};
-        struct sadmm_cuda_collision_tuning tight = {.tree_from = kind->tree_from, .radix_from = _i, .first_room = 3};
+        struct sadmm_cuda_collision_tuning tight = {
+            .tree_from = kind->tree_from, .radix_from = _i, .first_capacity = 3};
         COLLISION(tune)(b.device, &tight); /* with the repeats */
         cuda_emulation_calls_left = calls;
         sadmm_status status = COLLISION(find)(b.device, NULL, &later.input, NULL, &error);

@@ -4,10 +4,10 @@
 #include "core/solve/certificate.h"
 #include "cuda_runner.h"
 
-/* Stretches of all lengths, since what is relaxed depends on it, 18 and 35 with graphs in the STREAM tier; new weights
+/* Batches of all lengths, since what is relaxed depends on it, 18 and 35 with graphs in the STREAM tier; new weights
  * in between, often enough for levels. */
-static const int stretches[] = {1, 2, 18, 3, 1, 5, 35, 4};
-enum { STRETCHES = sizeof stretches / sizeof *stretches };
+static const int batches[] = {1, 2, 18, 3, 1, 5, 35, 4};
+enum { BATCHES = sizeof batches / sizeof *batches };
 
 static const struct sadmm_kernels *cpu(void)
 {
@@ -43,7 +43,7 @@ static int32_t limit(struct runner *r)
 /* One pass: weights, factor, an iteration, its residuals, new weights, another iteration. As in test_cuda.c, rounding
  * of the inputs (6e-8, 1e-16) in sums of some tens of terms, and a condition number of A + C under a hundred. */
 static const double entry_tolerance[2] = {1e-5, 1e-12};
-/* All stretches: what rounding grows to in 71 iterations with nine sets of weights; ten times what was measured. */
+/* All batches: what rounding grows to in 71 iterations with nine sets of weights; ten times what was measured. */
 static const double run_tolerance[2] = {2e-5, 1e-13};
 
 /* The largest |v| and |lambda| so far: a velocity on its way to 0 is not measured by itself. */
@@ -95,13 +95,13 @@ START_TEST(entries_equal_cpu)
     iterate(&own, 1, false);
     compare(&own, &ref, &scales, tolerance, "new weights");
 
-    for (int s = 0; s < STRETCHES; ++s) {
-        iterate(&ref, stretches[s], false);
-        iterate(&own, stretches[s], false);
+    for (int s = 0; s < BATCHES; ++s) {
+        iterate(&ref, batches[s], false);
+        iterate(&own, batches[s], false);
         refresh_weights(&ref);
         refresh_weights(&own);
     }
-    compare(&own, &ref, &scales, run_tolerance[table->precision], "stretches");
+    compare(&own, &ref, &scales, run_tolerance[table->precision], "batches");
     ck_assert_int_eq(limit(&own), limit(&ref));
     compare(&own, &ref, &scales, run_tolerance[table->precision], "limit");
     runner_stop(&ref);
@@ -113,12 +113,12 @@ END_TEST
 
 static void check_equal(struct runner *a, struct runner *b, const struct scene *scene)
 {
-    for (int s = 0; s < STRETCHES; ++s) {
+    for (int s = 0; s < BATCHES; ++s) {
         const bool measure = s % 2 == 0;
         char what[128];
-        snprintf(what, sizeof what, "%s, tier %d, stretch %d", scene->name, (int)tier_of(a->k, a->c, NULL), s);
-        iterate(a, stretches[s], measure);
-        iterate(b, stretches[s], measure);
+        snprintf(what, sizeof what, "%s, tier %d, batch %d", scene->name, (int)tier_of(a->k, a->c, NULL), s);
+        iterate(a, batches[s], measure);
+        iterate(b, batches[s], measure);
         check_same(a, b, what);
         if (measure) {
             const struct sadmm_residual x = runner_residual(a), y = runner_residual(b);
@@ -180,9 +180,9 @@ START_TEST(unrelaxed_tiers_agree)
 }
 END_TEST
 
-/* Stretches without new weights between them: what bodies keep from one to the next, and where it is taken anew in the
- * middle of one, after 128 iterations. The CPU's within the tolerance of all stretches: these are longer, but have one set of
- * weights. */
+/* Batches without new weights between them: what bodies keep from one to the next, and where it is taken again in the
+ * middle of one, after 128 iterations. The CPU's within the tolerance of all batches: these are longer, but have one
+ * set of weights. */
 START_TEST(stretches_go_on)
 {
     static const int counts[] = {1, 90, 3, 170}, some[] = {0, 2, 8}; /* 8: row blocks */
@@ -291,34 +291,34 @@ START_TEST(tall_islands)
 }
 END_TEST
 
-/* Between a halt and its end nothing changes, weights included. */
-START_TEST(halted_does_nothing)
+/* Between a abort_code and its end nothing changes, weights included. */
+START_TEST(aborted_does_nothing)
 {
     const struct sadmm_kernels *table = tables[_i];
     const struct scene *scene = find_scene("pyramid");
     for (size_t t = 0; t < TIERS; ++t) {
-        struct runner plain, halted;
+        struct runner plain, aborted;
         if (!device_has(table, tiers[t])) continue;
         start(&plain, table, scene, tiers[t]);
-        start(&halted, table, scene, tiers[t]);
+        start(&aborted, table, scene, tiers[t]);
         iterate(&plain, 3, false);
-        iterate(&halted, 3, false);
-        set_halt(&halted, HALT_PARTITION);
-        iterate(&halted, 20, true);
-        ck_assert_int_eq(limit(&halted), 0);
-        set_halt(&halted, HALT_NONE);
-        check_same(&halted, &plain, "halted");
+        iterate(&aborted, 3, false);
+        set_abort(&aborted, ABORT_PARTITION);
+        iterate(&aborted, 20, true);
+        ck_assert_int_eq(limit(&aborted), 0);
+        set_abort(&aborted, ABORT_NONE);
+        check_same(&aborted, &plain, "aborted");
         for (int k = 0; k < 2; ++k) {
-            struct runner *r = k ? &halted : &plain;
+            struct runner *r = k ? &aborted : &plain;
             refresh_weights(r);
-            if (k) set_halt(r, HALT_PARTITION);
+            if (k) set_abort(r, ABORT_PARTITION);
             if (k) CALL(r, table->factorize(r->c, &r->error));
-            if (k) set_halt(r, HALT_NONE);
+            if (k) set_abort(r, ABORT_NONE);
             iterate(r, 4, false);
         }
-        check_same(&halted, &plain, "after the halt");
+        check_same(&aborted, &plain, "after the abort_code");
         runner_stop(&plain);
-        runner_stop(&halted);
+        runner_stop(&aborted);
     }
 }
 END_TEST
@@ -499,7 +499,7 @@ int main(void)
     ADD_CASE(suite, stretches_go_on, 0, 3 * parts);
     ADD_CASE(suite, many_bodies, 0, parts);
     ADD_CASE(suite, tall_islands, 0, parts);
-    ADD_CASE(suite, halted_does_nothing, 0, parts);
+    ADD_CASE(suite, aborted_does_nothing, 0, parts);
     ADD_CASE(suite, runs_repeat, 0, parts);
     ADD_CASE(suite, solutions_are_certified, 0, parts);
     ADD_CASE(suite, islands_are_slowed_down, 0, parts);

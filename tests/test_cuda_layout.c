@@ -1,6 +1,6 @@
-/* The CUDA backend's layout (graph/layout.h) against a plain construction on the host: facts, slots, lists of halves and
- * every boundary of every part, number for number. On a real device, or skipped; test_cuda_layout_emulated.c runs the
- * same on the emulated one. */
+/* The CUDA backend's layout (graph/layout.h) against a plain construction on the host: statistics, slots, lists of
+ * sides and every boundary of every part, number for number. On a real device, or skipped; test_cuda_layout_emulated.c
+ * runs the same on the emulated one. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -232,11 +232,11 @@ static void label_bodies(struct host_layout *h)
 
 static int32_t larger(int32_t a, int32_t b) { return a > b ? a : b; }
 
-static void find_facts(struct host_layout *h, bool warm_start)
+static void find_statistics(struct host_layout *h, bool warm_start)
 {
-    struct cuda_facts *f = &h->wanted.facts;
+    struct cuda_graph_statistics *f = &h->wanted.statistics;
     int32_t *island_bodies = calloc((size_t)h->n + 1, sizeof(int32_t)), body[2];
-    int32_t *island_halves = calloc((size_t)h->n + 1, sizeof(int32_t));
+    int32_t *island_sides = calloc((size_t)h->n + 1, sizeof(int32_t));
     int32_t *degree = calloc((size_t)h->n + 1, sizeof(int32_t));
     const struct sadmm_contact_set *set = &h->p->contacts;
     for (int32_t i = 0; i < h->n; ++i) ++island_bodies[h->label[i]];
@@ -244,15 +244,15 @@ static void find_facts(struct host_layout *h, bool warm_start)
         record_bodies(h, r, body);
         for (int side = 0; side < 2; ++side) {
             if (body[side] < 0) continue;
-            ++f->halves;
+            ++f->sides;
             ++degree[body[side]];
-            ++island_halves[h->label[body[side]]];
+            ++island_sides[h->label[body[side]]];
         }
     }
     for (int32_t i = 0; i < h->n; ++i) {
         f->islands += h->label[i] == i;
         f->island_bodies = larger(f->island_bodies, island_bodies[i]);
-        f->island_halves = larger(f->island_halves, island_halves[i]);
+        f->island_sides = larger(f->island_sides, island_sides[i]);
         f->degree = larger(f->degree, degree[i]);
     }
     for (size_t p = 0; p < set->pair_count; ++p) {
@@ -264,7 +264,7 @@ static void find_facts(struct host_layout *h, bool warm_start)
         f->warm += warm && warm_start;
     }
     free(island_bodies);
-    free(island_halves);
+    free(island_sides);
     free(degree);
 }
 
@@ -279,7 +279,7 @@ static struct host_layout host_new(const struct contact_problem *p, bool warm_st
     h.label = numbers((size_t)h.n);
     h.wanted = copy_new(&h);
     label_bodies(&h);
-    find_facts(&h, warm_start);
+    find_statistics(&h, warm_start);
     return h;
 }
 
@@ -289,7 +289,7 @@ static void host_free(struct host_layout *h)
     free(h->label);
 }
 
-/* Bodies by label when wanted, lists of halves by going through the records once. */
+/* Bodies by label when wanted, lists of sides by going through the records once. */
 static void host_slots(struct host_layout *h, bool by_island)
 {
     struct cuda_layout_copy *w = &h->wanted;
@@ -335,7 +335,7 @@ static int32_t host_share(const struct host_layout *h, int32_t first, int32_t la
 static void host_parts(struct host_layout *h, const struct cuda_partition *partition)
 {
     struct cuda_layout_copy *w = &h->wanted;
-    w->facts.part_bodies = w->facts.part_halves = 0;
+    w->statistics.part_bodies = w->statistics.part_sides = 0;
     if (partition->tier == SADMM_CUDA_TIER_STREAM) return;
     const int32_t n = h->n, each = partition->cluster, clusters = partition->parts / each;
     const bool islands = partition->tier != SADMM_CUDA_TIER_GRID;
@@ -346,8 +346,9 @@ static void host_parts(struct host_layout *h, const struct cuda_partition *parti
     }
     w->parts[partition->parts] = n;
     for (int32_t p = 0; p < partition->parts; ++p) {
-        w->facts.part_bodies = larger(w->facts.part_bodies, w->parts[p + 1] - w->parts[p]);
-        w->facts.part_halves = larger(w->facts.part_halves, w->offsets[w->parts[p + 1]] - w->offsets[w->parts[p]]);
+        w->statistics.part_bodies = larger(w->statistics.part_bodies, w->parts[p + 1] - w->parts[p]);
+        w->statistics.part_sides =
+            larger(w->statistics.part_sides, w->offsets[w->parts[p + 1]] - w->offsets[w->parts[p]]);
     }
 }
 
@@ -359,10 +360,11 @@ static void same_numbers(const int32_t *got, const int32_t *wanted, int32_t coun
         ck_assert_msg(got[i] == wanted[i], "%s: %s[%d] = %d instead of %d", about, what, i, got[i], wanted[i]);
 }
 
-static void same_facts(const struct cuda_facts *got, const struct cuda_facts *wanted, const char *about)
+static void same_statistics(const struct cuda_graph_statistics *got, const struct cuda_graph_statistics *wanted,
+                            const char *about)
 {
-    static const char *const names[] = {"islands",     "island_bodies", "island_halves", "halves",      "degree",
-                                        "point_slots", "rough",         "warm",          "part_halves", "part_bodies"};
+    static const char *const names[] = {"islands",     "island_bodies", "island_sides", "sides",      "degree",
+                                        "point_slots", "rough",         "warm",          "part_sides", "part_bodies"};
     const int32_t *a = (const int32_t *)got, *b = (const int32_t *)wanted;
     ck_assert_uint_eq(sizeof *got, sizeof names / sizeof *names * sizeof *a);
     for (size_t i = 0; i < sizeof names / sizeof *names; ++i)
@@ -373,11 +375,11 @@ static void same_layout(const struct host_layout *h, const struct cuda_layout_co
                         const char *about)
 {
     const struct cuda_layout_copy *w = &h->wanted;
-    same_facts(&got->facts, &w->facts, about);
+    same_statistics(&got->statistics, &w->statistics, about);
     same_numbers(got->body_of, w->body_of, h->n, "body_of", about);
     same_numbers(got->slot_of, w->slot_of, h->n, "slot_of", about);
     same_numbers(got->offsets, w->offsets, h->n + 1, "offsets", about);
-    same_numbers(got->incident, w->incident, w->facts.halves, "incident", about);
+    same_numbers(got->incident, w->incident, w->statistics.sides, "incident", about);
     if (parts > 0) same_numbers(got->parts, w->parts, parts + 1, "parts", about);
 }
 
@@ -408,10 +410,10 @@ static void device_new(struct device *d, int precision)
     CALL(d, d->k->create(0, &d->c, &d->error));
 }
 
-static sadmm_status lay_out(struct device *d, const struct cuda_partition *partition, enum cuda_halt halt, int way,
-                            struct cuda_layout_copy *out)
+static sadmm_status lay_out(struct device *d, const struct cuda_partition *partition, enum cuda_abort abort_code,
+                            int way, struct cuda_layout_copy *out)
 {
-    return (d->k->precision == SADMM_F32 ? LAY_OUT_F32 : LAY_OUT_F64)(d->c, partition, halt, way, out, &d->error);
+    return (d->k->precision == SADMM_F32 ? LAY_OUT_F32 : LAY_OUT_F64)(d->c, partition, abort_code, way, out, &d->error);
 }
 
 /* ---- tests ----------------------------------------------------------------------------------------------------- */
@@ -452,17 +454,17 @@ START_TEST(equals_host)
             char about[128];
             host_slots(&h, by_island(&partition));
             host_parts(&h, &partition);
-            partition.most_bodies = h.wanted.facts.part_bodies;
-            partition.most_halves = h.wanted.facts.part_halves;
+            partition.most_bodies = h.wanted.statistics.part_bodies;
+            partition.most_sides = h.wanted.statistics.part_sides;
             for (int way = 0; way < 4; ++way) {
 #ifdef CUDA_EMULATED
                 if (way != (int)(k + g) % 4) continue; /* slow: every way is somebody's turn */
                 cuda_emulation_descending = (int)(k + g / 2) & 1;
 #endif
                 snprintf(about, sizeof about, "%s, partition %zu, way %d", graphs[g].name, k, way);
-                CALL(&d, lay_out(&d, &partition, HALT_NONE, way, &got));
+                CALL(&d, lay_out(&d, &partition, ABORT_NONE, way, &got));
                 ck_assert_msg(got.one_block == (graphs[g].small && !(way & CUDA_LAYOUT_GENERAL)), "%s", about);
-                ck_assert_int_eq(got.live.halt, HALT_NONE);
+                ck_assert_int_eq(got.live.abort_code, ABORT_NONE);
                 ck_assert_int_eq(got.live.pairs, (int32_t)p->contacts.pair_count);
                 same_layout(&h, &got, partition.parts, about);
             }
@@ -478,8 +480,8 @@ START_TEST(equals_host)
 }
 END_TEST
 
-/* A part with one half or one body too many halts the step, and the facts still say how large it is. */
-START_TEST(too_large_parts_halt)
+/* A part with one side or one body too many aborts the step, and the statistics still say how large it is. */
+START_TEST(too_large_parts_abort)
 {
     struct device d;
     struct contact_problem *p = towers();
@@ -494,10 +496,10 @@ START_TEST(too_large_parts_halt)
         host_parts(&h, &partition);
         for (int which = 0; which < 4; ++which) {
             const int way = which / 2 * CUDA_LAYOUT_GENERAL;
-            partition.most_bodies = h.wanted.facts.part_bodies - which % 2;
-            partition.most_halves = h.wanted.facts.part_halves - !(which % 2);
-            CALL(&d, lay_out(&d, &partition, HALT_NONE, way, &got));
-            ck_assert_int_eq(got.live.halt, HALT_PARTITION);
+            partition.most_bodies = h.wanted.statistics.part_bodies - which % 2;
+            partition.most_sides = h.wanted.statistics.part_sides - !(which % 2);
+            CALL(&d, lay_out(&d, &partition, ABORT_NONE, way, &got));
+            ck_assert_int_eq(got.live.abort_code, ABORT_PARTITION);
             same_layout(&h, &got, partition.parts, "too large");
         }
     }
@@ -508,8 +510,8 @@ START_TEST(too_large_parts_halt)
 }
 END_TEST
 
-/* After a halt nothing changes what the queue's last good step left. */
-START_TEST(halted_does_nothing)
+/* After a abort_code nothing changes what the queue's last good step left. */
+START_TEST(aborted_does_nothing)
 {
     struct device d;
     struct contact_problem *p = towers();
@@ -522,17 +524,17 @@ START_TEST(halted_does_nothing)
     host_parts(&h, &partition);
     for (int way = 0; way < 4; ++way) {
         partition = partitions[4];
-        partition.most_bodies = partition.most_halves = INT32_MAX;
-        CALL(&d, lay_out(&d, &partition, HALT_NONE, way, &got));
+        partition.most_bodies = partition.most_sides = INT32_MAX;
+        CALL(&d, lay_out(&d, &partition, ABORT_NONE, way, &got));
         same_layout(&h, &got, partition.parts, "before");
         partition.parts = 2;
         partition.most_bodies = 1;
-        CALL(&d, lay_out(&d, &partition, HALT_NON_FINITE, way, &got));
-        ck_assert_int_eq(got.live.halt, HALT_NON_FINITE);
-        same_facts(&got.facts, &h.wanted.facts, "halted");
-        same_numbers(got.offsets, h.wanted.offsets, h.n + 1, "offsets", "halted");
-        same_numbers(got.slot_of, h.wanted.slot_of, h.n, "slot_of", "halted");
-        same_numbers(got.parts, h.wanted.parts, 3, "parts", "halted");
+        CALL(&d, lay_out(&d, &partition, ABORT_NON_FINITE, way, &got));
+        ck_assert_int_eq(got.live.abort_code, ABORT_NON_FINITE);
+        same_statistics(&got.statistics, &h.wanted.statistics, "aborted");
+        same_numbers(got.offsets, h.wanted.offsets, h.n + 1, "offsets", "aborted");
+        same_numbers(got.slot_of, h.wanted.slot_of, h.n, "slot_of", "aborted");
+        same_numbers(got.parts, h.wanted.parts, 3, "parts", "aborted");
     }
     copy_free(&got);
     host_free(&h);
@@ -555,7 +557,7 @@ START_TEST(partitions_refused)
     device_new(&d, _i);
     device_begin(&d, p, true);
     for (size_t k = 0; k < sizeof bad / sizeof *bad; ++k) {
-        ck_assert_int_eq(lay_out(&d, &bad[k], HALT_NONE, 0, &none), SADMM_ERROR_INVALID_ARGUMENT);
+        ck_assert_int_eq(lay_out(&d, &bad[k], ABORT_NONE, 0, &none), SADMM_ERROR_INVALID_ARGUMENT);
         ck_assert_ptr_nonnull(strstr(d.error.message, "partition: parts = "));
     }
     contact_problem_free(p);
@@ -570,8 +572,8 @@ int main(void)
     if (!find_cuda_tables(tables)) return TEST_SKIPPED;
     Suite *suite = suite_create("cuda_layout");
     ADD_CASE(suite, equals_host, 0, 2);
-    ADD_CASE(suite, too_large_parts_halt, 0, 2);
-    ADD_CASE(suite, halted_does_nothing, 0, 2);
+    ADD_CASE(suite, too_large_parts_abort, 0, 2);
+    ADD_CASE(suite, aborted_does_nothing, 0, 2);
     ADD_CASE(suite, partitions_refused, 0, 2);
     return run_cuda_suite(suite);
 }

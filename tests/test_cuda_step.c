@@ -69,7 +69,7 @@ START_TEST(enqueued_steps_equal_single_steps)
 {
     const int precision = _i;
     sadmm_world *single = towers(3, 2, 0.5, precision), *queue = towers(3, 2, 0.5, precision);
-    tune_rooms(tables[precision], queue->context, 1);
+    tune_capacities(tables[precision], queue->context, 1);
     for (int step = 0; step < 20; ++step) {
         MUST(single, sadmm_world_step(single));
         MUST(queue, sadmm_world_step_async(queue));
@@ -330,7 +330,8 @@ START_TEST(contacts_after_a_step_that_fails)
 }
 END_TEST
 
-/* Every tier gives the same bits, from the first step (no contacts) to the last: parts are made anew as contacts come. */
+/* Every tier gives the same bits, from the first step (no contacts) to the last: parts are made again as contacts come.
+ */
 START_TEST(tiers_agree)
 {
     const int precision = _i / 2, fast = _i % 2;
@@ -377,7 +378,7 @@ START_TEST(fast_steps_in_the_queue)
     sadmm_world *host = towers(3, 2, 0.5, precision), *queue = towers(3, 2, 0.5, precision);
     int limited = 0;
     by_host(host);
-    tune_rooms(tables[precision], queue->context, 1);
+    tune_capacities(tables[precision], queue->context, 1);
     static const struct {
         int steps, iterations; /* 0: the method `paper` */
         bool warm;

@@ -28,9 +28,9 @@ static void refresh_weights(struct runner *r)
 
 /* ---- tables ------------------------------------------------------------------------------------------------------ */
 
-/* Stretches of all lengths, since what is relaxed depends on it; new weights in between, often enough for levels. */
-static const int stretches[] = {1, 1, 2, 3, 1, 5, 10, 2, 20, 40};
-enum { STRETCHES = sizeof stretches / sizeof *stretches };
+/* Batches of all lengths, since what is relaxed depends on it; new weights in between, often enough for levels. */
+static const int batches[] = {1, 1, 2, 3, 1, 5, 10, 2, 20, 40};
+enum { BATCHES = sizeof batches / sizeof *batches };
 
 static double largest_impulse(const struct spread *lambda, const struct runner *r)
 {
@@ -52,11 +52,11 @@ START_TEST(tables_equal_ref)
     struct spread primal = {0, 0}, dual = {0, 0};
     runner_start_method(&ref, literal(), scene, problem, 1, SADMM_METHOD_FAST);
     runner_start_method(&own, table, scene, problem, 2, SADMM_METHOD_FAST);
-    for (int s = 0; s < STRETCHES; ++s) {
+    for (int s = 0; s < BATCHES; ++s) {
         struct sadmm_residual wanted, got;
         bool measure = s % 2;
-        iterate(&ref, stretches[s], measure);
-        iterate(&own, stretches[s], measure);
+        iterate(&ref, batches[s], measure);
+        iterate(&own, batches[s], measure);
         compare_solutions(&own, &ref, &v, &lambda);
         if (measure) {
             CALL(&ref, ref.k->measure_residuals(ref.c, &wanted, &ref.error));
@@ -101,7 +101,7 @@ START_TEST(all_tables_run_fast)
 }
 END_TEST
 
-/* Step by step there is nothing: what an iteration relaxes depends on the stretch. */
+/* Step by step there is nothing: what an iteration relaxes depends on the batch. */
 START_TEST(single_steps_are_refused)
 {
     const struct sadmm_kernels *table = tables[_i];
@@ -124,11 +124,11 @@ START_TEST(threads_do_not_matter)
     struct contact_problem *problem = make_problem(scene);
     struct runner r[3];
     for (int t = 0; t < 3; ++t) runner_start_method(&r[t], table, scene, problem, t + 1, SADMM_METHOD_FAST);
-    for (int s = 0; s < STRETCHES; ++s)
+    for (int s = 0; s < BATCHES; ++s)
         for (int t = 0; t < 3; ++t) {
             struct spread v = {0, 0}, lambda = {0, 0};
             struct sadmm_residual wanted, got;
-            iterate(&r[t], stretches[s], true);
+            iterate(&r[t], batches[s], true);
             CALL(&r[0], table->measure_residuals(r[0].c, &wanted, &r[0].error));
             CALL(&r[t], table->measure_residuals(r[t].c, &got, &r[t].error));
             if (s == 6) refresh_weights(&r[t]);
@@ -136,7 +136,7 @@ START_TEST(threads_do_not_matter)
             ck_assert(v.difference == 0 && lambda.difference == 0);
             ck_assert(got.primal == wanted.primal && got.dual == wanted.dual);
         }
-    for (int t = 0; t < 3; ++t) iterate(&r[t], 140, false); /* defects are taken anew within */
+    for (int t = 0; t < 3; ++t) iterate(&r[t], 140, false); /* momentum residuals are taken again within */
     for (int t = 0; t < 3; ++t) {
         struct spread v = {0, 0}, lambda = {0, 0};
         int32_t limited;
@@ -174,7 +174,8 @@ START_TEST(weight_is_the_mass_carried)
 END_TEST
 
 /* N cubes of 1 kg on top of each other, at rest on exact impulses: the forces that the bodies feel add up to N^2 m g, twice
- * but for the one at the top, so that a load passes N / 2 bodies; tallness N / 20. Gaps of 1 um under every third cube. */
+ * but for the one at the top, so that a load passes N / 2 bodies; stack_depth N / 20. Gaps of 1 um under every third
+ * cube. */
 static struct contact_problem *tall_stack(int count)
 {
     double masses[64];
@@ -196,10 +197,10 @@ START_TEST(tall_islands_are_stiff)
     warm.warm = true;
     runner_start_method(&r, literal(), &warm, problem, 1, SADMM_METHOD_FAST);
     ck_assert(r.plan.warm);
-    double tallness = 30 / 20.0, e = 1e-6 / 0.005;
-    /* as in weight_is_the_mass_carried, with V less by tallness^2; 1e-8: the least speed, and a sum of 30 */
-    ck_assert_double_eq_tol(r.c->constraints[0].B[0], 30.0 / 4 * pow(tallness, 2) + 3.0 / 4, 1e-7);
-    ck_assert_double_eq_tol(r.c->constraints[0].e[0], e / pow(tallness, 6), 1e-9 * e);
+    double stack_depth = 30 / 20.0, e = 1e-6 / 0.005;
+    /* as in weight_is_the_mass_carried, with V less by stack_depth^2; 1e-8: the least speed, and a sum of 30 */
+    ck_assert_double_eq_tol(r.c->constraints[0].B[0], 30.0 / 4 * pow(stack_depth, 2) + 3.0 / 4, 1e-7);
+    ck_assert_double_eq_tol(r.c->constraints[0].e[0], e / pow(stack_depth, 6), 1e-9 * e);
     ck_assert_double_eq(r.c->constraints[2].e[0], 0);
     runner_stop(&r);
     /* Cubes that move at a quarter of V: 20 times more than at rest, and no reason for other weights. */
@@ -279,9 +280,9 @@ START_TEST(few_iterations_weigh_more)
         runner_stop(&r);
         contact_problem_free(problem);
     }
-    ck_assert_double_eq(weight_few(1, 20), 3);
-    ck_assert_double_eq(weight_few(1, 1), 6);
-    ck_assert_double_eq(weight_few(0, 5), 1); /* no world: a stretch of a longer solve */
+    ck_assert_double_eq(weight_under_iterated(1, 20), 3);
+    ck_assert_double_eq(weight_under_iterated(1, 1), 6);
+    ck_assert_double_eq(weight_under_iterated(0, 5), 1); /* no world: a batch of a longer solve */
 }
 END_TEST
 
@@ -294,7 +295,7 @@ START_TEST(bounces_are_taken_back)
     ck_assert_double_eq(limit_bounce_factor(&bounce, 1, 1e-16), 0.5);
     ck_assert_double_eq(limit_bounce_factor(&bounce, -2, 1e-16), 0.25);
     ck_assert_double_eq(limit_bounce_factor(&pushed, 1, 1e-16), 1);
-    ck_assert(limit_few(1, 59) && !limit_few(1, 60) && !limit_few(0, 59));
+    ck_assert(limit_under_iterated(1, 59) && !limit_under_iterated(1, 60) && !limit_under_iterated(0, 59));
 }
 END_TEST
 
@@ -464,9 +465,9 @@ START_TEST(solutions_are_certified)
 END_TEST
 
 /* Two thousand iterations from wrong impulses, in single precision: the momentum error ends where rounding the impulses puts it,
- * 8e-8 measured; where defects are never taken anew, at 1.7e-6. 4e-7 is between them. And it is a solution: the natural map ends
- * below epsilon g dt (3e-9 m/s) times the plates' 200 over the cubes' mass, 1e-6 rounded up. */
-START_TEST(defects_do_not_drift)
+ * 8e-8 measured; where momentum residuals are never taken again, at 1.7e-6. 4e-7 is between them. And it is a solution:
+ * the natural map ends below epsilon g dt (3e-9 m/s) times the plates' 200 over the cubes' mass, 1e-6 rounded up. */
+START_TEST(momentum_residuals_do_not_drift)
 {
     const struct sadmm_kernels *table = single_tables[_i];
     struct contact_problem *problem = plates(0);
@@ -631,7 +632,7 @@ int main(void)
     tcase_add_test(weights, islands_are_named_by_their_smallest_body);
     tcase_add_loop_test(solutions, few_iterations, 0, sizeof cold / sizeof *cold);
     tcase_add_loop_test(solutions, solutions_are_certified, 0, 4);
-    tcase_add_loop_test(solutions, defects_do_not_drift, 0, single_count);
+    tcase_add_loop_test(solutions, momentum_residuals_do_not_drift, 0, single_count);
     tcase_add_loop_test(motion, too_few_iterations_are_safe, 0, 4 * (int)(sizeof moving / sizeof *moving));
     tcase_add_loop_test(motion, few_iterations_come_to_rest, 0, 2 * RESTING);
     tcase_add_loop_test(motion, single_precision_rests, 0, 2);

@@ -608,7 +608,7 @@ START_TEST(devices)
     sadmm_solve_report first, second;
     ck_assert_int_eq(sadmm_problem_set_device(p, -1), SADMM_ERROR_INVALID_ARGUMENT);
     ck_assert_str_eq(sadmm_problem_message(p), "device = -1: must be >= 0");
-    /* Hosts have no devices to choose from, and what was kept is given up and made anew. */
+    /* Hosts have no devices to choose from, and what was kept is given up and made again. */
     s.warm_start = false;
     OK(sadmm_problem_solve(p, SADMM_BACKEND_CPU, SADMM_F64, &s, &first));
     OK(sadmm_problem_set_device(p, 3));

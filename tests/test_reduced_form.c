@@ -136,23 +136,23 @@ START_TEST(fused_equals_stepwise)
 {
     const struct sadmm_kernels *table = tables[_i / SCENES];
     const struct scene *scene = &scenes[_i % SCENES];
-    static const int stretches[] = {1, 10, 19, 30, 2, 58};
+    static const int batches[] = {1, 10, 19, 30, 2, 58};
     if (!table->iterate) return;
     struct contact_problem *problem = make_problem(scene);
     struct runner fused[3], step;
     runner_start(&step, table, scene, problem, 1);
     for (int t = 0; t < 3; ++t) runner_start(&fused[t], table, scene, problem, t + 1);
 
-    for (size_t s = 0; s < sizeof stretches / sizeof *stretches; ++s) {
+    for (size_t s = 0; s < sizeof batches / sizeof *batches; ++s) {
         struct sadmm_residual wanted, got;
-        for (int i = 1; i <= stretches[s]; ++i) runner_step(&step, i == stretches[s]);
+        for (int i = 1; i <= batches[s]; ++i) runner_step(&step, i == batches[s]);
         CALL(&step, step.k->measure_residuals(step.c, &wanted, &step.error));
         for (int t = 0; t < 3; ++t) {
             struct spread v = {0, 0}, lambda = {0, 0};
-            CALL(&fused[t], table->iterate(fused[t].c, stretches[s], true, &fused[t].error));
+            CALL(&fused[t], table->iterate(fused[t].c, batches[s], true, &fused[t].error));
             CALL(&fused[t], table->measure_residuals(fused[t].c, &got, &fused[t].error));
             compare_solutions(&fused[t], &step, &v, &lambda);
-            ck_assert_msg(v.difference == 0 && lambda.difference == 0, "%s, stretch %zu, %d threads: v %g, lambda %g",
+            ck_assert_msg(v.difference == 0 && lambda.difference == 0, "%s, batch %zu, %d threads: v %g, lambda %g",
                           scene->name, s, t + 1, relative(v), relative(lambda));
             ck_assert(got.primal == wanted.primal && got.dual == wanted.dual);
             if (s % 2) runner_penalty(&fused[t], 1.7);

@@ -166,8 +166,8 @@ START_TEST(same_solution)
     double *r = calloc(contacts, sizeof *r), *u = calloc(contacts, sizeof *u), *v = calloc(rows, sizeof *v);
     ck_assert_int_eq(gfc3d_driver(s, r, u, v, options), 0);
 
-    for (int stretch = 0; stretch < 200 && (stretch == 0 || certify(problem).siconos > 1e-12); ++stretch)
-        solve(problem, SADMM_BACKEND_CPU, method, 100, stretch > 0);
+    for (int batch = 0; batch < 200 && (batch == 0 || certify(problem).siconos > 1e-12); ++batch)
+        solve(problem, SADMM_BACKEND_CPU, method, 100, batch > 0);
     struct sadmm_global_solution x = solution_of(problem);
     ck_assert_msg(certify(problem).siconos <= 1e-12, "%s: ours ends at %g", problems[at].name,
                   certify(problem).siconos);

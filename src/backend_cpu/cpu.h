@@ -20,8 +20,8 @@
  * An iteration is two sweeps with a barrier after each: bodies (Step 1), constraints (Steps 2-4).
  *
  * The method `fast` has one weight B a constraint in place of beta: it comes in through inv_s and C_i (cpu_weights.c), with
- * beta = 1. Its sweeps pass on changes alone: wrench rows hold J^T d lambda, bodies keep their defect b - A v + J^T lambda
- * up to date (docs/algorithm.md), and both go `relaxation` times as far.
+ * beta = 1. Its sweeps pass on changes alone: wrench rows hold J^T d lambda, bodies keep their momentum residual b - A
+ * v + J^T lambda up to date (docs/algorithm.md), and both go `relaxation` times as far.
  */
 #ifndef SADMM_CPU_H
 #define SADMM_CPU_H
@@ -43,7 +43,7 @@
 #define CPU(name) SADMM_JOIN(sadmm_cpu_##name, SADMM_VARIANT)
 
 enum { STATE_INV_BETA = 6 }; /* slot of a state row */
-enum { BODY_SUMS = 4 };      /* weights: energy, kinetic, push, defect; limit: now, free, along, defect */
+enum { BODY_SUMS = 4 };      /* weights: energy, kinetic, push, momentum residual; limit: now, free, along, momentum residual */
 
 /* LANES contact pairs; points of all of them in `slots` slots from `first` on. Lanes without a pair point at the
  * static body; slots without a point have an error so large that lambda stays 0. */
@@ -76,7 +76,7 @@ struct body_block {
     lanes inv_alpha;
     vec sigma;       /* beta/alpha S */
     lane_sym3 K_inverse;
-    vec defect_linear, defect_angular; /* fast: b - A v + J^T lambda */
+    vec residual_linear, residual_angular; /* fast: b - A v + J^T lambda */
 };
 
 /* A constraint given by Jacobian rows. */
@@ -94,10 +94,10 @@ struct row_block {
 struct cpu_island {
     double energy, mass, speed; /* sum of g . A^-1 g, kg, V in m/s */
     double kinetic, push;       /* sum of v . A v; of the sizes of the bodies' impulses */
-    double tallness;            /* in steps that start warm */
-    double level, scale;        /* math/weight.h; not 0: weights stay, times this */
-    double violation, defect;
-    bool blocks;                /* there are constraints by rows: the level stays 1 */
+    double stack_depth;            /* in steps that start warm */
+    double weight_scale, rescale;        /* math/weight.h; not 0: weights stay, times this */
+    double violation, momentum_residual;
+    bool blocks;                /* there are constraints by rows: the weight scale stays 1 */
     struct limit_energies limit;
     double along; /* v . A v_f / 2 */
 };
@@ -117,9 +117,9 @@ struct sadmm_context {
     double *beta;                    /* bodies, kg */
     struct body_block *body_blocks;  /* if rigid_bodies */
     real *b, *A_columns, *H_columns; /* else: rows; 6 rows (columns of A, of (A + beta C)^-1) a body */
-    real *defects;                   /* and rows, fast */
+    real *momentum_residuals;                   /* and rows, fast */
     size_t state_capacity, A_capacity, C_capacity, beta_capacity, body_block_capacity, b_capacity, A_column_capacity,
-        H_column_capacity, defect_capacity;
+        H_column_capacity, momentum_residual_capacity;
 
     /* Geometric contacts */
     struct pair_block *pair_blocks;
@@ -152,7 +152,7 @@ struct sadmm_context {
     double *pair_response, *pair_weight; /* pair records: J A^-1 J^T, B in kg */
     double *pair_violation;     /* pair records: terms of the islands' sums */
     int refreshes;              /* of the weights, in this solve */
-    int exact_since;            /* iterations since the defects were taken */
+    int exact_since;            /* iterations since the momentum residuals were taken */
     double *body_sums;          /* bodies x BODY_SUMS: terms of the islands' sums */
     size_t body_sum_capacity, label_capacity, island_capacity, A_inverse_capacity, pair_response_capacity,
         pair_weight_capacity, pair_violation_capacity;
@@ -191,9 +191,10 @@ sadmm_status CPU(assemble_springs)(struct sadmm_context *, struct sadmm_error *)
 sadmm_status CPU(init_penalty)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(init_weights)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(update_weights)(struct sadmm_context *, struct sadmm_error *);
-/* A thread's share of what the levels of the islands need; then the levels (cpu_levels.c). `wrenches` hold J^T lambda. */
+/* A thread's share of what the weight scales of the islands need; then the levels (cpu_weight_scale.c). `wrenches` hold
+ * J^T lambda. */
 void CPU(add_up_imbalance)(struct sadmm_context *, int thread, int threads);
-void CPU(update_levels)(struct sadmm_context *);
+void CPU(update_weight_scales)(struct sadmm_context *);
 sadmm_status CPU(limit_velocity)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
 sadmm_status CPU(factorize)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(update_velocity)(struct sadmm_context *, struct sadmm_error *);
@@ -228,8 +229,8 @@ void CPU(sweep_bodies)(struct sadmm_context *, size_t begin, size_t end, bool se
 /* The same for the method `fast`: velocities go `velocity` times as far, multipliers have gone `multipliers` times. */
 void CPU(sweep_bodies_fast)(struct sadmm_context *, size_t begin, size_t end, bool settled, double velocity,
                             double multipliers);
-/* fast: the defects of bodies [begin, end) anew, in double from v and lambda (cpu_defects.c). */
-void CPU(take_defects)(struct sadmm_context *, size_t begin, size_t end);
+/* fast: the momentum residuals of bodies [begin, end), recomputed, in double from v and lambda (cpu_residuals.c). */
+void CPU(recompute_residuals)(struct sadmm_context *, size_t begin, size_t end);
 /* Largest entry of A v - b - (sum of wrenches), eq. (17), over body blocks [begin, end). */
 double CPU(dual_residual)(const struct sadmm_context *, size_t begin, size_t end);
 /* wrenches = J^T lambda; and at the start of a solve. */

@@ -82,7 +82,7 @@ sadmm_status CPU(update_velocity)(struct sadmm_context *c, struct sadmm_error *e
 }
 
 /* Iterations, or a part of one. */
-struct stretch {
+struct batch {
     struct sadmm_context *c;
     int count;
     bool measure;
@@ -90,7 +90,7 @@ struct stretch {
 
 static void constraints_share(void *argument, int thread, int threads)
 {
-    const struct stretch *s = (const struct stretch *)argument;
+    const struct batch *s = (const struct batch *)argument;
     double primal = 0;
     update_constraints(s->c, thread, threads, s->measure ? CPU_SWEEP_MEASURE : CPU_SWEEP_ITERATE, &primal);
     s->c->thread_max[thread * THREAD_MAX_STRIDE] = primal;
@@ -100,17 +100,17 @@ sadmm_status CPU(update_constraints)(struct sadmm_context *c, bool measure, stru
 {
     if (refuse_fast(c, error) != SADMM_OK) return SADMM_ERROR_UNSUPPORTED;
     clear_max(c);
-    cpu_parallel(c, constraints_share, &(struct stretch){c, 1, measure});
+    cpu_parallel(c, constraints_share, &(struct batch){c, 1, measure});
     c->measured = measure;
     if (measure) c->residual.primal = cpu_reduce_max(c);
     return SADMM_OK;
 }
 
-/* Before iteration i of a stretch? */
-static bool takes_defects(const struct sadmm_context *c, int i)
+/* Before iteration i of a batch? */
+static bool recomputes_residuals(const struct sadmm_context *c, int i)
 {
     int since = c->exact_since + i;
-    return since > 0 && since % RELAX_DEFECT_PERIOD == 0;
+    return since > 0 && since % RELAX_RESIDUAL_PERIOD == 0;
 }
 
 /* The method `fast`: constraints first, then bodies (math/relax.h). */
@@ -121,26 +121,26 @@ static void iterate_fast(struct sadmm_context *c, int thread, int threads, int c
     sadmm_share(c->body_block_count, thread, threads, &begin, &end);
     sadmm_share((size_t)c->bodies, thread, threads, &first, &past);
     for (int i = 0; i < count; ++i) {
-        if (takes_defects(c, i)) {
-            CPU(take_defects)(c, first, past);
+        if (recomputes_residuals(c, i)) {
+            CPU(recompute_residuals)(c, first, past);
             sadmm_barrier_wait(&c->barrier, threads);
         }
-        bool farther = relax_constraints(i, count), settled = c->settled || i > 0;
+        bool relaxes = relax_constraints(i, count), settled = c->settled || i > 0;
         update_constraints(c, thread, threads,
-                           farther   ? CPU_SWEEP_RELAX
+                           relaxes   ? CPU_SWEEP_RELAX
                            : measure ? CPU_SWEEP_PLAIN_MEASURE
                                      : CPU_SWEEP_PLAIN,
                            primal);
         sadmm_barrier_wait(&c->barrier, threads);
         CPU(sweep_bodies_fast)(c, begin, end, settled, relax_velocity(i, count, settled) ? relaxation : 1,
-                               farther ? relaxation : 1);
+                               relaxes ? relaxation : 1);
         sadmm_barrier_wait(&c->barrier, threads);
     }
 }
 
 static void iterate_share(void *argument, int thread, int threads)
 {
-    const struct stretch *s = (const struct stretch *)argument;
+    const struct batch *s = (const struct batch *)argument;
     struct sadmm_context *c = s->c;
     double primal = 0;
     unsigned mode = c->fast ? cpu_flush_tiny() : 0; /* what fast passes on goes to 0 */
@@ -164,9 +164,9 @@ sadmm_status CPU(iterate)(struct sadmm_context *c, int count, bool measure, stru
 {
     (void)error;
     clear_max(c);
-    cpu_parallel(c, iterate_share, &(struct stretch){c, count, measure});
+    cpu_parallel(c, iterate_share, &(struct batch){c, count, measure});
     c->settled = c->settled || count > 0;
-    if (count > 0) c->exact_since = (c->exact_since + count - 1) % RELAX_DEFECT_PERIOD + 1;
+    if (count > 0) c->exact_since = (c->exact_since + count - 1) % RELAX_RESIDUAL_PERIOD + 1;
     c->measured = measure && !c->fast;
     c->ratio = 1;
     if (measure) c->residual.primal = cpu_reduce_max(c);

@@ -111,7 +111,7 @@ sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *syst
               grow(&c->b, &c->b_capacity, general * ROW, sizeof(real)) &&
               grow(&c->A_columns, &c->A_column_capacity, general * 6 * ROW, sizeof(real)) &&
               grow(&c->H_columns, &c->H_column_capacity, general * 6 * ROW, sizeof(real)) &&
-              grow(&c->defects, &c->defect_capacity, c->fast ? general * ROW : 0, sizeof(real)) &&
+              grow(&c->momentum_residuals, &c->momentum_residual_capacity, c->fast ? general * ROW : 0, sizeof(real)) &&
               grow(&c->pair_order, &c->pair_order_capacity, (size_t)plan->pairs, sizeof(int32_t)) &&
               grow(&c->pair_blocks, &c->pair_block_capacity, c->pair_block_count, sizeof *c->pair_blocks) &&
               grow(&c->row_blocks, &c->row_block_capacity, c->row_block_count, sizeof *c->row_blocks) &&

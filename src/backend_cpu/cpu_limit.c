@@ -45,7 +45,7 @@ static double pair_work(const struct sadmm_context *c, size_t record)
 }
 
 /* Sums over islands in the order of bodies, whatever the threads. */
-static bool any_suspect(struct sadmm_context *c, bool few)
+static bool any_suspect(struct sadmm_context *c, bool under_iterated)
 {
     bool any = false;
     for (int32_t i = 0; i < c->bodies; ++i) {
@@ -62,14 +62,16 @@ static bool any_suspect(struct sadmm_context *c, bool few)
         const struct cpu_island *island = &c->islands[i];
         if (c->label[i] != i) continue;
         any = any || limit_suspects(island->limit.now, island->limit.free) ||
-              (few && limit_bounces(island->limit.now, island->limit.free, island->along, (double)SADMM_EPSILON));
+              (under_iterated &&
+               limit_bounces(island->limit.now, island->limit.free, island->along, (double)SADMM_EPSILON));
     }
     return any;
 }
 
-static void add_defects_and_work(struct sadmm_context *c)
+static void add_residuals_and_work(struct sadmm_context *c)
 {
-    for (int32_t i = 0; i < c->bodies; ++i) c->islands[c->label[i]].limit.defect += c->body_sums[BODY_SUMS * i + 3];
+    for (int32_t i = 0; i < c->bodies; ++i)
+        c->islands[c->label[i]].limit.momentum_residual += c->body_sums[BODY_SUMS * i + 3];
     for (size_t r = 0; r < c->pair_block_count * (size_t)LANES; ++r) {
         if (c->pair_blocks[r / (size_t)LANES].pair[r % (size_t)LANES] < 0) continue;
         const struct sadmm_contact_pair *pair = cpu_pair(c, r);
@@ -90,27 +92,28 @@ static void defects_share(void *context, int thread, int threads)
     struct sadmm_context *c = (struct sadmm_context *)context;
     size_t begin, end;
     sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
-    for (size_t i = begin; i < end; ++i) c->body_sums[BODY_SUMS * i + 3] = cpu_defect_energy(c, i) / 2;
+    for (size_t i = begin; i < end; ++i) c->body_sums[BODY_SUMS * i + 3] = cpu_residual_energy(c, i) / 2;
 }
 
 sadmm_status CPU(limit_velocity)(struct sadmm_context *c, int32_t *limited, struct sadmm_error *error)
 {
     (void)error;
-    bool few = limit_few(c->plan.warm, c->settings.iterations);
+    bool under_iterated = limit_under_iterated(c->plan.warm, c->settings.iterations);
     *limited = 0;
     cpu_parallel(c, energies_share, c);
-    if (!any_suspect(c, few)) return SADMM_OK;
+    if (!any_suspect(c, under_iterated)) return SADMM_OK;
     CPU(sum_wrenches)(c);
     cpu_parallel(c, defects_share, c);
-    add_defects_and_work(c);
+    add_residuals_and_work(c);
     for (int32_t i = 0; i < c->bodies; ++i) {
         const struct cpu_island *island = &c->islands[c->label[i]];
         double factor = limit_factor(&island->limit);
-        if (few) factor = fmin(factor, limit_bounce_factor(&island->limit, island->along, (double)SADMM_EPSILON));
+        if (under_iterated)
+            factor = fmin(factor, limit_bounce_factor(&island->limit, island->along, (double)SADMM_EPSILON));
         if (factor == 1) continue;
         *limited += c->label[i] == i;
         for (int k = 0; k < 6; ++k) c->state[(size_t)i * ROW + (size_t)k] *= (real)factor;
     }
-    if (*limited > 0) c->exact_since = RELAX_DEFECT_PERIOD; /* defects are taken anew, should anything follow */
+    if (*limited > 0) c->exact_since = RELAX_RESIDUAL_PERIOD; /* residuals are recomputed, should anything follow */
     return SADMM_OK;
 }

@@ -51,7 +51,7 @@ static inline void cpu_free_momentum(const struct sadmm_context *c, size_t i, do
 }
 
 /* r . A^-1 r, r = b + J^T lambda - A v; `wrenches` hold J^T lambda. */
-static inline double cpu_defect_energy(const struct sadmm_context *c, size_t i)
+static inline double cpu_residual_energy(const struct sadmm_context *c, size_t i)
 {
     double r[6];
     cpu_free_momentum(c, i, r);

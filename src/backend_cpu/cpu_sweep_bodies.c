@@ -39,7 +39,7 @@ static inline __attribute__((always_inline)) void load_block(const row8 *rows, c
 }
 
 /* b - A v + sum of wrenches of a block; `state` gets the block's state by number. */
-static inline __attribute__((always_inline)) void block_defect(const struct sadmm_context *c, size_t index,
+static inline __attribute__((always_inline)) void block_momentum_residual(const struct sadmm_context *c, size_t index,
                                                                lanes state[ROW], vec *linear, vec *angular)
 {
     const struct body_block *block = &c->body_blocks[index];
@@ -67,7 +67,7 @@ static void update_rigid(struct sadmm_context *c, size_t begin, size_t end, bool
         const struct body_block *block = &c->body_blocks[index];
         lanes state[ROW];
         vec linear, angular;
-        block_defect(c, index, state, &linear, &angular);
+        block_momentum_residual(c, index, state, &linear, &angular);
         vec dw = sym3_times(block->K_inverse, sub(angular, cross(block->sigma, linear)));
         vec dv = add(scale(linear, block->inv_alpha), cross(block->sigma, dw));
         state[0] += dv.x, state[1] += dv.y, state[2] += dv.z;
@@ -97,16 +97,16 @@ static void update_rigid_fast(struct sadmm_context *c, size_t begin, size_t end,
         for (int l = 0; l < LANES; ++l) sums[l] = wrench_sum(c, index * (size_t)LANES + (size_t)l);
         load_block(rows, sums, state, g);
         vec force = {g[0], g[1], g[2]}, torque = {g[3], g[4], g[5]};
-        vec linear = add(block->defect_linear, add(force, force));
-        vec angular = add(block->defect_angular, add(torque, torque));
+        vec linear = add(block->residual_linear, add(force, force));
+        vec angular = add(block->residual_angular, add(torque, torque));
         vec dw = sym3_times(block->K_inverse, sub(angular, cross(block->sigma, linear)));
         vec dv = add(scale(linear, block->inv_alpha), cross(block->sigma, dw));
         dv = move_by(state, scale(dv, velocity));
         dw = move_by(state + 3, scale(dw, velocity));
         store_rows(c->state + index * (size_t)LANES * ROW, state);
-        block->defect_linear = add(block->defect_linear, sub(scale(force, multipliers), scale(dv, block->mass)));
-        block->defect_angular =
-            add(block->defect_angular, sub(scale(torque, multipliers), sym3_times(block->inertia, dw)));
+        block->residual_linear = add(block->residual_linear, sub(scale(force, multipliers), scale(dv, block->mass)));
+        block->residual_angular =
+            add(block->residual_angular, sub(scale(torque, multipliers), sym3_times(block->inertia, dw)));
     }
 }
 
@@ -116,7 +116,7 @@ static double rigid_residual(const struct sadmm_context *c, size_t begin, size_t
     for (size_t index = begin; index < end; ++index) {
         lanes state[ROW];
         vec r[2];
-        block_defect(c, index, state, &r[0], &r[1]);
+        block_momentum_residual(c, index, state, &r[0], &r[1]);
         for (int part = 0; part < 2; ++part)
             largest = larger(largest, larger(magnitude(r[part].x), larger(magnitude(r[part].y), magnitude(r[part].z))));
     }
@@ -125,7 +125,7 @@ static double rigid_residual(const struct sadmm_context *c, size_t begin, size_t
 
 /* ---- any bodies: full 6x6 -------------------------------------------------------------------------------------- */
 
-static inline row8 general_defect(const struct sadmm_context *c, size_t i)
+static inline row8 general_momentum_residual(const struct sadmm_context *c, size_t i)
 {
     const row8 *A = (const row8 *)c->A_columns + 6 * i;
     row8 v = ((const row8 *)c->state)[i], g = ((const row8 *)c->b)[i] + wrench_sum(c, i);
@@ -138,7 +138,7 @@ static void update_general(struct sadmm_context *c, size_t begin, size_t end, bo
     for (size_t i = begin; i < end; ++i) {
         if (settled && c->offsets[i] == c->offsets[i + 1]) continue;
         const row8 *H = (const row8 *)c->H_columns + 6 * i;
-        row8 g = general_defect(c, i), step = {0};
+        row8 g = general_momentum_residual(c, i), step = {0};
         for (int k = 0; k < 6; ++k) step += H[k] * g[k];
         ((row8 *)c->state)[i] += step; /* number 6 of step is 0: 1/beta stays */
     }
@@ -150,14 +150,14 @@ static void update_general_fast(struct sadmm_context *c, size_t begin, size_t en
     for (size_t i = begin; i < end; ++i) {
         if (settled && c->offsets[i] == c->offsets[i + 1]) continue;
         const row8 *A = (const row8 *)c->A_columns + 6 * i, *H = (const row8 *)c->H_columns + 6 * i;
-        row8 *defect = (row8 *)c->defects + i;
-        row8 sum = wrench_sum(c, i), g = *defect + 2 * sum, step = {0};
+        row8 *momentum_residual = (row8 *)c->momentum_residuals + i;
+        row8 sum = wrench_sum(c, i), g = *momentum_residual + 2 * sum, step = {0};
         for (int k = 0; k < 6; ++k) step += H[k] * g[k];
         row8 *state = (row8 *)c->state + i, before = *state;
         *state += velocity * step;
         step = *state - before;
-        *defect += multipliers * sum;
-        for (int k = 0; k < 6; ++k) *defect -= A[k] * step[k];
+        *momentum_residual += multipliers * sum;
+        for (int k = 0; k < 6; ++k) *momentum_residual -= A[k] * step[k];
     }
 }
 
@@ -165,7 +165,7 @@ static double general_residual(const struct sadmm_context *c, size_t begin, size
 {
     double largest = 0;
     for (size_t i = begin; i < end; ++i) {
-        row8 g = general_defect(c, i);
+        row8 g = general_momentum_residual(c, i);
         for (int k = 0; k < 6; ++k) largest = fmax(largest, fabs((double)g[k]));
     }
     return largest;

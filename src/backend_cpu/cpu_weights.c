@@ -118,10 +118,11 @@ static void add_up_loads(struct sadmm_context *c)
         if (c->label[i] != i) continue;
         island->speed = weight_speed(island->energy, island->mass);
         if (!c->plan.warm) continue;
-        island->tallness = weight_tallness(island->speed, island->push, island->mass);
-        double speed = island->speed, few = weight_few(c->plan.rigid, c->settings.iterations);
-        island->speed = weight_speed_warm(speed, island->tallness, island->kinetic, island->mass);
-        island->speed = weight_speed_few(speed, island->speed, few, island->kinetic, island->mass);
+        island->stack_depth = weight_stack_depth(island->speed, island->push, island->mass);
+        double speed = island->speed, under_iterated = weight_under_iterated(c->plan.rigid, c->settings.iterations);
+        island->speed = weight_speed_warm(speed, island->stack_depth, island->kinetic, island->mass);
+        island->speed =
+            weight_speed_under_iterated(speed, island->speed, under_iterated, island->kinetic, island->mass);
     }
 }
 
@@ -157,7 +158,7 @@ static double pair_load(const struct sadmm_context *c, const struct pair_block *
     return sum / count;
 }
 
-/* The contacts of tall islands close small gaps slowly. */
+/* The contacts of deep stacks close small gaps slowly. */
 static void ease_gaps(struct sadmm_context *c, size_t index)
 {
     const struct pair_block *block = &c->pair_blocks[index];
@@ -165,7 +166,7 @@ static void ease_gaps(struct sadmm_context *c, size_t index)
     for (int l = 0; l < LANES; ++l) {
         if (block->pair[l] < 0) continue;
         const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[block->pair[l]];
-        double share = weight_gap_share(cpu_island_of(c, pair->body_a, pair->body_b)->tallness);
+        double share = weight_gap_share(cpu_island_of(c, pair->body_a, pair->body_b)->stack_depth);
         for (int k = 0; k < pair->count && share < 1; ++k) {
             real *error = c->plan.contact_rows == 3 ? (real *)&((struct point_slot *)c->slots + block->first + k)->error
                                                     : (real *)&((struct normal_slot *)c->slots + block->first + k)->error;
@@ -184,7 +185,7 @@ static void weigh_pair_block(struct sadmm_context *c, size_t index)
         double *B = &c->pair_weight[index * (size_t)LANES + (size_t)l];
         double carried = weight_mass(pair_load(c, block, l, pair->count), island->speed, island->mass);
         double response = c->pair_response[index * (size_t)LANES + (size_t)l];
-        *B = island->scale > 0 ? *B * island->scale : weight_of_pair(island->level, carried, response);
+        *B = island->rescale > 0 ? *B * island->rescale : weight_of_pair(island->weight_scale, carried, response);
         block->inv_s[l] = (real)(pair->body_a >= 0 && pair->body_b >= 0 ? *B / 2 : *B);
     }
 }
@@ -264,15 +265,15 @@ static void assemble_C(struct sadmm_context *c, size_t i)
 static void update_share(void *context, int thread, int threads)
 {
     struct sadmm_context *c = (struct sadmm_context *)context;
-    const bool levels = c->refreshes >= WEIGHT_FIRST_LEVEL;
+    const bool rescales = c->refreshes >= WEIGHT_FIRST_SCALE;
     const bool eases = c->refreshes == 0 && c->plan.warm && c->plan.rigid; /* world level: gaps, a slop and a step */
     size_t begin, end;
     sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) add_up_body(c, i, &c->body_sums[BODY_SUMS * i]);
-    if (levels) CPU(add_up_imbalance)(c, thread, threads);
+    if (rescales) CPU(add_up_imbalance)(c, thread, threads);
     sadmm_barrier_wait(&c->barrier, threads);
     if (thread == 0) add_up_loads(c);
-    if (thread == 0 && levels) CPU(update_levels)(c);
+    if (thread == 0 && rescales) CPU(update_weight_scales)(c);
     sadmm_barrier_wait(&c->barrier, threads);
     sadmm_share(c->pair_block_count, thread, threads, &begin, &end);
     for (size_t k = begin; k < end; ++k) weigh_pair_block(c, k);
@@ -282,7 +283,7 @@ static void update_share(void *context, int thread, int threads)
     sadmm_barrier_wait(&c->barrier, threads);
     sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) assemble_C(c, i);
-    CPU(take_defects)(c, begin, end);
+    CPU(recompute_residuals)(c, begin, end);
 }
 
 sadmm_status CPU(update_weights)(struct sadmm_context *c, struct sadmm_error *error)
@@ -316,8 +317,8 @@ sadmm_status CPU(init_weights)(struct sadmm_context *c, struct sadmm_error *erro
     sadmm_islands(c->system, c->label);
     cpu_parallel(c, respond_share, c);
     for (int32_t i = 0; i < c->bodies; ++i) {
-        c->islands[i].level = 1;
-        c->islands[i].scale = 0;
+        c->islands[i].weight_scale = 1;
+        c->islands[i].rescale = 0;
     }
     c->refreshes = -1; /* the first weights are none */
     c->settled = c->measured = false;

@@ -112,9 +112,9 @@ static void add_up_islands(struct sadmm_context *c)
     }
 }
 
-static double island_tallness(const struct ref_body *island)
+static double island_stack_depth(const struct ref_body *island)
 {
-    return weight_tallness(weight_speed(island->island_energy, island->island_mass), island->island_push,
+    return weight_stack_depth(weight_speed(island->island_energy, island->island_mass), island->island_push,
                            island->island_mass);
 }
 
@@ -123,13 +123,13 @@ static double island_speed(const struct sadmm_context *c, const struct ref_body 
 {
     double speed = weight_speed(island->island_energy, island->island_mass);
     if (!c->plan->warm) return speed;
-    double warm = weight_speed_warm(speed, island_tallness(island), island->island_kinetic, island->island_mass);
-    double few = weight_few(c->plan->rigid, c->settings->iterations);
-    return weight_speed_few(speed, warm, few, island->island_kinetic, island->island_mass);
+    double warm = weight_speed_warm(speed, island_stack_depth(island), island->island_kinetic, island->island_mass);
+    double under_iterated = weight_under_iterated(c->plan->rigid, c->settings->iterations);
+    return weight_speed_under_iterated(speed, warm, under_iterated, island->island_kinetic, island->island_mass);
 }
 
 /* A v - b - sum J^T multiplier, by body, into `impulse`. */
-static void momentum_defect(struct sadmm_context *c, bool seen)
+static void momentum_residual(struct sadmm_context *c, bool seen)
 {
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *body = &c->bodies[i];
@@ -185,26 +185,26 @@ static double pair_violation(const struct sadmm_context *c, const struct sadmm_c
     return sum;
 }
 
-static void update_levels(struct sadmm_context *c)
+static void update_weight_scales(struct sadmm_context *c)
 {
     const struct sadmm_contact_set *contacts = c->system->contacts;
-    momentum_defect(c, false);
+    momentum_residual(c, false);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
-        c->bodies[i].island_violation = c->bodies[i].island_defect = 0;
+        c->bodies[i].island_violation = c->bodies[i].island_residual = 0;
         c->bodies[i].blocks = false;
     }
     for (int32_t i = 0; i < c->system->body_count; ++i)
-        c->bodies[c->bodies[i].label].island_defect += inverse_form(&c->bodies[i], c->bodies[i].impulse);
+        c->bodies[c->bodies[i].label].island_residual += inverse_form(&c->bodies[i], c->bodies[i].impulse);
     for (size_t p = 0; p < contacts->pair_count; ++p)
         island_of(c, &c->constraints[contacts->pairs[p].first])->island_violation += pair_violation(c, &contacts->pairs[p]);
     for (size_t k = contacts->point_count; k < c->constraint_count; ++k) island_of(c, &c->constraints[k])->blocks = true;
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *island = &c->bodies[i];
         if (island->label != i || island->blocks) continue;
-        double balance = weight_balance(island->island_violation, island->island_defect, island->island_mass);
-        double level = weight_next_level(island->level, balance);
-        island->scale = weight_stalls(balance) ? level / island->level : 0;
-        island->level = level;
+        double balance = weight_balance(island->island_violation, island->island_residual, island->island_mass);
+        double next = weight_next_scale(island->weight_scale, balance);
+        island->rescale = weight_stalls(balance) ? next / island->weight_scale : 0;
+        island->weight_scale = next;
     }
 }
 
@@ -221,8 +221,8 @@ static void weigh_pair(struct sadmm_context *c, const struct sadmm_contact_pair 
     const struct ref_body *island = island_of(c, &c->constraints[pair->first]);
     double speed = island_speed(c, island);
     double carried = weight_mass(load / pair->count, speed, island->island_mass);
-    double B = island->scale > 0 ? c->constraints[pair->first].B[0] * island->scale
-                                 : weight_of_pair(island->level, carried, pair_response(c, pair));
+    double B = island->rescale > 0 ? c->constraints[pair->first].B[0] * island->rescale
+                                 : weight_of_pair(island->weight_scale, carried, pair_response(c, pair));
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
         struct ref_constraint *constraint = &c->constraints[k];
         memset(constraint->B, 0, sizeof constraint->B);
@@ -274,12 +274,12 @@ sadmm_status sadmm_ref_update_weights(struct sadmm_context *c, struct sadmm_erro
     (void)error;
     size_t points = c->system->contacts->point_count;
     add_up_islands(c);
-    if (++c->refreshes >= WEIGHT_FIRST_LEVEL) update_levels(c);
+    if (++c->refreshes >= WEIGHT_FIRST_SCALE) update_weight_scales(c);
     for (size_t p = 0; p < c->system->contacts->pair_count; ++p) weigh_pair(c, &c->system->contacts->pairs[p]);
     if (c->refreshes == 0 && c->plan->warm && c->plan->rigid)
         for (size_t k = 0; k < points; ++k) {
             struct ref_constraint *contact = &c->constraints[k];
-            double share = weight_gap_share(island_tallness(island_of(c, contact)));
+            double share = weight_gap_share(island_stack_depth(island_of(c, contact)));
             contact->e[0] = weight_gap_error(contact->e[0], share, c->settings->slop / c->settings->dt);
         }
     for (size_t k = points; k < c->constraint_count; ++k) weigh_block(c, &c->constraints[k]);
@@ -300,8 +300,8 @@ sadmm_status sadmm_ref_init_weights(struct sadmm_context *c, struct sadmm_error 
 {
     label_islands(c);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
-        c->bodies[i].level = 1;
-        c->bodies[i].scale = 0;
+        c->bodies[i].weight_scale = 1;
+        c->bodies[i].rescale = 0;
     }
     c->refreshes = -1; /* the first weights are none */
     c->settled = false;
@@ -311,7 +311,7 @@ sadmm_status sadmm_ref_init_weights(struct sadmm_context *c, struct sadmm_error 
 /* v^ = v + (A + C)^-1 (b - A v + sum J^T (2 lambda^ - lambda)) */
 static void step_velocity(struct sadmm_context *c, double relaxation)
 {
-    momentum_defect(c, true);
+    momentum_residual(c, true);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *body = &c->bodies[i];
         double step[6];
@@ -379,7 +379,7 @@ sadmm_status sadmm_ref_iterate_fast(struct sadmm_context *c, int count)
 
 sadmm_status sadmm_ref_measure_fast(struct sadmm_context *c, struct sadmm_residual *residual)
 {
-    momentum_defect(c, false);
+    momentum_residual(c, false);
     residual->primal = c->primal;
     residual->dual = 0;
     for (int32_t i = 0; i < c->system->body_count; ++i)
@@ -391,8 +391,8 @@ sadmm_status sadmm_ref_measure_fast(struct sadmm_context *c, struct sadmm_residu
 sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *c, int32_t *limited, struct sadmm_error *error)
 {
     (void)error;
-    momentum_defect(c, false);
-    bool few = limit_few(c->plan->warm, c->settings->iterations);
+    momentum_residual(c, false);
+    bool under_iterated = limit_under_iterated(c->plan->warm, c->settings->iterations);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         memset(&c->bodies[i].limit, 0, sizeof c->bodies[i].limit);
         c->bodies[i].along = 0;
@@ -404,7 +404,7 @@ sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *c, int32_t *limited,
         dense6_mul(body->A, body->v, momentum);
         sum->now += dense6_dot(momentum, body->v) / 2;
         sum->free += inverse_form(body, body->b) / 2;
-        sum->defect += inverse_form(body, body->impulse) / 2;
+        sum->momentum_residual += inverse_form(body, body->impulse) / 2;
         c->bodies[body->label].along += dense6_dot(body->v, body->b) / 2;
     }
     for (size_t k = 0; k < c->constraint_count; ++k) {
@@ -417,7 +417,7 @@ sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *c, int32_t *limited,
         struct ref_body *body = &c->bodies[i];
         const struct ref_body *island = &c->bodies[body->label];
         double factor = limit_factor(&island->limit);
-        if (few) factor = fmin(factor, limit_bounce_factor(&island->limit, island->along, DBL_EPSILON));
+        if (under_iterated) factor = fmin(factor, limit_bounce_factor(&island->limit, island->along, DBL_EPSILON));
         if (factor < 1 && body->label == i) ++*limited;
         for (int j = 0; j < 6; ++j) body->v[j] *= factor;
     }

@@ -61,7 +61,7 @@ static int set_option(void *target, size_t index, const char *value)
     case OPTION_MAX_ITERATIONS:
         ok = cli_read_int("--max-iterations", value, 1, 1000000000, &o->plan.max_iterations);
         break;
-    case OPTION_CHECK_PERIOD: ok = read_small_int("--check-period", value, 1, 1000000, &o->plan.stretch); break;
+    case OPTION_CHECK_PERIOD: ok = read_small_int("--check-period", value, 1, 1000000, &o->plan.batch); break;
     case OPTION_LEVEL: ok = cli_read_real("--penalty-offset", value, 1e-12, 1e12, &o->plan.level); break;
     case OPTION_MASS_FACTOR:
         ok = cli_read_real("--penalty-mass-factor", value, 0, 1e12, &s->penalty_mass_factor);
@@ -207,7 +207,7 @@ static int run(int argc, char **argv)
         .plan = {.precision = SADMM_F64,
                  .settings = sadmm_settings_default(),
                  .max_iterations = 100000,
-                 .stretch = 100},
+                 .batch = 100},
     };
     struct sadmm_error error = {0};
     sadmm_problem *problem = NULL;

@@ -11,15 +11,15 @@
 static const double factors[] = {1, 1, 10, 0.1, 100, 0.01, 1e3, 1e-3};
 enum { LANES = sizeof factors / sizeof *factors };
 
-/* In stretches: the first lane stalls when its measure has not halved in PATIENCE; rates are measured over RATE. */
+/* In batches: the first lane stalls when its measure has not halved in PATIENCE; rates are measured over RATE. */
 enum { PATIENCE = 6, RATE = 10 };
 
 struct lane {
     double level;                            /* kg */
     bool updates;
-    double *velocities, *impulses, *lambda;  /* where it is; NULL before its first stretch */
+    double *velocities, *impulses, *lambda;  /* where it is; NULL before its first batch */
     double measure;                          /* the smallest so far */
-    double left;                             /* stretches it still needs at its present rate */
+    double left;                             /* batches it still needs at its present rate */
 };
 
 struct loop {
@@ -85,14 +85,14 @@ static bool finished(const struct loop *l)
     return out->converged || l->exhausted || out->iterations >= l->plan->max_iterations;
 }
 
-/* One stretch on what is in the problem; `cold`: from nothing. */
-static sadmm_status stretch(struct loop *l, struct lane *lane, bool cold)
+/* One batch on what is in the problem; `cold`: from nothing. */
+static sadmm_status batch(struct loop *l, struct lane *lane, bool cold)
 {
     struct solve_outcome *out = l->out;
     sadmm_settings s = l->plan->settings;
     sadmm_certificate c;
     long left = l->plan->max_iterations - out->iterations;
-    s.iterations = left < l->plan->stretch ? (int)left : l->plan->stretch;
+    s.iterations = left < l->plan->batch ? (int)left : l->plan->batch;
     s.warm_start = !cold;
     s.penalty_update_warm = true;
     if (!lane->updates) s.penalty_period = 0;
@@ -118,7 +118,7 @@ static sadmm_status stretch(struct loop *l, struct lane *lane, bool cold)
     return SADMM_OK;
 }
 
-/* Some stretches of one lane, from where it is; then how many more it needs if it goes on like that. */
+/* Some batches of one lane, from where it is; then how many more it needs if it goes on like that. */
 static sadmm_status advance(struct loop *l, struct lane *lane)
 {
     bool cold = lane->velocities == NULL;
@@ -126,7 +126,7 @@ static sadmm_status advance(struct loop *l, struct lane *lane)
     int done = 0;
     if (!cold) TRY(restore(l, lane));
     for (; done < RATE && !finished(l); ++done) {
-        TRY(stretch(l, lane, cold && done == 0));
+        TRY(batch(l, lane, cold && done == 0));
         if (cold && done == RATE / 2 - 1) before = lane->measure; /* the first half is a transient */
     }
     if (finished(l)) return SADMM_OK;
@@ -148,7 +148,7 @@ static sadmm_status run_first(struct loop *l)
     int unimproved = 0;
     bool cold = true;
     while (!finished(l) && (!has_other_lanes(l->plan) || unimproved < PATIENCE)) {
-        TRY(stretch(l, lane, cold));
+        TRY(batch(l, lane, cold));
         cold = false;
         ++unimproved;
         if (lane->measure <= 0.5 * to_halve) {

@@ -1,12 +1,12 @@
 /* Solve a problem until siconos' measure is small enough.
  *
- * Stretches of iterations, each a warm continuation of the one before, with the certificate between them. The penalty
+ * Batches of iterations, each a warm continuation of the one before, with the certificate between them. The penalty
  * is beta = M Tr(A)/Tr(C) + level (eq. 13) with M = 0 unless asked for: near-uniform weights converge where
  * mass-proportional ones stall, but the best level differs by decades from problem to problem (docs/algorithm.md), and
  * updates by eq. (15) help most problems and ruin some. So the loop starts from the mean mass of the bodies with
  * updates. When the measure stalls, other levels without updates start from nothing beside it, and from then on the one
  * runs that will be the first to arrive if it goes on at its present rate. The method fast has no level to choose: it takes
- * its weights anew in every stretch.
+ * its weights again in every batch.
  */
 #ifndef SADMM_CLI_SOLVE_LOOP_H
 #define SADMM_CLI_SOLVE_LOOP_H
@@ -19,7 +19,7 @@ struct solve_plan {
     sadmm_settings settings;  /* iterations and warm_start are the loop's */
     double tolerance;         /* of siconos' measure */
     long max_iterations;
-    int stretch;              /* iterations between looks */
+    int batch;              /* iterations between looks */
     double level;             /* kg, kept; 0: chosen and changed automatically */
 };
 
@@ -29,11 +29,11 @@ struct solve_outcome {
     double ms;                /* solving, without the certificates */
     double level;             /* kg, the last one used */
     int levels_tried;
-    sadmm_solve_report report;/* of the last stretch */
+    sadmm_solve_report report;/* of the last batch */
     sadmm_certificate certificate; /* of the solution left in the problem: the best one seen */
 };
 
-/* An interrupt ends it after the stretch under way. Errors: those of sadmm_problem_solve; `error` holds the message. */
+/* An interrupt ends it after the batch under way. Errors: those of sadmm_problem_solve; `error` holds the message. */
 sadmm_status solve_loop(sadmm_problem *problem, const struct solve_plan *plan, struct solve_outcome *outcome,
                         struct sadmm_error *error);
 

@@ -9,7 +9,7 @@
  * the callback checks the boxes itself and orders nothing: the pair set depends on the boxes alone. Planes never enter
  * a tree: half-spaces crash it.
  *
- * C++ exceptions end here. After one the trees are dropped and built anew by the next update.
+ * C++ exceptions end here. After one the trees are dropped and built again by the next update.
  */
 #include "broad_phase.h"
 
@@ -44,7 +44,7 @@ struct Proxy : fcl::CollisionObject<double> {
 };
 
 /* A tree that is refitted keeps the shape it was built with: after boxes have mixed, queries take four times as long
- * (measured: 2,000 boxes, 400 steps of 1 cm). It is built anew once every box has moved this many times on average,
+ * (measured: 2,000 boxes, 400 steps of 1 cm). It is built again once every box has moved this many times on average,
  * which costs a few per cent. */
 constexpr size_t moves_before_rebuild = 32;
 
@@ -136,7 +136,7 @@ void sadmm_broad_phase::apply(const sadmm_broad_entry *entries, size_t count, co
         g->moves += g->moved.size();
         const bool rebuild = g->moves > moves_before_rebuild * g->moving.size();
         if (rebuild) g->moves = 0;
-        /* setup(), also within update(), builds the tree anew when it is higher than log2(size) + this */
+        /* setup(), also within update(), builds the tree again when it is higher than log2(size) + this */
         g->moving.max_tree_nonbalanced_level = rebuild ? -1000 : 10;
         /* Most of a tree moved: refit it as a whole; else move the leaves one by one. */
         if (rebuild || g->moved.size() * 2 > g->moving.size()) g->moving.update();

@@ -40,8 +40,9 @@ enum sadmm_cuda_tier cuda_emulation_tier_of(const struct sadmm_kernels *kernels,
                                            : sadmm_cuda_get_tier_emulated_f64(context, blocks);
 }
 
-void cuda_emulation_tune_rooms(const struct sadmm_kernels *kernels, struct sadmm_context *context, int64_t first_room)
+void cuda_emulation_tune_capacities(const struct sadmm_kernels *kernels, struct sadmm_context *context,
+                                    int64_t first_capacity)
 {
-    if (kernels->precision == SADMM_F32) sadmm_cuda_tune_rooms_emulated_f32(context, first_room);
-    else sadmm_cuda_tune_rooms_emulated_f64(context, first_room);
+    if (kernels->precision == SADMM_F32) sadmm_cuda_tune_capacities_emulated_f32(context, first_capacity);
+    else sadmm_cuda_tune_capacities_emulated_f64(context, first_capacity);
 }

@@ -21,7 +21,7 @@ void cuda_emulation_force_cluster(const struct sadmm_kernels *, struct sadmm_con
 enum sadmm_cuda_tier cuda_emulation_tier_of(const struct sadmm_kernels *, const struct sadmm_context *,
                                             int32_t *blocks);
 
-void cuda_emulation_tune_rooms(const struct sadmm_kernels *, struct sadmm_context *, int64_t first_room);
+void cuda_emulation_tune_capacities(const struct sadmm_kernels *, struct sadmm_context *, int64_t first_capacity);
 
 #ifdef __cplusplus
 }

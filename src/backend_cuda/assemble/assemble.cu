@@ -1,7 +1,7 @@
 /* Kernels A-D: raw bodies, contacts and blocks, as core has them, into this precision's layout. */
 #include "backend_cuda/device/double.h"
 
-#include "half_sums.h"
+#include "side_sums.h"
 #include "backend_cuda/iterate/stop_rule.h"
 
 /* ---- bodies --------------------------------------------------------------------------------------------------- */
@@ -40,7 +40,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     assemble_bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     int32_t i = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x);
-    if (i >= v.bodies || v.live->halt) return; /* may run before the step's contacts are known */
+    if (i >= v.bodies || v.live->abort_code) return; /* may run before the step's contacts are known */
     if (FAST && i == 0) clear_counts(v);
     double A[36], b[6], x[6], factor[36];
     const struct sadmm_settings settings = *v.settings;
@@ -112,7 +112,8 @@ static __device__ double solver_friction(const cuda_view &v, double mu)
     return v.fast ? contact_friction_inside(mu, SOLVER_EPSILON) : mu;
 }
 
-/* v.lanes threads a pair, each every v.lanes-th point; the first also what the points share. FAST: records of halves, too. */
+/* v.lanes threads a pair, each every v.lanes-th point; the first also what the points share. FAST: records of sides,
+ * too. */
 template <bool FAST>
 static __global__ void __launch_bounds__(BODY_THREADS)
     assemble_contacts_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
@@ -125,7 +126,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const struct sadmm_contact_point *points = v.raw_points + (live ? pair->first : 0);
     const vec3 normal = live ? v3_load(pair->normal) : v3(0, 0, 0);
     const bool a = live && pair->body_a >= 0, b = live && pair->body_b >= 0;
-    /* A pair of more points than the step was planned for halts it (step/step.h), but later: until then it has as many. */
+    /* A pair of more points than the step was planned for aborts it (step/step.h), but later: until then it has as
+     * many. */
     const int32_t count = !live ? 0 : pair->count <= v.point_slots ? pair->count : v.point_slots;
     vec3 between = v3(0, 0, 0);
     if (a && b && count > 0 && (FAST || lane == 0))
@@ -154,7 +156,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         for (int j = 0; j < 3; ++j) v.lambda[(size_t)j * v.lambda_stride + slot] = lambda[j];
         if (FAST) add_point(v, ends, about, difference, arm, lambda, true, &sums);
     }
-    if (FAST) store_halves(v, live, p, lane, count, ends, difference, true, inverse, &sums);
+    if (FAST) store_sides(v, live, p, lane, count, ends, difference, true, inverse, &sums);
 }
 
 /* ---- constraints given by Jacobian rows ------------------------------------------------------------------------ */
@@ -207,8 +209,8 @@ extern "C" sadmm_status CUDA(assemble_contacts)(struct sadmm_context *c, struct 
     CUDA_ENTER(c);
     CUDA_TRY(CUDA(launch_of)(c, c->fast ? assemble_contacts_kernel<true> : assemble_contacts_kernel<false>,
                              "assemble_contacts",
-                             ((int64_t)c->view.pair_room * c->view.lanes + BODY_THREADS - 1) / BODY_THREADS, BODY_THREADS,
-                             &args, error));
+                             ((int64_t)c->view.pair_capacity * c->view.lanes + BODY_THREADS - 1) / BODY_THREADS,
+                             BODY_THREADS, &args, error));
     return c->plan.blocks[SADMM_BLOCK_CONTACT] ? assemble_rows(c, SADMM_BLOCK_CONTACT, error) : SADMM_OK;
 }
 

@@ -72,7 +72,7 @@ static __global__ void __launch_bounds__(3 * GRID_SAMPLES) grid_kernel(const __g
 static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t i = collision_thread(PLACE_THREADS);
-    if (halted(v)) return;
+    if (aborted(v)) return;
     if (i == 0) *v.candidate_count = 0;
     if (i >= v.leaf_count + v.plane_count) return;
     const struct collision_step step = step_of(v);
@@ -197,7 +197,7 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) refit_kernel(const _
 static __global__ void __launch_bounds__(COLLISION_THREADS) clear_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t i = collision_thread(COLLISION_THREADS);
-    if (i < v.candidate_room) v.found[i] = ~UINT64_C(0);
+    if (i < v.candidate_capacity) v.found[i] = ~UINT64_C(0);
 }
 
 static __device__ bool may_meet(const collision_view &v, const collision_filter &a, const collision_filter &b)
@@ -231,7 +231,7 @@ static __device__ __forceinline__ uint64_t candidate_key(const collision_view &v
 
 static __device__ __forceinline__ void store_candidate(const collision_view &v, unsigned long long at, uint64_t key)
 {
-    if (at < (unsigned)v.candidate_room) v.found[at] = key;
+    if (at < (unsigned)v.candidate_capacity) v.found[at] = key;
 }
 
 /* Candidates of a thread on their way to memory. */
@@ -322,7 +322,7 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) walk_kernel(const __
 {
     const int64_t thread = collision_thread(COLLISION_THREADS);
     struct batch out;
-    if (halted(v)) return;
+    if (aborted(v)) return;
     out.count = 0;
     if (thread < v.leaf_count) walk(v, (int32_t)thread, &out);
     finish_batches(v, out);
@@ -343,7 +343,7 @@ static __global__ void __launch_bounds__(TILE_ROWS) tiles_kernel(const __grid_co
     const int32_t i = row * TILE_ROWS + t, first = column * TILE_COLUMNS;
     struct collision_leaf leaf;
     struct collision_filter own;
-    if (halted(v) || (column >= 0 && first + TILE_COLUMNS - 1 <= row * TILE_ROWS)) return;
+    if (aborted(v) || (column >= 0 && first + TILE_COLUMNS - 1 <= row * TILE_ROWS)) return;
     const struct collision_step step = step_of(v);
     if (i < v.leaf_count) {
         const uint32_t slot = v.present[i];

@@ -27,12 +27,13 @@ sadmm_status COLLISION(download)(struct sadmm_cuda_collision *collision, void *s
 /* ---- for steps that are enqueued: no host in between ---- */
 
 /* Take what a find takes from the host, once; `bodies` (by body slot) will be on the device, written before each
- * enqueued find, and are as input->bodies now. `halt`, on the device: while it is not 0, enqueued finds do nothing. `dt` and
- * `gravity`, on the device: in the place of the input's.
+ * enqueued find, and are as input->bodies now. `abort_code`, on the device: while it is not 0, enqueued finds do
+ * nothing. `dt` and `gravity`, on the device: in the place of the input's.
  * Everything enqueued earlier must be done. The current set stays. */
 sadmm_status COLLISION(attach)(struct sadmm_cuda_collision *collision, void *stream,
                                const struct sadmm_collision_input *input, const struct sadmm_collision_body *bodies,
-                               const int32_t *halt, const double *dt, const double *gravity, struct sadmm_error *error);
+                               const int32_t *abort_code, const double *dt, const double *gravity,
+                               struct sadmm_error *error);
 /* Room for so many candidates and points in both sets, which keep what they hold. 0: what a scene of this size is likely
  * to need. Everything enqueued must be done. *candidates and *points: what there is room for now, at least as much. */
 sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *collision, int64_t *candidates, int64_t *points,

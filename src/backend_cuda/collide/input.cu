@@ -22,8 +22,8 @@ static sadmm_status upload_input(struct sadmm_cuda_collision *c, int name, const
     if (!changed && *uploaded == bytes && (bytes == 0 || memcmp(in<void>(c, staged), data, bytes) == 0))
         return SADMM_OK;
     *uploaded = SIZE_MAX;
-    TRY(room(c, name, count, size, error));
-    TRY(room(c, staged, count, size, error));
+    TRY(reserve(c, name, count, size, error));
+    TRY(reserve(c, staged, count, size, error));
     if (bytes > 0) memcpy(in<void>(c, staged), data, bytes);
     TRY(copy(c, in<void>(c, name), in<void>(c, staged), bytes, true, error));
     *uploaded = bytes;
@@ -131,7 +131,7 @@ sadmm_status COLLISION(take_input)(struct sadmm_cuda_collision *c, const struct 
     v->bodies = bodies ? bodies : in<struct sadmm_collision_body>(c, BODIES);
     v->body_count = (int32_t)input->body_count;
     v->group_bits = group_bits(input);
-    v->halt = nullptr;
+    v->abort_code = nullptr;
     v->dt = v->gravity = nullptr;
     v->present = in<uint32_t>(c, PRESENT);
     v->planes = in<uint64_t>(c, PLANES);

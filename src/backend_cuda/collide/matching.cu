@@ -96,11 +96,11 @@ static __device__ void emit_point(const collision_view &v, const step_lengths &d
 static __global__ void __launch_bounds__(COLLISION_THREADS) emit_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t thread = collision_thread(COLLISION_THREADS), i = thread / POINT_LANES;
-    if (halted(v)) return;
+    if (aborted(v)) return;
     const step_lengths dt = lengths_of(v);
-    const uint64_t total = v.places[v.candidate_room];
+    const uint64_t total = v.places[v.candidate_capacity];
     if (thread == 0) emit_counts(v, total, dt.now);
-    if (i >= usable_candidates(v) || (int32_t)(uint32_t)total > v.point_room) return;
+    if (i >= usable_candidates(v) || (int32_t)(uint32_t)total > v.point_capacity) return;
     emit_point(v, dt, i, (int32_t)(thread % POINT_LANES), v.places[i]);
 }
 
@@ -128,7 +128,7 @@ emit_few_kernel(const __grid_constant__ collision_view v)
     const uint32_t *const sizes = (const uint32_t *)v.sizes;
     uint64_t before = 0, all = 0;
     const step_lengths dt = lengths_of(v);
-    if (halted(v) || (first >= found && first > 0)) return;
+    if (aborted(v) || (first >= found && first > 0)) return;
     for (int32_t k = t; k < (found + SIZES_A_WORD - 1) / SIZES_A_WORD; k += EMIT_CANDIDATES * POINT_LANES) {
         const uint64_t sum = sum_sizes(sizes[k]);
         all += sum;
@@ -149,7 +149,7 @@ emit_few_kernel(const __grid_constant__ collision_view v)
         all += shared.all[k];
     }
     if (t == 0 && first == 0) emit_counts(v, all, dt.now);
-    if (i >= found || (int32_t)(uint32_t)all > v.point_room) return;
+    if (i >= found || (int32_t)(uint32_t)all > v.point_capacity) return;
     for (int32_t k = first; k < i; k += SIZES_A_WORD) {
         const uint32_t word = sizes[k / SIZES_A_WORD];
         before += sum_sizes(i - k < SIZES_A_WORD ? word & ((UINT32_C(1) << 8 * (i - k)) - 1) : word);

@@ -84,7 +84,7 @@ struct sadmm_cuda_collision {
 
     int32_t tree_from;
     int64_t radix_from;
-    int64_t candidate_room, point_room;
+    int64_t candidate_capacity, point_capacity;
     int temp_leaves, temp_candidates; /* what TEMP is large enough for */
     struct sadmm_cuda_collision_stats stats;
 
@@ -144,7 +144,8 @@ static inline void release(struct sadmm_cuda_collision *c, int name)
 }
 
 /* At least count x size bytes; what the buffer held is lost when it grows. */
-static inline sadmm_status room(struct sadmm_cuda_collision *c, int name, size_t count, size_t size, struct sadmm_error *error)
+static inline sadmm_status reserve(struct sadmm_cuda_collision *c, int name, size_t count, size_t size,
+                                   struct sadmm_error *error)
 {
     struct collision_buffer *b = &c->buffers[name];
     size_t bytes = count * size, wanted = b->capacity + b->capacity / 2;
@@ -222,7 +223,7 @@ sadmm_status COLLISION(take_input)(struct sadmm_cuda_collision *c, const struct 
 /* Everything after the input, repeated until everything fits; `counts` of the new set. */
 sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots, struct sadmm_cuda_contact_counts *counts,
                                    struct sadmm_error *error);
-sadmm_status COLLISION(make_set_room)(struct sadmm_cuda_collision *c, int which, size_t pairs, size_t points,
+sadmm_status COLLISION(reserve_set)(struct sadmm_cuda_collision *c, int which, size_t pairs, size_t points,
                                       struct sadmm_error *error);
 
 #endif

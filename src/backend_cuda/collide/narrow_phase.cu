@@ -29,7 +29,7 @@ static __device__ int64_t find_key_in_eighths(const uint64_t *keys, int64_t coun
 static __global__ void __launch_bounds__(NARROW_THREADS) narrow_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t i = collision_thread(NARROW_THREADS);
-    if (i >= (int64_t)v.candidate_room + SIZES_BEYOND) return;
+    if (i >= (int64_t)v.candidate_capacity + SIZES_BEYOND) return;
     if (i >= usable_candidates(v)) {
         v.sizes[i] = 0;
         return;

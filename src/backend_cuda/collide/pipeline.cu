@@ -65,11 +65,11 @@ extern "C" sadmm_status COLLISION(upload)(struct sadmm_cuda_collision *c, void *
                           set->pair_count, set->point_count, (int)MOST_CANDIDATES);
     ENTER(c);
     TRY(begin_work(c, stream, error));
-    TRY(COLLISION(make_set_room)(c, which, set->pair_count, set->point_count, error));
-    TRY(room(c, PINNED_PAIRS, set->pair_count, sizeof *set->pairs, error));
-    TRY(room(c, PINNED_POINTS, set->point_count, sizeof *set->points, error));
-    TRY(room(c, PINNED_PAIR_KEYS, set->pair_count, sizeof(uint64_t), error));
-    TRY(room(c, PINNED_COUNTS, 1, sizeof(struct sadmm_cuda_contact_counts), error));
+    TRY(COLLISION(reserve_set)(c, which, set->pair_count, set->point_count, error));
+    TRY(reserve(c, PINNED_PAIRS, set->pair_count, sizeof *set->pairs, error));
+    TRY(reserve(c, PINNED_POINTS, set->point_count, sizeof *set->points, error));
+    TRY(reserve(c, PINNED_PAIR_KEYS, set->pair_count, sizeof(uint64_t), error));
+    TRY(reserve(c, PINNED_COUNTS, 1, sizeof(struct sadmm_cuda_contact_counts), error));
 
     const struct collision_set to = set_of(c, which);
     struct sadmm_cuda_contact_counts *counts = in<struct sadmm_cuda_contact_counts>(c, PINNED_COUNTS);
@@ -101,7 +101,7 @@ extern "C" sadmm_status COLLISION(find)(struct sadmm_cuda_collision *c, void *st
     c->can_undo = false;
     ENTER(c);
     TRY(begin_work(c, stream, error));
-    TRY(room(c, PINNED_COUNTS, 1, sizeof counts, error));
+    TRY(reserve(c, PINNED_COUNTS, 1, sizeof counts, error));
     TRY(COLLISION(take_input)(c, input, nullptr, error));
     TRY(COLLISION(run_stages)(c, input->shape_count, &counts, error));
     c->pending = false; /* run_stages has waited */
@@ -129,8 +129,8 @@ extern "C" sadmm_status COLLISION(download)(struct sadmm_cuda_collision *c, void
     const struct collision_set from = set_of(c, c->current);
     ENTER(c);
     TRY(begin_work(c, stream, error));
-    TRY(room(c, PINNED_PAIRS, pairs, sizeof *contacts->pairs, error));
-    TRY(room(c, PINNED_POINTS, points, sizeof *contacts->points, error));
+    TRY(reserve(c, PINNED_PAIRS, pairs, sizeof *contacts->pairs, error));
+    TRY(reserve(c, PINNED_POINTS, points, sizeof *contacts->points, error));
     TRY(copy(c, in<void>(c, PINNED_PAIRS), from.pairs, pairs * sizeof *contacts->pairs, false, error));
     TRY(copy(c, in<void>(c, PINNED_POINTS), from.points, points * sizeof *contacts->points, false, error));
     TRY(wait(c, error));
@@ -177,8 +177,8 @@ extern "C" void COLLISION(undo)(struct sadmm_cuda_collision *c)
 extern "C" struct sadmm_cuda_collision_stats COLLISION(stats)(const struct sadmm_cuda_collision *c)
 {
     struct sadmm_cuda_collision_stats stats = c->stats;
-    stats.candidate_room = c->candidate_room;
-    stats.point_room = c->point_room;
+    stats.candidate_capacity = c->candidate_capacity;
+    stats.point_capacity = c->point_capacity;
 #ifdef SADMM_CUDA_EMULATED
     stats.visits = node_visits;
 #endif
@@ -189,6 +189,6 @@ extern "C" void COLLISION(tune)(struct sadmm_cuda_collision *c, const struct sad
 {
     c->tree_from = tuning->tree_from > 0 ? tuning->tree_from : TREE_FROM;
     c->radix_from = tuning->radix_from > 0 ? tuning->radix_from : RADIX_FROM;
-    if (tuning->first_room > 0)
-        c->candidate_room = c->point_room = std::min(tuning->first_room, MOST_CANDIDATES);
+    if (tuning->first_capacity > 0)
+        c->candidate_capacity = c->point_capacity = std::min(tuning->first_capacity, MOST_CANDIDATES);
 }

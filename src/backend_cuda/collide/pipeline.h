@@ -30,7 +30,7 @@ struct sadmm_cuda_collision_stats {
     int64_t finds;       /* that succeeded */
     int64_t repeats;     /* stages repeated because something did not fit */
     int64_t allocations; /* of device and pinned memory, since creation */
-    int64_t candidate_room, point_room;
+    int64_t candidate_capacity, point_capacity;
     int64_t visits;      /* of nodes of the tree; counted on the emulated device only */
 };
 
@@ -38,7 +38,7 @@ struct sadmm_cuda_collision_stats {
 struct sadmm_cuda_collision_tuning {
     int32_t tree_from;  /* shapes; below, all pairs are tested */
     int64_t radix_from; /* room for candidates; below, they are ranked by counting */
-    int64_t first_room; /* the next find starts with room for so many candidates and points, whatever is allocated */
+    int64_t first_capacity; /* the next find starts with room for so many candidates and points, whatever is allocated */
 };
 
 #ifdef SADMM_CUDA_EMULATED

@@ -1,4 +1,5 @@
-/* The stages of a find: rooms and launches, repeated until everything fits, or enqueued once in the room there is. */
+/* The stages of a find: capacities and launches, repeated until everything fits, or enqueued once in the room there is.
+ */
 #include <algorithm>
 
 #include "backend_cuda/device/parallel.h"
@@ -6,25 +7,25 @@
 
 /* ---- stages ---------------------------------------------------------------------------------------------------- */
 
-static sadmm_status make_shape_room(struct sadmm_cuda_collision *c, size_t slots, bool tree, struct sadmm_error *error)
+static sadmm_status reserve_shape(struct sadmm_cuda_collision *c, size_t slots, bool tree, struct sadmm_error *error)
 {
     struct collision_view *v = &c->view;
     const size_t leaves = (size_t)v->leaf_count;
-    TRY(room(c, PROXIES, slots, sizeof *v->proxies, error));
-    TRY(room(c, FILTERS, slots, sizeof *v->filters, error));
-    TRY(room(c, PLACED, slots, sizeof *v->placed, error));
-    TRY(room(c, LEAF_KEYS, leaves, sizeof *v->leaf_keys, error));
-    TRY(room(c, LEAF_SLOTS, leaves, sizeof *v->leaf_slots, error));
+    TRY(reserve(c, PROXIES, slots, sizeof *v->proxies, error));
+    TRY(reserve(c, FILTERS, slots, sizeof *v->filters, error));
+    TRY(reserve(c, PLACED, slots, sizeof *v->placed, error));
+    TRY(reserve(c, LEAF_KEYS, leaves, sizeof *v->leaf_keys, error));
+    TRY(reserve(c, LEAF_SLOTS, leaves, sizeof *v->leaf_slots, error));
     if (tree) {
-        TRY(room(c, LEAF_KEYS_2, leaves, sizeof *v->leaf_keys, error));
-        TRY(room(c, LEAF_SLOTS_2, leaves, sizeof *v->leaf_slots, error));
-        TRY(room(c, NODES, 2 * leaves, sizeof *v->nodes, error));
-        TRY(room(c, GROUPS, 2 * leaves, sizeof *v->groups, error));
-        TRY(room(c, PARENTS, 2 * leaves, sizeof *v->parents, error));
-        TRY(room(c, ARRIVALS, leaves, sizeof *v->arrivals, error));
+        TRY(reserve(c, LEAF_KEYS_2, leaves, sizeof *v->leaf_keys, error));
+        TRY(reserve(c, LEAF_SLOTS_2, leaves, sizeof *v->leaf_slots, error));
+        TRY(reserve(c, NODES, 2 * leaves, sizeof *v->nodes, error));
+        TRY(reserve(c, GROUPS, 2 * leaves, sizeof *v->groups, error));
+        TRY(reserve(c, PARENTS, 2 * leaves, sizeof *v->parents, error));
+        TRY(reserve(c, ARRIVALS, leaves, sizeof *v->arrivals, error));
     }
-    TRY(room(c, COUNTER, 1, sizeof *v->candidate_count, error));
-    TRY(room(c, GRID, 1, sizeof *v->grid, error));
+    TRY(reserve(c, COUNTER, 1, sizeof *v->candidate_count, error));
+    TRY(reserve(c, GRID, 1, sizeof *v->grid, error));
     v->proxies = in<struct sadmm_proxy>(c, PROXIES);
     v->filters = in<struct collision_filter>(c, FILTERS);
     v->placed = in<struct collision_leaf>(c, PLACED);
@@ -39,37 +40,37 @@ static sadmm_status make_shape_room(struct sadmm_cuda_collision *c, size_t slots
     return SADMM_OK;
 }
 
-sadmm_status COLLISION(make_set_room)(struct sadmm_cuda_collision *c, int which, size_t pairs, size_t points,
+sadmm_status COLLISION(reserve_set)(struct sadmm_cuda_collision *c, int which, size_t pairs, size_t points,
                                       struct sadmm_error *error)
 {
     const int shift = which * SET_BUFFERS;
-    TRY(room(c, PAIRS + shift, pairs, sizeof(struct sadmm_contact_pair), error));
-    TRY(room(c, POINTS + shift, points, sizeof(struct sadmm_contact_point), error));
-    TRY(room(c, PAIR_KEYS + shift, pairs, sizeof(uint64_t), error));
+    TRY(reserve(c, PAIRS + shift, pairs, sizeof(struct sadmm_contact_pair), error));
+    TRY(reserve(c, POINTS + shift, points, sizeof(struct sadmm_contact_point), error));
+    TRY(reserve(c, PAIR_KEYS + shift, pairs, sizeof(uint64_t), error));
     if (in<void>(c, COUNTS + shift)) return SADMM_OK;
-    TRY(room(c, COUNTS + shift, 1, sizeof(struct sadmm_cuda_contact_counts), error));
+    TRY(reserve(c, COUNTS + shift, 1, sizeof(struct sadmm_cuda_contact_counts), error));
     CUDA_CALL(c, cudaMemsetAsync(in<void>(c, COUNTS + shift), 0, sizeof(struct sadmm_cuda_contact_counts), c->stream),
               "cudaMemsetAsync(counts)");
     return SADMM_OK;
 }
 
-static sadmm_status make_candidate_room(struct sadmm_cuda_collision *c, struct sadmm_error *error)
+static sadmm_status reserve_candidate(struct sadmm_cuda_collision *c, struct sadmm_error *error)
 {
     struct collision_view *v = &c->view;
-    const size_t candidates = (size_t)c->candidate_room;
-    TRY(room(c, CANDIDATES, candidates, sizeof *v->candidates, error));
-    TRY(room(c, CANDIDATES_2, candidates, sizeof *v->candidates, error));
-    TRY(room(c, MANIFOLDS, candidates, sizeof *v->manifolds, error));
-    TRY(room(c, MATCHES, candidates, sizeof *v->matches, error));
-    TRY(room(c, SIZES, candidates + SIZES_BEYOND, sizeof *v->sizes, error));
-    TRY(room(c, PLACES, candidates + 1, sizeof *v->places, error));
+    const size_t candidates = (size_t)c->candidate_capacity;
+    TRY(reserve(c, CANDIDATES, candidates, sizeof *v->candidates, error));
+    TRY(reserve(c, CANDIDATES_2, candidates, sizeof *v->candidates, error));
+    TRY(reserve(c, MANIFOLDS, candidates, sizeof *v->manifolds, error));
+    TRY(reserve(c, MATCHES, candidates, sizeof *v->matches, error));
+    TRY(reserve(c, SIZES, candidates + SIZES_BEYOND, sizeof *v->sizes, error));
+    TRY(reserve(c, PLACES, candidates + 1, sizeof *v->places, error));
     v->found = in<uint64_t>(c, CANDIDATES);
     v->manifolds = in<struct manifold>(c, MANIFOLDS);
     v->matches = in<int32_t>(c, MATCHES);
     v->sizes = in<uint8_t>(c, SIZES);
     v->places = in<uint64_t>(c, PLACES);
-    v->candidate_room = (int32_t)c->candidate_room;
-    v->point_room = (int32_t)c->point_room;
+    v->candidate_capacity = (int32_t)c->candidate_capacity;
+    v->point_capacity = (int32_t)c->point_capacity;
     return SADMM_OK;
 }
 
@@ -81,7 +82,7 @@ static void use_sets(struct sadmm_cuda_collision *c, int into)
 }
 
 /* Memory that sorts and scans of these sizes need. */
-static sadmm_status make_temp_room(struct sadmm_cuda_collision *c, int leaves, int candidates,
+static sadmm_status reserve_temp(struct sadmm_cuda_collision *c, int leaves, int candidates,
                                    struct sadmm_error *error)
 {
     uint64_t *none[2] = {nullptr, nullptr};
@@ -99,7 +100,7 @@ static sadmm_status make_temp_room(struct sadmm_cuda_collision *c, int leaves, i
     most = std::max(most, bytes);
     CUDA_CALL(c, COLLISION(sum)(nullptr, &bytes, nullptr, nullptr, candidates + 1, c->stream), "sizing of the scan");
     most = std::max(most, bytes);
-    TRY(room(c, TEMP, most, 1, error));
+    TRY(reserve(c, TEMP, most, 1, error));
     c->temp_leaves = leaves;
     c->temp_candidates = candidates;
     return SADMM_OK;
@@ -122,7 +123,7 @@ static sadmm_status build_tree(struct sadmm_cuda_collision *c, struct sadmm_erro
     return launch(c, c->kernels.refit, v->leaf_count, error);
 }
 
-static bool ranked(const struct sadmm_cuda_collision *c) { return c->view.candidate_room < c->radix_from; }
+static bool ranked(const struct sadmm_cuda_collision *c) { return c->view.candidate_capacity < c->radix_from; }
 
 static sadmm_status sort_candidates(struct sadmm_cuda_collision *c, struct sadmm_error *error)
 {
@@ -131,9 +132,9 @@ static sadmm_status sort_candidates(struct sadmm_cuda_collision *c, struct sadmm
     size_t bytes = c->buffers[TEMP].capacity;
     int at = 0;
     v->candidates = keys[1];
-    if (ranked(c)) return launch(c, c->kernels.rank, (int64_t)v->candidate_room * RANK_SHARES, error);
+    if (ranked(c)) return launch(c, c->kernels.rank, (int64_t)v->candidate_capacity * RANK_SHARES, error);
     c->kernel = "candidate sort";
-    CUDA_CALL(c, COLLISION(sort)(in<void>(c, TEMP), &bytes, keys, nullptr, v->candidate_room, 2 * v->slot_bits, &at,
+    CUDA_CALL(c, COLLISION(sort)(in<void>(c, TEMP), &bytes, keys, nullptr, v->candidate_capacity, 2 * v->slot_bits, &at,
                                  c->stream), c->kernel);
     v->candidates = keys[at];
     return SADMM_OK;
@@ -142,7 +143,7 @@ static sadmm_status sort_candidates(struct sadmm_cuda_collision *c, struct sadmm
 static sadmm_status find_candidates(struct sadmm_cuda_collision *c, bool tree, struct sadmm_error *error)
 {
     const struct collision_view *v = &c->view;
-    if (!ranked(c)) TRY(launch(c, c->kernels.clear, v->candidate_room, error));
+    if (!ranked(c)) TRY(launch(c, c->kernels.clear, v->candidate_capacity, error));
     if (tree) {
         TRY(launch(c, c->kernels.walk, v->leaf_count, error));
     } else {
@@ -155,12 +156,12 @@ static sadmm_status find_candidates(struct sadmm_cuda_collision *c, bool tree, s
 static sadmm_status make_contacts(struct sadmm_cuda_collision *c, struct sadmm_error *error)
 {
     struct collision_view *v = &c->view;
-    const int64_t lanes = (int64_t)v->candidate_room * POINT_LANES;
+    const int64_t lanes = (int64_t)v->candidate_capacity * POINT_LANES;
     size_t bytes = c->buffers[TEMP].capacity;
-    TRY(launch(c, c->kernels.narrow, (int64_t)v->candidate_room + SIZES_BEYOND, error));
+    TRY(launch(c, c->kernels.narrow, (int64_t)v->candidate_capacity + SIZES_BEYOND, error));
     if (ranked(c)) return launch(c, c->kernels.emit_few, lanes, error);
     c->kernel = "scan of the contacts";
-    CUDA_CALL(c, COLLISION(sum)(in<void>(c, TEMP), &bytes, v->sizes, v->places, v->candidate_room + 1, c->stream),
+    CUDA_CALL(c, COLLISION(sum)(in<void>(c, TEMP), &bytes, v->sizes, v->places, v->candidate_capacity + 1, c->stream),
               c->kernel);
     return launch(c, c->kernels.emit, lanes, error);
 }
@@ -186,18 +187,18 @@ sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots,
     const bool tree = v->leaf_count >= c->tree_from;
     struct sadmm_cuda_contact_counts *const staged = in<struct sadmm_cuda_contact_counts>(c, PINNED_COUNTS);
     const int64_t first = std::max((int64_t)1024, (int64_t)8 * v->leaf_count);
-    if (c->candidate_room == 0) c->candidate_room = std::min(first, MOST_CANDIDATES);
-    if (c->point_room == 0) c->point_room = c->candidate_room;
+    if (c->candidate_capacity == 0) c->candidate_capacity = std::min(first, MOST_CANDIDATES);
+    if (c->point_capacity == 0) c->point_capacity = c->candidate_capacity;
 
-    TRY(make_shape_room(c, slots, tree, error));
-    TRY(make_temp_room(c, v->leaf_count, (int)c->candidate_room, error));
-    TRY(COLLISION(make_set_room)(c, c->current, 0, 0, error));
+    TRY(reserve_shape(c, slots, tree, error));
+    TRY(reserve_temp(c, v->leaf_count, (int)c->candidate_capacity, error));
+    TRY(COLLISION(reserve_set)(c, c->current, 0, 0, error));
     TRY(place_shapes(c, tree, error));
     for (;;) {
-        TRY(make_candidate_room(c, error));
-        TRY(COLLISION(make_set_room)(c, 1 - c->current, (size_t)c->candidate_room, (size_t)c->point_room, error));
+        TRY(reserve_candidate(c, error));
+        TRY(COLLISION(reserve_set)(c, 1 - c->current, (size_t)c->candidate_capacity, (size_t)c->point_capacity, error));
         use_sets(c, 1 - c->current);
-        TRY(make_temp_room(c, v->leaf_count, (int)c->candidate_room, error));
+        TRY(reserve_temp(c, v->leaf_count, (int)c->candidate_capacity, error));
         TRY(find_candidates(c, tree, error));
         TRY(make_contacts(c, error));
         TRY(copy(c, staged, v->after.counts, sizeof *staged, false, error));
@@ -207,8 +208,9 @@ sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots,
         if (counts->candidates > MOST_CANDIDATES)
             return sadmm_fail(error, SADMM_ERROR_LIMIT, "%lld pairs of shapes may touch: at most %d can be indexed",
                               (long long)counts->candidates, (int)MOST_CANDIDATES);
-        if (counts->candidates > c->candidate_room) c->candidate_room = generous(counts->candidates, MOST_CANDIDATES);
-        else if (counts->points > c->point_room) c->point_room = generous(counts->points, INT32_MAX);
+        if (counts->candidates > c->candidate_capacity)
+            c->candidate_capacity = generous(counts->candidates, MOST_CANDIDATES);
+        else if (counts->points > c->point_capacity) c->point_capacity = generous(counts->points, INT32_MAX);
         else return SADMM_OK;
         ++c->stats.repeats;
         CUDA_CALL(c, cudaMemsetAsync(v->candidate_count, 0, sizeof *v->candidate_count, c->stream),
@@ -220,27 +222,27 @@ sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots,
 
 extern "C" sadmm_status COLLISION(attach)(struct sadmm_cuda_collision *c, void *stream,
                                           const struct sadmm_collision_input *input,
-                                          const struct sadmm_collision_body *bodies, const int32_t *halt,
+                                          const struct sadmm_collision_body *bodies, const int32_t *abort_code,
                                           const double *dt, const double *gravity, struct sadmm_error *error)
 {
     c->can_undo = false;
     ENTER(c);
     TRY(begin_work(c, stream, error));
     TRY(COLLISION(take_input)(c, input, bodies, error));
-    c->view.halt = halt;
+    c->view.abort_code = abort_code;
     c->view.dt = dt;
     c->view.gravity = gravity;
-    return make_shape_room(c, input->shape_count, c->view.leaf_count >= c->tree_from, error);
+    return reserve_shape(c, input->shape_count, c->view.leaf_count >= c->tree_from, error);
 }
 
 /* Grow a buffer and keep what it holds. */
-static sadmm_status keep_room(struct sadmm_cuda_collision *c, int name, size_t count, size_t size,
+static sadmm_status keep_capacity(struct sadmm_cuda_collision *c, int name, size_t count, size_t size,
                               struct sadmm_error *error)
 {
     struct collision_buffer old = c->buffers[name];
-    if (!old.data || count * size <= old.capacity) return room(c, name, count, size, error);
+    if (!old.data || count * size <= old.capacity) return reserve(c, name, count, size, error);
     c->buffers[name].data = nullptr; /* the capacity stays: growth is by half at least */
-    sadmm_status status = room(c, name, count, size, error);
+    sadmm_status status = reserve(c, name, count, size, error);
     if (status == SADMM_OK) {
         cudaError_t code = cudaMemcpyAsync(in<void>(c, name), old.data, old.capacity, cudaMemcpyDeviceToDevice, c->stream);
         if (code == cudaSuccess) code = cudaStreamSynchronize(c->stream);
@@ -264,20 +266,21 @@ extern "C" sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *c, int64
     if (*candidates > MOST_CANDIDATES)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%lld pairs of shapes may touch: at most %d can be indexed",
                           (long long)*candidates, (int)MOST_CANDIDATES);
-    const int64_t first_points = c->point_room > 0 ? c->point_room : *points > 0 ? 1 : likely;
-    c->candidate_room = std::max(c->candidate_room, *candidates > 0 ? *candidates : std::min(likely, MOST_CANDIDATES));
-    c->point_room = std::max(first_points, *points);
-    TRY(make_candidate_room(c, error));
-    TRY(make_temp_room(c, c->view.leaf_count, (int)c->candidate_room, error));
+    const int64_t first_points = c->point_capacity > 0 ? c->point_capacity : *points > 0 ? 1 : likely;
+    c->candidate_capacity =
+        std::max(c->candidate_capacity, *candidates > 0 ? *candidates : std::min(likely, MOST_CANDIDATES));
+    c->point_capacity = std::max(first_points, *points);
+    TRY(reserve_candidate(c, error));
+    TRY(reserve_temp(c, c->view.leaf_count, (int)c->candidate_capacity, error));
     for (int which = 0; which < 2; ++which) {
         const int shift = which * SET_BUFFERS;
-        TRY(keep_room(c, PAIRS + shift, (size_t)c->candidate_room, sizeof(struct sadmm_contact_pair), error));
-        TRY(keep_room(c, PAIR_KEYS + shift, (size_t)c->candidate_room, sizeof(uint64_t), error));
-        TRY(keep_room(c, POINTS + shift, (size_t)c->point_room, sizeof(struct sadmm_contact_point), error));
-        TRY(COLLISION(make_set_room)(c, which, 0, 0, error));
+        TRY(keep_capacity(c, PAIRS + shift, (size_t)c->candidate_capacity, sizeof(struct sadmm_contact_pair), error));
+        TRY(keep_capacity(c, PAIR_KEYS + shift, (size_t)c->candidate_capacity, sizeof(uint64_t), error));
+        TRY(keep_capacity(c, POINTS + shift, (size_t)c->point_capacity, sizeof(struct sadmm_contact_point), error));
+        TRY(COLLISION(reserve_set)(c, which, 0, 0, error));
     }
-    *candidates = c->candidate_room;
-    *points = c->point_room;
+    *candidates = c->candidate_capacity;
+    *points = c->point_capacity;
     return SADMM_OK;
 }
 

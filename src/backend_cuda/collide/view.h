@@ -111,7 +111,7 @@ struct collision_view {
     double large;                                  /* radius from which a mover is large, m */
     int32_t body_count;                            /* slots */
     struct collision_grid *grid;                   /* of this step */
-    const int32_t *halt;                           /* not NULL and not 0: do nothing */
+    const int32_t *abort_code;                           /* not NULL and not 0: do nothing */
     const double *dt, *gravity;                    /* not NULL: of the step, in the place of step's (step_of) */
 
     struct sadmm_proxy *proxies;                   /* by slot */
@@ -127,7 +127,7 @@ struct collision_view {
     unsigned long long *candidate_count;           /* found, whether they fit or not */
     uint64_t *found;                               /* candidates as they come: slot of a << slot_bits | slot of b */
     uint64_t *candidates;                          /* sorted */
-    int32_t candidate_room;
+    int32_t candidate_capacity;
     int32_t slot_bits;
     struct manifold *manifolds;                    /* by candidate; points beyond `count` are not written */
     int32_t *matches;                              /* by candidate: pair of the last step, or -1 */
@@ -135,10 +135,10 @@ struct collision_view {
     uint64_t *places;                              /* exclusive sums of pairs << 32 | points */
 
     struct collision_set before, after;
-    int32_t point_room;
+    int32_t point_capacity;
 };
 
-static __device__ __forceinline__ bool halted(const collision_view &v) { return v.halt && *v.halt != 0; }
+static __device__ __forceinline__ bool aborted(const collision_view &v) { return v.abort_code && *v.abort_code != 0; }
 
 /* To be fetched early: some of it may have to come from memory. */
 static __device__ __forceinline__ collision_step step_of(const collision_view &v)
@@ -154,8 +154,8 @@ static __device__ __forceinline__ collision_step step_of(const collision_view &v
 static __device__ __forceinline__ int32_t usable_candidates(const collision_view &v)
 {
     unsigned long long found = *v.candidate_count;
-    if (halted(v)) return 0;
-    return found <= (unsigned long long)v.candidate_room ? (int32_t)found : 0;
+    if (aborted(v)) return 0;
+    return found <= (unsigned long long)v.candidate_capacity ? (int32_t)found : 0;
 }
 
 static __device__ __forceinline__ int64_t collision_thread(int block)

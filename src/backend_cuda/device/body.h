@@ -1,4 +1,4 @@
-/* A body by its eight lanes, in double: what runs a few times a step and sums over a body's halves. */
+/* A body by its eight lanes, in double: what runs a few times a step and sums over a body's sides. */
 #ifndef SADMM_CUDA_DEVICE_BODY_H
 #define SADMM_CUDA_DEVICE_BODY_H
 
@@ -20,7 +20,7 @@ struct body_thread {
     int32_t slot, lane;
     bool live;
     size_t body; /* raw */
-    int32_t begin, end; /* places of its halves */
+    int32_t begin, end; /* places of its sides */
 };
 
 static __device__ __forceinline__ body_thread body_of_slot(const cuda_view &v, int32_t slot, bool live)

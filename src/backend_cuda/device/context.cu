@@ -49,7 +49,7 @@ static const char *const buffer_names[] = {
     "scalars",
     "settings",
     "weights",
-    "records of halves",
+    "records of sides",
     "bodies' input",
     "pairs' input",
     "points' input",
@@ -81,7 +81,7 @@ static void release(cuda_buffer *buffer)
     buffer->capacity = 0;
 }
 
-sadmm_status CUDA(room)(struct sadmm_context *c, enum cuda_buffer_name name, size_t bytes, struct sadmm_error *error)
+sadmm_status CUDA(reserve)(struct sadmm_context *c, enum cuda_buffer_name name, size_t bytes, struct sadmm_error *error)
 {
     cuda_buffer *buffer = &c->buffers[name];
     if (bytes <= buffer->capacity && buffer->data) return SADMM_OK;
@@ -145,8 +145,8 @@ sadmm_status CUDA(use_settings)(struct sadmm_context *c, const struct sadmm_sett
 {
     double numbers[SADMM_SETTING_NUMBERS];
     const struct cuda_settings kept = {*settings, gravity_size(settings->gravity)};
-    CUDA_TRY(CUDA(room)(c, BUFFER_SETTINGS, sizeof kept, error));
-    CUDA_TRY(CUDA(room)(c, PINNED_SETTINGS, sizeof kept, error));
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_SETTINGS, sizeof kept, error));
+    CUDA_TRY(CUDA(reserve)(c, PINNED_SETTINGS, sizeof kept, error));
     CUDA(plan_settings)(c, settings);
     c->view.settings = &((const struct cuda_settings *)c->buffers[BUFFER_SETTINGS].data)->settings;
     sadmm_settings_numbers(settings, numbers);
@@ -300,7 +300,7 @@ static sadmm_status open_device(struct sadmm_context *c, struct sadmm_error *err
               "cudaDeviceGetAttribute");
     CUDA_CALL(c, cudaDeviceGetAttribute(&clusters, cudaDevAttrClusterLaunch, c->device), "cudaDeviceGetAttribute");
     c->cooperative = cooperative != 0;
-    CUDA_CALL(c, CUDA(resident_allow)(c->shared_limit, clusters != 0, &c->clusters), "loading the kernels");
+    CUDA_CALL(c, CUDA(persistent_allow)(c->shared_limit, clusters != 0, &c->clusters), "loading the kernels");
     c->early = c->clusters && EARLY_ARCH <= CLUSTER_ARCH; /* the same devices, the same code */
     CUDA_CALL(c, LAYOUT(one_block_allow)(c->shared_limit), "loading the kernels");
     CUDA_CALL(c, cudaStreamCreateWithFlags(&c->stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
@@ -345,8 +345,10 @@ extern "C" void CUDA(destroy)(struct sadmm_context *c)
     sadmm_free(c);
 }
 
-
-extern "C" void CUDA(tune_rooms)(struct sadmm_context *c, int64_t first_room) { c->first_room = first_room; }
+extern "C" void CUDA(tune_capacities)(struct sadmm_context *c, int64_t first_capacity)
+{
+    c->first_capacity = first_capacity;
+}
 
 extern "C" void CUDA(set_tier)(struct sadmm_context *c, enum sadmm_cuda_tier tier)
 {

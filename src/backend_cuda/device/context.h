@@ -20,7 +20,7 @@ enum cuda_buffer_name {
     BUFFER_STATE, BUFFER_B, BUFFER_LINES, BUFFER_C, BUFFER_BETA,
     BUFFER_NORMAL, BUFFER_DIFFERENCE, BUFFER_PAIR_ENDS, BUFFER_ARM, BUFFER_LAMBDA,
     BUFFER_ROW_INFO, BUFFER_ROW_DATA, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_EXCHANGE, BUFFER_LIVE, BUFFER_LAYOUT, BUFFER_SORT,
-    BUFFER_NUMBERS, BUFFER_SCALARS, BUFFER_SETTINGS, BUFFER_WEIGHTS, BUFFER_HALVES,
+    BUFFER_NUMBERS, BUFFER_SCALARS, BUFFER_SETTINGS, BUFFER_WEIGHTS, BUFFER_SIDES,
     BUFFER_RAW_BODIES, BUFFER_RAW_PAIRS, BUFFER_RAW_POINTS, BUFFER_RAW_BLOCKS, BUFFER_OUT,
     BUFFER_WORLD_BODIES, BUFFER_WORLD_STEADY, BUFFER_WORLD_WRENCH, BUFFER_WORLD_VELOCITY, BUFFER_WORLD_IMPULSE,
     BUFFER_WORLD_SLOTS, BUFFER_WORLD_PLACES, BUFFER_WORLD_CONTROL,
@@ -44,29 +44,29 @@ struct sadmm_context {
     cuda_view view;
     cuda_buffer buffers[BUFFER_COUNT];
     bool starting; /* no iteration yet: the next Step 1 uses J^T lambda^0, which `records` may not hold yet */
-    bool placed;   /* pairs and row blocks know the places of their halves */
+    bool placed;   /* pairs and row blocks know the places of their sides */
     bool backward; /* the next sweeps go over bodies and constraints from the last one to the first */
     bool measured; /* records and change are apart: the next Step 1 uses records + ratio change */
     bool rescaled; /* ... by view.ratio; else it is 1 */
     bool fast;     /* the method */
     bool settled;  /* fast: Step 1 ran in this solve */
     int refreshes; /* fast: of the weights, in this solve */
-    int exact_since; /* fast: iterations since the defects were taken */
-    int looks;     /* fast: at the stop rule, in this step */
-    bool ends;     /* fast: of the whole step that is enqueued, the iterating kernels do the ends (iterate/resident_ends.h) */
+    int exact_since; /* fast: iterations since the momentum residuals were taken */
+    int checks;     /* fast: at the stop rule, in this step */
+    bool prologue;     /* fast: of the whole step that is enqueued, the iterating kernels do the prologue and the epilogue (iterate/prologue.h) */
     unsigned cleared; /* enum cuda_scalar: those that a kernel of this step has set to 0 for their first use */
     bool recording; /* a graph of the whole step: nothing is allocated, no graph launched in it */
 
     enum sadmm_cuda_tier wanted;     /* by a test */
     int wanted_cluster;              /* blocks a cluster, by a test; 0: any */
-    struct cuda_facts facts;         /* of the last begin */
+    struct cuda_graph_statistics statistics;         /* of the last begin */
     struct cuda_partition partition; /* what its layout was made for */
     struct layout_view layout;
     bool one_block;                  /* the layout takes one kernel of one block */
     bool numbered;                   /* BUFFER_NUMBERS is filled */
 
     struct cuda_step *step; /* the world, where whole steps are made here */
-    int64_t first_room;     /* for tests: candidates and points there is room for at first; 0: as likely */
+    int64_t first_capacity;     /* for tests: candidates and points there is room for at first; 0: as likely */
     unsigned refused;       /* bit of a tier: a part was too large */
 
     cudaGraphExec_t graph; /* GRAPH_ITERATIONS plain iterations */
@@ -78,7 +78,7 @@ struct sadmm_context {
 
 sadmm_status CUDA(fail)(struct sadmm_context *, cudaError_t code, const char *what, struct sadmm_error *error);
 /* At least `bytes` in a buffer; what it held is lost when it grows. */
-sadmm_status CUDA(room)(struct sadmm_context *, enum cuda_buffer_name name, size_t bytes, struct sadmm_error *error);
+sadmm_status CUDA(reserve)(struct sadmm_context *, enum cuda_buffer_name name, size_t bytes, struct sadmm_error *error);
 /* Launch blocks of THREADS on the stream; 0 blocks: nothing to do. */
 sadmm_status CUDA(launch)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks,
                           const cuda_args *args, struct sadmm_error *error);
@@ -131,11 +131,11 @@ struct device_scope {
 /* ---- graph/layout.cu, assemble/, weight/, iterate/: parts of the entries, launches only ---- */
 
 /* This precision's data for the view's counts and the partition (allocates). */
-sadmm_status CUDA(solver_room)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(reserve_solver)(struct sadmm_context *, struct sadmm_error *error);
 /* A, b and the start velocities: they need no contacts. */
 sadmm_status CUDA(enqueue_bodies)(struct sadmm_context *, struct sadmm_error *error);
-/* Of a whole step: penalties and factors at once, and whether it is what was planned for. fast: islands first; c->ends: all
- * of it is left to the iterating kernel, and to the last two. */
+/* Of a whole step: penalties and factors at once, and whether it is what was planned for. fast: islands first;
+ * c->prologue: all of it is left to the iterating kernel, and to the last two. */
 sadmm_status CUDA(enqueue_penalties)(struct sadmm_context *, struct sadmm_error *error);
 /* fast: a solve begins: its first weights come next. */
 void CUDA(begin_weights)(struct sadmm_context *);
@@ -145,17 +145,17 @@ cuda_args CUDA(weight_args)(const struct sadmm_context *);
 sadmm_status CUDA(enqueue_islands)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(enqueue_weighted_penalties)(struct sadmm_context *, bool first, bool factor, bool planned,
                                               struct sadmm_error *error);
-/* fast: all of that anew, from the loads there are now. */
+/* fast: all of that again, from the loads there are now. */
 sadmm_status CUDA(enqueue_weights)(struct sadmm_context *, bool factor, struct sadmm_error *error);
-/* fast: the bodies' defects anew. */
-sadmm_status CUDA(enqueue_defects)(struct sadmm_context *, struct sadmm_error *error);
+/* fast: the bodies' momentum residuals, recomputed. */
+sadmm_status CUDA(enqueue_momentum_residuals)(struct sadmm_context *, struct sadmm_error *error);
 /* fast: (17), as a maximum with what view.residual[1] is. */
 sadmm_status CUDA(enqueue_momentum_residual)(struct sadmm_context *, struct sadmm_error *error);
 /* fast: by what islands are to be slowed down (iterate/slow.h), and how many, in *view.limited. `suspected`: the iterations
  * have looked whether any is. */
 sadmm_status CUDA(enqueue_limit)(struct sadmm_context *, bool suspected, struct sadmm_error *error);
-/* fast: a look at the stop rule after `done` iterations of a step. */
-sadmm_status CUDA(enqueue_look)(struct sadmm_context *, int done, struct sadmm_error *error);
+/* fast: a convergence check after `done` iterations of a step. */
+sadmm_status CUDA(enqueue_convergence_check)(struct sadmm_context *, int done, struct sadmm_error *error);
 /* Iterations, as the entry; limit: what is wanted for the limit of energies after the last. */
 sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *, int count, bool measure, enum cuda_limit limit,
                                       struct sadmm_error *error);
@@ -175,44 +175,47 @@ sadmm_status CUDA(launch_finish)(struct sadmm_context *, struct sadmm_error *err
 sadmm_status CUDA(launch_commit)(struct sadmm_context *, struct sadmm_error *error);
 
 /* ---- graph/layout.cu -------------------------------------------------------------------------------------------------
- * Counts and rooms in the view, then layout_room (it allocates); then per step, by enqueueing only: survey and layout of
- * what view.raw_pairs, raw_points and raw.blocks point to. */
+ * Counts and rooms in the view, then reserve_layout (it allocates); then per step, by enqueueing only: statistics and
+ * layout of what view.raw_pairs, raw_points and raw.blocks point to. */
 
-sadmm_status CUDA(layout_room)(struct sadmm_context *, struct sadmm_error *error);
-/* The facts; islands: also which bodies hang together (what BLOCK and CLUSTER need). */
-sadmm_status CUDA(enqueue_survey)(struct sadmm_context *, bool islands, struct sadmm_error *error);
-/* Slots, offsets, incident, parts. A part that exceeds what the partition allows sets live->halt = HALT_PARTITION. */
+sadmm_status CUDA(reserve_layout)(struct sadmm_context *, struct sadmm_error *error);
+/* The statistics; islands: also which bodies hang together (what BLOCK and CLUSTER need). */
+sadmm_status CUDA(enqueue_statistics)(struct sadmm_context *, bool islands, struct sadmm_error *error);
+/* Slots, offsets, incident, parts. A part that exceeds what the partition allows sets live->abort_code =
+ * ABORT_PARTITION. */
 sadmm_status CUDA(enqueue_layout)(struct sadmm_context *, const struct cuda_partition *, struct sadmm_error *error);
 
 /* The same in one go; small scenes: in one kernel. */
-sadmm_status CUDA(enqueue_survey_and_layout)(struct sadmm_context *, bool islands, const struct cuda_partition *,
+sadmm_status CUDA(enqueue_statistics_and_layout)(struct sadmm_context *, bool islands, const struct cuda_partition *,
                                              struct sadmm_error *error);
 
-/* ---- iterate/streamed.cu, iterate/resident.cu ---- */
+/* ---- iterate/streamed.cu, iterate/persistent.cu ---- */
 
-/* STREAM. fast, goes_on: none of them is the stretch's last. */
+/* STREAM. fast, goes_on: none of them is the batch's last. */
 sadmm_status CUDA(stream_iterations)(struct sadmm_context *, int count, bool measure, bool goes_on, struct sadmm_error *error);
 /* Before a measured iteration: its primal residual. */
 sadmm_status CUDA(clear_primal)(struct sadmm_context *, bool measure, struct sadmm_error *error);
-/* The instance of the resident kernel for a tier (full: there are row blocks, or the last iteration is measured); threads
- * a block at most; bytes of shared memory. */
-cuda_kernel CUDA(resident_kernel)(int point_slots, enum sadmm_cuda_tier tier, int threads, bool full, bool fast,
+/* The instance of the persistent kernel for a tier (full: there are row blocks, or the last iteration is measured);
+ * threads a block at most; bytes of shared memory. */
+cuda_kernel CUDA(persistent_kernel)(int point_slots, enum sadmm_cuda_tier tier, int threads, bool full, bool fast,
                                   const char **name);
-/* Whether the instance for a partition, without row blocks and not measured, does the ends of a step of `fast`, too. */
-bool CUDA(resident_does_ends)(const struct cuda_partition *);
-int CUDA(resident_threads)(int point_slots);
-size_t CUDA(resident_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies, bool row_blocks);
+/* Whether the instance for a partition, without row blocks and not measured, does the prologue and the epilogue of a
+ * step of `fast`, too. */
+bool CUDA(persistent_does_prologue)(const struct cuda_partition *);
+int CUDA(persistent_threads)(int point_slots);
+size_t CUDA(persistent_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies, bool row_blocks);
 /* Let every instance use `bytes` of shared memory a block, and clusters of more than 8 blocks. *clusters: whether both the
  * device and the code that was loaded for it know clusters. */
-cudaError_t CUDA(resident_allow)(int bytes, bool device_has_clusters, bool *clusters);
+cudaError_t CUDA(persistent_allow)(int bytes, bool device_has_clusters, bool *clusters);
 
 /* ---- graph/partition.cu ---- */
 
-/* The tier and its thread blocks, from the facts of this step (or of one like it), the plan and the device. */
-sadmm_status CUDA(choose_partition)(struct sadmm_context *, const struct cuda_facts *facts,
+/* The tier and its thread blocks, from the statistics of this step (or of one like it), the plan and the device. */
+sadmm_status CUDA(choose_partition)(struct sadmm_context *, const struct cuda_graph_statistics *statistics,
                                     struct cuda_partition *partition, struct sadmm_error *error);
-/* Fewer threads, where the layout made for it has smaller parts (facts->part_halves, part_bodies) than could be known. */
-void CUDA(tighten_partition)(const struct sadmm_context *, const struct cuda_facts *facts,
+/* Fewer threads, where the layout made for it has smaller parts (statistics->part_sides, part_bodies) than could be
+ * known. */
+void CUDA(tighten_partition)(const struct sadmm_context *, const struct cuda_graph_statistics *statistics,
                              struct cuda_partition *partition);
 
 #define CUDA_TRY(call)                                  \

@@ -41,8 +41,9 @@ enum sadmm_cuda_tier sadmm_cuda_tier_of(const struct sadmm_kernels *kernels, con
                                            : sadmm_cuda_get_tier_f64(context, blocks);
 }
 
-void sadmm_cuda_tune_rooms(const struct sadmm_kernels *kernels, struct sadmm_context *context, int64_t first_room)
+void sadmm_cuda_tune_capacities(const struct sadmm_kernels *kernels, struct sadmm_context *context,
+                                int64_t first_capacity)
 {
-    if (kernels->precision == SADMM_F32) sadmm_cuda_tune_rooms_f32(context, first_room);
-    else sadmm_cuda_tune_rooms_f64(context, first_room);
+    if (kernels->precision == SADMM_F32) sadmm_cuda_tune_capacities_f32(context, first_capacity);
+    else sadmm_cuda_tune_capacities_f64(context, first_capacity);
 }

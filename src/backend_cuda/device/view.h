@@ -4,9 +4,9 @@
  *   - Points of a contact pair share normal, friction and bodies. With r_a, r_b = r_a + (x_a - x_b) a point's relative
  *     velocity is (v_b - v_a) + (w_b x r_b - w_a x r_a), and the pair's wrench on b is f = sum E_k, tau = sum r_b x E_k
  *     (E = 2 lambda - lambda_prev), on a -f, -sum r_a x E_k.
- *   - A "half" is one constraint as seen by one of its dynamic bodies: 2 record + side (0: on a, 1: on b); its record is
- *     the wrench on that body. Bodies gather the records of their halves over a CSR list in a fixed order. No float
- *     atomics: a result does not depend on timing, thread count, grid size or tier, bit for bit (the sources are
+ *   - A "side" is one constraint as seen by one of its dynamic bodies: 2 record + side (0: on a, 1: on b); its
+ *     record is the wrench on that body. Bodies gather the records of their sides over a CSR list in a fixed order. No
+ * float     atomics: a result does not depend on timing, thread count, grid size or tier, bit for bit (the sources are
  *     compiled without contraction of a * b + c for the same reason).
  *   - Sums over a pair's points, p_0 to p_7: q_j = p_j + p_{j+4} (p_j alone where there is no p_{j+4}, 0 where there is
  *     no p_j), then (q_0 + q_1) + (q_2 + q_3): four lanes of a warp make it in two exchanges.
@@ -23,16 +23,16 @@
  *   CLUSTER  islands packed into clusters of thread blocks, which read each other's velocities from shared memory
  *   GRID     one cooperative launch; velocities go through L2, with a grid barrier an iteration
  *   STREAM   two kernels an iteration, in a CUDA graph: any size
- * BLOCK, CLUSTER and GRID are one kernel (iterate/resident.h) over a partition into `parts` (graph/partition.cu).
+ * BLOCK, CLUSTER and GRID are one kernel (iterate/persistent.h) over a partition into `parts` (graph/partition.cu).
  *
  * The method `fast` has a weight B of its own for each constraint (weight/weights.cu) in place of beta, which is 1 then.
  * Its iteration is Steps 2-4 and then Step 1, relaxed (math/relax.h), by instances of its own of the same kernels;
  * slots are by island in every tier, since weights rest on sums over islands. It passes on changes alone: records are
- * J^T d lambda, and bodies keep their defect b - A v + J^T lambda (docs/algorithm.md). It begins with the multipliers: records
- * are not kept.
+ * J^T d lambda, and bodies keep their momentum residual b - A v + J^T lambda (docs/algorithm.md). It begins with the
+ * multipliers: records are not kept.
  *
  * Launch sizes follow from what the host knows (rooms, tier); kernels read the true counts from `live`, and do nothing
- * once it says halt.
+ * once it says abort_code.
  *
  * Raw data (bodies, contact pairs and points, blocks as core has them, in double) is turned into this layout on the device.
  * In a whole step contact finding leaves it there; for a solve alone the host copies it.
@@ -93,25 +93,25 @@ struct alignas(16) real4 {
 
 struct row_about {
     int32_t kind, rows, body_a, body_b; /* raw; the static world: `bodies` */
-    int32_t half_a, half_b;             /* as in pair_ends */
+    int32_t side_a, side_b;             /* as in pair_ends */
     int32_t active;                     /* bit r: row r exists (a hard row of zeros is no constraint, Sec. III-C) */
 };
 
 /* fast: of an island, at its label. */
 struct cuda_island {
     double speed, mass;  /* V in m/s; kg */
-    double level, scale; /* math/weight.h; scale not 0: weights are those taken last, times this */
-    double tallness;     /* math/weight.h: in steps that start warm, else 1 */
+    double weight_scale, rescale; /* math/weight.h; rescale not 0: weights are those taken last, times this */
+    double stack_depth;     /* math/weight.h: in steps that start warm, else 1 */
     double slow_down;    /* math/limit.h: the factor of its velocities */
-    int32_t blocks;      /* there are constraints by rows: the level stays 1 */
-    int32_t stopped;     /* iterations after which a look found the tolerances met; 0: not yet */
+    int32_t blocks;      /* there are constraints by rows: the weight scale stays 1 */
+    int32_t stopped;     /* iterations after which a check found the tolerances met; 0: not yet */
 };
 
 /* fast: of a step's stop rule (iterate/stop_rule.h). */
-enum { LOOKS_KEPT = 3 };     /* the last look's, this one's, the next one's */
+enum { CHECKS_KEPT = 3 };     /* the last check's, this one's, the next one's */
 struct cuda_stop {
     unsigned long long sum;    /* of the iterations of islands that have stopped */
-    int32_t unmet[LOOKS_KEPT]; /* islands that had not, by the number of the look */
+    int32_t unmet[CHECKS_KEPT]; /* islands that had not, by the number of the check */
     int32_t last;              /* the most iterations of those that have */
 };
 
@@ -121,18 +121,18 @@ struct cuda_stop {
 
 enum { TERMS = 6 }; /* of a body, in sums over islands */
 
-/* Numbers of a half in half_arms (assemble/half_sums.h): sums over arms, as in arm_sums, then these. */
-enum { HALF_ARMS = 10, HALF_LOAD = HALF_ARMS, HALF_RESPONSE, HALF_NUMBERS };
+/* Numbers of a side in side_arms (assemble/side_sums.h): sums over arms, as in arm_sums, then these. */
+enum { SIDE_ARMS = 10, SIDE_LOAD = SIDE_ARMS, SIDE_RESPONSE, SIDE_NUMBERS };
 
 /* What a pair joins. */
 struct alignas(16) pair_ends {
     int32_t body_a, body_b; /* raw; the static world: `bodies` */
-    int32_t half_a, half_b; /* places of its halves in `incident`, and of their records; of the static world: -1.
+    int32_t side_a, side_b; /* places of its sides in `incident`, and of their records; of the static world: -1.
                                For the stepwise kernels alone (streamed.cu) */
 };
 
 /* What kernels see. Pointers are device memory. Arrays over bodies are in raw order; offsets, parts and the states of
- * resident blocks count bodies in slots (graph/layout.h). */
+ * persistent thread blocks count bodies in slots (graph/layout.h). */
 /* What BUFFER_SETTINGS holds. */
 struct cuda_settings {
     struct sadmm_settings settings; /* numbers alone count */
@@ -141,9 +141,9 @@ struct cuda_settings {
 
 struct cuda_view {
     struct cuda_live *live;
-    struct cuda_facts *facts;
+    struct cuda_graph_statistics *statistics;
     int32_t bodies;      /* exact, known to the host (state row `bodies` is the static world) */
-    int32_t pair_room;   /* multiple of 32. The number of pair p as a constraint is p, of row block k pair_room + k */
+    int32_t pair_capacity;   /* multiple of 32. The number of pair p as a constraint is p, of row block k pair_capacity + k */
     int32_t lanes;       /* threads a pair: 4, or 1 where no pair has more than one point */
     int32_t rows;        /* row blocks: exact, known to the host */
     int32_t points;      /* room */
@@ -153,7 +153,7 @@ struct cuda_view {
 
     solver_real *state; /* (bodies + 1) x ROW: v, w, 1/beta, 0; the last row is the static world, all 0 */
     solver_real *b;     /* bodies x ROW */
-    solver_real *defect; /* fast: bodies x ROW: b - A v + J^T lambda */
+    solver_real *momentum_residual; /* fast: bodies x ROW: b - A v + J^T lambda */
     solver_real *lines; /* bodies x line: A and H (device/line.h) */
     int32_t line;
     int32_t rigid;      /* how lines are packed */
@@ -171,11 +171,11 @@ struct cuda_view {
     row_about *row_info;
     solver_real *row_data; /* ROW_PLANES x row_stride */
 
-    /* halves x ROW: a force, 0, torque, 0. After a measured iteration `records` holds J^T lambda and `change`
+    /* sides x ROW: a force, 0, torque, 0. After a measured iteration `records` holds J^T lambda and `change`
      * J^T (lambda - lambda_prev), else `records` holds J^T (2 lambda - lambda_prev). fast: J^T (lambda^ - lambda). */
     solver_real *records, *change;
 
-    const int32_t *offsets, *incident; /* body -> places of its halves; place -> half, ascending for each body */
+    const int32_t *offsets, *incident; /* body -> places of its sides; place -> side, ascending for each body */
     const int32_t *body_of, *slot_of;  /* slot -> raw body, raw body -> slot */
     const int32_t *parts;              /* first body slot of each part, and the end */
     solver_real *exchange;             /* GRID: velocities of even and of odd iterations, bodies x ROW each */
@@ -200,8 +200,8 @@ struct cuda_view {
     unsigned long long *arrivals; /* slots: of terms at places they are added up at; 0 between kernels */
     cuda_island *islands;    /* bodies, used at labels */
     double *weight, *response; /* pairs: B as taken last, kg; mean of J A^-1 J^T over points and rows, 1/kg */
-    double *half_wrench;     /* halves of pairs x ROW (assemble/half_sums.h) */
-    solver_real *half_arms;  /* halves of pairs x HALF_NUMBERS */
+    double *side_wrench;     /* sides of pairs x ROW (assemble/side_sums.h) */
+    solver_real *side_arms;  /* sides of pairs x SIDE_NUMBERS */
     solver_real *inv_s;      /* pairs: B / number of dynamic bodies */
     int32_t *limited;        /* islands slowed down */
     int32_t *suspects;       /* not 0: some island may have to be */
@@ -230,7 +230,8 @@ static __device__ __forceinline__ void let_next_begin(void)
 /* Where the data of point k of pair p is. */
 template <int LANES_A_PAIR> static __device__ __forceinline__ size_t point_slot(const cuda_view &v, int32_t p, int32_t k)
 {
-    return (size_t)(k / LANES_A_PAIR * LANES_A_PAIR) * (size_t)v.pair_room + (size_t)p * LANES_A_PAIR + (size_t)(k % LANES_A_PAIR);
+    return (size_t)(k / LANES_A_PAIR * LANES_A_PAIR) * (size_t)v.pair_capacity + (size_t)p * LANES_A_PAIR +
+           (size_t)(k % LANES_A_PAIR);
 }
 static __device__ __forceinline__ size_t point_slot(const cuda_view &v, int32_t p, int32_t k)
 {
@@ -241,15 +242,15 @@ static __device__ __forceinline__ size_t point_slot(const cuda_view &v, int32_t 
  * longest of all. */
 enum { POINTS_AT_ONCE = 4 };
 
-/* This step's counts; 0 when it is halted. Both are in one load. */
+/* This step's counts; 0 when it is aborted. Both are in one load. */
 static __device__ __forceinline__ int32_t live_pairs(const cuda_view &v)
 {
     const int4 live = *(const int4 *)v.live;
-    static_assert(sizeof(struct cuda_live) == sizeof(int4), "halt, bodies, pairs, points");
+    static_assert(sizeof(struct cuda_live) == sizeof(int4), "abort_code, bodies, pairs, points");
     return live.x ? 0 : live.z;
 }
-static __device__ __forceinline__ int32_t live_bodies(const cuda_view &v) { return v.live->halt ? 0 : v.bodies; }
-static __device__ __forceinline__ int32_t live_rows(const cuda_view &v) { return v.live->halt ? 0 : v.rows; }
+static __device__ __forceinline__ int32_t live_bodies(const cuda_view &v) { return v.live->abort_code ? 0 : v.bodies; }
+static __device__ __forceinline__ int32_t live_rows(const cuda_view &v) { return v.live->abort_code ? 0 : v.rows; }
 
 /* What an iterating kernel does about energies after its last iteration: it says whether an island may have too much, or it
  * sees to everything (BLOCK). */
@@ -267,12 +268,12 @@ struct cuda_args {
     int32_t backward;   /* thread blocks in descending order */
     int32_t in_order;   /* slots are raw indices */
     int32_t settled;    /* fast: Step 1 ran before in this solve */
-    int32_t goes_on;    /* fast: the stretch does not end with these iterations */
+    int32_t goes_on;    /* fast: the batch does not end with these iterations */
     int32_t warm;       /* fast: the step starts warm */
-    int32_t looks;      /* fast: of the stop rule, in this step so far */
+    int32_t checks;      /* fast: of the stop rule, in this step so far */
     int32_t begin;      /* fast, BLOCK: weights, C and factors first */
     int32_t limit;      /* fast: of energies; enum cuda_limit */
-    int32_t few;        /* fast: and those that bounce (math/limit.h) */
+    int32_t under_iterated;   /* fast: and those that bounce (math/limit.h) */
     int32_t relax;      /* fast, STREAM: bits of enum cuda_relax */
     const struct sadmm_resident_edit *edits;
     double factor;

@@ -1,23 +1,24 @@
-/* begin: room for the step, raw data to the device, the survey, the tier and the layout (graph/layout.h). */
+/* begin: room for the step, raw data to the device, the statistics, the tier and the layout (graph/layout.h). */
 #include <string.h>
 
 #include "backend_cuda/device/context.h"
 
-/* Live counts and facts, side by side in device memory and in the staging buffer. */
+/* Live counts and statistics, side by side in device memory and in the staging buffer. */
 struct known {
     struct cuda_live live;
-    struct cuda_facts facts;
+    struct cuda_graph_statistics statistics;
 };
 
-struct wanted_room {
+struct wanted_capacity {
     enum cuda_buffer_name name;
     size_t bytes;
 };
 
 template <size_t N>
-static sadmm_status make_room(struct sadmm_context *c, const wanted_room (&wanted)[N], struct sadmm_error *error)
+static sadmm_status make_capacity(struct sadmm_context *c, const wanted_capacity (&wanted)[N],
+                                  struct sadmm_error *error)
 {
-    for (const wanted_room &one : wanted) CUDA_TRY(CUDA(room)(c, one.name, one.bytes, error));
+    for (const wanted_capacity &one : wanted) CUDA_TRY(CUDA(reserve)(c, one.name, one.bytes, error));
     return SADMM_OK;
 }
 
@@ -32,7 +33,7 @@ static int64_t most_parts(const struct sadmm_context *c)
 /* The arrays in one buffer, in order; returns their bytes. base NULL: only that. */
 static size_t place_arrays(const struct sadmm_context *c, int32_t *base, struct layout_view *l)
 {
-    size_t n = (size_t)l->bodies, halves = 2 * ((size_t)l->pair_room + (size_t)l->rows), used = 0;
+    size_t n = (size_t)l->bodies, sides = 2 * ((size_t)l->pair_capacity + (size_t)l->rows), used = 0;
     auto take = [&](size_t count) {
         size_t at = used;
         used += (count + 3) / 4 * 4; /* each begins at 16 bytes */
@@ -41,15 +42,15 @@ static size_t place_arrays(const struct sadmm_context *c, int32_t *base, struct 
     l->label = take(n);
     l->degree = take(n);
     l->island_bodies = take(n);
-    l->island_halves = take(n);
+    l->island_sides = take(n);
     l->sorted_label = take(n);
     l->body_of = take(n);
     l->slot_of = take(n);
     l->offsets = take(n + 1);
-    l->half_body = take(halves);
-    l->half_slot = take(halves);
-    l->sorted = take(halves);
-    l->incident = take(halves);
+    l->side_body = take(sides);
+    l->side_slot = take(sides);
+    l->sorted = take(sides);
+    l->incident = take(sides);
     l->parts = take((size_t)most_parts(c) + 1);
     l->kept = (struct layout_kept *)take(sizeof *l->kept / sizeof(int32_t));
     return used * sizeof(int32_t);
@@ -60,7 +61,7 @@ static sadmm_status number(struct sadmm_context *c, size_t count, struct sadmm_e
 {
     cuda_buffer *numbers = &c->buffers[BUFFER_NUMBERS];
     size_t before = numbers->capacity;
-    CUDA_TRY(CUDA(room)(c, BUFFER_NUMBERS, count * sizeof(int32_t), error));
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_NUMBERS, count * sizeof(int32_t), error));
     if (numbers->capacity == before && c->numbered) return SADMM_OK;
     c->numbered = false;
     CUDA_CALL(
@@ -71,34 +72,34 @@ static sadmm_status number(struct sadmm_context *c, size_t count, struct sadmm_e
     return SADMM_OK;
 }
 
-sadmm_status CUDA(layout_room)(struct sadmm_context *c, struct sadmm_error *error)
+sadmm_status CUDA(reserve_layout)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_view *v = &c->view;
     struct layout_view *l = &c->layout;
-    size_t halves = 2 * ((size_t)v->pair_room + (size_t)v->rows), temp = 0;
+    size_t sides = 2 * ((size_t)v->pair_capacity + (size_t)v->rows), temp = 0;
     l->bodies = v->bodies;
-    l->pair_room = v->pair_room;
+    l->pair_capacity = v->pair_capacity;
     l->rows = v->rows;
     l->warm_start = v->warm_start;
     l->most_blocks = c->multiprocessors * (2048 / LAYOUT_THREADS);
-    CUDA_CALL(c, LAYOUT(temp_bytes)(v->bodies, (int32_t)halves, &temp), "sizing of the layout's sorts");
-    const wanted_room wanted[] = {
+    CUDA_CALL(c, LAYOUT(temp_bytes)(v->bodies, (int32_t)sides, &temp), "sizing of the layout's sorts");
+    const wanted_capacity wanted[] = {
         {BUFFER_LIVE, sizeof(known)},
         {PINNED_LIVE, sizeof(known)},
         {BUFFER_LAYOUT, place_arrays(c, nullptr, l)},
         {BUFFER_SORT, temp},
     };
-    CUDA_TRY(make_room(c, wanted, error));
-    CUDA_TRY(number(c, halves > (size_t)v->bodies ? halves : (size_t)v->bodies, error));
+    CUDA_TRY(make_capacity(c, wanted, error));
+    CUDA_TRY(number(c, sides > (size_t)v->bodies ? sides : (size_t)v->bodies, error));
     place_arrays(c, (int32_t *)c->buffers[BUFFER_LAYOUT].data, l);
     CUDA_CALL(c, cudaMemsetAsync(l->kept, 0, sizeof *l->kept, c->stream), "cudaMemsetAsync(layout)");
     CUDA_CALL(c, cudaMemsetAsync(c->buffers[BUFFER_LIVE].data, 0, sizeof(known), c->stream), "cudaMemsetAsync(live)");
     l->numbers = (const int32_t *)c->buffers[BUFFER_NUMBERS].data;
     l->temp = c->buffers[BUFFER_SORT].data;
     l->temp_bytes = c->buffers[BUFFER_SORT].capacity;
-    c->one_block = LAYOUT(one_block_shared)(v->bodies, (int32_t)halves) <= (size_t)c->shared_limit;
+    c->one_block = LAYOUT(one_block_shared)(v->bodies, (int32_t)sides) <= (size_t)c->shared_limit;
     v->live = l->live = &((known *)c->buffers[BUFFER_LIVE].data)->live;
-    v->facts = l->facts = &((known *)c->buffers[BUFFER_LIVE].data)->facts;
+    v->statistics = l->statistics = &((known *)c->buffers[BUFFER_LIVE].data)->statistics;
     v->label = l->label;
     v->island_bodies = l->island_bodies;
     v->body_of = l->body_of;
@@ -129,12 +130,12 @@ static sadmm_status check_partition(struct sadmm_context *c, const struct cuda_p
     return SADMM_OK;
 }
 
-sadmm_status CUDA(enqueue_survey)(struct sadmm_context *c, bool islands, struct sadmm_error *error)
+sadmm_status CUDA(enqueue_statistics)(struct sadmm_context *c, bool islands, struct sadmm_error *error)
 {
     bind_raw(c);
     CUDA_CALL(c,
               c->one_block ? LAYOUT(one_block)(&c->layout, true, islands, nullptr, c->stream, &c->kernel)
-                           : LAYOUT(survey)(&c->layout, islands, c->stream, &c->kernel),
+                           : LAYOUT(statistics)(&c->layout, islands, c->stream, &c->kernel),
               c->kernel);
     return SADMM_OK;
 }
@@ -150,11 +151,11 @@ sadmm_status CUDA(enqueue_layout)(struct sadmm_context *c, const struct cuda_par
     return SADMM_OK;
 }
 
-sadmm_status CUDA(enqueue_survey_and_layout)(struct sadmm_context *c, bool islands,
+sadmm_status CUDA(enqueue_statistics_and_layout)(struct sadmm_context *c, bool islands,
                                              const struct cuda_partition *partition, struct sadmm_error *error)
 {
     if (!c->one_block) {
-        CUDA_TRY(CUDA(enqueue_survey)(c, islands, error));
+        CUDA_TRY(CUDA(enqueue_statistics)(c, islands, error));
         return CUDA(enqueue_layout)(c, partition, error);
     }
     bind_raw(c);
@@ -166,20 +167,21 @@ sadmm_status CUDA(enqueue_survey_and_layout)(struct sadmm_context *c, bool islan
 /* ---- room ------------------------------------------------------------------------------------------------------- */
 
 /* Raw data, as core has it. Bodies: rigid, or A then b; then velocities. Blocks, then their multipliers. */
-static sadmm_status raw_room(struct sadmm_context *c, struct sadmm_error *error)
+static sadmm_status reserve_raw(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_view *v = &c->view;
     size_t n = (size_t)v->bodies, rows = (size_t)v->rows;
     size_t body = c->plan.rigid ? sizeof(struct sadmm_rigid) : 42 * sizeof(double);
-    size_t bodies = n * (body + 6 * sizeof(double)), pairs = (size_t)v->pair_room * sizeof(struct sadmm_contact_pair);
+    size_t bodies = n * (body + 6 * sizeof(double)),
+           pairs = (size_t)v->pair_capacity * sizeof(struct sadmm_contact_pair);
     size_t points = (size_t)v->points * sizeof(struct sadmm_contact_point);
     size_t blocks = rows * (sizeof(struct sadmm_problem_block) + 6 * sizeof(double));
-    const wanted_room wanted[] = {
+    const wanted_capacity wanted[] = {
         {BUFFER_RAW_BODIES, bodies}, {BUFFER_RAW_PAIRS, pairs}, {BUFFER_RAW_POINTS, points},
         {BUFFER_RAW_BLOCKS, blocks}, {PINNED_BODIES, bodies},   {PINNED_PAIRS, pairs},
         {PINNED_POINTS, points},     {PINNED_BLOCKS, blocks},
     };
-    CUDA_TRY(make_room(c, wanted, error));
+    CUDA_TRY(make_capacity(c, wanted, error));
     void *const none = nullptr;
     cuda_buffer *b = c->buffers;
     v->raw = *c->system;
@@ -198,15 +200,16 @@ static sadmm_status raw_room(struct sadmm_context *c, struct sadmm_error *error)
 }
 
 /* What only the method `fast` has. */
-static sadmm_status weights_room(struct sadmm_context *c, struct sadmm_error *error)
+static sadmm_status reserve_weights(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_view *v = &c->view;
-    const size_t n = (size_t)v->bodies, pairs = (size_t)v->pair_room;
-    CUDA_TRY(CUDA(room)(c, BUFFER_WEIGHTS,
+    const size_t n = (size_t)v->bodies, pairs = (size_t)v->pair_capacity;
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_WEIGHTS,
                         (n * (PACKED + TERMS + 2) + 2 * pairs) * sizeof(double) + n * sizeof(cuda_island) +
                             pairs * sizeof(solver_real),
                         error));
-    CUDA_TRY(CUDA(room)(c, BUFFER_HALVES, 2 * pairs * (ROW * sizeof(double) + HALF_NUMBERS * sizeof(solver_real)), error));
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_SIDES, 2 * pairs * (ROW * sizeof(double) + SIDE_NUMBERS * sizeof(solver_real)),
+                           error));
     v->A_inverse = (double *)c->buffers[BUFFER_WEIGHTS].data;
     v->free_energy = v->A_inverse + n * PACKED;
     v->terms = v->free_energy + n;
@@ -215,30 +218,30 @@ static sadmm_status weights_room(struct sadmm_context *c, struct sadmm_error *er
     v->response = v->weight + pairs;
     v->islands = (cuda_island *)(v->response + pairs);
     v->inv_s = (solver_real *)(v->islands + n);
-    v->half_wrench = (double *)c->buffers[BUFFER_HALVES].data;
-    v->half_arms = (solver_real *)(v->half_wrench + 2 * pairs * ROW);
+    v->side_wrench = (double *)c->buffers[BUFFER_SIDES].data;
+    v->side_arms = (solver_real *)(v->side_wrench + 2 * pairs * ROW);
     CUDA_CALL(c, cudaMemsetAsync(v->arrivals, 0, n * sizeof *v->arrivals, c->stream), "cudaMemsetAsync(arrivals)");
     return SADMM_OK;
 }
 
 enum { SCALAR_BYTES = 128 };
 
-/* This precision's data, once the facts are known. */
-sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *error)
+/* This precision's data, once the statistics are known. */
+sadmm_status CUDA(reserve_solver)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_view *v = &c->view;
-    size_t n = (size_t)v->bodies, pairs = (size_t)v->pair_room, rows = (size_t)v->row_stride,
+    size_t n = (size_t)v->bodies, pairs = (size_t)v->pair_capacity, rows = (size_t)v->row_stride,
            real_size = sizeof(solver_real);
-    v->lanes = c->facts.point_slots <= 1 ? 1 : 4;
-    size_t lanes = (size_t)v->lanes, slots = ((size_t)c->facts.point_slots + lanes - 1) / lanes * lanes * pairs;
+    v->lanes = c->statistics.point_slots <= 1 ? 1 : 4;
+    size_t lanes = (size_t)v->lanes, slots = ((size_t)c->statistics.point_slots + lanes - 1) / lanes * lanes * pairs;
     size_t records = 2 * (pairs + (size_t)v->rows) * ROW * real_size;
     size_t points = (size_t)v->points;
     bool joins = c->plan.residuals && !c->fast;
     v->rigid = c->plan.rigid;
     v->line = v->rigid ? LINE_RIGID : LINE_GENERAL;
-    v->point_slots = c->facts.point_slots;
+    v->point_slots = c->statistics.point_slots;
     size_t out = (13 * n + 3 * points + 6 * (size_t)v->rows + 2) * sizeof(double);
-    const wanted_room wanted[] = {
+    const wanted_capacity wanted[] = {
         {BUFFER_STATE, (n + 1) * ROW * real_size},
         {BUFFER_B, (c->fast ? 2 : 1) * n * ROW * real_size},
         {BUFFER_LINES, n * (size_t)v->line * real_size},
@@ -259,7 +262,7 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
         {PINNED_OUT, out},
     };
     const void *const before[] = {c->buffers[BUFFER_ARM].data, c->buffers[BUFFER_LAMBDA].data};
-    CUDA_TRY(make_room(c, wanted, error));
+    CUDA_TRY(make_capacity(c, wanted, error));
 
     /* Lanes without a point read one all the same. */
     for (enum cuda_buffer_name name : {BUFFER_ARM, BUFFER_LAMBDA})
@@ -270,7 +273,7 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
     cuda_buffer *b = c->buffers;
     v->state = (solver_real *)b[BUFFER_STATE].data;
     v->b = (solver_real *)b[BUFFER_B].data;
-    v->defect = c->fast ? v->b + n * ROW : nullptr;
+    v->momentum_residual = c->fast ? v->b + n * ROW : nullptr;
     v->lines = (solver_real *)b[BUFFER_LINES].data;
     v->C = (double *)b[BUFFER_C].data;
     v->beta = (double *)b[BUFFER_BETA].data;
@@ -294,7 +297,7 @@ sadmm_status CUDA(solver_room)(struct sadmm_context *c, struct sadmm_error *erro
     v->out = (double *)b[BUFFER_OUT].data;
     CUDA_CALL(c, cudaMemsetAsync(v->residual, 0, SCALAR_BYTES, c->stream), "cudaMemsetAsync(scalars)");
     CUDA_CALL(c, cudaMemsetAsync(v->state + n * ROW, 0, ROW * real_size, c->stream), "cudaMemsetAsync(static world)");
-    return c->fast ? weights_room(c, error) : SADMM_OK;
+    return c->fast ? reserve_weights(c, error) : SADMM_OK;
 }
 
 /* ---- begin ------------------------------------------------------------------------------------------------------ */
@@ -304,7 +307,7 @@ static void count(struct sadmm_context *c)
 {
     cuda_view *v = &c->view;
     v->bodies = c->plan.bodies;
-    v->pair_room = (c->plan.pairs + WARP - 1) / WARP * WARP;
+    v->pair_capacity = (c->plan.pairs + WARP - 1) / WARP * WARP;
     v->points = c->plan.points;
     v->rows = c->system->block_count;
     v->row_stride = (v->rows + WARP - 1) / WARP * WARP;
@@ -312,9 +315,9 @@ static void count(struct sadmm_context *c)
     v->warm_start = c->plan.warm_start;
 }
 
-static sadmm_status upload_live(struct sadmm_context *c, enum cuda_halt halt, struct sadmm_error *error)
+static sadmm_status upload_live(struct sadmm_context *c, enum cuda_abort abort_code, struct sadmm_error *error)
 {
-    const struct cuda_live live = {halt, c->plan.bodies, c->plan.pairs, c->plan.points};
+    const struct cuda_live live = {abort_code, c->plan.bodies, c->plan.pairs, c->plan.points};
     return CUDA(upload)(c, c->view.live, PINNED_LIVE, 0, &live, sizeof live, error);
 }
 
@@ -352,17 +355,17 @@ static sadmm_status lay_out(struct sadmm_context *c, struct sadmm_error *error)
     CUDA_TRY(CUDA(enqueue_layout)(c, partition, error));
     if (partition->tier == SADMM_CUDA_TIER_STREAM) return SADMM_OK;
     CUDA_TRY(download_known(c, &known, error));
-    c->facts = known.facts;
-    if (known.live.halt == HALT_NONE) return SADMM_OK;
+    c->statistics = known.statistics;
+    if (known.live.abort_code == ABORT_NONE) return SADMM_OK;
     if (c->wanted != SADMM_CUDA_TIER_AUTO)
         return sadmm_fail(
             error, SADMM_ERROR_UNSUPPORTED,
-            "the cuda tier asked for: a thread block would get %d halves and %d bodies: at most %d and %d",
-            known.facts.part_halves, known.facts.part_bodies, partition->most_halves, partition->most_bodies);
+            "the cuda tier asked for: a thread block would get %d sides and %d bodies: at most %d and %d",
+            known.statistics.part_sides, known.statistics.part_bodies, partition->most_sides, partition->most_bodies);
     *partition = {};
     partition->tier = SADMM_CUDA_TIER_STREAM;
     partition->islands = c->fast;
-    CUDA_TRY(upload_live(c, HALT_NONE, error));
+    CUDA_TRY(upload_live(c, ABORT_NONE, error));
     return CUDA(enqueue_layout)(c, partition, error);
 }
 
@@ -381,32 +384,32 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
     c->system = system;
     c->plan = *plan;
     c->starting = true;
-    c->placed = c->measured = c->rescaled = c->settled = c->ends = false;
+    c->placed = c->measured = c->rescaled = c->settled = c->prologue = false;
     c->refused = 0;
     c->graph_valid = false;
     CUDA_TRY(CUDA(use_settings)(c, settings, error));
     count(c);
-    CUDA_TRY(raw_room(c, error));
-    CUDA_TRY(CUDA(layout_room)(c, error));
+    CUDA_TRY(reserve_raw(c, error));
+    CUDA_TRY(CUDA(reserve_layout)(c, error));
     CUDA_TRY(upload_raw(c, error));
-    CUDA_TRY(upload_live(c, HALT_NONE, error));
+    CUDA_TRY(upload_live(c, ABORT_NONE, error));
     bool islands = c->fast || (c->wanted != SADMM_CUDA_TIER_GRID && c->wanted != SADMM_CUDA_TIER_STREAM);
     struct known known;
-    CUDA_TRY(CUDA(enqueue_survey)(c, islands, error));
+    CUDA_TRY(CUDA(enqueue_statistics)(c, islands, error));
     CUDA_TRY(download_known(c, &known, error));
-    c->facts = known.facts;
-    CUDA_TRY(CUDA(choose_partition)(c, &c->facts, &c->partition, error));
-    CUDA_TRY(CUDA(solver_room)(c, error));
+    c->statistics = known.statistics;
+    CUDA_TRY(CUDA(choose_partition)(c, &c->statistics, &c->partition, error));
+    CUDA_TRY(CUDA(reserve_solver)(c, error));
     return lay_out(c, error);
 }
 
 /* ---- for tests --------------------------------------------------------------------------------------------------- */
 
-extern "C" sadmm_status CUDA(set_halt)(struct sadmm_context *c, enum cuda_halt halt, struct sadmm_error *error)
+extern "C" sadmm_status CUDA(set_abort)(struct sadmm_context *c, enum cuda_abort abort_code, struct sadmm_error *error)
 {
     CUDA_ENTER(c);
     CUDA_TRY(CUDA(wait)(c, error));
-    return upload_live(c, halt, error);
+    return upload_live(c, abort_code, error);
 }
 
 /* Survey and layout as a graph, launched twice: captured, nothing may depend on when it runs or what ran before. */
@@ -416,7 +419,7 @@ static sadmm_status run_graph(struct sadmm_context *c, const struct cuda_partiti
     cudaGraph_t graph = nullptr;
     cudaGraphExec_t ready = nullptr;
     CUDA_CALL(c, cudaStreamBeginCapture(c->stream, cudaStreamCaptureModeThreadLocal), "cudaStreamBeginCapture");
-    sadmm_status status = CUDA(enqueue_survey_and_layout)(c, true, partition, error);
+    sadmm_status status = CUDA(enqueue_statistics_and_layout)(c, true, partition, error);
     CUDA_CALL(c, cudaStreamEndCapture(c->stream, &graph), "cudaStreamEndCapture");
     if (status == SADMM_OK) {
         cudaError_t code = cudaGraphInstantiate(&ready, graph, 0);
@@ -430,14 +433,14 @@ static sadmm_status run_graph(struct sadmm_context *c, const struct cuda_partiti
 }
 
 extern "C" sadmm_status CUDA(lay_out_again)(struct sadmm_context *c, const struct cuda_partition *partition,
-                                            enum cuda_halt halt, int way, struct cuda_layout_copy *out,
+                                            enum cuda_abort abort_code, int way, struct cuda_layout_copy *out,
                                             struct sadmm_error *error)
 {
     const cuda_view *v = &c->view;
     struct known known;
     CUDA_ENTER(c);
     CUDA_TRY(CUDA(wait)(c, error));
-    CUDA_TRY(upload_live(c, halt, error));
+    CUDA_TRY(upload_live(c, abort_code, error));
     out->one_block = c->one_block && !(way & CUDA_LAYOUT_GENERAL);
     bool chosen = c->one_block;
     c->one_block = out->one_block;
@@ -445,15 +448,15 @@ extern "C" sadmm_status CUDA(lay_out_again)(struct sadmm_context *c, const struc
     if (way & CUDA_LAYOUT_GRAPH) {
         status = run_graph(c, partition, error);
     } else {
-        status = CUDA(enqueue_survey)(c, true, error);
+        status = CUDA(enqueue_statistics)(c, true, error);
         if (status == SADMM_OK) status = CUDA(enqueue_layout)(c, partition, error);
     }
     c->one_block = chosen;
     CUDA_TRY(status);
     CUDA_TRY(download_known(c, &known, error));
     out->live = known.live;
-    out->facts = known.facts;
-    size_t n = (size_t)v->bodies, halves = known.facts.halves >= 0 ? (size_t)known.facts.halves : 0,
+    out->statistics = known.statistics;
+    size_t n = (size_t)v->bodies, sides = known.statistics.sides >= 0 ? (size_t)known.statistics.sides : 0,
            parts = partition->tier == SADMM_CUDA_TIER_STREAM ? 0 : (size_t)partition->parts + 1;
     const struct {
         int32_t *to;
@@ -462,10 +465,10 @@ extern "C" sadmm_status CUDA(lay_out_again)(struct sadmm_context *c, const struc
     } arrays[] = {{out->body_of, v->body_of, n},
                   {out->slot_of, v->slot_of, n},
                   {out->offsets, v->offsets, n + 1},
-                  {out->incident, v->incident, halves},
+                  {out->incident, v->incident, sides},
                   {out->parts, v->parts, parts}};
     for (const auto &one : arrays) {
-        CUDA_TRY(CUDA(room)(c, PINNED_OUT, one.count * sizeof(int32_t), error));
+        CUDA_TRY(CUDA(reserve)(c, PINNED_OUT, one.count * sizeof(int32_t), error));
         CUDA_TRY(CUDA(download)(c, one.from, one.count * sizeof(int32_t), error));
         if (one.count > 0) memcpy(one.to, c->buffers[PINNED_OUT].data, one.count * sizeof(int32_t));
     }

@@ -1,14 +1,14 @@
 /* The constraint graph of a step on the device: what is known where, and how it is split among thread blocks.
  *
- * Facts are on the device, guesses on the host: launches are sized by the room there is, kernels learn the true counts
- * from `cuda_live` and do nothing once a step of the queue has failed.
+ * Graph statistics are on the device, guesses on the host: launches are sized by the room there is, kernels learn the
+ * true counts from `cuda_live` and do nothing once a step of the queue has failed.
  *
  * Bodies have slots, so that an island's bodies are neighbours; where islands do not matter (GRID and STREAM in the
  * method `paper`) a body's slot is its raw index. Pairs and row blocks keep their raw order: the record of pair p is p,
- * that of row block k is pair_room + k. A half is a constraint as seen by one of its dynamic bodies: 2 record + side (0
- * on a, 1 on b).
+ * that of row block k is pair_capacity + k. A side is a constraint as seen by one of its dynamic bodies: 2 record +
+ * side (0 on a, 1 on b).
  *
- * Parts, the shares of thread blocks, are ranges of body slots. With C(i) the halves and bodies before slot i, share p
+ * Parts, the shares of thread blocks, are ranges of body slots. With C(i) the sides and bodies before slot i, share p
  * of P of the slots [first, last) begins at the first slot i with C(i) - C(first) >= ceil(p (C(last) - C(first)) / P).
  *   GRID     shares of all slots
  *   BLOCK    the same, moved to the next slot where an island begins
@@ -25,24 +25,24 @@
 
 #include "tier.h"
 
-enum cuda_halt { HALT_NONE = 0, HALT_ROOM, HALT_PARTITION, HALT_PLAN, HALT_NON_FINITE };
+enum cuda_abort { ABORT_NONE = 0, ABORT_CAPACITY, ABORT_PARTITION, ABORT_PLAN, ABORT_NON_FINITE };
 
 /* In device memory; written by begin() (problem level: copied from the host) or by the step's gate (world level). */
 struct cuda_live {
-    alignas(16) int32_t halt;      /* not 0: nothing after this does anything (its reason, enum cuda_halt) */
+    alignas(16) int32_t abort_code;      /* not 0: nothing after this does anything (its reason, enum cuda_abort) */
     int32_t bodies, pairs, points; /* this step's */
 };
 
 /* Of the constraint graph; in device memory, copied to the host on demand. */
-struct cuda_facts {
+struct cuda_graph_statistics {
     int32_t islands;         /* bodies joined by constraints; a lone body is one; 0: not looked for */
-    int32_t island_bodies, island_halves; /* of the largest (each maximum separately) */
-    int32_t halves;          /* all */
-    int32_t degree;          /* most halves of one body */
+    int32_t island_bodies, island_sides; /* of the largest (each maximum separately) */
+    int32_t sides;          /* all */
+    int32_t degree;          /* most sides of one body */
     int32_t point_slots;     /* most points of a pair */
     int32_t rough;           /* pairs with friction > 0 */
     int32_t warm;            /* pairs with any impulse != 0 at the start; 0 where the start is cold anyway */
-    int32_t part_halves, part_bodies; /* largest part of the partition made last */
+    int32_t part_sides, part_bodies; /* largest part of the partition made last */
 };
 
 /* The host's choice, before the layout is made. */
@@ -51,8 +51,8 @@ struct cuda_partition {
     int32_t parts;           /* thread blocks */
     int32_t cluster;         /* blocks a cluster, 1: none; parts is a multiple of it */
     int32_t threads;         /* a block */
-    int32_t most_halves, most_bodies; /* a part may have; a part with more sets live->halt = HALT_PARTITION */
-    size_t shared;           /* bytes a block, for most_halves and most_bodies */
+    int32_t most_sides, most_bodies; /* a part may have; a part with more sets live->abort_code = ABORT_PARTITION */
+    size_t shared;           /* bytes a block, for most_sides and most_bodies */
     bool islands;            /* slots by island in GRID and STREAM too */
 };
 
@@ -60,7 +60,7 @@ struct cuda_partition {
  * constraint and parts + 1. */
 struct cuda_layout_copy {
     struct cuda_live live;
-    struct cuda_facts facts;
+    struct cuda_graph_statistics statistics;
     int32_t *body_of, *slot_of, *offsets, *incident, *parts;
     bool one_block; /* made by the kernel for small scenes */
 };

@@ -9,53 +9,57 @@ static __device__ __forceinline__ int32_t thread_index(void)
 
 static int64_t blocks_for(int64_t threads) { return (threads + LAYOUT_THREADS - 1) / LAYOUT_THREADS; }
 
-/* No more than run at once, each going on through the records or bodies: facts take few atomics on one place. */
+/* No more than run at once, each going on through the records or bodies: statistics take few atomics on one place. */
 static int64_t few_blocks_for(const struct layout_view *v, int64_t threads)
 {
     return blocks_for(threads) < v->most_blocks ? blocks_for(threads) : v->most_blocks;
 }
 
-/* ---- survey ---------------------------------------------------------------------------------------------------- */
+/* ---- statistics ----------------------------------------------------------------------------------------------------
+ */
 
 static __global__ void clear_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
 {
-    if (v.live->halt) return;
+    if (v.live->abort_code) return;
     const int32_t i = thread_index();
     if (i == 0) {
-        cuda_facts none = {};
-        *v.facts = none;
+        cuda_graph_statistics none = {};
+        *v.statistics = none;
     }
     if (i < v.bodies) clear_body(v, i);
 }
 
-/* A stage whose threads find facts: for_each(base, facts) is called for the thread's items base + threadIdx.x. */
-template <class F> static __device__ __forceinline__ void find_facts(const layout_view &v, int32_t count, F for_each)
+/* A stage whose threads find statistics: for_each(base, statistics) is called for the thread's items base +
+ * threadIdx.x. */
+template <class F>
+static __device__ __forceinline__ void find_statistics(const layout_view &v, int32_t count, F for_each)
 {
     LAYOUT_SHARED(memory);
-    cuda_facts *block = (cuda_facts *)memory, own = {};
+    cuda_graph_statistics *block = (cuda_graph_statistics *)memory, own = {};
     if (threadIdx.x == 0) *block = own;
     __syncthreads();
     for (int32_t base = (int32_t)blockIdx.x * LAYOUT_THREADS; base < count; base += (int32_t)gridDim.x * LAYOUT_THREADS)
         for_each(base + (int32_t)threadIdx.x, &own);
-    gather_facts(block, own);
-    if (threadIdx.x == 0) merge_facts(v.facts, *block);
+    gather_statistics(block, own);
+    if (threadIdx.x == 0) merge_statistics(v.statistics, *block);
 }
 
 static __global__ void __launch_bounds__(LAYOUT_THREADS)
     records_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args args)
 {
-    if (v.live->halt) return;
-    const int32_t pairs = v.live->pairs, records = v.pair_room + v.rows;
-    find_facts(v, records, [&](int32_t record, cuda_facts *own) {
-        if (record < records) survey_record<false>(v, record, pairs, args.islands, own);
+    if (v.live->abort_code) return;
+    const int32_t pairs = v.live->pairs, records = v.pair_capacity + v.rows;
+    find_statistics(v, records, [&](int32_t record, cuda_graph_statistics *own) {
+        if (record < records) statistics_of_record<false>(v, record, pairs, args.islands, own);
     });
 }
 
 static __global__ void __launch_bounds__(LAYOUT_THREADS)
     bodies_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args args)
 {
-    if (v.live->halt) return;
-    find_facts(v, v.bodies, [&](int32_t i, cuda_facts *own) { survey_body<false>(v, i, args.islands, own); });
+    if (v.live->abort_code) return;
+    find_statistics(v, v.bodies,
+                    [&](int32_t i, cuda_graph_statistics *own) { statistics_of_body<false>(v, i, args.islands, own); });
 }
 
 /* ---- layout ---------------------------------------------------------------------------------------------------- */
@@ -63,23 +67,23 @@ static __global__ void __launch_bounds__(LAYOUT_THREADS)
 static __global__ void slots_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
 {
     const int32_t s = thread_index();
-    if (s < v.bodies && !v.live->halt) v.slot_of[v.body_of[s]] = s;
+    if (s < v.bodies && !v.live->abort_code) v.slot_of[v.body_of[s]] = s;
 }
 
-static __global__ void half_slots_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
+static __global__ void side_slots_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
 {
     const int32_t h = thread_index();
-    if (h >= 2 * (v.pair_room + v.rows) || v.live->halt) return;
-    const int32_t body = v.half_body[h];
-    v.half_slot[h] = body < v.bodies ? v.slot_of[body] : v.bodies;
+    if (h >= 2 * (v.pair_capacity + v.rows) || v.live->abort_code) return;
+    const int32_t body = v.side_body[h];
+    v.side_slot[h] = body < v.bodies ? v.slot_of[body] : v.bodies;
 }
 
-/* Where each body's halves begin among the sorted ones; slots that are raw indices. */
+/* Where each body's sides begin among the sorted ones; slots that are raw indices. */
 static __global__ void offsets_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args args)
 {
     const int32_t s = thread_index();
-    if (s > v.bodies || v.live->halt) return;
-    int32_t first = 0, last = v.facts->halves;
+    if (s > v.bodies || v.live->abort_code) return;
+    int32_t first = 0, last = v.statistics->sides;
     while (first < last) {
         int32_t middle = first + (last - first) / 2;
         if (v.sorted[middle] < s) first = middle + 1;
@@ -87,14 +91,14 @@ static __global__ void offsets_kernel(const __grid_constant__ layout_view v, con
     }
     v.offsets[s] = first;
     if (s < v.bodies && !args.islands) v.body_of[s] = v.slot_of[s] = s;
-    if (s == 0) v.facts->part_halves = v.facts->part_bodies = 0;
+    if (s == 0) v.statistics->part_sides = v.statistics->part_bodies = 0;
 }
 
 static __global__ void __launch_bounds__(ONE_BLOCK_THREADS)
     parts_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args args)
 {
     LAYOUT_SHARED(memory);
-    if (!v.live->halt) make_parts(v, args.partition, ONE_BLOCK_THREADS, (int32_t *)memory);
+    if (!v.live->abort_code) make_parts(v, args.partition, ONE_BLOCK_THREADS, (int32_t *)memory);
 }
 
 static __global__ void number_kernel(const __grid_constant__ layout_view v, const __grid_constant__ layout_args)
@@ -112,14 +116,15 @@ static __global__ void number_kernel(const __grid_constant__ layout_view v, cons
         if (launch_code != cudaSuccess) return launch_code;                                                   \
     } while (0)
 
-cudaError_t LAYOUT(survey)(const struct layout_view *v, bool islands, cudaStream_t stream, const char **kernel)
+cudaError_t LAYOUT(statistics)(const struct layout_view *v, bool islands, cudaStream_t stream, const char **kernel)
 {
     layout_args args = {};
     args.islands = islands;
-    LAUNCH(clear_kernel, "survey (clear)", blocks_for((int64_t)v->bodies + 1), LAYOUT_THREADS, 0);
-    LAUNCH(records_kernel, "survey (records)", few_blocks_for(v, (int64_t)v->pair_room + v->rows), LAYOUT_THREADS,
-           sizeof(cuda_facts));
-    LAUNCH(bodies_kernel, "survey (bodies)", few_blocks_for(v, v->bodies), LAYOUT_THREADS, sizeof(cuda_facts));
+    LAUNCH(clear_kernel, "statistics (clear)", blocks_for((int64_t)v->bodies + 1), LAYOUT_THREADS, 0);
+    LAUNCH(records_kernel, "statistics (records)", few_blocks_for(v, (int64_t)v->pair_capacity + v->rows),
+           LAYOUT_THREADS, sizeof(cuda_graph_statistics));
+    LAUNCH(bodies_kernel, "statistics (bodies)", few_blocks_for(v, v->bodies), LAYOUT_THREADS,
+           sizeof(cuda_graph_statistics));
     return cudaSuccess;
 }
 
@@ -143,7 +148,7 @@ static cudaError_t sort(const struct layout_view *v, const int32_t *keys, int32_
 cudaError_t LAYOUT(make)(const struct layout_view *v, const struct cuda_partition *partition, cudaStream_t stream,
                          const char **kernel)
 {
-    const int32_t halves = 2 * (v->pair_room + v->rows);
+    const int32_t sides = 2 * (v->pair_capacity + v->rows);
     layout_args args = {};
     cudaError_t code;
     args.islands = slots_by_island(partition);
@@ -153,10 +158,10 @@ cudaError_t LAYOUT(make)(const struct layout_view *v, const struct cuda_partitio
         code = sort(v, v->label, v->sorted_label, v->body_of, v->bodies, stream);
         if (code != cudaSuccess) return code;
         LAUNCH(slots_kernel, "layout (slots)", blocks_for(v->bodies), LAYOUT_THREADS, 0);
-        LAUNCH(half_slots_kernel, "layout (slots of halves)", blocks_for(halves), LAYOUT_THREADS, 0);
+        LAUNCH(side_slots_kernel, "layout (slots of sides)", blocks_for(sides), LAYOUT_THREADS, 0);
     }
-    *kernel = "layout (sort of halves)";
-    code = sort(v, args.islands ? v->half_slot : v->half_body, v->sorted, v->incident, halves, stream);
+    *kernel = "layout (sort of sides)";
+    code = sort(v, args.islands ? v->side_slot : v->side_body, v->sorted, v->incident, sides, stream);
     if (code != cudaSuccess) return code;
     LAUNCH(offsets_kernel, "layout (offsets)", blocks_for((int64_t)v->bodies + 1), LAYOUT_THREADS, 0);
     if (partition->tier != SADMM_CUDA_TIER_STREAM)
@@ -164,17 +169,17 @@ cudaError_t LAYOUT(make)(const struct layout_view *v, const struct cuda_partitio
     return cudaSuccess;
 }
 
-cudaError_t LAYOUT(temp_bytes)(int32_t bodies, int32_t halves, size_t *bytes)
+cudaError_t LAYOUT(temp_bytes)(int32_t bodies, int32_t sides, size_t *bytes)
 {
-    size_t of_bodies = 0, of_halves = 0;
+    size_t of_bodies = 0, of_sides = 0;
     cudaError_t code = cudaSuccess;
     if (bodies > 0)
         code = COLLISION(sort_numbers)(nullptr, &of_bodies, nullptr, nullptr, nullptr, nullptr, bodies, bits_of(bodies),
                                        nullptr);
-    if (code == cudaSuccess && halves > 0)
-        code = COLLISION(sort_numbers)(nullptr, &of_halves, nullptr, nullptr, nullptr, nullptr, halves, bits_of(bodies),
+    if (code == cudaSuccess && sides > 0)
+        code = COLLISION(sort_numbers)(nullptr, &of_sides, nullptr, nullptr, nullptr, nullptr, sides, bits_of(bodies),
                                        nullptr);
-    *bytes = of_bodies > of_halves ? of_bodies : of_halves;
+    *bytes = of_bodies > of_sides ? of_bodies : of_sides;
     return code;
 }
 

@@ -1,35 +1,35 @@
 /* The whole layout of a small scene by one block, in shared memory (graph/layout_view.h). */
 #include "layout_steps.h"
 
-/* A body or half to be sorted is one number, key << ITEM_BITS | index: indices ascend within a key. */
+/* A body or side to be sorted is one number, key << ITEM_BITS | index: indices ascend within a key. */
 enum { ITEM_BITS = 20, KEY_BITS = 32 - ITEM_BITS, DIGIT_BITS = 6, DIGITS = 1 << DIGIT_BITS };
 enum { WARPS = ONE_BLOCK_THREADS / LAYOUT_WARP, COUNTERS = DIGITS * WARPS };
 
 struct one_block_memory {
-    cuda_facts *facts;
+    cuda_graph_statistics *statistics;
     int32_t *most;                                           /* 2 */
-    int32_t *label, *degree, *island_bodies, *island_halves; /* bodies */
+    int32_t *label, *degree, *island_bodies, *island_sides; /* bodies */
     int32_t *body_of, *slot_of, *offsets;                    /* bodies, bodies, bodies + 1 */
     int32_t *counters, *totals;                              /* COUNTERS, WARPS */
-    uint32_t *items, *sorted;                                /* halves or bodies, what there are more of */
+    uint32_t *items, *sorted;                                /* sides or bodies, what there are more of */
 };
 
 /* One description for its size and its addresses (base NULL: only that). */
-static __host__ __device__ inline size_t place(one_block_memory *m, unsigned char *base, int32_t bodies, int32_t halves)
+static __host__ __device__ inline size_t place(one_block_memory *m, unsigned char *base, int32_t bodies, int32_t sides)
 {
-    const size_t n = (size_t)bodies, items = (size_t)(halves > bodies ? halves : bodies);
+    const size_t n = (size_t)bodies, items = (size_t)(sides > bodies ? sides : bodies);
     size_t used = 0;
     auto take = [&](size_t bytes) {
         size_t at = used;
         used += (bytes + 15) / 16 * 16;
         return base ? base + at : nullptr;
     };
-    m->facts = (cuda_facts *)take(sizeof(cuda_facts));
+    m->statistics = (cuda_graph_statistics *)take(sizeof(cuda_graph_statistics));
     m->most = (int32_t *)take(2 * sizeof(int32_t));
     m->label = (int32_t *)take(n * sizeof(int32_t));
     m->degree = (int32_t *)take(n * sizeof(int32_t));
     m->island_bodies = (int32_t *)take(n * sizeof(int32_t));
-    m->island_halves = (int32_t *)take(n * sizeof(int32_t));
+    m->island_sides = (int32_t *)take(n * sizeof(int32_t));
     m->body_of = (int32_t *)take(n * sizeof(int32_t));
     m->slot_of = (int32_t *)take(n * sizeof(int32_t));
     m->offsets = (int32_t *)take((n + 1) * sizeof(int32_t));
@@ -115,38 +115,40 @@ static __device__ uint32_t *sort(uint32_t *from, uint32_t *to, int32_t count, in
 
 /* ---- stages ---------------------------------------------------------------------------------------------------- */
 
-static __device__ void survey(const layout_view &v, const layout_view &global, bool islands)
+static __device__ void statistics(const layout_view &v, const layout_view &global, bool islands)
 {
     const int32_t t = (int32_t)threadIdx.x, pairs = v.live->pairs;
-    cuda_facts own = {};
-    if (t == 0) *v.facts = own;
+    cuda_graph_statistics own = {};
+    if (t == 0) *v.statistics = own;
     for (int32_t i = t; i < v.bodies; i += ONE_BLOCK_THREADS) clear_body(v, i);
     __syncthreads();
     for (int32_t k = t; k < pairs + v.rows; k += ONE_BLOCK_THREADS)
-        survey_record<true>(v, k < pairs ? k : v.pair_room + k - pairs, pairs, islands, &own);
+        statistics_of_record<true>(v, k < pairs ? k : v.pair_capacity + k - pairs, pairs, islands, &own);
     __syncthreads();
-    for (int32_t base = 0; base < v.bodies; base += ONE_BLOCK_THREADS) survey_body<true>(v, base + t, islands, &own);
-    gather_facts(v.facts, own);
+    for (int32_t base = 0; base < v.bodies; base += ONE_BLOCK_THREADS)
+        statistics_of_body<true>(v, base + t, islands, &own);
+    gather_statistics(v.statistics, own);
     /* for a layout that is made by a launch of its own */
     for (int32_t i = t; i < v.bodies; i += ONE_BLOCK_THREADS) {
         global.label[i] = v.label[i];
         global.degree[i] = v.degree[i];
         global.island_bodies[i] = v.island_bodies[i];
     }
-    if (t == 0) *global.facts = *v.facts;
+    if (t == 0) *global.statistics = *v.statistics;
 }
 
-/* Are the pairs, body by body, those that the arrays were made for? Then only what may differ is surveyed, into *facts
- * (shared memory). Every thread comes here; `same` is shared. */
-static __device__ bool same_pairs(const layout_view &v, const layout_args &args, int32_t *same, cuda_facts *facts)
+/* Are the pairs, body by body, those that the arrays were made for? Then only what may differ is counted, into
+ * *statistics (shared memory). Every thread comes here; `same` is shared. */
+static __device__ bool same_pairs(const layout_view &v, const layout_args &args, int32_t *same,
+                                  cuda_graph_statistics *statistics)
 {
     const int32_t t = (int32_t)threadIdx.x, pairs = v.live->pairs;
     const struct cuda_partition *now = &args.partition, *kept = &v.kept->partition;
-    cuda_facts own = {};
+    cuda_graph_statistics own = {};
     if (t == 0) {
-        *facts = own;
+        *statistics = own;
         *same = v.kept->valid && v.kept->pairs == pairs && v.rows == 0 && kept->tier == now->tier &&
-                kept->parts == now->parts && kept->cluster == now->cluster && kept->most_halves == now->most_halves &&
+                kept->parts == now->parts && kept->cluster == now->cluster && kept->most_sides == now->most_sides &&
                 kept->most_bodies == now->most_bodies && kept->islands == now->islands;
     }
     __syncthreads();
@@ -155,24 +157,24 @@ static __device__ bool same_pairs(const layout_view &v, const layout_args &args,
     bool differ = false;
     for (int32_t p = t; p < pairs; p += ONE_BLOCK_THREADS) {
         const pair_about about = load_about(&v.pairs[p]);
-        const int2 half = *(const int2 *)&v.half_body[2 * p];
-        differ = differ || half.x != (about.bodies.x >= 0 ? about.bodies.x : v.bodies) ||
-                 half.y != (about.bodies.y >= 0 ? about.bodies.y : v.bodies);
-        survey_pair(v, about, v.pairs[p].friction, &own);
+        const int2 side = *(const int2 *)&v.side_body[2 * p];
+        differ = differ || side.x != (about.bodies.x >= 0 ? about.bodies.x : v.bodies) ||
+                 side.y != (about.bodies.y >= 0 ? about.bodies.y : v.bodies);
+        statistics_of_pair(v, about, v.pairs[p].friction, &own);
     }
     if (differ) atomicMin(same, 0);
     __syncthreads();
     if (!*same) return false;
-    gather_facts(facts, own);
+    gather_statistics(statistics, own);
     if (t == 0) {
-        v.facts->rough = facts->rough;
-        v.facts->warm = facts->warm;
-        v.facts->point_slots = facts->point_slots;
+        v.statistics->rough = statistics->rough;
+        v.statistics->warm = statistics->warm;
+        v.statistics->point_slots = statistics->point_slots;
     }
     return true;
 }
 
-static __device__ void load_survey(const layout_view &v, const layout_view &global)
+static __device__ void load_statistics(const layout_view &v, const layout_view &global)
 {
     for (int32_t i = (int32_t)threadIdx.x; i < v.bodies; i += ONE_BLOCK_THREADS) {
         v.label[i] = global.label[i];
@@ -202,13 +204,13 @@ static __device__ void make_slots(const layout_view &v, const layout_view &globa
     scan(v.offsets, v.bodies + 1, m.totals);
 }
 
-static __device__ void list_halves(const layout_view &v, const layout_view &global, int bits, const one_block_memory &m)
+static __device__ void list_sides(const layout_view &v, const layout_view &global, int bits, const one_block_memory &m)
 {
     const int32_t t = (int32_t)threadIdx.x, of_pairs = 2 * v.live->pairs, count = of_pairs + 2 * v.rows;
     for (int32_t k = t; k < count; k += ONE_BLOCK_THREADS) {
-        const int32_t half = k < of_pairs ? k : 2 * v.pair_room + k - of_pairs, body = v.half_body[half];
+        const int32_t side = k < of_pairs ? k : 2 * v.pair_capacity + k - of_pairs, body = v.side_body[side];
         const int32_t slot = body < v.bodies ? v.slot_of[body] : v.bodies;
-        m.items[k] = (uint32_t)slot << ITEM_BITS | (uint32_t)half;
+        m.items[k] = (uint32_t)slot << ITEM_BITS | (uint32_t)side;
     }
     __syncthreads();
     const uint32_t *order = sort(m.items, m.sorted, count, bits, m.counters, m.totals);
@@ -223,38 +225,38 @@ static __global__ void __launch_bounds__(ONE_BLOCK_THREADS)
     LAYOUT_SHARED(memory);
     one_block_memory m;
     layout_view v = global; /* with the arrays in shared memory where there is one */
-    if (global.live->halt) return;
-    place(&m, memory, v.bodies, 2 * (v.pair_room + v.rows));
+    if (global.live->abort_code) return;
+    place(&m, memory, v.bodies, 2 * (v.pair_capacity + v.rows));
     v.label = m.label;
     v.degree = m.degree;
     v.island_bodies = m.island_bodies;
-    v.island_halves = m.island_halves;
+    v.island_sides = m.island_sides;
     v.body_of = m.body_of;
     v.slot_of = m.slot_of;
     v.offsets = m.offsets;
-    if (args.survey && args.layout && same_pairs(global, args, m.most, m.facts)) return;
+    if (args.statistics && args.layout && same_pairs(global, args, m.most, m.statistics)) return;
     __syncthreads();
-    if (args.survey) {
-        v.facts = m.facts;
-        survey(v, global, args.islands);
-        v.facts = global.facts;
+    if (args.statistics) {
+        v.statistics = m.statistics;
+        statistics(v, global, args.islands);
+        v.statistics = global.statistics;
         __syncthreads();
     } else {
-        load_survey(v, global);
+        load_statistics(v, global);
     }
     if (!args.layout) {
-        if (threadIdx.x == 0) global.kept->valid = 0; /* half_body is another step's now */
+        if (threadIdx.x == 0) global.kept->valid = 0; /* side_body is another step's now */
         return;
     }
     int bits = 1;
     while (v.bodies >> bits) ++bits;
     make_slots(v, global, slots_by_island(&args.partition), bits, m);
-    list_halves(v, global, bits, m);
+    list_sides(v, global, bits, m);
     if (args.partition.tier != SADMM_CUDA_TIER_STREAM) make_parts(v, args.partition, ONE_BLOCK_THREADS, m.most);
-    else if (threadIdx.x == 0) v.facts->part_halves = v.facts->part_bodies = 0;
+    else if (threadIdx.x == 0) v.statistics->part_sides = v.statistics->part_bodies = 0;
     __syncthreads();
     if (threadIdx.x == 0) {
-        global.kept->valid = global.live->halt == HALT_NONE;
+        global.kept->valid = global.live->abort_code == ABORT_NONE;
         global.kept->pairs = global.live->pairs;
         global.kept->partition = args.partition;
     }
@@ -262,11 +264,11 @@ static __global__ void __launch_bounds__(ONE_BLOCK_THREADS)
 
 /* ---- launch ---------------------------------------------------------------------------------------------------- */
 
-size_t LAYOUT(one_block_shared)(int32_t bodies, int32_t halves)
+size_t LAYOUT(one_block_shared)(int32_t bodies, int32_t sides)
 {
     one_block_memory unused;
-    if (bodies >> KEY_BITS || halves >> ITEM_BITS) return SIZE_MAX;
-    return place(&unused, nullptr, bodies, halves);
+    if (bodies >> KEY_BITS || sides >> ITEM_BITS) return SIZE_MAX;
+    return place(&unused, nullptr, bodies, sides);
 }
 
 cudaError_t LAYOUT(one_block_allow)(int bytes)
@@ -274,15 +276,15 @@ cudaError_t LAYOUT(one_block_allow)(int bytes)
     return cudaFuncSetAttribute((const void *)one_block_kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, bytes);
 }
 
-cudaError_t LAYOUT(one_block)(const struct layout_view *v, bool with_survey, bool islands,
+cudaError_t LAYOUT(one_block)(const struct layout_view *v, bool with_statistics, bool islands,
                               const struct cuda_partition *partition, cudaStream_t stream, const char **kernel)
 {
     layout_args args = {};
-    args.survey = with_survey;
+    args.statistics = with_statistics;
     args.islands = islands;
     args.layout = partition != nullptr;
     if (partition) args.partition = *partition;
     *kernel = "layout (one block)";
     return layout_launch(one_block_kernel, 1, ONE_BLOCK_THREADS,
-                         LAYOUT(one_block_shared)(v->bodies, 2 * (v->pair_room + v->rows)), v, &args, stream);
+                         LAYOUT(one_block_shared)(v->bodies, 2 * (v->pair_capacity + v->rows)), v, &args, stream);
 }

@@ -29,31 +29,31 @@ LAYOUT_INLINE int32_t warp_max(int32_t value)
 }
 
 /* Of one thread, block or launch into what is known so far. */
-LAYOUT_INLINE void merge_facts(struct cuda_facts *to, const cuda_facts &own)
+LAYOUT_INLINE void merge_statistics(struct cuda_graph_statistics *to, const cuda_graph_statistics &own)
 {
     if (own.islands) atomicAdd(&to->islands, own.islands);
-    if (own.halves) atomicAdd(&to->halves, own.halves);
+    if (own.sides) atomicAdd(&to->sides, own.sides);
     if (own.rough) atomicAdd(&to->rough, own.rough);
     if (own.warm) atomicAdd(&to->warm, own.warm);
     if (own.island_bodies) atomicMax(&to->island_bodies, own.island_bodies);
-    if (own.island_halves) atomicMax(&to->island_halves, own.island_halves);
+    if (own.island_sides) atomicMax(&to->island_sides, own.island_sides);
     if (own.degree) atomicMax(&to->degree, own.degree);
     if (own.point_slots) atomicMax(&to->point_slots, own.point_slots);
 }
 
-/* Facts of the block's threads into *block (shared memory, 0 before). Every thread comes here. */
-LAYOUT_INLINE void gather_facts(struct cuda_facts *block, const cuda_facts &own)
+/* Graph statistics of the block's threads into *block (shared memory, 0 before). Every thread comes here. */
+LAYOUT_INLINE void gather_statistics(struct cuda_graph_statistics *block, const cuda_graph_statistics &own)
 {
-    cuda_facts warp = {};
+    cuda_graph_statistics warp = {};
     warp.islands = warp_sum(own.islands);
-    warp.halves = warp_sum(own.halves);
+    warp.sides = warp_sum(own.sides);
     warp.rough = warp_sum(own.rough);
     warp.warm = warp_sum(own.warm);
     warp.island_bodies = warp_max(own.island_bodies);
-    warp.island_halves = warp_max(own.island_halves);
+    warp.island_sides = warp_max(own.island_sides);
     warp.degree = warp_max(own.degree);
     warp.point_slots = warp_max(own.point_slots);
-    if (threadIdx.x % LAYOUT_WARP == 0) merge_facts(block, warp);
+    if (threadIdx.x % LAYOUT_WARP == 0) merge_statistics(block, warp);
     __syncthreads();
 }
 
@@ -98,12 +98,13 @@ template <bool SHARED> LAYOUT_INLINE void join_bodies(int32_t *parents, int32_t 
     }
 }
 
-/* ---- survey ---------------------------------------------------------------------------------------------------- */
+/* ---- statistics ----------------------------------------------------------------------------------------------------
+ */
 
 LAYOUT_INLINE void clear_body(const layout_view &v, int32_t i)
 {
     v.label[i] = i;
-    v.degree[i] = v.island_bodies[i] = v.island_halves[i] = 0;
+    v.degree[i] = v.island_bodies[i] = v.island_sides[i] = 0;
 }
 
 LAYOUT_INLINE bool starts_warm(const layout_view &v, int32_t first, int32_t count)
@@ -129,47 +130,51 @@ LAYOUT_INLINE pair_about load_about(const sadmm_contact_pair *pair)
 }
 
 /* What may differ between steps of the same pairs. */
-LAYOUT_INLINE void survey_pair(const layout_view &v, const pair_about &about, double friction, cuda_facts *own)
+LAYOUT_INLINE void statistics_of_pair(const layout_view &v, const pair_about &about, double friction,
+                                      cuda_graph_statistics *own)
 {
     own->point_slots = larger(own->point_slots, about.points.y);
     own->rough += friction > 0;
     if (v.warm_start) own->warm += starts_warm(v, about.points.x, about.points.y);
 }
 
-/* A pair (record < pairs), a row block (record >= pair_room) or none. */
+/* A pair (record < pairs), a row block (record >= pair_capacity) or none. */
 template <bool SHARED>
-LAYOUT_INLINE void survey_record(const layout_view &v, int32_t record, int32_t pairs, bool islands, cuda_facts *own)
+LAYOUT_INLINE void statistics_of_record(const layout_view &v, int32_t record, int32_t pairs, bool islands,
+                                        cuda_graph_statistics *own)
 {
     int32_t body[2] = {-1, -1};
     if (record < pairs) {
         const pair_about about = load_about(&v.pairs[record]);
         body[0] = about.bodies.x;
         body[1] = about.bodies.y;
-        survey_pair(v, about, v.pairs[record].friction, own);
-    } else if (record >= v.pair_room) {
-        const sadmm_problem_block &block = v.blocks[record - v.pair_room];
+        statistics_of_pair(v, about, v.pairs[record].friction, own);
+    } else if (record >= v.pair_capacity) {
+        const sadmm_problem_block &block = v.blocks[record - v.pair_capacity];
         body[0] = block.body_a;
         body[1] = block.body_b;
     }
     for (int side = 0; side < 2; ++side) {
-        bool is_half = body[side] >= 0;
-        v.half_body[2 * record + side] = is_half ? body[side] : v.bodies;
-        if (!is_half) continue;
+        bool is_side = body[side] >= 0;
+        v.side_body[2 * record + side] = is_side ? body[side] : v.bodies;
+        if (!is_side) continue;
         atomicAdd(&v.degree[body[side]], 1);
-        ++own->halves;
+        ++own->sides;
     }
     if (islands && body[0] >= 0 && body[1] >= 0) join_bodies<SHARED>(v.label, body[0], body[1]);
 }
 
-/* The running total is largest when it is complete: the facts do not depend on who comes last. */
-LAYOUT_INLINE void add_to_island(const layout_view &v, int32_t label, int32_t bodies, int32_t halves, cuda_facts *own)
+/* The running total is largest when it is complete: the statistics do not depend on who comes last. */
+LAYOUT_INLINE void add_to_island(const layout_view &v, int32_t label, int32_t bodies, int32_t sides,
+                                 cuda_graph_statistics *own)
 {
     own->island_bodies = larger(own->island_bodies, atomicAdd(&v.island_bodies[label], bodies) + bodies);
-    own->island_halves = larger(own->island_halves, atomicAdd(&v.island_halves[label], halves) + halves);
+    own->island_sides = larger(own->island_sides, atomicAdd(&v.island_sides[label], sides) + sides);
 }
 
 /* Label body i; `own` gets what is known of bodies and islands. Every lane of the warp comes here, i ascending. */
-template <bool SHARED> LAYOUT_INLINE void survey_body(const layout_view &v, int32_t i, bool islands, cuda_facts *own)
+template <bool SHARED>
+LAYOUT_INLINE void statistics_of_body(const layout_view &v, int32_t i, bool islands, cuda_graph_statistics *own)
 {
     const bool live = i < v.bodies;
     const int32_t degree = live ? v.degree[i] : 0;
@@ -180,9 +185,9 @@ template <bool SHARED> LAYOUT_INLINE void survey_body(const layout_view &v, int3
     own->islands += live && label == i;
     /* Neighbours are mostly of one island: those of the first lane's go together. */
     const bool together = label == __shfl_sync(WHOLE_WARP, label, 0, LAYOUT_WARP);
-    const int32_t bodies = warp_sum(together), halves = warp_sum(together ? degree : 0);
+    const int32_t bodies = warp_sum(together), sides = warp_sum(together ? degree : 0);
     if (!live) return;
-    if (i % LAYOUT_WARP == 0) add_to_island(v, label, bodies, halves, own);
+    if (i % LAYOUT_WARP == 0) add_to_island(v, label, bodies, sides, own);
     else if (!together) add_to_island(v, label, 1, degree, own);
 }
 
@@ -224,7 +229,7 @@ LAYOUT_INLINE int32_t part_begin(const layout_view &v, const cuda_partition &par
 LAYOUT_INLINE void make_parts(const layout_view &v, const cuda_partition &partition, int32_t threads, int32_t *most)
 {
     const int32_t t = (int32_t)threadIdx.x;
-    int32_t halves = 0, bodies = 0;
+    int32_t sides = 0, bodies = 0;
     if (t < 2) most[t] = 0;
     __syncthreads();
     for (int32_t p = t; p <= partition.parts; p += threads) {
@@ -232,20 +237,20 @@ LAYOUT_INLINE void make_parts(const layout_view &v, const cuda_partition &partit
         v.parts[p] = begin;
         if (p == partition.parts) continue;
         const int32_t end = part_begin(v, partition, p + 1);
-        halves = larger(halves, v.offsets[end] - v.offsets[begin]);
+        sides = larger(sides, v.offsets[end] - v.offsets[begin]);
         bodies = larger(bodies, end - begin);
     }
-    halves = warp_max(halves);
+    sides = warp_max(sides);
     bodies = warp_max(bodies);
     if (t % LAYOUT_WARP == 0) {
-        atomicMax(&most[0], halves);
+        atomicMax(&most[0], sides);
         atomicMax(&most[1], bodies);
     }
     __syncthreads();
     if (t > 0) return;
-    v.facts->part_halves = most[0];
-    v.facts->part_bodies = most[1];
-    if (most[0] > partition.most_halves || most[1] > partition.most_bodies) v.live->halt = HALT_PARTITION;
+    v.statistics->part_sides = most[0];
+    v.statistics->part_bodies = most[1];
+    if (most[0] > partition.most_sides || most[1] > partition.most_bodies) v.live->abort_code = ABORT_PARTITION;
 }
 
 #endif

@@ -1,9 +1,9 @@
 /* The layout (graph/layout.h) of a step, made on the device from core's own pairs and blocks: compiled once, for both
  * precisions.
  *
- *   survey    a thread a record: facts of the pairs, the body of every half, degrees, islands joined
- *             a thread a body: islands labelled by their smallest body, facts of the bodies
- *   layout    bodies sorted by label (where islands matter), halves sorted by slot, both stably; where a body's halves
+ *   statistics    a thread a record: statistics of the pairs, the body of every side, degrees, islands joined
+ *             a thread a body: islands labelled by their smallest body, statistics of the bodies
+ *   layout    bodies sorted by label (where islands matter), sides sorted by slot, both stably; where a body's sides
  *             begin; parts
  *
  * Islands are a union-find forest whose roots are only ever hooked under smaller ones (Jaiganesh and Burtscher, A
@@ -30,22 +30,22 @@ struct layout_kept {
     struct cuda_partition partition;
 };
 
-/* Device memory. A half that is none (no pair, a static side) has body and slot `bodies`. */
+/* Device memory. A side that is none (no pair, a static side) has body and slot `bodies`. */
 struct layout_view {
     struct cuda_live *live;
-    struct cuda_facts *facts;
+    struct cuda_graph_statistics *statistics;
     const struct sadmm_contact_pair *pairs;
     const struct sadmm_contact_point *points;
     const struct sadmm_problem_block *blocks;
-    int32_t bodies, pair_room, rows; /* as in cuda_view */
+    int32_t bodies, pair_capacity, rows; /* as in cuda_view */
     int32_t warm_start;
     int32_t most_blocks; /* that run at once */
 
     int32_t *label, *degree;                 /* by raw body; label: its island's smallest body */
-    int32_t *island_bodies, *island_halves;  /* by label */
-    int32_t *half_body, *half_slot, *sorted; /* 2 (pair_room + rows): raw body, slot, slots sorted */
+    int32_t *island_bodies, *island_sides;  /* by label */
+    int32_t *side_body, *side_slot, *sorted; /* 2 (pair_capacity + rows): raw body, slot, slots sorted */
     int32_t *sorted_label;                   /* bodies */
-    const int32_t *numbers;                  /* 0, 1, ...: at least as many as halves or bodies */
+    const int32_t *numbers;                  /* 0, 1, ...: at least as many as sides or bodies */
     void *temp;                              /* of the sorts */
     size_t temp_bytes;
 
@@ -55,8 +55,8 @@ struct layout_view {
 
 /* Which stages, and what of them. */
 struct layout_args {
-    int32_t survey, layout; /* of one_block: which */
-    int32_t islands;        /* survey: look for them; layout: slots by island */
+    int32_t statistics, layout; /* of one_block: which */
+    int32_t islands;        /* statistics: look for them; layout: slots by island */
     struct cuda_partition partition;
 };
 
@@ -72,17 +72,17 @@ static __host__ __device__ inline bool slots_by_island(const struct cuda_partiti
 #endif
 
 /* On failure *kernel tells what was launched; after success, what was launched last. */
-cudaError_t LAYOUT(survey)(const struct layout_view *, bool islands, cudaStream_t stream, const char **kernel);
+cudaError_t LAYOUT(statistics)(const struct layout_view *, bool islands, cudaStream_t stream, const char **kernel);
 cudaError_t LAYOUT(make)(const struct layout_view *, const struct cuda_partition *, cudaStream_t stream,
                          const char **kernel);
-/* Either or both by one block: survey, and a layout where there is a partition. `shared`: bytes it takes, SIZE_MAX:
+/* Either or both by one block: statistics, and a layout where there is a partition. `shared`: bytes it takes, SIZE_MAX:
  * such a scene is too large. `allow`: let it take so many. */
-size_t LAYOUT(one_block_shared)(int32_t bodies, int32_t halves);
+size_t LAYOUT(one_block_shared)(int32_t bodies, int32_t sides);
 cudaError_t LAYOUT(one_block_allow)(int bytes);
-cudaError_t LAYOUT(one_block)(const struct layout_view *, bool survey, bool islands, const struct cuda_partition *,
+cudaError_t LAYOUT(one_block)(const struct layout_view *, bool statistics, bool islands, const struct cuda_partition *,
                               cudaStream_t stream, const char **kernel);
 /* What view.temp has to hold. */
-cudaError_t LAYOUT(temp_bytes)(int32_t bodies, int32_t halves, size_t *bytes);
+cudaError_t LAYOUT(temp_bytes)(int32_t bodies, int32_t sides, size_t *bytes);
 /* view.numbers */
 cudaError_t LAYOUT(number)(int32_t *numbers, int32_t count, cudaStream_t stream, const char **kernel);
 

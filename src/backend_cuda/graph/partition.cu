@@ -1,17 +1,18 @@
-/* Which tier a step runs in, on how many thread blocks of how many threads: from facts of its constraint graph.
+/* Which tier a step runs in, on how many thread blocks of how many threads: from statistics of its constraint graph.
  *
- * A part costs its halves + its bodies, and the layout gives every part an even share of all cost, rounded up to whole
+ * A part costs its sides + its bodies, and the layout gives every part an even share of all cost, rounded up to whole
  * islands (BLOCK, CLUSTER) or bodies (GRID). That bounds the largest part before it is made. The rooms of a launch
- * (threads, shared memory) are sized above the bound: facts may be those of a step before, and contacts come and go.
+ * (threads, shared memory) are sized above the bound: statistics may be those of a step before, and contacts come and
+ * go.
  *
  * Which tier. An iteration takes what its barrier and its longest chain of dependent instructions take, and then the time
- * a multiprocessor needs for the halves it holds: its warps take turns. A thread block to an island has the cheapest
+ * a multiprocessor needs for the sides it holds: its warps take turns. A thread block to an island has the cheapest
  * barrier; a cluster shares an island among 2 to 16 multiprocessors, and pays for it with a dearer barrier and velocities
  * from other multiprocessors; the grid shares among all of them, through memory. Whatever fits and is estimated to be
  * the fastest is taken, which comes to this:
- *   BLOCK    islands of up to about a hundred halves, and larger ones where there are so many islands that every
+ *   BLOCK    islands of up to about a hundred sides, and larger ones where there are so many islands that every
  *            multiprocessor has enough to do anyway
- *   CLUSTER  else, whenever a cluster can hold an island: its size such that a block holds some tens of halves, or as
+ *   CLUSTER  else, whenever a cluster can hold an island: its size such that a block holds some tens of sides, or as
  *            large as leaves one for every island
  *   GRID     an island that no cluster can hold, or a few that do not fit side by side
  *   STREAM   what the device cannot hold at once
@@ -19,15 +20,15 @@
 #include "backend_cuda/device/context.h"
 
 enum {
-    QUAD = 4,          /* threads a half */
-    SPREAD = 48,       /* halves a block of the grid at least: below that, barriers of more blocks cost more than they gain */
+    QUAD = 4,          /* threads a side */
+    SPREAD = 48,       /* sides a block of the grid at least: below that, barriers of more blocks cost more than they gain */
     MOST_BLOCKS = 16,  /* thread blocks a multiprocessor */
     MOST_CLUSTER = 16  /* thread blocks a cluster */
 };
 
-/* Nanoseconds of an iteration: floors of the tiers, of a cluster for each of its blocks, and of each half that a
+/* Nanoseconds of an iteration: floors of the tiers, of a cluster for each of its blocks, and of each side that a
  * multiprocessor holds. For an H200 and f32; how they compare is all that matters. */
-enum { BLOCK_TIME = 350, CLUSTER_TIME = 580, MEMBER_TIME = 8, GRID_TIME = 1900, HALF_TIME = 3 };
+enum { BLOCK_TIME = 350, CLUSTER_TIME = 580, MEMBER_TIME = 8, GRID_TIME = 1900, SIDE_TIME = 3 };
 
 /* A partition, why there is none (else NULL), and its nanoseconds an iteration. */
 struct choice {
@@ -41,54 +42,59 @@ static int64_t larger(int64_t a, int64_t b) { return a > b ? a : b; }
 /* a / b, rounded up. */
 static int64_t up(int64_t a, int64_t b) { return (a + b - 1) / b; }
 
-/* What a part may have at most: halves by threads, bodies by shared memory. */
+/* What a part may have at most: sides by threads, bodies by shared memory. */
 struct bound {
-    int64_t halves, bodies;
+    int64_t sides, bodies;
 };
 
 /* Threads for a part within the bound, with an eighth to spare; beyond `most` there is no margin, then no room. */
 static int64_t threads_for(struct bound bound, int64_t most)
 {
-    int64_t wanted = larger(QUAD * (bound.halves + bound.halves / 8), LANES * bound.bodies);
+    int64_t wanted = larger(QUAD * (bound.sides + bound.sides / 8), LANES * bound.bodies);
     /* Bodies beyond one for each eight threads take turns. */
-    wanted = larger(smaller(wanted, most), QUAD * bound.halves);
+    wanted = larger(smaller(wanted, most), QUAD * bound.sides);
     return up(larger(wanted, 1), WARP) * WARP;
 }
 
 /* Let the partition's blocks have `bytes` of shared memory each; false: the bound does not fit. */
-static bool take_room(const struct sadmm_context *c, struct cuda_partition *partition, struct bound bound, int64_t bytes)
+static bool take_capacity(const struct sadmm_context *c, struct cuda_partition *partition, struct bound bound,
+                          int64_t bytes)
 {
     bool rows = c->view.rows > 0;
     int64_t low = bound.bodies, high = larger(c->view.bodies, low);
-    partition->most_halves = partition->threads / QUAD;
+    partition->most_sides = partition->threads / QUAD;
     if (partition->threads == WARP && bound.bodies > WARP / LANES) return false;
-    if ((int64_t)CUDA(resident_shared)(partition->tier, partition->threads, (int32_t)low, rows) > bytes) return false;
+    if ((int64_t)CUDA(persistent_shared)(partition->tier, partition->threads, (int32_t)low, rows) > bytes) return false;
     while (low < high) { /* the most bodies that fit */
         int64_t middle = (low + high + 1) / 2;
-        if ((int64_t)CUDA(resident_shared)(partition->tier, partition->threads, (int32_t)middle, rows) <= bytes) low = middle;
+        if ((int64_t)CUDA(persistent_shared)(partition->tier, partition->threads, (int32_t)middle, rows) <= bytes)
+            low = middle;
         else high = middle - 1;
     }
-    /* A block of one warp keeps all its bodies in registers (iterate/resident.h). */
+    /* A block of one warp keeps all its bodies in registers (iterate/persistent.h). */
     if (partition->threads == WARP) low = smaller(low, WARP / LANES);
     partition->most_bodies = (int32_t)low;
-    partition->shared = CUDA(resident_shared)(partition->tier, partition->threads, partition->most_bodies, rows);
+    partition->shared = CUDA(persistent_shared)(partition->tier, partition->threads, partition->most_bodies, rows);
     return true;
 }
 
 /* Parts of whole islands: less than an even share, and then one island more (shares: at most the cost). */
-static struct bound island_bound(const struct sadmm_context *c, const struct cuda_facts *facts, int64_t shares)
+static struct bound island_bound(const struct sadmm_context *c, const struct cuda_graph_statistics *statistics,
+                                 int64_t shares)
 {
-    int64_t share = up((int64_t)facts->halves + c->view.bodies, shares);
-    struct bound bound = {smaller(facts->halves, larger(share - 1, 0) + facts->island_halves),
-                          smaller(c->view.bodies, larger(share - 1, 0) + facts->island_bodies)};
+    int64_t share = up((int64_t)statistics->sides + c->view.bodies, shares);
+    struct bound bound = {smaller(statistics->sides, larger(share - 1, 0) + statistics->island_sides),
+                          smaller(c->view.bodies, larger(share - 1, 0) + statistics->island_bodies)};
     return bound;
 }
 
 /* Parts of whole bodies. */
-static struct bound body_bound(const struct sadmm_context *c, const struct cuda_facts *facts, int64_t shares)
+static struct bound body_bound(const struct sadmm_context *c, const struct cuda_graph_statistics *statistics,
+                               int64_t shares)
 {
-    int64_t share = up((int64_t)facts->halves + c->view.bodies, shares);
-    struct bound bound = {smaller(facts->halves, larger(share - 1, 0) + facts->degree), smaller(c->view.bodies, share)};
+    int64_t share = up((int64_t)statistics->sides + c->view.bodies, shares);
+    struct bound bound = {smaller(statistics->sides, larger(share - 1, 0) + statistics->degree),
+                          smaller(c->view.bodies, share)};
     return bound;
 }
 
@@ -108,57 +114,57 @@ static int64_t most_parts(const struct sadmm_context *c)
 }
 
 /* Islands in thread blocks. */
-static struct choice choose_block(const struct sadmm_context *c, const struct cuda_facts *facts)
+static struct choice choose_block(const struct sadmm_context *c, const struct cuda_graph_statistics *statistics)
 {
     static const char too_large[] = "an island does not fit a thread block";
     if (c->refused >> SADMM_CUDA_TIER_BLOCK & 1) return no_choice(refused);
-    const int64_t most = CUDA(resident_threads)(facts->point_slots), most_halves = most / QUAD;
-    if (facts->island_halves > most_halves) return no_choice(too_large);
+    const int64_t most = CUDA(persistent_threads)(statistics->point_slots), most_sides = most / QUAD;
+    if (statistics->island_sides > most_sides) return no_choice(too_large);
     /* As many blocks a multiprocessor as run side by side and find an island each; when that is too few for the room a
      * block has, blocks that run one after another. */
     int64_t parts = c->multiprocessors, side_by_side = 1;
-    while (side_by_side < MOST_BLOCKS && 2 * parts <= facts->islands &&
-           2 * side_by_side * threads_for(island_bound(c, facts, 2 * parts), most) <= most) {
+    while (side_by_side < MOST_BLOCKS && 2 * parts <= statistics->islands &&
+           2 * side_by_side * threads_for(island_bound(c, statistics, 2 * parts), most) <= most) {
         parts *= 2;
         side_by_side *= 2;
     }
-    while (island_bound(c, facts, parts).halves > most_halves) parts += parts / 4 + 1;
+    while (island_bound(c, statistics, parts).sides > most_sides) parts += parts / 4 + 1;
     if (parts > most_parts(c)) return no_choice(too_many);
-    if (facts->islands <= 1) parts = 1;
-    struct bound bound = island_bound(c, facts, parts);
+    if (statistics->islands <= 1) parts = 1;
+    struct bound bound = island_bound(c, statistics, parts);
     struct choice choice = {};
     choice.partition.tier = SADMM_CUDA_TIER_BLOCK;
     choice.partition.parts = (int32_t)parts;
     choice.partition.cluster = 1;
     choice.partition.threads = (int32_t)threads_for(bound, most);
     if (choice.partition.threads > most) return no_choice(too_large);
-    if (!take_room(c, &choice.partition, bound, c->shared_limit / side_by_side) &&
-        !take_room(c, &choice.partition, bound, c->shared_limit))
+    if (!take_capacity(c, &choice.partition, bound, c->shared_limit / side_by_side) &&
+        !take_capacity(c, &choice.partition, bound, c->shared_limit))
         return no_choice(too_large);
-    const int64_t rounds = up(smaller(parts, larger(facts->islands, 1)), c->multiprocessors * side_by_side);
-    const int64_t halves = side_by_side * larger(facts->island_halves, up(facts->halves, parts));
-    choice.time = rounds * (BLOCK_TIME + HALF_TIME * halves);
+    const int64_t rounds = up(smaller(parts, larger(statistics->islands, 1)), c->multiprocessors * side_by_side);
+    const int64_t sides = side_by_side * larger(statistics->island_sides, up(statistics->sides, parts));
+    choice.time = rounds * (BLOCK_TIME + SIDE_TIME * sides);
     return choice;
 }
 
 /* Islands in clusters of `size` thread blocks. */
-static struct choice choose_cluster_of(const struct sadmm_context *c, const struct cuda_facts *facts, int32_t size,
-                                       cudaError_t *code)
+static struct choice choose_cluster_of(const struct sadmm_context *c, const struct cuda_graph_statistics *statistics,
+                                       int32_t size, cudaError_t *code)
 {
     static const char too_large[] = "an island does not fit a cluster of thread blocks";
     const char *name = nullptr;
-    const int64_t most = CUDA(resident_threads)(facts->point_slots), most_halves = most / QUAD;
-    const int64_t cost = (int64_t)facts->halves + c->view.bodies;
+    const int64_t most = CUDA(persistent_threads)(statistics->point_slots), most_sides = most / QUAD;
+    const int64_t cost = (int64_t)statistics->sides + c->view.bodies;
     /* As many clusters as find a multiprocessor for each of their blocks; when that is too few for the room a block has,
      * clusters that run one after another. */
-    int64_t clusters = facts->islands <= 1 ? 1 : larger(c->multiprocessors / size, 1);
+    int64_t clusters = statistics->islands <= 1 ? 1 : larger(c->multiprocessors / size, 1);
     struct bound bound;
     for (;; clusters += clusters / 4 + 1) {
-        const struct bound whole = island_bound(c, facts, clusters);
-        const int64_t share = up(smaller(cost, whole.halves + whole.bodies), size);
-        bound.halves = smaller(whole.halves, larger(share - 1, 0) + facts->degree);
+        const struct bound whole = island_bound(c, statistics, clusters);
+        const int64_t share = up(smaller(cost, whole.sides + whole.bodies), size);
+        bound.sides = smaller(whole.sides, larger(share - 1, 0) + statistics->degree);
         bound.bodies = smaller(whole.bodies, share);
-        if (bound.halves <= most_halves) break;
+        if (bound.sides <= most_sides) break;
         if (clusters >= cost) return no_choice(too_large);
     }
     if (clusters * size > most_parts(c)) return no_choice(too_many);
@@ -167,27 +173,29 @@ static struct choice choose_cluster_of(const struct sadmm_context *c, const stru
     choice.partition.parts = (int32_t)clusters * size;
     choice.partition.cluster = size;
     choice.partition.threads = (int32_t)threads_for(bound, most);
-    if (choice.partition.threads > most || !take_room(c, &choice.partition, bound, c->shared_limit))
+    if (choice.partition.threads > most || !take_capacity(c, &choice.partition, bound, c->shared_limit))
         return no_choice(too_large);
     int active = 0;
-    cuda_kernel kernel = CUDA(resident_kernel)(facts->point_slots, SADMM_CUDA_TIER_CLUSTER, 0, true, c->fast, &name);
+    cuda_kernel kernel =
+        CUDA(persistent_kernel)(statistics->point_slots, SADMM_CUDA_TIER_CLUSTER, 0, true, c->fast, &name);
     *code = CUDA(active_clusters)(c, kernel, &choice.partition, &active);
     if (*code != cudaSuccess || active < 1) return no_choice("the device has no clusters that large");
-    const int64_t rounds = up(smaller(clusters, larger(facts->islands, 1)), active);
-    const int64_t halves = up(larger(facts->island_halves, up(facts->halves, clusters)), size);
-    choice.time = rounds * (CLUSTER_TIME + MEMBER_TIME * size + HALF_TIME * halves);
+    const int64_t rounds = up(smaller(clusters, larger(statistics->islands, 1)), active);
+    const int64_t sides = up(larger(statistics->island_sides, up(statistics->sides, clusters)), size);
+    choice.time = rounds * (CLUSTER_TIME + MEMBER_TIME * size + SIDE_TIME * sides);
     return choice;
 }
 
 /* Islands in clusters of the size that is likely the fastest. */
-static struct choice choose_cluster(const struct sadmm_context *c, const struct cuda_facts *facts, cudaError_t *code)
+static struct choice choose_cluster(const struct sadmm_context *c, const struct cuda_graph_statistics *statistics,
+                                    cudaError_t *code)
 {
     if (c->refused >> SADMM_CUDA_TIER_CLUSTER & 1) return no_choice(refused);
     if (!c->clusters) return no_choice("the device has no clusters of thread blocks");
     struct choice best = no_choice("there are no clusters of that size");
     for (int32_t size = 2; size <= MOST_CLUSTER; size *= 2) {
         if (c->wanted_cluster > 0 && c->wanted_cluster != size) continue;
-        const struct choice one = choose_cluster_of(c, facts, size, code);
+        const struct choice one = choose_cluster_of(c, statistics, size, code);
         if (*code != cudaSuccess) return one;
         if (best.why || one.time < best.time) best = one;
     }
@@ -195,12 +203,14 @@ static struct choice choose_cluster(const struct sadmm_context *c, const struct 
 }
 
 /* Bodies over the whole device. */
-static struct choice choose_grid(const struct sadmm_context *c, const struct cuda_facts *facts, cudaError_t *code)
+static struct choice choose_grid(const struct sadmm_context *c, const struct cuda_graph_statistics *statistics,
+                                 cudaError_t *code)
 {
     static const char too_large[] = "more constraints than the device can hold at once";
     const char *name = nullptr;
     if (c->refused >> SADMM_CUDA_TIER_GRID & 1) return no_choice(refused);
-    const int64_t most = CUDA(resident_threads)(facts->point_slots), cost = (int64_t)facts->halves + c->view.bodies;
+    const int64_t most = CUDA(persistent_threads)(statistics->point_slots),
+                  cost = (int64_t)statistics->sides + c->view.bodies;
     if (!c->cooperative) return no_choice("the device has no cooperative launch");
     int64_t parts = larger(smaller(c->multiprocessors, up(cost, SPREAD)), 1);
     struct choice choice = {};
@@ -208,18 +218,19 @@ static struct choice choose_grid(const struct sadmm_context *c, const struct cud
     choice.partition.cluster = 1;
     for (int64_t side_by_side = 1; side_by_side <= MOST_BLOCKS; side_by_side *= 2) {
         if (side_by_side > 1) parts = c->multiprocessors * side_by_side;
-        struct bound bound = body_bound(c, facts, parts);
+        struct bound bound = body_bound(c, statistics, parts);
         int64_t threads = threads_for(bound, most);
         if (threads > most) continue;
         choice.partition.parts = (int32_t)parts;
         choice.partition.threads = (int32_t)threads;
-        if (!take_room(c, &choice.partition, bound, c->shared_limit / side_by_side)) continue;
+        if (!take_capacity(c, &choice.partition, bound, c->shared_limit / side_by_side)) continue;
         int resident = 0;
-        cuda_kernel kernel = CUDA(resident_kernel)(facts->point_slots, SADMM_CUDA_TIER_GRID, 0, true, c->fast, &name);
+        cuda_kernel kernel =
+            CUDA(persistent_kernel)(statistics->point_slots, SADMM_CUDA_TIER_GRID, 0, true, c->fast, &name);
         *code = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, (const void *)kernel,
                                                               choice.partition.threads, choice.partition.shared);
         if (*code != cudaSuccess || parts > (int64_t)resident * c->multiprocessors) return no_choice(too_large);
-        choice.time = GRID_TIME + HALF_TIME * side_by_side * up(facts->halves, parts);
+        choice.time = GRID_TIME + SIDE_TIME * side_by_side * up(statistics->sides, parts);
         return choice;
     }
     return no_choice(too_large);
@@ -232,33 +243,34 @@ static struct choice choose_stream(void)
 }
 
 /* What is likely the fastest; a tier whose floor is above what another takes is not looked at. */
-static struct choice choose_any(const struct sadmm_context *c, const struct cuda_facts *facts, cudaError_t *code)
+static struct choice choose_any(const struct sadmm_context *c, const struct cuda_graph_statistics *statistics,
+                                cudaError_t *code)
 {
-    struct choice best = choose_block(c, facts);
+    struct choice best = choose_block(c, statistics);
     if (best.time > CLUSTER_TIME) {
-        const struct choice cluster = choose_cluster(c, facts, code);
+        const struct choice cluster = choose_cluster(c, statistics, code);
         if (*code != cudaSuccess) return cluster;
         if (cluster.time < best.time) best = cluster;
     }
     if (best.time > GRID_TIME) {
-        const struct choice grid = choose_grid(c, facts, code);
+        const struct choice grid = choose_grid(c, statistics, code);
         if (*code != cudaSuccess) return grid;
         if (grid.time < best.time) best = grid;
     }
     return best.why ? choose_stream() : best;
 }
 
-sadmm_status CUDA(choose_partition)(struct sadmm_context *c, const struct cuda_facts *facts,
+sadmm_status CUDA(choose_partition)(struct sadmm_context *c, const struct cuda_graph_statistics *statistics,
                                     struct cuda_partition *partition, struct sadmm_error *error)
 {
     cudaError_t code = cudaSuccess;
     struct choice choice;
     switch (c->wanted) {
-    case SADMM_CUDA_TIER_BLOCK: choice = choose_block(c, facts); break;
-    case SADMM_CUDA_TIER_CLUSTER: choice = choose_cluster(c, facts, &code); break;
-    case SADMM_CUDA_TIER_GRID: choice = choose_grid(c, facts, &code); break;
+    case SADMM_CUDA_TIER_BLOCK: choice = choose_block(c, statistics); break;
+    case SADMM_CUDA_TIER_CLUSTER: choice = choose_cluster(c, statistics, &code); break;
+    case SADMM_CUDA_TIER_GRID: choice = choose_grid(c, statistics, &code); break;
     case SADMM_CUDA_TIER_STREAM: choice = choose_stream(); break;
-    default: choice = choose_any(c, facts, &code); break;
+    default: choice = choose_any(c, statistics, &code); break;
     }
     if (code != cudaSuccess) return CUDA(fail)(c, code, "looking for blocks that run side by side", error);
     if (choice.why) return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "the cuda tier asked for: %s", choice.why);
@@ -267,12 +279,13 @@ sadmm_status CUDA(choose_partition)(struct sadmm_context *c, const struct cuda_f
     return SADMM_OK;
 }
 
-void CUDA(tighten_partition)(const struct sadmm_context *c, const struct cuda_facts *facts,
+void CUDA(tighten_partition)(const struct sadmm_context *c, const struct cuda_graph_statistics *statistics,
                              struct cuda_partition *partition)
 {
     if (partition->tier == SADMM_CUDA_TIER_STREAM) return;
-    const struct bound bound = {facts->part_halves, facts->part_bodies};
+    const struct bound bound = {statistics->part_sides, statistics->part_bodies};
     struct cuda_partition tight = *partition;
-    tight.threads = (int32_t)threads_for(bound, CUDA(resident_threads)(facts->point_slots));
-    if (tight.threads < partition->threads && take_room(c, &tight, bound, (int64_t)partition->shared)) *partition = tight;
+    tight.threads = (int32_t)threads_for(bound, CUDA(persistent_threads)(statistics->point_slots));
+    if (tight.threads < partition->threads && take_capacity(c, &tight, bound, (int64_t)partition->shared))
+        *partition = tight;
 }

@@ -27,7 +27,8 @@ enum sadmm_cuda_tier sadmm_cuda_tier_of(const struct sadmm_kernels *kernels, con
                                         int32_t *blocks);
 
 /* Whole steps: room for so many candidates and points at first; 0: as likely. Before the world's first step. */
-void sadmm_cuda_tune_rooms(const struct sadmm_kernels *kernels, struct sadmm_context *context, int64_t first_room);
+void sadmm_cuda_tune_capacities(const struct sadmm_kernels *kernels, struct sadmm_context *context,
+                                int64_t first_capacity);
 
 #ifdef __cplusplus
 }

@@ -27,8 +27,8 @@ static __device__ __forceinline__ double energies_of_body(const cuda_view &v, co
     double sums[SUMS] = {}, term[TERMS] = {};
     for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) {
         const int32_t code = v.incident[at], p = code / 2;
-        add_half(v, code, sums, &sums[PUSH]);
-        if (p >= v.pair_room || (code & 1 && is_dynamic(v, v.ends[p].body_a))) continue; /* counted there */
+        add_side(v, code, sums, &sums[PUSH]);
+        if (p >= v.pair_capacity || (code & 1 && is_dynamic(v, v.ends[p].body_a))) continue; /* counted there */
         sums[WORK] += work_of(v, p);
     }
     sum_lanes<SUMS>(sums);
@@ -43,11 +43,13 @@ static __device__ __forceinline__ double energies_of_body(const cuda_view &v, co
 }
 
 /* What follows from their sums over an island. One thread of it. */
-static __device__ __forceinline__ void limit_island(const cuda_view &v, cuda_island *island, const double sum[TERMS], bool few)
+static __device__ __forceinline__ void limit_island(const cuda_view &v, cuda_island *island, const double sum[TERMS],
+                                                    bool under_iterated)
 {
     const struct limit_energies energies = {sum[0], sum[1], sum[2], sum[3]};
     const double allowed = limit_factor(&energies),
-                 factor = few ? fmin(allowed, limit_bounce_factor(&energies, sum[4], SOLVER_EPSILON)) : allowed;
+                 factor =
+                     under_iterated ? fmin(allowed, limit_bounce_factor(&energies, sum[4], SOLVER_EPSILON)) : allowed;
     island->slow_down = factor;
     if (factor != 1) atomicAdd(v.limited, 1);
 }

@@ -7,13 +7,13 @@
 
 /* ---- fused: BLOCK, CLUSTER and GRID ---------------------------------------------------------------------------- */
 
-static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool measure, enum cuda_limit limit,
+static sadmm_status persistent_iterations(struct sadmm_context *c, int count, bool measure, enum cuda_limit limit,
                                         bool goes_on, struct sadmm_error *error)
 {
     const struct cuda_partition *partition = &c->partition;
     const char *name = nullptr;
     cuda_args args = CUDA(weight_args)(c); /* of a solve that begins with them */
-    args.begin = c->ends && !c->settled;
+    args.begin = c->prologue && !c->settled;
     args.count = count;
     args.measure = measure;
     args.join = c->measured;
@@ -22,11 +22,11 @@ static sadmm_status resident_iterations(struct sadmm_context *c, int count, bool
     args.settled = c->settled;
     args.goes_on = goes_on;
     args.limit = limit;
-    args.few = limit_few(c->plan.warm, c->settings.iterations);
-    args.looks = c->looks;
+    args.under_iterated = limit_under_iterated(c->plan.warm, c->settings.iterations);
+    args.checks = c->checks;
     args.most_bodies = partition->most_bodies;
     args.cluster = partition->cluster;
-    cuda_kernel kernel = CUDA(resident_kernel)(c->facts.point_slots, partition->tier, partition->threads,
+    cuda_kernel kernel = CUDA(persistent_kernel)(c->statistics.point_slots, partition->tier, partition->threads,
                                                measure || c->view.rows > 0, c->fast, &name);
     if (partition->tier == SADMM_CUDA_TIER_GRID) CUDA_TRY(CUDA(clear)(c, SCALAR_BARRIER, error));
     CUDA_TRY(CUDA(launch_partition)(c, kernel, name, partition, true, &args, error));
@@ -41,14 +41,15 @@ sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *c, int count, bool m
     const bool stream = c->partition.tier == SADMM_CUDA_TIER_STREAM;
     CUDA_TRY(CUDA(clear_primal)(c, measure, error));
     while (count > 0) {
-        if (c->fast && c->exact_since == RELAX_DEFECT_PERIOD) {
-            CUDA_TRY(CUDA(enqueue_defects)(c, error));
+        if (c->fast && c->exact_since == RELAX_RESIDUAL_PERIOD) {
+            CUDA_TRY(CUDA(enqueue_momentum_residuals)(c, error));
             c->exact_since = 0;
         }
-        const int left = c->fast ? RELAX_DEFECT_PERIOD - c->exact_since : count, now = count < left ? count : left;
+        const int left = c->fast ? RELAX_RESIDUAL_PERIOD - c->exact_since : count, now = count < left ? count : left;
         const bool goes_on = now < count;
-        CUDA_TRY(stream ? CUDA(stream_iterations)(c, now, measure && !goes_on, goes_on, error)
-                        : resident_iterations(c, now, measure && !goes_on, goes_on ? LIMIT_NONE : limit, goes_on, error));
+        CUDA_TRY(
+            stream ? CUDA(stream_iterations)(c, now, measure && !goes_on, goes_on, error)
+                   : persistent_iterations(c, now, measure && !goes_on, goes_on ? LIMIT_NONE : limit, goes_on, error));
         if (c->fast) c->exact_since += now;
         count -= now;
     }

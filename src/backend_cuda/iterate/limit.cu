@@ -13,11 +13,12 @@
 
 #include "core/math/relax.h"
 
-template <bool RIGID> static __device__ __forceinline__ bool suspect(const cuda_view &v, const body_thread &t, bool few)
+template <bool RIGID>
+static __device__ __forceinline__ bool suspect(const cuda_view &v, const body_thread &t, bool under_iterated)
 {
     const wide_row<RIGID> row = row_of_body<RIGID>(v, t);
     const bool speaks = t.live && t.lane == 0;
-    return suspect_body(few, speaks, speaks ? v.free_energy[t.body] : 0, row.velocity, row.b, row.a);
+    return suspect_body(under_iterated, speaks, speaks ? v.free_energy[t.body] : 0, row.velocity, row.b, row.a);
 }
 
 static __global__ void __launch_bounds__(BODY_THREADS)
@@ -25,7 +26,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 {
     wait_for_stream();
     const body_thread t = body_of_thread(v);
-    if (v.rigid ? suspect<true>(v, t, args.few) : suspect<false>(v, t, args.few)) *v.suspects = 1;
+    if (v.rigid ? suspect<true>(v, t, args.under_iterated) : suspect<false>(v, t, args.under_iterated)) *v.suspects = 1;
 }
 
 static __global__ void __launch_bounds__(BODY_THREADS)
@@ -37,7 +38,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     double total[TERMS];
     const double term = v.rigid ? energies_of_body<true>(v, t) : energies_of_body<false>(v, t);
     if (add_up_island<add_terms>(v, t, term, total) && t.lane == 0)
-        limit_island(v, &v.islands[v.label[t.body]], total, args.few);
+        limit_island(v, &v.islands[v.label[t.body]], total, args.under_iterated);
 }
 
 static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
@@ -54,7 +55,7 @@ static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __
 static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const char *name, struct sadmm_error *error)
 {
     cuda_args args = {};
-    args.few = limit_few(c->plan.warm, c->settings.iterations);
+    args.under_iterated = limit_under_iterated(c->plan.warm, c->settings.iterations);
     return CUDA(launch_early)(c, kernel, name, body_blocks(c->view.bodies), BODY_THREADS, &args, error);
 }
 
@@ -74,6 +75,6 @@ extern "C" sadmm_status CUDA(limit_velocity)(struct sadmm_context *c, int32_t *l
     CUDA_TRY(CUDA(launch)(c, slow_kernel, "limit_velocity", blocks_for(c->view.bodies), &args, error));
     CUDA_TRY(CUDA(download)(c, c->view.limited, sizeof *limited, error));
     memcpy(limited, c->buffers[PINNED_OUT].data, sizeof *limited);
-    if (*limited > 0) c->exact_since = RELAX_DEFECT_PERIOD; /* defects are taken anew, should anything follow */
+    if (*limited > 0) c->exact_since = RELAX_RESIDUAL_PERIOD; /* residuals are recomputed, should anything follow */
     return SADMM_OK;
 }

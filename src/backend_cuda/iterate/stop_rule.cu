@@ -1,9 +1,10 @@
-/* The method `fast`: the stop rule of whole steps. A look finds each island's part of the certificate (core/solve/certificate.c),
- * the natural map of its contacts and its momentum error. An island that meets the tolerances has stopped, in every tier
- * after as many iterations as if it were alone: nothing is written to it any more. Tier BLOCK leaves a block out whose islands
- * have all stopped; the other tiers have nothing left to do once the last island has. The scale of the momentum error is the
- * island's own, which is no less strict than the certificate's (but for islands where nothing pushes: there the tolerance of
- * the natural map says what is nothing). In double, eight lanes a body. */
+/* The method `fast`: the stop rule of whole steps. A convergence check finds each island's part of the certificate
+ * (core/solve/certificate.c), the natural map of its contacts and its momentum error. An island that meets the
+ * tolerances has stopped, in every tier after as many iterations as if it were alone: nothing is written to it any
+ * more. Tier BLOCK leaves a block out whose islands have all stopped; the other tiers have nothing left to do once the
+ * last island has. The scale of the momentum error is the island's own, which is no less strict than the certificate's
+ * (but for islands where nothing pushes: there the tolerance of the natural map says what is nothing). In double, eight
+ * lanes a body. */
 #include <string.h>
 
 #include "backend_cuda/device/double.h"
@@ -90,20 +91,20 @@ static __device__ double natural_map_of_rows(const cuda_view &v, int32_t k)
 }
 
 /* Terms of a body: natural map of the constraints that count here (at their first dynamic body); momentum error, and the largest of
- * what it is made of. args.looks: this look's number, from 1; args.count: iterations done. */
+ * what it is made of. args.checks: this check's number, from 1; args.count: iterations done. */
 template <bool RIGID>
 static __global__ void __launch_bounds__(BODY_THREADS)
-    look_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+    convergence_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    if (blockIdx.x == 0 && threadIdx.x == 0) v.stop->unmet[(args.looks + 1) % LOOKS_KEPT] = 0;
-    if (args.looks > 1 && all_stopped(v, args.looks - 1)) return;
+    if (blockIdx.x == 0 && threadIdx.x == 0) v.stop->unmet[(args.checks + 1) % CHECKS_KEPT] = 0;
+    if (args.checks > 1 && all_stopped(v, args.checks - 1)) return;
     const body_thread t = body_of_thread(v);
     enum { MAP = 6, PUSH, SUMS };
     double sums[SUMS] = {}, map = 0, term[TERMS] = {}, largest[TERMS];
     for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) {
         const int32_t code = v.incident[at], p = code / 2;
-        add_half(v, code, sums, &sums[PUSH]);
-        const int32_t k = p - v.pair_room; /* a block of rows, or a pair */
+        add_side(v, code, sums, &sums[PUSH]);
+        const int32_t k = p - v.pair_capacity; /* a block of rows, or a pair */
         if (code & 1 && is_dynamic(v, k < 0 ? v.ends[p].body_a : v.row_info[k].body_a)) continue; /* counted there */
         map = largest_term::join(map, k < 0 ? natural_map(v, p) : natural_map_of_rows(v, k));
     }
@@ -118,27 +119,27 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const bool met = largest[0] <= v.settings->certificate_tolerance &&
                      largest[1] <= v.settings->certificate_momentum_tolerance * largest[2];
     int32_t *stopped = &v.islands[v.label[t.body]].stopped;
-    if (!met) atomicAdd(&v.stop->unmet[args.looks % LOOKS_KEPT], 1);
+    if (!met) atomicAdd(&v.stop->unmet[args.checks % CHECKS_KEPT], 1);
     if (!met || *stopped > 0) return;
     *stopped = args.count;
     atomicAdd(&v.stop->sum, (unsigned long long)args.count);
     atomicMax(&v.stop->last, args.count);
 }
 
-sadmm_status CUDA(enqueue_look)(struct sadmm_context *c, int done, struct sadmm_error *error)
+sadmm_status CUDA(enqueue_convergence_check)(struct sadmm_context *c, int done, struct sadmm_error *error)
 {
     cuda_args args = {};
-    args.looks = ++c->looks;
+    args.checks = ++c->checks;
     args.count = done;
-    return CUDA(launch_of)(c, c->view.rigid ? look_kernel<true> : look_kernel<false>, "look", body_blocks(c->view.bodies),
-                           BODY_THREADS, &args, error);
+    return CUDA(launch_of)(c, c->view.rigid ? convergence_kernel<true> : convergence_kernel<false>, "convergence check",
+                           body_blocks(c->view.bodies), BODY_THREADS, &args, error);
 }
 
 extern "C" sadmm_status CUDA(look)(struct sadmm_context *c, int done, int32_t *unmet, struct sadmm_error *error)
 {
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(enqueue_look)(c, done, error));
-    CUDA_TRY(CUDA(download)(c, &c->view.stop->unmet[c->looks % LOOKS_KEPT], sizeof *unmet, error));
+    CUDA_TRY(CUDA(enqueue_convergence_check)(c, done, error));
+    CUDA_TRY(CUDA(download)(c, &c->view.stop->unmet[c->checks % CHECKS_KEPT], sizeof *unmet, error));
     memcpy(unmet, c->buffers[PINNED_OUT].data, sizeof *unmet);
     return SADMM_OK;
 }

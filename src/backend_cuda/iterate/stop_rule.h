@@ -12,33 +12,33 @@ static __device__ __forceinline__ void clear_counts(const cuda_view &v)
     *v.stop = none;
 }
 
-/* Had every island stopped at the last of `looks` looks? */
-static __device__ __forceinline__ bool all_stopped(const cuda_view &v, int32_t looks)
+/* Had every island stopped by the last of `checks` convergence checks? */
+static __device__ __forceinline__ bool all_stopped(const cuda_view &v, int32_t checks)
 {
-    return looks > 0 && v.stop->unmet[looks % LOOKS_KEPT] == 0;
+    return checks > 0 && v.stop->unmet[checks % CHECKS_KEPT] == 0;
 }
 
 /* Had the island of a body? Then it stays as it is, whatever its thread block still does for others: an island's result does
  * not depend on who is beside it. */
-static __device__ __forceinline__ bool island_stopped(const cuda_view &v, int32_t looks, int32_t body)
+static __device__ __forceinline__ bool island_stopped(const cuda_view &v, int32_t checks, int32_t body)
 {
-    return looks > 0 && v.islands[v.label[body]].stopped > 0;
+    return checks > 0 && v.islands[v.label[body]].stopped > 0;
 }
 
-static __device__ __forceinline__ bool pair_stopped(const cuda_view &v, int32_t looks, const pair_ends &ends)
+static __device__ __forceinline__ bool pair_stopped(const cuda_view &v, int32_t checks, const pair_ends &ends)
 {
-    return looks > 0 && island_stopped(v, looks, ends.body_a < v.bodies ? ends.body_a : ends.body_b);
+    return checks > 0 && island_stopped(v, checks, ends.body_a < v.bodies ? ends.body_a : ends.body_b);
 }
 
-static __device__ __forceinline__ bool rows_stopped(const cuda_view &v, int32_t looks, const row_about &rows)
+static __device__ __forceinline__ bool rows_stopped(const cuda_view &v, int32_t checks, const row_about &rows)
 {
-    return looks > 0 && island_stopped(v, looks, rows.body_a < v.bodies ? rows.body_a : rows.body_b);
+    return checks > 0 && island_stopped(v, checks, rows.body_a < v.bodies ? rows.body_a : rows.body_b);
 }
 
 /* Had all islands of the slots [first, end), which are whole ones? */
-static __device__ __forceinline__ bool part_stopped(const cuda_view &v, int32_t looks, int32_t first, int32_t end)
+static __device__ __forceinline__ bool part_stopped(const cuda_view &v, int32_t checks, int32_t first, int32_t end)
 {
-    bool all = looks > 0;
+    bool all = checks > 0;
     for (int32_t s = first; all && s < end;) {
         const int32_t label = v.label[v.body_of[s]];
         all = v.islands[label].stopped > 0;

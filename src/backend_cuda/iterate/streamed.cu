@@ -53,9 +53,9 @@ static __device__ __forceinline__ real relaxed(const cuda_view &v, const cuda_ar
 }
 
 /* Step 1, a thread a body: all of a body's numbers lie side by side and are asked for at once, sixteen bytes at a time. (Eight
- * lanes a body, as in the resident tiers, where latency counts, spend the time on instructions that load and pass around
- * single numbers.) What is read once makes room in the caches for states and records. The sums are those of
- * free_momentum() and step_of(); FAST: of step_fast() and defect_after(), as far as args.relax says. */
+ * lanes a body, as in the persistent tiers, where latency counts, spend the time on instructions that load and pass
+ * around single numbers.) What is read once makes room in the caches for states and records. The sums are those of
+ * free_momentum() and step_of(); FAST: of step_fast() and residual_after(), as far as args.relax says. */
 template <bool JOIN, bool RIGID, bool FAST>
 static __global__ void __launch_bounds__(BODY_THREADS)
     bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
@@ -63,14 +63,15 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     enum { LINE = RIGID ? LINE_RIGID : LINE_GENERAL };
     const unsigned block = args.backward ? gridDim.x - 1 - blockIdx.x : blockIdx.x;
     const int32_t i = (int32_t)(block * (unsigned)BODY_THREADS + threadIdx.x);
-    if (i >= live_bodies(v) || (FAST && all_stopped(v, args.looks))) return;
+    if (i >= live_bodies(v) || (FAST && all_stopped(v, args.checks))) return;
     const size_t at = args.in_order ? (size_t)i : (size_t)v.body_of[i];
-    if (FAST && island_stopped(v, args.looks, (int32_t)at)) return;
-    const real ratio = JOIN && args.rescaled ? (real)*v.ratio : (real)1, farther = relaxed<FAST>(v, args, RELAX_VELOCITY),
+    if (FAST && island_stopped(v, args.checks, (int32_t)at)) return;
+    const real ratio = JOIN && args.rescaled ? (real)*v.ratio : (real)1,
+               relaxation_factor = relaxed<FAST>(v, args, RELAX_VELOCITY),
                multipliers = relaxed<FAST>(v, args, RELAX_MULTIPLIERS);
     real line[LINE], b[ROW], state[ROW], g[6], step[6];
     load_numbers_once<LINE / 4>(line, v.lines + at * LINE);
-    load_numbers_once<ROW / 4>(b, (FAST ? v.defect : v.b) + at * ROW);
+    load_numbers_once<ROW / 4>(b, (FAST ? v.momentum_residual : v.b) + at * ROW);
     load_numbers<ROW / 4>(state, v.state + at * ROW);
 #pragma unroll
     for (int r = 0; r < 6; ++r) {
@@ -99,7 +100,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         step[r] = product_with_row(H[packed_place(r, 0)], H[packed_place(r, 1)], H[packed_place(r, 2)],
                                    H[packed_place(r, 3)], H[packed_place(r, 4)], H[packed_place(r, 5)], pushed);
         const real before = state[r];
-        state[r] = FAST ? fused(farther, step[r], before) : before + step[r];
+        state[r] = FAST ? fused(relaxation_factor, step[r], before) : before + step[r];
         step[r] = state[r] - before;
     }
     store_numbers(v.state + at * ROW, state);
@@ -110,7 +111,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 #pragma unroll
             for (int k = 0; k < 6; ++k) b[r] = fused(-line_a((const real *)line, RIGID, r, k), step[k], b[r]);
         }
-        store_numbers(v.defect + at * ROW, b);
+        store_numbers(v.momentum_residual + at * ROW, b);
     }
 }
 
@@ -118,7 +119,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 
 template <int LANES_A_PAIR> static __device__ __forceinline__ int32_t pair_threads(const cuda_view &v)
 {
-    return (LANES_A_PAIR * v.pair_room + THREADS - 1) / THREADS * THREADS;
+    return (LANES_A_PAIR * v.pair_capacity + THREADS - 1) / THREADS * THREADS;
 }
 
 /* The pair of thread t: work(pair, lane, live), in whole warps; lanes beyond the last pair come with that one, not live. */
@@ -136,15 +137,15 @@ static __global__ void __launch_bounds__(THREADS)
 {
     const int32_t t = thread_index(args), k = t - pair_threads<LANES_A_PAIR>(v);
     double primal = 0;
-    if (FAST && all_stopped(v, args.looks)) return;
-    const real farther = relaxed<FAST>(v, args, RELAX_MULTIPLIERS);
+    if (FAST && all_stopped(v, args.checks)) return;
+    const real relaxation_factor = relaxed<FAST>(v, args, RELAX_MULTIPLIERS);
     if (k < 0)
         with_pair<LANES_A_PAIR>(v, t, [&](int32_t p, int32_t lane, bool live) {
-            const bool on = live && !(FAST && pair_stopped(v, args.looks, v.ends[p]));
-            primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v, p, lane, on, farther);
+            const bool on = live && !(FAST && pair_stopped(v, args.checks, v.ends[p]));
+            primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v, p, lane, on, relaxation_factor);
         });
-    else if (k < live_rows(v) && !(FAST && rows_stopped(v, args.looks, v.row_info[k])))
-        primal = FAST ? sweep_row_block_fast<MEASURE>(v, k, farther) : sweep_row_block<MEASURE>(v, k);
+    else if (k < live_rows(v) && !(FAST && rows_stopped(v, args.checks, v.row_info[k])))
+        primal = FAST ? sweep_row_block_fast<MEASURE>(v, k, relaxation_factor) : sweep_row_block<MEASURE>(v, k);
     if (MEASURE) reduce_max(primal, v.residual);
 }
 
@@ -169,9 +170,9 @@ static __global__ void place_kernel(const __grid_constant__ cuda_view v, const _
 {
     const int32_t at = thread_index(args), bodies = live_bodies(v);
     if (bodies == 0 || at >= v.offsets[bodies]) return;
-    const int32_t half = v.incident[at], side = half & 1, k = half / 2 - v.pair_room;
-    if (k < 0) *(side ? &v.ends[half / 2].half_b : &v.ends[half / 2].half_a) = at;
-    else *(side ? &v.row_info[k].half_b : &v.row_info[k].half_a) = at;
+    const int32_t side = v.incident[at], on_b = side & 1, k = side / 2 - v.pair_capacity;
+    if (k < 0) *(on_b ? &v.ends[side / 2].side_b : &v.ends[side / 2].side_a) = at;
+    else *(on_b ? &v.row_info[k].side_b : &v.row_info[k].side_a) = at;
 }
 
 /* ---- launches ------------------------------------------------------------------------------------------------- */
@@ -182,7 +183,7 @@ static sadmm_status launch_bodies(struct sadmm_context *c, bool join, int relax,
     cuda_args args = {};
     args.rescaled = c->rescaled;
     args.backward = c->backward;
-    args.looks = c->looks;
+    args.checks = c->checks;
     args.in_order = !slots_by_island(&c->partition);
     args.relax = relax;
     cuda_kernel kernel =
@@ -195,7 +196,7 @@ static sadmm_status launch_bodies(struct sadmm_context *c, bool join, int relax,
 
 static int64_t constraint_blocks(const cuda_view *v)
 {
-    return blocks_for((int64_t)v->lanes * v->pair_room) + blocks_for(v->rows);
+    return blocks_for((int64_t)v->lanes * v->pair_capacity) + blocks_for(v->rows);
 }
 
 template <int LANES_A_PAIR, int COUNT> static cuda_kernel sweep_kernel(bool measure, bool fast)
@@ -210,11 +211,11 @@ static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, in
 {
     cuda_args args = {};
     args.relax = relax;
-    args.looks = c->looks;
+    args.checks = c->checks;
     args.backward = c->backward;
     c->backward = !c->backward;
     cuda_kernel kernel = c->view.lanes == 1            ? sweep_kernel<1, 1>(measure, c->fast)
-                         : c->facts.point_slots <= 4 ? sweep_kernel<4, 1>(measure, c->fast)
+                         : c->statistics.point_slots <= 4 ? sweep_kernel<4, 1>(measure, c->fast)
                                                      : sweep_kernel<4, 2>(measure, c->fast);
     return CUDA(launch)(c, kernel, "update_constraints", constraint_blocks(&c->view), &args, error);
 }
@@ -222,7 +223,7 @@ static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, in
 sadmm_status CUDA(clear_primal)(struct sadmm_context *c, bool measure, struct sadmm_error *error)
 {
     if (!measure) return SADMM_OK;
-    if (!c->plan.residuals && c->view.pair_room + c->view.rows > 0)
+    if (!c->plan.residuals && c->view.pair_capacity + c->view.rows > 0)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "measure = true: the plan has residuals = false");
     return CUDA(clear)(c, SCALAR_PRIMAL, error);
 }
@@ -233,8 +234,8 @@ static sadmm_status prepare_stepwise(struct sadmm_context *c, struct sadmm_error
     const cuda_view *v = &c->view;
     cuda_args args = {};
     if (!c->placed)
-        CUDA_TRY(CUDA(launch)(c, place_kernel, "place_records", blocks_for(2 * ((int64_t)v->pair_room + v->rows)), &args,
-                              error));
+        CUDA_TRY(CUDA(launch)(c, place_kernel, "place_records", blocks_for(2 * ((int64_t)v->pair_capacity + v->rows)),
+                              &args, error));
     c->placed = true;
     if (!c->starting) return SADMM_OK;
     c->starting = false;

@@ -27,7 +27,7 @@ static __device__ __forceinline__ vec3 exchange(vec3 value, int lanes)
               __shfl_xor_sync(all, value.z, lanes));
 }
 
-/* The sums of a pair's lanes, added as (q_0 + q_1) + (q_2 + q_3), into the records of its halves. Of four lanes, 0 and 1
+/* The sums of a pair's lanes, added as (q_0 + q_1) + (q_2 + q_3), into the records of its sides. Of four lanes, 0 and 1
  * end up with force and torque on a, 2 and 3 on b. Every lane of the warp comes here. */
 template <int LANES_A_PAIR>
 static __device__ __forceinline__ void store_records(solver_real *records, const pair_ends &ends, int32_t lane,
@@ -35,31 +35,32 @@ static __device__ __forceinline__ void store_records(solver_real *records, const
 {
     real4 *out = (real4 *)records;
     if (LANES_A_PAIR == 1) {
-        if (live && ends.half_a >= 0) {
-            out[2 * (size_t)ends.half_a] = pack(v3_neg(q.force), 0);
-            out[2 * (size_t)ends.half_a + 1] = pack(v3_neg(q.torque_a), 0);
+        if (live && ends.side_a >= 0) {
+            out[2 * (size_t)ends.side_a] = pack(v3_neg(q.force), 0);
+            out[2 * (size_t)ends.side_a + 1] = pack(v3_neg(q.torque_a), 0);
         }
-        if (live && ends.half_b >= 0) {
-            out[2 * (size_t)ends.half_b] = pack(q.force, 0);
-            out[2 * (size_t)ends.half_b + 1] = pack(q.torque_b, 0);
+        if (live && ends.side_b >= 0) {
+            out[2 * (size_t)ends.side_b] = pack(q.force, 0);
+            out[2 * (size_t)ends.side_b + 1] = pack(q.torque_b, 0);
         }
         return;
     }
     const bool odd = lane & 1, on_b = lane & 2;
-    const int32_t half = on_b ? ends.half_b : ends.half_a;
+    const int32_t side = on_b ? ends.side_b : ends.side_a;
     /* Even lanes keep the force, odd ones the torques. */
     const vec3 kept = v3_add(odd ? q.torque_a : q.force, exchange(odd ? q.force : q.torque_a, 1));
     const vec3 torque_b = v3_add(q.torque_b, exchange(q.torque_b, 1));
     const vec3 sum = v3_add(odd && on_b ? torque_b : kept, exchange(odd && !on_b ? torque_b : kept, 2));
-    if (live && half >= 0) out[2 * (size_t)half + (odd ? 1 : 0)] = pack(on_b ? sum : v3_neg(sum), 0);
+    if (live && side >= 0) out[2 * (size_t)side + (odd ? 1 : 0)] = pack(on_b ? sum : v3_neg(sum), 0);
 }
 
 /* A lane's share of a pair: points lane and, where COUNT is 2, lane + 4. The first is loaded whether it is
  * there or not, so that nothing but the states waits for another load. `live`: else nothing is stored. Every lane of the warp comes
- * here. FAST: lambda goes `farther` times as far; records are those of Step 1 in any case. Returns the lane's share of the primal
- * residual. */
+ * here. FAST: lambda goes `relaxation_factor` times as far; records are those of Step 1 in any case. Returns the lane's
+ * share of the primal residual. */
 template <int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
-static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t p, int32_t lane, bool live, real farther)
+static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t p, int32_t lane, bool live,
+                                                    real relaxation_factor)
 {
     enum { SPLIT = MEASURE && !FAST };
     const real4 about = load_once(v.normal + p), between = load_once(v.difference + p);
@@ -92,7 +93,8 @@ static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t 
         const vec3 x = relative_velocity(a.motion, arm_a, b.motion, arm_b);
         const point_change to = update<FAST>(normal, about.w, x, point[j].w, inv_s, old[j]);
         const vec3 lambda = to.lambda, delta = to.delta;
-        if (live) store_lambda(v, slot[j], FAST ? relaxed(old[j], to, farther == 1, farther) : lambda);
+        if (live)
+            store_lambda(v, slot[j], FAST ? relaxed(old[j], to, relaxation_factor == 1, relaxation_factor) : lambda);
         add_point(&next, j,
                   FAST ? delta : SPLIT ? lambda : v3_add(lambda, delta), arm_a, arm_b);
         if (SPLIT) add_point(&change, j, delta, arm_a, arm_b);
@@ -125,12 +127,12 @@ static __device__ __forceinline__ void start_pair(const cuda_view &v, int32_t p,
 static __device__ __forceinline__ void store_row_records(const cuda_view &v, int32_t k, const row_about &about,
                                                          const real lambda[6], solver_real *records)
 {
-    if (about.half_a >= 0) store_row_record(v, k, about.rows, 0, lambda, records + (size_t)about.half_a * ROW);
-    if (about.half_b >= 0) store_row_record(v, k, about.rows, 1, lambda, records + (size_t)about.half_b * ROW);
+    if (about.side_a >= 0) store_row_record(v, k, about.rows, 0, lambda, records + (size_t)about.side_a * ROW);
+    if (about.side_b >= 0) store_row_record(v, k, about.rows, 1, lambda, records + (size_t)about.side_b * ROW);
 }
 
 template <bool MEASURE>
-static __device__ __forceinline__ double sweep_row_block_fast(const cuda_view &v, int32_t k, real farther)
+static __device__ __forceinline__ double sweep_row_block_fast(const cuda_view &v, int32_t k, real relaxation_factor)
 {
     const row_about about = v.row_info[k];
     real lambda[6], delta[6], kept[6];
@@ -138,7 +140,7 @@ static __device__ __forceinline__ double sweep_row_block_fast(const cuda_view &v
     for (int r = 0; r < 6; ++r) kept[r] = lambda[r];
     update_row_block_fast(v, k, about, v.state + (size_t)about.body_a * ROW, v.state + (size_t)about.body_b * ROW,
                           lambda, delta);
-    for (int r = 0; r < 6; ++r) kept[r] = relaxed(kept[r], lambda[r], delta[r], farther);
+    for (int r = 0; r < 6; ++r) kept[r] = relaxed(kept[r], lambda[r], delta[r], relaxation_factor);
     store_row_lambda(v, k, kept);
     store_row_records(v, k, about, delta, v.records);
     return MEASURE ? row_block_primal_fast(v, k, about, delta) : 0;

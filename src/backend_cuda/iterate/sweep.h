@@ -1,4 +1,4 @@
-/* What one thread does in Steps 1-4: shared by the stepwise and the resident kernels, so that they agree bit for bit.
+/* What one thread does in Steps 1-4: shared by the stepwise and the persistent kernels, so that they agree bit for bit.
  * Pointers to states and records are to global or shared memory. */
 #ifndef SADMM_CUDA_ITERATE_SWEEP_H
 #define SADMM_CUDA_ITERATE_SWEEP_H
@@ -301,14 +301,14 @@ CUDA_INLINE double row_block_primal_fast(const cuda_view &v, int32_t k, const ro
 
 /* ---- relaxation of the method `fast` (math/relax.h) -------------------------------------------------------------- */
 
-/* Multipliers that go `farther` times as far as lambda^: rho, or 1 where an iteration is plain. */
-CUDA_INLINE vec3 relaxed(vec3 old, const point_change &to, bool plain, real farther)
+/* Multipliers that go `relaxation_factor` times as far as lambda^: rho, or 1 where an iteration is plain. */
+CUDA_INLINE vec3 relaxed(vec3 old, const point_change &to, bool plain, real relaxation_factor)
 {
-    return plain ? to.lambda : fused_madd(old, farther, to.delta);
+    return plain ? to.lambda : fused_madd(old, relaxation_factor, to.delta);
 }
-CUDA_INLINE real relaxed(real old, real lambda, real delta, real farther)
+CUDA_INLINE real relaxed(real old, real lambda, real delta, real relaxation_factor)
 {
-    return farther == 1 ? lambda : fused(farther, delta, old);
+    return relaxation_factor == 1 ? lambda : fused(relaxation_factor, delta, old);
 }
 
 /* 1/B of a pair from B / n. */
@@ -316,8 +316,8 @@ CUDA_INLINE real inverse_of_weight(real inv_s, bool both) { return inv_s > 0 ? 1
 
 /* ---- bodies --------------------------------------------------------------------------------------------------- */
 
-/* Lane r's part of a body: rows r of A and H (which are symmetric), v, and b or, of the method `fast`, the defect; all 0 in
- * lanes 6 and 7. */
+/* Lane r's part of a body: rows r of A and H (which are symmetric), v, and b or, of the method `fast`, the momentum
+ * residual; all 0 in lanes 6 and 7. */
 struct body_lane {
     real A[6], H[6], b, v;
 };
@@ -367,8 +367,8 @@ CUDA_INLINE real step_of(const body_lane &body, real g)
     return product_with_row(H[0], H[1], H[2], H[3], H[4], H[5], other);
 }
 
-/* The method `fast`, with sum = J^T d lambda: v goes by rho H (r + 2 sum), and the defect r with what v has gone by in truth and
- * with multipliers that have gone `multipliers` times as far as lambda^. */
+/* The method `fast`, with sum = J^T d lambda: v goes by rho H (r + 2 sum), and the momentum residual r with what v has
+ * gone by in truth and with multipliers that have gone `multipliers` times as far as lambda^. */
 CUDA_INLINE real step_fast(body_lane *body, real sum, real relaxation)
 {
     const real before = body->v;
@@ -377,7 +377,7 @@ CUDA_INLINE real step_fast(body_lane *body, real sum, real relaxation)
 }
 
 /* Every lane of the warp comes here. */
-CUDA_INLINE real defect_after(const body_lane &body, real sum, real step, real multipliers)
+CUDA_INLINE real residual_after(const body_lane &body, real sum, real step, real multipliers)
 {
     real r = fused(multipliers, sum, body.b);
 #pragma unroll

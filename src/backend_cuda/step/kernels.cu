@@ -25,7 +25,7 @@ enum { STEP_THREADS = 64 }; /* a block: few, for long work and many multiprocess
 static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     int32_t i = thread_index();
-    if (i >= args.count || v.live->halt) return;
+    if (i >= args.count || v.live->abort_code) return;
     const struct sadmm_resident_edit *edit = &args.edits[i];
     const double *values = edit->values;
     if (edit->kind == SADMM_EDIT_SETTINGS) {
@@ -64,10 +64,10 @@ static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, co
 {
     const int64_t t = (int64_t)blockIdx.x * STEP_THREADS + threadIdx.x, i = t / START_LANES;
     const int32_t lane = (int32_t)(t % START_LANES);
-    if (v.live->halt) return;
+    if (v.live->abort_code) return;
     if (t == 0) {
         v.step.control->depth = 0;
-        v.step.control->culprit = INT32_MAX;
+        v.step.control->offending_body = INT32_MAX;
         v.step.control->stamps[STAMP_START] = nanoseconds();
     }
     if (i >= v.bodies) return;
@@ -97,11 +97,12 @@ static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, co
 /* One thread. What was found is this step's when it fits. */
 static __global__ void admit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    if (threadIdx.x > 0 || v.live->halt) return;
+    if (threadIdx.x > 0 || v.live->abort_code) return;
     const struct sadmm_cuda_contact_counts counts = *v.step.counts;
     v.step.control->stamps[STAMP_FOUND] = nanoseconds();
-    if (counts.candidates > v.step.candidate_room || counts.points > v.step.point_room || counts.pairs > v.pair_room) {
-        v.live->halt = HALT_ROOM;
+    if (counts.candidates > v.step.candidate_capacity || counts.points > v.step.point_capacity ||
+        counts.pairs > v.pair_capacity) {
+        v.live->abort_code = ABORT_CAPACITY;
         return;
     }
     v.live->bodies = v.bodies;
@@ -186,11 +187,11 @@ static __host__ __device__ inline finish_ranges ranges_of(const cuda_view &v)
     finish_ranges r;
     r.wrenches = (v.bodies + WARP - 1) / WARP * WARP;
     r.pairs = r.wrenches + (v.wrenches ? (LANES * v.bodies + WARP - 1) / WARP * WARP : 0);
-    r.end = r.pairs + v.lanes * v.pair_room;
+    r.end = r.pairs + v.lanes * v.pair_capacity;
     return r;
 }
 
-/* Does not look at culprits of this very kernel: which body is named must not depend on who came first. */
+/* Does not look at offending bodies of this very kernel: which body is named must not depend on who came first. */
 static __global__ void __launch_bounds__(STEP_THREADS)
     finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
@@ -205,15 +206,16 @@ static __global__ void __launch_bounds__(STEP_THREADS)
     pair_before pair = {};
     if (is_body && i < v.bodies) body = fetch_body(v, i);
     if (is_pair) pair = fetch_pair(v, p, lane);
-    /* Layout and penalties are the last that halt a step, the latter where it is not as planned; iterations come between. */
-    const bool on = as_planned(v) && !v.live->halt;
+    /* Layout and penalties are the last that abort a step, the latter where it is not as planned; iterations come
+     * between. */
+    const bool on = as_planned(v) && !v.live->abort_code;
 
     wait_for_stream();
     let_next_begin();
     const unsigned long long deepest = control->depth; /* of those that have come here */
     if (i == 0) control->stamps[STAMP_SOLVED] = nanoseconds();
     if (is_body) {
-        if (on && i < v.bodies && !finish_body(v, i, body, dt)) atomicMin(&control->culprit, i);
+        if (on && i < v.bodies && !finish_body(v, i, body, dt)) atomicMin(&control->offending_body, i);
     } else if (i < range.pairs) {
         const int32_t slot = (i - range.wrenches) / LANES, of_body = i % LANES;
         const bool live = on && slot < v.bodies;
@@ -222,7 +224,7 @@ static __global__ void __launch_bounds__(STEP_THREADS)
         if (live) store_wrench(wrench, of_body, v.step.wrench + 6 * (size_t)v.body_of[slot]);
     } else if (on && is_pair) {
         /* bodies are named first: all of them are below any contact's */
-        if (!finish_pair(v, p, lane, pair, &depth)) atomicMin(&control->culprit, v.bodies + pair.body);
+        if (!finish_pair(v, p, lane, pair, &depth)) atomicMin(&control->offending_body, v.bodies + pair.body);
     }
     /* -0 is no depth; a larger one may be there already */
     unsigned long long bits = depth > 0 ? (unsigned long long)__double_as_longlong(depth) : 0;
@@ -241,27 +243,30 @@ static __device__ double double_of(unsigned long long bits) { return __longlong_
 static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     const bool planned = as_planned(v);
-    const int32_t halted = v.live->halt;
+    const int32_t aborted = v.live->abort_code;
     wait_for_stream();
     if (threadIdx.x > 0) return;
     struct cuda_step_control *control = v.step.control;
     struct cuda_step_report *report = &v.step.reports[control->sequence % STEPS_AHEAD];
-    const int32_t culprit = control->culprit,
-                  halt = halted ? halted : !planned ? HALT_PLAN : culprit != INT32_MAX ? HALT_NON_FINITE : HALT_NONE;
+    const int32_t offending_body = control->offending_body, abort_code = aborted    ? aborted
+                                                                         : !planned ? ABORT_PLAN
+                                                                         : offending_body != INT32_MAX
+                                                                             ? ABORT_NON_FINITE
+                                                                             : ABORT_NONE;
     control->stamps[STAMP_END] = nanoseconds();
-    v.live->halt = halt;
+    v.live->abort_code = abort_code;
     report->sequence = control->sequence++;
-    report->halt = halt;
-    report->culprit = culprit;
+    report->abort_code = abort_code;
+    report->offending_body = offending_body;
     report->counts = *v.step.counts;
-    report->facts = *v.facts;
+    report->statistics = *v.statistics;
     report->depth = double_of(control->depth);
     report->primal = v.step.measured ? double_of(v.residual[0]) : -1;
     report->dual = v.step.measured ? double_of(v.residual[1]) : -1;
     report->limited = v.step.limits ? *v.limited : 0;
-    report->unmet = args.looks > 0 ? v.stop->unmet[args.looks % LOOKS_KEPT] : -1;
-    report->most_iterations = args.looks > 0 ? v.stop->last : 0;
-    report->sum_of_iterations = args.looks > 0 ? (int64_t)v.stop->sum : 0;
+    report->unmet = args.checks > 0 ? v.stop->unmet[args.checks % CHECKS_KEPT] : -1;
+    report->most_iterations = args.checks > 0 ? v.stop->last : 0;
+    report->sum_of_iterations = args.checks > 0 ? (int64_t)v.stop->sum : 0;
     for (int k = 0; k < STAMPS; ++k) report->stamps[k] = control->stamps[k];
 }
 
@@ -299,6 +304,6 @@ sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *er
 sadmm_status CUDA(launch_commit)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    args.looks = c->looks;
+    args.checks = c->checks;
     return CUDA(launch_early)(c, commit_kernel, "commit", 1, STEP_THREADS, &args, error);
 }

@@ -25,22 +25,23 @@ static __device__ __forceinline__ void stamp_assembled(const cuda_view &v)
 /* Is the step what it was planned for? */
 static __device__ __forceinline__ bool as_planned(const cuda_view &v)
 {
-    const struct cuda_facts *facts = v.facts;
+    const struct cuda_graph_statistics *statistics = v.statistics;
     const struct cuda_step_guess guess = v.step.guess;
-    const int32_t pairs = v.live->pairs, rows = pairs == 0 ? 0 : facts->rough > 0 ? 3 : 1;
-    const int32_t warm = pairs > 0 && 2 * (int64_t)facts->warm >= pairs;
-    return rows == guess.contact_rows && facts->point_slots <= guess.point_slots && (guess.warm < 0 || warm == guess.warm);
+    const int32_t pairs = v.live->pairs, rows = pairs == 0 ? 0 : statistics->rough > 0 ? 3 : 1;
+    const int32_t warm = pairs > 0 && 2 * (int64_t)statistics->warm >= pairs;
+    return rows == guess.contact_rows && statistics->point_slots <= guess.point_slots &&
+           (guess.warm < 0 || warm == guess.warm);
 }
 
-/* The grid's first thread compares the facts with the plan; what runs now and what was assembled is of no use when they
- * differ. Scalars are 0 for the iterations (enum cuda_scalar). */
+/* The grid's first thread compares the statistics with the plan; what runs now and what was assembled is of no use when
+ * they differ. Scalars are 0 for the iterations (enum cuda_scalar). */
 static __device__ __forceinline__ void check_plan(const cuda_view &v)
 {
     if (blockIdx.x > 0 || threadIdx.x > 0) return;
     stamp_assembled(v);
     v.residual[0] = v.residual[1] = 0;
     *v.barrier = 0;
-    if (!v.live->halt && !as_planned(v)) v.live->halt = HALT_PLAN;
+    if (!v.live->abort_code && !as_planned(v)) v.live->abort_code = ABORT_PLAN;
 }
 
 #endif

@@ -21,14 +21,14 @@ static __global__ void read_kernel(const __grid_constant__ cuda_view v, const __
         return;
     }
     i -= v.bodies;
-    if (i < v.pair_room) {
+    if (i < v.pair_capacity) {
         if (i >= live_pairs(v)) return;
         const struct sadmm_contact_pair *pair = &v.raw_pairs[i];
         for (int32_t k = 0; k < pair->count; ++k)
             v3_store(point_impulse(v, i, k), impulses + 3 * (size_t)(pair->first + k));
         return;
     }
-    i -= v.pair_room;
+    i -= v.pair_capacity;
     if (i < live_rows(v))
         for (int r = 0; r < 6; ++r) multipliers[6 * (size_t)i + (size_t)r] = row_multiplier(v, i, r);
 }
@@ -40,7 +40,8 @@ extern "C" sadmm_status CUDA(read_solution)(struct sadmm_context *c, struct sadm
     size_t n = (size_t)v->bodies, points = (size_t)c->plan.points, rows = (size_t)v->rows;
     cuda_args args = {};
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(launch)(c, read_kernel, "read_solution", blocks_for((int64_t)v->bodies + v->pair_room + v->rows), &args, error));
+    CUDA_TRY(CUDA(launch)(c, read_kernel, "read_solution", blocks_for((int64_t)v->bodies + v->pair_capacity + v->rows),
+                          &args, error));
     CUDA_TRY(CUDA(download)(c, v->out, (6 * n + 3 * points + 6 * rows) * sizeof(double), error));
     const double *from = (const double *)c->buffers[PINNED_OUT].data;
     if (n > 0) memcpy(system->velocity, from, 6 * n * sizeof *from);

@@ -36,15 +36,15 @@ static __device__ __forceinline__ void add_pair_wrench(const cuda_view &v, int32
     }
 }
 
-/* R: (12) with lambda = -u, J^T lambda / dt over the halves [begin, end) of a body, by eight lanes that take every eighth
- * half each; the sum is in all of them. per_dt: 1 / dt. Warp-collective. */
+/* R: (12) with lambda = -u, J^T lambda / dt over the sides [begin, end) of a body, by eight lanes that take every
+ * eighth half each; the sum is in all of them. per_dt: 1 / dt. Warp-collective. */
 static __device__ __forceinline__ void contact_wrench(const cuda_view &v, int32_t begin, int32_t end, int32_t lane,
                                                       double per_dt, double wrench[6])
 {
     for (int k = 0; k < 6; ++k) wrench[k] = 0;
     for (int32_t at = begin + lane; at < end; at += LANES) {
         int32_t record = v.incident[at] / 2, side = v.incident[at] & 1;
-        if (record < v.pair_room) add_pair_wrench(v, record, side, per_dt, wrench); /* contacts given by geometry only */
+        if (record < v.pair_capacity) add_pair_wrench(v, record, side, per_dt, wrench); /* contacts given by geometry only */
     }
 #pragma unroll
     for (int o = 1; o < LANES; o *= 2)

@@ -26,7 +26,7 @@ struct cuda_step {
     bool recorded;              /* and so are the graphs */
     cudaGraphExec_t graphs[2];  /* by the set that is written */
     struct cuda_step_guess guess;
-    int64_t candidate_room, point_room;
+    int64_t candidate_capacity, point_capacity;
 
     /* The queue: steps [seen, enqueued), at most STEPS_AHEAD. */
     struct queued_step queue[STEPS_AHEAD];
@@ -38,7 +38,7 @@ struct cuda_step {
     double time;                  /* simulated until after it, s */
     int64_t done, repeats;
     int64_t misfit;             /* the last step that its partition did not fit; -1: none */
-    int32_t culprit;
+    int32_t offending_body;
 };
 
 template <class T> static T *buffer(const struct sadmm_context *c, enum cuda_buffer_name name)
@@ -51,13 +51,13 @@ static struct cuda_step_report *reports(const struct sadmm_context *c)
     return buffer<struct cuda_step_report>(c, PINNED_REPORTS);
 }
 
-/* Rooms: more than there was, so that not every new contact repeats a step: half as much again in small scenes, where a heap
- * that spreads gains a third, an eighth in large ones, where it costs memory. */
+/* Capacities: more than there was, so that not every new contact repeats a step: half as much again in small scenes,
+ * where a heap that spreads gains a third, an eighth in large ones, where it costs memory. */
 static int64_t generous(int64_t count) { return count + std::min(count / 2, count / 8 + 8192) + 256; }
 
 /* ---- the view of a step ---------------------------------------------------------------------------------------- */
 
-/* Is there a stop rule to look at? Then residuals say nothing: islands end at different times. */
+/* Is there a stop rule to check? Then residuals say nothing: islands end at different times. */
 static bool stops(const struct sadmm_context *c) { return c->fast && c->settings.certificate_tolerance > 0; }
 
 /* Everything of the view that depends on which state and set is written. */
@@ -80,8 +80,8 @@ static void view_into(struct sadmm_context *c, int into)
     step->slot_of_body = buffer<int32_t>(c, BUFFER_WORLD_SLOTS);
     step->bodies = buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES);
     step->counts = set.device_counts;
-    step->candidate_room = s->candidate_room;
-    step->point_room = s->point_room;
+    step->candidate_capacity = s->candidate_capacity;
+    step->point_capacity = s->point_capacity;
     step->guess = s->guess;
     step->control = buffer<struct cuda_step_control>(c, BUFFER_WORLD_CONTROL);
     step->reports = reports(c);
@@ -103,7 +103,7 @@ static void view_counts(struct sadmm_context *c, int64_t pairs)
     v->raw = none;
     v->raw.body_count = s->bodies;
     v->bodies = s->bodies;
-    v->pair_room = (int32_t)((pairs + WARP - 1) / WARP * WARP);
+    v->pair_capacity = (int32_t)((pairs + WARP - 1) / WARP * WARP);
     v->rows = 0;
     v->row_stride = 0;
     v->contact_rows = s->guess.contact_rows == 1 ? 1 : 3;
@@ -137,11 +137,12 @@ struct side_branch {
 };
 } // namespace
 
-/* What the iterating kernels do about energies. With looks an island may have more iterations after them. */
+/* What the iterating kernels do about energies. With convergence checks an island may have more iterations after them.
+ */
 static enum cuda_limit limit_by_iterations(const struct sadmm_context *c)
 {
     if (!c->plan.limit || c->partition.tier == SADMM_CUDA_TIER_STREAM) return LIMIT_NONE;
-    return c->ends && !stops(c) ? LIMIT_WHOLE : LIMIT_SUSPECTS;
+    return c->prologue && !stops(c) ? LIMIT_WHOLE : LIMIT_SUSPECTS;
 }
 
 /* A and b of the bodies: beside contact finding, of which they need nothing. */
@@ -153,7 +154,7 @@ static sadmm_status record_gather(struct sadmm_context *c, struct sadmm_error *e
     return CUDA(enqueue_bodies)(c, error);
 }
 
-/* Facts and layout; beside them contacts in the solver's form, and what weights take from pairs. */
+/* Graph statistics and layout; beside them contacts in the solver's form, and what weights take from pairs. */
 static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *error)
 {
     {
@@ -162,7 +163,7 @@ static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *err
         CUDA_TRY(CUDA(assemble_contacts)(c, error));
         CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
     }
-    CUDA_TRY(CUDA(enqueue_survey_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
+    CUDA_TRY(CUDA(enqueue_statistics_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
     CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
     return SADMM_OK;
 }
@@ -197,7 +198,7 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
     case SADMM_STAGE_RESIDUALS: /* not reported where islands stop by themselves */
         *residuals = stage->last;
         return stage->last || stops(c) ? SADMM_OK : CUDA(enqueue_residuals)(c, error);
-    case SADMM_STAGE_CHECK: return CUDA(enqueue_look)(c, stage->done, error);
+    case SADMM_STAGE_CHECK: return CUDA(enqueue_convergence_check)(c, stage->done, error);
     case SADMM_STAGE_REWEIGH: return CUDA(enqueue_weights)(c, true, error);
     case SADMM_STAGE_BALANCE: /* the ratio of (15) is found on the device */
         CUDA_TRY(CUDA(enqueue_balance)(c, error));
@@ -223,8 +224,8 @@ static sadmm_status enqueue_step(struct sadmm_context *c, struct sadmm_error *er
     struct sadmm_stages stages = sadmm_stages_of(&c->plan, &c->settings, true);
     struct sadmm_stage stage;
     bool residuals = false;
-    c->ends = c->fast && !c->plan.residuals && c->view.rows == 0 && c->view.contact_rows == 3 &&
-              CUDA(resident_does_ends)(&c->partition);
+    c->prologue = c->fast && !c->plan.residuals && c->view.rows == 0 && c->view.contact_rows == 3 &&
+              CUDA(persistent_does_prologue)(&c->partition);
     while (sadmm_stages_next(&stages, &stage)) CUDA_TRY(record_stage(c, &stage, &residuals, error));
     return SADMM_OK;
 }
@@ -240,97 +241,99 @@ static sadmm_status copy_out(struct sadmm_context *c, void *to, const void *from
     return SADMM_OK;
 }
 
-static sadmm_status clear_halt(struct sadmm_context *c, struct sadmm_error *error)
+static sadmm_status clear_abort(struct sadmm_context *c, struct sadmm_error *error)
 {
     CUDA_CALL(c, cudaMemsetAsync(c->view.live, 0, sizeof *c->view.live, c->stream), "cudaMemsetAsync(live)");
     return SADMM_OK;
 }
 
 /* Contacts of the next step and what they are like, seen by the host. */
-struct look {
+struct preview {
     struct cuda_live live;
-    struct cuda_facts facts;
+    struct cuda_graph_statistics statistics;
     struct sadmm_cuda_contact_counts counts;
 };
 
-static sadmm_status look_at_step(struct sadmm_context *c, struct look *out, struct sadmm_error *error)
+static sadmm_status preview_step(struct sadmm_context *c, struct preview *out, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
-    CUDA_TRY(CUDA(room)(c, PINNED_OUT, sizeof *out, error));
-    struct look *staged = buffer<struct look>(c, PINNED_OUT);
+    CUDA_TRY(CUDA(reserve)(c, PINNED_OUT, sizeof *out, error));
+    struct preview *staged = buffer<struct preview>(c, PINNED_OUT);
     for (;;) {
-        CUDA_TRY(COLLISION(reserve)(s->collision, &s->candidate_room, &s->point_room, error));
-        view_counts(c, s->candidate_room);
-        CUDA_TRY(CUDA(layout_room)(c, error));
+        CUDA_TRY(COLLISION(reserve)(s->collision, &s->candidate_capacity, &s->point_capacity, error));
+        view_counts(c, s->candidate_capacity);
+        CUDA_TRY(CUDA(reserve_layout)(c, error));
         view_into(c, s->into);
-        CUDA_TRY(clear_halt(c, error));
+        CUDA_TRY(clear_abort(c, error));
         CUDA_TRY(CUDA(launch_start)(c, error));
         CUDA_TRY(enqueue_find(c, error));
-        CUDA_TRY(CUDA(enqueue_survey)(c, true, error));
+        CUDA_TRY(CUDA(enqueue_statistics)(c, true, error));
         CUDA_TRY(copy_out(c, &staged->live, c->view.live, sizeof staged->live, error));
-        CUDA_TRY(copy_out(c, &staged->facts, c->view.facts, sizeof staged->facts, error));
+        CUDA_TRY(copy_out(c, &staged->statistics, c->view.statistics, sizeof staged->statistics, error));
         CUDA_TRY(copy_out(c, &staged->counts, c->view.step.counts, sizeof staged->counts, error));
         CUDA_TRY(CUDA(wait)(c, error));
         *out = *staged;
-        if (out->live.halt != HALT_ROOM) return SADMM_OK;
-        s->candidate_room = std::max(s->candidate_room, generous(out->counts.candidates));
+        if (out->live.abort_code != ABORT_CAPACITY) return SADMM_OK;
+        s->candidate_capacity = std::max(s->candidate_capacity, generous(out->counts.candidates));
         /* points are counted only where all candidates had room */
-        if (out->counts.candidates <= c->view.step.candidate_room)
-            s->point_room = std::max(s->point_room, generous(out->counts.points));
+        if (out->counts.candidates <= c->view.step.candidate_capacity)
+            s->point_capacity = std::max(s->point_capacity, generous(out->counts.points));
     }
 }
 
-static struct sadmm_plan plan_of(const struct sadmm_context *c, const struct look *seen)
+static struct sadmm_plan plan_of(const struct sadmm_context *c, const struct preview *seen)
 {
     const struct cuda_step *s = c->step;
     struct sadmm_plan plan = {};
     plan.bodies = s->bodies;
     plan.pairs = seen->live.pairs;
     plan.points = seen->live.points;
-    plan.contact_rows = plan.points == 0 ? 0 : seen->facts.rough > 0 ? 3 : 1;
+    plan.contact_rows = plan.points == 0 ? 0 : seen->statistics.rough > 0 ? 3 : 1;
     plan.rigid = true;
     plan.gyroscopic = c->plan.gyroscopic; /* since load */
     plan.threads = 1;
-    sadmm_plan_settle(&plan, &c->settings, plan.pairs > 0 && 2 * (int64_t)seen->facts.warm >= plan.pairs);
+    sadmm_plan_settle(&plan, &c->settings, plan.pairs > 0 && 2 * (int64_t)seen->statistics.warm >= plan.pairs);
     return plan;
 }
 
 /* The layout once, for what its parts are really like. */
-static sadmm_status tighten(struct sadmm_context *c, const struct look *seen, struct sadmm_error *error)
+static sadmm_status tighten(struct sadmm_context *c, const struct preview *seen, struct sadmm_error *error)
 {
     if (c->partition.tier == SADMM_CUDA_TIER_STREAM) return SADMM_OK;
-    struct look *staged = buffer<struct look>(c, PINNED_OUT);
+    struct preview *staged = buffer<struct preview>(c, PINNED_OUT);
     staged->live = seen->live;
     CUDA_CALL(c, cudaMemcpyAsync(c->view.live, &staged->live, sizeof staged->live, cudaMemcpyHostToDevice, c->stream),
               "cudaMemcpyAsync to the device");
-    CUDA_TRY(CUDA(enqueue_survey_and_layout)(c, true, &c->partition, error));
+    CUDA_TRY(CUDA(enqueue_statistics_and_layout)(c, true, &c->partition, error));
     CUDA_TRY(copy_out(c, &staged->live, c->view.live, sizeof staged->live, error));
-    CUDA_TRY(copy_out(c, &staged->facts, c->view.facts, sizeof staged->facts, error));
+    CUDA_TRY(copy_out(c, &staged->statistics, c->view.statistics, sizeof staged->statistics, error));
     CUDA_TRY(CUDA(wait)(c, error));
-    struct cuda_facts facts = staged->facts;
-    facts.point_slots = c->facts.point_slots;
-    if (staged->live.halt == HALT_NONE) CUDA(tighten_partition)(c, &facts, &c->partition);
-    return clear_halt(c, error);
+    struct cuda_graph_statistics statistics = staged->statistics;
+    statistics.point_slots = c->statistics.point_slots;
+    if (staged->live.abort_code == ABORT_NONE) CUDA(tighten_partition)(c, &statistics, &c->partition);
+    return clear_abort(c, error);
 }
 
 static sadmm_status make_plan(struct sadmm_context *c, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
-    struct look seen;
-    CUDA_TRY(look_at_step(c, &seen, error));
+    struct preview seen;
+    CUDA_TRY(preview_step(c, &seen, error));
     c->plan = plan_of(c, &seen);
     s->guess.contact_rows = c->plan.contact_rows;
-    s->guess.point_slots = seen.facts.point_slots <= 1 ? 1 : seen.facts.point_slots <= 4 ? 4 : SADMM_MAX_POINTS;
+    s->guess.point_slots = seen.statistics.point_slots <= 1   ? 1
+                           : seen.statistics.point_slots <= 4 ? 4
+                                                              : SADMM_MAX_POINTS;
     s->guess.warm = sadmm_plan_depends_on_warmth(&c->settings) ? c->plan.warm : -1;
     view_counts(c, generous(seen.counts.pairs));
     c->view.points = 0; /* results are read elsewhere */
-    seen.facts.point_slots = s->guess.point_slots;
-    c->facts = seen.facts;
-    CUDA_TRY(CUDA(choose_partition)(c, &seen.facts, &c->partition, error));
-    CUDA_TRY(CUDA(layout_room)(c, error));
+    seen.statistics.point_slots = s->guess.point_slots;
+    c->statistics = seen.statistics;
+    CUDA_TRY(CUDA(choose_partition)(c, &seen.statistics, &c->partition, error));
+    CUDA_TRY(CUDA(reserve_layout)(c, error));
     CUDA_TRY(tighten(c, &seen, error));
-    CUDA_TRY(CUDA(solver_room)(c, error));
-    CUDA_TRY(CUDA(room)(c, BUFFER_WORLD_IMPULSE, 3 * (size_t)s->point_room * sizeof(double), error));
+    CUDA_TRY(CUDA(reserve_solver)(c, error));
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_IMPULSE, 3 * (size_t)s->point_capacity * sizeof(double), error));
     s->planned = true;
     s->recorded = false;
     return SADMM_OK;
@@ -352,7 +355,7 @@ static sadmm_status record_graph(struct sadmm_context *c, int into, struct sadmm
     s->into = next;
     cudaError_t code = cudaStreamEndCapture(c->stream, &graph);
     if (status == SADMM_OK && code != cudaSuccess) status = CUDA(fail)(c, code, "cudaStreamEndCapture", error);
-    /* Instantiated anew: plans change rarely, and then the graph's shape changes with them. */
+    /* Instantiated again: plans change rarely, and then the graph's shape changes with them. */
     if (s->graphs[into]) (void)cudaGraphExecDestroy(s->graphs[into]);
     s->graphs[into] = nullptr;
     if (status == SADMM_OK) {
@@ -366,7 +369,7 @@ static sadmm_status record_graph(struct sadmm_context *c, int into, struct sadmm
     return status;
 }
 
-/* Clear halt, plan if need be, record if need be. Nothing is running. */
+/* Clear the abort code, plan if need be, record if need be. Nothing is running. */
 static sadmm_status prepare(struct sadmm_context *c, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
@@ -430,23 +433,25 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
     struct cuda_step *s = c->step;
     const int64_t end = s->enqueued;
     CUDA_TRY(CUDA(wait)(c, error));
-    /* The device has numbered the steps that did not run; they are numbered anew. */
+    /* The device has numbered the steps that did not run; they are numbered again. */
     s->into = (end - first) % 2 ? 1 - s->into : s->into;
     s->seen = s->enqueued = first;
     CUDA_CALL(c, cudaMemcpyAsync(&c->view.step.control->sequence, &s->enqueued, sizeof s->enqueued,
                                  cudaMemcpyHostToDevice, c->stream),
               "cudaMemcpyAsync to the device");
-    CUDA_TRY(clear_halt(c, error));
+    CUDA_TRY(clear_abort(c, error));
     CUDA_TRY(CUDA(wait)(c, error));
-    if (report->halt == HALT_NON_FINITE) {
-        s->culprit = report->culprit >= s->bodies ? report->culprit - s->bodies : report->culprit;
+    if (report->abort_code == ABORT_NON_FINITE) {
+        s->offending_body =
+            report->offending_body >= s->bodies ? report->offending_body - s->bodies : report->offending_body;
         drop_steps(c, first, end);
         return sadmm_fail(error, SADMM_ERROR_NON_FINITE, "the solve gave a velocity or multiplier that is not finite");
     }
     ++s->repeats;
     s->planned = false;
-    if (report->halt == HALT_ROOM) s->candidate_room = std::max(s->candidate_room, generous(report->counts.candidates));
-    if (report->halt == HALT_PARTITION) {
+    if (report->abort_code == ABORT_CAPACITY)
+        s->candidate_capacity = std::max(s->candidate_capacity, generous(report->counts.candidates));
+    if (report->abort_code == ABORT_PARTITION) {
         /* The next partition is made for this very step, and fits; a tier that fails twice is left alone all the same. */
         if (s->misfit == first) c->refused |= 1u << c->partition.tier;
         s->misfit = first;
@@ -461,7 +466,7 @@ static sadmm_status see_step(struct sadmm_context *c, struct sadmm_error *error)
     cudaError_t code = cudaEventSynchronize(slot_of(s, s->seen)->done);
     if (code != cudaSuccess) CUDA_TRY(CUDA(wait)(c, error)); /* says what failed */
     const struct cuda_step_report report = reports(c)[s->seen % STEPS_AHEAD]; /* a copy: recover() reuses the place */
-    if (report.halt != HALT_NONE) return recover(c, s->seen, &report, error);
+    if (report.abort_code != ABORT_NONE) return recover(c, s->seen, &report, error);
     s->last = report;
     struct queued_step *q = slot_of(s, s->seen);
     q->edit_count = 0;
@@ -470,7 +475,7 @@ static sadmm_status see_step(struct sadmm_context *c, struct sadmm_error *error)
     ++s->seen;
     ++s->done;
     /* A plan with far too much room wastes launches. */
-    if (report.counts.pairs < c->view.pair_room / 4 - 256) s->planned = false;
+    if (report.counts.pairs < c->view.pair_capacity / 4 - 256) s->planned = false;
     return SADMM_OK;
 }
 
@@ -513,7 +518,7 @@ static sadmm_status step_create(struct sadmm_context *c, struct sadmm_error *err
 static sadmm_status put(struct sadmm_context *c, enum cuda_buffer_name name, const void *from, size_t bytes,
                         struct sadmm_error *error)
 {
-    CUDA_TRY(CUDA(room)(c, PINNED_BODIES, bytes, error));
+    CUDA_TRY(CUDA(reserve)(c, PINNED_BODIES, bytes, error));
     CUDA_TRY(CUDA(upload)(c, c->buffers[name].data, PINNED_BODIES, 0, from, bytes, error));
     return CUDA(wait)(c, error);
 }
@@ -540,18 +545,18 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     s->time = world->time;
     s->planned = s->recorded = false;
     s->enqueued = s->seen = s->done = s->repeats = 0;
-    s->culprit = -1;
+    s->offending_body = -1;
     for (struct queued_step &q : s->queue) q.edit_count = 0;
     memset(&s->last, 0, sizeof s->last);
     CUDA_TRY(CUDA(use_settings)(c, settings, error));
-    CUDA_TRY(CUDA(room)(c, BUFFER_WORLD_BODIES, 2 * n * sizeof *world->rigid, error));
-    CUDA_TRY(CUDA(room)(c, BUFFER_WORLD_STEADY, 2 * n * sizeof *world->steady, error));
-    CUDA_TRY(CUDA(room)(c, BUFFER_WORLD_WRENCH, 12 * n * sizeof(double), error));
-    CUDA_TRY(CUDA(room)(c, BUFFER_WORLD_VELOCITY, 6 * n * sizeof(double), error));
-    CUDA_TRY(CUDA(room)(c, BUFFER_WORLD_SLOTS, n * sizeof *world->slot_of, error));
-    CUDA_TRY(CUDA(room)(c, BUFFER_WORLD_PLACES, slots * sizeof(struct sadmm_collision_body), error));
-    CUDA_TRY(CUDA(room)(c, BUFFER_WORLD_CONTROL, sizeof(struct cuda_step_control), error));
-    CUDA_TRY(CUDA(room)(c, PINNED_REPORTS, STEPS_AHEAD * sizeof(struct cuda_step_report), error));
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_BODIES, 2 * n * sizeof *world->rigid, error));
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_STEADY, 2 * n * sizeof *world->steady, error));
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_WRENCH, 12 * n * sizeof(double), error));
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_VELOCITY, 6 * n * sizeof(double), error));
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_SLOTS, n * sizeof *world->slot_of, error));
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_PLACES, slots * sizeof(struct sadmm_collision_body), error));
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_CONTROL, sizeof(struct cuda_step_control), error));
+    CUDA_TRY(CUDA(reserve)(c, PINNED_REPORTS, STEPS_AHEAD * sizeof(struct cuda_step_report), error));
     CUDA_CALL(c, cudaMemsetAsync(buffer<void>(c, BUFFER_WORLD_CONTROL), 0, sizeof(struct cuda_step_control), c->stream),
               "cudaMemsetAsync(control)");
 
@@ -562,7 +567,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     const size_t before = (size_t)(1 - s->into);
     CUDA_TRY(put(c, BUFFER_WORLD_SLOTS, world->slot_of, n * sizeof *world->slot_of, error));
     CUDA_TRY(put(c, BUFFER_WORLD_PLACES, world->input->bodies, slots * sizeof *world->input->bodies, error));
-    CUDA_TRY(CUDA(room)(c, PINNED_BODIES, n * sizeof *world->rigid, error));
+    CUDA_TRY(CUDA(reserve)(c, PINNED_BODIES, n * sizeof *world->rigid, error));
     CUDA_TRY(CUDA(upload)(c, buffer<struct sadmm_rigid>(c, BUFFER_WORLD_BODIES) + before * n, PINNED_BODIES, 0,
                           world->rigid, n * sizeof *world->rigid, error));
     CUDA_TRY(CUDA(wait)(c, error));
@@ -570,14 +575,14 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
                           world->steady, n * sizeof *world->steady, error));
     CUDA_TRY(CUDA(wait)(c, error));
     view_counts(c, 0);
-    CUDA_TRY(CUDA(layout_room)(c, error)); /* live is needed from here on */
-    CUDA_TRY(clear_halt(c, error));
-    s->candidate_room = s->point_room = c->first_room;
+    CUDA_TRY(CUDA(reserve_layout)(c, error)); /* live is needed from here on */
+    CUDA_TRY(clear_abort(c, error));
+    s->candidate_capacity = s->point_capacity = c->first_capacity;
     c->refused = 0;
     s->misfit = -1;
     const struct cuda_settings *kept = buffer<struct cuda_settings>(c, BUFFER_SETTINGS);
     CUDA_TRY(COLLISION(attach)(s->collision, c->stream, world->input,
-                               buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES), &c->view.live->halt,
+                               buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES), &c->view.live->abort_code,
                                &kept->settings.dt, &kept->gravity, error));
     view_into(c, s->into);
     return CUDA(wait)(c, error);
@@ -677,7 +682,7 @@ extern "C" sadmm_status CUDA(wait_world)(struct sadmm_context *c, struct sadmm_r
     out->time = s->time;
     out->settings = *settings;
     out->repeats = s->repeats;
-    out->culprit = s->culprit;
+    out->offending_body = s->offending_body;
     out->plan = c->plan;
     out->plan.pairs = last->counts.pairs;
     out->plan.points = last->counts.points;
@@ -686,9 +691,9 @@ extern "C" sadmm_status CUDA(wait_world)(struct sadmm_context *c, struct sadmm_r
     out->islands_above = last->unmet;
     out->converged = last->unmet == 0;
     if (out->converged) out->iterations = last->most_iterations;
-    if (last->unmet >= 0 && last->facts.islands > 0)
+    if (last->unmet >= 0 && last->statistics.islands > 0)
         out->iterations_mean = ((double)last->sum_of_iterations + (double)last->unmet * settings->iterations) /
-                               last->facts.islands;
+                               last->statistics.islands;
     out->limited = last->limited;
     out->penetration_max = last->depth;
     out->residual.primal = last->primal;
@@ -708,7 +713,7 @@ static sadmm_status get(struct sadmm_context *c, void *to, const void *from, siz
 {
     enum { PIECE = 16 << 20 };
     if (!to) return SADMM_OK;
-    CUDA_TRY(CUDA(room)(c, PINNED_OUT, std::min(bytes, (size_t)PIECE), error));
+    CUDA_TRY(CUDA(reserve)(c, PINNED_OUT, std::min(bytes, (size_t)PIECE), error));
     for (size_t at = 0; at < bytes; at += PIECE) {
         const size_t piece = std::min(bytes - at, (size_t)PIECE);
         CUDA_TRY(CUDA(download)(c, (const char *)from + at, piece, error));

@@ -5,25 +5,26 @@
  *     find       contacts, from one set into the other                       (collide/view.h)
  *       beside it  A, b of the bodies
  *     admit      do they fit? Then they are this step's (cuda_live)
- *     survey     facts about them; islands                                   (graph/layout.cu)
- *     layout     slots, halves, parts
+ *     statistics     statistics about them; islands                                   (graph/layout.cu)
+ *     layout     slots, sides, parts
  *       beside it  contacts in the solver's form
  *     penalties  C, beta, factors (fast: weights, C, factors); and: is this what the step was planned for?
  *     iterate    (15), new weights where asked for                           (the kernel table's own kernels)
- *       after some   fast: a look at the stop rule
+ *       after some   fast: a convergence check
  *     limit      fast: islands that have more energy than they may
- *                fast, small islands (c->ends): `iterate` does penalties and limit, too, and the plan is looked at by the last two
- *       beside what follows  (16), (17)
+ *                fast, small islands (c->prologue): `iterate` does penalties and limit, too, and the plan is looked at
+ * by the last two       beside what follows  (16), (17)
  *     finish     impulses into the contacts, moved bodies, wrenches
- *     commit     the report; the step counts only if nothing was halted
+ *     commit     the report; the step counts only if nothing was aborted
  *
- * The host plans a step from the facts of an earlier one: rooms, tier and partition, rows a contact, warm or cold. All of
- * it goes into a graph that is launched again and again, two of them in turn, because states and contact sets change
- * places at every step. Where a plan does not hold, the step sets cuda_live.halt (with c->ends only its last kernel
- * does: what runs until then keeps to what was planned for), what was enqueued behind it does nothing, and the host, when it sees the report, looks at the facts, plans anew and enqueues the same steps again: a
- * repeated step starts from the same state, settings included, and gives the same bits. The settings' numbers are data in
- * device memory, so that a change of them is an edit like others: nothing is recorded anew or waited for. Reports and edits travel through pinned memory, a ring
- * of STEPS_AHEAD, written and read by the device itself.
+ * The host plans a step from the statistics of an earlier one: rooms, tier and partition, rows a contact, warm or cold.
+ * All of it goes into a graph that is launched again and again, two of them in turn, because states and contact sets
+ * change places at every step. Where a plan does not hold, the step sets cuda_live.abort_code (with c->prologue only
+ * its last kernel does: what runs until then keeps to what was planned for), what was enqueued behind it does nothing,
+ * and the host, when it sees the report, looks at the statistics, plans again and enqueues the same steps again: a
+ * repeated step starts from the same state, settings included, and gives the same bits. The settings' numbers are data
+ * in device memory, so that a change of them is an edit like others: nothing is recorded again or waited for. Reports
+ * and edits travel through pinned memory, a ring of STEPS_AHEAD, written and read by the device itself.
  */
 #ifndef SADMM_CUDA_STEP_STEP_H
 #define SADMM_CUDA_STEP_STEP_H
@@ -39,10 +40,10 @@ enum step_stamp { STAMP_START, STAMP_FOUND, STAMP_ASSEMBLED, STAMP_SOLVED, STAMP
 /* Written by commit, read by the host. */
 struct cuda_step_report {
     int64_t sequence; /* steps enqueued before this one, failed ones included */
-    int32_t halt;     /* enum cuda_halt */
-    int32_t culprit;  /* a body that is not finite; INT32_MAX: none */
+    int32_t abort_code;     /* enum cuda_abort */
+    int32_t offending_body;  /* a body that is not finite; INT32_MAX: none */
     struct sadmm_cuda_contact_counts counts;
-    struct cuda_facts facts;
+    struct cuda_graph_statistics statistics;
     double depth, primal, dual;
     int32_t limited; /* islands */
     int32_t unmet;   /* islands that the stop rule still waited for; -1: there is none */
@@ -56,7 +57,7 @@ struct cuda_step_control {
     int64_t sequence;
     unsigned long long depth; /* bit pattern of a double >= 0 */
     unsigned long long stamps[STAMPS];
-    int32_t culprit;
+    int32_t offending_body;
 };
 
 /* What the step was planned for. */
@@ -78,7 +79,7 @@ struct cuda_step_view {
     const int32_t *slot_of_body;          /* dynamic body -> world slot */
     struct sadmm_collision_body *bodies;  /* by world slot */
     const struct sadmm_cuda_contact_counts *counts;
-    int64_t candidate_room, point_room;
+    int64_t candidate_capacity, point_capacity;
     struct cuda_step_guess guess;
     struct cuda_step_control *control;
     struct cuda_step_report *reports;     /* pinned: STEPS_AHEAD */

@@ -1,4 +1,5 @@
-/* Constraints of the method `fast` in double, from this precision's data: what weights, levels and energies are made of. */
+/* Constraints of the method `fast` in double, from this precision's data: what weights, weight scales and energies are
+ * made of. */
 #ifndef SADMM_CUDA_WEIGHT_CONSTRAINT_H
 #define SADMM_CUDA_WEIGHT_CONSTRAINT_H
 
@@ -94,12 +95,12 @@ static __device__ __forceinline__ double mass_of(const cuda_view &v, size_t body
            3;
 }
 
-/* g += J^T lambda of a half; *push += the size of its force. */
-static inline __device__ void add_half(const cuda_view &v, int32_t code, double g[6], double *push)
+/* g += J^T lambda of a side; *push += the size of its force. */
+static inline __device__ void add_side(const cuda_view &v, int32_t code, double g[6], double *push)
 {
     const int32_t side = code & 1, p = code / 2;
-    if (p >= v.pair_room) {
-        const int32_t k = p - v.pair_room, jacobian = side ? ROW_J_B : ROW_J_A;
+    if (p >= v.pair_capacity) {
+        const int32_t k = p - v.pair_capacity, jacobian = side ? ROW_J_B : ROW_J_A;
         double wrench[6] = {};
         for (int r = 0; r < v.row_info[k].rows; ++r)
             for (int j = 0; j < 6; ++j)

@@ -4,16 +4,16 @@
 #define SADMM_CUDA_WEIGHT_FACTOR_H
 
 #include "constraint.h"
-#include "backend_cuda/assemble/half_sums.h"
+#include "backend_cuda/assemble/side_sums.h"
 
 #include "core/math/weight.h"
 
 /* ---- weights of the method `fast` -------------------------------------------------------------------------------- */
 
-/* The contacts of tall islands close small gaps slowly. */
-static __device__ __forceinline__ void ease_gaps(const cuda_view &v, int32_t p, double tallness)
+/* The contacts of deep stacks close small gaps slowly. */
+static __device__ __forceinline__ void ease_gaps(const cuda_view &v, int32_t p, double stack_depth)
 {
-    const double slop = v.settings->slop / v.settings->dt, share = weight_gap_share(tallness);
+    const double slop = v.settings->slop / v.settings->dt, share = weight_gap_share(stack_depth);
     const int32_t count = share < 1 ? (int32_t)v.difference[p].w : 0;
     for (int32_t k = 0; k < count; ++k) {
         solver_real *error = &v.arm[point_slot(v, p, k)].w;
@@ -21,29 +21,31 @@ static __device__ __forceinline__ void ease_gaps(const cuda_view &v, int32_t p, 
     }
 }
 
-/* Of eight halves of a body, one a lane: which, what its weight is made of, and from all of their records the lane's numbers. */
-struct eight_halves {
+/* Of eight sides of a body, one a lane: which, what its weight is made of, and from all of their records the lane's
+ * numbers. */
+struct eight_sides {
     int32_t code;                  /* of the lane's own, or -1 */
     pair_ends ends;
     solver_real load, response;    /* of a pair */
     solver_real number[2][LANES];  /* numbers lane and lane + LANES of arm_sums */
 };
 
-/* B of the pair of the lane's half. Both of its halves work it out; the one at its first dynamic body keeps it. */
-static __device__ __forceinline__ double weigh_half(const cuda_view &v, const eight_halves &halves, const cuda_island &island,
-                                                    bool first)
+/* B of the pair of the lane's side. Both of its sides work it out; the one at its first dynamic body keeps it. */
+static __device__ __forceinline__ double weigh_side(const cuda_view &v, const eight_sides &sides,
+                                                    const cuda_island &island, bool first)
 {
-    const int32_t p = halves.code / 2;
-    const double load = (double)halves.load, response = (double)halves.response;
-    const bool a = is_dynamic(v, halves.ends.body_a), both = a && is_dynamic(v, halves.ends.body_b);
-    const double scale = island.scale,
+    const int32_t p = sides.code / 2;
+    const double load = (double)sides.load, response = (double)sides.response;
+    const bool a = is_dynamic(v, sides.ends.body_a), both = a && is_dynamic(v, sides.ends.body_b);
+    const double scale = island.rescale,
                  taken = scale > 0 ? v.weight[p]
-                                   : weight_of_pair(island.level, weight_mass(load, island.speed, island.mass), response),
+                                   : weight_of_pair(island.weight_scale, weight_mass(load, island.speed, island.mass),
+                                                    response),
                  B = scale > 0 ? taken * scale : taken;
-    if (halves.code & 1 && a) return B;
+    if (sides.code & 1 && a) return B;
     v.inv_s[p] = (solver_real)(both ? B / 2 : B);
     if (!(scale > 0)) v.weight[p] = taken;
-    if (first && v.rigid) ease_gaps(v, p, island.tallness); /* world level: gaps, a slop and a step */
+    if (first && v.rigid) ease_gaps(v, p, island.stack_depth); /* world level: gaps, a slop and a step */
     return B;
 }
 
@@ -69,7 +71,7 @@ static inline __device__ void add_weighted_block(const cuda_view &v, int32_t k, 
     packed_add_row(C, along, 1);
 }
 
-/* B of a half's points into C, where contacts have one row. */
+/* B of a side's points into C, where contacts have one row. */
 static __device__ __forceinline__ void add_normals(const cuda_view &v, int32_t code, double B, double C[PACKED])
 {
     const int32_t side = code & 1, p = code / 2;
@@ -85,32 +87,33 @@ static __device__ __forceinline__ void add_normals(const cuda_view &v, int32_t c
 #define C_ROUNDING 8.0
 
 /* Those from place `begin` on. Every lane of the warp comes here. */
-static __device__ __forceinline__ eight_halves fetch_halves(const cuda_view &v, const body_thread &t, int32_t begin)
+static __device__ __forceinline__ eight_sides fetch_sides(const cuda_view &v, const body_thread &t, int32_t begin)
 {
-    const bool more = t.lane + LANES < HALF_ARMS;
+    const bool more = t.lane + LANES < SIDE_ARMS;
     const pair_ends nobody = {};
-    eight_halves out;
+    eight_sides out;
     out.code = begin + t.lane < t.end ? v.incident[begin + t.lane] : -1;
-    const bool own = out.code >= 0 && out.code < 2 * v.pair_room;
-    const solver_real *about = v.half_arms + (size_t)(own ? out.code : 0) * HALF_NUMBERS;
+    const bool own = out.code >= 0 && out.code < 2 * v.pair_capacity;
+    const solver_real *about = v.side_arms + (size_t)(own ? out.code : 0) * SIDE_NUMBERS;
     out.ends = own ? v.ends[out.code / 2] : nobody;
-    out.load = own ? about[HALF_LOAD] : (solver_real)0;
-    out.response = own ? about[HALF_RESPONSE] : (solver_real)0;
+    out.load = own ? about[SIDE_LOAD] : (solver_real)0;
+    out.response = own ? about[SIDE_RESPONSE] : (solver_real)0;
 #pragma unroll
     for (int j = 0; j < LANES; ++j) {
         const int32_t code = __shfl_sync((unsigned)ALL_LANES, out.code, j, LANES);
-        const bool pair = code >= 0 && code < 2 * v.pair_room && v.contact_rows == 3;
-        const solver_real *arms = v.half_arms + (size_t)(pair ? code : 0) * HALF_NUMBERS + t.lane;
+        const bool pair = code >= 0 && code < 2 * v.pair_capacity && v.contact_rows == 3;
+        const solver_real *arms = v.side_arms + (size_t)(pair ? code : 0) * SIDE_NUMBERS + t.lane;
         out.number[0][j] = pair ? arms[0] : (solver_real)0;
         out.number[1][j] = pair && more ? arms[LANES] : (solver_real)0;
     }
     return out;
 }
 
-/* C of a body by the weights, and beta = 1, in all lanes: each weighs every eighth half, and adds up a sum or two over all.
- * `halves`: the first of them. `first`: of a solve. CLOSED: as in has_closed_form. Every lane of the warp comes here. */
+/* C of a body by the weights, and beta = 1, in all lanes: each weighs every eighth side, and adds up a sum or two over
+ * all. `sides`: the first of them. `first`: of a solve. CLOSED: as in has_closed_form. Every lane of the warp comes
+ * here. */
 template <bool CLOSED>
-static __device__ __forceinline__ void weighted_matrix(const cuda_view &v, const body_thread &t, eight_halves halves,
+static __device__ __forceinline__ void weighted_matrix(const cuda_view &v, const body_thread &t, eight_sides sides,
                                                        const cuda_island &island, bool first, double C[PACKED])
 {
     const bool three = CLOSED || v.contact_rows == 3;
@@ -118,26 +121,27 @@ static __device__ __forceinline__ void weighted_matrix(const cuda_view &v, const
 #pragma unroll
     for (int k = 0; k < PACKED; ++k) C[k] = 0;
     for (int32_t begin = t.begin;;) {
-        const bool rows = !CLOSED && halves.code >= 0 && halves.code >= 2 * v.pair_room;
-        const double B = halves.code < 0 || rows ? 0 : weigh_half(v, halves, island, first);
-        if (rows) add_weighted_block(v, halves.code / 2 - v.pair_room, halves.code & 1, C);
-        else if (!three && halves.code >= 0) add_normals(v, halves.code, B, C);
+        const bool rows = !CLOSED && sides.code >= 0 && sides.code >= 2 * v.pair_capacity;
+        const double B = sides.code < 0 || rows ? 0 : weigh_side(v, sides, island, first);
+        if (rows) add_weighted_block(v, sides.code / 2 - v.pair_capacity, sides.code & 1, C);
+        else if (!three && sides.code >= 0) add_normals(v, sides.code, B, C);
 #pragma unroll
         for (int j = 0; j < LANES; ++j) {
             const double weight = __shfl_sync((unsigned)ALL_LANES, B, j, LANES);
-            sum[0] = fma(weight, (double)halves.number[0][j], sum[0]);
-            sum[1] = fma(weight, (double)halves.number[1][j], sum[1]);
+            sum[0] = fma(weight, (double)sides.number[0][j], sum[0]);
+            sum[1] = fma(weight, (double)sides.number[1][j], sum[1]);
         }
         begin += LANES;
         if (__ballot_sync((unsigned)ALL_LANES, begin < t.end) == 0) break;
-        halves = fetch_halves(v, t, begin);
+        sides = fetch_sides(v, t, begin);
     }
     if (!three || (!CLOSED && v.rows > 0)) sum_lanes<PACKED>(C);
     if (!three) return;
     struct arm_sums sums;
     double *in_order = &sums.count;
 #pragma unroll
-    for (int k = 0; k < HALF_ARMS; ++k) in_order[k] = __shfl_sync((unsigned)ALL_LANES, sum[k / LANES], k % LANES, LANES);
+    for (int k = 0; k < SIDE_ARMS; ++k)
+        in_order[k] = __shfl_sync((unsigned)ALL_LANES, sum[k / LANES], k % LANES, LANES);
     add_arm_sums(C, &sums);
     /* Sums are in this precision. What is rounded must not make C less: along axes that contacts do not turn about it is 0, and
      * what is left there is the inertia, of a light body under heavy ones a small part of C. More only slows. */

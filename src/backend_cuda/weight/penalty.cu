@@ -43,16 +43,16 @@ static __device__ void add_block(const cuda_view &v, int32_t k, int side, double
     }
 }
 
-/* C of a body with B = 1, in all lanes: each adds up every eighth half. From the raw contacts. Every lane of the warp comes
- * here. */
+/* C of a body with B = 1, in all lanes: each adds up every eighth side. From the raw contacts. Every lane of the warp
+ * comes here. */
 static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, const body_thread &t, double C[PACKED])
 {
     arm_sums sums = {};
     for (int k = 0; k < PACKED; ++k) C[k] = 0;
     for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) {
         const int32_t record = v.incident[at] / 2, side = v.incident[at] & 1;
-        if (record < v.pair_room) add_pair(v, &v.raw_pairs[record], side, &sums, C);
-        else add_block(v, record - v.pair_room, side, C);
+        if (record < v.pair_capacity) add_pair(v, &v.raw_pairs[record], side, &sums, C);
+        else add_block(v, record - v.pair_capacity, side, C);
     }
     if (v.contact_rows == 1 || v.rows > 0) sum_lanes<PACKED>(C);
     sum_lanes<sizeof sums / sizeof(double)>(&sums.count);
@@ -85,8 +85,9 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     double C[PACKED], beta = 1;
     if (PENALTY) {
         if (FORM == PLAIN) penalty_matrix(v, t, C);
-        else weighted_matrix<FORM == CLOSED>(v, t, fetch_halves(v, t, t.begin), t.live ? v.islands[v.label[t.body]] : none,
-                                             args.start, C);
+        else
+            weighted_matrix<FORM == CLOSED>(v, t, fetch_sides(v, t, t.begin),
+                                            t.live ? v.islands[v.label[t.body]] : none, args.start, C);
         if (t.live) {
             if (FORM == PLAIN) beta = penalty_of(v, v.lines + t.body * (size_t)v.line, C);
             if (t.lane == 0) v.beta[t.body] = beta;
@@ -131,7 +132,7 @@ extern "C" sadmm_status CUDA(init_penalty)(struct sadmm_context *c, struct sadmm
     cuda_args args = {};
     CUDA_ENTER(c);
     c->starting = true;
-    c->looks = 0;
+    c->checks = 0;
     c->cleared = 0;
     c->placed = false;
     c->measured = false;
@@ -167,12 +168,12 @@ sadmm_status CUDA(enqueue_penalties)(struct sadmm_context *c, struct sadmm_error
     cuda_args args = {};
     args.planned = true;
     c->starting = !c->fast;
-    c->looks = 0;
-    c->cleared = c->ends ? 0 : SCALAR_PRIMAL | SCALAR_DUAL | SCALAR_BARRIER; /* step/plan_check.h */
+    c->checks = 0;
+    c->cleared = c->prologue ? 0 : SCALAR_PRIMAL | SCALAR_DUAL | SCALAR_BARRIER; /* step/plan_check.h */
     c->placed = c->measured = c->rescaled = false;
     if (!c->fast) return launch_bodies(c, penalty_kernel<true, true, PLAIN>, "penalties", &args, error);
     CUDA(begin_weights)(c);
-    if (c->ends) return SADMM_OK;
+    if (c->prologue) return SADMM_OK;
     CUDA_TRY(CUDA(enqueue_islands)(c, error));
     return CUDA(enqueue_weighted_penalties)(c, true, true, true, error);
 }

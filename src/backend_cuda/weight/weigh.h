@@ -4,7 +4,7 @@
 #define SADMM_CUDA_WEIGHT_WEIGH_H
 
 #include "constraint.h"
-#include "backend_cuda/assemble/half_sums.h"
+#include "backend_cuda/assemble/side_sums.h"
 
 #include "core/math/weight.h"
 
@@ -37,22 +37,24 @@ static __device__ __forceinline__ void weigh_island(cuda_island *island, const d
     island->speed = weight_speed(sum[0], sum[1]);
     if (args.warm) {
         const double speed = island->speed;
-        island->tallness = weight_tallness(speed, sum[3], sum[1]);
-        island->speed = weight_speed_warm(speed, island->tallness, sum[2], sum[1]);
-        island->speed = weight_speed_few(speed, island->speed, args.factor, sum[2], sum[1]);
+        island->stack_depth = weight_stack_depth(speed, sum[3], sum[1]);
+        island->speed = weight_speed_warm(speed, island->stack_depth, sum[2], sum[1]);
+        island->speed = weight_speed_under_iterated(speed, island->speed, args.factor, sum[2], sum[1]);
     }
     island->mass = sum[1];
     if (!LEVELS || island->blocks) return;
-    const double balance = weight_balance(sum[5], sum[4], sum[1]), level = weight_next_level(island->level, balance);
-    /* those that stall keep the weights they have, times what the level has risen by since those were taken */
-    island->scale = weight_stalls(balance) ? (island->scale > 0 ? island->scale : 1) * (level / island->level) : 0;
-    island->level = level;
+    const double balance = weight_balance(sum[5], sum[4], sum[1]),
+                 next = weight_next_scale(island->weight_scale, balance);
+    /* those that stall keep the weights they have, times what the weight scale has risen by since those were taken */
+    island->rescale =
+        weight_stalls(balance) ? (island->rescale > 0 ? island->rescale : 1) * (next / island->weight_scale) : 0;
+    island->weight_scale = next;
 }
 
-/* Number `lane` of what half_wrench would have of half `code` of a row block. */
-static inline __device__ double row_half_number(const cuda_view &v, int32_t code, int32_t lane)
+/* Number `lane` of what side_wrench would have of side `code` of a row block. */
+static inline __device__ double row_side_number(const cuda_view &v, int32_t code, int32_t lane)
 {
-    const int32_t k = code / 2 - v.pair_room, jacobian = code & 1 ? ROW_J_B : ROW_J_A;
+    const int32_t k = code / 2 - v.pair_capacity, jacobian = code & 1 ? ROW_J_B : ROW_J_A;
     double square = 0;
     for (int j = lane < 6 ? lane : 0; j < (lane < 6 ? lane + 1 : 3); ++j) {
         double sum = 0;
@@ -60,12 +62,13 @@ static inline __device__ double row_half_number(const cuda_view &v, int32_t code
         if (lane < 6) return sum;
         square += sum * sum;
     }
-    return lane == HALF_PUSH ? sqrt(square) : 0;
+    return lane == SIDE_PUSH ? sqrt(square) : 0;
 }
 
-/* J^T lambda of a body, a component a lane; in lane HALF_PUSH the sum of the forces' sizes. ROWS: there may be row blocks. */
+/* J^T lambda of a body, a component a lane; in lane SIDE_PUSH the sum of the forces' sizes. ROWS: there may be row
+ * blocks. */
 template <bool ROWS>
-static __device__ __forceinline__ double sum_halves(const cuda_view &v, const body_thread &t)
+static __device__ __forceinline__ double sum_sides(const cuda_view &v, const body_thread &t)
 {
     enum { AT_ONCE = 4 };
     double sum = 0;
@@ -77,16 +80,16 @@ static __device__ __forceinline__ double sum_halves(const cuda_view &v, const bo
 #pragma unroll
         for (int32_t j = 0; j < AT_ONCE; ++j)
             number[j] = code[j] < 0                            ? 0
-                        : ROWS && code[j] / 2 >= v.pair_room ? row_half_number(v, code[j], t.lane)
-                                                               : v.half_wrench[(size_t)code[j] * ROW + (size_t)t.lane];
+                        : ROWS && code[j] / 2 >= v.pair_capacity ? row_side_number(v, code[j], t.lane)
+                                                               : v.side_wrench[(size_t)code[j] * ROW + (size_t)t.lane];
 #pragma unroll
         for (int32_t j = 0; j < AT_ONCE; ++j) sum += number[j];
     }
     return sum;
 }
 
-/* Terms of a body, one a lane, and its defect r = b + g - A v, g = J^T lambda. A pair counts at its first dynamic body. Every
- * lane of the warp comes here.
+/* Terms of a body, one a lane, and its momentum residual r = b + g - A v, g = J^T lambda. A pair counts at its first
+ * dynamic body. Every lane of the warp comes here.
  *                 g . A^-1 g, mass, v . A v, push        push: the sum of the forces' sizes
  *         LEVELS  also r . A^-1 r, what its pairs miss */
 template <bool LEVELS, bool RIGID, bool ROWS>
@@ -95,17 +98,17 @@ static __device__ __forceinline__ double terms_of_body(const cuda_view &v, const
     double missed = 0, term[TERMS] = {};
     for (int32_t at = t.begin + t.lane; LEVELS && at < t.end; at += LANES) {
         const int32_t code = v.incident[at], p = code / 2;
-        if (p >= v.pair_room || (code & 1 && is_dynamic(v, v.ends[p].body_a))) continue; /* counted there */
+        if (p >= v.pair_capacity || (code & 1 && is_dynamic(v, v.ends[p].body_a))) continue; /* counted there */
         missed += violation_of(v, p);
     }
     const wide_row<RIGID> row = row_of_body<RIGID>(v, t);
-    const double sum = sum_halves<ROWS>(v, t), g = t.lane < 6 ? sum : 0, momentum = product(row.velocity, row.a);
+    const double sum = sum_sides<ROWS>(v, t), g = t.lane < 6 ? sum : 0, momentum = product(row.velocity, row.a);
     term[0] = dot_lanes(g, product(g, row.a_inverse));
     term[1] = t.live ? mass_of(v, t.body) : 0;
     term[2] = dot_lanes(row.velocity, momentum);
-    term[3] = __shfl_sync((unsigned)ALL_LANES, sum, HALF_PUSH, LANES);
+    term[3] = __shfl_sync((unsigned)ALL_LANES, sum, SIDE_PUSH, LANES);
     const double r = row.b + g - momentum;
-    if (t.live) v.defect[t.body * ROW + (size_t)t.lane] = (solver_real)r;
+    if (t.live) v.momentum_residual[t.body * ROW + (size_t)t.lane] = (solver_real)r;
     if (LEVELS) {
         sum_lanes<1>(&missed);
         term[4] = dot_lanes(r, product(r, row.a_inverse));

@@ -1,21 +1,21 @@
-/* The method `fast`: weights of the constraints (kernels E-G; math/weight.h) and levels of the islands. In double, from this
- * precision's data; a few times a step.
+/* The method `fast`: weights of the constraints (kernels E-G; math/weight.h) and weight scales of the islands. In
+ * double, from this precision's data; a few times a step.
  *
- *   pairs    four threads a pair, or one: records of its halves (assemble/half_sums.h). The first ones come with the contacts
- *   terms    eight lanes a body: its defect, what it adds to the sums over its island, the sums (weight/island_sums.h), and what
- *            follows for the island
+ *   pairs    four threads a pair, or one: records of its sides (assemble/side_sums.h). The first ones come with the
+ * contacts   terms    eight lanes a body: its momentum residual, what it adds to the sums over its island, the sums
+ * (weight/island_sums.h), and what            follows for the island
  *   rows     a thread a row block: B
- *   then C and H (weight/penalty.cu), where each half of a pair works out B for itself
+ *   then C and H (weight/penalty.cu), where each side of a pair works out B for itself
  *
- * The first time, resident kernels of tier BLOCK do this themselves (iterate/resident_ends.h). */
+ * The first time, persistent kernels of tier BLOCK do this themselves (iterate/prologue.h). */
 #include "backend_cuda/device/double.h"
 #include "island_sums.h"
-#include "backend_cuda/assemble/half_sums.h"
+#include "backend_cuda/assemble/side_sums.h"
 #include "weigh.h"
 
 /* ---- pairs ------------------------------------------------------------------------------------------------------- */
 
-/* Records of halves anew, but for what depends on arms alone. */
+/* Records of sides again, but for what depends on arms alone. */
 static __global__ void __launch_bounds__(BODY_THREADS)
     pairs_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
@@ -31,7 +31,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         const point_numbers point = fetch_point(v, p, k);
         add_point(v, ends, about, difference, point.arm, point.lambda, false, &sums);
     }
-    store_halves(v, live, p, lane, count, ends, difference, false, no_inverse, &sums);
+    store_sides(v, live, p, lane, count, ends, difference, false, no_inverse, &sums);
 }
 
 /* ---- terms and islands --------------------------------------------------------------------------------------------- */
@@ -123,14 +123,14 @@ cuda_args CUDA(weight_args)(const struct sadmm_context *c)
     cuda_args args = {};
     args.start = c->refreshes == 0;
     args.warm = c->plan.warm;
-    args.factor = weight_few(c->plan.rigid, c->settings.iterations);
+    args.factor = weight_under_iterated(c->plan.rigid, c->settings.iterations);
     return args;
 }
 
 sadmm_status CUDA(enqueue_islands)(struct sadmm_context *c, struct sadmm_error *error)
 {
     const cuda_args args = CUDA(weight_args)(c);
-    const cuda_kernel kernel = c->refreshes >= WEIGHT_FIRST_LEVEL ? terms_kernel<true> : terms_kernel<false>;
+    const cuda_kernel kernel = c->refreshes >= WEIGHT_FIRST_SCALE ? terms_kernel<true> : terms_kernel<false>;
     CUDA_TRY(CUDA(launch_early)(c, kernel, "sums over islands", body_blocks(c->view.bodies), BODY_THREADS, &args, error));
     return CUDA(launch)(c, weigh_rows_kernel, "weights of row blocks", blocks_for(c->view.rows), &args, error);
 }
@@ -138,7 +138,7 @@ sadmm_status CUDA(enqueue_islands)(struct sadmm_context *c, struct sadmm_error *
 sadmm_status CUDA(enqueue_weights)(struct sadmm_context *c, bool factor, struct sadmm_error *error)
 {
     const cuda_args args = {};
-    const int64_t blocks = ((int64_t)c->view.pair_room * c->view.lanes + BODY_THREADS - 1) / BODY_THREADS;
+    const int64_t blocks = ((int64_t)c->view.pair_capacity * c->view.lanes + BODY_THREADS - 1) / BODY_THREADS;
     ++c->refreshes;
     c->exact_since = 0;
     CUDA_TRY(CUDA(launch_of)(c, pairs_kernel, "loads of pairs", blocks, BODY_THREADS, &args, error));

@@ -24,7 +24,7 @@
 #define LIMIT_BALANCED 1e-3
 
 struct limit_energies {
-    double now, free, defect, work; /* of v, of v_f, R, W; J */
+    double now, free, momentum_residual, work; /* of v, of v_f, R, W; J */
 };
 
 SADMM_INLINE int limit_suspects(double now, double free) { return now > (1 + LIMIT_ROUNDING) * free; }
@@ -32,7 +32,7 @@ SADMM_INLINE int limit_suspects(double now, double free) { return now > (1 + LIM
 /* The factor for the island's velocities, 1: none. */
 SADMM_INLINE double limit_factor(const struct limit_energies *e)
 {
-    int balanced = e->defect <= LIMIT_BALANCED * (e->now + e->free);
+    int balanced = e->momentum_residual <= LIMIT_BALANCED * (e->now + e->free);
     double allowed = e->free + (balanced ? e->work : 0);
     return limit_suspects(e->now, allowed) ? sqrt(allowed / e->now) : 1;
 }
@@ -45,7 +45,7 @@ SADMM_INLINE double limit_factor(const struct limit_energies *e)
 #define LIMIT_LEAST 0.25
 
 /* Is the island looked at for bounces? */
-SADMM_INLINE int limit_few(int warm, int iterations) { return warm && iterations < WEIGHT_FEW; }
+SADMM_INLINE int limit_under_iterated(int warm, int iterations) { return warm && iterations < WEIGHT_UNDER_ITERATED; }
 
 /* `along`: v . A v_f / 2, J. */
 SADMM_INLINE int limit_bounces(double now, double free, double along, double epsilon)

@@ -1,4 +1,4 @@
-/* What the method `fast` relaxes in a stretch of `count` iterations, i = 0 .. count - 1.
+/* What the method `fast` relaxes in a batch of `count` iterations, i = 0 .. count - 1.
  *
  * Steps 2-4 give lambda^ from (lambda, v), then Step 1 gives v^ from (v, 2 lambda^ - lambda); relaxed, lambda and v go rho times
  * as far. The last iteration is plain: the result is (lambda^, v^). The first Step 1 of a solve is plain too: bodies
@@ -8,10 +8,10 @@
 
 #include "real.h"
 
-/* Bodies keep their defect b - A v + J^T lambda by adding changes, while lambda and v are rounded: after so many iterations
- * it is taken anew from both. In single precision the momentum error would else grow (vertical_stacks with 2,000 iterations a step:
- * 9e-6 in place of 5e-7). */
-enum { RELAX_DEFECT_PERIOD = 128 };
+/* Bodies keep their momentum residual b - A v + J^T lambda by adding changes, while lambda and v are rounded: after so
+ * many iterations it is taken again from both. In single precision the momentum error would else grow (vertical_stacks
+ * with 2,000 iterations a step: 9e-6 in place of 5e-7). */
+enum { RELAX_RESIDUAL_PERIOD = 128 };
 
 SADMM_INLINE int relax_constraints(int i, int count) { return i + 1 < count; }
 /* `settled`: Step 1 ran before in this solve. */

@@ -1,5 +1,5 @@
 /* What a contact misses: w |lambda - Pi_C(lambda - u/w)|^2, J, with u = x + e n and w the contact's response. In the
- * world frame, in double. The level of the weights rests on it (weight.h). */
+ * world frame, in double. The weight scale rests on it (weight.h). */
 #ifndef SADMM_MATH_VIOLATION_H
 #define SADMM_MATH_VIOLATION_H
 

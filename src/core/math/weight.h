@@ -11,8 +11,8 @@
 
 #include "real.h"
 
-/* Iterations after which a step that started cold takes its weights anew, from the loads it has found by then: 5, 10, 20,
- * 40, and from there always half as many again. Changes as late as that are small, and a change disturbs. */
+/* Iterations after which a step that started cold takes its weights again, from the loads it has found by then: 5, 10,
+ * 20, 40, and from there always half as many again. Changes as late as that are small, and a change disturbs. */
 enum { WEIGHT_FIRST_REFRESH = 5, WEIGHT_DOUBLE_BELOW = 40 };
 
 SADMM_INLINE int weight_next_refresh(int at) { return at < WEIGHT_DOUBLE_BELOW ? 2 * at : at + at / 2; }
@@ -37,88 +37,89 @@ SADMM_INLINE double weight_mass(double load, double speed, double mass)
     return fmin(load / speed, mass);
 }
 
-/* The level of an island under contacts, a factor of its weights, from the sixth refresh on:
+/* The weight scale of an island under contacts, a factor of its weights, from the sixth refresh on:
  *
  *     q^2 = sum w |lambda - Pi_C(lambda - (x + e n)/w)|^2 / sum r . A^-1 r,      r = A v - b - J^T lambda
  *
  * what the contacts miss over what the momentum misses, both energies in J. Near 0.1 is usual. Where the momentum lags behind
  * (masses that differ by decades, in no order) the weights are too large. Where nothing but the contacts is left, impulses
  * move at constant speed along directions that no body feels; then the island stalls, and keeps the weights it has, times
- * what the level rises by: new ones would be felt. */
-enum { WEIGHT_FIRST_LEVEL = 6 };
+ * what the weight scale rises by: new ones would be felt. */
+enum { WEIGHT_FIRST_SCALE = 6 };
 #define WEIGHT_LAGS (1 / 3.0)
 #define WEIGHT_STALLS 30.0
-#define WEIGHT_LEVEL_POWER 0.3
-#define WEIGHT_LEVEL_STEP 4.0
-#define WEIGHT_LEVEL_LEAST 0.1
-#define WEIGHT_LEVEL_MOST 5.0
+#define WEIGHT_SCALE_POWER 0.3
+#define WEIGHT_SCALE_STEP 4.0
+#define WEIGHT_SCALE_LEAST 0.1
+#define WEIGHT_SCALE_MOST 5.0
 
 /* Less than this is rounding, m/s. */
-#define WEIGHT_LEVEL_ROUNDING 1e-12
+#define WEIGHT_SCALE_ROUNDING 1e-12
 
 /* q of an island. */
-SADMM_INLINE double weight_balance(double violation, double defect, double mass)
+SADMM_INLINE double weight_balance(double violation, double momentum_residual, double mass)
 {
-    double least = WEIGHT_LEVEL_ROUNDING * WEIGHT_LEVEL_ROUNDING * mass;
-    return sqrt((violation + least) / (defect + least));
+    double least = WEIGHT_SCALE_ROUNDING * WEIGHT_SCALE_ROUNDING * mass;
+    return sqrt((violation + least) / (momentum_residual + least));
 }
 
 SADMM_INLINE int weight_stalls(double balance) { return balance > WEIGHT_STALLS; }
 
-SADMM_INLINE double weight_next_level(double level, double balance)
+SADMM_INLINE double weight_next_scale(double scale, double balance)
 {
     double off = weight_stalls(balance) ? balance / WEIGHT_STALLS : fmin(balance / WEIGHT_LAGS, 1.0);
-    double factor = fmin(fmax(pow(off, WEIGHT_LEVEL_POWER), 1 / WEIGHT_LEVEL_STEP), WEIGHT_LEVEL_STEP);
-    return fmin(fmax(level * factor, WEIGHT_LEVEL_LEAST), WEIGHT_LEVEL_MOST);
+    double factor = fmin(fmax(pow(off, WEIGHT_SCALE_POWER), 1 / WEIGHT_SCALE_STEP), WEIGHT_SCALE_STEP);
+    return fmin(fmax(scale * factor, WEIGHT_SCALE_LEAST), WEIGHT_SCALE_MOST);
 }
 
-/* Tall islands in steps that start warm. Contacts that are solved in part, step by step, are springs of stiffness
+/* Deep stacks in steps that start warm. Contacts that are solved in part, step by step, are springs of stiffness
  * B iterations / dt^2, on which a tall pile buckles; and gaps, closed in one step, act on them as an integral
  * controller that excites them. `push`, the sum of the sizes of the impulses that the bodies feel, N s, over m V is
  * twice the number of bodies that a load passes on its way to the ground. */
-#define WEIGHT_TALL 20.0
-#define WEIGHT_TALL_MOST 6.0
+#define WEIGHT_DEEP 20.0
+#define WEIGHT_DEEP_MOST 6.0
 /* Over the speed of bodies at rest, the least V. */
 #define WEIGHT_REST 20.0
 #define WEIGHT_GAP_LEAST 0.001
 
 /* 1 and more. */
-SADMM_INLINE double weight_tallness(double speed, double push, double mass)
+SADMM_INLINE double weight_stack_depth(double speed, double push, double mass)
 {
-    return fmax(push / (mass * speed * WEIGHT_TALL), 1.0);
+    return fmax(push / (mass * speed * WEIGHT_DEEP), 1.0);
 }
 
 /* V: less, and B more, where the island is at rest. */
-SADMM_INLINE double weight_speed_warm(double speed, double tallness, double kinetic, double mass)
+SADMM_INLINE double weight_speed_warm(double speed, double stack_depth, double kinetic, double mass)
 {
-    double least = speed / fmin(tallness * tallness, WEIGHT_TALL_MOST);
+    double least = speed / fmin(stack_depth * stack_depth, WEIGHT_DEEP_MOST);
     return fmin(fmax(least, WEIGHT_REST * sqrt(kinetic / mass)), speed);
 }
 
 /* Steps that start warm with fewer iterations than this: the springs above would be softer, and heavy bodies on top
  * rock on them. B goes up as the iterations go down, except where the island moves: heavy weights are slow. */
-#define WEIGHT_FEW 60
-#define WEIGHT_FEW_MOST 6.0
+#define WEIGHT_UNDER_ITERATED 60
+#define WEIGHT_UNDER_ITERATED_MOST 6.0
 /* Over the speed of bodies that move, the least V. */
 #define WEIGHT_MOVING 0.5
 
-/* By how much V is less, 1: not at all. Steps of a world alone (`rigid`): a problem that is solved in short stretches is no
- * row of steps. */
-SADMM_INLINE double weight_few(int rigid, int iterations)
+/* By how much V is less, 1: not at all. Steps of a world alone (`rigid`): a problem that is solved in short batches is
+ * no row of steps. */
+SADMM_INLINE double weight_under_iterated(int rigid, int iterations)
 {
-    return rigid ? fmin(fmax((double)WEIGHT_FEW / iterations, 1.0), WEIGHT_FEW_MOST) : 1;
+    return rigid ? fmin(fmax((double)WEIGHT_UNDER_ITERATED / iterations, 1.0), WEIGHT_UNDER_ITERATED_MOST) : 1;
 }
 
 /* V of such a step; `warm` is what weight_speed_warm made of `speed`. */
-SADMM_INLINE double weight_speed_few(double speed, double warm, double few, double kinetic, double mass)
+SADMM_INLINE double weight_speed_under_iterated(double speed, double warm, double under_iterated, double kinetic,
+                                                double mass)
 {
-    return fmin(fmax(speed / few, WEIGHT_MOVING * sqrt(kinetic / mass)), warm);
+    return fmin(fmax(speed / under_iterated, WEIGHT_MOVING * sqrt(kinetic / mass)), warm);
 }
 
 /* The share of a gap within the slop that a step closes; and e with that, `slop` over dt, m/s. */
-SADMM_INLINE double weight_gap_share(double tallness)
+SADMM_INLINE double weight_gap_share(double stack_depth)
 {
-    double square = tallness * tallness;
+    double square = stack_depth * stack_depth;
     return fmax(1 / (square * square * square), WEIGHT_GAP_LEAST);
 }
 
@@ -147,10 +148,10 @@ SADMM_INLINE double weight_of_soft_row(double share, double lambda, double respo
     return response > 0 ? share * lambda * lambda + WEIGHT_FLOOR_BLOCK / response : 1;
 }
 
-/* B of a pair, kg. phi / w does not sink with the level: it is for contacts whose load is not known. */
-SADMM_INLINE double weight_of_pair(double level, double carried, double response)
+/* B of a pair, kg. phi / w does not sink with the weight scale: it is for contacts whose load is not known. */
+SADMM_INLINE double weight_of_pair(double scale, double carried, double response)
 {
-    return level * carried + fmax(level, 1.0) * WEIGHT_FLOOR_CONTACT / response;
+    return scale * carried + fmax(scale, 1.0) * WEIGHT_FLOOR_CONTACT / response;
 }
 
 #endif

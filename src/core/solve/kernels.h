@@ -10,8 +10,8 @@
  *     after a measured iteration: measure_residuals; then update_penalty(ratio); factorize
  *
  * The method FAST is iterated by `iterate` alone (update_velocity and update_constraints refuse it): an iteration is
- * Steps 2-4, then Step 1, and what is relaxed depends on how far a stretch still goes (math/relax.h). update_weights and
- * factorize may follow a stretch in the place of update_penalty, and limit_velocity ends the step's iterations.
+ * Steps 2-4, then Step 1, and what is relaxed depends on how far a batch still goes (math/relax.h). update_weights and
+ * factorize may follow a batch in the place of update_penalty, and limit_velocity ends the step's iterations.
  *
  * `measure` asks the iteration (for `iterate`: its last one) to keep what the residuals and a penalty update need; only
  * allowed when the plan's `residuals` is set.

@@ -22,7 +22,7 @@ struct sadmm_plan {
     bool warm;              /* ... and most constraints have one */
     bool penalty_updates;   /* eq. (15) will run at least once */
     bool predict;           /* FAST: starts from predicted loads (loads.h); never in steps that a backend makes alone */
-    bool weight_refresh;    /* FAST: weights are taken anew during the step */
+    bool weight_refresh;    /* FAST: weights are taken again during the step */
     bool limit;             /* FAST: energies are limited after the last iteration */
     bool residuals;         /* some iteration is measured */
     bool wrenches;          /* eq. (12) a body */

@@ -652,7 +652,7 @@ sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend backend, 
                                     &done.certificate, error);
     if (status != SADMM_OK) {
         restore_solution(problem);
-        if (status == SADMM_ERROR_DEVICE) { /* a device that failed once is started anew by the next solve */
+        if (status == SADMM_ERROR_DEVICE) { /* a device that failed once is started again by the next solve */
             kernels->destroy(*context);
             *context = NULL;
         }

@@ -5,7 +5,7 @@
  * as it was before it, and those enqueued after it do not run; `wait` tells. What a step could not know when it was
  * enqueued (how many contacts there will be) is no failure: the backend repeats the step with more room.
  *
- * What may change from step to step without loading the world anew are edits: a kind, a target and numbers, in the
+ * What may change from step to step without loading the world again are edits: a kind, a target and numbers, in the
  * backend's memory before the step that they come with. So are the settings' numbers. A step that was not done has taken
  * none of its edits: the caller gives them again.
  */
@@ -62,7 +62,7 @@ struct sadmm_resident_report {
     struct {
         double total, collide, assemble, solve, finish;
     } ms;                      /* on the backend's own clock */
-    int32_t culprit;           /* NON_FINITE: a body that is not finite, -1: unknown */
+    int32_t offending_body;           /* NON_FINITE: a body that is not finite, -1: unknown */
 };
 
 struct sadmm_resident_kernels {

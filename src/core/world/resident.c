@@ -1,7 +1,7 @@
 /* A world that a backend keeps (resident.h): steps are enqueued there, and the host's copy follows on demand.
  *
  *     loaded           the backend has the world. States and wrenches set meanwhile are edits, which go along with the next
- *                      step; any other change first takes the world back, and the next step loads it anew.
+ *                      step; any other change first takes the world back, and the next step loads it again.
  *     running          steps were enqueued whose end nobody has waited for
  *     bodies_behind,   the host's bodies, or contacts with everything else about the last step, are older than the
  *     contacts_behind  backend's: getters pull them, once
@@ -17,18 +17,18 @@
 #include "core/solve/certificate.h"
 #include "world_internal.h"
 
-/* A resident step is enqueued with all of its looks, and those that nobody needs any more take time as well. */
-enum { MOST_LOOKS = 64 };
+/* A resident step is enqueued with all of its checks, and those that nobody needs any more take time as well. */
+enum { MOST_CHECKS = 64 };
 
 bool sadmm_world_may_reside(const sadmm_world *world)
 {
-    /* Of the stop rules a backend looks at the certificate's in the method FAST alone; and the loads of a first step are
+    /* Of the stop rules a backend checks the certificate's in the method FAST alone; and the loads of a first step are
      * predicted on the host. */
     const sadmm_settings *s = &world->def.settings;
-    const bool fast = s->method == SADMM_METHOD_FAST, few_looks = (s->iterations - 1) / s->check_period < MOST_LOOKS;
+    const bool fast = s->method == SADMM_METHOD_FAST, few_checks = (s->iterations - 1) / s->check_period < MOST_CHECKS;
     if (fast && !world->stepped) return false;
     return world->kernels->resident && s->residual_tolerance <= 0 &&
-           (s->certificate_tolerance <= 0 || (fast && few_looks));
+           (s->certificate_tolerance <= 0 || (fast && few_checks));
 }
 
 /* ---- edits ------------------------------------------------------------------------------------------------------- */
@@ -207,7 +207,7 @@ static void take_report(sadmm_world *world, const struct sadmm_resident_report *
 /* `status`: of the call before, or SADMM_OK. The error of a step that failed is returned once. */
 static sadmm_status settle(sadmm_world *world, sadmm_status status)
 {
-    struct sadmm_resident_report report = {.culprit = -1};
+    struct sadmm_resident_report report = {.offending_body = -1};
     if (!world->resident.running) return status;
     world->resident.running = false;
     const struct sadmm_error before = world->error;
@@ -221,8 +221,9 @@ static sadmm_status settle(sadmm_world *world, sadmm_status status)
         edit_again(world);
     }
     world->resident.enqueued = world->resident.done;
-    return status == SADMM_ERROR_NON_FINITE && report.culprit >= 0 ? sadmm_world_not_finite(world, report.culprit)
-                                                                   : status;
+    return status == SADMM_ERROR_NON_FINITE && report.offending_body >= 0
+               ? sadmm_world_not_finite(world, report.offending_body)
+               : status;
 }
 
 /* The backend does not change wrenches, nor a state that was set after the last step. */

@@ -86,7 +86,7 @@ static sadmm_status check_next(sadmm_world *world)
 }
 
 /* The solve found something that is not finite: name a body of it. */
-static sadmm_status name_culprit(sadmm_world *world)
+static sadmm_status name_offending_body(sadmm_world *world)
 {
     for (size_t k = 0; k < 6 * (size_t)world->dynamic_count; ++k)
         if (!isfinite(world->velocity[k])) return sadmm_world_not_finite(world, (int32_t)(k / 6));
@@ -146,7 +146,7 @@ static sadmm_status make_plan(struct host_step *step)
 static sadmm_status solve_stage(struct host_step *step, const struct sadmm_stage *stage)
 {
     sadmm_status status = sadmm_solve_stage(&step->solve, &step->stages, stage);
-    return status == SADMM_ERROR_NON_FINITE ? name_culprit(step->world) : status;
+    return status == SADMM_ERROR_NON_FINITE ? name_offending_body(step->world) : status;
 }
 
 static sadmm_status integrate(sadmm_world *world)

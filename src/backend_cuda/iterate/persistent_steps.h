@@ -1,8 +1,9 @@
-/* The resident kernel (resident.h): Step 1 and Steps 2-4 of a part, and which of its bodies have too much energy. */
-#ifndef SADMM_CUDA_ITERATE_RESIDENT_STEPS_H
-#define SADMM_CUDA_ITERATE_RESIDENT_STEPS_H
+/* The persistent kernel (persistent.h): Step 1 and Steps 2-4 of a part, and which of its bodies have too much energy.
+ */
+#ifndef SADMM_CUDA_ITERATE_PERSISTENT_STEPS_H
+#define SADMM_CUDA_ITERATE_PERSISTENT_STEPS_H
 
-#include "resident_part.h"
+#include "persistent_part.h"
 
 /* ---- Step 1 ---------------------------------------------------------------------------------------------------- */
 
@@ -56,14 +57,14 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd)
         real g = free_momentum(one);
         if (live && r < 6) {
             const int32_t from = v.offsets[first_body + i], count = v.offsets[first_body + i + 1] - from;
-            g = gather(g, m.records + (from - first_half) * ROW + record_slot(r), count, count > FEW);
+            g = gather(g, m.records + (from - first_side) * ROW + record_slot(r), count, count > FEW);
         }
         publish(m.state + i * ROW + r, i, one.v + step_of(one, g), odd);
     }
 }
 
-/* `relaxation` times as far; multipliers have gone `multipliers` times. The defects of bodies in registers follow
- * later: nobody waits for them. */
+/* `relaxation` times as far; multipliers have gone `multipliers` times. The momentum residuals of bodies in registers
+ * follow later: nobody waits for them. */
 PART __device__ __forceinline__ void PART_RUN::move_bodies_fast(int32_t odd, real relaxation, real multipliers)
 {
     if (has_moves()) {
@@ -81,12 +82,12 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies_fast(int32_t odd, rea
         real pushed = 0;
         if (live) {
             const int32_t from = v.offsets[first_body + i], count = v.offsets[first_body + i + 1] - from;
-            pushed = gather(0, m.records + (from - first_half) * ROW + record_slot(r), count, count > FEW);
+            pushed = gather(0, m.records + (from - first_side) * ROW + record_slot(r), count, count > FEW);
         }
         const real gone = step_fast(&one, pushed, relaxation);
         publish(m.state + i * ROW + r, i, one.v, odd);
-        const real defect = defect_after(one, pushed, gone, multipliers);
-        if (live) m.b[at * ROW + r] = defect;
+        const real momentum_residual = residual_after(one, pushed, gone, multipliers);
+        if (live) m.b[at * ROW + r] = momentum_residual;
     }
 }
 
@@ -99,10 +100,10 @@ PART __device__ __forceinline__ void PART_RUN::store_record(real2_pair *record, 
     if (own.pair) *record = sum;
 }
 
-/* The lane's share of the primal residual. FAST: lambda goes `farther` times as far, plain: once; records are those of Step 1 in any
- * case. */
+/* The lane's share of the primal residual. FAST: lambda goes `relaxation_factor` times as far, plain: once; records are
+ * those of Step 1 in any case. */
 PART template <bool MEASURE>
-__device__ __forceinline__ double PART_RUN::update_halves(int32_t odd, real farther, bool plain)
+__device__ __forceinline__ double PART_RUN::update_sides(int32_t odd, real relaxation_factor, bool plain)
 {
     enum { SPLIT = MEASURE && !FAST };
     double primal = 0;
@@ -117,7 +118,7 @@ __device__ __forceinline__ double PART_RUN::update_halves(int32_t odd, real fart
         const vec3 old = own.lambda[j], x = relative_velocity(other, own.other_arm[j], own_motion, own.own_arm[j]);
         const point_change to = update<FAST>(own.normal, own.friction, x, own.error[j], own.inv_s[j], old);
         const vec3 lambda = to.lambda, delta = to.delta;
-        own.lambda[j] = FAST ? relaxed(old, to, plain, farther) : lambda;
+        own.lambda[j] = FAST ? relaxed(old, to, plain, relaxation_factor) : lambda;
         vec3 impulse =
             FAST ? delta : SPLIT ? lambda : v3_add(lambda, delta);
         vec3 moment = fused_cross(own.own_arm[j], impulse);
@@ -135,8 +136,8 @@ __device__ __forceinline__ double PART_RUN::update_halves(int32_t odd, real fart
     store_record(own_record, sum_quad(lane, force, torque));
     if (!MEASURE && !has_rows()) return primal;
 
-    const int32_t code = half < halves ? v.incident[first_half + half] : 0;
-    solver_real *change = SPLIT ? v.change + (size_t)(first_half + half) * ROW : nullptr;
+    const int32_t code = side < sides ? v.incident[first_side + side] : 0;
+    solver_real *change = SPLIT ? v.change + (size_t)(first_side + side) * ROW : nullptr;
     if (FAST && MEASURE && own.pair) {
         const pair_ends on = v.ends[code / 2];
         primal =
@@ -149,10 +150,10 @@ __device__ __forceinline__ double PART_RUN::update_halves(int32_t odd, real fart
             primal = (double)(largest * real_max(inv_beta_of(v, on.body_a), inv_beta_of(v, on.body_b)));
         }
     }
-    if (has_rows() && half < halves && !own.pair && lane == 0)
-        primal = FAST ? update_row_half_fast(v, code, mine, others, m.row_lambda + half * ROW,
-                                             m.records + half * ROW, farther)
-                      : update_row_half(v, code, mine, others, m.row_lambda + half * ROW, m.records + half * ROW,
+    if (has_rows() && side < sides && !own.pair && lane == 0)
+        primal = FAST ? update_row_side_fast(v, code, mine, others, m.row_lambda + side * ROW,
+                                             m.records + side * ROW, relaxation_factor)
+                      : update_row_side(v, code, mine, others, m.row_lambda + side * ROW, m.records + side * ROW,
                                         change);
     return primal;
 }
@@ -177,7 +178,7 @@ PART __device__ __forceinline__ bool PART_RUN::suspect(int32_t odd) const
             else if (live && r < 6) a[k] = (double)line_a(m.lines + at * LINE_GENERAL, true, r, r / 3 * 3 + k);
         }
         const double velocity = live && r < 6 ? (double)state(odd)[i * ROW + r] : 0;
-        any = suspect_body(args.few, speaks, free, velocity, b, a) || any;
+        any = suspect_body(args.under_iterated, speaks, free, velocity, b, a) || any;
     }
     return any;
 }

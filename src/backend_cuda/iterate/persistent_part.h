@@ -1,16 +1,16 @@
-/* The resident kernel (resident.h): a thread block's part, how it is loaded and stored. */
-#ifndef SADMM_CUDA_ITERATE_RESIDENT_PART_H
-#define SADMM_CUDA_ITERATE_RESIDENT_PART_H
+/* The persistent kernel (persistent.h): a thread block's part, how it is loaded and stored. */
+#ifndef SADMM_CUDA_ITERATE_PERSISTENT_PART_H
+#define SADMM_CUDA_ITERATE_PERSISTENT_PART_H
 
-#include "resident_memory.h"
-#include "resident_rows.h"
+#include "persistent_memory.h"
+#include "persistent_rows.h"
 #include "stop_rule.h"
 
-/* ---- halves in registers --------------------------------------------------------------------------------------- */
+/* ---- sides in registers --------------------------------------------------------------------------------------- */
 
-/* A lane's share of its quad's half: points lane, lane + 4, ... The half on side b sees the relative velocity x; the half
- * on side a sees -x, so its errors and weights have the other sign too. A point that is not there has all 0. */
-template <int POINTS> struct half_lane {
+/* A lane's share of its quad's side: points lane, lane + 4, ... The side on side b sees the relative velocity x; the
+ * side on side a sees -x, so its errors and weights have the other sign too. A point that is not there has all 0. */
+template <int POINTS> struct side_lane {
     enum { COUNT = POINTS / QUAD };
     vec3 normal;
     real friction, sign;
@@ -19,7 +19,7 @@ template <int POINTS> struct half_lane {
     int32_t own;              /* body, in the part */
     const solver_real *other; /* row of the other body's state in even iterations */
     int32_t other_odd;        /* from there to its row in odd iterations */
-    bool pair;                /* a half of a pair */
+    bool pair;                /* a side of a pair */
 };
 
 struct real2_pair {
@@ -53,8 +53,8 @@ template <int POINTS, int MODE, bool FULL, int SIZE, bool FAST> struct part_run 
     const cuda_view &v;
     const cuda_args &args;
     part_memory m;
-    int32_t t, r, lane, half; /* thread; component of a body; lane of a quad; the quad's half */
-    int32_t first_body, bodies, first_half, halves;
+    int32_t t, r, lane, side; /* thread; component of a body; lane of a quad; the quad's side */
+    int32_t first_body, bodies, first_side, sides;
     body_thread found; /* the thread's first body */
 
     /* One body for each eight threads is in registers, with where its records are; more are in shared memory. What the loop
@@ -63,27 +63,27 @@ template <int POINTS, int MODE, bool FULL, int SIZE, bool FAST> struct part_run 
     const solver_real *gathered; /* component r of the first record */
     int32_t gathered_count;      /* 0 in lanes that have no component */
     bool many;                   /* some lane of the warp has more than FEW */
-    bool moves, updates;         /* the warp has bodies, halves */
-    const solver_real *own_row;  /* of the half's own body in even iterations */
+    bool moves, updates;         /* the warp has bodies, sides */
+    const solver_real *own_row;  /* of the side's own body in even iterations */
     solver_real *own_state;      /* the body's component r, in even iterations */
     real2_pair *own_record;
     body_lane own_body;
     real momentum;               /* b - A v */
     real sum, step;              /* FAST: J^T d lambda, what v has gone by in this iteration */
-    half_lane<POINTS> own;
-    /* Until iterations begin (registers): what the half is, and its pair as it is in memory. */
-    int32_t half_code;
+    side_lane<POINTS> own;
+    /* Until iterations begin (registers): what the side is, and its pair as it is in memory. */
+    int32_t side_code;
     pair_ends on;
     real4 about, between, point[COUNT];
 
     __device__ __forceinline__ part_run(const cuda_view &view, const cuda_args &arguments, unsigned char *memory)
-        : v(view), args(arguments), t((int32_t)threadIdx.x), r(t % LANES), lane(t % QUAD), half(t / QUAD),
+        : v(view), args(arguments), t((int32_t)threadIdx.x), r(t % LANES), lane(t % QUAD), side(t / QUAD),
           first_body(v.parts[blockIdx.x]), bodies(v.parts[blockIdx.x + 1] - first_body),
-          first_half(v.offsets[first_body]), halves(v.offsets[first_body + bodies] - first_half),
+          first_side(v.offsets[first_body]), sides(v.offsets[first_body + bodies] - first_side),
           found(body_of_slot(v, first_body + t / LANES, t / LANES < bodies)), body(t / LANES),
-          gathered(nullptr), gathered_count(0), many(false), moves(warp_has_body(0)), updates(warp_has_half()),
+          gathered(nullptr), gathered_count(0), many(false), moves(warp_has_body(0)), updates(warp_has_side()),
           own_row(nullptr), own_state(nullptr), own_record(nullptr), own_body(), momentum(0), sum(0), step(0), own(),
-          half_code(half < halves ? v.incident[first_half + half] : 0), on(), about(), between(), point()
+          side_code(side < sides ? v.incident[first_side + side] : 0), on(), about(), between(), point()
     {
         lay_out(&m, memory, MODE == CLUSTER, (int)blockDim.x, args.most_bodies, has_rows());
     }
@@ -107,16 +107,16 @@ template <int POINTS, int MODE, bool FULL, int SIZE, bool FAST> struct part_run 
     {
         return first + t / WARP * (WARP / LANES) < bodies;
     }
-    __device__ __forceinline__ bool warp_has_half(void) const { return t / WARP * (WARP / QUAD) < halves; }
+    __device__ __forceinline__ bool warp_has_side(void) const { return t / WARP * (WARP / QUAD) < sides; }
 
     __device__ __forceinline__ void load(void);
-    /* Where point k of the half's pair is, if there is memory for so many: their number is not waited for. */
+    /* Where point k of the side's pair is, if there is memory for so many: their number is not waited for. */
     __device__ __forceinline__ size_t slot_or_first(int32_t k) const
     {
-        return k < v.lanes * ((v.point_slots + v.lanes - 1) / v.lanes) ? point_slot(v, half_code / 2, k) : 0;
+        return k < v.lanes * ((v.point_slots + v.lanes - 1) / v.lanes) ? point_slot(v, side_code / 2, k) : 0;
     }
-    __device__ __forceinline__ void fetch_half(void);
-    __device__ __forceinline__ void load_half(void);
+    __device__ __forceinline__ void fetch_side(void);
+    __device__ __forceinline__ void load_side(void);
     __device__ __forceinline__ void find_other(int32_t other);
     __device__ __forceinline__ void start_records(void);
     __device__ __forceinline__ void load_records(void);
@@ -125,7 +125,8 @@ template <int POINTS, int MODE, bool FULL, int SIZE, bool FAST> struct part_run 
     __device__ __forceinline__ void publish(solver_real *to, int32_t i, real value, int32_t odd);
     __device__ __forceinline__ void move_bodies(int32_t odd);
     __device__ __forceinline__ void move_bodies_fast(int32_t odd, real relaxation, real multipliers);
-    template <bool MEASURE> __device__ __forceinline__ double update_halves(int32_t odd, real farther, bool plain);
+    template <bool MEASURE>
+    __device__ __forceinline__ double update_sides(int32_t odd, real relaxation_factor, bool plain);
     __device__ __forceinline__ bool suspect(int32_t odd) const;
     __device__ __forceinline__ void store(int32_t odd);
 };
@@ -159,11 +160,11 @@ PART __device__ __forceinline__ void PART_RUN::find_other(int32_t other)
     }
 }
 
-/* The half's pair as it is in memory; its points' errors and weights may still change. */
-PART __device__ __forceinline__ void PART_RUN::fetch_half(void)
+/* The side's pair as it is in memory; its points' errors and weights may still change. */
+PART __device__ __forceinline__ void PART_RUN::fetch_side(void)
 {
-    const int32_t p = half_code / 2;
-    if (half >= halves || (FULL && p >= v.pair_room)) return;
+    const int32_t p = side_code / 2;
+    if (side >= sides || (FULL && p >= v.pair_capacity)) return;
     about = v.normal[p];
     between = v.difference[p];
     on = v.ends[p];
@@ -175,11 +176,11 @@ PART __device__ __forceinline__ void PART_RUN::fetch_half(void)
     }
 }
 
-PART __device__ __forceinline__ void PART_RUN::load_half(void)
+PART __device__ __forceinline__ void PART_RUN::load_side(void)
 {
-    const int32_t side = half_code & 1, p = half_code / 2;
-    if (FULL && p >= v.pair_room) {
-        const row_about rows = v.row_info[p - v.pair_room];
+    const int32_t side = side_code & 1, p = side_code / 2;
+    if (FULL && p >= v.pair_capacity) {
+        const row_about rows = v.row_info[p - v.pair_capacity];
         own.own = v.slot_of[side ? rows.body_b : rows.body_a] - first_body;
         find_other(side ? rows.body_a : rows.body_b);
         return;
@@ -220,12 +221,12 @@ PART __device__ __forceinline__ void PART_RUN::start_records(void)
     store_record(own_record, sum_quad(lane, force, torque));
 }
 
-/* What the last stretch or the stepwise kernels left, joined after a measured iteration. */
+/* What the last batch or the stepwise kernels left, joined after a measured iteration. */
 PART __device__ __forceinline__ void PART_RUN::load_records(void)
 {
     const real ratio = args.rescaled ? (real)*v.ratio : (real)1;
-    for (int32_t i = t; i < halves * ROW; i += (int32_t)blockDim.x) {
-        const size_t from = (size_t)first_half * ROW + (size_t)i;
+    for (int32_t i = t; i < sides * ROW; i += (int32_t)blockDim.x) {
+        const size_t from = (size_t)first_side * ROW + (size_t)i;
         m.records[i] = args.join ? v.records[from] + ratio * v.change[from] : v.records[from];
     }
 }
@@ -234,14 +235,14 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
 {
     const int32_t threads = (int32_t)blockDim.x, in_registers = threads / LANES;
     own_body = load_body(found.live, r, v.lines + found.body * (size_t)v.line, v.rigid,
-                         (FAST ? v.defect : v.b) + found.body * ROW, v.state + found.body * ROW);
+                         (FAST ? v.momentum_residual : v.b) + found.body * ROW, v.state + found.body * ROW);
     gathered = m.records;
     if (found.live && r < 6) {
-        gathered = m.records + (found.begin - first_half) * ROW + record_slot(r);
+        gathered = m.records + (found.begin - first_side) * ROW + record_slot(r);
         gathered_count = found.end - found.begin;
     }
     many = __ballot_sync((unsigned)ALL_LANES, gathered_count > FEW) != 0;
-    own_record = (real2_pair *)kept_address<SIZE>(m.records + half * ROW + quad_slot(lane));
+    own_record = (real2_pair *)kept_address<SIZE>(m.records + side * ROW + quad_slot(lane));
     if (!FAST && moves) momentum = free_momentum(own_body);
     if (found.live) m.state[body * ROW + r] = own_body.v;
     for (int32_t i = in_registers * ROW + t; i < bodies * ROW; i += threads) m.state[i] = v.state[raw_row(i)];
@@ -253,17 +254,17 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
                 v.lines[(size_t)v.body_of[first_body + in_registers + i / v.line] * (size_t)v.line +
                         (size_t)(i % v.line)];
         for (int32_t i = t; i < more * ROW; i += threads)
-            m.b[i] = (FAST ? v.defect : v.b)[raw_row(in_registers * ROW + i)];
+            m.b[i] = (FAST ? v.momentum_residual : v.b)[raw_row(in_registers * ROW + i)];
     }
     own.own = 0;
     own.other = m.state;
-    if (half < halves) load_half();
+    if (side < sides) load_side();
     own_row = kept_address<SIZE>(m.state + own.own * ROW);
     own_state = kept_address<SIZE>(m.state + body * ROW + r);
     if (!FAST && !args.start) load_records();
     else if (!FAST && updates) start_records();
-    if (has_rows() && half < halves && !own.pair && lane == 0)
-        start_row_half(v, half_code, m.row_lambda + half * ROW, m.records + half * ROW,
+    if (has_rows() && side < sides && !own.pair && lane == 0)
+        start_row_side(v, side_code, m.row_lambda + side * ROW, m.records + side * ROW,
                        !FAST && args.start);
     if (FAST && MODE == GRID) /* for the first Steps 2-4 of the others */
         for (int32_t i = t; i < bodies * ROW; i += threads)
@@ -273,21 +274,21 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
 
 /* ---- storing --------------------------------------------------------------------------------------------------- */
 
-/* Velocities, records (FAST: defects) and, from side a (b where a is static), multipliers; nothing of islands that have
- * stopped. */
+/* Velocities, records (FAST: momentum residuals) and, from side a (b where a is static), multipliers; nothing of
+ * islands that have stopped. */
 PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
 {
     const int32_t in_registers = (int32_t)blockDim.x / LANES;
     for (int32_t i = t; i < bodies * ROW; i += (int32_t)blockDim.x) {
-        if (i % ROW >= 6 || (FAST && island_stopped(v, args.looks, v.body_of[first_body + i / ROW]))) continue;
+        if (i % ROW >= 6 || (FAST && island_stopped(v, args.checks, v.body_of[first_body + i / ROW]))) continue;
         v.state[raw_row(i)] = state(odd)[i];
-        if (FAST) v.defect[raw_row(i)] = i < in_registers * ROW ? own_body.b : m.b[i - in_registers * ROW];
+        if (FAST) v.momentum_residual[raw_row(i)] = i < in_registers * ROW ? own_body.b : m.b[i - in_registers * ROW];
     }
-    for (int32_t i = t; !FAST && i < halves * ROW; i += (int32_t)blockDim.x)
-        v.records[(size_t)first_half * ROW + (size_t)i] = m.records[i];
-    if (half >= halves) return;
-    if (FAST && island_stopped(v, args.looks, v.body_of[first_body + own.own])) return;
-    const int32_t code = v.incident[first_half + half], p = code / 2;
+    for (int32_t i = t; !FAST && i < sides * ROW; i += (int32_t)blockDim.x)
+        v.records[(size_t)first_side * ROW + (size_t)i] = m.records[i];
+    if (side >= sides) return;
+    if (FAST && island_stopped(v, args.checks, v.body_of[first_body + own.own])) return;
+    const int32_t code = v.incident[first_side + side], p = code / 2;
     if (own.pair) {
         if (code & 1 && v.ends[p].body_a != v.bodies) return;
         const int32_t count = (int32_t)v.difference[p].w;
@@ -297,9 +298,9 @@ PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
             if (k < count) store_lambda(v, point_slot(v, p, k), own.lambda[j]);
         }
     } else if (FULL && lane == 0) {
-        const int32_t k = p - v.pair_room;
+        const int32_t k = p - v.pair_capacity;
         if (code & 1 && v.row_info[k].body_a != v.bodies) return;
-        store_row_lambda(v, k, m.row_lambda + half * ROW);
+        store_row_lambda(v, k, m.row_lambda + side * ROW);
     }
 }
 

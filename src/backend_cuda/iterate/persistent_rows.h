@@ -1,30 +1,30 @@
-/* The resident kernel (resident.h): halves of row blocks, out of line: few systems have them. */
-#ifndef SADMM_CUDA_ITERATE_RESIDENT_ROWS_H
-#define SADMM_CUDA_ITERATE_RESIDENT_ROWS_H
+/* The persistent kernel (persistent.h): sides of row blocks, out of line: few systems have them. */
+#ifndef SADMM_CUDA_ITERATE_PERSISTENT_ROWS_H
+#define SADMM_CUDA_ITERATE_PERSISTENT_ROWS_H
 
 #include "sweep.h"
 
-/* Steps 2-4 of half `code` of a row block, of the method `fast`, into this side's record. */
-static __device__ __noinline__ double update_row_half_fast(const cuda_view &v, int32_t code, const solver_real *own,
+/* Steps 2-4 of side `code` of a row block, of the method `fast`, into this side's record. */
+static __device__ __noinline__ double update_row_side_fast(const cuda_view &v, int32_t code, const solver_real *own,
                                                            const solver_real *other, solver_real *kept,
-                                                           solver_real *record, real farther)
+                                                           solver_real *record, real relaxation_factor)
 {
-    const int32_t k = code / 2 - v.pair_room, side = code & 1;
+    const int32_t k = code / 2 - v.pair_capacity, side = code & 1;
     const row_about about = v.row_info[k];
     real lambda[6], delta[6];
     for (int j = 0; j < 6; ++j) lambda[j] = kept[j];
     update_row_block_fast(v, k, about, side ? other : own, side ? own : other, lambda, delta);
-    for (int j = 0; j < 6; ++j) kept[j] = relaxed(kept[j], lambda[j], delta[j], farther);
+    for (int j = 0; j < 6; ++j) kept[j] = relaxed(kept[j], lambda[j], delta[j], relaxation_factor);
     store_row_record(v, k, about.rows, side, delta, record);
     return row_block_primal_fast(v, k, about, delta);
 }
 
-/* Steps 2-4 of half `code` of a row block, into this side's record; `change`: as after a measured iteration. */
-static __device__ __noinline__ double update_row_half(const cuda_view &v, int32_t code, const solver_real *own,
+/* Steps 2-4 of side `code` of a row block, into this side's record; `change`: as after a measured iteration. */
+static __device__ __noinline__ double update_row_side(const cuda_view &v, int32_t code, const solver_real *own,
                                                       const solver_real *other, solver_real *kept, solver_real *record,
                                                       solver_real *change)
 {
-    const int32_t k = code / 2 - v.pair_room, side = code & 1;
+    const int32_t k = code / 2 - v.pair_capacity, side = code & 1;
     const row_about about = v.row_info[k];
     real lambda[6], delta[6];
     for (int j = 0; j < 6; ++j) lambda[j] = kept[j];
@@ -38,10 +38,10 @@ static __device__ __noinline__ double update_row_half(const cuda_view &v, int32_
     return row_block_primal(v, about, delta);
 }
 
-static __device__ __noinline__ void start_row_half(const cuda_view &v, int32_t code, solver_real *kept,
+static __device__ __noinline__ void start_row_side(const cuda_view &v, int32_t code, solver_real *kept,
                                                    solver_real *record, bool start)
 {
-    const int32_t k = code / 2 - v.pair_room;
+    const int32_t k = code / 2 - v.pair_capacity;
     real lambda[6];
     load_row_lambda(v, k, lambda);
     for (int j = 0; j < 6; ++j) kept[j] = lambda[j];

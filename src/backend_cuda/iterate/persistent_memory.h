@@ -1,13 +1,14 @@
-/* The resident kernel (resident.h): what instances there are, the shared memory of a thread block, and how blocks meet. */
-#ifndef SADMM_CUDA_ITERATE_RESIDENT_MEMORY_H
-#define SADMM_CUDA_ITERATE_RESIDENT_MEMORY_H
+/* The persistent kernel (persistent.h): what instances there are, the shared memory of a thread block, and how blocks
+ * meet. */
+#ifndef SADMM_CUDA_ITERATE_PERSISTENT_MEMORY_H
+#define SADMM_CUDA_ITERATE_PERSISTENT_MEMORY_H
 
-#include "resident_ends.h"
+#include "prologue.h"
 #include "sweep.h"
 
-enum resident_mode { BLOCK, CLUSTER, GRID };
+enum persistent_mode { BLOCK, CLUSTER, GRID };
 
-enum { QUAD = 4 }; /* lanes a half */
+enum { QUAD = 4 }; /* lanes a side */
 
 /* Sizes of blocks an instance is made for: few threads may have all the registers they want, and a single warp needs no
  * barrier (BLOCK alone). */
@@ -29,12 +30,12 @@ enum { FEW = 4 };
 /* The same in every block of a launch: blocks of a cluster look into each other's memory. */
 struct part_memory {
     solver_real *state;      /* CLUSTER: of even, then of odd iterations; bodies x ROW each, then a row of 0 */
-    solver_real *records;    /* halves x ROW, and FEW rows that are read and not used */
-    solver_real *row_lambda; /* halves x ROW, when there are row blocks */
+    solver_real *records;    /* sides x ROW, and FEW rows that are read and not used */
+    solver_real *row_lambda; /* sides x ROW, when there are row blocks */
     solver_real *lines, *b;  /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x line, ROW; FAST:
-                                the defect in place of b */
+                                the momentum residual in place of b */
     int32_t *suspected;      /* a body of the part has too much energy */
-    /* Before the first iteration and after the last one, over what is above (iterate/resident_ends.h): */
+    /* Before the first iteration and after the last one, over what is above (iterate/prologue.h): */
     double *terms;           /* bodies x TERMS */
     island_range *range;     /* bodies */
 };
@@ -45,12 +46,12 @@ enum { SLACK = 16 }; /* the end, with what is to come there aligned */
 static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *base, bool cluster, int threads,
                                                  int32_t bodies, bool row_blocks)
 {
-    size_t n = (size_t)bodies, halves = (size_t)(threads / QUAD), first = (size_t)(threads / LANES);
+    size_t n = (size_t)bodies, sides = (size_t)(threads / QUAD), first = (size_t)(threads / LANES);
     size_t more = n > first ? n - first : 0;
     m->state = (solver_real *)base;
     m->records = m->state + ((cluster ? 2 * n : n) + 1) * ROW;
-    m->row_lambda = m->records + (halves + FEW) * ROW;
-    m->lines = m->row_lambda + (row_blocks ? halves * ROW : 0);
+    m->row_lambda = m->records + (sides + FEW) * ROW;
+    m->lines = m->row_lambda + (row_blocks ? sides * ROW : 0);
     m->b = m->lines + more * LINE_GENERAL;
     m->terms = (double *)base;
     m->range = (island_range *)(m->terms + n * TERMS);
@@ -62,7 +63,7 @@ static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *
 
 /* ---- barriers -------------------------------------------------------------------------------------------------- */
 
-/* Between the two halves of a barrier a thread may do what concerns nobody else. */
+/* Between the two sides of a barrier a thread may do what concerns nobody else. */
 template <int MODE, int SIZE> static __device__ __forceinline__ void arrive(unsigned *arrivals)
 {
 #ifdef SADMM_CUDA_EMULATED
@@ -123,8 +124,8 @@ static __device__ __forceinline__ const solver_real *in_block(const solver_real 
 #endif
 }
 
-/* An address in this block's own memory, in a register: to save one the compiler makes it anew from its parts in every iteration,
- * and what is loaded from there waits. Blocks of ANY_SIZE have none to spare. */
+/* An address in this block's own memory, in a register: to save one the compiler makes it again from its parts in every
+ * iteration, and what is loaded from there waits. Blocks of ANY_SIZE have none to spare. */
 template <int SIZE> static __device__ __forceinline__ solver_real *kept_address(solver_real *own)
 {
 #ifndef SADMM_CUDA_EMULATED

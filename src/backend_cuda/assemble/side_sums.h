@@ -1,19 +1,19 @@
-/* The method `fast`: what a pair adds to its bodies, a record for each half, so that what sums over a body's halves need not
- * look at points: J^T lambda for the momentum, sums over arms for C, load and response for the weight (math/weight.h). Made
- * by v.lanes threads a pair where contacts are assembled, and again where loads are taken anew. In double, from this
- * precision's data. */
-#ifndef SADMM_CUDA_ASSEMBLE_HALF_SUMS_H
-#define SADMM_CUDA_ASSEMBLE_HALF_SUMS_H
+/* The method `fast`: what a pair adds to its bodies, a record for each side, so that what sums over a body's sides need
+ * not look at points: J^T lambda for the momentum, sums over arms for C, load and response for the weight
+ * (math/weight.h). Made by v.lanes threads a pair where contacts are assembled, and again where loads are taken again.
+ * In double, from this precision's data. */
+#ifndef SADMM_CUDA_ASSEMBLE_SIDE_SUMS_H
+#define SADMM_CUDA_ASSEMBLE_SIDE_SUMS_H
 
 #include "backend_cuda/device/body.h"
 
 #include "core/math/violation.h"
 
-/* Numbers of half_wrench: force and torque, then the force's size; ROW in all. */
-enum { HALF_PUSH = 6 };
-/* Those of half_arms (device/view.h) are in this precision, and sums only where contacts have three rows: else C depends on
- * normals. */
-static_assert(sizeof(struct arm_sums) == HALF_ARMS * sizeof(double), "numbers are taken one by one");
+/* Numbers of side_wrench: force and torque, then the force's size; ROW in all. */
+enum { SIDE_PUSH = 6 };
+/* Those of side_arms (device/view.h) are in this precision, and sums only where contacts have three rows: else C
+ * depends on normals. */
+static_assert(sizeof(struct arm_sums) == SIDE_ARMS * sizeof(double), "numbers are taken one by one");
 
 /* Sums over a pair's points, with arms of side a (of side b where a is static). */
 struct pair_sums {
@@ -111,20 +111,20 @@ static __device__ __forceinline__ double side_response(const cuda_view &v, int32
 }
 
 /* share: 1 / count. */
-static __device__ __forceinline__ void store_half(const cuda_view &v, int32_t p, int32_t side, int32_t count, double share,
-                                                  bool first, const struct pair_sums *sums)
+static __device__ __forceinline__ void store_side(const cuda_view &v, int32_t p, int32_t side, int32_t count,
+                                                  double share, bool first, const struct pair_sums *sums)
 {
     const double sign = side ? 1 : -1, *f = sums->force;
-    double *wrench = v.half_wrench + (size_t)(2 * p + side) * ROW;
-    solver_real *arms = v.half_arms + (size_t)(2 * p + side) * HALF_NUMBERS;
+    double *wrench = v.side_wrench + (size_t)(2 * p + side) * ROW;
+    solver_real *arms = v.side_arms + (size_t)(2 * p + side) * SIDE_NUMBERS;
 #pragma unroll
     for (int j = 0; j < 3; ++j) {
         wrench[j] = sign * f[j];
         wrench[j + 3] = sign * sums->torque[j];
     }
-    wrench[HALF_PUSH] = sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
-    wrench[HALF_PUSH + 1] = 0;
-    arms[HALF_LOAD] = (solver_real)(sums->pushed * share);
+    wrench[SIDE_PUSH] = sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
+    wrench[SIDE_PUSH + 1] = 0;
+    arms[SIDE_LOAD] = (solver_real)(sums->pushed * share);
     if (!first) return;
     arms[0] = (solver_real)count;
 #pragma unroll
@@ -138,9 +138,9 @@ static __device__ __forceinline__ int32_t side_of_lane(const cuda_view &v, int32
 
 /* The records of a pair from its lanes' sums. `first`: also what depends on arms alone. `inverse`: of the body at the lane's
  * side. Every lane of the warp comes here. */
-static __device__ __forceinline__ void store_halves(const cuda_view &v, bool live, int32_t p, int32_t lane, int32_t count,
-                                                    const pair_ends &ends, const real4 &difference, bool first,
-                                                    const rigid_inverse &inverse, struct pair_sums *sums)
+static __device__ __forceinline__ void store_sides(const cuda_view &v, bool live, int32_t p, int32_t lane,
+                                                   int32_t count, const pair_ends &ends, const real4 &difference,
+                                                   bool first, const rigid_inverse &inverse, struct pair_sums *sums)
 {
     const double d[3] = {(double)difference.x, (double)difference.y, (double)difference.z}, share = 1 / (double)count;
     const int32_t own = side_of_lane(v, lane);
@@ -153,7 +153,7 @@ static __device__ __forceinline__ void store_halves(const cuda_view &v, bool liv
         const int32_t body = side ? ends.body_b : ends.body_a;
         if (side) shift_sums(sums, count, d);
         if (!live || body >= v.bodies || (own >= 0 && own != side)) continue;
-        store_half(v, p, side, count, share, first, sums);
+        store_side(v, p, side, count, share, first, sums);
         if (!first) continue;
         response += side_response(v, side, body, count, own < 0 && v.rigid ? inverse_of_body(v, body) : inverse, sums);
     }
@@ -163,7 +163,7 @@ static __device__ __forceinline__ void store_halves(const cuda_view &v, bool liv
     response *= v.contact_rows == 3 ? share * (1.0 / 3) : share;
     for (int32_t side = 0; side < 2; ++side)
         if (own < 0 || own == side)
-            v.half_arms[(size_t)(2 * p + side) * HALF_NUMBERS + HALF_RESPONSE] = (solver_real)response;
+            v.side_arms[(size_t)(2 * p + side) * SIDE_NUMBERS + SIDE_RESPONSE] = (solver_real)response;
     if (lane == 0) v.response[p] = response;
 }
 

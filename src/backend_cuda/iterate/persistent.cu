@@ -1,22 +1,22 @@
-/* The fused iteration (resident.h): which instance runs, and what it takes. */
-#include "resident.h"
+/* The fused iteration (persistent.h): which instance runs, and what it takes. */
+#include "persistent.h"
 
-int CUDA(resident_threads)(int point_slots) { return most_threads(point_slots <= 4 ? 4 : 8, ANY_SIZE); }
+int CUDA(persistent_threads)(int point_slots) { return most_threads(point_slots <= 4 ? 4 : 8, ANY_SIZE); }
 
-size_t CUDA(resident_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies, bool row_blocks)
+size_t CUDA(persistent_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies, bool row_blocks)
 {
     part_memory unused;
     return lay_out(&unused, nullptr, tier == SADMM_CUDA_TIER_CLUSTER, threads, most_bodies, row_blocks);
 }
 
-bool CUDA(resident_does_ends)(const struct cuda_partition *partition)
+bool CUDA(persistent_does_prologue)(const struct cuda_partition *partition)
 {
     return partition->tier == SADMM_CUDA_TIER_BLOCK && partition->threads <= SMALL_THREADS;
 }
 
-static resident_instances instances_of(enum sadmm_cuda_tier tier)
+static persistent_instances instances_of(enum sadmm_cuda_tier tier)
 {
-    const resident_instances none = {nullptr, 0};
+    const persistent_instances none = {nullptr, 0};
     switch (tier) {
     case SADMM_CUDA_TIER_BLOCK: return CUDA(block_instances)();
     case SADMM_CUDA_TIER_CLUSTER: return CUDA(cluster_instances)();
@@ -25,16 +25,16 @@ static resident_instances instances_of(enum sadmm_cuda_tier tier)
     }
 }
 
-cuda_kernel CUDA(resident_kernel)(int point_slots, enum sadmm_cuda_tier tier, int threads, bool full, bool fast,
+cuda_kernel CUDA(persistent_kernel)(int point_slots, enum sadmm_cuda_tier tier, int threads, bool full, bool fast,
                                   const char **name)
 {
     const int points = point_slots <= 4 ? 4 : 8;
     const int size = full || threads > SMALL_THREADS                    ? ANY_SIZE
                      : tier == SADMM_CUDA_TIER_BLOCK && threads == WARP ? ONE_WARP
                                                                         : SMALL;
-    const resident_instances all = instances_of(tier);
+    const persistent_instances all = instances_of(tier);
     for (size_t k = 0; k < all.count; ++k) {
-        const resident_instance &one = all.first[k];
+        const persistent_instance &one = all.first[k];
         if (one.points != points || one.full != full || one.size != size || one.fast != fast) continue;
         *name = one.name;
         return one.kernel;
@@ -45,7 +45,7 @@ cuda_kernel CUDA(resident_kernel)(int point_slots, enum sadmm_cuda_tier tier, in
 /* Let the instances of a tier use `bytes` of shared memory a block. */
 static cudaError_t allow_shared(enum sadmm_cuda_tier tier, int bytes)
 {
-    const resident_instances all = instances_of(tier);
+    const persistent_instances all = instances_of(tier);
     cudaError_t code = cudaSuccess;
     for (size_t k = 0; k < all.count && code == cudaSuccess; ++k)
         code = cudaFuncSetAttribute((const void *)all.first[k].kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, bytes);
@@ -53,10 +53,10 @@ static cudaError_t allow_shared(enum sadmm_cuda_tier tier, int bytes)
 }
 
 /* Clusters of more than 8 blocks, if the code has cluster barriers: what was compiled for earlier devices (__CUDA_ARCH__ in
- * resident.h) has none, wherever it runs. */
+ * persistent.h) has none, wherever it runs. */
 static cudaError_t allow_clusters(bool *clusters)
 {
-    const resident_instances all = CUDA(cluster_instances)();
+    const persistent_instances all = CUDA(cluster_instances)();
     cudaError_t code = cudaSuccess;
     for (size_t k = 0; k < all.count && code == cudaSuccess && *clusters; ++k) {
         const void *kernel = (const void *)all.first[k].kernel;
@@ -68,7 +68,7 @@ static cudaError_t allow_clusters(bool *clusters)
     return code;
 }
 
-cudaError_t CUDA(resident_allow)(int bytes, bool device_has_clusters, bool *clusters)
+cudaError_t CUDA(persistent_allow)(int bytes, bool device_has_clusters, bool *clusters)
 {
     *clusters = device_has_clusters;
     for (enum sadmm_cuda_tier tier : {SADMM_CUDA_TIER_BLOCK, SADMM_CUDA_TIER_CLUSTER, SADMM_CUDA_TIER_GRID}) {

@@ -1,5 +1,5 @@
-/* The method `fast`: levels of the islands (math/weight.h), from what contacts and momentum miss. In double; sums over an
- * island go in the order of pairs and of bodies. */
+/* The method `fast`: weight scales of the islands (math/weight.h), from what contacts and momentum miss. In double;
+ * sums over an island go in the order of pairs and of bodies. */
 #include "core/math/violation.h"
 #include "core/math/weight.h"
 #include "cpu_rows.h"
@@ -42,7 +42,7 @@ void CPU(add_up_imbalance)(struct sadmm_context *c, int thread, int threads)
 {
     size_t begin, end;
     sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
-    for (size_t i = begin; i < end; ++i) c->body_sums[BODY_SUMS * i + 3] = cpu_defect_energy(c, i);
+    for (size_t i = begin; i < end; ++i) c->body_sums[BODY_SUMS * i + 3] = cpu_residual_energy(c, i);
     sadmm_share(c->pair_block_count * (size_t)LANES, thread, threads, &begin, &end);
     for (size_t k = begin; k < end; ++k)
         if (c->pair_blocks[k / (size_t)LANES].pair[k % (size_t)LANES] >= 0) c->pair_violation[k] = pair_violation(c, k);
@@ -51,10 +51,11 @@ void CPU(add_up_imbalance)(struct sadmm_context *c, int thread, int threads)
 static void add_up_misses(struct sadmm_context *c)
 {
     for (int32_t i = 0; i < c->bodies; ++i) {
-        c->islands[i].violation = c->islands[i].defect = 0;
+        c->islands[i].violation = c->islands[i].momentum_residual = 0;
         c->islands[i].blocks = false;
     }
-    for (int32_t i = 0; i < c->bodies; ++i) c->islands[c->label[i]].defect += c->body_sums[BODY_SUMS * i + 3];
+    for (int32_t i = 0; i < c->bodies; ++i)
+        c->islands[c->label[i]].momentum_residual += c->body_sums[BODY_SUMS * i + 3];
     for (size_t k = 0; k < c->pair_block_count * (size_t)LANES; ++k) {
         if (c->pair_blocks[k / (size_t)LANES].pair[k % (size_t)LANES] < 0) continue;
         const struct sadmm_contact_pair *pair = cpu_pair(c, k);
@@ -64,15 +65,15 @@ static void add_up_misses(struct sadmm_context *c)
         cpu_island_of(c, c->row_blocks[k].body_a, c->row_blocks[k].body_b)->blocks = true;
 }
 
-void CPU(update_levels)(struct sadmm_context *c)
+void CPU(update_weight_scales)(struct sadmm_context *c)
 {
     add_up_misses(c);
     for (int32_t i = 0; i < c->bodies; ++i) {
         struct cpu_island *island = &c->islands[i];
         if (c->label[i] != i || island->blocks) continue;
-        double balance = weight_balance(island->violation, island->defect, island->mass);
-        double level = weight_next_level(island->level, balance);
-        island->scale = weight_stalls(balance) ? level / island->level : 0;
-        island->level = level;
+        double balance = weight_balance(island->violation, island->momentum_residual, island->mass);
+        double next = weight_next_scale(island->weight_scale, balance);
+        island->rescale = weight_stalls(balance) ? next / island->weight_scale : 0;
+        island->weight_scale = next;
     }
 }

@@ -1,40 +1,40 @@
 /* The fused iteration as one kernel whose state stays on the chip: tiers BLOCK, CLUSTER and GRID (device/view.h).
  *
- * A thread block owns a part: a range of bodies and the halves of their constraints. Four lanes (a quad) take a half, one
- * contact point each (points k and k + 4 where pairs have up to 8), and keep it in registers through all iterations. The
- * multipliers of a pair between two dynamic bodies are thereby computed twice, from the same inputs by the same
- * expressions, so that both copies stay equal bit for bit and no wrench ever leaves its block: an iteration exchanges
- * velocities, and nothing else.
+ * A thread block owns a part: a range of bodies and the sides of their constraints. Four lanes (a quad) take a side,
+ * one contact point each (points k and k + 4 where pairs have up to 8), and keep it in registers through all
+ * iterations. The multipliers of a pair between two dynamic bodies are thereby computed twice, from the same inputs by
+ * the same expressions, so that both copies stay equal bit for bit and no wrench ever leaves its block: an iteration
+ * exchanges velocities, and nothing else.
  *   BLOCK    parts are whole islands: nothing to exchange
  *   CLUSTER  the blocks of a cluster read each other's velocities from shared memory, written alternately to two
  *            buffers, and meet in one cluster barrier an iteration
  *   GRID     velocities go through global memory, two buffers again, with one grid barrier an iteration. The launch is
  *            cooperative, so that every block runs and the spinning ends.
- * A half of a row block is the work of its quad's first lane; it reads its Jacobians from memory (six rows on two bodies
- * are more than registers hold).
+ * A side of a row block is the work of its quad's first lane; it reads its Jacobians from memory (six rows on two
+ * bodies are more than registers hold).
  *
  * On entry and exit everything is in global memory as the stepwise kernels leave it. Before the first iteration and after
- * the last one of a step, BLOCK may also do what else an island needs (resident_ends.h).
+ * the last one of a step, BLOCK may also do what else an island needs (prologue.h).
  */
-#ifndef SADMM_CUDA_ITERATE_RESIDENT_H
-#define SADMM_CUDA_ITERATE_RESIDENT_H
+#ifndef SADMM_CUDA_ITERATE_PERSISTENT_H
+#define SADMM_CUDA_ITERATE_PERSISTENT_H
 
-#include "resident_steps.h"
+#include "persistent_steps.h"
 
 #include "backend_cuda/step/plan_check.h"
 
 /* ---- the kernel ------------------------------------------------------------------------------------------------ */
 
-/* The step is halted; or a block without bodies, or a cluster: there are more than islands, mostly. In the grid everybody comes to
- * the barrier. Or the stop rule is met. */
+/* The step is aborted; or a block without bodies, or a cluster: there are more than islands, mostly. In the grid
+ * everybody comes to the barrier. Or the stop rule is met. */
 template <int MODE, bool FAST>
 static __device__ __forceinline__ bool nothing_to_do(const cuda_view &v, const cuda_args &args)
 {
     const int32_t cluster = MODE == BLOCK ? 1 : args.cluster, part = (int32_t)blockIdx.x / cluster * cluster,
-                  first = v.parts[part], end = v.parts[part + cluster]; /* beside halt: neither load waits for the other */
-    if (v.live->halt || (FAST && MODE != BLOCK && all_stopped(v, args.looks))) return true;
+                  first = v.parts[part], end = v.parts[part + cluster]; /* beside abort_code: neither load waits for the other */
+    if (v.live->abort_code || (FAST && MODE != BLOCK && all_stopped(v, args.checks))) return true;
     if (MODE == GRID) return false;
-    return first == end || (FAST && MODE == BLOCK && part_stopped(v, args.looks, first, end));
+    return first == end || (FAST && MODE == BLOCK && part_stopped(v, args.checks, first, end));
 }
 
 /* The method `fast` (math/relax.h): Steps 2-4, then Step 1. An iteration has the barriers of the other method's. */
@@ -46,22 +46,24 @@ static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view 
         arrive<MODE, SIZE>(v.barrier);
         wait<MODE, SIZE>(v.barrier, *target += gridDim.x);
     }
-    int32_t count = args.count, stretch = args.goes_on ? count + 1 : count, settled = args.settled;
+    int32_t count = args.count, batch = args.goes_on ? count + 1 : count, settled = args.settled;
     /* Were it the launch's constant, and not a choice, it would be fetched in every iteration. */
     real all = part.bodies > 0 ? relaxation : (real)1;
-    keep<SIZE>(&count), keep<SIZE>(&stretch), keep<SIZE>(&settled), keep<SIZE>(&all);
+    keep<SIZE>(&count), keep<SIZE>(&batch), keep<SIZE>(&settled), keep<SIZE>(&all);
     for (int32_t i = 0; i < count; ++i) {
         const int32_t odd = i & 1;
-        const bool plain = !relax_constraints(i, stretch) || all == 1;
-        real farther = plain ? (real)1 : all, bodies_farther = relax_velocity(i, stretch, settled) ? all : (real)1;
-        keep<SIZE>(&farther), keep<SIZE>(&bodies_farther);
-        if (FULL && plain && args.measure) reduce_max(part.template update_halves<true>(odd, farther, true), v.residual);
-        else part.template update_halves<false>(odd, farther, plain);
+        const bool plain = !relax_constraints(i, batch) || all == 1;
+        real relaxation_factor = plain ? (real)1 : all,
+             velocity_factor = relax_velocity(i, batch, settled) ? all : (real)1;
+        keep<SIZE>(&relaxation_factor), keep<SIZE>(&velocity_factor);
+        if (FULL && plain && args.measure)
+            reduce_max(part.template update_sides<true>(odd, relaxation_factor, true), v.residual);
+        else part.template update_sides<false>(odd, relaxation_factor, plain);
         block_barrier<SIZE>();
-        part.move_bodies_fast(!odd, bodies_farther, farther);
+        part.move_bodies_fast(!odd, velocity_factor, relaxation_factor);
         settled = 1;
         arrive<MODE, SIZE>(v.barrier);
-        if (part.has_moves()) part.own_body.b = defect_after(part.own_body, part.sum, part.step, farther);
+        if (part.has_moves()) part.own_body.b = residual_after(part.own_body, part.sum, part.step, relaxation_factor);
         wait<MODE, SIZE>(v.barrier, *target += gridDim.x);
     }
 }
@@ -77,8 +79,8 @@ static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view
         if (part.has_moves()) part.momentum = free_momentum(part.own_body);
         wait<MODE, SIZE>(v.barrier, *target += gridDim.x);
         if (FULL && args.measure && iteration == args.count)
-            reduce_max(part.template update_halves<true>(odd, 1, true), v.residual);
-        else part.template update_halves<false>(odd, 1, true);
+            reduce_max(part.template update_sides<true>(odd, 1, true), v.residual);
+        else part.template update_sides<false>(odd, 1, true);
         block_barrier<SIZE>();
     }
     /* Nobody looks into this block's memory once it is gone. */
@@ -88,29 +90,29 @@ static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view
     }
 }
 
-/* FULL: with row blocks, or to be measured; both cost registers, and most stretches have neither. A multiprocessor holds one block
- * at least: unless told so the compiler gives a block of one warp fewer registers than it needs. */
+/* FULL: with row blocks, or to be measured; both cost registers, and most batches have neither. A multiprocessor holds
+ * one block at least: unless told so the compiler gives a block of one warp fewer registers than it needs. */
 template <int POINTS, int MODE, bool FULL, int SIZE, bool FAST>
 static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
-    resident_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+    persistent_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     CUDA_DYNAMIC_SHARED(memory);
     wait_for_stream();
     /* They take registers. */
-    constexpr bool ENDS = FAST && MODE == BLOCK && !FULL && SIZE != ANY_SIZE;
+    constexpr bool PROLOGUE = FAST && MODE == BLOCK && !FULL && SIZE != ANY_SIZE;
     if (nothing_to_do<MODE, FAST>(v, args)) {
-        if (ENDS && args.begin) stamp_assembled(v);
+        if (PROLOGUE && args.begin) stamp_assembled(v);
         return;
     }
     part_run<POINTS, MODE, FULL, SIZE, FAST> part(v, args, memory);
     const auto barrier = [] { block_barrier<SIZE>(); };
     const block_part ends = {part.first_body, part.bodies, part.m.terms, part.m.range, part.m.suspected};
-    if (ENDS && threadIdx.x == 0) *ends.suspected = 0;
-    const bool begins = ENDS && args.begin;
-    if constexpr (ENDS)
+    if (PROLOGUE && threadIdx.x == 0) *ends.suspected = 0;
+    const bool begins = PROLOGUE && args.begin;
+    if constexpr (PROLOGUE)
         if (begins) store_first_terms(v, ends, part.found);
-    part.fetch_half(); /* on its way while islands are weighed */
-    if constexpr (ENDS)
+    part.fetch_side(); /* on its way while islands are weighed */
+    if constexpr (PROLOGUE)
         if (begins) {
             weigh_in_block(v, args, ends, part.found, barrier);
             stamp_assembled(v);
@@ -126,20 +128,20 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     part.store(args.count & 1);
     if (!FAST || args.limit == LIMIT_NONE) return;
     const bool suspected = part.suspect(args.count & 1);
-    if (!ENDS || args.limit == LIMIT_SUSPECTS) {
+    if (!PROLOGUE || args.limit == LIMIT_SUSPECTS) {
         if (suspected) *v.suspects = 1;
         return;
     }
-    if constexpr (ENDS) {
+    if constexpr (PROLOGUE) {
         if (suspected) *ends.suspected = 1;
         block_barrier<SIZE>();
-        if (*ends.suspected) limit_in_block(v, args.few, ends, barrier);
+        if (*ends.suspected) limit_in_block(v, args.under_iterated, ends, barrier);
     }
 }
 
 /* ---- instances ------------------------------------------------------------------------------------------------- */
 
-struct resident_instance {
+struct persistent_instance {
     int points;
     bool full;
     int size;
@@ -149,16 +151,16 @@ struct resident_instance {
 };
 
 /* All of a mode, which has a source of its own: they take long to compile. */
-struct resident_instances {
-    const resident_instance *first;
+struct persistent_instances {
+    const persistent_instance *first;
     size_t count;
 };
-resident_instances CUDA(block_instances)(void);
-resident_instances CUDA(cluster_instances)(void);
-resident_instances CUDA(grid_instances)(void);
+persistent_instances CUDA(block_instances)(void);
+persistent_instances CUDA(cluster_instances)(void);
+persistent_instances CUDA(grid_instances)(void);
 
 #define INSTANCE(points, mode, full, size, fast, name) \
-    {points, full, size, fast, resident_kernel<points, mode, full, size, fast>, "iterate (" name ")"}
+    {points, full, size, fast, persistent_kernel<points, mode, full, size, fast>, "iterate (" name ")"}
 /* Boxes on boxes touch in up to 8 points, mostly 4: with 4 a lane needs fewer registers. */
 #define OF_SIZES(points, mode, fast, name)                        \
     INSTANCE(points, mode, false, ANY_SIZE, fast, name),          \

@@ -1,7 +1,7 @@
-/* The fused iteration (resident.h) of tier BLOCK: its instances. */
-#include "resident.h"
+/* The fused iteration (persistent.h) of tier BLOCK: its instances. */
+#include "persistent.h"
 
-static const resident_instance instances[] = {
+static const persistent_instance instances[] = {
     INSTANCE(4, BLOCK, false, ONE_WARP, false, "warp, 4 points"),
     INSTANCE(8, BLOCK, false, ONE_WARP, false, "warp, 8 points"),
     INSTANCE(4, BLOCK, false, ONE_WARP, true, "fast, warp, 4 points"),
@@ -9,8 +9,8 @@ static const resident_instance instances[] = {
     OF_MODE(BLOCK, "block"),
 };
 
-resident_instances CUDA(block_instances)(void)
+persistent_instances CUDA(block_instances)(void)
 {
-    const resident_instances all = {instances, sizeof instances / sizeof *instances};
+    const persistent_instances all = {instances, sizeof instances / sizeof *instances};
     return all;
 }

@@ -1,8 +1,8 @@
 /* The method `fast` in tier BLOCK, where a thread block has whole islands: what a step does before its first iteration and after
  * its last one, by the kernel that iterates. In the other tiers, and for refreshes, these are kernels of their own
  * (weight/weights.cu, weight/penalty.cu, iterate/limit.cu); the functions are the same, and so are the results, bit for bit. */
-#ifndef SADMM_CUDA_ITERATE_RESIDENT_ENDS_H
-#define SADMM_CUDA_ITERATE_RESIDENT_ENDS_H
+#ifndef SADMM_CUDA_ITERATE_PROLOGUE_H
+#define SADMM_CUDA_ITERATE_PROLOGUE_H
 
 #include "energies.h"
 #include "backend_cuda/weight/factor.h"
@@ -52,14 +52,15 @@ template <class Barrier>
 static __device__ __forceinline__ void weigh_in_block(const cuda_view &v, const cuda_args &args, const block_part &part,
                                                       const body_thread &own, Barrier barrier)
 {
-    const eight_halves fetched = fetch_halves(v, own, own.begin); /* on their way while terms are added up */
+    const eight_sides fetched = fetch_sides(v, own, own.begin); /* on their way while terms are added up */
     add_up_in_block<add_terms>(part.bodies, part.range, part.terms, barrier);
     for_each_body(v, part, own, [&](const body_thread &t, int32_t i) {
         const int32_t first = t.live ? part.range[i].first : 0;
         cuda_island island;
         double C[PACKED];
         weigh_island<false>(&island, part.terms + first * TERMS, args);
-        weighted_matrix<true>(v, t, i < (int32_t)blockDim.x / LANES ? fetched : fetch_halves(v, t, t.begin), island, true, C);
+        weighted_matrix<true>(v, t, i < (int32_t)blockDim.x / LANES ? fetched : fetch_sides(v, t, t.begin), island,
+                              true, C);
         if (!t.live) return;
         if (i == first && t.lane == 0) v.islands[v.label[t.body]] = island;
         factor_rigid(v, t.body, t.lane, C);
@@ -69,7 +70,8 @@ static __device__ __forceinline__ void weigh_in_block(const cuda_view &v, const 
 
 /* The limit of energies, where some body of the part was suspected. */
 template <class Barrier>
-static __device__ __noinline__ void limit_in_block(const cuda_view &v, bool few, const block_part &part, Barrier barrier)
+static __device__ __noinline__ void limit_in_block(const cuda_view &v, bool under_iterated, const block_part &part,
+                                                   Barrier barrier)
 {
     const body_thread own = body_of_slot(v, part.first_body + (int32_t)threadIdx.x / LANES,
                                          (int32_t)threadIdx.x / LANES < part.bodies);
@@ -77,7 +79,7 @@ static __device__ __noinline__ void limit_in_block(const cuda_view &v, bool few,
     add_up_in_block<add_terms>(part.bodies, part.range, part.terms, barrier);
     for_each_body(v, part, own, [&](const body_thread &t, int32_t i) {
         if (t.live && t.lane == 0 && i == part.range[i].first)
-            limit_island(v, &v.islands[v.label[t.body]], part.terms + i * TERMS, few);
+            limit_island(v, &v.islands[v.label[t.body]], part.terms + i * TERMS, under_iterated);
     });
 }
 

@@ -49,20 +49,21 @@ static void add_row_block(const struct row_block *block, int side, double r[6])
     }
 }
 
-static void store_defect(struct sadmm_context *c, size_t i, const double r[6])
+static void store_momentum_residual(struct sadmm_context *c, size_t i, const double r[6])
 {
     if (!c->rigid_bodies) {
-        for (int k = 0; k < ROW; ++k) c->defects[i * ROW + (size_t)k] = k < 6 ? (real)r[k] : 0;
+        for (int k = 0; k < ROW; ++k) c->momentum_residuals[i * ROW + (size_t)k] = k < 6 ? (real)r[k] : 0;
         return;
     }
     struct body_block *block = &c->body_blocks[i / (size_t)LANES];
     size_t l = i % (size_t)LANES;
-    block->defect_linear.x[l] = (real)r[0], block->defect_linear.y[l] = (real)r[1], block->defect_linear.z[l] = (real)r[2];
-    block->defect_angular.x[l] = (real)r[3], block->defect_angular.y[l] = (real)r[4];
-    block->defect_angular.z[l] = (real)r[5];
+    block->residual_linear.x[l] = (real)r[0], block->residual_linear.y[l] = (real)r[1],
+    block->residual_linear.z[l] = (real)r[2];
+    block->residual_angular.x[l] = (real)r[3], block->residual_angular.y[l] = (real)r[4];
+    block->residual_angular.z[l] = (real)r[5];
 }
 
-void CPU(take_defects)(struct sadmm_context *c, size_t begin, size_t end)
+void CPU(recompute_residuals)(struct sadmm_context *c, size_t begin, size_t end)
 {
     size_t pair_records = c->pair_block_count * (size_t)LANES;
     for (size_t i = begin; i < end; ++i) {
@@ -75,6 +76,6 @@ void CPU(take_defects)(struct sadmm_context *c, size_t begin, size_t end)
             if (record < pair_records) add_pair(c, record, side, r);
             else add_row_block(&c->row_blocks[record - pair_records], side, r);
         }
-        store_defect(c, i, r);
+        store_momentum_residual(c, i, r);
     }
 }

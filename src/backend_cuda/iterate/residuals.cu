@@ -1,0 +1,46 @@
+/* The method `fast`: what the momentum of bodies misses, b - A v + J^T lambda: taken again where it was kept up by
+ * changes for long (math/relax.h), and (17). In double, from this precision's data; eight lanes a body. The first of a
+ * solve comes with the sums over islands (weight/weights.cu). */
+#include "backend_cuda/weight/constraint.h"
+#include "stop_rule.h"
+
+/* b - A v + J^T lambda of a body, a component a lane. */
+template <bool RIGID>
+static __device__ __forceinline__ double momentum_residual_of(const cuda_view &v, const body_thread &t)
+{
+    const wide_row<RIGID> row = row_of_body<RIGID>(v, t);
+    enum { PUSH = 6, SUMS };
+    double sums[SUMS] = {};
+    for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) add_side(v, v.incident[at], sums, &sums[PUSH]);
+    sum_lanes<SUMS>(sums);
+    return row.b + own_number(sums, t.lane) - product(row.velocity, row.a);
+}
+
+/* Of all bodies. KEEP: as their momentum residuals; else the largest number of all. */
+template <bool KEEP>
+static __global__ void __launch_bounds__(BODY_THREADS)
+    momentum_residual_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    if (KEEP && all_stopped(v, args.checks)) return;
+    const body_thread t = body_of_thread(v);
+    const double r = v.rigid ? momentum_residual_of<true>(v, t) : momentum_residual_of<false>(v, t);
+    if (!KEEP) reduce_max(fabs(r), v.residual + 1);
+    else if (t.live) v.momentum_residual[t.body * ROW + (size_t)t.lane] = (solver_real)r;
+}
+
+static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const char *name, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    args.checks = c->checks;
+    return CUDA(launch_of)(c, kernel, name, body_blocks(c->view.bodies), BODY_THREADS, &args, error);
+}
+
+sadmm_status CUDA(enqueue_momentum_residuals)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    return launch(c, momentum_residual_kernel<true>, "momentum_residuals", error);
+}
+
+sadmm_status CUDA(enqueue_momentum_residual)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    return launch(c, momentum_residual_kernel<false>, "momentum residual", error);
+}
