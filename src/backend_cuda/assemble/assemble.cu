@@ -40,22 +40,23 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     assemble_bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     int32_t i = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x);
-    if (i >= v.bodies || v.live->abort_code) return; /* may run before the step's contacts are known */
-    if (FAST && i == 0) clear_counts(v);
+    if (i >= v.model.bodies || v.model.live->abort_code) return; /* may run before the step's contacts are known */
+    if (FAST && i == 0) clear_counts(v.islands);
     double A[36], b[6], x[6], factor[36];
-    const struct sadmm_settings settings = *v.settings;
-    sadmm_system_body(&v.raw, &settings, i, A, b);
-    if (v.warm_start || !dense6_cholesky(A, factor)) {
-        for (int k = 0; k < 6; ++k) x[k] = v.raw.velocity[6 * (size_t)i + (size_t)k];
+    const struct sadmm_settings settings = *v.model.settings;
+    sadmm_system_body(&v.raw.system, &settings, i, A, b);
+    if (v.model.warm_start || !dense6_cholesky(A, factor)) {
+        for (int k = 0; k < 6; ++k) x[k] = v.raw.system.velocity[6 * (size_t)i + (size_t)k];
     } else {
         dense6_solve(factor, b, x);
     }
-    solver_real *state = v.state + (size_t)i * ROW, *row = v.b + (size_t)i * ROW, *line = v.lines + (size_t)i * (size_t)v.line;
+    solver_real *state = v.bodies.state + (size_t)i * ROW, *row = v.bodies.b + (size_t)i * ROW,
+                *line = v.bodies.lines + (size_t)i * (size_t)v.bodies.line;
     for (int k = 0; k < ROW; ++k) {
         state[k] = k < 6 ? (solver_real)x[k] : (solver_real)0;
         row[k] = k < 6 ? (solver_real)b[k] : (solver_real)0;
     }
-    if (v.rigid) {
+    if (v.bodies.rigid) {
         line[0] = (solver_real)A[0];
         for (int r = 0; r < 3; ++r)
             for (int k = 0; k <= r; ++k) line[1 + packed_place(r, k)] = (solver_real)A[6 * (r + 3) + k + 3];
@@ -67,9 +68,9 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     }
     if (FAST) {
         double inverse[PACKED];
-        invert(v.rigid, A, inverse);
-        for (int k = 0; k < PACKED; ++k) v.A_inverse[PACKED * (size_t)i + (size_t)k] = inverse[k];
-        v.free_energy[i] = form(inverse, row) / 2;
+        invert(v.bodies.rigid, A, inverse);
+        for (int k = 0; k < PACKED; ++k) v.bodies.A_inverse[PACKED * (size_t)i + (size_t)k] = inverse[k];
+        v.bodies.free_energy[i] = form(inverse, row) / 2;
     }
 }
 
@@ -77,25 +78,28 @@ static sadmm_status launch_bodies(struct sadmm_context *c, struct sadmm_error *e
 {
     cuda_args args = {};
     return CUDA(launch_of)(c, c->fast ? assemble_bodies_kernel<true> : assemble_bodies_kernel<false>, "assemble_bodies",
-                           ((int64_t)c->view.bodies + BODY_THREADS - 1) / BODY_THREADS, BODY_THREADS, &args, error);
+                           ((int64_t)c->view.model.bodies + BODY_THREADS - 1) / BODY_THREADS, BODY_THREADS, &args,
+                           error);
 }
 
 extern "C" sadmm_status CUDA(assemble_bodies)(struct sadmm_context *c, struct sadmm_error *error)
 {
     const struct sadmm_system *system = c->system;
     const cuda_view *v = &c->view;
-    size_t n = (size_t)v->bodies, at = 0;
+    size_t n = (size_t)v->model.bodies, at = 0;
     CUDA_ENTER(c);
     if (c->plan.rigid) {
         at = n * sizeof *system->rigid;
-        CUDA_TRY(CUDA(upload)(c, (void *)v->raw.rigid, PINNED_BODIES, 0, system->rigid, at, error));
+        CUDA_TRY(CUDA(upload)(c, (void *)v->raw.system.rigid, PINNED_BODIES, 0, system->rigid, at, error));
     } else {
         size_t bytes = 36 * n * sizeof(double);
-        CUDA_TRY(CUDA(upload)(c, (void *)v->raw.A, PINNED_BODIES, 0, system->A, bytes, error));
-        CUDA_TRY(CUDA(upload)(c, (void *)v->raw.b, PINNED_BODIES, bytes, system->b, 6 * n * sizeof(double), error));
+        CUDA_TRY(CUDA(upload)(c, (void *)v->raw.system.A, PINNED_BODIES, 0, system->A, bytes, error));
+        CUDA_TRY(
+            CUDA(upload)(c, (void *)v->raw.system.b, PINNED_BODIES, bytes, system->b, 6 * n * sizeof(double), error));
         at = 42 * n * sizeof(double);
     }
-    CUDA_TRY(CUDA(upload)(c, v->raw.velocity, PINNED_BODIES, at, system->velocity, 6 * n * sizeof(double), error));
+    CUDA_TRY(
+        CUDA(upload)(c, v->raw.system.velocity, PINNED_BODIES, at, system->velocity, 6 * n * sizeof(double), error));
     return launch_bodies(c, error);
 }
 
@@ -107,98 +111,104 @@ static __device__ real4 pack(vec3 a, double w)
     return out;
 }
 
-static __device__ double solver_friction(const cuda_view &v, double mu)
+static __device__ double solver_friction(const model_view &model, double mu)
 {
-    return v.fast ? contact_friction_inside(mu, SOLVER_EPSILON) : mu;
+    return model.fast ? contact_friction_inside(mu, SOLVER_EPSILON) : mu;
 }
 
-/* v.lanes threads a pair, each every v.lanes-th point; the first also what the points share. FAST: records of sides,
- * too. */
+/* contacts.lanes threads a pair, each every contacts.lanes-th point; the first also what the points share. FAST: records
+ * of sides, too. */
 template <bool FAST>
 static __global__ void __launch_bounds__(BODY_THREADS)
     assemble_contacts_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    const int32_t t = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x), p = t / v.lanes, lane = t % v.lanes;
-    const bool live = p < live_pairs(v);
-    const struct sadmm_contact_pair *pair = &v.raw_pairs[live ? p : 0];
+    const int32_t t = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x), p = t / v.contacts.lanes,
+                  lane = t % v.contacts.lanes;
+    const bool live = p < live_pairs(v.model);
+    const struct sadmm_contact_pair *pair = &v.raw.pairs[live ? p : 0];
     if (!FAST && !live) return;
-    const struct sadmm_settings settings = *v.settings; /* those that count are fetched here, not where they are needed */
-    const struct sadmm_contact_point *points = v.raw_points + (live ? pair->first : 0);
+    /* Those that count are fetched here, not where they are needed. */
+    const struct sadmm_settings settings = *v.model.settings;
+    const struct sadmm_contact_point *points = v.raw.points + (live ? pair->first : 0);
     const vec3 normal = live ? v3_load(pair->normal) : v3(0, 0, 0);
     const bool a = live && pair->body_a >= 0, b = live && pair->body_b >= 0;
     /* A pair of more points than the step was planned for aborts it (step/step.h), but later: until then it has as
      * many. */
-    const int32_t count = !live ? 0 : pair->count <= v.point_slots ? pair->count : v.point_slots;
+    const int32_t count = !live ? 0 : pair->count <= v.contacts.point_slots ? pair->count : v.contacts.point_slots;
     vec3 between = v3(0, 0, 0);
     if (a && b && count > 0 && (FAST || lane == 0))
         between = v3_sub(v3_load(points[0].arm_b), v3_load(points[0].arm_a));
-    const pair_ends ends = {a ? pair->body_a : v.bodies, b ? pair->body_b : v.bodies, -1, -1};
-    const real4 about = pack(normal, live ? solver_friction(v, pair->friction) : 0), difference = pack(between, count);
+    const pair_ends ends = {a ? pair->body_a : v.model.bodies, b ? pair->body_b : v.model.bodies, -1, -1};
+    const real4 about = pack(normal, live ? solver_friction(v.model, pair->friction) : 0),
+                difference = pack(between, count);
     if (live && lane == 0) {
-        v.normal[p] = about;
-        v.difference[p] = difference;
-        v.ends[p] = ends;
+        v.contacts.normal[p] = about;
+        v.contacts.difference[p] = difference;
+        v.contacts.ends[p] = ends;
     }
     struct pair_sums sums = {};
     rigid_inverse inverse = {};
-    if (FAST && v.rigid && side_of_lane(v, lane) >= 0) { /* asked for early: it is from far away */
-        const int32_t body = lane == 0 ? ends.body_a : lane == 1 ? ends.body_b : v.bodies;
-        if (body < v.bodies) inverse = inverse_of_body(v, body);
+    if (FAST && v.bodies.rigid && side_of_lane(v.contacts, lane) >= 0) { /* asked for early: it is from far away */
+        const int32_t body = lane == 0 ? ends.body_a : lane == 1 ? ends.body_b : v.model.bodies;
+        if (body < v.model.bodies) inverse = inverse_of_body(v.bodies, body);
     }
-    for (int32_t k = lane; k < count; k += v.lanes) {
-        const size_t slot = point_slot(v, p, k);
-        vec3 impulse = v.warm_start ? v3_load(points[k].impulse) : v3(0, 0, 0);
-        if (v.contact_rows == 1) impulse = v3_scale(normal, v3_dot(normal, impulse)); /* the row there is */
-        const double error = sadmm_contact_e(&v.raw, &settings, pair, &points[k]);
+    for (int32_t k = lane; k < count; k += v.contacts.lanes) {
+        const size_t slot = point_slot(v.contacts, p, k);
+        vec3 impulse = v.model.warm_start ? v3_load(points[k].impulse) : v3(0, 0, 0);
+        if (v.model.contact_rows == 1) impulse = v3_scale(normal, v3_dot(normal, impulse)); /* the row there is */
+        const double error = sadmm_contact_e(&v.raw.system, &settings, pair, &points[k]);
         const real4 arm = pack(v3_load(a ? points[k].arm_a : points[k].arm_b), error);
         const solver_real lambda[3] = {(solver_real)impulse.x, (solver_real)impulse.y, (solver_real)impulse.z};
-        v.arm[slot] = arm;
-        for (int j = 0; j < 3; ++j) v.lambda[(size_t)j * v.lambda_stride + slot] = lambda[j];
-        if (FAST) add_point(v, ends, about, difference, arm, lambda, true, &sums);
+        v.contacts.arm[slot] = arm;
+        for (int j = 0; j < 3; ++j) v.contacts.lambda[(size_t)j * v.contacts.lambda_stride + slot] = lambda[j];
+        if (FAST) add_point(v.model, v.bodies, ends, about, difference, arm, lambda, true, &sums);
     }
-    if (FAST) store_sides(v, live, p, lane, count, ends, difference, true, inverse, &sums);
+    if (FAST)
+        store_sides(v.model, v.bodies, v.contacts, v.weights, live, p, lane, count, ends, difference, true, inverse,
+                    &sums);
 }
 
 /* ---- constraints given by Jacobian rows ------------------------------------------------------------------------ */
 
-static __device__ void store(const cuda_view &v, int32_t plane, int32_t k, double value)
+static __device__ void store(const row_view &rows, int32_t plane, int32_t k, double value)
 {
-    v.row_data[(size_t)plane * (size_t)v.row_stride + (size_t)k] = (solver_real)value;
+    rows.data[(size_t)plane * (size_t)rows.stride + (size_t)k] = (solver_real)value;
 }
 
 static __global__ void assemble_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     int32_t k = thread_index();
-    if (k >= live_rows(v)) return;
-    const struct sadmm_problem_block *block = &v.raw.blocks[k];
+    if (k >= live_rows(v.model, v.rows)) return;
+    const struct sadmm_problem_block *block = &v.raw.system.blocks[k];
     if ((int32_t)block->kind != args.count) return;
     bool a = block->body_a >= 0, b = block->body_b >= 0;
-    row_about about = {(int32_t)block->kind, block->rows, a ? block->body_a : v.bodies,
-                       b ? block->body_b : v.bodies, -1, -1, 0};
+    row_about about = {(int32_t)block->kind, block->rows, a ? block->body_a : v.model.bodies,
+                       b ? block->body_b : v.model.bodies, -1, -1, 0};
     for (int r = 0; r < 6; ++r) {
         bool used = r < block->rows, any = false;
         for (int j = 0; j < 6; ++j) {
             double ja = used && a ? block->jacobian_a[6 * r + j] : 0, jb = used && b ? block->jacobian_b[6 * r + j] : 0;
-            store(v, ROW_J_A + 6 * r + j, k, ja);
-            store(v, ROW_J_B + 6 * r + j, k, jb);
+            store(v.rows, ROW_J_A + 6 * r + j, k, ja);
+            store(v.rows, ROW_J_B + 6 * r + j, k, jb);
             any = any || ja != 0 || jb != 0;
         }
         bool active = used && (any || block->kind != SADMM_BLOCK_HARD);
         if (active) about.active |= 1 << r;
-        store(v, ROW_ERROR + r, k, used ? block->error[r] : 0);
-        store(v, ROW_STIFFNESS + r, k, used ? block->stiffness[r] : 0);
-        store(v, ROW_DAMPING + r, k, used ? block->damping[r] : 0);
-        store(v, ROW_LAMBDA + r, k, v.warm_start && active ? v.raw.block_lambda[6 * (size_t)k + (size_t)r] : 0);
+        store(v.rows, ROW_ERROR + r, k, used ? block->error[r] : 0);
+        store(v.rows, ROW_STIFFNESS + r, k, used ? block->stiffness[r] : 0);
+        store(v.rows, ROW_DAMPING + r, k, used ? block->damping[r] : 0);
+        store(v.rows, ROW_LAMBDA + r, k,
+              v.model.warm_start && active ? v.raw.system.block_lambda[6 * (size_t)k + (size_t)r] : 0);
     }
-    store(v, ROW_FRICTION, k, solver_friction(v, block->friction));
-    v.row_info[k] = about;
+    store(v.rows, ROW_FRICTION, k, solver_friction(v.model, block->friction));
+    v.rows.info[k] = about;
 }
 
 static sadmm_status assemble_rows(struct sadmm_context *c, enum sadmm_block_kind kind, struct sadmm_error *error)
 {
     cuda_args args = {};
     args.count = (int32_t)kind;
-    return CUDA(launch)(c, assemble_rows_kernel, "assemble_blocks", blocks_for(c->view.rows), &args, error);
+    return CUDA(launch)(c, assemble_rows_kernel, "assemble_blocks", blocks_for(c->view.rows.count), &args, error);
 }
 
 /* ---- entries --------------------------------------------------------------------------------------------------- */
@@ -207,10 +217,10 @@ extern "C" sadmm_status CUDA(assemble_contacts)(struct sadmm_context *c, struct 
 {
     cuda_args args = {};
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(launch_of)(c, c->fast ? assemble_contacts_kernel<true> : assemble_contacts_kernel<false>,
-                             "assemble_contacts",
-                             ((int64_t)c->view.pair_capacity * c->view.lanes + BODY_THREADS - 1) / BODY_THREADS,
-                             BODY_THREADS, &args, error));
+    CUDA_TRY(CUDA(launch_of)(
+        c, c->fast ? assemble_contacts_kernel<true> : assemble_contacts_kernel<false>, "assemble_contacts",
+        ((int64_t)c->view.contacts.pair_capacity * c->view.contacts.lanes + BODY_THREADS - 1) / BODY_THREADS,
+        BODY_THREADS, &args, error));
     return c->plan.blocks[SADMM_BLOCK_CONTACT] ? assemble_rows(c, SADMM_BLOCK_CONTACT, error) : SADMM_OK;
 }
 

@@ -1,7 +1,7 @@
 /* The method `fast`: what a pair adds to its bodies, a record for each side, so that what sums over a body's sides need
  * not look at points: J^T lambda for the momentum, sums over arms for C, load and response for the weight
- * (math/weight.h). Made by v.lanes threads a pair where contacts are assembled, and again where loads are taken again.
- * In double, from this precision's data. */
+ * (math/weight.h). Made by contacts.lanes threads a pair where contacts are assembled, and again where loads are taken
+ * again. In double, from this precision's data. */
 #ifndef SADMM_CUDA_ASSEMBLE_SIDE_SUMS_H
 #define SADMM_CUDA_ASSEMBLE_SIDE_SUMS_H
 
@@ -26,10 +26,10 @@ static_assert(PAIR_SUMS == ARM_END + 2, "numbers are taken one by one");
 
 /* sums[begin, end) added up over a pair's lanes, in all of them. Every lane of the warp comes here. */
 template <int BEGIN, int END>
-static __device__ __forceinline__ void sum_pair(const cuda_view &v, struct pair_sums *sums)
+static __device__ __forceinline__ void sum_pair(const contact_view &contacts, struct pair_sums *sums)
 {
     double *numbers = &sums->pushed;
-    for (int o = 1; o < v.lanes; o *= 2)
+    for (int o = 1; o < contacts.lanes; o *= 2)
 #pragma unroll
         for (int k = BEGIN; k < END; ++k) numbers[k] += __shfl_xor_sync((unsigned)ALL_LANES, numbers[k], o);
 }
@@ -38,16 +38,17 @@ static __device__ __forceinline__ void sum_pair(const cuda_view &v, struct pair_
 struct rigid_inverse {
     double linear, xx, yy, zz, xy, xz, yz;
 };
-static __device__ __forceinline__ rigid_inverse inverse_of_body(const cuda_view &v, int32_t body)
+static __device__ __forceinline__ rigid_inverse inverse_of_body(const body_view &bodies, int32_t body)
 {
-    const double *M = v.A_inverse + (size_t)body * PACKED;
+    const double *M = bodies.A_inverse + (size_t)body * PACKED;
     const rigid_inverse inverse = {M[0], M[9], M[14], M[20], M[13], M[18], M[19]};
     return inverse;
 }
 
-static __device__ __forceinline__ void add_point(const cuda_view &v, const pair_ends &ends, const real4 &normal,
-                                                 const real4 &difference, const real4 &arm, const solver_real lambda[3],
-                                                 bool first, struct pair_sums *sums)
+static __device__ __forceinline__ void add_point(const model_view &model, const body_view &bodies,
+                                                 const pair_ends &ends, const real4 &normal, const real4 &difference,
+                                                 const real4 &arm, const solver_real lambda[3], bool first,
+                                                 struct pair_sums *sums)
 {
     const double n[3] = {(double)normal.x, (double)normal.y, (double)normal.z},
                  r[3] = {(double)arm.x, (double)arm.y, (double)arm.z},
@@ -62,7 +63,7 @@ static __device__ __forceinline__ void add_point(const cuda_view &v, const pair_
     sums->pushed += sqrt(square);
     add_cross(r, impulse, 1, sums->torque);
     if (!first) return;
-    if (v.contact_rows == 3) {
+    if (model.contact_rows == 3) {
 #pragma unroll
         for (int j = 0; j < 3; ++j) {
             sums->r[j] += r[j];
@@ -75,9 +76,11 @@ static __device__ __forceinline__ void add_point(const cuda_view &v, const pair_
     }
     double row[6];
     normal_row(n, r, row);
-    if (ends.body_a < v.bodies) sums->row_response[0] += packed_form(v.A_inverse + (size_t)ends.body_a * PACKED, row);
+    if (ends.body_a < model.bodies)
+        sums->row_response[0] += packed_form(bodies.A_inverse + (size_t)ends.body_a * PACKED, row);
     normal_row(n, r_b, row);
-    if (ends.body_b < v.bodies) sums->row_response[1] += packed_form(v.A_inverse + (size_t)ends.body_b * PACKED, row);
+    if (ends.body_b < model.bodies)
+        sums->row_response[1] += packed_form(bodies.A_inverse + (size_t)ends.body_b * PACKED, row);
 }
 
 /* Sums with arms r + d, of a pair of `count` points. */
@@ -95,28 +98,29 @@ static __device__ __forceinline__ void shift_sums(struct pair_sums *sums, int32_
 }
 
 /* Of a side's body: <A^-1, sum J^T J> over points and rows. */
-static __device__ __forceinline__ double side_response(const cuda_view &v, int32_t side, int32_t body, int32_t count,
-                                                       const rigid_inverse &rigid, const struct pair_sums *sums)
+static __device__ __forceinline__ double side_response(const model_view &model, const body_view &bodies, int32_t side,
+                                                       int32_t body, int32_t count, const rigid_inverse &rigid,
+                                                       const struct pair_sums *sums)
 {
     const double *rr = sums->rr;
-    if (v.contact_rows == 1) return sums->row_response[side];
-    if (v.rigid)
+    if (model.contact_rows == 1) return sums->row_response[side];
+    if (bodies.rigid)
         return 3 * rigid.linear * count + rigid.xx * (rr[1] + rr[2]) + rigid.yy * (rr[0] + rr[2]) +
                rigid.zz * (rr[0] + rr[1]) - 2 * (rigid.xy * rr[3] + rigid.xz * rr[4] + rigid.yz * rr[5]);
     struct arm_sums arms = {(double)count, {sums->r[0], sums->r[1], sums->r[2]}, {}};
     double S[PACKED] = {};
     for (int j = 0; j < 6; ++j) arms.rr[j] = rr[j];
     add_arm_sums(S, &arms);
-    return packed_dot(v.A_inverse + (size_t)body * PACKED, S);
+    return packed_dot(bodies.A_inverse + (size_t)body * PACKED, S);
 }
 
 /* share: 1 / count. */
-static __device__ __forceinline__ void store_side(const cuda_view &v, int32_t p, int32_t side, int32_t count,
+static __device__ __forceinline__ void store_side(const weight_view &weights, int32_t p, int32_t side, int32_t count,
                                                   double share, bool first, const struct pair_sums *sums)
 {
     const double sign = side ? 1 : -1, *f = sums->force;
-    double *wrench = v.side_wrench + (size_t)(2 * p + side) * ROW;
-    solver_real *arms = v.side_arms + (size_t)(2 * p + side) * SIDE_NUMBERS;
+    double *wrench = weights.side_wrench + (size_t)(2 * p + side) * ROW;
+    solver_real *arms = weights.side_arms + (size_t)(2 * p + side) * SIDE_NUMBERS;
 #pragma unroll
     for (int j = 0; j < 3; ++j) {
         wrench[j] = sign * f[j];
@@ -134,37 +138,43 @@ static __device__ __forceinline__ void store_side(const cuda_view &v, int32_t p,
 }
 
 /* Which side's record a lane makes: the first lane side a, the second side b; a single lane both, -1 here. */
-static __device__ __forceinline__ int32_t side_of_lane(const cuda_view &v, int32_t lane) { return v.lanes == 1 ? -1 : lane; }
+static __device__ __forceinline__ int32_t side_of_lane(const contact_view &contacts, int32_t lane)
+{
+    return contacts.lanes == 1 ? -1 : lane;
+}
 
 /* The records of a pair from its lanes' sums. `first`: also what depends on arms alone. `inverse`: of the body at the lane's
  * side. Every lane of the warp comes here. */
-static __device__ __forceinline__ void store_sides(const cuda_view &v, bool live, int32_t p, int32_t lane,
-                                                   int32_t count, const pair_ends &ends, const real4 &difference,
-                                                   bool first, const rigid_inverse &inverse, struct pair_sums *sums)
+static __device__ __forceinline__ void store_sides(const model_view &model, const body_view &bodies,
+                                                   const contact_view &contacts, const weight_view &weights, bool live,
+                                                   int32_t p, int32_t lane, int32_t count, const pair_ends &ends,
+                                                   const real4 &difference, bool first, const rigid_inverse &inverse,
+                                                   struct pair_sums *sums)
 {
     const double d[3] = {(double)difference.x, (double)difference.y, (double)difference.z}, share = 1 / (double)count;
-    const int32_t own = side_of_lane(v, lane);
+    const int32_t own = side_of_lane(contacts, lane);
     double response = 0;
-    sum_pair<0, LOAD_SUMS>(v, sums);
-    if (first && v.contact_rows == 3) sum_pair<LOAD_SUMS, ARM_END>(v, sums);
-    if (first && v.contact_rows == 1) sum_pair<ARM_END, PAIR_SUMS>(v, sums);
+    sum_pair<0, LOAD_SUMS>(contacts, sums);
+    if (first && model.contact_rows == 3) sum_pair<LOAD_SUMS, ARM_END>(contacts, sums);
+    if (first && model.contact_rows == 1) sum_pair<ARM_END, PAIR_SUMS>(contacts, sums);
 #pragma unroll
     for (int32_t side = 0; side < 2; ++side) {
         const int32_t body = side ? ends.body_b : ends.body_a;
         if (side) shift_sums(sums, count, d);
-        if (!live || body >= v.bodies || (own >= 0 && own != side)) continue;
-        store_side(v, p, side, count, share, first, sums);
+        if (!live || body >= model.bodies || (own >= 0 && own != side)) continue;
+        store_side(weights, p, side, count, share, first, sums);
         if (!first) continue;
-        response += side_response(v, side, body, count, own < 0 && v.rigid ? inverse_of_body(v, body) : inverse, sums);
+        response += side_response(model, bodies, side, body, count,
+                                  own < 0 && bodies.rigid ? inverse_of_body(bodies, body) : inverse, sums);
     }
     if (!first) return;
-    if (v.lanes > 1) response += __shfl_xor_sync((unsigned)ALL_LANES, response, 1);
+    if (contacts.lanes > 1) response += __shfl_xor_sync((unsigned)ALL_LANES, response, 1);
     if (!live || lane > 1) return;
-    response *= v.contact_rows == 3 ? share * (1.0 / 3) : share;
+    response *= model.contact_rows == 3 ? share * (1.0 / 3) : share;
     for (int32_t side = 0; side < 2; ++side)
         if (own < 0 || own == side)
-            v.side_arms[(size_t)(2 * p + side) * SIDE_NUMBERS + SIDE_RESPONSE] = (solver_real)response;
-    if (lane == 0) v.response[p] = response;
+            weights.side_arms[(size_t)(2 * p + side) * SIDE_NUMBERS + SIDE_RESPONSE] = (solver_real)response;
+    if (lane == 0) weights.response[p] = response;
 }
 
 #endif

@@ -23,17 +23,17 @@ struct body_thread {
     int32_t begin, end; /* places of its sides */
 };
 
-static __device__ __forceinline__ body_thread body_of_slot(const cuda_view &v, int32_t slot, bool live)
+static __device__ __forceinline__ body_thread body_of_slot(const graph_view &graph, int32_t slot, bool live)
 {
-    const body_thread out = {slot, (int32_t)threadIdx.x % LANES, live, live ? (size_t)v.body_of[slot] : 0,
-                             live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0};
+    const body_thread out = {slot, (int32_t)threadIdx.x % LANES, live, live ? (size_t)graph.body_of[slot] : 0,
+                             live ? graph.offsets[slot] : 0, live ? graph.offsets[slot + 1] : 0};
     return out;
 }
 
-static __device__ __forceinline__ body_thread body_of_thread(const cuda_view &v)
+static __device__ __forceinline__ body_thread body_of_thread(const model_view &model, const graph_view &graph)
 {
     const int32_t t = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x), slot = t / LANES;
-    return body_of_slot(v, slot, slot < live_bodies(v));
+    return body_of_slot(graph, slot, slot < live_bodies(model));
 }
 
 /* What a body's lane r < 6 has of it: rows r of A and A^-1, components r of v and b; 0 in the others. RIGID: of the rows what is
@@ -42,12 +42,13 @@ template <bool RIGID> struct wide_row {
     double a[RIGID ? 3 : 6], a_inverse[RIGID ? 3 : 6], velocity, b;
 };
 
-template <bool RIGID> static __device__ __forceinline__ wide_row<RIGID> row_of_body(const cuda_view &v, const body_thread &t)
+template <bool RIGID>
+static __device__ __forceinline__ wide_row<RIGID> row_of_body(const body_view &bodies, const body_thread &t)
 {
     wide_row<RIGID> row = {};
     if (!t.live || t.lane >= 6) return row;
-    const solver_real *line = v.lines + t.body * (size_t)v.line;
-    const double *inverse = v.A_inverse + t.body * PACKED;
+    const solver_real *line = bodies.lines + t.body * (size_t)bodies.line;
+    const double *inverse = bodies.A_inverse + t.body * PACKED;
     if (RIGID) {
         const int32_t r = t.lane % 3;
 #pragma unroll
@@ -61,12 +62,12 @@ template <bool RIGID> static __device__ __forceinline__ wide_row<RIGID> row_of_b
     } else {
 #pragma unroll
         for (int k = 0; k < (RIGID ? 3 : 6); ++k) {
-            row.a[k] = (double)line_a(line, v.rigid, t.lane, k);
+            row.a[k] = (double)line_a(line, bodies.rigid, t.lane, k);
             row.a_inverse[k] = inverse[packed_place(t.lane, k)];
         }
     }
-    row.velocity = (double)v.state[t.body * ROW + (size_t)t.lane];
-    row.b = (double)v.b[t.body * ROW + (size_t)t.lane];
+    row.velocity = (double)bodies.state[t.body * ROW + (size_t)t.lane];
+    row.b = (double)bodies.b[t.body * ROW + (size_t)t.lane];
     return row;
 }
 
@@ -80,9 +81,9 @@ static __device__ __forceinline__ double own_number(const double *x, int32_t lan
     return own;
 }
 
-static __device__ __forceinline__ double row_number(const cuda_view &v, int32_t plane, int32_t k)
+static __device__ __forceinline__ double row_number(const row_view &rows, int32_t plane, int32_t k)
 {
-    return (double)v.row_data[(size_t)plane * (size_t)v.row_stride + (size_t)k];
+    return (double)rows.data[(size_t)plane * (size_t)rows.stride + (size_t)k];
 }
 
 #endif

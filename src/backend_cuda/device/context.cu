@@ -106,9 +106,12 @@ sadmm_status CUDA(clear)(struct sadmm_context *c, enum cuda_scalar scalar, struc
         return SADMM_OK;
     }
     if (scalar == SCALAR_BARRIER) {
-        CUDA_CALL(c, cudaMemsetAsync(v->barrier, 0, sizeof *v->barrier, c->stream), "cudaMemsetAsync(barrier)");
+        CUDA_CALL(c, cudaMemsetAsync(v->iteration.barrier, 0, sizeof *v->iteration.barrier, c->stream),
+                  "cudaMemsetAsync(barrier)");
     } else {
-        CUDA_CALL(c, cudaMemsetAsync(v->residual + (scalar == SCALAR_DUAL), 0, sizeof *v->residual, c->stream),
+        CUDA_CALL(c,
+                  cudaMemsetAsync(v->iteration.residual + (scalar == SCALAR_DUAL), 0, sizeof *v->iteration.residual,
+                                  c->stream),
                   "cudaMemsetAsync(residual)");
     }
     return SADMM_OK;
@@ -137,8 +140,8 @@ void CUDA(plan_settings)(struct sadmm_context *c, const struct sadmm_settings *s
 {
     c->settings = *settings;
     c->fast = settings->method == SADMM_METHOD_FAST;
-    c->view.fast = c->fast;
-    c->view.wrenches = settings->recover_wrenches;
+    c->view.model.fast = c->fast;
+    c->view.model.wrenches = settings->recover_wrenches;
 }
 
 sadmm_status CUDA(use_settings)(struct sadmm_context *c, const struct sadmm_settings *settings, struct sadmm_error *error)
@@ -148,7 +151,7 @@ sadmm_status CUDA(use_settings)(struct sadmm_context *c, const struct sadmm_sett
     CUDA_TRY(CUDA(reserve)(c, BUFFER_SETTINGS, sizeof kept, error));
     CUDA_TRY(CUDA(reserve)(c, PINNED_SETTINGS, sizeof kept, error));
     CUDA(plan_settings)(c, settings);
-    c->view.settings = &((const struct cuda_settings *)c->buffers[BUFFER_SETTINGS].data)->settings;
+    c->view.model.settings = &((const struct cuda_settings *)c->buffers[BUFFER_SETTINGS].data)->settings;
     sadmm_settings_numbers(settings, numbers);
     if (memcmp(c->numbers, numbers, sizeof numbers) == 0) return SADMM_OK;
     CUDA_TRY(CUDA(upload)(c, c->buffers[BUFFER_SETTINGS].data, PINNED_SETTINGS, 0, &kept, sizeof kept, error));

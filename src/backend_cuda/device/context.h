@@ -47,7 +47,7 @@ struct sadmm_context {
     bool placed;   /* pairs and row blocks know the places of their sides */
     bool backward; /* the next sweeps go over bodies and constraints from the last one to the first */
     bool measured; /* records and change are apart: the next Step 1 uses records + ratio change */
-    bool rescaled; /* ... by view.ratio; else it is 1 */
+    bool rescaled; /* ... by view.iteration.ratio; else it is 1 */
     bool fast;     /* the method */
     bool settled;  /* fast: Step 1 ran in this solve */
     int refreshes; /* fast: of the weights, in this solve */
@@ -101,7 +101,7 @@ sadmm_status CUDA(clear)(struct sadmm_context *, enum cuda_scalar scalar, struct
 /* Through pinned memory, asynchronously; the pinned buffer is free again once the stream is idle. */
 sadmm_status CUDA(upload)(struct sadmm_context *, void *to, enum cuda_buffer_name staging, size_t at, const void *from,
                           size_t bytes, struct sadmm_error *error);
-/* The first `bytes` of view.out into PINNED_OUT, and wait. */
+/* The first `bytes` of view.raw.out into PINNED_OUT, and wait. */
 sadmm_status CUDA(download)(struct sadmm_context *, const void *from, size_t bytes, struct sadmm_error *error);
 sadmm_status CUDA(wait)(struct sadmm_context *, struct sadmm_error *error);
 /* The settings that are no numbers: from the next launch, or recording, on. */
@@ -149,19 +149,19 @@ sadmm_status CUDA(enqueue_weighted_penalties)(struct sadmm_context *, bool first
 sadmm_status CUDA(enqueue_weights)(struct sadmm_context *, bool factor, struct sadmm_error *error);
 /* fast: the bodies' momentum residuals, recomputed. */
 sadmm_status CUDA(enqueue_momentum_residuals)(struct sadmm_context *, struct sadmm_error *error);
-/* fast: (17), as a maximum with what view.residual[1] is. */
+/* fast: (17), as a maximum with what view.iteration.residual[1] is. */
 sadmm_status CUDA(enqueue_momentum_residual)(struct sadmm_context *, struct sadmm_error *error);
-/* fast: by what islands are to be slowed down (iterate/slow.h), and how many, in *view.limited. `suspected`: the iterations
- * have looked whether any is. */
+/* fast: by what islands are to be slowed down (iterate/slow.h), and how many, in *view.islands.limited. `suspected`:
+ * the iterations have looked whether any is. */
 sadmm_status CUDA(enqueue_limit)(struct sadmm_context *, bool suspected, struct sadmm_error *error);
 /* fast: a convergence check after `done` iterations of a step. */
 sadmm_status CUDA(enqueue_convergence_check)(struct sadmm_context *, int done, struct sadmm_error *error);
 /* Iterations, as the entry; limit: what is wanted for the limit of energies after the last. */
 sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *, int count, bool measure, enum cuda_limit limit,
                                       struct sadmm_error *error);
-/* (16) and (17) of the iteration that was measured, into view.residual. */
+/* (16) and (17) of the iteration that was measured, into view.iteration.residual. */
 sadmm_status CUDA(enqueue_residuals)(struct sadmm_context *, struct sadmm_error *error);
-/* (15) by view.residual. */
+/* (15) by view.iteration.residual. */
 sadmm_status CUDA(enqueue_balance)(struct sadmm_context *, struct sadmm_error *error);
 
 /* ---- step/step.cu, step/kernels.cu ---- */
@@ -176,7 +176,7 @@ sadmm_status CUDA(launch_commit)(struct sadmm_context *, struct sadmm_error *err
 
 /* ---- graph/layout.cu -------------------------------------------------------------------------------------------------
  * Counts and rooms in the view, then reserve_layout (it allocates); then per step, by enqueueing only: statistics and
- * layout of what view.raw_pairs, raw_points and raw.blocks point to. */
+ * layout of what view.raw points to. */
 
 sadmm_status CUDA(reserve_layout)(struct sadmm_context *, struct sadmm_error *error);
 /* The statistics; islands: also which bodies hang together (what BLOCK and CLUSTER need). */

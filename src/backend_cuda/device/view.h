@@ -131,81 +131,120 @@ struct alignas(16) pair_ends {
                                For the stepwise kernels alone (streamed.cu) */
 };
 
-/* What kernels see. Pointers are device memory. Arrays over bodies are in raw order; offsets, parts and the states of
- * persistent thread blocks count bodies in slots (graph/layout.h). */
 /* What BUFFER_SETTINGS holds. */
 struct cuda_settings {
     struct sadmm_settings settings; /* numbers alone count */
     double gravity;                 /* size of it, m/s^2 */
 };
 
-struct cuda_view {
+/* ---- what kernels see --------------------------------------------------------------------------------------------
+ * A view a subject. Functions take those they read or write; kernels, and the few functions that need most of them, take
+ * all together (cuda_view). Pointers are device memory. Arrays over bodies are in raw order but where it says slots
+ * (graph/layout.h). */
+
+/* The step's size, and what is the same for all of it. */
+struct model_view {
     struct cuda_live *live;
     struct cuda_graph_statistics *statistics;
-    int32_t bodies;      /* exact, known to the host (state row `bodies` is the static world) */
-    int32_t pair_capacity;   /* multiple of 32. The number of pair p as a constraint is p, of row block k pair_capacity + k */
-    int32_t lanes;       /* threads a pair: 4, or 1 where no pair has more than one point */
-    int32_t rows;        /* row blocks: exact, known to the host */
-    int32_t points;      /* room */
-    int32_t row_stride;
+    const struct sadmm_settings *settings; /* its numbers alone (core/model/settings.h): they may be others at every step.
+                                              Fetched early, for a kernel waits for them as for other memory */
+    int32_t bodies;       /* exact, known to the host (state row `bodies` is the static world) */
+    int32_t points;       /* capacity */
     int32_t contact_rows; /* of C, B and the response: 1 where no contact has friction (the iteration has 3 in any case) */
     int32_t warm_start;
+    int32_t fast, wrenches; /* of the settings that are no numbers: the method; recover_wrenches */
+};
 
+/* Bodies in the solver's form. */
+struct body_view {
     solver_real *state; /* (bodies + 1) x ROW: v, w, 1/beta, 0; the last row is the static world, all 0 */
     solver_real *b;     /* bodies x ROW */
     solver_real *momentum_residual; /* fast: bodies x ROW: b - A v + J^T lambda */
     solver_real *lines; /* bodies x line: A and H (device/line.h) */
     int32_t line;
-    int32_t rigid;      /* how lines are packed */
-    int32_t point_slots; /* a pair has room for */
-    double *C;          /* bodies x PACKED */
-    double *beta;       /* bodies, kg */
+    int32_t rigid;       /* how lines are packed */
+    double *C;           /* bodies x PACKED */
+    double *beta;        /* bodies, kg */
+    double *A_inverse;   /* fast: bodies x PACKED */
+    double *free_energy; /* fast: bodies: of A^-1 b, J */
+};
 
-    real4 *normal;      /* pairs: n, mu */
-    real4 *difference;  /* pairs: x_a - x_b, number of points */
-    pair_ends *ends;    /* pairs */
-    real4 *arm;         /* points: r_a (r_b when a is static), e */
-    solver_real *lambda; /* points: a plane for each of x, y, z */
+/* The constraint graph as it is laid out (graph/layout.h). */
+struct graph_view {
+    const int32_t *offsets, *incident; /* slot -> places of its sides; place -> side, ascending for each body */
+    const int32_t *body_of, *slot_of;  /* slot -> raw body, raw body -> slot */
+    const int32_t *parts;              /* first body slot of each part, and the end */
+    const int32_t *label, *island_bodies; /* body -> its island's smallest body; at labels: bodies of the island */
+};
+
+/* Contact pairs and their points in the solver's form. */
+struct contact_view {
+    int32_t pair_capacity; /* multiple of 32. As a constraint pair p has number p, row block k pair_capacity + k */
+    int32_t lanes;         /* threads a pair: 4, or 1 where no pair has more than one point */
+    int32_t point_slots;   /* a pair has memory for */
+    real4 *normal;         /* pairs: n, mu */
+    real4 *difference;     /* pairs: x_a - x_b, number of points */
+    pair_ends *ends;       /* pairs */
+    solver_real *inv_s;    /* fast: pairs: B / number of dynamic bodies */
+    real4 *arm;            /* points: r_a (r_b when a is static), e */
+    solver_real *lambda;   /* points: a plane for each of x, y, z */
     size_t lambda_stride; /* from plane to plane */
+};
 
-    row_about *row_info;
-    solver_real *row_data; /* ROW_PLANES x row_stride */
+/* Row blocks in the solver's form. */
+struct row_view {
+    int32_t count, stride; /* exact, known to the host; rounded up */
+    row_about *info;
+    solver_real *data;     /* ROW_PLANES x stride */
+};
 
+/* fast: what weights are made of. */
+struct weight_view {
+    double *weight, *response; /* pairs: B as taken last, kg; mean of J A^-1 J^T over points and rows, 1/kg */
+    double *side_wrench;       /* sides of pairs x ROW (assemble/side_sums.h) */
+    solver_real *side_arms;    /* sides of pairs x SIDE_NUMBERS */
+};
+
+/* fast: islands, sums over them, their energies and the stop rule. */
+struct island_view {
+    cuda_island *info;            /* bodies, used at labels */
+    double *terms;                /* slots x TERMS: of bodies, then added up in place (weight/island_sums.h) */
+    unsigned long long *arrivals; /* slots: of terms at places they are added up at; 0 between kernels */
+    int32_t *limited;             /* islands slowed down */
+    int32_t *suspects;            /* not 0: some island may have to be */
+    cuda_stop *stop;
+};
+
+/* What passes from sweep to sweep, and what was measured of them. */
+struct iteration_view {
     /* sides x ROW: a force, 0, torque, 0. After a measured iteration `records` holds J^T lambda and `change`
      * J^T (lambda - lambda_prev), else `records` holds J^T (2 lambda - lambda_prev). fast: J^T (lambda^ - lambda). */
     solver_real *records, *change;
+    solver_real *exchange;        /* GRID: velocities of even and of odd iterations, bodies x ROW each, in slots */
+    unsigned *barrier;            /* arrivals at the grid barrier since launch */
+    unsigned long long *residual; /* primal, dual: bit patterns of doubles >= 0, which order like the numbers */
+    double *ratio;                /* of (15), the last time */
+};
 
-    const int32_t *offsets, *incident; /* body -> places of its sides; place -> side, ascending for each body */
-    const int32_t *body_of, *slot_of;  /* slot -> raw body, raw body -> slot */
-    const int32_t *parts;              /* first body slot of each part, and the end */
-    solver_real *exchange;             /* GRID: velocities of even and of odd iterations, bodies x ROW each */
-    unsigned *barrier;                 /* arrivals at the grid barrier since launch */
-    unsigned long long *residual;      /* primal, dual: bit patterns of doubles >= 0, which order like the numbers */
-    double *ratio;                     /* of (15), the last time */
+/* Core's own data, in double and in its order: where a step begins, and results. */
+struct raw_view {
+    struct sadmm_system system; /* rigid, A, b, velocity, blocks, block_lambda */
+    const struct sadmm_contact_pair *pairs;
+    const struct sadmm_contact_point *points;
+    double *out; /* results */
+};
 
-    struct sadmm_system raw;           /* rigid, A, b, velocity, blocks, block_lambda */
-    const struct sadmm_contact_pair *raw_pairs;
-    const struct sadmm_contact_point *raw_points;
-    const struct sadmm_settings *settings; /* its numbers alone (core/model/settings.h): they may be others at every step.
-                                              Fetched early, for a kernel waits for them as for other memory */
-    int32_t fast, wrenches; /* of the rest of the settings: the method; recover_wrenches */
-    double *out; /* results in raw order */
+struct cuda_view {
+    struct model_view model;
+    struct body_view bodies;
+    struct graph_view graph;
+    struct contact_view contacts;
+    struct row_view rows;
+    struct weight_view weights;
+    struct island_view islands;
+    struct iteration_view iteration;
+    struct raw_view raw;
     struct cuda_step_view step; /* whole steps alone */
-
-    /* fast */
-    const int32_t *label, *island_bodies; /* of the layout */
-    double *A_inverse;       /* bodies x PACKED */
-    double *free_energy;     /* bodies: of A^-1 b, J */
-    double *terms;           /* slots x TERMS: of bodies, then added up in place (weight/island_sums.h) */
-    unsigned long long *arrivals; /* slots: of terms at places they are added up at; 0 between kernels */
-    cuda_island *islands;    /* bodies, used at labels */
-    double *weight, *response; /* pairs: B as taken last, kg; mean of J A^-1 J^T over points and rows, 1/kg */
-    double *side_wrench;     /* sides of pairs x ROW (assemble/side_sums.h) */
-    solver_real *side_arms;  /* sides of pairs x SIDE_NUMBERS */
-    solver_real *inv_s;      /* pairs: B / number of dynamic bodies */
-    int32_t *limited;        /* islands slowed down */
-    int32_t *suspects;       /* not 0: some island may have to be */
-    cuda_stop *stop;
 };
 
 /* Kernels that are launched early (launch_early): until all that was enqueued before has ended. First of all, but for what is
@@ -228,14 +267,15 @@ static __device__ __forceinline__ void let_next_begin(void)
 }
 
 /* Where the data of point k of pair p is. */
-template <int LANES_A_PAIR> static __device__ __forceinline__ size_t point_slot(const cuda_view &v, int32_t p, int32_t k)
+template <int LANES_A_PAIR>
+static __device__ __forceinline__ size_t point_slot(const contact_view &contacts, int32_t p, int32_t k)
 {
-    return (size_t)(k / LANES_A_PAIR * LANES_A_PAIR) * (size_t)v.pair_capacity + (size_t)p * LANES_A_PAIR +
+    return (size_t)(k / LANES_A_PAIR * LANES_A_PAIR) * (size_t)contacts.pair_capacity + (size_t)p * LANES_A_PAIR +
            (size_t)(k % LANES_A_PAIR);
 }
-static __device__ __forceinline__ size_t point_slot(const cuda_view &v, int32_t p, int32_t k)
+static __device__ __forceinline__ size_t point_slot(const contact_view &contacts, int32_t p, int32_t k)
 {
-    return v.lanes == 1 ? point_slot<1>(v, p, k) : point_slot<4>(v, p, k);
+    return contacts.lanes == 1 ? point_slot<1>(contacts, p, k) : point_slot<4>(contacts, p, k);
 }
 
 /* Points of a pair that are fetched before the first of them is used: a thread that waits for memory point by point waits
@@ -243,14 +283,20 @@ static __device__ __forceinline__ size_t point_slot(const cuda_view &v, int32_t 
 enum { POINTS_AT_ONCE = 4 };
 
 /* This step's counts; 0 when it is aborted. Both are in one load. */
-static __device__ __forceinline__ int32_t live_pairs(const cuda_view &v)
+static __device__ __forceinline__ int32_t live_pairs(const model_view &model)
 {
-    const int4 live = *(const int4 *)v.live;
+    const int4 live = *(const int4 *)model.live;
     static_assert(sizeof(struct cuda_live) == sizeof(int4), "abort_code, bodies, pairs, points");
     return live.x ? 0 : live.z;
 }
-static __device__ __forceinline__ int32_t live_bodies(const cuda_view &v) { return v.live->abort_code ? 0 : v.bodies; }
-static __device__ __forceinline__ int32_t live_rows(const cuda_view &v) { return v.live->abort_code ? 0 : v.rows; }
+static __device__ __forceinline__ int32_t live_bodies(const model_view &model)
+{
+    return model.live->abort_code ? 0 : model.bodies;
+}
+static __device__ __forceinline__ int32_t live_rows(const model_view &model, const row_view &rows)
+{
+    return model.live->abort_code ? 0 : rows.count;
+}
 
 /* What an iterating kernel does about energies after its last iteration: it says whether an island may have too much, or it
  * sees to everything (BLOCK). */
@@ -264,7 +310,7 @@ struct cuda_args {
     int32_t start;      /* the first Step 1 takes J^T lambda^0, whatever the records are */
     int32_t most_bodies, cluster; /* of the partition */
     int32_t planned;    /* a whole step: compare with the plan */
-    int32_t rescaled;   /* ratio is view.ratio, else 1 */
+    int32_t rescaled;   /* ratio is iteration.ratio, else 1 */
     int32_t backward;   /* thread blocks in descending order */
     int32_t in_order;   /* slots are raw indices */
     int32_t settled;    /* fast: Step 1 ran before in this solve */

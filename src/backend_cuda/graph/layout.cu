@@ -27,7 +27,7 @@ static sadmm_status make_capacity(struct sadmm_context *c, const wanted_capacity
 /* Clusters of a block or more for every island, and as many blocks as the device can hold at once. */
 static int64_t most_parts(const struct sadmm_context *c)
 {
-    return (int64_t)c->view.bodies + (int64_t)c->multiprocessors * (2048 / WARP);
+    return (int64_t)c->view.model.bodies + (int64_t)c->multiprocessors * (2048 / WARP);
 }
 
 /* The arrays in one buffer, in order; returns their bytes. base NULL: only that. */
@@ -76,13 +76,13 @@ sadmm_status CUDA(reserve_layout)(struct sadmm_context *c, struct sadmm_error *e
 {
     cuda_view *v = &c->view;
     struct layout_view *l = &c->layout;
-    size_t sides = 2 * ((size_t)v->pair_capacity + (size_t)v->rows), temp = 0;
-    l->bodies = v->bodies;
-    l->pair_capacity = v->pair_capacity;
-    l->rows = v->rows;
-    l->warm_start = v->warm_start;
+    size_t sides = 2 * ((size_t)v->contacts.pair_capacity + (size_t)v->rows.count), temp = 0;
+    l->bodies = v->model.bodies;
+    l->pair_capacity = v->contacts.pair_capacity;
+    l->rows = v->rows.count;
+    l->warm_start = v->model.warm_start;
     l->most_blocks = c->multiprocessors * (2048 / LAYOUT_THREADS);
-    CUDA_CALL(c, LAYOUT(temp_bytes)(v->bodies, (int32_t)sides, &temp), "sizing of the layout's sorts");
+    CUDA_CALL(c, LAYOUT(temp_bytes)(v->model.bodies, (int32_t)sides, &temp), "sizing of the layout's sorts");
     const wanted_capacity wanted[] = {
         {BUFFER_LIVE, sizeof(known)},
         {PINNED_LIVE, sizeof(known)},
@@ -90,32 +90,32 @@ sadmm_status CUDA(reserve_layout)(struct sadmm_context *c, struct sadmm_error *e
         {BUFFER_SORT, temp},
     };
     CUDA_TRY(make_capacity(c, wanted, error));
-    CUDA_TRY(number(c, sides > (size_t)v->bodies ? sides : (size_t)v->bodies, error));
+    CUDA_TRY(number(c, sides > (size_t)v->model.bodies ? sides : (size_t)v->model.bodies, error));
     place_arrays(c, (int32_t *)c->buffers[BUFFER_LAYOUT].data, l);
     CUDA_CALL(c, cudaMemsetAsync(l->kept, 0, sizeof *l->kept, c->stream), "cudaMemsetAsync(layout)");
     CUDA_CALL(c, cudaMemsetAsync(c->buffers[BUFFER_LIVE].data, 0, sizeof(known), c->stream), "cudaMemsetAsync(live)");
     l->numbers = (const int32_t *)c->buffers[BUFFER_NUMBERS].data;
     l->temp = c->buffers[BUFFER_SORT].data;
     l->temp_bytes = c->buffers[BUFFER_SORT].capacity;
-    c->one_block = LAYOUT(one_block_shared)(v->bodies, (int32_t)sides) <= (size_t)c->shared_limit;
-    v->live = l->live = &((known *)c->buffers[BUFFER_LIVE].data)->live;
-    v->statistics = l->statistics = &((known *)c->buffers[BUFFER_LIVE].data)->statistics;
-    v->label = l->label;
-    v->island_bodies = l->island_bodies;
-    v->body_of = l->body_of;
-    v->slot_of = l->slot_of;
-    v->offsets = l->offsets;
-    v->incident = l->incident;
-    v->parts = l->parts;
+    c->one_block = LAYOUT(one_block_shared)(v->model.bodies, (int32_t)sides) <= (size_t)c->shared_limit;
+    v->model.live = l->live = &((known *)c->buffers[BUFFER_LIVE].data)->live;
+    v->model.statistics = l->statistics = &((known *)c->buffers[BUFFER_LIVE].data)->statistics;
+    v->graph.label = l->label;
+    v->graph.island_bodies = l->island_bodies;
+    v->graph.body_of = l->body_of;
+    v->graph.slot_of = l->slot_of;
+    v->graph.offsets = l->offsets;
+    v->graph.incident = l->incident;
+    v->graph.parts = l->parts;
     return SADMM_OK;
 }
 
 /* Contacts may have been found on the device: the view says where they are. */
 static void bind_raw(struct sadmm_context *c)
 {
-    c->layout.pairs = c->view.raw_pairs;
-    c->layout.points = c->view.raw_points;
-    c->layout.blocks = c->view.raw.blocks;
+    c->layout.pairs = c->view.raw.pairs;
+    c->layout.points = c->view.raw.points;
+    c->layout.blocks = c->view.raw.system.blocks;
 }
 
 static sadmm_status check_partition(struct sadmm_context *c, const struct cuda_partition *partition,
@@ -170,11 +170,11 @@ sadmm_status CUDA(enqueue_statistics_and_layout)(struct sadmm_context *c, bool i
 static sadmm_status reserve_raw(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_view *v = &c->view;
-    size_t n = (size_t)v->bodies, rows = (size_t)v->rows;
+    size_t n = (size_t)v->model.bodies, rows = (size_t)v->rows.count;
     size_t body = c->plan.rigid ? sizeof(struct sadmm_rigid) : 42 * sizeof(double);
     size_t bodies = n * (body + 6 * sizeof(double)),
-           pairs = (size_t)v->pair_capacity * sizeof(struct sadmm_contact_pair);
-    size_t points = (size_t)v->points * sizeof(struct sadmm_contact_point);
+           pairs = (size_t)v->contacts.pair_capacity * sizeof(struct sadmm_contact_pair);
+    size_t points = (size_t)v->model.points * sizeof(struct sadmm_contact_point);
     size_t blocks = rows * (sizeof(struct sadmm_problem_block) + 6 * sizeof(double));
     const wanted_capacity wanted[] = {
         {BUFFER_RAW_BODIES, bodies}, {BUFFER_RAW_PAIRS, pairs}, {BUFFER_RAW_POINTS, points},
@@ -184,18 +184,18 @@ static sadmm_status reserve_raw(struct sadmm_context *c, struct sadmm_error *err
     CUDA_TRY(make_capacity(c, wanted, error));
     void *const none = nullptr;
     cuda_buffer *b = c->buffers;
-    v->raw = *c->system;
-    v->raw.contacts = nullptr;
+    v->raw.system = *c->system;
+    v->raw.system.contacts = nullptr;
     char *raw = (char *)b[BUFFER_RAW_BODIES].data;
-    v->raw.rigid = (const struct sadmm_rigid *)(c->plan.rigid ? raw : none);
-    v->raw.A = (const double *)(c->plan.rigid ? none : raw);
-    v->raw.b = c->plan.rigid ? nullptr : v->raw.A + 36 * n;
-    v->raw.velocity = (double *)(raw + n * body);
+    v->raw.system.rigid = (const struct sadmm_rigid *)(c->plan.rigid ? raw : none);
+    v->raw.system.A = (const double *)(c->plan.rigid ? none : raw);
+    v->raw.system.b = c->plan.rigid ? nullptr : v->raw.system.A + 36 * n;
+    v->raw.system.velocity = (double *)(raw + n * body);
     raw = (char *)b[BUFFER_RAW_BLOCKS].data;
-    v->raw.blocks = (const struct sadmm_problem_block *)raw;
-    v->raw.block_lambda = (double *)(raw + rows * sizeof(struct sadmm_problem_block));
-    v->raw_pairs = (struct sadmm_contact_pair *)b[BUFFER_RAW_PAIRS].data;
-    v->raw_points = (struct sadmm_contact_point *)b[BUFFER_RAW_POINTS].data;
+    v->raw.system.blocks = (const struct sadmm_problem_block *)raw;
+    v->raw.system.block_lambda = (double *)(raw + rows * sizeof(struct sadmm_problem_block));
+    v->raw.pairs = (struct sadmm_contact_pair *)b[BUFFER_RAW_PAIRS].data;
+    v->raw.points = (struct sadmm_contact_point *)b[BUFFER_RAW_POINTS].data;
     return SADMM_OK;
 }
 
@@ -203,24 +203,25 @@ static sadmm_status reserve_raw(struct sadmm_context *c, struct sadmm_error *err
 static sadmm_status reserve_weights(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_view *v = &c->view;
-    const size_t n = (size_t)v->bodies, pairs = (size_t)v->pair_capacity;
+    const size_t n = (size_t)v->model.bodies, pairs = (size_t)v->contacts.pair_capacity;
     CUDA_TRY(CUDA(reserve)(c, BUFFER_WEIGHTS,
                         (n * (PACKED + TERMS + 2) + 2 * pairs) * sizeof(double) + n * sizeof(cuda_island) +
                             pairs * sizeof(solver_real),
                         error));
     CUDA_TRY(CUDA(reserve)(c, BUFFER_SIDES, 2 * pairs * (ROW * sizeof(double) + SIDE_NUMBERS * sizeof(solver_real)),
                            error));
-    v->A_inverse = (double *)c->buffers[BUFFER_WEIGHTS].data;
-    v->free_energy = v->A_inverse + n * PACKED;
-    v->terms = v->free_energy + n;
-    v->arrivals = (unsigned long long *)(v->terms + n * TERMS);
-    v->weight = v->terms + n * (TERMS + 1);
-    v->response = v->weight + pairs;
-    v->islands = (cuda_island *)(v->response + pairs);
-    v->inv_s = (solver_real *)(v->islands + n);
-    v->side_wrench = (double *)c->buffers[BUFFER_SIDES].data;
-    v->side_arms = (solver_real *)(v->side_wrench + 2 * pairs * ROW);
-    CUDA_CALL(c, cudaMemsetAsync(v->arrivals, 0, n * sizeof *v->arrivals, c->stream), "cudaMemsetAsync(arrivals)");
+    v->bodies.A_inverse = (double *)c->buffers[BUFFER_WEIGHTS].data;
+    v->bodies.free_energy = v->bodies.A_inverse + n * PACKED;
+    v->islands.terms = v->bodies.free_energy + n;
+    v->islands.arrivals = (unsigned long long *)(v->islands.terms + n * TERMS);
+    v->weights.weight = v->islands.terms + n * (TERMS + 1);
+    v->weights.response = v->weights.weight + pairs;
+    v->islands.info = (cuda_island *)(v->weights.response + pairs);
+    v->contacts.inv_s = (solver_real *)(v->islands.info + n);
+    v->weights.side_wrench = (double *)c->buffers[BUFFER_SIDES].data;
+    v->weights.side_arms = (solver_real *)(v->weights.side_wrench + 2 * pairs * ROW);
+    CUDA_CALL(c, cudaMemsetAsync(v->islands.arrivals, 0, n * sizeof *v->islands.arrivals, c->stream),
+              "cudaMemsetAsync(arrivals)");
     return SADMM_OK;
 }
 
@@ -230,21 +231,22 @@ enum { SCALAR_BYTES = 128 };
 sadmm_status CUDA(reserve_solver)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_view *v = &c->view;
-    size_t n = (size_t)v->bodies, pairs = (size_t)v->pair_capacity, rows = (size_t)v->row_stride,
+    size_t n = (size_t)v->model.bodies, pairs = (size_t)v->contacts.pair_capacity, rows = (size_t)v->rows.stride,
            real_size = sizeof(solver_real);
-    v->lanes = c->statistics.point_slots <= 1 ? 1 : 4;
-    size_t lanes = (size_t)v->lanes, slots = ((size_t)c->statistics.point_slots + lanes - 1) / lanes * lanes * pairs;
-    size_t records = 2 * (pairs + (size_t)v->rows) * ROW * real_size;
-    size_t points = (size_t)v->points;
+    v->contacts.lanes = c->statistics.point_slots <= 1 ? 1 : 4;
+    size_t lanes = (size_t)v->contacts.lanes,
+           slots = ((size_t)c->statistics.point_slots + lanes - 1) / lanes * lanes * pairs;
+    size_t records = 2 * (pairs + (size_t)v->rows.count) * ROW * real_size;
+    size_t points = (size_t)v->model.points;
     bool joins = c->plan.residuals && !c->fast;
-    v->rigid = c->plan.rigid;
-    v->line = v->rigid ? LINE_RIGID : LINE_GENERAL;
-    v->point_slots = c->statistics.point_slots;
-    size_t out = (13 * n + 3 * points + 6 * (size_t)v->rows + 2) * sizeof(double);
+    v->bodies.rigid = c->plan.rigid;
+    v->bodies.line = v->bodies.rigid ? LINE_RIGID : LINE_GENERAL;
+    v->contacts.point_slots = c->statistics.point_slots;
+    size_t out = (13 * n + 3 * points + 6 * (size_t)v->rows.count + 2) * sizeof(double);
     const wanted_capacity wanted[] = {
         {BUFFER_STATE, (n + 1) * ROW * real_size},
         {BUFFER_B, (c->fast ? 2 : 1) * n * ROW * real_size},
-        {BUFFER_LINES, n * (size_t)v->line * real_size},
+        {BUFFER_LINES, n * (size_t)v->bodies.line * real_size},
         {BUFFER_C, n * PACKED * sizeof(double)},
         {BUFFER_BETA, n * sizeof(double)},
         {BUFFER_NORMAL, pairs * sizeof(real4)},
@@ -271,32 +273,33 @@ sadmm_status CUDA(reserve_solver)(struct sadmm_context *c, struct sadmm_error *e
                       "cudaMemsetAsync(points)");
     void *const none = nullptr;
     cuda_buffer *b = c->buffers;
-    v->state = (solver_real *)b[BUFFER_STATE].data;
-    v->b = (solver_real *)b[BUFFER_B].data;
-    v->momentum_residual = c->fast ? v->b + n * ROW : nullptr;
-    v->lines = (solver_real *)b[BUFFER_LINES].data;
-    v->C = (double *)b[BUFFER_C].data;
-    v->beta = (double *)b[BUFFER_BETA].data;
-    v->normal = (real4 *)b[BUFFER_NORMAL].data;
-    v->difference = (real4 *)b[BUFFER_DIFFERENCE].data;
-    v->ends = (pair_ends *)b[BUFFER_PAIR_ENDS].data;
-    v->arm = (real4 *)b[BUFFER_ARM].data;
-    v->lambda = (solver_real *)b[BUFFER_LAMBDA].data;
-    v->lambda_stride = slots;
-    v->row_info = (row_about *)b[BUFFER_ROW_INFO].data;
-    v->row_data = (solver_real *)b[BUFFER_ROW_DATA].data;
-    v->records = (solver_real *)b[BUFFER_RECORDS].data;
-    v->change = (solver_real *)(joins ? b[BUFFER_CHANGE].data : none);
-    v->exchange = (solver_real *)b[BUFFER_EXCHANGE].data;
-    v->residual = (unsigned long long *)b[BUFFER_SCALARS].data;
-    v->ratio = (double *)(v->residual + 2);
-    v->limited = (int32_t *)(v->residual + 3);
-    v->suspects = v->limited + 1;
-    v->barrier = (unsigned *)(v->residual + 4); /* a sector of its own */
-    v->stop = (cuda_stop *)(v->residual + 8);
-    v->out = (double *)b[BUFFER_OUT].data;
-    CUDA_CALL(c, cudaMemsetAsync(v->residual, 0, SCALAR_BYTES, c->stream), "cudaMemsetAsync(scalars)");
-    CUDA_CALL(c, cudaMemsetAsync(v->state + n * ROW, 0, ROW * real_size, c->stream), "cudaMemsetAsync(static world)");
+    v->bodies.state = (solver_real *)b[BUFFER_STATE].data;
+    v->bodies.b = (solver_real *)b[BUFFER_B].data;
+    v->bodies.momentum_residual = c->fast ? v->bodies.b + n * ROW : nullptr;
+    v->bodies.lines = (solver_real *)b[BUFFER_LINES].data;
+    v->bodies.C = (double *)b[BUFFER_C].data;
+    v->bodies.beta = (double *)b[BUFFER_BETA].data;
+    v->contacts.normal = (real4 *)b[BUFFER_NORMAL].data;
+    v->contacts.difference = (real4 *)b[BUFFER_DIFFERENCE].data;
+    v->contacts.ends = (pair_ends *)b[BUFFER_PAIR_ENDS].data;
+    v->contacts.arm = (real4 *)b[BUFFER_ARM].data;
+    v->contacts.lambda = (solver_real *)b[BUFFER_LAMBDA].data;
+    v->contacts.lambda_stride = slots;
+    v->rows.info = (row_about *)b[BUFFER_ROW_INFO].data;
+    v->rows.data = (solver_real *)b[BUFFER_ROW_DATA].data;
+    v->iteration.records = (solver_real *)b[BUFFER_RECORDS].data;
+    v->iteration.change = (solver_real *)(joins ? b[BUFFER_CHANGE].data : none);
+    v->iteration.exchange = (solver_real *)b[BUFFER_EXCHANGE].data;
+    v->iteration.residual = (unsigned long long *)b[BUFFER_SCALARS].data;
+    v->iteration.ratio = (double *)(v->iteration.residual + 2);
+    v->islands.limited = (int32_t *)(v->iteration.residual + 3);
+    v->islands.suspects = v->islands.limited + 1;
+    v->iteration.barrier = (unsigned *)(v->iteration.residual + 4); /* a sector of its own */
+    v->islands.stop = (cuda_stop *)(v->iteration.residual + 8);
+    v->raw.out = (double *)b[BUFFER_OUT].data;
+    CUDA_CALL(c, cudaMemsetAsync(v->iteration.residual, 0, SCALAR_BYTES, c->stream), "cudaMemsetAsync(scalars)");
+    CUDA_CALL(c, cudaMemsetAsync(v->bodies.state + n * ROW, 0, ROW * real_size, c->stream),
+              "cudaMemsetAsync(static world)");
     return c->fast ? reserve_weights(c, error) : SADMM_OK;
 }
 
@@ -306,19 +309,19 @@ sadmm_status CUDA(reserve_solver)(struct sadmm_context *c, struct sadmm_error *e
 static void count(struct sadmm_context *c)
 {
     cuda_view *v = &c->view;
-    v->bodies = c->plan.bodies;
-    v->pair_capacity = (c->plan.pairs + WARP - 1) / WARP * WARP;
-    v->points = c->plan.points;
-    v->rows = c->system->block_count;
-    v->row_stride = (v->rows + WARP - 1) / WARP * WARP;
-    v->contact_rows = c->plan.contact_rows;
-    v->warm_start = c->plan.warm_start;
+    v->model.bodies = c->plan.bodies;
+    v->contacts.pair_capacity = (c->plan.pairs + WARP - 1) / WARP * WARP;
+    v->model.points = c->plan.points;
+    v->rows.count = c->system->block_count;
+    v->rows.stride = (v->rows.count + WARP - 1) / WARP * WARP;
+    v->model.contact_rows = c->plan.contact_rows;
+    v->model.warm_start = c->plan.warm_start;
 }
 
 static sadmm_status upload_live(struct sadmm_context *c, enum cuda_abort abort_code, struct sadmm_error *error)
 {
     const struct cuda_live live = {abort_code, c->plan.bodies, c->plan.pairs, c->plan.points};
-    return CUDA(upload)(c, c->view.live, PINNED_LIVE, 0, &live, sizeof live, error);
+    return CUDA(upload)(c, c->view.model.live, PINNED_LIVE, 0, &live, sizeof live, error);
 }
 
 static sadmm_status upload_raw(struct sadmm_context *c, struct sadmm_error *error)
@@ -326,22 +329,23 @@ static sadmm_status upload_raw(struct sadmm_context *c, struct sadmm_error *erro
     const struct sadmm_system *system = c->system;
     const struct sadmm_contact_set *contacts = system->contacts;
     const cuda_view *v = &c->view;
-    size_t blocks = (size_t)v->rows * sizeof *system->blocks;
-    CUDA_TRY(CUDA(upload)(c, (void *)v->raw_pairs, PINNED_PAIRS, 0, contacts->pairs,
+    size_t blocks = (size_t)v->rows.count * sizeof *system->blocks;
+    CUDA_TRY(CUDA(upload)(c, (void *)v->raw.pairs, PINNED_PAIRS, 0, contacts->pairs,
                           contacts->pair_count * sizeof *contacts->pairs, error));
-    CUDA_TRY(CUDA(upload)(c, (void *)v->raw_points, PINNED_POINTS, 0, contacts->points,
+    CUDA_TRY(CUDA(upload)(c, (void *)v->raw.points, PINNED_POINTS, 0, contacts->points,
                           contacts->point_count * sizeof *contacts->points, error));
-    CUDA_TRY(CUDA(upload)(c, (void *)v->raw.blocks, PINNED_BLOCKS, 0, system->blocks, blocks, error));
-    return CUDA(upload)(c, v->raw.block_lambda, PINNED_BLOCKS, blocks, system->block_lambda,
-                        6 * (size_t)v->rows * sizeof(double), error);
+    CUDA_TRY(CUDA(upload)(c, (void *)v->raw.system.blocks, PINNED_BLOCKS, 0, system->blocks, blocks, error));
+    return CUDA(upload)(c, v->raw.system.block_lambda, PINNED_BLOCKS, blocks, system->block_lambda,
+                        6 * (size_t)v->rows.count * sizeof(double), error);
 }
 
 /* Wait for what the device knows now. */
 static sadmm_status download_known(struct sadmm_context *c, struct known *out, struct sadmm_error *error)
 {
-    CUDA_CALL(
-        c, cudaMemcpyAsync(c->buffers[PINNED_LIVE].data, c->view.live, sizeof *out, cudaMemcpyDeviceToHost, c->stream),
-        "cudaMemcpyAsync from the device");
+    CUDA_CALL(c,
+              cudaMemcpyAsync(c->buffers[PINNED_LIVE].data, c->view.model.live, sizeof *out, cudaMemcpyDeviceToHost,
+                              c->stream),
+              "cudaMemcpyAsync from the device");
     CUDA_TRY(CUDA(wait)(c, error));
     memcpy(out, c->buffers[PINNED_LIVE].data, sizeof *out);
     return SADMM_OK;
@@ -456,17 +460,17 @@ extern "C" sadmm_status CUDA(lay_out_again)(struct sadmm_context *c, const struc
     CUDA_TRY(download_known(c, &known, error));
     out->live = known.live;
     out->statistics = known.statistics;
-    size_t n = (size_t)v->bodies, sides = known.statistics.sides >= 0 ? (size_t)known.statistics.sides : 0,
+    size_t n = (size_t)v->model.bodies, sides = known.statistics.sides >= 0 ? (size_t)known.statistics.sides : 0,
            parts = partition->tier == SADMM_CUDA_TIER_STREAM ? 0 : (size_t)partition->parts + 1;
     const struct {
         int32_t *to;
         const int32_t *from;
         size_t count;
-    } arrays[] = {{out->body_of, v->body_of, n},
-                  {out->slot_of, v->slot_of, n},
-                  {out->offsets, v->offsets, n + 1},
-                  {out->incident, v->incident, sides},
-                  {out->parts, v->parts, parts}};
+    } arrays[] = {{out->body_of, v->graph.body_of, n},
+                  {out->slot_of, v->graph.slot_of, n},
+                  {out->offsets, v->graph.offsets, n + 1},
+                  {out->incident, v->graph.incident, sides},
+                  {out->parts, v->graph.parts, parts}};
     for (const auto &one : arrays) {
         CUDA_TRY(CUDA(reserve)(c, PINNED_OUT, one.count * sizeof(int32_t), error));
         CUDA_TRY(CUDA(download)(c, one.from, one.count * sizeof(int32_t), error));

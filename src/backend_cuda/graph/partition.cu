@@ -60,8 +60,8 @@ static int64_t threads_for(struct bound bound, int64_t most)
 static bool take_capacity(const struct sadmm_context *c, struct cuda_partition *partition, struct bound bound,
                           int64_t bytes)
 {
-    bool rows = c->view.rows > 0;
-    int64_t low = bound.bodies, high = larger(c->view.bodies, low);
+    bool rows = c->view.rows.count > 0;
+    int64_t low = bound.bodies, high = larger(c->view.model.bodies, low);
     partition->most_sides = partition->threads / QUAD;
     if (partition->threads == WARP && bound.bodies > WARP / LANES) return false;
     if ((int64_t)CUDA(persistent_shared)(partition->tier, partition->threads, (int32_t)low, rows) > bytes) return false;
@@ -82,9 +82,9 @@ static bool take_capacity(const struct sadmm_context *c, struct cuda_partition *
 static struct bound island_bound(const struct sadmm_context *c, const struct cuda_graph_statistics *statistics,
                                  int64_t shares)
 {
-    int64_t share = up((int64_t)statistics->sides + c->view.bodies, shares);
+    int64_t share = up((int64_t)statistics->sides + c->view.model.bodies, shares);
     struct bound bound = {smaller(statistics->sides, larger(share - 1, 0) + statistics->island_sides),
-                          smaller(c->view.bodies, larger(share - 1, 0) + statistics->island_bodies)};
+                          smaller(c->view.model.bodies, larger(share - 1, 0) + statistics->island_bodies)};
     return bound;
 }
 
@@ -92,9 +92,9 @@ static struct bound island_bound(const struct sadmm_context *c, const struct cud
 static struct bound body_bound(const struct sadmm_context *c, const struct cuda_graph_statistics *statistics,
                                int64_t shares)
 {
-    int64_t share = up((int64_t)statistics->sides + c->view.bodies, shares);
+    int64_t share = up((int64_t)statistics->sides + c->view.model.bodies, shares);
     struct bound bound = {smaller(statistics->sides, larger(share - 1, 0) + statistics->degree),
-                          smaller(c->view.bodies, share)};
+                          smaller(c->view.model.bodies, share)};
     return bound;
 }
 
@@ -110,7 +110,7 @@ static const char too_many[] = "more thread blocks than the layout has room for"
 /* No more than the layout has room for. */
 static int64_t most_parts(const struct sadmm_context *c)
 {
-    return c->view.bodies + (int64_t)c->multiprocessors * MOST_BLOCKS;
+    return c->view.model.bodies + (int64_t)c->multiprocessors * MOST_BLOCKS;
 }
 
 /* Islands in thread blocks. */
@@ -154,7 +154,7 @@ static struct choice choose_cluster_of(const struct sadmm_context *c, const stru
     static const char too_large[] = "an island does not fit a cluster of thread blocks";
     const char *name = nullptr;
     const int64_t most = CUDA(persistent_threads)(statistics->point_slots), most_sides = most / QUAD;
-    const int64_t cost = (int64_t)statistics->sides + c->view.bodies;
+    const int64_t cost = (int64_t)statistics->sides + c->view.model.bodies;
     /* As many clusters as find a multiprocessor for each of their blocks; when that is too few for the room a block has,
      * clusters that run one after another. */
     int64_t clusters = statistics->islands <= 1 ? 1 : larger(c->multiprocessors / size, 1);
@@ -210,7 +210,7 @@ static struct choice choose_grid(const struct sadmm_context *c, const struct cud
     const char *name = nullptr;
     if (c->refused >> SADMM_CUDA_TIER_GRID & 1) return no_choice(refused);
     const int64_t most = CUDA(persistent_threads)(statistics->point_slots),
-                  cost = (int64_t)statistics->sides + c->view.bodies;
+                  cost = (int64_t)statistics->sides + c->view.model.bodies;
     if (!c->cooperative) return no_choice("the device has no cooperative launch");
     int64_t parts = larger(smaller(c->multiprocessors, up(cost, SPREAD)), 1);
     struct choice choice = {};

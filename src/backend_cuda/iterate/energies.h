@@ -7,12 +7,12 @@
 #include "slow.h"
 
 /* Work of a pair's contacts that push apart. */
-static inline __device__ double work_of(const cuda_view &v, int32_t p)
+static inline __device__ double work_of(const contact_view &contacts, int32_t p)
 {
-    const pair_data pair = load_pair(v, p);
+    const pair_data pair = load_pair(contacts, p);
     double work = 0;
     for (int32_t k = 0; k < pair.count; ++k) {
-        const point_data point = load_point(v, p, k, pair);
+        const point_data point = load_point(contacts, p, k, pair);
         work += fmax(0.0, -point.error) * dot3(pair.normal, point.lambda);
     }
     return work;
@@ -26,16 +26,17 @@ static __device__ __forceinline__ double energies_of_body(const cuda_view &v, co
     enum { WORK = 6, PUSH, SUMS };
     double sums[SUMS] = {}, term[TERMS] = {};
     for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) {
-        const int32_t code = v.incident[at], p = code / 2;
-        add_side(v, code, sums, &sums[PUSH]);
-        if (p >= v.pair_capacity || (code & 1 && is_dynamic(v, v.ends[p].body_a))) continue; /* counted there */
-        sums[WORK] += work_of(v, p);
+        const int32_t code = v.graph.incident[at], p = code / 2;
+        add_side(v.contacts, v.rows, code, sums, &sums[PUSH]);
+        if (p >= v.contacts.pair_capacity || (code & 1 && is_dynamic(v.model, v.contacts.ends[p].body_a)))
+            continue; /* counted there */
+        sums[WORK] += work_of(v.contacts, p);
     }
     sum_lanes<SUMS>(sums);
-    const wide_row<RIGID> row = row_of_body<RIGID>(v, t);
+    const wide_row<RIGID> row = row_of_body<RIGID>(v.bodies, t);
     const double momentum = product(row.velocity, row.a), r = row.b + own_number(sums, t.lane) - momentum;
     term[0] = dot_lanes(row.velocity, momentum) / 2;
-    term[1] = t.live ? v.free_energy[t.body] : 0;
+    term[1] = t.live ? v.bodies.free_energy[t.body] : 0;
     term[2] = dot_lanes(r, product(r, row.a_inverse)) / 2;
     term[3] = sums[WORK];
     term[4] = dot_lanes(row.velocity, row.b) / 2;
@@ -43,15 +44,15 @@ static __device__ __forceinline__ double energies_of_body(const cuda_view &v, co
 }
 
 /* What follows from their sums over an island. One thread of it. */
-static __device__ __forceinline__ void limit_island(const cuda_view &v, cuda_island *island, const double sum[TERMS],
-                                                    bool under_iterated)
+static __device__ __forceinline__ void limit_island(const island_view &islands, cuda_island *island,
+                                                    const double sum[TERMS], bool under_iterated)
 {
     const struct limit_energies energies = {sum[0], sum[1], sum[2], sum[3]};
     const double allowed = limit_factor(&energies),
                  factor =
                      under_iterated ? fmin(allowed, limit_bounce_factor(&energies, sum[4], SOLVER_EPSILON)) : allowed;
     island->slow_down = factor;
-    if (factor != 1) atomicAdd(v.limited, 1);
+    if (factor != 1) atomicAdd(islands.limited, 1);
 }
 
 #endif

@@ -27,7 +27,7 @@ static sadmm_status persistent_iterations(struct sadmm_context *c, int count, bo
     args.most_bodies = partition->most_bodies;
     args.cluster = partition->cluster;
     cuda_kernel kernel = CUDA(persistent_kernel)(c->statistics.point_slots, partition->tier, partition->threads,
-                                               measure || c->view.rows > 0, c->fast, &name);
+                                                 measure || c->view.rows.count > 0, c->fast, &name);
     if (partition->tier == SADMM_CUDA_TIER_GRID) CUDA_TRY(CUDA(clear)(c, SCALAR_BARRIER, error));
     CUDA_TRY(CUDA(launch_partition)(c, kernel, name, partition, true, &args, error));
     c->starting = false;
@@ -72,16 +72,16 @@ static __global__ void dual_kernel(const __grid_constant__ cuda_view v, const __
 {
     int32_t i = (int32_t)(blockIdx.x * (unsigned)THREADS + threadIdx.x) / LANES, r = (int32_t)threadIdx.x % LANES;
     double dual = 0;
-    if (i < live_bodies(v) && r < 6) {
-        size_t body = (size_t)v.body_of[i];
-        const solver_real *line = v.lines + body * (size_t)v.line, *state = v.state + body * ROW;
-        real g = -v.b[body * ROW + (size_t)r];
-        for (int k = 0; k < 6; ++k) g += line_a(line, v.rigid, r, k) * state[k];
-        for (int32_t at = v.offsets[i]; at < v.offsets[i + 1]; ++at)
-            g -= v.records[(size_t)at * ROW + (size_t)record_slot(r)];
+    if (i < live_bodies(v.model) && r < 6) {
+        size_t body = (size_t)v.graph.body_of[i];
+        const solver_real *line = v.bodies.lines + body * (size_t)v.bodies.line, *state = v.bodies.state + body * ROW;
+        real g = -v.bodies.b[body * ROW + (size_t)r];
+        for (int k = 0; k < 6; ++k) g += line_a(line, v.bodies.rigid, r, k) * state[k];
+        for (int32_t at = v.graph.offsets[i]; at < v.graph.offsets[i + 1]; ++at)
+            g -= v.iteration.records[(size_t)at * ROW + (size_t)record_slot(r)];
         dual = fabs((double)g);
     }
-    reduce_max(dual, v.residual + 1);
+    reduce_max(dual, v.iteration.residual + 1);
 }
 
 sadmm_status CUDA(enqueue_residuals)(struct sadmm_context *c, struct sadmm_error *error)
@@ -89,7 +89,8 @@ sadmm_status CUDA(enqueue_residuals)(struct sadmm_context *c, struct sadmm_error
     cuda_args args = {};
     CUDA_TRY(CUDA(clear)(c, SCALAR_DUAL, error));
     if (c->fast) return CUDA(enqueue_momentum_residual)(c, error);
-    return CUDA(launch)(c, dual_kernel, "measure_residuals", blocks_for((int64_t)c->view.bodies * LANES), &args, error);
+    return CUDA(launch)(c, dual_kernel, "measure_residuals", blocks_for((int64_t)c->view.model.bodies * LANES), &args,
+                        error);
 }
 
 extern "C" sadmm_status CUDA(measure_residuals)(struct sadmm_context *c, struct sadmm_residual *residual,
@@ -98,7 +99,7 @@ extern "C" sadmm_status CUDA(measure_residuals)(struct sadmm_context *c, struct 
     double both[2];
     CUDA_ENTER(c);
     CUDA_TRY(CUDA(enqueue_residuals)(c, error));
-    CUDA_TRY(CUDA(download)(c, c->view.residual, sizeof both, error));
+    CUDA_TRY(CUDA(download)(c, c->view.iteration.residual, sizeof both, error));
     memcpy(both, c->buffers[PINNED_OUT].data, sizeof both);
     residual->primal = both[0];
     residual->dual = both[1];

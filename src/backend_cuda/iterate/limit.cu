@@ -14,39 +14,41 @@
 #include "core/math/relax.h"
 
 template <bool RIGID>
-static __device__ __forceinline__ bool suspect(const cuda_view &v, const body_thread &t, bool under_iterated)
+static __device__ __forceinline__ bool suspect(const body_view &bodies, const body_thread &t, bool under_iterated)
 {
-    const wide_row<RIGID> row = row_of_body<RIGID>(v, t);
+    const wide_row<RIGID> row = row_of_body<RIGID>(bodies, t);
     const bool speaks = t.live && t.lane == 0;
-    return suspect_body(under_iterated, speaks, speaks ? v.free_energy[t.body] : 0, row.velocity, row.b, row.a);
+    return suspect_body(under_iterated, speaks, speaks ? bodies.free_energy[t.body] : 0, row.velocity, row.b, row.a);
 }
 
 static __global__ void __launch_bounds__(BODY_THREADS)
     suspect_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     wait_for_stream();
-    const body_thread t = body_of_thread(v);
-    if (v.rigid ? suspect<true>(v, t, args.under_iterated) : suspect<false>(v, t, args.under_iterated)) *v.suspects = 1;
+    const body_thread t = body_of_thread(v.model, v.graph);
+    if (v.bodies.rigid ? suspect<true>(v.bodies, t, args.under_iterated)
+                       : suspect<false>(v.bodies, t, args.under_iterated))
+        *v.islands.suspects = 1;
 }
 
 static __global__ void __launch_bounds__(BODY_THREADS)
     limit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     wait_for_stream();
-    if (!*v.suspects) return;
-    const body_thread t = body_of_thread(v);
+    if (!*v.islands.suspects) return;
+    const body_thread t = body_of_thread(v.model, v.graph);
     double total[TERMS];
-    const double term = v.rigid ? energies_of_body<true>(v, t) : energies_of_body<false>(v, t);
-    if (add_up_island<add_terms>(v, t, term, total) && t.lane == 0)
-        limit_island(v, &v.islands[v.label[t.body]], total, args.under_iterated);
+    const double term = v.bodies.rigid ? energies_of_body<true>(v, t) : energies_of_body<false>(v, t);
+    if (add_up_island<add_terms>(v.graph, v.islands, t, term, total) && t.lane == 0)
+        limit_island(v.islands, &v.islands.info[v.graph.label[t.body]], total, args.under_iterated);
 }
 
 static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     const int32_t i = thread_index();
-    if (i >= live_bodies(v)) return;
-    const solver_real factor = slow_down(v, i);
-    solver_real *state = v.state + (size_t)i * ROW;
+    if (i >= live_bodies(v.model)) return;
+    const solver_real factor = slow_down(v.graph, v.islands, i);
+    solver_real *state = v.bodies.state + (size_t)i * ROW;
     for (int k = 0; factor != 1 && k < 6; ++k) state[k] *= factor;
 }
 
@@ -56,7 +58,7 @@ static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const ch
 {
     cuda_args args = {};
     args.under_iterated = limit_under_iterated(c->plan.warm, c->settings.iterations);
-    return CUDA(launch_early)(c, kernel, name, body_blocks(c->view.bodies), BODY_THREADS, &args, error);
+    return CUDA(launch_early)(c, kernel, name, body_blocks(c->view.model.bodies), BODY_THREADS, &args, error);
 }
 
 sadmm_status CUDA(enqueue_limit)(struct sadmm_context *c, bool suspected, struct sadmm_error *error)
@@ -72,8 +74,8 @@ extern "C" sadmm_status CUDA(limit_velocity)(struct sadmm_context *c, int32_t *l
     cuda_args args = {};
     CUDA_ENTER(c);
     CUDA_TRY(CUDA(enqueue_limit)(c, false, error));
-    CUDA_TRY(CUDA(launch)(c, slow_kernel, "limit_velocity", blocks_for(c->view.bodies), &args, error));
-    CUDA_TRY(CUDA(download)(c, c->view.limited, sizeof *limited, error));
+    CUDA_TRY(CUDA(launch)(c, slow_kernel, "limit_velocity", blocks_for(c->view.model.bodies), &args, error));
+    CUDA_TRY(CUDA(download)(c, c->view.islands.limited, sizeof *limited, error));
     memcpy(limited, c->buffers[PINNED_OUT].data, sizeof *limited);
     if (*limited > 0) c->exact_since = RELAX_RESIDUAL_PERIOD; /* residuals are recomputed, should anything follow */
     return SADMM_OK;

@@ -28,13 +28,15 @@
 /* The step is aborted; or a block without bodies, or a cluster: there are more than islands, mostly. In the grid
  * everybody comes to the barrier. Or the stop rule is met. */
 template <int MODE, bool FAST>
-static __device__ __forceinline__ bool nothing_to_do(const cuda_view &v, const cuda_args &args)
+static __device__ __forceinline__ bool nothing_to_do(const model_view &model, const graph_view &graph,
+                                                     const island_view &islands, const cuda_args &args)
 {
     const int32_t cluster = MODE == BLOCK ? 1 : args.cluster, part = (int32_t)blockIdx.x / cluster * cluster,
-                  first = v.parts[part], end = v.parts[part + cluster]; /* beside abort_code: neither load waits for the other */
-    if (v.live->abort_code || (FAST && MODE != BLOCK && all_stopped(v, args.checks))) return true;
+                  first = graph.parts[part], end = graph.parts[part + cluster];
+    /* Asked for beside them: neither load waits for the other. */
+    if (model.live->abort_code || (FAST && MODE != BLOCK && all_stopped(islands, args.checks))) return true;
     if (MODE == GRID) return false;
-    return first == end || (FAST && MODE == BLOCK && part_stopped(v, args.checks, first, end));
+    return first == end || (FAST && MODE == BLOCK && part_stopped(graph, islands, args.checks, first, end));
 }
 
 /* The method `fast` (math/relax.h): Steps 2-4, then Step 1. An iteration has the barriers of the other method's. */
@@ -43,8 +45,8 @@ static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view 
                                                     unsigned *target)
 {
     if (MODE != BLOCK) { /* others look at the velocities that were loaded */
-        arrive<MODE, SIZE>(v.barrier);
-        wait<MODE, SIZE>(v.barrier, *target += gridDim.x);
+        arrive<MODE, SIZE>(v.iteration.barrier);
+        wait<MODE, SIZE>(v.iteration.barrier, *target += gridDim.x);
     }
     int32_t count = args.count, batch = args.goes_on ? count + 1 : count, settled = args.settled;
     /* Were it the launch's constant, and not a choice, it would be fetched in every iteration. */
@@ -57,14 +59,14 @@ static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view 
              velocity_factor = relax_velocity(i, batch, settled) ? all : (real)1;
         keep<SIZE>(&relaxation_factor), keep<SIZE>(&velocity_factor);
         if (FULL && plain && args.measure)
-            reduce_max(part.template update_sides<true>(odd, relaxation_factor, true), v.residual);
+            reduce_max(part.template update_sides<true>(odd, relaxation_factor, true), v.iteration.residual);
         else part.template update_sides<false>(odd, relaxation_factor, plain);
         block_barrier<SIZE>();
         part.move_bodies_fast(!odd, velocity_factor, relaxation_factor);
         settled = 1;
-        arrive<MODE, SIZE>(v.barrier);
+        arrive<MODE, SIZE>(v.iteration.barrier);
         if (part.has_moves()) part.own_body.b = residual_after(part.own_body, part.sum, part.step, relaxation_factor);
-        wait<MODE, SIZE>(v.barrier, *target += gridDim.x);
+        wait<MODE, SIZE>(v.iteration.barrier, *target += gridDim.x);
     }
 }
 
@@ -75,18 +77,18 @@ static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view
     for (int32_t iteration = 1; iteration <= args.count; ++iteration) {
         const int32_t odd = iteration & 1;
         part.move_bodies(odd);
-        arrive<MODE, SIZE>(v.barrier);
+        arrive<MODE, SIZE>(v.iteration.barrier);
         if (part.has_moves()) part.momentum = free_momentum(part.own_body);
-        wait<MODE, SIZE>(v.barrier, *target += gridDim.x);
+        wait<MODE, SIZE>(v.iteration.barrier, *target += gridDim.x);
         if (FULL && args.measure && iteration == args.count)
-            reduce_max(part.template update_sides<true>(odd, 1, true), v.residual);
+            reduce_max(part.template update_sides<true>(odd, 1, true), v.iteration.residual);
         else part.template update_sides<false>(odd, 1, true);
         block_barrier<SIZE>();
     }
     /* Nobody looks into this block's memory once it is gone. */
     if (MODE == CLUSTER) {
-        arrive<MODE, SIZE>(v.barrier);
-        wait<MODE, SIZE>(v.barrier, 0);
+        arrive<MODE, SIZE>(v.iteration.barrier);
+        wait<MODE, SIZE>(v.iteration.barrier, 0);
     }
 }
 
@@ -100,8 +102,8 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     wait_for_stream();
     /* They take registers. */
     constexpr bool PROLOGUE = FAST && MODE == BLOCK && !FULL && SIZE != ANY_SIZE;
-    if (nothing_to_do<MODE, FAST>(v, args)) {
-        if (PROLOGUE && args.begin) stamp_assembled(v);
+    if (nothing_to_do<MODE, FAST>(v.model, v.graph, v.islands, args)) {
+        if (PROLOGUE && args.begin) stamp_assembled(v.step);
         return;
     }
     part_run<POINTS, MODE, FULL, SIZE, FAST> part(v, args, memory);
@@ -115,9 +117,9 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     if constexpr (PROLOGUE)
         if (begins) {
             weigh_in_block(v, args, ends, part.found, barrier);
-            stamp_assembled(v);
+            stamp_assembled(v.step);
         }
-    const real relaxation = FAST ? (real)v.settings->relaxation : (real)1; /* on its way with what is loaded */
+    const real relaxation = FAST ? (real)v.model.settings->relaxation : (real)1; /* on its way with what is loaded */
     part.load();
     unsigned target = 0;
     if (FAST) iterate_fast<MODE, FULL, SIZE>(part, v, args, relaxation, &target);
@@ -129,7 +131,7 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     if (!FAST || args.limit == LIMIT_NONE) return;
     const bool suspected = part.suspect(args.count & 1);
     if (!PROLOGUE || args.limit == LIMIT_SUSPECTS) {
-        if (suspected) *v.suspects = 1;
+        if (suspected) *v.islands.suspects = 1;
         return;
     }
     if constexpr (PROLOGUE) {

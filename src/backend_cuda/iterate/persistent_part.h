@@ -78,12 +78,12 @@ template <int POINTS, int MODE, bool FULL, int SIZE, bool FAST> struct part_run 
 
     __device__ __forceinline__ part_run(const cuda_view &view, const cuda_args &arguments, unsigned char *memory)
         : v(view), args(arguments), t((int32_t)threadIdx.x), r(t % LANES), lane(t % QUAD), side(t / QUAD),
-          first_body(v.parts[blockIdx.x]), bodies(v.parts[blockIdx.x + 1] - first_body),
-          first_side(v.offsets[first_body]), sides(v.offsets[first_body + bodies] - first_side),
-          found(body_of_slot(v, first_body + t / LANES, t / LANES < bodies)), body(t / LANES),
-          gathered(nullptr), gathered_count(0), many(false), moves(warp_has_body(0)), updates(warp_has_side()),
-          own_row(nullptr), own_state(nullptr), own_record(nullptr), own_body(), momentum(0), sum(0), step(0), own(),
-          side_code(side < sides ? v.incident[first_side + side] : 0), on(), about(), between(), point()
+          first_body(v.graph.parts[blockIdx.x]), bodies(v.graph.parts[blockIdx.x + 1] - first_body),
+          first_side(v.graph.offsets[first_body]), sides(v.graph.offsets[first_body + bodies] - first_side),
+          found(body_of_slot(v.graph, first_body + t / LANES, t / LANES < bodies)), body(t / LANES), gathered(nullptr),
+          gathered_count(0), many(false), moves(warp_has_body(0)), updates(warp_has_side()), own_row(nullptr),
+          own_state(nullptr), own_record(nullptr), own_body(), momentum(0), sum(0), step(0), own(),
+          side_code(side < sides ? v.graph.incident[first_side + side] : 0), on(), about(), between(), point()
     {
         lay_out(&m, memory, MODE == CLUSTER, (int)blockDim.x, args.most_bodies, has_rows());
     }
@@ -99,9 +99,9 @@ template <int POINTS, int MODE, bool FULL, int SIZE, bool FAST> struct part_run 
     /* Number i of the part's rows of ROW, in the bodies' raw order. */
     __device__ __forceinline__ size_t raw_row(int32_t i) const
     {
-        return (size_t)v.body_of[first_body + i / ROW] * ROW + (size_t)(i % ROW);
+        return (size_t)v.graph.body_of[first_body + i / ROW] * ROW + (size_t)(i % ROW);
     }
-    __device__ __forceinline__ bool has_rows(void) const { return FULL && v.rows > 0; }
+    __device__ __forceinline__ bool has_rows(void) const { return FULL && v.rows.count > 0; }
     /* Warps without work are left out of everything but barriers. */
     __device__ __forceinline__ bool warp_has_body(int32_t first) const
     {
@@ -113,7 +113,9 @@ template <int POINTS, int MODE, bool FULL, int SIZE, bool FAST> struct part_run 
     /* Where point k of the side's pair is, if there is memory for so many: their number is not waited for. */
     __device__ __forceinline__ size_t slot_or_first(int32_t k) const
     {
-        return k < v.lanes * ((v.point_slots + v.lanes - 1) / v.lanes) ? point_slot(v, side_code / 2, k) : 0;
+        return k < v.contacts.lanes * ((v.contacts.point_slots + v.contacts.lanes - 1) / v.contacts.lanes)
+                   ? point_slot(v.contacts, side_code / 2, k)
+                   : 0;
     }
     __device__ __forceinline__ void fetch_side(void);
     __device__ __forceinline__ void load_side(void);
@@ -140,22 +142,22 @@ template <int POINTS, int MODE, bool FULL, int SIZE, bool FAST> struct part_run 
 PART __device__ __forceinline__ void PART_RUN::find_other(int32_t other)
 {
     /* slots are by island in BLOCK and CLUSTER, raw order in GRID; by island everywhere in the method `fast` */
-    const int32_t slot = (MODE == GRID && !FAST) || other == v.bodies ? other : v.slot_of[other],
+    const int32_t slot = (MODE == GRID && !FAST) || other == v.model.bodies ? other : v.graph.slot_of[other],
                   local = slot - first_body;
     own.other_odd = 0;
-    if (other == v.bodies) { /* the static world */
+    if (other == v.model.bodies) { /* the static world */
         own.other = m.state + (MODE == CLUSTER ? 2 : 1) * args.most_bodies * ROW;
     } else if (MODE == BLOCK) {
         own.other = m.state + local * ROW;
     } else if (MODE == GRID) {
         bool inside = local >= 0 && local < bodies;
-        own.other = inside ? m.state + local * ROW : v.exchange + (size_t)slot * ROW;
-        own.other_odd = inside ? 0 : v.bodies * ROW;
+        own.other = inside ? m.state + local * ROW : v.iteration.exchange + (size_t)slot * ROW;
+        own.other_odd = inside ? 0 : v.model.bodies * ROW;
     } else {
         const int32_t first_part = (int32_t)blockIdx.x / args.cluster * args.cluster;
         int32_t rank = 0;
-        while (rank + 1 < args.cluster && slot >= v.parts[first_part + rank + 1]) ++rank;
-        own.other = in_block(m.state, (unsigned)rank) + (slot - v.parts[first_part + rank]) * ROW;
+        while (rank + 1 < args.cluster && slot >= v.graph.parts[first_part + rank + 1]) ++rank;
+        own.other = in_block(m.state, (unsigned)rank) + (slot - v.graph.parts[first_part + rank]) * ROW;
         own.other_odd = args.most_bodies * ROW;
     }
 }
@@ -164,39 +166,40 @@ PART __device__ __forceinline__ void PART_RUN::find_other(int32_t other)
 PART __device__ __forceinline__ void PART_RUN::fetch_side(void)
 {
     const int32_t p = side_code / 2;
-    if (side >= sides || (FULL && p >= v.pair_capacity)) return;
-    about = v.normal[p];
-    between = v.difference[p];
-    on = v.ends[p];
+    if (side >= sides || (FULL && p >= v.contacts.pair_capacity)) return;
+    about = v.contacts.normal[p];
+    between = v.contacts.difference[p];
+    on = v.contacts.ends[p];
 #pragma unroll
     for (int32_t j = 0; j < COUNT; ++j) {
         const size_t slot = slot_or_first(lane + QUAD * j);
-        point[j] = v.arm[slot];
-        own.lambda[j] = load_lambda(v, slot);
+        point[j] = v.contacts.arm[slot];
+        own.lambda[j] = load_lambda(v.contacts, slot);
     }
 }
 
 PART __device__ __forceinline__ void PART_RUN::load_side(void)
 {
     const int32_t side = side_code & 1, p = side_code / 2;
-    if (FULL && p >= v.pair_capacity) {
-        const row_about rows = v.row_info[p - v.pair_capacity];
-        own.own = v.slot_of[side ? rows.body_b : rows.body_a] - first_body;
+    if (FULL && p >= v.contacts.pair_capacity) {
+        const row_about rows = v.rows.info[p - v.contacts.pair_capacity];
+        own.own = v.graph.slot_of[side ? rows.body_b : rows.body_a] - first_body;
         find_other(side ? rows.body_a : rows.body_b);
         return;
     }
     own.pair = true;
     own.sign = side ? (real)1 : (real)-1;
-    own.own = v.slot_of[side ? on.body_b : on.body_a] - first_body;
+    own.own = v.graph.slot_of[side ? on.body_b : on.body_a] - first_body;
     find_other(side ? on.body_a : on.body_b);
     const real inv_s =
-        own.sign * (FAST ? v.inv_s[p] : inverse_weight(inv_beta_of(v, on.body_a), inv_beta_of(v, on.body_b)));
+        own.sign * (FAST ? v.contacts.inv_s[p]
+                         : inverse_weight(inv_beta_of(v.bodies, on.body_a), inv_beta_of(v.bodies, on.body_b)));
     own.normal = xyz(about);
     own.friction = about.w;
 #pragma unroll
     for (int32_t j = 0; j < COUNT; ++j) {
         const int32_t k = lane + QUAD * j;
-        const real error = FAST ? v.arm[slot_or_first(k)].w : point[j].w;
+        const real error = FAST ? v.contacts.arm[slot_or_first(k)].w : point[j].w;
         const bool there = k < (int32_t)between.w;
         const vec3 arm_a = xyz(point[j]), arm_b = v3_add(arm_a, xyz(between)), none = v3(0, 0, 0);
         own.own_arm[j] = there ? (side ? arm_b : arm_a) : none;
@@ -224,18 +227,20 @@ PART __device__ __forceinline__ void PART_RUN::start_records(void)
 /* What the last batch or the stepwise kernels left, joined after a measured iteration. */
 PART __device__ __forceinline__ void PART_RUN::load_records(void)
 {
-    const real ratio = args.rescaled ? (real)*v.ratio : (real)1;
+    const real ratio = args.rescaled ? (real)*v.iteration.ratio : (real)1;
     for (int32_t i = t; i < sides * ROW; i += (int32_t)blockDim.x) {
         const size_t from = (size_t)first_side * ROW + (size_t)i;
-        m.records[i] = args.join ? v.records[from] + ratio * v.change[from] : v.records[from];
+        m.records[i] =
+            args.join ? v.iteration.records[from] + ratio * v.iteration.change[from] : v.iteration.records[from];
     }
 }
 
 PART __device__ __forceinline__ void PART_RUN::load(void)
 {
     const int32_t threads = (int32_t)blockDim.x, in_registers = threads / LANES;
-    own_body = load_body(found.live, r, v.lines + found.body * (size_t)v.line, v.rigid,
-                         (FAST ? v.momentum_residual : v.b) + found.body * ROW, v.state + found.body * ROW);
+    own_body = load_body(found.live, r, v.bodies.lines + found.body * (size_t)v.bodies.line, v.bodies.rigid,
+                         (FAST ? v.bodies.momentum_residual : v.bodies.b) + found.body * ROW,
+                         v.bodies.state + found.body * ROW);
     gathered = m.records;
     if (found.live && r < 6) {
         gathered = m.records + (found.begin - first_side) * ROW + record_slot(r);
@@ -245,16 +250,17 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
     own_record = (real2_pair *)kept_address<SIZE>(m.records + side * ROW + quad_slot(lane));
     if (!FAST && moves) momentum = free_momentum(own_body);
     if (found.live) m.state[body * ROW + r] = own_body.v;
-    for (int32_t i = in_registers * ROW + t; i < bodies * ROW; i += threads) m.state[i] = v.state[raw_row(i)];
+    for (int32_t i = in_registers * ROW + t; i < bodies * ROW; i += threads) m.state[i] = v.bodies.state[raw_row(i)];
     if (t < ROW) m.state[(MODE == CLUSTER ? 2 : 1) * args.most_bodies * ROW + t] = 0;
     if (bodies > in_registers) {
         const int32_t more = bodies - in_registers;
-        for (int32_t i = t; i < more * v.line; i += threads)
-            m.lines[i / v.line * LINE_GENERAL + i % v.line] =
-                v.lines[(size_t)v.body_of[first_body + in_registers + i / v.line] * (size_t)v.line +
-                        (size_t)(i % v.line)];
+        for (int32_t i = t; i < more * v.bodies.line; i += threads)
+            m.lines[i / v.bodies.line * LINE_GENERAL + i % v.bodies.line] =
+                v.bodies.lines[(size_t)v.graph.body_of[first_body + in_registers + i / v.bodies.line] *
+                                   (size_t)v.bodies.line +
+                               (size_t)(i % v.bodies.line)];
         for (int32_t i = t; i < more * ROW; i += threads)
-            m.b[i] = (FAST ? v.momentum_residual : v.b)[raw_row(in_registers * ROW + i)];
+            m.b[i] = (FAST ? v.bodies.momentum_residual : v.bodies.b)[raw_row(in_registers * ROW + i)];
     }
     own.own = 0;
     own.other = m.state;
@@ -268,7 +274,7 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
                        !FAST && args.start);
     if (FAST && MODE == GRID) /* for the first Steps 2-4 of the others */
         for (int32_t i = t; i < bodies * ROW; i += threads)
-            v.exchange[(size_t)first_body * ROW + (size_t)i] = v.state[raw_row(i)];
+            v.iteration.exchange[(size_t)first_body * ROW + (size_t)i] = v.bodies.state[raw_row(i)];
     block_barrier<SIZE>();
 }
 
@@ -280,27 +286,30 @@ PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
 {
     const int32_t in_registers = (int32_t)blockDim.x / LANES;
     for (int32_t i = t; i < bodies * ROW; i += (int32_t)blockDim.x) {
-        if (i % ROW >= 6 || (FAST && island_stopped(v, args.checks, v.body_of[first_body + i / ROW]))) continue;
-        v.state[raw_row(i)] = state(odd)[i];
-        if (FAST) v.momentum_residual[raw_row(i)] = i < in_registers * ROW ? own_body.b : m.b[i - in_registers * ROW];
+        if (i % ROW >= 6 ||
+            (FAST && island_stopped(v.graph, v.islands, args.checks, v.graph.body_of[first_body + i / ROW])))
+            continue;
+        v.bodies.state[raw_row(i)] = state(odd)[i];
+        if (FAST)
+            v.bodies.momentum_residual[raw_row(i)] = i < in_registers * ROW ? own_body.b : m.b[i - in_registers * ROW];
     }
     for (int32_t i = t; !FAST && i < sides * ROW; i += (int32_t)blockDim.x)
-        v.records[(size_t)first_side * ROW + (size_t)i] = m.records[i];
+        v.iteration.records[(size_t)first_side * ROW + (size_t)i] = m.records[i];
     if (side >= sides) return;
-    if (FAST && island_stopped(v, args.checks, v.body_of[first_body + own.own])) return;
-    const int32_t code = v.incident[first_side + side], p = code / 2;
+    if (FAST && island_stopped(v.graph, v.islands, args.checks, v.graph.body_of[first_body + own.own])) return;
+    const int32_t code = v.graph.incident[first_side + side], p = code / 2;
     if (own.pair) {
-        if (code & 1 && v.ends[p].body_a != v.bodies) return;
-        const int32_t count = (int32_t)v.difference[p].w;
+        if (code & 1 && v.contacts.ends[p].body_a != v.model.bodies) return;
+        const int32_t count = (int32_t)v.contacts.difference[p].w;
 #pragma unroll
         for (int32_t j = 0; j < COUNT; ++j) {
             const int32_t k = lane + QUAD * j;
-            if (k < count) store_lambda(v, point_slot(v, p, k), own.lambda[j]);
+            if (k < count) store_lambda(v.contacts, point_slot(v.contacts, p, k), own.lambda[j]);
         }
     } else if (FULL && lane == 0) {
-        const int32_t k = p - v.pair_capacity;
-        if (code & 1 && v.row_info[k].body_a != v.bodies) return;
-        store_row_lambda(v, k, m.row_lambda + side * ROW);
+        const int32_t k = p - v.contacts.pair_capacity;
+        if (code & 1 && v.rows.info[k].body_a != v.model.bodies) return;
+        store_row_lambda(v.rows, k, m.row_lambda + side * ROW);
     }
 }
 

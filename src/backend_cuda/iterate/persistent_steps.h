@@ -38,7 +38,8 @@ PART __device__ __forceinline__ void PART_RUN::publish(solver_real *to, int32_t 
 {
     if (i >= bodies || r >= 6) return;
     to[MODE == CLUSTER && odd ? args.most_bodies * ROW : 0] = value;
-    if (MODE == GRID) v.exchange[((size_t)(odd ? v.bodies : 0) + (size_t)(first_body + i)) * ROW + (size_t)r] = value;
+    if (MODE == GRID)
+        v.iteration.exchange[((size_t)(odd ? v.model.bodies : 0) + (size_t)(first_body + i)) * ROW + (size_t)r] = value;
 }
 
 PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd)
@@ -53,10 +54,10 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd)
         const int32_t i = first + body, at = i - in_registers;
         const bool live = i < bodies;
         body_lane one =
-            load_body(live, r, m.lines + at * LINE_GENERAL, v.rigid, m.b + at * ROW, state(!odd) + i * ROW);
+            load_body(live, r, m.lines + at * LINE_GENERAL, v.bodies.rigid, m.b + at * ROW, state(!odd) + i * ROW);
         real g = free_momentum(one);
         if (live && r < 6) {
-            const int32_t from = v.offsets[first_body + i], count = v.offsets[first_body + i + 1] - from;
+            const int32_t from = v.graph.offsets[first_body + i], count = v.graph.offsets[first_body + i + 1] - from;
             g = gather(g, m.records + (from - first_side) * ROW + record_slot(r), count, count > FEW);
         }
         publish(m.state + i * ROW + r, i, one.v + step_of(one, g), odd);
@@ -77,11 +78,11 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies_fast(int32_t odd, rea
     for (int32_t first = in_registers; warp_has_body(first); first += in_registers) {
         const int32_t i = first + body, at = i - in_registers;
         const bool live = i < bodies && r < 6;
-        body_lane one =
-            load_body(i < bodies, r, m.lines + at * LINE_GENERAL, v.rigid, m.b + at * ROW, state(!odd) + i * ROW);
+        body_lane one = load_body(i < bodies, r, m.lines + at * LINE_GENERAL, v.bodies.rigid, m.b + at * ROW,
+                                  state(!odd) + i * ROW);
         real pushed = 0;
         if (live) {
-            const int32_t from = v.offsets[first_body + i], count = v.offsets[first_body + i + 1] - from;
+            const int32_t from = v.graph.offsets[first_body + i], count = v.graph.offsets[first_body + i + 1] - from;
             pushed = gather(0, m.records + (from - first_side) * ROW + record_slot(r), count, count > FEW);
         }
         const real gone = step_fast(&one, pushed, relaxation);
@@ -136,18 +137,18 @@ __device__ __forceinline__ double PART_RUN::update_sides(int32_t odd, real relax
     store_record(own_record, sum_quad(lane, force, torque));
     if (!MEASURE && !has_rows()) return primal;
 
-    const int32_t code = side < sides ? v.incident[first_side + side] : 0;
-    solver_real *change = SPLIT ? v.change + (size_t)(first_side + side) * ROW : nullptr;
+    const int32_t code = side < sides ? v.graph.incident[first_side + side] : 0;
+    solver_real *change = SPLIT ? v.iteration.change + (size_t)(first_side + side) * ROW : nullptr;
     if (FAST && MEASURE && own.pair) {
-        const pair_ends on = v.ends[code / 2];
-        primal =
-            (double)(largest * inverse_of_weight(real_abs(own.inv_s[0]), on.body_a < v.bodies && on.body_b < v.bodies));
+        const pair_ends on = v.contacts.ends[code / 2];
+        primal = (double)(largest * inverse_of_weight(real_abs(own.inv_s[0]),
+                                                      on.body_a < v.model.bodies && on.body_b < v.model.bodies));
     }
     if (SPLIT) {
         store_record((real2_pair *)(change + quad_slot(lane)), sum_quad(lane, change_force, change_torque));
         if (own.pair) {
-            const pair_ends on = v.ends[code / 2];
-            primal = (double)(largest * real_max(inv_beta_of(v, on.body_a), inv_beta_of(v, on.body_b)));
+            const pair_ends on = v.contacts.ends[code / 2];
+            primal = (double)(largest * real_max(inv_beta_of(v.bodies, on.body_a), inv_beta_of(v.bodies, on.body_b)));
         }
     }
     if (has_rows() && side < sides && !own.pair && lane == 0)
@@ -168,9 +169,10 @@ PART __device__ __forceinline__ bool PART_RUN::suspect(int32_t odd) const
     for (int32_t first = 0; warp_has_body(first); first += in_registers) {
         const int32_t i = first + body, at = i - in_registers;
         const bool live = i < bodies;
-        const size_t raw = live ? (size_t)v.body_of[first_body + i] : 0;
+        const size_t raw = live ? (size_t)v.graph.body_of[first_body + i] : 0;
         const bool speaks = live && r == 0;
-        const double b = live && r < 6 ? (double)v.b[raw * ROW + (size_t)r] : 0, free = speaks ? v.free_energy[raw] : 0;
+        const double b = live && r < 6 ? (double)v.bodies.b[raw * ROW + (size_t)r] : 0,
+                     free = speaks ? v.bodies.free_energy[raw] : 0;
         double a[3] = {}; /* of rigid bodies */
 #pragma unroll
         for (int k = 0; k < 3; ++k) {

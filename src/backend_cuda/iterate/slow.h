@@ -19,9 +19,9 @@ static __device__ __forceinline__ bool suspect_body(bool under_iterated, bool sp
 }
 
 /* The factor of body i's velocities. */
-static __device__ __forceinline__ solver_real slow_down(const cuda_view &v, int32_t i)
+static __device__ __forceinline__ solver_real slow_down(const graph_view &graph, const island_view &islands, int32_t i)
 {
-    return *v.limited > 0 ? (solver_real)v.islands[v.label[i]].slow_down : (solver_real)1;
+    return *islands.limited > 0 ? (solver_real)islands.info[graph.label[i]].slow_down : (solver_real)1;
 }
 
 #endif

@@ -24,23 +24,26 @@ static __device__ double map_of_contact(const double lambda[3], const double u[3
 }
 
 /* The largest natural map of a pair's points, m/s. */
-static __device__ double natural_map(const cuda_view &v, int32_t p)
+static __device__ double natural_map(const model_view &model, const body_view &bodies, const contact_view &contacts,
+                                     const raw_view &raw, int32_t p)
 {
-    const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
+    const struct sadmm_contact_pair *pair = &raw.pairs[p];
     const mat3 frame = sadmm_contact_frame(pair->normal);
-    const int32_t bodies[2] = {pair->body_a, pair->body_b};
+    const int32_t joined[2] = {pair->body_a, pair->body_b};
     const int rows = pair->friction > 0 ? 3 : 1;
-    const struct sadmm_settings settings = *v.settings;
-    const int32_t count = (int32_t)v.difference[p].w; /* as planned for, should the pair have more: nobody has looked yet */
+    const struct sadmm_settings settings = *model.settings;
+    /* As planned for, should the pair have more: nobody has looked yet. */
+    const int32_t count = (int32_t)contacts.difference[p].w;
     double worst = 0;
     for (int32_t k = 0; k < count; ++k) {
-        const struct sadmm_contact_point *point = &v.raw_points[pair->first + k];
+        const struct sadmm_contact_point *point = &raw.points[pair->first + k];
         vec3 velocity = v3(0, 0, 0);
         double weight[3] = {};
         for (int side = 0; side < 2; ++side) {
-            if (bodies[side] < 0) continue;
-            const solver_real *state = v.state + (size_t)bodies[side] * ROW;
-            const double *arm = side ? point->arm_b : point->arm_a, *inverse = v.A_inverse + (size_t)bodies[side] * PACKED;
+            if (joined[side] < 0) continue;
+            const solver_real *state = bodies.state + (size_t)joined[side] * ROW;
+            const double *arm = side ? point->arm_b : point->arm_a,
+                         *inverse = bodies.A_inverse + (size_t)joined[side] * PACKED;
             const vec3 turn = v3((double)state[3], (double)state[4], (double)state[5]),
                        at_point = v3_add(v3((double)state[0], (double)state[1], (double)state[2]),
                                          v3_cross(turn, v3_load(arm)));
@@ -51,9 +54,9 @@ static __device__ double natural_map(const cuda_view &v, int32_t p)
                 weight[i] += packed_form(inverse, row);
             }
         }
-        const vec3 impulse = m3_mul(frame, point_impulse(v, p, k)), x = m3_mul(frame, velocity);
+        const vec3 impulse = m3_mul(frame, point_impulse(contacts, p, k)), x = m3_mul(frame, velocity);
         const double w = fmax(weight[0], fmax(weight[1], weight[2])),
-                     e = sadmm_contact_e(&v.raw, &settings, pair, point),
+                     e = sadmm_contact_e(&raw.system, &settings, pair, point),
                      lambda[3] = {impulse.x, impulse.y, impulse.z}, u[3] = {x.x + e, x.y, x.z};
         worst = largest_term::join(worst, map_of_contact(lambda, u, pair->friction, w));
     }
@@ -61,19 +64,20 @@ static __device__ double natural_map(const cuda_view &v, int32_t p)
 }
 
 /* The same of the rows of a block. */
-static __device__ double natural_map_of_rows(const cuda_view &v, int32_t k)
+static __device__ double natural_map_of_rows(const body_view &bodies, const row_view &rows, const raw_view &raw,
+                                             int32_t k)
 {
-    const struct sadmm_problem_block *block = &v.raw.blocks[k];
-    const int32_t bodies[2] = {block->body_a, block->body_b};
+    const struct sadmm_problem_block *block = &raw.system.blocks[k];
+    const int32_t joined[2] = {block->body_a, block->body_b};
     double x[6] = {}, weight[6] = {}, lambda[6] = {}, worst = 0;
     for (int r = 0; r < block->rows; ++r) {
-        lambda[r] = row_number(v, ROW_LAMBDA + r, k);
+        lambda[r] = row_number(rows, ROW_LAMBDA + r, k);
         for (int side = 0; side < 2; ++side) {
-            if (bodies[side] < 0) continue;
+            if (joined[side] < 0) continue;
             const double *row = (side ? block->jacobian_b : block->jacobian_a) + 6 * r;
-            const solver_real *state = v.state + (size_t)bodies[side] * ROW;
+            const solver_real *state = bodies.state + (size_t)joined[side] * ROW;
             for (int j = 0; j < 6; ++j) x[r] += row[j] * (double)state[j];
-            weight[r] += packed_form(v.A_inverse + (size_t)bodies[side] * PACKED, row);
+            weight[r] += packed_form(bodies.A_inverse + (size_t)joined[side] * PACKED, row);
         }
     }
     if (block->kind == SADMM_BLOCK_CONTACT) {
@@ -96,34 +100,36 @@ template <bool RIGID>
 static __global__ void __launch_bounds__(BODY_THREADS)
     convergence_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    if (blockIdx.x == 0 && threadIdx.x == 0) v.stop->unmet[(args.checks + 1) % CHECKS_KEPT] = 0;
-    if (args.checks > 1 && all_stopped(v, args.checks - 1)) return;
-    const body_thread t = body_of_thread(v);
+    if (blockIdx.x == 0 && threadIdx.x == 0) v.islands.stop->unmet[(args.checks + 1) % CHECKS_KEPT] = 0;
+    if (args.checks > 1 && all_stopped(v.islands, args.checks - 1)) return;
+    const body_thread t = body_of_thread(v.model, v.graph);
     enum { MAP = 6, PUSH, SUMS };
     double sums[SUMS] = {}, map = 0, term[TERMS] = {}, largest[TERMS];
     for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) {
-        const int32_t code = v.incident[at], p = code / 2;
-        add_side(v, code, sums, &sums[PUSH]);
-        const int32_t k = p - v.pair_capacity; /* a block of rows, or a pair */
-        if (code & 1 && is_dynamic(v, k < 0 ? v.ends[p].body_a : v.row_info[k].body_a)) continue; /* counted there */
-        map = largest_term::join(map, k < 0 ? natural_map(v, p) : natural_map_of_rows(v, k));
+        const int32_t code = v.graph.incident[at], p = code / 2;
+        add_side(v.contacts, v.rows, code, sums, &sums[PUSH]);
+        const int32_t k = p - v.contacts.pair_capacity; /* a block of rows, or a pair */
+        if (code & 1 && is_dynamic(v.model, k < 0 ? v.contacts.ends[p].body_a : v.rows.info[k].body_a))
+            continue; /* counted there */
+        map = largest_term::join(map, k < 0 ? natural_map(v.model, v.bodies, v.contacts, v.raw, p)
+                                            : natural_map_of_rows(v.bodies, v.rows, v.raw, k));
     }
     sum_lanes<SUMS>(sums);
-    const wide_row<RIGID> row = row_of_body<RIGID>(v, t);
+    const wide_row<RIGID> row = row_of_body<RIGID>(v.bodies, t);
     const double g = own_number(sums, t.lane), momentum = product(row.velocity, row.a);
     term[0] = largest_of_lanes(map);
     term[1] = largest_of_lanes(fabs(momentum - row.b - g));
     term[2] = largest_of_lanes(largest_term::join(fabs(g), largest_term::join(fabs(momentum), fabs(row.b))));
-    term[2] = fmax(term[2], t.live ? mass_of(v, t.body) * v.settings->certificate_tolerance : 0);
-    if (!add_up_island<largest_term>(v, t, own_number(term, t.lane), largest) || t.lane != 0) return;
-    const bool met = largest[0] <= v.settings->certificate_tolerance &&
-                     largest[1] <= v.settings->certificate_momentum_tolerance * largest[2];
-    int32_t *stopped = &v.islands[v.label[t.body]].stopped;
-    if (!met) atomicAdd(&v.stop->unmet[args.checks % CHECKS_KEPT], 1);
+    term[2] = fmax(term[2], t.live ? mass_of(v.bodies, t.body) * v.model.settings->certificate_tolerance : 0);
+    if (!add_up_island<largest_term>(v.graph, v.islands, t, own_number(term, t.lane), largest) || t.lane != 0) return;
+    const bool met = largest[0] <= v.model.settings->certificate_tolerance &&
+                     largest[1] <= v.model.settings->certificate_momentum_tolerance * largest[2];
+    int32_t *stopped = &v.islands.info[v.graph.label[t.body]].stopped;
+    if (!met) atomicAdd(&v.islands.stop->unmet[args.checks % CHECKS_KEPT], 1);
     if (!met || *stopped > 0) return;
     *stopped = args.count;
-    atomicAdd(&v.stop->sum, (unsigned long long)args.count);
-    atomicMax(&v.stop->last, args.count);
+    atomicAdd(&v.islands.stop->sum, (unsigned long long)args.count);
+    atomicMax(&v.islands.stop->last, args.count);
 }
 
 sadmm_status CUDA(enqueue_convergence_check)(struct sadmm_context *c, int done, struct sadmm_error *error)
@@ -131,15 +137,15 @@ sadmm_status CUDA(enqueue_convergence_check)(struct sadmm_context *c, int done, 
     cuda_args args = {};
     args.checks = ++c->checks;
     args.count = done;
-    return CUDA(launch_of)(c, c->view.rigid ? convergence_kernel<true> : convergence_kernel<false>, "convergence check",
-                           body_blocks(c->view.bodies), BODY_THREADS, &args, error);
+    return CUDA(launch_of)(c, c->view.bodies.rigid ? convergence_kernel<true> : convergence_kernel<false>,
+                           "convergence check", body_blocks(c->view.model.bodies), BODY_THREADS, &args, error);
 }
 
 extern "C" sadmm_status CUDA(look)(struct sadmm_context *c, int done, int32_t *unmet, struct sadmm_error *error)
 {
     CUDA_ENTER(c);
     CUDA_TRY(CUDA(enqueue_convergence_check)(c, done, error));
-    CUDA_TRY(CUDA(download)(c, &c->view.stop->unmet[c->checks % CHECKS_KEPT], sizeof *unmet, error));
+    CUDA_TRY(CUDA(download)(c, &c->view.islands.stop->unmet[c->checks % CHECKS_KEPT], sizeof *unmet, error));
     memcpy(unmet, c->buffers[PINNED_OUT].data, sizeof *unmet);
     return SADMM_OK;
 }

@@ -5,44 +5,48 @@
 #include "backend_cuda/device/context.h"
 
 /* Before the first kernel of a solve that counts islands: those slowed down, those that have stopped. */
-static __device__ __forceinline__ void clear_counts(const cuda_view &v)
+static __device__ __forceinline__ void clear_counts(const island_view &islands)
 {
     const cuda_stop none = {};
-    *v.limited = *v.suspects = 0;
-    *v.stop = none;
+    *islands.limited = *islands.suspects = 0;
+    *islands.stop = none;
 }
 
 /* Had every island stopped by the last of `checks` convergence checks? */
-static __device__ __forceinline__ bool all_stopped(const cuda_view &v, int32_t checks)
+static __device__ __forceinline__ bool all_stopped(const island_view &islands, int32_t checks)
 {
-    return checks > 0 && v.stop->unmet[checks % CHECKS_KEPT] == 0;
+    return checks > 0 && islands.stop->unmet[checks % CHECKS_KEPT] == 0;
 }
 
 /* Had the island of a body? Then it stays as it is, whatever its thread block still does for others: an island's result does
  * not depend on who is beside it. */
-static __device__ __forceinline__ bool island_stopped(const cuda_view &v, int32_t checks, int32_t body)
+static __device__ __forceinline__ bool island_stopped(const graph_view &graph, const island_view &islands,
+                                                      int32_t checks, int32_t body)
 {
-    return checks > 0 && v.islands[v.label[body]].stopped > 0;
+    return checks > 0 && islands.info[graph.label[body]].stopped > 0;
 }
 
-static __device__ __forceinline__ bool pair_stopped(const cuda_view &v, int32_t checks, const pair_ends &ends)
+static __device__ __forceinline__ bool pair_stopped(const model_view &model, const graph_view &graph,
+                                                    const island_view &islands, int32_t checks, const pair_ends &ends)
 {
-    return checks > 0 && island_stopped(v, checks, ends.body_a < v.bodies ? ends.body_a : ends.body_b);
+    return checks > 0 && island_stopped(graph, islands, checks, ends.body_a < model.bodies ? ends.body_a : ends.body_b);
 }
 
-static __device__ __forceinline__ bool rows_stopped(const cuda_view &v, int32_t checks, const row_about &rows)
+static __device__ __forceinline__ bool rows_stopped(const model_view &model, const graph_view &graph,
+                                                    const island_view &islands, int32_t checks, const row_about &rows)
 {
-    return checks > 0 && island_stopped(v, checks, rows.body_a < v.bodies ? rows.body_a : rows.body_b);
+    return checks > 0 && island_stopped(graph, islands, checks, rows.body_a < model.bodies ? rows.body_a : rows.body_b);
 }
 
 /* Had all islands of the slots [first, end), which are whole ones? */
-static __device__ __forceinline__ bool part_stopped(const cuda_view &v, int32_t checks, int32_t first, int32_t end)
+static __device__ __forceinline__ bool part_stopped(const graph_view &graph, const island_view &islands, int32_t checks,
+                                                    int32_t first, int32_t end)
 {
     bool all = checks > 0;
     for (int32_t s = first; all && s < end;) {
-        const int32_t label = v.label[v.body_of[s]];
-        all = v.islands[label].stopped > 0;
-        s += v.island_bodies[label];
+        const int32_t label = graph.label[graph.body_of[s]];
+        all = islands.info[label].stopped > 0;
+        s += graph.island_bodies[label];
     }
     return all;
 }

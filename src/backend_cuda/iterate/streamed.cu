@@ -47,9 +47,9 @@ static __device__ __forceinline__ void store_numbers(solver_real *to, const real
 
 /* How far a part of the iteration goes. */
 template <bool FAST>
-static __device__ __forceinline__ real relaxed(const cuda_view &v, const cuda_args &args, enum cuda_relax what)
+static __device__ __forceinline__ real relaxed(const model_view &model, const cuda_args &args, enum cuda_relax what)
 {
-    return FAST && args.relax & what ? (real)v.settings->relaxation : (real)1;
+    return FAST && args.relax & what ? (real)model.settings->relaxation : (real)1;
 }
 
 /* Step 1, a thread a body: all of a body's numbers lie side by side and are asked for at once, sixteen bytes at a time. (Eight
@@ -63,28 +63,28 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     enum { LINE = RIGID ? LINE_RIGID : LINE_GENERAL };
     const unsigned block = args.backward ? gridDim.x - 1 - blockIdx.x : blockIdx.x;
     const int32_t i = (int32_t)(block * (unsigned)BODY_THREADS + threadIdx.x);
-    if (i >= live_bodies(v) || (FAST && all_stopped(v, args.checks))) return;
-    const size_t at = args.in_order ? (size_t)i : (size_t)v.body_of[i];
-    if (FAST && island_stopped(v, args.checks, (int32_t)at)) return;
-    const real ratio = JOIN && args.rescaled ? (real)*v.ratio : (real)1,
-               relaxation_factor = relaxed<FAST>(v, args, RELAX_VELOCITY),
-               multipliers = relaxed<FAST>(v, args, RELAX_MULTIPLIERS);
+    if (i >= live_bodies(v.model) || (FAST && all_stopped(v.islands, args.checks))) return;
+    const size_t at = args.in_order ? (size_t)i : (size_t)v.graph.body_of[i];
+    if (FAST && island_stopped(v.graph, v.islands, args.checks, (int32_t)at)) return;
+    const real ratio = JOIN && args.rescaled ? (real)*v.iteration.ratio : (real)1,
+               relaxation_factor = relaxed<FAST>(v.model, args, RELAX_VELOCITY),
+               multipliers = relaxed<FAST>(v.model, args, RELAX_MULTIPLIERS);
     real line[LINE], b[ROW], state[ROW], g[6], step[6];
-    load_numbers_once<LINE / 4>(line, v.lines + at * LINE);
-    load_numbers_once<ROW / 4>(b, (FAST ? v.momentum_residual : v.b) + at * ROW);
-    load_numbers<ROW / 4>(state, v.state + at * ROW);
+    load_numbers_once<LINE / 4>(line, v.bodies.lines + at * LINE);
+    load_numbers_once<ROW / 4>(b, (FAST ? v.bodies.momentum_residual : v.bodies.b) + at * ROW);
+    load_numbers<ROW / 4>(state, v.bodies.state + at * ROW);
 #pragma unroll
     for (int r = 0; r < 6; ++r) {
         g[r] = FAST ? (real)0 : b[r];
 #pragma unroll
         for (int k = 0; k < 6 && !FAST; ++k) g[r] = fused(-line_a((const real *)line, RIGID, r, k), state[k], g[r]);
     }
-    const int32_t end = v.offsets[i + 1];
+    const int32_t end = v.graph.offsets[i + 1];
 #pragma unroll 4
-    for (int32_t h = v.offsets[i]; h < end; ++h) {
+    for (int32_t h = v.graph.offsets[i]; h < end; ++h) {
         real record[ROW], change[ROW];
-        load_numbers<ROW / 4>(record, v.records + (size_t)h * ROW);
-        if (JOIN) load_numbers<ROW / 4>(change, v.change + (size_t)h * ROW);
+        load_numbers<ROW / 4>(record, v.iteration.records + (size_t)h * ROW);
+        if (JOIN) load_numbers<ROW / 4>(change, v.iteration.change + (size_t)h * ROW);
 #pragma unroll
         for (int r = 0; r < 6; ++r) {
             const int slot = record_slot(r);
@@ -103,7 +103,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         state[r] = FAST ? fused(relaxation_factor, step[r], before) : before + step[r];
         step[r] = state[r] - before;
     }
-    store_numbers(v.state + at * ROW, state);
+    store_numbers(v.bodies.state + at * ROW, state);
     if (FAST) {
 #pragma unroll
         for (int r = 0; r < 6; ++r) {
@@ -111,22 +111,22 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 #pragma unroll
             for (int k = 0; k < 6; ++k) b[r] = fused(-line_a((const real *)line, RIGID, r, k), step[k], b[r]);
         }
-        store_numbers(v.momentum_residual + at * ROW, b);
+        store_numbers(v.bodies.momentum_residual + at * ROW, b);
     }
 }
 
 /* ---- kernels over constraints: blocks of threads for pairs, then blocks for row blocks ----------------------------- */
 
-template <int LANES_A_PAIR> static __device__ __forceinline__ int32_t pair_threads(const cuda_view &v)
+template <int LANES_A_PAIR> static __device__ __forceinline__ int32_t pair_threads(const contact_view &contacts)
 {
-    return (LANES_A_PAIR * v.pair_capacity + THREADS - 1) / THREADS * THREADS;
+    return (LANES_A_PAIR * contacts.pair_capacity + THREADS - 1) / THREADS * THREADS;
 }
 
 /* The pair of thread t: work(pair, lane, live), in whole warps; lanes beyond the last pair come with that one, not live. */
 template <int LANES_A_PAIR, class Work>
-static __device__ __forceinline__ void with_pair(const cuda_view &v, int32_t t, Work work)
+static __device__ __forceinline__ void with_pair(const model_view &model, int32_t t, Work work)
 {
-    const int32_t pairs = live_pairs(v), p = t / LANES_A_PAIR;
+    const int32_t pairs = live_pairs(model), p = t / LANES_A_PAIR;
     if (t / WARP * (WARP / LANES_A_PAIR) < pairs) work(p < pairs ? p : pairs - 1, t % LANES_A_PAIR, p < pairs);
 }
 
@@ -135,44 +135,48 @@ template <int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
 static __global__ void __launch_bounds__(THREADS)
     constraints_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    const int32_t t = thread_index(args), k = t - pair_threads<LANES_A_PAIR>(v);
+    const int32_t t = thread_index(args), k = t - pair_threads<LANES_A_PAIR>(v.contacts);
     double primal = 0;
-    if (FAST && all_stopped(v, args.checks)) return;
-    const real relaxation_factor = relaxed<FAST>(v, args, RELAX_MULTIPLIERS);
+    if (FAST && all_stopped(v.islands, args.checks)) return;
+    const real relaxation_factor = relaxed<FAST>(v.model, args, RELAX_MULTIPLIERS);
     if (k < 0)
-        with_pair<LANES_A_PAIR>(v, t, [&](int32_t p, int32_t lane, bool live) {
-            const bool on = live && !(FAST && pair_stopped(v, args.checks, v.ends[p]));
-            primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v, p, lane, on, relaxation_factor);
+        with_pair<LANES_A_PAIR>(v.model, t, [&](int32_t p, int32_t lane, bool live) {
+            const bool on =
+                live && !(FAST && pair_stopped(v.model, v.graph, v.islands, args.checks, v.contacts.ends[p]));
+            primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v.model, v.bodies, v.contacts, v.iteration, p, lane,
+                                                                    on, relaxation_factor);
         });
-    else if (k < live_rows(v) && !(FAST && rows_stopped(v, args.checks, v.row_info[k])))
-        primal = FAST ? sweep_row_block_fast<MEASURE>(v, k, relaxation_factor) : sweep_row_block<MEASURE>(v, k);
-    if (MEASURE) reduce_max(primal, v.residual);
+    else if (k < live_rows(v.model, v.rows) &&
+             !(FAST && rows_stopped(v.model, v.graph, v.islands, args.checks, v.rows.info[k])))
+        primal = FAST ? sweep_row_block_fast<MEASURE>(v.model, v.bodies, v.rows, v.iteration, k, relaxation_factor)
+                      : sweep_row_block<MEASURE>(v.bodies, v.rows, v.iteration, k);
+    if (MEASURE) reduce_max(primal, v.iteration.residual);
 }
 
 /* J^T lambda^0. */
 template <int LANES_A_PAIR>
 static __global__ void start_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    const int32_t t = thread_index(args), k = t - pair_threads<LANES_A_PAIR>(v);
+    const int32_t t = thread_index(args), k = t - pair_threads<LANES_A_PAIR>(v.contacts);
     if (k < 0) {
-        with_pair<LANES_A_PAIR>(v, t, [&](int32_t p, int32_t lane, bool live) {
-            start_pair<LANES_A_PAIR>(v, p, lane, live);
+        with_pair<LANES_A_PAIR>(v.model, t, [&](int32_t p, int32_t lane, bool live) {
+            start_pair<LANES_A_PAIR>(v.contacts, v.iteration, p, lane, live);
         });
-    } else if (k < live_rows(v)) {
+    } else if (k < live_rows(v.model, v.rows)) {
         real lambda[6];
-        load_row_lambda(v, k, lambda);
-        store_row_records(v, k, v.row_info[k], lambda, v.records);
+        load_row_lambda(v.rows, k, lambda);
+        store_row_records(v.rows, k, v.rows.info[k], lambda, v.iteration.records);
     }
 }
 
 /* Where records go. */
 static __global__ void place_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    const int32_t at = thread_index(args), bodies = live_bodies(v);
-    if (bodies == 0 || at >= v.offsets[bodies]) return;
-    const int32_t side = v.incident[at], on_b = side & 1, k = side / 2 - v.pair_capacity;
-    if (k < 0) *(on_b ? &v.ends[side / 2].side_b : &v.ends[side / 2].side_a) = at;
-    else *(on_b ? &v.row_info[k].side_b : &v.row_info[k].side_a) = at;
+    const int32_t at = thread_index(args), bodies = live_bodies(v.model);
+    if (bodies == 0 || at >= v.graph.offsets[bodies]) return;
+    const int32_t side = v.graph.incident[at], on_b = side & 1, k = side / 2 - v.contacts.pair_capacity;
+    if (k < 0) *(on_b ? &v.contacts.ends[side / 2].side_b : &v.contacts.ends[side / 2].side_a) = at;
+    else *(on_b ? &v.rows.info[k].side_b : &v.rows.info[k].side_a) = at;
 }
 
 /* ---- launches ------------------------------------------------------------------------------------------------- */
@@ -187,16 +191,16 @@ static sadmm_status launch_bodies(struct sadmm_context *c, bool join, int relax,
     args.in_order = !slots_by_island(&c->partition);
     args.relax = relax;
     cuda_kernel kernel =
-        c->fast         ? (c->view.rigid ? bodies_kernel<false, true, true> : bodies_kernel<false, false, true>)
-        : c->view.rigid ? (join ? bodies_kernel<true, true, false> : bodies_kernel<false, true, false>)
-                        : (join ? bodies_kernel<true, false, false> : bodies_kernel<false, false, false>);
-    const int64_t blocks = ((int64_t)c->view.bodies + BODY_THREADS - 1) / BODY_THREADS;
+        c->fast ? (c->view.bodies.rigid ? bodies_kernel<false, true, true> : bodies_kernel<false, false, true>)
+        : c->view.bodies.rigid ? (join ? bodies_kernel<true, true, false> : bodies_kernel<false, true, false>)
+                               : (join ? bodies_kernel<true, false, false> : bodies_kernel<false, false, false>);
+    const int64_t blocks = ((int64_t)c->view.model.bodies + BODY_THREADS - 1) / BODY_THREADS;
     return CUDA(launch_of)(c, kernel, "update_velocity", blocks, BODY_THREADS, &args, error);
 }
 
 static int64_t constraint_blocks(const cuda_view *v)
 {
-    return blocks_for((int64_t)v->lanes * v->pair_capacity) + blocks_for(v->rows);
+    return blocks_for((int64_t)v->contacts.lanes * v->contacts.pair_capacity) + blocks_for(v->rows.count);
 }
 
 template <int LANES_A_PAIR, int COUNT> static cuda_kernel sweep_kernel(bool measure, bool fast)
@@ -214,16 +218,16 @@ static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, in
     args.checks = c->checks;
     args.backward = c->backward;
     c->backward = !c->backward;
-    cuda_kernel kernel = c->view.lanes == 1            ? sweep_kernel<1, 1>(measure, c->fast)
+    cuda_kernel kernel = c->view.contacts.lanes == 1      ? sweep_kernel<1, 1>(measure, c->fast)
                          : c->statistics.point_slots <= 4 ? sweep_kernel<4, 1>(measure, c->fast)
-                                                     : sweep_kernel<4, 2>(measure, c->fast);
+                                                          : sweep_kernel<4, 2>(measure, c->fast);
     return CUDA(launch)(c, kernel, "update_constraints", constraint_blocks(&c->view), &args, error);
 }
 
 sadmm_status CUDA(clear_primal)(struct sadmm_context *c, bool measure, struct sadmm_error *error)
 {
     if (!measure) return SADMM_OK;
-    if (!c->plan.residuals && c->view.pair_capacity + c->view.rows > 0)
+    if (!c->plan.residuals && c->view.contacts.pair_capacity + c->view.rows.count > 0)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "measure = true: the plan has residuals = false");
     return CUDA(clear)(c, SCALAR_PRIMAL, error);
 }
@@ -234,12 +238,13 @@ static sadmm_status prepare_stepwise(struct sadmm_context *c, struct sadmm_error
     const cuda_view *v = &c->view;
     cuda_args args = {};
     if (!c->placed)
-        CUDA_TRY(CUDA(launch)(c, place_kernel, "place_records", blocks_for(2 * ((int64_t)v->pair_capacity + v->rows)),
-                              &args, error));
+        CUDA_TRY(CUDA(launch)(c, place_kernel, "place_records",
+                              blocks_for(2 * ((int64_t)v->contacts.pair_capacity + v->rows.count)), &args, error));
     c->placed = true;
     if (!c->starting) return SADMM_OK;
     c->starting = false;
-    return CUDA(launch)(c, v->lanes == 1 ? start_kernel<1> : start_kernel<4>, "start_records", constraint_blocks(v), &args, error);
+    return CUDA(launch)(c, v->contacts.lanes == 1 ? start_kernel<1> : start_kernel<4>, "start_records",
+                        constraint_blocks(v), &args, error);
 }
 
 static sadmm_status refuse_fast(const struct sadmm_context *c, struct sadmm_error *error)

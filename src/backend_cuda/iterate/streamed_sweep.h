@@ -59,28 +59,29 @@ static __device__ __forceinline__ void store_records(solver_real *records, const
  * here. FAST: lambda goes `relaxation_factor` times as far; records are those of Step 1 in any case. Returns the lane's
  * share of the primal residual. */
 template <int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
-static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t p, int32_t lane, bool live,
-                                                    real relaxation_factor)
+static __device__ __forceinline__ double sweep_pair(const model_view &model, const body_view &bodies,
+                                                    const contact_view &contacts, const iteration_view &iteration,
+                                                    int32_t p, int32_t lane, bool live, real relaxation_factor)
 {
     enum { SPLIT = MEASURE && !FAST };
-    const real4 about = load_once(v.normal + p), between = load_once(v.difference + p);
-    const pair_ends ends = load_once(v.ends + p);
-    const real weight = FAST ? v.inv_s[p] : (real)0;
+    const real4 about = load_once(contacts.normal + p), between = load_once(contacts.difference + p);
+    const pair_ends ends = load_once(contacts.ends + p);
+    const real weight = FAST ? contacts.inv_s[p] : (real)0;
     size_t slot[COUNT];
     real4 point[COUNT];
     vec3 old[COUNT];
-    slot[0] = point_slot<LANES_A_PAIR>(v, p, lane);
-    point[0] = load_once(v.arm + slot[0]);
-    old[0] = load_lambda(v, slot[0]);
+    slot[0] = point_slot<LANES_A_PAIR>(contacts, p, lane);
+    point[0] = load_once(contacts.arm + slot[0]);
+    old[0] = load_lambda(contacts, slot[0]);
     const int32_t count = (int32_t)between.w;
 #pragma unroll
     for (int32_t j = 1; j < COUNT; ++j) {
         if (lane + LANES_A_PAIR * j >= count) continue;
-        slot[j] = point_slot<LANES_A_PAIR>(v, p, lane + LANES_A_PAIR * j);
-        point[j] = load_once(v.arm + slot[j]);
-        old[j] = load_lambda(v, slot[j]);
+        slot[j] = point_slot<LANES_A_PAIR>(contacts, p, lane + LANES_A_PAIR * j);
+        point[j] = load_once(contacts.arm + slot[j]);
+        old[j] = load_lambda(contacts, slot[j]);
     }
-    const body_row a = load_row(v.state, ends.body_a), b = load_row(v.state, ends.body_b);
+    const body_row a = load_row(bodies.state, ends.body_a), b = load_row(bodies.state, ends.body_b);
 
     const vec3 normal = xyz(about), difference = xyz(between);
     const real inv_s = FAST ? weight : inverse_weight(a.inv_beta, b.inv_beta);
@@ -94,74 +95,80 @@ static __device__ __forceinline__ double sweep_pair(const cuda_view &v, int32_t 
         const point_change to = update<FAST>(normal, about.w, x, point[j].w, inv_s, old[j]);
         const vec3 lambda = to.lambda, delta = to.delta;
         if (live)
-            store_lambda(v, slot[j], FAST ? relaxed(old[j], to, relaxation_factor == 1, relaxation_factor) : lambda);
+            store_lambda(contacts, slot[j],
+                         FAST ? relaxed(old[j], to, relaxation_factor == 1, relaxation_factor) : lambda);
         add_point(&next, j,
                   FAST ? delta : SPLIT ? lambda : v3_add(lambda, delta), arm_a, arm_b);
         if (SPLIT) add_point(&change, j, delta, arm_a, arm_b);
         if (!MEASURE) continue;
         largest = real_max(largest, largest_row(normal, delta));
     }
-    store_records<LANES_A_PAIR>(v.records, ends, lane, live, next);
-    if (SPLIT) store_records<LANES_A_PAIR>(v.change, ends, lane, live, change);
+    store_records<LANES_A_PAIR>(iteration.records, ends, lane, live, next);
+    if (SPLIT) store_records<LANES_A_PAIR>(iteration.change, ends, lane, live, change);
     if (!MEASURE) return 0;
-    return (double)(largest * (FAST ? inverse_of_weight(inv_s, ends.body_a < v.bodies && ends.body_b < v.bodies)
+    return (double)(largest * (FAST ? inverse_of_weight(inv_s, ends.body_a < model.bodies && ends.body_b < model.bodies)
                                     : real_max(a.inv_beta, b.inv_beta)));
 }
 
 /* The same for J^T lambda^0. */
 template <int LANES_A_PAIR>
-static __device__ __forceinline__ void start_pair(const cuda_view &v, int32_t p, int32_t lane, bool live)
+static __device__ __forceinline__ void start_pair(const contact_view &contacts, const iteration_view &iteration,
+                                                  int32_t p, int32_t lane, bool live)
 {
-    const real4 between = v.difference[p];
+    const real4 between = contacts.difference[p];
     pair_sum sum = {};
     for (int32_t k = lane; k < (int32_t)between.w; k += LANES_A_PAIR) {
-        size_t slot = point_slot<LANES_A_PAIR>(v, p, k);
-        vec3 arm = xyz(v.arm[slot]), lambda = load_lambda(v, slot);
+        size_t slot = point_slot<LANES_A_PAIR>(contacts, p, k);
+        vec3 arm = xyz(contacts.arm[slot]), lambda = load_lambda(contacts, slot);
         add_point(&sum, k / LANES_A_PAIR, lambda, arm, v3_add(arm, xyz(between)));
     }
-    store_records<LANES_A_PAIR>(v.records, v.ends[p], lane, live, sum);
+    store_records<LANES_A_PAIR>(iteration.records, contacts.ends[p], lane, live, sum);
 }
 
 /* ---- row blocks ------------------------------------------------------------------------------------------------- */
 
-static __device__ __forceinline__ void store_row_records(const cuda_view &v, int32_t k, const row_about &about,
+static __device__ __forceinline__ void store_row_records(const row_view &rows, int32_t k, const row_about &about,
                                                          const real lambda[6], solver_real *records)
 {
-    if (about.side_a >= 0) store_row_record(v, k, about.rows, 0, lambda, records + (size_t)about.side_a * ROW);
-    if (about.side_b >= 0) store_row_record(v, k, about.rows, 1, lambda, records + (size_t)about.side_b * ROW);
+    if (about.side_a >= 0) store_row_record(rows, k, about.rows, 0, lambda, records + (size_t)about.side_a * ROW);
+    if (about.side_b >= 0) store_row_record(rows, k, about.rows, 1, lambda, records + (size_t)about.side_b * ROW);
 }
 
 template <bool MEASURE>
-static __device__ __forceinline__ double sweep_row_block_fast(const cuda_view &v, int32_t k, real relaxation_factor)
+static __device__ __forceinline__ double sweep_row_block_fast(const model_view &model, const body_view &bodies,
+                                                              const row_view &rows, const iteration_view &iteration,
+                                                              int32_t k, real relaxation_factor)
 {
-    const row_about about = v.row_info[k];
+    const row_about about = rows.info[k];
     real lambda[6], delta[6], kept[6];
-    load_row_lambda(v, k, lambda);
+    load_row_lambda(rows, k, lambda);
     for (int r = 0; r < 6; ++r) kept[r] = lambda[r];
-    update_row_block_fast(v, k, about, v.state + (size_t)about.body_a * ROW, v.state + (size_t)about.body_b * ROW,
-                          lambda, delta);
+    update_row_block_fast(model, rows, k, about, bodies.state + (size_t)about.body_a * ROW,
+                          bodies.state + (size_t)about.body_b * ROW, lambda, delta);
     for (int r = 0; r < 6; ++r) kept[r] = relaxed(kept[r], lambda[r], delta[r], relaxation_factor);
-    store_row_lambda(v, k, kept);
-    store_row_records(v, k, about, delta, v.records);
-    return MEASURE ? row_block_primal_fast(v, k, about, delta) : 0;
+    store_row_lambda(rows, k, kept);
+    store_row_records(rows, k, about, delta, iteration.records);
+    return MEASURE ? row_block_primal_fast(rows, k, about, delta) : 0;
 }
 
-template <bool MEASURE> static __device__ __forceinline__ double sweep_row_block(const cuda_view &v, int32_t k)
+template <bool MEASURE>
+static __device__ __forceinline__ double sweep_row_block(const body_view &bodies, const row_view &rows,
+                                                         const iteration_view &iteration, int32_t k)
 {
-    const row_about about = v.row_info[k];
+    const row_about about = rows.info[k];
     real lambda[6], delta[6];
-    load_row_lambda(v, k, lambda);
-    update_row_block(v, k, about, v.state + (size_t)about.body_a * ROW, v.state + (size_t)about.body_b * ROW, lambda,
-                     delta);
-    store_row_lambda(v, k, lambda);
+    load_row_lambda(rows, k, lambda);
+    update_row_block(bodies, rows, k, about, bodies.state + (size_t)about.body_a * ROW,
+                     bodies.state + (size_t)about.body_b * ROW, lambda, delta);
+    store_row_lambda(rows, k, lambda);
     if (MEASURE) {
-        store_row_records(v, k, about, lambda, v.records);
-        store_row_records(v, k, about, delta, v.change);
+        store_row_records(rows, k, about, lambda, iteration.records);
+        store_row_records(rows, k, about, delta, iteration.change);
     } else {
         for (int r = 0; r < 6; ++r) lambda[r] += delta[r];
-        store_row_records(v, k, about, lambda, v.records);
+        store_row_records(rows, k, about, lambda, iteration.records);
     }
-    return MEASURE ? row_block_primal(v, about, delta) : 0;
+    return MEASURE ? row_block_primal(bodies, about, delta) : 0;
 }
 
 #endif

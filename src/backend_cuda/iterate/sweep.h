@@ -64,9 +64,9 @@ CUDA_INLINE body_motion no_motion(void)
     return m;
 }
 
-CUDA_INLINE real inv_beta_of(const cuda_view &v, int32_t body)
+CUDA_INLINE real inv_beta_of(const body_view &bodies, int32_t body)
 {
-    return v.state[(size_t)body * ROW + STATE_INV_BETA];
+    return bodies.state[(size_t)body * ROW + STATE_INV_BETA];
 }
 
 /* 1/s, s = 1/beta_a + 1/beta_b. */
@@ -107,17 +107,17 @@ CUDA_INLINE vec3 relative_velocity(const body_motion &a, vec3 arm_a, const body_
 }
 
 /* Multipliers of a point, a world vector. Without friction it is along the normal, since the projection's disc is a point. */
-CUDA_INLINE vec3 load_lambda(const cuda_view &v, size_t slot)
+CUDA_INLINE vec3 load_lambda(const contact_view &contacts, size_t slot)
 {
-    const solver_real *lambda = v.lambda + slot;
-    return v3(lambda[0], lambda[v.lambda_stride], lambda[2 * v.lambda_stride]);
+    const solver_real *lambda = contacts.lambda + slot;
+    return v3(lambda[0], lambda[contacts.lambda_stride], lambda[2 * contacts.lambda_stride]);
 }
 
-CUDA_INLINE void store_lambda(const cuda_view &v, size_t slot, vec3 lambda)
+CUDA_INLINE void store_lambda(const contact_view &contacts, size_t slot, vec3 lambda)
 {
-    v.lambda[slot] = lambda.x;
-    v.lambda[v.lambda_stride + slot] = lambda.y;
-    v.lambda[2 * v.lambda_stride + slot] = lambda.z;
+    contacts.lambda[slot] = lambda.x;
+    contacts.lambda[contacts.lambda_stride + slot] = lambda.y;
+    contacts.lambda[2 * contacts.lambda_stride + slot] = lambda.z;
 }
 
 /* Of x > 0 that is no denormal; 2 units of rounding. */
@@ -199,101 +199,101 @@ CUDA_INLINE real largest_row(vec3 normal, vec3 delta)
 
 /* ---- row blocks ----------------------------------------------------------------------------------------------- */
 
-CUDA_INLINE real row_value(const cuda_view &v, int32_t plane, int32_t k)
+CUDA_INLINE real row_value(const row_view &rows, int32_t plane, int32_t k)
 {
-    return v.row_data[(size_t)plane * (size_t)v.row_stride + (size_t)k];
+    return rows.data[(size_t)plane * (size_t)rows.stride + (size_t)k];
 }
 
 /* J^T lambda on one side. */
-CUDA_INLINE void store_row_record(const cuda_view &v, int32_t k, int32_t rows, int side, const real lambda[6],
+CUDA_INLINE void store_row_record(const row_view &rows, int32_t k, int32_t count, int side, const real lambda[6],
                                   solver_real *record)
 {
     const int32_t jacobian = side ? ROW_J_B : ROW_J_A;
     for (int j = 0; j < ROW; ++j) record[j] = 0;
     for (int j = 0; j < 6; ++j) {
         real sum = 0;
-        for (int r = 0; r < rows; ++r) sum += row_value(v, jacobian + 6 * r + j, k) * lambda[r];
+        for (int r = 0; r < count; ++r) sum += row_value(rows, jacobian + 6 * r + j, k) * lambda[r];
         record[record_slot(j)] = sum;
     }
 }
 
 /* Steps 2-4 of row block k for the velocities va, vb of its bodies: lambda, and its change in delta. */
-CUDA_INLINE void update_row_block(const cuda_view &v, int32_t k, const row_about &about, const solver_real *va,
-                                  const solver_real *vb, real lambda[6], real delta[6])
+CUDA_INLINE void update_row_block(const body_view &bodies, const row_view &rows, int32_t k, const row_about &about,
+                                  const solver_real *va, const solver_real *vb, real lambda[6], real delta[6])
 {
-    real s = inv_beta_of(v, about.body_a) + inv_beta_of(v, about.body_b), old[6];
+    real s = inv_beta_of(bodies, about.body_a) + inv_beta_of(bodies, about.body_b), old[6];
     for (int r = 0; r < 6; ++r) {
         old[r] = lambda[r];
         lambda[r] = 0;
         if (r >= about.rows) continue;
-        real x = 0, error = row_value(v, ROW_ERROR + r, k);
+        real x = 0, error = row_value(rows, ROW_ERROR + r, k);
         for (int j = 0; j < 6; ++j)
-            x += row_value(v, ROW_J_A + 6 * r + j, k) * va[j] + row_value(v, ROW_J_B + 6 * r + j, k) * vb[j];
+            x += row_value(rows, ROW_J_A + 6 * r + j, k) * va[j] + row_value(rows, ROW_J_B + 6 * r + j, k) * vb[j];
         if (about.kind == SADMM_BLOCK_SOFT)
-            lambda[r] = soft_multiplier(row_value(v, ROW_STIFFNESS + r, k), row_value(v, ROW_DAMPING + r, k), error, x,
-                                        s, old[r]);
+            lambda[r] = soft_multiplier(row_value(rows, ROW_STIFFNESS + r, k), row_value(rows, ROW_DAMPING + r, k),
+                                        error, x, s, old[r]);
         else if (about.active >> r & 1)
             lambda[r] = old[r] - (x + error) / s;
     }
     if (about.kind == SADMM_BLOCK_CONTACT) {
         real y[3] = {lambda[0], lambda[1], lambda[2]};
-        contact_project_rows(y, row_value(v, ROW_FRICTION, k), lambda);
+        contact_project_rows(y, row_value(rows, ROW_FRICTION, k), lambda);
     }
     for (int r = 0; r < 6; ++r) delta[r] = lambda[r] - old[r];
 }
 
 /* The same for the method `fast`: B / n in place of 1/s, n the number of dynamic bodies. */
-CUDA_INLINE void update_row_block_fast(const cuda_view &v, int32_t k, const row_about &about, const solver_real *va,
-                                       const solver_real *vb, real lambda[6], real delta[6])
+CUDA_INLINE void update_row_block_fast(const model_view &model, const row_view &rows, int32_t k, const row_about &about,
+                                       const solver_real *va, const solver_real *vb, real lambda[6], real delta[6])
 {
-    const real inv_n = about.body_a < v.bodies && about.body_b < v.bodies ? (real)0.5 : (real)1;
+    const real inv_n = about.body_a < model.bodies && about.body_b < model.bodies ? (real)0.5 : (real)1;
     real u[6], along = 0, old[6], step[6] = {};
     for (int r = 0; r < 6; ++r) {
         old[r] = lambda[r];
         u[r] = delta[r] = 0;
         if (r >= about.rows) continue;
         for (int j = 0; j < 6; ++j)
-            u[r] += row_value(v, ROW_J_A + 6 * r + j, k) * va[j] + row_value(v, ROW_J_B + 6 * r + j, k) * vb[j];
-        if (about.kind != SADMM_BLOCK_SOFT) u[r] += row_value(v, ROW_ERROR + r, k);
-        along += row_value(v, ROW_ALONG + r, k) * u[r];
+            u[r] += row_value(rows, ROW_J_A + 6 * r + j, k) * va[j] + row_value(rows, ROW_J_B + 6 * r + j, k) * vb[j];
+        if (about.kind != SADMM_BLOCK_SOFT) u[r] += row_value(rows, ROW_ERROR + r, k);
+        along += row_value(rows, ROW_ALONG + r, k) * u[r];
     }
     for (int r = 0; r < about.rows; ++r) {
-        const real weight = inv_n * row_value(v, ROW_WEIGHT + r, k);
+        const real weight = inv_n * row_value(rows, ROW_WEIGHT + r, k);
         step[r] = weight * u[r];
         if (about.kind == SADMM_BLOCK_SOFT)
-            delta[r] = soft_change(row_value(v, ROW_STIFFNESS + r, k), row_value(v, ROW_DAMPING + r, k),
-                                   row_value(v, ROW_ERROR + r, k), u[r], 1 / weight, old[r]);
-        else if (about.active >> r & 1)
-            delta[r] = -(step[r] + inv_n * row_value(v, ROW_ALONG + r, k) * along);
+            delta[r] = soft_change(row_value(rows, ROW_STIFFNESS + r, k), row_value(rows, ROW_DAMPING + r, k),
+                                   row_value(rows, ROW_ERROR + r, k), u[r], 1 / weight, old[r]);
+        else if (about.active >> r & 1) delta[r] = -(step[r] + inv_n * row_value(rows, ROW_ALONG + r, k) * along);
         lambda[r] = old[r] + delta[r];
     }
-    if (about.kind == SADMM_BLOCK_CONTACT) contact_change_rows(old, step, row_value(v, ROW_FRICTION, k), delta, lambda);
+    if (about.kind == SADMM_BLOCK_CONTACT)
+        contact_change_rows(old, step, row_value(rows, ROW_FRICTION, k), delta, lambda);
 }
 
-CUDA_INLINE void load_row_lambda(const cuda_view &v, int32_t k, real lambda[6])
+CUDA_INLINE void load_row_lambda(const row_view &rows, int32_t k, real lambda[6])
 {
-    for (int r = 0; r < 6; ++r) lambda[r] = row_value(v, ROW_LAMBDA + r, k);
+    for (int r = 0; r < 6; ++r) lambda[r] = row_value(rows, ROW_LAMBDA + r, k);
 }
 
-CUDA_INLINE void store_row_lambda(const cuda_view &v, int32_t k, const real lambda[6])
+CUDA_INLINE void store_row_lambda(const row_view &rows, int32_t k, const real lambda[6])
 {
-    for (int r = 0; r < 6; ++r) v.row_data[(size_t)(ROW_LAMBDA + r) * (size_t)v.row_stride + (size_t)k] = lambda[r];
+    for (int r = 0; r < 6; ++r) rows.data[(size_t)(ROW_LAMBDA + r) * (size_t)rows.stride + (size_t)k] = lambda[r];
 }
 
 /* Largest |d lambda| times the larger 1/beta: the block's share of the primal residual. */
-CUDA_INLINE double row_block_primal(const cuda_view &v, const row_about &about, const real delta[6])
+CUDA_INLINE double row_block_primal(const body_view &bodies, const row_about &about, const real delta[6])
 {
     real largest = 0;
     for (int r = 0; r < 6; ++r) largest = real_max(largest, real_abs(delta[r]));
-    return (double)(largest * real_max(inv_beta_of(v, about.body_a), inv_beta_of(v, about.body_b)));
+    return (double)(largest * real_max(inv_beta_of(bodies, about.body_a), inv_beta_of(bodies, about.body_b)));
 }
 
 /* The same for the method `fast`: |d lambda| / B of each row. */
-CUDA_INLINE double row_block_primal_fast(const cuda_view &v, int32_t k, const row_about &about, const real delta[6])
+CUDA_INLINE double row_block_primal_fast(const row_view &rows, int32_t k, const row_about &about, const real delta[6])
 {
     real largest = 0;
     for (int r = 0; r < about.rows; ++r) {
-        const real along = row_value(v, ROW_ALONG + r, k), B = row_value(v, ROW_WEIGHT + r, k) + along * along;
+        const real along = row_value(rows, ROW_ALONG + r, k), B = row_value(rows, ROW_WEIGHT + r, k) + along * along;
         if (about.active >> r & 1) largest = real_max(largest, real_abs(delta[r]) * (1 / B));
     }
     return (double)largest;

@@ -25,11 +25,11 @@ enum { STEP_THREADS = 64 }; /* a block: few, for long work and many multiprocess
 static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     int32_t i = thread_index();
-    if (i >= args.count || v.live->abort_code) return;
+    if (i >= args.count || v.model.live->abort_code) return;
     const struct sadmm_resident_edit *edit = &args.edits[i];
     const double *values = edit->values;
     if (edit->kind == SADMM_EDIT_SETTINGS) {
-        struct cuda_settings *kept = (struct cuda_settings *)v.settings; /* its first member */
+        struct cuda_settings *kept = (struct cuda_settings *)v.model.settings; /* its first member */
         struct sadmm_settings *settings = &kept->settings;
         int k = 0;
 #define PUT(name) settings->name = values[k++];
@@ -64,19 +64,19 @@ static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, co
 {
     const int64_t t = (int64_t)blockIdx.x * STEP_THREADS + threadIdx.x, i = t / START_LANES;
     const int32_t lane = (int32_t)(t % START_LANES);
-    if (v.live->abort_code) return;
+    if (v.model.live->abort_code) return;
     if (t == 0) {
         v.step.control->depth = 0;
         v.step.control->offending_body = INT32_MAX;
         v.step.control->stamps[STAMP_START] = nanoseconds();
     }
-    if (i >= v.bodies) return;
+    if (i >= v.model.bodies) return;
     /* Every lane fetches all that any of them needs, before it is told apart: one wait for memory, not one a kind of lane. */
     const struct sadmm_rigid *body = &v.step.before[i];
     const struct sadmm_steady *steady = &v.step.steady_before[i];
     const int32_t slot = v.step.slot_of_body[i], k = lane >= CARRIED_VELOCITY && lane < CARRIED ? lane - CARRIED_VELOCITY : 0;
-    const double number = ((const double *)body)[lane < CARRIED ? lane : 0], dt = v.settings->dt, last_dt = steady->dt,
-                 change = steady->change[k];
+    const double number = ((const double *)body)[lane < CARRIED ? lane : 0], dt = v.model.settings->dt,
+                 last_dt = steady->dt, change = steady->change[k];
     const int32_t streak = steady->streak[k / 3];
     const uint32_t placed = steady->placed;
     const vec3 force = v3_load(body->wrench), torque = v3_load(body->wrench + 3);
@@ -97,17 +97,17 @@ static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, co
 /* One thread. What was found is this step's when it fits. */
 static __global__ void admit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    if (threadIdx.x > 0 || v.live->abort_code) return;
+    if (threadIdx.x > 0 || v.model.live->abort_code) return;
     const struct sadmm_cuda_contact_counts counts = *v.step.counts;
     v.step.control->stamps[STAMP_FOUND] = nanoseconds();
     if (counts.candidates > v.step.candidate_capacity || counts.points > v.step.point_capacity ||
-        counts.pairs > v.pair_capacity) {
-        v.live->abort_code = ABORT_CAPACITY;
+        counts.pairs > v.contacts.pair_capacity) {
+        v.model.live->abort_code = ABORT_CAPACITY;
         return;
     }
-    v.live->bodies = v.bodies;
-    v.live->pairs = counts.pairs;
-    v.live->points = counts.points;
+    v.model.live->bodies = v.model.bodies;
+    v.model.live->pairs = counts.pairs;
+    v.model.live->points = counts.points;
 }
 
 /* ---- finish ---------------------------------------------------------------------------------------------------- */
@@ -118,21 +118,22 @@ struct body_before {
     struct sadmm_steady steady;
 };
 
-static __device__ body_before fetch_body(const cuda_view &v, int32_t i)
+static __device__ body_before fetch_body(const cuda_step_view &step, int32_t i)
 {
-    const body_before before = {v.step.before[i], v.step.steady_before[i]};
+    const body_before before = {step.before[i], step.steady_before[i]};
     return before;
 }
 
-static __device__ bool finish_body(const cuda_view &v, int32_t i, const body_before &before, double dt)
+static __device__ bool finish_body(const body_view &bodies, const graph_view &graph, const island_view &islands,
+                                   const cuda_step_view &step, int32_t i, const body_before &before, double dt)
 {
     struct sadmm_steady steady = before.steady;
     struct sadmm_rigid next = before.body;
-    const solver_real slow = v.step.limits ? slow_down(v, i) : (solver_real)1;
-    move_body(v, i, &before.body, slow, dt, next.position, next.orientation, next.velocity);
+    const solver_real slow = step.limits ? slow_down(graph, islands, i) : (solver_real)1;
+    move_body(bodies, i, &before.body, slow, dt, next.position, next.orientation, next.velocity);
     steady_keep(&steady, &before.body, &next, dt);
-    v.step.after[i] = next;
-    v.step.steady_after[i] = steady;
+    step.after[i] = next;
+    step.steady_after[i] = steady;
     return finite_numbers(next.position, 3) && finite_numbers(next.orientation, 4) && finite_numbers(next.velocity, 6);
 }
 
@@ -151,23 +152,24 @@ struct pair_before {
     point_before point;         /* the lane's first */
 };
 
-static __device__ pair_before fetch_pair(const cuda_view &v, int32_t p, int32_t lane)
+static __device__ pair_before fetch_pair(const raw_view &raw, const cuda_step_view &step, int32_t p, int32_t lane)
 {
-    const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
+    const struct sadmm_contact_pair *pair = &raw.pairs[p];
     pair_before before = {pair->first, pair->count, pair->body_b >= 0 ? pair->body_b : pair->body_a, {}};
-    if (lane < before.count) before.point = fetch_before(&v.step.points[before.first + lane]);
+    if (lane < before.count) before.point = fetch_before(&step.points[before.first + lane]);
     return before;
 }
 
-/* Impulses of a pair into its points, every v.lanes-th of them from `lane` on; *depth: the deepest. */
-static __device__ bool finish_pair(const cuda_view &v, int32_t p, int32_t lane, const pair_before &pair, double *depth)
+/* Impulses of a pair into its points, every v.contacts.lanes-th of them from `lane` on; *depth: the deepest. */
+static __device__ bool finish_pair(const contact_view &contacts, const cuda_step_view &step, int32_t p, int32_t lane,
+                                   const pair_before &pair, double *depth)
 {
     bool finite = true;
-    for (int32_t k = lane; k < pair.count; k += v.lanes) {
-        struct sadmm_contact_point *point = &v.step.points[pair.first + k];
+    for (int32_t k = lane; k < pair.count; k += contacts.lanes) {
+        struct sadmm_contact_point *point = &step.points[pair.first + k];
         const point_before before = k == lane ? pair.point : fetch_before(point);
-        double *start = v.step.start_impulse + 3 * (size_t)(pair.first + k), impulse[3];
-        v3_store(point_impulse(v, p, k), impulse);
+        double *start = step.start_impulse + 3 * (size_t)(pair.first + k), impulse[3];
+        v3_store(point_impulse(contacts, p, k), impulse);
         finite = finite && finite_numbers(impulse, 3);
         for (int j = 0; j < 3; ++j) {
             start[j] = before.impulse[j];
@@ -182,12 +184,12 @@ static __device__ bool finish_pair(const cuda_view &v, int32_t p, int32_t lane, 
 struct finish_ranges {
     int32_t wrenches, pairs, end;
 };
-static __host__ __device__ inline finish_ranges ranges_of(const cuda_view &v)
+static __host__ __device__ inline finish_ranges ranges_of(const model_view &model, const contact_view &contacts)
 {
     finish_ranges r;
-    r.wrenches = (v.bodies + WARP - 1) / WARP * WARP;
-    r.pairs = r.wrenches + (v.wrenches ? (LANES * v.bodies + WARP - 1) / WARP * WARP : 0);
-    r.end = r.pairs + v.lanes * v.pair_capacity;
+    r.wrenches = (model.bodies + WARP - 1) / WARP * WARP;
+    r.pairs = r.wrenches + (model.wrenches ? (LANES * model.bodies + WARP - 1) / WARP * WARP : 0);
+    r.end = r.pairs + contacts.lanes * contacts.pair_capacity;
     return r;
 }
 
@@ -196,35 +198,39 @@ static __global__ void __launch_bounds__(STEP_THREADS)
     finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     const int32_t i = (int32_t)(blockIdx.x * (unsigned)STEP_THREADS + threadIdx.x);
-    const finish_ranges range = ranges_of(v);
+    const finish_ranges range = ranges_of(v.model, v.contacts);
     struct cuda_step_control *control = v.step.control;
     double depth = 0;
-    const double dt = v.settings->dt;
-    const bool is_body = i < range.wrenches, is_pair = i >= range.pairs && (i - range.pairs) / v.lanes < live_pairs(v);
-    const int32_t p = (i - range.pairs) / v.lanes, lane = is_pair ? (i - range.pairs) % v.lanes : 0;
+    const double dt = v.model.settings->dt;
+    const bool is_body = i < range.wrenches,
+               is_pair = i >= range.pairs && (i - range.pairs) / v.contacts.lanes < live_pairs(v.model);
+    const int32_t p = (i - range.pairs) / v.contacts.lanes, lane = is_pair ? (i - range.pairs) % v.contacts.lanes : 0;
     body_before body = {};
     pair_before pair = {};
-    if (is_body && i < v.bodies) body = fetch_body(v, i);
-    if (is_pair) pair = fetch_pair(v, p, lane);
+    if (is_body && i < v.model.bodies) body = fetch_body(v.step, i);
+    if (is_pair) pair = fetch_pair(v.raw, v.step, p, lane);
     /* Layout and penalties are the last that abort a step, the latter where it is not as planned; iterations come
      * between. */
-    const bool on = as_planned(v) && !v.live->abort_code;
+    const bool on = as_planned(v.model, v.step) && !v.model.live->abort_code;
 
     wait_for_stream();
     let_next_begin();
     const unsigned long long deepest = control->depth; /* of those that have come here */
     if (i == 0) control->stamps[STAMP_SOLVED] = nanoseconds();
     if (is_body) {
-        if (on && i < v.bodies && !finish_body(v, i, body, dt)) atomicMin(&control->offending_body, i);
+        if (on && i < v.model.bodies && !finish_body(v.bodies, v.graph, v.islands, v.step, i, body, dt))
+            atomicMin(&control->offending_body, i);
     } else if (i < range.pairs) {
         const int32_t slot = (i - range.wrenches) / LANES, of_body = i % LANES;
-        const bool live = on && slot < v.bodies;
+        const bool live = on && slot < v.model.bodies;
         double wrench[6];
-        contact_wrench(v, live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0, of_body, 1 / dt, wrench);
-        if (live) store_wrench(wrench, of_body, v.step.wrench + 6 * (size_t)v.body_of[slot]);
+        contact_wrench(v.graph, v.contacts, v.raw, live ? v.graph.offsets[slot] : 0,
+                       live ? v.graph.offsets[slot + 1] : 0, of_body, 1 / dt, wrench);
+        if (live) store_wrench(wrench, of_body, v.step.wrench + 6 * (size_t)v.graph.body_of[slot]);
     } else if (on && is_pair) {
         /* bodies are named first: all of them are below any contact's */
-        if (!finish_pair(v, p, lane, pair, &depth)) atomicMin(&control->offending_body, v.bodies + pair.body);
+        if (!finish_pair(v.contacts, v.step, p, lane, pair, &depth))
+            atomicMin(&control->offending_body, v.model.bodies + pair.body);
     }
     /* -0 is no depth; a larger one may be there already */
     unsigned long long bits = depth > 0 ? (unsigned long long)__double_as_longlong(depth) : 0;
@@ -242,8 +248,8 @@ static __device__ double double_of(unsigned long long bits) { return __longlong_
 /* One thread. */
 static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    const bool planned = as_planned(v);
-    const int32_t aborted = v.live->abort_code;
+    const bool planned = as_planned(v.model, v.step);
+    const int32_t aborted = v.model.live->abort_code;
     wait_for_stream();
     if (threadIdx.x > 0) return;
     struct cuda_step_control *control = v.step.control;
@@ -254,19 +260,19 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
                                                                              ? ABORT_NON_FINITE
                                                                              : ABORT_NONE;
     control->stamps[STAMP_END] = nanoseconds();
-    v.live->abort_code = abort_code;
+    v.model.live->abort_code = abort_code;
     report->sequence = control->sequence++;
     report->abort_code = abort_code;
     report->offending_body = offending_body;
     report->counts = *v.step.counts;
-    report->statistics = *v.statistics;
+    report->statistics = *v.model.statistics;
     report->depth = double_of(control->depth);
-    report->primal = v.step.measured ? double_of(v.residual[0]) : -1;
-    report->dual = v.step.measured ? double_of(v.residual[1]) : -1;
-    report->limited = v.step.limits ? *v.limited : 0;
-    report->unmet = args.checks > 0 ? v.stop->unmet[args.checks % CHECKS_KEPT] : -1;
-    report->most_iterations = args.checks > 0 ? v.stop->last : 0;
-    report->sum_of_iterations = args.checks > 0 ? (int64_t)v.stop->sum : 0;
+    report->primal = v.step.measured ? double_of(v.iteration.residual[0]) : -1;
+    report->dual = v.step.measured ? double_of(v.iteration.residual[1]) : -1;
+    report->limited = v.step.limits ? *v.islands.limited : 0;
+    report->unmet = args.checks > 0 ? v.islands.stop->unmet[args.checks % CHECKS_KEPT] : -1;
+    report->most_iterations = args.checks > 0 ? v.islands.stop->last : 0;
+    report->sum_of_iterations = args.checks > 0 ? (int64_t)v.islands.stop->sum : 0;
     for (int k = 0; k < STAMPS; ++k) report->stamps[k] = control->stamps[k];
 }
 
@@ -284,7 +290,7 @@ sadmm_status CUDA(launch_edits)(struct sadmm_context *c, const struct sadmm_resi
 sadmm_status CUDA(launch_start)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    const int64_t blocks = (int64_t)c->view.bodies * START_LANES / STEP_THREADS + 1;
+    const int64_t blocks = (int64_t)c->view.model.bodies * START_LANES / STEP_THREADS + 1;
     return CUDA(launch_of)(c, start_step_kernel, "start", blocks, STEP_THREADS, &args, error);
 }
 
@@ -297,7 +303,7 @@ sadmm_status CUDA(launch_admit)(struct sadmm_context *c, struct sadmm_error *err
 sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    int64_t blocks = ((int64_t)ranges_of(c->view).end + STEP_THREADS - 1) / STEP_THREADS;
+    int64_t blocks = ((int64_t)ranges_of(c->view.model, c->view.contacts).end + STEP_THREADS - 1) / STEP_THREADS;
     return CUDA(launch_early)(c, finish_kernel, "finish", blocks, STEP_THREADS, &args, error);
 }
 

@@ -17,17 +17,17 @@ static __device__ __forceinline__ unsigned long long nanoseconds(void)
 }
 
 /* Assembly ends here. The grid's first thread says so. */
-static __device__ __forceinline__ void stamp_assembled(const cuda_view &v)
+static __device__ __forceinline__ void stamp_assembled(const cuda_step_view &step)
 {
-    if (blockIdx.x == 0 && threadIdx.x == 0) v.step.control->stamps[STAMP_ASSEMBLED] = nanoseconds();
+    if (blockIdx.x == 0 && threadIdx.x == 0) step.control->stamps[STAMP_ASSEMBLED] = nanoseconds();
 }
 
 /* Is the step what it was planned for? */
-static __device__ __forceinline__ bool as_planned(const cuda_view &v)
+static __device__ __forceinline__ bool as_planned(const model_view &model, const cuda_step_view &step)
 {
-    const struct cuda_graph_statistics *statistics = v.statistics;
-    const struct cuda_step_guess guess = v.step.guess;
-    const int32_t pairs = v.live->pairs, rows = pairs == 0 ? 0 : statistics->rough > 0 ? 3 : 1;
+    const struct cuda_graph_statistics *statistics = model.statistics;
+    const struct cuda_step_guess guess = step.guess;
+    const int32_t pairs = model.live->pairs, rows = pairs == 0 ? 0 : statistics->rough > 0 ? 3 : 1;
     const int32_t warm = pairs > 0 && 2 * (int64_t)statistics->warm >= pairs;
     return rows == guess.contact_rows && statistics->point_slots <= guess.point_slots &&
            (guess.warm < 0 || warm == guess.warm);
@@ -35,13 +35,14 @@ static __device__ __forceinline__ bool as_planned(const cuda_view &v)
 
 /* The grid's first thread compares the statistics with the plan; what runs now and what was assembled is of no use when
  * they differ. Scalars are 0 for the iterations (enum cuda_scalar). */
-static __device__ __forceinline__ void check_plan(const cuda_view &v)
+static __device__ __forceinline__ void check_plan(const model_view &model, const iteration_view &iteration,
+                                                  const cuda_step_view &step)
 {
     if (blockIdx.x > 0 || threadIdx.x > 0) return;
-    stamp_assembled(v);
-    v.residual[0] = v.residual[1] = 0;
-    *v.barrier = 0;
-    if (!v.live->abort_code && !as_planned(v)) v.live->abort_code = ABORT_PLAN;
+    stamp_assembled(step);
+    iteration.residual[0] = iteration.residual[1] = 0;
+    *iteration.barrier = 0;
+    if (!model.live->abort_code && !as_planned(model, step)) model.live->abort_code = ABORT_PLAN;
 }
 
 #endif

@@ -2,9 +2,9 @@
 #include "backend_cuda/device/double.h"
 #include "solution.h"
 
-static __device__ double row_multiplier(const cuda_view &v, int32_t k, int r)
+static __device__ double row_multiplier(const row_view &rows, int32_t k, int r)
 {
-    return (double)v.row_data[(size_t)(ROW_LAMBDA + r) * (size_t)v.row_stride + (size_t)k];
+    return (double)rows.data[(size_t)(ROW_LAMBDA + r) * (size_t)rows.stride + (size_t)k];
 }
 
 /* ---- v and lambda ---------------------------------------------------------------------------------------------- */
@@ -13,36 +13,37 @@ static __device__ double row_multiplier(const cuda_view &v, int32_t k, int r)
 static __global__ void read_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     int32_t i = thread_index();
-    double *impulses = v.out + 6 * (size_t)v.bodies, *multipliers = impulses + 3 * (size_t)v.points;
-    if (i < v.bodies) {
-        if (i >= live_bodies(v)) return;
-        double *out = v.out + 6 * (size_t)i;
-        for (int k = 0; k < 6; ++k) out[k] = (double)v.state[(size_t)i * ROW + (size_t)k];
+    double *impulses = v.raw.out + 6 * (size_t)v.model.bodies, *multipliers = impulses + 3 * (size_t)v.model.points;
+    if (i < v.model.bodies) {
+        if (i >= live_bodies(v.model)) return;
+        double *out = v.raw.out + 6 * (size_t)i;
+        for (int k = 0; k < 6; ++k) out[k] = (double)v.bodies.state[(size_t)i * ROW + (size_t)k];
         return;
     }
-    i -= v.bodies;
-    if (i < v.pair_capacity) {
-        if (i >= live_pairs(v)) return;
-        const struct sadmm_contact_pair *pair = &v.raw_pairs[i];
+    i -= v.model.bodies;
+    if (i < v.contacts.pair_capacity) {
+        if (i >= live_pairs(v.model)) return;
+        const struct sadmm_contact_pair *pair = &v.raw.pairs[i];
         for (int32_t k = 0; k < pair->count; ++k)
-            v3_store(point_impulse(v, i, k), impulses + 3 * (size_t)(pair->first + k));
+            v3_store(point_impulse(v.contacts, i, k), impulses + 3 * (size_t)(pair->first + k));
         return;
     }
-    i -= v.pair_capacity;
-    if (i < live_rows(v))
-        for (int r = 0; r < 6; ++r) multipliers[6 * (size_t)i + (size_t)r] = row_multiplier(v, i, r);
+    i -= v.contacts.pair_capacity;
+    if (i < live_rows(v.model, v.rows))
+        for (int r = 0; r < 6; ++r) multipliers[6 * (size_t)i + (size_t)r] = row_multiplier(v.rows, i, r);
 }
 
 extern "C" sadmm_status CUDA(read_solution)(struct sadmm_context *c, struct sadmm_error *error)
 {
     const struct sadmm_system *system = c->system;
     const cuda_view *v = &c->view;
-    size_t n = (size_t)v->bodies, points = (size_t)c->plan.points, rows = (size_t)v->rows;
+    size_t n = (size_t)v->model.bodies, points = (size_t)c->plan.points, rows = (size_t)v->rows.count;
     cuda_args args = {};
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(launch)(c, read_kernel, "read_solution", blocks_for((int64_t)v->bodies + v->pair_capacity + v->rows),
-                          &args, error));
-    CUDA_TRY(CUDA(download)(c, v->out, (6 * n + 3 * points + 6 * rows) * sizeof(double), error));
+    CUDA_TRY(CUDA(launch)(c, read_kernel, "read_solution",
+                          blocks_for((int64_t)v->model.bodies + v->contacts.pair_capacity + v->rows.count), &args,
+                          error));
+    CUDA_TRY(CUDA(download)(c, v->raw.out, (6 * n + 3 * points + 6 * rows) * sizeof(double), error));
     const double *from = (const double *)c->buffers[PINNED_OUT].data;
     if (n > 0) memcpy(system->velocity, from, 6 * n * sizeof *from);
     from += 6 * n;
@@ -56,16 +57,16 @@ extern "C" sadmm_status CUDA(read_solution)(struct sadmm_context *c, struct sadm
 static __global__ void read_penalty_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     int32_t i = thread_index();
-    if (i < live_bodies(v)) v.out[i] = v.beta[i];
+    if (i < live_bodies(v.model)) v.raw.out[i] = v.bodies.beta[i];
 }
 
 extern "C" sadmm_status CUDA(read_penalty)(struct sadmm_context *c, double *beta, struct sadmm_error *error)
 {
-    size_t bytes = (size_t)c->view.bodies * sizeof *beta;
+    size_t bytes = (size_t)c->view.model.bodies * sizeof *beta;
     cuda_args args = {};
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(launch)(c, read_penalty_kernel, "read_penalty", blocks_for(c->view.bodies), &args, error));
-    CUDA_TRY(CUDA(download)(c, c->view.out, bytes, error));
+    CUDA_TRY(CUDA(launch)(c, read_penalty_kernel, "read_penalty", blocks_for(c->view.model.bodies), &args, error));
+    CUDA_TRY(CUDA(download)(c, c->view.raw.out, bytes, error));
     if (bytes > 0) memcpy(beta, c->buffers[PINNED_OUT].data, bytes);
     return SADMM_OK;
 }
@@ -77,20 +78,20 @@ enum { MOVED = 13 }; /* position, orientation, velocity */
 static __global__ void integrate_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     int32_t i = thread_index();
-    if (i >= live_bodies(v)) return;
-    double *out = v.out + MOVED * (size_t)i;
-    move_body(v, i, &v.raw.rigid[i], (solver_real)1, v.settings->dt, out, out + 3, out + 7);
+    if (i >= live_bodies(v.model)) return;
+    double *out = v.raw.out + MOVED * (size_t)i;
+    move_body(v.bodies, i, &v.raw.system.rigid[i], (solver_real)1, v.model.settings->dt, out, out + 3, out + 7);
 }
 
 extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)
 {
-    size_t n = (size_t)c->view.bodies;
+    size_t n = (size_t)c->view.model.bodies;
     cuda_args args = {};
     if (!c->plan.rigid)
         return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "integrate: the system gives A and b, not rigid bodies");
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(launch)(c, integrate_kernel, "integrate", blocks_for(c->view.bodies), &args, error));
-    CUDA_TRY(CUDA(download)(c, c->view.out, MOVED * n * sizeof(double), error));
+    CUDA_TRY(CUDA(launch)(c, integrate_kernel, "integrate", blocks_for(c->view.model.bodies), &args, error));
+    CUDA_TRY(CUDA(download)(c, c->view.raw.out, MOVED * n * sizeof(double), error));
     const double *from = (const double *)c->buffers[PINNED_OUT].data;
     for (size_t i = 0; i < n; ++i, from += MOVED) {
         next[i] = c->system->rigid[i];
@@ -106,19 +107,21 @@ extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_ri
 static __global__ void wrench_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     int32_t slot = thread_index() / LANES, lane = (int32_t)threadIdx.x % LANES;
-    bool live = slot < live_bodies(v);
+    bool live = slot < live_bodies(v.model);
     double wrench[6];
-    contact_wrench(v, live ? v.offsets[slot] : 0, live ? v.offsets[slot + 1] : 0, lane, 1 / v.settings->dt, wrench);
-    if (live) store_wrench(wrench, lane, v.out + 6 * (size_t)v.body_of[slot]);
+    contact_wrench(v.graph, v.contacts, v.raw, live ? v.graph.offsets[slot] : 0, live ? v.graph.offsets[slot + 1] : 0,
+                   lane, 1 / v.model.settings->dt, wrench);
+    if (live) store_wrench(wrench, lane, v.raw.out + 6 * (size_t)v.graph.body_of[slot]);
 }
 
 extern "C" sadmm_status CUDA(recover_wrenches)(struct sadmm_context *c, double *wrench, struct sadmm_error *error)
 {
-    size_t bytes = 6 * (size_t)c->view.bodies * sizeof *wrench;
+    size_t bytes = 6 * (size_t)c->view.model.bodies * sizeof *wrench;
     cuda_args args = {};
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(launch)(c, wrench_kernel, "recover_wrenches", blocks_for((int64_t)c->view.bodies * LANES), &args, error));
-    CUDA_TRY(CUDA(download)(c, c->view.out, bytes, error));
+    CUDA_TRY(CUDA(launch)(c, wrench_kernel, "recover_wrenches", blocks_for((int64_t)c->view.model.bodies * LANES),
+                          &args, error));
+    CUDA_TRY(CUDA(download)(c, c->view.raw.out, bytes, error));
     if (bytes > 0) memcpy(wrench, c->buffers[PINNED_OUT].data, bytes);
     return SADMM_OK;
 }

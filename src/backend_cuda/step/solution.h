@@ -5,17 +5,18 @@
 #include "backend_cuda/device/double.h"
 
 /* Multiplier of a point as a world vector on b. */
-static __device__ __forceinline__ vec3 point_impulse(const cuda_view &v, int32_t p, int32_t k)
+static __device__ __forceinline__ vec3 point_impulse(const contact_view &contacts, int32_t p, int32_t k)
 {
-    const solver_real *lambda = v.lambda + point_slot(v, p, k);
-    return v3((double)lambda[0], (double)lambda[v.lambda_stride], (double)lambda[2 * v.lambda_stride]);
+    const solver_real *lambda = contacts.lambda + point_slot(contacts, p, k);
+    return v3((double)lambda[0], (double)lambda[contacts.lambda_stride], (double)lambda[2 * contacts.lambda_stride]);
 }
 
 /* Q: semi-implicit Euler of body i, its velocities times `slow`. dt: the settings', fetched early. */
-static __device__ __forceinline__ void move_body(const cuda_view &v, int32_t i, const struct sadmm_rigid *body, solver_real slow, double dt,
-                                 double position[3], double orientation[4], double velocity[6])
+static __device__ __forceinline__ void move_body(const body_view &bodies, int32_t i, const struct sadmm_rigid *body,
+                                                 solver_real slow, double dt, double position[3], double orientation[4],
+                                                 double velocity[6])
 {
-    const solver_real *state = v.state + (size_t)i * ROW;
+    const solver_real *state = bodies.state + (size_t)i * ROW;
     vec3 linear = v3((double)(state[0] * slow), (double)(state[1] * slow), (double)(state[2] * slow));
     vec3 angular = v3((double)(state[3] * slow), (double)(state[4] * slow), (double)(state[5] * slow));
     v3_store(rigid_move(v3_load(body->position), linear, dt), position);
@@ -24,12 +25,13 @@ static __device__ __forceinline__ void move_body(const cuda_view &v, int32_t i, 
     v3_store(angular, velocity + 3);
 }
 
-static __device__ __forceinline__ void add_pair_wrench(const cuda_view &v, int32_t p, int side, double per_dt, double wrench[6])
+static __device__ __forceinline__ void add_pair_wrench(const contact_view &contacts, const raw_view &raw, int32_t p,
+                                                       int side, double per_dt, double wrench[6])
 {
-    const struct sadmm_contact_pair *pair = &v.raw_pairs[p];
+    const struct sadmm_contact_pair *pair = &raw.pairs[p];
     for (int32_t k = 0; k < pair->count; ++k) {
-        const struct sadmm_contact_point *point = &v.raw_points[pair->first + k];
-        vec3 f = point_impulse(v, p, k), m = v3_cross(v3_load(side ? point->arm_b : point->arm_a), f);
+        const struct sadmm_contact_point *point = &raw.points[pair->first + k];
+        vec3 f = point_impulse(contacts, p, k), m = v3_cross(v3_load(side ? point->arm_b : point->arm_a), f);
         double sign = side ? per_dt : -per_dt;
         wrench[0] += sign * f.x, wrench[1] += sign * f.y, wrench[2] += sign * f.z;
         wrench[3] += sign * m.x, wrench[4] += sign * m.y, wrench[5] += sign * m.z;
@@ -38,13 +40,15 @@ static __device__ __forceinline__ void add_pair_wrench(const cuda_view &v, int32
 
 /* R: (12) with lambda = -u, J^T lambda / dt over the sides [begin, end) of a body, by eight lanes that take every
  * eighth half each; the sum is in all of them. per_dt: 1 / dt. Warp-collective. */
-static __device__ __forceinline__ void contact_wrench(const cuda_view &v, int32_t begin, int32_t end, int32_t lane,
+static __device__ __forceinline__ void contact_wrench(const graph_view &graph, const contact_view &contacts,
+                                                      const raw_view &raw, int32_t begin, int32_t end, int32_t lane,
                                                       double per_dt, double wrench[6])
 {
     for (int k = 0; k < 6; ++k) wrench[k] = 0;
     for (int32_t at = begin + lane; at < end; at += LANES) {
-        int32_t record = v.incident[at] / 2, side = v.incident[at] & 1;
-        if (record < v.pair_capacity) add_pair_wrench(v, record, side, per_dt, wrench); /* contacts given by geometry only */
+        int32_t record = graph.incident[at] / 2, side = graph.incident[at] & 1;
+        if (record < contacts.pair_capacity)
+            add_pair_wrench(contacts, raw, record, side, per_dt, wrench); /* contacts given by geometry only */
     }
 #pragma unroll
     for (int o = 1; o < LANES; o *= 2)

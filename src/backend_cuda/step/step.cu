@@ -87,10 +87,10 @@ static void view_into(struct sadmm_context *c, int into)
     step->reports = reports(c);
     step->measured = c->plan.residuals && !stops(c);
     step->limits = c->plan.limit;
-    c->view.raw.rigid = step->before;
-    c->view.raw.velocity = step->start_velocity;
-    c->view.raw_pairs = set.pairs;
-    c->view.raw_points = set.points;
+    c->view.raw.system.rigid = step->before;
+    c->view.raw.system.velocity = step->start_velocity;
+    c->view.raw.pairs = set.pairs;
+    c->view.raw.points = set.points;
 }
 
 /* Counts and settings of the view; pairs: room for so many. */
@@ -100,14 +100,14 @@ static void view_counts(struct sadmm_context *c, int64_t pairs)
     cuda_view *v = &c->view;
     struct sadmm_system none = {};
     c->system = nullptr;
-    v->raw = none;
-    v->raw.body_count = s->bodies;
-    v->bodies = s->bodies;
-    v->pair_capacity = (int32_t)((pairs + WARP - 1) / WARP * WARP);
-    v->rows = 0;
-    v->row_stride = 0;
-    v->contact_rows = s->guess.contact_rows == 1 ? 1 : 3;
-    v->warm_start = c->settings.warm_start;
+    v->raw.system = none;
+    v->raw.system.body_count = s->bodies;
+    v->model.bodies = s->bodies;
+    v->contacts.pair_capacity = (int32_t)((pairs + WARP - 1) / WARP * WARP);
+    v->rows.count = 0;
+    v->rows.stride = 0;
+    v->model.contact_rows = s->guess.contact_rows == 1 ? 1 : 3;
+    v->model.warm_start = c->settings.warm_start;
 }
 
 /* ---- a step, launch by launch ---------------------------------------------------------------------------------- */
@@ -224,8 +224,8 @@ static sadmm_status enqueue_step(struct sadmm_context *c, struct sadmm_error *er
     struct sadmm_stages stages = sadmm_stages_of(&c->plan, &c->settings, true);
     struct sadmm_stage stage;
     bool residuals = false;
-    c->prologue = c->fast && !c->plan.residuals && c->view.rows == 0 && c->view.contact_rows == 3 &&
-              CUDA(persistent_does_prologue)(&c->partition);
+    c->prologue = c->fast && !c->plan.residuals && c->view.rows.count == 0 && c->view.model.contact_rows == 3 &&
+                  CUDA(persistent_does_prologue)(&c->partition);
     while (sadmm_stages_next(&stages, &stage)) CUDA_TRY(record_stage(c, &stage, &residuals, error));
     return SADMM_OK;
 }
@@ -243,7 +243,8 @@ static sadmm_status copy_out(struct sadmm_context *c, void *to, const void *from
 
 static sadmm_status clear_abort(struct sadmm_context *c, struct sadmm_error *error)
 {
-    CUDA_CALL(c, cudaMemsetAsync(c->view.live, 0, sizeof *c->view.live, c->stream), "cudaMemsetAsync(live)");
+    CUDA_CALL(c, cudaMemsetAsync(c->view.model.live, 0, sizeof *c->view.model.live, c->stream),
+              "cudaMemsetAsync(live)");
     return SADMM_OK;
 }
 
@@ -268,8 +269,8 @@ static sadmm_status preview_step(struct sadmm_context *c, struct preview *out, s
         CUDA_TRY(CUDA(launch_start)(c, error));
         CUDA_TRY(enqueue_find(c, error));
         CUDA_TRY(CUDA(enqueue_statistics)(c, true, error));
-        CUDA_TRY(copy_out(c, &staged->live, c->view.live, sizeof staged->live, error));
-        CUDA_TRY(copy_out(c, &staged->statistics, c->view.statistics, sizeof staged->statistics, error));
+        CUDA_TRY(copy_out(c, &staged->live, c->view.model.live, sizeof staged->live, error));
+        CUDA_TRY(copy_out(c, &staged->statistics, c->view.model.statistics, sizeof staged->statistics, error));
         CUDA_TRY(copy_out(c, &staged->counts, c->view.step.counts, sizeof staged->counts, error));
         CUDA_TRY(CUDA(wait)(c, error));
         *out = *staged;
@@ -302,11 +303,12 @@ static sadmm_status tighten(struct sadmm_context *c, const struct preview *seen,
     if (c->partition.tier == SADMM_CUDA_TIER_STREAM) return SADMM_OK;
     struct preview *staged = buffer<struct preview>(c, PINNED_OUT);
     staged->live = seen->live;
-    CUDA_CALL(c, cudaMemcpyAsync(c->view.live, &staged->live, sizeof staged->live, cudaMemcpyHostToDevice, c->stream),
-              "cudaMemcpyAsync to the device");
+    CUDA_CALL(
+        c, cudaMemcpyAsync(c->view.model.live, &staged->live, sizeof staged->live, cudaMemcpyHostToDevice, c->stream),
+        "cudaMemcpyAsync to the device");
     CUDA_TRY(CUDA(enqueue_statistics_and_layout)(c, true, &c->partition, error));
-    CUDA_TRY(copy_out(c, &staged->live, c->view.live, sizeof staged->live, error));
-    CUDA_TRY(copy_out(c, &staged->statistics, c->view.statistics, sizeof staged->statistics, error));
+    CUDA_TRY(copy_out(c, &staged->live, c->view.model.live, sizeof staged->live, error));
+    CUDA_TRY(copy_out(c, &staged->statistics, c->view.model.statistics, sizeof staged->statistics, error));
     CUDA_TRY(CUDA(wait)(c, error));
     struct cuda_graph_statistics statistics = staged->statistics;
     statistics.point_slots = c->statistics.point_slots;
@@ -326,7 +328,7 @@ static sadmm_status make_plan(struct sadmm_context *c, struct sadmm_error *error
                                                               : SADMM_MAX_POINTS;
     s->guess.warm = sadmm_plan_depends_on_warmth(&c->settings) ? c->plan.warm : -1;
     view_counts(c, generous(seen.counts.pairs));
-    c->view.points = 0; /* results are read elsewhere */
+    c->view.model.points = 0; /* results are read elsewhere */
     seen.statistics.point_slots = s->guess.point_slots;
     c->statistics = seen.statistics;
     CUDA_TRY(CUDA(choose_partition)(c, &seen.statistics, &c->partition, error));
@@ -475,7 +477,7 @@ static sadmm_status see_step(struct sadmm_context *c, struct sadmm_error *error)
     ++s->seen;
     ++s->done;
     /* A plan with far too much room wastes launches. */
-    if (report.counts.pairs < c->view.pair_capacity / 4 - 256) s->planned = false;
+    if (report.counts.pairs < c->view.contacts.pair_capacity / 4 - 256) s->planned = false;
     return SADMM_OK;
 }
 
@@ -582,8 +584,8 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     s->misfit = -1;
     const struct cuda_settings *kept = buffer<struct cuda_settings>(c, BUFFER_SETTINGS);
     CUDA_TRY(COLLISION(attach)(s->collision, c->stream, world->input,
-                               buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES), &c->view.live->abort_code,
-                               &kept->settings.dt, &kept->gravity, error));
+                               buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES),
+                               &c->view.model.live->abort_code, &kept->settings.dt, &kept->gravity, error));
     view_into(c, s->into);
     return CUDA(wait)(c, error);
 }

@@ -83,8 +83,8 @@ struct cuda_step_view {
     struct cuda_step_guess guess;
     struct cuda_step_control *control;
     struct cuda_step_report *reports;     /* pinned: STEPS_AHEAD */
-    int32_t measured;                     /* residuals of the last iteration are in view.residual */
-    int32_t limits;                       /* energies are limited: view.limited */
+    int32_t measured;                     /* residuals of the last iteration are in view.iteration.residual */
+    int32_t limits;                       /* energies are limited: view.islands.limited */
 };
 
 #endif

@@ -12,9 +12,9 @@ struct pair_data {
     int32_t count;
 };
 
-static __device__ __forceinline__ pair_data load_pair(const cuda_view &v, int32_t p)
+static __device__ __forceinline__ pair_data load_pair(const contact_view &contacts, int32_t p)
 {
-    const real4 about = v.normal[p], between = v.difference[p];
+    const real4 about = contacts.normal[p], between = contacts.difference[p];
     const pair_data pair = {{(double)about.x, (double)about.y, (double)about.z},
                             {(double)between.x, (double)between.y, (double)between.z},
                             (double)about.w,
@@ -33,14 +33,14 @@ struct point_numbers {
     solver_real lambda[3];
 };
 
-static __device__ __forceinline__ point_numbers fetch_point(const cuda_view &v, int32_t p, int32_t k)
+static __device__ __forceinline__ point_numbers fetch_point(const contact_view &contacts, int32_t p, int32_t k)
 {
-    const size_t slot = point_slot(v, p, k);
+    const size_t slot = point_slot(contacts, p, k);
     point_numbers point;
-    point.arm = v.arm[slot];
-    point.lambda[0] = v.lambda[slot];
-    point.lambda[1] = v.lambda[v.lambda_stride + slot];
-    point.lambda[2] = v.lambda[2 * v.lambda_stride + slot];
+    point.arm = contacts.arm[slot];
+    point.lambda[0] = contacts.lambda[slot];
+    point.lambda[1] = contacts.lambda[contacts.lambda_stride + slot];
+    point.lambda[2] = contacts.lambda[2 * contacts.lambda_stride + slot];
     return point;
 }
 
@@ -58,20 +58,22 @@ static __device__ __forceinline__ point_data point_of(const point_numbers &numbe
     return point;
 }
 
-static __device__ __forceinline__ point_data load_point(const cuda_view &v, int32_t p, int32_t k, const pair_data &pair)
+static __device__ __forceinline__ point_data load_point(const contact_view &contacts, int32_t p, int32_t k,
+                                                        const pair_data &pair)
 {
-    return point_of(fetch_point(v, p, k), pair);
+    return point_of(fetch_point(contacts, p, k), pair);
 }
 
 /* use(point) for each point of a pair, in order. */
 template <class Use>
-static __device__ __forceinline__ void for_each_point(const cuda_view &v, int32_t p, const pair_data &pair, Use use)
+static __device__ __forceinline__ void for_each_point(const contact_view &contacts, int32_t p, const pair_data &pair,
+                                                      Use use)
 {
     for (int32_t first = 0; first < pair.count; first += POINTS_AT_ONCE) {
         point_numbers numbers[POINTS_AT_ONCE] = {};
 #pragma unroll
         for (int32_t j = 0; j < POINTS_AT_ONCE; ++j)
-            if (first + j < pair.count) numbers[j] = fetch_point(v, p, first + j);
+            if (first + j < pair.count) numbers[j] = fetch_point(contacts, p, first + j);
 #pragma unroll
         for (int32_t j = 0; j < POINTS_AT_ONCE; ++j)
             if (first + j < pair.count) use(point_of(numbers[j], pair));
@@ -83,36 +85,37 @@ static __device__ __forceinline__ double dot3(const double a[3], const double b[
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static __device__ __forceinline__ bool is_dynamic(const cuda_view &v, int32_t body) { return body < v.bodies; }
+static __device__ __forceinline__ bool is_dynamic(const model_view &model, int32_t body) { return body < model.bodies; }
 
 /* (A_0 + A_1 + A_2) / 3 */
-static __device__ __forceinline__ double mass_of(const cuda_view &v, size_t body)
+static __device__ __forceinline__ double mass_of(const body_view &bodies, size_t body)
 {
-    const solver_real *line = v.lines + body * (size_t)v.line;
-    if (v.rigid) return (double)line[0];
-    return ((double)line_a(line, v.rigid, 0, 0) + (double)line_a(line, v.rigid, 1, 1) +
-            (double)line_a(line, v.rigid, 2, 2)) /
+    const solver_real *line = bodies.lines + body * (size_t)bodies.line;
+    if (bodies.rigid) return (double)line[0];
+    return ((double)line_a(line, bodies.rigid, 0, 0) + (double)line_a(line, bodies.rigid, 1, 1) +
+            (double)line_a(line, bodies.rigid, 2, 2)) /
            3;
 }
 
 /* g += J^T lambda of a side; *push += the size of its force. */
-static inline __device__ void add_side(const cuda_view &v, int32_t code, double g[6], double *push)
+static inline __device__ void add_side(const contact_view &contacts, const row_view &rows, int32_t code, double g[6],
+                                       double *push)
 {
     const int32_t side = code & 1, p = code / 2;
-    if (p >= v.pair_capacity) {
-        const int32_t k = p - v.pair_capacity, jacobian = side ? ROW_J_B : ROW_J_A;
+    if (p >= contacts.pair_capacity) {
+        const int32_t k = p - contacts.pair_capacity, jacobian = side ? ROW_J_B : ROW_J_A;
         double wrench[6] = {};
-        for (int r = 0; r < v.row_info[k].rows; ++r)
+        for (int r = 0; r < rows.info[k].rows; ++r)
             for (int j = 0; j < 6; ++j)
-                wrench[j] += row_number(v, jacobian + 6 * r + j, k) * row_number(v, ROW_LAMBDA + r, k);
+                wrench[j] += row_number(rows, jacobian + 6 * r + j, k) * row_number(rows, ROW_LAMBDA + r, k);
         for (int j = 0; j < 6; ++j) g[j] += wrench[j];
         *push += sqrt(dot3(wrench, wrench));
         return;
     }
-    const pair_data pair = load_pair(v, p);
+    const pair_data pair = load_pair(contacts, p);
     const double sign = side ? 1 : -1;
     double force[3] = {};
-    for_each_point(v, p, pair, [&](const point_data &point) {
+    for_each_point(contacts, p, pair, [&](const point_data &point) {
         double arm[3];
         for (int j = 0; j < 3; ++j) {
             arm[j] = side ? point.arm[1][j] : point.arm[0][j];

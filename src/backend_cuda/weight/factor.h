@@ -11,12 +11,13 @@
 /* ---- weights of the method `fast` -------------------------------------------------------------------------------- */
 
 /* The contacts of deep stacks close small gaps slowly. */
-static __device__ __forceinline__ void ease_gaps(const cuda_view &v, int32_t p, double stack_depth)
+static __device__ __forceinline__ void ease_gaps(const model_view &model, const contact_view &contacts, int32_t p,
+                                                 double stack_depth)
 {
-    const double slop = v.settings->slop / v.settings->dt, share = weight_gap_share(stack_depth);
-    const int32_t count = share < 1 ? (int32_t)v.difference[p].w : 0;
+    const double slop = model.settings->slop / model.settings->dt, share = weight_gap_share(stack_depth);
+    const int32_t count = share < 1 ? (int32_t)contacts.difference[p].w : 0;
     for (int32_t k = 0; k < count; ++k) {
-        solver_real *error = &v.arm[point_slot(v, p, k)].w;
+        solver_real *error = &contacts.arm[point_slot(contacts, p, k)].w;
         *error = (solver_real)weight_gap_error((double)*error, share, slop);
     }
 }
@@ -31,52 +32,57 @@ struct eight_sides {
 };
 
 /* B of the pair of the lane's side. Both of its sides work it out; the one at its first dynamic body keeps it. */
-static __device__ __forceinline__ double weigh_side(const cuda_view &v, const eight_sides &sides,
-                                                    const cuda_island &island, bool first)
+static __device__ __forceinline__ double weigh_side(const model_view &model, const body_view &bodies,
+                                                    const contact_view &contacts, const weight_view &weights,
+                                                    const eight_sides &sides, const cuda_island &island, bool first)
 {
     const int32_t p = sides.code / 2;
     const double load = (double)sides.load, response = (double)sides.response;
-    const bool a = is_dynamic(v, sides.ends.body_a), both = a && is_dynamic(v, sides.ends.body_b);
+    const bool a = is_dynamic(model, sides.ends.body_a), both = a && is_dynamic(model, sides.ends.body_b);
     const double scale = island.rescale,
-                 taken = scale > 0 ? v.weight[p]
+                 taken = scale > 0 ? weights.weight[p]
                                    : weight_of_pair(island.weight_scale, weight_mass(load, island.speed, island.mass),
                                                     response),
                  B = scale > 0 ? taken * scale : taken;
     if (sides.code & 1 && a) return B;
-    v.inv_s[p] = (solver_real)(both ? B / 2 : B);
-    if (!(scale > 0)) v.weight[p] = taken;
-    if (first && v.rigid) ease_gaps(v, p, island.stack_depth); /* world level: gaps, a slop and a step */
+    contacts.inv_s[p] = (solver_real)(both ? B / 2 : B);
+    if (!(scale > 0)) weights.weight[p] = taken;
+    if (first && bodies.rigid)
+        ease_gaps(model, contacts, p, island.stack_depth); /* world level: gaps, a slop and a step */
     return B;
 }
 
 /* Are bodies rigid, and have contacts of three rows alone? Then A + C is inverted in closed form (factor_rigid). */
-static __host__ __device__ __forceinline__ bool has_closed_form(const cuda_view &v)
+static __host__ __device__ __forceinline__ bool has_closed_form(const model_view &model, const body_view &bodies,
+                                                               const row_view &rows)
 {
-    return v.rigid && v.contact_rows == 3 && v.rows == 0;
+    return bodies.rigid && model.contact_rows == 3 && rows.count == 0;
 }
 
 /* ---- C ----------------------------------------------------------------------------------------------------------- */
 
-static inline __device__ void add_weighted_block(const cuda_view &v, int32_t k, int32_t side, double C[PACKED])
+static inline __device__ void add_weighted_block(const row_view &rows, const raw_view &raw, int32_t k, int32_t side,
+                                                 double C[PACKED])
 {
-    const struct sadmm_problem_block *block = &v.raw.blocks[k];
+    const struct sadmm_problem_block *block = &raw.system.blocks[k];
     const double *J = side ? block->jacobian_b : block->jacobian_a;
     double along[6] = {};
     for (int32_t r = 0; r < block->rows; ++r) {
         double row[6];
         for (int j = 0; j < 6; ++j) row[j] = J[6 * r + j];
-        packed_add_row(C, row, row_number(v, ROW_WEIGHT + r, k));
-        for (int j = 0; j < 6; ++j) along[j] += row_number(v, ROW_ALONG + r, k) * row[j];
+        packed_add_row(C, row, row_number(rows, ROW_WEIGHT + r, k));
+        for (int j = 0; j < 6; ++j) along[j] += row_number(rows, ROW_ALONG + r, k) * row[j];
     }
     packed_add_row(C, along, 1);
 }
 
 /* B of a side's points into C, where contacts have one row. */
-static __device__ __forceinline__ void add_normals(const cuda_view &v, int32_t code, double B, double C[PACKED])
+static __device__ __forceinline__ void add_normals(const contact_view &contacts, int32_t code, double B,
+                                                   double C[PACKED])
 {
     const int32_t side = code & 1, p = code / 2;
-    const pair_data pair = load_pair(v, p);
-    for_each_point(v, p, pair, [&](const point_data &point) {
+    const pair_data pair = load_pair(contacts, p);
+    for_each_point(contacts, p, pair, [&](const point_data &point) {
         double row[6];
         normal_row(pair.normal, side ? point.arm[1] : point.arm[0], row);
         packed_add_row(C, row, B);
@@ -87,22 +93,24 @@ static __device__ __forceinline__ void add_normals(const cuda_view &v, int32_t c
 #define C_ROUNDING 8.0
 
 /* Those from place `begin` on. Every lane of the warp comes here. */
-static __device__ __forceinline__ eight_sides fetch_sides(const cuda_view &v, const body_thread &t, int32_t begin)
+static __device__ __forceinline__ eight_sides fetch_sides(const model_view &model, const graph_view &graph,
+                                                          const contact_view &contacts, const weight_view &weights,
+                                                          const body_thread &t, int32_t begin)
 {
     const bool more = t.lane + LANES < SIDE_ARMS;
     const pair_ends nobody = {};
     eight_sides out;
-    out.code = begin + t.lane < t.end ? v.incident[begin + t.lane] : -1;
-    const bool own = out.code >= 0 && out.code < 2 * v.pair_capacity;
-    const solver_real *about = v.side_arms + (size_t)(own ? out.code : 0) * SIDE_NUMBERS;
-    out.ends = own ? v.ends[out.code / 2] : nobody;
+    out.code = begin + t.lane < t.end ? graph.incident[begin + t.lane] : -1;
+    const bool own = out.code >= 0 && out.code < 2 * contacts.pair_capacity;
+    const solver_real *about = weights.side_arms + (size_t)(own ? out.code : 0) * SIDE_NUMBERS;
+    out.ends = own ? contacts.ends[out.code / 2] : nobody;
     out.load = own ? about[SIDE_LOAD] : (solver_real)0;
     out.response = own ? about[SIDE_RESPONSE] : (solver_real)0;
 #pragma unroll
     for (int j = 0; j < LANES; ++j) {
         const int32_t code = __shfl_sync((unsigned)ALL_LANES, out.code, j, LANES);
-        const bool pair = code >= 0 && code < 2 * v.pair_capacity && v.contact_rows == 3;
-        const solver_real *arms = v.side_arms + (size_t)(pair ? code : 0) * SIDE_NUMBERS + t.lane;
+        const bool pair = code >= 0 && code < 2 * contacts.pair_capacity && model.contact_rows == 3;
+        const solver_real *arms = weights.side_arms + (size_t)(pair ? code : 0) * SIDE_NUMBERS + t.lane;
         out.number[0][j] = pair ? arms[0] : (solver_real)0;
         out.number[1][j] = pair && more ? arms[LANES] : (solver_real)0;
     }
@@ -116,15 +124,16 @@ template <bool CLOSED>
 static __device__ __forceinline__ void weighted_matrix(const cuda_view &v, const body_thread &t, eight_sides sides,
                                                        const cuda_island &island, bool first, double C[PACKED])
 {
-    const bool three = CLOSED || v.contact_rows == 3;
+    const bool three = CLOSED || v.model.contact_rows == 3;
     double sum[2] = {};
 #pragma unroll
     for (int k = 0; k < PACKED; ++k) C[k] = 0;
     for (int32_t begin = t.begin;;) {
-        const bool rows = !CLOSED && sides.code >= 0 && sides.code >= 2 * v.pair_capacity;
-        const double B = sides.code < 0 || rows ? 0 : weigh_side(v, sides, island, first);
-        if (rows) add_weighted_block(v, sides.code / 2 - v.pair_capacity, sides.code & 1, C);
-        else if (!three && sides.code >= 0) add_normals(v, sides.code, B, C);
+        const bool rows = !CLOSED && sides.code >= 0 && sides.code >= 2 * v.contacts.pair_capacity;
+        const double B =
+            sides.code < 0 || rows ? 0 : weigh_side(v.model, v.bodies, v.contacts, v.weights, sides, island, first);
+        if (rows) add_weighted_block(v.rows, v.raw, sides.code / 2 - v.contacts.pair_capacity, sides.code & 1, C);
+        else if (!three && sides.code >= 0) add_normals(v.contacts, sides.code, B, C);
 #pragma unroll
         for (int j = 0; j < LANES; ++j) {
             const double weight = __shfl_sync((unsigned)ALL_LANES, B, j, LANES);
@@ -133,9 +142,9 @@ static __device__ __forceinline__ void weighted_matrix(const cuda_view &v, const
         }
         begin += LANES;
         if (__ballot_sync((unsigned)ALL_LANES, begin < t.end) == 0) break;
-        sides = fetch_sides(v, t, begin);
+        sides = fetch_sides(v.model, v.graph, v.contacts, v.weights, t, begin);
     }
-    if (!three || (!CLOSED && v.rows > 0)) sum_lanes<PACKED>(C);
+    if (!three || (!CLOSED && v.rows.count > 0)) sum_lanes<PACKED>(C);
     if (!three) return;
     struct arm_sums sums;
     double *in_order = &sums.count;
@@ -178,15 +187,15 @@ static __device__ __forceinline__ bool packed_cholesky(double M[PACKED], double 
 }
 
 /* A column of H into the lower triangle, 1/beta, and what H has unused. */
-static __device__ __forceinline__ void store_column(const cuda_view &v, size_t body, int32_t lane, double beta, solver_real *H,
-                                                    const double x[6])
+static __device__ __forceinline__ void store_column(const body_view &bodies, size_t body, int32_t lane, double beta,
+                                                    solver_real *H, const double x[6])
 {
 #pragma unroll
     for (int i = 0; i < 6; ++i)
         if (lane <= i) H[i * (i + 1) / 2 + lane] = (solver_real)x[i];
     if (lane == 6)
         for (int k = PACKED; k < LINE_H; ++k) H[k] = 0;
-    if (lane == 7) v.state[body * ROW + STATE_INV_BETA] = (solver_real)(1 / beta);
+    if (lane == 7) bodies.state[body * ROW + STATE_INV_BETA] = (solver_real)(1 / beta);
 }
 
 /* H where it has a closed form. A + C = [p I, -[q]x; [q]x, R] with [q]x u = q x u; by eliminating the linear part, a column a lane: in
@@ -194,9 +203,10 @@ static __device__ __forceinline__ void store_column(const cuda_view &v, size_t b
  *     p t - q x w = f,   q x t + R w = g        S w = g - q x f / p,   S = R - (|q|^2 I - q q^T) / p,   t = (f + q x w) / p
  *
  * S = L D L^T. */
-static __device__ __forceinline__ void factor_rigid(const cuda_view &v, size_t body, int32_t lane, const double C[PACKED])
+static __device__ __forceinline__ void factor_rigid(const body_view &bodies, size_t body, int32_t lane,
+                                                    const double C[PACKED])
 {
-    solver_real *line = v.lines + body * (size_t)v.line;
+    solver_real *line = bodies.lines + body * (size_t)bodies.line;
     const double p = (double)line[0] + C[0], x = C[16], y = C[8], z = C[10], by_p = 1 / p;
     const double rxx = (double)line[1] + C[9], rxy = (double)line[2] + C[13], ryy = (double)line[3] + C[14],
                  rxz = (double)line[4] + C[18], ryz = (double)line[5] + C[19], rzz = (double)line[6] + C[20];
@@ -220,20 +230,20 @@ static __device__ __forceinline__ void factor_rigid(const cuda_view &v, size_t b
 #pragma unroll
         for (int i = 0; i < 6; ++i) column[i] = i == lane ? 1 / diagonal : 0;
     }
-    store_column(v, body, lane, 1, line_h(line, true), column);
+    store_column(bodies, body, lane, 1, line_h(line, true), column);
 }
 
 /* H = (A + beta C)^-1, a column a lane, and 1/beta. */
-static __device__ __forceinline__ void factor_body(const cuda_view &v, size_t body, int32_t lane, double beta,
+static __device__ __forceinline__ void factor_body(const body_view &bodies, size_t body, int32_t lane, double beta,
                                                    const double C[PACKED])
 {
-    solver_real *line = v.lines + body * (size_t)v.line, *H = line_h(line, v.rigid);
+    solver_real *line = bodies.lines + body * (size_t)bodies.line, *H = line_h(line, bodies.rigid);
     double M[PACKED], diagonal[6], inverse[6], x[6];
 #pragma unroll
     for (int r = 0; r < 6; ++r) {
 #pragma unroll
         for (int k = 0; k <= r; ++k)
-            M[r * (r + 1) / 2 + k] = (double)line_a(line, v.rigid, r, k) + beta * C[r * (r + 1) / 2 + k];
+            M[r * (r + 1) / 2 + k] = (double)line_a(line, bodies.rigid, r, k) + beta * C[r * (r + 1) / 2 + k];
         diagonal[r] = M[r * (r + 1) / 2 + r];
     }
     const bool ok = packed_cholesky(M, inverse);
@@ -254,7 +264,7 @@ static __device__ __forceinline__ void factor_body(const cuda_view &v, size_t bo
 #pragma unroll
     for (int i = 0; i < 6; ++i) /* A rounded to f32 stays positive definite unless the problem is beyond f32: then keep the diagonal. */
         if (!ok) x[i] = i == lane ? 1 / diagonal[i] : 0;
-    store_column(v, body, lane, beta, H, x);
+    store_column(bodies, body, lane, beta, H, x);
 }
 
 #endif

@@ -21,14 +21,14 @@ struct largest_term { /* a NaN stays */
  * island; those have all of the sums in `sum`, and see what any body of the island has written before it came here. Every
  * lane of the warp comes here. */
 template <class Join>
-static __device__ __forceinline__ bool add_up_island(const cuda_view &v, const body_thread &t, double term,
-                                                     double sum[TERMS])
+static __device__ __forceinline__ bool add_up_island(const graph_view &graph, const island_view &islands,
+                                                     const body_thread &t, double term, double sum[TERMS])
 {
-    const int32_t label = t.live ? v.label[t.body] : 0, first = t.live ? v.slot_of[label] : 0,
-                  bodies = t.live ? v.island_bodies[label] : 0;
+    const int32_t label = t.live ? graph.label[t.body] : 0, first = t.live ? graph.slot_of[label] : 0,
+                  bodies = t.live ? graph.island_bodies[label] : 0;
     int32_t rank = t.slot - first;
     bool on = t.live;
-    double *own = v.terms + (size_t)t.slot * TERMS;
+    double *own = islands.terms + (size_t)t.slot * TERMS;
     if (on && t.lane < TERMS) own[t.lane] = term;
     int32_t power = 0;
     for (int64_t apart = 1; __ballot_sync((unsigned)ALL_LANES, on && apart < bodies) != 0; apart *= SPREAD, ++power) {
@@ -41,16 +41,16 @@ static __device__ __forceinline__ bool add_up_island(const cuda_view &v, const b
         if (!alone && t.lane == 0) {
             const unsigned long long one = 1ull << ARRIVAL_BITS * power;
             __threadfence(); /* what the lanes have written, before their body is counted */
-            const unsigned long long before = atomicAdd(&v.arrivals[first + begin], one);
+            const unsigned long long before = atomicAdd(&islands.arrivals[first + begin], one);
             last = (int32_t)(before >> ARRIVAL_BITS * power & ((1u << ARRIVAL_BITS) - 1)) + 1 == members;
-            if (last) atomicAdd(&v.arrivals[first + begin], 0ull - one * (unsigned long long)members);
+            if (last) atomicAdd(&islands.arrivals[first + begin], 0ull - one * (unsigned long long)members);
             __threadfence(); /* and what the others have */
         }
         on = __shfl_sync((unsigned)ALL_LANES, last, 0, LANES);
         __syncwarp((unsigned)ALL_LANES);
         if (alone || !on) continue;
         rank = begin;
-        double *to = v.terms + (size_t)(first + begin) * TERMS;
+        double *to = islands.terms + (size_t)(first + begin) * TERMS;
         if (t.lane >= TERMS) continue;
         double all[SPREAD];
 #pragma unroll

@@ -6,11 +6,11 @@
 
 /* ---- C ------------------------------------------------------------------------------------------------------------- */
 
-static __device__ void add_pair(const cuda_view &v, const struct sadmm_contact_pair *pair, int side,
-                                arm_sums *sums, double C[PACKED])
+static __device__ void add_pair(const model_view &model, const raw_view &raw, const struct sadmm_contact_pair *pair,
+                                int side, arm_sums *sums, double C[PACKED])
 {
     const int32_t count = pair->count;
-    const struct sadmm_contact_point *points = v.raw_points + pair->first;
+    const struct sadmm_contact_point *points = raw.points + pair->first;
     for (int32_t first = 0; first < count; first += POINTS_AT_ONCE) {
         double arms[POINTS_AT_ONCE][3] = {};
 #pragma unroll
@@ -21,7 +21,7 @@ static __device__ void add_pair(const cuda_view &v, const struct sadmm_contact_p
 #pragma unroll
         for (int32_t j = 0; j < POINTS_AT_ONCE; ++j) {
             if (first + j >= count) continue;
-            if (v.contact_rows == 3) {
+            if (model.contact_rows == 3) {
                 add_arm(sums, arms[j], 1);
             } else {
                 double row[6];
@@ -32,9 +32,9 @@ static __device__ void add_pair(const cuda_view &v, const struct sadmm_contact_p
     }
 }
 
-static __device__ void add_block(const cuda_view &v, int32_t k, int side, double C[PACKED])
+static __device__ void add_block(const raw_view &raw, int32_t k, int side, double C[PACKED])
 {
-    const struct sadmm_problem_block *block = &v.raw.blocks[k];
+    const struct sadmm_problem_block *block = &raw.system.blocks[k];
     const double *J = side ? block->jacobian_b : block->jacobian_a;
     for (int32_t r = 0; r < block->rows; ++r) {
         double row[6];
@@ -50,22 +50,23 @@ static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, const 
     arm_sums sums = {};
     for (int k = 0; k < PACKED; ++k) C[k] = 0;
     for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) {
-        const int32_t record = v.incident[at] / 2, side = v.incident[at] & 1;
-        if (record < v.pair_capacity) add_pair(v, &v.raw_pairs[record], side, &sums, C);
-        else add_block(v, record - v.pair_capacity, side, C);
+        const int32_t record = v.graph.incident[at] / 2, side = v.graph.incident[at] & 1;
+        if (record < v.contacts.pair_capacity) add_pair(v.model, v.raw, &v.raw.pairs[record], side, &sums, C);
+        else add_block(v.raw, record - v.contacts.pair_capacity, side, C);
     }
-    if (v.contact_rows == 1 || v.rows > 0) sum_lanes<PACKED>(C);
+    if (v.model.contact_rows == 1 || v.rows.count > 0) sum_lanes<PACKED>(C);
     sum_lanes<sizeof sums / sizeof(double)>(&sums.count);
     add_arm_sums(C, &sums);
 }
 
 /* (13). dt^2: c is given in the paper's time-scaled units. Without constraints beta does not matter. */
-static __device__ __forceinline__ double penalty_of(const cuda_view &v, const solver_real *line, const double C[PACKED])
+static __device__ __forceinline__ double penalty_of(const model_view &model, const body_view &bodies,
+                                                    const solver_real *line, const double C[PACKED])
 {
-    const struct sadmm_settings *s = v.settings;
+    const struct sadmm_settings *s = model.settings;
     double trace_A = 0, trace_C = C[0] + C[2] + C[5] + C[9] + C[14] + C[20];
 #pragma unroll
-    for (int k = 0; k < 6; ++k) trace_A += (double)line_a(line, v.rigid, k, k);
+    for (int k = 0; k < 6; ++k) trace_A += (double)line_a(line, bodies.rigid, k, k);
     return trace_C > 0 ? s->penalty_mass_factor * trace_A / trace_C + s->penalty_offset * s->dt * s->dt : 1;
 }
 
@@ -80,50 +81,54 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     penalty_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     wait_for_stream();
-    const body_thread t = body_of_thread(v);
+    const body_thread t = body_of_thread(v.model, v.graph);
     const cuda_island none = {};
     double C[PACKED], beta = 1;
     if (PENALTY) {
         if (FORM == PLAIN) penalty_matrix(v, t, C);
         else
-            weighted_matrix<FORM == CLOSED>(v, t, fetch_sides(v, t, t.begin),
-                                            t.live ? v.islands[v.label[t.body]] : none, args.start, C);
+            weighted_matrix<FORM == CLOSED>(v, t, fetch_sides(v.model, v.graph, v.contacts, v.weights, t, t.begin),
+                                            t.live ? v.islands.info[v.graph.label[t.body]] : none, args.start, C);
         if (t.live) {
-            if (FORM == PLAIN) beta = penalty_of(v, v.lines + t.body * (size_t)v.line, C);
-            if (t.lane == 0) v.beta[t.body] = beta;
+            if (FORM == PLAIN) beta = penalty_of(v.model, v.bodies, v.bodies.lines + t.body * (size_t)v.bodies.line, C);
+            if (t.lane == 0) v.bodies.beta[t.body] = beta;
 #pragma unroll
             for (int k = 0; k < PACKED; ++k)
-                if (k % LANES == t.lane) v.C[t.body * PACKED + (size_t)k] = C[k];
+                if (k % LANES == t.lane) v.bodies.C[t.body * PACKED + (size_t)k] = C[k];
         }
     } else if (t.live) {
-        beta = v.beta[t.body];
-        for (int k = 0; k < PACKED; ++k) C[k] = v.C[t.body * PACKED + (size_t)k];
+        beta = v.bodies.beta[t.body];
+        for (int k = 0; k < PACKED; ++k) C[k] = v.bodies.C[t.body * PACKED + (size_t)k];
     }
-    if (FACTOR && t.live && FORM == CLOSED) factor_rigid(v, t.body, t.lane, C);
-    else if (FACTOR && t.live) factor_body(v, t.body, t.lane, beta, C);
-    if (args.planned) check_plan(v);
+    if (FACTOR && t.live && FORM == CLOSED) factor_rigid(v.bodies, t.body, t.lane, C);
+    else if (FACTOR && t.live) factor_body(v.bodies, t.body, t.lane, beta, C);
+    if (args.planned) check_plan(v.model, v.iteration, v.step);
 }
 
 static __global__ void scale_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     int32_t i = thread_index();
-    if (i >= live_bodies(v)) return;
+    if (i >= live_bodies(v.model)) return;
     double ratio = args.factor;
     if (args.measure) /* by the residuals */
-        ratio = sadmm_penalty_ratio(__longlong_as_double((long long)v.residual[0]),
-                                    __longlong_as_double((long long)v.residual[1]), v.settings->penalty_ratio_limit);
-    v.beta[i] *= ratio;
-    if (i == 0) *v.ratio = ratio;
+        ratio = sadmm_penalty_ratio(__longlong_as_double((long long)v.iteration.residual[0]),
+                                    __longlong_as_double((long long)v.iteration.residual[1]),
+                                    v.model.settings->penalty_ratio_limit);
+    v.bodies.beta[i] *= ratio;
+    if (i == 0) *v.iteration.ratio = ratio;
 }
 
 /* ---- entries --------------------------------------------------------------------------------------------------- */
 
-static bool closed_form(const struct sadmm_context *c) { return c->fast && has_closed_form(c->view); }
+static bool closed_form(const struct sadmm_context *c)
+{
+    return c->fast && has_closed_form(c->view.model, c->view.bodies, c->view.rows);
+}
 
 static sadmm_status launch_bodies(struct sadmm_context *c, cuda_kernel kernel, const char *name, const cuda_args *args,
                                   struct sadmm_error *error)
 {
-    const int64_t blocks = body_blocks(c->view.bodies);
+    const int64_t blocks = body_blocks(c->view.model.bodies);
     return CUDA(launch_early)(c, kernel, name, args->planned && blocks == 0 ? 1 : blocks, BODY_THREADS, args, error);
 }
 
@@ -158,7 +163,7 @@ extern "C" sadmm_status CUDA(update_penalty)(struct sadmm_context *c, double rat
     cuda_args args = {};
     args.factor = ratio;
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(launch)(c, scale_kernel, "update_penalty", blocks_for(c->view.bodies), &args, error));
+    CUDA_TRY(CUDA(launch)(c, scale_kernel, "update_penalty", blocks_for(c->view.model.bodies), &args, error));
     c->rescaled = true;
     return SADMM_OK;
 }
@@ -182,7 +187,7 @@ sadmm_status CUDA(enqueue_balance)(struct sadmm_context *c, struct sadmm_error *
 {
     cuda_args args = {};
     args.measure = 1;
-    CUDA_TRY(CUDA(launch)(c, scale_kernel, "update_penalty", blocks_for(c->view.bodies), &args, error));
+    CUDA_TRY(CUDA(launch)(c, scale_kernel, "update_penalty", blocks_for(c->view.model.bodies), &args, error));
     c->rescaled = true;
     return SADMM_OK;
 }

@@ -9,21 +9,22 @@
 #include "core/math/weight.h"
 
 /* What the contacts of a pair miss. */
-static inline __device__ double violation_of(const cuda_view &v, int32_t p)
+static inline __device__ double violation_of(const body_view &bodies, const contact_view &contacts,
+                                             const weight_view &weights, int32_t p)
 {
-    const pair_data pair = load_pair(v, p);
-    const pair_ends ends = v.ends[p];
-    const int32_t bodies[2] = {ends.body_a, ends.body_b};
+    const pair_data pair = load_pair(contacts, p);
+    const pair_ends ends = contacts.ends[p];
+    const int32_t joined[2] = {ends.body_a, ends.body_b};
     double velocity[2][6], sum = 0;
     for (int side = 0; side < 2; ++side)
-        for (int j = 0; j < 6; ++j) velocity[side][j] = (double)v.state[(size_t)bodies[side] * ROW + (size_t)j];
+        for (int j = 0; j < 6; ++j) velocity[side][j] = (double)bodies.state[(size_t)joined[side] * ROW + (size_t)j];
     for (int32_t k = 0; k < pair.count; ++k) {
-        const point_data point = load_point(v, p, k, pair);
+        const point_data point = load_point(contacts, p, k, pair);
         double u[3];
         for (int j = 0; j < 3; ++j) u[j] = velocity[1][j] - velocity[0][j] + point.error * pair.normal[j];
         add_cross(velocity[1] + 3, point.arm[1], 1, u);
         add_cross(velocity[0] + 3, point.arm[0], -1, u);
-        sum += contact_violation(point.lambda, u, pair.normal, pair.friction, v.response[p]);
+        sum += contact_violation(point.lambda, u, pair.normal, pair.friction, weights.response[p]);
     }
     return sum;
 }
@@ -52,13 +53,15 @@ static __device__ __forceinline__ void weigh_island(cuda_island *island, const d
 }
 
 /* Number `lane` of what side_wrench would have of side `code` of a row block. */
-static inline __device__ double row_side_number(const cuda_view &v, int32_t code, int32_t lane)
+static inline __device__ double row_side_number(const contact_view &contacts, const row_view &rows, int32_t code,
+                                                int32_t lane)
 {
-    const int32_t k = code / 2 - v.pair_capacity, jacobian = code & 1 ? ROW_J_B : ROW_J_A;
+    const int32_t k = code / 2 - contacts.pair_capacity, jacobian = code & 1 ? ROW_J_B : ROW_J_A;
     double square = 0;
     for (int j = lane < 6 ? lane : 0; j < (lane < 6 ? lane + 1 : 3); ++j) {
         double sum = 0;
-        for (int r = 0; r < v.row_info[k].rows; ++r) sum += row_number(v, jacobian + 6 * r + j, k) * row_number(v, ROW_LAMBDA + r, k);
+        for (int r = 0; r < rows.info[k].rows; ++r)
+            sum += row_number(rows, jacobian + 6 * r + j, k) * row_number(rows, ROW_LAMBDA + r, k);
         if (lane < 6) return sum;
         square += sum * sum;
     }
@@ -68,7 +71,9 @@ static inline __device__ double row_side_number(const cuda_view &v, int32_t code
 /* J^T lambda of a body, a component a lane; in lane SIDE_PUSH the sum of the forces' sizes. ROWS: there may be row
  * blocks. */
 template <bool ROWS>
-static __device__ __forceinline__ double sum_sides(const cuda_view &v, const body_thread &t)
+static __device__ __forceinline__ double sum_sides(const graph_view &graph, const contact_view &contacts,
+                                                   const row_view &rows, const weight_view &weights,
+                                                   const body_thread &t)
 {
     enum { AT_ONCE = 4 };
     double sum = 0;
@@ -76,12 +81,13 @@ static __device__ __forceinline__ double sum_sides(const cuda_view &v, const bod
         double number[AT_ONCE];
         int32_t code[AT_ONCE];
 #pragma unroll
-        for (int32_t j = 0; j < AT_ONCE; ++j) code[j] = first + j < t.end ? v.incident[first + j] : -1;
+        for (int32_t j = 0; j < AT_ONCE; ++j) code[j] = first + j < t.end ? graph.incident[first + j] : -1;
 #pragma unroll
         for (int32_t j = 0; j < AT_ONCE; ++j)
-            number[j] = code[j] < 0                            ? 0
-                        : ROWS && code[j] / 2 >= v.pair_capacity ? row_side_number(v, code[j], t.lane)
-                                                               : v.side_wrench[(size_t)code[j] * ROW + (size_t)t.lane];
+            number[j] = code[j] < 0 ? 0
+                        : ROWS && code[j] / 2 >= contacts.pair_capacity
+                            ? row_side_number(contacts, rows, code[j], t.lane)
+                            : weights.side_wrench[(size_t)code[j] * ROW + (size_t)t.lane];
 #pragma unroll
         for (int32_t j = 0; j < AT_ONCE; ++j) sum += number[j];
     }
@@ -97,18 +103,20 @@ static __device__ __forceinline__ double terms_of_body(const cuda_view &v, const
 {
     double missed = 0, term[TERMS] = {};
     for (int32_t at = t.begin + t.lane; LEVELS && at < t.end; at += LANES) {
-        const int32_t code = v.incident[at], p = code / 2;
-        if (p >= v.pair_capacity || (code & 1 && is_dynamic(v, v.ends[p].body_a))) continue; /* counted there */
-        missed += violation_of(v, p);
+        const int32_t code = v.graph.incident[at], p = code / 2;
+        if (p >= v.contacts.pair_capacity || (code & 1 && is_dynamic(v.model, v.contacts.ends[p].body_a)))
+            continue; /* counted there */
+        missed += violation_of(v.bodies, v.contacts, v.weights, p);
     }
-    const wide_row<RIGID> row = row_of_body<RIGID>(v, t);
-    const double sum = sum_sides<ROWS>(v, t), g = t.lane < 6 ? sum : 0, momentum = product(row.velocity, row.a);
+    const wide_row<RIGID> row = row_of_body<RIGID>(v.bodies, t);
+    const double sum = sum_sides<ROWS>(v.graph, v.contacts, v.rows, v.weights, t), g = t.lane < 6 ? sum : 0,
+                 momentum = product(row.velocity, row.a);
     term[0] = dot_lanes(g, product(g, row.a_inverse));
-    term[1] = t.live ? mass_of(v, t.body) : 0;
+    term[1] = t.live ? mass_of(v.bodies, t.body) : 0;
     term[2] = dot_lanes(row.velocity, momentum);
     term[3] = __shfl_sync((unsigned)ALL_LANES, sum, SIDE_PUSH, LANES);
     const double r = row.b + g - momentum;
-    if (t.live) v.momentum_residual[t.body * ROW + (size_t)t.lane] = (solver_real)r;
+    if (t.live) v.bodies.momentum_residual[t.body * ROW + (size_t)t.lane] = (solver_real)r;
     if (LEVELS) {
         sum_lanes<1>(&missed);
         term[4] = dot_lanes(r, product(r, row.a_inverse));
