@@ -40,7 +40,7 @@ static void rebind(struct contact_problem *p)
     p->system.A = p->A;
     p->system.b = p->b;
     p->system.contacts = &p->contacts;
-    p->system.blocks = p->blocks;
+    p->system.rows = &p->rows;
 }
 
 struct contact_problem *contact_problem_new(void)
@@ -59,7 +59,8 @@ void contact_problem_free(struct contact_problem *p)
     free(p->b);
     free(p->blocks);
     free(p->system.velocity);
-    free(p->system.block_lambda);
+    free(p->block_lambda);
+    sadmm_rows_free(&p->rows);
     free(p->contacts.pairs);
     free(p->contacts.points);
     free(p);
@@ -68,17 +69,26 @@ void contact_problem_free(struct contact_problem *p)
 struct contact_problem *contact_problem_copy(const struct contact_problem *p)
 {
     struct contact_problem *q = duplicate(p, 1, sizeof *p);
-    size_t n = (size_t)p->system.body_count, m = (size_t)p->system.block_count;
+    size_t n = (size_t)p->system.body_count, m = (size_t)p->block_count;
     q->rigid = p->rigid ? duplicate(p->rigid, n, sizeof *p->rigid) : NULL;
     q->A = p->A ? duplicate(p->A, 36 * n, sizeof(double)) : NULL;
     q->b = p->b ? duplicate(p->b, 6 * n, sizeof(double)) : NULL;
     q->blocks = duplicate(p->blocks, m, sizeof *p->blocks);
     q->system.velocity = duplicate(p->system.velocity, 6 * n, sizeof(double));
-    q->system.block_lambda = duplicate(p->system.block_lambda, 6 * m, sizeof(double));
+    q->block_lambda = duplicate(p->block_lambda, 6 * m, sizeof(double));
+    memset(&q->rows, 0, sizeof q->rows);
     q->contacts.pairs = duplicate(p->contacts.pairs, p->contacts.pair_count, sizeof *p->contacts.pairs);
     q->contacts.points = duplicate(p->contacts.points, p->contacts.point_count, sizeof *p->contacts.points);
     rebind(q);
+    contact_problem_rows(q);
     return q;
+}
+
+void contact_problem_rows(struct contact_problem *p)
+{
+    sadmm_rows_clear(&p->rows);
+    for (int32_t k = 0; k < p->block_count; ++k)
+        if (!sadmm_rows_add_block(&p->rows, &p->blocks[k], p->block_lambda + 6 * (size_t)k)) abort();
 }
 
 int32_t contact_problem_box(struct contact_problem *p, double mass, double hx, double hy, double hz, double x, double y,
@@ -135,10 +145,10 @@ void contact_problem_touch(struct contact_problem *p, int32_t a, int32_t b, cons
 sadmm_problem_block *contact_problem_block(struct contact_problem *p, sadmm_block_kind kind, int32_t rows, int32_t a,
                                            int32_t b)
 {
-    size_t m = (size_t)++p->system.block_count;
+    size_t m = (size_t)++p->block_count;
     p->blocks = resize(p->blocks, m, sizeof *p->blocks);
-    p->system.block_lambda = resize(p->system.block_lambda, 6 * m, sizeof(double));
-    memset(p->system.block_lambda + 6 * (m - 1), 0, 6 * sizeof(double));
+    p->block_lambda = resize(p->block_lambda, 6 * m, sizeof(double));
+    memset(p->block_lambda + 6 * (m - 1), 0, 6 * sizeof(double));
     sadmm_problem_block *block = &p->blocks[m - 1];
     memset(block, 0, sizeof *block);
     block->kind = kind;
@@ -170,6 +180,7 @@ void contact_problem_raw(struct contact_problem *p, const sadmm_settings *settin
     p->rigid = NULL;
     p->system.errors_given = true;
     rebind(p);
+    contact_problem_rows(p);
 }
 
 void contact_problem_warm(struct contact_problem *p, double speed, double impulse)
@@ -183,9 +194,10 @@ void contact_problem_warm(struct contact_problem *p, double speed, double impuls
                 p->contacts.points[i].impulse[j] =
                     impulse * (pair->normal[j] + (pair->friction > 0 ? 0.3 * contact_problem_random() : 0));
     }
-    for (int32_t k = 0; k < p->system.block_count; ++k)
+    for (int32_t k = 0; k < p->block_count; ++k)
         for (int r = 0; r < p->blocks[k].rows; ++r)
-            p->system.block_lambda[6 * k + r] = impulse * contact_problem_random();
+            p->block_lambda[6 * k + r] = impulse * contact_problem_random();
+    contact_problem_rows(p);
 }
 
 /* ---- scenes -------------------------------------------------------------------------------------------------- */

@@ -12,12 +12,17 @@ struct contact_problem {
     struct sadmm_rigid *rigid;
     double *A, *b;
     sadmm_problem_block *blocks;
-    int32_t body_capacity, block_capacity;
+    double *block_lambda; /* (blocks x 6) */
+    int32_t block_count;
+    struct sadmm_rows rows; /* what the blocks mean, once contact_problem_rows() has said so */
 };
 
 struct contact_problem *contact_problem_new(void);
 void contact_problem_free(struct contact_problem *problem);
+/* With rows from the blocks as they are. */
 struct contact_problem *contact_problem_copy(const struct contact_problem *problem);
+/* The system's rows from the blocks as they are: before anything looks at the system. */
+void contact_problem_rows(struct contact_problem *problem);
 
 /* A solid box; returns its index. */
 int32_t contact_problem_box(struct contact_problem *problem, double mass, double hx, double hy, double hz, double x,

@@ -83,7 +83,7 @@ static inline struct contact_problem *shuffled_towers(void)
         if (*a >= 0) *a = place[*a];
         if (*b >= 0) *b = place[*b];
     }
-    for (int32_t k = 0; k < p->system.block_count; ++k) {
+    for (int32_t k = 0; k < p->block_count; ++k) {
         p->blocks[k].body_a = place[p->blocks[k].body_a];
         p->blocks[k].body_b = place[p->blocks[k].body_b];
     }
@@ -152,7 +152,7 @@ static inline struct contact_problem *scene_blocks(void)
 static inline struct contact_problem *scene_free(void)
 {
     struct contact_problem *p = scene_blocks();
-    p->system.block_count = 0;
+    p->block_count = 0;
     return p;
 }
 static inline struct contact_problem *scene_empty(void) { return contact_problem_new(); }
@@ -199,6 +199,7 @@ static inline struct contact_problem *make_problem(const struct scene *scene, co
     contact_problem_seed(42);
     if (scene->form == RAW) contact_problem_raw(p, settings, 0.1);
     if (scene->warm) contact_problem_warm(p, 0.3, 0.2);
+    contact_problem_rows(p);
     return p;
 }
 

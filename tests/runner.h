@@ -36,9 +36,8 @@ static inline const struct sadmm_kernels *literal(void)
 static inline void runner_assemble(struct runner *r)
 {
     CALL(r, r->k->assemble_bodies(r->c, &r->error));
-    if (r->plan.points || r->plan.blocks[SADMM_BLOCK_CONTACT]) CALL(r, r->k->assemble_contacts(r->c, &r->error));
-    if (r->plan.blocks[SADMM_BLOCK_HARD]) CALL(r, r->k->assemble_joints(r->c, &r->error));
-    if (r->plan.blocks[SADMM_BLOCK_SOFT]) CALL(r, r->k->assemble_springs(r->c, &r->error));
+    if (r->plan.points) CALL(r, r->k->assemble_contacts(r->c, &r->error));
+    if (r->plan.row_constraints) CALL(r, r->k->assemble_rows(r->c, &r->error));
     CALL(r, r->k->init_penalty(r->c, &r->error));
     CALL(r, r->k->factorize(r->c, &r->error));
 }
@@ -75,7 +74,7 @@ static inline void add_multipliers(struct spread *s, const struct runner *got, c
     const struct sadmm_system *a = &got->p->system, *b = &wanted->p->system;
     for (size_t k = 0; k < b->contacts->point_count; ++k)
         for (int i = 0; i < 3; ++i) add(s, a->contacts->points[k].impulse[i], b->contacts->points[k].impulse[i]);
-    for (int32_t i = 0; i < 6 * b->block_count; ++i) add(s, a->block_lambda[i], b->block_lambda[i]);
+    for (size_t r = 0; r < b->rows->row_count; ++r) add(s, a->rows->lambda[r], b->rows->lambda[r]);
 }
 
 static inline struct spread velocity_spread(const struct runner *got, const struct runner *wanted)

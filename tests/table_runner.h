@@ -79,7 +79,7 @@ static struct contact_problem *no_contacts(int seed)
 static struct contact_problem *free_bodies(int seed)
 {
     struct contact_problem *p = no_contacts(seed);
-    p->system.block_count = 0;
+    p->block_count = 0;
     return p;
 }
 static struct contact_problem *no_bodies(int seed) { return (void)seed, contact_problem_new(); }
@@ -137,6 +137,7 @@ static struct contact_problem *make_problem(const struct scene *scene)
     contact_problem_seed(42);
     if (scene->form == RAW) contact_problem_raw(p, &s, 0.1);
     if (scene->warm) contact_problem_warm(p, 0.3, 0.2);
+    contact_problem_rows(p);
     return p;
 }
 

@@ -23,7 +23,7 @@ static void set_entry(NumericsMatrix *matrix, int row, int column, double value)
 /* siconos: M v = q + H r, u = H^T v + b. H is (6 bodies x 3 contacts). */
 static double siconos_error(const struct sadmm_system *system)
 {
-    int n = 6 * system->body_count, contacts = (int)system->contacts->point_count + system->block_count;
+    int n = 6 * system->body_count, contacts = (int)(system->contacts->point_count + system->rows->constraint_count);
     GlobalFrictionContactProblem *problem = globalFrictionContactProblem_new();
     double *v = calloc((size_t)n, sizeof *v), *r = calloc(3 * (size_t)contacts, sizeof *r);
     double *u = calloc(3 * (size_t)contacts, sizeof *u), error;
@@ -58,16 +58,17 @@ static double siconos_error(const struct sadmm_system *system)
             }
         }
     }
-    for (int32_t i = 0; i < system->block_count; ++i) {
-        const sadmm_problem_block *block = &system->blocks[i];
-        int k = (int)system->contacts->point_count + i;
-        problem->mu[k] = block->friction;
+    const struct sadmm_rows *rows = system->rows;
+    for (size_t i = 0; i < rows->constraint_count; ++i) {
+        const struct sadmm_row_constraint *constraint = &rows->constraints[i];
+        int k = (int)(system->contacts->point_count + i);
+        problem->mu[k] = constraint->friction;
         for (int row = 0; row < 3; ++row) {
-            problem->b[3 * k + row] = block->error[row];
-            r[3 * k + row] = system->block_lambda[6 * i + row];
+            problem->b[3 * k + row] = rows->bias[constraint->first + row];
+            r[3 * k + row] = rows->lambda[constraint->first + row];
             for (int side = 0; side < 2; ++side) {
-                int32_t body = side ? block->body_b : block->body_a;
-                const double *J = side ? block->jacobian_b : block->jacobian_a;
+                int32_t body = side ? constraint->body_b : constraint->body_a;
+                const double *J = (side ? rows->jacobian_b : rows->jacobian_a) + 6 * constraint->first;
                 for (int j = 0; body >= 0 && j < 6; ++j)
                     set_entry(problem->H, 6 * body + j, 3 * k + row, J[6 * row + j]);
             }
@@ -97,7 +98,7 @@ START_TEST(same_value)
     sadmm_settings s = sadmm_settings_default();
     struct sadmm_error error;
     struct contact_problem *p = contact_problem_mixed(10 + (uint64_t)_i, _i % 3 == 0 ? 0 : 0.3 * (1 + _i % 3));
-    p->system.block_count = 4; /* the contacts; siconos has no joints */
+    p->block_count = 4; /* the contacts; siconos has no joints */
     contact_problem_raw(p, &s, 0.1);
     for (int k = 0; k < 16; ++k) {
         sadmm_certificate c;

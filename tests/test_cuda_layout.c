@@ -275,7 +275,7 @@ static struct host_layout host_new(const struct contact_problem *p, bool warm_st
     h.p = p;
     h.n = p->system.body_count;
     h.room = (int32_t)(p->contacts.pair_count + 31) / 32 * 32;
-    h.records = h.room + p->system.block_count;
+    h.records = h.room + p->block_count;
     h.label = numbers((size_t)h.n);
     h.wanted = copy_new(&h);
     label_bodies(&h);

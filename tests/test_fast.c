@@ -349,13 +349,13 @@ START_TEST(blocks_have_no_unit)
 {
     struct spread v = {0, 0}, lambda = {0, 0};
     struct contact_problem *problem = make_problem(&scenes[11]), *scaled = contact_problem_copy(problem);
-    for (int32_t k = 0; k < scaled->system.block_count; ++k) {
+    for (int32_t k = 0; k < scaled->block_count; ++k) {
         sadmm_problem_block *block = &scaled->blocks[k];
         if (block->kind != SADMM_BLOCK_HARD) continue;
         for (int r = 0; r < block->rows; ++r) {
             double s = 1 + r;
             block->error[r] *= s;
-            scaled->system.block_lambda[6 * k + r] /= s;
+            scaled->block_lambda[6 * k + r] /= s;
             for (int j = 0; j < 6; ++j) {
                 block->jacobian_a[6 * r + j] *= s;
                 block->jacobian_b[6 * r + j] *= s;

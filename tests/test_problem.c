@@ -651,7 +651,7 @@ START_TEST(what_was_set_can_be_read)
 {
     struct contact_problem *given = contact_problem_mixed(3, 0.5);
     sadmm_settings s = sadmm_settings_default();
-    int32_t n = given->system.body_count, blocks = given->system.block_count;
+    int32_t n = given->system.body_count, blocks = given->block_count;
     int32_t points = (int32_t)given->contacts.point_count;
     contact_problem_raw(given, &s, 0.1);
     contact_problem_warm(given, 1, 1);
@@ -677,7 +677,7 @@ START_TEST(what_was_set_can_be_read)
     ck_assert_str_eq(sadmm_problem_message(p), "");
     OK(sadmm_problem_set_bodies(p, n, given->A, given->b, given->system.velocity));
     OK(sadmm_problem_set_contacts(p, points, contacts, impulses));
-    OK(sadmm_problem_set_blocks(p, blocks, given->blocks, given->system.block_lambda));
+    OK(sadmm_problem_set_blocks(p, blocks, given->blocks, given->block_lambda));
     ck_assert(sadmm_problem_body_count(p) == n && sadmm_problem_contact_count(p) == points &&
               sadmm_problem_block_count(p) == blocks);
 
@@ -707,7 +707,7 @@ START_TEST(what_was_set_can_be_read)
     }
     OK(sadmm_problem_get_solution(p, v, r, l));
     ck_assert(memcmp(r, impulses, (size_t)points * 3 * sizeof *r) == 0);
-    ck_assert(memcmp(l, given->system.block_lambda, (size_t)blocks * 6 * sizeof *l) == 0);
+    ck_assert(memcmp(l, given->block_lambda, (size_t)blocks * 6 * sizeof *l) == 0);
 
     /* set_solution leaves alone what is NULL. */
     for (int32_t i = 0; i < 6 * n; ++i) v[i] = i;

@@ -233,13 +233,14 @@ START_TEST(literal_invariants)
             double small = 1e-13 * z_scale;
             const double *l = constraint->lambda, *e = constraint->e;
             for (int i = 0; i < constraint->rows; ++i) {
-                if (constraint->kind == SADMM_BLOCK_HARD && constraint->free_row[i]) ck_assert(l[i] == 0 && z[i] == 0);
-                else if (constraint->kind == SADMM_BLOCK_HARD) ck_assert_double_le(fabs(z[i] + e[i]), small);
-                else if (constraint->kind == SADMM_BLOCK_SOFT)
-                    ck_assert_double_le(fabs(l[i] + constraint->k[i] * e[i] + constraint->c[i] * z[i]),
-                                        small * (constraint->c[i] + stiffest) + 1e-14 * fabs(constraint->k[i] * e[i]));
+                const double gain = constraint->gain[i], compliance = constraint->compliance[i];
+                if (constraint->cone) continue;
+                if (constraint->free_row[i]) ck_assert(l[i] == 0 && z[i] == 0);
+                else
+                    ck_assert_double_le(fabs(gain * z[i] + e[i] + compliance * l[i]),
+                                        small * (gain + compliance * stiffest) + 1e-14 * fabs(compliance * e[i]));
             }
-            if (constraint->kind == SADMM_BLOCK_CONTACT) {
+            if (constraint->cone) {
                 double gap = z[0] + e[0], tangent = 0, slip = 0, dot = 0;
                 ck_assert(l[0] >= 0);
                 ck_assert_double_ge(gap, -small);

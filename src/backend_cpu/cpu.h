@@ -11,11 +11,12 @@
  *         on a: (-f, -tau)      on b: (f, tau + d x f);
  *   - the pair writes two wrench rows, bodies gather their rows over a CSR list: E is never stored, nothing is added
  *     atomically, and the order of a body's sum does not depend on the threads.
- * Constraints given by Jacobians (row blocks) write the same wrench rows, after the pairs'.
+ * Constraints given by rows go into blocks of LANES as well, a row of each of them in a slot, and write the same wrench rows,
+ * after the pairs'.
  *
- * Bodies come in two forms (`rigid_bodies`): where A is (m I, inertia) and all constraints are three-row contacts,
- * A + beta C has the 3x3 structure of one rigid body and LANES bodies are updated at once from 23 numbers each; everything
- * else goes through a full 6x6 inverse.
+ * Bodies have one of two forms, each by itself (cpu_forms.c): where A is (m I, inertia) and all constraints on it are three-row contacts,
+ * A + beta C has the 3x3 structure of one rigid body and LANES bodies are updated at once from 23 numbers each; any other
+ * body is a general one, with a full 6x6 inverse. Its lane is idle, and it is updated after the lanes by itself.
  *
  * An iteration is two sweeps with a barrier after each: bodies (Step 1), constraints (Steps 2-4).
  *
@@ -66,9 +67,10 @@ struct normal_slot { /* 1 row a contact (no friction anywhere) */
     lanes error, lambda;
 };
 
-/* LANES rigid bodies under three-row contacts only. With n points, S = sum r, Q = sum (|r|^2 I - r r^T):
+/* LANES rigid bodies under three-row contacts only; lanes of general bodies are 0 throughout. With n points, S = sum r, Q = sum (|r|^2 I - r r^T):
  *     A + beta C = [ alpha I, -beta [S]x; beta [S]x, I + beta Q ],  alpha = m + beta n,
  * and eliminating the linear part leaves K = I + beta Q + beta^2/alpha [S]x[S]x. */
+enum { ALL_LANES = (1 << LANES) - 1 };
 struct body_block {
     vec b_linear, b_angular;
     lanes mass;
@@ -79,15 +81,27 @@ struct body_block {
     vec residual_linear, residual_angular; /* fast: b - A v + J^T lambda */
 };
 
-/* A constraint given by Jacobian rows. */
+/* LANES constraints given by rows, all cones or all of scalar rows; rows of all of them in `slots` slots from `first` on. What
+ * is not there (a lane without a constraint, a row that is zero on both bodies) has an equation that 0 solves. */
 struct row_block {
-    int32_t kind, rows, body_a, body_b;
-    real jacobian_a[36], jacobian_b[36];
-    real error[6], stiffness[6], damping[6], lambda[6];
-    real friction;
-    bool active[6]; /* a hard row of zeros is no constraint (Sec. III-C) */
-    /* fast: B = diag(weight) + along along^T; per row J A^-1 J^T, and what its multiplier counts for in the load */
-    real weight[6], along[6], response[6], scale[6];
+    lanes friction, inv_s; /* of cones, as in pair_block */
+    int32_t body_a[LANES], body_b[LANES];
+    int32_t constraint[LANES]; /* index in the system, -1 for an empty lane */
+    int32_t slots;
+    bool cone;
+    size_t first;
+};
+
+struct row_slot { /* math/row.h */
+    lanes jacobian_a[6], jacobian_b[6];
+    lanes gain, bias, compliance, lo, hi, lambda;
+    lanes step;  /* row_step() */
+    lanes along; /* fast: with n dynamic bodies, B / n has the part along along^T */
+};
+
+/* fast: of a row of the system. B = diag(weight) + along along^T; J A^-1 J^T, and what its multiplier counts for in the load */
+struct row_weight {
+    double weight, along, response, scale;
 };
 
 /* fast: sums over an island. */
@@ -97,7 +111,7 @@ struct cpu_island {
     double stack_depth;            /* in steps that start warm */
     double weight_scale, rescale;        /* math/weight.h; not 0: weights stay, times this */
     double violation, momentum_residual;
-    bool blocks;                /* there are constraints by rows: the weight scale stays 1 */
+    bool rows;                  /* there are constraints by rows: no limit of energies, the weight scale stays 1 */
     struct limit_energies limit;
     double along; /* v . A v_f / 2 */
 };
@@ -111,13 +125,18 @@ struct sadmm_context {
     /* Bodies; index `bodies` is the static world: state and 1/beta 0, never written. Rows are padded to whole blocks. */
     int32_t bodies;
     size_t body_block_count;
-    bool rigid_bodies;
     real *state;                     /* rows: v, w, 1/beta, 0 */
     double *A, *C;                   /* bodies x PACKED6 */
     double *beta;                    /* bodies, kg */
-    struct body_block *body_blocks;  /* if rigid_bodies */
-    real *b, *A_columns, *H_columns; /* else: rows; 6 rows (columns of A, of (A + beta C)^-1) a body */
+    struct body_block *body_blocks;  /* unless all bodies are general */
+    /* General bodies, none (and the first three are not read then) or some: index among them or -1, of each body; the bodies,
+     * ascending; of each body block which lanes are general (bits), those behind the last body too. */
+    size_t general_count;
+    int32_t *general_of, *general_bodies;
+    uint32_t *general_lanes;
+    real *b, *A_columns, *H_columns; /* of general bodies: rows; 6 rows (columns of A, of (A + beta C)^-1) a body */
     real *momentum_residuals;                   /* and rows, fast */
+    size_t general_of_capacity, general_body_capacity, general_lane_capacity;
     size_t state_capacity, A_capacity, C_capacity, beta_capacity, body_block_capacity, b_capacity, A_column_capacity,
         H_column_capacity, momentum_residual_capacity;
 
@@ -128,10 +147,14 @@ struct sadmm_context {
     int32_t *pair_order; /* scratch */
     size_t pair_order_capacity;
 
+    /* Constraints given by rows: blocks of cones first */
     struct row_block *row_blocks;
-    size_t row_block_count, row_block_capacity;
+    struct row_slot *row_slots;
+    int32_t *row_order;             /* scratch */
+    struct row_weight *row_weights; /* fast; rows of the system */
+    size_t row_block_count, row_slot_count, row_block_capacity, row_slot_capacity, row_order_capacity, row_weight_capacity;
 
-    /* Wrench rows: record_count rows on a, then as many on b; record: pair lane, or row block after all pair lanes.
+    /* Wrench rows: record_count rows on a, then as many on b; record: pair lane, or row lane after all pair lanes.
      * `change` holds J^T (lambda - lambda_prev) after a measured iteration, when `wrenches` holds J^T lambda. */
     real *wrenches, *change;
     size_t record_count, wrench_capacity, change_capacity;
@@ -177,6 +200,12 @@ static inline double cpu_reduce_max(const struct sadmm_context *c)
     return largest;
 }
 
+/* Index among the general bodies, -1: a rigid one. */
+static inline int32_t cpu_general(const struct sadmm_context *c, size_t body)
+{
+    return c->general_count ? c->general_of[body] : -1;
+}
+
 /* Row of a body in `state`: the static world is the last one. */
 static inline int32_t cpu_body(const struct sadmm_context *c, int32_t body) { return body < 0 ? c->bodies : body; }
 
@@ -186,8 +215,7 @@ sadmm_status CPU(begin)(struct sadmm_context *, const struct sadmm_system *, con
                         const struct sadmm_settings *, struct sadmm_error *);
 sadmm_status CPU(assemble_bodies)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(assemble_contacts)(struct sadmm_context *, struct sadmm_error *);
-sadmm_status CPU(assemble_joints)(struct sadmm_context *, struct sadmm_error *);
-sadmm_status CPU(assemble_springs)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CPU(assemble_rows)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(init_penalty)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(init_weights)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(update_weights)(struct sadmm_context *, struct sadmm_error *);
@@ -223,16 +251,27 @@ static inline bool cpu_sweep_measures(enum cpu_sweep sweep)
     return sweep == CPU_SWEEP_MEASURE || sweep == CPU_SWEEP_PLAIN_MEASURE;
 }
 void CPU(sweep_pairs)(struct sadmm_context *, size_t begin, size_t end, enum cpu_sweep sweep, double *primal);
-void CPU(sweep_row_blocks)(struct sadmm_context *, size_t begin, size_t end, enum cpu_sweep sweep, double *primal);
-/* Step 1 of body blocks [begin, end); `settled`: all but the bodies without constraints. */
-void CPU(sweep_bodies)(struct sadmm_context *, size_t begin, size_t end, bool settled);
+void CPU(sweep_rows)(struct sadmm_context *, size_t begin, size_t end, enum cpu_sweep sweep, double *primal);
+/* Step 1 of a thread's share of the bodies; `settled`: all but the bodies without constraints. */
+void CPU(sweep_bodies)(struct sadmm_context *, int thread, int threads, bool settled);
 /* The same for the method `fast`: velocities go `velocity` times as far, multipliers have gone `multipliers` times. */
-void CPU(sweep_bodies_fast)(struct sadmm_context *, size_t begin, size_t end, bool settled, double velocity,
+void CPU(sweep_bodies_fast)(struct sadmm_context *, int thread, int threads, bool settled, double velocity,
                             double multipliers);
 /* fast: the momentum residuals of bodies [begin, end), recomputed, in double from v and lambda (cpu_residuals.c). */
 void CPU(recompute_residuals)(struct sadmm_context *, size_t begin, size_t end);
-/* Largest entry of A v - b - (sum of wrenches), eq. (17), over body blocks [begin, end). */
-double CPU(dual_residual)(const struct sadmm_context *, size_t begin, size_t end);
+/* Largest entry of A v - b - (sum of wrenches), eq. (17), over a thread's share of the bodies. */
+double CPU(dual_residual)(const struct sadmm_context *, int thread, int threads);
+/* Is a packed A (m I, symmetric inertia), and can the inertia be inverted by its cofactors? World bodies always count as such. */
+bool CPU(has_rigid_mass)(const struct sadmm_context *, const double A[PACKED6]);
+/* Which bodies are general (cpu_forms.c); false when memory runs out. */
+bool CPU(find_forms)(struct sadmm_context *);
+/* Constraints given by rows: their lanes (before their number of blocks is used), and their slots. False when memory runs out. */
+bool CPU(lay_out_rows)(struct sadmm_context *);
+/* The steps of a row block, by beta. */
+void CPU(set_row_steps)(struct sadmm_context *, size_t block);
+/* fast: responses of a row block, once a step; its weights. */
+void CPU(respond_rows)(struct sadmm_context *, size_t block);
+void CPU(weigh_rows)(struct sadmm_context *, size_t block);
 /* wrenches = J^T lambda; and at the start of a solve. */
 void CPU(sum_wrenches)(struct sadmm_context *);
 void CPU(start_wrenches)(struct sadmm_context *);

@@ -1,10 +1,10 @@
-/* Kernels A-D: bodies, contacts, hard and soft blocks from the system's doubles into this precision's layout. */
+/* Kernels A and B: bodies and contacts from the system's doubles into this precision's layout. */
 #include <string.h>
 
 #include "core/math/dense6.h"
 #include "core/math/contact.h"
 #include "core/model/system_terms.h"
-#include "cpu.h"
+#include "cpu_rows.h"
 
 static void set_lane(vec *v, int l, const double value[3])
 {
@@ -20,6 +20,13 @@ static void set_rigid_lane(struct body_block *block, int l, const double A[36], 
     block->mass[l] = (real)A[0];
     block->inertia.xx[l] = (real)A[21], block->inertia.yy[l] = (real)A[28], block->inertia.zz[l] = (real)A[35];
     block->inertia.xy[l] = (real)A[22], block->inertia.xz[l] = (real)A[23], block->inertia.yz[l] = (real)A[29];
+}
+
+/* Of a general body: it stays where it is. */
+static void clear_lane(struct body_block *block, int l)
+{
+    lanes *numbers = (lanes *)block;
+    for (size_t k = 0; k < sizeof *block / sizeof *numbers; ++k) numbers[k][l] = 0;
 }
 
 static void set_general(struct sadmm_context *c, size_t i, const double A[36], const double b[6])
@@ -44,8 +51,11 @@ static void assemble_body(struct sadmm_context *c, int32_t i)
     double *packed = &c->A[(size_t)i * PACKED6];
     for (int r = 0; r < 6; ++r)
         for (int k = 0; k <= r; ++k) *packed++ = A[6 * r + k];
-    if (c->rigid_bodies) set_rigid_lane(&c->body_blocks[i / LANES], i % LANES, A, b);
-    else set_general(c, (size_t)i, A, b);
+    const int32_t general = cpu_general(c, (size_t)i);
+    if (general >= 0) set_general(c, (size_t)general, A, b);
+    if (c->general_count == (size_t)c->bodies) return;
+    if (general >= 0) clear_lane(&c->body_blocks[i / LANES], i % LANES);
+    else set_rigid_lane(&c->body_blocks[i / LANES], i % LANES, A, b);
 }
 
 /* Lanes and the row behind the last body: no mass, no motion. */
@@ -53,7 +63,7 @@ static void clear_padding(struct sadmm_context *c)
 {
     size_t rows = c->body_block_count * (size_t)LANES + 1, n = (size_t)c->bodies;
     memset(&c->state[n * ROW], 0, (rows - n) * ROW * sizeof(real));
-    if (c->rigid_bodies && c->body_block_count)
+    if (c->general_count < n)
         memset(&c->body_blocks[c->body_block_count - 1], 0, sizeof *c->body_blocks);
 }
 
@@ -99,11 +109,6 @@ static void assemble_point(const struct sadmm_context *c, const struct sadmm_con
     }
 }
 
-static real solver_friction(const struct sadmm_context *c, double mu)
-{
-    return (real)(c->fast ? contact_friction_inside(mu, (double)SADMM_EPSILON) : mu);
-}
-
 static void assemble_lane(struct sadmm_context *c, struct pair_block *block, int l)
 {
     static const double zero[3], up[3] = {0, 0, 1};
@@ -116,43 +121,12 @@ static void assemble_lane(struct sadmm_context *c, struct pair_block *block, int
     }
     set_lane(&block->normal, l, pair ? pair->normal : up);
     set_lane(&block->d, l, pair ? d : zero);
-    block->friction[l] = pair ? solver_friction(c, pair->friction) : 0;
+    block->friction[l] = pair ? cpu_friction(c, pair->friction) : 0;
     block->inv_s[l] = 0;
     block->body_a[l] = pair ? cpu_body(c, pair->body_a) : c->bodies;
     block->body_b[l] = pair ? cpu_body(c, pair->body_b) : c->bodies;
     for (int k = 0; k < block->slots; ++k)
         assemble_point(c, pair, k, pair && k < pair->count ? &contacts->points[pair->first + k] : NULL, block, l);
-}
-
-static void assemble_row_block(struct sadmm_context *c, size_t k)
-{
-    const struct sadmm_problem_block *in = &c->system->blocks[k];
-    struct row_block *out = &c->row_blocks[k];
-    memset(out, 0, sizeof *out);
-    out->kind = in->kind;
-    out->rows = in->rows;
-    out->body_a = cpu_body(c, in->body_a);
-    out->body_b = cpu_body(c, in->body_b);
-    out->friction = solver_friction(c, in->friction);
-    for (int r = 0; r < in->rows; ++r) {
-        bool any = false;
-        for (int j = 0; j < 6; ++j) {
-            out->jacobian_a[6 * r + j] = in->body_a >= 0 ? (real)in->jacobian_a[6 * r + j] : 0;
-            out->jacobian_b[6 * r + j] = in->body_b >= 0 ? (real)in->jacobian_b[6 * r + j] : 0;
-            any = any || out->jacobian_a[6 * r + j] != 0 || out->jacobian_b[6 * r + j] != 0;
-        }
-        out->active[r] = any || in->kind != SADMM_BLOCK_HARD;
-        out->error[r] = (real)in->error[r];
-        out->stiffness[r] = (real)in->stiffness[r];
-        out->damping[r] = (real)in->damping[r];
-        out->lambda[r] = c->plan.warm_start && out->active[r] ? (real)c->system->block_lambda[6 * k + (size_t)r] : 0;
-    }
-}
-
-static void assemble_row_blocks(struct sadmm_context *c, enum sadmm_block_kind kind)
-{
-    for (size_t k = 0; k < c->row_block_count; ++k)
-        if (c->system->blocks[k].kind == kind) assemble_row_block(c, k);
 }
 
 static void assemble_pair_share(void *context, int thread, int threads)
@@ -168,20 +142,5 @@ sadmm_status CPU(assemble_contacts)(struct sadmm_context *c, struct sadmm_error 
 {
     (void)error;
     cpu_parallel(c, assemble_pair_share, c);
-    assemble_row_blocks(c, SADMM_BLOCK_CONTACT);
-    return SADMM_OK;
-}
-
-sadmm_status CPU(assemble_joints)(struct sadmm_context *c, struct sadmm_error *error)
-{
-    (void)error;
-    assemble_row_blocks(c, SADMM_BLOCK_HARD);
-    return SADMM_OK;
-}
-
-sadmm_status CPU(assemble_springs)(struct sadmm_context *c, struct sadmm_error *error)
-{
-    (void)error;
-    assemble_row_blocks(c, SADMM_BLOCK_SOFT);
     return SADMM_OK;
 }

@@ -5,13 +5,6 @@
 #include "cpu.h"
 #include "cpu_flush.h"
 
-static void update_bodies(struct sadmm_context *c, int thread, int threads, bool settled)
-{
-    size_t begin, end;
-    sadmm_share(c->body_block_count, thread, threads, &begin, &end);
-    CPU(sweep_bodies)(c, begin, end, settled);
-}
-
 static void update_constraints(struct sadmm_context *c, int thread, int threads, enum cpu_sweep sweep, double *primal)
 {
     size_t begin, end;
@@ -21,7 +14,7 @@ static void update_constraints(struct sadmm_context *c, int thread, int threads,
     }
     if (c->row_block_count) {
         sadmm_share(c->row_block_count, thread, threads, &begin, &end);
-        CPU(sweep_row_blocks)(c, begin, end, sweep, primal);
+        CPU(sweep_rows)(c, begin, end, sweep, primal);
     }
 }
 
@@ -68,7 +61,7 @@ static void velocity_share(void *context, int thread, int threads)
         join_wrenches(c, thread, threads);
         sadmm_barrier_wait(&c->barrier, threads);
     }
-    update_bodies(c, thread, threads, c->settled);
+    CPU(sweep_bodies)(c, thread, threads, c->settled);
 }
 
 sadmm_status CPU(update_velocity)(struct sadmm_context *c, struct sadmm_error *error)
@@ -117,8 +110,7 @@ static bool recomputes_residuals(const struct sadmm_context *c, int i)
 static void iterate_fast(struct sadmm_context *c, int thread, int threads, int count, bool measure, double *primal)
 {
     const double relaxation = c->settings.relaxation;
-    size_t begin, end, first, past;
-    sadmm_share(c->body_block_count, thread, threads, &begin, &end);
+    size_t first, past;
     sadmm_share((size_t)c->bodies, thread, threads, &first, &past);
     for (int i = 0; i < count; ++i) {
         if (recomputes_residuals(c, i)) {
@@ -132,7 +124,7 @@ static void iterate_fast(struct sadmm_context *c, int thread, int threads, int c
                                      : CPU_SWEEP_PLAIN,
                            primal);
         sadmm_barrier_wait(&c->barrier, threads);
-        CPU(sweep_bodies_fast)(c, begin, end, settled, relax_velocity(i, count, settled) ? relaxation : 1,
+        CPU(sweep_bodies_fast)(c, thread, threads, settled, relax_velocity(i, count, settled) ? relaxation : 1,
                                relaxes ? relaxation : 1);
         sadmm_barrier_wait(&c->barrier, threads);
     }
@@ -151,7 +143,7 @@ static void iterate_share(void *argument, int thread, int threads)
     if (c->fast) iterate_fast(c, thread, threads, s->count, s->measure, &primal);
     for (int i = 0; i < s->count && !c->fast; ++i) {
         bool last = s->measure && i + 1 == s->count;
-        update_bodies(c, thread, threads, c->settled || i > 0);
+        CPU(sweep_bodies)(c, thread, threads, c->settled || i > 0);
         sadmm_barrier_wait(&c->barrier, threads);
         update_constraints(c, thread, threads, last ? CPU_SWEEP_MEASURE : CPU_SWEEP_ITERATE, &primal);
         sadmm_barrier_wait(&c->barrier, threads);
@@ -176,9 +168,7 @@ sadmm_status CPU(iterate)(struct sadmm_context *c, int count, bool measure, stru
 static void dual_share(void *context, int thread, int threads)
 {
     struct sadmm_context *c = (struct sadmm_context *)context;
-    size_t begin, end;
-    sadmm_share(c->body_block_count, thread, threads, &begin, &end);
-    c->thread_max[thread * THREAD_MAX_STRIDE] = CPU(dual_residual)(c, begin, end);
+    c->thread_max[thread * THREAD_MAX_STRIDE] = CPU(dual_residual)(c, thread, threads);
 }
 
 /* Eqs. (16) and (17) after a measured iteration. The primal part was taken in the sweep; the dual one is the momentum

@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "core/base/memory.h"
-#include "cpu.h"
+#include "cpu_rows.h"
 
 /* Pairs are sorted by point count inside windows of this many blocks: a block is as deep as its deepest pair, so equal
  * counts waste no slots, while a window keeps neighbours in memory together. */
@@ -43,13 +43,13 @@ static void count_slots(struct sadmm_context *c)
 
 static void record_bodies(const struct sadmm_context *c, size_t record, int32_t bodies[2])
 {
-    size_t pair_records = c->pair_block_count * (size_t)LANES;
     bodies[0] = bodies[1] = -1;
-    if (record >= pair_records + c->row_block_count) return;
-    if (record >= pair_records) {
-        const struct sadmm_problem_block *block = &c->system->blocks[record - pair_records];
-        bodies[0] = block->body_a;
-        bodies[1] = block->body_b;
+    if (record >= cpu_pair_records(c)) {
+        int lane;
+        const int32_t constraint = cpu_row_block(c, record, &lane)->constraint[lane];
+        if (constraint < 0) return;
+        bodies[0] = c->system->rows->constraints[constraint].body_a;
+        bodies[1] = c->system->rows->constraints[constraint].body_b;
         return;
     }
     int32_t index = c->pair_blocks[record / (size_t)LANES].pair[record % (size_t)LANES];
@@ -93,20 +93,20 @@ sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *syst
     c->measured = false;
     c->ratio = 1;
     c->pair_block_count = ((size_t)plan->pairs + LANES - 1) / LANES;
-    c->row_block_count = (size_t)system->block_count;
-    /* Whole vectors of rows on either side, so that pairs store aligned. */
-    c->record_count = (c->pair_block_count + (c->row_block_count + LANES - 1) / LANES) * (size_t)LANES;
+    if (!CPU(lay_out_rows)(c)) return sadmm_fail_memory(error, "the cpu backend's rows");
+    /* Whole vectors of rows on either side, so that they are stored aligned. */
+    c->record_count = (c->pair_block_count + c->row_block_count) * (size_t)LANES;
     if (c->record_count > INT32_MAX / 2)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%zu constraints: at most %d", c->record_count, INT32_MAX / 2);
 
-    c->rigid_bodies = plan->rigid && plan->contact_rows != 1 && c->row_block_count == 0;
     c->body_block_count = (n + LANES - 1) / LANES;
-    size_t rows = c->body_block_count * (size_t)LANES + 1, general = c->rigid_bodies ? 0 : n;
+    if (!CPU(find_forms)(c)) return sadmm_fail_memory(error, "the cpu backend's bodies");
+    size_t rows = c->body_block_count * (size_t)LANES + 1, general = c->general_count;
     bool ok = grow(&c->state, &c->state_capacity, rows * ROW, sizeof(real)) &&
               grow(&c->A, &c->A_capacity, n * PACKED6, sizeof(double)) &&
               grow(&c->C, &c->C_capacity, n * PACKED6, sizeof(double)) &&
               grow(&c->beta, &c->beta_capacity, n, sizeof(double)) &&
-              grow(&c->body_blocks, &c->body_block_capacity, c->rigid_bodies ? c->body_block_count : 0,
+              grow(&c->body_blocks, &c->body_block_capacity, general < n ? c->body_block_count : 0,
                    sizeof *c->body_blocks) &&
               grow(&c->b, &c->b_capacity, general * ROW, sizeof(real)) &&
               grow(&c->A_columns, &c->A_column_capacity, general * 6 * ROW, sizeof(real)) &&
@@ -114,7 +114,6 @@ sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *syst
               grow(&c->momentum_residuals, &c->momentum_residual_capacity, c->fast ? general * ROW : 0, sizeof(real)) &&
               grow(&c->pair_order, &c->pair_order_capacity, (size_t)plan->pairs, sizeof(int32_t)) &&
               grow(&c->pair_blocks, &c->pair_block_capacity, c->pair_block_count, sizeof *c->pair_blocks) &&
-              grow(&c->row_blocks, &c->row_block_capacity, c->row_block_count, sizeof *c->row_blocks) &&
               grow(&c->wrenches, &c->wrench_capacity, 2 * c->record_count * ROW, sizeof(real)) &&
               (!plan->residuals || c->fast ||
                grow(&c->change, &c->change_capacity, 2 * c->record_count * ROW, sizeof(real))) &&

@@ -60,7 +60,7 @@ static bool any_suspect(struct sadmm_context *c, bool under_iterated)
     }
     for (int32_t i = 0; i < c->bodies; ++i) {
         const struct cpu_island *island = &c->islands[i];
-        if (c->label[i] != i) continue;
+        if (c->label[i] != i || island->rows) continue;
         any = any || limit_suspects(island->limit.now, island->limit.free) ||
               (under_iterated &&
                limit_bounces(island->limit.now, island->limit.free, island->along, (double)SADMM_EPSILON));
@@ -107,6 +107,7 @@ sadmm_status CPU(limit_velocity)(struct sadmm_context *c, int32_t *limited, stru
     add_residuals_and_work(c);
     for (int32_t i = 0; i < c->bodies; ++i) {
         const struct cpu_island *island = &c->islands[c->label[i]];
+        if (island->rows) continue; /* the energies are those of contacts alone */
         double factor = limit_factor(&island->limit);
         if (under_iterated)
             factor = fmin(factor, limit_bounce_factor(&island->limit, island->along, (double)SADMM_EPSILON));

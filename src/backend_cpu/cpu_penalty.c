@@ -24,11 +24,13 @@ static void add_pair(const struct sadmm_context *c, size_t record, int side, str
     }
 }
 
-static void add_row_block(const struct row_block *block, int side, double C[PACKED6])
+static void add_rows(const struct sadmm_context *c, size_t record, int side, double C[PACKED6])
 {
-    for (int r = 0; r < block->rows; ++r) {
+    int lane;
+    const struct row_block *block = cpu_row_block(c, record, &lane);
+    for (int r = 0; r < cpu_row_count(c, block, lane); ++r) {
         double row[6];
-        block_row(block, side, r, row);
+        cpu_load_row(c, block, lane, side, r, row);
         packed_add_row(C, row, 1);
     }
 }
@@ -39,16 +41,13 @@ static void assemble_C(struct sadmm_context *c, int32_t i)
 {
     double *C = &c->C[(size_t)i * PACKED6];
     struct arm_sums sums = {0};
-    size_t pair_records = c->pair_block_count * (size_t)LANES;
     memset(C, 0, PACKED6 * sizeof *C);
     for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) {
         size_t row = (size_t)c->incident[at];
         int side = row >= c->record_count;
         size_t record = side ? row - c->record_count : row;
-        if (record < pair_records)
-            add_pair(c, record, side, &sums, C);
-        else
-            add_row_block(&c->row_blocks[record - pair_records], side, C);
+        if (record < cpu_pair_records(c)) add_pair(c, record, side, &sums, C);
+        else add_rows(c, record, side, C);
     }
     add_arm_sums(C, &sums);
 
@@ -99,8 +98,8 @@ static void factorize_rigid(struct sadmm_context *c, size_t i)
     K->zz[l] = (real)(inv * (xx * yy - xy * xy));
 }
 
-/* (A + beta C)^-1 in full. */
-static void factorize_general(struct sadmm_context *c, size_t i)
+/* (A + beta C)^-1 in full, of general body `general`. */
+static void factorize_general(struct sadmm_context *c, size_t i, size_t general)
 {
     double M[36], L[36], column[6];
     const double *A = &c->A[i * PACKED6], *C = &c->C[i * PACKED6];
@@ -116,7 +115,7 @@ static void factorize_general(struct sadmm_context *c, size_t i)
         double unit[6] = {0};
         unit[k] = 1;
         dense6_solve(L, unit, column);
-        real *out = &c->H_columns[(6 * i + (size_t)k) * ROW];
+        real *out = &c->H_columns[(6 * general + (size_t)k) * ROW];
         for (int r = 0; r < ROW; ++r) out[r] = r < 6 ? (real)column[r] : 0;
     }
 }
@@ -124,8 +123,9 @@ static void factorize_general(struct sadmm_context *c, size_t i)
 static void factorize_body(struct sadmm_context *c, size_t i)
 {
     c->state[i * ROW + STATE_INV_BETA] = (real)(1 / c->beta[i]);
-    if (c->rigid_bodies) factorize_rigid(c, i);
-    else factorize_general(c, i);
+    const int32_t general = cpu_general(c, i);
+    if (general >= 0) factorize_general(c, i, (size_t)general);
+    else factorize_rigid(c, i);
 }
 
 static void weigh_pair_block(struct sadmm_context *c, struct pair_block *block)
@@ -143,10 +143,12 @@ static void factorize_share(void *context, int thread, int threads)
     size_t begin, end;
     sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) factorize_body(c, i);
-    if (c->fast) return; /* the weights are the pairs' own */
+    if (c->fast) return; /* the weights are the constraints' own */
     sadmm_barrier_wait(&c->barrier, threads);
     sadmm_share(c->pair_block_count, thread, threads, &begin, &end);
     for (size_t k = begin; k < end; ++k) weigh_pair_block(c, &c->pair_blocks[k]);
+    sadmm_share(c->row_block_count, thread, threads, &begin, &end);
+    for (size_t k = begin; k < end; ++k) CPU(set_row_steps)(c, k);
 }
 
 sadmm_status CPU(factorize)(struct sadmm_context *c, struct sadmm_error *error)

@@ -40,19 +40,22 @@ static void add_pair(const struct sadmm_context *c, size_t record, int side, dou
     }
 }
 
-static void add_row_block(const struct row_block *block, int side, double r[6])
+static void add_rows(const struct sadmm_context *c, size_t record, int side, double r[6])
 {
-    double row[6];
-    for (int k = 0; k < block->rows; ++k) {
-        block_row(block, side, k, row);
-        for (int j = 0; j < 6; ++j) r[j] += row[j] * (double)block->lambda[k];
+    int lane;
+    const struct row_block *block = cpu_row_block(c, record, &lane);
+    for (int k = 0; k < cpu_row_count(c, block, lane); ++k) {
+        double row[6], lambda = (double)c->row_slots[block->first + (size_t)k].lambda[lane];
+        cpu_load_row(c, block, lane, side, k, row);
+        for (int j = 0; j < 6; ++j) r[j] += row[j] * lambda;
     }
 }
 
 static void store_momentum_residual(struct sadmm_context *c, size_t i, const double r[6])
 {
-    if (!c->rigid_bodies) {
-        for (int k = 0; k < ROW; ++k) c->momentum_residuals[i * ROW + (size_t)k] = k < 6 ? (real)r[k] : 0;
+    const int32_t general = cpu_general(c, i);
+    if (general >= 0) {
+        for (int k = 0; k < ROW; ++k) c->momentum_residuals[(size_t)general * ROW + (size_t)k] = k < 6 ? (real)r[k] : 0;
         return;
     }
     struct body_block *block = &c->body_blocks[i / (size_t)LANES];
@@ -65,7 +68,6 @@ static void store_momentum_residual(struct sadmm_context *c, size_t i, const dou
 
 void CPU(recompute_residuals)(struct sadmm_context *c, size_t begin, size_t end)
 {
-    size_t pair_records = c->pair_block_count * (size_t)LANES;
     for (size_t i = begin; i < end; ++i) {
         double r[6];
         cpu_free_momentum(c, i, r);
@@ -73,8 +75,8 @@ void CPU(recompute_residuals)(struct sadmm_context *c, size_t begin, size_t end)
             size_t row = (size_t)c->incident[at];
             int side = row >= c->record_count;
             size_t record = side ? row - c->record_count : row;
-            if (record < pair_records) add_pair(c, record, side, r);
-            else add_row_block(&c->row_blocks[record - pair_records], side, r);
+            if (record < cpu_pair_records(c)) add_pair(c, record, side, r);
+            else add_rows(c, record, side, r);
         }
         store_momentum_residual(c, i, r);
     }

@@ -1,15 +1,41 @@
-/* Sums of J^T J over a body's constraints, in double: packed lower triangles, rows first. */
+/* What kernels that run a few times a step read of the layout, in double. */
 #ifndef SADMM_CPU_ROWS_H
 #define SADMM_CPU_ROWS_H
 
 #include <string.h>
 
+#include "core/math/contact.h"
 #include "cpu.h"
 
-static inline void block_row(const struct row_block *block, int side, int r, double row[6])
+/* Records of pairs; those of constraints given by rows follow. */
+static inline size_t cpu_pair_records(const struct sadmm_context *c) { return c->pair_block_count * (size_t)LANES; }
+
+/* The block of a record of rows, and its lane. */
+static inline const struct row_block *cpu_row_block(const struct sadmm_context *c, size_t record, int *lane)
 {
-    const real *J = (side ? block->jacobian_b : block->jacobian_a) + 6 * r;
-    for (int j = 0; j < 6; ++j) row[j] = (double)J[j];
+    const size_t at = record - cpu_pair_records(c);
+    *lane = (int)(at % (size_t)LANES);
+    return &c->row_blocks[at / (size_t)LANES];
+}
+
+/* Rows of a lane's constraint, which there is. */
+static inline int cpu_row_count(const struct sadmm_context *c, const struct row_block *block, int l)
+{
+    return c->system->rows->constraints[block->constraint[l]].count;
+}
+
+/* Jacobian row r of a lane on a side, as this precision has it. */
+static inline void cpu_load_row(const struct sadmm_context *c, const struct row_block *block, int l, int side, int r,
+                                double row[6])
+{
+    const struct row_slot *slot = &c->row_slots[block->first + (size_t)r];
+    for (int j = 0; j < 6; ++j) row[j] = (double)(side ? slot->jacobian_b : slot->jacobian_a)[j][l];
+}
+
+/* mu as the method takes it. */
+static inline real cpu_friction(const struct sadmm_context *c, double mu)
+{
+    return (real)(c->fast ? contact_friction_inside(mu, (double)SADMM_EPSILON) : mu);
 }
 
 /* The pair of a record that is one. */
@@ -21,8 +47,9 @@ static inline const struct sadmm_contact_pair *cpu_pair(const struct sadmm_conte
 /* b and v of a body. */
 static inline void cpu_load_b(const struct sadmm_context *c, size_t i, double b[6])
 {
-    if (!c->rigid_bodies) {
-        for (int k = 0; k < 6; ++k) b[k] = (double)c->b[i * ROW + (size_t)k];
+    const int32_t general = cpu_general(c, i);
+    if (general >= 0) {
+        for (int k = 0; k < 6; ++k) b[k] = (double)c->b[(size_t)general * ROW + (size_t)k];
         return;
     }
     const struct body_block *block = &c->body_blocks[i / (size_t)LANES];

@@ -20,6 +20,13 @@ static void read_pair(struct sadmm_context *c, const struct pair_block *block, i
     }
 }
 
+static void read_rows(struct sadmm_context *c, const struct row_block *block, int l)
+{
+    const struct sadmm_row_constraint *constraint = &c->system->rows->constraints[block->constraint[l]];
+    for (int r = 0; r < constraint->count; ++r)
+        c->system->rows->lambda[constraint->first + r] = (double)c->row_slots[block->first + (size_t)r].lambda[l];
+}
+
 static void read_share(void *context, int thread, int threads)
 {
     struct sadmm_context *c = (struct sadmm_context *)context;
@@ -31,14 +38,16 @@ static void read_share(void *context, int thread, int threads)
     for (size_t k = begin; k < end; ++k)
         for (int l = 0; l < LANES; ++l)
             if (c->pair_blocks[k].pair[l] >= 0) read_pair(c, &c->pair_blocks[k], l);
+    sadmm_share(c->row_block_count, thread, threads, &begin, &end);
+    for (size_t k = begin; k < end; ++k)
+        for (int l = 0; l < LANES; ++l)
+            if (c->row_blocks[k].constraint[l] >= 0) read_rows(c, &c->row_blocks[k], l);
 }
 
 sadmm_status CPU(read_solution)(struct sadmm_context *c, struct sadmm_error *error)
 {
     (void)error;
     cpu_parallel(c, read_share, c);
-    for (size_t k = 0; k < c->row_block_count; ++k)
-        for (int r = 0; r < 6; ++r) c->system->block_lambda[6 * k + (size_t)r] = (double)c->row_blocks[k].lambda[r];
     return SADMM_OK;
 }
 

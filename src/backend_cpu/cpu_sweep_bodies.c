@@ -38,8 +38,25 @@ static inline __attribute__((always_inline)) void load_block(const row8 *rows, c
 #undef SUM_ROW
 }
 
+/* Sums of a block's bodies; 0 in the lanes of general ones, which are updated by themselves. */
+static inline __attribute__((always_inline)) void block_sums(const struct sadmm_context *c, size_t index, uint32_t general,
+                                                             row8 sums[LANES])
+{
+    const size_t first = index * (size_t)LANES;
+    if (general == 0) {
+        for (int l = 0; l < LANES; ++l) sums[l] = wrench_sum(c, first + (size_t)l);
+        return;
+    }
+    for (int l = 0; l < LANES; ++l) sums[l] = general >> l & 1 ? (row8){0} : wrench_sum(c, first + (size_t)l);
+}
+
+static inline uint32_t general_lanes(const struct sadmm_context *c, size_t block)
+{
+    return c->general_count ? c->general_lanes[block] : 0;
+}
+
 /* b - A v + sum of wrenches of a block; `state` gets the block's state by number. */
-static inline __attribute__((always_inline)) void block_momentum_residual(const struct sadmm_context *c, size_t index,
+static inline __attribute__((always_inline)) void block_momentum_residual(const struct sadmm_context *c, size_t index, uint32_t general,
                                                                lanes state[ROW], vec *linear, vec *angular)
 {
     const struct body_block *block = &c->body_blocks[index];
@@ -47,7 +64,7 @@ static inline __attribute__((always_inline)) void block_momentum_residual(const 
     row8 sums[LANES];
     lanes g[ROW];
     prefetch_wrenches(c, index + 1);
-    for (int l = 0; l < LANES; ++l) sums[l] = wrench_sum(c, index * (size_t)LANES + (size_t)l);
+    block_sums(c, index, general, sums);
     load_block(rows, sums, state, g);
     vec v = {state[0], state[1], state[2]}, w = {state[3], state[4], state[5]};
     *linear = add(sub(block->b_linear, scale(v, block->mass)), (vec){g[0], g[1], g[2]});
@@ -63,11 +80,13 @@ static size_t first_body(const struct sadmm_context *c, size_t block)
 static void update_rigid(struct sadmm_context *c, size_t begin, size_t end, bool settled)
 {
     for (size_t index = begin; index < end; ++index) {
+        const uint32_t general = general_lanes(c, index);
+        if (general == ALL_LANES) continue;
         if (settled && c->offsets[first_body(c, index)] == c->offsets[first_body(c, index + 1)]) continue;
         const struct body_block *block = &c->body_blocks[index];
         lanes state[ROW];
         vec linear, angular;
-        block_momentum_residual(c, index, state, &linear, &angular);
+        block_momentum_residual(c, index, general, state, &linear, &angular);
         vec dw = sym3_times(block->K_inverse, sub(angular, cross(block->sigma, linear)));
         vec dv = add(scale(linear, block->inv_alpha), cross(block->sigma, dw));
         state[0] += dv.x, state[1] += dv.y, state[2] += dv.z;
@@ -88,13 +107,15 @@ static void update_rigid_fast(struct sadmm_context *c, size_t begin, size_t end,
                               lanes multipliers)
 {
     for (size_t index = begin; index < end; ++index) {
+        const uint32_t general = general_lanes(c, index);
+        if (general == ALL_LANES) continue;
         if (settled && c->offsets[first_body(c, index)] == c->offsets[first_body(c, index + 1)]) continue;
         struct body_block *block = &c->body_blocks[index];
         const row8 *rows = (const row8 *)c->state + index * (size_t)LANES;
         lanes state[ROW], g[ROW];
         row8 sums[LANES];
         prefetch_wrenches(c, index + 1);
-        for (int l = 0; l < LANES; ++l) sums[l] = wrench_sum(c, index * (size_t)LANES + (size_t)l);
+        block_sums(c, index, general, sums);
         load_block(rows, sums, state, g);
         vec force = {g[0], g[1], g[2]}, torque = {g[3], g[4], g[5]};
         vec linear = add(block->residual_linear, add(force, force));
@@ -116,30 +137,31 @@ static double rigid_residual(const struct sadmm_context *c, size_t begin, size_t
     for (size_t index = begin; index < end; ++index) {
         lanes state[ROW];
         vec r[2];
-        block_momentum_residual(c, index, state, &r[0], &r[1]);
+        block_momentum_residual(c, index, general_lanes(c, index), state, &r[0], &r[1]);
         for (int part = 0; part < 2; ++part)
             largest = larger(largest, larger(magnitude(r[part].x), larger(magnitude(r[part].y), magnitude(r[part].z))));
     }
     return (double)horizontal_max(largest);
 }
 
-/* ---- any bodies: full 6x6 -------------------------------------------------------------------------------------- */
+/* ---- general bodies: full 6x6 ---------------------------------------------------------------------------------- */
 
-static inline row8 general_momentum_residual(const struct sadmm_context *c, size_t i)
+static inline row8 general_momentum_residual(const struct sadmm_context *c, size_t k, size_t i)
 {
-    const row8 *A = (const row8 *)c->A_columns + 6 * i;
-    row8 v = ((const row8 *)c->state)[i], g = ((const row8 *)c->b)[i] + wrench_sum(c, i);
-    for (int k = 0; k < 6; ++k) g -= A[k] * v[k];
+    const row8 *A = (const row8 *)c->A_columns + 6 * k;
+    row8 v = ((const row8 *)c->state)[i], g = ((const row8 *)c->b)[k] + wrench_sum(c, i);
+    for (int j = 0; j < 6; ++j) g -= A[j] * v[j];
     return g;
 }
 
 static void update_general(struct sadmm_context *c, size_t begin, size_t end, bool settled)
 {
-    for (size_t i = begin; i < end; ++i) {
+    for (size_t k = begin; k < end; ++k) {
+        const size_t i = (size_t)c->general_bodies[k];
         if (settled && c->offsets[i] == c->offsets[i + 1]) continue;
-        const row8 *H = (const row8 *)c->H_columns + 6 * i;
-        row8 g = general_momentum_residual(c, i), step = {0};
-        for (int k = 0; k < 6; ++k) step += H[k] * g[k];
+        const row8 *H = (const row8 *)c->H_columns + 6 * k;
+        row8 g = general_momentum_residual(c, k, i), step = {0};
+        for (int j = 0; j < 6; ++j) step += H[j] * g[j];
         ((row8 *)c->state)[i] += step; /* number 6 of step is 0: 1/beta stays */
     }
 }
@@ -147,47 +169,79 @@ static void update_general(struct sadmm_context *c, size_t begin, size_t end, bo
 static void update_general_fast(struct sadmm_context *c, size_t begin, size_t end, bool settled, real velocity,
                                 real multipliers)
 {
-    for (size_t i = begin; i < end; ++i) {
+    for (size_t k = begin; k < end; ++k) {
+        const size_t i = (size_t)c->general_bodies[k];
         if (settled && c->offsets[i] == c->offsets[i + 1]) continue;
-        const row8 *A = (const row8 *)c->A_columns + 6 * i, *H = (const row8 *)c->H_columns + 6 * i;
-        row8 *momentum_residual = (row8 *)c->momentum_residuals + i;
+        const row8 *A = (const row8 *)c->A_columns + 6 * k, *H = (const row8 *)c->H_columns + 6 * k;
+        row8 *momentum_residual = (row8 *)c->momentum_residuals + k;
         row8 sum = wrench_sum(c, i), g = *momentum_residual + 2 * sum, step = {0};
-        for (int k = 0; k < 6; ++k) step += H[k] * g[k];
+        for (int j = 0; j < 6; ++j) step += H[j] * g[j];
         row8 *state = (row8 *)c->state + i, before = *state;
         *state += velocity * step;
         step = *state - before;
         *momentum_residual += multipliers * sum;
-        for (int k = 0; k < 6; ++k) *momentum_residual -= A[k] * step[k];
+        for (int j = 0; j < 6; ++j) *momentum_residual -= A[j] * step[j];
     }
 }
 
 static double general_residual(const struct sadmm_context *c, size_t begin, size_t end)
 {
     double largest = 0;
-    for (size_t i = begin; i < end; ++i) {
-        row8 g = general_momentum_residual(c, i);
-        for (int k = 0; k < 6; ++k) largest = fmax(largest, fabs((double)g[k]));
+    for (size_t k = begin; k < end; ++k) {
+        row8 g = general_momentum_residual(c, k, (size_t)c->general_bodies[k]);
+        for (int j = 0; j < 6; ++j) largest = fmax(largest, fabs((double)g[j]));
     }
     return largest;
 }
 
-/* ---- by blocks, so that both forms share the work the same way -------------------------------------------------- */
+/* ---- a thread's share of both ------------------------------------------------------------------------------------ */
 
-void CPU(sweep_bodies)(struct sadmm_context *c, size_t begin, size_t end, bool settled)
+/* Whole blocks and the general bodies in them: a block's rows are stored together. */
+struct body_share {
+    size_t begin, end, general_begin, general_end;
+};
+
+/* The first general body from `body` on, by its index among them. */
+static size_t first_general(const struct sadmm_context *c, size_t body)
 {
-    if (c->rigid_bodies) update_rigid(c, begin, end, settled);
-    else update_general(c, first_body(c, begin), first_body(c, end), settled);
+    size_t low = 0, high = c->general_count;
+    while (low < high) {
+        size_t middle = low + (high - low) / 2;
+        if ((size_t)c->general_bodies[middle] < body) low = middle + 1;
+        else high = middle;
+    }
+    return low;
 }
 
-void CPU(sweep_bodies_fast)(struct sadmm_context *c, size_t begin, size_t end, bool settled, double velocity,
+static struct body_share share_of(const struct sadmm_context *c, int thread, int threads)
+{
+    struct body_share s = {0};
+    sadmm_share(c->body_block_count, thread, threads, &s.begin, &s.end);
+    if (c->general_count) {
+        s.general_begin = first_general(c, s.begin * (size_t)LANES);
+        s.general_end = first_general(c, s.end * (size_t)LANES);
+    }
+    if (c->general_count == (size_t)c->bodies) s.begin = s.end; /* there are no other lanes */
+    return s;
+}
+
+void CPU(sweep_bodies)(struct sadmm_context *c, int thread, int threads, bool settled)
+{
+    const struct body_share s = share_of(c, thread, threads);
+    update_rigid(c, s.begin, s.end, settled);
+    update_general(c, s.general_begin, s.general_end, settled);
+}
+
+void CPU(sweep_bodies_fast)(struct sadmm_context *c, int thread, int threads, bool settled, double velocity,
                             double multipliers)
 {
-    if (c->rigid_bodies) update_rigid_fast(c, begin, end, settled, fill((real)velocity), fill((real)multipliers));
-    else
-        update_general_fast(c, first_body(c, begin), first_body(c, end), settled, (real)velocity, (real)multipliers);
+    const struct body_share s = share_of(c, thread, threads);
+    update_rigid_fast(c, s.begin, s.end, settled, fill((real)velocity), fill((real)multipliers));
+    update_general_fast(c, s.general_begin, s.general_end, settled, (real)velocity, (real)multipliers);
 }
 
-double CPU(dual_residual)(const struct sadmm_context *c, size_t begin, size_t end)
+double CPU(dual_residual)(const struct sadmm_context *c, int thread, int threads)
 {
-    return c->rigid_bodies ? rigid_residual(c, begin, end) : general_residual(c, first_body(c, begin), first_body(c, end));
+    const struct body_share s = share_of(c, thread, threads);
+    return fmax(rigid_residual(c, s.begin, s.end), general_residual(c, s.general_begin, s.general_end));
 }

@@ -9,9 +9,9 @@
 #include "cpu_rows.h"
 
 /* A^-1, packed. A rigid body's is inverted by blocks. */
-static void invert(bool rigid, const double A[PACKED6], double out[PACKED6])
+static void invert(const struct sadmm_context *c, const double A[PACKED6], double out[PACKED6])
 {
-    if (rigid) {
+    if (CPU(has_rigid_mass)(c, A)) {
         packed_invert_rigid(A, out);
         return;
     }
@@ -61,7 +61,7 @@ static double pair_response(const struct sadmm_context *c, const struct sadmm_co
         const double *inverse = &c->A_inverse[(size_t)bodies[side] * PACKED6];
         struct arm_sums sums;
         if (c->plan.contact_rows == 3) pair_arms(c, pair, side, &sums);
-        if (c->plan.contact_rows == 3 && c->plan.rigid) {
+        if (c->plan.contact_rows == 3 && CPU(has_rigid_mass)(c, &c->A[(size_t)bodies[side] * PACKED6])) {
             w += packed_dot_arms(inverse, &sums);
             continue;
         }
@@ -77,27 +77,6 @@ static double pair_response(const struct sadmm_context *c, const struct sadmm_co
 }
 
 static double length3(const double x[3]) { return sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]); }
-
-/* Of every row; and what a row's multiplier counts for in the block's load: a row that pushes by how much, a row that
- * only turns by the push that would take as much energy. */
-static void block_response(const struct sadmm_context *c, struct row_block *block)
-{
-    const int32_t bodies[2] = {block->body_a, block->body_b};
-    double inverse_mass = 0;
-    for (int side = 0; side < 2; ++side)
-        if (bodies[side] < c->bodies) inverse_mass += 1 / cpu_body_mass(c, bodies[side]);
-    for (int r = 0; r < block->rows; ++r) {
-        double w = 0, push = 0, row[6];
-        for (int side = 0; side < 2; ++side) {
-            if (bodies[side] >= c->bodies) continue;
-            block_row(block, side, r, row);
-            w += packed_form(&c->A_inverse[(size_t)bodies[side] * PACKED6], row);
-            push = fmax(push, length3(row));
-        }
-        block->response[r] = (real)w;
-        block->scale[r] = (real)(push > 0 ? push : sqrt(w / inverse_mass));
-    }
-}
 
 /* ---- weights ----------------------------------------------------------------------------------------------------- */
 
@@ -190,41 +169,18 @@ static void weigh_pair_block(struct sadmm_context *c, size_t index)
     }
 }
 
-/* B = diag(weight) + along along^T */
-static void weigh_row_block(struct sadmm_context *c, struct row_block *block)
-{
-    const struct cpu_island *island = cpu_island_of(c, block->body_a, block->body_b);
-    double load2 = 0, lambda2 = 0, w = 0;
-    for (int r = 0; r < block->rows; ++r) {
-        double lambda = (double)block->lambda[r], load = (double)block->scale[r] * lambda;
-        load2 += load * load;
-        lambda2 += lambda * lambda;
-        w += (double)block->response[r] / block->rows;
-    }
-    double share = weight_share(load2, island->speed, island->mass);
-    for (int r = 0; r < block->rows; ++r) {
-        double lambda = (double)block->lambda[r], response = (double)block->response[r];
-        block->along[r] = 0;
-        switch ((sadmm_block_kind)block->kind) {
-        case SADMM_BLOCK_CONTACT: block->weight[r] = (real)weight_of_contact_block(share, lambda2, w); break;
-        case SADMM_BLOCK_HARD:
-            block->weight[r] = (real)weight_of_hard_row(response);
-            block->along[r] = (real)(sqrt(share) * lambda);
-            break;
-        case SADMM_BLOCK_SOFT: block->weight[r] = (real)weight_of_soft_row(share, lambda, response); break;
-        }
-    }
-}
-
 /* ---- C_i = sum J^T B J ------------------------------------------------------------------------------------------- */
 
-static void add_row_block(const struct row_block *block, int side, double C[PACKED6])
+static void add_rows(const struct sadmm_context *c, size_t record, int side, double C[PACKED6])
 {
+    int lane;
+    const struct row_block *block = cpu_row_block(c, record, &lane);
+    const struct row_weight *weights = c->row_weights + c->system->rows->constraints[block->constraint[lane]].first;
     double row[6], along[6] = {0};
-    for (int r = 0; r < block->rows; ++r) {
-        block_row(block, side, r, row);
-        packed_add_row(C, row, (double)block->weight[r]);
-        for (int j = 0; j < 6; ++j) along[j] += (double)block->along[r] * row[j];
+    for (int r = 0; r < cpu_row_count(c, block, lane); ++r) {
+        cpu_load_row(c, block, lane, side, r, row);
+        packed_add_row(C, row, weights[r].weight);
+        for (int j = 0; j < 6; ++j) along[j] += weights[r].along * row[j];
     }
     packed_add_row(C, along, 1);
 }
@@ -239,15 +195,14 @@ static void add_weighted_arms(struct arm_sums *to, const struct arm_sums *arms, 
 static void assemble_C(struct sadmm_context *c, size_t i)
 {
     double *C = &c->C[i * PACKED6], S[PACKED6];
-    size_t pair_records = c->pair_block_count * (size_t)LANES;
     struct arm_sums arms, weighted = {0};
     memset(C, 0, PACKED6 * sizeof *C);
     for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) {
         size_t row = (size_t)c->incident[at];
         int side = row >= c->record_count;
         size_t record = side ? row - c->record_count : row;
-        if (record >= pair_records) {
-            add_row_block(&c->row_blocks[record - pair_records], side, C);
+        if (record >= cpu_pair_records(c)) {
+            add_rows(c, record, side, C);
         } else if (c->plan.contact_rows == 3) {
             pair_arms(c, cpu_pair(c, record), side, &arms);
             add_weighted_arms(&weighted, &arms, c->pair_weight[record]);
@@ -279,7 +234,7 @@ static void update_share(void *context, int thread, int threads)
     for (size_t k = begin; k < end; ++k) weigh_pair_block(c, k);
     for (size_t k = begin; k < end && eases; ++k) ease_gaps(c, k);
     sadmm_share(c->row_block_count, thread, threads, &begin, &end);
-    for (size_t k = begin; k < end; ++k) weigh_row_block(c, &c->row_blocks[k]);
+    for (size_t k = begin; k < end; ++k) CPU(weigh_rows)(c, k);
     sadmm_barrier_wait(&c->barrier, threads);
     sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) assemble_C(c, i);
@@ -301,7 +256,7 @@ static void respond_share(void *context, int thread, int threads)
     struct sadmm_context *c = (struct sadmm_context *)context;
     size_t begin, end;
     sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
-    for (size_t i = begin; i < end; ++i) invert(c->plan.rigid, &c->A[i * PACKED6], &c->A_inverse[i * PACKED6]);
+    for (size_t i = begin; i < end; ++i) invert(c, &c->A[i * PACKED6], &c->A_inverse[i * PACKED6]);
     sadmm_barrier_wait(&c->barrier, threads);
     size_t pair_records = c->pair_block_count * (size_t)LANES;
     sadmm_share(pair_records, thread, threads, &begin, &end);
@@ -309,7 +264,7 @@ static void respond_share(void *context, int thread, int threads)
         if (c->pair_blocks[k / (size_t)LANES].pair[k % (size_t)LANES] >= 0)
             c->pair_response[k] = pair_response(c, cpu_pair(c, k));
     sadmm_share(c->row_block_count, thread, threads, &begin, &end);
-    for (size_t k = begin; k < end; ++k) block_response(c, &c->row_blocks[k]);
+    for (size_t k = begin; k < end; ++k) CPU(respond_rows)(c, k);
 }
 
 sadmm_status CPU(init_weights)(struct sadmm_context *c, struct sadmm_error *error)
@@ -319,7 +274,10 @@ sadmm_status CPU(init_weights)(struct sadmm_context *c, struct sadmm_error *erro
     for (int32_t i = 0; i < c->bodies; ++i) {
         c->islands[i].weight_scale = 1;
         c->islands[i].rescale = 0;
+        c->islands[i].rows = false;
     }
+    for (size_t k = 0; k < sadmm_row_constraint_count(c->system); ++k)
+        cpu_island_of(c, c->system->rows->constraints[k].body_a, c->system->rows->constraints[k].body_b)->rows = true;
     c->refreshes = -1; /* the first weights are none */
     c->settled = c->measured = false;
     return CPU(update_weights)(c, error);

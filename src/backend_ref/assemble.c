@@ -37,45 +37,37 @@ static void start(struct sadmm_context *c, struct ref_constraint *constraint)
     }
 }
 
-static void clear(struct ref_constraint *constraint, sadmm_block_kind kind, int rows, int32_t a, int32_t b)
+static void clear(struct ref_constraint *constraint, bool cone, int rows, int32_t a, int32_t b)
 {
     memset(constraint, 0, sizeof *constraint);
-    constraint->kind = kind;
+    constraint->cone = cone;
     constraint->rows = rows;
     constraint->side[0].body = a;
     constraint->side[1].body = b;
 }
 
-static void assemble_block(struct sadmm_context *c, int32_t index)
+static void assemble_constraint(struct sadmm_context *c, size_t index)
 {
-    const struct sadmm_problem_block *block = &c->system->blocks[index];
-    struct ref_constraint *constraint = &c->constraints[c->system->contacts->point_count + (size_t)index];
-    size_t rows = (size_t)block->rows;
+    const struct sadmm_rows *in = c->system->rows;
+    const struct sadmm_row_constraint *about = &in->constraints[index];
+    struct ref_constraint *constraint = &c->constraints[c->system->contacts->point_count + index];
+    size_t first = (size_t)about->first, count = (size_t)about->count;
 
-    clear(constraint, block->kind, block->rows, block->body_a, block->body_b);
-    if (block->body_a >= 0) memcpy(constraint->side[0].J, block->jacobian_a, 6 * rows * sizeof(double));
-    if (block->body_b >= 0) memcpy(constraint->side[1].J, block->jacobian_b, 6 * rows * sizeof(double));
-    constraint->mu = block->friction;
-    for (int r = 0; r < block->rows; ++r) {
-        constraint->e[r] = block->error[r];
-        constraint->k[r] = block->stiffness[r];
-        constraint->c[r] = block->damping[r];
-        if (block->kind == SADMM_BLOCK_HARD) {
-            constraint->free_row[r] = true;
-            for (int s = 0; s < 2; ++s)
-                for (int j = 0; j < 6; ++j)
-                    if (constraint->side[s].J[6 * r + j] != 0) constraint->free_row[r] = false;
-        }
-        if (c->plan->warm_start && !constraint->free_row[r])
-            constraint->lambda[r] = c->system->block_lambda[6 * (size_t)index + (size_t)r];
+    clear(constraint, about->cone, about->count, about->body_a, about->body_b);
+    if (about->body_a >= 0) memcpy(constraint->side[0].J, in->jacobian_a + 6 * first, 6 * count * sizeof(double));
+    if (about->body_b >= 0) memcpy(constraint->side[1].J, in->jacobian_b + 6 * first, 6 * count * sizeof(double));
+    constraint->mu = about->friction;
+    for (size_t r = 0; r < count; ++r) {
+        constraint->e[r] = in->bias[first + r];
+        constraint->gain[r] = in->gain[first + r];
+        constraint->compliance[r] = in->compliance[first + r];
+        constraint->lo[r] = in->lo[first + r];
+        constraint->hi[r] = in->hi[first + r];
+        constraint->coupled[r] = sadmm_row_is_coupled(in, first + r);
+        constraint->free_row[r] = !about->cone && in->compliance[first + r] == 0 && !sadmm_row_acts(in, first + r);
+        if (c->plan->warm_start && !constraint->free_row[r]) constraint->lambda[r] = in->lambda[first + r];
     }
     start(c, constraint);
-}
-
-static void assemble_blocks(struct sadmm_context *c, sadmm_block_kind kind)
-{
-    for (int32_t k = 0; k < c->system->block_count; ++k)
-        if (c->system->blocks[k].kind == kind) assemble_block(c, k);
 }
 
 sadmm_status sadmm_ref_assemble_contacts(struct sadmm_context *c, struct sadmm_error *error)
@@ -88,7 +80,7 @@ sadmm_status sadmm_ref_assemble_contacts(struct sadmm_context *c, struct sadmm_e
         for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
             const struct sadmm_contact_point *point = &contacts->points[k];
             struct ref_constraint *constraint = &c->constraints[k];
-            clear(constraint, SADMM_BLOCK_CONTACT, c->plan->contact_rows, pair->body_a, pair->body_b);
+            clear(constraint, true, c->plan->contact_rows, pair->body_a, pair->body_b);
             constraint->mu = pair->friction;
             constraint->e[0] = sadmm_contact_e(c->system, c->settings, pair, point);
             for (int r = 0; r < constraint->rows; ++r) {
@@ -102,20 +94,12 @@ sadmm_status sadmm_ref_assemble_contacts(struct sadmm_context *c, struct sadmm_e
             start(c, constraint);
         }
     }
-    assemble_blocks(c, SADMM_BLOCK_CONTACT);
     return SADMM_OK;
 }
 
-sadmm_status sadmm_ref_assemble_joints(struct sadmm_context *c, struct sadmm_error *error)
+sadmm_status sadmm_ref_assemble_rows(struct sadmm_context *c, struct sadmm_error *error)
 {
     (void)error;
-    assemble_blocks(c, SADMM_BLOCK_HARD);
-    return SADMM_OK;
-}
-
-sadmm_status sadmm_ref_assemble_springs(struct sadmm_context *c, struct sadmm_error *error)
-{
-    (void)error;
-    assemble_blocks(c, SADMM_BLOCK_SOFT);
+    for (size_t k = 0; k < sadmm_row_constraint_count(c->system); ++k) assemble_constraint(c, k);
     return SADMM_OK;
 }

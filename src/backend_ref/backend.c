@@ -25,7 +25,7 @@ static sadmm_status begin(struct sadmm_context *c, const struct sadmm_system *sy
                           const struct sadmm_settings *settings, struct sadmm_error *error)
 {
     size_t bodies = (size_t)system->body_count;
-    size_t constraints = system->contacts->point_count + (size_t)system->block_count;
+    size_t constraints = system->contacts->point_count + sadmm_row_constraint_count(system);
     if (!sadmm_grow((void **)&c->bodies, &c->body_capacity, 0, bodies, sizeof *c->bodies) ||
         !sadmm_grow((void **)&c->constraints, &c->constraint_capacity, 0, constraints, sizeof *c->constraints))
         return sadmm_fail_memory(error, "the literal backend");
@@ -51,9 +51,11 @@ static sadmm_status read_solution(struct sadmm_context *c, struct sadmm_error *e
             v3_store(m3_tmul(frame, v3_load(lambda)), system->contacts->points[k].impulse);
         }
     }
-    for (int32_t k = 0; k < system->block_count; ++k)
-        memcpy(system->block_lambda + 6 * (size_t)k, c->constraints[system->contacts->point_count + (size_t)k].lambda,
-               6 * sizeof(double));
+    for (size_t k = 0; k < sadmm_row_constraint_count(system); ++k) {
+        const struct sadmm_row_constraint *about = &system->rows->constraints[k];
+        memcpy(system->rows->lambda + about->first, c->constraints[system->contacts->point_count + k].lambda,
+               (size_t)about->count * sizeof(double));
+    }
     return SADMM_OK;
 }
 
@@ -131,8 +133,7 @@ static const struct sadmm_kernels kernels_ref = {
     .begin = begin,
     .assemble_bodies = sadmm_ref_assemble_bodies,
     .assemble_contacts = sadmm_ref_assemble_contacts,
-    .assemble_joints = sadmm_ref_assemble_joints,
-    .assemble_springs = sadmm_ref_assemble_springs,
+    .assemble_rows = sadmm_ref_assemble_rows,
     .init_penalty = init_penalty,
     .factorize = sadmm_ref_factorize,
     .update_velocity = sadmm_ref_update_velocity,

@@ -8,6 +8,7 @@
 #include "core/math/dense6.h"
 #include "core/math/contact.h"
 #include "core/math/relax.h"
+#include "core/math/row.h"
 #include "core/math/weight.h"
 #include "literal.h"
 
@@ -189,18 +190,15 @@ static void update_weight_scales(struct sadmm_context *c)
 {
     const struct sadmm_contact_set *contacts = c->system->contacts;
     momentum_residual(c, false);
-    for (int32_t i = 0; i < c->system->body_count; ++i) {
+    for (int32_t i = 0; i < c->system->body_count; ++i)
         c->bodies[i].island_violation = c->bodies[i].island_residual = 0;
-        c->bodies[i].blocks = false;
-    }
     for (int32_t i = 0; i < c->system->body_count; ++i)
         c->bodies[c->bodies[i].label].island_residual += inverse_form(&c->bodies[i], c->bodies[i].impulse);
     for (size_t p = 0; p < contacts->pair_count; ++p)
         island_of(c, &c->constraints[contacts->pairs[p].first])->island_violation += pair_violation(c, &contacts->pairs[p]);
-    for (size_t k = contacts->point_count; k < c->constraint_count; ++k) island_of(c, &c->constraints[k])->blocks = true;
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *island = &c->bodies[i];
-        if (island->label != i || island->blocks) continue;
+        if (island->label != i || island->rows) continue;
         double balance = weight_balance(island->island_violation, island->island_residual, island->island_mass);
         double next = weight_next_scale(island->weight_scale, balance);
         island->rescale = weight_stalls(balance) ? next / island->weight_scale : 0;
@@ -230,8 +228,8 @@ static void weigh_pair(struct sadmm_context *c, const struct sadmm_contact_pair 
     }
 }
 
-/* share lambda lambda^T + phi / w: in full for a hard block, its diagonal for a soft one, a scalar for a contact. */
-static void weigh_block(struct sadmm_context *c, struct ref_constraint *constraint)
+/* share lambda lambda^T + phi / w: of the rows that may be coupled in full, of others the diagonal, of a contact a scalar. */
+static void weigh_constraint(struct sadmm_context *c, struct ref_constraint *constraint)
 {
     const double *lambda = constraint->lambda;
     double load2 = 0, lambda2 = 0, mean = 0, w[6];
@@ -247,14 +245,15 @@ static void weigh_block(struct sadmm_context *c, struct ref_constraint *constrai
     double share = load2 > 0 ? weight_mass(sqrt(load2), speed, island->island_mass) / load2 : 0;
     memset(constraint->B, 0, sizeof constraint->B);
     for (int r = 0; r < constraint->rows; ++r) {
-        double own = w[r] > 0 ? WEIGHT_FLOOR_BLOCK / w[r] : 0;
-        if (constraint->kind == SADMM_BLOCK_CONTACT)
+        double own = w[r] > 0 ? WEIGHT_FLOOR_ROW / w[r] : 0;
+        if (constraint->cone)
             constraint->B[7 * r] = share * lambda2 + (mean > 0 ? WEIGHT_FLOOR_CONTACT / mean : 1);
-        else if (constraint->kind == SADMM_BLOCK_SOFT)
+        else if (!constraint->coupled[r])
             constraint->B[7 * r] = w[r] > 0 ? share * lambda[r] * lambda[r] + own : 1;
         else
             for (int q = 0; q < constraint->rows; ++q)
-                constraint->B[6 * r + q] = share * lambda[r] * lambda[q] + (q == r ? own : 0);
+                if (constraint->coupled[q])
+                    constraint->B[6 * r + q] = share * lambda[r] * lambda[q] + (q == r ? own : 0);
     }
 }
 
@@ -282,7 +281,7 @@ sadmm_status sadmm_ref_update_weights(struct sadmm_context *c, struct sadmm_erro
             double share = weight_gap_share(island_stack_depth(island_of(c, contact)));
             contact->e[0] = weight_gap_error(contact->e[0], share, c->settings->slop / c->settings->dt);
         }
-    for (size_t k = points; k < c->constraint_count; ++k) weigh_block(c, &c->constraints[k]);
+    for (size_t k = points; k < c->constraint_count; ++k) weigh_constraint(c, &c->constraints[k]);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         memset(c->bodies[i].C, 0, sizeof c->bodies[i].C);
         c->bodies[i].beta = 1;
@@ -302,7 +301,10 @@ sadmm_status sadmm_ref_init_weights(struct sadmm_context *c, struct sadmm_error 
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         c->bodies[i].weight_scale = 1;
         c->bodies[i].rescale = 0;
+        c->bodies[i].rows = false;
     }
+    for (size_t k = c->system->contacts->point_count; k < c->constraint_count; ++k)
+        island_of(c, &c->constraints[k])->rows = true;
     c->refreshes = -1; /* the first weights are none */
     c->settled = false;
     return sadmm_ref_update_weights(c, error);
@@ -320,32 +322,36 @@ static void step_velocity(struct sadmm_context *c, double relaxation)
     }
 }
 
-/* lambda^ = Pi_C( lambda - B (x + e) / n ), n the number of dynamic bodies. */
+/* lambda^ = Pi_C( lambda - B (x + e) / n ), n the number of dynamic bodies; of scalar rows the law of math/row.h. */
 static void solve_multiplier(const struct sadmm_context *c, const struct ref_constraint *constraint, double out[6])
 {
-    double x[6] = {0}, step[6] = {0}, n = 0, candidate[3] = {0, 0, 0}, projected[3];
+    double x[6] = {0}, n = 0;
     for (int s = 0; s < 2; ++s) {
         const struct ref_side *side = &constraint->side[s];
         if (side->body < 0) continue;
         n += 1;
         for (int r = 0; r < constraint->rows; ++r) x[r] += dense6_dot(side->J + 6 * r, c->bodies[side->body].v);
     }
-    for (int r = 0; r < constraint->rows; ++r)
-        for (int q = 0; q < constraint->rows; ++q)
-            step[r] += constraint->B[6 * r + q] * (x[q] + constraint->e[q]) / n;
     memset(out, 0, 6 * sizeof *out);
-    for (int r = 0; r < constraint->rows; ++r) {
-        if (constraint->kind == SADMM_BLOCK_SOFT)
-            out[r] = soft_multiplier(constraint->k[r], constraint->c[r], constraint->e[r], x[r],
-                                     n / constraint->B[7 * r], constraint->lambda[r]);
-        else if (constraint->kind == SADMM_BLOCK_HARD)
-            out[r] = constraint->free_row[r] ? 0 : constraint->lambda[r] - step[r];
-        else
-            candidate[r] = constraint->lambda[r] - step[r];
+    if (constraint->cone) {
+        double candidate[3] = {0, 0, 0}, projected[3];
+        for (int r = 0; r < constraint->rows; ++r)
+            candidate[r] = constraint->lambda[r] - constraint->B[7 * r] * (x[r] + constraint->e[r]) / n;
+        contact_project_rows(candidate, constraint->mu, projected);
+        memcpy(out, projected, (size_t)constraint->rows * sizeof *out);
+        return;
     }
-    if (constraint->kind != SADMM_BLOCK_CONTACT) return;
-    contact_project_rows(candidate, constraint->mu, projected);
-    memcpy(out, projected, (size_t)constraint->rows * sizeof *out);
+    for (int r = 0; r < constraint->rows; ++r) {
+        double step = 0;
+        if (constraint->free_row[r]) continue;
+        if (constraint->coupled[r])
+            for (int q = 0; q < constraint->rows; ++q)
+                step += constraint->B[6 * r + q] * (x[q] + constraint->e[q]) / n;
+        else
+            step = row_residual(constraint->gain[r], constraint->e[r], constraint->compliance[r], x[r], constraint->lambda[r]) /
+                   (constraint->compliance[r] + constraint->gain[r] * n / constraint->B[7 * r]);
+        out[r] = fmin(fmax(constraint->lambda[r] - step, constraint->lo[r]), constraint->hi[r]);
+    }
 }
 
 static void step_multipliers(struct sadmm_context *c, double relaxation)
@@ -407,7 +413,7 @@ sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *c, int32_t *limited,
         sum->momentum_residual += inverse_form(body, body->impulse) / 2;
         c->bodies[body->label].along += dense6_dot(body->v, body->b) / 2;
     }
-    for (size_t k = 0; k < c->constraint_count; ++k) {
+    for (size_t k = 0; k < c->system->contacts->point_count; ++k) {
         const struct ref_constraint *constraint = &c->constraints[k];
         int32_t body = constraint->side[0].body >= 0 ? constraint->side[0].body : constraint->side[1].body;
         c->bodies[c->bodies[body].label].limit.work += fmax(0, -constraint->e[0]) * constraint->lambda[0];
@@ -416,6 +422,7 @@ sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *c, int32_t *limited,
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *body = &c->bodies[i];
         const struct ref_body *island = &c->bodies[body->label];
+        if (island->rows) continue; /* the energies are those of contacts alone */
         double factor = limit_factor(&island->limit);
         if (under_iterated) factor = fmin(factor, limit_bounce_factor(&island->limit, island->along, DBL_EPSILON));
         if (factor < 1 && body->label == i) ++*limited;

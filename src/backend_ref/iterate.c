@@ -83,22 +83,16 @@ sadmm_status sadmm_ref_update_velocity(struct sadmm_context *c, struct sadmm_err
 static void solve_lambda(struct ref_constraint *constraint, const double sum[6], double s)
 {
     double *lambda = constraint->lambda;
-    switch (constraint->kind) {
-    case SADMM_BLOCK_SOFT:
-        for (int r = 0; r < constraint->rows; ++r)
-            lambda[r] = -(constraint->k[r] * constraint->e[r] + constraint->c[r] * sum[r]) / (1 + constraint->c[r] * s);
-        break;
-    case SADMM_BLOCK_HARD:
-        for (int r = 0; r < constraint->rows; ++r)
-            lambda[r] = constraint->free_row[r] ? 0 : -(constraint->e[r] + sum[r]) / s;
-        break;
-    case SADMM_BLOCK_CONTACT: {
+    if (constraint->cone) {
         double candidate[3] = {0, 0, 0}, projected[3];
         for (int r = 0; r < constraint->rows; ++r) candidate[r] = -(constraint->e[r] + sum[r]) / s;
         contact_project_rows(candidate, constraint->mu, projected);
         for (int r = 0; r < constraint->rows; ++r) lambda[r] = projected[r];
-        break;
+        return;
     }
+    for (int r = 0; r < constraint->rows; ++r) { /* math/row.h with x = sum + s lambda */
+        double alone = -(constraint->e[r] + constraint->gain[r] * sum[r]) / (constraint->compliance[r] + constraint->gain[r] * s);
+        lambda[r] = constraint->free_row[r] ? 0 : fmin(fmax(alone, constraint->lo[r]), constraint->hi[r]);
     }
 }
 

@@ -24,13 +24,14 @@ struct ref_side {
 };
 
 struct ref_constraint {
-    sadmm_block_kind kind;
+    bool cone;                       /* a contact, (5); else each row is a law of its own, math/row.h */
     int rows;
     struct ref_side side[2];
-    double e[6];
+    double e[6];                     /* contact; of other rows the bias */
     double mu;                       /* contact */
-    double k[6], c[6];               /* soft: (3) */
-    bool free_row[6];                /* hard: zero on both bodies (Sec. III-C), carries nothing */
+    double gain[6], compliance[6], lo[6], hi[6];
+    bool coupled[6];                 /* fast: may share a dense weight with other rows (core/model/rows.h) */
+    bool free_row[6];                /* zero on both bodies (Sec. III-C): carries nothing */
     double lambda[6];
     double B[36], seen[6];           /* fast: weight (6 x 6), the multiplier that the next Step 1 sees */
 };
@@ -46,7 +47,7 @@ struct ref_body {
     int32_t label;                   /* the smallest body of its island; that one keeps the island's sums */
     double island_energy, island_mass, island_kinetic, island_push;
     double island_violation, island_residual, weight_scale, rescale; /* math/weight.h; rescale, if not 0: weights stay, times this */
-    bool blocks;                     /* the island has constraints that are no pair's */
+    bool rows;                       /* the island has constraints given by rows */
     struct limit_energies limit;
     double along; /* v . A v_f / 2 of the island */
     double impulse[6];               /* sums over the body's constraints */
@@ -58,7 +59,7 @@ struct sadmm_context {
     const struct sadmm_settings *settings;
     struct ref_body *bodies;
     size_t body_capacity;
-    struct ref_constraint *constraints; /* contact points in order, then blocks in order */
+    struct ref_constraint *constraints; /* contact points in order, then constraints given by rows */
     size_t constraint_capacity, constraint_count;
     bool settled;                    /* fast: Step 1 ran */
     int refreshes;                   /* fast: of the weights, in this solve */
@@ -68,8 +69,7 @@ struct sadmm_context {
 /* assemble.c */
 sadmm_status sadmm_ref_assemble_bodies(struct sadmm_context *, struct sadmm_error *);
 sadmm_status sadmm_ref_assemble_contacts(struct sadmm_context *, struct sadmm_error *);
-sadmm_status sadmm_ref_assemble_joints(struct sadmm_context *, struct sadmm_error *);
-sadmm_status sadmm_ref_assemble_springs(struct sadmm_context *, struct sadmm_error *);
+sadmm_status sadmm_ref_assemble_rows(struct sadmm_context *, struct sadmm_error *);
 
 /* iterate.c */
 sadmm_status sadmm_ref_init_penalty(struct sadmm_context *, struct sadmm_error *);

@@ -175,12 +175,11 @@ static __device__ void store(const row_view &rows, int32_t plane, int32_t k, dou
     rows.data[(size_t)plane * (size_t)rows.stride + (size_t)k] = (solver_real)value;
 }
 
-static __global__ void assemble_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+static __global__ void assemble_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     int32_t k = thread_index();
     if (k >= live_rows(v.model, v.rows)) return;
-    const struct sadmm_problem_block *block = &v.raw.system.blocks[k];
-    if ((int32_t)block->kind != args.count) return;
+    const struct sadmm_problem_block *block = &v.raw.blocks[k];
     bool a = block->body_a >= 0, b = block->body_b >= 0;
     row_about about = {(int32_t)block->kind, block->rows, a ? block->body_a : v.model.bodies,
                        b ? block->body_b : v.model.bodies, -1, -1, 0};
@@ -198,17 +197,10 @@ static __global__ void assemble_rows_kernel(const __grid_constant__ cuda_view v,
         store(v.rows, ROW_STIFFNESS + r, k, used ? block->stiffness[r] : 0);
         store(v.rows, ROW_DAMPING + r, k, used ? block->damping[r] : 0);
         store(v.rows, ROW_LAMBDA + r, k,
-              v.model.warm_start && active ? v.raw.system.block_lambda[6 * (size_t)k + (size_t)r] : 0);
+              v.model.warm_start && active ? v.raw.block_lambda[6 * (size_t)k + (size_t)r] : 0);
     }
     store(v.rows, ROW_FRICTION, k, solver_friction(v.model, block->friction));
     v.rows.info[k] = about;
-}
-
-static sadmm_status assemble_rows(struct sadmm_context *c, enum sadmm_block_kind kind, struct sadmm_error *error)
-{
-    cuda_args args = {};
-    args.count = (int32_t)kind;
-    return CUDA(launch)(c, assemble_rows_kernel, "assemble_blocks", blocks_for(c->view.rows.count), &args, error);
 }
 
 /* ---- entries --------------------------------------------------------------------------------------------------- */
@@ -217,23 +209,17 @@ extern "C" sadmm_status CUDA(assemble_contacts)(struct sadmm_context *c, struct 
 {
     cuda_args args = {};
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(launch_of)(
+    return CUDA(launch_of)(
         c, c->fast ? assemble_contacts_kernel<true> : assemble_contacts_kernel<false>, "assemble_contacts",
         ((int64_t)c->view.contacts.pair_capacity * c->view.contacts.lanes + BODY_THREADS - 1) / BODY_THREADS,
-        BODY_THREADS, &args, error));
-    return c->plan.blocks[SADMM_BLOCK_CONTACT] ? assemble_rows(c, SADMM_BLOCK_CONTACT, error) : SADMM_OK;
+        BODY_THREADS, &args, error);
 }
 
-extern "C" sadmm_status CUDA(assemble_joints)(struct sadmm_context *c, struct sadmm_error *error)
+extern "C" sadmm_status CUDA(assemble_rows)(struct sadmm_context *c, struct sadmm_error *error)
 {
+    cuda_args args = {};
     CUDA_ENTER(c);
-    return assemble_rows(c, SADMM_BLOCK_HARD, error);
-}
-
-extern "C" sadmm_status CUDA(assemble_springs)(struct sadmm_context *c, struct sadmm_error *error)
-{
-    CUDA_ENTER(c);
-    return assemble_rows(c, SADMM_BLOCK_SOFT, error);
+    return CUDA(launch)(c, assemble_rows_kernel, "assemble_rows", blocks_for(c->view.rows.count), &args, error);
 }
 
 sadmm_status CUDA(enqueue_bodies)(struct sadmm_context *c, struct sadmm_error *error) { return launch_bodies(c, error); }

@@ -29,8 +29,7 @@ sadmm_status CUDA(begin)(struct sadmm_context *, const struct sadmm_system *, co
                          const struct sadmm_settings *, struct sadmm_error *);
 sadmm_status CUDA(assemble_bodies)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CUDA(assemble_contacts)(struct sadmm_context *, struct sadmm_error *);
-sadmm_status CUDA(assemble_joints)(struct sadmm_context *, struct sadmm_error *);
-sadmm_status CUDA(assemble_springs)(struct sadmm_context *, struct sadmm_error *);
+sadmm_status CUDA(assemble_rows)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CUDA(init_penalty)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CUDA(update_weights)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CUDA(factorize)(struct sadmm_context *, struct sadmm_error *);

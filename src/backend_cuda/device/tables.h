@@ -12,8 +12,7 @@
         .begin = sadmm_cuda_begin##suffix,                     \
         .assemble_bodies = sadmm_cuda_assemble_bodies##suffix, \
         .assemble_contacts = sadmm_cuda_assemble_contacts##suffix, \
-        .assemble_joints = sadmm_cuda_assemble_joints##suffix, \
-        .assemble_springs = sadmm_cuda_assemble_springs##suffix, \
+        .assemble_rows = sadmm_cuda_assemble_rows##suffix, \
         .init_penalty = sadmm_cuda_init_penalty##suffix,       \
         .update_weights = sadmm_cuda_update_weights##suffix,   \
         .factorize = sadmm_cuda_factorize##suffix,             \

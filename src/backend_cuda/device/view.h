@@ -228,7 +228,9 @@ struct iteration_view {
 
 /* Core's own data, in double and in its order: where a step begins, and results. */
 struct raw_view {
-    struct sadmm_system system; /* rigid, A, b, velocity, blocks, block_lambda */
+    struct sadmm_system system; /* rigid, A, b, velocity */
+    const struct sadmm_problem_block *blocks; /* constraints given by rows */
+    double *block_lambda;                     /* (blocks x 6) */
     const struct sadmm_contact_pair *pairs;
     const struct sadmm_contact_point *points;
     double *out; /* results */

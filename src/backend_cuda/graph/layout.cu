@@ -1,6 +1,7 @@
 /* begin: room for the step, raw data to the device, the statistics, the tier and the layout (graph/layout.h). */
 #include <string.h>
 
+#include "core/base/memory.h"
 #include "backend_cuda/device/context.h"
 
 /* Live counts and statistics, side by side in device memory and in the staging buffer. */
@@ -115,7 +116,7 @@ static void bind_raw(struct sadmm_context *c)
 {
     c->layout.pairs = c->view.raw.pairs;
     c->layout.points = c->view.raw.points;
-    c->layout.blocks = c->view.raw.system.blocks;
+    c->layout.blocks = c->view.raw.blocks;
 }
 
 static sadmm_status check_partition(struct sadmm_context *c, const struct cuda_partition *partition,
@@ -186,14 +187,15 @@ static sadmm_status reserve_raw(struct sadmm_context *c, struct sadmm_error *err
     cuda_buffer *b = c->buffers;
     v->raw.system = *c->system;
     v->raw.system.contacts = nullptr;
+    v->raw.system.rows = nullptr;
     char *raw = (char *)b[BUFFER_RAW_BODIES].data;
     v->raw.system.rigid = (const struct sadmm_rigid *)(c->plan.rigid ? raw : none);
     v->raw.system.A = (const double *)(c->plan.rigid ? none : raw);
     v->raw.system.b = c->plan.rigid ? nullptr : v->raw.system.A + 36 * n;
     v->raw.system.velocity = (double *)(raw + n * body);
     raw = (char *)b[BUFFER_RAW_BLOCKS].data;
-    v->raw.system.blocks = (const struct sadmm_problem_block *)raw;
-    v->raw.system.block_lambda = (double *)(raw + rows * sizeof(struct sadmm_problem_block));
+    v->raw.blocks = (const struct sadmm_problem_block *)raw;
+    v->raw.block_lambda = (double *)(raw + rows * sizeof(struct sadmm_problem_block));
     v->raw.pairs = (struct sadmm_contact_pair *)b[BUFFER_RAW_PAIRS].data;
     v->raw.points = (struct sadmm_contact_point *)b[BUFFER_RAW_POINTS].data;
     return SADMM_OK;
@@ -312,7 +314,7 @@ static void count(struct sadmm_context *c)
     v->model.bodies = c->plan.bodies;
     v->contacts.pair_capacity = (c->plan.pairs + WARP - 1) / WARP * WARP;
     v->model.points = c->plan.points;
-    v->rows.count = c->system->block_count;
+    v->rows.count = (int32_t)sadmm_row_constraint_count(c->system);
     v->rows.stride = (v->rows.count + WARP - 1) / WARP * WARP;
     v->model.contact_rows = c->plan.contact_rows;
     v->model.warm_start = c->plan.warm_start;
@@ -324,19 +326,41 @@ static sadmm_status upload_live(struct sadmm_context *c, enum cuda_abort abort_c
     return CUDA(upload)(c, c->view.model.live, PINNED_LIVE, 0, &live, sizeof live, error);
 }
 
+/* Constraints given by rows as blocks: what the kernels know of them. */
+static sadmm_status upload_blocks(struct sadmm_context *c, struct sadmm_error *error)
+{
+    const struct sadmm_rows *rows = c->system->rows;
+    const cuda_view *v = &c->view;
+    const size_t count = rows->constraint_count, size = count * sizeof(struct sadmm_problem_block);
+    struct sadmm_problem_block *blocks = (struct sadmm_problem_block *)sadmm_alloc(count, sizeof *blocks);
+    double *lambda = (double *)sadmm_alloc(6 * count, sizeof *lambda);
+    sadmm_status status = blocks && lambda ? SADMM_OK : sadmm_fail_memory(error, "the cuda backend's rows");
+    for (size_t k = 0; k < count && status == SADMM_OK; ++k) {
+        const struct sadmm_row_constraint *constraint = &rows->constraints[k];
+        if (!sadmm_rows_as_block(rows, k, &blocks[k]))
+            status = sadmm_fail(error, SADMM_ERROR_UNSUPPORTED,
+                                "constraint %zu given by rows: the cuda backend has no rows with bounds, nor several kinds in one",
+                                k);
+        memcpy(lambda + 6 * k, rows->lambda + constraint->first, (size_t)constraint->count * sizeof *lambda);
+    }
+    if (status == SADMM_OK) status = CUDA(upload)(c, (void *)v->raw.blocks, PINNED_BLOCKS, 0, blocks, size, error);
+    if (status == SADMM_OK)
+        status = CUDA(upload)(c, v->raw.block_lambda, PINNED_BLOCKS, size, lambda, 6 * count * sizeof *lambda, error);
+    sadmm_free(blocks);
+    sadmm_free(lambda);
+    return status;
+}
+
 static sadmm_status upload_raw(struct sadmm_context *c, struct sadmm_error *error)
 {
     const struct sadmm_system *system = c->system;
     const struct sadmm_contact_set *contacts = system->contacts;
     const cuda_view *v = &c->view;
-    size_t blocks = (size_t)v->rows.count * sizeof *system->blocks;
     CUDA_TRY(CUDA(upload)(c, (void *)v->raw.pairs, PINNED_PAIRS, 0, contacts->pairs,
                           contacts->pair_count * sizeof *contacts->pairs, error));
     CUDA_TRY(CUDA(upload)(c, (void *)v->raw.points, PINNED_POINTS, 0, contacts->points,
                           contacts->point_count * sizeof *contacts->points, error));
-    CUDA_TRY(CUDA(upload)(c, (void *)v->raw.system.blocks, PINNED_BLOCKS, 0, system->blocks, blocks, error));
-    return CUDA(upload)(c, v->raw.system.block_lambda, PINNED_BLOCKS, blocks, system->block_lambda,
-                        6 * (size_t)v->rows.count * sizeof(double), error);
+    return v->rows.count > 0 ? upload_blocks(c, error) : SADMM_OK;
 }
 
 /* Wait for what the device knows now. */
@@ -377,7 +401,7 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
                                     const struct sadmm_plan *plan, const struct sadmm_settings *settings,
                                     struct sadmm_error *error)
 {
-    int64_t records = (int64_t)plan->pairs + system->block_count + WARP;
+    int64_t records = (int64_t)plan->pairs + plan->row_constraints + WARP;
     if (records > INT32_MAX / (4 * ROW))
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%lld constraints: at most %d", (long long)(records - WARP),
                           INT32_MAX / (4 * ROW) - WARP);

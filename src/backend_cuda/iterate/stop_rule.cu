@@ -67,7 +67,7 @@ static __device__ double natural_map(const model_view &model, const body_view &b
 static __device__ double natural_map_of_rows(const body_view &bodies, const row_view &rows, const raw_view &raw,
                                              int32_t k)
 {
-    const struct sadmm_problem_block *block = &raw.system.blocks[k];
+    const struct sadmm_problem_block *block = &raw.blocks[k];
     const int32_t joined[2] = {block->body_a, block->body_b};
     double x[6] = {}, weight[6] = {}, lambda[6] = {}, worst = 0;
     for (int r = 0; r < block->rows; ++r) {

@@ -48,7 +48,10 @@ extern "C" sadmm_status CUDA(read_solution)(struct sadmm_context *c, struct sadm
     if (n > 0) memcpy(system->velocity, from, 6 * n * sizeof *from);
     from += 6 * n;
     for (size_t k = 0; k < points; ++k, from += 3) memcpy(system->contacts->points[k].impulse, from, 3 * sizeof *from);
-    if (rows > 0) memcpy(system->block_lambda, from, 6 * rows * sizeof *from);
+    for (size_t k = 0; k < rows; ++k, from += 6) {
+        const struct sadmm_row_constraint *constraint = &system->rows->constraints[k];
+        memcpy(system->rows->lambda + constraint->first, from, (size_t)constraint->count * sizeof *from);
+    }
     return SADMM_OK;
 }
 

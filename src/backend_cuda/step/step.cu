@@ -213,8 +213,7 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
     case SADMM_STAGE_WRENCHES: /* and adds up wrenches */
     case SADMM_STAGE_CERTIFY:  /* by the host, afterwards */
     case SADMM_STAGE_PREDICT:  /* worlds are not loaded before their first step, */
-    case SADMM_STAGE_HARD:     /* and have no blocks */
-    case SADMM_STAGE_SOFT:
+    case SADMM_STAGE_ROWS:     /* and have none */
     default: return SADMM_OK;
     }
 }

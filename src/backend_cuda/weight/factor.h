@@ -64,7 +64,7 @@ static __host__ __device__ __forceinline__ bool has_closed_form(const model_view
 static inline __device__ void add_weighted_block(const row_view &rows, const raw_view &raw, int32_t k, int32_t side,
                                                  double C[PACKED])
 {
-    const struct sadmm_problem_block *block = &raw.system.blocks[k];
+    const struct sadmm_problem_block *block = &raw.blocks[k];
     const double *J = side ? block->jacobian_b : block->jacobian_a;
     double along[6] = {};
     for (int32_t r = 0; r < block->rows; ++r) {

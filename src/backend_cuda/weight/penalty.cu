@@ -34,7 +34,7 @@ static __device__ void add_pair(const model_view &model, const raw_view &raw, co
 
 static __device__ void add_block(const raw_view &raw, int32_t k, int side, double C[PACKED])
 {
-    const struct sadmm_problem_block *block = &raw.system.blocks[k];
+    const struct sadmm_problem_block *block = &raw.blocks[k];
     const double *J = side ? block->jacobian_b : block->jacobian_a;
     for (int32_t r = 0; r < block->rows; ++r) {
         double row[6];

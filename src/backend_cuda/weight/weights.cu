@@ -103,9 +103,9 @@ static __device__ void weigh_row_block(const cuda_view &v, int32_t k, bool first
         const double lambda = row_number(v.rows, ROW_LAMBDA + r, k), response = row_number(v.rows, ROW_RESPONSE + r, k);
         const bool hard = about.kind == SADMM_BLOCK_HARD;
         store_row(v.rows, ROW_WEIGHT + r, k,
-                  hard                                ? weight_of_hard_row(response)
-                  : about.kind == SADMM_BLOCK_CONTACT ? weight_of_contact_block(share, lambda2, mean)
-                                                      : weight_of_soft_row(share, lambda, response));
+                  hard                                ? weight_of_coupled_row(response)
+                  : about.kind == SADMM_BLOCK_CONTACT ? weight_of_cone(share, lambda2, mean)
+                                                      : weight_of_single_row(share, lambda, response));
         store_row(v.rows, ROW_ALONG + r, k, hard ? sqrt(share) * lambda : 0);
     }
 }

@@ -20,7 +20,7 @@ SADMM_INLINE int weight_next_refresh(int at) { return at < WEIGHT_DOUBLE_BELOW ?
 /* phi. Contacts: loads that have not been found yet are the ones to come. Joints and springs hold in all directions, loaded or
  * not. */
 #define WEIGHT_FLOOR_CONTACT 3.0
-#define WEIGHT_FLOOR_BLOCK 30.0
+#define WEIGHT_FLOOR_ROW 30.0
 
 /* Less is rounding of the impulses, and says nothing about loads; m/s. */
 #define WEIGHT_LEAST_SPEED 1e-6
@@ -129,23 +129,24 @@ SADMM_INLINE double weight_gap_error(double error, double share, double slop)
     return error <= 0 ? error : eased > beyond ? eased : beyond;
 }
 
-/* A block of rows, by share = min(load / V, m) / load^2: B = share lambda lambda^T + phi / w, of a contact
- * share |lambda|^2 + phi / w, of a soft block the diagonal alone. A row nobody feels (w = 0) has no weight. */
+/* A constraint given by rows, by share = min(load / V, m) / load^2: of the rows that have neither bounds nor compliance
+ * together B = share lambda lambda^T + phi / w, of each other row share lambda_r^2 + phi / w, so that its bounds and its compliance
+ * are met by itself; of a contact share |lambda|^2 + phi / w. A row nobody feels (w = 0) has no weight. */
 SADMM_INLINE double weight_share(double load2, double speed, double mass)
 {
     return load2 > 0 ? weight_mass(sqrt(load2), speed, mass) / load2 : 0;
 }
 
-SADMM_INLINE double weight_of_contact_block(double share, double lambda2, double response)
+SADMM_INLINE double weight_of_cone(double share, double lambda2, double response)
 {
     return share * lambda2 + (response > 0 ? WEIGHT_FLOOR_CONTACT / response : 1);
 }
 
-SADMM_INLINE double weight_of_hard_row(double response) { return response > 0 ? WEIGHT_FLOOR_BLOCK / response : 0; }
+SADMM_INLINE double weight_of_coupled_row(double response) { return response > 0 ? WEIGHT_FLOOR_ROW / response : 0; }
 
-SADMM_INLINE double weight_of_soft_row(double share, double lambda, double response)
+SADMM_INLINE double weight_of_single_row(double share, double lambda, double response)
 {
-    return response > 0 ? share * lambda * lambda + WEIGHT_FLOOR_BLOCK / response : 1;
+    return response > 0 ? share * lambda * lambda + WEIGHT_FLOOR_ROW / response : 1;
 }
 
 /* B of a pair, kg. phi / w does not sink with the weight scale: it is for contacts whose load is not known. */

@@ -24,6 +24,7 @@ void sadmm_islands(const struct sadmm_system *system, int32_t *label)
     for (int32_t i = 0; i < system->body_count; ++i) label[i] = i;
     for (size_t p = 0; p < system->contacts->pair_count; ++p)
         join(label, system->contacts->pairs[p].body_a, system->contacts->pairs[p].body_b);
-    for (int32_t k = 0; k < system->block_count; ++k) join(label, system->blocks[k].body_a, system->blocks[k].body_b);
+    for (size_t k = 0; k < sadmm_row_constraint_count(system); ++k)
+        join(label, system->rows->constraints[k].body_a, system->rows->constraints[k].body_b);
     for (int32_t i = 0; i < system->body_count; ++i) label[i] = label[label[i]]; /* parents are smaller: done already */
 }

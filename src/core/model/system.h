@@ -12,6 +12,7 @@
 #include <stdint.h>
 
 #include "core/base/contact_set.h"
+#include "rows.h"
 #include "subadmm/problem.h"
 
 #ifdef __cplusplus
@@ -49,10 +50,14 @@ struct sadmm_system {
     struct sadmm_contact_set *contacts;
     bool errors_given;               /* points carry e (problem level) instead of a gap */
     bool first;                      /* no step came before: where there are no impulses, none are known */
-    int32_t block_count;
-    const struct sadmm_problem_block *blocks;
-    double *block_lambda;            /* (block_count x 6) start in, solution out */
+    struct sadmm_rows *rows;         /* constraints given by Jacobian rows; NULL: none */
 };
+
+/* Constraints given by rows. */
+static inline size_t sadmm_row_constraint_count(const struct sadmm_system *system)
+{
+    return system->rows ? system->rows->constraint_count : 0;
+}
 
 #ifdef __cplusplus
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/math/dense6.h"
+#include "core/math/row.h"
 #include "core/model/islands.h"
 #include "core/base/memory.h"
 #include "core/model/system_math.h"
@@ -18,7 +19,7 @@ struct tally {
     double ncp_max, ncp_sum;
     int64_t ncp_worst, count;
     double u2, r2, map2; /* siconos: |u|^2, |r|^2, |r - P_K(r - u^)|^2 */
-    bool soft;
+    bool outside; /* rows that siconos does not have */
 };
 
 /* max that keeps a NaN: a solution that is not finite must not look good. */
@@ -122,48 +123,57 @@ static void certify_pair(struct tally *tally, const struct sadmm_system *system,
     }
 }
 
-static void certify_block(struct tally *tally, const struct sadmm_system *system, int32_t k, double *bodies)
+/* The natural map of a scalar row whose own response is w > 0. */
+static double row_map(struct tally *tally, const struct sadmm_rows *rows, size_t r, double x, double w)
 {
-    const struct sadmm_problem_block *block = &system->blocks[k];
-    const double *lambda = system->block_lambda + 6 * (size_t)k;
-    double x[6] = {0}, weight[6] = {0};
+    const double lambda = rows->lambda[r], gain = rows->gain[r], compliance = rows->compliance[r];
+    const double missing = row_residual(gain, rows->bias[r], compliance, x, lambda);
+    double change = -missing / (compliance + gain * w);
+    const double unbounded = change;
+    row_bounded(lambda, rows->lo[r], rows->hi[r], &change);
+    if (sadmm_row_is_coupled(rows, r)) { /* K is the whole line for a hard row: r - P_K(r - u) = u. */
+        tally->u2 += missing * missing;
+        tally->r2 += lambda * lambda;
+        tally->map2 += missing * missing;
+    }
+    /* w / (gain w) is exactly 1 */
+    return change == unbounded ? fabs(missing) * (w / (compliance + gain * w)) : fabs(change) * w;
+}
+
+static void certify_rows(struct tally *tally, const struct sadmm_system *system, size_t k, double *bodies)
+{
+    const struct sadmm_rows *rows = system->rows;
+    const struct sadmm_row_constraint *constraint = &rows->constraints[k];
+    const size_t first = (size_t)constraint->first;
+    double x[SADMM_MAX_ROWS] = {0}, weight[SADMM_MAX_ROWS] = {0};
     for (int side = 0; side < 2; ++side) {
-        int32_t index = side ? block->body_b : block->body_a;
+        int32_t index = side ? constraint->body_b : constraint->body_a;
         if (index < 0) continue;
-        const double *jacobian = side ? block->jacobian_b : block->jacobian_a;
+        const double *jacobian = (side ? rows->jacobian_b : rows->jacobian_a) + 6 * first;
         double *body = bodies + BODY_SIZE * (size_t)index;
-        for (int r = 0; r < block->rows; ++r) {
+        for (int r = 0; r < constraint->count; ++r) {
             const double *row = jacobian + 6 * r;
             x[r] += dense6_dot(row, system->velocity + 6 * (size_t)index);
             weight[r] += row_weight(body, row);
-            add_impulse(body, row, lambda[r]);
+            add_impulse(body, row, rows->lambda[first + (size_t)r]);
         }
     }
 
     double error = 0;
-    if (block->kind == SADMM_BLOCK_CONTACT) {
-        double u[3] = {x[0] + block->error[0], x[1] + block->error[1], x[2] + block->error[2]};
-        double w = block->friction > 0 ? fmax(weight[0], fmax(weight[1], weight[2])) : weight[0];
-        error = contact_map(tally, lambda, u, block->friction, w);
+    if (constraint->cone) {
+        const double *e = rows->bias + first;
+        double u[3] = {x[0] + e[0], x[1] + e[1], x[2] + e[2]};
+        double w = constraint->friction > 0 ? fmax(weight[0], fmax(weight[1], weight[2])) : weight[0];
+        error = contact_map(tally, rows->lambda + first, u, constraint->friction, w);
     } else {
-        for (int r = 0; r < block->rows; ++r) {
-            if (block->kind == SADMM_BLOCK_HARD) {
-                if (weight[r] == 0) continue; /* a free row: zero on both bodies */
-                double u = x[r] + block->error[r];
-                error = keep_max(error, fabs(u));
-                /* K is the whole line for a hard row: r - P_K(r - u) = u. */
-                tally->u2 += u * u;
-                tally->r2 += lambda[r] * lambda[r];
-                tally->map2 += u * u;
-            } else {
-                double c = block->damping[r];
-                double gap = lambda[r] + block->stiffness[r] * block->error[r] + c * x[r];
-                error = keep_max(error, fabs(gap) * weight[r] / (1 + c * weight[r]));
-                tally->soft = true;
-            }
+        for (int r = 0; r < constraint->count; ++r) {
+            tally->outside = tally->outside || !sadmm_row_is_coupled(rows, first + (size_t)r);
+            if (weight[r] != 0) /* rows that nobody feels do not count */
+                error = keep_max(error, row_map(tally, rows, first + (size_t)r, x[r], weight[r]));
         }
     }
-    count_constraint(tally, (int64_t)system->contacts->point_count + k, error, bodies, block->body_a, block->body_b);
+    count_constraint(tally, (int64_t)(system->contacts->point_count + k), error, bodies, constraint->body_a,
+                     constraint->body_b);
 }
 
 /* siconos divides only by norms above this (gfc3d_compute_error.c, MIN_RELATIVE_SCALING). A scale that has overflowed would
@@ -211,7 +221,7 @@ sadmm_status sadmm_certify_with(struct sadmm_certificate_workspace *workspace, c
     struct tally tally = {.ncp_worst = -1};
     for (size_t p = 0; p < system->contacts->pair_count; ++p)
         certify_pair(&tally, system, settings, &system->contacts->pairs[p], bodies);
-    for (int32_t k = 0; k < system->block_count; ++k) certify_block(&tally, system, k, bodies);
+    for (size_t k = 0; k < sadmm_row_constraint_count(system); ++k) certify_rows(&tally, system, k, bodies);
 
     sadmm_certificate out = sadmm_certificate_none();
     double residual_max = -1, scale = 0, residual2 = 0, Av2 = 0, b2 = 0, Jl2 = 0;
@@ -238,7 +248,7 @@ sadmm_status sadmm_certify_with(struct sadmm_certificate_workspace *workspace, c
     out.ncp_max = tally.ncp_max;
     out.ncp_mean = tally.count ? tally.ncp_sum / (double)tally.count : 0;
     out.ncp_worst = tally.ncp_worst;
-    if (!tally.soft)
+    if (!tally.outside)
         out.siconos = relative(sqrt(residual2), sqrt(keep_max(b2, keep_max(Av2, Jl2)))) +
                       relative(sqrt(tally.map2), sqrt(keep_max(tally.u2, tally.r2)));
     if (settings && settings->certificate_tolerance > 0) {

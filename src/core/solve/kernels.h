@@ -39,9 +39,8 @@ struct sadmm_kernels {
                           const struct sadmm_settings *, struct sadmm_error *error);
 
     sadmm_status (*assemble_bodies)(struct sadmm_context *, struct sadmm_error *);   /* A: A_i, b_i, start velocity */
-    sadmm_status (*assemble_contacts)(struct sadmm_context *, struct sadmm_error *); /* B: geometric and general contacts */
-    sadmm_status (*assemble_joints)(struct sadmm_context *, struct sadmm_error *);   /* C, D: hard blocks */
-    sadmm_status (*assemble_springs)(struct sadmm_context *, struct sadmm_error *);  /* C, D: soft blocks */
+    sadmm_status (*assemble_contacts)(struct sadmm_context *, struct sadmm_error *); /* B: contacts given by geometry */
+    sadmm_status (*assemble_rows)(struct sadmm_context *, struct sadmm_error *);     /* C, D: constraints given by rows */
 
     sadmm_status (*init_penalty)(struct sadmm_context *, struct sadmm_error *); /* E-G: C_i (14), beta_i (13); FAST: weights */
     /* FAST, after iterations: weights from the multipliers found by now (math/weight.h). Then factorize. */
@@ -55,10 +54,10 @@ struct sadmm_kernels {
     sadmm_status (*measure_residuals)(struct sadmm_context *, struct sadmm_residual *, struct sadmm_error *); /* (16), (17) */
     sadmm_status (*update_penalty)(struct sadmm_context *, double ratio, struct sadmm_error *); /* P: beta *= ratio (15) */
 
-    /* FAST, rigid bodies under contacts: slow down islands with more energy than they may have (math/limit.h). */
+    /* FAST, rigid bodies: slow down islands under contacts alone with more energy than they may have (math/limit.h). */
     sadmm_status (*limit_velocity)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
 
-    /* v and lambda to system->velocity, ->contacts points' impulse, ->block_lambda. */
+    /* v and lambda to system->velocity, ->contacts points' impulse, ->rows' lambda. */
     sadmm_status (*read_solution)(struct sadmm_context *, struct sadmm_error *);
     /* beta_i of every body, kg (tests, dumps). FAST: 1, the weights are in C_i. */
     sadmm_status (*read_penalty)(struct sadmm_context *, double *beta, struct sadmm_error *);

@@ -190,9 +190,14 @@ static void predict(struct predictor *p)
     struct sadmm_system *system = p->system;
     for (size_t k = 0; k < system->contacts->point_count; ++k)
         memset(system->contacts->points[k].impulse, 0, sizeof system->contacts->points[k].impulse);
+    for (size_t k = 0; system->rows && k < system->rows->row_count; ++k) system->rows->lambda[k] = 0;
     list_pairs(p);
     find_depths(p);
     sadmm_islands(system, p->label);
+    for (size_t k = 0; k < sadmm_row_constraint_count(system); ++k) { /* what rows carry is not predicted */
+        const struct sadmm_row_constraint *constraint = &system->rows->constraints[k];
+        p->failed[p->label[constraint->body_a >= 0 ? constraint->body_a : constraint->body_b]] = true;
+    }
     for (int32_t i = 0; i < system->body_count; ++i) {
         double A[36];
         sadmm_system_body(system, p->settings, i, A, &p->momentum[6 * (size_t)i]);

@@ -33,10 +33,17 @@ static bool pair_is_warm(const struct sadmm_contact_set *contacts, const struct 
     return false;
 }
 
-static bool any_pair_is_warm(const struct sadmm_contact_set *contacts)
+static bool constraint_is_warm(const struct sadmm_rows *rows, const struct sadmm_row_constraint *constraint)
 {
-    for (size_t p = 0; p < contacts->pair_count; ++p)
-        if (pair_is_warm(contacts, &contacts->pairs[p])) return true;
+    return any_nonzero(rows->lambda + constraint->first, constraint->count);
+}
+
+static bool any_is_warm(const struct sadmm_system *system)
+{
+    for (size_t p = 0; p < system->contacts->pair_count; ++p)
+        if (pair_is_warm(system->contacts, &system->contacts->pairs[p])) return true;
+    for (size_t k = 0; k < sadmm_row_constraint_count(system); ++k)
+        if (constraint_is_warm(system->rows, &system->rows->constraints[k])) return true;
     return false;
 }
 
@@ -59,12 +66,13 @@ static void count_warm(void *argument, int thread, int threads)
 static bool starts_warm(const struct sadmm_system *system, int plan_threads)
 {
     struct warm_count count;
-    size_t total = system->contacts->pair_count + (size_t)system->block_count, warm = 0;
+    size_t total = system->contacts->pair_count + sadmm_row_constraint_count(system), warm = 0;
     count.contacts = system->contacts;
     const int ran = sadmm_parallel(system->team, sadmm_pass_threads(plan_threads, system->contacts->pair_count), count_warm,
                                    &count);
     for (int t = 0; t < ran; ++t) warm += count.warm[t];
-    for (size_t k = 0; k < (size_t)system->block_count; ++k) warm += any_nonzero(system->block_lambda + 6 * k, 6);
+    for (size_t k = 0; k < sadmm_row_constraint_count(system); ++k)
+        warm += constraint_is_warm(system->rows, &system->rows->constraints[k]);
     return total > 0 && 2 * warm >= total;
 }
 
@@ -81,12 +89,7 @@ static bool may_update_penalty(const struct sadmm_settings *settings)
            settings->iterations > settings->penalty_period;
 }
 
-static bool has_blocks(const struct sadmm_plan *plan)
-{
-    return plan->blocks[SADMM_BLOCK_CONTACT] > 0 || plan->blocks[SADMM_BLOCK_HARD] > 0 || plan->blocks[SADMM_BLOCK_SOFT] > 0;
-}
-
-bool sadmm_plan_is_constrained(const struct sadmm_plan *plan) { return plan->points > 0 || has_blocks(plan); }
+bool sadmm_plan_is_constrained(const struct sadmm_plan *plan) { return plan->points > 0 || plan->row_constraints > 0; }
 
 bool sadmm_plan_depends_on_warmth(const struct sadmm_settings *settings)
 {
@@ -103,7 +106,7 @@ void sadmm_plan_settle(struct sadmm_plan *plan, const struct sadmm_settings *set
     plan->penalty_updates = constrained && may_update_penalty(settings) && (settings->penalty_update_warm || !plan->warm);
     bool fast = constrained && settings->method == SADMM_METHOD_FAST;
     plan->weight_refresh = fast && !plan->warm;
-    plan->limit = fast && plan->rigid && !has_blocks(plan);
+    plan->limit = fast && plan->rigid && plan->points > 0;
     plan->certificate = settings->certify || settings->certificate_tolerance > 0;
     plan->residuals = constrained && (plan->penalty_updates || settings->measure_residuals ||
                                       settings->residual_tolerance > 0);
@@ -121,13 +124,13 @@ struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struc
         for (size_t p = 0; p < system->contacts->pair_count && plan.contact_rows == 1; ++p)
             if (system->contacts->pairs[p].friction > 0) plan.contact_rows = 3;
     }
-    for (int32_t k = 0; k < system->block_count; ++k) ++plan.blocks[system->blocks[k].kind];
+    plan.row_constraints = (int32_t)sadmm_row_constraint_count(system);
     plan.rigid = system->rigid != NULL;
-    plan.threads = sadmm_plan_threads(system->team, settings->threads, (size_t)plan.points + 4 * (size_t)system->block_count);
+    plan.threads = sadmm_plan_threads(system->team, settings->threads, (size_t)plan.points + 4 * (size_t)plan.row_constraints);
     plan.gyroscopic = plan.rigid && sadmm_plan_is_gyroscopic(system->rigid, system->body_count);
     sadmm_plan_settle(&plan, settings, settings->warm_start && starts_warm(system, plan.threads));
-    plan.predict = settings->method == SADMM_METHOD_FAST && plan.points > 0 && !has_blocks(&plan) && system->first &&
-                   !(settings->warm_start && any_pair_is_warm(system->contacts));
+    plan.predict = settings->method == SADMM_METHOD_FAST && plan.points > 0 && system->first &&
+                   !(settings->warm_start && any_is_warm(system));
     if (plan.predict) plan.warm_start = true; /* predicted loads are the system's start values then */
     return plan;
 }

@@ -14,16 +14,16 @@ extern "C" {
 struct sadmm_plan {
     int32_t bodies;         /* dynamic */
     int32_t pairs, points;  /* contacts given by geometry */
-    int32_t blocks[3];      /* constraints given by Jacobians, by sadmm_block_kind */
+    int32_t row_constraints; /* constraints given by Jacobian rows */
     int contact_rows;       /* rows of a geometric contact: 0 no contact, 1 every mu is 0, 3 otherwise */
-    bool rigid;             /* A is (m I, world inertia) */
+    bool rigid;             /* world level: bodies are given by their state, A is (m I, world inertia) */
     bool gyroscopic;        /* some body has unequal principal moments (world level) */
     bool warm_start;        /* take the system's start values */
     bool warm;              /* ... and most constraints have one */
     bool penalty_updates;   /* eq. (15) will run at least once */
     bool predict;           /* FAST: starts from predicted loads (loads.h); never in steps that a backend makes alone */
     bool weight_refresh;    /* FAST: weights are taken again during the step */
-    bool limit;             /* FAST: energies are limited after the last iteration */
+    bool limit;             /* FAST: energies of islands under contacts alone are limited after the last iteration */
     bool residuals;         /* some iteration is measured */
     bool wrenches;          /* eq. (12) a body */
     bool certificate;

@@ -101,7 +101,7 @@ static sadmm_status read_solution(struct sadmm_solve *s)
     const struct sadmm_system *system = s->system;
     TRY(s->kernels->read_solution(s->context, s->error));
     if (!finite_array(system->velocity, 6 * (size_t)system->body_count) ||
-        !finite_array(system->block_lambda, 6 * (size_t)system->block_count) ||
+        (system->rows && !finite_array(system->rows->lambda, system->rows->row_count)) ||
         !finite_impulses(system, s->plan->threads))
         return sadmm_fail(s->error, SADMM_ERROR_NON_FINITE, "the solve gave a velocity or multiplier that is not finite");
     return SADMM_OK;
@@ -114,8 +114,7 @@ sadmm_status sadmm_solve_stage(struct sadmm_solve *s, struct sadmm_stages *stage
     case SADMM_STAGE_PREDICT: return sadmm_loads_predict(s->system, s->settings, s->error);
     case SADMM_STAGE_BODIES: return assemble_bodies(s);
     case SADMM_STAGE_CONTACTS: return k->assemble_contacts(s->context, s->error);
-    case SADMM_STAGE_HARD: return k->assemble_joints(s->context, s->error);
-    case SADMM_STAGE_SOFT: return k->assemble_springs(s->context, s->error);
+    case SADMM_STAGE_ROWS: return k->assemble_rows(s->context, s->error);
     case SADMM_STAGE_PENALTY: return init_penalty(s);
     case SADMM_STAGE_ITERATE: s->report->iterations = stage->done; return iterate(s, stage->count, stage->measure);
     case SADMM_STAGE_RESIDUALS: return k->measure_residuals(s->context, &s->report->residual, s->error);

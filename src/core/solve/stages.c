@@ -68,9 +68,8 @@ static bool is_needed(const struct sadmm_stages *s, enum sadmm_stage_kind kind)
     case SADMM_STAGE_WRENCHES: return s->world && plan->wrenches;
     case SADMM_STAGE_CERTIFY: return s->world && plan->certificate;
     case SADMM_STAGE_PREDICT: return plan->predict;
-    case SADMM_STAGE_CONTACTS: return plan->points > 0 || plan->blocks[SADMM_BLOCK_CONTACT] > 0;
-    case SADMM_STAGE_HARD: return plan->blocks[SADMM_BLOCK_HARD] > 0;
-    case SADMM_STAGE_SOFT: return plan->blocks[SADMM_BLOCK_SOFT] > 0;
+    case SADMM_STAGE_CONTACTS: return plan->points > 0;
+    case SADMM_STAGE_ROWS: return plan->row_constraints > 0;
     case SADMM_STAGE_RESIDUALS: return s->batch.measure;
     case SADMM_STAGE_CHECK: return s->batch.check;
     case SADMM_STAGE_REWEIGH: return s->batch.reweigh && !s->stopped;

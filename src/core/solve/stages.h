@@ -1,7 +1,7 @@
 /* The schedule of a step: the paper's Fig. 4 as a list of stages, in order. It exists once.
  *
  *     step = GATHER FIND PLAN  solve  INTEGRATE WRENCHES CERTIFY COMMIT     (world level)
- *     solve = PREDICT BODIES CONTACTS HARD SOFT PENALTY  iterations  LIMIT SOLUTION
+ *     solve = PREDICT BODIES CONTACTS ROWS PENALTY  iterations  LIMIT SOLUTION
  *     iterations = { ITERATE RESIDUALS CHECK REWEIGH BALANCE } until the budget is spent or a check is met
  *
  * What the plan and the settings do not ask for is not in the list. Whoever executes it goes through it one stage after the
@@ -24,8 +24,7 @@ enum sadmm_stage_kind {
     SADMM_STAGE_PREDICT,   /* -    FAST: loads to start from (loads.h) */
     SADMM_STAGE_BODIES,    /* A    A_i, b_i */
     SADMM_STAGE_CONTACTS,  /* B    contacts in the solver's form */
-    SADMM_STAGE_HARD,      /* C, D hard blocks */
-    SADMM_STAGE_SOFT,      /* C, D soft blocks */
+    SADMM_STAGE_ROWS,      /* C, D constraints given by rows */
     SADMM_STAGE_PENALTY,   /* E-H  C_i, beta_i (FAST: weights) and the factors of A_i + beta_i C_i */
     SADMM_STAGE_ITERATE,   /* I-O  Steps 1-4, `count` times */
     SADMM_STAGE_RESIDUALS, /* N    eqs. (16), (17) of the last iteration */

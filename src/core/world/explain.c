@@ -28,11 +28,8 @@ static void explain_constraints(struct text *t, const struct sadmm_plan *plan)
              plan->pairs);
     else
         line(t, "contacts     left out: nothing touches\n");
-    static const char *const kinds[] = {"general contacts", "hard blocks", "soft blocks"};
-    for (int kind = 0; kind < 3; ++kind) {
-        if (plan->blocks[kind]) line(t, "%-12s %d\n", kinds[kind], plan->blocks[kind]);
-        else line(t, "%-16s left out: there are none\n", kinds[kind]);
-    }
+    if (plan->row_constraints) line(t, "rows         %d constraints given by rows\n", plan->row_constraints);
+    else line(t, "rows         left out: there are none\n");
 }
 
 static void explain_options(struct text *t, const struct sadmm_plan *plan, const sadmm_settings *s)

@@ -1,0 +1,100 @@
+#include "rows.h"
+
+#include <string.h>
+
+#include "core/base/memory.h"
+
+void sadmm_rows_clear(struct sadmm_rows *rows) { rows->constraint_count = rows->row_count = 0; }
+
+void sadmm_rows_free(struct sadmm_rows *rows)
+{
+    void *arrays[] = {rows->constraints, rows->jacobian_a, rows->jacobian_b, rows->gain, rows->bias,
+                      rows->compliance,  rows->lo,         rows->hi,         rows->lambda};
+    for (size_t k = 0; k < sizeof arrays / sizeof *arrays; ++k) sadmm_free(arrays[k]);
+    memset(rows, 0, sizeof *rows);
+}
+
+bool sadmm_rows_reserve(struct sadmm_rows *rows, size_t constraints, size_t row_count)
+{
+    double **numbers[] = {&rows->gain, &rows->bias, &rows->compliance, &rows->lo, &rows->hi, &rows->lambda};
+    double **jacobians[] = {&rows->jacobian_a, &rows->jacobian_b};
+    if (!sadmm_grow((void **)&rows->constraints, &rows->constraint_capacity, rows->constraint_count, constraints,
+                    sizeof *rows->constraints))
+        return false;
+    if (row_count <= rows->row_capacity) return true;
+    size_t wanted = 0;
+    for (int k = 0; k < 8; ++k) { /* capacities from the old one, so that all end at the same */
+        double **array = k < 6 ? numbers[k] : jacobians[k - 6];
+        size_t width = k < 6 ? 1 : 6;
+        wanted = rows->row_capacity;
+        if (!sadmm_grow((void **)array, &wanted, rows->row_count, row_count, width * sizeof **array)) return false;
+    }
+    rows->row_capacity = wanted;
+    return true;
+}
+
+int32_t sadmm_rows_add(struct sadmm_rows *rows, int32_t count, int32_t body_a, int32_t body_b)
+{
+    size_t first = rows->row_count, n = (size_t)count;
+    if (!sadmm_rows_reserve(rows, rows->constraint_count + 1, first + n)) return -1;
+    rows->constraints[rows->constraint_count++] = (struct sadmm_row_constraint){
+        .body_a = body_a, .body_b = body_b, .first = (int32_t)first, .count = count};
+    rows->row_count += n;
+    memset(rows->jacobian_a + 6 * first, 0, 6 * n * sizeof(double));
+    memset(rows->jacobian_b + 6 * first, 0, 6 * n * sizeof(double));
+    for (size_t r = first; r < rows->row_count; ++r) {
+        sadmm_row_hard(rows, (int32_t)r, 0);
+        rows->lambda[r] = 0;
+    }
+    return (int32_t)first;
+}
+
+bool sadmm_rows_add_block(struct sadmm_rows *rows, const sadmm_problem_block *block, const double *lambda)
+{
+    const int32_t first = sadmm_rows_add(rows, block->rows, block->body_a, block->body_b);
+    if (first < 0) return false;
+    struct sadmm_row_constraint *constraint = &rows->constraints[rows->constraint_count - 1];
+    size_t at = (size_t)first, n = (size_t)block->rows;
+    constraint->cone = block->kind == SADMM_BLOCK_CONTACT;
+    constraint->friction = constraint->cone ? block->friction : 0;
+    if (block->body_a >= 0) memcpy(rows->jacobian_a + 6 * at, block->jacobian_a, 6 * n * sizeof(double));
+    if (block->body_b >= 0) memcpy(rows->jacobian_b + 6 * at, block->jacobian_b, 6 * n * sizeof(double));
+    for (int32_t r = 0; r < block->rows; ++r) {
+        if (block->kind == SADMM_BLOCK_SOFT)
+            sadmm_row_soft(rows, first + r, block->stiffness[r], block->damping[r], block->error[r]);
+        else
+            sadmm_row_hard(rows, first + r, block->error[r]);
+        if (lambda) rows->lambda[first + r] = lambda[r];
+    }
+    return true;
+}
+
+bool sadmm_rows_as_block(const struct sadmm_rows *rows, size_t index, sadmm_problem_block *block)
+{
+    const struct sadmm_row_constraint *constraint = &rows->constraints[index];
+    size_t first = (size_t)constraint->first, n = (size_t)constraint->count;
+    bool soft = !constraint->cone && rows->compliance[first] != 0;
+    memset(block, 0, sizeof *block);
+    block->kind = constraint->cone ? SADMM_BLOCK_CONTACT : soft ? SADMM_BLOCK_SOFT : SADMM_BLOCK_HARD;
+    block->rows = constraint->count;
+    block->body_a = constraint->body_a;
+    block->body_b = constraint->body_b;
+    block->friction = constraint->friction;
+    memcpy(block->jacobian_a, rows->jacobian_a + 6 * first, 6 * n * sizeof(double));
+    memcpy(block->jacobian_b, rows->jacobian_b + 6 * first, 6 * n * sizeof(double));
+    for (size_t r = 0; r < n; ++r) {
+        const double compliance = rows->compliance[first + r];
+        if (rows->lo[first + r] != -INFINITY || rows->hi[first + r] != INFINITY || soft != (compliance != 0)) return false;
+        block->error[r] = soft ? rows->bias[first + r] / compliance : rows->bias[first + r];
+        block->stiffness[r] = soft;
+        block->damping[r] = soft ? rows->gain[first + r] / compliance : 0;
+    }
+    return true;
+}
+
+bool sadmm_row_acts(const struct sadmm_rows *rows, size_t r)
+{
+    for (size_t j = 6 * r; j < 6 * r + 6; ++j)
+        if (rows->jacobian_a[j] != 0 || rows->jacobian_b[j] != 0) return true;
+    return false;
+}
