@@ -32,7 +32,7 @@ enum cuda_buffer_name {
 struct sadmm_context {
     int device;
     cudaStream_t stream;
-    cudaStream_t side;        /* of a step's graph: what does not wait for contacts (step/step.cu) */
+    cudaStream_t side;        /* of a step's graph: what does not wait for contacts (step/record.cu) */
     cudaEvent_t fork, join;
     int multiprocessors, shared_limit; /* shared_limit: bytes a block may have */
     bool cooperative, clusters, early; /* what the device can launch, with the code that was loaded for it */
@@ -128,10 +128,13 @@ struct device_scope {
     device_scope scope((c)->device);    \
     CUDA_CALL((c), scope.code, "cudaSetDevice")
 
-/* ---- graph/layout.cu, assemble/, weight/, iterate/: parts of the entries, launches only ---- */
+/* ---- device/begin.cu ---- */
 
 /* This precision's data for the view's counts and the partition (allocates). */
 sadmm_status CUDA(reserve_solver)(struct sadmm_context *, struct sadmm_error *error);
+
+/* ---- assemble/, weight/, iterate/: parts of the entries, launches only ---- */
+
 /* A, b and the start velocities: they need no contacts. */
 sadmm_status CUDA(enqueue_bodies)(struct sadmm_context *, struct sadmm_error *error);
 /* Of a whole step: penalties and factors at once, and whether it is what was planned for. fast: islands first;
@@ -164,7 +167,7 @@ sadmm_status CUDA(enqueue_residuals)(struct sadmm_context *, struct sadmm_error 
 /* (15) by view.iteration.residual. */
 sadmm_status CUDA(enqueue_balance)(struct sadmm_context *, struct sadmm_error *error);
 
-/* ---- step/step.cu, step/kernels.cu ---- */
+/* ---- step/world.cu, step/kernels.cu ---- */
 
 void CUDA(step_destroy)(struct sadmm_context *);
 sadmm_status CUDA(launch_edits)(struct sadmm_context *, const struct sadmm_resident_edit *edits, size_t count,
@@ -187,7 +190,11 @@ sadmm_status CUDA(enqueue_layout)(struct sadmm_context *, const struct cuda_part
 
 /* The same in one go; small scenes: in one kernel. */
 sadmm_status CUDA(enqueue_statistics_and_layout)(struct sadmm_context *, bool islands, const struct cuda_partition *,
-                                             struct sadmm_error *error);
+                                                 struct sadmm_error *error);
+/* The plan's counts to the device. */
+sadmm_status CUDA(upload_live)(struct sadmm_context *, enum cuda_abort, struct sadmm_error *error);
+/* Wait for what the device knows now. */
+sadmm_status CUDA(download_known)(struct sadmm_context *, struct cuda_known *out, struct sadmm_error *error);
 
 /* ---- iterate/streamed.cu, iterate/persistent.cu ---- */
 
@@ -228,6 +235,19 @@ void CUDA(tighten_partition)(const struct sadmm_context *, const struct cuda_gra
         cudaError_t try_code = (call);                                          \
         if (try_code != cudaSuccess) return CUDA(fail)((c), try_code, (name), error); \
     } while (0)
+
+/* Several buffers, as by CUDA(reserve). */
+struct cuda_capacity {
+    enum cuda_buffer_name name;
+    size_t bytes;
+};
+template <size_t N>
+static inline sadmm_status reserve_all(struct sadmm_context *c, const cuda_capacity (&wanted)[N],
+                                       struct sadmm_error *error)
+{
+    for (const cuda_capacity &one : wanted) CUDA_TRY(CUDA(reserve)(c, one.name, one.bytes, error));
+    return SADMM_OK;
+}
 
 static inline int64_t blocks_for(int64_t threads) { return (threads + THREADS - 1) / THREADS; }
 

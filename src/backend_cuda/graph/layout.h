@@ -45,6 +45,12 @@ struct cuda_graph_statistics {
     int32_t part_sides, part_bodies; /* largest part of the partition made last */
 };
 
+/* Both, side by side in device memory and in the staging buffer. */
+struct cuda_known {
+    struct cuda_live live;
+    struct cuda_graph_statistics statistics;
+};
+
 /* The host's choice, before the layout is made. */
 struct cuda_partition {
     enum sadmm_cuda_tier tier; /* BLOCK, CLUSTER, GRID, STREAM (no parts) */

@@ -1,0 +1,108 @@
+/* Whole steps on the device: a step is planned before it is known, from the statistics of an earlier one (world.h).
+ * Where there is none its contacts are found first. A guess costs time where it is wrong, never a result. */
+#include <algorithm>
+
+#include "core/solve/plan.h"
+#include "world.h"
+
+static sadmm_status copy_out(struct sadmm_context *c, void *to, const void *from, size_t bytes,
+                             struct sadmm_error *error)
+{
+    if (bytes > 0)
+        CUDA_CALL(c, cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, c->stream),
+                  "cudaMemcpyAsync from the device");
+    return SADMM_OK;
+}
+
+/* Contacts of the next step and what they are like, seen by the host. */
+struct preview {
+    struct cuda_live live;
+    struct cuda_graph_statistics statistics;
+    struct sadmm_cuda_contact_counts counts;
+};
+
+static sadmm_status preview_step(struct sadmm_context *c, struct preview *out, struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    CUDA_TRY(CUDA(reserve)(c, PINNED_OUT, sizeof *out, error));
+    struct preview *staged = buffer<struct preview>(c, PINNED_OUT);
+    for (;;) {
+        CUDA_TRY(COLLISION(reserve)(s->collision, &s->candidate_capacity, &s->point_capacity, error));
+        CUDA(view_counts)(c, s->candidate_capacity);
+        CUDA_TRY(CUDA(reserve_layout)(c, error));
+        CUDA(view_into)(c, s->into);
+        CUDA_TRY(CUDA(clear_abort)(c, error));
+        CUDA_TRY(CUDA(launch_start)(c, error));
+        CUDA_TRY(CUDA(enqueue_find)(c, error));
+        CUDA_TRY(CUDA(enqueue_statistics)(c, true, error));
+        CUDA_TRY(copy_out(c, &staged->live, c->view.model.live, sizeof staged->live, error));
+        CUDA_TRY(copy_out(c, &staged->statistics, c->view.model.statistics, sizeof staged->statistics, error));
+        CUDA_TRY(copy_out(c, &staged->counts, c->view.step.counts, sizeof staged->counts, error));
+        CUDA_TRY(CUDA(wait)(c, error));
+        *out = *staged;
+        if (out->live.abort_code != ABORT_CAPACITY) return SADMM_OK;
+        s->candidate_capacity = std::max(s->candidate_capacity, generous(out->counts.candidates));
+        /* points are counted only where all candidates had room */
+        if (out->counts.candidates <= c->view.step.candidate_capacity)
+            s->point_capacity = std::max(s->point_capacity, generous(out->counts.points));
+    }
+}
+
+static struct sadmm_plan plan_of(const struct sadmm_context *c, const struct preview *seen)
+{
+    const struct cuda_step *s = c->step;
+    struct sadmm_plan plan = {};
+    plan.bodies = s->bodies;
+    plan.pairs = seen->live.pairs;
+    plan.points = seen->live.points;
+    plan.contact_rows = plan.points == 0 ? 0 : seen->statistics.rough > 0 ? 3 : 1;
+    plan.rigid = true;
+    plan.gyroscopic = c->plan.gyroscopic; /* since load */
+    plan.threads = 1;
+    sadmm_plan_settle(&plan, &c->settings, plan.pairs > 0 && 2 * (int64_t)seen->statistics.warm >= plan.pairs);
+    return plan;
+}
+
+/* The layout once, for what its parts are really like. */
+static sadmm_status tighten(struct sadmm_context *c, const struct preview *seen, struct sadmm_error *error)
+{
+    if (c->partition.tier == SADMM_CUDA_TIER_STREAM) return SADMM_OK;
+    struct preview *staged = buffer<struct preview>(c, PINNED_OUT);
+    staged->live = seen->live;
+    CUDA_CALL(
+        c, cudaMemcpyAsync(c->view.model.live, &staged->live, sizeof staged->live, cudaMemcpyHostToDevice, c->stream),
+        "cudaMemcpyAsync to the device");
+    CUDA_TRY(CUDA(enqueue_statistics_and_layout)(c, true, &c->partition, error));
+    CUDA_TRY(copy_out(c, &staged->live, c->view.model.live, sizeof staged->live, error));
+    CUDA_TRY(copy_out(c, &staged->statistics, c->view.model.statistics, sizeof staged->statistics, error));
+    CUDA_TRY(CUDA(wait)(c, error));
+    struct cuda_graph_statistics statistics = staged->statistics;
+    statistics.point_slots = c->statistics.point_slots;
+    if (staged->live.abort_code == ABORT_NONE) CUDA(tighten_partition)(c, &statistics, &c->partition);
+    return CUDA(clear_abort)(c, error);
+}
+
+sadmm_status CUDA(guess_step)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    struct preview seen;
+    CUDA_TRY(preview_step(c, &seen, error));
+    c->plan = plan_of(c, &seen);
+    s->guess.contact_rows = c->plan.contact_rows;
+    s->guess.point_slots = seen.statistics.point_slots <= 1   ? 1
+                           : seen.statistics.point_slots <= 4 ? 4
+                                                              : SADMM_MAX_POINTS;
+    s->guess.warm = sadmm_plan_depends_on_warmth(&c->settings) ? c->plan.warm : -1;
+    CUDA(view_counts)(c, generous(seen.counts.pairs));
+    c->view.model.points = 0; /* results are read elsewhere */
+    seen.statistics.point_slots = s->guess.point_slots;
+    c->statistics = seen.statistics;
+    CUDA_TRY(CUDA(choose_partition)(c, &seen.statistics, &c->partition, error));
+    CUDA_TRY(CUDA(reserve_layout)(c, error));
+    CUDA_TRY(tighten(c, &seen, error));
+    CUDA_TRY(CUDA(reserve_solver)(c, error));
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_IMPULSE, 3 * (size_t)s->point_capacity * sizeof(double), error));
+    s->planned = true;
+    s->recorded = false;
+    return SADMM_OK;
+}

@@ -1,0 +1,217 @@
+/* Whole steps on the device: steps are enqueued, their reports seen, and those repeated whose plan did not hold
+ * (step/world.h). */
+#include <string.h>
+
+#include <algorithm>
+
+#include "core/base/memory.h"
+#include "world.h"
+
+/* ---- running --------------------------------------------------------------------------------------------------- */
+
+/* Clear the abort code, plan if need be, record if need be. Nothing is running. */
+static sadmm_status prepare(struct sadmm_context *c, struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    if (!s->planned) CUDA_TRY(CUDA(guess_step)(c, error));
+    if (s->recorded) return SADMM_OK;
+    for (int into = 0; into < 2; ++into) CUDA_TRY(CUDA(record_step)(c, into, error));
+    s->recorded = true;
+    return SADMM_OK;
+}
+
+static struct queued_step *slot_of(struct cuda_step *s, int64_t sequence) { return &s->queue[sequence % STEPS_AHEAD]; }
+
+static sadmm_status launch_edits_of(struct sadmm_context *c, int64_t sequence, struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    const struct queued_step *q = slot_of(s, sequence);
+    CUDA(view_into)(c, s->into);
+    return CUDA(launch_edits)(c, q->edits, q->edit_count, error);
+}
+
+static sadmm_status launch_step(struct sadmm_context *c, int64_t sequence, struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    c->kernel = "a step's graph";
+    CUDA_CALL(c, cudaGraphLaunch(s->graphs[s->into], c->stream), "cudaGraphLaunch");
+    CUDA_CALL(c, cudaEventRecord(slot_of(s, sequence)->done, c->stream), "cudaEventRecord");
+    s->into = 1 - s->into;
+    return SADMM_OK;
+}
+
+/* ---- seeing and repeating -------------------------------------------------------------------------------------- */
+
+/* Forget the steps from `first` to `end`, which have not been done, and their edits: the caller gives these again. */
+static void drop_steps(struct sadmm_context *c, int64_t first, int64_t end)
+{
+    for (int64_t sequence = first; sequence < end; ++sequence) slot_of(c->step, sequence)->edit_count = 0;
+    memset(c->numbers, 0, sizeof c->numbers);
+}
+
+/* Repeat the steps from `first` to `end`. */
+static sadmm_status repeat_steps(struct sadmm_context *c, int64_t first, int64_t end, struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    for (int64_t sequence = first; sequence < end; ++sequence) {
+        sadmm_status status = launch_edits_of(c, sequence, error);
+        if (status == SADMM_OK) status = prepare(c, error);
+        if (status == SADMM_OK) status = launch_step(c, sequence, error);
+        if (status != SADMM_OK) { /* no memory: this step and those behind it are lost */
+            drop_steps(c, sequence, end);
+            return status;
+        }
+        s->enqueued = sequence + 1;
+    }
+    return SADMM_OK;
+}
+
+/* The step `first` of the queue has failed, and nothing behind it has been done. */
+static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct cuda_step_report *report,
+                            struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    const int64_t end = s->enqueued;
+    CUDA_TRY(CUDA(wait)(c, error));
+    /* The device has numbered the steps that did not run; they are numbered again. */
+    s->into = (end - first) % 2 ? 1 - s->into : s->into;
+    s->seen = s->enqueued = first;
+    CUDA_CALL(c,
+              cudaMemcpyAsync(&c->view.step.control->sequence, &s->enqueued, sizeof s->enqueued, cudaMemcpyHostToDevice,
+                              c->stream),
+              "cudaMemcpyAsync to the device");
+    CUDA_TRY(CUDA(clear_abort)(c, error));
+    CUDA_TRY(CUDA(wait)(c, error));
+    if (report->abort_code == ABORT_NON_FINITE) {
+        s->offending_body =
+            report->offending_body >= s->bodies ? report->offending_body - s->bodies : report->offending_body;
+        drop_steps(c, first, end);
+        return sadmm_fail(error, SADMM_ERROR_NON_FINITE, "the solve gave a velocity or multiplier that is not finite");
+    }
+    ++s->repeats;
+    s->planned = false;
+    if (report->abort_code == ABORT_CAPACITY)
+        s->candidate_capacity = std::max(s->candidate_capacity, generous(report->counts.candidates));
+    if (report->abort_code == ABORT_PARTITION) {
+        /* The next partition is made for this very step, and fits; a tier that fails twice is left alone all the same. */
+        if (s->misfit == first) c->refused |= 1u << c->partition.tier;
+        s->misfit = first;
+    }
+    return repeat_steps(c, first, end, error);
+}
+
+/* Wait for the oldest step of the queue and read its report. */
+static sadmm_status see_step(struct sadmm_context *c, struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    cudaError_t code = cudaEventSynchronize(slot_of(s, s->seen)->done);
+    if (code != cudaSuccess) CUDA_TRY(CUDA(wait)(c, error)); /* says what failed */
+    /* A copy: recover() reuses the place. */
+    const struct cuda_step_report report = step_reports(c)[s->seen % STEPS_AHEAD];
+    if (report.abort_code != ABORT_NONE) return recover(c, s->seen, &report, error);
+    s->last = report;
+    struct queued_step *q = slot_of(s, s->seen);
+    q->edit_count = 0;
+    s->last_settings = q->settings;
+    s->time += q->settings.dt;
+    ++s->seen;
+    ++s->done;
+    /* A plan with far too much room wastes launches. */
+    if (report.counts.pairs < c->view.contacts.pair_capacity / 4 - 256) s->planned = false;
+    return SADMM_OK;
+}
+
+static sadmm_status see_all(struct sadmm_context *c, struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    while (s->seen < s->enqueued) CUDA_TRY(see_step(c, error));
+    return SADMM_OK;
+}
+
+/* ---- entries --------------------------------------------------------------------------------------------------- */
+
+/* Make the queue's next place free. */
+static sadmm_status next_place(struct sadmm_context *c, struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    while (s->enqueued - s->seen >= STEPS_AHEAD) CUDA_TRY(see_step(c, error));
+    return SADMM_OK;
+}
+
+/* The edits of a step, and the settings' numbers where the device has others, into its place in the queue. */
+static sadmm_status take_edits(struct sadmm_context *c, struct queued_step *q, const struct sadmm_settings *settings,
+                               const struct sadmm_resident_edit *edits, size_t count, struct sadmm_error *error)
+{
+    struct sadmm_resident_edit numbers = {SADMM_EDIT_SETTINGS, 0, {}};
+    sadmm_settings_numbers(settings, numbers.values);
+    const bool other = memcmp(numbers.values, c->numbers, sizeof c->numbers) != 0;
+    const size_t total = count + other;
+    if (total > q->edit_capacity) {
+        const size_t capacity = std::max(2 * q->edit_capacity, total);
+        if (sadmm_test_allocation_fails())
+            return CUDA(fail)(c, cudaErrorMemoryAllocation, "allocation of changes of bodies", error);
+        if (q->edits) (void)cudaFreeHost(q->edits);
+        q->edits = nullptr;
+        q->edit_capacity = 0;
+        CUDA_CALL(c, cudaMallocHost((void **)&q->edits, capacity * sizeof *q->edits),
+                  "allocation of changes of bodies");
+        q->edit_capacity = capacity;
+    }
+    if (count > 0) memcpy(q->edits, edits, count * sizeof *edits);
+    if (other) q->edits[count] = numbers;
+    memcpy(c->numbers, numbers.values, sizeof c->numbers);
+    q->settings = *settings;
+    q->edit_count = total;
+    return SADMM_OK;
+}
+
+static sadmm_status enqueue_next(struct sadmm_context *c, struct queued_step *q, const struct sadmm_settings *settings,
+                                 const struct sadmm_resident_edit *edits, size_t count, struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    CUDA_TRY(take_edits(c, q, settings, edits, count, error));
+    CUDA_TRY(launch_edits_of(c, s->enqueued, error));
+    CUDA_TRY(prepare(c, error));
+    return launch_step(c, s->enqueued, error);
+}
+
+extern "C" sadmm_status CUDA(step_world)(struct sadmm_context *c, const struct sadmm_settings *settings,
+                                         const struct sadmm_resident_edit *edits, size_t count,
+                                         struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    CUDA_ENTER(c);
+    CUDA_TRY(next_place(c, error));
+    if (!sadmm_settings_same_but_numbers(&c->settings, settings)) {
+        CUDA_TRY(see_all(c, error));
+        s->planned = false;
+    }
+    if (!s->planned) CUDA_TRY(see_all(c, error));
+    CUDA(plan_settings)(c, settings);
+    struct queued_step *q = slot_of(s, s->enqueued);
+    sadmm_status status = enqueue_next(c, q, settings, edits, count, error);
+    if (status != SADMM_OK) {
+        drop_steps(c, s->enqueued, s->enqueued + 1);
+        return status;
+    }
+    ++s->enqueued;
+    return SADMM_OK;
+}
+
+extern "C" sadmm_status CUDA(wait_world)(struct sadmm_context *c, struct sadmm_resident_report *out,
+                                         struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    CUDA_ENTER(c);
+    sadmm_status status = see_all(c, error);
+    /* Where some steps could not be repeated the ones before them still run. */
+    while (status != SADMM_OK && status != SADMM_ERROR_DEVICE && s->seen < s->enqueued) {
+        struct sadmm_error later;
+        if (see_step(c, &later) != SADMM_ERROR_DEVICE) continue;
+        *error = later;
+        status = SADMM_ERROR_DEVICE;
+    }
+    COLLISION(settle)(s->collision, 1 - s->into, s->last.counts);
+    CUDA(report_step)(c, out);
+    return status;
+}

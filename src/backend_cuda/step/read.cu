@@ -1,0 +1,93 @@
+/* Whole steps on the device: the world and the report come back (step/world.h). */
+#include <string.h>
+
+#include <algorithm>
+
+#include "collision/collision.h"
+#include "world.h"
+
+/* ---- the report ------------------------------------------------------------------------------------------------ */
+
+static double milliseconds(const struct cuda_step_report *report, enum step_stamp from, enum step_stamp to)
+{
+    return 1e-6 * (double)(report->stamps[to] - report->stamps[from]);
+}
+
+void CUDA(report_step)(const struct sadmm_context *c, struct sadmm_resident_report *out)
+{
+    const struct cuda_step *s = c->step;
+    const struct cuda_step_report *last = &s->last;
+    const struct sadmm_settings *settings = &s->last_settings;
+    out->done = s->done;
+    out->time = s->time;
+    out->settings = *settings;
+    out->repeats = s->repeats;
+    out->offending_body = s->offending_body;
+    out->plan = c->plan;
+    out->plan.pairs = last->counts.pairs;
+    out->plan.points = last->counts.points;
+    out->iterations = last->counts.points > 0 ? settings->iterations : 1;
+    out->iterations_mean = out->iterations;
+    out->islands_above = last->unmet;
+    out->converged = last->unmet == 0;
+    if (out->converged) out->iterations = last->most_iterations;
+    if (last->unmet >= 0 && last->statistics.islands > 0)
+        out->iterations_mean =
+            ((double)last->sum_of_iterations + (double)last->unmet * settings->iterations) / last->statistics.islands;
+    out->limited = last->limited;
+    out->penetration_max = last->depth;
+    out->residual.primal = last->primal;
+    out->residual.dual = last->dual;
+    out->ms.collide = milliseconds(last, STAMP_START, STAMP_FOUND);
+    out->ms.assemble = milliseconds(last, STAMP_FOUND, STAMP_ASSEMBLED);
+    out->ms.solve = milliseconds(last, STAMP_ASSEMBLED, STAMP_SOLVED);
+    out->ms.finish = milliseconds(last, STAMP_SOLVED, STAMP_END);
+    out->ms.total = milliseconds(last, STAMP_START, STAMP_END);
+}
+
+/* ---- entries --------------------------------------------------------------------------------------------------- */
+
+/* In pieces, through pinned memory of that size. */
+static sadmm_status get(struct sadmm_context *c, void *to, const void *from, size_t bytes, struct sadmm_error *error)
+{
+    enum { PIECE = 16 << 20 };
+    if (!to) return SADMM_OK;
+    CUDA_TRY(CUDA(reserve)(c, PINNED_OUT, std::min(bytes, (size_t)PIECE), error));
+    for (size_t at = 0; at < bytes; at += PIECE) {
+        const size_t piece = std::min(bytes - at, (size_t)PIECE);
+        CUDA_TRY(CUDA(download)(c, (const char *)from + at, piece, error));
+        memcpy((char *)to + at, c->buffers[PINNED_OUT].data, piece);
+    }
+    return SADMM_OK;
+}
+
+extern "C" sadmm_status CUDA(read_bodies)(struct sadmm_context *c, struct sadmm_rigid *rigid,
+                                          struct sadmm_steady *steady, double *wrench, struct sadmm_error *error)
+{
+    const struct cuda_step *s = c->step;
+    const size_t n = (size_t)s->bodies;
+    CUDA_ENTER(c);
+    CUDA(view_into)(c, s->into);
+    CUDA_TRY(get(c, rigid, c->view.step.before, n * sizeof *rigid, error));
+    CUDA_TRY(get(c, steady, c->view.step.steady_before, n * sizeof *steady, error));
+    return get(c, wrench, buffer<double>(c, BUFFER_WORLD_WRENCH) + (size_t)(1 - s->into) * 6 * n,
+               6 * n * sizeof *wrench, error);
+}
+
+extern "C" sadmm_status CUDA(read_contacts)(struct sadmm_context *c, struct sadmm_contact_set *contacts,
+                                            struct sadmm_error *error)
+{
+    return COLLISION(download)(c->step->collision, c->stream, contacts, error);
+}
+
+extern "C" sadmm_status CUDA(read_start)(struct sadmm_context *c, struct sadmm_rigid *rigid, double *velocity,
+                                         double *impulse, struct sadmm_error *error)
+{
+    const struct cuda_step *s = c->step;
+    const size_t n = (size_t)s->bodies, points = (size_t)s->last.counts.points;
+    CUDA_ENTER(c);
+    CUDA(view_into)(c, 1 - s->into); /* of the last step */
+    CUDA_TRY(get(c, rigid, c->view.step.before, n * sizeof *rigid, error));
+    CUDA_TRY(get(c, velocity, c->view.step.start_velocity, 6 * n * sizeof *velocity, error));
+    return get(c, impulse, c->view.step.start_impulse, 3 * points * sizeof *impulse, error);
+}

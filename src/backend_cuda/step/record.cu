@@ -1,0 +1,153 @@
+/* Whole steps on the device: a step, launch by launch, and the graph that is made of it (step/world.h). */
+#include "collision/collision.h"
+#include "core/solve/stages.h"
+#include "world.h"
+
+/* ---- stages ---------------------------------------------------------------------------------------------------- */
+
+/* Contacts, up to the gate. */
+sadmm_status CUDA(enqueue_find)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    CUDA_TRY(COLLISION(enqueue)(c->step->collision, c->stream, c->step->into, error));
+    return CUDA(launch_admit)(c, error);
+}
+
+/* Launches go to the side stream while this lives; it begins behind what is on the main one. */
+namespace {
+struct side_branch {
+    struct sadmm_context *c;
+    cudaStream_t main;
+    cudaError_t code;
+    explicit side_branch(struct sadmm_context *context) : c(context), main(context->stream)
+    {
+        code = cudaEventRecord(c->fork, main);
+        if (code == cudaSuccess) code = cudaStreamWaitEvent(c->side, c->fork, 0);
+        c->stream = c->side;
+    }
+    ~side_branch() { c->stream = main; }
+    side_branch(const side_branch &) = delete;
+    side_branch &operator=(const side_branch &) = delete;
+};
+} // namespace
+
+/* What the iterating kernels do about energies. With convergence checks an island may have more iterations after them.
+ */
+static enum cuda_limit limit_by_iterations(const struct sadmm_context *c)
+{
+    if (!c->plan.limit || c->partition.tier == SADMM_CUDA_TIER_STREAM) return LIMIT_NONE;
+    return c->prologue && !stop_rule_checked(c) ? LIMIT_WHOLE : LIMIT_SUSPECTS;
+}
+
+/* A and b of the bodies: beside contact finding, of which they need nothing. */
+static sadmm_status record_gather(struct sadmm_context *c, struct sadmm_error *error)
+{
+    CUDA_TRY(CUDA(launch_start)(c, error));
+    side_branch side(c);
+    CUDA_CALL(c, side.code, "a branch of the step");
+    return CUDA(enqueue_bodies)(c, error);
+}
+
+/* Graph statistics and layout; beside them contacts in the solver's form, and what weights take from pairs. */
+static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *error)
+{
+    {
+        side_branch side(c);
+        CUDA_CALL(c, side.code, "a branch of the step");
+        CUDA_TRY(CUDA(assemble_contacts)(c, error));
+        CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
+    }
+    CUDA_TRY(CUDA(enqueue_statistics_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
+    CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
+    return SADMM_OK;
+}
+
+/* The end of the step, wrenches included; beside it the residuals of the last iteration, where they are wanted. */
+static sadmm_status record_finish(struct sadmm_context *c, bool residuals, struct sadmm_error *error)
+{
+    if (residuals) {
+        side_branch side(c);
+        CUDA_CALL(c, side.code, "a branch of the step");
+        CUDA_TRY(CUDA(enqueue_residuals)(c, error));
+        CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
+    }
+    CUDA_TRY(CUDA(launch_finish)(c, error));
+    if (residuals) CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
+    return SADMM_OK;
+}
+
+/* *residuals: those of the last iteration are wanted. */
+static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_stage *stage, bool *residuals,
+                                 struct sadmm_error *error)
+{
+    const enum cuda_limit limit = limit_by_iterations(c);
+    switch (stage->kind) {
+    case SADMM_STAGE_GATHER: return record_gather(c, error);
+    case SADMM_STAGE_FIND: return CUDA(enqueue_find)(c, error);
+    case SADMM_STAGE_PLAN: return record_plan(c, error);
+    case SADMM_STAGE_PENALTY: return CUDA(enqueue_penalties)(c, error);
+    case SADMM_STAGE_ITERATE:
+        return CUDA(enqueue_iterations)(c, stage->count, stage->measure && (stage->last || !stop_rule_checked(c)),
+                                        stage->last || stage->checked ? limit : LIMIT_NONE, error);
+    case SADMM_STAGE_RESIDUALS: /* not reported where islands stop by themselves */
+        *residuals = stage->last;
+        return stage->last || stop_rule_checked(c) ? SADMM_OK : CUDA(enqueue_residuals)(c, error);
+    case SADMM_STAGE_CHECK: return CUDA(enqueue_convergence_check)(c, stage->done, error);
+    case SADMM_STAGE_REWEIGH: return CUDA(enqueue_weights)(c, true, error);
+    case SADMM_STAGE_BALANCE: /* the ratio of (15) is found on the device */
+        CUDA_TRY(CUDA(enqueue_balance)(c, error));
+        return CUDA(factorize)(c, error);
+    case SADMM_STAGE_LIMIT:
+        return limit == LIMIT_WHOLE ? SADMM_OK : CUDA(enqueue_limit)(c, limit == LIMIT_SUSPECTS, error);
+    case SADMM_STAGE_INTEGRATE: return record_finish(c, *residuals, error);
+    case SADMM_STAGE_COMMIT: return CUDA(launch_commit)(c, error);
+    case SADMM_STAGE_BODIES:   /* beside FIND */
+    case SADMM_STAGE_CONTACTS: /* beside PLAN */
+    case SADMM_STAGE_SOLUTION: /* INTEGRATE reads it where it is, */
+    case SADMM_STAGE_WRENCHES: /* and adds up wrenches */
+    case SADMM_STAGE_CERTIFY:  /* by the host, afterwards */
+    case SADMM_STAGE_PREDICT:  /* worlds are not loaded before their first step, */
+    case SADMM_STAGE_ROWS:     /* and have none */
+    default: return SADMM_OK;
+    }
+}
+
+static sadmm_status enqueue_step(struct sadmm_context *c, struct sadmm_error *error)
+{
+    struct sadmm_stages stages = sadmm_stages_of(&c->plan, &c->settings, true);
+    struct sadmm_stage stage;
+    bool residuals = false;
+    c->prologue = c->fast && !c->plan.residuals && c->view.rows.count == 0 && c->view.model.contact_rows == 3 &&
+                  CUDA(persistent_does_prologue)(&c->partition);
+    while (sadmm_stages_next(&stages, &stage)) CUDA_TRY(record_stage(c, &stage, &residuals, error));
+    return SADMM_OK;
+}
+
+/* ---- graphs ---------------------------------------------------------------------------------------------------- */
+
+sadmm_status CUDA(record_step)(struct sadmm_context *c, int into, struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    cudaGraph_t graph = nullptr;
+    const int next = s->into;
+    CUDA_CALL(c, cudaStreamBeginCapture(c->stream, cudaStreamCaptureModeThreadLocal), "cudaStreamBeginCapture");
+    s->into = into;
+    CUDA(view_into)(c, into);
+    c->recording = true;
+    sadmm_status status = enqueue_step(c, error);
+    c->recording = false;
+    s->into = next;
+    cudaError_t code = cudaStreamEndCapture(c->stream, &graph);
+    if (status == SADMM_OK && code != cudaSuccess) status = CUDA(fail)(c, code, "cudaStreamEndCapture", error);
+    /* Instantiated again: plans change rarely, and then the graph's shape changes with them. */
+    if (s->graphs[into]) (void)cudaGraphExecDestroy(s->graphs[into]);
+    s->graphs[into] = nullptr;
+    if (status == SADMM_OK) {
+        code = cudaGraphInstantiate(&s->graphs[into], graph, 0);
+        if (code != cudaSuccess) {
+            s->graphs[into] = nullptr;
+            status = CUDA(fail)(c, code, "cudaGraphInstantiate", error);
+        }
+    }
+    if (graph) (void)cudaGraphDestroy(graph);
+    return status;
+}

@@ -1,0 +1,167 @@
+/* Whole steps on the device: take over a world, let it go; where its arrays are (step/world.h). */
+#include <string.h>
+
+#include "collision/collision.h"
+#include "core/base/memory.h"
+#include "world.h"
+
+/* ---- the view of a step ---------------------------------------------------------------------------------------- */
+
+/* Everything of the view that depends on which state and set is written. */
+void CUDA(view_into)(struct sadmm_context *c, int into)
+{
+    const struct cuda_step *s = c->step;
+    const struct sadmm_cuda_contacts set = COLLISION(set)(s->collision, into);
+    const size_t n = (size_t)s->bodies;
+    struct cuda_step_view *step = &c->view.step;
+    struct sadmm_rigid *rigid = buffer<struct sadmm_rigid>(c, BUFFER_WORLD_BODIES);
+    struct sadmm_steady *steady = buffer<struct sadmm_steady>(c, BUFFER_WORLD_STEADY);
+    step->before = rigid + (size_t)(1 - into) * n;
+    step->after = rigid + (size_t)into * n;
+    step->steady_before = steady + (size_t)(1 - into) * n;
+    step->steady_after = steady + (size_t)into * n;
+    step->wrench = buffer<double>(c, BUFFER_WORLD_WRENCH) + (size_t)into * 6 * n;
+    step->start_velocity = buffer<double>(c, BUFFER_WORLD_VELOCITY);
+    step->start_impulse = buffer<double>(c, BUFFER_WORLD_IMPULSE);
+    step->points = set.points;
+    step->slot_of_body = buffer<int32_t>(c, BUFFER_WORLD_SLOTS);
+    step->bodies = buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES);
+    step->counts = set.device_counts;
+    step->candidate_capacity = s->candidate_capacity;
+    step->point_capacity = s->point_capacity;
+    step->guess = s->guess;
+    step->control = buffer<struct cuda_step_control>(c, BUFFER_WORLD_CONTROL);
+    step->reports = step_reports(c);
+    step->measured = c->plan.residuals && !stop_rule_checked(c);
+    step->limits = c->plan.limit;
+    c->view.raw.system.rigid = step->before;
+    c->view.raw.system.velocity = step->start_velocity;
+    c->view.raw.pairs = set.pairs;
+    c->view.raw.points = set.points;
+}
+
+/* Counts and settings of the view; pairs: room for so many. */
+void CUDA(view_counts)(struct sadmm_context *c, int64_t pairs)
+{
+    struct cuda_step *s = c->step;
+    cuda_view *v = &c->view;
+    struct sadmm_system none = {};
+    c->system = nullptr;
+    v->raw.system = none;
+    v->raw.system.body_count = s->bodies;
+    v->model.bodies = s->bodies;
+    v->contacts.pair_capacity = (int32_t)((pairs + WARP - 1) / WARP * WARP);
+    v->rows.count = 0;
+    v->rows.stride = 0;
+    v->model.contact_rows = s->guess.contact_rows == 1 ? 1 : 3;
+    v->model.warm_start = c->settings.warm_start;
+}
+
+sadmm_status CUDA(clear_abort)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    CUDA_CALL(c, cudaMemsetAsync(c->view.model.live, 0, sizeof *c->view.model.live, c->stream),
+              "cudaMemsetAsync(live)");
+    return SADMM_OK;
+}
+
+/* ---- entries --------------------------------------------------------------------------------------------------- */
+
+void CUDA(step_destroy)(struct sadmm_context *c)
+{
+    struct cuda_step *s = c->step;
+    if (!s) return;
+    for (struct queued_step &q : s->queue) {
+        if (q.done) (void)cudaEventDestroy(q.done);
+        if (q.edits) (void)cudaFreeHost(q.edits);
+    }
+    for (cudaGraphExec_t graph : s->graphs)
+        if (graph) (void)cudaGraphExecDestroy(graph);
+    COLLISION(destroy)(s->collision);
+    sadmm_free(s);
+    c->step = nullptr;
+}
+
+static sadmm_status step_create(struct sadmm_context *c, struct sadmm_error *error)
+{
+    struct cuda_step *s = (struct cuda_step *)sadmm_alloc(1, sizeof *s);
+    if (!s) return sadmm_fail_memory(error, "the cuda backend's world");
+    c->step = s;
+    CUDA_TRY(COLLISION(create)(c->device, &s->collision, error));
+    for (struct queued_step &q : s->queue)
+        CUDA_CALL(c, cudaEventCreateWithFlags(&q.done, cudaEventDisableTiming), "cudaEventCreate");
+    return SADMM_OK;
+}
+
+/* Through pinned memory that is free again when this returns. */
+static sadmm_status put(struct sadmm_context *c, enum cuda_buffer_name name, const void *from, size_t bytes,
+                        struct sadmm_error *error)
+{
+    CUDA_TRY(CUDA(reserve)(c, PINNED_BODIES, bytes, error));
+    CUDA_TRY(CUDA(upload)(c, c->buffers[name].data, PINNED_BODIES, 0, from, bytes, error));
+    return CUDA(wait)(c, error);
+}
+
+extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct sadmm_resident_world *world,
+                                         const struct sadmm_settings *settings, struct sadmm_error *error)
+{
+    const size_t n = (size_t)world->body_count, slots = world->input->body_count;
+    if (n > (size_t)INT32_MAX / 64)
+        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d bodies: at most %d", world->body_count, INT32_MAX / 64);
+    CUDA_ENTER(c);
+    CUDA_TRY(CUDA(wait)(c, error));
+    if (!c->step) {
+        sadmm_status status = step_create(c, error);
+        if (status != SADMM_OK) {
+            CUDA(step_destroy)(c);
+            return status;
+        }
+    }
+    struct cuda_step *s = c->step;
+    s->bodies = (int32_t)n;
+    s->slots = (int32_t)slots;
+    s->last_settings = *settings;
+    s->time = world->time;
+    s->planned = s->recorded = false;
+    s->enqueued = s->seen = s->done = s->repeats = 0;
+    s->offending_body = -1;
+    for (struct queued_step &q : s->queue) q.edit_count = 0;
+    memset(&s->last, 0, sizeof s->last);
+    CUDA_TRY(CUDA(use_settings)(c, settings, error));
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_BODIES, 2 * n * sizeof *world->rigid, error));
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_STEADY, 2 * n * sizeof *world->steady, error));
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_WRENCH, 12 * n * sizeof(double), error));
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_VELOCITY, 6 * n * sizeof(double), error));
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_SLOTS, n * sizeof *world->slot_of, error));
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_PLACES, slots * sizeof(struct sadmm_collision_body), error));
+    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_CONTROL, sizeof(struct cuda_step_control), error));
+    CUDA_TRY(CUDA(reserve)(c, PINNED_REPORTS, STEPS_AHEAD * sizeof(struct cuda_step_report), error));
+    CUDA_CALL(c, cudaMemsetAsync(buffer<void>(c, BUFFER_WORLD_CONTROL), 0, sizeof(struct cuda_step_control), c->stream),
+              "cudaMemsetAsync(control)");
+
+    c->plan.gyroscopic = sadmm_plan_is_gyroscopic(world->rigid, world->body_count);
+    /* The state before the first step is the one that is not written by it. */
+    CUDA_TRY(COLLISION(upload)(s->collision, c->stream, world->contacts, error));
+    s->into = 1 - COLLISION(current)(s->collision);
+    const size_t before = (size_t)(1 - s->into);
+    CUDA_TRY(put(c, BUFFER_WORLD_SLOTS, world->slot_of, n * sizeof *world->slot_of, error));
+    CUDA_TRY(put(c, BUFFER_WORLD_PLACES, world->input->bodies, slots * sizeof *world->input->bodies, error));
+    CUDA_TRY(CUDA(reserve)(c, PINNED_BODIES, n * sizeof *world->rigid, error));
+    CUDA_TRY(CUDA(upload)(c, buffer<struct sadmm_rigid>(c, BUFFER_WORLD_BODIES) + before * n, PINNED_BODIES, 0,
+                          world->rigid, n * sizeof *world->rigid, error));
+    CUDA_TRY(CUDA(wait)(c, error));
+    CUDA_TRY(CUDA(upload)(c, buffer<struct sadmm_steady>(c, BUFFER_WORLD_STEADY) + before * n, PINNED_BODIES, 0,
+                          world->steady, n * sizeof *world->steady, error));
+    CUDA_TRY(CUDA(wait)(c, error));
+    CUDA(view_counts)(c, 0);
+    CUDA_TRY(CUDA(reserve_layout)(c, error)); /* live is needed from here on */
+    CUDA_TRY(CUDA(clear_abort)(c, error));
+    s->candidate_capacity = s->point_capacity = c->first_capacity;
+    c->refused = 0;
+    s->misfit = -1;
+    const struct cuda_settings *kept = buffer<struct cuda_settings>(c, BUFFER_SETTINGS);
+    CUDA_TRY(COLLISION(attach)(s->collision, c->stream, world->input,
+                               buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES),
+                               &c->view.model.live->abort_code, &kept->settings.dt, &kept->gravity, error));
+    CUDA(view_into)(c, s->into);
+    return CUDA(wait)(c, error);
+}

@@ -1,0 +1,84 @@
+/* The world on the device, the host's side: what the sources of whole steps (step/step.h) share.
+ *
+ *   world.cu   take over a world and let it go; where its arrays are
+ *   guess.cu   plan a step from the statistics of an earlier one
+ *   record.cu  a step as a graph
+ *   queue.cu   run steps and see what became of them; repeat those whose plan did not hold
+ *   read.cu    bring the world and the report back
+ */
+#ifndef SADMM_CUDA_STEP_WORLD_H
+#define SADMM_CUDA_STEP_WORLD_H
+
+#include <algorithm>
+
+#include "backend_cuda/collide/pipeline.h"
+#include "backend_cuda/device/context.h"
+#include "core/model/settings.h"
+
+/* Of a step that was enqueued, until its report has been seen. */
+struct queued_step {
+    cudaEvent_t done;
+    struct sadmm_settings settings;
+    struct sadmm_resident_edit *edits; /* pinned */
+    size_t edit_count, edit_capacity;
+};
+
+struct cuda_step {
+    struct sadmm_cuda_collision *collision;
+    int32_t bodies, slots;
+
+    bool planned;               /* capacities, partition and guess are for the world as it is */
+    bool recorded;              /* and so are the graphs */
+    cudaGraphExec_t graphs[2];  /* by the set that is written */
+    struct cuda_step_guess guess;
+    int64_t candidate_capacity, point_capacity;
+
+    /* The queue: steps [seen, enqueued), at most STEPS_AHEAD. */
+    struct queued_step queue[STEPS_AHEAD];
+    int64_t enqueued, seen;
+    int into;                   /* set and state the next step writes */
+
+    struct cuda_step_report last; /* of the last step that was done, */
+    struct sadmm_settings last_settings;
+    double time;                  /* simulated until after it, s */
+    int64_t done, repeats;
+    int64_t misfit;             /* the last step that its partition did not fit; -1: none */
+    int32_t offending_body;
+};
+
+template <class T> static inline T *buffer(const struct sadmm_context *c, enum cuda_buffer_name name)
+{
+    return (T *)c->buffers[name].data;
+}
+
+static inline struct cuda_step_report *step_reports(const struct sadmm_context *c)
+{
+    return buffer<struct cuda_step_report>(c, PINNED_REPORTS);
+}
+
+/* Capacities: more than there was, so that not every new contact repeats a step: half as much again in small scenes,
+ * where a heap that spreads gains a third, an eighth in large ones, where it costs memory. */
+static inline int64_t generous(int64_t count) { return count + std::min(count / 2, count / 8 + 8192) + 256; }
+
+/* Is there a stop rule to check? Then residuals say nothing: islands end at different times. */
+static inline bool stop_rule_checked(const struct sadmm_context *c)
+{
+    return c->fast && c->settings.certificate_tolerance > 0;
+}
+
+/* world.cu: what of the view depends on which state and set is written. */
+void CUDA(view_into)(struct sadmm_context *, int into);
+/* world.cu: counts and settings of the view; pairs: capacity. */
+void CUDA(view_counts)(struct sadmm_context *, int64_t pairs);
+/* world.cu */
+sadmm_status CUDA(clear_abort)(struct sadmm_context *, struct sadmm_error *error);
+/* guess.cu: what the next step and those like it need. Nothing is running. */
+sadmm_status CUDA(guess_step)(struct sadmm_context *, struct sadmm_error *error);
+/* record.cu: contacts, up to the gate. */
+sadmm_status CUDA(enqueue_find)(struct sadmm_context *, struct sadmm_error *error);
+/* record.cu: the graph of a step that writes state and set `into`. */
+sadmm_status CUDA(record_step)(struct sadmm_context *, int into, struct sadmm_error *error);
+/* read.cu: the report of the last step that was done. */
+void CUDA(report_step)(const struct sadmm_context *, struct sadmm_resident_report *out);
+
+#endif
