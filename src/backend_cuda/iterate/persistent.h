@@ -19,6 +19,7 @@
 #ifndef SADMM_CUDA_ITERATE_PERSISTENT_H
 #define SADMM_CUDA_ITERATE_PERSISTENT_H
 
+#include "persistent_load.h"
 #include "persistent_steps.h"
 
 #include "backend_cuda/step/plan_check.h"

@@ -94,13 +94,6 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies_fast(int32_t odd, rea
 
 /* ---- Steps 2-4 ------------------------------------------------------------------------------------------------- */
 
-PART __device__ __forceinline__ void PART_RUN::store_record(real2_pair *record, real2_pair sum) const
-{
-    sum.x *= own.sign;
-    sum.y *= own.sign;
-    if (own.pair) *record = sum;
-}
-
 /* The lane's share of the primal residual. FAST: lambda goes `relaxation_factor` times as far, plain: once; records are
  * those of Step 1 in any case. */
 PART template <bool MEASURE>

@@ -124,8 +124,6 @@ static sadmm_status copy_name(const char *given, char **name, struct sadmm_error
     return SADMM_OK;
 }
 
-const char *sadmm_world_body_name(const struct sadmm_world_body *body) { return body->name ? body->name : ""; }
-
 sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def, sadmm_body_id *id)
 {
     TRY(sadmm_check_given(world, "world", NULL));

@@ -1,5 +1,7 @@
-/* From an id to the live object it names. */
+/* From an id to the live object it names, and what to call it. */
 #include "world_internal.h"
+
+const char *sadmm_world_body_name(const struct sadmm_world_body *body) { return body->name ? body->name : ""; }
 
 struct sadmm_world_body *sadmm_world_find_body(const sadmm_world *world, sadmm_body_id id, const char *argument,
                                                struct sadmm_error *error)

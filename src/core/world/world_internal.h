@@ -1,4 +1,11 @@
-/* A world's insides, shared by the files of this folder. */
+/* A world's insides, shared by the files of this folder. Each calls those before it alone:
+ *
+ *   slots, pair_table, ids, report   lists and names
+ *   gather                           what a step reads
+ *   resident                         where a backend keeps the world
+ *   shape, body, contacts, explain   what callers see of it, and change
+ *   step, world                      steps; settings, the whole
+ */
 #ifndef SADMM_CORE_WORLD_INTERNAL_H
 #define SADMM_CORE_WORLD_INTERNAL_H
 

@@ -1,0 +1,184 @@
+/* The persistent kernel (persistent.h): a part is loaded before the first iteration and stored after the last one. */
+#ifndef SADMM_CUDA_ITERATE_PERSISTENT_LOAD_H
+#define SADMM_CUDA_ITERATE_PERSISTENT_LOAD_H
+
+#include "persistent_part.h"
+
+/* ---- loading --------------------------------------------------------------------------------------------------- */
+
+/* Where the other body's state will be. */
+PART __device__ __forceinline__ void PART_RUN::find_other(int32_t other)
+{
+    /* slots are by island in BLOCK and CLUSTER, raw order in GRID; by island everywhere in the method `fast` */
+    const int32_t slot = (MODE == GRID && !FAST) || other == v.model.bodies ? other : v.graph.slot_of[other],
+                  local = slot - first_body;
+    own.other_odd = 0;
+    if (other == v.model.bodies) { /* the static world */
+        own.other = m.state + (MODE == CLUSTER ? 2 : 1) * args.most_bodies * ROW;
+    } else if (MODE == BLOCK) {
+        own.other = m.state + local * ROW;
+    } else if (MODE == GRID) {
+        bool inside = local >= 0 && local < bodies;
+        own.other = inside ? m.state + local * ROW : v.iteration.exchange + (size_t)slot * ROW;
+        own.other_odd = inside ? 0 : v.model.bodies * ROW;
+    } else {
+        const int32_t first_part = (int32_t)blockIdx.x / args.cluster * args.cluster;
+        int32_t rank = 0;
+        while (rank + 1 < args.cluster && slot >= v.graph.parts[first_part + rank + 1]) ++rank;
+        own.other = in_block(m.state, (unsigned)rank) + (slot - v.graph.parts[first_part + rank]) * ROW;
+        own.other_odd = args.most_bodies * ROW;
+    }
+}
+
+/* The side's pair as it is in memory; its points' errors and weights may still change. */
+PART __device__ __forceinline__ void PART_RUN::fetch_side(void)
+{
+    const int32_t p = side_code / 2;
+    if (side >= sides || (FULL && p >= v.contacts.pair_capacity)) return;
+    about = v.contacts.normal[p];
+    between = v.contacts.difference[p];
+    on = v.contacts.ends[p];
+#pragma unroll
+    for (int32_t j = 0; j < COUNT; ++j) {
+        const size_t slot = slot_or_first(lane + QUAD * j);
+        point[j] = v.contacts.arm[slot];
+        own.lambda[j] = load_lambda(v.contacts, slot);
+    }
+}
+
+PART __device__ __forceinline__ void PART_RUN::load_side(void)
+{
+    const int32_t side = side_code & 1, p = side_code / 2;
+    if (FULL && p >= v.contacts.pair_capacity) {
+        const row_about rows = v.rows.info[p - v.contacts.pair_capacity];
+        own.own = v.graph.slot_of[side ? rows.body_b : rows.body_a] - first_body;
+        find_other(side ? rows.body_a : rows.body_b);
+        return;
+    }
+    own.pair = true;
+    own.sign = side ? (real)1 : (real)-1;
+    own.own = v.graph.slot_of[side ? on.body_b : on.body_a] - first_body;
+    find_other(side ? on.body_a : on.body_b);
+    const real inv_s =
+        own.sign * (FAST ? v.contacts.inv_s[p]
+                         : inverse_weight(inv_beta_of(v.bodies, on.body_a), inv_beta_of(v.bodies, on.body_b)));
+    own.normal = xyz(about);
+    own.friction = about.w;
+#pragma unroll
+    for (int32_t j = 0; j < COUNT; ++j) {
+        const int32_t k = lane + QUAD * j;
+        const real error = FAST ? v.contacts.arm[slot_or_first(k)].w : point[j].w;
+        const bool there = k < (int32_t)between.w;
+        const vec3 arm_a = xyz(point[j]), arm_b = v3_add(arm_a, xyz(between)), none = v3(0, 0, 0);
+        own.own_arm[j] = there ? (side ? arm_b : arm_a) : none;
+        own.other_arm[j] = there ? (side ? arm_a : arm_b) : none;
+        own.error[j] = there ? own.sign * error : 0;
+        own.inv_s[j] = there ? inv_s : 0;
+        own.lambda[j] = there ? own.lambda[j] : none;
+    }
+}
+
+/* J^T lambda. */
+PART __device__ __forceinline__ void PART_RUN::start_records(void)
+{
+    vec3 force = v3(0, 0, 0), torque = force;
+#pragma unroll
+    for (int32_t j = 0; j < COUNT; ++j) {
+        vec3 impulse = own.lambda[j],
+             moment = fused_cross(own.own_arm[j], impulse);
+        force = j == 0 ? impulse : v3_add(force, impulse);
+        torque = j == 0 ? moment : v3_add(torque, moment);
+    }
+    store_record(own_record, sum_quad(lane, force, torque));
+}
+
+/* What the last batch or the stepwise kernels left, joined after a measured iteration. */
+PART __device__ __forceinline__ void PART_RUN::load_records(void)
+{
+    const real ratio = args.rescaled ? (real)*v.iteration.ratio : (real)1;
+    for (int32_t i = t; i < sides * ROW; i += (int32_t)blockDim.x) {
+        const size_t from = (size_t)first_side * ROW + (size_t)i;
+        m.records[i] =
+            args.join ? v.iteration.records[from] + ratio * v.iteration.change[from] : v.iteration.records[from];
+    }
+}
+
+PART __device__ __forceinline__ void PART_RUN::load(void)
+{
+    const int32_t threads = (int32_t)blockDim.x, in_registers = threads / LANES;
+    own_body = load_body(found.live, r, v.bodies.lines + found.body * (size_t)v.bodies.line, v.bodies.rigid,
+                         (FAST ? v.bodies.momentum_residual : v.bodies.b) + found.body * ROW,
+                         v.bodies.state + found.body * ROW);
+    gathered = m.records;
+    if (found.live && r < 6) {
+        gathered = m.records + (found.begin - first_side) * ROW + record_slot(r);
+        gathered_count = found.end - found.begin;
+    }
+    many = __ballot_sync((unsigned)ALL_LANES, gathered_count > FEW) != 0;
+    own_record = (real2_pair *)kept_address<SIZE>(m.records + side * ROW + quad_slot(lane));
+    if (!FAST && moves) momentum = free_momentum(own_body);
+    if (found.live) m.state[body * ROW + r] = own_body.v;
+    for (int32_t i = in_registers * ROW + t; i < bodies * ROW; i += threads) m.state[i] = v.bodies.state[raw_row(i)];
+    if (t < ROW) m.state[(MODE == CLUSTER ? 2 : 1) * args.most_bodies * ROW + t] = 0;
+    if (bodies > in_registers) {
+        const int32_t more = bodies - in_registers;
+        for (int32_t i = t; i < more * v.bodies.line; i += threads)
+            m.lines[i / v.bodies.line * LINE_GENERAL + i % v.bodies.line] =
+                v.bodies.lines[(size_t)v.graph.body_of[first_body + in_registers + i / v.bodies.line] *
+                                   (size_t)v.bodies.line +
+                               (size_t)(i % v.bodies.line)];
+        for (int32_t i = t; i < more * ROW; i += threads)
+            m.b[i] = (FAST ? v.bodies.momentum_residual : v.bodies.b)[raw_row(in_registers * ROW + i)];
+    }
+    own.own = 0;
+    own.other = m.state;
+    if (side < sides) load_side();
+    own_row = kept_address<SIZE>(m.state + own.own * ROW);
+    own_state = kept_address<SIZE>(m.state + body * ROW + r);
+    if (!FAST && !args.start) load_records();
+    else if (!FAST && updates) start_records();
+    if (has_rows() && side < sides && !own.pair && lane == 0)
+        start_row_side(v, side_code, m.row_lambda + side * ROW, m.records + side * ROW,
+                       !FAST && args.start);
+    if (FAST && MODE == GRID) /* for the first Steps 2-4 of the others */
+        for (int32_t i = t; i < bodies * ROW; i += threads)
+            v.iteration.exchange[(size_t)first_body * ROW + (size_t)i] = v.bodies.state[raw_row(i)];
+    block_barrier<SIZE>();
+}
+
+/* ---- storing --------------------------------------------------------------------------------------------------- */
+
+/* Velocities, records (FAST: momentum residuals) and, from side a (b where a is static), multipliers; nothing of
+ * islands that have stopped. */
+PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
+{
+    const int32_t in_registers = (int32_t)blockDim.x / LANES;
+    for (int32_t i = t; i < bodies * ROW; i += (int32_t)blockDim.x) {
+        if (i % ROW >= 6 ||
+            (FAST && island_stopped(v.graph, v.islands, args.checks, v.graph.body_of[first_body + i / ROW])))
+            continue;
+        v.bodies.state[raw_row(i)] = state(odd)[i];
+        if (FAST)
+            v.bodies.momentum_residual[raw_row(i)] = i < in_registers * ROW ? own_body.b : m.b[i - in_registers * ROW];
+    }
+    for (int32_t i = t; !FAST && i < sides * ROW; i += (int32_t)blockDim.x)
+        v.iteration.records[(size_t)first_side * ROW + (size_t)i] = m.records[i];
+    if (side >= sides) return;
+    if (FAST && island_stopped(v.graph, v.islands, args.checks, v.graph.body_of[first_body + own.own])) return;
+    const int32_t code = v.graph.incident[first_side + side], p = code / 2;
+    if (own.pair) {
+        if (code & 1 && v.contacts.ends[p].body_a != v.model.bodies) return;
+        const int32_t count = (int32_t)v.contacts.difference[p].w;
+#pragma unroll
+        for (int32_t j = 0; j < COUNT; ++j) {
+            const int32_t k = lane + QUAD * j;
+            if (k < count) store_lambda(v.contacts, point_slot(v.contacts, p, k), own.lambda[j]);
+        }
+    } else if (FULL && lane == 0) {
+        const int32_t k = p - v.contacts.pair_capacity;
+        if (code & 1 && v.rows.info[k].body_a != v.model.bodies) return;
+        store_row_lambda(v.rows, k, m.row_lambda + side * ROW);
+    }
+}
+
+#endif
