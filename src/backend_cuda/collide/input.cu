@@ -43,19 +43,14 @@ static bool shapes_changed(const struct sadmm_cuda_collision *c, const struct sa
     return false;
 }
 
-static bool grow(void *array, size_t *capacity, size_t needed, size_t size)
-{
-    return sadmm_grow((void **)array, capacity, 0, needed, size);
-}
-
 /* The list of shapes: leaves, then planes; and from which radius a mover is large. */
 static sadmm_status list_shapes(struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input,
                                 struct sadmm_error *error)
 {
     struct collision_view *v = &c->view;
     size_t leaves = 0, planes = 0;
-    if (!grow(&c->present, &c->present_capacity, input->shape_count, sizeof *c->present) ||
-        !grow(&c->radii, &c->radius_capacity, input->shape_count, sizeof *c->radii))
+    if (!sadmm_grow_empty(&c->present, &c->present_capacity, input->shape_count, sizeof *c->present) ||
+        !sadmm_grow_empty(&c->radii, &c->radius_capacity, input->shape_count, sizeof *c->radii))
         return sadmm_fail_memory(error, "collision's list of shapes");
     for (size_t slot = 0; slot < input->shape_count; ++slot) {
         const struct sadmm_shape *shape = &input->shapes[slot];
@@ -66,7 +61,7 @@ static sadmm_status list_shapes(struct sadmm_cuda_collision *c, const struct sad
     for (size_t slot = 0; slot < input->shape_count; ++slot)
         if (input->shapes[slot].alive && input->shapes[slot].type == SADMM_SHAPE_PLANE)
             c->present[leaves + planes++] = (uint32_t)slot;
-    if (!grow(&c->planes, &c->plane_capacity, planes, sizeof *c->planes))
+    if (!sadmm_grow_empty(&c->planes, &c->plane_capacity, planes, sizeof *c->planes))
         return sadmm_fail_memory(error, "collision's list of planes");
     v->leaf_count = (int32_t)leaves;
     v->plane_count = (int32_t)planes;

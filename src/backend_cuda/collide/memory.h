@@ -148,10 +148,8 @@ static inline sadmm_status reserve(struct sadmm_cuda_collision *c, int name, siz
                                    struct sadmm_error *error)
 {
     struct collision_buffer *b = &c->buffers[name];
-    size_t bytes = count * size, wanted = b->capacity + b->capacity / 2;
+    const size_t bytes = count * size, wanted = sadmm_grown_capacity(b->capacity, bytes, 256);
     if (b->data && bytes <= b->capacity) return SADMM_OK;
-    if (wanted < bytes) wanted = bytes;
-    if (wanted < 256) wanted = 256;
     char what[96];
     snprintf(what, sizeof what, "allocation of %zu bytes for collision's %s", wanted, buffer_names[name]);
     if (sadmm_test_allocation_fails()) return fail(c, cudaErrorMemoryAllocation, what, error);

@@ -85,9 +85,7 @@ sadmm_status CUDA(reserve)(struct sadmm_context *c, enum cuda_buffer_name name, 
 {
     cuda_buffer *buffer = &c->buffers[name];
     if (bytes <= buffer->capacity && buffer->data) return SADMM_OK;
-    size_t wanted = buffer->capacity + buffer->capacity / 2;
-    if (wanted < bytes) wanted = bytes;
-    if (wanted < 256) wanted = 256;
+    const size_t wanted = sadmm_grown_capacity(buffer->capacity, bytes, 256);
     char what[96];
     snprintf(what, sizeof what, "allocation of %zu bytes for the cuda backend's %s", wanted, buffer_names[name]);
     if (sadmm_test_allocation_fails()) return CUDA(fail)(c, cudaErrorMemoryAllocation, what, error);

@@ -55,11 +55,11 @@ static struct sadmm_plan plan_of(const struct sadmm_context *c, const struct pre
     plan.bodies = s->bodies;
     plan.pairs = seen->live.pairs;
     plan.points = seen->live.points;
-    plan.contact_rows = plan.points == 0 ? 0 : seen->statistics.rough > 0 ? 3 : 1;
+    plan.contact_rows = plan_contact_rows(plan.points, seen->statistics.rough);
     plan.rigid = true;
     plan.gyroscopic = c->plan.gyroscopic; /* since load */
     plan.threads = 1;
-    sadmm_plan_settle(&plan, &c->settings, plan.pairs > 0 && 2 * (int64_t)seen->statistics.warm >= plan.pairs);
+    sadmm_plan_settle(&plan, &c->settings, plan_mostly_warm(plan.pairs, seen->statistics.warm));
     return plan;
 }
 

@@ -3,6 +3,7 @@
 #define SADMM_CUDA_STEP_PLAN_CHECK_H
 
 #include "backend_cuda/device/context.h"
+#include "core/solve/plan.h"
 
 /* The device's clock. */
 static __device__ __forceinline__ unsigned long long nanoseconds(void)
@@ -27,8 +28,8 @@ static __device__ __forceinline__ bool as_planned(const model_view &model, const
 {
     const struct cuda_graph_statistics *statistics = model.statistics;
     const struct cuda_step_guess guess = step.guess;
-    const int32_t pairs = model.live->pairs, rows = pairs == 0 ? 0 : statistics->rough > 0 ? 3 : 1;
-    const int32_t warm = pairs > 0 && 2 * (int64_t)statistics->warm >= pairs;
+    const int32_t pairs = model.live->pairs, rows = plan_contact_rows(pairs, statistics->rough);
+    const int32_t warm = plan_mostly_warm(pairs, statistics->warm);
     return rows == guess.contact_rows && statistics->point_slots <= guess.point_slots &&
            (guess.warm < 0 || warm == guess.warm);
 }

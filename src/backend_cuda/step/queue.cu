@@ -147,7 +147,7 @@ static sadmm_status take_edits(struct sadmm_context *c, struct queued_step *q, c
     const bool other = memcmp(numbers.values, c->numbers, sizeof c->numbers) != 0;
     const size_t total = count + other;
     if (total > q->edit_capacity) {
-        const size_t capacity = std::max(2 * q->edit_capacity, total);
+        const size_t capacity = sadmm_grown_capacity(q->edit_capacity, total, 16);
         if (sadmm_test_allocation_fails())
             return CUDA(fail)(c, cudaErrorMemoryAllocation, "allocation of changes of bodies", error);
         if (q->edits) (void)cudaFreeHost(q->edits);

@@ -51,9 +51,7 @@ void sadmm_free(void *block)
 bool sadmm_grow(void **array, size_t *capacity, size_t used, size_t needed, size_t size)
 {
     if (needed <= *capacity) return true;
-    size_t wanted = *capacity + *capacity / 2;
-    if (wanted < needed) wanted = needed;
-    if (wanted < 16) wanted = 16;
+    const size_t wanted = sadmm_grown_capacity(*capacity, needed, 16);
     char *block = (char *)allocate(wanted, size);
     if (!block) return false;
     if (used) memcpy(block, *array, used * size);

@@ -8,18 +8,14 @@
 #include <math.h>
 #include <stdint.h>
 
+#include "core/base/inline.h"
+
 #ifndef SADMM_REAL
 #define SADMM_REAL double
 #define SADMM_REAL_IS_DOUBLE 1
 #endif
 
 typedef SADMM_REAL real;
-
-#ifdef __CUDACC__
-#define SADMM_INLINE static inline __host__ __device__
-#else
-#define SADMM_INLINE static inline
-#endif
 
 /* Before a loop over an array of known size, which stays in registers then. */
 #ifdef __CUDA_ARCH__

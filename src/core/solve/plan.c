@@ -33,6 +33,13 @@ static bool pair_is_warm(const struct sadmm_contact_set *contacts, const struct 
     return false;
 }
 
+static bool any_pair_is_rough(const struct sadmm_contact_set *contacts)
+{
+    for (size_t p = 0; p < contacts->pair_count; ++p)
+        if (contacts->pairs[p].friction > 0) return true;
+    return false;
+}
+
 static bool constraint_is_warm(const struct sadmm_rows *rows, const struct sadmm_row_constraint *constraint)
 {
     return any_nonzero(rows->lambda + constraint->first, constraint->count);
@@ -73,7 +80,7 @@ static bool starts_warm(const struct sadmm_system *system, int plan_threads)
     for (int t = 0; t < ran; ++t) warm += count.warm[t];
     for (size_t k = 0; k < sadmm_row_constraint_count(system); ++k)
         warm += constraint_is_warm(system->rows, &system->rows->constraints[k]);
-    return total > 0 && 2 * warm >= total;
+    return plan_mostly_warm((int64_t)total, (int64_t)warm);
 }
 
 bool sadmm_plan_is_gyroscopic(const struct sadmm_rigid *rigid, int32_t count)
@@ -119,11 +126,7 @@ struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struc
     plan.bodies = system->body_count;
     plan.pairs = (int32_t)system->contacts->pair_count;
     plan.points = (int32_t)system->contacts->point_count;
-    if (plan.points > 0) {
-        plan.contact_rows = 1;
-        for (size_t p = 0; p < system->contacts->pair_count && plan.contact_rows == 1; ++p)
-            if (system->contacts->pairs[p].friction > 0) plan.contact_rows = 3;
-    }
+    plan.contact_rows = plan_contact_rows(plan.points, any_pair_is_rough(system->contacts));
     plan.row_constraints = (int32_t)sadmm_row_constraint_count(system);
     plan.rigid = system->rigid != NULL;
     plan.threads = sadmm_plan_threads(system->team, settings->threads, (size_t)plan.points + 4 * (size_t)plan.row_constraints);

@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "core/base/inline.h"
 #include "core/model/system.h"
 
 #ifdef __cplusplus
@@ -29,6 +30,19 @@ struct sadmm_plan {
     bool certificate;
     int threads;            /* at most, >= 1 */
 };
+
+/* ---- rules, also for a backend that counts contacts where they are ------------------------------------------------- */
+
+/* Rows of a geometric contact. contacts: how many there are; rough: how many of them, or of their pairs, have friction. */
+SADMM_INLINE int plan_contact_rows(int64_t contacts, int64_t rough) { return contacts == 0 ? 0 : rough > 0 ? 3 : 1; }
+
+/* Do at least half of the constraints carry an impulse? */
+SADMM_INLINE bool plan_mostly_warm(int64_t constraints, int64_t warm)
+{
+    return constraints > 0 && 2 * warm >= constraints;
+}
+
+/* ---- the plan ------------------------------------------------------------------------------------------------------ */
 
 /* Threads for `points` contact points: as many as have enough to do, at most `wanted` (0: any number). `team` may be NULL. */
 int sadmm_plan_threads(const struct sadmm_team *team, int wanted, size_t points);

@@ -8,11 +8,6 @@
 #include "core/model/steady.h"
 #include "world_internal.h"
 
-static bool grow(void *array, size_t *capacity, size_t needed, size_t size)
-{
-    return sadmm_grow((void **)array, capacity, 0, needed, size);
-}
-
 static bool moves(const struct sadmm_world_body *body) { return body->alive && body->type != SADMM_BODY_STATIC; }
 
 static int32_t count_moving(const sadmm_world *world, size_t begin, size_t end)
@@ -76,13 +71,13 @@ sadmm_status sadmm_world_gather(sadmm_world *world)
 {
     /* One at least: a system without bodies is still one of rigid bodies. */
     size_t n = (size_t)world->dynamic_count + 1, slots = world->body_slots;
-    if (!grow(&world->collision_bodies, &world->collision_body_capacity, slots, sizeof *world->collision_bodies) ||
-        !grow(&world->start.rigid, &world->start.rigid_capacity, n, sizeof *world->start.rigid) ||
-        !grow(&world->next, &world->next_capacity, n, sizeof *world->next) ||
-        !grow(&world->velocity, &world->velocity_capacity, 6 * n, sizeof *world->velocity) ||
-        !grow(&world->wrench, &world->wrench_capacity, 6 * n, sizeof *world->wrench) ||
-        !grow(&world->start.velocity, &world->start.velocity_capacity, 6 * n, sizeof *world->start.velocity) ||
-        !grow(&world->slot_of, &world->slot_of_capacity, n, sizeof *world->slot_of))
+    if (!sadmm_grow_empty(&world->collision_bodies, &world->collision_body_capacity, slots, sizeof *world->collision_bodies) ||
+        !sadmm_grow_empty(&world->start.rigid, &world->start.rigid_capacity, n, sizeof *world->start.rigid) ||
+        !sadmm_grow_empty(&world->next, &world->next_capacity, n, sizeof *world->next) ||
+        !sadmm_grow_empty(&world->velocity, &world->velocity_capacity, 6 * n, sizeof *world->velocity) ||
+        !sadmm_grow_empty(&world->wrench, &world->wrench_capacity, 6 * n, sizeof *world->wrench) ||
+        !sadmm_grow_empty(&world->start.velocity, &world->start.velocity_capacity, 6 * n, sizeof *world->start.velocity) ||
+        !sadmm_grow_empty(&world->slot_of, &world->slot_of_capacity, n, sizeof *world->slot_of))
         return sadmm_fail_memory(&world->error, "the step");
     struct gathering g;
     g.world = world;

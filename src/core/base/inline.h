@@ -1,0 +1,11 @@
+/* Functions that nvcc compiles for the device, too. */
+#ifndef SADMM_CORE_BASE_INLINE_H
+#define SADMM_CORE_BASE_INLINE_H
+
+#ifdef __CUDACC__
+#define SADMM_INLINE static inline __host__ __device__
+#else
+#define SADMM_INLINE static inline
+#endif
+
+#endif
