@@ -80,6 +80,7 @@ static struct contact_problem *scattered(int32_t n, int32_t pairs, int32_t block
         if (k < pairs) touch(p, a, b, most);
         else join(p, a, b);
     }
+    contact_problem_rows(p);
     return p;
 }
 
