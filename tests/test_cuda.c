@@ -384,6 +384,21 @@ START_TEST(calls_that_fail)
 END_TEST
 #endif
 
+/* Said by name, before anything is solved; and the context is as good as before. */
+START_TEST(rows_with_bounds_are_refused)
+{
+    const struct sadmm_kernels *table = tables[_i];
+    struct runner r;
+    runner_create(&r, table);
+    solve(&r, find_scene("towers"));
+    sadmm_row_limit(&r.p->rows, r.p->rows.constraints[1].first, 0);
+    ck_assert_int_eq(table->begin(r.c, &r.p->system, &r.plan, &r.settings, &r.error), SADMM_ERROR_UNSUPPORTED);
+    ck_assert_msg(strstr(r.error.message, "constraint 1 given by rows"), "%s", r.error.message);
+    solve(&r, find_scene("towers"));
+    runner_stop(&r);
+}
+END_TEST
+
 /* ---------------------------------------------------------------------------------------------------------------- */
 
 /* Under sanitizers, on the emulated device, which is slow there: one precision, and some of the scenes. */
@@ -403,6 +418,7 @@ int main(void)
     ADD_CASE(suite, runs_repeat, 0, parts);
     ADD_CASE(suite, contexts_side_by_side, 0, parts);
     ADD_CASE(suite, no_such_device, 0, parts);
+    ADD_CASE(suite, rows_with_bounds_are_refused, 0, parts);
 #ifdef CUDA_EMULATED
     ADD_CASE(suite, calls_that_fail, 0, parts);
 #endif
