@@ -347,7 +347,7 @@ START_TEST(other_islands_keep_every_bit)
                 for (int32_t i = 0; i < without->system.body_count; ++i) {
                     bool same = memcmp(with->system.velocity + 6 * i, without->system.velocity + 6 * i, 6 * sizeof(double)) == 0;
                     if (i == JOINED || i == JOINED + 1) moved = moved || !same;
-                    else ck_assert_msg(same, "method %d, warm %d: body %d", m, warm, i);
+                    else ck_assert_msg(same, "method %d, warm %d, %d threads: body %d", m, warm, threads, i);
                 }
                 ck_assert(moved); /* the block is felt */
                 for (size_t k = 0; k < without->contacts.pair_count; ++k) {

@@ -129,8 +129,8 @@ struct sadmm_context {
     double *A, *C;                   /* bodies x PACKED6 */
     double *beta;                    /* bodies, kg */
     struct body_block *body_blocks;  /* unless all bodies are general */
-    /* General bodies, none (and the first three are not read then) or some: index among them or -1, of each body; the bodies,
-     * ascending; of each body block which lanes are general (bits), those behind the last body too. */
+    /* Of each body its index among the general ones or -1; the general ones, ascending. Of each body block which lanes are general
+     * (bits); where there are some, those behind the last body, too. */
     size_t general_count;
     int32_t *general_of, *general_bodies;
     uint32_t *general_lanes;
@@ -203,7 +203,7 @@ static inline double cpu_reduce_max(const struct sadmm_context *c)
 /* Index among the general bodies, -1: a rigid one. */
 static inline int32_t cpu_general(const struct sadmm_context *c, size_t body)
 {
-    return c->general_count ? c->general_of[body] : -1;
+    return c->general_of[body];
 }
 
 /* Row of a body in `state`: the static world is the last one. */

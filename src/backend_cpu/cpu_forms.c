@@ -49,17 +49,17 @@ bool CPU(find_forms)(struct sadmm_context *c)
 {
     const size_t n = (size_t)c->bodies, rows = sadmm_row_constraint_count(c->system);
     c->general_count = 0;
-    if (c->plan.rigid && c->plan.contact_rows != 1 && rows == 0) return true; /* as in worlds: none */
     if (!sadmm_grow((void **)&c->general_of, &c->general_of_capacity, 0, n, sizeof *c->general_of) ||
         !sadmm_grow((void **)&c->general_bodies, &c->general_body_capacity, 0, n, sizeof *c->general_bodies) ||
         !sadmm_grow((void **)&c->general_lanes, &c->general_lane_capacity, 0, c->body_block_count, sizeof *c->general_lanes))
         return false;
+    for (size_t block = 0; block < c->body_block_count; ++block) c->general_lanes[block] = 0;
     cpu_parallel(c, classify_share, c);
+    if (c->plan.rigid && c->plan.contact_rows != 1 && rows == 0) return true; /* as in worlds: none */
     for (size_t k = 0; k < rows; ++k) {
         mark(c, c->system->rows->constraints[k].body_a);
         mark(c, c->system->rows->constraints[k].body_b);
     }
-    for (size_t block = 0; block < c->body_block_count; ++block) c->general_lanes[block] = 0;
     for (size_t i = 0; i < n; ++i) {
         if (c->general_of[i] < 0) continue;
         c->general_of[i] = (int32_t)c->general_count;

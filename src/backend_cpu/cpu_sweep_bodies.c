@@ -38,25 +38,25 @@ static inline __attribute__((always_inline)) void load_block(const row8 *rows, c
 #undef SUM_ROW
 }
 
-/* Sums of a block's bodies; 0 in the lanes of general ones, which are updated by themselves. */
-static inline __attribute__((always_inline)) void block_sums(const struct sadmm_context *c, size_t index, uint32_t general,
-                                                             row8 sums[LANES])
+/* Sums of a block some of whose lanes are general bodies', which are updated by themselves: 0 there. Not inlined: what follows the
+ * sums must be one piece of code for all blocks, or compilers may fuse products differently in two. */
+static __attribute__((noinline)) void mixed_block_sums(const struct sadmm_context *c, size_t index, row8 sums[LANES])
 {
-    const size_t first = index * (size_t)LANES;
-    if (general == 0) {
-        for (int l = 0; l < LANES; ++l) sums[l] = wrench_sum(c, first + (size_t)l);
-        return;
-    }
-    for (int l = 0; l < LANES; ++l) sums[l] = general >> l & 1 ? (row8){0} : wrench_sum(c, first + (size_t)l);
+    const uint32_t general = c->general_lanes[index];
+    for (int l = 0; l < LANES; ++l)
+        sums[l] = general >> l & 1 ? (row8){0} : wrench_sum(c, index * (size_t)LANES + (size_t)l);
 }
 
-static inline uint32_t general_lanes(const struct sadmm_context *c, size_t block)
+/* Sums of a block's bodies. */
+static inline __attribute__((always_inline)) void block_sums(const struct sadmm_context *c, size_t index, row8 sums[LANES])
 {
-    return c->general_count ? c->general_lanes[block] : 0;
+    if (c->general_lanes[index]) mixed_block_sums(c, index, sums);
+    else
+        for (int l = 0; l < LANES; ++l) sums[l] = wrench_sum(c, index * (size_t)LANES + (size_t)l);
 }
 
 /* b - A v + sum of wrenches of a block; `state` gets the block's state by number. */
-static inline __attribute__((always_inline)) void block_momentum_residual(const struct sadmm_context *c, size_t index, uint32_t general,
+static inline __attribute__((always_inline)) void block_momentum_residual(const struct sadmm_context *c, size_t index,
                                                                lanes state[ROW], vec *linear, vec *angular)
 {
     const struct body_block *block = &c->body_blocks[index];
@@ -64,7 +64,7 @@ static inline __attribute__((always_inline)) void block_momentum_residual(const 
     row8 sums[LANES];
     lanes g[ROW];
     prefetch_wrenches(c, index + 1);
-    block_sums(c, index, general, sums);
+    block_sums(c, index, sums);
     load_block(rows, sums, state, g);
     vec v = {state[0], state[1], state[2]}, w = {state[3], state[4], state[5]};
     *linear = add(sub(block->b_linear, scale(v, block->mass)), (vec){g[0], g[1], g[2]});
@@ -80,13 +80,12 @@ static size_t first_body(const struct sadmm_context *c, size_t block)
 static void update_rigid(struct sadmm_context *c, size_t begin, size_t end, bool settled)
 {
     for (size_t index = begin; index < end; ++index) {
-        const uint32_t general = general_lanes(c, index);
-        if (general == ALL_LANES) continue;
+        if (c->general_lanes[index] == ALL_LANES) continue;
         if (settled && c->offsets[first_body(c, index)] == c->offsets[first_body(c, index + 1)]) continue;
         const struct body_block *block = &c->body_blocks[index];
         lanes state[ROW];
         vec linear, angular;
-        block_momentum_residual(c, index, general, state, &linear, &angular);
+        block_momentum_residual(c, index, state, &linear, &angular);
         vec dw = sym3_times(block->K_inverse, sub(angular, cross(block->sigma, linear)));
         vec dv = add(scale(linear, block->inv_alpha), cross(block->sigma, dw));
         state[0] += dv.x, state[1] += dv.y, state[2] += dv.z;
@@ -107,15 +106,14 @@ static void update_rigid_fast(struct sadmm_context *c, size_t begin, size_t end,
                               lanes multipliers)
 {
     for (size_t index = begin; index < end; ++index) {
-        const uint32_t general = general_lanes(c, index);
-        if (general == ALL_LANES) continue;
+        if (c->general_lanes[index] == ALL_LANES) continue;
         if (settled && c->offsets[first_body(c, index)] == c->offsets[first_body(c, index + 1)]) continue;
         struct body_block *block = &c->body_blocks[index];
         const row8 *rows = (const row8 *)c->state + index * (size_t)LANES;
         lanes state[ROW], g[ROW];
         row8 sums[LANES];
         prefetch_wrenches(c, index + 1);
-        block_sums(c, index, general, sums);
+        block_sums(c, index, sums);
         load_block(rows, sums, state, g);
         vec force = {g[0], g[1], g[2]}, torque = {g[3], g[4], g[5]};
         vec linear = add(block->residual_linear, add(force, force));
@@ -137,7 +135,7 @@ static double rigid_residual(const struct sadmm_context *c, size_t begin, size_t
     for (size_t index = begin; index < end; ++index) {
         lanes state[ROW];
         vec r[2];
-        block_momentum_residual(c, index, general_lanes(c, index), state, &r[0], &r[1]);
+        block_momentum_residual(c, index, state, &r[0], &r[1]);
         for (int part = 0; part < 2; ++part)
             largest = larger(largest, larger(magnitude(r[part].x), larger(magnitude(r[part].y), magnitude(r[part].z))));
     }
@@ -217,10 +215,8 @@ static struct body_share share_of(const struct sadmm_context *c, int thread, int
 {
     struct body_share s = {0};
     sadmm_share(c->body_block_count, thread, threads, &s.begin, &s.end);
-    if (c->general_count) {
-        s.general_begin = first_general(c, s.begin * (size_t)LANES);
-        s.general_end = first_general(c, s.end * (size_t)LANES);
-    }
+    s.general_begin = first_general(c, s.begin * (size_t)LANES);
+    s.general_end = first_general(c, s.end * (size_t)LANES);
     if (c->general_count == (size_t)c->bodies) s.begin = s.end; /* there are no other lanes */
     return s;
 }
