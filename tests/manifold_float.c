@@ -24,12 +24,15 @@ void manifold_in_float(int type_a, const double size_a[3], int type_b, const dou
                        struct world_manifold *out)
 {
     struct pair_pose pose = pair_pose(type_a == SADMM_SHAPE_PLANE, Ra, xa, Rb, xb);
+    struct sadmm_geometry a = {.type = type_a, .children = 1}, b = {.type = type_b, .children = 1};
     struct manifold m;
     double n[3];
 
     memset(out, 0, sizeof *out);
     memset(&m, 0x55, sizeof m);
-    pair_manifold(type_a, v3_load(size_a), type_b, v3_load(size_b), &pose, (float)limit, cache, &m);
+    memcpy(a.size, size_a, sizeof a.size);
+    memcpy(b.size, size_b, sizeof b.size);
+    pair_manifold(&a, &b, 0, &pose, (float)limit, cache, &m);
     out->count = m.count;
     out->cache = m.cache;
     if (m.count == 0) return;

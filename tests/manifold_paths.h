@@ -227,8 +227,8 @@ static inline struct path make_path(struct random *r, enum path_pair pair, enum 
     if (pair == PATH_SPHERE_BOX) p.a = path_round(r, SADMM_SHAPE_SPHERE);
     if (pair == PATH_CAPSULE_BOX || pair == PATH_CAPSULE_CAPSULE) p.a = path_round(r, SADMM_SHAPE_CAPSULE);
     if (pair == PATH_CAPSULE_CAPSULE) p.b = path_round(r, SADMM_SHAPE_CAPSULE);
-    p.thin = fmin(shape_thickness(p.a.type, p.a.size), shape_thickness(p.b.type, p.b.size));
-    reach = shape_radius(p.a.type, p.a.size) + shape_radius(p.b.type, p.b.size);
+    p.thin = fmin(thickness_of(&p.a), thickness_of(&p.b));
+    reach = radius_of(&p.a) + radius_of(&p.b);
 
     random_rotation(r, p.a.R);
     random_rotation(r, p.b.R);
@@ -254,7 +254,7 @@ static inline struct path make_path(struct random *r, enum path_pair pair, enum 
     /* Round shapes have something to remember once their cores are inside the box or pass each other closely. */
     p.beyond = -0.45 * p.thin;
     if (pair == PATH_SPHERE_BOX || pair == PATH_CAPSULE_BOX)
-        p.beyond = -p.a.size[0] - 0.225 * shape_thickness(p.b.type, p.b.size);
+        p.beyond = -p.a.size[0] - 0.225 * thickness_of(&p.b);
     if (pair == PATH_CAPSULE_CAPSULE) p.beyond = -0.75 * (p.a.size[0] + p.b.size[0]);
     p.mean = random_in(r, 0.8 * p.beyond, 0.3 * p.thin);
     p.swing = random_in(r, 0, 0.1) * p.thin;
@@ -303,8 +303,9 @@ static inline struct world_manifold path_touch(const struct path *p, bool in_flo
         manifold_in_float(p->a.type, p->a.size, p->b.type, p->b.size, p->a.R, p->a.x, p->b.R, p->b.x, limit, cache, &w);
     } else {
         struct pair_pose pose = pair_pose(false, p->a.R, p->a.x, p->b.R, p->b.x);
+        const struct sadmm_geometry a = geometry_of(p->a.type, p->a.size), b = geometry_of(p->b.type, p->b.size);
         struct manifold m;
-        pair_manifold(p->a.type, v3_load(p->a.size), p->b.type, v3_load(p->b.size), &pose, limit, cache, &m);
+        pair_manifold(&a, &b, 0, &pose, limit, cache, &m);
         w.count = m.count;
         w.cache = m.cache;
         if (m.count == 0) return w;
@@ -337,7 +338,7 @@ static inline bool path_edge_axis(const struct path *p, uint32_t cache, double a
  * at worst sqrt(slack x reach). The rest is some tens of roundings of the reach. */
 static inline double path_margin(const struct path *p, enum path_pair pair, bool in_float, double chosen)
 {
-    double reach = shape_radius(p->a.type, p->a.size) + shape_radius(p->b.type, p->b.size),
+    double reach = radius_of(&p->a) + radius_of(&p->b),
            keep = (double)MANIFOLD_KEEP_EXTENT * p->thin, share = (double)MANIFOLD_KEEP_DEPTH * fabs(chosen),
            epsilon = in_float ? FLT_EPSILON : DBL_EPSILON, rounding = 64 * epsilon * reach;
     switch (pair) {

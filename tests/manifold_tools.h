@@ -29,6 +29,13 @@ static inline double random_unit(struct random *r) /* [0, 1) */
 
 static inline double random_in(struct random *r, double lo, double hi) { return lo + (hi - lo) * random_unit(r); }
 
+/* The geometry of a type and its sizes. */
+static inline struct sadmm_geometry geometry_of(int type, const double size[3])
+{
+    struct sadmm_geometry geometry = {.type = type, .children = 1, .size = {size[0], size[1], size[2]}};
+    return geometry;
+}
+
 /* A shape with a pose: R row-major, shape to world. */
 struct solid {
     int type;
@@ -81,6 +88,18 @@ static inline void apply(const double R[9], const double v[3], double out[3])
 
 static inline double dot3(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
+static inline double thickness_of(const struct solid *s)
+{
+    const struct sadmm_geometry geometry = geometry_of(s->type, s->size);
+    return geometry_thickness(&geometry);
+}
+
+static inline double radius_of(const struct solid *s)
+{
+    const struct sadmm_geometry geometry = geometry_of(s->type, s->size);
+    return geometry_radius(&geometry);
+}
+
 static inline struct solid solid_at(int type, double s0, double s1, double s2, double x, double y, double z)
 {
     struct solid s = {.type = type, .size = {s0, s1, s2}, .R = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .x = {x, y, z}};
@@ -122,11 +141,12 @@ static inline struct world_manifold touch(const struct solid *a, const struct so
     bool swap = a->type > b->type;
     const struct solid *first = swap ? b : a, *second = swap ? a : b;
     struct pair_pose pose = pair_pose(first->type == SADMM_SHAPE_PLANE, first->R, first->x, second->R, second->x);
+    const struct sadmm_geometry a_is = geometry_of(first->type, first->size), b_is = geometry_of(second->type, second->size);
     struct manifold m;
     struct world_manifold w = {0};
 
     memset(&m, 0x55, sizeof m); /* nothing may rely on what was there */
-    pair_manifold(first->type, v3_load(first->size), second->type, v3_load(second->size), &pose, limit, cache, &m);
+    pair_manifold(&a_is, &b_is, 0, &pose, limit, cache, &m);
     w.count = m.count;
     w.cache = m.cache;
     if (m.count == 0) return w;

@@ -285,6 +285,7 @@ END_TEST
 
 struct scene {
     struct sadmm_shape shapes[COUNT];
+    struct sadmm_geometry geometries[COUNT]; /* by shape */
     struct sadmm_collision_body bodies[COUNT];
     struct sadmm_collision_input input;
 };
@@ -300,14 +301,15 @@ static void fill_scene(struct scene *s, struct random *r, int environments)
         bool plane = i % 98 == 0, still = i % 98 < 2 || i / 2 % 7 == 0;
         double R[9], size = pow(10, random_in(r, -3, -0.5));
         shape->alive = true;
-        shape->type = plane ? SADMM_SHAPE_PLANE : (sadmm_shape_type)(1 + i % 3);
+        shape->geometry = (uint32_t)i;
         shape->body = i / 2;
         shape->revision = (uint32_t)i + 1;
         shape->category = 1u << i % 3;
         shape->mask = i % 5 ? ~0u : 5u;
         shape->orientation[0] = 1;
+        s->geometries[i] = (struct sadmm_geometry){.type = plane ? SADMM_SHAPE_PLANE : 1 + i % 3, .children = 1};
         for (int k = 0; k < 3; ++k) {
-            shape->size[k] = size * random_in(r, 0.3, 1);
+            s->geometries[i].size[k] = size * random_in(r, 0.3, 1);
             shape->position[k] = random_in(r, -0.1, 0.1);
         }
         if (i % 2 == 0) {
@@ -326,6 +328,8 @@ static void fill_scene(struct scene *s, struct random *r, int environments)
     s->input = (struct sadmm_collision_input){
         .shapes = s->shapes,
         .shape_count = COUNT,
+        .geometries = s->geometries,
+        .geometry_count = COUNT,
         .bodies = s->bodies,
         .body_count = COUNT / 2,
         .dt = 0.005,
@@ -405,7 +409,9 @@ START_TEST(what_accelerations_bring_together_is_foreseen)
         const double dt = random_in(&r, 0.001, 0.02), margin = trial % 3 ? 0.02 : 0;
         const double gravity = trial % 5 ? random_in(&r, 0, 20) : 0;
         const bool plane = trial % 4 == 0;
-        struct sadmm_shape shape[2] = {{.type = plane ? SADMM_SHAPE_PLANE : SADMM_SHAPE_SPHERE}, {.type = SADMM_SHAPE_SPHERE}};
+        struct sadmm_geometry geometry[2] = {{.type = plane ? SADMM_SHAPE_PLANE : SADMM_SHAPE_SPHERE, .children = 1},
+                                             {.type = SADMM_SHAPE_SPHERE, .children = 1}};
+        struct sadmm_shape shape[2] = {{.geometry = 0}, {.geometry = 1}};
         struct sadmm_collision_body body[2] = {{.system_body = plane ? -1 : 0}, {.system_body = 1}};
         struct sadmm_proxy proxy[2];
         struct sadmm_box3 box[2];
@@ -414,7 +420,7 @@ START_TEST(what_accelerations_bring_together_is_foreseen)
         for (int s = 0; s < 2; ++s) {
             const double force[3] = {random_in(&r, -1, 1), random_in(&r, -1, 1), trial % 2 ? random_in(&r, -20, 20) : 0};
             const bool moves = body[s].system_body >= 0, falls = random_unit(&r) < 0.7, driven = random_unit(&r) < 0.7;
-            shape[s].size[0] = pow(10, random_in(&r, -4, -1));
+            geometry[s].size[0] = pow(10, random_in(&r, -4, -1));
             shape[s].orientation[0] = body[s].orientation[0] = 1;
             body[s].acceleration[0] = moves ? sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]) : 0;
             for (int k = 0; k < 3; ++k) {
@@ -422,10 +428,10 @@ START_TEST(what_accelerations_bring_together_is_foreseen)
                 velocity[k] = body[s].velocity[k] + (moves ? (falls ? g[k] : 0) + (driven ? force[k] : 0) : 0) * dt;
                 way[k] = velocity[k] * dt - way[k];
             }
-            height += s || !plane ? shape[s].size[0] : 0;
+            height += s || !plane ? geometry[s].size[0] : 0;
         }
         body[1].position[2] = height; /* above, as seen from the first */
-        for (int s = 0; s < 2; ++s) proxy_place(&shape[s], &body[s], dt, margin, gravity, &proxy[s], &box[s]);
+        for (int s = 0; s < 2; ++s) proxy_place(&shape[s], &geometry[s], &body[s], dt, margin, gravity, &proxy[s], &box[s]);
 
         bool touch = false, touch_without = false;
         for (int moment = 0; moment <= 50 && !touch; ++moment) {
@@ -478,16 +484,16 @@ START_TEST(the_list_of_candidates_is_complete_at_every_step)
             if (random_unit(&r) > 0.005 || step % 4 == 2) continue;
             shape->revision = revision++;
             if (random_unit(&r) < 0.5) shape->alive = !shape->alive;
-            else shape->size[0] *= 1.5;
+            else s.geometries[shape->geometry].size[0] *= 1.5;
         }
         ck_assert_int_eq(sadmm_candidates_update(&c, &s.input, 1, &error), SADMM_OK);
         for (size_t i = 1; i < c.list.count; ++i) ck_assert(c.list.keys[i - 1] < c.list.keys[i]);
         for (uint32_t i = 0; i < COUNT; ++i)
             for (uint32_t j = i + 1; j < COUNT; ++j) {
-                bool swap = s.shapes[j].type < s.shapes[i].type;
+                bool swap = s.geometries[j].type < s.geometries[i].type;
                 uint32_t a = swap ? j : i, b = swap ? i : j;
                 uint64_t key = (uint64_t)a << 32 | b;
-                if (s.shapes[a].type == SADMM_SHAPE_PLANE && s.shapes[b].type == SADMM_SHAPE_PLANE) continue;
+                if (s.geometries[a].type == SADMM_SHAPE_PLANE && s.geometries[b].type == SADMM_SHAPE_PLANE) continue;
                 if (!may_touch(&s, &c, a, b)) continue;
                 ck_assert_msg(bsearch(&key, c.list.keys, c.list.count, sizeof key, compare_keys) != NULL,
                               "step %d: pair %u %u is missing", step, a, b);

@@ -15,6 +15,7 @@ enum { MAX_SHAPES = 4000 };
 /* Shapes, one a body unless said otherwise, and everything a find needs. */
 struct scene {
     struct sadmm_shape shapes[MAX_SHAPES];
+    struct sadmm_geometry geometries[MAX_SHAPES]; /* one a shape, unless a test says otherwise */
     struct sadmm_collision_body bodies[MAX_SHAPES];
     struct sadmm_collision_input input;
     struct sadmm_collision *collision;
@@ -31,6 +32,8 @@ static struct scene *make_scene(const struct sadmm_broad_phase_kind *kind)
                      SADMM_OK);
     s->input = (struct sadmm_collision_input){
         .shapes = s->shapes,
+        .geometries = s->geometries,
+        .geometry_count = MAX_SHAPES,
         .bodies = s->bodies,
         .dt = 0.005,
         .margin = 0.02,
@@ -62,10 +65,8 @@ static int32_t add_shape(struct scene *s, int32_t body, sadmm_shape_type type, d
 {
     struct sadmm_shape *shape = &s->shapes[s->shape_count];
     ck_assert_int_lt(s->shape_count, MAX_SHAPES);
-    shape->type = type;
-    shape->size[0] = s0;
-    shape->size[1] = s1;
-    shape->size[2] = s2;
+    shape->geometry = (uint32_t)s->shape_count;
+    s->geometries[shape->geometry] = geometry_of((int)type, (double[]){s0, s1, s2});
     shape->orientation[0] = 1;
     shape->friction = 0.5;
     shape->category = 1;
@@ -222,8 +223,8 @@ START_TEST(arms_start_at_the_centre_of_mass)
         struct solid solids[2];
         for (int side = 0; side < 2; ++side) {
             const struct sadmm_proxy *proxy = &s->collision->candidates.proxies[side ? p->shape_b : p->shape_a];
-            solids[side].type = proxy->type;
-            memcpy(solids[side].size, proxy->size, sizeof proxy->size);
+            solids[side].type = proxy->geometry.type;
+            memcpy(solids[side].size, proxy->geometry.size, sizeof proxy->geometry.size);
             memcpy(solids[side].R, proxy->R, sizeof proxy->R);
             memcpy(solids[side].x, proxy->x, sizeof proxy->x);
         }
@@ -258,7 +259,8 @@ START_TEST(pairs_come_sorted_by_type_and_slot)
     for (size_t i = 0; i < s->contacts.pair_count; ++i) {
         const struct sadmm_contact_pair *p = &s->contacts.pairs[i];
         const struct sadmm_shape *a = &s->shapes[p->shape_a], *b = &s->shapes[p->shape_b];
-        ck_assert(a->type < b->type || (a->type == b->type && p->shape_a < p->shape_b));
+        const int type_a = s->geometries[a->geometry].type, type_b = s->geometries[b->geometry].type;
+        ck_assert(type_a < type_b || (type_a == type_b && p->shape_a < p->shape_b));
         ck_assert_int_eq(p->first, next);
         ck_assert_int_ge(p->count, 1);
         ck_assert_int_le(p->count, SADMM_MAX_POINTS);
@@ -269,6 +271,7 @@ START_TEST(pairs_come_sorted_by_type_and_slot)
         if (i == 0) continue;
         const struct sadmm_contact_pair *q = p - 1;
         ck_assert(q->shape_a < p->shape_a || (q->shape_a == p->shape_a && q->shape_b < p->shape_b));
+        ck_assert_uint_eq(p->child, 0); /* a type of one piece */
     }
     ck_assert_uint_eq((size_t)next, s->contacts.point_count);
     free_scene(s);
@@ -297,6 +300,181 @@ START_TEST(friction_and_restitution_of_a_pair)
     find(s);
     ck_assert_double_eq_tol(pair_of(s, ground, low)->friction, sqrt(0.9 * 0.4), 1e-15);
     ck_assert_double_eq(pair_of(s, low, high)->friction, value);
+    free_scene(s);
+}
+END_TEST
+
+/* ---- geometries and their children -------------------------------------------------------------------------------- */
+
+/* A shape is what its handle says: the same contacts, bit for bit, whether equal boxes have a geometry each or share one. */
+START_TEST(shapes_may_share_a_geometry)
+{
+    struct scene *s = make_scene(NULL), *t = make_scene(NULL);
+    struct random r = {3}, r2 = {3};
+    for (int which = 0; which < 2; ++which) {
+        struct scene *scene = which ? t : s;
+        add_ground(scene);
+        for (int i = 0; i < 27; ++i) add_box(scene, 0.05, 0.09 * (i % 3), 0.09 * (i / 3 % 3), 0.05 + 0.09 * (i / 9));
+    }
+    /* the one of all boxes is the last of the array; the others mean nothing */
+    for (int32_t i = 1; i < t->shape_count; ++i) t->shapes[i].geometry = MAX_SHAPES - 1;
+    t->geometries[MAX_SHAPES - 1] = t->geometries[1];
+    for (int32_t i = 1; i < t->shape_count; ++i) t->geometries[i] = geometry_of(SADMM_SHAPE_SPHERE, (double[]){1, 1, 1});
+    for (int step = 0; step < 3; ++step) {
+        find(s);
+        find(t);
+        ck_assert_uint_gt(s->contacts.point_count, 200);
+        expect_equal_sets(&s->contacts, &t->contacts);
+        put_impulses(s);
+        put_impulses(t);
+        stir(s, &r, 1e-3);
+        stir(t, &r2, 1e-3);
+    }
+    free_scene(s);
+    free_scene(t);
+}
+END_TEST
+
+/* Two shapes of two and three pieces have six manifolds: pairs of their own, in order, each as of the whole. */
+START_TEST(a_pair_has_a_manifold_for_each_child)
+{
+    struct scene *s = make_scene(NULL), *t = make_scene(NULL);
+    for (int which = 0; which < 2; ++which) {
+        struct scene *scene = which ? t : s;
+        add_ground(scene);
+        for (int i = 0; i < 2; ++i) add_box(scene, 0.05, 0.01 * i, 0, 0.05 + 0.0999 * i);
+    }
+    t->geometries[1].children = 2;
+    t->geometries[2].children = 3;
+    find(s);
+    find(t);
+    ck_assert_uint_eq(s->contacts.pair_count, 2);
+    ck_assert_uint_eq(t->contacts.pair_count, 2 + 6); /* on the ground, and on each other */
+    for (size_t i = 0; i < t->contacts.pair_count; ++i) {
+        const struct sadmm_contact_pair *p = &t->contacts.pairs[i], *whole = pair_of(s, p->shape_a, p->shape_b);
+        ck_assert_uint_eq(p->child, i < 2 ? i : i - 2);
+        ck_assert_int_eq(p->shape_b, i < 2 ? 1 : 2);
+        ck_assert_int_eq(p->first, i == 0 ? 0 : t->contacts.pairs[i - 1].first + t->contacts.pairs[i - 1].count);
+        ck_assert_int_eq(p->count, whole->count);
+        ck_assert_mem_eq(&t->contacts.points[p->first], &s->contacts.points[whole->first],
+                         (size_t)p->count * sizeof *t->contacts.points);
+    }
+    free_scene(s);
+    free_scene(t);
+}
+END_TEST
+
+/* Impulses belong to (shape, shape, child). Of the four children of a pair the last step had three;
+ * each goes on with what was its own, and the one that was not there starts without. */
+START_TEST(what_is_kept_is_kept_by_child)
+{
+    struct scene *s = make_scene(NULL);
+    struct sadmm_contact_set *set = &s->contacts;
+    int32_t low = add_shape(s, add_body(s, true, 0, 0, 0), SADMM_SHAPE_BOX, 0.05, 0.05, 0.05);
+    int32_t high = add_shape(s, add_body(s, true, 0, 0, 0.0999), SADMM_SHAPE_BOX, 0.05, 0.05, 0.05);
+    add_box(s, 0.05, 0.5, 0, 0); /* pairs before and after */
+    add_box(s, 0.05, 0.5, 0, 0.0999);
+    s->geometries[low].children = s->geometries[high].children = 2;
+    find(s);
+    ck_assert_uint_eq(set->pair_count, 4 + 1);
+    for (size_t i = 0; i < set->pair_count; ++i)
+        for (int32_t j = 0; j < set->pairs[i].count; ++j)
+            for (int k = 0; k < 3; ++k)
+                set->points[set->pairs[i].first + j].impulse[k] = (double)(1 + i) * set->pairs[i].normal[k];
+    /* without child 1 */
+    memmove(&set->pairs[1], &set->pairs[2], 3 * sizeof *set->pairs);
+    --set->pair_count;
+    find(s);
+    ck_assert_uint_eq(set->pair_count, 4 + 1);
+    for (size_t i = 0; i < set->pair_count; ++i) {
+        const struct sadmm_contact_pair *p = &set->pairs[i];
+        ck_assert_uint_eq(p->child, i < 4 ? i : 0);
+        for (int32_t j = 0; j < p->count; ++j)
+            for (int k = 0; k < 3; ++k) /* the normal is unit to rounding */
+                ck_assert_double_eq_tol(set->points[p->first + j].impulse[k],
+                                        i == 1 ? 0 : (double)(1 + i) * p->normal[k], 1e-13);
+    }
+    free_scene(s);
+}
+END_TEST
+
+/* A cube has gone so far into another that two faces are equally near: each child stays with the face that it had. */
+START_TEST(the_axis_is_kept_by_child)
+{
+    struct scene *s = make_scene(NULL);
+    int32_t a = add_box(s, 0.05, 0, 0, 0);
+    add_box(s, 0.05, 0.09, 0, 0.09);
+    s->geometries[a].children = 2;
+    find(s);
+    ck_assert_uint_eq(s->contacts.pair_count, 2);
+    uint32_t x, z;
+    s->contacts.pair_count = s->contacts.point_count = 0;
+    s->bodies[1].position[0] = 0.095;
+    find(s);
+    x = s->contacts.pairs[0].cache; /* overlaps by 5 mm along x and by 10 mm along z */
+    s->contacts.pair_count = s->contacts.point_count = 0;
+    s->bodies[1].position[0] = 0.09;
+    s->bodies[1].position[2] = 0.095;
+    find(s);
+    z = s->contacts.pairs[0].cache;
+    ck_assert_uint_ne(x, z);
+    s->bodies[1].position[2] = 0.09;
+    s->contacts.pairs[0].cache = x;
+    s->contacts.pairs[1].cache = z;
+    find(s);
+    ck_assert_uint_eq(s->contacts.pairs[0].cache, x);
+    ck_assert_uint_eq(s->contacts.pairs[1].cache, z);
+    ck_assert_double_gt(fabs(s->contacts.pairs[0].normal[0]), 0.9);
+    ck_assert_double_gt(fabs(s->contacts.pairs[1].normal[2]), 0.9);
+    free_scene(s);
+}
+END_TEST
+
+static void expect_refused(struct scene *s, const char *word)
+{
+    const struct sadmm_contact_pair *before = s->contacts.pairs;
+    const size_t count = s->contacts.pair_count;
+    for (int time = 0; time < 2; ++time) { /* and again, as long as it is there */
+        ck_assert_int_eq(try_find(s), SADMM_ERROR_INVALID_ARGUMENT);
+        ck_assert_msg(strstr(s->error.message, word) != NULL, "%s: does not say %s", s->error.message, word);
+    }
+    ck_assert_ptr_eq(s->contacts.pairs, before);
+    ck_assert_uint_eq(s->contacts.pair_count, count);
+}
+
+/* A shape that collision knows nothing of is an error, wherever it is, and no capsule. */
+START_TEST(shapes_without_manifolds_are_refused)
+{
+    struct scene *s = make_scene(NULL);
+    add_ground(s);
+    int32_t box = add_box(s, 0.05, 0, 0, 0.05), far = add_box(s, 0.05, 1000, 0, 1000);
+    const struct sadmm_geometry good = s->geometries[box];
+    s->input.threads = 1 + 2 * _i;
+    sadmm_test_force_threads(_i);
+    find(s);
+    for (int which = 0; which < 2; ++which) {
+        const int32_t shape = which ? far : box;
+        struct sadmm_geometry *geometry = &s->geometries[shape];
+        for (int type = -1; type <= SADMM_SHAPE_TYPE_COUNT; type += SADMM_SHAPE_TYPE_COUNT + 1) {
+            ++s->shapes[shape].revision;
+            geometry->type = type;
+            expect_refused(s, which ? "shapes[2]: type" : "shapes[1]: type");
+        }
+        geometry->type = SADMM_SHAPE_PLANE; /* on a body that moves, where it might meet another plane */
+        expect_refused(s, "only static bodies");
+        *geometry = good;
+        geometry->children = 0;
+        expect_refused(s, "children = 0");
+        geometry->children = SADMM_MOST_CHILDREN + 1;
+        expect_refused(s, "children = 65536");
+        *geometry = good;
+        s->shapes[shape].geometry = MAX_SHAPES;
+        expect_refused(s, "geometry = 4000");
+        s->shapes[shape].geometry = (uint32_t)shape;
+        find(s);
+        ck_assert_uint_eq(s->contacts.point_count, 4);
+    }
+    sadmm_test_force_threads(false);
     free_scene(s);
 }
 END_TEST
@@ -864,6 +1042,11 @@ int main(void)
     tcase_add_test(cases, arms_start_at_the_centre_of_mass);
     tcase_add_test(cases, pairs_come_sorted_by_type_and_slot);
     tcase_add_test(cases, friction_and_restitution_of_a_pair);
+    tcase_add_test(cases, shapes_may_share_a_geometry);
+    tcase_add_test(cases, a_pair_has_a_manifold_for_each_child);
+    tcase_add_test(cases, what_is_kept_is_kept_by_child);
+    tcase_add_test(cases, the_axis_is_kept_by_child);
+    tcase_add_loop_test(cases, shapes_without_manifolds_are_refused, 0, 2);
     tcase_add_test(cases, filters);
     tcase_add_loop_test(cases, environments_share_space_without_meeting, 0, 2);
     tcase_add_test(cases, a_plane_that_is_moved_takes_its_contacts_along);

@@ -66,9 +66,9 @@ static void check_same(const struct sadmm_contact_set *host, const struct sadmm_
                   device->point_count, host->pair_count, host->point_count);
     for (size_t i = 0; i < host->pair_count; ++i) {
         const struct sadmm_contact_pair *p = &host->pairs[i], *q = &device->pairs[i];
-        ck_assert_msg(p->shape_a == q->shape_a && p->shape_b == q->shape_b,
-                      "%s: pair %zu is %d-%d instead of %d-%d", about, i, q->shape_a, q->shape_b, p->shape_a,
-                      p->shape_b);
+        ck_assert_msg(p->shape_a == q->shape_a && p->shape_b == q->shape_b && p->child == q->child,
+                      "%s: pair %zu is %d-%d, child %u, instead of %d-%d, child %u", about, i, q->shape_a, q->shape_b,
+                      q->child, p->shape_a, p->shape_b, p->child);
         ck_assert_msg(p->body_a == q->body_a && p->body_b == q->body_b && p->first == q->first &&
                           p->count == q->count && p->cache == q->cache && p->revision == q->revision && p->placed == q->placed,
                       "%s: pair %zu (shapes %d-%d): %d points from %d, cache %u instead of %d from %d, cache %u", about,
@@ -167,6 +167,7 @@ static void random_impulses(struct sadmm_contact_set *set)
 
 struct soup {
     struct sadmm_shape *shapes;
+    struct sadmm_geometry *geometries; /* one a shape */
     struct sadmm_collision_body *bodies;
     uint64_t *disabled, *friction;
     double *values;
@@ -181,6 +182,7 @@ struct soup_kind {
     double size_low, size_high;
     double static_share, filter_share, disabled_share, friction_share, dead_share;
     int steps, tree_from;
+    int children;           /* of a geometry, at most; 0: one */
 };
 
 static int compare_keys(const void *a, const void *b)
@@ -206,13 +208,16 @@ static size_t random_pairs(uint64_t *keys, size_t wanted, int slots)
 
 static void random_shape(struct soup *s, const struct soup_kind *kind, struct sadmm_shape *shape, int body)
 {
+    struct sadmm_geometry *geometry = &s->geometries[shape - s->shapes];
     memset(shape, 0, sizeof *shape);
-    shape->type = SADMM_SHAPE_SPHERE + below(3);
-    for (int k = 0; k < 3; ++k) shape->size[k] = kind->size_low * pow(kind->size_high / kind->size_low, uniform());
-    if (chance(0.3)) shape->size[1] = shape->size[2] = shape->size[0];
+    shape->geometry = (uint32_t)(shape - s->shapes);
+    geometry->type = SADMM_SHAPE_SPHERE + below(3);
+    geometry->children = 1 + (kind->children ? below(kind->children) : 0);
+    for (int k = 0; k < 3; ++k) geometry->size[k] = kind->size_low * pow(kind->size_high / kind->size_low, uniform());
+    if (chance(0.3)) geometry->size[1] = geometry->size[2] = geometry->size[0];
     random_quaternion(shape->orientation);
     if (kind->shapes_a_body > 1)
-        for (int k = 0; k < 3; ++k) shape->position[k] = between(-1, 1) * shape->size[0];
+        for (int k = 0; k < 3; ++k) shape->position[k] = between(-1, 1) * geometry->size[0];
     shape->friction = below(3) * 0.25;
     shape->restitution = uniform();
     shape->category = chance(kind->filter_share) ? 1u << below(4) : 1;
@@ -231,6 +236,7 @@ static struct soup soup_new(const struct soup_kind *kind, uint64_t number)
     int32_t dynamic = 0;
     seed(number);
     s.shapes = calloc((size_t)shapes + 1, sizeof *s.shapes);
+    s.geometries = calloc((size_t)shapes + 1, sizeof *s.geometries);
     s.bodies = calloc((size_t)bodies + 1, sizeof *s.bodies);
     s.disabled = calloc(overrides, sizeof *s.disabled);
     s.friction = calloc(overrides, sizeof *s.friction);
@@ -241,10 +247,11 @@ static struct soup soup_new(const struct soup_kind *kind, uint64_t number)
                              ? kind->bodies + plane : i % (kind->bodies ? kind->bodies : 1);
         random_shape(&s, kind, &s.shapes[i], body);
         if (body < kind->bodies) {
-            volume += pow(2 * fmax(s.shapes[i].size[0], fmax(s.shapes[i].size[1], s.shapes[i].size[2])), 3);
+            const double *size = s.geometries[i].size;
+            volume += pow(2 * fmax(size[0], fmax(size[1], size[2])), 3);
         } else {
             ++plane;
-            s.shapes[i].type = SADMM_SHAPE_PLANE;
+            s.geometries[i].type = SADMM_SHAPE_PLANE;
             s.shapes[i].alive = true;
         }
     }
@@ -266,6 +273,8 @@ static struct soup soup_new(const struct soup_kind *kind, uint64_t number)
     }
     s.input.shapes = s.shapes;
     s.input.shape_count = (size_t)shapes;
+    s.input.geometries = s.geometries;
+    s.input.geometry_count = (size_t)shapes;
     s.input.bodies = s.bodies;
     s.input.body_count = (size_t)bodies;
     s.input.dt = 0.01;
@@ -286,6 +295,7 @@ static struct soup soup_new(const struct soup_kind *kind, uint64_t number)
 static void soup_free(struct soup *s)
 {
     free(s->shapes);
+    free(s->geometries);
     free(s->bodies);
     free(s->disabled);
     free(s->friction);
@@ -313,7 +323,7 @@ static void soup_advance(struct soup *s, const struct soup_kind *kind)
         for (int k = 0; k < 4; ++k) b->orientation[k] /= sqrt(size);
     }
     for (size_t i = 0; i < s->input.shape_count && kind->dead_share > 0; ++i)
-        if (s->shapes[i].type != SADMM_SHAPE_PLANE && chance(0.05))
+        if (s->geometries[i].type != SADMM_SHAPE_PLANE && chance(0.05))
             random_shape(s, kind, &s->shapes[i], s->shapes[i].body);
 }
 
@@ -336,6 +346,12 @@ static const struct soup_kind soups[] = {
     {.name = "several shapes a body, filters, overrides, all pairs", .bodies = 60, .shapes_a_body = 4, .planes = 2,
      .density = 3, .size_low = 0.3, .size_high = 1, .static_share = 0.2, .filter_share = 0.5, .disabled_share = 1,
      .friction_share = 1, .dead_share = 0.2, .steps = 5},
+    {.name = "several manifolds a pair, tree", .bodies = 90, .shapes_a_body = 2, .groups = 3, .planes = 4, .density = 2,
+     .size_low = 0.3, .size_high = 1, .static_share = 0.2, .friction_share = 1, .dead_share = 0.1, .steps = 4,
+     .tree_from = 1, .children = 3},
+    {.name = "several manifolds a pair, all pairs", .bodies = 90, .shapes_a_body = 2, .planes = 2, .density = 2,
+     .size_low = 0.3, .size_high = 1, .static_share = 0.2, .friction_share = 1, .dead_share = 0.1, .steps = 4,
+     .children = 3},
 };
 enum { SOUPS = sizeof soups / sizeof *soups };
 
@@ -372,6 +388,8 @@ static struct sadmm_collision_input world_input(const sadmm_world *world, struct
     struct sadmm_collision_input input = {
         .shapes = world->shapes,
         .shape_count = world->shape_slots,
+        .geometries = world->geometries,
+        .geometry_count = world->shape_slots,
         .bodies = bodies,
         .body_count = world->body_slots,
         .dt = world->def.settings.dt,
@@ -492,11 +510,19 @@ END_TEST
 
 /* ---- edges ----------------------------------------------------------------------------------------------------- */
 
-static struct sadmm_shape sphere(int body, double radius)
+static struct sadmm_geometry geometry_of(int type, double s0, double s1, double s2)
 {
-    struct sadmm_shape shape = {.type = SADMM_SHAPE_SPHERE, .size = {radius, 0, 0}, .orientation = {1, 0, 0, 0},
-                                .friction = 0.5, .category = 1, .mask = UINT32_MAX, .body = body, .alive = true,
-                                .revision = (uint32_t)body + 1};
+    struct sadmm_geometry geometry = {.type = type, .children = 1, .size = {s0, s1, s2}};
+    return geometry;
+}
+
+static struct sadmm_geometry ball(double radius) { return geometry_of(SADMM_SHAPE_SPHERE, radius, 0, 0); }
+
+/* The shape of a body; of the geometry of that number. */
+static struct sadmm_shape shape_of(int body)
+{
+    struct sadmm_shape shape = {.geometry = (uint32_t)body, .orientation = {1, 0, 0, 0}, .friction = 0.5, .category = 1,
+                                .mask = UINT32_MAX, .body = body, .alive = true, .revision = (uint32_t)body + 1};
     return shape;
 }
 
@@ -509,10 +535,10 @@ START_TEST(few_shapes)
         {.position = {0, 0, 0.5}, .orientation = {1, 0, 0, 0}, .system_body = 0},
         {.position = {0, 0, 1.4}, .orientation = {1, 0, 0, 0}, .system_body = 1},
     };
-    struct sadmm_shape shapes[3] = {sphere(0, 0), sphere(1, 0.5), sphere(2, 0.5)};
-    struct sadmm_collision_input input = {.shapes = shapes, .bodies = bodies, .body_count = 3, .dt = 0.01,
-                                          .margin = 0.02};
-    shapes[0].type = SADMM_SHAPE_PLANE;
+    struct sadmm_geometry geometries[3] = {geometry_of(SADMM_SHAPE_PLANE, 0, 0, 0), ball(0.5), ball(0.5)};
+    struct sadmm_shape shapes[3] = {shape_of(0), shape_of(1), shape_of(2)};
+    struct sadmm_collision_input input = {.shapes = shapes, .geometries = geometries, .geometry_count = 3,
+                                          .bodies = bodies, .body_count = 3, .dt = 0.01, .margin = 0.02};
     for (int round = 0; round < 2; ++round)
         for (size_t count = 0; count <= 3; ++count) {
             input.shape_count = count;
@@ -534,13 +560,16 @@ START_TEST(one_place)
 {
     enum { COUNT = 48 };
     struct sadmm_shape shapes[COUNT];
+    struct sadmm_geometry geometries[COUNT];
     struct sadmm_collision_body bodies[COUNT];
-    struct sadmm_collision_input input = {.shapes = shapes, .shape_count = COUNT, .bodies = bodies, .body_count = COUNT,
-                                          .dt = 0.01, .margin = 0.02};
+    struct sadmm_collision_input input = {.shapes = shapes, .shape_count = COUNT, .geometries = geometries,
+                                          .geometry_count = COUNT, .bodies = bodies, .body_count = COUNT, .dt = 0.01,
+                                          .margin = 0.02};
     struct both b = both_new(1);
     memset(bodies, 0, sizeof bodies);
     for (int i = 0; i < COUNT; ++i) {
-        shapes[i] = sphere(i, i % 7 ? 0.1 : 20);
+        shapes[i] = shape_of(i);
+        geometries[i] = ball(i % 7 ? 0.1 : 20);
         bodies[i].orientation[0] = 1;
         bodies[i].system_body = i;
     }
@@ -554,24 +583,142 @@ END_TEST
 /* A shape that takes over a slot inherits nothing; one whose neighbour changed neither. */
 START_TEST(slots_are_reused)
 {
-    struct sadmm_shape shapes[3] = {sphere(0, 0.5), sphere(1, 0.5), sphere(2, 0.5)};
+    struct sadmm_geometry geometries[3] = {ball(0.5), ball(0.5), ball(0.5)};
+    struct sadmm_shape shapes[3] = {shape_of(0), shape_of(1), shape_of(2)};
     struct sadmm_collision_body bodies[3] = {
         {.orientation = {1, 0, 0, 0}, .system_body = 0},
         {.position = {0, 0, 0.95}, .orientation = {1, 0, 0, 0}, .system_body = 1},
         {.position = {0, 0, 1.9}, .orientation = {1, 0, 0, 0}, .system_body = 2},
     };
-    struct sadmm_collision_input input = {.shapes = shapes, .shape_count = 3, .bodies = bodies, .body_count = 3,
-                                          .dt = 0.01, .margin = 0.02};
+    struct sadmm_collision_input input = {.shapes = shapes, .shape_count = 3, .geometries = geometries,
+                                          .geometry_count = 3, .bodies = bodies, .body_count = 3, .dt = 0.01,
+                                          .margin = 0.02};
     struct both b = both_new(0);
     both_find(&b, &input, "first");
     ck_assert_uint_eq(b.device_set.point_count, 2);
     for (int k = 0; k < 2; ++k) b.host_set.points[k].impulse[2] = 1 + k;
     both_start_from(&b, &b.host_set);
-    shapes[2] = sphere(2, 0.49);
+    geometries[2] = ball(0.49);
     shapes[2].revision = 9;
     both_find(&b, &input, "another sphere in the third slot");
     ck_assert_double_eq_tol(b.device_set.points[0].impulse[2], 1, 1e-14); /* the normal is unit to rounding */
     ck_assert(b.device_set.points[1].impulse[2] == 0);
+    both_free(&b);
+}
+END_TEST
+
+/* Pairs are matched by (shape, shape, child): of the four manifolds of two cubes the last step had all but the second. Each
+ * goes on with its own impulses and its own axis (two are equally good), and the one that was not there starts without. */
+START_TEST(children_are_matched_by_number)
+{
+    struct sadmm_geometry geometries[3] = {geometry_of(SADMM_SHAPE_BOX, 0.05, 0.05, 0.05),
+                                           geometry_of(SADMM_SHAPE_BOX, 0.05, 0.05, 0.05), ball(0.05)};
+    struct sadmm_shape shapes[3] = {shape_of(0), shape_of(1), shape_of(2)};
+    struct sadmm_collision_body bodies[3] = {
+        {.orientation = {1, 0, 0, 0}, .system_body = 0},
+        {.position = {0.09, 0, 0.09}, .orientation = {1, 0, 0, 0}, .system_body = 1},
+        {.position = {-0.09, 0, 0}, .orientation = {1, 0, 0, 0}, .system_body = 2},
+    };
+    struct sadmm_collision_input input = {.shapes = shapes, .shape_count = 3, .geometries = geometries,
+                                          .geometry_count = 3, .bodies = bodies, .body_count = 3, .dt = 0.01,
+                                          .margin = 0.02};
+    struct both b = both_new_tuned(_i % 2 ? 1 : 1000000, _i / 2);
+    uint32_t face[2];
+    for (int k = 0; k < 2; ++k) { /* what is remembered of the face that is less deep: along x, along z */
+        bodies[1].position[2 * k] = 0.095;
+        both_find(&b, &input, "one child each");
+        ck_assert_uint_eq(b.device_set.pair_count, 2);
+        ck_assert_int_eq(b.device_set.pairs[0].shape_a, 0);
+        face[k] = b.device_set.pairs[0].cache;
+        bodies[1].position[2 * k] = 0.09;
+        both_start_from(&b, &(struct sadmm_contact_set){0});
+    }
+    ck_assert_uint_ne(face[0], face[1]);
+    geometries[0].children = geometries[1].children = 2;
+    shapes[0].revision = 10;
+    shapes[1].revision = 11;
+    both_find(&b, &input, "two children each");
+    ck_assert_uint_eq(b.device_set.pair_count, 4 + 2); /* the ball is of one piece */
+    for (int i = 0; i < 4; ++i) b.host_set.pairs[i].cache = face[i % 2];
+    both_start_from(&b, &b.host_set);
+    both_find(&b, &input, "each with its own face");
+    for (size_t i = 0; i < b.host_set.pair_count; ++i) {
+        const struct sadmm_contact_pair *p = &b.host_set.pairs[i];
+        for (int32_t j = 0; j < p->count; ++j)
+            for (int k = 0; k < 3; ++k) b.host_set.points[p->first + j].impulse[k] = (double)(1 + i) * p->normal[k];
+    }
+    memmove(&b.host_set.pairs[1], &b.host_set.pairs[2], (b.host_set.pair_count - 2) * sizeof *b.host_set.pairs);
+    --b.host_set.pair_count;
+    both_start_from(&b, &b.host_set);
+    both_find(&b, &input, "without the second");
+    ck_assert_uint_eq(b.device_set.pair_count, 4 + 2);
+    for (size_t i = 0; i < b.device_set.pair_count; ++i) {
+        const struct sadmm_contact_pair *p = &b.device_set.pairs[i];
+        ck_assert_uint_eq(p->child, i < 4 ? i : i - 4);
+        if (i < 4 && i != 1) ck_assert_uint_eq(p->cache, face[i % 2]);
+        for (int32_t j = 0; j < p->count; ++j)
+            for (int k = 0; k < 3; ++k) /* the normal is unit to rounding */
+                ck_assert_double_eq_tol(b.device_set.points[p->first + j].impulse[k],
+                                        i == 1 ? 0 : (double)(1 + i) * p->normal[k], 1e-13);
+    }
+    both_free(&b);
+}
+END_TEST
+
+/* What collision knows nothing of is refused when it is loaded, as on the host, so that no kernel ever sees it; the current
+ * set stays. */
+START_TEST(shapes_without_manifolds_are_refused)
+{
+    enum { MANY = 70000 };
+    struct sadmm_geometry geometries[2] = {geometry_of(SADMM_SHAPE_BOX, 0.5, 0.5, 0.5), ball(0.5)};
+    const struct sadmm_geometry good = geometries[1];
+    struct sadmm_shape *shapes = calloc(MANY, sizeof *shapes);
+    struct sadmm_collision_body bodies[2] = {
+        {.orientation = {1, 0, 0, 0}, .system_body = -1},
+        {.position = {0, 0, 0.99}, .orientation = {1, 0, 0, 0}, .system_body = 0},
+    };
+    struct sadmm_collision_input input = {.shapes = shapes, .shape_count = 2, .geometries = geometries,
+                                          .geometry_count = 2, .bodies = bodies, .body_count = 2, .dt = 0.01,
+                                          .margin = 0.02};
+    static const struct {
+        int32_t type, children;
+        uint32_t handle;
+        const char *words;
+    } bad[] = {
+        {SADMM_SHAPE_TYPE_COUNT, 1, 1, "shapes[1]: type = 4"}, {-1, 1, 1, "type = -1"},
+        {SADMM_SHAPE_PLANE, 1, 1, "only static bodies"},       {SADMM_SHAPE_SPHERE, 0, 1, "children = 0"},
+        {SADMM_SHAPE_SPHERE, 1, 2, "geometry = 2"},
+    };
+    struct both b = both_new(0);
+    shapes[0] = shape_of(0);
+    shapes[1] = shape_of(1);
+    both_find(&b, &input, "good ones");
+    ck_assert_uint_eq(b.device_set.pair_count, 1);
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+        struct sadmm_error error = {0};
+        struct sadmm_cuda_contacts out;
+        geometries[1].type = bad[i].type;
+        geometries[1].children = bad[i].children;
+        shapes[1].geometry = bad[i].handle;
+        ++shapes[1].revision;
+        for (int time = 0; time < 2; ++time) {
+            ck_assert_int_eq(COLLISION(find)(b.device, NULL, &input, &out, &error), SADMM_ERROR_INVALID_ARGUMENT);
+            ck_assert_msg(strstr(error.message, bad[i].words) != NULL, "%s: does not say %s", error.message, bad[i].words);
+        }
+        OK(COLLISION(download)(b.device, NULL, &b.device_set, error));
+        check_same(&b.host_set, &b.device_set, bad[i].words);
+        geometries[1] = good;
+        shapes[1].geometry = 1;
+        both_find(&b, &input, "good again");
+    }
+    /* a candidate is one 64-bit key: slots and children must fit into it */
+    struct sadmm_error error = {0};
+    geometries[1].children = SADMM_MOST_CHILDREN;
+    ++shapes[1].revision;
+    input.shape_count = MANY; /* but for two they are dead */
+    ck_assert_int_eq(COLLISION(find)(b.device, NULL, &input, NULL, &error), SADMM_ERROR_LIMIT);
+    ck_assert_ptr_nonnull(strstr(error.message, "70000 shapes of up to 65535 children"));
+    free(shapes);
     both_free(&b);
 }
 END_TEST
@@ -776,6 +923,8 @@ int main(void)
     tcase_add_loop_test(tests, few_shapes, 0, 2);
     tcase_add_test(tests, one_place);
     tcase_add_test(tests, slots_are_reused);
+    tcase_add_loop_test(tests, children_are_matched_by_number, 0, 4);
+    tcase_add_test(tests, shapes_without_manifolds_are_refused);
     tcase_add_test(tests, a_find_can_be_undone);
     tcase_add_test(tests, side_by_side);
     tcase_add_test(tests, no_such_device);

@@ -1,4 +1,4 @@
-/* How far shapes reach: extents, boxes around them, and the distance within which a pair makes contacts. In double on
+/* How far shapes reach: boxes around them, and the distance within which a pair makes contacts. In double on
  * every backend, so that all of them see the same pairs.
  *
  * A pair makes contacts up to   max(margin x thinner extent, fall) + what the velocities may close within the step.
@@ -14,43 +14,8 @@
 #define SADMM_COLLISION_BOUNDS_H
 
 #include "core/math/real.h"
-#include "subadmm/world.h"
 
 struct sadmm_box3 { double lo[3], hi[3]; };
-
-/* Smallest extent, m; a plane has none that limits. */
-SADMM_INLINE double shape_thickness(int type, const double size[3])
-{
-    switch (type) {
-    case SADMM_SHAPE_SPHERE:
-    case SADMM_SHAPE_CAPSULE: return 2 * size[0];
-    case SADMM_SHAPE_BOX: return 2 * fmin(size[0], fmin(size[1], size[2]));
-    default: return HUGE_VAL;
-    }
-}
-
-/* Radius of the ball around the shape's centre that holds it, m; 0 for a plane (planes do not move). */
-SADMM_INLINE double shape_radius(int type, const double size[3])
-{
-    switch (type) {
-    case SADMM_SHAPE_SPHERE: return size[0];
-    case SADMM_SHAPE_CAPSULE: return size[0] + size[1];
-    case SADMM_SHAPE_BOX: return sqrt(size[0] * size[0] + size[1] * size[1] + size[2] * size[2]);
-    default: return 0;
-    }
-}
-
-/* Half extents along the world axes, m. R: shape to world. Not for planes. */
-SADMM_INLINE void shape_world_extent(int type, const double size[3], const double R[9], double extent[3])
-{
-    int k;
-    for (k = 0; k < 3; ++k) {
-        if (type == SADMM_SHAPE_BOX)
-            extent[k] = fabs(R[3 * k]) * size[0] + fabs(R[3 * k + 1]) * size[1] + fabs(R[3 * k + 2]) * size[2];
-        else if (type == SADMM_SHAPE_CAPSULE) extent[k] = size[0] + fabs(R[3 * k + 2]) * size[1];
-        else extent[k] = size[0];
-    }
-}
 
 /* The part of a motion that goes down, and up. Not by fmin and fmax, which are calls where instructions see NaN in another way. */
 SADMM_INLINE double downward(double way) { return way < 0 ? way : 0; }

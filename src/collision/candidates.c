@@ -4,9 +4,15 @@
 
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
+#include "keys.h"
 #include "radix_sort.h"
 
-enum { SLOT_PRESENT = 1, SLOT_LEFT = 2 /* its box left the larger one, or the entry changed */ };
+enum {
+    SLOT_PRESENT = 1,
+    SLOT_LEFT = 2, /* its box left the larger one, or the entry changed */
+    SLOT_PLANE = 4,
+    SLOT_REFUSED = 8 /* sadmm_collision_check_shape says why */
+};
 
 /* The larger box: this share of the shape's radius on every side, and the way it goes in some steps, up to its radius.
  * Larger: fewer updates, more pairs to look at. */
@@ -15,14 +21,12 @@ enum { SLOT_PRESENT = 1, SLOT_LEFT = 2 /* its box left the larger one, or the en
 /* Ask the broad phase for single shapes up to one in so many: a query costs as much as some ten of a sweep over all. */
 enum { FEW = 8 };
 
-static uint64_t pair_key(uint32_t a, uint32_t b) { return (uint64_t)a << 32 | b; }
-
 bool sadmm_pair_list_add(struct sadmm_pair_list *list, uint32_t a, uint32_t b)
 {
     if (list->count == list->capacity &&
         !sadmm_grow((void **)&list->keys, &list->capacity, list->count, list->count + 1, sizeof *list->keys))
         return false;
-    list->keys[list->count++] = a < b ? pair_key(a, b) : pair_key(b, a);
+    list->keys[list->count++] = unordered_key(a, b);
     return true;
 }
 
@@ -78,7 +82,7 @@ static bool contains(const struct sadmm_box3 *outer, const struct sadmm_box3 *in
 
 static void enlarge(const struct sadmm_box3 *box, const struct sadmm_proxy *p, double dt, struct sadmm_box3 *larger)
 {
-    double radius = p->system_body >= 0 ? shape_radius(p->type, p->size) : 0;
+    double radius = p->system_body >= 0 ? geometry_radius(&p->geometry) : 0;
     for (int k = 0; k < 3; ++k) {
         double way = fmin(fmax(STEPS_AHEAD * dt * p->velocity[k], -radius), radius);
         larger->lo[k] = box->lo[k] - ROOM * radius + fmin(way, 0.0);
@@ -101,27 +105,37 @@ static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision
     struct sadmm_broad_entry *entry = &c->entries[slot];
     struct sadmm_seen *seen = &c->seen[slot], now = {0};
     const struct sadmm_collision_body *body;
+    const struct sadmm_geometry *geometry;
+    struct sadmm_error refusal;
+    unsigned char kind;
     bool plane, same;
 
     if (!shape || !shape->alive) {
-        c->state[slot] = seen->alive ? SLOT_LEFT : 0;
+        const bool was_plane = seen->alive && !entry->present;
+        c->state[slot] = (unsigned char)((seen->alive ? SLOT_LEFT : 0) | (was_plane ? SLOT_PLANE : 0));
         entry->present = false;
         *seen = now;
         return;
     }
     body = &input->bodies[shape->body];
-    plane = shape->type == SADMM_SHAPE_PLANE;
     now.revision = shape->revision;
     now.body = shape->body;
     now.group = body->environment;
     now.alive = true;
     now.moves = body->system_body >= 0;
-    proxy_place(shape, body, input->dt, input->margin, input->gravity, &c->proxies[slot], &c->boxes[slot]);
     same = seen->alive && seen->revision == now.revision && seen->body == now.body && seen->group == now.group &&
            seen->moves == now.moves && !renew;
-    c->state[slot] = SLOT_PRESENT;
+    if (!same && sadmm_collision_check_shape(input, slot, &refusal) != SADMM_OK) {
+        c->state[slot] = SLOT_REFUSED;
+        return;
+    }
+    geometry = &input->geometries[shape->geometry];
+    plane = geometry->type == SADMM_SHAPE_PLANE;
+    kind = plane ? SLOT_PRESENT | SLOT_PLANE : SLOT_PRESENT;
+    proxy_place(shape, geometry, body, input->dt, input->margin, input->gravity, &c->proxies[slot], &c->boxes[slot]);
+    c->state[slot] = kind;
     if (same && (plane ? plane_stays(entry, &c->proxies[slot]) : contains(&entry->box, &c->boxes[slot]))) return;
-    c->state[slot] = SLOT_PRESENT | SLOT_LEFT;
+    c->state[slot] = (unsigned char)(kind | SLOT_LEFT);
     *seen = now;
     entry->present = !plane;
     entry->group = now.group;
@@ -153,7 +167,7 @@ static void update_share(void *argument, int thread, int threads)
 bool sadmm_candidate_meets(const struct sadmm_candidates *c, const struct sadmm_collision_input *input, uint32_t a,
                            uint32_t b)
 {
-    if (c->proxies[a].type == SADMM_SHAPE_PLANE)
+    if (c->proxies[a].geometry.type == SADMM_SHAPE_PLANE)
         return proxy_plane_meets(&c->proxies[a], &c->boxes[b],
                                  proxy_plane_reach(&c->proxies[b], input->margin, fall_of(input->gravity, input->dt)));
     return boxes_overlap(&c->boxes[a], &c->boxes[b]) &&
@@ -170,20 +184,13 @@ static bool may_meet(const struct sadmm_collision_input *input, uint32_t a, uint
 static uint64_t ordered(const struct sadmm_candidates *c, uint64_t key)
 {
     uint32_t low = (uint32_t)(key >> 32), high = (uint32_t)key;
-    return c->proxies[high].type < c->proxies[low].type ? pair_key(high, low) : key;
-}
-
-static int bits_for(size_t count)
-{
-    int bits = 1;
-    while (bits < 32 && count >> bits) ++bits;
-    return bits;
+    return c->proxies[high].geometry.type < c->proxies[low].geometry.type ? ordered_key(high, low) : key;
 }
 
 /* Keys to order (slot of a, slot of b); slots need few bits, so squeeze them together for the sort. */
 static bool sort_pairs(struct sadmm_pair_list *list, struct sadmm_pair_list *scratch, size_t slots)
 {
-    int bits = bits_for(slots);
+    int bits = bits_of(slots);
     uint64_t mask = (UINT64_C(1) << bits) - 1;
     if (!grow(&scratch->keys, &scratch->capacity, 0, list->count, sizeof *scratch->keys)) return false;
     for (size_t i = 0; i < list->count; ++i)
@@ -202,8 +209,8 @@ static void list_movers(struct sadmm_candidates *c)
     for (size_t slot = 0; slot < c->slot_count; ++slot) {
         const struct sadmm_broad_entry *e = &c->entries[slot];
         if (!e->present || !e->moves || e->group < 0) continue;
-        c->movers[c->mover_count++] = pair_key((uint32_t)e->group, (uint32_t)slot);
-        if (bits_for((size_t)e->group) > bits) bits = bits_for((size_t)e->group);
+        c->movers[c->mover_count++] = ordered_key((uint32_t)e->group, (uint32_t)slot);
+        if (bits_of((uint64_t)e->group) > bits) bits = bits_of((uint64_t)e->group);
     }
     /* slots ascend already: the sort is stable, but it looks at whole keys */
     sadmm_radix_sort(c->movers, c->movers + c->mover_count, c->mover_count, 32 + bits);
@@ -211,13 +218,7 @@ static void list_movers(struct sadmm_candidates *c)
 
 static size_t first_mover(const struct sadmm_candidates *c, uint64_t key)
 {
-    size_t low = 0, high = c->mover_count;
-    while (low < high) {
-        size_t mid = low + (high - low) / 2;
-        if (c->movers[mid] < key) low = mid + 1;
-        else high = mid;
-    }
-    return low;
+    return (size_t)lower_bound(c->movers, (int64_t)c->mover_count, key);
 }
 
 /* Planes against what moves, all of it or, when few moved, that. */
@@ -228,8 +229,8 @@ static bool plane_pairs(struct sadmm_candidates *c, const struct sadmm_collision
         int32_t group = c->entries[plane].group;
         size_t i = 0, end = only_changed ? c->changed_count : c->mover_count;
         if (!only_changed && group >= 0) {
-            i = first_mover(c, pair_key((uint32_t)group, 0));
-            end = first_mover(c, pair_key((uint32_t)group + 1, 0));
+            i = first_mover(c, ordered_key((uint32_t)group, 0));
+            end = first_mover(c, ordered_key((uint32_t)group + 1, 0));
         }
         for (; i < end; ++i) {
             uint32_t slot = only_changed ? c->changed[i] : (uint32_t)c->movers[i];
@@ -324,7 +325,11 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
 
     c->changed_count = c->plane_count = 0;
     for (size_t slot = 0; slot < slots; ++slot) {
-        bool plane = slot < input->shape_count && input->shapes[slot].type == SADMM_SHAPE_PLANE;
+        const bool plane = c->state[slot] & SLOT_PLANE;
+        if (c->state[slot] & SLOT_REFUSED) {
+            c->broad_phase_valid = c->list_valid = false;
+            return sadmm_collision_check_shape(input, slot, error);
+        }
         if (c->state[slot] & SLOT_PRESENT) {
             if (plane) c->planes[c->plane_count++] = (uint32_t)slot;
             else ++present;

@@ -7,6 +7,7 @@
 #include "collision.h"
 
 #include <stdatomic.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "core/base/memory.h"
@@ -58,6 +59,18 @@ void sadmm_collision_destroy(struct sadmm_collision *collision)
     for (size_t i = 0; i < collision->part_count; ++i) sadmm_contact_set_free(&collision->parts[i]);
     sadmm_free(collision->parts);
     sadmm_free(collision);
+}
+
+sadmm_status sadmm_collision_check_shape(const struct sadmm_collision_input *input, size_t slot, struct sadmm_error *error)
+{
+    const struct sadmm_shape *shape = &input->shapes[slot];
+    char name[40];
+    if (shape->geometry >= input->geometry_count)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "shapes[%zu].geometry = %u: must be in [0, %zu)", slot,
+                          shape->geometry, input->geometry_count);
+    snprintf(name, sizeof name, "shapes[%zu]: ", slot);
+    return sadmm_geometry_check(&input->geometries[shape->geometry], input->bodies[shape->body].system_body >= 0, name,
+                                error);
 }
 
 static int thread_count(const struct sadmm_collision_input *input, size_t pairs)
@@ -169,6 +182,9 @@ sadmm_status sadmm_collision_find(struct sadmm_collision *collision, const struc
     threads = thread_count(input, collision->candidates.list.count);
     if (!reserve_parts(collision, (size_t)threads - 1) || !find_in_threads(collision, input, contacts, threads))
         return sadmm_fail_memory(error, "contacts");
+    if (collision->spare.point_count > INT32_MAX)
+        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%zu contact points: at most %d can be indexed",
+                          collision->spare.point_count, (int)INT32_MAX);
     swap = *contacts;
     *contacts = collision->spare;
     collision->spare = swap;

@@ -1,11 +1,13 @@
 /* Collision detection on the host: broad phase (FCL, or sort and sweep), pair manifolds, matching with the last step.
  *
  * Shapes live in slots that stay put for a shape's life; a dead slot has alive = false. The result does not depend on
- * the order in which a broad phase finds pairs: pairs come out sorted by (shape_a, shape_b), where a is the shape of the
- * lower (type, slot) and the normal runs from a to b.
+ * the order in which a broad phase finds pairs: pairs come out sorted by (shape_a, shape_b, child), where a is the shape of
+ * the lower (type, slot) and the normal runs from a to b. Two shapes have a pair for each of their manifolds (sadmm_geometry).
  */
 #ifndef SADMM_COLLISION_COLLISION_H
 #define SADMM_COLLISION_COLLISION_H
+
+#include <stdbool.h>
 
 #include "subadmm/world.h"
 #include "core/base/error.h"
@@ -15,22 +17,37 @@
 extern "C" {
 #endif
 
+enum { SADMM_MOST_CHILDREN = 65535 }; /* the children of a pair are counted in 32 bits */
+
+/* What a shape is made of, apart from where it is and what it is like to touch. Shapes refer to it by a handle, so that
+ * several may share one. A geometry has children, the pieces that collide: a pair of shapes has a manifold for each pair of
+ * their children, at most. The types there are have one child, the whole; where one is given more, each is the whole. */
+struct sadmm_geometry {
+    int32_t type;     /* sadmm_shape_type */
+    int32_t children; /* in [1, SADMM_MOST_CHILDREN] */
+    double size[3];   /* m, as in sadmm_shape_def */
+};
+
+/* May a shape be of this geometry, on a body that moves or does not? Else INVALID_ARGUMENT; `name`: what the message calls
+ * the geometry, as "def->". Sizes are not looked at. */
+sadmm_status sadmm_geometry_check(const struct sadmm_geometry *geometry, bool moves, const char *name,
+                                  struct sadmm_error *error);
+
 struct sadmm_shape {
-    sadmm_shape_type type;
-    double size[3];
+    uint32_t geometry; /* handle: its index in the input's geometries */
     double position[3], orientation[4]; /* shape frame in the body's */
     double friction, restitution;
     uint32_t category, mask;
     int32_t body;     /* world body slot */
     bool alive;
-    uint32_t revision; /* changes whenever the slot is reused or the shape's definition changes */
+    uint32_t revision; /* changes whenever the slot is reused or the shape's definition changes, its geometry's included */
 };
 
 /* What a world body slot looks like to collision. */
 struct sadmm_collision_body {
     double position[3], orientation[4], velocity[6]; /* velocity 0 for static bodies */
     double acceleration[2]; /* sizes of what its own force and torque give it, m/s^2, rad/s^2; 0 for static bodies */
-    uint32_t placed;        /* changes whenever its pose is set: pairs forget the axis they remember (contact_carry.h) */
+    uint32_t placed;        /* changes whenever its pose is set: pairs forget the axis they remember (contact_match.h) */
     int32_t system_body;  /* index among dynamic bodies, -1 for static */
     int32_t environment;  /* -1: meets all */
 };
@@ -38,6 +55,8 @@ struct sadmm_collision_body {
 struct sadmm_collision_input {
     const struct sadmm_shape *shapes;
     size_t shape_count;               /* slots, dead ones included */
+    const struct sadmm_geometry *geometries; /* by handle */
+    size_t geometry_count;
     const struct sadmm_collision_body *bodies; /* by world body slot */
     size_t body_count;
     double dt;
@@ -49,6 +68,10 @@ struct sadmm_collision_input {
     const uint64_t *friction_pairs; const double *friction_values; size_t friction_pair_count; /* shape slots */
     double gravity; /* its size, m/s^2: a body at rest just outside the margin falls gravity x dt^2 in its first step */
 };
+
+/* Is the shape in this slot one that collision can work on? Else INVALID_ARGUMENT that names it. Asked for every shape that is
+ * new or changed, by whoever takes the input over. */
+sadmm_status sadmm_collision_check_shape(const struct sadmm_collision_input *input, size_t slot, struct sadmm_error *error);
 
 struct sadmm_collision;
 sadmm_status sadmm_collision_create(struct sadmm_collision **out, struct sadmm_error *error);

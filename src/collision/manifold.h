@@ -1,4 +1,4 @@
-/* What two shapes that touch give: one normal and up to eight points. The narrow phase is a set of inline functions
+/* What two pieces that touch give: one normal and up to eight points. The narrow phase is a set of inline functions
  * on small structs, one header a family of pairs, compiled by gcc (double) and nvcc (float and double): no allocation,
  * bounded loops, no state but the cache word.
  *

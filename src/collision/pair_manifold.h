@@ -1,13 +1,14 @@
-/* Manifold of any ordered pair of shapes, and the bounds both broad phases and the narrow phase share. */
+/* The manifold of any ordered pair of shapes. */
 #ifndef SADMM_COLLISION_PAIR_MANIFOLD_H
 #define SADMM_COLLISION_PAIR_MANIFOLD_H
 
+#include "collision_table.h"
+#include "geometry.h"
 #include "manifold.h"
 #include "manifold_box.h"
 #include "manifold_box_round.h"
 #include "manifold_plane.h"
 #include "manifold_round.h"
-#include "subadmm/world.h"
 
 /* Pose of a in b's frame. The differences are taken in double before anything is rounded to `real`. A plane's origin
  * may be far away: it moves to the foot of the perpendicular from b's centre. R: row-major, shape to world. */
@@ -31,27 +32,20 @@ SADMM_INLINE struct pair_pose pair_pose(bool a_is_plane, const double Ra[9], con
     return pose;
 }
 
-/* type_a <= type_b; not two planes. size as in sadmm_shape_def. m->count is 0 when the shapes are apart. */
-SADMM_INLINE void pair_manifold(int type_a, vec3 size_a, int type_b, vec3 size_b, const struct pair_pose *pose,
-                                real limit, uint32_t cache, struct manifold *m)
+/* Of one child of the pair. a->type <= b->type; m->count is 0 when the shapes are apart, and for types that are not listed. */
+SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b, uint32_t child,
+                                const struct pair_pose *pose, real limit, uint32_t cache, struct manifold *m)
 {
+    const vec3 a = v3_load(shape_a->size), b = v3_load(shape_b->size);
+    (void)child; /* no type has more than one piece */
     m->count = 0;
     m->cache = 0;
-    if (type_a == SADMM_SHAPE_BOX) {
-        manifold_box_box(size_b, size_a, pose, limit, cache, m);
-    } else if (type_a == SADMM_SHAPE_PLANE) {
-        if (type_b == SADMM_SHAPE_BOX) manifold_plane_box(size_b, pose, limit, m);
-        else if (type_b == SADMM_SHAPE_SPHERE) manifold_plane_sphere(size_b.x, pose, limit, m);
-        else if (type_b == SADMM_SHAPE_CAPSULE) manifold_plane_capsule(size_b.x, size_b.y, pose, limit, m);
-    } else if (type_a == SADMM_SHAPE_SPHERE) {
-        if (type_b == SADMM_SHAPE_SPHERE) manifold_sphere_sphere(size_a.x, size_b.x, pose, limit, m);
-        else if (type_b == SADMM_SHAPE_CAPSULE)
-            manifold_sphere_capsule(size_a.x, size_b.x, size_b.y, pose, limit, m);
-        else manifold_sphere_box(size_a.x, size_b, pose, limit, cache, m);
-    } else {
-        if (type_b == SADMM_SHAPE_CAPSULE)
-            manifold_capsule_capsule(size_a.x, size_a.y, size_b.x, size_b.y, pose, limit, cache, m);
-        else manifold_capsule_box(size_a.x, size_a.y, size_b, pose, limit, cache, m);
+    switch (SADMM_TYPE_PAIR(shape_a->type, shape_b->type)) {
+#define SADMM_MANIFOLD(A, B, call) \
+    case SADMM_TYPE_PAIR((int)SADMM_SHAPE_##A, (int)SADMM_SHAPE_##B): call; break;
+        SADMM_COLLISION_TABLE(SADMM_MANIFOLD)
+#undef SADMM_MANIFOLD
+    default: break;
     }
 }
 

@@ -5,23 +5,25 @@
 #include "core/math/quat.h"
 #include "bounds.h"
 #include "collision.h"
+#include "geometry.h"
 
 struct sadmm_proxy {
     double R[9], x[3];  /* shape to world, row-major; centre, m */
-    double size[3];
+    struct sadmm_geometry geometry; /* a copy: a pair needs no third place in memory */
     double arm[3];      /* centre relative to the body's centre of mass, m, world */
     double com[3];      /* of the body */
     double velocity[3]; /* of the body, m/s */
     double spin, fall;  /* reach of rotation, and of the force and torque on the body, within the step, m */
     double thin;        /* smallest extent, m */
     double friction, restitution;
-    int32_t type, body, system_body;
+    int32_t body, system_body;
     uint32_t revision, placed;
 };
 
 /* `box` is left alone for a plane. gravity: its size, m/s^2. */
-SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadmm_collision_body *body, double dt,
-                              double margin, double gravity, struct sadmm_proxy *p, struct sadmm_box3 *box)
+SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadmm_geometry *geometry,
+                              const struct sadmm_collision_body *body, double dt, double margin, double gravity,
+                              struct sadmm_proxy *p, struct sadmm_box3 *box)
 {
     quat q_body = q_load(body->orientation), q = q_normalize(q_mul(q_body, q_load(shape->orientation)));
     mat3 R = q_matrix(q);
@@ -30,27 +32,26 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
     double extent[3], reach;
     int i;
 
+    p->geometry = *geometry;
     for (i = 0; i < 3; ++i) v3_store(R.r[i], p->R + 3 * i);
     v3_store(arm, p->arm);
     for (i = 0; i < 3; ++i) {
         p->com[i] = body->position[i];
         p->x[i] = body->position[i] + p->arm[i];
-        p->size[i] = shape->size[i];
         p->velocity[i] = moves ? body->velocity[i] : 0;
     }
-    reach = v3_norm(arm) + shape_radius((int)shape->type, shape->size);
+    reach = v3_norm(arm) + geometry_radius(geometry);
     p->spin = moves ? rotation_sweep(body->velocity + 3, reach, dt) : 0;
     p->fall = moves ? own_fall(body->acceleration, reach, dt) : 0;
-    p->thin = shape_thickness((int)shape->type, shape->size);
+    p->thin = geometry_thickness(geometry);
     p->friction = shape->friction;
     p->restitution = shape->restitution;
-    p->type = (int32_t)shape->type;
     p->body = shape->body;
     p->system_body = body->system_body;
     p->revision = shape->revision;
     p->placed = body->placed;
-    if (shape->type == SADMM_SHAPE_PLANE) return;
-    shape_world_extent(p->type, p->size, p->R, extent);
+    if (geometry->type == SADMM_SHAPE_PLANE) return;
+    geometry_extents(geometry, p->R, extent);
     shape_box(p->x, extent, shape_reach(margin, p->thin, p->fall, fall_of(gravity, dt)), p->velocity, p->spin, dt, box);
 }
 

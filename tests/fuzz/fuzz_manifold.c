@@ -21,11 +21,6 @@
 #include "core/math/quat.h"
 
 
-static double radius_of(const struct solid *s)
-{
-    return s->type == SADMM_SHAPE_PLANE ? 0 : shape_radius(s->type, s->size);
-}
-
 static void take_rotation(struct bytes *in, double R[9])
 {
     double q[4], n2 = 0;
@@ -111,7 +106,7 @@ static struct truth truth_of(const struct solid *a, const struct solid *b)
 {
     struct truth t = {.at_least = -HUGE_VAL, .scale = radius_of(a) + radius_of(b)};
     double p[3], q[3], d[3], length;
-    t.thin = fmin(shape_thickness(a->type, a->size), shape_thickness(b->type, b->size));
+    t.thin = fmin(thickness_of(a), thickness_of(b));
     memcpy(p, a->x, sizeof p);
     for (int i = 0; i < 60; ++i) {
         project_on_core(b, p, q);
@@ -183,7 +178,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     double d[3], side[3];
     take_direction(&in, &a, &b, d);
     bool plane = a.type == SADMM_SHAPE_PLANE;
-    double thin = plane ? shape_thickness(b.type, b.size) : fmin(shape_thickness(a.type, a.size), shape_thickness(b.type, b.size));
+    double thin = plane ? thickness_of(&b) : fmin(thickness_of(&a), thickness_of(&b));
     double distance = take_distance(&in, (plane ? 0 : shadow(&a, d)) + shadow(&b, d));
     double slide = take_choice(&in, 4) == 3 ? (radius_of(&a) + radius_of(&b)) * take_in(&in, -1, 1) : 0;
     take_direction(&in, &b, &a, side);

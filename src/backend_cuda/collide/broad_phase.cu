@@ -84,12 +84,12 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
     struct collision_leaf leaf;
     struct collision_filter filter;
 
-    proxy_place(&shape, &body, step.dt, step.margin, step.gravity, &proxy, &leaf.box);
+    proxy_place(&shape, &v.geometries[shape.geometry], &body, step.dt, step.margin, step.gravity, &proxy, &leaf.box);
     v.proxies[slot] = proxy;
     filter.category = shape.category;
     filter.mask = shape.mask;
     filter.body = shape.body;
-    filter.kind = (int32_t)shape.type | (moves ? FILTER_MOVES : 0);
+    filter.kind = proxy.geometry.type | (moves ? FILTER_MOVES : 0);
     v.filters[slot] = filter;
     if (i >= v.leaf_count) return;
 
@@ -101,7 +101,7 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
 
     const uint64_t group = body.environment < 0 ? 0 : (uint64_t)body.environment;
     const int rest = LEAF_CLASS_SHIFT - v.group_bits;
-    uint64_t key = shape_radius(proxy.type, proxy.size) >= v.large ? LEAF_LARGE : 0;
+    uint64_t key = geometry_radius(&proxy.geometry) >= v.large ? LEAF_LARGE : 0;
     if (!moves) key = LEAF_STATIC;
     v.leaf_keys[i] = key << LEAF_CLASS_SHIFT | group << rest | morton(*v.grid, proxy.x) >> (3 * MORTON_BITS - rest);
     v.leaf_slots[i] = slot;
@@ -220,13 +220,13 @@ static __device__ __forceinline__ bool leaves_meet(const collision_view &v, cons
     return boxes_meet(&a.box, v.proxies[a.slot].velocity, &b.box, v.proxies[b.slot].velocity, dt);
 }
 
-/* The shape of the lower (type, slot) comes first. */
+/* The first candidate of two shapes: the one of the lower (type, slot) is a. */
 static __device__ __forceinline__ uint64_t candidate_key(const collision_view &v, uint32_t a, int32_t kind_a,
                                                          uint32_t b, int32_t kind_b)
 {
     const int type_a = kind_a & FILTER_TYPE, type_b = kind_b & FILTER_TYPE;
     const bool ordered = type_a < type_b || (type_a == type_b && a < b);
-    return (uint64_t)(ordered ? a : b) << v.slot_bits | (ordered ? b : a);
+    return first_candidate(v, ordered ? a : b, ordered ? b : a);
 }
 
 static __device__ __forceinline__ void store_candidate(const collision_view &v, unsigned long long at, uint64_t key)
@@ -246,13 +246,16 @@ static __device__ void write_batch(const collision_view &v, const struct batch &
     for (unsigned i = 0; i < out.count; ++i) store_candidate(v, first + i, out.keys[i]);
 }
 
-static __device__ void add(const collision_view &v, struct batch *out, uint64_t key)
+/* The candidates of a pair. */
+static __device__ void add(const collision_view &v, struct batch *out, uint64_t first, uint32_t count)
 {
-    if (out->count == BATCH) {
-        write_batch(v, *out, reserve(v.candidate_count, out->count));
-        out->count = 0;
+    for (uint32_t child = 0; child < count; ++child) {
+        if (out->count == BATCH) {
+            write_batch(v, *out, reserve(v.candidate_count, out->count));
+            out->count = 0;
+        }
+        out->keys[out->count++] = first + child;
     }
-    out->keys[out->count++] = key;
 }
 
 /* What is left, by all threads of a warp together. */
@@ -275,7 +278,7 @@ static __device__ void add_planes(const collision_view &v, const struct collisio
         for (; i < v.plane_count && v.planes[i] >> 32 == group; ++i) {
             const uint32_t plane = (uint32_t)v.planes[i];
             if (may_meet(v, v.filters[plane], own) && proxy_plane_meets(&v.proxies[plane], &leaf.box, reach))
-                add(v, out, (uint64_t)plane << v.slot_bits | slot);
+                add(v, out, first_candidate(v, plane, slot), candidates_of(v, plane, slot));
         }
     }
 }
@@ -312,7 +315,8 @@ static __device__ void walk(const collision_view &v, int32_t i, struct batch *ou
         if (meet && leaves_overlap(leaf, v.placed[node.child]) && leaves_meet(v, leaf, v.placed[node.child], step.dt)) {
             const struct collision_filter other = v.filters[node.child];
             if (may_meet(v, own, other))
-                add(v, out, candidate_key(v, (uint32_t)leaf.slot, own.kind, (uint32_t)node.child, other.kind));
+                add(v, out, candidate_key(v, (uint32_t)leaf.slot, own.kind, (uint32_t)node.child, other.kind),
+                    candidates_of(v, (uint32_t)leaf.slot, (uint32_t)node.child));
         }
         at = node.next;
     }
@@ -377,11 +381,19 @@ static __global__ void __launch_bounds__(TILE_ROWS) tiles_kernel(const __grid_co
             if (!may_meet(v, own, others.filters[j]) || !leaves_meet(v, leaf, others.leaves[j], step.dt)) hits ^= left & (0 - left);
         }
     }
-    unsigned long long at = reserve_by_warp(v.candidate_count, (unsigned)bits_set(hits));
+    const uint32_t slot = (uint32_t)leaf.slot;
+    unsigned total = (unsigned)bits_set(hits);
+    if (v.child_bits > 0) {
+        total = 0;
+        for (uint64_t left = hits; left; left &= left - 1)
+            total += candidates_of(v, slot, (uint32_t)others.leaves[trailing_zeros(left)].slot);
+    }
+    unsigned long long at = reserve_by_warp(v.candidate_count, total);
     for (; hits; hits &= hits - 1) {
         const int j = trailing_zeros(hits);
-        store_candidate(v, at++, candidate_key(v, (uint32_t)leaf.slot, own.kind, (uint32_t)others.leaves[j].slot,
-                                               others.filters[j].kind));
+        const uint32_t other = (uint32_t)others.leaves[j].slot, count = candidates_of(v, slot, other);
+        const uint64_t first = candidate_key(v, slot, own.kind, other, others.filters[j].kind);
+        for (uint32_t child = 0; child < count; ++child) store_candidate(v, at++, first + child);
     }
 }
 

@@ -1,4 +1,4 @@
-/* What contact finding starts from: shapes, bodies, overrides, which shapes there are.
+/* What contact finding starts from: shapes, geometries, bodies, overrides, which shapes there are.
  *
  * What rarely changes is kept in pinned memory as it was last uploaded, and uploaded again only when it differs.
  */
@@ -30,7 +30,7 @@ static sadmm_status upload_input(struct sadmm_cuda_collision *c, int name, const
     return SADMM_OK;
 }
 
-/* A slot's revision changes with everything that matters. */
+/* A slot's revision changes with everything that matters, its geometry included. */
 static bool shapes_changed(const struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input)
 {
     const struct sadmm_shape *before = in<struct sadmm_shape>(c, PINNED_SHAPES);
@@ -43,6 +43,31 @@ static bool shapes_changed(const struct sadmm_cuda_collision *c, const struct sa
     return false;
 }
 
+static const struct sadmm_geometry &geometry_of(const struct sadmm_collision_input *input, size_t slot)
+{
+    return input->geometries[input->shapes[slot].geometry];
+}
+
+/* Bits of a candidate (candidate_of). */
+static sadmm_status measure_candidates(struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input,
+                                       struct sadmm_error *error)
+{
+    struct collision_view *v = &c->view;
+    uint64_t most = 1;
+    for (size_t slot = 0; slot < input->shape_count; ++slot) {
+        if (!input->shapes[slot].alive) continue;
+        TRY(sadmm_collision_check_shape(input, slot, error));
+        most = std::max(most, (uint64_t)geometry_of(input, slot).children);
+    }
+    v->slot_bits = std::max(bits_of(input->shape_count), 1);
+    v->child_bits = bits_of(most * most - 1);
+    if (2 * v->slot_bits + v->child_bits > 64)
+        return sadmm_fail(error, SADMM_ERROR_LIMIT,
+                          "%zu shapes of up to %llu children: their pairs take %d bits, at most 64 can be indexed",
+                          input->shape_count, (unsigned long long)most, 2 * v->slot_bits + v->child_bits);
+    return SADMM_OK;
+}
+
 /* The list of shapes: leaves, then planes; and from which radius a mover is large. */
 static sadmm_status list_shapes(struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input,
                                 struct sadmm_error *error)
@@ -53,13 +78,12 @@ static sadmm_status list_shapes(struct sadmm_cuda_collision *c, const struct sad
         !sadmm_grow_empty(&c->radii, &c->radius_capacity, input->shape_count, sizeof *c->radii))
         return sadmm_fail_memory(error, "collision's list of shapes");
     for (size_t slot = 0; slot < input->shape_count; ++slot) {
-        const struct sadmm_shape *shape = &input->shapes[slot];
-        if (!shape->alive || shape->type == SADMM_SHAPE_PLANE) continue;
-        c->radii[leaves] = shape_radius((int)shape->type, shape->size);
+        if (!input->shapes[slot].alive || geometry_of(input, slot).type == SADMM_SHAPE_PLANE) continue;
+        c->radii[leaves] = geometry_radius(&geometry_of(input, slot));
         c->present[leaves++] = (uint32_t)slot;
     }
     for (size_t slot = 0; slot < input->shape_count; ++slot)
-        if (input->shapes[slot].alive && input->shapes[slot].type == SADMM_SHAPE_PLANE)
+        if (input->shapes[slot].alive && geometry_of(input, slot).type == SADMM_SHAPE_PLANE)
             c->present[leaves + planes++] = (uint32_t)slot;
     if (!sadmm_grow_empty(&c->planes, &c->plane_capacity, planes, sizeof *c->planes))
         return sadmm_fail_memory(error, "collision's list of planes");
@@ -108,9 +132,11 @@ sadmm_status COLLISION(take_input)(struct sadmm_cuda_collision *c, const struct 
                           input->shape_count, input->body_count, (int)(INT32_MAX / 2), (int)INT32_MAX);
     if (shapes_changed(c, input)) {
         c->input_bytes[0] = SIZE_MAX;
+        TRY(measure_candidates(c, input, error));
         TRY(list_shapes(c, input, error));
         TRY(upload_input(c, PRESENT, c->present, (size_t)(v->leaf_count + v->plane_count), sizeof *c->present, true,
                          error));
+        TRY(upload_input(c, GEOMETRIES, input->geometries, input->geometry_count, sizeof *input->geometries, true, error));
         TRY(upload_input(c, SHAPES, input->shapes, input->shape_count, sizeof *input->shapes, true, error));
     }
     if (!bodies) TRY(upload_input(c, BODIES, input->bodies, input->body_count, sizeof *input->bodies, true, error));
@@ -123,6 +149,7 @@ sadmm_status COLLISION(take_input)(struct sadmm_cuda_collision *c, const struct 
                      sizeof *input->friction_values, false, error));
 
     v->shapes = in<struct sadmm_shape>(c, SHAPES);
+    v->geometries = in<struct sadmm_geometry>(c, GEOMETRIES);
     v->bodies = bodies ? bodies : in<struct sadmm_collision_body>(c, BODIES);
     v->body_count = (int32_t)input->body_count;
     v->group_bits = group_bits(input);
@@ -138,6 +165,5 @@ sadmm_status COLLISION(take_input)(struct sadmm_cuda_collision *c, const struct 
     v->step.dt = input->dt;
     v->step.margin = input->margin;
     v->step.gravity = input->gravity;
-    for (v->slot_bits = 1; input->shape_count >> v->slot_bits; ++v->slot_bits) {}
     return SADMM_OK;
 }

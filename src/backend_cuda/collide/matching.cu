@@ -2,15 +2,6 @@
  * point; the first one writes the pair as well. */
 #include "view.h"
 
-static __device__ double pair_friction(const collision_view &v, uint32_t a, uint32_t b, double mu_a, double mu_b)
-{
-    if (v.friction_count > 0) {
-        const int64_t at = find_key(v.friction_pairs, v.friction_count, unordered_key(a, b));
-        if (at >= 0) return v.friction_values[at];
-    }
-    return mu_a == mu_b ? mu_a : sqrt(mu_a * mu_b);
-}
-
 /* Time steps of this set and of the one before; fetched first, so that nothing waits for them later. */
 struct step_lengths {
     double now, before;
@@ -36,60 +27,26 @@ static __device__ void emit_point(const collision_view &v, const step_lengths &d
     const int32_t count = v.sizes[i], at = (int32_t)(place >> 32), first = (int32_t)(uint32_t)place;
     if (lane >= count) return;
 
-    const uint64_t key = v.candidates[i];
-    const uint32_t a = (uint32_t)(key >> v.slot_bits), b = (uint32_t)(key & ((UINT64_C(1) << v.slot_bits) - 1));
-    const struct sadmm_proxy *pa = &v.proxies[a], *pb = &v.proxies[b];
+    const struct candidate own = candidate_of(v, v.candidates[i]);
+    const struct sadmm_proxy *pa = &v.proxies[own.a], *pb = &v.proxies[own.b];
     const struct manifold *m = &v.manifolds[i];
-    const double friction = pair_friction(v, a, b, pa->friction, pb->friction);
+    const double friction =
+        contact_friction(v.friction_pairs, v.friction_values, v.friction_count, own.a, own.b, pa, pb);
     double normal[3];
     rotate_to_world(pb->R, m->normal, normal);
 
     if (lane == 0) {
         struct sadmm_contact_pair pair;
-        pair.body_a = pa->system_body;
-        pair.body_b = pb->system_body;
-        pair.shape_a = (int32_t)a;
-        pair.shape_b = (int32_t)b;
-        pair.first = first;
-        pair.count = count;
-        for (int k = 0; k < 3; ++k) pair.normal[k] = normal[k];
-        pair.friction = friction;
-        pair.restitution = fmax(pa->restitution, pb->restitution);
-        pair.cache = m->cache;
-        pair.revision = word_of_pair(pa->revision, pb->revision);
-        pair.placed = word_of_pair(pa->placed, pb->placed);
-        pair.reserved = 0;
+        contact_emit_pair(own.a, own.b, own.child, pa, pb, m, normal, friction, first, &pair);
         v.after.pairs[at] = pair;
-        v.after.keys[at] = ordered_key(a, b);
+        v.after.keys[at] = ordered_key(own.a, own.b);
     }
 
-    const struct manifold_point from = m->points[lane];
     struct sadmm_contact_point point;
-    double p[3];
-    rotate_to_world(pb->R, from.position, p);
-    for (int k = 0; k < 3; ++k) {
-        const double arm = p[k] + pb->arm[k], between = pb->com[k] - pa->com[k];
-        point.arm_b[k] = pb->system_body >= 0 ? arm : 0;
-        point.arm_a[k] = pa->system_body >= 0 ? arm + between : 0;
-        point.impulse[k] = 0;
-    }
-    point.gap = from.separation;
-    point.error = 0;
-    point.feature = from.feature;
-    point.reserved = 0;
+    contact_emit_point(pa, pb, &m->points[lane], &point);
     const int32_t match = v.matches[i];
-    if (match >= 0) {
-        const struct sadmm_contact_pair *old = &v.before.pairs[match];
-        const int32_t old_first = old->first, old_count = old->count;
-        /* a feature occurs once; most are where they were */
-        for (int32_t n = 0; n < old_count; ++n) {
-            const int32_t k = lane + n < old_count ? lane + n : (lane + n) % old_count;
-            const struct sadmm_contact_point *before = &v.before.points[old_first + k];
-            if (before->feature != from.feature) continue;
-            impulse_carry(old->normal, before->impulse, normal, friction, step_ratio(dt.now, dt.before), point.impulse);
-            break;
-        }
-    }
+    if (match >= 0)
+        contact_carry(&v.before.pairs[match], v.before.points, dt.before, lane, normal, friction, dt.now, &point);
     v.after.points[first + lane] = point;
 }
 

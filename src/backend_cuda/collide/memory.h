@@ -18,10 +18,10 @@ enum buffer_name {
     PROXIES, FILTERS, PLACED, LEAF_KEYS, LEAF_KEYS_2, LEAF_SLOTS, LEAF_SLOTS_2, NODES, GROUPS, PARENTS, ARRIVALS,
     COUNTER, GRID, CANDIDATES, CANDIDATES_2, MANIFOLDS, MATCHES, SIZES, PLACES, TEMP,
     PAIRS, POINTS, PAIR_KEYS, COUNTS, PAIRS_2, POINTS_2, PAIR_KEYS_2, COUNTS_2,
-    SHAPES, BODIES, PRESENT, PLANES, DISABLED_PAIRS, FRICTION_PAIRS, FRICTION_VALUES,
+    SHAPES, GEOMETRIES, BODIES, PRESENT, PLANES, DISABLED_PAIRS, FRICTION_PAIRS, FRICTION_VALUES,
     /* pinned: first what was uploaded to the last buffers above, in their order */
-    PINNED_SHAPES, PINNED_BODIES, PINNED_PRESENT, PINNED_PLANES, PINNED_DISABLED_PAIRS, PINNED_FRICTION_PAIRS,
-    PINNED_FRICTION_VALUES, PINNED_PAIRS, PINNED_POINTS, PINNED_PAIR_KEYS, PINNED_COUNTS,
+    PINNED_SHAPES, PINNED_GEOMETRIES, PINNED_BODIES, PINNED_PRESENT, PINNED_PLANES, PINNED_DISABLED_PAIRS,
+    PINNED_FRICTION_PAIRS, PINNED_FRICTION_VALUES, PINNED_PAIRS, PINNED_POINTS, PINNED_PAIR_KEYS, PINNED_COUNTS,
     BUFFERS
 };
 enum { SET_BUFFERS = COUNTS_2 - COUNTS, INPUTS = PINNED_SHAPES - SHAPES };
@@ -32,8 +32,8 @@ static const char *const buffer_names[BUFFERS] = {
     "places", "sort",
     "contact pairs", "contact points", "contact keys", "contact counts",
     "contact pairs", "contact points", "contact keys", "contact counts",
-    "shapes", "bodies", "list of shapes", "planes", "disabled pairs", "friction pairs", "friction values",
-    "staged shapes", "staged bodies", "staged list of shapes", "staged planes", "staged disabled pairs",
+    "shapes", "geometries", "bodies", "list of shapes", "planes", "disabled pairs", "friction pairs", "friction values",
+    "staged shapes", "staged geometries", "staged bodies", "staged list of shapes", "staged planes", "staged disabled pairs",
     "staged friction pairs", "staged friction values", "staged contact pairs", "staged contact points",
     "staged contact keys", "staged contact counts",
 };

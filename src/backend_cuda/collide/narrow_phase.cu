@@ -35,19 +35,22 @@ static __global__ void __launch_bounds__(NARROW_THREADS) narrow_kernel(const __g
         return;
     }
     const struct collision_step step = step_of(v);
-    const uint64_t key = v.candidates[i];
-    const uint32_t a = (uint32_t)(key >> v.slot_bits), b = (uint32_t)(key & ((UINT64_C(1) << v.slot_bits) - 1));
-    const struct sadmm_proxy *pa = &v.proxies[a], *pb = &v.proxies[b];
-    int64_t before = find_key_in_eighths(v.before.keys, v.before.counts->pairs, ordered_key(a, b));
+    const struct candidate own = candidate_of(v, v.candidates[i]);
+    const struct sadmm_proxy *pa = &v.proxies[own.a], *pb = &v.proxies[own.b];
+    const uint64_t shapes = ordered_key(own.a, own.b);
+    const int32_t count = v.before.counts->pairs;
+    int64_t before = find_key_in_eighths(v.before.keys, count, shapes);
+    if (before >= 0 && own.child > 0) {
+        before = contact_lower_bound(v.before.pairs, before, count, shapes, own.child);
+        if (before == count || contact_shapes(&v.before.pairs[before]) != shapes) before = -1;
+    }
     const struct sadmm_contact_pair *old = &v.before.pairs[before >= 0 ? before : 0];
-    const uint32_t revision = old->revision, placed = old->placed, cache = old->cache; /* at once, not one for the other */
-    if (revision != word_of_pair(pa->revision, pb->revision)) before = -1;
-    const bool in_place = before >= 0 && placed == word_of_pair(pa->placed, pb->placed);
+    const uint32_t cache = contact_memory(old, pa, pb); /* at once, not after what comes next */
+    if (!contact_goes_on(old, own.child, pa, pb)) before = -1;
     const double limit = proxy_limit(pa, pb, step.margin, step.gravity, step.dt);
-    const struct pair_pose pose = pair_pose(pa->type == SADMM_SHAPE_PLANE, pa->R, pa->x, pb->R, pb->x);
+    const struct pair_pose pose = pair_pose(pa->geometry.type == SADMM_SHAPE_PLANE, pa->R, pa->x, pb->R, pb->x);
     struct manifold m;
-    pair_manifold(pa->type, v3_load(pa->size), pb->type, v3_load(pb->size), &pose, (real)limit,
-                  in_place ? cache : 0, &m);
+    pair_manifold(&pa->geometry, &pb->geometry, own.child, &pose, (real)limit, before >= 0 ? cache : 0, &m);
 
     v.sizes[i] = (uint8_t)m.count;
     if (m.count == 0) return;

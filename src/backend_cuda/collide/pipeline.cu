@@ -79,7 +79,7 @@ extern "C" sadmm_status COLLISION(upload)(struct sadmm_cuda_collision *c, void *
     counts->points = (int32_t)set->point_count;
     counts->dt = set->dt;
     for (size_t i = 0; i < set->pair_count; ++i)
-        keys[i] = ordered_key((uint32_t)set->pairs[i].shape_a, (uint32_t)set->pairs[i].shape_b);
+        keys[i] = contact_shapes(&set->pairs[i]);
     if (set->pair_count > 0) memcpy(in<void>(c, PINNED_PAIRS), set->pairs, set->pair_count * sizeof *set->pairs);
     if (set->point_count > 0) memcpy(in<void>(c, PINNED_POINTS), set->points, set->point_count * sizeof *set->points);
     TRY(copy(c, to.pairs, in<void>(c, PINNED_PAIRS), set->pair_count * sizeof *set->pairs, true, error));

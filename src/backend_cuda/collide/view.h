@@ -4,7 +4,7 @@
  *   place    pose, box and filter of every shape                                   a thread a shape
  *   tree     Morton codes, radix sort, Karras' hierarchy, boxes bottom up          (few shapes: not needed)
  *   pairs    candidates: boxes overlap and the pair may meet                       a thread a shape, or tiles of pairs
- *   sort     candidates by (slot of a, slot of b), the host's order
+ *   sort     candidates by (slot of a, slot of b, child), the host's order
  *   narrow   the last step's pair (a search), manifold into slots[candidate]       a thread a candidate
  *   scan     where each candidate's contacts go                                    (few candidates: by emit itself)
  *   emit     pairs and points in world terms, the last step's impulses             eight threads a candidate
@@ -19,15 +19,21 @@
  * contacts before its own: two launches where a radix sort and a scan need some eight. With more room the sort takes
  * all of it; unused candidates are all ones and go to the end.
  *
- * Double throughout, with the host pipeline's own inline formulas (collide/formulas.h, pair_manifold.h).
+ * A candidate is a child of a pair of shapes (collision/geometry.h): where every shape has one child, a pair. Shapes are
+ * checked when they are taken over (input.cu), so that every pair of them is one that collision_table.h lists; a pair that
+ * is not would have no contacts.
+ *
+ * Double throughout, with the host pipeline's own inline formulas (proxy.h, pair_manifold.h, contact_match.h, contact_emit.h):
+ * the same operations in the same order, compiled without contraction of a * b + c, so that the contacts are the host's bit
+ * for bit. tests/test_cuda_collision.c holds the two together.
  */
 #ifndef SADMM_CUDA_COLLIDE_VIEW_H
 #define SADMM_CUDA_COLLIDE_VIEW_H
 
 #include <cuda_runtime.h>
 
+#include "collision/contact_emit.h"
 #include "pipeline.h"
-#include "formulas.h"
 
 enum {
     COLLISION_THREADS = 256, /* a block */
@@ -92,13 +98,14 @@ struct collision_step {
 struct collision_set {
     struct sadmm_contact_pair *pairs;
     struct sadmm_contact_point *points;
-    uint64_t *keys; /* of the pairs: slot of a << 32 | slot of b */
+    uint64_t *keys; /* of the pairs: slot of a << 32 | slot of b; as often as the two have a manifold */
     struct sadmm_cuda_contact_counts *counts;
 };
 
 /* What kernels see: device memory. */
 struct collision_view {
     const struct sadmm_shape *shapes;              /* by slot */
+    const struct sadmm_geometry *geometries;       /* by handle */
     const struct sadmm_collision_body *bodies;     /* by body slot */
     const uint32_t *present;                       /* slots: leaves, then planes */
     const uint64_t *planes;                        /* (group + 1) << 32 | slot, sorted */
@@ -125,10 +132,10 @@ struct collision_view {
     int32_t *arrivals;                             /* at inner nodes, bottom up */
 
     unsigned long long *candidate_count;           /* found, whether they fit or not */
-    uint64_t *found;                               /* candidates as they come: slot of a << slot_bits | slot of b */
+    uint64_t *found;                               /* candidates as they come, packed (candidate_of) */
     uint64_t *candidates;                          /* sorted */
     int32_t candidate_capacity;
-    int32_t slot_bits;
+    int32_t slot_bits, child_bits;                 /* of a candidate; child_bits is 0 where every shape has one child */
     struct manifold *manifolds;                    /* by candidate; points beyond `count` are not written */
     int32_t *matches;                              /* by candidate: pair of the last step, or -1 */
     uint8_t *sizes;                                /* points by candidate; 0 beyond the last, SIZES_BEYOND of them */
@@ -148,6 +155,27 @@ static __device__ __forceinline__ collision_step step_of(const collision_view &v
     step.dt = *v.dt;
     step.gravity = *v.gravity;
     return step;
+}
+
+/* A candidate, unpacked from slot of a, slot of b, child. */
+struct candidate {
+    uint32_t a, b, child;
+};
+static __device__ __forceinline__ candidate candidate_of(const collision_view &v, uint64_t key)
+{
+    const uint64_t shapes = key >> v.child_bits;
+    const candidate c = {(uint32_t)(shapes >> v.slot_bits), (uint32_t)(shapes & ((UINT64_C(1) << v.slot_bits) - 1)),
+                         (uint32_t)(key & ((UINT64_C(1) << v.child_bits) - 1))};
+    return c;
+}
+static __device__ __forceinline__ uint64_t first_candidate(const collision_view &v, uint32_t a, uint32_t b)
+{
+    return ((uint64_t)a << v.slot_bits | b) << v.child_bits;
+}
+/* Candidates of a pair: they follow the first one. */
+static __device__ __forceinline__ uint32_t candidates_of(const collision_view &v, uint32_t a, uint32_t b)
+{
+    return v.child_bits > 0 ? pair_children(&v.proxies[a].geometry, &v.proxies[b].geometry) : 1;
 }
 
 /* Candidates that the kernels after the pairs stage work on: none when they did not all fit. */

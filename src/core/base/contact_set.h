@@ -11,7 +11,8 @@ extern "C" {
 
 enum { SADMM_MAX_POINTS = 8 };
 
-/* Contacts of one pair of shapes: one normal, up to SADMM_MAX_POINTS points. */
+/* A manifold of a pair of shapes: one normal, up to SADMM_MAX_POINTS points. Two shapes may have several, told apart by
+ * `child` (collision/geometry.h). */
 struct sadmm_contact_pair {
     int32_t body_a, body_b;   /* system body or -1 */
     int32_t shape_a, shape_b; /* world shape slot (world level), else -1 */
@@ -20,8 +21,8 @@ struct sadmm_contact_pair {
     double friction;          /* mu */
     double restitution;
     uint32_t cache;           /* narrow phase: axis and side of the last step (collision/manifold.h), 0 = none */
-    uint32_t revision, placed; /* of the two shapes, and of their bodies' poses (collision/contact_carry.h) */
-    uint32_t reserved;
+    uint32_t revision, placed; /* of the two shapes, and of their bodies' poses (collision/contact_match.h) */
+    uint32_t child;
 };
 
 struct sadmm_contact_point {
@@ -33,7 +34,7 @@ struct sadmm_contact_point {
     uint32_t reserved;
 };
 
-/* A contact set that grows. Order: pairs by (shape_a, shape_b), points in pair order: point index = contact index. */
+/* A contact set that grows. Order: pairs by (shape_a, shape_b, child), points in pair order: point index = contact index. */
 struct sadmm_contact_set {
     struct sadmm_contact_pair *pairs;
     struct sadmm_contact_point *points;

@@ -98,6 +98,8 @@ struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *worl
     struct sadmm_collision_input input = {
         .shapes = world->shapes,
         .shape_count = world->shape_slots,
+        .geometries = world->geometries,
+        .geometry_count = world->shape_slots,
         .bodies = world->collision_bodies,
         .body_count = world->body_slots,
         .dt = world->def.settings.dt,

@@ -2,25 +2,15 @@
 
 #include <string.h>
 
+#include "collision/keys.h"
 #include "core/base/memory.h"
 
-uint64_t sadmm_pair_key(size_t a, size_t b)
-{
-    return a < b ? (uint64_t)a << 32 | (uint64_t)b : (uint64_t)b << 32 | (uint64_t)a;
-}
+uint64_t sadmm_pair_key(size_t a, size_t b) { return unordered_key((uint32_t)a, (uint32_t)b); }
 
 bool sadmm_pair_table_find(const struct sadmm_pair_table *table, uint64_t key, size_t *at)
 {
-    size_t low = 0, high = table->count;
-    while (low < high) {
-        size_t middle = low + (high - low) / 2;
-        if (table->keys[middle] < key)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    *at = low;
-    return low < table->count && table->keys[low] == key;
+    *at = (size_t)lower_bound(table->keys, (int64_t)table->count, key);
+    return *at < table->count && table->keys[*at] == key;
 }
 
 sadmm_status sadmm_pair_table_set(struct sadmm_pair_table *table, uint64_t key, double value, struct sadmm_error *error)

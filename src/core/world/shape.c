@@ -1,6 +1,7 @@
 /* Shapes of a world. */
 #include <string.h>
 
+#include "collision/geometry.h"
 #include "core/base/memory.h"
 #include "world_internal.h"
 
@@ -21,25 +22,19 @@ static bool alive(const sadmm_world *world, size_t slot)
     return world->shapes[slot].alive;
 }
 
-static int size_entries(sadmm_shape_type type)
+static struct sadmm_geometry geometry_of(const sadmm_shape_def *def)
 {
-    switch (type) {
-    case SADMM_SHAPE_SPHERE: return 1;
-    case SADMM_SHAPE_CAPSULE: return 2;
-    case SADMM_SHAPE_BOX: return 3;
-    default: return 0;
-    }
+    struct sadmm_geometry geometry = {.type = (int32_t)def->type, .children = 1};
+    memcpy(geometry.size, def->size, sizeof geometry.size);
+    return geometry;
 }
 
 static sadmm_status check_def(const struct sadmm_world_body *body, const sadmm_shape_def *def, double orientation[4],
                               struct sadmm_error *error)
 {
-    if ((unsigned)def->type >= SADMM_SHAPE_TYPE_COUNT)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->type = %d: must be in [0, %d)", (int)def->type,
-                          SADMM_SHAPE_TYPE_COUNT);
-    if (def->type == SADMM_SHAPE_PLANE && body->type != SADMM_BODY_STATIC)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->type = SADMM_SHAPE_PLANE: only static bodies may have planes");
-    for (int k = 0; k < size_entries(def->type); ++k)
+    const struct sadmm_geometry geometry = geometry_of(def);
+    TRY(sadmm_geometry_check(&geometry, body->type != SADMM_BODY_STATIC, "def->", error));
+    for (int k = 0; k < geometry_sizes(geometry.type); ++k)
         if (!(def->size[k] >= 1e-6 && def->size[k] <= 1e6))
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->size[%d] = %g: must be in [1e-6, 1e6] m", k,
                               def->size[k]);
@@ -66,7 +61,9 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d shapes: a world holds at most 2^28", world->shape_count);
     if (!sadmm_grow((void **)&world->shapes, &world->shape_capacity, world->shape_slots, slot + 1, sizeof *world->shapes) ||
         !sadmm_grow((void **)&world->shape_generations, &world->shape_generation_capacity, world->shape_slots, slot + 1,
-                    sizeof *world->shape_generations))
+                    sizeof *world->shape_generations) ||
+        !sadmm_grow((void **)&world->geometries, &world->geometry_capacity, world->shape_slots, slot + 1,
+                    sizeof *world->geometries))
         return sadmm_fail_memory(error, "a shape");
 
     struct sadmm_shape *shape = &world->shapes[slot];
@@ -75,8 +72,8 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
         world->shape_generations[slot] = 1;
     }
     memset(shape, 0, sizeof *shape);
-    shape->type = def->type;
-    memcpy(shape->size, def->size, sizeof shape->size);
+    shape->geometry = (uint32_t)slot;
+    world->geometries[shape->geometry] = geometry_of(def);
     memcpy(shape->position, def->position, sizeof shape->position);
     memcpy(shape->orientation, orientation, sizeof orientation);
     shape->friction = def->friction;
@@ -144,8 +141,9 @@ sadmm_status sadmm_world_shape_def(sadmm_world *world, sadmm_shape_id id, sadmm_
     if (!shape) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(def, "def", error));
     memset(def, 0, sizeof *def);
-    def->type = shape->type;
-    memcpy(def->size, shape->size, sizeof def->size);
+    const struct sadmm_geometry *geometry = &world->geometries[shape->geometry];
+    def->type = (sadmm_shape_type)geometry->type;
+    memcpy(def->size, geometry->size, sizeof def->size);
     memcpy(def->position, shape->position, sizeof def->position);
     memcpy(def->orientation, shape->orientation, sizeof def->orientation);
     def->friction = shape->friction;

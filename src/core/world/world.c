@@ -59,12 +59,12 @@ void sadmm_world_destroy(sadmm_world *world)
     sadmm_contact_set_free(&world->contacts);
     sadmm_certificate_workspace_free(&world->certificate_workspace);
     for (size_t slot = 0; slot < world->body_slots; ++slot) sadmm_free(world->bodies[slot].name);
-    void *blocks[] = {world->bodies, world->shapes, world->shape_generations, world->disabled_pairs.keys,
-                      world->disabled_pairs.values, world->friction_pairs.keys, world->friction_pairs.values,
-                      world->collision_bodies, world->start.rigid, world->start.velocity, world->start.impulse,
-                      world->last_start.rigid, world->last_start.velocity, world->last_start.impulse, world->next,
-                      world->velocity, world->wrench, world->slot_of, world->resident.steady,
-                      world->resident.edited, world->resident.edits};
+    void *blocks[] = {world->bodies, world->shapes, world->shape_generations, world->geometries,
+                      world->disabled_pairs.keys, world->disabled_pairs.values, world->friction_pairs.keys,
+                      world->friction_pairs.values, world->collision_bodies, world->start.rigid, world->start.velocity,
+                      world->start.impulse, world->last_start.rigid, world->last_start.velocity,
+                      world->last_start.impulse, world->next, world->velocity, world->wrench, world->slot_of,
+                      world->resident.steady, world->resident.edited, world->resident.edits};
     for (size_t i = 0; i < sizeof blocks / sizeof *blocks; ++i) sadmm_free(blocks[i]);
     sadmm_free(world);
 }

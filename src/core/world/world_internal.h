@@ -58,7 +58,8 @@ struct sadmm_world {
     struct sadmm_slot_marks body_marks;
     struct sadmm_shape *shapes;
     uint32_t *shape_generations;
-    size_t shape_slots, shape_capacity, shape_generation_capacity;
+    struct sadmm_geometry *geometries; /* every shape has one of its own, by the number of its slot */
+    size_t shape_slots, shape_capacity, shape_generation_capacity, geometry_capacity;
     int32_t shape_count;
     struct sadmm_slot_marks shape_marks;
     uint32_t shape_revisions;

@@ -1,0 +1,47 @@
+/* Which pairs of types collide, and how: the one list, for host and device.
+ *
+ * An entry is PAIR(type of a, type of b, call): a is of the lower type or, of two of one type, the shape in the lower
+ * slot. In the call a and b are the sizes of the two (vec3, m) and child is the child of the pair (geometry.h); pose,
+ * limit, cache and m are as in manifold.h. The list becomes a switch (pair_manifold.h), not a table of pointers: so all of
+ * it is inlined into the narrow phase, which asks per pair, and a pair that is listed twice does not compile.
+ *
+ * Types without an entry have no contacts and must never meet. Static bodies do not meet each other, so a type that
+ * lacks an entry with any other is for static bodies only: sadmm_geometry_check refuses it elsewhere, where a shape is
+ * added and where collision takes shapes over, on the host and for the device.
+ */
+#ifndef SADMM_COLLISION_COLLISION_TABLE_H
+#define SADMM_COLLISION_COLLISION_TABLE_H
+
+#include <stdbool.h>
+
+#include "core/math/real.h"
+#include "subadmm/world.h"
+
+/* clang-format off */
+#define SADMM_COLLISION_TABLE(PAIR)                                                             \
+    PAIR(PLANE,   SPHERE,  manifold_plane_sphere(b.x, pose, limit, m))                          \
+    PAIR(PLANE,   CAPSULE, manifold_plane_capsule(b.x, b.y, pose, limit, m))                    \
+    PAIR(PLANE,   BOX,     manifold_plane_box(b, pose, limit, m))                               \
+    PAIR(SPHERE,  SPHERE,  manifold_sphere_sphere(a.x, b.x, pose, limit, m))                    \
+    PAIR(SPHERE,  CAPSULE, manifold_sphere_capsule(a.x, b.x, b.y, pose, limit, m))              \
+    PAIR(SPHERE,  BOX,     manifold_sphere_box(a.x, b, pose, limit, cache, m))                  \
+    PAIR(CAPSULE, CAPSULE, manifold_capsule_capsule(a.x, a.y, b.x, b.y, pose, limit, cache, m)) \
+    PAIR(CAPSULE, BOX,     manifold_capsule_box(a.x, a.y, b, pose, limit, cache, m))            \
+    PAIR(BOX,     BOX,     manifold_box_box(b, a, pose, limit, cache, m))
+/* clang-format on */
+
+/* One number for two types, below 256 each. */
+#define SADMM_TYPE_PAIR(type_a, type_b) ((type_a) * 256 + (type_b))
+
+/* Is there an entry for the two types, in either order? */
+SADMM_INLINE bool pair_is_listed(int type_a, int type_b)
+{
+    switch (type_a < type_b ? SADMM_TYPE_PAIR(type_a, type_b) : SADMM_TYPE_PAIR(type_b, type_a)) {
+#define SADMM_LISTED(A, B, call) case SADMM_TYPE_PAIR((int)SADMM_SHAPE_##A, (int)SADMM_SHAPE_##B):
+        SADMM_COLLISION_TABLE(SADMM_LISTED) return true;
+#undef SADMM_LISTED
+    default: return false;
+    }
+}
+
+#endif

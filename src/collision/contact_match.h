@@ -1,0 +1,111 @@
+/* How a contact of the last step lives on in this one.
+ *
+ * Identity: the pair of shapes, the child (geometry.h) and the revisions of the shapes (a slot may hold another shape by
+ * now), then the feature. Sets are sorted by (shape_a, shape_b, child). Impulses are kept as world vectors; where the normal
+ * turned, the normal part goes along the new normal and the tangential part is projected into the new tangent plane, within
+ * the friction disc. They are forces times a time step: where the steps differ in length, the forces are what carries over.
+ *
+ * The axis and the side that the pair remembers (`cache`) say where the bodies came from. They hold only while both
+ * move by themselves: once a pose has been set (sadmm_collision_body.placed), the pair starts without. Impulses may
+ * stay then, for they are no more than a start.
+ */
+#ifndef SADMM_COLLISION_CONTACT_MATCH_H
+#define SADMM_COLLISION_CONTACT_MATCH_H
+
+#include "core/base/contact_set.h"
+#include "core/math/step.h"
+#include "keys.h"
+#include "proxy.h"
+
+/* One word from two counts (revisions, placings): a change of either always shows, of both together as well while the
+ * counts are less than some ten thousand apart (the multipliers have no shorter relation). */
+SADMM_INLINE uint32_t word_of_pair(uint32_t a, uint32_t b) { return a * 0x9E3779B1u + b * 0x85EBCA77u; }
+
+/* ---- which pair -------------------------------------------------------------------------------------------------- */
+
+SADMM_INLINE uint64_t contact_shapes(const struct sadmm_contact_pair *pair)
+{
+    return ordered_key((uint32_t)pair->shape_a, (uint32_t)pair->shape_b);
+}
+
+/* Does the pair come before (shapes, child) in the order of a set? shapes: ordered_key of the two. */
+SADMM_INLINE bool contact_is_before(const struct sadmm_contact_pair *pair, uint64_t shapes, uint32_t child)
+{
+    const uint64_t own = contact_shapes(pair);
+    return own < shapes || (own == shapes && pair->child < child);
+}
+
+/* Index of the first of the sorted pairs [low, high) that does not come before (shapes, child). */
+SADMM_INLINE int64_t contact_lower_bound(const struct sadmm_contact_pair *pairs, int64_t low, int64_t high,
+                                         uint64_t shapes, uint32_t child)
+{
+    while (low < high) {
+        int64_t mid = low + (high - low) / 2;
+        if (contact_is_before(&pairs[mid], shapes, child)) low = mid + 1;
+        else high = mid;
+    }
+    return low;
+}
+
+/* Is `old`, a pair of the same two slots, the same manifold of the same two shapes? All is read at once: no part waits for
+ * another. */
+SADMM_INLINE bool contact_goes_on(const struct sadmm_contact_pair *old, uint32_t child, const struct sadmm_proxy *a,
+                                  const struct sadmm_proxy *b)
+{
+    return (old->child == child) & (old->revision == word_of_pair(a->revision, b->revision));
+}
+
+/* What the pair that goes on remembers, 0: nothing that holds. */
+SADMM_INLINE uint32_t contact_memory(const struct sadmm_contact_pair *old, const struct sadmm_proxy *a,
+                                     const struct sadmm_proxy *b)
+{
+    const uint32_t placed = old->placed, cache = old->cache;
+    return placed == word_of_pair(a->placed, b->placed) ? cache : 0;
+}
+
+/* ---- impulses ---------------------------------------------------------------------------------------------------- */
+
+/* ratio: step_ratio. `out` is left alone when nothing carries over. */
+SADMM_INLINE void impulse_carry(const double old_normal[3], const double old_impulse[3], const double normal[3],
+                                double friction, double ratio, double out[3])
+{
+    double turned = 0, along = 0, back = 0, size = 0, limit, scale, t[3], impulse[3];
+    int k;
+    for (k = 0; k < 3; ++k) {
+        impulse[k] = ratio * old_impulse[k];
+        turned += old_normal[k] * normal[k];
+        along += old_normal[k] * impulse[k];
+    }
+    if (turned <= 0 || along <= 0) return;
+    for (k = 0; k < 3; ++k) {
+        t[k] = impulse[k] - along * old_normal[k];
+        back += t[k] * normal[k];
+    }
+    for (k = 0; k < 3; ++k) {
+        t[k] -= back * normal[k];
+        size += t[k] * t[k];
+    }
+    size = sqrt(size);
+    limit = friction * along;
+    scale = size > limit ? limit / size : 1;
+    for (k = 0; k < 3; ++k) out[k] = along * normal[k] + scale * t[k];
+}
+
+/* The impulse of the old pair's point of this feature, if there is one. A feature occurs once in a manifold; `guess`: its
+ * index in the new one, as most are where they were. before, now: lengths of the steps, s. */
+SADMM_INLINE void contact_carry(const struct sadmm_contact_pair *old, const struct sadmm_contact_point *old_points,
+                                double before, int32_t guess, const double normal[3], double friction, double now,
+                                struct sadmm_contact_point *point)
+{
+    const int32_t count = old->count;
+    const struct sadmm_contact_point *from = old_points + old->first;
+    int32_t n;
+    for (n = 0; n < count; ++n) {
+        const int32_t k = n; (void)guess;
+        if (from[k].feature != point->feature) continue;
+        impulse_carry(old->normal, from[k].impulse, normal, friction, step_ratio(now, before), point->impulse);
+        return;
+    }
+}
+
+#endif

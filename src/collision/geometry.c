@@ -1,0 +1,20 @@
+#include "collision.h"
+
+#include "collision_table.h"
+
+sadmm_status sadmm_geometry_check(const struct sadmm_geometry *geometry, bool moves, const char *name,
+                                  struct sadmm_error *error)
+{
+    if ((uint32_t)geometry->type >= SADMM_SHAPE_TYPE_COUNT)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%stype = %d: must be in [0, %d)", name,
+                          (int)geometry->type, SADMM_SHAPE_TYPE_COUNT);
+    if (geometry->children < 1 || geometry->children > SADMM_MOST_CHILDREN)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%schildren = %d: must be in [1, %d]", name,
+                          (int)geometry->children, SADMM_MOST_CHILDREN);
+    for (int other = 0; moves && other < SADMM_SHAPE_TYPE_COUNT; ++other)
+        if (!pair_is_listed(geometry->type, other))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                              "%stype = %d: has no contacts with type %d, so that only static bodies may have it", name,
+                              (int)geometry->type, other);
+    return SADMM_OK;
+}

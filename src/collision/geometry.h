@@ -1,0 +1,77 @@
+/* What depends on the type of a single geometry; what depends on two is in collision_table.h. */
+#ifndef SADMM_COLLISION_GEOMETRY_H
+#define SADMM_COLLISION_GEOMETRY_H
+
+#include "collision.h"
+#include "core/math/real.h"
+
+/* Every switch over the types names them all and has no default: the compiler says where a new one is missing. */
+
+/* Entries of `size` that the type uses. */
+SADMM_INLINE int geometry_sizes(int type)
+{
+    switch ((sadmm_shape_type)type) {
+    case SADMM_SHAPE_SPHERE: return 1;
+    case SADMM_SHAPE_CAPSULE: return 2;
+    case SADMM_SHAPE_BOX: return 3;
+    case SADMM_SHAPE_PLANE:
+    case SADMM_SHAPE_TYPE_COUNT: break;
+    }
+    return 0;
+}
+
+/* Smallest extent, m; a plane has none that limits. */
+SADMM_INLINE double geometry_thickness(const struct sadmm_geometry *g)
+{
+    switch ((sadmm_shape_type)g->type) {
+    case SADMM_SHAPE_SPHERE:
+    case SADMM_SHAPE_CAPSULE: return 2 * g->size[0];
+    case SADMM_SHAPE_BOX: return 2 * fmin(g->size[0], fmin(g->size[1], g->size[2]));
+    case SADMM_SHAPE_PLANE:
+    case SADMM_SHAPE_TYPE_COUNT: break;
+    }
+    return HUGE_VAL;
+}
+
+/* Radius of the ball around the shape's centre that holds it, m; 0 for a plane (planes do not move). */
+SADMM_INLINE double geometry_radius(const struct sadmm_geometry *g)
+{
+    switch ((sadmm_shape_type)g->type) {
+    case SADMM_SHAPE_SPHERE: return g->size[0];
+    case SADMM_SHAPE_CAPSULE: return g->size[0] + g->size[1];
+    case SADMM_SHAPE_BOX: return sqrt(g->size[0] * g->size[0] + g->size[1] * g->size[1] + g->size[2] * g->size[2]);
+    case SADMM_SHAPE_PLANE:
+    case SADMM_SHAPE_TYPE_COUNT: break;
+    }
+    return 0;
+}
+
+/* Half extents along the world axes, m. R: shape to world. Not for planes, which have no end. */
+SADMM_INLINE void geometry_extents(const struct sadmm_geometry *g, const double R[9], double extent[3])
+{
+    const double *size = g->size;
+    int k;
+    switch ((sadmm_shape_type)g->type) {
+    case SADMM_SHAPE_SPHERE:
+        for (k = 0; k < 3; ++k) extent[k] = size[0];
+        return;
+    case SADMM_SHAPE_CAPSULE:
+        for (k = 0; k < 3; ++k) extent[k] = size[0] + fabs(R[3 * k + 2]) * size[1];
+        return;
+    case SADMM_SHAPE_BOX:
+        for (k = 0; k < 3; ++k)
+            extent[k] = fabs(R[3 * k]) * size[0] + fabs(R[3 * k + 1]) * size[1] + fabs(R[3 * k + 2]) * size[2];
+        return;
+    case SADMM_SHAPE_PLANE:
+    case SADMM_SHAPE_TYPE_COUNT: break;
+    }
+    for (k = 0; k < 3; ++k) extent[k] = HUGE_VAL;
+}
+
+/* Manifolds that a pair may have at most: child = (child of a) x (children of b) + (child of b). */
+SADMM_INLINE uint32_t pair_children(const struct sadmm_geometry *a, const struct sadmm_geometry *b)
+{
+    return (uint32_t)a->children * (uint32_t)b->children;
+}
+
+#endif
