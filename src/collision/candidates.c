@@ -164,16 +164,6 @@ static void update_share(void *argument, int thread, int threads)
     for (size_t slot = begin; slot < end; ++slot) update_slot(update->candidates, update->input, slot, update->renew);
 }
 
-bool sadmm_candidate_meets(const struct sadmm_candidates *c, const struct sadmm_collision_input *input, uint32_t a,
-                           uint32_t b)
-{
-    if (c->proxies[a].geometry.type == SADMM_SHAPE_PLANE)
-        return proxy_plane_meets(&c->proxies[a], &c->boxes[b],
-                                 proxy_plane_reach(&c->proxies[b], input->margin, fall_of(input->gravity, input->dt)));
-    return boxes_overlap(&c->boxes[a], &c->boxes[b]) &&
-           boxes_meet(&c->boxes[a], c->proxies[a].velocity, &c->boxes[b], c->proxies[b].velocity, input->dt);
-}
-
 /* Things that do not change while the shapes stay what they are. */
 static bool may_meet(const struct sadmm_collision_input *input, uint32_t a, uint32_t b)
 {

@@ -58,7 +58,14 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
                                      struct sadmm_error *error);
 
 /* Do the two shapes of a pair in the list come together within this step, as far as their boxes tell (bounds.h)? */
-bool sadmm_candidate_meets(const struct sadmm_candidates *c, const struct sadmm_collision_input *input, uint32_t a,
-                           uint32_t b);
+SADMM_INLINE bool sadmm_candidate_meets(const struct sadmm_candidates *c, const struct sadmm_collision_input *input,
+                                        uint32_t a, uint32_t b)
+{
+    if (c->proxies[a].geometry.type == SADMM_SHAPE_PLANE)
+        return proxy_plane_meets(&c->proxies[a], &c->boxes[b],
+                                 proxy_plane_reach(&c->proxies[b], input->margin, fall_of(input->gravity, input->dt)));
+    return boxes_overlap(&c->boxes[a], &c->boxes[b]) &&
+           boxes_meet(&c->boxes[a], c->proxies[a].velocity, &c->boxes[b], c->proxies[b].velocity, input->dt);
+}
 
 #endif

@@ -61,7 +61,8 @@ void sadmm_collision_destroy(struct sadmm_collision *collision)
     sadmm_free(collision);
 }
 
-sadmm_status sadmm_collision_check_shape(const struct sadmm_collision_input *input, size_t slot, struct sadmm_error *error)
+sadmm_status sadmm_collision_check_shape(const struct sadmm_collision_input *input, size_t slot,
+                                         struct sadmm_error *error)
 {
     const struct sadmm_shape *shape = &input->shapes[slot];
     char name[40];

@@ -1,8 +1,8 @@
 /* Collision detection on the host: broad phase (FCL, or sort and sweep), pair manifolds, matching with the last step.
  *
  * Shapes live in slots that stay put for a shape's life; a dead slot has alive = false. The result does not depend on
- * the order in which a broad phase finds pairs: pairs come out sorted by (shape_a, shape_b, child), where a is the shape of
- * the lower (type, slot) and the normal runs from a to b. Two shapes have a pair for each of their manifolds (sadmm_geometry).
+ * the order in which a broad phase finds pairs: pairs come out sorted by (shape_a, shape_b, child), where a is the shape
+ * of the lower (type, slot) and the normal runs from a to b. Two shapes have a pair for each of their manifolds.
  */
 #ifndef SADMM_COLLISION_COLLISION_H
 #define SADMM_COLLISION_COLLISION_H
@@ -20,16 +20,17 @@ extern "C" {
 enum { SADMM_MOST_CHILDREN = 65535 }; /* the children of a pair are counted in 32 bits */
 
 /* What a shape is made of, apart from where it is and what it is like to touch. Shapes refer to it by a handle, so that
- * several may share one. A geometry has children, the pieces that collide: a pair of shapes has a manifold for each pair of
- * their children, at most. The types there are have one child, the whole; where one is given more, each is the whole. */
+ * several may share one. A geometry has children, the pieces that collide: a pair of shapes has a manifold for each
+ * pair of their children, at most. The types there are have one child, the whole; where one is given more, each is the
+ * whole. */
 struct sadmm_geometry {
     int32_t type;     /* sadmm_shape_type */
     int32_t children; /* in [1, SADMM_MOST_CHILDREN] */
     double size[3];   /* m, as in sadmm_shape_def */
 };
 
-/* May a shape be of this geometry, on a body that moves or does not? Else INVALID_ARGUMENT; `name`: what the message calls
- * the geometry, as "def->". Sizes are not looked at. */
+/* May a shape be of this geometry, on a body that moves or does not? Else INVALID_ARGUMENT; `name`: what the message
+ * calls the geometry, as "def->". Sizes are not checked. */
 sadmm_status sadmm_geometry_check(const struct sadmm_geometry *geometry, bool moves, const char *name,
                                   struct sadmm_error *error);
 
@@ -40,7 +41,7 @@ struct sadmm_shape {
     uint32_t category, mask;
     int32_t body;     /* world body slot */
     bool alive;
-    uint32_t revision; /* changes whenever the slot is reused or the shape's definition changes, its geometry's included */
+    uint32_t revision; /* changes whenever the slot is reused or the shape's definition changes, geometry included */
 };
 
 /* What a world body slot looks like to collision. */
@@ -69,9 +70,10 @@ struct sadmm_collision_input {
     double gravity; /* its size, m/s^2: a body at rest just outside the margin falls gravity x dt^2 in its first step */
 };
 
-/* Is the shape in this slot one that collision can work on? Else INVALID_ARGUMENT that names it. Asked for every shape that is
- * new or changed, by whoever takes the input over. */
-sadmm_status sadmm_collision_check_shape(const struct sadmm_collision_input *input, size_t slot, struct sadmm_error *error);
+/* Is the shape in this slot one that collision can work on? Else INVALID_ARGUMENT that names it. Asked for every shape
+ * that is new or changed, by whoever takes the input over. */
+sadmm_status sadmm_collision_check_shape(const struct sadmm_collision_input *input, size_t slot,
+                                         struct sadmm_error *error);
 
 struct sadmm_collision;
 sadmm_status sadmm_collision_create(struct sadmm_collision **out, struct sadmm_error *error);

@@ -44,21 +44,23 @@ SADMM_INLINE void contact_emit_pair(uint32_t slot_a, uint32_t slot_b, uint32_t c
     pair->child = child;
 }
 
-/* Without an impulse. */
-SADMM_INLINE void contact_emit_point(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+SADMM_INLINE void contact_between(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double between[3])
+{
+    int k;
+    for (k = 0; k < 3; ++k) between[k] = b->com[k] - a->com[k];
+}
+
+/* Without an impulse. between: from the centre of mass of a's body to that of b's. */
+SADMM_INLINE void contact_emit_point(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double between[3],
                                      const struct manifold_point *from, struct sadmm_contact_point *point)
 {
-    const bool a_moves = a->system_body >= 0, b_moves = b->system_body >= 0;
-    double p[3], arm_a[3], arm_b[3];
+    double p[3];
     int k;
     rotate_to_world(b->R, from->position, p);
     for (k = 0; k < 3; ++k) {
-        arm_b[k] = p[k] + b->arm[k];
-        arm_a[k] = arm_b[k] + (b->com[k] - a->com[k]);
-    }
-    for (k = 0; k < 3; ++k) {
-        point->arm_a[k] = a_moves ? arm_a[k] : 0;
-        point->arm_b[k] = b_moves ? arm_b[k] : 0;
+        const double arm = p[k] + b->arm[k];
+        point->arm_b[k] = b->system_body >= 0 ? arm : 0;
+        point->arm_a[k] = a->system_body >= 0 ? arm + between[k] : 0;
         point->impulse[k] = 0;
     }
     point->gap = (double)from->separation;

@@ -1,9 +1,10 @@
 /* How a contact of the last step lives on in this one.
  *
- * Identity: the pair of shapes, the child (geometry.h) and the revisions of the shapes (a slot may hold another shape by
- * now), then the feature. Sets are sorted by (shape_a, shape_b, child). Impulses are kept as world vectors; where the normal
- * turned, the normal part goes along the new normal and the tangential part is projected into the new tangent plane, within
- * the friction disc. They are forces times a time step: where the steps differ in length, the forces are what carries over.
+ * Identity: the pair of shapes, the child (sadmm_geometry) and the revisions of the shapes (a slot may hold another shape
+ * by now), then the feature. Sets are sorted by (shape_a, shape_b, child). Impulses are kept as world vectors; where the
+ * normal turned, the normal part goes along the new normal and the tangential part is projected into the new tangent
+ * plane, within the friction disc. They are forces times a time step: where the steps differ in length, the forces are
+ * what carries over.
  *
  * The axis and the side that the pair remembers (`cache`) say where the bodies came from. They hold only while both
  * move by themselves: once a pose has been set (sadmm_collision_body.placed), the pair starts without. Impulses may
@@ -47,8 +48,8 @@ SADMM_INLINE int64_t contact_lower_bound(const struct sadmm_contact_pair *pairs,
     return low;
 }
 
-/* Is `old`, a pair of the same two slots, the same manifold of the same two shapes? All is read at once: no part waits for
- * another. */
+/* Is `old`, a pair of the same two slots, the same manifold of the same two shapes? All is read at once: no part waits
+ * for another. */
 SADMM_INLINE bool contact_goes_on(const struct sadmm_contact_pair *old, uint32_t child, const struct sadmm_proxy *a,
                                   const struct sadmm_proxy *b)
 {
@@ -91,21 +92,26 @@ SADMM_INLINE void impulse_carry(const double old_normal[3], const double old_imp
     for (k = 0; k < 3; ++k) out[k] = along * normal[k] + scale * t[k];
 }
 
-/* The impulse of the old pair's point of this feature, if there is one. A feature occurs once in a manifold; `guess`: its
- * index in the new one, as most are where they were. before, now: lengths of the steps, s. */
+/* Of the points of the old pair the one of this feature, -1: none. A feature occurs once in a manifold; `guess`: its
+ * index in the new one, for most are where they were. */
+SADMM_INLINE int32_t contact_find_feature(const struct sadmm_contact_point *points, int32_t count, uint32_t feature,
+                                          int32_t guess)
+{
+    int32_t k;
+    if (guess < count && points[guess].feature == feature) return guess;
+    for (k = 0; k < count; ++k)
+        if (points[k].feature == feature) return k;
+    return -1;
+}
+
+/* The impulse of the old pair's point of this feature, if there is one. ratio: step_ratio. */
 SADMM_INLINE void contact_carry(const struct sadmm_contact_pair *old, const struct sadmm_contact_point *old_points,
-                                double before, int32_t guess, const double normal[3], double friction, double now,
+                                int32_t guess, const double normal[3], double friction, double ratio,
                                 struct sadmm_contact_point *point)
 {
-    const int32_t count = old->count;
     const struct sadmm_contact_point *from = old_points + old->first;
-    int32_t n;
-    for (n = 0; n < count; ++n) {
-        const int32_t k = n; (void)guess;
-        if (from[k].feature != point->feature) continue;
-        impulse_carry(old->normal, from[k].impulse, normal, friction, step_ratio(now, before), point->impulse);
-        return;
-    }
+    const int32_t k = contact_find_feature(from, old->count, point->feature, guess);
+    if (k >= 0) impulse_carry(old->normal, from[k].impulse, normal, friction, ratio, point->impulse);
 }
 
 #endif

@@ -13,56 +13,97 @@ static void emit(const struct sadmm_candidates *c, const struct sadmm_collision_
     struct sadmm_contact_pair *pair = &out->pairs[out->pair_count++];
     const double friction = contact_friction(input->friction_pairs, input->friction_values,
                                              (int64_t)input->friction_pair_count, a, b, pa, pb);
-    double normal[3];
+    const double ratio = step_ratio(input->dt, old->dt);
+    double normal[3], between[3];
 
+    contact_between(pa, pb, between);
     rotate_to_world(pb->R, m->normal, normal);
     contact_emit_pair(a, b, child, pa, pb, m, normal, friction, (int32_t)out->point_count, pair);
     for (int i = 0; i < m->count; ++i) {
         struct sadmm_contact_point *point = &out->points[out->point_count++];
-        contact_emit_point(pa, pb, &m->points[i], point);
-        if (before) contact_carry(before, old->points, old->dt, i, normal, friction, input->dt, point);
+        contact_emit_point(pa, pb, between, &m->points[i], point);
+        if (before) contact_carry(before, old->points, i, normal, friction, ratio, point);
     }
 }
 
-static bool is_disabled(const struct sadmm_collision_input *input, const struct sadmm_proxy *a, const struct sadmm_proxy *b)
+static bool is_disabled(const struct sadmm_collision_input *input, const struct sadmm_proxy *a,
+                        const struct sadmm_proxy *b)
 {
     return input->disabled_body_pair_count &&
            find_key(input->disabled_body_pairs, (int64_t)input->disabled_body_pair_count,
                     unordered_key((uint32_t)a->body, (uint32_t)b->body)) >= 0;
 }
 
+/* For one more manifold. */
+static bool has_capacity(const struct sadmm_contact_set *set)
+{
+    return set->pair_count < set->pair_capacity && set->point_count + SADMM_MANIFOLD_POINTS <= set->point_capacity;
+}
+
+static bool grow(struct sadmm_contact_set *set)
+{
+    return sadmm_grow((void **)&set->pairs, &set->pair_capacity, set->pair_count, set->pair_count + 1,
+                      sizeof *set->pairs) &&
+           sadmm_grow((void **)&set->points, &set->point_capacity, set->point_count,
+                      set->point_count + SADMM_MANIFOLD_POINTS, sizeof *set->points);
+}
+
+/* What a range of candidates is worked on with. */
+struct narrow_phase {
+    const struct sadmm_candidates *candidates;
+    const struct sadmm_collision_input *input;
+    const struct sadmm_contact_set *old;
+    size_t next; /* pairs of `old` before it come before everything that is left */
+    struct sadmm_contact_set *out;
+};
+
+/* The pair that a manifold goes on from, NULL: none. They are asked for in the order of sets. */
+static const struct sadmm_contact_pair *find_before(struct narrow_phase *n, uint64_t shapes, uint32_t child,
+                                                    const struct sadmm_proxy *a, const struct sadmm_proxy *b)
+{
+    const struct sadmm_contact_pair *pairs = n->old->pairs;
+    const size_t count = n->old->pair_count;
+    size_t at = n->next;
+    while (at < count && contact_is_before(&pairs[at], shapes, child)) ++at;
+    n->next = at;
+    return at < count && contact_shapes(&pairs[at]) == shapes && contact_goes_on(&pairs[at], child, a, b) ? &pairs[at]
+                                                                                                         : NULL;
+}
+
+/* The manifolds of two shapes; false when out of memory. */
+static bool find_children(struct narrow_phase *n, uint32_t a, uint32_t b)
+{
+    const struct sadmm_collision_input *input = n->input;
+    const struct sadmm_proxy *pa = &n->candidates->proxies[a], *pb = &n->candidates->proxies[b];
+    const uint32_t children = pair_children(&pa->geometry, &pb->geometry);
+    const double limit = proxy_limit(pa, pb, input->margin, input->gravity, input->dt);
+    const struct pair_pose pose = pair_pose(pa->geometry.type == SADMM_SHAPE_PLANE, pa->R, pa->x, pb->R, pb->x);
+    struct manifold m;
+
+    for (uint32_t child = 0; child < children; ++child) {
+        const struct sadmm_contact_pair *before = find_before(n, ordered_key(a, b), child, pa, pb);
+        pair_manifold(&pa->geometry, &pb->geometry, child, &pose, (real)limit,
+                      before ? contact_memory(before, pa, pb) : 0, &m);
+        if (m.count == 0) continue;
+        if (!has_capacity(n->out) && !grow(n->out)) return false;
+        emit(n->candidates, input, a, b, child, &m, n->old, before, n->out);
+    }
+    return true;
+}
+
 bool sadmm_narrow_phase(const struct sadmm_candidates *c, const struct sadmm_collision_input *input, size_t begin,
                         size_t end, const struct sadmm_contact_set *old, struct sadmm_contact_set *out)
 {
-    const uint64_t first = begin < end ? c->list.keys[begin] : 0;
-    size_t next = (size_t)contact_lower_bound(old->pairs, 0, (int64_t)old->pair_count, first, 0);
-    struct manifold m;
+    struct narrow_phase n = {.candidates = c, .input = input, .old = old, .out = out};
+    if (begin < end)
+        n.next = (size_t)contact_lower_bound(old->pairs, 0, (int64_t)old->pair_count, c->list.keys[begin], 0);
 
     for (size_t i = begin; i < end; ++i) {
         const uint64_t key = c->list.keys[i];
         const uint32_t a = (uint32_t)(key >> 32), b = (uint32_t)key;
-        const struct sadmm_proxy *pa = &c->proxies[a], *pb = &c->proxies[b];
-
-        if (!sadmm_candidate_meets(c, input, a, b) || is_disabled(input, pa, pb)) continue;
-        const uint32_t children = pair_children(&pa->geometry, &pb->geometry);
-        const double limit = proxy_limit(pa, pb, input->margin, input->gravity, input->dt);
-        const struct pair_pose pose = pair_pose(pa->geometry.type == SADMM_SHAPE_PLANE, pa->R, pa->x, pb->R, pb->x);
-        for (uint32_t child = 0; child < children; ++child) {
-            const struct sadmm_contact_pair *before = NULL;
-            while (next < old->pair_count && contact_is_before(&old->pairs[next], key, child)) ++next;
-            if (next < old->pair_count && contact_shapes(&old->pairs[next]) == key &&
-                contact_goes_on(&old->pairs[next], child, pa, pb))
-                before = &old->pairs[next];
-            pair_manifold(&pa->geometry, &pb->geometry, child, &pose, (real)limit,
-                          before ? contact_memory(before, pa, pb) : 0, &m);
-            if (m.count == 0) continue;
-            if (!sadmm_grow((void **)&out->pairs, &out->pair_capacity, out->pair_count, out->pair_count + 1,
-                            sizeof *out->pairs) ||
-                !sadmm_grow((void **)&out->points, &out->point_capacity, out->point_count,
-                            out->point_count + SADMM_MANIFOLD_POINTS, sizeof *out->points))
-                return false;
-            emit(c, input, a, b, child, &m, old, before, out);
-        }
+        if (sadmm_candidate_meets(c, input, a, b) && !is_disabled(input, &c->proxies[a], &c->proxies[b]) &&
+            !find_children(&n, a, b))
+            return false;
     }
     return true;
 }

@@ -32,9 +32,11 @@ SADMM_INLINE struct pair_pose pair_pose(bool a_is_plane, const double Ra[9], con
     return pose;
 }
 
-/* Of one child of the pair. a->type <= b->type; m->count is 0 when the shapes are apart, and for types that are not listed. */
-SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b, uint32_t child,
-                                const struct pair_pose *pose, real limit, uint32_t cache, struct manifold *m)
+/* Of one child of the pair. The type of a is not above b's; m->count is 0 when the shapes are apart, and for types that
+ * are not listed. */
+SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
+                                uint32_t child, const struct pair_pose *pose, real limit, uint32_t cache,
+                                struct manifold *m)
 {
     const vec3 a = v3_load(shape_a->size), b = v3_load(shape_b->size);
     (void)child; /* no type has more than one piece */

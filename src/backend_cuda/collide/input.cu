@@ -136,7 +136,8 @@ sadmm_status COLLISION(take_input)(struct sadmm_cuda_collision *c, const struct 
         TRY(list_shapes(c, input, error));
         TRY(upload_input(c, PRESENT, c->present, (size_t)(v->leaf_count + v->plane_count), sizeof *c->present, true,
                          error));
-        TRY(upload_input(c, GEOMETRIES, input->geometries, input->geometry_count, sizeof *input->geometries, true, error));
+        TRY(upload_input(c, GEOMETRIES, input->geometries, input->geometry_count, sizeof *input->geometries, true,
+                         error));
         TRY(upload_input(c, SHAPES, input->shapes, input->shape_count, sizeof *input->shapes, true, error));
     }
     if (!bodies) TRY(upload_input(c, BODIES, input->bodies, input->body_count, sizeof *input->bodies, true, error));

@@ -43,10 +43,13 @@ static __device__ void emit_point(const collision_view &v, const step_lengths &d
     }
 
     struct sadmm_contact_point point;
-    contact_emit_point(pa, pb, &m->points[lane], &point);
+    double between[3];
+    contact_between(pa, pb, between);
+    contact_emit_point(pa, pb, between, &m->points[lane], &point);
     const int32_t match = v.matches[i];
     if (match >= 0)
-        contact_carry(&v.before.pairs[match], v.before.points, dt.before, lane, normal, friction, dt.now, &point);
+        contact_carry(&v.before.pairs[match], v.before.points, lane, normal, friction, step_ratio(dt.now, dt.before),
+                      &point);
     v.after.points[first + lane] = point;
 }
 

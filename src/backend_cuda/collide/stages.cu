@@ -134,8 +134,9 @@ static sadmm_status sort_candidates(struct sadmm_cuda_collision *c, struct sadmm
     v->candidates = keys[1];
     if (ranked(c)) return launch(c, c->kernels.rank, (int64_t)v->candidate_capacity * RANK_SHARES, error);
     c->kernel = "candidate sort";
-    CUDA_CALL(c, COLLISION(sort)(in<void>(c, TEMP), &bytes, keys, nullptr, v->candidate_capacity, 2 * v->slot_bits + v->child_bits,
-                                 &at, c->stream), c->kernel);
+    const int bits = 2 * v->slot_bits + v->child_bits;
+    CUDA_CALL(c, COLLISION(sort)(in<void>(c, TEMP), &bytes, keys, nullptr, v->candidate_capacity, bits, &at, c->stream),
+              c->kernel);
     v->candidates = keys[at];
     return SADMM_OK;
 }

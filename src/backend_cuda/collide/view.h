@@ -19,13 +19,13 @@
  * contacts before its own: two launches where a radix sort and a scan need some eight. With more room the sort takes
  * all of it; unused candidates are all ones and go to the end.
  *
- * A candidate is a child of a pair of shapes (collision/geometry.h): where every shape has one child, a pair. Shapes are
- * checked when they are taken over (input.cu), so that every pair of them is one that collision_table.h lists; a pair that
- * is not would have no contacts.
+ * A candidate is a child of a pair of shapes (sadmm_geometry): where every shape has one child, a pair. Shapes are
+ * checked when they are taken over (input.cu), so that collision_table.h lists every pair that meets; one that it does
+ * not list would have no contacts.
  *
- * Double throughout, with the host pipeline's own inline formulas (proxy.h, pair_manifold.h, contact_match.h, contact_emit.h):
- * the same operations in the same order, compiled without contraction of a * b + c, so that the contacts are the host's bit
- * for bit. tests/test_cuda_collision.c holds the two together.
+ * Double throughout, with the host pipeline's own inline formulas (proxy.h, pair_manifold.h, contact_match.h,
+ * contact_emit.h): the same operations in the same order, compiled without contraction of a * b + c, so that the
+ * contacts are the host's bit for bit. tests/test_cuda_collision.c holds the two together.
  */
 #ifndef SADMM_CUDA_COLLIDE_VIEW_H
 #define SADMM_CUDA_COLLIDE_VIEW_H
