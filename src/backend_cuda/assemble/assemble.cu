@@ -111,11 +111,6 @@ static __device__ real4 pack(vec3 a, double w)
     return out;
 }
 
-static __device__ double solver_friction(const model_view &model, double mu)
-{
-    return model.fast ? contact_friction_inside(mu, SOLVER_EPSILON) : mu;
-}
-
 /* contacts.lanes threads a pair, each every contacts.lanes-th point; the first also what the points share. FAST: records
  * of sides, too. */
 template <bool FAST>
@@ -168,41 +163,6 @@ static __global__ void __launch_bounds__(BODY_THREADS)
                     &sums);
 }
 
-/* ---- constraints given by Jacobian rows ------------------------------------------------------------------------ */
-
-static __device__ void store(const row_view &rows, int32_t plane, int32_t k, double value)
-{
-    rows.data[(size_t)plane * (size_t)rows.stride + (size_t)k] = (solver_real)value;
-}
-
-static __global__ void assemble_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
-{
-    int32_t k = thread_index();
-    if (k >= live_rows(v.model, v.rows)) return;
-    const struct sadmm_problem_block *block = &v.raw.blocks[k];
-    bool a = block->body_a >= 0, b = block->body_b >= 0;
-    row_about about = {(int32_t)block->kind, block->rows, a ? block->body_a : v.model.bodies,
-                       b ? block->body_b : v.model.bodies, -1, -1, 0};
-    for (int r = 0; r < 6; ++r) {
-        bool used = r < block->rows, any = false;
-        for (int j = 0; j < 6; ++j) {
-            double ja = used && a ? block->jacobian_a[6 * r + j] : 0, jb = used && b ? block->jacobian_b[6 * r + j] : 0;
-            store(v.rows, ROW_J_A + 6 * r + j, k, ja);
-            store(v.rows, ROW_J_B + 6 * r + j, k, jb);
-            any = any || ja != 0 || jb != 0;
-        }
-        bool active = used && (any || block->kind != SADMM_BLOCK_HARD);
-        if (active) about.active |= 1 << r;
-        store(v.rows, ROW_ERROR + r, k, used ? block->error[r] : 0);
-        store(v.rows, ROW_STIFFNESS + r, k, used ? block->stiffness[r] : 0);
-        store(v.rows, ROW_DAMPING + r, k, used ? block->damping[r] : 0);
-        store(v.rows, ROW_LAMBDA + r, k,
-              v.model.warm_start && active ? v.raw.block_lambda[6 * (size_t)k + (size_t)r] : 0);
-    }
-    store(v.rows, ROW_FRICTION, k, solver_friction(v.model, block->friction));
-    v.rows.info[k] = about;
-}
-
 /* ---- entries --------------------------------------------------------------------------------------------------- */
 
 extern "C" sadmm_status CUDA(assemble_contacts)(struct sadmm_context *c, struct sadmm_error *error)
@@ -213,13 +173,6 @@ extern "C" sadmm_status CUDA(assemble_contacts)(struct sadmm_context *c, struct 
         c, c->fast ? assemble_contacts_kernel<true> : assemble_contacts_kernel<false>, "assemble_contacts",
         ((int64_t)c->view.contacts.pair_capacity * c->view.contacts.lanes + BODY_THREADS - 1) / BODY_THREADS,
         BODY_THREADS, &args, error);
-}
-
-extern "C" sadmm_status CUDA(assemble_rows)(struct sadmm_context *c, struct sadmm_error *error)
-{
-    cuda_args args = {};
-    CUDA_ENTER(c);
-    return CUDA(launch)(c, assemble_rows_kernel, "assemble_rows", blocks_for(c->view.rows.count), &args, error);
 }
 
 sadmm_status CUDA(enqueue_bodies)(struct sadmm_context *c, struct sadmm_error *error) { return launch_bodies(c, error); }

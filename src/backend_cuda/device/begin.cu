@@ -2,7 +2,6 @@
 #include <string.h>
 
 #include "backend_cuda/device/context.h"
-#include "core/base/memory.h"
 
 /* ---- arrays ---------------------------------------------------------------------------------------------------- */
 
@@ -10,16 +9,16 @@
 static sadmm_status reserve_raw(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_view *v = &c->view;
-    size_t n = (size_t)v->model.bodies, rows = (size_t)v->rows.count;
+    size_t n = (size_t)v->model.bodies;
     size_t body = c->plan.rigid ? sizeof(struct sadmm_rigid) : 42 * sizeof(double);
     size_t bodies = n * (body + 6 * sizeof(double)),
            pairs = (size_t)v->contacts.pair_capacity * sizeof(struct sadmm_contact_pair);
     size_t points = (size_t)v->model.points * sizeof(struct sadmm_contact_point);
-    size_t blocks = rows * (sizeof(struct sadmm_problem_block) + 6 * sizeof(double));
+    size_t row_bytes = CUDA(raw_row_bytes)(v->rows.count);
     const cuda_capacity wanted[] = {
         {BUFFER_RAW_BODIES, bodies}, {BUFFER_RAW_PAIRS, pairs}, {BUFFER_RAW_POINTS, points},
-        {BUFFER_RAW_BLOCKS, blocks}, {PINNED_BODIES, bodies},   {PINNED_PAIRS, pairs},
-        {PINNED_POINTS, points},     {PINNED_BLOCKS, blocks},
+        {BUFFER_RAW_ROWS, row_bytes}, {PINNED_BODIES, bodies},   {PINNED_PAIRS, pairs},
+        {PINNED_POINTS, points},     {PINNED_ROWS, row_bytes},
     };
     CUDA_TRY(reserve_all(c, wanted, error));
     void *const none = nullptr;
@@ -32,9 +31,7 @@ static sadmm_status reserve_raw(struct sadmm_context *c, struct sadmm_error *err
     v->raw.system.A = (const double *)(c->plan.rigid ? none : raw);
     v->raw.system.b = c->plan.rigid ? nullptr : v->raw.system.A + 36 * n;
     v->raw.system.velocity = (double *)(raw + n * body);
-    raw = (char *)b[BUFFER_RAW_BLOCKS].data;
-    v->raw.blocks = (const struct sadmm_problem_block *)raw;
-    v->raw.block_lambda = (double *)(raw + rows * sizeof(struct sadmm_problem_block));
+    CUDA(bind_raw_rows)(c, b[BUFFER_RAW_ROWS].data);
     v->raw.pairs = (struct sadmm_contact_pair *)b[BUFFER_RAW_PAIRS].data;
     v->raw.points = (struct sadmm_contact_point *)b[BUFFER_RAW_POINTS].data;
     return SADMM_OK;
@@ -72,7 +69,7 @@ enum { SCALAR_BYTES = 128 };
 sadmm_status CUDA(reserve_solver)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_view *v = &c->view;
-    size_t n = (size_t)v->model.bodies, pairs = (size_t)v->contacts.pair_capacity, rows = (size_t)v->rows.stride,
+    size_t n = (size_t)v->model.bodies, pairs = (size_t)v->contacts.pair_capacity, rows = (size_t)v->rows.count,
            real_size = sizeof(solver_real);
     v->contacts.lanes = c->statistics.point_slots <= 1 ? 1 : 4;
     size_t lanes = (size_t)v->contacts.lanes,
@@ -95,8 +92,9 @@ sadmm_status CUDA(reserve_solver)(struct sadmm_context *c, struct sadmm_error *e
         {BUFFER_PAIR_ENDS, pairs * sizeof(pair_ends)},
         {BUFFER_ARM, slots * sizeof(real4)},
         {BUFFER_LAMBDA, 3 * slots * real_size},
-        {BUFFER_ROW_INFO, rows * sizeof(row_about)},
-        {BUFFER_ROW_DATA, rows * ROW_PLANES * real_size},
+        {BUFFER_ROW_CONSTRAINTS, rows * sizeof(row_constraint)},
+        {BUFFER_ROWS, rows * SADMM_MAX_ROWS * sizeof(row_data)},
+        {BUFFER_ROW_RESPONSES, rows * SADMM_MAX_ROWS * sizeof(row_response)},
         {BUFFER_RECORDS, records},
         {BUFFER_CHANGE, joins ? records : 0},
         {BUFFER_EXCHANGE, c->partition.tier == SADMM_CUDA_TIER_GRID ? 2 * n * ROW * real_size : 0},
@@ -126,8 +124,9 @@ sadmm_status CUDA(reserve_solver)(struct sadmm_context *c, struct sadmm_error *e
     v->contacts.arm = (real4 *)b[BUFFER_ARM].data;
     v->contacts.lambda = (solver_real *)b[BUFFER_LAMBDA].data;
     v->contacts.lambda_stride = slots;
-    v->rows.info = (row_about *)b[BUFFER_ROW_INFO].data;
-    v->rows.data = (solver_real *)b[BUFFER_ROW_DATA].data;
+    v->rows.constraints = (row_constraint *)b[BUFFER_ROW_CONSTRAINTS].data;
+    v->rows.data = (row_data *)b[BUFFER_ROWS].data;
+    v->rows.responses = (row_response *)b[BUFFER_ROW_RESPONSES].data;
     v->iteration.records = (solver_real *)b[BUFFER_RECORDS].data;
     v->iteration.change = (solver_real *)(joins ? b[BUFFER_CHANGE].data : none);
     v->iteration.exchange = (solver_real *)b[BUFFER_EXCHANGE].data;
@@ -154,34 +153,8 @@ static void count(struct sadmm_context *c)
     v->contacts.pair_capacity = (c->plan.pairs + WARP - 1) / WARP * WARP;
     v->model.points = c->plan.points;
     v->rows.count = (int32_t)sadmm_row_constraint_count(c->system);
-    v->rows.stride = (v->rows.count + WARP - 1) / WARP * WARP;
     v->model.contact_rows = c->plan.contact_rows;
     v->model.warm_start = c->plan.warm_start;
-}
-
-/* Constraints given by rows as blocks: what the kernels know of them. */
-static sadmm_status upload_blocks(struct sadmm_context *c, struct sadmm_error *error)
-{
-    const struct sadmm_rows *rows = c->system->rows;
-    const cuda_view *v = &c->view;
-    const size_t count = rows->constraint_count, size = count * sizeof(struct sadmm_problem_block);
-    struct sadmm_problem_block *blocks = (struct sadmm_problem_block *)sadmm_alloc(count, sizeof *blocks);
-    double *lambda = (double *)sadmm_alloc(6 * count, sizeof *lambda);
-    sadmm_status status = blocks && lambda ? SADMM_OK : sadmm_fail_memory(error, "the cuda backend's rows");
-    for (size_t k = 0; k < count && status == SADMM_OK; ++k) {
-        const struct sadmm_row_constraint *constraint = &rows->constraints[k];
-        if (!sadmm_rows_as_block(rows, k, &blocks[k]))
-            status = sadmm_fail(error, SADMM_ERROR_UNSUPPORTED,
-                                "constraint %zu given by rows: the cuda backend has no rows with bounds, nor several kinds in one",
-                                k);
-        memcpy(lambda + 6 * k, rows->lambda + constraint->first, (size_t)constraint->count * sizeof *lambda);
-    }
-    if (status == SADMM_OK) status = CUDA(upload)(c, (void *)v->raw.blocks, PINNED_BLOCKS, 0, blocks, size, error);
-    if (status == SADMM_OK)
-        status = CUDA(upload)(c, v->raw.block_lambda, PINNED_BLOCKS, size, lambda, 6 * count * sizeof *lambda, error);
-    sadmm_free(blocks);
-    sadmm_free(lambda);
-    return status;
 }
 
 static sadmm_status upload_raw(struct sadmm_context *c, struct sadmm_error *error)
@@ -193,7 +166,7 @@ static sadmm_status upload_raw(struct sadmm_context *c, struct sadmm_error *erro
                           contacts->pair_count * sizeof *contacts->pairs, error));
     CUDA_TRY(CUDA(upload)(c, (void *)v->raw.points, PINNED_POINTS, 0, contacts->points,
                           contacts->point_count * sizeof *contacts->points, error));
-    return v->rows.count > 0 ? upload_blocks(c, error) : SADMM_OK;
+    return CUDA(upload_rows)(c, error);
 }
 
 /* Parts that turn out to be too large: STREAM has none. */

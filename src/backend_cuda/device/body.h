@@ -81,9 +81,4 @@ static __device__ __forceinline__ double own_number(const double *x, int32_t lan
     return own;
 }
 
-static __device__ __forceinline__ double row_number(const row_view &rows, int32_t plane, int32_t k)
-{
-    return (double)rows.data[(size_t)plane * (size_t)rows.stride + (size_t)k];
-}
-
 #endif

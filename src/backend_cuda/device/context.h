@@ -19,13 +19,13 @@ enum cuda_buffer_name {
     /* device */
     BUFFER_STATE, BUFFER_B, BUFFER_LINES, BUFFER_C, BUFFER_BETA,
     BUFFER_NORMAL, BUFFER_DIFFERENCE, BUFFER_PAIR_ENDS, BUFFER_ARM, BUFFER_LAMBDA,
-    BUFFER_ROW_INFO, BUFFER_ROW_DATA, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_EXCHANGE, BUFFER_LIVE, BUFFER_LAYOUT, BUFFER_SORT,
+    BUFFER_ROW_CONSTRAINTS, BUFFER_ROWS, BUFFER_ROW_RESPONSES, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_EXCHANGE, BUFFER_LIVE, BUFFER_LAYOUT, BUFFER_SORT,
     BUFFER_NUMBERS, BUFFER_SCALARS, BUFFER_SETTINGS, BUFFER_WEIGHTS, BUFFER_SIDES,
-    BUFFER_RAW_BODIES, BUFFER_RAW_PAIRS, BUFFER_RAW_POINTS, BUFFER_RAW_BLOCKS, BUFFER_OUT,
+    BUFFER_RAW_BODIES, BUFFER_RAW_PAIRS, BUFFER_RAW_POINTS, BUFFER_RAW_ROWS, BUFFER_OUT,
     BUFFER_WORLD_BODIES, BUFFER_WORLD_STEADY, BUFFER_WORLD_WRENCH, BUFFER_WORLD_VELOCITY, BUFFER_WORLD_IMPULSE,
     BUFFER_WORLD_SLOTS, BUFFER_WORLD_PLACES, BUFFER_WORLD_CONTROL,
     /* pinned */
-    PINNED_LIVE, PINNED_SETTINGS, PINNED_BODIES, PINNED_PAIRS, PINNED_POINTS, PINNED_BLOCKS, PINNED_OUT, PINNED_REPORTS,
+    PINNED_LIVE, PINNED_SETTINGS, PINNED_BODIES, PINNED_PAIRS, PINNED_POINTS, PINNED_ROWS, PINNED_OUT, PINNED_REPORTS,
     BUFFER_COUNT
 };
 
@@ -196,21 +196,27 @@ sadmm_status CUDA(upload_live)(struct sadmm_context *, enum cuda_abort, struct s
 /* Wait for what the device knows now. */
 sadmm_status CUDA(download_known)(struct sadmm_context *, struct cuda_known *out, struct sadmm_error *error);
 
+/* ---- assemble/rows.cu: constraints given by rows, as core has them ---- */
+
+size_t CUDA(raw_row_bytes)(int32_t count); /* of constraints */
+void CUDA(bind_raw_rows)(struct sadmm_context *, void *memory);
+sadmm_status CUDA(upload_rows)(struct sadmm_context *, struct sadmm_error *error);
+
 /* ---- iterate/streamed.cu, iterate/persistent.cu ---- */
 
 /* STREAM. fast, goes_on: none of them is the batch's last. */
 sadmm_status CUDA(stream_iterations)(struct sadmm_context *, int count, bool measure, bool goes_on, struct sadmm_error *error);
 /* Before a measured iteration: its primal residual. */
 sadmm_status CUDA(clear_primal)(struct sadmm_context *, bool measure, struct sadmm_error *error);
-/* The instance of the persistent kernel for a tier (full: there are row blocks, or the last iteration is measured);
- * threads a block at most; bytes of shared memory. */
-cuda_kernel CUDA(persistent_kernel)(int point_slots, enum sadmm_cuda_tier tier, int threads, bool full, bool fast,
+/* The instance of the persistent kernel for a tier (rows: there are constraints given by rows); threads a block at most;
+ * bytes of shared memory. */
+cuda_kernel CUDA(persistent_kernel)(int point_slots, enum sadmm_cuda_tier tier, int threads, bool rows, bool fast,
                                   const char **name);
-/* Whether the instance for a partition, without row blocks and not measured, does the prologue and the epilogue of a
+/* Whether the instance for a partition, without constraints given by rows, does the prologue and the epilogue of a
  * step of `fast`, too. */
 bool CUDA(persistent_does_prologue)(const struct cuda_partition *);
-int CUDA(persistent_threads)(int point_slots);
-size_t CUDA(persistent_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies, bool row_blocks);
+int CUDA(persistent_threads)(int point_slots, bool rows);
+size_t CUDA(persistent_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies);
 /* Let every instance use `bytes` of shared memory a block, and clusters of more than 8 blocks. *clusters: whether both the
  * device and the code that was loaded for it know clusters. */
 cudaError_t CUDA(persistent_allow)(int bytes, bool device_has_clusters, bool *clusters);

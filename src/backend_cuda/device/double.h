@@ -15,4 +15,9 @@ static __device__ __forceinline__ int32_t thread_index(void)
     return (int32_t)(blockIdx.x * (unsigned)THREADS + threadIdx.x);
 }
 
+static inline __device__ double solver_friction(const model_view &model, double mu)
+{
+    return model.fast ? contact_friction_inside(mu, SOLVER_EPSILON) : mu;
+}
+
 #endif

@@ -53,6 +53,8 @@
 
 typedef SADMM_REAL solver_real;
 
+#include "row.h"
+
 /* Of this precision. */
 #define SOLVER_EPSILON (sizeof(solver_real) == sizeof(float) ? (double)FLT_EPSILON : DBL_EPSILON)
 
@@ -70,31 +72,8 @@ enum {
     LANES = 8             /* threads a body */
 };
 
-/* Planes of the row blocks' data, each row_stride long. */
-enum {
-    ROW_J_A = 0,
-    ROW_J_B = 36,
-    ROW_ERROR = 72,
-    ROW_STIFFNESS = 78,
-    ROW_DAMPING = 84,
-    ROW_LAMBDA = 90,
-    ROW_FRICTION = 96,
-    /* fast: B = diag(weight) + along along^T; per row J A^-1 J^T, and what its multiplier counts for in the load */
-    ROW_WEIGHT = 97,
-    ROW_ALONG = 103,
-    ROW_RESPONSE = 109,
-    ROW_SCALE = 115,
-    ROW_PLANES = 121
-};
-
 struct alignas(16) real4 {
     solver_real x, y, z, w;
-};
-
-struct row_about {
-    int32_t kind, rows, body_a, body_b; /* raw; the static world: `bodies` */
-    int32_t side_a, side_b;             /* as in pair_ends */
-    int32_t active;                     /* bit r: row r exists (a hard row of zeros is no constraint, Sec. III-C) */
 };
 
 /* fast: of an island, at its label. */
@@ -103,7 +82,7 @@ struct cuda_island {
     double weight_scale, rescale; /* math/weight.h; rescale not 0: weights are those taken last, times this */
     double stack_depth;     /* math/weight.h: in steps that start warm, else 1 */
     double slow_down;    /* math/limit.h: the factor of its velocities */
-    int32_t blocks;      /* there are constraints by rows: the weight scale stays 1 */
+    int32_t rows;        /* there are constraints given by rows: the weight scale stays 1 */
     int32_t stopped;     /* iterations after which a check found the tolerances met; 0: not yet */
 };
 
@@ -191,11 +170,12 @@ struct contact_view {
     size_t lambda_stride; /* from plane to plane */
 };
 
-/* Row blocks in the solver's form. */
+/* Constraints given by rows in the solver's form (device/row.h). */
 struct row_view {
-    int32_t count, stride; /* exact, known to the host; rounded up */
-    row_about *info;
-    solver_real *data;     /* ROW_PLANES x stride */
+    int32_t count; /* of constraints: exact, known to the host */
+    row_constraint *constraints;
+    row_data *data;          /* count x SADMM_MAX_ROWS */
+    row_response *responses; /* fast: likewise */
 };
 
 /* fast: what weights are made of. */
@@ -229,8 +209,8 @@ struct iteration_view {
 /* Core's own data, in double and in its order: where a step begins, and results. */
 struct raw_view {
     struct sadmm_system system; /* rigid, A, b, velocity */
-    const struct sadmm_problem_block *blocks; /* constraints given by rows */
-    double *block_lambda;                     /* (blocks x 6) */
+    const struct sadmm_row_constraint *constraints;
+    const struct raw_row *rows; /* constraints x SADMM_MAX_ROWS */
     const struct sadmm_contact_pair *pairs;
     const struct sadmm_contact_point *points;
     double *out; /* results */

@@ -99,7 +99,7 @@ static void bind_raw(struct sadmm_context *c)
 {
     c->layout.pairs = c->view.raw.pairs;
     c->layout.points = c->view.raw.points;
-    c->layout.blocks = c->view.raw.blocks;
+    c->layout.constraints = c->view.raw.constraints;
 }
 
 static sadmm_status check_partition(struct sadmm_context *c, const struct cuda_partition *partition,
@@ -174,6 +174,7 @@ extern "C" sadmm_status CUDA(set_abort)(struct sadmm_context *c, enum cuda_abort
 {
     CUDA_ENTER(c);
     CUDA_TRY(CUDA(wait)(c, error));
+    c->placed = false; /* what was to place records while aborted did nothing */
     return CUDA(upload_live)(c, abort_code, error);
 }
 

@@ -150,9 +150,9 @@ LAYOUT_INLINE void statistics_of_record(const layout_view &v, int32_t record, in
         body[1] = about.bodies.y;
         statistics_of_pair(v, about, v.pairs[record].friction, own);
     } else if (record >= v.pair_capacity) {
-        const sadmm_problem_block &block = v.blocks[record - v.pair_capacity];
-        body[0] = block.body_a;
-        body[1] = block.body_b;
+        const sadmm_row_constraint &constraint = v.constraints[record - v.pair_capacity];
+        body[0] = constraint.body_a;
+        body[1] = constraint.body_b;
     }
     for (int side = 0; side < 2; ++side) {
         bool is_side = body[side] >= 0;

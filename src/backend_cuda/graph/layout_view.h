@@ -1,4 +1,4 @@
-/* The layout (graph/layout.h) of a step, made on the device from core's own pairs and blocks: compiled once, for both
+/* The layout (graph/layout.h) of a step, made on the device from core's own pairs and row constraints: compiled once, for both
  * precisions.
  *
  *   statistics    a thread a record: statistics of the pairs, the body of every side, degrees, islands joined
@@ -36,7 +36,7 @@ struct layout_view {
     struct cuda_graph_statistics *statistics;
     const struct sadmm_contact_pair *pairs;
     const struct sadmm_contact_point *points;
-    const struct sadmm_problem_block *blocks;
+    const struct sadmm_row_constraint *constraints; /* given by rows */
     int32_t bodies, pair_capacity, rows; /* as in cuda_view */
     int32_t warm_start;
     int32_t most_blocks; /* that run at once */

@@ -17,6 +17,8 @@
  *   GRID     an island that no cluster can hold, or a few that do not fit side by side
  *   STREAM   what the device cannot hold at once
  */
+#include <limits.h>
+
 #include "backend_cuda/device/context.h"
 
 enum {
@@ -60,21 +62,20 @@ static int64_t threads_for(struct bound bound, int64_t most)
 static bool take_capacity(const struct sadmm_context *c, struct cuda_partition *partition, struct bound bound,
                           int64_t bytes)
 {
-    bool rows = c->view.rows.count > 0;
     int64_t low = bound.bodies, high = larger(c->view.model.bodies, low);
     partition->most_sides = partition->threads / QUAD;
     if (partition->threads == WARP && bound.bodies > WARP / LANES) return false;
-    if ((int64_t)CUDA(persistent_shared)(partition->tier, partition->threads, (int32_t)low, rows) > bytes) return false;
+    if ((int64_t)CUDA(persistent_shared)(partition->tier, partition->threads, (int32_t)low) > bytes) return false;
     while (low < high) { /* the most bodies that fit */
         int64_t middle = (low + high + 1) / 2;
-        if ((int64_t)CUDA(persistent_shared)(partition->tier, partition->threads, (int32_t)middle, rows) <= bytes)
+        if ((int64_t)CUDA(persistent_shared)(partition->tier, partition->threads, (int32_t)middle) <= bytes)
             low = middle;
         else high = middle - 1;
     }
     /* A block of one warp keeps all its bodies in registers (iterate/persistent.h). */
     if (partition->threads == WARP) low = smaller(low, WARP / LANES);
     partition->most_bodies = (int32_t)low;
-    partition->shared = CUDA(persistent_shared)(partition->tier, partition->threads, partition->most_bodies, rows);
+    partition->shared = CUDA(persistent_shared)(partition->tier, partition->threads, partition->most_bodies);
     return true;
 }
 
@@ -118,7 +119,7 @@ static struct choice choose_block(const struct sadmm_context *c, const struct cu
 {
     static const char too_large[] = "an island does not fit a thread block";
     if (c->refused >> SADMM_CUDA_TIER_BLOCK & 1) return no_choice(refused);
-    const int64_t most = CUDA(persistent_threads)(statistics->point_slots), most_sides = most / QUAD;
+    const int64_t most = CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0), most_sides = most / QUAD;
     if (statistics->island_sides > most_sides) return no_choice(too_large);
     /* As many blocks a multiprocessor as run side by side and find an island each; when that is too few for the room a
      * block has, blocks that run one after another. */
@@ -153,7 +154,7 @@ static struct choice choose_cluster_of(const struct sadmm_context *c, const stru
 {
     static const char too_large[] = "an island does not fit a cluster of thread blocks";
     const char *name = nullptr;
-    const int64_t most = CUDA(persistent_threads)(statistics->point_slots), most_sides = most / QUAD;
+    const int64_t most = CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0), most_sides = most / QUAD;
     const int64_t cost = (int64_t)statistics->sides + c->view.model.bodies;
     /* As many clusters as find a multiprocessor for each of their blocks; when that is too few for the room a block has,
      * clusters that run one after another. */
@@ -177,7 +178,7 @@ static struct choice choose_cluster_of(const struct sadmm_context *c, const stru
         return no_choice(too_large);
     int active = 0;
     cuda_kernel kernel =
-        CUDA(persistent_kernel)(statistics->point_slots, SADMM_CUDA_TIER_CLUSTER, 0, true, c->fast, &name);
+        CUDA(persistent_kernel)(statistics->point_slots, SADMM_CUDA_TIER_CLUSTER, INT_MAX, c->view.rows.count > 0, c->fast, &name);
     *code = CUDA(active_clusters)(c, kernel, &choice.partition, &active);
     if (*code != cudaSuccess || active < 1) return no_choice("the device has no clusters that large");
     const int64_t rounds = up(smaller(clusters, larger(statistics->islands, 1)), active);
@@ -209,7 +210,7 @@ static struct choice choose_grid(const struct sadmm_context *c, const struct cud
     static const char too_large[] = "more constraints than the device can hold at once";
     const char *name = nullptr;
     if (c->refused >> SADMM_CUDA_TIER_GRID & 1) return no_choice(refused);
-    const int64_t most = CUDA(persistent_threads)(statistics->point_slots),
+    const int64_t most = CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0),
                   cost = (int64_t)statistics->sides + c->view.model.bodies;
     if (!c->cooperative) return no_choice("the device has no cooperative launch");
     int64_t parts = larger(smaller(c->multiprocessors, up(cost, SPREAD)), 1);
@@ -226,7 +227,7 @@ static struct choice choose_grid(const struct sadmm_context *c, const struct cud
         if (!take_capacity(c, &choice.partition, bound, c->shared_limit / side_by_side)) continue;
         int resident = 0;
         cuda_kernel kernel =
-            CUDA(persistent_kernel)(statistics->point_slots, SADMM_CUDA_TIER_GRID, 0, true, c->fast, &name);
+            CUDA(persistent_kernel)(statistics->point_slots, SADMM_CUDA_TIER_GRID, INT_MAX, c->view.rows.count > 0, c->fast, &name);
         *code = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, (const void *)kernel,
                                                               choice.partition.threads, choice.partition.shared);
         if (*code != cudaSuccess || parts > (int64_t)resident * c->multiprocessors) return no_choice(too_large);
@@ -285,7 +286,7 @@ void CUDA(tighten_partition)(const struct sadmm_context *c, const struct cuda_gr
     if (partition->tier == SADMM_CUDA_TIER_STREAM) return;
     const struct bound bound = {statistics->part_sides, statistics->part_bodies};
     struct cuda_partition tight = *partition;
-    tight.threads = (int32_t)threads_for(bound, CUDA(persistent_threads)(statistics->point_slots));
+    tight.threads = (int32_t)threads_for(bound, CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0));
     if (tight.threads < partition->threads && take_capacity(c, &tight, bound, (int64_t)partition->shared))
         *partition = tight;
 }

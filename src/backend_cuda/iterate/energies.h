@@ -51,7 +51,7 @@ static __device__ __forceinline__ void limit_island(const island_view &islands, 
     const double allowed = limit_factor(&energies),
                  factor =
                      under_iterated ? fmin(allowed, limit_bounce_factor(&energies, sum[4], SOLVER_EPSILON)) : allowed;
-    if (island->blocks) return; /* the energies are those of contacts alone; slow_down stays 1 */
+    if (island->rows) return; /* the energies are those of contacts alone; slow_down stays 1 */
     island->slow_down = factor;
     if (factor != 1) atomicAdd(islands.limited, 1);
 }

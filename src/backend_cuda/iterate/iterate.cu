@@ -7,15 +7,14 @@
 
 /* ---- fused: BLOCK, CLUSTER and GRID ---------------------------------------------------------------------------- */
 
-static sadmm_status persistent_iterations(struct sadmm_context *c, int count, bool measure, enum cuda_limit limit,
-                                        bool goes_on, struct sadmm_error *error)
+static sadmm_status persistent_iterations(struct sadmm_context *c, int count, enum cuda_limit limit, bool goes_on,
+                                          struct sadmm_error *error)
 {
     const struct cuda_partition *partition = &c->partition;
     const char *name = nullptr;
     cuda_args args = CUDA(weight_args)(c); /* of a solve that begins with them */
     args.begin = c->prologue && !c->settled;
     args.count = count;
-    args.measure = measure;
     args.join = c->measured;
     args.rescaled = c->rescaled;
     args.start = c->starting || args.begin;
@@ -27,7 +26,7 @@ static sadmm_status persistent_iterations(struct sadmm_context *c, int count, bo
     args.most_bodies = partition->most_bodies;
     args.cluster = partition->cluster;
     cuda_kernel kernel = CUDA(persistent_kernel)(c->statistics.point_slots, partition->tier, partition->threads,
-                                                 measure || c->view.rows.count > 0, c->fast, &name);
+                                                 c->view.rows.count > 0, c->fast, &name);
     if (partition->tier == SADMM_CUDA_TIER_GRID) CUDA_TRY(CUDA(clear)(c, SCALAR_BARRIER, error));
     CUDA_TRY(CUDA(launch_partition)(c, kernel, name, partition, true, &args, error));
     c->starting = false;
@@ -35,10 +34,28 @@ static sadmm_status persistent_iterations(struct sadmm_context *c, int count, bo
     return SADMM_OK;
 }
 
+/* The measured iteration, a batch's last one, is made by the stepwise kernels, to the same bits: to measure takes
+ * registers that the persistent kernel needs for iterations. */
+static sadmm_status measured_batch(struct sadmm_context *c, int count, struct sadmm_error *error)
+{
+    if (count > 1) {
+        CUDA_TRY(persistent_iterations(c, count - 1, LIMIT_NONE, true, error));
+        c->measured = c->rescaled = false; /* joined */
+    }
+    return CUDA(stream_iterations)(c, 1, true, false, error);
+}
+
+/* Up to `count` iterations, the last ones of the batch unless it goes on. */
+static sadmm_status iterations_of_tier(struct sadmm_context *c, int count, bool measure, enum cuda_limit limit,
+                                       bool goes_on, struct sadmm_error *error)
+{
+    if (c->partition.tier == SADMM_CUDA_TIER_STREAM) return CUDA(stream_iterations)(c, count, measure, goes_on, error);
+    return measure ? measured_batch(c, count, error) : persistent_iterations(c, count, limit, goes_on, error);
+}
+
 sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *c, int count, bool measure, enum cuda_limit limit,
                                       struct sadmm_error *error)
 {
-    const bool stream = c->partition.tier == SADMM_CUDA_TIER_STREAM;
     CUDA_TRY(CUDA(clear_primal)(c, measure, error));
     while (count > 0) {
         if (c->fast && c->exact_since == RELAX_RESIDUAL_PERIOD) {
@@ -47,9 +64,7 @@ sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *c, int count, bool m
         }
         const int left = c->fast ? RELAX_RESIDUAL_PERIOD - c->exact_since : count, now = count < left ? count : left;
         const bool goes_on = now < count;
-        CUDA_TRY(
-            stream ? CUDA(stream_iterations)(c, now, measure && !goes_on, goes_on, error)
-                   : persistent_iterations(c, now, measure && !goes_on, goes_on ? LIMIT_NONE : limit, goes_on, error));
+        CUDA_TRY(iterations_of_tier(c, now, measure && !goes_on, goes_on ? LIMIT_NONE : limit, goes_on, error));
         if (c->fast) c->exact_since += now;
         count -= now;
     }

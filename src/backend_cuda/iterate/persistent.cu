@@ -1,12 +1,16 @@
 /* The fused iteration (persistent.h): which instance runs, and what it takes. */
 #include "persistent.h"
 
-int CUDA(persistent_threads)(int point_slots) { return most_threads(point_slots <= 4 ? 4 : 8, ANY_SIZE); }
+/* Rows take registers that blocks of more threads do not have. */
+int CUDA(persistent_threads)(int point_slots, bool rows)
+{
+    return most_threads(point_slots <= 4 ? 4 : 8, rows ? SMALL : ANY_SIZE);
+}
 
-size_t CUDA(persistent_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies, bool row_blocks)
+size_t CUDA(persistent_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies)
 {
     part_memory unused;
-    return lay_out(&unused, nullptr, tier == SADMM_CUDA_TIER_CLUSTER, threads, most_bodies, row_blocks);
+    return lay_out(&unused, nullptr, tier == SADMM_CUDA_TIER_CLUSTER, threads, most_bodies);
 }
 
 bool CUDA(persistent_does_prologue)(const struct cuda_partition *partition)
@@ -25,17 +29,18 @@ static persistent_instances instances_of(enum sadmm_cuda_tier tier)
     }
 }
 
-cuda_kernel CUDA(persistent_kernel)(int point_slots, enum sadmm_cuda_tier tier, int threads, bool full, bool fast,
-                                  const char **name)
+cuda_kernel CUDA(persistent_kernel)(int point_slots, enum sadmm_cuda_tier tier, int threads, bool rows, bool fast,
+                                    const char **name)
 {
     const int points = point_slots <= 4 ? 4 : 8;
-    const int size = full || threads > SMALL_THREADS                    ? ANY_SIZE
+    const int size = rows                                               ? SMALL
+                     : threads > SMALL_THREADS                          ? ANY_SIZE
                      : tier == SADMM_CUDA_TIER_BLOCK && threads == WARP ? ONE_WARP
                                                                         : SMALL;
     const persistent_instances all = instances_of(tier);
     for (size_t k = 0; k < all.count; ++k) {
         const persistent_instance &one = all.first[k];
-        if (one.points != points || one.full != full || one.size != size || one.fast != fast) continue;
+        if (one.points != points || one.rows != rows || one.size != size || one.fast != fast) continue;
         *name = one.name;
         return one.kernel;
     }

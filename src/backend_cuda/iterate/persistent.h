@@ -10,8 +10,7 @@
  *            buffers, and meet in one cluster barrier an iteration
  *   GRID     velocities go through global memory, two buffers again, with one grid barrier an iteration. The launch is
  *            cooperative, so that every block runs and the spinning ends.
- * A side of a row block is the work of its quad's first lane; it reads its Jacobians from memory (six rows on two
- * bodies are more than registers hold).
+ * A quad takes a side of a constraint given by rows, too, up to two rows a lane (persistent_rows.h).
  *
  * On entry and exit everything is in global memory as the stepwise kernels leave it. Before the first iteration and after
  * the last one of a step, BLOCK may also do what else an island needs (prologue.h).
@@ -40,15 +39,12 @@ static __device__ __forceinline__ bool nothing_to_do(const model_view &model, co
     return first == end || (FAST && MODE == BLOCK && part_stopped(graph, islands, args.checks, first, end));
 }
 
-/* The method `fast` (math/relax.h): Steps 2-4, then Step 1. An iteration has the barriers of the other method's. */
-template <int MODE, bool FULL, int SIZE, class Part>
+/* All iterations of a batch by the method `fast` (math/relax.h): Steps 2-4, then Step 1. An iteration has the barriers of
+ * the other method's. ROWS: some side may be of a constraint given by rows. */
+template <int MODE, int SIZE, bool ROWS, class Part>
 static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view &v, const cuda_args &args, real relaxation,
-                                                    unsigned *target)
+                                                    row_lane *rows, unsigned *target)
 {
-    if (MODE != BLOCK) { /* others look at the velocities that were loaded */
-        arrive<MODE, SIZE>(v.iteration.barrier);
-        wait<MODE, SIZE>(v.iteration.barrier, *target += gridDim.x);
-    }
     int32_t count = args.count, batch = args.goes_on ? count + 1 : count, settled = args.settled;
     /* Were it the launch's constant, and not a choice, it would be fetched in every iteration. */
     real all = part.bodies > 0 ? relaxation : (real)1;
@@ -59,9 +55,8 @@ static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view 
         real relaxation_factor = plain ? (real)1 : all,
              velocity_factor = relax_velocity(i, batch, settled) ? all : (real)1;
         keep<SIZE>(&relaxation_factor), keep<SIZE>(&velocity_factor);
-        if (FULL && plain && args.measure)
-            reduce_max(part.template update_sides<true>(odd, relaxation_factor, true), v.iteration.residual);
-        else part.template update_sides<false>(odd, relaxation_factor, plain);
+        part.update_sides(odd, relaxation_factor, plain);
+        if (ROWS && part.row_sides) part.update_rows(rows, odd, relaxation_factor);
         block_barrier<SIZE>();
         part.move_bodies_fast(!odd, velocity_factor, relaxation_factor);
         settled = 1;
@@ -71,9 +66,10 @@ static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view 
     }
 }
 
-/* The method `paper`: Step 1, then Steps 2-4. */
-template <int MODE, bool FULL, int SIZE, class Part>
-static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view &v, const cuda_args &args, unsigned *target)
+/* The same by the method `paper`: Step 1, then Steps 2-4. */
+template <int MODE, int SIZE, bool ROWS, class Part>
+static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view &v, const cuda_args &args, row_lane *rows,
+                                                     unsigned *target)
 {
     for (int32_t iteration = 1; iteration <= args.count; ++iteration) {
         const int32_t odd = iteration & 1;
@@ -81,35 +77,65 @@ static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view
         arrive<MODE, SIZE>(v.iteration.barrier);
         if (part.has_moves()) part.momentum = free_momentum(part.own_body);
         wait<MODE, SIZE>(v.iteration.barrier, *target += gridDim.x);
-        if (FULL && args.measure && iteration == args.count)
-            reduce_max(part.template update_sides<true>(odd, 1, true), v.iteration.residual);
-        else part.template update_sides<false>(odd, 1, true);
+        part.update_sides(odd, 1, true);
+        if (ROWS && part.row_sides) part.update_rows(rows, odd, 1);
         block_barrier<SIZE>();
-    }
-    /* Nobody looks into this block's memory once it is gone. */
-    if (MODE == CLUSTER) {
-        arrive<MODE, SIZE>(v.iteration.barrier);
-        wait<MODE, SIZE>(v.iteration.barrier, 0);
     }
 }
 
-/* FULL: with row blocks, or to be measured; both cost registers, and most batches have neither. A multiprocessor holds
- * one block at least: unless told so the compiler gives a block of one warp fewer registers than it needs. */
-template <int POINTS, int MODE, bool FULL, int SIZE, bool FAST>
+/* A batch's iterations, and what follows them: storing, and the limit of energies. */
+template <int MODE, int SIZE, bool FAST, bool PROLOGUE, bool ROWS, class Part>
+static __device__ __forceinline__ void run_batch(Part &part, const cuda_view &v, const cuda_args &args, real relaxation,
+                                                 const block_part &ends)
+{
+    unsigned target = 0;
+    row_lane rows;
+    if (ROWS && part.row_sides) load_rows<FAST>(&rows, v, part.lane, part.is_row_side(), part.side_code);
+    if (FAST && MODE != BLOCK) { /* others look at the velocities that were loaded */
+        arrive<MODE, SIZE>(v.iteration.barrier);
+        wait<MODE, SIZE>(v.iteration.barrier, target += gridDim.x);
+    }
+    if (FAST) iterate_fast<MODE, SIZE, ROWS>(part, v, args, relaxation, &rows, &target);
+    else iterate_paper<MODE, SIZE, ROWS>(part, v, args, &rows, &target);
+    /* Nobody looks into this block's memory once it is gone. */
+    if (!FAST && MODE == CLUSTER) {
+        arrive<MODE, SIZE>(v.iteration.barrier);
+        wait<MODE, SIZE>(v.iteration.barrier, 0);
+    }
+    /* After the iterations: what has come takes a place beside them. A cooperative launch ends 10 us later for it, and after
+     * clusters it gains nothing. */
+    if (MODE == BLOCK) let_next_begin();
+    part.store(args.count & 1);
+    if (ROWS && part.row_sides && part.is_row_side() && !part.side_stopped()) rows.store(part.lane);
+    if (!FAST || args.limit == LIMIT_NONE) return;
+    const bool suspected = part.suspect(args.count & 1);
+    if (!PROLOGUE || args.limit == LIMIT_SUSPECTS) {
+        if (suspected) *v.islands.suspects = 1;
+        return;
+    }
+    if constexpr (PROLOGUE) {
+        if (suspected) *ends.suspected = 1;
+        block_barrier<SIZE>();
+        if (*ends.suspected) limit_in_block(v, args.under_iterated, ends, [] { block_barrier<SIZE>(); });
+    }
+}
+
+/* A multiprocessor holds one block at least: unless told so the compiler gives a block of one warp fewer registers than it needs. */
+template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST>
 static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     persistent_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     CUDA_DYNAMIC_SHARED(memory);
     wait_for_stream();
     /* They take registers. */
-    constexpr bool PROLOGUE = FAST && MODE == BLOCK && !FULL && SIZE != ANY_SIZE;
+    constexpr bool PROLOGUE = FAST && MODE == BLOCK && !ROWS && SIZE != ANY_SIZE;
     if (nothing_to_do<MODE, FAST>(v.model, v.graph, v.islands, args)) {
         if (PROLOGUE && args.begin) stamp_assembled(v.step);
         return;
     }
-    part_run<POINTS, MODE, FULL, SIZE, FAST> part(v, args, memory);
+    part_run<POINTS, MODE, ROWS, SIZE, FAST> part(v, args, memory);
     const auto barrier = [] { block_barrier<SIZE>(); };
-    const block_part ends = {part.first_body, part.bodies, part.m.terms, part.m.range, part.m.suspected};
+    const block_part ends = part.ends();
     if (PROLOGUE && threadIdx.x == 0) *ends.suspected = 0;
     const bool begins = PROLOGUE && args.begin;
     if constexpr (PROLOGUE)
@@ -122,31 +148,14 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
         }
     const real relaxation = FAST ? (real)v.model.settings->relaxation : (real)1; /* on its way with what is loaded */
     part.load();
-    unsigned target = 0;
-    if (FAST) iterate_fast<MODE, FULL, SIZE>(part, v, args, relaxation, &target);
-    else iterate_paper<MODE, FULL, SIZE>(part, v, args, &target);
-    /* After the iterations: what has come takes a place beside them. A cooperative launch ends 10 us later for it, and after
-     * clusters it gains nothing. */
-    if (MODE == BLOCK) let_next_begin();
-    part.store(args.count & 1);
-    if (!FAST || args.limit == LIMIT_NONE) return;
-    const bool suspected = part.suspect(args.count & 1);
-    if (!PROLOGUE || args.limit == LIMIT_SUSPECTS) {
-        if (suspected) *v.islands.suspects = 1;
-        return;
-    }
-    if constexpr (PROLOGUE) {
-        if (suspected) *ends.suspected = 1;
-        block_barrier<SIZE>();
-        if (*ends.suspected) limit_in_block(v, args.under_iterated, ends, barrier);
-    }
+    run_batch<MODE, SIZE, FAST, PROLOGUE, ROWS>(part, v, args, relaxation, ends);
 }
 
 /* ---- instances ------------------------------------------------------------------------------------------------- */
 
 struct persistent_instance {
     int points;
-    bool full;
+    bool rows;
     int size;
     bool fast;
     cuda_kernel kernel;
@@ -162,13 +171,13 @@ persistent_instances CUDA(block_instances)(void);
 persistent_instances CUDA(cluster_instances)(void);
 persistent_instances CUDA(grid_instances)(void);
 
-#define INSTANCE(points, mode, full, size, fast, name) \
-    {points, full, size, fast, persistent_kernel<points, mode, full, size, fast>, "iterate (" name ")"}
+#define INSTANCE(points, mode, rows, size, fast, name) \
+    {points, rows, size, fast, persistent_kernel<points, mode, rows, size, fast>, "iterate (" name ")"}
 /* Boxes on boxes touch in up to 8 points, mostly 4: with 4 a lane needs fewer registers. */
 #define OF_SIZES(points, mode, fast, name)                        \
     INSTANCE(points, mode, false, ANY_SIZE, fast, name),          \
         INSTANCE(points, mode, false, SMALL, fast, name ", small"), \
-        INSTANCE(points, mode, true, ANY_SIZE, fast, name ", full")
+        INSTANCE(points, mode, true, SMALL, fast, name ", rows")
 #define OF_MODE(mode, name)                                      \
     OF_SIZES(4, mode, false, name ", 4 points"),                 \
         OF_SIZES(8, mode, false, name ", 8 points"),             \

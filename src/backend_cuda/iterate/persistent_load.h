@@ -34,7 +34,7 @@ PART __device__ __forceinline__ void PART_RUN::find_other(int32_t other)
 PART __device__ __forceinline__ void PART_RUN::fetch_side(void)
 {
     const int32_t p = side_code / 2;
-    if (side >= sides || (FULL && p >= v.contacts.pair_capacity)) return;
+    if (side >= sides || is_row_side()) return;
     about = v.contacts.normal[p];
     between = v.contacts.difference[p];
     on = v.contacts.ends[p];
@@ -48,17 +48,17 @@ PART __device__ __forceinline__ void PART_RUN::fetch_side(void)
 
 PART __device__ __forceinline__ void PART_RUN::load_side(void)
 {
-    const int32_t side = side_code & 1, p = side_code / 2;
-    if (FULL && p >= v.contacts.pair_capacity) {
-        const row_about rows = v.rows.info[p - v.contacts.pair_capacity];
-        own.own = v.graph.slot_of[side ? rows.body_b : rows.body_a] - first_body;
-        find_other(side ? rows.body_a : rows.body_b);
+    const int32_t on_b = side_code & 1, p = side_code / 2;
+    if (is_row_side()) {
+        const row_constraint rows = v.rows.constraints[p - v.contacts.pair_capacity];
+        own.own = v.graph.slot_of[on_b ? rows.body_b : rows.body_a] - first_body;
+        find_other(on_b ? rows.body_a : rows.body_b);
         return;
     }
     own.pair = true;
-    own.sign = side ? (real)1 : (real)-1;
-    own.own = v.graph.slot_of[side ? on.body_b : on.body_a] - first_body;
-    find_other(side ? on.body_a : on.body_b);
+    own.sign = on_b ? (real)1 : (real)-1;
+    own.own = v.graph.slot_of[on_b ? on.body_b : on.body_a] - first_body;
+    find_other(on_b ? on.body_a : on.body_b);
     const real inv_s =
         own.sign * (FAST ? v.contacts.inv_s[p]
                          : inverse_weight(inv_beta_of(v.bodies, on.body_a), inv_beta_of(v.bodies, on.body_b)));
@@ -70,8 +70,8 @@ PART __device__ __forceinline__ void PART_RUN::load_side(void)
         const real error = FAST ? v.contacts.arm[slot_or_first(k)].w : point[j].w;
         const bool there = k < (int32_t)between.w;
         const vec3 arm_a = xyz(point[j]), arm_b = v3_add(arm_a, xyz(between)), none = v3(0, 0, 0);
-        own.own_arm[j] = there ? (side ? arm_b : arm_a) : none;
-        own.other_arm[j] = there ? (side ? arm_a : arm_b) : none;
+        own.own_arm[j] = there ? (on_b ? arm_b : arm_a) : none;
+        own.other_arm[j] = there ? (on_b ? arm_a : arm_b) : none;
         own.error[j] = there ? own.sign * error : 0;
         own.inv_s[j] = there ? inv_s : 0;
         own.lambda[j] = there ? own.lambda[j] : none;
@@ -90,6 +90,16 @@ PART __device__ __forceinline__ void PART_RUN::start_records(void)
         torque = j == 0 ? moment : v3_add(torque, moment);
     }
     store_record(own_record, sum_quad(lane, force, torque));
+}
+
+PART __device__ __forceinline__ void PART_RUN::start_row_records(void)
+{
+    row_lane rows;
+    vec3 force, torque;
+    load_rows<FAST>(&rows, v, lane, is_row_side(), side_code);
+    rows.wrench(rows.lambda, &force, &torque);
+    const real2_pair sum = sum_quad(lane, force, torque);
+    if (rows.rows) *own_record = sum;
 }
 
 /* What the last batch or the stepwise kernels left, joined after a measured iteration. */
@@ -137,9 +147,7 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
     own_state = kept_address<SIZE>(m.state + body * ROW + r);
     if (!FAST && !args.start) load_records();
     else if (!FAST && updates) start_records();
-    if (has_rows() && side < sides && !own.pair && lane == 0)
-        start_row_side(v, side_code, m.row_lambda + side * ROW, m.records + side * ROW,
-                       !FAST && args.start);
+    if (ROWS && !FAST && args.start && row_sides) start_row_records();
     if (FAST && MODE == GRID) /* for the first Steps 2-4 of the others */
         for (int32_t i = t; i < bodies * ROW; i += threads)
             v.iteration.exchange[(size_t)first_body * ROW + (size_t)i] = v.bodies.state[raw_row(i)];
@@ -164,7 +172,7 @@ PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
     for (int32_t i = t; !FAST && i < sides * ROW; i += (int32_t)blockDim.x)
         v.iteration.records[(size_t)first_side * ROW + (size_t)i] = m.records[i];
     if (side >= sides) return;
-    if (FAST && island_stopped(v.graph, v.islands, args.checks, v.graph.body_of[first_body + own.own])) return;
+    if (side_stopped()) return;
     const int32_t code = v.graph.incident[first_side + side], p = code / 2;
     if (own.pair) {
         if (code & 1 && v.contacts.ends[p].body_a != v.model.bodies) return;
@@ -174,10 +182,6 @@ PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
             const int32_t k = lane + QUAD * j;
             if (k < count) store_lambda(v.contacts, point_slot(v.contacts, p, k), own.lambda[j]);
         }
-    } else if (FULL && lane == 0) {
-        const int32_t k = p - v.contacts.pair_capacity;
-        if (code & 1 && v.rows.info[k].body_a != v.model.bodies) return;
-        store_row_lambda(v.rows, k, m.row_lambda + side * ROW);
     }
 }
 

@@ -4,11 +4,9 @@
 #define SADMM_CUDA_ITERATE_PERSISTENT_MEMORY_H
 
 #include "prologue.h"
-#include "sweep.h"
+#include "quad.h"
 
 enum persistent_mode { BLOCK, CLUSTER, GRID };
-
-enum { QUAD = 4 }; /* lanes a side */
 
 /* Sizes of blocks an instance is made for: few threads may have all the registers they want, and a single warp needs no
  * barrier (BLOCK alone). */
@@ -31,7 +29,6 @@ enum { FEW = 4 };
 struct part_memory {
     solver_real *state;      /* CLUSTER: of even, then of odd iterations; bodies x ROW each, then a row of 0 */
     solver_real *records;    /* sides x ROW, and FEW rows that are read and not used */
-    solver_real *row_lambda; /* sides x ROW, when there are row blocks */
     solver_real *lines, *b;  /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x line, ROW; FAST:
                                 the momentum residual in place of b */
     int32_t *suspected;      /* a body of the part has too much energy */
@@ -44,14 +41,13 @@ enum { SLACK = 16 }; /* the end, with what is to come there aligned */
 
 /* One description of the layout for its size and its addresses. */
 static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *base, bool cluster, int threads,
-                                                 int32_t bodies, bool row_blocks)
+                                                 int32_t bodies)
 {
     size_t n = (size_t)bodies, sides = (size_t)(threads / QUAD), first = (size_t)(threads / LANES);
     size_t more = n > first ? n - first : 0;
     m->state = (solver_real *)base;
     m->records = m->state + ((cluster ? 2 * n : n) + 1) * ROW;
-    m->row_lambda = m->records + (sides + FEW) * ROW;
-    m->lines = m->row_lambda + (row_blocks ? sides * ROW : 0);
+    m->lines = m->records + (sides + FEW) * ROW;
     m->b = m->lines + more * LINE_GENERAL;
     m->terms = (double *)base;
     m->range = (island_range *)(m->terms + n * TERMS);

@@ -23,33 +23,9 @@ template <int POINTS> struct side_lane {
     bool pair;                /* a side of a pair */
 };
 
-struct real2_pair {
-    solver_real x, y;
-};
-
-/* Force and torque added over a quad as (q_0 + q_1) + (q_2 + q_3); lane 0 gets the force's x and y, lane 2 its z and 0, lanes
- * 1 and 3 the torque's. Every lane of the warp comes here. */
-CUDA_INLINE real2_pair sum_quad(int32_t lane, vec3 force, vec3 torque)
-{
-    const unsigned all = (unsigned)ALL_LANES;
-    const bool odd = lane & 1, high = lane & 2;
-    vec3 mine = odd ? torque : force, given = odd ? force : torque;
-    mine.x += __shfl_xor_sync(all, given.x, 1);
-    mine.y += __shfl_xor_sync(all, given.y, 1);
-    mine.z += __shfl_xor_sync(all, given.z, 1);
-    real first = high ? mine.z : mine.x, other = high ? mine.x : mine.z;
-    first += __shfl_xor_sync(all, other, 2);
-    mine.y += __shfl_xor_sync(all, mine.y, 2);
-    real2_pair sum = {first, high ? (real)0 : mine.y};
-    return sum;
-}
-
-/* Where a lane's share of that sum is in the record. */
-CUDA_INLINE int32_t quad_slot(int32_t lane) { return (lane & 1) * QUAD + (lane & 2); }
-
 /* ---- a part ---------------------------------------------------------------------------------------------------- */
 
-template <int POINTS, int MODE, bool FULL, int SIZE, bool FAST> struct part_run {
+template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run {
     enum { COUNT = POINTS / QUAD, MORE = MODE == BLOCK ? 8 : 4 }; /* more take registers, fewer another round */
     const cuda_view &v;
     const cuda_args &args;
@@ -64,7 +40,7 @@ template <int POINTS, int MODE, bool FULL, int SIZE, bool FAST> struct part_run 
     const solver_real *gathered; /* component r of the first record */
     int32_t gathered_count;      /* 0 in lanes that have no component */
     bool many;                   /* some lane of the warp has more than FEW */
-    bool moves, updates;         /* the warp has bodies, sides */
+    bool moves, updates, row_sides; /* the warp has bodies, sides, sides of constraints given by rows */
     const solver_real *own_row;  /* of the side's own body in even iterations */
     solver_real *own_state;      /* the body's component r, in even iterations */
     real2_pair *own_record;
@@ -82,11 +58,12 @@ template <int POINTS, int MODE, bool FULL, int SIZE, bool FAST> struct part_run 
           first_body(v.graph.parts[blockIdx.x]), bodies(v.graph.parts[blockIdx.x + 1] - first_body),
           first_side(v.graph.offsets[first_body]), sides(v.graph.offsets[first_body + bodies] - first_side),
           found(body_of_slot(v.graph, first_body + t / LANES, t / LANES < bodies)), body(t / LANES), gathered(nullptr),
-          gathered_count(0), many(false), moves(warp_has_body(0)), updates(warp_has_side()), own_row(nullptr),
+          gathered_count(0), many(false), moves(warp_has_body(0)), updates(warp_has_side()), row_sides(false), own_row(nullptr),
           own_state(nullptr), own_record(nullptr), own_body(), momentum(0), sum(0), step(0), own(),
           side_code(side < sides ? v.graph.incident[first_side + side] : 0), on(), about(), between(), point()
     {
-        lay_out(&m, memory, MODE == CLUSTER, (int)blockDim.x, args.most_bodies, has_rows());
+        lay_out(&m, memory, MODE == CLUSTER, (int)blockDim.x, args.most_bodies);
+        if (ROWS) row_sides = __ballot_sync((unsigned)ALL_LANES, is_row_side()) != 0;
     }
 
     /* A block of one warp has work, or would not be here. */
@@ -102,7 +79,21 @@ template <int POINTS, int MODE, bool FULL, int SIZE, bool FAST> struct part_run 
     {
         return (size_t)v.graph.body_of[first_body + i / ROW] * ROW + (size_t)(i % ROW);
     }
-    __device__ __forceinline__ bool has_rows(void) const { return FULL && v.rows.count > 0; }
+    /* What prologue.h sees of it. */
+    __device__ __forceinline__ block_part ends(void) const
+    {
+        const block_part out = {first_body, bodies, m.terms, m.range, m.suspected};
+        return out;
+    }
+    /* fast: has the island of the side met the stop rule? */
+    __device__ __forceinline__ bool side_stopped(void) const
+    {
+        return FAST && island_stopped(v.graph, v.islands, args.checks, v.graph.body_of[first_body + own.own]);
+    }
+    __device__ __forceinline__ bool is_row_side(void) const
+    {
+        return ROWS && side < sides && side_code / 2 >= v.contacts.pair_capacity;
+    }
     /* Warps without work are left out of everything but barriers. */
     __device__ __forceinline__ bool warp_has_body(int32_t first) const
     {
@@ -122,20 +113,21 @@ template <int POINTS, int MODE, bool FULL, int SIZE, bool FAST> struct part_run 
     __device__ __forceinline__ void load_side(void);
     __device__ __forceinline__ void find_other(int32_t other);
     __device__ __forceinline__ void start_records(void);
+    __device__ __forceinline__ void start_row_records(void);
     __device__ __forceinline__ void load_records(void);
     __device__ __forceinline__ void store_record(real2_pair *record, real2_pair sum) const;
     __device__ __forceinline__ real gather(real g, const solver_real *from, int32_t count, bool more) const;
     __device__ __forceinline__ void publish(solver_real *to, int32_t i, real value, int32_t odd);
     __device__ __forceinline__ void move_bodies(int32_t odd);
     __device__ __forceinline__ void move_bodies_fast(int32_t odd, real relaxation, real multipliers);
-    template <bool MEASURE>
-    __device__ __forceinline__ double update_sides(int32_t odd, real relaxation_factor, bool plain);
+    __device__ __forceinline__ void update_sides(int32_t odd, real relaxation_factor, bool plain);
+    __device__ __forceinline__ void update_rows(row_lane *rows, int32_t odd, real relaxation_factor) const;
     __device__ __forceinline__ bool suspect(int32_t odd) const;
     __device__ __forceinline__ void store(int32_t odd);
 };
 
-#define PART template <int POINTS, int MODE, bool FULL, int SIZE, bool FAST>
-#define PART_RUN part_run<POINTS, MODE, FULL, SIZE, FAST>
+#define PART template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST>
+#define PART_RUN part_run<POINTS, MODE, ROWS, SIZE, FAST>
 
 /* The quad's sum as the record of its side. */
 PART __device__ __forceinline__ void PART_RUN::store_record(real2_pair *record, real2_pair sum) const

@@ -1,51 +1,133 @@
-/* The persistent kernel (persistent.h): sides of row blocks, out of line: few systems have them. */
+/* The persistent kernel (persistent.h): sides of constraints given by rows. A quad takes a side, as it takes that of a
+ * pair; lane q has the rows q and q + 4. Only warps that have such sides come here. */
 #ifndef SADMM_CUDA_ITERATE_PERSISTENT_ROWS_H
 #define SADMM_CUDA_ITERATE_PERSISTENT_ROWS_H
 
-#include "sweep.h"
+#include "quad.h"
+#include "row_law.h"
 
-/* Steps 2-4 of side `code` of a row block, of the method `fast`, into this side's record. */
-static __device__ __noinline__ double update_row_side_fast(const cuda_view &v, int32_t code, const solver_real *own,
-                                                           const solver_real *other, solver_real *kept,
-                                                           solver_real *record, real relaxation_factor)
+struct row_lane {
+    enum { COUNT = 2 };
+    real own[COUNT][6], other[COUNT][6]; /* Jacobians of the side's own body and of the other */
+    row_law law[COUNT];
+    real lambda[COUNT], next[COUNT], delta[COUNT]; /* next: lambda^, delta: lambda^ - lambda */
+    real share, friction;
+    row_data *rows;                      /* of the constraint; NULL: the quad's side is none of rows */
+    bool cone, stores;                   /* stores: of its constraint's two sides this one writes multipliers */
+    bool cones;                          /* some lane of the warp has a cone */
+
+    template <bool FAST> __device__ __forceinline__ void load(const cuda_view &v, int32_t lane, bool live, int32_t code);
+    template <bool FAST> __device__ __forceinline__ void update(const body_motion &mine, const body_motion &others);
+    __device__ __forceinline__ void wrench(const real impulse[COUNT], vec3 *force, vec3 *torque) const;
+    __device__ __forceinline__ void store(int32_t lane) const;
+};
+
+/* live: is there a side, and is it one of rows? Every lane of the warp comes here. */
+template <bool FAST>
+__device__ __forceinline__ void row_lane::load(const cuda_view &v, int32_t lane, bool live, int32_t code)
 {
-    const int32_t k = code / 2 - v.contacts.pair_capacity, side = code & 1;
-    const row_about about = v.rows.info[k];
-    real lambda[6], delta[6];
-    for (int j = 0; j < 6; ++j) lambda[j] = kept[j];
-    update_row_block_fast(v.model, v.rows, k, about, side ? other : own, side ? own : other, lambda, delta);
-    for (int j = 0; j < 6; ++j) kept[j] = relaxed(kept[j], lambda[j], delta[j], relaxation_factor);
-    store_row_record(v.rows, k, about.rows, side, delta, record);
-    return row_block_primal_fast(v.rows, k, about, delta);
+    const int32_t k = live ? code / 2 - v.contacts.pair_capacity : 0, on_b = code & 1;
+    row_constraint about = {};
+    if (live) about = v.rows.constraints[k];
+    const bool both = about.body_a < v.model.bodies && about.body_b < v.model.bodies;
+    const real beta_a = live ? inv_beta_of(v.bodies, about.body_a) : (real)0,
+               beta_b = live ? inv_beta_of(v.bodies, about.body_b) : (real)0;
+    rows = live ? v.rows.data + (size_t)k * SADMM_MAX_ROWS : nullptr;
+    stores = live && (!on_b || about.body_a == v.model.bodies);
+    cone = live && about.cone;
+    cones = __ballot_sync((unsigned)ALL_LANES, cone) != 0;
+    share = share_of_body(both);
+    friction = about.friction;
+#pragma unroll
+    for (int32_t j = 0; j < COUNT; ++j) {
+        const int32_t r = lane + QUAD * j;
+        row_data row = {};
+        if (live && r < SADMM_MAX_ROWS) row = rows[r];
+        for (int32_t i = 0; i < 6; ++i) {
+            own[j][i] = on_b ? row.jacobian[1][i] : row.jacobian[0][i];
+            other[j][i] = on_b ? row.jacobian[0][i] : row.jacobian[1][i];
+        }
+        law[j] = law_of_row(row, FAST ? share * row.weight : inverse_weight(beta_a, beta_b));
+        lambda[j] = row.lambda;
+        delta[j] = 0;
+    }
 }
 
-/* Steps 2-4 of side `code` of a row block, into this side's record; `change`: as after a measured iteration. */
-static __device__ __noinline__ double update_row_side(const cuda_view &v, int32_t code, const solver_real *own,
-                                                      const solver_real *other, solver_real *kept, solver_real *record,
-                                                      solver_real *change)
+/* next and delta. Every lane of the warp comes here. */
+template <bool FAST>
+__device__ __forceinline__ void row_lane::update(const body_motion &mine, const body_motion &others)
 {
-    const int32_t k = code / 2 - v.contacts.pair_capacity, side = code & 1;
-    const row_about about = v.rows.info[k];
-    real lambda[6], delta[6];
-    for (int j = 0; j < 6; ++j) lambda[j] = kept[j];
-    update_row_block(v.bodies, v.rows, k, about, side ? other : own, side ? own : other, lambda, delta);
-    for (int j = 0; j < 6; ++j) kept[j] = lambda[j];
-    if (!change)
-        for (int j = 0; j < 6; ++j) lambda[j] += delta[j];
-    store_row_record(v.rows, k, about.rows, side, lambda, record);
-    if (!change) return 0;
-    store_row_record(v.rows, k, about.rows, side, delta, change);
-    return row_block_primal(v.bodies, about, delta);
+    const unsigned all = (unsigned)ALL_LANES;
+    real missing[COUNT], push = 0;
+#pragma unroll
+    for (int32_t j = 0; j < COUNT; ++j) {
+        missing[j] = row_missing(law[j], row_velocity(own[j], mine) + row_velocity(other[j], others), lambda[j]);
+        push = j == 0 ? law[j].along * missing[j] : fused(law[j].along, missing[j], push);
+    }
+    if (FAST) {
+        push += __shfl_xor_sync(all, push, 1);
+        push += __shfl_xor_sync(all, push, 2);
+        push *= share;
+    }
+#pragma unroll
+    for (int32_t j = 0; j < COUNT; ++j) {
+        const row_change change = change_row(law[j], missing[j], FAST ? push : (real)0, lambda[j]);
+        next[j] = change.lambda;
+        delta[j] = change.delta;
+    }
+    if (!cones) return;
+    real old[3], step[3], projected[3], change[3];
+    for (int32_t r = 0; r < 3; ++r) {
+        old[r] = __shfl_sync(all, lambda[0], r, QUAD);
+        step[r] = __shfl_sync(all, law[0].step * missing[0], r, QUAD);
+    }
+    change_cone<FAST>(old, step, friction, projected, change);
+    const int32_t lane = (int32_t)threadIdx.x % QUAD;
+    if (!cone || lane >= 3) return;
+    next[0] = lane == 0 ? projected[0] : lane == 1 ? projected[1] : projected[2];
+    delta[0] = lane == 0 ? change[0] : lane == 1 ? change[1] : change[2];
 }
 
-static __device__ __noinline__ void start_row_side(const cuda_view &v, int32_t code, solver_real *kept,
-                                                   solver_real *record, bool start)
+/* J^T impulse of the lane's rows on the side's own body. */
+__device__ __forceinline__ void row_lane::wrench(const real impulse[COUNT], vec3 *force, vec3 *torque) const
 {
-    const int32_t k = code / 2 - v.contacts.pair_capacity;
-    real lambda[6];
-    load_row_lambda(v.rows, k, lambda);
-    for (int j = 0; j < 6; ++j) kept[j] = lambda[j];
-    if (start) store_row_record(v.rows, k, v.rows.info[k].rows, code & 1, lambda, record);
+#pragma unroll
+    for (int32_t j = 0; j < COUNT; ++j) add_row(own[j], impulse[j], j == 0, force, torque);
+}
+
+__device__ __forceinline__ void row_lane::store(int32_t lane) const
+{
+    if (!stores) return;
+#pragma unroll
+    for (int32_t j = 0; j < COUNT; ++j)
+        if (lane + QUAD * j < SADMM_MAX_ROWS) rows[lane + QUAD * j].lambda = lambda[j];
+}
+
+/* Out of line, and a row_lane in memory: rows take no registers of those who have none. */
+template <bool FAST>
+static __device__ __noinline__ void load_rows(row_lane *rows, const cuda_view &v, int32_t lane, bool live, int32_t code)
+{
+    rows->load<FAST>(v, lane, live, code);
+}
+
+/* Steps 2-4 of the warp's sides given by rows: into the record of the side; lambda goes `relaxation_factor` times as far. */
+template <bool FAST>
+static __device__ __noinline__ void sweep_row_lanes(row_lane *memory, const solver_real *mine, const solver_real *others,
+                                                    real2_pair *record, real relaxation_factor)
+{
+    row_lane rows = *memory;
+    real impulse[row_lane::COUNT];
+    vec3 force, torque;
+    rows.update<FAST>(load_motion(mine), load_motion(others));
+#pragma unroll
+    for (int32_t j = 0; j < row_lane::COUNT; ++j) {
+        impulse[j] = FAST ? rows.delta[j] : rows.next[j] + rows.delta[j];
+        memory->lambda[j] =
+            FAST && relaxation_factor != 1 ? fused(relaxation_factor, rows.delta[j], rows.lambda[j]) : rows.next[j];
+    }
+    rows.wrench(impulse, &force, &torque);
+    const real2_pair sum = sum_quad((int32_t)threadIdx.x % QUAD, force, torque);
+    if (rows.rows) *record = sum;
 }
 
 #endif

@@ -94,62 +94,31 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies_fast(int32_t odd, rea
 
 /* ---- Steps 2-4 ------------------------------------------------------------------------------------------------- */
 
-/* The lane's share of the primal residual. FAST: lambda goes `relaxation_factor` times as far, plain: once; records are
- * those of Step 1 in any case. */
-PART template <bool MEASURE>
-__device__ __forceinline__ double PART_RUN::update_sides(int32_t odd, real relaxation_factor, bool plain)
+/* FAST: lambda goes `relaxation_factor` times as far, plain: once; records are those of Step 1 in any case. */
+PART __device__ __forceinline__ void PART_RUN::update_sides(int32_t odd, real relaxation_factor, bool plain)
 {
-    enum { SPLIT = MEASURE && !FAST };
-    double primal = 0;
-    if (!has_updates()) return primal;
+    if (!has_updates()) return;
     const solver_real *mine = own_row + (MODE == CLUSTER && odd ? args.most_bodies * ROW : 0),
                       *others = own.other + (odd ? own.other_odd : 0);
     const body_motion own_motion = load_motion(mine), other = load_motion(others);
-    vec3 force = v3(0, 0, 0), torque = force, change_force = force, change_torque = force;
-    real largest = 0;
+    vec3 force = v3(0, 0, 0), torque = force;
 #pragma unroll
     for (int32_t j = 0; j < COUNT; ++j) {
         const vec3 old = own.lambda[j], x = relative_velocity(other, own.other_arm[j], own_motion, own.own_arm[j]);
         const point_change to = update<FAST>(own.normal, own.friction, x, own.error[j], own.inv_s[j], old);
-        const vec3 lambda = to.lambda, delta = to.delta;
-        own.lambda[j] = FAST ? relaxed(old, to, plain, relaxation_factor) : lambda;
-        vec3 impulse =
-            FAST ? delta : SPLIT ? lambda : v3_add(lambda, delta);
-        vec3 moment = fused_cross(own.own_arm[j], impulse);
+        own.lambda[j] = FAST ? relaxed(old, to, plain, relaxation_factor) : to.lambda;
+        const vec3 impulse = FAST ? to.delta : v3_add(to.lambda, to.delta), moment = fused_cross(own.own_arm[j], impulse);
         force = j == 0 ? impulse : v3_add(force, impulse);
         torque = j == 0 ? moment : v3_add(torque, moment);
-        if (SPLIT) {
-            impulse = delta;
-            moment = fused_cross(own.own_arm[j], impulse);
-            change_force = j == 0 ? impulse : v3_add(change_force, impulse);
-            change_torque = j == 0 ? moment : v3_add(change_torque, moment);
-        }
-        if (!MEASURE) continue;
-        largest = real_max(largest, largest_row(own.normal, delta));
     }
     store_record(own_record, sum_quad(lane, force, torque));
-    if (!MEASURE && !has_rows()) return primal;
+}
 
-    const int32_t code = side < sides ? v.graph.incident[first_side + side] : 0;
-    solver_real *change = SPLIT ? v.iteration.change + (size_t)(first_side + side) * ROW : nullptr;
-    if (FAST && MEASURE && own.pair) {
-        const pair_ends on = v.contacts.ends[code / 2];
-        primal = (double)(largest * inverse_of_weight(real_abs(own.inv_s[0]),
-                                                      on.body_a < v.model.bodies && on.body_b < v.model.bodies));
-    }
-    if (SPLIT) {
-        store_record((real2_pair *)(change + quad_slot(lane)), sum_quad(lane, change_force, change_torque));
-        if (own.pair) {
-            const pair_ends on = v.contacts.ends[code / 2];
-            primal = (double)(largest * real_max(inv_beta_of(v.bodies, on.body_a), inv_beta_of(v.bodies, on.body_b)));
-        }
-    }
-    if (has_rows() && side < sides && !own.pair && lane == 0)
-        primal = FAST ? update_row_side_fast(v, code, mine, others, m.row_lambda + side * ROW,
-                                             m.records + side * ROW, relaxation_factor)
-                      : update_row_side(v, code, mine, others, m.row_lambda + side * ROW, m.records + side * ROW,
-                                        change);
-    return primal;
+/* The same of the warp's sides of constraints given by rows. */
+PART __device__ __forceinline__ void PART_RUN::update_rows(row_lane *rows, int32_t odd, real relaxation_factor) const
+{
+    sweep_row_lanes<FAST>(rows, own_row + (MODE == CLUSTER && odd ? args.most_bodies * ROW : 0),
+                          own.other + (odd ? own.other_odd : 0), own_record, relaxation_factor);
 }
 
 /* ---- the limit of energies, of the method `fast` ------------------------------------------------------------------ */

@@ -11,6 +11,8 @@
 #include "backend_cuda/weight/constraint.h"
 #include "backend_cuda/weight/island_sums.h"
 #include "stop_rule.h"
+
+#include "core/math/row.h"
 #include "backend_cuda/step/solution.h"
 
 /* Of a contact in its frame, with u = x + e and the response w. */
@@ -63,34 +65,31 @@ static __device__ double natural_map(const model_view &model, const body_view &b
     return worst;
 }
 
-/* The same of the rows of a block. */
-static __device__ double natural_map_of_rows(const body_view &bodies, const row_view &rows, const raw_view &raw,
-                                             int32_t k)
+/* The same of a constraint given by rows (the map of a row: core/solve/certificate.c). */
+static __device__ double natural_map_of_rows(const body_view &bodies, const row_view &rows, const raw_view &raw, int32_t k)
 {
-    const struct sadmm_problem_block *block = &raw.blocks[k];
-    const int32_t joined[2] = {block->body_a, block->body_b};
-    double x[6] = {}, weight[6] = {}, lambda[6] = {}, worst = 0;
-    for (int r = 0; r < block->rows; ++r) {
-        lambda[r] = row_number(rows, ROW_LAMBDA + r, k);
+    const struct sadmm_row_constraint constraint = raw.constraints[k];
+    const struct raw_row *row = raw.rows + (size_t)k * SADMM_MAX_ROWS;
+    const int32_t joined[2] = {constraint.body_a, constraint.body_b};
+    double x[SADMM_MAX_ROWS] = {}, weight[SADMM_MAX_ROWS] = {}, lambda[SADMM_MAX_ROWS] = {}, worst = 0;
+    for (int r = 0; r < constraint.count; ++r) {
+        lambda[r] = (double)rows.data[(size_t)k * SADMM_MAX_ROWS + (size_t)r].lambda;
         for (int side = 0; side < 2; ++side) {
             if (joined[side] < 0) continue;
-            const double *row = (side ? block->jacobian_b : block->jacobian_a) + 6 * r;
             const solver_real *state = bodies.state + (size_t)joined[side] * ROW;
-            for (int j = 0; j < 6; ++j) x[r] += row[j] * (double)state[j];
-            weight[r] += packed_form(bodies.A_inverse + (size_t)joined[side] * PACKED, row);
+            for (int j = 0; j < 6; ++j) x[r] += row[r].jacobian[side][j] * (double)state[j];
+            weight[r] += packed_form(bodies.A_inverse + (size_t)joined[side] * PACKED, row[r].jacobian[side]);
         }
     }
-    if (block->kind == SADMM_BLOCK_CONTACT) {
-        const double u[3] = {x[0] + block->error[0], x[1] + block->error[1], x[2] + block->error[2]},
-                     w = block->friction > 0 ? fmax(weight[0], fmax(weight[1], weight[2])) : weight[0];
-        return map_of_contact(lambda, u, block->friction, w);
+    if (constraint.cone) {
+        const double u[3] = {x[0] + row[0].bias, x[1] + row[1].bias, x[2] + row[2].bias},
+                     w = constraint.friction > 0 ? fmax(weight[0], fmax(weight[1], weight[2])) : weight[0];
+        return map_of_contact(lambda, u, constraint.friction, w);
     }
-    for (int r = 0; r < block->rows; ++r) {
-        const double c = block->damping[r], spring = lambda[r] + block->stiffness[r] * block->error[r] + c * x[r];
-        double missed = fabs(spring) * weight[r] / (1 + c * weight[r]);
-        if (block->kind == SADMM_BLOCK_HARD) missed = weight[r] == 0 ? 0 : fabs(x[r] + block->error[r]);
-        worst = largest_term::join(worst, missed);
-    }
+    for (int r = 0; r < constraint.count; ++r)
+        if (weight[r] != 0)
+            worst = largest_term::join(worst, row_natural_map(row[r].gain, row[r].bias, row[r].compliance, row[r].lo,
+                                                              row[r].hi, x[r], lambda[r], weight[r]));
     return worst;
 }
 
@@ -109,7 +108,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         const int32_t code = v.graph.incident[at], p = code / 2;
         add_side(v.contacts, v.rows, code, sums, &sums[PUSH]);
         const int32_t k = p - v.contacts.pair_capacity; /* a block of rows, or a pair */
-        if (code & 1 && is_dynamic(v.model, k < 0 ? v.contacts.ends[p].body_a : v.rows.info[k].body_a))
+        if (code & 1 && is_dynamic(v.model, k < 0 ? v.contacts.ends[p].body_a : v.rows.constraints[k].body_a))
             continue; /* counted there */
         map = largest_term::join(map, k < 0 ? natural_map(v.model, v.bodies, v.contacts, v.raw, p)
                                             : natural_map_of_rows(v.bodies, v.rows, v.raw, k));

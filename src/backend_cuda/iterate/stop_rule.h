@@ -33,7 +33,7 @@ static __device__ __forceinline__ bool pair_stopped(const model_view &model, con
 }
 
 static __device__ __forceinline__ bool rows_stopped(const model_view &model, const graph_view &graph,
-                                                    const island_view &islands, int32_t checks, const row_about &rows)
+                                                    const island_view &islands, int32_t checks, const row_constraint &rows)
 {
     return checks > 0 && island_stopped(graph, islands, checks, rows.body_a < model.bodies ? rows.body_a : rows.body_b);
 }

@@ -117,11 +117,6 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 
 /* ---- kernels over constraints: blocks of threads for pairs, then blocks for row blocks ----------------------------- */
 
-template <int LANES_A_PAIR> static __device__ __forceinline__ int32_t pair_threads(const contact_view &contacts)
-{
-    return (LANES_A_PAIR * contacts.pair_capacity + THREADS - 1) / THREADS * THREADS;
-}
-
 /* The pair of thread t: work(pair, lane, live), in whole warps; lanes beyond the last pair come with that one, not live. */
 template <int LANES_A_PAIR, class Work>
 static __device__ __forceinline__ void with_pair(const model_view &model, int32_t t, Work work)
@@ -135,21 +130,30 @@ template <int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
 static __global__ void __launch_bounds__(THREADS)
     constraints_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    const int32_t t = thread_index(args), k = t - pair_threads<LANES_A_PAIR>(v.contacts);
+    const int32_t t = thread_index(args);
     double primal = 0;
     if (FAST && all_stopped(v.islands, args.checks)) return;
     const real relaxation_factor = relaxed<FAST>(v.model, args, RELAX_MULTIPLIERS);
-    if (k < 0)
-        with_pair<LANES_A_PAIR>(v.model, t, [&](int32_t p, int32_t lane, bool live) {
-            const bool on =
-                live && !(FAST && pair_stopped(v.model, v.graph, v.islands, args.checks, v.contacts.ends[p]));
-            primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v.model, v.bodies, v.contacts, v.iteration, p, lane,
-                                                                    on, relaxation_factor);
-        });
-    else if (k < live_rows(v.model, v.rows) &&
-             !(FAST && rows_stopped(v.model, v.graph, v.islands, args.checks, v.rows.info[k])))
-        primal = FAST ? sweep_row_block_fast<MEASURE>(v.model, v.bodies, v.rows, v.iteration, k, relaxation_factor)
-                      : sweep_row_block<MEASURE>(v.bodies, v.rows, v.iteration, k);
+    with_pair<LANES_A_PAIR>(v.model, t, [&](int32_t p, int32_t lane, bool live) {
+        const bool on = live && !(FAST && pair_stopped(v.model, v.graph, v.islands, args.checks, v.contacts.ends[p]));
+        primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v.model, v.bodies, v.contacts, v.iteration, p, lane, on,
+                                                                relaxation_factor);
+    });
+    if (MEASURE) reduce_max(primal, v.iteration.residual);
+}
+
+/* The same of constraints given by rows: a kernel of its own, whose registers pairs do not pay for. */
+template <bool MEASURE, bool FAST>
+static __global__ void __launch_bounds__(THREADS)
+    rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    const int32_t k = thread_index(args);
+    double primal = 0;
+    if (FAST && all_stopped(v.islands, args.checks)) return;
+    if (k < live_rows(v.model, v.rows) &&
+        !(FAST && rows_stopped(v.model, v.graph, v.islands, args.checks, v.rows.constraints[k])))
+        primal = sweep_rows<MEASURE, FAST>(v.model, v.bodies, v.rows, v.iteration, k,
+                                           relaxed<FAST>(v.model, args, RELAX_MULTIPLIERS));
     if (MEASURE) reduce_max(primal, v.iteration.residual);
 }
 
@@ -157,16 +161,15 @@ static __global__ void __launch_bounds__(THREADS)
 template <int LANES_A_PAIR>
 static __global__ void start_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    const int32_t t = thread_index(args), k = t - pair_threads<LANES_A_PAIR>(v.contacts);
-    if (k < 0) {
-        with_pair<LANES_A_PAIR>(v.model, t, [&](int32_t p, int32_t lane, bool live) {
-            start_pair<LANES_A_PAIR>(v.contacts, v.iteration, p, lane, live);
-        });
-    } else if (k < live_rows(v.model, v.rows)) {
-        real lambda[6];
-        load_row_lambda(v.rows, k, lambda);
-        store_row_records(v.rows, k, v.rows.info[k], lambda, v.iteration.records);
-    }
+    with_pair<LANES_A_PAIR>(v.model, thread_index(args), [&](int32_t p, int32_t lane, bool live) {
+        start_pair<LANES_A_PAIR>(v.contacts, v.iteration, p, lane, live);
+    });
+}
+
+static __global__ void start_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    const int32_t k = thread_index(args);
+    if (k < live_rows(v.model, v.rows)) start_rows(v.rows, v.iteration, k);
 }
 
 /* Where records go. */
@@ -176,7 +179,7 @@ static __global__ void place_kernel(const __grid_constant__ cuda_view v, const _
     if (bodies == 0 || at >= v.graph.offsets[bodies]) return;
     const int32_t side = v.graph.incident[at], on_b = side & 1, k = side / 2 - v.contacts.pair_capacity;
     if (k < 0) *(on_b ? &v.contacts.ends[side / 2].side_b : &v.contacts.ends[side / 2].side_a) = at;
-    else *(on_b ? &v.rows.info[k].side_b : &v.rows.info[k].side_a) = at;
+    else *(on_b ? &v.rows.constraints[k].side_b : &v.rows.constraints[k].side_a) = at;
 }
 
 /* ---- launches ------------------------------------------------------------------------------------------------- */
@@ -198,9 +201,9 @@ static sadmm_status launch_bodies(struct sadmm_context *c, bool join, int relax,
     return CUDA(launch_of)(c, kernel, "update_velocity", blocks, BODY_THREADS, &args, error);
 }
 
-static int64_t constraint_blocks(const cuda_view *v)
+static int64_t pair_blocks(const cuda_view *v)
 {
-    return blocks_for((int64_t)v->contacts.lanes * v->contacts.pair_capacity) + blocks_for(v->rows.count);
+    return blocks_for((int64_t)v->contacts.lanes * v->contacts.pair_capacity);
 }
 
 template <int LANES_A_PAIR, int COUNT> static cuda_kernel sweep_kernel(bool measure, bool fast)
@@ -221,7 +224,10 @@ static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, in
     cuda_kernel kernel = c->view.contacts.lanes == 1      ? sweep_kernel<1, 1>(measure, c->fast)
                          : c->statistics.point_slots <= 4 ? sweep_kernel<4, 1>(measure, c->fast)
                                                           : sweep_kernel<4, 2>(measure, c->fast);
-    return CUDA(launch)(c, kernel, "update_constraints", constraint_blocks(&c->view), &args, error);
+    CUDA_TRY(CUDA(launch)(c, kernel, "update_constraints", pair_blocks(&c->view), &args, error));
+    kernel = measure ? (c->fast ? rows_kernel<true, true> : rows_kernel<true, false>)
+                     : (c->fast ? rows_kernel<false, true> : rows_kernel<false, false>);
+    return CUDA(launch)(c, kernel, "update_constraints (rows)", blocks_for(c->view.rows.count), &args, error);
 }
 
 sadmm_status CUDA(clear_primal)(struct sadmm_context *c, bool measure, struct sadmm_error *error)
@@ -243,8 +249,9 @@ static sadmm_status prepare_stepwise(struct sadmm_context *c, struct sadmm_error
     c->placed = true;
     if (!c->starting) return SADMM_OK;
     c->starting = false;
-    return CUDA(launch)(c, v->contacts.lanes == 1 ? start_kernel<1> : start_kernel<4>, "start_records",
-                        constraint_blocks(v), &args, error);
+    CUDA_TRY(CUDA(launch)(c, v->contacts.lanes == 1 ? start_kernel<1> : start_kernel<4>, "start_records",
+                          pair_blocks(v), &args, error));
+    return CUDA(launch)(c, start_rows_kernel, "start_records (rows)", blocks_for(v->rows.count), &args, error);
 }
 
 static sadmm_status refuse_fast(const struct sadmm_context *c, struct sadmm_error *error)

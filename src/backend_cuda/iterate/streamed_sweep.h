@@ -2,7 +2,7 @@
 #ifndef SADMM_CUDA_ITERATE_STREAMED_SWEEP_H
 #define SADMM_CUDA_ITERATE_STREAMED_SWEEP_H
 
-#include "sweep.h"
+#include "row_law.h"
 
 /* ---- Steps 2-4 of a pair, points in memory ---------------------------------------------------------------------- */
 
@@ -125,50 +125,46 @@ static __device__ __forceinline__ void start_pair(const contact_view &contacts, 
     store_records<LANES_A_PAIR>(iteration.records, contacts.ends[p], lane, live, sum);
 }
 
-/* ---- row blocks ------------------------------------------------------------------------------------------------- */
+/* ---- constraints given by rows --------------------------------------------------------------------------------- */
 
-static __device__ __forceinline__ void store_row_records(const row_view &rows, int32_t k, const row_about &about,
-                                                         const real lambda[6], solver_real *records)
+static __device__ __forceinline__ void store_row_records(const row_view &rows, int32_t k, const row_constraint &about,
+                                                         const real impulse[SADMM_MAX_ROWS], solver_real *records)
 {
-    if (about.side_a >= 0) store_row_record(rows, k, about.rows, 0, lambda, records + (size_t)about.side_a * ROW);
-    if (about.side_b >= 0) store_row_record(rows, k, about.rows, 1, lambda, records + (size_t)about.side_b * ROW);
+    const row_data *row = rows.data + (size_t)k * SADMM_MAX_ROWS;
+    if (about.side_a >= 0) store_row_record(row, 0, impulse, records + (size_t)about.side_a * ROW);
+    if (about.side_b >= 0) store_row_record(row, 1, impulse, records + (size_t)about.side_b * ROW);
 }
 
-template <bool MEASURE>
-static __device__ __forceinline__ double sweep_row_block_fast(const model_view &model, const body_view &bodies,
-                                                              const row_view &rows, const iteration_view &iteration,
-                                                              int32_t k, real relaxation_factor)
+template <bool MEASURE, bool FAST>
+static __device__ __forceinline__ double sweep_rows(const model_view &model, const body_view &bodies, const row_view &rows,
+                                                    const iteration_view &iteration, int32_t k, real relaxation_factor)
 {
-    const row_about about = rows.info[k];
-    real lambda[6], delta[6], kept[6];
-    load_row_lambda(rows, k, lambda);
-    for (int r = 0; r < 6; ++r) kept[r] = lambda[r];
-    update_row_block_fast(model, rows, k, about, bodies.state + (size_t)about.body_a * ROW,
-                          bodies.state + (size_t)about.body_b * ROW, lambda, delta);
-    for (int r = 0; r < 6; ++r) kept[r] = relaxed(kept[r], lambda[r], delta[r], relaxation_factor);
-    store_row_lambda(rows, k, kept);
-    store_row_records(rows, k, about, delta, iteration.records);
-    return MEASURE ? row_block_primal_fast(rows, k, about, delta) : 0;
-}
-
-template <bool MEASURE>
-static __device__ __forceinline__ double sweep_row_block(const body_view &bodies, const row_view &rows,
-                                                         const iteration_view &iteration, int32_t k)
-{
-    const row_about about = rows.info[k];
-    real lambda[6], delta[6];
-    load_row_lambda(rows, k, lambda);
-    update_row_block(bodies, rows, k, about, bodies.state + (size_t)about.body_a * ROW,
-                     bodies.state + (size_t)about.body_b * ROW, lambda, delta);
-    store_row_lambda(rows, k, lambda);
-    if (MEASURE) {
-        store_row_records(rows, k, about, lambda, iteration.records);
-        store_row_records(rows, k, about, delta, iteration.change);
-    } else {
-        for (int r = 0; r < 6; ++r) lambda[r] += delta[r];
-        store_row_records(rows, k, about, lambda, iteration.records);
+    enum { SPLIT = MEASURE && !FAST };
+    const row_constraint about = rows.constraints[k];
+    row_data *row = rows.data + (size_t)k * SADMM_MAX_ROWS;
+    const real beta_a = inv_beta_of(bodies, about.body_a), beta_b = inv_beta_of(bodies, about.body_b);
+    real lambda[SADMM_MAX_ROWS], delta[SADMM_MAX_ROWS], impulse[SADMM_MAX_ROWS], largest = 0;
+    update_rows<FAST>(row, about, about.body_a < model.bodies && about.body_b < model.bodies,
+                      inverse_weight(beta_a, beta_b), load_motion(bodies.state + (size_t)about.body_a * ROW),
+                      load_motion(bodies.state + (size_t)about.body_b * ROW), lambda, delta);
+    for (int r = 0; r < SADMM_MAX_ROWS; ++r) {
+        impulse[r] = FAST ? delta[r] : SPLIT ? lambda[r] : lambda[r] + delta[r];
+        if (MEASURE)
+            largest = real_max(largest, FAST ? row_primal_fast(delta[r], row[r].weight, row[r].along)
+                                             : row_primal(delta[r], real_max(beta_a, beta_b)));
+        row[r].lambda = FAST && relaxation_factor != 1 ? fused(relaxation_factor, delta[r], row[r].lambda) : lambda[r];
     }
-    return MEASURE ? row_block_primal(bodies, about, delta) : 0;
+    store_row_records(rows, k, about, impulse, iteration.records);
+    if (SPLIT) store_row_records(rows, k, about, delta, iteration.change);
+    return (double)largest;
+}
+
+/* The same for J^T lambda^0. */
+static __device__ __forceinline__ void start_rows(const row_view &rows, const iteration_view &iteration, int32_t k)
+{
+    real lambda[SADMM_MAX_ROWS];
+    for (int r = 0; r < SADMM_MAX_ROWS; ++r) lambda[r] = rows.data[(size_t)k * SADMM_MAX_ROWS + (size_t)r].lambda;
+    store_row_records(rows, k, rows.constraints[k], lambda, iteration.records);
 }
 
 #endif

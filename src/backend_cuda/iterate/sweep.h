@@ -197,118 +197,12 @@ CUDA_INLINE real largest_row(vec3 normal, vec3 delta)
     return real_max(real_abs(v3_dot(delta, normal)), real_max(real_abs(v3_dot(delta, t1)), real_abs(v3_dot(delta, t2))));
 }
 
-/* ---- row blocks ----------------------------------------------------------------------------------------------- */
-
-CUDA_INLINE real row_value(const row_view &rows, int32_t plane, int32_t k)
-{
-    return rows.data[(size_t)plane * (size_t)rows.stride + (size_t)k];
-}
-
-/* J^T lambda on one side. */
-CUDA_INLINE void store_row_record(const row_view &rows, int32_t k, int32_t count, int side, const real lambda[6],
-                                  solver_real *record)
-{
-    const int32_t jacobian = side ? ROW_J_B : ROW_J_A;
-    for (int j = 0; j < ROW; ++j) record[j] = 0;
-    for (int j = 0; j < 6; ++j) {
-        real sum = 0;
-        for (int r = 0; r < count; ++r) sum += row_value(rows, jacobian + 6 * r + j, k) * lambda[r];
-        record[record_slot(j)] = sum;
-    }
-}
-
-/* Steps 2-4 of row block k for the velocities va, vb of its bodies: lambda, and its change in delta. */
-CUDA_INLINE void update_row_block(const body_view &bodies, const row_view &rows, int32_t k, const row_about &about,
-                                  const solver_real *va, const solver_real *vb, real lambda[6], real delta[6])
-{
-    real s = inv_beta_of(bodies, about.body_a) + inv_beta_of(bodies, about.body_b), old[6];
-    for (int r = 0; r < 6; ++r) {
-        old[r] = lambda[r];
-        lambda[r] = 0;
-        if (r >= about.rows) continue;
-        real x = 0, error = row_value(rows, ROW_ERROR + r, k);
-        for (int j = 0; j < 6; ++j)
-            x += row_value(rows, ROW_J_A + 6 * r + j, k) * va[j] + row_value(rows, ROW_J_B + 6 * r + j, k) * vb[j];
-        if (about.kind == SADMM_BLOCK_SOFT)
-            lambda[r] = soft_multiplier(row_value(rows, ROW_STIFFNESS + r, k), row_value(rows, ROW_DAMPING + r, k),
-                                        error, x, s, old[r]);
-        else if (about.active >> r & 1)
-            lambda[r] = old[r] - (x + error) / s;
-    }
-    if (about.kind == SADMM_BLOCK_CONTACT) {
-        real y[3] = {lambda[0], lambda[1], lambda[2]};
-        contact_project_rows(y, row_value(rows, ROW_FRICTION, k), lambda);
-    }
-    for (int r = 0; r < 6; ++r) delta[r] = lambda[r] - old[r];
-}
-
-/* The same for the method `fast`: B / n in place of 1/s, n the number of dynamic bodies. */
-CUDA_INLINE void update_row_block_fast(const model_view &model, const row_view &rows, int32_t k, const row_about &about,
-                                       const solver_real *va, const solver_real *vb, real lambda[6], real delta[6])
-{
-    const real inv_n = about.body_a < model.bodies && about.body_b < model.bodies ? (real)0.5 : (real)1;
-    real u[6], along = 0, old[6], step[6] = {};
-    for (int r = 0; r < 6; ++r) {
-        old[r] = lambda[r];
-        u[r] = delta[r] = 0;
-        if (r >= about.rows) continue;
-        for (int j = 0; j < 6; ++j)
-            u[r] += row_value(rows, ROW_J_A + 6 * r + j, k) * va[j] + row_value(rows, ROW_J_B + 6 * r + j, k) * vb[j];
-        if (about.kind != SADMM_BLOCK_SOFT) u[r] += row_value(rows, ROW_ERROR + r, k);
-        along += row_value(rows, ROW_ALONG + r, k) * u[r];
-    }
-    for (int r = 0; r < about.rows; ++r) {
-        const real weight = inv_n * row_value(rows, ROW_WEIGHT + r, k);
-        step[r] = weight * u[r];
-        if (about.kind == SADMM_BLOCK_SOFT)
-            delta[r] = soft_change(row_value(rows, ROW_STIFFNESS + r, k), row_value(rows, ROW_DAMPING + r, k),
-                                   row_value(rows, ROW_ERROR + r, k), u[r], 1 / weight, old[r]);
-        else if (about.active >> r & 1) delta[r] = -(step[r] + inv_n * row_value(rows, ROW_ALONG + r, k) * along);
-        lambda[r] = old[r] + delta[r];
-    }
-    if (about.kind == SADMM_BLOCK_CONTACT)
-        contact_change_rows(old, step, row_value(rows, ROW_FRICTION, k), delta, lambda);
-}
-
-CUDA_INLINE void load_row_lambda(const row_view &rows, int32_t k, real lambda[6])
-{
-    for (int r = 0; r < 6; ++r) lambda[r] = row_value(rows, ROW_LAMBDA + r, k);
-}
-
-CUDA_INLINE void store_row_lambda(const row_view &rows, int32_t k, const real lambda[6])
-{
-    for (int r = 0; r < 6; ++r) rows.data[(size_t)(ROW_LAMBDA + r) * (size_t)rows.stride + (size_t)k] = lambda[r];
-}
-
-/* Largest |d lambda| times the larger 1/beta: the block's share of the primal residual. */
-CUDA_INLINE double row_block_primal(const body_view &bodies, const row_about &about, const real delta[6])
-{
-    real largest = 0;
-    for (int r = 0; r < 6; ++r) largest = real_max(largest, real_abs(delta[r]));
-    return (double)(largest * real_max(inv_beta_of(bodies, about.body_a), inv_beta_of(bodies, about.body_b)));
-}
-
-/* The same for the method `fast`: |d lambda| / B of each row. */
-CUDA_INLINE double row_block_primal_fast(const row_view &rows, int32_t k, const row_about &about, const real delta[6])
-{
-    real largest = 0;
-    for (int r = 0; r < about.rows; ++r) {
-        const real along = row_value(rows, ROW_ALONG + r, k), B = row_value(rows, ROW_WEIGHT + r, k) + along * along;
-        if (about.active >> r & 1) largest = real_max(largest, real_abs(delta[r]) * (1 / B));
-    }
-    return (double)largest;
-}
-
 /* ---- relaxation of the method `fast` (math/relax.h) -------------------------------------------------------------- */
 
 /* Multipliers that go `relaxation_factor` times as far as lambda^: rho, or 1 where an iteration is plain. */
 CUDA_INLINE vec3 relaxed(vec3 old, const point_change &to, bool plain, real relaxation_factor)
 {
     return plain ? to.lambda : fused_madd(old, relaxation_factor, to.delta);
-}
-CUDA_INLINE real relaxed(real old, real lambda, real delta, real relaxation_factor)
-{
-    return relaxation_factor == 1 ? lambda : fused(relaxation_factor, delta, old);
 }
 
 /* 1/B of a pair from B / n. */

@@ -34,7 +34,7 @@ struct side_branch {
  */
 static enum cuda_limit limit_by_iterations(const struct sadmm_context *c)
 {
-    if (!c->plan.limit || c->partition.tier == SADMM_CUDA_TIER_STREAM) return LIMIT_NONE;
+    if (!c->plan.limit || c->partition.tier == SADMM_CUDA_TIER_STREAM || c->plan.residuals) return LIMIT_NONE;
     return c->prologue && !stop_rule_checked(c) ? LIMIT_WHOLE : LIMIT_SUSPECTS;
 }
 

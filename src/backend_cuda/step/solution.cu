@@ -2,11 +2,6 @@
 #include "backend_cuda/device/double.h"
 #include "solution.h"
 
-static __device__ double row_multiplier(const row_view &rows, int32_t k, int r)
-{
-    return (double)rows.data[(size_t)(ROW_LAMBDA + r) * (size_t)rows.stride + (size_t)k];
-}
-
 /* ---- v and lambda ---------------------------------------------------------------------------------------------- */
 
 /* out: velocities (bodies x 6), impulses (points x 3), multipliers (blocks x 6). One thread a body, pair or block. */
@@ -30,7 +25,7 @@ static __global__ void read_kernel(const __grid_constant__ cuda_view v, const __
     }
     i -= v.contacts.pair_capacity;
     if (i < live_rows(v.model, v.rows))
-        for (int r = 0; r < 6; ++r) multipliers[6 * (size_t)i + (size_t)r] = row_multiplier(v.rows, i, r);
+        for (int r = 0; r < 6; ++r) multipliers[6 * (size_t)i + (size_t)r] = (double)v.rows.data[6 * (size_t)i + (size_t)r].lambda;
 }
 
 extern "C" sadmm_status CUDA(read_solution)(struct sadmm_context *c, struct sadmm_error *error)

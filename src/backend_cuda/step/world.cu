@@ -52,7 +52,6 @@ void CUDA(view_counts)(struct sadmm_context *c, int64_t pairs)
     v->model.bodies = s->bodies;
     v->contacts.pair_capacity = (int32_t)((pairs + WARP - 1) / WARP * WARP);
     v->rows.count = 0;
-    v->rows.stride = 0;
     v->model.contact_rows = s->guess.contact_rows == 1 ? 1 : 3;
     v->model.warm_start = c->settings.warm_start;
 }

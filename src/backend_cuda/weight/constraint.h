@@ -4,6 +4,7 @@
 #define SADMM_CUDA_WEIGHT_CONSTRAINT_H
 
 #include "backend_cuda/device/body.h"
+#include "row_sums.h"
 
 #include "core/math/violation.h"
 
@@ -103,11 +104,8 @@ static inline __device__ void add_side(const contact_view &contacts, const row_v
 {
     const int32_t side = code & 1, p = code / 2;
     if (p >= contacts.pair_capacity) {
-        const int32_t k = p - contacts.pair_capacity, jacobian = side ? ROW_J_B : ROW_J_A;
-        double wrench[6] = {};
-        for (int r = 0; r < rows.info[k].rows; ++r)
-            for (int j = 0; j < 6; ++j)
-                wrench[j] += row_number(rows, jacobian + 6 * r + j, k) * row_number(rows, ROW_LAMBDA + r, k);
+        double wrench[6];
+        wrench_of_rows(rows, p - contacts.pair_capacity, side, wrench);
         for (int j = 0; j < 6; ++j) g[j] += wrench[j];
         *push += sqrt(dot3(wrench, wrench));
         return;

@@ -61,21 +61,6 @@ static __host__ __device__ __forceinline__ bool has_closed_form(const model_view
 
 /* ---- C ----------------------------------------------------------------------------------------------------------- */
 
-static inline __device__ void add_weighted_block(const row_view &rows, const raw_view &raw, int32_t k, int32_t side,
-                                                 double C[PACKED])
-{
-    const struct sadmm_problem_block *block = &raw.blocks[k];
-    const double *J = side ? block->jacobian_b : block->jacobian_a;
-    double along[6] = {};
-    for (int32_t r = 0; r < block->rows; ++r) {
-        double row[6];
-        for (int j = 0; j < 6; ++j) row[j] = J[6 * r + j];
-        packed_add_row(C, row, row_number(rows, ROW_WEIGHT + r, k));
-        for (int j = 0; j < 6; ++j) along[j] += row_number(rows, ROW_ALONG + r, k) * row[j];
-    }
-    packed_add_row(C, along, 1);
-}
-
 /* B of a side's points into C, where contacts have one row. */
 static __device__ __forceinline__ void add_normals(const contact_view &contacts, int32_t code, double B,
                                                    double C[PACKED])
@@ -132,7 +117,7 @@ static __device__ __forceinline__ void weighted_matrix(const cuda_view &v, const
         const bool rows = !CLOSED && sides.code >= 0 && sides.code >= 2 * v.contacts.pair_capacity;
         const double B =
             sides.code < 0 || rows ? 0 : weigh_side(v.model, v.bodies, v.contacts, v.weights, sides, island, first);
-        if (rows) add_weighted_block(v.rows, v.raw, sides.code / 2 - v.contacts.pair_capacity, sides.code & 1, C);
+        if (rows) add_weighted_rows(v.rows, sides.code / 2 - v.contacts.pair_capacity, sides.code & 1, C);
         else if (!three && sides.code >= 0) add_normals(v.contacts, sides.code, B, C);
 #pragma unroll
         for (int j = 0; j < LANES; ++j) {

@@ -32,17 +32,6 @@ static __device__ void add_pair(const model_view &model, const raw_view &raw, co
     }
 }
 
-static __device__ void add_block(const raw_view &raw, int32_t k, int side, double C[PACKED])
-{
-    const struct sadmm_problem_block *block = &raw.blocks[k];
-    const double *J = side ? block->jacobian_b : block->jacobian_a;
-    for (int32_t r = 0; r < block->rows; ++r) {
-        double row[6];
-        for (int j = 0; j < 6; ++j) row[j] = J[6 * r + j];
-        packed_add_row(C, row, 1);
-    }
-}
-
 /* C of a body with B = 1, in all lanes: each adds up every eighth side. From the raw contacts. Every lane of the warp
  * comes here. */
 static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, const body_thread &t, double C[PACKED])
@@ -52,7 +41,7 @@ static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, const 
     for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) {
         const int32_t record = v.graph.incident[at] / 2, side = v.graph.incident[at] & 1;
         if (record < v.contacts.pair_capacity) add_pair(v.model, v.raw, &v.raw.pairs[record], side, &sums, C);
-        else add_block(v.raw, record - v.contacts.pair_capacity, side, C);
+        else add_rows(v.rows, record - v.contacts.pair_capacity, side, C);
     }
     if (v.model.contact_rows == 1 || v.rows.count > 0) sum_lanes<PACKED>(C);
     sum_lanes<sizeof sums / sizeof(double)>(&sums.count);

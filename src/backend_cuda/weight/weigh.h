@@ -43,7 +43,7 @@ static __device__ __forceinline__ void weigh_island(cuda_island *island, const d
         island->speed = weight_speed_under_iterated(speed, island->speed, args.factor, sum[2], sum[1]);
     }
     island->mass = sum[1];
-    if (!LEVELS || island->blocks) return;
+    if (!LEVELS || island->rows) return;
     const double balance = weight_balance(sum[5], sum[4], sum[1]),
                  next = weight_next_scale(island->weight_scale, balance);
     /* those that stall keep the weights they have, times what the weight scale has risen by since those were taken */
@@ -56,12 +56,13 @@ static __device__ __forceinline__ void weigh_island(cuda_island *island, const d
 static inline __device__ double row_side_number(const contact_view &contacts, const row_view &rows, int32_t code,
                                                 int32_t lane)
 {
-    const int32_t k = code / 2 - contacts.pair_capacity, jacobian = code & 1 ? ROW_J_B : ROW_J_A;
+    const int32_t k = code / 2 - contacts.pair_capacity, side = code & 1;
+    const row_data *row = rows_of(rows, k);
     double square = 0;
     for (int j = lane < 6 ? lane : 0; j < (lane < 6 ? lane + 1 : 3); ++j) {
         double sum = 0;
-        for (int r = 0; r < rows.info[k].rows; ++r)
-            sum += row_number(rows, jacobian + 6 * r + j, k) * row_number(rows, ROW_LAMBDA + r, k);
+        for (int r = 0; r < rows.constraints[k].rows; ++r)
+            sum += (double)row[r].jacobian[side][j] * (double)row[r].lambda;
         if (lane < 6) return sum;
         square += sum * sum;
     }

@@ -4,7 +4,7 @@
  *   pairs    four threads a pair, or one: records of its sides (assemble/side_sums.h). The first ones come with the
  * contacts   terms    eight lanes a body: its momentum residual, what it adds to the sums over its island, the sums
  * (weight/island_sums.h), and what            follows for the island
- *   rows     a thread a row block: B
+ *   rows     a thread a constraint given by rows: B
  *   then C and H (weight/penalty.cu), where each side of a pair works out B for itself
  *
  * The first time, persistent kernels of tier BLOCK do this themselves (iterate/prologue.h). */
@@ -53,67 +53,68 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 
 /* ---- row blocks -------------------------------------------------------------------------------------------------- */
 
-static __device__ void store_row(const row_view &rows, int32_t plane, int32_t k, double value)
+/* Of every row; and what its multiplier counts for in the load: a row that pushes by how much, a row that only turns by
+ * the push that would take as much energy. */
+static __device__ void respond_rows(const model_view &model, const body_view &bodies, const row_view &rows, int32_t k)
 {
-    rows.data[(size_t)plane * (size_t)rows.stride + (size_t)k] = (solver_real)value;
-}
-
-/* Of every row of a block, and what its multiplier counts for in the load: a row that pushes by how much, a row that
- * only turns by the push that would take as much energy. */
-static __device__ void respond_row_block(const model_view &model, const body_view &bodies, const row_view &rows,
-                                         int32_t k, const row_about &about)
-{
+    const row_constraint about = rows.constraints[k];
     const int32_t joined[2] = {about.body_a, about.body_b};
     double inverse_mass = 0;
     for (int side = 0; side < 2; ++side)
         if (is_dynamic(model, joined[side])) inverse_mass += 1 / mass_of(bodies, (size_t)joined[side]);
     for (int r = 0; r < about.rows; ++r) {
-        double w = 0, push = 0, row[6];
+        double w = 0, push = 0, J[6];
         for (int side = 0; side < 2; ++side) {
             if (!is_dynamic(model, joined[side])) continue;
-            for (int j = 0; j < 6; ++j) row[j] = row_number(rows, (side ? ROW_J_B : ROW_J_A) + 6 * r + j, k);
-            w += packed_form(bodies.A_inverse + (size_t)joined[side] * PACKED, row);
-            push = fmax(push, sqrt(dot3(row, row)));
+            load_jacobian(rows_of(rows, k)[r], side, J);
+            w += packed_form(bodies.A_inverse + (size_t)joined[side] * PACKED, J);
+            push = fmax(push, sqrt(dot3(J, J)));
         }
-        store_row(rows, ROW_RESPONSE + r, k, w);
-        store_row(rows, ROW_SCALE + r, k, push > 0 ? push : sqrt(w / inverse_mass));
+        const row_response out = {w, push > 0 ? push : sqrt(w / inverse_mass)};
+        rows.responses[(size_t)k * SADMM_MAX_ROWS + (size_t)r] = out;
     }
 }
 
-/* B = diag(weight) + along along^T */
-static __device__ void weigh_row_block(const cuda_view &v, int32_t k, bool first)
+/* A row that has neither bounds nor compliance shares a dense weight with the others of its constraint that have none. */
+static __device__ bool is_coupled(const row_data &row)
 {
-    const row_about about = v.rows.info[k];
+    return row.compliance == 0 && isinf(row.lo) && isinf(row.hi);
+}
+
+/* B = diag(weight) + along along^T */
+static __device__ void weigh_rows(const cuda_view &v, int32_t k, bool first)
+{
+    const row_constraint about = v.rows.constraints[k];
+    row_data *rows = v.rows.data + (size_t)k * SADMM_MAX_ROWS;
     cuda_island *island =
         &v.islands.info[v.graph.label[is_dynamic(v.model, about.body_a) ? about.body_a : about.body_b]];
     double load2 = 0, lambda2 = 0, mean = 0;
     if (first) {
-        respond_row_block(v.model, v.bodies, v.rows, k, about);
-        island->blocks = 1;
+        respond_rows(v.model, v.bodies, v.rows, k);
+        island->rows = 1;
     }
+    const row_response *responses = v.rows.responses + (size_t)k * SADMM_MAX_ROWS;
     for (int r = 0; r < about.rows; ++r) {
-        const double lambda = row_number(v.rows, ROW_LAMBDA + r, k),
-                     load = row_number(v.rows, ROW_SCALE + r, k) * lambda;
+        const double lambda = (double)rows[r].lambda, load = responses[r].scale * lambda;
         load2 += load * load;
         lambda2 += lambda * lambda;
-        mean += row_number(v.rows, ROW_RESPONSE + r, k) / about.rows;
+        mean += responses[r].response / about.rows;
     }
     const double share = weight_share(load2, island->speed, island->mass);
     for (int r = 0; r < about.rows; ++r) {
-        const double lambda = row_number(v.rows, ROW_LAMBDA + r, k), response = row_number(v.rows, ROW_RESPONSE + r, k);
-        const bool hard = about.kind == SADMM_BLOCK_HARD;
-        store_row(v.rows, ROW_WEIGHT + r, k,
-                  hard                                ? weight_of_coupled_row(response)
-                  : about.kind == SADMM_BLOCK_CONTACT ? weight_of_cone(share, lambda2, mean)
-                                                      : weight_of_single_row(share, lambda, response));
-        store_row(v.rows, ROW_ALONG + r, k, hard ? sqrt(share) * lambda : 0);
+        const double lambda = (double)rows[r].lambda, response = responses[r].response;
+        const bool coupled = !about.cone && is_coupled(rows[r]);
+        rows[r].weight = (solver_real)(about.cone ? weight_of_cone(share, lambda2, mean)
+                                       : coupled  ? weight_of_coupled_row(response)
+                                                  : weight_of_single_row(share, lambda, response));
+        rows[r].along = (solver_real)(coupled ? sqrt(share) * lambda : 0);
     }
 }
 
 static __global__ void weigh_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     const int32_t k = thread_index();
-    if (k < live_rows(v.model, v.rows)) weigh_row_block(v, k, args.start);
+    if (k < live_rows(v.model, v.rows)) weigh_rows(v, k, args.start);
 }
 
 /* ---- launches ---------------------------------------------------------------------------------------------------- */
@@ -139,7 +140,7 @@ sadmm_status CUDA(enqueue_islands)(struct sadmm_context *c, struct sadmm_error *
     const cuda_kernel kernel = c->refreshes >= WEIGHT_FIRST_SCALE ? terms_kernel<true> : terms_kernel<false>;
     CUDA_TRY(CUDA(launch_early)(c, kernel, "sums over islands", body_blocks(c->view.model.bodies), BODY_THREADS, &args,
                                 error));
-    return CUDA(launch)(c, weigh_rows_kernel, "weights of row blocks", blocks_for(c->view.rows.count), &args, error);
+    return CUDA(launch)(c, weigh_rows_kernel, "weights of rows", blocks_for(c->view.rows.count), &args, error);
 }
 
 sadmm_status CUDA(enqueue_weights)(struct sadmm_context *c, bool factor, struct sadmm_error *error)

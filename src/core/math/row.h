@@ -44,4 +44,16 @@ SADMM_INLINE real row_bounded(real lambda, real lo, real hi, real *change)
     return bounded;
 }
 
+/* The natural map of a row whose own response J A^-1 J^T is w > 0: how far lambda is from the law's solution by this row
+ * alone, times w, m/s. */
+SADMM_INLINE real row_natural_map(real gain, real bias, real compliance, real lo, real hi, real x, real lambda, real w)
+{
+    const real missing = row_residual(gain, bias, compliance, x, lambda), under = compliance + gain * w;
+    real change = -missing / under;
+    const real unbounded = change;
+    row_bounded(lambda, lo, hi, &change);
+    /* w / (gain w) is exactly 1 */
+    return change == unbounded ? real_abs(missing) * (w / under) : real_abs(change) * w;
+}
+
 #endif

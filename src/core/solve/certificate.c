@@ -128,16 +128,12 @@ static double row_map(struct tally *tally, const struct sadmm_rows *rows, size_t
 {
     const double lambda = rows->lambda[r], gain = rows->gain[r], compliance = rows->compliance[r];
     const double missing = row_residual(gain, rows->bias[r], compliance, x, lambda);
-    double change = -missing / (compliance + gain * w);
-    const double unbounded = change;
-    row_bounded(lambda, rows->lo[r], rows->hi[r], &change);
     if (sadmm_row_is_coupled(rows, r)) { /* K is the whole line for a hard row: r - P_K(r - u) = u. */
         tally->u2 += missing * missing;
         tally->r2 += lambda * lambda;
         tally->map2 += missing * missing;
     }
-    /* w / (gain w) is exactly 1 */
-    return change == unbounded ? fabs(missing) * (w / (compliance + gain * w)) : fabs(change) * w;
+    return row_natural_map(gain, rows->bias[r], compliance, rows->lo[r], rows->hi[r], x, lambda, w);
 }
 
 static void certify_rows(struct tally *tally, const struct sadmm_system *system, size_t k, double *bodies)
