@@ -11,6 +11,7 @@
 #include "core/base/memory.h"
 #include "global_problem.h"
 #include "h5.h"
+#include "open_file.h"
 
 enum { NAME_SIZE = 64, LARGEST = INT32_MAX - 1 };
 
@@ -184,24 +185,35 @@ static sadmm_status read_global(hid_t file, struct sadmm_global_problem *g, stru
     return SADMM_OK;
 }
 
-sadmm_status sadmm_fclib_load(const char *path, sadmm_problem **out, struct sadmm_error *error)
+/* Of the file at `path`, or of `file` where path is NULL. */
+static sadmm_status read_problem(const char *path, hid_t file, sadmm_problem **out, struct sadmm_error *error)
 {
     struct sadmm_h5_session session;
     struct sadmm_global_problem global = {0};
-    hid_t file;
-    if (!out) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "out is NULL");
     *out = NULL;
-    if (!path) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "path is NULL");
     TRY(sadmm_h5_begin(&session, error));
-    sadmm_status status = sadmm_h5_open(path, SADMM_H5_READ, &file, error);
+    sadmm_status status = path ? sadmm_h5_open(path, SADMM_H5_READ, &file, error) : SADMM_OK;
     if (status == SADMM_OK) {
         status = read_global(file, &global, error);
-        H5Fclose(file);
+        if (path) H5Fclose(file);
     }
     sadmm_h5_end(&session);
     if (status == SADMM_OK) status = sadmm_global_to_problem(&global, out, error);
     sadmm_global_problem_free(&global);
     return status;
+}
+
+sadmm_status sadmm_fclib_load(const char *path, sadmm_problem **out, struct sadmm_error *error)
+{
+    if (!out) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "out is NULL");
+    *out = NULL;
+    if (!path) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "path is NULL");
+    return read_problem(path, -1, out, error);
+}
+
+sadmm_status sadmm_fclib_read(hid_t file, sadmm_problem **out, struct sadmm_error *error)
+{
+    return read_problem(NULL, file, out, error);
 }
 
 /* ---- writing ----------------------------------------------------------------------------------------------------- */
@@ -325,6 +337,20 @@ sadmm_status sadmm_fclib_save(sadmm_problem *problem, const char *path, const ch
     TRY(sadmm_global_from_problem(problem, &global, error));
     sadmm_status status = check_target(path, error);
     if (status == SADMM_OK) status = finish(path, write_file(path, false, &global, title ? title : "", NULL, error));
+    sadmm_global_problem_free(&global);
+    return status;
+}
+
+sadmm_status sadmm_fclib_write(sadmm_problem *problem, hid_t file, const char *title, struct sadmm_error *error)
+{
+    struct sadmm_h5_session session;
+    struct sadmm_global_problem global;
+    TRY(sadmm_global_from_problem(problem, &global, error));
+    sadmm_status status = sadmm_h5_begin(&session, error);
+    if (status == SADMM_OK) {
+        status = write_global(file, &global, title, error);
+        sadmm_h5_end(&session);
+    }
     sadmm_global_problem_free(&global);
     return status;
 }
