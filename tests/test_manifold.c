@@ -24,10 +24,11 @@ static double choice(const struct solid *a, const struct solid *b, double depth)
 static void expect_points_near_both(const struct solid *a, const struct solid *b, const struct world_manifold *m)
 {
     for (int i = 0; i < m->count; ++i) {
-        double half = 0.5 * fabs(m->separation[i]), slack = 1.5e-3 * fmax(shadow(a, m->normal), shadow(b, m->normal));
-        /* midway between the surfaces: no farther from either than half the separation, plus the clipping tolerance */
-        ck_assert_double_le(outside(a, m->position[i]), half * 1.5 + slack + 1e-3 * thinner(a, b));
-        ck_assert_double_le(outside(b, m->position[i]), half * 1.5 + slack + 1e-3 * thinner(a, b));
+        /* midway between the surfaces: no farther from either than half the separation, but where corners stay corners */
+        double slack = MANIFOLD_SNAP * fmin(shape_radius(a->type, a->size), shape_radius(b->type, b->size)) + 1e-12;
+        double reach = 0.5 * fabs(m->separation[i]) + slack;
+        ck_assert_double_le(outside(a, m->position[i]), reach);
+        ck_assert_double_le(outside(b, m->position[i]), reach);
     }
 }
 

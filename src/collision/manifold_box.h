@@ -267,7 +267,7 @@ SADMM_INLINE void manifold_box_box(vec3 half1, vec3 half2, const struct pair_pos
     s = use_edge ? axes.s_edge : axes.separation[axes.face];
     box_axis_manifold(&b, axis, negative, &crossing, m);
     if (m->count > 0 && use_edge) s = m->points[m->count - 1].separation;
-    if (m->count == 0 || (!crossing && s > 0)) {
+    if (m->count == 0 || (s > 0 && (!crossing || s > limit))) {
         if (s > 0) {
             if (box_corner_over_face(&b, &axes))
                 box_axis_manifold(&b, axes.best_face, axes.negative[axes.best_face], &crossing, m);

@@ -25,16 +25,25 @@ SADMM_INLINE int box_edge_end(const real centre[3], int i, int upper)
     return (upper ? 1 << i : 0) | (centre[u] > 0 ? 1 << u : 0) | (centre[v] > 0 ? 1 << v : 0);
 }
 
-/* Tangent of the steepest descent of the box's surface beside the edge, looking sideways along `side` (unit, across the
- * edge and the normal): how fast the gap opens there. */
-SADMM_INLINE real box_edge_fall(const real centre[3], int i, const real n[3], const real side[3])
+/* The smallest s at which the line x - s out is in the box of half extents h, a large number where it passes the box by.
+ * All in the box's frame; `out` looks out of the box, across the edge along i, near which x is: that edge goes on at its ends. */
+SADMM_INLINE real box_depth_along(const real x[3], const real out[3], const real h[3], int i)
 {
-    int u = i == 2 ? 0 : i + 1, v = u == 2 ? 0 : u + 1;
-    /* outward normals of the two faces at the edge; the one that looks more to the side falls away there */
-    real fu = centre[u] >= 0 ? (real)1 : (real)-1, fv = centre[v] >= 0 ? (real)1 : (real)-1;
-    real su = fu * side[u], sv = fv * side[v], nu = fu * n[u], nv = fv * n[v];
-    real s = su > sv ? su : sv, c = su > sv ? nu : nv;
-    return s > 0 && c > (real)1e-3 ? s / c : (s > 0 ? (real)1e3 : 0);
+    real first = -(real)1e30, last = (real)1e30;
+    int k;
+    for (k = 0; k < 3; ++k) {
+        real near, inverse;
+        if (k == i) continue;
+        if (real_abs(out[k]) < SADMM_EPSILON) {
+            if (real_abs(x[k]) > h[k]) return (real)1e30;
+            continue;
+        }
+        inverse = 1 / out[k];
+        near = out[k] > 0 ? h[k] : -h[k];
+        first = real_max(first, (x[k] - near) * inverse);
+        last = real_min(last, (x[k] + near) * inverse);
+    }
+    return first <= last ? first : (real)1e30;
 }
 
 /* Edge-edge manifold for axis code `axis`; returns false when the edges do not cross (closest points at an end). */
@@ -85,33 +94,28 @@ SADMM_INLINE bool box_edge_manifold(const struct box_pair *b, int axis, int nega
         hi = real_min(hi1, hi2);
         if (hi - lo > MANIFOLD_SNAP * real_min(b->h1[i], b->h2[j])) {
             for (end = 0; end < 2; ++end) {
-                real x = end ? hi : lo, side_length, gap;
+                /* the gap along the normal where the one edge ends and where the other does; the smaller one counts */
+                real x = end ? hi : lo, gap, gap1, gap2, x1[3], x2[3];
                 vec3 a1 = v3_madd(p, (x - v3_dot(mean, p)) / d1, axis1), a2 = v3_madd(q, (x - v3_dot(mean, q)) / d2, w);
-                vec3 d = v3_sub(a2, a1), side;
+                vec3 d = v3_sub(a1, v3_from_array(b->t));
                 uint32_t feature;
-                gap = v3_dot(n, d);
-                side = v3_madd(d, -gap, n);
-                side_length = v3_norm(side);
-                if (side_length > 0) {
-                    real side1[3], side2[3];
-                    side = v3_scale(side, 1 / side_length);
-                    v3_to_array(side, side1);
-                    for (k = 0; k < 3; ++k)
-                        side2[k] = -(side1[0] * b->R[0][k] + side1[1] * b->R[1][k] + side1[2] * b->R[2][k]);
-                    gap += side_length * real_min(box_edge_fall(c1, i, n1, side1), box_edge_fall(c2, j, n2, side2));
-                }
+                for (k = 0; k < 3; ++k) x2[k] = d.x * b->R[0][k] + d.y * b->R[1][k] + d.z * b->R[2][k];
+                v3_to_array(a2, x1);
+                gap1 = box_depth_along(x2, n2, b->h2, j);
+                gap2 = box_depth_along(x1, n1, b->h1, i);
+                gap = real_min(gap1, gap2);
                 deepest = real_min(deepest, gap);
                 if (gap > b->limit) continue;
                 /* the end belongs to the edge that stops there */
                 if (end ? hi1 <= hi2 : lo1 >= lo2) feature = box_feature_vertex(0, box_edge_end(c1, i, end));
                 else feature = box_feature_vertex(1, box_edge_end(c2, j, (end != 0) == (d2 > 0)));
-                manifold_add(m, v3_scale(v3_add(a1, a2), (real)0.5), gap, feature);
+                manifold_add(m, gap1 <= gap2 ? v3_madd(a1, gap / 2, n) : v3_madd(a2, -gap / 2, n), gap, feature);
             }
             if (m->count > 0 && deepest - separation <= MANIFOLD_FLAT * b->thin) return crossing;
         }
     }
-    if (separation <= b->limit + b->slack)
-        manifold_add(m, v3_scale(v3_add(p1, p2), (real)0.5), separation, box_feature_crossing(e1, e2));
+    /* beyond the limit too, by which the caller sees what became of the axis */
+    manifold_add(m, v3_scale(v3_add(p1, p2), (real)0.5), separation, box_feature_crossing(e1, e2));
     return crossing;
 }
 

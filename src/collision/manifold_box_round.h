@@ -218,10 +218,10 @@ SADMM_INLINE void manifold_capsule_box_inside(real radius, real half, vec3 h, ve
     {
         vec3 c0 = segment_at(p, first, u), c1 = segment_at(p, last, u);
         real s0 = v3_dot(n, c0) - ha[k] - radius, s1 = v3_dot(n, c1) - ha[k] - radius;
-        bool one = last - first <= MANIFOLD_SNAP * half;
+        bool one = last - first <= MANIFOLD_SNAP * real_min(half, v3_max_abs(h)); /* then the deeper end */
         /* midway between the lowest point of the ball and the face */
-        if (s0 <= limit || (one && s1 > limit)) manifold_add(m, v3_madd(c0, -(radius + s0 / 2), n), s0, 1);
-        if (!one && s1 <= limit) manifold_add(m, v3_madd(c1, -(radius + s1 / 2), n), s1, 2);
+        if (one ? s0 <= s1 : s0 <= limit) manifold_add(m, v3_madd(c0, -(radius + s0 / 2), n), s0, 1);
+        if (one ? s0 > s1 : s1 <= limit) manifold_add(m, v3_madd(c1, -(radius + s1 / 2), n), s1, 2);
     }
 }
 
@@ -252,14 +252,15 @@ SADMM_INLINE void manifold_segment_outside(real radius, real half, vec3 h, vec3 
         if (na[k] * na[k] < 1 - MANIFOLD_COS_NEAR * MANIFOLD_COS_NEAR && k != main_axis &&
             real_abs(xa[k]) <= ha[k] * (1 + MANIFOLD_SNAP))
             stretch = stretch && segment_slab(pa[k], ua[k], ha[k], &first, &last);
-    if (stretch && last - first > MANIFOLD_SNAP * half) {
+    if (stretch && last - first > MANIFOLD_SNAP * real_min(half, v3_max_abs(h))) {
         for (e = 0; e < 2; ++e) {
             vec3 c = segment_at(p, e ? last : first, u), qe = box_clamp(c, h), d = v3_sub(qe, c);
             real distance = v3_norm(d), separation = distance - radius;
             if (!(v3_dot(m->normal, d) >= MANIFOLD_COS_NEAR * distance)) continue;
             best_end = real_min(best_end, separation);
-            if (separation <= limit)
-                manifold_add(m, v3_madd(qe, -separation / 2, m->normal), separation, first_feature + (uint32_t)e);
+            if (separation <= limit) /* midway between the end's surface and the box */
+                manifold_add(m, v3_madd(qe, -separation / 2, distance > 0 ? v3_scale(d, 1 / distance) : m->normal),
+                             separation, first_feature + (uint32_t)e);
         }
         if (m->count == 2 && best_end - closest < flat) return;
         if (m->count == 1 && best_end - closest < flat) { /* the closest point, in the name of that end */
@@ -285,7 +286,8 @@ SADMM_INLINE void manifold_capsule_box(real radius, real half, vec3 h, const str
     if (length <= 64 * SADMM_EPSILON * (radius + half + v3_max_abs(h)))
         manifold_capsule_box_inside(radius, half, h, p, u, limit, cache, m);
     else if (length - radius <= limit)
-        manifold_segment_outside(radius, half, h, p, u, x, q, length, MANIFOLD_FLAT * radius, limit, 1, m);
+        manifold_segment_outside(radius, half, h, p, u, x, q, length,
+                                 MANIFOLD_FLAT * real_min(radius, real_min(h.x, real_min(h.y, h.z))), limit, 1, m);
 }
 
 #endif

@@ -65,13 +65,20 @@ SADMM_INLINE void segments_closest(vec3 p, vec3 u, real hp, vec3 q, vec3 w, real
     *t = b;
 }
 
-/* Cross-section of two capsules at height z on b's axis: the point of a's axis there, p + s u. Away from the crossing
- * the axes drift apart sideways; that excess is added to the separation along the normal. */
-SADMM_INLINE real manifold_capsule_section(const struct manifold *m, vec3 ca, vec3 cb, real radii)
+/* Balls around ca and cb whose centres are apart sideways as well: adds the point midway between their surfaces on the line
+ * along the normal on which they are nearest. Returns the separation there, a large number where they pass each other by. */
+SADMM_INLINE real manifold_add_section(struct manifold *m, vec3 ca, real ra, vec3 cb, real rb, real limit, uint32_t feature)
 {
-    vec3 d = v3_sub(cb, ca);
-    real along = v3_dot(m->normal, d);
-    return along - radii + (v3_norm(d) - real_abs(along));
+    vec3 d = v3_sub(cb, ca), side;
+    real along = v3_dot(m->normal, d), share = ra / (ra + rb), height2, height, s;
+    side = v3_madd(d, -along, m->normal);
+    height2 = (ra + rb) * (ra + rb) - v3_norm2(side);
+    if (height2 <= 0) return (real)1e30;
+    height = real_sqrt(height2);
+    s = along - height;
+    if (s <= limit)
+        manifold_add(m, v3_madd(v3_madd(ca, share, side), share * height + s / 2, m->normal), s, feature);
+    return s;
 }
 
 /* Two capsules side by side touch along a line: both ends of the common stretch. Otherwise the closest points.
@@ -104,12 +111,9 @@ SADMM_INLINE void manifold_capsule_capsule(real ra, real ha, real rb, real hb, c
         if (hi - lo > MANIFOLD_SNAP * (ha + hb)) {
             vec3 a_lo = v3_madd(p, (lo - p.z) / u.z, u), a_hi = v3_madd(p, (hi - p.z) / u.z, u);
             vec3 b_lo = v3(0, 0, lo), b_hi = v3(0, 0, hi);
-            real s_lo = manifold_capsule_section(m, a_lo, b_lo, radii);
-            real s_hi = manifold_capsule_section(m, a_hi, b_hi, radii);
-            vec3 shift = v3_scale(m->normal, (ra - rb) / 2);
-            if (s_lo <= limit) manifold_add(m, v3_madd(v3_scale(v3_add(a_lo, b_lo), (real)0.5), 1, shift), s_lo, 1);
-            if (s_hi <= limit) manifold_add(m, v3_madd(v3_scale(v3_add(a_hi, b_hi), (real)0.5), 1, shift), s_hi, 2);
-            if (m->count > 0 && real_min(s_lo, s_hi) - closest <= MANIFOLD_FLAT * radii) return;
+            real s_lo = manifold_add_section(m, a_lo, ra, b_lo, rb, limit, 1);
+            real s_hi = manifold_add_section(m, a_hi, ra, b_hi, rb, limit, 2);
+            if (m->count > 0 && real_min(s_lo, s_hi) - closest <= MANIFOLD_FLAT * 2 * real_min(ra, rb)) return;
         }
     }
     manifold_add_balls(m, ca, ra, cb, rb, limit, 3);

@@ -1,0 +1,148 @@
+/* Pairs that the search of tests/fuzz found, each with a contact whose point was not between the surfaces, or with none.
+ * Every point is midway between surface points of the two that are its separation apart, so that it lies no farther
+ * outside of either than half of that.
+ *
+ * Tolerance: 64 roundings of a double at the size of the pair (poses, a square root, and the projections of the oracle). */
+#include <float.h>
+
+#include "manifold_tools.h"
+#include "run_suite.h"
+
+static double pair_size(const struct solid *a, const struct solid *b)
+{
+    return shape_radius(a->type, a->size) + shape_radius(b->type, b->size);
+}
+
+/* The number of points, as given and exchanged. */
+static int expect_between(struct solid a, struct solid b, double limit)
+{
+    double tolerance = 64 * DBL_EPSILON * pair_size(&a, &b);
+    int least = SADMM_MANIFOLD_POINTS;
+    for (int exchanged = 0; exchanged < 2; ++exchanged) {
+        struct world_manifold m = exchanged ? touch(&b, &a, limit, 0) : touch(&a, &b, limit, 0);
+        for (int i = 0; i < m.count; ++i) {
+            double half = 0.5 * fabs(m.separation[i]) + tolerance;
+            ck_assert_double_le(m.separation[i], limit + tolerance);
+            ck_assert_double_le(outside(&a, m.position[i]), half);
+            ck_assert_double_le(outside(&b, m.position[i]), half);
+        }
+        least = m.count < least ? m.count : least;
+    }
+    return least;
+}
+
+/* Edges 2 degrees from parallel and apart: at an end of what they have in common they are apart sideways. */
+START_TEST(edges_that_drift_apart)
+{
+    struct solid a = box_at(0.25, 0.5, 0.75, 0, 0, 0), b = box_at(0.25, 0.25, 0.25, 0.85568194512042683,
+                                                                 0.027264320978180347, -0.72557704235174225);
+    const double Ra[9] = {0, -1, 0, 1, 0, 0, 0, 0, 1};
+    const double Rb[9] = {-0.019844139623231172, -0.64670204092177885, 0.76248454436153645,
+                          -0.99794651073130314,  0.059266553123667021, 0.024294801914336028,
+                          -0.060901328736169602, -0.76043668109083584, -0.64655013897587543};
+    memcpy(a.R, Ra, sizeof Ra);
+    memcpy(b.R, Rb, sizeof Rb);
+    ck_assert_int_ge(expect_between(a, b, 0.01), 1);
+}
+END_TEST
+
+/* Boxes far apart (the limit is larger still) whose nearest features are edges, in a slightly other direction at the ends. */
+START_TEST(edges_far_apart)
+{
+    struct solid a = box_at(1, 0.5, 1, 0, 0, 0), b = box_at(1, 0.25, 0.5, 0.35177385882228041, -1.597980792741295,
+                                                            1.5648656620287567);
+    const double Ra[9] = {1, 0, 0, 0, 1, -2.0235374666871598e-09, 0, 2.0235374666871598e-09, 1};
+    const double Rb[9] = {-0.99867855962999741, 0.03633961017509086,    -0.03633961017509086,
+                          -0.03633961017509086, -0.99933927981499915,   -0.00066072018500165186,
+                          -0.03633961017509086, 0.00066072018500165186, 0.99933927981499837};
+    memcpy(a.R, Ra, sizeof Ra);
+    memcpy(b.R, Rb, sizeof Rb);
+    ck_assert_int_ge(expect_between(a, b, 400), 1);
+}
+END_TEST
+
+/* Corners that touch but for rounding, limit 0: there may be a contact or none, but not one 0.3 m deep and 0.9 m away. */
+START_TEST(corners_that_just_touch)
+{
+    static const double x[2][3] = {{0.99998787646099863, 0.99997786033805414, 1.0000078337997556},
+                                   {1.0000000000000022, 1.0000000000000022, 0.99553343119739079}};
+    static const double R[2][9] = {{0.45871410072960617, -0.29640473857865574, 0.83769063784904962, 0.83769063784904962,
+                                    0.45871410072960617, -0.29640473857865574, -0.29640473857865574, 0.83769063784904962,
+                                    0.45871410072960617},
+                                   {0.37116504804291894, -0.2620024268309763, 0.89083737878805735, 0.89083737878805735,
+                                    0.37116504804291894, -0.2620024268309763, -0.2620024268309763, 0.89083737878805735,
+                                    0.37116504804291894}};
+    const double quarter[9] = {1, 0, 0, 0, -2.2204460492503131e-16, -1, 0, 1, -2.2204460492503131e-16};
+    struct solid a = box_at(0.5, 0.5, 0.5, 0, 0, 0), b = a;
+    memcpy(a.R, quarter, sizeof a.R);
+    memcpy(b.x, x[_i], sizeof b.x);
+    memcpy(b.R, R[_i], sizeof b.R);
+    expect_between(a, b, 0);
+}
+END_TEST
+
+/* Capsules of unequal radii, 4 degrees from parallel. */
+START_TEST(unequal_capsules_side_by_side)
+{
+    struct solid a = solid_at(SADMM_SHAPE_CAPSULE, 0.016, 0.02, 0, 0, 0, 0), b = solid_at(SADMM_SHAPE_CAPSULE, 0.003, 0.07, 0,
+                                                                                         0.019, 0, 0);
+    turn(&a, 1, 0, 0, 0.066);
+    ck_assert_int_eq(expect_between(a, b, 1e-4), 3); /* the ends and, deeper, the middle */
+}
+END_TEST
+
+/* Their axes cross: sideways is all the distance that the ends have. */
+START_TEST(crossed_capsules)
+{
+    struct solid a = solid_at(SADMM_SHAPE_CAPSULE, 1e-4, 2, 0, 0, 0, 0), b = solid_at(SADMM_SHAPE_CAPSULE, 0.75, 0.75, 0, 0, 0,
+                                                                                     0);
+    turn(&a, 1, 0, 0, 0.011);
+    ck_assert_int_ge(expect_between(a, b, 0), 1);
+}
+END_TEST
+
+/* The middle of a line is as deep as the shapes are, by the thinner of the two: not by what is flat for a huge one. */
+START_TEST(a_line_along_a_huge_capsule)
+{
+    struct solid a = solid_at(SADMM_SHAPE_CAPSULE, 846588.2494276989, 1.0758934996354235, 0, 0, 0, 0);
+    struct solid b = solid_at(SADMM_SHAPE_CAPSULE, 0.0014078182090317614, 2.1292250208800398, 0, 846588.24014772661,
+                              0.0020342516918464191, 131.23161089270479);
+    const double R[9] = {0.99999998798558987,   2.4028820280460253e-09, -0.00015501232251127769,
+                         2.4028820280460253e-09, 0.99999999951942364,   3.100246450225554e-05,
+                         0.00015501232251127769, -3.100246450225554e-05, 0.9999999875050134};
+    double tolerance = MANIFOLD_FLAT * 2 * b.size[0] + 64 * DBL_EPSILON * pair_size(&a, &b);
+    memcpy(a.R, R, sizeof R);
+    struct world_manifold m = touch(&b, &a, 0, 0);
+    ck_assert_double_le(least_separation(&m), separation_along(&b, &a, m.normal) + tolerance);
+    ck_assert_int_ge(expect_between(a, b, 0), 1);
+}
+END_TEST
+
+/* A capsule 10^11 times as long as thick through a plate: the stretch inside is short for the capsule, not for the box. */
+START_TEST(a_needle_through_a_plate)
+{
+    struct solid a = solid_at(SADMM_SHAPE_CAPSULE, 1.2155676276376767e-06, 304661.66224296024, 0, 0, 0, 0);
+    struct solid b = box_at(0.9428799426706399, 0.00014325170312147337, 0.94686372766399229, 0, 0, -0.28532006819048761);
+    const double R[9] = {-0.83485863744445776, -0.37441020702971728, 0.40351958113126002,
+                         0.38628444373443904,  -0.92073181446802255, -0.05511129063266329,
+                         0.3921675458438118,   0.10986319992785185,  0.91330974662950715};
+    memcpy(a.R, R, sizeof R);
+    ck_assert_int_ge(touch(&a, &b, 3e-7, 0).count, 1);
+    ck_assert_int_ge(expect_between(a, b, 3e-7), 1);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("manifolds found");
+    TCase *cases = tcase_create("found");
+    tcase_add_test(cases, edges_that_drift_apart);
+    tcase_add_test(cases, edges_far_apart);
+    tcase_add_loop_test(cases, corners_that_just_touch, 0, 2);
+    tcase_add_test(cases, unequal_capsules_side_by_side);
+    tcase_add_test(cases, crossed_capsules);
+    tcase_add_test(cases, a_line_along_a_huge_capsule);
+    tcase_add_test(cases, a_needle_through_a_plate);
+    suite_add_tcase(suite, cases);
+    return run_suite(suite);
+}
