@@ -566,20 +566,19 @@ START_TEST(overflow_is_reported_and_undone)
 }
 END_TEST
 
-/* Numbers so large that a certificate of them could not be computed are refused by name; a solution that gets there all
- * the same is NaN in the certificate, not small, and does not count as converged. */
-START_TEST(what_overflows_is_not_solved)
+/* Numbers so large that products of them may not be numbers are refused by name. Squares that would overflow do not: the
+ * solution is v = A^-1 b = 1e200 m/s. In single precision that is none, and the solve says so. */
+START_TEST(what_is_large_is_solved_or_refused)
 {
     const struct sadmm_kernels *table = tables[_i];
-    double A[36] = {0}, b[6] = {0};
+    double A[36] = {0}, b[6] = {0}, v[6];
     sadmm_settings s = method_settings();
     sadmm_solve_report report;
     sadmm_certificate certificate;
     sadmm_problem_block block = {.kind = SADMM_BLOCK_CONTACT, .rows = 3, .body_a = -1, .body_b = 0};
     sadmm_problem *p;
-    if (table->precision == SADMM_F32) return; /* 1e200 is not finite there: the solve says so */
     for (int i = 0; i < 6; ++i) A[7 * i] = 1e-140;
-    b[0] = 1e60; /* v = A^-1 b = 1e200 m/s, along the contact, which is apart */
+    b[0] = 1e60;
     OK(sadmm_problem_create(&p));
     OK(sadmm_problem_set_bodies(p, 1, A, b, NULL));
     for (int r = 0; r < 3; ++r) block.jacobian_b[6 * r + (r + 2) % 3] = 1;
@@ -591,12 +590,44 @@ START_TEST(what_overflows_is_not_solved)
     const sadmm_problem_contact apart = {.body_a = -1, .body_b = 0, .normal = {0, 0, 1}, .error = 1, .friction = 0.5};
     OK(sadmm_problem_set_contacts(p, 1, &apart, NULL));
     s.residual_tolerance = 1e50; /* rounding of 1e60 is below */
-    OK(sadmm_problem_solve(p, table->backend, table->precision, &s, &report));
-    ck_assert(report.residual.primal <= s.residual_tolerance && report.residual.dual <= s.residual_tolerance);
-    ck_assert(!(report.certificate.siconos <= 1e300)); /* |u|^2 = 1e400 */
-    ck_assert(!report.converged);
-    OK(sadmm_problem_certify(p, &certificate));
-    ck_assert(!(certificate.siconos <= 1e300));
+    sadmm_status status = sadmm_problem_solve(p, table->backend, table->precision, &s, &report);
+    if (table->precision == SADMM_F32) {
+        ck_assert_int_eq(status, SADMM_ERROR_NON_FINITE);
+    } else {
+        OK(status);
+        ck_assert(report.residual.primal <= s.residual_tolerance && report.residual.dual <= s.residual_tolerance);
+        ck_assert(report.converged);
+        /* 6 rows of a few roundings each, relative */
+        ck_assert(report.certificate.siconos >= 0 && report.certificate.siconos <= 64 * DBL_EPSILON);
+        OK(sadmm_problem_get_solution(p, v, NULL, NULL));
+        v[0] *= 1.5; /* |A v - b| = b / 2, relative to |A v| = 1.5 b; sliding without an impulse is no error */
+        OK(sadmm_problem_set_solution(p, v, NULL, NULL));
+        OK(sadmm_problem_certify(p, &certificate));
+        ck_assert_double_eq_tol(certificate.siconos, 1.0 / 3, 64 * DBL_EPSILON);
+        ck_assert_double_eq_tol(certificate.momentum_max, 1.0 / 3, 64 * DBL_EPSILON);
+    }
+    sadmm_problem_destroy(p);
+}
+END_TEST
+
+/* Where a product overflows all the same (J A^-1 J^T = 1e60^2 / 1e-200) there is no certificate, not one that is NaN. */
+START_TEST(what_overflows_has_no_certificate)
+{
+    double A[36] = {0}, b[6] = {0};
+    sadmm_certificate certificate, before;
+    sadmm_problem_block block = {.kind = SADMM_BLOCK_CONTACT, .rows = 3, .body_a = -1, .body_b = 0};
+    sadmm_problem *p;
+    for (int i = 0; i < 6; ++i) A[7 * i] = 1e-200;
+    for (int r = 0; r < 3; ++r) block.jacobian_b[6 * r + (r + 2) % 3] = 1e60;
+    OK(sadmm_problem_create(&p));
+    OK(sadmm_problem_set_bodies(p, 1, A, b, NULL));
+    OK(sadmm_problem_set_blocks(p, 1, &block, NULL));
+    memset(&certificate, 7, sizeof certificate);
+    before = certificate;
+    ck_assert_int_eq(sadmm_problem_certify(p, &certificate), SADMM_ERROR_NON_FINITE);
+    ck_assert_msg(strstr(sadmm_problem_message(p), "the error of the solution is not a finite number"), "%s",
+                  sadmm_problem_message(p));
+    ck_assert(memcmp(&certificate, &before, sizeof certificate) == 0);
     sadmm_problem_destroy(p);
 }
 END_TEST
@@ -764,7 +795,8 @@ static void add_case(Suite *suite, const char *name, void (*use_method)(void))
     tcase_add_loop_test(cases, stop_rules_and_report, 0, table_count);
     tcase_add_loop_test(cases, free_bodies, 0, table_count);
     tcase_add_loop_test(cases, overflow_is_reported_and_undone, 0, table_count);
-    tcase_add_loop_test(cases, what_overflows_is_not_solved, 0, table_count);
+    tcase_add_loop_test(cases, what_is_large_is_solved_or_refused, 0, table_count);
+    tcase_add_test(cases, what_overflows_has_no_certificate);
     tcase_add_test(cases, devices);
     tcase_add_test(cases, backends);
     suite_add_tcase(suite, cases);

@@ -111,8 +111,8 @@ SADMM_API sadmm_status sadmm_problem_set_tasks(sadmm_problem *problem, const sad
 /* Solve. The solution replaces the initial values, so that solving again continues from there (when
  * settings->warm_start). gravity, dt (but for the unit of penalty_offset) and stabilisation are not used: they are
  * in A, b and e already. report may be NULL. Errors: INVALID_ARGUMENT, UNAVAILABLE, OUT_OF_MEMORY, NON_FINITE
- * (the problem keeps its previous values), DEVICE. report->converged is false where the report's residual or certificate
- * is not finite. */
+ * (the solution, or the certificate that a report asks for; the problem keeps its previous values), DEVICE. report->converged
+ * is false where the report's residual is not finite. */
 SADMM_API sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend backend, sadmm_precision precision,
                                            const sadmm_settings *settings, sadmm_solve_report *report);
 
@@ -125,7 +125,8 @@ SADMM_API sadmm_status sadmm_problem_get_solution(const sadmm_problem *problem, 
 SADMM_API sadmm_status sadmm_problem_set_solution(sadmm_problem *problem, const double *velocities,
                                                   const double *impulses, const double *block_lambda);
 
-/* The error of the current (v, lambda), in double from raw data; no solve. What overflows is NaN, never a small error. */
+/* The error of the current (v, lambda), in double from raw data; no solve. Errors: NON_FINITE where a product overflows (then
+ * *certificate is unchanged), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_problem_certify(sadmm_problem *problem, sadmm_certificate *certificate);
 
 #ifdef __cplusplus

@@ -164,7 +164,8 @@ SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_s
  * be repeated bit for bit begins with a new world. */
 
 /* One time step of settings.dt. Errors: OUT_OF_MEMORY, NON_FINITE (state rolled back to before the step, message
- * names the body), DEVICE, LIMIT. After an error the world is as before the step and stays usable.
+ * names the body), DEVICE, LIMIT. After an error the world is as before the step and stays usable. NON_FINITE also where
+ * settings.certify asks for a certificate of numbers whose products overflow; on CUDA that step counts as done.
  *
  * DEVICE: a call of the device failed; any function that waits for steps begun may return it, once. Everything the world had
  * on the device is given up, and the next step begins there anew. Where the device still answers (a call failed, not the

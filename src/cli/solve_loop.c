@@ -104,11 +104,9 @@ static sadmm_status batch(struct loop *l, struct lane *lane, bool cold)
     out->level = lane->level;
     out->iterations += out->report.iterations;
     out->ms += out->report.solve_ms;
-    bool measured = solve_is_measured(&c);
-    double measure = measured ? c.siconos : INFINITY;
+    double measure = c.siconos;
     out->converged = measure <= l->plan->tolerance;
-    /* Without constraints one iteration is exact; and what has overflowed does not come back. */
-    l->exhausted = !measured || out->report.iterations < s.iterations;
+    l->exhausted = out->report.iterations < s.iterations; /* without constraints one iteration is exact */
     if (cold || measure < lane->measure) lane->measure = measure;
     if (first || measure < l->best.measure) {
         out->certificate = c;
@@ -187,11 +185,6 @@ static sadmm_status run(struct loop *l)
     }
     while (!finished(l)) TRY(advance(l, choose(l)));
     return restore(l, &l->best);
-}
-
-bool solve_is_measured(const sadmm_certificate *c)
-{
-    return isfinite(c->siconos) && isfinite(c->ncp_max) && isfinite(c->ncp_mean) && isfinite(c->momentum_max);
 }
 
 sadmm_status solve_loop(sadmm_problem *problem, const struct solve_plan *plan, struct solve_outcome *out,

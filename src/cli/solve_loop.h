@@ -37,7 +37,4 @@ struct solve_outcome {
 sadmm_status solve_loop(sadmm_problem *problem, const struct solve_plan *plan, struct solve_outcome *outcome,
                         struct sadmm_error *error);
 
-/* Are its errors finite numbers? They need not be, where those of the problem are huge: such a solution is none. */
-bool solve_is_measured(const sadmm_certificate *certificate);
-
 #endif

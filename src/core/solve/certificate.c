@@ -14,13 +14,16 @@
  * momentum error, and whether its island (by its first body) was counted as above the tolerances. */
 enum { FACTOR = 0, IMPULSE = 36, NATURAL_MAP = 42, MOMENTUM = 43, COUNTED = 44, BODY_SIZE = 45 };
 
-/* Norms and maxima gathered on the way. */
+/* Norms and maxima gathered on the way. Squares are of numbers times `unit`, a power of two: 1, or so small that none overflows
+ * whose root is a number. */
 struct tally {
+    double unit;
     double ncp_max, ncp_sum;
     int64_t ncp_worst, count;
     double u2, r2, map2; /* siconos: |u|^2, |r|^2, |r - P_K(r - u^)|^2 */
     bool outside; /* rows that siconos does not have */
 };
+static const double SMALL_UNIT = 0x1p-600;
 
 /* max that keeps a NaN: a solution that is not finite must not look good. */
 static bool exceeds(double x, double best) { return !(x <= best); }
@@ -47,6 +50,15 @@ static void count_constraint(struct tally *t, int64_t index, double error, doubl
     }
     t->ncp_sum += error;
     ++t->count;
+}
+
+static double square(const struct tally *t, double x) { return (t->unit * x) * (t->unit * x); }
+
+static double square6(const struct tally *t, const double x[6])
+{
+    double sum = 0;
+    for (int i = 0; i < 6; ++i) sum += square(t, x[i]);
+    return sum;
 }
 
 /* Diagonal entry J A^-1 J^T of one row on one body: |L^-1 J^T|^2. */
@@ -82,17 +94,17 @@ static double contact_map(struct tally *tally, const double lambda[3], const dou
     double y[3], p[3], error2 = 0;
     for (int i = 0; i < 3; ++i) y[i] = lambda[i] - u[i] / w;
     contact_project_rows(y, mu, p);
-    for (int i = 0; i < 3; ++i) error2 += (lambda[i] - p[i]) * (lambda[i] - p[i]);
+    for (int i = 0; i < 3; ++i) error2 += square(tally, lambda[i] - p[i]);
 
     /* siconos' fc3d_unitary_compute_and_add_error: natural map with rho = 1 of the modified velocity. */
     double modified[3] = {lambda[0] - u[0] - mu * hypot(u[1], u[2]), lambda[1] - u[1], lambda[2] - u[2]};
     project_cone(modified, mu, p);
     for (int i = 0; i < 3; ++i) {
-        tally->u2 += u[i] * u[i];
-        tally->r2 += lambda[i] * lambda[i];
-        tally->map2 += (lambda[i] - p[i]) * (lambda[i] - p[i]);
+        tally->u2 += square(tally, u[i]);
+        tally->r2 += square(tally, lambda[i]);
+        tally->map2 += square(tally, lambda[i] - p[i]);
     }
-    return sqrt(error2) * w;
+    return sqrt(error2) / tally->unit * w;
 }
 
 static void certify_pair(struct tally *tally, const struct sadmm_system *system, const struct sadmm_settings *settings,
@@ -129,9 +141,9 @@ static double row_map(struct tally *tally, const struct sadmm_rows *rows, size_t
     const double lambda = rows->lambda[r], gain = rows->gain[r], compliance = rows->compliance[r];
     const double missing = row_residual(gain, rows->bias[r], compliance, x, lambda);
     if (sadmm_row_is_coupled(rows, r)) { /* K is the whole line for a hard row: r - P_K(r - u) = u. */
-        tally->u2 += missing * missing;
-        tally->r2 += lambda * lambda;
-        tally->map2 += missing * missing;
+        tally->u2 += square(tally, missing);
+        tally->r2 += square(tally, lambda);
+        tally->map2 += square(tally, missing);
     }
     return row_natural_map(gain, rows->bias[r], compliance, rows->lo[r], rows->hi[r], x, lambda, w);
 }
@@ -172,12 +184,13 @@ static void certify_rows(struct tally *tally, const struct sadmm_system *system,
                      constraint->body_b);
 }
 
-/* siconos divides only by norms above this (gfc3d_compute_error.c, MIN_RELATIVE_SCALING). A scale that has overflowed would
- * make every error small. */
-static double relative(double error, double scale)
+/* Of two sums of squares. siconos divides only by norms above this (gfc3d_compute_error.c, MIN_RELATIVE_SCALING). A scale that
+ * has overflowed would make every error small. */
+static double relative(const struct tally *t, double error2, double scale2)
 {
+    double error = sqrt(error2), scale = sqrt(scale2);
     if (!isfinite(scale)) return NAN;
-    return scale > sqrt(DBL_EPSILON) ? error / scale : error;
+    return scale > sqrt(DBL_EPSILON) * t->unit ? error / scale : error / t->unit;
 }
 
 static int64_t count_islands_above(double *bodies, size_t count, const int32_t *labels,
@@ -196,9 +209,9 @@ static int64_t count_islands_above(double *bodies, size_t count, const int32_t *
     return above;
 }
 
-sadmm_status sadmm_certify_with(struct sadmm_certificate_workspace *workspace, const struct sadmm_system *system,
-                                const struct sadmm_settings *settings, sadmm_certificate *certificate,
-                                struct sadmm_error *error)
+static sadmm_status certify(struct sadmm_certificate_workspace *workspace, const struct sadmm_system *system,
+                            const struct sadmm_settings *settings, double unit, sadmm_certificate *certificate,
+                            struct sadmm_error *error)
 {
     size_t count = (size_t)system->body_count;
     if (!sadmm_grow((void **)&workspace->values, &workspace->capacity, 0, BODY_SIZE * count, sizeof(double)))
@@ -214,7 +227,7 @@ sadmm_status sadmm_certify_with(struct sadmm_certificate_workspace *workspace, c
         memset(body + IMPULSE, 0, (BODY_SIZE - IMPULSE) * sizeof *body);
     }
 
-    struct tally tally = {.ncp_worst = -1};
+    struct tally tally = {.unit = unit, .ncp_worst = -1};
     for (size_t p = 0; p < system->contacts->pair_count; ++p)
         certify_pair(&tally, system, settings, &system->contacts->pairs[p], bodies);
     for (size_t k = 0; k < sadmm_row_constraint_count(system); ++k) certify_rows(&tally, system, k, bodies);
@@ -234,10 +247,10 @@ sadmm_status sadmm_certify_with(struct sadmm_certificate_workspace *workspace, c
             out.momentum_worst = (int64_t)i;
         }
         scale = keep_max(scale, keep_max(max_abs6(b), keep_max(max_abs6(Av), max_abs6(impulse))));
-        residual2 += dense6_dot(residual, residual);
-        Av2 += dense6_dot(Av, Av);
-        b2 += dense6_dot(b, b);
-        Jl2 += dense6_dot(impulse, impulse);
+        residual2 += square6(&tally, residual);
+        Av2 += square6(&tally, Av);
+        b2 += square6(&tally, b);
+        Jl2 += square6(&tally, impulse);
     }
 
     out.momentum_max = !isfinite(scale) ? NAN : scale > 0 ? residual_max / scale : 0;
@@ -245,8 +258,8 @@ sadmm_status sadmm_certify_with(struct sadmm_certificate_workspace *workspace, c
     out.ncp_mean = tally.count ? tally.ncp_sum / (double)tally.count : 0;
     out.ncp_worst = tally.ncp_worst;
     if (!tally.outside)
-        out.siconos = relative(sqrt(residual2), sqrt(keep_max(b2, keep_max(Av2, Jl2)))) +
-                      relative(sqrt(tally.map2), sqrt(keep_max(tally.u2, tally.r2)));
+        out.siconos = relative(&tally, residual2, keep_max(b2, keep_max(Av2, Jl2))) +
+                      relative(&tally, tally.map2, keep_max(tally.u2, tally.r2));
     if (settings && settings->certificate_tolerance > 0) {
         if (!sadmm_grow((void **)&workspace->labels, &workspace->label_capacity, 0, count, sizeof *workspace->labels))
             return sadmm_fail_memory(error, "the certificate");
@@ -254,6 +267,27 @@ sadmm_status sadmm_certify_with(struct sadmm_certificate_workspace *workspace, c
         out.islands_above = count_islands_above(bodies, count, workspace->labels, settings, scale);
     }
     *certificate = out;
+    return SADMM_OK;
+}
+
+static bool is_finite(const sadmm_certificate *c)
+{
+    return isfinite(c->ncp_max) && isfinite(c->ncp_mean) && isfinite(c->momentum_max) && isfinite(c->siconos);
+}
+
+sadmm_status sadmm_certify_with(struct sadmm_certificate_workspace *workspace, const struct sadmm_system *system,
+                                const struct sadmm_settings *settings, sadmm_certificate *certificate,
+                                struct sadmm_error *error)
+{
+    sadmm_certificate c;
+    TRY(certify(workspace, system, settings, 1, &c, error));
+    if (!is_finite(&c)) TRY(certify(workspace, system, settings, SMALL_UNIT, &c, error));
+    if (!is_finite(&c))
+        return sadmm_fail(error, SADMM_ERROR_NON_FINITE,
+                          "the error of the solution is not a finite number (natural map %g m/s, momentum %g, siconos %g): "
+                          "velocities, multipliers or masses are too large or too small, or not finite",
+                          c.ncp_max, c.momentum_max, c.siconos);
+    *certificate = c;
     return SADMM_OK;
 }
 
@@ -271,11 +305,6 @@ void sadmm_certificate_workspace_free(struct sadmm_certificate_workspace *worksp
     sadmm_free(workspace->values);
     sadmm_free(workspace->labels);
     *workspace = (struct sadmm_certificate_workspace){0};
-}
-
-bool sadmm_certificate_is_finite(const sadmm_certificate *c)
-{
-    return isfinite(c->ncp_max) && isfinite(c->ncp_mean) && isfinite(c->momentum_max) && isfinite(c->siconos);
 }
 
 sadmm_certificate sadmm_certificate_none(void)

@@ -10,8 +10,8 @@
  * All three are one thing, the natural map: how far (as a velocity) an exact solve of the constraint on its own, with
  * everything else held, would move it. For a soft row the factor 1/(1 + c w) makes it |lambda + k e| w for a plain
  * force and |x + (k e + lambda)/c| for a stiff spring, so that it tends to the hard row's |x + e|.
- * A contact without friction has one row: w is its normal entry. A NaN in (v, lambda), or
- * a scale that overflows, gives NaN, never a small error.
+ * A contact without friction has one row: w is its normal entry. All errors are finite, or there is no certificate: NON_FINITE
+ * where (v, lambda) holds a NaN or a product overflows (squares alone do not: their unit is chosen).
  */
 #ifndef SADMM_CORE_SOLVE_CERTIFICATE_H
 #define SADMM_CORE_SOLVE_CERTIFICATE_H
@@ -25,7 +25,7 @@ extern "C" {
 
 /* Certify system->velocity, ->contacts' impulses and ->rows' multipliers. `settings` gives dt, gravity and stabilisation for
  * systems with rigid bodies or gaps; may be NULL when A, b and e are given. Errors: OUT_OF_MEMORY, INVALID_ARGUMENT
- * (a body's A is not positive definite); *certificate is unchanged then. */
+ * (a body's A is not positive definite), NON_FINITE; *certificate is unchanged then. */
 sadmm_status sadmm_certify(const struct sadmm_system *system, const struct sadmm_settings *settings,
                            sadmm_certificate *certificate, struct sadmm_error *error);
 
@@ -42,9 +42,6 @@ void sadmm_certificate_workspace_free(struct sadmm_certificate_workspace *worksp
 
 /* A certificate that says "not computed": ncp_max = -1. */
 sadmm_certificate sadmm_certificate_none(void);
-
-/* Are all of its errors numbers? What is not certifies nothing. */
-bool sadmm_certificate_is_finite(const sadmm_certificate *certificate);
 
 #ifdef __cplusplus
 }

@@ -177,7 +177,6 @@ sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend backend, 
         }
         return status;
     }
-    done.converged = done.converged && sadmm_certificate_is_finite(&done.certificate);
     if (report) *report = done;
     return SADMM_OK;
 }

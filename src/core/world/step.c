@@ -194,7 +194,7 @@ static void report_step(const struct host_step *step)
         .time = step->world->report.time + step->world->def.settings.dt,
         .iterations = solved->iterations,
         .iterations_mean = solved->iterations,
-        .converged = solved->converged && sadmm_certificate_is_finite(&solved->certificate),
+        .converged = solved->converged,
         .limited = solved->limited,
         .penetration_max = step->depth,
         .residual = solved->residual,
