@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "config.h"
+#include "text_file.h"
 
 static char folder[64];
 
@@ -47,16 +48,8 @@ __attribute__((format(printf, 1, 2))) static inline int sh(const char *format, .
 
 static inline char *read_text(const char *path)
 {
-    FILE *file = fopen(path, "r");
-    size_t size = 0, room = 1 << 16;
-    char *text = malloc(room);
-    ck_assert_msg(file && text, "%s: cannot be read", path);
-    for (size_t got; (got = fread(text + size, 1, room - 1 - size, file)) > 0;) {
-        size += got;
-        if (room - 1 - size == 0) text = realloc(text, room *= 2);
-    }
-    text[size] = 0;
-    fclose(file);
+    char *text = read_text_if_there(path);
+    ck_assert_msg(text != NULL, "%s: cannot be read", path);
     return text;
 }
 

@@ -167,7 +167,7 @@ START_TEST(pairs_of_a_few_are_their_share_of_all)
     struct sadmm_error error = {0};
     struct sadmm_pair_list found = {0}, expected;
     size_t n = 0;
-    if (!kind->pairs_of) return;
+    ck_assert(kind->pairs_of != NULL);
     ck_assert_int_eq(kind->create(&bp, &error), SADMM_OK);
     for (uint32_t i = 0; i < COUNT; ++i) {
         changed[i] = i;
@@ -544,7 +544,8 @@ int main(void)
     tcase_set_timeout(trees, 60);
     tcase_add_loop_test(trees, every_broad_phase_finds_what_brute_force_finds, 0, KINDS);
     tcase_add_loop_test(trees, boxes_that_touch_or_coincide_meet, 0, KINDS);
-    tcase_add_loop_test(trees, pairs_of_a_few_are_their_share_of_all, 0, KINDS);
+    for (int k = 0; k < KINDS; ++k) /* an optional entry */
+        if (kinds[k]->pairs_of) tcase_add_loop_test(trees, pairs_of_a_few_are_their_share_of_all, k, k + 1);
     tcase_add_loop_test(trees, the_order_of_insertion_does_not_matter, 0, KINDS);
     tcase_add_loop_test(trees, broad_phases_survive_lack_of_memory, 0, KINDS);
     tcase_add_test(trees, radix_sort_sorts);

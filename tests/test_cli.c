@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "config.h"
+#include "text_file.h"
 #ifdef SADMM_HAVE_HDF5
 #include <hdf5.h>
 #endif
@@ -36,17 +37,7 @@ static char *read_text(const char *name)
 {
     char path[128];
     snprintf(path, sizeof path, "%s/%s", folder, name);
-    FILE *file = fopen(path, "r");
-    if (!file) return NULL;
-    size_t size = 0, room = 1 << 16;
-    char *text = malloc(room);
-    for (size_t got; (got = fread(text + size, 1, room - 1 - size, file)) > 0;) {
-        size += got;
-        if (room - 1 - size == 0) text = realloc(text, room *= 2);
-    }
-    text[size] = 0;
-    fclose(file);
-    return text;
+    return read_text_if_there(path);
 }
 
 static char *out, *err; /* of the last run */

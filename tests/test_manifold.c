@@ -25,7 +25,7 @@ static void expect_points_near_both(const struct solid *a, const struct solid *b
 {
     for (int i = 0; i < m->count; ++i) {
         /* midway between the surfaces: no farther from either than half the separation, but where corners stay corners */
-        double slack = MANIFOLD_SNAP * fmin(shape_radius(a->type, a->size), shape_radius(b->type, b->size)) + 1e-12;
+        double slack = MANIFOLD_SNAP * fmin(radius_of(a), radius_of(b)) + 1e-12;
         double reach = 0.5 * fabs(m->separation[i]) + slack;
         ck_assert_double_le(outside(a, m->position[i]), reach);
         ck_assert_double_le(outside(b, m->position[i]), reach);

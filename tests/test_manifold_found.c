@@ -10,7 +10,7 @@
 
 static double pair_size(const struct solid *a, const struct solid *b)
 {
-    return shape_radius(a->type, a->size) + shape_radius(b->type, b->size);
+    return radius_of(a) + radius_of(b);
 }
 
 /* The number of points, as given and exchanged. */

@@ -137,7 +137,7 @@ START_TEST(fused_equals_stepwise)
     const struct sadmm_kernels *table = tables[_i / SCENES];
     const struct scene *scene = &scenes[_i % SCENES];
     static const int batches[] = {1, 10, 19, 30, 2, 58};
-    if (!table->iterate) return;
+    ck_assert(table->iterate != NULL);
     struct contact_problem *problem = make_problem(scene);
     struct runner fused[3], step;
     runner_start(&step, table, scene, problem, 1);

@@ -1,0 +1,26 @@
+/* Text files, whole. */
+#ifndef TESTS_TEXT_FILE_H
+#define TESTS_TEXT_FILE_H
+
+#include <check.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+/* To be freed; NULL: there is no such file. */
+static inline char *read_text_if_there(const char *path)
+{
+    FILE *file = fopen(path, "r");
+    if (!file) return NULL;
+    size_t size = 0, room = 1 << 16;
+    char *text = malloc(room);
+    for (size_t got; text && (got = fread(text + size, 1, room - 1 - size, file)) > 0;) {
+        size += got;
+        if (room - 1 - size == 0) text = realloc(text, room *= 2);
+    }
+    fclose(file);
+    ck_assert_msg(text != NULL, "%s: no memory", path);
+    text[size] = 0;
+    return text;
+}
+
+#endif
