@@ -7,6 +7,7 @@
  * why.
  */
 #include "cuda_runner.h"
+#include "row_laws.h"
 
 /* ---- entries against the literal form -------------------------------------------------------------------------- */
 
@@ -384,18 +385,12 @@ START_TEST(calls_that_fail)
 END_TEST
 #endif
 
-/* Said by name, before anything is solved; and the context is as good as before. */
-START_TEST(rows_with_bounds_are_refused)
+/* Bounds, springs and hard rows, alone and together in one constraint. */
+START_TEST(laws_of_rows_hold)
 {
-    const struct sadmm_kernels *table = tables[_i];
-    struct runner r;
-    runner_create(&r, table);
-    solve(&r, find_scene("towers"));
-    sadmm_row_limit(&r.p->rows, r.p->rows.constraints[1].first, 0);
-    ck_assert_int_eq(table->begin(r.c, &r.p->system, &r.plan, &r.settings, &r.error), SADMM_ERROR_UNSUPPORTED);
-    ck_assert_msg(strstr(r.error.message, "constraint 1 given by rows"), "%s", r.error.message);
-    solve(&r, find_scene("towers"));
-    runner_stop(&r);
+    for (int m = 0; m < 2; ++m)
+        for (int k = 0; k < LAW_CASES; ++k) check_law(tables[_i], law_methods[m], k, (k + m) % 2);
+    check_many_laws(tables[_i]);
 }
 END_TEST
 
@@ -418,7 +413,7 @@ int main(void)
     ADD_CASE(suite, runs_repeat, 0, parts);
     ADD_CASE(suite, contexts_side_by_side, 0, parts);
     ADD_CASE(suite, no_such_device, 0, parts);
-    ADD_CASE(suite, rows_with_bounds_are_refused, 0, parts);
+    ADD_CASE(suite, laws_of_rows_hold, 0, parts);
 #ifdef CUDA_EMULATED
     ADD_CASE(suite, calls_that_fail, 0, parts);
 #endif
