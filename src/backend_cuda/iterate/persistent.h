@@ -177,7 +177,7 @@ persistent_instances CUDA(grid_instances)(void);
 #define OF_SIZES(points, mode, fast, name)                        \
     INSTANCE(points, mode, false, ANY_SIZE, fast, name),          \
         INSTANCE(points, mode, false, SMALL, fast, name ", small"), \
-        INSTANCE(points, mode, true, SMALL, fast, name ", rows")
+        INSTANCE(points, mode, true, ROWS_SIZE, fast, name ", rows")
 #define OF_MODE(mode, name)                                      \
     OF_SIZES(4, mode, false, name ", 4 points"),                 \
         OF_SIZES(8, mode, false, name ", 8 points"),             \

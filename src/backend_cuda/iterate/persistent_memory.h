@@ -12,6 +12,8 @@ enum persistent_mode { BLOCK, CLUSTER, GRID };
  * barrier (BLOCK alone). */
 enum block_size { ANY_SIZE, SMALL, ONE_WARP };
 enum { SMALL_THREADS = sizeof(solver_real) == sizeof(float) ? 512 : 256 };
+/* Rows take registers: blocks of up to 512 threads. */
+enum { ROWS_SIZE = sizeof(solver_real) == sizeof(float) ? SMALL : ANY_SIZE };
 
 static constexpr int most_threads(int points, int size)
 {
