@@ -221,7 +221,8 @@ static sadmm_status through_memory(const struct content *content, int allocation
     sadmm_test_fail_allocations_after(-1);
     if (status != SADMM_OK) return status;
     written = sadmm_fclib_write(*problem, files[1], "again", error);
-    must_be_read_again(*problem, written, sadmm_fclib_read(files[1], &again, error), again, error);
+    const sadmm_status read = sadmm_fclib_read(files[1], &again, error);
+    must_be_read_again(*problem, written, read, again, error);
     return status;
 }
 
@@ -241,7 +242,8 @@ static sadmm_status through_files(const struct content *content, int allocations
     sadmm_test_fail_allocations_after(-1);
     if (status == SADMM_OK) {
         written = sadmm_fclib_save(*problem, paths[1], "again", error);
-        must_be_read_again(*problem, written, sadmm_fclib_load(paths[1], &again, error), again, error);
+        const sadmm_status read = sadmm_fclib_load(paths[1], &again, error);
+        must_be_read_again(*problem, written, read, again, error);
     }
     for (int k = 0; k < 2; ++k) unlink(paths[k]);
     return status;
