@@ -67,16 +67,4 @@ SADMM_INLINE void contact_change_rows(const real lambda[3], const real step[3], 
     for (k = 0; k < 3; ++k) change[k] = sticks ? -step[k] : projected[k] - lambda[k];
 }
 
-/* Soft constraint: lambda = -(k e + c (x - s lambda_old)) / (1 + c s), s = 1/beta_a + 1/beta_b (Step 3, soft). */
-SADMM_INLINE real soft_multiplier(real k, real c, real e, real x, real s, real lambda_old)
-{
-    return -(k * e + c * (x - s * lambda_old)) / (1 + c * s);
-}
-
-/* The same minus lambda_old: what is missing of (3). */
-SADMM_INLINE real soft_change(real k, real c, real e, real x, real s, real lambda_old)
-{
-    return -(k * e + c * x + lambda_old) / (1 + c * s);
-}
-
 #endif
