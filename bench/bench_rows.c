@@ -1,6 +1,6 @@
 /* subadmm-bench rows: what a constraint given by rows costs a scene. The frozen problem of a step with two further bodies (or
- * more pairs of them), without and with a weld between them, solved in turn; an iteration's time is the difference of solves that differ by ITERATIONS.
- * What is printed are medians: of both times, and of the ratios of neighbours. */
+ * more pairs of them), without and with a weld between them, solved in turn; an iteration's time is the difference of
+ * solves that differ by ITERATIONS. What is printed are medians: of both times, and of the ratios of neighbours. */
 #include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>

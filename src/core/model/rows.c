@@ -69,29 +69,6 @@ bool sadmm_rows_add_block(struct sadmm_rows *rows, const sadmm_problem_block *bl
     return true;
 }
 
-bool sadmm_rows_as_block(const struct sadmm_rows *rows, size_t index, sadmm_problem_block *block)
-{
-    const struct sadmm_row_constraint *constraint = &rows->constraints[index];
-    size_t first = (size_t)constraint->first, n = (size_t)constraint->count;
-    bool soft = !constraint->cone && rows->compliance[first] != 0;
-    memset(block, 0, sizeof *block);
-    block->kind = constraint->cone ? SADMM_BLOCK_CONTACT : soft ? SADMM_BLOCK_SOFT : SADMM_BLOCK_HARD;
-    block->rows = constraint->count;
-    block->body_a = constraint->body_a;
-    block->body_b = constraint->body_b;
-    block->friction = constraint->friction;
-    memcpy(block->jacobian_a, rows->jacobian_a + 6 * first, 6 * n * sizeof(double));
-    memcpy(block->jacobian_b, rows->jacobian_b + 6 * first, 6 * n * sizeof(double));
-    for (size_t r = 0; r < n; ++r) {
-        const double compliance = rows->compliance[first + r];
-        if (rows->lo[first + r] != -INFINITY || rows->hi[first + r] != INFINITY || soft != (compliance != 0)) return false;
-        block->error[r] = soft ? rows->bias[first + r] / compliance : rows->bias[first + r];
-        block->stiffness[r] = soft;
-        block->damping[r] = soft ? rows->gain[first + r] / compliance : 0;
-    }
-    return true;
-}
-
 bool sadmm_row_acts(const struct sadmm_rows *rows, size_t r)
 {
     for (size_t j = 6 * r; j < 6 * r + 6; ++j)
