@@ -4,7 +4,7 @@ set -euo pipefail
 # shellcheck source=scripts/lib.sh
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 
-steps=(plain asan tsan minimal cuda)
+steps=(plain asan tsan clang minimal cuda)
 slow_steps=(fuzz) # with --slow
 more_steps=(gpu)  # only when asked for
 
@@ -16,6 +16,8 @@ Installs what is missing (Debian and Ubuntu, as root or by sudo without a passwo
     plain    every feature but CUDA, warnings are errors, the whole suite
     asan     address and undefined-behaviour sanitizers, the whole suite
     tsan     thread sanitizer, the tests of suite 'threads'
+    clang    by clang with LLVM's OpenMP, the tests of suite 'threads': it writes a lane of a vector by storing the whole vector,
+             which makes a race where threads share one
     minimal  by clang, no optional feature, no instruction set beyond the compiler's default, the whole suite without the
              emulated CUDA device, which plain and asan have
     cuda     when nvcc is found: the CUDA backend compiles; its tests run where there is a GPU, and are counted as skipped
@@ -119,6 +121,15 @@ step_tsan() {
         fi
     fi
     run_tests tsan --suite threads
+}
+
+step_clang() {
+    say "clang: by clang with LLVM's OpenMP"
+    # Only what the tests of this suite need is built.
+    CC=clang CXX=clang++ configure "$project/build-clang" -Dwerror=true -Dtests=enabled -Dopenmp=enabled -Dcpu_isas=avx2 -Dcli=disabled \
+        -Dbench=disabled -Dfcl=disabled -Dcuda=disabled -Dhdf5=disabled -Dsiconos=disabled -Demulated_cuda=disabled || return 1
+    local rebuild=()
+    run_tests clang --suite threads
 }
 
 step_minimal() {

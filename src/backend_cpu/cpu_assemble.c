@@ -71,7 +71,7 @@ static void assemble_body_share(void *context, int thread, int threads)
 {
     struct sadmm_context *c = (struct sadmm_context *)context;
     size_t begin, end;
-    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    cpu_share_bodies(c, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) assemble_body(c, (int32_t)i);
 }
 

@@ -36,7 +36,7 @@ static void classify_share(void *context, int thread, int threads)
 {
     struct sadmm_context *c = (struct sadmm_context *)context;
     size_t begin, end;
-    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    cpu_share_bodies(c, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) c->general_of[i] = has_rigid_form(c, i) ? -1 : 0;
 }
 

@@ -111,7 +111,7 @@ static void iterate_fast(struct sadmm_context *c, int thread, int threads, int c
 {
     const double relaxation = c->settings.relaxation;
     size_t first, past;
-    sadmm_share((size_t)c->bodies, thread, threads, &first, &past);
+    cpu_share_bodies(c, thread, threads, &first, &past);
     for (int i = 0; i < count; ++i) {
         if (recomputes_residuals(c, i)) {
             CPU(recompute_residuals)(c, first, past);

@@ -61,7 +61,7 @@ static void assemble_C_share(void *context, int thread, int threads)
 {
     struct sadmm_context *c = (struct sadmm_context *)context;
     size_t begin, end;
-    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    cpu_share_bodies(c, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) assemble_C(c, (int32_t)i);
 }
 
@@ -141,7 +141,7 @@ static void factorize_share(void *context, int thread, int threads)
 {
     struct sadmm_context *c = (struct sadmm_context *)context;
     size_t begin, end;
-    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    cpu_share_bodies(c, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) factorize_body(c, i);
     if (c->fast) return; /* the weights are the constraints' own */
     sadmm_barrier_wait(&c->barrier, threads);

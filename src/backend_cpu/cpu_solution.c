@@ -31,7 +31,7 @@ static void read_share(void *context, int thread, int threads)
 {
     struct sadmm_context *c = (struct sadmm_context *)context;
     size_t begin, end;
-    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    cpu_share_bodies(c, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i)
         for (int k = 0; k < 6; ++k) c->system->velocity[6 * i + (size_t)k] = (double)c->state[i * ROW + (size_t)k];
     sadmm_share(c->pair_block_count, thread, threads, &begin, &end);
@@ -61,7 +61,7 @@ static void integrate_share(void *argument, int thread, int threads)
     const struct integration *in = (const struct integration *)argument;
     const struct sadmm_context *c = in->c;
     size_t begin, end;
-    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    cpu_share_bodies(c, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i)
         sadmm_rigid_advance(&c->system->rigid[i], &c->system->velocity[6 * i], c->settings.dt, &in->next[i]);
 }
@@ -107,7 +107,7 @@ static void recover_share(void *argument, int thread, int threads)
 {
     const struct recovery *r = (const struct recovery *)argument;
     size_t begin, end;
-    sadmm_share((size_t)r->c->bodies, thread, threads, &begin, &end);
+    cpu_share_bodies(r->c, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) body_wrench(r->c, i, r->wrench + 6 * i);
 }
 

@@ -41,7 +41,7 @@ static double pair_violation(const struct sadmm_context *c, size_t record)
 void CPU(add_up_imbalance)(struct sadmm_context *c, int thread, int threads)
 {
     size_t begin, end;
-    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    cpu_share_bodies(c, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) c->body_sums[BODY_SUMS * i + 3] = cpu_residual_energy(c, i);
     sadmm_share(c->pair_block_count * (size_t)LANES, thread, threads, &begin, &end);
     for (size_t k = begin; k < end; ++k)

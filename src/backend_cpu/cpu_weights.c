@@ -223,7 +223,7 @@ static void update_share(void *context, int thread, int threads)
     const bool rescales = c->refreshes >= WEIGHT_FIRST_SCALE;
     const bool eases = c->refreshes == 0 && c->plan.warm && c->plan.rigid; /* world level: gaps, a slop and a step */
     size_t begin, end;
-    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    cpu_share_bodies(c, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) add_up_body(c, i, &c->body_sums[BODY_SUMS * i]);
     if (rescales) CPU(add_up_imbalance)(c, thread, threads);
     sadmm_barrier_wait(&c->barrier, threads);
@@ -236,7 +236,7 @@ static void update_share(void *context, int thread, int threads)
     sadmm_share(c->row_block_count, thread, threads, &begin, &end);
     for (size_t k = begin; k < end; ++k) CPU(weigh_rows)(c, k);
     sadmm_barrier_wait(&c->barrier, threads);
-    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    cpu_share_bodies(c, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) assemble_C(c, i);
     CPU(recompute_residuals)(c, begin, end);
 }
@@ -255,7 +255,7 @@ static void respond_share(void *context, int thread, int threads)
 {
     struct sadmm_context *c = (struct sadmm_context *)context;
     size_t begin, end;
-    sadmm_share((size_t)c->bodies, thread, threads, &begin, &end);
+    cpu_share_bodies(c, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) invert(c, &c->A[i * PACKED6], &c->A_inverse[i * PACKED6]);
     sadmm_barrier_wait(&c->barrier, threads);
     size_t pair_records = c->pair_block_count * (size_t)LANES;
