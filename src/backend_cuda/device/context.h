@@ -215,7 +215,9 @@ cuda_kernel CUDA(persistent_kernel)(int point_slots, enum sadmm_cuda_tier tier, 
 /* Whether the instance for a partition, without constraints given by rows, does the prologue and the epilogue of a
  * step of `fast`, too. */
 bool CUDA(persistent_does_prologue)(const struct cuda_partition *);
+/* The most threads of a block; and of one whose threads have all the registers they want. */
 int CUDA(persistent_threads)(int point_slots, bool rows);
+int CUDA(persistent_small_threads)(void);
 size_t CUDA(persistent_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies);
 /* Let every instance use `bytes` of shared memory a block, and clusters of more than 8 blocks. *clusters: whether both the
  * device and the code that was loaded for it know clusters. */

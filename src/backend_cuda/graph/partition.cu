@@ -49,12 +49,20 @@ struct bound {
     int64_t sides, bodies;
 };
 
-/* Threads for a part within the bound, with an eighth to spare; beyond `most` there is no margin, then no room. */
-static int64_t threads_for(struct bound bound, int64_t most)
+/* Places for sides that may stay empty: constraints given by rows begin with a warp (iterate/persistent_part.h). */
+static int64_t spare_sides(const struct sadmm_context *c) { return c->view.rows.count > 0 ? WARP / QUAD - 1 : 0; }
+
+/* The most sides that a block of so many threads takes. */
+static int64_t most_sides_of(const struct sadmm_context *c, int64_t threads) { return threads / QUAD - spare_sides(c); }
+
+/* Threads for a part within the bound, with an eighth to spare; beyond `most` there is no margin, then no capacity. */
+static int64_t threads_for(const struct sadmm_context *c, struct bound bound, int64_t most)
 {
-    int64_t wanted = larger(QUAD * (bound.sides + bound.sides / 8), LANES * bound.bodies);
-    /* Bodies beyond one for each eight threads take turns. */
-    wanted = larger(smaller(wanted, most), QUAD * bound.sides);
+    /* Bodies beyond one for each eight threads take turns: for them alone no block is so large that its threads have fewer
+     * registers. */
+    const int64_t needed = QUAD * (bound.sides + spare_sides(c)),
+                  bodies = smaller(LANES * bound.bodies, CUDA(persistent_small_threads)());
+    const int64_t wanted = larger(smaller(larger(needed + QUAD * (bound.sides / 8), bodies), most), needed);
     return up(larger(wanted, 1), WARP) * WARP;
 }
 
@@ -63,7 +71,7 @@ static bool take_capacity(const struct sadmm_context *c, struct cuda_partition *
                           int64_t bytes)
 {
     int64_t low = bound.bodies, high = larger(c->view.model.bodies, low);
-    partition->most_sides = partition->threads / QUAD;
+    partition->most_sides = (int32_t)most_sides_of(c, partition->threads);
     if (partition->threads == WARP && bound.bodies > WARP / LANES) return false;
     if ((int64_t)CUDA(persistent_shared)(partition->tier, partition->threads, (int32_t)low) > bytes) return false;
     while (low < high) { /* the most bodies that fit */
@@ -119,13 +127,14 @@ static struct choice choose_block(const struct sadmm_context *c, const struct cu
 {
     static const char too_large[] = "an island does not fit a thread block";
     if (c->refused >> SADMM_CUDA_TIER_BLOCK & 1) return no_choice(refused);
-    const int64_t most = CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0), most_sides = most / QUAD;
+    const int64_t most = CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0),
+                  most_sides = most_sides_of(c, most);
     if (statistics->island_sides > most_sides) return no_choice(too_large);
     /* As many blocks a multiprocessor as run side by side and find an island each; when that is too few for the room a
      * block has, blocks that run one after another. */
     int64_t parts = c->multiprocessors, side_by_side = 1;
     while (side_by_side < MOST_BLOCKS && 2 * parts <= statistics->islands &&
-           2 * side_by_side * threads_for(island_bound(c, statistics, 2 * parts), most) <= most) {
+           2 * side_by_side * threads_for(c, island_bound(c, statistics, 2 * parts), most) <= most) {
         parts *= 2;
         side_by_side *= 2;
     }
@@ -137,7 +146,7 @@ static struct choice choose_block(const struct sadmm_context *c, const struct cu
     choice.partition.tier = SADMM_CUDA_TIER_BLOCK;
     choice.partition.parts = (int32_t)parts;
     choice.partition.cluster = 1;
-    choice.partition.threads = (int32_t)threads_for(bound, most);
+    choice.partition.threads = (int32_t)threads_for(c, bound, most);
     if (choice.partition.threads > most) return no_choice(too_large);
     if (!take_capacity(c, &choice.partition, bound, c->shared_limit / side_by_side) &&
         !take_capacity(c, &choice.partition, bound, c->shared_limit))
@@ -154,7 +163,8 @@ static struct choice choose_cluster_of(const struct sadmm_context *c, const stru
 {
     static const char too_large[] = "an island does not fit a cluster of thread blocks";
     const char *name = nullptr;
-    const int64_t most = CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0), most_sides = most / QUAD;
+    const int64_t most = CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0),
+                  most_sides = most_sides_of(c, most);
     const int64_t cost = (int64_t)statistics->sides + c->view.model.bodies;
     /* As many clusters as find a multiprocessor for each of their blocks; when that is too few for the room a block has,
      * clusters that run one after another. */
@@ -173,7 +183,7 @@ static struct choice choose_cluster_of(const struct sadmm_context *c, const stru
     choice.partition.tier = SADMM_CUDA_TIER_CLUSTER;
     choice.partition.parts = (int32_t)clusters * size;
     choice.partition.cluster = size;
-    choice.partition.threads = (int32_t)threads_for(bound, most);
+    choice.partition.threads = (int32_t)threads_for(c, bound, most);
     if (choice.partition.threads > most || !take_capacity(c, &choice.partition, bound, c->shared_limit))
         return no_choice(too_large);
     int active = 0;
@@ -220,7 +230,7 @@ static struct choice choose_grid(const struct sadmm_context *c, const struct cud
     for (int64_t side_by_side = 1; side_by_side <= MOST_BLOCKS; side_by_side *= 2) {
         if (side_by_side > 1) parts = c->multiprocessors * side_by_side;
         struct bound bound = body_bound(c, statistics, parts);
-        int64_t threads = threads_for(bound, most);
+        int64_t threads = threads_for(c, bound, most);
         if (threads > most) continue;
         choice.partition.parts = (int32_t)parts;
         choice.partition.threads = (int32_t)threads;
@@ -286,7 +296,7 @@ void CUDA(tighten_partition)(const struct sadmm_context *c, const struct cuda_gr
     if (partition->tier == SADMM_CUDA_TIER_STREAM) return;
     const struct bound bound = {statistics->part_sides, statistics->part_bodies};
     struct cuda_partition tight = *partition;
-    tight.threads = (int32_t)threads_for(bound, CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0));
+    tight.threads = (int32_t)threads_for(c, bound, CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0));
     if (tight.threads < partition->threads && take_capacity(c, &tight, bound, (int64_t)partition->shared))
         *partition = tight;
 }

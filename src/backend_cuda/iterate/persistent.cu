@@ -4,8 +4,10 @@
 /* Rows take registers that blocks of more threads do not have. */
 int CUDA(persistent_threads)(int point_slots, bool rows)
 {
-    return most_threads(point_slots <= 4 ? 4 : 8, rows ? (int)ROWS_SIZE : (int)ANY_SIZE);
+    return most_threads(point_slots <= 4 ? 4 : 8, rows ? (int)WITH_ROWS : (int)ANY_SIZE);
 }
+
+int CUDA(persistent_small_threads)(void) { return SMALL_THREADS; }
 
 size_t CUDA(persistent_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies)
 {
@@ -33,7 +35,7 @@ cuda_kernel CUDA(persistent_kernel)(int point_slots, enum sadmm_cuda_tier tier, 
                                     const char **name)
 {
     const int points = point_slots <= 4 ? 4 : 8;
-    const int size = rows                                               ? (int)ROWS_SIZE
+    const int size = rows                                               ? (int)WITH_ROWS
                      : threads > SMALL_THREADS                          ? ANY_SIZE
                      : tier == SADMM_CUDA_TIER_BLOCK && threads == WARP ? ONE_WARP
                                                                         : SMALL;

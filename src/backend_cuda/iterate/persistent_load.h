@@ -6,6 +6,30 @@
 
 /* ---- loading --------------------------------------------------------------------------------------------------- */
 
+/* Which side each quad takes: those of pairs first, then, from the next whole warp on, those of constraints given by rows. A
+ * warp that had both would do one after the other, and all wait for it. Of every thread's own side before: number t. */
+PART __device__ __forceinline__ void PART_RUN::part_rows_from_pairs(void)
+{
+    enum { QUADS = WARP / QUAD };
+    const int32_t quads = (int32_t)blockDim.x / QUAD, warps = (int32_t)blockDim.x / WARP, warp = t / WARP;
+    int32_t *taken = (int32_t *)m.records, *counts = taken + quads, before = 0, all = 0; /* before there are records */
+    const bool rows = t < sides && v.graph.incident[first_side + t] / 2 >= v.contacts.pair_capacity;
+    const unsigned votes = __ballot_sync((unsigned)ALL_LANES, rows);
+    if (t % WARP == 0) counts[warp] = __popc(votes);
+    if (t < quads) taken[t] = sides;
+    block_barrier<SIZE>();
+    for (int32_t k = 0; k < warps; ++k) {
+        before += k < warp ? counts[k] : 0;
+        all += counts[k];
+    }
+    before += __popc(votes & ((1u << t % WARP) - 1));
+    if (t < sides) taken[rows ? (sides - all + QUADS - 1) / QUADS * QUADS + before : t - before] = t;
+    block_barrier<SIZE>();
+    side = taken[t / QUAD];
+    side_code = side < sides ? v.graph.incident[first_side + side] : 0;
+    block_barrier<SIZE>();
+}
+
 /* Where the other body's state will be. */
 PART __device__ __forceinline__ void PART_RUN::find_other(int32_t other)
 {
@@ -96,7 +120,7 @@ PART __device__ __forceinline__ void PART_RUN::start_row_records(void)
 {
     row_lane rows;
     vec3 force, torque;
-    load_rows<FAST>(&rows, v, lane, is_row_side(), side_code);
+    rows.load<FAST>(v, lane, is_row_side(), side_code);
     rows.wrench(rows.lambda, &force, &torque);
     const real2_pair sum = sum_quad(lane, force, torque);
     if (rows.rows) *own_record = sum;
@@ -156,9 +180,8 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
 
 /* ---- storing --------------------------------------------------------------------------------------------------- */
 
-/* Velocities, records (FAST: momentum residuals) and, from side a (b where a is static), multipliers; nothing of
- * islands that have stopped. */
-PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
+/* Velocities, and records (FAST: momentum residuals); nothing of islands that have stopped. */
+PART __device__ __forceinline__ void PART_RUN::store_bodies(int32_t odd)
 {
     const int32_t in_registers = (int32_t)blockDim.x / LANES;
     for (int32_t i = t; i < bodies * ROW; i += (int32_t)blockDim.x) {
@@ -171,17 +194,18 @@ PART __device__ __forceinline__ void PART_RUN::store(int32_t odd)
     }
     for (int32_t i = t; !FAST && i < sides * ROW; i += (int32_t)blockDim.x)
         v.iteration.records[(size_t)first_side * ROW + (size_t)i] = m.records[i];
-    if (side >= sides) return;
-    if (side_stopped()) return;
+}
+
+/* The multipliers of the side's pair, from side a (b where a is static). */
+PART __device__ __forceinline__ void PART_RUN::store_pair(void)
+{
     const int32_t code = v.graph.incident[first_side + side], p = code / 2;
-    if (own.pair) {
-        if (code & 1 && v.contacts.ends[p].body_a != v.model.bodies) return;
-        const int32_t count = (int32_t)v.contacts.difference[p].w;
+    if (code & 1 && v.contacts.ends[p].body_a != v.model.bodies) return;
+    const int32_t count = (int32_t)v.contacts.difference[p].w;
 #pragma unroll
-        for (int32_t j = 0; j < COUNT; ++j) {
-            const int32_t k = lane + QUAD * j;
-            if (k < count) store_lambda(v.contacts, point_slot(v.contacts, p, k), own.lambda[j]);
-        }
+    for (int32_t j = 0; j < COUNT; ++j) {
+        const int32_t k = lane + QUAD * j;
+        if (k < count) store_lambda(v.contacts, point_slot(v.contacts, p, k), own.lambda[j]);
     }
 }
 

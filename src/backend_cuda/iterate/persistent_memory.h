@@ -9,16 +9,14 @@
 enum persistent_mode { BLOCK, CLUSTER, GRID };
 
 /* Sizes of blocks an instance is made for: few threads may have all the registers they want, and a single warp needs no
- * barrier (BLOCK alone). */
-enum block_size { ANY_SIZE, SMALL, ONE_WARP };
+ * barrier (BLOCK alone). WITH_ROWS: of whatever size, with constraints given by rows, which take registers. */
+enum block_size { ANY_SIZE, SMALL, ONE_WARP, WITH_ROWS };
 enum { SMALL_THREADS = sizeof(solver_real) == sizeof(float) ? 512 : 256 };
-/* Rows take registers: blocks of up to 512 threads. */
-enum { ROWS_SIZE = sizeof(solver_real) == sizeof(float) ? SMALL : ANY_SIZE };
 
 static constexpr int most_threads(int points, int size)
 {
     if (size == ONE_WARP) return WARP;
-    if (size == SMALL) return SMALL_THREADS;
+    if (size == SMALL || (size == WITH_ROWS && sizeof(solver_real) == sizeof(float))) return SMALL_THREADS;
     return sizeof(solver_real) == sizeof(float) ? (points == 4 ? 1024 : 768) : (points == 4 ? 512 : 384);
 }
 
@@ -61,6 +59,19 @@ static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *
 
 /* ---- barriers -------------------------------------------------------------------------------------------------- */
 
+/* Of the block's own. WITH_ROWS: warps that have rows come to it from another place than those that have pairs. */
+template <int SIZE> static __device__ __forceinline__ void block_barrier(void)
+{
+#ifndef SADMM_CUDA_EMULATED
+    if (SIZE == WITH_ROWS) {
+        asm volatile("barrier.sync 1, %0;" ::"r"(blockDim.x) : "memory");
+        return;
+    }
+#endif
+    if (SIZE == ONE_WARP) __syncwarp((unsigned)ALL_LANES);
+    else __syncthreads();
+}
+
 /* Between the two sides of a barrier a thread may do what concerns nobody else. */
 template <int MODE, int SIZE> static __device__ __forceinline__ void arrive(unsigned *arrivals)
 {
@@ -70,20 +81,13 @@ template <int MODE, int SIZE> static __device__ __forceinline__ void arrive(unsi
     if (MODE == GRID) {
         /* One thread of a block speaks for it: its release and acquire, with the block's own barriers around them, order
          * every thread's writes before every thread's reads. */
-        __syncthreads();
+        block_barrier<SIZE>();
         if (threadIdx.x == 0) asm volatile("red.release.gpu.global.add.u32 [%0], 1;" ::"l"(arrivals) : "memory");
     }
 #if __CUDA_ARCH__ >= CLUSTER_ARCH
     if (MODE == CLUSTER) asm volatile("barrier.cluster.arrive.release.aligned;" ::: "memory");
 #endif
 #endif
-}
-
-/* Of the block's own. */
-template <int SIZE> static __device__ __forceinline__ void block_barrier(void)
-{
-    if (SIZE == ONE_WARP) __syncwarp((unsigned)ALL_LANES);
-    else __syncthreads();
 }
 
 /* `target`: arrivals in all when every block has come. */
@@ -122,12 +126,16 @@ static __device__ __forceinline__ const solver_real *in_block(const solver_real 
 #endif
 }
 
+/* Blocks of ANY_SIZE have no registers to spare. */
+template <int SIZE>
+constexpr bool SPARES_REGISTERS = SIZE != ANY_SIZE && (SIZE != WITH_ROWS || sizeof(solver_real) == sizeof(float));
+
 /* An address in this block's own memory, in a register: to save one the compiler makes it again from its parts in every
- * iteration, and what is loaded from there waits. Blocks of ANY_SIZE have none to spare. */
+ * iteration, and what is loaded from there waits. */
 template <int SIZE> static __device__ __forceinline__ solver_real *kept_address(solver_real *own)
 {
 #ifndef SADMM_CUDA_EMULATED
-    if (SIZE != ANY_SIZE) {
+    if (SPARES_REGISTERS<SIZE>) {
         uint32_t at = (uint32_t)__cvta_generic_to_shared(own);
         asm volatile("" : "+r"(at));
         return (solver_real *)__cvta_shared_to_generic(at);
@@ -144,15 +152,15 @@ template <int SIZE, typename T> static void keep(T *)
 #else
 template <int SIZE> static __device__ __forceinline__ void keep(int32_t *number)
 {
-    if (SIZE != ANY_SIZE) asm volatile("" : "+r"(*number));
+    if (SPARES_REGISTERS<SIZE>) asm volatile("" : "+r"(*number));
 }
 template <int SIZE> static __device__ __forceinline__ void keep(float *number)
 {
-    if (SIZE != ANY_SIZE) asm volatile("" : "+f"(*number));
+    if (SPARES_REGISTERS<SIZE>) asm volatile("" : "+f"(*number));
 }
 template <int SIZE> static __device__ __forceinline__ void keep(double *number)
 {
-    if (SIZE != ANY_SIZE) asm volatile("" : "+d"(*number));
+    if (SPARES_REGISTERS<SIZE>) asm volatile("" : "+d"(*number));
 }
 #endif
 

@@ -63,7 +63,10 @@ template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run 
           side_code(side < sides ? v.graph.incident[first_side + side] : 0), on(), about(), between(), point()
     {
         lay_out(&m, memory, MODE == CLUSTER, (int)blockDim.x, args.most_bodies);
-        if (ROWS) row_sides = __ballot_sync((unsigned)ALL_LANES, is_row_side()) != 0;
+        if (!ROWS) return;
+        part_rows_from_pairs();
+        row_sides = __ballot_sync((unsigned)ALL_LANES, is_row_side()) != 0;
+        updates = __ballot_sync((unsigned)ALL_LANES, side < sides && !is_row_side()) != 0;
     }
 
     /* A block of one warp has work, or would not be here. */
@@ -90,6 +93,7 @@ template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run 
     {
         return FAST && island_stopped(v.graph, v.islands, args.checks, v.graph.body_of[first_body + own.own]);
     }
+    __device__ __forceinline__ bool has_side(void) const { return side < sides; }
     __device__ __forceinline__ bool is_row_side(void) const
     {
         return ROWS && side < sides && side_code / 2 >= v.contacts.pair_capacity;
@@ -101,6 +105,7 @@ template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run 
     }
     __device__ __forceinline__ bool warp_has_side(void) const { return t / WARP * (WARP / QUAD) < sides; }
 
+    __device__ __forceinline__ void part_rows_from_pairs(void);
     __device__ __forceinline__ void load(void);
     /* Where point k of the side's pair is, if there is memory for so many: their number is not waited for. */
     __device__ __forceinline__ size_t slot_or_first(int32_t k) const
@@ -123,7 +128,8 @@ template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run 
     __device__ __forceinline__ void update_sides(int32_t odd, real relaxation_factor, bool plain);
     __device__ __forceinline__ void update_rows(row_lane *rows, int32_t odd, real relaxation_factor) const;
     __device__ __forceinline__ bool suspect(int32_t odd) const;
-    __device__ __forceinline__ void store(int32_t odd);
+    __device__ __forceinline__ void store_bodies(int32_t odd);
+    __device__ __forceinline__ void store_pair(void);
 };
 
 #define PART template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST>

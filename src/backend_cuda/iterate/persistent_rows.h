@@ -103,31 +103,4 @@ __device__ __forceinline__ void row_lane::store(int32_t lane) const
         if (lane + QUAD * j < SADMM_MAX_ROWS) rows[lane + QUAD * j].lambda = lambda[j];
 }
 
-/* Out of line, and a row_lane in memory: rows take no registers of those who have none. */
-template <bool FAST>
-static __device__ __noinline__ void load_rows(row_lane *rows, const cuda_view &v, int32_t lane, bool live, int32_t code)
-{
-    rows->load<FAST>(v, lane, live, code);
-}
-
-/* Steps 2-4 of the warp's sides given by rows: into the record of the side; lambda goes `relaxation_factor` times as far. */
-template <bool FAST>
-static __device__ __noinline__ void sweep_row_lanes(row_lane *memory, const solver_real *mine, const solver_real *others,
-                                                    real2_pair *record, real relaxation_factor)
-{
-    row_lane rows = *memory;
-    real impulse[row_lane::COUNT];
-    vec3 force, torque;
-    rows.update<FAST>(load_motion(mine), load_motion(others));
-#pragma unroll
-    for (int32_t j = 0; j < row_lane::COUNT; ++j) {
-        impulse[j] = FAST ? rows.delta[j] : rows.next[j] + rows.delta[j];
-        memory->lambda[j] =
-            FAST && relaxation_factor != 1 ? fused(relaxation_factor, rows.delta[j], rows.lambda[j]) : rows.next[j];
-    }
-    rows.wrench(impulse, &force, &torque);
-    const real2_pair sum = sum_quad((int32_t)threadIdx.x % QUAD, force, torque);
-    if (rows.rows) *record = sum;
-}
-
 #endif

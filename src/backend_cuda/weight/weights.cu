@@ -38,7 +38,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 
 /* ---- terms and islands --------------------------------------------------------------------------------------------- */
 
-template <bool LEVELS>
+/* ROWS: there may be constraints given by rows. */
+template <bool LEVELS, bool ROWS>
 static __global__ void __launch_bounds__(BODY_THREADS)
     terms_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
@@ -46,7 +47,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const body_thread t = body_of_thread(v.model, v.graph);
     double total[TERMS];
     const double term =
-        v.bodies.rigid ? terms_of_body<LEVELS, true, true>(v, t) : terms_of_body<LEVELS, false, true>(v, t);
+        v.bodies.rigid ? terms_of_body<LEVELS, true, ROWS>(v, t) : terms_of_body<LEVELS, false, ROWS>(v, t);
     if (add_up_island<add_terms>(v.graph, v.islands, t, term, total) && t.lane == 0)
         weigh_island<LEVELS>(&v.islands.info[v.graph.label[t.body]], total, args);
 }
@@ -137,7 +138,9 @@ cuda_args CUDA(weight_args)(const struct sadmm_context *c)
 sadmm_status CUDA(enqueue_islands)(struct sadmm_context *c, struct sadmm_error *error)
 {
     const cuda_args args = CUDA(weight_args)(c);
-    const cuda_kernel kernel = c->refreshes >= WEIGHT_FIRST_SCALE ? terms_kernel<true> : terms_kernel<false>;
+    const bool levels = c->refreshes >= WEIGHT_FIRST_SCALE, rows = c->view.rows.count > 0;
+    const cuda_kernel kernel = levels ? (rows ? terms_kernel<true, true> : terms_kernel<true, false>)
+                                      : (rows ? terms_kernel<false, true> : terms_kernel<false, false>);
     CUDA_TRY(CUDA(launch_early)(c, kernel, "sums over islands", body_blocks(c->view.model.bodies), BODY_THREADS, &args,
                                 error));
     return CUDA(launch)(c, weigh_rows_kernel, "weights of rows", blocks_for(c->view.rows.count), &args, error);
