@@ -9,7 +9,7 @@
 struct standing_case {
     const char *spec;
     double duration;    /* s; in the second half of it everything is at rest */
-    double load;        /* what the body under most carries, itself included, over its own weight */
+    double load;        /* weight on and of the body that carries most, over its own */
     double reach;       /* m, how far a body may get from where it was put; INFINITY: some are dropped */
     int32_t contacts;   /* at rest, by the scene's geometry; 0: not that simple */
     void (*expect)(sadmm_world *world, const sadmm_body_state *start); /* what else, at the end; may be NULL */
@@ -19,9 +19,9 @@ struct standing_case {
 /* Contacts may be penetrated by this much (the default). */
 #define SLOP 1e-5
 
-/* The fastest a body at rest may be, m/s: a millimetre in twelve days, and what rounding leaves. Method paper adds up impulses:
- * what a body's load is rounded to pushes it. Method fast passes on changes, which go to 0: less than what gravity adds in a
- * step is rounded to. */
+/* The fastest a body at rest may be, m/s: a millimetre in twelve days, and what rounding leaves. Method paper adds up
+ * impulses: what a body's load is rounded to pushes it. Method fast passes on changes, which go to 0: less than what
+ * gravity adds in a step is rounded to. */
 static inline double creep(const struct standing_case *about, sadmm_method method, sadmm_precision precision, double dt)
 {
     const double roundoff = (precision == SADMM_F32 ? FLT_EPSILON : DBL_EPSILON) / 2;
@@ -52,7 +52,8 @@ static inline void run_standing(const struct standing_case *about, sadmm_method 
         if (middle && about->contacts)
             ck_assert_msg(report.contacts == about->contacts, "%s: %d contacts", what, report.contacts);
         /* Deeper ones are pushed out, by a share a step. */
-        if (middle) ck_assert_msg(report.penetration_max <= SLOP + still * dt, "%s: %g m deep", what, report.penetration_max);
+        if (middle)
+            ck_assert_msg(report.penetration_max <= SLOP + still * dt, "%s: %g m deep", what, report.penetration_max);
         if (i == steps / 2) middle = all_states(world);
         if (i % 20 && i < steps) continue; /* along the way, so that what moves and comes back is seen */
         const double away = top_drift(world, start), crept = middle ? top_drift(world, middle) : 0;
@@ -73,15 +74,16 @@ static inline void run_standing(const struct standing_case *about, sadmm_method 
     sadmm_world_destroy(world);
 }
 
-/* Every third body after the ground is the top of a stack of three 0.3 m cubes. A contact sinks by the slop and no more, which
- * tilts a cube by that over its side about two axes; the heavy one was dropped pitched by 0.025 rad, and rights itself about
- * an edge, which takes its centre, and what is below along with it, half (1 - cos + sin) to the side. */
+/* Every third body after the ground is the top of a stack of three 0.3 m cubes. A contact sinks by the slop and no
+ * more, which tilts a cube by that over its side about two axes; the heavy one was dropped pitched by 0.025 rad, and
+ * rights itself about an edge, which takes its centre, and what is below along with it, half (1 - cos + sin) to the
+ * side. */
 static inline void expect_vertical_stacks(sadmm_world *world, const sadmm_body_state *start)
 {
     const double half = 0.15, pitch = 0.025, sideways = half * (1 - cos(pitch) + sin(pitch));
     for (int32_t i = 1; i < sadmm_world_body_count(world); ++i) {
         const int level = (i - 1) % 3;
-        const double sunk = (level + 1) * SLOP * (1 + 1e-3), tilted = sqrt(2) * sunk / (2 * half);
+        const double sunk = (level + 1) * SLOP, tilted = sqrt(2) * sunk / (2 * half);
         sadmm_body_state state = body_state(world, body_at(world, i));
         double height = half * (2 * level + 1), tilt = 2 * hypot(state.orientation[1], state.orientation[2]);
         double moved = hypot(state.position[0] - start[i].position[0], state.position[1] - start[i].position[1]);

@@ -475,7 +475,8 @@ START_TEST(a_sphere_bounces_when_it_touches)
     ck_assert_int_eq(world_report(world).contacts, 1);
     ck_assert_double_eq_tol(body_state(world, id).linear_velocity[2], -1, rounding_of(_i, 1));
     step_world(world, 1);
-    ck_assert_double_eq_tol(body_state(world, id).linear_velocity[2], 0.5, 1e-9 + rounding_of(_i, 1)); /* the solver's error */
+    /* 1e-9: the solver's error */
+    ck_assert_double_eq_tol(body_state(world, id).linear_velocity[2], 0.5, 1e-9 + rounding_of(_i, 1));
     sadmm_world_destroy(world);
 }
 END_TEST

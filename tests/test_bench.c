@@ -128,8 +128,8 @@ START_TEST(scaling_measures)
         ck_assert(number(&table, row, "steps") == 9);
         ck_assert(number(&table, row, "hash_step") == 12);
 
-        /* Each is a median by itself: none of the four is above the whole's, and together they make it up about; a step of this
-         * takes 0.5 ms. */
+        /* Each is a median by itself: none of the four is above the whole's, and together they make it up about; a step
+         * of this takes 0.5 ms. */
         double step = number(&table, row, "step_ms"), solver = number(&table, row, "solver_ms"), sum = 0;
         static const char *const parts[] = {"collide_ms", "assemble_ms", "solve_ms", "finish_ms"};
         for (int k = 0; k < 4; ++k) {

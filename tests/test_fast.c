@@ -241,8 +241,9 @@ START_TEST(tall_tables_equal_ref)
         iterate(&three, 10, false);
         compare_solutions(&own, &ref, &v, &lambda);
     }
-    /* Fifty iterations that pass on what is rounded at most as it is (scene_tolerance; equal masses); and a cube of 1 kg is pushed by
-     * what its eight impulses are rounded to at the start, which are thousands of times larger than what it moves by. */
+    /* Fifty iterations that pass on what is rounded at most as it is (scene_tolerance; equal masses); and a cube of 1
+     * kg is pushed by what its eight impulses are rounded to at the start, which are thousands of times larger than
+     * what it moves by. */
     const double rounding = 50 * table_epsilon(table), pushed = 8 * table_epsilon(table) * lambda.scale / v.scale;
     expect_agreement(&own, &three, &v, rounding + pushed, &lambda, rounding);
     runner_stop(&ref);
@@ -263,8 +264,8 @@ static sadmm_settings few_settings(int iterations, int threads)
 }
 
 /* Three cubes on exact impulses: load / V of the lowest contacts is 3/4 kg a point, twice that with half the 60 iterations
- * that are not few; less the faster the stack moves by itself, and no more than the stack's 3 kg. Of the highest contacts it is
- * 1/4 kg, and phi / w half as much, since both cubes give way. */
+ * that are not few; less the faster the stack moves by itself, and no more than the stack's 3 kg. Of the highest
+ * contacts it is 1/4 kg, and phi / w half as much, since both cubes give way. */
 START_TEST(few_iterations_weigh_more)
 {
     static const struct {
@@ -349,8 +350,8 @@ START_TEST(few_tables_equal_ref)
 }
 END_TEST
 
-/* Overlapping cubes are pushed apart, with more energy than they would have in free motion. A solution is left as it is: that
- * energy is the work of its contacts. */
+/* Overlapping cubes are pushed apart, with more energy than they would have in free motion. A solution is left as it
+ * is: that energy is the work of its contacts. */
 START_TEST(solutions_are_not_slowed_down)
 {
     const struct sadmm_kernels *table = _i < table_count ? tables[_i] : literal();
@@ -370,8 +371,8 @@ START_TEST(solutions_are_not_slowed_down)
 }
 END_TEST
 
-/* The deeper a stack, the smaller the share of a gap within the slop that a step closes: by depth^-6, down to a thousandth. Larger
- * gaps are closed but for what the slop leaves of them, without a jump; overlaps are left alone. */
+/* The deeper a stack, the smaller the share of a gap within the slop that a step closes: by depth^-6, down to a
+ * thousandth. Larger gaps are closed but for what the slop leaves of them, without a jump; overlaps are left alone. */
 START_TEST(small_gaps_are_eased)
 {
     const double slop = 2e-3;
@@ -488,18 +489,21 @@ static int cold_iterations(struct contact_problem *problem, sadmm_method method,
     return report.iterations;
 }
 
-/* Over-relaxation is worth having; and to 1e-6 m/s fast takes a third of the iterations of paper, in the geometric mean, as
- * docs/convergence.md has it for problems whose loads are not predicted. */
+/* Over-relaxation is worth having; and to 1e-6 m/s fast takes a third of the iterations of paper, in the geometric
+ * mean, as docs/convergence.md has it for problems whose loads are not predicted. `most` is a guard against regressions
+ * and no more: what an over-relaxation of 1.2 takes. */
 START_TEST(few_iterations)
 {
     static struct contact_problem *(*const problems[])(int) = {stack, pyramid, plates};
     enum { PROBLEMS = sizeof problems / sizeof *problems };
+    static const int most[PROBLEMS] = {50, 110, 90};
     const double relaxation = sadmm_settings_default().relaxation;
     double ratio = 1;
     for (int k = 0; k < PROBLEMS; ++k) {
         const int fast = cold_iterations(problems[k](0), SADMM_METHOD_FAST, relaxation);
         const int plain = cold_iterations(problems[k](0), SADMM_METHOD_FAST, 1);
         const int paper = cold_iterations(problems[k](0), SADMM_METHOD_PAPER, relaxation);
+        ck_assert_msg(fast < most[k], "problem %d: %d iterations", k, fast);
         ck_assert_msg(fast < plain, "problem %d: %d iterations, %d without over-relaxation", k, fast, plain);
         ck_assert_msg(fast < paper, "problem %d: %d iterations, paper takes %d", k, fast, paper);
         ratio *= (double)paper / fast;
@@ -508,8 +512,8 @@ START_TEST(few_iterations)
 }
 END_TEST
 
-/* A weight is the mass that its contact carries, so that masses and their order are nothing to the iteration: stacks of 1:1:1,
- * 1:100:10,000 and 10,000:100:1 take the same number but for one look, once the loads are known. */
+/* A weight is the mass that its contact carries, so that masses and their order are nothing to the iteration: stacks of
+ * 1:1:1, 1:100:10,000 and 10,000:100:1 take the same number but for one look, once the loads are known. */
 START_TEST(masses_do_not_matter)
 {
     static const double masses[][3] = {{1, 1, 1}, {0.01, 1, 100}, {100, 1, 0.01}};
@@ -537,7 +541,8 @@ START_TEST(solutions_are_certified)
 }
 END_TEST
 
-/* What single precision rounds a body's impulses to, at most, over the largest body's b: the certificate's scale, or less. */
+/* What single precision rounds a body's impulses to, at most, over the largest body's b: the certificate's scale, or
+ * less. */
 static double impulse_rounding(const struct runner *r)
 {
     const struct sadmm_system *system = &r->p->system;
@@ -556,9 +561,9 @@ static double impulse_rounding(const struct runner *r)
     return FLT_EPSILON / 2 * worst / scale;
 }
 
-/* Two thousand iterations from wrong impulses, in single precision: the momentum error ends where rounding the impulses puts it
- * (where momentum residuals are never recomputed, at five times that). And it is a solution: contacts move by what two bodies
- * do that move and turn by half an ulp of g dt, although the plates' impulses are rounded to more. */
+/* Two thousand iterations from wrong impulses, in single precision: the momentum error ends where rounding the impulses
+ * puts it (where momentum residuals are never recomputed, at five times that). And it is a solution: contacts move by
+ * what two bodies do that move and turn by half an ulp of g dt, although the plates' impulses are rounded to more. */
 START_TEST(momentum_residuals_do_not_drift)
 {
     const struct sadmm_kernels *table = single_tables[_i];
@@ -665,8 +670,9 @@ static double fastest_body(sadmm_world *world)
     return fastest;
 }
 
-/* Few iterations bring what can stand to rest: below the share of g dt, as energies, at which islands are no longer slowed down
- * (math/limit.h), motions die out by themselves. Without what is done for few iterations stacks sway at 0.03 m/s for good. */
+/* Few iterations bring what can stand to rest: below 1e-8 of the energy of its free motion, in single precision 1e-6,
+ * an island is no longer slowed down (docs/algorithm.md, section 7), so that motions as small as that have to die out
+ * by themselves. Without what is done for few iterations stacks sway at 0.03 m/s for good. */
 START_TEST(few_iterations_come_to_rest)
 {
     struct sadmm_scene scene = open_scene(resting[_i % RESTING].spec);
@@ -677,8 +683,7 @@ START_TEST(few_iterations_come_to_rest)
     scene.def.settings.iterations = resting[_i % RESTING].iterations;
     sadmm_world *world = build_scene(&scene);
     step_world(world, (int)lround(resting[_i % RESTING].duration / scene.def.settings.dt));
-    const double epsilon = scene.def.precision == SADMM_F32 ? FLT_EPSILON : DBL_EPSILON, dt = scene.def.settings.dt;
-    const double still = sqrt(fmax(LIMIT_STILL, LIMIT_STILL_ROUNDING * epsilon)) * 9.81 * dt;
+    const double still = sqrt(scene.def.precision == SADMM_F32 ? 1e-6 : 1e-8) * 9.81 * scene.def.settings.dt;
     double fastest = fastest_body(world);
     ck_assert_msg(fastest <= still, "%s, %d iterations: %g m/s after %g s", resting[_i % RESTING].spec,
                   resting[_i % RESTING].iterations, fastest, resting[_i % RESTING].duration);

@@ -96,8 +96,8 @@ START_TEST(others_start_from_nothing)
 }
 END_TEST
 
-/* A cube of which one edge is a little off the ground, or in it: by less than a thousandth of what it falls in a step it rests there
- * all the same, by a hundredth it does not. */
+/* A cube of which one edge is a little off the ground, or in it: by less than a thousandth of what it falls in a step
+ * it rests there all the same, by a hundredth it does not. */
 START_TEST(small_errors_are_left_to_the_iteration)
 {
     static const double one[] = {1}, shares[] = {5e-4, 1e-2};
@@ -107,7 +107,8 @@ START_TEST(small_errors_are_left_to_the_iteration)
         const double off = shares[k % 2] * g_dt * s.dt, gap = k < 2 ? off : -s.slop - off / s.baumgarte;
         problem->contacts.points[1].gap = problem->contacts.points[3].gap = gap;
         predict(problem, &s);
-        ck_assert_msg((largest_impulse(problem) > 0) == (k % 2 == 0), "gap %g m: largest impulse %g", gap, largest_impulse(problem));
+        ck_assert_msg((largest_impulse(problem) > 0) == (k % 2 == 0), "gap %g m: largest impulse %g", gap,
+                      largest_impulse(problem));
         contact_problem_free(problem);
     }
 }

@@ -1,9 +1,9 @@
-/* Structures that stand by exact friction and nothing else: no sleeping, no damping. Short versions of the scenes, by both
- * methods and in both precisions; test_standing_slow has the full ones. */
+/* Structures that stand by exact friction and nothing else: no sleeping, no damping. Short versions of the scenes, by
+ * both methods and in both precisions; test_standing_slow has the full ones. */
 #include "standing.h"
 
-/* In a layer of contacts, bodies sink by the slop; where one edge does and the other does not, a body as tall as it is wide
- * leans by as much. */
+/* In a layer of contacts, bodies sink by the slop; where one edge does and the other does not, a body as tall as it is
+ * wide leans by as much. */
 #define LAYERS(n) (2 * (n) * SLOP)
 
 static const struct standing_case cases[] = {

@@ -7,8 +7,8 @@
 static const struct standing_case cases[] = {
     {"vertical_stacks", 5, 101.01 / 0.01, INFINITY, 120 * 12, expect_vertical_stacks, 1438},
     {"oblique_stacks", 5, (2 * 10 + 9 * 0.05) / (9 * 0.05) + 1, LAYERS(4), 7 * 144, NULL, 1087},
-    /* Five levels of three joints each, whose gaps of 0.05 mm close; a card that leans by 17 degrees comes down by 1 / sin of
-     * that as much as its ends give way. A card that slips off or a house that folds moves by centimetres. */
+    /* Five levels of three joints each, whose gaps of 0.05 mm close; a card that leans by 17 degrees comes down by 1 /
+     * sin of that as much as its ends give way. A card that slips off or a house that folds moves by centimetres. */
     {"card_houses", 10, 40 / 2.0, 5 * 3 * (5e-5 + SLOP) / 0.288, 0, NULL, 2551},
     {"pyramid:30", 5, 30, LAYERS(30), 4 * 30 + 4 * 30 * 29, NULL, 0},
 };
@@ -21,8 +21,8 @@ START_TEST(stands)
 END_TEST
 
 /* Method fast: 5,050 cubes in 100 rows, 10 iterations a step at 1/60 s, in single precision. Without what math/weight.h says
- * about tall islands it has buckled after 500 steps (0.2 m). It starts from predicted loads that are its solution, with faces that
- * touch, so that no contact has reason to open or to sink by more than the slop. */
+ * about tall islands it has buckled after 500 steps (0.2 m). It starts from predicted loads that are its solution, with
+ * faces that touch, so that no contact has reason to open or to sink by more than the slop. */
 START_TEST(tall_pyramid)
 {
     struct sadmm_scene scene = open_scene("pyramid:100");
