@@ -427,6 +427,24 @@ START_TEST(blocks_have_no_unit)
 }
 END_TEST
 
+/* The weight scale stays where the misses are balanced, goes down where the momentum lags, up where the impulses creep,
+ * by the power 0.3 of how far they are off and a factor of 4 at most a refresh; it never leaves [0.1, 5]. */
+START_TEST(weight_scales_follow_the_balance)
+{
+    ck_assert(!weight_stalls(30) && weight_stalls(31));
+    for (double scale = 0.1; scale <= 5; scale *= 1.5) {
+        ck_assert_double_eq(weight_next_scale(scale, 0.5), scale);
+        ck_assert_double_eq(weight_next_scale(scale, 29), scale);
+        for (double off = 1.1; off < 1e5; off *= 3) {
+            const double factor = fmin(pow(off, 0.3), 4);
+            ck_assert_double_eq_tol(weight_next_scale(scale, 1 / 3.0 / off), fmax(scale / factor, 0.1),
+                                    8 * DBL_EPSILON * scale);
+            ck_assert_double_eq_tol(weight_next_scale(scale, 30 * off), fmin(scale * factor, 5), 8 * DBL_EPSILON * 5);
+        }
+    }
+}
+END_TEST
+
 START_TEST(islands_are_named_by_their_smallest_body)
 {
     struct contact_problem *p = contact_problem_new();
@@ -732,6 +750,7 @@ int main(void)
     tcase_add_loop_test(weights, solutions_are_not_slowed_down, 0, table_count + 1);
     tcase_add_test(weights, small_gaps_are_eased);
     tcase_add_test(weights, blocks_have_no_unit);
+    tcase_add_test(weights, weight_scales_follow_the_balance);
     tcase_add_test(weights, islands_are_named_by_their_smallest_body);
     tcase_add_test(solutions, few_iterations);
     tcase_add_test(solutions, masses_do_not_matter);
