@@ -223,15 +223,16 @@ static void expect_agreement(struct runner *own, struct runner *threads, struct 
     ck_assert(v->difference == 0 && lambda->difference == 0);
 }
 
-/* The same in every table, whatever the threads. */
+/* The same in every table, whatever the threads: at rest, and at a quarter of V. */
 START_TEST(tall_tables_equal_ref)
 {
-    const struct sadmm_kernels *table = tables[_i];
+    const struct sadmm_kernels *table = tables[_i / 2];
     struct contact_problem *problem = tall_stack(30);
     struct scene warm = scenes[0];
     struct spread v = {0, 0}, lambda = {0, 0};
     struct runner ref, own, three;
     warm.warm = true;
+    for (int i = 0; i < 30 && _i % 2; ++i) problem->system.velocity[6 * i] = 9.81 * 0.005 / 4;
     runner_start_method(&ref, literal(), &warm, problem, 1, SADMM_METHOD_FAST);
     runner_start_method(&own, table, &warm, problem, 1, SADMM_METHOD_FAST);
     runner_start_method(&three, table, &warm, problem, 3, SADMM_METHOD_FAST);
@@ -742,7 +743,7 @@ int main(void)
     tcase_add_loop_test(tables_case, single_steps_are_refused, 0, table_count);
     tcase_add_test(weights, weight_is_the_mass_carried);
     tcase_add_test(weights, tall_islands_are_stiff);
-    tcase_add_loop_test(weights, tall_tables_equal_ref, 0, table_count);
+    tcase_add_loop_test(weights, tall_tables_equal_ref, 0, 2 * table_count);
     tcase_add_test(weights, few_iterations_weigh_more);
     tcase_add_test(weights, few_iterations_of_a_problem_weigh_the_same);
     tcase_add_test(weights, bounces_are_taken_back);
