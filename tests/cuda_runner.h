@@ -267,26 +267,46 @@ static inline void check_same(struct runner *got, struct runner *wanted, const c
                   relative(lambda));
 }
 
-static const enum sadmm_cuda_tier tiers[] = {SADMM_CUDA_TIER_BLOCK, SADMM_CUDA_TIER_CLUSTER, SADMM_CUDA_TIER_GRID,
-                                             SADMM_CUDA_TIER_STREAM};
-enum { TIERS = sizeof tiers / sizeof *tiers };
+/* The device's tiers, STREAM last: it is what others are compared with. */
+enum { MOST_TIERS = 4 };
+static enum sadmm_cuda_tier tiers[MOST_TIERS];
+static size_t tier_count;
 
 /* Only devices of compute capability 9.0 and later have clusters; the emulated one has them. */
-static inline bool device_has(const struct sadmm_kernels *table, enum sadmm_cuda_tier tier)
+static inline bool device_has_clusters(const struct sadmm_kernels *table)
 {
 #ifdef CUDA_EMULATED
     (void)table;
-    (void)tier;
     return true;
 #else
-    if (tier != SADMM_CUDA_TIER_CLUSTER) return true;
-    struct runner r;
-    runner_create(&r, table);
-    force_tier(table, r.c, tier);
-    const bool has = runner_begin(&r, &scenes[0], SADMM_METHOD_PAPER) == SADMM_OK || !strstr(r.error.message, "the device has no clusters");
-    runner_stop(&r);
-    return has;
+    const sadmm_settings settings = sadmm_settings_default();
+    struct contact_problem *p = make_problem(&scenes[0], &settings);
+    struct sadmm_plan plan = sadmm_plan_make(&p->system, &settings);
+    struct sadmm_context *c = NULL;
+    struct sadmm_error error = {SADMM_OK, ""};
+    sadmm_status status = table->create(0, &c, &error);
+    if (status == SADMM_OK) {
+        force_tier(table, c, SADMM_CUDA_TIER_CLUSTER);
+        status = table->begin(c, &p->system, &plan, &settings, &error);
+    }
+    table->destroy(c);
+    contact_problem_free(p);
+    /* What else fails is for the tests to say. */
+    return status != SADMM_ERROR_UNSUPPORTED || !strstr(error.message, "the device has no clusters");
 #endif
+}
+
+/* Before tests are registered, so that none counts that had nothing to test. Returns whether there are clusters. */
+static inline bool find_tiers(void)
+{
+    const bool clusters = device_has_clusters(tables[0]);
+    tier_count = 0;
+    tiers[tier_count++] = SADMM_CUDA_TIER_BLOCK;
+    if (clusters) tiers[tier_count++] = SADMM_CUDA_TIER_CLUSTER;
+    tiers[tier_count++] = SADMM_CUDA_TIER_GRID;
+    tiers[tier_count++] = SADMM_CUDA_TIER_STREAM;
+    if (!clusters) printf("without tests of clusters: the device has none\n");
+    return clusters;
 }
 
 static inline void set_abort(struct runner *r, enum cuda_abort abort_code)

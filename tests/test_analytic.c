@@ -461,6 +461,48 @@ START_TEST(a_sphere_leaves_the_ground_with_its_restitution)
 }
 END_TEST
 
+/* At 1 m/s and 1.5 steps from the ground there is a contact already, but no bounce: that is the next step's. */
+START_TEST(a_sphere_bounces_when_it_touches)
+{
+    const double dt = 0.005, none[3] = { 0 }, down[3] = { 0, 0, -1 };
+    sadmm_world_def def = world_def(_i, dt, 100);
+    no_gravity(&def);
+    sadmm_world *world = solver_world(_i, &def);
+    add_plane(world, sadmm_frame_world(), 0.5);
+    sadmm_body_id id = add_sphere(world, sadmm_frame_moved(sadmm_frame_world(), 0, 0, 0.1 + 1.5 * dt), 1, 0.5);
+    set_velocity(world, id, down, none);
+    step_world(world, 1);
+    ck_assert_int_eq(world_report(world).contacts, 1);
+    ck_assert_double_eq_tol(body_state(world, id).linear_velocity[2], -1, rounding_of(_i, 1));
+    step_world(world, 1);
+    /* 1e-9: the solver's error */
+    ck_assert_double_eq_tol(body_state(world, id).linear_velocity[2], 0.5, 1e-9 + rounding_of(_i, 1));
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+/* In the ground by more than the slop: out again by Baumgarte's share of that in a step, at the correction speed at most. */
+START_TEST(overlaps_are_pushed_out)
+{
+    static const double depths[] = { 1e-3, 0.05 };
+    const double none[3] = { 0, 0, 0 };
+    for (int k = 0; k < 2; ++k) {
+        sadmm_world_def def = world_def(_i, 0.005, 100);
+        no_gravity(&def);
+        def.settings.correction_speed = 0.5;
+        sadmm_world *world = solver_world(_i, &def);
+        add_plane(world, sadmm_frame_world(), 0.5);
+        sadmm_body_id id = add_sphere(world, sadmm_frame_moved(sadmm_frame_world(), 0, 0, 0.1 - depths[k]), 1, 0);
+        set_velocity(world, id, none, none);
+        step_world(world, 1);
+        const double share = def.settings.baumgarte * (depths[k] - def.settings.slop) / def.settings.dt;
+        ck_assert(share < 0.5 || k == 1);
+        ck_assert_double_eq_tol(body_state(world, id).linear_velocity[2], fmin(share, 0.5), 1e-9 + rounding_of(_i, 0.5));
+        sadmm_world_destroy(world);
+    }
+}
+END_TEST
+
 /* Head-on, masses 1 and 3: velocities after follow from momentum and from v_b' - v_a' = -e (v_b - v_a). */
 START_TEST(head_on_spheres_part_as_newton_says)
 {
@@ -509,6 +551,8 @@ int main(void)
     tcase_add_loop_test(flight, a_symmetric_top_precesses_at_the_right_rate, 0, end);
     tcase_add_loop_test(collision, an_isolated_collision_keeps_momentum, 0, 2 * end);
     tcase_add_loop_test(collision, a_sphere_leaves_the_ground_with_its_restitution, bounce_first, bounce_end);
+    tcase_add_loop_test(collision, a_sphere_bounces_when_it_touches, 0, end);
+    tcase_add_loop_test(collision, overlaps_are_pushed_out, 0, end);
     tcase_add_loop_test(collision, head_on_spheres_part_as_newton_says, bounce_first, bounce_end);
     tcase_set_timeout(flight, 60);
     tcase_set_timeout(slope, 60);

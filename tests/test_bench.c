@@ -128,7 +128,8 @@ START_TEST(scaling_measures)
         ck_assert(number(&table, row, "steps") == 9);
         ck_assert(number(&table, row, "hash_step") == 12);
 
-        /* Each is a median by itself, so the parts make up the whole only about; a step of this takes 0.5 ms. */
+        /* Each is a median by itself: none of the four is above the whole's, and together they make it up about; a step
+         * of this takes 0.5 ms. */
         double step = number(&table, row, "step_ms"), solver = number(&table, row, "solver_ms"), sum = 0;
         static const char *const parts[] = {"collide_ms", "assemble_ms", "solve_ms", "finish_ms"};
         for (int k = 0; k < 4; ++k) {
@@ -136,7 +137,7 @@ START_TEST(scaling_measures)
             ck_assert_msg(part > 0 && part < step, "%s = %g of %g", parts[k], part, step);
             sum += part;
         }
-        ck_assert_msg(sum < 3 * step && sum > step / 3, "the parts of a step are %g of %g ms", sum, step);
+        ck_assert_msg(sum < 4 * step && sum > step / 3, "the parts of a step are %g of %g ms", sum, step);
         ck_assert_msg(step > 0.01 && step < 1000, "a step of %g ms", step);
         ck_assert(solver > 0 && solver < step);
 

@@ -327,7 +327,7 @@ START_TEST(workspace_is_kept_and_failures_change_nothing)
 END_TEST
 
 /* Three boxes side by side on exact impulses, a fourth on top of the last: three islands. Then one impulse is wrong, then a
- * velocity. */
+ * velocity. Momentum is looked at as in momentum_max, relative to the largest. */
 START_TEST(islands_above_tolerance)
 {
     struct sadmm_error error = {SADMM_OK, ""};
@@ -351,6 +351,14 @@ START_TEST(islands_above_tolerance)
     p->system.velocity[2] = -1e-6;
     ck_assert_int_eq(sadmm_certify(&p->system, &s, &c, &error), SADMM_OK);
     ck_assert_int_eq(c.islands_above, 2);
+    p->system.velocity[2] = 0;
+    const double momentum = 0.01 / 1.01; /* the wrong impulse's share of itself */
+    for (int above = 0; above < 2; ++above) {
+        s.certificate_momentum_tolerance = above ? 0.99 * momentum : 1.01 * momentum;
+        ck_assert_int_eq(sadmm_certify(&p->system, &s, &c, &error), SADMM_OK);
+        ck_assert_double_eq_tol(c.momentum_max, momentum, 1e-14); /* rounding of shares of 1 */
+        ck_assert_int_eq(c.islands_above, above);
+    }
     contact_problem_free(p);
 }
 END_TEST

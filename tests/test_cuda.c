@@ -121,10 +121,9 @@ START_TEST(tiers_equal_stepwise)
     const struct sadmm_kernels *table = tables[_i / SCENES];
     const struct scene *scene = &scenes[_i % SCENES];
     static const int batches[] = {1, 2, 34, 7};
-    for (size_t t = 0; t < TIERS; ++t) {
+    for (size_t t = 0; t < tier_count; ++t) {
         struct runner step, fused;
         char what[128];
-        if (!device_has(table, tiers[t])) continue;
         if (!(scene->tiers >> tiers[t] & 1)) {
             runner_create(&fused, table);
             force_tier(table, fused.c, tiers[t]);
@@ -168,7 +167,6 @@ START_TEST(cluster_sizes)
                  {"towers, frictionless", {2, 2}}, {"octagons", {2, 2}}, {"large", {4, 8}},
                  {"free bodies", {2, 2}},     {"nothing", {2, 2}}};
     const struct sadmm_kernels *table = tables[_i];
-    if (!device_has(table, SADMM_CUDA_TIER_CLUSTER)) return;
     for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
         const struct scene *scene = find_scene(cases[k].scene);
         struct runner wanted;
@@ -231,7 +229,6 @@ START_TEST(tiers_chosen)
                  {find_scene("nothing"), SADMM_CUDA_TIER_BLOCK}};
     const struct sadmm_kernels *table = tables[_i];
     (void)huge;
-    if (!device_has(table, SADMM_CUDA_TIER_CLUSTER)) return;
     struct runner r;
     runner_create(&r, table);
     for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
@@ -249,9 +246,9 @@ START_TEST(aborted_does_nothing)
     static const char *const names[] = {"mixed", "large"};
     const struct sadmm_kernels *table = tables[_i / 2];
     const struct scene *scene = find_scene(names[_i % 2]);
-    for (size_t t = 0; t < TIERS; ++t) {
+    for (size_t t = 0; t < tier_count; ++t) {
         struct runner plain, aborted;
-        if (!device_has(table, tiers[t]) || !(scene->tiers >> tiers[t] & 1)) continue;
+        if (!(scene->tiers >> tiers[t] & 1)) continue;
         runner_start(&plain, table, scene, tiers[t]);
         runner_start(&aborted, table, scene, tiers[t]);
         CALL(&plain, table->iterate(plain.c, 3, false, &plain.error));
@@ -373,7 +370,7 @@ START_TEST(calls_that_fail)
     settings.warm_start = false;
     settings.measure_residuals = true;
     int failed = 0;
-    for (size_t t = 0; t < TIERS; ++t) {
+    for (size_t t = 0; t < tier_count; ++t) {
         enum sadmm_cuda_tier tier = tiers[t];
         /* 18 iterations are a graph in the STREAM tier; the others launch once, however many there are. */
         settings.penalty_period = tier == SADMM_CUDA_TIER_STREAM ? 18 : 1;
@@ -401,14 +398,17 @@ int main(void)
 {
     if (!find_cuda_tables(tables)) return TEST_SKIPPED;
     const int parts = tested_precisions();
+    const bool clusters = find_tiers();
     Suite *suite = suite_create("cuda");
     for (int p = 0; p < parts; ++p) {
         add_case(suite, p ? "entries_f64" : "entries_f32", entries_equal_literal, p * SCENES, (p + 1) * SCENES);
         add_case(suite, p ? "tiers_f64" : "tiers_f32", tiers_equal_stepwise, p * SCENES,
                  p * SCENES + (parts == 2 ? SCENES : SCENES / 3));
     }
-    ADD_CASE(suite, cluster_sizes, 0, parts);
-    ADD_CASE(suite, tiers_chosen, 0, parts);
+    if (clusters) {
+        ADD_CASE(suite, cluster_sizes, 0, parts);
+        ADD_CASE(suite, tiers_chosen, 0, parts);
+    }
     ADD_CASE(suite, aborted_does_nothing, 0, 4);
     ADD_CASE(suite, runs_repeat, 0, parts);
     ADD_CASE(suite, contexts_side_by_side, 0, parts);

@@ -213,25 +213,26 @@ START_TEST(tall_islands_are_stiff)
 END_TEST
 
 /* A table's solution is ref's within a tolerance (the spreads say how far off it was), and the same bits by more threads. */
-static void expect_agreement(struct runner *own, struct runner *threads, struct spread *v,
-                             struct spread *lambda, double tolerance)
+static void expect_agreement(struct runner *own, struct runner *threads, struct spread *v, double v_tolerance,
+                             struct spread *lambda, double lambda_tolerance)
 {
-    ck_assert_msg(relative(*v) <= tolerance, "v differs by %g", relative(*v));
-    ck_assert_msg(relative(*lambda) <= tolerance, "lambda differs by %g", relative(*lambda));
+    ck_assert_msg(relative(*v) <= v_tolerance, "v differs by %g", relative(*v));
+    ck_assert_msg(relative(*lambda) <= lambda_tolerance, "lambda differs by %g", relative(*lambda));
     v->difference = lambda->difference = 0;
     compare_solutions(threads, own, v, lambda);
     ck_assert(v->difference == 0 && lambda->difference == 0);
 }
 
-/* The same in every table, whatever the threads. */
+/* The same in every table, whatever the threads: at rest, and at a quarter of V. */
 START_TEST(tall_tables_equal_ref)
 {
-    const struct sadmm_kernels *table = tables[_i];
+    const struct sadmm_kernels *table = tables[_i / 2];
     struct contact_problem *problem = tall_stack(30);
     struct scene warm = scenes[0];
     struct spread v = {0, 0}, lambda = {0, 0};
     struct runner ref, own, three;
     warm.warm = true;
+    for (int i = 0; i < 30 && _i % 2; ++i) problem->system.velocity[6 * i] = 9.81 * 0.005 / 4;
     runner_start_method(&ref, literal(), &warm, problem, 1, SADMM_METHOD_FAST);
     runner_start_method(&own, table, &warm, problem, 1, SADMM_METHOD_FAST);
     runner_start_method(&three, table, &warm, problem, 3, SADMM_METHOD_FAST);
@@ -241,9 +242,11 @@ START_TEST(tall_tables_equal_ref)
         iterate(&three, 10, false);
         compare_solutions(&own, &ref, &v, &lambda);
     }
-    /* v is 1e-4 of what the impulses would make of it: their rounding, 30 bodies deep, over it */
-    double tolerance = table->precision == SADMM_F32 ? 1e-2 : 1e-10;
-    expect_agreement(&own, &three, &v, &lambda, tolerance);
+    /* Fifty iterations that pass on what is rounded at most as it is (scene_tolerance; equal masses); and a cube of 1
+     * kg is pushed by what its eight impulses are rounded to at the start, which are thousands of times larger than
+     * what it moves by. */
+    const double rounding = 50 * table_epsilon(table), pushed = 8 * table_epsilon(table) * lambda.scale / v.scale;
+    expect_agreement(&own, &three, &v, rounding + pushed, &lambda, rounding);
     runner_stop(&ref);
     runner_stop(&own);
     runner_stop(&three);
@@ -262,13 +265,14 @@ static sadmm_settings few_settings(int iterations, int threads)
 }
 
 /* Three cubes on exact impulses: load / V of the lowest contacts is 3/4 kg a point, twice that with half the 60 iterations
- * that are not few; less the faster the stack moves by itself. */
+ * that are not few; less the faster the stack moves by itself, and no more than the stack's 3 kg. Of the highest
+ * contacts it is 1/4 kg, and phi / w half as much, since both cubes give way. */
 START_TEST(few_iterations_weigh_more)
 {
     static const struct {
         int iterations;
         double speed, factor; /* over V */
-    } cases[] = {{60, 0, 1}, {100, 0, 1}, {30, 0, 2}, {30, 0.5, 2}, {30, 1.6, 1.25}, {30, 4, 1}};
+    } cases[] = {{60, 0, 1}, {100, 0, 1}, {30, 0, 2}, {20, 0, 3}, {1, 0, 6}, {30, 0.5, 2}, {30, 1.6, 1.25}, {30, 4, 1}};
     for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
         struct contact_problem *problem = tall_stack(3);
         sadmm_settings settings = few_settings(cases[k].iterations, 1);
@@ -276,13 +280,30 @@ START_TEST(few_iterations_weigh_more)
         for (int i = 0; i < 3; ++i) problem->system.velocity[6 * i] = cases[k].speed * 9.81 * 0.005;
         runner_start_settings(&r, literal(), &settings, problem);
         ck_assert(r.plan.warm);
-        ck_assert_double_eq_tol(r.c->constraints[0].B[0], 3.0 / 4 * cases[k].factor + 3.0 / 4, 1e-8);
+        ck_assert_double_eq_tol(r.c->constraints[0].B[0], fmin(3.0 / 4 * cases[k].factor, 3) + 3.0 / 4, 1e-8);
+        ck_assert_double_eq_tol(r.c->constraints[8].B[0], 1.0 / 4 * cases[k].factor + 3.0 / 8, 1e-8);
         runner_stop(&r);
         contact_problem_free(problem);
     }
-    ck_assert_double_eq(weight_under_iterated(1, 20), 3);
-    ck_assert_double_eq(weight_under_iterated(1, 1), 6);
-    ck_assert_double_eq(weight_under_iterated(0, 5), 1); /* no world: a batch of a longer solve */
+}
+END_TEST
+
+/* A problem is no step of a world, but may be solved in short batches: few iterations in one mean nothing. */
+START_TEST(few_iterations_of_a_problem_weigh_the_same)
+{
+    double weight[2];
+    for (int k = 0; k < 2; ++k) {
+        struct contact_problem *problem = tall_stack(3);
+        sadmm_settings settings = few_settings(k ? 5 : 100, 1);
+        struct runner r;
+        contact_problem_raw(problem, &settings, 0);
+        runner_start_settings(&r, literal(), &settings, problem);
+        ck_assert(r.plan.warm && !r.plan.rigid);
+        weight[k] = r.c->constraints[0].B[0];
+        runner_stop(&r);
+        contact_problem_free(problem);
+    }
+    ck_assert_double_eq(weight[1], weight[0]);
 }
 END_TEST
 
@@ -300,16 +321,18 @@ START_TEST(bounces_are_taken_back)
 END_TEST
 
 /* A stack that has just landed: three times the impulses it rests on. Five iterations leave it jumping, and all tables
- * slow it down alike. */
+ * slow it down alike; less where cubes overlap, by 1 mm, since pushing them apart is work. */
 START_TEST(few_tables_equal_ref)
 {
-    const struct sadmm_kernels *table = tables[_i];
+    const struct sadmm_kernels *table = tables[_i / 2];
+    const bool overlap = _i % 2;
     struct contact_problem *problem = tall_stack(5);
     sadmm_settings one_thread = few_settings(5, 1), three_threads = few_settings(5, 3);
     struct spread v = {0, 0}, lambda = {0, 0};
     struct runner ref, own, three;
     int32_t limited[3];
     for (int k = 0; k < 20; ++k) problem->contacts.points[k].impulse[2] *= 3;
+    for (int k = 4; k < 20 && overlap; ++k) problem->contacts.points[k].gap = -1e-3;
     runner_start_settings(&ref, literal(), &one_thread, problem);
     runner_start_settings(&own, table, &one_thread, problem);
     runner_start_settings(&three, table, &three_threads, problem);
@@ -322,24 +345,48 @@ START_TEST(few_tables_equal_ref)
     compare_solutions(&own, &ref, &v, &lambda);
     /* Five iterations that pass on what is rounded at most as it is (scene_tolerance), each of some ten sums; equal masses. */
     const double tolerance = 5 * 10 * table_epsilon(table);
-    expect_agreement(&own, &three, &v, &lambda, tolerance);
+    expect_agreement(&own, &three, &v, tolerance, &lambda, tolerance);
     for (int k = 0; k < 3; ++k) runner_stop(runners[k]);
     contact_problem_free(problem);
 }
 END_TEST
 
-/* Gaps within the slop are closed by a share, larger ones but for what is left of that; overlaps are left alone. */
+/* Overlapping cubes are pushed apart, with more energy than they would have in free motion. A solution is left as it
+ * is: that energy is the work of its contacts. */
+START_TEST(solutions_are_not_slowed_down)
+{
+    const struct sadmm_kernels *table = _i < table_count ? tables[_i] : literal();
+    struct contact_problem *problem = tall_stack(5);
+    sadmm_settings settings = few_settings(300, 1);
+    struct runner r;
+    int32_t limited;
+    for (int k = 0; k < 20; ++k) problem->contacts.points[k].gap = -1e-3;
+    runner_start_settings(&r, table, &settings, problem);
+    iterate(&r, 300, false);
+    CALL(&r, table->limit_velocity(r.c, &limited, &r.error));
+    ck_assert_int_eq(limited, 0);
+    CALL(&r, table->read_solution(r.c, &r.error));
+    ck_assert_double_gt(r.p->system.velocity[6 * 4 + 2], 2 * 9.81 * r.settings.dt);
+    runner_stop(&r);
+    contact_problem_free(problem);
+}
+END_TEST
+
+/* The deeper a stack, the smaller the share of a gap within the slop that a step closes: by depth^-6, down to a
+ * thousandth. Larger gaps are closed but for what the slop leaves of them, without a jump; overlaps are left alone. */
 START_TEST(small_gaps_are_eased)
 {
-    const double slop = 2e-3, share = 1.0 / 64;
-    ck_assert_double_eq(weight_gap_share(1), 1);
-    ck_assert_double_eq(weight_gap_share(2), share);
-    ck_assert_double_eq(weight_gap_share(100), 0.001);
-    ck_assert_double_eq(weight_gap_error(1e-3, 1, slop), 1e-3);
-    ck_assert_double_eq(weight_gap_error(-1e-3, share, slop), -1e-3);
-    ck_assert_double_eq_tol(weight_gap_error(1e-3, share, slop), share * 1e-3, 1e-18);
-    ck_assert_double_eq_tol(weight_gap_error(slop, share, slop), share * slop, 1e-18);
-    ck_assert_double_eq_tol(weight_gap_error(1, share, slop), 1 - (1 - share) * slop, 1e-15);
+    const double slop = 2e-3;
+    for (double depth = 1; depth < 20; depth *= 1.25) {
+        const double share = weight_gap_share(depth);
+        ck_assert_double_eq_tol(share, fmax(pow(depth, -6), 0.001), 4 * DBL_EPSILON);
+        ck_assert_double_eq(weight_gap_error(-slop, share, slop), -slop);
+        ck_assert_double_eq(weight_gap_error(0, share, slop), 0);
+        for (double error = slop / 8; error < 8 * slop; error *= 2) {
+            const double left = error - weight_gap_error(error, share, slop);
+            ck_assert_double_eq_tol(left, (1 - share) * fmin(error, slop), 4 * DBL_EPSILON * error);
+        }
+    }
 }
 END_TEST
 
@@ -381,6 +428,24 @@ START_TEST(blocks_have_no_unit)
 }
 END_TEST
 
+/* The weight scale stays where the misses are balanced, goes down where the momentum lags, up where the impulses creep,
+ * by the power 0.3 of how far they are off and a factor of 4 at most a refresh; it never leaves [0.1, 5]. */
+START_TEST(weight_scales_follow_the_balance)
+{
+    ck_assert(!weight_stalls(30) && weight_stalls(31));
+    for (double scale = 0.1; scale <= 5; scale *= 1.5) {
+        ck_assert_double_eq(weight_next_scale(scale, 0.5), scale);
+        ck_assert_double_eq(weight_next_scale(scale, 29), scale);
+        for (double off = 1.1; off < 1e5; off *= 3) {
+            const double factor = fmin(pow(off, 0.3), 4);
+            ck_assert_double_eq_tol(weight_next_scale(scale, 1 / 3.0 / off), fmax(scale / factor, 0.1),
+                                    8 * DBL_EPSILON * scale);
+            ck_assert_double_eq_tol(weight_next_scale(scale, 30 * off), fmin(scale * factor, 5), 8 * DBL_EPSILON * 5);
+        }
+    }
+}
+END_TEST
+
 START_TEST(islands_are_named_by_their_smallest_body)
 {
     struct contact_problem *p = contact_problem_new();
@@ -398,20 +463,16 @@ END_TEST
 
 /* ---- solutions --------------------------------------------------------------------------------------------------- */
 
-static struct sadmm_solve_report solve_cold(struct contact_problem *problem, sadmm_method method, int iterations,
-                                            double tolerance)
+static struct sadmm_solve_report solve_with(struct contact_problem *problem, const sadmm_settings *wanted)
 {
     const char *reason;
     const struct sadmm_kernels *k = sadmm_kernels_find(SADMM_BACKEND_CPU, SADMM_F64, &reason);
     struct sadmm_error error = {SADMM_OK, ""};
     struct sadmm_solve_report report = {0};
     struct sadmm_context *c = NULL;
-    sadmm_settings s = sadmm_settings_default();
-    s.method = method;
-    s.iterations = iterations;
+    sadmm_settings s = *wanted;
     s.warm_start = false;
     s.threads = 1;
-    s.certificate_tolerance = tolerance;
     s.certificate_momentum_tolerance = 1e-2; /* the natural map is what is looked at */
     s.check_period = 5;
     struct sadmm_plan plan = sadmm_plan_make(&problem->system, &s);
@@ -424,28 +485,63 @@ static struct sadmm_solve_report solve_cold(struct contact_problem *problem, sad
     return report;
 }
 
-/* Cold, to a natural map of 1e-6 m/s, looked at every 5 iterations. Limits: half as many again as measured (35, 70, 70). */
-static const struct {
-    const char *name;
-    struct contact_problem *(*make)(int seed);
-    int limit;
-} cold[] = {
-    {"10 g / 1 kg / 100 kg", stack, 55},
-    {"pyramid, 6 rows", pyramid, 105},
-    {"plates, mu 3", plates, 105},
-};
+static struct sadmm_solve_report solve_cold(struct contact_problem *problem, int iterations, double tolerance)
+{
+    sadmm_settings s = sadmm_settings_default();
+    s.iterations = iterations;
+    s.certificate_tolerance = tolerance;
+    return solve_with(problem, &s);
+}
 
+/* Iterations from nothing to a natural map of 1e-6 m/s, looked at every five; the problem is freed. */
+static int cold_iterations(struct contact_problem *problem, sadmm_method method, double relaxation)
+{
+    sadmm_settings s = sadmm_settings_default();
+    s.method = method;
+    s.relaxation = relaxation;
+    s.iterations = 3000;
+    s.certificate_tolerance = 1e-6;
+    struct sadmm_solve_report report = solve_with(problem, &s);
+    ck_assert_msg(method == SADMM_METHOD_PAPER || report.certificate.ncp_max <= 1e-6, "natural map %g after %d",
+                  report.certificate.ncp_max, report.iterations);
+    contact_problem_free(problem);
+    return report.iterations;
+}
+
+/* Over-relaxation is worth having; and to 1e-6 m/s fast takes a third of the iterations of paper, in the geometric
+ * mean, as docs/convergence.md has it for problems whose loads are not predicted. `most` is a guard against regressions
+ * and no more: what an over-relaxation of 1.2 takes. */
 START_TEST(few_iterations)
 {
-    struct contact_problem *problem = cold[_i].make(0), *other = cold[_i].make(0);
-    struct sadmm_solve_report fast = solve_cold(problem, SADMM_METHOD_FAST, 1000, 1e-6);
-    struct sadmm_solve_report paper = solve_cold(other, SADMM_METHOD_PAPER, 1000, 1e-6);
-    ck_assert_msg(fast.converged, "%s: natural map %g after %d", cold[_i].name, fast.certificate.ncp_max, fast.iterations);
-    ck_assert_double_le(fast.certificate.ncp_max, 1e-6);
-    ck_assert_msg(fast.iterations <= cold[_i].limit, "%s: %d iterations", cold[_i].name, fast.iterations);
-    ck_assert_int_lt(fast.iterations, paper.iterations);
-    contact_problem_free(problem);
-    contact_problem_free(other);
+    static struct contact_problem *(*const problems[])(int) = {stack, pyramid, plates};
+    enum { PROBLEMS = sizeof problems / sizeof *problems };
+    static const int most[PROBLEMS] = {50, 110, 90};
+    const double relaxation = sadmm_settings_default().relaxation;
+    double ratio = 1;
+    for (int k = 0; k < PROBLEMS; ++k) {
+        const int fast = cold_iterations(problems[k](0), SADMM_METHOD_FAST, relaxation);
+        const int plain = cold_iterations(problems[k](0), SADMM_METHOD_FAST, 1);
+        const int paper = cold_iterations(problems[k](0), SADMM_METHOD_PAPER, relaxation);
+        ck_assert_msg(fast < most[k], "problem %d: %d iterations", k, fast);
+        ck_assert_msg(fast < plain, "problem %d: %d iterations, %d without over-relaxation", k, fast, plain);
+        ck_assert_msg(fast < paper, "problem %d: %d iterations, paper takes %d", k, fast, paper);
+        ratio *= (double)paper / fast;
+    }
+    ck_assert_msg(pow(ratio, 1.0 / PROBLEMS) >= 3, "paper takes %g times as many", pow(ratio, 1.0 / PROBLEMS));
+}
+END_TEST
+
+/* A weight is the mass that its contact carries, so that masses and their order are nothing to the iteration: stacks of
+ * 1:1:1, 1:100:10,000 and 10,000:100:1 take the same number but for one look, once the loads are known. */
+START_TEST(masses_do_not_matter)
+{
+    static const double masses[][3] = {{1, 1, 1}, {0.01, 1, 100}, {100, 1, 0.01}};
+    int iterations[3];
+    for (int k = 0; k < 3; ++k)
+        iterations[k] = cold_iterations(contact_problem_stack(masses[k], 3, 0.5), SADMM_METHOD_FAST,
+                                        sadmm_settings_default().relaxation);
+    for (int k = 1; k < 3; ++k)
+        ck_assert_msg(abs(iterations[k] - iterations[0]) <= 5, "%d and %d iterations", iterations[k], iterations[0]);
 }
 END_TEST
 
@@ -456,7 +552,7 @@ START_TEST(solutions_are_certified)
     static const int solvable[] = {8, 9, 10, 11};
     const struct scene *scene = &scenes[solvable[_i]];
     struct contact_problem *problem = make_problem(scene), *other = make_problem(scene);
-    struct sadmm_solve_report fast = solve_cold(problem, SADMM_METHOD_FAST, 3000, 1e-9);
+    struct sadmm_solve_report fast = solve_cold(problem, 3000, 1e-9);
     ck_assert_msg(fast.converged, "%s: natural map %g, momentum %g", scene->name, fast.certificate.ncp_max,
                   fast.certificate.momentum_max);
     contact_problem_free(problem);
@@ -464,22 +560,29 @@ START_TEST(solutions_are_certified)
 }
 END_TEST
 
-/* Contact points of the body that has most. */
-static int most_points(const struct contact_problem *p)
+/* What single precision rounds a body's impulses to, at most, over the largest body's b: the certificate's scale, or
+ * less. */
+static double impulse_rounding(const struct runner *r)
 {
-    int most = 0;
-    for (int32_t body = 0; body < p->system.body_count; ++body) {
-        int points = 0;
-        for (size_t k = 0; k < p->contacts.pair_count; ++k)
-            if (p->contacts.pairs[k].body_a == body || p->contacts.pairs[k].body_b == body) points += p->contacts.pairs[k].count;
-        most = points > most ? points : most;
+    const struct sadmm_system *system = &r->p->system;
+    double A[36], b[6], worst = 0, scale = 0;
+    for (int32_t body = 0; body < system->body_count; ++body) {
+        double sum = 0;
+        for (size_t p = 0; p < system->contacts->pair_count; ++p) {
+            const struct sadmm_contact_pair *pair = &system->contacts->pairs[p];
+            for (int k = 0; k < pair->count && (pair->body_a == body || pair->body_b == body); ++k)
+                sum += norm3(system->contacts->points[pair->first + k].impulse);
+        }
+        sadmm_system_body(system, &r->settings, body, A, b);
+        for (int j = 0; j < 6; ++j) scale = fmax(scale, fabs(b[j]));
+        worst = fmax(worst, sum);
     }
-    return most;
+    return FLT_EPSILON / 2 * worst / scale;
 }
 
-/* Two thousand iterations from wrong impulses, in single precision: the momentum error ends where rounding the impulses puts it,
- * half an ulp of each point of a body; where momentum residuals are never taken again, at 1.7e-6. And it is a solution:
- * the natural map ends below epsilon g dt (3e-9 m/s) times the plates' 200 over the cubes' mass, 1e-6 rounded up. */
+/* Two thousand iterations from wrong impulses, in single precision: the momentum error ends where rounding the impulses
+ * puts it (where momentum residuals are never recomputed, at five times that). And it is a solution: contacts move by
+ * what two bodies do that move and turn by half an ulp of g dt, although the plates' impulses are rounded to more. */
 START_TEST(momentum_residuals_do_not_drift)
 {
     const struct sadmm_kernels *table = single_tables[_i];
@@ -487,7 +590,7 @@ START_TEST(momentum_residuals_do_not_drift)
     struct scene warm = scenes[0];
     struct runner r;
     struct sadmm_certificate certificate;
-    solve_cold(problem, SADMM_METHOD_FAST, 1000, 1e-9);
+    solve_cold(problem, 1000, 1e-9);
     for (size_t k = 0; k < problem->contacts.point_count; ++k)
         for (int j = 0; j < 3; ++j) problem->contacts.points[k].impulse[j] *= k % 3 ? 0.5 : 1.5;
     warm.warm = true;
@@ -496,9 +599,9 @@ START_TEST(momentum_residuals_do_not_drift)
     for (int s = 0; s < 20; ++s) iterate(&r, 100, false);
     CALL(&r, table->read_solution(r.c, &r.error));
     ck_assert_int_eq(sadmm_certify(&r.p->system, &r.settings, &certificate, &r.error), SADMM_OK);
-    const double rounding = most_points(problem) * FLT_EPSILON / 2;
+    const double rounding = impulse_rounding(&r), still = 4 * FLT_EPSILON / 2 * 9.81 * r.settings.dt;
     ck_assert_msg(certificate.momentum_max <= rounding, "momentum %g, rounding %g", certificate.momentum_max, rounding);
-    ck_assert_msg(certificate.ncp_max <= 1e-6, "natural map %g", certificate.ncp_max);
+    ck_assert_msg(certificate.ncp_max <= still, "natural map %g", certificate.ncp_max);
     runner_stop(&r);
     contact_problem_free(problem);
 }
@@ -586,8 +689,9 @@ static double fastest_body(sadmm_world *world)
     return fastest;
 }
 
-/* Few iterations bring what can stand to rest. Measured: 3e-7 m/s and less in single precision, 1e-8 in double; without what
- * is done for few iterations 0.03 m/s and more, for good. 1e-4 is between them. */
+/* Few iterations bring what can stand to rest: below 1e-8 of the energy of its free motion, in single precision 1e-6,
+ * an island is no longer slowed down (docs/algorithm.md, section 7), so that motions as small as that have to die out
+ * by themselves. Without what is done for few iterations stacks sway at 0.03 m/s for good. */
 START_TEST(few_iterations_come_to_rest)
 {
     struct sadmm_scene scene = open_scene(resting[_i % RESTING].spec);
@@ -598,8 +702,9 @@ START_TEST(few_iterations_come_to_rest)
     scene.def.settings.iterations = resting[_i % RESTING].iterations;
     sadmm_world *world = build_scene(&scene);
     step_world(world, (int)lround(resting[_i % RESTING].duration / scene.def.settings.dt));
+    const double still = sqrt(scene.def.precision == SADMM_F32 ? 1e-6 : 1e-8) * 9.81 * scene.def.settings.dt;
     double fastest = fastest_body(world);
-    ck_assert_msg(fastest <= 1e-4, "%s, %d iterations: %g m/s after %g s", resting[_i % RESTING].spec,
+    ck_assert_msg(fastest <= still, "%s, %d iterations: %g m/s after %g s", resting[_i % RESTING].spec,
                   resting[_i % RESTING].iterations, fastest, resting[_i % RESTING].duration);
     sadmm_world_destroy(world);
 }
@@ -638,14 +743,18 @@ int main(void)
     tcase_add_loop_test(tables_case, single_steps_are_refused, 0, table_count);
     tcase_add_test(weights, weight_is_the_mass_carried);
     tcase_add_test(weights, tall_islands_are_stiff);
-    tcase_add_loop_test(weights, tall_tables_equal_ref, 0, table_count);
+    tcase_add_loop_test(weights, tall_tables_equal_ref, 0, 2 * table_count);
     tcase_add_test(weights, few_iterations_weigh_more);
+    tcase_add_test(weights, few_iterations_of_a_problem_weigh_the_same);
     tcase_add_test(weights, bounces_are_taken_back);
-    tcase_add_loop_test(weights, few_tables_equal_ref, 0, table_count);
+    tcase_add_loop_test(weights, few_tables_equal_ref, 0, 2 * table_count);
+    tcase_add_loop_test(weights, solutions_are_not_slowed_down, 0, table_count + 1);
     tcase_add_test(weights, small_gaps_are_eased);
     tcase_add_test(weights, blocks_have_no_unit);
+    tcase_add_test(weights, weight_scales_follow_the_balance);
     tcase_add_test(weights, islands_are_named_by_their_smallest_body);
-    tcase_add_loop_test(solutions, few_iterations, 0, sizeof cold / sizeof *cold);
+    tcase_add_test(solutions, few_iterations);
+    tcase_add_test(solutions, masses_do_not_matter);
     tcase_add_loop_test(solutions, solutions_are_certified, 0, 4);
     tcase_add_loop_test(solutions, momentum_residuals_do_not_drift, 0, single_count);
     tcase_add_loop_test(motion, too_few_iterations_are_safe, 0, 4 * (int)(sizeof moving / sizeof *moving));
