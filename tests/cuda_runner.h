@@ -18,7 +18,7 @@
 #define tier_of cuda_emulation_tier_of
 #define SYMBOL(name, precision) sadmm_cuda_##name##_emulated_##precision
 #else
-#include "backend_cuda/graph/tier.h"
+#include "backend_cuda/device/tier.h"
 #define force_tier sadmm_cuda_force_tier
 #define force_cluster sadmm_cuda_force_cluster
 #define tier_of sadmm_cuda_tier_of

@@ -15,7 +15,7 @@
 #define tier_of cuda_emulation_tier_of
 #define tune_capacities cuda_emulation_tune_capacities
 #else
-#include "backend_cuda/graph/tier.h"
+#include "backend_cuda/device/tier.h"
 #define force_tier sadmm_cuda_force_tier
 #define tier_of sadmm_cuda_tier_of
 #define tune_capacities sadmm_cuda_tune_capacities

@@ -3,7 +3,7 @@
 #define SADMM_EMULATION_CONTROL_H
 
 #include "core/solve/kernels.h"
-#include "backend_cuda/graph/tier.h"
+#include "backend_cuda/device/tier.h"
 
 #ifdef __cplusplus
 extern "C" {

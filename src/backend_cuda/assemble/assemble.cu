@@ -1,8 +1,8 @@
 /* Kernels A-D: raw bodies, contacts and blocks, as core has them, into this precision's layout. */
 #include "backend_cuda/device/double.h"
 
+#include "assemble.h"
 #include "side_sums.h"
-#include "backend_cuda/iterate/stop_rule.h"
 
 /* ---- bodies --------------------------------------------------------------------------------------------------- */
 
@@ -127,7 +127,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const struct sadmm_contact_point *points = v.raw.points + (live ? pair->first : 0);
     const vec3 normal = live ? v3_load(pair->normal) : v3(0, 0, 0);
     const bool a = live && pair->body_a >= 0, b = live && pair->body_b >= 0;
-    /* A pair of more points than the step was planned for aborts it (step/step.h), but later: until then it has as
+    /* A pair of more points than the step was planned for aborts it (device/step.h), but later: until then it has as
      * many. */
     const int32_t count = !live ? 0 : pair->count <= v.contacts.point_slots ? pair->count : v.contacts.point_slots;
     vec3 between = v3(0, 0, 0);

@@ -8,15 +8,10 @@
 #ifndef SADMM_CUDA_COLLIDE_PIPELINE_H
 #define SADMM_CUDA_COLLIDE_PIPELINE_H
 
+#include "backend_cuda/device/found.h"
 #include "collision/collision.h"
 
 struct sadmm_cuda_collision;
-
-struct sadmm_cuda_contact_counts {
-    int64_t candidates; /* pairs of shapes whose boxes overlap */
-    int32_t pairs, points;
-    double dt;          /* of the step that the impulses are for, s; 0: of none */
-};
 
 /* The current set. Device memory, valid until the second find from now on, an upload or destroy. */
 struct sadmm_cuda_contacts {
@@ -41,11 +36,6 @@ struct sadmm_cuda_collision_tuning {
     int64_t first_capacity; /* the next find starts with room for so many candidates and points, whatever is allocated */
 };
 
-#ifdef SADMM_CUDA_EMULATED
-#define COLLISION(name) sadmm_cuda_collision_##name##_emulated
-#else
-#define COLLISION(name) sadmm_cuda_collision_##name
-#endif
 #include "entries.h"
 
 #endif

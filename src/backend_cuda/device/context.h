@@ -77,6 +77,7 @@ struct sadmm_context {
 /* ---- device/context.cu ---- */
 
 sadmm_status CUDA(fail)(struct sadmm_context *, cudaError_t code, const char *what, struct sadmm_error *error);
+void CUDA(release_buffers)(struct sadmm_context *);
 /* At least `bytes` in a buffer; what it held is lost when it grows. */
 sadmm_status CUDA(reserve)(struct sadmm_context *, enum cuda_buffer_name name, size_t bytes, struct sadmm_error *error);
 /* Launch blocks of THREADS on the stream; 0 blocks: nothing to do. */
@@ -128,108 +129,10 @@ struct device_scope {
     device_scope scope((c)->device);    \
     CUDA_CALL((c), scope.code, "cudaSetDevice")
 
-/* ---- device/begin.cu ---- */
+/* ---- device/arrays.cu ---- */
 
 /* This precision's data for the view's counts and the partition (allocates). */
 sadmm_status CUDA(reserve_solver)(struct sadmm_context *, struct sadmm_error *error);
-
-/* ---- assemble/, weight/, iterate/: parts of the entries, launches only ---- */
-
-/* A, b and the start velocities: they need no contacts. */
-sadmm_status CUDA(enqueue_bodies)(struct sadmm_context *, struct sadmm_error *error);
-/* Of a whole step: penalties and factors at once, and whether it is what was planned for. fast: islands first;
- * c->prologue: all of it is left to the iterating kernel, and to the last two. */
-sadmm_status CUDA(enqueue_penalties)(struct sadmm_context *, struct sadmm_error *error);
-/* fast: a solve begins: its first weights come next. */
-void CUDA(begin_weights)(struct sadmm_context *);
-/* fast: what weights of islands depend on beside the islands. */
-cuda_args CUDA(weight_args)(const struct sadmm_context *);
-/* fast: islands, and B of row blocks; then B, C and, for `factor`, H. `planned` as above. */
-sadmm_status CUDA(enqueue_islands)(struct sadmm_context *, struct sadmm_error *error);
-sadmm_status CUDA(enqueue_weighted_penalties)(struct sadmm_context *, bool first, bool factor, bool planned,
-                                              struct sadmm_error *error);
-/* fast: all of that again, from the loads there are now. */
-sadmm_status CUDA(enqueue_weights)(struct sadmm_context *, bool factor, struct sadmm_error *error);
-/* fast: the bodies' momentum residuals, recomputed. */
-sadmm_status CUDA(enqueue_momentum_residuals)(struct sadmm_context *, struct sadmm_error *error);
-/* fast: (17), as a maximum with what view.iteration.residual[1] is. */
-sadmm_status CUDA(enqueue_momentum_residual)(struct sadmm_context *, struct sadmm_error *error);
-/* fast: by what islands are to be slowed down (iterate/slow.h), and how many, in *view.islands.limited. `suspected`:
- * the iterations have looked whether any is. */
-sadmm_status CUDA(enqueue_limit)(struct sadmm_context *, bool suspected, struct sadmm_error *error);
-/* fast: a convergence check after `done` iterations of a step. */
-sadmm_status CUDA(enqueue_convergence_check)(struct sadmm_context *, int done, struct sadmm_error *error);
-/* Iterations, as the entry; limit: what is wanted for the limit of energies after the last. */
-sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *, int count, bool measure, enum cuda_limit limit,
-                                      struct sadmm_error *error);
-/* (16) and (17) of the iteration that was measured, into view.iteration.residual. */
-sadmm_status CUDA(enqueue_residuals)(struct sadmm_context *, struct sadmm_error *error);
-/* (15) by view.iteration.residual. */
-sadmm_status CUDA(enqueue_balance)(struct sadmm_context *, struct sadmm_error *error);
-
-/* ---- step/world.cu, step/kernels.cu ---- */
-
-void CUDA(step_destroy)(struct sadmm_context *);
-sadmm_status CUDA(launch_edits)(struct sadmm_context *, const struct sadmm_resident_edit *edits, size_t count,
-                                struct sadmm_error *error);
-sadmm_status CUDA(launch_start)(struct sadmm_context *, struct sadmm_error *error);
-sadmm_status CUDA(launch_admit)(struct sadmm_context *, struct sadmm_error *error);
-sadmm_status CUDA(launch_finish)(struct sadmm_context *, struct sadmm_error *error);
-sadmm_status CUDA(launch_commit)(struct sadmm_context *, struct sadmm_error *error);
-
-/* ---- graph/layout.cu -------------------------------------------------------------------------------------------------
- * Counts and rooms in the view, then reserve_layout (it allocates); then per step, by enqueueing only: statistics and
- * layout of what view.raw points to. */
-
-sadmm_status CUDA(reserve_layout)(struct sadmm_context *, struct sadmm_error *error);
-/* The statistics; islands: also which bodies hang together (what BLOCK and CLUSTER need). */
-sadmm_status CUDA(enqueue_statistics)(struct sadmm_context *, bool islands, struct sadmm_error *error);
-/* Slots, offsets, incident, parts. A part that exceeds what the partition allows sets live->abort_code =
- * ABORT_PARTITION. */
-sadmm_status CUDA(enqueue_layout)(struct sadmm_context *, const struct cuda_partition *, struct sadmm_error *error);
-
-/* The same in one go; small scenes: in one kernel. */
-sadmm_status CUDA(enqueue_statistics_and_layout)(struct sadmm_context *, bool islands, const struct cuda_partition *,
-                                                 struct sadmm_error *error);
-/* The plan's counts to the device. */
-sadmm_status CUDA(upload_live)(struct sadmm_context *, enum cuda_abort, struct sadmm_error *error);
-/* Wait for what the device knows now. */
-sadmm_status CUDA(download_known)(struct sadmm_context *, struct cuda_known *out, struct sadmm_error *error);
-
-/* ---- assemble/rows.cu: constraints given by rows, as core has them ---- */
-
-size_t CUDA(raw_row_bytes)(int32_t count); /* of constraints */
-void CUDA(bind_raw_rows)(struct sadmm_context *, void *memory);
-sadmm_status CUDA(upload_rows)(struct sadmm_context *, struct sadmm_error *error);
-
-/* ---- iterate/streamed.cu, iterate/persistent.cu ---- */
-
-/* STREAM. fast, goes_on: none of them is the batch's last. */
-sadmm_status CUDA(stream_iterations)(struct sadmm_context *, int count, bool measure, bool goes_on, struct sadmm_error *error);
-/* Before a measured iteration: its primal residual. */
-sadmm_status CUDA(clear_primal)(struct sadmm_context *, bool measure, struct sadmm_error *error);
-/* The instance of the persistent kernel for a tier (rows: there are constraints given by rows); threads a block at most;
- * bytes of shared memory. */
-cuda_kernel CUDA(persistent_kernel)(int point_slots, enum sadmm_cuda_tier tier, int threads, bool rows, bool fast,
-                                  const char **name);
-/* Whether the instance for a partition, without constraints given by rows, does the prologue and the epilogue of a
- * step of `fast`, too. */
-bool CUDA(persistent_does_prologue)(const struct cuda_partition *);
-int CUDA(persistent_threads)(int point_slots, bool rows);
-size_t CUDA(persistent_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies);
-/* Let every instance use `bytes` of shared memory a block, and clusters of more than 8 blocks. *clusters: whether both the
- * device and the code that was loaded for it know clusters. */
-cudaError_t CUDA(persistent_allow)(int bytes, bool device_has_clusters, bool *clusters);
-
-/* ---- graph/partition.cu ---- */
-
-/* The tier and its thread blocks, from the statistics of this step (or of one like it), the plan and the device. */
-sadmm_status CUDA(choose_partition)(struct sadmm_context *, const struct cuda_graph_statistics *statistics,
-                                    struct cuda_partition *partition, struct sadmm_error *error);
-/* Fewer threads, where the layout made for it has smaller parts (statistics->part_sides, part_bodies) than could be
- * known. */
-void CUDA(tighten_partition)(const struct sadmm_context *, const struct cuda_graph_statistics *statistics,
-                             struct cuda_partition *partition);
 
 #define CUDA_TRY(call)                                  \
     do {                                                \

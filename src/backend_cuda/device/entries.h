@@ -1,5 +1,5 @@
 /* The entries of the kernel table for one precision, in C: CUDA(name) is set by the includer. */
-#include "backend_cuda/graph/layout.h"
+#include "layout.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -14,7 +14,7 @@
  *     knows where they go. Points are stored pair by pair, four lanes a pair (point_slot).
  *   - Eight lanes take a body: lane r < 6 owns component r of A v, of the gathered sum and of H g, H = (A + beta C)^-1.
  *
- * Order. Bodies are numbered by island, stably, where islands matter: "slots" (graph/layout.h). Pairs and row blocks keep
+ * Order. Bodies are numbered by island, stably, where islands matter: "slots" (device/layout.h). Pairs and row blocks keep
  * their raw order. Static bodies join nothing and share the state row after the last body, which is 0. Within a body's
  * list records ascend, so that the sums are the same in every tier.
  *
@@ -23,7 +23,7 @@
  *   CLUSTER  islands packed into clusters of thread blocks, which read each other's velocities from shared memory
  *   GRID     one cooperative launch; velocities go through L2, with a grid barrier an iteration
  *   STREAM   two kernels an iteration, in a CUDA graph: any size
- * BLOCK, CLUSTER and GRID are one kernel (iterate/persistent.h) over a partition into `parts` (graph/partition.cu).
+ * BLOCK, CLUSTER and GRID are one kernel (iterate/persistent.h) over a partition into `parts` (iterate/partition.cu).
  *
  * The method `fast` has a weight B of its own for each constraint (weight/weights.cu) in place of beta, which is 1 then.
  * Its iteration is Steps 2-4 and then Step 1, relaxed (math/relax.h), by instances of its own of the same kernels;
@@ -47,9 +47,9 @@
 #include <cuda_runtime.h>
 
 #include "core/solve/kernels.h"
+#include "layout.h"
 #include "line.h"
-#include "backend_cuda/step/step.h"
-#include "backend_cuda/graph/layout_view.h"
+#include "step.h"
 
 typedef SADMM_REAL solver_real;
 
@@ -119,7 +119,7 @@ struct cuda_settings {
 /* ---- what kernels see --------------------------------------------------------------------------------------------
  * A view a subject. Functions take those they read or write; kernels, and the few functions that need most of them, take
  * all together (cuda_view). Pointers are device memory. Arrays over bodies are in raw order but where it says slots
- * (graph/layout.h). */
+ * (device/layout.h). */
 
 /* The step's size, and what is the same for all of it. */
 struct model_view {
@@ -148,7 +148,7 @@ struct body_view {
     double *free_energy; /* fast: bodies: of A^-1 b, J */
 };
 
-/* The constraint graph as it is laid out (graph/layout.h). */
+/* The constraint graph as it is laid out (device/layout.h). */
 struct graph_view {
     const int32_t *offsets, *incident; /* slot -> places of its sides; place -> side, ascending for each body */
     const int32_t *body_of, *slot_of;  /* slot -> raw body, raw body -> slot */
@@ -278,6 +278,14 @@ static __device__ __forceinline__ int32_t live_bodies(const model_view &model)
 static __device__ __forceinline__ int32_t live_rows(const model_view &model, const row_view &rows)
 {
     return model.live->abort_code ? 0 : rows.count;
+}
+
+/* Before the first kernel of a solve that counts islands: those slowed down, those that have stopped. */
+static __device__ __forceinline__ void clear_counts(const island_view &islands)
+{
+    const cuda_stop none = {};
+    *islands.limited = *islands.suspects = 0;
+    *islands.stop = none;
 }
 
 /* What an iterating kernel does about energies after its last iteration: it says whether an island may have too much, or it

@@ -1,7 +1,7 @@
-/* The layout on the host's side (graph/layout.h): its arrays, what enqueues its stages, and what is known of a step. */
+/* The layout on the host's side (device/layout.h): its arrays, what enqueues its stages, and what is known of a step. */
 #include <string.h>
 
-#include "backend_cuda/device/context.h"
+#include "graph.h"
 
 /* ---- arrays ---------------------------------------------------------------------------------------------------- */
 

@@ -1,11 +1,11 @@
-/* What a thread, a warp or a block does in the layout (graph/layout_view.h): shared by the kernels of any size and the
+/* What a thread, a warp or a block does in the layout (graph/layout_kernels.h): shared by the kernels of any size and the
  * one for small scenes. The view's arrays may be in global or shared memory. */
 #ifndef SADMM_CUDA_GRAPH_LAYOUT_STEPS_H
 #define SADMM_CUDA_GRAPH_LAYOUT_STEPS_H
 
 #include <stddef.h>
 
-#include "layout_view.h"
+#include "layout_kernels.h"
 
 #define LAYOUT_INLINE static __device__ __forceinline__
 

@@ -1,6 +1,8 @@
 /* The fused iteration in any tier, and the residuals (16), (17). */
 #include <string.h>
 
+#include "backend_cuda/weight/weight.h"
+#include "iterate.h"
 #include "sweep.h"
 
 #include "core/math/limit.h"

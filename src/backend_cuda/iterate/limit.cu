@@ -9,6 +9,7 @@
 
 #include "backend_cuda/device/double.h"
 #include "energies.h"
+#include "iterate.h"
 #include "backend_cuda/weight/island_sums.h"
 
 #include "core/math/relax.h"

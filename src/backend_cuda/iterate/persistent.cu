@@ -1,4 +1,5 @@
 /* The fused iteration (persistent.h): which instance runs, and what it takes. */
+#include "iterate.h"
 #include "persistent.h"
 
 /* Rows take registers that blocks of more threads do not have. */

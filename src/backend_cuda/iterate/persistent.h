@@ -21,7 +21,7 @@
 #include "persistent_load.h"
 #include "persistent_steps.h"
 
-#include "backend_cuda/step/plan_check.h"
+#include "backend_cuda/device/plan_check.h"
 
 /* ---- the kernel ------------------------------------------------------------------------------------------------ */
 

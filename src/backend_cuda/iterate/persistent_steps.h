@@ -48,7 +48,7 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd)
         own_body.v += step_of(own_body, gather(momentum, gathered, gathered_count, many));
         publish(own_state, body, own_body.v, odd);
     }
-    if (SIZE == ONE_WARP) return; /* at most one body for each eight threads (graph/partition.cu) */
+    if (SIZE == ONE_WARP) return; /* at most one body for each eight threads (iterate/partition.cu) */
     const int32_t in_registers = (int32_t)blockDim.x / LANES;
     for (int32_t first = in_registers; warp_has_body(first); first += in_registers) {
         const int32_t i = first + body, at = i - in_registers;
@@ -73,7 +73,7 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies_fast(int32_t odd, rea
         step = step_fast(&own_body, sum, relaxation);
         publish(own_state, body, own_body.v, odd);
     }
-    if (SIZE == ONE_WARP) return; /* at most one body for each eight threads (graph/partition.cu) */
+    if (SIZE == ONE_WARP) return; /* at most one body for each eight threads (iterate/partition.cu) */
     const int32_t in_registers = (int32_t)blockDim.x / LANES;
     for (int32_t first = in_registers; warp_has_body(first); first += in_registers) {
         const int32_t i = first + body, at = i - in_registers;

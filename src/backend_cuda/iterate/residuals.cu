@@ -2,6 +2,7 @@
  * changes for long (math/relax.h), and (17). In double, from this precision's data; eight lanes a body. The first of a
  * solve comes with the sums over islands (weight/weights.cu). */
 #include "backend_cuda/weight/constraint.h"
+#include "iterate.h"
 #include "stop_rule.h"
 
 /* b - A v + J^T lambda of a body, a component a lane. */

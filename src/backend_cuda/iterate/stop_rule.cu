@@ -10,10 +10,11 @@
 #include "backend_cuda/device/double.h"
 #include "backend_cuda/weight/constraint.h"
 #include "backend_cuda/weight/island_sums.h"
+#include "iterate.h"
 #include "stop_rule.h"
 
 #include "core/math/row.h"
-#include "backend_cuda/step/solution.h"
+#include "solution.h"
 
 /* Of a contact in its frame, with u = x + e and the response w. */
 static __device__ double map_of_contact(const double lambda[3], const double u[3], double friction, double w)

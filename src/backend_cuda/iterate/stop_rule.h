@@ -4,14 +4,6 @@
 
 #include "backend_cuda/device/context.h"
 
-/* Before the first kernel of a solve that counts islands: those slowed down, those that have stopped. */
-static __device__ __forceinline__ void clear_counts(const island_view &islands)
-{
-    const cuda_stop none = {};
-    *islands.limited = *islands.suspects = 0;
-    *islands.stop = none;
-}
-
 /* Had every island stopped by the last of `checks` convergence checks? */
 static __device__ __forceinline__ bool all_stopped(const island_view &islands, int32_t checks)
 {

@@ -1,4 +1,6 @@
 /* The iteration as two kernels: stepwise (kernels I-O), and tier STREAM, a graph of plain steps. */
+#include "backend_cuda/graph/layout_kernels.h"
+#include "iterate.h"
 #include "stop_rule.h"
 #include "streamed_sweep.h"
 

@@ -2,6 +2,8 @@
  * Where there is none its contacts are found first. A guess costs time where it is wrong, never a result. */
 #include <algorithm>
 
+#include "backend_cuda/graph/graph.h"
+#include "backend_cuda/iterate/iterate.h"
 #include "core/solve/plan.h"
 #include "world.h"
 

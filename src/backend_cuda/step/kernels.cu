@@ -1,14 +1,15 @@
-/* The step's own kernels (step/step.h): start, admit, check, finish, commit, edits. */
+/* The step's own kernels (device/step.h): start, admit, check, finish, commit, edits. */
 #include <stddef.h>
 
 #include "backend_cuda/device/double.h"
 
 #include "collision/bounds.h"
 
-#include "core/model/steady.h"
+#include "backend_cuda/device/plan_check.h"
 #include "backend_cuda/iterate/slow.h"
-#include "solution.h"
-#include "plan_check.h"
+#include "backend_cuda/iterate/solution.h"
+#include "core/model/steady.h"
+#include "world.h"
 
 static __device__ __forceinline__ bool finite_numbers(const double *x, int count)
 {

@@ -1,4 +1,8 @@
 /* Whole steps on the device: a step, launch by launch, and the graph that is made of it (step/world.h). */
+#include "backend_cuda/assemble/assemble.h"
+#include "backend_cuda/graph/graph.h"
+#include "backend_cuda/iterate/iterate.h"
+#include "backend_cuda/weight/weight.h"
 #include "collision/collision.h"
 #include "core/solve/stages.h"
 #include "world.h"

@@ -1,6 +1,6 @@
 /* What a step gives back, in raw order and double: v and lambda, beta, the moved bodies (Q), contact wrenches (R). */
 #include "backend_cuda/device/double.h"
-#include "solution.h"
+#include "backend_cuda/iterate/solution.h"
 
 /* ---- v and lambda ---------------------------------------------------------------------------------------------- */
 

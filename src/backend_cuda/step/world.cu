@@ -1,6 +1,7 @@
 /* Whole steps on the device: take over a world, let it go; where its arrays are (step/world.h). */
 #include <string.h>
 
+#include "backend_cuda/graph/graph.h"
 #include "collision/collision.h"
 #include "core/base/memory.h"
 #include "world.h"

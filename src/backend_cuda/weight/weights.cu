@@ -12,6 +12,7 @@
 #include "island_sums.h"
 #include "backend_cuda/assemble/side_sums.h"
 #include "weigh.h"
+#include "weight.h"
 
 /* ---- pairs ------------------------------------------------------------------------------------------------------- */
 
@@ -143,7 +144,7 @@ sadmm_status CUDA(enqueue_islands)(struct sadmm_context *c, struct sadmm_error *
     return CUDA(launch)(c, weigh_rows_kernel, "weights of rows", blocks_for(c->view.rows.count), &args, error);
 }
 
-sadmm_status CUDA(enqueue_weights)(struct sadmm_context *c, bool factor, struct sadmm_error *error)
+sadmm_status CUDA(enqueue_loads)(struct sadmm_context *c, struct sadmm_error *error)
 {
     const cuda_args args = {};
     const int64_t blocks =
@@ -151,14 +152,5 @@ sadmm_status CUDA(enqueue_weights)(struct sadmm_context *c, bool factor, struct 
     ++c->refreshes;
     c->exact_since = 0;
     CUDA_TRY(CUDA(launch_of)(c, pairs_kernel, "loads of pairs", blocks, BODY_THREADS, &args, error));
-    CUDA_TRY(CUDA(enqueue_islands)(c, error));
-    return CUDA(enqueue_weighted_penalties)(c, false, factor, false, error);
-}
-
-/* ---- entries ----------------------------------------------------------------------------------------------------- */
-
-extern "C" sadmm_status CUDA(update_weights)(struct sadmm_context *c, struct sadmm_error *error)
-{
-    CUDA_ENTER(c);
-    return CUDA(enqueue_weights)(c, false, error);
+    return CUDA(enqueue_islands)(c, error);
 }

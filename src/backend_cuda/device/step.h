@@ -26,12 +26,12 @@
  * in device memory, so that a change of them is an edit like others: nothing is recorded again or waited for. Reports
  * and edits travel through pinned memory, a ring of STEPS_AHEAD, written and read by the device itself.
  */
-#ifndef SADMM_CUDA_STEP_STEP_H
-#define SADMM_CUDA_STEP_STEP_H
+#ifndef SADMM_CUDA_DEVICE_STEP_H
+#define SADMM_CUDA_DEVICE_STEP_H
 
 #include "core/solve/resident.h"
-#include "backend_cuda/collide/pipeline.h"
-#include "backend_cuda/graph/layout.h"
+#include "found.h"
+#include "layout.h"
 
 enum { STEPS_AHEAD = 4 };
 

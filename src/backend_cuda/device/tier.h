@@ -1,6 +1,6 @@
 /* How the CUDA backend's fused entry runs (device/view.h), and how tests choose it. */
-#ifndef SADMM_CUDA_GRAPH_TIER_H
-#define SADMM_CUDA_GRAPH_TIER_H
+#ifndef SADMM_CUDA_DEVICE_TIER_H
+#define SADMM_CUDA_DEVICE_TIER_H
 
 #include "core/solve/kernels.h"
 

@@ -15,8 +15,8 @@
  *   CLUSTER  so for clusters of blocks, whose slots are shared out among their blocks as in GRID
  * A part may be empty.
  */
-#ifndef SADMM_CUDA_GRAPH_LAYOUT_H
-#define SADMM_CUDA_GRAPH_LAYOUT_H
+#ifndef SADMM_CUDA_DEVICE_LAYOUT_H
+#define SADMM_CUDA_DEVICE_LAYOUT_H
 
 #include <stdalign.h>
 #include <stdbool.h>
@@ -24,6 +24,10 @@
 #include <stdint.h>
 
 #include "tier.h"
+
+struct sadmm_contact_pair;
+struct sadmm_contact_point;
+struct sadmm_row_constraint;
 
 enum cuda_abort { ABORT_NONE = 0, ABORT_CAPACITY, ABORT_PARTITION, ABORT_PLAN, ABORT_NON_FINITE };
 
@@ -60,6 +64,35 @@ struct cuda_partition {
     int32_t most_sides, most_bodies; /* a part may have; a part with more sets live->abort_code = ABORT_PARTITION */
     size_t shared;           /* bytes a block, for most_sides and most_bodies */
     bool islands;            /* slots by island in GRID and STREAM too */
+};
+
+/* What the arrays hold, so that a scene whose pairs are still the same keeps them (one_block). */
+struct layout_kept {
+    int32_t valid, pairs;
+    struct cuda_partition partition;
+};
+
+/* Device memory. A side that is none (no pair, a static side) has body and slot `bodies`. */
+struct layout_view {
+    struct cuda_live *live;
+    struct cuda_graph_statistics *statistics;
+    const struct sadmm_contact_pair *pairs;
+    const struct sadmm_contact_point *points;
+    const struct sadmm_row_constraint *constraints; /* given by rows */
+    int32_t bodies, pair_capacity, rows; /* as in cuda_view */
+    int32_t warm_start;
+    int32_t most_blocks; /* that run at once */
+
+    int32_t *label, *degree;                 /* by raw body; label: its island's smallest body */
+    int32_t *island_bodies, *island_sides;  /* by label */
+    int32_t *side_body, *side_slot, *sorted; /* 2 (pair_capacity + rows): raw body, slot, slots sorted */
+    int32_t *sorted_label;                   /* bodies */
+    const int32_t *numbers;                  /* 0, 1, ...: at least as many as sides or bodies */
+    void *temp;                              /* of the sorts */
+    size_t temp_bytes;
+
+    int32_t *body_of, *slot_of, *offsets, *incident, *parts;
+    struct layout_kept *kept;
 };
 
 /* A layout brought to the host, for tests; arrays of the caller, with room for bodies, bodies, bodies + 1, two a

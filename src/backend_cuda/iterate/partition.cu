@@ -19,7 +19,7 @@
  */
 #include <limits.h>
 
-#include "backend_cuda/device/context.h"
+#include "iterate.h"
 
 enum {
     QUAD = 4,          /* threads a side */

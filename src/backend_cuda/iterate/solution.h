@@ -1,6 +1,6 @@
 /* What a body or a pair gives back, in double. */
-#ifndef SADMM_CUDA_STEP_SOLUTION_H
-#define SADMM_CUDA_STEP_SOLUTION_H
+#ifndef SADMM_CUDA_ITERATE_SOLUTION_H
+#define SADMM_CUDA_ITERATE_SOLUTION_H
 
 #include "backend_cuda/device/double.h"
 
