@@ -15,20 +15,11 @@ enum {
 };
 
 /* The larger box: this share of the shape's radius on every side, and the way it goes in some steps, up to its radius.
- * Larger: fewer updates, more pairs to look at. */
-#define ROOM 0.1
+ * Larger: fewer updates, more pairs to test. */
+#define ENLARGED_BY 0.1
 #define STEPS_AHEAD 4
 /* Ask the broad phase for single shapes up to one in so many: a query costs as much as some ten of a sweep over all. */
-enum { FEW = 8 };
-
-bool sadmm_pair_list_add(struct sadmm_pair_list *list, uint32_t a, uint32_t b)
-{
-    if (list->count == list->capacity &&
-        !sadmm_grow((void **)&list->keys, &list->capacity, list->count, list->count + 1, sizeof *list->keys))
-        return false;
-    list->keys[list->count++] = unordered_key(a, b);
-    return true;
-}
+enum { ONE_BY_ONE = 8 };
 
 sadmm_status sadmm_candidates_init(struct sadmm_candidates *c, const struct sadmm_broad_phase_kind *kind,
                                    struct sadmm_error *error)
@@ -60,7 +51,7 @@ static bool grow(void *array, size_t *capacity, size_t used, size_t needed, size
     return sadmm_grow((void **)array, capacity, used, needed, size);
 }
 
-static bool make_room(struct sadmm_candidates *c, size_t slots)
+static bool reserve_slots(struct sadmm_candidates *c, size_t slots)
 {
     /* entries and seen remember the last step */
     return grow(&c->proxies, &c->proxy_capacity, 0, slots, sizeof *c->proxies) &&
@@ -85,8 +76,8 @@ static void enlarge(const struct sadmm_box3 *box, const struct sadmm_proxy *p, d
     double radius = p->system_body >= 0 ? geometry_radius(&p->geometry) : 0;
     for (int k = 0; k < 3; ++k) {
         double way = fmin(fmax(STEPS_AHEAD * dt * p->velocity[k], -radius), radius);
-        larger->lo[k] = box->lo[k] - ROOM * radius + fmin(way, 0.0);
-        larger->hi[k] = box->hi[k] + ROOM * radius + fmax(way, 0.0);
+        larger->lo[k] = box->lo[k] - ENLARGED_BY * radius + fmin(way, 0.0);
+        larger->hi[k] = box->hi[k] + ENLARGED_BY * radius + fmax(way, 0.0);
     }
 }
 
@@ -273,12 +264,12 @@ static bool merge_found(struct sadmm_candidates *c)
     return true;
 }
 
-static sadmm_status refresh_list(struct sadmm_candidates *c, const struct sadmm_collision_input *input, bool few,
+static sadmm_status refresh_list(struct sadmm_candidates *c, const struct sadmm_collision_input *input, bool one_by_one,
                                  struct sadmm_error *error)
 {
     sadmm_status status;
     c->found.count = 0;
-    if (few) {
+    if (one_by_one) {
         status = c->kind->pairs_of(c->broad_phase, c->entries, c->slot_count, c->changed, c->changed_count, &c->found,
                                    error);
     } else {
@@ -287,7 +278,7 @@ static sadmm_status refresh_list(struct sadmm_candidates *c, const struct sadmm_
         if (c->plane_count > 0) list_movers(c);
     }
     if (status != SADMM_OK) return status;
-    if (!plane_pairs(c, input, few) || !finish_found(c, input) || !merge_found(c))
+    if (!plane_pairs(c, input, one_by_one) || !finish_found(c, input) || !merge_found(c))
         return sadmm_fail_memory(error, "candidate pairs");
     return SADMM_OK;
 }
@@ -300,10 +291,10 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
     const double gravity_fall = fall_of(input->gravity, input->dt);
     /* Planes have no box that could leave a larger one: what they reach must not grow unnoticed. */
     bool renew = !c->broad_phase_valid || !(c->margin == input->margin) || gravity_fall > c->gravity_fall;
-    bool few, plane_changed = false;
+    bool one_by_one, plane_changed = false;
     sadmm_status status;
 
-    if (!make_room(c, slots)) return sadmm_fail_memory(error, "collision shapes");
+    if (!reserve_slots(c, slots)) return sadmm_fail_memory(error, "collision shapes");
     if (slots > c->slot_count) {
         memset(c->entries + c->slot_count, 0, (slots - c->slot_count) * sizeof *c->entries);
         memset(c->seen + c->slot_count, 0, (slots - c->slot_count) * sizeof *c->seen);
@@ -330,14 +321,14 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
     }
     if (c->changed_count == 0 && c->list_valid && !renew) return SADMM_OK;
 
-    few = c->list_valid && !renew && !plane_changed && c->kind->pairs_of && c->changed_count * FEW < present;
+    one_by_one = c->list_valid && !renew && !plane_changed && c->kind->pairs_of && c->changed_count * ONE_BY_ONE < present;
     c->broad_phase_valid = c->list_valid = false;
     c->margin = input->margin;
     if (renew) c->gravity_fall = gravity_fall;
     status = c->kind->update(c->broad_phase, c->entries, slots, c->changed, c->changed_count, error);
     if (status != SADMM_OK) return status;
     c->broad_phase_valid = true;
-    status = refresh_list(c, input, few, error);
+    status = refresh_list(c, input, one_by_one, error);
     c->list_valid = status == SADMM_OK;
     return status;
 }

@@ -1,13 +1,12 @@
 /* The pipeline of a step: candidates, narrow phase, and the swap of contact sets.
  *
  * The new set is written beside the old one and the two are exchanged at the end, so a failure changes nothing and a
- * step that fails later can be undone. Threads take consecutive stretches of the sorted candidates and write to sets of
+ * step that fails later can be undone. Threads take consecutive shares of the sorted candidates and write to sets of
  * their own, which are put together in order: the result does not depend on their number.
  */
 #include "collision.h"
 
 #include <stdatomic.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "core/base/memory.h"
@@ -59,19 +58,6 @@ void sadmm_collision_destroy(struct sadmm_collision *collision)
     for (size_t i = 0; i < collision->part_count; ++i) sadmm_contact_set_free(&collision->parts[i]);
     sadmm_free(collision->parts);
     sadmm_free(collision);
-}
-
-sadmm_status sadmm_collision_check_shape(const struct sadmm_collision_input *input, size_t slot,
-                                         struct sadmm_error *error)
-{
-    const struct sadmm_shape *shape = &input->shapes[slot];
-    char name[40];
-    if (shape->geometry >= input->geometry_count)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "shapes[%zu].geometry = %u: must be in [0, %zu)", slot,
-                          shape->geometry, input->geometry_count);
-    snprintf(name, sizeof name, "shapes[%zu]: ", slot);
-    return sadmm_geometry_check(&input->geometries[shape->geometry], input->bodies[shape->body].system_body >= 0, name,
-                                error);
 }
 
 static int thread_count(const struct sadmm_collision_input *input, size_t pairs)
