@@ -62,11 +62,21 @@ static int run_command(int argc, char **argv)
 int main(int argc, char **argv)
 {
     outputs_begin("subadmm-bench");
-    interrupts_expect(); /* all of them look */
+    interrupts_expect(); /* every command checks for them */
     interrupts_begin();
     int code = outputs_end(run_command(argc, argv));
     if (interrupted()) fprintf(stderr, "subadmm-bench: interrupted\n");
     return interrupted_status(code);
+}
+
+void bench_write_csv_text(FILE *out, const char *text)
+{
+    putc('"', out);
+    for (; *text; ++text) {
+        if (*text == '"') putc('"', out);
+        putc(*text == '\n' ? ' ' : *text, out);
+    }
+    putc('"', out);
 }
 
 int bench_compare_doubles(const void *a, const void *b)

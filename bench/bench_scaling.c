@@ -49,22 +49,6 @@ struct sinks {
     FILE *csv;
 };
 
-static const char *backend_name(sadmm_backend backend)
-{
-    sadmm_backend_info info;
-    return sadmm_backend_query(backend, &info) == SADMM_OK ? info.name : "?";
-}
-
-static void write_text(FILE *out, const char *text)
-{
-    putc('"', out);
-    for (; *text; ++text) {
-        if (*text == '"') putc('"', out);
-        putc(*text == '\n' ? ' ' : *text, out);
-    }
-    putc('"', out);
-}
-
 static void write_header(const struct sinks *out, const struct options *o)
 {
     if (out->csv)
@@ -86,8 +70,8 @@ static void write_csv(FILE *out, const struct row *row)
 {
     const struct scene_timing *t = &row->timing;
     const struct series *s = row->series;
-    fprintf(out, "%s,%s,%d,%s,", row->scene, backend_name(s->backend), s->threads, bench_precision_name(s->precision));
-    write_text(out, s->runs_on);
+    fprintf(out, "%s,%s,%d,%s,", row->scene, bench_word_of(bench_backends, (int)s->backend), s->threads, bench_precision_name(s->precision));
+    bench_write_csv_text(out, s->runs_on);
     if (t->steps > 0)
         fprintf(out, ",%d,%d,%d,%d,%d,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g", t->last.bodies, t->last.contacts, t->last.pairs,
                 t->last.iterations, t->steps, t->ms.collide, t->ms.assemble, t->ms.solve, t->ms.finish, t->solver_ms,
@@ -98,7 +82,7 @@ static void write_csv(FILE *out, const struct row *row)
     if (t->steps > 0) fprintf(out, ",%" PRId64 ",%016" PRIx64, t->last.step, t->state_hash);
     else fputs(",,", out);
     fprintf(out, ",%s,", sadmm_build_commit());
-    write_text(out, row->status);
+    bench_write_csv_text(out, row->status);
     putc('\n', out);
 }
 
@@ -111,7 +95,7 @@ static void write_row(const struct sinks *out, const struct row *row)
         fflush(out->csv); /* for who watches */
     }
     if (!out->table) return;
-    fprintf(out->table, "%-24s %-5s %4d %-4s ", row->scene, backend_name(s->backend), s->threads,
+    fprintf(out->table, "%-24s %-5s %4d %-4s ", row->scene, bench_word_of(bench_backends, (int)s->backend), s->threads,
             bench_precision_name(s->precision));
     if (t->steps > 0) {
         fprintf(out->table, "%9d %5d %9.3f %9.3f %9.3f %9.3f %9.3f %9.3f %5d ", t->last.contacts, t->last.iterations,

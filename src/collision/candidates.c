@@ -46,22 +46,17 @@ void sadmm_candidates_free(struct sadmm_candidates *c)
     memset(c, 0, sizeof *c);
 }
 
-static bool grow(void *array, size_t *capacity, size_t used, size_t needed, size_t size)
-{
-    return sadmm_grow((void **)array, capacity, used, needed, size);
-}
-
 static bool reserve_slots(struct sadmm_candidates *c, size_t slots)
 {
     /* entries and seen remember the last step */
-    return grow(&c->proxies, &c->proxy_capacity, 0, slots, sizeof *c->proxies) &&
-           grow(&c->boxes, &c->box_capacity, 0, slots, sizeof *c->boxes) &&
-           grow(&c->entries, &c->entry_capacity, c->slot_count, slots, sizeof *c->entries) &&
-           grow(&c->seen, &c->seen_capacity, c->slot_count, slots, sizeof *c->seen) &&
-           grow(&c->state, &c->state_capacity, 0, slots, sizeof *c->state) &&
-           grow(&c->changed, &c->changed_capacity, 0, slots, sizeof *c->changed) &&
-           grow(&c->movers, &c->mover_capacity, 0, 2 * slots, sizeof *c->movers) &&
-           grow(&c->planes, &c->plane_capacity, 0, slots, sizeof *c->planes);
+    return sadmm_grow(&c->proxies, &c->proxy_capacity, 0, slots, sizeof *c->proxies) &&
+           sadmm_grow(&c->boxes, &c->box_capacity, 0, slots, sizeof *c->boxes) &&
+           sadmm_grow(&c->entries, &c->entry_capacity, c->slot_count, slots, sizeof *c->entries) &&
+           sadmm_grow(&c->seen, &c->seen_capacity, c->slot_count, slots, sizeof *c->seen) &&
+           sadmm_grow(&c->state, &c->state_capacity, 0, slots, sizeof *c->state) &&
+           sadmm_grow(&c->changed, &c->changed_capacity, 0, slots, sizeof *c->changed) &&
+           sadmm_grow(&c->movers, &c->mover_capacity, 0, 2 * slots, sizeof *c->movers) &&
+           sadmm_grow(&c->planes, &c->plane_capacity, 0, slots, sizeof *c->planes);
 }
 
 static bool contains(const struct sadmm_box3 *outer, const struct sadmm_box3 *inner)
@@ -173,7 +168,7 @@ static bool sort_pairs(struct sadmm_pair_list *list, struct sadmm_pair_list *scr
 {
     int bits = bits_of(slots);
     uint64_t mask = (UINT64_C(1) << bits) - 1;
-    if (!grow(&scratch->keys, &scratch->capacity, 0, list->count, sizeof *scratch->keys)) return false;
+    if (!sadmm_grow(&scratch->keys, &scratch->capacity, 0, list->count, sizeof *scratch->keys)) return false;
     for (size_t i = 0; i < list->count; ++i)
         list->keys[i] = (list->keys[i] >> 32) << bits | (list->keys[i] & UINT32_MAX);
     sadmm_radix_sort(list->keys, scratch->keys, list->count, 2 * bits);
@@ -248,7 +243,7 @@ static bool merge_found(struct sadmm_candidates *c)
 {
     size_t i = 0, j = 0, n = 0;
     struct sadmm_pair_list swap;
-    if (!grow(&c->merged.keys, &c->merged.capacity, 0, c->list.count + c->found.count, sizeof *c->merged.keys))
+    if (!sadmm_grow(&c->merged.keys, &c->merged.capacity, 0, c->list.count + c->found.count, sizeof *c->merged.keys))
         return false;
     for (; i < c->list.count; ++i) {
         uint64_t key = c->list.keys[i];

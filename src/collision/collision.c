@@ -69,7 +69,7 @@ static int thread_count(const struct sadmm_collision_input *input, size_t pairs)
 static bool reserve_parts(struct sadmm_collision *collision, size_t count)
 {
     if (count <= collision->part_count) return true;
-    if (!sadmm_grow((void **)&collision->parts, &collision->part_capacity, collision->part_count, count,
+    if (!sadmm_grow(&collision->parts, &collision->part_capacity, collision->part_count, count,
                     sizeof *collision->parts))
         return false;
     memset(collision->parts + collision->part_count, 0, (count - collision->part_count) * sizeof *collision->parts);
@@ -117,8 +117,8 @@ static bool append_parts(struct sadmm_contact_set *set, struct sadmm_team *team,
         pairs += parts[t].pair_count;
         points += parts[t].point_count;
     }
-    if (!sadmm_grow((void **)&set->pairs, &set->pair_capacity, set->pair_count, pairs, sizeof *set->pairs) ||
-        !sadmm_grow((void **)&set->points, &set->point_capacity, set->point_count, points, sizeof *set->points))
+    if (!sadmm_grow(&set->pairs, &set->pair_capacity, set->pair_count, pairs, sizeof *set->pairs) ||
+        !sadmm_grow(&set->points, &set->point_capacity, set->point_count, points, sizeof *set->points))
         return false;
     struct appending appending = {set, parts, count};
     sadmm_parallel(team, (int)count + 1, append_share, &appending);

@@ -10,9 +10,9 @@
 bool sadmm_triplets_add(struct sadmm_triplets *m, int32_t row, int32_t column, double value)
 {
     size_t used = m->count, needed = used + 1;
-    if (!sadmm_grow((void **)&m->row, &m->capacity[0], used, needed, sizeof *m->row) ||
-        !sadmm_grow((void **)&m->column, &m->capacity[1], used, needed, sizeof *m->column) ||
-        !sadmm_grow((void **)&m->value, &m->capacity[2], used, needed, sizeof *m->value))
+    if (!sadmm_grow(&m->row, &m->capacity[0], used, needed, sizeof *m->row) ||
+        !sadmm_grow(&m->column, &m->capacity[1], used, needed, sizeof *m->column) ||
+        !sadmm_grow(&m->value, &m->capacity[2], used, needed, sizeof *m->value))
         return false;
     m->row[used] = row;
     m->column[used] = column;

@@ -90,15 +90,15 @@ extern "C" sadmm_status CUDA(assemble_bodies)(struct sadmm_context *c, struct sa
     CUDA_ENTER(c);
     if (c->plan.rigid) {
         at = n * sizeof *system->rigid;
-        CUDA_TRY(CUDA(upload)(c, (void *)v->raw.system.rigid, PINNED_BODIES, 0, system->rigid, at, error));
+        TRY(CUDA(upload)(c, (void *)v->raw.system.rigid, PINNED_BODIES, 0, system->rigid, at, error));
     } else {
         size_t bytes = 36 * n * sizeof(double);
-        CUDA_TRY(CUDA(upload)(c, (void *)v->raw.system.A, PINNED_BODIES, 0, system->A, bytes, error));
-        CUDA_TRY(
+        TRY(CUDA(upload)(c, (void *)v->raw.system.A, PINNED_BODIES, 0, system->A, bytes, error));
+        TRY(
             CUDA(upload)(c, (void *)v->raw.system.b, PINNED_BODIES, bytes, system->b, 6 * n * sizeof(double), error));
         at = 42 * n * sizeof(double);
     }
-    CUDA_TRY(
+    TRY(
         CUDA(upload)(c, v->raw.system.velocity, PINNED_BODIES, at, system->velocity, 6 * n * sizeof(double), error));
     return launch_bodies(c, error);
 }

@@ -134,9 +134,9 @@ extern "C" sadmm_status COLLISION(download)(struct sadmm_cuda_collision *c, void
     TRY(copy(c, in<void>(c, PINNED_PAIRS), from.pairs, pairs * sizeof *contacts->pairs, false, error));
     TRY(copy(c, in<void>(c, PINNED_POINTS), from.points, points * sizeof *contacts->points, false, error));
     TRY(wait(c, error));
-    if (!sadmm_grow((void **)&contacts->pairs, &contacts->pair_capacity, contacts->pair_count, pairs,
+    if (!sadmm_grow(&contacts->pairs, &contacts->pair_capacity, contacts->pair_count, pairs,
                     sizeof *contacts->pairs) ||
-        !sadmm_grow((void **)&contacts->points, &contacts->point_capacity, contacts->point_count, points,
+        !sadmm_grow(&contacts->points, &contacts->point_capacity, contacts->point_count, points,
                     sizeof *contacts->points))
         return sadmm_fail_memory(error, "contacts");
     if (pairs > 0) memcpy(contacts->pairs, in<void>(c, PINNED_PAIRS), pairs * sizeof *contacts->pairs);

@@ -6,11 +6,11 @@ static sadmm_status reserve_weights(struct sadmm_context *c, struct sadmm_error 
 {
     cuda_view *v = &c->view;
     const size_t n = (size_t)v->model.bodies, pairs = (size_t)v->contacts.pair_capacity;
-    CUDA_TRY(CUDA(reserve)(c, BUFFER_WEIGHTS,
-                           (n * (PACKED + TERMS + 2) + 2 * pairs) * sizeof(double) + n * sizeof(cuda_island) +
-                               pairs * sizeof(solver_real),
-                           error));
-    CUDA_TRY(
+    TRY(CUDA(reserve)(c, BUFFER_WEIGHTS,
+                      (n * (PACKED + TERMS + 2) + 2 * pairs) * sizeof(double) + n * sizeof(cuda_island) +
+                          pairs * sizeof(solver_real),
+                      error));
+    TRY(
         CUDA(reserve)(c, BUFFER_SIDES, 2 * pairs * (ROW * sizeof(double) + SIDE_NUMBERS * sizeof(solver_real)), error));
     v->bodies.A_inverse = (double *)c->buffers[BUFFER_WEIGHTS].data;
     v->bodies.free_energy = v->bodies.A_inverse + n * PACKED;
@@ -67,7 +67,7 @@ sadmm_status CUDA(reserve_solver)(struct sadmm_context *c, struct sadmm_error *e
         {PINNED_OUT, out},
     };
     const void *const before[] = {c->buffers[BUFFER_ARM].data, c->buffers[BUFFER_LAMBDA].data};
-    CUDA_TRY(reserve_all(c, wanted, error));
+    TRY(reserve_all(c, wanted, error));
 
     /* Lanes without a point read one all the same. */
     for (enum cuda_buffer_name name : {BUFFER_ARM, BUFFER_LAMBDA})

@@ -152,13 +152,13 @@ sadmm_status CUDA(use_settings)(struct sadmm_context *c, const struct sadmm_sett
 {
     double numbers[SADMM_SETTING_NUMBERS];
     const struct cuda_settings kept = {*settings, gravity_size(settings->gravity)};
-    CUDA_TRY(CUDA(reserve)(c, BUFFER_SETTINGS, sizeof kept, error));
-    CUDA_TRY(CUDA(reserve)(c, PINNED_SETTINGS, sizeof kept, error));
+    TRY(CUDA(reserve)(c, BUFFER_SETTINGS, sizeof kept, error));
+    TRY(CUDA(reserve)(c, PINNED_SETTINGS, sizeof kept, error));
     CUDA(plan_settings)(c, settings);
     c->view.model.settings = &((const struct cuda_settings *)c->buffers[BUFFER_SETTINGS].data)->settings;
     sadmm_settings_numbers(settings, numbers);
     if (memcmp(c->numbers, numbers, sizeof numbers) == 0) return SADMM_OK;
-    CUDA_TRY(CUDA(upload)(c, c->buffers[BUFFER_SETTINGS].data, PINNED_SETTINGS, 0, &kept, sizeof kept, error));
+    TRY(CUDA(upload)(c, c->buffers[BUFFER_SETTINGS].data, PINNED_SETTINGS, 0, &kept, sizeof kept, error));
     memcpy(c->numbers, numbers, sizeof numbers);
     return SADMM_OK;
 }

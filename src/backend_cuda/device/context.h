@@ -134,11 +134,6 @@ struct device_scope {
 /* This precision's data for the view's counts and the partition (allocates). */
 sadmm_status CUDA(reserve_solver)(struct sadmm_context *, struct sadmm_error *error);
 
-#define CUDA_TRY(call)                                  \
-    do {                                                \
-        sadmm_status try_status = (call);               \
-        if (try_status != SADMM_OK) return try_status;  \
-    } while (0)
 #define CUDA_CALL(c, call, name)                                                \
     do {                                                                        \
         cudaError_t try_code = (call);                                          \
@@ -154,7 +149,7 @@ template <size_t N>
 static inline sadmm_status reserve_all(struct sadmm_context *c, const cuda_capacity (&wanted)[N],
                                        struct sadmm_error *error)
 {
-    for (const cuda_capacity &one : wanted) CUDA_TRY(CUDA(reserve)(c, one.name, one.bytes, error));
+    for (const cuda_capacity &one : wanted) TRY(CUDA(reserve)(c, one.name, one.bytes, error));
     return SADMM_OK;
 }
 

@@ -64,7 +64,7 @@ static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const ch
 
 sadmm_status CUDA(enqueue_limit)(struct sadmm_context *c, bool suspected, struct sadmm_error *error)
 {
-    if (!suspected) CUDA_TRY(launch(c, suspect_kernel, "energies", error));
+    if (!suspected) TRY(launch(c, suspect_kernel, "energies", error));
     return launch(c, limit_kernel, "limit", error);
 }
 
@@ -74,9 +74,9 @@ extern "C" sadmm_status CUDA(limit_velocity)(struct sadmm_context *c, int32_t *l
 {
     cuda_args args = {};
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(enqueue_limit)(c, false, error));
-    CUDA_TRY(CUDA(launch)(c, slow_kernel, "limit_velocity", blocks_for(c->view.model.bodies), &args, error));
-    CUDA_TRY(CUDA(download)(c, c->view.islands.limited, sizeof *limited, error));
+    TRY(CUDA(enqueue_limit)(c, false, error));
+    TRY(CUDA(launch)(c, slow_kernel, "limit_velocity", blocks_for(c->view.model.bodies), &args, error));
+    TRY(CUDA(download)(c, c->view.islands.limited, sizeof *limited, error));
     memcpy(limited, c->buffers[PINNED_OUT].data, sizeof *limited);
     if (*limited > 0) c->exact_since = RELAX_RESIDUAL_PERIOD; /* residuals are recomputed, should anything follow */
     return SADMM_OK;

@@ -144,8 +144,8 @@ sadmm_status CUDA(enqueue_convergence_check)(struct sadmm_context *c, int done, 
 extern "C" sadmm_status CUDA(look)(struct sadmm_context *c, int done, int32_t *unmet, struct sadmm_error *error)
 {
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(enqueue_convergence_check)(c, done, error));
-    CUDA_TRY(CUDA(download)(c, &c->view.islands.stop->unmet[c->checks % CHECKS_KEPT], sizeof *unmet, error));
+    TRY(CUDA(enqueue_convergence_check)(c, done, error));
+    TRY(CUDA(download)(c, &c->view.islands.stop->unmet[c->checks % CHECKS_KEPT], sizeof *unmet, error));
     memcpy(unmet, c->buffers[PINNED_OUT].data, sizeof *unmet);
     return SADMM_OK;
 }

@@ -226,7 +226,7 @@ static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, in
     cuda_kernel kernel = c->view.contacts.lanes == 1      ? sweep_kernel<1, 1>(measure, c->fast)
                          : c->statistics.point_slots <= 4 ? sweep_kernel<4, 1>(measure, c->fast)
                                                           : sweep_kernel<4, 2>(measure, c->fast);
-    CUDA_TRY(CUDA(launch)(c, kernel, "update_constraints", pair_blocks(&c->view), &args, error));
+    TRY(CUDA(launch)(c, kernel, "update_constraints", pair_blocks(&c->view), &args, error));
     kernel = measure ? (c->fast ? rows_kernel<true, true> : rows_kernel<true, false>)
                      : (c->fast ? rows_kernel<false, true> : rows_kernel<false, false>);
     return CUDA(launch)(c, kernel, "update_constraints (rows)", blocks_for(c->view.rows.count), &args, error);
@@ -246,13 +246,13 @@ static sadmm_status prepare_stepwise(struct sadmm_context *c, struct sadmm_error
     const cuda_view *v = &c->view;
     cuda_args args = {};
     if (!c->placed)
-        CUDA_TRY(CUDA(launch)(c, place_kernel, "place_records",
-                              blocks_for(2 * ((int64_t)v->contacts.pair_capacity + v->rows.count)), &args, error));
+        TRY(CUDA(launch)(c, place_kernel, "place_records",
+                         blocks_for(2 * ((int64_t)v->contacts.pair_capacity + v->rows.count)), &args, error));
     c->placed = true;
     if (!c->starting) return SADMM_OK;
     c->starting = false;
-    CUDA_TRY(CUDA(launch)(c, v->contacts.lanes == 1 ? start_kernel<1> : start_kernel<4>, "start_records",
-                          pair_blocks(v), &args, error));
+    TRY(CUDA(launch)(c, v->contacts.lanes == 1 ? start_kernel<1> : start_kernel<4>, "start_records",
+                     pair_blocks(v), &args, error));
     return CUDA(launch)(c, start_rows_kernel, "start_records (rows)", blocks_for(v->rows.count), &args, error);
 }
 
@@ -264,10 +264,10 @@ static sadmm_status refuse_fast(const struct sadmm_context *c, struct sadmm_erro
 
 extern "C" sadmm_status CUDA(update_velocity)(struct sadmm_context *c, struct sadmm_error *error)
 {
-    CUDA_TRY(refuse_fast(c, error));
+    TRY(refuse_fast(c, error));
     CUDA_ENTER(c);
-    CUDA_TRY(prepare_stepwise(c, error));
-    CUDA_TRY(launch_bodies(c, c->measured, 0, error));
+    TRY(prepare_stepwise(c, error));
+    TRY(launch_bodies(c, c->measured, 0, error));
     c->measured = false;
     c->rescaled = false;
     return SADMM_OK;
@@ -275,11 +275,11 @@ extern "C" sadmm_status CUDA(update_velocity)(struct sadmm_context *c, struct sa
 
 extern "C" sadmm_status CUDA(update_constraints)(struct sadmm_context *c, bool measure, struct sadmm_error *error)
 {
-    CUDA_TRY(refuse_fast(c, error));
+    TRY(refuse_fast(c, error));
     CUDA_ENTER(c);
-    CUDA_TRY(prepare_stepwise(c, error));
-    CUDA_TRY(CUDA(clear_primal)(c, measure, error));
-    CUDA_TRY(launch_constraints(c, measure, 0, error));
+    TRY(prepare_stepwise(c, error));
+    TRY(CUDA(clear_primal)(c, measure, error));
+    TRY(launch_constraints(c, measure, 0, error));
     c->measured = measure;
     return SADMM_OK;
 }
@@ -290,8 +290,8 @@ extern "C" sadmm_status CUDA(update_constraints)(struct sadmm_context *c, bool m
 static sadmm_status fast_iteration(struct sadmm_context *c, int i, int count, bool measure, struct sadmm_error *error)
 {
     const int multipliers = relax_constraints(i, count) ? RELAX_MULTIPLIERS : 0;
-    CUDA_TRY(launch_constraints(c, measure, multipliers, error));
-    CUDA_TRY(launch_bodies(c, false, multipliers | (relax_velocity(i, count, c->settled) ? RELAX_VELOCITY : 0), error));
+    TRY(launch_constraints(c, measure, multipliers, error));
+    TRY(launch_bodies(c, false, multipliers | (relax_velocity(i, count, c->settled) ? RELAX_VELOCITY : 0), error));
     c->settled = true;
     return SADMM_OK;
 }
@@ -301,11 +301,11 @@ static sadmm_status plain_iterations(struct sadmm_context *c, int count, struct 
 {
     for (int i = 0; i < count; ++i) {
         if (c->fast) {
-            CUDA_TRY(fast_iteration(c, i, count + 1, false, error));
+            TRY(fast_iteration(c, i, count + 1, false, error));
             continue;
         }
-        CUDA_TRY(launch_bodies(c, false, 0, error));
-        CUDA_TRY(launch_constraints(c, false, 0, error));
+        TRY(launch_bodies(c, false, 0, error));
+        TRY(launch_constraints(c, false, 0, error));
     }
     return SADMM_OK;
 }
@@ -342,25 +342,25 @@ static sadmm_status make_graph(struct sadmm_context *c, struct sadmm_error *erro
 sadmm_status CUDA(stream_iterations)(struct sadmm_context *c, int count, bool measure, bool goes_on,
                                      struct sadmm_error *error)
 {
-    CUDA_TRY(prepare_stepwise(c, error));
+    TRY(prepare_stepwise(c, error));
     if (c->measured) {
-        CUDA_TRY(launch_bodies(c, true, 0, error));
-        CUDA_TRY(launch_constraints(c, measure && count == 1, 0, error));
+        TRY(launch_bodies(c, true, 0, error));
+        TRY(launch_constraints(c, measure && count == 1, 0, error));
         --count;
     }
     if (c->fast && !c->settled && (count > 1 || goes_on)) {
-        CUDA_TRY(fast_iteration(c, 0, 2, false, error));
+        TRY(fast_iteration(c, 0, 2, false, error));
         --count;
     }
     int plain = (measure || (c->fast && !goes_on)) && count > 0 ? count - 1 : count;
-    if (plain >= GRAPH_ITERATIONS && !c->recording && !c->graph_valid) CUDA_TRY(make_graph(c, error));
+    if (plain >= GRAPH_ITERATIONS && !c->recording && !c->graph_valid) TRY(make_graph(c, error));
     for (; plain >= GRAPH_ITERATIONS && !c->recording; plain -= GRAPH_ITERATIONS, count -= GRAPH_ITERATIONS)
         CUDA_CALL(c, cudaGraphLaunch(c->graph, c->stream), "cudaGraphLaunch");
-    CUDA_TRY(plain_iterations(c, plain, error));
+    TRY(plain_iterations(c, plain, error));
     if (count > plain && c->fast) return fast_iteration(c, 0, 1, measure, error);
     if (count > plain) {
-        CUDA_TRY(launch_bodies(c, false, 0, error));
-        CUDA_TRY(launch_constraints(c, true, 0, error));
+        TRY(launch_bodies(c, false, 0, error));
+        TRY(launch_constraints(c, true, 0, error));
     }
     return SADMM_OK;
 }

@@ -9,8 +9,6 @@
 #ifndef SADMM_CUDA_STEP_WORLD_H
 #define SADMM_CUDA_STEP_WORLD_H
 
-#include <algorithm>
-
 #include "backend_cuda/collide/pipeline.h"
 #include "backend_cuda/device/context.h"
 #include "core/model/settings.h"
@@ -55,10 +53,6 @@ static inline struct cuda_step_report *step_reports(const struct sadmm_context *
 {
     return buffer<struct cuda_step_report>(c, PINNED_REPORTS);
 }
-
-/* Capacities: more than there was, so that not every new contact repeats a step: half as much again in small scenes,
- * where a heap that spreads gains a third, an eighth in large ones, where it costs memory. */
-static inline int64_t generous(int64_t count) { return count + std::min(count / 2, count / 8 + 8192) + 256; }
 
 /* Is there a stop rule to check? Then residuals say nothing: islands end at different times. */
 static inline bool stop_rule_checked(const struct sadmm_context *c)

@@ -22,7 +22,7 @@ static sadmm_status reserve_raw(struct sadmm_context *c, struct sadmm_error *err
         {BUFFER_RAW_ROWS, row_bytes}, {PINNED_BODIES, bodies},   {PINNED_PAIRS, pairs},
         {PINNED_POINTS, points},     {PINNED_ROWS, row_bytes},
     };
-    CUDA_TRY(reserve_all(c, wanted, error));
+    TRY(reserve_all(c, wanted, error));
     void *const none = nullptr;
     cuda_buffer *b = c->buffers;
     v->raw.system = *c->system;
@@ -58,10 +58,10 @@ static sadmm_status upload_raw(struct sadmm_context *c, struct sadmm_error *erro
     const struct sadmm_system *system = c->system;
     const struct sadmm_contact_set *contacts = system->contacts;
     const cuda_view *v = &c->view;
-    CUDA_TRY(CUDA(upload)(c, (void *)v->raw.pairs, PINNED_PAIRS, 0, contacts->pairs,
-                          contacts->pair_count * sizeof *contacts->pairs, error));
-    CUDA_TRY(CUDA(upload)(c, (void *)v->raw.points, PINNED_POINTS, 0, contacts->points,
-                          contacts->point_count * sizeof *contacts->points, error));
+    TRY(CUDA(upload)(c, (void *)v->raw.pairs, PINNED_PAIRS, 0, contacts->pairs,
+                     contacts->pair_count * sizeof *contacts->pairs, error));
+    TRY(CUDA(upload)(c, (void *)v->raw.points, PINNED_POINTS, 0, contacts->points,
+                     contacts->point_count * sizeof *contacts->points, error));
     return CUDA(upload_rows)(c, error);
 }
 
@@ -70,9 +70,9 @@ static sadmm_status lay_out(struct sadmm_context *c, struct sadmm_error *error)
 {
     struct cuda_partition *partition = &c->partition;
     struct cuda_known known;
-    CUDA_TRY(CUDA(enqueue_layout)(c, partition, error));
+    TRY(CUDA(enqueue_layout)(c, partition, error));
     if (partition->tier == SADMM_CUDA_TIER_STREAM) return SADMM_OK;
-    CUDA_TRY(CUDA(download_known)(c, &known, error));
+    TRY(CUDA(download_known)(c, &known, error));
     c->statistics = known.statistics;
     if (known.live.abort_code == ABORT_NONE) return SADMM_OK;
     if (c->wanted != SADMM_CUDA_TIER_AUTO)
@@ -83,7 +83,7 @@ static sadmm_status lay_out(struct sadmm_context *c, struct sadmm_error *error)
     *partition = {};
     partition->tier = SADMM_CUDA_TIER_STREAM;
     partition->islands = c->fast;
-    CUDA_TRY(CUDA(upload_live)(c, ABORT_NONE, error));
+    TRY(CUDA(upload_live)(c, ABORT_NONE, error));
     return CUDA(enqueue_layout)(c, partition, error);
 }
 
@@ -98,25 +98,25 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
     if (plan->bodies > INT32_MAX / LINE_GENERAL)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d bodies: at most %d", plan->bodies, INT32_MAX / LINE_GENERAL);
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(wait)(c, error)); /* the staging buffers are about to be written */
+    TRY(CUDA(wait)(c, error)); /* the staging buffers are about to be written */
     c->system = system;
     c->plan = *plan;
     c->starting = true;
     c->placed = c->measured = c->rescaled = c->settled = c->prologue = false;
     c->refused = 0;
     c->graph_valid = false;
-    CUDA_TRY(CUDA(use_settings)(c, settings, error));
+    TRY(CUDA(use_settings)(c, settings, error));
     count(c);
-    CUDA_TRY(reserve_raw(c, error));
-    CUDA_TRY(CUDA(reserve_layout)(c, error));
-    CUDA_TRY(upload_raw(c, error));
-    CUDA_TRY(CUDA(upload_live)(c, ABORT_NONE, error));
+    TRY(reserve_raw(c, error));
+    TRY(CUDA(reserve_layout)(c, error));
+    TRY(upload_raw(c, error));
+    TRY(CUDA(upload_live)(c, ABORT_NONE, error));
     bool islands = c->fast || (c->wanted != SADMM_CUDA_TIER_GRID && c->wanted != SADMM_CUDA_TIER_STREAM);
     struct cuda_known known;
-    CUDA_TRY(CUDA(enqueue_statistics)(c, islands, error));
-    CUDA_TRY(CUDA(download_known)(c, &known, error));
+    TRY(CUDA(enqueue_statistics)(c, islands, error));
+    TRY(CUDA(download_known)(c, &known, error));
     c->statistics = known.statistics;
-    CUDA_TRY(CUDA(choose_partition)(c, &c->statistics, &c->partition, error));
-    CUDA_TRY(CUDA(reserve_solver)(c, error));
+    TRY(CUDA(choose_partition)(c, &c->statistics, &c->partition, error));
+    TRY(CUDA(reserve_solver)(c, error));
     return lay_out(c, error);
 }

@@ -146,7 +146,7 @@ extern "C" sadmm_status CUDA(init_penalty)(struct sadmm_context *c, struct sadmm
     c->rescaled = false;
     if (c->fast) {
         CUDA(begin_weights)(c);
-        CUDA_TRY(CUDA(enqueue_islands)(c, error));
+        TRY(CUDA(enqueue_islands)(c, error));
         return enqueue_weighted_penalties(c, true, false, false, error);
     }
     return launch_bodies(c, penalty_kernel<true, false, PLAIN>, "init_penalty", &args, error);
@@ -165,7 +165,7 @@ extern "C" sadmm_status CUDA(update_penalty)(struct sadmm_context *c, double rat
     cuda_args args = {};
     args.factor = ratio;
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(launch)(c, scale_kernel, "update_penalty", blocks_for(c->view.model.bodies), &args, error));
+    TRY(CUDA(launch)(c, scale_kernel, "update_penalty", blocks_for(c->view.model.bodies), &args, error));
     c->rescaled = true;
     return SADMM_OK;
 }
@@ -181,7 +181,7 @@ sadmm_status CUDA(enqueue_penalties)(struct sadmm_context *c, struct sadmm_error
     if (!c->fast) return launch_bodies(c, penalty_kernel<true, true, PLAIN>, "penalties", &args, error);
     CUDA(begin_weights)(c);
     if (c->prologue) return SADMM_OK;
-    CUDA_TRY(CUDA(enqueue_islands)(c, error));
+    TRY(CUDA(enqueue_islands)(c, error));
     return enqueue_weighted_penalties(c, true, true, true, error);
 }
 
@@ -189,14 +189,14 @@ sadmm_status CUDA(enqueue_balance)(struct sadmm_context *c, struct sadmm_error *
 {
     cuda_args args = {};
     args.measure = 1;
-    CUDA_TRY(CUDA(launch)(c, scale_kernel, "update_penalty", blocks_for(c->view.model.bodies), &args, error));
+    TRY(CUDA(launch)(c, scale_kernel, "update_penalty", blocks_for(c->view.model.bodies), &args, error));
     c->rescaled = true;
     return SADMM_OK;
 }
 
 sadmm_status CUDA(enqueue_weights)(struct sadmm_context *c, bool factor, struct sadmm_error *error)
 {
-    CUDA_TRY(CUDA(enqueue_loads)(c, error));
+    TRY(CUDA(enqueue_loads)(c, error));
     return enqueue_weighted_penalties(c, false, factor, false, error);
 }
 

@@ -139,8 +139,8 @@ sadmm_status CUDA(enqueue_islands)(struct sadmm_context *c, struct sadmm_error *
 {
     const cuda_args args = CUDA(weight_args)(c);
     const cuda_kernel kernel = c->refreshes >= WEIGHT_FIRST_SCALE ? terms_kernel<true> : terms_kernel<false>;
-    CUDA_TRY(CUDA(launch_early)(c, kernel, "sums over islands", body_blocks(c->view.model.bodies), BODY_THREADS, &args,
-                                error));
+    TRY(CUDA(launch_early)(c, kernel, "sums over islands", body_blocks(c->view.model.bodies), BODY_THREADS, &args,
+                           error));
     return CUDA(launch)(c, weigh_rows_kernel, "weights of rows", blocks_for(c->view.rows.count), &args, error);
 }
 
@@ -151,6 +151,6 @@ sadmm_status CUDA(enqueue_loads)(struct sadmm_context *c, struct sadmm_error *er
         ((int64_t)c->view.contacts.pair_capacity * c->view.contacts.lanes + BODY_THREADS - 1) / BODY_THREADS;
     ++c->refreshes;
     c->exact_since = 0;
-    CUDA_TRY(CUDA(launch_of)(c, pairs_kernel, "loads of pairs", blocks, BODY_THREADS, &args, error));
+    TRY(CUDA(launch_of)(c, pairs_kernel, "loads of pairs", blocks, BODY_THREADS, &args, error));
     return CUDA(enqueue_islands)(c, error);
 }

@@ -21,13 +21,13 @@ static inline size_t sadmm_grown_capacity(size_t capacity, size_t needed, size_t
     return wanted > least ? wanted : least;
 }
 
-/* Grow *array (elements of `size` bytes) to hold at least `needed`, keeping `used` elements and zeroing the rest; false,
- * with nothing changed, when memory runs out. */
-bool sadmm_grow(void **array, size_t *capacity, size_t used, size_t needed, size_t size);
-/* The same where nothing is kept. `array`: the address of a pointer of any type. */
+/* Grow *array (`array`: the address of a pointer of any type; elements of `size` bytes) to hold at least `needed`, keeping
+ * `used` elements and zeroing the rest; false, with nothing changed, when memory runs out. */
+bool sadmm_grow(void *array, size_t *capacity, size_t used, size_t needed, size_t size);
+/* The same where nothing is kept. */
 static inline bool sadmm_grow_empty(void *array, size_t *capacity, size_t needed, size_t size)
 {
-    return sadmm_grow((void **)array, capacity, 0, needed, size);
+    return sadmm_grow(array, capacity, 0, needed, size);
 }
 
 /* Tests: on this thread, let `successes` allocations pass and fail the following ones; negative: never fail. */

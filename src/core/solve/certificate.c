@@ -214,7 +214,7 @@ static sadmm_status certify(struct sadmm_certificate_workspace *workspace, const
                             struct sadmm_error *error)
 {
     size_t count = (size_t)system->body_count;
-    if (!sadmm_grow((void **)&workspace->values, &workspace->capacity, 0, BODY_SIZE * count, sizeof(double)))
+    if (!sadmm_grow(&workspace->values, &workspace->capacity, 0, BODY_SIZE * count, sizeof(double)))
         return sadmm_fail_memory(error, "the certificate");
     double *bodies = workspace->values;
     double A[36], b[6];
@@ -261,7 +261,7 @@ static sadmm_status certify(struct sadmm_certificate_workspace *workspace, const
         out.siconos = relative(&tally, residual2, keep_max(b2, keep_max(Av2, Jl2))) +
                       relative(&tally, tally.map2, keep_max(tally.u2, tally.r2));
     if (settings && settings->certificate_tolerance > 0) {
-        if (!sadmm_grow((void **)&workspace->labels, &workspace->label_capacity, 0, count, sizeof *workspace->labels))
+        if (!sadmm_grow(&workspace->labels, &workspace->label_capacity, 0, count, sizeof *workspace->labels))
             return sadmm_fail_memory(error, "the certificate");
         sadmm_islands(system, workspace->labels);
         out.islands_above = count_islands_above(bodies, count, workspace->labels, settings, scale);

@@ -117,7 +117,7 @@ static sadmm_status reserve_saved(sadmm_problem *problem, int32_t bodies, size_t
                                   struct sadmm_error *error)
 {
     size_t needed = 6 * (size_t)bodies + 3 * points + rows;
-    if (sadmm_grow((void **)&problem->saved, &problem->saved_capacity, 0, needed, sizeof(double))) return SADMM_OK;
+    if (sadmm_grow(&problem->saved, &problem->saved_capacity, 0, needed, sizeof(double))) return SADMM_OK;
     return sadmm_fail_memory(error, "the problem's saved values");
 }
 

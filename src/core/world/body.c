@@ -137,7 +137,7 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def,
     size_t slot = free_slot(world);
     if (slot >= (size_t)1 << 27)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d bodies: a world holds at most 2^27", world->body_count);
-    if (!sadmm_grow((void **)&world->bodies, &world->body_capacity, world->body_slots, slot + 1, sizeof *world->bodies))
+    if (!sadmm_grow(&world->bodies, &world->body_capacity, world->body_slots, slot + 1, sizeof *world->bodies))
         return sadmm_fail_memory(error, "a body");
     TRY(copy_name(def->name, &name, error));
 

@@ -86,7 +86,7 @@ static void put_edit(struct sadmm_resident_edit *edit, const struct sadmm_world_
 static sadmm_status list_edits(sadmm_world *world, size_t *count)
 {
     *count = 0;
-    if (!sadmm_grow((void **)&world->resident.edits, &world->resident.edit_capacity, 0,
+    if (!sadmm_grow(&world->resident.edits, &world->resident.edit_capacity, 0,
                     SADMM_BODY_EDITS * world->resident.edited_count, sizeof *world->resident.edits))
         return sadmm_fail_memory(&world->error, "changes of bodies");
     for (size_t k = 0; k < world->resident.edited_count; ++k) {
@@ -107,9 +107,9 @@ static sadmm_status load(sadmm_world *world)
     sadmm_status status = sadmm_world_gather(world);
     sadmm_world_swap_starts(world);
     TRY(status);
-    if (!sadmm_grow((void **)&world->resident.steady, &world->resident.steady_capacity, 0, n + 1,
+    if (!sadmm_grow(&world->resident.steady, &world->resident.steady_capacity, 0, n + 1,
                     sizeof *world->resident.steady) ||
-        !sadmm_grow((void **)&world->resident.edited, &world->resident.edited_capacity, 0, n + 1,
+        !sadmm_grow(&world->resident.edited, &world->resident.edited_capacity, 0, n + 1,
                     sizeof *world->resident.edited))
         return sadmm_fail_memory(&world->error, "the step");
     for (size_t i = 0; i < n; ++i) {
@@ -256,9 +256,9 @@ static sadmm_status pull_contacts(sadmm_world *world)
     if (!world->resident.contacts_behind) return SADMM_OK;
     size_t count = (size_t)world->report.contacts, n = (size_t)world->dynamic_count;
     struct sadmm_step_start *start = &world->start;
-    if (!sadmm_grow((void **)&start->rigid, &start->rigid_capacity, 0, n + 1, sizeof *start->rigid) ||
-        !sadmm_grow((void **)&start->velocity, &start->velocity_capacity, 0, 6 * (n + 1), sizeof *start->velocity) ||
-        !sadmm_grow((void **)&start->impulse, &start->impulse_capacity, 0, 3 * count, sizeof *start->impulse))
+    if (!sadmm_grow(&start->rigid, &start->rigid_capacity, 0, n + 1, sizeof *start->rigid) ||
+        !sadmm_grow(&start->velocity, &start->velocity_capacity, 0, 6 * (n + 1), sizeof *start->velocity) ||
+        !sadmm_grow(&start->impulse, &start->impulse_capacity, 0, 3 * count, sizeof *start->impulse))
         return sadmm_fail_memory(&world->error, "the step's starting impulses");
     TRY(backend->read_start(world->context, start->rigid, start->velocity, start->impulse, &world->error));
     TRY(backend->read_bodies(world->context, world->next, NULL, NULL, &world->error));

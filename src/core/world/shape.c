@@ -59,10 +59,10 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
     if ((size_t)world->shape_count < world->shape_slots) slot = sadmm_slot_free(&world->shape_marks, world, alive);
     if (slot >= (size_t)1 << 28)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d shapes: a world holds at most 2^28", world->shape_count);
-    if (!sadmm_grow((void **)&world->shapes, &world->shape_capacity, world->shape_slots, slot + 1, sizeof *world->shapes) ||
-        !sadmm_grow((void **)&world->shape_generations, &world->shape_generation_capacity, world->shape_slots, slot + 1,
+    if (!sadmm_grow(&world->shapes, &world->shape_capacity, world->shape_slots, slot + 1, sizeof *world->shapes) ||
+        !sadmm_grow(&world->shape_generations, &world->shape_generation_capacity, world->shape_slots, slot + 1,
                     sizeof *world->shape_generations) ||
-        !sadmm_grow((void **)&world->geometries, &world->geometry_capacity, world->shape_slots, slot + 1,
+        !sadmm_grow(&world->geometries, &world->geometry_capacity, world->shape_slots, slot + 1,
                     sizeof *world->geometries))
         return sadmm_fail_memory(error, "a shape");
 

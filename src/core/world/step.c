@@ -59,7 +59,7 @@ static sadmm_status keep_start(sadmm_world *world, double *depth)
 {
     const size_t count = world->contacts.point_count;
     struct start_keeping keeping;
-    if (!sadmm_grow((void **)&world->start.impulse, &world->start.impulse_capacity, 0, 3 * count,
+    if (!sadmm_grow(&world->start.impulse, &world->start.impulse_capacity, 0, 3 * count,
                     sizeof *world->start.impulse))
         return sadmm_fail_memory(&world->error, "the step's starting impulses");
     keeping.world = world;
