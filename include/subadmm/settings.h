@@ -77,7 +77,7 @@ typedef struct sadmm_settings {
                                     is <= certificate_momentum_tolerance; 0 = never; default 0 */
     double certificate_momentum_tolerance; /* dimensionless, > 0; default 1e-6. In single precision rounding alone may
                                               be a few 1e-6: ask for 1e-5 there */
-    int check_period;            /* iterations between looks at the stop rule, in [1, 1000000]; default 10 */
+    int check_period;            /* iterations between convergence checks (of the tolerances above), in [1, 1000000]; default 10 */
 
     bool measure_residuals;      /* report the residuals of the last iteration; default false */
     bool certify;                /* report the certificate of every step; default false */

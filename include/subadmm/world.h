@@ -168,7 +168,7 @@ SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_s
  * settings.certify asks for a certificate of numbers whose products overflow; on CUDA that step counts as done.
  *
  * DEVICE: a call of the device failed; any function that waits for steps begun may return it, once. Everything the world had
- * on the device is given up, and the next step begins there anew. Where the device still answers (a call failed, not the
+ * on the device is given up, and the next step loads the world into a new context. Where the device still answers (a call failed, not the
  * device) nothing is lost: the world is as after the last step done. Where it does not, the host's copy counts: bodies as they
  * were when a function that reads states (sadmm_world_body_state, _body_def, _body_contact_wrench, _state_hash) was called
  * last, impulses to start from as when contacts were, and every state and wrench set since; time and sadmm_step_report.step go
@@ -178,7 +178,7 @@ SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_s
 SADMM_API sadmm_status sadmm_world_step(sadmm_world *world);
 
 /* Begin a step and return without waiting for it, where the backend can: CUDA, in the method FAST from the second step on;
- * not with a residual_tolerance, nor with a certificate_tolerance in the method PAPER or with more than 64 looks a step.
+ * not with a residual_tolerance, nor with a certificate_tolerance in the method PAPER or with more than 64 convergence checks a step.
  * Elsewhere the same as sadmm_world_step. Steps run in order, a few of them at a time; states, wrenches and settings set
  * in between take effect at the next one. Getters wait for the steps begun so far.
  * Errors: as sadmm_world_step; they may be those of an earlier step, and then nothing after that step has been done
@@ -205,16 +205,16 @@ typedef struct sadmm_step_report {
     int32_t pairs;                 /* shape pairs with at least one contact */
     int iterations;                /* done; with a stop rule on CUDA (below): by the island that did most */
     double iterations_mean;        /* over islands. The same, but where whole steps are made on CUDA with a stop rule
-                                      (method FAST, settings.certificate_tolerance, at most 64 looks a step): there every
-                                      island is looked at by itself and stops by itself */
+                                      (method FAST, settings.certificate_tolerance, at most 64 convergence checks
+                                      a step): there every island is checked and stops by itself */
     bool converged;                /* a stop rule was met, by every island */
     int32_t limited;               /* method FAST: islands that ended the iterations with more kinetic energy than
                                       contacts can leave them with, or, with fewer than 60 iterations in a step that starts
                                       warm, in a bounce that they cannot make, and were slowed down. In a few steps
                                       after an impact that is no reason for more iterations; in many it is */
-    int64_t repeated;              /* steps since creation that a backend which runs ahead (CUDA) began with too little
-                                      room or another plan than they needed, and did again with more: nothing is lost
-                                      but time */
+    int64_t repeated;              /* steps since creation that a backend which runs ahead (CUDA) began with too small
+                                      capacities or another plan than they needed, and repeated: nothing is lost but
+                                      time */
     double penetration_max;        /* deepest overlap at the start of the step, m, >= 0 */
     sadmm_phase_times ms;          /* the certificate's own time is in `certify_ms`, not in here */
     double certify_ms;

@@ -230,7 +230,7 @@ sadmm_status CPU(assemble_rows)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(init_penalty)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(init_weights)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(update_weights)(struct sadmm_context *, struct sadmm_error *);
-/* A thread's share of what the weight scales of the islands need; then the levels (cpu_weight_scale.c). `wrenches` hold
+/* A thread's share of what the weight scales of the islands need; then the weight scales (cpu_weight_scale.c). `wrenches` hold
  * J^T lambda. */
 void CPU(add_up_imbalance)(struct sadmm_context *, int thread, int threads);
 void CPU(update_weight_scales)(struct sadmm_context *);

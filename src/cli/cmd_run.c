@@ -28,7 +28,7 @@ static const struct cli_option options[] = {
     [OPTION_METHOD] = {"method", "NAME", "paper or fast (default fast)"},
     [OPTION_ITERATIONS] = {"iterations", "N", "iterations a step (default the scene's for the method)"},
     [OPTION_TOLERANCE] = {"tolerance", "T", "end a step's iterations once its true error is below T, m/s (default never)"},
-    [OPTION_CHECK_PERIOD] = {"check-period", "N", "iterations between looks at that (default 10)"},
+    [OPTION_CHECK_PERIOD] = {"check-period", "N", "iterations between convergence checks (default 10)"},
     [OPTION_PENALTY_PERIOD] = {"penalty-period", "N", "paper: iterations between penalty updates, 0 = never"},
     [OPTION_THREADS] = {"threads", "N", "CPU threads at most, 0 = as many as pay (default)"},
     [OPTION_NO_WARM_START] = {"no-warm-start", NULL, "start every step from zero impulses"},

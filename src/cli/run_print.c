@@ -153,7 +153,7 @@ void run_record_print(const struct run_record *record, const char *spec, const s
         printf("limited        %zu steps slowed islands down to the energy contacts can leave: too few iterations\n",
                record->limited_steps);
     if (record->steps > 0 && last->repeated > 0)
-        printf("repeated       %" PRId64 " steps, which outgrew the room or the plan they were begun with\n", last->repeated);
+        printf("repeated       %" PRId64 " steps, which outgrew the capacities or the plan they were begun with\n", last->repeated);
     if (record->steps > 0) printf("penetration    %.3g m at most\n", record->penetration_max);
     printf("final state    fastest %.3g m/s, moved %.3g m at most, %s, hash %016" PRIx64 "\n", record->speed_max,
            record->displacement_max, record->finite ? "finite" : "NOT FINITE", record->hash);

@@ -133,18 +133,18 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     vec3 between = v3(0, 0, 0);
     if (a && b && count > 0 && (FAST || lane == 0))
         between = v3_sub(v3_load(points[0].arm_b), v3_load(points[0].arm_a));
-    const pair_ends ends = {a ? pair->body_a : v.model.bodies, b ? pair->body_b : v.model.bodies, -1, -1};
+    const pair_bodies joined = {a ? pair->body_a : v.model.bodies, b ? pair->body_b : v.model.bodies, -1, -1};
     const real4 about = pack(normal, live ? solver_friction(v.model, pair->friction) : 0),
                 difference = pack(between, count);
     if (live && lane == 0) {
         v.contacts.normal[p] = about;
         v.contacts.difference[p] = difference;
-        v.contacts.ends[p] = ends;
+        v.contacts.bodies[p] = joined;
     }
     struct pair_sums sums = {};
     rigid_inverse inverse = {};
     if (FAST && v.bodies.rigid && side_of_lane(v.contacts, lane) >= 0) { /* asked for early: it is from far away */
-        const int32_t body = lane == 0 ? ends.body_a : lane == 1 ? ends.body_b : v.model.bodies;
+        const int32_t body = lane == 0 ? joined.body_a : lane == 1 ? joined.body_b : v.model.bodies;
         if (body < v.model.bodies) inverse = inverse_of_body(v.bodies, body);
     }
     for (int32_t k = lane; k < count; k += v.contacts.lanes) {
@@ -156,10 +156,10 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         const solver_real lambda[3] = {(solver_real)impulse.x, (solver_real)impulse.y, (solver_real)impulse.z};
         v.contacts.arm[slot] = arm;
         for (int j = 0; j < 3; ++j) v.contacts.lambda[(size_t)j * v.contacts.lambda_stride + slot] = lambda[j];
-        if (FAST) add_point(v.model, v.bodies, ends, about, difference, arm, lambda, true, &sums);
+        if (FAST) add_point(v.model, v.bodies, joined, about, difference, arm, lambda, true, &sums);
     }
     if (FAST)
-        store_sides(v.model, v.bodies, v.contacts, v.weights, live, p, lane, count, ends, difference, true, inverse,
+        store_sides(v.model, v.bodies, v.contacts, v.weights, live, p, lane, count, joined, difference, true, inverse,
                     &sums);
 }
 

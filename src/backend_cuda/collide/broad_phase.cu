@@ -193,7 +193,7 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) refit_kernel(const _
 
 /* ---- pairs ----------------------------------------------------------------------------------------------------- */
 
-/* What a radix sort of all the room needs. */
+/* What a radix sort of the whole capacity needs. */
 static __global__ void __launch_bounds__(COLLISION_THREADS) clear_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t i = collision_thread(COLLISION_THREADS);

@@ -10,7 +10,7 @@
 #include "backend_cuda/device/parallel.h"
 #include "memory.h"
 
-/* Shapes from which the tree pays, room from which the radix sort does. */
+/* Shapes from which the tree pays, capacity from which the radix sort does. */
 enum { TREE_FROM = 6144 };
 static const int64_t RADIX_FROM = 16385;
 

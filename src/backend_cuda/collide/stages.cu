@@ -1,4 +1,4 @@
-/* The stages of a find: capacities and launches, repeated until everything fits, or enqueued once in the room there is.
+/* The stages of a find: capacities and launches, repeated until everything fits, or enqueued once with the capacities there are.
  */
 #include <algorithm>
 

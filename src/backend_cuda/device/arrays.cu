@@ -53,7 +53,7 @@ sadmm_status CUDA(reserve_solver)(struct sadmm_context *c, struct sadmm_error *e
         {BUFFER_BETA, n * sizeof(double)},
         {BUFFER_NORMAL, pairs * sizeof(real4)},
         {BUFFER_DIFFERENCE, pairs * sizeof(real4)},
-        {BUFFER_PAIR_ENDS, pairs * sizeof(pair_ends)},
+        {BUFFER_PAIR_BODIES, pairs * sizeof(pair_bodies)},
         {BUFFER_ARM, slots * sizeof(real4)},
         {BUFFER_LAMBDA, 3 * slots * real_size},
         {BUFFER_ROW_CONSTRAINTS, rows * sizeof(row_constraint)},
@@ -84,7 +84,7 @@ sadmm_status CUDA(reserve_solver)(struct sadmm_context *c, struct sadmm_error *e
     v->bodies.beta = (double *)b[BUFFER_BETA].data;
     v->contacts.normal = (real4 *)b[BUFFER_NORMAL].data;
     v->contacts.difference = (real4 *)b[BUFFER_DIFFERENCE].data;
-    v->contacts.ends = (pair_ends *)b[BUFFER_PAIR_ENDS].data;
+    v->contacts.bodies = (pair_bodies *)b[BUFFER_PAIR_BODIES].data;
     v->contacts.arm = (real4 *)b[BUFFER_ARM].data;
     v->contacts.lambda = (solver_real *)b[BUFFER_LAMBDA].data;
     v->contacts.lambda_stride = slots;

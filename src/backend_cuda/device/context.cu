@@ -34,7 +34,7 @@ static const char *const buffer_names[] = {
     "penalties",
     "normals",
     "arms between bodies",
-    "pairs' ends",
+    "pairs' bodies",
     "arms",
     "impulses",
     "constraints given by rows",

@@ -18,7 +18,7 @@ struct cuda_buffer {
 enum cuda_buffer_name {
     /* device */
     BUFFER_STATE, BUFFER_B, BUFFER_LINES, BUFFER_C, BUFFER_BETA,
-    BUFFER_NORMAL, BUFFER_DIFFERENCE, BUFFER_PAIR_ENDS, BUFFER_ARM, BUFFER_LAMBDA,
+    BUFFER_NORMAL, BUFFER_DIFFERENCE, BUFFER_PAIR_BODIES, BUFFER_ARM, BUFFER_LAMBDA,
     BUFFER_ROW_CONSTRAINTS, BUFFER_ROWS, BUFFER_ROW_RESPONSES, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_EXCHANGE, BUFFER_LIVE, BUFFER_LAYOUT, BUFFER_SORT,
     BUFFER_NUMBERS, BUFFER_SCALARS, BUFFER_SETTINGS, BUFFER_WEIGHTS, BUFFER_SIDES,
     BUFFER_RAW_BODIES, BUFFER_RAW_PAIRS, BUFFER_RAW_POINTS, BUFFER_RAW_ROWS, BUFFER_OUT,
@@ -66,7 +66,7 @@ struct sadmm_context {
     bool numbered;                   /* BUFFER_NUMBERS is filled */
 
     struct cuda_step *step; /* the world, where whole steps are made here */
-    int64_t first_capacity;     /* for tests: candidates and points there is room for at first; 0: as likely */
+    int64_t first_capacity;     /* for tests: first capacities for candidates and points; 0: by the number of shapes */
     unsigned refused;       /* bit of a tier: a part was too large */
 
     cudaGraphExec_t graph; /* GRAPH_ITERATIONS plain iterations */

@@ -1,6 +1,6 @@
 /* The constraint graph of a step on the device: what is known where, and how it is split among thread blocks.
  *
- * Graph statistics are on the device, guesses on the host: launches are sized by the room there is, kernels learn the
+ * Graph statistics are on the device, guesses on the host: launches are sized by the capacities, kernels learn the
  * true counts from `cuda_live` and do nothing once a step of the queue has failed.
  *
  * Bodies have slots, so that an island's bodies are neighbours; where islands do not matter (GRID and STREAM in the
@@ -39,7 +39,7 @@ struct cuda_live {
 
 /* Of the constraint graph; in device memory, copied to the host on demand. */
 struct cuda_graph_statistics {
-    int32_t islands;         /* bodies joined by constraints; a lone body is one; 0: not looked for */
+    int32_t islands;         /* bodies joined by constraints; a lone body is one; 0: not counted */
     int32_t island_bodies, island_sides; /* of the largest (each maximum separately) */
     int32_t sides;          /* all */
     int32_t degree;          /* most sides of one body */
@@ -95,8 +95,8 @@ struct layout_view {
     struct layout_kept *kept;
 };
 
-/* A layout brought to the host, for tests; arrays of the caller, with room for bodies, bodies, bodies + 1, two a
- * constraint and parts + 1. */
+/* A layout brought to the host, for tests; arrays of the caller, of bodies, bodies, bodies + 1, two a
+ * constraint and parts + 1 elements. */
 struct cuda_layout_copy {
     struct cuda_live live;
     struct cuda_graph_statistics statistics;

@@ -5,8 +5,8 @@
  *     velocity is (v_b - v_a) + (w_b x r_b - w_a x r_a), and the pair's wrench on b is f = sum E_k, tau = sum r_b x E_k
  *     (E = 2 lambda - lambda_prev), on a -f, -sum r_a x E_k.
  *   - A "side" is one constraint as seen by one of its dynamic bodies: 2 record + side (0: on a, 1: on b); its
- *     record is the wrench on that body. Bodies gather the records of their sides over a CSR list in a fixed order. No
- * float     atomics: a result does not depend on timing, thread count, grid size or tier, bit for bit (the sources are
+ *     record is the wrench on that body. Bodies gather the records of their sides over a CSR list in a fixed order. No float
+ *     atomics: a result does not depend on timing, thread count, grid size or tier, bit for bit (the sources are
  *     compiled without contraction of a * b + c for the same reason).
  *   - Sums over a pair's points, p_0 to p_7: q_j = p_j + p_{j+4} (p_j alone where there is no p_{j+4}, 0 where there is
  *     no p_j), then (q_0 + q_1) + (q_2 + q_3): four lanes of a warp make it in two exchanges.
@@ -31,7 +31,7 @@
  * J^T d lambda, and bodies keep their momentum residual b - A v + J^T lambda (docs/algorithm.md). It begins with the
  * multipliers: records are not kept.
  *
- * Launch sizes follow from what the host knows (rooms, tier); kernels read the true counts from `live`, and do nothing
+ * Launch sizes follow from what the host knows (capacities, tier); kernels read the true counts from `live`, and do nothing
  * once it says abort_code.
  *
  * Raw data (bodies, contact pairs and points, blocks as core has them, in double) is turned into this layout on the device.
@@ -104,7 +104,7 @@ enum { TERMS = 6 }; /* of a body, in sums over islands */
 enum { SIDE_ARMS = 10, SIDE_LOAD = SIDE_ARMS, SIDE_RESPONSE, SIDE_NUMBERS };
 
 /* What a pair joins. */
-struct alignas(16) pair_ends {
+struct alignas(16) pair_bodies {
     int32_t body_a, body_b; /* raw; the static world: `bodies` */
     int32_t side_a, side_b; /* places of its sides in `incident`, and of their records; of the static world: -1.
                                For the stepwise kernels alone (streamed.cu) */
@@ -163,7 +163,7 @@ struct contact_view {
     int32_t point_slots;   /* a pair has memory for */
     real4 *normal;         /* pairs: n, mu */
     real4 *difference;     /* pairs: x_a - x_b, number of points */
-    pair_ends *ends;       /* pairs */
+    pair_bodies *bodies;      /* pairs */
     solver_real *inv_s;    /* fast: pairs: B / number of dynamic bodies */
     real4 *arm;            /* points: r_a (r_b when a is static), e */
     solver_real *lambda;   /* points: a plane for each of x, y, z */

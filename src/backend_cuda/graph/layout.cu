@@ -178,7 +178,7 @@ extern "C" sadmm_status CUDA(set_abort)(struct sadmm_context *c, enum cuda_abort
     return CUDA(upload_live)(c, abort_code, error);
 }
 
-/* Survey and layout as a graph, launched twice: captured, nothing may depend on when it runs or what ran before. */
+/* Statistics and layout as a graph, launched twice: captured, nothing may depend on when it runs or what ran before. */
 static sadmm_status run_graph(struct sadmm_context *c, const struct cuda_partition *partition,
                               struct sadmm_error *error)
 {

@@ -27,7 +27,7 @@ enum { LAYOUT_THREADS = 256, ONE_BLOCK_THREADS = 1024 };
 /* Which stages, and what of them. */
 struct layout_args {
     int32_t statistics, layout; /* of one_block: which */
-    int32_t islands;        /* statistics: look for them; layout: slots by island */
+    int32_t islands;        /* statistics: find them; layout: slots by island */
     struct cuda_partition partition;
 };
 

@@ -28,7 +28,7 @@ static __device__ __forceinline__ double energies_of_body(const cuda_view &v, co
     for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) {
         const int32_t code = v.graph.incident[at], p = code / 2;
         add_side(v.contacts, v.rows, code, sums, &sums[PUSH]);
-        if (p >= v.contacts.pair_capacity || (code & 1 && is_dynamic(v.model, v.contacts.ends[p].body_a)))
+        if (p >= v.contacts.pair_capacity || (code & 1 && is_dynamic(v.model, v.contacts.bodies[p].body_a)))
             continue; /* counted there */
         sums[WORK] += work_of(v.contacts, p);
     }

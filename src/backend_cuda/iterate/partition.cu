@@ -1,8 +1,8 @@
 /* Which tier a step runs in, on how many thread blocks of how many threads: from statistics of its constraint graph.
  *
  * A part costs its sides + its bodies, and the layout gives every part an even share of all cost, rounded up to whole
- * islands (BLOCK, CLUSTER) or bodies (GRID). That bounds the largest part before it is made. The rooms of a launch
- * (threads, shared memory) are sized above the bound: statistics may be those of a step before, and contacts come and
+ * islands (BLOCK, CLUSTER) or bodies (GRID). That bounds the largest part before it is made. The threads and the shared memory of a
+ * launch are sized above the bound: statistics may be those of a step before, and contacts come and
  * go.
  *
  * Which tier. An iteration takes what its barrier and its longest chain of dependent instructions take, and then the time
@@ -49,7 +49,7 @@ struct bound {
     int64_t sides, bodies;
 };
 
-/* Threads for a part within the bound, with an eighth to spare; beyond `most` there is no margin, then no room. */
+/* Threads for a part within the bound, with an eighth to spare; beyond `most` there is no margin, then it does not fit. */
 static int64_t threads_for(struct bound bound, int64_t most)
 {
     int64_t wanted = larger(QUAD * (bound.sides + bound.sides / 8), LANES * bound.bodies);
@@ -106,9 +106,9 @@ static struct choice no_choice(const char *why)
 }
 
 static const char refused[] = "a thread block would get too much";
-static const char too_many[] = "more thread blocks than the layout has room for";
+static const char too_many[] = "more thread blocks than the layout has capacity for";
 
-/* No more than the layout has room for. */
+/* No more than the layout has capacity for. */
 static int64_t most_parts(const struct sadmm_context *c)
 {
     return c->view.model.bodies + (int64_t)c->multiprocessors * MOST_BLOCKS;
@@ -121,7 +121,7 @@ static struct choice choose_block(const struct sadmm_context *c, const struct cu
     if (c->refused >> SADMM_CUDA_TIER_BLOCK & 1) return no_choice(refused);
     const int64_t most = CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0), most_sides = most / QUAD;
     if (statistics->island_sides > most_sides) return no_choice(too_large);
-    /* As many blocks a multiprocessor as run side by side and find an island each; when that is too few for the room a
+    /* As many blocks a multiprocessor as run side by side and find an island each; when that is too few for the memory a
      * block has, blocks that run one after another. */
     int64_t parts = c->multiprocessors, side_by_side = 1;
     while (side_by_side < MOST_BLOCKS && 2 * parts <= statistics->islands &&
@@ -156,7 +156,7 @@ static struct choice choose_cluster_of(const struct sadmm_context *c, const stru
     const char *name = nullptr;
     const int64_t most = CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0), most_sides = most / QUAD;
     const int64_t cost = (int64_t)statistics->sides + c->view.model.bodies;
-    /* As many clusters as find a multiprocessor for each of their blocks; when that is too few for the room a block has,
+    /* As many clusters as find a multiprocessor for each of their blocks; when that is too few for the memory a block has,
      * clusters that run one after another. */
     int64_t clusters = statistics->islands <= 1 ? 1 : larger(c->multiprocessors / size, 1);
     struct bound bound;
@@ -243,7 +243,7 @@ static struct choice choose_stream(void)
     return choice;
 }
 
-/* What is likely the fastest; a tier whose floor is above what another takes is not looked at. */
+/* What is likely the fastest; a tier whose floor is above what another takes is left out. */
 static struct choice choose_any(const struct sadmm_context *c, const struct cuda_graph_statistics *statistics,
                                 cudaError_t *code)
 {

@@ -86,18 +86,18 @@ static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view
 /* A batch's iterations, and what follows them: storing, and the limit of energies. */
 template <int MODE, int SIZE, bool FAST, bool PROLOGUE, bool ROWS, class Part>
 static __device__ __forceinline__ void run_batch(Part &part, const cuda_view &v, const cuda_args &args, real relaxation,
-                                                 const block_part &ends)
+                                                 const block_part &block)
 {
     unsigned target = 0;
     row_lane rows;
     if (ROWS && part.row_sides) load_rows<FAST>(&rows, v, part.lane, part.is_row_side(), part.side_code);
-    if (FAST && MODE != BLOCK) { /* others look at the velocities that were loaded */
+    if (FAST && MODE != BLOCK) { /* others read the velocities that were loaded */
         arrive<MODE, SIZE>(v.iteration.barrier);
         wait<MODE, SIZE>(v.iteration.barrier, target += gridDim.x);
     }
     if (FAST) iterate_fast<MODE, SIZE, ROWS>(part, v, args, relaxation, &rows, &target);
     else iterate_paper<MODE, SIZE, ROWS>(part, v, args, &rows, &target);
-    /* Nobody looks into this block's memory once it is gone. */
+    /* No block may read this one's memory once it is gone. */
     if (!FAST && MODE == CLUSTER) {
         arrive<MODE, SIZE>(v.iteration.barrier);
         wait<MODE, SIZE>(v.iteration.barrier, 0);
@@ -114,9 +114,9 @@ static __device__ __forceinline__ void run_batch(Part &part, const cuda_view &v,
         return;
     }
     if constexpr (PROLOGUE) {
-        if (suspected) *ends.suspected = 1;
+        if (suspected) *block.suspected = 1;
         block_barrier<SIZE>();
-        if (*ends.suspected) limit_in_block(v, args.under_iterated, ends, [] { block_barrier<SIZE>(); });
+        if (*block.suspected) limit_in_block(v, args.under_iterated, block, [] { block_barrier<SIZE>(); });
     }
 }
 
@@ -135,20 +135,20 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     }
     part_run<POINTS, MODE, ROWS, SIZE, FAST> part(v, args, memory);
     const auto barrier = [] { block_barrier<SIZE>(); };
-    const block_part ends = part.ends();
-    if (PROLOGUE && threadIdx.x == 0) *ends.suspected = 0;
+    const block_part block = part.for_prologue();
+    if (PROLOGUE && threadIdx.x == 0) *block.suspected = 0;
     const bool begins = PROLOGUE && args.begin;
     if constexpr (PROLOGUE)
-        if (begins) store_first_terms(v, ends, part.found);
+        if (begins) store_first_terms(v, block, part.found);
     part.fetch_side(); /* on its way while islands are weighed */
     if constexpr (PROLOGUE)
         if (begins) {
-            weigh_in_block(v, args, ends, part.found, barrier);
+            weigh_in_block(v, args, block, part.found, barrier);
             stamp_assembled(v.step);
         }
     const real relaxation = FAST ? (real)v.model.settings->relaxation : (real)1; /* on its way with what is loaded */
     part.load();
-    run_batch<MODE, SIZE, FAST, PROLOGUE, ROWS>(part, v, args, relaxation, ends);
+    run_batch<MODE, SIZE, FAST, PROLOGUE, ROWS>(part, v, args, relaxation, block);
 }
 
 /* ---- instances ------------------------------------------------------------------------------------------------- */

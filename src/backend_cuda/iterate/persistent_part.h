@@ -39,7 +39,7 @@ template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run 
     int32_t body;
     const solver_real *gathered; /* component r of the first record */
     int32_t gathered_count;      /* 0 in lanes that have no component */
-    bool many;                   /* some lane of the warp has more than FEW */
+    bool many;                   /* some lane of the warp has more than FETCHED_FIRST */
     bool moves, updates, row_sides; /* the warp has bodies, sides, sides of constraints given by rows */
     const solver_real *own_row;  /* of the side's own body in even iterations */
     solver_real *own_state;      /* the body's component r, in even iterations */
@@ -50,7 +50,7 @@ template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run 
     side_lane<POINTS> own;
     /* Until iterations begin (registers): what the side is, and its pair as it is in memory. */
     int32_t side_code;
-    pair_ends on;
+    pair_bodies on;
     real4 about, between, point[COUNT];
 
     __device__ __forceinline__ part_run(const cuda_view &view, const cuda_args &arguments, unsigned char *memory)
@@ -80,7 +80,7 @@ template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run 
         return (size_t)v.graph.body_of[first_body + i / ROW] * ROW + (size_t)(i % ROW);
     }
     /* What prologue.h sees of it. */
-    __device__ __forceinline__ block_part ends(void) const
+    __device__ __forceinline__ block_part for_prologue(void) const
     {
         const block_part out = {first_body, bodies, m.terms, m.range, m.suspected};
         return out;

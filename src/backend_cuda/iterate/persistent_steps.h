@@ -11,18 +11,18 @@
  * there or not; where a lane of the warp has more, the next ones too before the first is added. */
 PART __device__ __forceinline__ real PART_RUN::gather(real g, const solver_real *from, int32_t count, bool more) const
 {
-    real few[FEW], value[MORE] = {};
+    real first[FETCHED_FIRST], value[MORE] = {};
 #pragma unroll
-    for (int32_t j = 0; j < FEW; ++j) few[j] = from[j * ROW];
+    for (int32_t j = 0; j < FETCHED_FIRST; ++j) first[j] = from[j * ROW];
     if (more) {
 #pragma unroll
-        for (int32_t j = 0; j < MORE; ++j) value[j] = FEW + j < count ? from[(FEW + j) * ROW] : (real)0;
+        for (int32_t j = 0; j < MORE; ++j) value[j] = FETCHED_FIRST + j < count ? from[(FETCHED_FIRST + j) * ROW] : (real)0;
     }
 #pragma unroll
-    for (int32_t j = 0; j < FEW; ++j)
-        if (j < count) g += few[j];
+    for (int32_t j = 0; j < FETCHED_FIRST; ++j)
+        if (j < count) g += first[j];
     if (!more) return g;
-    for (int32_t h = FEW;;) {
+    for (int32_t h = FETCHED_FIRST;;) {
 #pragma unroll
         for (int32_t j = 0; j < MORE; ++j)
             if (h + j < count) g += value[j];
@@ -58,7 +58,7 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd)
         real g = free_momentum(one);
         if (live && r < 6) {
             const int32_t from = v.graph.offsets[first_body + i], count = v.graph.offsets[first_body + i + 1] - from;
-            g = gather(g, m.records + (from - first_side) * ROW + record_slot(r), count, count > FEW);
+            g = gather(g, m.records + (from - first_side) * ROW + record_slot(r), count, count > FETCHED_FIRST);
         }
         publish(m.state + i * ROW + r, i, one.v + step_of(one, g), odd);
     }
@@ -83,7 +83,7 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies_fast(int32_t odd, rea
         real pushed = 0;
         if (live) {
             const int32_t from = v.graph.offsets[first_body + i], count = v.graph.offsets[first_body + i + 1] - from;
-            pushed = gather(0, m.records + (from - first_side) * ROW + record_slot(r), count, count > FEW);
+            pushed = gather(0, m.records + (from - first_side) * ROW + record_slot(r), count, count > FETCHED_FIRST);
         }
         const real gone = step_fast(&one, pushed, relaxation);
         publish(m.state + i * ROW + r, i, one.v, odd);

@@ -35,7 +35,7 @@ static __device__ double natural_map(const model_view &model, const body_view &b
     const int32_t joined[2] = {pair->body_a, pair->body_b};
     const int rows = pair->friction > 0 ? 3 : 1;
     const struct sadmm_settings settings = *model.settings;
-    /* As planned for, should the pair have more: nobody has looked yet. */
+    /* As planned for, should the pair have more: nothing has checked that yet. */
     const int32_t count = (int32_t)contacts.difference[p].w;
     double worst = 0;
     for (int32_t k = 0; k < count; ++k) {
@@ -109,7 +109,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         const int32_t code = v.graph.incident[at], p = code / 2;
         add_side(v.contacts, v.rows, code, sums, &sums[PUSH]);
         const int32_t k = p - v.contacts.pair_capacity; /* a block of rows, or a pair */
-        if (code & 1 && is_dynamic(v.model, k < 0 ? v.contacts.ends[p].body_a : v.rows.constraints[k].body_a))
+        if (code & 1 && is_dynamic(v.model, k < 0 ? v.contacts.bodies[p].body_a : v.rows.constraints[k].body_a))
             continue; /* counted there */
         map = largest_term::join(map, k < 0 ? natural_map(v.model, v.bodies, v.contacts, v.raw, p)
                                             : natural_map_of_rows(v.bodies, v.rows, v.raw, k));
@@ -141,7 +141,7 @@ sadmm_status CUDA(enqueue_convergence_check)(struct sadmm_context *c, int done, 
                            "convergence check", body_blocks(c->view.model.bodies), BODY_THREADS, &args, error);
 }
 
-extern "C" sadmm_status CUDA(look)(struct sadmm_context *c, int done, int32_t *unmet, struct sadmm_error *error)
+extern "C" sadmm_status CUDA(check_convergence)(struct sadmm_context *c, int done, int32_t *unmet, struct sadmm_error *error)
 {
     CUDA_ENTER(c);
     TRY(CUDA(enqueue_convergence_check)(c, done, error));

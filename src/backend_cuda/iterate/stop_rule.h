@@ -19,9 +19,9 @@ static __device__ __forceinline__ bool island_stopped(const graph_view &graph, c
 }
 
 static __device__ __forceinline__ bool pair_stopped(const model_view &model, const graph_view &graph,
-                                                    const island_view &islands, int32_t checks, const pair_ends &ends)
+                                                    const island_view &islands, int32_t checks, const pair_bodies &pair)
 {
-    return checks > 0 && island_stopped(graph, islands, checks, ends.body_a < model.bodies ? ends.body_a : ends.body_b);
+    return checks > 0 && island_stopped(graph, islands, checks, pair.body_a < model.bodies ? pair.body_a : pair.body_b);
 }
 
 static __device__ __forceinline__ bool rows_stopped(const model_view &model, const graph_view &graph,

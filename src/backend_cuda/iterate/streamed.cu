@@ -56,7 +56,7 @@ static __device__ __forceinline__ real relaxed(const model_view &model, const cu
 
 /* Step 1, a thread a body: all of a body's numbers lie side by side and are asked for at once, sixteen bytes at a time. (Eight
  * lanes a body, as in the persistent tiers, where latency counts, spend the time on instructions that load and pass
- * around single numbers.) What is read once makes room in the caches for states and records. The sums are those of
+ * around single numbers.) What is read once leaves the caches to states and records. The sums are those of
  * free_momentum() and step_of(); FAST: of step_fast() and residual_after(), as far as args.relax says. */
 template <bool JOIN, bool RIGID, bool FAST>
 static __global__ void __launch_bounds__(BODY_THREADS)
@@ -137,7 +137,7 @@ static __global__ void __launch_bounds__(THREADS)
     if (FAST && all_stopped(v.islands, args.checks)) return;
     const real relaxation_factor = relaxed<FAST>(v.model, args, RELAX_MULTIPLIERS);
     with_pair<LANES_A_PAIR>(v.model, t, [&](int32_t p, int32_t lane, bool live) {
-        const bool on = live && !(FAST && pair_stopped(v.model, v.graph, v.islands, args.checks, v.contacts.ends[p]));
+        const bool on = live && !(FAST && pair_stopped(v.model, v.graph, v.islands, args.checks, v.contacts.bodies[p]));
         primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v.model, v.bodies, v.contacts, v.iteration, p, lane, on,
                                                                 relaxation_factor);
     });
@@ -180,7 +180,7 @@ static __global__ void place_kernel(const __grid_constant__ cuda_view v, const _
     const int32_t at = thread_index(args), bodies = live_bodies(v.model);
     if (bodies == 0 || at >= v.graph.offsets[bodies]) return;
     const int32_t side = v.graph.incident[at], on_b = side & 1, k = side / 2 - v.contacts.pair_capacity;
-    if (k < 0) *(on_b ? &v.contacts.ends[side / 2].side_b : &v.contacts.ends[side / 2].side_a) = at;
+    if (k < 0) *(on_b ? &v.contacts.bodies[side / 2].side_b : &v.contacts.bodies[side / 2].side_a) = at;
     else *(on_b ? &v.rows.constraints[k].side_b : &v.rows.constraints[k].side_a) = at;
 }
 

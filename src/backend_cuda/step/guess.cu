@@ -44,7 +44,7 @@ static sadmm_status preview_step(struct sadmm_context *c, struct preview *out, s
         *out = *staged;
         if (out->live.abort_code != ABORT_CAPACITY) return SADMM_OK;
         s->candidate_capacity = std::max(s->candidate_capacity, generous(out->counts.candidates));
-        /* points are counted only where all candidates had room */
+        /* points are counted only where all candidates fitted */
         if (out->counts.candidates <= c->view.step.candidate_capacity)
             s->point_capacity = std::max(s->point_capacity, generous(out->counts.points));
     }

@@ -49,7 +49,7 @@ static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __
         for (int k = 0; k < 6; ++k) body->wrench[k] = values[k];
     }
 }
-static_assert((int)SADMM_EDIT_VALUES >= (int)SADMM_SETTING_NUMBERS && (int)SADMM_EDIT_VALUES >= 13, "every kind has room");
+static_assert((int)SADMM_EDIT_VALUES >= (int)SADMM_SETTING_NUMBERS && (int)SADMM_EDIT_VALUES >= 13, "every kind fits");
 
 /* ---- start ----------------------------------------------------------------------------------------------------- */
 
@@ -194,7 +194,7 @@ static __host__ __device__ inline finish_ranges ranges_of(const model_view &mode
     return r;
 }
 
-/* Does not look at offending bodies of this very kernel: which body is named must not depend on who came first. */
+/* Never reads offending bodies found by this same kernel: which body is named must not depend on timing. */
 static __global__ void __launch_bounds__(STEP_THREADS)
     finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {

@@ -116,7 +116,7 @@ static sadmm_status see_step(struct sadmm_context *c, struct sadmm_error *error)
     s->time += q->settings.dt;
     ++s->seen;
     ++s->done;
-    /* A plan with far too much room wastes launches. */
+    /* A plan with far too large capacities wastes launches. */
     if (report.counts.pairs < c->view.contacts.pair_capacity / 4 - 256) s->planned = false;
     return SADMM_OK;
 }

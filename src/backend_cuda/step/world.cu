@@ -41,7 +41,7 @@ void CUDA(view_into)(struct sadmm_context *c, int into)
     c->view.raw.points = set.points;
 }
 
-/* Counts and settings of the view; pairs: room for so many. */
+/* Counts and settings of the view; pairs: their capacity. */
 void CUDA(view_counts)(struct sadmm_context *c, int64_t pairs)
 {
     struct cuda_step *s = c->step;

@@ -26,7 +26,7 @@ static __device__ __forceinline__ void ease_gaps(const model_view &model, const 
  * numbers. */
 struct eight_sides {
     int32_t code;                  /* of the lane's own, or -1 */
-    pair_ends ends;
+    pair_bodies bodies;
     solver_real load, response;    /* of a pair */
     solver_real number[2][LANES];  /* numbers lane and lane + LANES of arm_sums */
 };
@@ -38,7 +38,7 @@ static __device__ __forceinline__ double weigh_side(const model_view &model, con
 {
     const int32_t p = sides.code / 2;
     const double load = (double)sides.load, response = (double)sides.response;
-    const bool a = is_dynamic(model, sides.ends.body_a), both = a && is_dynamic(model, sides.ends.body_b);
+    const bool a = is_dynamic(model, sides.bodies.body_a), both = a && is_dynamic(model, sides.bodies.body_b);
     const double scale = island.rescale,
                  taken = scale > 0 ? weights.weight[p]
                                    : weight_of_pair(island.weight_scale, weight_mass(load, island.speed, island.mass),
@@ -83,12 +83,12 @@ static __device__ __forceinline__ eight_sides fetch_sides(const model_view &mode
                                                           const body_thread &t, int32_t begin)
 {
     const bool more = t.lane + LANES < SIDE_ARMS;
-    const pair_ends nobody = {};
+    const pair_bodies nobody = {};
     eight_sides out;
     out.code = begin + t.lane < t.end ? graph.incident[begin + t.lane] : -1;
     const bool own = out.code >= 0 && out.code < 2 * contacts.pair_capacity;
     const solver_real *about = weights.side_arms + (size_t)(own ? out.code : 0) * SIDE_NUMBERS;
-    out.ends = own ? contacts.ends[out.code / 2] : nobody;
+    out.bodies = own ? contacts.bodies[out.code / 2] : nobody;
     out.load = own ? about[SIDE_LOAD] : (solver_real)0;
     out.response = own ? about[SIDE_RESPONSE] : (solver_real)0;
 #pragma unroll

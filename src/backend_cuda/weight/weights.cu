@@ -24,22 +24,22 @@ static __global__ void __launch_bounds__(BODY_THREADS)
                   lane = t % v.contacts.lanes;
     const bool live = p < live_pairs(v.model);
     const real4 none = {};
-    const pair_ends nobody = {v.model.bodies, v.model.bodies, -1, -1}, ends = live ? v.contacts.ends[p] : nobody;
+    const pair_bodies nobody = {v.model.bodies, v.model.bodies, -1, -1}, joined = live ? v.contacts.bodies[p] : nobody;
     const real4 about = live ? v.contacts.normal[p] : none, difference = live ? v.contacts.difference[p] : none;
     const int32_t count = (int32_t)difference.w;
     const rigid_inverse no_inverse = {};
     struct pair_sums sums = {};
     for (int32_t k = lane; k < count; k += v.contacts.lanes) {
         const point_numbers point = fetch_point(v.contacts, p, k);
-        add_point(v.model, v.bodies, ends, about, difference, point.arm, point.lambda, false, &sums);
+        add_point(v.model, v.bodies, joined, about, difference, point.arm, point.lambda, false, &sums);
     }
-    store_sides(v.model, v.bodies, v.contacts, v.weights, live, p, lane, count, ends, difference, false, no_inverse,
+    store_sides(v.model, v.bodies, v.contacts, v.weights, live, p, lane, count, joined, difference, false, no_inverse,
                 &sums);
 }
 
 /* ---- terms and islands --------------------------------------------------------------------------------------------- */
 
-template <bool LEVELS>
+template <bool SCALES>
 static __global__ void __launch_bounds__(BODY_THREADS)
     terms_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
@@ -47,9 +47,9 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const body_thread t = body_of_thread(v.model, v.graph);
     double total[TERMS];
     const double term =
-        v.bodies.rigid ? terms_of_body<LEVELS, true, true>(v, t) : terms_of_body<LEVELS, false, true>(v, t);
+        v.bodies.rigid ? terms_of_body<SCALES, true, true>(v, t) : terms_of_body<SCALES, false, true>(v, t);
     if (add_up_island<add_terms>(v.graph, v.islands, t, term, total) && t.lane == 0)
-        weigh_island<LEVELS>(&v.islands.info[v.graph.label[t.body]], total, args);
+        weigh_island<SCALES>(&v.islands.info[v.graph.label[t.body]], total, args);
 }
 
 /* ---- row blocks -------------------------------------------------------------------------------------------------- */

@@ -39,7 +39,7 @@ struct sadmm_rows {
 void sadmm_rows_clear(struct sadmm_rows *rows);
 void sadmm_rows_free(struct sadmm_rows *rows);
 
-/* Room for so many; false, with nothing changed, when memory runs out. */
+/* Capacity for so many; false, with nothing changed, when memory runs out. */
 bool sadmm_rows_reserve(struct sadmm_rows *rows, size_t constraints, size_t row_count);
 
 /* Add a constraint of `count` rows whose Jacobians and multipliers are 0 and whose laws are hard with bias 0: its first row,

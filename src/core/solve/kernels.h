@@ -34,7 +34,7 @@ struct sadmm_kernels {
     sadmm_status (*create)(int device, struct sadmm_context **out, struct sadmm_error *error);
     void (*destroy)(struct sadmm_context *context);
 
-    /* Bind the step's system, plan and settings (alive until the next begin) and make room: the only allocation. */
+    /* Bind the step's system, plan and settings (alive until the next begin) and allocate: the only entry that does. */
     sadmm_status (*begin)(struct sadmm_context *, const struct sadmm_system *, const struct sadmm_plan *,
                           const struct sadmm_settings *, struct sadmm_error *error);
 

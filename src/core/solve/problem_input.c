@@ -77,7 +77,7 @@ static void symmetric_part(const double A[36], double mean[36])
             mean[6 * i + j] = mean[6 * j + i] = A[6 * i + j] + 0.5 * (A[6 * j + i] - A[6 * i + j]);
 }
 
-/* Symmetric to 1e-9 of the diagonal's scale (room for a file's decimals), and what is kept of it positive definite. */
+/* Symmetric to 1e-9 of the diagonal's scale (a file has so many decimals), and what is kept of it positive definite. */
 static sadmm_status check_mass(int32_t index, const double A[36], struct sadmm_error *error)
 {
     double mean[36], L[36];
@@ -112,7 +112,7 @@ sadmm_status sadmm_check_values(const char *name, const double *values, int32_t 
     return SADMM_OK;
 }
 
-/* Room for what a solve of this size has to save. */
+/* Memory for what a solve of this size has to save. */
 static sadmm_status reserve_saved(sadmm_problem *problem, int32_t bodies, size_t points, size_t rows,
                                   struct sadmm_error *error)
 {
@@ -288,7 +288,7 @@ static sadmm_status check_block(int32_t index, const sadmm_problem_block *block,
     return SADMM_OK;
 }
 
-/* Only what the block's kind and size use; the rest is 0, so that nobody has to look at rows before reading. */
+/* Only what the block's kind and size use; the rest is 0, so that no reader has to check `rows` first. */
 static void load_block(const sadmm_problem_block *given, sadmm_problem_block *block)
 {
     size_t rows = (size_t)given->rows, row = 6 * sizeof(double);

@@ -1,5 +1,5 @@
 /* A problem's insides: what its files share (problem.c: life and solving; problem_input.c: what is set; problem_solution.c: what is
- * read back), and what tests look at. */
+ * read back), and what tests read. */
 #ifndef SADMM_CORE_SOLVE_PROBLEM_INTERNAL_H
 #define SADMM_CORE_SOLVE_PROBLEM_INTERNAL_H
 

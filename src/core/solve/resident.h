@@ -3,7 +3,7 @@
  *
  * Steps are enqueued: `step` may return before the step has run. Steps run in order. A step that fails leaves the world
  * as it was before it, and those enqueued after it do not run; `wait` tells. What a step could not know when it was
- * enqueued (how many contacts there will be) is no failure: the backend repeats the step with more room.
+ * enqueued (how many contacts there will be) is no failure: the backend repeats the step with larger capacities.
  *
  * What may change from step to step without loading the world again are edits: a kind, a target and numbers, in the
  * backend's memory before the step that they come with. So are the settings' numbers. A step that was not done has taken

@@ -41,7 +41,7 @@ static void explain_options(struct text *t, const struct sadmm_plan *plan, const
                                : "start        cold: impulses 0, velocities A^-1 b (asked for)\n");
     if (s->method == SADMM_METHOD_FAST)
         line(t, "weights      by load, relaxation %g; %s\n", s->relaxation,
-             plan->weight_refresh ? "taken anew during the step, which starts cold"
+             plan->weight_refresh ? "recomputed during the step, which starts cold"
              : plan->warm         ? "kept during the step, which starts warm"
                                   : "kept: no constraints");
     else if (plan->penalty_updates)
@@ -84,7 +84,7 @@ size_t sadmm_world_explain(sadmm_world *world, char *out, size_t size)
     if (world->report.certificate.islands_above > 0)
         line(&t, "islands left %lld above the tolerance\n", (long long)world->report.certificate.islands_above);
     if (world->report.repeated)
-        line(&t, "repeated     %lld steps so far outgrew the room or the plan they were begun with; nothing is lost\n",
+        line(&t, "repeated     %lld steps so far outgrew the capacities or the plan they were begun with; nothing is lost\n",
              (long long)world->report.repeated);
     if (world->report.limited)
         line(&t, "limited      %d islands had more energy than contacts can leave them with: too few iterations\n",

@@ -17,7 +17,7 @@
 #include "core/solve/certificate.h"
 #include "world_internal.h"
 
-/* A resident step is enqueued with all of its checks, and those that nobody needs any more take time as well. */
+/* A step on the device is enqueued with all of its convergence checks, and those that nobody needs any more take time as well. */
 enum { MOST_CHECKS = 64 };
 
 bool sadmm_world_may_reside(const sadmm_world *world)

@@ -90,7 +90,7 @@ struct sadmm_world {
         int64_t kept_step;   /* steps and time of the bodies above */
         double kept_time;
         struct sadmm_steady *steady; /* dynamic bodies */
-        uint32_t *edited;    /* slots of bodies with `edits`; room for all dynamic ones */
+        uint32_t *edited;    /* slots of bodies with `edits`; capacity: all dynamic ones */
         struct sadmm_resident_edit *edits; /* for the backend, when a step is enqueued */
         size_t steady_capacity, edited_count, edited_capacity, edit_capacity;
     } resident;
