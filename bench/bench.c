@@ -18,7 +18,8 @@ static const struct {
 } commands[] = {
     {"kernels", bench_kernels, "ns per contact per iteration by backend, precision, threads and size"},
     {"scaling", bench_scaling, "ms per step of growing scenes, CPU by threads against GPU"},
-    {"convergence", bench_convergence, "iterations and time to a tolerance, errors of warm steps: method against method"},
+    {"convergence", bench_convergence,
+     "iterations and time to a tolerance, errors of warm steps: method against method"},
     {"stand", bench_stand, "does a structure stand for many steps, and what does a step cost"},
     {"rows", bench_rows, "what one constraint given by rows costs an iteration of a scene"},
 };

@@ -38,8 +38,8 @@ struct row {
 };
 
 /* The bytes an iteration of the reduced form has to move at least: contact (arm, error, lambda read and written), pair
- * (normal, offset, friction, weight, two indices, both wrenches written and read), body (A, H, b, v read and written; fast: the
- * momentum residual, read and written, in place of b). */
+ * (normal, offset, friction, weight, two indices, both wrenches written and read), body (A, H, b, v read and written;
+ * fast: the momentum residual, read and written, in place of b). */
 static double bytes_per_iteration(const struct lattice *lattice, size_t real, sadmm_method method)
 {
     double contact = 10.0 * (double)real, pair = (8 + 2 * 12) * (double)real + 16;
@@ -49,7 +49,8 @@ static double bytes_per_iteration(const struct lattice *lattice, size_t real, sa
 }
 
 static sadmm_status prepare(const struct sadmm_kernels *k, struct sadmm_context *c, struct lattice *lattice,
-                            const struct sadmm_settings *settings, const struct sadmm_plan *plan, struct sadmm_error *error)
+                            const struct sadmm_settings *settings, const struct sadmm_plan *plan,
+                            struct sadmm_error *error)
 {
     sadmm_status status = k->begin(c, &lattice->system, plan, settings, error);
     if (status == SADMM_OK) status = k->assemble_bodies(c, error);
@@ -89,7 +90,8 @@ static sadmm_status measure(const struct sadmm_kernels *k, struct sadmm_context 
     if (batch < 10) batch = 10;
     if (batch > 100000) batch = 100000;
     begin = sadmm_clock_ms();
-    while (status == SADMM_OK && !interrupted() && batches < MAX_BATCHES && (batches < 3 || sadmm_clock_ms() - begin < seconds * 1e3)) {
+    while (status == SADMM_OK && !interrupted() && batches < MAX_BATCHES &&
+           (batches < 3 || sadmm_clock_ms() - begin < seconds * 1e3)) {
         double start = sadmm_clock_ms();
         status = iterate(k, c, batch, beta, error);
         times[batches++] = (sadmm_clock_ms() - start) / batch;
@@ -129,8 +131,8 @@ static sadmm_status run_row(const struct sadmm_kernels *k, struct lattice *latti
     if (status == SADMM_OK) status = k->read_solution(context, error);
     if (status == SADMM_OK) status = sadmm_certify(&lattice->system, &settings, &row->certificate, error);
     k->destroy(context);
-    row->gb_per_s =
-        bytes_per_iteration(lattice, k->precision == SADMM_F32 ? 4 : 8, settings.method) / (row->ns * (double)row->contacts);
+    row->gb_per_s = bytes_per_iteration(lattice, k->precision == SADMM_F32 ? 4 : 8, settings.method) /
+                    (row->ns * (double)row->contacts);
     return status;
 }
 
@@ -176,12 +178,15 @@ int bench_kernels(int argc, char **argv)
     double bandwidth[BENCH_LIST];
     for (int t = 0; t < o.thread_count && !interrupted(); ++t) {
         bandwidth[t] = bench_memory_bandwidth((int)o.threads[t]);
-        json_array_append_new(bandwidths, json_pack("{s:i, s:f}", "threads", (int)o.threads[t], "gb_per_s", bandwidth[t]));
-        if (!quiet) printf("memory, %ld thread%s: %.1f GB/s (copy)\n", o.threads[t], o.threads[t] == 1 ? "" : "s", bandwidth[t]);
+        json_array_append_new(bandwidths,
+                              json_pack("{s:i, s:f}", "threads", (int)o.threads[t], "gb_per_s", bandwidth[t]));
+        if (!quiet)
+            printf("memory, %ld thread%s: %.1f GB/s (copy)\n", o.threads[t], o.threads[t] == 1 ? "" : "s",
+                   bandwidth[t]);
     }
     if (!quiet)
-        printf("%-5s %-8s %-4s %7s %9s %11s %8s %7s %10s\n", "", "variant", "", "threads", "contacts", "ns/cont/it", "GB/s",
-               "of mem", "ncp_max");
+        printf("%-5s %-8s %-4s %7s %9s %11s %8s %7s %10s\n", "", "variant", "", "threads", "contacts", "ns/cont/it",
+               "GB/s", "of mem", "ncp_max");
     for (int size = 0; size < o.contact_count && status == 0 && !interrupted(); ++size) {
         struct lattice lattice;
         if (!lattice_create(&lattice, o.contacts[size])) {
@@ -199,7 +204,8 @@ int bench_kernels(int argc, char **argv)
                 sadmm_backend_info info;
                 struct sadmm_error error = {SADMM_OK, ""};
                 sadmm_backend_query(k->backend, &info);
-                struct row row = {.backend = k->backend, .name = info.name, .variant = k->variant, .precision = k->precision,
+                struct row row = {.backend = k->backend, .name = info.name, .variant = k->variant,
+                                  .precision = k->precision,
                                   .threads = k->backend == SADMM_BACKEND_CPU ? (int)o.threads[t] : 1};
                 if (run_row(k, &lattice, (sadmm_method)o.method, o.seconds, &row, &error) != SADMM_OK) {
                     fprintf(stderr, "subadmm-bench kernels: %s\n", error.message);
@@ -219,9 +225,10 @@ int bench_kernels(int argc, char **argv)
         }
         lattice_destroy(&lattice);
     }
-    json_t *document = json_pack("{s:s, s:s, s:b, s:s, s:s, s:o, s:o}", "bench", "kernels", "method",
-                                 bench_word_of(bench_methods, o.method), "interrupted", interrupted() != 0, "commit", sadmm_build_commit(),
-                                 "compiler", sadmm_build_compiler(), "memory", bandwidths, "rows", rows);
+    json_t *document =
+        json_pack("{s:s, s:s, s:b, s:s, s:s, s:o, s:o}", "bench", "kernels", "method",
+                  bench_word_of(bench_methods, o.method), "interrupted", interrupted() != 0, "commit",
+                  sadmm_build_commit(), "compiler", sadmm_build_compiler(), "memory", bandwidths, "rows", rows);
     if (status == 0 && json) {
         FILE *stream = output_stream(json);
         bool complete = json_dumpf(document, stream, JSON_INDENT(2)) == 0;

@@ -131,8 +131,8 @@ static void usage(FILE *out, const char *command, const struct bench_option *opt
     if (more) fprintf(out, "\n%s", more);
 }
 
-int bench_parse(const char *command, const struct bench_option *options, size_t option_count, const char *more, int argc,
-                char **argv)
+int bench_parse(const char *command, const struct bench_option *options, size_t option_count, const char *more,
+                int argc, char **argv)
 {
     struct option longs[MOST_OPTIONS + 2] = {{0}};
     for (size_t k = 0; k < option_count; ++k)

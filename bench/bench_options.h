@@ -1,4 +1,5 @@
-/* Options of the benchmarks: a command has one table of them, from which come its --help, the parsing and the messages. */
+/* Options of the benchmarks: a command has one table of them, from which come its --help, the parsing and the
+ * messages. */
 #ifndef BENCH_OPTIONS_H
 #define BENCH_OPTIONS_H
 
@@ -48,10 +49,10 @@ struct bench_option {
     {name, NULL, help, BENCH_IS_WORD, to, NULL, 0, 0, words, word_count}
 
 /* Read a command's arguments into where its options point to: bool, const char * (texts: BENCH_LIST of them), long
- * (numbers: BENCH_LIST of them), double, int. `more`: what --help says after the options, or NULL. Returns 0 to go on, -1
- * after --help, 2 after wrong usage, which was named on standard error. */
-int bench_parse(const char *command, const struct bench_option *options, size_t option_count, const char *more, int argc,
-                char **argv);
+ * (numbers: BENCH_LIST of them), double, int. `more`: what --help says after the options, or NULL. Returns 0 to go on,
+ * -1 after --help, 2 after wrong usage, which was named on standard error. */
+int bench_parse(const char *command, const struct bench_option *options, size_t option_count, const char *more,
+                int argc, char **argv);
 
 /* The word for a value: "cpu", "f32", "fast". */
 const char *bench_word_of(const struct bench_word *words, int value);

@@ -1,6 +1,7 @@
-/* subadmm-bench rows: what a constraint given by rows costs a scene. The frozen problem of a step with two further bodies (or
- * more pairs of them), without and with a weld between them, solved in turn; an iteration's time is the difference of
- * solves that differ by ITERATIONS. What is printed are medians: of both times, and of the ratios of neighbours. */
+/* subadmm-bench rows: what a constraint given by rows costs a scene. The frozen problem of a step with two further
+ * bodies (or more pairs of them), without and with a weld between them, solved in turn; an iteration's time is the
+ * difference of solves that differ by ITERATIONS. What is printed are medians: of both times, and of the ratios of
+ * neighbours. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -70,10 +71,12 @@ static sadmm_status extend(sadmm_problem *from, sadmm_problem *to, long more, bo
         status = of_problem(from, sadmm_problem_get_solution(from, NULL, impulses, NULL), error);
     for (size_t i = (size_t)n; status == SADMM_OK && i < bodies; ++i) {
         for (int j = 0; j < 6; ++j) A[36 * i + 7 * (size_t)j] = j < 3 ? 1 : 0.1;
-        for (int j = 0; j < 6; ++j) b[6 * i + (size_t)j] = i % 2 ? 1 : 2; /* they keep moving: nothing is a denormal number */
+        for (int j = 0; j < 6; ++j)
+            b[6 * i + (size_t)j] = i % 2 ? 1 : 2; /* they keep moving: nothing is a denormal number */
     }
     for (int32_t k = 0; status == SADMM_OK && k < (int32_t)more; ++k) {
-        welds[k] = (sadmm_problem_block){.kind = SADMM_BLOCK_HARD, .rows = 6, .body_a = n + 2 * k, .body_b = n + 2 * k + 1};
+        welds[k] =
+            (sadmm_problem_block){.kind = SADMM_BLOCK_HARD, .rows = 6, .body_a = n + 2 * k, .body_b = n + 2 * k + 1};
         for (int j = 0; j < 6; ++j) welds[k].jacobian_a[7 * j] = -1, welds[k].jacobian_b[7 * j] = 1;
     }
     if (status == SADMM_OK) status = of_problem(to, sadmm_problem_set_bodies(to, (int32_t)bodies, A, b, v), error);
@@ -92,7 +95,8 @@ static sadmm_status solve(sadmm_problem *problem, const struct options *o, sadmm
 {
     sadmm_solve_report report;
     settings.iterations = iterations;
-    sadmm_status status = sadmm_problem_solve(problem, (sadmm_backend)o->backend, (sadmm_precision)precision, &settings, &report);
+    sadmm_status status =
+        sadmm_problem_solve(problem, (sadmm_backend)o->backend, (sadmm_precision)precision, &settings, &report);
     *ms = report.solve_ms;
     return of_problem(problem, status, error);
 }
@@ -103,8 +107,8 @@ static double median(double *values, int count)
     return values[count / 2];
 }
 
-static sadmm_status measure(sadmm_problem *const problems[2], const struct options *o, sadmm_method method, int precision,
-                            struct figures *out, struct sadmm_error *error)
+static sadmm_status measure(sadmm_problem *const problems[2], const struct options *o, sadmm_method method,
+                            int precision, struct figures *out, struct sadmm_error *error)
 {
     double us[2][MOST_PAIRS], ratio[MOST_PAIRS];
     sadmm_settings settings = sadmm_settings_default();
@@ -150,7 +154,8 @@ static sadmm_status run(const struct options *o, sadmm_problem *const problems[3
 {
     sadmm_backend_info info;
     sadmm_status status = freeze(o, problems[2], error);
-    for (int k = 0; k < 2 && status == SADMM_OK; ++k) status = extend(problems[2], problems[k], o->welds, k == 1, error);
+    for (int k = 0; k < 2 && status == SADMM_OK; ++k)
+        status = extend(problems[2], problems[k], o->welds, k == 1, error);
     if (status != SADMM_OK) return status;
     sadmm_backend_query((sadmm_backend)o->backend, &info);
     printf("%s after %ld steps: %d bodies, %d contacts; %ld welds between %ld more bodies\n", o->scene, o->steps,

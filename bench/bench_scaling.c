@@ -54,7 +54,8 @@ static void write_header(const struct sinks *out, const struct options *o)
     if (out->csv)
         fputs(
             "scene,backend,threads,precision,runs_on,bodies,contacts,pairs,iterations,steps,"
-            "collide_ms,assemble_ms,solve_ms,finish_ms,solver_ms,step_ms,ncp_max,momentum_max,hash_step,state_hash,commit,status\n",
+            "collide_ms,assemble_ms,solve_ms,finish_ms,solver_ms,step_ms,ncp_max,momentum_max,"
+            "hash_step,state_hash,commit,status\n",
             out->csv);
     if (!out->table) return;
     fprintf(out->table,
@@ -70,7 +71,8 @@ static void write_csv(FILE *out, const struct row *row)
 {
     const struct scene_timing *t = &row->timing;
     const struct series *s = row->series;
-    fprintf(out, "%s,%s,%d,%s,", row->scene, bench_word_of(bench_backends, (int)s->backend), s->threads, bench_precision_name(s->precision));
+    fprintf(out, "%s,%s,%d,%s,", row->scene, bench_word_of(bench_backends, (int)s->backend), s->threads,
+            bench_precision_name(s->precision));
     bench_write_csv_text(out, s->runs_on);
     if (t->steps > 0)
         fprintf(out, ",%d,%d,%d,%d,%d,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g", t->last.bodies, t->last.contacts, t->last.pairs,

@@ -148,10 +148,11 @@ static int report(struct stand *s, const struct options *o)
     printf("whole step     %.3f ms median, %.3f 95 %%, %.3f at most\n", s->ms[s->done / 2],
            s->ms[(long)(0.95 * (double)(s->done - 1))], s->ms[s->done - 1]);
     for (int k = 0; k < PHASES; ++k) qsort(s->phases[k], (size_t)s->done, sizeof *s->phases[k], bench_compare_doubles);
-    printf("  of it        %.3f ms collide, %.3f assemble, %.3f solve, %.3f finish (medians)\n", s->phases[0][s->done / 2],
-           s->phases[1][s->done / 2], s->phases[2][s->done / 2], s->phases[3][s->done / 2]);
+    printf("  of it        %.3f ms collide, %.3f assemble, %.3f solve, %.3f finish (medians)\n",
+           s->phases[0][s->done / 2], s->phases[1][s->done / 2], s->phases[2][s->done / 2], s->phases[3][s->done / 2]);
     printf("penetration    %.3g m at most: %.3g of the smallest body (%.3g m)\n", s->penetration, penetration, s->size);
-    printf("drift          %.3g m at most, %.3g m at the end: %.3g of the smallest body\n", s->worst_drift, s->drift, drift);
+    printf("drift          %.3g m at most, %.3g m at the end: %.3g of the smallest body\n", s->worst_drift, s->drift,
+           drift);
     printf("certificate    ncp %.3g m/s, momentum %.3g (one step more)\n", s->ncp, s->last.certificate.momentum_max);
     printf("%s: drift %s penetration %s %g of the smallest body\n", stands ? "stands" : "does not stand",
            stands ? "and" : "or", stands ? "at most" : "above", o->limit);

@@ -58,7 +58,8 @@ static void write_row(FILE *out, const struct row *r)
     fprintf(out, "%s,", kinds[r->kind]);
     bench_write_csv_text(out, r->name);
     fprintf(out, ",%s,%s,%s,%d,", bench_word_of(bench_methods, (int)r->method),
-            bench_word_of(bench_backends, (int)r->series.backend), bench_precision_name(r->series.precision), r->series.threads);
+            bench_word_of(bench_backends, (int)r->series.backend), bench_precision_name(r->series.precision),
+            r->series.threads);
     bench_write_csv_text(out, r->series.runs_on);
     fprintf(out, ",%d,%d,%d", r->bodies, r->contacts, r->blocks);
     write_integer(out, r->limit);
@@ -189,7 +190,8 @@ static void print_cold_ratios(const struct rows *rows, const struct series *seri
 
 static void print_heading(const char *what, const struct series *s, FILE *out)
 {
-    fprintf(out, "### %s: %s %s", what, bench_word_of(bench_backends, (int)s->backend), bench_precision_name(s->precision));
+    fprintf(out, "### %s: %s %s", what, bench_word_of(bench_backends, (int)s->backend),
+            bench_precision_name(s->precision));
     if (s->backend == SADMM_BACKEND_CPU) fprintf(out, ", %d thread%s", s->threads, s->threads == 1 ? "" : "s");
     fprintf(out, "\n\n%s, commit %s\n\n", s->runs_on, sadmm_build_commit());
 }

@@ -112,7 +112,8 @@ static inline struct contact_problem *octagons(double friction)
     return p;
 }
 
-/* No pair has more than one point: one thread a pair. Each ball rests on two of the row below, the lowest on the ground. */
+/* No pair has more than one point: one thread a pair. Each ball rests on two of the row below, the lowest on the
+ * ground. */
 static inline struct contact_problem *balls(double friction)
 {
     static const double up[3] = {0, 0, 1};
@@ -283,7 +284,8 @@ static inline bool device_has(const struct sadmm_kernels *table, enum sadmm_cuda
     struct runner r;
     runner_create(&r, table);
     force_tier(table, r.c, tier);
-    const bool has = runner_begin(&r, &scenes[0], SADMM_METHOD_PAPER) == SADMM_OK || !strstr(r.error.message, "the device has no clusters");
+    const bool has = runner_begin(&r, &scenes[0], SADMM_METHOD_PAPER) == SADMM_OK ||
+                     !strstr(r.error.message, "the device has no clusters");
     runner_stop(&r);
     return has;
 #endif
@@ -296,9 +298,10 @@ static inline void set_abort(struct runner *r, enum cuda_abort abort_code)
 }
 
 #ifdef CUDA_EMULATED
-/* A solve in which runtime calls fail from number `calls` on: a status and a message, never a leak. False: it had fewer. */
-static inline bool solve_fails_at(const struct sadmm_kernels *table, enum sadmm_cuda_tier tier, const struct scene *scene,
-                                  const sadmm_settings *settings, long calls)
+/* A solve in which runtime calls fail from number `calls` on: a status and a message, never a leak. False: it had
+ * fewer. */
+static inline bool solve_fails_at(const struct sadmm_kernels *table, enum sadmm_cuda_tier tier,
+                                  const struct scene *scene, const sadmm_settings *settings, long calls)
 {
     struct contact_problem *p = make_problem(scene, settings);
     struct sadmm_plan plan = sadmm_plan_make(&p->system, settings);
@@ -315,7 +318,8 @@ static inline bool solve_fails_at(const struct sadmm_kernels *table, enum sadmm_
     }
     const bool reached = cuda_emulation_calls_left < 0;
     cuda_emulation_calls_left = -1;
-    ck_assert_msg(status == (reached ? SADMM_ERROR_DEVICE : SADMM_OK), "call %ld: %s", calls, sadmm_status_name(status));
+    ck_assert_msg(status == (reached ? SADMM_ERROR_DEVICE : SADMM_OK), "call %ld: %s", calls,
+                  sadmm_status_name(status));
     if (reached)
         ck_assert_msg(strstr(error.message, "CUDA device 1: ") && strstr(error.message, "launch failure"), "%s",
                       error.message);

@@ -77,7 +77,7 @@ typedef struct sadmm_settings {
                                     is <= certificate_momentum_tolerance; 0 = never; default 0 */
     double certificate_momentum_tolerance; /* dimensionless, > 0; default 1e-6. In single precision rounding alone may
                                               be a few 1e-6: ask for 1e-5 there */
-    int check_period;            /* iterations between convergence checks (of the tolerances above), in [1, 1000000]; default 10 */
+    int check_period; /* iterations between convergence checks (of the tolerances above), in [1, 1000000]; default 10 */
 
     bool measure_residuals;      /* report the residuals of the last iteration; default false */
     bool certify;                /* report the certificate of every step; default false */
@@ -88,10 +88,10 @@ typedef struct sadmm_settings {
     double correction_speed;     /* cap of the corrective normal speed, m/s, in [0, 1e3]; default 1 */
     double restitution_threshold;/* approach speed under which restitution is ignored, m/s, >= 0; default 0.1 */
 
-    int threads;                 /* CPU threads at most, in [0, 1024]; 0 = no bound; default 0. As many work as have enough
-                                    to do, no more than there are processors (0: than OMP_NUM_THREADS, where that is set)
-                                    or threads of a pool of the host's (tasks.h), and no more than the process can make;
-                                    reports say how many that were. Results do not depend on it */
+    int threads; /* CPU threads at most, in [0, 1024]; 0 = no bound; default 0. As many work as have
+                                    enough to do, no more than there are processors (0: than OMP_NUM_THREADS, where that
+                                    is set) or threads of a pool of the host's (tasks.h), and no more than the process
+                                    can make; reports say how many that were. Results do not depend on it */
 } sadmm_settings;
 
 SADMM_API sadmm_settings sadmm_settings_default(void);
@@ -106,7 +106,7 @@ typedef struct sadmm_residual {
 typedef struct sadmm_certificate {
     double ncp_max;          /* natural map, largest over constraints, m/s */
     double ncp_mean;         /* the same, mean over constraints, m/s */
-    int64_t ncp_worst;       /* index of the worst constraint: contacts first (in contact order), then blocks; -1: none */
+    int64_t ncp_worst; /* index of the worst constraint: contacts first (in contact order), then blocks; -1: none */
     double momentum_max;     /* |A v - b - J^T lambda| of the worst body over the largest |b|, |A v|, |J^T lambda|
                                 of any body (infinity norms), dimensionless */
     int64_t momentum_worst;  /* index of that body among the dynamic ones; -1: none */

@@ -1,5 +1,5 @@
-/* Constraints given by rows: which lane each has, and kernels C and D, their rows from the system's doubles into this precision's
- * slots. */
+/* Constraints given by rows: which lane each has, and kernels C and D, their rows from the system's doubles into this
+ * precision's slots. */
 #include "core/base/memory.h"
 #include "core/math/contact.h"
 #include "core/math/row.h"
@@ -63,7 +63,8 @@ bool CPU(lay_out_rows)(struct sadmm_context *c)
         for (int l = 0; l < LANES; ++l) {
             int32_t index = c->row_order[k * (size_t)LANES + (size_t)l];
             block->constraint[l] = index;
-            if (index >= 0 && constraint_of(c, index)->count > block->slots) block->slots = constraint_of(c, index)->count;
+            if (index >= 0 && constraint_of(c, index)->count > block->slots)
+                block->slots = constraint_of(c, index)->count;
         }
         c->row_slot_count += (size_t)block->slots;
     }

@@ -119,7 +119,8 @@ static sadmm_status iterate(struct sadmm_context *c, int count, bool measure, st
     return status;
 }
 
-static sadmm_status measure_residuals(struct sadmm_context *c, struct sadmm_residual *residual, struct sadmm_error *error)
+static sadmm_status measure_residuals(struct sadmm_context *c, struct sadmm_residual *residual,
+                                      struct sadmm_error *error)
 {
     return is_fast(c) ? sadmm_ref_measure_fast(c, residual) : sadmm_ref_measure_residuals(c, residual, error);
 }

@@ -316,7 +316,8 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
     }
     if (c->changed_count == 0 && c->list_valid && !renew) return SADMM_OK;
 
-    one_by_one = c->list_valid && !renew && !plane_changed && c->kind->pairs_of && c->changed_count * ONE_BY_ONE < present;
+    one_by_one =
+        c->list_valid && !renew && !plane_changed && c->kind->pairs_of && c->changed_count * ONE_BY_ONE < present;
     c->broad_phase_valid = c->list_valid = false;
     c->margin = input->margin;
     if (renew) c->gravity_fall = gravity_fall;

@@ -78,8 +78,8 @@ static bool reserve_parts(struct sadmm_collision *collision, size_t count)
 }
 
 /* Copy share `share` of `shares` of a part into the set, from its pair `to_pair` and point `to_point` on. */
-static void copy_share(struct sadmm_contact_set *set, const struct sadmm_contact_set *part, size_t to_pair, size_t to_point,
-                       size_t share, size_t shares)
+static void copy_share(struct sadmm_contact_set *set, const struct sadmm_contact_set *part, size_t to_pair,
+                       size_t to_point, size_t share, size_t shares)
 {
     size_t pair = part->pair_count * share / shares, pair_end = part->pair_count * (share + 1) / shares,
            point = part->point_count * share / shares, point_end = part->point_count * (share + 1) / shares;
@@ -141,7 +141,8 @@ static void find_share(void *argument, int thread, int threads)
     size_t begin, end;
     sadmm_share(f->collision->candidates.list.count, thread, threads, &begin, &end);
     out->pair_count = out->point_count = 0;
-    if (!sadmm_narrow_phase(&f->collision->candidates, f->input, begin, end, f->old, out)) atomic_store(&f->failed, true);
+    if (!sadmm_narrow_phase(&f->collision->candidates, f->input, begin, end, f->old, out))
+        atomic_store(&f->failed, true);
 }
 
 static bool find_in_threads(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
@@ -150,7 +151,8 @@ static bool find_in_threads(struct sadmm_collision *collision, const struct sadm
     struct finding finding = {.collision = collision, .input = input, .old = old};
     const int ran = sadmm_parallel(input->team, threads, find_share, &finding);
     collision->spare.dt = input->dt;
-    return !atomic_load(&finding.failed) && append_parts(&collision->spare, input->team, collision->parts, (size_t)ran - 1);
+    return !atomic_load(&finding.failed) &&
+           append_parts(&collision->spare, input->team, collision->parts, (size_t)ran - 1);
 }
 
 sadmm_status sadmm_collision_find(struct sadmm_collision *collision, const struct sadmm_collision_input *input,

@@ -111,8 +111,8 @@ static __device__ real4 pack(vec3 a, double w)
     return out;
 }
 
-/* contacts.lanes threads a pair, each every contacts.lanes-th point; the first also what the points share. FAST: records
- * of sides, too. */
+/* contacts.lanes threads a pair, each every contacts.lanes-th point; the first also what the points share. FAST:
+ * records of sides, too. */
 template <bool FAST>
 static __global__ void __launch_bounds__(BODY_THREADS)
     assemble_contacts_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
@@ -175,4 +175,7 @@ extern "C" sadmm_status CUDA(assemble_contacts)(struct sadmm_context *c, struct 
         BODY_THREADS, &args, error);
 }
 
-sadmm_status CUDA(enqueue_bodies)(struct sadmm_context *c, struct sadmm_error *error) { return launch_bodies(c, error); }
+sadmm_status CUDA(enqueue_bodies)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    return launch_bodies(c, error);
+}

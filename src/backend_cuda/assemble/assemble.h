@@ -1,4 +1,5 @@
-/* Bodies, contacts and rows into the solver's form: what other folders call. Launches only, but for the memory of rows. */
+/* Bodies, contacts and rows into the solver's form: what other folders call. Launches only, but for the memory of
+ * rows. */
 #ifndef SADMM_CUDA_ASSEMBLE_ASSEMBLE_H
 #define SADMM_CUDA_ASSEMBLE_ASSEMBLE_H
 

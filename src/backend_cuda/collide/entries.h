@@ -34,12 +34,12 @@ sadmm_status COLLISION(attach)(struct sadmm_cuda_collision *collision, void *str
                                const struct sadmm_collision_input *input, const struct sadmm_collision_body *bodies,
                                const int32_t *abort_code, const double *dt, const double *gravity,
                                struct sadmm_error *error);
-/* Capacity for so many candidates and points in both sets, which keep what they hold. 0: what a scene of this size is likely
- * to need. Everything enqueued must be done. *candidates and *points: the capacities now, at least as much. */
+/* Capacity for so many candidates and points in both sets, which keep what they hold. 0: what a scene of this size is
+ * likely to need. Everything enqueued must be done. *candidates and *points: the capacities now, at least as much. */
 sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *collision, int64_t *candidates, int64_t *points,
                                 struct sadmm_error *error);
-/* Launches alone, so that a graph may record them: find contacts into set `into` (0 or 1), from the other one. The counts
- * say afterwards whether everything fitted (nothing is written to the set when not). */
+/* Launches alone, so that a graph may record them: find contacts into set `into` (0 or 1), from the other one. The
+ * counts say afterwards whether everything fitted (nothing is written to the set when not). */
 sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *collision, void *stream, int into,
                                 struct sadmm_error *error);
 /* A set's pointers; counts are not filled. */

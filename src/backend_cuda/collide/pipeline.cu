@@ -1,7 +1,7 @@
 /* The pipeline's entries: contact sets to and fro, finds.
  *
- * Pinned memory is written only while nothing reads it: every entry that leaves work on the stream behind sets `pending`,
- * and the next one waits first.
+ * Pinned memory is written only while nothing reads it: every entry that leaves work on the stream behind sets
+ * `pending`, and the next one waits first.
  */
 #include <string.h>
 

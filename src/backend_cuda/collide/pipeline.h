@@ -33,7 +33,8 @@ struct sadmm_cuda_collision_stats {
 struct sadmm_cuda_collision_tuning {
     int32_t tree_from;  /* shapes; below, all pairs are tested */
     int64_t radix_from; /* capacity for candidates; below, they are ranked by counting */
-    int64_t first_capacity; /* the next find starts with this capacity for candidates and points, whatever is allocated */
+    int64_t
+        first_capacity; /* the next find starts with this capacity for candidates and points, whatever is allocated */
 };
 
 #include "entries.h"

@@ -1,4 +1,5 @@
-/* The stages of a find: capacities and launches, repeated until everything fits, or enqueued once with the capacities there are.
+/* The stages of a find: capacities and launches, repeated until everything fits, or enqueued once with the capacities
+ * there are.
  */
 #include <algorithm>
 
@@ -178,8 +179,8 @@ static sadmm_status place_shapes(struct sadmm_cuda_collision *c, bool tree, stru
     return tree ? build_tree(c, error) : SADMM_OK;
 }
 
-sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots, struct sadmm_cuda_contact_counts *counts,
-                                   struct sadmm_error *error)
+sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots,
+                                   struct sadmm_cuda_contact_counts *counts, struct sadmm_error *error)
 {
     struct collision_view *v = &c->view;
     const bool tree = v->leaf_count >= c->tree_from;
@@ -208,7 +209,8 @@ sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots,
                               (long long)counts->candidates, (int)MOST_CANDIDATES);
         if (counts->candidates > c->candidate_capacity)
             c->candidate_capacity = std::min(generous(counts->candidates), MOST_CANDIDATES);
-        else if (counts->points > c->point_capacity) c->point_capacity = std::min<int64_t>(generous(counts->points), INT32_MAX);
+        else if (counts->points > c->point_capacity)
+            c->point_capacity = std::min<int64_t>(generous(counts->points), INT32_MAX);
         else return SADMM_OK;
         ++c->stats.repeats;
         CUDA_CALL(c, cudaMemsetAsync(v->candidate_count, 0, sizeof *v->candidate_count, c->stream),
@@ -242,7 +244,8 @@ static sadmm_status keep_capacity(struct sadmm_cuda_collision *c, int name, size
     c->buffers[name].data = nullptr; /* the capacity stays: growth is by half at least */
     sadmm_status status = reserve(c, name, count, size, error);
     if (status == SADMM_OK) {
-        cudaError_t code = cudaMemcpyAsync(in<void>(c, name), old.data, old.capacity, cudaMemcpyDeviceToDevice, c->stream);
+        cudaError_t code =
+            cudaMemcpyAsync(in<void>(c, name), old.data, old.capacity, cudaMemcpyDeviceToDevice, c->stream);
         if (code == cudaSuccess) code = cudaStreamSynchronize(c->stream);
         if (code != cudaSuccess) status = fail(c, code, "cudaMemcpyAsync on the device", error);
     }

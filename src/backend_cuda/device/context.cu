@@ -148,7 +148,8 @@ void CUDA(plan_settings)(struct sadmm_context *c, const struct sadmm_settings *s
     c->view.model.wrenches = settings->recover_wrenches;
 }
 
-sadmm_status CUDA(use_settings)(struct sadmm_context *c, const struct sadmm_settings *settings, struct sadmm_error *error)
+sadmm_status CUDA(use_settings)(struct sadmm_context *c, const struct sadmm_settings *settings,
+                                struct sadmm_error *error)
 {
     double numbers[SADMM_SETTING_NUMBERS];
     const struct cuda_settings kept = {*settings, gravity_size(settings->gravity)};
@@ -230,8 +231,8 @@ sadmm_status CUDA(launch)(struct sadmm_context *c, cuda_kernel kernel, const cha
     return CUDA(launch_of)(c, kernel, name, blocks, THREADS, args, error);
 }
 
-static sadmm_status launch_blocks(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
-                                  bool early, const cuda_args *args, struct sadmm_error *error)
+static sadmm_status launch_blocks(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
+                                  int threads, bool early, const cuda_args *args, struct sadmm_error *error)
 {
     struct cuda_partition plain = {};
     if (blocks <= 0) return SADMM_OK;
@@ -247,8 +248,8 @@ sadmm_status CUDA(launch_of)(struct sadmm_context *c, cuda_kernel kernel, const 
     return launch_blocks(c, kernel, name, blocks, threads, false, args, error);
 }
 
-sadmm_status CUDA(launch_early)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
-                                const cuda_args *args, struct sadmm_error *error)
+sadmm_status CUDA(launch_early)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
+                                int threads, const cuda_args *args, struct sadmm_error *error)
 {
     return launch_blocks(c, kernel, name, blocks, threads, true, args, error);
 }

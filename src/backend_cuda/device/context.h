@@ -1,4 +1,5 @@
-/* A context of the CUDA backend: device, streams, buffers, what the entries are made of. What kernels see is in view.h. */
+/* A context of the CUDA backend: device, streams, buffers, what the entries are made of. What kernels see is in
+ * view.h. */
 #ifndef SADMM_CUDA_DEVICE_CONTEXT_H
 #define SADMM_CUDA_DEVICE_CONTEXT_H
 
@@ -19,7 +20,8 @@ enum cuda_buffer_name {
     /* device */
     BUFFER_STATE, BUFFER_B, BUFFER_LINES, BUFFER_C, BUFFER_BETA,
     BUFFER_NORMAL, BUFFER_DIFFERENCE, BUFFER_PAIR_BODIES, BUFFER_ARM, BUFFER_LAMBDA,
-    BUFFER_ROW_CONSTRAINTS, BUFFER_ROWS, BUFFER_ROW_RESPONSES, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_EXCHANGE, BUFFER_LIVE, BUFFER_LAYOUT, BUFFER_SORT,
+    BUFFER_ROW_CONSTRAINTS, BUFFER_ROWS, BUFFER_ROW_RESPONSES, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_EXCHANGE,
+    BUFFER_LIVE, BUFFER_LAYOUT, BUFFER_SORT,
     BUFFER_NUMBERS, BUFFER_SCALARS, BUFFER_SETTINGS, BUFFER_WEIGHTS, BUFFER_SIDES,
     BUFFER_RAW_BODIES, BUFFER_RAW_PAIRS, BUFFER_RAW_POINTS, BUFFER_RAW_ROWS, BUFFER_OUT,
     BUFFER_WORLD_BODIES, BUFFER_WORLD_STEADY, BUFFER_WORLD_WRENCH, BUFFER_WORLD_VELOCITY, BUFFER_WORLD_IMPULSE,
@@ -40,7 +42,7 @@ struct sadmm_context {
     const struct sadmm_system *system;
     struct sadmm_plan plan;
     struct sadmm_settings settings;
-    double numbers[SADMM_SETTING_NUMBERS]; /* of the settings that are, or will be, in BUFFER_SETTINGS; dt = 0: unknown */
+    double numbers[SADMM_SETTING_NUMBERS]; /* that are, or will be, in BUFFER_SETTINGS; dt = 0: unknown */
     cuda_view view;
     cuda_buffer buffers[BUFFER_COUNT];
     bool starting; /* no iteration yet: the next Step 1 uses J^T lambda^0, which `records` may not hold yet */
@@ -53,7 +55,7 @@ struct sadmm_context {
     int refreshes; /* fast: of the weights, in this solve */
     int exact_since; /* fast: iterations since the momentum residuals were taken */
     int checks;     /* fast: at the stop rule, in this step */
-    bool prologue;     /* fast: of the whole step that is enqueued, the iterating kernels do the prologue and the epilogue (iterate/prologue.h) */
+    bool prologue; /* fast: the iterating kernels of the step enqueued do prologue and epilogue (iterate/prologue.h) */
     unsigned cleared; /* enum cuda_scalar: those that a kernel of this step has set to 0 for their first use */
     bool recording; /* a graph of the whole step: nothing is allocated, no graph launched in it */
 
@@ -86,10 +88,10 @@ sadmm_status CUDA(launch)(struct sadmm_context *, cuda_kernel kernel, const char
 /* The same with blocks of so many threads. */
 sadmm_status CUDA(launch_of)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
                              const cuda_args *args, struct sadmm_error *error);
-/* The same for a kernel that waits itself (wait_for_stream): in a whole step it comes to its multiprocessors while the ones
- * before it end. */
-sadmm_status CUDA(launch_early)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
-                                const cuda_args *args, struct sadmm_error *error);
+/* The same for a kernel that waits itself (wait_for_stream): in a whole step it comes to its multiprocessors while the
+ * ones before it end. */
+sadmm_status CUDA(launch_early)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks,
+                                int threads, const cuda_args *args, struct sadmm_error *error);
 /* How many of the partition's clusters the device runs side by side; 0: clusters that large do not exist. */
 cudaError_t CUDA(active_clusters)(const struct sadmm_context *, cuda_kernel kernel,
                                   const struct cuda_partition *partition, int *clusters);
@@ -108,10 +110,11 @@ sadmm_status CUDA(wait)(struct sadmm_context *, struct sadmm_error *error);
 /* The settings that are no numbers: from the next launch, or recording, on. */
 void CUDA(plan_settings)(struct sadmm_context *, const struct sadmm_settings *settings);
 /* All of them, the numbers into device memory. Nothing may be enqueued. */
-sadmm_status CUDA(use_settings)(struct sadmm_context *, const struct sadmm_settings *settings, struct sadmm_error *error);
+sadmm_status CUDA(use_settings)(struct sadmm_context *, const struct sadmm_settings *settings,
+                                struct sadmm_error *error);
 
-/* The context's device is current while this lives; then the caller's again. (Unnamed: a test program links these sources
- * twice, for a device and emulated, and each must keep its own.) */
+/* The context's device is current while this lives; then the caller's again. (Unnamed: a test program links these
+ * sources twice, for a device and emulated, and each must keep its own.) */
 namespace {
 struct device_scope {
     int before;

@@ -45,8 +45,8 @@ sadmm_status CUDA(integrate)(struct sadmm_context *, struct sadmm_rigid *next, s
 sadmm_status CUDA(recover_wrenches)(struct sadmm_context *, double *wrench, struct sadmm_error *);
 
 /* core/solve/resident.h */
-sadmm_status CUDA(load_world)(struct sadmm_context *, const struct sadmm_resident_world *, const struct sadmm_settings *,
-                              struct sadmm_error *);
+sadmm_status CUDA(load_world)(struct sadmm_context *, const struct sadmm_resident_world *,
+                              const struct sadmm_settings *, struct sadmm_error *);
 sadmm_status CUDA(step_world)(struct sadmm_context *, const struct sadmm_settings *, const struct sadmm_resident_edit *,
                               size_t, struct sadmm_error *);
 sadmm_status CUDA(wait_world)(struct sadmm_context *, struct sadmm_resident_report *, struct sadmm_error *);

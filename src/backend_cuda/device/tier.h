@@ -26,7 +26,8 @@ void sadmm_cuda_force_cluster(const struct sadmm_kernels *kernels, struct sadmm_
 enum sadmm_cuda_tier sadmm_cuda_tier_of(const struct sadmm_kernels *kernels, const struct sadmm_context *context,
                                         int32_t *blocks);
 
-/* Whole steps: the first capacities for candidates and points; 0: by the number of shapes. Before the world's first step. */
+/* Whole steps: the first capacities for candidates and points; 0: by the number of shapes. Before the world's first
+ * step. */
 void sadmm_cuda_tune_capacities(const struct sadmm_kernels *kernels, struct sadmm_context *context,
                                 int64_t first_capacity);
 

@@ -1,5 +1,6 @@
-/* The layout of the constraint graph (device/layout.h): what other folders call. Counts and capacities in the view, then
- * reserve_layout (it allocates); then per step, by enqueueing only: statistics and layout of what view.raw points to. */
+/* The layout of the constraint graph (device/layout.h): what other folders call. Counts and capacities in the view,
+ * then reserve_layout (it allocates); then per step, by enqueueing only: statistics and layout of what view.raw points
+ * to. */
 #ifndef SADMM_CUDA_GRAPH_GRAPH_H
 #define SADMM_CUDA_GRAPH_GRAPH_H
 

@@ -1,4 +1,5 @@
-/* The layout on the host's side (device/layout.h): its arrays, what enqueues its stages, and what is known of a step. */
+/* The layout on the host's side (device/layout.h): its arrays, what enqueues its stages, and what is known of a
+ * step. */
 #include <string.h>
 
 #include "graph.h"

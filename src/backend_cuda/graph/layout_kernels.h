@@ -1,18 +1,18 @@
-/* The layout (device/layout.h) of a step, made on the device from core's own pairs and row constraints: compiled once, for both
- * precisions.
+/* The layout (device/layout.h) of a step, made on the device from core's own pairs and row constraints: compiled once,
+ * for both precisions.
  *
- *   statistics    a thread a record: statistics of the pairs, the body of every side, degrees, islands joined
- *             a thread a body: islands labelled by their smallest body, statistics of the bodies
- *   layout    bodies sorted by label (where islands matter), sides sorted by slot, both stably; where a body's sides
- *             begin; parts
+ *   statistics  a thread a record: statistics of the pairs, the body of every side, degrees, islands joined
+ *               a thread a body: islands labelled by their smallest body, statistics of the bodies
+ *   layout      bodies sorted by label (where islands matter), sides sorted by slot, both stably; where a body's sides
+ *               begin; parts
  *
  * Islands are a union-find forest whose roots are only ever hooked under smaller ones (Jaiganesh and Burtscher, A
  * High-Performance Connected Components Implementation for GPUs, HPDC 2018): whatever the timing, an island's root ends
  * up to be its smallest body.
  *
- * A small scene takes one kernel of one block for both stages, its arrays in shared memory (graph/layout_small.cu): a launch
- * costs as much as such a stage. Both ways give the same layout. The functions below only enqueue, so that they can be
- * captured into a graph.
+ * A small scene takes one kernel of one block for both stages, its arrays in shared memory (graph/layout_small.cu): a
+ * launch costs as much as such a stage. Both ways give the same layout. The functions below only enqueue, so that they
+ * can be captured into a graph.
  */
 #ifndef SADMM_CUDA_GRAPH_LAYOUT_KERNELS_H
 #define SADMM_CUDA_GRAPH_LAYOUT_KERNELS_H

@@ -1,5 +1,5 @@
-/* The method `fast`: energies of islands, and by what they are slowed down (math/limit.h). In double, from this precision's data;
- * eight lanes a body. */
+/* The method `fast`: energies of islands, and by what they are slowed down (math/limit.h). In double, from this
+ * precision's data; eight lanes a body. */
 #ifndef SADMM_CUDA_ITERATE_ENERGIES_H
 #define SADMM_CUDA_ITERATE_ENERGIES_H
 
@@ -18,8 +18,8 @@ static inline __device__ double work_of(const contact_view &contacts, int32_t p)
     return work;
 }
 
-/* Terms of a body, one a lane: energy of v, of A^-1 b, of r = b + g - A v, g = J^T lambda; work; v . b / 2. A pair counts at
- * its first dynamic body. Every lane of the warp comes here. */
+/* Terms of a body, one a lane: energy of v, of A^-1 b, of r = b + g - A v, g = J^T lambda; work; v . b / 2. A pair
+ * counts at its first dynamic body. Every lane of the warp comes here. */
 template <bool RIGID>
 static __device__ __forceinline__ double energies_of_body(const cuda_view &v, const body_thread &t)
 {

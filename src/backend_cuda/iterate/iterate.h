@@ -24,14 +24,15 @@ sadmm_status CUDA(enqueue_limit)(struct sadmm_context *, bool suspected, struct 
 /* ---- streamed.cu ---- */
 
 /* STREAM. fast, goes_on: none of them is the batch's last. */
-sadmm_status CUDA(stream_iterations)(struct sadmm_context *, int count, bool measure, bool goes_on, struct sadmm_error *error);
+sadmm_status CUDA(stream_iterations)(struct sadmm_context *, int count, bool measure, bool goes_on,
+                                     struct sadmm_error *error);
 /* Before a measured iteration: its primal residual. */
 sadmm_status CUDA(clear_primal)(struct sadmm_context *, bool measure, struct sadmm_error *error);
 
 /* ---- persistent.cu ---- */
 
-/* The instance of the persistent kernel for a tier (rows: there are constraints given by rows); threads a block at most;
- * bytes of shared memory. */
+/* The instance of the persistent kernel for a tier (rows: there are constraints given by rows); threads a block at
+ * most; bytes of shared memory. */
 cuda_kernel CUDA(persistent_kernel)(int point_slots, enum sadmm_cuda_tier tier, int threads, bool rows, bool fast,
                                     const char **name);
 int CUDA(persistent_threads)(int point_slots, bool rows);
@@ -39,8 +40,8 @@ size_t CUDA(persistent_shared)(enum sadmm_cuda_tier tier, int threads, int32_t m
 /* Whether the instance for a partition, without constraints given by rows, does the prologue and the epilogue of a
  * step of `fast`, too. */
 bool CUDA(persistent_does_prologue)(const struct cuda_partition *);
-/* Let every instance use `bytes` of shared memory a block, and clusters of more than 8 blocks. *clusters: whether both the
- * device and the code that was loaded for it know clusters. */
+/* Let every instance use `bytes` of shared memory a block, and clusters of more than 8 blocks. *clusters: whether both
+ * the device and the code that was loaded for it know clusters. */
 cudaError_t CUDA(persistent_allow)(int bytes, bool device_has_clusters, bool *clusters);
 
 /* ---- partition.cu ---- */

@@ -1,9 +1,10 @@
-/* The method `fast`: the limit of energies (math/limit.h). In double, from this precision's data; once a step, eight lanes a body.
+/* The method `fast`: the limit of energies (math/limit.h). In double, from this precision's data; once a step, eight
+ * lanes a body.
  *
- *   suspect   is there a body with more energy than its free motion has, or that bounces? Else no island does. Persistent
- *             kernels test that themselves, those of tier BLOCK see to the rest too
- *   limit     nothing, unless there is one: energies and work, sums over islands (weight/island_sums.h), the factor of each
- *             island's velocities. Whole steps apply it where they move bodies (step/kernels.cu)
+ *   suspect   is there a body with more energy than its free motion has, or that bounces? Else no island does.
+ *             Persistent kernels test that themselves, those of tier BLOCK see to the rest too
+ *   limit     nothing, unless there is one: energies and work, sums over islands (weight/island_sums.h), the factor of
+ *             each island's velocities. Whole steps apply it where they move bodies (step/kernels.cu)
  */
 #include <string.h>
 

@@ -1,15 +1,14 @@
 /* Which tier a step runs in, on how many thread blocks of how many threads: from statistics of its constraint graph.
  *
  * A part costs its sides + its bodies, and the layout gives every part an even share of all cost, rounded up to whole
- * islands (BLOCK, CLUSTER) or bodies (GRID). That bounds the largest part before it is made. The threads and the shared memory of a
- * launch are sized above the bound: statistics may be those of a step before, and contacts come and
- * go.
+ * islands (BLOCK, CLUSTER) or bodies (GRID). That bounds the largest part before it is made. The threads and the shared
+ * memory of a launch are sized above the bound: statistics may be those of a step before, and contacts come and go.
  *
- * Which tier. An iteration takes what its barrier and its longest chain of dependent instructions take, and then the time
- * a multiprocessor needs for the sides it holds: its warps take turns. A thread block to an island has the cheapest
- * barrier; a cluster shares an island among 2 to 16 multiprocessors, and pays for it with a dearer barrier and velocities
- * from other multiprocessors; the grid shares among all of them, through memory. Whatever fits and is estimated to be
- * the fastest is taken, which comes to this:
+ * Which tier. An iteration takes what its barrier and its longest chain of dependent instructions take, and then the
+ * time a multiprocessor needs for the sides it holds: its warps take turns. A thread block to an island has the
+ * cheapest barrier; a cluster shares an island among 2 to 16 multiprocessors, and pays for it with a dearer barrier and
+ * velocities from other multiprocessors; the grid shares among all of them, through memory. Whatever fits and is
+ * estimated to be the fastest is taken, which comes to this:
  *   BLOCK    islands of up to about a hundred sides, and larger ones where there are so many islands that every
  *            multiprocessor has enough to do anyway
  *   CLUSTER  else, whenever a cluster can hold an island: its size such that a block holds some tens of sides, or as
@@ -22,10 +21,10 @@
 #include "iterate.h"
 
 enum {
-    QUAD = 4,          /* threads a side */
-    SPREAD = 48,       /* sides a block of the grid at least: below that, barriers of more blocks cost more than they gain */
-    MOST_BLOCKS = 16,  /* thread blocks a multiprocessor */
-    MOST_CLUSTER = 16  /* thread blocks a cluster */
+    QUAD = 4,    /* threads a side */
+    SPREAD = 48, /* sides a block of the grid at least: below that, barriers of more blocks cost more than they gain */
+    MOST_BLOCKS = 16, /* thread blocks a multiprocessor */
+    MOST_CLUSTER = 16 /* thread blocks a cluster */
 };
 
 /* Nanoseconds of an iteration: floors of the tiers, of a cluster for each of its blocks, and of each side that a
@@ -49,7 +48,8 @@ struct bound {
     int64_t sides, bodies;
 };
 
-/* Threads for a part within the bound, with an eighth to spare; beyond `most` there is no margin, then it does not fit. */
+/* Threads for a part within the bound, with an eighth to spare; beyond `most` there is no margin, then it does not
+ * fit. */
 static int64_t threads_for(struct bound bound, int64_t most)
 {
     int64_t wanted = larger(QUAD * (bound.sides + bound.sides / 8), LANES * bound.bodies);
@@ -119,10 +119,11 @@ static struct choice choose_block(const struct sadmm_context *c, const struct cu
 {
     static const char too_large[] = "an island does not fit a thread block";
     if (c->refused >> SADMM_CUDA_TIER_BLOCK & 1) return no_choice(refused);
-    const int64_t most = CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0), most_sides = most / QUAD;
+    const int64_t most = CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0),
+                  most_sides = most / QUAD;
     if (statistics->island_sides > most_sides) return no_choice(too_large);
-    /* As many blocks a multiprocessor as run side by side and find an island each; when that is too few for the memory a
-     * block has, blocks that run one after another. */
+    /* As many blocks a multiprocessor as run side by side and find an island each; when that is too few for the memory
+     * a block has, blocks that run one after another. */
     int64_t parts = c->multiprocessors, side_by_side = 1;
     while (side_by_side < MOST_BLOCKS && 2 * parts <= statistics->islands &&
            2 * side_by_side * threads_for(island_bound(c, statistics, 2 * parts), most) <= most) {
@@ -154,10 +155,11 @@ static struct choice choose_cluster_of(const struct sadmm_context *c, const stru
 {
     static const char too_large[] = "an island does not fit a cluster of thread blocks";
     const char *name = nullptr;
-    const int64_t most = CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0), most_sides = most / QUAD;
+    const int64_t most = CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0),
+                  most_sides = most / QUAD;
     const int64_t cost = (int64_t)statistics->sides + c->view.model.bodies;
-    /* As many clusters as find a multiprocessor for each of their blocks; when that is too few for the memory a block has,
-     * clusters that run one after another. */
+    /* As many clusters as find a multiprocessor for each of their blocks; when that is too few for the memory a block
+     * has, clusters that run one after another. */
     int64_t clusters = statistics->islands <= 1 ? 1 : larger(c->multiprocessors / size, 1);
     struct bound bound;
     for (;; clusters += clusters / 4 + 1) {
@@ -177,8 +179,8 @@ static struct choice choose_cluster_of(const struct sadmm_context *c, const stru
     if (choice.partition.threads > most || !take_capacity(c, &choice.partition, bound, c->shared_limit))
         return no_choice(too_large);
     int active = 0;
-    cuda_kernel kernel =
-        CUDA(persistent_kernel)(statistics->point_slots, SADMM_CUDA_TIER_CLUSTER, INT_MAX, c->view.rows.count > 0, c->fast, &name);
+    cuda_kernel kernel = CUDA(persistent_kernel)(statistics->point_slots, SADMM_CUDA_TIER_CLUSTER, INT_MAX,
+                                                 c->view.rows.count > 0, c->fast, &name);
     *code = CUDA(active_clusters)(c, kernel, &choice.partition, &active);
     if (*code != cudaSuccess || active < 1) return no_choice("the device has no clusters that large");
     const int64_t rounds = up(smaller(clusters, larger(statistics->islands, 1)), active);
@@ -226,8 +228,8 @@ static struct choice choose_grid(const struct sadmm_context *c, const struct cud
         choice.partition.threads = (int32_t)threads;
         if (!take_capacity(c, &choice.partition, bound, c->shared_limit / side_by_side)) continue;
         int resident = 0;
-        cuda_kernel kernel =
-            CUDA(persistent_kernel)(statistics->point_slots, SADMM_CUDA_TIER_GRID, INT_MAX, c->view.rows.count > 0, c->fast, &name);
+        cuda_kernel kernel = CUDA(persistent_kernel)(statistics->point_slots, SADMM_CUDA_TIER_GRID, INT_MAX,
+                                                     c->view.rows.count > 0, c->fast, &name);
         *code = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, (const void *)kernel,
                                                               choice.partition.threads, choice.partition.shared);
         if (*code != cudaSuccess || parts > (int64_t)resident * c->multiprocessors) return no_choice(too_large);
@@ -286,7 +288,8 @@ void CUDA(tighten_partition)(const struct sadmm_context *c, const struct cuda_gr
     if (partition->tier == SADMM_CUDA_TIER_STREAM) return;
     const struct bound bound = {statistics->part_sides, statistics->part_bodies};
     struct cuda_partition tight = *partition;
-    tight.threads = (int32_t)threads_for(bound, CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0));
+    tight.threads =
+        (int32_t)threads_for(bound, CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0));
     if (tight.threads < partition->threads && take_capacity(c, &tight, bound, (int64_t)partition->shared))
         *partition = tight;
 }

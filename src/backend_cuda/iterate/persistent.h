@@ -12,8 +12,8 @@
  *            cooperative, so that every block runs and the spinning ends.
  * A quad takes a side of a constraint given by rows, too, up to two rows a lane (persistent_rows.h).
  *
- * On entry and exit everything is in global memory as the stepwise kernels leave it. Before the first iteration and after
- * the last one of a step, BLOCK may also do what else an island needs (prologue.h).
+ * On entry and exit everything is in global memory as the stepwise kernels leave it. Before the first iteration and
+ * after the last one of a step, BLOCK may also do what else an island needs (prologue.h).
  */
 #ifndef SADMM_CUDA_ITERATE_PERSISTENT_H
 #define SADMM_CUDA_ITERATE_PERSISTENT_H
@@ -39,11 +39,11 @@ static __device__ __forceinline__ bool nothing_to_do(const model_view &model, co
     return first == end || (FAST && MODE == BLOCK && part_stopped(graph, islands, args.checks, first, end));
 }
 
-/* All iterations of a batch by the method `fast` (math/relax.h): Steps 2-4, then Step 1. An iteration has the barriers of
- * the other method's. ROWS: some side may be of a constraint given by rows. */
+/* All iterations of a batch by the method `fast` (math/relax.h): Steps 2-4, then Step 1. An iteration has the barriers
+ * of the other method's. ROWS: some side may be of a constraint given by rows. */
 template <int MODE, int SIZE, bool ROWS, class Part>
-static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view &v, const cuda_args &args, real relaxation,
-                                                    row_lane *rows, unsigned *target)
+static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view &v, const cuda_args &args,
+                                                    real relaxation, row_lane *rows, unsigned *target)
 {
     int32_t count = args.count, batch = args.goes_on ? count + 1 : count, settled = args.settled;
     /* Were it the launch's constant, and not a choice, it would be fetched in every iteration. */
@@ -68,8 +68,8 @@ static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view 
 
 /* The same by the method `paper`: Step 1, then Steps 2-4. */
 template <int MODE, int SIZE, bool ROWS, class Part>
-static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view &v, const cuda_args &args, row_lane *rows,
-                                                     unsigned *target)
+static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view &v, const cuda_args &args,
+                                                     row_lane *rows, unsigned *target)
 {
     for (int32_t iteration = 1; iteration <= args.count; ++iteration) {
         const int32_t odd = iteration & 1;
@@ -102,8 +102,8 @@ static __device__ __forceinline__ void run_batch(Part &part, const cuda_view &v,
         arrive<MODE, SIZE>(v.iteration.barrier);
         wait<MODE, SIZE>(v.iteration.barrier, 0);
     }
-    /* After the iterations: what has come takes a place beside them. A cooperative launch ends 10 us later for it, and after
-     * clusters it gains nothing. */
+    /* After the iterations: what has come takes a place beside them. A cooperative launch ends 10 us later for it, and
+     * after clusters it gains nothing. */
     if (MODE == BLOCK) let_next_begin();
     part.store(args.count & 1);
     if (ROWS && part.row_sides && part.is_row_side() && !part.side_stopped()) rows.store(part.lane);
@@ -120,7 +120,8 @@ static __device__ __forceinline__ void run_batch(Part &part, const cuda_view &v,
     }
 }
 
-/* A multiprocessor holds one block at least: unless told so the compiler gives a block of one warp fewer registers than it needs. */
+/* A multiprocessor holds one block at least: unless told so the compiler gives a block of one warp fewer registers than
+ * it needs. */
 template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST>
 static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     persistent_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)

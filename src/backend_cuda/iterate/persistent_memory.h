@@ -31,7 +31,8 @@ enum { FETCHED_FIRST = 4 };
 struct part_memory {
     solver_real *state;      /* CLUSTER: of even, then of odd iterations; bodies x ROW each, then a row of 0 */
     solver_real *records;    /* sides x ROW, and FETCHED_FIRST rows that are read and not used */
-    solver_real *lines, *b;  /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x line, ROW; FAST:
+    solver_real *lines,
+        *b; /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x line, ROW; FAST:
                                 the momentum residual in place of b */
     int32_t *suspected;      /* a body of the part has too much energy */
     /* Before the first iteration and after the last one, over what is above (iterate/prologue.h): */
@@ -68,8 +69,8 @@ template <int MODE, int SIZE> static __device__ __forceinline__ void arrive(unsi
     (void)arrivals;
 #else
     if (MODE == GRID) {
-        /* One thread of a block speaks for it: its release and acquire, with the block's own barriers around them, order
-         * every thread's writes before every thread's reads. */
+        /* One thread of a block speaks for it: its release and acquire, with the block's own barriers around them,
+         * order every thread's writes before every thread's reads. */
         __syncthreads();
         if (threadIdx.x == 0) asm volatile("red.release.gpu.global.add.u32 [%0], 1;" ::"l"(arrivals) : "memory");
     }

@@ -16,7 +16,8 @@ struct row_lane {
     bool cone, stores;                   /* stores: of its constraint's two sides this one writes multipliers */
     bool cones;                          /* some lane of the warp has a cone */
 
-    template <bool FAST> __device__ __forceinline__ void load(const cuda_view &v, int32_t lane, bool live, int32_t code);
+    template <bool FAST>
+    __device__ __forceinline__ void load(const cuda_view &v, int32_t lane, bool live, int32_t code);
     template <bool FAST> __device__ __forceinline__ void update(const body_motion &mine, const body_motion &others);
     __device__ __forceinline__ void wrench(const real impulse[COUNT], vec3 *force, vec3 *torque) const;
     __device__ __forceinline__ void store(int32_t lane) const;
@@ -110,10 +111,12 @@ static __device__ __noinline__ void load_rows(row_lane *rows, const cuda_view &v
     rows->load<FAST>(v, lane, live, code);
 }
 
-/* Steps 2-4 of the warp's sides given by rows: into the record of the side; lambda goes `relaxation_factor` times as far. */
+/* Steps 2-4 of the warp's sides given by rows: into the record of the side; lambda goes `relaxation_factor` times as
+ * far. */
 template <bool FAST>
-static __device__ __noinline__ void sweep_row_lanes(row_lane *memory, const solver_real *mine, const solver_real *others,
-                                                    real2_pair *record, real relaxation_factor)
+static __device__ __noinline__ void sweep_row_lanes(row_lane *memory, const solver_real *mine,
+                                                    const solver_real *others, real2_pair *record,
+                                                    real relaxation_factor)
 {
     row_lane rows = *memory;
     real impulse[row_lane::COUNT];

@@ -16,7 +16,8 @@ PART __device__ __forceinline__ real PART_RUN::gather(real g, const solver_real 
     for (int32_t j = 0; j < FETCHED_FIRST; ++j) first[j] = from[j * ROW];
     if (more) {
 #pragma unroll
-        for (int32_t j = 0; j < MORE; ++j) value[j] = FETCHED_FIRST + j < count ? from[(FETCHED_FIRST + j) * ROW] : (real)0;
+        for (int32_t j = 0; j < MORE; ++j)
+            value[j] = FETCHED_FIRST + j < count ? from[(FETCHED_FIRST + j) * ROW] : (real)0;
     }
 #pragma unroll
     for (int32_t j = 0; j < FETCHED_FIRST; ++j)
@@ -107,7 +108,8 @@ PART __device__ __forceinline__ void PART_RUN::update_sides(int32_t odd, real re
         const vec3 old = own.lambda[j], x = relative_velocity(other, own.other_arm[j], own_motion, own.own_arm[j]);
         const point_change to = update<FAST>(own.normal, own.friction, x, own.error[j], own.inv_s[j], old);
         own.lambda[j] = FAST ? relaxed(old, to, plain, relaxation_factor) : to.lambda;
-        const vec3 impulse = FAST ? to.delta : v3_add(to.lambda, to.delta), moment = fused_cross(own.own_arm[j], impulse);
+        const vec3 impulse = FAST ? to.delta : v3_add(to.lambda, to.delta),
+                   moment = fused_cross(own.own_arm[j], impulse);
         force = j == 0 ? impulse : v3_add(force, impulse);
         torque = j == 0 ? moment : v3_add(torque, moment);
     }
@@ -121,9 +123,11 @@ PART __device__ __forceinline__ void PART_RUN::update_rows(row_lane *rows, int32
                           own.other + (odd ? own.other_odd : 0), own_record, relaxation_factor);
 }
 
-/* ---- the limit of energies, of the method `fast` ------------------------------------------------------------------ */
+/* ---- the limit of energies, of the method `fast`
+ * ------------------------------------------------------------------ */
 
-/* Is there a body, one of those that this thread speaks for, that has more energy than it may? Of a world: rigid ones. */
+/* Is there a body, one of those that this thread speaks for, that has more energy than it may? Of a world: rigid
+ * ones. */
 PART __device__ __forceinline__ bool PART_RUN::suspect(int32_t odd) const
 {
     bool any = false;

@@ -67,7 +67,8 @@ static __device__ double natural_map(const model_view &model, const body_view &b
 }
 
 /* The same of a constraint given by rows (the map of a row: core/solve/certificate.c). */
-static __device__ double natural_map_of_rows(const body_view &bodies, const row_view &rows, const raw_view &raw, int32_t k)
+static __device__ double natural_map_of_rows(const body_view &bodies, const row_view &rows, const raw_view &raw,
+                                             int32_t k)
 {
     const struct sadmm_row_constraint constraint = raw.constraints[k];
     const struct raw_row *row = raw.rows + (size_t)k * SADMM_MAX_ROWS;
@@ -94,8 +95,8 @@ static __device__ double natural_map_of_rows(const body_view &bodies, const row_
     return worst;
 }
 
-/* Terms of a body: natural map of the constraints that count here (at their first dynamic body); momentum error, and the largest of
- * what it is made of. args.checks: this check's number, from 1; args.count: iterations done. */
+/* Terms of a body: natural map of the constraints that count here (at their first dynamic body); momentum error, and
+ * the largest of what it is made of. args.checks: this check's number, from 1; args.count: iterations done. */
 template <bool RIGID>
 static __global__ void __launch_bounds__(BODY_THREADS)
     convergence_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
@@ -141,7 +142,8 @@ sadmm_status CUDA(enqueue_convergence_check)(struct sadmm_context *c, int done, 
                            "convergence check", body_blocks(c->view.model.bodies), BODY_THREADS, &args, error);
 }
 
-extern "C" sadmm_status CUDA(check_convergence)(struct sadmm_context *c, int done, int32_t *unmet, struct sadmm_error *error)
+extern "C" sadmm_status CUDA(check_convergence)(struct sadmm_context *c, int done, int32_t *unmet,
+                                                struct sadmm_error *error)
 {
     CUDA_ENTER(c);
     TRY(CUDA(enqueue_convergence_check)(c, done, error));

@@ -10,8 +10,8 @@ static __device__ __forceinline__ bool all_stopped(const island_view &islands, i
     return checks > 0 && islands.stop->unmet[checks % CHECKS_KEPT] == 0;
 }
 
-/* Had the island of a body? Then it stays as it is, whatever its thread block still does for others: an island's result does
- * not depend on who is beside it. */
+/* Had the island of a body? Then it stays as it is, whatever its thread block still does for others: an island's result
+ * does not depend on who is beside it. */
 static __device__ __forceinline__ bool island_stopped(const graph_view &graph, const island_view &islands,
                                                       int32_t checks, int32_t body)
 {
@@ -25,7 +25,8 @@ static __device__ __forceinline__ bool pair_stopped(const model_view &model, con
 }
 
 static __device__ __forceinline__ bool rows_stopped(const model_view &model, const graph_view &graph,
-                                                    const island_view &islands, int32_t checks, const row_constraint &rows)
+                                                    const island_view &islands, int32_t checks,
+                                                    const row_constraint &rows)
 {
     return checks > 0 && island_stopped(graph, islands, checks, rows.body_a < model.bodies ? rows.body_a : rows.body_b);
 }

@@ -10,8 +10,8 @@ enum { BODY_THREADS = 128 };
 
 /* ---- Step 1 --------------------------------------------------------------------------------------------------- */
 
-/* Iterations go over the data forward and backward in turn: what one has touched last is still in the caches when the next
- * one begins. */
+/* Iterations go over the data forward and backward in turn: what one has touched last is still in the caches when the
+ * next one begins. */
 static __device__ __forceinline__ int32_t thread_index(const cuda_args &args)
 {
     const unsigned block = args.backward ? gridDim.x - 1 - blockIdx.x : blockIdx.x;
@@ -54,9 +54,9 @@ static __device__ __forceinline__ real relaxed(const model_view &model, const cu
     return FAST && args.relax & what ? (real)model.settings->relaxation : (real)1;
 }
 
-/* Step 1, a thread a body: all of a body's numbers lie side by side and are asked for at once, sixteen bytes at a time. (Eight
- * lanes a body, as in the persistent tiers, where latency counts, spend the time on instructions that load and pass
- * around single numbers.) What is read once leaves the caches to states and records. The sums are those of
+/* Step 1, a thread a body: all of a body's numbers lie side by side and are asked for at once, sixteen bytes at a time.
+ * (Eight lanes a body, as in the persistent tiers, where latency counts, spend the time on instructions that load and
+ * pass around single numbers.) What is read once leaves the caches to states and records. The sums are those of
  * free_momentum() and step_of(); FAST: of step_fast() and residual_after(), as far as args.relax says. */
 template <bool JOIN, bool RIGID, bool FAST>
 static __global__ void __launch_bounds__(BODY_THREADS)
@@ -117,9 +117,11 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     }
 }
 
-/* ---- kernels over constraints: blocks of threads for pairs, then blocks for row blocks ----------------------------- */
+/* ---- kernels over constraints: blocks of threads for pairs, then blocks for row blocks
+ * ----------------------------- */
 
-/* The pair of thread t: work(pair, lane, live), in whole warps; lanes beyond the last pair come with that one, not live. */
+/* The pair of thread t: work(pair, lane, live), in whole warps; lanes beyond the last pair come with that one, not
+ * live. */
 template <int LANES_A_PAIR, class Work>
 static __device__ __forceinline__ void with_pair(const model_view &model, int32_t t, Work work)
 {

@@ -54,10 +54,10 @@ static __device__ __forceinline__ void store_records(solver_real *records, const
     if (live && side >= 0) out[2 * (size_t)side + (odd ? 1 : 0)] = pack(on_b ? sum : v3_neg(sum), 0);
 }
 
-/* A lane's share of a pair: points lane and, where COUNT is 2, lane + 4. The first is loaded whether it is
- * there or not, so that nothing but the states waits for another load. `live`: else nothing is stored. Every lane of the warp comes
- * here. FAST: lambda goes `relaxation_factor` times as far; records are those of Step 1 in any case. Returns the lane's
- * share of the primal residual. */
+/* A lane's share of a pair: points lane and, where COUNT is 2, lane + 4. The first is loaded whether it is there or
+ * not, so that nothing but the states waits for another load. `live`: else nothing is stored. Every lane of the warp
+ * comes here. FAST: lambda goes `relaxation_factor` times as far; records are those of Step 1 in any case. Returns the
+ * lane's share of the primal residual. */
 template <int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
 static __device__ __forceinline__ double sweep_pair(const model_view &model, const body_view &bodies,
                                                     const contact_view &contacts, const iteration_view &iteration,
@@ -106,8 +106,9 @@ static __device__ __forceinline__ double sweep_pair(const model_view &model, con
     store_records<LANES_A_PAIR>(iteration.records, joined, lane, live, next);
     if (SPLIT) store_records<LANES_A_PAIR>(iteration.change, joined, lane, live, change);
     if (!MEASURE) return 0;
-    return (double)(largest * (FAST ? inverse_of_weight(inv_s, joined.body_a < model.bodies && joined.body_b < model.bodies)
-                                    : real_max(a.inv_beta, b.inv_beta)));
+    return (double)(largest *
+                    (FAST ? inverse_of_weight(inv_s, joined.body_a < model.bodies && joined.body_b < model.bodies)
+                          : real_max(a.inv_beta, b.inv_beta)));
 }
 
 /* The same for J^T lambda^0. */
@@ -136,8 +137,9 @@ static __device__ __forceinline__ void store_row_records(const row_view &rows, i
 }
 
 template <bool MEASURE, bool FAST>
-static __device__ __forceinline__ double sweep_rows(const model_view &model, const body_view &bodies, const row_view &rows,
-                                                    const iteration_view &iteration, int32_t k, real relaxation_factor)
+static __device__ __forceinline__ double sweep_rows(const model_view &model, const body_view &bodies,
+                                                    const row_view &rows, const iteration_view &iteration, int32_t k,
+                                                    real relaxation_factor)
 {
     enum { SPLIT = MEASURE && !FAST };
     const row_constraint about = rows.constraints[k];

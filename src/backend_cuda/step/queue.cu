@@ -93,7 +93,8 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
     if (report->abort_code == ABORT_CAPACITY)
         s->candidate_capacity = std::max(s->candidate_capacity, generous(report->counts.candidates));
     if (report->abort_code == ABORT_PARTITION) {
-        /* The next partition is made for this very step, and fits; a tier that fails twice is left alone all the same. */
+        /* The next partition is made for this very step, and fits; a tier that fails twice is left alone all the
+         * same. */
         if (s->misfit == first) c->refused |= 1u << c->partition.tier;
         s->misfit = first;
     }

@@ -25,7 +25,8 @@ static __global__ void read_kernel(const __grid_constant__ cuda_view v, const __
     }
     i -= v.contacts.pair_capacity;
     if (i < live_rows(v.model, v.rows))
-        for (int r = 0; r < 6; ++r) multipliers[6 * (size_t)i + (size_t)r] = (double)v.rows.data[6 * (size_t)i + (size_t)r].lambda;
+        for (int r = 0; r < 6; ++r)
+            multipliers[6 * (size_t)i + (size_t)r] = (double)v.rows.data[6 * (size_t)i + (size_t)r].lambda;
 }
 
 extern "C" sadmm_status CUDA(read_solution)(struct sadmm_context *c, struct sadmm_error *error)

@@ -1,4 +1,5 @@
-/* begin: raw data to the device; statistics, tier and layout (device/layout.h); arrays for the solve (device/arrays.cu). */
+/* begin: raw data to the device; statistics, tier and layout (device/layout.h); arrays for the solve
+ * (device/arrays.cu). */
 #include <string.h>
 
 #include "backend_cuda/assemble/assemble.h"

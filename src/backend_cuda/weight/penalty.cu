@@ -5,7 +5,8 @@
 #include "weight.h"
 #include "backend_cuda/device/plan_check.h"
 
-/* ---- C ------------------------------------------------------------------------------------------------------------- */
+/* ---- C
+ * ------------------------------------------------------------------------------------------------------------- */
 
 static __device__ void add_pair(const model_view &model, const raw_view &raw, const struct sadmm_contact_pair *pair,
                                 int side, arm_sums *sums, double C[PACKED])
@@ -129,8 +130,9 @@ static sadmm_status enqueue_weighted_penalties(struct sadmm_context *c, bool fir
     cuda_args args = {};
     args.start = first;
     args.planned = planned;
-    const cuda_kernel kernel = closed_form(c) ? (factor ? penalty_kernel<true, true, CLOSED> : penalty_kernel<true, false, CLOSED>)
-                                              : (factor ? penalty_kernel<true, true, WEIGHTED> : penalty_kernel<true, false, WEIGHTED>);
+    const cuda_kernel kernel =
+        closed_form(c) ? (factor ? penalty_kernel<true, true, CLOSED> : penalty_kernel<true, false, CLOSED>)
+                       : (factor ? penalty_kernel<true, true, WEIGHTED> : penalty_kernel<true, false, WEIGHTED>);
     return launch_bodies(c, kernel, "penalties", &args, error);
 }
 
@@ -156,7 +158,8 @@ extern "C" sadmm_status CUDA(factorize)(struct sadmm_context *c, struct sadmm_er
 {
     cuda_args args = {};
     CUDA_ENTER(c);
-    const cuda_kernel kernel = closed_form(c) ? penalty_kernel<false, true, CLOSED> : penalty_kernel<false, true, PLAIN>;
+    const cuda_kernel kernel =
+        closed_form(c) ? penalty_kernel<false, true, CLOSED> : penalty_kernel<false, true, PLAIN>;
     return launch_bodies(c, kernel, "factorize", &args, error);
 }
 

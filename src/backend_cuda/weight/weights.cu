@@ -2,8 +2,9 @@
  * double, from this precision's data; a few times a step.
  *
  *   pairs    four threads a pair, or one: records of its sides (assemble/side_sums.h). The first ones come with the
- * contacts   terms    eight lanes a body: its momentum residual, what it adds to the sums over its island, the sums
- * (weight/island_sums.h), and what            follows for the island
+ *            contacts
+ *   terms    eight lanes a body: its momentum residual, what it adds to the sums over its island, the sums
+ *            (weight/island_sums.h), and what follows for the island
  *   rows     a thread a constraint given by rows: B
  *   then C and H (weight/penalty.cu), where each side of a pair works out B for itself
  *
@@ -37,7 +38,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
                 &sums);
 }
 
-/* ---- terms and islands --------------------------------------------------------------------------------------------- */
+/* ---- terms and islands
+ * --------------------------------------------------------------------------------------------- */
 
 template <bool SCALES>
 static __global__ void __launch_bounds__(BODY_THREADS)
@@ -76,7 +78,8 @@ static __device__ void respond_rows(const model_view &model, const body_view &bo
     }
 }
 
-/* A row that has neither bounds nor compliance shares a dense weight with the others of its constraint that have none. */
+/* A row that has neither bounds nor compliance shares a dense weight with the others of its constraint that have
+ * none. */
 static __device__ bool is_coupled(const row_data &row)
 {
     return row.compliance == 0 && isinf(row.lo) && isinf(row.hi);

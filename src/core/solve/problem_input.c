@@ -1,6 +1,6 @@
-/* What a problem is made of: bodies, contacts, blocks. Contacts are grouped into pairs here, blocks become constraint rows
- * (core/model/rows.h). Every call that replaces a part builds the new part first and swaps it in last, so that a failure loses
- * nothing. */
+/* What a problem is made of: bodies, contacts, blocks. Contacts are grouped into pairs here, blocks become constraint
+ * rows (core/model/rows.h). Every call that replaces a part builds the new part first and swaps it in last, so that a
+ * failure loses nothing. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -27,7 +27,8 @@ static sadmm_status check_count(const char *what, int32_t count, int32_t limit, 
 static bool in_range(double x) { return fabs(x) <= VALUE_LIMIT; } /* NaN is not */
 
 /* `values` (count x width), data of the problem; NULL is fine. */
-static sadmm_status check_data(const char *name, const double *values, int32_t count, int width, struct sadmm_error *error)
+static sadmm_status check_data(const char *name, const double *values, int32_t count, int width,
+                               struct sadmm_error *error)
 {
     for (size_t i = 0; values && i < (size_t)count * (size_t)width; ++i)
         if (!in_range(values[i]))
@@ -48,7 +49,8 @@ static sadmm_status check_vector(const char *array, int32_t index, const char *f
     return SADMM_OK;
 }
 
-static sadmm_status check_number(const char *array, int32_t index, const char *field, double x, struct sadmm_error *error)
+static sadmm_status check_number(const char *array, int32_t index, const char *field, double x,
+                                 struct sadmm_error *error)
 {
     if (!in_range(x)) REFUSE("%s[%d].%s = %g: must be finite and within +-%g", array, index, field, x, VALUE_LIMIT);
     return SADMM_OK;
@@ -338,7 +340,8 @@ sadmm_status sadmm_problem_set_blocks(sadmm_problem *problem, int32_t count, con
     size_t row_count = 0;
     for (int32_t k = 0; k < count; ++k) row_count += (size_t)blocks[k].rows;
     if (row_count > MAX_CONSTRAINTS)
-        return sadmm_fail(error, SADMM_ERROR_LIMIT, "blocks: %zu rows in all: must be in [0, %d]", row_count, MAX_CONSTRAINTS);
+        return sadmm_fail(error, SADMM_ERROR_LIMIT, "blocks: %zu rows in all: must be in [0, %d]", row_count,
+                          MAX_CONSTRAINTS);
     TRY(reserve_saved(problem, problem->body_count, problem->contacts.point_count, row_count, error));
 
     struct sadmm_rows rows = {0};
