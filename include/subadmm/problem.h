@@ -34,7 +34,7 @@ typedef struct sadmm_problem_contact {
     double arm_a[3];        /* contact point relative to a's centre of mass, m, world frame; ignored when a is -1 */
     double arm_b[3];        /* the same for b */
     double error;           /* e of eq. (5) along the normal, m/s: gap/dt, or the stabilised penetration (negative) */
-    double friction;        /* mu, >= 0 */
+    double friction;        /* mu, in [0, 1e60] */
 } sadmm_problem_contact;
 
 /* A constraint given by its Jacobian rows. */
@@ -51,7 +51,7 @@ typedef struct sadmm_problem_block {
     double jacobian_a[36];   /* (rows x 6) row-major, acts on (linear, angular) of a; ignored when a is -1 */
     double jacobian_b[36];   /* the same for b */
     double error[6];         /* CONTACT and HARD: e, m/s. SOFT: e, m or rad */
-    double friction;         /* CONTACT: mu >= 0 */
+    double friction;         /* CONTACT: mu, in [0, 1e60] */
     double stiffness[6];     /* SOFT: k of lambda = -(k e + c x), N s/m, i.e. dt times the spring constant; >= 0 */
     double damping[6];       /* SOFT: c, kg (use c = dt (damping + dt stiffness) for an implicit spring); >= 0 */
 } sadmm_problem_block;
@@ -63,8 +63,8 @@ typedef struct sadmm_solve_report {
     int iterations;             /* done */
     bool converged;             /* a stop rule was met (false when none was asked for) */
     int32_t limited;            /* islands slowed down, see sadmm_step_report; 0 at the problem level */
-    sadmm_residual residual;    /* of the last iteration */
-    sadmm_certificate certificate;
+    sadmm_residual residual;    /* of the last iteration; -1 where it was not measured */
+    sadmm_certificate certificate; /* of the solution */
     double solve_ms;            /* wall time of the solve without the certificate, ms */
     int threads;                /* CPU threads that worked on the solve: the most at a time */
 } sadmm_solve_report;
@@ -124,7 +124,8 @@ SADMM_API sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend
 SADMM_API sadmm_status sadmm_problem_get_solution(const sadmm_problem *problem, double *velocities, double *impulses,
                                                   double *block_lambda);
 
-/* Set (v, lambda) by hand, e.g. to certify another solver's answer. Shapes as above; NULL leaves a part alone. */
+/* Set (v, lambda) by hand, e.g. to certify another solver's answer. Shapes as above; NULL leaves a part alone.
+ * Errors: INVALID_ARGUMENT (a number that is not finite; nothing changes). */
 SADMM_API sadmm_status sadmm_problem_set_solution(sadmm_problem *problem, const double *velocities,
                                                   const double *impulses, const double *block_lambda);
 

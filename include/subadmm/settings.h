@@ -58,7 +58,8 @@ typedef struct sadmm_settings {
                                     (the step report's `limited` says so), and so does a problem that is solved once:
                                     some 100 to 1000, or a tolerance below with a large number here.
                                     PAPER: 100 to 300 */
-    double relaxation;           /* FAST: over-relaxation rho, dimensionless, in [1, 2); default 1.8 */
+    double relaxation;           /* FAST: over-relaxation rho, dimensionless, in [1, 2); default 1.8 (docs/algorithm.md,
+                                    section 7) */
     int penalty_period;          /* PAPER, as all of penalty_*. m of eq. (15): iterations between penalty updates,
                                     0 = never; default 30 */
     double penalty_mass_factor;  /* M of eq. (13), dimensionless, in [0, 1e12]; default 16 */
@@ -94,6 +95,7 @@ typedef struct sadmm_settings {
                                     can make; reports say how many that were. Results do not depend on it */
 } sadmm_settings;
 
+/* The defaults named above. Thread-safe. */
 SADMM_API sadmm_settings sadmm_settings_default(void);
 
 /* Residuals of eqs. (16) and (17), infinity norms, at the last iteration they were measured. */

@@ -47,6 +47,7 @@ typedef struct sadmm_world_def {
     sadmm_settings settings;
 } sadmm_world_def;
 
+/* The defaults named above. Thread-safe. */
 SADMM_API sadmm_world_def sadmm_world_def_default(void);
 
 /* Errors: INVALID_ARGUMENT, UNAVAILABLE, OUT_OF_MEMORY (message: sadmm_last_message). */
@@ -87,12 +88,14 @@ typedef struct sadmm_body_def {
     const char *name;            /* copied, at most 63 bytes; NULL = "" */
 } sadmm_body_def;
 
+/* The defaults named above. Thread-safe. */
 SADMM_API sadmm_body_def sadmm_body_def_default(void);
+/* *id: the new body. Errors: INVALID_ARGUMENT (range; nothing changes), LIMIT (2^27 bodies), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def, sadmm_body_id *id);
-/* Destroys its shapes too. */
+/* Destroys its shapes too. Errors: STALE_ID. */
 SADMM_API sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id);
 SADMM_API int32_t sadmm_world_body_count(const sadmm_world *world);      /* all, static ones included; of NULL: 0 */
-/* The index-th live body in order of creation slot, index in [0, body_count). */
+/* The index-th live body in order of creation slot, index in [0, body_count). Errors: INVALID_ARGUMENT (range). */
 SADMM_API sadmm_status sadmm_world_body_at(sadmm_world *world, int32_t index, sadmm_body_id *id);
 
 typedef struct sadmm_body_state {
@@ -102,14 +105,16 @@ typedef struct sadmm_body_state {
     double angular_velocity[3];  /* rad/s, world frame */
 } sadmm_body_state;
 
+/* The state after the steps begun so far. Errors: STALE_ID, DEVICE. */
 SADMM_API sadmm_status sadmm_world_body_state(sadmm_world *world, sadmm_body_id id, sadmm_body_state *state);
 /* Any finite position and velocity is taken, so that what a step made can be set again; the orientation as in the
  * definition, velocities 0 for static bodies. Contacts lose accuracy beyond the ranges of the definition.
  * A pose other than the body has is a jump: the body's contacts are found as those of bodies that never touched before,
- * without what was known of the side they came from. Velocities may be set with the pose that was read. */
+ * without what was known of the side they came from. Velocities may be set with the pose that was read. Errors: STALE_ID,
+ * INVALID_ARGUMENT (nothing changes). */
 SADMM_API sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, const sadmm_body_state *state);
 /* Read back the definition (mass, inertia, type, name) with the current state. The name is the world's own: it stays
- * where it is, and valid, until the body is removed or the world destroyed. */
+ * where it is, and valid, until the body is removed or the world destroyed. Errors: STALE_ID, DEVICE. */
 SADMM_API sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id, sadmm_body_def *def);
 /* External force (N) at the centre of mass and torque (N m), world frame, each component within +-1e15; kept until set
  * again. Errors: STALE_ID, INVALID_ARGUMENT (range; a static body, which nothing moves). */
@@ -118,7 +123,8 @@ SADMM_API sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_bod
 /* Sum of the contact wrenches of the last step on the body: force (N), then torque about its centre of mass
  * (N m), world frame (eq. 12). Errors: STALE_ID, UNAVAILABLE when settings.recover_wrenches was false. */
 SADMM_API sadmm_status sadmm_world_body_contact_wrench(sadmm_world *world, sadmm_body_id id, double wrench[6]);
-/* Turn contact between two bodies off or on again (default on). */
+/* Turn contact between two bodies off or on again (default on). Errors: STALE_ID, INVALID_ARGUMENT (a and b the same),
+ * OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_set_body_pair_contact(sadmm_world *world, sadmm_body_id a, sadmm_body_id b,
                                                          bool enabled);
 
@@ -148,15 +154,22 @@ typedef struct sadmm_shape_def {
     uint32_t category, mask; /* two shapes meet if (a.category & b.mask) and (b.category & a.mask); default 1, all */
 } sadmm_shape_def;
 
+/* The defaults named above. Thread-safe. */
 SADMM_API sadmm_shape_def sadmm_shape_def_default(void);
+/* *id: the new shape, on `body` until that is removed. Errors: STALE_ID, INVALID_ARGUMENT (range; a plane on a dynamic
+ * body; nothing changes), LIMIT (2^28 shapes), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body, const sadmm_shape_def *def,
                                              sadmm_shape_id *id /* may be NULL */);
+/* Errors: STALE_ID. */
 SADMM_API sadmm_status sadmm_world_remove_shape(sadmm_world *world, sadmm_shape_id id);
 SADMM_API int32_t sadmm_world_shape_count(const sadmm_world *world); /* of NULL: 0 */
+/* The index-th live shape in order of creation slot, index in [0, shape_count). Errors: INVALID_ARGUMENT (range). */
 SADMM_API sadmm_status sadmm_world_shape_at(sadmm_world *world, int32_t index, sadmm_shape_id *id);
+/* Read back the definition, and the body that has the shape. Errors: STALE_ID. */
 SADMM_API sadmm_status sadmm_world_shape_def(sadmm_world *world, sadmm_shape_id id, sadmm_shape_def *def,
                                              sadmm_body_id *body /* may be NULL */);
-/* Override the pair's friction (mu >= 0), or give -1 to return to the geometric mean. */
+/* Override the pair's friction (mu in [0, 1e6]), or give -1 to return to the geometric mean. Errors: STALE_ID,
+ * INVALID_ARGUMENT (range; a and b the same), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_shape_id a, sadmm_shape_id b,
                                                      double friction);
 
@@ -222,7 +235,7 @@ typedef struct sadmm_step_report {
                                       time */
     double penetration_max;        /* deepest overlap at the start of the step, m, >= 0 */
     sadmm_phase_times ms;          /* the certificate's own time is in `certify_ms`, not in here */
-    double certify_ms;
+    double certify_ms;             /* wall time of the certificate on the host, ms; 0: there is none */
     sadmm_residual residual;       /* valid if measured (settings or penalty update or tolerance); else -1. Not measured
                                       where islands stop by themselves */
     sadmm_certificate
@@ -230,7 +243,7 @@ typedef struct sadmm_step_report {
                                       on CUDA with a tolerance and without settings.certify: islands_above alone */
 } sadmm_step_report;
 
-/* The report of the last step (zeroed before the first). */
+/* The report of the last step (zeroed before the first). Waits for steps; errors: those of the steps waited for. */
 SADMM_API sadmm_status sadmm_world_report(sadmm_world *world, sadmm_step_report *report);
 
 typedef struct sadmm_contact {
@@ -250,7 +263,7 @@ typedef struct sadmm_contact {
  * before it, they are lost with it (0). Waits for steps; the error of one is left for the next call that returns a
  * status. */
 SADMM_API int32_t sadmm_world_contact_count(sadmm_world *world);
-/* Copy contacts [first, first + count) of the last step. Errors: INVALID_ARGUMENT (range). */
+/* Copy contacts [first, first + count) of the last step. Errors: INVALID_ARGUMENT (range), OUT_OF_MEMORY, DEVICE. */
 SADMM_API sadmm_status sadmm_world_contacts(sadmm_world *world, int32_t first, int32_t count, sadmm_contact *contacts);
 
 /* 64-bit hash of all live bodies' poses and velocities (bit patterns, in slot order). Nothing is written after an
