@@ -98,7 +98,7 @@ SADMM_API int32_t sadmm_problem_contact_count(const sadmm_problem *problem);
 SADMM_API int32_t sadmm_problem_block_count(const sadmm_problem *problem);
 
 /* Read back what was set (or what sadmm_world_freeze put in). A, b as in set_bodies, v0 (count x 6); any may be
- * NULL. */
+ * NULL. index in [0, contact count) or [0, block count). Errors: INVALID_ARGUMENT (range). */
 SADMM_API sadmm_status sadmm_problem_get_bodies(const sadmm_problem *problem, double *A, double *b, double *v0);
 SADMM_API sadmm_status sadmm_problem_get_contact(sadmm_problem *problem, int32_t index, sadmm_problem_contact *contact);
 SADMM_API sadmm_status sadmm_problem_get_block(sadmm_problem *problem, int32_t index, sadmm_problem_block *block);

@@ -110,8 +110,8 @@ SADMM_API sadmm_status sadmm_world_body_state(sadmm_world *world, sadmm_body_id 
 /* Any finite position and velocity is taken, so that what a step made can be set again; the orientation as in the
  * definition, velocities 0 for static bodies. Contacts lose accuracy beyond the ranges of the definition.
  * A pose other than the body has is a jump: the body's contacts are found as those of bodies that never touched before,
- * without what was known of the side they came from. Velocities may be set with the pose that was read. Errors: STALE_ID,
- * INVALID_ARGUMENT (nothing changes). */
+ * without what was known of the side they came from. Velocities may be set with the pose that was read.
+ * Errors: STALE_ID, INVALID_ARGUMENT (nothing changes). */
 SADMM_API sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, const sadmm_body_state *state);
 /* Read back the definition (mass, inertia, type, name) with the current state. The name is the world's own: it stays
  * where it is, and valid, until the body is removed or the world destroyed. Errors: STALE_ID, DEVICE. */
