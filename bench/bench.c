@@ -18,7 +18,8 @@ static const struct {
 } commands[] = {
     {"kernels", bench_kernels, "ns per contact per iteration by backend, precision, threads and size"},
     {"scaling", bench_scaling, "ms per step of growing scenes, CPU by threads against GPU"},
-    {"convergence", bench_convergence, "iterations and time to a tolerance, errors of warm steps: method against method"},
+    {"convergence", bench_convergence,
+     "iterations and time to a tolerance, errors of warm steps: method against method"},
     {"stand", bench_stand, "does a structure stand for many steps, and what does a step cost"},
     {"rows", bench_rows, "what one constraint given by rows costs an iteration of a scene"},
 };
@@ -62,11 +63,21 @@ static int run_command(int argc, char **argv)
 int main(int argc, char **argv)
 {
     outputs_begin("subadmm-bench");
-    interrupts_expect(); /* all of them look */
+    interrupts_expect(); /* every command checks for them */
     interrupts_begin();
     int code = outputs_end(run_command(argc, argv));
     if (interrupted()) fprintf(stderr, "subadmm-bench: interrupted\n");
     return interrupted_status(code);
+}
+
+void bench_write_csv_text(FILE *out, const char *text)
+{
+    putc('"', out);
+    for (; *text; ++text) {
+        if (*text == '"') putc('"', out);
+        putc(*text == '\n' ? ' ' : *text, out);
+    }
+    putc('"', out);
 }
 
 int bench_compare_doubles(const void *a, const void *b)

@@ -3,6 +3,7 @@
 #define BENCH_BENCH_H
 
 #include <stdbool.h>
+#include <stdio.h>
 
 #include "subadmm/settings.h"
 
@@ -18,6 +19,9 @@ double bench_memory_bandwidth(int threads);
 /* The CPU's or the accelerator's name. */
 void bench_runs_on(sadmm_backend backend, char *name, size_t size);
 int bench_machine_threads(void);
+
+/* A field of a CSV: quoted, on one line. */
+void bench_write_csv_text(FILE *out, const char *text);
 
 int bench_compare_doubles(const void *a, const void *b);
 

@@ -1,7 +1,6 @@
 /* subadmm-bench convergence: how many iterations, and how much time, each method takes to a tolerance on a set of cold
  * problems, and how far from the solution a scene's steps are when they do few. docs/convergence.md says how to read
  * it; bench/convergence.sh regenerates its tables, bench/plot_convergence.py draws the CSV. */
-#include <getopt.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -15,14 +14,16 @@
 
 static const char command[] = "convergence";
 
+enum part { PART_COLD, PART_WARM };
+
 struct options {
-    sadmm_backend backend; /* AUTO: cpu and cuda */
-    int precision, method; /* -1: both */
+    int backend;                 /* SADMM_BACKEND_AUTO: cpu and cuda */
+    int precision, method, only; /* -1: both; only: of enum part */
     long threads[BENCH_LIST], budgets[BENCH_LIST], limit, device;
     int thread_count, budget_count;
     double seconds; /* 0: each scene's own */
     double max_seconds;
-    bool cold, warm, quick;
+    bool quick;
     const char *problem; /* NULL: all; else those with it in their name */
     const char *files[BENCH_LIST], *scenes[BENCH_LIST];
     int file_count, scene_count;
@@ -133,8 +134,8 @@ static void measure_warm(struct bench *b)
 
 static void measure_series(struct bench *b)
 {
-    if (b->o->cold) measure_cold(b);
-    if (b->o->warm) measure_warm(b);
+    if (b->o->only != PART_WARM) measure_cold(b);
+    if (b->o->only != PART_COLD) measure_warm(b);
     FILE *out = outputs_on_stdout() ? stderr : stdout;
     rows_print_cold(b->rows, &b->series, out);
     rows_print_warm(b->rows, &b->series, out);
@@ -148,7 +149,7 @@ static void measure_backend(struct bench *b, sadmm_backend backend, sadmm_precis
     sadmm_backend_query(backend, &info);
     if (!info.available[precision]) {
         fprintf(stderr, "%s in %s: not available: %s\n", info.name, bench_precision_name(precision), info.reason);
-        if (b->o->backend == backend) b->failed = true;
+        if (b->o->backend == (int)backend) b->failed = true;
         return;
     }
     b->series = (struct series){.backend = backend, .precision = precision, .threads = 1};
@@ -160,39 +161,6 @@ static void measure_backend(struct bench *b, sadmm_backend backend, sadmm_precis
 }
 
 /* ---- command line ---------------------------------------------------------------------------------------------- */
-
-static void usage(FILE *out)
-{
-    fprintf(out, "usage: subadmm-bench convergence [options]\n\n"
-                 "  --method paper|fast|both   default both\n"
-                 "  --backend ref|cpu|cuda|all all: cpu and cuda; default cpu\n"
-                 "  --precision f32|f64|both   default f64; errors are measured in double in both\n"
-                 "  --threads N[,N...]         CPU threads at most, default 1\n"
-                 "  --device N                 accelerator, default 0\n"
-                 "  --only cold|warm           one half of the measurements\n"
-                 "  --problem TEXT             only the cold problems with TEXT in their name\n"
-                 "  --fclib FILE.hdf5          one more cold problem; up to 16 times\n"
-                 "  --limit N                  most iterations of a cold solve, default 2000\n"
-                 "  --scene SPEC               these scenes instead of the default ones; up to 16 times\n"
-                 "  --budgets N[,N...]         iterations a step, default 5,10,20,30\n"
-                 "  --seconds S                simulated time of a scene, default 1 or 2 by scene\n"
-                 "  --max-seconds S            wall time of a scene's run, default 60\n"
-                 "  --quick                    a few small problems and one scene\n"
-                 "  --csv FILE|-               the rows as CSV\n");
-}
-
-static int bad(const char *option, const char *value, const char *allowed)
-{
-    return bench_bad_option(command, option, value, allowed);
-}
-
-/* One more of at most BENCH_LIST. */
-static bool append(const char **list, int *count, const char *text)
-{
-    if (*count == BENCH_LIST) return false;
-    list[(*count)++] = text;
-    return true;
-}
 
 static int check_scenes(const struct options *o)
 {
@@ -206,86 +174,30 @@ static int check_scenes(const struct options *o)
     return 0;
 }
 
-/* 0, 2 for wrong usage, -1 for --help. */
 static int parse(int argc, char **argv, struct options *o)
 {
-    static const struct option longs[] = {
-        {"method", required_argument, NULL, 'M'},
-        {"backend", required_argument, NULL, 'b'},
-        {"precision", required_argument, NULL, 'p'},
-        {"threads", required_argument, NULL, 't'},
-        {"device", required_argument, NULL, 'd'},
-        {"only", required_argument, NULL, 'o'},
-        {"problem", required_argument, NULL, 'P'},
-        {"fclib", required_argument, NULL, 'F'},
-        {"limit", required_argument, NULL, 'l'},
-        {"scene", required_argument, NULL, 'S'},
-        {"budgets", required_argument, NULL, 'k'},
-        {"seconds", required_argument, NULL, 's'},
-        {"max-seconds", required_argument, NULL, 'm'},
-        {"quick", no_argument, NULL, 'q'},
-        {"csv", required_argument, NULL, 'C'},
-        {"help", no_argument, NULL, 'h'},
-        {NULL, 0, NULL, 0},
+    static const struct bench_word parts[] = {{"cold", PART_COLD}, {"warm", PART_WARM}};
+    const struct bench_option options[] = {
+        BENCH_WORD("method", &o->method, bench_methods, 3, "default both"),
+        BENCH_WORD("backend", &o->backend, bench_backends, 4, "all: cpu and cuda; default cpu"),
+        BENCH_WORD("precision", &o->precision, bench_precisions, 3,
+                   "default f64; errors are measured in double in both"),
+        BENCH_NUMBERS("threads", o->threads, &o->thread_count, 1, 1024, "CPU threads at most, default 1"),
+        BENCH_NUMBER("device", &o->device, 0, 1023, "accelerator, default 0"),
+        BENCH_WORD("only", &o->only, parts, 2, "one of the two parts of the measurements"),
+        BENCH_TEXT("problem", "TEXT", &o->problem, "only the cold problems with TEXT in their name"),
+        BENCH_TEXTS("fclib", "FILE.hdf5", o->files, &o->file_count, "one more cold problem; up to 16 times"),
+        BENCH_NUMBER("limit", &o->limit, 1, 1000000, "most iterations of a cold solve, default 2000"),
+        BENCH_TEXTS("scene", "SPEC", o->scenes, &o->scene_count,
+                    "these scenes instead of the default ones; up to 16 times"),
+        BENCH_NUMBERS("budgets", o->budgets, &o->budget_count, 1, 1000000, "iterations a step, default 5,10,20,30"),
+        BENCH_REAL("seconds", "S", &o->seconds, 3600, "simulated time of a scene, default 1 or 2 by scene"),
+        BENCH_REAL("max-seconds", "S", &o->max_seconds, 86400, "wall time of a scene's run, default 60"),
+        BENCH_FLAG("quick", &o->quick, "a few small problems and one scene"),
+        BENCH_TEXT("csv", "FILE|-", &o->csv, "the rows as CSV"),
     };
-    sadmm_method method;
-    for (int option; (option = getopt_long(argc, argv, "h", longs, NULL)) != -1;) {
-        switch (option) {
-        case 'M':
-            if (!strcmp(optarg, "both")) o->method = -1;
-            else if (bench_parse_method(optarg, &method)) o->method = (int)method;
-            else return bad("method", optarg, "paper, fast or both");
-            break;
-        case 'b':
-            if (!bench_parse_backend(optarg, &o->backend)) return bad("backend", optarg, "ref, cpu, cuda or all");
-            break;
-        case 'p':
-            if (!bench_parse_precision(optarg, &o->precision)) return bad("precision", optarg, "f32, f64 or both");
-            break;
-        case 't':
-            if (!bench_parse_list(optarg, 1, 1024, o->threads, &o->thread_count))
-                return bad("threads", optarg, "up to 16 numbers in [1, 1024]");
-            break;
-        case 'd':
-            if (!bench_parse_number(optarg, 0, 1023, &o->device)) return bad("device", optarg, "in [0, 1023]");
-            break;
-        case 'o':
-            if (strcmp(optarg, "cold") != 0 && strcmp(optarg, "warm") != 0) return bad("only", optarg, "cold or warm");
-            o->cold = !strcmp(optarg, "cold");
-            o->warm = !o->cold;
-            break;
-        case 'P': o->problem = optarg; break;
-        case 'F':
-            if (!append(o->files, &o->file_count, optarg)) return bad("fclib", optarg, "given 16 times at most");
-            break;
-        case 'l':
-            if (!bench_parse_number(optarg, 1, 1000000, &o->limit)) return bad("limit", optarg, "in [1, 1000000]");
-            break;
-        case 'S':
-            if (!append(o->scenes, &o->scene_count, optarg)) return bad("scene", optarg, "given 16 times at most");
-            break;
-        case 'k':
-            if (!bench_parse_list(optarg, 1, 1000000, o->budgets, &o->budget_count))
-                return bad("budgets", optarg, "up to 16 numbers in [1, 1000000]");
-            break;
-        case 's':
-            if (!bench_parse_seconds(optarg, 3600, &o->seconds)) return bad("seconds", optarg, "in (0, 3600]");
-            break;
-        case 'm':
-            if (!bench_parse_seconds(optarg, 86400, &o->max_seconds))
-                return bad("max-seconds", optarg, "in (0, 86400]");
-            break;
-        case 'q': o->quick = true; break;
-        case 'C': o->csv = optarg; break;
-        case 'h': usage(stdout); return -1;
-        default: usage(stderr); return 2;
-        }
-    }
-    if (optind < argc) {
-        fprintf(stderr, "subadmm-bench %s: unexpected argument \"%s\"\n", command, argv[optind]);
-        return 2;
-    }
-    return check_scenes(o);
+    const int code = bench_parse(command, options, sizeof options / sizeof *options, NULL, argc, argv);
+    return code ? code : check_scenes(o);
 }
 
 int bench_convergence(int argc, char **argv)
@@ -300,8 +212,7 @@ int bench_convergence(int argc, char **argv)
         .budget_count = 4,
         .limit = 2000,
         .max_seconds = 60,
-        .cold = true,
-        .warm = true,
+        .only = -1,
     };
     static const sadmm_backend order[] = {SADMM_BACKEND_REF, SADMM_BACKEND_CPU, SADMM_BACKEND_CUDA};
     int status = parse(argc, argv, &o);
@@ -315,7 +226,7 @@ int bench_convergence(int argc, char **argv)
     for (int precision = SADMM_F32; precision <= SADMM_F64; ++precision) {
         if (o.precision >= 0 && o.precision != precision) continue;
         for (size_t k = 0; k < sizeof order / sizeof *order; ++k)
-            if (o.backend == SADMM_BACKEND_AUTO ? order[k] != SADMM_BACKEND_REF : order[k] == o.backend)
+            if (o.backend == SADMM_BACKEND_AUTO ? order[k] != SADMM_BACKEND_REF : (int)order[k] == o.backend)
                 measure_backend(&b, order[k], (sadmm_precision)precision);
     }
     status = output_close(csv);

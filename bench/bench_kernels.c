@@ -1,6 +1,5 @@
 /* subadmm-bench kernels: the cost of one iteration (Step 1 included) per contact, and how much of memory's bandwidth it
  * uses. The problem is the lattice of lattice.h; the solve is checked by its certificate, printed beside the time. */
-#include <getopt.h>
 #include <jansson.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -18,12 +17,11 @@
 #include "lattice.h"
 
 struct options {
-    sadmm_backend backend; /* AUTO: all */
-    sadmm_method method;
-    int precision;         /* -1: both */
-    int threads[BENCH_LIST], thread_count;
-    long contacts[BENCH_LIST];
-    int contact_count;
+    int backend;   /* SADMM_BACKEND_AUTO: all */
+    int method;
+    int precision; /* -1: both */
+    long threads[BENCH_LIST], contacts[BENCH_LIST];
+    int thread_count, contact_count;
     double seconds;
     const char *json;
 };
@@ -40,8 +38,8 @@ struct row {
 };
 
 /* The bytes an iteration of the reduced form has to move at least: contact (arm, error, lambda read and written), pair
- * (normal, offset, friction, weight, two indices, both wrenches written and read), body (A, H, b, v read and written; fast: the
- * defect, read and written, in place of b). */
+ * (normal, offset, friction, weight, two indices, both wrenches written and read), body (A, H, b, v read and written;
+ * fast: the momentum residual, read and written, in place of b). */
 static double bytes_per_iteration(const struct lattice *lattice, size_t real, sadmm_method method)
 {
     double contact = 10.0 * (double)real, pair = (8 + 2 * 12) * (double)real + 16;
@@ -51,7 +49,8 @@ static double bytes_per_iteration(const struct lattice *lattice, size_t real, sa
 }
 
 static sadmm_status prepare(const struct sadmm_kernels *k, struct sadmm_context *c, struct lattice *lattice,
-                            const struct sadmm_settings *settings, const struct sadmm_plan *plan, struct sadmm_error *error)
+                            const struct sadmm_settings *settings, const struct sadmm_plan *plan,
+                            struct sadmm_error *error)
 {
     sadmm_status status = k->begin(c, &lattice->system, plan, settings, error);
     if (status == SADMM_OK) status = k->assemble_bodies(c, error);
@@ -91,7 +90,8 @@ static sadmm_status measure(const struct sadmm_kernels *k, struct sadmm_context 
     if (batch < 10) batch = 10;
     if (batch > 100000) batch = 100000;
     begin = sadmm_clock_ms();
-    while (status == SADMM_OK && !interrupted() && batches < MAX_BATCHES && (batches < 3 || sadmm_clock_ms() - begin < seconds * 1e3)) {
+    while (status == SADMM_OK && !interrupted() && batches < MAX_BATCHES &&
+           (batches < 3 || sadmm_clock_ms() - begin < seconds * 1e3)) {
         double start = sadmm_clock_ms();
         status = iterate(k, c, batch, beta, error);
         times[batches++] = (sadmm_clock_ms() - start) / batch;
@@ -131,72 +131,25 @@ static sadmm_status run_row(const struct sadmm_kernels *k, struct lattice *latti
     if (status == SADMM_OK) status = k->read_solution(context, error);
     if (status == SADMM_OK) status = sadmm_certify(&lattice->system, &settings, &row->certificate, error);
     k->destroy(context);
-    row->gb_per_s =
-        bytes_per_iteration(lattice, k->precision == SADMM_F32 ? 4 : 8, settings.method) / (row->ns * (double)row->contacts);
+    row->gb_per_s = bytes_per_iteration(lattice, k->precision == SADMM_F32 ? 4 : 8, settings.method) /
+                    (row->ns * (double)row->contacts);
     return status;
 }
 
-static void usage(FILE *out)
-{
-    fprintf(out,
-            "usage: subadmm-bench kernels [options]\n\n"
-            "  --backend ref|cpu|cuda|all   default all (ref up to 10,000 contacts)\n"
-            "  --precision f32|f64|both     default both\n"
-            "  --method paper|fast          default fast; tables that do not have the method are left out\n"
-            "  --threads N[,N...]           CPU threads, default 1,2\n"
-            "  --contacts N[,N...]          default 1000,10000,100000,1000000\n"
-            "  --seconds S                  time spent on each row, default 1\n"
-            "  --json FILE|-                rows[] of {backend, precision, threads, contacts, ns_per_contact_iteration, gb_per_s, ...}\n");
-}
-
-static int bad(const char *option, const char *value, const char *allowed)
-{
-    return bench_bad_option("kernels", option, value, allowed);
-}
-
-/* 0, 2 for wrong usage, -1 for --help. */
 static int parse(int argc, char **argv, struct options *o)
 {
-    static const struct option longs[] = {
-        {"backend", required_argument, NULL, 'b'},  {"precision", required_argument, NULL, 'p'},
-        {"threads", required_argument, NULL, 't'},  {"contacts", required_argument, NULL, 'c'},
-        {"seconds", required_argument, NULL, 's'},  {"json", required_argument, NULL, 'j'},
-        {"method", required_argument, NULL, 'm'},   {"help", no_argument, NULL, 'h'},
-        {NULL, 0, NULL, 0},
+    const struct bench_option options[] = {
+        BENCH_WORD("backend", &o->backend, bench_backends, 4, "default all (ref up to 10,000 contacts)"),
+        BENCH_WORD("precision", &o->precision, bench_precisions, 3, "default both"),
+        BENCH_WORD("method", &o->method, bench_methods, BENCH_ONE_METHOD,
+                   "default fast; tables that do not have the method are left out"),
+        BENCH_NUMBERS("threads", o->threads, &o->thread_count, 1, 1024, "CPU threads, default 1,2"),
+        BENCH_NUMBERS("contacts", o->contacts, &o->contact_count, 1, 20000000, "default 1000,10000,100000,1000000"),
+        BENCH_REAL("seconds", "S", &o->seconds, 600, "time spent on each row, default 1"),
+        BENCH_TEXT("json", "FILE|-", &o->json,
+                   "rows[] of {backend, precision, threads, contacts, ns_per_contact_iteration, gb_per_s, ...}"),
     };
-    long threads[BENCH_LIST];
-    for (int option; (option = getopt_long(argc, argv, "h", longs, NULL)) != -1;) {
-        switch (option) {
-        case 'b':
-            if (!bench_parse_backend(optarg, &o->backend)) return bad("backend", optarg, "ref, cpu, cuda or all");
-            break;
-        case 'p':
-            if (!bench_parse_precision(optarg, &o->precision)) return bad("precision", optarg, "f32, f64 or both");
-            break;
-        case 't':
-            if (!bench_parse_list(optarg, 1, 1024, threads, &o->thread_count)) return bad("threads", optarg, "up to 16 numbers in [1, 1024]");
-            for (int k = 0; k < o->thread_count; ++k) o->threads[k] = (int)threads[k];
-            break;
-        case 'c':
-            if (!bench_parse_list(optarg, 1, 20000000, o->contacts, &o->contact_count))
-                return bad("contacts", optarg, "up to 16 numbers in [1, 20000000]");
-            break;
-        case 's':
-            if (!bench_parse_seconds(optarg, 600, &o->seconds)) return bad("seconds", optarg, "in (0, 600]");
-            break;
-        case 'm':
-            if (!bench_parse_method(optarg, &o->method)) return bad("method", optarg, "paper or fast");
-            break;
-        case 'j': o->json = optarg; break;
-        case 'h': usage(stdout); return -1;
-        default: usage(stderr); return 2;
-        }
-    }
-    if (optind < argc) {
-        fprintf(stderr, "subadmm-bench kernels: unexpected argument \"%s\"\n", argv[optind]);
-        return 2;
-    }
-    return 0;
+    return bench_parse("kernels", options, sizeof options / sizeof *options, NULL, argc, argv);
 }
 
 static json_t *row_json(const struct row *row)
@@ -224,13 +177,16 @@ int bench_kernels(int argc, char **argv)
     json_t *rows = json_array(), *bandwidths = json_array();
     double bandwidth[BENCH_LIST];
     for (int t = 0; t < o.thread_count && !interrupted(); ++t) {
-        bandwidth[t] = bench_memory_bandwidth(o.threads[t]);
-        json_array_append_new(bandwidths, json_pack("{s:i, s:f}", "threads", o.threads[t], "gb_per_s", bandwidth[t]));
-        if (!quiet) printf("memory, %d thread%s: %.1f GB/s (copy)\n", o.threads[t], o.threads[t] == 1 ? "" : "s", bandwidth[t]);
+        bandwidth[t] = bench_memory_bandwidth((int)o.threads[t]);
+        json_array_append_new(bandwidths,
+                              json_pack("{s:i, s:f}", "threads", (int)o.threads[t], "gb_per_s", bandwidth[t]));
+        if (!quiet)
+            printf("memory, %ld thread%s: %.1f GB/s (copy)\n", o.threads[t], o.threads[t] == 1 ? "" : "s",
+                   bandwidth[t]);
     }
     if (!quiet)
-        printf("%-5s %-8s %-4s %7s %9s %11s %8s %7s %10s\n", "", "variant", "", "threads", "contacts", "ns/cont/it", "GB/s",
-               "of mem", "ncp_max");
+        printf("%-5s %-8s %-4s %7s %9s %11s %8s %7s %10s\n", "", "variant", "", "threads", "contacts", "ns/cont/it",
+               "GB/s", "of mem", "ncp_max");
     for (int size = 0; size < o.contact_count && status == 0 && !interrupted(); ++size) {
         struct lattice lattice;
         if (!lattice_create(&lattice, o.contacts[size])) {
@@ -240,7 +196,7 @@ int bench_kernels(int argc, char **argv)
         }
         const struct sadmm_kernels *k;
         for (size_t index = 0; (k = sadmm_kernels_at(index)) != NULL && status == 0 && !interrupted(); ++index) {
-            if (o.backend != SADMM_BACKEND_AUTO && k->backend != o.backend) continue;
+            if (o.backend != SADMM_BACKEND_AUTO && (int)k->backend != o.backend) continue;
             if (o.precision >= 0 && (int)k->precision != o.precision) continue;
             if (o.method == SADMM_METHOD_FAST && !k->update_weights) continue;
             if (k->backend == SADMM_BACKEND_REF && o.contacts[size] > 10000 && o.backend != SADMM_BACKEND_REF) continue;
@@ -248,9 +204,10 @@ int bench_kernels(int argc, char **argv)
                 sadmm_backend_info info;
                 struct sadmm_error error = {SADMM_OK, ""};
                 sadmm_backend_query(k->backend, &info);
-                struct row row = {.backend = k->backend, .name = info.name, .variant = k->variant, .precision = k->precision,
-                                  .threads = k->backend == SADMM_BACKEND_CPU ? o.threads[t] : 1};
-                if (run_row(k, &lattice, o.method, o.seconds, &row, &error) != SADMM_OK) {
+                struct row row = {.backend = k->backend, .name = info.name, .variant = k->variant,
+                                  .precision = k->precision,
+                                  .threads = k->backend == SADMM_BACKEND_CPU ? (int)o.threads[t] : 1};
+                if (run_row(k, &lattice, (sadmm_method)o.method, o.seconds, &row, &error) != SADMM_OK) {
                     fprintf(stderr, "subadmm-bench kernels: %s\n", error.message);
                     status = 1;
                     break;
@@ -268,9 +225,10 @@ int bench_kernels(int argc, char **argv)
         }
         lattice_destroy(&lattice);
     }
-    json_t *document = json_pack("{s:s, s:s, s:b, s:s, s:s, s:o, s:o}", "bench", "kernels", "method",
-                                 o.method == SADMM_METHOD_FAST ? "fast" : "paper", "interrupted", interrupted() != 0, "commit", sadmm_build_commit(),
-                                 "compiler", sadmm_build_compiler(), "memory", bandwidths, "rows", rows);
+    json_t *document =
+        json_pack("{s:s, s:s, s:b, s:s, s:s, s:o, s:o}", "bench", "kernels", "method",
+                  bench_word_of(bench_methods, o.method), "interrupted", interrupted() != 0, "commit",
+                  sadmm_build_commit(), "compiler", sadmm_build_compiler(), "memory", bandwidths, "rows", rows);
     if (status == 0 && json) {
         FILE *stream = output_stream(json);
         bool complete = json_dumpf(document, stream, JSON_INDENT(2)) == 0;

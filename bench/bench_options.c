@@ -1,73 +1,152 @@
 #include "bench_options.h"
 
+#include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-bool bench_parse_list(const char *text, long low, long high, long *values, int *count)
+enum { MOST_OPTIONS = 32, HELP_COLUMN = 30, FIRST_VALUE = 1000 /* of an option, for getopt: no character */ };
+
+const struct bench_word bench_backends[4] = {
+    {"ref", SADMM_BACKEND_REF}, {"cpu", SADMM_BACKEND_CPU}, {"cuda", SADMM_BACKEND_CUDA}, {"all", SADMM_BACKEND_AUTO}};
+const struct bench_word bench_precisions[3] = {{"f32", SADMM_F32}, {"f64", SADMM_F64}, {"both", -1}};
+const struct bench_word bench_methods[3] = {{"paper", SADMM_METHOD_PAPER}, {"fast", SADMM_METHOD_FAST}, {"both", -1}};
+
+const char *bench_word_of(const struct bench_word *words, int value)
 {
-    *count = 0;
-    while (*count < BENCH_LIST) {
-        char *end;
-        long value = strtol(text, &end, 10);
-        if (end == text || value < low || value > high || (*end && *end != ',')) return false;
-        values[(*count)++] = value;
-        if (!*end) return true;
-        text = end + 1;
+    while (words->value != value) ++words;
+    return words->word;
+}
+
+const char *bench_precision_name(sadmm_precision precision) { return bench_word_of(bench_precisions, (int)precision); }
+
+int bench_bad_option(const char *command, const char *option, const char *value, const char *allowed)
+{
+    fprintf(stderr, "subadmm-bench %s: --%s %s: must be %s\n", command, option, value, allowed);
+    return 2;
+}
+
+/* ---- values ---------------------------------------------------------------------------------------------------- */
+
+static bool starts_like_a_number(const char *text) { return *text && strchr("+-.0123456789", *text); }
+
+/* A whole number of the option's range up to `stop`, or the end of the text. */
+static bool read_number(const struct bench_option *o, const char **text, char stop, long *to)
+{
+    char *end;
+    if (!starts_like_a_number(*text)) return false;
+    *to = strtol(*text, &end, 10);
+    if (end == *text || (*end && *end != stop) || (double)*to < o->low || (double)*to > o->high) return false;
+    *text = end;
+    return true;
+}
+
+static bool read_numbers(const struct bench_option *o, const char *text)
+{
+    long *to = o->to;
+    for (*o->count = 0; *o->count < BENCH_LIST; ++text) {
+        if (!read_number(o, &text, ',', &to[*o->count])) return false;
+        ++*o->count;
+        if (!*text) return true;
     }
     return false;
 }
 
-bool bench_parse_number(const char *text, long low, long high, long *value)
+static bool read_real(const struct bench_option *o, const char *text)
 {
-    char *end;
-    long number = strtol(text, &end, 10);
-    if (end == text || *end || number < low || number > high) return false;
-    *value = number;
+    char *end = NULL;
+    const double number = starts_like_a_number(text) ? strtod(text, &end) : 0;
+    if (!end || end == text || *end || !(number > 0 && number <= o->high)) return false;
+    *(double *)o->to = number;
     return true;
 }
 
-bool bench_parse_seconds(const char *text, double high, double *seconds)
+static bool read_word(const struct bench_option *o, const char *text)
 {
-    char *end;
-    double number = strtod(text, &end);
-    if (end == text || *end || !(number > 0 && number <= high)) return false;
-    *seconds = number;
-    return true;
-}
-
-bool bench_parse_backend(const char *text, sadmm_backend *backend)
-{
-    static const char *const names[] = {"all", "ref", "cpu", "cuda"};
-    for (int k = 0; k < 4; ++k)
-        if (!strcmp(text, names[k])) {
-            *backend = (sadmm_backend)k;
+    for (int k = 0; k < o->word_count; ++k)
+        if (!strcmp(text, o->words[k].word)) {
+            *(int *)o->to = o->words[k].value;
             return true;
         }
     return false;
 }
 
-bool bench_parse_precision(const char *text, int *precision)
+static bool read_value(const struct bench_option *o, const char *text)
 {
-    if (!strcmp(text, "f32")) *precision = SADMM_F32;
-    else if (!strcmp(text, "f64")) *precision = SADMM_F64;
-    else if (!strcmp(text, "both")) *precision = -1;
-    else return false;
-    return true;
+    switch (o->kind) {
+    case BENCH_IS_FLAG: *(bool *)o->to = true; return true;
+    case BENCH_IS_TEXT: *(const char **)o->to = text; return true;
+    case BENCH_IS_TEXTS:
+        if (*o->count == BENCH_LIST) return false;
+        ((const char **)o->to)[(*o->count)++] = text;
+        return true;
+    case BENCH_IS_NUMBER: return read_number(o, &text, 0, o->to);
+    case BENCH_IS_NUMBERS: return read_numbers(o, text);
+    case BENCH_IS_REAL: return read_real(o, text);
+    case BENCH_IS_WORD: return read_word(o, text);
+    }
+    return false;
 }
 
-bool bench_parse_method(const char *text, sadmm_method *method)
+/* ---- what they may be ------------------------------------------------------------------------------------------ */
+
+/* "ref, cpu or cuda", or with one separator everywhere: "ref|cpu|cuda". */
+static void join_words(const struct bench_option *o, const char *between, const char *last, char *out, size_t size)
 {
-    if (!strcmp(text, "paper")) *method = SADMM_METHOD_PAPER;
-    else if (!strcmp(text, "fast")) *method = SADMM_METHOD_FAST;
-    else return false;
-    return true;
+    size_t used = 0;
+    out[0] = 0;
+    for (int k = 0; k < o->word_count && used < size; ++k)
+        used += (size_t)snprintf(out + used, size - used, "%s%s", k == 0 ? "" : k + 1 == o->word_count ? last : between,
+                                 o->words[k].word);
 }
 
-const char *bench_precision_name(sadmm_precision precision) { return precision == SADMM_F32 ? "f32" : "f64"; }
-
-int bench_bad_option(const char *command, const char *option, const char *value, const char *allowed)
+static int refuse(const char *command, const struct bench_option *o, const char *text)
 {
-    fprintf(stderr, "subadmm-bench %s: --%s %s: must be %s\n", command, option, value, allowed);
+    char allowed[128] = "";
+    switch (o->kind) {
+    case BENCH_IS_FLAG:
+    case BENCH_IS_TEXT: break;
+    case BENCH_IS_TEXTS: snprintf(allowed, sizeof allowed, "given %d times at most", (int)BENCH_LIST); break;
+    case BENCH_IS_NUMBER: snprintf(allowed, sizeof allowed, "in [%.0f, %.0f]", o->low, o->high); break;
+    case BENCH_IS_NUMBERS:
+        snprintf(allowed, sizeof allowed, "up to %d numbers in [%.0f, %.0f]", (int)BENCH_LIST, o->low, o->high);
+        break;
+    case BENCH_IS_REAL: snprintf(allowed, sizeof allowed, "in (0, %g]", o->high); break;
+    case BENCH_IS_WORD: join_words(o, ", ", " or ", allowed, sizeof allowed); break;
+    }
+    return bench_bad_option(command, o->name, text, allowed);
+}
+
+static void usage(FILE *out, const char *command, const struct bench_option *options, size_t count, const char *more)
+{
+    fprintf(out, "usage: subadmm-bench %s [options]\n\n", command);
+    for (size_t k = 0; k < count; ++k) {
+        const struct bench_option *o = &options[k];
+        char words[64];
+        join_words(o, "|", "|", words, sizeof words);
+        const char *value = o->value ? o->value : words;
+        const int width = fprintf(out, "  --%s%s%s", o->name, *value ? " " : "", value);
+        fprintf(out, "%*s%s\n", width < HELP_COLUMN ? HELP_COLUMN - width : 1, "", o->help);
+    }
+    if (more) fprintf(out, "\n%s", more);
+}
+
+int bench_parse(const char *command, const struct bench_option *options, size_t option_count, const char *more,
+                int argc, char **argv)
+{
+    struct option longs[MOST_OPTIONS + 2] = {{0}};
+    for (size_t k = 0; k < option_count; ++k)
+        longs[k] = (struct option){options[k].name, options[k].kind != BENCH_IS_FLAG, NULL, FIRST_VALUE + (int)k};
+    longs[option_count] = (struct option){"help", no_argument, NULL, 'h'};
+    for (int found; (found = getopt_long(argc, argv, "h", longs, NULL)) != -1;) {
+        if (found < FIRST_VALUE) {
+            usage(found == 'h' ? stdout : stderr, command, options, option_count, more);
+            return found == 'h' ? -1 : 2;
+        }
+        const struct bench_option *o = &options[found - FIRST_VALUE];
+        if (!read_value(o, optarg)) return refuse(command, o, optarg);
+    }
+    if (optind == argc) return 0;
+    fprintf(stderr, "subadmm-bench %s: unexpected argument \"%s\"\n", command, argv[optind]);
     return 2;
 }

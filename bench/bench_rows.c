@@ -1,7 +1,7 @@
-/* subadmm-bench rows: what a constraint given by rows costs a scene. The frozen problem of a step with two further bodies (or
- * more pairs of them), without and with a weld between them, solved in turn; an iteration's time is the difference of
- * solves that differ by ITERATIONS. What is printed are medians: of both times, and of the ratios of neighbours. */
-#include <getopt.h>
+/* subadmm-bench rows: what a constraint given by rows costs a scene. The frozen problem of a step with two further
+ * bodies (or more pairs of them), without and with a weld between them, solved in turn; an iteration's time is the
+ * difference of solves that differ by ITERATIONS. What is printed are medians: of both times, and of the ratios of
+ * neighbours. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,12 +16,11 @@
 
 static const char command[] = "rows";
 
-enum { FEW = 20, ITERATIONS = 200, MOST_PAIRS = 1000 };
+enum { BASE_ITERATIONS = 20, ITERATIONS = 200, MOST_PAIRS = 1000 };
 
 struct options {
     const char *scene;
-    sadmm_backend backend;
-    int precision, method; /* -1: both */
+    int backend, precision, method; /* precision, method -1: both */
     long steps, threads, pairs, welds;
 };
 
@@ -72,10 +71,12 @@ static sadmm_status extend(sadmm_problem *from, sadmm_problem *to, long more, bo
         status = of_problem(from, sadmm_problem_get_solution(from, NULL, impulses, NULL), error);
     for (size_t i = (size_t)n; status == SADMM_OK && i < bodies; ++i) {
         for (int j = 0; j < 6; ++j) A[36 * i + 7 * (size_t)j] = j < 3 ? 1 : 0.1;
-        for (int j = 0; j < 6; ++j) b[6 * i + (size_t)j] = i % 2 ? 1 : 2; /* they keep moving: nothing is a denormal number */
+        for (int j = 0; j < 6; ++j)
+            b[6 * i + (size_t)j] = i % 2 ? 1 : 2; /* they keep moving: nothing is a denormal number */
     }
     for (int32_t k = 0; status == SADMM_OK && k < (int32_t)more; ++k) {
-        welds[k] = (sadmm_problem_block){.kind = SADMM_BLOCK_HARD, .rows = 6, .body_a = n + 2 * k, .body_b = n + 2 * k + 1};
+        welds[k] =
+            (sadmm_problem_block){.kind = SADMM_BLOCK_HARD, .rows = 6, .body_a = n + 2 * k, .body_b = n + 2 * k + 1};
         for (int j = 0; j < 6; ++j) welds[k].jacobian_a[7 * j] = -1, welds[k].jacobian_b[7 * j] = 1;
     }
     if (status == SADMM_OK) status = of_problem(to, sadmm_problem_set_bodies(to, (int32_t)bodies, A, b, v), error);
@@ -94,7 +95,8 @@ static sadmm_status solve(sadmm_problem *problem, const struct options *o, sadmm
 {
     sadmm_solve_report report;
     settings.iterations = iterations;
-    sadmm_status status = sadmm_problem_solve(problem, o->backend, (sadmm_precision)precision, &settings, &report);
+    sadmm_status status =
+        sadmm_problem_solve(problem, (sadmm_backend)o->backend, (sadmm_precision)precision, &settings, &report);
     *ms = report.solve_ms;
     return of_problem(problem, status, error);
 }
@@ -105,8 +107,8 @@ static double median(double *values, int count)
     return values[count / 2];
 }
 
-static sadmm_status measure(sadmm_problem *const problems[2], const struct options *o, sadmm_method method, int precision,
-                            struct figures *out, struct sadmm_error *error)
+static sadmm_status measure(sadmm_problem *const problems[2], const struct options *o, sadmm_method method,
+                            int precision, struct figures *out, struct sadmm_error *error)
 {
     double us[2][MOST_PAIRS], ratio[MOST_PAIRS];
     sadmm_settings settings = sadmm_settings_default();
@@ -118,12 +120,12 @@ static sadmm_status measure(sadmm_problem *const problems[2], const struct optio
         double now[2];
         for (int k = 0; k < 2; ++k) {
             const int which = pair % 2 ? 1 - k : k;
-            double few, many;
-            sadmm_status status = solve(problems[which], o, settings, precision, FEW, &few, error);
+            double base, longer;
+            sadmm_status status = solve(problems[which], o, settings, precision, BASE_ITERATIONS, &base, error);
             if (status == SADMM_OK)
-                status = solve(problems[which], o, settings, precision, FEW + ITERATIONS, &many, error);
+                status = solve(problems[which], o, settings, precision, BASE_ITERATIONS + ITERATIONS, &longer, error);
             if (status != SADMM_OK) return status;
-            now[which] = 1e3 * (many - few) / ITERATIONS;
+            now[which] = 1e3 * (longer - base) / ITERATIONS;
         }
         if (pair < 0) continue;
         us[0][done] = now[0], us[1][done] = now[1];
@@ -133,78 +135,29 @@ static sadmm_status measure(sadmm_problem *const problems[2], const struct optio
     return SADMM_OK;
 }
 
-static void usage(FILE *out)
-{
-    fprintf(out, "usage: subadmm-bench rows [options]\n\n"
-                 "  --scene SPEC              default sliding_cubes:2000\n"
-                 "  --steps N                 before the problem is frozen, default 20\n"
-                 "  --backend NAME            ref, cpu (default) or cuda\n"
-                 "  --method paper|fast       default both\n"
-                 "  --precision f32|f64|both  default both\n"
-                 "  --threads N               at most, default 1\n"
-                 "  --welds N                 between two more bodies each, default 1\n"
-                 "  --pairs N                 solves without and with the block in turn, default 21\n");
-}
-
-static int bad(const char *option, const char *value, const char *allowed)
-{
-    return bench_bad_option(command, option, value, allowed);
-}
-
-/* 0, 2 for wrong usage, -1 for --help. */
 static int parse(int argc, char **argv, struct options *o)
 {
-    static const struct option longs[] = {
-        {"scene", required_argument, NULL, 'S'},     {"steps", required_argument, NULL, 's'},
-        {"backend", required_argument, NULL, 'b'},   {"method", required_argument, NULL, 'M'},
-        {"precision", required_argument, NULL, 'p'}, {"threads", required_argument, NULL, 't'},
-        {"pairs", required_argument, NULL, 'n'},     {"welds", required_argument, NULL, 'w'},
-        {"help", no_argument, NULL, 'h'},
-        {NULL, 0, NULL, 0},
+    const struct bench_option options[] = {
+        BENCH_TEXT("scene", "SPEC", &o->scene, "default sliding_cubes:2000"),
+        BENCH_NUMBER("steps", &o->steps, 1, 100000, "before the problem is frozen, default 20"),
+        BENCH_WORD("backend", &o->backend, bench_backends, BENCH_ONE_BACKEND, "default cpu"),
+        BENCH_WORD("method", &o->method, bench_methods, 3, "default both"),
+        BENCH_WORD("precision", &o->precision, bench_precisions, 3, "default both"),
+        BENCH_NUMBER("threads", &o->threads, 0, 1024, "at most, 0: as many as there are; default 1"),
+        BENCH_NUMBER("welds", &o->welds, 1, 1000000, "between two more bodies each, default 1"),
+        BENCH_NUMBER("pairs", &o->pairs, 1, MOST_PAIRS, "solves without and with the block in turn, default 21"),
     };
-    sadmm_method method;
-    for (int option; (option = getopt_long(argc, argv, "h", longs, NULL)) != -1;) {
-        switch (option) {
-        case 'S': o->scene = optarg; break;
-        case 's':
-            if (!bench_parse_number(optarg, 1, 100000, &o->steps)) return bad("steps", optarg, "in [1, 100000]");
-            break;
-        case 'b':
-            if (!bench_parse_backend(optarg, &o->backend) || o->backend == SADMM_BACKEND_AUTO)
-                return bad("backend", optarg, "ref, cpu or cuda");
-            break;
-        case 'M':
-            if (!bench_parse_method(optarg, &method)) return bad("method", optarg, "paper or fast");
-            o->method = (int)method;
-            break;
-        case 'p':
-            if (!bench_parse_precision(optarg, &o->precision)) return bad("precision", optarg, "f32, f64 or both");
-            break;
-        case 't':
-            if (!bench_parse_number(optarg, 0, 1024, &o->threads)) return bad("threads", optarg, "in [0, 1024]");
-            break;
-        case 'w':
-            if (!bench_parse_number(optarg, 1, 1000000, &o->welds)) return bad("welds", optarg, "in [1, 1000000]");
-            break;
-        case 'n':
-            if (!bench_parse_number(optarg, 1, MOST_PAIRS, &o->pairs)) return bad("pairs", optarg, "in [1, 1000]");
-            break;
-        case 'h': usage(stdout); return -1;
-        default: usage(stderr); return 2;
-        }
-    }
-    if (optind == argc) return 0;
-    fprintf(stderr, "subadmm-bench %s: unexpected argument \"%s\"\n", command, argv[optind]);
-    return 2;
+    return bench_parse(command, options, sizeof options / sizeof *options, NULL, argc, argv);
 }
 
 static sadmm_status run(const struct options *o, sadmm_problem *const problems[3], struct sadmm_error *error)
 {
     sadmm_backend_info info;
     sadmm_status status = freeze(o, problems[2], error);
-    for (int k = 0; k < 2 && status == SADMM_OK; ++k) status = extend(problems[2], problems[k], o->welds, k == 1, error);
+    for (int k = 0; k < 2 && status == SADMM_OK; ++k)
+        status = extend(problems[2], problems[k], o->welds, k == 1, error);
     if (status != SADMM_OK) return status;
-    sadmm_backend_query(o->backend, &info);
+    sadmm_backend_query((sadmm_backend)o->backend, &info);
     printf("%s after %ld steps: %d bodies, %d contacts; %ld welds between %ld more bodies\n", o->scene, o->steps,
            sadmm_problem_body_count(problems[2]), sadmm_problem_contact_count(problems[2]), o->welds, 2 * o->welds);
     printf("%-6s %-5s %-4s %12s %12s %8s\n", "", "", "", "us/it", "with rows", "ratio");
@@ -216,7 +169,7 @@ static sadmm_status run(const struct options *o, sadmm_problem *const problems[3
             if (o->precision < 0 && !info.available[precision]) continue;
             status = measure(problems, o, (sadmm_method)method, precision, &figures, error);
             if (status != SADMM_OK) return status;
-            printf("%-6s %-5s %-4s %12.2f %12.2f %8.3f\n", info.name, method == SADMM_METHOD_FAST ? "fast" : "paper",
+            printf("%-6s %-5s %-4s %12.2f %12.2f %8.3f\n", info.name, bench_word_of(bench_methods, method),
                    bench_precision_name((sadmm_precision)precision), figures.without, figures.with, figures.ratio);
             fflush(stdout);
         }

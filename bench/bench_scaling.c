@@ -1,7 +1,6 @@
 /* subadmm-bench scaling: whole steps of a scene that grows, on the CPU by threads and on the GPU. Times come from steps
  * without a certificate; the errors beside them from further steps of the same run with it. A size that would take too
  * long is left out, and the row says so. bench/plot_scaling.py draws the CSV. */
-#include <getopt.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,10 +16,10 @@ static const char command[] = "scaling";
 
 struct options {
     const char *scene;
-    sadmm_backend backend; /* AUTO: cpu and cuda */
-    int precision;         /* -1: both */
-    sadmm_method method;
-    long iterations;       /* 0: the scene's */
+    int backend;     /* SADMM_BACKEND_AUTO: cpu and cuda */
+    int precision;   /* -1: both */
+    int method;
+    long iterations; /* 0: the scene's */
     long sizes[BENCH_LIST], threads[BENCH_LIST], steps, warm_up, certified, device;
     int size_count, thread_count;
     double max_seconds;
@@ -50,28 +49,13 @@ struct sinks {
     FILE *csv;
 };
 
-static const char *backend_name(sadmm_backend backend)
-{
-    sadmm_backend_info info;
-    return sadmm_backend_query(backend, &info) == SADMM_OK ? info.name : "?";
-}
-
-static void write_text(FILE *out, const char *text)
-{
-    putc('"', out);
-    for (; *text; ++text) {
-        if (*text == '"') putc('"', out);
-        putc(*text == '\n' ? ' ' : *text, out);
-    }
-    putc('"', out);
-}
-
 static void write_header(const struct sinks *out, const struct options *o)
 {
     if (out->csv)
         fputs(
             "scene,backend,threads,precision,runs_on,bodies,contacts,pairs,iterations,steps,"
-            "collide_ms,assemble_ms,solve_ms,finish_ms,solver_ms,step_ms,ncp_max,momentum_max,hash_step,state_hash,commit,status\n",
+            "collide_ms,assemble_ms,solve_ms,finish_ms,solver_ms,step_ms,ncp_max,momentum_max,"
+            "hash_step,state_hash,commit,status\n",
             out->csv);
     if (!out->table) return;
     fprintf(out->table,
@@ -87,8 +71,9 @@ static void write_csv(FILE *out, const struct row *row)
 {
     const struct scene_timing *t = &row->timing;
     const struct series *s = row->series;
-    fprintf(out, "%s,%s,%d,%s,", row->scene, backend_name(s->backend), s->threads, bench_precision_name(s->precision));
-    write_text(out, s->runs_on);
+    fprintf(out, "%s,%s,%d,%s,", row->scene, bench_word_of(bench_backends, (int)s->backend), s->threads,
+            bench_precision_name(s->precision));
+    bench_write_csv_text(out, s->runs_on);
     if (t->steps > 0)
         fprintf(out, ",%d,%d,%d,%d,%d,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g", t->last.bodies, t->last.contacts, t->last.pairs,
                 t->last.iterations, t->steps, t->ms.collide, t->ms.assemble, t->ms.solve, t->ms.finish, t->solver_ms,
@@ -99,7 +84,7 @@ static void write_csv(FILE *out, const struct row *row)
     if (t->steps > 0) fprintf(out, ",%" PRId64 ",%016" PRIx64, t->last.step, t->state_hash);
     else fputs(",,", out);
     fprintf(out, ",%s,", sadmm_build_commit());
-    write_text(out, row->status);
+    bench_write_csv_text(out, row->status);
     putc('\n', out);
 }
 
@@ -112,7 +97,7 @@ static void write_row(const struct sinks *out, const struct row *row)
         fflush(out->csv); /* for who watches */
     }
     if (!out->table) return;
-    fprintf(out->table, "%-24s %-5s %4d %-4s ", row->scene, backend_name(s->backend), s->threads,
+    fprintf(out->table, "%-24s %-5s %4d %-4s ", row->scene, bench_word_of(bench_backends, (int)s->backend), s->threads,
             bench_precision_name(s->precision));
     if (t->steps > 0) {
         fprintf(out->table, "%9d %5d %9.3f %9.3f %9.3f %9.3f %9.3f %9.3f %5d ", t->last.contacts, t->last.iterations,
@@ -149,7 +134,7 @@ static bool run_row(const struct options *o, struct series *s, long size, const 
             scene.def.precision = s->precision;
             scene.def.device = (int)o->device;
             scene.def.settings.threads = s->threads;
-            sadmm_scene_set_method(&scene, o->method);
+            sadmm_scene_set_method(&scene, (sadmm_method)o->method);
             if (o->iterations > 0) scene.def.settings.iterations = (int)o->iterations;
             status = scene_timing_run(&scene, &plan, &row.timing, &error);
         }
@@ -202,7 +187,7 @@ static bool run_backend(const struct options *o, sadmm_backend backend, sadmm_pr
     if (sadmm_backend_query(backend, &info) != SADMM_OK) return false;
     if (!info.available[precision]) {
         fprintf(notes, "%s in %s: not available: %s\n", info.name, bench_precision_name(precision), info.reason);
-        return o->backend != backend;
+        return o->backend != (int)backend;
     }
     if (backend == SADMM_BACKEND_CPU) return run_cpu(o, precision, out, notes);
     struct series s = {.backend = backend, .precision = precision, .threads = 1};
@@ -212,101 +197,34 @@ static bool run_backend(const struct options *o, sadmm_backend backend, sadmm_pr
 
 /* ---- command line ---------------------------------------------------------------------------------------------- */
 
-static void usage(FILE *out)
-{
-    fprintf(out,
-            "usage: subadmm-bench scaling [options]\n\n"
-            "  --scene NAME               a scene that takes a size, default sliding_cubes\n"
-            "  --sizes N[,N...]           ascending; default 100,500,1000,2000,5000,10000,100000,1000000\n"
-            "  --backend ref|cpu|cuda|all all: cpu and cuda (default)\n"
-            "  --threads N[,N...]         CPU threads at most, default 1,2,4,8,16; more than the machine has are left out\n"
-            "  --precision f32|f64|both   default f32\n"
-            "  --method paper|fast        default fast\n"
-            "  --iterations N             a step; default the scene's for the method\n"
-            "  --device N                 accelerator, default 0\n"
-            "  --steps N                  timed steps a row, default 20\n"
-            "  --warm-up N                steps before them, default 5\n"
-            "  --certified N              steps with the certificate after them, default 1\n"
-            "  --max-seconds S            a row; larger sizes that would take longer are skipped; default 60\n"
-            "  --csv FILE|-               the rows as CSV\n");
-}
-
-static int bad(const char *option, const char *value, const char *allowed)
-{
-    return bench_bad_option(command, option, value, allowed);
-}
-
-/* 0, 2 for wrong usage, -1 for --help. */
 static int parse(int argc, char **argv, struct options *o)
 {
-    static const struct option longs[] = {
-        {"scene", required_argument, NULL, 'S'},
-        {"sizes", required_argument, NULL, 'n'},
-        {"backend", required_argument, NULL, 'b'},
-        {"threads", required_argument, NULL, 't'},
-        {"precision", required_argument, NULL, 'p'},
-        {"method", required_argument, NULL, 'M'},
-        {"iterations", required_argument, NULL, 'i'},
-        {"device", required_argument, NULL, 'd'},
-        {"steps", required_argument, NULL, 's'},
-        {"warm-up", required_argument, NULL, 'w'},
-        {"certified", required_argument, NULL, 'c'},
-        {"max-seconds", required_argument, NULL, 'm'},
-        {"csv", required_argument, NULL, 'C'},
-        {"help", no_argument, NULL, 'h'},
-        {NULL, 0, NULL, 0},
+    const struct bench_option options[] = {
+        BENCH_TEXT("scene", "NAME", &o->scene, "a scene that takes a size, default sliding_cubes"),
+        BENCH_NUMBERS("sizes", o->sizes, &o->size_count, 1, 1000000,
+                      "ascending; default 100,500,1000,2000,5000,10000,100000,1000000"),
+        BENCH_WORD("backend", &o->backend, bench_backends, 4, "all: cpu and cuda (default)"),
+        BENCH_NUMBERS("threads", o->threads, &o->thread_count, 1, 1024,
+                      "CPU threads at most, default 1,2,4,8,16; more than the machine has are left out"),
+        BENCH_WORD("precision", &o->precision, bench_precisions, 3, "default f32"),
+        BENCH_WORD("method", &o->method, bench_methods, BENCH_ONE_METHOD, "default fast"),
+        BENCH_NUMBER("iterations", &o->iterations, 1, 1000000, "a step; default the scene's for the method"),
+        BENCH_NUMBER("device", &o->device, 0, 1023, "accelerator, default 0"),
+        BENCH_NUMBER("steps", &o->steps, 1, 100000, "timed steps a row, default 20"),
+        BENCH_NUMBER("warm-up", &o->warm_up, 0, 100000, "steps before them, default 5"),
+        BENCH_NUMBER("certified", &o->certified, 0, 1000, "steps with the certificate after them, default 1"),
+        BENCH_REAL("max-seconds", "S", &o->max_seconds, 86400,
+                   "a row; larger sizes that would take longer are skipped; default 60"),
+        BENCH_TEXT("csv", "FILE|-", &o->csv, "the rows as CSV"),
     };
-    for (int option; (option = getopt_long(argc, argv, "h", longs, NULL)) != -1;) {
-        switch (option) {
-        case 'S': o->scene = optarg; break;
-        case 'n':
-            if (!bench_parse_list(optarg, 1, 1000000, o->sizes, &o->size_count))
-                return bad("sizes", optarg, "up to 16 numbers in [1, 1000000]");
-            for (int k = 1; k < o->size_count; ++k)
-                if (o->sizes[k] <= o->sizes[k - 1]) return bad("sizes", optarg, "ascending");
-            break;
-        case 'b':
-            if (!bench_parse_backend(optarg, &o->backend)) return bad("backend", optarg, "ref, cpu, cuda or all");
-            break;
-        case 't':
-            if (!bench_parse_list(optarg, 1, 1024, o->threads, &o->thread_count))
-                return bad("threads", optarg, "up to 16 numbers in [1, 1024]");
-            break;
-        case 'p':
-            if (!bench_parse_precision(optarg, &o->precision)) return bad("precision", optarg, "f32, f64 or both");
-            break;
-        case 'M':
-            if (!bench_parse_method(optarg, &o->method)) return bad("method", optarg, "paper or fast");
-            break;
-        case 'i':
-            if (!bench_parse_number(optarg, 1, 1000000, &o->iterations))
-                return bad("iterations", optarg, "in [1, 1000000]");
-            break;
-        case 'd':
-            if (!bench_parse_number(optarg, 0, 1023, &o->device)) return bad("device", optarg, "in [0, 1023]");
-            break;
-        case 's':
-            if (!bench_parse_number(optarg, 1, 100000, &o->steps)) return bad("steps", optarg, "in [1, 100000]");
-            break;
-        case 'w':
-            if (!bench_parse_number(optarg, 0, 100000, &o->warm_up)) return bad("warm-up", optarg, "in [0, 100000]");
-            break;
-        case 'c':
-            if (!bench_parse_number(optarg, 0, 1000, &o->certified)) return bad("certified", optarg, "in [0, 1000]");
-            break;
-        case 'm':
-            if (!bench_parse_seconds(optarg, 86400, &o->max_seconds))
-                return bad("max-seconds", optarg, "in (0, 86400]");
-            break;
-        case 'C': o->csv = optarg; break;
-        case 'h': usage(stdout); return -1;
-        default: usage(stderr); return 2;
+    const int code = bench_parse(command, options, sizeof options / sizeof *options, NULL, argc, argv);
+    if (code) return code;
+    for (int k = 1; k < o->size_count; ++k)
+        if (o->sizes[k] <= o->sizes[k - 1]) {
+            char sizes[64];
+            snprintf(sizes, sizeof sizes, "%ld,%ld", o->sizes[k - 1], o->sizes[k]);
+            return bench_bad_option(command, "sizes", sizes, "ascending");
         }
-    }
-    if (optind < argc) {
-        fprintf(stderr, "subadmm-bench %s: unexpected argument \"%s\"\n", command, argv[optind]);
-        return 2;
-    }
     /* Before anything is measured: does the scene take the smallest and the largest size? */
     for (int k = 0; k < 2; ++k) {
         struct sadmm_scene scene;
@@ -347,7 +265,7 @@ int bench_scaling(int argc, char **argv)
     for (int precision = SADMM_F32; precision <= SADMM_F64; ++precision) {
         if (o.precision >= 0 && o.precision != precision) continue;
         for (size_t k = 0; k < sizeof order / sizeof *order; ++k) {
-            bool wanted = o.backend == SADMM_BACKEND_AUTO ? order[k] != SADMM_BACKEND_REF : order[k] == o.backend;
+            bool wanted = o.backend == SADMM_BACKEND_AUTO ? order[k] != SADMM_BACKEND_REF : (int)order[k] == o.backend;
             if (wanted && !run_backend(&o, order[k], (sadmm_precision)precision, &out, out.table ? out.table : stderr))
                 status = 1;
         }

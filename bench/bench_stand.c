@@ -1,6 +1,5 @@
 /* subadmm-bench stand: a scene that is built at rest, over many steps. Whole-step times, deepest penetration, how far
  * any body has moved from where it was put as a share of the smallest body, and whether that counts as standing. */
-#include <getopt.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,9 +17,7 @@ static const char command[] = "stand";
 
 struct options {
     const char *scene;
-    sadmm_method method;
-    sadmm_backend backend;
-    int precision;
+    int method, backend, precision;
     long threads, iterations, steps, device;
     double dt, limit;
 };
@@ -44,12 +41,6 @@ struct stand {
     sadmm_step_report last;
     struct sadmm_error error;
 };
-
-#define TRY(call)                                      \
-    do {                                               \
-        sadmm_status try_status = (call);              \
-        if (try_status != SADMM_OK) return try_status; \
-    } while (0)
 
 static sadmm_status check(struct stand *s, sadmm_status status)
 {
@@ -116,12 +107,12 @@ static sadmm_status step(struct stand *s)
 static sadmm_status run(struct stand *s, const struct options *o)
 {
     s->ms = sadmm_alloc((size_t)o->steps + 1, sizeof *s->ms);
-    bool room = s->ms;
+    bool allocated = s->ms;
     for (int k = 0; k < PHASES; ++k) {
         s->phases[k] = sadmm_alloc((size_t)o->steps + 1, sizeof *s->phases[k]);
-        room = room && s->phases[k];
+        allocated = allocated && s->phases[k];
     }
-    if (!room) return sadmm_fail_memory(&s->error, "the times");
+    if (!allocated) return sadmm_fail_memory(&s->error, "the times");
     TRY(remember(s));
     while (s->done < o->steps && !(interrupted() && s->done > 0)) {
         TRY(step(s));
@@ -149,7 +140,7 @@ static int report(struct stand *s, const struct options *o)
     qsort(s->ms, (size_t)s->done, sizeof *s->ms, bench_compare_doubles);
     const sadmm_settings *settings = &s->scene->def.settings;
     printf("%s, %s, %d iterations a step, dt %g s, %ld steps (%.4g s)\n", o->scene,
-           settings->method == SADMM_METHOD_FAST ? "fast" : "paper", settings->iterations, settings->dt, s->done,
+           bench_word_of(bench_methods, (int)settings->method), settings->iterations, settings->dt, s->done,
            settings->dt * (double)s->done);
     printf("%s %s, %d thread%s, %s, commit %s\n", info.name, bench_precision_name(s->last.precision), s->last.threads,
            s->last.threads == 1 ? "" : "s", machine, sadmm_build_commit());
@@ -157,95 +148,34 @@ static int report(struct stand *s, const struct options *o)
     printf("whole step     %.3f ms median, %.3f 95 %%, %.3f at most\n", s->ms[s->done / 2],
            s->ms[(long)(0.95 * (double)(s->done - 1))], s->ms[s->done - 1]);
     for (int k = 0; k < PHASES; ++k) qsort(s->phases[k], (size_t)s->done, sizeof *s->phases[k], bench_compare_doubles);
-    printf("  of it        %.3f ms collide, %.3f assemble, %.3f solve, %.3f finish (medians)\n", s->phases[0][s->done / 2],
-           s->phases[1][s->done / 2], s->phases[2][s->done / 2], s->phases[3][s->done / 2]);
+    printf("  of it        %.3f ms collide, %.3f assemble, %.3f solve, %.3f finish (medians)\n",
+           s->phases[0][s->done / 2], s->phases[1][s->done / 2], s->phases[2][s->done / 2], s->phases[3][s->done / 2]);
     printf("penetration    %.3g m at most: %.3g of the smallest body (%.3g m)\n", s->penetration, penetration, s->size);
-    printf("drift          %.3g m at most, %.3g m at the end: %.3g of the smallest body\n", s->worst_drift, s->drift, drift);
+    printf("drift          %.3g m at most, %.3g m at the end: %.3g of the smallest body\n", s->worst_drift, s->drift,
+           drift);
     printf("certificate    ncp %.3g m/s, momentum %.3g (one step more)\n", s->ncp, s->last.certificate.momentum_max);
     printf("%s: drift %s penetration %s %g of the smallest body\n", stands ? "stands" : "does not stand",
            stands ? "and" : "or", stands ? "at most" : "above", o->limit);
     return stands ? 0 : 1;
 }
 
-static void usage(FILE *out)
-{
-    fprintf(out, "usage: subadmm-bench stand [options]\n\n"
-                 "  --scene SPEC          default pyramid:100\n"
-                 "  --dt S                default 1/60\n"
-                 "  --steps N             default 2000\n"
-                 "  --method paper|fast   default fast\n"
-                 "  --iterations N        a step, default the scene's for the method\n"
-                 "  --backend NAME        ref, cpu (default) or cuda\n"
-                 "  --precision f32|f64   default f32\n"
-                 "  --threads N           at most, default 2\n"
-                 "  --device N            accelerator, default 0\n"
-                 "  --limit X             most drift and penetration of what stands, as a share of the smallest body,\n"
-                 "                        default 0.01\n\n"
-                 "Exit status: 0 it stands, 1 it does not (or something failed).\n");
-}
-
-static int bad(const char *option, const char *value, const char *allowed)
-{
-    return bench_bad_option(command, option, value, allowed);
-}
-
-/* 0, 2 for wrong usage, -1 for --help. */
 static int parse(int argc, char **argv, struct options *o)
 {
-    static const struct option longs[] = {
-        {"scene", required_argument, NULL, 'S'},
-        {"dt", required_argument, NULL, 'T'},
-        {"steps", required_argument, NULL, 's'},
-        {"method", required_argument, NULL, 'M'},
-        {"iterations", required_argument, NULL, 'i'},
-        {"backend", required_argument, NULL, 'b'},
-        {"precision", required_argument, NULL, 'p'},
-        {"threads", required_argument, NULL, 't'},
-        {"device", required_argument, NULL, 'd'},
-        {"limit", required_argument, NULL, 'l'},
-        {"help", no_argument, NULL, 'h'},
-        {NULL, 0, NULL, 0},
+    const struct bench_option options[] = {
+        BENCH_TEXT("scene", "SPEC", &o->scene, "default pyramid:100"),
+        BENCH_REAL("dt", "S", &o->dt, 1, "default 1/60"),
+        BENCH_NUMBER("steps", &o->steps, 1, 10000000, "default 2000"),
+        BENCH_WORD("method", &o->method, bench_methods, BENCH_ONE_METHOD, "default fast"),
+        BENCH_NUMBER("iterations", &o->iterations, 1, 1000000, "a step, default the scene's for the method"),
+        BENCH_WORD("backend", &o->backend, bench_backends, BENCH_ONE_BACKEND, "default cpu"),
+        BENCH_WORD("precision", &o->precision, bench_precisions, BENCH_ONE_PRECISION, "default f32"),
+        BENCH_NUMBER("threads", &o->threads, 0, 1024, "at most, 0: as many as there are; default 2"),
+        BENCH_NUMBER("device", &o->device, 0, 1023, "accelerator, default 0"),
+        BENCH_REAL("limit", "X", &o->limit, 1e6,
+                   "most drift and penetration of what stands, as a share of the smallest body; default 0.01"),
     };
-    for (int option; (option = getopt_long(argc, argv, "h", longs, NULL)) != -1;) {
-        switch (option) {
-        case 'S': o->scene = optarg; break;
-        case 'T':
-            if (!bench_parse_seconds(optarg, 1, &o->dt)) return bad("dt", optarg, "in (0, 1]");
-            break;
-        case 's':
-            if (!bench_parse_number(optarg, 1, 10000000, &o->steps)) return bad("steps", optarg, "in [1, 10000000]");
-            break;
-        case 'M':
-            if (!bench_parse_method(optarg, &o->method)) return bad("method", optarg, "paper or fast");
-            break;
-        case 'i':
-            if (!bench_parse_number(optarg, 1, 1000000, &o->iterations))
-                return bad("iterations", optarg, "in [1, 1000000]");
-            break;
-        case 'b':
-            if (!bench_parse_backend(optarg, &o->backend) || o->backend == SADMM_BACKEND_AUTO)
-                return bad("backend", optarg, "ref, cpu or cuda");
-            break;
-        case 'p':
-            if (!bench_parse_precision(optarg, &o->precision) || o->precision < 0)
-                return bad("precision", optarg, "f32 or f64");
-            break;
-        case 't':
-            if (!bench_parse_number(optarg, 0, 1024, &o->threads)) return bad("threads", optarg, "in [0, 1024]");
-            break;
-        case 'd':
-            if (!bench_parse_number(optarg, 0, 1023, &o->device)) return bad("device", optarg, "in [0, 1023]");
-            break;
-        case 'l':
-            if (!bench_parse_seconds(optarg, 1e6, &o->limit)) return bad("limit", optarg, "in (0, 1e6]");
-            break;
-        case 'h': usage(stdout); return -1;
-        default: usage(stderr); return 2;
-        }
-    }
-    if (optind == argc) return 0;
-    fprintf(stderr, "subadmm-bench %s: unexpected argument \"%s\"\n", command, argv[optind]);
-    return 2;
+    return bench_parse(command, options, sizeof options / sizeof *options,
+                       "Exit status: 0 it stands, 1 it does not (or something failed).\n", argc, argv);
 }
 
 int bench_stand(int argc, char **argv)
@@ -267,11 +197,11 @@ int bench_stand(int argc, char **argv)
         return 2;
     }
     sadmm_settings *settings = &scene.def.settings;
-    scene.def.backend = o.backend;
+    scene.def.backend = (sadmm_backend)o.backend;
     scene.def.precision = (sadmm_precision)o.precision;
     scene.def.device = (int)o.device;
     settings->dt = o.dt;
-    sadmm_scene_set_method(&scene, o.method);
+    sadmm_scene_set_method(&scene, (sadmm_method)o.method);
     if (o.iterations > 0) settings->iterations = (int)o.iterations;
     settings->threads = (int)o.threads;
     sadmm_status status = sadmm_scene_build(&scene, &s.world, &s.error);

@@ -22,12 +22,6 @@ struct cold {
     struct sadmm_error *error;
 };
 
-#define TRY(call)                                      \
-    do {                                               \
-        sadmm_status try_status = (call);              \
-        if (try_status != SADMM_OK) return try_status; \
-    } while (0)
-
 static sadmm_status check(struct cold *c, sadmm_status status)
 {
     return status == SADMM_OK ? status : sadmm_fail(c->error, status, "%s", sadmm_problem_message(c->problem->problem));

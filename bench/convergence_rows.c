@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "bench.h"
 #include "bench_options.h"
 #include "core/base/memory.h"
 
@@ -29,14 +30,6 @@ struct row row_start(enum row_kind kind, const char *name, sadmm_method method, 
     return row;
 }
 
-static const char *backend_name(sadmm_backend backend)
-{
-    sadmm_backend_info info;
-    return sadmm_backend_query(backend, &info) == SADMM_OK ? info.name : "?";
-}
-
-static const char *method_name(sadmm_method method) { return method == SADMM_METHOD_FAST ? "fast" : "paper"; }
-
 /* ---- CSV ------------------------------------------------------------------------------------------------------- */
 
 void rows_write_header(FILE *csv)
@@ -46,16 +39,6 @@ void rows_write_header(FILE *csv)
           "commit,"
           "status\n",
           csv);
-}
-
-static void write_text(FILE *out, const char *text)
-{
-    putc('"', out);
-    for (; *text; ++text) {
-        if (*text == '"') putc('"', out);
-        putc(*text == '\n' ? ' ' : *text, out);
-    }
-    putc('"', out);
 }
 
 static void write_number(FILE *out, double x)
@@ -73,10 +56,11 @@ static void write_integer(FILE *out, int x)
 static void write_row(FILE *out, const struct row *r)
 {
     fprintf(out, "%s,", kinds[r->kind]);
-    write_text(out, r->name);
-    fprintf(out, ",%s,%s,%s,%d,", method_name(r->method), backend_name(r->series.backend),
-            bench_precision_name(r->series.precision), r->series.threads);
-    write_text(out, r->series.runs_on);
+    bench_write_csv_text(out, r->name);
+    fprintf(out, ",%s,%s,%s,%d,", bench_word_of(bench_methods, (int)r->method),
+            bench_word_of(bench_backends, (int)r->series.backend), bench_precision_name(r->series.precision),
+            r->series.threads);
+    bench_write_csv_text(out, r->series.runs_on);
     fprintf(out, ",%d,%d,%d", r->bodies, r->contacts, r->blocks);
     write_integer(out, r->limit);
     write_integer(out, r->iterations);
@@ -84,14 +68,14 @@ static void write_row(FILE *out, const struct row *r)
                               r->ncp_last,  r->settle_s, r->energy_excess, r->penetration,  r->limited};
     for (size_t k = 0; k < sizeof numbers / sizeof *numbers; ++k) write_number(out, numbers[k]);
     fprintf(out, ",%s,", sadmm_build_commit());
-    write_text(out, r->status);
+    bench_write_csv_text(out, r->status);
     putc('\n', out);
     fflush(out); /* for who watches */
 }
 
 bool rows_add(struct rows *rows, const struct row *row)
 {
-    if (!sadmm_grow((void **)&rows->rows, &rows->capacity, rows->count, rows->count + 1, sizeof *rows->rows))
+    if (!sadmm_grow(&rows->rows, &rows->capacity, rows->count, rows->count + 1, sizeof *rows->rows))
         return false;
     rows->rows[rows->count++] = *row;
     if (rows->csv) write_row(rows->csv, row);
@@ -206,7 +190,8 @@ static void print_cold_ratios(const struct rows *rows, const struct series *seri
 
 static void print_heading(const char *what, const struct series *s, FILE *out)
 {
-    fprintf(out, "### %s: %s %s", what, backend_name(s->backend), bench_precision_name(s->precision));
+    fprintf(out, "### %s: %s %s", what, bench_word_of(bench_backends, (int)s->backend),
+            bench_precision_name(s->precision));
     if (s->backend == SADMM_BACKEND_CPU) fprintf(out, ", %d thread%s", s->threads, s->threads == 1 ? "" : "s");
     fprintf(out, "\n\n%s, commit %s\n\n", s->runs_on, sadmm_build_commit());
 }

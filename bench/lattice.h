@@ -1,5 +1,5 @@
-/* A contact problem of any size with a known shape: layers of cubes at rest, every other layer shifted by half a cube, so
- * that each cube lies on two (4 points each), the lowest layer on the ground (4 points). About 8 contacts a body. */
+/* A contact problem of any size with a known shape: layers of cubes at rest, every other layer shifted by half a cube,
+ * so that each cube lies on two (4 points each), the lowest layer on the ground (4 points). About 8 contacts a body. */
 #ifndef BENCH_LATTICE_H
 #define BENCH_LATTICE_H
 

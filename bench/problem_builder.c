@@ -20,7 +20,7 @@ struct built_body *problem_builder_box(struct problem_builder *builder, double m
 {
     static struct built_body lost; /* written, never read: finish refuses what is incomplete */
     size_t n = builder->body_count;
-    if (!sadmm_grow((void **)&builder->bodies, &builder->body_capacity, n, n + 1, sizeof *builder->bodies)) {
+    if (!sadmm_grow(&builder->bodies, &builder->body_capacity, n, n + 1, sizeof *builder->bodies)) {
         builder->out_of_memory = true;
         return &lost;
     }
@@ -45,7 +45,7 @@ void problem_builder_contact(struct problem_builder *builder, int32_t body, int3
 {
     size_t n = builder->contact_count;
     if (builder->out_of_memory ||
-        !sadmm_grow((void **)&builder->contacts, &builder->contact_capacity, n, n + 1, sizeof *builder->contacts)) {
+        !sadmm_grow(&builder->contacts, &builder->contact_capacity, n, n + 1, sizeof *builder->contacts)) {
         builder->out_of_memory = true;
         return;
     }
@@ -78,7 +78,7 @@ void problem_builder_ball(struct problem_builder *builder, int32_t a, int32_t b,
 {
     size_t n = builder->joint_count;
     if (builder->out_of_memory ||
-        !sadmm_grow((void **)&builder->joints, &builder->joint_capacity, n, n + 1, sizeof *builder->joints)) {
+        !sadmm_grow(&builder->joints, &builder->joint_capacity, n, n + 1, sizeof *builder->joints)) {
         builder->out_of_memory = true;
         return;
     }

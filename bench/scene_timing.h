@@ -22,7 +22,8 @@ struct scene_timing {
     double ncp_max, momentum_max;
 };
 
-/* Build the scene and step it, until all is done or the program is asked to end (cli/interrupt.h). Errors: those of building and stepping. */
+/* Build the scene and step it, until all is done or the program is asked to end (cli/interrupt.h). Errors: those of
+ * building and stepping. */
 sadmm_status scene_timing_run(const struct sadmm_scene *scene, const struct scene_timing_plan *plan,
                               struct scene_timing *timing, struct sadmm_error *error);
 

@@ -33,12 +33,6 @@ struct warm {
     struct sadmm_error *error;
 };
 
-#define TRY(call)                                      \
-    do {                                               \
-        sadmm_status try_status = (call);              \
-        if (try_status != SADMM_OK) return try_status; \
-    } while (0)
-
 static sadmm_status check(struct warm *w, sadmm_status status)
 {
     return status == SADMM_OK ? status : sadmm_fail(w->error, status, "%s", sadmm_world_message(w->world));

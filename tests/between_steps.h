@@ -16,8 +16,8 @@ static inline sadmm_world_def between_def(double dt, double gravity)
 }
 
 /* A body of 1 kg, or a static one, of one box. */
-static inline sadmm_body_id between_box(sadmm_world *world, bool moves, double x, double y, double z, double a, double b,
-                                        double c)
+static inline sadmm_body_id between_box(sadmm_world *world, bool moves, double x, double y, double z, double a,
+                                        double b, double c)
 {
     const double half[3] = { a, b, c };
     sadmm_body_def body = sadmm_body_def_default();
@@ -46,7 +46,8 @@ static inline void place(sadmm_world *world, sadmm_body_id id, double x, double 
 
 /* ---- what is at rest before the step: world of between_def(1.0 / 60, 9.81) --------------------------------------- */
 
-/* A card of 1 mm, 0.03 mm above a plate of 1 mm: its margin is 0.02 mm, and in the first step it falls g dt^2 = 2.7 mm. */
+/* A card of 1 mm, 0.03 mm above a plate of 1 mm: its margin is 0.02 mm, and in the first step it falls g dt^2 = 2.7
+ * mm. */
 static inline void card_stays_on_plate(sadmm_world *world)
 {
     between_box(world, false, 0, 0, 0, 0.05, 0.05, 0.0005);
@@ -98,8 +99,8 @@ static inline void torque_does_not_turn_through(sadmm_world *world, int steps_be
 
 /* ---- world of between_def(0.005, 9.81) --------------------------------------------------------------------------- */
 
-/* A cube that rested on a slab of 4 cm is put below it, overlapping by 0.1 mm: it falls. What the pair knew of the cube's
- * side was true before. `which`: the cube is moved; the slab is; both, so that they change places. */
+/* A cube that rested on a slab of 4 cm is put below it, overlapping by 0.1 mm: it falls. What the pair knew of the
+ * cube's side was true before. `which`: the cube is moved; the slab is; both, so that they change places. */
 static inline void pose_that_is_set_forgets_the_side(sadmm_world *world, int which)
 {
     sadmm_body_id slab = between_box(world, which == 2, 0, 0, 0, 0.4, 0.4, 0.02);
@@ -121,12 +122,13 @@ static inline void pose_that_is_set_forgets_the_side(sadmm_world *world, int whi
     for (int step = 0; step < 8; ++step) {
         MUST(world, sadmm_world_step(world));
         /* a fifth of the overlap beyond the slop is taken out in a step: no more than all of it, upwards */
-        ck_assert_msg(height_of(world, cube) < highest + 1e-4, "step %d: the cube is at %g m", step, height_of(world, cube));
+        ck_assert_msg(height_of(world, cube) < highest + 1e-4, "step %d: the cube is at %g m", step,
+                      height_of(world, cube));
     }
 }
 
-/* A stack at rest stays at rest when steps of another length follow, as forces go on and not impulses. `tolerance`: m/s,
- * what the iterations before had left. */
+/* A stack at rest stays at rest when steps of another length follow, as forces go on and not impulses. `tolerance`:
+ * m/s, what the iterations before had left. */
 static inline void stack_rests_through_steps_of_any_length(sadmm_world *world, int height, double tolerance)
 {
     static const double dt[] = { 0.01, 0.0005, 0.02, 0.003 };
@@ -142,7 +144,8 @@ static inline void stack_rests_through_steps_of_any_length(sadmm_world *world, i
             MUST(world, sadmm_world_step(world));
             sadmm_body_state state = body_state(world, top);
             for (int i = 0; i < 3; ++i)
-                ck_assert_msg(fabs(state.linear_velocity[i]) <= tolerance && fabs(state.angular_velocity[i]) <= 10 * tolerance,
+                ck_assert_msg(fabs(state.linear_velocity[i]) <= tolerance &&
+                                  fabs(state.angular_velocity[i]) <= 10 * tolerance,
                               "dt = %g s, step %d: the top moves at %g m/s and %g rad/s along %d", dt[k], step,
                               state.linear_velocity[i], state.angular_velocity[i], i);
         }

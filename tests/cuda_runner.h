@@ -18,7 +18,7 @@
 #define tier_of cuda_emulation_tier_of
 #define SYMBOL(name, precision) sadmm_cuda_##name##_emulated_##precision
 #else
-#include "backend_cuda/graph/tier.h"
+#include "backend_cuda/device/tier.h"
 #define force_tier sadmm_cuda_force_tier
 #define force_cluster sadmm_cuda_force_cluster
 #define tier_of sadmm_cuda_tier_of
@@ -112,7 +112,8 @@ static inline struct contact_problem *octagons(double friction)
     return p;
 }
 
-/* No pair has more than one point: one thread a pair. Each ball rests on two of the row below, the lowest on the ground. */
+/* No pair has more than one point: one thread a pair. Each ball rests on two of the row below, the lowest on the
+ * ground. */
 static inline struct contact_problem *balls(double friction)
 {
     static const double up[3] = {0, 0, 1};
@@ -316,9 +317,10 @@ static inline void set_abort(struct runner *r, enum cuda_abort abort_code)
 }
 
 #ifdef CUDA_EMULATED
-/* A solve in which runtime calls fail from number `calls` on: a status and a message, never a leak. False: it had fewer. */
-static inline bool solve_fails_at(const struct sadmm_kernels *table, enum sadmm_cuda_tier tier, const struct scene *scene,
-                                  const sadmm_settings *settings, long calls)
+/* A solve in which runtime calls fail from number `calls` on: a status and a message, never a leak. False: it had
+ * fewer. */
+static inline bool solve_fails_at(const struct sadmm_kernels *table, enum sadmm_cuda_tier tier,
+                                  const struct scene *scene, const sadmm_settings *settings, long calls)
 {
     struct contact_problem *p = make_problem(scene, settings);
     struct sadmm_plan plan = sadmm_plan_make(&p->system, settings);
@@ -335,7 +337,8 @@ static inline bool solve_fails_at(const struct sadmm_kernels *table, enum sadmm_
     }
     const bool reached = cuda_emulation_calls_left < 0;
     cuda_emulation_calls_left = -1;
-    ck_assert_msg(status == (reached ? SADMM_ERROR_DEVICE : SADMM_OK), "call %ld: %s", calls, sadmm_status_name(status));
+    ck_assert_msg(status == (reached ? SADMM_ERROR_DEVICE : SADMM_OK), "call %ld: %s", calls,
+                  sadmm_status_name(status));
     if (reached)
         ck_assert_msg(strstr(error.message, "CUDA device 1: ") && strstr(error.message, "launch failure"), "%s",
                       error.message);

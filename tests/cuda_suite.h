@@ -1,5 +1,5 @@
-/* What the test programs of the CUDA backend share: its tables, on a device or emulated (CUDA_EMULATED), and a case a test, so
- * that CK_RUN_CASE=<name> runs one of them: sanitizers of devices are slow, and run them side by side. */
+/* What the test programs of the CUDA backend share: its tables, on a device or emulated (CUDA_EMULATED), and a case a
+ * test, so that CK_RUN_CASE=<name> runs one of them: sanitizers of devices are slow, and run them side by side. */
 #ifndef TESTS_CUDA_SUITE_H
 #define TESTS_CUDA_SUITE_H
 

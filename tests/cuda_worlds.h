@@ -15,7 +15,7 @@
 #define tier_of cuda_emulation_tier_of
 #define tune_capacities cuda_emulation_tune_capacities
 #else
-#include "backend_cuda/graph/tier.h"
+#include "backend_cuda/device/tier.h"
 #define force_tier sadmm_cuda_force_tier
 #define tier_of sadmm_cuda_tier_of
 #define tune_capacities sadmm_cuda_tune_capacities
@@ -36,7 +36,8 @@ enum { EMULATED = 0 };
 static inline void use_device(sadmm_world *world, int precision, int device)
 {
     world->kernels = tables[precision];
-    ck_assert_msg(world->kernels->create(device, &world->context, &world->error) == SADMM_OK, "%s", world->error.message);
+    ck_assert_msg(world->kernels->create(device, &world->context, &world->error) == SADMM_OK, "%s",
+                  world->error.message);
 }
 
 /* The host makes the steps: a stop rule has to be looked at, and nothing ever meets this one. */
@@ -58,8 +59,8 @@ static inline void use_fast(sadmm_world *world, int iterations)
 }
 
 /* A box, or a ball with the inertia of the box around it. */
-static inline sadmm_body_id add_solid(sadmm_world *world, sadmm_shape_type type, double x, double y, double z, double half, double mass,
-                               double friction)
+static inline sadmm_body_id add_solid(sadmm_world *world, sadmm_shape_type type, double x, double y, double z,
+                                      double half, double mass, double friction)
 {
     sadmm_body_def body = sadmm_body_def_default();
     sadmm_shape_def shape = sadmm_shape_def_default();
@@ -78,7 +79,8 @@ static inline sadmm_body_id add_solid(sadmm_world *world, sadmm_shape_type type,
     return id;
 }
 
-static inline sadmm_body_id add_box(sadmm_world *world, double x, double y, double z, double half, double mass, double friction)
+static inline sadmm_body_id add_box(sadmm_world *world, double x, double y, double z, double half, double mass,
+                                    double friction)
 {
     return add_solid(world, SADMM_SHAPE_BOX, x, y, z, half, mass, friction);
 }
@@ -109,7 +111,8 @@ static inline sadmm_world *towers_on(int count, int height, double friction, int
     add_ground(world, friction);
     for (int t = 0; t < count; ++t)
         for (int i = 0; i < height; ++i)
-            add_box(world, t % 3 == 2 ? 0.5 * t - 0.29 : 0.5 * t, 0.01 * i, 0.1 + 0.002 * t + 0.201 * i, 0.1, 1 + i, friction);
+            add_box(world, t % 3 == 2 ? 0.5 * t - 0.29 : 0.5 * t, 0.01 * i, 0.1 + 0.002 * t + 0.201 * i, 0.1, 1 + i,
+                    friction);
     use_device(world, precision, device);
     return world;
 }

@@ -141,7 +141,8 @@ static inline struct world_manifold touch(const struct solid *a, const struct so
     bool swap = a->type > b->type;
     const struct solid *first = swap ? b : a, *second = swap ? a : b;
     struct pair_pose pose = pair_pose(first->type == SADMM_SHAPE_PLANE, first->R, first->x, second->R, second->x);
-    const struct sadmm_geometry a_is = geometry_of(first->type, first->size), b_is = geometry_of(second->type, second->size);
+    const struct sadmm_geometry a_is = geometry_of(first->type, first->size),
+                                b_is = geometry_of(second->type, second->size);
     struct manifold m;
     struct world_manifold w = {0};
 

@@ -100,7 +100,8 @@ static struct sadmm_system *bodies_of(const double *masses, const double *b, int
     return &system;
 }
 
-/* Slowest is a force at its bound in the method `paper`: v goes by m / (m + beta) = 0.94 an iteration. What is left is rounding. */
+/* Slowest is a force at its bound in the method `paper`: v goes by m / (m + beta) = 0.94 an iteration. What is left is
+ * rounding. */
 static double close_enough(const struct sadmm_kernels *table) { return table->precision == SADMM_F32 ? 2e-5 : 1e-12; }
 
 static void check_law(const struct sadmm_kernels *table, sadmm_method method, int k, bool on_b)
@@ -119,9 +120,9 @@ static void check_law(const struct sadmm_kernels *table, sadmm_method method, in
     ck_assert_msg(fabs(x - law_cases[k].v) <= tolerance, "case %d: x = %.17g", k, x);
 }
 
-/* Six laws in one constraint of two bodies, a coordinate each, so that all depend on their own row alone: x = v_b - v_a =
- * x_free + w lambda with w = 1/m_a + 1/m_b, and lambda solves the law with that. Two of the rows are coupled in the method
- * `fast`. */
+/* Six laws in one constraint of two bodies, a coordinate each, so that all depend on their own row alone: x = v_b - v_a
+ * = x_free + w lambda with w = 1/m_a + 1/m_b, and lambda solves the law with that. Two of the rows are coupled in the
+ * method `fast`. */
 static void check_many_laws(const struct sadmm_kernels *table)
 {
     static const struct law laws[2][6] = {
@@ -146,9 +147,10 @@ static void check_many_laws(const struct sadmm_kernels *table)
                 double x_free = push[6 + r] / masses[1] - push[r] / masses[0];
                 double wanted = -(law->gain * x_free + law->bias) / (law->compliance + law->gain * w);
                 wanted = fmin(fmax(wanted, law->lo), law->hi);
-                ck_assert_msg(fabs(rows->lambda[r] - wanted) <= close_enough(table), "set %d, row %d: %.17g, not %.17g", set, r,
-                              rows->lambda[r], wanted);
-                ck_assert_double_eq_tol(system->velocity[6 + r], (push[6 + r] + wanted) / masses[1], close_enough(table));
+                ck_assert_msg(fabs(rows->lambda[r] - wanted) <= close_enough(table), "set %d, row %d: %.17g, not %.17g",
+                              set, r, rows->lambda[r], wanted);
+                ck_assert_double_eq_tol(system->velocity[6 + r], (push[6 + r] + wanted) / masses[1],
+                                        close_enough(table));
             }
         }
 }

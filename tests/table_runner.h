@@ -110,9 +110,9 @@ static inline double table_epsilon(const struct sadmm_kernels *table)
 
 /* How far v and lambda may be from the oracle's, over the largest so far, in a run of 120 iterations.
  *
- * An iteration does not take two states apart in the norm of A + beta C, so that what is rounded in one is passed on at most
- * as it is: 120 times the unit roundoff. In the largest velocity it may show larger by the square root of what that norm
- * differs by between bodies that touch: of their masses' ratio, 100 (growth 10) or 200 (14), or 1. */
+ * An iteration does not take two states apart in the norm of A + beta C, so that what is rounded in one is passed on at
+ * most as it is: 120 times the unit roundoff. In the largest velocity it may show larger by the square root of what
+ * that norm differs by between bodies that touch: of their masses' ratio, 100 (growth 10) or 200 (14), or 1. */
 static inline double scene_tolerance(const struct scene *scene, const struct sadmm_kernels *table)
 {
     return 120 * scene->growth * table_epsilon(table);

@@ -1,5 +1,5 @@
-/* Motions with a known answer, by both methods, in double and in single precision: on every CPU backend here, on CUDA in
- * test_cuda_analytic.c (ANALYTIC_ON_CUDA), which includes this file.
+/* Motions with a known answer, by both methods, in double and in single precision: on every CPU backend here, on CUDA
+ * in test_cuda_analytic.c (ANALYTIC_ON_CUDA), which includes this file.
  *
  * A world integrates by semi-implicit Euler: under a constant acceleration a velocities are exact and positions are
  * x_n = x_0 + v_0 t + a dt^2 n (n + 1) / 2, which is the parabola plus a t dt / 2. Where a test compares with the
@@ -34,10 +34,13 @@ static const struct {
 enum { SOLVERS = sizeof solvers / sizeof solvers[0] };
 
 /* Unit roundoff of velocities and impulses; poses are double in both. */
-static double epsilon_of(int solver) { return (solvers[solver].precision == SADMM_F32 ? FLT_EPSILON : DBL_EPSILON) / 2; }
+static double epsilon_of(int solver)
+{
+    return (solvers[solver].precision == SADMM_F32 ? FLT_EPSILON : DBL_EPSILON) / 2;
+}
 
-/* What rounding leaves of a step's velocities of about `scale`: an iteration brings two states nearer by 0.963 (a sliding
- * block, the slowest here; SLIDING_ITERATIONS) and rounds, which adds up to 1 / (1 - 0.963) roundings. */
+/* What rounding leaves of a step's velocities of about `scale`: an iteration brings two states nearer by 0.963 (a
+ * sliding block, the slowest here; SLIDING_ITERATIONS) and rounds, which adds up to 1 / (1 - 0.963) roundings. */
 static double rounding_of(int solver, double scale) { return epsilon_of(solver) / (1 - 0.963) * scale; }
 
 /* The world of a solver: as `def`, or by the device's kernels. */
@@ -104,7 +107,7 @@ static sadmm_body_id add_cube(sadmm_world *world, struct sadmm_frame frame, doub
 
 static sadmm_body_id add_sphere(sadmm_world *world, struct sadmm_frame frame, double mass, double restitution)
 {
-    const struct sadmm_piece piece = { .half_extents = { 0.1 }, .mass = mass, .friction = 0.5, .restitution = restitution };
+    const struct sadmm_piece piece = {.half_extents = {0.1}, .mass = mass, .friction = 0.5, .restitution = restitution};
     sadmm_body_id id;
     struct sadmm_error error = { 0 };
     ck_assert_msg(sadmm_place_sphere(world, frame, &piece, &id, &error) == SADMM_OK, "%s", error.message);
@@ -162,7 +165,8 @@ START_TEST(a_block_below_the_critical_angle_does_not_creep)
     sadmm_body_state before = body_state(world, id);
     step_world(world, 200);
     sadmm_body_state after = body_state(world, id);
-    /* 1e-9 m/s is a millimetre in twelve days; gravity gives 0.05 m/s in one step, and what that is rounded to comes on top. */
+    /* 1e-9 m/s is a millimetre in twelve days; gravity gives 0.05 m/s in one step, and what that is rounded to comes on
+     * top. */
     const double creep = 1e-9 + rounding_of(_i / SLOPES, g * 0.005);
     ck_assert_double_lt(distance(before.position, after.position) / (200 * 0.005), creep);
     ck_assert_double_lt(norm3(after.linear_velocity), creep);
@@ -184,8 +188,8 @@ START_TEST(a_block_above_the_critical_angle_slides_as_coulomb_says)
     sadmm_body_state state = body_state(world, id);
     for (int i = 0; i < 3; ++i) along += state.linear_velocity[i] * downhill[i];
     for (int i = 0; i < 3; ++i) across = fmax(across, fabs(state.linear_velocity[i] - along * downhill[i]));
-    /* Coulomb friction of a sliding block is constant: the velocity is exact but for the solver's error and what 400 steps
-     * round, of gravity's share of a step and of the speed reached. */
+    /* Coulomb friction of a sliding block is constant: the velocity is exact but for the solver's error and what 400
+     * steps round, of gravity's share of a step and of the speed reached. */
     const double speed = 400 * dt * acceleration;
     const double error = 1e-6 * speed + 400 * rounding_of(_i / SLOPES, g * dt + speed);
     ck_assert_double_eq_tol(along, speed, error);
@@ -225,8 +229,8 @@ START_TEST(a_block_stops_where_coulomb_says)
         /* sum of v dt over the steps until friction can stop it within one */
         const double discrete = dt * (n * speed - lost * n * (n + 1) / 2);
         const double moved = stopping_distance(_i, dt, speed, mu, 30 * degree);
-        /* n steps, each with a solver error well under 1e-8 m/s, and rounded: what a step adds to the speed moves the block
-         * for the rest of the way */
+        /* n steps, each with a solver error well under 1e-8 m/s, and rounded: what a step adds to the speed moves the
+         * block for the rest of the way */
         const double error = 1e-7 + rounding_of(_i, speed) * dt * n * n / 2;
         ck_assert_double_eq_tol(moved, discrete, error);
         /* first order: the integrator loses v dt / 2 */
@@ -255,7 +259,8 @@ START_TEST(free_fall)
     ck_assert_double_eq_tol(state.position[0], 1 + 0.5 * n * dt, rounding);
     ck_assert_double_eq_tol(state.position[1], 2 - 0.25 * n * dt, rounding);
     ck_assert_double_eq_tol(state.position[2], 3 + 2 * n * dt - g * dt * dt * n * (n + 1) / 2, rounding);
-    ck_assert_double_eq_tol(state.position[2], 3 + 2 * n * dt - g * n * dt * n * dt / 2, g * n * dt * dt / 2 + rounding);
+    ck_assert_double_eq_tol(state.position[2], 3 + 2 * n * dt - g * n * dt * n * dt / 2,
+                            g * n * dt * dt / 2 + rounding);
     ck_assert_double_eq_tol(state.linear_velocity[2], 2 - g * n * dt, rounding);
     /* a cube keeps its spin, and the exponential map adds up turns about one axis without error */
     ck_assert_double_eq_tol(state.angular_velocity[2], 3, rounding);
@@ -332,7 +337,8 @@ static double precession_error(int solver, double dt, double time)
     sadmm_body_state state = body_state(world, id);
     sadmm_world_destroy(world);
 
-    const double inverse[4] = { state.orientation[0], -state.orientation[1], -state.orientation[2], -state.orientation[3] };
+    const double inverse[4] = {state.orientation[0], -state.orientation[1], -state.orientation[2],
+                               -state.orientation[3]};
     const double z[3] = { 0, 0, 1 };
     double axis[3], expected[3];
     to_body(inverse, z, axis);
@@ -413,8 +419,8 @@ START_TEST(an_isolated_collision_keeps_momentum)
     struct momenta after = momenta_of(world);
     ck_assert_double_gt(met, 0.1); /* they did collide */
     for (int i = 0; i < 3; ++i) {
-        /* Up to 100 steps in contact. What is rounded in a step's velocities is an error of momentum by beta, 20 times the
-         * mass. Contact arms end in one point for both bodies, so that no couple is left over either. */
+        /* Up to 100 steps in contact. What is rounded in a step's velocities is an error of momentum by beta, 20 times
+         * the mass. Contact arms end in one point for both bodies, so that no couple is left over either. */
         const double rounding = 100 * 20 * rounding_of(_i / 2, 1);
         ck_assert_double_eq_tol(after.linear[i], before.linear[i], rounding * before.scale[0]);
         ck_assert_double_eq_tol(after.angular[i], before.angular[i], rounding * (before.scale[0] + before.scale[1]));
@@ -522,7 +528,8 @@ START_TEST(head_on_spheres_part_as_newton_says)
     /* With e = 0 the first step closes the gap that is left, the next one stops the approach. */
     const double centre = (ma * va + mb * vb) / (ma + mb);
     const double wa = centre + e * mb / (ma + mb) * (vb - va), wb = centre - e * ma / (ma + mb) * (vb - va);
-    /* 1e-9: the solver's error after 2000 iterations, with room. Velocities up to 2 m/s are rounded in each of 100 steps. */
+    /* 1e-9: the solver's error after 2000 iterations, with room. Velocities up to 2 m/s are rounded in each of 100
+     * steps. */
     const double tolerance = 1e-9 + 100 * 2 * epsilon_of(_i / 5);
     ck_assert_double_eq_tol(body_state(world, a).linear_velocity[0], wa, tolerance);
     ck_assert_double_eq_tol(body_state(world, b).linear_velocity[0], wb, tolerance);

@@ -1,5 +1,5 @@
-/* What a world hands to collision and keeps from step to step, on the host's backends. The same scenes run on the device in
- * test_cuda_step.c. */
+/* What a world hands to collision and keeps from step to step, on the host's backends. The same scenes run on the
+ * device in test_cuda_step.c. */
 #include "between_steps.h"
 #include "core/world/world_internal.h"
 
@@ -89,8 +89,8 @@ START_TEST(a_slide_goes_on_in_steps_of_any_length)
             double before = body_state(world, block).linear_velocity[0];
             step_world(world, 1);
             double gained = body_state(world, block).linear_velocity[0] - before;
-            ck_assert_msg(fabs(gained - gain * dt[k]) <= 1e-4 * gain * dt[k], "dt = %g s: %g m/s gained instead of %g", dt[k],
-                          gained, gain * dt[k]);
+            ck_assert_msg(fabs(gained - gain * dt[k]) <= 1e-4 * gain * dt[k], "dt = %g s: %g m/s gained instead of %g",
+                          dt[k], gained, gain * dt[k]);
         }
     }
     sadmm_world_destroy(world);
@@ -145,7 +145,8 @@ START_TEST(contacts_without_a_margin_are_where_bodies_touch)
         ck_assert_int_le(count, 16);
         MUST(world, sadmm_world_contacts(world, 0, count, contacts));
         for (int32_t k = 0; k < count; ++k)
-            ck_assert_msg(fabs(contacts[k].position[0] - 0.01) <= 0.0501 && fabs(contacts[k].position[1] - 0.02) <= 0.0501,
+            ck_assert_msg(fabs(contacts[k].position[0] - 0.01) <= 0.0501 &&
+                              fabs(contacts[k].position[1] - 0.02) <= 0.0501,
                           "%d ulps: a contact at %g %g", ulps, contacts[k].position[0], contacts[k].position[1]);
         touched += count > 0;
         sadmm_world_destroy(world);

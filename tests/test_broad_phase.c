@@ -350,8 +350,8 @@ static bool may_touch(const struct scene *s, const struct sadmm_candidates *c, u
     return sadmm_candidate_meets(c, &s->input, i, j);
 }
 
-/* Boxes in straight motion against 400 moments of the step: what overlaps at one of them meets; and of two that move alike
- * only what overlaps at rest does, however fast they are. */
+/* Boxes in straight motion against 400 moments of the step: what overlaps at one of them meets; and of two that move
+ * alike only what overlaps at rest does, however fast they are. */
 START_TEST(boxes_meet_when_they_come_together)
 {
     const double dt = 0.01;
@@ -418,7 +418,8 @@ START_TEST(what_accelerations_bring_together_is_foreseen)
         double g[3], way[3] = {0, 0, 0}, velocity[3], gap = random_in(&r, 0, 1) * dt * dt * 20, height = gap;
         random_direction(&r, gravity, g);
         for (int s = 0; s < 2; ++s) {
-            const double force[3] = {random_in(&r, -1, 1), random_in(&r, -1, 1), trial % 2 ? random_in(&r, -20, 20) : 0};
+            const double force[3] = {random_in(&r, -1, 1), random_in(&r, -1, 1),
+                                     trial % 2 ? random_in(&r, -20, 20) : 0};
             const bool moves = body[s].system_body >= 0, falls = random_unit(&r) < 0.7, driven = random_unit(&r) < 0.7;
             geometry[s].size[0] = pow(10, random_in(&r, -4, -1));
             shape[s].orientation[0] = body[s].orientation[0] = 1;
@@ -431,7 +432,8 @@ START_TEST(what_accelerations_bring_together_is_foreseen)
             height += s || !plane ? geometry[s].size[0] : 0;
         }
         body[1].position[2] = height; /* above, as seen from the first */
-        for (int s = 0; s < 2; ++s) proxy_place(&shape[s], &geometry[s], &body[s], dt, margin, gravity, &proxy[s], &box[s]);
+        for (int s = 0; s < 2; ++s)
+            proxy_place(&shape[s], &geometry[s], &body[s], dt, margin, gravity, &proxy[s], &box[s]);
 
         bool touch = false, touch_without = false;
         for (int moment = 0; moment <= 50 && !touch; ++moment) {
@@ -444,7 +446,8 @@ START_TEST(what_accelerations_bring_together_is_foreseen)
         if (!touch) continue;
         ck_assert_double_le(gap, proxy_limit(&proxy[0], &proxy[1], margin, gravity, dt));
         if (plane)
-            ck_assert(proxy_plane_meets(&proxy[0], &box[1], proxy_plane_reach(&proxy[1], margin, fall_of(gravity, dt))));
+            ck_assert(
+                proxy_plane_meets(&proxy[0], &box[1], proxy_plane_reach(&proxy[1], margin, fall_of(gravity, dt))));
         else
             ck_assert(boxes_overlap(&box[0], &box[1]) &&
                       boxes_meet(&box[0], proxy[0].velocity, &box[1], proxy[1].velocity, dt));
@@ -456,8 +459,8 @@ START_TEST(what_accelerations_bring_together_is_foreseen)
 }
 END_TEST
 
-/* Over many steps with moves small and large, other forces, another gravity and time step, deaths, births and changes of
- * shapes: the list holds every pair that meets, in order, once. */
+/* Over many steps with moves small and large, other forces, another gravity and time step, deaths, births and changes
+ * of shapes: the list holds every pair that meets, in order, once. */
 START_TEST(the_list_of_candidates_is_complete_at_every_step)
 {
     struct random r = {400};

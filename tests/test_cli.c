@@ -292,7 +292,8 @@ START_TEST(run_stops)
     json_t *r = run_json("run pyramid:3 --steps 12 --backend cpu --iterations 70 --json -");
     ck_assert(json_is_null(at(r, "stop")));
     json_decref(r);
-    r = run_json("run pyramid:3 --steps 12 --backend cpu --iterations 70 --tolerance 1e-6 --check-period 7 --certify --json -");
+    r = run_json(
+        "run pyramid:3 --steps 12 --backend cpu --iterations 70 --tolerance 1e-6 --check-period 7 --certify --json -");
     ck_assert_double_eq(number(r, "stop.tolerance"), 1e-6);
     ck_assert_double_eq(number(r, "stop.steps_met"), 12); /* it stands, from loads that were predicted */
     ck_assert_double_le(number(r, "certificate.ncp_max_run"), 1e-6);
@@ -372,7 +373,8 @@ START_TEST(threads_that_cannot_be_made)
     snprintf(text, sizeof text, arguments, scenes[_i], 1);
     hash_of(text, wanted);
     snprintf(text, sizeof text, arguments, scenes[_i], 64);
-    snprintf(limited, sizeof limited, "cd %s && ulimit -s 8192 && ulimit -v 400000 && %s %s >out 2>err", folder, command, text);
+    snprintf(limited, sizeof limited, "cd %s && ulimit -s 8192 && ulimit -v 400000 && %s %s >out 2>err", folder,
+             command, text);
     ck_assert_int_eq(system(limited), 0);
     free(out);
     out = read_text("out");

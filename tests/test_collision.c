@@ -304,9 +304,10 @@ START_TEST(friction_and_restitution_of_a_pair)
 }
 END_TEST
 
-/* ---- geometries and their children -------------------------------------------------------------------------------- */
+/* ---- geometries and their children ------------------------------------------------------------------------------- */
 
-/* A shape is what its handle says: the same contacts, bit for bit, whether equal boxes have a geometry each or share one. */
+/* A shape is what its handle says: the same contacts, bit for bit, whether equal boxes have a geometry each or share
+ * one. */
 START_TEST(shapes_may_share_a_geometry)
 {
     struct scene *s = make_scene(NULL), *t = make_scene(NULL);
@@ -319,7 +320,8 @@ START_TEST(shapes_may_share_a_geometry)
     /* the one of all boxes is the last of the array; the others mean nothing */
     for (int32_t i = 1; i < t->shape_count; ++i) t->shapes[i].geometry = MAX_SHAPES - 1;
     t->geometries[MAX_SHAPES - 1] = t->geometries[1];
-    for (int32_t i = 1; i < t->shape_count; ++i) t->geometries[i] = geometry_of(SADMM_SHAPE_SPHERE, (double[]){1, 1, 1});
+    for (int32_t i = 1; i < t->shape_count; ++i)
+        t->geometries[i] = geometry_of(SADMM_SHAPE_SPHERE, (double[]){1, 1, 1});
     for (int step = 0; step < 3; ++step) {
         find(s);
         find(t);
@@ -769,8 +771,8 @@ START_TEST(a_reused_slot_inherits_nothing)
 }
 END_TEST
 
-/* A cube that has sunk into a thin slab until its centre is below the slab's is still pushed up; one that was put there is
- * not. */
+/* A cube that has sunk into a thin slab until its centre is below the slab's is still pushed up; one that was put there
+ * is not. */
 START_TEST(a_pose_that_is_set_forgets_the_axis)
 {
     for (int which = 0; which < 3; ++which) {

@@ -41,7 +41,8 @@ START_TEST(worlds_on_threads_of_their_own)
 {
     pthread_t threads[THREADS];
     uint64_t hashes[THREADS];
-    for (int t = 0; t < THREADS; ++t) ck_assert_int_eq(pthread_create(&threads[t], NULL, create_and_step, &hashes[t]), 0);
+    for (int t = 0; t < THREADS; ++t)
+        ck_assert_int_eq(pthread_create(&threads[t], NULL, create_and_step, &hashes[t]), 0);
     for (int t = 0; t < THREADS; ++t) pthread_join(threads[t], NULL);
     for (int t = 1; t < THREADS; ++t) ck_assert_uint_eq(hashes[t], hashes[0]);
 }
@@ -65,7 +66,8 @@ static void *read_all(void *data)
         r->sum += sadmm_problem_body_count(r->problem) + sadmm_problem_contact_count(r->problem) +
                   sadmm_problem_block_count(r->problem) + (double)strlen(sadmm_problem_message(r->problem));
         if (sadmm_problem_get_bodies(r->problem, NULL, velocity, NULL) == SADMM_OK) r->sum += velocity[0];
-        if (sadmm_problem_get_solution(r->problem, velocity, impulse, NULL) == SADMM_OK) r->sum += velocity[1] + impulse[2];
+        if (sadmm_problem_get_solution(r->problem, velocity, impulse, NULL) == SADMM_OK)
+            r->sum += velocity[1] + impulse[2];
     }
     return NULL;
 }

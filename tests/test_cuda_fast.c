@@ -388,8 +388,8 @@ END_TEST
 static int32_t look(struct runner *r, int done)
 {
     int32_t unmet = -1;
-    if (r->k->precision == SADMM_F32) CALL(r, SYMBOL(look, f32)(r->c, done, &unmet, &r->error));
-    else CALL(r, SYMBOL(look, f64)(r->c, done, &unmet, &r->error));
+    if (r->k->precision == SADMM_F32) CALL(r, SYMBOL(check_convergence, f32)(r->c, done, &unmet, &r->error));
+    else CALL(r, SYMBOL(check_convergence, f64)(r->c, done, &unmet, &r->error));
     return unmet;
 }
 

@@ -1,4 +1,4 @@
-/* The CUDA backend's layout (graph/layout.h) against a plain construction on the host: statistics, slots, lists of
+/* The CUDA backend's layout (device/layout.h) against a plain construction on the host: statistics, slots, lists of
  * sides and every boundary of every part, number for number. On a real device, or skipped; test_cuda_layout_emulated.c
  * runs the same on the emulated one. */
 #include <stdio.h>

@@ -1,4 +1,4 @@
-/* Whole steps on the device (backend_cuda/step/step.h) against the same kernels driven by the host, step by step.
+/* Whole steps on the device (backend_cuda/device/step.h) against the same kernels driven by the host, step by step.
  *
  * Contacts are the same bits on both sides, and so are the solver's kernels: everything that can be read of a world must be
  * equal to the last bit, however the steps were enqueued, planned or repeated. A stop rule that is never met sends a

@@ -801,8 +801,8 @@ static void soft_cycle(hid_t f)
     H5Lcreate_soft("/fclib_global/M", f, "/fclib_global/N", H5P_DEFAULT, H5P_DEFAULT);
 }
 
-/* Vectors as long as the sizes say, packed to almost nothing; the matrices are next to empty. Before 60 GB of blocks are
- * asked for. */
+/* Vectors as long as the sizes say, packed to almost nothing; the matrices are next to empty. Before 60 GB of blocks
+ * are asked for. */
 static void put_zeros(hid_t f, const char *name, hsize_t count)
 {
     hsize_t chunk = 1 << 20;
@@ -956,7 +956,8 @@ START_TEST(refuses_what_is_no_file)
                  {"", "is not a file"},           {"pipe", "is not a file"},        {"text/x", "Not a directory"}};
     for (size_t k = 0; k < sizeof files / sizeof *files; ++k) {
         ck_assert_int_eq(sadmm_fclib_load(path_of(files[k].name), &problem, &error), SADMM_ERROR_IO);
-        ck_assert_msg(strstr(error.message, files[k].says) != NULL, "'%s' does not say '%s'", error.message, files[k].says);
+        ck_assert_msg(strstr(error.message, files[k].says) != NULL, "'%s' does not say '%s'", error.message,
+                      files[k].says);
         ck_assert_ptr_null(problem);
     }
     ck_assert_int_eq(sadmm_fclib_load("/dev/zero", &problem, &error), SADMM_ERROR_IO);

@@ -1,4 +1,5 @@
-/* Predicted loads (core/solve/loads.h): a solution where bodies rest on what is nearer to the ground, and nothing anywhere else. */
+/* Predicted loads (core/solve/loads.h): a solution where bodies rest on what is nearer to the ground, and nothing
+ * anywhere else. */
 #include "contact_problems.h"
 #include "core/solve/certificate.h"
 #include "core/solve/loads.h"
@@ -53,15 +54,16 @@ START_TEST(loads_add_up)
     predict(problem, &s);
     for (size_t p = 0; p < problem->contacts.pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &problem->contacts.pairs[p];
-        for (int k = 0; k < pair->count && pair->body_a < 0; ++k) sum += problem->contacts.points[pair->first + k].impulse[2];
+        for (int k = 0; k < pair->count && pair->body_a < 0; ++k)
+            sum += problem->contacts.points[pair->first + k].impulse[2];
     }
     ck_assert_double_eq_tol(sum, 55 * g_dt, 1e-5 * 55 * g_dt); /* softness of the supports, 10 rows of it */
     contact_problem_free(problem);
 }
 END_TEST
 
-/* Nothing is known of what slides, flies up, is pushed out, or has no ground; nor does an island without a prediction spoil
- * another. */
+/* Nothing is known of what slides, flies up, is pushed out, or has no ground; nor does an island without a prediction
+ * spoil another. */
 START_TEST(others_start_from_nothing)
 {
     static const double one[] = {1, 1};

@@ -24,7 +24,8 @@ static double choice(const struct solid *a, const struct solid *b, double depth)
 static void expect_points_near_both(const struct solid *a, const struct solid *b, const struct world_manifold *m)
 {
     for (int i = 0; i < m->count; ++i) {
-        /* midway between the surfaces: no farther from either than half the separation, but where corners stay corners */
+        /* midway between the surfaces: no farther from either than half the separation, but where corners stay
+         * corners */
         double slack = MANIFOLD_SNAP * fmin(radius_of(a), radius_of(b)) + 1e-12;
         double reach = 0.5 * fabs(m->separation[i]) + slack;
         ck_assert_double_le(outside(a, m->position[i]), reach);
@@ -389,8 +390,8 @@ START_TEST(a_corner_over_a_face_has_the_normal_of_the_face)
 }
 END_TEST
 
-/* A card leans with its upper edge just below and beside the end of a lying one: both ends of the line that they have in
- * common, whichever way the last bit turns. (Half the contacts of a card house begin like that.) */
+/* A card leans with its upper edge just below and beside the end of a lying one: both ends of the line that they have
+ * in common, whichever way the last bit turns. (Half the contacts of a card house begin like that.) */
 START_TEST(edges_side_by_side_touch_at_both_ends)
 {
     const double tilts[] = {0, 1e-15, -1e-15, 1e-9, -1e-9}, half = 0.03, lean = 0.2923;

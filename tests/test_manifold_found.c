@@ -1,8 +1,9 @@
-/* Pairs that the search of tests/fuzz found, each with a contact whose point was not between the surfaces, or with none.
- * Every point is midway between surface points of the two that are its separation apart, so that it lies no farther
- * outside of either than half of that.
+/* Pairs that the search of tests/fuzz found, each with a contact whose point was not between the surfaces, or with
+ * none. Every point is midway between surface points of the two that are its separation apart, so that it lies no
+ * farther outside of either than half of that.
  *
- * Tolerance: 64 roundings of a double at the size of the pair (poses, a square root, and the projections of the oracle). */
+ * Tolerance: 64 roundings of a double at the size of the pair (poses, a square root, and the projections of the
+ * oracle). */
 #include <float.h>
 
 #include "manifold_tools.h"
@@ -46,7 +47,8 @@ START_TEST(edges_that_drift_apart)
 }
 END_TEST
 
-/* Boxes far apart (the limit is larger still) whose nearest features are edges, in a slightly other direction at the ends. */
+/* Boxes far apart (the limit is larger still) whose nearest features are edges, in a slightly other direction at the
+ * ends. */
 START_TEST(edges_far_apart)
 {
     struct solid a = box_at(1, 0.5, 1, 0, 0, 0), b = box_at(1, 0.25, 0.5, 0.35177385882228041, -1.597980792741295,
@@ -61,17 +63,17 @@ START_TEST(edges_far_apart)
 }
 END_TEST
 
-/* Corners that touch but for rounding, limit 0: there may be a contact or none, but not one 0.3 m deep and 0.9 m away. */
+/* Corners that touch but for rounding, limit 0: there may be a contact or none, but not one 0.3 m deep and 0.9 m
+ * away. */
 START_TEST(corners_that_just_touch)
 {
     static const double x[2][3] = {{0.99998787646099863, 0.99997786033805414, 1.0000078337997556},
                                    {1.0000000000000022, 1.0000000000000022, 0.99553343119739079}};
-    static const double R[2][9] = {{0.45871410072960617, -0.29640473857865574, 0.83769063784904962, 0.83769063784904962,
-                                    0.45871410072960617, -0.29640473857865574, -0.29640473857865574, 0.83769063784904962,
-                                    0.45871410072960617},
-                                   {0.37116504804291894, -0.2620024268309763, 0.89083737878805735, 0.89083737878805735,
-                                    0.37116504804291894, -0.2620024268309763, -0.2620024268309763, 0.89083737878805735,
-                                    0.37116504804291894}};
+    static const double R[2][9] = {
+        {0.45871410072960617, -0.29640473857865574, 0.83769063784904962, 0.83769063784904962, 0.45871410072960617,
+         -0.29640473857865574, -0.29640473857865574, 0.83769063784904962, 0.45871410072960617},
+        {0.37116504804291894, -0.2620024268309763, 0.89083737878805735, 0.89083737878805735, 0.37116504804291894,
+         -0.2620024268309763, -0.2620024268309763, 0.89083737878805735, 0.37116504804291894}};
     const double quarter[9] = {1, 0, 0, 0, -2.2204460492503131e-16, -1, 0, 1, -2.2204460492503131e-16};
     struct solid a = box_at(0.5, 0.5, 0.5, 0, 0, 0), b = a;
     memcpy(a.R, quarter, sizeof a.R);
@@ -84,8 +86,8 @@ END_TEST
 /* Capsules of unequal radii, 4 degrees from parallel. */
 START_TEST(unequal_capsules_side_by_side)
 {
-    struct solid a = solid_at(SADMM_SHAPE_CAPSULE, 0.016, 0.02, 0, 0, 0, 0), b = solid_at(SADMM_SHAPE_CAPSULE, 0.003, 0.07, 0,
-                                                                                         0.019, 0, 0);
+    struct solid a = solid_at(SADMM_SHAPE_CAPSULE, 0.016, 0.02, 0, 0, 0, 0),
+                 b = solid_at(SADMM_SHAPE_CAPSULE, 0.003, 0.07, 0, 0.019, 0, 0);
     turn(&a, 1, 0, 0, 0.066);
     ck_assert_int_eq(expect_between(a, b, 1e-4), 3); /* the ends and, deeper, the middle */
 }
@@ -94,8 +96,8 @@ END_TEST
 /* Their axes cross: sideways is all the distance that the ends have. */
 START_TEST(crossed_capsules)
 {
-    struct solid a = solid_at(SADMM_SHAPE_CAPSULE, 1e-4, 2, 0, 0, 0, 0), b = solid_at(SADMM_SHAPE_CAPSULE, 0.75, 0.75, 0, 0, 0,
-                                                                                     0);
+    struct solid a = solid_at(SADMM_SHAPE_CAPSULE, 1e-4, 2, 0, 0, 0, 0),
+                 b = solid_at(SADMM_SHAPE_CAPSULE, 0.75, 0.75, 0, 0, 0, 0);
     turn(&a, 1, 0, 0, 0.011);
     ck_assert_int_ge(expect_between(a, b, 0), 1);
 }
@@ -118,11 +120,13 @@ START_TEST(a_line_along_a_huge_capsule)
 }
 END_TEST
 
-/* A capsule 10^11 times as long as thick through a plate: the stretch inside is short for the capsule, not for the box. */
+/* A capsule 10^11 times as long as thick through a plate: the stretch inside is short for the capsule, not for the
+ * box. */
 START_TEST(a_needle_through_a_plate)
 {
     struct solid a = solid_at(SADMM_SHAPE_CAPSULE, 1.2155676276376767e-06, 304661.66224296024, 0, 0, 0, 0);
-    struct solid b = box_at(0.9428799426706399, 0.00014325170312147337, 0.94686372766399229, 0, 0, -0.28532006819048761);
+    struct solid b =
+        box_at(0.9428799426706399, 0.00014325170312147337, 0.94686372766399229, 0, 0, -0.28532006819048761);
     const double R[9] = {-0.83485863744445776, -0.37441020702971728, 0.40351958113126002,
                          0.38628444373443904,  -0.92073181446802255, -0.05511129063266329,
                          0.3921675458438118,   0.10986319992785185,  0.91330974662950715};

@@ -1,5 +1,6 @@
-/* Every exported function takes NULL for every pointer: refused by name where the pointer is needed, a documented answer
- * where there is no status to return. The list of functions is the shared library's own, so that none can be left out. */
+/* Every exported function takes NULL for every pointer: refused by name where the pointer is needed, a documented
+ * answer where there is no status to return. The list of functions is the shared library's own, so that none can be
+ * left out. */
 #include <check.h>
 #include <stdio.h>
 #include <string.h>

@@ -565,8 +565,8 @@ START_TEST(overflow_is_reported_and_undone)
 }
 END_TEST
 
-/* Numbers so large that products of them may not be numbers are refused by name. Squares that would overflow do not: the
- * solution is v = A^-1 b = 1e200 m/s. In single precision that is none, and the solve says so. */
+/* Numbers so large that products of them may not be numbers are refused by name. Squares that would overflow do not:
+ * the solution is v = A^-1 b = 1e200 m/s. In single precision that is none, and the solve says so. */
 START_TEST(what_is_large_is_solved_or_refused)
 {
     const struct sadmm_kernels *table = tables[_i];
@@ -583,8 +583,9 @@ START_TEST(what_is_large_is_solved_or_refused)
     for (int r = 0; r < 3; ++r) block.jacobian_b[6 * r + (r + 2) % 3] = 1;
     block.jacobian_b[7] = 1e308;
     ck_assert_int_eq(sadmm_problem_set_blocks(p, 1, &block, NULL), SADMM_ERROR_INVALID_ARGUMENT);
-    ck_assert_msg(strstr(sadmm_problem_message(p), "blocks[0].jacobian_b[7] = 1e+308: must be finite and within +-1e+60"),
-                  "%s", sadmm_problem_message(p));
+    ck_assert_msg(
+        strstr(sadmm_problem_message(p), "blocks[0].jacobian_b[7] = 1e+308: must be finite and within +-1e+60"), "%s",
+        sadmm_problem_message(p));
 
     const sadmm_problem_contact apart = {.body_a = -1, .body_b = 0, .normal = {0, 0, 1}, .error = 1, .friction = 0.5};
     OK(sadmm_problem_set_contacts(p, 1, &apart, NULL));
@@ -609,7 +610,8 @@ START_TEST(what_is_large_is_solved_or_refused)
 }
 END_TEST
 
-/* Where a product overflows all the same (J A^-1 J^T = 1e60^2 / 1e-200) there is no certificate, not one that is NaN. */
+/* Where a product overflows all the same (J A^-1 J^T = 1e60^2 / 1e-200) there is no certificate, not one that is
+ * NaN. */
 START_TEST(what_overflows_has_no_certificate)
 {
     double A[36] = {0}, b[6] = {0};
@@ -650,7 +652,8 @@ START_TEST(devices)
         OK(sadmm_problem_set_device(p, 0));
         OK(sadmm_problem_solve(p, SADMM_BACKEND_CUDA, SADMM_F64, &s, &second));
         OK(sadmm_problem_set_device(p, 1000));
-        ck_assert_int_eq(sadmm_problem_solve(p, SADMM_BACKEND_CUDA, SADMM_F64, &s, &second), SADMM_ERROR_INVALID_ARGUMENT);
+        ck_assert_int_eq(sadmm_problem_solve(p, SADMM_BACKEND_CUDA, SADMM_F64, &s, &second),
+                         SADMM_ERROR_INVALID_ARGUMENT);
         ck_assert_msg(strstr(sadmm_problem_message(p), "device = 1000") != NULL, "%s", sadmm_problem_message(p));
     }
     sadmm_problem_destroy(p);

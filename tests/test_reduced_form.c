@@ -93,7 +93,8 @@ START_TEST(stepwise_equals_literal)
                worst_dual, relative(betas));
     ck_assert_msg(relative(v) <= tolerance, "%s: v differs by %g", scene->name, relative(v));
     ck_assert_msg(relative(lambda) <= tolerance, "%s: lambda differs by %g", scene->name, relative(lambda));
-    /* Rounding of lambda and of the impulses they are differences of: a body's sum has up to 32 points here (the plates'). */
+    /* Rounding of lambda and of the impulses they are differences of: a body's sum has up to 32 points here (the
+     * plates'). */
     double rounding = 32 * table_epsilon(table);
     ck_assert_msg(worst_primal <= rounding, "%s: primal residual differs by %g", scene->name, worst_primal);
     ck_assert_msg(worst_dual <= rounding, "%s: dual residual differs by %g", scene->name, worst_dual);

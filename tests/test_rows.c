@@ -1,6 +1,6 @@
-/* Constraints given by rows: the law of a row (core/math/row.h) against cases solved by hand, bounds that hold to the bit, every
- * table against the literal backend, and that rows cost other islands nothing: not one bit, and not the fast form of their
- * bodies. */
+/* Constraints given by rows: the law of a row (core/math/row.h) against cases solved by hand, bounds that hold to the
+ * bit, every table against the literal backend, and that rows cost other islands nothing: not one bit, and not the fast
+ * form of their bodies. */
 #include <check.h>
 #include <float.h>
 #include <math.h>
@@ -38,7 +38,8 @@ END_TEST
 START_TEST(one_constraint_has_many_laws) { check_many_laws(tables[_i]); }
 END_TEST
 
-/* Of what the law does not allow, the certificate is the velocity by which an exact solve of the row alone would move it. */
+/* Of what the law does not allow, the certificate is the velocity by which an exact solve of the row alone would move
+ * it. */
 START_TEST(certificate_knows_bounds)
 {
     static const struct {
@@ -76,7 +77,7 @@ START_TEST(certificate_knows_bounds)
 }
 END_TEST
 
-/* ---- bounds, iterate by iterate; tables against ref ----------------------------------------------------------------- */
+/* ---- bounds, iterate by iterate; tables against ref -------------------------------------------------------------- */
 
 /* Bodies, contacts and rows of all kinds; some hard and soft ones get bounds, so that constraints mix them. */
 static struct contact_problem *bounded_problem(uint64_t seed)
@@ -137,15 +138,15 @@ START_TEST(bounds_hold_in_every_iterate)
             for (int32_t i = 0; i < 6 * ref->system.body_count; ++i)
                 add(&v, own->system.velocity[i], ref->system.velocity[i]);
             for (size_t r = 0; r < ref->rows.row_count; ++r) add(&lambda, own->rows.lambda[r], ref->rows.lambda[r]);
-            ck_assert_msg(relative(v) <= tolerance && relative(lambda) <= tolerance, "method %d, %d iterations: v %g, lambda %g",
-                          m, iterations[n], relative(v), relative(lambda));
+            ck_assert_msg(relative(v) <= tolerance && relative(lambda) <= tolerance,
+                          "method %d, %d iterations: v %g, lambda %g", m, iterations[n], relative(v), relative(lambda));
             contact_problem_free(own);
             contact_problem_free(ref);
         }
 }
 END_TEST
 
-/* ---- other islands ---------------------------------------------------------------------------------------------------- */
+/* ---- other islands ----------------------------------------------------------------------------------------------- */
 
 enum { TOWERS = 7, TALL = 3, JOINED = TALL * 3 }; /* the two bodies from JOINED on lie between towers */
 
@@ -154,7 +155,8 @@ static const double up[3] = {0, 0, 1};
 static void stand(struct contact_problem *p, int32_t below, int32_t box, double x, double z)
 {
     for (int i = 0; i < 4; ++i)
-        contact_problem_touch(p, below, box, (double[3]){x + (i & 1 ? 0.1 : -0.1), i & 2 ? 0.1 : -0.1, z}, up, 1e-5 * i, 0.4, 0);
+        contact_problem_touch(p, below, box, (double[3]){x + (i & 1 ? 0.1 : -0.1), i & 2 ? 0.1 : -0.1, z}, up, 1e-5 * i,
+                              0.4, 0);
 }
 
 /* Towers, and between them two bodies, one on the other, with a hard block or without. Every island is a tower. */
@@ -206,7 +208,8 @@ START_TEST(other_islands_keep_every_bit)
                 limited += run_towers(table, with, law_methods[m], warm, threads);
                 ck_assert_int_le(some, TOWERS);
                 for (int32_t i = 0; i < without->system.body_count; ++i) {
-                    bool same = memcmp(with->system.velocity + 6 * i, without->system.velocity + 6 * i, 6 * sizeof(double)) == 0;
+                    bool same = memcmp(with->system.velocity + 6 * i, without->system.velocity + 6 * i,
+                                       6 * sizeof(double)) == 0;
                     if (i == JOINED || i == JOINED + 1) moved = moved || !same;
                     else ck_assert_msg(same, "method %d, warm %d, %d threads: body %d", m, warm, threads, i);
                 }
@@ -225,8 +228,8 @@ START_TEST(other_islands_keep_every_bit)
 }
 END_TEST
 
-/* A, b and e of a step, as sadmm_world_freeze gives them, take the form of the world's bodies: the same bits in the method
- * `paper`. (`fast` knows that a world's step is one of many.) */
+/* A, b and e of a step, as sadmm_world_freeze gives them, take the form of the world's bodies: the same bits in the
+ * method `paper`. (`fast` knows that a world's step is one of many.) */
 START_TEST(frozen_problems_keep_the_fast_form)
 {
     const struct sadmm_kernels *table = tables[_i];
@@ -242,7 +245,7 @@ START_TEST(frozen_problems_keep_the_fast_form)
 }
 END_TEST
 
-/* ---- the store ---------------------------------------------------------------------------------------------------- */
+/* ---- the store --------------------------------------------------------------------------------------------------- */
 
 START_TEST(blocks_become_rows)
 {
@@ -252,7 +255,8 @@ START_TEST(blocks_become_rows)
     in.stiffness[0] = 2, in.error[0] = 0.25, in.damping[1] = 7;
     in.jacobian_b[0] = NAN; /* of the static world: not read */
     ck_assert(sadmm_rows_add_block(&rows, &in, lambda));
-    ck_assert(rows.bias[0] == 0.5 && rows.gain[0] == 0 && rows.compliance[0] == 1 && rows.gain[1] == 7 && rows.bias[1] == 0);
+    ck_assert(rows.bias[0] == 0.5 && rows.gain[0] == 0 && rows.compliance[0] == 1 && rows.gain[1] == 7 &&
+              rows.bias[1] == 0);
     ck_assert(rows.lambda[0] == 4 && rows.lambda[1] == 5 && rows.jacobian_a[2] == 3 && rows.jacobian_b[0] == 0);
     ck_assert(sadmm_row_acts(&rows, 0) && !sadmm_row_acts(&rows, 1) && !sadmm_row_is_coupled(&rows, 0));
     ck_assert(!rows.constraints[0].cone && rows.constraints[0].count == 2);

@@ -83,7 +83,8 @@ END_TEST
 /* Sizes around the turns of the layout: one cube, no upper layer, full and partly filled layers. */
 START_TEST(sliding_cubes_have_n_cubes)
 {
-    static const char *const sizes[] = { "1", "2", "3", "64", "65", "66", "99", "101", "400", "441", "484", "3000", "20000" };
+    static const char *const sizes[] = {"1",   "2",   "3",   "64",  "65",   "66",   "99",
+                                        "101", "400", "441", "484", "3000", "20000"};
     for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; ++i) {
         char spec[32];
         snprintf(spec, sizeof spec, "sliding_cubes:%s", sizes[i]);

@@ -1,6 +1,6 @@
-/* Threads: how many work, whose they are, and that the library gets along with what happens to the process: forks, limits,
- * unloading. That results do not depend on their number is also in test_fast, test_reduced_form, test_collision and
- * test_scenes, kernel by kernel and scene by scene. */
+/* Threads: how many work, whose they are, and that the library gets along with what happens to the process: forks,
+ * limits, unloading. That results do not depend on their number is also in test_fast, test_reduced_form, test_collision
+ * and test_scenes, kernel by kernel and scene by scene. */
 #include <dlfcn.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -264,7 +264,8 @@ START_TEST(problems_take_tasks)
         if (run == 1) pool_stop(&pool); /* whoever calls it later hangs, or worse */
     }
     for (int run = 1; run < 3; ++run)
-        ck_assert_mem_eq(velocities[0], velocities[run], 6 * (size_t)sadmm_problem_body_count(problem) * sizeof(double));
+        ck_assert_mem_eq(velocities[0], velocities[run],
+                         6 * (size_t)sadmm_problem_body_count(problem) * sizeof(double));
     for (int run = 0; run < 3; ++run) free(velocities[run]);
     sadmm_problem_destroy(problem);
     sadmm_world_destroy(world);
@@ -350,8 +351,8 @@ static int child_takes_new_pool(uint64_t expected)
     return same && pool.enqueued > 0 ? 0 : 1;
 }
 
-/* A pool that the child made itself is as good as any. Sanitizers allow no threads after a fork with threads: the parent has
- * none here. */
+/* A pool that the child made itself is as good as any. Sanitizers allow no threads after a fork with threads: the
+ * parent has none here. */
 START_TEST(a_forked_child_may_have_a_pool)
 {
     const uint64_t expected = hash_of("vertical_stacks:4", 1, NULL, 5);

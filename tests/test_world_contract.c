@@ -26,7 +26,8 @@ static sadmm_body_id add_ball(sadmm_world *world, const sadmm_body_def *def)
 }
 
 /* A plane, and a ball that rests on it. */
-static sadmm_world *ground_and_ball(sadmm_backend backend, sadmm_precision precision, sadmm_body_id *ground, sadmm_body_id *ball)
+static sadmm_world *ground_and_ball(sadmm_backend backend, sadmm_precision precision, sadmm_body_id *ground,
+                                    sadmm_body_id *ball)
 {
     sadmm_world_def def = sadmm_world_def_default();
     sadmm_body_def floor = sadmm_body_def_default(), resting = ball_def(0.1);
@@ -77,7 +78,7 @@ START_TEST(names_stay_where_they_are)
 }
 END_TEST
 
-/* ---- a step that fails --------------------------------------------------------------------------------------------- */
+/* ---- a step that fails ------------------------------------------------------------------------------------------- */
 
 /* Contacts, the frozen problem, the plan and the report are those of the last step that was done. */
 START_TEST(a_failed_step_leaves_what_can_be_read)
@@ -115,14 +116,15 @@ START_TEST(a_failed_step_leaves_what_can_be_read)
     }
     ck_assert_int_eq(memcmp(contacts[0], contacts[1], sizeof contacts[0]), 0);
     ck_assert(contacts[0][0].impulse[2] > 0);
-    ck_assert(memcmp(A[0], A[1], sizeof A[0]) == 0 && memcmp(b[0], b[1], sizeof b[0]) == 0 && memcmp(v[0], v[1], sizeof v[0]) == 0);
+    ck_assert(memcmp(A[0], A[1], sizeof A[0]) == 0 && memcmp(b[0], b[1], sizeof b[0]) == 0 &&
+              memcmp(v[0], v[1], sizeof v[0]) == 0);
     ck_assert_str_eq(text[0], text[1]);
     for (int pass = 0; pass < 2; ++pass) sadmm_problem_destroy(frozen[pass]);
     sadmm_world_destroy(world);
 }
 END_TEST
 
-/* ---- states, wrenches, inertias -------------------------------------------------------------------------------------- */
+/* ---- states, wrenches, inertias ---------------------------------------------------------------------------------- */
 
 /* What a step made can be set, however far and fast it is, and gives the same next step. */
 START_TEST(what_was_read_can_be_set)
@@ -169,7 +171,9 @@ START_TEST(inertias_that_are_taken_can_be_stepped)
 {
     const sadmm_precision precision = _i % 2 ? SADMM_F32 : SADMM_F64;
     const double ratio = precision == SADMM_F32 ? 1e6 : 1e12;
-    const struct { double scale, ratio; } ends[] = {{1, ratio}, {1e-24 * ratio, ratio}, {1e-24, 1}, {1e24, 1}, {1e24, ratio}};
+    const struct {
+        double scale, ratio;
+    } ends[] = {{1, ratio}, {1e-24 * ratio, ratio}, {1e-24, 1}, {1e24, 1}, {1e24, ratio}};
     for (size_t k = 0; k < sizeof ends / sizeof *ends; ++k)
         for (int method = 0; method < SADMM_METHOD_COUNT; ++method) {
             sadmm_body_id ground, ball, thin;
@@ -181,7 +185,8 @@ START_TEST(inertias_that_are_taken_can_be_stepped)
             sadmm_body_def def = ball_def(0.5);
             for (int j = 0; j < 3; ++j) def.inertia[j] = ends[k].scale;
             def.inertia[2] /= ends[k].ratio;
-            const double turned[4] = {0.56771830021180747, -0.18190050800876933, 0.56771830021180747, 0.56771830021180747};
+            const double turned[4] = {0.56771830021180747, -0.18190050800876933, 0.56771830021180747,
+                                      0.56771830021180747};
             memcpy(def.orientation, turned, sizeof turned);
             MUST(world, sadmm_world_add_body(world, &def, &thin));
             step_world(world, 2);
@@ -201,7 +206,7 @@ START_TEST(inertias_that_are_taken_can_be_stepped)
 }
 END_TEST
 
-/* ---- reports --------------------------------------------------------------------------------------------------------- */
+/* ---- reports ----------------------------------------------------------------------------------------------------- */
 
 /* Asked for, the residuals are those of the last iteration, whatever ended it; and nothing else changes. */
 START_TEST(residuals_are_measured_when_a_stop_rule_ends_the_step)
@@ -228,7 +233,7 @@ START_TEST(residuals_are_measured_when_a_stop_rule_ends_the_step)
 }
 END_TEST
 
-/* ---- memory ---------------------------------------------------------------------------------------------------------- */
+/* ---- memory ------------------------------------------------------------------------------------------------------ */
 
 static size_t bytes_in_use(void) { return mallinfo2().uordblks; }
 
@@ -249,12 +254,13 @@ START_TEST(environments_leave_nothing_behind)
         if (k == some) after_some = bytes_in_use();
     }
     /* A thousand of the smallest conceivable leaks are 16 kB. */
-    if (after_some > 0) ck_assert_msg(bytes_in_use() < after_some + 8192, "%zu bytes, then %zu", after_some, bytes_in_use());
+    if (after_some > 0)
+        ck_assert_msg(bytes_in_use() < after_some + 8192, "%zu bytes, then %zu", after_some, bytes_in_use());
     sadmm_world_destroy(world);
 }
 END_TEST
 
-/* ---- settings -------------------------------------------------------------------------------------------------------- */
+/* ---- settings ---------------------------------------------------------------------------------------------------- */
 
 /* Members count, padding does not. */
 START_TEST(settings_are_compared_by_their_members)
@@ -263,9 +269,11 @@ START_TEST(settings_are_compared_by_their_members)
     sadmm_settings a, b;
     memset(&a, 0x00, sizeof a);
     memset(&b, 0xff, sizeof b);
-#define BOTH(member) memcpy(&a.member, &given.member, sizeof given.member), memcpy(&b.member, &given.member, sizeof given.member)
+#define BOTH(member) \
+    memcpy(&a.member, &given.member, sizeof given.member), memcpy(&b.member, &given.member, sizeof given.member)
     BOTH(dt), BOTH(gravity), BOTH(method), BOTH(iterations), BOTH(relaxation), BOTH(penalty_period);
-    BOTH(penalty_mass_factor), BOTH(penalty_offset), BOTH(penalty_ratio_limit), BOTH(penalty_update_warm), BOTH(warm_start);
+    BOTH(penalty_mass_factor), BOTH(penalty_offset), BOTH(penalty_ratio_limit), BOTH(penalty_update_warm),
+        BOTH(warm_start);
     BOTH(residual_tolerance), BOTH(certificate_tolerance), BOTH(certificate_momentum_tolerance), BOTH(check_period);
     BOTH(measure_residuals), BOTH(certify), BOTH(recover_wrenches), BOTH(baumgarte), BOTH(slop), BOTH(correction_speed);
     BOTH(restitution_threshold), BOTH(threads);

@@ -278,11 +278,13 @@ START_TEST(bad_settings_are_refused)
     for (size_t i = 0; i < COUNT(bad); ++i) {
         sadmm_settings settings = small_def().settings;
         memcpy((char *)&settings + bad[i].offset, &bad[i].value, sizeof bad[i].value);
-        expect_refused(w.world, sadmm_world_set_settings(w.world, &settings), SADMM_ERROR_INVALID_ARGUMENT, bad[i].field);
+        expect_refused(w.world, sadmm_world_set_settings(w.world, &settings), SADMM_ERROR_INVALID_ARGUMENT,
+                       bad[i].field);
     }
     sadmm_settings settings = small_def().settings;
     settings.penalty_mass_factor = settings.penalty_offset = 0;
-    expect_refused(w.world, sadmm_world_set_settings(w.world, &settings), SADMM_ERROR_INVALID_ARGUMENT, "penalty_offset");
+    expect_refused(w.world, sadmm_world_set_settings(w.world, &settings), SADMM_ERROR_INVALID_ARGUMENT,
+                   "penalty_offset");
     expect_refused(w.world, sadmm_world_set_settings(w.world, NULL), SADMM_ERROR_INVALID_ARGUMENT, "settings");
     expect_equal_future(w.world, other.world);
     sadmm_world_destroy(w.world);
@@ -331,13 +333,17 @@ START_TEST(bad_states_and_wrenches_are_refused)
     sadmm_body_state state;
 
     state = good, state.position[1] = NAN;
-    expect_refused(w.world, sadmm_world_set_body_state(w.world, w.high, &state), SADMM_ERROR_INVALID_ARGUMENT, "position");
+    expect_refused(w.world, sadmm_world_set_body_state(w.world, w.high, &state), SADMM_ERROR_INVALID_ARGUMENT,
+                   "position");
     state = good, state.position[1] = -INFINITY;
-    expect_refused(w.world, sadmm_world_set_body_state(w.world, w.high, &state), SADMM_ERROR_INVALID_ARGUMENT, "position");
+    expect_refused(w.world, sadmm_world_set_body_state(w.world, w.high, &state), SADMM_ERROR_INVALID_ARGUMENT,
+                   "position");
     state = good, memset(state.orientation, 0, sizeof state.orientation);
-    expect_refused(w.world, sadmm_world_set_body_state(w.world, w.high, &state), SADMM_ERROR_INVALID_ARGUMENT, "orientation");
+    expect_refused(w.world, sadmm_world_set_body_state(w.world, w.high, &state), SADMM_ERROR_INVALID_ARGUMENT,
+                   "orientation");
     state = good, state.orientation[0] *= 1.0001;
-    expect_refused(w.world, sadmm_world_set_body_state(w.world, w.high, &state), SADMM_ERROR_INVALID_ARGUMENT, "orientation");
+    expect_refused(w.world, sadmm_world_set_body_state(w.world, w.high, &state), SADMM_ERROR_INVALID_ARGUMENT,
+                   "orientation");
     state = good, state.linear_velocity[2] = INFINITY;
     expect_refused(w.world, sadmm_world_set_body_state(w.world, w.high, &state), SADMM_ERROR_INVALID_ARGUMENT,
                    "linear_velocity");
@@ -352,10 +358,12 @@ START_TEST(bad_states_and_wrenches_are_refused)
                    "state->angular_velocity[2] = -2: must be 0, for the body is static");
     expect_refused(w.world, sadmm_world_set_body_state(w.world, w.high, NULL), SADMM_ERROR_INVALID_ARGUMENT, "state");
 
-    expect_refused(w.world, sadmm_world_set_body_wrench(w.world, w.high, nan, zero), SADMM_ERROR_INVALID_ARGUMENT, "force");
+    expect_refused(w.world, sadmm_world_set_body_wrench(w.world, w.high, nan, zero), SADMM_ERROR_INVALID_ARGUMENT,
+                   "force");
     expect_refused(w.world, sadmm_world_set_body_wrench(w.world, w.high, one, infinite), SADMM_ERROR_INVALID_ARGUMENT,
                    "torque");
-    expect_refused(w.world, sadmm_world_set_body_wrench(w.world, w.high, NULL, zero), SADMM_ERROR_INVALID_ARGUMENT, "force");
+    expect_refused(w.world, sadmm_world_set_body_wrench(w.world, w.high, NULL, zero), SADMM_ERROR_INVALID_ARGUMENT,
+                   "force");
 
     const double frictions[] = { NAN, INFINITY, -0.5, -2, 1.01e6 };
     for (size_t i = 0; i < COUNT(frictions); ++i)
@@ -363,8 +371,8 @@ START_TEST(bad_states_and_wrenches_are_refused)
                        SADMM_ERROR_INVALID_ARGUMENT, "friction");
     expect_refused(w.world, sadmm_world_set_pair_friction(w.world, w.low_shape, w.low_shape, 1),
                    SADMM_ERROR_INVALID_ARGUMENT, "same");
-    expect_refused(w.world, sadmm_world_set_body_pair_contact(w.world, w.low, w.low, false), SADMM_ERROR_INVALID_ARGUMENT,
-                   "same");
+    expect_refused(w.world, sadmm_world_set_body_pair_contact(w.world, w.low, w.low, false),
+                   SADMM_ERROR_INVALID_ARGUMENT, "same");
     MUST(w.world, sadmm_world_set_pair_friction(w.world, w.low_shape, w.high_shape, 2));
     MUST(w.world, sadmm_world_set_pair_friction(w.world, w.high_shape, w.low_shape, -1)); /* takes it back */
     expect_equal_future(w.world, other.world);
@@ -455,7 +463,8 @@ START_TEST(bad_ranges_and_early_calls_are_refused)
     ck_assert(count > 0 && count <= 64);
     MUST(w.world, sadmm_world_contacts(w.world, 0, count, contacts));
     MUST(w.world, sadmm_world_contacts(w.world, count, 0, NULL));
-    expect_refused(w.world, sadmm_world_contacts(w.world, 0, count + 1, contacts), SADMM_ERROR_INVALID_ARGUMENT, "first");
+    expect_refused(w.world, sadmm_world_contacts(w.world, 0, count + 1, contacts), SADMM_ERROR_INVALID_ARGUMENT,
+                   "first");
     expect_refused(w.world, sadmm_world_contacts(w.world, -1, 1, contacts), SADMM_ERROR_INVALID_ARGUMENT, "first");
     expect_refused(w.world, sadmm_world_contacts(w.world, 0, -1, contacts), SADMM_ERROR_INVALID_ARGUMENT, "count");
     expect_refused(w.world, sadmm_world_contacts(w.world, INT32_MAX, INT32_MAX, contacts), SADMM_ERROR_INVALID_ARGUMENT,
@@ -516,8 +525,8 @@ START_TEST(long_names_are_cut)
 }
 END_TEST
 
-/* Bodies that come and go by the hundred thousand, looked at one by one: work in proportion to their number. Any loop over
- * all slots in one of these calls takes minutes here (the test's time limit). */
+/* Bodies that come and go by the hundred thousand, looked at one by one: work in proportion to their number. Any loop
+ * over all slots in one of these calls takes minutes here (the test's time limit). */
 START_TEST(many_bodies_come_and_go)
 {
     enum { COUNT = 200000 };

@@ -3,15 +3,16 @@
  *   A_i v_i = b_i + sum_k J_{i,k}^T lambda_k                      (eq. 1 of the paper, impulse form)
  *   (J_a v_a + J_b v_b, lambda_k) in C(e_k)                       (eqs. 2-5)
  *
- * Velocities are (linear, angular) in the world frame, m/s and rad/s. Impulses are N s (rows that act on
- * rotation: N m s). A body index of -1 means the static world. lambda acts with +J_b^T on body b and with
- * J_a^T on body a (for contacts J_a = -[I, -[r_a]x]): a positive normal impulse pushes b along the normal and a against it.
+ * Velocities are (linear, angular) in the world frame, m/s and rad/s. Impulses are N s (rows that act on rotation: N m
+ * s). A body index of -1 means the static world. lambda acts with +J_b^T on body b and with J_a^T on body a (for
+ * contacts J_a = -[I, -[r_a]x]): a positive normal impulse pushes b along the normal and a against it.
  *
  * Threads: a problem is used by one thread at a time; calls that take a const one only read it, and may run on several
  * threads at once while no other call is made on it. Different problems are independent.
  *
  * Numbers of bodies and constraints must be finite and within +-1e60, which leaves room for the products of a
- * certificate; starts and solutions must be finite. Errors, of every call besides its own: INVALID_ARGUMENT where a pointer is NULL that may not be.
+ * certificate; starts and solutions must be finite. Errors, of every call besides its own: INVALID_ARGUMENT where a
+ * pointer is NULL that may not be.
  */
 #ifndef SUBADMM_PROBLEM_H
 #define SUBADMM_PROBLEM_H
@@ -33,7 +34,7 @@ typedef struct sadmm_problem_contact {
     double arm_a[3];        /* contact point relative to a's centre of mass, m, world frame; ignored when a is -1 */
     double arm_b[3];        /* the same for b */
     double error;           /* e of eq. (5) along the normal, m/s: gap/dt, or the stabilised penetration (negative) */
-    double friction;        /* mu, >= 0 */
+    double friction;        /* mu, in [0, 1e60] */
 } sadmm_problem_contact;
 
 /* A constraint given by its Jacobian rows. */
@@ -50,7 +51,7 @@ typedef struct sadmm_problem_block {
     double jacobian_a[36];   /* (rows x 6) row-major, acts on (linear, angular) of a; ignored when a is -1 */
     double jacobian_b[36];   /* the same for b */
     double error[6];         /* CONTACT and HARD: e, m/s. SOFT: e, m or rad */
-    double friction;         /* CONTACT: mu >= 0 */
+    double friction;         /* CONTACT: mu, in [0, 1e60] */
     double stiffness[6];     /* SOFT: k of lambda = -(k e + c x), N s/m, i.e. dt times the spring constant; >= 0 */
     double damping[6];       /* SOFT: c, kg (use c = dt (damping + dt stiffness) for an implicit spring); >= 0 */
 } sadmm_problem_block;
@@ -62,8 +63,8 @@ typedef struct sadmm_solve_report {
     int iterations;             /* done */
     bool converged;             /* a stop rule was met (false when none was asked for) */
     int32_t limited;            /* islands slowed down, see sadmm_step_report; 0 at the problem level */
-    sadmm_residual residual;    /* of the last iteration */
-    sadmm_certificate certificate;
+    sadmm_residual residual;    /* of the last iteration; -1 where it was not measured */
+    sadmm_certificate certificate; /* of the solution */
     double solve_ms;            /* wall time of the solve without the certificate, ms */
     int threads;                /* CPU threads that worked on the solve: the most at a time */
 } sadmm_solve_report;
@@ -72,7 +73,8 @@ typedef struct sadmm_solve_report {
 SADMM_API sadmm_status sadmm_problem_create(sadmm_problem **out);
 SADMM_API void sadmm_problem_destroy(sadmm_problem *problem); /* NULL is fine */
 
-/* The message of the last failed call on this problem, "" when none failed or problem is NULL; valid until the next call. */
+/* The message of the last failed call on this problem, "" when none failed or problem is NULL; valid until the next
+ * call. */
 SADMM_API const char *sadmm_problem_message(const sadmm_problem *problem);
 
 /* Set all bodies. A: (count x 6 x 6), symmetric positive definite, kg, kg m, kg m^2. b: (count x 6), N s, N m s.
@@ -95,24 +97,25 @@ SADMM_API int32_t sadmm_problem_body_count(const sadmm_problem *problem);
 SADMM_API int32_t sadmm_problem_contact_count(const sadmm_problem *problem);
 SADMM_API int32_t sadmm_problem_block_count(const sadmm_problem *problem);
 
-/* Read back what was set (or what sadmm_world_freeze put in). A, b as in set_bodies, v0 (count x 6); any may be NULL. */
+/* Read back what was set (or what sadmm_world_freeze put in). A, b as in set_bodies, v0 (count x 6); any may be
+ * NULL. index in [0, contact count) or [0, block count). Errors: INVALID_ARGUMENT (range). */
 SADMM_API sadmm_status sadmm_problem_get_bodies(const sadmm_problem *problem, double *A, double *b, double *v0);
 SADMM_API sadmm_status sadmm_problem_get_contact(sadmm_problem *problem, int32_t index, sadmm_problem_contact *contact);
 SADMM_API sadmm_status sadmm_problem_get_block(sadmm_problem *problem, int32_t index, sadmm_problem_block *block);
 
-/* The accelerator later solves run on where they run on one, index >= 0; default 0. What is kept on another is given up.
- * Errors: INVALID_ARGUMENT (negative; an index that the machine lacks is refused by sadmm_problem_solve). */
+/* The accelerator later solves run on where they run on one, index >= 0; default 0. What is kept on another is given
+ * up. Errors: INVALID_ARGUMENT (negative; an index that the machine lacks is refused by sadmm_problem_solve). */
 SADMM_API sadmm_status sadmm_problem_set_device(sadmm_problem *problem, int device);
 
-/* Threads of the host to work on solves (tasks.h); NULL or all zero: OpenMP's, the default. Errors: INVALID_ARGUMENT (nothing
- * changes), OUT_OF_MEMORY. */
+/* Threads of the host to work on solves (tasks.h); NULL or all zero: OpenMP's, the default. Errors: INVALID_ARGUMENT
+ * (nothing changes), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_problem_set_tasks(sadmm_problem *problem, const sadmm_tasks *tasks);
 
 /* Solve. The solution replaces the initial values, so that solving again continues from there (when
- * settings->warm_start). gravity, dt (but for the unit of penalty_offset) and stabilisation are not used: they are
- * in A, b and e already. report may be NULL. Errors: INVALID_ARGUMENT, UNAVAILABLE, OUT_OF_MEMORY, NON_FINITE
- * (the solution, or the certificate that a report asks for; the problem keeps its previous values), DEVICE. report->converged
- * is false where the report's residual is not finite. */
+ * settings->warm_start). gravity, dt (but for the unit of penalty_offset) and stabilisation are not used: they are in
+ * A, b and e already. report may be NULL. Errors: INVALID_ARGUMENT, UNAVAILABLE, OUT_OF_MEMORY, NON_FINITE (the
+ * solution, or the certificate that a report asks for; the problem keeps its previous values), DEVICE.
+ * report->converged is false where the report's residual is not finite. */
 SADMM_API sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend backend, sadmm_precision precision,
                                            const sadmm_settings *settings, sadmm_solve_report *report);
 
@@ -121,12 +124,13 @@ SADMM_API sadmm_status sadmm_problem_solve(sadmm_problem *problem, sadmm_backend
 SADMM_API sadmm_status sadmm_problem_get_solution(const sadmm_problem *problem, double *velocities, double *impulses,
                                                   double *block_lambda);
 
-/* Set (v, lambda) by hand, e.g. to certify another solver's answer. Shapes as above; NULL leaves a part alone. */
+/* Set (v, lambda) by hand, e.g. to certify another solver's answer. Shapes as above; NULL leaves a part alone.
+ * Errors: INVALID_ARGUMENT (a number that is not finite; nothing changes). */
 SADMM_API sadmm_status sadmm_problem_set_solution(sadmm_problem *problem, const double *velocities,
                                                   const double *impulses, const double *block_lambda);
 
-/* The error of the current (v, lambda), in double from raw data; no solve. Errors: NON_FINITE where a product overflows (then
- * *certificate is unchanged), OUT_OF_MEMORY. */
+/* The error of the current (v, lambda), in double from raw data; no solve. Errors: NON_FINITE where a product overflows
+ * (then *certificate is unchanged), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_problem_certify(sadmm_problem *problem, sadmm_certificate *certificate);
 
 #ifdef __cplusplus

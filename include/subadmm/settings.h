@@ -58,7 +58,8 @@ typedef struct sadmm_settings {
                                     (the step report's `limited` says so), and so does a problem that is solved once:
                                     some 100 to 1000, or a tolerance below with a large number here.
                                     PAPER: 100 to 300 */
-    double relaxation;           /* FAST: over-relaxation rho, dimensionless, in [1, 2); default 1.8 */
+    double relaxation;           /* FAST: over-relaxation rho, dimensionless, in [1, 2); default 1.8 (docs/algorithm.md,
+                                    section 7) */
     int penalty_period;          /* PAPER, as all of penalty_*. m of eq. (15): iterations between penalty updates,
                                     0 = never; default 30 */
     double penalty_mass_factor;  /* M of eq. (13), dimensionless, in [0, 1e12]; default 16 */
@@ -77,7 +78,7 @@ typedef struct sadmm_settings {
                                     is <= certificate_momentum_tolerance; 0 = never; default 0 */
     double certificate_momentum_tolerance; /* dimensionless, > 0; default 1e-6. In single precision rounding alone may
                                               be a few 1e-6: ask for 1e-5 there */
-    int check_period;            /* iterations between looks at the stop rule, in [1, 1000000]; default 10 */
+    int check_period; /* iterations between convergence checks (of the tolerances above), in [1, 1000000]; default 10 */
 
     bool measure_residuals;      /* report the residuals of the last iteration; default false */
     bool certify;                /* report the certificate of every step; default false */
@@ -88,12 +89,13 @@ typedef struct sadmm_settings {
     double correction_speed;     /* cap of the corrective normal speed, m/s, in [0, 1e3]; default 1 */
     double restitution_threshold;/* approach speed under which restitution is ignored, m/s, >= 0; default 0.1 */
 
-    int threads;                 /* CPU threads at most, in [0, 1024]; 0 = no bound; default 0. As many work as have enough
-                                    to do, no more than there are processors (0: than OMP_NUM_THREADS, where that is set)
-                                    or threads of a pool of the host's (tasks.h), and no more than the process can make;
-                                    reports say how many that were. Results do not depend on it */
+    int threads; /* CPU threads at most, in [0, 1024]; 0 = no bound; default 0. As many work as have
+                                    enough to do, no more than there are processors (0: than OMP_NUM_THREADS, where that
+                                    is set) or threads of a pool of the host's (tasks.h), and no more than the process
+                                    can make; reports say how many that were. Results do not depend on it */
 } sadmm_settings;
 
+/* The defaults named above. Thread-safe. */
 SADMM_API sadmm_settings sadmm_settings_default(void);
 
 /* Residuals of eqs. (16) and (17), infinity norms, at the last iteration they were measured. */
@@ -106,7 +108,7 @@ typedef struct sadmm_residual {
 typedef struct sadmm_certificate {
     double ncp_max;          /* natural map, largest over constraints, m/s */
     double ncp_mean;         /* the same, mean over constraints, m/s */
-    int64_t ncp_worst;       /* index of the worst constraint: contacts first (in contact order), then blocks; -1: none */
+    int64_t ncp_worst; /* index of the worst constraint: contacts first (in contact order), then blocks; -1: none */
     double momentum_max;     /* |A v - b - J^T lambda| of the worst body over the largest |b|, |A v|, |J^T lambda|
                                 of any body (infinity norms), dimensionless */
     int64_t momentum_worst;  /* index of that body among the dynamic ones; -1: none */

@@ -5,17 +5,18 @@
  * axes along the principal axes of inertia.
  *
  * Threads: a world is used by one thread at a time, also where it is only read, because calls that read it may wait for
- * steps, fetch what a device holds and leave a message: they take a world that is not const. The few that take a const one
- * only read it, and may run on several threads at once while no other call is made on it. Different worlds are
+ * steps, fetch what a device holds and leave a message: they take a world that is not const. The few that take a const
+ * one only read it, and may run on several threads at once while no other call is made on it. Different worlds are
  * independent.
  *
  * Errors, of every call besides its own: INVALID_ARGUMENT where a pointer is NULL that may not be. Calls that wait for
  * steps (all that read what a step changes) also return the error of a step begun with sadmm_world_step_async, once.
  * Ids are small values with a generation: an id of a destroyed object gives SADMM_ERROR_STALE_ID, never another object.
  *
- * After a fork, while no call was running, parent and child each have a world of their own (not on CUDA, whose devices do
- * not survive one). Threads do not survive it either: a child of a process that has stepped or solved on OpenMP's threads
- * steps and solves on one, with the same results, and so do worlds and problems in it that have the parent's `tasks`.
+ * After a fork, while no call was running, parent and child each have a world of their own (not on CUDA, whose devices
+ * do not survive one). Threads do not survive it either: a child of a process that has stepped or solved on OpenMP's
+ * threads steps and solves on one, with the same results, and so do worlds and problems in it that have the parent's
+ * `tasks`.
  */
 #ifndef SUBADMM_WORLD_H
 #define SUBADMM_WORLD_H
@@ -46,24 +47,26 @@ typedef struct sadmm_world_def {
     sadmm_settings settings;
 } sadmm_world_def;
 
+/* The defaults named above. Thread-safe. */
 SADMM_API sadmm_world_def sadmm_world_def_default(void);
 
 /* Errors: INVALID_ARGUMENT, UNAVAILABLE, OUT_OF_MEMORY (message: sadmm_last_message). */
 SADMM_API sadmm_status sadmm_world_create(const sadmm_world_def *def, sadmm_world **out);
 SADMM_API void sadmm_world_destroy(sadmm_world *world); /* NULL is fine */
-/* The message of the last failed call on this world, "" when none failed or world is NULL; valid until the next call. */
+/* The message of the last failed call on this world, "" when none failed or world is NULL; valid until the next
+ * call. */
 SADMM_API const char *sadmm_world_message(const sadmm_world *world);
 
-/* Replace or read the settings; they take effect at the next step. Steps of another length (dt) go on with the forces of
- * the last one. Numbers (dt, gravity, relaxation, penalties, tolerances, error correction) may change at every step; where steps
- * run ahead (sadmm_world_step_async), a change of anything else, e.g. of iterations, waits for the steps begun.
- * Errors: INVALID_ARGUMENT (nothing changes). The settings of NULL are the default ones. */
+/* Replace or read the settings; they take effect at the next step. Steps of another length (dt) go on with the forces
+ * of the last one. Numbers (dt, gravity, relaxation, penalties, tolerances, error correction) may change at every step;
+ * where steps run ahead (sadmm_world_step_async), a change of anything else, e.g. of iterations, waits for the steps
+ * begun. Errors: INVALID_ARGUMENT (nothing changes). The settings of NULL are the default ones. */
 SADMM_API sadmm_status sadmm_world_set_settings(sadmm_world *world, const sadmm_settings *settings);
 SADMM_API sadmm_settings sadmm_world_settings(const sadmm_world *world);
 
-/* Let another backend, precision or device (as in sadmm_world_def) make the steps from the next one on; the world goes on
- * from where it is, with its impulses. Steps begun are waited for. Errors: as sadmm_world_create, and those of the steps begun
- * (nothing changes; after a lost device's DEVICE, ask once more). */
+/* Let another backend, precision or device (as in sadmm_world_def) make the steps from the next one on; the world goes
+ * on from where it is, with its impulses. Steps begun are waited for. Errors: as sadmm_world_create, and those of the
+ * steps begun (nothing changes; after a lost device's DEVICE, ask once more). */
 SADMM_API sadmm_status sadmm_world_set_backend(sadmm_world *world, sadmm_backend backend, sadmm_precision precision,
                                                int device);
 
@@ -74,7 +77,7 @@ typedef enum sadmm_body_type { SADMM_BODY_DYNAMIC = 0, SADMM_BODY_STATIC } sadmm
 typedef struct sadmm_body_def {
     sadmm_body_type type;        /* default DYNAMIC */
     double mass;                 /* kg, in [1e-9, 1e12]; ignored for static bodies; no default (must be set) */
-    double inertia[3];           /* principal moments, kg m^2, in [1e-24, 1e24], each <= the sum of the other two (relative
+    double inertia[3]; /* principal moments, kg m^2, in [1e-24, 1e24], each <= the sum of the other two (relative
                                     1e-9), the largest <= 1e6 (F32) or 1e12 (F64) times the smallest */
     double position[3];          /* centre of mass, m, |x| <= 1e9 */
     double orientation[4];       /* w x y z, | |q| - 1 | <= 1e-6 (then normalised); default identity */
@@ -85,12 +88,14 @@ typedef struct sadmm_body_def {
     const char *name;            /* copied, at most 63 bytes; NULL = "" */
 } sadmm_body_def;
 
+/* The defaults named above. Thread-safe. */
 SADMM_API sadmm_body_def sadmm_body_def_default(void);
+/* *id: the new body. Errors: INVALID_ARGUMENT (range; nothing changes), LIMIT (2^27 bodies), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def, sadmm_body_id *id);
-/* Destroys its shapes too. */
+/* Destroys its shapes too. Errors: STALE_ID. */
 SADMM_API sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id);
 SADMM_API int32_t sadmm_world_body_count(const sadmm_world *world);      /* all, static ones included; of NULL: 0 */
-/* The index-th live body in order of creation slot, index in [0, body_count). */
+/* The index-th live body in order of creation slot, index in [0, body_count). Errors: INVALID_ARGUMENT (range). */
 SADMM_API sadmm_status sadmm_world_body_at(sadmm_world *world, int32_t index, sadmm_body_id *id);
 
 typedef struct sadmm_body_state {
@@ -100,14 +105,16 @@ typedef struct sadmm_body_state {
     double angular_velocity[3];  /* rad/s, world frame */
 } sadmm_body_state;
 
+/* The state after the steps begun so far. Errors: STALE_ID, DEVICE. */
 SADMM_API sadmm_status sadmm_world_body_state(sadmm_world *world, sadmm_body_id id, sadmm_body_state *state);
 /* Any finite position and velocity is taken, so that what a step made can be set again; the orientation as in the
  * definition, velocities 0 for static bodies. Contacts lose accuracy beyond the ranges of the definition.
  * A pose other than the body has is a jump: the body's contacts are found as those of bodies that never touched before,
- * without what was known of the side they came from. Velocities may be set with the pose that was read. */
+ * without what was known of the side they came from. Velocities may be set with the pose that was read.
+ * Errors: STALE_ID, INVALID_ARGUMENT (nothing changes). */
 SADMM_API sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, const sadmm_body_state *state);
-/* Read back the definition (mass, inertia, type, name) with the current state. The name is the world's own: it stays where
- * it is, and valid, until the body is removed or the world destroyed. */
+/* Read back the definition (mass, inertia, type, name) with the current state. The name is the world's own: it stays
+ * where it is, and valid, until the body is removed or the world destroyed. Errors: STALE_ID, DEVICE. */
 SADMM_API sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id, sadmm_body_def *def);
 /* External force (N) at the centre of mass and torque (N m), world frame, each component within +-1e15; kept until set
  * again. Errors: STALE_ID, INVALID_ARGUMENT (range; a static body, which nothing moves). */
@@ -116,8 +123,10 @@ SADMM_API sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_bod
 /* Sum of the contact wrenches of the last step on the body: force (N), then torque about its centre of mass
  * (N m), world frame (eq. 12). Errors: STALE_ID, UNAVAILABLE when settings.recover_wrenches was false. */
 SADMM_API sadmm_status sadmm_world_body_contact_wrench(sadmm_world *world, sadmm_body_id id, double wrench[6]);
-/* Turn contact between two bodies off or on again (default on). */
-SADMM_API sadmm_status sadmm_world_set_body_pair_contact(sadmm_world *world, sadmm_body_id a, sadmm_body_id b, bool enabled);
+/* Turn contact between two bodies off or on again (default on). Errors: STALE_ID, INVALID_ARGUMENT (a and b the same),
+ * OUT_OF_MEMORY. */
+SADMM_API sadmm_status sadmm_world_set_body_pair_contact(sadmm_world *world, sadmm_body_id a, sadmm_body_id b,
+                                                         bool enabled);
 
 /* Principal inertia of solid bodies with their axes along the shape's, kg m^2. With a NULL pointer nothing is done.
  * box: half extents (m). capsule: radius and half length of the segment (m), axis z. */
@@ -142,55 +151,64 @@ typedef struct sadmm_shape_def {
     double orientation[4];       /* shape to body, w x y z; default identity */
     double friction;             /* mu >= 0, <= 1e6; a pair uses the geometric mean; default 0.5 */
     double restitution;          /* in [0, 1]; a pair uses the larger; default 0 */
-    uint32_t category, mask;     /* two shapes meet if (a.category & b.mask) and (b.category & a.mask); default 1, all */
+    uint32_t category, mask; /* two shapes meet if (a.category & b.mask) and (b.category & a.mask); default 1, all */
 } sadmm_shape_def;
 
+/* The defaults named above. Thread-safe. */
 SADMM_API sadmm_shape_def sadmm_shape_def_default(void);
+/* *id: the new shape, on `body` until that is removed. Errors: STALE_ID, INVALID_ARGUMENT (range; a plane on a dynamic
+ * body; nothing changes), LIMIT (2^28 shapes), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body, const sadmm_shape_def *def,
                                              sadmm_shape_id *id /* may be NULL */);
+/* Errors: STALE_ID. */
 SADMM_API sadmm_status sadmm_world_remove_shape(sadmm_world *world, sadmm_shape_id id);
 SADMM_API int32_t sadmm_world_shape_count(const sadmm_world *world); /* of NULL: 0 */
+/* The index-th live shape in order of creation slot, index in [0, shape_count). Errors: INVALID_ARGUMENT (range). */
 SADMM_API sadmm_status sadmm_world_shape_at(sadmm_world *world, int32_t index, sadmm_shape_id *id);
+/* Read back the definition, and the body that has the shape. Errors: STALE_ID. */
 SADMM_API sadmm_status sadmm_world_shape_def(sadmm_world *world, sadmm_shape_id id, sadmm_shape_def *def,
                                              sadmm_body_id *body /* may be NULL */);
-/* Override the pair's friction (mu >= 0), or give -1 to return to the geometric mean. */
-SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_shape_id a, sadmm_shape_id b, double friction);
+/* Override the pair's friction (mu in [0, 1e6]), or give -1 to return to the geometric mean. Errors: STALE_ID,
+ * INVALID_ARGUMENT (range; a and b the same), OUT_OF_MEMORY. */
+SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_shape_id a, sadmm_shape_id b,
+                                                     double friction);
 
 /* ---- stepping ---------------------------------------------------------------------------------------------- */
 
-/* Beside bodies and shapes a world keeps from step to step: the impulse of every contact (by shapes and feature), the axis
- * and side of every pair of shapes, and how steadily each body accelerates. The next step starts there, a world's first step
- * from nothing. So the same states, reached in another way or set again, go on alike but not bit for bit; a run that is to
- * be repeated bit for bit begins with a new world. */
+/* Beside bodies and shapes a world keeps from step to step: the impulse of every contact (by shapes and feature), the
+ * axis and side of every pair of shapes, and how steadily each body accelerates. The next step starts there, a world's
+ * first step from nothing. So the same states, reached in another way or set again, go on alike but not bit for bit; a
+ * run that is to be repeated bit for bit begins with a new world. */
 
-/* One time step of settings.dt. Errors: OUT_OF_MEMORY, NON_FINITE (state rolled back to before the step, message
- * names the body), DEVICE, LIMIT. After an error the world is as before the step and stays usable. NON_FINITE also where
+/* One time step of settings.dt. Errors: OUT_OF_MEMORY, NON_FINITE (state rolled back to before the step, message names
+ * the body), DEVICE, LIMIT. After an error the world is as before the step and stays usable. NON_FINITE also where
  * settings.certify asks for a certificate of numbers whose products overflow; on CUDA that step counts as done.
  *
- * DEVICE: a call of the device failed; any function that waits for steps begun may return it, once. Everything the world had
- * on the device is given up, and the next step begins there anew. Where the device still answers (a call failed, not the
- * device) nothing is lost: the world is as after the last step done. Where it does not, the host's copy counts: bodies as they
- * were when a function that reads states (sadmm_world_body_state, _body_def, _body_contact_wrench, _state_hash) was called
- * last, impulses to start from as when contacts were, and every state and wrench set since; time and sadmm_step_report.step go
- * back to that step, which the message names. All functions but steps go on with it; a step says DEVICE as long as the device
- * does not answer (CUDA: after a fault of a kernel, until the process ends or resets the device, which is for the program to
- * do, once every world of the device has returned the error). sadmm_world_set_backend takes the world elsewhere. */
+ * DEVICE: a call of the device failed; any function that waits for steps begun may return it, once. Everything the
+ * world had on the device is given up, and the next step loads the world into a new context. Where the device still
+ * answers (a call failed, not the device) nothing is lost: the world is as after the last step done. Where it does not,
+ * the host's copy counts: bodies as they were when a function that reads states (sadmm_world_body_state, _body_def,
+ * _body_contact_wrench, _state_hash) was called last, impulses to start from as when contacts were, and every state and
+ * wrench set since; time and sadmm_step_report.step go back to that step, which the message names. All functions but
+ * steps go on with it; a step says DEVICE as long as the device does not answer (CUDA: after a fault of a kernel, until
+ * the process ends or resets the device, which is for the program to do, once every world of the device has returned
+ * the error). sadmm_world_set_backend takes the world elsewhere. */
 SADMM_API sadmm_status sadmm_world_step(sadmm_world *world);
 
-/* Begin a step and return without waiting for it, where the backend can: CUDA, in the method FAST from the second step on;
- * not with a residual_tolerance, nor with a certificate_tolerance in the method PAPER or with more than 64 looks a step.
- * Elsewhere the same as sadmm_world_step. Steps run in order, a few of them at a time; states, wrenches and settings set
- * in between take effect at the next one. Getters wait for the steps begun so far.
+/* Begin a step and return without waiting for it, where the backend can: CUDA, in the method FAST from the second step
+ * on; not with a residual_tolerance, nor with a certificate_tolerance in the method PAPER or with more than 64
+ * convergence checks a step. Elsewhere the same as sadmm_world_step. Steps run in order, a few of them at a time;
+ * states, wrenches and settings set in between take effect at the next one. Getters wait for the steps begun so far.
  * Errors: as sadmm_world_step; they may be those of an earlier step, and then nothing after that step has been done
- * (sadmm_step_report.step counts what has). With settings.certify the step is waited for.
- * One thread at a time a world; different worlds are independent, also on one device. */
+ * (sadmm_step_report.step counts what has). With settings.certify the step is waited for. One thread at a time a world;
+ * different worlds are independent, also on one device. */
 SADMM_API sadmm_status sadmm_world_step_async(sadmm_world *world);
-/* Wait until all steps begun are done; at once when there are none. Errors: the first one of a step, see above. One thread
- * at a time a world. */
+/* Wait until all steps begun are done; at once when there are none. Errors: the first one of a step, see above. One
+ * thread at a time a world. */
 SADMM_API sadmm_status sadmm_world_wait(sadmm_world *world);
 
-/* ms. Wall time on the host; where the backend keeps the world (CUDA), the phases are on the device's clock, and so is the
- * total of a step begun with sadmm_world_step_async. */
+/* ms. Wall time on the host; where the backend keeps the world (CUDA), the phases are on the device's clock, and so is
+ * the total of a step begun with sadmm_world_step_async. */
 typedef struct sadmm_phase_times { double total, collide, assemble, solve, finish; } sadmm_phase_times;
 
 typedef struct sadmm_step_report {
@@ -205,26 +223,27 @@ typedef struct sadmm_step_report {
     int32_t pairs;                 /* shape pairs with at least one contact */
     int iterations;                /* done; with a stop rule on CUDA (below): by the island that did most */
     double iterations_mean;        /* over islands. The same, but where whole steps are made on CUDA with a stop rule
-                                      (method FAST, settings.certificate_tolerance, at most 64 looks a step): there every
-                                      island is looked at by itself and stops by itself */
+                                      (method FAST, settings.certificate_tolerance, at most 64 convergence checks
+                                      a step): there every island is checked and stops by itself */
     bool converged;                /* a stop rule was met, by every island */
     int32_t limited;               /* method FAST: islands that ended the iterations with more kinetic energy than
-                                      contacts can leave them with, or, with fewer than 60 iterations in a step that starts
-                                      warm, in a bounce that they cannot make, and were slowed down. In a few steps
-                                      after an impact that is no reason for more iterations; in many it is */
-    int64_t repeated;              /* steps since creation that a backend which runs ahead (CUDA) began with too little
-                                      room or another plan than they needed, and did again with more: nothing is lost
-                                      but time */
+                                      contacts can leave them with, or, with fewer than 60 iterations in a step that
+                                      starts warm, in a bounce that they cannot make, and were slowed down. In a few
+                                      steps after an impact that is no reason for more iterations; in many it is */
+    int64_t repeated;              /* steps since creation that a backend which runs ahead (CUDA) began with too small
+                                      capacities or another plan than they needed, and repeated: nothing is lost but
+                                      time */
     double penetration_max;        /* deepest overlap at the start of the step, m, >= 0 */
     sadmm_phase_times ms;          /* the certificate's own time is in `certify_ms`, not in here */
-    double certify_ms;
+    double certify_ms;             /* wall time of the certificate on the host, ms; 0: there is none */
     sadmm_residual residual;       /* valid if measured (settings or penalty update or tolerance); else -1. Not measured
                                       where islands stop by themselves */
-    sadmm_certificate certificate; /* valid if settings.certify or a certificate tolerance; else ncp_max = -1. Steps made
+    sadmm_certificate
+        certificate; /* valid if settings.certify or a certificate tolerance; else ncp_max = -1. Steps made
                                       on CUDA with a tolerance and without settings.certify: islands_above alone */
 } sadmm_step_report;
 
-/* The report of the last step (zeroed before the first). */
+/* The report of the last step (zeroed before the first). Waits for steps; errors: those of the steps waited for. */
 SADMM_API sadmm_status sadmm_world_report(sadmm_world *world, sadmm_step_report *report);
 
 typedef struct sadmm_contact {
@@ -239,15 +258,16 @@ typedef struct sadmm_contact {
     uint32_t feature;     /* id of the touching features, stable from step to step within a shape pair */
 } sadmm_contact;
 
-/* Contacts of the last step that was done, 0 where there was none, world is NULL, or something was removed since. A step
- * that failed changes nothing here; but where a backend keeps the world (CUDA) and the contacts were not read before it,
- * they are lost with it (0). Waits for steps; the error of one is left for the next call that returns a status. */
+/* Contacts of the last step that was done, 0 where there was none, world is NULL, or something was removed since. A
+ * step that failed changes nothing here; but where a backend keeps the world (CUDA) and the contacts were not read
+ * before it, they are lost with it (0). Waits for steps; the error of one is left for the next call that returns a
+ * status. */
 SADMM_API int32_t sadmm_world_contact_count(sadmm_world *world);
-/* Copy contacts [first, first + count) of the last step. Errors: INVALID_ARGUMENT (range). */
+/* Copy contacts [first, first + count) of the last step. Errors: INVALID_ARGUMENT (range), OUT_OF_MEMORY, DEVICE. */
 SADMM_API sadmm_status sadmm_world_contacts(sadmm_world *world, int32_t first, int32_t count, sadmm_contact *contacts);
 
-/* 64-bit hash of all live bodies' poses and velocities (bit patterns, in slot order). Nothing is written after an error.
- * Errors: those of the steps waited for, OUT_OF_MEMORY, DEVICE. */
+/* 64-bit hash of all live bodies' poses and velocities (bit patterns, in slot order). Nothing is written after an
+ * error. Errors: those of the steps waited for, OUT_OF_MEMORY, DEVICE. */
 SADMM_API sadmm_status sadmm_world_state_hash(sadmm_world *world, uint64_t *hash);
 
 /* What the last step ran, what it left out and why, as text lines. Writes at most `size` bytes with the final 0 and

@@ -11,18 +11,19 @@
  *         on a: (-f, -tau)      on b: (f, tau + d x f);
  *   - the pair writes two wrench rows, bodies gather their rows over a CSR list: E is never stored, nothing is added
  *     atomically, and the order of a body's sum does not depend on the threads.
- * Constraints given by rows go into blocks of LANES as well, a row of each of them in a slot, and write the same wrench rows,
- * after the pairs'.
+ * Constraints given by rows go into blocks of LANES as well, a row of each of them in a slot, and write the same wrench
+ * rows, after the pairs'.
  *
- * Bodies have one of two forms, each by itself (cpu_forms.c): where A is (m I, inertia) and all constraints on it are three-row contacts,
- * A + beta C has the 3x3 structure of one rigid body and LANES bodies are updated at once from 23 numbers each; any other
- * body is a general one, with a full 6x6 inverse. Its lane is idle, and it is updated after the lanes by itself.
+ * Bodies have one of two forms, each by itself (cpu_forms.c): where A is (m I, inertia) and all constraints on it are
+ * three-row contacts, A + beta C has the 3x3 structure of one rigid body and LANES bodies are updated at once from 23
+ * numbers each; any other body is a general one, with a full 6x6 inverse. Its lane is idle, and it is updated after the
+ * lanes by itself.
  *
  * An iteration is two sweeps with a barrier after each: bodies (Step 1), constraints (Steps 2-4).
  *
- * The method `fast` has one weight B a constraint in place of beta: it comes in through inv_s and C_i (cpu_weights.c), with
- * beta = 1. Its sweeps pass on changes alone: wrench rows hold J^T d lambda, bodies keep their momentum residual b - A
- * v + J^T lambda up to date (docs/algorithm.md), and both go `relaxation` times as far.
+ * The method `fast` has one weight B a constraint in place of beta: it comes in through inv_s and C_i (cpu_weights.c),
+ * with beta = 1. Its sweeps pass on changes alone: wrench rows hold J^T d lambda, bodies keep their momentum residual b
+ * - A v + J^T lambda up to date (docs/algorithm.md), and both go `relaxation` times as far.
  */
 #ifndef SADMM_CPU_H
 #define SADMM_CPU_H
@@ -44,7 +45,9 @@
 #define CPU(name) SADMM_JOIN(sadmm_cpu_##name, SADMM_VARIANT)
 
 enum { STATE_INV_BETA = 6 }; /* slot of a state row */
-enum { BODY_SUMS = 4 };      /* weights: energy, kinetic, push, momentum residual; limit: now, free, along, momentum residual */
+enum {
+    BODY_SUMS = 4
+}; /* weights: energy, kinetic, push, momentum residual; limit: now, free, along, momentum residual */
 
 /* LANES contact pairs; points of all of them in `slots` slots from `first` on. Lanes without a pair point at the
  * static body; slots without a point have an error so large that lambda stays 0. */
@@ -67,7 +70,8 @@ struct normal_slot { /* 1 row a contact (no friction anywhere) */
     lanes error, lambda;
 };
 
-/* LANES rigid bodies under three-row contacts only; lanes of general bodies are 0 throughout. With n points, S = sum r, Q = sum (|r|^2 I - r r^T):
+/* LANES rigid bodies under three-row contacts only; lanes of general bodies are 0 throughout. With n points, S = sum r,
+ * Q = sum (|r|^2 I - r r^T):
  *     A + beta C = [ alpha I, -beta [S]x; beta [S]x, I + beta Q ],  alpha = m + beta n,
  * and eliminating the linear part leaves K = I + beta Q + beta^2/alpha [S]x[S]x. */
 enum { ALL_LANES = (1 << LANES) - 1 };
@@ -81,8 +85,9 @@ struct body_block {
     vec residual_linear, residual_angular; /* fast: b - A v + J^T lambda */
 };
 
-/* LANES constraints given by rows, all cones or all of scalar rows; rows of all of them in `slots` slots from `first` on. What
- * is not there (a lane without a constraint, a row that is zero on both bodies) has an equation that 0 solves. */
+/* LANES constraints given by rows, all cones or all of scalar rows; rows of all of them in `slots` slots from `first`
+ * on. What is not there (a lane without a constraint, a row that is zero on both bodies) has an equation that 0
+ * solves. */
 struct row_block {
     lanes friction, inv_s; /* of cones, as in pair_block */
     int32_t body_a[LANES], body_b[LANES];
@@ -99,7 +104,8 @@ struct row_slot { /* math/row.h */
     lanes along; /* fast: with n dynamic bodies, B / n has the part along along^T */
 };
 
-/* fast: of a row of the system. B = diag(weight) + along along^T; J A^-1 J^T, and what its multiplier counts for in the load */
+/* fast: of a row of the system. B = diag(weight) + along along^T; J A^-1 J^T, and what its multiplier counts for in the
+ * load */
 struct row_weight {
     double weight, along, response, scale;
 };
@@ -122,15 +128,16 @@ struct sadmm_context {
     struct sadmm_settings settings;
     struct sadmm_barrier barrier;
 
-    /* Bodies; index `bodies` is the static world: state and 1/beta 0, never written. Rows are padded to whole blocks. */
+    /* Bodies; index `bodies` is the static world: state and 1/beta 0, never written. Rows are padded to whole
+     * blocks. */
     int32_t bodies;
     size_t body_block_count;
     real *state;                     /* rows: v, w, 1/beta, 0 */
     double *A, *C;                   /* bodies x PACKED6 */
     double *beta;                    /* bodies, kg */
     struct body_block *body_blocks;  /* unless all bodies are general */
-    /* Of each body its index among the general ones or -1; the general ones, ascending. Of each body block which lanes are general
-     * (bits); where there are some, those behind the last body, too. */
+    /* Of each body its index among the general ones or -1; the general ones, ascending. Of each body block which lanes
+     * are general (bits); where there are some, those behind the last body, too. */
     size_t general_count;
     int32_t *general_of, *general_bodies;
     uint32_t *general_lanes;
@@ -152,7 +159,8 @@ struct sadmm_context {
     struct row_slot *row_slots;
     int32_t *row_order;             /* scratch */
     struct row_weight *row_weights; /* fast; rows of the system */
-    size_t row_block_count, row_slot_count, row_block_capacity, row_slot_capacity, row_order_capacity, row_weight_capacity;
+    size_t row_block_count, row_slot_count, row_block_capacity, row_slot_capacity, row_order_capacity,
+        row_weight_capacity;
 
     /* Wrench rows: record_count rows on a, then as many on b; record: pair lane, or row lane after all pair lanes.
      * `change` holds J^T (lambda - lambda_prev) after a measured iteration, when `wrenches` holds J^T lambda. */
@@ -230,8 +238,8 @@ sadmm_status CPU(assemble_rows)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(init_penalty)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(init_weights)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(update_weights)(struct sadmm_context *, struct sadmm_error *);
-/* A thread's share of what the weight scales of the islands need; then the levels (cpu_weight_scale.c). `wrenches` hold
- * J^T lambda. */
+/* A thread's share of what the weight scales of the islands need; then the weight scales (cpu_weight_scale.c).
+ * `wrenches` hold J^T lambda. */
 void CPU(add_up_imbalance)(struct sadmm_context *, int thread, int threads);
 void CPU(update_weight_scales)(struct sadmm_context *);
 sadmm_status CPU(limit_velocity)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
@@ -272,11 +280,13 @@ void CPU(sweep_bodies_fast)(struct sadmm_context *, int thread, int threads, boo
 void CPU(recompute_residuals)(struct sadmm_context *, size_t begin, size_t end);
 /* Largest entry of A v - b - (sum of wrenches), eq. (17), over a thread's share of the bodies. */
 double CPU(dual_residual)(const struct sadmm_context *, int thread, int threads);
-/* Is a packed A (m I, symmetric inertia), and can the inertia be inverted by its cofactors? World bodies always count as such. */
+/* Is a packed A (m I, symmetric inertia), and can the inertia be inverted by its cofactors? World bodies always count
+ * as such. */
 bool CPU(has_rigid_mass)(const struct sadmm_context *, const double A[PACKED6]);
 /* Which bodies are general (cpu_forms.c); false when memory runs out. */
 bool CPU(find_forms)(struct sadmm_context *);
-/* Constraints given by rows: their lanes (before their number of blocks is used), and their slots. False when memory runs out. */
+/* Constraints given by rows: their lanes (before their number of blocks is used), and their slots. False when memory
+ * runs out. */
 bool CPU(lay_out_rows)(struct sadmm_context *);
 /* The steps of a row block, by beta. */
 void CPU(set_row_steps)(struct sadmm_context *, size_t block);

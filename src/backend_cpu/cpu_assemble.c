@@ -33,7 +33,8 @@ static void set_general(struct sadmm_context *c, size_t i, const double A[36], c
 {
     for (int k = 0; k < ROW; ++k) {
         c->b[i * ROW + (size_t)k] = k < 6 ? (real)b[k] : 0;
-        for (int j = 0; j < 6; ++j) c->A_columns[(i * 6 + (size_t)j) * ROW + (size_t)k] = k < 6 ? (real)A[6 * k + j] : 0;
+        for (int j = 0; j < 6; ++j)
+            c->A_columns[(i * 6 + (size_t)j) * ROW + (size_t)k] = k < 6 ? (real)A[6 * k + j] : 0;
     }
 }
 

@@ -1,6 +1,6 @@
-/* Numbers too small to be normal count as 0 in a thread, for a while: x86 processors take many times as long for them, and an
- * iteration that passes on changes alone arrives there at rest. Elsewhere nothing is done: results differ by numbers of
- * that size at most. */
+/* Numbers too small to be normal count as 0 in a thread, for a while: x86 processors take many times as long for them,
+ * and an iteration that passes on changes alone arrives there at rest. Elsewhere nothing is done: results differ by
+ * numbers of that size at most. */
 #ifndef SADMM_CPU_FLUSH_H
 #define SADMM_CPU_FLUSH_H
 

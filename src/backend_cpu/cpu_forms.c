@@ -1,10 +1,10 @@
-/* Which form each body has: rigid, with LANES others in a body block, or general (cpu.h). It depends on the body alone: on its
- * A, and on whether other constraints than three-row contacts act on it. */
+/* Which form each body has: rigid, with LANES others in a body block, or general (cpu.h). It depends on the body alone:
+ * on its A, and on whether other constraints than three-row contacts act on it. */
 #include "core/base/memory.h"
 #include "cpu.h"
 
-/* The determinant over the product of the moments, 1 for principal axes, is what cofactors lose digits by; moments beyond
- * these could make it overflow. Rods a thousand times as long as thick are within. */
+/* The determinant over the product of the moments, 1 for principal axes, is what cofactors lose digits by; moments
+ * beyond these could make it overflow. Rods a thousand times as long as thick are within. */
 #define LEAST_DETERMINANT 1e-9
 #define LEAST_MOMENT 1e-60
 #define MOST_MOMENT 1e60
@@ -49,9 +49,9 @@ bool CPU(find_forms)(struct sadmm_context *c)
 {
     const size_t n = (size_t)c->bodies, rows = sadmm_row_constraint_count(c->system);
     c->general_count = 0;
-    if (!sadmm_grow((void **)&c->general_of, &c->general_of_capacity, 0, n, sizeof *c->general_of) ||
-        !sadmm_grow((void **)&c->general_bodies, &c->general_body_capacity, 0, n, sizeof *c->general_bodies) ||
-        !sadmm_grow((void **)&c->general_lanes, &c->general_lane_capacity, 0, c->body_block_count, sizeof *c->general_lanes))
+    if (!sadmm_grow(&c->general_of, &c->general_of_capacity, 0, n, sizeof *c->general_of) ||
+        !sadmm_grow(&c->general_bodies, &c->general_body_capacity, 0, n, sizeof *c->general_bodies) ||
+        !sadmm_grow(&c->general_lanes, &c->general_lane_capacity, 0, c->body_block_count, sizeof *c->general_lanes))
         return false;
     for (size_t block = 0; block < c->body_block_count; ++block) c->general_lanes[block] = 0;
     cpu_parallel(c, classify_share, c);
@@ -66,6 +66,7 @@ bool CPU(find_forms)(struct sadmm_context *c)
         c->general_bodies[c->general_count++] = (int32_t)i;
         c->general_lanes[i / (size_t)LANES] |= 1u << (i % (size_t)LANES);
     }
-    for (size_t i = n; i < c->body_block_count * (size_t)LANES; ++i) c->general_lanes[i / (size_t)LANES] |= 1u << (i % (size_t)LANES);
+    for (size_t i = n; i < c->body_block_count * (size_t)LANES; ++i)
+        c->general_lanes[i / (size_t)LANES] |= 1u << (i % (size_t)LANES);
     return true;
 }

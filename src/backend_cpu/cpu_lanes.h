@@ -1,5 +1,5 @@
-/* SIMD lanes by compiler vector extensions (gcc, clang): arithmetic, 3-vectors a lane, and the transposition between rows
- * (a body's or wrench's eight numbers in a row) and lanes (one number of LANES bodies). */
+/* SIMD lanes by compiler vector extensions (gcc, clang): arithmetic, 3-vectors a lane, and the transposition between
+ * rows (a body's or wrench's eight numbers in a row) and lanes (one number of LANES bodies). */
 #ifndef SADMM_CPU_LANES_H
 #define SADMM_CPU_LANES_H
 

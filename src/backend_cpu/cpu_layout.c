@@ -1,4 +1,4 @@
-/* begin: room for the step, pairs into lane blocks, and the body -> record list. */
+/* begin: memory for the step, pairs into lane blocks, and the body -> record list. */
 #include <string.h>
 
 #include "core/base/memory.h"
@@ -72,13 +72,9 @@ static void list_incident(struct sadmm_context *c)
     for (size_t r = 0; r < c->record_count; ++r) {
         record_bodies(c, r, bodies);
         for (int side = 0; side < 2; ++side)
-            if (bodies[side] >= 0) c->incident[offsets[bodies[side] + 1]++] = (int32_t)(r + (side ? c->record_count : 0));
+            if (bodies[side] >= 0)
+                c->incident[offsets[bodies[side] + 1]++] = (int32_t)(r + (side ? c->record_count : 0));
     }
-}
-
-static bool grow(void *array, size_t *capacity, size_t needed, size_t size)
-{
-    return sadmm_grow((void **)array, capacity, 0, needed, size);
 }
 
 sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *system, const struct sadmm_plan *plan,
@@ -102,37 +98,43 @@ sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *syst
     c->body_block_count = (n + LANES - 1) / LANES;
     if (!CPU(find_forms)(c)) return sadmm_fail_memory(error, "the cpu backend's bodies");
     size_t rows = c->body_block_count * (size_t)LANES + 1, general = c->general_count;
-    bool ok = grow(&c->state, &c->state_capacity, rows * ROW, sizeof(real)) &&
-              grow(&c->A, &c->A_capacity, n * PACKED6, sizeof(double)) &&
-              grow(&c->C, &c->C_capacity, n * PACKED6, sizeof(double)) &&
-              grow(&c->beta, &c->beta_capacity, n, sizeof(double)) &&
-              grow(&c->body_blocks, &c->body_block_capacity, general < n ? c->body_block_count : 0,
+    bool ok = sadmm_grow_empty(&c->state, &c->state_capacity, rows * ROW, sizeof(real)) &&
+              sadmm_grow_empty(&c->A, &c->A_capacity, n * PACKED6, sizeof(double)) &&
+              sadmm_grow_empty(&c->C, &c->C_capacity, n * PACKED6, sizeof(double)) &&
+              sadmm_grow_empty(&c->beta, &c->beta_capacity, n, sizeof(double)) &&
+              sadmm_grow_empty(&c->body_blocks, &c->body_block_capacity, general < n ? c->body_block_count : 0,
                    sizeof *c->body_blocks) &&
-              grow(&c->b, &c->b_capacity, general * ROW, sizeof(real)) &&
-              grow(&c->A_columns, &c->A_column_capacity, general * 6 * ROW, sizeof(real)) &&
-              grow(&c->H_columns, &c->H_column_capacity, general * 6 * ROW, sizeof(real)) &&
-              grow(&c->momentum_residuals, &c->momentum_residual_capacity, c->fast ? general * ROW : 0, sizeof(real)) &&
-              grow(&c->pair_order, &c->pair_order_capacity, (size_t)plan->pairs, sizeof(int32_t)) &&
-              grow(&c->pair_blocks, &c->pair_block_capacity, c->pair_block_count, sizeof *c->pair_blocks) &&
-              grow(&c->wrenches, &c->wrench_capacity, 2 * c->record_count * ROW, sizeof(real)) &&
+              sadmm_grow_empty(&c->b, &c->b_capacity, general * ROW, sizeof(real)) &&
+              sadmm_grow_empty(&c->A_columns, &c->A_column_capacity, general * 6 * ROW, sizeof(real)) &&
+              sadmm_grow_empty(&c->H_columns, &c->H_column_capacity, general * 6 * ROW, sizeof(real)) &&
+              sadmm_grow_empty(&c->momentum_residuals, &c->momentum_residual_capacity, c->fast ? general * ROW : 0,
+                               sizeof(real)) &&
+              sadmm_grow_empty(&c->pair_order, &c->pair_order_capacity, (size_t)plan->pairs, sizeof(int32_t)) &&
+              sadmm_grow_empty(&c->pair_blocks, &c->pair_block_capacity, c->pair_block_count, sizeof *c->pair_blocks) &&
+              sadmm_grow_empty(&c->wrenches, &c->wrench_capacity, 2 * c->record_count * ROW, sizeof(real)) &&
               (!plan->residuals || c->fast ||
-               grow(&c->change, &c->change_capacity, 2 * c->record_count * ROW, sizeof(real))) &&
-              grow(&c->offsets, &c->offsets_capacity, n + 2, sizeof(int32_t)) &&
-              grow(&c->incident, &c->incident_capacity, 2 * c->record_count, sizeof(int32_t)) &&
-              (!c->fast || (grow(&c->label, &c->label_capacity, n, sizeof(int32_t)) &&
-                            grow(&c->islands, &c->island_capacity, n, sizeof *c->islands) &&
-                            grow(&c->body_sums, &c->body_sum_capacity, BODY_SUMS * n, sizeof(double)) &&
-                            grow(&c->A_inverse, &c->A_inverse_capacity, n * PACKED6, sizeof(double)) &&
-                            grow(&c->pair_response, &c->pair_response_capacity, c->record_count, sizeof(double)) &&
-                            grow(&c->pair_weight, &c->pair_weight_capacity, c->record_count, sizeof(double)) &&
-                            grow(&c->pair_violation, &c->pair_violation_capacity, c->record_count, sizeof(double)))) &&
-              grow(&c->thread_max, &c->thread_max_capacity, (size_t)plan->threads * THREAD_MAX_STRIDE, sizeof(double));
+               sadmm_grow_empty(&c->change, &c->change_capacity, 2 * c->record_count * ROW, sizeof(real))) &&
+              sadmm_grow_empty(&c->offsets, &c->offsets_capacity, n + 2, sizeof(int32_t)) &&
+              sadmm_grow_empty(&c->incident, &c->incident_capacity, 2 * c->record_count, sizeof(int32_t)) &&
+              (!c->fast || (sadmm_grow_empty(&c->label, &c->label_capacity, n, sizeof(int32_t)) &&
+                            sadmm_grow_empty(&c->islands, &c->island_capacity, n, sizeof *c->islands) &&
+                            sadmm_grow_empty(&c->body_sums, &c->body_sum_capacity, BODY_SUMS * n, sizeof(double)) &&
+                            sadmm_grow_empty(&c->A_inverse, &c->A_inverse_capacity, n * PACKED6, sizeof(double)) &&
+                            sadmm_grow_empty(&c->pair_response, &c->pair_response_capacity, c->record_count,
+                                             sizeof(double)) &&
+                            sadmm_grow_empty(&c->pair_weight, &c->pair_weight_capacity, c->record_count,
+                                             sizeof(double)) &&
+                            sadmm_grow_empty(&c->pair_violation, &c->pair_violation_capacity, c->record_count,
+                                             sizeof(double)))) &&
+              sadmm_grow_empty(&c->thread_max, &c->thread_max_capacity, (size_t)plan->threads * THREAD_MAX_STRIDE,
+                               sizeof(double));
     if (!ok) return sadmm_fail_memory(error, "the cpu backend's step");
     order_pairs(c);
     count_slots(c);
     size_t slot_size = plan->contact_rows == 1 ? sizeof(struct normal_slot) : sizeof(struct point_slot);
     size_t slot_bytes = c->slot_count * slot_size;
-    if (!grow(&c->slots, &c->slot_capacity, slot_bytes, 1)) return sadmm_fail_memory(error, "the cpu backend's contacts");
+    if (!sadmm_grow_empty(&c->slots, &c->slot_capacity, slot_bytes, 1))
+        return sadmm_fail_memory(error, "the cpu backend's contacts");
     list_incident(c);
     return SADMM_OK;
 }

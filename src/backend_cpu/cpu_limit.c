@@ -87,7 +87,7 @@ static void energies_share(void *context, int thread, int threads)
     for (size_t i = begin; i < end; ++i) energies(c, i, &c->body_sums[BODY_SUMS * i]);
 }
 
-static void defects_share(void *context, int thread, int threads)
+static void momentum_residuals_share(void *context, int thread, int threads)
 {
     struct sadmm_context *c = (struct sadmm_context *)context;
     size_t begin, end;
@@ -103,7 +103,7 @@ sadmm_status CPU(limit_velocity)(struct sadmm_context *c, int32_t *limited, stru
     cpu_parallel(c, energies_share, c);
     if (!any_suspect(c, under_iterated)) return SADMM_OK;
     CPU(sum_wrenches)(c);
-    cpu_parallel(c, defects_share, c);
+    cpu_parallel(c, momentum_residuals_share, c);
     add_residuals_and_work(c);
     for (int32_t i = 0; i < c->bodies; ++i) {
         const struct cpu_island *island = &c->islands[c->label[i]];

@@ -1,7 +1,7 @@
 /* Kernels E-H and P: C_i (14), beta_i (13), (15), and the factor of A_i + beta_i C_i.
  *
- * In double whatever the precision, from the system's raw data: it runs a few times a step, and H only preconditions (the
- * fixed point of Step 1 does not depend on it). Each body gathers over its own constraints. */
+ * In double whatever the precision, from the system's raw data: it runs a few times a step, and H only preconditions
+ * (the fixed point of Step 1 does not depend on it). Each body gathers over its own constraints. */
 #include <string.h>
 
 #include "core/math/dense6.h"
@@ -106,7 +106,8 @@ static void factorize_general(struct sadmm_context *c, size_t i, size_t general)
     int at = 0;
     for (int r = 0; r < 6; ++r)
         for (int k = 0; k <= r; ++k, ++at) M[6 * r + k] = M[6 * k + r] = A[at] + c->beta[i] * C[at];
-    /* A is positive definite; only a beta C some 1e15 times larger can lose it to rounding: precondition by the diagonal. */
+    /* A is positive definite; only a beta C some 1e15 times larger can lose it to rounding: precondition by the
+     * diagonal. */
     if (!dense6_cholesky(M, L)) {
         memset(L, 0, sizeof L);
         for (int k = 0; k < 6; ++k) L[7 * k] = sqrt(M[7 * k]);

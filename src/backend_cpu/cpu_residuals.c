@@ -1,5 +1,5 @@
-/* The method `fast`: what the momentum of bodies misses, r = b - A v + J^T lambda, before iterations change it by what v and
- * lambda change. In double, from this precision's b, v and lambda, in the order of a body's records. */
+/* The method `fast`: what the momentum of bodies misses, r = b - A v + J^T lambda, before iterations change it by what
+ * v and lambda change. In double, from this precision's b, v and lambda, in the order of a body's records. */
 #include "core/math/violation.h"
 #include "cpu_rows.h"
 

@@ -1,5 +1,5 @@
-/* Constraints given by rows: which lane each has, and kernels C and D, their rows from the system's doubles into this precision's
- * slots. */
+/* Constraints given by rows: which lane each has, and kernels C and D, their rows from the system's doubles into this
+ * precision's slots. */
 #include "core/base/memory.h"
 #include "core/math/contact.h"
 #include "core/math/row.h"
@@ -49,9 +49,9 @@ bool CPU(lay_out_rows)(struct sadmm_context *c)
     for (size_t k = 0; k < count; ++k) cones += constraint_of(c, (int32_t)k)->cone;
     const size_t padded = whole_lanes(cones) + whole_lanes(count - cones);
     c->row_block_count = padded / (size_t)LANES;
-    if (!sadmm_grow((void **)&c->row_order, &c->row_order_capacity, 0, padded + count, sizeof *c->row_order) ||
-        !sadmm_grow((void **)&c->row_blocks, &c->row_block_capacity, 0, c->row_block_count, sizeof *c->row_blocks) ||
-        (c->fast && !sadmm_grow((void **)&c->row_weights, &c->row_weight_capacity, 0, c->system->rows->row_count,
+    if (!sadmm_grow(&c->row_order, &c->row_order_capacity, 0, padded + count, sizeof *c->row_order) ||
+        !sadmm_grow(&c->row_blocks, &c->row_block_capacity, 0, c->row_block_count, sizeof *c->row_blocks) ||
+        (c->fast && !sadmm_grow(&c->row_weights, &c->row_weight_capacity, 0, c->system->rows->row_count,
                                 sizeof *c->row_weights)))
         return false;
     order_rows(c, cones, count - cones);
@@ -63,11 +63,12 @@ bool CPU(lay_out_rows)(struct sadmm_context *c)
         for (int l = 0; l < LANES; ++l) {
             int32_t index = c->row_order[k * (size_t)LANES + (size_t)l];
             block->constraint[l] = index;
-            if (index >= 0 && constraint_of(c, index)->count > block->slots) block->slots = constraint_of(c, index)->count;
+            if (index >= 0 && constraint_of(c, index)->count > block->slots)
+                block->slots = constraint_of(c, index)->count;
         }
         c->row_slot_count += (size_t)block->slots;
     }
-    return sadmm_grow((void **)&c->row_slots, &c->row_slot_capacity, 0, c->row_slot_count, sizeof *c->row_slots);
+    return sadmm_grow(&c->row_slots, &c->row_slot_capacity, 0, c->row_slot_count, sizeof *c->row_slots);
 }
 
 /* A row that is not there: its equation, x = 0 with x = 0, has the solution 0. */

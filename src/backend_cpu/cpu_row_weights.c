@@ -8,8 +8,8 @@ static struct row_weight *weights_of(struct sadmm_context *c, const struct row_b
     return c->row_weights + c->system->rows->constraints[block->constraint[l]].first;
 }
 
-/* Of every row; and what a row's multiplier counts for in the load of its constraint: a row that pushes by how much, a row that
- * only turns by the push that would take as much energy. */
+/* Of every row; and what a row's multiplier counts for in the load of its constraint: a row that pushes by how much, a
+ * row that only turns by the push that would take as much energy. */
 static void respond(struct sadmm_context *c, const struct row_block *block, int l)
 {
     const int32_t bodies[2] = {block->body_a[l], block->body_b[l]};

@@ -1,6 +1,7 @@
 /* Step 1 (kernels I-K), eq. (6) in the reduced form: v <- v + (A + beta C)^-1 (b - A v + sum of wrenches).
  *
- * The method `fast` keeps r = b - A v + J^T lambda of each body, and its wrenches are J^T d lambda, d lambda = lambda^ - lambda:
+ * The method `fast` keeps r = b - A v + J^T lambda of each body, and its wrenches are J^T d lambda, d lambda = lambda^
+ * - lambda:
  *     d v = (A + C)^-1 (r + 2 sum of wrenches),   v += rho d v,   r += rho (sum of wrenches) - A (what v has gone by)
  * Everything on the right goes to 0, and so does its rounding. */
 #include "cpu.h"
@@ -38,8 +39,8 @@ static inline __attribute__((always_inline)) void load_block(const row8 *rows, c
 #undef SUM_ROW
 }
 
-/* Sums of a block some of whose lanes are general bodies', which are updated by themselves: 0 there. Not inlined: what follows the
- * sums must be one piece of code for all blocks, or compilers may fuse products differently in two. */
+/* Sums of a block some of whose lanes are general bodies', which are updated by themselves: 0 there. Not inlined: what
+ * follows the sums must be one piece of code for all blocks, or compilers may fuse products differently in two. */
 static __attribute__((noinline)) void mixed_block_sums(const struct sadmm_context *c, size_t index, row8 sums[LANES])
 {
     const uint32_t general = c->general_lanes[index];
@@ -48,7 +49,8 @@ static __attribute__((noinline)) void mixed_block_sums(const struct sadmm_contex
 }
 
 /* Sums of a block's bodies. */
-static inline __attribute__((always_inline)) void block_sums(const struct sadmm_context *c, size_t index, row8 sums[LANES])
+static inline __attribute__((always_inline)) void block_sums(const struct sadmm_context *c, size_t index,
+                                                             row8 sums[LANES])
 {
     if (c->general_lanes[index]) mixed_block_sums(c, index, sums);
     else

@@ -1,5 +1,5 @@
-/* Steps 2-4 (kernels L-N) of geometric contacts, LANES pairs at a time. Written once, specialised at compile time by the
- * number of contact rows and by what the sweep is for. */
+/* Steps 2-4 (kernels L-N) of geometric contacts, LANES pairs at a time. Written once, specialised at compile time by
+ * the number of contact rows and by what the sweep is for. */
 #include "cpu.h"
 
 /* What a pair adds up over its points: force and torque about a, of lambda-like vectors. */
@@ -13,8 +13,8 @@ static inline void add_to(struct pair_sum *sum, vec arm, vec impulse)
     sum->torque = add(sum->torque, cross(arm, impulse));
 }
 
-static inline void write_wrenches(const struct sadmm_context *c, real *wrenches, size_t block, const struct pair_sum *sum,
-                                  vec d)
+static inline void write_wrenches(const struct sadmm_context *c, real *wrenches, size_t block,
+                                  const struct pair_sum *sum, vec d)
 {
     vec f = sum->force, ta = sum->torque, tb = add(ta, cross(d, f));
     size_t record = block * (size_t)LANES;

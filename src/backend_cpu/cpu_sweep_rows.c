@@ -1,5 +1,5 @@
-/* Steps 2-4 of constraints given by rows, LANES of them at a time. Written once, specialised at compile time by the law and by what
- * the sweep is for. */
+/* Steps 2-4 of constraints given by rows, LANES of them at a time. Written once, specialised at compile time by the law
+ * and by what the sweep is for. */
 #include "cpu.h"
 
 /* What rows add to the wrenches of their two bodies. */
@@ -15,7 +15,8 @@ static inline void add_row(struct row_sum *sum, const struct row_slot *slot, lan
     }
 }
 
-static inline void write_wrenches(const struct sadmm_context *c, real *wrenches, size_t index, const struct row_sum *sum)
+static inline void write_wrenches(const struct sadmm_context *c, real *wrenches, size_t index,
+                                  const struct row_sum *sum)
 {
     size_t record = (c->pair_block_count + index) * (size_t)LANES;
     store_rows(wrenches + record * ROW, sum->on_a);

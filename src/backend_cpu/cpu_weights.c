@@ -1,8 +1,8 @@
 /* Kernels E-G of the method `fast`: one weight a constraint (math/weight.h), shared by the points of a pair, and
  * C_i = sum J^T B J. beta is 1 then, so that factor and Step 1 are those of the method `paper`.
  *
- * In double from the system's raw data; only the impulses are in this precision. Sums over a body go in the order of its
- * records, sums over an island in the order of bodies. */
+ * In double from the system's raw data; only the impulses are in this precision. Sums over a body go in the order of
+ * its records, sums over an island in the order of bodies. */
 #include "core/math/dense6.h"
 #include "core/model/islands.h"
 #include "core/math/weight.h"
@@ -29,7 +29,8 @@ static void invert(const struct sadmm_context *c, const double A[PACKED6], doubl
 }
 
 /* Sums over a pair's points on one of its bodies: of arms where contacts have three rows, else of J^T J. */
-static void pair_arms(const struct sadmm_context *c, const struct sadmm_contact_pair *pair, int side, struct arm_sums *sums)
+static void pair_arms(const struct sadmm_context *c, const struct sadmm_contact_pair *pair, int side,
+                      struct arm_sums *sums)
 {
     memset(sums, 0, sizeof *sums);
     for (int k = 0; k < pair->count; ++k) {
@@ -147,8 +148,9 @@ static void ease_gaps(struct sadmm_context *c, size_t index)
         const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[block->pair[l]];
         double share = weight_gap_share(cpu_island_of(c, pair->body_a, pair->body_b)->stack_depth);
         for (int k = 0; k < pair->count && share < 1; ++k) {
-            real *error = c->plan.contact_rows == 3 ? (real *)&((struct point_slot *)c->slots + block->first + k)->error
-                                                    : (real *)&((struct normal_slot *)c->slots + block->first + k)->error;
+            real *error = c->plan.contact_rows == 3
+                              ? (real *)&((struct point_slot *)c->slots + block->first + k)->error
+                              : (real *)&((struct normal_slot *)c->slots + block->first + k)->error;
             error[l] = (real)weight_gap_error((double)error[l], share, slop);
         }
     }

@@ -26,8 +26,8 @@ static sadmm_status begin(struct sadmm_context *c, const struct sadmm_system *sy
 {
     size_t bodies = (size_t)system->body_count;
     size_t constraints = system->contacts->point_count + sadmm_row_constraint_count(system);
-    if (!sadmm_grow((void **)&c->bodies, &c->body_capacity, 0, bodies, sizeof *c->bodies) ||
-        !sadmm_grow((void **)&c->constraints, &c->constraint_capacity, 0, constraints, sizeof *c->constraints))
+    if (!sadmm_grow(&c->bodies, &c->body_capacity, 0, bodies, sizeof *c->bodies) ||
+        !sadmm_grow(&c->constraints, &c->constraint_capacity, 0, constraints, sizeof *c->constraints))
         return sadmm_fail_memory(error, "the literal backend");
     c->system = system;
     c->plan = plan;
@@ -119,7 +119,8 @@ static sadmm_status iterate(struct sadmm_context *c, int count, bool measure, st
     return status;
 }
 
-static sadmm_status measure_residuals(struct sadmm_context *c, struct sadmm_residual *residual, struct sadmm_error *error)
+static sadmm_status measure_residuals(struct sadmm_context *c, struct sadmm_residual *residual,
+                                      struct sadmm_error *error)
 {
     return is_fast(c) ? sadmm_ref_measure_fast(c, residual) : sadmm_ref_measure_residuals(c, residual, error);
 }

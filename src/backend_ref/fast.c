@@ -1,8 +1,8 @@
-/* The method `fast` (docs/algorithm.md, section 7) written down plainly: a dense weight B a constraint, C_i = sum J^T B J,
- * and the relaxed iteration in (v, lambda). As the rest of this backend it takes nothing from the fast ones: rows are
- * those of the literal Jacobians, islands are found by passing labels on, inverses by dense factors.
+/* The method `fast` (docs/algorithm.md, section 7) written down plainly: a dense weight B a constraint, C_i = sum J^T B
+ * J, and the relaxed iteration in (v, lambda). As the rest of this backend it takes nothing from the fast ones: rows
+ * are those of the literal Jacobians, islands are found by passing labels on, inverses by dense factors.
  *
- * u = -lambda is kept in the sides, where recover_wrenches looks for it. */
+ * u = -lambda is kept in the sides, where recover_wrenches reads it. */
 #include <string.h>
 
 #include "core/math/dense6.h"
@@ -78,7 +78,8 @@ static void add_impulse(const struct ref_constraint *constraint, int side, doubl
         for (int j = 0; j < 6; ++j) impulse[j] += constraint->side[side].J[6 * r + j] * constraint->lambda[r];
 }
 
-/* Sums over the bodies of every island, kept at the body that names it; `count` constraints from `first` on act as one. */
+/* Sums over the bodies of every island, kept at the body that names it; `count` constraints from `first` on act as
+ * one. */
 static void add_up_group(struct sadmm_context *c, size_t first, size_t count)
 {
     for (int s = 0; s < 2; ++s) {
@@ -195,7 +196,8 @@ static void update_weight_scales(struct sadmm_context *c)
     for (int32_t i = 0; i < c->system->body_count; ++i)
         c->bodies[c->bodies[i].label].island_residual += inverse_form(&c->bodies[i], c->bodies[i].impulse);
     for (size_t p = 0; p < contacts->pair_count; ++p)
-        island_of(c, &c->constraints[contacts->pairs[p].first])->island_violation += pair_violation(c, &contacts->pairs[p]);
+        island_of(c, &c->constraints[contacts->pairs[p].first])->island_violation +=
+            pair_violation(c, &contacts->pairs[p]);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *island = &c->bodies[i];
         if (island->label != i || island->rows) continue;
@@ -228,7 +230,8 @@ static void weigh_pair(struct sadmm_context *c, const struct sadmm_contact_pair 
     }
 }
 
-/* share lambda lambda^T + phi / w: of the rows that may be coupled in full, of others the diagonal, of a contact a scalar. */
+/* share lambda lambda^T + phi / w: of the rows that may be coupled in full, of others the diagonal, of a contact a
+ * scalar. */
 static void weigh_constraint(struct sadmm_context *c, struct ref_constraint *constraint)
 {
     const double *lambda = constraint->lambda;
@@ -348,7 +351,8 @@ static void solve_multiplier(const struct sadmm_context *c, const struct ref_con
             for (int q = 0; q < constraint->rows; ++q)
                 step += constraint->B[6 * r + q] * (x[q] + constraint->e[q]) / n;
         else
-            step = row_residual(constraint->gain[r], constraint->e[r], constraint->compliance[r], x[r], constraint->lambda[r]) /
+            step = row_residual(constraint->gain[r], constraint->e[r], constraint->compliance[r], x[r],
+                                constraint->lambda[r]) /
                    (constraint->compliance[r] + constraint->gain[r] * n / constraint->B[7 * r]);
         out[r] = fmin(fmax(constraint->lambda[r] - step, constraint->lo[r]), constraint->hi[r]);
     }

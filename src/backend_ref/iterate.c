@@ -91,7 +91,8 @@ static void solve_lambda(struct ref_constraint *constraint, const double sum[6],
         return;
     }
     for (int r = 0; r < constraint->rows; ++r) { /* math/row.h with x = sum + s lambda */
-        double alone = -(constraint->e[r] + constraint->gain[r] * sum[r]) / (constraint->compliance[r] + constraint->gain[r] * s);
+        double alone =
+            -(constraint->e[r] + constraint->gain[r] * sum[r]) / (constraint->compliance[r] + constraint->gain[r] * s);
         lambda[r] = constraint->free_row[r] ? 0 : fmin(fmax(alone, constraint->lo[r]), constraint->hi[r]);
     }
 }

@@ -1,10 +1,10 @@
 /* Comparing backends with the literal one (ref, f64) on a scene.
  *
- * Three comparisons. "Run": every table simulates the scene on its own and its states are compared with ref's after every
- * step; contact detection and everything else is included, and differences feed on themselves. "One step": the contact
- * problems of some of ref's steps are frozen and every table solves the same problem with the same number of
- * iterations, so that a difference can only come from the solver. "Kernels": of these problems every kernel from assembly to
- * Step 4 runs once, from identical inputs, so that nothing has been amplified.
+ * Three comparisons. "Run": every table simulates the scene on its own and its states are compared with ref's after
+ * every step; contact detection and everything else is included, and differences feed on themselves. "One step": the
+ * contact problems of some of ref's steps are frozen and every table solves the same problem with the same number of
+ * iterations, so that a difference can only come from the solver. "Kernels": of these problems every kernel from
+ * assembly to Step 4 runs once, from identical inputs, so that nothing has been amplified.
  */
 #ifndef SADMM_CLI_CHECK_RUNS_H
 #define SADMM_CLI_CHECK_RUNS_H

@@ -54,7 +54,8 @@ bool cli_read_backend(const char *option, const char *text, sadmm_backend *out);
 bool cli_read_precision(const char *option, const char *text, sadmm_precision *out);
 bool cli_read_method(const char *option, const char *text, sadmm_method *out);
 
-/* The name of an output, "-" where none is given. False when the option was given before: nothing is dropped in silence. */
+/* The name of an output, "-" where none is given. False when the option was given before: nothing is dropped in
+ * silence. */
 bool cli_read_output(const char *option, const char *text, const char **out);
 
 const char *cli_backend_name(sadmm_backend backend);

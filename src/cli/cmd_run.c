@@ -15,7 +15,8 @@
 
 enum {
     OPTION_BACKEND, OPTION_DEVICE, OPTION_PRECISION, OPTION_STEPS, OPTION_DT, OPTION_METHOD, OPTION_ITERATIONS,
-    OPTION_TOLERANCE, OPTION_CHECK_PERIOD, OPTION_PENALTY_PERIOD, OPTION_THREADS, OPTION_NO_WARM_START, OPTION_CERTIFY, OPTION_EXPLAIN, OPTION_JSON, OPTION_TRACE, OPTION_DUMP,
+    OPTION_TOLERANCE, OPTION_CHECK_PERIOD, OPTION_PENALTY_PERIOD, OPTION_THREADS, OPTION_NO_WARM_START, OPTION_CERTIFY,
+    OPTION_EXPLAIN, OPTION_JSON, OPTION_TRACE, OPTION_DUMP,
     OPTION_QUIET
 };
 
@@ -28,7 +29,7 @@ static const struct cli_option options[] = {
     [OPTION_METHOD] = {"method", "NAME", "paper or fast (default fast)"},
     [OPTION_ITERATIONS] = {"iterations", "N", "iterations a step (default the scene's for the method)"},
     [OPTION_TOLERANCE] = {"tolerance", "T", "end a step's iterations once its true error is below T, m/s (default never)"},
-    [OPTION_CHECK_PERIOD] = {"check-period", "N", "iterations between looks at that (default 10)"},
+    [OPTION_CHECK_PERIOD] = {"check-period", "N", "iterations between convergence checks (default 10)"},
     [OPTION_PENALTY_PERIOD] = {"penalty-period", "N", "paper: iterations between penalty updates, 0 = never"},
     [OPTION_THREADS] = {"threads", "N", "CPU threads at most, 0 = as many as pay (default)"},
     [OPTION_NO_WARM_START] = {"no-warm-start", NULL, "start every step from zero impulses"},
@@ -36,7 +37,8 @@ static const struct cli_option options[] = {
     [OPTION_EXPLAIN] = {"explain", NULL, "say what the last step ran, what it left out and why"},
     [OPTION_JSON] = {"json", "[FILE|-]", "write JSON to FILE, or to standard output (-, the default)"},
     [OPTION_TRACE] = {"trace", "FILE", "write every body's state after every step as CSV (-: to standard output)"},
-    [OPTION_DUMP] = {"dump-problem", "STEP:FILE", "write the contact problem of a step (1: the first) as FCLIB HDF5; up to 16"},
+    [OPTION_DUMP] = {"dump-problem", "STEP:FILE",
+                     "write the contact problem of a step (1: the first) as FCLIB HDF5; up to 16"},
     [OPTION_QUIET] = {"quiet", NULL, "no progress, no table"},
 };
 

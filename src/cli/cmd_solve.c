@@ -8,7 +8,8 @@
 #include "solve_loop.h"
 
 enum {
-    OPTION_BACKEND, OPTION_PRECISION, OPTION_METHOD, OPTION_TOLERANCE, OPTION_MAX_ITERATIONS, OPTION_CHECK_PERIOD, OPTION_LEVEL,
+    OPTION_BACKEND, OPTION_PRECISION, OPTION_METHOD, OPTION_TOLERANCE, OPTION_MAX_ITERATIONS, OPTION_CHECK_PERIOD,
+    OPTION_OFFSET,
     OPTION_MASS_FACTOR, OPTION_PENALTY_PERIOD, OPTION_THREADS, OPTION_SOLUTION, OPTION_JSON, OPTION_QUIET
 };
 
@@ -18,8 +19,8 @@ static const struct cli_option options[] = {
     [OPTION_METHOD] = {"method", "NAME", "paper or fast (default fast)"},
     [OPTION_TOLERANCE] = {"tolerance", "T", "of siconos' measure (default 1e-8; f32: 1e-6)"},
     [OPTION_MAX_ITERATIONS] = {"max-iterations", "N", "give up after (default 100000)"},
-    [OPTION_CHECK_PERIOD] = {"check-period", "N", "iterations between looks at the error (default 100)"},
-    [OPTION_LEVEL] = {"penalty-offset", "KG", "paper: c of eq. (13), kg (default: tried from the mean mass)"},
+    [OPTION_CHECK_PERIOD] = {"check-period", "N", "iterations between convergence checks (default 100)"},
+    [OPTION_OFFSET] = {"penalty-offset", "KG", "paper: c of eq. (13), kg (default: tried from the mean mass)"},
     [OPTION_MASS_FACTOR] = {"penalty-mass-factor", "M", "paper: M of eq. (13) (default 0)"},
     [OPTION_PENALTY_PERIOD] = {"penalty-period", "N", "paper: iterations between updates, 0 = never (default 30)"},
     [OPTION_THREADS] = {"threads", "N", "CPU threads at most, 0 = as many as pay (default)"},
@@ -48,7 +49,7 @@ static int set_option(void *target, size_t index, const char *value)
     struct solve_options *o = target;
     sadmm_settings *s = &o->plan.settings;
     bool ok = true;
-    if (index == OPTION_LEVEL || index == OPTION_MASS_FACTOR || index == OPTION_PENALTY_PERIOD)
+    if (index == OPTION_OFFSET || index == OPTION_MASS_FACTOR || index == OPTION_PENALTY_PERIOD)
         o->penalty = options[index].name;
     switch (index) {
     case OPTION_BACKEND: ok = cli_read_backend("--backend", value, &o->plan.backend); break;
@@ -62,7 +63,7 @@ static int set_option(void *target, size_t index, const char *value)
         ok = cli_read_int("--max-iterations", value, 1, 1000000000, &o->plan.max_iterations);
         break;
     case OPTION_CHECK_PERIOD: ok = read_small_int("--check-period", value, 1, 1000000, &o->plan.batch); break;
-    case OPTION_LEVEL: ok = cli_read_real("--penalty-offset", value, 1e-12, 1e12, &o->plan.level); break;
+    case OPTION_OFFSET: ok = cli_read_real("--penalty-offset", value, 1e-12, 1e12, &o->plan.offset); break;
     case OPTION_MASS_FACTOR:
         ok = cli_read_real("--penalty-mass-factor", value, 0, 1e12, &s->penalty_mass_factor);
         break;
@@ -102,8 +103,8 @@ static json_t *penalty_json(const struct solve_options *o, const struct solve_ou
     if (o->plan.settings.method != SADMM_METHOD_PAPER) return json_null();
     json_t *penalty = json_object();
     json_object_set_new(penalty, "mass_factor", cli_json_real(o->plan.settings.penalty_mass_factor));
-    json_object_set_new(penalty, "offset_kg", cli_json_real(out->level));
-    json_object_set_new(penalty, "offsets_tried", json_integer(out->levels_tried));
+    json_object_set_new(penalty, "offset_kg", cli_json_real(out->offset));
+    json_object_set_new(penalty, "offsets_tried", json_integer(out->offsets_tried));
     json_object_set_new(penalty, "period", json_integer(o->plan.settings.penalty_period));
     return penalty;
 }
@@ -157,7 +158,7 @@ static void print_outcome(const char *path, const struct solve_options *o, const
                            : "NOT converged",
            out->iterations, out->ms, cli_method_name(o->plan.settings.method));
     if (o->plan.settings.method == SADMM_METHOD_PAPER)
-        printf(", penalty offset %.3g kg, %d tried", out->level, out->levels_tried);
+        printf(", penalty offset %.3g kg, %d tried", out->offset, out->offsets_tried);
     printf(")\n");
     printf("siconos        %.3g (tolerance %g)\n", c->siconos, o->plan.tolerance);
     printf("certificate    ncp %.3g m/s at most, %.3g mean; momentum %.3g\n", c->ncp_max, c->ncp_mean, c->momentum_max);

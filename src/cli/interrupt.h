@@ -1,7 +1,7 @@
 /* Being asked to end: SIGINT (Ctrl-C) and SIGTERM.
  *
- * A run that looks at `interrupted` ends in order at the first of them, with what it has, and exits with 128 plus the
- * signal's number (130, 143). A second one ends it at once, as the first does where nobody looks, and as SIGHUP and
+ * A run that checks `interrupted` ends in order at the first of them, with what it has, and exits with 128 plus the
+ * signal's number (130, 143). A second one ends it at once, as the first does where nobody checks, and as SIGHUP and
  * SIGPIPE do; also then no half-written file is left behind (output.h).
  */
 #ifndef SADMM_CLI_INTERRUPT_H
@@ -10,7 +10,7 @@
 /* At the start of main. A signal that is ignored stays so. */
 void interrupts_begin(void);
 
-/* From now on somebody looks. */
+/* From now on the program checks `interrupted`. */
 void interrupts_expect(void);
 
 /* The signal that asked, or 0. */

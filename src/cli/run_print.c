@@ -126,7 +126,8 @@ void run_record_print(const struct run_record *record, const char *spec, const s
     const sadmm_step_report *last = &record->last;
     const sadmm_certificate *c = &last->certificate;
     printf("scene          %s, %zu bodies\n", spec, record->body_count);
-    printf("steps          %zu of %g s%s\n", record->steps, scene->def.settings.dt, interrupted() ? ", interrupted" : "");
+    printf("steps          %zu of %g s%s\n", record->steps, scene->def.settings.dt,
+           interrupted() ? ", interrupted" : "");
     if (record->steps > 0) {
         printf("backend        %s %s, %d thread%s, %d iterations a step (%s)\n", cli_backend_name(last->backend),
                cli_precision_name(last->precision), last->threads, last->threads == 1 ? "" : "s",
@@ -147,13 +148,15 @@ void run_record_print(const struct run_record *record, const char *spec, const s
         printf("certificate    ncp %.3g m/s (largest of the run %.3g), momentum %.3g (%.3g)\n", c->ncp_max,
                record->ncp_max, c->momentum_max, record->momentum_max);
     if (record->steps > 0 && scene->def.settings.certificate_tolerance > 0)
-        printf("stop rule      met in %zu steps, %.1f iterations in the mean; last step: %d at most, %" PRId64 " islands above\n",
+        printf("stop rule      met in %zu steps, %.1f iterations in the mean; last step: %d at most, %" PRId64
+               " islands above\n",
                record->met, record->iterations_sum / (double)record->steps, last->iterations, c->islands_above);
     if (record->limited_steps > 0)
         printf("limited        %zu steps slowed islands down to the energy contacts can leave: too few iterations\n",
                record->limited_steps);
     if (record->steps > 0 && last->repeated > 0)
-        printf("repeated       %" PRId64 " steps, which outgrew the room or the plan they were begun with\n", last->repeated);
+        printf("repeated       %" PRId64 " steps, which outgrew the capacities or the plan they were begun with\n",
+               last->repeated);
     if (record->steps > 0) printf("penetration    %.3g m at most\n", record->penetration_max);
     printf("final state    fastest %.3g m/s, moved %.3g m at most, %s, hash %016" PRIx64 "\n", record->speed_max,
            record->displacement_max, record->finite ? "finite" : "NOT FINITE", record->hash);

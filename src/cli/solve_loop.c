@@ -7,7 +7,7 @@
 #include "core/base/memory.h"
 #include "interrupt.h"
 
-/* The lanes: levels as multiples of the first one. Lane 0 has penalty updates. */
+/* The lanes: offsets as multiples of the first one. Lane 0 has penalty updates. */
 static const double factors[] = {1, 1, 10, 0.1, 100, 0.01, 1e3, 1e-3};
 enum { LANES = sizeof factors / sizeof *factors };
 
@@ -15,7 +15,7 @@ enum { LANES = sizeof factors / sizeof *factors };
 enum { PATIENCE = 6, RATE = 10 };
 
 struct lane {
-    double level;                            /* kg */
+    double offset;                            /* kg */
     bool updates;
     double *velocities, *impulses, *lambda;  /* where it is; NULL before its first batch */
     double measure;                          /* the smallest so far */
@@ -97,11 +97,11 @@ static sadmm_status batch(struct loop *l, struct lane *lane, bool cold)
     s.penalty_update_warm = true;
     if (!lane->updates) s.penalty_period = 0;
     /* The paper's offset is in kg/s^2 and is multiplied by dt^2. */
-    s.penalty_offset = lane->level / (s.dt * s.dt);
+    s.penalty_offset = lane->offset / (s.dt * s.dt);
     TRY(check(l, sadmm_problem_solve(l->problem, l->plan->backend, l->plan->precision, &s, &out->report)));
     TRY(check(l, sadmm_problem_certify(l->problem, &c)));
     bool first = out->iterations == 0;
-    out->level = lane->level;
+    out->offset = lane->offset;
     out->iterations += out->report.iterations;
     out->ms += out->report.solve_ms;
     double measure = c.siconos;
@@ -135,7 +135,7 @@ static sadmm_status advance(struct loop *l, struct lane *lane)
 
 static bool has_other_lanes(const struct solve_plan *plan)
 {
-    return plan->level <= 0 && plan->settings.method == SADMM_METHOD_PAPER;
+    return plan->offset <= 0 && plan->settings.method == SADMM_METHOD_PAPER;
 }
 
 /* The first lane alone, until the end or, when there are others, until it stalls. */
@@ -170,18 +170,18 @@ static struct lane *choose(struct loop *l)
 
 static sadmm_status run(struct loop *l)
 {
-    double level = l->plan->level;
-    if (level <= 0) TRY(mean_mass(l, &level));
+    double offset = l->plan->offset;
+    if (offset <= 0) TRY(mean_mass(l, &offset));
     for (int k = 0; k < LANES; ++k) {
-        l->lanes[k].level = level * factors[k];
+        l->lanes[k].offset = offset * factors[k];
         l->lanes[k].updates = k == 0;
     }
-    l->out->levels_tried = 1;
+    l->out->offsets_tried = 1;
     TRY(run_first(l));
     if (!finished(l)) TRY(advance(l, &l->lanes[0]));
     for (int k = 1; k < LANES && !finished(l); ++k) {
         TRY(advance(l, &l->lanes[k]));
-        l->out->levels_tried += k > 1; /* lane 1 has the level of lane 0 */
+        l->out->offsets_tried += k > 1; /* lane 1 has the offset of lane 0 */
     }
     while (!finished(l)) TRY(advance(l, choose(l)));
     return restore(l, &l->best);

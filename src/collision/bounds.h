@@ -1,14 +1,14 @@
 /* How far shapes reach: boxes around them, and the distance within which a pair makes contacts. In double on
  * every backend, so that all of them see the same pairs.
  *
- * A pair makes contacts up to   max(margin x thinner extent, fall) + what the velocities may close within the step.
- * The fall is what external accelerations add to that: velocities come first (semi-implicit Euler), so that a body moves
- * by the whole of a dt^2 in the step in which it lets go. Gravity counts once, as one body of a pair may be held while
- * the other falls; the forces and torques on the two bodies count both. Joints will add theirs.
- * The box of a shape covers its own part: half the margin, or half the fall by gravity and its own part of the rest,
- * whichever is more; its sweep along its velocity; and the reach of its rotation. Two such parts are never less than
- * what the pair asks for. Shapes are a pair when their boxes overlap, and overlap still when the one is swept along the
- * velocity it has relative to the other.
+ * A pair makes contacts up to   max(margin x thinner extent, fall) + what the velocities may close within the step. The
+ * fall is what external accelerations add to that: velocities come first (semi-implicit Euler), so that a body moves by
+ * the whole of a dt^2 in the step in which it lets go. Gravity counts once, as one body of a pair may be held while the
+ * other falls; the forces and torques on the two bodies count both. Joints will add theirs. The box of a shape covers
+ * its own part: half the margin, or half the fall by gravity and its own part of the rest, whichever is more; its sweep
+ * along its velocity; and the reach of its rotation. Two such parts are never less than what the pair asks for. Shapes
+ * are a pair when their boxes overlap, and overlap still when the one is swept along the velocity it has relative to
+ * the other.
  */
 #ifndef SADMM_COLLISION_BOUNDS_H
 #define SADMM_COLLISION_BOUNDS_H
@@ -17,7 +17,8 @@
 
 struct sadmm_box3 { double lo[3], hi[3]; };
 
-/* The part of a motion that goes down, and up. Not by fmin and fmax, which are calls where instructions see NaN in another way. */
+/* The part of a motion that goes down, and up. Not by fmin and fmax, which are calls where instructions see NaN in
+ * another way. */
 SADMM_INLINE double downward(double way) { return way < 0 ? way : 0; }
 SADMM_INLINE double upward(double way) { return way > 0 ? way : 0; }
 
@@ -75,7 +76,8 @@ SADMM_INLINE void shape_box(const double centre[3], const double extent[3], doub
     }
 }
 
-/* Along one axis: do a, at rest, and b, in motion relative to it, come together? Own sweeps are taken off the boxes first. */
+/* Along one axis: do a, at rest, and b, in motion relative to it, come together? Own sweeps are taken off the boxes
+ * first. */
 SADMM_INLINE int intervals_meet(double lo_a, double hi_a, double lo_b, double hi_b, double sweep_a, double sweep_b)
 {
     double relative = sweep_b - sweep_a;
@@ -84,9 +86,9 @@ SADMM_INLINE int intervals_meet(double lo_a, double hi_a, double lo_b, double hi
 }
 
 /* Do two shapes whose boxes overlap come together within the step? Two that move alike sweep over the same places and
- * never do: without this, the pairs to look at would grow with the speed of a heap that moves as one. */
-SADMM_INLINE int boxes_meet(const struct sadmm_box3 *a, const double va[3], const struct sadmm_box3 *b, const double vb[3],
-                            double dt)
+ * never do: without this, the pairs to test would grow with the speed of a heap that moves as one. */
+SADMM_INLINE int boxes_meet(const struct sadmm_box3 *a, const double va[3], const struct sadmm_box3 *b,
+                            const double vb[3], double dt)
 {
     return intervals_meet(a->lo[0], a->hi[0], b->lo[0], b->hi[0], va[0] * dt, vb[0] * dt) &&
            intervals_meet(a->lo[1], a->hi[1], b->lo[1], b->hi[1], va[1] * dt, vb[1] * dt) &&

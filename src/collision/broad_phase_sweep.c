@@ -51,9 +51,9 @@ static sadmm_status sweep_update(struct sadmm_broad_phase *bp, const struct sadm
             else ++own;
         }
     bp->own_count = bp->shared_count = 0;
-    if (!sadmm_grow((void **)&bp->own, &bp->own_capacity, 0, own, sizeof *bp->own) ||
-        !sadmm_grow((void **)&bp->shared, &bp->shared_capacity, 0, shared, sizeof *bp->shared) ||
-        !sadmm_grow((void **)&bp->scratch, &bp->scratch_capacity, 0, own > shared ? own : shared, sizeof *bp->scratch))
+    if (!sadmm_grow(&bp->own, &bp->own_capacity, 0, own, sizeof *bp->own) ||
+        !sadmm_grow(&bp->shared, &bp->shared_capacity, 0, shared, sizeof *bp->shared) ||
+        !sadmm_grow(&bp->scratch, &bp->scratch_capacity, 0, own > shared ? own : shared, sizeof *bp->scratch))
         return sadmm_fail_memory(error, "sort-and-sweep intervals");
     for (i = 0; i < entry_count; ++i)
         if (entries[i].present) {

@@ -15,20 +15,11 @@ enum {
 };
 
 /* The larger box: this share of the shape's radius on every side, and the way it goes in some steps, up to its radius.
- * Larger: fewer updates, more pairs to look at. */
-#define ROOM 0.1
+ * Larger: fewer updates, more pairs to test. */
+#define ENLARGED_BY 0.1
 #define STEPS_AHEAD 4
 /* Ask the broad phase for single shapes up to one in so many: a query costs as much as some ten of a sweep over all. */
-enum { FEW = 8 };
-
-bool sadmm_pair_list_add(struct sadmm_pair_list *list, uint32_t a, uint32_t b)
-{
-    if (list->count == list->capacity &&
-        !sadmm_grow((void **)&list->keys, &list->capacity, list->count, list->count + 1, sizeof *list->keys))
-        return false;
-    list->keys[list->count++] = unordered_key(a, b);
-    return true;
-}
+enum { ONE_BY_ONE = 8 };
 
 sadmm_status sadmm_candidates_init(struct sadmm_candidates *c, const struct sadmm_broad_phase_kind *kind,
                                    struct sadmm_error *error)
@@ -55,22 +46,17 @@ void sadmm_candidates_free(struct sadmm_candidates *c)
     memset(c, 0, sizeof *c);
 }
 
-static bool grow(void *array, size_t *capacity, size_t used, size_t needed, size_t size)
-{
-    return sadmm_grow((void **)array, capacity, used, needed, size);
-}
-
-static bool make_room(struct sadmm_candidates *c, size_t slots)
+static bool reserve_slots(struct sadmm_candidates *c, size_t slots)
 {
     /* entries and seen remember the last step */
-    return grow(&c->proxies, &c->proxy_capacity, 0, slots, sizeof *c->proxies) &&
-           grow(&c->boxes, &c->box_capacity, 0, slots, sizeof *c->boxes) &&
-           grow(&c->entries, &c->entry_capacity, c->slot_count, slots, sizeof *c->entries) &&
-           grow(&c->seen, &c->seen_capacity, c->slot_count, slots, sizeof *c->seen) &&
-           grow(&c->state, &c->state_capacity, 0, slots, sizeof *c->state) &&
-           grow(&c->changed, &c->changed_capacity, 0, slots, sizeof *c->changed) &&
-           grow(&c->movers, &c->mover_capacity, 0, 2 * slots, sizeof *c->movers) &&
-           grow(&c->planes, &c->plane_capacity, 0, slots, sizeof *c->planes);
+    return sadmm_grow(&c->proxies, &c->proxy_capacity, 0, slots, sizeof *c->proxies) &&
+           sadmm_grow(&c->boxes, &c->box_capacity, 0, slots, sizeof *c->boxes) &&
+           sadmm_grow(&c->entries, &c->entry_capacity, c->slot_count, slots, sizeof *c->entries) &&
+           sadmm_grow(&c->seen, &c->seen_capacity, c->slot_count, slots, sizeof *c->seen) &&
+           sadmm_grow(&c->state, &c->state_capacity, 0, slots, sizeof *c->state) &&
+           sadmm_grow(&c->changed, &c->changed_capacity, 0, slots, sizeof *c->changed) &&
+           sadmm_grow(&c->movers, &c->mover_capacity, 0, 2 * slots, sizeof *c->movers) &&
+           sadmm_grow(&c->planes, &c->plane_capacity, 0, slots, sizeof *c->planes);
 }
 
 static bool contains(const struct sadmm_box3 *outer, const struct sadmm_box3 *inner)
@@ -85,8 +71,8 @@ static void enlarge(const struct sadmm_box3 *box, const struct sadmm_proxy *p, d
     double radius = p->system_body >= 0 ? geometry_radius(&p->geometry) : 0;
     for (int k = 0; k < 3; ++k) {
         double way = fmin(fmax(STEPS_AHEAD * dt * p->velocity[k], -radius), radius);
-        larger->lo[k] = box->lo[k] - ROOM * radius + fmin(way, 0.0);
-        larger->hi[k] = box->hi[k] + ROOM * radius + fmax(way, 0.0);
+        larger->lo[k] = box->lo[k] - ENLARGED_BY * radius + fmin(way, 0.0);
+        larger->hi[k] = box->hi[k] + ENLARGED_BY * radius + fmax(way, 0.0);
     }
 }
 
@@ -182,7 +168,7 @@ static bool sort_pairs(struct sadmm_pair_list *list, struct sadmm_pair_list *scr
 {
     int bits = bits_of(slots);
     uint64_t mask = (UINT64_C(1) << bits) - 1;
-    if (!grow(&scratch->keys, &scratch->capacity, 0, list->count, sizeof *scratch->keys)) return false;
+    if (!sadmm_grow(&scratch->keys, &scratch->capacity, 0, list->count, sizeof *scratch->keys)) return false;
     for (size_t i = 0; i < list->count; ++i)
         list->keys[i] = (list->keys[i] >> 32) << bits | (list->keys[i] & UINT32_MAX);
     sadmm_radix_sort(list->keys, scratch->keys, list->count, 2 * bits);
@@ -257,7 +243,7 @@ static bool merge_found(struct sadmm_candidates *c)
 {
     size_t i = 0, j = 0, n = 0;
     struct sadmm_pair_list swap;
-    if (!grow(&c->merged.keys, &c->merged.capacity, 0, c->list.count + c->found.count, sizeof *c->merged.keys))
+    if (!sadmm_grow(&c->merged.keys, &c->merged.capacity, 0, c->list.count + c->found.count, sizeof *c->merged.keys))
         return false;
     for (; i < c->list.count; ++i) {
         uint64_t key = c->list.keys[i];
@@ -273,12 +259,12 @@ static bool merge_found(struct sadmm_candidates *c)
     return true;
 }
 
-static sadmm_status refresh_list(struct sadmm_candidates *c, const struct sadmm_collision_input *input, bool few,
+static sadmm_status refresh_list(struct sadmm_candidates *c, const struct sadmm_collision_input *input, bool one_by_one,
                                  struct sadmm_error *error)
 {
     sadmm_status status;
     c->found.count = 0;
-    if (few) {
+    if (one_by_one) {
         status = c->kind->pairs_of(c->broad_phase, c->entries, c->slot_count, c->changed, c->changed_count, &c->found,
                                    error);
     } else {
@@ -287,7 +273,7 @@ static sadmm_status refresh_list(struct sadmm_candidates *c, const struct sadmm_
         if (c->plane_count > 0) list_movers(c);
     }
     if (status != SADMM_OK) return status;
-    if (!plane_pairs(c, input, few) || !finish_found(c, input) || !merge_found(c))
+    if (!plane_pairs(c, input, one_by_one) || !finish_found(c, input) || !merge_found(c))
         return sadmm_fail_memory(error, "candidate pairs");
     return SADMM_OK;
 }
@@ -300,10 +286,10 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
     const double gravity_fall = fall_of(input->gravity, input->dt);
     /* Planes have no box that could leave a larger one: what they reach must not grow unnoticed. */
     bool renew = !c->broad_phase_valid || !(c->margin == input->margin) || gravity_fall > c->gravity_fall;
-    bool few, plane_changed = false;
+    bool one_by_one, plane_changed = false;
     sadmm_status status;
 
-    if (!make_room(c, slots)) return sadmm_fail_memory(error, "collision shapes");
+    if (!reserve_slots(c, slots)) return sadmm_fail_memory(error, "collision shapes");
     if (slots > c->slot_count) {
         memset(c->entries + c->slot_count, 0, (slots - c->slot_count) * sizeof *c->entries);
         memset(c->seen + c->slot_count, 0, (slots - c->slot_count) * sizeof *c->seen);
@@ -330,14 +316,15 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
     }
     if (c->changed_count == 0 && c->list_valid && !renew) return SADMM_OK;
 
-    few = c->list_valid && !renew && !plane_changed && c->kind->pairs_of && c->changed_count * FEW < present;
+    one_by_one =
+        c->list_valid && !renew && !plane_changed && c->kind->pairs_of && c->changed_count * ONE_BY_ONE < present;
     c->broad_phase_valid = c->list_valid = false;
     c->margin = input->margin;
     if (renew) c->gravity_fall = gravity_fall;
     status = c->kind->update(c->broad_phase, c->entries, slots, c->changed, c->changed_count, error);
     if (status != SADMM_OK) return status;
     c->broad_phase_valid = true;
-    status = refresh_list(c, input, few, error);
+    status = refresh_list(c, input, one_by_one, error);
     c->list_valid = status == SADMM_OK;
     return status;
 }

@@ -4,7 +4,7 @@
  * broad phase works on larger boxes that are kept until a shape's own box leaves them: as long as nothing leaves, the
  * list of the last step is still complete and the broad phase does not run at all; when little moved, only that is
  * asked for. The list may therefore hold more pairs than overlap at present. The narrow phase asks
- * sadmm_candidate_meets, which looks at this step's boxes alone: results depend on the present state and never on the
+ * sadmm_candidate_meets, which uses this step's boxes alone: results depend on the present state and never on the
  * history of the larger boxes.
  */
 #ifndef SADMM_COLLISION_CANDIDATES_H

@@ -1,13 +1,12 @@
 /* The pipeline of a step: candidates, narrow phase, and the swap of contact sets.
  *
  * The new set is written beside the old one and the two are exchanged at the end, so a failure changes nothing and a
- * step that fails later can be undone. Threads take consecutive stretches of the sorted candidates and write to sets of
+ * step that fails later can be undone. Threads take consecutive shares of the sorted candidates and write to sets of
  * their own, which are put together in order: the result does not depend on their number.
  */
 #include "collision.h"
 
 #include <stdatomic.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "core/base/memory.h"
@@ -61,19 +60,6 @@ void sadmm_collision_destroy(struct sadmm_collision *collision)
     sadmm_free(collision);
 }
 
-sadmm_status sadmm_collision_check_shape(const struct sadmm_collision_input *input, size_t slot,
-                                         struct sadmm_error *error)
-{
-    const struct sadmm_shape *shape = &input->shapes[slot];
-    char name[40];
-    if (shape->geometry >= input->geometry_count)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "shapes[%zu].geometry = %u: must be in [0, %zu)", slot,
-                          shape->geometry, input->geometry_count);
-    snprintf(name, sizeof name, "shapes[%zu]: ", slot);
-    return sadmm_geometry_check(&input->geometries[shape->geometry], input->bodies[shape->body].system_body >= 0, name,
-                                error);
-}
-
 static int thread_count(const struct sadmm_collision_input *input, size_t pairs)
 {
     const size_t wanted = input->threads > 1 ? (size_t)input->threads : 1, useful = pairs / PAIRS_PER_THREAD + 1;
@@ -83,7 +69,7 @@ static int thread_count(const struct sadmm_collision_input *input, size_t pairs)
 static bool reserve_parts(struct sadmm_collision *collision, size_t count)
 {
     if (count <= collision->part_count) return true;
-    if (!sadmm_grow((void **)&collision->parts, &collision->part_capacity, collision->part_count, count,
+    if (!sadmm_grow(&collision->parts, &collision->part_capacity, collision->part_count, count,
                     sizeof *collision->parts))
         return false;
     memset(collision->parts + collision->part_count, 0, (count - collision->part_count) * sizeof *collision->parts);
@@ -92,8 +78,8 @@ static bool reserve_parts(struct sadmm_collision *collision, size_t count)
 }
 
 /* Copy share `share` of `shares` of a part into the set, from its pair `to_pair` and point `to_point` on. */
-static void copy_share(struct sadmm_contact_set *set, const struct sadmm_contact_set *part, size_t to_pair, size_t to_point,
-                       size_t share, size_t shares)
+static void copy_share(struct sadmm_contact_set *set, const struct sadmm_contact_set *part, size_t to_pair,
+                       size_t to_point, size_t share, size_t shares)
 {
     size_t pair = part->pair_count * share / shares, pair_end = part->pair_count * (share + 1) / shares,
            point = part->point_count * share / shares, point_end = part->point_count * (share + 1) / shares;
@@ -131,8 +117,8 @@ static bool append_parts(struct sadmm_contact_set *set, struct sadmm_team *team,
         pairs += parts[t].pair_count;
         points += parts[t].point_count;
     }
-    if (!sadmm_grow((void **)&set->pairs, &set->pair_capacity, set->pair_count, pairs, sizeof *set->pairs) ||
-        !sadmm_grow((void **)&set->points, &set->point_capacity, set->point_count, points, sizeof *set->points))
+    if (!sadmm_grow(&set->pairs, &set->pair_capacity, set->pair_count, pairs, sizeof *set->pairs) ||
+        !sadmm_grow(&set->points, &set->point_capacity, set->point_count, points, sizeof *set->points))
         return false;
     struct appending appending = {set, parts, count};
     sadmm_parallel(team, (int)count + 1, append_share, &appending);
@@ -155,7 +141,8 @@ static void find_share(void *argument, int thread, int threads)
     size_t begin, end;
     sadmm_share(f->collision->candidates.list.count, thread, threads, &begin, &end);
     out->pair_count = out->point_count = 0;
-    if (!sadmm_narrow_phase(&f->collision->candidates, f->input, begin, end, f->old, out)) atomic_store(&f->failed, true);
+    if (!sadmm_narrow_phase(&f->collision->candidates, f->input, begin, end, f->old, out))
+        atomic_store(&f->failed, true);
 }
 
 static bool find_in_threads(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
@@ -164,7 +151,8 @@ static bool find_in_threads(struct sadmm_collision *collision, const struct sadm
     struct finding finding = {.collision = collision, .input = input, .old = old};
     const int ran = sadmm_parallel(input->team, threads, find_share, &finding);
     collision->spare.dt = input->dt;
-    return !atomic_load(&finding.failed) && append_parts(&collision->spare, input->team, collision->parts, (size_t)ran - 1);
+    return !atomic_load(&finding.failed) &&
+           append_parts(&collision->spare, input->team, collision->parts, (size_t)ran - 1);
 }
 
 sadmm_status sadmm_collision_find(struct sadmm_collision *collision, const struct sadmm_collision_input *input,

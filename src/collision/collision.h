@@ -1,8 +1,8 @@
 /* Collision detection on the host: broad phase (FCL, or sort and sweep), pair manifolds, matching with the last step.
  *
  * Shapes live in slots that stay put for a shape's life; a dead slot has alive = false. The result does not depend on
- * the order in which a broad phase finds pairs: pairs come out sorted by (shape_a, shape_b, child), where a is the shape
- * of the lower (type, slot) and the normal runs from a to b. Two shapes have a pair for each of their manifolds.
+ * the order in which a broad phase finds pairs: pairs come out sorted by (shape_a, shape_b, child), where a is the
+ * shape of the lower (type, slot) and the normal runs from a to b. Two shapes have a pair for each of their manifolds.
  */
 #ifndef SADMM_COLLISION_COLLISION_H
 #define SADMM_COLLISION_COLLISION_H
@@ -44,11 +44,11 @@ struct sadmm_shape {
     uint32_t revision; /* changes whenever the slot is reused or the shape's definition changes, geometry included */
 };
 
-/* What a world body slot looks like to collision. */
+/* What collision knows of a world's body slot. */
 struct sadmm_collision_body {
     double position[3], orientation[4], velocity[6]; /* velocity 0 for static bodies */
     double acceleration[2]; /* sizes of what its own force and torque give it, m/s^2, rad/s^2; 0 for static bodies */
-    uint32_t placed;        /* changes whenever its pose is set: pairs forget the axis they remember (contact_match.h) */
+    uint32_t placed;      /* changes whenever its pose is set: pairs forget the axis they remember (contact_match.h) */
     int32_t system_body;  /* index among dynamic bodies, -1 for static */
     int32_t environment;  /* -1: meets all */
 };
@@ -84,9 +84,9 @@ void sadmm_collision_destroy(struct sadmm_collision *collision);
 sadmm_status sadmm_collision_find(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
                                   struct sadmm_contact_set *contacts, struct sadmm_error *error);
 
-/* Put back the set that the last successful sadmm_collision_find replaced, impulses and caches included (the pipeline keeps
- * it until the next find), so that a step that fails later leaves no trace. Does nothing when the last find failed or was
- * undone already. */
+/* Put back the set that the last successful sadmm_collision_find replaced, impulses and caches included (the pipeline
+ * keeps it until the next find), so that a step that fails later leaves no trace. Does nothing when the last find
+ * failed or was undone already. */
 void sadmm_collision_undo(struct sadmm_collision *collision, struct sadmm_contact_set *contacts);
 
 /* "fcl" or "sweep". */

@@ -1,10 +1,10 @@
 /* How a contact of the last step lives on in this one.
  *
- * Identity: the pair of shapes, the child (sadmm_geometry) and the revisions of the shapes (a slot may hold another shape
- * by now), then the feature. Sets are sorted by (shape_a, shape_b, child). Impulses are kept as world vectors; where the
- * normal turned, the normal part goes along the new normal and the tangential part is projected into the new tangent
- * plane, within the friction disc. They are forces times a time step: where the steps differ in length, the forces are
- * what carries over.
+ * Identity: the pair of shapes, the child (sadmm_geometry) and the revisions of the shapes (a slot may hold another
+ * shape by now), then the feature. Sets are sorted by (shape_a, shape_b, child). Impulses are kept as world vectors;
+ * where the normal turned, the normal part goes along the new normal and the tangential part is projected into the new
+ * tangent plane, within the friction disc. They are forces times a time step: where the steps differ in length, the
+ * forces are what carries over.
  *
  * The axis and the side that the pair remembers (`cache`) say where the bodies came from. They hold only while both
  * move by themselves: once a pose has been set (sadmm_collision_body.placed), the pair starts without. Impulses may

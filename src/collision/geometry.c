@@ -1,5 +1,7 @@
 #include "collision.h"
 
+#include <stdio.h>
+
 #include "collision_table.h"
 
 sadmm_status sadmm_geometry_check(const struct sadmm_geometry *geometry, bool moves, const char *name,
@@ -17,4 +19,17 @@ sadmm_status sadmm_geometry_check(const struct sadmm_geometry *geometry, bool mo
                               "%stype = %d: has no contacts with type %d, so that only static bodies may have it", name,
                               (int)geometry->type, other);
     return SADMM_OK;
+}
+
+sadmm_status sadmm_collision_check_shape(const struct sadmm_collision_input *input, size_t slot,
+                                         struct sadmm_error *error)
+{
+    const struct sadmm_shape *shape = &input->shapes[slot];
+    char name[40];
+    if (shape->geometry >= input->geometry_count)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "shapes[%zu].geometry = %u: must be in [0, %zu)", slot,
+                          shape->geometry, input->geometry_count);
+    snprintf(name, sizeof name, "shapes[%zu]: ", slot);
+    return sadmm_geometry_check(&input->geometries[shape->geometry], input->bodies[shape->body].system_body >= 0, name,
+                                error);
 }

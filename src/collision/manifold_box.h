@@ -231,7 +231,7 @@ SADMM_INLINE int box_axis_manifold(const struct box_pair *b, int axis, int negat
 }
 
 /* Boxes apart whose closest features are a corner of 1 and the inside of the best face, one of 2? (That corner is on no
- * edge of 2, where box_corner_manifold looks.) */
+ * edge of 2, which box_corner_manifold handles.) */
 SADMM_INLINE bool box_corner_over_face(const struct box_pair *b, const struct box_axes *axes)
 {
     int face = axes->best_face - 3, k, j;

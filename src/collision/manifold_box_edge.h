@@ -25,8 +25,9 @@ SADMM_INLINE int box_edge_end(const real centre[3], int i, int upper)
     return (upper ? 1 << i : 0) | (centre[u] > 0 ? 1 << u : 0) | (centre[v] > 0 ? 1 << v : 0);
 }
 
-/* The smallest s at which the line x - s out is in the box of half extents h, a large number where it passes the box by.
- * All in the box's frame; `out` looks out of the box, across the edge along i, near which x is: that edge goes on at its ends. */
+/* The smallest s at which the line x - s out is in the box of half extents h, a large number where it passes the box
+ * by. All in the box's frame; `out` points out of the box, across the edge along i, near which x is: that edge goes on
+ * at its ends. */
 SADMM_INLINE real box_depth_along(const real x[3], const real out[3], const real h[3], int i)
 {
     real first = -(real)1e30, last = (real)1e30;

@@ -1,4 +1,4 @@
-/* Face axis: the face of the other box that looks against the normal is clipped by the sides of the reference face
+/* Face axis: the face of the other box that points against the normal is clipped by the sides of the reference face
  * (Sutherland-Hodgman). The edges of the polygon carry labels, from which the features of its vertices follow. */
 #ifndef SADMM_COLLISION_MANIFOLD_BOX_FACE_H
 #define SADMM_COLLISION_MANIFOLD_BOX_FACE_H
@@ -148,7 +148,7 @@ SADMM_INLINE void box_face_manifold(const struct box_pair *b, int axis, int nega
     if (axis < 3) {
         box_clip_face(b->h1, b->h2, b->R, b->t, axis, sg, limit, 0, m);
     } else {
-        /* in the frame of 2 the normal from 1 to 2 looks out of 1: the reference side of 2 is opposite */
+        /* in the frame of 2 the normal from 1 to 2 points out of 1: the reference side of 2 is opposite */
         real RT[3][3], t[3];
         for (i = 0; i < 3; ++i) {
             for (j = 0; j < 3; ++j) RT[i][j] = b->R[j][i];

@@ -232,7 +232,8 @@ SADMM_INLINE void manifold_capsule_box_inside(real radius, real half, vec3 h, ve
 SADMM_INLINE void manifold_segment_outside(real radius, real half, vec3 h, vec3 p, vec3 u, vec3 x, vec3 q, real length,
                                            real flat, real limit, uint32_t first_feature, struct manifold *m)
 {
-    real pa[3], ua[3], ha[3], na[3], xa[3], closest = length - radius, first = -half, last = half, best_end = (real)1e30;
+    real pa[3], ua[3], ha[3], na[3], xa[3], closest = length - radius, first = -half, last = half,
+                                            best_end = (real)1e30;
     bool stretch = true;
     int k, e, main_axis = 0;
 

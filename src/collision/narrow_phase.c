@@ -40,11 +40,11 @@ static bool has_capacity(const struct sadmm_contact_set *set)
     return set->pair_count < set->pair_capacity && set->point_count + SADMM_MANIFOLD_POINTS <= set->point_capacity;
 }
 
-static bool grow(struct sadmm_contact_set *set)
+static bool add_capacity(struct sadmm_contact_set *set)
 {
-    return sadmm_grow((void **)&set->pairs, &set->pair_capacity, set->pair_count, set->pair_count + 1,
+    return sadmm_grow(&set->pairs, &set->pair_capacity, set->pair_count, set->pair_count + 1,
                       sizeof *set->pairs) &&
-           sadmm_grow((void **)&set->points, &set->point_capacity, set->point_count,
+           sadmm_grow(&set->points, &set->point_capacity, set->point_count,
                       set->point_count + SADMM_MANIFOLD_POINTS, sizeof *set->points);
 }
 
@@ -85,7 +85,7 @@ static bool find_children(struct narrow_phase *n, uint32_t a, uint32_t b)
         pair_manifold(&pa->geometry, &pb->geometry, child, &pose, (real)limit,
                       before ? contact_memory(before, pa, pb) : 0, &m);
         if (m.count == 0) continue;
-        if (!has_capacity(n->out) && !grow(n->out)) return false;
+        if (!has_capacity(n->out) && !add_capacity(n->out)) return false;
         emit(n->candidates, input, a, b, child, &m, n->old, before, n->out);
     }
     return true;

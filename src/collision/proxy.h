@@ -1,4 +1,4 @@
-/* A shape in the world, this step: what every backend computes from a shape and its body before it looks at pairs. */
+/* A shape in the world, this step: what every backend computes from a shape and its body before it tests pairs. */
 #ifndef SADMM_COLLISION_PROXY_H
 #define SADMM_COLLISION_PROXY_H
 

@@ -83,13 +83,13 @@ static sadmm_status expand_triplets(const char *group, const struct stored_matri
 static sadmm_status expand_compressed(const char *group, const struct stored_matrix *m, bool by_row,
                                       struct sadmm_triplets *out, struct sadmm_error *error)
 {
-    int64_t room = m->i_count < m->x_count ? m->i_count : m->x_count;
+    int64_t entries = m->i_count < m->x_count ? m->i_count : m->x_count;
     int32_t lines = by_row ? m->rows : m->columns;
     if (m->p[0] != 0) return sadmm_fail(error, SADMM_ERROR_IO, "%s/p starts with %d: must be 0", group, m->p[0]);
     for (int32_t line = 0; line < lines; ++line) {
-        if (m->p[line + 1] < m->p[line] || m->p[line + 1] > room)
+        if (m->p[line + 1] < m->p[line] || m->p[line + 1] > entries)
             return sadmm_fail(error, SADMM_ERROR_IO, "%s/p: value %d is %d: must be in [%d, %lld]", group, line + 1,
-                              m->p[line + 1], m->p[line], (long long)room);
+                              m->p[line + 1], m->p[line], (long long)entries);
         for (int32_t e = m->p[line]; e < m->p[line + 1]; ++e)
             TRY(add_entry(group, out, by_row ? line : m->i[e], by_row ? m->i[e] : line, m->x[e], error));
     }

@@ -10,9 +10,9 @@
 bool sadmm_triplets_add(struct sadmm_triplets *m, int32_t row, int32_t column, double value)
 {
     size_t used = m->count, needed = used + 1;
-    if (!sadmm_grow((void **)&m->row, &m->capacity[0], used, needed, sizeof *m->row) ||
-        !sadmm_grow((void **)&m->column, &m->capacity[1], used, needed, sizeof *m->column) ||
-        !sadmm_grow((void **)&m->value, &m->capacity[2], used, needed, sizeof *m->value))
+    if (!sadmm_grow(&m->row, &m->capacity[0], used, needed, sizeof *m->row) ||
+        !sadmm_grow(&m->column, &m->capacity[1], used, needed, sizeof *m->column) ||
+        !sadmm_grow(&m->value, &m->capacity[2], used, needed, sizeof *m->value))
         return false;
     m->row[used] = row;
     m->column[used] = column;
@@ -136,24 +136,24 @@ static sadmm_status fill(sadmm_problem *problem, const struct sizes *s, struct s
 {
     size_t n = (size_t)s->bodies;
     double *A = sadmm_alloc(42 * n, sizeof *A), *b = A ? A + 36 * n : NULL;
-    bool room = A && g->f && g->w && g->mu && g->b;
+    bool allocated = A && g->f && g->w && g->mu && g->b;
     int32_t contact = 0, hard = 0;
     sadmm_status status = SADMM_OK;
-    if (room) status = sadmm_problem_get_bodies(problem, A, b, NULL);
-    if (room && status == SADMM_OK) room = add_bodies(A, b, g);
+    if (allocated) status = sadmm_problem_get_bodies(problem, A, b, NULL);
+    if (allocated && status == SADMM_OK) allocated = add_bodies(A, b, g);
     sadmm_free(A);
-    for (; room && status == SADMM_OK && contact < s->points; ++contact) {
+    for (; allocated && status == SADMM_OK && contact < s->points; ++contact) {
         sadmm_problem_contact c;
         status = sadmm_problem_get_contact(problem, contact, &c);
-        if (status == SADMM_OK) room = add_contact(&c, contact, g);
+        if (status == SADMM_OK) allocated = add_contact(&c, contact, g);
     }
-    for (int32_t k = 0; room && status == SADMM_OK && k < s->blocks; ++k) {
+    for (int32_t k = 0; allocated && status == SADMM_OK && k < s->blocks; ++k) {
         sadmm_problem_block block;
         status = sadmm_problem_get_block(problem, k, &block);
-        if (status == SADMM_OK) room = add_block(&block, &contact, &hard, g);
+        if (status == SADMM_OK) allocated = add_block(&block, &contact, &hard, g);
     }
     if (status != SADMM_OK) return sadmm_fail(error, status, "%s", sadmm_problem_message(problem));
-    return room ? SADMM_OK : sadmm_fail_memory(error, "the matrix form of a problem");
+    return allocated ? SADMM_OK : sadmm_fail_memory(error, "the matrix form of a problem");
 }
 
 sadmm_status sadmm_global_from_problem(sadmm_problem *problem, struct sadmm_global_problem *g,

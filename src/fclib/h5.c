@@ -59,7 +59,8 @@ sadmm_status sadmm_h5_open(const char *path, enum sadmm_h5_mode mode, hid_t *fil
 {
     struct stat info;
     /* HDF5 would wait for the other end of a pipe. */
-    if (mode != SADMM_H5_CREATE && stat(path, &info) != 0) return sadmm_fail(error, SADMM_ERROR_IO, "%s", strerror(errno));
+    if (mode != SADMM_H5_CREATE && stat(path, &info) != 0)
+        return sadmm_fail(error, SADMM_ERROR_IO, "%s", strerror(errno));
     if (mode != SADMM_H5_CREATE && !S_ISREG(info.st_mode)) return sadmm_fail(error, SADMM_ERROR_IO, "is not a file");
     hid_t access = H5Pcreate(H5P_FILE_ACCESS);
     if (access < 0) return fail_h5(error, "file", "no file access list");

@@ -1,6 +1,6 @@
 #include "emulation_control.h"
 
-#include "backend_cuda/device/tables.h"
+#include "backend_cuda/table/tables.h"
 
 #define CUDA(name) sadmm_cuda_##name##_emulated_f32
 #include "backend_cuda/device/entries.h"

@@ -3,7 +3,7 @@
 #define SADMM_EMULATION_CONTROL_H
 
 #include "core/solve/kernels.h"
-#include "backend_cuda/graph/tier.h"
+#include "backend_cuda/device/tier.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -13,7 +13,8 @@ extern int cuda_emulation_descending;   /* run threads from the last one to the 
 extern long cuda_emulation_calls_left;  /* runtime calls that succeed before one fails; < 0: none fails */
 extern int cuda_emulation_lost;         /* every runtime call fails */
 extern long cuda_emulation_allocations; /* device and pinned blocks, streams and graphs alive */
-extern long cuda_emulation_graphs_made, cuda_emulation_waits; /* instantiations; calls that wait for a stream or an event */
+extern long cuda_emulation_graphs_made,
+    cuda_emulation_waits; /* instantiations; calls that wait for a stream or an event */
 
 extern const struct sadmm_kernels cuda_emulation_tables[2]; /* by precision */
 void cuda_emulation_force_tier(const struct sadmm_kernels *, struct sadmm_context *, enum sadmm_cuda_tier);

@@ -1,6 +1,6 @@
-/* Flows of control with stacks of their own. Fibers change millions of times in a test: on the machines below a change is a
- * few instructions; elsewhere it is swapcontext, which asks the kernel for the signal mask twice a change and is some ten
- * times slower.
+/* Flows of control with stacks of their own. Fibers change millions of times in a test: on the machines below a change
+ * is a few instructions; elsewhere it is swapcontext, which asks the kernel for the signal mask twice a change and is
+ * some ten times slower.
  *
  * The address sanitizer is told of every change, so that it watches the stacks of fibers too (and need not guess, as it
  * must for swapcontext: it then forgets a whole stack at every change). */
@@ -31,7 +31,8 @@
 #include <sanitizer/common_interface_defs.h>
 #endif
 
-/* fiber_switch.c: keep what a call must preserve on the stack in use and the stack's pointer in *from; take both from `to`. */
+/* fiber_switch.c: keep what a call must preserve on the stack in use and the stack's pointer in *from; take both from
+ * `to`. */
 extern "C" void cuda_emulation_switch(void **from, void *to);
 
 namespace cuda_emulation {

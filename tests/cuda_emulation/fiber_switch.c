@@ -1,5 +1,5 @@
-/* void cuda_emulation_switch(void **from, void *to), see fiber.h: the registers that a call preserves by the machine's ABI.
- * Control words of floating-point arithmetic are not among them: no kernel changes them. */
+/* void cuda_emulation_switch(void **from, void *to), see fiber.h: the registers that a call preserves by the machine's
+ * ABI. Control words of floating-point arithmetic are not among them: no kernel changes them. */
 #if defined __ELF__ && defined __x86_64__ && !defined __ILP32__
 __asm__(".text\n"
         ".p2align 4\n"

@@ -1,8 +1,8 @@
 /* Kernels A-D: raw bodies, contacts and blocks, as core has them, into this precision's layout. */
 #include "backend_cuda/device/double.h"
 
+#include "assemble.h"
 #include "side_sums.h"
-#include "backend_cuda/iterate/stop_rule.h"
 
 /* ---- bodies --------------------------------------------------------------------------------------------------- */
 
@@ -90,15 +90,15 @@ extern "C" sadmm_status CUDA(assemble_bodies)(struct sadmm_context *c, struct sa
     CUDA_ENTER(c);
     if (c->plan.rigid) {
         at = n * sizeof *system->rigid;
-        CUDA_TRY(CUDA(upload)(c, (void *)v->raw.system.rigid, PINNED_BODIES, 0, system->rigid, at, error));
+        TRY(CUDA(upload)(c, (void *)v->raw.system.rigid, PINNED_BODIES, 0, system->rigid, at, error));
     } else {
         size_t bytes = 36 * n * sizeof(double);
-        CUDA_TRY(CUDA(upload)(c, (void *)v->raw.system.A, PINNED_BODIES, 0, system->A, bytes, error));
-        CUDA_TRY(
+        TRY(CUDA(upload)(c, (void *)v->raw.system.A, PINNED_BODIES, 0, system->A, bytes, error));
+        TRY(
             CUDA(upload)(c, (void *)v->raw.system.b, PINNED_BODIES, bytes, system->b, 6 * n * sizeof(double), error));
         at = 42 * n * sizeof(double);
     }
-    CUDA_TRY(
+    TRY(
         CUDA(upload)(c, v->raw.system.velocity, PINNED_BODIES, at, system->velocity, 6 * n * sizeof(double), error));
     return launch_bodies(c, error);
 }
@@ -111,8 +111,8 @@ static __device__ real4 pack(vec3 a, double w)
     return out;
 }
 
-/* contacts.lanes threads a pair, each every contacts.lanes-th point; the first also what the points share. FAST: records
- * of sides, too. */
+/* contacts.lanes threads a pair, each every contacts.lanes-th point; the first also what the points share. FAST:
+ * records of sides, too. */
 template <bool FAST>
 static __global__ void __launch_bounds__(BODY_THREADS)
     assemble_contacts_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
@@ -127,24 +127,24 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const struct sadmm_contact_point *points = v.raw.points + (live ? pair->first : 0);
     const vec3 normal = live ? v3_load(pair->normal) : v3(0, 0, 0);
     const bool a = live && pair->body_a >= 0, b = live && pair->body_b >= 0;
-    /* A pair of more points than the step was planned for aborts it (step/step.h), but later: until then it has as
+    /* A pair of more points than the step was planned for aborts it (device/step.h), but later: until then it has as
      * many. */
     const int32_t count = !live ? 0 : pair->count <= v.contacts.point_slots ? pair->count : v.contacts.point_slots;
     vec3 between = v3(0, 0, 0);
     if (a && b && count > 0 && (FAST || lane == 0))
         between = v3_sub(v3_load(points[0].arm_b), v3_load(points[0].arm_a));
-    const pair_ends ends = {a ? pair->body_a : v.model.bodies, b ? pair->body_b : v.model.bodies, -1, -1};
+    const pair_bodies joined = {a ? pair->body_a : v.model.bodies, b ? pair->body_b : v.model.bodies, -1, -1};
     const real4 about = pack(normal, live ? solver_friction(v.model, pair->friction) : 0),
                 difference = pack(between, count);
     if (live && lane == 0) {
         v.contacts.normal[p] = about;
         v.contacts.difference[p] = difference;
-        v.contacts.ends[p] = ends;
+        v.contacts.bodies[p] = joined;
     }
     struct pair_sums sums = {};
     rigid_inverse inverse = {};
     if (FAST && v.bodies.rigid && side_of_lane(v.contacts, lane) >= 0) { /* asked for early: it is from far away */
-        const int32_t body = lane == 0 ? ends.body_a : lane == 1 ? ends.body_b : v.model.bodies;
+        const int32_t body = lane == 0 ? joined.body_a : lane == 1 ? joined.body_b : v.model.bodies;
         if (body < v.model.bodies) inverse = inverse_of_body(v.bodies, body);
     }
     for (int32_t k = lane; k < count; k += v.contacts.lanes) {
@@ -156,10 +156,10 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         const solver_real lambda[3] = {(solver_real)impulse.x, (solver_real)impulse.y, (solver_real)impulse.z};
         v.contacts.arm[slot] = arm;
         for (int j = 0; j < 3; ++j) v.contacts.lambda[(size_t)j * v.contacts.lambda_stride + slot] = lambda[j];
-        if (FAST) add_point(v.model, v.bodies, ends, about, difference, arm, lambda, true, &sums);
+        if (FAST) add_point(v.model, v.bodies, joined, about, difference, arm, lambda, true, &sums);
     }
     if (FAST)
-        store_sides(v.model, v.bodies, v.contacts, v.weights, live, p, lane, count, ends, difference, true, inverse,
+        store_sides(v.model, v.bodies, v.contacts, v.weights, live, p, lane, count, joined, difference, true, inverse,
                     &sums);
 }
 
@@ -175,4 +175,7 @@ extern "C" sadmm_status CUDA(assemble_contacts)(struct sadmm_context *c, struct 
         BODY_THREADS, &args, error);
 }
 
-sadmm_status CUDA(enqueue_bodies)(struct sadmm_context *c, struct sadmm_error *error) { return launch_bodies(c, error); }
+sadmm_status CUDA(enqueue_bodies)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    return launch_bodies(c, error);
+}

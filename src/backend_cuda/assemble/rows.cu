@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "backend_cuda/device/double.h"
+#include "assemble.h"
 #include "core/base/memory.h"
 
 /* ---- upload ---------------------------------------------------------------------------------------------------- */

@@ -1,7 +1,7 @@
 /* The method `fast`: what a pair adds to its bodies, a record for each side, so that what sums over a body's sides need
- * not look at points: J^T lambda for the momentum, sums over arms for C, load and response for the weight
- * (math/weight.h). Made by contacts.lanes threads a pair where contacts are assembled, and again where loads are taken
- * again. In double, from this precision's data. */
+ * not read points: J^T lambda for the momentum, sums over arms for C, load and response for the weight
+ * (math/weight.h). Made by contacts.lanes threads a pair where contacts are assembled, and again where loads are
+ * recomputed. In double, from this precision's data. */
 #ifndef SADMM_CUDA_ASSEMBLE_SIDE_SUMS_H
 #define SADMM_CUDA_ASSEMBLE_SIDE_SUMS_H
 
@@ -46,9 +46,9 @@ static __device__ __forceinline__ rigid_inverse inverse_of_body(const body_view 
 }
 
 static __device__ __forceinline__ void add_point(const model_view &model, const body_view &bodies,
-                                                 const pair_ends &ends, const real4 &normal, const real4 &difference,
-                                                 const real4 &arm, const solver_real lambda[3], bool first,
-                                                 struct pair_sums *sums)
+                                                 const pair_bodies &joined, const real4 &normal,
+                                                 const real4 &difference, const real4 &arm, const solver_real lambda[3],
+                                                 bool first, struct pair_sums *sums)
 {
     const double n[3] = {(double)normal.x, (double)normal.y, (double)normal.z},
                  r[3] = {(double)arm.x, (double)arm.y, (double)arm.z},
@@ -76,11 +76,11 @@ static __device__ __forceinline__ void add_point(const model_view &model, const 
     }
     double row[6];
     normal_row(n, r, row);
-    if (ends.body_a < model.bodies)
-        sums->row_response[0] += packed_form(bodies.A_inverse + (size_t)ends.body_a * PACKED, row);
+    if (joined.body_a < model.bodies)
+        sums->row_response[0] += packed_form(bodies.A_inverse + (size_t)joined.body_a * PACKED, row);
     normal_row(n, r_b, row);
-    if (ends.body_b < model.bodies)
-        sums->row_response[1] += packed_form(bodies.A_inverse + (size_t)ends.body_b * PACKED, row);
+    if (joined.body_b < model.bodies)
+        sums->row_response[1] += packed_form(bodies.A_inverse + (size_t)joined.body_b * PACKED, row);
 }
 
 /* Sums with arms r + d, of a pair of `count` points. */
@@ -143,11 +143,11 @@ static __device__ __forceinline__ int32_t side_of_lane(const contact_view &conta
     return contacts.lanes == 1 ? -1 : lane;
 }
 
-/* The records of a pair from its lanes' sums. `first`: also what depends on arms alone. `inverse`: of the body at the lane's
- * side. Every lane of the warp comes here. */
+/* The records of a pair from its lanes' sums. `first`: also what depends on arms alone. `inverse`: of the body at the
+ * lane's side. Every lane of the warp comes here. */
 static __device__ __forceinline__ void store_sides(const model_view &model, const body_view &bodies,
                                                    const contact_view &contacts, const weight_view &weights, bool live,
-                                                   int32_t p, int32_t lane, int32_t count, const pair_ends &ends,
+                                                   int32_t p, int32_t lane, int32_t count, const pair_bodies &joined,
                                                    const real4 &difference, bool first, const rigid_inverse &inverse,
                                                    struct pair_sums *sums)
 {
@@ -159,7 +159,7 @@ static __device__ __forceinline__ void store_sides(const model_view &model, cons
     if (first && model.contact_rows == 1) sum_pair<ARM_END, PAIR_SUMS>(contacts, sums);
 #pragma unroll
     for (int32_t side = 0; side < 2; ++side) {
-        const int32_t body = side ? ends.body_b : ends.body_a;
+        const int32_t body = side ? joined.body_b : joined.body_a;
         if (side) shift_sums(sums, count, d);
         if (!live || body >= model.bodies || (own >= 0 && own != side)) continue;
         store_side(weights, p, side, count, share, first, sums);

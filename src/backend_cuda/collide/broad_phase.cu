@@ -193,7 +193,7 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) refit_kernel(const _
 
 /* ---- pairs ----------------------------------------------------------------------------------------------------- */
 
-/* What a radix sort of all the room needs. */
+/* What a radix sort of the whole capacity needs. */
 static __global__ void __launch_bounds__(COLLISION_THREADS) clear_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t i = collision_thread(COLLISION_THREADS);
@@ -378,7 +378,8 @@ static __global__ void __launch_bounds__(TILE_ROWS) tiles_kernel(const __grid_co
         if (i >= first) hits &= i - first < TILE_COLUMNS - 1 ? ~UINT64_C(0) << (i - first + 1) : 0;
         for (uint64_t left = hits; left; left &= left - 1) {
             const int j = trailing_zeros(left);
-            if (!may_meet(v, own, others.filters[j]) || !leaves_meet(v, leaf, others.leaves[j], step.dt)) hits ^= left & (0 - left);
+            if (!may_meet(v, own, others.filters[j]) || !leaves_meet(v, leaf, others.leaves[j], step.dt))
+                hits ^= left & (0 - left);
         }
     }
     const uint32_t slot = (uint32_t)leaf.slot;

@@ -14,13 +14,13 @@ sadmm_status COLLISION(upload)(struct sadmm_cuda_collision *collision, void *str
 
 /* Find all contacts: the same set, in the same order, with the same impulses and caches as sadmm_collision_find. The
  * current set is the previous step's on entry and the new one on success; after a failure it is what it was. Waits
- * for the stream once at the end, or once more for every time that room has to grow. */
+ * for the stream once at the end, or once more for every time that a capacity has to grow. */
 sadmm_status COLLISION(find)(struct sadmm_cuda_collision *collision, void *stream,
                              const struct sadmm_collision_input *input, struct sadmm_cuda_contacts *out,
                              struct sadmm_error *error);
 
 /* The current set, copied to the host, as it is once the work on the stream is done. `contacts` is unchanged (but for
- * its room) after a failure. */
+ * its capacity) after a failure. */
 sadmm_status COLLISION(download)(struct sadmm_cuda_collision *collision, void *stream,
                                  struct sadmm_contact_set *contacts, struct sadmm_error *error);
 
@@ -34,12 +34,12 @@ sadmm_status COLLISION(attach)(struct sadmm_cuda_collision *collision, void *str
                                const struct sadmm_collision_input *input, const struct sadmm_collision_body *bodies,
                                const int32_t *abort_code, const double *dt, const double *gravity,
                                struct sadmm_error *error);
-/* Room for so many candidates and points in both sets, which keep what they hold. 0: what a scene of this size is likely
- * to need. Everything enqueued must be done. *candidates and *points: what there is room for now, at least as much. */
+/* Capacity for so many candidates and points in both sets, which keep what they hold. 0: what a scene of this size is
+ * likely to need. Everything enqueued must be done. *candidates and *points: the capacities now, at least as much. */
 sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *collision, int64_t *candidates, int64_t *points,
                                 struct sadmm_error *error);
-/* Launches alone, so that a graph may record them: find contacts into set `into` (0 or 1), from the other one. The counts
- * say afterwards whether everything fitted (nothing is written to the set when not). */
+/* Launches alone, so that a graph may record them: find contacts into set `into` (0 or 1), from the other one. The
+ * counts say afterwards whether everything fitted (nothing is written to the set when not). */
 sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *collision, void *stream, int into,
                                 struct sadmm_error *error);
 /* A set's pointers; counts are not filled. */

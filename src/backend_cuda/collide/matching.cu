@@ -22,7 +22,8 @@ static __device__ void emit_counts(const collision_view &v, uint64_t total, doub
 }
 
 /* Point `lane` of candidate i; place: pairs << 32 | points before it. */
-static __device__ void emit_point(const collision_view &v, const step_lengths &dt, int64_t i, int32_t lane, uint64_t place)
+static __device__ void emit_point(const collision_view &v, const step_lengths &dt, int64_t i, int32_t lane,
+                                  uint64_t place)
 {
     const int32_t count = v.sizes[i], at = (int32_t)(place >> 32), first = (int32_t)(uint32_t)place;
     if (lane >= count) return;

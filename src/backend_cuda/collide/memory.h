@@ -33,7 +33,8 @@ static const char *const buffer_names[BUFFERS] = {
     "contact pairs", "contact points", "contact keys", "contact counts",
     "contact pairs", "contact points", "contact keys", "contact counts",
     "shapes", "geometries", "bodies", "list of shapes", "planes", "disabled pairs", "friction pairs", "friction values",
-    "staged shapes", "staged geometries", "staged bodies", "staged list of shapes", "staged planes", "staged disabled pairs",
+    "staged shapes", "staged geometries", "staged bodies", "staged list of shapes", "staged planes",
+    "staged disabled pairs",
     "staged friction pairs", "staged friction values", "staged contact pairs", "staged contact points",
     "staged contact keys", "staged contact counts",
 };
@@ -191,8 +192,8 @@ static inline sadmm_status launch(struct sadmm_cuda_collision *c, const struct c
     return SADMM_OK;
 }
 
-static inline sadmm_status copy(struct sadmm_cuda_collision *c, void *to, const void *from, size_t bytes, bool to_device,
-                         struct sadmm_error *error)
+static inline sadmm_status copy(struct sadmm_cuda_collision *c, void *to, const void *from, size_t bytes,
+                                bool to_device, struct sadmm_error *error)
 {
     const auto kind = to_device ? cudaMemcpyHostToDevice : cudaMemcpyDeviceToHost;
     if (bytes > 0)
@@ -219,8 +220,8 @@ static inline struct collision_set set_of(const struct sadmm_cuda_collision *c, 
 sadmm_status COLLISION(take_input)(struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input,
                                    const struct sadmm_collision_body *bodies, struct sadmm_error *error);
 /* Everything after the input, repeated until everything fits; `counts` of the new set. */
-sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots, struct sadmm_cuda_contact_counts *counts,
-                                   struct sadmm_error *error);
+sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots,
+                                   struct sadmm_cuda_contact_counts *counts, struct sadmm_error *error);
 sadmm_status COLLISION(reserve_set)(struct sadmm_cuda_collision *c, int which, size_t pairs, size_t points,
                                       struct sadmm_error *error);
 

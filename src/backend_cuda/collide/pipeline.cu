@@ -1,7 +1,7 @@
 /* The pipeline's entries: contact sets to and fro, finds.
  *
- * Pinned memory is written only while nothing reads it: every entry that leaves work on the stream behind sets `pending`,
- * and the next one waits first.
+ * Pinned memory is written only while nothing reads it: every entry that leaves work on the stream behind sets
+ * `pending`, and the next one waits first.
  */
 #include <string.h>
 
@@ -10,7 +10,7 @@
 #include "backend_cuda/device/parallel.h"
 #include "memory.h"
 
-/* Shapes from which the tree pays, room from which the radix sort does. */
+/* Shapes from which the tree pays, capacity from which the radix sort does. */
 enum { TREE_FROM = 6144 };
 static const int64_t RADIX_FROM = 16385;
 
@@ -134,9 +134,9 @@ extern "C" sadmm_status COLLISION(download)(struct sadmm_cuda_collision *c, void
     TRY(copy(c, in<void>(c, PINNED_PAIRS), from.pairs, pairs * sizeof *contacts->pairs, false, error));
     TRY(copy(c, in<void>(c, PINNED_POINTS), from.points, points * sizeof *contacts->points, false, error));
     TRY(wait(c, error));
-    if (!sadmm_grow((void **)&contacts->pairs, &contacts->pair_capacity, contacts->pair_count, pairs,
+    if (!sadmm_grow(&contacts->pairs, &contacts->pair_capacity, contacts->pair_count, pairs,
                     sizeof *contacts->pairs) ||
-        !sadmm_grow((void **)&contacts->points, &contacts->point_capacity, contacts->point_count, points,
+        !sadmm_grow(&contacts->points, &contacts->point_capacity, contacts->point_count, points,
                     sizeof *contacts->points))
         return sadmm_fail_memory(error, "contacts");
     if (pairs > 0) memcpy(contacts->pairs, in<void>(c, PINNED_PAIRS), pairs * sizeof *contacts->pairs);

@@ -8,15 +8,10 @@
 #ifndef SADMM_CUDA_COLLIDE_PIPELINE_H
 #define SADMM_CUDA_COLLIDE_PIPELINE_H
 
+#include "backend_cuda/device/found.h"
 #include "collision/collision.h"
 
 struct sadmm_cuda_collision;
-
-struct sadmm_cuda_contact_counts {
-    int64_t candidates; /* pairs of shapes whose boxes overlap */
-    int32_t pairs, points;
-    double dt;          /* of the step that the impulses are for, s; 0: of none */
-};
 
 /* The current set. Device memory, valid until the second find from now on, an upload or destroy. */
 struct sadmm_cuda_contacts {
@@ -37,15 +32,11 @@ struct sadmm_cuda_collision_stats {
 /* For tests and measurements; 0: the default. */
 struct sadmm_cuda_collision_tuning {
     int32_t tree_from;  /* shapes; below, all pairs are tested */
-    int64_t radix_from; /* room for candidates; below, they are ranked by counting */
-    int64_t first_capacity; /* the next find starts with room for so many candidates and points, whatever is allocated */
+    int64_t radix_from; /* capacity for candidates; below, they are ranked by counting */
+    int64_t
+        first_capacity; /* the next find starts with this capacity for candidates and points, whatever is allocated */
 };
 
-#ifdef SADMM_CUDA_EMULATED
-#define COLLISION(name) sadmm_cuda_collision_##name##_emulated
-#else
-#define COLLISION(name) sadmm_cuda_collision_##name
-#endif
 #include "entries.h"
 
 #endif

@@ -1,4 +1,5 @@
-/* The stages of a find: capacities and launches, repeated until everything fits, or enqueued once in the room there is.
+/* The stages of a find: capacities and launches, repeated until everything fits, or enqueued once with the capacities
+ * there are.
  */
 #include <algorithm>
 
@@ -178,11 +179,8 @@ static sadmm_status place_shapes(struct sadmm_cuda_collision *c, bool tree, stru
     return tree ? build_tree(c, error) : SADMM_OK;
 }
 
-/* More than needed, so that a growing number of contacts does not repeat every step. */
-static int64_t generous(int64_t needed, int64_t most) { return std::min(needed + needed / 4, most); }
-
-sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots, struct sadmm_cuda_contact_counts *counts,
-                                   struct sadmm_error *error)
+sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots,
+                                   struct sadmm_cuda_contact_counts *counts, struct sadmm_error *error)
 {
     struct collision_view *v = &c->view;
     const bool tree = v->leaf_count >= c->tree_from;
@@ -210,8 +208,9 @@ sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots,
             return sadmm_fail(error, SADMM_ERROR_LIMIT, "%lld pairs of shapes may touch: at most %d can be indexed",
                               (long long)counts->candidates, (int)MOST_CANDIDATES);
         if (counts->candidates > c->candidate_capacity)
-            c->candidate_capacity = generous(counts->candidates, MOST_CANDIDATES);
-        else if (counts->points > c->point_capacity) c->point_capacity = generous(counts->points, INT32_MAX);
+            c->candidate_capacity = std::min(generous(counts->candidates), MOST_CANDIDATES);
+        else if (counts->points > c->point_capacity)
+            c->point_capacity = std::min<int64_t>(generous(counts->points), INT32_MAX);
         else return SADMM_OK;
         ++c->stats.repeats;
         CUDA_CALL(c, cudaMemsetAsync(v->candidate_count, 0, sizeof *v->candidate_count, c->stream),
@@ -245,7 +244,8 @@ static sadmm_status keep_capacity(struct sadmm_cuda_collision *c, int name, size
     c->buffers[name].data = nullptr; /* the capacity stays: growth is by half at least */
     sadmm_status status = reserve(c, name, count, size, error);
     if (status == SADMM_OK) {
-        cudaError_t code = cudaMemcpyAsync(in<void>(c, name), old.data, old.capacity, cudaMemcpyDeviceToDevice, c->stream);
+        cudaError_t code =
+            cudaMemcpyAsync(in<void>(c, name), old.data, old.capacity, cudaMemcpyDeviceToDevice, c->stream);
         if (code == cudaSuccess) code = cudaStreamSynchronize(c->stream);
         if (code != cudaSuccess) status = fail(c, code, "cudaMemcpyAsync on the device", error);
     }

@@ -10,14 +10,14 @@
  *   emit     pairs and points in world terms, the last step's impulses             eight threads a candidate
  *
  * Candidates are appended in any order (an integer counter) and then sorted: keys are unique, so the result does not
- * depend on timing. The counter also counts what does not fit, hence a stage that lacks room says exactly how much it
- * needs: the kernels after it do nothing, the host, which reads the counts once at the end of the stage, makes room and
- * repeats it. Launches are sized by the room there is (the host does not know the counts).
+ * depend on timing. The counter also counts what does not fit, hence a stage whose capacity is too small says exactly
+ * how much it needs: the kernels after it do nothing, the host, which reads the counts once at the end of the stage,
+ * grows it and repeats it. Launches are sized by the capacities (the host does not know the counts).
  *
  * Small scenes are a matter of latency, not of work: few launches, and blocks so small that they spread over the whole
- * chip. With little room a candidate's place in the order is found by counting the smaller ones, and emit adds up the
- * contacts before its own: two launches where a radix sort and a scan need some eight. With more room the sort takes
- * all of it; unused candidates are all ones and go to the end.
+ * chip. With a small capacity a candidate's place in the order is found by counting the smaller ones, and emit adds up
+ * the contacts before its own: two launches where a radix sort and a scan need some eight. With a larger one the sort
+ * takes all of it; unused candidates are all ones and go to the end.
  *
  * A candidate is a child of a pair of shapes (sadmm_geometry): where every shape has one child, a pair. Shapes are
  * checked when they are taken over (input.cu), so that collision_table.h lists every pair that meets; one that it does
@@ -58,8 +58,8 @@ struct alignas(16) collision_leaf {
 };
 
 /* A leaf or an inner node of the tree. Inner nodes come first: [0, leaves - 1), then leaves in tree order. A walk goes
- * to `child` where boxes and groups meet, else to `next`: the node after the whole subtree, -1 at the end. It needs
- * no stack, and a walk that starts at a leaf's `next` sees later leaves only. Boxes are rounded outwards, so that a node
+ * to `child` where boxes and groups meet, else to `next`: the node after the whole subtree, -1 at the end. It needs no
+ * stack, and a walk that starts at a leaf's `next` sees later leaves only. Boxes are rounded outwards, so that a node
  * is one sector of memory; whether two leaves meet is decided by their own boxes. */
 struct alignas(32) collision_node {
     float lo[3], hi[3];
@@ -67,7 +67,7 @@ struct alignas(32) collision_node {
     int32_t next;
 };
 
-/* Of the leaves below a node. Looked at only where there are several groups. */
+/* Of the leaves below a node. Read only where there are several groups. */
 struct alignas(8) collision_groups {
     int32_t low, high;
 };
@@ -197,7 +197,7 @@ static __host__ __device__ __forceinline__ int32_t tile_columns(int32_t leaves)
     return 1 + (leaves + TILE_COLUMNS - 1) / TILE_COLUMNS;
 }
 
-/* Sizes are read in words of four; and one more than there is room for is scanned: its place is the sum of all. */
+/* Sizes are read in words of four; and one more than the capacity is scanned: its place is the sum of all. */
 enum { SIZES_BEYOND = 4 };
 
 /* A kernel's shared memory: one struct. */

@@ -36,8 +36,8 @@ static __device__ __forceinline__ body_thread body_of_thread(const model_view &m
     return body_of_slot(graph, slot, slot < live_bodies(model));
 }
 
-/* What a body's lane r < 6 has of it: rows r of A and A^-1, components r of v and b; 0 in the others. RIGID: of the rows what is
- * in the block of 3 x 3 on the diagonal, the rest is 0. */
+/* What a body's lane r < 6 has of it: rows r of A and A^-1, components r of v and b; 0 in the others. RIGID: of the
+ * rows what is in the block of 3 x 3 on the diagonal, the rest is 0. */
 template <bool RIGID> struct wide_row {
     double a[RIGID ? 3 : 6], a_inverse[RIGID ? 3 : 6], velocity, b;
 };
@@ -52,7 +52,8 @@ static __device__ __forceinline__ wide_row<RIGID> row_of_body(const body_view &b
     if (RIGID) {
         const int32_t r = t.lane % 3;
 #pragma unroll
-        for (int k = 0; k < 3; ++k) { /* fetched in any case: what a lane fetches under a condition is waited for one by one */
+        for (int k = 0; k < 3;
+             ++k) { /* fetched in any case: what a lane fetches under a condition is waited for one by one */
             const bool turns = t.lane >= 3, on = turns || k == r;
             const double a = (double)line[turns ? 1 + packed_place(r, k) : 0],
                          a_inverse = inverse[turns ? packed_place(r + 3, k + 3) : 0];

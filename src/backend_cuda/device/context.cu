@@ -34,7 +34,7 @@ static const char *const buffer_names[] = {
     "penalties",
     "normals",
     "arms between bodies",
-    "pairs' ends",
+    "pairs' bodies",
     "arms",
     "impulses",
     "constraints given by rows",
@@ -80,6 +80,11 @@ static void release(cuda_buffer *buffer)
     if (buffer->data) (void)(buffer->pinned ? cudaFreeHost(buffer->data) : cudaFree(buffer->data));
     buffer->data = nullptr;
     buffer->capacity = 0;
+}
+
+void CUDA(release_buffers)(struct sadmm_context *c)
+{
+    for (cuda_buffer &buffer : c->buffers) release(&buffer);
 }
 
 sadmm_status CUDA(reserve)(struct sadmm_context *c, enum cuda_buffer_name name, size_t bytes, struct sadmm_error *error)
@@ -143,17 +148,18 @@ void CUDA(plan_settings)(struct sadmm_context *c, const struct sadmm_settings *s
     c->view.model.wrenches = settings->recover_wrenches;
 }
 
-sadmm_status CUDA(use_settings)(struct sadmm_context *c, const struct sadmm_settings *settings, struct sadmm_error *error)
+sadmm_status CUDA(use_settings)(struct sadmm_context *c, const struct sadmm_settings *settings,
+                                struct sadmm_error *error)
 {
     double numbers[SADMM_SETTING_NUMBERS];
     const struct cuda_settings kept = {*settings, gravity_size(settings->gravity)};
-    CUDA_TRY(CUDA(reserve)(c, BUFFER_SETTINGS, sizeof kept, error));
-    CUDA_TRY(CUDA(reserve)(c, PINNED_SETTINGS, sizeof kept, error));
+    TRY(CUDA(reserve)(c, BUFFER_SETTINGS, sizeof kept, error));
+    TRY(CUDA(reserve)(c, PINNED_SETTINGS, sizeof kept, error));
     CUDA(plan_settings)(c, settings);
     c->view.model.settings = &((const struct cuda_settings *)c->buffers[BUFFER_SETTINGS].data)->settings;
     sadmm_settings_numbers(settings, numbers);
     if (memcmp(c->numbers, numbers, sizeof numbers) == 0) return SADMM_OK;
-    CUDA_TRY(CUDA(upload)(c, c->buffers[BUFFER_SETTINGS].data, PINNED_SETTINGS, 0, &kept, sizeof kept, error));
+    TRY(CUDA(upload)(c, c->buffers[BUFFER_SETTINGS].data, PINNED_SETTINGS, 0, &kept, sizeof kept, error));
     memcpy(c->numbers, numbers, sizeof numbers);
     return SADMM_OK;
 }
@@ -225,8 +231,8 @@ sadmm_status CUDA(launch)(struct sadmm_context *c, cuda_kernel kernel, const cha
     return CUDA(launch_of)(c, kernel, name, blocks, THREADS, args, error);
 }
 
-static sadmm_status launch_blocks(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
-                                  bool early, const cuda_args *args, struct sadmm_error *error)
+static sadmm_status launch_blocks(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
+                                  int threads, bool early, const cuda_args *args, struct sadmm_error *error)
 {
     struct cuda_partition plain = {};
     if (blocks <= 0) return SADMM_OK;
@@ -242,125 +248,8 @@ sadmm_status CUDA(launch_of)(struct sadmm_context *c, cuda_kernel kernel, const 
     return launch_blocks(c, kernel, name, blocks, threads, false, args, error);
 }
 
-sadmm_status CUDA(launch_early)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
-                                const cuda_args *args, struct sadmm_error *error)
+sadmm_status CUDA(launch_early)(struct sadmm_context *c, cuda_kernel kernel, const char *name, int64_t blocks,
+                                int threads, const cuda_args *args, struct sadmm_error *error)
 {
     return launch_blocks(c, kernel, name, blocks, threads, true, args, error);
-}
-
-/* ---- devices -------------------------------------------------------------------------------------------------- */
-
-struct probe_result {
-    bool found;
-    char about[512];
-};
-
-static probe_result probe(void)
-{
-    probe_result result = {false, ""};
-    int count = 0;
-    cudaError_t code = cudaGetDeviceCount(&count);
-    if (code != cudaSuccess || count == 0) {
-        (void)cudaGetLastError();
-        snprintf(result.about, sizeof result.about, "no CUDA device: %s",
-                 code != cudaSuccess ? cudaGetErrorString(code) : "the driver lists none");
-        return result;
-    }
-    cudaDeviceProp properties;
-    code = cudaGetDeviceProperties(&properties, 0);
-    if (code != cudaSuccess) {
-        (void)cudaGetLastError();
-        snprintf(result.about, sizeof result.about, "CUDA device 0 does not answer: %s", cudaGetErrorString(code));
-        return result;
-    }
-    result.found = true;
-    snprintf(result.about, sizeof result.about, "%s, compute capability %d.%d, %d multiprocessors; %d device%s",
-             properties.name, properties.major, properties.minor, properties.multiProcessorCount, count,
-             count == 1 ? "" : "s");
-    return result;
-}
-
-extern "C" bool CUDA(probe)(const char **about)
-{
-    static const probe_result result = probe(); /* once a process: starting the driver takes a while */
-    *about = result.about;
-    return result.found;
-}
-
-static sadmm_status open_device(struct sadmm_context *c, struct sadmm_error *error)
-{
-    int cooperative = 0, clusters = 0, count = 0;
-    CUDA_CALL(c, cudaGetDeviceCount(&count), "cudaGetDeviceCount");
-    if (c->device < 0 || c->device >= count)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "device = %d: must be in [0, %d]", c->device, count - 1);
-    CUDA_ENTER(c);
-    CUDA_CALL(c, cudaDeviceGetAttribute(&c->multiprocessors, cudaDevAttrMultiProcessorCount, c->device),
-              "cudaDeviceGetAttribute");
-    CUDA_CALL(c, cudaDeviceGetAttribute(&c->shared_limit, cudaDevAttrMaxSharedMemoryPerBlockOptin, c->device),
-              "cudaDeviceGetAttribute");
-    CUDA_CALL(c, cudaDeviceGetAttribute(&cooperative, cudaDevAttrCooperativeLaunch, c->device),
-              "cudaDeviceGetAttribute");
-    CUDA_CALL(c, cudaDeviceGetAttribute(&clusters, cudaDevAttrClusterLaunch, c->device), "cudaDeviceGetAttribute");
-    c->cooperative = cooperative != 0;
-    CUDA_CALL(c, CUDA(persistent_allow)(c->shared_limit, clusters != 0, &c->clusters), "loading the kernels");
-    c->early = c->clusters && EARLY_ARCH <= CLUSTER_ARCH; /* the same devices, the same code */
-    CUDA_CALL(c, LAYOUT(one_block_allow)(c->shared_limit), "loading the kernels");
-    CUDA_CALL(c, cudaStreamCreateWithFlags(&c->stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
-    CUDA_CALL(c, cudaStreamCreateWithFlags(&c->side, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
-    CUDA_CALL(c, cudaEventCreateWithFlags(&c->fork, cudaEventDisableTiming), "cudaEventCreateWithFlags");
-    CUDA_CALL(c, cudaEventCreateWithFlags(&c->join, cudaEventDisableTiming), "cudaEventCreateWithFlags");
-    return SADMM_OK;
-}
-
-/* ---- entries -------------------------------------------------------------------------------------------------- */
-
-extern "C" sadmm_status CUDA(create)(int device, struct sadmm_context **out, struct sadmm_error *error)
-{
-    struct sadmm_context *c = (struct sadmm_context *)sadmm_alloc(1, sizeof *c);
-    *out = nullptr;
-    if (!c) return sadmm_fail_memory(error, "the cuda backend's context");
-    c->device = device;
-    sadmm_status status = open_device(c, error);
-    if (status != SADMM_OK) {
-        CUDA(destroy)(c);
-        return status;
-    }
-    *out = c;
-    return SADMM_OK;
-}
-
-extern "C" void CUDA(destroy)(struct sadmm_context *c)
-{
-    if (!c) return;
-    if (c->stream) { /* a device was opened; after a device error these calls fail, and there is nothing left to free */
-        device_scope scope(c->device);
-        (void)cudaStreamSynchronize(c->stream);
-        CUDA(step_destroy)(c);
-        if (c->graph) (void)cudaGraphExecDestroy(c->graph);
-        for (cuda_buffer &buffer : c->buffers) release(&buffer);
-        if (c->join) (void)cudaEventDestroy(c->join);
-        if (c->fork) (void)cudaEventDestroy(c->fork);
-        if (c->side) (void)cudaStreamDestroy(c->side);
-        (void)cudaStreamDestroy(c->stream);
-        (void)cudaGetLastError();
-    }
-    sadmm_free(c);
-}
-
-extern "C" void CUDA(tune_capacities)(struct sadmm_context *c, int64_t first_capacity)
-{
-    c->first_capacity = first_capacity;
-}
-
-extern "C" void CUDA(set_tier)(struct sadmm_context *c, enum sadmm_cuda_tier tier)
-{
-    c->wanted = tier;
-}
-
-extern "C" void CUDA(set_cluster)(struct sadmm_context *c, int blocks) { c->wanted_cluster = blocks; }
-
-extern "C" enum sadmm_cuda_tier CUDA(get_tier)(const struct sadmm_context *c, int32_t *blocks)
-{
-    if (blocks) *blocks = c->partition.parts;
-    return c->partition.tier;
 }

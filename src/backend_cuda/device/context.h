@@ -1,4 +1,5 @@
-/* A context of the CUDA backend: device, streams, buffers, what the entries are made of. What kernels see is in view.h. */
+/* A context of the CUDA backend: device, streams, buffers, what the entries are made of. What kernels see is in
+ * view.h. */
 #ifndef SADMM_CUDA_DEVICE_CONTEXT_H
 #define SADMM_CUDA_DEVICE_CONTEXT_H
 
@@ -18,8 +19,9 @@ struct cuda_buffer {
 enum cuda_buffer_name {
     /* device */
     BUFFER_STATE, BUFFER_B, BUFFER_LINES, BUFFER_C, BUFFER_BETA,
-    BUFFER_NORMAL, BUFFER_DIFFERENCE, BUFFER_PAIR_ENDS, BUFFER_ARM, BUFFER_LAMBDA,
-    BUFFER_ROW_CONSTRAINTS, BUFFER_ROWS, BUFFER_ROW_RESPONSES, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_EXCHANGE, BUFFER_LIVE, BUFFER_LAYOUT, BUFFER_SORT,
+    BUFFER_NORMAL, BUFFER_DIFFERENCE, BUFFER_PAIR_BODIES, BUFFER_ARM, BUFFER_LAMBDA,
+    BUFFER_ROW_CONSTRAINTS, BUFFER_ROWS, BUFFER_ROW_RESPONSES, BUFFER_RECORDS, BUFFER_CHANGE, BUFFER_EXCHANGE,
+    BUFFER_LIVE, BUFFER_LAYOUT, BUFFER_SORT,
     BUFFER_NUMBERS, BUFFER_SCALARS, BUFFER_SETTINGS, BUFFER_WEIGHTS, BUFFER_SIDES,
     BUFFER_RAW_BODIES, BUFFER_RAW_PAIRS, BUFFER_RAW_POINTS, BUFFER_RAW_ROWS, BUFFER_OUT,
     BUFFER_WORLD_BODIES, BUFFER_WORLD_STEADY, BUFFER_WORLD_WRENCH, BUFFER_WORLD_VELOCITY, BUFFER_WORLD_IMPULSE,
@@ -40,7 +42,7 @@ struct sadmm_context {
     const struct sadmm_system *system;
     struct sadmm_plan plan;
     struct sadmm_settings settings;
-    double numbers[SADMM_SETTING_NUMBERS]; /* of the settings that are, or will be, in BUFFER_SETTINGS; dt = 0: unknown */
+    double numbers[SADMM_SETTING_NUMBERS]; /* that are, or will be, in BUFFER_SETTINGS; dt = 0: unknown */
     cuda_view view;
     cuda_buffer buffers[BUFFER_COUNT];
     bool starting; /* no iteration yet: the next Step 1 uses J^T lambda^0, which `records` may not hold yet */
@@ -53,7 +55,7 @@ struct sadmm_context {
     int refreshes; /* fast: of the weights, in this solve */
     int exact_since; /* fast: iterations since the momentum residuals were taken */
     int checks;     /* fast: at the stop rule, in this step */
-    bool prologue;     /* fast: of the whole step that is enqueued, the iterating kernels do the prologue and the epilogue (iterate/prologue.h) */
+    bool prologue; /* fast: the iterating kernels of the step enqueued do prologue and epilogue (iterate/prologue.h) */
     unsigned cleared; /* enum cuda_scalar: those that a kernel of this step has set to 0 for their first use */
     bool recording; /* a graph of the whole step: nothing is allocated, no graph launched in it */
 
@@ -66,7 +68,7 @@ struct sadmm_context {
     bool numbered;                   /* BUFFER_NUMBERS is filled */
 
     struct cuda_step *step; /* the world, where whole steps are made here */
-    int64_t first_capacity;     /* for tests: candidates and points there is room for at first; 0: as likely */
+    int64_t first_capacity;     /* for tests: first capacities for candidates and points; 0: by the number of shapes */
     unsigned refused;       /* bit of a tier: a part was too large */
 
     cudaGraphExec_t graph; /* GRAPH_ITERATIONS plain iterations */
@@ -77,6 +79,7 @@ struct sadmm_context {
 /* ---- device/context.cu ---- */
 
 sadmm_status CUDA(fail)(struct sadmm_context *, cudaError_t code, const char *what, struct sadmm_error *error);
+void CUDA(release_buffers)(struct sadmm_context *);
 /* At least `bytes` in a buffer; what it held is lost when it grows. */
 sadmm_status CUDA(reserve)(struct sadmm_context *, enum cuda_buffer_name name, size_t bytes, struct sadmm_error *error);
 /* Launch blocks of THREADS on the stream; 0 blocks: nothing to do. */
@@ -85,10 +88,10 @@ sadmm_status CUDA(launch)(struct sadmm_context *, cuda_kernel kernel, const char
 /* The same with blocks of so many threads. */
 sadmm_status CUDA(launch_of)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
                              const cuda_args *args, struct sadmm_error *error);
-/* The same for a kernel that waits itself (wait_for_stream): in a whole step it comes to its multiprocessors while the ones
- * before it end. */
-sadmm_status CUDA(launch_early)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks, int threads,
-                                const cuda_args *args, struct sadmm_error *error);
+/* The same for a kernel that waits itself (wait_for_stream): in a whole step it comes to its multiprocessors while the
+ * ones before it end. */
+sadmm_status CUDA(launch_early)(struct sadmm_context *, cuda_kernel kernel, const char *name, int64_t blocks,
+                                int threads, const cuda_args *args, struct sadmm_error *error);
 /* How many of the partition's clusters the device runs side by side; 0: clusters that large do not exist. */
 cudaError_t CUDA(active_clusters)(const struct sadmm_context *, cuda_kernel kernel,
                                   const struct cuda_partition *partition, int *clusters);
@@ -107,10 +110,11 @@ sadmm_status CUDA(wait)(struct sadmm_context *, struct sadmm_error *error);
 /* The settings that are no numbers: from the next launch, or recording, on. */
 void CUDA(plan_settings)(struct sadmm_context *, const struct sadmm_settings *settings);
 /* All of them, the numbers into device memory. Nothing may be enqueued. */
-sadmm_status CUDA(use_settings)(struct sadmm_context *, const struct sadmm_settings *settings, struct sadmm_error *error);
+sadmm_status CUDA(use_settings)(struct sadmm_context *, const struct sadmm_settings *settings,
+                                struct sadmm_error *error);
 
-/* The context's device is current while this lives; then the caller's again. (Unnamed: a test program links these sources
- * twice, for a device and emulated, and each must keep its own.) */
+/* The context's device is current while this lives; then the caller's again. (Unnamed: a test program links these
+ * sources twice, for a device and emulated, and each must keep its own.) */
 namespace {
 struct device_scope {
     int before;
@@ -128,116 +132,11 @@ struct device_scope {
     device_scope scope((c)->device);    \
     CUDA_CALL((c), scope.code, "cudaSetDevice")
 
-/* ---- device/begin.cu ---- */
+/* ---- device/arrays.cu ---- */
 
 /* This precision's data for the view's counts and the partition (allocates). */
 sadmm_status CUDA(reserve_solver)(struct sadmm_context *, struct sadmm_error *error);
 
-/* ---- assemble/, weight/, iterate/: parts of the entries, launches only ---- */
-
-/* A, b and the start velocities: they need no contacts. */
-sadmm_status CUDA(enqueue_bodies)(struct sadmm_context *, struct sadmm_error *error);
-/* Of a whole step: penalties and factors at once, and whether it is what was planned for. fast: islands first;
- * c->prologue: all of it is left to the iterating kernel, and to the last two. */
-sadmm_status CUDA(enqueue_penalties)(struct sadmm_context *, struct sadmm_error *error);
-/* fast: a solve begins: its first weights come next. */
-void CUDA(begin_weights)(struct sadmm_context *);
-/* fast: what weights of islands depend on beside the islands. */
-cuda_args CUDA(weight_args)(const struct sadmm_context *);
-/* fast: islands, and B of row blocks; then B, C and, for `factor`, H. `planned` as above. */
-sadmm_status CUDA(enqueue_islands)(struct sadmm_context *, struct sadmm_error *error);
-sadmm_status CUDA(enqueue_weighted_penalties)(struct sadmm_context *, bool first, bool factor, bool planned,
-                                              struct sadmm_error *error);
-/* fast: all of that again, from the loads there are now. */
-sadmm_status CUDA(enqueue_weights)(struct sadmm_context *, bool factor, struct sadmm_error *error);
-/* fast: the bodies' momentum residuals, recomputed. */
-sadmm_status CUDA(enqueue_momentum_residuals)(struct sadmm_context *, struct sadmm_error *error);
-/* fast: (17), as a maximum with what view.iteration.residual[1] is. */
-sadmm_status CUDA(enqueue_momentum_residual)(struct sadmm_context *, struct sadmm_error *error);
-/* fast: by what islands are to be slowed down (iterate/slow.h), and how many, in *view.islands.limited. `suspected`:
- * the iterations have looked whether any is. */
-sadmm_status CUDA(enqueue_limit)(struct sadmm_context *, bool suspected, struct sadmm_error *error);
-/* fast: a convergence check after `done` iterations of a step. */
-sadmm_status CUDA(enqueue_convergence_check)(struct sadmm_context *, int done, struct sadmm_error *error);
-/* Iterations, as the entry; limit: what is wanted for the limit of energies after the last. */
-sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *, int count, bool measure, enum cuda_limit limit,
-                                      struct sadmm_error *error);
-/* (16) and (17) of the iteration that was measured, into view.iteration.residual. */
-sadmm_status CUDA(enqueue_residuals)(struct sadmm_context *, struct sadmm_error *error);
-/* (15) by view.iteration.residual. */
-sadmm_status CUDA(enqueue_balance)(struct sadmm_context *, struct sadmm_error *error);
-
-/* ---- step/world.cu, step/kernels.cu ---- */
-
-void CUDA(step_destroy)(struct sadmm_context *);
-sadmm_status CUDA(launch_edits)(struct sadmm_context *, const struct sadmm_resident_edit *edits, size_t count,
-                                struct sadmm_error *error);
-sadmm_status CUDA(launch_start)(struct sadmm_context *, struct sadmm_error *error);
-sadmm_status CUDA(launch_admit)(struct sadmm_context *, struct sadmm_error *error);
-sadmm_status CUDA(launch_finish)(struct sadmm_context *, struct sadmm_error *error);
-sadmm_status CUDA(launch_commit)(struct sadmm_context *, struct sadmm_error *error);
-
-/* ---- graph/layout.cu -------------------------------------------------------------------------------------------------
- * Counts and rooms in the view, then reserve_layout (it allocates); then per step, by enqueueing only: statistics and
- * layout of what view.raw points to. */
-
-sadmm_status CUDA(reserve_layout)(struct sadmm_context *, struct sadmm_error *error);
-/* The statistics; islands: also which bodies hang together (what BLOCK and CLUSTER need). */
-sadmm_status CUDA(enqueue_statistics)(struct sadmm_context *, bool islands, struct sadmm_error *error);
-/* Slots, offsets, incident, parts. A part that exceeds what the partition allows sets live->abort_code =
- * ABORT_PARTITION. */
-sadmm_status CUDA(enqueue_layout)(struct sadmm_context *, const struct cuda_partition *, struct sadmm_error *error);
-
-/* The same in one go; small scenes: in one kernel. */
-sadmm_status CUDA(enqueue_statistics_and_layout)(struct sadmm_context *, bool islands, const struct cuda_partition *,
-                                                 struct sadmm_error *error);
-/* The plan's counts to the device. */
-sadmm_status CUDA(upload_live)(struct sadmm_context *, enum cuda_abort, struct sadmm_error *error);
-/* Wait for what the device knows now. */
-sadmm_status CUDA(download_known)(struct sadmm_context *, struct cuda_known *out, struct sadmm_error *error);
-
-/* ---- assemble/rows.cu: constraints given by rows, as core has them ---- */
-
-size_t CUDA(raw_row_bytes)(int32_t count); /* of constraints */
-void CUDA(bind_raw_rows)(struct sadmm_context *, void *memory);
-sadmm_status CUDA(upload_rows)(struct sadmm_context *, struct sadmm_error *error);
-
-/* ---- iterate/streamed.cu, iterate/persistent.cu ---- */
-
-/* STREAM. fast, goes_on: none of them is the batch's last. */
-sadmm_status CUDA(stream_iterations)(struct sadmm_context *, int count, bool measure, bool goes_on, struct sadmm_error *error);
-/* Before a measured iteration: its primal residual. */
-sadmm_status CUDA(clear_primal)(struct sadmm_context *, bool measure, struct sadmm_error *error);
-/* The instance of the persistent kernel for a tier (rows: there are constraints given by rows); threads a block at most;
- * bytes of shared memory. */
-cuda_kernel CUDA(persistent_kernel)(int point_slots, enum sadmm_cuda_tier tier, int threads, bool rows, bool fast,
-                                  const char **name);
-/* Whether the instance for a partition, without constraints given by rows, does the prologue and the epilogue of a
- * step of `fast`, too. */
-bool CUDA(persistent_does_prologue)(const struct cuda_partition *);
-/* The most threads of a block; and of one whose threads have all the registers they want. */
-int CUDA(persistent_threads)(int point_slots, bool rows);
-int CUDA(persistent_small_threads)(void);
-size_t CUDA(persistent_shared)(enum sadmm_cuda_tier tier, int threads, int32_t most_bodies);
-/* Let every instance use `bytes` of shared memory a block, and clusters of more than 8 blocks. *clusters: whether both the
- * device and the code that was loaded for it know clusters. */
-cudaError_t CUDA(persistent_allow)(int bytes, bool device_has_clusters, bool *clusters);
-
-/* ---- graph/partition.cu ---- */
-
-/* The tier and its thread blocks, from the statistics of this step (or of one like it), the plan and the device. */
-sadmm_status CUDA(choose_partition)(struct sadmm_context *, const struct cuda_graph_statistics *statistics,
-                                    struct cuda_partition *partition, struct sadmm_error *error);
-/* Fewer threads, where the layout made for it has smaller parts (statistics->part_sides, part_bodies) than could be
- * known. */
-void CUDA(tighten_partition)(const struct sadmm_context *, const struct cuda_graph_statistics *statistics,
-                             struct cuda_partition *partition);
-
-#define CUDA_TRY(call)                                  \
-    do {                                                \
-        sadmm_status try_status = (call);               \
-        if (try_status != SADMM_OK) return try_status;  \
-    } while (0)
 #define CUDA_CALL(c, call, name)                                                \
     do {                                                                        \
         cudaError_t try_code = (call);                                          \
@@ -253,7 +152,7 @@ template <size_t N>
 static inline sadmm_status reserve_all(struct sadmm_context *c, const cuda_capacity (&wanted)[N],
                                        struct sadmm_error *error)
 {
-    for (const cuda_capacity &one : wanted) CUDA_TRY(CUDA(reserve)(c, one.name, one.bytes, error));
+    for (const cuda_capacity &one : wanted) TRY(CUDA(reserve)(c, one.name, one.bytes, error));
     return SADMM_OK;
 }
 

@@ -1,5 +1,5 @@
 /* The entries of the kernel table for one precision, in C: CUDA(name) is set by the includer. */
-#include "backend_cuda/graph/layout.h"
+#include "layout.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -7,7 +7,7 @@ extern "C" {
 
 /* Whether a device can be used; *about (static storage): what was found, or why not. */
 bool CUDA(probe)(const char **about);
-/* Whole steps: room for so many candidates and points at first; 0: as likely (tests). */
+/* Whole steps: the first capacities for candidates and points; 0: by the number of shapes (tests). */
 void CUDA(tune_capacities)(struct sadmm_context *, int64_t first_capacity);
 void CUDA(set_tier)(struct sadmm_context *, enum sadmm_cuda_tier tier);
 /* For tests: blocks a cluster where there are clusters (0: as likely the fastest); what `live` says from now on. */
@@ -16,7 +16,7 @@ sadmm_status CUDA(set_abort)(struct sadmm_context *, enum cuda_abort, struct sad
 enum sadmm_cuda_tier CUDA(get_tier)(const struct sadmm_context *, int32_t *blocks);
 
 /* For tests: a convergence check after `done` iterations of a solve; *unmet: islands that do not meet it yet. */
-sadmm_status CUDA(look)(struct sadmm_context *, int done, int32_t *unmet, struct sadmm_error *);
+sadmm_status CUDA(check_convergence)(struct sadmm_context *, int done, int32_t *unmet, struct sadmm_error *);
 
 /* For tests: statistics and layout of the last begin's system once more, for this partition, aborted from the start or
  * not; `way`: of enum cuda_layout_way. */
@@ -45,8 +45,8 @@ sadmm_status CUDA(integrate)(struct sadmm_context *, struct sadmm_rigid *next, s
 sadmm_status CUDA(recover_wrenches)(struct sadmm_context *, double *wrench, struct sadmm_error *);
 
 /* core/solve/resident.h */
-sadmm_status CUDA(load_world)(struct sadmm_context *, const struct sadmm_resident_world *, const struct sadmm_settings *,
-                              struct sadmm_error *);
+sadmm_status CUDA(load_world)(struct sadmm_context *, const struct sadmm_resident_world *,
+                              const struct sadmm_settings *, struct sadmm_error *);
 sadmm_status CUDA(step_world)(struct sadmm_context *, const struct sadmm_settings *, const struct sadmm_resident_edit *,
                               size_t, struct sadmm_error *);
 sadmm_status CUDA(wait_world)(struct sadmm_context *, struct sadmm_resident_report *, struct sadmm_error *);

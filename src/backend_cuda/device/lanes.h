@@ -13,8 +13,8 @@ template <int COUNT> static __device__ __forceinline__ void sum_lanes(double x[C
         for (int k = 0; k < COUNT; ++k) x[k] += __shfl_xor_sync((unsigned)ALL_LANES, x[k], o);
 }
 
-/* A component of x in each lane: that of M x, by the lane's row of M; of three numbers where M is two blocks of 3 x 3. Every
- * lane of the warp comes here. */
+/* A component of x in each lane: that of M x, by the lane's row of M; of three numbers where M is two blocks of 3 x 3.
+ * Every lane of the warp comes here. */
 template <int SIZE> static __device__ __forceinline__ double product(double x, const double (&row)[SIZE])
 {
     const int32_t first = SIZE == 6 || (int32_t)threadIdx.x % LANES < SIZE ? 0 : SIZE;

@@ -1,7 +1,7 @@
 /* A body's matrices in memory: one packed "line", lower triangles row by row.
  *
- *   rigid    m, then the world inertia's 6 and 1 unused; H's 21 and 3 unused        LINE_RIGID numbers, 128 bytes in f32
- *   general  A's 21 and 3 unused; H's 21 and 3 unused                               LINE_GENERAL numbers
+ *   rigid    m, then the world inertia's 6 and 1 unused; H's 21 and 3 unused      LINE_RIGID numbers, 128 bytes in f32
+ *   general  A's 21 and 3 unused; H's 21 and 3 unused                             LINE_GENERAL numbers
  *
  * H is stored once and read as both sides, so that it is symmetric to the last bit.
  */

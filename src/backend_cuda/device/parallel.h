@@ -7,7 +7,7 @@
 
 #include <cuda_runtime.h>
 
-#include "backend_cuda/collide/pipeline.h"
+#include "found.h"
 
 /* Sort keys[0] by their low `bits` bits, stably, with values[0] (values NULL: keys alone); the result is in
  * keys[*result], values[*result]. temp NULL: only *bytes is set, to what temp must hold. */

@@ -22,7 +22,7 @@ struct alignas(16) row_data {
 
 struct row_constraint {
     int32_t body_a, body_b; /* raw; the static world: `bodies` */
-    int32_t side_a, side_b; /* as in pair_ends */
+    int32_t side_a, side_b; /* as in pair_bodies */
     int32_t rows;
     int32_t cone;           /* rows 0 to 2 are a contact's normal and tangents */
     solver_real friction;

@@ -6,36 +6,36 @@
  *     (E = 2 lambda - lambda_prev), on a -f, -sum r_a x E_k.
  *   - A "side" is one constraint as seen by one of its dynamic bodies: 2 record + side (0: on a, 1: on b); its
  *     record is the wrench on that body. Bodies gather the records of their sides over a CSR list in a fixed order. No
- * float     atomics: a result does not depend on timing, thread count, grid size or tier, bit for bit (the sources are
+ *     float atomics: a result does not depend on timing, thread count, grid size or tier, bit for bit (the sources are
  *     compiled without contraction of a * b + c for the same reason).
  *   - Sums over a pair's points, p_0 to p_7: q_j = p_j + p_{j+4} (p_j alone where there is no p_{j+4}, 0 where there is
  *     no p_j), then (q_0 + q_1) + (q_2 + q_3): four lanes of a warp make it in two exchanges.
- *   - Records are in the order of the bodies' lists, so that a body reads its own one after the other; whoever writes them
- *     knows where they go. Points are stored pair by pair, four lanes a pair (point_slot).
+ *   - Records are in the order of the bodies' lists, so that a body reads its own one after the other; whoever writes
+ *     them knows where they go. Points are stored pair by pair, four lanes a pair (point_slot).
  *   - Eight lanes take a body: lane r < 6 owns component r of A v, of the gathered sum and of H g, H = (A + beta C)^-1.
  *
- * Order. Bodies are numbered by island, stably, where islands matter: "slots" (graph/layout.h). Pairs and row blocks keep
- * their raw order. Static bodies join nothing and share the state row after the last body, which is 0. Within a body's
- * list records ascend, so that the sums are the same in every tier.
+ * Order. Bodies are numbered by island, stably, where islands matter: "slots" (device/layout.h). Pairs and row blocks
+ * keep their raw order. Static bodies join nothing and share the state row after the last body, which is 0. Within a
+ * body's list records ascend, so that the sums are the same in every tier.
  *
  * Tiers of the fused entry
  *   BLOCK    islands packed into thread blocks, everything on the chip; only __syncthreads
  *   CLUSTER  islands packed into clusters of thread blocks, which read each other's velocities from shared memory
  *   GRID     one cooperative launch; velocities go through L2, with a grid barrier an iteration
  *   STREAM   two kernels an iteration, in a CUDA graph: any size
- * BLOCK, CLUSTER and GRID are one kernel (iterate/persistent.h) over a partition into `parts` (graph/partition.cu).
+ * BLOCK, CLUSTER and GRID are one kernel (iterate/persistent.h) over a partition into `parts` (iterate/partition.cu).
  *
- * The method `fast` has a weight B of its own for each constraint (weight/weights.cu) in place of beta, which is 1 then.
- * Its iteration is Steps 2-4 and then Step 1, relaxed (math/relax.h), by instances of its own of the same kernels;
- * slots are by island in every tier, since weights rest on sums over islands. It passes on changes alone: records are
- * J^T d lambda, and bodies keep their momentum residual b - A v + J^T lambda (docs/algorithm.md). It begins with the
- * multipliers: records are not kept.
+ * The method `fast` has a weight B of its own for each constraint (weight/weights.cu) in place of beta, which is 1
+ * then. Its iteration is Steps 2-4 and then Step 1, relaxed (math/relax.h), by instances of its own of the same
+ * kernels; slots are by island in every tier, since weights rest on sums over islands. It passes on changes alone:
+ * records are J^T d lambda, and bodies keep their momentum residual b - A v + J^T lambda (docs/algorithm.md). It begins
+ * with the multipliers: records are not kept.
  *
- * Launch sizes follow from what the host knows (rooms, tier); kernels read the true counts from `live`, and do nothing
- * once it says abort_code.
+ * Launch sizes follow from what the host knows (capacities, tier); kernels read the true counts from `live`, and do
+ * nothing once it says abort_code.
  *
- * Raw data (bodies, contact pairs and points, blocks as core has them, in double) is turned into this layout on the device.
- * In a whole step contact finding leaves it there; for a solve alone the host copies it.
+ * Raw data (bodies, contact pairs and points, blocks as core has them, in double) is turned into this layout on the
+ * device. In a whole step contact finding leaves it there; for a solve alone the host copies it.
  */
 #ifndef SADMM_CUDA_DEVICE_VIEW_H
 #define SADMM_CUDA_DEVICE_VIEW_H
@@ -47,9 +47,9 @@
 #include <cuda_runtime.h>
 
 #include "core/solve/kernels.h"
+#include "layout.h"
 #include "line.h"
-#include "backend_cuda/step/step.h"
-#include "backend_cuda/graph/layout_view.h"
+#include "step.h"
 
 typedef SADMM_REAL solver_real;
 
@@ -104,7 +104,7 @@ enum { TERMS = 6 }; /* of a body, in sums over islands */
 enum { SIDE_ARMS = 10, SIDE_LOAD = SIDE_ARMS, SIDE_RESPONSE, SIDE_NUMBERS };
 
 /* What a pair joins. */
-struct alignas(16) pair_ends {
+struct alignas(16) pair_bodies {
     int32_t body_a, body_b; /* raw; the static world: `bodies` */
     int32_t side_a, side_b; /* places of its sides in `incident`, and of their records; of the static world: -1.
                                For the stepwise kernels alone (streamed.cu) */
@@ -117,19 +117,19 @@ struct cuda_settings {
 };
 
 /* ---- what kernels see --------------------------------------------------------------------------------------------
- * A view a subject. Functions take those they read or write; kernels, and the few functions that need most of them, take
+ * A view a subject. Functions take those they read or write; kernels, and functions that need most of them, take
  * all together (cuda_view). Pointers are device memory. Arrays over bodies are in raw order but where it says slots
- * (graph/layout.h). */
+ * (device/layout.h). */
 
 /* The step's size, and what is the same for all of it. */
 struct model_view {
     struct cuda_live *live;
     struct cuda_graph_statistics *statistics;
-    const struct sadmm_settings *settings; /* its numbers alone (core/model/settings.h): they may be others at every step.
-                                              Fetched early, for a kernel waits for them as for other memory */
+    const struct sadmm_settings *settings; /* its numbers alone (core/model/settings.h), which may change at every step.
+                                              Kernels fetch them early: they are in memory */
     int32_t bodies;       /* exact, known to the host (state row `bodies` is the static world) */
     int32_t points;       /* capacity */
-    int32_t contact_rows; /* of C, B and the response: 1 where no contact has friction (the iteration has 3 in any case) */
+    int32_t contact_rows; /* of C, B and the response: 1 where no contact has friction (the iteration always has 3) */
     int32_t warm_start;
     int32_t fast, wrenches; /* of the settings that are no numbers: the method; recover_wrenches */
 };
@@ -148,7 +148,7 @@ struct body_view {
     double *free_energy; /* fast: bodies: of A^-1 b, J */
 };
 
-/* The constraint graph as it is laid out (graph/layout.h). */
+/* The constraint graph as it is laid out (device/layout.h). */
 struct graph_view {
     const int32_t *offsets, *incident; /* slot -> places of its sides; place -> side, ascending for each body */
     const int32_t *body_of, *slot_of;  /* slot -> raw body, raw body -> slot */
@@ -163,7 +163,7 @@ struct contact_view {
     int32_t point_slots;   /* a pair has memory for */
     real4 *normal;         /* pairs: n, mu */
     real4 *difference;     /* pairs: x_a - x_b, number of points */
-    pair_ends *ends;       /* pairs */
+    pair_bodies *bodies;      /* pairs */
     solver_real *inv_s;    /* fast: pairs: B / number of dynamic bodies */
     real4 *arm;            /* points: r_a (r_b when a is static), e */
     solver_real *lambda;   /* points: a plane for each of x, y, z */
@@ -229,9 +229,9 @@ struct cuda_view {
     struct cuda_step_view step; /* whole steps alone */
 };
 
-/* Kernels that are launched early (launch_early): until all that was enqueued before has ended. First of all, but for what is
- * fetched from memory that the kernel before does not write: that one has waited itself, or was launched after all others had
- * ended. */
+/* Programmatic dependent launch (launch_early): wait until all kernels enqueued before have ended. To be called before
+ * anything is read that the kernel before writes. What that kernel does not write may be fetched earlier: the kernels
+ * before it have ended, because it has waited itself or was not launched early. */
 static __device__ __forceinline__ void wait_for_stream(void)
 {
 #if !defined(SADMM_CUDA_EMULATED) && __CUDA_ARCH__ >= EARLY_ARCH
@@ -239,8 +239,8 @@ static __device__ __forceinline__ void wait_for_stream(void)
 #endif
 }
 
-/* The next kernel, where launched early, may come to its multiprocessors and do what it does before it waits. Where this one has
- * waited. */
+/* Programmatic dependent launch: the next kernel, where launched early, may begin and run up to its own wait. To be
+ * called after this one's wait. */
 static __device__ __forceinline__ void let_next_begin(void)
 {
 #if !defined(SADMM_CUDA_EMULATED) && __CUDA_ARCH__ >= EARLY_ARCH
@@ -260,8 +260,8 @@ static __device__ __forceinline__ size_t point_slot(const contact_view &contacts
     return contacts.lanes == 1 ? point_slot<1>(contacts, p, k) : point_slot<4>(contacts, p, k);
 }
 
-/* Points of a pair that are fetched before the first of them is used: a thread that waits for memory point by point waits
- * longest of all. */
+/* Points of a pair that are fetched before the first of them is used: a thread that waits for memory point by point
+ * waits longest of all. */
 enum { POINTS_AT_ONCE = 4 };
 
 /* This step's counts; 0 when it is aborted. Both are in one load. */
@@ -280,8 +280,16 @@ static __device__ __forceinline__ int32_t live_rows(const model_view &model, con
     return model.live->abort_code ? 0 : rows.count;
 }
 
-/* What an iterating kernel does about energies after its last iteration: it says whether an island may have too much, or it
- * sees to everything (BLOCK). */
+/* Before the first kernel of a solve that counts islands: those slowed down, those that have stopped. */
+static __device__ __forceinline__ void clear_counts(const island_view &islands)
+{
+    const cuda_stop none = {};
+    *islands.limited = *islands.suspects = 0;
+    *islands.stop = none;
+}
+
+/* What an iterating kernel does about energies after its last iteration: it says whether an island may have too much,
+ * or it sees to everything (BLOCK). */
 enum cuda_limit { LIMIT_NONE, LIMIT_SUSPECTS, LIMIT_WHOLE };
 
 /* What differs between launches of a kernel. */

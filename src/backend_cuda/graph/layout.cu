@@ -1,7 +1,8 @@
-/* The layout on the host's side (graph/layout.h): its arrays, what enqueues its stages, and what is known of a step. */
+/* The layout on the host's side (device/layout.h): its arrays, what enqueues its stages, and what is known of a
+ * step. */
 #include <string.h>
 
-#include "backend_cuda/device/context.h"
+#include "graph.h"
 
 /* ---- arrays ---------------------------------------------------------------------------------------------------- */
 
@@ -42,7 +43,7 @@ static sadmm_status number(struct sadmm_context *c, size_t count, struct sadmm_e
 {
     cuda_buffer *numbers = &c->buffers[BUFFER_NUMBERS];
     size_t before = numbers->capacity;
-    CUDA_TRY(CUDA(reserve)(c, BUFFER_NUMBERS, count * sizeof(int32_t), error));
+    TRY(CUDA(reserve)(c, BUFFER_NUMBERS, count * sizeof(int32_t), error));
     if (numbers->capacity == before && c->numbered) return SADMM_OK;
     c->numbered = false;
     CUDA_CALL(
@@ -70,8 +71,8 @@ sadmm_status CUDA(reserve_layout)(struct sadmm_context *c, struct sadmm_error *e
         {BUFFER_LAYOUT, place_arrays(c, nullptr, l)},
         {BUFFER_SORT, temp},
     };
-    CUDA_TRY(reserve_all(c, wanted, error));
-    CUDA_TRY(number(c, sides > (size_t)v->model.bodies ? sides : (size_t)v->model.bodies, error));
+    TRY(reserve_all(c, wanted, error));
+    TRY(number(c, sides > (size_t)v->model.bodies ? sides : (size_t)v->model.bodies, error));
     place_arrays(c, (int32_t *)c->buffers[BUFFER_LAYOUT].data, l);
     CUDA_CALL(c, cudaMemsetAsync(l->kept, 0, sizeof *l->kept, c->stream), "cudaMemsetAsync(layout)");
     CUDA_CALL(c, cudaMemsetAsync(c->buffers[BUFFER_LIVE].data, 0, sizeof(cuda_known), c->stream),
@@ -127,7 +128,7 @@ sadmm_status CUDA(enqueue_statistics)(struct sadmm_context *c, bool islands, str
 sadmm_status CUDA(enqueue_layout)(struct sadmm_context *c, const struct cuda_partition *partition,
                                   struct sadmm_error *error)
 {
-    CUDA_TRY(check_partition(c, partition, error));
+    TRY(check_partition(c, partition, error));
     CUDA_CALL(c,
               c->one_block ? LAYOUT(one_block)(&c->layout, false, false, partition, c->stream, &c->kernel)
                            : LAYOUT(make)(&c->layout, partition, c->stream, &c->kernel),
@@ -139,11 +140,11 @@ sadmm_status CUDA(enqueue_statistics_and_layout)(struct sadmm_context *c, bool i
                                              const struct cuda_partition *partition, struct sadmm_error *error)
 {
     if (!c->one_block) {
-        CUDA_TRY(CUDA(enqueue_statistics)(c, islands, error));
+        TRY(CUDA(enqueue_statistics)(c, islands, error));
         return CUDA(enqueue_layout)(c, partition, error);
     }
     bind_raw(c);
-    CUDA_TRY(check_partition(c, partition, error));
+    TRY(check_partition(c, partition, error));
     CUDA_CALL(c, LAYOUT(one_block)(&c->layout, true, islands, partition, c->stream, &c->kernel), c->kernel);
     return SADMM_OK;
 }
@@ -163,7 +164,7 @@ sadmm_status CUDA(download_known)(struct sadmm_context *c, struct cuda_known *ou
               cudaMemcpyAsync(c->buffers[PINNED_LIVE].data, c->view.model.live, sizeof *out, cudaMemcpyDeviceToHost,
                               c->stream),
               "cudaMemcpyAsync from the device");
-    CUDA_TRY(CUDA(wait)(c, error));
+    TRY(CUDA(wait)(c, error));
     memcpy(out, c->buffers[PINNED_LIVE].data, sizeof *out);
     return SADMM_OK;
 }
@@ -173,12 +174,12 @@ sadmm_status CUDA(download_known)(struct sadmm_context *c, struct cuda_known *ou
 extern "C" sadmm_status CUDA(set_abort)(struct sadmm_context *c, enum cuda_abort abort_code, struct sadmm_error *error)
 {
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(wait)(c, error));
+    TRY(CUDA(wait)(c, error));
     c->placed = false; /* what was to place records while aborted did nothing */
     return CUDA(upload_live)(c, abort_code, error);
 }
 
-/* Survey and layout as a graph, launched twice: captured, nothing may depend on when it runs or what ran before. */
+/* Statistics and layout as a graph, launched twice: captured, nothing may depend on when it runs or what ran before. */
 static sadmm_status run_graph(struct sadmm_context *c, const struct cuda_partition *partition,
                               struct sadmm_error *error)
 {
@@ -205,8 +206,8 @@ extern "C" sadmm_status CUDA(lay_out_again)(struct sadmm_context *c, const struc
     const cuda_view *v = &c->view;
     struct cuda_known known;
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(wait)(c, error));
-    CUDA_TRY(CUDA(upload_live)(c, abort_code, error));
+    TRY(CUDA(wait)(c, error));
+    TRY(CUDA(upload_live)(c, abort_code, error));
     out->one_block = c->one_block && !(way & CUDA_LAYOUT_GENERAL);
     bool chosen = c->one_block;
     c->one_block = out->one_block;
@@ -218,8 +219,8 @@ extern "C" sadmm_status CUDA(lay_out_again)(struct sadmm_context *c, const struc
         if (status == SADMM_OK) status = CUDA(enqueue_layout)(c, partition, error);
     }
     c->one_block = chosen;
-    CUDA_TRY(status);
-    CUDA_TRY(CUDA(download_known)(c, &known, error));
+    TRY(status);
+    TRY(CUDA(download_known)(c, &known, error));
     out->live = known.live;
     out->statistics = known.statistics;
     size_t n = (size_t)v->model.bodies, sides = known.statistics.sides >= 0 ? (size_t)known.statistics.sides : 0,
@@ -234,8 +235,8 @@ extern "C" sadmm_status CUDA(lay_out_again)(struct sadmm_context *c, const struc
                   {out->incident, v->graph.incident, sides},
                   {out->parts, v->graph.parts, parts}};
     for (const auto &one : arrays) {
-        CUDA_TRY(CUDA(reserve)(c, PINNED_OUT, one.count * sizeof(int32_t), error));
-        CUDA_TRY(CUDA(download)(c, one.from, one.count * sizeof(int32_t), error));
+        TRY(CUDA(reserve)(c, PINNED_OUT, one.count * sizeof(int32_t), error));
+        TRY(CUDA(download)(c, one.from, one.count * sizeof(int32_t), error));
         if (one.count > 0) memcpy(one.to, c->buffers[PINNED_OUT].data, one.count * sizeof(int32_t));
     }
     return SADMM_OK;

@@ -1,4 +1,4 @@
-/* The layout of a scene of any size: a kernel a stage, sorts by CUB (graph/layout_view.h). */
+/* The layout of a scene of any size: a kernel a stage, sorts by CUB (graph/layout_kernels.h). */
 #include "backend_cuda/device/parallel.h"
 #include "layout_steps.h"
 

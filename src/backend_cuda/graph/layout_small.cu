@@ -1,4 +1,4 @@
-/* The whole layout of a small scene by one block, in shared memory (graph/layout_view.h). */
+/* The whole layout of a small scene by one block, in shared memory (graph/layout_kernels.h). */
 #include "layout_steps.h"
 
 /* A body or side to be sorted is one number, key << ITEM_BITS | index: indices ascend within a key. */

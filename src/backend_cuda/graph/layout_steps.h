@@ -1,11 +1,11 @@
-/* What a thread, a warp or a block does in the layout (graph/layout_view.h): shared by the kernels of any size and the
- * one for small scenes. The view's arrays may be in global or shared memory. */
+/* What a thread, a warp or a block does in the layout (graph/layout_kernels.h): shared by the kernels of any size and
+ * the one for small scenes. The view's arrays may be in global or shared memory. */
 #ifndef SADMM_CUDA_GRAPH_LAYOUT_STEPS_H
 #define SADMM_CUDA_GRAPH_LAYOUT_STEPS_H
 
 #include <stddef.h>
 
-#include "layout_view.h"
+#include "layout_kernels.h"
 
 #define LAYOUT_INLINE static __device__ __forceinline__
 
@@ -59,9 +59,9 @@ LAYOUT_INLINE void gather_statistics(struct cuda_graph_statistics *block, const 
 
 /* ---- islands --------------------------------------------------------------------------------------------------- */
 
-/* Parents only ever get smaller, on the way to the root, so an old one is as good as a new one. Several threads read and
- * write them at once. SHARED: in a block's memory, atomically; else they are read past the caches of multiprocessors: atomics
- * on the root of a large island would queue up. */
+/* Parents only ever get smaller, on the way to the root, so an old one is as good as a new one. Several threads read
+ * and write them at once. SHARED: in a block's memory, atomically; else they are read past the caches of
+ * multiprocessors: atomics on the root of a large island would queue up. */
 template <bool SHARED> LAYOUT_INLINE int32_t parent_of(const int32_t *parents, int32_t i)
 {
     return SHARED ? atomicAdd(const_cast<int32_t *>(&parents[i]), 0) : *(const volatile int32_t *)&parents[i];
@@ -116,7 +116,8 @@ LAYOUT_INLINE bool starts_warm(const layout_view &v, int32_t first, int32_t coun
     return false;
 }
 
-/* What a pair joins, two numbers at a time: threads ask for neighbours, which are far apart, and what counts is how often. */
+/* What a pair joins, two numbers at a time: threads ask for neighbours, which are far apart, and what counts is how
+ * often. */
 struct pair_about {
     int2 bodies, points; /* a, b; first, count */
 };

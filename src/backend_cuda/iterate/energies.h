@@ -1,5 +1,5 @@
-/* The method `fast`: energies of islands, and by what they are slowed down (math/limit.h). In double, from this precision's data;
- * eight lanes a body. */
+/* The method `fast`: energies of islands, and by what they are slowed down (math/limit.h). In double, from this
+ * precision's data; eight lanes a body. */
 #ifndef SADMM_CUDA_ITERATE_ENERGIES_H
 #define SADMM_CUDA_ITERATE_ENERGIES_H
 
@@ -18,8 +18,8 @@ static inline __device__ double work_of(const contact_view &contacts, int32_t p)
     return work;
 }
 
-/* Terms of a body, one a lane: energy of v, of A^-1 b, of r = b + g - A v, g = J^T lambda; work; v . b / 2. A pair counts at
- * its first dynamic body. Every lane of the warp comes here. */
+/* Terms of a body, one a lane: energy of v, of A^-1 b, of r = b + g - A v, g = J^T lambda; work; v . b / 2. A pair
+ * counts at its first dynamic body. Every lane of the warp comes here. */
 template <bool RIGID>
 static __device__ __forceinline__ double energies_of_body(const cuda_view &v, const body_thread &t)
 {
@@ -28,7 +28,7 @@ static __device__ __forceinline__ double energies_of_body(const cuda_view &v, co
     for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) {
         const int32_t code = v.graph.incident[at], p = code / 2;
         add_side(v.contacts, v.rows, code, sums, &sums[PUSH]);
-        if (p >= v.contacts.pair_capacity || (code & 1 && is_dynamic(v.model, v.contacts.ends[p].body_a)))
+        if (p >= v.contacts.pair_capacity || (code & 1 && is_dynamic(v.model, v.contacts.bodies[p].body_a)))
             continue; /* counted there */
         sums[WORK] += work_of(v.contacts, p);
     }

@@ -1,6 +1,8 @@
 /* The fused iteration in any tier, and the residuals (16), (17). */
 #include <string.h>
 
+#include "backend_cuda/weight/weight.h"
+#include "iterate.h"
 #include "sweep.h"
 
 #include "core/math/limit.h"
@@ -27,8 +29,8 @@ static sadmm_status persistent_iterations(struct sadmm_context *c, int count, en
     args.cluster = partition->cluster;
     cuda_kernel kernel = CUDA(persistent_kernel)(c->statistics.point_slots, partition->tier, partition->threads,
                                                  c->view.rows.count > 0, c->fast, &name);
-    if (partition->tier == SADMM_CUDA_TIER_GRID) CUDA_TRY(CUDA(clear)(c, SCALAR_BARRIER, error));
-    CUDA_TRY(CUDA(launch_partition)(c, kernel, name, partition, true, &args, error));
+    if (partition->tier == SADMM_CUDA_TIER_GRID) TRY(CUDA(clear)(c, SCALAR_BARRIER, error));
+    TRY(CUDA(launch_partition)(c, kernel, name, partition, true, &args, error));
     c->starting = false;
     c->settled = true;
     return SADMM_OK;
@@ -39,7 +41,7 @@ static sadmm_status persistent_iterations(struct sadmm_context *c, int count, en
 static sadmm_status measured_batch(struct sadmm_context *c, int count, struct sadmm_error *error)
 {
     if (count > 1) {
-        CUDA_TRY(persistent_iterations(c, count - 1, LIMIT_NONE, true, error));
+        TRY(persistent_iterations(c, count - 1, LIMIT_NONE, true, error));
         c->measured = c->rescaled = false; /* joined */
     }
     return CUDA(stream_iterations)(c, 1, true, false, error);
@@ -56,15 +58,15 @@ static sadmm_status iterations_of_tier(struct sadmm_context *c, int count, bool 
 sadmm_status CUDA(enqueue_iterations)(struct sadmm_context *c, int count, bool measure, enum cuda_limit limit,
                                       struct sadmm_error *error)
 {
-    CUDA_TRY(CUDA(clear_primal)(c, measure, error));
+    TRY(CUDA(clear_primal)(c, measure, error));
     while (count > 0) {
         if (c->fast && c->exact_since == RELAX_RESIDUAL_PERIOD) {
-            CUDA_TRY(CUDA(enqueue_momentum_residuals)(c, error));
+            TRY(CUDA(enqueue_momentum_residuals)(c, error));
             c->exact_since = 0;
         }
         const int left = c->fast ? RELAX_RESIDUAL_PERIOD - c->exact_since : count, now = count < left ? count : left;
         const bool goes_on = now < count;
-        CUDA_TRY(iterations_of_tier(c, now, measure && !goes_on, goes_on ? LIMIT_NONE : limit, goes_on, error));
+        TRY(iterations_of_tier(c, now, measure && !goes_on, goes_on ? LIMIT_NONE : limit, goes_on, error));
         if (c->fast) c->exact_since += now;
         count -= now;
     }
@@ -102,7 +104,7 @@ static __global__ void dual_kernel(const __grid_constant__ cuda_view v, const __
 sadmm_status CUDA(enqueue_residuals)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    CUDA_TRY(CUDA(clear)(c, SCALAR_DUAL, error));
+    TRY(CUDA(clear)(c, SCALAR_DUAL, error));
     if (c->fast) return CUDA(enqueue_momentum_residual)(c, error);
     return CUDA(launch)(c, dual_kernel, "measure_residuals", blocks_for((int64_t)c->view.model.bodies * LANES), &args,
                         error);
@@ -113,8 +115,8 @@ extern "C" sadmm_status CUDA(measure_residuals)(struct sadmm_context *c, struct 
 {
     double both[2];
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(enqueue_residuals)(c, error));
-    CUDA_TRY(CUDA(download)(c, c->view.iteration.residual, sizeof both, error));
+    TRY(CUDA(enqueue_residuals)(c, error));
+    TRY(CUDA(download)(c, c->view.iteration.residual, sizeof both, error));
     memcpy(both, c->buffers[PINNED_OUT].data, sizeof both);
     residual->primal = both[0];
     residual->dual = both[1];

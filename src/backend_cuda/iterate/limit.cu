@@ -1,14 +1,16 @@
-/* The method `fast`: the limit of energies (math/limit.h). In double, from this precision's data; once a step, eight lanes a body.
+/* The method `fast`: the limit of energies (math/limit.h). In double, from this precision's data; once a step, eight
+ * lanes a body.
  *
- *   suspect   is there a body with more energy than its free motion has, or that bounces? Else no island does. Resident
- *             kernels look themselves, those of tier BLOCK see to the rest too
- *   limit     nothing, unless there is one: energies and work, sums over islands (weight/island_sums.h), the factor of each
- *             island's velocities. Whole steps apply it where they move bodies (step/kernels.cu)
+ *   suspect   is there a body with more energy than its free motion has, or that bounces? Else no island does.
+ *             Persistent kernels test that themselves, those of tier BLOCK see to the rest too
+ *   limit     nothing, unless there is one: energies and work, sums over islands (weight/island_sums.h), the factor of
+ *             each island's velocities. Whole steps apply it where they move bodies (step/kernels.cu)
  */
 #include <string.h>
 
 #include "backend_cuda/device/double.h"
 #include "energies.h"
+#include "iterate.h"
 #include "backend_cuda/weight/island_sums.h"
 
 #include "core/math/relax.h"
@@ -63,7 +65,7 @@ static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const ch
 
 sadmm_status CUDA(enqueue_limit)(struct sadmm_context *c, bool suspected, struct sadmm_error *error)
 {
-    if (!suspected) CUDA_TRY(launch(c, suspect_kernel, "energies", error));
+    if (!suspected) TRY(launch(c, suspect_kernel, "energies", error));
     return launch(c, limit_kernel, "limit", error);
 }
 
@@ -73,9 +75,9 @@ extern "C" sadmm_status CUDA(limit_velocity)(struct sadmm_context *c, int32_t *l
 {
     cuda_args args = {};
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(enqueue_limit)(c, false, error));
-    CUDA_TRY(CUDA(launch)(c, slow_kernel, "limit_velocity", blocks_for(c->view.model.bodies), &args, error));
-    CUDA_TRY(CUDA(download)(c, c->view.islands.limited, sizeof *limited, error));
+    TRY(CUDA(enqueue_limit)(c, false, error));
+    TRY(CUDA(launch)(c, slow_kernel, "limit_velocity", blocks_for(c->view.model.bodies), &args, error));
+    TRY(CUDA(download)(c, c->view.islands.limited, sizeof *limited, error));
     memcpy(limited, c->buffers[PINNED_OUT].data, sizeof *limited);
     if (*limited > 0) c->exact_since = RELAX_RESIDUAL_PERIOD; /* residuals are recomputed, should anything follow */
     return SADMM_OK;

@@ -1,4 +1,5 @@
 /* The fused iteration (persistent.h): which instance runs, and what it takes. */
+#include "iterate.h"
 #include "persistent.h"
 
 /* Rows take registers that blocks of more threads do not have. */
@@ -55,12 +56,13 @@ static cudaError_t allow_shared(enum sadmm_cuda_tier tier, int bytes)
     const persistent_instances all = instances_of(tier);
     cudaError_t code = cudaSuccess;
     for (size_t k = 0; k < all.count && code == cudaSuccess; ++k)
-        code = cudaFuncSetAttribute((const void *)all.first[k].kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, bytes);
+        code =
+            cudaFuncSetAttribute((const void *)all.first[k].kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, bytes);
     return code;
 }
 
-/* Clusters of more than 8 blocks, if the code has cluster barriers: what was compiled for earlier devices (__CUDA_ARCH__ in
- * persistent.h) has none, wherever it runs. */
+/* Clusters of more than 8 blocks, if the code has cluster barriers: what was compiled for earlier devices
+ * (__CUDA_ARCH__ in persistent.h) has none, wherever it runs. */
 static cudaError_t allow_clusters(bool *clusters)
 {
     const persistent_instances all = CUDA(cluster_instances)();

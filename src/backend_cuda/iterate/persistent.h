@@ -13,8 +13,8 @@
  * A quad takes a side of a constraint given by rows, too, up to two rows a lane (persistent_rows.h); warps have sides of pairs
  * or of such constraints, never both.
  *
- * On entry and exit everything is in global memory as the stepwise kernels leave it. Before the first iteration and after
- * the last one of a step, BLOCK may also do what else an island needs (prologue.h).
+ * On entry and exit everything is in global memory as the stepwise kernels leave it. Before the first iteration and
+ * after the last one of a step, BLOCK may also do what else an island needs (prologue.h).
  */
 #ifndef SADMM_CUDA_ITERATE_PERSISTENT_H
 #define SADMM_CUDA_ITERATE_PERSISTENT_H
@@ -22,7 +22,7 @@
 #include "persistent_load.h"
 #include "persistent_steps.h"
 
-#include "backend_cuda/step/plan_check.h"
+#include "backend_cuda/device/plan_check.h"
 
 /* ---- the kernel ------------------------------------------------------------------------------------------------ */
 
@@ -43,8 +43,8 @@ static __device__ __forceinline__ bool nothing_to_do(const model_view &model, co
 /* All iterations of a batch by the method `fast` (math/relax.h): Steps 2-4, then Step 1. An iteration has the barriers of
  * the other method's. ROWS: of a warp whose sides are of constraints given by rows. */
 template <int MODE, int SIZE, bool ROWS, class Part>
-static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view &v, const cuda_args &args, real relaxation,
-                                                    row_lane *rows, unsigned *target)
+static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view &v, const cuda_args &args,
+                                                    real relaxation, row_lane *rows, unsigned *target)
 {
     int32_t count = args.count, batch = args.goes_on ? count + 1 : count, settled = args.settled;
     /* Were it the launch's constant, and not a choice, it would be fetched in every iteration. */
@@ -69,8 +69,8 @@ static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view 
 
 /* The same by the method `paper`: Step 1, then Steps 2-4. */
 template <int MODE, int SIZE, bool ROWS, class Part>
-static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view &v, const cuda_args &args, row_lane *rows,
-                                                     unsigned *target)
+static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view &v, const cuda_args &args,
+                                                     row_lane *rows, unsigned *target)
 {
     for (int32_t iteration = 1; iteration <= args.count; ++iteration) {
         const int32_t odd = iteration & 1;
@@ -91,19 +91,19 @@ static __device__ __forceinline__ void iterate(Part &part, const cuda_view &v, c
     unsigned target = 0;
     row_lane rows;
     if (ROWS) rows.load<FAST>(v, part.lane, part.is_row_side(), part.side_code);
-    if (FAST && MODE != BLOCK) { /* others look at the velocities that were loaded */
+    if (FAST && MODE != BLOCK) { /* others read the velocities that were loaded */
         arrive<MODE, SIZE>(v.iteration.barrier);
         wait<MODE, SIZE>(v.iteration.barrier, target += gridDim.x);
     }
     if (FAST) iterate_fast<MODE, SIZE, ROWS>(part, v, args, relaxation, &rows, &target);
     else iterate_paper<MODE, SIZE, ROWS>(part, v, args, &rows, &target);
-    /* Nobody looks into this block's memory once it is gone. */
+    /* No block may read this one's memory once it is gone. */
     if (!FAST && MODE == CLUSTER) {
         arrive<MODE, SIZE>(v.iteration.barrier);
         wait<MODE, SIZE>(v.iteration.barrier, 0);
     }
-    /* After the iterations: what has come takes a place beside them. A cooperative launch ends 10 us later for it, and after
-     * clusters it gains nothing. */
+    /* After the iterations: what has come takes a place beside them. A cooperative launch ends 10 us later for it, and
+     * after clusters it gains nothing. */
     if (MODE == BLOCK) let_next_begin();
     part.store_bodies(args.count & 1);
     if (!part.has_side() || part.side_stopped()) return;
@@ -115,7 +115,7 @@ static __device__ __forceinline__ void iterate(Part &part, const cuda_view &v, c
  * for either, and the others' loop is what it is without rows. */
 template <int MODE, int SIZE, bool FAST, bool PROLOGUE, bool ROWS, class Part>
 static __device__ __forceinline__ void run_batch(Part &part, const cuda_view &v, const cuda_args &args, real relaxation,
-                                                 const block_part &ends)
+                                                 const block_part &block)
 {
     if (ROWS && part.row_sides) iterate<MODE, SIZE, FAST, ROWS>(part, v, args, relaxation);
     else iterate<MODE, SIZE, FAST, false>(part, v, args, relaxation);
@@ -126,13 +126,14 @@ static __device__ __forceinline__ void run_batch(Part &part, const cuda_view &v,
         return;
     }
     if constexpr (PROLOGUE) {
-        if (suspected) *ends.suspected = 1;
+        if (suspected) *block.suspected = 1;
         block_barrier<SIZE>();
-        if (*ends.suspected) limit_in_block(v, args.under_iterated, ends, [] { block_barrier<SIZE>(); });
+        if (*block.suspected) limit_in_block(v, args.under_iterated, block, [] { block_barrier<SIZE>(); });
     }
 }
 
-/* A multiprocessor holds one block at least: unless told so the compiler gives a block of one warp fewer registers than it needs. */
+/* A multiprocessor holds one block at least: unless told so the compiler gives a block of one warp fewer registers than
+ * it needs. */
 template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST>
 static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     persistent_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
@@ -147,20 +148,20 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     }
     part_run<POINTS, MODE, ROWS, SIZE, FAST> part(v, args, memory);
     const auto barrier = [] { block_barrier<SIZE>(); };
-    const block_part ends = part.ends();
-    if (PROLOGUE && threadIdx.x == 0) *ends.suspected = 0;
+    const block_part block = part.for_prologue();
+    if (PROLOGUE && threadIdx.x == 0) *block.suspected = 0;
     const bool begins = PROLOGUE && args.begin;
     if constexpr (PROLOGUE)
-        if (begins) store_first_terms(v, ends, part.found);
+        if (begins) store_first_terms(v, block, part.found);
     part.fetch_side(); /* on its way while islands are weighed */
     if constexpr (PROLOGUE)
         if (begins) {
-            weigh_in_block(v, args, ends, part.found, barrier);
+            weigh_in_block(v, args, block, part.found, barrier);
             stamp_assembled(v.step);
         }
     const real relaxation = FAST ? (real)v.model.settings->relaxation : (real)1; /* on its way with what is loaded */
     part.load();
-    run_batch<MODE, SIZE, FAST, PROLOGUE, ROWS>(part, v, args, relaxation, ends);
+    run_batch<MODE, SIZE, FAST, PROLOGUE, ROWS>(part, v, args, relaxation, block);
 }
 
 /* ---- instances ------------------------------------------------------------------------------------------------- */

@@ -61,7 +61,7 @@ PART __device__ __forceinline__ void PART_RUN::fetch_side(void)
     if (side >= sides || is_row_side()) return;
     about = v.contacts.normal[p];
     between = v.contacts.difference[p];
-    on = v.contacts.ends[p];
+    on = v.contacts.bodies[p];
 #pragma unroll
     for (int32_t j = 0; j < COUNT; ++j) {
         const size_t slot = slot_or_first(lane + QUAD * j);
@@ -148,7 +148,7 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
         gathered = m.records + (found.begin - first_side) * ROW + record_slot(r);
         gathered_count = found.end - found.begin;
     }
-    many = __ballot_sync((unsigned)ALL_LANES, gathered_count > FEW) != 0;
+    many = __ballot_sync((unsigned)ALL_LANES, gathered_count > FETCHED_FIRST) != 0;
     own_record = (real2_pair *)kept_address<SIZE>(m.records + side * ROW + quad_slot(lane));
     if (!FAST && moves) momentum = free_momentum(own_body);
     if (found.live) m.state[body * ROW + r] = own_body.v;
@@ -200,7 +200,7 @@ PART __device__ __forceinline__ void PART_RUN::store_bodies(int32_t odd)
 PART __device__ __forceinline__ void PART_RUN::store_pair(void)
 {
     const int32_t code = v.graph.incident[first_side + side], p = code / 2;
-    if (code & 1 && v.contacts.ends[p].body_a != v.model.bodies) return;
+    if (code & 1 && v.contacts.bodies[p].body_a != v.model.bodies) return;
     const int32_t count = (int32_t)v.contacts.difference[p].w;
 #pragma unroll
     for (int32_t j = 0; j < COUNT; ++j) {

@@ -21,15 +21,16 @@ static constexpr int most_threads(int points, int size)
 }
 
 /* Records of a body that are fetched at once, whether it has them or not. */
-enum { FEW = 4 };
+enum { FETCHED_FIRST = 4 };
 
 /* ---- shared memory --------------------------------------------------------------------------------------------- */
 
-/* The same in every block of a launch: blocks of a cluster look into each other's memory. */
+/* The same in every block of a launch: blocks of a cluster read each other's memory. */
 struct part_memory {
     solver_real *state;      /* CLUSTER: of even, then of odd iterations; bodies x ROW each, then a row of 0 */
-    solver_real *records;    /* sides x ROW, and FEW rows that are read and not used */
-    solver_real *lines, *b;  /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x line, ROW; FAST:
+    solver_real *records;    /* sides x ROW, and FETCHED_FIRST rows that are read and not used */
+    solver_real *lines,
+        *b; /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x line, ROW; FAST:
                                 the momentum residual in place of b */
     int32_t *suspected;      /* a body of the part has too much energy */
     /* Before the first iteration and after the last one, over what is above (iterate/prologue.h): */
@@ -47,12 +48,12 @@ static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *
     size_t more = n > first ? n - first : 0;
     m->state = (solver_real *)base;
     m->records = m->state + ((cluster ? 2 * n : n) + 1) * ROW;
-    m->lines = m->records + (sides + FEW) * ROW;
+    m->lines = m->records + (sides + FETCHED_FIRST) * ROW;
     m->b = m->lines + more * LINE_GENERAL;
     m->terms = (double *)base;
     m->range = (island_range *)(m->terms + n * TERMS);
     size_t iterating = (size_t)(m->b + more * ROW - m->state) * sizeof(solver_real),
-           ends = n * (TERMS * sizeof(double) + sizeof(island_range)), used = iterating > ends ? iterating : ends;
+           around = n * (TERMS * sizeof(double) + sizeof(island_range)), used = iterating > around ? iterating : around;
     m->suspected = (int32_t *)(base + used);
     return used + SLACK;
 }

@@ -34,12 +34,12 @@ template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run 
     int32_t first_body, bodies, first_side, sides;
     body_thread found; /* the thread's first body */
 
-    /* One body for each eight threads is in registers, with where its records are; more are in shared memory. What the loop
-     * needs is worked out before it: addresses, and what holds for a whole warp. */
+    /* One body for each eight threads is in registers, with where its records are; more are in shared memory. What the
+     * loop needs is worked out before it: addresses, and what holds for a whole warp. */
     int32_t body;
     const solver_real *gathered; /* component r of the first record */
     int32_t gathered_count;      /* 0 in lanes that have no component */
-    bool many;                   /* some lane of the warp has more than FEW */
+    bool many;                   /* some lane of the warp has more than FETCHED_FIRST */
     bool moves, updates, row_sides; /* the warp has bodies, sides, sides of constraints given by rows */
     const solver_real *own_row;  /* of the side's own body in even iterations */
     solver_real *own_state;      /* the body's component r, in even iterations */
@@ -50,7 +50,7 @@ template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run 
     side_lane<POINTS> own;
     /* Until iterations begin (registers): what the side is, and its pair as it is in memory. */
     int32_t side_code;
-    pair_ends on;
+    pair_bodies on;
     real4 about, between, point[COUNT];
 
     __device__ __forceinline__ part_run(const cuda_view &view, const cuda_args &arguments, unsigned char *memory)
@@ -58,8 +58,8 @@ template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run 
           first_body(v.graph.parts[blockIdx.x]), bodies(v.graph.parts[blockIdx.x + 1] - first_body),
           first_side(v.graph.offsets[first_body]), sides(v.graph.offsets[first_body + bodies] - first_side),
           found(body_of_slot(v.graph, first_body + t / LANES, t / LANES < bodies)), body(t / LANES), gathered(nullptr),
-          gathered_count(0), many(false), moves(warp_has_body(0)), updates(warp_has_side()), row_sides(false), own_row(nullptr),
-          own_state(nullptr), own_record(nullptr), own_body(), momentum(0), sum(0), step(0), own(),
+          gathered_count(0), many(false), moves(warp_has_body(0)), updates(warp_has_side()), row_sides(false),
+          own_row(nullptr), own_state(nullptr), own_record(nullptr), own_body(), momentum(0), sum(0), step(0), own(),
           side_code(side < sides ? v.graph.incident[first_side + side] : 0), on(), about(), between(), point()
     {
         lay_out(&m, memory, MODE == CLUSTER, (int)blockDim.x, args.most_bodies);
@@ -83,7 +83,7 @@ template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run 
         return (size_t)v.graph.body_of[first_body + i / ROW] * ROW + (size_t)(i % ROW);
     }
     /* What prologue.h sees of it. */
-    __device__ __forceinline__ block_part ends(void) const
+    __device__ __forceinline__ block_part for_prologue(void) const
     {
         const block_part out = {first_body, bodies, m.terms, m.range, m.suspected};
         return out;

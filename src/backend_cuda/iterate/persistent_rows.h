@@ -16,7 +16,8 @@ struct row_lane {
     bool cone, stores;                   /* stores: of its constraint's two sides this one writes multipliers */
     bool cones;                          /* some lane of the warp has a cone */
 
-    template <bool FAST> __device__ __forceinline__ void load(const cuda_view &v, int32_t lane, bool live, int32_t code);
+    template <bool FAST>
+    __device__ __forceinline__ void load(const cuda_view &v, int32_t lane, bool live, int32_t code);
     template <bool FAST> __device__ __forceinline__ void update(const body_motion &mine, const body_motion &others);
     __device__ __forceinline__ void wrench(const real impulse[COUNT], vec3 *force, vec3 *torque) const;
     __device__ __forceinline__ void store(int32_t lane) const;

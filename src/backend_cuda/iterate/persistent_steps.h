@@ -11,18 +11,19 @@
  * there or not; where a lane of the warp has more, the next ones too before the first is added. */
 PART __device__ __forceinline__ real PART_RUN::gather(real g, const solver_real *from, int32_t count, bool more) const
 {
-    real few[FEW], value[MORE] = {};
+    real first[FETCHED_FIRST], value[MORE] = {};
 #pragma unroll
-    for (int32_t j = 0; j < FEW; ++j) few[j] = from[j * ROW];
+    for (int32_t j = 0; j < FETCHED_FIRST; ++j) first[j] = from[j * ROW];
     if (more) {
 #pragma unroll
-        for (int32_t j = 0; j < MORE; ++j) value[j] = FEW + j < count ? from[(FEW + j) * ROW] : (real)0;
+        for (int32_t j = 0; j < MORE; ++j)
+            value[j] = FETCHED_FIRST + j < count ? from[(FETCHED_FIRST + j) * ROW] : (real)0;
     }
 #pragma unroll
-    for (int32_t j = 0; j < FEW; ++j)
-        if (j < count) g += few[j];
+    for (int32_t j = 0; j < FETCHED_FIRST; ++j)
+        if (j < count) g += first[j];
     if (!more) return g;
-    for (int32_t h = FEW;;) {
+    for (int32_t h = FETCHED_FIRST;;) {
 #pragma unroll
         for (int32_t j = 0; j < MORE; ++j)
             if (h + j < count) g += value[j];
@@ -48,7 +49,7 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd)
         own_body.v += step_of(own_body, gather(momentum, gathered, gathered_count, many));
         publish(own_state, body, own_body.v, odd);
     }
-    if (SIZE == ONE_WARP) return; /* at most one body for each eight threads (graph/partition.cu) */
+    if (SIZE == ONE_WARP) return; /* at most one body for each eight threads (iterate/partition.cu) */
     const int32_t in_registers = (int32_t)blockDim.x / LANES;
     for (int32_t first = in_registers; warp_has_body(first); first += in_registers) {
         const int32_t i = first + body, at = i - in_registers;
@@ -58,7 +59,7 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies(int32_t odd)
         real g = free_momentum(one);
         if (live && r < 6) {
             const int32_t from = v.graph.offsets[first_body + i], count = v.graph.offsets[first_body + i + 1] - from;
-            g = gather(g, m.records + (from - first_side) * ROW + record_slot(r), count, count > FEW);
+            g = gather(g, m.records + (from - first_side) * ROW + record_slot(r), count, count > FETCHED_FIRST);
         }
         publish(m.state + i * ROW + r, i, one.v + step_of(one, g), odd);
     }
@@ -73,7 +74,7 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies_fast(int32_t odd, rea
         step = step_fast(&own_body, sum, relaxation);
         publish(own_state, body, own_body.v, odd);
     }
-    if (SIZE == ONE_WARP) return; /* at most one body for each eight threads (graph/partition.cu) */
+    if (SIZE == ONE_WARP) return; /* at most one body for each eight threads (iterate/partition.cu) */
     const int32_t in_registers = (int32_t)blockDim.x / LANES;
     for (int32_t first = in_registers; warp_has_body(first); first += in_registers) {
         const int32_t i = first + body, at = i - in_registers;
@@ -83,7 +84,7 @@ PART __device__ __forceinline__ void PART_RUN::move_bodies_fast(int32_t odd, rea
         real pushed = 0;
         if (live) {
             const int32_t from = v.graph.offsets[first_body + i], count = v.graph.offsets[first_body + i + 1] - from;
-            pushed = gather(0, m.records + (from - first_side) * ROW + record_slot(r), count, count > FEW);
+            pushed = gather(0, m.records + (from - first_side) * ROW + record_slot(r), count, count > FETCHED_FIRST);
         }
         const real gone = step_fast(&one, pushed, relaxation);
         publish(m.state + i * ROW + r, i, one.v, odd);
@@ -107,7 +108,8 @@ PART __device__ __forceinline__ void PART_RUN::update_sides(int32_t odd, real re
         const vec3 old = own.lambda[j], x = relative_velocity(other, own.other_arm[j], own_motion, own.own_arm[j]);
         const point_change to = update<FAST>(own.normal, own.friction, x, own.error[j], own.inv_s[j], old);
         own.lambda[j] = FAST ? relaxed(old, to, plain, relaxation_factor) : to.lambda;
-        const vec3 impulse = FAST ? to.delta : v3_add(to.lambda, to.delta), moment = fused_cross(own.own_arm[j], impulse);
+        const vec3 impulse = FAST ? to.delta : v3_add(to.lambda, to.delta),
+                   moment = fused_cross(own.own_arm[j], impulse);
         force = j == 0 ? impulse : v3_add(force, impulse);
         torque = j == 0 ? moment : v3_add(torque, moment);
     }
@@ -132,9 +134,10 @@ PART __device__ __forceinline__ void PART_RUN::update_rows(row_lane *rows, int32
     if (rows->rows) *own_record = sum;
 }
 
-/* ---- the limit of energies, of the method `fast` ------------------------------------------------------------------ */
+/* ---- the limit of energies, of the method `fast` ----------------------------------------------------------------- */
 
-/* Is there a body, one of those that this thread speaks for, that has more energy than it may? Of a world: rigid ones. */
+/* Is there a body, one of those that this thread speaks for, that has more energy than it may? Of a world: rigid
+ * ones. */
 PART __device__ __forceinline__ bool PART_RUN::suspect(int32_t odd) const
 {
     bool any = false;

@@ -1,6 +1,7 @@
-/* The method `fast` in tier BLOCK, where a thread block has whole islands: what a step does before its first iteration and after
- * its last one, by the kernel that iterates. In the other tiers, and for refreshes, these are kernels of their own
- * (weight/weights.cu, weight/penalty.cu, iterate/limit.cu); the functions are the same, and so are the results, bit for bit. */
+/* The method `fast` in tier BLOCK, where a thread block has whole islands: what a step does before its first iteration
+ * and after its last one, by the kernel that iterates. In the other tiers, and for refreshes, these are kernels of
+ * their own (weight/weights.cu, weight/penalty.cu, iterate/limit.cu); the functions are the same, and so are the
+ * results, bit for bit. */
 #ifndef SADMM_CUDA_ITERATE_PROLOGUE_H
 #define SADMM_CUDA_ITERATE_PROLOGUE_H
 
@@ -17,7 +18,8 @@ struct block_part {
     int32_t *suspected;  /* shared: 0 at first */
 };
 
-/* use(t, i) for the part's bodies, eight lanes each; `own`: the thread's first. Every thread of the block comes here. */
+/* use(t, i) for the part's bodies, eight lanes each; `own`: the thread's first. Every thread of the block comes
+ * here. */
 template <class Use>
 static __device__ __forceinline__ void for_each_body(const graph_view &graph, const block_part &part,
                                                      const body_thread &own, Use use)
@@ -45,7 +47,8 @@ static __device__ __forceinline__ void store_terms(const graph_view &graph, cons
 }
 
 /* What a solve begins with: terms of its bodies; then the weights, C and factors that follow. */
-static __device__ __forceinline__ void store_first_terms(const cuda_view &v, const block_part &part, const body_thread &own)
+static __device__ __forceinline__ void store_first_terms(const cuda_view &v, const block_part &part,
+                                                         const body_thread &own)
 {
     store_terms(v.graph, part, own, [&](const body_thread &t) { return terms_of_body<false, true, false>(v, t); });
 }
@@ -62,7 +65,8 @@ static __device__ __forceinline__ void weigh_in_block(const cuda_view &v, const 
         double C[PACKED];
         weigh_island<false>(&island, part.terms + first * TERMS, args);
         const bool own_sides = i < (int32_t)blockDim.x / LANES;
-        weighted_matrix<true>(v, t, own_sides ? fetched : fetch_sides(v.model, v.graph, v.contacts, v.weights, t, t.begin),
+        weighted_matrix<true>(v, t,
+                              own_sides ? fetched : fetch_sides(v.model, v.graph, v.contacts, v.weights, t, t.begin),
                               island, true, C);
         if (!t.live) return;
         if (i == first && t.lane == 0) v.islands.info[v.graph.label[t.body]] = island;

@@ -10,8 +10,8 @@ struct real2_pair {
     solver_real x, y;
 };
 
-/* Force and torque added over a quad as (q_0 + q_1) + (q_2 + q_3); lane 0 gets the force's x and y, lane 2 its z and 0, lanes
- * 1 and 3 the torque's. Every lane of the warp comes here. */
+/* Force and torque added over a quad as (q_0 + q_1) + (q_2 + q_3); lane 0 gets the force's x and y, lane 2 its z and 0,
+ * lanes 1 and 3 the torque's. Every lane of the warp comes here. */
 CUDA_INLINE real2_pair sum_quad(int32_t lane, vec3 force, vec3 torque)
 {
     const unsigned all = (unsigned)ALL_LANES;

@@ -1,7 +1,8 @@
-/* The method `fast`: what the momentum of bodies misses, b - A v + J^T lambda: taken again where it was kept up by
+/* The method `fast`: what the momentum of bodies misses, b - A v + J^T lambda: recomputed where it was updated by
  * changes for long (math/relax.h), and (17). In double, from this precision's data; eight lanes a body. The first of a
  * solve comes with the sums over islands (weight/weights.cu). */
 #include "backend_cuda/weight/constraint.h"
+#include "iterate.h"
 #include "stop_rule.h"
 
 /* b - A v + J^T lambda of a body, a component a lane. */

@@ -1,5 +1,5 @@
-/* Steps 2-4 of constraints given by Jacobian rows (math/row.h), for the stepwise and the persistent kernels. Sums over rows
- * have the order of a quad: lane q has the rows q and q + 4, and lanes are added as (0 + 1) + (2 + 3). */
+/* Steps 2-4 of constraints given by Jacobian rows (math/row.h), for the stepwise and the persistent kernels. Sums over
+ * rows have the order of a quad: lane q has the rows q and q + 4, and lanes are added as (0 + 1) + (2 + 3). */
 #ifndef SADMM_CUDA_ITERATE_ROW_LAW_H
 #define SADMM_CUDA_ITERATE_ROW_LAW_H
 
@@ -73,7 +73,7 @@ CUDA_INLINE void add_row(const real row[6], real impulse, bool first, vec3 *forc
     *torque = first ? v3_scale(angular, impulse) : fused_madd(*torque, impulse, angular);
 }
 
-/* ---- by one thread ------------------------------------------------------------------------------------------------ */
+/* ---- by one thread ----------------------------------------------------------------------------------------------- */
 
 /* All of a constraint's rows, for the velocities of its bodies. `weight`: paper: 1/s. */
 template <bool FAST>
@@ -87,7 +87,8 @@ CUDA_INLINE void update_rows(const row_data *rows, const row_constraint &constra
     for (int r = 0; r < SADMM_MAX_ROWS; ++r) {
         const row_data row = rows[r];
         law[r] = law_of_row(row, FAST ? share * row.weight : weight);
-        missing[r] = row_missing(law[r], row_velocity(row.jacobian[0], a) + row_velocity(row.jacobian[1], b), row.lambda);
+        missing[r] =
+            row_missing(law[r], row_velocity(row.jacobian[0], a) + row_velocity(row.jacobian[1], b), row.lambda);
     }
     for (int q = 0; q < QUAD; ++q) {
         push[q] = law[q].along * missing[q];

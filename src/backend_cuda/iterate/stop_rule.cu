@@ -10,10 +10,11 @@
 #include "backend_cuda/device/double.h"
 #include "backend_cuda/weight/constraint.h"
 #include "backend_cuda/weight/island_sums.h"
+#include "iterate.h"
 #include "stop_rule.h"
 
 #include "core/math/row.h"
-#include "backend_cuda/step/solution.h"
+#include "solution.h"
 
 /* Of a contact in its frame, with u = x + e and the response w. */
 static __device__ double map_of_contact(const double lambda[3], const double u[3], double friction, double w)
@@ -34,7 +35,7 @@ static __device__ double natural_map(const model_view &model, const body_view &b
     const int32_t joined[2] = {pair->body_a, pair->body_b};
     const int rows = pair->friction > 0 ? 3 : 1;
     const struct sadmm_settings settings = *model.settings;
-    /* As planned for, should the pair have more: nobody has looked yet. */
+    /* As planned for, should the pair have more: nothing has checked that yet. */
     const int32_t count = (int32_t)contacts.difference[p].w;
     double worst = 0;
     for (int32_t k = 0; k < count; ++k) {
@@ -66,7 +67,8 @@ static __device__ double natural_map(const model_view &model, const body_view &b
 }
 
 /* The same of a constraint given by rows (the map of a row: core/solve/certificate.c). */
-static __device__ double natural_map_of_rows(const body_view &bodies, const row_view &rows, const raw_view &raw, int32_t k)
+static __device__ double natural_map_of_rows(const body_view &bodies, const row_view &rows, const raw_view &raw,
+                                             int32_t k)
 {
     const struct sadmm_row_constraint constraint = raw.constraints[k];
     const struct raw_row *row = raw.rows + (size_t)k * SADMM_MAX_ROWS;
@@ -93,8 +95,8 @@ static __device__ double natural_map_of_rows(const body_view &bodies, const row_
     return worst;
 }
 
-/* Terms of a body: natural map of the constraints that count here (at their first dynamic body); momentum error, and the largest of
- * what it is made of. args.checks: this check's number, from 1; args.count: iterations done. */
+/* Terms of a body: natural map of the constraints that count here (at their first dynamic body); momentum error, and
+ * the largest of what it is made of. args.checks: this check's number, from 1; args.count: iterations done. */
 template <bool RIGID>
 static __global__ void __launch_bounds__(BODY_THREADS)
     convergence_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
@@ -108,7 +110,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         const int32_t code = v.graph.incident[at], p = code / 2;
         add_side(v.contacts, v.rows, code, sums, &sums[PUSH]);
         const int32_t k = p - v.contacts.pair_capacity; /* a block of rows, or a pair */
-        if (code & 1 && is_dynamic(v.model, k < 0 ? v.contacts.ends[p].body_a : v.rows.constraints[k].body_a))
+        if (code & 1 && is_dynamic(v.model, k < 0 ? v.contacts.bodies[p].body_a : v.rows.constraints[k].body_a))
             continue; /* counted there */
         map = largest_term::join(map, k < 0 ? natural_map(v.model, v.bodies, v.contacts, v.raw, p)
                                             : natural_map_of_rows(v.bodies, v.rows, v.raw, k));
@@ -140,11 +142,12 @@ sadmm_status CUDA(enqueue_convergence_check)(struct sadmm_context *c, int done, 
                            "convergence check", body_blocks(c->view.model.bodies), BODY_THREADS, &args, error);
 }
 
-extern "C" sadmm_status CUDA(look)(struct sadmm_context *c, int done, int32_t *unmet, struct sadmm_error *error)
+extern "C" sadmm_status CUDA(check_convergence)(struct sadmm_context *c, int done, int32_t *unmet,
+                                                struct sadmm_error *error)
 {
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(enqueue_convergence_check)(c, done, error));
-    CUDA_TRY(CUDA(download)(c, &c->view.islands.stop->unmet[c->checks % CHECKS_KEPT], sizeof *unmet, error));
+    TRY(CUDA(enqueue_convergence_check)(c, done, error));
+    TRY(CUDA(download)(c, &c->view.islands.stop->unmet[c->checks % CHECKS_KEPT], sizeof *unmet, error));
     memcpy(unmet, c->buffers[PINNED_OUT].data, sizeof *unmet);
     return SADMM_OK;
 }

@@ -4,22 +4,14 @@
 
 #include "backend_cuda/device/context.h"
 
-/* Before the first kernel of a solve that counts islands: those slowed down, those that have stopped. */
-static __device__ __forceinline__ void clear_counts(const island_view &islands)
-{
-    const cuda_stop none = {};
-    *islands.limited = *islands.suspects = 0;
-    *islands.stop = none;
-}
-
 /* Had every island stopped by the last of `checks` convergence checks? */
 static __device__ __forceinline__ bool all_stopped(const island_view &islands, int32_t checks)
 {
     return checks > 0 && islands.stop->unmet[checks % CHECKS_KEPT] == 0;
 }
 
-/* Had the island of a body? Then it stays as it is, whatever its thread block still does for others: an island's result does
- * not depend on who is beside it. */
+/* Had the island of a body? Then it stays as it is, whatever its thread block still does for others: an island's result
+ * does not depend on who is beside it. */
 static __device__ __forceinline__ bool island_stopped(const graph_view &graph, const island_view &islands,
                                                       int32_t checks, int32_t body)
 {
@@ -27,13 +19,14 @@ static __device__ __forceinline__ bool island_stopped(const graph_view &graph, c
 }
 
 static __device__ __forceinline__ bool pair_stopped(const model_view &model, const graph_view &graph,
-                                                    const island_view &islands, int32_t checks, const pair_ends &ends)
+                                                    const island_view &islands, int32_t checks, const pair_bodies &pair)
 {
-    return checks > 0 && island_stopped(graph, islands, checks, ends.body_a < model.bodies ? ends.body_a : ends.body_b);
+    return checks > 0 && island_stopped(graph, islands, checks, pair.body_a < model.bodies ? pair.body_a : pair.body_b);
 }
 
 static __device__ __forceinline__ bool rows_stopped(const model_view &model, const graph_view &graph,
-                                                    const island_view &islands, int32_t checks, const row_constraint &rows)
+                                                    const island_view &islands, int32_t checks,
+                                                    const row_constraint &rows)
 {
     return checks > 0 && island_stopped(graph, islands, checks, rows.body_a < model.bodies ? rows.body_a : rows.body_b);
 }

@@ -1,4 +1,6 @@
 /* The iteration as two kernels: stepwise (kernels I-O), and tier STREAM, a graph of plain steps. */
+#include "backend_cuda/graph/layout_kernels.h"
+#include "iterate.h"
 #include "stop_rule.h"
 #include "streamed_sweep.h"
 
@@ -8,8 +10,8 @@ enum { BODY_THREADS = 128 };
 
 /* ---- Step 1 --------------------------------------------------------------------------------------------------- */
 
-/* Iterations go over the data forward and backward in turn: what one has touched last is still in the caches when the next
- * one begins. */
+/* Iterations go over the data forward and backward in turn: what one has touched last is still in the caches when the
+ * next one begins. */
 static __device__ __forceinline__ int32_t thread_index(const cuda_args &args)
 {
     const unsigned block = args.backward ? gridDim.x - 1 - blockIdx.x : blockIdx.x;
@@ -52,9 +54,9 @@ static __device__ __forceinline__ real relaxed(const model_view &model, const cu
     return FAST && args.relax & what ? (real)model.settings->relaxation : (real)1;
 }
 
-/* Step 1, a thread a body: all of a body's numbers lie side by side and are asked for at once, sixteen bytes at a time. (Eight
- * lanes a body, as in the persistent tiers, where latency counts, spend the time on instructions that load and pass
- * around single numbers.) What is read once makes room in the caches for states and records. The sums are those of
+/* Step 1, a thread a body: all of a body's numbers lie side by side and are asked for at once, sixteen bytes at a time.
+ * (Eight lanes a body, as in the persistent tiers, where latency counts, spend the time on instructions that load and
+ * pass around single numbers.) What is read once leaves the caches to states and records. The sums are those of
  * free_momentum() and step_of(); FAST: of step_fast() and residual_after(), as far as args.relax says. */
 template <bool JOIN, bool RIGID, bool FAST>
 static __global__ void __launch_bounds__(BODY_THREADS)
@@ -115,9 +117,10 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     }
 }
 
-/* ---- kernels over constraints: blocks of threads for pairs, then blocks for row blocks ----------------------------- */
+/* ---- kernels over constraints: blocks of threads for pairs, then blocks for row blocks --------------------------- */
 
-/* The pair of thread t: work(pair, lane, live), in whole warps; lanes beyond the last pair come with that one, not live. */
+/* The pair of thread t: work(pair, lane, live), in whole warps; lanes beyond the last pair come with that one, not
+ * live. */
 template <int LANES_A_PAIR, class Work>
 static __device__ __forceinline__ void with_pair(const model_view &model, int32_t t, Work work)
 {
@@ -135,7 +138,7 @@ static __global__ void __launch_bounds__(THREADS)
     if (FAST && all_stopped(v.islands, args.checks)) return;
     const real relaxation_factor = relaxed<FAST>(v.model, args, RELAX_MULTIPLIERS);
     with_pair<LANES_A_PAIR>(v.model, t, [&](int32_t p, int32_t lane, bool live) {
-        const bool on = live && !(FAST && pair_stopped(v.model, v.graph, v.islands, args.checks, v.contacts.ends[p]));
+        const bool on = live && !(FAST && pair_stopped(v.model, v.graph, v.islands, args.checks, v.contacts.bodies[p]));
         primal = sweep_pair<LANES_A_PAIR, COUNT, MEASURE, FAST>(v.model, v.bodies, v.contacts, v.iteration, p, lane, on,
                                                                 relaxation_factor);
     });
@@ -178,7 +181,7 @@ static __global__ void place_kernel(const __grid_constant__ cuda_view v, const _
     const int32_t at = thread_index(args), bodies = live_bodies(v.model);
     if (bodies == 0 || at >= v.graph.offsets[bodies]) return;
     const int32_t side = v.graph.incident[at], on_b = side & 1, k = side / 2 - v.contacts.pair_capacity;
-    if (k < 0) *(on_b ? &v.contacts.ends[side / 2].side_b : &v.contacts.ends[side / 2].side_a) = at;
+    if (k < 0) *(on_b ? &v.contacts.bodies[side / 2].side_b : &v.contacts.bodies[side / 2].side_a) = at;
     else *(on_b ? &v.rows.constraints[k].side_b : &v.rows.constraints[k].side_a) = at;
 }
 
@@ -224,7 +227,7 @@ static sadmm_status launch_constraints(struct sadmm_context *c, bool measure, in
     cuda_kernel kernel = c->view.contacts.lanes == 1      ? sweep_kernel<1, 1>(measure, c->fast)
                          : c->statistics.point_slots <= 4 ? sweep_kernel<4, 1>(measure, c->fast)
                                                           : sweep_kernel<4, 2>(measure, c->fast);
-    CUDA_TRY(CUDA(launch)(c, kernel, "update_constraints", pair_blocks(&c->view), &args, error));
+    TRY(CUDA(launch)(c, kernel, "update_constraints", pair_blocks(&c->view), &args, error));
     kernel = measure ? (c->fast ? rows_kernel<true, true> : rows_kernel<true, false>)
                      : (c->fast ? rows_kernel<false, true> : rows_kernel<false, false>);
     return CUDA(launch)(c, kernel, "update_constraints (rows)", blocks_for(c->view.rows.count), &args, error);
@@ -244,13 +247,13 @@ static sadmm_status prepare_stepwise(struct sadmm_context *c, struct sadmm_error
     const cuda_view *v = &c->view;
     cuda_args args = {};
     if (!c->placed)
-        CUDA_TRY(CUDA(launch)(c, place_kernel, "place_records",
-                              blocks_for(2 * ((int64_t)v->contacts.pair_capacity + v->rows.count)), &args, error));
+        TRY(CUDA(launch)(c, place_kernel, "place_records",
+                         blocks_for(2 * ((int64_t)v->contacts.pair_capacity + v->rows.count)), &args, error));
     c->placed = true;
     if (!c->starting) return SADMM_OK;
     c->starting = false;
-    CUDA_TRY(CUDA(launch)(c, v->contacts.lanes == 1 ? start_kernel<1> : start_kernel<4>, "start_records",
-                          pair_blocks(v), &args, error));
+    TRY(CUDA(launch)(c, v->contacts.lanes == 1 ? start_kernel<1> : start_kernel<4>, "start_records",
+                     pair_blocks(v), &args, error));
     return CUDA(launch)(c, start_rows_kernel, "start_records (rows)", blocks_for(v->rows.count), &args, error);
 }
 
@@ -262,10 +265,10 @@ static sadmm_status refuse_fast(const struct sadmm_context *c, struct sadmm_erro
 
 extern "C" sadmm_status CUDA(update_velocity)(struct sadmm_context *c, struct sadmm_error *error)
 {
-    CUDA_TRY(refuse_fast(c, error));
+    TRY(refuse_fast(c, error));
     CUDA_ENTER(c);
-    CUDA_TRY(prepare_stepwise(c, error));
-    CUDA_TRY(launch_bodies(c, c->measured, 0, error));
+    TRY(prepare_stepwise(c, error));
+    TRY(launch_bodies(c, c->measured, 0, error));
     c->measured = false;
     c->rescaled = false;
     return SADMM_OK;
@@ -273,11 +276,11 @@ extern "C" sadmm_status CUDA(update_velocity)(struct sadmm_context *c, struct sa
 
 extern "C" sadmm_status CUDA(update_constraints)(struct sadmm_context *c, bool measure, struct sadmm_error *error)
 {
-    CUDA_TRY(refuse_fast(c, error));
+    TRY(refuse_fast(c, error));
     CUDA_ENTER(c);
-    CUDA_TRY(prepare_stepwise(c, error));
-    CUDA_TRY(CUDA(clear_primal)(c, measure, error));
-    CUDA_TRY(launch_constraints(c, measure, 0, error));
+    TRY(prepare_stepwise(c, error));
+    TRY(CUDA(clear_primal)(c, measure, error));
+    TRY(launch_constraints(c, measure, 0, error));
     c->measured = measure;
     return SADMM_OK;
 }
@@ -288,8 +291,8 @@ extern "C" sadmm_status CUDA(update_constraints)(struct sadmm_context *c, bool m
 static sadmm_status fast_iteration(struct sadmm_context *c, int i, int count, bool measure, struct sadmm_error *error)
 {
     const int multipliers = relax_constraints(i, count) ? RELAX_MULTIPLIERS : 0;
-    CUDA_TRY(launch_constraints(c, measure, multipliers, error));
-    CUDA_TRY(launch_bodies(c, false, multipliers | (relax_velocity(i, count, c->settled) ? RELAX_VELOCITY : 0), error));
+    TRY(launch_constraints(c, measure, multipliers, error));
+    TRY(launch_bodies(c, false, multipliers | (relax_velocity(i, count, c->settled) ? RELAX_VELOCITY : 0), error));
     c->settled = true;
     return SADMM_OK;
 }
@@ -299,11 +302,11 @@ static sadmm_status plain_iterations(struct sadmm_context *c, int count, struct 
 {
     for (int i = 0; i < count; ++i) {
         if (c->fast) {
-            CUDA_TRY(fast_iteration(c, i, count + 1, false, error));
+            TRY(fast_iteration(c, i, count + 1, false, error));
             continue;
         }
-        CUDA_TRY(launch_bodies(c, false, 0, error));
-        CUDA_TRY(launch_constraints(c, false, 0, error));
+        TRY(launch_bodies(c, false, 0, error));
+        TRY(launch_constraints(c, false, 0, error));
     }
     return SADMM_OK;
 }
@@ -340,25 +343,25 @@ static sadmm_status make_graph(struct sadmm_context *c, struct sadmm_error *erro
 sadmm_status CUDA(stream_iterations)(struct sadmm_context *c, int count, bool measure, bool goes_on,
                                      struct sadmm_error *error)
 {
-    CUDA_TRY(prepare_stepwise(c, error));
+    TRY(prepare_stepwise(c, error));
     if (c->measured) {
-        CUDA_TRY(launch_bodies(c, true, 0, error));
-        CUDA_TRY(launch_constraints(c, measure && count == 1, 0, error));
+        TRY(launch_bodies(c, true, 0, error));
+        TRY(launch_constraints(c, measure && count == 1, 0, error));
         --count;
     }
     if (c->fast && !c->settled && (count > 1 || goes_on)) {
-        CUDA_TRY(fast_iteration(c, 0, 2, false, error));
+        TRY(fast_iteration(c, 0, 2, false, error));
         --count;
     }
     int plain = (measure || (c->fast && !goes_on)) && count > 0 ? count - 1 : count;
-    if (plain >= GRAPH_ITERATIONS && !c->recording && !c->graph_valid) CUDA_TRY(make_graph(c, error));
+    if (plain >= GRAPH_ITERATIONS && !c->recording && !c->graph_valid) TRY(make_graph(c, error));
     for (; plain >= GRAPH_ITERATIONS && !c->recording; plain -= GRAPH_ITERATIONS, count -= GRAPH_ITERATIONS)
         CUDA_CALL(c, cudaGraphLaunch(c->graph, c->stream), "cudaGraphLaunch");
-    CUDA_TRY(plain_iterations(c, plain, error));
+    TRY(plain_iterations(c, plain, error));
     if (count > plain && c->fast) return fast_iteration(c, 0, 1, measure, error);
     if (count > plain) {
-        CUDA_TRY(launch_bodies(c, false, 0, error));
-        CUDA_TRY(launch_constraints(c, true, 0, error));
+        TRY(launch_bodies(c, false, 0, error));
+        TRY(launch_constraints(c, true, 0, error));
     }
     return SADMM_OK;
 }

@@ -30,23 +30,23 @@ static __device__ __forceinline__ vec3 exchange(vec3 value, int lanes)
 /* The sums of a pair's lanes, added as (q_0 + q_1) + (q_2 + q_3), into the records of its sides. Of four lanes, 0 and 1
  * end up with force and torque on a, 2 and 3 on b. Every lane of the warp comes here. */
 template <int LANES_A_PAIR>
-static __device__ __forceinline__ void store_records(solver_real *records, const pair_ends &ends, int32_t lane,
+static __device__ __forceinline__ void store_records(solver_real *records, const pair_bodies &joined, int32_t lane,
                                                      bool live, const pair_sum &q)
 {
     real4 *out = (real4 *)records;
     if (LANES_A_PAIR == 1) {
-        if (live && ends.side_a >= 0) {
-            out[2 * (size_t)ends.side_a] = pack(v3_neg(q.force), 0);
-            out[2 * (size_t)ends.side_a + 1] = pack(v3_neg(q.torque_a), 0);
+        if (live && joined.side_a >= 0) {
+            out[2 * (size_t)joined.side_a] = pack(v3_neg(q.force), 0);
+            out[2 * (size_t)joined.side_a + 1] = pack(v3_neg(q.torque_a), 0);
         }
-        if (live && ends.side_b >= 0) {
-            out[2 * (size_t)ends.side_b] = pack(q.force, 0);
-            out[2 * (size_t)ends.side_b + 1] = pack(q.torque_b, 0);
+        if (live && joined.side_b >= 0) {
+            out[2 * (size_t)joined.side_b] = pack(q.force, 0);
+            out[2 * (size_t)joined.side_b + 1] = pack(q.torque_b, 0);
         }
         return;
     }
     const bool odd = lane & 1, on_b = lane & 2;
-    const int32_t side = on_b ? ends.side_b : ends.side_a;
+    const int32_t side = on_b ? joined.side_b : joined.side_a;
     /* Even lanes keep the force, odd ones the torques. */
     const vec3 kept = v3_add(odd ? q.torque_a : q.force, exchange(odd ? q.force : q.torque_a, 1));
     const vec3 torque_b = v3_add(q.torque_b, exchange(q.torque_b, 1));
@@ -54,10 +54,10 @@ static __device__ __forceinline__ void store_records(solver_real *records, const
     if (live && side >= 0) out[2 * (size_t)side + (odd ? 1 : 0)] = pack(on_b ? sum : v3_neg(sum), 0);
 }
 
-/* A lane's share of a pair: points lane and, where COUNT is 2, lane + 4. The first is loaded whether it is
- * there or not, so that nothing but the states waits for another load. `live`: else nothing is stored. Every lane of the warp comes
- * here. FAST: lambda goes `relaxation_factor` times as far; records are those of Step 1 in any case. Returns the lane's
- * share of the primal residual. */
+/* A lane's share of a pair: points lane and, where COUNT is 2, lane + 4. The first is loaded whether it is there or
+ * not, so that nothing but the states waits for another load. `live`: else nothing is stored. Every lane of the warp
+ * comes here. FAST: lambda goes `relaxation_factor` times as far; records are those of Step 1 in any case. Returns the
+ * lane's share of the primal residual. */
 template <int LANES_A_PAIR, int COUNT, bool MEASURE, bool FAST>
 static __device__ __forceinline__ double sweep_pair(const model_view &model, const body_view &bodies,
                                                     const contact_view &contacts, const iteration_view &iteration,
@@ -65,7 +65,7 @@ static __device__ __forceinline__ double sweep_pair(const model_view &model, con
 {
     enum { SPLIT = MEASURE && !FAST };
     const real4 about = load_once(contacts.normal + p), between = load_once(contacts.difference + p);
-    const pair_ends ends = load_once(contacts.ends + p);
+    const pair_bodies joined = load_once(contacts.bodies + p);
     const real weight = FAST ? contacts.inv_s[p] : (real)0;
     size_t slot[COUNT];
     real4 point[COUNT];
@@ -81,7 +81,7 @@ static __device__ __forceinline__ double sweep_pair(const model_view &model, con
         point[j] = load_once(contacts.arm + slot[j]);
         old[j] = load_lambda(contacts, slot[j]);
     }
-    const body_row a = load_row(bodies.state, ends.body_a), b = load_row(bodies.state, ends.body_b);
+    const body_row a = load_row(bodies.state, joined.body_a), b = load_row(bodies.state, joined.body_b);
 
     const vec3 normal = xyz(about), difference = xyz(between);
     const real inv_s = FAST ? weight : inverse_weight(a.inv_beta, b.inv_beta);
@@ -103,11 +103,12 @@ static __device__ __forceinline__ double sweep_pair(const model_view &model, con
         if (!MEASURE) continue;
         largest = real_max(largest, largest_row(normal, delta));
     }
-    store_records<LANES_A_PAIR>(iteration.records, ends, lane, live, next);
-    if (SPLIT) store_records<LANES_A_PAIR>(iteration.change, ends, lane, live, change);
+    store_records<LANES_A_PAIR>(iteration.records, joined, lane, live, next);
+    if (SPLIT) store_records<LANES_A_PAIR>(iteration.change, joined, lane, live, change);
     if (!MEASURE) return 0;
-    return (double)(largest * (FAST ? inverse_of_weight(inv_s, ends.body_a < model.bodies && ends.body_b < model.bodies)
-                                    : real_max(a.inv_beta, b.inv_beta)));
+    return (double)(largest *
+                    (FAST ? inverse_of_weight(inv_s, joined.body_a < model.bodies && joined.body_b < model.bodies)
+                          : real_max(a.inv_beta, b.inv_beta)));
 }
 
 /* The same for J^T lambda^0. */
@@ -122,7 +123,7 @@ static __device__ __forceinline__ void start_pair(const contact_view &contacts, 
         vec3 arm = xyz(contacts.arm[slot]), lambda = load_lambda(contacts, slot);
         add_point(&sum, k / LANES_A_PAIR, lambda, arm, v3_add(arm, xyz(between)));
     }
-    store_records<LANES_A_PAIR>(iteration.records, contacts.ends[p], lane, live, sum);
+    store_records<LANES_A_PAIR>(iteration.records, contacts.bodies[p], lane, live, sum);
 }
 
 /* ---- constraints given by rows --------------------------------------------------------------------------------- */
@@ -136,8 +137,9 @@ static __device__ __forceinline__ void store_row_records(const row_view &rows, i
 }
 
 template <bool MEASURE, bool FAST>
-static __device__ __forceinline__ double sweep_rows(const model_view &model, const body_view &bodies, const row_view &rows,
-                                                    const iteration_view &iteration, int32_t k, real relaxation_factor)
+static __device__ __forceinline__ double sweep_rows(const model_view &model, const body_view &bodies,
+                                                    const row_view &rows, const iteration_view &iteration, int32_t k,
+                                                    real relaxation_factor)
 {
     enum { SPLIT = MEASURE && !FAST };
     const row_constraint about = rows.constraints[k];

@@ -81,8 +81,8 @@ CUDA_INLINE int32_t record_slot(int32_t r) { return r < 3 ? r : r + 1; }
 
 /* ---- fused products ------------------------------------------------------------------------------------------- */
 
-/* a b + c, rounded once. The sources are compiled without contraction; where the iteration fuses it says so here, and so
- * does every tier. */
+/* a b + c, rounded once. The sources are compiled without contraction; where the iteration fuses it says so here, and
+ * so does every tier. */
 #ifdef SADMM_CUDA_EMULATED
 CUDA_INLINE real fused(real a, real b, real c) { return a * b + c; }
 #else
@@ -91,7 +91,10 @@ CUDA_INLINE double fused(double a, double b, double c) { return __fma_rn(a, b, c
 #endif
 
 /* a + s b */
-CUDA_INLINE vec3 fused_madd(vec3 a, real s, vec3 b) { return v3(fused(s, b.x, a.x), fused(s, b.y, a.y), fused(s, b.z, a.z)); }
+CUDA_INLINE vec3 fused_madd(vec3 a, real s, vec3 b)
+{
+    return v3(fused(s, b.x, a.x), fused(s, b.y, a.y), fused(s, b.z, a.z));
+}
 CUDA_INLINE real fused_dot(vec3 a, vec3 b) { return fused(a.z, b.z, fused(a.y, b.y, a.x * b.x)); }
 CUDA_INLINE vec3 fused_cross(vec3 a, vec3 b)
 {
@@ -106,7 +109,8 @@ CUDA_INLINE vec3 relative_velocity(const body_motion &a, vec3 arm_a, const body_
     return v3_add(v3_sub(b.linear, a.linear), v3_sub(fused_cross(b.angular, arm_b), fused_cross(a.angular, arm_a)));
 }
 
-/* Multipliers of a point, a world vector. Without friction it is along the normal, since the projection's disc is a point. */
+/* Multipliers of a point, a world vector. Without friction it is along the normal, since the projection's disc is a
+ * point. */
 CUDA_INLINE vec3 load_lambda(const contact_view &contacts, size_t slot)
 {
     const solver_real *lambda = contacts.lambda + slot;
@@ -165,7 +169,8 @@ CUDA_INLINE vec3 update_point(vec3 normal, real friction, vec3 x, real error, re
     return project(fused_madd(old, -inv_s, fused_madd(x, error, normal)), normal, friction);
 }
 
-/* The same for the method `fast`: lambda^, and lambda^ - lambda, where the contact sticks without the rounding of either. */
+/* The same for the method `fast`: lambda^, and lambda^ - lambda, where the contact sticks without the rounding of
+ * either. */
 struct point_change {
     vec3 lambda, delta;
 };
@@ -176,12 +181,14 @@ CUDA_INLINE point_change change_point(vec3 normal, real friction, vec3 x, real e
     const cone_parts parts = cone_parts_of(y, normal, friction);
     out.lambda = parts.slides ? fused_madd(v3_scale(normal, parts.normal), parts.scale, parts.tangent) : y;
     /* what does not wait for the root comes first */
-    out.delta = parts.slides ? fused_madd(fused_madd(v3_neg(old), parts.normal, normal), parts.scale, parts.tangent) : step;
+    out.delta =
+        parts.slides ? fused_madd(fused_madd(v3_neg(old), parts.normal, normal), parts.scale, parts.tangent) : step;
     return out;
 }
 
 /* Either, by the method. */
-template <bool FAST> CUDA_INLINE point_change update(vec3 normal, real friction, vec3 x, real error, real inv_s, vec3 old)
+template <bool FAST>
+CUDA_INLINE point_change update(vec3 normal, real friction, vec3 x, real error, real inv_s, vec3 old)
 {
     if (FAST) return change_point(normal, friction, x, error, inv_s, old);
     const vec3 lambda = update_point(normal, friction, x, error, inv_s, old);
@@ -194,7 +201,8 @@ CUDA_INLINE real largest_row(vec3 normal, vec3 delta)
 {
     vec3 t1, t2;
     v3_tangents(normal, &t1, &t2);
-    return real_max(real_abs(v3_dot(delta, normal)), real_max(real_abs(v3_dot(delta, t1)), real_abs(v3_dot(delta, t2))));
+    return real_max(real_abs(v3_dot(delta, normal)),
+                    real_max(real_abs(v3_dot(delta, t1)), real_abs(v3_dot(delta, t2))));
 }
 
 /* ---- relaxation of the method `fast` (math/relax.h) -------------------------------------------------------------- */

@@ -2,6 +2,8 @@
  * Where there is none its contacts are found first. A guess costs time where it is wrong, never a result. */
 #include <algorithm>
 
+#include "backend_cuda/graph/graph.h"
+#include "backend_cuda/iterate/iterate.h"
 #include "core/solve/plan.h"
 #include "world.h"
 
@@ -24,25 +26,25 @@ struct preview {
 static sadmm_status preview_step(struct sadmm_context *c, struct preview *out, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
-    CUDA_TRY(CUDA(reserve)(c, PINNED_OUT, sizeof *out, error));
+    TRY(CUDA(reserve)(c, PINNED_OUT, sizeof *out, error));
     struct preview *staged = buffer<struct preview>(c, PINNED_OUT);
     for (;;) {
-        CUDA_TRY(COLLISION(reserve)(s->collision, &s->candidate_capacity, &s->point_capacity, error));
+        TRY(COLLISION(reserve)(s->collision, &s->candidate_capacity, &s->point_capacity, error));
         CUDA(view_counts)(c, s->candidate_capacity);
-        CUDA_TRY(CUDA(reserve_layout)(c, error));
+        TRY(CUDA(reserve_layout)(c, error));
         CUDA(view_into)(c, s->into);
-        CUDA_TRY(CUDA(clear_abort)(c, error));
-        CUDA_TRY(CUDA(launch_start)(c, error));
-        CUDA_TRY(CUDA(enqueue_find)(c, error));
-        CUDA_TRY(CUDA(enqueue_statistics)(c, true, error));
-        CUDA_TRY(copy_out(c, &staged->live, c->view.model.live, sizeof staged->live, error));
-        CUDA_TRY(copy_out(c, &staged->statistics, c->view.model.statistics, sizeof staged->statistics, error));
-        CUDA_TRY(copy_out(c, &staged->counts, c->view.step.counts, sizeof staged->counts, error));
-        CUDA_TRY(CUDA(wait)(c, error));
+        TRY(CUDA(clear_abort)(c, error));
+        TRY(CUDA(launch_start)(c, error));
+        TRY(CUDA(enqueue_find)(c, error));
+        TRY(CUDA(enqueue_statistics)(c, true, error));
+        TRY(copy_out(c, &staged->live, c->view.model.live, sizeof staged->live, error));
+        TRY(copy_out(c, &staged->statistics, c->view.model.statistics, sizeof staged->statistics, error));
+        TRY(copy_out(c, &staged->counts, c->view.step.counts, sizeof staged->counts, error));
+        TRY(CUDA(wait)(c, error));
         *out = *staged;
         if (out->live.abort_code != ABORT_CAPACITY) return SADMM_OK;
         s->candidate_capacity = std::max(s->candidate_capacity, generous(out->counts.candidates));
-        /* points are counted only where all candidates had room */
+        /* points are counted only where all candidates fitted */
         if (out->counts.candidates <= c->view.step.candidate_capacity)
             s->point_capacity = std::max(s->point_capacity, generous(out->counts.points));
     }
@@ -72,10 +74,10 @@ static sadmm_status tighten(struct sadmm_context *c, const struct preview *seen,
     CUDA_CALL(
         c, cudaMemcpyAsync(c->view.model.live, &staged->live, sizeof staged->live, cudaMemcpyHostToDevice, c->stream),
         "cudaMemcpyAsync to the device");
-    CUDA_TRY(CUDA(enqueue_statistics_and_layout)(c, true, &c->partition, error));
-    CUDA_TRY(copy_out(c, &staged->live, c->view.model.live, sizeof staged->live, error));
-    CUDA_TRY(copy_out(c, &staged->statistics, c->view.model.statistics, sizeof staged->statistics, error));
-    CUDA_TRY(CUDA(wait)(c, error));
+    TRY(CUDA(enqueue_statistics_and_layout)(c, true, &c->partition, error));
+    TRY(copy_out(c, &staged->live, c->view.model.live, sizeof staged->live, error));
+    TRY(copy_out(c, &staged->statistics, c->view.model.statistics, sizeof staged->statistics, error));
+    TRY(CUDA(wait)(c, error));
     struct cuda_graph_statistics statistics = staged->statistics;
     statistics.point_slots = c->statistics.point_slots;
     if (staged->live.abort_code == ABORT_NONE) CUDA(tighten_partition)(c, &statistics, &c->partition);
@@ -86,7 +88,7 @@ sadmm_status CUDA(guess_step)(struct sadmm_context *c, struct sadmm_error *error
 {
     struct cuda_step *s = c->step;
     struct preview seen;
-    CUDA_TRY(preview_step(c, &seen, error));
+    TRY(preview_step(c, &seen, error));
     c->plan = plan_of(c, &seen);
     s->guess.contact_rows = c->plan.contact_rows;
     s->guess.point_slots = seen.statistics.point_slots <= 1   ? 1
@@ -97,11 +99,11 @@ sadmm_status CUDA(guess_step)(struct sadmm_context *c, struct sadmm_error *error
     c->view.model.points = 0; /* results are read elsewhere */
     seen.statistics.point_slots = s->guess.point_slots;
     c->statistics = seen.statistics;
-    CUDA_TRY(CUDA(choose_partition)(c, &seen.statistics, &c->partition, error));
-    CUDA_TRY(CUDA(reserve_layout)(c, error));
-    CUDA_TRY(tighten(c, &seen, error));
-    CUDA_TRY(CUDA(reserve_solver)(c, error));
-    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_IMPULSE, 3 * (size_t)s->point_capacity * sizeof(double), error));
+    TRY(CUDA(choose_partition)(c, &seen.statistics, &c->partition, error));
+    TRY(CUDA(reserve_layout)(c, error));
+    TRY(tighten(c, &seen, error));
+    TRY(CUDA(reserve_solver)(c, error));
+    TRY(CUDA(reserve)(c, BUFFER_WORLD_IMPULSE, 3 * (size_t)s->point_capacity * sizeof(double), error));
     s->planned = true;
     s->recorded = false;
     return SADMM_OK;

@@ -1,14 +1,15 @@
-/* The step's own kernels (step/step.h): start, admit, check, finish, commit, edits. */
+/* The step's own kernels (device/step.h): start, admit, check, finish, commit, edits. */
 #include <stddef.h>
 
 #include "backend_cuda/device/double.h"
 
 #include "collision/bounds.h"
 
-#include "core/model/steady.h"
+#include "backend_cuda/device/plan_check.h"
 #include "backend_cuda/iterate/slow.h"
-#include "solution.h"
-#include "plan_check.h"
+#include "backend_cuda/iterate/solution.h"
+#include "core/model/steady.h"
+#include "world.h"
 
 static __device__ __forceinline__ bool finite_numbers(const double *x, int count)
 {
@@ -48,12 +49,12 @@ static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __
         for (int k = 0; k < 6; ++k) body->wrench[k] = values[k];
     }
 }
-static_assert((int)SADMM_EDIT_VALUES >= (int)SADMM_SETTING_NUMBERS && (int)SADMM_EDIT_VALUES >= 13, "every kind has room");
+static_assert((int)SADMM_EDIT_VALUES >= (int)SADMM_SETTING_NUMBERS && (int)SADMM_EDIT_VALUES >= 13, "every kind fits");
 
 /* ---- start ----------------------------------------------------------------------------------------------------- */
 
-/* What a body brings along, in the order of both structures: position, orientation, velocity. Then, by a lane each, what
- * its wrench gives it and how often it was placed. */
+/* What a body brings along, in the order of both structures: position, orientation, velocity. Then, by a lane each,
+ * what its wrench gives it and how often it was placed. */
 enum { CARRIED = 13, CARRIED_VELOCITY = 7, LANE_FORCE = CARRIED, LANE_TORQUE, LANE_PLACED, START_LANES };
 static_assert(offsetof(struct sadmm_rigid, velocity) == CARRIED_VELOCITY * sizeof(double) &&
                   offsetof(struct sadmm_collision_body, velocity) == CARRIED_VELOCITY * sizeof(double),
@@ -71,10 +72,12 @@ static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, co
         v.step.control->stamps[STAMP_START] = nanoseconds();
     }
     if (i >= v.model.bodies) return;
-    /* Every lane fetches all that any of them needs, before it is told apart: one wait for memory, not one a kind of lane. */
+    /* Every lane fetches all that any of them needs, before it is told apart: one wait for memory, not one a kind of
+     * lane. */
     const struct sadmm_rigid *body = &v.step.before[i];
     const struct sadmm_steady *steady = &v.step.steady_before[i];
-    const int32_t slot = v.step.slot_of_body[i], k = lane >= CARRIED_VELOCITY && lane < CARRIED ? lane - CARRIED_VELOCITY : 0;
+    const int32_t slot = v.step.slot_of_body[i],
+                  k = lane >= CARRIED_VELOCITY && lane < CARRIED ? lane - CARRIED_VELOCITY : 0;
     const double number = ((const double *)body)[lane < CARRIED ? lane : 0], dt = v.model.settings->dt,
                  last_dt = steady->dt, change = steady->change[k];
     const int32_t streak = steady->streak[k / 3];
@@ -86,9 +89,9 @@ static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, co
         v.step.start_velocity[6 * i + k] = steady_velocity(number, streak, change, step_ratio(dt, last_dt));
     if (lane == LANE_FORCE) out->acceleration[0] = v3_max_abs(force) == 0 ? 0 : rigid_acceleration(body->mass, force);
     if (lane == LANE_TORQUE)
-        out->acceleration[1] = v3_max_abs(torque) == 0
-                                   ? 0
-                                   : rigid_angular_acceleration(q_load(body->orientation), v3_load(body->inertia), torque);
+        out->acceleration[1] = v3_max_abs(torque) == 0 ? 0
+                                                       : rigid_angular_acceleration(q_load(body->orientation),
+                                                                                    v3_load(body->inertia), torque);
     if (lane == LANE_PLACED) out->placed = placed;
 }
 
@@ -193,7 +196,7 @@ static __host__ __device__ inline finish_ranges ranges_of(const model_view &mode
     return r;
 }
 
-/* Does not look at offending bodies of this very kernel: which body is named must not depend on who came first. */
+/* Never reads offending bodies found by this same kernel: which body is named must not depend on timing. */
 static __global__ void __launch_bounds__(STEP_THREADS)
     finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {

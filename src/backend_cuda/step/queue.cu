@@ -13,9 +13,9 @@
 static sadmm_status prepare(struct sadmm_context *c, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
-    if (!s->planned) CUDA_TRY(CUDA(guess_step)(c, error));
+    if (!s->planned) TRY(CUDA(guess_step)(c, error));
     if (s->recorded) return SADMM_OK;
-    for (int into = 0; into < 2; ++into) CUDA_TRY(CUDA(record_step)(c, into, error));
+    for (int into = 0; into < 2; ++into) TRY(CUDA(record_step)(c, into, error));
     s->recorded = true;
     return SADMM_OK;
 }
@@ -72,7 +72,7 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
 {
     struct cuda_step *s = c->step;
     const int64_t end = s->enqueued;
-    CUDA_TRY(CUDA(wait)(c, error));
+    TRY(CUDA(wait)(c, error));
     /* The device has numbered the steps that did not run; they are numbered again. */
     s->into = (end - first) % 2 ? 1 - s->into : s->into;
     s->seen = s->enqueued = first;
@@ -80,8 +80,8 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
               cudaMemcpyAsync(&c->view.step.control->sequence, &s->enqueued, sizeof s->enqueued, cudaMemcpyHostToDevice,
                               c->stream),
               "cudaMemcpyAsync to the device");
-    CUDA_TRY(CUDA(clear_abort)(c, error));
-    CUDA_TRY(CUDA(wait)(c, error));
+    TRY(CUDA(clear_abort)(c, error));
+    TRY(CUDA(wait)(c, error));
     if (report->abort_code == ABORT_NON_FINITE) {
         s->offending_body =
             report->offending_body >= s->bodies ? report->offending_body - s->bodies : report->offending_body;
@@ -93,7 +93,8 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
     if (report->abort_code == ABORT_CAPACITY)
         s->candidate_capacity = std::max(s->candidate_capacity, generous(report->counts.candidates));
     if (report->abort_code == ABORT_PARTITION) {
-        /* The next partition is made for this very step, and fits; a tier that fails twice is left alone all the same. */
+        /* The next partition is made for this very step, and fits; a tier that fails twice is left alone all the
+         * same. */
         if (s->misfit == first) c->refused |= 1u << c->partition.tier;
         s->misfit = first;
     }
@@ -105,7 +106,7 @@ static sadmm_status see_step(struct sadmm_context *c, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
     cudaError_t code = cudaEventSynchronize(slot_of(s, s->seen)->done);
-    if (code != cudaSuccess) CUDA_TRY(CUDA(wait)(c, error)); /* says what failed */
+    if (code != cudaSuccess) TRY(CUDA(wait)(c, error)); /* says what failed */
     /* A copy: recover() reuses the place. */
     const struct cuda_step_report report = step_reports(c)[s->seen % STEPS_AHEAD];
     if (report.abort_code != ABORT_NONE) return recover(c, s->seen, &report, error);
@@ -116,7 +117,7 @@ static sadmm_status see_step(struct sadmm_context *c, struct sadmm_error *error)
     s->time += q->settings.dt;
     ++s->seen;
     ++s->done;
-    /* A plan with far too much room wastes launches. */
+    /* A plan with far too large capacities wastes launches. */
     if (report.counts.pairs < c->view.contacts.pair_capacity / 4 - 256) s->planned = false;
     return SADMM_OK;
 }
@@ -124,7 +125,7 @@ static sadmm_status see_step(struct sadmm_context *c, struct sadmm_error *error)
 static sadmm_status see_all(struct sadmm_context *c, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
-    while (s->seen < s->enqueued) CUDA_TRY(see_step(c, error));
+    while (s->seen < s->enqueued) TRY(see_step(c, error));
     return SADMM_OK;
 }
 
@@ -134,7 +135,7 @@ static sadmm_status see_all(struct sadmm_context *c, struct sadmm_error *error)
 static sadmm_status next_place(struct sadmm_context *c, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
-    while (s->enqueued - s->seen >= STEPS_AHEAD) CUDA_TRY(see_step(c, error));
+    while (s->enqueued - s->seen >= STEPS_AHEAD) TRY(see_step(c, error));
     return SADMM_OK;
 }
 
@@ -169,9 +170,9 @@ static sadmm_status enqueue_next(struct sadmm_context *c, struct queued_step *q,
                                  const struct sadmm_resident_edit *edits, size_t count, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
-    CUDA_TRY(take_edits(c, q, settings, edits, count, error));
-    CUDA_TRY(launch_edits_of(c, s->enqueued, error));
-    CUDA_TRY(prepare(c, error));
+    TRY(take_edits(c, q, settings, edits, count, error));
+    TRY(launch_edits_of(c, s->enqueued, error));
+    TRY(prepare(c, error));
     return launch_step(c, s->enqueued, error);
 }
 
@@ -181,12 +182,12 @@ extern "C" sadmm_status CUDA(step_world)(struct sadmm_context *c, const struct s
 {
     struct cuda_step *s = c->step;
     CUDA_ENTER(c);
-    CUDA_TRY(next_place(c, error));
+    TRY(next_place(c, error));
     if (!sadmm_settings_same_but_numbers(&c->settings, settings)) {
-        CUDA_TRY(see_all(c, error));
+        TRY(see_all(c, error));
         s->planned = false;
     }
-    if (!s->planned) CUDA_TRY(see_all(c, error));
+    if (!s->planned) TRY(see_all(c, error));
     CUDA(plan_settings)(c, settings);
     struct queued_step *q = slot_of(s, s->enqueued);
     sadmm_status status = enqueue_next(c, q, settings, edits, count, error);

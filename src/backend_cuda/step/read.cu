@@ -52,10 +52,10 @@ static sadmm_status get(struct sadmm_context *c, void *to, const void *from, siz
 {
     enum { PIECE = 16 << 20 };
     if (!to) return SADMM_OK;
-    CUDA_TRY(CUDA(reserve)(c, PINNED_OUT, std::min(bytes, (size_t)PIECE), error));
+    TRY(CUDA(reserve)(c, PINNED_OUT, std::min(bytes, (size_t)PIECE), error));
     for (size_t at = 0; at < bytes; at += PIECE) {
         const size_t piece = std::min(bytes - at, (size_t)PIECE);
-        CUDA_TRY(CUDA(download)(c, (const char *)from + at, piece, error));
+        TRY(CUDA(download)(c, (const char *)from + at, piece, error));
         memcpy((char *)to + at, c->buffers[PINNED_OUT].data, piece);
     }
     return SADMM_OK;
@@ -68,8 +68,8 @@ extern "C" sadmm_status CUDA(read_bodies)(struct sadmm_context *c, struct sadmm_
     const size_t n = (size_t)s->bodies;
     CUDA_ENTER(c);
     CUDA(view_into)(c, s->into);
-    CUDA_TRY(get(c, rigid, c->view.step.before, n * sizeof *rigid, error));
-    CUDA_TRY(get(c, steady, c->view.step.steady_before, n * sizeof *steady, error));
+    TRY(get(c, rigid, c->view.step.before, n * sizeof *rigid, error));
+    TRY(get(c, steady, c->view.step.steady_before, n * sizeof *steady, error));
     return get(c, wrench, buffer<double>(c, BUFFER_WORLD_WRENCH) + (size_t)(1 - s->into) * 6 * n,
                6 * n * sizeof *wrench, error);
 }
@@ -87,7 +87,7 @@ extern "C" sadmm_status CUDA(read_start)(struct sadmm_context *c, struct sadmm_r
     const size_t n = (size_t)s->bodies, points = (size_t)s->last.counts.points;
     CUDA_ENTER(c);
     CUDA(view_into)(c, 1 - s->into); /* of the last step */
-    CUDA_TRY(get(c, rigid, c->view.step.before, n * sizeof *rigid, error));
-    CUDA_TRY(get(c, velocity, c->view.step.start_velocity, 6 * n * sizeof *velocity, error));
+    TRY(get(c, rigid, c->view.step.before, n * sizeof *rigid, error));
+    TRY(get(c, velocity, c->view.step.start_velocity, 6 * n * sizeof *velocity, error));
     return get(c, impulse, c->view.step.start_impulse, 3 * points * sizeof *impulse, error);
 }

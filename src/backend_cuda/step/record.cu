@@ -1,4 +1,8 @@
 /* Whole steps on the device: a step, launch by launch, and the graph that is made of it (step/world.h). */
+#include "backend_cuda/assemble/assemble.h"
+#include "backend_cuda/graph/graph.h"
+#include "backend_cuda/iterate/iterate.h"
+#include "backend_cuda/weight/weight.h"
 #include "collision/collision.h"
 #include "core/solve/stages.h"
 #include "world.h"
@@ -8,7 +12,7 @@
 /* Contacts, up to the gate. */
 sadmm_status CUDA(enqueue_find)(struct sadmm_context *c, struct sadmm_error *error)
 {
-    CUDA_TRY(COLLISION(enqueue)(c->step->collision, c->stream, c->step->into, error));
+    TRY(COLLISION(enqueue)(c->step->collision, c->stream, c->step->into, error));
     return CUDA(launch_admit)(c, error);
 }
 
@@ -41,7 +45,7 @@ static enum cuda_limit limit_by_iterations(const struct sadmm_context *c)
 /* A and b of the bodies: beside contact finding, of which they need nothing. */
 static sadmm_status record_gather(struct sadmm_context *c, struct sadmm_error *error)
 {
-    CUDA_TRY(CUDA(launch_start)(c, error));
+    TRY(CUDA(launch_start)(c, error));
     side_branch side(c);
     CUDA_CALL(c, side.code, "a branch of the step");
     return CUDA(enqueue_bodies)(c, error);
@@ -53,10 +57,10 @@ static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *err
     {
         side_branch side(c);
         CUDA_CALL(c, side.code, "a branch of the step");
-        CUDA_TRY(CUDA(assemble_contacts)(c, error));
+        TRY(CUDA(assemble_contacts)(c, error));
         CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
     }
-    CUDA_TRY(CUDA(enqueue_statistics_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
+    TRY(CUDA(enqueue_statistics_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
     CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
     return SADMM_OK;
 }
@@ -67,10 +71,10 @@ static sadmm_status record_finish(struct sadmm_context *c, bool residuals, struc
     if (residuals) {
         side_branch side(c);
         CUDA_CALL(c, side.code, "a branch of the step");
-        CUDA_TRY(CUDA(enqueue_residuals)(c, error));
+        TRY(CUDA(enqueue_residuals)(c, error));
         CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
     }
-    CUDA_TRY(CUDA(launch_finish)(c, error));
+    TRY(CUDA(launch_finish)(c, error));
     if (residuals) CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
     return SADMM_OK;
 }
@@ -94,7 +98,7 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
     case SADMM_STAGE_CHECK: return CUDA(enqueue_convergence_check)(c, stage->done, error);
     case SADMM_STAGE_REWEIGH: return CUDA(enqueue_weights)(c, true, error);
     case SADMM_STAGE_BALANCE: /* the ratio of (15) is found on the device */
-        CUDA_TRY(CUDA(enqueue_balance)(c, error));
+        TRY(CUDA(enqueue_balance)(c, error));
         return CUDA(factorize)(c, error);
     case SADMM_STAGE_LIMIT:
         return limit == LIMIT_WHOLE ? SADMM_OK : CUDA(enqueue_limit)(c, limit == LIMIT_SUSPECTS, error);
@@ -118,7 +122,7 @@ static sadmm_status enqueue_step(struct sadmm_context *c, struct sadmm_error *er
     bool residuals = false;
     c->prologue = c->fast && !c->plan.residuals && c->view.rows.count == 0 && c->view.model.contact_rows == 3 &&
                   CUDA(persistent_does_prologue)(&c->partition);
-    while (sadmm_stages_next(&stages, &stage)) CUDA_TRY(record_stage(c, &stage, &residuals, error));
+    while (sadmm_stages_next(&stages, &stage)) TRY(record_stage(c, &stage, &residuals, error));
     return SADMM_OK;
 }
 

@@ -1,6 +1,6 @@
 /* What a step gives back, in raw order and double: v and lambda, beta, the moved bodies (Q), contact wrenches (R). */
 #include "backend_cuda/device/double.h"
-#include "solution.h"
+#include "backend_cuda/iterate/solution.h"
 
 /* ---- v and lambda ---------------------------------------------------------------------------------------------- */
 
@@ -25,7 +25,8 @@ static __global__ void read_kernel(const __grid_constant__ cuda_view v, const __
     }
     i -= v.contacts.pair_capacity;
     if (i < live_rows(v.model, v.rows))
-        for (int r = 0; r < 6; ++r) multipliers[6 * (size_t)i + (size_t)r] = (double)v.rows.data[6 * (size_t)i + (size_t)r].lambda;
+        for (int r = 0; r < 6; ++r)
+            multipliers[6 * (size_t)i + (size_t)r] = (double)v.rows.data[6 * (size_t)i + (size_t)r].lambda;
 }
 
 extern "C" sadmm_status CUDA(read_solution)(struct sadmm_context *c, struct sadmm_error *error)
@@ -35,10 +36,10 @@ extern "C" sadmm_status CUDA(read_solution)(struct sadmm_context *c, struct sadm
     size_t n = (size_t)v->model.bodies, points = (size_t)c->plan.points, rows = (size_t)v->rows.count;
     cuda_args args = {};
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(launch)(c, read_kernel, "read_solution",
-                          blocks_for((int64_t)v->model.bodies + v->contacts.pair_capacity + v->rows.count), &args,
-                          error));
-    CUDA_TRY(CUDA(download)(c, v->raw.out, (6 * n + 3 * points + 6 * rows) * sizeof(double), error));
+    TRY(CUDA(launch)(c, read_kernel, "read_solution",
+                     blocks_for((int64_t)v->model.bodies + v->contacts.pair_capacity + v->rows.count), &args,
+                     error));
+    TRY(CUDA(download)(c, v->raw.out, (6 * n + 3 * points + 6 * rows) * sizeof(double), error));
     const double *from = (const double *)c->buffers[PINNED_OUT].data;
     if (n > 0) memcpy(system->velocity, from, 6 * n * sizeof *from);
     from += 6 * n;
@@ -63,8 +64,8 @@ extern "C" sadmm_status CUDA(read_penalty)(struct sadmm_context *c, double *beta
     size_t bytes = (size_t)c->view.model.bodies * sizeof *beta;
     cuda_args args = {};
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(launch)(c, read_penalty_kernel, "read_penalty", blocks_for(c->view.model.bodies), &args, error));
-    CUDA_TRY(CUDA(download)(c, c->view.raw.out, bytes, error));
+    TRY(CUDA(launch)(c, read_penalty_kernel, "read_penalty", blocks_for(c->view.model.bodies), &args, error));
+    TRY(CUDA(download)(c, c->view.raw.out, bytes, error));
     if (bytes > 0) memcpy(beta, c->buffers[PINNED_OUT].data, bytes);
     return SADMM_OK;
 }
@@ -88,8 +89,8 @@ extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_ri
     if (!c->plan.rigid)
         return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "integrate: the system gives A and b, not rigid bodies");
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(launch)(c, integrate_kernel, "integrate", blocks_for(c->view.model.bodies), &args, error));
-    CUDA_TRY(CUDA(download)(c, c->view.raw.out, MOVED * n * sizeof(double), error));
+    TRY(CUDA(launch)(c, integrate_kernel, "integrate", blocks_for(c->view.model.bodies), &args, error));
+    TRY(CUDA(download)(c, c->view.raw.out, MOVED * n * sizeof(double), error));
     const double *from = (const double *)c->buffers[PINNED_OUT].data;
     for (size_t i = 0; i < n; ++i, from += MOVED) {
         next[i] = c->system->rigid[i];
@@ -117,9 +118,9 @@ extern "C" sadmm_status CUDA(recover_wrenches)(struct sadmm_context *c, double *
     size_t bytes = 6 * (size_t)c->view.model.bodies * sizeof *wrench;
     cuda_args args = {};
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(launch)(c, wrench_kernel, "recover_wrenches", blocks_for((int64_t)c->view.model.bodies * LANES),
-                          &args, error));
-    CUDA_TRY(CUDA(download)(c, c->view.raw.out, bytes, error));
+    TRY(CUDA(launch)(c, wrench_kernel, "recover_wrenches", blocks_for((int64_t)c->view.model.bodies * LANES),
+                     &args, error));
+    TRY(CUDA(download)(c, c->view.raw.out, bytes, error));
     if (bytes > 0) memcpy(wrench, c->buffers[PINNED_OUT].data, bytes);
     return SADMM_OK;
 }

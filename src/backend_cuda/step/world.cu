@@ -1,6 +1,7 @@
 /* Whole steps on the device: take over a world, let it go; where its arrays are (step/world.h). */
 #include <string.h>
 
+#include "backend_cuda/graph/graph.h"
 #include "collision/collision.h"
 #include "core/base/memory.h"
 #include "world.h"
@@ -40,7 +41,7 @@ void CUDA(view_into)(struct sadmm_context *c, int into)
     c->view.raw.points = set.points;
 }
 
-/* Counts and settings of the view; pairs: room for so many. */
+/* Counts and settings of the view; pairs: their capacity. */
 void CUDA(view_counts)(struct sadmm_context *c, int64_t pairs)
 {
     struct cuda_step *s = c->step;
@@ -85,7 +86,7 @@ static sadmm_status step_create(struct sadmm_context *c, struct sadmm_error *err
     struct cuda_step *s = (struct cuda_step *)sadmm_alloc(1, sizeof *s);
     if (!s) return sadmm_fail_memory(error, "the cuda backend's world");
     c->step = s;
-    CUDA_TRY(COLLISION(create)(c->device, &s->collision, error));
+    TRY(COLLISION(create)(c->device, &s->collision, error));
     for (struct queued_step &q : s->queue)
         CUDA_CALL(c, cudaEventCreateWithFlags(&q.done, cudaEventDisableTiming), "cudaEventCreate");
     return SADMM_OK;
@@ -95,8 +96,8 @@ static sadmm_status step_create(struct sadmm_context *c, struct sadmm_error *err
 static sadmm_status put(struct sadmm_context *c, enum cuda_buffer_name name, const void *from, size_t bytes,
                         struct sadmm_error *error)
 {
-    CUDA_TRY(CUDA(reserve)(c, PINNED_BODIES, bytes, error));
-    CUDA_TRY(CUDA(upload)(c, c->buffers[name].data, PINNED_BODIES, 0, from, bytes, error));
+    TRY(CUDA(reserve)(c, PINNED_BODIES, bytes, error));
+    TRY(CUDA(upload)(c, c->buffers[name].data, PINNED_BODIES, 0, from, bytes, error));
     return CUDA(wait)(c, error);
 }
 
@@ -107,7 +108,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     if (n > (size_t)INT32_MAX / 64)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d bodies: at most %d", world->body_count, INT32_MAX / 64);
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(wait)(c, error));
+    TRY(CUDA(wait)(c, error));
     if (!c->step) {
         sadmm_status status = step_create(c, error);
         if (status != SADMM_OK) {
@@ -125,42 +126,42 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     s->offending_body = -1;
     for (struct queued_step &q : s->queue) q.edit_count = 0;
     memset(&s->last, 0, sizeof s->last);
-    CUDA_TRY(CUDA(use_settings)(c, settings, error));
-    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_BODIES, 2 * n * sizeof *world->rigid, error));
-    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_STEADY, 2 * n * sizeof *world->steady, error));
-    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_WRENCH, 12 * n * sizeof(double), error));
-    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_VELOCITY, 6 * n * sizeof(double), error));
-    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_SLOTS, n * sizeof *world->slot_of, error));
-    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_PLACES, slots * sizeof(struct sadmm_collision_body), error));
-    CUDA_TRY(CUDA(reserve)(c, BUFFER_WORLD_CONTROL, sizeof(struct cuda_step_control), error));
-    CUDA_TRY(CUDA(reserve)(c, PINNED_REPORTS, STEPS_AHEAD * sizeof(struct cuda_step_report), error));
+    TRY(CUDA(use_settings)(c, settings, error));
+    TRY(CUDA(reserve)(c, BUFFER_WORLD_BODIES, 2 * n * sizeof *world->rigid, error));
+    TRY(CUDA(reserve)(c, BUFFER_WORLD_STEADY, 2 * n * sizeof *world->steady, error));
+    TRY(CUDA(reserve)(c, BUFFER_WORLD_WRENCH, 12 * n * sizeof(double), error));
+    TRY(CUDA(reserve)(c, BUFFER_WORLD_VELOCITY, 6 * n * sizeof(double), error));
+    TRY(CUDA(reserve)(c, BUFFER_WORLD_SLOTS, n * sizeof *world->slot_of, error));
+    TRY(CUDA(reserve)(c, BUFFER_WORLD_PLACES, slots * sizeof(struct sadmm_collision_body), error));
+    TRY(CUDA(reserve)(c, BUFFER_WORLD_CONTROL, sizeof(struct cuda_step_control), error));
+    TRY(CUDA(reserve)(c, PINNED_REPORTS, STEPS_AHEAD * sizeof(struct cuda_step_report), error));
     CUDA_CALL(c, cudaMemsetAsync(buffer<void>(c, BUFFER_WORLD_CONTROL), 0, sizeof(struct cuda_step_control), c->stream),
               "cudaMemsetAsync(control)");
 
     c->plan.gyroscopic = sadmm_plan_is_gyroscopic(world->rigid, world->body_count);
     /* The state before the first step is the one that is not written by it. */
-    CUDA_TRY(COLLISION(upload)(s->collision, c->stream, world->contacts, error));
+    TRY(COLLISION(upload)(s->collision, c->stream, world->contacts, error));
     s->into = 1 - COLLISION(current)(s->collision);
     const size_t before = (size_t)(1 - s->into);
-    CUDA_TRY(put(c, BUFFER_WORLD_SLOTS, world->slot_of, n * sizeof *world->slot_of, error));
-    CUDA_TRY(put(c, BUFFER_WORLD_PLACES, world->input->bodies, slots * sizeof *world->input->bodies, error));
-    CUDA_TRY(CUDA(reserve)(c, PINNED_BODIES, n * sizeof *world->rigid, error));
-    CUDA_TRY(CUDA(upload)(c, buffer<struct sadmm_rigid>(c, BUFFER_WORLD_BODIES) + before * n, PINNED_BODIES, 0,
-                          world->rigid, n * sizeof *world->rigid, error));
-    CUDA_TRY(CUDA(wait)(c, error));
-    CUDA_TRY(CUDA(upload)(c, buffer<struct sadmm_steady>(c, BUFFER_WORLD_STEADY) + before * n, PINNED_BODIES, 0,
-                          world->steady, n * sizeof *world->steady, error));
-    CUDA_TRY(CUDA(wait)(c, error));
+    TRY(put(c, BUFFER_WORLD_SLOTS, world->slot_of, n * sizeof *world->slot_of, error));
+    TRY(put(c, BUFFER_WORLD_PLACES, world->input->bodies, slots * sizeof *world->input->bodies, error));
+    TRY(CUDA(reserve)(c, PINNED_BODIES, n * sizeof *world->rigid, error));
+    TRY(CUDA(upload)(c, buffer<struct sadmm_rigid>(c, BUFFER_WORLD_BODIES) + before * n, PINNED_BODIES, 0,
+                     world->rigid, n * sizeof *world->rigid, error));
+    TRY(CUDA(wait)(c, error));
+    TRY(CUDA(upload)(c, buffer<struct sadmm_steady>(c, BUFFER_WORLD_STEADY) + before * n, PINNED_BODIES, 0,
+                     world->steady, n * sizeof *world->steady, error));
+    TRY(CUDA(wait)(c, error));
     CUDA(view_counts)(c, 0);
-    CUDA_TRY(CUDA(reserve_layout)(c, error)); /* live is needed from here on */
-    CUDA_TRY(CUDA(clear_abort)(c, error));
+    TRY(CUDA(reserve_layout)(c, error)); /* live is needed from here on */
+    TRY(CUDA(clear_abort)(c, error));
     s->candidate_capacity = s->point_capacity = c->first_capacity;
     c->refused = 0;
     s->misfit = -1;
     const struct cuda_settings *kept = buffer<struct cuda_settings>(c, BUFFER_SETTINGS);
-    CUDA_TRY(COLLISION(attach)(s->collision, c->stream, world->input,
-                               buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES),
-                               &c->view.model.live->abort_code, &kept->settings.dt, &kept->gravity, error));
+    TRY(COLLISION(attach)(s->collision, c->stream, world->input,
+                          buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES),
+                          &c->view.model.live->abort_code, &kept->settings.dt, &kept->gravity, error));
     CUDA(view_into)(c, s->into);
     return CUDA(wait)(c, error);
 }

@@ -1,4 +1,4 @@
-/* The world on the device, the host's side: what the sources of whole steps (step/step.h) share.
+/* The world on the device, the host's side: what the sources of whole steps (device/step.h) share.
  *
  *   world.cu   take over a world and let it go; where its arrays are
  *   guess.cu   plan a step from the statistics of an earlier one
@@ -8,8 +8,6 @@
  */
 #ifndef SADMM_CUDA_STEP_WORLD_H
 #define SADMM_CUDA_STEP_WORLD_H
-
-#include <algorithm>
 
 #include "backend_cuda/collide/pipeline.h"
 #include "backend_cuda/device/context.h"
@@ -56,16 +54,14 @@ static inline struct cuda_step_report *step_reports(const struct sadmm_context *
     return buffer<struct cuda_step_report>(c, PINNED_REPORTS);
 }
 
-/* Capacities: more than there was, so that not every new contact repeats a step: half as much again in small scenes,
- * where a heap that spreads gains a third, an eighth in large ones, where it costs memory. */
-static inline int64_t generous(int64_t count) { return count + std::min(count / 2, count / 8 + 8192) + 256; }
-
 /* Is there a stop rule to check? Then residuals say nothing: islands end at different times. */
 static inline bool stop_rule_checked(const struct sadmm_context *c)
 {
     return c->fast && c->settings.certificate_tolerance > 0;
 }
 
+/* world.cu */
+void CUDA(step_destroy)(struct sadmm_context *);
 /* world.cu: what of the view depends on which state and set is written. */
 void CUDA(view_into)(struct sadmm_context *, int into);
 /* world.cu: counts and settings of the view; pairs: capacity. */
@@ -80,5 +76,13 @@ sadmm_status CUDA(enqueue_find)(struct sadmm_context *, struct sadmm_error *erro
 sadmm_status CUDA(record_step)(struct sadmm_context *, int into, struct sadmm_error *error);
 /* read.cu: the report of the last step that was done. */
 void CUDA(report_step)(const struct sadmm_context *, struct sadmm_resident_report *out);
+
+/* kernels.cu: launches of the step's own kernels. */
+sadmm_status CUDA(launch_edits)(struct sadmm_context *, const struct sadmm_resident_edit *edits, size_t count,
+                                struct sadmm_error *error);
+sadmm_status CUDA(launch_start)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_admit)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_finish)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_commit)(struct sadmm_context *, struct sadmm_error *error);
 
 #endif

@@ -1,5 +1,5 @@
-/* H = (A + beta C)^-1 of a body, and B and C of the method `fast`. In double; eight lanes a body. H only preconditions: the
- * fixed point of Step 1 does not depend on it. */
+/* H = (A + beta C)^-1 of a body, and B and C of the method `fast`. In double; eight lanes a body. H only preconditions:
+ * the fixed point of Step 1 does not depend on it. */
 #ifndef SADMM_CUDA_WEIGHT_FACTOR_H
 #define SADMM_CUDA_WEIGHT_FACTOR_H
 
@@ -26,7 +26,7 @@ static __device__ __forceinline__ void ease_gaps(const model_view &model, const 
  * numbers. */
 struct eight_sides {
     int32_t code;                  /* of the lane's own, or -1 */
-    pair_ends ends;
+    pair_bodies bodies;
     solver_real load, response;    /* of a pair */
     solver_real number[2][LANES];  /* numbers lane and lane + LANES of arm_sums */
 };
@@ -38,7 +38,7 @@ static __device__ __forceinline__ double weigh_side(const model_view &model, con
 {
     const int32_t p = sides.code / 2;
     const double load = (double)sides.load, response = (double)sides.response;
-    const bool a = is_dynamic(model, sides.ends.body_a), both = a && is_dynamic(model, sides.ends.body_b);
+    const bool a = is_dynamic(model, sides.bodies.body_a), both = a && is_dynamic(model, sides.bodies.body_b);
     const double scale = island.rescale,
                  taken = scale > 0 ? weights.weight[p]
                                    : weight_of_pair(island.weight_scale, weight_mass(load, island.speed, island.mass),
@@ -74,7 +74,8 @@ static __device__ __forceinline__ void add_normals(const contact_view &contacts,
     });
 }
 
-/* Units of rounding by which a diagonal number of C may be short: its own, three entries a row, and those of q q^T / p. */
+/* Units of rounding by which a diagonal number of C may be short: its own, three entries a row, and those of q q^T /
+ * p. */
 #define C_ROUNDING 8.0
 
 /* Those from place `begin` on. Every lane of the warp comes here. */
@@ -83,12 +84,12 @@ static __device__ __forceinline__ eight_sides fetch_sides(const model_view &mode
                                                           const body_thread &t, int32_t begin)
 {
     const bool more = t.lane + LANES < SIDE_ARMS;
-    const pair_ends nobody = {};
+    const pair_bodies nobody = {};
     eight_sides out;
     out.code = begin + t.lane < t.end ? graph.incident[begin + t.lane] : -1;
     const bool own = out.code >= 0 && out.code < 2 * contacts.pair_capacity;
     const solver_real *about = weights.side_arms + (size_t)(own ? out.code : 0) * SIDE_NUMBERS;
-    out.ends = own ? contacts.ends[out.code / 2] : nobody;
+    out.bodies = own ? contacts.bodies[out.code / 2] : nobody;
     out.load = own ? about[SIDE_LOAD] : (solver_real)0;
     out.response = own ? about[SIDE_RESPONSE] : (solver_real)0;
 #pragma unroll
@@ -137,8 +138,9 @@ static __device__ __forceinline__ void weighted_matrix(const cuda_view &v, const
     for (int k = 0; k < SIDE_ARMS; ++k)
         in_order[k] = __shfl_sync((unsigned)ALL_LANES, sum[k / LANES], k % LANES, LANES);
     add_arm_sums(C, &sums);
-    /* Sums are in this precision. What is rounded must not make C less: along axes that contacts do not turn about it is 0, and
-     * what is left there is the inertia, of a light body under heavy ones a small part of C. More only slows. */
+    /* Sums are in this precision. What is rounded must not make C less: along axes that contacts do not turn about it
+     * is 0, and what is left there is the inertia, of a light body under heavy ones a small part of C. More only
+     * slows. */
     C[9] += C_ROUNDING * SOLVER_EPSILON * C[9];
     C[14] += C_ROUNDING * SOLVER_EPSILON * C[14];
     C[20] += C_ROUNDING * SOLVER_EPSILON * C[20];
@@ -183,9 +185,10 @@ static __device__ __forceinline__ void store_column(const body_view &bodies, siz
     if (lane == 7) bodies.state[body * ROW + STATE_INV_BETA] = (solver_real)(1 / beta);
 }
 
-/* H where it has a closed form. A + C = [p I, -[q]x; [q]x, R] with [q]x u = q x u; by eliminating the linear part, a column a lane: in
+/* H where it has a closed form. A + C = [p I, -[q]x; [q]x, R] with [q]x u = q x u; by eliminating the linear part, a
+ * column a lane: in
  *
- *     p t - q x w = f,   q x t + R w = g        S w = g - q x f / p,   S = R - (|q|^2 I - q q^T) / p,   t = (f + q x w) / p
+ *     p t - q x w = f,   q x t + R w = g      S w = g - q x f / p,   S = R - (|q|^2 I - q q^T) / p,   t = (f + q x w) / p
  *
  * S = L D L^T. */
 static __device__ __forceinline__ void factor_rigid(const body_view &bodies, size_t body, int32_t lane,
@@ -197,18 +200,21 @@ static __device__ __forceinline__ void factor_rigid(const body_view &bodies, siz
                  rxz = (double)line[4] + C[18], ryz = (double)line[5] + C[19], rzz = (double)line[6] + C[20];
     const double qx = x * by_p, qy = y * by_p, qz = z * by_p;
     const double sxx = fma(-qz, z, fma(-qy, y, rxx)), syy = fma(-qz, z, fma(-qx, x, ryy)),
-                 szz = fma(-qy, y, fma(-qx, x, rzz)), sxy = fma(qx, y, rxy), sxz = fma(qx, z, rxz), syz = fma(qy, z, ryz);
+                 szz = fma(-qy, y, fma(-qx, x, rzz)), sxy = fma(qx, y, rxy), sxz = fma(qx, z, rxz),
+                 syz = fma(qy, z, ryz);
     const double d0 = 1 / sxx, l1 = sxy * d0, l2 = sxz * d0, left = fma(-l1, sxy, syy), d1 = 1 / left,
                  cross = fma(-l1, sxz, syz), l3 = cross * d1, last = fma(-l3, cross, fma(-l2, sxz, szz)), d2 = 1 / last;
-    const bool ok = p > 0 && sxx > 4 * DBL_EPSILON * rxx && left > 4 * DBL_EPSILON * ryy && last > 4 * DBL_EPSILON * rzz &&
-                    p <= DBL_MAX && sxx <= DBL_MAX && left <= DBL_MAX && last <= DBL_MAX;
+    const bool ok = p > 0 && sxx > 4 * DBL_EPSILON * rxx && left > 4 * DBL_EPSILON * ryy &&
+                    last > 4 * DBL_EPSILON * rzz && p <= DBL_MAX && sxx <= DBL_MAX && left <= DBL_MAX &&
+                    last <= DBL_MAX;
     /* g - q x f / p with f or g the unit vector of the lane */
     const double g0 = lane == 1 ? qz : lane == 2 ? -qy : lane == 3 ? 1 : 0,
                  g1 = lane == 0 ? -qz : lane == 2 ? qx : lane == 4 ? 1 : 0,
                  g2 = lane == 0 ? qy : lane == 1 ? -qx : lane == 5 ? 1 : 0;
     const double y1 = fma(-l1, g0, g1), y2 = fma(-l3, y1, fma(-l2, g0, g2));
     const double w2 = y2 * d2, w1 = fma(-l3, w2, y1 * d1), w0 = fma(-l2, w2, fma(-l1, w1, g0 * d0));
-    double column[6] = {fma(qy, w2, fma(-qz, w1, lane == 0 ? by_p : 0)), fma(qz, w0, fma(-qx, w2, lane == 1 ? by_p : 0)),
+    double column[6] = {fma(qy, w2, fma(-qz, w1, lane == 0 ? by_p : 0)),
+                        fma(qz, w0, fma(-qx, w2, lane == 1 ? by_p : 0)),
                         fma(qx, w1, fma(-qy, w0, lane == 2 ? by_p : 0)), w0, w1, w2};
     if (!ok) { /* as in factor_body */
         const double diagonal = lane < 3 ? p : lane == 3 ? rxx : lane == 4 ? ryy : rzz;
@@ -247,7 +253,8 @@ static __device__ __forceinline__ void factor_body(const body_view &bodies, size
         x[i] = s * inverse[i];
     }
 #pragma unroll
-    for (int i = 0; i < 6; ++i) /* A rounded to f32 stays positive definite unless the problem is beyond f32: then keep the diagonal. */
+    for (int i = 0; i < 6;
+         ++i) /* A rounded to f32 stays positive definite unless the problem is beyond f32: then keep the diagonal. */
         if (!ok) x[i] = i == lane ? 1 / diagonal[i] : 0;
     store_column(bodies, body, lane, beta, H, x);
 }

@@ -1,7 +1,7 @@
-/* Sums and maxima over islands, in the kernel that makes their terms: slots are by island, and a body's place in its island
- * is what the order of a sum depends on. Of SPREAD neighbours that are SPREAD^k apart the one that comes last adds up all of
- * them, in order, and goes on to the next power; so every sum has one order, whatever surrounds the island and whoever comes
- * last. */
+/* Sums and maxima over islands, in the kernel that makes their terms: slots are by island, and a body's place in its
+ * island is what the order of a sum depends on. Of SPREAD neighbours that are SPREAD^k apart the one that comes last
+ * adds up all of them, in order, and goes on to the next power; so every sum has one order, whatever surrounds the
+ * island and whoever comes last. */
 #ifndef SADMM_CUDA_WEIGHT_ISLAND_SUMS_H
 #define SADMM_CUDA_WEIGHT_ISLAND_SUMS_H
 
@@ -17,9 +17,9 @@ struct largest_term { /* a NaN stays */
     static __device__ __forceinline__ double join(double a, double b) { return a != a || b <= a ? a : b; }
 };
 
-/* Terms of a body, term k in lane k, added up (or what Join says) over its island. True in the lanes of one body of each
- * island; those have all of the sums in `sum`, and see what any body of the island has written before it came here. Every
- * lane of the warp comes here. */
+/* Terms of a body, term k in lane k, added up (or what Join says) over its island. True in the lanes of one body of
+ * each island; those have all of the sums in `sum`, and see what any body of the island has written before it came
+ * here. Every lane of the warp comes here. */
 template <class Join>
 static __device__ __forceinline__ bool add_up_island(const graph_view &graph, const island_view &islands,
                                                      const body_thread &t, double term, double sum[TERMS])
@@ -72,8 +72,9 @@ struct island_range {
     int32_t first, bodies;
 };
 
-/* The same of all islands of a thread block, whose `bodies` bodies are whole islands: `terms` (shared) holds TERMS of each, and
- * at an island's first body its sums in the end, equal to the last bit. `barrier` is the block's; it comes first and last. */
+/* The same of all islands of a thread block, whose `bodies` bodies are whole islands: `terms` (shared) holds TERMS of
+ * each, and at an island's first body its sums in the end, equal to the last bit. `barrier` is the block's; it comes
+ * first and last. */
 template <class Join, class Barrier>
 static __device__ __forceinline__ void add_up_in_block(int32_t bodies, const island_range *range, double *terms,
                                                        Barrier barrier)

@@ -2,9 +2,10 @@
  * a step, and H only preconditions (the fixed point of Step 1 does not depend on it). */
 #include "backend_cuda/device/double.h"
 #include "factor.h"
-#include "backend_cuda/step/plan_check.h"
+#include "weight.h"
+#include "backend_cuda/device/plan_check.h"
 
-/* ---- C ------------------------------------------------------------------------------------------------------------- */
+/* ---- C ----------------------------------------------------------------------------------------------------------- */
 
 static __device__ void add_pair(const model_view &model, const raw_view &raw, const struct sadmm_contact_pair *pair,
                                 int side, arm_sums *sums, double C[PACKED])
@@ -121,6 +122,19 @@ static sadmm_status launch_bodies(struct sadmm_context *c, cuda_kernel kernel, c
     return CUDA(launch_early)(c, kernel, name, args->planned && blocks == 0 ? 1 : blocks, BODY_THREADS, args, error);
 }
 
+/* fast: B, C and, for `factor`, H. first: of the solve; planned: compare with the plan. */
+static sadmm_status enqueue_weighted_penalties(struct sadmm_context *c, bool first, bool factor, bool planned,
+                                               struct sadmm_error *error)
+{
+    cuda_args args = {};
+    args.start = first;
+    args.planned = planned;
+    const cuda_kernel kernel =
+        closed_form(c) ? (factor ? penalty_kernel<true, true, CLOSED> : penalty_kernel<true, false, CLOSED>)
+                       : (factor ? penalty_kernel<true, true, WEIGHTED> : penalty_kernel<true, false, WEIGHTED>);
+    return launch_bodies(c, kernel, "penalties", &args, error);
+}
+
 extern "C" sadmm_status CUDA(init_penalty)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
@@ -133,8 +147,8 @@ extern "C" sadmm_status CUDA(init_penalty)(struct sadmm_context *c, struct sadmm
     c->rescaled = false;
     if (c->fast) {
         CUDA(begin_weights)(c);
-        CUDA_TRY(CUDA(enqueue_islands)(c, error));
-        return CUDA(enqueue_weighted_penalties)(c, true, false, false, error);
+        TRY(CUDA(enqueue_islands)(c, error));
+        return enqueue_weighted_penalties(c, true, false, false, error);
     }
     return launch_bodies(c, penalty_kernel<true, false, PLAIN>, "init_penalty", &args, error);
 }
@@ -143,7 +157,8 @@ extern "C" sadmm_status CUDA(factorize)(struct sadmm_context *c, struct sadmm_er
 {
     cuda_args args = {};
     CUDA_ENTER(c);
-    const cuda_kernel kernel = closed_form(c) ? penalty_kernel<false, true, CLOSED> : penalty_kernel<false, true, PLAIN>;
+    const cuda_kernel kernel =
+        closed_form(c) ? penalty_kernel<false, true, CLOSED> : penalty_kernel<false, true, PLAIN>;
     return launch_bodies(c, kernel, "factorize", &args, error);
 }
 
@@ -152,7 +167,7 @@ extern "C" sadmm_status CUDA(update_penalty)(struct sadmm_context *c, double rat
     cuda_args args = {};
     args.factor = ratio;
     CUDA_ENTER(c);
-    CUDA_TRY(CUDA(launch)(c, scale_kernel, "update_penalty", blocks_for(c->view.model.bodies), &args, error));
+    TRY(CUDA(launch)(c, scale_kernel, "update_penalty", blocks_for(c->view.model.bodies), &args, error));
     c->rescaled = true;
     return SADMM_OK;
 }
@@ -163,31 +178,32 @@ sadmm_status CUDA(enqueue_penalties)(struct sadmm_context *c, struct sadmm_error
     args.planned = true;
     c->starting = !c->fast;
     c->checks = 0;
-    c->cleared = c->prologue ? 0 : SCALAR_PRIMAL | SCALAR_DUAL | SCALAR_BARRIER; /* step/plan_check.h */
+    c->cleared = c->prologue ? 0 : SCALAR_PRIMAL | SCALAR_DUAL | SCALAR_BARRIER; /* device/plan_check.h */
     c->placed = c->measured = c->rescaled = false;
     if (!c->fast) return launch_bodies(c, penalty_kernel<true, true, PLAIN>, "penalties", &args, error);
     CUDA(begin_weights)(c);
     if (c->prologue) return SADMM_OK;
-    CUDA_TRY(CUDA(enqueue_islands)(c, error));
-    return CUDA(enqueue_weighted_penalties)(c, true, true, true, error);
+    TRY(CUDA(enqueue_islands)(c, error));
+    return enqueue_weighted_penalties(c, true, true, true, error);
 }
 
 sadmm_status CUDA(enqueue_balance)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
     args.measure = 1;
-    CUDA_TRY(CUDA(launch)(c, scale_kernel, "update_penalty", blocks_for(c->view.model.bodies), &args, error));
+    TRY(CUDA(launch)(c, scale_kernel, "update_penalty", blocks_for(c->view.model.bodies), &args, error));
     c->rescaled = true;
     return SADMM_OK;
 }
 
-sadmm_status CUDA(enqueue_weighted_penalties)(struct sadmm_context *c, bool first, bool factor, bool planned,
-                                              struct sadmm_error *error)
+sadmm_status CUDA(enqueue_weights)(struct sadmm_context *c, bool factor, struct sadmm_error *error)
 {
-    cuda_args args = {};
-    args.start = first;
-    args.planned = planned;
-    const cuda_kernel kernel = closed_form(c) ? (factor ? penalty_kernel<true, true, CLOSED> : penalty_kernel<true, false, CLOSED>)
-                                              : (factor ? penalty_kernel<true, true, WEIGHTED> : penalty_kernel<true, false, WEIGHTED>);
-    return launch_bodies(c, kernel, "penalties", &args, error);
+    TRY(CUDA(enqueue_loads)(c, error));
+    return enqueue_weighted_penalties(c, false, factor, false, error);
+}
+
+extern "C" sadmm_status CUDA(update_weights)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    CUDA_ENTER(c);
+    return CUDA(enqueue_weights)(c, false, error);
 }

@@ -13,8 +13,8 @@ static inline __device__ double violation_of(const body_view &bodies, const cont
                                              const weight_view &weights, int32_t p)
 {
     const pair_data pair = load_pair(contacts, p);
-    const pair_ends ends = contacts.ends[p];
-    const int32_t joined[2] = {ends.body_a, ends.body_b};
+    const pair_bodies of_pair = contacts.bodies[p];
+    const int32_t joined[2] = {of_pair.body_a, of_pair.body_b};
     double velocity[2][6], sum = 0;
     for (int side = 0; side < 2; ++side)
         for (int j = 0; j < 6; ++j) velocity[side][j] = (double)bodies.state[(size_t)joined[side] * ROW + (size_t)j];
@@ -30,7 +30,7 @@ static inline __device__ double violation_of(const body_view &bodies, const cont
 }
 
 /* What follows from the sums over an island. */
-template <bool LEVELS>
+template <bool SCALES>
 static __device__ __forceinline__ void weigh_island(cuda_island *island, const double sum[TERMS], const cuda_args &args)
 {
     const cuda_island fresh = {0, 0, 1, 0, 1, 1, 0, 0};
@@ -43,7 +43,7 @@ static __device__ __forceinline__ void weigh_island(cuda_island *island, const d
         island->speed = weight_speed_under_iterated(speed, island->speed, args.factor, sum[2], sum[1]);
     }
     island->mass = sum[1];
-    if (!LEVELS || island->rows) return;
+    if (!SCALES || island->rows) return;
     const double balance = weight_balance(sum[5], sum[4], sum[1]),
                  next = weight_next_scale(island->weight_scale, balance);
     /* those that stall keep the weights they have, times what the weight scale has risen by since those were taken */
@@ -98,14 +98,14 @@ static __device__ __forceinline__ double sum_sides(const graph_view &graph, cons
 /* Terms of a body, one a lane, and its momentum residual r = b + g - A v, g = J^T lambda. A pair counts at its first
  * dynamic body. Every lane of the warp comes here.
  *                 g . A^-1 g, mass, v . A v, push        push: the sum of the forces' sizes
- *         LEVELS  also r . A^-1 r, what its pairs miss */
-template <bool LEVELS, bool RIGID, bool ROWS>
+ *         SCALES  also r . A^-1 r, what its pairs miss */
+template <bool SCALES, bool RIGID, bool ROWS>
 static __device__ __forceinline__ double terms_of_body(const cuda_view &v, const body_thread &t)
 {
     double missed = 0, term[TERMS] = {};
-    for (int32_t at = t.begin + t.lane; LEVELS && at < t.end; at += LANES) {
+    for (int32_t at = t.begin + t.lane; SCALES && at < t.end; at += LANES) {
         const int32_t code = v.graph.incident[at], p = code / 2;
-        if (p >= v.contacts.pair_capacity || (code & 1 && is_dynamic(v.model, v.contacts.ends[p].body_a)))
+        if (p >= v.contacts.pair_capacity || (code & 1 && is_dynamic(v.model, v.contacts.bodies[p].body_a)))
             continue; /* counted there */
         missed += violation_of(v.bodies, v.contacts, v.weights, p);
     }
@@ -118,7 +118,7 @@ static __device__ __forceinline__ double terms_of_body(const cuda_view &v, const
     term[3] = __shfl_sync((unsigned)ALL_LANES, sum, SIDE_PUSH, LANES);
     const double r = row.b + g - momentum;
     if (t.live) v.bodies.momentum_residual[t.body * ROW + (size_t)t.lane] = (solver_real)r;
-    if (LEVELS) {
+    if (SCALES) {
         sum_lanes<1>(&missed);
         term[4] = dot_lanes(r, product(r, row.a_inverse));
         term[5] = missed;

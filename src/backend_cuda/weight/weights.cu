@@ -2,8 +2,9 @@
  * double, from this precision's data; a few times a step.
  *
  *   pairs    four threads a pair, or one: records of its sides (assemble/side_sums.h). The first ones come with the
- * contacts   terms    eight lanes a body: its momentum residual, what it adds to the sums over its island, the sums
- * (weight/island_sums.h), and what            follows for the island
+ *            contacts
+ *   terms    eight lanes a body: its momentum residual, what it adds to the sums over its island, the sums
+ *            (weight/island_sums.h), and what follows for the island
  *   rows     a thread a constraint given by rows: B
  *   then C and H (weight/penalty.cu), where each side of a pair works out B for itself
  *
@@ -12,6 +13,7 @@
 #include "island_sums.h"
 #include "backend_cuda/assemble/side_sums.h"
 #include "weigh.h"
+#include "weight.h"
 
 /* ---- pairs ------------------------------------------------------------------------------------------------------- */
 
@@ -23,23 +25,23 @@ static __global__ void __launch_bounds__(BODY_THREADS)
                   lane = t % v.contacts.lanes;
     const bool live = p < live_pairs(v.model);
     const real4 none = {};
-    const pair_ends nobody = {v.model.bodies, v.model.bodies, -1, -1}, ends = live ? v.contacts.ends[p] : nobody;
+    const pair_bodies nobody = {v.model.bodies, v.model.bodies, -1, -1}, joined = live ? v.contacts.bodies[p] : nobody;
     const real4 about = live ? v.contacts.normal[p] : none, difference = live ? v.contacts.difference[p] : none;
     const int32_t count = (int32_t)difference.w;
     const rigid_inverse no_inverse = {};
     struct pair_sums sums = {};
     for (int32_t k = lane; k < count; k += v.contacts.lanes) {
         const point_numbers point = fetch_point(v.contacts, p, k);
-        add_point(v.model, v.bodies, ends, about, difference, point.arm, point.lambda, false, &sums);
+        add_point(v.model, v.bodies, joined, about, difference, point.arm, point.lambda, false, &sums);
     }
-    store_sides(v.model, v.bodies, v.contacts, v.weights, live, p, lane, count, ends, difference, false, no_inverse,
+    store_sides(v.model, v.bodies, v.contacts, v.weights, live, p, lane, count, joined, difference, false, no_inverse,
                 &sums);
 }
 
 /* ---- terms and islands --------------------------------------------------------------------------------------------- */
 
 /* ROWS: there may be constraints given by rows. */
-template <bool LEVELS, bool ROWS>
+template <bool SCALES, bool ROWS>
 static __global__ void __launch_bounds__(BODY_THREADS)
     terms_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
@@ -47,9 +49,9 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const body_thread t = body_of_thread(v.model, v.graph);
     double total[TERMS];
     const double term =
-        v.bodies.rigid ? terms_of_body<LEVELS, true, ROWS>(v, t) : terms_of_body<LEVELS, false, ROWS>(v, t);
+        v.bodies.rigid ? terms_of_body<SCALES, true, ROWS>(v, t) : terms_of_body<SCALES, false, ROWS>(v, t);
     if (add_up_island<add_terms>(v.graph, v.islands, t, term, total) && t.lane == 0)
-        weigh_island<LEVELS>(&v.islands.info[v.graph.label[t.body]], total, args);
+        weigh_island<SCALES>(&v.islands.info[v.graph.label[t.body]], total, args);
 }
 
 /* ---- row blocks -------------------------------------------------------------------------------------------------- */
@@ -76,7 +78,8 @@ static __device__ void respond_rows(const model_view &model, const body_view &bo
     }
 }
 
-/* A row that has neither bounds nor compliance shares a dense weight with the others of its constraint that have none. */
+/* A row that has neither bounds nor compliance shares a dense weight with the others of its constraint that have
+ * none. */
 static __device__ bool is_coupled(const row_data &row)
 {
     return row.compliance == 0 && isinf(row.lo) && isinf(row.hi);
@@ -138,30 +141,21 @@ cuda_args CUDA(weight_args)(const struct sadmm_context *c)
 sadmm_status CUDA(enqueue_islands)(struct sadmm_context *c, struct sadmm_error *error)
 {
     const cuda_args args = CUDA(weight_args)(c);
-    const bool levels = c->refreshes >= WEIGHT_FIRST_SCALE, rows = c->view.rows.count > 0;
-    const cuda_kernel kernel = levels ? (rows ? terms_kernel<true, true> : terms_kernel<true, false>)
+    const bool scales = c->refreshes >= WEIGHT_FIRST_SCALE, rows = c->view.rows.count > 0;
+    const cuda_kernel kernel = scales ? (rows ? terms_kernel<true, true> : terms_kernel<true, false>)
                                       : (rows ? terms_kernel<false, true> : terms_kernel<false, false>);
-    CUDA_TRY(CUDA(launch_early)(c, kernel, "sums over islands", body_blocks(c->view.model.bodies), BODY_THREADS, &args,
+    TRY(CUDA(launch_early)(c, kernel, "sums over islands", body_blocks(c->view.model.bodies), BODY_THREADS, &args,
                                 error));
     return CUDA(launch)(c, weigh_rows_kernel, "weights of rows", blocks_for(c->view.rows.count), &args, error);
 }
 
-sadmm_status CUDA(enqueue_weights)(struct sadmm_context *c, bool factor, struct sadmm_error *error)
+sadmm_status CUDA(enqueue_loads)(struct sadmm_context *c, struct sadmm_error *error)
 {
     const cuda_args args = {};
     const int64_t blocks =
         ((int64_t)c->view.contacts.pair_capacity * c->view.contacts.lanes + BODY_THREADS - 1) / BODY_THREADS;
     ++c->refreshes;
     c->exact_since = 0;
-    CUDA_TRY(CUDA(launch_of)(c, pairs_kernel, "loads of pairs", blocks, BODY_THREADS, &args, error));
-    CUDA_TRY(CUDA(enqueue_islands)(c, error));
-    return CUDA(enqueue_weighted_penalties)(c, false, factor, false, error);
-}
-
-/* ---- entries ----------------------------------------------------------------------------------------------------- */
-
-extern "C" sadmm_status CUDA(update_weights)(struct sadmm_context *c, struct sadmm_error *error)
-{
-    CUDA_ENTER(c);
-    return CUDA(enqueue_weights)(c, false, error);
+    TRY(CUDA(launch_of)(c, pairs_kernel, "loads of pairs", blocks, BODY_THREADS, &args, error));
+    return CUDA(enqueue_islands)(c, error);
 }

@@ -1,7 +1,8 @@
 /* The barrier of a parallel region (parallel.h), between the sweeps of an iteration above all.
  *
- * A sweep takes microseconds, so threads wait spinning; on a machine with fewer free cores than threads the spin gives way
- * soon, or every barrier would cost a scheduler's time slice. C11 atomics: a thread sanitizer sees the order it makes. */
+ * A sweep takes microseconds, so threads wait spinning; on a machine with fewer free cores than threads the spin gives
+ * way soon, or every barrier would cost a scheduler's time slice. C11 atomics: a thread sanitizer sees the order it
+ * makes. */
 #ifndef SADMM_CORE_BARRIER_H
 #define SADMM_CORE_BARRIER_H
 

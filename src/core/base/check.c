@@ -14,8 +14,8 @@ sadmm_status sadmm_check_vector(const char *name, const double *x, int count, do
         if (isinf(limit) && !isfinite(x[k]))
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s[%d] = %g: must be finite", name, k, x[k]);
         else if (!(fabs(x[k]) <= limit))
-            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s[%d] = %g: must be in [-%g, %g]", name, k, x[k], limit,
-                              limit);
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s[%d] = %g: must be in [-%g, %g]", name, k, x[k],
+                              limit, limit);
     return SADMM_OK;
 }
 
@@ -31,8 +31,8 @@ sadmm_status sadmm_check_orientation(const char *name, const double q[4], double
     double norm = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     if (!(fabs(norm - 1) <= 1e-6))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "%s = (%g, %g, %g, %g) of norm %g: must be a unit quaternion within 1e-6", name, q[0], q[1], q[2],
-                          q[3], norm);
+                          "%s = (%g, %g, %g, %g) of norm %g: must be a unit quaternion within 1e-6", name, q[0], q[1],
+                          q[2], q[3], norm);
     for (int k = 0; k < 4; ++k) out[k] = q[k] / norm;
     return SADMM_OK;
 }

@@ -34,7 +34,8 @@ struct sadmm_contact_point {
     uint32_t reserved;
 };
 
-/* A contact set that grows. Order: pairs by (shape_a, shape_b, child), points in pair order: point index = contact index. */
+/* A contact set that grows. Order: pairs by (shape_a, shape_b, child), points in pair order: point index = contact
+ * index. */
 struct sadmm_contact_set {
     struct sadmm_contact_pair *pairs;
     struct sadmm_contact_point *points;

@@ -48,16 +48,18 @@ void sadmm_free(void *block)
     free(block);
 }
 
-bool sadmm_grow(void **array, size_t *capacity, size_t used, size_t needed, size_t size)
+bool sadmm_grow(void *array, size_t *capacity, size_t used, size_t needed, size_t size)
 {
     if (needed <= *capacity) return true;
+    void *old;
+    memcpy(&old, array, sizeof old);
     const size_t wanted = sadmm_grown_capacity(*capacity, needed, 16);
     char *block = (char *)allocate(wanted, size);
     if (!block) return false;
-    if (used) memcpy(block, *array, used * size);
+    if (used) memcpy(block, old, used * size);
     memset(block + used * size, 0, (wanted - used) * size);
-    free(*array);
-    *array = block;
+    free(old);
+    memcpy(array, &block, sizeof block);
     *capacity = wanted;
     return true;
 }

@@ -13,21 +13,21 @@ extern "C" {
 void *sadmm_alloc(size_t count, size_t size);
 void sadmm_free(void *block);
 
-/* What a capacity that is less than `needed` grows to, whatever the memory: half as much again, so that a size that creeps
- * up asks for memory seldom; at least `needed` and `least`. */
+/* What a capacity that is less than `needed` grows to, whatever the memory: half as much again, so that a size that
+ * creeps up asks for memory seldom; at least `needed` and `least`. */
 static inline size_t sadmm_grown_capacity(size_t capacity, size_t needed, size_t least)
 {
     const size_t grown = capacity + capacity / 2, wanted = grown > needed ? grown : needed;
     return wanted > least ? wanted : least;
 }
 
-/* Grow *array (elements of `size` bytes) to hold at least `needed`, keeping `used` elements and zeroing the rest; false,
- * with nothing changed, when memory runs out. */
-bool sadmm_grow(void **array, size_t *capacity, size_t used, size_t needed, size_t size);
-/* The same where nothing is kept. `array`: the address of a pointer of any type. */
+/* Grow *array (`array`: the address of a pointer of any type; elements of `size` bytes) to hold at least `needed`,
+ * keeping `used` elements and zeroing the rest; false, with nothing changed, when memory runs out. */
+bool sadmm_grow(void *array, size_t *capacity, size_t used, size_t needed, size_t size);
+/* The same where nothing is kept. */
 static inline bool sadmm_grow_empty(void *array, size_t *capacity, size_t needed, size_t size)
 {
-    return sadmm_grow((void **)array, capacity, 0, needed, size);
+    return sadmm_grow(array, capacity, 0, needed, size);
 }
 
 /* Tests: on this thread, let `successes` allocations pass and fail the following ones; negative: never fail. */

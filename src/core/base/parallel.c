@@ -38,7 +38,8 @@ static bool watch_forks(void) { return pthread_once(&once, watch) == 0 && watchi
 
 /* ---- teams ------------------------------------------------------------------------------------------------------- */
 
-sadmm_status sadmm_team_init(struct sadmm_team *team, const sadmm_tasks *tasks, const char *name, struct sadmm_error *error)
+sadmm_status sadmm_team_init(struct sadmm_team *team, const sadmm_tasks *tasks, const char *name,
+                             struct sadmm_error *error)
 {
     static const sadmm_tasks none;
     if (!tasks) tasks = &none;
@@ -46,8 +47,8 @@ sadmm_status sadmm_team_init(struct sadmm_team *team, const sadmm_tasks *tasks, 
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s.%s = NULL: must be given with %s.%s", name,
                           tasks->enqueue ? "wait" : "enqueue", name, tasks->enqueue ? "enqueue" : "wait");
     if (tasks->enqueue && (tasks->threads < 1 || tasks->threads > SADMM_MOST_THREADS))
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s.threads = %d: must be in [1, %d]", name, tasks->threads,
-                          (int)SADMM_MOST_THREADS);
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s.threads = %d: must be in [1, %d]", name,
+                          tasks->threads, (int)SADMM_MOST_THREADS);
     if (tasks->enqueue && !watch_forks()) return sadmm_fail_memory(error, "the callbacks for tasks");
     *team = (struct sadmm_team){.tasks = *tasks, .forks = atomic_load(&forks)};
     return SADMM_OK;
@@ -117,7 +118,8 @@ static int try_threads(int count)
     pthread_attr_t like_openmp;
     int n = 0;
     if (pthread_attr_init(&like_openmp) != 0) return 0;
-    if (stack_size() > 0) pthread_attr_setstacksize(&like_openmp, stack_size()); /* too small a size is OpenMP's to refuse */
+    if (stack_size() > 0)
+        pthread_attr_setstacksize(&like_openmp, stack_size()); /* too small a size is OpenMP's to refuse */
     pthread_mutex_lock(&gate);
     while (n < count && pthread_create(&made[n], &like_openmp, pass_gate, &gate) == 0) ++n;
     pthread_mutex_unlock(&gate);
@@ -196,7 +198,8 @@ static void join_region(void *argument)
     if (hands_out) return;
     do {
         if (door & SHUT) return;
-    } while (!atomic_compare_exchange_weak_explicit(&region->door, &door, door + 1, memory_order_acq_rel, memory_order_relaxed));
+    } while (!atomic_compare_exchange_weak_explicit(&region->door, &door, door + 1, memory_order_acq_rel,
+                                                    memory_order_relaxed));
     const int thread = door;
     for (int spin = 0; !((door = atomic_load_explicit(&region->door, memory_order_acquire)) & SHUT); ++spin) {
         if (spin < SADMM_SPINS) sadmm_pause();

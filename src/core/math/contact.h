@@ -1,4 +1,4 @@
-/* Contact formulas: constraint error, the strict projection on the friction cone, the natural map. */
+/* Contact formulas: constraint error, and the strict projection on the friction cone. */
 #ifndef SADMM_MATH_CONTACT_H
 #define SADMM_MATH_CONTACT_H
 
@@ -25,7 +25,8 @@ SADMM_INLINE double contact_error(double gap, double approach, double restitutio
 
 /* Strict projection of the paper's Step 3 [its ref. 19]: the normal part is clamped at 0, then the tangential part is
  * scaled into the disc of radius mu lambda_n. With one scalar weight a contact this is the exact solution of the local
- * Signorini-Coulomb problem (5), not the Euclidean projection on the cone. Frame-free: lambda in any frame with n in it. */
+ * Signorini-Coulomb problem (5), not the Euclidean projection on the cone. Frame-free: lambda in any frame with n in
+ * it. */
 SADMM_INLINE vec3 contact_project(vec3 lambda, vec3 n, real mu)
 {
     real ln = v3_dot(n, lambda);
@@ -48,17 +49,18 @@ SADMM_INLINE void contact_project_rows(const real in[3], real mu, real out[3])
     out[2] = scale * in[2];
 }
 
-/* mu as the method `fast` takes it, for a precision's epsilon: less by some rounding, so that an impulse at the edge of the cone
- * is inside whoever computes it, and a contact that sticks there is not off by rounding. */
+/* mu as the method `fast` takes it, for a precision's epsilon: less by some rounding, so that an impulse at the edge of
+ * the cone is inside whoever computes it, and a contact that sticks there is not off by rounding. */
 #define CONTACT_CONE_ROUNDING 4.0
 SADMM_INLINE double contact_friction_inside(double mu, double epsilon)
 {
     return mu * (1 - CONTACT_CONE_ROUNDING * epsilon);
 }
 
-/* lambda^ = Pi_C(lambda - step) and lambda^ - lambda, where the contact sticks without the rounding of either: the method
- * `fast` passes on changes alone. In the contact's frame. */
-SADMM_INLINE void contact_change_rows(const real lambda[3], const real step[3], real mu, real change[3], real projected[3])
+/* lambda^ = Pi_C(lambda - step) and lambda^ - lambda, where the contact sticks without the rounding of either: the
+ * method `fast` passes on changes alone. In the contact's frame. */
+SADMM_INLINE void contact_change_rows(const real lambda[3], const real step[3], real mu, real change[3],
+                                      real projected[3])
 {
     const real y[3] = {lambda[0] - step[0], lambda[1] - step[1], lambda[2] - step[2]};
     real limit = mu * y[0];

@@ -1,9 +1,9 @@
 /* The most kinetic energy a step may leave an island of rigid bodies with (method `fast`).
  *
- * Contacts take energy out of the free motion v_f = A^-1 b, but for the work W = sum max(0, -e) lambda_n of those that push
- * overlapping bodies apart. An iteration that is cut short need not: then the island is slowed down to what is allowed.
- * W is believed only where the momentum A v - b - J^T lambda is balanced to 3 % (R: its energy, by A^-1). A solution
- * stays as it is.
+ * Contacts take energy out of the free motion v_f = A^-1 b, but for the work W = sum max(0, -e) lambda_n of those that
+ * push overlapping bodies apart. An iteration that is cut short need not: then the island is slowed down to what is
+ * allowed. W is believed only where the momentum A v - b - J^T lambda is balanced to 3 % (R: its energy, by A^-1). A
+ * solution stays as it is.
  *
  * That much energy lets bodies bounce: impulses of a landing, taken over into the next step, need iterations to go down
  * again. In a solution they cannot. From A (v - v_f) = J^T lambda and lambda . x <= -e lambda_n (friction takes
@@ -44,7 +44,7 @@ SADMM_INLINE double limit_factor(const struct limit_energies *e)
 /* The least factor: islands that would be stopped in every step could not find their way out. */
 #define LIMIT_LEAST 0.25
 
-/* Is the island looked at for bounces? */
+/* Is the island checked for bounces? */
 SADMM_INLINE int limit_under_iterated(int warm, int iterations) { return warm && iterations < WEIGHT_UNDER_ITERATED; }
 
 /* `along`: v . A v_f / 2, J. */

@@ -4,21 +4,21 @@
  *
  * An impulse of size `load` changes velocities of its island by about V, so load / V is the mass behind the constraint.
  * Where impulses cancel in g (bodies clamped between each other) V says nothing: m, the mass of the island, is the cap.
- * phi / w, with w the constraint's own response, is what a constraint without a load gets. Double in every precision: it
- * runs a few times a step. */
+ * phi / w, with w the constraint's own response, is what a constraint without a load gets. Double in every precision:
+ * it runs a few times a step. */
 #ifndef SADMM_MATH_WEIGHT_H
 #define SADMM_MATH_WEIGHT_H
 
 #include "real.h"
 
-/* Iterations after which a step that started cold takes its weights again, from the loads it has found by then: 5, 10,
+/* Iterations after which a step that started cold recomputes its weights, from the loads it has found by then: 5, 10,
  * 20, 40, and from there always half as many again. Changes as late as that are small, and a change disturbs. */
 enum { WEIGHT_FIRST_REFRESH = 5, WEIGHT_DOUBLE_BELOW = 40 };
 
 SADMM_INLINE int weight_next_refresh(int at) { return at < WEIGHT_DOUBLE_BELOW ? 2 * at : at + at / 2; }
 
-/* phi. Contacts: loads that have not been found yet are the ones to come. Joints and springs hold in all directions, loaded or
- * not. */
+/* phi. Contacts: loads that have not been found yet are the ones to come. Joints and springs hold in all directions,
+ * loaded or not. */
 #define WEIGHT_FLOOR_CONTACT 3.0
 #define WEIGHT_FLOOR_ROW 30.0
 
@@ -41,10 +41,10 @@ SADMM_INLINE double weight_mass(double load, double speed, double mass)
  *
  *     q^2 = sum w |lambda - Pi_C(lambda - (x + e n)/w)|^2 / sum r . A^-1 r,      r = A v - b - J^T lambda
  *
- * what the contacts miss over what the momentum misses, both energies in J. Near 0.1 is usual. Where the momentum lags behind
- * (masses that differ by decades, in no order) the weights are too large. Where nothing but the contacts is left, impulses
- * move at constant speed along directions that no body feels; then the island stalls, and keeps the weights it has, times
- * what the weight scale rises by: new ones would be felt. */
+ * what the contacts miss over what the momentum misses, both energies in J. Near 0.1 is usual. Where the momentum lags
+ * behind (masses that differ by decades, in no order) the weights are too large. Where nothing but the contacts is
+ * left, impulses move at constant speed along directions that no body feels; then the island stalls, and keeps the
+ * weights it has, times what the weight scale rises by: new ones would be felt. */
 enum { WEIGHT_FIRST_SCALE = 6 };
 #define WEIGHT_LAGS (1 / 3.0)
 #define WEIGHT_STALLS 30.0
@@ -130,8 +130,9 @@ SADMM_INLINE double weight_gap_error(double error, double share, double slop)
 }
 
 /* A constraint given by rows, by share = min(load / V, m) / load^2: of the rows that have neither bounds nor compliance
- * together B = share lambda lambda^T + phi / w, of each other row share lambda_r^2 + phi / w, so that its bounds and its compliance
- * are met by itself; of a contact share |lambda|^2 + phi / w. A row nobody feels (w = 0) has no weight. */
+ * together B = share lambda lambda^T + phi / w, of each other row share lambda_r^2 + phi / w, so that its bounds and
+ * its compliance are met by itself; of a contact share |lambda|^2 + phi / w. A row nobody feels (w = 0) has no
+ * weight. */
 SADMM_INLINE double weight_share(double load2, double speed, double mass)
 {
     return load2 > 0 ? weight_mass(sqrt(load2), speed, mass) / load2 : 0;

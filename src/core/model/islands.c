@@ -1,6 +1,7 @@
 #include "islands.h"
 
-/* Paths are halved on the way; roots are the smallest body of their tree, since the larger root goes under the smaller. */
+/* Paths are halved on the way; roots are the smallest body of their tree, since the larger root goes under the
+ * smaller. */
 static int32_t root_of(int32_t *parent, int32_t i)
 {
     while (parent[i] != i) {

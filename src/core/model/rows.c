@@ -18,7 +18,7 @@ bool sadmm_rows_reserve(struct sadmm_rows *rows, size_t constraints, size_t row_
 {
     double **numbers[] = {&rows->gain, &rows->bias, &rows->compliance, &rows->lo, &rows->hi, &rows->lambda};
     double **jacobians[] = {&rows->jacobian_a, &rows->jacobian_b};
-    if (!sadmm_grow((void **)&rows->constraints, &rows->constraint_capacity, rows->constraint_count, constraints,
+    if (!sadmm_grow(&rows->constraints, &rows->constraint_capacity, rows->constraint_count, constraints,
                     sizeof *rows->constraints))
         return false;
     if (row_count <= rows->row_capacity) return true;
@@ -27,7 +27,7 @@ bool sadmm_rows_reserve(struct sadmm_rows *rows, size_t constraints, size_t row_
         double **array = k < 6 ? numbers[k] : jacobians[k - 6];
         size_t width = k < 6 ? 1 : 6;
         wanted = rows->row_capacity;
-        if (!sadmm_grow((void **)array, &wanted, rows->row_count, row_count, width * sizeof **array)) return false;
+        if (!sadmm_grow(array, &wanted, rows->row_count, row_count, width * sizeof **array)) return false;
     }
     rows->row_capacity = wanted;
     return true;

@@ -1,9 +1,9 @@
-/* Constraints given by Jacobian rows, as structure of arrays: what a problem's blocks become (and joints, limits, motors),
- * and what every backend and the certificate read.
+/* Constraints given by Jacobian rows, as structure of arrays: what a problem's blocks become (and joints, limits,
+ * motors), and what every backend and the certificate read.
  *
  * A constraint is one to six rows on two bodies. Its rows are scalar laws of their own (math/row.h), or three rows
- * (normal, tangent, tangent) are a contact: a cone, Signorini's and Coulomb's law (math/contact.h) with gain 1 and compliance 0
- * in every row, whose bounds are not read. */
+ * (normal, tangent, tangent) are a contact: a cone, Signorini's and Coulomb's law (math/contact.h) with gain 1 and
+ * compliance 0 in every row, whose bounds are not read. */
 #ifndef SADMM_CORE_MODEL_ROWS_H
 #define SADMM_CORE_MODEL_ROWS_H
 
@@ -39,11 +39,11 @@ struct sadmm_rows {
 void sadmm_rows_clear(struct sadmm_rows *rows);
 void sadmm_rows_free(struct sadmm_rows *rows);
 
-/* Room for so many; false, with nothing changed, when memory runs out. */
+/* Capacity for so many; false, with nothing changed, when memory runs out. */
 bool sadmm_rows_reserve(struct sadmm_rows *rows, size_t constraints, size_t row_count);
 
-/* Add a constraint of `count` rows whose Jacobians and multipliers are 0 and whose laws are hard with bias 0: its first row,
- * -1 when memory runs out. Bodies as in sadmm_problem_block. */
+/* Add a constraint of `count` rows whose Jacobians and multipliers are 0 and whose laws are hard with bias 0: its first
+ * row, -1 when memory runs out. Bodies as in sadmm_problem_block. */
 int32_t sadmm_rows_add(struct sadmm_rows *rows, int32_t count, int32_t body_a, int32_t body_b);
 
 /* Add what a block means, and its multipliers (6, or NULL for 0). False when memory runs out. */
@@ -80,8 +80,8 @@ static inline void sadmm_row_motor(struct sadmm_rows *rows, int32_t r, double sp
     sadmm_row_set(rows, r, 1, -speed, 0, -most, most);
 }
 
-/* May this row share a dense weight with others of its constraint (method `fast`)? A multiplier with bounds, or with compliance,
- * is only exact on its own. */
+/* May this row share a dense weight with others of its constraint (method `fast`)? A multiplier with bounds, or with
+ * compliance, is only exact on its own. */
 static inline bool sadmm_row_is_coupled(const struct sadmm_rows *rows, size_t r)
 {
     return rows->compliance[r] == 0 && rows->lo[r] == -INFINITY && rows->hi[r] == INFINITY;

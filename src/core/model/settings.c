@@ -84,8 +84,8 @@ sadmm_status sadmm_settings_validate(const struct sadmm_settings *s, struct sadm
                               nonnegative[i].name, nonnegative[i].value);
 
     if ((int)s->method < 0 || s->method >= SADMM_METHOD_COUNT)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.method = %d: must be in [0, %d]", (int)s->method,
-                          SADMM_METHOD_COUNT - 1);
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.method = %d: must be in [0, %d]",
+                          (int)s->method, SADMM_METHOD_COUNT - 1);
     if (!(s->relaxation >= 1 && s->relaxation < 2))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.relaxation = %g: must be in [1, 2)",
                           s->relaxation);

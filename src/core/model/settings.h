@@ -16,8 +16,9 @@ sadmm_status sadmm_settings_validate(const struct sadmm_settings *settings, stru
 
 /* Are all members the same, bit for bit? Padding between them does not count. */
 bool sadmm_settings_equal(const struct sadmm_settings *a, const struct sadmm_settings *b);
-/* Settings are of two kinds. Numbers are what formulas read: they may change from step to step, and a backend keeps them
- * as data. The rest says what a step consists of: how many iterations in which order, what is looked at, measured, kept. */
+/* Settings are of two kinds. Numbers are what formulas read: they may change from step to step, and a backend keeps
+ * them as data. The rest says what a step consists of: how many iterations in which order, what is checked, measured,
+ * kept. */
 #define SADMM_EACH_SETTING_NUMBER(X)                                                                                  \
     X(dt) X(gravity[0]) X(gravity[1]) X(gravity[2]) X(relaxation) X(penalty_mass_factor) X(penalty_offset)            \
     X(penalty_ratio_limit) X(certificate_tolerance) X(certificate_momentum_tolerance) X(baumgarte) X(slop)            \
@@ -28,7 +29,8 @@ enum { SADMM_SETTING_NUMBERS = 0 SADMM_EACH_SETTING_NUMBER(SADMM_COUNT_SETTING) 
 #undef SADMM_COUNT_SETTING
 
 void sadmm_settings_numbers(const struct sadmm_settings *settings, double numbers[SADMM_SETTING_NUMBERS]);
-/* Do steps of both consist of the same? (A tolerance, or a limit of the penalty's update, counts by whether there is one.) */
+/* Do steps of both consist of the same? (A tolerance, or a limit of the penalty's update, counts by whether there is
+ * one.) */
 bool sadmm_settings_same_but_numbers(const struct sadmm_settings *a, const struct sadmm_settings *b);
 
 #ifdef __cplusplus

@@ -1,11 +1,11 @@
 /* What is remembered of a body from step to step: the velocity a solve starts from, and whether its pose was set.
  *
- * A contact that slides holds its impulse at the cone's edge whatever the velocity does, so a step's change of speed has
- * to come from the momentum balance alone, by a factor m / (m + J^T beta J) an iteration: a few per cent of it are still
- * missing after a hundred. Where the last steps changed a body's velocity by the same amount (sliding under gravity or
- * friction), the next one starts from that change and nothing is missing. Only after three such steps: with few
- * iterations velocities jitter, and following the jitter would feed it. What stays the same is the acceleration: a change
- * counts by the length of its step. A pose that is set ends a streak: the body is where other contacts are.
+ * A contact that slides holds its impulse at the cone's edge whatever the velocity does, so a step's change of speed
+ * has to come from the momentum balance alone, by a factor m / (m + J^T beta J) an iteration: a few per cent of it are
+ * still missing after a hundred. Where the last steps changed a body's velocity by the same amount (sliding under
+ * gravity or friction), the next one starts from that change and nothing is missing. Only after three such steps: with
+ * few iterations velocities jitter, and following the jitter would feed it. What stays the same is the acceleration: a
+ * change counts by the length of its step. A pose that is set ends a streak: the body is where other contacts are.
  */
 #ifndef SADMM_CORE_MODEL_STEADY_H
 #define SADMM_CORE_MODEL_STEADY_H

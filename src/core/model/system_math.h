@@ -78,8 +78,8 @@ SADMM_INLINE double sadmm_contact_e(const struct sadmm_system *system, const str
                          settings->correction_speed, settings->restitution_threshold);
 }
 
-/* Eq. (15): beta is multiplied by this. A residual of zero on both sides says nothing about the balance: leave the penalty
- * alone. */
+/* Eq. (15): beta is multiplied by this. A residual of zero on both sides says nothing about the balance: leave the
+ * penalty alone. */
 SADMM_INLINE double sadmm_penalty_ratio(double primal, double dual, double limit)
 {
     if (primal <= 0 && dual <= 0) return 1;

@@ -1,5 +1,5 @@
-/* What each backend offers the registry: its table for a precision, or NULL with a reason (static storage). When a table
- * is returned, *reason says what it runs on. */
+/* What each backend offers the registry: its table for a precision, or NULL with a reason (static storage). When a
+ * table is returned, *reason says what it runs on. */
 #ifndef SADMM_CORE_SOLVE_BACKENDS_H
 #define SADMM_CORE_SOLVE_BACKENDS_H
 

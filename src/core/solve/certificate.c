@@ -14,8 +14,8 @@
  * momentum error, and whether its island (by its first body) was counted as above the tolerances. */
 enum { FACTOR = 0, IMPULSE = 36, NATURAL_MAP = 42, MOMENTUM = 43, COUNTED = 44, BODY_SIZE = 45 };
 
-/* Norms and maxima gathered on the way. Squares are of numbers times `unit`, a power of two: 1, or so small that none overflows
- * whose root is a number. */
+/* Norms and maxima gathered on the way. Squares are of numbers times `unit`, a power of two: 1, or so small that none
+ * overflows whose root is a number. */
 struct tally {
     double unit;
     double ncp_max, ncp_sum;
@@ -36,7 +36,8 @@ static double max_abs6(const double x[6])
     return m;
 }
 
-static void count_constraint(struct tally *t, int64_t index, double error, double *bodies, int32_t body_a, int32_t body_b)
+static void count_constraint(struct tally *t, int64_t index, double error, double *bodies, int32_t body_a,
+                             int32_t body_b)
 {
     const int32_t sides[2] = {body_a, body_b};
     for (int side = 0; side < 2; ++side) {
@@ -184,8 +185,8 @@ static void certify_rows(struct tally *tally, const struct sadmm_system *system,
                      constraint->body_b);
 }
 
-/* Of two sums of squares. siconos divides only by norms above this (gfc3d_compute_error.c, MIN_RELATIVE_SCALING). A scale that
- * has overflowed would make every error small. */
+/* Of two sums of squares. siconos divides only by norms above this (gfc3d_compute_error.c, MIN_RELATIVE_SCALING). A
+ * scale that has overflowed would make every error small. */
 static double relative(const struct tally *t, double error2, double scale2)
 {
     double error = sqrt(error2), scale = sqrt(scale2);
@@ -214,7 +215,7 @@ static sadmm_status certify(struct sadmm_certificate_workspace *workspace, const
                             struct sadmm_error *error)
 {
     size_t count = (size_t)system->body_count;
-    if (!sadmm_grow((void **)&workspace->values, &workspace->capacity, 0, BODY_SIZE * count, sizeof(double)))
+    if (!sadmm_grow(&workspace->values, &workspace->capacity, 0, BODY_SIZE * count, sizeof(double)))
         return sadmm_fail_memory(error, "the certificate");
     double *bodies = workspace->values;
     double A[36], b[6];
@@ -261,7 +262,7 @@ static sadmm_status certify(struct sadmm_certificate_workspace *workspace, const
         out.siconos = relative(&tally, residual2, keep_max(b2, keep_max(Av2, Jl2))) +
                       relative(&tally, tally.map2, keep_max(tally.u2, tally.r2));
     if (settings && settings->certificate_tolerance > 0) {
-        if (!sadmm_grow((void **)&workspace->labels, &workspace->label_capacity, 0, count, sizeof *workspace->labels))
+        if (!sadmm_grow(&workspace->labels, &workspace->label_capacity, 0, count, sizeof *workspace->labels))
             return sadmm_fail_memory(error, "the certificate");
         sadmm_islands(system, workspace->labels);
         out.islands_above = count_islands_above(bodies, count, workspace->labels, settings, scale);
@@ -283,10 +284,11 @@ sadmm_status sadmm_certify_with(struct sadmm_certificate_workspace *workspace, c
     TRY(certify(workspace, system, settings, 1, &c, error));
     if (!is_finite(&c)) TRY(certify(workspace, system, settings, SMALL_UNIT, &c, error));
     if (!is_finite(&c))
-        return sadmm_fail(error, SADMM_ERROR_NON_FINITE,
-                          "the error of the solution is not a finite number (natural map %g m/s, momentum %g, siconos %g): "
-                          "velocities, multipliers or masses are too large or too small, or not finite",
-                          c.ncp_max, c.momentum_max, c.siconos);
+        return sadmm_fail(
+            error, SADMM_ERROR_NON_FINITE,
+            "the error of the solution is not a finite number (natural map %g m/s, momentum %g, siconos %g): "
+            "velocities, multipliers or masses are too large or too small, or not finite",
+            c.ncp_max, c.momentum_max, c.siconos);
     *certificate = c;
     return SADMM_OK;
 }

@@ -34,25 +34,29 @@ struct sadmm_kernels {
     sadmm_status (*create)(int device, struct sadmm_context **out, struct sadmm_error *error);
     void (*destroy)(struct sadmm_context *context);
 
-    /* Bind the step's system, plan and settings (alive until the next begin) and make room: the only allocation. */
+    /* Bind the step's system, plan and settings (alive until the next begin) and allocate: the only entry that does. */
     sadmm_status (*begin)(struct sadmm_context *, const struct sadmm_system *, const struct sadmm_plan *,
                           const struct sadmm_settings *, struct sadmm_error *error);
 
     sadmm_status (*assemble_bodies)(struct sadmm_context *, struct sadmm_error *);   /* A: A_i, b_i, start velocity */
     sadmm_status (*assemble_contacts)(struct sadmm_context *, struct sadmm_error *); /* B: contacts given by geometry */
-    sadmm_status (*assemble_rows)(struct sadmm_context *, struct sadmm_error *);     /* C, D: constraints given by rows */
+    sadmm_status (*assemble_rows)(struct sadmm_context *, struct sadmm_error *); /* C, D: constraints given by rows */
 
-    sadmm_status (*init_penalty)(struct sadmm_context *, struct sadmm_error *); /* E-G: C_i (14), beta_i (13); FAST: weights */
+    sadmm_status (*init_penalty)(struct sadmm_context *,
+                                 struct sadmm_error *); /* E-G: C_i (14), beta_i (13); FAST: weights */
     /* FAST, after iterations: weights from the multipliers found by now (math/weight.h). Then factorize. */
     sadmm_status (*update_weights)(struct sadmm_context *, struct sadmm_error *);
     sadmm_status (*factorize)(struct sadmm_context *, struct sadmm_error *);    /* H: of A_i + beta_i C_i */
 
-    sadmm_status (*update_velocity)(struct sadmm_context *, struct sadmm_error *);                  /* I-K: Step 1 (6) */
+    sadmm_status (*update_velocity)(struct sadmm_context *, struct sadmm_error *); /* I-K: Step 1 (6) */
     sadmm_status (*update_constraints)(struct sadmm_context *, bool measure, struct sadmm_error *); /* L-O: Steps 2-4 */
-    sadmm_status (*iterate)(struct sadmm_context *, int count, bool measure, struct sadmm_error *); /* (optional) fused */
+    sadmm_status (*iterate)(struct sadmm_context *, int count, bool measure,
+                            struct sadmm_error *); /* (optional) fused */
 
-    sadmm_status (*measure_residuals)(struct sadmm_context *, struct sadmm_residual *, struct sadmm_error *); /* (16), (17) */
-    sadmm_status (*update_penalty)(struct sadmm_context *, double ratio, struct sadmm_error *); /* P: beta *= ratio (15) */
+    sadmm_status (*measure_residuals)(struct sadmm_context *, struct sadmm_residual *,
+                                      struct sadmm_error *);                                    /* (16), (17) */
+    sadmm_status (*update_penalty)(struct sadmm_context *, double ratio,
+                                   struct sadmm_error *); /* P: beta *= ratio (15) */
 
     /* FAST, rigid bodies: slow down islands under contacts alone with more energy than they may have (math/limit.h). */
     sadmm_status (*limit_velocity)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
@@ -62,8 +66,10 @@ struct sadmm_kernels {
     /* beta_i of every body, kg (tests, dumps). FAST: 1, the weights are in C_i. */
     sadmm_status (*read_penalty)(struct sadmm_context *, double *beta, struct sadmm_error *);
 
-    sadmm_status (*integrate)(struct sadmm_context *, struct sadmm_rigid *next, struct sadmm_error *); /* Q: state after dt */
-    sadmm_status (*recover_wrenches)(struct sadmm_context *, double *wrench, struct sadmm_error *);    /* R: (12), (bodies x 6) */
+    sadmm_status (*integrate)(struct sadmm_context *, struct sadmm_rigid *next,
+                              struct sadmm_error *); /* Q: state after dt */
+    sadmm_status (*recover_wrenches)(struct sadmm_context *, double *wrench,
+                                     struct sadmm_error *); /* R: (12), (bodies x 6) */
 
     const struct sadmm_resident_kernels *resident; /* (optional) whole steps without the host (resident.h) */
 };

@@ -222,8 +222,8 @@ sadmm_status sadmm_loads_predict(struct sadmm_system *system, const struct sadmm
     p.label = sadmm_alloc(n, sizeof *p.label);
     p.failed = sadmm_alloc(n, sizeof *p.failed);
     p.momentum = sadmm_alloc(6 * n, sizeof *p.momentum);
-    bool room = p.offsets && p.incident && p.depth && p.order && p.label && p.failed && p.momentum;
-    if (room) predict(&p);
+    bool allocated = p.offsets && p.incident && p.depth && p.order && p.label && p.failed && p.momentum;
+    if (allocated) predict(&p);
     sadmm_free(p.offsets);
     sadmm_free(p.incident);
     sadmm_free(p.depth);
@@ -231,5 +231,5 @@ sadmm_status sadmm_loads_predict(struct sadmm_system *system, const struct sadmm
     sadmm_free(p.label);
     sadmm_free(p.failed);
     sadmm_free(p.momentum);
-    return room ? SADMM_OK : sadmm_fail_memory(error, "the loads to start from");
+    return allocated ? SADMM_OK : sadmm_fail_memory(error, "the loads to start from");
 }

@@ -75,8 +75,8 @@ static bool starts_warm(const struct sadmm_system *system, int plan_threads)
     struct warm_count count;
     size_t total = system->contacts->pair_count + sadmm_row_constraint_count(system), warm = 0;
     count.contacts = system->contacts;
-    const int ran = sadmm_parallel(system->team, sadmm_pass_threads(plan_threads, system->contacts->pair_count), count_warm,
-                                   &count);
+    const int ran = sadmm_parallel(system->team, sadmm_pass_threads(plan_threads, system->contacts->pair_count),
+                                   count_warm, &count);
     for (int t = 0; t < ran; ++t) warm += count.warm[t];
     for (size_t k = 0; k < sadmm_row_constraint_count(system); ++k)
         warm += constraint_is_warm(system->rows, &system->rows->constraints[k]);
@@ -92,8 +92,8 @@ bool sadmm_plan_is_gyroscopic(const struct sadmm_rigid *rigid, int32_t count)
 
 static bool may_update_penalty(const struct sadmm_settings *settings)
 {
-    return settings->method == SADMM_METHOD_PAPER && settings->penalty_period > 0 && settings->penalty_ratio_limit > 1 &&
-           settings->iterations > settings->penalty_period;
+    return settings->method == SADMM_METHOD_PAPER && settings->penalty_period > 0 &&
+           settings->penalty_ratio_limit > 1 && settings->iterations > settings->penalty_period;
 }
 
 bool sadmm_plan_is_constrained(const struct sadmm_plan *plan) { return plan->points > 0 || plan->row_constraints > 0; }
@@ -110,7 +110,8 @@ void sadmm_plan_settle(struct sadmm_plan *plan, const struct sadmm_settings *set
     bool constrained = sadmm_plan_is_constrained(plan);
     plan->warm_start = settings->warm_start;
     plan->warm = plan->warm_start && mostly_warm;
-    plan->penalty_updates = constrained && may_update_penalty(settings) && (settings->penalty_update_warm || !plan->warm);
+    plan->penalty_updates =
+        constrained && may_update_penalty(settings) && (settings->penalty_update_warm || !plan->warm);
     bool fast = constrained && settings->method == SADMM_METHOD_FAST;
     plan->weight_refresh = fast && !plan->warm;
     plan->limit = fast && plan->rigid && plan->points > 0;
@@ -129,7 +130,8 @@ struct sadmm_plan sadmm_plan_make(const struct sadmm_system *system, const struc
     plan.contact_rows = plan_contact_rows(plan.points, any_pair_is_rough(system->contacts));
     plan.row_constraints = (int32_t)sadmm_row_constraint_count(system);
     plan.rigid = system->rigid != NULL;
-    plan.threads = sadmm_plan_threads(system->team, settings->threads, (size_t)plan.points + 4 * (size_t)plan.row_constraints);
+    plan.threads =
+        sadmm_plan_threads(system->team, settings->threads, (size_t)plan.points + 4 * (size_t)plan.row_constraints);
     plan.gyroscopic = plan.rigid && sadmm_plan_is_gyroscopic(system->rigid, system->body_count);
     sadmm_plan_settle(&plan, settings, settings->warm_start && starts_warm(system, plan.threads));
     plan.predict = settings->method == SADMM_METHOD_FAST && plan.points > 0 && system->first &&

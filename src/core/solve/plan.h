@@ -23,7 +23,7 @@ struct sadmm_plan {
     bool warm;              /* ... and most constraints have one */
     bool penalty_updates;   /* eq. (15) will run at least once */
     bool predict;           /* FAST: starts from predicted loads (loads.h); never in steps that a backend makes alone */
-    bool weight_refresh;    /* FAST: weights are taken again during the step */
+    bool weight_refresh;    /* FAST: weights are recomputed during the step */
     bool limit;             /* FAST: energies of islands under contacts alone are limited after the last iteration */
     bool residuals;         /* some iteration is measured */
     bool wrenches;          /* eq. (12) a body */
@@ -31,9 +31,10 @@ struct sadmm_plan {
     int threads;            /* at most, >= 1 */
 };
 
-/* ---- rules, also for a backend that counts contacts where they are ------------------------------------------------- */
+/* ---- rules, also for a backend that counts contacts where they are ----------------------------------------------- */
 
-/* Rows of a geometric contact. contacts: how many there are; rough: how many of them, or of their pairs, have friction. */
+/* Rows of a geometric contact. contacts: how many there are; rough: how many of them, or of their pairs, have
+ * friction. */
 SADMM_INLINE int plan_contact_rows(int64_t contacts, int64_t rough) { return contacts == 0 ? 0 : rough > 0 ? 3 : 1; }
 
 /* Do at least half of the constraints carry an impulse? */
@@ -42,16 +43,18 @@ SADMM_INLINE bool plan_mostly_warm(int64_t constraints, int64_t warm)
     return constraints > 0 && 2 * warm >= constraints;
 }
 
-/* ---- the plan ------------------------------------------------------------------------------------------------------ */
+/* ---- the plan ---------------------------------------------------------------------------------------------------- */
 
-/* Threads for `points` contact points: as many as have enough to do, at most `wanted` (0: any number). `team` may be NULL. */
+/* Threads for `points` contact points: as many as have enough to do, at most `wanted` (0: any number). `team` may be
+ * NULL. */
 int sadmm_plan_threads(const struct sadmm_team *team, int wanted, size_t points);
 
-/* Threads for a pass over `count` bodies, pairs or points outside the kernels: those of the plan if there is enough to do. */
+/* Threads for a pass over `count` bodies, pairs or points outside the kernels: those of the plan if there is enough to
+ * do. */
 int sadmm_pass_threads(int threads, size_t count);
 
-/* What follows from the settings once the counts and `contact_rows` are in; `mostly_warm`: at least half of the constraints
- * (contacts counted by pairs) carry an impulse. `threads` is left alone. */
+/* What follows from the settings once the counts and `contact_rows` are in; `mostly_warm`: at least half of the
+ * constraints (contacts counted by pairs) carry an impulse. `threads` is left alone. */
 void sadmm_plan_settle(struct sadmm_plan *plan, const struct sadmm_settings *settings, bool mostly_warm);
 
 /* Does the number of warm constraints decide anything in a plan with contacts? */

@@ -1,8 +1,8 @@
 /* The problem level: bodies with A and b, contacts and blocks with e given, one solve at a time.
  *
- * Storage is that of a sadmm_system (problem_input.c). A solve writes into the system's own arrays; `saved` holds the values it
- * started from, to be put back when it fails. Contexts are kept by backend and precision: solving again allocates only if the problem
- * grew.
+ * Storage is that of a sadmm_system (problem_input.c). A solve writes into the system's own arrays; `saved` holds the
+ * values it started from, to be put back when it fails. Contexts are kept by backend and precision: solving again
+ * allocates only if the problem grew.
  */
 #include <string.h>
 

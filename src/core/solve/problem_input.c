@@ -1,6 +1,6 @@
-/* What a problem is made of: bodies, contacts, blocks. Contacts are grouped into pairs here, blocks become constraint rows
- * (core/model/rows.h). Every call that replaces a part builds the new part first and swaps it in last, so that a failure loses
- * nothing. */
+/* What a problem is made of: bodies, contacts, blocks. Contacts are grouped into pairs here, blocks become constraint
+ * rows (core/model/rows.h). Every call that replaces a part builds the new part first and swaps it in last, so that a
+ * failure loses nothing. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -27,7 +27,8 @@ static sadmm_status check_count(const char *what, int32_t count, int32_t limit, 
 static bool in_range(double x) { return fabs(x) <= VALUE_LIMIT; } /* NaN is not */
 
 /* `values` (count x width), data of the problem; NULL is fine. */
-static sadmm_status check_data(const char *name, const double *values, int32_t count, int width, struct sadmm_error *error)
+static sadmm_status check_data(const char *name, const double *values, int32_t count, int width,
+                               struct sadmm_error *error)
 {
     for (size_t i = 0; values && i < (size_t)count * (size_t)width; ++i)
         if (!in_range(values[i]))
@@ -48,7 +49,8 @@ static sadmm_status check_vector(const char *array, int32_t index, const char *f
     return SADMM_OK;
 }
 
-static sadmm_status check_number(const char *array, int32_t index, const char *field, double x, struct sadmm_error *error)
+static sadmm_status check_number(const char *array, int32_t index, const char *field, double x,
+                                 struct sadmm_error *error)
 {
     if (!in_range(x)) REFUSE("%s[%d].%s = %g: must be finite and within +-%g", array, index, field, x, VALUE_LIMIT);
     return SADMM_OK;
@@ -77,7 +79,7 @@ static void symmetric_part(const double A[36], double mean[36])
             mean[6 * i + j] = mean[6 * j + i] = A[6 * i + j] + 0.5 * (A[6 * j + i] - A[6 * i + j]);
 }
 
-/* Symmetric to 1e-9 of the diagonal's scale (room for a file's decimals), and what is kept of it positive definite. */
+/* Symmetric to 1e-9 of the diagonal's scale (a file has so many decimals), and what is kept of it positive definite. */
 static sadmm_status check_mass(int32_t index, const double A[36], struct sadmm_error *error)
 {
     double mean[36], L[36];
@@ -112,12 +114,12 @@ sadmm_status sadmm_check_values(const char *name, const double *values, int32_t 
     return SADMM_OK;
 }
 
-/* Room for what a solve of this size has to save. */
+/* Memory for what a solve of this size has to save. */
 static sadmm_status reserve_saved(sadmm_problem *problem, int32_t bodies, size_t points, size_t rows,
                                   struct sadmm_error *error)
 {
     size_t needed = 6 * (size_t)bodies + 3 * points + rows;
-    if (sadmm_grow((void **)&problem->saved, &problem->saved_capacity, 0, needed, sizeof(double))) return SADMM_OK;
+    if (sadmm_grow(&problem->saved, &problem->saved_capacity, 0, needed, sizeof(double))) return SADMM_OK;
     return sadmm_fail_memory(error, "the problem's saved values");
 }
 
@@ -288,7 +290,7 @@ static sadmm_status check_block(int32_t index, const sadmm_problem_block *block,
     return SADMM_OK;
 }
 
-/* Only what the block's kind and size use; the rest is 0, so that nobody has to look at rows before reading. */
+/* Only what the block's kind and size use; the rest is 0, so that no reader has to check `rows` first. */
 static void load_block(const sadmm_problem_block *given, sadmm_problem_block *block)
 {
     size_t rows = (size_t)given->rows, row = 6 * sizeof(double);
@@ -338,7 +340,8 @@ sadmm_status sadmm_problem_set_blocks(sadmm_problem *problem, int32_t count, con
     size_t row_count = 0;
     for (int32_t k = 0; k < count; ++k) row_count += (size_t)blocks[k].rows;
     if (row_count > MAX_CONSTRAINTS)
-        return sadmm_fail(error, SADMM_ERROR_LIMIT, "blocks: %zu rows in all: must be in [0, %d]", row_count, MAX_CONSTRAINTS);
+        return sadmm_fail(error, SADMM_ERROR_LIMIT, "blocks: %zu rows in all: must be in [0, %d]", row_count,
+                          MAX_CONSTRAINTS);
     TRY(reserve_saved(problem, problem->body_count, problem->contacts.point_count, row_count, error));
 
     struct sadmm_rows rows = {0};

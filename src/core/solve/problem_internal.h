@@ -1,5 +1,5 @@
-/* A problem's insides: what its files share (problem.c: life and solving; problem_input.c: what is set; problem_solution.c: what is
- * read back), and what tests look at. */
+/* A problem's insides: what its files share (problem.c: life and solving; problem_input.c: what is set;
+ * problem_solution.c: what is read back), and what tests read. */
 #ifndef SADMM_CORE_SOLVE_PROBLEM_INTERNAL_H
 #define SADMM_CORE_SOLVE_PROBLEM_INTERNAL_H
 
@@ -44,8 +44,8 @@ static inline sadmm_status sadmm_check_problem(const sadmm_problem *problem)
 sadmm_status sadmm_check_values(const char *name, const double *values, int32_t count, int width,
                                 struct sadmm_error *error);
 /* The same for multipliers (blocks x 6), of which only the rows that there are count. */
-sadmm_status sadmm_check_lambda(const char *name, const sadmm_problem_block *blocks, int32_t count, const double *lambda,
-                                struct sadmm_error *error);
+sadmm_status sadmm_check_lambda(const char *name, const sadmm_problem_block *blocks, int32_t count,
+                                const double *lambda, struct sadmm_error *error);
 
 /* Bodies and constraints are gone; what they were kept in is free. */
 void sadmm_problem_drop_parts(sadmm_problem *problem);

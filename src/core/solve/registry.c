@@ -30,7 +30,8 @@ const struct sadmm_kernels *sadmm_kernels_at(size_t index)
 {
     for (int backend = SADMM_BACKEND_REF; backend < SADMM_BACKEND_COUNT; ++backend)
         for (int precision = SADMM_F32; precision <= SADMM_F64; ++precision) {
-            const struct sadmm_kernels *found = sadmm_kernels_find((sadmm_backend)backend, (sadmm_precision)precision, NULL);
+            const struct sadmm_kernels *found =
+                sadmm_kernels_find((sadmm_backend)backend, (sadmm_precision)precision, NULL);
             if (found && index-- == 0) return found;
         }
     return NULL;
@@ -47,12 +48,14 @@ sadmm_status sadmm_backend_query(sadmm_backend backend, sadmm_backend_info *info
     /* An unavailable precision explains itself; else the f32 line says what it runs on. */
     const char *reasons[2] = {"", ""};
     for (int precision = SADMM_F32; precision <= SADMM_F64; ++precision)
-        info->available[precision] = sadmm_kernels_find(backend, (sadmm_precision)precision, &reasons[precision]) != NULL;
+        info->available[precision] =
+            sadmm_kernels_find(backend, (sadmm_precision)precision, &reasons[precision]) != NULL;
     info->reason = reasons[info->available[SADMM_F32] ? SADMM_F64 : SADMM_F32];
     return SADMM_OK;
 }
 
-/* From this many contacts on a step on the GPU is the shorter one (docs/performance.md: 484 contacts, 0.12 against 0.17 ms). */
+/* From this many contacts on a step on the GPU is the shorter one (docs/performance.md: 484 contacts, 0.12 against 0.17
+ * ms). */
 enum { AUTO_CUDA_CONTACTS = 500 };
 
 sadmm_status sadmm_backend_choose(sadmm_backend wanted, sadmm_precision precision, int64_t expected_contacts,

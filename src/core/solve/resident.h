@@ -3,11 +3,11 @@
  *
  * Steps are enqueued: `step` may return before the step has run. Steps run in order. A step that fails leaves the world
  * as it was before it, and those enqueued after it do not run; `wait` tells. What a step could not know when it was
- * enqueued (how many contacts there will be) is no failure: the backend repeats the step with more room.
+ * enqueued (how many contacts there will be) is no failure: the backend repeats the step with larger capacities.
  *
  * What may change from step to step without loading the world again are edits: a kind, a target and numbers, in the
- * backend's memory before the step that they come with. So are the settings' numbers. A step that was not done has taken
- * none of its edits: the caller gives them again.
+ * backend's memory before the step that they come with. So are the settings' numbers. A step that was not done has
+ * taken none of its edits: the caller gives them again.
  */
 #ifndef SADMM_CORE_SOLVE_RESIDENT_H
 #define SADMM_CORE_SOLVE_RESIDENT_H
@@ -69,9 +69,9 @@ struct sadmm_resident_kernels {
     /* Take over a world. Everything the backend kept before is forgotten. */
     sadmm_status (*load)(struct sadmm_context *, const struct sadmm_resident_world *, const struct sadmm_settings *,
                          struct sadmm_error *);
-    /* Enqueue a step, with edits before it (free again on return). An error is this step's, or an earlier one's: then `wait`
-     * says how far the world has got. Numbers of the settings (settings.h) may change at every step; where the rest of them
-     * does, the backend may wait for the steps before. */
+    /* Enqueue a step, with edits before it (free again on return). An error is this step's, or an earlier one's: then
+     * `wait` says how far the world has got. Numbers of the settings (settings.h) may change at every step; where the
+     * rest of them does, the backend may wait for the steps before. */
     sadmm_status (*step)(struct sadmm_context *, const struct sadmm_settings *, const struct sadmm_resident_edit *edits,
                          size_t count, struct sadmm_error *);
     /* Until all enqueued steps have run. The report is filled also when a step has failed; after any error but
@@ -82,8 +82,8 @@ struct sadmm_resident_kernels {
                                 double *wrench /* (bodies x 6) */, struct sadmm_error *);
     /* Contacts of the last step done, with its impulses. Nothing may be enqueued. */
     sadmm_status (*read_contacts)(struct sadmm_context *, struct sadmm_contact_set *contacts, struct sadmm_error *);
-    /* What the last step done started from: bodies, velocities (bodies x 6, m/s and rad/s) and impulses (points x 3, N s);
-     * any pointer may be NULL. Nothing may be enqueued. */
+    /* What the last step done started from: bodies, velocities (bodies x 6, m/s and rad/s) and impulses (points x 3, N
+     * s); any pointer may be NULL. Nothing may be enqueued. */
     sadmm_status (*read_start)(struct sadmm_context *, struct sadmm_rigid *rigid, double *velocity, double *impulse,
                                struct sadmm_error *);
 };

@@ -103,7 +103,8 @@ static sadmm_status read_solution(struct sadmm_solve *s)
     if (!finite_array(system->velocity, 6 * (size_t)system->body_count) ||
         (system->rows && !finite_array(system->rows->lambda, system->rows->row_count)) ||
         !finite_impulses(system, s->plan->threads))
-        return sadmm_fail(s->error, SADMM_ERROR_NON_FINITE, "the solve gave a velocity or multiplier that is not finite");
+        return sadmm_fail(s->error, SADMM_ERROR_NON_FINITE,
+                          "the solve gave a velocity or multiplier that is not finite");
     return SADMM_OK;
 }
 
@@ -144,7 +145,8 @@ sadmm_solve_report sadmm_solve_report_empty(const struct sadmm_kernels *kernels)
 
 sadmm_status sadmm_schedule_solve(const struct sadmm_kernels *kernels, struct sadmm_context *context,
                                   struct sadmm_system *system, const struct sadmm_settings *settings,
-                                  const struct sadmm_plan *plan, struct sadmm_solve_report *report, struct sadmm_error *error)
+                                  const struct sadmm_plan *plan, struct sadmm_solve_report *report,
+                                  struct sadmm_error *error)
 {
     struct sadmm_solve solve = {kernels, context, system, settings, plan, report, error};
     struct sadmm_stages stages = sadmm_stages_of(plan, settings, false);

@@ -4,9 +4,9 @@
  *     solve = PREDICT BODIES CONTACTS ROWS PENALTY  iterations  LIMIT SOLUTION
  *     iterations = { ITERATE RESIDUALS CHECK REWEIGH BALANCE } until the budget is spent or a check is met
  *
- * What the plan and the settings do not ask for is not in the list. Whoever executes it goes through it one stage after the
- * other: hosts run each stage (schedule.c, world/step.c), the CUDA backend records it into its graph. An executor may begin
- * a stage before its turn where all that the stage reads is there.
+ * What the plan and the settings do not ask for is not in the list. Whoever executes it goes through it one stage after
+ * the other: hosts run each stage (schedule.c, world/step.c), the CUDA backend records it into its graph. An executor
+ * may begin a stage before its turn where all that the stage reads is there.
  */
 #ifndef SADMM_CORE_SOLVE_STAGES_H
 #define SADMM_CORE_SOLVE_STAGES_H
@@ -68,8 +68,8 @@ struct sadmm_stages sadmm_stages_of(const struct sadmm_plan *plan, const struct 
 bool sadmm_stages_next(struct sadmm_stages *stages, struct sadmm_stage *stage);
 
 /* What a stage's time counts as. */
-enum sadmm_phase { SADMM_PHASE_COLLIDE, SADMM_PHASE_ASSEMBLE, SADMM_PHASE_SOLVE, SADMM_PHASE_FINISH, SADMM_PHASE_CERTIFY,
-                   SADMM_PHASE_OTHER, SADMM_PHASE_COUNT };
+enum sadmm_phase { SADMM_PHASE_COLLIDE, SADMM_PHASE_ASSEMBLE, SADMM_PHASE_SOLVE, SADMM_PHASE_FINISH,
+                   SADMM_PHASE_CERTIFY, SADMM_PHASE_OTHER, SADMM_PHASE_COUNT };
 enum sadmm_phase sadmm_stage_phase(enum sadmm_stage_kind kind);
 
 /* Iterations of a solve that nobody stops: without constraints Step 1 is exact at once, v = A^-1 b. */

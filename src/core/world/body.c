@@ -21,14 +21,15 @@ sadmm_body_def sadmm_body_def_default(void)
  * arm of 1e6 m on the smallest, 1e12 / 1e-24, is still a number in single precision. */
 static const double INERTIA_MIN = 1e-24, INERTIA_MAX = 1e24;
 
-/* World-frame moments are sums of all three, so that the smallest is known to (unit roundoff x ratio): it and the velocity
- * about its axis are lost to 1 % at these ratios, wholly at some 100 times these. */
+/* World-frame moments are sums of all three, so that the smallest is known to (unit roundoff x ratio): it and the
+ * velocity about its axis are lost to 1 % at these ratios, wholly at some 100 times these. */
 static double inertia_ratio_limit(sadmm_precision precision) { return precision == SADMM_F32 ? 1e6 : 1e12; }
 
 static sadmm_status check_inertia_ratio(const char *name, const double inertia[3], sadmm_precision precision,
                                         struct sadmm_error *error)
 {
-    double least = fmin(inertia[0], fmin(inertia[1], inertia[2])), most = fmax(inertia[0], fmax(inertia[1], inertia[2]));
+    double least = fmin(inertia[0], fmin(inertia[1], inertia[2])),
+           most = fmax(inertia[0], fmax(inertia[1], inertia[2]));
     if (!(most <= inertia_ratio_limit(precision) * least))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                           "%s = (%g, %g, %g): the largest must be at most %g times the smallest in %s precision, "
@@ -53,14 +54,15 @@ static sadmm_status check_inertia(const double inertia[3], sadmm_precision preci
 {
     for (int k = 0; k < 3; ++k)
         if (!(inertia[k] >= INERTIA_MIN && inertia[k] <= INERTIA_MAX))
-            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->inertia[%d] = %g: must be in [%g, %g] kg m^2", k,
-                              inertia[k], INERTIA_MIN, INERTIA_MAX);
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->inertia[%d] = %g: must be in [%g, %g] kg m^2",
+                              k, inertia[k], INERTIA_MIN, INERTIA_MAX);
     for (int k = 0; k < 3; ++k) {
         double others = inertia[(k + 1) % 3] + inertia[(k + 2) % 3];
         if (!(inertia[k] <= others * (1 + 1e-9)))
-            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                              "def->inertia[%d] = %g: must be at most the sum of the other two, %g (no rigid body has more)",
-                              k, inertia[k], others);
+            return sadmm_fail(
+                error, SADMM_ERROR_INVALID_ARGUMENT,
+                "def->inertia[%d] = %g: must be at most the sum of the other two, %g (no rigid body has more)", k,
+                inertia[k], others);
     }
     return check_inertia_ratio("def->inertia", inertia, precision, error);
 }
@@ -137,7 +139,7 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def,
     size_t slot = free_slot(world);
     if (slot >= (size_t)1 << 27)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d bodies: a world holds at most 2^27", world->body_count);
-    if (!sadmm_grow((void **)&world->bodies, &world->body_capacity, world->body_slots, slot + 1, sizeof *world->bodies))
+    if (!sadmm_grow(&world->bodies, &world->body_capacity, world->body_slots, slot + 1, sizeof *world->bodies))
         return sadmm_fail_memory(error, "a body");
     TRY(copy_name(def->name, &name, error));
 
@@ -199,7 +201,8 @@ sadmm_status sadmm_world_body_at(sadmm_world *world, int32_t index, sadmm_body_i
     struct sadmm_error *error = &world->error;
     TRY(sadmm_check_given(id, "id", error));
     if (index < 0 || index >= world->body_count)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index, world->body_count);
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index,
+                          world->body_count);
     size_t slot = (size_t)index;
     if ((size_t)world->body_count < world->body_slots)
         slot = sadmm_slot_at(&world->body_marks, index, world, alive);
@@ -233,8 +236,8 @@ sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, co
     TRY(sadmm_check_given(state, "state", error));
     TRY(sadmm_check_vector("state->position", state->position, 3, ANY, error));
     TRY(sadmm_check_orientation("state->orientation", state->orientation, orientation, error));
-    TRY(check_motion("state->linear_velocity", "state->angular_velocity", state->linear_velocity, state->angular_velocity,
-                     body->type, ANY, error));
+    TRY(check_motion("state->linear_velocity", "state->angular_velocity", state->linear_velocity,
+                     state->angular_velocity, body->type, ANY, error));
     /* A static body is part of what the backend was given once. */
     if (body->system_body < 0) TRY(sadmm_world_take_back(world));
     steady_place(&body->steady, &body->rigid, state->position, orientation);
@@ -267,7 +270,8 @@ sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id, sadmm_bo
     return SADMM_OK;
 }
 
-sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, const double force[3], const double torque[3])
+sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, const double force[3],
+                                         const double torque[3])
 {
     TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;

@@ -45,7 +45,8 @@ static size_t pair_of(const struct sadmm_contact_set *contacts, int32_t point)
     return low;
 }
 
-static void read_contact(const sadmm_world *world, const struct sadmm_contact_pair *pair, int32_t index, sadmm_contact *out)
+static void read_contact(const sadmm_world *world, const struct sadmm_contact_pair *pair, int32_t index,
+                         sadmm_contact *out)
 {
     const struct sadmm_contact_point *point = &world->contacts.points[index];
     int32_t body = pair->body_b >= 0 ? pair->body_b : pair->body_a;
@@ -72,8 +73,9 @@ sadmm_status sadmm_world_contacts(sadmm_world *world, int32_t first, int32_t cou
     int32_t total = readable_contacts(world);
     struct sadmm_error *error = &world->error;
     if (first < 0 || count < 0 || first > total - count)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "[first, first + count) = [%d, %lld): must be in [0, %d)", first,
-                          (long long)first + count, total);
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "[first, first + count) = [%d, %lld): must be in [0, %d)", first, (long long)first + count,
+                          total);
     if (count == 0) return SADMM_OK;
     TRY(sadmm_check_given(contacts, "contacts", error));
     TRY(sadmm_world_pull_contacts(world));

@@ -41,7 +41,7 @@ static void explain_options(struct text *t, const struct sadmm_plan *plan, const
                                : "start        cold: impulses 0, velocities A^-1 b (asked for)\n");
     if (s->method == SADMM_METHOD_FAST)
         line(t, "weights      by load, relaxation %g; %s\n", s->relaxation,
-             plan->weight_refresh ? "taken anew during the step, which starts cold"
+             plan->weight_refresh ? "recomputed during the step, which starts cold"
              : plan->warm         ? "kept during the step, which starts warm"
                                   : "kept: no constraints");
     else if (plan->penalty_updates)
@@ -55,7 +55,8 @@ static void explain_options(struct text *t, const struct sadmm_plan *plan, const
              : s->iterations <= s->penalty_period ? "fewer iterations than their period"
              : plan->warm                         ? "the step starts warm"
                                                   : "no constraints");
-    line(t, plan->residuals ? "residuals    measured when needed (16), (17)\n" : "residuals    left out: nobody asks\n");
+    line(t,
+         plan->residuals ? "residuals    measured when needed (16), (17)\n" : "residuals    left out: nobody asks\n");
     line(t, plan->wrenches ? "wrenches     recovered (12)\n" : "wrenches     left out: not asked for\n");
     line(t, plan->certificate ? "certificate  computed\n" : "certificate  left out: not asked for\n");
 }
@@ -69,9 +70,10 @@ size_t sadmm_world_explain(sadmm_world *world, char *out, size_t size)
     line(&t, "backend      %s\n", world->why[0] ? world->why : "chosen at the first step");
     sadmm_world_settle_quietly(world);
     if (!world->stepped) return t.length;
-    line(&t, "precision    %s, %d thread%s\n", world->report.precision == SADMM_F32 ? "f32" : "f64", world->report.threads,
-         world->report.threads == 1 ? "" : "s");
-    if (world->resident.loaded) line(&t, "world        kept by the backend: contacts are found there, the host reads on demand\n");
+    line(&t, "precision    %s, %d thread%s\n", world->report.precision == SADMM_F32 ? "f32" : "f64",
+         world->report.threads, world->report.threads == 1 ? "" : "s");
+    if (world->resident.loaded)
+        line(&t, "world        kept by the backend: contacts are found there, the host reads on demand\n");
     else line(&t, "broad phase  %s\n", sadmm_collision_broad_phase_name());
     line(&t, "bodies       %d dynamic (static ones take no part in the solve)\n", plan->bodies);
     explain_constraints(&t, plan);
@@ -84,8 +86,10 @@ size_t sadmm_world_explain(sadmm_world *world, char *out, size_t size)
     if (world->report.certificate.islands_above > 0)
         line(&t, "islands left %lld above the tolerance\n", (long long)world->report.certificate.islands_above);
     if (world->report.repeated)
-        line(&t, "repeated     %lld steps so far outgrew the room or the plan they were begun with; nothing is lost\n",
-             (long long)world->report.repeated);
+        line(
+            &t,
+            "repeated     %lld steps so far outgrew the capacities or the plan they were begun with; nothing is lost\n",
+            (long long)world->report.repeated);
     if (world->report.limited)
         line(&t, "limited      %d islands had more energy than contacts can leave them with: too few iterations\n",
              world->report.limited);

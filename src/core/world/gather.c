@@ -71,12 +71,14 @@ sadmm_status sadmm_world_gather(sadmm_world *world)
 {
     /* One at least: a system without bodies is still one of rigid bodies. */
     size_t n = (size_t)world->dynamic_count + 1, slots = world->body_slots;
-    if (!sadmm_grow_empty(&world->collision_bodies, &world->collision_body_capacity, slots, sizeof *world->collision_bodies) ||
+    if (!sadmm_grow_empty(&world->collision_bodies, &world->collision_body_capacity, slots,
+                          sizeof *world->collision_bodies) ||
         !sadmm_grow_empty(&world->start.rigid, &world->start.rigid_capacity, n, sizeof *world->start.rigid) ||
         !sadmm_grow_empty(&world->next, &world->next_capacity, n, sizeof *world->next) ||
         !sadmm_grow_empty(&world->velocity, &world->velocity_capacity, 6 * n, sizeof *world->velocity) ||
         !sadmm_grow_empty(&world->wrench, &world->wrench_capacity, 6 * n, sizeof *world->wrench) ||
-        !sadmm_grow_empty(&world->start.velocity, &world->start.velocity_capacity, 6 * n, sizeof *world->start.velocity) ||
+        !sadmm_grow_empty(&world->start.velocity, &world->start.velocity_capacity, 6 * n,
+                          sizeof *world->start.velocity) ||
         !sadmm_grow_empty(&world->slot_of, &world->slot_of_capacity, n, sizeof *world->slot_of))
         return sadmm_fail_memory(&world->error, "the step");
     struct gathering g;
@@ -132,6 +134,6 @@ sadmm_status sadmm_world_not_finite(sadmm_world *world, int32_t body)
 {
     int32_t slot = world->slot_of[body];
     return sadmm_fail(&world->error, SADMM_ERROR_NON_FINITE,
-                      "the step made body (slot %d, generation %u, \"%s\") not finite; the world is as before it", slot + 1,
-                      world->bodies[slot].generation, sadmm_world_body_name(&world->bodies[slot]));
+                      "the step made body (slot %d, generation %u, \"%s\") not finite; the world is as before it",
+                      slot + 1, world->bodies[slot].generation, sadmm_world_body_name(&world->bodies[slot]));
 }

@@ -21,7 +21,7 @@ struct sadmm_shape *sadmm_world_find_shape(const sadmm_world *world, sadmm_shape
     if (id.slot >= 1 && id.slot <= world->shape_slots && world->shapes[id.slot - 1].alive &&
         world->shape_generations[id.slot - 1] == id.generation)
         return &world->shapes[id.slot - 1];
-    sadmm_fail(error, SADMM_ERROR_STALE_ID, "%s = (slot %u, generation %u): no such shape (any more)", argument, id.slot,
-               id.generation);
+    sadmm_fail(error, SADMM_ERROR_STALE_ID, "%s = (slot %u, generation %u): no such shape (any more)", argument,
+               id.slot, id.generation);
     return NULL;
 }

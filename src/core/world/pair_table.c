@@ -17,8 +17,8 @@ sadmm_status sadmm_pair_table_set(struct sadmm_pair_table *table, uint64_t key, 
 {
     size_t at, count = table->count;
     if (!sadmm_pair_table_find(table, key, &at)) {
-        if (!sadmm_grow((void **)&table->keys, &table->key_capacity, count, count + 1, sizeof *table->keys) ||
-            !sadmm_grow((void **)&table->values, &table->value_capacity, count, count + 1, sizeof *table->values))
+        if (!sadmm_grow(&table->keys, &table->key_capacity, count, count + 1, sizeof *table->keys) ||
+            !sadmm_grow(&table->values, &table->value_capacity, count, count + 1, sizeof *table->values))
             return sadmm_fail_memory(error, "a pair override");
         memmove(table->keys + at + 1, table->keys + at, (count - at) * sizeof *table->keys);
         memmove(table->values + at + 1, table->values + at, (count - at) * sizeof *table->values);

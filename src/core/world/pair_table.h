@@ -17,7 +17,8 @@ struct sadmm_pair_table {
 
 /* Is `key` in the table? *at is where it is or belongs. */
 bool sadmm_pair_table_find(const struct sadmm_pair_table *table, uint64_t key, size_t *at);
-sadmm_status sadmm_pair_table_set(struct sadmm_pair_table *table, uint64_t key, double value, struct sadmm_error *error);
+sadmm_status sadmm_pair_table_set(struct sadmm_pair_table *table, uint64_t key, double value,
+                                  struct sadmm_error *error);
 void sadmm_pair_table_remove(struct sadmm_pair_table *table, uint64_t key);
 /* Remove every pair that names the slot. */
 void sadmm_pair_table_forget(struct sadmm_pair_table *table, uint32_t slot);

@@ -1,13 +1,13 @@
 /* A world that a backend keeps (resident.h): steps are enqueued there, and the host's copy follows on demand.
  *
- *     loaded           the backend has the world. States and wrenches set meanwhile are edits, which go along with the next
- *                      step; any other change first takes the world back, and the next step loads it again.
+ *     loaded           the backend has the world. States and wrenches set meanwhile are edits, which go along with the
+ *                      next step; any other change first takes the world back, and the next step loads it again.
  *     running          steps were enqueued whose end nobody has waited for
  *     bodies_behind,   the host's bodies, or contacts with everything else about the last step, are older than the
  *     contacts_behind  backend's: getters pull them, once
  *
- * What was set is in the host's bodies at once, however far behind they are; `set_at` tells a pull that it is newer than what
- * the backend has. So the host's world is a whole one at any time, and what is left when a device is lost.
+ * What was set is in the host's bodies at once, however far behind they are; `set_at` tells a pull that it is newer
+ * than what the backend has. So the host's world is a whole one at any time, and what is left when a device is lost.
  */
 #include <string.h>
 
@@ -17,7 +17,8 @@
 #include "core/solve/certificate.h"
 #include "world_internal.h"
 
-/* A resident step is enqueued with all of its checks, and those that nobody needs any more take time as well. */
+/* A step on the device is enqueued with all of its convergence checks, and those that nobody needs any more take time
+ * as well. */
 enum { MOST_CHECKS = 64 };
 
 bool sadmm_world_may_reside(const sadmm_world *world)
@@ -86,7 +87,7 @@ static void put_edit(struct sadmm_resident_edit *edit, const struct sadmm_world_
 static sadmm_status list_edits(sadmm_world *world, size_t *count)
 {
     *count = 0;
-    if (!sadmm_grow((void **)&world->resident.edits, &world->resident.edit_capacity, 0,
+    if (!sadmm_grow(&world->resident.edits, &world->resident.edit_capacity, 0,
                     SADMM_BODY_EDITS * world->resident.edited_count, sizeof *world->resident.edits))
         return sadmm_fail_memory(&world->error, "changes of bodies");
     for (size_t k = 0; k < world->resident.edited_count; ++k) {
@@ -107,9 +108,9 @@ static sadmm_status load(sadmm_world *world)
     sadmm_status status = sadmm_world_gather(world);
     sadmm_world_swap_starts(world);
     TRY(status);
-    if (!sadmm_grow((void **)&world->resident.steady, &world->resident.steady_capacity, 0, n + 1,
+    if (!sadmm_grow(&world->resident.steady, &world->resident.steady_capacity, 0, n + 1,
                     sizeof *world->resident.steady) ||
-        !sadmm_grow((void **)&world->resident.edited, &world->resident.edited_capacity, 0, n + 1,
+        !sadmm_grow(&world->resident.edited, &world->resident.edited_capacity, 0, n + 1,
                     sizeof *world->resident.edited))
         return sadmm_fail_memory(&world->error, "the step");
     for (size_t i = 0; i < n; ++i) {
@@ -170,7 +171,8 @@ static sadmm_status enqueue(sadmm_world *world)
     sadmm_status status =
         backend->step(world->context, &world->def.settings, world->resident.edits, count, &world->error);
     world->resident.running = true;
-    if (status != SADMM_OK) return settle(world, status); /* of this step or an earlier one: how far has the world got? */
+    if (status != SADMM_OK)
+        return settle(world, status); /* of this step or an earlier one: how far has the world got? */
     ++world->resident.enqueued;
     forget_edits(world);
     return SADMM_OK;
@@ -216,7 +218,8 @@ static sadmm_status settle(sadmm_world *world, sadmm_status status)
     else status = waited;
     take_report(world, &report);
     if (status != SADMM_OK) {
-        /* The step that failed may have written over what the last one started from: only a copy on the host is left. */
+        /* The step that failed may have written over what the last one started from: only a copy on the host is
+         * left. */
         if (world->resident.contacts_behind) world->contacts_readable = false;
         edit_again(world);
     }
@@ -256,9 +259,9 @@ static sadmm_status pull_contacts(sadmm_world *world)
     if (!world->resident.contacts_behind) return SADMM_OK;
     size_t count = (size_t)world->report.contacts, n = (size_t)world->dynamic_count;
     struct sadmm_step_start *start = &world->start;
-    if (!sadmm_grow((void **)&start->rigid, &start->rigid_capacity, 0, n + 1, sizeof *start->rigid) ||
-        !sadmm_grow((void **)&start->velocity, &start->velocity_capacity, 0, 6 * (n + 1), sizeof *start->velocity) ||
-        !sadmm_grow((void **)&start->impulse, &start->impulse_capacity, 0, 3 * count, sizeof *start->impulse))
+    if (!sadmm_grow(&start->rigid, &start->rigid_capacity, 0, n + 1, sizeof *start->rigid) ||
+        !sadmm_grow(&start->velocity, &start->velocity_capacity, 0, 6 * (n + 1), sizeof *start->velocity) ||
+        !sadmm_grow(&start->impulse, &start->impulse_capacity, 0, 3 * count, sizeof *start->impulse))
         return sadmm_fail_memory(&world->error, "the step's starting impulses");
     TRY(backend->read_start(world->context, start->rigid, start->velocity, start->impulse, &world->error));
     TRY(backend->read_bodies(world->context, world->next, NULL, NULL, &world->error));
@@ -292,7 +295,8 @@ static bool save(sadmm_world *world)
 /* The steps after the bodies were read last are lost; what was set since then is in the bodies. */
 static void fall_back(sadmm_world *world)
 {
-    world->contacts_readable = world->contacts_readable && !world->resident.bodies_behind && !world->resident.contacts_behind;
+    world->contacts_readable =
+        world->contacts_readable && !world->resident.bodies_behind && !world->resident.contacts_behind;
     world->report.step = world->resident.kept_step;
     world->report.time = world->resident.kept_time;
     world->stepped = world->report.step > 0;

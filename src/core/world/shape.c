@@ -44,7 +44,8 @@ static sadmm_status check_def(const struct sadmm_world_body *body, const sadmm_s
     return sadmm_check_range("def->restitution", def->restitution, 0, 1, error);
 }
 
-sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, const sadmm_shape_def *def, sadmm_shape_id *id)
+sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, const sadmm_shape_def *def,
+                                   sadmm_shape_id *id)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
@@ -59,10 +60,10 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
     if ((size_t)world->shape_count < world->shape_slots) slot = sadmm_slot_free(&world->shape_marks, world, alive);
     if (slot >= (size_t)1 << 28)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%d shapes: a world holds at most 2^28", world->shape_count);
-    if (!sadmm_grow((void **)&world->shapes, &world->shape_capacity, world->shape_slots, slot + 1, sizeof *world->shapes) ||
-        !sadmm_grow((void **)&world->shape_generations, &world->shape_generation_capacity, world->shape_slots, slot + 1,
+    if (!sadmm_grow(&world->shapes, &world->shape_capacity, world->shape_slots, slot + 1, sizeof *world->shapes) ||
+        !sadmm_grow(&world->shape_generations, &world->shape_generation_capacity, world->shape_slots, slot + 1,
                     sizeof *world->shape_generations) ||
-        !sadmm_grow((void **)&world->geometries, &world->geometry_capacity, world->shape_slots, slot + 1,
+        !sadmm_grow(&world->geometries, &world->geometry_capacity, world->shape_slots, slot + 1,
                     sizeof *world->geometries))
         return sadmm_fail_memory(error, "a shape");
 
@@ -124,7 +125,8 @@ sadmm_status sadmm_world_shape_at(sadmm_world *world, int32_t index, sadmm_shape
     struct sadmm_error *error = &world->error;
     TRY(sadmm_check_given(id, "id", error));
     if (index < 0 || index >= world->shape_count)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index, world->shape_count);
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index,
+                          world->shape_count);
     size_t slot = (size_t)index;
     if ((size_t)world->shape_count < world->shape_slots)
         slot = sadmm_slot_at(&world->shape_marks, index, world, alive);

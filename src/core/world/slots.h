@@ -14,7 +14,8 @@ struct sadmm_slot_marks {
     int32_t below; /* and how many live ones are below it */
 };
 
-/* The lowest free slot, where there is one; sadmm_slot_taken says that it is free no more. `alive` tells of one slot. */
+/* The lowest free slot, where there is one; sadmm_slot_taken says that it is free no more. `alive` tells of one
+ * slot. */
 size_t sadmm_slot_free(struct sadmm_slot_marks *marks, const sadmm_world *world,
                        bool (*alive)(const sadmm_world *world, size_t slot));
 /* The slot of the index-th live one, where there is one. */

@@ -1,5 +1,5 @@
-/* A step by the host: the stages of core/solve/stages.h, one after the other. Nothing before COMMIT changes a body. A backend
- * that keeps the world goes through the same list on its own (resident.c).
+/* A step by the host: the stages of core/solve/stages.h, one after the other. Nothing before COMMIT changes a body. A
+ * backend that keeps the world goes through the same list on its own (resident.c).
  */
 #include <math.h>
 #include <string.h>
@@ -59,7 +59,7 @@ static sadmm_status keep_start(sadmm_world *world, double *depth)
 {
     const size_t count = world->contacts.point_count;
     struct start_keeping keeping;
-    if (!sadmm_grow((void **)&world->start.impulse, &world->start.impulse_capacity, 0, 3 * count,
+    if (!sadmm_grow(&world->start.impulse, &world->start.impulse_capacity, 0, 3 * count,
                     sizeof *world->start.impulse))
         return sadmm_fail_memory(&world->error, "the step's starting impulses");
     keeping.world = world;
@@ -202,7 +202,8 @@ static void report_step(const struct host_step *step)
                .solve = ms[SADMM_PHASE_SOLVE], .finish = ms[SADMM_PHASE_FINISH]},
     };
     done.plan.threads = step->world->team.ran;
-    for (int phase = 0; phase < SADMM_PHASE_COUNT; ++phase) done.ms.total += phase == SADMM_PHASE_CERTIFY ? 0 : ms[phase];
+    for (int phase = 0; phase < SADMM_PHASE_COUNT; ++phase)
+        done.ms.total += phase == SADMM_PHASE_CERTIFY ? 0 : ms[phase];
     sadmm_world_report_steps(step->world, 1, &done);
     step->world->report.certificate = solved->certificate;
     step->world->report.certify_ms = ms[SADMM_PHASE_CERTIFY];

@@ -90,7 +90,7 @@ struct sadmm_world {
         int64_t kept_step;   /* steps and time of the bodies above */
         double kept_time;
         struct sadmm_steady *steady; /* dynamic bodies */
-        uint32_t *edited;    /* slots of bodies with `edits`; room for all dynamic ones */
+        uint32_t *edited;    /* slots of bodies with `edits`; capacity: all dynamic ones */
         struct sadmm_resident_edit *edits; /* for the backend, when a step is enqueued */
         size_t steady_capacity, edited_count, edited_capacity, edit_capacity;
     } resident;
@@ -136,12 +136,13 @@ void sadmm_world_settle_quietly(sadmm_world *world);
 /* Bring the bodies (or contacts and everything else) of the last step back, where the backend is ahead. */
 sadmm_status sadmm_world_pull_bodies(sadmm_world *world);
 sadmm_status sadmm_world_pull_contacts(sadmm_world *world);
-/* Both, and from here on the host's world is the one that counts: before anything but a state or a wrench is changed. */
+/* Both, and from here on the host's world is the one that counts: before anything but a state or a wrench is
+ * changed. */
 sadmm_status sadmm_world_take_back(sadmm_world *world);
 /* A dynamic body's state or wrench has been set: the next step takes it along. */
 void sadmm_world_edit(sadmm_world *world, struct sadmm_world_body *body, enum sadmm_edit_kind kind);
-/* Passes `status` on. After SADMM_ERROR_DEVICE the backend's context is given up, the host's world counts again, and the next
- * step begins with a new context. */
+/* Passes `status` on. After SADMM_ERROR_DEVICE the backend's context is given up, the host's world counts again, and
+ * the next step begins with a new context. */
 sadmm_status sadmm_world_contain(sadmm_world *world, sadmm_status status);
 
 /* ---- ids.c ---- */

@@ -1,62 +1,33 @@
-/* The layout (graph/layout.h) of a step, made on the device from core's own pairs and row constraints: compiled once, for both
- * precisions.
+/* The layout (device/layout.h) of a step, made on the device from core's own pairs and row constraints: compiled once,
+ * for both precisions.
  *
- *   statistics    a thread a record: statistics of the pairs, the body of every side, degrees, islands joined
- *             a thread a body: islands labelled by their smallest body, statistics of the bodies
- *   layout    bodies sorted by label (where islands matter), sides sorted by slot, both stably; where a body's sides
- *             begin; parts
+ *   statistics  a thread a record: statistics of the pairs, the body of every side, degrees, islands joined
+ *               a thread a body: islands labelled by their smallest body, statistics of the bodies
+ *   layout      bodies sorted by label (where islands matter), sides sorted by slot, both stably; where a body's sides
+ *               begin; parts
  *
  * Islands are a union-find forest whose roots are only ever hooked under smaller ones (Jaiganesh and Burtscher, A
  * High-Performance Connected Components Implementation for GPUs, HPDC 2018): whatever the timing, an island's root ends
  * up to be its smallest body.
  *
- * A small scene takes one kernel of one block for both stages, its arrays in shared memory (graph/layout_small.cu): a launch
- * costs as much as such a stage. Both ways give the same layout. The functions below only enqueue, so that they can be
- * captured into a graph.
+ * A small scene takes one kernel of one block for both stages, its arrays in shared memory (graph/layout_small.cu): a
+ * launch costs as much as such a stage. Both ways give the same layout. The functions below only enqueue, so that they
+ * can be captured into a graph.
  */
-#ifndef SADMM_CUDA_GRAPH_LAYOUT_VIEW_H
-#define SADMM_CUDA_GRAPH_LAYOUT_VIEW_H
+#ifndef SADMM_CUDA_GRAPH_LAYOUT_KERNELS_H
+#define SADMM_CUDA_GRAPH_LAYOUT_KERNELS_H
 
 #include <cuda_runtime.h>
 
 #include "core/model/system.h"
-#include "layout.h"
+#include "backend_cuda/device/layout.h"
 
 enum { LAYOUT_THREADS = 256, ONE_BLOCK_THREADS = 1024 };
-
-/* What the arrays hold, so that a scene whose pairs are still the same keeps them (one_block). */
-struct layout_kept {
-    int32_t valid, pairs;
-    struct cuda_partition partition;
-};
-
-/* Device memory. A side that is none (no pair, a static side) has body and slot `bodies`. */
-struct layout_view {
-    struct cuda_live *live;
-    struct cuda_graph_statistics *statistics;
-    const struct sadmm_contact_pair *pairs;
-    const struct sadmm_contact_point *points;
-    const struct sadmm_row_constraint *constraints; /* given by rows */
-    int32_t bodies, pair_capacity, rows; /* as in cuda_view */
-    int32_t warm_start;
-    int32_t most_blocks; /* that run at once */
-
-    int32_t *label, *degree;                 /* by raw body; label: its island's smallest body */
-    int32_t *island_bodies, *island_sides;  /* by label */
-    int32_t *side_body, *side_slot, *sorted; /* 2 (pair_capacity + rows): raw body, slot, slots sorted */
-    int32_t *sorted_label;                   /* bodies */
-    const int32_t *numbers;                  /* 0, 1, ...: at least as many as sides or bodies */
-    void *temp;                              /* of the sorts */
-    size_t temp_bytes;
-
-    int32_t *body_of, *slot_of, *offsets, *incident, *parts;
-    struct layout_kept *kept;
-};
 
 /* Which stages, and what of them. */
 struct layout_args {
     int32_t statistics, layout; /* of one_block: which */
-    int32_t islands;        /* statistics: look for them; layout: slots by island */
+    int32_t islands;        /* statistics: find them; layout: slots by island */
     struct cuda_partition partition;
 };
 

@@ -1,6 +1,6 @@
 /* How the CUDA backend's fused entry runs (device/view.h), and how tests choose it. */
-#ifndef SADMM_CUDA_GRAPH_TIER_H
-#define SADMM_CUDA_GRAPH_TIER_H
+#ifndef SADMM_CUDA_DEVICE_TIER_H
+#define SADMM_CUDA_DEVICE_TIER_H
 
 #include "core/solve/kernels.h"
 
@@ -20,13 +20,14 @@ enum sadmm_cuda_tier {
  * table that made the context. */
 void sadmm_cuda_force_tier(const struct sadmm_kernels *kernels, struct sadmm_context *context,
                            enum sadmm_cuda_tier tier);
-/* Likewise: blocks a cluster (2, 4, 8 or 16) where a begin chooses CLUSTER; 0: as likely the fastest. */
+/* Likewise: blocks a cluster (2, 4, 8 or 16) where a begin chooses CLUSTER; 0: the one that is likely the fastest. */
 void sadmm_cuda_force_cluster(const struct sadmm_kernels *kernels, struct sadmm_context *context, int blocks);
 /* The tier the last begin chose, and its blocks (0 for STREAM). */
 enum sadmm_cuda_tier sadmm_cuda_tier_of(const struct sadmm_kernels *kernels, const struct sadmm_context *context,
                                         int32_t *blocks);
 
-/* Whole steps: room for so many candidates and points at first; 0: as likely. Before the world's first step. */
+/* Whole steps: the first capacities for candidates and points; 0: by the number of shapes. Before the world's first
+ * step. */
 void sadmm_cuda_tune_capacities(const struct sadmm_kernels *kernels, struct sadmm_context *context,
                                 int64_t first_capacity);
 

@@ -1,6 +1,6 @@
 /* What a body or a pair gives back, in double. */
-#ifndef SADMM_CUDA_STEP_SOLUTION_H
-#define SADMM_CUDA_STEP_SOLUTION_H
+#ifndef SADMM_CUDA_ITERATE_SOLUTION_H
+#define SADMM_CUDA_ITERATE_SOLUTION_H
 
 #include "backend_cuda/device/double.h"
 
@@ -39,7 +39,7 @@ static __device__ __forceinline__ void add_pair_wrench(const contact_view &conta
 }
 
 /* R: (12) with lambda = -u, J^T lambda / dt over the sides [begin, end) of a body, by eight lanes that take every
- * eighth half each; the sum is in all of them. per_dt: 1 / dt. Warp-collective. */
+ * eighth side each; the sum is in all of them. per_dt: 1 / dt. Every lane of the warp comes here. */
 static __device__ __forceinline__ void contact_wrench(const graph_view &graph, const contact_view &contacts,
                                                       const raw_view &raw, int32_t begin, int32_t end, int32_t lane,
                                                       double per_dt, double wrench[6])

@@ -1,37 +1,34 @@
 /* Whole steps on the device (core/solve/resident.h): what the world is there, and how the host follows.
  *
- *     edit       states, wrenches and settings' numbers set since the last step  (when there are any)
- *     start      where a solve starts from; bodies as collision sees them
- *     find       contacts, from one set into the other                       (collide/view.h)
- *       beside it  A, b of the bodies
- *     admit      do they fit? Then they are this step's (cuda_live)
- *     statistics     statistics about them; islands                                   (graph/layout.cu)
- *     layout     slots, sides, parts
- *       beside it  contacts in the solver's form
- *     penalties  C, beta, factors (fast: weights, C, factors); and: is this what the step was planned for?
- *     iterate    (15), new weights where asked for                           (the kernel table's own kernels)
- *       after some   fast: a convergence check
- *     limit      fast: islands that have more energy than they may
- *                fast, small islands (c->prologue): `iterate` does penalties and limit, too, and the plan is looked at
- * by the last two       beside what follows  (16), (17)
- *     finish     impulses into the contacts, moved bodies, wrenches
- *     commit     the report; the step counts only if nothing was aborted
+ *     edit        states, wrenches and settings' numbers set since the last step (when there are any)
+ *     start       where a solve starts from; bodies as collision sees them
+ *     find        contacts, from one set into the other (collide/view.h); beside it A, b of the bodies
+ *     admit       do they fit? Then they are this step's (cuda_live)
+ *     statistics  of the constraint graph; islands (graph/layout.cu)
+ *     layout      slots, sides, parts; beside it contacts in the solver's form
+ *     penalties   C, beta, factors (fast: weights, C, factors); and: is this what the step was planned for?
+ *     iterate     (15), new weights where asked for (the kernel table's own kernels); fast: convergence checks
+ *     limit       fast: islands that have more energy than they may
+ *     finish      impulses into the contacts, moved bodies, wrenches; beside it (16), (17)
+ *     commit      the report; the step counts only if nothing was aborted
  *
- * The host plans a step from the statistics of an earlier one: rooms, tier and partition, rows a contact, warm or cold.
- * All of it goes into a graph that is launched again and again, two of them in turn, because states and contact sets
- * change places at every step. Where a plan does not hold, the step sets cuda_live.abort_code (with c->prologue only
- * its last kernel does: what runs until then keeps to what was planned for), what was enqueued behind it does nothing,
- * and the host, when it sees the report, looks at the statistics, plans again and enqueues the same steps again: a
- * repeated step starts from the same state, settings included, and gives the same bits. The settings' numbers are data
- * in device memory, so that a change of them is an edit like others: nothing is recorded again or waited for. Reports
- * and edits travel through pinned memory, a ring of STEPS_AHEAD, written and read by the device itself.
+ * fast, small islands (c->prologue): `iterate` does penalties and limit too, and the last two check the plan.
+ *
+ * The host plans a step from the statistics of an earlier one: capacities, tier and partition, rows a contact, warm or
+ * cold. All of it goes into a graph that is launched again and again, two of them in turn, because states and contact
+ * sets change places at every step. Where a plan does not hold, the step sets cuda_live.abort_code (with c->prologue
+ * only its last kernel does: what runs until then keeps to what was planned for), what was enqueued behind it does
+ * nothing, and the host, when it sees the report, reads the statistics, plans again and enqueues the same steps again:
+ * a repeated step starts from the same state, settings included, and gives the same bits. The settings' numbers are
+ * data in device memory, so that a change of them is an edit like others: nothing is recorded again or waited for.
+ * Reports and edits travel through pinned memory, a ring of STEPS_AHEAD, written and read by the device itself.
  */
-#ifndef SADMM_CUDA_STEP_STEP_H
-#define SADMM_CUDA_STEP_STEP_H
+#ifndef SADMM_CUDA_DEVICE_STEP_H
+#define SADMM_CUDA_DEVICE_STEP_H
 
 #include "core/solve/resident.h"
-#include "backend_cuda/collide/pipeline.h"
-#include "backend_cuda/graph/layout.h"
+#include "found.h"
+#include "layout.h"
 
 enum { STEPS_AHEAD = 4 };
 

@@ -1,15 +1,14 @@
 /* Which tier a step runs in, on how many thread blocks of how many threads: from statistics of its constraint graph.
  *
  * A part costs its sides + its bodies, and the layout gives every part an even share of all cost, rounded up to whole
- * islands (BLOCK, CLUSTER) or bodies (GRID). That bounds the largest part before it is made. The rooms of a launch
- * (threads, shared memory) are sized above the bound: statistics may be those of a step before, and contacts come and
- * go.
+ * islands (BLOCK, CLUSTER) or bodies (GRID). That bounds the largest part before it is made. The threads and the shared
+ * memory of a launch are sized above the bound: statistics may be those of a step before, and contacts come and go.
  *
- * Which tier. An iteration takes what its barrier and its longest chain of dependent instructions take, and then the time
- * a multiprocessor needs for the sides it holds: its warps take turns. A thread block to an island has the cheapest
- * barrier; a cluster shares an island among 2 to 16 multiprocessors, and pays for it with a dearer barrier and velocities
- * from other multiprocessors; the grid shares among all of them, through memory. Whatever fits and is estimated to be
- * the fastest is taken, which comes to this:
+ * Which tier. An iteration takes what its barrier and its longest chain of dependent instructions take, and then the
+ * time a multiprocessor needs for the sides it holds: its warps take turns. A thread block to an island has the
+ * cheapest barrier; a cluster shares an island among 2 to 16 multiprocessors, and pays for it with a dearer barrier and
+ * velocities from other multiprocessors; the grid shares among all of them, through memory. Whatever fits and is
+ * estimated to be the fastest is taken, which comes to this:
  *   BLOCK    islands of up to about a hundred sides, and larger ones where there are so many islands that every
  *            multiprocessor has enough to do anyway
  *   CLUSTER  else, whenever a cluster can hold an island: its size such that a block holds some tens of sides, or as
@@ -19,13 +18,13 @@
  */
 #include <limits.h>
 
-#include "backend_cuda/device/context.h"
+#include "iterate.h"
 
 enum {
-    QUAD = 4,          /* threads a side */
-    SPREAD = 48,       /* sides a block of the grid at least: below that, barriers of more blocks cost more than they gain */
-    MOST_BLOCKS = 16,  /* thread blocks a multiprocessor */
-    MOST_CLUSTER = 16  /* thread blocks a cluster */
+    QUAD = 4,    /* threads a side */
+    SPREAD = 48, /* sides a block of the grid at least: below that, barriers of more blocks cost more than they gain */
+    MOST_BLOCKS = 16, /* thread blocks a multiprocessor */
+    MOST_CLUSTER = 16 /* thread blocks a cluster */
 };
 
 /* Nanoseconds of an iteration: floors of the tiers, of a cluster for each of its blocks, and of each side that a
@@ -114,9 +113,9 @@ static struct choice no_choice(const char *why)
 }
 
 static const char refused[] = "a thread block would get too much";
-static const char too_many[] = "more thread blocks than the layout has room for";
+static const char too_many[] = "more thread blocks than the layout has capacity for";
 
-/* No more than the layout has room for. */
+/* No more than the layout has capacity for. */
 static int64_t most_parts(const struct sadmm_context *c)
 {
     return c->view.model.bodies + (int64_t)c->multiprocessors * MOST_BLOCKS;
@@ -130,8 +129,8 @@ static struct choice choose_block(const struct sadmm_context *c, const struct cu
     const int64_t most = CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0),
                   most_sides = most_sides_of(c, most);
     if (statistics->island_sides > most_sides) return no_choice(too_large);
-    /* As many blocks a multiprocessor as run side by side and find an island each; when that is too few for the room a
-     * block has, blocks that run one after another. */
+    /* As many blocks a multiprocessor as run side by side and find an island each; when that is too few for the memory
+     * a block has, blocks that run one after another. */
     int64_t parts = c->multiprocessors, side_by_side = 1;
     while (side_by_side < MOST_BLOCKS && 2 * parts <= statistics->islands &&
            2 * side_by_side * threads_for(c, island_bound(c, statistics, 2 * parts), most) <= most) {
@@ -166,8 +165,8 @@ static struct choice choose_cluster_of(const struct sadmm_context *c, const stru
     const int64_t most = CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0),
                   most_sides = most_sides_of(c, most);
     const int64_t cost = (int64_t)statistics->sides + c->view.model.bodies;
-    /* As many clusters as find a multiprocessor for each of their blocks; when that is too few for the room a block has,
-     * clusters that run one after another. */
+    /* As many clusters as find a multiprocessor for each of their blocks; when that is too few for the memory a block
+     * has, clusters that run one after another. */
     int64_t clusters = statistics->islands <= 1 ? 1 : larger(c->multiprocessors / size, 1);
     struct bound bound;
     for (;; clusters += clusters / 4 + 1) {
@@ -187,8 +186,8 @@ static struct choice choose_cluster_of(const struct sadmm_context *c, const stru
     if (choice.partition.threads > most || !take_capacity(c, &choice.partition, bound, c->shared_limit))
         return no_choice(too_large);
     int active = 0;
-    cuda_kernel kernel =
-        CUDA(persistent_kernel)(statistics->point_slots, SADMM_CUDA_TIER_CLUSTER, INT_MAX, c->view.rows.count > 0, c->fast, &name);
+    cuda_kernel kernel = CUDA(persistent_kernel)(statistics->point_slots, SADMM_CUDA_TIER_CLUSTER, INT_MAX,
+                                                 c->view.rows.count > 0, c->fast, &name);
     *code = CUDA(active_clusters)(c, kernel, &choice.partition, &active);
     if (*code != cudaSuccess || active < 1) return no_choice("the device has no clusters that large");
     const int64_t rounds = up(smaller(clusters, larger(statistics->islands, 1)), active);
@@ -236,8 +235,8 @@ static struct choice choose_grid(const struct sadmm_context *c, const struct cud
         choice.partition.threads = (int32_t)threads;
         if (!take_capacity(c, &choice.partition, bound, c->shared_limit / side_by_side)) continue;
         int resident = 0;
-        cuda_kernel kernel =
-            CUDA(persistent_kernel)(statistics->point_slots, SADMM_CUDA_TIER_GRID, INT_MAX, c->view.rows.count > 0, c->fast, &name);
+        cuda_kernel kernel = CUDA(persistent_kernel)(statistics->point_slots, SADMM_CUDA_TIER_GRID, INT_MAX,
+                                                     c->view.rows.count > 0, c->fast, &name);
         *code = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, (const void *)kernel,
                                                               choice.partition.threads, choice.partition.shared);
         if (*code != cudaSuccess || parts > (int64_t)resident * c->multiprocessors) return no_choice(too_large);
@@ -253,7 +252,7 @@ static struct choice choose_stream(void)
     return choice;
 }
 
-/* What is likely the fastest; a tier whose floor is above what another takes is not looked at. */
+/* What is likely the fastest; a tier whose floor is above what another takes is left out. */
 static struct choice choose_any(const struct sadmm_context *c, const struct cuda_graph_statistics *statistics,
                                 cudaError_t *code)
 {

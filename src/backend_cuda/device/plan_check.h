@@ -1,8 +1,8 @@
-/* Is a step what it was planned for? (step/step.h) */
-#ifndef SADMM_CUDA_STEP_PLAN_CHECK_H
-#define SADMM_CUDA_STEP_PLAN_CHECK_H
+/* Is a step what it was planned for? (device/step.h) */
+#ifndef SADMM_CUDA_DEVICE_PLAN_CHECK_H
+#define SADMM_CUDA_DEVICE_PLAN_CHECK_H
 
-#include "backend_cuda/device/context.h"
+#include "context.h"
 #include "core/solve/plan.h"
 
 /* The device's clock. */

@@ -1,13 +1,13 @@
 /* The CUDA backend's two tables, and whether this machine can run them. */
 #include "core/solve/backends.h"
 #include "tables.h"
-#include "backend_cuda/graph/tier.h"
+#include "backend_cuda/device/tier.h"
 
 #define CUDA(name) sadmm_cuda_##name##_f32
-#include "entries.h"
+#include "backend_cuda/device/entries.h"
 #undef CUDA
 #define CUDA(name) sadmm_cuda_##name##_f64
-#include "entries.h"
+#include "backend_cuda/device/entries.h"
 #undef CUDA
 
 static const struct sadmm_kernels tables[2] = {

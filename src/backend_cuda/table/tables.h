@@ -1,6 +1,6 @@
 /* One precision's kernel table, from device/entries.h's symbols with a suffix. */
-#ifndef SADMM_CUDA_DEVICE_TABLES_H
-#define SADMM_CUDA_DEVICE_TABLES_H
+#ifndef SADMM_CUDA_TABLE_TABLES_H
+#define SADMM_CUDA_TABLE_TABLES_H
 
 #define CUDA_TABLE(suffix, floats)                             \
     {                                                          \

@@ -1,6 +1,6 @@
 /* The constraint graph of a step on the device: what is known where, and how it is split among thread blocks.
  *
- * Graph statistics are on the device, guesses on the host: launches are sized by the room there is, kernels learn the
+ * Graph statistics are on the device, guesses on the host: launches are sized by the capacities, kernels learn the
  * true counts from `cuda_live` and do nothing once a step of the queue has failed.
  *
  * Bodies have slots, so that an island's bodies are neighbours; where islands do not matter (GRID and STREAM in the
@@ -15,8 +15,8 @@
  *   CLUSTER  so for clusters of blocks, whose slots are shared out among their blocks as in GRID
  * A part may be empty.
  */
-#ifndef SADMM_CUDA_GRAPH_LAYOUT_H
-#define SADMM_CUDA_GRAPH_LAYOUT_H
+#ifndef SADMM_CUDA_DEVICE_LAYOUT_H
+#define SADMM_CUDA_DEVICE_LAYOUT_H
 
 #include <stdalign.h>
 #include <stdbool.h>
@@ -24,6 +24,10 @@
 #include <stdint.h>
 
 #include "tier.h"
+
+struct sadmm_contact_pair;
+struct sadmm_contact_point;
+struct sadmm_row_constraint;
 
 enum cuda_abort { ABORT_NONE = 0, ABORT_CAPACITY, ABORT_PARTITION, ABORT_PLAN, ABORT_NON_FINITE };
 
@@ -35,7 +39,7 @@ struct cuda_live {
 
 /* Of the constraint graph; in device memory, copied to the host on demand. */
 struct cuda_graph_statistics {
-    int32_t islands;         /* bodies joined by constraints; a lone body is one; 0: not looked for */
+    int32_t islands;         /* bodies joined by constraints; a lone body is one; 0: not counted */
     int32_t island_bodies, island_sides; /* of the largest (each maximum separately) */
     int32_t sides;          /* all */
     int32_t degree;          /* most sides of one body */
@@ -62,8 +66,37 @@ struct cuda_partition {
     bool islands;            /* slots by island in GRID and STREAM too */
 };
 
-/* A layout brought to the host, for tests; arrays of the caller, with room for bodies, bodies, bodies + 1, two a
- * constraint and parts + 1. */
+/* What the arrays hold, so that a scene whose pairs are still the same keeps them (one_block). */
+struct layout_kept {
+    int32_t valid, pairs;
+    struct cuda_partition partition;
+};
+
+/* Device memory. A side that is none (no pair, a static side) has body and slot `bodies`. */
+struct layout_view {
+    struct cuda_live *live;
+    struct cuda_graph_statistics *statistics;
+    const struct sadmm_contact_pair *pairs;
+    const struct sadmm_contact_point *points;
+    const struct sadmm_row_constraint *constraints; /* given by rows */
+    int32_t bodies, pair_capacity, rows; /* as in cuda_view */
+    int32_t warm_start;
+    int32_t most_blocks; /* that run at once */
+
+    int32_t *label, *degree;                 /* by raw body; label: its island's smallest body */
+    int32_t *island_bodies, *island_sides;  /* by label */
+    int32_t *side_body, *side_slot, *sorted; /* 2 (pair_capacity + rows): raw body, slot, slots sorted */
+    int32_t *sorted_label;                   /* bodies */
+    const int32_t *numbers;                  /* 0, 1, ...: at least as many as sides or bodies */
+    void *temp;                              /* of the sorts */
+    size_t temp_bytes;
+
+    int32_t *body_of, *slot_of, *offsets, *incident, *parts;
+    struct layout_kept *kept;
+};
+
+/* A layout brought to the host, for tests; arrays of the caller, of bodies, bodies, bodies + 1, two a
+ * constraint and parts + 1 elements. */
 struct cuda_layout_copy {
     struct cuda_live live;
     struct cuda_graph_statistics statistics;

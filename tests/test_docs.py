@@ -1,0 +1,97 @@
+#!/usr/bin/env python3
+"""Documents name what there is.
+
+    test_docs.py PROJECT
+
+In README.md, CONTRIBUTING.md and docs/*.md: links lead to files, and to headings where they name one; in back quotes, files
+and folders exist, and so do functions, structs, macros and options. docs/architecture.md names every folder of src.
+"""
+import os
+import re
+import sys
+
+CODE = (".c", ".h", ".cu", ".cpp", ".in", ".py", ".sh", ".build", ".txt", ".ini", ".map")
+
+
+def read(path):
+    with open(path, encoding="utf-8") as file:
+        return file.read()
+
+
+def tree(project):
+    paths = []
+    for top in ("include", "src", "bench", "tests", "examples", "docs", "scripts", "presets"):
+        for folder, _, names in os.walk(os.path.join(project, top)):
+            paths += [os.path.relpath(os.path.join(folder, name), project) for name in names]
+            paths.append(os.path.relpath(folder, project) + "/")
+    return paths + [name for name in os.listdir(project) if os.path.isfile(os.path.join(project, name))]
+
+
+def headings(text):
+    """Anchors as the usual viewers make them."""
+    titles = re.findall(r"^#+ +(.+)$", re.sub(r"^```.*?^```", "", text, flags=re.M | re.S), re.M)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+def wrong_links(project, document, text):
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if re.match(r"\w+:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        path = os.path.normpath(os.path.join(project, os.path.dirname(document), path)) if path else None
+        if path and not os.path.exists(path):
+            yield f"link to {target}: no such file"
+        elif anchor and anchor not in headings(read(path) if path else text):
+            yield f"link to {target}: no such heading"
+
+
+def wrong_names(text, paths, sources):
+    # What stands in back quotes, outside of blocks and of file lists' indentation.
+    for name in sorted(set(re.findall(r"`([^`\n]+)`", re.sub(r"^```.*?^```", "", text, flags=re.M | re.S)))):
+        if re.fullmatch(r"[\w./\-]+\.(c|h|cu|cpp|py|sh|md|ini|csv|png|build|txt|map)", name) or re.fullmatch(r"[\w\-]+(/[\w\-]+)*/", name):
+            if not any(path == name or path.endswith("/" + name) for path in paths):
+                yield f"`{name}`: no such file or folder"
+        elif re.fullmatch(r"(sadmm|SADMM|CUDA|CPU)_\w+(\(.*\))?|struct \w+", name):
+            word = re.match(r"(?:struct )?(\w+)", name).group(1)
+            if word not in sources and word != "sadmm_x":
+                yield f"`{name}`: no such name in the sources"
+        elif re.fullmatch(r"--[\w\-]+.*", name):
+            option = re.match(r"--([\w\-]+)", name).group(1)
+            if option != "buildtype" and not re.search(rf"(--|\"){re.escape(option)}\b", sources):
+                yield f"`{name}`: no such option"
+
+
+def wrong_commands(text, sources):
+    """Options of the project's commands, in back quotes and in blocks."""
+    spans = re.findall(r"^```.*?^```", text, re.M | re.S) + re.findall(r"`([^`]+)`", text)
+    for span in spans:
+        for command, rest in re.findall(r"\b(subadmm(?:-bench)? [a-z]+)((?:[^#\n]|\n(?! *subadmm))*)", span):
+            for option in re.findall(r"(?<!\S)--([a-z][\w\-]*)", rest):
+                if f'"{option}"' not in sources:
+                    yield f"{command} --{option}: no such option"
+
+
+def main():
+    project = sys.argv[1]
+    paths = tree(project)
+    sources = "\n".join(read(os.path.join(project, path)) for path in paths
+                        if path.endswith(CODE) and not path.startswith("docs/"))
+    failed = False
+    documents = ["README.md", "CONTRIBUTING.md"] + sorted(path for path in paths if re.fullmatch(r"docs/\w+\.md", path))
+    for document in documents:
+        text = read(os.path.join(project, document))
+        errors = list(wrong_links(project, document, text)) + list(wrong_names(text, paths, sources)) + \
+            list(wrong_commands(text, sources))
+        if document == "docs/architecture.md":
+            for path in paths:
+                folder = path[:-1]
+                if path.startswith("src/") and path.endswith("/") and os.path.basename(folder) + "/" not in text:
+                    errors.append(f"src folder {path} is not named")
+        for error in errors:
+            print(f"{document}: {error}")
+        failed = failed or bool(errors)
+    print(f"{len(documents)} documents")
+    sys.exit(failed)
+
+
+main()

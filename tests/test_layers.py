@@ -1,0 +1,141 @@
+#!/usr/bin/env python3
+"""Imports run one way (docs/architecture.md, "Layers").
+
+    test_layers.py PROJECT [ARCHIVE]...
+
+Of every source below PROJECT/src: folders include those they may, and no file includes itself, directly or through others.
+Of the objects in the archives (by nm): no two of them call each other, directly or through others, and folders call those
+they may include. What is in an archive several times over (precisions, instruction sets) counts as one object.
+"""
+import os
+import re
+import shutil
+import subprocess
+import sys
+
+# folder -> folders it may use, besides itself. Within a group of folders each may use those before it.
+CORE = ["core/base", "core/math", "core/model", "core/solve"]
+CUDA = ["backend_cuda/" + name for name in
+        ("device", "collide", "graph", "assemble", "weight", "iterate", "step", "table")]
+MAY_USE = {folder: CORE[:place] for place, folder in enumerate(CORE)}
+MAY_USE.update({
+    "core/world": CORE + ["collision"],
+    "collision": ["core/base", "core/math"],
+    "backend_ref": CORE,
+    "backend_cpu": CORE,
+    "scenes": ["core/base", "core/math"],
+    "fclib": ["core/base", "core/model"],
+    "cli": ["core/base", "scenes", "fclib"],
+})
+MAY_USE.update({folder: CORE + ["collision"] + CUDA[:place] for place, folder in enumerate(CUDA)})
+# The list of backends: the one place that names them (each through its find function).
+BACKEND_LIST = "core/solve/registry.c"
+
+
+def files_below(root):
+    for folder, _, names in os.walk(root):
+        for name in names:
+            if name.endswith((".h", ".c", ".cpp", ".cu")):
+                yield os.path.relpath(os.path.join(folder, name), root)
+
+
+def includes(root, files):
+    graph = {}
+    for file in files:
+        with open(os.path.join(root, file), encoding="utf-8") as lines:
+            wanted = re.findall(r'^\s*#\s*include\s+"([^"]+)"', lines.read(), re.M)
+        beside = [os.path.normpath(os.path.join(os.path.dirname(file), name)) for name in wanted]
+        graph[file] = {near if near in files else name for near, name in zip(beside, wanted)} & files
+    return graph
+
+
+def calls(archives, files):
+    """Object -> objects that define what it uses; objects by their source below src, where one is known."""
+    source = {re.sub(r"[/.]", "_", os.path.splitext(file)[0]): file for file in files if not file.endswith(".h")}
+
+    def source_of(member):
+        name = re.sub(r"(_f32|_f64|_emulated)?(\.c|\.cpp)?\.o$", "", member).split("_.._")[-1]
+        return source.get(name) or source.get("backend_cuda_" + re.sub("^cuda_", "", name))
+
+    defined, used = {}, {}
+    for archive in archives:
+        member = None
+        listing = subprocess.run(["nm", "--format=posix", archive], capture_output=True, text=True, check=True)
+        for line in listing.stdout.splitlines():
+            if line.endswith("]:") or line.endswith(".o:"):
+                member = source_of(os.path.basename(re.sub(r"^.*\[|\]?:$", "", line)))
+                continue
+            fields = line.split()
+            if not member or len(fields) < 2:
+                continue
+            if fields[1] in "TDBRC":
+                defined[fields[0]] = member
+            elif fields[1] == "U":
+                used.setdefault(member, set()).add(fields[0])
+    return {file: {defined[symbol] for symbol in symbols if symbol in defined} - {file}
+            for file, symbols in used.items()}
+
+
+def circle(graph):
+    """Some circle, as a list; None: there is none."""
+    done, path = set(), []
+
+    def visit(node):
+        if node in path:
+            return path[path.index(node):] + [node]
+        if node in done:
+            return None
+        path.append(node)
+        for other in sorted(graph.get(node, ())):
+            found = visit(other)
+            if found:
+                return found
+        path.pop()
+        done.add(node)
+        return None
+
+    for node in sorted(graph):
+        found = visit(node)
+        if found:
+            return found
+    return None
+
+
+def wrong_edges(graph, verb):
+    for file in sorted(graph):
+        folder = os.path.dirname(file)
+        if folder not in MAY_USE:
+            yield f"{file}: folder src/{folder} has no layer in tests/test_layers.py"
+            continue
+        for other in sorted(graph[file]):
+            to = os.path.dirname(other)
+            if to == folder or to in MAY_USE[folder]:
+                continue
+            if file == BACKEND_LIST and to.startswith("backend_") and verb == "calls":
+                continue
+            yield f"{file} {verb} {other}: src/{folder} may use {', '.join(MAY_USE[folder]) or 'nothing'}"
+
+
+def main():
+    root, archives = os.path.join(sys.argv[1], "src"), sys.argv[2:]
+    files = set(files_below(root))
+    graphs = [("includes", includes(root, files))]
+    if archives and shutil.which("nm"):
+        graphs.append(("calls", calls(archives, files)))
+        if len(graphs[-1][1]) < 20:
+            sys.exit(f"only {len(graphs[-1][1])} objects of src found in {' '.join(archives)}")
+    failed = False
+    for verb, graph in graphs:
+        errors = list(wrong_edges(graph, verb))
+        found = circle(graph)
+        if found:
+            errors.append(f"a circle: {f' {verb} '.join(found)}")
+        for error in errors:
+            print(error)
+        failed = failed or bool(errors)
+        print(f"{sum(map(len, graph.values()))} times a file {verb} another: "
+              f"{'no circle, one way' if not errors else f'{len(errors)} wrong'}")
+    sys.exit(failed)
+
+
+main()
