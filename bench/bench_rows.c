@@ -1,6 +1,6 @@
 /* subadmm-bench rows: what a constraint given by rows costs a scene. The frozen problem of a step with two further
  * bodies (or more pairs of them), without and with a weld between them, solved in turn; an iteration's time is the
- * difference of solves that differ by ITERATIONS. What is printed are medians: of both times, and of the ratios of
+ * difference of solves that differ by so many. What is printed are medians: of both times, and of the ratios of
  * neighbours. */
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,12 +16,14 @@
 
 static const char command[] = "rows";
 
-enum { BASE_ITERATIONS = 20, ITERATIONS = 200, MOST_PAIRS = 1000 };
+/* Iterations of the shorter solve; by how many two solves differ, on a processor and on an accelerator: some milliseconds,
+ * beside which the start of a solve is even. */
+enum { BASE_ITERATIONS = 20, HOST_ITERATIONS = 200, DEVICE_ITERATIONS = 4000, MOST_PAIRS = 1000 };
 
 struct options {
     const char *scene;
     int backend, precision, method; /* precision, method -1: both */
-    long steps, threads, pairs, welds;
+    long steps, threads, pairs, welds, iterations; /* iterations 0: by the backend */
 };
 
 struct figures {
@@ -115,6 +117,9 @@ static sadmm_status measure(sadmm_problem *const problems[2], const struct optio
     settings.method = method;
     settings.threads = (int)o->threads;
     settings.penalty_period = 0;
+    const int iterations = o->iterations > 0                        ? (int)o->iterations
+                           : o->backend == SADMM_BACKEND_CUDA ? DEVICE_ITERATIONS
+                                                              : HOST_ITERATIONS;
     int done = 0;
     for (long pair = -1; pair < o->pairs && !(interrupted() && done > 0); ++pair) { /* the first one warms up */
         double now[2];
@@ -123,9 +128,9 @@ static sadmm_status measure(sadmm_problem *const problems[2], const struct optio
             double base, longer;
             sadmm_status status = solve(problems[which], o, settings, precision, BASE_ITERATIONS, &base, error);
             if (status == SADMM_OK)
-                status = solve(problems[which], o, settings, precision, BASE_ITERATIONS + ITERATIONS, &longer, error);
+                status = solve(problems[which], o, settings, precision, BASE_ITERATIONS + iterations, &longer, error);
             if (status != SADMM_OK) return status;
-            now[which] = 1e3 * (longer - base) / ITERATIONS;
+            now[which] = 1e3 * (longer - base) / iterations;
         }
         if (pair < 0) continue;
         us[0][done] = now[0], us[1][done] = now[1];
@@ -145,6 +150,7 @@ static int parse(int argc, char **argv, struct options *o)
         BENCH_WORD("precision", &o->precision, bench_precisions, 3, "default both"),
         BENCH_NUMBER("threads", &o->threads, 0, 1024, "at most, 0: as many as there are; default 1"),
         BENCH_NUMBER("welds", &o->welds, 1, 1000000, "between two more bodies each, default 1"),
+        BENCH_NUMBER("iterations", &o->iterations, 1, 100000, "by which two solves differ, default 200, cuda 4000"),
         BENCH_NUMBER("pairs", &o->pairs, 1, MOST_PAIRS, "solves without and with the block in turn, default 21"),
     };
     return bench_parse(command, options, sizeof options / sizeof *options, NULL, argc, argv);

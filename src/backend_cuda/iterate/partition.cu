@@ -69,20 +69,21 @@ static int64_t threads_for(const struct sadmm_context *c, struct bound bound, in
 static bool take_capacity(const struct sadmm_context *c, struct cuda_partition *partition, struct bound bound,
                           int64_t bytes)
 {
+    const bool rows = c->view.rows.count > 0;
     int64_t low = bound.bodies, high = larger(c->view.model.bodies, low);
     partition->most_sides = (int32_t)most_sides_of(c, partition->threads);
     if (partition->threads == WARP && bound.bodies > WARP / LANES) return false;
-    if ((int64_t)CUDA(persistent_shared)(partition->tier, partition->threads, (int32_t)low) > bytes) return false;
+    if ((int64_t)CUDA(persistent_shared)(partition->tier, rows, partition->threads, (int32_t)low) > bytes) return false;
     while (low < high) { /* the most bodies that fit */
         int64_t middle = (low + high + 1) / 2;
-        if ((int64_t)CUDA(persistent_shared)(partition->tier, partition->threads, (int32_t)middle) <= bytes)
+        if ((int64_t)CUDA(persistent_shared)(partition->tier, rows, partition->threads, (int32_t)middle) <= bytes)
             low = middle;
         else high = middle - 1;
     }
     /* A block of one warp keeps all its bodies in registers (iterate/persistent.h). */
     if (partition->threads == WARP) low = smaller(low, WARP / LANES);
     partition->most_bodies = (int32_t)low;
-    partition->shared = CUDA(persistent_shared)(partition->tier, partition->threads, partition->most_bodies);
+    partition->shared = CUDA(persistent_shared)(partition->tier, rows, partition->threads, partition->most_bodies);
     return true;
 }
 

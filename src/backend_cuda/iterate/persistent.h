@@ -90,7 +90,7 @@ static __device__ __forceinline__ void iterate(Part &part, const cuda_view &v, c
 {
     unsigned target = 0;
     row_lane rows;
-    if (ROWS) rows.load<FAST>(v, part.lane, part.is_row_side(), part.side_code);
+    if (ROWS) rows.load<FAST>(v, part.lane, part.is_row_side(), part.side_code, part.m.jacobians);
     if (FAST && MODE != BLOCK) { /* others read the velocities that were loaded */
         arrive<MODE, SIZE>(v.iteration.barrier);
         wait<MODE, SIZE>(v.iteration.barrier, target += gridDim.x);

@@ -120,7 +120,7 @@ PART __device__ __forceinline__ void PART_RUN::start_row_records(void)
 {
     row_lane rows;
     vec3 force, torque;
-    rows.load<FAST>(v, lane, is_row_side(), side_code);
+    rows.load<FAST>(v, lane, is_row_side(), side_code, m.jacobians);
     rows.wrench(rows.lambda, &force, &torque);
     const real2_pair sum = sum_quad(lane, force, torque);
     if (rows.rows) *own_record = sum;

@@ -25,6 +25,10 @@ enum { FETCHED_FIRST = 4 };
 
 /* ---- shared memory --------------------------------------------------------------------------------------------- */
 
+/* Rows of constraints (persistent_rows.h): of a lane, and numbers of a row's two Jacobians. */
+enum { ROWS_OF_LANE = 2, JACOBIAN = 12 };
+constexpr bool JACOBIANS_SHARED = sizeof(solver_real) == sizeof(double);
+
 /* The same in every block of a launch: blocks of a cluster read each other's memory. */
 struct part_memory {
     solver_real *state;      /* CLUSTER: of even, then of odd iterations; bodies x ROW each, then a row of 0 */
@@ -32,6 +36,7 @@ struct part_memory {
     solver_real *lines,
         *b; /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x line, ROW; FAST:
                                 the momentum residual in place of b */
+    solver_real *jacobians;  /* with rows, JACOBIANS_SHARED: threads x ROWS_OF_LANE x JACOBIAN */
     int32_t *suspected;      /* a body of the part has too much energy */
     /* Before the first iteration and after the last one, over what is above (iterate/prologue.h): */
     double *terms;           /* bodies x TERMS */
@@ -41,8 +46,8 @@ struct part_memory {
 enum { SLACK = 16 }; /* the end, with what is to come there aligned */
 
 /* One description of the layout for its size and its addresses. */
-static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *base, bool cluster, int threads,
-                                                 int32_t bodies)
+static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *base, bool cluster, bool rows,
+                                                 int threads, int32_t bodies)
 {
     size_t n = (size_t)bodies, sides = (size_t)(threads / QUAD), first = (size_t)(threads / LANES);
     size_t more = n > first ? n - first : 0;
@@ -50,9 +55,11 @@ static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *
     m->records = m->state + ((cluster ? 2 * n : n) + 1) * ROW;
     m->lines = m->records + (sides + FETCHED_FIRST) * ROW;
     m->b = m->lines + more * LINE_GENERAL;
+    m->jacobians = m->b + more * ROW;
     m->terms = (double *)base;
     m->range = (island_range *)(m->terms + n * TERMS);
-    size_t iterating = (size_t)(m->b + more * ROW - m->state) * sizeof(solver_real),
+    const size_t jacobians = rows && JACOBIANS_SHARED ? (size_t)threads * ROWS_OF_LANE * JACOBIAN : 0;
+    size_t iterating = ((size_t)(m->jacobians - m->state) + jacobians) * sizeof(solver_real),
            around = n * (TERMS * sizeof(double) + sizeof(island_range)), used = iterating > around ? iterating : around;
     m->suspected = (int32_t *)(base + used);
     return used + SLACK;
@@ -65,7 +72,7 @@ template <int SIZE> static __device__ __forceinline__ void block_barrier(void)
 {
 #ifndef SADMM_CUDA_EMULATED
     if (SIZE == WITH_ROWS) {
-        asm volatile("barrier.sync 1, %0;" ::"r"(blockDim.x) : "memory");
+        asm volatile("bar.sync 1, %0;" ::"r"(blockDim.x) : "memory");
         return;
     }
 #endif

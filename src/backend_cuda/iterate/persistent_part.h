@@ -62,7 +62,7 @@ template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run 
           own_row(nullptr), own_state(nullptr), own_record(nullptr), own_body(), momentum(0), sum(0), step(0), own(),
           side_code(side < sides ? v.graph.incident[first_side + side] : 0), on(), about(), between(), point()
     {
-        lay_out(&m, memory, MODE == CLUSTER, (int)blockDim.x, args.most_bodies);
+        lay_out(&m, memory, MODE == CLUSTER, ROWS, (int)blockDim.x, args.most_bodies);
         if (!ROWS) return;
         part_rows_from_pairs();
         row_sides = __ballot_sync((unsigned)ALL_LANES, is_row_side()) != 0;

@@ -7,8 +7,12 @@
 #include "row_law.h"
 
 struct row_lane {
-    enum { COUNT = 2 };
-    real own[COUNT][6], other[COUNT][6]; /* Jacobians of the side's own body and of the other */
+    enum { COUNT = ROWS_OF_LANE };
+    /* Numbers 0 to 5 of a row are its Jacobian of the side's own body, 6 to 11 of the other. In double there are more of them
+     * than registers: they are in shared memory. (Local memory would be asked for from afar in every iteration of the grid,
+     * whose barriers empty the cache.) */
+    real held[JACOBIANS_SHARED ? 1 : COUNT * JACOBIAN];
+    solver_real *shared; /* the lane's first; the others follow a warp apart */
     row_law law[COUNT];
     real lambda[COUNT], next[COUNT], delta[COUNT]; /* next: lambda^, delta: lambda^ - lambda */
     real share, friction;
@@ -17,16 +21,39 @@ struct row_lane {
     bool cones;                          /* some lane of the warp has a cone */
 
     template <bool FAST>
-    __device__ __forceinline__ void load(const cuda_view &v, int32_t lane, bool live, int32_t code);
+    __device__ __forceinline__ void load(const cuda_view &v, int32_t lane, bool live, int32_t code,
+                                         solver_real *jacobians);
+    __device__ __forceinline__ void keep_number(int32_t j, int32_t i, real value);
+    __device__ __forceinline__ void jacobian(int32_t j, bool other, real row[6]) const;
     template <bool FAST> __device__ __forceinline__ void update(const body_motion &mine, const body_motion &others);
     __device__ __forceinline__ void wrench(const real impulse[COUNT], vec3 *force, vec3 *torque) const;
     __device__ __forceinline__ void store(int32_t lane) const;
 };
 
-/* live: is there a side, and is it one of rows? Every lane of the warp comes here. */
-template <bool FAST>
-__device__ __forceinline__ void row_lane::load(const cuda_view &v, int32_t lane, bool live, int32_t code)
+__device__ __forceinline__ void row_lane::keep_number(int32_t j, int32_t i, real value)
 {
+    if (JACOBIANS_SHARED) shared[(j * JACOBIAN + i) * WARP] = value;
+    else held[JACOBIANS_SHARED ? 0 : j * JACOBIAN + i] = value;
+}
+
+/* Of row j, of the other body or of the side's own. */
+__device__ __forceinline__ void row_lane::jacobian(int32_t j, bool other, real row[6]) const
+{
+#pragma unroll
+    for (int32_t i = 0; i < 6; ++i) {
+        const int32_t number = j * JACOBIAN + (other ? 6 : 0) + i;
+        row[i] = JACOBIANS_SHARED ? shared[number * WARP] : held[JACOBIANS_SHARED ? 0 : number];
+    }
+}
+
+/* live: is there a side, and is it one of rows? jacobians: the block's shared memory for them. Every lane of the warp comes
+ * here. */
+template <bool FAST>
+__device__ __forceinline__ void row_lane::load(const cuda_view &v, int32_t lane, bool live, int32_t code,
+                                               solver_real *jacobians)
+{
+    const int32_t t = (int32_t)threadIdx.x;
+    shared = jacobians + t / WARP * (COUNT * JACOBIAN * WARP) + t % WARP;
     const int32_t k = live ? code / 2 - v.contacts.pair_capacity : 0, on_b = code & 1;
     row_constraint about = {};
     if (live) about = v.rows.constraints[k];
@@ -44,9 +71,10 @@ __device__ __forceinline__ void row_lane::load(const cuda_view &v, int32_t lane,
         const int32_t r = lane + QUAD * j;
         row_data row = {};
         if (live && r < SADMM_MAX_ROWS) row = rows[r];
+#pragma unroll
         for (int32_t i = 0; i < 6; ++i) {
-            own[j][i] = on_b ? row.jacobian[1][i] : row.jacobian[0][i];
-            other[j][i] = on_b ? row.jacobian[0][i] : row.jacobian[1][i];
+            keep_number(j, i, on_b ? row.jacobian[1][i] : row.jacobian[0][i]);
+            keep_number(j, 6 + i, on_b ? row.jacobian[0][i] : row.jacobian[1][i]);
         }
         law[j] = law_of_row(row, FAST ? share * row.weight : inverse_weight(beta_a, beta_b));
         lambda[j] = row.lambda;
@@ -62,7 +90,10 @@ __device__ __forceinline__ void row_lane::update(const body_motion &mine, const 
     real missing[COUNT], push = 0;
 #pragma unroll
     for (int32_t j = 0; j < COUNT; ++j) {
-        missing[j] = row_missing(law[j], row_velocity(own[j], mine) + row_velocity(other[j], others), lambda[j]);
+        real own[6], other[6];
+        jacobian(j, false, own);
+        jacobian(j, true, other);
+        missing[j] = row_missing(law[j], row_velocity(own, mine) + row_velocity(other, others), lambda[j]);
         push = j == 0 ? law[j].along * missing[j] : fused(law[j].along, missing[j], push);
     }
     if (FAST) {
@@ -93,7 +124,11 @@ __device__ __forceinline__ void row_lane::update(const body_motion &mine, const 
 __device__ __forceinline__ void row_lane::wrench(const real impulse[COUNT], vec3 *force, vec3 *torque) const
 {
 #pragma unroll
-    for (int32_t j = 0; j < COUNT; ++j) add_row(own[j], impulse[j], j == 0, force, torque);
+    for (int32_t j = 0; j < COUNT; ++j) {
+        real own[6];
+        jacobian(j, false, own);
+        add_row(own, impulse[j], j == 0, force, torque);
+    }
 }
 
 __device__ __forceinline__ void row_lane::store(int32_t lane) const
