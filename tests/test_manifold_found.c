@@ -136,6 +136,20 @@ START_TEST(a_needle_through_a_plate)
 }
 END_TEST
 
+/* A beam of a million metres through a sheet as large, 0.03 degrees from its plane: over such lengths that angle decides which
+ * edges of the beam support the contact. (One on the far side was taken, and the boxes counted as far apart.) */
+START_TEST(a_beam_through_a_sheet)
+{
+    struct solid a = box_at(806179.36498047982, 294681.08112263959, 0.87581514584710662, 0, 0, 0);
+    struct solid b = box_at(897685.65399164031, 0.9964226240829126, 0.99978921104099738, 0, 0, 0);
+    const double R[9] = {-0.99269799655959168, -0.1206255472375137,  -0.0004061775763337106,
+                         -0.12062535962662393, 0.99269799655959157,  -0.00045852101457717701,
+                         0.00045852101457717701, -0.0004061775763337106, -0.99999981238911029};
+    memcpy(a.R, R, sizeof R);
+    ck_assert_int_ge(expect_between(a, b, 0.03), 1);
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("manifolds found");
@@ -147,6 +161,7 @@ int main(void)
     tcase_add_test(cases, crossed_capsules);
     tcase_add_test(cases, a_line_along_a_huge_capsule);
     tcase_add_test(cases, a_needle_through_a_plate);
+    tcase_add_test(cases, a_beam_through_a_sheet);
     suite_add_tcase(suite, cases);
     return run_suite(suite);
 }

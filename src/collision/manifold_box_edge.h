@@ -6,12 +6,13 @@
 #include "manifold_box_pair.h"
 
 /* Supporting edge along axis i of a box with half extents h towards direction n (own frame); `lean`: where the other
- * box is, for coordinates along which n does not decide. Returns the edge's id. */
-SADMM_INLINE int box_support_edge(const real h[3], int i, const real n[3], const real lean[3], real centre[3])
+ * box is, for coordinates along which n does not decide: both edges lie equally far out, but for `even`. Returns the
+ * edge's id. */
+SADMM_INLINE int box_support_edge(const real h[3], int i, const real n[3], const real lean[3], real even, real centre[3])
 {
     int u = i == 2 ? 0 : i + 1, v = u == 2 ? 0 : u + 1, bu, bv;
-    bu = (real_abs(n[u]) > (real)1e-3 ? n[u] : lean[u]) >= 0;
-    bv = (real_abs(n[v]) > (real)1e-3 ? n[v] : lean[v]) >= 0;
+    bu = (h[u] * real_abs(n[u]) > even ? n[u] : lean[u]) >= 0;
+    bv = (h[v] * real_abs(n[v]) > even ? n[v] : lean[v]) >= 0;
     centre[i] = 0;
     centre[u] = bu ? h[u] : -h[u];
     centre[v] = bv ? h[v] : -h[v];
@@ -64,8 +65,8 @@ SADMM_INLINE bool box_edge_manifold(const struct box_pair *b, int axis, int nega
         lean1[k] = b->t[k];
         lean2[k] = -b->t2[k];
     }
-    e1 = box_support_edge(b->h1, i, n1, lean1, c1);
-    e2 = box_support_edge(b->h2, j, n2, lean2, c2);
+    e1 = box_support_edge(b->h1, i, n1, lean1, MANIFOLD_EVEN * b->thin, c1);
+    e2 = box_support_edge(b->h2, j, n2, lean2, MANIFOLD_EVEN * b->thin, c2);
     p = v3_from_array(c1);
     {
         real c[3];
