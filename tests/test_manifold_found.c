@@ -150,6 +150,21 @@ START_TEST(a_beam_through_a_sheet)
 }
 END_TEST
 
+/* Boxes further apart than any sensible world is wide, but not than the limit, which grows with their speed: the square of their
+ * distance is still a number, and what says how near they are is compared with it. (There was a contact without a normal.) */
+START_TEST(boxes_at_a_distance_of_10_to_the_17)
+{
+    struct solid a = box_at(0.86, 0.47, 0.87, 0, 0, 0), b = box_at(2.8e-6, 2.8e-6, 143, 6e16, -1.6e17, -1.5e17);
+    turn(&b, 1, 2, 3, 0.7);
+    struct world_manifold m = touch(&a, &b, 1e20, 0); /* checks that the normal is of length 1 */
+    double d[3] = {6e16, -1.6e17, -1.5e17}, length = sqrt(dot3(d, d));
+    ck_assert_int_ge(m.count, 1);
+    /* a distance that dwarfs the boxes: a few roundings */
+    ck_assert_double_eq_tol(dot3(m.normal, d), length, 64 * DBL_EPSILON * length);
+    ck_assert_double_eq_tol(m.separation[0], length, 64 * DBL_EPSILON * length);
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("manifolds found");
@@ -162,6 +177,7 @@ int main(void)
     tcase_add_test(cases, a_line_along_a_huge_capsule);
     tcase_add_test(cases, a_needle_through_a_plate);
     tcase_add_test(cases, a_beam_through_a_sheet);
+    tcase_add_test(cases, boxes_at_a_distance_of_10_to_the_17);
     suite_add_tcase(suite, cases);
     return run_suite(suite);
 }

@@ -257,7 +257,7 @@ SADMM_INLINE void manifold_box_box(vec3 half1, vec3 half2, const struct pair_pos
     box_recall(&b, cache, &axes);
     axes.edge = -1;
     axes.edge_negative = 0;
-    axes.s_edge = -(real)1e30;
+    axes.s_edge = -SADMM_REAL_MAX;
     axes.keep = MANIFOLD_KEEP_EXTENT * b.thin;
     if (!box_test_faces(&b, &axes) || !box_test_edges(&b, &axes)) return;
 

@@ -75,7 +75,7 @@ SADMM_INLINE real manifold_add_section(struct manifold *m, vec3 ca, real ra, vec
     real along = v3_dot(m->normal, d), share = ra / (ra + rb), height2, height, s;
     side = v3_madd(d, -along, m->normal);
     height2 = (ra + rb) * (ra + rb) - v3_norm2(side);
-    if (height2 <= 0) return (real)1e30;
+    if (height2 <= 0) return SADMM_REAL_MAX;
     height = real_sqrt(height2);
     s = along - height;
     if (s <= limit)
