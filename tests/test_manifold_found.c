@@ -165,6 +165,34 @@ START_TEST(boxes_at_a_distance_of_10_to_the_17)
 }
 END_TEST
 
+/* An edge on a face, limit 0, turned in it by 1e-13, so that only a corner touches, 0.75 m beside the face. */
+START_TEST(a_corner_that_touches_beside_a_face)
+{
+    struct solid a = box_at(0.25, 0.25, 1, 0, 0, 0), b = box_at(1, 1, 0.25, 1.2573569585592357, 0, -0.043964366640632503);
+    const double Ra[9] = {0.99938925986090621, 0, 0.034944345389062624, 0, 1, 0, -0.034944345389062624, 0, 0.99938925986090621};
+    const double Rb[9] = {1, 0, 0, 0, 1, -1.2429054667427512e-13, 0, 1.2429054667427512e-13, 1};
+    memcpy(a.R, Ra, sizeof Ra);
+    memcpy(b.R, Rb, sizeof Rb);
+    expect_between(a, b, 0);
+}
+END_TEST
+
+/* Axes that cross at 0.01 degrees, b's frame turned by a quarter: they are as deep as their radii across both axes, and that is
+ * the normal; in the plane of the axes they are three times as deep. */
+START_TEST(capsules_that_cross_at_a_small_angle)
+{
+    struct solid a = solid_at(SADMM_SHAPE_CAPSULE, 0.0018, 220, 0, 0, 0, 0), b = solid_at(SADMM_SHAPE_CAPSULE, 0.0015, 21, 0, 0, 0,
+                                                                                         0);
+    turn(&a, 1, 0, 0, 2.2246660562e-4);
+    turn(&b, 0, 0, 1, M_PI / 2);
+    for (int exchanged = 0; exchanged < 2; ++exchanged) {
+        struct world_manifold m = exchanged ? touch(&b, &a, 0, 0) : touch(&a, &b, 0, 0);
+        /* a line of two ends may leave out a middle that is deeper by MANIFOLD_FLAT of the thinner */
+        ck_assert_double_eq_tol(least_separation(&m), -0.0033, MANIFOLD_FLAT * 0.003 + 64 * DBL_EPSILON * pair_size(&a, &b));
+    }
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("manifolds found");
@@ -178,6 +206,8 @@ int main(void)
     tcase_add_test(cases, a_needle_through_a_plate);
     tcase_add_test(cases, a_beam_through_a_sheet);
     tcase_add_test(cases, boxes_at_a_distance_of_10_to_the_17);
+    tcase_add_test(cases, a_corner_that_touches_beside_a_face);
+    tcase_add_test(cases, capsules_that_cross_at_a_small_angle);
     suite_add_tcase(suite, cases);
     return run_suite(suite);
 }

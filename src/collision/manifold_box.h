@@ -282,7 +282,10 @@ SADMM_INLINE void manifold_box_box(vec3 half1, vec3 half2, const struct pair_pos
             if (box_axis_manifold(&b, first, first_negative, &crossing, m) == 0 &&
                 (second < 0 || box_axis_manifold(&b, second, second_negative, &crossing, m) == 0)) {
                 m->cache = (uint32_t)(best + 1) | (axes.negative[best] ? BOX_AXIS_NEGATIVE : 0u);
-                box_vertex_manifold(&b, best, axes.negative[best], axes.separation[best], m);
+                /* boxes that touch but for rounding: there may be nothing of the one over the face of the other */
+                if (axes.separation[best] >= -4 * b.slack)
+                    box_corner_manifold(&b, box_axis_direction(&b, best, axes.negative[best]), m);
+                else box_vertex_manifold(&b, best, axes.negative[best], axes.separation[best], m);
             }
         }
     }
