@@ -193,6 +193,55 @@ START_TEST(capsules_that_cross_at_a_small_angle)
 }
 END_TEST
 
+/* The same far from the middle: how far along they meet is a difference of numbers that are nearly equal. */
+START_TEST(capsules_that_cross_far_out)
+{
+    struct solid a = solid_at(SADMM_SHAPE_CAPSULE, 0.0017677670718836312, 220.64506034776068, 0, 0, 0, 0);
+    struct solid b = solid_at(SADMM_SHAPE_CAPSULE, 0.0018438936399546844, 112.62544763099666, 0, -0.033656231498237786, 0,
+                              -151.28666422234826);
+    const double R[9] = {0.9999999752543044, 0, 0.00022246660562180064, 0, 1, 0, -0.00022246660562180064, 0, 0.9999999752543044};
+    memcpy(a.R, R, sizeof R);
+    for (int exchanged = 0; exchanged < 2; ++exchanged) {
+        struct world_manifold m = exchanged ? touch(&b, &a, 0, 0) : touch(&a, &b, 0, 0);
+        ck_assert_double_eq_tol(least_separation(&m), -a.size[0] - b.size[0],
+                                MANIFOLD_FLAT * 2 * a.size[0] + 64 * DBL_EPSILON * pair_size(&a, &b));
+    }
+}
+END_TEST
+
+/* A strip a micrometre thick flat on a block of 800 km: rounding is more than what is short for the strip. */
+START_TEST(a_strip_on_a_block)
+{
+    struct solid a = box_at(0.99978921104099738, 10206.591910354506, 1.6109996467208182e-06, 0, 0, 0);
+    struct solid b = box_at(575124.61991429236, 805839.53338240227, 0.99978921104099738, 0, -1.7893232082322479e-10,
+                            805839.53338401346);
+    const double Ra[9] = {0.42358244698048475, -0.90585755536399037, 0, 0.90585755536399037, 0.42358244698048475, 0, 0, 0, 1};
+    const double Rb[9] = {1, 0, 0, 0, -2.2204460492503131e-16, -1, 0, 1, -2.2204460492503131e-16};
+    memcpy(a.R, Ra, sizeof Ra);
+    memcpy(b.R, Rb, sizeof Rb);
+    struct world_manifold m = touch(&a, &b, 0, 0);
+    /* across the strip's faces */
+    if (m.count > 0) ck_assert_double_ge(separation_along(&a, &b, m.normal), -64 * DBL_EPSILON * pair_size(&a, &b));
+    expect_between(a, b, 0);
+}
+END_TEST
+
+/* Two strips end to end in a plane but for a turn of 4e-7: their edges may touch, but what is apart is not in contact. */
+START_TEST(strips_end_to_end)
+{
+    struct solid a = box_at(0.94526819780071769, 10202.289490086152, 1.6109996467208182e-06, 0, 0, 0);
+    struct solid b = box_at(0.99978921104099738, 10202.289490086152, 1.709675586693204e-06, 1.9450689677522768,
+                            2.2038439493046279e-09, 0);
+    const double Ra[9] = {1, -1.1330415454889456e-09, 0, 1.1330415454889456e-09, 1, 0, 0, 0, 1};
+    const double Rb[9] = {1, 0, 0, 0, 0.99999999999993738, -3.5400089538993208e-07, 0, 3.5400089538993208e-07,
+                          0.99999999999993738};
+    memcpy(a.R, Ra, sizeof Ra);
+    memcpy(b.R, Rb, sizeof Rb);
+    struct world_manifold m = touch(&a, &b, 0, 0);
+    for (int i = 0; i < m.count; ++i) ck_assert_double_le(m.separation[i], 64 * DBL_EPSILON * pair_size(&a, &b));
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("manifolds found");
@@ -208,6 +257,9 @@ int main(void)
     tcase_add_test(cases, boxes_at_a_distance_of_10_to_the_17);
     tcase_add_test(cases, a_corner_that_touches_beside_a_face);
     tcase_add_test(cases, capsules_that_cross_at_a_small_angle);
+    tcase_add_test(cases, capsules_that_cross_far_out);
+    tcase_add_test(cases, a_strip_on_a_block);
+    tcase_add_test(cases, strips_end_to_end);
     suite_add_tcase(suite, cases);
     return run_suite(suite);
 }

@@ -56,6 +56,8 @@ struct pair_pose {
 /* Edges of a box whose distances along a normal differ by less than twice this share of the thinner extent support it
  * equally: the one nearer to the other box counts. */
 #define MANIFOLD_EVEN ((real)5e-4)
+/* Square of the angle below which edges are parallel: their cross product is rounding, and the faces speak for them. */
+#define MANIFOLD_PARALLEL2 (sizeof(real) == 4 ? (real)1e-7 : (real)1e-16)
 /* cos 8 degrees: axes within this angle are the same direction for the choice of an axis. */
 #define MANIFOLD_COS_NEAR ((real)0.99026806874157036)
 /* cos 45 degrees: an axis that has turned by more since the last step is another one. */

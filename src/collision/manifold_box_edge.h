@@ -158,7 +158,7 @@ SADMM_INLINE void box_corner_manifold(const struct box_pair *b, vec3 fallback, s
     distance = real_sqrt(best2);
     /* the square of a distance may be no number; as separations of axes are judged, boxes that touch but for rounding do */
     if (!(best2 < SADMM_REAL_MAX) || distance > b->limit + b->slack) return;
-    if (distance > (real)1e-4 * b->thin) {
+    if (distance > real_max((real)1e-4 * b->thin, 4 * b->slack)) {
         manifold_segment_outside(0, half, h1, p, u, x, q, distance, MANIFOLD_FLAT * b->thin, b->limit,
                                  256u + 3u * (uint32_t)best, m);
         m->normal = v3_neg(m->normal); /* it came from 2 to 1 */
