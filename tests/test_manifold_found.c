@@ -242,6 +242,21 @@ START_TEST(strips_end_to_end)
 }
 END_TEST
 
+/* A beam steeply through a sheet of 10 km, in whose length two points near each other are one: not where the one is a third
+ * deeper. They lie symmetrically about the middle, so that exchanging the two may exchange sides, but not the depth. */
+START_TEST(a_beam_steeply_through_a_sheet)
+{
+    struct solid a = box_at(9785.2049078719974, 1, 1, 0, 0, 0), b = box_at(0.00015957891549730317, 10745.334976704695,
+                                                                           0.99978921104099738, 0, 0, 0);
+    const double R[9] = {4.7863059293717924e-07, 0.98668370380980563,   0.16265075664113901,
+                         -0.95803849419570308,   -0.046621690659233828, 0.28282266811432327,
+                         0.28663957095802539,    -0.1558258213398499,   0.94528094753081759};
+    memcpy(a.R, R, sizeof R);
+    struct world_manifold m = touch(&a, &b, 0, 0), w = touch(&b, &a, 0, 0);
+    ck_assert_double_eq_tol(least_separation(&m), least_separation(&w), 64 * DBL_EPSILON * pair_size(&a, &b));
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("manifolds found");
@@ -260,6 +275,7 @@ int main(void)
     tcase_add_test(cases, capsules_that_cross_far_out);
     tcase_add_test(cases, a_strip_on_a_block);
     tcase_add_test(cases, strips_end_to_end);
+    tcase_add_test(cases, a_beam_steeply_through_a_sheet);
     suite_add_tcase(suite, cases);
     return run_suite(suite);
 }
