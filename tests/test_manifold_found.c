@@ -257,6 +257,21 @@ START_TEST(a_beam_steeply_through_a_sheet)
 }
 END_TEST
 
+/* A bar crosswise over the edge of a sheet a micrometre thick, 6e-10 m apart, which the axes do not see: no contact 3 mm off. */
+START_TEST(a_bar_across_the_edge_of_a_sheet)
+{
+    struct solid a = box_at(0.99978921104099738, 10202.289490086152, 1.6109996467208182e-06, 0, 0, 0);
+    struct solid b = box_at(0.0039285482341883159, 0.87581514584710662, 0.00013509763471643217, 1.0037177599422584,
+                            1.137253921959679e-09, 0);
+    const double Ra[9] = {1, -1.1330415454889456e-09, 0, 1.1330415454889456e-09, 1, 0, 0, 0, 1};
+    const double Rb[9] = {1, 0, 0, 0, -0.99999228043630972, -0.0039292579183424553, 0, 0.0039292579183424553,
+                          -0.99999228043630972};
+    memcpy(a.R, Ra, sizeof Ra);
+    memcpy(b.R, Rb, sizeof Rb);
+    expect_between(a, b, 0);
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("manifolds found");
@@ -276,6 +291,7 @@ int main(void)
     tcase_add_test(cases, a_strip_on_a_block);
     tcase_add_test(cases, strips_end_to_end);
     tcase_add_test(cases, a_beam_steeply_through_a_sheet);
+    tcase_add_test(cases, a_bar_across_the_edge_of_a_sheet);
     suite_add_tcase(suite, cases);
     return run_suite(suite);
 }

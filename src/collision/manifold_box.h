@@ -290,8 +290,9 @@ SADMM_INLINE void manifold_box_box(vec3 half1, vec3 half2, const struct pair_pos
             if (!box_axis_has_contacts(&b, first, first_negative, m) &&
                 (second < 0 || !box_axis_has_contacts(&b, second, second_negative, m))) {
                 m->cache = (uint32_t)(best + 1) | (axes.negative[best] ? BOX_AXIS_NEGATIVE : 0u);
-                /* boxes that touch but for rounding: there may be nothing of the one over the face of the other */
-                if (axes.separation[best] >= -4 * b.slack)
+                /* Boxes that may be apart, by the angle of edges that count as parallel over the boxes' extents (slack is those
+                 * times 4 roundings): there may be nothing of the one over the face of the other. */
+                if (axes.separation[best] >= -real_sqrt(MANIFOLD_PARALLEL2) / SADMM_EPSILON * b.slack)
                     box_corner_manifold(&b, box_axis_direction(&b, best, axes.negative[best]), m);
                 else box_vertex_manifold(&b, best, axes.negative[best], axes.separation[best], m);
             }
