@@ -53,6 +53,11 @@ struct pair_pose {
 /* A line contact is given by its two ends as long as nothing between them is deeper by more than this share of the
  * thinner extent; otherwise the deepest point comes third. */
 #define MANIFOLD_FLAT ((real)1e-4)
+/* Edges of a box whose distances along a normal differ by less than twice this share of the thinner extent support it
+ * equally: the one nearer to the other box counts. */
+#define MANIFOLD_EVEN ((real)5e-4)
+/* Square of the angle below which edges are parallel: their cross product is rounding, and the faces speak for them. */
+#define MANIFOLD_PARALLEL2 (sizeof(real) == 4 ? (real)1e-7 : (real)1e-16)
 /* cos 8 degrees: axes within this angle are the same direction for the choice of an axis. */
 #define MANIFOLD_COS_NEAR ((real)0.99026806874157036)
 /* cos 45 degrees: an axis that has turned by more since the last step is another one. */

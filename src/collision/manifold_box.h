@@ -138,7 +138,7 @@ SADMM_INLINE bool box_test_edges(const struct box_pair *b, struct box_axes *axes
             /* division by a length below 1 only makes it worse */
             if (s <= s_face && s <= 0 && code != axes->cached) continue;
             length2 = b->R[i1][j] * b->R[i1][j] + b->R[i2][j] * b->R[i2][j];
-            if (length2 < (sizeof(real) == 4 ? (real)1e-7 : (real)1e-16)) continue;
+            if (length2 < MANIFOLD_PARALLEL2) continue;
             length = real_sqrt(length2);
             s /= length;
             if (s > b->limit) return false;
@@ -230,6 +230,14 @@ SADMM_INLINE int box_axis_manifold(const struct box_pair *b, int axis, int negat
     return m->count;
 }
 
+/* Contacts of an axis, if it has any within the limit. (Edges may turn out to be farther apart than their axis said.) */
+SADMM_INLINE bool box_axis_has_contacts(const struct box_pair *b, int axis, int negative, struct manifold *m)
+{
+    bool crossing;
+    return box_axis_manifold(b, axis, negative, &crossing, m) > 0 &&
+           m->points[m->count - 1].separation <= b->limit + b->slack;
+}
+
 /* Boxes apart whose closest features are a corner of 1 and the inside of the best face, one of 2? (That corner is on no
  * edge of 2, which box_corner_manifold handles.) */
 SADMM_INLINE bool box_corner_over_face(const struct box_pair *b, const struct box_axes *axes)
@@ -257,7 +265,7 @@ SADMM_INLINE void manifold_box_box(vec3 half1, vec3 half2, const struct pair_pos
     box_recall(&b, cache, &axes);
     axes.edge = -1;
     axes.edge_negative = 0;
-    axes.s_edge = -(real)1e30;
+    axes.s_edge = -SADMM_REAL_MAX;
     axes.keep = MANIFOLD_KEEP_EXTENT * b.thin;
     if (!box_test_faces(&b, &axes) || !box_test_edges(&b, &axes)) return;
 
@@ -279,10 +287,14 @@ SADMM_INLINE void manifold_box_box(vec3 half1, vec3 half2, const struct pair_pos
             int first = edge_first ? axes.edge : best, second = edge_first ? best : axes.edge;
             int first_negative = edge_first ? axes.edge_negative : axes.negative[best];
             int second_negative = edge_first ? axes.negative[best] : axes.edge_negative;
-            if (box_axis_manifold(&b, first, first_negative, &crossing, m) == 0 &&
-                (second < 0 || box_axis_manifold(&b, second, second_negative, &crossing, m) == 0)) {
+            if (!box_axis_has_contacts(&b, first, first_negative, m) &&
+                (second < 0 || !box_axis_has_contacts(&b, second, second_negative, m))) {
                 m->cache = (uint32_t)(best + 1) | (axes.negative[best] ? BOX_AXIS_NEGATIVE : 0u);
-                box_vertex_manifold(&b, best, axes.negative[best], axes.separation[best], m);
+                /* Boxes that may be apart, by the angle of edges that count as parallel over the boxes' extents (slack is those
+                 * times 4 roundings): there may be nothing of the one over the face of the other. */
+                if (axes.separation[best] >= -real_sqrt(MANIFOLD_PARALLEL2) / SADMM_EPSILON * b.slack)
+                    box_corner_manifold(&b, box_axis_direction(&b, best, axes.negative[best]), m);
+                else box_vertex_manifold(&b, best, axes.negative[best], axes.separation[best], m);
             }
         }
     }

@@ -6,12 +6,13 @@
 #include "manifold_box_pair.h"
 
 /* Supporting edge along axis i of a box with half extents h towards direction n (own frame); `lean`: where the other
- * box is, for coordinates along which n does not decide. Returns the edge's id. */
-SADMM_INLINE int box_support_edge(const real h[3], int i, const real n[3], const real lean[3], real centre[3])
+ * box is, for coordinates along which n does not decide: both edges lie equally far out, but for `even`. Returns the
+ * edge's id. */
+SADMM_INLINE int box_support_edge(const real h[3], int i, const real n[3], const real lean[3], real even, real centre[3])
 {
     int u = i == 2 ? 0 : i + 1, v = u == 2 ? 0 : u + 1, bu, bv;
-    bu = (real_abs(n[u]) > (real)1e-3 ? n[u] : lean[u]) >= 0;
-    bv = (real_abs(n[v]) > (real)1e-3 ? n[v] : lean[v]) >= 0;
+    bu = (h[u] * real_abs(n[u]) > even ? n[u] : lean[u]) >= 0;
+    bv = (h[v] * real_abs(n[v]) > even ? n[v] : lean[v]) >= 0;
     centre[i] = 0;
     centre[u] = bu ? h[u] : -h[u];
     centre[v] = bv ? h[v] : -h[v];
@@ -30,13 +31,13 @@ SADMM_INLINE int box_edge_end(const real centre[3], int i, int upper)
  * at its ends. */
 SADMM_INLINE real box_depth_along(const real x[3], const real out[3], const real h[3], int i)
 {
-    real first = -(real)1e30, last = (real)1e30;
+    real first = -SADMM_REAL_MAX, last = SADMM_REAL_MAX;
     int k;
     for (k = 0; k < 3; ++k) {
         real near, inverse;
         if (k == i) continue;
         if (real_abs(out[k]) < SADMM_EPSILON) {
-            if (real_abs(x[k]) > h[k]) return (real)1e30;
+            if (real_abs(x[k]) > h[k]) return SADMM_REAL_MAX;
             continue;
         }
         inverse = 1 / out[k];
@@ -44,7 +45,7 @@ SADMM_INLINE real box_depth_along(const real x[3], const real out[3], const real
         first = real_max(first, (x[k] - near) * inverse);
         last = real_min(last, (x[k] + near) * inverse);
     }
-    return first <= last ? first : (real)1e30;
+    return first <= last ? first : SADMM_REAL_MAX;
 }
 
 /* Edge-edge manifold for axis code `axis`; returns false when the edges do not cross (closest points at an end). */
@@ -64,8 +65,8 @@ SADMM_INLINE bool box_edge_manifold(const struct box_pair *b, int axis, int nega
         lean1[k] = b->t[k];
         lean2[k] = -b->t2[k];
     }
-    e1 = box_support_edge(b->h1, i, n1, lean1, c1);
-    e2 = box_support_edge(b->h2, j, n2, lean2, c2);
+    e1 = box_support_edge(b->h1, i, n1, lean1, MANIFOLD_EVEN * b->thin, c1);
+    e2 = box_support_edge(b->h2, j, n2, lean2, MANIFOLD_EVEN * b->thin, c2);
     p = v3_from_array(c1);
     {
         real c[3];
@@ -83,7 +84,7 @@ SADMM_INLINE bool box_edge_manifold(const struct box_pair *b, int axis, int nega
         /* nearly parallel: ends of the stretch the edges have in common along their mean direction, where the gap has
          * not opened past the limit */
         vec3 mean = b->R[i][j] > 0 ? v3_add(axis1, w) : v3_sub(axis1, w);
-        real inverse = 1 / v3_norm(mean), d1, d2, lo1, hi1, lo2, hi2, lo, hi, deepest = (real)1e30;
+        real inverse = 1 / v3_norm(mean), d1, d2, lo1, hi1, lo2, hi2, lo, hi, deepest = SADMM_REAL_MAX;
         mean = v3_scale(mean, inverse);
         d1 = v3_dot(mean, axis1);
         d2 = v3_dot(mean, w);
@@ -124,7 +125,7 @@ SADMM_INLINE bool box_edge_manifold(const struct box_pair *b, int axis, int nega
 SADMM_INLINE void box_corner_manifold(const struct box_pair *b, vec3 fallback, struct manifold *m)
 {
     vec3 h1 = v3_from_array(b->h1), p = v3(0, 0, 0), u = p, x = p, q = p;
-    real best2 = (real)1e30, best_slope = (real)1e30, half = 0, distance, tie = 64 * b->slack * b->limit;
+    real best2 = SADMM_REAL_MAX, best_slope = SADMM_REAL_MAX, half = 0, distance, tie = 64 * b->slack * b->limit;
     int direction, side, best = 0;
     uint32_t cache = m->cache;
 
@@ -155,8 +156,9 @@ SADMM_INLINE void box_corner_manifold(const struct box_pair *b, vec3 fallback, s
         }
     }
     distance = real_sqrt(best2);
-    if (distance > b->limit) return;
-    if (distance > (real)1e-4 * b->thin) {
+    /* the square of a distance may be no number; as separations of axes are judged, boxes that touch but for rounding do */
+    if (!(best2 < SADMM_REAL_MAX) || distance > b->limit + b->slack) return;
+    if (distance > real_max((real)1e-4 * b->thin, 4 * b->slack)) {
         manifold_segment_outside(0, half, h1, p, u, x, q, distance, MANIFOLD_FLAT * b->thin, b->limit,
                                  256u + 3u * (uint32_t)best, m);
         m->normal = v3_neg(m->normal); /* it came from 2 to 1 */

@@ -44,7 +44,7 @@ SADMM_INLINE int box_clip_face(const real hr[3], const real hi[3], const real R[
     int u = k == 2 ? 0 : k + 1, v = u == 2 ? 0 : u + 1, j = 0, ju, jv, q, i, count = 4, base_bits, ref_bits;
     struct clip_vertex poly[12], other[12];
     int bits[4];
-    real si, cx, cy, cz, ux, uy, uz, vx, vy, vz, tol_u, tol_v;
+    real si, cx, cy, cz, ux, uy, uz, vx, vy, vz, tol_u, tol_v, tol_z;
     bool clip_u = false, clip_v = false;
 
     /* incident face: the axis most against the normal */
@@ -64,6 +64,7 @@ SADMM_INLINE int box_clip_face(const real hr[3], const real hi[3], const real R[
     /* the smaller of the two faces says what is near */
     tol_u = MANIFOLD_SNAP * real_min(hr[u], real_abs(ux) + real_abs(vx));
     tol_v = MANIFOLD_SNAP * real_min(hr[v], real_abs(uy) + real_abs(vy));
+    tol_z = 2 * MANIFOLD_SNAP * real_min(real_min(hr[0], real_min(hr[1], hr[2])), real_min(hi[0], real_min(hi[1], hi[2])));
     for (q = 0; q < 4; ++q) {
         /* around the face: (+,+), (-,+), (-,-), (+,-) */
         int pu = q == 0 || q == 3, pv = q < 2;
@@ -118,7 +119,9 @@ SADMM_INLINE int box_clip_face(const real hr[3], const real hi[3], const real R[
         }
         for (d = 0; d < m->count; ++d) {
             real dx = real_abs(m->points[d].position.x - p->x), dy = real_abs(m->points[d].position.y - p->y);
-            duplicate = duplicate || (dx <= tol_u && dy <= tol_v) || m->points[d].feature == feature;
+            /* near each other on a face that is long and steep, but not equally deep: two points */
+            bool even = real_abs(m->points[d].separation - p->z) <= tol_z;
+            duplicate = duplicate || (dx <= tol_u && dy <= tol_v && even) || m->points[d].feature == feature;
         }
         if (duplicate || m->count == SADMM_MANIFOLD_POINTS) continue;
         position[0] = p->x;

@@ -156,7 +156,7 @@ SADMM_INLINE vec3 segment_at(vec3 p, real s, vec3 u) { return v3_madd(p, s, u); 
 SADMM_INLINE void manifold_capsule_box_inside(real radius, real half, vec3 h, vec3 p, vec3 u, real limit,
                                               uint32_t cache, struct manifold *m)
 {
-    real pa[3], ua[3], ha[3], lo[3], hi[3], s_face, s_edge = -(real)1e30, first = -half, last = half;
+    real pa[3], ua[3], ha[3], lo[3], hi[3], s_face, s_edge = -SADMM_REAL_MAX, first = -half, last = half;
     real thin = 2 * real_min(radius, real_min(h.x, real_min(h.y, h.z)));
     real n_cached[3];
     vec3 n_edge = v3(0, 0, 1), n;
@@ -233,7 +233,7 @@ SADMM_INLINE void manifold_segment_outside(real radius, real half, vec3 h, vec3 
                                            real flat, real limit, uint32_t first_feature, struct manifold *m)
 {
     real pa[3], ua[3], ha[3], na[3], xa[3], closest = length - radius, first = -half, last = half,
-                                            best_end = (real)1e30;
+                                            best_end = SADMM_REAL_MAX;
     bool stretch = true;
     int k, e, main_axis = 0;
 

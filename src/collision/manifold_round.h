@@ -49,9 +49,12 @@ SADMM_INLINE void manifold_sphere_capsule(real ra, real rb, real half, const str
 SADMM_INLINE void segments_closest(vec3 p, vec3 u, real hp, vec3 q, vec3 w, real hq, real *s, real *t)
 {
     vec3 d = v3_sub(q, p);
-    real c = v3_dot(u, w), du = v3_dot(d, u), dw = v3_dot(d, w), sin2 = v3_norm2(v3_cross(u, w));
-    real a = sin2 > 16 * SADMM_EPSILON * SADMM_EPSILON ? (du - c * dw) / sin2 : du;
-    real b;
+    vec3 cross = v3_cross(u, w);
+    real c = v3_dot(u, w), du = v3_dot(d, u), dw = v3_dot(d, w), sin2 = v3_norm2(cross);
+    real a = du, b;
+    /* nearly parallel: the difference would be of numbers that are equal but for sin2 */
+    if (sin2 > (real)1e-6) a = (du - c * dw) / sin2;
+    else if (sin2 > 16 * SADMM_EPSILON * SADMM_EPSILON) a = v3_dot(d, v3_cross(w, cross)) / sin2;
     a = real_clamp(a, -hp, hp);
     b = a * c - dw;
     if (b > hq) {
@@ -75,7 +78,7 @@ SADMM_INLINE real manifold_add_section(struct manifold *m, vec3 ca, real ra, vec
     real along = v3_dot(m->normal, d), share = ra / (ra + rb), height2, height, s;
     side = v3_madd(d, -along, m->normal);
     height2 = (ra + rb) * (ra + rb) - v3_norm2(side);
-    if (height2 <= 0) return (real)1e30;
+    if (height2 <= 0) return SADMM_REAL_MAX;
     height = real_sqrt(height2);
     s = along - height;
     if (s <= limit)
@@ -90,19 +93,21 @@ SADMM_INLINE void manifold_capsule_capsule(real ra, real ha, real rb, real hb, c
 {
     vec3 u = m3_column(&pose->R, 2), w = v3(0, 0, 1), p = pose->t, cross = v3_cross(u, w), fallback = v3(1, 0, 0), d;
     vec3 ca, cb;
-    real s, t, closest, sin2 = v3_norm2(cross), radii = ra + rb;
+    real s, t, closest, sin2 = v3_norm2(cross), radii = ra + rb, size = radii + ha + hb;
 
     segments_closest(p, u, ha, v3(0, 0, 0), w, hb, &s, &t);
     ca = v3_madd(p, s, u);
     cb = v3_scale(w, t);
     d = v3_sub(cb, ca);
-    if (sin2 > (real)1e-6) {
+    if (sin2 > (real)1e-6) size /= real_sqrt(sin2); /* the rounding of where they meet (segments_closest) */
+    if (sin2 > 16 * SADMM_EPSILON * SADMM_EPSILON) {
         vec3 n_cached = cache ? manifold_cached_direction(cache) : cross;
-        bool crossing = real_abs(s) < ha && real_abs(t) < hb && v3_norm2(d) < (real)0.25 * radii * radii;
+        bool crossing = sin2 > (real)1e-6 && real_abs(s) < ha && real_abs(t) < hb && v3_norm2(d) < (real)0.25 * radii * radii;
+        /* however small their angle: along capsules that are long enough it is more than their radii */
         fallback = v3_scale(cross, (v3_dot(cross, n_cached) < 0 ? -1 : 1) / real_sqrt(sin2));
         if (crossing && cache && v3_dot(d, n_cached) < 0) d = v3_neg(d);
     }
-    direction_or(d, radii + ha + hb, fallback, &m->normal);
+    direction_or(d, size, fallback, &m->normal);
     m->cache = 1 | manifold_direction_bits(m->normal);
 
     closest = v3_dot(m->normal, v3_sub(cb, ca)) - radii;

@@ -183,12 +183,11 @@ static sadmm_status read_array(hid_t file, const char *name, H5T_class_t class, 
                                int64_t *count, void **data, struct sadmm_error *error)
 {
     *data = NULL;
-    if (!sadmm_h5_exists(file, name)) return sadmm_fail(error, SADMM_ERROR_IO, "%s: missing", name);
     hid_t access = access_list(H5P_DATASET_ACCESS);
     hid_t dataset = access >= 0 ? H5Dopen2(file, name, access) : -1;
     sadmm_status status = dataset >= 0 ? SADMM_ERROR_IO : fail_h5(error, name, "cannot open as a dataset");
     if (access >= 0) H5Pclose(access);
-    if (dataset < 0) return status;
+    if (dataset < 0) return sadmm_h5_exists(file, name) ? status : sadmm_fail(error, SADMM_ERROR_IO, "%s: missing", name);
 
     int64_t found = check_dataset(file, dataset, class, name, *count, error);
     if (found >= 0) {

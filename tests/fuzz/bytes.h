@@ -44,6 +44,15 @@ static inline int take_choice(struct bytes *in, int n) { return take_byte(in) % 
 /* True for one byte in `n`; never at the end of the input. */
 static inline bool take_rarely(struct bytes *in, int n) { return bytes_left(in) && take_byte(in) >= 256 - 256 / n; }
 
+/* True for one input in `n`, n a power of 2, by all of its bytes, so that which ones is nobody's choice: for what costs many
+ * times the rest. (libFuzzer likes some bytes better than others.) */
+static inline bool one_input_in(const uint8_t *data, size_t size, uint32_t n)
+{
+    uint64_t hash = UINT64_C(0xcbf29ce484222325);
+    for (size_t k = 0; k < size; ++k) hash = (hash ^ data[k]) * UINT64_C(0x100000001b3);
+    return (hash >> 40) % n == 0;
+}
+
 /* In steps of a 65535th, both ends included; bytes of zero give the middle of [-x, x]. */
 static inline double take_in(struct bytes *in, double lo, double hi)
 {

@@ -26,6 +26,7 @@ typedef SADMM_REAL real;
 
 /* sizeof folds at compile time: one source serves both precisions without the preprocessor knowing the type. */
 #define SADMM_EPSILON ((real)(sizeof(real) == 4 ? (double)FLT_EPSILON : DBL_EPSILON))
+#define SADMM_REAL_MAX ((real)(sizeof(real) == 4 ? (double)FLT_MAX : DBL_MAX))
 
 SADMM_INLINE real real_sqrt(real x) { return sizeof(real) == 4 ? (real)sqrtf((float)x) : (real)sqrt((double)x); }
 SADMM_INLINE real real_abs(real x) { return x < 0 ? -x : x; }
