@@ -37,7 +37,7 @@ cuda_kernel CUDA(persistent_kernel)(int point_slots, enum sadmm_cuda_tier tier, 
                                     const char **name);
 int CUDA(persistent_threads)(int point_slots, bool rows);
 int CUDA(persistent_small_threads)(void);
-size_t CUDA(persistent_shared)(enum sadmm_cuda_tier tier, bool rows, int threads, int32_t most_bodies);
+size_t CUDA(persistent_shared)(enum sadmm_cuda_tier tier, int row_constraints, int threads, int32_t most_bodies);
 /* Whether the instance for a partition, without constraints given by rows, does the prologue and the epilogue of a
  * step of `fast`, too. */
 bool CUDA(persistent_does_prologue)(const struct cuda_partition *);

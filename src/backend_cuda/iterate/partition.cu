@@ -69,7 +69,7 @@ static int64_t threads_for(const struct sadmm_context *c, struct bound bound, in
 static bool take_capacity(const struct sadmm_context *c, struct cuda_partition *partition, struct bound bound,
                           int64_t bytes)
 {
-    const bool rows = c->view.rows.count > 0;
+    const int rows = c->view.rows.count;
     int64_t low = bound.bodies, high = larger(c->view.model.bodies, low);
     partition->most_sides = (int32_t)most_sides_of(c, partition->threads);
     if (partition->threads == WARP && bound.bodies > WARP / LANES) return false;

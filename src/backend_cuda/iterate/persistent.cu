@@ -10,10 +10,10 @@ int CUDA(persistent_threads)(int point_slots, bool rows)
 
 int CUDA(persistent_small_threads)(void) { return SMALL_THREADS; }
 
-size_t CUDA(persistent_shared)(enum sadmm_cuda_tier tier, bool rows, int threads, int32_t most_bodies)
+size_t CUDA(persistent_shared)(enum sadmm_cuda_tier tier, int row_constraints, int threads, int32_t most_bodies)
 {
     part_memory unused;
-    return lay_out(&unused, nullptr, tier == SADMM_CUDA_TIER_CLUSTER, rows, threads, most_bodies);
+    return lay_out(&unused, nullptr, tier == SADMM_CUDA_TIER_CLUSTER, row_constraints, threads, most_bodies);
 }
 
 bool CUDA(persistent_does_prologue)(const struct cuda_partition *partition)

@@ -10,8 +10,8 @@
  *            buffers, and meet in one cluster barrier an iteration
  *   GRID     velocities go through global memory, two buffers again, with one grid barrier an iteration. The launch is
  *            cooperative, so that every block runs and the spinning ends.
- * A quad takes a side of a constraint given by rows, too, up to two rows a lane (persistent_rows.h); warps have sides of pairs
- * or of such constraints, never both.
+ * A quad takes a side of a constraint given by rows, too, up to two rows a lane (persistent_rows.h); a warp has sides of
+ * pairs or of such constraints, never both.
  *
  * On entry and exit everything is in global memory as the stepwise kernels leave it. Before the first iteration and
  * after the last one of a step, BLOCK may also do what else an island needs (prologue.h).
@@ -40,8 +40,8 @@ static __device__ __forceinline__ bool nothing_to_do(const model_view &model, co
     return first == end || (FAST && MODE == BLOCK && part_stopped(graph, islands, args.checks, first, end));
 }
 
-/* All iterations of a batch by the method `fast` (math/relax.h): Steps 2-4, then Step 1. An iteration has the barriers of
- * the other method's. ROWS: of a warp whose sides are of constraints given by rows. */
+/* All iterations of a batch by the method `fast` (math/relax.h): Steps 2-4, then Step 1. An iteration has the barriers
+ * of the other method's. ROWS: some side may be of a constraint given by rows. */
 template <int MODE, int SIZE, bool ROWS, class Part>
 static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view &v, const cuda_args &args,
                                                     real relaxation, row_lane *rows, unsigned *target)
@@ -56,7 +56,7 @@ static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view 
         real relaxation_factor = plain ? (real)1 : all,
              velocity_factor = relax_velocity(i, batch, settled) ? all : (real)1;
         keep<SIZE>(&relaxation_factor), keep<SIZE>(&velocity_factor);
-        if (ROWS) part.update_rows(rows, odd, relaxation_factor);
+        if (ROWS && part.row_sides) part.update_rows(*rows, odd, relaxation_factor);
         else part.update_sides(odd, relaxation_factor, plain);
         block_barrier<SIZE>();
         part.move_bodies_fast(!odd, velocity_factor, relaxation_factor);
@@ -78,19 +78,19 @@ static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view
         arrive<MODE, SIZE>(v.iteration.barrier);
         if (part.has_moves()) part.momentum = free_momentum(part.own_body);
         wait<MODE, SIZE>(v.iteration.barrier, *target += gridDim.x);
-        if (ROWS) part.update_rows(rows, odd, 1);
+        if (ROWS && part.row_sides) part.update_rows(*rows, odd, 1);
         else part.update_sides(odd, 1, true);
         block_barrier<SIZE>();
     }
 }
 
-/* A batch's iterations; then what they leave is stored. ROWS: of a warp whose sides are of constraints given by rows. */
+/* A batch's iterations; then what they leave is stored. */
 template <int MODE, int SIZE, bool FAST, bool ROWS, class Part>
 static __device__ __forceinline__ void iterate(Part &part, const cuda_view &v, const cuda_args &args, real relaxation)
 {
     unsigned target = 0;
-    row_lane rows;
-    if (ROWS) rows.load<FAST>(v, part.lane, part.is_row_side(), part.side_code, part.m.jacobians);
+    row_lane rows = {};
+    if (ROWS && part.row_sides) rows.load<FAST>(v, part.lane, part.is_row_side(), part.side_code, part.row_memory);
     if (FAST && MODE != BLOCK) { /* others read the velocities that were loaded */
         arrive<MODE, SIZE>(v.iteration.barrier);
         wait<MODE, SIZE>(v.iteration.barrier, target += gridDim.x);
@@ -107,18 +107,16 @@ static __device__ __forceinline__ void iterate(Part &part, const cuda_view &v, c
     if (MODE == BLOCK) let_next_begin();
     part.store_bodies(args.count & 1);
     if (!part.has_side() || part.side_stopped()) return;
-    if (ROWS) rows.store(part.lane);
+    if (ROWS && part.row_sides) rows.store(part.lane);
     else part.store_pair();
 }
 
-/* A batch's iterations, and the limit of energies after them. Warps that have rows iterate by themselves: the registers are
- * for either, and the others' loop is what it is without rows. */
+/* A batch's iterations, and the limit of energies after them. */
 template <int MODE, int SIZE, bool FAST, bool PROLOGUE, bool ROWS, class Part>
 static __device__ __forceinline__ void run_batch(Part &part, const cuda_view &v, const cuda_args &args, real relaxation,
                                                  const block_part &block)
 {
-    if (ROWS && part.row_sides) iterate<MODE, SIZE, FAST, ROWS>(part, v, args, relaxation);
-    else iterate<MODE, SIZE, FAST, false>(part, v, args, relaxation);
+    iterate<MODE, SIZE, FAST, ROWS>(part, v, args, relaxation);
     if (!FAST || args.limit == LIMIT_NONE) return;
     const bool suspected = part.suspect(args.count & 1);
     if (!PROLOGUE || args.limit == LIMIT_SUSPECTS) {

@@ -27,6 +27,7 @@ PART __device__ __forceinline__ void PART_RUN::part_rows_from_pairs(void)
     block_barrier<SIZE>();
     side = taken[t / QUAD];
     side_code = side < sides ? v.graph.incident[first_side + side] : 0;
+    row_memory = m.rows + (warp - (sides - all + QUADS - 1) / QUADS) * (ROWS_OF_LANE * ROW_NUMBERS * WARP);
     block_barrier<SIZE>();
 }
 
@@ -118,10 +119,11 @@ PART __device__ __forceinline__ void PART_RUN::start_records(void)
 
 PART __device__ __forceinline__ void PART_RUN::start_row_records(void)
 {
-    row_lane rows;
+    row_lane rows = {};
     vec3 force, torque;
-    rows.load<FAST>(v, lane, is_row_side(), side_code, m.jacobians);
-    rows.wrench(rows.lambda, &force, &torque);
+    rows.load<FAST>(v, lane, is_row_side(), side_code, row_memory);
+    const real impulse[] = {rows.number(0, ROW_LAMBDA), rows.number(1, ROW_LAMBDA)};
+    rows.wrench(impulse, &force, &torque);
     const real2_pair sum = sum_quad(lane, force, torque);
     if (rows.rows) *own_record = sum;
 }

@@ -25,18 +25,23 @@ enum { FETCHED_FIRST = 4 };
 
 /* ---- shared memory --------------------------------------------------------------------------------------------- */
 
-/* Rows of constraints (persistent_rows.h): of a lane, and numbers of a row's two Jacobians. */
-enum { ROWS_OF_LANE = 2, JACOBIAN = 12 };
-constexpr bool JACOBIANS_SHARED = sizeof(solver_real) == sizeof(double);
+/* Constraints given by rows (persistent_rows.h): rows of a lane, and numbers of a row. */
+enum { ROWS_OF_LANE = 2, ROW_NUMBERS = 20 };
+
+/* The most warps of a block that have sides of such constraints. */
+static __host__ __device__ inline int most_row_warps(int constraints, int threads)
+{
+    const int warps = (2 * constraints + WARP / QUAD - 1) / (WARP / QUAD);
+    return warps < threads / WARP ? warps : threads / WARP;
+}
 
 /* The same in every block of a launch: blocks of a cluster read each other's memory. */
 struct part_memory {
     solver_real *state;      /* CLUSTER: of even, then of odd iterations; bodies x ROW each, then a row of 0 */
     solver_real *records;    /* sides x ROW, and FETCHED_FIRST rows that are read and not used */
-    solver_real *lines,
-        *b; /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x line, ROW; FAST:
-                                the momentum residual in place of b */
-    solver_real *jacobians;  /* with rows, JACOBIANS_SHARED: threads x ROWS_OF_LANE x JACOBIAN */
+    solver_real *lines, *b;  /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x line, ROW;
+                                FAST: the momentum residual in place of b */
+    solver_real *rows;       /* of warps that have rows: ROWS_OF_LANE x ROW_NUMBERS x WARP each */
     int32_t *suspected;      /* a body of the part has too much energy */
     /* Before the first iteration and after the last one, over what is above (iterate/prologue.h): */
     double *terms;           /* bodies x TERMS */
@@ -46,8 +51,8 @@ struct part_memory {
 enum { SLACK = 16 }; /* the end, with what is to come there aligned */
 
 /* One description of the layout for its size and its addresses. */
-static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *base, bool cluster, bool rows,
-                                                 int threads, int32_t bodies)
+static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *base, bool cluster,
+                                                 int row_constraints, int threads, int32_t bodies)
 {
     size_t n = (size_t)bodies, sides = (size_t)(threads / QUAD), first = (size_t)(threads / LANES);
     size_t more = n > first ? n - first : 0;
@@ -55,11 +60,11 @@ static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *
     m->records = m->state + ((cluster ? 2 * n : n) + 1) * ROW;
     m->lines = m->records + (sides + FETCHED_FIRST) * ROW;
     m->b = m->lines + more * LINE_GENERAL;
-    m->jacobians = m->b + more * ROW;
+    m->rows = m->b + more * ROW;
     m->terms = (double *)base;
     m->range = (island_range *)(m->terms + n * TERMS);
-    const size_t jacobians = rows && JACOBIANS_SHARED ? (size_t)threads * ROWS_OF_LANE * JACOBIAN : 0;
-    size_t iterating = ((size_t)(m->jacobians - m->state) + jacobians) * sizeof(solver_real),
+    const size_t rows = (size_t)most_row_warps(row_constraints, threads) * ROWS_OF_LANE * ROW_NUMBERS * WARP;
+    size_t iterating = ((size_t)(m->rows - m->state) + rows) * sizeof(solver_real),
            around = n * (TERMS * sizeof(double) + sizeof(island_range)), used = iterating > around ? iterating : around;
     m->suspected = (int32_t *)(base + used);
     return used + SLACK;
@@ -67,15 +72,9 @@ static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *
 
 /* ---- barriers -------------------------------------------------------------------------------------------------- */
 
-/* Of the block's own. WITH_ROWS: warps that have rows come to it from another place than those that have pairs. */
+/* Of the block's own. */
 template <int SIZE> static __device__ __forceinline__ void block_barrier(void)
 {
-#ifndef SADMM_CUDA_EMULATED
-    if (SIZE == WITH_ROWS) {
-        asm volatile("bar.sync 1, %0;" ::"r"(blockDim.x) : "memory");
-        return;
-    }
-#endif
     if (SIZE == ONE_WARP) __syncwarp((unsigned)ALL_LANES);
     else __syncthreads();
 }

@@ -44,6 +44,7 @@ template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run 
     const solver_real *own_row;  /* of the side's own body in even iterations */
     solver_real *own_state;      /* the body's component r, in even iterations */
     real2_pair *own_record;
+    solver_real *row_memory;     /* of the warp's rows */
     body_lane own_body;
     real momentum;               /* b - A v */
     real sum, step;              /* FAST: J^T d lambda, what v has gone by in this iteration */
@@ -59,10 +60,10 @@ template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run 
           first_side(v.graph.offsets[first_body]), sides(v.graph.offsets[first_body + bodies] - first_side),
           found(body_of_slot(v.graph, first_body + t / LANES, t / LANES < bodies)), body(t / LANES), gathered(nullptr),
           gathered_count(0), many(false), moves(warp_has_body(0)), updates(warp_has_side()), row_sides(false),
-          own_row(nullptr), own_state(nullptr), own_record(nullptr), own_body(), momentum(0), sum(0), step(0), own(),
+          own_row(nullptr), own_state(nullptr), own_record(nullptr), row_memory(nullptr), own_body(), momentum(0), sum(0), step(0), own(),
           side_code(side < sides ? v.graph.incident[first_side + side] : 0), on(), about(), between(), point()
     {
-        lay_out(&m, memory, MODE == CLUSTER, ROWS, (int)blockDim.x, args.most_bodies);
+        lay_out(&m, memory, MODE == CLUSTER, ROWS ? v.rows.count : 0, (int)blockDim.x, args.most_bodies);
         if (!ROWS) return;
         part_rows_from_pairs();
         row_sides = __ballot_sync((unsigned)ALL_LANES, is_row_side()) != 0;
@@ -126,7 +127,7 @@ template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run 
     __device__ __forceinline__ void move_bodies(int32_t odd);
     __device__ __forceinline__ void move_bodies_fast(int32_t odd, real relaxation, real multipliers);
     __device__ __forceinline__ void update_sides(int32_t odd, real relaxation_factor, bool plain);
-    __device__ __forceinline__ void update_rows(row_lane *rows, int32_t odd, real relaxation_factor) const;
+    __device__ __forceinline__ void update_rows(const row_lane &rows, int32_t odd, real relaxation_factor) const;
     __device__ __forceinline__ bool suspect(int32_t odd) const;
     __device__ __forceinline__ void store_bodies(int32_t odd);
     __device__ __forceinline__ void store_pair(void);

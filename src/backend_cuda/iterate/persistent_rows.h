@@ -6,54 +6,59 @@
 #include "quad.h"
 #include "row_law.h"
 
+/* Numbers of a row in shared memory, a warp apart: it takes no registers of those who have no rows, and local memory would
+ * be asked for from afar in every iteration of the grid, whose barriers empty the cache. */
+enum row_number {
+    ROW_OWN,        /* six each: Jacobians of the side's own body and of the other */
+    ROW_OTHER = 6,
+    ROW_LAW = 12,   /* as in struct row_law */
+    ROW_LAMBDA = 19
+};
+
 struct row_lane {
     enum { COUNT = ROWS_OF_LANE };
-    /* Numbers 0 to 5 of a row are its Jacobian of the side's own body, 6 to 11 of the other. In double there are more of them
-     * than registers: they are in shared memory. (Local memory would be asked for from afar in every iteration of the grid,
-     * whose barriers empty the cache.) */
-    real held[JACOBIANS_SHARED ? 1 : COUNT * JACOBIAN];
-    solver_real *shared; /* the lane's first; the others follow a warp apart */
-    row_law law[COUNT];
-    real lambda[COUNT], next[COUNT], delta[COUNT]; /* next: lambda^, delta: lambda^ - lambda */
+    solver_real *numbers;  /* the lane's first */
     real share, friction;
-    row_data *rows;                      /* of the constraint; NULL: the quad's side is none of rows */
-    bool cone, stores;                   /* stores: of its constraint's two sides this one writes multipliers */
-    bool cones;                          /* some lane of the warp has a cone */
+    row_data *rows;        /* of the constraint; NULL: the quad's side is none of rows */
+    bool cone, stores;     /* stores: of its constraint's two sides this one writes multipliers */
+    bool cones;            /* some lane of the warp has a cone */
 
+    __device__ __forceinline__ solver_real &number(int32_t j, int32_t k) const
+    {
+        return numbers[(j * ROW_NUMBERS + k) * WARP];
+    }
     template <bool FAST>
     __device__ __forceinline__ void load(const cuda_view &v, int32_t lane, bool live, int32_t code,
-                                         solver_real *jacobians);
-    __device__ __forceinline__ void keep_number(int32_t j, int32_t i, real value);
-    __device__ __forceinline__ void jacobian(int32_t j, bool other, real row[6]) const;
-    template <bool FAST> __device__ __forceinline__ void update(const body_motion &mine, const body_motion &others);
+                                         solver_real *memory);
+    __device__ __forceinline__ row_law law(int32_t j) const;
+    __device__ __forceinline__ void jacobian(int32_t j, row_number first, real row[6]) const;
+    template <bool FAST>
+    __device__ __forceinline__ void update(const body_motion &mine, const body_motion &others, real next[COUNT],
+                                           real delta[COUNT]) const;
     __device__ __forceinline__ void wrench(const real impulse[COUNT], vec3 *force, vec3 *torque) const;
     __device__ __forceinline__ void store(int32_t lane) const;
 };
 
-__device__ __forceinline__ void row_lane::keep_number(int32_t j, int32_t i, real value)
+__device__ __forceinline__ row_law row_lane::law(int32_t j) const
 {
-    if (JACOBIANS_SHARED) shared[(j * JACOBIAN + i) * WARP] = value;
-    else held[JACOBIANS_SHARED ? 0 : j * JACOBIAN + i] = value;
+    const row_law out = {number(j, ROW_LAW),     number(j, ROW_LAW + 1), number(j, ROW_LAW + 2), number(j, ROW_LAW + 3),
+                         number(j, ROW_LAW + 4), number(j, ROW_LAW + 5), number(j, ROW_LAW + 6)};
+    return out;
 }
 
-/* Of row j, of the other body or of the side's own. */
-__device__ __forceinline__ void row_lane::jacobian(int32_t j, bool other, real row[6]) const
+__device__ __forceinline__ void row_lane::jacobian(int32_t j, row_number first, real row[6]) const
 {
 #pragma unroll
-    for (int32_t i = 0; i < 6; ++i) {
-        const int32_t number = j * JACOBIAN + (other ? 6 : 0) + i;
-        row[i] = JACOBIANS_SHARED ? shared[number * WARP] : held[JACOBIANS_SHARED ? 0 : number];
-    }
+    for (int32_t i = 0; i < 6; ++i) row[i] = number(j, first + i);
 }
 
-/* live: is there a side, and is it one of rows? jacobians: the block's shared memory for them. Every lane of the warp comes
- * here. */
+/* live: is there a side, and is it one of rows? memory: the warp's, of ROWS_OF_LANE x ROW_NUMBERS a lane. Every lane of the
+ * warp comes here. */
 template <bool FAST>
 __device__ __forceinline__ void row_lane::load(const cuda_view &v, int32_t lane, bool live, int32_t code,
-                                               solver_real *jacobians)
+                                               solver_real *memory)
 {
-    const int32_t t = (int32_t)threadIdx.x;
-    shared = jacobians + t / WARP * (COUNT * JACOBIAN * WARP) + t % WARP;
+    numbers = memory + threadIdx.x % WARP;
     const int32_t k = live ? code / 2 - v.contacts.pair_capacity : 0, on_b = code & 1;
     row_constraint about = {};
     if (live) about = v.rows.constraints[k];
@@ -73,28 +78,31 @@ __device__ __forceinline__ void row_lane::load(const cuda_view &v, int32_t lane,
         if (live && r < SADMM_MAX_ROWS) row = rows[r];
 #pragma unroll
         for (int32_t i = 0; i < 6; ++i) {
-            keep_number(j, i, on_b ? row.jacobian[1][i] : row.jacobian[0][i]);
-            keep_number(j, 6 + i, on_b ? row.jacobian[0][i] : row.jacobian[1][i]);
+            number(j, ROW_OWN + i) = on_b ? row.jacobian[1][i] : row.jacobian[0][i];
+            number(j, ROW_OTHER + i) = on_b ? row.jacobian[0][i] : row.jacobian[1][i];
         }
-        law[j] = law_of_row(row, FAST ? share * row.weight : inverse_weight(beta_a, beta_b));
-        lambda[j] = row.lambda;
-        delta[j] = 0;
+        const row_law law = law_of_row(row, FAST ? share * row.weight : inverse_weight(beta_a, beta_b));
+        const real numbers_of_law[] = {law.gain, law.bias, law.compliance, law.lo, law.hi, law.step, law.along};
+#pragma unroll
+        for (int32_t i = 0; i < 7; ++i) number(j, ROW_LAW + i) = numbers_of_law[i];
+        number(j, ROW_LAMBDA) = row.lambda;
     }
 }
 
-/* next and delta. Every lane of the warp comes here. */
+/* lambda^, and lambda^ - lambda. Every lane of the warp comes here. */
 template <bool FAST>
-__device__ __forceinline__ void row_lane::update(const body_motion &mine, const body_motion &others)
+__device__ __forceinline__ void row_lane::update(const body_motion &mine, const body_motion &others, real next[COUNT],
+                                                 real delta[COUNT]) const
 {
     const unsigned all = (unsigned)ALL_LANES;
     real missing[COUNT], push = 0;
 #pragma unroll
     for (int32_t j = 0; j < COUNT; ++j) {
         real own[6], other[6];
-        jacobian(j, false, own);
-        jacobian(j, true, other);
-        missing[j] = row_missing(law[j], row_velocity(own, mine) + row_velocity(other, others), lambda[j]);
-        push = j == 0 ? law[j].along * missing[j] : fused(law[j].along, missing[j], push);
+        jacobian(j, ROW_OWN, own);
+        jacobian(j, ROW_OTHER, other);
+        missing[j] = row_missing(law(j), row_velocity(own, mine) + row_velocity(other, others), number(j, ROW_LAMBDA));
+        push = j == 0 ? law(j).along * missing[j] : fused(law(j).along, missing[j], push);
     }
     if (FAST) {
         push += __shfl_xor_sync(all, push, 1);
@@ -103,15 +111,15 @@ __device__ __forceinline__ void row_lane::update(const body_motion &mine, const 
     }
 #pragma unroll
     for (int32_t j = 0; j < COUNT; ++j) {
-        const row_change change = change_row(law[j], missing[j], FAST ? push : (real)0, lambda[j]);
+        const row_change change = change_row(law(j), missing[j], FAST ? push : (real)0, number(j, ROW_LAMBDA));
         next[j] = change.lambda;
         delta[j] = change.delta;
     }
     if (!cones) return;
     real old[3], step[3], projected[3], change[3];
     for (int32_t r = 0; r < 3; ++r) {
-        old[r] = __shfl_sync(all, lambda[0], r, QUAD);
-        step[r] = __shfl_sync(all, law[0].step * missing[0], r, QUAD);
+        old[r] = __shfl_sync(all, number(0, ROW_LAMBDA), r, QUAD);
+        step[r] = __shfl_sync(all, law(0).step * missing[0], r, QUAD);
     }
     change_cone<FAST>(old, step, friction, projected, change);
     const int32_t lane = (int32_t)threadIdx.x % QUAD;
@@ -126,7 +134,7 @@ __device__ __forceinline__ void row_lane::wrench(const real impulse[COUNT], vec3
 #pragma unroll
     for (int32_t j = 0; j < COUNT; ++j) {
         real own[6];
-        jacobian(j, false, own);
+        jacobian(j, ROW_OWN, own);
         add_row(own, impulse[j], j == 0, force, torque);
     }
 }
@@ -136,7 +144,7 @@ __device__ __forceinline__ void row_lane::store(int32_t lane) const
     if (!stores) return;
 #pragma unroll
     for (int32_t j = 0; j < COUNT; ++j)
-        if (lane + QUAD * j < SADMM_MAX_ROWS) rows[lane + QUAD * j].lambda = lambda[j];
+        if (lane + QUAD * j < SADMM_MAX_ROWS) rows[lane + QUAD * j].lambda = number(j, ROW_LAMBDA);
 }
 
 #endif

@@ -117,21 +117,22 @@ PART __device__ __forceinline__ void PART_RUN::update_sides(int32_t odd, real re
 }
 
 /* The same of the warp's sides of constraints given by rows. */
-PART __device__ __forceinline__ void PART_RUN::update_rows(row_lane *rows, int32_t odd, real relaxation_factor) const
+PART __device__ __forceinline__ void PART_RUN::update_rows(const row_lane &rows, int32_t odd,
+                                                          real relaxation_factor) const
 {
-    real impulse[row_lane::COUNT];
+    real next[row_lane::COUNT], delta[row_lane::COUNT], impulse[row_lane::COUNT];
     vec3 force, torque;
-    rows->update<FAST>(load_motion(own_row + (MODE == CLUSTER && odd ? args.most_bodies * ROW : 0)),
-                       load_motion(own.other + (odd ? own.other_odd : 0)));
+    rows.update<FAST>(load_motion(own_row + (MODE == CLUSTER && odd ? args.most_bodies * ROW : 0)),
+                      load_motion(own.other + (odd ? own.other_odd : 0)), next, delta);
 #pragma unroll
     for (int32_t j = 0; j < row_lane::COUNT; ++j) {
-        impulse[j] = FAST ? rows->delta[j] : rows->next[j] + rows->delta[j];
-        rows->lambda[j] =
-            FAST && relaxation_factor != 1 ? fused(relaxation_factor, rows->delta[j], rows->lambda[j]) : rows->next[j];
+        impulse[j] = FAST ? delta[j] : next[j] + delta[j];
+        if (FAST && relaxation_factor != 1) next[j] = fused(relaxation_factor, delta[j], rows.number(j, ROW_LAMBDA));
+        rows.number(j, ROW_LAMBDA) = next[j];
     }
-    rows->wrench(impulse, &force, &torque);
+    rows.wrench(impulse, &force, &torque);
     const real2_pair sum = sum_quad(lane, force, torque);
-    if (rows->rows) *own_record = sum;
+    if (rows.rows) *own_record = sum;
 }
 
 /* ---- the limit of energies, of the method `fast` ----------------------------------------------------------------- */
