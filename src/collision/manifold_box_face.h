@@ -36,10 +36,10 @@ SADMM_INLINE int clip_side(const struct clip_vertex *in, int count, int along_y,
 }
 
 /* Points of reference face (axis k, side sg of the reference box hr) against the incident box (hi, axes: columns of R,
- * centre t, all in the reference frame). owner: 1 when the reference is box 2. Positions are in the reference frame.
- * Returns the number of points within the limit. */
+ * centre t, all in the reference frame). thin: the thinner extent of both. owner: 1 when the reference is box 2.
+ * Positions are in the reference frame. Returns the number of points within the limit. */
 SADMM_INLINE int box_clip_face(const real hr[3], const real hi[3], const real R[3][3], const real t[3], int k, real sg,
-                               real limit, int owner, struct manifold *m)
+                               real limit, real thin, int owner, struct manifold *m)
 {
     int u = k == 2 ? 0 : k + 1, v = u == 2 ? 0 : u + 1, j = 0, ju, jv, q, i, count = 4, base_bits, ref_bits;
     struct clip_vertex poly[12], other[12];
@@ -64,7 +64,7 @@ SADMM_INLINE int box_clip_face(const real hr[3], const real hi[3], const real R[
     /* the smaller of the two faces says what is near */
     tol_u = MANIFOLD_SNAP * real_min(hr[u], real_abs(ux) + real_abs(vx));
     tol_v = MANIFOLD_SNAP * real_min(hr[v], real_abs(uy) + real_abs(vy));
-    tol_z = 2 * MANIFOLD_SNAP * real_min(real_min(hr[0], real_min(hr[1], hr[2])), real_min(hi[0], real_min(hi[1], hi[2])));
+    tol_z = MANIFOLD_SNAP * thin;
     for (q = 0; q < 4; ++q) {
         /* around the face: (+,+), (-,+), (-,-), (+,-) */
         int pu = q == 0 || q == 3, pv = q < 2;
@@ -119,9 +119,9 @@ SADMM_INLINE int box_clip_face(const real hr[3], const real hi[3], const real R[
         }
         for (d = 0; d < m->count; ++d) {
             real dx = real_abs(m->points[d].position.x - p->x), dy = real_abs(m->points[d].position.y - p->y);
+            if (m->points[d].feature == feature) duplicate = true;
             /* near each other on a face that is long and steep, but not equally deep: two points */
-            bool even = real_abs(m->points[d].separation - p->z) <= tol_z;
-            duplicate = duplicate || (dx <= tol_u && dy <= tol_v && even) || m->points[d].feature == feature;
+            else if (dx <= tol_u && dy <= tol_v && real_abs(m->points[d].separation - p->z) <= tol_z) duplicate = true;
         }
         if (duplicate || m->count == SADMM_MANIFOLD_POINTS) continue;
         position[0] = p->x;
@@ -149,7 +149,7 @@ SADMM_INLINE void box_face_manifold(const struct box_pair *b, int axis, int nega
     m->count = 0;
     m->normal = box_axis_direction(b, axis, negative);
     if (axis < 3) {
-        box_clip_face(b->h1, b->h2, b->R, b->t, axis, sg, limit, 0, m);
+        box_clip_face(b->h1, b->h2, b->R, b->t, axis, sg, limit, b->thin, 0, m);
     } else {
         /* in the frame of 2 the normal from 1 to 2 points out of 1: the reference side of 2 is opposite */
         real RT[3][3], t[3];
@@ -157,7 +157,7 @@ SADMM_INLINE void box_face_manifold(const struct box_pair *b, int axis, int nega
             for (j = 0; j < 3; ++j) RT[i][j] = b->R[j][i];
             t[i] = -b->t2[i];
         }
-        box_clip_face(b->h2, b->h1, RT, t, axis - 3, -sg, limit, 1, m);
+        box_clip_face(b->h2, b->h1, RT, t, axis - 3, -sg, limit, b->thin, 1, m);
         for (i = 0; i < m->count; ++i) {
             real p[3], q[3];
             v3_to_array(m->points[i].position, p);

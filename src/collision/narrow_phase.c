@@ -4,16 +4,16 @@
 #include "contact_emit.h"
 #include "pair_manifold.h"
 
-/* Write the manifold as a pair with its points; there is capacity. `before`: the pair that it goes on from, or NULL. */
+/* Write the manifold as a pair with its points; there is capacity. `before`: the pair that it goes on from, or NULL.
+ * ratio: step_ratio of both sets. */
 static void emit(const struct sadmm_candidates *c, const struct sadmm_collision_input *input, uint32_t a, uint32_t b,
-                 uint32_t child, const struct manifold *m, const struct sadmm_contact_set *old,
+                 uint32_t child, const struct manifold *m, const struct sadmm_contact_set *old, double ratio,
                  const struct sadmm_contact_pair *before, struct sadmm_contact_set *out)
 {
     const struct sadmm_proxy *pa = &c->proxies[a], *pb = &c->proxies[b];
     struct sadmm_contact_pair *pair = &out->pairs[out->pair_count++];
     const double friction = contact_friction(input->friction_pairs, input->friction_values,
                                              (int64_t)input->friction_pair_count, a, b, pa, pb);
-    const double ratio = step_ratio(input->dt, old->dt);
     double normal[3], between[3];
 
     contact_between(pa, pb, between);
@@ -54,6 +54,7 @@ struct narrow_phase {
     const struct sadmm_collision_input *input;
     const struct sadmm_contact_set *old;
     size_t next; /* pairs of `old` before it come before everything that is left */
+    double ratio; /* of the steps' lengths */
     struct sadmm_contact_set *out;
 };
 
@@ -86,7 +87,7 @@ static bool find_children(struct narrow_phase *n, uint32_t a, uint32_t b)
                       before ? contact_memory(before, pa, pb) : 0, &m);
         if (m.count == 0) continue;
         if (!has_capacity(n->out) && !add_capacity(n->out)) return false;
-        emit(n->candidates, input, a, b, child, &m, n->old, before, n->out);
+        emit(n->candidates, input, a, b, child, &m, n->old, n->ratio, before, n->out);
     }
     return true;
 }
@@ -94,7 +95,8 @@ static bool find_children(struct narrow_phase *n, uint32_t a, uint32_t b)
 bool sadmm_narrow_phase(const struct sadmm_candidates *c, const struct sadmm_collision_input *input, size_t begin,
                         size_t end, const struct sadmm_contact_set *old, struct sadmm_contact_set *out)
 {
-    struct narrow_phase n = {.candidates = c, .input = input, .old = old, .out = out};
+    struct narrow_phase n = {.candidates = c, .input = input, .old = old, .out = out,
+                             .ratio = step_ratio(input->dt, old->dt)};
     if (begin < end)
         n.next = (size_t)contact_lower_bound(old->pairs, 0, (int64_t)old->pair_count, c->list.keys[begin], 0);
 
