@@ -31,7 +31,7 @@ struct both {
     struct sadmm_contact_set host_set, device_set;
 };
 
-/* radix: with the sort and the scan of large scenes, whatever the room. */
+/* radix: with the sort and the scan of large scenes, whatever the capacities. */
 static struct both both_new_tuned(int32_t tree_from, bool radix)
 {
     struct both b = {0};
@@ -455,11 +455,11 @@ START_TEST(scenes_equal_host)
 }
 END_TEST
 
-/* ---- room ------------------------------------------------------------------------------------------------------ */
+/* ---- capacities ------------------------------------------------------------------------------------------------ */
 
-/* A find that starts with room for one candidate and one point repeats until everything fits, and drops nothing; then
+/* A find that starts with capacities of one candidate and one point repeats until everything fits, and drops nothing; then
  * nothing is allocated any more while the numbers stay. */
-START_TEST(room_grows)
+START_TEST(capacities_grow)
 {
     const struct soup_kind *kind = &soups[_i % SOUPS];
     struct soup s = soup_new(kind, 3);
@@ -471,7 +471,7 @@ START_TEST(room_grows)
     struct sadmm_cuda_collision_stats first = COLLISION(stats)(b.device);
     ck_assert_int_gt(out.counts.points, 1);
     ck_assert_int_ge(first.repeats, 1);
-    ck_assert_int_le(first.repeats, 2); /* each kind of room once: the counts are exact */
+    ck_assert_int_le(first.repeats, 2); /* each capacity once: the counts are exact */
     ck_assert_int_ge(first.candidate_capacity, out.counts.candidates);
     ck_assert_int_ge(first.point_capacity, out.counts.points);
 
@@ -487,8 +487,8 @@ START_TEST(room_grows)
 }
 END_TEST
 
-/* Room that lacks in the middle of a run: the previous step's impulses are still there for the repeated stage. */
-START_TEST(room_grows_later)
+/* Capacities too small in the middle of a run: the previous step's impulses are still there for the repeated stage. */
+START_TEST(capacities_grow_later)
 {
     const struct soup_kind *kind = &soups[6];
     struct soup s = soup_new(kind, 4);
@@ -499,7 +499,7 @@ START_TEST(room_grows_later)
     both_start_from(&b, &b.host_set);
     for (int step = 0; step < 3; ++step) {
         COLLISION(tune)(b.device, &tight);
-        both_find(&b, &s.input, "after the room was taken away");
+        both_find(&b, &s.input, "after the capacities were taken back");
         soup_advance(&s, kind);
     }
     ck_assert_int_ge(COLLISION(stats)(b.device).repeats, 3);
@@ -918,8 +918,8 @@ int main(void)
     tcase_set_timeout(tests, 60);
     tcase_add_loop_test(tests, soups_equal_host, 0, SOUPS);
     tcase_add_loop_test(tests, scenes_equal_host, 0, 2 * SCENES);
-    tcase_add_loop_test(tests, room_grows, 0, 2 * SOUPS);
-    tcase_add_test(tests, room_grows_later);
+    tcase_add_loop_test(tests, capacities_grow, 0, 2 * SOUPS);
+    tcase_add_test(tests, capacities_grow_later);
     tcase_add_loop_test(tests, few_shapes, 0, 2);
     tcase_add_test(tests, one_place);
     tcase_add_test(tests, slots_are_reused);

@@ -250,7 +250,7 @@ END_TEST
 
 /* A column of boxes at rest with the impulses that hold it, and gaps of some um: loads pass 60 bodies, so that warm
  * steps take larger weights and ease the gaps (math/weight.h). */
-static void start_tall(struct runner *r, const struct sadmm_kernels *k, enum sadmm_cuda_tier tier)
+static void start_deep_stack(struct runner *r, const struct sadmm_kernels *k, enum sadmm_cuda_tier tier)
 {
     static const double up[3] = {0, 0, 1};
     enum { BOXES = 60 };
@@ -273,19 +273,19 @@ static void start_tall(struct runner *r, const struct sadmm_kernels *k, enum sad
     runner_assemble(r);
 }
 
-START_TEST(tall_islands)
+START_TEST(deep_stacks)
 {
     const struct sadmm_kernels *table = tables[_i];
     struct runner ref, own[MOST_TIERS];
     struct scales scales = {0, 0};
-    start_tall(&ref, cpu(), SADMM_CUDA_TIER_AUTO);
+    start_deep_stack(&ref, cpu(), SADMM_CUDA_TIER_AUTO);
     iterate(&ref, 3, false);
     for (size_t t = tier_count; t-- > 0;) {
-        start_tall(&own[t], table, tiers[t]);
+        start_deep_stack(&own[t], table, tiers[t]);
         iterate(&own[t], 3, false);
         /* three iterations of an entry's error each */
-        compare(&own[t], &ref, &scales, 3 * entry_tolerance[table->precision], "tall");
-        if (t + 1 < tier_count) check_same(&own[t], &own[tier_count - 1], "tall, tiers");
+        compare(&own[t], &ref, &scales, 3 * entry_tolerance[table->precision], "deep stack");
+        if (t + 1 < tier_count) check_same(&own[t], &own[tier_count - 1], "deep stack, tiers");
     }
     for (size_t t = 0; t < tier_count; ++t) runner_stop(&own[t]);
     runner_stop(&ref);
@@ -362,7 +362,7 @@ START_TEST(runs_repeat)
 }
 END_TEST
 
-/* To a certificate, in no more iterations than the CPU (20 are one look). */
+/* To a certificate, in no more iterations than the CPU (a convergence check every 20). */
 START_TEST(solutions_are_certified)
 {
     static const char *const names[] = {"pyramid", "towers, frictionless", "octagons, frictionless"};
@@ -385,7 +385,7 @@ START_TEST(solutions_are_certified)
 }
 END_TEST
 
-static int32_t look(struct runner *r, int done)
+static int32_t check_convergence(struct runner *r, int done)
 {
     int32_t unmet = -1;
     if (r->k->precision == SADMM_F32) CALL(r, SYMBOL(check_convergence, f32)(r->c, done, &unmet, &r->error));
@@ -403,9 +403,9 @@ static void start_with_rule(struct runner *r, const struct sadmm_kernels *k, con
     runner_assemble(r);
 }
 
-/* Looks of every tier find as many islands above the tolerance as the certificate does, whatever their constraints are, row blocks
+/* Convergence checks of every tier find as many islands above the tolerance as the certificate does, whatever their constraints are, row blocks
  * included; and islands that met it stay as they are. */
-START_TEST(looks_find_what_the_certificate_does)
+START_TEST(convergence_checks_find_what_the_certificate_does)
 {
     static const int counts[] = {1, 4, 15, 40};
     const struct sadmm_kernels *table = tables[_i / SCENES];
@@ -424,8 +424,8 @@ START_TEST(looks_find_what_the_certificate_does)
             iterate(&own, counts[k], false);
             done += counts[k];
             snprintf(what, sizeof what, "%s, tier %d, %d iterations", scene->name, (int)tiers[t], done);
-            unmet = look(&own, done);
-            ck_assert_int_eq(unmet, look(&stream, done));
+            unmet = check_convergence(&own, done);
+            ck_assert_int_eq(unmet, check_convergence(&stream, done));
             check_same(&own, &stream, what);
             CALL(&own, sadmm_certify(&own.p->system, &own.settings, &certificate, &own.error));
             ck_assert_msg(unmet == certificate.islands_above, "%s: %d islands, the certificate has %lld", what, unmet,
@@ -493,13 +493,13 @@ int main(void)
     for (int p = 0; p < parts; ++p) {
         const int first = p * SCENES, some = first + (parts == 2 ? SCENES : SCENES / 3);
         add_case(suite, p ? "entries_f64" : "entries_f32", entries_equal_cpu, first, first + SCENES);
-        add_case(suite, p ? "looks_f64" : "looks_f32", looks_find_what_the_certificate_does, first, some);
+        add_case(suite, p ? "checks_f64" : "checks_f32", convergence_checks_find_what_the_certificate_does, first, some);
         add_case(suite, p ? "tiers_f64" : "tiers_f32", tiers_agree, first, some);
     }
     ADD_CASE(suite, unrelaxed_tiers_agree, 0, parts);
     ADD_CASE(suite, batches_go_on, 0, 3 * parts);
     ADD_CASE(suite, many_bodies, 0, parts);
-    ADD_CASE(suite, tall_islands, 0, parts);
+    ADD_CASE(suite, deep_stacks, 0, parts);
     ADD_CASE(suite, aborted_does_nothing, 0, parts);
     ADD_CASE(suite, runs_repeat, 0, parts);
     ADD_CASE(suite, solutions_are_certified, 0, parts);

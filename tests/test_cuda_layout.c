@@ -170,8 +170,8 @@ enum { GRAPHS = sizeof graphs / sizeof *graphs };
 
 struct host_layout {
     const struct contact_problem *p;
-    int32_t n, records, room; /* room: records of pairs, before those of blocks */
-    int32_t *label;           /* raw body -> smallest body of its island */
+    int32_t n, records, pair_capacity; /* pair_capacity: records of pairs, before those of blocks */
+    int32_t *label;                    /* raw body -> smallest body of its island */
     struct cuda_layout_copy wanted;
 };
 
@@ -181,9 +181,9 @@ static void record_bodies(const struct host_layout *h, int32_t record, int32_t b
     if (record < (int32_t)h->p->contacts.pair_count) {
         body[0] = h->p->contacts.pairs[record].body_a;
         body[1] = h->p->contacts.pairs[record].body_b;
-    } else if (record >= h->room) {
-        body[0] = h->p->blocks[record - h->room].body_a;
-        body[1] = h->p->blocks[record - h->room].body_b;
+    } else if (record >= h->pair_capacity) {
+        body[0] = h->p->blocks[record - h->pair_capacity].body_a;
+        body[1] = h->p->blocks[record - h->pair_capacity].body_b;
     }
 }
 
@@ -275,8 +275,8 @@ static struct host_layout host_new(const struct contact_problem *p, bool warm_st
     memset(&h, 0, sizeof h);
     h.p = p;
     h.n = p->system.body_count;
-    h.room = (int32_t)(p->contacts.pair_count + 31) / 32 * 32;
-    h.records = h.room + p->block_count;
+    h.pair_capacity = (int32_t)(p->contacts.pair_count + 31) / 32 * 32;
+    h.records = h.pair_capacity + p->block_count;
     h.label = numbers((size_t)h.n);
     h.wanted = copy_new(&h);
     label_bodies(&h);

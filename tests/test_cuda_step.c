@@ -64,7 +64,7 @@ START_TEST(resident_steps_equal_steps_by_host)
 }
 END_TEST
 
-/* The queue, however long, gives what single steps give; also where its first steps have to be repeated with more room. */
+/* The queue, however long, gives what single steps give; also where its first steps have to be repeated with larger capacities. */
 START_TEST(enqueued_steps_equal_single_steps)
 {
     const int precision = _i;
@@ -419,7 +419,7 @@ static sadmm_world *tall_tower(int precision)
     return world;
 }
 
-/* Steps that the host makes, with the same kernels, between steps on the device: those with more looks than fit a graph. */
+/* Steps that the host makes, with the same kernels, between steps on the device: those with more convergence checks than fit a graph. */
 START_TEST(steps_by_host_in_between)
 {
     const int precision = _i;
@@ -441,7 +441,7 @@ START_TEST(steps_by_host_in_between)
 }
 END_TEST
 
-/* With a stop rule: where balls rest a box lands, with four points where the plan has one. What the step still does, looks
+/* With a stop rule: where balls rest a box lands, with four points where the plan has one. What the step still does, convergence checks
  * included, stays within what was planned for (the address sanitizer sees it), and it is repeated. */
 START_TEST(more_points_than_planned_with_a_stop_rule)
 {
@@ -514,7 +514,7 @@ static sadmm_world *stopping_towers(int first, int count, double lift, int preci
 }
 
 /* The stop rule of whole steps: in every tier an island stops when it would stop if it were alone, and then as the host's
- * look at the certificate has it. */
+ * convergence check has it. */
 START_TEST(islands_stop_by_themselves)
 {
     static const enum sadmm_cuda_tier stopping_tiers[] = {SADMM_CUDA_TIER_BLOCK, SADMM_CUDA_TIER_STREAM,
@@ -539,14 +539,14 @@ START_TEST(islands_stop_by_themselves)
         for (int t = 0; t < 2; ++t) {
             MUST(alone[t], sadmm_world_step(alone[t]));
             want[t] = world_report(alone[t]);
-            if (want[t].contacts == 0 && got.contacts > 0) want[t].iterations = 3; /* in the air: until the first look */
+            if (want[t].contacts == 0 && got.contacts > 0) want[t].iterations = 3; /* in the air: until the first check */
             left += !want[t].converged && want[t].contacts > 0;
             for (int i = 0; i < 3; ++i) {
                 sadmm_body_state a = body_state(both, body_at(both, 1 + 3 * t + i)), b = body_state(alone[t], body_at(alone[t], 1 + i));
                 ck_assert_msg(memcmp(&a, &b, sizeof a) == 0, "step %d, tower %d, box %d", step, t, i);
             }
         }
-        if (step == 0) continue; /* the first step is the host's, which looks at all islands together */
+        if (step == 0) continue; /* the first step is the host's, which checks all islands together */
         ck_assert_int_eq(got.converged, left == 0);
         ck_assert_int_eq(got.certificate.islands_above, left);
         ck_assert_int_eq(got.iterations, want[0].iterations > want[1].iterations ? want[0].iterations : want[1].iterations);
@@ -600,7 +600,7 @@ START_TEST(tiers_stop_alike)
     }
     step_world(budget, steps);
     step_world(late, steps);
-    expect_same_world(budget, late, "a look at the end");
+    expect_same_world(budget, late, "a check at the end");
     ck_assert_int_eq(world_report(late).converged, false);
     ck_assert_int_eq(world_report(late).certificate.islands_above, 1);
     /* nothing of the rule is left without it */

@@ -176,7 +176,7 @@ END_TEST
 /* N cubes of 1 kg on top of each other, at rest on exact impulses: the forces that the bodies feel add up to N^2 m g, twice
  * but for the one at the top, so that a load passes N / 2 bodies; stack_depth N / 20. Gaps of 1 um under every third
  * cube. */
-static struct contact_problem *tall_stack(int count)
+static struct contact_problem *deep_stack(int count)
 {
     double masses[64];
     for (int i = 0; i < count; ++i) masses[i] = 1;
@@ -189,9 +189,9 @@ static struct contact_problem *tall_stack(int count)
     return problem;
 }
 
-START_TEST(tall_islands_are_stiff)
+START_TEST(deep_stacks_are_stiff)
 {
-    struct contact_problem *problem = tall_stack(30);
+    struct contact_problem *problem = deep_stack(30);
     struct scene warm = scenes[0];
     struct runner r;
     warm.warm = true;
@@ -224,10 +224,10 @@ static void expect_agreement(struct runner *own, struct runner *threads, struct 
 }
 
 /* The same in every table, whatever the threads: at rest, and at a quarter of V. */
-START_TEST(tall_tables_equal_ref)
+START_TEST(deep_stacks_equal_ref)
 {
     const struct sadmm_kernels *table = tables[_i / 2];
-    struct contact_problem *problem = tall_stack(30);
+    struct contact_problem *problem = deep_stack(30);
     struct scene warm = scenes[0];
     struct spread v = {0, 0}, lambda = {0, 0};
     struct runner ref, own, three;
@@ -254,7 +254,7 @@ START_TEST(tall_tables_equal_ref)
 }
 END_TEST
 
-static sadmm_settings few_settings(int iterations, int threads)
+static sadmm_settings warm_settings(int iterations, int threads)
 {
     sadmm_settings s = scene_settings(&scenes[0]);
     s.method = SADMM_METHOD_FAST;
@@ -267,15 +267,15 @@ static sadmm_settings few_settings(int iterations, int threads)
 /* Three cubes on exact impulses: load / V of the lowest contacts is 3/4 kg a point, twice that with half the 60 iterations
  * that are not few; less the faster the stack moves by itself, and no more than the stack's 3 kg. Of the highest
  * contacts it is 1/4 kg, and phi / w half as much, since both cubes give way. */
-START_TEST(few_iterations_weigh_more)
+START_TEST(under_iterated_weights_are_larger)
 {
     static const struct {
         int iterations;
         double speed, factor; /* over V */
     } cases[] = {{60, 0, 1}, {100, 0, 1}, {30, 0, 2}, {20, 0, 3}, {1, 0, 6}, {30, 0.5, 2}, {30, 1.6, 1.25}, {30, 4, 1}};
     for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
-        struct contact_problem *problem = tall_stack(3);
-        sadmm_settings settings = few_settings(cases[k].iterations, 1);
+        struct contact_problem *problem = deep_stack(3);
+        sadmm_settings settings = warm_settings(cases[k].iterations, 1);
         struct runner r;
         for (int i = 0; i < 3; ++i) problem->system.velocity[6 * i] = cases[k].speed * 9.81 * 0.005;
         runner_start_settings(&r, literal(), &settings, problem);
@@ -293,8 +293,8 @@ START_TEST(few_iterations_of_a_problem_weigh_the_same)
 {
     double weight[2];
     for (int k = 0; k < 2; ++k) {
-        struct contact_problem *problem = tall_stack(3);
-        sadmm_settings settings = few_settings(k ? 5 : 100, 1);
+        struct contact_problem *problem = deep_stack(3);
+        sadmm_settings settings = warm_settings(k ? 5 : 100, 1);
         struct runner r;
         contact_problem_raw(problem, &settings, 0);
         runner_start_settings(&r, literal(), &settings, problem);
@@ -322,12 +322,12 @@ END_TEST
 
 /* A stack that has just landed: three times the impulses it rests on. Five iterations leave it jumping, and all tables
  * slow it down alike; less where cubes overlap, by 1 mm, since pushing them apart is work. */
-START_TEST(few_tables_equal_ref)
+START_TEST(under_iterated_tables_equal_ref)
 {
     const struct sadmm_kernels *table = tables[_i / 2];
     const bool overlap = _i % 2;
-    struct contact_problem *problem = tall_stack(5);
-    sadmm_settings one_thread = few_settings(5, 1), three_threads = few_settings(5, 3);
+    struct contact_problem *problem = deep_stack(5);
+    sadmm_settings one_thread = warm_settings(5, 1), three_threads = warm_settings(5, 3);
     struct spread v = {0, 0}, lambda = {0, 0};
     struct runner ref, own, three;
     int32_t limited[3];
@@ -356,8 +356,8 @@ END_TEST
 START_TEST(solutions_are_not_slowed_down)
 {
     const struct sadmm_kernels *table = _i < table_count ? tables[_i] : literal();
-    struct contact_problem *problem = tall_stack(5);
-    sadmm_settings settings = few_settings(300, 1);
+    struct contact_problem *problem = deep_stack(5);
+    sadmm_settings settings = warm_settings(300, 1);
     struct runner r;
     int32_t limited;
     for (int k = 0; k < 20; ++k) problem->contacts.points[k].gap = -1e-3;
@@ -511,7 +511,7 @@ static int cold_iterations(struct contact_problem *problem, sadmm_method method,
 /* Over-relaxation is worth having; and to 1e-6 m/s fast takes a third of the iterations of paper, in the geometric
  * mean, as docs/convergence.md has it for problems whose loads are not predicted. `most` is a guard against regressions
  * and no more: what an over-relaxation of 1.2 takes. */
-START_TEST(few_iterations)
+START_TEST(cold_solves)
 {
     static struct contact_problem *(*const problems[])(int) = {stack, pyramid, plates};
     enum { PROBLEMS = sizeof problems / sizeof *problems };
@@ -532,7 +532,7 @@ START_TEST(few_iterations)
 END_TEST
 
 /* A weight is the mass that its contact carries, so that masses and their order are nothing to the iteration: stacks of
- * 1:1:1, 1:100:10,000 and 10,000:100:1 take the same number but for one look, once the loads are known. */
+ * 1:1:1, 1:100:10,000 and 10,000:100:1 take the same number but for one convergence check, once the loads are known. */
 START_TEST(masses_do_not_matter)
 {
     static const double masses[][3] = {{1, 1, 1}, {0.01, 1, 100}, {100, 1, 0.01}};
@@ -742,18 +742,18 @@ int main(void)
     tcase_add_loop_test(tables_case, threads_do_not_matter, 0, table_count * SCENES);
     tcase_add_loop_test(tables_case, single_steps_are_refused, 0, table_count);
     tcase_add_test(weights, weight_is_the_mass_carried);
-    tcase_add_test(weights, tall_islands_are_stiff);
-    tcase_add_loop_test(weights, tall_tables_equal_ref, 0, 2 * table_count);
-    tcase_add_test(weights, few_iterations_weigh_more);
+    tcase_add_test(weights, deep_stacks_are_stiff);
+    tcase_add_loop_test(weights, deep_stacks_equal_ref, 0, 2 * table_count);
+    tcase_add_test(weights, under_iterated_weights_are_larger);
     tcase_add_test(weights, few_iterations_of_a_problem_weigh_the_same);
     tcase_add_test(weights, bounces_are_taken_back);
-    tcase_add_loop_test(weights, few_tables_equal_ref, 0, 2 * table_count);
+    tcase_add_loop_test(weights, under_iterated_tables_equal_ref, 0, 2 * table_count);
     tcase_add_loop_test(weights, solutions_are_not_slowed_down, 0, table_count + 1);
     tcase_add_test(weights, small_gaps_are_eased);
     tcase_add_test(weights, blocks_have_no_unit);
     tcase_add_test(weights, weight_scales_follow_the_balance);
     tcase_add_test(weights, islands_are_named_by_their_smallest_body);
-    tcase_add_test(solutions, few_iterations);
+    tcase_add_test(solutions, cold_solves);
     tcase_add_test(solutions, masses_do_not_matter);
     tcase_add_loop_test(solutions, solutions_are_certified, 0, 4);
     tcase_add_loop_test(solutions, momentum_residuals_do_not_drift, 0, single_count);
