@@ -70,7 +70,8 @@ static void check_same(const struct sadmm_contact_set *host, const struct sadmm_
                       "%s: pair %zu is %d-%d, child %u, instead of %d-%d, child %u", about, i, q->shape_a, q->shape_b,
                       q->child, p->shape_a, p->shape_b, p->child);
         ck_assert_msg(p->body_a == q->body_a && p->body_b == q->body_b && p->first == q->first &&
-                          p->count == q->count && p->cache == q->cache && p->revision == q->revision && p->placed == q->placed,
+                          p->count == q->count && p->cache == q->cache && p->revision == q->revision &&
+                          p->placed == q->placed,
                       "%s: pair %zu (shapes %d-%d): %d points from %d, cache %u instead of %d from %d, cache %u", about,
                       i, p->shape_a, p->shape_b, q->count, q->first, q->cache, p->count, p->first, p->cache);
         ck_assert_msg(same_numbers(p->normal, q->normal, 3) && same_numbers(&p->friction, &q->friction, 1) &&
@@ -457,8 +458,8 @@ END_TEST
 
 /* ---- capacities ------------------------------------------------------------------------------------------------ */
 
-/* A find that starts with capacities of one candidate and one point repeats until everything fits, and drops nothing; then
- * nothing is allocated any more while the numbers stay. */
+/* A find that starts with capacities of one candidate and one point repeats until everything fits, and drops nothing;
+ * then nothing is allocated any more while the numbers stay. */
 START_TEST(capacities_grow)
 {
     const struct soup_kind *kind = &soups[_i % SOUPS];
@@ -607,8 +608,9 @@ START_TEST(slots_are_reused)
 }
 END_TEST
 
-/* Pairs are matched by (shape, shape, child): of the four manifolds of two cubes the last step had all but the second. Each
- * goes on with its own impulses and its own axis (two are equally good), and the one that was not there starts without. */
+/* Pairs are matched by (shape, shape, child): of the four manifolds of two cubes the last step had all but the second.
+ * Each goes on with its own impulses and its own axis (two are equally good), and the one that was not there starts
+ * without. */
 START_TEST(children_are_matched_by_number)
 {
     struct sadmm_geometry geometries[3] = {geometry_of(SADMM_SHAPE_BOX, 0.05, 0.05, 0.05),
@@ -665,8 +667,8 @@ START_TEST(children_are_matched_by_number)
 }
 END_TEST
 
-/* What collision knows nothing of is refused when it is loaded, as on the host, so that no kernel ever sees it; the current
- * set stays. */
+/* What collision knows nothing of is refused when it is loaded, as on the host, so that no kernel ever sees it; the
+ * current set stays. */
 START_TEST(shapes_without_manifolds_are_refused)
 {
     enum { MANY = 70000 };
@@ -703,7 +705,8 @@ START_TEST(shapes_without_manifolds_are_refused)
         ++shapes[1].revision;
         for (int time = 0; time < 2; ++time) {
             ck_assert_int_eq(COLLISION(find)(b.device, NULL, &input, &out, &error), SADMM_ERROR_INVALID_ARGUMENT);
-            ck_assert_msg(strstr(error.message, bad[i].words) != NULL, "%s: does not say %s", error.message, bad[i].words);
+            ck_assert_msg(strstr(error.message, bad[i].words) != NULL, "%s: does not say %s", error.message,
+                          bad[i].words);
         }
         OK(COLLISION(download)(b.device, NULL, &b.device_set, error));
         check_same(&b.host_set, &b.device_set, bad[i].words);

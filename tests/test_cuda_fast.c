@@ -45,9 +45,9 @@ static int32_t limit(struct runner *r)
 /* One pass: weights, factor, an iteration, its residuals, new weights, another iteration. As in test_cuda.c, rounding
  * of the inputs (6e-8, 1e-16) by a condition number of A + C of a hundred or a few. */
 static const double entry_tolerance[2] = {1e-5, 5e-14};
-/* All batches: 71 iterations. One does not take two states apart in the norm of A + beta C, so that what is rounded is passed
- * on at most as it is; in the largest velocity it may show larger by the square root of what that norm differs by between
- * bodies that touch, of their masses' ratio of 100 (as scene_tolerance in table_runner.h). */
+/* All batches: 71 iterations. One does not take two states apart in the norm of A + beta C, so that what is rounded is
+ * passed on at most as it is; in the largest velocity it may show larger by the square root of what that norm differs
+ * by between bodies that touch, of their masses' ratio of 100 (as scene_tolerance in table_runner.h). */
 static const double run_tolerance[2] = {71 * 10 * FLT_EPSILON / 2, 71 * 10 * DBL_EPSILON / 2};
 
 /* The largest |v| and |lambda| so far: a velocity on its way to 0 is not measured by itself. */
@@ -166,7 +166,8 @@ static void start_unrelaxed(struct runner *r, const struct sadmm_kernels *k, enu
     runner_assemble(r);
 }
 
-/* Without over-relaxation every iteration is plain: it keeps the projected multipliers, not the old ones and a change. */
+/* Without over-relaxation every iteration is plain: it keeps the projected multipliers, not the old ones and a
+ * change. */
 START_TEST(unrelaxed_tiers_agree)
 {
     const struct sadmm_kernels *table = tables[_i];
@@ -213,8 +214,8 @@ START_TEST(batches_go_on)
 }
 END_TEST
 
-/* Sums over islands of several powers of sixteen, and islands that begin anywhere: chains of one contact each, one of them
- * of more than two thousand bodies. */
+/* Sums over islands of several powers of sixteen, and islands that begin anywhere: chains of one contact each, one of
+ * them of more than two thousand bodies. */
 static struct contact_problem *chains(void)
 {
     static const double up[3] = {0, 0, 1};
@@ -394,7 +395,8 @@ static int32_t check_convergence(struct runner *r, int done)
 }
 
 /* The stop rule asks for the natural map alone: what is nothing in momentum an island of a step decides for itself. */
-static void start_with_rule(struct runner *r, const struct sadmm_kernels *k, const struct scene *scene, enum sadmm_cuda_tier tier)
+static void start_with_rule(struct runner *r, const struct sadmm_kernels *k, const struct scene *scene,
+                            enum sadmm_cuda_tier tier)
 {
     start(r, k, scene, tier);
     r->settings.certificate_tolerance = 1e-3;
@@ -403,8 +405,8 @@ static void start_with_rule(struct runner *r, const struct sadmm_kernels *k, con
     runner_assemble(r);
 }
 
-/* Convergence checks of every tier find as many islands above the tolerance as the certificate does, whatever their constraints are, row blocks
- * included; and islands that met it stay as they are. */
+/* Convergence checks of every tier find as many islands above the tolerance as the certificate does, whatever their
+ * constraints are, row blocks included; and islands that met it stay as they are. */
 START_TEST(convergence_checks_find_what_the_certificate_does)
 {
     static const int counts[] = {1, 4, 15, 40};
@@ -493,7 +495,8 @@ int main(void)
     for (int p = 0; p < parts; ++p) {
         const int first = p * SCENES, some = first + (parts == 2 ? SCENES : SCENES / 3);
         add_case(suite, p ? "entries_f64" : "entries_f32", entries_equal_cpu, first, first + SCENES);
-        add_case(suite, p ? "checks_f64" : "checks_f32", convergence_checks_find_what_the_certificate_does, first, some);
+        add_case(suite, p ? "checks_f64" : "checks_f32", convergence_checks_find_what_the_certificate_does, first,
+                 some);
         add_case(suite, p ? "tiers_f64" : "tiers_f32", tiers_agree, first, some);
     }
     ADD_CASE(suite, unrelaxed_tiers_agree, 0, parts);

@@ -1,5 +1,5 @@
-/* The method `fast`: every table's iterates are the plainly written ones of `ref`, whatever the threads; its weights are
- * what docs/algorithm.md says; its solutions are certified, in few iterations; and it is safe with too few.
+/* The method `fast`: every table's iterates are the plainly written ones of `ref`, whatever the threads; its weights
+ * are what docs/algorithm.md says; its solutions are certified, in few iterations; and it is safe with too few.
  */
 #include "backend_ref/literal.h"
 #include "core/solve/certificate.h"
@@ -77,10 +77,11 @@ START_TEST(tables_equal_ref)
     double tolerance = scene_tolerance(scene, table);
     ck_assert_msg(relative(v) <= tolerance, "%s: v differs by %g", scene->name, relative(v));
     ck_assert_msg(relative(lambda) <= tolerance, "%s: lambda differs by %g", scene->name, relative(lambda));
-    /* Differences of what was just compared, so that they are off by as much, and by the roundings of their own terms. */
+    /* Differences of what was just compared, so that they are off by as much, and by the roundings of their own
+     * terms. */
     double rounding = 4 * table_epsilon(table);
-    ck_assert_msg(primal.difference <= tolerance * primal.scale + rounding * v.scale, "%s: primal residual differs by %g of %g",
-                  scene->name, primal.difference, primal.scale);
+    ck_assert_msg(primal.difference <= tolerance * primal.scale + rounding * v.scale,
+                  "%s: primal residual differs by %g of %g", scene->name, primal.difference, primal.scale);
     ck_assert_msg(dual.difference <= tolerance * dual.scale + rounding * largest_impulse(&lambda, &ref),
                   "%s: dual residual differs by %g of %g", scene->name, dual.difference, dual.scale);
     runner_stop(&ref);
@@ -151,9 +152,9 @@ END_TEST
 
 /* ---- weights ----------------------------------------------------------------------------------------------------- */
 
-/* A cube of mass m at rest, carried by four points with m g dt / 4 each: g = J^T lambda changes its velocity by V = g dt,
- * and the load of a point over V is m / 4. Mean response of a point at (h, h, -h): 1/m for the push, and for a torque
- * [r]x over the moment 2/3 m h^2 on average 2/3 |r|^2 / (2/3 m h^2) = 3/m. So B = m/4 + phi m/4, phi = 3. */
+/* A cube of mass m at rest, carried by four points with m g dt / 4 each: g = J^T lambda changes its velocity by
+ * V = g dt, and the load of a point over V is m / 4. Mean response of a point at (h, h, -h): 1/m for the push, and for
+ * a torque [r]x over the moment 2/3 m h^2 on average 2/3 |r|^2 / (2/3 m h^2) = 3/m. So B = m/4 + phi m/4, phi = 3. */
 START_TEST(weight_is_the_mass_carried)
 {
     struct contact_problem *problem = contact_problem_stack((double[]){2}, 1, 0.5);
@@ -173,9 +174,9 @@ START_TEST(weight_is_the_mass_carried)
 }
 END_TEST
 
-/* N cubes of 1 kg on top of each other, at rest on exact impulses: the forces that the bodies feel add up to N^2 m g, twice
- * but for the one at the top, so that a load passes N / 2 bodies; stack_depth N / 20. Gaps of 1 um under every third
- * cube. */
+/* N cubes of 1 kg on top of each other, at rest on exact impulses: the forces that the bodies feel add up to N^2 m g,
+ * twice but for the one at the top, so that a load passes N / 2 bodies; stack_depth N / 20. Gaps of 1 um under every
+ * third cube. */
 static struct contact_problem *deep_stack(int count)
 {
     double masses[64];
@@ -212,7 +213,8 @@ START_TEST(deep_stacks_are_stiff)
 }
 END_TEST
 
-/* A table's solution is ref's within a tolerance (the spreads say how far off it was), and the same bits by more threads. */
+/* A table's solution is ref's within a tolerance (the spreads say how far off it was), and the same bits by more
+ * threads. */
 static void expect_agreement(struct runner *own, struct runner *threads, struct spread *v, double v_tolerance,
                              struct spread *lambda, double lambda_tolerance)
 {
@@ -264,9 +266,9 @@ static sadmm_settings warm_settings(int iterations, int threads)
     return s;
 }
 
-/* Three cubes on exact impulses: load / V of the lowest contacts is 3/4 kg a point, twice that with half the 60 iterations
- * that are not few; less the faster the stack moves by itself, and no more than the stack's 3 kg. Of the highest
- * contacts it is 1/4 kg, and phi / w half as much, since both cubes give way. */
+/* Three cubes on exact impulses: load / V of the lowest contacts is 3/4 kg a point, twice that with half the 60
+ * iterations that are not few; less the faster the stack moves by itself, and no more than the stack's 3 kg. Of the
+ * highest contacts it is 1/4 kg, and phi / w half as much, since both cubes give way. */
 START_TEST(under_iterated_weights_are_larger)
 {
     static const struct {
@@ -343,7 +345,8 @@ START_TEST(under_iterated_tables_equal_ref)
         ck_assert_int_eq(limited[k], 1);
     }
     compare_solutions(&own, &ref, &v, &lambda);
-    /* Five iterations that pass on what is rounded at most as it is (scene_tolerance), each of some ten sums; equal masses. */
+    /* Five iterations that pass on what is rounded at most as it is (scene_tolerance), each of some ten sums; equal
+     * masses. */
     const double tolerance = 5 * 10 * table_epsilon(table);
     expect_agreement(&own, &three, &v, tolerance, &lambda, tolerance);
     for (int k = 0; k < 3; ++k) runner_stop(runners[k]);
@@ -390,8 +393,8 @@ START_TEST(small_gaps_are_eased)
 }
 END_TEST
 
-/* The weight of a hard block does not depend on the unit of a row: with row and error times s, lambda is 1/s of it, B too
- * by s^2, and the body moves all the same. */
+/* The weight of a hard block does not depend on the unit of a row: with row and error times s, lambda is 1/s of it, B
+ * too by s^2, and the body moves all the same. */
 START_TEST(blocks_have_no_unit)
 {
     struct spread v = {0, 0}, lambda = {0, 0};
@@ -545,8 +548,8 @@ START_TEST(masses_do_not_matter)
 }
 END_TEST
 
-/* All kinds of constraints at once, both forms of bodies, with and without friction: it ends at a solution. (Of the random
- * mixed problems, those that can be solved: the others hold welds against each other.) */
+/* All kinds of constraints at once, both forms of bodies, with and without friction: it ends at a solution. (Of the
+ * random mixed problems, those that can be solved: the others hold welds against each other.) */
 START_TEST(solutions_are_certified)
 {
     static const int solvable[] = {8, 9, 10, 11};
@@ -621,7 +624,8 @@ static double total_energy(sadmm_world *world, const double gravity[3], double *
         if (def.type != SADMM_BODY_DYNAMIC) continue;
         double conjugate[4] = {s.orientation[0], -s.orientation[1], -s.orientation[2], -s.orientation[3]};
         vec3 w = m3_mul(q_matrix(q_load(conjugate)), v3_load(s.angular_velocity));
-        energy += def.mass * v3_norm2(v3_load(s.linear_velocity)) / 2 - def.mass * v3_dot(v3_load(gravity), v3_load(s.position));
+        energy += def.mass * v3_norm2(v3_load(s.linear_velocity)) / 2 -
+                  def.mass * v3_dot(v3_load(gravity), v3_load(s.position));
         energy += (def.inertia[0] * w.x * w.x + def.inertia[1] * w.y * w.y + def.inertia[2] * w.z * w.z) / 2;
         *weight += def.mass * norm3(gravity);
     }
@@ -638,8 +642,8 @@ static const struct {
 static const int budgets[] = {1, 2, 5, 10};
 
 /* However few the iterations, energy is not made: there is at most 1 % more than at the start, of what the scene turns
- * over or of its weight times 0.1 m, about the size of its bodies. (So a scene at rest may rise by 1 mm: bodies sink into each
- * other where iterations are cut short, and pushing them out is work.) */
+ * over or of its weight times 0.1 m, about the size of its bodies. (So a scene at rest may rise by 1 mm: bodies sink
+ * into each other where iterations are cut short, and pushing them out is work.) */
 START_TEST(too_few_iterations_are_safe)
 {
     struct sadmm_scene scene = open_scene(moving[_i / 4].spec);
@@ -710,8 +714,8 @@ START_TEST(few_iterations_come_to_rest)
 }
 END_TEST
 
-/* What is passed on goes to 0, and its rounding with it: bodies come to rest below half an ulp of g dt, which is where they stay
- * if impulses themselves are added up (5e-9 to 8e-9 m/s; dt is 5 ms). */
+/* What is passed on goes to 0, and its rounding with it: bodies come to rest below half an ulp of g dt, which is where
+ * they stay if impulses themselves are added up (5e-9 to 8e-9 m/s; dt is 5 ms). */
 START_TEST(single_precision_rests)
 {
     static const char *const specs[] = {"vertical_stacks:4", "oblique_stacks:1"};

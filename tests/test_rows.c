@@ -113,10 +113,10 @@ static int at_bounds(const struct sadmm_rows *rows)
     return count;
 }
 
-/* After any number of iterations, with weights that were taken from the multipliers found so far; and what a table has is what the
- * literal backend has. An iteration takes two states no further apart in its own norm; masses over three decades make that
- * a factor of some 30 in velocities, which the rounding of every iteration may grow to, and of what it starts with:
- * masses, rows, factors, multipliers. After 60 there have been five sets of weights. */
+/* After any number of iterations, with weights that were taken from the multipliers found so far; and what a table has
+ * is what the literal backend has. An iteration takes two states no further apart in its own norm; masses over three
+ * decades make that a factor of some 30 in velocities, which the rounding of every iteration may grow to, and of what
+ * it starts with: masses, rows, factors, multipliers. After 60 there have been five sets of weights. */
 START_TEST(bounds_hold_in_every_iterate)
 {
     static const int iterations[] = {1, 2, 3, 5, 8, 30, 60};
@@ -279,7 +279,8 @@ START_TEST(blocks_become_rows)
         ck_assert(rows.row_count == capacity && rows.lambda[0] == 4 && left < 9);
     }
     sadmm_test_fail_allocations_after(-1);
-    ck_assert(rows.row_count == capacity + 6 && rows.lambda[0] == 4 && rows.gain[capacity] == 1 && rows.hi[capacity] == INFINITY);
+    ck_assert(rows.row_count == capacity + 6 && rows.lambda[0] == 4 && rows.gain[capacity] == 1 &&
+              rows.hi[capacity] == INFINITY);
     sadmm_rows_free(&rows);
     ck_assert(rows.row_count == 0 && rows.lambda == NULL);
 }
