@@ -5,6 +5,8 @@
  * x_n = x_0 + v_0 t + a dt^2 n (n + 1) / 2, which is the parabola plus a t dt / 2. Where a test compares with the
  * discrete formula only rounding and the solver's error remain; where it compares with the continuous one, the
  * difference must shrink with dt.
+ *
+ * One file: the tests share `solvers` and their worlds, and test_cuda_analytic.c includes them as a whole.
  */
 #include <float.h>
 

@@ -3,7 +3,8 @@
  * Every formula is the host's, in double and without contraction, so there are no tolerances: a difference of one bit
  * in a gap or an arm is a failure. Inputs are scenes that the CPU backend steps and random soups. The same checks run
  * on the emulated device (test_cuda_collision_emulated.c, cuda_emulation/), where every build can run them; here they
- * run on a real one, or the program is skipped and says why.
+ * run on a real one, or the program is skipped and says why. One file: nearly all tests run the same two pipelines
+ * (`both`), most of them on the same random soups.
  */
 #include "scene_tools.h"
 

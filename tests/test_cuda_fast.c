@@ -1,6 +1,7 @@
 /* The method `fast` on the CUDA backend: its entries against the CPU's from identical inputs, and tiers that must agree
  * to the last bit, weights, levels and limit included. test_fast.c drives every registered table beside the literal
- * backend. The same checks run on the emulated device (test_cuda_fast_emulated.c). */
+ * backend. The same checks run on the emulated device (test_cuda_fast_emulated.c). One file: its tests share
+ * how runs are started, iterated and compared. */
 #include <float.h>
 
 #include "core/solve/certificate.h"

@@ -1,6 +1,7 @@
 /* The CUDA backend's layout (device/layout.h) against a plain construction on the host: statistics, slots, lists of
  * sides and every boundary of every part, number for number. On a real device, or skipped; test_cuda_layout_emulated.c
- * runs the same on the emulated one. */
+ * runs the same on the emulated one. One file: more than half of it, the graphs and the plain construction, is used by
+ * nearly every test. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -3,6 +3,7 @@
  * Contacts are the same bits on both sides, and so are the solver's kernels: everything that can be read of a world
  * must be equal to the last bit, however the steps were enqueued, planned or repeated. A stop rule that is never met
  * sends a world through the host: `by_host`. The same checks run on the emulated device (test_cuda_step_emulated.c).
+ * One file: nearly every test makes this one comparison (expect_same_world), in another situation.
  */
 #include <math.h>
 #include <stdint.h>

@@ -1,5 +1,7 @@
 /* The method `fast`: every table's iterates are the plainly written ones of `ref`, whatever the threads; its weights
  * are what docs/algorithm.md says; its solutions are certified, in few iterations; and it is safe with too few.
+ * One file: weights, iterates and solutions are tested on the same problems (deep_stack, the scenes of table_runner.h)
+ * and by the same runners.
  */
 #include "backend_ref/literal.h"
 #include "core/solve/certificate.h"

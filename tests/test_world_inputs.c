@@ -1,6 +1,7 @@
 /* Bad input to a world: every call names what is wrong and changes nothing, memory may run out anywhere, and a step
  * that fails leaves the world as it was. "Changes nothing" is tested by stepping on beside a world that never saw the
  * bad call: the states must stay equal bit for bit.
+ * One file: the tests share that comparison and the small world it is made with.
  */
 #include <stddef.h>
 
