@@ -16,8 +16,8 @@
 
 static const char command[] = "rows";
 
-/* Iterations of the shorter solve; by how many two solves differ, on a processor and on an accelerator: some milliseconds,
- * beside which the start of a solve is even. */
+/* Iterations of the shorter solve; by how many two solves differ, on a processor and on an accelerator: some
+ * milliseconds, beside which the start of a solve is even. */
 enum { BASE_ITERATIONS = 20, HOST_ITERATIONS = 200, DEVICE_ITERATIONS = 4000, MOST_PAIRS = 1000 };
 
 struct options {

@@ -14,7 +14,7 @@ static void must(sadmm_status status, const sadmm_problem *problem)
     abort();
 }
 
-static void *room(size_t count, size_t size)
+static void *zeroed(size_t count, size_t size)
 {
     void *block = calloc(count ? count : 1, size);
     if (!block) abort();
@@ -26,8 +26,8 @@ static void *room(size_t count, size_t size)
 sadmm_problem *public_problem_stack(int count, double friction, double lean, double other)
 {
     const double half = 0.1, dt = 0.005, gravity = 9.81;
-    double *A = room((size_t)count, 36 * sizeof *A), *b = room((size_t)count, 6 * sizeof *b);
-    sadmm_problem_contact *contacts = room((size_t)count, 4 * sizeof *contacts);
+    double *A = zeroed((size_t)count, 36 * sizeof *A), *b = zeroed((size_t)count, 6 * sizeof *b);
+    sadmm_problem_contact *contacts = zeroed((size_t)count, 4 * sizeof *contacts);
     for (int i = 0; i < count; ++i) {
         double mass = i % 2 ? other : 1, inertia = mass * (2 * half) * (2 * half) / 6;
         for (int k = 0; k < 6; ++k) A[36 * i + 7 * k] = k < 3 ? mass : inertia;
@@ -106,9 +106,9 @@ sadmm_problem *public_problem_random(unsigned seed, int bodies, int contact_coun
 {
     state = seed * 2862933555777941757u + 3037000493u;
     int all = block_count + joint_count;
-    double *A = room((size_t)bodies, 36 * sizeof *A), *b = room((size_t)bodies, 6 * sizeof *b);
-    sadmm_problem_contact *contacts = room((size_t)contact_count, sizeof *contacts);
-    sadmm_problem_block *blocks = room((size_t)all, sizeof *blocks);
+    double *A = zeroed((size_t)bodies, 36 * sizeof *A), *b = zeroed((size_t)bodies, 6 * sizeof *b);
+    sadmm_problem_contact *contacts = zeroed((size_t)contact_count, sizeof *contacts);
+    sadmm_problem_block *blocks = zeroed((size_t)all, sizeof *blocks);
     random_bodies(bodies, A, b);
     for (int k = 0; k < contact_count; ++k) {
         sadmm_problem_contact *c = &contacts[k];

@@ -5,6 +5,8 @@
  * x_n = x_0 + v_0 t + a dt^2 n (n + 1) / 2, which is the parabola plus a t dt / 2. Where a test compares with the
  * discrete formula only rounding and the solver's error remain; where it compares with the continuous one, the
  * difference must shrink with dt.
+ *
+ * One file: the tests share `solvers` and their worlds, and test_cuda_analytic.c includes them as a whole.
  */
 #include <float.h>
 
@@ -487,7 +489,8 @@ START_TEST(a_sphere_bounces_when_it_touches)
 }
 END_TEST
 
-/* In the ground by more than the slop: out again by Baumgarte's share of that in a step, at the correction speed at most. */
+/* In the ground by more than the slop: out again by Baumgarte's share of that in a step, at the correction speed at
+ * most. */
 START_TEST(overlaps_are_pushed_out)
 {
     static const double depths[] = { 1e-3, 0.05 };
@@ -503,7 +506,8 @@ START_TEST(overlaps_are_pushed_out)
         step_world(world, 1);
         const double share = def.settings.baumgarte * (depths[k] - def.settings.slop) / def.settings.dt;
         ck_assert(share < 0.5 || k == 1);
-        ck_assert_double_eq_tol(body_state(world, id).linear_velocity[2], fmin(share, 0.5), 1e-9 + rounding_of(_i, 0.5));
+        ck_assert_double_eq_tol(body_state(world, id).linear_velocity[2], fmin(share, 0.5),
+                                1e-9 + rounding_of(_i, 0.5));
         sadmm_world_destroy(world);
     }
 }

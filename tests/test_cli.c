@@ -1,4 +1,5 @@
-/* The `subadmm` command as its users see it: exit codes, messages, JSON. What it does with files: test_outputs.c. */
+/* The `subadmm` command as its users see it: exit codes, messages, JSON. What it does with files: test_outputs.c.
+ * One file: all subcommands are run, and their JSON is read, by the same functions. */
 #include <check.h>
 #include <jansson.h>
 #include <math.h>

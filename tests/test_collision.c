@@ -1,4 +1,6 @@
-/* The collision pipeline: what it promises about pairs, points, filters, warm start, failures and repeatability. */
+/* The collision pipeline: what it promises about pairs, points, filters, warm start, failures and repeatability.
+ * One file: all of its tests put together the same small scene (make_scene, add_body, add_shape) and find contacts in
+ * it. */
 #include <check.h>
 #include <math.h>
 #include <stdlib.h>

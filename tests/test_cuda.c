@@ -211,8 +211,8 @@ START_TEST(cluster_sizes)
 }
 END_TEST
 
-/* The tier that is likely the fastest: small islands in blocks, a large one in a cluster, and all else that does not fit
- * in the two kernels of STREAM. */
+/* The tier that is likely the fastest: small islands in blocks, a large one in a cluster, and all else that does not
+ * fit in the two kernels of STREAM. */
 static struct contact_problem *scene_huge(void) { return contact_problem_pyramid(40, 0.5); }
 START_TEST(tiers_chosen)
 {

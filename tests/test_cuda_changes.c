@@ -1,6 +1,7 @@
-/* What changes between steps on a backend that keeps the world: states, wrenches and settings that are set while steps run
- * ahead, and a device that fails. Everything must be equal, to the last bit, to what the same kernels give when the host drives
- * them step by step (test_cuda_step.c). The same checks run on the emulated device (test_cuda_changes_emulated.c).
+/* What changes between steps on a backend that keeps the world: states, wrenches and settings that are set while steps
+ * run ahead, and a device that fails. Everything must be equal, to the last bit, to what the same kernels give when the
+ * host drives them step by step (test_cuda_step.c). The same checks run on the emulated device
+ * (test_cuda_changes_emulated.c).
  */
 #include <math.h>
 #include <stdint.h>
@@ -29,7 +30,8 @@ static void set_state(sadmm_world *world, int body, double x, double spin)
 
 /* ---- edits ------------------------------------------------------------------------------------------------------- */
 
-/* Several changes of one body before a step: the last one counts, of states and of wrenches, and neither disturbs the other. */
+/* Several changes of one body before a step: the last one counts, of states and of wrenches, and neither disturbs the
+ * other. */
 static void edit_often(sadmm_world *world, int step)
 {
     set_wrench(world, 1, 300, 400);
@@ -47,7 +49,8 @@ static void edit_often(sadmm_world *world, int step)
 
 static void expect_last_edit_wins(int precision)
 {
-    sadmm_world *host = small_world(precision, 1), *device = small_world(precision, 1), *queue = small_world(precision, 1);
+    sadmm_world *host = small_world(precision, 1), *device = small_world(precision, 1),
+                *queue = small_world(precision, 1);
     sadmm_world *worlds[] = {host, device, queue};
     by_host(host);
     for (int step = 0; step < 12; ++step) {
@@ -92,7 +95,8 @@ START_TEST(changes_of_a_body_do_not_pile_up)
 }
 END_TEST
 
-/* Getters between changes and steps, waited for or not: they give what was set, and the rest as the last step left it. */
+/* Getters between changes and steps, waited for or not: they give what was set, and the rest as the last step left
+ * it. */
 START_TEST(reading_between_changes)
 {
     const int precision = _i;
@@ -148,8 +152,8 @@ static void change_numbers(sadmm_world *world, int step)
     MUST(world, sadmm_world_set_settings(world, &s));
 }
 
-/* In both methods, with new weights and penalties in steps that start cold, a stop rule, and every tier: as by the host, which
- * stops all islands together: there is one. */
+/* In both methods, with new weights and penalties in steps that start cold, a stop rule, and every tier: as by the
+ * host, which stops all islands together: there is one. */
 START_TEST(numbers_of_the_settings_change_at_every_step)
 {
     enum { PAPER_COLD, PAPER, FAST_COLD, FAST, STOPPING, CASES_OF_SETTINGS };
@@ -259,8 +263,8 @@ static void change_before(sadmm_world *world, int64_t step)
     set_wrench(world, 1, 0.2, 0.3 * (double)step);
 }
 
-/* Steps in pairs, readings between them, and a body that is moved: until `FAILING_STEPS` are done, whatever fails. Returns how
- * many calls failed. */
+/* Steps in pairs, readings between them, and a body that is moved: until `FAILING_STEPS` are done, whatever fails.
+ * Returns how many calls failed. */
 static int go_on_to_the_end(sadmm_world *world, const char *what)
 {
     for (int failed = 0;;) {
@@ -287,7 +291,8 @@ static int go_on_to_the_end(sadmm_world *world, const char *what)
         }
         if (status == SADMM_OK) continue;
         ++failed;
-        ck_assert_msg(status == SADMM_ERROR_DEVICE, "%s: %s: %s", what, sadmm_status_name(status), sadmm_world_message(world));
+        ck_assert_msg(status == SADMM_ERROR_DEVICE, "%s: %s: %s", what, sadmm_status_name(status),
+                      sadmm_world_message(world));
         ck_assert_msg(strstr(sadmm_world_message(world), "CUDA device 0: ") != NULL, "%s", sadmm_world_message(world));
         ck_assert_msg(failed <= 1, "%s: fails again: %s", what, sadmm_world_message(world));
     }
@@ -324,8 +329,8 @@ static void expect_lost(sadmm_world *world, sadmm_status status)
     ck_assert_msg(strstr(sadmm_world_message(world), "CUDA device 0: ") != NULL, "%s", sadmm_world_message(world));
 }
 
-/* The device is lost while steps run ahead: every step says so, everything that the host had read is there, and what was set; and
- * when the device is back, the world goes on from there. */
+/* The device is lost while steps run ahead: every step says so, everything that the host had read is there, and what
+ * was set; and when the device is back, the world goes on from there. */
 START_TEST(a_device_that_is_lost)
 {
     const int precision = _i / 2, all_read = _i % 2;

@@ -3,7 +3,8 @@
  * Every formula is the host's, in double and without contraction, so there are no tolerances: a difference of one bit
  * in a gap or an arm is a failure. Inputs are scenes that the CPU backend steps and random soups. The same checks run
  * on the emulated device (test_cuda_collision_emulated.c, cuda_emulation/), where every build can run them; here they
- * run on a real one, or the program is skipped and says why.
+ * run on a real one, or the program is skipped and says why. One file: nearly all tests run the same two pipelines
+ * (`both`), most of them on the same random soups.
  */
 #include "scene_tools.h"
 
@@ -31,7 +32,7 @@ struct both {
     struct sadmm_contact_set host_set, device_set;
 };
 
-/* radix: with the sort and the scan of large scenes, whatever the room. */
+/* radix: with the sort and the scan of large scenes, whatever the capacities. */
 static struct both both_new_tuned(int32_t tree_from, bool radix)
 {
     struct both b = {0};
@@ -70,7 +71,8 @@ static void check_same(const struct sadmm_contact_set *host, const struct sadmm_
                       "%s: pair %zu is %d-%d, child %u, instead of %d-%d, child %u", about, i, q->shape_a, q->shape_b,
                       q->child, p->shape_a, p->shape_b, p->child);
         ck_assert_msg(p->body_a == q->body_a && p->body_b == q->body_b && p->first == q->first &&
-                          p->count == q->count && p->cache == q->cache && p->revision == q->revision && p->placed == q->placed,
+                          p->count == q->count && p->cache == q->cache && p->revision == q->revision &&
+                          p->placed == q->placed,
                       "%s: pair %zu (shapes %d-%d): %d points from %d, cache %u instead of %d from %d, cache %u", about,
                       i, p->shape_a, p->shape_b, q->count, q->first, q->cache, p->count, p->first, p->cache);
         ck_assert_msg(same_numbers(p->normal, q->normal, 3) && same_numbers(&p->friction, &q->friction, 1) &&
@@ -455,11 +457,11 @@ START_TEST(scenes_equal_host)
 }
 END_TEST
 
-/* ---- room ------------------------------------------------------------------------------------------------------ */
+/* ---- capacities ------------------------------------------------------------------------------------------------ */
 
-/* A find that starts with room for one candidate and one point repeats until everything fits, and drops nothing; then
- * nothing is allocated any more while the numbers stay. */
-START_TEST(room_grows)
+/* A find that starts with capacities of one candidate and one point repeats until everything fits, and drops nothing;
+ * then nothing is allocated any more while the numbers stay. */
+START_TEST(capacities_grow)
 {
     const struct soup_kind *kind = &soups[_i % SOUPS];
     struct soup s = soup_new(kind, 3);
@@ -471,7 +473,7 @@ START_TEST(room_grows)
     struct sadmm_cuda_collision_stats first = COLLISION(stats)(b.device);
     ck_assert_int_gt(out.counts.points, 1);
     ck_assert_int_ge(first.repeats, 1);
-    ck_assert_int_le(first.repeats, 2); /* each kind of room once: the counts are exact */
+    ck_assert_int_le(first.repeats, 2); /* each capacity once: the counts are exact */
     ck_assert_int_ge(first.candidate_capacity, out.counts.candidates);
     ck_assert_int_ge(first.point_capacity, out.counts.points);
 
@@ -487,8 +489,8 @@ START_TEST(room_grows)
 }
 END_TEST
 
-/* Room that lacks in the middle of a run: the previous step's impulses are still there for the repeated stage. */
-START_TEST(room_grows_later)
+/* Capacities too small in the middle of a run: the previous step's impulses are still there for the repeated stage. */
+START_TEST(capacities_grow_later)
 {
     const struct soup_kind *kind = &soups[6];
     struct soup s = soup_new(kind, 4);
@@ -499,7 +501,7 @@ START_TEST(room_grows_later)
     both_start_from(&b, &b.host_set);
     for (int step = 0; step < 3; ++step) {
         COLLISION(tune)(b.device, &tight);
-        both_find(&b, &s.input, "after the room was taken away");
+        both_find(&b, &s.input, "after the capacities were taken back");
         soup_advance(&s, kind);
     }
     ck_assert_int_ge(COLLISION(stats)(b.device).repeats, 3);
@@ -607,8 +609,9 @@ START_TEST(slots_are_reused)
 }
 END_TEST
 
-/* Pairs are matched by (shape, shape, child): of the four manifolds of two cubes the last step had all but the second. Each
- * goes on with its own impulses and its own axis (two are equally good), and the one that was not there starts without. */
+/* Pairs are matched by (shape, shape, child): of the four manifolds of two cubes the last step had all but the second.
+ * Each goes on with its own impulses and its own axis (two are equally good), and the one that was not there starts
+ * without. */
 START_TEST(children_are_matched_by_number)
 {
     struct sadmm_geometry geometries[3] = {geometry_of(SADMM_SHAPE_BOX, 0.05, 0.05, 0.05),
@@ -665,8 +668,8 @@ START_TEST(children_are_matched_by_number)
 }
 END_TEST
 
-/* What collision knows nothing of is refused when it is loaded, as on the host, so that no kernel ever sees it; the current
- * set stays. */
+/* What collision knows nothing of is refused when it is loaded, as on the host, so that no kernel ever sees it; the
+ * current set stays. */
 START_TEST(shapes_without_manifolds_are_refused)
 {
     enum { MANY = 70000 };
@@ -703,7 +706,8 @@ START_TEST(shapes_without_manifolds_are_refused)
         ++shapes[1].revision;
         for (int time = 0; time < 2; ++time) {
             ck_assert_int_eq(COLLISION(find)(b.device, NULL, &input, &out, &error), SADMM_ERROR_INVALID_ARGUMENT);
-            ck_assert_msg(strstr(error.message, bad[i].words) != NULL, "%s: does not say %s", error.message, bad[i].words);
+            ck_assert_msg(strstr(error.message, bad[i].words) != NULL, "%s: does not say %s", error.message,
+                          bad[i].words);
         }
         OK(COLLISION(download)(b.device, NULL, &b.device_set, error));
         check_same(&b.host_set, &b.device_set, bad[i].words);
@@ -918,8 +922,8 @@ int main(void)
     tcase_set_timeout(tests, 60);
     tcase_add_loop_test(tests, soups_equal_host, 0, SOUPS);
     tcase_add_loop_test(tests, scenes_equal_host, 0, 2 * SCENES);
-    tcase_add_loop_test(tests, room_grows, 0, 2 * SOUPS);
-    tcase_add_test(tests, room_grows_later);
+    tcase_add_loop_test(tests, capacities_grow, 0, 2 * SOUPS);
+    tcase_add_test(tests, capacities_grow_later);
     tcase_add_loop_test(tests, few_shapes, 0, 2);
     tcase_add_test(tests, one_place);
     tcase_add_test(tests, slots_are_reused);

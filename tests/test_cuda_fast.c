@@ -1,6 +1,7 @@
 /* The method `fast` on the CUDA backend: its entries against the CPU's from identical inputs, and tiers that must agree
  * to the last bit, weights, levels and limit included. test_fast.c drives every registered table beside the literal
- * backend. The same checks run on the emulated device (test_cuda_fast_emulated.c). */
+ * backend. The same checks run on the emulated device (test_cuda_fast_emulated.c). One file: its tests share
+ * how runs are started, iterated and compared. */
 #include <float.h>
 
 #include "core/solve/certificate.h"
@@ -45,9 +46,9 @@ static int32_t limit(struct runner *r)
 /* One pass: weights, factor, an iteration, its residuals, new weights, another iteration. As in test_cuda.c, rounding
  * of the inputs (6e-8, 1e-16) by a condition number of A + C of a hundred or a few. */
 static const double entry_tolerance[2] = {1e-5, 5e-14};
-/* All batches: 71 iterations. One does not take two states apart in the norm of A + beta C, so that what is rounded is passed
- * on at most as it is; in the largest velocity it may show larger by the square root of what that norm differs by between
- * bodies that touch, of their masses' ratio of 100 (as scene_tolerance in table_runner.h). */
+/* All batches: 71 iterations. One does not take two states apart in the norm of A + beta C, so that what is rounded is
+ * passed on at most as it is; in the largest velocity it may show larger by the square root of what that norm differs
+ * by between bodies that touch, of their masses' ratio of 100 (as scene_tolerance in table_runner.h). */
 static const double run_tolerance[2] = {71 * 10 * FLT_EPSILON / 2, 71 * 10 * DBL_EPSILON / 2};
 
 /* The largest |v| and |lambda| so far: a velocity on its way to 0 is not measured by itself. */
@@ -166,7 +167,8 @@ static void start_unrelaxed(struct runner *r, const struct sadmm_kernels *k, enu
     runner_assemble(r);
 }
 
-/* Without over-relaxation every iteration is plain: it keeps the projected multipliers, not the old ones and a change. */
+/* Without over-relaxation every iteration is plain: it keeps the projected multipliers, not the old ones and a
+ * change. */
 START_TEST(unrelaxed_tiers_agree)
 {
     const struct sadmm_kernels *table = tables[_i];
@@ -213,8 +215,8 @@ START_TEST(batches_go_on)
 }
 END_TEST
 
-/* Sums over islands of several powers of sixteen, and islands that begin anywhere: chains of one contact each, one of them
- * of more than two thousand bodies. */
+/* Sums over islands of several powers of sixteen, and islands that begin anywhere: chains of one contact each, one of
+ * them of more than two thousand bodies. */
 static struct contact_problem *chains(void)
 {
     static const double up[3] = {0, 0, 1};
@@ -250,7 +252,7 @@ END_TEST
 
 /* A column of boxes at rest with the impulses that hold it, and gaps of some um: loads pass 60 bodies, so that warm
  * steps take larger weights and ease the gaps (math/weight.h). */
-static void start_tall(struct runner *r, const struct sadmm_kernels *k, enum sadmm_cuda_tier tier)
+static void start_deep_stack(struct runner *r, const struct sadmm_kernels *k, enum sadmm_cuda_tier tier)
 {
     static const double up[3] = {0, 0, 1};
     enum { BOXES = 60 };
@@ -273,19 +275,19 @@ static void start_tall(struct runner *r, const struct sadmm_kernels *k, enum sad
     runner_assemble(r);
 }
 
-START_TEST(tall_islands)
+START_TEST(deep_stacks)
 {
     const struct sadmm_kernels *table = tables[_i];
     struct runner ref, own[MOST_TIERS];
     struct scales scales = {0, 0};
-    start_tall(&ref, cpu(), SADMM_CUDA_TIER_AUTO);
+    start_deep_stack(&ref, cpu(), SADMM_CUDA_TIER_AUTO);
     iterate(&ref, 3, false);
     for (size_t t = tier_count; t-- > 0;) {
-        start_tall(&own[t], table, tiers[t]);
+        start_deep_stack(&own[t], table, tiers[t]);
         iterate(&own[t], 3, false);
         /* three iterations of an entry's error each */
-        compare(&own[t], &ref, &scales, 3 * entry_tolerance[table->precision], "tall");
-        if (t + 1 < tier_count) check_same(&own[t], &own[tier_count - 1], "tall, tiers");
+        compare(&own[t], &ref, &scales, 3 * entry_tolerance[table->precision], "deep stack");
+        if (t + 1 < tier_count) check_same(&own[t], &own[tier_count - 1], "deep stack, tiers");
     }
     for (size_t t = 0; t < tier_count; ++t) runner_stop(&own[t]);
     runner_stop(&ref);
@@ -362,7 +364,7 @@ START_TEST(runs_repeat)
 }
 END_TEST
 
-/* To a certificate, in no more iterations than the CPU (20 are one look). */
+/* To a certificate, in no more iterations than the CPU (a convergence check every 20). */
 START_TEST(solutions_are_certified)
 {
     static const char *const names[] = {"pyramid", "towers, frictionless", "octagons, frictionless"};
@@ -385,7 +387,7 @@ START_TEST(solutions_are_certified)
 }
 END_TEST
 
-static int32_t look(struct runner *r, int done)
+static int32_t check_convergence(struct runner *r, int done)
 {
     int32_t unmet = -1;
     if (r->k->precision == SADMM_F32) CALL(r, SYMBOL(check_convergence, f32)(r->c, done, &unmet, &r->error));
@@ -394,7 +396,8 @@ static int32_t look(struct runner *r, int done)
 }
 
 /* The stop rule asks for the natural map alone: what is nothing in momentum an island of a step decides for itself. */
-static void start_with_rule(struct runner *r, const struct sadmm_kernels *k, const struct scene *scene, enum sadmm_cuda_tier tier)
+static void start_with_rule(struct runner *r, const struct sadmm_kernels *k, const struct scene *scene,
+                            enum sadmm_cuda_tier tier)
 {
     start(r, k, scene, tier);
     r->settings.certificate_tolerance = 1e-3;
@@ -403,9 +406,9 @@ static void start_with_rule(struct runner *r, const struct sadmm_kernels *k, con
     runner_assemble(r);
 }
 
-/* Looks of every tier find as many islands above the tolerance as the certificate does, whatever their constraints are, row blocks
- * included; and islands that met it stay as they are. */
-START_TEST(looks_find_what_the_certificate_does)
+/* Convergence checks of every tier find as many islands above the tolerance as the certificate does, whatever their
+ * constraints are, row blocks included; and islands that met it stay as they are. */
+START_TEST(convergence_checks_find_what_the_certificate_does)
 {
     static const int counts[] = {1, 4, 15, 40};
     const struct sadmm_kernels *table = tables[_i / SCENES];
@@ -424,8 +427,8 @@ START_TEST(looks_find_what_the_certificate_does)
             iterate(&own, counts[k], false);
             done += counts[k];
             snprintf(what, sizeof what, "%s, tier %d, %d iterations", scene->name, (int)tiers[t], done);
-            unmet = look(&own, done);
-            ck_assert_int_eq(unmet, look(&stream, done));
+            unmet = check_convergence(&own, done);
+            ck_assert_int_eq(unmet, check_convergence(&stream, done));
             check_same(&own, &stream, what);
             CALL(&own, sadmm_certify(&own.p->system, &own.settings, &certificate, &own.error));
             ck_assert_msg(unmet == certificate.islands_above, "%s: %d islands, the certificate has %lld", what, unmet,
@@ -493,13 +496,14 @@ int main(void)
     for (int p = 0; p < parts; ++p) {
         const int first = p * SCENES, some = first + (parts == 2 ? SCENES : SCENES / 3);
         add_case(suite, p ? "entries_f64" : "entries_f32", entries_equal_cpu, first, first + SCENES);
-        add_case(suite, p ? "looks_f64" : "looks_f32", looks_find_what_the_certificate_does, first, some);
+        add_case(suite, p ? "checks_f64" : "checks_f32", convergence_checks_find_what_the_certificate_does, first,
+                 some);
         add_case(suite, p ? "tiers_f64" : "tiers_f32", tiers_agree, first, some);
     }
     ADD_CASE(suite, unrelaxed_tiers_agree, 0, parts);
     ADD_CASE(suite, batches_go_on, 0, 3 * parts);
     ADD_CASE(suite, many_bodies, 0, parts);
-    ADD_CASE(suite, tall_islands, 0, parts);
+    ADD_CASE(suite, deep_stacks, 0, parts);
     ADD_CASE(suite, aborted_does_nothing, 0, parts);
     ADD_CASE(suite, runs_repeat, 0, parts);
     ADD_CASE(suite, solutions_are_certified, 0, parts);

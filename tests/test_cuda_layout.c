@@ -1,6 +1,7 @@
 /* The CUDA backend's layout (device/layout.h) against a plain construction on the host: statistics, slots, lists of
  * sides and every boundary of every part, number for number. On a real device, or skipped; test_cuda_layout_emulated.c
- * runs the same on the emulated one. */
+ * runs the same on the emulated one. One file: more than half of it, the graphs and the plain construction, is used by
+ * nearly every test. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -170,8 +171,8 @@ enum { GRAPHS = sizeof graphs / sizeof *graphs };
 
 struct host_layout {
     const struct contact_problem *p;
-    int32_t n, records, room; /* room: records of pairs, before those of blocks */
-    int32_t *label;           /* raw body -> smallest body of its island */
+    int32_t n, records, pair_capacity; /* pair_capacity: records of pairs, before those of blocks */
+    int32_t *label;                    /* raw body -> smallest body of its island */
     struct cuda_layout_copy wanted;
 };
 
@@ -181,9 +182,9 @@ static void record_bodies(const struct host_layout *h, int32_t record, int32_t b
     if (record < (int32_t)h->p->contacts.pair_count) {
         body[0] = h->p->contacts.pairs[record].body_a;
         body[1] = h->p->contacts.pairs[record].body_b;
-    } else if (record >= h->room) {
-        body[0] = h->p->blocks[record - h->room].body_a;
-        body[1] = h->p->blocks[record - h->room].body_b;
+    } else if (record >= h->pair_capacity) {
+        body[0] = h->p->blocks[record - h->pair_capacity].body_a;
+        body[1] = h->p->blocks[record - h->pair_capacity].body_b;
     }
 }
 
@@ -275,8 +276,8 @@ static struct host_layout host_new(const struct contact_problem *p, bool warm_st
     memset(&h, 0, sizeof h);
     h.p = p;
     h.n = p->system.body_count;
-    h.room = (int32_t)(p->contacts.pair_count + 31) / 32 * 32;
-    h.records = h.room + p->block_count;
+    h.pair_capacity = (int32_t)(p->contacts.pair_count + 31) / 32 * 32;
+    h.records = h.pair_capacity + p->block_count;
     h.label = numbers((size_t)h.n);
     h.wanted = copy_new(&h);
     label_bodies(&h);

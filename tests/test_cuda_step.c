@@ -1,8 +1,9 @@
 /* Whole steps on the device (backend_cuda/device/step.h) against the same kernels driven by the host, step by step.
  *
- * Contacts are the same bits on both sides, and so are the solver's kernels: everything that can be read of a world must be
- * equal to the last bit, however the steps were enqueued, planned or repeated. A stop rule that is never met sends a
- * world through the host: `by_host`. The same checks run on the emulated device (test_cuda_step_emulated.c).
+ * Contacts are the same bits on both sides, and so are the solver's kernels: everything that can be read of a world
+ * must be equal to the last bit, however the steps were enqueued, planned or repeated. A stop rule that is never met
+ * sends a world through the host: `by_host`. The same checks run on the emulated device (test_cuda_step_emulated.c).
+ * One file: nearly every test makes this one comparison (expect_same_world), in another situation.
  */
 #include <math.h>
 #include <stdint.h>
@@ -64,7 +65,8 @@ START_TEST(resident_steps_equal_steps_by_host)
 }
 END_TEST
 
-/* The queue, however long, gives what single steps give; also where its first steps have to be repeated with more room. */
+/* The queue, however long, gives what single steps give; also where its first steps have to be repeated with larger
+ * capacities. */
 START_TEST(enqueued_steps_equal_single_steps)
 {
     const int precision = _i;
@@ -269,8 +271,8 @@ START_TEST(a_step_that_fails_leaves_the_world_before_it)
 }
 END_TEST
 
-/* Contacts that were read before a step that fails can be read after it; those that were not are gone with it, and calls
- * that have no status leave its error for the next one that has. */
+/* Contacts that were read before a step that fails can be read after it; those that were not are gone with it, and
+ * calls that have no status leave its error for the next one that has. */
 START_TEST(contacts_after_a_step_that_fails)
 {
     const int precision = _i;
@@ -302,7 +304,8 @@ START_TEST(contacts_after_a_step_that_fails)
     ck_assert(memcmp(contacts[0], contacts[1], (size_t)count * sizeof *contacts[0]) == 0);
     const int32_t bodies = sadmm_problem_body_count(frozen[0]);
     double *b[2] = {calloc((size_t)bodies, 6 * sizeof(double)), calloc((size_t)bodies, 6 * sizeof(double))};
-    for (int pass = 0; pass < 2; ++pass) ck_assert_int_eq(sadmm_problem_get_bodies(frozen[pass], NULL, b[pass], NULL), SADMM_OK);
+    for (int pass = 0; pass < 2; ++pass)
+        ck_assert_int_eq(sadmm_problem_get_bodies(frozen[pass], NULL, b[pass], NULL), SADMM_OK);
     ck_assert(memcmp(b[0], b[1], 6 * (size_t)bodies * sizeof(double)) == 0);
 
     /* Not read before: another step, then one that fails. */
@@ -419,7 +422,8 @@ static sadmm_world *tall_tower(int precision)
     return world;
 }
 
-/* Steps that the host makes, with the same kernels, between steps on the device: those with more looks than fit a graph. */
+/* Steps that the host makes, with the same kernels, between steps on the device: those with more convergence checks
+ * than fit a graph. */
 START_TEST(steps_by_host_in_between)
 {
     const int precision = _i;
@@ -441,8 +445,9 @@ START_TEST(steps_by_host_in_between)
 }
 END_TEST
 
-/* With a stop rule: where balls rest a box lands, with four points where the plan has one. What the step still does, looks
- * included, stays within what was planned for (the address sanitizer sees it), and it is repeated. */
+/* With a stop rule: where balls rest a box lands, with four points where the plan has one. What the step still does,
+ * convergence checks included, stays within what was planned for (the address sanitizer sees it), and it is
+ * repeated. */
 START_TEST(more_points_than_planned_with_a_stop_rule)
 {
     const int precision = _i;
@@ -471,7 +476,8 @@ START_TEST(more_points_than_planned_with_a_stop_rule)
 }
 END_TEST
 
-/* A box of a tower is turned: pairs have eight points where the plan has four. The step is repeated, and is the host's. */
+/* A box of a tower is turned: pairs have eight points where the plan has four. The step is repeated, and is the
+ * host's. */
 START_TEST(more_points_than_planned_in_a_tall_tower)
 {
     const int precision = _i;
@@ -494,7 +500,8 @@ START_TEST(more_points_than_planned_in_a_tall_tower)
 END_TEST
 
 /* Two towers that do not touch each other, or one of them, `lift` above the ground, with a stop rule. */
-static sadmm_world *stopping_towers(int first, int count, double lift, int precision, double tolerance, int check_period)
+static sadmm_world *stopping_towers(int first, int count, double lift, int precision, double tolerance,
+                                    int check_period)
 {
     sadmm_world_def def = sadmm_world_def_default();
     def.backend = SADMM_BACKEND_CPU;
@@ -513,8 +520,8 @@ static sadmm_world *stopping_towers(int first, int count, double lift, int preci
     return world;
 }
 
-/* The stop rule of whole steps: in every tier an island stops when it would stop if it were alone, and then as the host's
- * look at the certificate has it. */
+/* The stop rule of whole steps: in every tier an island stops when it would stop if it were alone, and then as the
+ * host's convergence check has it. */
 START_TEST(islands_stop_by_themselves)
 {
     static const enum sadmm_cuda_tier stopping_tiers[] = {SADMM_CUDA_TIER_BLOCK, SADMM_CUDA_TIER_STREAM,
@@ -539,17 +546,20 @@ START_TEST(islands_stop_by_themselves)
         for (int t = 0; t < 2; ++t) {
             MUST(alone[t], sadmm_world_step(alone[t]));
             want[t] = world_report(alone[t]);
-            if (want[t].contacts == 0 && got.contacts > 0) want[t].iterations = 3; /* in the air: until the first look */
+            if (want[t].contacts == 0 && got.contacts > 0)
+                want[t].iterations = 3; /* in the air: until the first check */
             left += !want[t].converged && want[t].contacts > 0;
             for (int i = 0; i < 3; ++i) {
-                sadmm_body_state a = body_state(both, body_at(both, 1 + 3 * t + i)), b = body_state(alone[t], body_at(alone[t], 1 + i));
+                sadmm_body_state a = body_state(both, body_at(both, 1 + 3 * t + i)),
+                                 b = body_state(alone[t], body_at(alone[t], 1 + i));
                 ck_assert_msg(memcmp(&a, &b, sizeof a) == 0, "step %d, tower %d, box %d", step, t, i);
             }
         }
-        if (step == 0) continue; /* the first step is the host's, which looks at all islands together */
+        if (step == 0) continue; /* the first step is the host's, which checks all islands together */
         ck_assert_int_eq(got.converged, left == 0);
         ck_assert_int_eq(got.certificate.islands_above, left);
-        ck_assert_int_eq(got.iterations, want[0].iterations > want[1].iterations ? want[0].iterations : want[1].iterations);
+        ck_assert_int_eq(got.iterations,
+                         want[0].iterations > want[1].iterations ? want[0].iterations : want[1].iterations);
         ck_assert_double_eq_tol(got.iterations_mean, (want[0].iterations + want[1].iterations) / 2.0, 1e-12);
         apart += want[0].iterations != want[1].iterations;
         above += left > 0;
@@ -561,13 +571,14 @@ START_TEST(islands_stop_by_themselves)
 }
 END_TEST
 
-/* One island: every tier stops after as many iterations, with the same bits; what stopped meets the tolerance; and a rule that
- * is looked at only at the end changes nothing. */
+/* One island: every tier stops after as many iterations, with the same bits; what stopped meets the tolerance; and a
+ * rule that is looked at only at the end changes nothing. */
 START_TEST(tiers_stop_alike)
 {
     const int precision = _i, steps = EMULATED ? 8 : 60;
     const double tolerance = precision == SADMM_F32 ? 1e-5 : 1e-7;
-    sadmm_world *first = stopping_towers(1, 1, 0.001, precision, tolerance, 4), *budget = stopping_towers(1, 1, 0.001, precision, 0, 4),
+    sadmm_world *first = stopping_towers(1, 1, 0.001, precision, tolerance, 4),
+                *budget = stopping_towers(1, 1, 0.001, precision, 0, 4),
                 *late = stopping_towers(1, 1, 0.001, precision, 1e-300, 60);
     sadmm_settings settings = sadmm_world_settings(first);
     settings.certify = true;
@@ -600,7 +611,7 @@ START_TEST(tiers_stop_alike)
     }
     step_world(budget, steps);
     step_world(late, steps);
-    expect_same_world(budget, late, "a look at the end");
+    expect_same_world(budget, late, "a check at the end");
     ck_assert_int_eq(world_report(late).converged, false);
     ck_assert_int_eq(world_report(late).certificate.islands_above, 1);
     /* nothing of the rule is left without it */
@@ -667,7 +678,8 @@ START_TEST(lack_of_memory)
 }
 END_TEST
 
-/* Contacts are read with the bodies of their step. Where a step has begun to replace these and failed, there are none. */
+/* Contacts are read with the bodies of their step. Where a step has begun to replace these and failed, there are
+ * none. */
 START_TEST(contacts_are_read_with_their_own_bodies)
 {
     sadmm_world *world = towers(2, 1, 0.5, _i);
@@ -714,7 +726,8 @@ START_TEST(calls_that_fail)
         if (reached && status != SADMM_OK) {
             ++failed;
             ck_assert_msg(status == SADMM_ERROR_DEVICE, "call %ld: %s", calls, sadmm_status_name(status));
-            ck_assert_msg(strstr(sadmm_world_message(world), "CUDA device 0: ") != NULL, "%s", sadmm_world_message(world));
+            ck_assert_msg(strstr(sadmm_world_message(world), "CUDA device 0: ") != NULL, "%s",
+                          sadmm_world_message(world));
         }
         sadmm_world_destroy(world);
         ck_assert_msg(cuda_emulation_allocations == 0, "call %ld: %ld left", calls, cuda_emulation_allocations);
@@ -732,7 +745,8 @@ int main(void)
     const int parts = tested_precisions();
     Suite *suite = suite_create("cuda_step");
     for (int p = 0; p < parts; ++p)
-        add_case(suite, p ? "resident_f64" : "resident_f32", resident_steps_equal_steps_by_host, p * CASES, (p + 1) * CASES);
+        add_case(suite, p ? "resident_f64" : "resident_f32", resident_steps_equal_steps_by_host, p * CASES,
+                 (p + 1) * CASES);
     ADD_CASE(suite, enqueued_steps_equal_single_steps, 0, parts);
     ADD_CASE(suite, changes_between_steps_equal_those_by_host, 0, parts);
     ADD_CASE(suite, what_is_kept_between_steps, 0, parts * SCENES_BETWEEN);

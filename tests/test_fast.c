@@ -1,5 +1,7 @@
-/* The method `fast`: every table's iterates are the plainly written ones of `ref`, whatever the threads; its weights are
- * what docs/algorithm.md says; its solutions are certified, in few iterations; and it is safe with too few.
+/* The method `fast`: every table's iterates are the plainly written ones of `ref`, whatever the threads; its weights
+ * are what docs/algorithm.md says; its solutions are certified, in few iterations; and it is safe with too few.
+ * One file: weights, iterates and solutions are tested on the same problems (deep_stack, the scenes of table_runner.h)
+ * and by the same runners.
  */
 #include "backend_ref/literal.h"
 #include "core/solve/certificate.h"
@@ -77,10 +79,11 @@ START_TEST(tables_equal_ref)
     double tolerance = scene_tolerance(scene, table);
     ck_assert_msg(relative(v) <= tolerance, "%s: v differs by %g", scene->name, relative(v));
     ck_assert_msg(relative(lambda) <= tolerance, "%s: lambda differs by %g", scene->name, relative(lambda));
-    /* Differences of what was just compared, so that they are off by as much, and by the roundings of their own terms. */
+    /* Differences of what was just compared, so that they are off by as much, and by the roundings of their own
+     * terms. */
     double rounding = 4 * table_epsilon(table);
-    ck_assert_msg(primal.difference <= tolerance * primal.scale + rounding * v.scale, "%s: primal residual differs by %g of %g",
-                  scene->name, primal.difference, primal.scale);
+    ck_assert_msg(primal.difference <= tolerance * primal.scale + rounding * v.scale,
+                  "%s: primal residual differs by %g of %g", scene->name, primal.difference, primal.scale);
     ck_assert_msg(dual.difference <= tolerance * dual.scale + rounding * largest_impulse(&lambda, &ref),
                   "%s: dual residual differs by %g of %g", scene->name, dual.difference, dual.scale);
     runner_stop(&ref);
@@ -151,9 +154,9 @@ END_TEST
 
 /* ---- weights ----------------------------------------------------------------------------------------------------- */
 
-/* A cube of mass m at rest, carried by four points with m g dt / 4 each: g = J^T lambda changes its velocity by V = g dt,
- * and the load of a point over V is m / 4. Mean response of a point at (h, h, -h): 1/m for the push, and for a torque
- * [r]x over the moment 2/3 m h^2 on average 2/3 |r|^2 / (2/3 m h^2) = 3/m. So B = m/4 + phi m/4, phi = 3. */
+/* A cube of mass m at rest, carried by four points with m g dt / 4 each: g = J^T lambda changes its velocity by
+ * V = g dt, and the load of a point over V is m / 4. Mean response of a point at (h, h, -h): 1/m for the push, and for
+ * a torque [r]x over the moment 2/3 m h^2 on average 2/3 |r|^2 / (2/3 m h^2) = 3/m. So B = m/4 + phi m/4, phi = 3. */
 START_TEST(weight_is_the_mass_carried)
 {
     struct contact_problem *problem = contact_problem_stack((double[]){2}, 1, 0.5);
@@ -173,10 +176,10 @@ START_TEST(weight_is_the_mass_carried)
 }
 END_TEST
 
-/* N cubes of 1 kg on top of each other, at rest on exact impulses: the forces that the bodies feel add up to N^2 m g, twice
- * but for the one at the top, so that a load passes N / 2 bodies; stack_depth N / 20. Gaps of 1 um under every third
- * cube. */
-static struct contact_problem *tall_stack(int count)
+/* N cubes of 1 kg on top of each other, at rest on exact impulses: the forces that the bodies feel add up to N^2 m g,
+ * twice but for the one at the top, so that a load passes N / 2 bodies; stack_depth N / 20. Gaps of 1 um under every
+ * third cube. */
+static struct contact_problem *deep_stack(int count)
 {
     double masses[64];
     for (int i = 0; i < count; ++i) masses[i] = 1;
@@ -189,9 +192,9 @@ static struct contact_problem *tall_stack(int count)
     return problem;
 }
 
-START_TEST(tall_islands_are_stiff)
+START_TEST(deep_stacks_are_stiff)
 {
-    struct contact_problem *problem = tall_stack(30);
+    struct contact_problem *problem = deep_stack(30);
     struct scene warm = scenes[0];
     struct runner r;
     warm.warm = true;
@@ -212,7 +215,8 @@ START_TEST(tall_islands_are_stiff)
 }
 END_TEST
 
-/* A table's solution is ref's within a tolerance (the spreads say how far off it was), and the same bits by more threads. */
+/* A table's solution is ref's within a tolerance (the spreads say how far off it was), and the same bits by more
+ * threads. */
 static void expect_agreement(struct runner *own, struct runner *threads, struct spread *v, double v_tolerance,
                              struct spread *lambda, double lambda_tolerance)
 {
@@ -224,10 +228,10 @@ static void expect_agreement(struct runner *own, struct runner *threads, struct 
 }
 
 /* The same in every table, whatever the threads: at rest, and at a quarter of V. */
-START_TEST(tall_tables_equal_ref)
+START_TEST(deep_stacks_equal_ref)
 {
     const struct sadmm_kernels *table = tables[_i / 2];
-    struct contact_problem *problem = tall_stack(30);
+    struct contact_problem *problem = deep_stack(30);
     struct scene warm = scenes[0];
     struct spread v = {0, 0}, lambda = {0, 0};
     struct runner ref, own, three;
@@ -254,7 +258,7 @@ START_TEST(tall_tables_equal_ref)
 }
 END_TEST
 
-static sadmm_settings few_settings(int iterations, int threads)
+static sadmm_settings warm_settings(int iterations, int threads)
 {
     sadmm_settings s = scene_settings(&scenes[0]);
     s.method = SADMM_METHOD_FAST;
@@ -264,18 +268,18 @@ static sadmm_settings few_settings(int iterations, int threads)
     return s;
 }
 
-/* Three cubes on exact impulses: load / V of the lowest contacts is 3/4 kg a point, twice that with half the 60 iterations
- * that are not few; less the faster the stack moves by itself, and no more than the stack's 3 kg. Of the highest
- * contacts it is 1/4 kg, and phi / w half as much, since both cubes give way. */
-START_TEST(few_iterations_weigh_more)
+/* Three cubes on exact impulses: load / V of the lowest contacts is 3/4 kg a point, twice that with half the 60
+ * iterations that are not few; less the faster the stack moves by itself, and no more than the stack's 3 kg. Of the
+ * highest contacts it is 1/4 kg, and phi / w half as much, since both cubes give way. */
+START_TEST(under_iterated_weights_are_larger)
 {
     static const struct {
         int iterations;
         double speed, factor; /* over V */
     } cases[] = {{60, 0, 1}, {100, 0, 1}, {30, 0, 2}, {20, 0, 3}, {1, 0, 6}, {30, 0.5, 2}, {30, 1.6, 1.25}, {30, 4, 1}};
     for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
-        struct contact_problem *problem = tall_stack(3);
-        sadmm_settings settings = few_settings(cases[k].iterations, 1);
+        struct contact_problem *problem = deep_stack(3);
+        sadmm_settings settings = warm_settings(cases[k].iterations, 1);
         struct runner r;
         for (int i = 0; i < 3; ++i) problem->system.velocity[6 * i] = cases[k].speed * 9.81 * 0.005;
         runner_start_settings(&r, literal(), &settings, problem);
@@ -293,8 +297,8 @@ START_TEST(few_iterations_of_a_problem_weigh_the_same)
 {
     double weight[2];
     for (int k = 0; k < 2; ++k) {
-        struct contact_problem *problem = tall_stack(3);
-        sadmm_settings settings = few_settings(k ? 5 : 100, 1);
+        struct contact_problem *problem = deep_stack(3);
+        sadmm_settings settings = warm_settings(k ? 5 : 100, 1);
         struct runner r;
         contact_problem_raw(problem, &settings, 0);
         runner_start_settings(&r, literal(), &settings, problem);
@@ -322,12 +326,12 @@ END_TEST
 
 /* A stack that has just landed: three times the impulses it rests on. Five iterations leave it jumping, and all tables
  * slow it down alike; less where cubes overlap, by 1 mm, since pushing them apart is work. */
-START_TEST(few_tables_equal_ref)
+START_TEST(under_iterated_tables_equal_ref)
 {
     const struct sadmm_kernels *table = tables[_i / 2];
     const bool overlap = _i % 2;
-    struct contact_problem *problem = tall_stack(5);
-    sadmm_settings one_thread = few_settings(5, 1), three_threads = few_settings(5, 3);
+    struct contact_problem *problem = deep_stack(5);
+    sadmm_settings one_thread = warm_settings(5, 1), three_threads = warm_settings(5, 3);
     struct spread v = {0, 0}, lambda = {0, 0};
     struct runner ref, own, three;
     int32_t limited[3];
@@ -343,7 +347,8 @@ START_TEST(few_tables_equal_ref)
         ck_assert_int_eq(limited[k], 1);
     }
     compare_solutions(&own, &ref, &v, &lambda);
-    /* Five iterations that pass on what is rounded at most as it is (scene_tolerance), each of some ten sums; equal masses. */
+    /* Five iterations that pass on what is rounded at most as it is (scene_tolerance), each of some ten sums; equal
+     * masses. */
     const double tolerance = 5 * 10 * table_epsilon(table);
     expect_agreement(&own, &three, &v, tolerance, &lambda, tolerance);
     for (int k = 0; k < 3; ++k) runner_stop(runners[k]);
@@ -356,8 +361,8 @@ END_TEST
 START_TEST(solutions_are_not_slowed_down)
 {
     const struct sadmm_kernels *table = _i < table_count ? tables[_i] : literal();
-    struct contact_problem *problem = tall_stack(5);
-    sadmm_settings settings = few_settings(300, 1);
+    struct contact_problem *problem = deep_stack(5);
+    sadmm_settings settings = warm_settings(300, 1);
     struct runner r;
     int32_t limited;
     for (int k = 0; k < 20; ++k) problem->contacts.points[k].gap = -1e-3;
@@ -390,8 +395,8 @@ START_TEST(small_gaps_are_eased)
 }
 END_TEST
 
-/* The weight of a hard block does not depend on the unit of a row: with row and error times s, lambda is 1/s of it, B too
- * by s^2, and the body moves all the same. */
+/* The weight of a hard block does not depend on the unit of a row: with row and error times s, lambda is 1/s of it, B
+ * too by s^2, and the body moves all the same. */
 START_TEST(blocks_have_no_unit)
 {
     struct spread v = {0, 0}, lambda = {0, 0};
@@ -511,7 +516,7 @@ static int cold_iterations(struct contact_problem *problem, sadmm_method method,
 /* Over-relaxation is worth having; and to 1e-6 m/s fast takes a third of the iterations of paper, in the geometric
  * mean, as docs/convergence.md has it for problems whose loads are not predicted. `most` is a guard against regressions
  * and no more: what an over-relaxation of 1.2 takes. */
-START_TEST(few_iterations)
+START_TEST(cold_solves)
 {
     static struct contact_problem *(*const problems[])(int) = {stack, pyramid, plates};
     enum { PROBLEMS = sizeof problems / sizeof *problems };
@@ -532,7 +537,7 @@ START_TEST(few_iterations)
 END_TEST
 
 /* A weight is the mass that its contact carries, so that masses and their order are nothing to the iteration: stacks of
- * 1:1:1, 1:100:10,000 and 10,000:100:1 take the same number but for one look, once the loads are known. */
+ * 1:1:1, 1:100:10,000 and 10,000:100:1 take the same number but for one convergence check, once the loads are known. */
 START_TEST(masses_do_not_matter)
 {
     static const double masses[][3] = {{1, 1, 1}, {0.01, 1, 100}, {100, 1, 0.01}};
@@ -545,8 +550,8 @@ START_TEST(masses_do_not_matter)
 }
 END_TEST
 
-/* All kinds of constraints at once, both forms of bodies, with and without friction: it ends at a solution. (Of the random
- * mixed problems, those that can be solved: the others hold welds against each other.) */
+/* All kinds of constraints at once, both forms of bodies, with and without friction: it ends at a solution. (Of the
+ * random mixed problems, those that can be solved: the others hold welds against each other.) */
 START_TEST(solutions_are_certified)
 {
     static const int solvable[] = {8, 9, 10, 11};
@@ -621,7 +626,8 @@ static double total_energy(sadmm_world *world, const double gravity[3], double *
         if (def.type != SADMM_BODY_DYNAMIC) continue;
         double conjugate[4] = {s.orientation[0], -s.orientation[1], -s.orientation[2], -s.orientation[3]};
         vec3 w = m3_mul(q_matrix(q_load(conjugate)), v3_load(s.angular_velocity));
-        energy += def.mass * v3_norm2(v3_load(s.linear_velocity)) / 2 - def.mass * v3_dot(v3_load(gravity), v3_load(s.position));
+        energy += def.mass * v3_norm2(v3_load(s.linear_velocity)) / 2 -
+                  def.mass * v3_dot(v3_load(gravity), v3_load(s.position));
         energy += (def.inertia[0] * w.x * w.x + def.inertia[1] * w.y * w.y + def.inertia[2] * w.z * w.z) / 2;
         *weight += def.mass * norm3(gravity);
     }
@@ -638,8 +644,8 @@ static const struct {
 static const int budgets[] = {1, 2, 5, 10};
 
 /* However few the iterations, energy is not made: there is at most 1 % more than at the start, of what the scene turns
- * over or of its weight times 0.1 m, about the size of its bodies. (So a scene at rest may rise by 1 mm: bodies sink into each
- * other where iterations are cut short, and pushing them out is work.) */
+ * over or of its weight times 0.1 m, about the size of its bodies. (So a scene at rest may rise by 1 mm: bodies sink
+ * into each other where iterations are cut short, and pushing them out is work.) */
 START_TEST(too_few_iterations_are_safe)
 {
     struct sadmm_scene scene = open_scene(moving[_i / 4].spec);
@@ -710,8 +716,8 @@ START_TEST(few_iterations_come_to_rest)
 }
 END_TEST
 
-/* What is passed on goes to 0, and its rounding with it: bodies come to rest below half an ulp of g dt, which is where they stay
- * if impulses themselves are added up (5e-9 to 8e-9 m/s; dt is 5 ms). */
+/* What is passed on goes to 0, and its rounding with it: bodies come to rest below half an ulp of g dt, which is where
+ * they stay if impulses themselves are added up (5e-9 to 8e-9 m/s; dt is 5 ms). */
 START_TEST(single_precision_rests)
 {
     static const char *const specs[] = {"vertical_stacks:4", "oblique_stacks:1"};
@@ -742,18 +748,18 @@ int main(void)
     tcase_add_loop_test(tables_case, threads_do_not_matter, 0, table_count * SCENES);
     tcase_add_loop_test(tables_case, single_steps_are_refused, 0, table_count);
     tcase_add_test(weights, weight_is_the_mass_carried);
-    tcase_add_test(weights, tall_islands_are_stiff);
-    tcase_add_loop_test(weights, tall_tables_equal_ref, 0, 2 * table_count);
-    tcase_add_test(weights, few_iterations_weigh_more);
+    tcase_add_test(weights, deep_stacks_are_stiff);
+    tcase_add_loop_test(weights, deep_stacks_equal_ref, 0, 2 * table_count);
+    tcase_add_test(weights, under_iterated_weights_are_larger);
     tcase_add_test(weights, few_iterations_of_a_problem_weigh_the_same);
     tcase_add_test(weights, bounces_are_taken_back);
-    tcase_add_loop_test(weights, few_tables_equal_ref, 0, 2 * table_count);
+    tcase_add_loop_test(weights, under_iterated_tables_equal_ref, 0, 2 * table_count);
     tcase_add_loop_test(weights, solutions_are_not_slowed_down, 0, table_count + 1);
     tcase_add_test(weights, small_gaps_are_eased);
     tcase_add_test(weights, blocks_have_no_unit);
     tcase_add_test(weights, weight_scales_follow_the_balance);
     tcase_add_test(weights, islands_are_named_by_their_smallest_body);
-    tcase_add_test(solutions, few_iterations);
+    tcase_add_test(solutions, cold_solves);
     tcase_add_test(solutions, masses_do_not_matter);
     tcase_add_loop_test(solutions, solutions_are_certified, 0, 4);
     tcase_add_loop_test(solutions, momentum_residuals_do_not_drift, 0, single_count);

@@ -1,7 +1,7 @@
 /* FCLIB files: what is read, what is written, what is refused.
  *
  * Files are written and read here with plain HDF5 calls from dense matrices, so that the module under test never checks
- * itself.
+ * itself. One file: reading, writing and refusing share these calls and the sample made with them.
  */
 #include <check.h>
 #include <hdf5.h>

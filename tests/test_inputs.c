@@ -1,5 +1,6 @@
 /* Bad input and failing allocations at the problem level: refused with a message that names the argument, its value
- * and the range, and nothing lost. */
+ * and the range, and nothing lost. One file: most tests give bad values to the same problem (`make`), and then check
+ * that it is what it was. */
 #include <check.h>
 #include <limits.h>
 #include <math.h>

@@ -3,6 +3,8 @@
  *
  * Tolerances. 1e-12: positions of size 1 after some tens of roundings. The choice of an axis may cost up to 5 % of the
  * depth and 0.5 % of the thinner box (manifold.h); where a test allows for that it says `choice`.
+ *
+ * One file: one function is under test, and these tolerances hold for all of its tests.
  */
 #include "manifold_tools.h"
 

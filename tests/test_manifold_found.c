@@ -120,7 +120,7 @@ START_TEST(a_line_along_a_huge_capsule)
 }
 END_TEST
 
-/* A capsule 10^11 times as long as thick through a plate: the stretch inside is short for the capsule, not for the
+/* A capsule 10^11 times as long as thick through a plate: the segment inside is short for the capsule, not for the
  * box. */
 START_TEST(a_needle_through_a_plate)
 {
@@ -136,8 +136,9 @@ START_TEST(a_needle_through_a_plate)
 }
 END_TEST
 
-/* A beam of a million metres through a sheet as large, 0.03 degrees from its plane: over such lengths that angle decides which
- * edges of the beam support the contact. (One on the far side was taken, and the boxes counted as far apart.) */
+/* A beam of a million metres through a sheet as large, 0.03 degrees from its plane: over such lengths that angle
+ * decides which edges of the beam support the contact. (One on the far side was taken, and the boxes counted as far
+ * apart.) */
 START_TEST(a_beam_through_a_sheet)
 {
     struct solid a = box_at(806179.36498047982, 294681.08112263959, 0.87581514584710662, 0, 0, 0);
@@ -150,8 +151,9 @@ START_TEST(a_beam_through_a_sheet)
 }
 END_TEST
 
-/* Boxes further apart than any sensible world is wide, but not than the limit, which grows with their speed: the square of their
- * distance is still a number, and what says how near they are is compared with it. (There was a contact without a normal.) */
+/* Boxes further apart than any sensible world is wide, but not than the limit, which grows with their speed: the square
+ * of their distance is still a number, and what says how near they are is compared with it. (There was a contact
+ * without a normal.) */
 START_TEST(boxes_at_a_distance_of_10_to_the_17)
 {
     struct solid a = box_at(0.86, 0.47, 0.87, 0, 0, 0), b = box_at(2.8e-6, 2.8e-6, 143, 6e16, -1.6e17, -1.5e17);
@@ -168,8 +170,10 @@ END_TEST
 /* An edge on a face, limit 0, turned in it by 1e-13, so that only a corner touches, 0.75 m beside the face. */
 START_TEST(a_corner_that_touches_beside_a_face)
 {
-    struct solid a = box_at(0.25, 0.25, 1, 0, 0, 0), b = box_at(1, 1, 0.25, 1.2573569585592357, 0, -0.043964366640632503);
-    const double Ra[9] = {0.99938925986090621, 0, 0.034944345389062624, 0, 1, 0, -0.034944345389062624, 0, 0.99938925986090621};
+    struct solid a = box_at(0.25, 0.25, 1, 0, 0, 0),
+                 b = box_at(1, 1, 0.25, 1.2573569585592357, 0, -0.043964366640632503);
+    const double Ra[9] = {0.99938925986090621,   0, 0.034944345389062624, 0, 1, 0,
+                          -0.034944345389062624, 0, 0.99938925986090621};
     const double Rb[9] = {1, 0, 0, 0, 1, -1.2429054667427512e-13, 0, 1.2429054667427512e-13, 1};
     memcpy(a.R, Ra, sizeof Ra);
     memcpy(b.R, Rb, sizeof Rb);
@@ -177,18 +181,19 @@ START_TEST(a_corner_that_touches_beside_a_face)
 }
 END_TEST
 
-/* Axes that cross at 0.01 degrees, b's frame turned by a quarter: they are as deep as their radii across both axes, and that is
- * the normal; in the plane of the axes they are three times as deep. */
+/* Axes that cross at 0.01 degrees, b's frame turned by a quarter: they are as deep as their radii across both axes, and
+ * that is the normal; in the plane of the axes they are three times as deep. */
 START_TEST(capsules_that_cross_at_a_small_angle)
 {
-    struct solid a = solid_at(SADMM_SHAPE_CAPSULE, 0.0018, 220, 0, 0, 0, 0), b = solid_at(SADMM_SHAPE_CAPSULE, 0.0015, 21, 0, 0, 0,
-                                                                                         0);
+    struct solid a = solid_at(SADMM_SHAPE_CAPSULE, 0.0018, 220, 0, 0, 0, 0),
+                 b = solid_at(SADMM_SHAPE_CAPSULE, 0.0015, 21, 0, 0, 0, 0);
     turn(&a, 1, 0, 0, 2.2246660562e-4);
     turn(&b, 0, 0, 1, M_PI / 2);
     for (int exchanged = 0; exchanged < 2; ++exchanged) {
         struct world_manifold m = exchanged ? touch(&b, &a, 0, 0) : touch(&a, &b, 0, 0);
         /* a line of two ends may leave out a middle that is deeper by MANIFOLD_FLAT of the thinner */
-        ck_assert_double_eq_tol(least_separation(&m), -0.0033, MANIFOLD_FLAT * 0.003 + 64 * DBL_EPSILON * pair_size(&a, &b));
+        ck_assert_double_eq_tol(least_separation(&m), -0.0033,
+                                MANIFOLD_FLAT * 0.003 + 64 * DBL_EPSILON * pair_size(&a, &b));
     }
 }
 END_TEST
@@ -197,9 +202,10 @@ END_TEST
 START_TEST(capsules_that_cross_far_out)
 {
     struct solid a = solid_at(SADMM_SHAPE_CAPSULE, 0.0017677670718836312, 220.64506034776068, 0, 0, 0, 0);
-    struct solid b = solid_at(SADMM_SHAPE_CAPSULE, 0.0018438936399546844, 112.62544763099666, 0, -0.033656231498237786, 0,
-                              -151.28666422234826);
-    const double R[9] = {0.9999999752543044, 0, 0.00022246660562180064, 0, 1, 0, -0.00022246660562180064, 0, 0.9999999752543044};
+    struct solid b = solid_at(SADMM_SHAPE_CAPSULE, 0.0018438936399546844, 112.62544763099666, 0, -0.033656231498237786,
+                              0, -151.28666422234826);
+    const double R[9] = {0.9999999752543044,      0, 0.00022246660562180064, 0, 1, 0,
+                         -0.00022246660562180064, 0, 0.9999999752543044};
     memcpy(a.R, R, sizeof R);
     for (int exchanged = 0; exchanged < 2; ++exchanged) {
         struct world_manifold m = exchanged ? touch(&b, &a, 0, 0) : touch(&a, &b, 0, 0);
@@ -209,24 +215,8 @@ START_TEST(capsules_that_cross_far_out)
 }
 END_TEST
 
-/* A strip a micrometre thick flat on a block of 800 km: rounding is more than what is short for the strip. */
-START_TEST(a_strip_on_a_block)
-{
-    struct solid a = box_at(0.99978921104099738, 10206.591910354506, 1.6109996467208182e-06, 0, 0, 0);
-    struct solid b = box_at(575124.61991429236, 805839.53338240227, 0.99978921104099738, 0, -1.7893232082322479e-10,
-                            805839.53338401346);
-    const double Ra[9] = {0.42358244698048475, -0.90585755536399037, 0, 0.90585755536399037, 0.42358244698048475, 0, 0, 0, 1};
-    const double Rb[9] = {1, 0, 0, 0, -2.2204460492503131e-16, -1, 0, 1, -2.2204460492503131e-16};
-    memcpy(a.R, Ra, sizeof Ra);
-    memcpy(b.R, Rb, sizeof Rb);
-    struct world_manifold m = touch(&a, &b, 0, 0);
-    /* across the strip's faces */
-    if (m.count > 0) ck_assert_double_ge(separation_along(&a, &b, m.normal), -64 * DBL_EPSILON * pair_size(&a, &b));
-    expect_between(a, b, 0);
-}
-END_TEST
-
-/* Two strips end to end in a plane but for a turn of 4e-7: their edges may touch, but what is apart is not in contact. */
+/* Two strips end to end in a plane but for a turn of 4e-7: their edges may touch, but what is apart is not in
+ * contact. */
 START_TEST(strips_end_to_end)
 {
     struct solid a = box_at(0.94526819780071769, 10202.289490086152, 1.6109996467208182e-06, 0, 0, 0);
@@ -242,8 +232,9 @@ START_TEST(strips_end_to_end)
 }
 END_TEST
 
-/* A beam steeply through a sheet of 10 km, in whose length two points near each other are one: not where the one is a third
- * deeper. They lie symmetrically about the middle, so that exchanging the two may exchange sides, but not the depth. */
+/* A beam steeply through a sheet of 10 km, in whose length two points near each other are one: not where the one is a
+ * third deeper. They lie symmetrically about the middle, so that exchanging the two may exchange sides, but not the
+ * depth. */
 START_TEST(a_beam_steeply_through_a_sheet)
 {
     struct solid a = box_at(9785.2049078719974, 1, 1, 0, 0, 0), b = box_at(0.00015957891549730317, 10745.334976704695,
@@ -257,7 +248,8 @@ START_TEST(a_beam_steeply_through_a_sheet)
 }
 END_TEST
 
-/* A bar crosswise over the edge of a sheet a micrometre thick, 6e-10 m apart, which the axes do not see: no contact 3 mm off. */
+/* A bar crosswise over the edge of a sheet a micrometre thick, 6e-10 m apart, which the axes do not see: no contact 3
+ * mm off. */
 START_TEST(a_bar_across_the_edge_of_a_sheet)
 {
     struct solid a = box_at(0.99978921104099738, 10202.289490086152, 1.6109996467208182e-06, 0, 0, 0);
@@ -288,7 +280,6 @@ int main(void)
     tcase_add_test(cases, a_corner_that_touches_beside_a_face);
     tcase_add_test(cases, capsules_that_cross_at_a_small_angle);
     tcase_add_test(cases, capsules_that_cross_far_out);
-    tcase_add_test(cases, a_strip_on_a_block);
     tcase_add_test(cases, strips_end_to_end);
     tcase_add_test(cases, a_beam_steeply_through_a_sheet);
     tcase_add_test(cases, a_bar_across_the_edge_of_a_sheet);

@@ -184,8 +184,8 @@ static const struct {
       P(get_solution), P(set_solution), P(certify)}},
     {on_others, {"sadmm_backend_query", "sadmm_box_inertia", "sadmm_sphere_inertia", "sadmm_capsule_inertia"}},
     {NULL,
-     {"sadmm_settings_default", W(def_default), "sadmm_body_def_default", "sadmm_shape_def_default", "sadmm_status_name",
-      "sadmm_last_message", "sadmm_version", "sadmm_build_commit", "sadmm_build_compiler"}},
+     {"sadmm_settings_default", W(def_default), "sadmm_body_def_default", "sadmm_shape_def_default",
+      "sadmm_status_name", "sadmm_last_message", "sadmm_version", "sadmm_build_commit", "sadmm_build_compiler"}},
 };
 enum { GROUPS = sizeof functions / sizeof *functions };
 

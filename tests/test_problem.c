@@ -1,4 +1,5 @@
-/* The problem level on every backend: closed-form solutions, warm starts, stop rules, what a failure leaves. */
+/* The problem level on every backend: closed-form solutions, warm starts, stop rules, what a failure leaves.
+ * One file: every test runs with each method, and most with every table, by the same fixtures and tolerances. */
 #include <check.h>
 #include <math.h>
 #include <stdlib.h>

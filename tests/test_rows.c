@@ -113,10 +113,10 @@ static int at_bounds(const struct sadmm_rows *rows)
     return count;
 }
 
-/* After any number of iterations, with weights that were taken from the multipliers found so far; and what a table has is what the
- * literal backend has. An iteration takes two states no further apart in its own norm; masses over three decades make that
- * a factor of some 30 in velocities, which the rounding of every iteration may grow to, and of what it starts with:
- * masses, rows, factors, multipliers. After 60 there have been five sets of weights. */
+/* After any number of iterations, with weights that were taken from the multipliers found so far; and what a table has
+ * is what the literal backend has. An iteration takes two states no further apart in its own norm; masses over three
+ * decades make that a factor of some 30 in velocities, which the rounding of every iteration may grow to, and of what
+ * it starts with: masses, rows, factors, multipliers. After 60 there have been five sets of weights. */
 START_TEST(bounds_hold_in_every_iterate)
 {
     static const int iterations[] = {1, 2, 3, 5, 8, 30, 60};
@@ -271,15 +271,16 @@ START_TEST(blocks_become_rows)
     sadmm_row_motor(&rows, 3, 2, 5);
     ck_assert(rows.bias[3] == -2 && rows.lo[3] == -5 && rows.hi[3] == 5);
 
-    const size_t room = rows.row_capacity;
-    for (size_t k = rows.row_count; k < room; ++k) ck_assert_int_ge(sadmm_rows_add(&rows, 1, 0, -1), 0);
-    for (long left = 0; left < 9; ++left) { /* of nine arrays; the first one may have room yet */
+    const size_t capacity = rows.row_capacity;
+    for (size_t k = rows.row_count; k < capacity; ++k) ck_assert_int_ge(sadmm_rows_add(&rows, 1, 0, -1), 0);
+    for (long left = 0; left < 9; ++left) { /* of nine arrays; the first one may have capacity left */
         sadmm_test_fail_allocations_after(left);
         if (sadmm_rows_add(&rows, 6, 0, -1) >= 0) break;
-        ck_assert(rows.row_count == room && rows.lambda[0] == 4 && left < 9);
+        ck_assert(rows.row_count == capacity && rows.lambda[0] == 4 && left < 9);
     }
     sadmm_test_fail_allocations_after(-1);
-    ck_assert(rows.row_count == room + 6 && rows.lambda[0] == 4 && rows.gain[room] == 1 && rows.hi[room] == INFINITY);
+    ck_assert(rows.row_count == capacity + 6 && rows.lambda[0] == 4 && rows.gain[capacity] == 1 &&
+              rows.hi[capacity] == INFINITY);
     sadmm_rows_free(&rows);
     ck_assert(rows.row_count == 0 && rows.lambda == NULL);
 }

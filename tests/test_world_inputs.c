@@ -1,6 +1,7 @@
 /* Bad input to a world: every call names what is wrong and changes nothing, memory may run out anywhere, and a step
  * that fails leaves the world as it was. "Changes nothing" is tested by stepping on beside a world that never saw the
  * bad call: the states must stay equal bit for bit.
+ * One file: the tests share that comparison and the small world it is made with.
  */
 #include <stddef.h>
 
@@ -104,7 +105,8 @@ struct bad_number {
 #define BODY(field, ...) { #field, offsetof(sadmm_body_def, field), { __VA_ARGS__ } }
 static const struct bad_number bad_body[] = {
     BODY(mass, 0), BODY(mass, NAN, INFINITY, -INFINITY, -1, 0.99e-9), BODY(mass, 1.01e12),
-    BODY(inertia[0], 0), BODY(inertia[1], NAN, INFINITY, -1, 5e-324, 0.99e-24), BODY(inertia[2], 1, 1e300), /* 1: more than the other two */
+    BODY(inertia[0], 0), BODY(inertia[1], NAN, INFINITY, -1, 5e-324, 0.99e-24),
+    BODY(inertia[2], 1, 1e300), /* 1: more than the other two */
     BODY(position[0], NAN, INFINITY, -INFINITY, 1.01e9, -1e300), BODY(position[2], NAN),
     BODY(orientation, 0), /* all 0 */
     BODY(orientation[0], NAN, INFINITY, 1.00001, 0.99999, -2), BODY(orientation[3], 1e-2, NAN),

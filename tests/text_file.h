@@ -11,11 +11,11 @@ static inline char *read_text_if_there(const char *path)
 {
     FILE *file = fopen(path, "r");
     if (!file) return NULL;
-    size_t size = 0, room = 1 << 16;
-    char *text = malloc(room);
-    for (size_t got; text && (got = fread(text + size, 1, room - 1 - size, file)) > 0;) {
+    size_t size = 0, capacity = 1 << 16;
+    char *text = malloc(capacity);
+    for (size_t got; text && (got = fread(text + size, 1, capacity - 1 - size, file)) > 0;) {
         size += got;
-        if (room - 1 - size == 0) text = realloc(text, room *= 2);
+        if (capacity - 1 - size == 0) text = realloc(text, capacity *= 2);
     }
     fclose(file);
     ck_assert_msg(text != NULL, "%s: no memory", path);

@@ -200,8 +200,8 @@ static inline void cpu_parallel(const struct sadmm_context *c, sadmm_parallel_fu
     sadmm_parallel(c->system->team, c->plan.threads, function, argument);
 }
 
-/* A thread's share of the bodies: whole blocks. A lane of a block is written by loading and storing the whole vector, by clang for
- * one: two threads must not have bodies of one block. */
+/* A thread's share of the bodies: whole blocks. A lane of a block is written by loading and storing the whole vector,
+ * by clang for one: two threads must not have bodies of one block. */
 static inline void cpu_share_bodies(const struct sadmm_context *c, int thread, int threads, size_t *begin, size_t *end)
 {
     const size_t bodies = (size_t)c->bodies;

@@ -11,10 +11,11 @@ sadmm_status CPU(create)(int device, struct sadmm_context **out, struct sadmm_er
 void CPU(destroy)(struct sadmm_context *c)
 {
     if (!c) return;
-    void *blocks[] = {c->state, c->A, c->C, c->beta, c->body_blocks, c->b, c->momentum_residuals, c->A_columns, c->H_columns, c->pair_blocks,
-                      c->slots, c->pair_order, c->row_blocks, c->row_slots, c->row_order, c->row_weights,
-                      c->general_of, c->general_bodies, c->general_lanes, c->wrenches, c->change, c->offsets, c->incident, c->thread_max,
-                      c->label, c->islands, c->A_inverse, c->pair_response, c->pair_weight, c->pair_violation, c->body_sums};
+    void *blocks[] = {c->state, c->A, c->C, c->beta, c->body_blocks, c->b, c->momentum_residuals, c->A_columns,
+                      c->H_columns, c->pair_blocks, c->slots, c->pair_order, c->row_blocks, c->row_slots, c->row_order,
+                      c->row_weights, c->general_of, c->general_bodies, c->general_lanes, c->wrenches, c->change,
+                      c->offsets, c->incident, c->thread_max, c->label, c->islands, c->A_inverse, c->pair_response,
+                      c->pair_weight, c->pair_violation, c->body_sums};
     for (size_t i = 0; i < sizeof blocks / sizeof *blocks; ++i) sadmm_free(blocks[i]);
     sadmm_free(c);
 }

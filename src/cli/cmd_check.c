@@ -67,8 +67,8 @@ static struct tolerances tolerances_of(sadmm_precision precision, const struct c
         .kernel_velocity = !single ? 1e-12 : fast ? 1e-4 : 1e-5,
         .kernel_impulse = single ? 1e-5 : 1e-12,
         .reason = !single ? "f64: kernels, 1e-16 of rounding in sums of tens of terms; " AMPLIFIED "1e-8 " DOUBLING
-                  : fast  ? "f32: kernels, 6e-8 of rounding in sums of tens of terms, in velocities times the weight of a "
-                            "constraint over a body's mass; " AMPLIFIED "1e-3 " DOUBLING
+                  : fast  ? "f32: kernels, 6e-8 of rounding in sums of tens of terms, in velocities times the weight "
+                            "of a constraint over a body's mass; " AMPLIFIED "1e-3 " DOUBLING
                           : "f32: kernels, 6e-8 of rounding in sums of tens of terms; " AMPLIFIED "1e-3 " DOUBLING,
     };
 }

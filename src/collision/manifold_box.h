@@ -230,7 +230,8 @@ SADMM_INLINE int box_axis_manifold(const struct box_pair *b, int axis, int negat
     return m->count;
 }
 
-/* Contacts of an axis, if it has any within the limit. (Edges may turn out to be farther apart than their axis said.) */
+/* Contacts of an axis, if it has any within the limit. (Edges may turn out to be farther apart than their axis
+ * said.) */
 SADMM_INLINE bool box_axis_has_contacts(const struct box_pair *b, int axis, int negative, struct manifold *m)
 {
     bool crossing;
@@ -290,8 +291,8 @@ SADMM_INLINE void manifold_box_box(vec3 half1, vec3 half2, const struct pair_pos
             if (!box_axis_has_contacts(&b, first, first_negative, m) &&
                 (second < 0 || !box_axis_has_contacts(&b, second, second_negative, m))) {
                 m->cache = (uint32_t)(best + 1) | (axes.negative[best] ? BOX_AXIS_NEGATIVE : 0u);
-                /* Boxes that may be apart, by the angle of edges that count as parallel over the boxes' extents (slack is those
-                 * times 4 roundings): there may be nothing of the one over the face of the other. */
+                /* Boxes that may be apart, by the angle of edges that count as parallel over the boxes' extents (slack
+                 * is those times 4 roundings): there may be nothing of the one over the face of the other. */
                 if (axes.separation[best] >= -real_sqrt(MANIFOLD_PARALLEL2) / SADMM_EPSILON * b.slack)
                     box_corner_manifold(&b, box_axis_direction(&b, best, axes.negative[best]), m);
                 else box_vertex_manifold(&b, best, axes.negative[best], axes.separation[best], m);

@@ -8,7 +8,8 @@
 /* Supporting edge along axis i of a box with half extents h towards direction n (own frame); `lean`: where the other
  * box is, for coordinates along which n does not decide: both edges lie equally far out, but for `even`. Returns the
  * edge's id. */
-SADMM_INLINE int box_support_edge(const real h[3], int i, const real n[3], const real lean[3], real even, real centre[3])
+SADMM_INLINE int box_support_edge(const real h[3], int i, const real n[3], const real lean[3], real even,
+                                  real centre[3])
 {
     int u = i == 2 ? 0 : i + 1, v = u == 2 ? 0 : u + 1, bu, bv;
     bu = (h[u] * real_abs(n[u]) > even ? n[u] : lean[u]) >= 0;
@@ -156,7 +157,8 @@ SADMM_INLINE void box_corner_manifold(const struct box_pair *b, vec3 fallback, s
         }
     }
     distance = real_sqrt(best2);
-    /* the square of a distance may be no number; as separations of axes are judged, boxes that touch but for rounding do */
+    /* the square of a distance may be no number; as separations of axes are judged, boxes that touch but for rounding
+     * do */
     if (!(best2 < SADMM_REAL_MAX) || distance > b->limit + b->slack) return;
     if (distance > real_max((real)1e-4 * b->thin, 4 * b->slack)) {
         manifold_segment_outside(0, half, h1, p, u, x, q, distance, MANIFOLD_FLAT * b->thin, b->limit,

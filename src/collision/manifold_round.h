@@ -102,7 +102,8 @@ SADMM_INLINE void manifold_capsule_capsule(real ra, real ha, real rb, real hb, c
     if (sin2 > (real)1e-6) size /= real_sqrt(sin2); /* the rounding of where they meet (segments_closest) */
     if (sin2 > 16 * SADMM_EPSILON * SADMM_EPSILON) {
         vec3 n_cached = cache ? manifold_cached_direction(cache) : cross;
-        bool crossing = sin2 > (real)1e-6 && real_abs(s) < ha && real_abs(t) < hb && v3_norm2(d) < (real)0.25 * radii * radii;
+        bool crossing =
+            sin2 > (real)1e-6 && real_abs(s) < ha && real_abs(t) < hb && v3_norm2(d) < (real)0.25 * radii * radii;
         /* however small their angle: along capsules that are long enough it is more than their radii */
         fallback = v3_scale(cross, (v3_dot(cross, n_cached) < 0 ? -1 : 1) / real_sqrt(sin2));
         if (crossing && cache && v3_dot(d, n_cached) < 0) d = v3_neg(d);

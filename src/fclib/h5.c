@@ -187,7 +187,8 @@ static sadmm_status read_array(hid_t file, const char *name, H5T_class_t class, 
     hid_t dataset = access >= 0 ? H5Dopen2(file, name, access) : -1;
     sadmm_status status = dataset >= 0 ? SADMM_ERROR_IO : fail_h5(error, name, "cannot open as a dataset");
     if (access >= 0) H5Pclose(access);
-    if (dataset < 0) return sadmm_h5_exists(file, name) ? status : sadmm_fail(error, SADMM_ERROR_IO, "%s: missing", name);
+    if (dataset < 0)
+        return sadmm_h5_exists(file, name) ? status : sadmm_fail(error, SADMM_ERROR_IO, "%s: missing", name);
 
     int64_t found = check_dataset(file, dataset, class, name, *count, error);
     if (found >= 0) {

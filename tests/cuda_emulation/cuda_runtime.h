@@ -10,6 +10,8 @@
  *
  * Not emulated: memory ordering, and any concurrency between blocks of a launch that is neither cooperative nor in
  * clusters; blocks of a cluster run side by side, clusters one after the other.
+ *
+ * One file, as the toolkit's: it stands in for that header, by its name.
  */
 #ifndef SADMM_CUDA_EMULATION_H
 #define SADMM_CUDA_EMULATION_H

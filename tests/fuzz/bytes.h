@@ -44,8 +44,8 @@ static inline int take_choice(struct bytes *in, int n) { return take_byte(in) % 
 /* True for one byte in `n`; never at the end of the input. */
 static inline bool take_rarely(struct bytes *in, int n) { return bytes_left(in) && take_byte(in) >= 256 - 256 / n; }
 
-/* True for one input in `n`, n a power of 2, by all of its bytes, so that which ones is nobody's choice: for what costs many
- * times the rest. (libFuzzer likes some bytes better than others.) */
+/* True for one input in `n`, n a power of 2, by all of its bytes, so that which ones is nobody's choice: for what costs
+ * many times the rest. (libFuzzer likes some bytes better than others.) */
 static inline bool one_input_in(const uint8_t *data, size_t size, uint32_t n)
 {
     uint64_t hash = UINT64_C(0xcbf29ce484222325);

@@ -1,12 +1,12 @@
-/* Problem files: the input says what a small FCLIB file holds, and how it departs from one. Values, lengths, types and shapes
- * of data sets, sets that are missing or are groups: all that this library must see through. (The bytes of the container are
- * libhdf5's.) Whatever the file:
+/* Problem files: the input says what a small FCLIB file holds, and how it departs from one. Values, lengths, types and
+ * shapes of data sets, sets that are missing or are groups: all that this library must see through. (The bytes of the
+ * container are libhdf5's.) Whatever the file:
  *
  *   - it is read, or refused with a reason and nothing in hand
  *   - what was read can be written and is read again as the same problem
  *
- * Nearly all of the time is libhdf5's. So the files are in memory and stay open from input to input (opening one costs more
- * than all that is in it), one input in 4 is written and read again, and one in 64 goes through files of a disk.
+ * Nearly all of the time is libhdf5's. So the files are in memory and stay open from input to input (opening one costs
+ * more than all that is in it), one input in 4 is written and read again, and one in 64 goes through files of a disk.
  */
 #include <hdf5.h>
 #include <string.h>
@@ -59,7 +59,8 @@ static void add_matrix(struct content *c, const char *group, const double *dense
     add_int(c, group, "n", columns);
     add_int(c, group, "nzmax", entries);
     add_int(c, group, "nz", nz < 0 ? nz : entries);
-    struct set *p = add_set(c, group, "p", false, nz < 0 ? outer + 1 : entries), *i = add_set(c, group, "i", false, entries);
+    struct set *p = add_set(c, group, "p", false, nz < 0 ? outer + 1 : entries),
+               *i = add_set(c, group, "i", false, entries);
     struct set *x = add_set(c, group, "x", true, entries);
     int at = 0;
     for (int o = 0; o < outer; ++o) {
@@ -119,7 +120,8 @@ static void make_content(struct bytes *in, struct content *c)
 /* Depart from it. */
 static void damage(struct bytes *in, struct content *c)
 {
-    static const int32_t ints[] = {-1, 0, 1, -2, -3, 2, 3, 5, 6, 7, 12, INT32_MAX, INT32_MIN, INT32_MAX - 1, 1 << 30, 1 << 16};
+    static const int32_t ints[] = {-1, 0, 1, -2, -3, 2, 3, 5, 6, 7, 12, INT32_MAX, INT32_MIN, INT32_MAX - 1,
+                                   1 << 30, 1 << 16};
     for (int changes = take_choice(in, 4); changes > 0; --changes) {
         struct set *set = &c->sets[take_choice(in, c->count)];
         int at = set->count > 0 ? take_choice(in, set->count < 256 ? set->count : 256) : 0;
@@ -145,7 +147,8 @@ static void write_set(hid_t file, hid_t parents, const struct set *set)
         return;
     }
     hsize_t extent[2] = {(hsize_t)set->count, 1};
-    hid_t space = set->how == SCALAR ? H5Screate(H5S_SCALAR) : H5Screate_simple(set->how == MATRIX ? 2 : 1, extent, NULL);
+    hid_t space =
+        set->how == SCALAR ? H5Screate(H5S_SCALAR) : H5Screate_simple(set->how == MATRIX ? 2 : 1, extent, NULL);
     bool real = set->real != (set->how == WRONG_CLASS);
     hid_t stored = real ? (set->how == OTHER_SIZE ? H5T_IEEE_F32BE : H5T_IEEE_F64LE)
                         : (set->how == OTHER_SIZE ? H5T_STD_I64BE : H5T_STD_I32LE);
@@ -181,11 +184,14 @@ static void must_be_the_same(sadmm_problem *a, sadmm_problem *b)
     for (int k = 0; k < 6 * bodies; ++k) MUST(f[0][k] == f[1][k], "b[%d]", k);
     for (int32_t k = 0; k < blocks; ++k) {
         sadmm_problem_block x, y;
-        MUST(sadmm_problem_get_block(a, k, &x) == SADMM_OK && sadmm_problem_get_block(b, k, &y) == SADMM_OK, "block %d", k);
-        MUST(x.kind == y.kind && x.rows == y.rows && x.body_a == y.body_a && x.body_b == y.body_b && x.friction == y.friction,
+        MUST(sadmm_problem_get_block(a, k, &x) == SADMM_OK && sadmm_problem_get_block(b, k, &y) == SADMM_OK, "block %d",
+             k);
+        MUST(x.kind == y.kind && x.rows == y.rows && x.body_a == y.body_a && x.body_b == y.body_b &&
+                 x.friction == y.friction,
              "block %d", k);
         for (int i = 0; i < 6 * x.rows; ++i)
-            MUST((x.body_a < 0 || x.jacobian_a[i] == y.jacobian_a[i]) && x.jacobian_b[i] == y.jacobian_b[i], "block %d", k);
+            MUST((x.body_a < 0 || x.jacobian_a[i] == y.jacobian_a[i]) && x.jacobian_b[i] == y.jacobian_b[i], "block %d",
+                 k);
     }
 }
 
@@ -199,8 +205,8 @@ static void must_be_read_again(sadmm_problem *problem, sadmm_status written, sad
     sadmm_problem_destroy(again);
 }
 
-static sadmm_status through_memory(const struct content *content, int allocations, bool both_ways, sadmm_problem **problem,
-                                   struct sadmm_error *error)
+static sadmm_status through_memory(const struct content *content, int allocations, bool both_ways,
+                                   sadmm_problem **problem, struct sadmm_error *error)
 {
     static hid_t files[2] = {-1, -1};
     sadmm_problem *again = NULL;

@@ -70,7 +70,7 @@ static double take_distance(struct bytes *in, double touching)
     }
 }
 
-/* ---- a plane and another: exact ----------------------------------------------------------------------------------- */
+/* ---- a plane and another: exact ---------------------------------------------------------------------------------- */
 
 static void check_plane(const struct solid *plane, const struct solid *b, double limit)
 {
@@ -82,7 +82,8 @@ static void check_plane(const struct solid *plane, const struct solid *b, double
     if (height > limit + tolerance) MUST(m.count == 0, "%g over the plane, limit %g", height, limit);
     if (height < limit - tolerance) MUST(m.count > 0, "%g over the plane, limit %g", height, limit);
     if (m.count == 0) return;
-    MUST(fabs(least_separation(&m) - height) <= tolerance, "%.17g over the plane, not %.17g", height, least_separation(&m));
+    MUST(fabs(least_separation(&m) - height) <= tolerance, "%.17g over the plane, not %.17g", height,
+         least_separation(&m));
     for (int i = 0; i < m.count; ++i) {
         MUST(m.separation[i] <= limit, "point %d", i);
         double half = 0.5 * fabs(m.separation[i]) + tolerance, p[3];
@@ -92,7 +93,7 @@ static void check_plane(const struct solid *plane, const struct solid *b, double
     }
 }
 
-/* ---- two solids --------------------------------------------------------------------------------------------------- */
+/* ---- two solids -------------------------------------------------------------------------------------------------- */
 
 struct truth {
     double at_least, at_most; /* bounds of the separation */
@@ -123,7 +124,8 @@ static struct truth truth_of(const struct solid *a, const struct solid *b)
     if (a->type == SADMM_SHAPE_BOX && b->type == SADMM_SHAPE_BOX) {
         t.at_least = fmax(t.at_least, box_separation(a, b, NULL));
         t.parallel = sqrt(MANIFOLD_PARALLEL2) * t.scale;
-        t.aside = MANIFOLD_SNAP * M_SQRT2 * fmin(radius_of(a), radius_of(b)); /* a face, turned in the plane of another */
+        /* a face, turned in the plane of another */
+        t.aside = MANIFOLD_SNAP * M_SQRT2 * fmin(radius_of(a), radius_of(b));
     }
     return t;
 }

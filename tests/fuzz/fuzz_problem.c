@@ -1,5 +1,5 @@
-/* Problems: bodies, contacts and blocks with ordinary, extreme and wrong values, solved by every table of the CPU, read,
- * certified and solved again, while memory may run out. Whatever the calls:
+/* Problems: bodies, contacts and blocks with ordinary, extreme and wrong values, solved by every table of the CPU,
+ * read, certified and solved again, while memory may run out. Whatever the calls:
  *
  *   - a call that fails leaves the problem as it was, its solution included, and says why
  *   - after a solve that succeeds the solution is finite
@@ -157,12 +157,13 @@ static sadmm_status set_contacts(struct machine *m)
         }
     }
     if (start) take_values(&m->in, impulses, 3 * count);
-    sadmm_status status = sadmm_problem_set_contacts(m->problem, count, null ? NULL : contacts, start ? impulses : NULL);
+    sadmm_status status =
+        sadmm_problem_set_contacts(m->problem, count, null ? NULL : contacts, start ? impulses : NULL);
     if (status != SADMM_OK) return status;
     for (int32_t k = 0; k < count; ++k) {
         MUST(sadmm_problem_get_contact(m->problem, k, &read) == SADMM_OK, "contact %d", k);
-        MUST(read.body_a == contacts[k].body_a && read.body_b == contacts[k].body_b && read.error == contacts[k].error &&
-                 read.friction == contacts[k].friction,
+        MUST(read.body_a == contacts[k].body_a && read.body_b == contacts[k].body_b &&
+                 read.error == contacts[k].error && read.friction == contacts[k].friction,
              "contact %d", k);
     }
     return SADMM_OK;
@@ -218,9 +219,9 @@ static sadmm_status solve(struct machine *m)
     int table = take_choice(&m->in, 3);
     sadmm_settings settings = take_settings(&m->in);
     if (m->solves++ >= MAX_SOLVES) return SADMM_OK;
-    sadmm_status status = sadmm_problem_solve(m->problem, table == 0 ? SADMM_BACKEND_REF : SADMM_BACKEND_CPU,
-                                              table == 1 ? SADMM_F32 : SADMM_F64, take_rarely(&m->in, 64) ? NULL : &settings,
-                                              &report);
+    sadmm_status status =
+        sadmm_problem_solve(m->problem, table == 0 ? SADMM_BACKEND_REF : SADMM_BACKEND_CPU,
+                            table == 1 ? SADMM_F32 : SADMM_F64, take_rarely(&m->in, 64) ? NULL : &settings, &report);
     if (status != SADMM_OK) return status;
     look(m->problem, &after);
     MUST(all_finite(after.v, 6 * after.bodies) && all_finite(after.impulse, 3 * after.contacts) &&
@@ -238,7 +239,8 @@ static sadmm_status set_solution(struct machine *m)
     take_values(&m->in, v, 6 * MAX_BODIES);
     take_values(&m->in, impulse, 3 * MAX_CONTACTS);
     take_values(&m->in, lambda, 6 * MAX_BLOCKS);
-    return sadmm_problem_set_solution(m->problem, parts & 1 ? v : NULL, parts & 2 ? impulse : NULL, parts & 4 ? lambda : NULL);
+    return sadmm_problem_set_solution(m->problem, parts & 1 ? v : NULL, parts & 2 ? impulse : NULL,
+                                      parts & 4 ? lambda : NULL);
 }
 
 static sadmm_status certify(struct machine *m)

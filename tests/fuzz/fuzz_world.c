@@ -2,7 +2,8 @@
  * runs out. Whatever the calls:
  *
  *   - a call that fails leaves the world as it was: its bodies, their states, its shapes and its settings, and says why
- *   - after a step that succeeds every state and every contact is finite and in its range, and a certificate that was asked for
+ *   - after a step that succeeds every state and every contact is finite and in its range, and a certificate that was
+ *     asked for
  *     finite and not negative
  *   - what was set is what is read
  */
@@ -13,7 +14,8 @@
 #include "subadmm/world.h"
 
 /* Few, so that an input is quick and its calls meet the same objects again. */
-enum { MAX_BODIES = 6, MAX_SHAPES = 8, MAX_CALLS = 64, MAX_STEPS = 10, IDS = 16, MAX_CONTACTS = 8 * MAX_SHAPES * MAX_SHAPES };
+enum { MAX_BODIES = 6, MAX_SHAPES = 8, MAX_CALLS = 64, MAX_STEPS = 10, IDS = 16 };
+enum { MAX_CONTACTS = 8 * MAX_SHAPES * MAX_SHAPES };
 
 struct machine {
     struct bytes in;
@@ -86,7 +88,8 @@ static void must_be_as_before(sadmm_world *world, const struct picture *before, 
     MUST(after.bodies == before->bodies && after.shapes == before->shapes, "%s: bodies or shapes came or went", name);
     MUST(after.objects == before->objects, "%s: a body or a shape changed", name);
     MUST(memcmp(&after.settings, &before->settings, sizeof after.settings) == 0, "%s: the settings changed", name);
-    MUST(after.report.step == before->report.step && after.report.time == before->report.time, "%s: time went on", name);
+    MUST(after.report.step == before->report.step && after.report.time == before->report.time, "%s: time went on",
+         name);
 }
 
 /* ---- what must hold after a step --------------------------------------------------------------------------------- */
@@ -119,13 +122,14 @@ static void must_be_sound(struct machine *m)
     MUST(sadmm_world_report(m->world, &report) == SADMM_OK, "report");
     int32_t contacts = sadmm_world_contact_count(m->world);
     MUST(report.step == ++m->done, "step %lld", (long long)report.step);
-    MUST(report.bodies == dynamic && report.contacts == contacts, "%d bodies, %d contacts", report.bodies, report.contacts);
+    MUST(report.bodies == dynamic && report.contacts == contacts, "%d bodies, %d contacts", report.bodies,
+         report.contacts);
     MUST(report.pairs <= contacts && (report.pairs > 0) == (contacts > 0), "%d pairs", report.pairs);
     MUST(isfinite(report.penetration_max) && report.penetration_max >= 0, "penetration %g", report.penetration_max);
     const sadmm_certificate *c = &report.certificate;
     if (sadmm_world_settings(m->world).certify)
-        MUST(isfinite(c->ncp_max) && c->ncp_max >= 0 && isfinite(c->ncp_mean) && c->ncp_mean >= 0 && isfinite(c->momentum_max) &&
-                 c->momentum_max >= 0 && isfinite(c->siconos) && c->siconos >= 0,
+        MUST(isfinite(c->ncp_max) && c->ncp_max >= 0 && isfinite(c->ncp_mean) && c->ncp_mean >= 0 &&
+                 isfinite(c->momentum_max) && c->momentum_max >= 0 && isfinite(c->siconos) && c->siconos >= 0,
              "natural map %g, mean %g, momentum %g, siconos %g", c->ncp_max, c->ncp_mean, c->momentum_max, c->siconos);
     MUST(report.iterations >= 0 && report.iterations <= sadmm_world_settings(m->world).iterations, "%d iterations",
          report.iterations);
@@ -228,7 +232,8 @@ static sadmm_body_def take_body_def(struct machine *m)
         memcpy(def.angular_velocity, state.angular_velocity, sizeof def.angular_velocity);
     }
     def.environment = take_rarely(in, 4) ? take_choice(in, 4) - 2 : (def.type == SADMM_BODY_STATIC ? -1 : 0);
-    if (take_rarely(in, 16)) def.name = "a name that is longer than the sixty-three bytes that are kept of it, and then some";
+    if (take_rarely(in, 16))
+        def.name = "a name that is longer than the sixty-three bytes that are kept of it, and then some";
     return def;
 }
 

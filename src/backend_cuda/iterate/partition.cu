@@ -57,8 +57,8 @@ static int64_t most_sides_of(const struct sadmm_context *c, int64_t threads) { r
 /* Threads for a part within the bound, with an eighth to spare; beyond `most` there is no margin, then no capacity. */
 static int64_t threads_for(const struct sadmm_context *c, struct bound bound, int64_t most)
 {
-    /* Bodies beyond one for each eight threads take turns: for them alone no block is so large that its threads have fewer
-     * registers. */
+    /* Bodies beyond one for each eight threads take turns: for them alone no block is so large that its threads have
+     * fewer registers. */
     const int64_t needed = QUAD * (bound.sides + spare_sides(c)),
                   bodies = smaller(LANES * bound.bodies, CUDA(persistent_small_threads)());
     const int64_t wanted = larger(smaller(larger(needed + QUAD * (bound.sides / 8), bodies), most), needed);
@@ -296,7 +296,8 @@ void CUDA(tighten_partition)(const struct sadmm_context *c, const struct cuda_gr
     if (partition->tier == SADMM_CUDA_TIER_STREAM) return;
     const struct bound bound = {statistics->part_sides, statistics->part_bodies};
     struct cuda_partition tight = *partition;
-    tight.threads = (int32_t)threads_for(c, bound, CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0));
+    tight.threads =
+        (int32_t)threads_for(c, bound, CUDA(persistent_threads)(statistics->point_slots, c->view.rows.count > 0));
     if (tight.threads < partition->threads && take_capacity(c, &tight, bound, (int64_t)partition->shared))
         *partition = tight;
 }

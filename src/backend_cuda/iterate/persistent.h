@@ -10,8 +10,8 @@
  *            buffers, and meet in one cluster barrier an iteration
  *   GRID     velocities go through global memory, two buffers again, with one grid barrier an iteration. The launch is
  *            cooperative, so that every block runs and the spinning ends.
- * A quad takes a side of a constraint given by rows, too, up to two rows a lane (persistent_rows.h); a warp has sides of
- * pairs or of such constraints, never both.
+ * A quad takes a side of a constraint given by rows, too, up to two rows a lane (persistent_rows.h); a warp has sides
+ * of pairs or of such constraints, never both.
  *
  * On entry and exit everything is in global memory as the stepwise kernels leave it. Before the first iteration and
  * after the last one of a step, BLOCK may also do what else an island needs (prologue.h).

@@ -86,8 +86,8 @@ template <int MODE, int SIZE> static __device__ __forceinline__ void arrive(unsi
     (void)arrivals;
 #else
     if (MODE == GRID) {
-        /* One thread of a block speaks for it: its release and acquire, with the block's own barriers around them, order
-         * every thread's writes before every thread's reads. */
+        /* One thread of a block speaks for it: its release and acquire, with the block's own barriers around them,
+         * order every thread's writes before every thread's reads. */
         block_barrier<SIZE>();
         if (threadIdx.x == 0) asm volatile("red.release.gpu.global.add.u32 [%0], 1;" ::"l"(arrivals) : "memory");
     }

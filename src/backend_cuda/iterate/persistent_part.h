@@ -60,8 +60,9 @@ template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run 
           first_side(v.graph.offsets[first_body]), sides(v.graph.offsets[first_body + bodies] - first_side),
           found(body_of_slot(v.graph, first_body + t / LANES, t / LANES < bodies)), body(t / LANES), gathered(nullptr),
           gathered_count(0), many(false), moves(warp_has_body(0)), updates(warp_has_side()), row_sides(false),
-          own_row(nullptr), own_state(nullptr), own_record(nullptr), row_memory(nullptr), own_body(), momentum(0), sum(0), step(0), own(),
-          side_code(side < sides ? v.graph.incident[first_side + side] : 0), on(), about(), between(), point()
+          own_row(nullptr), own_state(nullptr), own_record(nullptr), row_memory(nullptr), own_body(), momentum(0),
+          sum(0), step(0), own(), side_code(side < sides ? v.graph.incident[first_side + side] : 0), on(), about(),
+          between(), point()
     {
         lay_out(&m, memory, MODE == CLUSTER, ROWS ? v.rows.count : 0, (int)blockDim.x, args.most_bodies);
         if (!ROWS) return;

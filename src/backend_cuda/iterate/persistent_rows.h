@@ -6,8 +6,8 @@
 #include "quad.h"
 #include "row_law.h"
 
-/* Numbers of a row in shared memory, a warp apart: it takes no registers of those who have no rows, and local memory would
- * be asked for from afar in every iteration of the grid, whose barriers empty the cache. */
+/* Numbers of a row in shared memory, a warp apart: it takes no registers of those who have no rows, and local memory
+ * would be asked for from afar in every iteration of the grid, whose barriers empty the cache. */
 enum row_number {
     ROW_OWN,        /* six each: Jacobians of the side's own body and of the other */
     ROW_OTHER = 6,
@@ -52,8 +52,8 @@ __device__ __forceinline__ void row_lane::jacobian(int32_t j, row_number first, 
     for (int32_t i = 0; i < 6; ++i) row[i] = number(j, first + i);
 }
 
-/* live: is there a side, and is it one of rows? memory: the warp's, of ROWS_OF_LANE x ROW_NUMBERS a lane. Every lane of the
- * warp comes here. */
+/* live: is there a side, and is it one of rows? memory: the warp's, of ROWS_OF_LANE x ROW_NUMBERS a lane. Every lane of
+ * the warp comes here. */
 template <bool FAST>
 __device__ __forceinline__ void row_lane::load(const cuda_view &v, int32_t lane, bool live, int32_t code,
                                                solver_real *memory)

@@ -188,7 +188,8 @@ static __device__ __forceinline__ void store_column(const body_view &bodies, siz
 /* H where it has a closed form. A + C = [p I, -[q]x; [q]x, R] with [q]x u = q x u; by eliminating the linear part, a
  * column a lane: in
  *
- *     p t - q x w = f,   q x t + R w = g      S w = g - q x f / p,   S = R - (|q|^2 I - q q^T) / p,   t = (f + q x w) / p
+ *     p t - q x w = f,   q x t + R w = g
+ *     S w = g - q x f / p,   S = R - (|q|^2 I - q q^T) / p,   t = (f + q x w) / p
  *
  * S = L D L^T. */
 static __device__ __forceinline__ void factor_rigid(const body_view &bodies, size_t body, int32_t lane,

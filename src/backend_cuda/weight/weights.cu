@@ -38,7 +38,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
                 &sums);
 }
 
-/* ---- terms and islands --------------------------------------------------------------------------------------------- */
+/* ---- terms and islands ------------------------------------------------------------------------------------------- */
 
 /* ROWS: there may be constraints given by rows. */
 template <bool SCALES, bool ROWS>

@@ -3,9 +3,10 @@
  * It knows nothing of a backend or of the iteration: x comes from v, J^T lambda from lambda; A, b, e from the system.
  *
  *   contact  |lambda - Pi_C(lambda - (x + e)/w)| w     w: largest diagonal entry of the contact's own J A^-1 J^T
- *   row      |lambda - clamp(lambda - (g x + b + d lambda)/(d + g w))| w      the largest of a constraint; w: that row's
- *            own diagonal entry; gain g, bias b, compliance d, bounds (math/row.h). Without bounds that is |x + e| of a
- *            hard row and |lambda + k e + c x| w / (1 + c w) of a soft one. Rows that are zero on both bodies do not count
+ *   row      |lambda - clamp(lambda - (g x + b + d lambda)/(d + g w))| w      the largest of a constraint; w: that
+ *            row's own diagonal entry; gain g, bias b, compliance d, bounds (math/row.h). Without bounds that is
+ *            |x + e| of a hard row and |lambda + k e + c x| w / (1 + c w) of a soft one. Rows that are zero on both
+ *            bodies do not count
  *
  * All three are one thing, the natural map: how far (as a velocity) an exact solve of the constraint on its own, with
  * everything else held, would move it. For a soft row the factor 1/(1 + c w) makes it |lambda + k e| w for a plain
