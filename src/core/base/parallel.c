@@ -129,6 +129,15 @@ static int try_threads(int count)
     return n;
 }
 
+/* LLVM's workers allocate when they begin. What malloc sets aside for each of them (64 MB of addresses with glibc, and for a
+ * moment twice that) is not there for the next, and the runtime ends the process where one cannot be made: how many it can
+ * make in a process that is short of addresses cannot be foreseen. */
+#ifdef __clang__
+enum { RUNTIME_ENDS_PROCESS = true };
+#else
+enum { RUNTIME_ENDS_PROCESS = false };
+#endif
+
 /* Threads for a region that wants that many. */
 static int allowed(int threads)
 {
@@ -142,7 +151,7 @@ static int allowed(int threads)
     /* One more than it makes, for the runtime's own memory. Where the process has not enough for all, half of what it
      * has: the other half of its address space is for what the step works on. */
     int made = try_threads(threads);
-    if (made < threads) most = threads = made < 2 ? 1 : made / 2;
+    if (made < threads) most = threads = made < 2 || RUNTIME_ENDS_PROCESS ? 1 : made / 2;
     tried = threads;
     return threads;
 }
