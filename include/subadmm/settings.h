@@ -89,7 +89,7 @@ typedef struct sadmm_settings {
     double correction_speed;     /* cap of the corrective normal speed, m/s, in [0, 1e3]; default 1 */
     double restitution_threshold;/* approach speed under which restitution is ignored, m/s, >= 0; default 0.1 */
 
-    int threads; /* CPU threads at most, in [0, 1024]; 0 = no bound; default 0. As many work as have
+    int threads;                 /* CPU threads at most, in [0, 1024]; 0 = no bound; default 0. As many work as have
                                     enough to do, no more than there are processors (0: than OMP_NUM_THREADS, where that
                                     is set) or threads of a pool of the host's (tasks.h), and no more than the process
                                     can make; reports say how many that were. Results do not depend on it */

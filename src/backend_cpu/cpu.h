@@ -45,9 +45,8 @@
 #define CPU(name) SADMM_JOIN(sadmm_cpu_##name, SADMM_VARIANT)
 
 enum { STATE_INV_BETA = 6 }; /* slot of a state row */
-enum {
-    BODY_SUMS = 4
-}; /* weights: energy, kinetic, push, momentum residual; limit: now, free, along, momentum residual */
+/* Of weights: energy, kinetic, push, momentum residual; of the limit: now, free, along, momentum residual. */
+enum { BODY_SUMS = 4 };
 
 /* LANES contact pairs; points of all of them in `slots` slots from `first` on. Lanes without a pair point at the
  * static body; slots without a point have an error so large that lambda stays 0. */

@@ -48,7 +48,7 @@ struct bound {
     int64_t sides, bodies;
 };
 
-/* Places for sides that may stay empty: constraints given by rows begin with a warp (iterate/persistent_part.h). */
+/* Places for sides that may stay empty: constraints given by rows begin with a warp (part_rows_from_pairs in persistent_load.h). */
 static int64_t spare_sides(const struct sadmm_context *c) { return c->view.rows.count > 0 ? WARP / QUAD - 1 : 0; }
 
 /* The most sides that a block of so many threads takes. */

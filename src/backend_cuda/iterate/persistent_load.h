@@ -7,8 +7,8 @@
 /* ---- loading --------------------------------------------------------------------------------------------------- */
 
 /* Which side each quad takes: those of pairs first, then, from the next whole warp on, those of constraints given by
- * rows. A warp that had both would do one after the other, and all wait for it. Of every thread's own side before:
- * number t. */
+ * rows. A warp that had both would do one after the other, and all wait for it. Thread t first classifies side t: a
+ * block has more threads than sides. */
 PART __device__ __forceinline__ void PART_RUN::part_rows_from_pairs(void)
 {
     enum { QUADS = WARP / QUAD };
