@@ -20,13 +20,16 @@ SADMM_INLINE int geometry_sizes(int type)
     return 0;
 }
 
+/* Not by fmin, which is a call where instructions see NaN in another way. */
+SADMM_INLINE double smaller_of(double a, double b) { return a < b ? a : b; }
+
 /* Smallest extent, m; a plane has none that limits. */
 SADMM_INLINE double geometry_thickness(const struct sadmm_geometry *g)
 {
     switch ((sadmm_shape_type)g->type) {
     case SADMM_SHAPE_SPHERE:
     case SADMM_SHAPE_CAPSULE: return 2 * g->size[0];
-    case SADMM_SHAPE_BOX: return 2 * fmin(g->size[0], fmin(g->size[1], g->size[2]));
+    case SADMM_SHAPE_BOX: return 2 * smaller_of(g->size[0], smaller_of(g->size[1], g->size[2]));
     case SADMM_SHAPE_PLANE:
     case SADMM_SHAPE_TYPE_COUNT: break;
     }

@@ -29,7 +29,7 @@ typedef SADMM_REAL real;
 #define SADMM_REAL_MAX ((real)(sizeof(real) == 4 ? (double)FLT_MAX : DBL_MAX))
 
 SADMM_INLINE real real_sqrt(real x) { return sizeof(real) == 4 ? (real)sqrtf((float)x) : (real)sqrt((double)x); }
-SADMM_INLINE real real_abs(real x) { return x < 0 ? -x : x; }
+SADMM_INLINE real real_abs(real x) { return sizeof(real) == 4 ? (real)fabsf((float)x) : (real)fabs((double)x); }
 SADMM_INLINE real real_min(real a, real b) { return a < b ? a : b; }
 SADMM_INLINE real real_max(real a, real b) { return a > b ? a : b; }
 SADMM_INLINE real real_clamp(real x, real lo, real hi) { return x < lo ? lo : (x > hi ? hi : x); }
