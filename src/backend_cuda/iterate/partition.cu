@@ -16,7 +16,6 @@
  *   GRID     an island that no cluster can hold, or a few that do not fit side by side
  *   STREAM   what the device cannot hold at once
  */
-#include <limits.h>
 
 #include "iterate.h"
 
@@ -187,7 +186,7 @@ static struct choice choose_cluster_of(const struct sadmm_context *c, const stru
     if (choice.partition.threads > most || !take_capacity(c, &choice.partition, bound, c->shared_limit))
         return no_choice(too_large);
     int active = 0;
-    cuda_kernel kernel = CUDA(persistent_kernel)(statistics->point_slots, SADMM_CUDA_TIER_CLUSTER, INT_MAX,
+    cuda_kernel kernel = CUDA(persistent_kernel)(statistics->point_slots, SADMM_CUDA_TIER_CLUSTER, (int)most,
                                                  c->view.rows.count > 0, c->fast, &name);
     *code = CUDA(active_clusters)(c, kernel, &choice.partition, &active);
     if (*code != cudaSuccess || active < 1) return no_choice("the device has no clusters that large");
@@ -236,7 +235,7 @@ static struct choice choose_grid(const struct sadmm_context *c, const struct cud
         choice.partition.threads = (int32_t)threads;
         if (!take_capacity(c, &choice.partition, bound, c->shared_limit / side_by_side)) continue;
         int resident = 0;
-        cuda_kernel kernel = CUDA(persistent_kernel)(statistics->point_slots, SADMM_CUDA_TIER_GRID, INT_MAX,
+        cuda_kernel kernel = CUDA(persistent_kernel)(statistics->point_slots, SADMM_CUDA_TIER_GRID, (int)most,
                                                      c->view.rows.count > 0, c->fast, &name);
         *code = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, (const void *)kernel,
                                                               choice.partition.threads, choice.partition.shared);

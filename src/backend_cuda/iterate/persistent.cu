@@ -35,15 +35,11 @@ static persistent_instances instances_of(enum sadmm_cuda_tier tier)
 cuda_kernel CUDA(persistent_kernel)(int point_slots, enum sadmm_cuda_tier tier, int threads, bool rows, bool fast,
                                     const char **name)
 {
-    const int points = point_slots <= 4 ? 4 : 8;
-    const int size = rows                                               ? (int)WITH_ROWS
-                     : threads > SMALL_THREADS                          ? ANY_SIZE
-                     : tier == SADMM_CUDA_TIER_BLOCK && threads == WARP ? ONE_WARP
-                                                                        : SMALL;
     const persistent_instances all = instances_of(tier);
     for (size_t k = 0; k < all.count; ++k) {
         const persistent_instance &one = all.first[k];
-        if (one.points != points || one.rows != rows || one.size != size || one.fast != fast) continue;
+        if (!one.kernel || one.points < point_slots || one.threads < threads) continue;
+        if (one.rows != rows || one.fast != fast) continue;
         *name = one.name;
         return one.kernel;
     }
@@ -55,9 +51,10 @@ static cudaError_t allow_shared(enum sadmm_cuda_tier tier, int bytes)
 {
     const persistent_instances all = instances_of(tier);
     cudaError_t code = cudaSuccess;
-    for (size_t k = 0; k < all.count && code == cudaSuccess; ++k)
-        code =
-            cudaFuncSetAttribute((const void *)all.first[k].kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, bytes);
+    for (size_t k = 0; k < all.count && code == cudaSuccess; ++k) {
+        const void *kernel = (const void *)all.first[k].kernel;
+        if (kernel) code = cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, bytes);
+    }
     return code;
 }
 
@@ -69,6 +66,7 @@ static cudaError_t allow_clusters(bool *clusters)
     cudaError_t code = cudaSuccess;
     for (size_t k = 0; k < all.count && code == cudaSuccess && *clusters; ++k) {
         const void *kernel = (const void *)all.first[k].kernel;
+        if (!kernel) continue;
         cudaFuncAttributes about = {};
         code = cudaFuncGetAttributes(&about, kernel);
         *clusters = code == cudaSuccess && about.ptxVersion >= CLUSTER_ARCH / 10;

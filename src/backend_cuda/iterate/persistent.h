@@ -41,8 +41,8 @@ static __device__ __forceinline__ bool nothing_to_do(const model_view &model, co
 }
 
 /* All iterations of a batch by the method `fast` (math/relax.h): Steps 2-4, then Step 1. An iteration has the barriers
- * of the other method's. ROWS: some side may be of a constraint given by rows. */
-template <int MODE, int SIZE, bool ROWS, class Part>
+ * of the other method's. */
+template <int MODE, int SIZE, class Part>
 static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view &v, const cuda_args &args,
                                                     real relaxation, row_lane *rows, unsigned *target)
 {
@@ -56,7 +56,7 @@ static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view 
         real relaxation_factor = plain ? (real)1 : all,
              velocity_factor = relax_velocity(i, batch, settled) ? all : (real)1;
         keep<SIZE>(&relaxation_factor), keep<SIZE>(&velocity_factor);
-        if (ROWS && part.row_sides) part.update_rows(*rows, odd, relaxation_factor);
+        if (HAS_ROWS<SIZE> && part.row_sides) part.update_rows(*rows, odd, relaxation_factor);
         else part.update_sides(odd, relaxation_factor, plain);
         block_barrier<SIZE>();
         part.move_bodies_fast(!odd, velocity_factor, relaxation_factor);
@@ -68,7 +68,7 @@ static __device__ __forceinline__ void iterate_fast(Part &part, const cuda_view 
 }
 
 /* The same by the method `paper`: Step 1, then Steps 2-4. */
-template <int MODE, int SIZE, bool ROWS, class Part>
+template <int MODE, int SIZE, class Part>
 static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view &v, const cuda_args &args,
                                                      row_lane *rows, unsigned *target)
 {
@@ -78,25 +78,25 @@ static __device__ __forceinline__ void iterate_paper(Part &part, const cuda_view
         arrive<MODE, SIZE>(v.iteration.barrier);
         if (part.has_moves()) part.momentum = free_momentum(part.own_body);
         wait<MODE, SIZE>(v.iteration.barrier, *target += gridDim.x);
-        if (ROWS && part.row_sides) part.update_rows(*rows, odd, 1);
+        if (HAS_ROWS<SIZE> && part.row_sides) part.update_rows(*rows, odd, 1);
         else part.update_sides(odd, 1, true);
         block_barrier<SIZE>();
     }
 }
 
 /* A batch's iterations; then what they leave is stored. */
-template <int MODE, int SIZE, bool FAST, bool ROWS, class Part>
+template <int MODE, int SIZE, bool FAST, class Part>
 static __device__ __forceinline__ void iterate(Part &part, const cuda_view &v, const cuda_args &args, real relaxation)
 {
     unsigned target = 0;
     row_lane rows = {};
-    if (ROWS && part.row_sides) rows.load<FAST>(v, part.lane, part.is_row_side(), part.side_code, part.row_memory);
+    if (HAS_ROWS<SIZE> && part.row_sides) rows.load<FAST>(v, part.lane, part.is_row_side(), part.side_code, part.row_memory);
     if (FAST && MODE != BLOCK) { /* others read the velocities that were loaded */
         arrive<MODE, SIZE>(v.iteration.barrier);
         wait<MODE, SIZE>(v.iteration.barrier, target += gridDim.x);
     }
-    if (FAST) iterate_fast<MODE, SIZE, ROWS>(part, v, args, relaxation, &rows, &target);
-    else iterate_paper<MODE, SIZE, ROWS>(part, v, args, &rows, &target);
+    if (FAST) iterate_fast<MODE, SIZE>(part, v, args, relaxation, &rows, &target);
+    else iterate_paper<MODE, SIZE>(part, v, args, &rows, &target);
     /* No block may read this one's memory once it is gone. */
     if (!FAST && MODE == CLUSTER) {
         arrive<MODE, SIZE>(v.iteration.barrier);
@@ -107,16 +107,16 @@ static __device__ __forceinline__ void iterate(Part &part, const cuda_view &v, c
     if (MODE == BLOCK) let_next_begin();
     part.store_bodies(args.count & 1);
     if (!part.has_side() || part.side_stopped()) return;
-    if (ROWS && part.row_sides) rows.store(part.lane);
+    if (HAS_ROWS<SIZE> && part.row_sides) rows.store(part.lane);
     else part.store_pair();
 }
 
 /* A batch's iterations, and the limit of energies after them. */
-template <int MODE, int SIZE, bool FAST, bool PROLOGUE, bool ROWS, class Part>
+template <int MODE, int SIZE, bool FAST, bool PROLOGUE, class Part>
 static __device__ __forceinline__ void run_batch(Part &part, const cuda_view &v, const cuda_args &args, real relaxation,
                                                  const block_part &block)
 {
-    iterate<MODE, SIZE, FAST, ROWS>(part, v, args, relaxation);
+    iterate<MODE, SIZE, FAST>(part, v, args, relaxation);
     if (!FAST || args.limit == LIMIT_NONE) return;
     const bool suspected = part.suspect(args.count & 1);
     if (!PROLOGUE || args.limit == LIMIT_SUSPECTS) {
@@ -132,19 +132,19 @@ static __device__ __forceinline__ void run_batch(Part &part, const cuda_view &v,
 
 /* A multiprocessor holds one block at least: unless told so the compiler gives a block of one warp fewer registers than
  * it needs. */
-template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST>
+template <int POINTS, int MODE, int SIZE, bool FAST>
 static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     persistent_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     CUDA_DYNAMIC_SHARED(memory);
     wait_for_stream();
     /* They take registers. */
-    constexpr bool PROLOGUE = FAST && MODE == BLOCK && !ROWS && SIZE != ANY_SIZE;
+    constexpr bool PROLOGUE = FAST && MODE == BLOCK && !HAS_ROWS<SIZE> && SIZE != ANY_SIZE;
     if (nothing_to_do<MODE, FAST>(v.model, v.graph, v.islands, args)) {
         if (PROLOGUE && args.begin) stamp_assembled(v.step);
         return;
     }
-    part_run<POINTS, MODE, ROWS, SIZE, FAST> part(v, args, memory);
+    part_run<POINTS, MODE, SIZE, FAST> part(v, args, memory);
     const auto barrier = [] { block_barrier<SIZE>(); };
     const block_part block = part.for_prologue();
     if (PROLOGUE && threadIdx.x == 0) *block.suspected = 0;
@@ -159,21 +159,35 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
         }
     const real relaxation = FAST ? (real)v.model.settings->relaxation : (real)1; /* on its way with what is loaded */
     part.load();
-    run_batch<MODE, SIZE, FAST, PROLOGUE, ROWS>(part, v, args, relaxation, block);
+    run_batch<MODE, SIZE, FAST, PROLOGUE>(part, v, args, relaxation, block);
 }
 
 /* ---- instances ------------------------------------------------------------------------------------------------- */
 
+/* Is there such an instance? Each takes long to compile, and is there for what steps take longer without it
+ * (docs/performance.md). Boxes on boxes touch in up to 8 points, mostly 4: with 4 a lane needs fewer registers. */
+template <int POINTS, int MODE, int SIZE, bool FAST> constexpr bool exists(void)
+{
+    const bool in_double = sizeof(solver_real) == sizeof(double);
+    if (SIZE == ONE_WARP) return MODE == BLOCK;
+    return !(SIZE == SMALL && MODE == GRID && in_double && !FAST);
+}
+
 struct persistent_instance {
-    int points;
-    bool rows;
-    int size;
-    bool fast;
-    cuda_kernel kernel;
+    int points, threads; /* at most */
+    bool rows, fast;
+    cuda_kernel kernel; /* NULL: does not exist */
     const char *name;
 };
 
-/* All of a mode, which has a source of its own: they take long to compile. */
+template <int POINTS, int MODE, int SIZE, bool FAST> constexpr persistent_instance instance(const char *name)
+{
+    persistent_instance one = {POINTS, most_threads(POINTS, SIZE), HAS_ROWS<SIZE>, FAST, nullptr, name};
+    if constexpr (exists<POINTS, MODE, SIZE, FAST>()) one.kernel = persistent_kernel<POINTS, MODE, SIZE, FAST>;
+    return one;
+}
+
+/* All of a mode, which has a source of its own; from those of few threads to those of many. */
 struct persistent_instances {
     const persistent_instance *first;
     size_t count;
@@ -182,17 +196,13 @@ persistent_instances CUDA(block_instances)(void);
 persistent_instances CUDA(cluster_instances)(void);
 persistent_instances CUDA(grid_instances)(void);
 
-#define INSTANCE(points, mode, rows, size, fast, name) \
-    {points, rows, size, fast, persistent_kernel<points, mode, rows, size, fast>, "iterate (" name ")"}
-/* Boxes on boxes touch in up to 8 points, mostly 4: with 4 a lane needs fewer registers. */
-#define OF_SIZES(points, mode, fast, name)                        \
-    INSTANCE(points, mode, false, ANY_SIZE, fast, name),          \
-        INSTANCE(points, mode, false, SMALL, fast, name ", small"), \
-        INSTANCE(points, mode, true, WITH_ROWS, fast, name ", rows")
-#define OF_MODE(mode, name)                                      \
-    OF_SIZES(4, mode, false, name ", 4 points"),                 \
-        OF_SIZES(8, mode, false, name ", 8 points"),             \
-        OF_SIZES(4, mode, true, "fast, " name ", 4 points"),     \
-        OF_SIZES(8, mode, true, "fast, " name ", 8 points")
+#define OF_POINTS(points, mode, fast, name)                                                      \
+    instance<points, mode, ONE_WARP, fast>("iterate (" name ", " #points " points, warp)"),      \
+        instance<points, mode, SMALL, fast>("iterate (" name ", " #points " points, small)"),    \
+        instance<points, mode, ANY_SIZE, fast>("iterate (" name ", " #points " points)"),        \
+        instance<points, mode, WITH_ROWS, fast>("iterate (" name ", " #points " points, rows)")
+#define OF_MODE(mode, name)                                                                      \
+    OF_POINTS(4, mode, false, name), OF_POINTS(8, mode, false, name),                            \
+        OF_POINTS(4, mode, true, "fast, " name), OF_POINTS(8, mode, true, "fast, " name)
 
 #endif

@@ -174,7 +174,7 @@ PART __device__ __forceinline__ void PART_RUN::load(void)
     own_state = kept_address<SIZE>(m.state + body * ROW + r);
     if (!FAST && !args.start) load_records();
     else if (!FAST && updates) start_records();
-    if (ROWS && !FAST && args.start && row_sides) start_row_records();
+    if (HAS_ROWS<SIZE> && !FAST && args.start && row_sides) start_row_records();
     if (FAST && MODE == GRID) /* for the first Steps 2-4 of the others */
         for (int32_t i = t; i < bodies * ROW; i += threads)
             v.iteration.exchange[(size_t)first_body * ROW + (size_t)i] = v.bodies.state[raw_row(i)];

@@ -11,6 +11,7 @@ enum persistent_mode { BLOCK, CLUSTER, GRID };
 /* Sizes of blocks an instance is made for: few threads may have all the registers they want, and a single warp needs no
  * barrier (BLOCK alone). WITH_ROWS: of whatever size, with constraints given by rows, which take registers. */
 enum block_size { ANY_SIZE, SMALL, ONE_WARP, WITH_ROWS };
+template <int SIZE> constexpr bool HAS_ROWS = SIZE == WITH_ROWS;
 enum { SMALL_THREADS = sizeof(solver_real) == sizeof(float) ? 512 : 256 };
 
 static constexpr int most_threads(int points, int size)

@@ -25,7 +25,7 @@ template <int POINTS> struct side_lane {
 
 /* ---- a part ---------------------------------------------------------------------------------------------------- */
 
-template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run {
+template <int POINTS, int MODE, int SIZE, bool FAST> struct part_run {
     enum { COUNT = POINTS / QUAD, MORE = MODE == BLOCK ? 8 : 4 }; /* more take registers, fewer another round */
     const cuda_view &v;
     const cuda_args &args;
@@ -64,8 +64,8 @@ template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run 
           sum(0), step(0), own(), side_code(side < sides ? v.graph.incident[first_side + side] : 0), on(), about(),
           between(), point()
     {
-        lay_out(&m, memory, MODE == CLUSTER, ROWS ? v.rows.count : 0, (int)blockDim.x, args.most_bodies);
-        if (!ROWS) return;
+        lay_out(&m, memory, MODE == CLUSTER, HAS_ROWS<SIZE> ? v.rows.count : 0, (int)blockDim.x, args.most_bodies);
+        if (!HAS_ROWS<SIZE>) return;
         part_rows_from_pairs();
         row_sides = __ballot_sync((unsigned)ALL_LANES, is_row_side()) != 0;
         updates = __ballot_sync((unsigned)ALL_LANES, side < sides && !is_row_side()) != 0;
@@ -98,7 +98,7 @@ template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run 
     __device__ __forceinline__ bool has_side(void) const { return side < sides; }
     __device__ __forceinline__ bool is_row_side(void) const
     {
-        return ROWS && side < sides && side_code / 2 >= v.contacts.pair_capacity;
+        return HAS_ROWS<SIZE> && side < sides && side_code / 2 >= v.contacts.pair_capacity;
     }
     /* Warps without work are left out of everything but barriers. */
     __device__ __forceinline__ bool warp_has_body(int32_t first) const
@@ -134,8 +134,8 @@ template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST> struct part_run 
     __device__ __forceinline__ void store_pair(void);
 };
 
-#define PART template <int POINTS, int MODE, bool ROWS, int SIZE, bool FAST>
-#define PART_RUN part_run<POINTS, MODE, ROWS, SIZE, FAST>
+#define PART template <int POINTS, int MODE, int SIZE, bool FAST>
+#define PART_RUN part_run<POINTS, MODE, SIZE, FAST>
 
 /* The quad's sum as the record of its side. */
 PART __device__ __forceinline__ void PART_RUN::store_record(real2_pair *record, real2_pair sum) const
