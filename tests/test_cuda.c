@@ -240,7 +240,7 @@ START_TEST(tiers_chosen)
 }
 END_TEST
 
-/* Between a abort_code and its end an iteration changes nothing, in any tier. */
+/* Between an abort and its end an iteration changes nothing, in any tier. */
 START_TEST(aborted_does_nothing)
 {
     static const char *const names[] = {"mixed", "large"};
@@ -260,7 +260,7 @@ START_TEST(aborted_does_nothing)
         check_same(&aborted, &plain, "aborted");
         CALL(&plain, table->iterate(plain.c, 4, true, &plain.error));
         CALL(&aborted, table->iterate(aborted.c, 4, true, &aborted.error));
-        check_same(&aborted, &plain, "after the abort_code");
+        check_same(&aborted, &plain, "after the abort");
         const struct sadmm_residual wanted = runner_residual(&plain), got = runner_residual(&aborted);
         ck_assert(got.primal == wanted.primal && got.dual == wanted.dual);
         /* A measured iteration that is aborted measures nothing. */

@@ -294,7 +294,7 @@ START_TEST(deep_stacks)
 }
 END_TEST
 
-/* Between a abort_code and its end nothing changes, weights included. */
+/* Between an abort and its end nothing changes, weights included. */
 START_TEST(aborted_does_nothing)
 {
     const struct sadmm_kernels *table = tables[_i];
@@ -318,7 +318,7 @@ START_TEST(aborted_does_nothing)
             if (k) set_abort(r, ABORT_NONE);
             iterate(r, 4, false);
         }
-        check_same(&aborted, &plain, "after the abort_code");
+        check_same(&aborted, &plain, "after the abort");
         runner_stop(&plain);
         runner_stop(&aborted);
     }

@@ -512,7 +512,7 @@ START_TEST(too_large_parts_abort)
 }
 END_TEST
 
-/* After a abort_code nothing changes what the queue's last good step left. */
+/* After an abort nothing changes what the queue's last good step left. */
 START_TEST(aborted_does_nothing)
 {
     struct device d;
