@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "core/math/real.h"
+#include "core/math/contact.h"
 
 enum { LANES = SADMM_VECTOR_BYTES / (int)sizeof(real) };
 /* may_alias: memory is seen as numbers, rows and lanes in turn. */
@@ -43,6 +43,8 @@ static inline real horizontal_max(lanes a)
     for (int l = 1; l < LANES; ++l) m = real_max(m, a[l]);
     return m;
 }
+
+CONTACT_LAW(lane_law, lanes, lane_mask, fill, pick, root) /* math/contact.h */
 
 static inline vec pick_vec(lane_mask mask, vec yes, vec no)
 {

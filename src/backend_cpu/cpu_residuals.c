@@ -1,6 +1,6 @@
 /* The method `fast`: what the momentum of bodies misses, r = b - A v + J^T lambda, before iterations change it by what
  * v and lambda change. In double, from this precision's b, v and lambda, in the order of a body's records. */
-#include "core/math/violation.h"
+#include "core/math/array3.h"
 #include "cpu_rows.h"
 
 /* The impulse of point k of a pair's lane, on b, and its arm about a (b where a is static). */

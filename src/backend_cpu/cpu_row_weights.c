@@ -1,4 +1,5 @@
 /* The method `fast`: weights of constraints given by rows (math/weight.h). In double. */
+#include "core/math/array3.h"
 #include "core/math/row.h"
 #include "core/math/weight.h"
 #include "cpu_rows.h"
@@ -24,7 +25,7 @@ static void respond(struct sadmm_context *c, const struct row_block *block, int 
             if (bodies[side] >= c->bodies) continue;
             cpu_load_row(c, block, l, side, r, row);
             out->response += packed_form(&c->A_inverse[(size_t)bodies[side] * PACKED6], row);
-            push = fmax(push, sqrt(row[0] * row[0] + row[1] * row[1] + row[2] * row[2]));
+            push = fmax(push, length3(row));
         }
         out->scale = push > 0 ? push : sqrt(out->response / inverse_mass);
     }

@@ -96,17 +96,14 @@ static inline __attribute__((always_inline)) void sweep_block(struct sadmm_conte
             }
             vec x = add(u, cross(w, arm)), e = scale(n, slot->error);
             vec step = scale(add(x, e), inv_s), y = sub(old, step);
-            /* The strict projection (math/contact.h, contact_project). */
-            lanes yn = dot(n, y), normal = pick(yn > 0, yn, zero), limit = mu * normal;
+            lanes yn = dot(n, y);
             vec t = sub(y, scale(n, yn));
-            lanes t2 = dot(t, t), shrink = pick(t2 > limit * limit, limit / root(t2), fill(1));
-            vec lambda = add(scale(n, normal), scale(t, shrink));
-            vec delta = sub(lambda, old);
+            const struct lane_law law = lane_law_of(yn, dot(t, t), mu);
+            vec lambda = add(scale(n, law.push), scale(t, law.shrink)), delta = sub(lambda, old);
             if (cpu_sweep_passes_changes(sweep)) {
                 /* where it sticks, lambda^ - lambda is -step, without the rounding of either */
-                lane_mask moves = (t2 > limit * limit) | (yn <= 0);
-                delta = pick_vec(moves, delta, (vec){-step.x, -step.y, -step.z});
-                lambda = pick_vec(moves, lambda, y);
+                delta = pick_vec(law.moves, delta, (vec){-step.x, -step.y, -step.z});
+                lambda = pick_vec(law.moves, lambda, y);
             }
             if (sweep == CPU_SWEEP_RELAX) slot->lambda = add(old, scale(delta, relaxation));
             else slot->lambda = lambda;

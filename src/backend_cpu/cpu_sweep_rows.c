@@ -54,22 +54,17 @@ static lanes inverse_weight(const struct sadmm_context *c, const struct row_bloc
 static inline void solve_cone(const struct row_block *block, const struct row_slot *slots, const lanes missing[6],
                               bool changes, lanes delta[6], lanes lambda[6])
 {
-    const lanes zero = {0};
     lanes step[3], y[3];
     for (int r = 0; r < 3; ++r) {
         step[r] = missing[r] * block->inv_s;
         y[r] = slots[r].lambda - step[r];
     }
-    lanes normal = pick(y[0] > 0, y[0], zero), limit = block->friction * normal, t2 = y[1] * y[1] + y[2] * y[2];
-    lanes shrink = pick(t2 > limit * limit, limit / root(t2), fill(1));
-    lane_mask moves = (t2 > limit * limit) | (y[0] <= 0);
+    const struct lane_law law = lane_law_of(y[0], y[1] * y[1] + y[2] * y[2], block->friction);
     for (int r = 0; r < 3; ++r) {
-        lambda[r] = shrink * y[r];
-        if (r == 0) lambda[r] = normal;
+        lambda[r] = law.shrink * y[r];
+        if (r == 0) lambda[r] = law.push;
         delta[r] = lambda[r] - slots[r].lambda;
-        if (!changes) continue;
-        delta[r] = pick(moves, delta[r], -step[r]);
-        lambda[r] = pick(moves, lambda[r], y[r]);
+        if (changes) delta[r] = pick(law.moves, delta[r], -step[r]);
     }
 }
 

@@ -1,6 +1,6 @@
 /* The method `fast`: weight scales of the islands (math/weight.h), from what contacts and momentum miss. In double;
  * sums over an island go in the order of pairs and of bodies. */
-#include "core/math/violation.h"
+#include "core/math/array3.h"
 #include "core/math/weight.h"
 #include "cpu_rows.h"
 

@@ -3,6 +3,7 @@
  *
  * In double from the system's raw data; only the impulses are in this precision. Sums over a body go in the order of
  * its records, sums over an island in the order of bodies. */
+#include "core/math/array3.h"
 #include "core/math/dense6.h"
 #include "core/model/islands.h"
 #include "core/math/weight.h"
@@ -76,8 +77,6 @@ static double pair_response(const struct sadmm_context *c, const struct sadmm_co
     }
     return w / (c->plan.contact_rows * pair->count);
 }
-
-static double length3(const double x[3]) { return sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]); }
 
 /* ---- weights ----------------------------------------------------------------------------------------------------- */
 

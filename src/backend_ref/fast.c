@@ -5,6 +5,7 @@
  * u = -lambda is kept in the sides, where recover_wrenches reads it. */
 #include <string.h>
 
+#include "core/math/array3.h"
 #include "core/math/dense6.h"
 #include "core/math/contact.h"
 #include "core/math/relax.h"
@@ -59,7 +60,7 @@ static double row_scale(const struct sadmm_context *c, const struct ref_constrai
         const struct ref_side *side = &constraint->side[s];
         if (side->body < 0) continue;
         const double *J = side->J + 6 * r;
-        push = fmax(push, sqrt(J[0] * J[0] + J[1] * J[1] + J[2] * J[2]));
+        push = fmax(push, length3(J));
         inverse_mass += 1 / mass_of(&c->bodies[side->body]);
     }
     return push > 0 ? push : sqrt(row_response(c, constraint, r) / inverse_mass);
@@ -88,8 +89,7 @@ static void add_up_group(struct sadmm_context *c, size_t first, size_t count)
         if (body < 0) continue;
         for (size_t k = first; k < first + count; ++k) add_impulse(&c->constraints[k], s, impulse);
         for (int j = 0; j < 6; ++j) c->bodies[body].impulse[j] += impulse[j];
-        c->bodies[c->bodies[body].label].island_push +=
-            sqrt(impulse[0] * impulse[0] + impulse[1] * impulse[1] + impulse[2] * impulse[2]);
+        c->bodies[c->bodies[body].label].island_push += length3(impulse);
     }
 }
 
@@ -177,12 +177,10 @@ static double pair_violation(const struct sadmm_context *c, const struct sadmm_c
     double w = pair_response(c, pair), sum = 0;
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
         const struct ref_constraint *constraint = &c->constraints[k];
-        double u[6], candidate[3] = {0, 0, 0}, projected[3];
+        double u[6] = {0}, missing[3];
         slip(c, constraint, u);
-        for (int r = 0; r < constraint->rows; ++r) candidate[r] = constraint->lambda[r] - u[r] / w;
-        contact_project_rows(candidate, constraint->mu, projected);
-        for (int r = 0; r < constraint->rows; ++r)
-            sum += w * (constraint->lambda[r] - projected[r]) * (constraint->lambda[r] - projected[r]);
+        contact_missing_rows(constraint->lambda, u, constraint->mu, w, missing);
+        for (int r = 0; r < constraint->rows; ++r) sum += w * missing[r] * missing[r];
     }
     return sum;
 }

@@ -7,7 +7,7 @@
 
 #include "backend_cuda/device/body.h"
 
-#include "core/math/violation.h"
+#include "core/math/array3.h"
 
 /* Numbers of side_wrench: force and torque, then the force's size; ROW in all. */
 enum { SIDE_PUSH = 6 };
@@ -126,7 +126,7 @@ static __device__ __forceinline__ void store_side(const weight_view &weights, in
         wrench[j] = sign * f[j];
         wrench[j + 3] = sign * sums->torque[j];
     }
-    wrench[SIDE_PUSH] = sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
+    wrench[SIDE_PUSH] = length3(f);
     wrench[SIDE_PUSH + 1] = 0;
     arms[SIDE_LOAD] = (solver_real)(sums->pushed * share);
     if (!first) return;

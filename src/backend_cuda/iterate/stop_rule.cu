@@ -19,10 +19,9 @@
 /* Of a contact in its frame, with u = x + e and the response w. */
 static __device__ double map_of_contact(const double lambda[3], const double u[3], double friction, double w)
 {
-    double y[3], inside[3], missed = 0;
-    for (int i = 0; i < 3; ++i) y[i] = lambda[i] - u[i] / w;
-    contact_project_rows(y, friction, inside);
-    for (int i = 0; i < 3; ++i) missed += (lambda[i] - inside[i]) * (lambda[i] - inside[i]);
+    double missing[3], missed = 0;
+    contact_missing_rows(lambda, u, friction, w, missing);
+    for (int i = 0; i < 3; ++i) missed += missing[i] * missing[i];
     return w * sqrt(missed);
 }
 

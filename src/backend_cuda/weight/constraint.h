@@ -6,7 +6,8 @@
 #include "backend_cuda/device/body.h"
 #include "row_sums.h"
 
-#include "core/math/violation.h"
+#include "core/math/array3.h"
+#include "core/math/contact.h"
 
 struct pair_data {
     double normal[3], difference[3], friction;
@@ -81,11 +82,6 @@ static __device__ __forceinline__ void for_each_point(const contact_view &contac
     }
 }
 
-static __device__ __forceinline__ double dot3(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 static __device__ __forceinline__ bool is_dynamic(const model_view &model, int32_t body) { return body < model.bodies; }
 
 /* (A_0 + A_1 + A_2) / 3 */
@@ -107,7 +103,7 @@ static inline __device__ void add_side(const contact_view &contacts, const row_v
         double wrench[6];
         wrench_of_rows(rows, p - contacts.pair_capacity, side, wrench);
         for (int j = 0; j < 6; ++j) g[j] += wrench[j];
-        *push += sqrt(dot3(wrench, wrench));
+        *push += length3(wrench);
         return;
     }
     const pair_data pair = load_pair(contacts, p);
@@ -122,7 +118,7 @@ static inline __device__ void add_side(const contact_view &contacts, const row_v
         add_cross(arm, point.lambda, sign, g + 3);
     });
     for (int j = 0; j < 3; ++j) g[j] += sign * force[j];
-    *push += sqrt(dot3(force, force));
+    *push += length3(force);
 }
 
 #endif

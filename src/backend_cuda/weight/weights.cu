@@ -71,7 +71,7 @@ static __device__ void respond_rows(const model_view &model, const body_view &bo
             if (!is_dynamic(model, joined[side])) continue;
             load_jacobian(rows_of(rows, k)[r], side, J);
             w += packed_form(bodies.A_inverse + (size_t)joined[side] * PACKED, J);
-            push = fmax(push, sqrt(dot3(J, J)));
+            push = fmax(push, length3(J));
         }
         const row_response out = {w, push > 0 ? push : sqrt(w / inverse_mass)};
         rows.responses[(size_t)k * SADMM_MAX_ROWS + (size_t)r] = out;

@@ -7,5 +7,7 @@
 #else
 #define SADMM_INLINE static inline
 #endif
+/* Where a call would cost more than the function. */
+#define SADMM_ALWAYS_INLINE SADMM_INLINE __attribute__((always_inline))
 
 #endif

@@ -1,4 +1,4 @@
-/* Contact formulas: constraint error, and the strict projection on the friction cone. */
+/* Contact formulas: constraint error, and the law of a contact: the strict projection on the friction cone. */
 #ifndef SADMM_MATH_CONTACT_H
 #define SADMM_MATH_CONTACT_H
 
@@ -23,30 +23,94 @@ SADMM_INLINE double contact_error(double gap, double approach, double restitutio
     return e;
 }
 
-/* Strict projection of the paper's Step 3 [its ref. 19]: the normal part is clamped at 0, then the tangential part is
+/* ---- the law ------------------------------------------------------------------------------------------------------
+ *
+ * Strict projection of the paper's Step 3 [its ref. 19]: the normal part is clamped at 0, then the tangential part is
  * scaled into the disc of radius mu lambda_n. With one scalar weight a contact this is the exact solution of the local
- * Signorini-Coulomb problem (5), not the Euclidean projection on the cone. Frame-free: lambda in any frame with n in
- * it. */
+ * Signorini-Coulomb problem (5), not the Euclidean projection on the cone (which siconos' error is made of:
+ * core/solve/certificate.c). From the normal part of lambda and the square of its tangential part t,
+ *
+ *     Pi_C(lambda) = push n + shrink t
+ *
+ * and Pi_C(lambda) = lambda unless the contact `moves`.
+ *
+ * CONTACT_LAW defines this for any type of `number`: scalars below, SIMD lanes in backend_cpu/cpu_lanes.h. `condition`
+ * is the type of a comparison; `constant`, `pick` and `root` make a constant, choose by a condition, and take a root.
+ *
+ * The iteration on GPUs has a form of its own with the same meaning (cone_parts_of in backend_cuda/iterate/sweep.h),
+ * for speed: fused products, and one inverse root in place of a root and a division. */
+#define CONTACT_LAW(law, number, condition, constant, pick, root)                               \
+    struct law {                                                                                \
+        number push, shrink;                                                                    \
+        condition moves;                                                                        \
+    };                                                                                          \
+    SADMM_ALWAYS_INLINE struct law law##_of(number normal, number tangential2, number mu)       \
+    {                                                                                           \
+        const number push = pick(normal > constant(0), normal, constant(0)), limit = mu * push; \
+        const condition slides = tangential2 > limit * limit;                                   \
+        const struct law out = {push, pick(slides, limit / root(tangential2), constant(1)),     \
+                                slides | (normal <= constant(0))};                              \
+        return out;                                                                             \
+    }
+
+#define CONTACT_PICK(condition, yes, no) ((condition) ? (yes) : (no))
+CONTACT_LAW(contact_law, real, int, (real), CONTACT_PICK, real_sqrt)
+CONTACT_LAW(contact_law_double, double, int, (double), CONTACT_PICK, sqrt)
+
+/* Frame-free: lambda in any frame with n in it. */
 SADMM_INLINE vec3 contact_project(vec3 lambda, vec3 n, real mu)
 {
-    real ln = v3_dot(n, lambda);
-    vec3 t = v3_madd(lambda, -ln, n);
-    real limit, t2 = v3_norm2(t), scale;
-    ln = ln > 0 ? ln : (real)0;
-    limit = mu * ln;
-    scale = t2 > limit * limit ? limit / real_sqrt(t2) : (real)1;
-    return v3_madd(v3_scale(n, ln), scale, t);
+    const real normal = v3_dot(n, lambda);
+    const vec3 t = v3_madd(lambda, -normal, n);
+    const struct contact_law law = contact_law_of(normal, v3_norm2(t), mu);
+    return v3_madd(v3_scale(n, law.push), law.shrink, t);
 }
 
-/* The same in the contact's frame (n, t1, t2). */
-SADMM_INLINE void contact_project_rows(const real in[3], real mu, real out[3])
+/* The same in the contact's frame (n, t1, t2). Does it move? */
+SADMM_INLINE int contact_project_rows(const real in[3], real mu, real out[3])
 {
-    real n = in[0] > 0 ? in[0] : (real)0, limit = mu * n;
-    real t2 = in[1] * in[1] + in[2] * in[2];
-    real scale = t2 > limit * limit ? limit / real_sqrt(t2) : (real)1;
-    out[0] = n;
-    out[1] = scale * in[1];
-    out[2] = scale * in[2];
+    const struct contact_law law = contact_law_of(in[0], in[1] * in[1] + in[2] * in[2], mu);
+    out[0] = law.push;
+    out[1] = law.shrink * in[1];
+    out[2] = law.shrink * in[2];
+    return law.moves;
+}
+
+/* What a contact misses, in its frame: lambda - Pi_C(lambda - u/w), with u = x + e n and w its response. Its size times
+ * w is the natural map, m/s. */
+SADMM_INLINE void contact_missing_rows(const real lambda[3], const real u[3], real mu, real w, real missing[3])
+{
+    real y[3], projected[3];
+    SADMM_UNROLL
+    for (int k = 0; k < 3; ++k) y[k] = lambda[k] - u[k] / w;
+    contact_project_rows(y, mu, projected);
+    SADMM_UNROLL
+    for (int k = 0; k < 3; ++k) missing[k] = lambda[k] - projected[k];
+}
+
+/* The same as an energy, w |lambda - Pi_C(lambda - u/w)|^2, J. In the world frame, and in double in every precision:
+ * the weight scale rests on it (weight.h). */
+SADMM_INLINE double contact_violation(const double lambda[3], const double u[3], const double n[3], double mu, double w)
+{
+    struct contact_law_double law;
+    double y[3], tangential[3], normal = 0, tangential2 = 0, sum = 0;
+    SADMM_UNROLL
+    for (int k = 0; k < 3; ++k) {
+        y[k] = lambda[k] - u[k] / w;
+        normal += y[k] * n[k];
+    }
+    SADMM_UNROLL
+    for (int k = 0; k < 3; ++k) {
+        tangential[k] = y[k] - normal * n[k];
+        tangential2 += tangential[k] * tangential[k];
+    }
+    law = contact_law_double_of(normal, tangential2, mu);
+    SADMM_UNROLL
+    for (int k = 0; k < 3; ++k) {
+        const double missing = lambda[k] - law.push * n[k] - law.shrink * tangential[k];
+        sum += missing * missing;
+    }
+    return w * sum;
 }
 
 /* mu as the method `fast` takes it, for a precision's epsilon: less by some rounding, so that an impulse at the edge of
@@ -63,10 +127,9 @@ SADMM_INLINE void contact_change_rows(const real lambda[3], const real step[3], 
                                       real projected[3])
 {
     const real y[3] = {lambda[0] - step[0], lambda[1] - step[1], lambda[2] - step[2]};
-    real limit = mu * y[0];
-    int k, sticks = y[0] > 0 && y[1] * y[1] + y[2] * y[2] <= limit * limit;
-    contact_project_rows(y, mu, projected);
-    for (k = 0; k < 3; ++k) change[k] = sticks ? -step[k] : projected[k] - lambda[k];
+    const int moves = contact_project_rows(y, mu, projected);
+    int k;
+    for (k = 0; k < 3; ++k) change[k] = moves ? projected[k] - lambda[k] : -step[k];
 }
 
 #endif

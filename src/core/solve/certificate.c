@@ -92,10 +92,9 @@ static void project_cone(const double r[3], double mu, double out[3])
 /* One contact in its frame: lambda and u = x + e, rows (n, t, t). */
 static double contact_map(struct tally *tally, const double lambda[3], const double u[3], double mu, double w)
 {
-    double y[3], p[3], error2 = 0;
-    for (int i = 0; i < 3; ++i) y[i] = lambda[i] - u[i] / w;
-    contact_project_rows(y, mu, p);
-    for (int i = 0; i < 3; ++i) error2 += square(tally, lambda[i] - p[i]);
+    double missing[3], p[3], error2 = 0;
+    contact_missing_rows(lambda, u, mu, w, missing);
+    for (int i = 0; i < 3; ++i) error2 += square(tally, missing[i]);
 
     /* siconos' fc3d_unitary_compute_and_add_error: natural map with rho = 1 of the modified velocity. */
     double modified[3] = {lambda[0] - u[0] - mu * hypot(u[1], u[2]), lambda[1] - u[1], lambda[2] - u[2]};
