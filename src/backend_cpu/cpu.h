@@ -111,11 +111,9 @@ struct row_weight {
 
 /* fast: sums over an island. */
 struct cpu_island {
-    double energy, mass, speed; /* sum of g . A^-1 g, kg, V in m/s */
-    double kinetic, push;       /* sum of v . A v; of the sizes of the bodies' impulses */
-    double stack_depth;            /* in steps that start warm */
-    double weight_scale, rescale;        /* math/weight.h; not 0: weights stay, times this */
-    double violation, momentum_residual;
+    struct weight_sums sums;
+    struct weight_island weights;
+    double rescale;             /* not 0: the weights of pairs stay, times this */
     bool rows;                  /* there are constraints by rows: no limit of energies, the weight scale stays 1 */
     struct limit_energies limit;
     double along; /* v . A v_f / 2 */

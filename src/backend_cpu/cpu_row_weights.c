@@ -9,8 +9,7 @@ static struct row_weight *weights_of(struct sadmm_context *c, const struct row_b
     return c->row_weights + c->system->rows->constraints[block->constraint[l]].first;
 }
 
-/* Of every row; and what a row's multiplier counts for in the load of its constraint: a row that pushes by how much, a
- * row that only turns by the push that would take as much energy. */
+/* Of every row; and what its multiplier counts for in the load of its constraint. */
 static void respond(struct sadmm_context *c, const struct row_block *block, int l)
 {
     const int32_t bodies[2] = {block->body_a[l], block->body_b[l]};
@@ -27,7 +26,7 @@ static void respond(struct sadmm_context *c, const struct row_block *block, int 
             out->response += packed_form(&c->A_inverse[(size_t)bodies[side] * PACKED6], row);
             push = fmax(push, length3(row));
         }
-        out->scale = push > 0 ? push : sqrt(out->response / inverse_mass);
+        out->scale = weight_row_scale(push, out->response, inverse_mass);
     }
 }
 
@@ -47,22 +46,17 @@ static void weigh(struct sadmm_context *c, struct row_block *block, int l)
     const double inv_n = both ? 0.5 : 1;
     struct row_slot *slots = c->row_slots + block->first;
     struct row_weight *weights = weights_of(c, block, l);
-    double load2 = 0, lambda2 = 0, w = 0;
-    for (int r = 0; r < count; ++r) {
-        double lambda = (double)slots[r].lambda[l], load = weights[r].scale * lambda;
-        load2 += load * load;
-        lambda2 += lambda * lambda;
-        w += weights[r].response / count;
-    }
-    const double share = weight_share(load2, island->speed, island->mass);
+    struct weight_row_sums sums = {0};
+    for (int r = 0; r < count; ++r)
+        weight_add_row(&sums, (double)slots[r].lambda[l], weights[r].scale, weights[r].response, count);
+    const double share = weight_share(&island->weights, sums.load2);
     for (int r = 0; r < count; ++r) {
         struct row_weight *out = &weights[r];
-        const double lambda = (double)slots[r].lambda[l];
-        const bool coupled = !block->cone && sadmm_row_is_coupled(c->system->rows, first + (size_t)r);
-        out->along = coupled ? sqrt(share) * lambda : 0;
-        out->weight = block->cone ? weight_of_cone(share, lambda2, w)
-                      : coupled   ? weight_of_coupled_row(out->response)
-                                  : weight_of_single_row(share, lambda, out->response);
+        const bool coupled = sadmm_row_is_coupled(c->system->rows, first + (size_t)r);
+        const struct weight_row B =
+            weight_of_row(&sums, share, block->cone, coupled, (double)slots[r].lambda[l], out->response);
+        out->weight = B.weight;
+        out->along = B.along;
         slots[r].step[l] = row_step(slots[r].gain[l], slots[r].compliance[l], (real)(inv_n * out->weight));
         slots[r].along[l] = (real)(sqrt(inv_n) * out->along);
         block->inv_s[l] = (real)(inv_n * out->weight); /* of cones: that of all rows */

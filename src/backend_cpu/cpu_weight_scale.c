@@ -50,13 +50,12 @@ void CPU(add_up_imbalance)(struct sadmm_context *c, int thread, int threads)
 
 static void add_up_misses(struct sadmm_context *c)
 {
-    for (int32_t i = 0; i < c->bodies; ++i) c->islands[i].violation = c->islands[i].momentum_residual = 0;
     for (int32_t i = 0; i < c->bodies; ++i)
-        c->islands[c->label[i]].momentum_residual += c->body_sums[BODY_SUMS * i + 3];
+        c->islands[c->label[i]].sums.momentum_residual += c->body_sums[BODY_SUMS * i + 3];
     for (size_t k = 0; k < c->pair_block_count * (size_t)LANES; ++k) {
         if (c->pair_blocks[k / (size_t)LANES].pair[k % (size_t)LANES] < 0) continue;
         const struct sadmm_contact_pair *pair = cpu_pair(c, k);
-        cpu_island_of(c, pair->body_a, pair->body_b)->violation += c->pair_violation[k];
+        cpu_island_of(c, pair->body_a, pair->body_b)->sums.violation += c->pair_violation[k];
     }
 }
 
@@ -65,10 +64,6 @@ void CPU(update_weight_scales)(struct sadmm_context *c)
     add_up_misses(c);
     for (int32_t i = 0; i < c->bodies; ++i) {
         struct cpu_island *island = &c->islands[i];
-        if (c->label[i] != i || island->rows) continue;
-        double balance = weight_balance(island->violation, island->momentum_residual, island->mass);
-        double next = weight_next_scale(island->weight_scale, balance);
-        island->rescale = weight_stalls(balance) ? next / island->weight_scale : 0;
-        island->weight_scale = next;
+        if (c->label[i] == i && !island->rows) island->rescale = weight_rescale(&island->weights, &island->sums);
     }
 }

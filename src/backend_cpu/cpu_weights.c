@@ -83,26 +83,18 @@ static double pair_response(const struct sadmm_context *c, const struct sadmm_co
 /* V of every island, kept at its label. `wrenches` hold J^T lambda. */
 static void add_up_loads(struct sadmm_context *c)
 {
+    const double under_iterated = weight_under_iterated(c->plan.rigid, c->settings.iterations);
+    for (int32_t i = 0; i < c->bodies; ++i) c->islands[i].sums = (struct weight_sums){0};
+    for (int32_t i = 0; i < c->bodies; ++i) {
+        struct weight_sums *sums = &c->islands[c->label[i]].sums;
+        sums->energy += c->body_sums[BODY_SUMS * i];
+        sums->kinetic += c->body_sums[BODY_SUMS * i + 1];
+        sums->push += c->body_sums[BODY_SUMS * i + 2];
+        sums->mass += cpu_body_mass(c, i);
+    }
     for (int32_t i = 0; i < c->bodies; ++i)
-        c->islands[i].energy = c->islands[i].mass = c->islands[i].kinetic = c->islands[i].push = 0;
-    for (int32_t i = 0; i < c->bodies; ++i) {
-        struct cpu_island *island = &c->islands[c->label[i]];
-        island->energy += c->body_sums[BODY_SUMS * i];
-        island->kinetic += c->body_sums[BODY_SUMS * i + 1];
-        island->push += c->body_sums[BODY_SUMS * i + 2];
-        island->mass += cpu_body_mass(c, i);
-    }
-    for (int32_t i = 0; i < c->bodies; ++i) {
-        struct cpu_island *island = &c->islands[i];
-        if (c->label[i] != i) continue;
-        island->speed = weight_speed(island->energy, island->mass);
-        if (!c->plan.warm) continue;
-        island->stack_depth = weight_stack_depth(island->speed, island->push, island->mass);
-        double speed = island->speed, under_iterated = weight_under_iterated(c->plan.rigid, c->settings.iterations);
-        island->speed = weight_speed_warm(speed, island->stack_depth, island->kinetic, island->mass);
-        island->speed =
-            weight_speed_under_iterated(speed, island->speed, under_iterated, island->kinetic, island->mass);
-    }
+        if (c->label[i] == i)
+            weight_update_speed(&c->islands[i].weights, &c->islands[i].sums, c->plan.warm, under_iterated);
 }
 
 /* A body's part of its island's sums. */
@@ -145,7 +137,7 @@ static void ease_gaps(struct sadmm_context *c, size_t index)
     for (int l = 0; l < LANES; ++l) {
         if (block->pair[l] < 0) continue;
         const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[block->pair[l]];
-        double share = weight_gap_share(cpu_island_of(c, pair->body_a, pair->body_b)->stack_depth);
+        double share = weight_gap_share(cpu_island_of(c, pair->body_a, pair->body_b)->weights.stack_depth);
         for (int k = 0; k < pair->count && share < 1; ++k) {
             real *error = c->plan.contact_rows == 3
                               ? (real *)&((struct point_slot *)c->slots + block->first + k)->error
@@ -163,9 +155,9 @@ static void weigh_pair_block(struct sadmm_context *c, size_t index)
         const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[block->pair[l]];
         const struct cpu_island *island = cpu_island_of(c, pair->body_a, pair->body_b);
         double *B = &c->pair_weight[index * (size_t)LANES + (size_t)l];
-        double carried = weight_mass(pair_load(c, block, l, pair->count), island->speed, island->mass);
+        double load = pair_load(c, block, l, pair->count);
         double response = c->pair_response[index * (size_t)LANES + (size_t)l];
-        *B = island->rescale > 0 ? *B * island->rescale : weight_of_pair(island->weight_scale, carried, response);
+        *B = island->rescale > 0 ? *B * island->rescale : weight_of_pair(&island->weights, load, response);
         block->inv_s[l] = (real)(pair->body_a >= 0 && pair->body_b >= 0 ? *B / 2 : *B);
     }
 }
@@ -273,7 +265,7 @@ sadmm_status CPU(init_weights)(struct sadmm_context *c, struct sadmm_error *erro
     sadmm_islands(c->system, c->label);
     cpu_parallel(c, respond_share, c);
     for (int32_t i = 0; i < c->bodies; ++i) {
-        c->islands[i].weight_scale = 1;
+        c->islands[i].weights = weight_new_island();
         c->islands[i].rescale = 0;
         c->islands[i].rows = false;
     }

@@ -63,7 +63,7 @@ static double row_scale(const struct sadmm_context *c, const struct ref_constrai
         push = fmax(push, length3(J));
         inverse_mass += 1 / mass_of(&c->bodies[side->body]);
     }
-    return push > 0 ? push : sqrt(row_response(c, constraint, r) / inverse_mass);
+    return weight_row_scale(push, row_response(c, constraint, r), inverse_mass);
 }
 
 static struct ref_body *island_of(const struct sadmm_context *c, const struct ref_constraint *constraint)
@@ -89,7 +89,7 @@ static void add_up_group(struct sadmm_context *c, size_t first, size_t count)
         if (body < 0) continue;
         for (size_t k = first; k < first + count; ++k) add_impulse(&c->constraints[k], s, impulse);
         for (int j = 0; j < 6; ++j) c->bodies[body].impulse[j] += impulse[j];
-        c->bodies[c->bodies[body].label].island_push += length3(impulse);
+        c->bodies[c->bodies[body].label].sums.push += length3(impulse);
     }
 }
 
@@ -98,36 +98,25 @@ static void add_up_islands(struct sadmm_context *c)
     const struct sadmm_contact_set *contacts = c->system->contacts;
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *body = &c->bodies[i];
-        body->island_energy = body->island_mass = body->island_kinetic = body->island_push = 0;
+        memset(&body->sums, 0, sizeof body->sums);
         memset(body->impulse, 0, sizeof body->impulse);
     }
     for (size_t p = 0; p < contacts->pair_count; ++p)
         add_up_group(c, (size_t)contacts->pairs[p].first, (size_t)contacts->pairs[p].count);
     for (size_t k = contacts->point_count; k < c->constraint_count; ++k) add_up_group(c, k, 1);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
-        struct ref_body *body = &c->bodies[i], *island = &c->bodies[body->label];
+        const struct ref_body *body = &c->bodies[i];
+        struct weight_sums *sums = &c->bodies[body->label].sums;
         double momentum[6];
         dense6_mul(body->A, body->v, momentum);
-        island->island_energy += inverse_form(body, body->impulse);
-        island->island_kinetic += dense6_dot(momentum, body->v);
-        island->island_mass += mass_of(body);
+        sums->energy += inverse_form(body, body->impulse);
+        sums->kinetic += dense6_dot(momentum, body->v);
+        sums->mass += mass_of(body);
     }
-}
-
-static double island_stack_depth(const struct ref_body *island)
-{
-    return weight_stack_depth(weight_speed(island->island_energy, island->island_mass), island->island_push,
-                           island->island_mass);
-}
-
-/* V of an island. */
-static double island_speed(const struct sadmm_context *c, const struct ref_body *island)
-{
-    double speed = weight_speed(island->island_energy, island->island_mass);
-    if (!c->plan->warm) return speed;
-    double warm = weight_speed_warm(speed, island_stack_depth(island), island->island_kinetic, island->island_mass);
-    double under_iterated = weight_under_iterated(c->plan->rigid, c->settings->iterations);
-    return weight_speed_under_iterated(speed, warm, under_iterated, island->island_kinetic, island->island_mass);
+    for (int32_t i = 0; i < c->system->body_count; ++i)
+        if (c->bodies[i].label == i)
+            weight_update_speed(&c->bodies[i].weights, &c->bodies[i].sums, c->plan->warm,
+                                weight_under_iterated(c->plan->rigid, c->settings->iterations));
 }
 
 /* A v - b - sum J^T multiplier, by body, into `impulse`. */
@@ -190,19 +179,13 @@ static void update_weight_scales(struct sadmm_context *c)
     const struct sadmm_contact_set *contacts = c->system->contacts;
     momentum_residual(c, false);
     for (int32_t i = 0; i < c->system->body_count; ++i)
-        c->bodies[i].island_violation = c->bodies[i].island_residual = 0;
-    for (int32_t i = 0; i < c->system->body_count; ++i)
-        c->bodies[c->bodies[i].label].island_residual += inverse_form(&c->bodies[i], c->bodies[i].impulse);
+        c->bodies[c->bodies[i].label].sums.momentum_residual += inverse_form(&c->bodies[i], c->bodies[i].impulse);
     for (size_t p = 0; p < contacts->pair_count; ++p)
-        island_of(c, &c->constraints[contacts->pairs[p].first])->island_violation +=
+        island_of(c, &c->constraints[contacts->pairs[p].first])->sums.violation +=
             pair_violation(c, &contacts->pairs[p]);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *island = &c->bodies[i];
-        if (island->label != i || island->rows) continue;
-        double balance = weight_balance(island->island_violation, island->island_residual, island->island_mass);
-        double next = weight_next_scale(island->weight_scale, balance);
-        island->rescale = weight_stalls(balance) ? next / island->weight_scale : 0;
-        island->weight_scale = next;
+        if (island->label == i && !island->rows) island->rescale = weight_rescale(&island->weights, &island->sums);
     }
 }
 
@@ -217,10 +200,9 @@ static void weigh_pair(struct sadmm_context *c, const struct sadmm_contact_pair 
         load += sqrt(lambda2);
     }
     const struct ref_body *island = island_of(c, &c->constraints[pair->first]);
-    double speed = island_speed(c, island);
-    double carried = weight_mass(load / pair->count, speed, island->island_mass);
-    double B = island->rescale > 0 ? c->constraints[pair->first].B[0] * island->rescale
-                                 : weight_of_pair(island->weight_scale, carried, pair_response(c, pair));
+    double B = island->rescale > 0
+                   ? c->constraints[pair->first].B[0] * island->rescale
+                   : weight_of_pair(&island->weights, load / pair->count, pair_response(c, pair));
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
         struct ref_constraint *constraint = &c->constraints[k];
         memset(constraint->B, 0, sizeof constraint->B);
@@ -233,28 +215,19 @@ static void weigh_pair(struct sadmm_context *c, const struct sadmm_contact_pair 
 static void weigh_constraint(struct sadmm_context *c, struct ref_constraint *constraint)
 {
     const double *lambda = constraint->lambda;
-    double load2 = 0, lambda2 = 0, mean = 0, w[6];
+    struct weight_row_sums sums = {0};
+    double w[6];
     for (int r = 0; r < constraint->rows; ++r) {
-        double load = row_scale(c, constraint, r) * lambda[r];
         w[r] = row_response(c, constraint, r);
-        load2 += load * load;
-        lambda2 += lambda[r] * lambda[r];
-        mean += w[r] / constraint->rows;
+        weight_add_row(&sums, lambda[r], row_scale(c, constraint, r), w[r], constraint->rows);
     }
-    const struct ref_body *island = island_of(c, constraint);
-    double speed = island_speed(c, island);
-    double share = load2 > 0 ? weight_mass(sqrt(load2), speed, island->island_mass) / load2 : 0;
+    double share = weight_share(&island_of(c, constraint)->weights, sums.load2);
     memset(constraint->B, 0, sizeof constraint->B);
     for (int r = 0; r < constraint->rows; ++r) {
-        double own = w[r] > 0 ? WEIGHT_FLOOR_ROW / w[r] : 0;
-        if (constraint->cone)
-            constraint->B[7 * r] = share * lambda2 + (mean > 0 ? WEIGHT_FLOOR_CONTACT / mean : 1);
-        else if (!constraint->coupled[r])
-            constraint->B[7 * r] = w[r] > 0 ? share * lambda[r] * lambda[r] + own : 1;
-        else
-            for (int q = 0; q < constraint->rows; ++q)
-                if (constraint->coupled[q])
-                    constraint->B[6 * r + q] = share * lambda[r] * lambda[q] + (q == r ? own : 0);
+        bool coupled = !constraint->cone && constraint->coupled[r];
+        for (int q = 0; q < constraint->rows && coupled; ++q)
+            if (constraint->coupled[q]) constraint->B[6 * r + q] = share * lambda[r] * lambda[q];
+        constraint->B[7 * r] += weight_of_row(&sums, share, constraint->cone, coupled, lambda[r], w[r]).weight;
     }
 }
 
@@ -279,7 +252,7 @@ sadmm_status sadmm_ref_update_weights(struct sadmm_context *c, struct sadmm_erro
     if (c->refreshes == 0 && c->plan->warm && c->plan->rigid)
         for (size_t k = 0; k < points; ++k) {
             struct ref_constraint *contact = &c->constraints[k];
-            double share = weight_gap_share(island_stack_depth(island_of(c, contact)));
+            double share = weight_gap_share(island_of(c, contact)->weights.stack_depth);
             contact->e[0] = weight_gap_error(contact->e[0], share, c->settings->slop / c->settings->dt);
         }
     for (size_t k = points; k < c->constraint_count; ++k) weigh_constraint(c, &c->constraints[k]);
@@ -300,7 +273,7 @@ sadmm_status sadmm_ref_init_weights(struct sadmm_context *c, struct sadmm_error 
 {
     label_islands(c);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
-        c->bodies[i].weight_scale = 1;
+        c->bodies[i].weights = weight_new_island();
         c->bodies[i].rescale = 0;
         c->bodies[i].rows = false;
     }

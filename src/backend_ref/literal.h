@@ -45,9 +45,9 @@ struct ref_body {
     double dual[6];                  /* (17), this body's part */
     /* fast */
     int32_t label;                   /* the smallest body of its island; that one keeps the island's sums */
-    double island_energy, island_mass, island_kinetic, island_push;
-    double island_violation, island_residual, weight_scale,
-        rescale;                     /* math/weight.h; rescale, if not 0: weights stay, times this */
+    struct weight_sums sums;
+    struct weight_island weights;
+    double rescale;                  /* not 0: the weights of pairs stay, times this */
     bool rows;                       /* the island has constraints given by rows */
     struct limit_energies limit;
     double along; /* v . A v_f / 2 of the island */

@@ -46,6 +46,7 @@
 
 #include <cuda_runtime.h>
 
+#include "core/math/weight.h"
 #include "core/solve/kernels.h"
 #include "layout.h"
 #include "line.h"
@@ -78,9 +79,8 @@ struct alignas(16) real4 {
 
 /* fast: of an island, at its label. */
 struct cuda_island {
-    double speed, mass;  /* V in m/s; kg */
-    double weight_scale, rescale; /* math/weight.h; rescale not 0: weights are those taken last, times this */
-    double stack_depth;     /* math/weight.h: in steps that start warm, else 1 */
+    struct weight_island weights;
+    double rescale;      /* not 0: weights of pairs are those taken last, times this */
     double slow_down;    /* math/limit.h: the factor of its velocities */
     int32_t rows;        /* there are constraints given by rows: the weight scale stays 1 */
     int32_t stopped;     /* iterations after which a check found the tolerances met; 0: not yet */

@@ -41,14 +41,13 @@ static __device__ __forceinline__ double weigh_side(const model_view &model, con
     const bool a = is_dynamic(model, sides.bodies.body_a), both = a && is_dynamic(model, sides.bodies.body_b);
     const double scale = island.rescale,
                  taken = scale > 0 ? weights.weight[p]
-                                   : weight_of_pair(island.weight_scale, weight_mass(load, island.speed, island.mass),
-                                                    response),
+                                   : weight_of_pair(&island.weights, load, response),
                  B = scale > 0 ? taken * scale : taken;
     if (sides.code & 1 && a) return B;
     contacts.inv_s[p] = (solver_real)(both ? B / 2 : B);
     if (!(scale > 0)) weights.weight[p] = taken;
     if (first && bodies.rigid)
-        ease_gaps(model, contacts, p, island.stack_depth); /* world level: gaps, a slop and a step */
+        ease_gaps(model, contacts, p, island.weights.stack_depth); /* world level: gaps, a slop and a step */
     return B;
 }
 

@@ -33,23 +33,15 @@ static inline __device__ double violation_of(const body_view &bodies, const cont
 template <bool SCALES>
 static __device__ __forceinline__ void weigh_island(cuda_island *island, const double sum[TERMS], const cuda_args &args)
 {
-    const cuda_island fresh = {0, 0, 1, 0, 1, 1, 0, 0};
+    static_assert(sizeof(struct weight_sums) == TERMS * sizeof(double), "a term for each");
+    const struct weight_sums sums = {sum[0], sum[1], sum[2], sum[3], sum[4], sum[5]};
+    const cuda_island fresh = {weight_new_island(), 0, 1, 0, 0};
     if (args.start) *island = fresh;
-    island->speed = weight_speed(sum[0], sum[1]);
-    if (args.warm) {
-        const double speed = island->speed;
-        island->stack_depth = weight_stack_depth(speed, sum[3], sum[1]);
-        island->speed = weight_speed_warm(speed, island->stack_depth, sum[2], sum[1]);
-        island->speed = weight_speed_under_iterated(speed, island->speed, args.factor, sum[2], sum[1]);
-    }
-    island->mass = sum[1];
+    weight_update_speed(&island->weights, &sums, args.warm, args.factor);
     if (!SCALES || island->rows) return;
-    const double balance = weight_balance(sum[5], sum[4], sum[1]),
-                 next = weight_next_scale(island->weight_scale, balance);
     /* those that stall keep the weights they have, times what the weight scale has risen by since those were taken */
-    island->rescale =
-        weight_stalls(balance) ? (island->rescale > 0 ? island->rescale : 1) * (next / island->weight_scale) : 0;
-    island->weight_scale = next;
+    const double rise = weight_rescale(&island->weights, &sums);
+    island->rescale = (island->rescale > 0 ? island->rescale : 1) * rise;
 }
 
 /* Number `lane` of what side_wrench would have of side `code` of a row block. */
@@ -95,10 +87,8 @@ static __device__ __forceinline__ double sum_sides(const graph_view &graph, cons
     return sum;
 }
 
-/* Terms of a body, one a lane, and its momentum residual r = b + g - A v, g = J^T lambda. A pair counts at its first
- * dynamic body. Every lane of the warp comes here.
- *                 g . A^-1 g, mass, v . A v, push        push: the sum of the forces' sizes
- *         SCALES  also r . A^-1 r, what its pairs miss */
+/* Terms of a body (struct weight_sums; the last two: SCALES), one a lane, and its momentum residual r = b + g - A v,
+ * g = J^T lambda. A pair counts at its first dynamic body. Every lane of the warp comes here. */
 template <bool SCALES, bool RIGID, bool ROWS>
 static __device__ __forceinline__ double terms_of_body(const cuda_view &v, const body_thread &t)
 {

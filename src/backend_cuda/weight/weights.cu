@@ -56,8 +56,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 
 /* ---- row blocks -------------------------------------------------------------------------------------------------- */
 
-/* Of every row; and what its multiplier counts for in the load: a row that pushes by how much, a row that only turns by
- * the push that would take as much energy. */
+/* Of every row; and what its multiplier counts for in the load of its constraint. */
 static __device__ void respond_rows(const model_view &model, const body_view &bodies, const row_view &rows, int32_t k)
 {
     const row_constraint about = rows.constraints[k];
@@ -73,7 +72,7 @@ static __device__ void respond_rows(const model_view &model, const body_view &bo
             w += packed_form(bodies.A_inverse + (size_t)joined[side] * PACKED, J);
             push = fmax(push, length3(J));
         }
-        const row_response out = {w, push > 0 ? push : sqrt(w / inverse_mass)};
+        const row_response out = {w, weight_row_scale(push, w, inverse_mass)};
         rows.responses[(size_t)k * SADMM_MAX_ROWS + (size_t)r] = out;
     }
 }
@@ -92,26 +91,20 @@ static __device__ void weigh_rows(const cuda_view &v, int32_t k, bool first)
     row_data *rows = v.rows.data + (size_t)k * SADMM_MAX_ROWS;
     cuda_island *island =
         &v.islands.info[v.graph.label[is_dynamic(v.model, about.body_a) ? about.body_a : about.body_b]];
-    double load2 = 0, lambda2 = 0, mean = 0;
+    struct weight_row_sums sums = {0, 0, 0};
     if (first) {
         respond_rows(v.model, v.bodies, v.rows, k);
         island->rows = 1;
     }
     const row_response *responses = v.rows.responses + (size_t)k * SADMM_MAX_ROWS;
+    for (int r = 0; r < about.rows; ++r)
+        weight_add_row(&sums, (double)rows[r].lambda, responses[r].scale, responses[r].response, about.rows);
+    const double share = weight_share(&island->weights, sums.load2);
     for (int r = 0; r < about.rows; ++r) {
-        const double lambda = (double)rows[r].lambda, load = responses[r].scale * lambda;
-        load2 += load * load;
-        lambda2 += lambda * lambda;
-        mean += responses[r].response / about.rows;
-    }
-    const double share = weight_share(load2, island->speed, island->mass);
-    for (int r = 0; r < about.rows; ++r) {
-        const double lambda = (double)rows[r].lambda, response = responses[r].response;
-        const bool coupled = !about.cone && is_coupled(rows[r]);
-        rows[r].weight = (solver_real)(about.cone ? weight_of_cone(share, lambda2, mean)
-                                       : coupled  ? weight_of_coupled_row(response)
-                                                  : weight_of_single_row(share, lambda, response));
-        rows[r].along = (solver_real)(coupled ? sqrt(share) * lambda : 0);
+        const struct weight_row B = weight_of_row(&sums, share, about.cone, is_coupled(rows[r]),
+                                                  (double)rows[r].lambda, responses[r].response);
+        rows[r].weight = (solver_real)B.weight;
+        rows[r].along = (solver_real)B.along;
     }
 }
 

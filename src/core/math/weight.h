@@ -9,7 +9,9 @@
 #ifndef SADMM_MATH_WEIGHT_H
 #define SADMM_MATH_WEIGHT_H
 
-#include "real.h"
+#include <math.h>
+
+#include "core/base/inline.h"
 
 /* Iterations after which a step that started cold recomputes its weights, from the loads it has found by then: 5, 10,
  * 20, 40, and from there always half as many again. Changes as late as that are small, and a change disturbs. */
@@ -24,6 +26,26 @@ SADMM_INLINE int weight_next_refresh(int at) { return at < WEIGHT_DOUBLE_BELOW ?
 
 /* Less is rounding of the impulses, and says nothing about loads; m/s. */
 #define WEIGHT_LEAST_SPEED 1e-6
+
+/* Sums over the bodies of an island; with g = J^T lambda, r = A v - b - g. */
+struct weight_sums {
+    double energy, mass;                 /* g . A^-1 g, J; kg */
+    double kinetic, push;                /* v . A v, J; the sizes of the impulses that the bodies feel, N s */
+    double momentum_residual, violation; /* r . A^-1 r; what contacts miss (math/contact.h); J, for the weight scale */
+};
+
+/* What the weights of an island's constraints are made of. */
+struct weight_island {
+    double speed, mass; /* V in m/s; kg */
+    double stack_depth; /* in steps that start warm, else 1 */
+    double scale;       /* the weight scale */
+};
+
+SADMM_INLINE struct weight_island weight_new_island(void)
+{
+    const struct weight_island fresh = {0, 0, 1, 1};
+    return fresh;
+}
 
 /* V of an island from sum g . A^-1 g over its bodies and its mass, m/s. */
 SADMM_INLINE double weight_speed(double energy, double mass)
@@ -72,6 +94,17 @@ SADMM_INLINE double weight_next_scale(double scale, double balance)
     return fmin(fmax(scale * factor, WEIGHT_SCALE_LEAST), WEIGHT_SCALE_MOST);
 }
 
+/* The next weight scale. Returns what the weights of an island that stalls rise by, 0: it does not stall, and takes new
+ * ones. */
+SADMM_INLINE double weight_rescale(struct weight_island *island, const struct weight_sums *sums)
+{
+    const double balance = weight_balance(sums->violation, sums->momentum_residual, sums->mass);
+    const double next = weight_next_scale(island->scale, balance);
+    const double rise = weight_stalls(balance) ? next / island->scale : 0;
+    island->scale = next;
+    return rise;
+}
+
 /* Deep stacks in steps that start warm. Contacts that are solved in part, step by step, are springs of stiffness
  * B iterations / dt^2, on which a tall pile buckles; and gaps, closed in one step, act on them as an integral
  * controller that excites them. `push`, the sum of the sizes of the impulses that the bodies feel, N s, over m V is
@@ -116,6 +149,20 @@ SADMM_INLINE double weight_speed_under_iterated(double speed, double warm, doubl
     return fmin(fmax(speed / under_iterated, WEIGHT_MOVING * sqrt(kinetic / mass)), warm);
 }
 
+/* V, and what goes with it. warm: the step starts warm; under_iterated: weight_under_iterated. */
+SADMM_INLINE void weight_update_speed(struct weight_island *island, const struct weight_sums *sums, int warm,
+                                      double under_iterated)
+{
+    const double mass = sums->mass, speed = weight_speed(sums->energy, mass);
+    island->mass = mass;
+    island->speed = speed;
+    island->stack_depth = 1;
+    if (!warm) return;
+    island->stack_depth = weight_stack_depth(speed, sums->push, mass);
+    island->speed = weight_speed_warm(speed, island->stack_depth, sums->kinetic, mass);
+    island->speed = weight_speed_under_iterated(speed, island->speed, under_iterated, sums->kinetic, mass);
+}
+
 /* The share of a gap within the slop that a step closes; and e with that, `slop` over dt, m/s. */
 SADMM_INLINE double weight_gap_share(double stack_depth)
 {
@@ -129,31 +176,65 @@ SADMM_INLINE double weight_gap_error(double error, double share, double slop)
     return error <= 0 ? error : eased > beyond ? eased : beyond;
 }
 
-/* A constraint given by rows, by share = min(load / V, m) / load^2: of the rows that have neither bounds nor compliance
- * together B = share lambda lambda^T + phi / w, of each other row share lambda_r^2 + phi / w, so that its bounds and
- * its compliance are met by itself; of a contact share |lambda|^2 + phi / w. A row nobody feels (w = 0) has no
- * weight. */
-SADMM_INLINE double weight_share(double load2, double speed, double mass)
+/* ---- B ----------------------------------------------------------------------------------------------------------- */
+
+/* B of a pair, kg. load: the mean size of its impulses, N s. phi / w does not sink with the weight scale: it is for
+ * contacts whose load is not known. */
+SADMM_INLINE double weight_of_pair(const struct weight_island *island, double load, double response)
 {
-    return load2 > 0 ? weight_mass(sqrt(load2), speed, mass) / load2 : 0;
+    const double scale = island->scale;
+    return scale * weight_mass(load, island->speed, island->mass) +
+           fmax(scale, 1.0) * WEIGHT_FLOOR_CONTACT / response;
 }
 
-SADMM_INLINE double weight_of_cone(double share, double lambda2, double response)
+/* Sums over the rows of a constraint given by rows: squares of loads (N s) and of multipliers; the mean response. */
+struct weight_row_sums {
+    double load2, lambda2, response;
+};
+
+/* What a row's multiplier counts for in the load of its constraint: of a row that pushes by how much, `push`; of a row
+ * that only turns the push that would take as much energy. inverse_mass: of its bodies. */
+SADMM_INLINE double weight_row_scale(double push, double response, double inverse_mass)
 {
-    return share * lambda2 + (response > 0 ? WEIGHT_FLOOR_CONTACT / response : 1);
+    return push > 0 ? push : sqrt(response / inverse_mass);
 }
 
-SADMM_INLINE double weight_of_coupled_row(double response) { return response > 0 ? WEIGHT_FLOOR_ROW / response : 0; }
-
-SADMM_INLINE double weight_of_single_row(double share, double lambda, double response)
+/* One of `count` rows; scale: weight_row_scale. */
+SADMM_INLINE void weight_add_row(struct weight_row_sums *sums, double lambda, double scale, double response, int count)
 {
-    return response > 0 ? share * lambda * lambda + WEIGHT_FLOOR_ROW / response : 1;
+    const double load = scale * lambda;
+    sums->load2 += load * load;
+    sums->lambda2 += lambda * lambda;
+    sums->response += response / count;
 }
 
-/* B of a pair, kg. phi / w does not sink with the weight scale: it is for contacts whose load is not known. */
-SADMM_INLINE double weight_of_pair(double scale, double carried, double response)
+/* B of a constraint given by rows is diag(weight) + along along^T. By share = min(load / V, m) / load^2: of the rows
+ * that have neither bounds nor compliance together share lambda lambda^T + phi / w, of each other row
+ * share lambda_r^2 + phi / w, so that its bounds and its compliance are met by itself; of a contact (cone)
+ * share |lambda|^2 + phi / w. A row nobody feels (w = 0) has no weight. */
+struct weight_row {
+    double weight, along;
+};
+
+SADMM_INLINE double weight_share(const struct weight_island *island, double load2)
 {
-    return scale * carried + fmax(scale, 1.0) * WEIGHT_FLOOR_CONTACT / response;
+    return load2 > 0 ? weight_mass(sqrt(load2), island->speed, island->mass) / load2 : 0;
+}
+
+/* coupled: the row has neither bounds nor compliance (core/model/rows.h). */
+SADMM_INLINE struct weight_row weight_of_row(const struct weight_row_sums *sums, double share, int cone, int coupled,
+                                             double lambda, double response)
+{
+    struct weight_row out = {0, 0};
+    if (cone) {
+        out.weight = share * sums->lambda2 + (sums->response > 0 ? WEIGHT_FLOOR_CONTACT / sums->response : 1);
+    } else if (coupled) {
+        out.weight = response > 0 ? WEIGHT_FLOOR_ROW / response : 0;
+        out.along = sqrt(share) * lambda;
+    } else {
+        out.weight = response > 0 ? share * lambda * lambda + WEIGHT_FLOOR_ROW / response : 1;
+    }
+    return out;
 }
 
 #endif
