@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/math/dense6.h"
+#include "core/math/penalty.h"
 #include "cpu_rows.h"
 
 static void add_pair(const struct sadmm_context *c, size_t record, int side, struct arm_sums *sums, double C[PACKED6])
@@ -43,9 +44,8 @@ static void assemble_C(struct sadmm_context *c, int32_t i)
     struct arm_sums sums = {0};
     memset(C, 0, PACKED6 * sizeof *C);
     for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) {
-        size_t row = (size_t)c->incident[at];
-        int side = row >= c->record_count;
-        size_t record = side ? row - c->record_count : row;
+        int side;
+        const size_t record = cpu_record(c, at, &side);
         if (record < cpu_pair_records(c)) add_pair(c, record, side, &sums, C);
         else add_rows(c, record, side, C);
     }
@@ -53,8 +53,7 @@ static void assemble_C(struct sadmm_context *c, int32_t i)
 
     double trace_A = packed_trace(&c->A[(size_t)i * PACKED6]), trace_C = packed_trace(C);
     const struct sadmm_settings *s = &c->settings;
-    /* dt^2: c is given in the paper's time-scaled units */
-    c->beta[i] = trace_C > 0 ? s->penalty_mass_factor * trace_A / trace_C + s->penalty_offset * s->dt * s->dt : 1;
+    c->beta[i] = penalty_of_body(trace_A, trace_C, s->penalty_mass_factor, s->penalty_offset, s->dt);
 }
 
 static void assemble_C_share(void *context, int thread, int threads)
@@ -84,8 +83,8 @@ static void factorize_rigid(struct sadmm_context *c, size_t i)
     double xx = A[9] + beta * C[9] + q * (S[0] * S[0] - S2), yy = A[14] + beta * C[14] + q * (S[1] * S[1] - S2);
     double zz = A[20] + beta * C[20] + q * (S[2] * S[2] - S2), xy = A[13] + beta * C[13] + q * S[0] * S[1];
     double xz = A[18] + beta * C[18] + q * S[0] * S[2], yz = A[19] + beta * C[19] + q * S[1] * S[2];
-    double c00 = yy * zz - yz * yz, c01 = xz * yz - xy * zz, c02 = xy * yz - xz * yy;
-    double inv = 1 / (xx * c00 + xy * c01 + xz * c02);
+    double inverse[6];
+    invert_symmetric3(xx, yy, zz, xy, xz, yz, inverse);
 
     struct body_block *block = &c->body_blocks[i / (size_t)LANES];
     int l = (int)(i % (size_t)LANES);
@@ -93,9 +92,8 @@ static void factorize_rigid(struct sadmm_context *c, size_t i)
     block->sigma.x[l] = (real)(ratio * S[0]), block->sigma.y[l] = (real)(ratio * S[1]);
     block->sigma.z[l] = (real)(ratio * S[2]);
     lane_sym3 *K = &block->K_inverse;
-    K->xx[l] = (real)(inv * c00), K->xy[l] = (real)(inv * c01), K->xz[l] = (real)(inv * c02);
-    K->yy[l] = (real)(inv * (xx * zz - xz * xz)), K->yz[l] = (real)(inv * (xy * xz - xx * yz));
-    K->zz[l] = (real)(inv * (xx * yy - xy * xy));
+    K->xx[l] = (real)inverse[0], K->yy[l] = (real)inverse[1], K->zz[l] = (real)inverse[2];
+    K->xy[l] = (real)inverse[3], K->xz[l] = (real)inverse[4], K->yz[l] = (real)inverse[5];
 }
 
 /* (A + beta C)^-1 in full, of general body `general`. */
@@ -131,11 +129,8 @@ static void factorize_body(struct sadmm_context *c, size_t i)
 
 static void weigh_pair_block(struct sadmm_context *c, struct pair_block *block)
 {
-    for (int l = 0; l < LANES; ++l) {
-        real s = c->state[(size_t)block->body_a[l] * ROW + STATE_INV_BETA] +
-                 c->state[(size_t)block->body_b[l] * ROW + STATE_INV_BETA];
-        block->inv_s[l] = s > 0 ? 1 / s : 0;
-    }
+    for (int l = 0; l < LANES; ++l)
+        block->inv_s[l] = penalty_inverse_s(cpu_inv_beta(c, block->body_a[l]), cpu_inv_beta(c, block->body_b[l]));
 }
 
 static void factorize_share(void *context, int thread, int threads)

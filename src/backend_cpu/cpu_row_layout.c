@@ -2,6 +2,7 @@
  * precision's slots. */
 #include "core/base/memory.h"
 #include "core/math/contact.h"
+#include "core/math/penalty.h"
 #include "core/math/row.h"
 #include "cpu_rows.h"
 
@@ -137,9 +138,7 @@ void CPU(set_row_steps)(struct sadmm_context *c, size_t index)
 {
     struct row_block *block = &c->row_blocks[index];
     for (int l = 0; l < LANES; ++l) {
-        real s = c->state[(size_t)block->body_a[l] * ROW + STATE_INV_BETA] +
-                 c->state[(size_t)block->body_b[l] * ROW + STATE_INV_BETA];
-        block->inv_s[l] = s > 0 ? 1 / s : 0;
+        block->inv_s[l] = penalty_inverse_s(cpu_inv_beta(c, block->body_a[l]), cpu_inv_beta(c, block->body_b[l]));
         for (int r = 0; r < block->slots && !block->cone; ++r) {
             struct row_slot *slot = &c->row_slots[block->first + (size_t)r];
             slot->step[l] = row_step(slot->gain[l], slot->compliance[l], block->inv_s[l]);

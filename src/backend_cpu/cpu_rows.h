@@ -10,6 +10,49 @@
 /* Records of pairs; those of constraints given by rows follow. */
 static inline size_t cpu_pair_records(const struct sadmm_context *c) { return c->pair_block_count * (size_t)LANES; }
 
+/* The record at a place of a body's list, and on which side of it the body is. */
+static inline size_t cpu_record(const struct sadmm_context *c, int32_t at, int *side)
+{
+    const size_t row = (size_t)c->incident[at];
+    *side = row >= c->record_count;
+    return *side ? row - c->record_count : row;
+}
+
+/* 1/beta of a body. */
+static inline real cpu_inv_beta(const struct sadmm_context *c, int32_t body)
+{
+    return c->state[(size_t)body * ROW + STATE_INV_BETA];
+}
+
+/* Point k of a pair's lane: the impulse on b, its arm about a (b where a is static), e. */
+struct cpu_point {
+    double impulse[3], arm[3], error;
+};
+
+static inline struct cpu_point cpu_load_point(const struct sadmm_context *c, const struct pair_block *block, size_t l,
+                                              int k)
+{
+    const size_t at = block->first + (size_t)k;
+    struct cpu_point out;
+    const vec *arm;
+    if (c->plan.contact_rows == 3) {
+        const struct point_slot *slot = (const struct point_slot *)c->slots + at;
+        arm = &slot->arm;
+        out.error = (double)slot->error[l];
+        out.impulse[0] = (double)slot->lambda.x[l], out.impulse[1] = (double)slot->lambda.y[l];
+        out.impulse[2] = (double)slot->lambda.z[l];
+    } else {
+        const struct normal_slot *slot = (const struct normal_slot *)c->slots + at;
+        const double push = (double)slot->lambda[l];
+        arm = &slot->arm;
+        out.error = (double)slot->error[l];
+        out.impulse[0] = push * (double)block->normal.x[l], out.impulse[1] = push * (double)block->normal.y[l];
+        out.impulse[2] = push * (double)block->normal.z[l];
+    }
+    out.arm[0] = (double)arm->x[l], out.arm[1] = (double)arm->y[l], out.arm[2] = (double)arm->z[l];
+    return out;
+}
+
 /* The block of a record of rows, and its lane. */
 static inline const struct row_block *cpu_row_block(const struct sadmm_context *c, size_t record, int *lane)
 {

@@ -1,8 +1,9 @@
 /* What the step gives back: v and lambda (double), the moved bodies (Q), the contact wrenches (R, eq. 12). */
 #include <string.h>
 
+#include "core/math/array3.h"
 #include "core/model/system_terms.h"
-#include "cpu.h"
+#include "cpu_rows.h"
 
 static void read_pair(struct sadmm_context *c, const struct pair_block *block, int l)
 {
@@ -77,23 +78,18 @@ sadmm_status CPU(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, s
 static void body_wrench(const struct sadmm_context *c, size_t i, double wrench[6])
 {
     const struct sadmm_contact_set *contacts = c->system->contacts;
-    size_t pair_records = c->pair_block_count * (size_t)LANES;
     memset(wrench, 0, 6 * sizeof *wrench);
     for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) {
-        size_t row = (size_t)c->incident[at];
-        int side = row >= c->record_count;
-        size_t record = side ? row - c->record_count : row;
-        if (record >= pair_records) continue; /* contact wrenches only */
-        const struct sadmm_contact_pair *pair =
-            &contacts->pairs[c->pair_blocks[record / (size_t)LANES].pair[record % (size_t)LANES]];
+        int side;
+        const size_t record = cpu_record(c, at, &side);
+        if (record >= cpu_pair_records(c)) continue; /* contact wrenches only */
+        const struct sadmm_contact_pair *pair = cpu_pair(c, record);
         double per_dt = (side ? 1 : -1) / c->settings.dt;
         for (int k = 0; k < pair->count; ++k) {
             const struct sadmm_contact_point *point = &contacts->points[pair->first + k];
             const double *r = side ? point->arm_b : point->arm_a, *f = point->impulse;
             for (int j = 0; j < 3; ++j) wrench[j] += per_dt * f[j];
-            wrench[3] += per_dt * (r[1] * f[2] - r[2] * f[1]);
-            wrench[4] += per_dt * (r[2] * f[0] - r[0] * f[2]);
-            wrench[5] += per_dt * (r[0] * f[1] - r[1] * f[0]);
+            add_cross(r, f, per_dt, wrench + 3);
         }
     }
 }

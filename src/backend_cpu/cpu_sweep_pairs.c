@@ -1,6 +1,6 @@
 /* Steps 2-4 (kernels L-N) of geometric contacts, LANES pairs at a time. Written once, specialised at compile time by
  * the number of contact rows and by what the sweep is for. */
-#include "cpu.h"
+#include "cpu_rows.h"
 
 /* What a pair adds up over its points: force and torque about a, of lambda-like vectors. */
 struct pair_sum {
@@ -41,8 +41,7 @@ static inline lanes larger_inv_beta(const struct sadmm_context *c, const struct 
         out[l] = block->inv_s[l] > 0 ? 1 / ((both ? 2 : 1) * block->inv_s[l]) : 0;
     }
     for (int l = 0; l < LANES && !c->fast; ++l)
-        out[l] = real_max(c->state[(size_t)block->body_a[l] * ROW + STATE_INV_BETA],
-                          c->state[(size_t)block->body_b[l] * ROW + STATE_INV_BETA]);
+        out[l] = real_max(cpu_inv_beta(c, block->body_a[l]), cpu_inv_beta(c, block->body_b[l]));
     return out;
 }
 

@@ -1,6 +1,6 @@
 /* Steps 2-4 of constraints given by rows, LANES of them at a time. Written once, specialised at compile time by the law
  * and by what the sweep is for. */
-#include "cpu.h"
+#include "cpu_rows.h"
 
 /* What rows add to the wrenches of their two bodies. */
 struct row_sum {
@@ -36,8 +36,7 @@ static lanes inverse_weight(const struct sadmm_context *c, const struct row_bloc
     lanes out = {0};
     for (int l = 0; l < LANES; ++l) {
         if (!c->fast) {
-            out[l] = real_max(c->state[(size_t)block->body_a[l] * ROW + STATE_INV_BETA],
-                              c->state[(size_t)block->body_b[l] * ROW + STATE_INV_BETA]);
+            out[l] = real_max(cpu_inv_beta(c, block->body_a[l]), cpu_inv_beta(c, block->body_b[l]));
             continue;
         }
         if (block->constraint[l] < 0) continue;

@@ -14,26 +14,13 @@ static double pair_violation(const struct sadmm_context *c, size_t record)
     cpu_load_v(c, (size_t)block->body_a[l], a);
     cpu_load_v(c, (size_t)block->body_b[l], b);
     for (int k = 0; k < c->system->contacts->pairs[block->pair[l]].count; ++k) {
-        double arm[3], lambda[3], error, friction = 0;
-        if (c->plan.contact_rows == 3) {
-            const struct point_slot *slot = (const struct point_slot *)c->slots + block->first + k;
-            arm[0] = (double)slot->arm.x[l], arm[1] = (double)slot->arm.y[l], arm[2] = (double)slot->arm.z[l];
-            lambda[0] = (double)slot->lambda.x[l], lambda[1] = (double)slot->lambda.y[l];
-            lambda[2] = (double)slot->lambda.z[l];
-            error = (double)slot->error[l];
-            friction = (double)block->friction[l];
-        } else {
-            const struct normal_slot *slot = (const struct normal_slot *)c->slots + block->first + k;
-            arm[0] = (double)slot->arm.x[l], arm[1] = (double)slot->arm.y[l], arm[2] = (double)slot->arm.z[l];
-            for (int j = 0; j < 3; ++j) lambda[j] = (double)slot->lambda[l] * n[j];
-            error = (double)slot->error[l];
-        }
-        const double arm_b[3] = {arm[0] + d[0], arm[1] + d[1], arm[2] + d[2]};
+        const struct cpu_point point = cpu_load_point(c, block, l, k);
+        const double arm_b[3] = {point.arm[0] + d[0], point.arm[1] + d[1], point.arm[2] + d[2]};
         double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
         add_cross(b + 3, arm_b, 1, u);
-        add_cross(a + 3, arm, -1, u);
-        for (int j = 0; j < 3; ++j) u[j] += error * n[j];
-        sum += contact_violation(lambda, u, n, friction, c->pair_response[record]);
+        add_cross(a + 3, point.arm, -1, u);
+        for (int j = 0; j < 3; ++j) u[j] += point.error * n[j];
+        sum += contact_violation(point.impulse, u, n, (double)block->friction[l], c->pair_response[record]);
     }
     return sum;
 }

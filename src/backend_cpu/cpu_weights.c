@@ -4,7 +4,6 @@
  * In double from the system's raw data; only the impulses are in this precision. Sums over a body go in the order of
  * its records, sums over an island in the order of bodies. */
 #include "core/math/array3.h"
-#include "core/math/dense6.h"
 #include "core/model/islands.h"
 #include "core/math/weight.h"
 #include "cpu_rows.h"
@@ -16,17 +15,10 @@ static void invert(const struct sadmm_context *c, const double A[PACKED6], doubl
         packed_invert_rigid(A, out);
         return;
     }
-    double M[36], L[36], column[6];
+    double M[36];
     for (int r = 0, at = 0; r < 6; ++r)
         for (int k = 0; k <= r; ++k, ++at) M[6 * r + k] = M[6 * k + r] = A[at];
-    memset(out, 0, PACKED6 * sizeof *out);
-    if (!dense6_cholesky(M, L)) return; /* problems refuse such an A; weights without a response would be no use */
-    for (int k = 0; k < 6; ++k) {
-        double unit[6] = {0};
-        unit[k] = 1;
-        dense6_solve(L, unit, column);
-        for (int r = k; r < 6; ++r) out[r * (r + 1) / 2 + k] = column[r];
-    }
+    packed_invert(M, out);
 }
 
 /* Sums over a pair's points on one of its bodies: of arms where contacts have three rows, else of J^T J. */
@@ -191,9 +183,8 @@ static void assemble_C(struct sadmm_context *c, size_t i)
     struct arm_sums arms, weighted = {0};
     memset(C, 0, PACKED6 * sizeof *C);
     for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) {
-        size_t row = (size_t)c->incident[at];
-        int side = row >= c->record_count;
-        size_t record = side ? row - c->record_count : row;
+        int side;
+        const size_t record = cpu_record(c, at, &side);
         if (record >= cpu_pair_records(c)) {
             add_rows(c, record, side, C);
         } else if (c->plan.contact_rows == 3) {

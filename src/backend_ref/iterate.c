@@ -3,10 +3,10 @@
 
 #include "core/math/dense6.h"
 #include "core/math/contact.h"
+#include "core/math/penalty.h"
 #include "literal.h"
 
-/* (14): C_i = sum_k J_{i,k}^T J_{i,k}, and (13): beta_i = M Tr(A_i) / Tr(C_i) + c, c in kg. A body without (non-zero)
- * rows has no use for a penalty: 1. */
+/* (14): C_i = sum_k J_{i,k}^T J_{i,k}, and (13): beta_i = M Tr(A_i) / Tr(C_i) + c. */
 sadmm_status sadmm_ref_init_penalty(struct sadmm_context *c, struct sadmm_error *error)
 {
     (void)error;
@@ -25,7 +25,6 @@ sadmm_status sadmm_ref_init_penalty(struct sadmm_context *c, struct sadmm_error 
     }
 
     const struct sadmm_settings *settings = c->settings;
-    double offset = settings->penalty_offset * settings->dt * settings->dt;
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *body = &c->bodies[i];
         double trace_A = 0, trace_C = 0;
@@ -33,7 +32,8 @@ sadmm_status sadmm_ref_init_penalty(struct sadmm_context *c, struct sadmm_error 
             trace_A += body->A[7 * j];
             trace_C += body->C[7 * j];
         }
-        body->beta = trace_C > 0 ? settings->penalty_mass_factor * trace_A / trace_C + offset : 1;
+        body->beta = penalty_of_body(trace_A, trace_C, settings->penalty_mass_factor, settings->penalty_offset,
+                                     settings->dt);
     }
     return SADMM_OK;
 }

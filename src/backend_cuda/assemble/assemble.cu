@@ -9,21 +9,11 @@
 /* A^-1, packed. */
 static __device__ void invert(bool rigid, const double A[36], double out[PACKED])
 {
-    double packed[PACKED], factor[36];
+    double packed[PACKED];
     for (int r = 0; r < 6; ++r)
         for (int k = 0; k <= r; ++k) packed[r * (r + 1) / 2 + k] = A[6 * r + k];
-    if (rigid) {
-        packed_invert_rigid(packed, out);
-        return;
-    }
-    for (int k = 0; k < PACKED; ++k) out[k] = 0;
-    if (!dense6_cholesky(A, factor)) return; /* problems refuse such an A; weights without a response would be no use */
-    for (int k = 0; k < 6; ++k) {
-        double unit[6] = {}, column[6];
-        unit[k] = 1;
-        dense6_solve(factor, unit, column);
-        for (int r = k; r < 6; ++r) out[r * (r + 1) / 2 + k] = column[r];
-    }
+    if (rigid) packed_invert_rigid(packed, out);
+    else packed_invert(A, out);
 }
 
 /* x . M x */

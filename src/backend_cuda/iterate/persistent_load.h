@@ -87,7 +87,7 @@ PART __device__ __forceinline__ void PART_RUN::load_side(void)
     find_other(on_b ? on.body_a : on.body_b);
     const real inv_s =
         own.sign * (FAST ? v.contacts.inv_s[p]
-                         : inverse_weight(inv_beta_of(v.bodies, on.body_a), inv_beta_of(v.bodies, on.body_b)));
+                         : penalty_inverse_s(inv_beta_of(v.bodies, on.body_a), inv_beta_of(v.bodies, on.body_b)));
     own.normal = xyz(about);
     own.friction = about.w;
 #pragma unroll

@@ -81,7 +81,7 @@ __device__ __forceinline__ void row_lane::load(const cuda_view &v, int32_t lane,
             number(j, ROW_OWN + i) = on_b ? row.jacobian[1][i] : row.jacobian[0][i];
             number(j, ROW_OTHER + i) = on_b ? row.jacobian[0][i] : row.jacobian[1][i];
         }
-        const row_law law = law_of_row(row, FAST ? share * row.weight : inverse_weight(beta_a, beta_b));
+        const row_law law = law_of_row(row, FAST ? share * row.weight : penalty_inverse_s(beta_a, beta_b));
         const real numbers_of_law[] = {law.gain, law.bias, law.compliance, law.lo, law.hi, law.step, law.along};
 #pragma unroll
         for (int32_t i = 0; i < 7; ++i) number(j, ROW_LAW + i) = numbers_of_law[i];

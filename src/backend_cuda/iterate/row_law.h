@@ -4,6 +4,7 @@
 #define SADMM_CUDA_ITERATE_ROW_LAW_H
 
 #include "core/math/contact.h"
+#include "core/math/row.h"
 #include "quad.h"
 
 struct row_law {
@@ -46,9 +47,9 @@ struct row_change {
 };
 CUDA_INLINE row_change change_row(const row_law &law, real missing, real push, real old)
 {
-    const real delta = -fused(law.along, push, law.step * missing), next = old + delta,
-               bounded = next < law.lo ? law.lo : next > law.hi ? law.hi : next;
-    const row_change out = {bounded, bounded != next ? bounded - old : delta};
+    row_change out;
+    out.delta = -fused(law.along, push, law.step * missing);
+    out.lambda = row_bounded(old, law.lo, law.hi, &out.delta);
     return out;
 }
 

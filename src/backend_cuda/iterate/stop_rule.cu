@@ -60,7 +60,7 @@ static __device__ double natural_map(const model_view &model, const body_view &b
         const double w = fmax(weight[0], fmax(weight[1], weight[2])),
                      e = sadmm_contact_e(&raw.system, &settings, pair, point),
                      lambda[3] = {impulse.x, impulse.y, impulse.z}, u[3] = {x.x + e, x.y, x.z};
-        worst = largest_term::join(worst, map_of_contact(lambda, u, pair->friction, w));
+        worst = keep_max(worst, map_of_contact(lambda, u, pair->friction, w));
     }
     return worst;
 }
@@ -89,7 +89,7 @@ static __device__ double natural_map_of_rows(const body_view &bodies, const row_
     }
     for (int r = 0; r < constraint.count; ++r)
         if (weight[r] != 0)
-            worst = largest_term::join(worst, row_natural_map(row[r].gain, row[r].bias, row[r].compliance, row[r].lo,
+            worst = keep_max(worst, row_natural_map(row[r].gain, row[r].bias, row[r].compliance, row[r].lo,
                                                               row[r].hi, x[r], lambda[r], weight[r]));
     return worst;
 }
@@ -111,7 +111,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         const int32_t k = p - v.contacts.pair_capacity; /* a block of rows, or a pair */
         if (code & 1 && is_dynamic(v.model, k < 0 ? v.contacts.bodies[p].body_a : v.rows.constraints[k].body_a))
             continue; /* counted there */
-        map = largest_term::join(map, k < 0 ? natural_map(v.model, v.bodies, v.contacts, v.raw, p)
+        map = keep_max(map, k < 0 ? natural_map(v.model, v.bodies, v.contacts, v.raw, p)
                                             : natural_map_of_rows(v.bodies, v.rows, v.raw, k));
     }
     sum_lanes<SUMS>(sums);
@@ -119,7 +119,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     const double g = own_number(sums, t.lane), momentum = product(row.velocity, row.a);
     term[0] = largest_of_lanes(map);
     term[1] = largest_of_lanes(fabs(momentum - row.b - g));
-    term[2] = largest_of_lanes(largest_term::join(fabs(g), largest_term::join(fabs(momentum), fabs(row.b))));
+    term[2] = largest_of_lanes(keep_max(fabs(g), keep_max(fabs(momentum), fabs(row.b))));
     term[2] = fmax(term[2], t.live ? mass_of(v.bodies, t.body) * v.model.settings->certificate_tolerance : 0);
     if (!add_up_island<largest_term>(v.graph, v.islands, t, own_number(term, t.lane), largest) || t.lane != 0) return;
     const bool met = largest[0] <= v.model.settings->certificate_tolerance &&

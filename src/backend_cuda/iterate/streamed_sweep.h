@@ -84,7 +84,7 @@ static __device__ __forceinline__ double sweep_pair(const model_view &model, con
     const body_row a = load_row(bodies.state, joined.body_a), b = load_row(bodies.state, joined.body_b);
 
     const vec3 normal = xyz(about), difference = xyz(between);
-    const real inv_s = FAST ? weight : inverse_weight(a.inv_beta, b.inv_beta);
+    const real inv_s = FAST ? weight : penalty_inverse_s(a.inv_beta, b.inv_beta);
     real largest = 0;
     pair_sum next = {}, change = {};
 #pragma unroll
@@ -147,7 +147,7 @@ static __device__ __forceinline__ double sweep_rows(const model_view &model, con
     const real beta_a = inv_beta_of(bodies, about.body_a), beta_b = inv_beta_of(bodies, about.body_b);
     real lambda[SADMM_MAX_ROWS], delta[SADMM_MAX_ROWS], impulse[SADMM_MAX_ROWS], largest = 0;
     update_rows<FAST>(row, about, about.body_a < model.bodies && about.body_b < model.bodies,
-                      inverse_weight(beta_a, beta_b), load_motion(bodies.state + (size_t)about.body_a * ROW),
+                      penalty_inverse_s(beta_a, beta_b), load_motion(bodies.state + (size_t)about.body_a * ROW),
                       load_motion(bodies.state + (size_t)about.body_b * ROW), lambda, delta);
     for (int r = 0; r < SADMM_MAX_ROWS; ++r) {
         impulse[r] = FAST ? delta[r] : SPLIT ? lambda[r] : lambda[r] + delta[r];

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/math/contact.h"
+#include "core/math/penalty.h"
 #include "core/math/relax.h"
 #include "backend_cuda/device/context.h"
 
@@ -67,13 +68,6 @@ CUDA_INLINE body_motion no_motion(void)
 CUDA_INLINE real inv_beta_of(const body_view &bodies, int32_t body)
 {
     return bodies.state[(size_t)body * ROW + STATE_INV_BETA];
-}
-
-/* 1/s, s = 1/beta_a + 1/beta_b. */
-CUDA_INLINE real inverse_weight(real inv_beta_a, real inv_beta_b)
-{
-    real s = inv_beta_a + inv_beta_b;
-    return s > 0 ? 1 / s : (real)0;
 }
 
 /* Component r < 6 of a wrench is number record_slot(r) of its record: force and torque are four apart. */

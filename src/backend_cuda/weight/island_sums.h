@@ -13,8 +13,8 @@ static_assert(SPREAD < 1 << ARRIVAL_BITS && 32 / 4 * ARRIVAL_BITS <= 64, "a numb
 struct add_terms {
     static __device__ __forceinline__ double join(double a, double b) { return a + b; }
 };
-struct largest_term { /* a NaN stays */
-    static __device__ __forceinline__ double join(double a, double b) { return a != a || b <= a ? a : b; }
+struct largest_term {
+    static __device__ __forceinline__ double join(double a, double b) { return keep_max(a, b); }
 };
 
 /* Terms of a body, term k in lane k, added up (or what Join says) over its island. True in the lanes of one body of

@@ -5,6 +5,8 @@
 #include "weight.h"
 #include "backend_cuda/device/plan_check.h"
 
+#include "core/math/penalty.h"
+
 /* ---- C ----------------------------------------------------------------------------------------------------------- */
 
 static __device__ void add_pair(const model_view &model, const raw_view &raw, const struct sadmm_contact_pair *pair,
@@ -49,7 +51,7 @@ static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, const 
     add_arm_sums(C, &sums);
 }
 
-/* (13). dt^2: c is given in the paper's time-scaled units. Without constraints beta does not matter. */
+/* (13) */
 static __device__ __forceinline__ double penalty_of(const model_view &model, const body_view &bodies,
                                                     const solver_real *line, const double C[PACKED])
 {
@@ -57,7 +59,7 @@ static __device__ __forceinline__ double penalty_of(const model_view &model, con
     double trace_A = 0, trace_C = C[0] + C[2] + C[5] + C[9] + C[14] + C[20];
 #pragma unroll
     for (int k = 0; k < 6; ++k) trace_A += (double)line_a(line, bodies.rigid, k, k);
-    return trace_C > 0 ? s->penalty_mass_factor * trace_A / trace_C + s->penalty_offset * s->dt * s->dt : 1;
+    return penalty_of_body(trace_A, trace_C, s->penalty_mass_factor, s->penalty_offset, s->dt);
 }
 
 /* ---- kernels ----------------------------------------------------------------------------------------------------- */
@@ -101,9 +103,9 @@ static __global__ void scale_kernel(const __grid_constant__ cuda_view v, const _
     if (i >= live_bodies(v.model)) return;
     double ratio = args.factor;
     if (args.measure) /* by the residuals */
-        ratio = sadmm_penalty_ratio(__longlong_as_double((long long)v.iteration.residual[0]),
-                                    __longlong_as_double((long long)v.iteration.residual[1]),
-                                    v.model.settings->penalty_ratio_limit);
+        ratio = penalty_ratio(__longlong_as_double((long long)v.iteration.residual[0]),
+                              __longlong_as_double((long long)v.iteration.residual[1]),
+                              v.model.settings->penalty_ratio_limit);
     v.bodies.beta[i] *= ratio;
     if (i == 0) *v.iteration.ratio = ratio;
 }

@@ -77,13 +77,6 @@ static __device__ void respond_rows(const model_view &model, const body_view &bo
     }
 }
 
-/* A row that has neither bounds nor compliance shares a dense weight with the others of its constraint that have
- * none. */
-static __device__ bool is_coupled(const row_data &row)
-{
-    return row.compliance == 0 && isinf(row.lo) && isinf(row.hi);
-}
-
 /* B = diag(weight) + along along^T */
 static __device__ void weigh_rows(const cuda_view &v, int32_t k, bool first)
 {
@@ -101,8 +94,9 @@ static __device__ void weigh_rows(const cuda_view &v, int32_t k, bool first)
         weight_add_row(&sums, (double)rows[r].lambda, responses[r].scale, responses[r].response, about.rows);
     const double share = weight_share(&island->weights, sums.load2);
     for (int r = 0; r < about.rows; ++r) {
-        const struct weight_row B = weight_of_row(&sums, share, about.cone, is_coupled(rows[r]),
-                                                  (double)rows[r].lambda, responses[r].response);
+        const bool coupled = sadmm_law_is_coupled((double)rows[r].compliance, (double)rows[r].lo, (double)rows[r].hi);
+        const struct weight_row B =
+            weight_of_row(&sums, share, about.cone, coupled, (double)rows[r].lambda, responses[r].response);
         rows[r].weight = (solver_real)B.weight;
         rows[r].along = (solver_real)B.along;
     }

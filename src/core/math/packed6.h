@@ -3,7 +3,7 @@
 #ifndef SADMM_MATH_PACKED6_H
 #define SADMM_MATH_PACKED6_H
 
-#include "real.h"
+#include "dense6.h"
 
 enum { PACKED6 = 21 };
 
@@ -88,17 +88,40 @@ SADMM_INLINE void normal_row(const double n[3], const double r[3], double row[6]
     row[3] = r[1] * n[2] - r[2] * n[1], row[4] = r[2] * n[0] - r[0] * n[2], row[5] = r[0] * n[1] - r[1] * n[0];
 }
 
+/* Of a symmetric 3 x 3 matrix, by its cofactors: xx yy zz xy xz yz. */
+SADMM_INLINE void invert_symmetric3(double xx, double yy, double zz, double xy, double xz, double yz, double out[6])
+{
+    const double c00 = yy * zz - yz * yz, c01 = xz * yz - xy * zz, c02 = xy * yz - xz * yy;
+    const double inv = 1 / (xx * c00 + xy * c01 + xz * c02);
+    out[0] = inv * c00, out[1] = inv * (xx * zz - xz * xz), out[2] = inv * (xx * yy - xy * xy);
+    out[3] = inv * c01, out[4] = inv * c02, out[5] = inv * (xy * xz - xx * yz);
+}
+
 /* A^-1 of a rigid body, by blocks. */
 SADMM_INLINE void packed_invert_rigid(const double A[PACKED6], double out[PACKED6])
 {
-    double xx = A[9], yy = A[14], zz = A[20], xy = A[13], xz = A[18], yz = A[19];
-    double c00 = yy * zz - yz * yz, c01 = xz * yz - xy * zz, c02 = xy * yz - xz * yy;
-    double inv = 1 / (xx * c00 + xy * c01 + xz * c02);
+    double inertia[6];
+    invert_symmetric3(A[9], A[14], A[20], A[13], A[18], A[19], inertia);
     SADMM_UNROLL
     for (int k = 0; k < PACKED6; ++k) out[k] = 0;
     out[0] = out[2] = out[5] = 1 / A[0];
-    out[9] = inv * c00, out[13] = inv * c01, out[14] = inv * (xx * zz - xz * xz);
-    out[18] = inv * c02, out[19] = inv * (xy * xz - xx * yz), out[20] = inv * (xx * yy - xy * xy);
+    out[9] = inertia[0], out[14] = inertia[1], out[20] = inertia[2];
+    out[13] = inertia[3], out[18] = inertia[4], out[19] = inertia[5];
+}
+
+/* A^-1 of any body, from its lower half. 0 where A is not positive definite: problems refuse such an A, and weights
+ * without a response would be no use. */
+SADMM_INLINE void packed_invert(const double A[36], double out[PACKED6])
+{
+    double L[36];
+    for (int k = 0; k < PACKED6; ++k) out[k] = 0;
+    if (!dense6_cholesky(A, L)) return;
+    for (int k = 0; k < 6; ++k) {
+        double unit[6] = {0}, column[6];
+        unit[k] = 1;
+        dense6_solve(L, unit, column);
+        for (int r = k; r < 6; ++r) out[r * (r + 1) / 2 + k] = column[r];
+    }
 }
 
 #endif

@@ -33,5 +33,7 @@ SADMM_INLINE real real_abs(real x) { return sizeof(real) == 4 ? (real)fabsf((flo
 SADMM_INLINE real real_min(real a, real b) { return a < b ? a : b; }
 SADMM_INLINE real real_max(real a, real b) { return a > b ? a : b; }
 SADMM_INLINE real real_clamp(real x, real lo, real hi) { return x < lo ? lo : (x > hi ? hi : x); }
+/* The larger one, in double in every precision; a NaN stays. */
+SADMM_INLINE double keep_max(double a, double b) { return a != a || b <= a ? a : b; }
 
 #endif

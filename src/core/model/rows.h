@@ -12,6 +12,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "core/base/inline.h"
 #include "subadmm/problem.h"
 
 #ifdef __cplusplus
@@ -80,11 +81,15 @@ static inline void sadmm_row_motor(struct sadmm_rows *rows, int32_t r, double sp
     sadmm_row_set(rows, r, 1, -speed, 0, -most, most);
 }
 
-/* May this row share a dense weight with others of its constraint (method `fast`)? A multiplier with bounds, or with
+/* May a row share a dense weight with others of its constraint (method `fast`)? A multiplier with bounds, or with
  * compliance, is only exact on its own. */
+SADMM_INLINE bool sadmm_law_is_coupled(double compliance, double lo, double hi)
+{
+    return compliance == 0 && lo == -INFINITY && hi == INFINITY;
+}
 static inline bool sadmm_row_is_coupled(const struct sadmm_rows *rows, size_t r)
 {
-    return rows->compliance[r] == 0 && rows->lo[r] == -INFINITY && rows->hi[r] == INFINITY;
+    return sadmm_law_is_coupled(rows->compliance[r], rows->lo[r], rows->hi[r]);
 }
 
 /* A row that is zero on both bodies is no constraint (Sec. III-C of the paper): it carries nothing where it has no

@@ -78,14 +78,6 @@ SADMM_INLINE double sadmm_contact_e(const struct sadmm_system *system, const str
                          settings->correction_speed, settings->restitution_threshold);
 }
 
-/* Eq. (15): beta is multiplied by this. A residual of zero on both sides says nothing about the balance: leave the
- * penalty alone. */
-SADMM_INLINE double sadmm_penalty_ratio(double primal, double dual, double limit)
-{
-    if (primal <= 0 && dual <= 0) return 1;
-    return fmin(fmax(primal / fmax(dual, 1e-300), 1 / limit), limit);
-}
-
 /* The contact's frame: rows n, t1, t2. */
 SADMM_INLINE mat3 sadmm_contact_frame(const double normal[3])
 {

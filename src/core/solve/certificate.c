@@ -25,9 +25,8 @@ struct tally {
 };
 static const double SMALL_UNIT = 0x1p-600;
 
-/* max that keeps a NaN: a solution that is not finite must not look good. */
+/* A NaN does: a solution that is not finite must not look good. */
 static bool exceeds(double x, double best) { return !(x <= best); }
-static double keep_max(double a, double b) { return isnan(a) || b <= a ? a : b; }
 
 static double max_abs6(const double x[6])
 {

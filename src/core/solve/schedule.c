@@ -4,7 +4,7 @@
 #include "certificate.h"
 #include "core/base/clock.h"
 #include "core/base/parallel.h"
-#include "core/model/system_math.h"
+#include "core/math/penalty.h"
 #include "loads.h"
 
 static sadmm_status assemble_bodies(struct sadmm_solve *s)
@@ -56,7 +56,7 @@ static sadmm_status reweigh(struct sadmm_solve *s)
 static sadmm_status balance_penalty(struct sadmm_solve *s)
 {
     const struct sadmm_residual *residual = &s->report->residual;
-    const double ratio = sadmm_penalty_ratio(residual->primal, residual->dual, s->settings->penalty_ratio_limit);
+    const double ratio = penalty_ratio(residual->primal, residual->dual, s->settings->penalty_ratio_limit);
     if (ratio == 1) return SADMM_OK;
     TRY(s->kernels->update_penalty(s->context, ratio, s->error));
     return s->kernels->factorize(s->context, s->error);
