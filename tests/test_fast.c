@@ -451,6 +451,41 @@ START_TEST(weight_scales_follow_the_balance)
 }
 END_TEST
 
+/* What a contact misses, lambda - Pi_C(lambda - u/w), with lambda = (2, 0, 0), mu = 0.5, w = 4 in its frame, by hand;
+ * its energy is the same in the world's frame, for any normal. */
+START_TEST(what_contacts_miss_is_known)
+{
+    static const struct {
+        double u[3], missing[3];
+        int moves;
+    } cases[] = {
+        {{-4, -4, 4}, {-1, -1, 1}, 0},   /* (3, 1, -1) is in the cone: |(1, -1)| < 1.5 */
+        {{0, -6, 8}, {0, -0.6, 0.8}, 1}, /* (2, 1.5, -2): 2.5 long, and 1 allowed */
+        {{12, 4, 0}, {2, 0, 0}, 1},      /* it would pull */
+        {{12, 0, 0}, {2, 0, 0}, 1},
+    };
+    const double lambda[3] = {2, 0, 0}, normals[][3] = {{1, 0, 0}, {0, 0.6, -0.8}, {2 / 3.0, -2 / 3.0, 1 / 3.0}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
+        double missing[3], y[3], projected[3], energy = 0;
+        contact_missing_rows(lambda, cases[k].u, 0.5, 4, missing);
+        for (int i = 0; i < 3; ++i) {
+            ck_assert_double_eq_tol(missing[i], cases[k].missing[i], 4 * DBL_EPSILON); /* of numbers up to 3 */
+            energy += 4 * missing[i] * missing[i];
+            y[i] = lambda[i] - cases[k].u[i] / 4;
+        }
+        ck_assert_int_eq(contact_project_rows(y, 0.5, projected), cases[k].moves);
+        for (size_t n = 0; n < sizeof normals / sizeof *normals; ++n) {
+            const mat3 frame = sadmm_contact_frame(normals[n]);
+            double world_lambda[3], world_u[3];
+            v3_store(m3_tmul(frame, v3_load(lambda)), world_lambda);
+            v3_store(m3_tmul(frame, v3_load(cases[k].u)), world_u);
+            ck_assert_double_eq_tol(contact_violation(world_lambda, world_u, normals[n], 0.5, 4), energy,
+                                    64 * DBL_EPSILON * energy); /* some ten roundings of numbers up to 3, squared */
+        }
+    }
+}
+END_TEST
+
 START_TEST(islands_are_named_by_their_smallest_body)
 {
     struct contact_problem *p = contact_problem_new();
@@ -758,6 +793,7 @@ int main(void)
     tcase_add_test(weights, small_gaps_are_eased);
     tcase_add_test(weights, blocks_have_no_unit);
     tcase_add_test(weights, weight_scales_follow_the_balance);
+    tcase_add_test(weights, what_contacts_miss_is_known);
     tcase_add_test(weights, islands_are_named_by_their_smallest_body);
     tcase_add_test(solutions, cold_solves);
     tcase_add_test(solutions, masses_do_not_matter);
