@@ -209,6 +209,11 @@ static const struct {
     { "incline", 20 },
     { "bounce", 500 }, /* through the first bounce */
     { "spin_plate", 100 },
+    { "rolling", 20 },
+    { "rocking", 50 }, /* through the first landing */
+    { "two_balls", 260 }, /* through the collision */
+    { "dominoes:8", 40 }, /* through the first collision */
+    { "falling_chain:5", 20 }, /* through the first landing */
 };
 
 static uint64_t hash_after(const char *spec, sadmm_method method, int threads, int steps)
@@ -251,6 +256,7 @@ START_TEST(bad_specs_are_refused)
         { "", "must be one of sliding_cubes[:N], vertical_stacks" },
         { "sliding_cube", "must be one of" },
         { "sliding_cubesx", "must be one of" },
+        { "a name that is so long that it must be cut for the list to fit", "falling_chain[:N]" },
         { ":5", "must be one of" },
         { "sliding_cubes:", "must be a whole number in [1, 1000000]" },
         { "sliding_cubes:abc", "\"sliding_cubes:abc\": N must be a whole number" },
@@ -297,7 +303,7 @@ END_TEST
 
 START_TEST(the_list_has_no_twins)
 {
-    ck_assert_uint_eq(sadmm_scene_count(), 14);
+    ck_assert_uint_eq(sadmm_scene_count(), 19);
     ck_assert_ptr_null(sadmm_scene_at(sadmm_scene_count()));
     for (size_t i = 0; i < sadmm_scene_count(); ++i) {
         for (size_t j = 0; j < i; ++j) ck_assert_str_ne(sadmm_scene_at(i)->name, sadmm_scene_at(j)->name);

@@ -32,5 +32,10 @@ extern const struct sadmm_scene_family sadmm_family_burst;
 extern const struct sadmm_scene_family sadmm_family_incline;
 extern const struct sadmm_scene_family sadmm_family_bounce;
 extern const struct sadmm_scene_family sadmm_family_spin_plate;
+extern const struct sadmm_scene_family sadmm_family_rolling;
+extern const struct sadmm_scene_family sadmm_family_rocking;
+extern const struct sadmm_scene_family sadmm_family_two_balls;
+extern const struct sadmm_scene_family sadmm_family_dominoes;
+extern const struct sadmm_scene_family sadmm_family_falling_chain;
 
 #endif

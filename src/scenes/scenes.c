@@ -13,7 +13,9 @@ static const struct sadmm_scene_family *const families[] = {
     &sadmm_family_card_houses,   &sadmm_family_pyramid,         &sadmm_family_pile,
     &sadmm_family_mixed_pile,    &sadmm_family_sliding_pile,    &sadmm_family_settled_pile,
     &sadmm_family_burst,         &sadmm_family_kicked_cubes,    &sadmm_family_incline,
-    &sadmm_family_bounce,        &sadmm_family_spin_plate,
+    &sadmm_family_bounce,        &sadmm_family_spin_plate,      &sadmm_family_rolling,
+    &sadmm_family_rocking,       &sadmm_family_two_balls,       &sadmm_family_dominoes,
+    &sadmm_family_falling_chain,
 };
 
 enum { FAMILY_COUNT = sizeof families / sizeof families[0] };
@@ -51,7 +53,7 @@ static sadmm_status fail_unknown(const char *spec, struct sadmm_error *error)
         used += (size_t)snprintf(names + used, sizeof names - used, "%s%s%s", i ? ", " : "", families[i]->info.name,
                                  families[i]->info.arguments);
     }
-    return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene = \"%.60s\": must be one of %s", spec, names);
+    return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene = \"%.16s\": must be one of %s", spec, names);
 }
 
 /* The N of "name:N": digits only, so that "+5", " 5" and "5x" are refused and not half read. */

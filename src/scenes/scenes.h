@@ -8,6 +8,7 @@
 #ifndef SADMM_SCENES_H
 #define SADMM_SCENES_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -24,6 +25,7 @@ struct sadmm_scene_info {
     const char *description; /* one line */
     double duration;         /* s, simulated time the scene is meant to be run for */
     int iterations[SADMM_METHOD_COUNT]; /* a step, by method */
+    bool chaotic; /* trajectories that differ by rounding part within the duration: only statistics can be compared */
 };
 
 /* The scenes, index in [0, count); NULL outside. Static storage. */
