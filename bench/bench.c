@@ -21,6 +21,7 @@ static const struct {
     {"convergence", bench_convergence,
      "iterations and time to a tolerance, errors of warm steps: method against method"},
     {"stand", bench_stand, "does a structure stand for many steps, and what does a step cost"},
+    {"motion", bench_motion, "total error against run time of scenes in motion, and how deep bodies overlap"},
     {"rows", bench_rows, "what one constraint given by rows costs an iteration of a scene"},
 };
 

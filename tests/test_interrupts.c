@@ -106,6 +106,7 @@ START_TEST(other_runs_report_too)
         {"$B kernels --seconds 600 --backend ref --contacts 1000 --json r.json", "r.json"},
         {"$B scaling --scene pile --sizes 300 --steps 100000 --max-seconds 80000 --backend cpu --csv r.csv", "r.csv"},
         {"$B convergence --only warm --scene pile:300 --seconds 3600 --max-seconds 80000 --csv r.csv", "r.csv"},
+        {"$B motion --scene pile:300 --seconds 3600 --json r.json", "r.json"},
 #ifdef SADMM_HAVE_HDF5
         {"$S solve p.hdf5 --tolerance 0 --max-iterations 1000000000 --json r.json --solution s.hdf5", "r.json"},
 #endif
