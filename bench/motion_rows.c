@@ -3,7 +3,6 @@
 #include <math.h>
 
 #include "cli/interrupt.h"
-#include "core/solve/schedule.h"
 
 static double seconds_of(const struct motion_plan *plan) { return plan->frames * plan->scene.def.settings.dt; }
 

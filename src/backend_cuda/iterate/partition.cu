@@ -16,7 +16,6 @@
  *   GRID     an island that no cluster can hold, or a few that do not fit side by side
  *   STREAM   what the device cannot hold at once
  */
-
 #include "iterate.h"
 
 enum {
@@ -47,7 +46,8 @@ struct bound {
     int64_t sides, bodies;
 };
 
-/* Places for sides that may stay empty: constraints given by rows begin with a warp (part_rows_from_pairs in persistent_load.h). */
+/* Places for sides that may stay empty: constraints given by rows begin with a warp (part_rows_from_pairs in
+ * persistent_load.h). */
 static int64_t spare_sides(const struct sadmm_context *c) { return c->view.rows.count > 0 ? WARP / QUAD - 1 : 0; }
 
 /* The most sides that a block of so many threads takes. */

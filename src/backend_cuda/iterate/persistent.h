@@ -90,7 +90,8 @@ static __device__ __forceinline__ void iterate(Part &part, const cuda_view &v, c
 {
     unsigned target = 0;
     row_lane rows = {};
-    if (HAS_ROWS<SIZE> && part.row_sides) rows.load<FAST>(v, part.lane, part.is_row_side(), part.side_code, part.row_memory);
+    if (HAS_ROWS<SIZE> && part.row_sides)
+        rows.load<FAST>(v, part.lane, part.is_row_side(), part.side_code, part.row_memory);
     if (FAST && MODE != BLOCK) { /* others read the velocities that were loaded */
         arrive<MODE, SIZE>(v.iteration.barrier);
         wait<MODE, SIZE>(v.iteration.barrier, target += gridDim.x);

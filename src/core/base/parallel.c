@@ -129,9 +129,9 @@ static int try_threads(int count)
     return n;
 }
 
-/* LLVM's workers allocate when they begin. What malloc sets aside for each of them (64 MB of addresses with glibc, and for a
- * moment twice that) is not there for the next, and the runtime ends the process where one cannot be made: how many it can
- * make in a process that is short of addresses cannot be foreseen. */
+/* LLVM's workers allocate when they begin. What malloc sets aside for each of them (64 MB of addresses with glibc, and
+ * for a moment twice that) is not there for the next, and the runtime ends the process where one cannot be made: how
+ * many it can make in a process that is short of addresses cannot be foreseen. */
 #ifdef __clang__
 enum { RUNTIME_ENDS_PROCESS = true };
 #else
