@@ -16,9 +16,9 @@ static const char command[] = "motion";
 struct options {
     const char *scene, *json;
     int backend, precision, method;
-    long device, threads, halvings, iterations[BENCH_LIST], match, seeds, repeats, starts, reference,
-        reference_iterations;
-    int iteration_count;
+    long device, threads, halvings, substeps[BENCH_LIST], iterations[BENCH_LIST], match, seeds, repeats, starts,
+        reference, reference_iterations;
+    int substep_count, iteration_count;
     double dt, seconds, horizon;
 };
 
@@ -28,6 +28,8 @@ static int parse(int argc, char **argv, struct options *o)
         BENCH_TEXT("scene", "SPEC", &o->scene, "default pile:300"),
         BENCH_REAL("dt", "S", &o->dt, 1, "time step of a frame, default the scene's"),
         BENCH_NUMBER("halvings", &o->halvings, 0, MOST_HALVINGS, "of it: dt, dt/2, ...; default 2"),
+        BENCH_NUMBERS("substeps", o->substeps, &o->substep_count, 1, SADMM_MOST_SUBSTEPS,
+                      "of a step, which share its iterations; default 1"),
         BENCH_NUMBERS("iterations", o->iterations, &o->iteration_count, 1, 1000000, "a step, default 20,60"),
         BENCH_NUMBER("match", &o->match, 0, 1000000,
                      "and N at dt, N/2 at dt/2, ...: steps x iterations kept; default the scene's, 0: not"),
@@ -44,7 +46,7 @@ static int parse(int argc, char **argv, struct options *o)
         BENCH_NUMBER("reference", &o->reference, 1, MOST_HALVINGS, "halvings of the reference's step, default 6"),
         BENCH_NUMBER("reference-iterations", &o->reference_iterations, 1, 1000000, "default 300"),
         BENCH_TEXT("json", "FILE|-", &o->json,
-                   "rows[] of {dt, iterations, ms_per_simulated_second, error, overlap_max, ...}"),
+                   "rows[] of {dt, substeps, iterations, ms_per_simulated_second, error, overlap_max, ...}"),
     };
     return bench_parse(command, options, sizeof options / sizeof *options, NULL, argc, argv);
 }
@@ -74,6 +76,9 @@ static int make_plan(const struct options *o, struct motion_plan *plan)
     if (o->dt > 0) *dt = o->dt;
     if (*dt / (double)(1L << o->reference) < 1e-6) return bad_number("reference", o->reference, "fewer: dt >= 1e-6 s");
     if (o->halvings >= o->reference) return bad_number("halvings", o->halvings, "fewer than --reference");
+    for (int k = 0; k < o->substep_count; ++k)
+        if (*dt / (double)(1L << o->halvings) < 1e-6 * (double)o->substeps[k])
+            return bad_number("substeps", o->substeps[k], "fewer: dt of a sub-step >= 1e-6 s");
     plan->spec = o->scene;
     plan->backend = (sadmm_backend)o->backend;
     plan->method = (sadmm_method)o->method;
@@ -81,6 +86,8 @@ static int make_plan(const struct options *o, struct motion_plan *plan)
     plan->device = (int)o->device;
     plan->threads = (int)o->threads;
     plan->halvings = (int)o->halvings;
+    for (int k = 0; k < o->substep_count; ++k) plan->substeps[k] = (int)o->substeps[k];
+    plan->substep_count = o->substep_count;
     for (int k = 0; k < o->iteration_count; ++k) plan->iterations[k] = (int)o->iterations[k];
     plan->iteration_count = o->iteration_count;
     plan->match = o->match >= 0 ? (int)o->match : scene->info->iterations[plan->method];
@@ -136,7 +143,8 @@ int bench_motion(int argc, char **argv)
 {
     struct options o = {
         .scene = "pile:300", .backend = SADMM_BACKEND_CPU, .precision = SADMM_F32, .method = SADMM_METHOD_FAST,
-        .threads = 1, .halvings = 2, .iterations = {20, 60}, .iteration_count = 2, .match = -1, .seeds = 3,
+        .threads = 1, .halvings = 2, .substeps = {1}, .substep_count = 1, .iterations = {20, 60},
+        .iteration_count = 2, .match = -1, .seeds = 3,
         .starts = 9, .horizon = 0.05, .reference = 6, .reference_iterations = 300,
     };
     struct motion_plan plan;

@@ -51,10 +51,10 @@ static void print_head(const struct motion_study *s, const char *runs_on, FILE *
             mm_text(largest, s->floor.largest));
     fprintf(out, "* none is faster and closer, ** least product of both; solver: to many iterations of the same step; "
                  "step: of those to the reference\n\n");
-    fprintf(out, "%-4s %8s %5s %9s  | %8s %8s %8s %8s | %8s %8s %8s %8s %8s %8s  %s\n", "", "", "", "ms per",
-            "error,", "at", "of the", "of the", "overlap,", "", "", "at", "pairs a", "deeper", "");
-    fprintf(out, "%-4s %8s %5s %9s  | %8s %8s %8s %8s | %8s %8s %8s %8s %8s %8s  %s\n", "", "dt, ms", "it.", "sim. s",
-            "mm", "most", "solver", "step", "mm: 50 %", "99 %", "99.9 %", "most", "frame", "than 1 %", "");
+    fprintf(out, "%-4s %8s %4s %5s %9s  | %8s %8s %8s %8s | %8s %8s %8s %8s %8s %8s  %s\n", "", "", "sub-", "",
+            "ms per", "error,", "at", "of the", "of the", "overlap,", "", "", "at", "pairs a", "deeper", "");
+    fprintf(out, "%-4s %8s %4s %5s %9s  | %8s %8s %8s %8s | %8s %8s %8s %8s %8s %8s  %s\n", "", "dt, ms",
+            "step", "it.", "sim. s", "mm", "most", "solver", "step", "mm: 50 %", "99 %", "99.9 %", "most", "frame", "than 1 %", "");
 }
 
 void motion_print(const struct motion_study *s, const char *runs_on, FILE *out)
@@ -65,8 +65,8 @@ void motion_print(const struct motion_study *s, const char *runs_on, FILE *out)
         const struct depth_counts *d = &row->measure.depths;
         char text[16];
         if (row->runs == 0 && !row->failed) continue; /* interrupted */
-        fprintf(out, "%-4s %8.4g %5d ", bench_precision_name(row->setting.precision), 1e3 * row->dt,
-                row->setting.iterations);
+        fprintf(out, "%-4s %8.4g %4d %5d ", bench_precision_name(row->setting.precision), 1e3 * row->dt,
+                row->setting.substeps, row->setting.iterations);
         if (row->runs > 0) {
             fprintf(out, "%9.4g%-2s|", row->ms_median, row->best ? "**" : row->front ? "*" : "");
             const double errors[] = {row->total.median, row->total.largest, row->solver.median, row->step.median};
@@ -122,8 +122,8 @@ static json_t *row_json(const struct motion_plan *plan, const struct motion_row 
     sadmm_backend_query(setting->backend, &info);
     json_t *o = json_pack("{s:s, s:s, s:s, s:s, s:i, s:i, s:i, s:i, s:s}", "scene", plan->spec, "backend", info.name,
                           "precision", bench_precision_name(setting->precision), "method",
-                          bench_word_of(bench_methods, (int)setting->method), "threads", row->threads, "substeps", 1,
-                          "iterations", setting->iterations, "runs", row->runs, "status", row->status);
+                          bench_word_of(bench_methods, (int)setting->method), "threads", row->threads, "substeps",
+                          setting->substeps, "iterations", setting->iterations, "runs", row->runs, "status", row->status);
     if (!o) return NULL;
     set_real(o, "dt", row->dt);
     set_real(o, "ms_per_simulated_second", row->ms_median);

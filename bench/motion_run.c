@@ -10,6 +10,7 @@ static sadmm_settings settings_of(const struct sadmm_scene *scene, const struct 
 {
     sadmm_settings settings = scene->def.settings;
     settings.method = setting->method;
+    settings.substeps = setting->substeps;
     settings.iterations = setting->iterations;
     settings.threads = setting->threads;
     settings.dt = scene->def.settings.dt / (double)(1 << setting->halvings);
@@ -21,6 +22,7 @@ static sadmm_status lead_in(struct motion_world *w, const struct motion_run *run
     struct motion_setting lead = run->setting;
     lead.method = SADMM_METHOD_FAST;
     lead.iterations = LEAD_ITERATIONS;
+    lead.substeps = 1;
     lead.halvings = run->lead_halvings;
     const sadmm_settings settings = settings_of(run->scene, &lead);
     TRY(motion_world_check(w, sadmm_world_set_settings(w->world, &settings)));

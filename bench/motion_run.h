@@ -11,6 +11,7 @@ struct motion_setting {
     sadmm_method method;
     int device, threads;
     int halvings; /* of the scene's time step: 2^halvings steps a frame */
+    int substeps; /* of each of them */
     int iterations;
 };
 

@@ -19,16 +19,21 @@ int motion_study_points(const struct motion_plan *plan)
 
 /* ---- rows ------------------------------------------------------------------------------------------------------ */
 
-static void add_row(struct motion_study *s, sadmm_precision precision, int halvings, int iterations)
+/* place: of the sub-steps in the plan's list. */
+static void add_row(struct motion_study *s, sadmm_precision precision, int halvings, int place, int iterations)
 {
     const struct motion_plan *plan = s->plan;
+    const int substeps = plan->substeps[place];
     for (int k = 0; k < s->row_count; ++k) {
         const struct motion_setting *other = &s->rows[k].setting;
-        if (other->precision == precision && other->halvings == halvings && other->iterations == iterations) return;
+        if (other->precision == precision && other->halvings == halvings && other->substeps == substeps &&
+            other->iterations == iterations)
+            return;
     }
     s->rows[s->row_count++] = (struct motion_row){
-        .setting = {plan->backend, precision, plan->method, plan->device, plan->threads, halvings, iterations},
-        .dt = plan->scene.def.settings.dt / (double)(1 << halvings),
+        .setting = {plan->backend, precision, plan->method, plan->device, plan->threads, halvings, substeps,
+                    iterations},
+        .dt = plan->scene.def.settings.dt / (double)(1 << halvings), .substep_place = place,
         .total = motion_error_none(), .solver = motion_error_none(), .step = motion_error_none(),
         .ms_median = NAN, .status = "ok",
     };
@@ -39,19 +44,21 @@ static int compare_rows(const void *a, const void *b)
     const struct motion_setting *x = &((const struct motion_row *)a)->setting;
     const struct motion_setting *y = &((const struct motion_row *)b)->setting;
     if (x->precision != y->precision) return (int)x->precision - (int)y->precision;
-    return x->halvings != y->halvings ? x->halvings - y->halvings : x->iterations - y->iterations;
+    if (x->halvings != y->halvings) return x->halvings - y->halvings;
+    return x->substeps != y->substeps ? x->substeps - y->substeps : x->iterations - y->iterations;
 }
 
 static sadmm_status make_rows(struct motion_study *s, struct sadmm_error *error)
 {
     const struct motion_plan *plan = s->plan;
     for (int precision = SADMM_F32; precision <= SADMM_F64; ++precision)
-        for (int h = 0; h <= plan->halvings && (plan->precision < 0 || plan->precision == precision); ++h) {
-            for (int k = 0; k < plan->iteration_count; ++k)
-                add_row(s, (sadmm_precision)precision, h, plan->iterations[k]);
-            const int matched = (int)lround((double)plan->match / (double)(1 << h));
-            if (plan->match > 0) add_row(s, (sadmm_precision)precision, h, matched > 0 ? matched : 1);
-        }
+        for (int h = 0; h <= plan->halvings && (plan->precision < 0 || plan->precision == precision); ++h)
+            for (int place = 0; place < plan->substep_count; ++place) {
+                for (int k = 0; k < plan->iteration_count; ++k)
+                    add_row(s, (sadmm_precision)precision, h, place, plan->iterations[k]);
+                const int matched = (int)lround((double)plan->match / (double)(1 << h));
+                if (plan->match > 0) add_row(s, (sadmm_precision)precision, h, place, matched > 0 ? matched : 1);
+            }
     qsort(s->rows, (size_t)s->row_count, sizeof *s->rows, compare_rows);
     for (int k = 0; k < s->row_count; ++k) {
         struct motion_row *row = &s->rows[k];
@@ -82,11 +89,11 @@ static sadmm_status follow(const struct motion_study *s, const struct motion_set
     return SADMM_OK;
 }
 
-/* What is as good as solved: in double, on the CPU, with many iterations. */
-static struct motion_setting solved_setting(const struct motion_plan *plan, int halvings, int iterations)
+/* What is as good as solved: in double, on the CPU, with many iterations in every sub-step. */
+static struct motion_setting solved_setting(const struct motion_plan *plan, int halvings, int substeps, int iterations)
 {
     return (struct motion_setting){SADMM_BACKEND_CPU, SADMM_F64, SADMM_METHOD_FAST, 0, plan->threads, halvings,
-                                   iterations};
+                                   substeps, substeps * iterations};
 }
 
 /* States on one run of a heap at an eighth of the step, evenly from its start to one part before its end. */
@@ -96,7 +103,7 @@ static sadmm_status find_starts(struct motion_study *s, struct sadmm_error *erro
     const int iterations = plan->scene.info->iterations[SADMM_METHOD_FAST];
     s->starts = (struct track){.runs = 1, .points = plan->starts};
     struct motion_run run = {
-        .scene = &plan->scene, .setting = solved_setting(plan, START_HALVINGS, iterations), .track = &s->starts,
+        .scene = &plan->scene, .setting = solved_setting(plan, START_HALVINGS, 1, iterations), .track = &s->starts,
         .frames = (int)((int64_t)plan->frames * plan->starts / (plan->starts + 1)),
     };
     return motion_run(&run, error);
@@ -106,11 +113,13 @@ static sadmm_status find_references(struct motion_study *s, struct sadmm_error *
 {
     const struct motion_plan *plan = s->plan;
     if (is_heap(plan)) TRY(find_starts(s, error));
-    for (int h = 0; h <= plan->halvings; ++h) {
-        const struct motion_setting setting = solved_setting(plan, h, plan->reference_iterations);
-        TRY(follow(s, &setting, &s->solved[h], error));
-    }
-    const struct motion_setting fine = solved_setting(plan, plan->reference_halvings, plan->reference_iterations);
+    for (int h = 0; h <= plan->halvings; ++h)
+        for (int place = 0; place < plan->substep_count; ++place) {
+            const struct motion_setting setting =
+                solved_setting(plan, h, plan->substeps[place], plan->reference_iterations);
+            TRY(follow(s, &setting, &s->solved[h][place], error));
+        }
+    const struct motion_setting fine = solved_setting(plan, plan->reference_halvings, 1, plan->reference_iterations);
     struct motion_setting coarse = fine;
     --coarse.halvings;
     TRY(follow(s, &coarse, &s->coarser, error));
@@ -130,7 +139,7 @@ static bool row_failed(struct motion_row *row, sadmm_status status, const struct
 
 static sadmm_status compare_row(struct motion_study *s, struct motion_row *row, struct sadmm_error *error)
 {
-    const struct track *solved = &s->solved[row->setting.halvings];
+    const struct track *solved = &s->solved[row->setting.halvings][row->substep_place];
     if (!s->has_errors || row->failed || interrupted()) return SADMM_OK;
     TRY(track_compare(&row->track, &s->reference, &row->total, error));
     TRY(track_compare(&row->track, solved, &row->solver, error));
@@ -210,7 +219,8 @@ void motion_study_free(struct motion_study *s)
         motion_measure_free(&s->rows[k].measure);
         sadmm_free(s->rows[k].ms);
     }
-    for (int h = 0; h <= MOST_HALVINGS; ++h) track_free(&s->solved[h]);
+    for (int h = 0; h <= MOST_HALVINGS; ++h)
+        for (int place = 0; place < BENCH_LIST; ++place) track_free(&s->solved[h][place]);
     track_free(&s->starts);
     track_free(&s->reference);
     track_free(&s->coarser);

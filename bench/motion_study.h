@@ -5,7 +5,7 @@
 #include "bench_options.h"
 #include "motion_run.h"
 
-enum { MOST_HALVINGS = 10, MOST_ROWS = 2 * (MOST_HALVINGS + 1) * (BENCH_LIST + 1) };
+enum { MOST_HALVINGS = 10, MOST_ROWS = 2 * (MOST_HALVINGS + 1) * BENCH_LIST * (BENCH_LIST + 1) };
 
 struct motion_plan {
     const char *spec;
@@ -15,6 +15,7 @@ struct motion_plan {
     int precision; /* -1: both */
     int device, threads, halvings;
     int iterations[BENCH_LIST], iteration_count, match; /* match: iterations of the base step; 0: none */
+    int substeps[BENCH_LIST], substep_count;
     int frames;         /* of a run */
     int seeds, repeats; /* runs a row */
     int starts, start_frames; /* heaps: states on one run, and how far trajectories are followed from each */
@@ -24,6 +25,7 @@ struct motion_plan {
 struct motion_row {
     struct motion_setting setting;
     double dt;
+    int substep_place; /* in the plan's list */
     struct track track; /* for the errors */
     struct motion_error total, solver, step; /* to the reference; to many iterations of the same step; of those to the
                                                 reference */
@@ -41,7 +43,8 @@ struct motion_study {
     const struct motion_plan *plan;
     struct motion_row rows[MOST_ROWS];
     int row_count;
-    struct track starts, reference, coarser, solved[MOST_HALVINGS + 1]; /* coarser: twice the reference's step */
+    struct track starts, reference, coarser; /* coarser: twice the reference's step */
+    struct track solved[MOST_HALVINGS + 1][BENCH_LIST]; /* by halvings, and place in the list of sub-steps */
     struct motion_error floor; /* of coarser to reference */
     bool has_errors;
 };

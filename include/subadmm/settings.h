@@ -43,17 +43,27 @@ typedef struct sadmm_backend_info {
  * Errors: INVALID_ARGUMENT. Thread-safe. */
 SADMM_API sadmm_status sadmm_backend_query(sadmm_backend backend, sadmm_backend_info *info);
 
+/* The largest sadmm_settings.substeps. */
+enum { SADMM_MOST_SUBSTEPS = 64 };
+
 /* Settings of a solve. Start from sadmm_settings_default(); a struct is validated when it is handed over.
  * Symbols are the paper's (Sec. III-D). "kg/s^2" values are the paper's time-scaled units; the solver works
  * in impulses and converts (beta_impulse = dt^2 beta_paper, docs/algorithm.md). */
 typedef struct sadmm_settings {
     double dt;                   /* time step, s, in [1e-6, 1]; default 0.005. It may change from step to step */
+    int substeps;                /* of a world's step, in [1, SADMM_MOST_SUBSTEPS], dt / substeps >= 1e-6 s; default 1. A
+                                    step is made of so many sub-steps of dt / substeps with a share of `iterations`
+                                    each; what overlaps of bodies in motion come from shrinks with them (docs/motion.md).
+                                    Pairs of shapes that may touch are found once a step, all else in every sub-step.
+                                    States are those of `substeps` steps of dt / substeps, for less; wrenches set from
+                                    outside act through all of them. Problems have none */
     double gravity[3];           /* m/s^2, world frame, finite, norm <= 1e6; default (0, 0, -9.81) */
 
     sadmm_method method;         /* default SADMM_METHOD_FAST: the same solutions in fewer iterations that cost the same
                                     (docs/convergence.md). PAPER is the paper's own iteration, to compare with; it needs
                                     more iterations, below, and takes the penalty_* settings */
-    int iterations;              /* iterations a step, in [1, 1000000]; default 20: enough for FAST in a world, where a
+    int iterations;              /* iterations a step, in [1, 1000000]; sub-steps do iterations / substeps each, rounded
+                                    up; default 20: enough for FAST in a world, where a
                                     step goes on from the one before. Bodies that meet in many places at once need more
                                     (the step report's `limited` says so), and so does a problem that is solved once:
                                     some 100 to 1000, or a tolerance below with a large number here.
@@ -81,10 +91,10 @@ typedef struct sadmm_settings {
     int check_period; /* iterations between convergence checks (of the tolerances above), in [1, 1000000]; default 10 */
 
     bool measure_residuals;      /* report the residuals of the last iteration; default false */
-    bool certify;                /* report the certificate of every step; default false */
+    bool certify;                /* report the certificate of every step (of its last sub-step); default false */
     bool recover_wrenches;       /* compute the contact wrench of every body; default true */
 
-    double baumgarte;            /* share of penetration beyond the slop removed a step, in [0, 1]; default 0.2 */
+    double baumgarte;            /* share of penetration beyond the slop removed a (sub-)step, in [0, 1]; default 0.2 */
     double slop;                 /* penetration left alone, m, in [0, 1]; default 1e-5 */
     double correction_speed;     /* cap of the corrective normal speed, m/s, in [0, 1e3]; default 1 */
     double restitution_threshold;/* approach speed under which restitution is ignored, m/s, >= 0; default 0.1 */

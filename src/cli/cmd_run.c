@@ -14,10 +14,9 @@
 #include "run_trace.h"
 
 enum {
-    OPTION_BACKEND, OPTION_DEVICE, OPTION_PRECISION, OPTION_STEPS, OPTION_DT, OPTION_METHOD, OPTION_ITERATIONS,
-    OPTION_TOLERANCE, OPTION_CHECK_PERIOD, OPTION_PENALTY_PERIOD, OPTION_THREADS, OPTION_NO_WARM_START, OPTION_CERTIFY,
-    OPTION_EXPLAIN, OPTION_JSON, OPTION_TRACE, OPTION_DUMP,
-    OPTION_QUIET
+    OPTION_BACKEND, OPTION_DEVICE, OPTION_PRECISION, OPTION_STEPS, OPTION_DT, OPTION_SUBSTEPS, OPTION_METHOD,
+    OPTION_ITERATIONS, OPTION_TOLERANCE, OPTION_CHECK_PERIOD, OPTION_PENALTY_PERIOD, OPTION_THREADS,
+    OPTION_NO_WARM_START, OPTION_CERTIFY, OPTION_EXPLAIN, OPTION_JSON, OPTION_TRACE, OPTION_DUMP, OPTION_QUIET
 };
 
 static const struct cli_option options[] = {
@@ -26,6 +25,7 @@ static const struct cli_option options[] = {
     [OPTION_PRECISION] = {"precision", "P", "f32 or f64 (default the scene's)"},
     [OPTION_STEPS] = {"steps", "N", "number of steps (default the scene's duration / dt)"},
     [OPTION_DT] = {"dt", "S", "time step, s (default the scene's)"},
+    [OPTION_SUBSTEPS] = {"substeps", "N", "sub-steps of a step, which share its iterations (default the scene's)"},
     [OPTION_METHOD] = {"method", "NAME", "paper or fast (default fast)"},
     [OPTION_ITERATIONS] = {"iterations", "N", "iterations a step (default the scene's for the method)"},
     [OPTION_TOLERANCE] = {"tolerance", "T",
@@ -39,7 +39,7 @@ static const struct cli_option options[] = {
     [OPTION_JSON] = {"json", "[FILE|-]", "write JSON to FILE, or to standard output (-, the default)"},
     [OPTION_TRACE] = {"trace", "FILE", "write every body's state after every step as CSV (-: to standard output)"},
     [OPTION_DUMP] = {"dump-problem", "STEP:FILE",
-                     "write the contact problem of a step (1: the first) as FCLIB HDF5; up to 16"},
+                     "write the contact problem of a step (1: the first), of its last sub-step, as FCLIB HDF5; up to 16"},
     [OPTION_QUIET] = {"quiet", NULL, "no progress, no table"},
 };
 
@@ -56,7 +56,7 @@ struct run_options {
     sadmm_precision precision;
     sadmm_method method;
     long steps, iterations, penalty_period, threads; /* -1: the scene's */
-    long check_period;                               /* 0: the scene's */
+    long check_period, substeps;                     /* 0: the scene's */
     double dt, tolerance;                            /* 0: the scene's */
     long device;
     bool no_warm_start, certify, explain, quiet, precision_given, method_given;
@@ -98,6 +98,7 @@ static int set_option(void *target, size_t index, const char *value)
         break;
     case OPTION_STEPS: ok = cli_read_int("--steps", value, 0, 1000000000, &o->steps); break;
     case OPTION_DT: ok = cli_read_real("--dt", value, 1e-6, 1, &o->dt); break;
+    case OPTION_SUBSTEPS: ok = cli_read_int("--substeps", value, 1, SADMM_MOST_SUBSTEPS, &o->substeps); break;
     case OPTION_METHOD:
         ok = cli_read_method("--method", value, &o->method);
         o->method_given = true;
@@ -125,6 +126,7 @@ static void apply(const struct run_options *o, struct sadmm_scene *scene)
     scene->def.device = (int)o->device;
     if (o->precision_given) scene->def.precision = o->precision;
     if (o->dt > 0) s->dt = o->dt;
+    if (o->substeps > 0) s->substeps = (int)o->substeps;
     if (o->method_given) sadmm_scene_set_method(scene, o->method);
     if (o->iterations >= 0) s->iterations = (int)o->iterations;
     if (o->tolerance > 0) s->certificate_tolerance = o->tolerance;

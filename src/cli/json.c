@@ -58,6 +58,7 @@ json_t *cli_json_settings(const sadmm_settings *s)
 {
     json_t *o = json_object();
     json_object_set_new(o, "dt", cli_json_real(s->dt));
+    json_object_set_new(o, "substeps", json_integer(s->substeps));
     json_object_set_new(o, "gravity", cli_json_reals(s->gravity, 3));
     json_object_set_new(o, "method", json_string(cli_method_name(s->method)));
     json_object_set_new(o, "iterations", json_integer(s->iterations));

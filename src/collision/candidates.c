@@ -15,7 +15,8 @@ enum {
 };
 
 /* The larger box: this share of the shape's radius on every side, and the way it goes in some steps, up to its radius.
- * Larger: fewer updates, more pairs to test. */
+ * Larger: fewer updates, more pairs to test. A first sub-step renews it where the shape is about to leave it within the
+ * step, so that the broad phase runs once a step unless velocities change much in it. */
 #define ENLARGED_BY 0.1
 #define STEPS_AHEAD 4
 /* Ask the broad phase for single shapes up to one in so many: a query costs as much as some ten of a sweep over all. */
@@ -66,11 +67,36 @@ static bool contains(const struct sadmm_box3 *outer, const struct sadmm_box3 *in
     return true;
 }
 
-static void enlarge(const struct sadmm_box3 *box, const struct sadmm_proxy *p, double dt, struct sadmm_box3 *larger)
+/* Where will the shape be in its last sub-step? */
+static void move_on(const struct sadmm_box3 *box, const struct sadmm_proxy *p,
+                    const struct sadmm_collision_input *input, struct sadmm_box3 *last)
+{
+    for (int k = 0; k < 3; ++k) {
+        const double way = input->substeps_left * (input->dt * p->velocity[k]);
+        last->lo[k] = box->lo[k] + way;
+        last->hi[k] = box->hi[k] + way;
+    }
+}
+
+/* Is the list of pairs good for the shape, and will it be in the sub-steps to come? */
+static bool stays(const struct sadmm_broad_entry *entry, const struct sadmm_box3 *box, const struct sadmm_proxy *p,
+                  const struct sadmm_collision_input *input)
+{
+    struct sadmm_box3 last;
+    if (!contains(&entry->box, box)) return false;
+    if (input->substeps_left == 0) return true;
+    move_on(box, p, input, &last);
+    return contains(&entry->box, &last);
+}
+
+static void enlarge(const struct sadmm_box3 *box, const struct sadmm_proxy *p,
+                    const struct sadmm_collision_input *input, struct sadmm_box3 *larger)
 {
     double radius = p->system_body >= 0 ? geometry_radius(&p->geometry) : 0;
     for (int k = 0; k < 3; ++k) {
-        double way = fmin(fmax(STEPS_AHEAD * dt * p->velocity[k], -radius), radius);
+        const double dt = input->dt * (1 + input->substeps_left),
+                     most = fmax(radius, fabs(input->substeps_left * (input->dt * p->velocity[k])));
+        double way = fmin(fmax(STEPS_AHEAD * dt * p->velocity[k], -most), most);
         larger->lo[k] = box->lo[k] - ENLARGED_BY * radius + fmin(way, 0.0);
         larger->hi[k] = box->hi[k] + ENLARGED_BY * radius + fmax(way, 0.0);
     }
@@ -120,7 +146,9 @@ static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision
     kind = plane ? SLOT_PRESENT | SLOT_PLANE : SLOT_PRESENT;
     proxy_place(shape, geometry, body, input->dt, input->margin, input->gravity, &c->proxies[slot], &c->boxes[slot]);
     c->state[slot] = kind;
-    if (same && (plane ? plane_stays(entry, &c->proxies[slot]) : contains(&entry->box, &c->boxes[slot]))) return;
+    if (same && (plane ? plane_stays(entry, &c->proxies[slot])
+                       : stays(entry, &c->boxes[slot], &c->proxies[slot], input)))
+        return;
     c->state[slot] = (unsigned char)(kind | SLOT_LEFT);
     *seen = now;
     entry->present = !plane;
@@ -132,7 +160,7 @@ static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision
             entry->box.hi[k] = c->proxies[slot].R[3 * k + 2];
         }
     } else {
-        enlarge(&c->boxes[slot], &c->proxies[slot], input->dt, &entry->box);
+        enlarge(&c->boxes[slot], &c->proxies[slot], input, &entry->box);
     }
 }
 

@@ -55,6 +55,7 @@ void sadmm_collision_destroy(struct sadmm_collision *collision)
     if (!collision) return;
     sadmm_candidates_free(&collision->candidates);
     sadmm_contact_set_free(&collision->spare);
+    sadmm_contact_set_free(&collision->between);
     for (size_t i = 0; i < collision->part_count; ++i) sadmm_contact_set_free(&collision->parts[i]);
     sadmm_free(collision->parts);
     sadmm_free(collision);
@@ -131,13 +132,14 @@ struct finding {
     struct sadmm_collision *collision;
     const struct sadmm_collision_input *input;
     const struct sadmm_contact_set *old;
+    struct sadmm_contact_set *out; /* of the first thread */
     atomic_bool failed;
 };
 
 static void find_share(void *argument, int thread, int threads)
 {
     struct finding *f = (struct finding *)argument;
-    struct sadmm_contact_set *out = thread == 0 ? &f->collision->spare : &f->collision->parts[thread - 1];
+    struct sadmm_contact_set *out = thread == 0 ? f->out : &f->collision->parts[thread - 1];
     size_t begin, end;
     sadmm_share(f->collision->candidates.list.count, thread, threads, &begin, &end);
     out->pair_count = out->point_count = 0;
@@ -146,47 +148,62 @@ static void find_share(void *argument, int thread, int threads)
 }
 
 static bool find_in_threads(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
-                            const struct sadmm_contact_set *old, int threads)
+                            const struct sadmm_contact_set *old, struct sadmm_contact_set *out, int threads)
 {
-    struct finding finding = {.collision = collision, .input = input, .old = old};
+    struct finding finding = {.collision = collision, .input = input, .old = old, .out = out};
     const int ran = sadmm_parallel(input->team, threads, find_share, &finding);
-    collision->spare.dt = input->dt;
-    return !atomic_load(&finding.failed) &&
-           append_parts(&collision->spare, input->team, collision->parts, (size_t)ran - 1);
+    out->dt = input->dt;
+    return !atomic_load(&finding.failed) && append_parts(out, input->team, collision->parts, (size_t)ran - 1);
 }
 
-sadmm_status sadmm_collision_find(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
-                                  struct sadmm_contact_set *contacts, struct sadmm_error *error)
+static void exchange(struct sadmm_contact_set *a, struct sadmm_contact_set *b)
 {
-    struct sadmm_contact_set swap;
+    const struct sadmm_contact_set swap = *a;
+    *a = *b;
+    *b = swap;
+}
+
+/* The new set into `out`, which then takes the place of `contacts`. */
+static sadmm_status find_into(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
+                              struct sadmm_contact_set *out, struct sadmm_contact_set *contacts,
+                              struct sadmm_error *error)
+{
     sadmm_status status;
     int threads;
 
-    collision->can_undo = false;
     status = sadmm_candidates_update(&collision->candidates, input, thread_count(input, input->shape_count), error);
     if (status != SADMM_OK) return status;
     if (collision->candidates.list.count > INT32_MAX / SADMM_MAX_POINTS)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%zu pairs of shapes may touch: at most %d can be indexed",
                           collision->candidates.list.count, (int)(INT32_MAX / SADMM_MAX_POINTS));
     threads = thread_count(input, collision->candidates.list.count);
-    if (!reserve_parts(collision, (size_t)threads - 1) || !find_in_threads(collision, input, contacts, threads))
+    if (!reserve_parts(collision, (size_t)threads - 1) || !find_in_threads(collision, input, contacts, out, threads))
         return sadmm_fail_memory(error, "contacts");
-    if (collision->spare.point_count > INT32_MAX)
+    if (out->point_count > INT32_MAX)
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%zu contact points: at most %d can be indexed",
-                          collision->spare.point_count, (int)INT32_MAX);
-    swap = *contacts;
-    *contacts = collision->spare;
-    collision->spare = swap;
+                          out->point_count, (int)INT32_MAX);
+    exchange(contacts, out);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_collision_find(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
+                                  struct sadmm_contact_set *contacts, struct sadmm_error *error)
+{
+    collision->can_undo = false;
+    TRY(find_into(collision, input, &collision->spare, contacts, error));
     collision->can_undo = true;
     return SADMM_OK;
 }
 
+sadmm_status sadmm_collision_find_again(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
+                                        struct sadmm_contact_set *contacts, struct sadmm_error *error)
+{
+    return find_into(collision, input, &collision->between, contacts, error);
+}
+
 void sadmm_collision_undo(struct sadmm_collision *collision, struct sadmm_contact_set *contacts)
 {
-    struct sadmm_contact_set swap;
     if (!collision->can_undo) return;
     collision->can_undo = false;
-    swap = *contacts;
-    *contacts = collision->spare;
-    collision->spare = swap;
+    exchange(contacts, &collision->spare);
 }

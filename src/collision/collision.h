@@ -60,7 +60,8 @@ struct sadmm_collision_input {
     size_t geometry_count;
     const struct sadmm_collision_body *bodies; /* by world body slot */
     size_t body_count;
-    double dt;
+    double dt;                        /* of what contacts are found for: the step, or the sub-step */
+    int substeps_left;                /* so many more finds follow within the step: the list of pairs should last */
     double margin;                    /* share of the thinner shape's smallest extent (world def contact_margin) */
     int threads;                      /* at most; less than 1 counts as 1 */
     struct sadmm_team *team;          /* whose threads (parallel.h); NULL: OpenMP's */
@@ -83,6 +84,11 @@ void sadmm_collision_destroy(struct sadmm_collision *collision);
  * pair or feature start with impulse 0); on success it holds the new one. On failure it is unchanged. */
 sadmm_status sadmm_collision_find(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
                                   struct sadmm_contact_set *contacts, struct sadmm_error *error);
+
+/* The same for a later sub-step of the step that the last sadmm_collision_find was for: what an undo puts back stays
+ * the set from before the step. */
+sadmm_status sadmm_collision_find_again(struct sadmm_collision *collision, const struct sadmm_collision_input *input,
+                                        struct sadmm_contact_set *contacts, struct sadmm_error *error);
 
 /* Put back the set that the last successful sadmm_collision_find replaced, impulses and caches included (the pipeline
  * keeps it until the next find), so that a step that fails later leaves no trace. Does nothing when the last find

@@ -6,10 +6,11 @@
 
 struct sadmm_collision {
     struct sadmm_candidates candidates;
-    /* The set before the last find, to undo it; the next find writes here. */
-    struct sadmm_contact_set spare;
+    /* The set before the last find, to undo it; the next find writes here. Finds again write to `between`, from the
+     * set that they replace. */
+    struct sadmm_contact_set spare, between;
     bool can_undo;
-    /* One a thread beyond the first; its first thread writes to `spare`. */
+    /* One a thread beyond the first; its first thread writes to the new set itself. */
     struct sadmm_contact_set *parts;
     size_t part_count, part_capacity;
 };

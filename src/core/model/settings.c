@@ -7,6 +7,7 @@ sadmm_settings sadmm_settings_default(void)
 {
     sadmm_settings s = {
         .dt = 0.005,
+        .substeps = 1,
         .gravity = {0, 0, -9.81},
         .method = SADMM_METHOD_FAST,
         .iterations = 20,
@@ -57,6 +58,7 @@ sadmm_status sadmm_settings_validate(const struct sadmm_settings *s, struct sadm
         const char *name;
         int value, lo, hi;
     } integers[] = {
+        {"substeps", s->substeps, 1, SADMM_MOST_SUBSTEPS},
         {"iterations", s->iterations, 1, 1000000},
         {"check_period", s->check_period, 1, 1000000},
         {"threads", s->threads, 0, 1024},
@@ -83,6 +85,9 @@ sadmm_status sadmm_settings_validate(const struct sadmm_settings *s, struct sadm
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.%s = %g: must be finite and >= 0",
                               nonnegative[i].name, nonnegative[i].value);
 
+    if (s->dt < 1e-6 * s->substeps)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "settings.dt / settings.substeps = %g / %d: must be >= 1e-06", s->dt, s->substeps);
     if ((int)s->method < 0 || s->method >= SADMM_METHOD_COUNT)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "settings.method = %d: must be in [0, %d]",
                           (int)s->method, SADMM_METHOD_COUNT - 1);
@@ -112,11 +117,20 @@ sadmm_status sadmm_settings_validate(const struct sadmm_settings *s, struct sadm
     return SADMM_OK;
 }
 
+sadmm_settings sadmm_settings_of_substep(const sadmm_settings *whole)
+{
+    sadmm_settings s = *whole;
+    if (s.substeps == 1) return s;
+    s.dt = whole->dt / whole->substeps;
+    s.iterations = whole->iterations / whole->substeps + (whole->iterations % whole->substeps > 0);
+    return s;
+}
+
 /* ---- equality ------------------------------------------------------------------------------------------------- */
 
 /* Every member, and which of them are arrays of three. */
 #define MEMBERS(ONE, THREE)                                                                                      \
-    ONE(dt) THREE(gravity)                                                                                       \
+    ONE(dt) ONE(substeps) THREE(gravity)                                                                         \
     ONE(method) ONE(iterations) ONE(relaxation) ONE(penalty_period) ONE(penalty_mass_factor) ONE(penalty_offset) \
     ONE(penalty_ratio_limit) ONE(penalty_update_warm) ONE(warm_start)                                            \
     ONE(residual_tolerance) ONE(certificate_tolerance) ONE(certificate_momentum_tolerance) ONE(check_period)     \

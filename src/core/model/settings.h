@@ -14,6 +14,10 @@ extern "C" {
 /* INVALID_ARGUMENT with the first field out of range, its value and the range; NULL is refused too. */
 sadmm_status sadmm_settings_validate(const struct sadmm_settings *settings, struct sadmm_error *error);
 
+/* A sub-step's share of a step of a world: of its time and its iterations. (`substeps` still says how many there
+ * are.) */
+sadmm_settings sadmm_settings_of_substep(const struct sadmm_settings *whole);
+
 /* Are all members the same, bit for bit? Padding between them does not count. */
 bool sadmm_settings_equal(const struct sadmm_settings *a, const struct sadmm_settings *b);
 /* Settings are of two kinds. Numbers are what formulas read: they may change from step to step, and a backend keeps

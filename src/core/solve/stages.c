@@ -15,6 +15,11 @@ int sadmm_stages_budget(const struct sadmm_plan *plan, const struct sadmm_settin
     return sadmm_plan_is_constrained(plan) ? settings->iterations : 1;
 }
 
+bool sadmm_stages_in_last_substep(const struct sadmm_stages *s)
+{
+    return !s->world || s->substep + 1 >= s->settings->substeps;
+}
+
 /* Iterations until the next multiple of `period` after `done`, at most `limit`. */
 static int until(int done, int period, int limit)
 {
@@ -65,6 +70,7 @@ static bool is_needed(const struct sadmm_stages *s, enum sadmm_stage_kind kind)
     case SADMM_STAGE_PLAN:
     case SADMM_STAGE_INTEGRATE:
     case SADMM_STAGE_COMMIT: return s->world;
+    case SADMM_STAGE_TURN: return !sadmm_stages_in_last_substep(s);
     case SADMM_STAGE_WRENCHES: return s->world && plan->wrenches;
     case SADMM_STAGE_CERTIFY: return s->world && plan->certificate;
     case SADMM_STAGE_PREDICT: return plan->predict;
@@ -81,11 +87,20 @@ static bool is_needed(const struct sadmm_stages *s, enum sadmm_stage_kind kind)
 
 enum sadmm_phase sadmm_stage_phase(enum sadmm_stage_kind kind)
 {
-    if (kind <= SADMM_STAGE_FIND) return SADMM_PHASE_COLLIDE;
+    if (kind <= SADMM_STAGE_FIND || kind == SADMM_STAGE_TURN) return SADMM_PHASE_COLLIDE;
     if (kind == SADMM_STAGE_PLAN || kind == SADMM_STAGE_COMMIT) return SADMM_PHASE_OTHER;
     if (kind <= SADMM_STAGE_PENALTY) return SADMM_PHASE_ASSEMBLE;
     if (kind <= SADMM_STAGE_SOLUTION) return SADMM_PHASE_SOLVE;
     return kind == SADMM_STAGE_CERTIFY ? SADMM_PHASE_CERTIFY : SADMM_PHASE_FINISH;
+}
+
+static void begin_substep(struct sadmm_stages *s)
+{
+    const struct sadmm_stages begun = sadmm_stages_of(s->plan, s->settings, s->world);
+    const int substep = s->substep + 1;
+    *s = begun;
+    s->substep = substep;
+    s->next = SADMM_STAGE_FIND;
 }
 
 bool sadmm_stages_next(struct sadmm_stages *s, struct sadmm_stage *stage)
@@ -95,6 +110,7 @@ bool sadmm_stages_next(struct sadmm_stages *s, struct sadmm_stage *stage)
         const int count = kind == SADMM_STAGE_ITERATE ? begin_batch(s) : 0;
         if (kind == SADMM_STAGE_BALANCE && !s->batch.last && !s->stopped) s->next = SADMM_STAGE_ITERATE;
         if (!is_needed(s, kind)) continue;
+        if (kind == SADMM_STAGE_TURN) begin_substep(s);
         stage->kind = kind;
         stage->count = count;
         stage->measure = s->batch.measure;

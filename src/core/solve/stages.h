@@ -1,6 +1,7 @@
 /* The schedule of a step: the paper's Fig. 4 as a list of stages, in order. It exists once.
  *
- *     step = GATHER FIND PLAN  solve  INTEGRATE WRENCHES CERTIFY COMMIT     (world level)
+ *     step = GATHER  sub-step { TURN sub-step } *  CERTIFY COMMIT           (world level)
+ *     sub-step = FIND PLAN  solve  INTEGRATE WRENCHES
  *     solve = PREDICT BODIES CONTACTS ROWS PENALTY  iterations  LIMIT SOLUTION
  *     iterations = { ITERATE RESIDUALS CHECK REWEIGH BALANCE } until the budget is spent or a check is met
  *
@@ -35,6 +36,7 @@ enum sadmm_stage_kind {
     SADMM_STAGE_SOLUTION,  /* -    velocities and multipliers to where the caller reads them */
     SADMM_STAGE_INTEGRATE, /* Q    states after dt */
     SADMM_STAGE_WRENCHES,  /* R    eq. (12) */
+    SADMM_STAGE_TURN,      /* -    the next sub-step starts from where this one has ended */
     SADMM_STAGE_CERTIFY,   /* -    the true error, from the raw data */
     SADMM_STAGE_COMMIT,    /* -    the step is made; nothing before changes the world */
     SADMM_STAGE_COUNT
@@ -52,9 +54,10 @@ struct sadmm_stage {
 /* Where in the list an executor is. */
 struct sadmm_stages {
     const struct sadmm_plan *plan;         /* read after PLAN */
-    const struct sadmm_settings *settings;
+    const struct sadmm_settings *settings; /* of a sub-step */
     bool world;                            /* a step; else a solve alone */
     bool stopped;                          /* set by the executor: a check was met */
+    int substep;                           /* from 0; after TURN: of the one that comes */
     int next;                              /* enum sadmm_stage_kind */
     struct {                               /* the iterations up to the next stage that needs their result */
         int done;
@@ -63,6 +66,9 @@ struct sadmm_stages {
 };
 
 struct sadmm_stages sadmm_stages_of(const struct sadmm_plan *plan, const struct sadmm_settings *settings, bool world);
+
+/* Is this the sub-step that ends the step? */
+bool sadmm_stages_in_last_substep(const struct sadmm_stages *stages);
 
 /* The next stage; false: there is none. */
 bool sadmm_stages_next(struct sadmm_stages *stages, struct sadmm_stage *stage);

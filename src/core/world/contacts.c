@@ -46,7 +46,7 @@ static size_t pair_of(const struct sadmm_contact_set *contacts, int32_t point)
 }
 
 static void read_contact(const sadmm_world *world, const struct sadmm_contact_pair *pair, int32_t index,
-                         sadmm_contact *out)
+                         double dt, sadmm_contact *out)
 {
     const struct sadmm_contact_point *point = &world->contacts.points[index];
     int32_t body = pair->body_b >= 0 ? pair->body_b : pair->body_a;
@@ -59,7 +59,7 @@ static void read_contact(const sadmm_world *world, const struct sadmm_contact_pa
         out->position[k] = world->start.rigid[body].position[k] + arm[k];
         out->normal[k] = pair->normal[k];
         out->impulse[k] = point->impulse[k];
-        out->force[k] = point->impulse[k] / world->step_settings.dt;
+        out->force[k] = point->impulse[k] / dt;
     }
     out->gap = point->gap;
     out->friction = pair->friction;
@@ -79,10 +79,11 @@ sadmm_status sadmm_world_contacts(sadmm_world *world, int32_t first, int32_t cou
     if (count == 0) return SADMM_OK;
     TRY(sadmm_check_given(contacts, "contacts", error));
     TRY(sadmm_world_pull_contacts(world));
+    const double dt = sadmm_settings_of_substep(&world->step_settings).dt;
     size_t p = pair_of(&world->contacts, first);
     for (int32_t k = first; k < first + count; ++k) {
         while (k >= world->contacts.pairs[p].first + world->contacts.pairs[p].count) ++p;
-        read_contact(world, &world->contacts.pairs[p], k, &contacts[k - first]);
+        read_contact(world, &world->contacts.pairs[p], k, dt, &contacts[k - first]);
     }
     return SADMM_OK;
 }
@@ -91,9 +92,10 @@ static sadmm_status freeze(const sadmm_world *world, sadmm_problem *problem, dou
                            sadmm_problem_contact *contacts)
 {
     size_t n = (size_t)world->plan.bodies;
+    const sadmm_settings settings = sadmm_settings_of_substep(&world->step_settings);
     struct sadmm_system system = {.body_count = world->plan.bodies, .rigid = world->start.rigid};
     for (size_t i = 0; i < n; ++i) {
-        sadmm_system_body(&system, &world->step_settings, (int32_t)i, A + 36 * i, b + 6 * i);
+        sadmm_system_body(&system, &settings, (int32_t)i, A + 36 * i, b + 6 * i);
         memcpy(v + 6 * i, world->start.velocity + 6 * i, 6 * sizeof *v);
     }
     for (size_t p = 0; p < world->contacts.pair_count; ++p) {
@@ -106,7 +108,7 @@ static sadmm_status freeze(const sadmm_world *world, sadmm_problem *problem, dou
             memcpy(contact->normal, pair->normal, sizeof contact->normal);
             memcpy(contact->arm_a, point->arm_a, sizeof contact->arm_a);
             memcpy(contact->arm_b, point->arm_b, sizeof contact->arm_b);
-            contact->error = sadmm_contact_e(&system, &world->step_settings, pair, point);
+            contact->error = sadmm_contact_e(&system, &settings, pair, point);
             contact->friction = pair->friction;
         }
     }

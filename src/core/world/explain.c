@@ -67,6 +67,7 @@ size_t sadmm_world_explain(sadmm_world *world, char *out, size_t size)
     if (out && size > 0) out[0] = 0;
     if (!world) return 0;
     const struct sadmm_plan *plan = &world->plan;
+    const sadmm_settings settings = sadmm_settings_of_substep(&world->step_settings);
     line(&t, "backend      %s\n", world->why[0] ? world->why : "chosen at the first step");
     sadmm_world_settle_quietly(world);
     if (!world->stepped) return t.length;
@@ -76,10 +77,13 @@ size_t sadmm_world_explain(sadmm_world *world, char *out, size_t size)
         line(&t, "world        kept by the backend: contacts are found there, the host reads on demand\n");
     else line(&t, "broad phase  %s\n", sadmm_collision_broad_phase_name());
     line(&t, "bodies       %d dynamic (static ones take no part in the solve)\n", plan->bodies);
+    if (settings.substeps > 1)
+        line(&t, "sub-steps    %d of %g s with up to %d iterations each; what follows is the last one's\n",
+             settings.substeps, settings.dt, settings.iterations);
     explain_constraints(&t, plan);
-    explain_options(&t, plan, &world->step_settings);
-    line(&t, "iterations   %d of at most %d%s\n", world->report.iterations, world->step_settings.iterations,
-         world->report.iterations == 1 && !plan->points ? ": without constraints Step 1 is exact" : "");
+    explain_options(&t, plan, &settings);
+    line(&t, "iterations   %d of at most %d%s\n", world->report.iterations, settings.iterations * settings.substeps,
+         world->report.iterations == settings.substeps && !plan->points ? ": without constraints Step 1 is exact" : "");
     if (world->report.converged || world->report.iterations_mean != world->report.iterations)
         line(&t, "stopped      by the stop rule%s, after %.1f iterations in the mean of islands\n",
              world->report.converged ? "" : " in part", world->report.iterations_mean);

@@ -17,29 +17,44 @@ static int32_t count_moving(const sadmm_world *world, size_t begin, size_t end)
     return count;
 }
 
+/* A body as collision sees it. */
+static void place(struct sadmm_collision_body *out, const struct sadmm_rigid *rigid, bool dynamic)
+{
+    memcpy(out->position, rigid->position, sizeof out->position);
+    memcpy(out->orientation, rigid->orientation, sizeof out->orientation);
+    memcpy(out->velocity, rigid->velocity, sizeof out->velocity);
+    out->acceleration[0] = out->acceleration[1] = 0;
+    if (!dynamic) return;
+    out->acceleration[0] = rigid_acceleration(rigid->mass, v3_load(rigid->wrench));
+    out->acceleration[1] = rigid_angular_acceleration(q_load(rigid->orientation), v3_load(rigid->inertia),
+                                                      v3_load(rigid->wrench + 3));
+}
+
+/* Where the solve for a dynamic body starts. dt: of the sub-step. */
+static void start_body(sadmm_world *world, int32_t i, const struct sadmm_rigid *rigid,
+                       const struct sadmm_steady *steady, double dt)
+{
+    double *velocity = world->velocity + 6 * (size_t)i;
+    world->start.rigid[i] = *rigid;
+    steady_start(rigid, steady, dt, velocity);
+    memcpy(world->start.velocity + 6 * (size_t)i, velocity, 6 * sizeof *velocity);
+}
+
 /* Slots [begin, end), whose dynamic bodies are `dynamic` and the following. */
 static void gather_slots(sadmm_world *world, size_t begin, size_t end, int32_t dynamic)
 {
+    const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings);
     for (size_t slot = begin; slot < end; ++slot) {
         struct sadmm_world_body *body = &world->bodies[slot];
         struct sadmm_collision_body *out = &world->collision_bodies[slot];
-        memcpy(out->position, body->rigid.position, sizeof out->position);
-        memcpy(out->orientation, body->rigid.orientation, sizeof out->orientation);
-        memcpy(out->velocity, body->rigid.velocity, sizeof out->velocity);
-        out->acceleration[0] = out->acceleration[1] = 0;
         out->placed = body->steady.placed;
         out->environment = body->environment;
         out->system_body = body->system_body = -1;
+        place(out, &body->rigid, moves(body));
         if (!moves(body)) continue;
-        const struct sadmm_rigid *rigid = &body->rigid;
-        out->acceleration[0] = rigid_acceleration(rigid->mass, v3_load(rigid->wrench));
-        out->acceleration[1] = rigid_angular_acceleration(q_load(rigid->orientation), v3_load(rigid->inertia),
-                                                          v3_load(rigid->wrench + 3));
         out->system_body = body->system_body = dynamic;
-        world->start.rigid[dynamic] = body->rigid;
-        steady_start(&body->rigid, &body->steady, world->def.settings.dt, world->velocity + 6 * (size_t)dynamic);
-        memcpy(world->start.velocity + 6 * (size_t)dynamic, world->velocity + 6 * (size_t)dynamic,
-               6 * sizeof *world->velocity);
+        start_body(world, dynamic, &body->rigid, &body->steady, settings.dt);
+        if (settings.substeps > 1) world->steady[dynamic] = body->steady;
         world->slot_of[dynamic++] = (int32_t)slot;
     }
 }
@@ -71,6 +86,7 @@ sadmm_status sadmm_world_gather(sadmm_world *world)
 {
     /* One at least: a system without bodies is still one of rigid bodies. */
     size_t n = (size_t)world->dynamic_count + 1, slots = world->body_slots;
+    const size_t several = world->def.settings.substeps > 1 ? n : 0;
     if (!sadmm_grow_empty(&world->collision_bodies, &world->collision_body_capacity, slots,
                           sizeof *world->collision_bodies) ||
         !sadmm_grow_empty(&world->start.rigid, &world->start.rigid_capacity, n, sizeof *world->start.rigid) ||
@@ -79,6 +95,8 @@ sadmm_status sadmm_world_gather(sadmm_world *world)
         !sadmm_grow_empty(&world->wrench, &world->wrench_capacity, 6 * n, sizeof *world->wrench) ||
         !sadmm_grow_empty(&world->start.velocity, &world->start.velocity_capacity, 6 * n,
                           sizeof *world->start.velocity) ||
+        !sadmm_grow_empty(&world->steady, &world->steady_capacity, several, sizeof *world->steady) ||
+        !sadmm_grow_empty(&world->wrench_sum, &world->wrench_sum_capacity, 6 * several, sizeof *world->wrench_sum) ||
         !sadmm_grow_empty(&world->slot_of, &world->slot_of_capacity, n, sizeof *world->slot_of))
         return sadmm_fail_memory(&world->error, "the step");
     struct gathering g;
@@ -88,6 +106,36 @@ sadmm_status sadmm_world_gather(sadmm_world *world)
     return SADMM_OK;
 }
 
+struct turning {
+    sadmm_world *world;
+    int substep;
+};
+
+static void turn_share(void *argument, int thread, int threads)
+{
+    const struct turning *turning = (const struct turning *)argument;
+    sadmm_world *world = turning->world;
+    const double dt = sadmm_settings_of_substep(&world->def.settings).dt;
+    size_t begin, end;
+    sadmm_share((size_t)world->dynamic_count, thread, threads, &begin, &end);
+    for (size_t i = begin; i < end; ++i) {
+        const struct sadmm_rigid *next = &world->next[i];
+        steady_keep(&world->steady[i], &world->start.rigid[i], next, dt);
+        start_body(world, (int32_t)i, next, &world->steady[i], dt);
+        place(&world->collision_bodies[world->slot_of[i]], next, true);
+    }
+    if (!world->plan.wrenches) return;
+    for (size_t k = 6 * begin; k < 6 * end; ++k)
+        world->wrench_sum[k] = (turning->substep > 0 ? world->wrench_sum[k] : 0) + world->wrench[k];
+}
+
+void sadmm_world_turn(sadmm_world *world, int substep)
+{
+    struct turning turning = {world, substep};
+    sadmm_parallel(&world->team, sadmm_pass_threads(world->plan.threads, (size_t)world->dynamic_count), turn_share,
+                   &turning);
+}
+
 void sadmm_world_swap_starts(sadmm_world *world)
 {
     const struct sadmm_step_start start = world->start;
@@ -95,8 +143,9 @@ void sadmm_world_swap_starts(sadmm_world *world)
     world->last_start = start;
 }
 
-struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *world)
+struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *world, int substep)
 {
+    const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings);
     struct sadmm_collision_input input = {
         .shapes = world->shapes,
         .shape_count = world->shape_slots,
@@ -104,7 +153,8 @@ struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *worl
         .geometry_count = world->shape_slots,
         .bodies = world->collision_bodies,
         .body_count = world->body_slots,
-        .dt = world->def.settings.dt,
+        .dt = settings.dt,
+        .substeps_left = settings.substeps - 1 - substep,
         .margin = world->def.contact_margin,
         .threads = last_threads(world),
         .disabled_body_pairs = world->disabled_pairs.keys,
@@ -112,7 +162,7 @@ struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *worl
         .friction_pairs = world->friction_pairs.keys,
         .friction_values = world->friction_pairs.values,
         .friction_pair_count = world->friction_pairs.count,
-        .gravity = gravity_size(world->def.settings.gravity),
+        .gravity = gravity_size(settings.gravity),
     };
     return input;
 }

@@ -25,8 +25,9 @@ bool sadmm_world_may_reside(const sadmm_world *world)
 {
     /* Of the stop rules a backend checks the certificate's in the method FAST alone; and the loads of a first step are
      * predicted on the host. */
-    const sadmm_settings *s = &world->def.settings;
-    const bool fast = s->method == SADMM_METHOD_FAST, few_checks = (s->iterations - 1) / s->check_period < MOST_CHECKS;
+    const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings), *s = &settings;
+    const bool fast = s->method == SADMM_METHOD_FAST,
+               few_checks = (s->iterations - 1) / s->check_period < MOST_CHECKS / s->substeps;
     if (fast && !world->stepped) return false;
     return world->kernels->resident && s->residual_tolerance <= 0 &&
            (s->certificate_tolerance <= 0 || (fast && few_checks));
@@ -119,7 +120,7 @@ static sadmm_status load(sadmm_world *world)
         body->edits = 0;
         for (int kind = 0; kind < SADMM_BODY_EDITS; ++kind) body->set_at[kind] = -1;
     }
-    struct sadmm_collision_input input = sadmm_world_collision_input(world);
+    struct sadmm_collision_input input = sadmm_world_collision_input(world, 0);
     struct sadmm_resident_world whole = {
         .input = &input,
         .body_count = world->dynamic_count,
@@ -143,8 +144,9 @@ static sadmm_status certify(sadmm_world *world)
     TRY(sadmm_world_pull_bodies(world));
     TRY(sadmm_world_pull_contacts(world));
     struct sadmm_system system = sadmm_world_system(world);
+    const sadmm_settings settings = sadmm_settings_of_substep(&world->step_settings);
     double begin = sadmm_clock_ms();
-    TRY(sadmm_certify_with(&world->certificate_workspace, &system, &world->step_settings, &world->report.certificate,
+    TRY(sadmm_certify_with(&world->certificate_workspace, &system, &settings, &world->report.certificate,
                            &world->error));
     world->report.certify_ms = sadmm_clock_ms() - begin;
     return SADMM_OK;

@@ -26,11 +26,12 @@ sadmm_status sadmm_world_choose_backend(sadmm_world *world)
     return status;
 }
 
-static sadmm_status find_contacts(sadmm_world *world)
+static sadmm_status find_contacts(sadmm_world *world, int substep)
 {
-    struct sadmm_collision_input input = sadmm_world_collision_input(world);
+    struct sadmm_collision_input input = sadmm_world_collision_input(world, substep);
     input.team = &world->team;
-    return sadmm_collision_find(world->collision, &input, &world->contacts, &world->error);
+    return (substep > 0 ? sadmm_collision_find_again : sadmm_collision_find)(world->collision, &input,
+                                                                             &world->contacts, &world->error);
 }
 
 struct start_keeping {
@@ -103,13 +104,19 @@ static sadmm_status name_offending_body(sadmm_world *world)
 static void commit_share(void *argument, int thread, int threads)
 {
     sadmm_world *world = (sadmm_world *)argument;
+    const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings);
     size_t begin, end;
     sadmm_share((size_t)world->dynamic_count, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) {
         struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
-        steady_keep(&body->steady, &body->rigid, &world->next[i], world->def.settings.dt);
+        if (settings.substeps > 1) body->steady = world->steady[i];
+        steady_keep(&body->steady, &world->start.rigid[i], &world->next[i], settings.dt);
         body->rigid = world->next[i];
-        if (world->plan.wrenches) memcpy(body->contact_wrench, world->wrench + 6 * i, sizeof body->contact_wrench);
+        if (!world->plan.wrenches) continue;
+        const double *last = world->wrench + 6 * i, *before = world->wrench_sum + 6 * i;
+        if (settings.substeps == 1) memcpy(body->contact_wrench, last, sizeof body->contact_wrench);
+        else
+            for (int k = 0; k < 6; ++k) body->contact_wrench[k] = (before[k] + last[k]) / settings.substeps;
     }
 }
 
@@ -124,23 +131,44 @@ static void commit(sadmm_world *world)
 /* A step made by the host, while it is made. */
 struct host_step {
     sadmm_world *world;
+    sadmm_settings settings; /* of a sub-step */
     struct sadmm_system system;
     struct sadmm_solve solve;
     sadmm_solve_report report;
     struct sadmm_stages stages;
     bool found;   /* the contacts have been replaced */
-    double depth; /* deepest penetration, m */
+    /* Of the sub-steps made so far. */
+    double depth;          /* deepest penetration, m */
+    int iterations;        /* of all of them */
+    bool unconverged;      /* one of them has not met a stop rule */
+    int32_t limited;       /* islands, most of any */
+    int64_t islands_above; /* likewise, but of the last sub-step; -1: no stop rule */
     double ms[SADMM_PHASE_COUNT];
 };
 
 static sadmm_status make_plan(struct host_step *step)
 {
     sadmm_world *world = step->world;
+    double depth = 0;
     step->found = true;
     step->system = sadmm_world_system(world);
-    world->plan = sadmm_plan_make(&step->system, &world->def.settings);
+    step->system.first = step->system.first && step->stages.substep == 0;
+    world->plan = sadmm_plan_make(&step->system, &step->settings);
     step->report = sadmm_solve_report_empty(world->kernels);
-    return keep_start(world, &step->depth);
+    TRY(keep_start(world, &depth));
+    step->depth = depth > step->depth ? depth : step->depth;
+    return SADMM_OK;
+}
+
+/* A sub-step has been made. */
+static void add_substep(struct host_step *step)
+{
+    const sadmm_solve_report *solved = &step->report;
+    const int64_t above = solved->certificate.islands_above;
+    step->iterations += solved->iterations;
+    step->unconverged = step->unconverged || !solved->converged;
+    step->limited = solved->limited > step->limited ? solved->limited : step->limited;
+    if (!sadmm_stages_in_last_substep(&step->stages) && above > step->islands_above) step->islands_above = above;
 }
 
 static sadmm_status solve_stage(struct host_step *step, const struct sadmm_stage *stage)
@@ -149,9 +177,11 @@ static sadmm_status solve_stage(struct host_step *step, const struct sadmm_stage
     return status == SADMM_ERROR_NON_FINITE ? name_offending_body(step->world) : status;
 }
 
-static sadmm_status integrate(sadmm_world *world)
+static sadmm_status integrate(struct host_step *step)
 {
+    sadmm_world *world = step->world;
     TRY(world->kernels->integrate(world->context, world->next, &world->error));
+    add_substep(step);
     return check_next(world);
 }
 
@@ -160,12 +190,13 @@ static sadmm_status run_stage(struct host_step *step, const struct sadmm_stage *
     sadmm_world *world = step->world;
     switch (stage->kind) {
     case SADMM_STAGE_GATHER: return sadmm_world_gather(world);
-    case SADMM_STAGE_FIND: return find_contacts(world);
+    case SADMM_STAGE_FIND: return find_contacts(world, step->stages.substep);
     case SADMM_STAGE_PLAN: return make_plan(step);
-    case SADMM_STAGE_INTEGRATE: return integrate(world);
+    case SADMM_STAGE_INTEGRATE: return integrate(step);
     case SADMM_STAGE_WRENCHES: return world->kernels->recover_wrenches(world->context, world->wrench, &world->error);
+    case SADMM_STAGE_TURN: sadmm_world_turn(world, step->stages.substep - 1); return SADMM_OK;
     case SADMM_STAGE_CERTIFY:
-        return sadmm_certify_with(&world->certificate_workspace, &step->system, &world->def.settings,
+        return sadmm_certify_with(&world->certificate_workspace, &step->system, &step->settings,
                                   &step->report.certificate, &world->error);
     case SADMM_STAGE_COMMIT: commit(world); return SADMM_OK;
     default: return solve_stage(step, stage);
@@ -192,10 +223,10 @@ static void report_step(const struct host_step *step)
     struct sadmm_resident_report done = {
         .plan = step->world->plan,
         .time = step->world->report.time + step->world->def.settings.dt,
-        .iterations = solved->iterations,
-        .iterations_mean = solved->iterations,
-        .converged = solved->converged,
-        .limited = solved->limited,
+        .iterations = step->iterations,
+        .iterations_mean = step->iterations,
+        .converged = !step->unconverged,
+        .limited = step->limited,
         .penetration_max = step->depth,
         .residual = solved->residual,
         .ms = {.collide = ms[SADMM_PHASE_COLLIDE], .assemble = ms[SADMM_PHASE_ASSEMBLE],
@@ -206,17 +237,21 @@ static void report_step(const struct host_step *step)
         done.ms.total += phase == SADMM_PHASE_CERTIFY ? 0 : ms[phase];
     sadmm_world_report_steps(step->world, 1, &done);
     step->world->report.certificate = solved->certificate;
+    if (step->islands_above > solved->certificate.islands_above)
+        step->world->report.certificate.islands_above = step->islands_above;
     step->world->report.certify_ms = ms[SADMM_PHASE_CERTIFY];
 }
 
 /* A step made by the host, stage by stage. */
 static sadmm_status host_step(sadmm_world *world)
 {
-    struct host_step step = {.world = world, .stages = sadmm_stages_of(&world->plan, &world->def.settings, true)};
+    struct host_step step = {
+        .world = world, .settings = sadmm_settings_of_substep(&world->def.settings), .islands_above = -1};
+    step.stages = sadmm_stages_of(&world->plan, &step.settings, true);
     TRY(sadmm_world_take_back(world));
     world->team.ran = 1;
     const struct sadmm_plan last_plan = world->plan;
-    step.solve = (struct sadmm_solve){world->kernels, world->context, &step.system, &world->def.settings,
+    step.solve = (struct sadmm_solve){world->kernels, world->context, &step.system, &step.settings,
                                       &world->plan, &step.report, &world->error};
     sadmm_world_swap_starts(world);
     sadmm_status status = run_stages(&step);

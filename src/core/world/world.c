@@ -5,7 +5,6 @@
 
 #include "core/base/memory.h"
 #include "core/solve/registry.h"
-#include "core/model/settings.h"
 #include "world_internal.h"
 
 sadmm_world_def sadmm_world_def_default(void)
@@ -63,7 +62,8 @@ void sadmm_world_destroy(sadmm_world *world)
                       world->disabled_pairs.keys, world->disabled_pairs.values, world->friction_pairs.keys,
                       world->friction_pairs.values, world->collision_bodies, world->start.rigid, world->start.velocity,
                       world->start.impulse, world->last_start.rigid, world->last_start.velocity,
-                      world->last_start.impulse, world->next, world->velocity, world->wrench, world->slot_of,
+                      world->last_start.impulse, world->next, world->velocity, world->wrench, world->steady,
+                      world->wrench_sum, world->slot_of,
                       world->resident.steady, world->resident.edited, world->resident.edits};
     for (size_t i = 0; i < sizeof blocks / sizeof *blocks; ++i) sadmm_free(blocks[i]);
     sadmm_free(world);

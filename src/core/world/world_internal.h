@@ -13,6 +13,7 @@
 #include "core/base/check.h"
 #include "core/base/error.h"
 #include "core/base/parallel.h"
+#include "core/model/settings.h"
 #include "core/solve/certificate.h"
 #include "core/solve/kernels.h"
 #include "core/solve/schedule.h"
@@ -73,10 +74,13 @@ struct sadmm_world {
     struct sadmm_step_start start, last_start;     /* of the step at hand; a failing step swaps it back */
     struct sadmm_rigid *next;                      /* dynamic bodies after the step */
     double *velocity, *wrench;                     /* dynamic bodies x 6 */
+    struct sadmm_steady *steady;                   /* dynamic bodies, after the sub-steps made so far */
+    double *wrench_sum;                            /* dynamic bodies x 6, of these; both only where there are several */
     int32_t *slot_of;                              /* dynamic body -> slot */
-    size_t collision_body_capacity, next_capacity, velocity_capacity, wrench_capacity, slot_of_capacity;
+    size_t collision_body_capacity, next_capacity, velocity_capacity, wrench_capacity, slot_of_capacity,
+        steady_capacity, wrench_sum_capacity;
     struct sadmm_plan plan;
-    sadmm_settings step_settings;
+    sadmm_settings step_settings;                  /* of the whole step */
     bool stepped;
 
     /* Where a backend keeps the world (resident.c). */
@@ -106,9 +110,13 @@ struct sadmm_world {
 
 /* Dynamic bodies in slot order into `start` and what else a step works on, and all bodies as collision sees them. */
 sadmm_status sadmm_world_gather(sadmm_world *world);
+/* The same from one sub-step to the next: from `next`, and without a look at the bodies' slots. substep: the one that
+ * has ended. */
+void sadmm_world_turn(sadmm_world *world, int substep);
 /* Exchange `start` and `last_start`. */
 void sadmm_world_swap_starts(sadmm_world *world);
-struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *world);
+/* substep: the one that contacts are to be found for. */
+struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *world, int substep);
 struct sadmm_system sadmm_world_system(sadmm_world *world);
 /* SADMM_ERROR_NON_FINITE that names a dynamic body. */
 sadmm_status sadmm_world_not_finite(sadmm_world *world, int32_t body);
