@@ -68,12 +68,75 @@ static __global__ void __launch_bounds__(3 * GRID_SAMPLES) grid_kernel(const __g
     v.grid->scale = range > 0 && range < HUGE_VAL ? (double)(1 << MORTON_BITS) / (3 * range) : 0;
 }
 
+/* A shape's box without its sweep. */
+static __device__ struct sadmm_box3 core_of(const struct sadmm_box3 &box, const double velocity[3], double dt)
+{
+    struct sadmm_box3 core;
+    for (int k = 0; k < 3; ++k) {
+        core.lo[k] = box.lo[k] - downward(velocity[k] * dt);
+        core.hi[k] = box.hi[k] - upward(velocity[k] * dt);
+    }
+    return core;
+}
+
+/* How much larger a reach is than the box: a share of the radius; for what stops, or is set off as fast, what it goes
+ * in the step, up to another share (beyond, the candidates of all that moves fast would be too many); and rotation. */
+static const double REACH_SHARE = 0.1, MOST_STOP_SHARE = 0.25;
+
+static __device__ double reach_beyond(const struct sadmm_proxy &proxy, double whole, int32_t substeps)
+{
+    const double radius = geometry_radius(&proxy.geometry), way = v3_norm(v3_load(proxy.velocity)) * whole,
+                 most = MOST_STOP_SHARE * radius;
+    return proxy.system_body < 0 ? 0 : REACH_SHARE * radius + (way < most ? way : most) + (substeps - 1) * proxy.spin;
+}
+
+/* The reach, and the box that it sweeps in the whole step. box: of the sub-step. */
+static __device__ struct sadmm_box3 make_reach(const collision_view &v, const struct sadmm_proxy &proxy,
+                                               const struct sadmm_box3 &box, double dt, struct collision_reach *out)
+{
+    const double whole = dt * v.substeps, beyond = reach_beyond(proxy, whole, v.substeps);
+    const struct sadmm_box3 core = core_of(box, proxy.velocity, dt);
+    struct sadmm_box3 swept;
+    for (int k = 0; k < 3; ++k) {
+        out->box.lo[k] = core.lo[k] - beyond;
+        out->box.hi[k] = core.hi[k] + beyond;
+        out->velocity[k] = proxy.velocity[k];
+        swept.lo[k] = out->box.lo[k] + downward(proxy.velocity[k] * whole);
+        swept.hi[k] = out->box.hi[k] + upward(proxy.velocity[k] * whole);
+    }
+    return swept;
+}
+
+/* Of the reach: the rest is for rounding. */
+static const double REACH_USED = 0.99;
+
+/* Is the shape within its reach at both ends of this sub-step? Comparisons are written so that NaN fails them. */
+static __device__ bool is_within(const struct collision_reach &reach, const struct sadmm_proxy &proxy,
+                                 const struct sadmm_box3 &box, double dt, int32_t substep)
+{
+    const struct sadmm_box3 core = core_of(box, proxy.velocity, dt);
+    bool within = true;
+    for (int k = 0; k < 3; ++k) {
+        const double spare = (1 - REACH_USED) * REACH_SHARE * geometry_radius(&proxy.geometry),
+                     now = substep * dt * reach.velocity[k], then = (substep + 1) * dt * reach.velocity[k],
+                     way = dt * proxy.velocity[k];
+        within = within && reach.box.lo[k] + now + spare <= core.lo[k] && core.hi[k] <= reach.box.hi[k] + now - spare &&
+                 reach.box.lo[k] + then + spare <= core.lo[k] + way &&
+                 core.hi[k] + way <= reach.box.hi[k] + then - spare;
+    }
+    return within;
+}
+
+/* By which find of a step shapes are placed. */
+enum place_for { PLACE_ONE, PLACE_FIRST, PLACE_AGAIN };
+
 /* The first kernel of a find also resets the counter of the candidates. */
+template <int FOR>
 static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t i = collision_thread(PLACE_THREADS);
     if (aborted(v)) return;
-    if (i == 0) *v.candidate_count = 0;
+    if (i == 0 && FOR != PLACE_AGAIN) *v.candidate_count = 0;
     if (i >= v.leaf_count + v.plane_count) return;
     const struct collision_step step = step_of(v);
     const uint32_t slot = v.present[i];
@@ -86,6 +149,12 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
 
     proxy_place(&shape, &v.geometries[shape.geometry], &body, step.dt, step.margin, step.gravity, &proxy, &leaf.box);
     v.proxies[slot] = proxy;
+    if (FOR == PLACE_AGAIN) {
+        if (i >= v.leaf_count) return;
+        v.boxes[slot] = leaf.box;
+        if (moves && !is_within(v.reaches[slot], proxy, leaf.box, step.dt, v.substep)) *v.abort_code = ABORT_REACH;
+        return;
+    }
     filter.category = shape.category;
     filter.mask = shape.mask;
     filter.body = shape.body;
@@ -93,6 +162,10 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
     v.filters[slot] = filter;
     if (i >= v.leaf_count) return;
 
+    if (FOR == PLACE_FIRST) {
+        v.boxes[slot] = leaf.box;
+        leaf.box = make_reach(v, proxy, leaf.box, step.dt, &v.reaches[slot]);
+    }
     leaf.slot = (int32_t)slot;
     leaf.reserved = 0;
     leaf.group_low = body.environment < 0 ? INT32_MIN : body.environment;
@@ -312,7 +385,8 @@ static __device__ void walk(const collision_view &v, int32_t i, struct batch *ou
             at = node.child;
             continue;
         }
-        if (meet && leaves_overlap(leaf, v.placed[node.child]) && leaves_meet(v, leaf, v.placed[node.child], step.dt)) {
+        if (meet && leaves_overlap(leaf, v.placed[node.child]) &&
+            leaves_meet(v, leaf, v.placed[node.child], time_of_candidates(v, step))) {
             const struct collision_filter other = v.filters[node.child];
             if (may_meet(v, own, other))
                 add(v, out, candidate_key(v, (uint32_t)leaf.slot, own.kind, (uint32_t)node.child, other.kind),
@@ -378,7 +452,8 @@ static __global__ void __launch_bounds__(TILE_ROWS) tiles_kernel(const __grid_co
         if (i >= first) hits &= i - first < TILE_COLUMNS - 1 ? ~UINT64_C(0) << (i - first + 1) : 0;
         for (uint64_t left = hits; left; left &= left - 1) {
             const int j = trailing_zeros(left);
-            if (!may_meet(v, own, others.filters[j]) || !leaves_meet(v, leaf, others.leaves[j], step.dt))
+            if (!may_meet(v, own, others.filters[j]) ||
+                !leaves_meet(v, leaf, others.leaves[j], time_of_candidates(v, step)))
                 hits ^= left & (0 - left);
         }
     }
@@ -401,7 +476,9 @@ static __global__ void __launch_bounds__(TILE_ROWS) tiles_kernel(const __grid_co
 void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels)
 {
     kernels->grid = {grid_kernel, 3 * GRID_SAMPLES, sizeof(struct grid_sample), "grid of the tree"};
-    kernels->place = {place_kernel, PLACE_THREADS, 0, "placing of the shapes"};
+    kernels->place = {place_kernel<PLACE_ONE>, PLACE_THREADS, 0, "placing of the shapes"};
+    kernels->place_first = {place_kernel<PLACE_FIRST>, PLACE_THREADS, 0, "placing of the shapes"};
+    kernels->place_again = {place_kernel<PLACE_AGAIN>, PLACE_THREADS, 0, "placing of the shapes"};
     kernels->build = {build_kernel, COLLISION_THREADS, 0, "build of the tree"};
     kernels->refit = {refit_kernel, COLLISION_THREADS, 0, "boxes of the tree"};
     kernels->clear = {clear_kernel, COLLISION_THREADS, 0, "reset of the candidates"};

@@ -28,20 +28,22 @@ sadmm_status COLLISION(download)(struct sadmm_cuda_collision *collision, void *s
 
 /* Take what a find takes from the host, once; `bodies` (by body slot) will be on the device, written before each
  * enqueued find, and are as input->bodies now. `abort_code`, on the device: while it is not 0, enqueued finds do
- * nothing. `dt` and `gravity`, on the device: in the place of the input's.
+ * nothing; sub-steps set it to ABORT_REACH (device/layout.h) where a shape leaves what the first one foresaw. `dt` and
+ * `gravity`, on the device: in the place of the input's.
  * Everything enqueued earlier must be done. The current set stays. */
 sadmm_status COLLISION(attach)(struct sadmm_cuda_collision *collision, void *stream,
                                const struct sadmm_collision_input *input, const struct sadmm_collision_body *bodies,
-                               const int32_t *abort_code, const double *dt, const double *gravity,
+                               int32_t *abort_code, const double *dt, const double *gravity,
                                struct sadmm_error *error);
-/* Capacity for so many candidates and points in both sets, which keep what they hold. 0: what a scene of this size is
+/* Capacity for so many candidates and points in both sets, or all three where a step has sub-steps; they keep what they
+ * hold. 0: what a scene of this size is
  * likely to need. Everything enqueued must be done. *candidates and *points: the capacities now, at least as much. */
-sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *collision, int64_t *candidates, int64_t *points,
-                                struct sadmm_error *error);
-/* Launches alone, so that a graph may record them: find contacts into set `into` (0 or 1), from the other one. The
+sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *collision, bool substeps, int64_t *candidates,
+                                int64_t *points, struct sadmm_error *error);
+/* Launches alone, so that a graph may record them: find contacts. The
  * counts say afterwards whether everything fitted (nothing is written to the set when not). */
-sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *collision, void *stream, int into,
-                                struct sadmm_error *error);
+sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *collision, void *stream,
+                                const struct sadmm_cuda_find *find, struct sadmm_error *error);
 /* A set's pointers; counts are not filled. */
 struct sadmm_cuda_contacts COLLISION(set)(const struct sadmm_cuda_collision *collision, int which);
 /* Which set is the current one, and with how much in it, after enqueued finds. */

@@ -166,5 +166,7 @@ sadmm_status COLLISION(take_input)(struct sadmm_cuda_collision *c, const struct 
     v->step.dt = input->dt;
     v->step.margin = input->margin;
     v->step.gravity = input->gravity;
+    v->substeps = 1;
+    v->substep = 0;
     return SADMM_OK;
 }

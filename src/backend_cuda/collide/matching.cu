@@ -41,6 +41,7 @@ static __device__ void emit_point(const collision_view &v, const step_lengths &d
         contact_emit_pair(own.a, own.b, own.child, pa, pb, m, normal, friction, first, &pair);
         v.after.pairs[at] = pair;
         v.after.keys[at] = ordered_key(own.a, own.b);
+        if (v.substeps > 1) v.pair_of[i] = at;
     }
 
     struct sadmm_contact_point point;

@@ -16,8 +16,9 @@ struct collision_buffer {
 enum buffer_name {
     /* device */
     PROXIES, FILTERS, PLACED, LEAF_KEYS, LEAF_KEYS_2, LEAF_SLOTS, LEAF_SLOTS_2, NODES, GROUPS, PARENTS, ARRIVALS,
-    COUNTER, GRID, CANDIDATES, CANDIDATES_2, MANIFOLDS, MATCHES, SIZES, PLACES, TEMP,
-    PAIRS, POINTS, PAIR_KEYS, COUNTS, PAIRS_2, POINTS_2, PAIR_KEYS_2, COUNTS_2,
+    COUNTER, GRID, CANDIDATES, CANDIDATES_2, MANIFOLDS, MATCHES, SIZES, PLACES, TEMP, BOXES, REACHES, PAIR_OF,
+    PAIRS, POINTS, PAIR_KEYS, COUNTS, PAIRS_2, POINTS_2, PAIR_KEYS_2, COUNTS_2, PAIRS_3, POINTS_3, PAIR_KEYS_3,
+    COUNTS_3,
     SHAPES, GEOMETRIES, BODIES, PRESENT, PLANES, DISABLED_PAIRS, FRICTION_PAIRS, FRICTION_VALUES,
     /* pinned: first what was uploaded to the last buffers above, in their order */
     PINNED_SHAPES, PINNED_GEOMETRIES, PINNED_BODIES, PINNED_PRESENT, PINNED_PLANES, PINNED_DISABLED_PAIRS,
@@ -29,7 +30,8 @@ enum { SET_BUFFERS = COUNTS_2 - COUNTS, INPUTS = PINNED_SHAPES - SHAPES };
 static const char *const buffer_names[BUFFERS] = {
     "placed shapes", "filters", "boxes", "tree keys", "sorted tree keys", "leaves", "sorted leaves", "tree", "groups",
     "parents", "arrivals", "counter", "grid", "candidates", "sorted candidates", "manifolds", "matches", "sizes",
-    "places", "sort",
+    "places", "sort", "boxes of sub-steps", "reaches", "pairs of candidates",
+    "contact pairs", "contact points", "contact keys", "contact counts",
     "contact pairs", "contact points", "contact keys", "contact counts",
     "contact pairs", "contact points", "contact keys", "contact counts",
     "shapes", "geometries", "bodies", "list of shapes", "planes", "disabled pairs", "friction pairs", "friction values",
@@ -202,7 +204,7 @@ static inline sadmm_status copy(struct sadmm_cuda_collision *c, void *to, const 
     return SADMM_OK;
 }
 
-/* One of the two sets. */
+/* One of the sets. */
 static inline struct collision_set set_of(const struct sadmm_cuda_collision *c, int which)
 {
     const int shift = which * SET_BUFFERS;

@@ -26,6 +26,21 @@ static __device__ int64_t find_key_in_eighths(const uint64_t *keys, int64_t coun
     return there ? low : -1;
 }
 
+/* Do the two shapes of a candidate of the whole step meet in this sub-step? As sadmm_candidate_meets on the host. */
+static __device__ bool meet_now(const collision_view &v, const struct collision_step &step, const struct candidate &c)
+{
+    const struct sadmm_proxy *a = &v.proxies[c.a], *b = &v.proxies[c.b];
+    const struct sadmm_box3 box = v.boxes[c.b];
+    if (a->geometry.type == SADMM_SHAPE_PLANE)
+        return proxy_plane_meets(a, &box, proxy_plane_reach(b, step.margin, fall_of(step.gravity, step.dt)));
+    const struct sadmm_box3 own = v.boxes[c.a];
+    return boxes_overlap(&own, &box) && boxes_meet(&own, a->velocity, &box, b->velocity, step.dt);
+}
+
+/* By which find of a step: in later sub-steps the pair that a candidate goes on from is known. */
+enum narrow_for { NARROW_ONE, NARROW_FIRST, NARROW_AGAIN };
+
+template <int FOR>
 static __global__ void __launch_bounds__(NARROW_THREADS) narrow_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t i = collision_thread(NARROW_THREADS);
@@ -37,12 +52,19 @@ static __global__ void __launch_bounds__(NARROW_THREADS) narrow_kernel(const __g
     const struct collision_step step = step_of(v);
     const struct candidate own = candidate_of(v, v.candidates[i]);
     const struct sadmm_proxy *pa = &v.proxies[own.a], *pb = &v.proxies[own.b];
-    const uint64_t shapes = ordered_key(own.a, own.b);
-    const int32_t count = v.before.counts->pairs;
-    int64_t before = find_key_in_eighths(v.before.keys, count, shapes);
-    if (before >= 0 && own.child > 0) {
-        before = contact_lower_bound(v.before.pairs, before, count, shapes, own.child);
-        if (before == count || contact_shapes(&v.before.pairs[before]) != shapes) before = -1;
+    int64_t before = FOR == NARROW_AGAIN && v.sizes[i] > 0 ? v.pair_of[i] : -1;
+    if (FOR != NARROW_ONE && !meet_now(v, step, own)) {
+        v.sizes[i] = 0;
+        return;
+    }
+    if (FOR != NARROW_AGAIN) {
+        const uint64_t shapes = ordered_key(own.a, own.b);
+        const int32_t count = v.before.counts->pairs;
+        before = find_key_in_eighths(v.before.keys, count, shapes);
+        if (before >= 0 && own.child > 0) {
+            before = contact_lower_bound(v.before.pairs, before, count, shapes, own.child);
+            if (before == count || contact_shapes(&v.before.pairs[before]) != shapes) before = -1;
+        }
     }
     const struct sadmm_contact_pair *old = &v.before.pairs[before >= 0 ? before : 0];
     const uint32_t cache = contact_memory(old, pa, pb); /* at once, not after what comes next */
@@ -64,5 +86,7 @@ static __global__ void __launch_bounds__(NARROW_THREADS) narrow_kernel(const __g
 
 void COLLISION(narrow_phase_kernels)(struct collision_kernels *kernels)
 {
-    kernels->narrow = {narrow_kernel, NARROW_THREADS, 0, "narrow phase"};
+    kernels->narrow = {narrow_kernel<NARROW_ONE>, NARROW_THREADS, 0, "narrow phase"};
+    kernels->narrow_first = {narrow_kernel<NARROW_FIRST>, NARROW_THREADS, 0, "narrow phase"};
+    kernels->narrow_again = {narrow_kernel<NARROW_AGAIN>, NARROW_THREADS, 0, "narrow phase"};
 }

@@ -29,6 +29,14 @@ struct sadmm_cuda_collision_stats {
     int64_t visits;      /* of nodes of the tree; counted on the emulated device only */
 };
 
+/* A find that is enqueued: from one set into another. In a step of several sub-steps the first one looks for the pairs
+ * that may touch in any of them, and the others take these (view.h). */
+struct sadmm_cuda_find {
+    int from, into;
+    int substep, substeps; /* substeps 1: nothing is taken from, or left for, another find */
+};
+enum { SADMM_CUDA_SETS = 3 }; /* the third for what lies between two sub-steps */
+
 /* For tests and measurements; 0: the default. */
 struct sadmm_cuda_collision_tuning {
     int32_t tree_from;  /* shapes; below, all pairs are tested */

@@ -75,10 +75,9 @@ static sadmm_status reserve_candidate(struct sadmm_cuda_collision *c, struct sad
     return SADMM_OK;
 }
 
-/* From the other set into this one. */
-static void use_sets(struct sadmm_cuda_collision *c, int into)
+static void use_sets(struct sadmm_cuda_collision *c, int from, int into)
 {
-    c->view.before = set_of(c, 1 - into);
+    c->view.before = set_of(c, from);
     c->view.after = set_of(c, into);
 }
 
@@ -160,7 +159,10 @@ static sadmm_status make_contacts(struct sadmm_cuda_collision *c, struct sadmm_e
     struct collision_view *v = &c->view;
     const int64_t lanes = (int64_t)v->candidate_capacity * POINT_LANES;
     size_t bytes = c->buffers[TEMP].capacity;
-    TRY(launch(c, c->kernels.narrow, (int64_t)v->candidate_capacity + SIZES_BEYOND, error));
+    const struct collision_launch &narrow = v->substeps == 1  ? c->kernels.narrow
+                                            : v->substep == 0 ? c->kernels.narrow_first
+                                                              : c->kernels.narrow_again;
+    TRY(launch(c, narrow, (int64_t)v->candidate_capacity + SIZES_BEYOND, error));
     if (ranked(c)) return launch(c, c->kernels.emit_few, lanes, error);
     c->kernel = "scan of the contacts";
     CUDA_CALL(c, COLLISION(sum)(in<void>(c, TEMP), &bytes, v->sizes, v->places, v->candidate_capacity + 1, c->stream),
@@ -175,7 +177,8 @@ static sadmm_status place_shapes(struct sadmm_cuda_collision *c, bool tree, stru
     c->view.leaf_keys = in<uint64_t>(c, LEAF_KEYS);
     c->view.leaf_slots = in<uint32_t>(c, LEAF_SLOTS);
     if (tree) TRY(launch(c, c->kernels.grid, 1, error));
-    TRY(launch(c, c->kernels.place, std::max(v->leaf_count + v->plane_count, 1), error));
+    TRY(launch(c, v->substeps == 1 ? c->kernels.place : c->kernels.place_first,
+               std::max(v->leaf_count + v->plane_count, 1), error));
     return tree ? build_tree(c, error) : SADMM_OK;
 }
 
@@ -196,7 +199,7 @@ sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots,
     for (;;) {
         TRY(reserve_candidate(c, error));
         TRY(COLLISION(reserve_set)(c, 1 - c->current, (size_t)c->candidate_capacity, (size_t)c->point_capacity, error));
-        use_sets(c, 1 - c->current);
+        use_sets(c, c->current, 1 - c->current);
         TRY(reserve_temp(c, v->leaf_count, (int)c->candidate_capacity, error));
         TRY(find_candidates(c, tree, error));
         TRY(make_contacts(c, error));
@@ -222,7 +225,7 @@ sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots,
 
 extern "C" sadmm_status COLLISION(attach)(struct sadmm_cuda_collision *c, void *stream,
                                           const struct sadmm_collision_input *input,
-                                          const struct sadmm_collision_body *bodies, const int32_t *abort_code,
+                                          const struct sadmm_collision_body *bodies, int32_t *abort_code,
                                           const double *dt, const double *gravity, struct sadmm_error *error)
 {
     c->can_undo = false;
@@ -258,8 +261,22 @@ static sadmm_status keep_capacity(struct sadmm_cuda_collision *c, int name, size
     return SADMM_OK;
 }
 
-extern "C" sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *c, int64_t *candidates, int64_t *points,
-                                           struct sadmm_error *error)
+/* What steps of several sub-steps need besides. */
+static sadmm_status reserve_substeps(struct sadmm_cuda_collision *c, struct sadmm_error *error)
+{
+    struct collision_view *v = &c->view;
+    const size_t slots = c->input_bytes[0] / sizeof *v->shapes;
+    TRY(reserve(c, BOXES, slots, sizeof *v->boxes, error));
+    TRY(reserve(c, REACHES, slots, sizeof *v->reaches, error));
+    TRY(reserve(c, PAIR_OF, (size_t)c->candidate_capacity, sizeof *v->pair_of, error));
+    v->boxes = in<struct sadmm_box3>(c, BOXES);
+    v->reaches = in<struct collision_reach>(c, REACHES);
+    v->pair_of = in<int32_t>(c, PAIR_OF);
+    return SADMM_OK;
+}
+
+extern "C" sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *c, bool substeps, int64_t *candidates,
+                                           int64_t *points, struct sadmm_error *error)
 {
     const int64_t likely = std::max((int64_t)1024, (int64_t)8 * c->view.leaf_count);
     ENTER(c);
@@ -273,7 +290,8 @@ extern "C" sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *c, int64
     c->point_capacity = std::max(first_points, *points);
     TRY(reserve_candidate(c, error));
     TRY(reserve_temp(c, c->view.leaf_count, (int)c->candidate_capacity, error));
-    for (int which = 0; which < 2; ++which) {
+    if (substeps) TRY(reserve_substeps(c, error));
+    for (int which = 0; which < (substeps ? SADMM_CUDA_SETS : 2); ++which) {
         const int shift = which * SET_BUFFERS;
         TRY(keep_capacity(c, PAIRS + shift, (size_t)c->candidate_capacity, sizeof(struct sadmm_contact_pair), error));
         TRY(keep_capacity(c, PAIR_KEYS + shift, (size_t)c->candidate_capacity, sizeof(uint64_t), error));
@@ -285,13 +303,19 @@ extern "C" sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *c, int64
     return SADMM_OK;
 }
 
-extern "C" sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *c, void *stream, int into,
-                                           struct sadmm_error *error)
+extern "C" sadmm_status COLLISION(enqueue)(struct sadmm_cuda_collision *c, void *stream,
+                                           const struct sadmm_cuda_find *find, struct sadmm_error *error)
 {
     const bool tree = c->view.leaf_count >= c->tree_from;
     c->stream = (cudaStream_t)stream;
     c->pending = true;
-    use_sets(c, into);
+    c->view.substeps = find->substeps;
+    c->view.substep = find->substep;
+    use_sets(c, find->from, find->into);
+    if (find->substep > 0) {
+        TRY(launch(c, c->kernels.place_again, std::max(c->view.leaf_count + c->view.plane_count, 1), error));
+        return make_contacts(c, error);
+    }
     TRY(place_shapes(c, tree, error));
     TRY(find_candidates(c, tree, error));
     return make_contacts(c, error);

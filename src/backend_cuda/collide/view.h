@@ -9,6 +9,11 @@
  *   scan     where each candidate's contacts go                                    (few candidates: by emit itself)
  *   emit     pairs and points in world terms, the last step's impulses             eight threads a candidate
  *
+ * In a step of several sub-steps the first one looks for candidates of the whole step (collision_reach); the others go
+ * from `place`, which sees to it that these are enough, to `narrow` at once, and know the pair that a candidate goes on
+ * from. `narrow` then passes over candidates that do not meet in its sub-step, so that contacts are those of a step by
+ * itself.
+ *
  * Candidates are appended in any order (an integer counter) and then sorted: keys are unique, so the result does not
  * depend on timing. The counter also counts what does not fit, hence a stage whose capacity is too small says exactly
  * how much it needs: the kernels after it do nothing, the host, which reads the counts once at the end of the stage,
@@ -32,6 +37,7 @@
 
 #include <cuda_runtime.h>
 
+#include "backend_cuda/device/layout.h"
 #include "collision/contact_emit.h"
 #include "pipeline.h"
 
@@ -90,9 +96,17 @@ struct collision_grid {
     double origin[3], scale;
 };
 
-/* Numbers of the step. */
+/* Numbers of the step, or the sub-step. */
 struct collision_step {
     double dt, margin, gravity;
+};
+
+/* Where a shape may be in the sub-steps to come: its box, larger by as much as velocities are likely to change, on its
+ * way with the velocity that the step begins with. Boxes that stay in their reaches meet only where these do; a shape
+ * that leaves its own aborts the step, which is then repeated with candidates looked for in every sub-step. */
+struct collision_reach {
+    struct sadmm_box3 box; /* at the step's start */
+    double velocity[3];
 };
 
 struct collision_set {
@@ -114,16 +128,19 @@ struct collision_view {
     int32_t leaf_count, plane_count, disabled_count, friction_count;
     int32_t shared_planes;                         /* the first ones: of group -1 */
     struct collision_step step;
+    int32_t substeps, substep;                     /* of the step; 1: what concerns sub-steps is left out */
     int32_t group_bits;                            /* of the leaf keys */
     double large;                                  /* radius from which a mover is large, m */
     int32_t body_count;                            /* slots */
     struct collision_grid *grid;                   /* of this step */
-    const int32_t *abort_code;                           /* not NULL and not 0: do nothing */
+    int32_t *abort_code;                           /* not NULL and not 0: do nothing */
     const double *dt, *gravity;                    /* not NULL: of the step, in the place of step's (step_of) */
 
     struct sadmm_proxy *proxies;                   /* by slot */
     struct collision_filter *filters;              /* by slot */
-    struct collision_leaf *placed;                 /* by slot */
+    struct collision_leaf *placed;                 /* by slot; with sub-steps: what the whole step reaches */
+    struct sadmm_box3 *boxes;                      /* sub-steps: of this one, by slot */
+    struct collision_reach *reaches;               /* and of all to come */
     uint64_t *leaf_keys;                           /* by leaf; sorted: tree order */
     uint32_t *leaf_slots;
     struct collision_node *nodes;                  /* 2 leaves - 1 */
@@ -138,6 +155,7 @@ struct collision_view {
     int32_t slot_bits, child_bits;                 /* of a candidate; child_bits is 0 where every shape has one child */
     struct manifold *manifolds;                    /* by candidate; points beyond `count` are not written */
     int32_t *matches;                              /* by candidate: pair of the last step, or -1 */
+    int32_t *pair_of;                              /* sub-steps: by candidate with a size: its pair in the new set */
     uint8_t *sizes;                                /* points by candidate; 0 beyond the last, SIZES_BEYOND of them */
     uint64_t *places;                              /* exclusive sums of pairs << 32 | points */
 
@@ -155,6 +173,12 @@ static __device__ __forceinline__ collision_step step_of(const collision_view &v
     step.dt = *v.dt;
     step.gravity = *v.gravity;
     return step;
+}
+
+/* The time that candidates are looked for: of the whole step. */
+static __device__ __forceinline__ double time_of_candidates(const collision_view &v, const collision_step &step)
+{
+    return step.dt * v.substeps;
 }
 
 /* A candidate, unpacked from slot of a, slot of b, child. */
@@ -217,7 +241,8 @@ struct collision_launch {
 
 /* The kernels, each beside what it does. */
 struct collision_kernels {
-    struct collision_launch grid, place, build, refit, clear, walk, tiles, rank, narrow, emit, emit_few;
+    struct collision_launch grid, place, place_first, place_again, build, refit, clear, walk, tiles, rank, narrow,
+        narrow_first, narrow_again, emit, emit_few;
 };
 void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels);
 void COLLISION(sort_kernels)(struct collision_kernels *kernels);

@@ -29,7 +29,8 @@ struct sadmm_contact_pair;
 struct sadmm_contact_point;
 struct sadmm_row_constraint;
 
-enum cuda_abort { ABORT_NONE = 0, ABORT_CAPACITY, ABORT_PARTITION, ABORT_PLAN, ABORT_NON_FINITE };
+/* REACH: a shape is not where the step's first sub-step thought it might be (collide/view.h). */
+enum cuda_abort { ABORT_NONE = 0, ABORT_CAPACITY, ABORT_PARTITION, ABORT_PLAN, ABORT_NON_FINITE, ABORT_REACH };
 
 /* In device memory; written by begin() (problem level: copied from the host) or by the step's gate (world level). */
 struct cuda_live {

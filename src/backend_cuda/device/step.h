@@ -12,6 +12,12 @@
  *     finish      impulses into the contacts, moved bodies, wrenches; beside it (16), (17)
  *     commit      the report; the step counts only if nothing was aborted
  *
+ * A step of several sub-steps (sadmm_settings.substeps) goes through `find` to `finish` for each of them, all in one
+ * graph, with `turn` between two: the account of the one that has ended, and `start` of the next. The step's start is
+ * not written to: there is a third state, and a third set of contacts, for what lies between two sub-steps
+ * (step_state). Each sub-step has a plan of its own; the first one's is known beforehand, those of others are taken to
+ * be like it until the report of a step that failed says what they are.
+ *
  * fast, small islands (c->prologue): `iterate` does penalties and limit too, and the last two check the plan.
  *
  * The host plans a step from the statistics of an earlier one: capacities, tier and partition, rows a contact, warm or
@@ -34,27 +40,37 @@ enum { STEPS_AHEAD = 4 };
 
 enum step_stamp { STAMP_START, STAMP_FOUND, STAMP_ASSEMBLED, STAMP_SOLVED, STAMP_END, STAMPS };
 
+/* What the sub-steps made so far were like. */
+struct cuda_step_totals {
+    int32_t limited, unmet;  /* most of any; unmet: -1: no stop rule */
+    int32_t met;             /* sub-steps that met theirs */
+    int32_t constrained;     /* sub-steps with contacts */
+    int32_t most_iterations; /* sums: of islands that stopped, the most; */
+    double iterations_mean;  /* and of all */
+    unsigned long long stamps[STAMPS]; /* ns since the first sub-step began, without what comes between them */
+};
+
 /* Written by commit, read by the host. */
 struct cuda_step_report {
     int64_t sequence; /* steps enqueued before this one, failed ones included */
     int32_t abort_code;     /* enum cuda_abort */
     int32_t offending_body;  /* a body that is not finite; INT32_MAX: none */
+    int32_t substep; /* the last one that found contacts: that of `counts` and `statistics` */
     struct sadmm_cuda_contact_counts counts;
     struct cuda_graph_statistics statistics;
     double depth, primal, dual;
-    int32_t limited; /* islands */
-    int32_t unmet;   /* islands that the stop rule still waited for; -1: there is none */
-    int32_t most_iterations;   /* of islands that stopped */
-    int64_t sum_of_iterations; /* of all of them */
-    unsigned long long stamps[STAMPS]; /* ns */
+    struct cuda_step_totals totals;
 };
 
 /* In device memory, of the step that runs. */
 struct cuda_step_control {
     int64_t sequence;
     unsigned long long depth; /* bit pattern of a double >= 0 */
-    unsigned long long stamps[STAMPS];
+    unsigned long long stamps[STAMPS]; /* of the sub-step */
     int32_t offending_body;
+    int32_t substep;
+    struct sadmm_cuda_contact_counts counts; /* of the last find that was not aborted */
+    struct cuda_step_totals totals;
 };
 
 /* What the step was planned for. */
@@ -82,6 +98,15 @@ struct cuda_step_view {
     struct cuda_step_report *reports;     /* pinned: STEPS_AHEAD */
     int32_t measured;                     /* residuals of the last iteration are in view.iteration.residual */
     int32_t limits;                       /* energies are limited: view.islands.limited */
+    int32_t substep, substeps;
 };
+
+/* Of the three states, and sets of contacts, the one that sub-step `substep` writes; -1: the one that the step begins
+ * with. into: 0 or 1, where the step ends; it begins with the other one. */
+static inline int step_state(int into, int substep, int substeps)
+{
+    if (substep < 0) return 1 - into;
+    return (substeps - 1 - substep) % 2 == 0 ? into : 2;
+}
 
 #endif

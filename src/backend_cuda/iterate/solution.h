@@ -63,4 +63,16 @@ static __device__ __forceinline__ void store_wrench(const double wrench[6], int3
         if (k == lane) out[k] = wrench[k];
 }
 
+/* The mean over the sub-steps of a step, once the last one has come. */
+static __device__ __forceinline__ void add_wrench(const double wrench[6], int32_t lane, int32_t substep,
+                                                  int32_t substeps, double *out)
+{
+#pragma unroll
+    for (int k = 0; k < 6; ++k) {
+        if (k != lane) continue;
+        const double sum = substep > 0 ? out[k] + wrench[k] : wrench[k];
+        out[k] = substeps > 1 && substep + 1 == substeps ? sum / substeps : sum;
+    }
+}
+
 #endif

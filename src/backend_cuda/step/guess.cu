@@ -29,13 +29,14 @@ static sadmm_status preview_step(struct sadmm_context *c, struct preview *out, s
     TRY(CUDA(reserve)(c, PINNED_OUT, sizeof *out, error));
     struct preview *staged = buffer<struct preview>(c, PINNED_OUT);
     for (;;) {
-        TRY(COLLISION(reserve)(s->collision, &s->candidate_capacity, &s->point_capacity, error));
+        TRY(COLLISION(reserve)(s->collision, c->settings.substeps > 1, &s->candidate_capacity, &s->point_capacity,
+                               error));
         CUDA(view_counts)(c, s->candidate_capacity);
         TRY(CUDA(reserve_layout)(c, error));
-        CUDA(view_into)(c, s->into);
+        CUDA(view_into)(c, s->into, 0);
         TRY(CUDA(clear_abort)(c, error));
         TRY(CUDA(launch_start)(c, error));
-        TRY(CUDA(enqueue_find)(c, error));
+        TRY(CUDA(enqueue_find)(c, 0, error));
         TRY(CUDA(enqueue_statistics)(c, true, error));
         TRY(copy_out(c, &staged->live, c->view.model.live, sizeof staged->live, error));
         TRY(copy_out(c, &staged->statistics, c->view.model.statistics, sizeof staged->statistics, error));
@@ -50,25 +51,55 @@ static sadmm_status preview_step(struct sadmm_context *c, struct preview *out, s
     }
 }
 
-static struct sadmm_plan plan_of(const struct sadmm_context *c, const struct preview *seen)
+struct substep_plan CUDA(plan_of)(const struct sadmm_context *c, int32_t pairs, int32_t points,
+                                  const struct cuda_graph_statistics *statistics)
 {
     const struct cuda_step *s = c->step;
     struct sadmm_plan plan = {};
     plan.bodies = s->bodies;
-    plan.pairs = seen->live.pairs;
-    plan.points = seen->live.points;
-    plan.contact_rows = plan_contact_rows(plan.points, seen->statistics.rough);
+    plan.pairs = pairs;
+    plan.points = points;
+    plan.contact_rows = plan_contact_rows(plan.points, statistics->rough);
     plan.rigid = true;
     plan.gyroscopic = c->plan.gyroscopic; /* since load */
     plan.threads = 1;
-    sadmm_plan_settle(&plan, &c->settings, plan_mostly_warm(plan.pairs, seen->statistics.warm));
-    return plan;
+    sadmm_plan_settle(&plan, &c->settings, plan_mostly_warm(plan.pairs, statistics->warm));
+    const int32_t warm = sadmm_plan_depends_on_warmth(&c->settings) ? plan.warm : -1;
+    const struct substep_plan out = {plan, plan.contact_rows, warm};
+    return out;
 }
 
-/* The layout once, for what its parts are really like. */
+void CUDA(merge_statistics)(struct cuda_graph_statistics *a, const struct cuda_graph_statistics *b)
+{
+    /* bounds of the largest parts follow from these */
+    a->sides = std::max(a->sides, b->sides);
+    a->degree = std::max(a->degree, b->degree);
+    a->island_sides = std::max(a->island_sides, b->island_sides);
+    a->island_bodies = std::max(a->island_bodies, b->island_bodies);
+    a->point_slots = std::max(a->point_slots, b->point_slots);
+}
+
+/* Plans of the sub-steps, and the most that any of them is known to need. */
+static void plan_substeps(struct sadmm_context *c, struct preview *seen)
+{
+    struct cuda_step *s = c->step;
+    const int substeps = c->settings.substeps;
+    struct learned *learned = &s->learned;
+    if (learned->step != s->enqueued) learned->step = -1;
+    const int known = learned->step >= 0 && learned->substep < substeps ? learned->substep : 0;
+    s->plans[0] = CUDA(plan_of)(c, seen->live.pairs, seen->live.points, &seen->statistics);
+    for (int k = known + 1; k < substeps; ++k) s->plans[k] = s->plans[known];
+    c->plan = s->plans[0].plan;
+    for (int k = 1; k < substeps; ++k) c->plan.residuals = c->plan.residuals || s->plans[k].plan.residuals;
+    if (known == 0) return;
+    seen->counts.pairs = (int32_t)std::max((int64_t)seen->counts.pairs, learned->pairs);
+    CUDA(merge_statistics)(&seen->statistics, &learned->statistics);
+}
+
+/* The layout once, for what its parts are really like. Not where later sub-steps are known to differ. */
 static sadmm_status tighten(struct sadmm_context *c, const struct preview *seen, struct sadmm_error *error)
 {
-    if (c->partition.tier == SADMM_CUDA_TIER_STREAM) return SADMM_OK;
+    if (c->partition.tier == SADMM_CUDA_TIER_STREAM || c->step->learned.step >= 0) return SADMM_OK;
     struct preview *staged = buffer<struct preview>(c, PINNED_OUT);
     staged->live = seen->live;
     CUDA_CALL(
@@ -89,12 +120,12 @@ sadmm_status CUDA(guess_step)(struct sadmm_context *c, struct sadmm_error *error
     struct cuda_step *s = c->step;
     struct preview seen;
     TRY(preview_step(c, &seen, error));
-    c->plan = plan_of(c, &seen);
-    s->guess.contact_rows = c->plan.contact_rows;
+    plan_substeps(c, &seen);
+    s->guess.contact_rows = s->plans[0].contact_rows;
     s->guess.point_slots = seen.statistics.point_slots <= 1   ? 1
                            : seen.statistics.point_slots <= 4 ? 4
                                                               : SADMM_MAX_POINTS;
-    s->guess.warm = sadmm_plan_depends_on_warmth(&c->settings) ? c->plan.warm : -1;
+    s->guess.warm = s->plans[0].warm;
     CUDA(view_counts)(c, generous(seen.counts.pairs));
     c->view.model.points = 0; /* results are read elsewhere */
     seen.statistics.point_slots = s->guess.point_slots;

@@ -60,22 +60,12 @@ static_assert(offsetof(struct sadmm_rigid, velocity) == CARRIED_VELOCITY * sizeo
                   offsetof(struct sadmm_collision_body, velocity) == CARRIED_VELOCITY * sizeof(double),
               "numbers of a body are copied one by one");
 
-/* START_LANES threads a body, a number each: neighbours in memory go to neighbours. */
-static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+/* Of body i, number `lane` of what it brings along. */
+static __device__ __forceinline__ void start_body(const cuda_view &v, int64_t i, int32_t lane,
+                                                  const struct sadmm_rigid *body, const struct sadmm_steady *steady)
 {
-    const int64_t t = (int64_t)blockIdx.x * STEP_THREADS + threadIdx.x, i = t / START_LANES;
-    const int32_t lane = (int32_t)(t % START_LANES);
-    if (v.model.live->abort_code) return;
-    if (t == 0) {
-        v.step.control->depth = 0;
-        v.step.control->offending_body = INT32_MAX;
-        v.step.control->stamps[STAMP_START] = nanoseconds();
-    }
-    if (i >= v.model.bodies) return;
     /* Every lane fetches all that any of them needs, before it is told apart: one wait for memory, not one a kind of
      * lane. */
-    const struct sadmm_rigid *body = &v.step.before[i];
-    const struct sadmm_steady *steady = &v.step.steady_before[i];
     const int32_t slot = v.step.slot_of_body[i],
                   k = lane >= CARRIED_VELOCITY && lane < CARRIED ? lane - CARRIED_VELOCITY : 0;
     const double number = ((const double *)body)[lane < CARRIED ? lane : 0], dt = v.model.settings->dt,
@@ -95,6 +85,21 @@ static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, co
     if (lane == LANE_PLACED) out->placed = placed;
 }
 
+/* START_LANES threads a body, a number each: neighbours in memory go to neighbours. */
+static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    const int64_t t = (int64_t)blockIdx.x * STEP_THREADS + threadIdx.x, i = t / START_LANES;
+    const int32_t lane = (int32_t)(t % START_LANES);
+    if (v.model.live->abort_code) return;
+    if (t == 0) {
+        v.step.control->depth = 0;
+        v.step.control->offending_body = INT32_MAX;
+        v.step.control->stamps[STAMP_START] = nanoseconds();
+    }
+    if (i >= v.model.bodies) return;
+    start_body(v, i, lane, &v.step.before[i], &v.step.steady_before[i]);
+}
+
 /* ---- gates ----------------------------------------------------------------------------------------------------- */
 
 /* One thread. What was found is this step's when it fits. */
@@ -103,6 +108,8 @@ static __global__ void admit_kernel(const __grid_constant__ cuda_view v, const _
     if (threadIdx.x > 0 || v.model.live->abort_code) return;
     const struct sadmm_cuda_contact_counts counts = *v.step.counts;
     v.step.control->stamps[STAMP_FOUND] = nanoseconds();
+    v.step.control->counts = counts;
+    v.step.control->substep = v.step.substep;
     if (counts.candidates > v.step.candidate_capacity || counts.points > v.step.point_capacity ||
         counts.pairs > v.contacts.pair_capacity) {
         v.model.live->abort_code = ABORT_CAPACITY;
@@ -229,7 +236,9 @@ static __global__ void __launch_bounds__(STEP_THREADS)
         double wrench[6];
         contact_wrench(v.graph, v.contacts, v.raw, live ? v.graph.offsets[slot] : 0,
                        live ? v.graph.offsets[slot + 1] : 0, of_body, 1 / dt, wrench);
-        if (live) store_wrench(wrench, of_body, v.step.wrench + 6 * (size_t)v.graph.body_of[slot]);
+        if (live)
+            add_wrench(wrench, of_body, v.step.substep, v.step.substeps,
+                       v.step.wrench + 6 * (size_t)v.graph.body_of[slot]);
     } else if (on && is_pair) {
         /* bodies are named first: all of them are below any contact's */
         if (!finish_pair(v.contacts, v.step, p, lane, pair, &depth))
@@ -242,6 +251,58 @@ static __global__ void __launch_bounds__(STEP_THREADS)
         bits = other > bits ? other : bits;
     }
     if (threadIdx.x % WARP == 0 && bits > deepest) atomicMax(&control->depth, bits);
+}
+
+/* ---- turn ------------------------------------------------------------------------------------------------------ */
+
+/* What has become of the sub-step. One thread, once it has ended. */
+static __device__ int32_t abort_of(int32_t aborted, bool planned, int32_t offending_body)
+{
+    return aborted ? aborted : !planned ? ABORT_PLAN : offending_body != INT32_MAX ? ABORT_NON_FINITE : ABORT_NONE;
+}
+
+/* The sub-step is added to those before it. args.count: its iterations. */
+static __device__ struct cuda_step_totals totals_of(const cuda_view &v, const cuda_args &args)
+{
+    const struct cuda_step_totals none = {0, -1, 0, 0, 0, 0, {}};
+    const struct cuda_step_control *control = v.step.control;
+    struct cuda_step_totals totals = v.step.substep > 0 ? control->totals : none;
+    const bool constrained = control->counts.points > 0;
+    const int32_t limited = v.step.limits ? *v.islands.limited : 0, islands = v.model.statistics->islands;
+    double iterations = constrained ? args.count : 1;
+    if (args.checks > 0) {
+        const struct cuda_stop stop = *v.islands.stop;
+        const int32_t unmet = stop.unmet[args.checks % CHECKS_KEPT];
+        totals.unmet = unmet > totals.unmet ? unmet : totals.unmet;
+        totals.met += unmet == 0;
+        totals.most_iterations += stop.last;
+        if (islands > 0) iterations = ((double)(int64_t)stop.sum + (double)unmet * args.count) / islands;
+    }
+    totals.limited = limited > totals.limited ? limited : totals.limited;
+    totals.constrained += constrained;
+    totals.iterations_mean += iterations;
+    /* each phase goes on from where it was */
+    for (int k = 1; k < STAMPS; ++k) totals.stamps[k] += control->stamps[k] - control->stamps[0];
+    return totals;
+}
+
+/* The end of a sub-step that others follow, as seen by it: the account, and what the next one starts from. Threads as
+ * in start_step_kernel. */
+static __global__ void turn_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    const int64_t t = (int64_t)blockIdx.x * STEP_THREADS + threadIdx.x, i = t / START_LANES;
+    const int32_t lane = (int32_t)(t % START_LANES);
+    if (v.model.live->abort_code) return;
+    if (t == 0) {
+        struct cuda_step_control *control = v.step.control;
+        control->stamps[STAMP_END] = nanoseconds();
+        control->totals = totals_of(v, args);
+        control->stamps[STAMP_START] = control->stamps[STAMP_END];
+        const int32_t code = abort_of(ABORT_NONE, as_planned(v.model, v.step), control->offending_body);
+        if (code) v.model.live->abort_code = code;
+    }
+    if (i >= v.model.bodies) return;
+    start_body(v, i, lane, &v.step.after[i], &v.step.steady_after[i]);
 }
 
 /* ---- commit ---------------------------------------------------------------------------------------------------- */
@@ -257,26 +318,20 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
     if (threadIdx.x > 0) return;
     struct cuda_step_control *control = v.step.control;
     struct cuda_step_report *report = &v.step.reports[control->sequence % STEPS_AHEAD];
-    const int32_t offending_body = control->offending_body, abort_code = aborted    ? aborted
-                                                                         : !planned ? ABORT_PLAN
-                                                                         : offending_body != INT32_MAX
-                                                                             ? ABORT_NON_FINITE
-                                                                             : ABORT_NONE;
+    const int32_t offending_body = control->offending_body,
+                  abort_code = abort_of(aborted, planned, offending_body);
     control->stamps[STAMP_END] = nanoseconds();
     v.model.live->abort_code = abort_code;
     report->sequence = control->sequence++;
     report->abort_code = abort_code;
     report->offending_body = offending_body;
-    report->counts = *v.step.counts;
+    report->substep = control->substep;
+    report->counts = control->counts;
     report->statistics = *v.model.statistics;
     report->depth = double_of(control->depth);
     report->primal = v.step.measured ? double_of(v.iteration.residual[0]) : -1;
     report->dual = v.step.measured ? double_of(v.iteration.residual[1]) : -1;
-    report->limited = v.step.limits ? *v.islands.limited : 0;
-    report->unmet = args.checks > 0 ? v.islands.stop->unmet[args.checks % CHECKS_KEPT] : -1;
-    report->most_iterations = args.checks > 0 ? v.islands.stop->last : 0;
-    report->sum_of_iterations = args.checks > 0 ? (int64_t)v.islands.stop->sum : 0;
-    for (int k = 0; k < STAMPS; ++k) report->stamps[k] = control->stamps[k];
+    report->totals = totals_of(v, args);
 }
 
 /* ---- launches -------------------------------------------------------------------------------------------------- */
@@ -297,6 +352,15 @@ sadmm_status CUDA(launch_start)(struct sadmm_context *c, struct sadmm_error *err
     return CUDA(launch_of)(c, start_step_kernel, "start", blocks, STEP_THREADS, &args, error);
 }
 
+sadmm_status CUDA(launch_turn)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    const int64_t blocks = (int64_t)c->view.model.bodies * START_LANES / STEP_THREADS + 1;
+    args.checks = c->checks;
+    args.count = c->settings.iterations;
+    return CUDA(launch_of)(c, turn_kernel, "turn", blocks, STEP_THREADS, &args, error);
+}
+
 sadmm_status CUDA(launch_admit)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
@@ -314,5 +378,6 @@ sadmm_status CUDA(launch_commit)(struct sadmm_context *c, struct sadmm_error *er
 {
     cuda_args args = {};
     args.checks = c->checks;
+    args.count = c->settings.iterations;
     return CUDA(launch_early)(c, commit_kernel, "commit", 1, STEP_THREADS, &args, error);
 }

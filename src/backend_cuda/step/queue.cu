@@ -26,7 +26,7 @@ static sadmm_status launch_edits_of(struct sadmm_context *c, int64_t sequence, s
 {
     struct cuda_step *s = c->step;
     const struct queued_step *q = slot_of(s, sequence);
-    CUDA(view_into)(c, s->into);
+    CUDA(view_into)(c, s->into, 0);
     return CUDA(launch_edits)(c, q->edits, q->edit_count, error);
 }
 
@@ -66,6 +66,33 @@ static sadmm_status repeat_steps(struct sadmm_context *c, int64_t first, int64_t
     return SADMM_OK;
 }
 
+/* Steps that look for candidates in every sub-step, once shapes have left their reach. */
+enum { CAREFUL_STEPS = 64 };
+
+/* A later sub-step of the step `first` was not as planned: the next plan is made for it, too. Those behind it are taken
+ * to be like it. */
+static void learn(struct sadmm_context *c, int64_t first, const struct cuda_step_report *report)
+{
+    struct cuda_step *s = c->step;
+    struct learned *learned = &s->learned;
+    const struct cuda_graph_statistics none = {};
+    if (learned->step != first) {
+        learned->step = first;
+        learned->substep = 0;
+        learned->pairs = 0;
+        learned->statistics = none;
+    }
+    learned->pairs = std::max(learned->pairs, (int64_t)report->counts.pairs);
+    if (report->abort_code == ABORT_CAPACITY) {
+        if (report->counts.candidates <= s->candidate_capacity)
+            s->point_capacity = std::max(s->point_capacity, generous(report->counts.points));
+        return; /* there are no statistics of it */
+    }
+    CUDA(merge_statistics)(&learned->statistics, &report->statistics);
+    s->plans[report->substep] = CUDA(plan_of)(c, report->counts.pairs, report->counts.points, &report->statistics);
+    learned->substep = std::max(learned->substep, report->substep);
+}
+
 /* The step `first` of the queue has failed, and nothing behind it has been done. */
 static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct cuda_step_report *report,
                             struct sadmm_error *error)
@@ -94,10 +121,13 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
         s->candidate_capacity = std::max(s->candidate_capacity, generous(report->counts.candidates));
     if (report->abort_code == ABORT_PARTITION) {
         /* The next partition is made for this very step, and fits; a tier that fails twice is left alone all the
-         * same. */
-        if (s->misfit == first) c->refused |= 1u << c->partition.tier;
+         * same. Sub-steps that no plan was made for yet do not count. */
+        const bool known = report->substep == 0 || (s->learned.step == first && report->substep <= s->learned.substep);
+        if (s->misfit == first && known) c->refused |= 1u << c->partition.tier;
         s->misfit = first;
     }
+    if (report->abort_code == ABORT_REACH) s->careful = CAREFUL_STEPS;
+    else if (report->substep > 0) learn(c, first, report);
     return repeat_steps(c, first, end, error);
 }
 
@@ -117,6 +147,7 @@ static sadmm_status see_step(struct sadmm_context *c, struct sadmm_error *error)
     s->time += q->settings.dt;
     ++s->seen;
     ++s->done;
+    if (s->careful > 0 && --s->careful == 0) s->planned = false;
     /* A plan with far too large capacities wastes launches. */
     if (report.counts.pairs < c->view.contacts.pair_capacity / 4 - 256) s->planned = false;
     return SADMM_OK;
@@ -144,7 +175,8 @@ static sadmm_status take_edits(struct sadmm_context *c, struct queued_step *q, c
                                const struct sadmm_resident_edit *edits, size_t count, struct sadmm_error *error)
 {
     struct sadmm_resident_edit numbers = {SADMM_EDIT_SETTINGS, 0, {}};
-    sadmm_settings_numbers(settings, numbers.values);
+    const struct sadmm_settings share = sadmm_settings_of_substep(settings);
+    sadmm_settings_numbers(&share, numbers.values);
     const bool other = memcmp(numbers.values, c->numbers, sizeof c->numbers) != 0;
     const size_t total = count + other;
     if (total > q->edit_capacity) {
@@ -181,14 +213,15 @@ extern "C" sadmm_status CUDA(step_world)(struct sadmm_context *c, const struct s
                                          struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
+    const struct sadmm_settings share = sadmm_settings_of_substep(settings);
     CUDA_ENTER(c);
     TRY(next_place(c, error));
-    if (!sadmm_settings_same_but_numbers(&c->settings, settings)) {
+    if (!sadmm_settings_same_but_numbers(&c->settings, &share)) {
         TRY(see_all(c, error));
         s->planned = false;
     }
     if (!s->planned) TRY(see_all(c, error));
-    CUDA(plan_settings)(c, settings);
+    CUDA(plan_settings)(c, &share); /* kernels know sub-steps alone */
     struct queued_step *q = slot_of(s, s->enqueued);
     sadmm_status status = enqueue_next(c, q, settings, edits, count, error);
     if (status != SADMM_OK) {

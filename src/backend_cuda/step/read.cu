@@ -10,7 +10,7 @@
 
 static double milliseconds(const struct cuda_step_report *report, enum step_stamp from, enum step_stamp to)
 {
-    return 1e-6 * (double)(report->stamps[to] - report->stamps[from]);
+    return 1e-6 * (double)(report->totals.stamps[to] - report->totals.stamps[from]);
 }
 
 void CUDA(report_step)(const struct sadmm_context *c, struct sadmm_resident_report *out)
@@ -26,15 +26,14 @@ void CUDA(report_step)(const struct sadmm_context *c, struct sadmm_resident_repo
     out->plan = c->plan;
     out->plan.pairs = last->counts.pairs;
     out->plan.points = last->counts.points;
-    out->iterations = last->counts.points > 0 ? settings->iterations : 1;
-    out->iterations_mean = out->iterations;
-    out->islands_above = last->unmet;
-    out->converged = last->unmet == 0;
-    if (out->converged) out->iterations = last->most_iterations;
-    if (last->unmet >= 0 && last->statistics.islands > 0)
-        out->iterations_mean =
-            ((double)last->sum_of_iterations + (double)last->unmet * settings->iterations) / last->statistics.islands;
-    out->limited = last->limited;
+    const struct sadmm_settings share = sadmm_settings_of_substep(settings);
+    const struct cuda_step_totals *totals = &last->totals;
+    out->iterations = totals->constrained * share.iterations + (share.substeps - totals->constrained);
+    out->iterations_mean = totals->iterations_mean;
+    out->islands_above = totals->unmet;
+    out->converged = totals->met == share.substeps;
+    if (out->converged) out->iterations = totals->most_iterations;
+    out->limited = totals->limited;
     out->penetration_max = last->depth;
     out->residual.primal = last->primal;
     out->residual.dual = last->dual;
@@ -67,7 +66,7 @@ extern "C" sadmm_status CUDA(read_bodies)(struct sadmm_context *c, struct sadmm_
     const struct cuda_step *s = c->step;
     const size_t n = (size_t)s->bodies;
     CUDA_ENTER(c);
-    CUDA(view_into)(c, s->into);
+    CUDA(view_into)(c, s->into, 0);
     TRY(get(c, rigid, c->view.step.before, n * sizeof *rigid, error));
     TRY(get(c, steady, c->view.step.steady_before, n * sizeof *steady, error));
     return get(c, wrench, buffer<double>(c, BUFFER_WORLD_WRENCH) + (size_t)(1 - s->into) * 6 * n,
@@ -86,8 +85,9 @@ extern "C" sadmm_status CUDA(read_start)(struct sadmm_context *c, struct sadmm_r
     const struct cuda_step *s = c->step;
     const size_t n = (size_t)s->bodies, points = (size_t)s->last.counts.points;
     CUDA_ENTER(c);
-    CUDA(view_into)(c, 1 - s->into); /* of the last step */
-    TRY(get(c, rigid, c->view.step.before, n * sizeof *rigid, error));
-    TRY(get(c, velocity, c->view.step.start_velocity, 6 * n * sizeof *velocity, error));
-    return get(c, impulse, c->view.step.start_impulse, 3 * points * sizeof *impulse, error);
+    const int substeps = s->last_settings.substeps, /* of the last one */
+              from = step_state(1 - s->into, substeps - 2, substeps);
+    TRY(get(c, rigid, buffer<struct sadmm_rigid>(c, BUFFER_WORLD_BODIES) + (size_t)from * n, n * sizeof *rigid, error));
+    TRY(get(c, velocity, buffer<double>(c, BUFFER_WORLD_VELOCITY), 6 * n * sizeof *velocity, error));
+    return get(c, impulse, buffer<double>(c, BUFFER_WORLD_IMPULSE), 3 * points * sizeof *impulse, error);
 }

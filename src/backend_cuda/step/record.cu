@@ -10,9 +10,15 @@
 /* ---- stages ---------------------------------------------------------------------------------------------------- */
 
 /* Contacts, up to the gate. */
-sadmm_status CUDA(enqueue_find)(struct sadmm_context *c, struct sadmm_error *error)
+sadmm_status CUDA(enqueue_find)(struct sadmm_context *c, int substep, struct sadmm_error *error)
 {
-    TRY(COLLISION(enqueue)(c->step->collision, c->stream, c->step->into, error));
+    const struct cuda_step *s = c->step;
+    const int substeps = c->settings.substeps;
+    const bool alone = s->careful > 0; /* each with candidates of its own */
+    const struct sadmm_cuda_find find = {step_state(s->into, substep - 1, substeps),
+                                         step_state(s->into, substep, substeps), alone ? 0 : substep,
+                                         alone ? 1 : substeps};
+    TRY(COLLISION(enqueue)(s->collision, c->stream, &find, error));
     return CUDA(launch_admit)(c, error);
 }
 
@@ -42,10 +48,23 @@ static enum cuda_limit limit_by_iterations(const struct sadmm_context *c)
     return c->prologue && !stop_rule_checked(c) ? LIMIT_WHOLE : LIMIT_SUSPECTS;
 }
 
-/* A and b of the bodies: beside contact finding, of which they need nothing. */
-static sadmm_status record_gather(struct sadmm_context *c, struct sadmm_error *error)
+/* What is planned and seen from here on is sub-step `substep`. */
+static void view_substep(struct sadmm_context *c, int substep)
 {
-    TRY(CUDA(launch_start)(c, error));
+    struct cuda_step *s = c->step;
+    const struct substep_plan *plan = &s->plans[substep];
+    c->plan = plan->plan;
+    s->guess.contact_rows = plan->contact_rows;
+    s->guess.warm = plan->warm;
+    c->view.model.contact_rows = plan->contact_rows == 1 ? 1 : 3;
+    CUDA(view_into)(c, s->into, substep);
+    c->prologue = c->fast && !c->plan.residuals && c->view.rows.count == 0 && c->view.model.contact_rows == 3 &&
+                  CUDA(persistent_does_prologue)(&c->partition);
+}
+
+/* A and b of the bodies: beside contact finding, of which they need nothing. */
+static sadmm_status record_bodies(struct sadmm_context *c, struct sadmm_error *error)
+{
     side_branch side(c);
     CUDA_CALL(c, side.code, "a branch of the step");
     return CUDA(enqueue_bodies)(c, error);
@@ -85,8 +104,8 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
 {
     const enum cuda_limit limit = limit_by_iterations(c);
     switch (stage->kind) {
-    case SADMM_STAGE_GATHER: return record_gather(c, error);
-    case SADMM_STAGE_FIND: return CUDA(enqueue_find)(c, error);
+    case SADMM_STAGE_GATHER: TRY(CUDA(launch_start)(c, error)); return record_bodies(c, error);
+    case SADMM_STAGE_FIND: return CUDA(enqueue_find)(c, c->view.step.substep, error);
     case SADMM_STAGE_PLAN: return record_plan(c, error);
     case SADMM_STAGE_PENALTY: return CUDA(enqueue_penalties)(c, error);
     case SADMM_STAGE_ITERATE:
@@ -103,6 +122,11 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
     case SADMM_STAGE_LIMIT:
         return limit == LIMIT_WHOLE ? SADMM_OK : CUDA(enqueue_limit)(c, limit == LIMIT_SUSPECTS, error);
     case SADMM_STAGE_INTEGRATE: return record_finish(c, *residuals, error);
+    case SADMM_STAGE_TURN:
+        TRY(CUDA(launch_turn)(c, error));
+        view_substep(c, c->view.step.substep + 1);
+        *residuals = false;
+        return record_bodies(c, error);
     case SADMM_STAGE_COMMIT: return CUDA(launch_commit)(c, error);
     case SADMM_STAGE_BODIES:   /* beside FIND */
     case SADMM_STAGE_CONTACTS: /* beside PLAN */
@@ -120,8 +144,7 @@ static sadmm_status enqueue_step(struct sadmm_context *c, struct sadmm_error *er
     struct sadmm_stages stages = sadmm_stages_of(&c->plan, &c->settings, true);
     struct sadmm_stage stage;
     bool residuals = false;
-    c->prologue = c->fast && !c->plan.residuals && c->view.rows.count == 0 && c->view.model.contact_rows == 3 &&
-                  CUDA(persistent_does_prologue)(&c->partition);
+    view_substep(c, 0);
     while (sadmm_stages_next(&stages, &stage)) TRY(record_stage(c, &stage, &residuals, error));
     return SADMM_OK;
 }
@@ -135,7 +158,6 @@ sadmm_status CUDA(record_step)(struct sadmm_context *c, int into, struct sadmm_e
     const int next = s->into;
     CUDA_CALL(c, cudaStreamBeginCapture(c->stream, cudaStreamCaptureModeThreadLocal), "cudaStreamBeginCapture");
     s->into = into;
-    CUDA(view_into)(c, into);
     c->recording = true;
     sadmm_status status = enqueue_step(c, error);
     c->recording = false;

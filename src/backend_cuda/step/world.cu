@@ -8,19 +8,21 @@
 
 /* ---- the view of a step ---------------------------------------------------------------------------------------- */
 
-/* Everything of the view that depends on which state and set is written. */
-void CUDA(view_into)(struct sadmm_context *c, int into)
+void CUDA(view_into)(struct sadmm_context *c, int into, int substep)
 {
     const struct cuda_step *s = c->step;
-    const struct sadmm_cuda_contacts set = COLLISION(set)(s->collision, into);
+    const int substeps = c->settings.substeps;
+    const size_t from = (size_t)step_state(into, substep - 1, substeps),
+                 to = (size_t)step_state(into, substep, substeps);
+    const struct sadmm_cuda_contacts set = COLLISION(set)(s->collision, (int)to);
     const size_t n = (size_t)s->bodies;
     struct cuda_step_view *step = &c->view.step;
     struct sadmm_rigid *rigid = buffer<struct sadmm_rigid>(c, BUFFER_WORLD_BODIES);
     struct sadmm_steady *steady = buffer<struct sadmm_steady>(c, BUFFER_WORLD_STEADY);
-    step->before = rigid + (size_t)(1 - into) * n;
-    step->after = rigid + (size_t)into * n;
-    step->steady_before = steady + (size_t)(1 - into) * n;
-    step->steady_after = steady + (size_t)into * n;
+    step->before = rigid + from * n;
+    step->after = rigid + to * n;
+    step->steady_before = steady + from * n;
+    step->steady_after = steady + to * n;
     step->wrench = buffer<double>(c, BUFFER_WORLD_WRENCH) + (size_t)into * 6 * n;
     step->start_velocity = buffer<double>(c, BUFFER_WORLD_VELOCITY);
     step->start_impulse = buffer<double>(c, BUFFER_WORLD_IMPULSE);
@@ -35,6 +37,8 @@ void CUDA(view_into)(struct sadmm_context *c, int into)
     step->reports = step_reports(c);
     step->measured = c->plan.residuals && !stop_rule_checked(c);
     step->limits = c->plan.limit;
+    step->substep = substep;
+    step->substeps = substeps;
     c->view.raw.system.rigid = step->before;
     c->view.raw.system.velocity = step->start_velocity;
     c->view.raw.pairs = set.pairs;
@@ -119,16 +123,19 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     struct cuda_step *s = c->step;
     s->bodies = (int32_t)n;
     s->slots = (int32_t)slots;
+    const struct sadmm_settings share = sadmm_settings_of_substep(settings);
     s->last_settings = *settings;
     s->time = world->time;
     s->planned = s->recorded = false;
     s->enqueued = s->seen = s->done = s->repeats = 0;
     s->offending_body = -1;
+    s->learned.step = -1;
+    s->careful = 0;
     for (struct queued_step &q : s->queue) q.edit_count = 0;
     memset(&s->last, 0, sizeof s->last);
-    TRY(CUDA(use_settings)(c, settings, error));
-    TRY(CUDA(reserve)(c, BUFFER_WORLD_BODIES, 2 * n * sizeof *world->rigid, error));
-    TRY(CUDA(reserve)(c, BUFFER_WORLD_STEADY, 2 * n * sizeof *world->steady, error));
+    TRY(CUDA(use_settings)(c, &share, error));
+    TRY(CUDA(reserve)(c, BUFFER_WORLD_BODIES, 3 * n * sizeof *world->rigid, error));
+    TRY(CUDA(reserve)(c, BUFFER_WORLD_STEADY, 3 * n * sizeof *world->steady, error));
     TRY(CUDA(reserve)(c, BUFFER_WORLD_WRENCH, 12 * n * sizeof(double), error));
     TRY(CUDA(reserve)(c, BUFFER_WORLD_VELOCITY, 6 * n * sizeof(double), error));
     TRY(CUDA(reserve)(c, BUFFER_WORLD_SLOTS, n * sizeof *world->slot_of, error));
@@ -162,6 +169,6 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     TRY(COLLISION(attach)(s->collision, c->stream, world->input,
                           buffer<struct sadmm_collision_body>(c, BUFFER_WORLD_PLACES),
                           &c->view.model.live->abort_code, &kept->settings.dt, &kept->gravity, error));
-    CUDA(view_into)(c, s->into);
+    CUDA(view_into)(c, s->into, 0);
     return CUDA(wait)(c, error);
 }

@@ -21,6 +21,20 @@ struct queued_step {
     size_t edit_count, edit_capacity;
 };
 
+/* What a sub-step is planned to be. */
+struct substep_plan {
+    struct sadmm_plan plan;
+    int32_t contact_rows, warm; /* as in cuda_step_guess */
+};
+
+/* From the reports of a step that failed in a later sub-step. */
+struct learned {
+    int64_t step;    /* of the queue; -1: none */
+    int substep;     /* the plans up to this one are known */
+    int64_t pairs;   /* the most that one of them has */
+    struct cuda_graph_statistics statistics; /* the most of any */
+};
+
 struct cuda_step {
     struct sadmm_cuda_collision *collision;
     int32_t bodies, slots;
@@ -30,6 +44,10 @@ struct cuda_step {
     cudaGraphExec_t graphs[2];  /* by the set that is written */
     struct cuda_step_guess guess;
     int64_t candidate_capacity, point_capacity;
+
+    struct substep_plan plans[SADMM_MOST_SUBSTEPS];
+    struct learned learned;
+    int64_t careful;            /* so many steps more look for candidates in every sub-step: shapes left their reach */
 
     /* The queue: steps [seen, enqueued), at most STEPS_AHEAD. */
     struct queued_step queue[STEPS_AHEAD];
@@ -62,16 +80,22 @@ static inline bool stop_rule_checked(const struct sadmm_context *c)
 
 /* world.cu */
 void CUDA(step_destroy)(struct sadmm_context *);
-/* world.cu: what of the view depends on which state and set is written. */
-void CUDA(view_into)(struct sadmm_context *, int into);
+/* world.cu: what of the view depends on which state and set is written: by a sub-step of the step that ends in
+ * `into`. */
+void CUDA(view_into)(struct sadmm_context *, int into, int substep);
 /* world.cu: counts and settings of the view; pairs: capacity. */
 void CUDA(view_counts)(struct sadmm_context *, int64_t pairs);
 /* world.cu */
 sadmm_status CUDA(clear_abort)(struct sadmm_context *, struct sadmm_error *error);
 /* guess.cu: what the next step and those like it need. Nothing is running. */
 sadmm_status CUDA(guess_step)(struct sadmm_context *, struct sadmm_error *error);
+/* guess.cu: the plan of a step, of this many pairs and points with these statistics, or a sub-step. */
+struct substep_plan CUDA(plan_of)(const struct sadmm_context *, int32_t pairs, int32_t points,
+                                  const struct cuda_graph_statistics *statistics);
+/* guess.cu: *a becomes what a partition for both needs. */
+void CUDA(merge_statistics)(struct cuda_graph_statistics *a, const struct cuda_graph_statistics *b);
 /* record.cu: contacts, up to the gate. */
-sadmm_status CUDA(enqueue_find)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(enqueue_find)(struct sadmm_context *, int substep, struct sadmm_error *error);
 /* record.cu: the graph of a step that writes state and set `into`. */
 sadmm_status CUDA(record_step)(struct sadmm_context *, int into, struct sadmm_error *error);
 /* read.cu: the report of the last step that was done. */
@@ -81,6 +105,7 @@ void CUDA(report_step)(const struct sadmm_context *, struct sadmm_resident_repor
 sadmm_status CUDA(launch_edits)(struct sadmm_context *, const struct sadmm_resident_edit *edits, size_t count,
                                 struct sadmm_error *error);
 sadmm_status CUDA(launch_start)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_turn)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_admit)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_finish)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_commit)(struct sadmm_context *, struct sadmm_error *error);

@@ -1,0 +1,323 @@
+/* Sub-steps of steps that the device makes alone (sadmm_settings.substeps, backend_cuda/device/step.h): against the same
+ * kernels driven by the host, and against steps of dt / substeps, to the last bit, however the steps were enqueued,
+ * planned or repeated. The same checks run on the emulated device (test_cuda_substeps_emulated.c).
+ */
+#include "between_steps.h"
+#include "cuda_worlds.h"
+
+static void use_substeps(sadmm_world *world, int substeps)
+{
+    sadmm_settings settings = sadmm_world_settings(world);
+    settings.substeps = substeps;
+    MUST(world, sadmm_world_set_settings(world, &settings));
+}
+
+/* A step of `substeps` sub-steps as so many steps. Their iterations: of the whole, divisible. */
+static void step_short(sadmm_world *world, int substeps)
+{
+    const sadmm_settings whole = sadmm_world_settings(world);
+    sadmm_settings share = whole;
+    share.dt = whole.dt / substeps;
+    share.iterations = whole.iterations / substeps;
+    share.substeps = 1;
+    MUST(world, sadmm_world_set_settings(world, &share));
+    step_world(world, substeps);
+    MUST(world, sadmm_world_set_settings(world, &whole));
+}
+
+static const struct {
+    int count, height, substeps;
+    double friction;
+    int fast; /* iterations of the method `fast`; 0: paper */
+} cases[] = {{3, 2, 4, 0.5, 24}, {3, 2, 3, 0, 12}, {1, 1, 2, 0.5, 7}, {2, 2, 5, 0.5, 0},
+             {4, 2, 2, 0.6, EMULATED ? 12 : 95}};
+enum { CASES = sizeof cases / sizeof *cases };
+
+/* From the first fall to rest: contacts appear in some sub-step, first cold, then warm. */
+START_TEST(resident_substeps_equal_those_by_host)
+{
+    const int precision = _i / CASES, at = _i % CASES;
+    sadmm_world *worlds[2];
+    char what[80];
+    for (int k = 0; k < 2; ++k) {
+        worlds[k] = towers(cases[at].count, cases[at].height, cases[at].friction, precision);
+        if (cases[at].fast) use_fast(worlds[k], cases[at].fast);
+        use_substeps(worlds[k], cases[at].substeps);
+    }
+    by_host(worlds[0]);
+    for (int step = 0; step < (EMULATED ? 10 : 24); ++step) {
+        for (int k = 0; k < 2; ++k) MUST(worlds[k], sadmm_world_step(worlds[k]));
+        ck_assert(worlds[1]->resident.loaded == (step > 0 || !cases[at].fast) && !worlds[0]->resident.loaded);
+        snprintf(what, sizeof what, "case %d, %s, step %d", at, precision ? "f64" : "f32", step);
+        if (step % 3 != 1) expect_same_world(worlds[0], worlds[1], what); /* also several steps between two reads */
+    }
+    for (int k = 0; k < 2; ++k) sadmm_world_destroy(worlds[k]);
+}
+END_TEST
+
+START_TEST(substeps_equal_short_steps)
+{
+    enum { SUBSTEPS = 4 };
+    const int precision = _i;
+    sadmm_world *whole = towers(3, 2, 0.5, precision), *parts = towers(3, 2, 0.5, precision);
+    use_fast(whole, 24);
+    use_fast(parts, 24);
+    use_substeps(whole, SUBSTEPS);
+    for (int step = 0; step < 8; ++step) {
+        MUST(whole, sadmm_world_step(whole));
+        step_short(parts, SUBSTEPS);
+        ck_assert_msg(state_hash(whole) == state_hash(parts), "step %d", step);
+        ck_assert_int_eq(sadmm_world_contact_count(whole), sadmm_world_contact_count(parts));
+    }
+    ck_assert(whole->resident.loaded && parts->resident.loaded);
+    ck_assert_double_eq_tol(world_report(whole).time, world_report(parts).time, 1e-12); /* rounding of sums */
+    ck_assert_int_eq(world_report(whole).step, 8);
+    sadmm_world_destroy(whole);
+    sadmm_world_destroy(parts);
+}
+END_TEST
+
+/* Steps in the queue, where the first ones are repeated with larger capacities; twice, to the same bits. */
+START_TEST(enqueued_substeps_equal_single_steps)
+{
+    const int precision = _i;
+    sadmm_world *worlds[3];
+    for (int k = 0; k < 3; ++k) {
+        worlds[k] = towers(3, 2, 0.5, precision);
+        use_fast(worlds[k], 24);
+        use_substeps(worlds[k], 3);
+        if (k > 0) tune_capacities(tables[precision], worlds[k]->context, 1);
+    }
+    for (int step = 0; step < 12; ++step) {
+        MUST(worlds[0], sadmm_world_step(worlds[0]));
+        for (int k = 1; k < 3; ++k) MUST(worlds[k], sadmm_world_step_async(worlds[k]));
+    }
+    for (int k = 1; k < 3; ++k) {
+        MUST(worlds[k], sadmm_world_wait(worlds[k]));
+        expect_same_world(worlds[0], worlds[k], "12 steps");
+        ck_assert_int_gt(world_report(worlds[k]).repeated, 0);
+    }
+    for (int k = 0; k < 3; ++k) sadmm_world_destroy(worlds[k]);
+}
+END_TEST
+
+/* Also the number of sub-steps changes between steps, and states, wrenches and bodies do. */
+static void change(sadmm_world *world, int step)
+{
+    const double force[3] = {0.5, -0.2, 0.1 * step}, torque[3] = {0, 0.01, 0.02};
+    static const int substeps[] = {4, 1, 2, 2, 3};
+    if (step % 2 == 0) use_substeps(world, substeps[step / 2 % 5]);
+    if (step % 3 == 0) MUST(world, sadmm_world_set_body_wrench(world, body_at(world, 1 + step % 5), force, torque));
+    if (step == 5) place(world, body_at(world, 2), 0.5, 0.02, 0.41);
+    if (step == 7) add_box(world, 0.1, 0.3, 1.2, 0.1, 2, 0.5);
+    if (step == 9) MUST(world, sadmm_world_remove_body(world, body_at(world, 3)));
+    if (step == 10) {
+        sadmm_settings settings = sadmm_world_settings(world);
+        settings.dt = 0.004;
+        MUST(world, sadmm_world_set_settings(world, &settings));
+    }
+}
+
+START_TEST(changes_between_steps_equal_those_by_host)
+{
+    const int precision = _i;
+    sadmm_world *worlds[3];
+    for (int k = 0; k < 3; ++k) {
+        worlds[k] = towers(3, 2, 0.5, precision);
+        use_fast(worlds[k], 20);
+    }
+    by_host(worlds[0]);
+    for (int step = 0; step < 14; ++step) {
+        for (int k = 0; k < 3; ++k) change(worlds[k], step);
+        for (int k = 0; k < 2; ++k) MUST(worlds[k], sadmm_world_step(worlds[k]));
+        MUST(worlds[2], sadmm_world_step_async(worlds[2]));
+        if (step % 3 == 0) expect_same_world(worlds[0], worlds[1], "single steps");
+    }
+    expect_same_world(worlds[0], worlds[1], "single steps");
+    expect_same_world(worlds[0], worlds[2], "enqueued steps");
+    for (int k = 0; k < 3; ++k) sadmm_world_destroy(worlds[k]);
+}
+END_TEST
+
+/* A force sets a box off in mid-air, so fast that it leaves what the first sub-step thought it might reach, then it hits
+ * others. Before it hits there are no contacts: nothing but the reach can have been the reason to repeat a step. */
+START_TEST(a_shape_leaves_its_reach)
+{
+    const int precision = _i;
+    const double force[3] = {8000, 0, 0}, none[3] = {0, 0, 0};
+    sadmm_world *worlds[2];
+    for (int k = 0; k < 2; ++k) {
+        sadmm_world_def def = between_def(0.005, 0);
+        def.precision = (sadmm_precision)precision;
+        def.settings.iterations = 24;
+        def.settings.substeps = 4;
+        worlds[k] = create_world(&def);
+        add_box(worlds[k], 0, 0, 0, 0.1, 1, 0.5);
+        for (int i = 0; i < 3; ++i) add_box(worlds[k], 1.2 + 0.25 * i, 0.05 * i, 0.02, 0.1, 1, 0.5);
+        use_device(worlds[k], precision, 0);
+    }
+    by_host(worlds[0]);
+    for (int step = 0; step < 10; ++step) {
+        if (step == 2)
+            for (int k = 0; k < 2; ++k)
+                MUST(worlds[k], sadmm_world_set_body_wrench(worlds[k], body_at(worlds[k], 0), force, none));
+        for (int k = 0; k < 2; ++k) MUST(worlds[k], sadmm_world_step(worlds[k]));
+        expect_same_world(worlds[0], worlds[1], "a box that is set off");
+        const sadmm_step_report report = world_report(worlds[1]);
+        if (step == 1) ck_assert_int_eq(report.repeated, 0);
+        if (step == 2) ck_assert_int_gt(report.repeated, 0);
+        if (step == 2) ck_assert_int_eq(report.contacts, 0);
+    }
+    ck_assert_double_gt(body_state(worlds[1], body_at(worlds[1], 1)).linear_velocity[0], 1); /* was hit */
+    for (int k = 0; k < 2; ++k) sadmm_world_destroy(worlds[k]);
+}
+END_TEST
+
+/* Whatever the tier, and with the stop rule, where each island stops by itself. */
+START_TEST(tiers_agree)
+{
+    static const enum sadmm_cuda_tier tiers[] = {SADMM_CUDA_TIER_BLOCK, SADMM_CUDA_TIER_CLUSTER, SADMM_CUDA_TIER_GRID,
+                                                 SADMM_CUDA_TIER_STREAM};
+    const int precision = _i / 2;
+    const bool stops = _i % 2;
+    sadmm_world *first = NULL;
+    for (int k = 0; k < 4; ++k) {
+        sadmm_world *world = towers(3, 2, 0.5, precision);
+        sadmm_settings settings = sadmm_world_settings(world);
+        settings.method = SADMM_METHOD_FAST;
+        settings.iterations = 40;
+        settings.substeps = 2;
+        settings.certificate_tolerance = stops ? 1e-3 : 0;
+        settings.certificate_momentum_tolerance = 1e-3;
+        settings.check_period = 5;
+        MUST(world, sadmm_world_set_settings(world, &settings));
+        force_tier(tables[precision], world->context, tiers[k]);
+        step_world(world, 9);
+        ck_assert(world->resident.loaded && tier_of(tables[precision], world->context, NULL) == tiers[k]);
+        const sadmm_step_report report = world_report(world);
+        ck_assert_int_le(report.iterations, 40);
+        ck_assert(report.iterations_mean <= report.iterations);
+        ck_assert(report.converged == (stops && report.certificate.islands_above == 0));
+        if (first) expect_same_world(first, world, "tiers");
+        if (first) sadmm_world_destroy(world);
+        else first = world;
+    }
+    sadmm_world_destroy(first);
+}
+END_TEST
+
+/* What a step with a stop rule reports: the sum of what its sub-steps did. */
+START_TEST(a_stop_rule_ends_each_substep)
+{
+    const int precision = _i;
+    sadmm_world *whole = towers(3, 2, 0.5, precision), *parts = towers(3, 2, 0.5, precision);
+    for (int k = 0; k < 2; ++k) {
+        sadmm_world *world = k ? parts : whole;
+        sadmm_settings settings = sadmm_world_settings(world);
+        settings.method = SADMM_METHOD_FAST;
+        settings.iterations = 80;
+        settings.substeps = k ? 1 : 2;
+        MUST(world, sadmm_world_set_settings(world, &settings));
+        settings.certificate_tolerance = 1e-3;
+        settings.certificate_momentum_tolerance = 1e-3;
+        settings.check_period = 5;
+        if (k) step_short(world, 2); /* the first step is the host's, whose rule is for all islands together */
+        else step_world(world, 1);
+        MUST(world, sadmm_world_set_settings(world, &settings));
+    }
+    for (int step = 0; step < 8; ++step) {
+        MUST(whole, sadmm_world_step(whole));
+        const sadmm_settings settings = sadmm_world_settings(parts);
+        sadmm_settings half = settings;
+        int iterations = 0;
+        double mean = 0, depth = 0;
+        half.dt /= 2;
+        half.iterations /= 2;
+        MUST(parts, sadmm_world_set_settings(parts, &half));
+        for (int k = 0; k < 2; ++k) {
+            step_world(parts, 1);
+            const sadmm_step_report report = world_report(parts);
+            iterations += report.iterations;
+            mean += report.iterations_mean;
+            depth = fmax(depth, report.penetration_max);
+        }
+        MUST(parts, sadmm_world_set_settings(parts, &settings));
+        const sadmm_step_report report = world_report(whole);
+        ck_assert_msg(state_hash(whole) == state_hash(parts), "step %d", step);
+        /* where not all of them converged it is the budget of those with contacts */
+        if (report.converged) ck_assert_int_eq(report.iterations, iterations);
+        else ck_assert_int_ge(report.iterations, iterations);
+        ck_assert_double_eq(report.iterations_mean, mean);
+        ck_assert_double_eq(report.penetration_max, depth);
+    }
+    sadmm_world_destroy(whole);
+    sadmm_world_destroy(parts);
+}
+END_TEST
+
+/* A body that is finite after the first sub-step, and not after the second: the world stays before the step. */
+START_TEST(a_later_substep_that_fails)
+{
+    const int precision = _i;
+    sadmm_world *world = towers(2, 2, 0.5, precision), *other = towers(2, 2, 0.5, precision);
+    for (int k = 0; k < 2; ++k) {
+        sadmm_body_def def = sadmm_body_def_default();
+        sadmm_body_id feather;
+        def.mass = 1;
+        def.position[0] = 9;
+        def.name = "feather";
+        for (int i = 0; i < 3; ++i) def.inertia[i] = 1;
+        MUST(k ? other : world, sadmm_world_add_body(k ? other : world, &def, &feather));
+        use_fast(k ? other : world, 24);
+        use_substeps(k ? other : world, 4);
+    }
+    step_world(world, 5);
+    step_world(other, 5);
+    const sadmm_body_id feather = body_at(world, sadmm_world_body_count(world) - 1);
+    const sadmm_body_state state = body_state(world, feather);
+    sadmm_body_state far = state;
+    sadmm_settings settings = sadmm_world_settings(world);
+    /* 1.70e308 + 0.06e308 a sub-step: the largest number is 1.7977e308. In single precision the solver's velocities end
+     * at 3.4e38: there the first sub-step fails. */
+    settings.dt = 1;
+    far.position[0] = 1.7e308;
+    far.linear_velocity[0] = precision == SADMM_F64 ? 0.24e308 : 1e300;
+    MUST(world, sadmm_world_set_settings(world, &settings));
+    MUST(world, sadmm_world_set_body_state(world, feather, &far));
+    const uint64_t before = state_hash(world);
+    ck_assert_int_eq(sadmm_world_step(world), SADMM_ERROR_NON_FINITE);
+    ck_assert_msg(strstr(sadmm_world_message(world), "feather") != NULL, "%s", sadmm_world_message(world));
+    ck_assert(state_hash(world) == before);
+    ck_assert_int_eq(world_report(world).step, 5);
+    /* and on, as if nothing had been */
+    settings.dt = 0.005;
+    MUST(world, sadmm_world_set_settings(world, &settings));
+    for (int k = 0; k < 2; ++k) { /* a pose that is set counts as one, in both */
+        sadmm_body_state away = state;
+        away.position[0] += 1;
+        MUST(k ? other : world, sadmm_world_set_body_state(k ? other : world, feather, &away));
+    }
+    step_world(world, 3);
+    step_world(other, 3);
+    expect_same_world(world, other, "after the failure");
+    sadmm_world_destroy(world);
+    sadmm_world_destroy(other);
+}
+END_TEST
+
+/* Under sanitizers, on the emulated device, which is slow there: one precision. */
+int main(void)
+{
+    if (!find_cuda_tables(tables)) return TEST_SKIPPED;
+    const int parts = tested_precisions();
+    Suite *suite = suite_create("cuda_substeps");
+    ADD_CASE(suite, resident_substeps_equal_those_by_host, 0, parts * CASES);
+    ADD_CASE(suite, substeps_equal_short_steps, 0, parts);
+    ADD_CASE(suite, enqueued_substeps_equal_single_steps, 0, parts);
+    ADD_CASE(suite, changes_between_steps_equal_those_by_host, 0, parts);
+    ADD_CASE(suite, a_shape_leaves_its_reach, 0, parts);
+    ADD_CASE(suite, tiers_agree, 0, 2 * parts);
+    ADD_CASE(suite, a_stop_rule_ends_each_substep, 0, parts);
+    ADD_CASE(suite, a_later_substep_that_fails, 0, parts);
+    return run_cuda_suite(suite);
+}

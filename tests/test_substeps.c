@@ -1,0 +1,2 @@
+#include "scene_tools.h"
+int main(void){return 0;}
