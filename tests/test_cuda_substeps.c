@@ -1,6 +1,6 @@
-/* Sub-steps of steps that the device makes alone (sadmm_settings.substeps, backend_cuda/device/step.h): against the same
- * kernels driven by the host, and against steps of dt / substeps, to the last bit, however the steps were enqueued,
- * planned or repeated. The same checks run on the emulated device (test_cuda_substeps_emulated.c).
+/* Sub-steps of steps that the device makes alone (sadmm_settings.substeps, backend_cuda/device/step.h): against the
+ * same kernels driven by the host, and against steps of dt / substeps, to the last bit, however the steps were
+ * enqueued, planned or repeated. The same checks run on the emulated device (test_cuda_substeps_emulated.c).
  */
 #include "between_steps.h"
 #include "cuda_worlds.h"
@@ -139,8 +139,8 @@ START_TEST(changes_between_steps_equal_those_by_host)
 }
 END_TEST
 
-/* A force sets a box off in mid-air, so fast that it leaves what the first sub-step thought it might reach, then it hits
- * others. Before it hits there are no contacts: nothing but the reach can have been the reason to repeat a step. */
+/* A force sets a box off in mid-air, so fast that it leaves what the first sub-step thought it might reach, then it
+ * hits others. Before it hits there are no contacts: nothing but the reach can have been why a step was repeated. */
 START_TEST(a_shape_leaves_its_reach)
 {
     const int precision = _i;

@@ -19,6 +19,9 @@ enum {
  * step, so that the broad phase runs once a step unless velocities change much in it. */
 #define ENLARGED_BY 0.1
 #define STEPS_AHEAD 4
+/* How far sub-steps look, as a share of the way that is left: the first one farthest, so that no later one finds, by
+ * its rounding, what that one has not. */
+#define SUBSTEPS_AHEAD 1.1
 /* Ask the broad phase for single shapes up to one in so many: a query costs as much as some ten of a sweep over all. */
 enum { ONE_BY_ONE = 8 };
 
@@ -67,12 +70,18 @@ static bool contains(const struct sadmm_box3 *outer, const struct sadmm_box3 *in
     return true;
 }
 
+/* What the shape goes until its last sub-step, and a little more. */
+static double way_left(const struct sadmm_collision_input *input, double velocity)
+{
+    return SUBSTEPS_AHEAD * input->substeps_left * (input->dt * velocity);
+}
+
 /* Where will the shape be in its last sub-step? */
 static void move_on(const struct sadmm_box3 *box, const struct sadmm_proxy *p,
                     const struct sadmm_collision_input *input, struct sadmm_box3 *last)
 {
     for (int k = 0; k < 3; ++k) {
-        const double way = input->substeps_left * (input->dt * p->velocity[k]);
+        const double way = way_left(input, p->velocity[k]);
         last->lo[k] = box->lo[k] + way;
         last->hi[k] = box->hi[k] + way;
     }
@@ -95,7 +104,7 @@ static void enlarge(const struct sadmm_box3 *box, const struct sadmm_proxy *p,
     double radius = p->system_body >= 0 ? geometry_radius(&p->geometry) : 0;
     for (int k = 0; k < 3; ++k) {
         const double dt = input->dt * (1 + input->substeps_left),
-                     most = fmax(radius, fabs(input->substeps_left * (input->dt * p->velocity[k])));
+                     most = fmax(radius, fabs(way_left(input, p->velocity[k])));
         double way = fmin(fmax(STEPS_AHEAD * dt * p->velocity[k], -most), most);
         larger->lo[k] = box->lo[k] - ENLARGED_BY * radius + fmin(way, 0.0);
         larger->hi[k] = box->hi[k] + ENLARGED_BY * radius + fmax(way, 0.0);
