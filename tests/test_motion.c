@@ -78,7 +78,7 @@ static void check_head(const json_t *document, const char *scene, const char *ki
         ck_assert_str_eq(text_of(row, "scene"), scene);
         ck_assert_str_eq(text_of(row, "backend"), "cpu");
         ck_assert_str_eq(text_of(row, "status"), "ok");
-        ck_assert(real_of(row, "substeps") == 1 && real_of(row, "threads") == 1);
+        ck_assert(real_of(row, "threads") == 1);
         ck_assert(real_of(row, "ms_per_simulated_second") > 0);
         const double quantiles[] = {0, real_of(row, "overlap_median"), real_of(row, "overlap_p99"),
                                     real_of(row, "overlap_p999"), real_of(row, "overlap_max"), 1};
@@ -105,6 +105,7 @@ START_TEST(rolling_has_the_error_of_semi_implicit_euler)
     for (int h = 0; h <= 2; ++h) {
         const double dt = 0.005 / (1 << h);
         const json_t *row = row_of(document, dt, 50);
+        ck_assert(real_of(row, "substeps") == 1);
         const double error = sqrt(1.4) * a * 1 * (dt - reference) / 2;
         /* 1e-4: the turn's sine, (d / r)^2 / 24. */
         ck_assert_double_eq_tol(real_of(row, "error") / error, 1, 1e-4 + pow(error / 0.1, 2) / 24);
@@ -211,6 +212,30 @@ START_TEST(bad_options_are_refused)
 }
 END_TEST
 
+/* Sub-steps of a fourth have the error of steps of a fourth: the same trajectory. */
+START_TEST(substeps_have_the_error_of_short_steps)
+{
+    json_t *document = run_json("--scene rolling --precision f64 --seconds 1 --halvings 2 --substeps 1,4 "
+                                "--iterations 40,160 --match 0 --reference-iterations 100 --repeats 1");
+    const json_t *found[2] = {NULL, NULL};
+    size_t k;
+    json_t *row;
+    check_head(document, "rolling", "trajectory", 12);
+    json_array_foreach(json_object_get(document, "rows"), k, row) {
+        const bool whole = fabs(real_of(row, "dt") - 0.005) < 1e-9;
+        if (real_of(row, "substeps") == 4 && whole && real_of(row, "iterations") == 160) found[0] = row;
+        if (real_of(row, "substeps") == 1 && fabs(real_of(row, "dt") - 0.00125) < 1e-9 &&
+            real_of(row, "iterations") == 40)
+            found[1] = row;
+    }
+    ck_assert(found[0] && found[1]);
+    for (const char *const *name = (const char *const[]){"error", "error_step", "error_solver", NULL}; *name; ++name)
+        ck_assert_msg(real_of(found[0], *name) == real_of(found[1], *name), "%s: %g and %g", *name,
+                      real_of(found[0], *name), real_of(found[1], *name));
+    json_decref(document);
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("motion");
@@ -218,6 +243,7 @@ int main(void)
     tcase_set_timeout(cases, 60);
     tcase_add_test(cases, rolling_has_the_error_of_semi_implicit_euler);
     tcase_add_test(cases, kicked_cubes_have_the_error_of_their_distance);
+    tcase_add_test(cases, substeps_have_the_error_of_short_steps);
     tcase_add_test(cases, heap);
     tcase_add_test(cases, table);
     tcase_add_loop_test(cases, bad_options_are_refused, 0, sizeof refused / sizeof *refused);

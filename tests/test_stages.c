@@ -47,6 +47,38 @@ static struct sadmm_plan contacts_plan(const sadmm_settings *settings, bool warm
     return plan;
 }
 
+/* A step of three sub-steps: what finds, solves and moves comes three times, in the same order each time, with a turn
+ * between two; the rest once, at the ends. A solve alone has none. */
+START_TEST(substeps_repeat_what_a_step_does)
+{
+    static struct list one, three;
+    sadmm_settings settings = sadmm_settings_default();
+    settings.certify = true;
+    settings.iterations = 20; /* of a sub-step */
+    const struct sadmm_plan plan = contacts_plan(&settings, false);
+    take_list(&one, &plan, &settings, true, 0);
+    ck_assert_int_eq(count_of(&one, SADMM_STAGE_TURN), 0);
+    settings.substeps = 3;
+    take_list(&three, &plan, &settings, true, 0);
+    const int body = one.count - 3; /* without GATHER, CERTIFY, COMMIT */
+    ck_assert_int_eq(three.count, 3 * body + 2 + 3);
+    ck_assert_int_eq(three.stages[0].kind, SADMM_STAGE_GATHER);
+    ck_assert_int_eq(three.stages[three.count - 2].kind, SADMM_STAGE_CERTIFY);
+    ck_assert_int_eq(three.stages[three.count - 1].kind, SADMM_STAGE_COMMIT);
+    for (int k = 0; k < 3; ++k) {
+        for (int i = 0; i < body; ++i) {
+            const struct sadmm_stage *a = &one.stages[1 + i], *b = &three.stages[1 + k * (body + 1) + i];
+            ck_assert_int_eq(a->kind, b->kind);
+            ck_assert(a->count == b->count && a->done == b->done && a->last == b->last);
+        }
+        if (k < 2) ck_assert_int_eq(three.stages[(k + 1) * (body + 1)].kind, SADMM_STAGE_TURN);
+    }
+    take_list(&three, &plan, &settings, false, 0);
+    ck_assert_int_eq(count_of(&three, SADMM_STAGE_TURN), 0);
+    ck_assert_int_eq(count_of(&three, SADMM_STAGE_LIMIT), 1);
+}
+END_TEST
+
 START_TEST(a_world_without_constraints)
 {
     static struct list list;
@@ -171,6 +203,7 @@ int main(void)
 {
     Suite *suite = suite_create("stages");
     TCase *cases = tcase_create("stages");
+    tcase_add_test(cases, substeps_repeat_what_a_step_does);
     tcase_add_test(cases, a_world_without_constraints);
     tcase_add_test(cases, a_solve_has_nothing_of_a_world);
     tcase_add_test(cases, everything_stands_where_it_is_due);

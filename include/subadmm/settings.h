@@ -51,12 +51,13 @@ enum { SADMM_MOST_SUBSTEPS = 64 };
  * in impulses and converts (beta_impulse = dt^2 beta_paper, docs/algorithm.md). */
 typedef struct sadmm_settings {
     double dt;                   /* time step, s, in [1e-6, 1]; default 0.005. It may change from step to step */
-    int substeps;                /* of a world's step, in [1, SADMM_MOST_SUBSTEPS], dt / substeps >= 1e-6 s; default 1. A
-                                    step is made of so many sub-steps of dt / substeps with a share of `iterations`
-                                    each; what overlaps of bodies in motion come from shrinks with them (docs/motion.md).
-                                    Pairs of shapes that may touch are found once a step, all else in every sub-step.
-                                    States are those of `substeps` steps of dt / substeps, for less; wrenches set from
-                                    outside act through all of them. Problems have none */
+    int substeps;                /* of a world's step, in [1, SADMM_MOST_SUBSTEPS = 64], dt / substeps >= 1e-6 s;
+                                    default 1. A step is made of so many sub-steps of dt / substeps with a share of
+                                    `iterations` each, so that bodies in motion overlap less (docs/motion.md). Pairs of
+                                    shapes that may touch are looked for once a step, all else is done in every
+                                    sub-step: states are those of `substeps` steps of dt / substeps, for less. External
+                                    wrenches act through all of them. What is read of a step: world.h. Problems have
+                                    none */
     double gravity[3];           /* m/s^2, world frame, finite, norm <= 1e6; default (0, 0, -9.81) */
 
     sadmm_method method;         /* default SADMM_METHOD_FAST: the same solutions in fewer iterations that cost the same

@@ -57,7 +57,7 @@ SADMM_API void sadmm_world_destroy(sadmm_world *world); /* NULL is fine */
  * call. */
 SADMM_API const char *sadmm_world_message(const sadmm_world *world);
 
-/* Replace or read the settings; they take effect at the next step. Steps of another length (dt) go on with the forces
+/* Replace or read the settings; they take effect at the next step. (Sub-)steps of another length go on with the forces
  * of the last one. Numbers (dt, gravity, relaxation, penalties, tolerances, error correction) may change at every step;
  * where steps run ahead (sadmm_world_step_async), a change of anything else, e.g. of iterations, waits for the steps
  * begun. Errors: INVALID_ARGUMENT (nothing changes). The settings of NULL are the default ones. */
@@ -121,7 +121,8 @@ SADMM_API sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id
 SADMM_API sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, const double force[3],
                                                    const double torque[3]);
 /* Sum of the contact wrenches of the last step on the body: force (N), then torque about its centre of mass
- * (N m), world frame (eq. 12). Errors: STALE_ID, UNAVAILABLE when settings.recover_wrenches was false. */
+ * (N m), world frame (eq. 12). With sub-steps their mean, so that dt times it is what contacts gave the body in the
+ * step. Errors: STALE_ID, UNAVAILABLE when settings.recover_wrenches was false. */
 SADMM_API sadmm_status sadmm_world_body_contact_wrench(sadmm_world *world, sadmm_body_id id, double wrench[6]);
 /* Turn contact between two bodies off or on again (default on). Errors: STALE_ID, INVALID_ARGUMENT (a and b the same),
  * OUT_OF_MEMORY. */
@@ -180,9 +181,10 @@ SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_s
  * first step from nothing. So the same states, reached in another way or set again, go on alike but not bit for bit; a
  * run that is to be repeated bit for bit begins with a new world. */
 
-/* One time step of settings.dt. Errors: OUT_OF_MEMORY, NON_FINITE (state rolled back to before the step, message names
- * the body), DEVICE, LIMIT. After an error the world is as before the step and stays usable. NON_FINITE also where
- * settings.certify asks for a certificate of numbers whose products overflow; on CUDA that step counts as done.
+/* One time step of settings.dt, with all of its sub-steps (settings.substeps), or none of it. Errors: OUT_OF_MEMORY,
+ * NON_FINITE (state rolled back to before the step, message names the body), DEVICE, LIMIT. After an error the world is
+ * as before the step and stays usable. NON_FINITE also where settings.certify asks for a certificate of numbers whose
+ * products overflow; on CUDA that step counts as done.
  *
  * DEVICE: a call of the device failed; any function that waits for steps begun may return it, once. Everything the
  * world had on the device is given up, and the next step loads the world into a new context. Where the device still
@@ -211,6 +213,8 @@ SADMM_API sadmm_status sadmm_world_wait(sadmm_world *world);
  * the total of a step begun with sadmm_world_step_async. */
 typedef struct sadmm_phase_times { double total, collide, assemble, solve, finish; } sadmm_phase_times;
 
+/* With sub-steps: contacts, pairs, residual and certificate are the last one's; iterations, iterations_mean and times
+ * sums over all of them; limited, penetration_max and certificate.islands_above the most of any; converged: all. */
 typedef struct sadmm_step_report {
     sadmm_backend backend;
     sadmm_precision precision;
@@ -246,6 +250,7 @@ typedef struct sadmm_step_report {
 /* The report of the last step (zeroed before the first). Waits for steps; errors: those of the steps waited for. */
 SADMM_API sadmm_status sadmm_world_report(sadmm_world *world, sadmm_step_report *report);
 
+/* With sub-steps: of the last one, and so are the length of the step and its start. */
 typedef struct sadmm_contact {
     sadmm_body_id body_a, body_b;
     sadmm_shape_id shape_a, shape_b;
@@ -275,9 +280,9 @@ SADMM_API sadmm_status sadmm_world_state_hash(sadmm_world *world, uint64_t *hash
  * a NULL world: "", 0. Waits for steps; the error of one is left for the next call that returns a status. */
 SADMM_API size_t sadmm_world_explain(sadmm_world *world, char *text, size_t size);
 
-/* Freeze the contact problem of the last step (bodies, contacts, its starting values) into `problem`. The k-th
- * dynamic body in slot order is body k. Errors: UNAVAILABLE before the first step, after a removal, and where a failed
- * step took the last one's contacts along (sadmm_world_contact_count); OUT_OF_MEMORY. */
+/* Freeze the contact problem of the last step, or sub-step (bodies, contacts, its starting values), into `problem`.
+ * The k-th dynamic body in slot order is body k. Errors: UNAVAILABLE before the first step, after a removal, and where
+ * a failed step took the last one's contacts along (sadmm_world_contact_count); OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_freeze(sadmm_world *world, sadmm_problem *problem);
 
 #ifdef __cplusplus
