@@ -28,6 +28,14 @@ namespace {
 
 using Tree = fcl::DynamicAABBTreeCollisionManager<double>;
 
+/* FCL multiplies sizes and crashes where these overflow. Coordinates are cut to what it can take: boxes that overlap
+ * still do, and those that do not are sorted out by the callback. */
+constexpr double farthest = 1e75;
+
+/* What is no number reaches everywhere. */
+double lower(double x) { return x > -farthest ? (x < farthest ? x : farthest) : -farthest; }
+double upper(double x) { return x < farthest ? (x > -farthest ? x : -farthest) : farthest; }
+
 struct Proxy : fcl::CollisionObject<double> {
     Proxy(const std::shared_ptr<fcl::CollisionGeometry<double>> &geometry, uint32_t slot_)
         : fcl::CollisionObject<double>(geometry), slot(slot_)
@@ -35,8 +43,10 @@ struct Proxy : fcl::CollisionObject<double> {
     }
     void place(const sadmm_box3 &box)
     {
-        aabb.min_ = fcl::Vector3<double>(box.lo[0], box.lo[1], box.lo[2]);
-        aabb.max_ = fcl::Vector3<double>(box.hi[0], box.hi[1], box.hi[2]);
+        for (int k = 0; k < 3; ++k) {
+            aabb.min_[k] = lower(box.lo[k]);
+            aabb.max_[k] = upper(box.hi[k]);
+        }
     }
     uint32_t slot;
     int32_t group = 0;
