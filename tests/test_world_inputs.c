@@ -268,6 +268,8 @@ START_TEST(bad_settings_are_refused)
         size_t offset;
         int value;
     } bad[] = {
+        { "substeps", offsetof(sadmm_settings, substeps), 0 },
+        { "substeps", offsetof(sadmm_settings, substeps), 65 },
         { "iterations", offsetof(sadmm_settings, iterations), 0 },
         { "iterations", offsetof(sadmm_settings, iterations), -5 },
         { "iterations", offsetof(sadmm_settings, iterations), 1000001 },
@@ -634,6 +636,32 @@ START_TEST(a_step_that_is_not_finite_is_rolled_back)
 }
 END_TEST
 
+/* Any finite velocity is taken: one that leads nowhere fails, or makes a step, and is over. */
+START_TEST(the_largest_velocities)
+{
+    for (int k = 0; k < 2; ++k) {
+        sadmm_world_def def = small_def();
+        def.settings.substeps = k ? 4 : 1;
+        sadmm_world *world = create_world(&def);
+        for (int i = 0; i < 2; ++i) {
+            sadmm_body_def body = box_body(1 + i);
+            sadmm_shape_def box = box_shape();
+            sadmm_body_id id;
+            MUST(world, sadmm_world_add_body(world, &body, &id));
+            MUST(world, sadmm_world_add_shape(world, id, &box, NULL));
+            sadmm_body_state state = body_state(world, id);
+            state.linear_velocity[1] = DBL_MAX;
+            MUST(world, sadmm_world_set_body_state(world, id, &state));
+        }
+        for (int step = 0; step < 3; ++step) {
+            const sadmm_status status = sadmm_world_step(world);
+            ck_assert_msg(status == SADMM_OK || status == SADMM_ERROR_NON_FINITE, "%s", sadmm_status_name(status));
+        }
+        sadmm_world_destroy(world);
+    }
+}
+END_TEST
+
 /* ---- memory that runs out, at every allocation in turn ---- */
 
 static void expect_out_of_memory(const sadmm_world *world, sadmm_status status)
@@ -736,6 +764,7 @@ START_TEST(steps_without_memory)
     long n, failures = 0;
 
     if (_i == 1) settings.certify = settings.measure_residuals = true; /* with their own workspaces */
+    if (_i == 2) settings.substeps = 3; /* memory runs out in any of them */
     MUST(w.world, sadmm_world_set_settings(w.world, &settings));
     MUST(other.world, sadmm_world_set_settings(other.world, &settings));
     for (int i = 0; i < 30; ++i) {
@@ -799,10 +828,11 @@ int main(void)
     tcase_add_test(values, many_bodies_come_and_go);
     tcase_add_loop_test(values, an_empty_world_steps, 0, 2);
     tcase_add_test(values, a_step_that_is_not_finite_is_rolled_back);
+    tcase_add_test(values, the_largest_velocities);
     tcase_add_test(memory, creation_without_memory);
     tcase_add_loop_test(memory, scenes_without_memory, 0, 2);
     tcase_add_test(memory, adding_without_memory);
-    tcase_add_loop_test(memory, steps_without_memory, 0, 2);
+    tcase_add_loop_test(memory, steps_without_memory, 0, 3);
     tcase_add_test(memory, freezing_without_memory);
     tcase_set_timeout(memory, 60);
     suite_add_tcase(suite, values);

@@ -131,7 +131,8 @@ static void must_be_sound(struct machine *m)
         MUST(isfinite(c->ncp_max) && c->ncp_max >= 0 && isfinite(c->ncp_mean) && c->ncp_mean >= 0 &&
                  isfinite(c->momentum_max) && c->momentum_max >= 0 && isfinite(c->siconos) && c->siconos >= 0,
              "natural map %g, mean %g, momentum %g, siconos %g", c->ncp_max, c->ncp_mean, c->momentum_max, c->siconos);
-    MUST(report.iterations >= 0 && report.iterations <= sadmm_world_settings(m->world).iterations, "%d iterations",
+    const sadmm_settings settings = sadmm_world_settings(m->world);
+    MUST(report.iterations >= 0 && report.iterations <= settings.iterations + settings.substeps - 1, "%d iterations",
          report.iterations);
     MUST(contacts <= MAX_CONTACTS, "%d contacts", contacts);
     MUST(sadmm_world_contacts(m->world, 0, contacts, m->contacts) == SADMM_OK, "contacts");
@@ -189,7 +190,10 @@ static sadmm_settings take_settings(struct machine *m, sadmm_settings s)
         case 20: s.correction_speed = take_number(in, 0, 1e3); break;
         case 21: s.restitution_threshold = take_number(in, 0, 10); break;
         case 22: s.threads = take_choice(in, 4) - 1; break;
-        default: s.gravity[2] = 0; break;
+        default:
+            if (take_choice(in, 2)) s.substeps = take_choice(in, 6);
+            else s.gravity[2] = 0;
+            break;
         }
     return s;
 }

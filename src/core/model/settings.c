@@ -120,7 +120,7 @@ sadmm_status sadmm_settings_validate(const struct sadmm_settings *s, struct sadm
 sadmm_settings sadmm_settings_of_substep(const sadmm_settings *whole)
 {
     sadmm_settings s = *whole;
-    if (s.substeps == 1) return s;
+    if (s.substeps <= 1) return s; /* 0: of no step yet */
     s.dt = whole->dt / whole->substeps;
     s.iterations = whole->iterations / whole->substeps + (whole->iterations % whole->substeps > 0);
     return s;
