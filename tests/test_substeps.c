@@ -362,6 +362,7 @@ START_TEST(explain_says_so)
     char text[2048];
     struct sadmm_scene scene;
     sadmm_world *world = open_world(1, "vertical_stacks:2", 20, &scene);
+    ck_assert_uint_gt(sadmm_world_explain(world, text, sizeof text), 0); /* of no step yet */
     step_world(world, 1);
     sadmm_world_explain(world, text, sizeof text);
     ck_assert_msg(!strstr(text, "sub-steps"), "%s", text);
