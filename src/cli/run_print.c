@@ -98,6 +98,7 @@ json_t *run_record_json(const struct run_record *record, const char *spec, const
     json_object_set_new(o, "contacts", contacts_json(record));
     json_object_set_new(o, "steps", json_integer((json_int_t)record->steps));
     json_object_set_new(o, "dt", cli_json_real(scene->def.settings.dt));
+    json_object_set_new(o, "substeps", json_integer(scene->def.settings.substeps));
     json_object_set_new(o, "iterations", json_integer(scene->def.settings.iterations));
     json_object_set_new(o, "warm_start", json_boolean(scene->def.settings.warm_start));
     set_or_null(o, "threads", record, json_integer(last->threads));
@@ -126,8 +127,9 @@ void run_record_print(const struct run_record *record, const char *spec, const s
     const sadmm_step_report *last = &record->last;
     const sadmm_certificate *c = &last->certificate;
     printf("scene          %s, %zu bodies\n", spec, record->body_count);
-    printf("steps          %zu of %g s%s\n", record->steps, scene->def.settings.dt,
-           interrupted() ? ", interrupted" : "");
+    printf("steps          %zu of %g s", record->steps, scene->def.settings.dt);
+    if (scene->def.settings.substeps > 1) printf(" in %d sub-steps", scene->def.settings.substeps);
+    printf("%s\n", interrupted() ? ", interrupted" : "");
     if (record->steps > 0) {
         printf("backend        %s %s, %d thread%s, %d iterations a step (%s)\n", cli_backend_name(last->backend),
                cli_precision_name(last->precision), last->threads, last->threads == 1 ? "" : "s",
