@@ -53,8 +53,8 @@ static void print_head(const struct motion_study *s, const char *runs_on, FILE *
                  "step: of those to the reference\n\n");
     fprintf(out, "%-4s %8s %4s %5s %9s  | %8s %8s %8s %8s | %8s %8s %8s %8s %8s %8s  %s\n", "", "", "sub-", "",
             "ms per", "error,", "at", "of the", "of the", "overlap,", "", "", "at", "pairs a", "deeper", "");
-    fprintf(out, "%-4s %8s %4s %5s %9s  | %8s %8s %8s %8s | %8s %8s %8s %8s %8s %8s  %s\n", "", "dt, ms",
-            "step", "it.", "sim. s", "mm", "most", "solver", "step", "mm: 50 %", "99 %", "99.9 %", "most", "frame", "than 1 %", "");
+    fprintf(out, "%-4s %8s %4s %5s %9s  | %8s %8s %8s %8s | %8s %8s %8s %8s %8s %8s  %s\n", "", "dt, ms", "step", "it.",
+            "sim. s", "mm", "most", "solver", "step", "mm: 50 %", "99 %", "99.9 %", "most", "frame", "than 1 %", "");
 }
 
 void motion_print(const struct motion_study *s, const char *runs_on, FILE *out)
@@ -123,7 +123,8 @@ static json_t *row_json(const struct motion_plan *plan, const struct motion_row 
     json_t *o = json_pack("{s:s, s:s, s:s, s:s, s:i, s:i, s:i, s:i, s:s}", "scene", plan->spec, "backend", info.name,
                           "precision", bench_precision_name(setting->precision), "method",
                           bench_word_of(bench_methods, (int)setting->method), "threads", row->threads, "substeps",
-                          setting->substeps, "iterations", setting->iterations, "runs", row->runs, "status", row->status);
+                          setting->substeps, "iterations", setting->iterations, "runs", row->runs, "status",
+                          row->status);
     if (!o) return NULL;
     set_real(o, "dt", row->dt);
     set_real(o, "ms_per_simulated_second", row->ms_median);

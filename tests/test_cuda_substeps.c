@@ -173,6 +173,37 @@ START_TEST(a_shape_leaves_its_reach)
 }
 END_TEST
 
+/* So many shapes that candidates are looked for in a tree, and sorted by their bits: pairs of balls that roll off each
+ * other in the air, at a few metres a second so that they come across others. */
+START_TEST(many_shapes)
+{
+    enum { SIDE = 80 }; /* 6,400: 6,144 and more take the tree */
+    const int precision = _i;
+    sadmm_world *worlds[2];
+    for (int k = 0; k < 2; ++k) {
+        sadmm_world_def def = between_def(0.005, 9.81);
+        def.precision = (sadmm_precision)precision;
+        def.settings.iterations = 6;
+        def.settings.substeps = 3;
+        worlds[k] = create_world(&def);
+        for (int i = 0; i < SIDE * SIDE; ++i) {
+            const double x = 0.13 * (i % SIDE) - (i % 2 ? 0.035 : 0), y = 0.13 * (i / SIDE);
+            const sadmm_body_id id = add_solid(worlds[k], SADMM_SHAPE_SPHERE, x, y, 0.02 * (i % 3), 0.05, 1, 0.5);
+            sadmm_body_state state = body_state(worlds[k], id);
+            state.linear_velocity[i % 2] = i % 5 - 2;
+            MUST(worlds[k], sadmm_world_set_body_state(worlds[k], id, &state));
+        }
+        use_device(worlds[k], precision, 0);
+    }
+    by_host(worlds[0]);
+    for (int step = 0; step < (EMULATED ? 2 : 20); ++step)
+        for (int k = 0; k < 2; ++k) MUST(worlds[k], sadmm_world_step(worlds[k]));
+    expect_same_world(worlds[0], worlds[1], "many shapes");
+    ck_assert_int_gt(world_report(worlds[1]).contacts, 1000);
+    for (int k = 0; k < 2; ++k) sadmm_world_destroy(worlds[k]);
+}
+END_TEST
+
 /* Whatever the tier, and with the stop rule, where each island stops by itself. */
 START_TEST(tiers_agree)
 {
@@ -316,6 +347,7 @@ int main(void)
     ADD_CASE(suite, enqueued_substeps_equal_single_steps, 0, parts);
     ADD_CASE(suite, changes_between_steps_equal_those_by_host, 0, parts);
     ADD_CASE(suite, a_shape_leaves_its_reach, 0, parts);
+    ADD_CASE(suite, many_shapes, 0, EMULATED ? 1 : parts);
     ADD_CASE(suite, tiers_agree, 0, 2 * parts);
     ADD_CASE(suite, a_stop_rule_ends_each_substep, 0, parts);
     ADD_CASE(suite, a_later_substep_that_fails, 0, parts);

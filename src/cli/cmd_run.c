@@ -39,7 +39,8 @@ static const struct cli_option options[] = {
     [OPTION_JSON] = {"json", "[FILE|-]", "write JSON to FILE, or to standard output (-, the default)"},
     [OPTION_TRACE] = {"trace", "FILE", "write every body's state after every step as CSV (-: to standard output)"},
     [OPTION_DUMP] = {"dump-problem", "STEP:FILE",
-                     "write the contact problem of a step (1: the first), of its last sub-step, as FCLIB HDF5; up to 16"},
+                     "write the contact problem of a step (1: the first; of its last sub-step) as FCLIB HDF5; "
+                     "up to 16"},
     [OPTION_QUIET] = {"quiet", NULL, "no progress, no table"},
 };
 

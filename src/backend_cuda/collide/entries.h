@@ -36,8 +36,8 @@ sadmm_status COLLISION(attach)(struct sadmm_cuda_collision *collision, void *str
                                int32_t *abort_code, const double *dt, const double *gravity,
                                struct sadmm_error *error);
 /* Capacity for so many candidates and points in both sets, or all three where a step has sub-steps; they keep what they
- * hold. 0: what a scene of this size is
- * likely to need. Everything enqueued must be done. *candidates and *points: the capacities now, at least as much. */
+ * hold. 0: what a scene of this size is likely to need. Everything enqueued must be done. *candidates and *points: the
+ * capacities now, at least as much. */
 sadmm_status COLLISION(reserve)(struct sadmm_cuda_collision *collision, bool substeps, int64_t *candidates,
                                 int64_t *points, struct sadmm_error *error);
 /* Launches alone, so that a graph may record them: find contacts. The
