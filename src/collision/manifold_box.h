@@ -1,7 +1,8 @@
 /* Box against box: separating axis test over 6 face axes and 9 edge axes, then
  *
  *   face axis   points of the clipped incident face, up to 8 (manifold_box_face.h)
- *   edge axis   closest points of the two edges, or the ends of a line contact (manifold_box_edge.h)
+ *   edge axis   closest points of the two edges, or the ends of a line contact (manifold_box_edge.h), and the points
+ *               of the faces beside them that are within reach
  *
  * Boxes that are apart and meet by corners (no point in the clipped face, edges that do not cross) get the closest
  * points of the two boxes.
@@ -215,30 +216,6 @@ SADMM_INLINE void box_vertex_manifold(const struct box_pair *b, int axis, int ne
     manifold_add(m, p, separation, box_feature_vertex(!of_1, bits));
 }
 
-/* Contacts of an axis; the number of points. *crossing: false when an edge axis has its points at an end. */
-SADMM_INLINE int box_axis_manifold(const struct box_pair *b, int axis, int negative, bool *crossing,
-                                   struct manifold *m)
-{
-    *crossing = true;
-    if (axis < 6) {
-        m->cache = (uint32_t)(axis + 1) | (negative ? BOX_AXIS_NEGATIVE : 0u);
-        box_face_manifold(b, axis, negative, m);
-    } else {
-        *crossing = box_edge_manifold(b, axis, negative, m);
-        m->cache = (uint32_t)(axis + 1) | manifold_direction_bits(m->normal);
-    }
-    return m->count;
-}
-
-/* Contacts of an axis, if it has any within the limit. (Edges may turn out to be farther apart than their axis
- * said.) */
-SADMM_INLINE bool box_axis_has_contacts(const struct box_pair *b, int axis, int negative, struct manifold *m)
-{
-    bool crossing;
-    return box_axis_manifold(b, axis, negative, &crossing, m) > 0 &&
-           m->points[m->count - 1].separation <= b->limit + b->slack;
-}
-
 /* Boxes apart whose closest features are a corner of 1 and the inside of the best face, one of 2? (That corner is on no
  * edge of 2, which box_corner_manifold handles.) */
 SADMM_INLINE bool box_corner_over_face(const struct box_pair *b, const struct box_axes *axes)
@@ -253,12 +230,39 @@ SADMM_INLINE bool box_corner_over_face(const struct box_pair *b, const struct bo
     return true;
 }
 
+/* The face that an edge axis is completed by: the one nearest to the normal, unless what lies beyond half the thinner
+ * box's extent to the side of the crossing is out of reach; -1: none. */
+SADMM_INLINE int box_facing_axis(const struct box_pair *b, vec3 n, real separation)
+{
+    real cosine = 0, sine;
+    int axis, nearest = -1;
+    for (axis = 0; axis < 6; ++axis) {
+        real c = real_abs(v3_dot(box_axis_direction(b, axis, 0), n));
+        if (c > cosine) {
+            cosine = c;
+            nearest = axis;
+        }
+    }
+    sine = real_sqrt(real_max(0, 1 - cosine * cosine));
+    return sine * b->thin / 2 <= b->limit - separation ? nearest : -1;
+}
+
+/* Which axis is asked for contacts. */
+enum box_turn {
+    BOX_PREFERRED,
+    BOX_OVER_FACE, /* a corner over a face, apart */
+    BOX_BETTER,    /* the preferred axis has no points although the boxes overlap: better ones, not preferred, may */
+    BOX_OTHER,
+    BOX_COMPLETE   /* the faces beside a crossing of edges */
+};
+
 SADMM_INLINE void manifold_box_box(vec3 half1, vec3 half2, const struct pair_pose *pose, real limit, uint32_t cache,
                                    struct manifold *m)
 {
     struct box_pair b;
     struct box_axes axes;
-    bool use_edge, crossing;
+    enum box_turn turn = BOX_PREFERRED;
+    bool edge_first;
     int axis, negative;
     real s;
 
@@ -270,34 +274,70 @@ SADMM_INLINE void manifold_box_box(vec3 half1, vec3 half2, const struct pair_pos
     axes.keep = MANIFOLD_KEEP_EXTENT * b.thin;
     if (!box_test_faces(&b, &axes) || !box_test_edges(&b, &axes)) return;
 
-    use_edge = box_prefers_edge(&b, &axes);
-    axis = use_edge ? axes.edge : axes.face;
-    negative = use_edge ? axes.edge_negative : axes.negative[axes.face];
-    s = use_edge ? axes.s_edge : axes.separation[axes.face];
-    box_axis_manifold(&b, axis, negative, &crossing, m);
-    if (m->count > 0 && use_edge) s = m->points[m->count - 1].separation;
-    if (m->count == 0 || (s > 0 && (!crossing || s > limit))) {
-        if (s > 0) {
-            if (box_corner_over_face(&b, &axes))
-                box_axis_manifold(&b, axes.best_face, axes.negative[axes.best_face], &crossing, m);
-            else box_corner_manifold(&b, box_axis_direction(&b, axis, negative), m);
-        } else {
-            /* the preferred axis has no points: then a better one, which was not preferred, has */
-            int best = axes.best_face;
-            bool edge_first = axes.edge >= 0 && axes.s_edge > axes.separation[best];
-            int first = edge_first ? axes.edge : best, second = edge_first ? best : axes.edge;
-            int first_negative = edge_first ? axes.edge_negative : axes.negative[best];
-            int second_negative = edge_first ? axes.negative[best] : axes.edge_negative;
-            if (!box_axis_has_contacts(&b, first, first_negative, m) &&
-                (second < 0 || !box_axis_has_contacts(&b, second, second_negative, m))) {
-                m->cache = (uint32_t)(best + 1) | (axes.negative[best] ? BOX_AXIS_NEGATIVE : 0u);
-                /* Boxes that may be apart, by the angle of edges that count as parallel over the boxes' extents (slack
-                 * is those times 4 roundings): there may be nothing of the one over the face of the other. */
-                if (axes.separation[best] >= -real_sqrt(MANIFOLD_PARALLEL2) / SADMM_EPSILON * b.slack)
-                    box_corner_manifold(&b, box_axis_direction(&b, best, axes.negative[best]), m);
-                else box_vertex_manifold(&b, best, axes.negative[best], axes.separation[best], m);
+    if (box_prefers_edge(&b, &axes)) {
+        axis = axes.edge;
+        negative = axes.edge_negative;
+        s = axes.s_edge;
+    } else {
+        axis = axes.face;
+        negative = axes.negative[axis];
+        s = axes.separation[axis];
+    }
+    edge_first = axes.edge >= 0 && axes.s_edge > axes.separation[axes.best_face];
+
+    for (;;) {
+        bool crossing = true;
+        if (axis < 6) {
+            if (turn != BOX_COMPLETE) {
+                m->count = 0;
+                m->normal = box_axis_direction(&b, axis, negative);
+                m->cache = (uint32_t)(axis + 1) | (negative ? BOX_AXIS_NEGATIVE : 0u);
             }
+            box_face_manifold(&b, axis, negative, turn == BOX_COMPLETE, m);
+        } else {
+            crossing = box_edge_manifold(&b, axis, negative, m);
+            m->cache = (uint32_t)(axis + 1) | manifold_direction_bits(m->normal);
         }
+        if (turn == BOX_COMPLETE || turn == BOX_OVER_FACE) break;
+        if (turn == BOX_PREFERRED) {
+            if (m->count > 0 && axis >= 6) s = m->points[m->count - 1].separation;
+            if (m->count == 0 || (s > 0 && (!crossing || s > limit))) {
+                if (s <= 0) {
+                    turn = BOX_BETTER;
+                    axis = edge_first ? axes.edge : axes.best_face;
+                } else if (box_corner_over_face(&b, &axes)) {
+                    turn = BOX_OVER_FACE;
+                    axis = axes.best_face;
+                } else {
+                    box_corner_manifold(&b, box_axis_direction(&b, axis, negative), m);
+                    break;
+                }
+                negative = axis < 6 ? axes.negative[axis] : axes.edge_negative;
+                continue;
+            }
+        } else if (m->count == 0 || m->points[m->count - 1].separation > b.limit + b.slack) {
+            /* Edges may turn out to be farther apart than their axis said. */
+            if (turn == BOX_BETTER && axes.edge >= 0) {
+                turn = BOX_OTHER;
+                axis = edge_first ? axes.best_face : axes.edge;
+                negative = axis < 6 ? axes.negative[axis] : axes.edge_negative;
+                continue;
+            }
+            axis = axes.best_face;
+            negative = axes.negative[axis];
+            m->cache = (uint32_t)(axis + 1) | (negative ? BOX_AXIS_NEGATIVE : 0u);
+            /* Boxes that may be apart, by the angle of edges that count as parallel over the boxes' extents (slack
+             * is those times 4 roundings): there may be nothing of the one over the face of the other. */
+            if (axes.separation[axis] >= -real_sqrt(MANIFOLD_PARALLEL2) / SADMM_EPSILON * b.slack)
+                box_corner_manifold(&b, box_axis_direction(&b, axis, negative), m);
+            else box_vertex_manifold(&b, axis, negative, axes.separation[axis], m);
+            break;
+        }
+        if (axis < 6) break;
+        axis = box_facing_axis(&b, m->normal, m->points[m->count - 1].separation);
+        if (axis < 0) break;
+        negative = v3_dot(box_axis_direction(&b, axis, 0), m->normal) < 0;
+        turn = BOX_COMPLETE;
     }
     m->normal = v3_neg(m->normal);
 }

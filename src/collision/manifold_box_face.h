@@ -1,5 +1,7 @@
-/* Face axis: the face of the other box that points against the normal is clipped by the sides of the reference face
- * (Sutherland-Hodgman). The edges of the polygon carry labels, from which the features of its vertices follow. */
+/* Facing faces, seen along the normal: the face of the other box that points against the reference face is clipped by
+ * its sides (Sutherland-Hodgman). The edges of the polygon carry labels, from which the features of its vertices follow.
+ * The normal is the reference face's own, or that of an edge axis near it (manifold_box.h): then the incident face is
+ * projected onto the reference plane along the normal, and separations are along it. */
 #ifndef SADMM_COLLISION_MANIFOLD_BOX_FACE_H
 #define SADMM_COLLISION_MANIFOLD_BOX_FACE_H
 
@@ -35,12 +37,20 @@ SADMM_INLINE int clip_side(const struct clip_vertex *in, int count, int along_y,
     return n;
 }
 
+/* How the normal leans in the reference frame: its components along u and v over that along the face's own normal, and
+ * the latter. (0, 0, 1): it is the face's normal. */
+struct box_lean {
+    real u, v, cosine;
+};
+
 /* Points of reference face (axis k, side sg of the reference box hr) against the incident box (hi, axes: columns of R,
  * centre t, all in the reference frame). thin: the thinner extent of both. owner: 1 when the reference is box 2.
- * Positions are in the reference frame. Returns the number of points within the limit. */
-SADMM_INLINE int box_clip_face(const real hr[3], const real hi[3], const real R[3][3], const real t[3], int k, real sg,
-                               real limit, real thin, int owner, struct manifold *m)
+ * Appends points within the limit to m, which has others already in completions; positions are in the reference
+ * frame. */
+SADMM_INLINE void box_clip_face(const real hr[3], const real hi[3], const real R[3][3], const real t[3], int k, real sg,
+                                struct box_lean lean, real limit, real thin, int owner, struct manifold *m)
 {
+    int first = m->count;
     int u = k == 2 ? 0 : k + 1, v = u == 2 ? 0 : u + 1, j = 0, ju, jv, q, i, count = 4, base_bits, ref_bits;
     struct clip_vertex poly[12], other[12];
     int bits[4];
@@ -72,6 +82,8 @@ SADMM_INLINE int box_clip_face(const real hr[3], const real hi[3], const real R[
         poly[q].x = cx + a * ux + b * vx;
         poly[q].y = cy + a * uy + b * vy;
         poly[q].z = cz + a * uz + b * vz;
+        poly[q].x -= lean.u * poly[q].z;
+        poly[q].y -= lean.v * poly[q].z;
         poly[q].out = q;
         bits[q] = base_bits | (pu ? 1 << ju : 0) | (pv ? 1 << jv : 0);
         clip_u = clip_u || real_abs(poly[q].x) > hr[u] + tol_u;
@@ -89,12 +101,12 @@ SADMM_INLINE int box_clip_face(const real hr[3], const real hi[3], const real R[
         const struct clip_vertex *p = &poly[i];
         int in = poly[i > 0 ? i - 1 : count - 1].out, out = p->out, d;
         uint32_t feature;
-        real position[3];
+        real position[3], separation = p->z / lean.cosine;
         bool duplicate = false;
         /* on a corner of the reference face? */
         bool corner = real_abs(real_abs(p->x) - hr[u]) <= tol_u && real_abs(real_abs(p->y) - hr[v]) <= tol_v;
         int corner_bits = ref_bits | (p->x > 0 ? 1 << u : 0) | (p->y > 0 ? 1 << v : 0);
-        if (p->z > limit) continue;
+        if (separation > limit) continue;
         if (in < 4 && out < 4) {
             /* vertex of the incident box; where two coincide the id is that of box 1's */
             feature = corner && !owner ? box_feature_vertex(0, corner_bits)
@@ -121,49 +133,59 @@ SADMM_INLINE int box_clip_face(const real hr[3], const real hi[3], const real R[
             real dx = real_abs(m->points[d].position.x - p->x), dy = real_abs(m->points[d].position.y - p->y);
             if (m->points[d].feature == feature) duplicate = true;
             /* near each other on a face that is long and steep, but not equally deep: two points */
-            else if (dx <= tol_u && dy <= tol_v && real_abs(m->points[d].separation - p->z) <= tol_z) duplicate = true;
+            else if (d >= first && dx <= tol_u && dy <= tol_v &&
+                     real_abs(m->points[d].separation - separation) <= tol_z)
+                duplicate = true;
         }
         if (duplicate || m->count == SADMM_MANIFOLD_POINTS) continue;
         position[0] = p->x;
         position[1] = p->y;
         position[2] = p->z;
-        manifold_add(m, v3_from_array(position), p->z, feature);
+        manifold_add(m, v3_from_array(position), separation, feature);
     }
     /* in-plane to the reference frame, midway between the incident face and the reference face */
-    for (i = 0; i < m->count; ++i) {
-        real position[3];
-        position[u] = m->points[i].position.x;
-        position[v] = m->points[i].position.y;
-        position[k] = sg * (hr[k] + m->points[i].separation / 2);
+    for (i = first; i < m->count; ++i) {
+        real position[3], half = lean.cosine * m->points[i].separation / 2;
+        position[u] = m->points[i].position.x + lean.u * half;
+        position[v] = m->points[i].position.y + lean.v * half;
+        position[k] = sg * (hr[k] + half);
         m->points[i].position = v3_from_array(position);
     }
-    return m->count;
 }
 
-SADMM_INLINE void box_face_manifold(const struct box_pair *b, int axis, int negative, struct manifold *m)
+/* Appends the points of a face axis, seen along m->normal: the face's own, or one near it (`leans`). */
+SADMM_INLINE void box_face_manifold(const struct box_pair *b, int axis, int negative, bool leans, struct manifold *m)
 {
-    real sg = negative ? (real)-1 : (real)1;
     /* as the separation of the axis was judged: faces that touch keep their points, whatever their rounding says */
-    real limit = b->limit + b->slack;
-    int i, j;
-    m->count = 0;
-    m->normal = box_axis_direction(b, axis, negative);
-    if (axis < 3) {
-        box_clip_face(b->h1, b->h2, b->R, b->t, axis, sg, limit, b->thin, 0, m);
-    } else {
-        /* in the frame of 2 the normal from 1 to 2 points out of 1: the reference side of 2 is opposite */
-        real RT[3][3], t[3];
-        for (i = 0; i < 3; ++i) {
-            for (j = 0; j < 3; ++j) RT[i][j] = b->R[j][i];
-            t[i] = -b->t2[i];
-        }
-        box_clip_face(b->h2, b->h1, RT, t, axis - 3, -sg, limit, b->thin, 1, m);
-        for (i = 0; i < m->count; ++i) {
-            real p[3], q[3];
-            v3_to_array(m->points[i].position, p);
-            for (j = 0; j < 3; ++j) q[j] = b->t[j] + b->R[j][0] * p[0] + b->R[j][1] * p[1] + b->R[j][2] * p[2];
-            m->points[i].position = v3_from_array(q);
-        }
+    const real limit = b->limit + b->slack;
+    const int owner = axis >= 3, k = owner ? axis - 3 : axis, u = k == 2 ? 0 : k + 1, v = u == 2 ? 0 : u + 1;
+    /* in the frame of 2 the normal from 1 to 2 points out of 1: the reference side of 2 is opposite */
+    const real sg = (negative != 0) != (owner != 0) ? (real)-1 : (real)1;
+    struct box_lean lean = {0, 0, 1};
+    real R[3][3], t[3], hr[3], hi[3];
+    int i, j, first = m->count;
+
+    for (i = 0; i < 3; ++i) {
+        for (j = 0; j < 3; ++j) R[i][j] = owner ? b->R[j][i] : b->R[i][j];
+        t[i] = owner ? -b->t2[i] : b->t[i];
+        hr[i] = owner ? b->h2[i] : b->h1[i];
+        hi[i] = owner ? b->h1[i] : b->h2[i];
+    }
+    if (leans) {
+        real n[3], along[3];
+        v3_to_array(m->normal, n);
+        for (i = 0; i < 3; ++i) along[i] = owner ? -(R[i][0] * n[0] + R[i][1] * n[1] + R[i][2] * n[2]) : n[i];
+        lean.cosine = sg * along[k];
+        lean.u = along[u] / lean.cosine;
+        lean.v = along[v] / lean.cosine;
+    }
+    box_clip_face(hr, hi, R, t, k, sg, lean, limit, b->thin, owner, m);
+    if (!owner) return;
+    for (i = first; i < m->count; ++i) {
+        real p[3], q[3];
+        v3_to_array(m->points[i].position, p);
+        for (j = 0; j < 3; ++j) q[j] = b->t[j] + b->R[j][0] * p[0] + b->R[j][1] * p[1] + b->R[j][2] * p[2];
+        m->points[i].position = v3_from_array(q);
     }
 }
 
