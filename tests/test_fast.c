@@ -315,12 +315,35 @@ END_TEST
 START_TEST(bounces_are_taken_back)
 {
     const struct limit_energies bounce = {.now = 2, .free = 2}, pushed = {.now = 2, .free = 2, .work = 2};
-    ck_assert_double_eq(limit_factor(&bounce), 1);
+    ck_assert_double_eq(limit_factor(&bounce, 1e-16), 1);
     ck_assert_double_eq(limit_bounce_factor(&bounce, 2, 1e-16), 1);
     ck_assert_double_eq(limit_bounce_factor(&bounce, 1, 1e-16), 0.5);
     ck_assert_double_eq(limit_bounce_factor(&bounce, -2, 1e-16), 0.25);
     ck_assert_double_eq(limit_bounce_factor(&pushed, 1, 1e-16), 1);
     ck_assert(limit_under_iterated(1, 59) && !limit_under_iterated(1, 60) && !limit_under_iterated(0, 59));
+}
+END_TEST
+
+/* Work lets an island have more energy: a loose one by the share of the impulses that solve the dual problem best, and
+ * less what they take; a held one where its momentum is balanced. What is rounding of the motions left alone is no
+ * energy. */
+START_TEST(work_counts_by_its_share)
+{
+    const struct limit_energies none = {.now = 8, .free = 2, .work = 6, .loose = 1, .drive = -1, .response = 1},
+                                half = {.now = 8, .free = 2, .work = 6.5, .loose = 1, .drive = 1, .response = 2},
+                                all = {.now = 8, .free = 2, .work = 7.5, .loose = 1, .drive = 3, .response = 2},
+                                taken = {.now = 8, .free = 2, .work = 6, .loose = 1, .drive = 13, .response = 2},
+                                held = {.now = 8, .free = 2, .work = 6}, unbalanced = {.now = 8, .free = 2, .work = 6,
+                                                                                      .momentum_residual = 1},
+                                rounding = {.now = 1e-16, .rigid = 1};
+    ck_assert_double_eq(limit_factor(&none, 1e-16), 0.5);
+    ck_assert_double_eq(limit_factor(&half, 1e-16), sqrt(5.0 / 8));
+    ck_assert_double_eq(limit_factor(&all, 1e-16), 1);
+    ck_assert_double_eq(limit_factor(&taken, 1e-16), 0.5);
+    ck_assert_double_eq(limit_factor(&held, 1e-16), 1);
+    ck_assert_double_eq(limit_factor(&unbalanced, 1e-16), 0.5);
+    ck_assert_double_eq(limit_factor(&rounding, 1e-16), 1);
+    ck_assert_double_eq(limit_bounce_factor(&rounding, 0, 1e-16), 1);
 }
 END_TEST
 
@@ -516,7 +539,7 @@ static struct sadmm_solve_report solve_with(struct contact_problem *problem, con
     s.certificate_momentum_tolerance = 1e-2; /* the natural map is what is looked at */
     s.check_period = 5;
     struct sadmm_plan plan = sadmm_plan_make(&problem->system, &s);
-    plan.limit = false; /* the problem, not a time step */
+    plan.limit = plan.momentum = false; /* the problem, not a time step */
     ck_assert_int_eq(k->create(0, &c, &error), SADMM_OK);
     sadmm_status status = sadmm_schedule_solve(k, c, &problem->system, &s, &plan, &report, &error);
     ck_assert_msg(status == SADMM_OK, "%s", error.message);
@@ -788,6 +811,7 @@ int main(void)
     tcase_add_test(weights, under_iterated_weights_are_larger);
     tcase_add_test(weights, few_iterations_of_a_problem_weigh_the_same);
     tcase_add_test(weights, bounces_are_taken_back);
+    tcase_add_test(weights, work_counts_by_its_share);
     tcase_add_loop_test(weights, under_iterated_tables_equal_ref, 0, 2 * table_count);
     tcase_add_loop_test(weights, solutions_are_not_slowed_down, 0, table_count + 1);
     tcase_add_test(weights, small_gaps_are_eased);

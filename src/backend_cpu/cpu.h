@@ -45,7 +45,8 @@
 #define CPU(name) SADMM_JOIN(sadmm_cpu_##name, SADMM_VARIANT)
 
 enum { STATE_INV_BETA = 6 }; /* slot of a state row */
-/* Of weights: energy, kinetic, push, momentum residual; of the limit: now, free, along, momentum residual. */
+/* Of weights: energy, kinetic, push, momentum residual; of the limit: now, free, along; then momentum
+ * residual, drive, response. */
 enum { BODY_SUMS = 4 };
 
 /* LANES contact pairs; points of all of them in `slots` slots from `first` on. Lanes without a pair point at the
@@ -107,6 +108,13 @@ struct row_slot { /* math/row.h */
  * load */
 struct row_weight {
     double weight, along, response, scale;
+};
+
+/* An island under contacts of which no static pair is known to hold it (math/momentum.h). */
+struct cpu_loose {
+    int32_t first_body, end_body, first_pair, end_pair; /* in loose_bodies, loose_pairs */
+    struct momentum_motions motions;
+    double slow_down; /* the factor of its velocities, but for those motions */
 };
 
 /* fast: sums over an island. */
@@ -172,9 +180,16 @@ struct sadmm_context {
     int32_t *offsets, *incident;
     size_t offsets_capacity, incident_capacity;
 
+    /* Islands; without constraints and limits of worlds in the method `paper`: none */
+    int32_t *label;             /* bodies: the smallest body of its island */
+    int32_t *loose_of;          /* bodies, used at labels: index in `loose`, negative: held */
+    struct cpu_loose *loose;
+    int32_t *loose_bodies, *loose_pairs; /* by island, ascending; of pairs the static ones */
+    int32_t loose_count;
+    size_t label_capacity, loose_of_capacity, loose_capacity, loose_body_capacity, loose_pair_capacity;
+
     /* fast */
     bool fast;
-    int32_t *label;             /* bodies: the smallest body of its island */
     struct cpu_island *islands; /* bodies, used at labels */
     double *A_inverse;          /* bodies x PACKED6 */
     double *pair_response, *pair_weight; /* pair records: J A^-1 J^T, B in kg */
@@ -182,7 +197,7 @@ struct sadmm_context {
     int refreshes;              /* of the weights, in this solve */
     int exact_since;            /* iterations since the momentum residuals were taken */
     double *body_sums;          /* bodies x BODY_SUMS: terms of the islands' sums */
-    size_t body_sum_capacity, label_capacity, island_capacity, A_inverse_capacity, pair_response_capacity,
+    size_t body_sum_capacity, island_capacity, A_inverse_capacity, pair_response_capacity,
         pair_weight_capacity, pair_violation_capacity;
 
     double *thread_max; /* one cache line a thread */
@@ -240,6 +255,11 @@ sadmm_status CPU(update_weights)(struct sadmm_context *, struct sadmm_error *);
 void CPU(add_up_imbalance)(struct sadmm_context *, int thread, int threads);
 void CPU(update_weight_scales)(struct sadmm_context *);
 sadmm_status CPU(limit_velocity)(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
+/* begin: islands, and which are loose (cpu_islands.c); false when memory runs out. */
+bool CPU(find_islands)(struct sadmm_context *);
+/* Motions of the loose islands; then their velocities, slowed down but for these (cpu_momentum.c). */
+void CPU(find_motions)(struct sadmm_context *);
+void CPU(move_loose)(struct sadmm_context *);
 sadmm_status CPU(factorize)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(update_velocity)(struct sadmm_context *, struct sadmm_error *);
 sadmm_status CPU(update_constraints)(struct sadmm_context *, bool measure, struct sadmm_error *);

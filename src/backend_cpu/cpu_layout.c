@@ -116,8 +116,7 @@ sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *syst
                sadmm_grow_empty(&c->change, &c->change_capacity, 2 * c->record_count * ROW, sizeof(real))) &&
               sadmm_grow_empty(&c->offsets, &c->offsets_capacity, n + 2, sizeof(int32_t)) &&
               sadmm_grow_empty(&c->incident, &c->incident_capacity, 2 * c->record_count, sizeof(int32_t)) &&
-              (!c->fast || (sadmm_grow_empty(&c->label, &c->label_capacity, n, sizeof(int32_t)) &&
-                            sadmm_grow_empty(&c->islands, &c->island_capacity, n, sizeof *c->islands) &&
+              (!c->fast || (sadmm_grow_empty(&c->islands, &c->island_capacity, n, sizeof *c->islands) &&
                             sadmm_grow_empty(&c->body_sums, &c->body_sum_capacity, BODY_SUMS * n, sizeof(double)) &&
                             sadmm_grow_empty(&c->A_inverse, &c->A_inverse_capacity, n * PACKED6, sizeof(double)) &&
                             sadmm_grow_empty(&c->pair_response, &c->pair_response_capacity, c->record_count,
@@ -136,5 +135,6 @@ sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *syst
     if (!sadmm_grow_empty(&c->slots, &c->slot_capacity, slot_bytes, 1))
         return sadmm_fail_memory(error, "the cpu backend's contacts");
     list_incident(c);
+    if (!CPU(find_islands)(c)) return sadmm_fail_memory(error, "the cpu backend's islands");
     return SADMM_OK;
 }

@@ -1,4 +1,5 @@
-/* The method `fast`, after the last iteration: no island keeps more energy than it may have (math/limit.h). */
+/* After the last iteration: momentum that no contact may change is restored (cpu_momentum.c); in the method `fast` no
+ * island keeps more energy than it may have (math/limit.h). */
 #include "core/math/dense6.h"
 #include "core/math/relax.h"
 #include "cpu_rows.h"
@@ -8,6 +9,15 @@ static double rigid_form(const double M[PACKED6], const double x[6])
 {
     return M[0] * (x[0] * x[0] + x[1] * x[1] + x[2] * x[2]) + M[9] * x[3] * x[3] + M[14] * x[4] * x[4] +
            M[20] * x[5] * x[5] + 2 * (M[13] * x[3] * x[4] + M[18] * x[3] * x[5] + M[19] * x[4] * x[5]);
+}
+
+/* M x */
+static void rigid_product(const double M[PACKED6], const double x[6], double y[6])
+{
+    for (int k = 0; k < 3; ++k) y[k] = M[0] * x[k];
+    y[3] = M[9] * x[3] + M[13] * x[4] + M[18] * x[5];
+    y[4] = M[13] * x[3] + M[14] * x[4] + M[19] * x[5];
+    y[5] = M[18] * x[3] + M[19] * x[4] + M[20] * x[5];
 }
 
 /* A body's terms: now, free, along. */
@@ -21,12 +31,12 @@ static void energies(const struct sadmm_context *c, size_t i, double terms[3])
     terms[2] = dense6_dot(v, b) / 2;
 }
 
-/* Work of a pair's contacts that push apart. */
-static double pair_work(const struct sadmm_context *c, size_t record)
+/* Of a pair: work of its contacts that push apart, and what e adds to the drive. */
+static void add_pair(const struct sadmm_context *c, size_t record, struct limit_energies *sum)
 {
     const struct pair_block *block = &c->pair_blocks[record / (size_t)LANES];
     size_t l = record % (size_t)LANES;
-    double work = 0;
+    double work = 0, drive = 0;
     for (int k = 0; k < c->system->contacts->pairs[block->pair[l]].count; ++k) {
         double error, impulse;
         if (c->plan.contact_rows == 3) {
@@ -40,8 +50,10 @@ static double pair_work(const struct sadmm_context *c, size_t record)
             impulse = (double)slot->lambda[l];
         }
         work += fmax(0, -error) * impulse;
+        drive -= error * impulse;
     }
-    return work;
+    sum->work += work;
+    sum->drive += drive;
 }
 
 /* Sums over islands in the order of bodies, whatever the threads. */
@@ -58,9 +70,14 @@ static bool any_suspect(struct sadmm_context *c, bool under_iterated)
         sum->limit.free += c->body_sums[BODY_SUMS * i + 1];
         sum->along += c->body_sums[BODY_SUMS * i + 2];
     }
+    for (int32_t k = 0; k < c->loose_count; ++k) {
+        const struct momentum_energies rigid = momentum_energies_of(&c->loose[k].motions);
+        struct cpu_island *island = &c->islands[c->label[c->loose_bodies[c->loose[k].first_body]]];
+        limit_take_rigid(&island->limit, &island->along, &rigid);
+    }
     for (int32_t i = 0; i < c->bodies; ++i) {
         const struct cpu_island *island = &c->islands[i];
-        if (c->label[i] != i || island->rows) continue;
+        if (c->label[i] != i || island->rows || limit_is_rounding(&island->limit, (double)SADMM_EPSILON)) continue;
         any = any || limit_suspects(island->limit.now, island->limit.free) ||
               (under_iterated &&
                limit_bounces(island->limit.now, island->limit.free, island->along, (double)SADMM_EPSILON));
@@ -68,14 +85,19 @@ static bool any_suspect(struct sadmm_context *c, bool under_iterated)
     return any;
 }
 
-static void add_residuals_and_work(struct sadmm_context *c)
+static void add_impulses(struct sadmm_context *c)
 {
-    for (int32_t i = 0; i < c->bodies; ++i)
-        c->islands[c->label[i]].limit.momentum_residual += c->body_sums[BODY_SUMS * i + 3];
+    for (int32_t i = 0; i < c->bodies; ++i) {
+        struct limit_energies *sum = &c->islands[c->label[i]].limit;
+        const double *terms = &c->body_sums[BODY_SUMS * i];
+        sum->momentum_residual += terms[0];
+        sum->drive += terms[1];
+        sum->response += terms[2];
+    }
     for (size_t r = 0; r < c->pair_block_count * (size_t)LANES; ++r) {
         if (c->pair_blocks[r / (size_t)LANES].pair[r % (size_t)LANES] < 0) continue;
         const struct sadmm_contact_pair *pair = cpu_pair(c, r);
-        cpu_island_of(c, pair->body_a, pair->body_b)->limit.work += pair_work(c, r);
+        add_pair(c, r, &cpu_island_of(c, pair->body_a, pair->body_b)->limit);
     }
 }
 
@@ -87,34 +109,68 @@ static void energies_share(void *context, int thread, int threads)
     for (size_t i = begin; i < end; ++i) energies(c, i, &c->body_sums[BODY_SUMS * i]);
 }
 
-static void momentum_residuals_share(void *context, int thread, int threads)
+/* A body's terms: of the momentum residual; in loose islands of drive and response. `wrenches` hold J^T lambda. */
+static void impulse_terms(const struct sadmm_context *c, size_t i, double terms[3])
+{
+    double b[6], g[6] = {0}, change[6];
+    terms[0] = terms[1] = terms[2] = 0;
+    if (c->loose_of[c->label[i]] < 0) {
+        terms[0] = cpu_residual_energy(c, i) / 2;
+        return;
+    }
+    for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at)
+        for (int k = 0; k < 6; ++k) g[k] += (double)c->wrenches[(size_t)c->incident[at] * ROW + (size_t)k];
+    cpu_load_b(c, i, b);
+    rigid_product(&c->A_inverse[i * PACKED6], g, change);
+    terms[1] = -dense6_dot(change, b);
+    terms[2] = dense6_dot(change, g);
+}
+
+static void impulses_share(void *context, int thread, int threads)
 {
     struct sadmm_context *c = (struct sadmm_context *)context;
     size_t begin, end;
     cpu_share_bodies(c, thread, threads, &begin, &end);
-    for (size_t i = begin; i < end; ++i) c->body_sums[BODY_SUMS * i + 3] = cpu_residual_energy(c, i) / 2;
+    for (size_t i = begin; i < end; ++i) impulse_terms(c, i, &c->body_sums[BODY_SUMS * i]);
+}
+
+/* By what the island of body i is slowed down. */
+static double factor_of(const struct sadmm_context *c, int32_t i, bool under_iterated)
+{
+    const struct cpu_island *island = &c->islands[c->label[i]];
+    if (island->rows) return 1; /* the energies are those of contacts alone */
+    const double factor = limit_factor(&island->limit, (double)SADMM_EPSILON);
+    if (!under_iterated) return factor;
+    return fmin(factor, limit_bounce_factor(&island->limit, island->along, (double)SADMM_EPSILON));
+}
+
+static void limit_energies(struct sadmm_context *c, int32_t *limited)
+{
+    const bool under_iterated = limit_under_iterated(c->plan.warm, c->settings.iterations);
+    cpu_parallel(c, energies_share, c);
+    if (!any_suspect(c, under_iterated)) return;
+    CPU(sum_wrenches)(c);
+    cpu_parallel(c, impulses_share, c);
+    add_impulses(c);
+    for (int32_t i = 0; i < c->bodies; ++i) {
+        const double factor = factor_of(c, i, under_iterated);
+        const int32_t loose = c->loose_of[c->label[i]];
+        if (factor == 1) continue;
+        *limited += c->label[i] == i;
+        if (loose >= 0) c->loose[loose].slow_down = factor;
+        else
+            for (int k = 0; k < 6; ++k) c->state[(size_t)i * ROW + (size_t)k] *= (real)factor;
+    }
 }
 
 sadmm_status CPU(limit_velocity)(struct sadmm_context *c, int32_t *limited, struct sadmm_error *error)
 {
     (void)error;
-    bool under_iterated = limit_under_iterated(c->plan.warm, c->settings.iterations);
     *limited = 0;
-    cpu_parallel(c, energies_share, c);
-    if (!any_suspect(c, under_iterated)) return SADMM_OK;
-    CPU(sum_wrenches)(c);
-    cpu_parallel(c, momentum_residuals_share, c);
-    add_residuals_and_work(c);
-    for (int32_t i = 0; i < c->bodies; ++i) {
-        const struct cpu_island *island = &c->islands[c->label[i]];
-        if (island->rows) continue; /* the energies are those of contacts alone */
-        double factor = limit_factor(&island->limit);
-        if (under_iterated)
-            factor = fmin(factor, limit_bounce_factor(&island->limit, island->along, (double)SADMM_EPSILON));
-        if (factor == 1) continue;
-        *limited += c->label[i] == i;
-        for (int k = 0; k < 6; ++k) c->state[(size_t)i * ROW + (size_t)k] *= (real)factor;
-    }
-    if (*limited > 0) c->exact_since = RELAX_RESIDUAL_PERIOD; /* residuals are recomputed, should anything follow */
+    CPU(find_motions)(c);
+    if (c->fast) limit_energies(c, limited);
+    CPU(move_loose)(c);
+    /* residuals are recomputed, should anything follow */
+    if (*limited > 0 || c->loose_count > 0) c->exact_since = RELAX_RESIDUAL_PERIOD;
     return SADMM_OK;
 }

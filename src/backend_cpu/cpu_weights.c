@@ -4,7 +4,6 @@
  * In double from the system's raw data; only the impulses are in this precision. Sums over a body go in the order of
  * its records, sums over an island in the order of bodies. */
 #include "core/math/array3.h"
-#include "core/model/islands.h"
 #include "core/math/weight.h"
 #include "cpu_rows.h"
 
@@ -253,7 +252,6 @@ static void respond_share(void *context, int thread, int threads)
 
 sadmm_status CPU(init_weights)(struct sadmm_context *c, struct sadmm_error *error)
 {
-    sadmm_islands(c->system, c->label);
     cpu_parallel(c, respond_share, c);
     for (int32_t i = 0; i < c->bodies; ++i) {
         c->islands[i].weights = weight_new_island();

@@ -14,7 +14,7 @@
 #include "literal.h"
 
 /* label of a body: the smallest one it is joined with. */
-static void label_islands(struct sadmm_context *c)
+void sadmm_ref_label_islands(struct sadmm_context *c)
 {
     for (int32_t i = 0; i < c->system->body_count; ++i) c->bodies[i].label = i;
     for (bool changed = true; changed;) {
@@ -119,6 +119,16 @@ static void add_up_islands(struct sadmm_context *c)
                                 weight_under_iterated(c->plan->rigid, c->settings->iterations));
 }
 
+void sadmm_ref_sum_impulses(struct sadmm_context *c)
+{
+    for (int32_t i = 0; i < c->system->body_count; ++i) memset(c->bodies[i].impulse, 0, sizeof c->bodies[i].impulse);
+    for (size_t k = 0; k < c->constraint_count; ++k)
+        for (int s = 0; s < 2; ++s) {
+            const int32_t body = c->constraints[k].side[s].body;
+            if (body >= 0) add_impulse(&c->constraints[k], s, c->bodies[body].impulse);
+        }
+}
+
 /* A v - b - sum J^T multiplier, by body, into `impulse`. */
 static void momentum_residual(struct sadmm_context *c, bool seen)
 {
@@ -173,6 +183,8 @@ static double pair_violation(const struct sadmm_context *c, const struct sadmm_c
     }
     return sum;
 }
+
+void sadmm_ref_momentum_residual(struct sadmm_context *c) { momentum_residual(c, false); }
 
 static void update_weight_scales(struct sadmm_context *c)
 {
@@ -271,7 +283,7 @@ sadmm_status sadmm_ref_update_weights(struct sadmm_context *c, struct sadmm_erro
 
 sadmm_status sadmm_ref_init_weights(struct sadmm_context *c, struct sadmm_error *error)
 {
-    label_islands(c);
+    sadmm_ref_label_islands(c);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         c->bodies[i].weights = weight_new_island();
         c->bodies[i].rescale = 0;
@@ -365,43 +377,5 @@ sadmm_status sadmm_ref_measure_fast(struct sadmm_context *c, struct sadmm_residu
     residual->dual = 0;
     for (int32_t i = 0; i < c->system->body_count; ++i)
         for (int j = 0; j < 6; ++j) residual->dual = fmax(residual->dual, fabs(c->bodies[i].impulse[j]));
-    return SADMM_OK;
-}
-
-/* math/limit.h: twice the energies of the bodies, and the work of the contacts, added up at the islands' names. */
-sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *c, int32_t *limited, struct sadmm_error *error)
-{
-    (void)error;
-    momentum_residual(c, false);
-    bool under_iterated = limit_under_iterated(c->plan->warm, c->settings->iterations);
-    for (int32_t i = 0; i < c->system->body_count; ++i) {
-        memset(&c->bodies[i].limit, 0, sizeof c->bodies[i].limit);
-        c->bodies[i].along = 0;
-    }
-    for (int32_t i = 0; i < c->system->body_count; ++i) {
-        const struct ref_body *body = &c->bodies[i];
-        struct limit_energies *sum = &c->bodies[body->label].limit;
-        double momentum[6];
-        dense6_mul(body->A, body->v, momentum);
-        sum->now += dense6_dot(momentum, body->v) / 2;
-        sum->free += inverse_form(body, body->b) / 2;
-        sum->momentum_residual += inverse_form(body, body->impulse) / 2;
-        c->bodies[body->label].along += dense6_dot(body->v, body->b) / 2;
-    }
-    for (size_t k = 0; k < c->system->contacts->point_count; ++k) {
-        const struct ref_constraint *constraint = &c->constraints[k];
-        int32_t body = constraint->side[0].body >= 0 ? constraint->side[0].body : constraint->side[1].body;
-        c->bodies[c->bodies[body].label].limit.work += fmax(0, -constraint->e[0]) * constraint->lambda[0];
-    }
-    *limited = 0;
-    for (int32_t i = 0; i < c->system->body_count; ++i) {
-        struct ref_body *body = &c->bodies[i];
-        const struct ref_body *island = &c->bodies[body->label];
-        if (island->rows) continue; /* the energies are those of contacts alone */
-        double factor = limit_factor(&island->limit);
-        if (under_iterated) factor = fmin(factor, limit_bounce_factor(&island->limit, island->along, DBL_EPSILON));
-        if (factor < 1 && body->label == i) ++*limited;
-        for (int j = 0; j < 6; ++j) body->v[j] *= factor;
-    }
     return SADMM_OK;
 }

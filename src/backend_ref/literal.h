@@ -51,6 +51,11 @@ struct ref_body {
     bool rows;                       /* the island has constraints given by rows */
     struct limit_energies limit;
     double along; /* v . A v_f / 2 of the island */
+    /* of the island that it names, in either method */
+    struct momentum_sums momentum;
+    struct momentum_motions motions;
+    bool loose;                      /* it has contacts, and none is known to hold it */
+    double slow_down;                /* the factor of its velocities, but for those motions */
     double impulse[6];               /* sums over the body's constraints */
 };
 
@@ -84,7 +89,19 @@ sadmm_status sadmm_ref_update_penalty(struct sadmm_context *, double ratio, stru
 sadmm_status sadmm_ref_init_weights(struct sadmm_context *, struct sadmm_error *);
 sadmm_status sadmm_ref_update_weights(struct sadmm_context *, struct sadmm_error *);
 sadmm_status sadmm_ref_iterate_fast(struct sadmm_context *, int count);
-sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
 sadmm_status sadmm_ref_measure_fast(struct sadmm_context *, struct sadmm_residual *);
+void sadmm_ref_label_islands(struct sadmm_context *);
+/* A v - b - sum J^T lambda, by body, into `impulse`; and sum J^T lambda alone. */
+void sadmm_ref_momentum_residual(struct sadmm_context *);
+void sadmm_ref_sum_impulses(struct sadmm_context *);
+
+/* momentum.c */
+/* Of every island the motions that no static contact feels; at the body that names it. */
+void sadmm_ref_find_motions(struct sadmm_context *);
+/* Body i of an island that is slowed down to `factor`, but for those motions, in which it keeps its momentum. */
+void sadmm_ref_move_island(struct sadmm_context *, int32_t i, double factor);
+
+/* limit.c */
+sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *, int32_t *limited, struct sadmm_error *);
 
 #endif

@@ -31,7 +31,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 {
     int32_t i = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x);
     if (i >= v.model.bodies || v.model.live->abort_code) return; /* may run before the step's contacts are known */
-    if (FAST && i == 0) clear_counts(v.islands);
+    if (i == 0) clear_counts(v.islands);
+    if (!FAST && v.islands.info) v.islands.info[i].held = 0;
     double A[36], b[6], x[6], factor[36];
     const struct sadmm_settings settings = *v.model.settings;
     sadmm_system_body(&v.raw.system, &settings, i, A, b);
@@ -149,8 +150,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         if (FAST) add_point(v.model, v.bodies, joined, about, difference, arm, lambda, true, &sums);
     }
     if (FAST)
-        store_sides(v.model, v.bodies, v.contacts, v.weights, live, p, lane, count, joined, difference, true, inverse,
-                    &sums);
+        store_sides(v.model, v.bodies, v.contacts, v.weights, live, p, lane, count, joined, (double)about.w, difference,
+                    true, inverse, &sums);
 }
 
 /* ---- entries --------------------------------------------------------------------------------------------------- */

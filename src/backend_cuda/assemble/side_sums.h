@@ -7,10 +7,11 @@
 
 #include "backend_cuda/device/body.h"
 
-#include "core/math/array3.h"
+#include "core/math/momentum.h"
 
-/* Numbers of side_wrench: force and torque, then the force's size; ROW in all. */
-enum { SIDE_PUSH = 6 };
+/* Numbers of side_wrench: force and torque, then the force's size, and 1 where the pair holds its island
+ * (math/momentum.h), as a solve begins; ROW in all. */
+enum { SIDE_PUSH = 6, SIDE_HOLDS };
 /* Those of side_arms (device/view.h) are in this precision, and sums only where contacts have three rows: else C
  * depends on normals. */
 static_assert(sizeof(struct arm_sums) == SIDE_ARMS * sizeof(double), "numbers are taken one by one");
@@ -116,7 +117,7 @@ static __device__ __forceinline__ double side_response(const model_view &model, 
 
 /* share: 1 / count. */
 static __device__ __forceinline__ void store_side(const weight_view &weights, int32_t p, int32_t side, int32_t count,
-                                                  double share, bool first, const struct pair_sums *sums)
+                                                  double share, bool first, bool holds, const struct pair_sums *sums)
 {
     const double sign = side ? 1 : -1, *f = sums->force;
     double *wrench = weights.side_wrench + (size_t)(2 * p + side) * ROW;
@@ -127,7 +128,7 @@ static __device__ __forceinline__ void store_side(const weight_view &weights, in
         wrench[j + 3] = sign * sums->torque[j];
     }
     wrench[SIDE_PUSH] = length3(f);
-    wrench[SIDE_PUSH + 1] = 0;
+    wrench[SIDE_HOLDS] = holds;
     arms[SIDE_LOAD] = (solver_real)(sums->pushed * share);
     if (!first) return;
     arms[0] = (solver_real)count;
@@ -143,12 +144,25 @@ static __device__ __forceinline__ int32_t side_of_lane(const contact_view &conta
     return contacts.lanes == 1 ? -1 : lane;
 }
 
+/* Does the pair hold its island, one of its bodies being static? */
+static __device__ __forceinline__ bool pair_holds(const model_view &model, int32_t count, const pair_bodies &joined,
+                                                  double friction, const struct pair_sums *sums)
+{
+    if (count < 3 || model.contact_rows == 1) return false;
+    if (joined.body_a < model.bodies && joined.body_b < model.bodies) return false;
+    struct arm_sums arms = {(double)count, {sums->r[0], sums->r[1], sums->r[2]}, {}};
+#pragma unroll
+    for (int j = 0; j < 6; ++j) arms.rr[j] = sums->rr[j];
+    return momentum_is_held(friction, &arms);
+}
+
 /* The records of a pair from its lanes' sums. `first`: also what depends on arms alone. `inverse`: of the body at the
  * lane's side. Every lane of the warp comes here. */
 static __device__ __forceinline__ void store_sides(const model_view &model, const body_view &bodies,
                                                    const contact_view &contacts, const weight_view &weights, bool live,
                                                    int32_t p, int32_t lane, int32_t count, const pair_bodies &joined,
-                                                   const real4 &difference, bool first, const rigid_inverse &inverse,
+                                                   double friction, const real4 &difference, bool first,
+                                                   const rigid_inverse &inverse,
                                                    struct pair_sums *sums)
 {
     const double d[3] = {(double)difference.x, (double)difference.y, (double)difference.z}, share = 1 / (double)count;
@@ -157,12 +171,13 @@ static __device__ __forceinline__ void store_sides(const model_view &model, cons
     sum_pair<0, LOAD_SUMS>(contacts, sums);
     if (first && model.contact_rows == 3) sum_pair<LOAD_SUMS, ARM_END>(contacts, sums);
     if (first && model.contact_rows == 1) sum_pair<ARM_END, PAIR_SUMS>(contacts, sums);
+    const bool holds = first && live && pair_holds(model, count, joined, friction, sums);
 #pragma unroll
     for (int32_t side = 0; side < 2; ++side) {
         const int32_t body = side ? joined.body_b : joined.body_a;
         if (side) shift_sums(sums, count, d);
         if (!live || body >= model.bodies || (own >= 0 && own != side)) continue;
-        store_side(weights, p, side, count, share, first, sums);
+        store_side(weights, p, side, count, share, first, holds, sums);
         if (!first) continue;
         response += side_response(model, bodies, side, body, count,
                                   own < 0 && bodies.rigid ? inverse_of_body(bodies, body) : inverse, sums);

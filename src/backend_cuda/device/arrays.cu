@@ -1,6 +1,24 @@
 /* The arrays that a solve works on, by the view's counts, the plan and the partition. */
 #include "context.h"
 
+/* What restores the momentum of islands. The method `fast` has its islands elsewhere. */
+static sadmm_status reserve_motions(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_view *v = &c->view;
+    const size_t n = (size_t)v->model.bodies;
+    v->islands.motions = nullptr;
+    if (!c->fast) v->islands.info = nullptr;
+    if (!c->plan.momentum) return SADMM_OK;
+    const size_t islands = c->fast ? 0 : n * sizeof(cuda_island);
+    TRY(CUDA(reserve)(c, BUFFER_MOTIONS, n * (MOTION_TERMS + 1) * sizeof(double) + islands, error));
+    v->islands.motions = (double *)c->buffers[BUFFER_MOTIONS].data;
+    v->islands.motion_arrivals = (unsigned long long *)(v->islands.motions + n * MOTION_TERMS);
+    if (!c->fast) v->islands.info = (cuda_island *)(v->islands.motion_arrivals + n);
+    CUDA_CALL(c, cudaMemsetAsync(v->islands.motion_arrivals, 0, n * sizeof *v->islands.motion_arrivals, c->stream),
+              "cudaMemsetAsync(arrivals)");
+    return SADMM_OK;
+}
+
 /* What only the method `fast` has. */
 static sadmm_status reserve_weights(struct sadmm_context *c, struct sadmm_error *error)
 {
@@ -100,9 +118,11 @@ sadmm_status CUDA(reserve_solver)(struct sadmm_context *c, struct sadmm_error *e
     v->islands.suspects = v->islands.limited + 1;
     v->iteration.barrier = (unsigned *)(v->iteration.residual + 4); /* a sector of its own */
     v->islands.stop = (cuda_stop *)(v->iteration.residual + 8);
+    v->islands.moved = (int32_t *)(v->iteration.residual + 11);
     v->raw.out = (double *)b[BUFFER_OUT].data;
     CUDA_CALL(c, cudaMemsetAsync(v->iteration.residual, 0, SCALAR_BYTES, c->stream), "cudaMemsetAsync(scalars)");
     CUDA_CALL(c, cudaMemsetAsync(v->bodies.state + n * ROW, 0, ROW * real_size, c->stream),
               "cudaMemsetAsync(static world)");
-    return c->fast ? reserve_weights(c, error) : SADMM_OK;
+    if (c->fast) TRY(reserve_weights(c, error));
+    return reserve_motions(c, error);
 }

@@ -51,6 +51,7 @@ static const char *const buffer_names[] = {
     "settings",
     "weights",
     "records of sides",
+    "momentum of islands",
     "bodies' input",
     "pairs' input",
     "points' input",

@@ -4,9 +4,9 @@
  * true counts from `cuda_live` and do nothing once a step of the queue has failed.
  *
  * Bodies have slots, so that an island's bodies are neighbours; where islands do not matter (GRID and STREAM in the
- * method `paper`) a body's slot is its raw index. Pairs and row blocks keep their raw order: the record of pair p is p,
- * that of row block k is pair_capacity + k. A side is a constraint as seen by one of its dynamic bodies: 2 record +
- * side (0 on a, 1 on b).
+ * method `paper`, but for steps of worlds) a body's slot is its raw index. Pairs and row blocks keep their raw order:
+ * the record of pair p is p, that of row block k is pair_capacity + k. A side is a constraint as seen by one of its
+ * dynamic bodies: 2 record + side (0 on a, 1 on b).
  *
  * Parts, the shares of thread blocks, are ranges of body slots. With C(i) the sides and bodies before slot i, share p
  * of P of the slots [first, last) begins at the first slot i with C(i) - C(first) >= ceil(p (C(last) - C(first)) / P).

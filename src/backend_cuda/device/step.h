@@ -97,7 +97,7 @@ struct cuda_step_view {
     struct cuda_step_control *control;
     struct cuda_step_report *reports;     /* pinned: STEPS_AHEAD */
     int32_t measured;                     /* residuals of the last iteration are in view.iteration.residual */
-    int32_t limits;                       /* energies are limited: view.islands.limited */
+    int32_t limits;                       /* momentum is restored; fast: energies are limited (view.islands) */
     int32_t substep, substeps;
 };
 

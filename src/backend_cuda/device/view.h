@@ -77,11 +77,12 @@ struct alignas(16) real4 {
     solver_real x, y, z, w;
 };
 
-/* fast: of an island, at its label. */
+/* Of an island, at its label. paper: slow_down and held alone, in worlds. */
 struct cuda_island {
     struct weight_island weights;
     double rescale;      /* not 0: weights of pairs are those taken last, times this */
     double slow_down;    /* math/limit.h: the factor of its velocities */
+    int32_t held;        /* not loose (math/momentum.h): some pair holds it, nothing touches it, or there are rows */
     int32_t rows;        /* there are constraints given by rows: the weight scale stays 1 */
     int32_t stopped;     /* iterations after which a check found the tolerances met; 0: not yet */
 };
@@ -99,6 +100,8 @@ struct cuda_stop {
 #define EARLY_ARCH 900
 
 enum { TERMS = 6 }; /* of a body, in sums over islands */
+/* The same of islands that are not held (iterate/motions.h): seven numbers a lane. */
+enum { MOTION_NUMBERS = 7, MOTION_TERMS = MOTION_NUMBERS * LANES };
 
 /* Numbers of a side in side_arms (assemble/side_sums.h): sums over arms, as in arm_sums, then these. */
 enum { SIDE_ARMS = 10, SIDE_LOAD = SIDE_ARMS, SIDE_RESPONSE, SIDE_NUMBERS };
@@ -185,13 +188,17 @@ struct weight_view {
     solver_real *side_arms;    /* sides of pairs x SIDE_NUMBERS */
 };
 
-/* fast: islands, sums over them, their energies and the stop rule. */
+/* Islands and sums over them; fast: their energies and the stop rule. */
 struct island_view {
-    cuda_island *info;            /* bodies, used at labels */
+    cuda_island *info;            /* bodies, used at labels; NULL: neither `fast` nor a world with contacts */
+    double *motions;              /* worlds: slots x MOTION_TERMS, as `terms`; then at an island's first slot the rigid
+                                     motion that restores its momentum */
+    unsigned long long *motion_arrivals; /* of these */
+    int32_t *moved;               /* not 0: there are such motions */
     double *terms;                /* slots x TERMS: of bodies, then added up in place (weight/island_sums.h) */
     unsigned long long *arrivals; /* slots: of terms at places they are added up at; 0 between kernels */
     int32_t *limited;             /* islands slowed down */
-    int32_t *suspects;            /* not 0: some island may have to be */
+    int32_t *suspects;            /* not 0: some island may have to be, or is not held */
     cuda_stop *stop;
 };
 
@@ -280,11 +287,11 @@ static __device__ __forceinline__ int32_t live_rows(const model_view &model, con
     return model.live->abort_code ? 0 : rows.count;
 }
 
-/* Before the first kernel of a solve that counts islands: those slowed down, those that have stopped. */
+/* Before the first kernel of a solve that counts islands: those slowed down, moved, those that have stopped. */
 static __device__ __forceinline__ void clear_counts(const island_view &islands)
 {
     const cuda_stop none = {};
-    *islands.limited = *islands.suspects = 0;
+    *islands.limited = *islands.suspects = *islands.moved = 0;
     *islands.stop = none;
 }
 

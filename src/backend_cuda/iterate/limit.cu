@@ -1,17 +1,18 @@
-/* The method `fast`: the limit of energies (math/limit.h). In double, from this precision's data; once a step, eight
- * lanes a body.
+/* After the last iteration: momentum that no contact may change is restored (iterate/motions.h), and in the method
+ * `fast` energies are limited (math/limit.h). In double, from this precision's data; once a step, eight lanes a body.
  *
- *   suspect   is there a body with more energy than its free motion has, or that bounces? Else no island does.
- *             Persistent kernels test that themselves, those of tier BLOCK see to the rest too
+ *   suspect   is there a body with more energy than its free motion has, or that bounces? Else no island does, unless
+ *             it is not held. Persistent kernels test that themselves, those of tier BLOCK see to the rest too
  *   limit     nothing, unless there is one: energies and work, sums over islands (weight/island_sums.h), the factor of
- *             each island's velocities. Whole steps apply it where they move bodies (step/kernels.cu)
+ *             each island's velocities, and the rigid motion of those that are not held. Whole steps apply both where
+ *             they move bodies (step/kernels.cu)
+ *   momentum  paper: that motion alone
  */
 #include <string.h>
 
 #include "backend_cuda/device/double.h"
-#include "energies.h"
 #include "iterate.h"
-#include "backend_cuda/weight/island_sums.h"
+#include "motions.h"
 
 #include "core/math/relax.h"
 
@@ -40,18 +41,28 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     if (!*v.islands.suspects) return;
     const body_thread t = body_of_thread(v.model, v.graph);
     double total[TERMS];
-    const double term = v.bodies.rigid ? energies_of_body<true>(v, t) : energies_of_body<false>(v, t);
-    if (add_up_island<add_terms>(v.graph, v.islands, t, term, total) && t.lane == 0)
+    const double term = v.bodies.rigid ? energies_of_body<true, false>(v, t) : energies_of_body<false, false>(v, t);
+    const bool loose = v.islands.motions && is_loose(v, t);
+    if (add_up_island<add_terms>(v.graph, v.islands, t, term, total) && t.lane == 0 && !loose)
         limit_island(v.islands, &v.islands.info[v.graph.label[t.body]], total, args.under_iterated);
+    if (v.islands.motions) restore_islands<true>(v, t, loose, args.under_iterated);
+}
+
+static __global__ void __launch_bounds__(BODY_THREADS)
+    momentum_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    wait_for_stream();
+    const body_thread t = body_of_thread(v.model, v.graph);
+    restore_islands<false>(v, t, is_loose(v, t), false);
 }
 
 static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
     const int32_t i = thread_index();
     if (i >= live_bodies(v.model)) return;
-    const solver_real factor = slow_down(v.graph, v.islands, i);
-    solver_real *state = v.bodies.state + (size_t)i * ROW;
-    for (int k = 0; factor != 1 && k < 6; ++k) state[k] *= factor;
+    solver_real *state = v.bodies.state + (size_t)i * ROW, velocity[6];
+    end_velocity(v, i, velocity);
+    for (int k = 0; k < 6; ++k) state[k] = velocity[k];
 }
 
 /* ---- launches ---------------------------------------------------------------------------------------------------- */
@@ -65,6 +76,7 @@ static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const ch
 
 sadmm_status CUDA(enqueue_limit)(struct sadmm_context *c, bool suspected, struct sadmm_error *error)
 {
+    if (!c->fast) return launch(c, momentum_kernel, "momentum", error);
     if (!suspected) TRY(launch(c, suspect_kernel, "energies", error));
     return launch(c, limit_kernel, "limit", error);
 }
@@ -79,6 +91,6 @@ extern "C" sadmm_status CUDA(limit_velocity)(struct sadmm_context *c, int32_t *l
     TRY(CUDA(launch)(c, slow_kernel, "limit_velocity", blocks_for(c->view.model.bodies), &args, error));
     TRY(CUDA(download)(c, c->view.islands.limited, sizeof *limited, error));
     memcpy(limited, c->buffers[PINNED_OUT].data, sizeof *limited);
-    if (*limited > 0) c->exact_since = RELAX_RESIDUAL_PERIOD; /* residuals are recomputed, should anything follow */
+    if (c->fast) c->exact_since = RELAX_RESIDUAL_PERIOD; /* residuals are recomputed, should anything follow */
     return SADMM_OK;
 }

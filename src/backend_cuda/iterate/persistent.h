@@ -148,14 +148,17 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     part_run<POINTS, MODE, SIZE, FAST> part(v, args, memory);
     const auto barrier = [] { block_barrier<SIZE>(); };
     const block_part block = part.for_prologue();
-    if (PROLOGUE && threadIdx.x == 0) *block.suspected = 0;
     const bool begins = PROLOGUE && args.begin;
+    /* islands that are not held: this kernel finds them out as it begins, or an earlier one has */
+    if (PROLOGUE && threadIdx.x == 0)
+        *block.suspected = begins || args.limit != LIMIT_WHOLE ? 0 : *v.islands.suspects;
     if constexpr (PROLOGUE)
         if (begins) store_first_terms(v, block, part.found);
     part.fetch_side(); /* on its way while islands are weighed */
     if constexpr (PROLOGUE)
         if (begins) {
             weigh_in_block(v, args, block, part.found, barrier);
+            if (threadIdx.x == 0 && *block.suspected) *v.islands.suspects = 1; /* for kernels after this one */
             stamp_assembled(v.step);
         }
     const real relaxation = FAST ? (real)v.model.settings->relaxation : (real)1; /* on its way with what is loaded */

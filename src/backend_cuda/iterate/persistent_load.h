@@ -35,9 +35,7 @@ PART __device__ __forceinline__ void PART_RUN::part_rows_from_pairs(void)
 /* Where the other body's state will be. */
 PART __device__ __forceinline__ void PART_RUN::find_other(int32_t other)
 {
-    /* slots are by island in BLOCK and CLUSTER, raw order in GRID; by island everywhere in the method `fast` */
-    const int32_t slot = (MODE == GRID && !FAST) || other == v.model.bodies ? other : v.graph.slot_of[other],
-                  local = slot - first_body;
+    const int32_t slot = other == v.model.bodies ? other : v.graph.slot_of[other], local = slot - first_body;
     own.other_odd = 0;
     if (other == v.model.bodies) { /* the static world */
         own.other = m.state + (MODE == CLUSTER ? 2 : 1) * args.most_bodies * ROW;

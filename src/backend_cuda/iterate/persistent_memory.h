@@ -43,7 +43,7 @@ struct part_memory {
     solver_real *lines, *b;  /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x line, ROW;
                                 FAST: the momentum residual in place of b */
     solver_real *rows;       /* of warps that have rows: ROWS_OF_LANE x ROW_NUMBERS x WARP each */
-    int32_t *suspected;      /* a body of the part has too much energy */
+    int32_t *suspected;      /* of 2: a body of the part has too much energy, or its island is not held */
     /* Before the first iteration and after the last one, over what is above (iterate/prologue.h): */
     double *terms;           /* bodies x TERMS */
     island_range *range;     /* bodies */

@@ -5,7 +5,7 @@
 #ifndef SADMM_CUDA_ITERATE_PROLOGUE_H
 #define SADMM_CUDA_ITERATE_PROLOGUE_H
 
-#include "energies.h"
+#include "motions.h"
 #include "backend_cuda/weight/factor.h"
 #include "backend_cuda/weight/island_sums.h"
 #include "backend_cuda/weight/weigh.h"
@@ -15,7 +15,7 @@ struct block_part {
     int32_t first_body, bodies;
     double *terms;       /* shared: bodies x TERMS */
     island_range *range; /* shared: of bodies */
-    int32_t *suspected;  /* shared: 0 at first */
+    int32_t *suspected;  /* shared: 0 at first; whether there may be something to do for the limit. The next: scratch */
 };
 
 /* use(t, i) for the part's bodies, eight lanes each; `own`: the thread's first. Every thread of the block comes
@@ -69,25 +69,30 @@ static __device__ __forceinline__ void weigh_in_block(const cuda_view &v, const 
                               own_sides ? fetched : fetch_sides(v.model, v.graph, v.contacts, v.weights, t, t.begin),
                               island, true, C);
         if (!t.live) return;
-        if (i == first && t.lane == 0) v.islands.info[v.graph.label[t.body]] = island;
+        if (i == first && t.lane == 0) {
+            v.islands.info[v.graph.label[t.body]] = island;
+            part.suspected[island.held] = 1; /* a choice would take registers */
+        }
         factor_rigid(v.bodies, t.body, t.lane, C);
     });
     barrier();
 }
 
-/* The limit of energies, where some body of the part was suspected. */
+/* The limit of energies, where some body of the part was suspected, and the momentum of islands that are not held. */
 template <class Barrier>
 static __device__ __noinline__ void limit_in_block(const cuda_view &v, bool under_iterated, const block_part &part,
                                                    Barrier barrier)
 {
     const body_thread own = body_of_slot(v.graph, part.first_body + (int32_t)threadIdx.x / LANES,
                                          (int32_t)threadIdx.x / LANES < part.bodies);
-    store_terms(v.graph, part, own, [&](const body_thread &t) { return energies_of_body<true>(v, t); });
+    store_terms(v.graph, part, own, [&](const body_thread &t) { return energies_of_body<true, false>(v, t); });
     add_up_in_block<add_terms>(part.bodies, part.range, part.terms, barrier);
     for_each_body(v.graph, part, own, [&](const body_thread &t, int32_t i) {
-        if (t.live && t.lane == 0 && i == part.range[i].first)
+        if (t.live && t.lane == 0 && i == part.range[i].first && v.islands.info[v.graph.label[t.body]].held)
             limit_island(v.islands, &v.islands.info[v.graph.label[t.body]], part.terms + i * TERMS, under_iterated);
     });
+    for_each_body(v.graph, part, own,
+                  [&](const body_thread &t, int32_t) { restore_islands<true>(v, t, is_loose(v, t), under_iterated); });
 }
 
 #endif

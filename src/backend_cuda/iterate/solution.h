@@ -11,14 +11,12 @@ static __device__ __forceinline__ vec3 point_impulse(const contact_view &contact
     return v3((double)lambda[0], (double)lambda[contacts.lambda_stride], (double)lambda[2 * contacts.lambda_stride]);
 }
 
-/* Q: semi-implicit Euler of body i, its velocities times `slow`. dt: the settings', fetched early. */
-static __device__ __forceinline__ void move_body(const body_view &bodies, int32_t i, const struct sadmm_rigid *body,
-                                                 solver_real slow, double dt, double position[3], double orientation[4],
-                                                 double velocity[6])
+/* Q: semi-implicit Euler of a body with velocity `v`. dt: the settings', fetched early. */
+static __device__ __forceinline__ void move_body(const struct sadmm_rigid *body, const solver_real v[6], double dt,
+                                                 double position[3], double orientation[4], double velocity[6])
 {
-    const solver_real *state = bodies.state + (size_t)i * ROW;
-    vec3 linear = v3((double)(state[0] * slow), (double)(state[1] * slow), (double)(state[2] * slow));
-    vec3 angular = v3((double)(state[3] * slow), (double)(state[4] * slow), (double)(state[5] * slow));
+    vec3 linear = v3((double)v[0], (double)v[1], (double)v[2]);
+    vec3 angular = v3((double)v[3], (double)v[4], (double)v[5]);
     v3_store(rigid_move(v3_load(body->position), linear, dt), position);
     q_store(rigid_turn(q_load(body->orientation), angular, dt), orientation);
     v3_store(linear, velocity);

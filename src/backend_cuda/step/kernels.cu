@@ -134,16 +134,18 @@ static __device__ body_before fetch_body(const cuda_step_view &step, int32_t i)
     return before;
 }
 
-static __device__ bool finish_body(const body_view &bodies, const graph_view &graph, const island_view &islands,
-                                   const cuda_step_view &step, int32_t i, const body_before &before, double dt)
+static __device__ bool finish_body(const cuda_view &v, int32_t i, const body_before &before, double dt)
 {
     struct sadmm_steady steady = before.steady;
     struct sadmm_rigid next = before.body;
-    const solver_real slow = step.limits ? slow_down(graph, islands, i) : (solver_real)1;
-    move_body(bodies, i, &before.body, slow, dt, next.position, next.orientation, next.velocity);
+    solver_real velocity[6];
+    if (v.step.limits) end_velocity(v, i, velocity);
+    else
+        for (int k = 0; k < 6; ++k) velocity[k] = v.bodies.state[(size_t)i * ROW + (size_t)k];
+    move_body(&before.body, velocity, dt, next.position, next.orientation, next.velocity);
     steady_keep(&steady, &before.body, &next, dt);
-    step.after[i] = next;
-    step.steady_after[i] = steady;
+    v.step.after[i] = next;
+    v.step.steady_after[i] = steady;
     return finite_numbers(next.position, 3) && finite_numbers(next.orientation, 4) && finite_numbers(next.velocity, 6);
 }
 
@@ -228,7 +230,7 @@ static __global__ void __launch_bounds__(STEP_THREADS)
     const unsigned long long deepest = control->depth; /* of those that have come here */
     if (i == 0) control->stamps[STAMP_SOLVED] = nanoseconds();
     if (is_body) {
-        if (on && i < v.model.bodies && !finish_body(v.bodies, v.graph, v.islands, v.step, i, body, dt))
+        if (on && i < v.model.bodies && !finish_body(v, i, body, dt))
             atomicMin(&control->offending_body, i);
     } else if (i < range.pairs) {
         const int32_t slot = (i - range.wrenches) / LANES, of_body = i % LANES;

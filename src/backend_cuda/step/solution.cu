@@ -79,7 +79,7 @@ static __global__ void integrate_kernel(const __grid_constant__ cuda_view v, con
     int32_t i = thread_index();
     if (i >= live_bodies(v.model)) return;
     double *out = v.raw.out + MOVED * (size_t)i;
-    move_body(v.bodies, i, &v.raw.system.rigid[i], (solver_real)1, v.model.settings->dt, out, out + 3, out + 7);
+    move_body(&v.raw.system.rigid[i], v.bodies.state + (size_t)i * ROW, v.model.settings->dt, out, out + 3, out + 7);
 }
 
 extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)

@@ -36,7 +36,7 @@ void CUDA(view_into)(struct sadmm_context *c, int into, int substep)
     step->control = buffer<struct cuda_step_control>(c, BUFFER_WORLD_CONTROL);
     step->reports = step_reports(c);
     step->measured = c->plan.residuals && !stop_rule_checked(c);
-    step->limits = c->plan.limit;
+    step->limits = c->plan.momentum;
     step->substep = substep;
     step->substeps = substeps;
     c->view.raw.system.rigid = step->before;

@@ -83,7 +83,7 @@ static sadmm_status lay_out(struct sadmm_context *c, struct sadmm_error *error)
                           partition->most_bodies);
     *partition = {};
     partition->tier = SADMM_CUDA_TIER_STREAM;
-    partition->islands = c->fast;
+    partition->islands = c->fast || c->plan.momentum;
     TRY(CUDA(upload_live)(c, ABORT_NONE, error));
     return CUDA(enqueue_layout)(c, partition, error);
 }
@@ -112,7 +112,8 @@ extern "C" sadmm_status CUDA(begin)(struct sadmm_context *c, const struct sadmm_
     TRY(CUDA(reserve_layout)(c, error));
     TRY(upload_raw(c, error));
     TRY(CUDA(upload_live)(c, ABORT_NONE, error));
-    bool islands = c->fast || (c->wanted != SADMM_CUDA_TIER_GRID && c->wanted != SADMM_CUDA_TIER_STREAM);
+    bool islands = c->fast || plan->momentum ||
+                   (c->wanted != SADMM_CUDA_TIER_GRID && c->wanted != SADMM_CUDA_TIER_STREAM);
     struct cuda_known known;
     TRY(CUDA(enqueue_statistics)(c, islands, error));
     TRY(CUDA(download_known)(c, &known, error));

@@ -17,19 +17,16 @@ struct largest_term {
     static __device__ __forceinline__ double join(double a, double b) { return keep_max(a, b); }
 };
 
-/* Terms of a body, term k in lane k, added up (or what Join says) over its island. True in the lanes of one body of
- * each island; those have all of the sums in `sum`, and see what any body of the island has written before it came
- * here. Every lane of the warp comes here. */
-template <class Join>
-static __device__ __forceinline__ bool add_up_island(const graph_view &graph, const island_view &islands,
-                                                     const body_thread &t, double term, double sum[TERMS])
+/* Of bodies that are `on`, whole islands of them: add_up(slot, apart, members) for each power, by the lanes of the body
+ * that came last. True in the lanes of one body of each island; those see what any body of the island has written
+ * before it came here. `arrivals`: slots, 0 before and after. Every lane of the warp comes here. */
+template <class AddUp>
+static __device__ __forceinline__ bool add_up_by_powers(const graph_view &graph, unsigned long long *arrivals,
+                                                        const body_thread &t, bool on, AddUp add_up)
 {
-    const int32_t label = t.live ? graph.label[t.body] : 0, first = t.live ? graph.slot_of[label] : 0,
-                  bodies = t.live ? graph.island_bodies[label] : 0;
+    const int32_t label = on ? graph.label[t.body] : 0, first = on ? graph.slot_of[label] : 0,
+                  bodies = on ? graph.island_bodies[label] : 0;
     int32_t rank = t.slot - first;
-    bool on = t.live;
-    double *own = islands.terms + (size_t)t.slot * TERMS;
-    if (on && t.lane < TERMS) own[t.lane] = term;
     int32_t power = 0;
     for (int64_t apart = 1; __ballot_sync((unsigned)ALL_LANES, on && apart < bodies) != 0; apart *= SPREAD, ++power) {
         const int32_t begin = (int32_t)(rank / (apart * SPREAD) * (apart * SPREAD));
@@ -41,17 +38,31 @@ static __device__ __forceinline__ bool add_up_island(const graph_view &graph, co
         if (!alone && t.lane == 0) {
             const unsigned long long one = 1ull << ARRIVAL_BITS * power;
             __threadfence(); /* what the lanes have written, before their body is counted */
-            const unsigned long long before = atomicAdd(&islands.arrivals[first + begin], one);
+            const unsigned long long before = atomicAdd(&arrivals[first + begin], one);
             last = (int32_t)(before >> ARRIVAL_BITS * power & ((1u << ARRIVAL_BITS) - 1)) + 1 == members;
-            if (last) atomicAdd(&islands.arrivals[first + begin], 0ull - one * (unsigned long long)members);
+            if (last) atomicAdd(&arrivals[first + begin], 0ull - one * (unsigned long long)members);
             __threadfence(); /* and what the others have */
         }
         on = __shfl_sync((unsigned)ALL_LANES, last, 0, LANES);
         __syncwarp((unsigned)ALL_LANES);
         if (alone || !on) continue;
         rank = begin;
-        double *to = islands.terms + (size_t)(first + begin) * TERMS;
-        if (t.lane >= TERMS) continue;
+        add_up(first + begin, apart, members);
+    }
+    return on;
+}
+
+/* Terms of a body, term k in lane k, added up (or what Join says) over its island. True in the lanes of one body of
+ * each island; those have all of the sums in `sum`. Every lane of the warp comes here. */
+template <class Join>
+static __device__ __forceinline__ bool add_up_island(const graph_view &graph, const island_view &islands,
+                                                     const body_thread &t, double term, double sum[TERMS])
+{
+    double *own = islands.terms + (size_t)t.slot * TERMS;
+    if (t.live && t.lane < TERMS) own[t.lane] = term;
+    const auto add_up = [&](int32_t slot, int64_t apart, int32_t members) {
+        double *to = islands.terms + (size_t)slot * TERMS;
+        if (t.lane >= TERMS) return;
         double all[SPREAD];
 #pragma unroll
         for (int32_t j = 0; j < SPREAD; ++j)
@@ -61,7 +72,8 @@ static __device__ __forceinline__ bool add_up_island(const graph_view &graph, co
         for (int32_t j = 1; j < SPREAD; ++j)
             if (j < members) term = Join::join(term, all[j]);
         to[t.lane] = term;
-    }
+    };
+    const bool on = add_up_by_powers(graph, islands.arrivals, t, t.live, add_up);
 #pragma unroll
     for (int k = 0; k < TERMS; ++k) sum[k] = __shfl_sync((unsigned)ALL_LANES, term, k, LANES);
     return on;

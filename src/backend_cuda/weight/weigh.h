@@ -29,13 +29,17 @@ static inline __device__ double violation_of(const body_view &bodies, const cont
     return sum;
 }
 
+/* Of the terms of a body before there are weight scales: what holds its island. */
+enum { TERM_HELD = 4 };
+
 /* What follows from the sums over an island. */
 template <bool SCALES>
 static __device__ __forceinline__ void weigh_island(cuda_island *island, const double sum[TERMS], const cuda_args &args)
 {
     static_assert(sizeof(struct weight_sums) == TERMS * sizeof(double), "a term for each");
     const struct weight_sums sums = {sum[0], sum[1], sum[2], sum[3], sum[4], sum[5]};
-    const cuda_island fresh = {weight_new_island(), 0, 1, 0, 0};
+    /* while there are no scales, the terms of these are others */
+    const cuda_island fresh = {weight_new_island(), 0, 1, !SCALES && sum[TERM_HELD] > 0, 0, 0};
     if (args.start) *island = fresh;
     weight_update_speed(&island->weights, &sums, args.warm, args.factor);
     if (!SCALES || island->rows) return;
@@ -61,7 +65,8 @@ static inline __device__ double row_side_number(const contact_view &contacts, co
     return lane == SIDE_PUSH ? sqrt(square) : 0;
 }
 
-/* J^T lambda of a body, a component a lane; in lane SIDE_PUSH the sum of the forces' sizes. ROWS: there may be row
+/* J^T lambda of a body, a component a lane; in lane SIDE_PUSH the sum of the forces' sizes, in lane SIDE_HOLDS how many
+ * sides hold it. ROWS: there may be row
  * blocks. */
 template <bool ROWS>
 static __device__ __forceinline__ double sum_sides(const graph_view &graph, const contact_view &contacts,
@@ -108,7 +113,11 @@ static __device__ __forceinline__ double terms_of_body(const cuda_view &v, const
     term[3] = __shfl_sync((unsigned)ALL_LANES, sum, SIDE_PUSH, LANES);
     const double r = row.b + g - momentum;
     if (t.live) v.bodies.momentum_residual[t.body * ROW + (size_t)t.lane] = (solver_real)r;
-    if (SCALES) {
+    if (!SCALES) {
+        /* a body that nothing touches moves as it should */
+        const double holds = __shfl_sync((unsigned)ALL_LANES, sum, SIDE_HOLDS, LANES);
+        term[TERM_HELD] = t.live && t.begin == t.end ? 1 : holds;
+    } else {
         sum_lanes<1>(&missed);
         term[4] = dot_lanes(r, product(r, row.a_inverse));
         term[5] = missed;

@@ -34,8 +34,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         const point_numbers point = fetch_point(v.contacts, p, k);
         add_point(v.model, v.bodies, joined, about, difference, point.arm, point.lambda, false, &sums);
     }
-    store_sides(v.model, v.bodies, v.contacts, v.weights, live, p, lane, count, joined, difference, false, no_inverse,
-                &sums);
+    store_sides(v.model, v.bodies, v.contacts, v.weights, live, p, lane, count, joined, (double)about.w, difference,
+                false, no_inverse, &sums);
 }
 
 /* ---- terms and islands ------------------------------------------------------------------------------------------- */
@@ -50,8 +50,11 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     double total[TERMS];
     const double term =
         v.bodies.rigid ? terms_of_body<SCALES, true, ROWS>(v, t) : terms_of_body<SCALES, false, ROWS>(v, t);
-    if (add_up_island<add_terms>(v.graph, v.islands, t, term, total) && t.lane == 0)
-        weigh_island<SCALES>(&v.islands.info[v.graph.label[t.body]], total, args);
+    if (add_up_island<add_terms>(v.graph, v.islands, t, term, total) && t.lane == 0) {
+        cuda_island *island = &v.islands.info[v.graph.label[t.body]];
+        weigh_island<SCALES>(island, total, args);
+        if (!SCALES && args.start && !island->held) *v.islands.suspects = 1;
+    }
 }
 
 /* ---- row blocks -------------------------------------------------------------------------------------------------- */
@@ -87,7 +90,7 @@ static __device__ void weigh_rows(const cuda_view &v, int32_t k, bool first)
     struct weight_row_sums sums = {0, 0, 0};
     if (first) {
         respond_rows(v.model, v.bodies, v.rows, k);
-        island->rows = 1;
+        island->rows = island->held = 1; /* left alone */
     }
     const row_response *responses = v.rows.responses + (size_t)k * SADMM_MAX_ROWS;
     for (int r = 0; r < about.rows; ++r)

@@ -12,11 +12,21 @@
  *     v . A (v - v_f) <= W
  *
  * so that v ends on or in the sphere that has 0 and v_f at opposite ends, but for W. Few iterations in a step that
- * starts warm are held to that, too. Here W need not be believed: what too large a W allows is limited by the above. */
+ * starts warm are held to that, too. Here W need not be believed: what too large a W allows is limited by the above.
+ *
+ * What contacts cannot change is left alone. Of a loose island, which may move in ways no static contact feels
+ * (math/momentum.h), energies are those of the rest of v and v_f, and the rest alone is slowed down. In free fall v_f
+ * has no rest: bodies that overlap would hang together for good, were W believed in the end alone. It counts as far as
+ * the impulses can do it: they may be far too large, and most of them take energy. By the share of lambda that solves
+ * the dual problem best,
+ *
+ *     s = min(1, drive / response),    drive = -lambda . (J v_f + e),   response = lambda . J A^-1 J^T lambda
+ *
+ * the energy of A^-1 (b + s J^T lambda) is at most that of v_f and s (W - drive / 2). */
 #ifndef SADMM_MATH_LIMIT_H
 #define SADMM_MATH_LIMIT_H
 
-#include "real.h"
+#include "momentum.h"
 #include "weight.h"
 
 /* Rounding of energies in single precision, some hundred times over. */
@@ -25,24 +35,52 @@
 
 struct limit_energies {
     double now, free, momentum_residual, work; /* of v, of v_f, R, W; J */
+    /* Of islands that are loose: that no pair is known to hold. */
+    int loose;
+    double drive, response;
+    double rigid; /* of the motions that are left alone, which are not in the others */
 };
 
 SADMM_INLINE int limit_suspects(double now, double free) { return now > (1 + LIMIT_ROUNDING) * free; }
 
-/* The factor for the island's velocities, 1: none. */
-SADMM_INLINE double limit_factor(const struct limit_energies *e)
+/* Less is rounding of what was taken out; epsilon: of the solver's precision. */
+#define LIMIT_RIGID_ROUNDING 10.0
+SADMM_INLINE int limit_is_rounding(const struct limit_energies *e, double epsilon)
 {
-    int balanced = e->momentum_residual <= LIMIT_BALANCED * (e->now + e->free);
-    double allowed = e->free + (balanced ? e->work : 0);
-    return limit_suspects(e->now, allowed) ? sqrt(allowed / e->now) : 1;
+    return e->now <= LIMIT_RIGID_ROUNDING * epsilon * e->rigid;
+}
+
+/* Of a loose island: the energies of the rest. `along`: as below. */
+SADMM_INLINE void limit_take_rigid(struct limit_energies *e, double *along, const struct momentum_energies *rigid)
+{
+    e->now -= rigid->now;
+    e->free = fmax(e->free - rigid->free, 0.0);
+    e->rigid = rigid->free;
+    e->loose = 1;
+    *along -= rigid->along;
+}
+
+/* What of W counts. */
+SADMM_INLINE double limit_work(const struct limit_energies *e)
+{
+    if (!e->loose) return e->momentum_residual <= LIMIT_BALANCED * (e->now + e->free) ? e->work : 0;
+    const double share = e->drive >= e->response ? 1 : e->drive > 0 ? e->drive / e->response : 0;
+    return fmax(share * (e->work - e->drive / 2), 0.0);
+}
+
+/* The factor for the island's velocities, 1: none. */
+SADMM_INLINE double limit_factor(const struct limit_energies *e, double epsilon)
+{
+    const double allowed = e->free + limit_work(e);
+    return limit_suspects(e->now, allowed) && !limit_is_rounding(e, epsilon) ? sqrt(allowed / e->now) : 1;
 }
 
 /* What goes along the free motion by less than this share is left to come to rest by itself; so is what may be
  * rounding, by epsilon of the solver's precision. */
-#define LIMIT_STILL 1e-8
+#define LIMIT_STILL          1e-8
 #define LIMIT_STILL_ROUNDING 10.0
 /* The least factor: islands that would be stopped in every step could not find their way out. */
-#define LIMIT_LEAST 0.25
+#define LIMIT_LEAST          0.25
 
 /* Is the island checked for bounces? */
 SADMM_INLINE int limit_under_iterated(int warm, int iterations) { return warm && iterations < WEIGHT_UNDER_ITERATED; }
@@ -57,7 +95,7 @@ SADMM_INLINE int limit_bounces(double now, double free, double along, double eps
 SADMM_INLINE double limit_bounce_factor(const struct limit_energies *e, double along, double epsilon)
 {
     double factor;
-    if (!limit_bounces(e->now, e->free, along, epsilon)) return 1;
+    if (!limit_bounces(e->now, e->free, along, epsilon) || limit_is_rounding(e, epsilon)) return 1;
     factor = (along + sqrt(along * along + 2 * e->now * e->work)) / (2 * e->now);
     return factor > 1 - LIMIT_ROUNDING ? 1 : fmax(factor, LIMIT_LEAST);
 }

@@ -20,8 +20,10 @@ typedef SADMM_REAL real;
 /* Before a loop over an array of known size, which stays in registers then. */
 #ifdef __CUDA_ARCH__
 #define SADMM_UNROLL _Pragma("unroll")
+#define SADMM_ROLLED _Pragma("unroll 1") /* what runs rarely should not take registers */
 #else
 #define SADMM_UNROLL
+#define SADMM_ROLLED
 #endif
 
 /* sizeof folds at compile time: one source serves both precisions without the preprocessor knowing the type. */

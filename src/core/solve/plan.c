@@ -114,7 +114,8 @@ void sadmm_plan_settle(struct sadmm_plan *plan, const struct sadmm_settings *set
         constrained && may_update_penalty(settings) && (settings->penalty_update_warm || !plan->warm);
     bool fast = constrained && settings->method == SADMM_METHOD_FAST;
     plan->weight_refresh = fast && !plan->warm;
-    plan->limit = fast && plan->rigid && plan->points > 0;
+    plan->momentum = plan->rigid && plan->points > 0;
+    plan->limit = fast && plan->momentum;
     plan->certificate = settings->certify || settings->certificate_tolerance > 0;
     plan->residuals = constrained && (plan->penalty_updates || settings->measure_residuals ||
                                       settings->residual_tolerance > 0);

@@ -25,6 +25,7 @@ struct sadmm_plan {
     bool predict;           /* FAST: starts from predicted loads (loads.h); never in steps that a backend makes alone */
     bool weight_refresh;    /* FAST: weights are recomputed during the step */
     bool limit;             /* FAST: energies of islands under contacts alone are limited after the last iteration */
+    bool momentum;          /* islands of rigid bodies under contacts keep what momentum no static contact may change */
     bool residuals;         /* some iteration is measured */
     bool wrenches;          /* eq. (12) a body */
     bool certificate;

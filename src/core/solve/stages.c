@@ -80,7 +80,7 @@ static bool is_needed(const struct sadmm_stages *s, enum sadmm_stage_kind kind)
     case SADMM_STAGE_CHECK: return s->batch.check;
     case SADMM_STAGE_REWEIGH: return s->batch.reweigh && !s->stopped;
     case SADMM_STAGE_BALANCE: return s->batch.balance && !s->stopped;
-    case SADMM_STAGE_LIMIT: return plan->limit;
+    case SADMM_STAGE_LIMIT: return plan->momentum;
     default: return true;
     }
 }

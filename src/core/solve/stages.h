@@ -32,7 +32,8 @@ enum sadmm_stage_kind {
     SADMM_STAGE_CHECK,     /* -    convergence: where the stop rule is met, no iteration follows */
     SADMM_STAGE_REWEIGH,   /* -    FAST: weights from the multipliers found so far; factors */
     SADMM_STAGE_BALANCE,   /* P    eq. (15), and where it changes the penalty factors */
-    SADMM_STAGE_LIMIT,     /* -    FAST: islands with more energy than they may have (math/limit.h) */
+    SADMM_STAGE_LIMIT,     /* -    momentum that no contact may change (math/momentum.h); FAST: islands with more energy
+                              than they may have (math/limit.h) */
     SADMM_STAGE_SOLUTION,  /* -    velocities and multipliers to where the caller reads them */
     SADMM_STAGE_INTEGRATE, /* Q    states after dt */
     SADMM_STAGE_WRENCHES,  /* R    eq. (12) */

@@ -1,0 +1,81 @@
+/* After the last iteration: momentum that no contact may change is restored, in either method; in the method `fast` no
+ * island keeps more energy than it may have (math/limit.h). Energies and the work of contacts are added up at the
+ * bodies that name the islands. */
+#include <float.h>
+#include <string.h>
+
+#include "core/math/dense6.h"
+#include "literal.h"
+
+/* x . A^-1 y */
+static double inverse_form(const struct ref_body *body, const double x[6], const double y[6])
+{
+    double L[36], z[6];
+    dense6_cholesky(body->A, L);
+    dense6_solve(L, y, z);
+    return dense6_dot(x, z);
+}
+
+static void add_up_energies(struct sadmm_context *c)
+{
+    sadmm_ref_momentum_residual(c);
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        memset(&c->bodies[i].limit, 0, sizeof c->bodies[i].limit);
+        c->bodies[i].along = 0;
+    }
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        const struct ref_body *body = &c->bodies[i];
+        struct limit_energies *sum = &c->bodies[body->label].limit;
+        double momentum[6];
+        dense6_mul(body->A, body->v, momentum);
+        sum->now += dense6_dot(momentum, body->v) / 2;
+        sum->free += inverse_form(body, body->b, body->b) / 2;
+        sum->momentum_residual += inverse_form(body, body->impulse, body->impulse) / 2;
+        c->bodies[body->label].along += dense6_dot(body->v, body->b) / 2;
+    }
+    sadmm_ref_sum_impulses(c);
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        const struct ref_body *body = &c->bodies[i];
+        struct limit_energies *sum = &c->bodies[body->label].limit;
+        sum->drive -= inverse_form(body, body->impulse, body->b);
+        sum->response += inverse_form(body, body->impulse, body->impulse);
+    }
+    for (size_t k = 0; k < c->system->contacts->point_count; ++k) {
+        const struct ref_constraint *constraint = &c->constraints[k];
+        int32_t body = constraint->side[0].body >= 0 ? constraint->side[0].body : constraint->side[1].body;
+        struct limit_energies *sum = &c->bodies[c->bodies[body].label].limit;
+        sum->work += fmax(0, -constraint->e[0]) * constraint->lambda[0];
+        sum->drive -= constraint->e[0] * constraint->lambda[0];
+    }
+}
+
+/* By what an island is slowed down. */
+static double factor_of(struct ref_body *island, bool under_iterated)
+{
+    const struct momentum_energies rigid = momentum_energies_of(&island->motions);
+    if (island->rows) return 1; /* the energies are those of contacts alone */
+    if (island->loose) limit_take_rigid(&island->limit, &island->along, &rigid);
+    double factor = limit_factor(&island->limit, DBL_EPSILON);
+    if (under_iterated) factor = fmin(factor, limit_bounce_factor(&island->limit, island->along, DBL_EPSILON));
+    return factor;
+}
+
+sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *c, int32_t *limited, struct sadmm_error *error)
+{
+    (void)error;
+    const bool fast = c->settings->method == SADMM_METHOD_FAST;
+    const bool under_iterated = limit_under_iterated(c->plan->warm, c->settings->iterations);
+    *limited = 0;
+    if (!fast) sadmm_ref_label_islands(c);
+    sadmm_ref_find_motions(c);
+    if (fast) add_up_energies(c);
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        struct ref_body *island = &c->bodies[i];
+        if (island->label != i) continue;
+        island->slow_down = fast ? factor_of(island, under_iterated) : 1;
+        *limited += island->slow_down < 1;
+    }
+    for (int32_t i = 0; i < c->system->body_count; ++i)
+        sadmm_ref_move_island(c, i, c->bodies[c->bodies[i].label].slow_down);
+    return SADMM_OK;
+}
