@@ -90,7 +90,10 @@ static void plan_substeps(struct sadmm_context *c, struct preview *seen)
     s->plans[0] = CUDA(plan_of)(c, seen->live.pairs, seen->live.points, &seen->statistics);
     for (int k = known + 1; k < substeps; ++k) s->plans[k] = s->plans[known];
     c->plan = s->plans[0].plan;
-    for (int k = 1; k < substeps; ++k) c->plan.residuals = c->plan.residuals || s->plans[k].plan.residuals;
+    for (int k = 1; k < substeps; ++k) {
+        c->plan.residuals = c->plan.residuals || s->plans[k].plan.residuals;
+        c->plan.momentum = c->plan.momentum || s->plans[k].plan.momentum; /* the first contact may come later */
+    }
     if (known == 0) return;
     seen->counts.pairs = (int32_t)std::max((int64_t)seen->counts.pairs, learned->pairs);
     CUDA(merge_statistics)(&seen->statistics, &learned->statistics);
