@@ -5,6 +5,11 @@
 #include "manifold_tools.h"
 #include "run_suite.h"
 
+/* Points within a thousandth of the half extent of a rim count as on it (MANIFOLD_SNAP); what that changes of a gap,
+ * by both snaps and slopes of up to 0.3 between the faces, m. */
+#define SNAP 1e-3
+#define SNAPPED 5e-4
+
 /* Two unit plates, corner over corner, the upper one rolled and pitched a little: edges cross, and by the axis of
  * these edges the plates are nearest. */
 static void crossed_plates(struct random *r, double lean, struct solid *a, struct solid *b)
@@ -43,6 +48,21 @@ static bool line_in_box(const struct solid *box, const double p[3], const double
     return *from <= *to;
 }
 
+/* Does the line p + s n cross the surface of the box at s by a face that points along n? */
+static bool by_a_face_along(const struct solid *box, const double p[3], const double n[3], double s)
+{
+    double farthest = 0, along = 0;
+    for (int k = 0; k < 3; ++k) {
+        const double axis[3] = {box->R[k], box->R[3 + k], box->R[6 + k]};
+        double at = 0;
+        for (int j = 0; j < 3; ++j) at += axis[j] * (p[j] + s * n[j] - box->x[j]);
+        if (fabs(at) / box->size[k] < farthest) continue;
+        farthest = fabs(at) / box->size[k];
+        along = fabs(dot3(axis, n));
+    }
+    return along > 0.5;
+}
+
 /* The gap at a point of the manifold is the one that the two boxes have on the line along the normal through it. */
 START_TEST(points_are_on_both_surfaces)
 {
@@ -57,17 +77,17 @@ START_TEST(points_are_on_both_surfaces)
         ++edges;
         completed += m.count > 1;
         for (int i = 0; i < m.count; ++i) {
-            /* a little towards the middle of what all points span: at a corner the line only just meets the boxes */
+            /* a little towards the middle of what all points span: clipping snaps to a rim within SNAP */
             double p[3] = {0, 0, 0}, a0, a1, b0, b1;
             for (int j = 0; j < m.count; ++j)
                 for (int k = 0; k < 3; ++k) p[k] += m.position[j][k] / m.count;
-            for (int k = 0; k < 3; ++k) p[k] = m.position[i][k] + 1e-7 * (p[k] - m.position[i][k]);
+            for (int k = 0; k < 3; ++k) p[k] = m.position[i][k] + SNAP * (p[k] - m.position[i][k]);
             if (!line_in_box(&a, p, m.normal, &a0, &a1) || !line_in_box(&b, p, m.normal, &b0, &b1)) continue;
-            /* 1e-6: slopes of at most 0.3 over the 1e-7 by which the line was moved, of a plate's diagonal */
-            ck_assert_double_eq_tol(b0 - a1, m.separation[i], 1e-6);
+            if (!by_a_face_along(&a, p, m.normal, a1) || !by_a_face_along(&b, p, m.normal, b0)) continue; /* by a side */
+            ck_assert_double_eq_tol(b0 - a1, m.separation[i], SNAPPED);
         }
         for (int i = 0; i < m.count; ++i) {
-            double half = 0.5 * fabs(m.separation[i]) + 1e-12;
+            double half = 0.5 * fabs(m.separation[i]) + SNAPPED;
             ck_assert_double_le(m.separation[i], 0.05 + 1e-12);
             ck_assert_double_le(outside(&a, m.position[i]), half);
             ck_assert_double_le(outside(&b, m.position[i]), half);
@@ -79,14 +99,15 @@ START_TEST(points_are_on_both_surfaces)
 }
 END_TEST
 
-/* A vertex of one box faces the other where the line along the normal enters, or leaves, its own box there. */
+/* A vertex of one box faces the other where the line along the normal leaves, or enters, its own box there, and the
+ * other by a face of that direction. */
 static bool faces(const struct solid *own, const struct solid *other, const double p[3], const double n[3], bool below,
                   double *gap)
 {
     double own0, own1, other0, other1;
     if (!line_in_box(own, p, n, &own0, &own1) || !line_in_box(other, p, n, &other0, &other1)) return false;
     *gap = below ? other0 - own1 : own0 - other1;
-    return fabs(below ? own1 : own0) < 1e-6;
+    return fabs(below ? own1 : own0) < 1e-6 && by_a_face_along(other, p, n, below ? other0 : other1);
 }
 
 /* Every corner within reach of the other box's face is a point, but for those next to its rim (clipping snaps them). */
@@ -115,13 +136,9 @@ START_TEST(corners_in_reach_are_points)
                 double d[3], along;
                 for (int k = 0; k < 3; ++k) d[k] = m.position[i][k] - p[k];
                 along = dot3(d, m.normal);
-                along = sqrt(fmax(0, dot3(d, d) - along * along));
-                /* over the side of the other box, beside an edge that is nearer and has a point: not a facing corner */
-                if (m.separation[i] < gap && along < 0.02) along = 0;
-                nearest = fmin(nearest, along);
+                nearest = fmin(nearest, sqrt(fmax(0, dot3(d, d) - along * along)));
             }
-            /* clipping snaps within a thousandth of the half extent, along two sides */
-            ck_assert_double_le(nearest, 1e-3 * M_SQRT2);
+            ck_assert_double_le(nearest, SNAP * M_SQRT2); /* along two sides */
         }
     }
     ck_assert_int_ge(corners, 500); /* or nothing is asked: some 1,500 are */

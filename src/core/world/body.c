@@ -1,4 +1,5 @@
 /* Bodies of a world. */
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -226,6 +227,15 @@ sadmm_status sadmm_world_body_state(sadmm_world *world, sadmm_body_id id, sadmm_
     return SADMM_OK;
 }
 
+/* What a step made is set as it is: an orientation that is unit but for its own rounding would be another one once
+ * normalised. */
+static void keep_if_unit(const double given[4], double normalised[4])
+{
+    double most = 0;
+    for (int k = 0; k < 4; ++k) most = fmax(most, fabs(normalised[k] - given[k]));
+    if (most <= 2 * DBL_EPSILON) memcpy(normalised, given, 4 * sizeof *normalised);
+}
+
 sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, const sadmm_body_state *state)
 {
     TRY(sadmm_check_given(world, "world", NULL));
@@ -236,6 +246,7 @@ sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, co
     TRY(sadmm_check_given(state, "state", error));
     TRY(sadmm_check_vector("state->position", state->position, 3, ANY, error));
     TRY(sadmm_check_orientation("state->orientation", state->orientation, orientation, error));
+    keep_if_unit(state->orientation, orientation);
     TRY(check_motion("state->linear_velocity", "state->angular_velocity", state->linear_velocity,
                      state->angular_velocity, body->type, ANY, error));
     /* A static body is part of what the backend was given once. */
