@@ -32,8 +32,10 @@ START_TEST(every_scene_builds_and_steps)
     ck_assert_int_eq(sadmm_scene_before_step(&scene, world, 0, &error), SADMM_OK);
     step_world(world, 1);
     ck_assert(state_hash(world) != start);
-    /* Scenes are laid out without overlaps: touching faces may overlap by rounding only. */
-    ck_assert_double_lt(world_report(world).penetration_max, 1e-12);
+    /* Scenes are laid out without overlaps: touching faces may overlap by rounding only. Gaps at the start of a step
+     * are taken back from its middle: where a domino is pushed they are off by what half a step's turn differs from a
+     * straight line, 0.05 m x (5 rad/s x 0.0025 s)^2 / 2. */
+    ck_assert_double_lt(world_report(world).penetration_max, 4e-6);
     sadmm_world_destroy(world);
 }
 END_TEST

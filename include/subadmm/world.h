@@ -237,7 +237,7 @@ typedef struct sadmm_step_report {
     int64_t repeated;              /* steps since creation that a backend which runs ahead (CUDA) began with too small
                                       capacities or another plan than they needed, and repeated: nothing is lost but
                                       time */
-    double penetration_max;        /* deepest overlap at the start of the step, m, >= 0 */
+    double penetration_max;        /* deepest overlap at the start of the step, m, >= 0: of sadmm_contact.gap */
     sadmm_phase_times ms;          /* the certificate's own time is in `certify_ms`, not in here */
     double certify_ms;             /* wall time of the certificate on the host, ms; 0: there is none */
     sadmm_residual residual;       /* valid if measured (settings or penalty update or tolerance); else -1. Not measured
@@ -250,13 +250,19 @@ typedef struct sadmm_step_report {
 /* The report of the last step (zeroed before the first). Waits for steps; errors: those of the steps waited for. */
 SADMM_API sadmm_status sadmm_world_report(sadmm_world *world, sadmm_step_report *report);
 
-/* With sub-steps: of the last one, and so are the length of the step and its start. */
+/* Contacts are found where the bodies are halfway through the step by their velocities at its start; impulses, gaps and
+ * the certificate are those of that geometry (docs/algorithm.md, section 6). With sub-steps: of the last one, and so are
+ * the length of the step and its start. */
 typedef struct sadmm_contact {
     sadmm_body_id body_a, body_b;
     sadmm_shape_id shape_a, shape_b;
-    double position[3];   /* m, world, midway between the surfaces, at the start of the step */
-    double normal[3];     /* unit, world, from a to b */
-    double gap;           /* m, negative: penetration, at the start of the step */
+    double position[3];   /* m, world, midway between the surfaces where they are halfway through the step; with two
+                             dynamic bodies, less what their mean velocity moves it until then */
+    double normal[3];     /* unit, world, from a to b, halfway through the step */
+    double gap;           /* m, negative: penetration; at the start of the step: taken back from its middle by the
+                             velocities along this normal, so that gap + dt x relative velocity is the one at its
+                             end. It differs from the distance at the start by what bodies turn within half a
+                             step, to second order */
     double friction;      /* mu of the pair */
     double impulse[3];    /* on b, world, N s */
     double force[3];      /* impulse / dt, on b, world, N (eq. 12) */

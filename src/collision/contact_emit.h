@@ -44,26 +44,55 @@ SADMM_INLINE void contact_emit_pair(uint32_t slot_a, uint32_t slot_b, uint32_t c
     pair->child = child;
 }
 
-SADMM_INLINE void contact_between(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double between[3])
+/* What the points of a pair have in common. The contact was found where its bodies are `ahead` of the step's start
+ * (midway.h), and goes back to the start: arms to the start's centres of mass, gaps by the velocities. */
+struct pair_motion {
+    double between[3]; /* from the centre of mass of a's body to that of b's, ahead, m */
+    double shift_a[3], shift_b[3]; /* from arms ahead to arms at the start, of one point in space, m */
+    double opened; /* what the centres of mass went apart until then, along the normal, m */
+    double slant;  /* what the shifts make of the way that turning moves the points within the step, a less b, m */
+};
+
+/* n . (w x r) */
+SADMM_INLINE double along_turn(const double n[3], const double w[3], const double r[3])
 {
-    int k;
-    for (k = 0; k < 3; ++k) between[k] = b->com[k] - a->com[k];
+    return n[0] * (w[1] * r[2] - w[2] * r[1]) + n[1] * (w[2] * r[0] - w[0] * r[2]) + n[2] * (w[0] * r[1] - w[1] * r[0]);
 }
 
-/* Without an impulse. between: from the centre of mass of a's body to that of b's. */
-SADMM_INLINE void contact_emit_point(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double between[3],
+/* The point goes along with the mean velocity of both bodies, or stays where it is on the one that does not move. */
+SADMM_INLINE void pair_motion_of(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double normal[3],
+                                 double dt, struct pair_motion *m)
+{
+    const double share = a->system_body >= 0 && b->system_body >= 0 ? 0.5 : 0, ahead = proxy_ahead(a, b, dt);
+    int k;
+    m->opened = 0;
+    for (k = 0; k < 3; ++k) {
+        const double way = way_ahead(a, b, ahead, k);
+        m->between[k] = b->com[k] - a->com[k] + way;
+        m->shift_a[k] = -share * way;
+        m->shift_b[k] = share * way;
+        m->opened += normal[k] * way;
+    }
+    m->slant = dt * (along_turn(normal, a->angular, m->shift_a) - along_turn(normal, b->angular, m->shift_b));
+}
+
+/* Without an impulse. normal: in the world. */
+SADMM_INLINE void contact_emit_point(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+                                     const struct pair_motion *motion, const double normal[3],
                                      const struct manifold_point *from, struct sadmm_contact_point *point)
 {
-    double p[3];
+    double arm_a[3], arm_b[3];
     int k;
-    rotate_to_world(b->R, from->position, p);
+    rotate_to_world(b->R, from->position, arm_b);
     for (k = 0; k < 3; ++k) {
-        const double arm = p[k] + b->arm[k];
-        point->arm_b[k] = b->system_body >= 0 ? arm : 0;
-        point->arm_a[k] = a->system_body >= 0 ? arm + between[k] : 0;
+        arm_b[k] += b->arm[k];
+        arm_a[k] = arm_b[k] + motion->between[k];
+        point->arm_b[k] = b->system_body >= 0 ? arm_b[k] + motion->shift_b[k] : 0;
+        point->arm_a[k] = a->system_body >= 0 ? arm_a[k] + motion->shift_a[k] : 0;
         point->impulse[k] = 0;
     }
-    point->gap = (double)from->separation;
+    point->gap = (double)from->separation - motion->opened + a->ahead * along_turn(normal, a->angular, arm_a) -
+                 b->ahead * along_turn(normal, b->angular, arm_b) + motion->slant;
     point->error = 0;
     point->feature = from->feature;
     point->reserved = 0;

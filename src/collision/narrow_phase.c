@@ -14,14 +14,15 @@ static void emit(const struct sadmm_candidates *c, const struct sadmm_collision_
     struct sadmm_contact_pair *pair = &out->pairs[out->pair_count++];
     const double friction = contact_friction(input->friction_pairs, input->friction_values,
                                              (int64_t)input->friction_pair_count, a, b, pa, pb);
-    double normal[3], between[3];
+    struct pair_motion motion;
+    double normal[3];
 
-    contact_between(pa, pb, between);
     rotate_to_world(pb->R, m->normal, normal);
+    pair_motion_of(pa, pb, normal, input->dt, &motion);
     contact_emit_pair(a, b, child, pa, pb, m, normal, friction, (int32_t)out->point_count, pair);
     for (int i = 0; i < m->count; ++i) {
         struct sadmm_contact_point *point = &out->points[out->point_count++];
-        contact_emit_point(pa, pb, between, &m->points[i], point);
+        contact_emit_point(pa, pb, &motion, normal, &m->points[i], point);
         if (before) contact_carry(before, old->points, i, normal, friction, ratio, point);
     }
 }
@@ -78,7 +79,7 @@ static bool find_children(struct narrow_phase *n, uint32_t a, uint32_t b)
     const struct sadmm_proxy *pa = &n->candidates->proxies[a], *pb = &n->candidates->proxies[b];
     const uint32_t children = pair_children(&pa->geometry, &pb->geometry);
     const double limit = proxy_limit(pa, pb, input->margin, input->gravity, input->dt);
-    const struct pair_pose pose = pair_pose(pa->geometry.type == SADMM_SHAPE_PLANE, pa->R, pa->x, pb->R, pb->x);
+    const struct pair_pose pose = proxies_pose(pa, pb, proxy_ahead(pa, pb, input->dt));
     struct manifold m;
 
     for (uint32_t child = 0; child < children; ++child) {

@@ -9,27 +9,42 @@
 #include "manifold_box_round.h"
 #include "manifold_plane.h"
 #include "manifold_round.h"
+#include "proxy.h"
 
-/* Pose of a in b's frame. The differences are taken in double before anything is rounded to `real`. A plane's origin
- * may be far away: it moves to the foot of the perpendicular from b's centre. R: row-major, shape to world. */
-SADMM_INLINE struct pair_pose pair_pose(bool a_is_plane, const double Ra[9], const double xa[3], const double Rb[9],
-                                        const double xb[3])
+/* Pose of a in b's frame; d: from b's centre to a's origin. The differences are taken in double before anything is
+ * rounded to `real`. A plane's origin may be far away: it moves to the foot of the perpendicular from b's centre. R:
+ * row-major, shape to world. */
+SADMM_INLINE struct pair_pose pose_at(bool a_is_plane, const double Ra[9], const double d[3], const double Rb[9])
 {
-    double d[3] = {xa[0] - xb[0], xa[1] - xb[1], xa[2] - xb[2]};
-    double R[9], t[3];
+    double foot[3], R[9], t[3];
     struct pair_pose pose;
     int i, j;
-    if (a_is_plane) {
-        double height = d[0] * Ra[2] + d[1] * Ra[5] + d[2] * Ra[8];
-        for (i = 0; i < 3; ++i) d[i] = height * Ra[3 * i + 2];
-    }
+    const double height = d[0] * Ra[2] + d[1] * Ra[5] + d[2] * Ra[8];
+    for (i = 0; i < 3; ++i) foot[i] = a_is_plane ? height * Ra[3 * i + 2] : d[i];
     for (i = 0; i < 3; ++i) {
         for (j = 0; j < 3; ++j) R[3 * i + j] = Rb[i] * Ra[j] + Rb[3 + i] * Ra[3 + j] + Rb[6 + i] * Ra[6 + j];
-        t[i] = Rb[i] * d[0] + Rb[3 + i] * d[1] + Rb[6 + i] * d[2];
+        t[i] = Rb[i] * foot[0] + Rb[3 + i] * foot[1] + Rb[6 + i] * foot[2];
     }
     for (i = 0; i < 3; ++i) pose.R.r[i] = v3((real)R[3 * i], (real)R[3 * i + 1], (real)R[3 * i + 2]);
     pose.t = v3((real)t[0], (real)t[1], (real)t[2]);
     return pose;
+}
+
+/* The same with a's origin and b's centre in the world. */
+SADMM_INLINE struct pair_pose pair_pose(bool a_is_plane, const double Ra[9], const double xa[3], const double Rb[9],
+                                        const double xb[3])
+{
+    const double d[3] = {xa[0] - xb[0], xa[1] - xb[1], xa[2] - xb[2]};
+    return pose_at(a_is_plane, Ra, d, Rb);
+}
+
+/* Of two shapes, `ahead` of the step's start (midway.h). */
+SADMM_INLINE struct pair_pose proxies_pose(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead)
+{
+    double d[3];
+    int i;
+    for (i = 0; i < 3; ++i) d[i] = a->x[i] - b->x[i] - way_ahead(a, b, ahead, i);
+    return pose_at(a->geometry.type == SADMM_SHAPE_PLANE, a->R, d, b->R);
 }
 
 /* Of one child of the pair. The type of a is not above b's; m->count is 0 when the shapes are apart, and for types that

@@ -6,13 +6,16 @@
 #include "bounds.h"
 #include "collision.h"
 #include "geometry.h"
+#include "midway.h"
 
 struct sadmm_proxy {
-    double R[9], x[3];  /* shape to world, row-major; centre, m */
+    double R[9], x[3];  /* shape to world, row-major; centre, m: its body turned ahead (midway.h), not yet moved on */
     struct sadmm_geometry geometry; /* a copy: a pair needs no third place in memory */
-    double arm[3];      /* centre relative to the body's centre of mass, m, world */
-    double com[3];      /* of the body */
+    double arm[3];      /* centre relative to the body's centre of mass, m, world: turned ahead as well */
+    double com[3];      /* of the body, at the step's start */
     double velocity[3]; /* of the body, m/s */
+    double angular[3];  /* of the body, rad/s */
+    double ahead;       /* by how much it was turned ahead, s: [0, dt / 2] */
     double spin, fall;  /* reach of rotation, and of the force and torque on the body, within the step, m */
     double thin;        /* smallest extent, m */
     double friction, restitution;
@@ -25,13 +28,16 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
                               const struct sadmm_collision_body *body, double dt, double margin, double gravity,
                               struct sadmm_proxy *p, struct sadmm_box3 *box)
 {
-    quat q_body = q_load(body->orientation), q = q_normalize(q_mul(q_body, q_load(shape->orientation)));
+    bool moves = body->system_body >= 0;
+    const double ahead = moves ? turn_ahead(body->velocity + 3, dt) : 0;
+    quat q_start = q_load(body->orientation), q_body = moves ? turned(q_start, body->velocity + 3, ahead) : q_start;
+    quat q = q_normalize(q_mul(q_body, q_load(shape->orientation)));
     mat3 R = q_matrix(q);
     vec3 arm = m3_mul(q_matrix(q_body), v3_load(shape->position));
-    bool moves = body->system_body >= 0;
     double extent[3], reach;
     int i;
 
+    p->ahead = ahead;
     p->geometry = *geometry;
     for (i = 0; i < 3; ++i) v3_store(R.r[i], p->R + 3 * i);
     v3_store(arm, p->arm);
@@ -39,6 +45,7 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
         p->com[i] = body->position[i];
         p->x[i] = body->position[i] + p->arm[i];
         p->velocity[i] = moves ? body->velocity[i] : 0;
+        p->angular[i] = moves ? body->velocity[3 + i] : 0;
     }
     reach = v3_norm(arm) + geometry_radius(geometry);
     p->spin = moves ? rotation_sweep(body->velocity + 3, reach, dt) : 0;
@@ -67,6 +74,18 @@ SADMM_INLINE double proxy_limit(const struct sadmm_proxy *a, const struct sadmm_
 {
     return pair_limit(margin, a->thin, b->thin, a->velocity, b->velocity, a->spin, b->spin, a->fall, b->fall,
                       fall_of(gravity, dt), dt);
+}
+
+/* move_ahead of two shapes. */
+SADMM_INLINE double proxy_ahead(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double dt)
+{
+    return move_ahead(a->velocity, b->velocity, a->thin < b->thin ? a->thin : b->thin, dt);
+}
+
+/* What b moves relative to a in `ahead` seconds, m; 0 where velocities are so large that they leave no time. */
+SADMM_INLINE double way_ahead(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double ahead, int axis)
+{
+    return ahead > 0 ? ahead * (b->velocity[axis] - a->velocity[axis]) : 0;
 }
 
 /* Does the box come within `reach` of the plane? */

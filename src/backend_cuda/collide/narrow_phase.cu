@@ -70,7 +70,7 @@ static __global__ void __launch_bounds__(NARROW_THREADS) narrow_kernel(const __g
     const uint32_t cache = contact_memory(old, pa, pb); /* at once, not after what comes next */
     if (!contact_goes_on(old, own.child, pa, pb)) before = -1;
     const double limit = proxy_limit(pa, pb, step.margin, step.gravity, step.dt);
-    const struct pair_pose pose = pair_pose(pa->geometry.type == SADMM_SHAPE_PLANE, pa->R, pa->x, pb->R, pb->x);
+    const struct pair_pose pose = proxies_pose(pa, pb, proxy_ahead(pa, pb, step.dt));
     struct manifold m;
     pair_manifold(&pa->geometry, &pb->geometry, own.child, &pose, (real)limit, before >= 0 ? cache : 0, &m);
 
