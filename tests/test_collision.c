@@ -60,6 +60,7 @@ static int32_t add_body(struct scene *s, bool moves, double x, double y, double 
     body->orientation[0] = 1;
     body->system_body = moves ? s->dynamic_count++ : -1;
     body->environment = moves ? 0 : -1;
+    body->inertia = moves ? 1 : 0;
     return s->body_count++;
 }
 

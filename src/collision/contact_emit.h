@@ -5,13 +5,6 @@
 #include "contact_match.h"
 #include "manifold.h"
 
-SADMM_INLINE void rotate_to_world(const double R[9], vec3 v, double out[3])
-{
-    int k;
-    for (k = 0; k < 3; ++k)
-        out[k] = R[3 * k] * (double)v.x + R[3 * k + 1] * (double)v.y + R[3 * k + 2] * (double)v.z;
-}
-
 /* The value set for the two shapes (keys: unordered_key of slots, sorted), else the geometric mean. */
 SADMM_INLINE double contact_friction(const uint64_t *keys, const double *values, int64_t count, uint32_t slot_a,
                                      uint32_t slot_b, const struct sadmm_proxy *a, const struct sadmm_proxy *b)
@@ -59,18 +52,21 @@ SADMM_INLINE double along_turn(const double n[3], const double w[3], const doubl
     return n[0] * (w[1] * r[2] - w[2] * r[1]) + n[1] * (w[2] * r[0] - w[0] * r[2]) + n[2] * (w[0] * r[1] - w[1] * r[0]);
 }
 
-/* The point goes along with the mean velocity of both bodies, or stays where it is on the one that does not move. */
+/* ahead: manifold.ahead. The point stays where it is on a body beside a static one. Of two dynamic bodies the arms of the
+ * one that is harder to turn take up most of the way: those of a bullet must be its own. */
 SADMM_INLINE void pair_motion_of(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double normal[3],
-                                 double dt, struct pair_motion *m)
+                                 double ahead, double dt, struct pair_motion *m)
 {
-    const double share = a->system_body >= 0 && b->system_body >= 0 ? 0.5 : 0, ahead = proxy_ahead(a, b, dt);
+    const bool both = a->system_body >= 0 && b->system_body >= 0;
+    const double share_a = both ? a->inertia / (a->inertia + b->inertia) : 0,
+                 share_b = both ? b->inertia / (a->inertia + b->inertia) : 0;
     int k;
     m->opened = 0;
     for (k = 0; k < 3; ++k) {
         const double way = way_ahead(a, b, ahead, k);
         m->between[k] = b->com[k] - a->com[k] + way;
-        m->shift_a[k] = -share * way;
-        m->shift_b[k] = share * way;
+        m->shift_a[k] = -share_a * way;
+        m->shift_b[k] = share_b * way;
         m->opened += normal[k] * way;
     }
     m->slant = dt * (along_turn(normal, a->angular, m->shift_a) - along_turn(normal, b->angular, m->shift_b));

@@ -35,6 +35,7 @@ struct manifold {
     vec3 normal; /* unit, frame of b, from a to b */
     int count;   /* 0: not in contact */
     uint32_t cache;
+    double ahead; /* s: of the step's start, where the pair is (pair_manifold.h: find_manifold) */
     struct manifold_point points[SADMM_MANIFOLD_POINTS];
 };
 

@@ -37,23 +37,6 @@ struct box_axes {
     real keep;                   /* absolute part of the preferences */
 };
 
-SADMM_INLINE void box_pair_make(vec3 half1, vec3 half2, const struct pair_pose *pose, real limit, struct box_pair *b)
-{
-    int i, j;
-    v3_to_array(half1, b->h1);
-    v3_to_array(half2, b->h2);
-    v3_to_array(pose->R.r[0], b->R[0]);
-    v3_to_array(pose->R.r[1], b->R[1]);
-    v3_to_array(pose->R.r[2], b->R[2]);
-    v3_to_array(pose->t, b->t);
-    for (i = 0; i < 3; ++i)
-        for (j = 0; j < 3; ++j) b->Q[i][j] = real_abs(b->R[i][j]);
-    b->limit = limit;
-    b->slack = 4 * SADMM_EPSILON * (b->h1[0] + b->h1[1] + b->h1[2] + b->h2[0] + b->h2[1] + b->h2[2]);
-    b->thin = 2 * real_min(real_min(b->h1[0], real_min(b->h1[1], b->h1[2])),
-                           real_min(b->h2[0], real_min(b->h2[1], b->h2[2])));
-}
-
 /* What an axis is given when it is the cached one. */
 SADMM_INLINE real box_bonus(const struct box_axes *axes, real separation)
 {

@@ -19,6 +19,23 @@ struct box_pair {
     real limit, thin, slack; /* slack: rounding of a separation */
 };
 
+SADMM_INLINE void box_pair_make(vec3 half1, vec3 half2, const struct pair_pose *pose, real limit, struct box_pair *b)
+{
+    int i, j;
+    v3_to_array(half1, b->h1);
+    v3_to_array(half2, b->h2);
+    v3_to_array(pose->R.r[0], b->R[0]);
+    v3_to_array(pose->R.r[1], b->R[1]);
+    v3_to_array(pose->R.r[2], b->R[2]);
+    v3_to_array(pose->t, b->t);
+    for (i = 0; i < 3; ++i)
+        for (j = 0; j < 3; ++j) b->Q[i][j] = real_abs(b->R[i][j]);
+    b->limit = limit;
+    b->slack = 4 * SADMM_EPSILON * (b->h1[0] + b->h1[1] + b->h1[2] + b->h2[0] + b->h2[1] + b->h2[2]);
+    b->thin = 2 * real_min(real_min(b->h1[0], real_min(b->h1[1], b->h1[2])),
+                           real_min(b->h2[0], real_min(b->h2[1], b->h2[2])));
+}
+
 /* Edge pair (i, j): axis e_i x b_j, not normalised. */
 SADMM_INLINE vec3 box_edge_axis(const struct box_pair *b, int i, int j)
 {

@@ -14,9 +14,9 @@
 
 /* Most that a shape is turned ahead, rad: a body that turns faster has no middle of a step to speak of. */
 #define MIDWAY_TURN 0.25
-/* Most that two shapes are moved ahead relative to each other, as a share of the thinner one's extent: they are not to
- * pass through each other before their contact is asked for. */
-#define MIDWAY_TRAVEL 0.25
+/* Most that two shapes are moved halfway relative to each other, as a share of the thinner one's extent: beyond, what
+ * they touch with may be another part of them by then (advance.h). */
+#define MIDWAY_TRAVEL 0.1
 
 /* How far on a body is turned, s: half a step, but for MIDWAY_TURN. */
 SADMM_INLINE double turn_ahead(const double angular[3], double dt)

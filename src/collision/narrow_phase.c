@@ -18,7 +18,7 @@ static void emit(const struct sadmm_candidates *c, const struct sadmm_collision_
     double normal[3];
 
     rotate_to_world(pb->R, m->normal, normal);
-    pair_motion_of(pa, pb, normal, input->dt, &motion);
+    pair_motion_of(pa, pb, normal, m->ahead, input->dt, &motion);
     contact_emit_pair(a, b, child, pa, pb, m, normal, friction, (int32_t)out->point_count, pair);
     for (int i = 0; i < m->count; ++i) {
         struct sadmm_contact_point *point = &out->points[out->point_count++];
@@ -78,13 +78,11 @@ static bool find_children(struct narrow_phase *n, uint32_t a, uint32_t b)
     const struct sadmm_collision_input *input = n->input;
     const struct sadmm_proxy *pa = &n->candidates->proxies[a], *pb = &n->candidates->proxies[b];
     const uint32_t children = pair_children(&pa->geometry, &pb->geometry);
-    const double limit = proxy_limit(pa, pb, input->margin, input->gravity, input->dt);
-    const struct pair_pose pose = proxies_pose(pa, pb, proxy_ahead(pa, pb, input->dt));
     struct manifold m;
 
     for (uint32_t child = 0; child < children; ++child) {
         const struct sadmm_contact_pair *before = find_before(n, ordered_key(a, b), child, pa, pb);
-        pair_manifold(&pa->geometry, &pb->geometry, child, &pose, (real)limit,
+        find_manifold(pa, pb, child, input->margin, input->gravity, input->dt,
                       before ? contact_memory(before, pa, pb) : 0, &m);
         if (m.count == 0) continue;
         if (!has_capacity(n->out) && !add_capacity(n->out)) return false;

@@ -2,6 +2,7 @@
 #ifndef SADMM_COLLISION_PAIR_MANIFOLD_H
 #define SADMM_COLLISION_PAIR_MANIFOLD_H
 
+#include "advance.h"
 #include "collision_table.h"
 #include "geometry.h"
 #include "manifold.h"
@@ -64,6 +65,25 @@ SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const stru
 #undef SADMM_MANIFOLD
     default: break;
     }
+}
+
+/* The same of two shapes in a step: where they are halfway through it (midway.h), or where a pair that is faster than
+ * that first touches (advance.h). What passes by is near, or no contact. */
+SADMM_INLINE void find_manifold(const struct sadmm_proxy *a, const struct sadmm_proxy *b, uint32_t child, double margin,
+                                double gravity, double dt, uint32_t cache, struct manifold *m)
+{
+    double ahead = proxy_ahead(a, b, dt), limit = proxy_limit(a, b, margin, gravity, dt);
+    struct advance state = {0, false};
+    bool moves_on = advance_needed(ahead, dt);
+    for (;;) {
+        const struct pair_pose pose = proxies_pose(a, b, ahead);
+        const bool last = !moves_on;
+        pair_manifold(&a->geometry, &b->geometry, child, &pose, last ? (real)limit : SADMM_REAL_MAX, last ? cache : 0, m);
+        if (last) break;
+        moves_on = advance_pair(a, b, &pose, m, dt, &state, &ahead);
+        if (state.missed) limit = proxy_near(a, b, margin, gravity, dt);
+    }
+    m->ahead = ahead;
 }
 
 #endif

@@ -18,6 +18,7 @@ struct sadmm_proxy {
     double ahead;       /* by how much it was turned ahead, s: [0, dt / 2] */
     double spin, fall;  /* reach of rotation, and of the force and torque on the body, within the step, m */
     double thin;        /* smallest extent, m */
+    double inertia;     /* of the body: its largest principal moment, kg m^2; 0: static */
     double friction, restitution;
     int32_t body, system_body;
     uint32_t revision, placed;
@@ -51,6 +52,7 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
     p->spin = moves ? rotation_sweep(body->velocity + 3, reach, dt) : 0;
     p->fall = moves ? own_fall(body->acceleration, reach, dt) : 0;
     p->thin = geometry_thickness(geometry);
+    p->inertia = body->inertia;
     p->friction = shape->friction;
     p->restitution = shape->restitution;
     p->body = shape->body;
@@ -60,6 +62,13 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
     if (geometry->type == SADMM_SHAPE_PLANE) return;
     geometry_extents(geometry, p->R, extent);
     shape_box(p->x, extent, shape_reach(margin, p->thin, p->fall, fall_of(gravity, dt)), p->velocity, p->spin, dt, box);
+}
+
+SADMM_INLINE void rotate_to_world(const double R[9], vec3 v, double out[3])
+{
+    int k;
+    for (k = 0; k < 3; ++k)
+        out[k] = R[3 * k] * (double)v.x + R[3 * k + 1] * (double)v.y + R[3 * k + 2] * (double)v.z;
 }
 
 /* A plane's own part of what a pair with it reaches, m: what is not in the other shape's box. gravity: fall_of it. */
@@ -73,6 +82,14 @@ SADMM_INLINE double proxy_limit(const struct sadmm_proxy *a, const struct sadmm_
                                 double dt)
 {
     return pair_limit(margin, a->thin, b->thin, a->velocity, b->velocity, a->spin, b->spin, a->fall, b->fall,
+                      fall_of(gravity, dt), dt);
+}
+
+/* pair_limit of what comes near without touching: margin, fall and rotation. */
+SADMM_INLINE double proxy_near(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double margin, double gravity,
+                               double dt)
+{
+    return pair_limit(margin, a->thin, b->thin, a->velocity, a->velocity, a->spin, b->spin, a->fall, b->fall,
                       fall_of(gravity, dt), dt);
 }
 

@@ -69,10 +69,8 @@ static __global__ void __launch_bounds__(NARROW_THREADS) narrow_kernel(const __g
     const struct sadmm_contact_pair *old = &v.before.pairs[before >= 0 ? before : 0];
     const uint32_t cache = contact_memory(old, pa, pb); /* at once, not after what comes next */
     if (!contact_goes_on(old, own.child, pa, pb)) before = -1;
-    const double limit = proxy_limit(pa, pb, step.margin, step.gravity, step.dt);
-    const struct pair_pose pose = proxies_pose(pa, pb, proxy_ahead(pa, pb, step.dt));
     struct manifold m;
-    pair_manifold(&pa->geometry, &pb->geometry, own.child, &pose, (real)limit, before >= 0 ? cache : 0, &m);
+    find_manifold(pa, pb, own.child, step.margin, step.gravity, step.dt, before >= 0 ? cache : 0, &m);
 
     v.sizes[i] = (uint8_t)m.count;
     if (m.count == 0) return;
@@ -81,6 +79,7 @@ static __global__ void __launch_bounds__(NARROW_THREADS) narrow_kernel(const __g
     out->normal = m.normal;
     out->count = m.count;
     out->cache = m.cache;
+    out->ahead = m.ahead;
     for (int k = 0; k < m.count; ++k) out->points[k] = m.points[k];
 }
 

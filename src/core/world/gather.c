@@ -23,11 +23,12 @@ static void place(struct sadmm_collision_body *out, const struct sadmm_rigid *ri
     memcpy(out->position, rigid->position, sizeof out->position);
     memcpy(out->orientation, rigid->orientation, sizeof out->orientation);
     memcpy(out->velocity, rigid->velocity, sizeof out->velocity);
-    out->acceleration[0] = out->acceleration[1] = 0;
+    out->acceleration[0] = out->acceleration[1] = out->inertia = 0;
     if (!dynamic) return;
     out->acceleration[0] = rigid_acceleration(rigid->mass, v3_load(rigid->wrench));
     out->acceleration[1] = rigid_angular_acceleration(q_load(rigid->orientation), v3_load(rigid->inertia),
                                                       v3_load(rigid->wrench + 3));
+    out->inertia = v3_max_abs(v3_load(rigid->inertia));
 }
 
 /* Where the solve for a dynamic body starts. dt: of the sub-step. */
