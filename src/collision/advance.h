@@ -66,7 +66,7 @@ SADMM_INLINE double shapes_apart(const struct sadmm_geometry *a, const struct sa
 
 /* Move *ahead on. m: the manifold there, of points at any distance. False: *ahead is where the contact is to be
  * taken. */
-SADMM_INLINE bool advance_pair(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const struct pair_pose *pose,
+SADMM_RARE bool advance_pair(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const struct pair_pose *pose,
                                const struct manifold *m, double dt, struct advance *state, double *ahead)
 {
     const double touch = ADVANCE_TOUCH * smaller_of(a->thin, b->thin);
