@@ -272,6 +272,9 @@ static struct soup soup_new(const struct soup_kind *kind, uint64_t number)
             for (int k = 0; k < 3; ++k) b->position[k] = -0.8 * half;
         }
         for (int k = 0; k < 6 && !still; ++k) b->velocity[k] = between(-1, 1) * (k < 3 ? half : 3);
+        if (!still) b->inertia = exp(between(-9, 0));
+        if (chance(0.02)) /* a bullet */
+            for (int k = 0; k < 3; ++k) b->velocity[k] *= 30;
     }
     s.input.shapes = s.shapes;
     s.input.shape_count = (size_t)shapes;
@@ -409,6 +412,7 @@ static struct sadmm_collision_input world_input(const sadmm_world *world, struct
         memcpy(bodies[slot].position, body->rigid.position, sizeof bodies[slot].position);
         memcpy(bodies[slot].orientation, body->rigid.orientation, sizeof bodies[slot].orientation);
         memcpy(bodies[slot].velocity, body->rigid.velocity, sizeof bodies[slot].velocity);
+        bodies[slot].inertia = body->rigid.inertia[0];
         bodies[slot].environment = body->environment;
         bodies[slot].system_body = body->alive && body->type == SADMM_BODY_DYNAMIC ? dynamic++ : -1;
     }

@@ -69,7 +69,8 @@ START_TEST(gaps_at_the_end_of_the_step)
                 const double middle = 0.1 * (z * cos(turn[0]) - x * sin(turn[0]));
                 if (fabs(half_x - (arm[0] - 0.5 * dt * v[0])) > 0.01 || z > 0) continue;
                 /* the next orders: (w dt)^4 / 384 and the half angle for its tangent, (w dt)^3 / 96 */
-                ck_assert_double_eq_tol(predicted - end, dt * dt / 8 * w * w * middle, 0.1 * pow(w * dt, 3) / 40 + 1e-12);
+                ck_assert_double_eq_tol(predicted - end, dt * dt / 8 * w * w * middle,
+                                        0.1 * pow(w * dt, 3) / 40 + 1e-12);
                 ++found;
             }
     }

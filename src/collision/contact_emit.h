@@ -52,14 +52,14 @@ SADMM_INLINE double along_turn(const double n[3], const double w[3], const doubl
     return n[0] * (w[1] * r[2] - w[2] * r[1]) + n[1] * (w[2] * r[0] - w[0] * r[2]) + n[2] * (w[0] * r[1] - w[1] * r[0]);
 }
 
-/* ahead: manifold.ahead. The point stays where it is on a body beside a static one. Of two dynamic bodies the arms of the
- * one that is harder to turn take up most of the way: those of a bullet must be its own. */
+/* ahead: manifold.ahead. The point stays where it is on a body beside a static one. Of two dynamic bodies the arms of
+ * the one that is harder to turn take up most of the way: those of a bullet must be its own. */
 SADMM_INLINE void pair_motion_of(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double normal[3],
                                  double ahead, double dt, struct pair_motion *m)
 {
     const bool both = a->system_body >= 0 && b->system_body >= 0;
-    const double share_a = both ? a->inertia / (a->inertia + b->inertia) : 0,
-                 share_b = both ? b->inertia / (a->inertia + b->inertia) : 0;
+    const double inertia = a->inertia + b->inertia, share_a = !both ? 0 : inertia > 0 ? a->inertia / inertia : 0.5,
+                 share_b = !both ? 0 : inertia > 0 ? b->inertia / inertia : 0.5;
     int k;
     m->opened = 0;
     for (k = 0; k < 3; ++k) {

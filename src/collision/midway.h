@@ -3,8 +3,8 @@
  * as an integral by the midpoint is. A normal that turns within the step, a corner that swings down: all of that is a
  * first-order error of geometry taken at the start.
  *
- * Gaps are taken back to the start of the step by the same normals and arms, so that "gap + dt x velocity" is the gap at
- * its end. Impulses act at one point of space, whatever moves through it: arms are measured from the centres of mass at
+ * Gaps are taken back to the start of the step by the same normals and arms, so that "gap + dt x velocity" is the gap
+ * at its end. Impulses act at one point of space, whatever moves through it: arms are measured from the centres of mass at
  * the start of the step to a point that both bodies have in common, or pairs would make angular momentum.
  */
 #ifndef SADMM_COLLISION_MIDWAY_H

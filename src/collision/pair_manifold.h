@@ -78,7 +78,8 @@ SADMM_INLINE void find_manifold(const struct sadmm_proxy *a, const struct sadmm_
     for (;;) {
         const struct pair_pose pose = proxies_pose(a, b, ahead);
         const bool last = !moves_on;
-        pair_manifold(&a->geometry, &b->geometry, child, &pose, last ? (real)limit : SADMM_REAL_MAX, last ? cache : 0, m);
+        pair_manifold(&a->geometry, &b->geometry, child, &pose, last ? (real)limit : SADMM_REAL_MAX, last ? cache : 0,
+                      m);
         if (last) break;
         moves_on = advance_pair(a, b, &pose, m, dt, &state, &ahead);
         if (state.missed) limit = proxy_near(a, b, margin, gravity, dt);

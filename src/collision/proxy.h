@@ -18,7 +18,7 @@ struct sadmm_proxy {
     double ahead;       /* by how much it was turned ahead, s: [0, dt / 2] */
     double spin, fall;  /* reach of rotation, and of the force and torque on the body, within the step, m */
     double thin;        /* smallest extent, m */
-    double inertia;     /* of the body: its largest principal moment, kg m^2; 0: static */
+    double inertia;     /* of the body: its largest principal moment, kg m^2 */
     double friction, restitution;
     int32_t body, system_body;
     uint32_t revision, placed;
