@@ -78,7 +78,7 @@ SADMM_RARE bool advance_pair(const struct sadmm_proxy *a, const struct sadmm_pro
     rotate_to_world(b->R, n, normal);
     for (k = 0; k < 3; ++k) closing -= normal[k] * (b->velocity[k] - a->velocity[k]);
     next = *ahead + distance / closing;
-    if (closing <= 0 || next >= dt) {
+    if (!(closing > 0 && next < dt)) { /* nor with velocities that have no difference */
         state->missed = true;
         return false;
     }
