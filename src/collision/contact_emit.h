@@ -2,6 +2,7 @@
 #ifndef SADMM_COLLISION_CONTACT_EMIT_H
 #define SADMM_COLLISION_CONTACT_EMIT_H
 
+#include "core/math/array3.h"
 #include "contact_match.h"
 #include "manifold.h"
 
@@ -42,15 +43,10 @@ SADMM_INLINE void contact_emit_pair(uint32_t slot_a, uint32_t slot_b, uint32_t c
 struct pair_motion {
     double between[3]; /* from the centre of mass of a's body to that of b's, ahead, m */
     double shift_a[3], shift_b[3]; /* from arms ahead to arms at the start, of one point in space, m */
-    double opened; /* what the centres of mass went apart until then, along the normal, m */
-    double slant;  /* what the shifts make of the way that turning moves the points within the step, a less b, m */
+    double turn_a[3], turn_b[3]; /* times an arm ahead: what turning has closed of the gap until then, less what it has
+                                    opened, m / m */
+    double closed; /* by the centres of mass, along the normal, and by what the shifts make of turning in the step, m */
 };
-
-/* n . (w x r) */
-SADMM_INLINE double along_turn(const double n[3], const double w[3], const double r[3])
-{
-    return n[0] * (w[1] * r[2] - w[2] * r[1]) + n[1] * (w[2] * r[0] - w[0] * r[2]) + n[2] * (w[0] * r[1] - w[1] * r[0]);
-}
 
 /* ahead: manifold.ahead. The point stays where it is on a body beside a static one. Of two dynamic bodies the arms of
  * the one that is harder to turn take up most of the way: those of a bullet must be its own. */
@@ -60,22 +56,27 @@ SADMM_INLINE void pair_motion_of(const struct sadmm_proxy *a, const struct sadmm
     const bool both = a->system_body >= 0 && b->system_body >= 0;
     const double inertia = a->inertia + b->inertia, share_a = !both ? 0 : inertia > 0 ? a->inertia / inertia : 0.5,
                  share_b = !both ? 0 : inertia > 0 ? b->inertia / inertia : 0.5;
+    double across_a[3] = {0, 0, 0}, across_b[3] = {0, 0, 0}; /* n x w, since n . (w x r) = r . (n x w) */
     int k;
-    m->opened = 0;
+    add_cross(normal, a->angular, 1, across_a);
+    add_cross(normal, b->angular, 1, across_b);
+    m->closed = 0;
     for (k = 0; k < 3; ++k) {
         const double way = way_ahead(a, b, ahead, k);
         m->between[k] = b->com[k] - a->com[k] + way;
         m->shift_a[k] = -share_a * way;
         m->shift_b[k] = share_b * way;
-        m->opened += normal[k] * way;
+        m->turn_a[k] = a->ahead * across_a[k];
+        m->turn_b[k] = -b->ahead * across_b[k];
+        m->closed -= normal[k] * way;
     }
-    m->slant = dt * (along_turn(normal, a->angular, m->shift_a) - along_turn(normal, b->angular, m->shift_b));
+    m->closed += dt * (dot3(across_a, m->shift_a) - dot3(across_b, m->shift_b));
 }
 
-/* Without an impulse. normal: in the world. */
+/* Without an impulse. */
 SADMM_INLINE void contact_emit_point(const struct sadmm_proxy *a, const struct sadmm_proxy *b,
-                                     const struct pair_motion *motion, const double normal[3],
-                                     const struct manifold_point *from, struct sadmm_contact_point *point)
+                                     const struct pair_motion *motion, const struct manifold_point *from,
+                                     struct sadmm_contact_point *point)
 {
     double arm_a[3], arm_b[3];
     int k;
@@ -87,8 +88,8 @@ SADMM_INLINE void contact_emit_point(const struct sadmm_proxy *a, const struct s
         point->arm_a[k] = a->system_body >= 0 ? arm_a[k] + motion->shift_a[k] : 0;
         point->impulse[k] = 0;
     }
-    point->gap = (double)from->separation - motion->opened + a->ahead * along_turn(normal, a->angular, arm_a) -
-                 b->ahead * along_turn(normal, b->angular, arm_b) + motion->slant;
+    point->gap = (double)from->separation + motion->closed + dot3(motion->turn_a, arm_a) +
+                 dot3(motion->turn_b, arm_b);
     point->error = 0;
     point->feature = from->feature;
     point->reserved = 0;

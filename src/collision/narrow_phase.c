@@ -22,7 +22,7 @@ static void emit(const struct sadmm_candidates *c, const struct sadmm_collision_
     contact_emit_pair(a, b, child, pa, pb, m, normal, friction, (int32_t)out->point_count, pair);
     for (int i = 0; i < m->count; ++i) {
         struct sadmm_contact_point *point = &out->points[out->point_count++];
-        contact_emit_point(pa, pb, &motion, normal, &m->points[i], point);
+        contact_emit_point(pa, pb, &motion, &m->points[i], point);
         if (before) contact_carry(before, old->points, i, normal, friction, ratio, point);
     }
 }

@@ -47,7 +47,7 @@ static __device__ void emit_point(const collision_view &v, const step_lengths &d
     struct sadmm_contact_point point;
     struct pair_motion motion;
     pair_motion_of(pa, pb, normal, m->ahead, dt.now, &motion);
-    contact_emit_point(pa, pb, &motion, normal, &m->points[lane], &point);
+    contact_emit_point(pa, pb, &motion, &m->points[lane], &point);
     const int32_t match = v.matches[i];
     if (match >= 0)
         contact_carry(&v.before.pairs[match], v.before.points, lane, normal, friction, step_ratio(dt.now, dt.before),
