@@ -48,7 +48,7 @@ START_TEST(axes)
 }
 END_TEST
 
-/* dt 0.01 s, slop 1e-5 m: 1e-6 m of noise. */
+/* dt 0.01 s, slop 1e-5 m: 1e-6 m of noise. Leads are along the normal. */
 START_TEST(points)
 {
     static const struct {
@@ -74,7 +74,8 @@ START_TEST(points)
         {0.003, 1, 1, {0, 1}, 0, {TOUCH_CARRIED, TOUCH_CARRIED}},
     };
     struct lead_touch touch = {0, {0, 0}};
-    lead_add_point(&touch, cases[_i].gap, cases[_i].push, cases[_i].speed, cases[_i].lead, 0.01, 1e-5);
+    lead_add_point(&touch, cases[_i].gap, cases[_i].push, cases[_i].speed, cases[_i].lead,
+                   fabs(cases[_i].lead[0]) + fabs(cases[_i].lead[1]), 0.01, 1e-5);
     ck_assert_int_eq(touch.island, cases[_i].island);
     for (int s = 0; s < 2; ++s) ck_assert_int_eq(touch.body[s], cases[_i].body[s]);
 }

@@ -252,9 +252,9 @@ typedef struct sadmm_step_report {
 /* The report of the last step (zeroed before the first). Waits for steps; errors: those of the steps waited for. */
 SADMM_API sadmm_status sadmm_world_report(sadmm_world *world, sadmm_step_report *report);
 
-/* Contacts are found where the bodies are halfway through the step by their velocities at its start; impulses, gaps and
- * the certificate are those of that geometry (docs/algorithm.md, section 6). With sub-steps: of the last one, and so are
- * the length of the step and its start. */
+/* Contacts are found where the bodies are halfway through the step by their velocities at its start, or where what is
+ * fast first touches; impulses, gaps and the certificate are those of that geometry (docs/algorithm.md, section 6). With
+ * sub-steps: of the last one, and so are the length of the step and its start. */
 typedef struct sadmm_contact {
     sadmm_body_id body_a, body_b;
     sadmm_shape_id shape_a, shape_b;

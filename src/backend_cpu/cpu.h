@@ -189,7 +189,8 @@ struct sadmm_context {
     struct cpu_loose *loose;
     int32_t *loose_bodies, *loose_pairs; /* by island, ascending; of pairs the static ones */
     int32_t loose_count;
-    size_t label_capacity, touch_capacity, pair_touch_capacity, loose_of_capacity, loose_capacity, loose_body_capacity, loose_pair_capacity;
+    size_t label_capacity, touch_capacity, pair_touch_capacity, loose_of_capacity, loose_capacity, loose_body_capacity,
+        loose_pair_capacity;
 
     /* fast */
     bool fast;

@@ -72,10 +72,12 @@ static void touch_pair(const struct sadmm_context *c, const struct sadmm_contact
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
         const struct sadmm_contact_point *point = &c->system->contacts->points[k];
         const double *n = pair->normal, *arm_a = point->arm_a, *arm_b = point->arm_b;
+        const double size = lead_size(lead[0], arm_a) + lead_size(lead[1], arm_b);
+        lead_add_push(out, dot3(n, point->impulse));
+        if (lead_is_still(size, c->settings.dt, c->settings.slop)) continue;
         const double leads[2] = {-lead_along(n, lead[0], arm_a), lead_along(n, lead[1], arm_b)};
-        lead_add_point(out, point->gap, dot3(n, point->impulse),
-                       lead_along(n, velocity[1], arm_b) - lead_along(n, velocity[0], arm_a), leads, c->settings.dt,
-                       c->settings.slop);
+        const double speed = lead_along(n, velocity[1], arm_b) - lead_along(n, velocity[0], arm_a);
+        lead_add_way(out, point->gap, speed, leads, size, c->settings.dt, c->settings.slop);
     }
 }
 

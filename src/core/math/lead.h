@@ -10,6 +10,8 @@
 #ifndef SADMM_MATH_LEAD_H
 #define SADMM_MATH_LEAD_H
 
+#include <stdbool.h>
+
 #include "array3.h"
 
 /* What touches an island, bits; then what touches a body of it. */
@@ -63,23 +65,53 @@ SADMM_INLINE double lead_along(const double n[3], const double v[6], const doubl
     return dot3(n, x);
 }
 
-/* Taking leads back may close a contact by this share of the slop: what a solve that was cut short jitters by. */
+/* No less than the speed by which a lead moves the point: sums of sizes of components. */
+SADMM_INLINE double lead_size(const double lead[6], const double arm[3])
+{
+    return fabs(lead[0]) + fabs(lead[1]) + fabs(lead[2]) +
+           (fabs(lead[3]) + fabs(lead[4]) + fabs(lead[5])) * (fabs(arm[0]) + fabs(arm[1]) + fabs(arm[2]));
+}
+
+/* Taking leads back may close a contact by this share of what they move it by in all, since the normal part of a lead
+ * grows with the square of the speed where a body rolls, or of the slop, which is what a solve that was cut short
+ * jitters by. */
+#define LEAD_SHARE 0.05
 #define LEAD_SLOP 0.1
 
-/* A contact point: its gap, its normal impulse, the speed at which it opens, and what the leads of a and b add to that.
- * Bits of the island; of a; of b. Each of two bodies may close half of what is left, whatever the other one does. */
+/* Bits of an island, and of the two bodies, a and b. */
 struct lead_touch {
     int island, body[2];
 };
 
-SADMM_INLINE void lead_add_point(struct lead_touch *touch, double gap, double push, double speed, const double lead[2],
-                                 double dt, double slop)
+/* Of a contact point, by its normal impulse. */
+SADMM_INLINE void lead_add_push(struct lead_touch *touch, double push)
 {
-    const double end = gap + dt * speed, room = (end > 0 ? end : 0) + LEAD_SLOP * slop;
+    SADMM_UNROLL
+    for (int s = 0; s < 2; ++s)
+        if (push > 0) touch->body[s] |= TOUCH_CARRIED;
+}
+
+/* Leads whose sizes come to `size` close nothing worth a look: bodies at rest, say. */
+SADMM_INLINE bool lead_is_still(double size, double dt, double slop) { return dt * size <= LEAD_SLOP * slop / 2; }
+
+/* Of a point whose leads are not still, by its gap, the speed at which it opens, and what the leads of a and b add to
+ * that. Each of two bodies may close half of what is left, whatever the other one does. */
+SADMM_INLINE void lead_add_way(struct lead_touch *touch, double gap, double speed, const double lead[2], double size,
+                               double dt, double slop)
+{
+    const double end = gap + dt * speed, room = (end > 0 ? end : 0) + fmax(LEAD_SHARE * dt * size, LEAD_SLOP * slop);
     if (dt * (lead[0] + lead[1]) > room) touch->island |= TOUCH_JOLT;
     SADMM_UNROLL
     for (int s = 0; s < 2; ++s)
-        if (push > 0 || dt * lead[s] > room / 2) touch->body[s] |= TOUCH_CARRIED;
+        if (dt * lead[s] > room / 2) touch->body[s] |= TOUCH_CARRIED;
+}
+
+/* Both. */
+SADMM_INLINE void lead_add_point(struct lead_touch *touch, double gap, double push, double speed, const double lead[2],
+                                 double size, double dt, double slop)
+{
+    lead_add_push(touch, push);
+    if (!lead_is_still(size, dt, slop)) lead_add_way(touch, gap, speed, lead, size, dt, slop);
 }
 
 #endif
