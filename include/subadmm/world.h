@@ -181,7 +181,9 @@ SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_s
  * first step from nothing. So the same states, reached in another way or set again, go on alike but not bit for bit; a
  * run that is to be repeated bit for bit begins with a new world. */
 
-/* One time step of settings.dt, with all of its sub-steps (settings.substeps), or none of it. Errors: OUT_OF_MEMORY,
+/* One time step of settings.dt, with all of its sub-steps (settings.substeps), or none of it. Constant forces, friction
+ * of what slides included, move bodies exactly, to x + v t + a t^2 / 2, until a contact begins or ends (which it does
+ * at the beginning or end of a step). Errors: OUT_OF_MEMORY,
  * NON_FINITE (state rolled back to before the step, message names the body), DEVICE, LIMIT. After an error the world is
  * as before the step and stays usable. NON_FINITE also where settings.certify asks for a certificate of numbers whose
  * products overflow; on CUDA that step counts as done.
@@ -250,9 +252,9 @@ typedef struct sadmm_step_report {
 /* The report of the last step (zeroed before the first). Waits for steps; errors: those of the steps waited for. */
 SADMM_API sadmm_status sadmm_world_report(sadmm_world *world, sadmm_step_report *report);
 
-/* Contacts are found where the bodies are halfway through the step by their velocities at its start; impulses, gaps and
- * the certificate are those of that geometry (docs/algorithm.md, section 6). With sub-steps: of the last one, and so are
- * the length of the step and its start. */
+/* Contacts are found where the bodies are halfway through the step by their velocities at its start, or where what is
+ * fast first touches; impulses, gaps and the certificate are those of that geometry (docs/algorithm.md, section 6). With
+ * sub-steps: of the last one, and so are the length of the step and its start. */
 typedef struct sadmm_contact {
     sadmm_body_id body_a, body_b;
     sadmm_shape_id shape_a, shape_b;

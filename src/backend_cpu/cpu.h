@@ -35,6 +35,7 @@
 #include "core/base/barrier.h"
 #include "core/base/parallel.h"
 #include "core/solve/kernels.h"
+#include "core/math/lead.h"
 #include "core/math/limit.h"
 #include "core/math/packed6.h"
 #include "cpu_lanes.h"
@@ -182,11 +183,14 @@ struct sadmm_context {
 
     /* Islands; without constraints and limits of worlds in the method `paper`: none */
     int32_t *label;             /* bodies: the smallest body of its island */
+    int32_t *touch;             /* bodies: bits (math/lead.h), of the body and, at labels, of the island */
+    struct lead_touch *pair_touch; /* pair records */
     int32_t *loose_of;          /* bodies, used at labels: index in `loose`, negative: held */
     struct cpu_loose *loose;
     int32_t *loose_bodies, *loose_pairs; /* by island, ascending; of pairs the static ones */
     int32_t loose_count;
-    size_t label_capacity, loose_of_capacity, loose_capacity, loose_body_capacity, loose_pair_capacity;
+    size_t label_capacity, touch_capacity, pair_touch_capacity, loose_of_capacity, loose_capacity, loose_body_capacity,
+        loose_pair_capacity;
 
     /* fast */
     bool fast;

@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "core/math/array3.h"
+#include "core/math/lead.h"
 #include "core/model/system_terms.h"
 #include "cpu_rows.h"
 
@@ -52,19 +53,91 @@ sadmm_status CPU(read_solution)(struct sadmm_context *c, struct sadmm_error *err
     return SADMM_OK;
 }
 
+/* ---- Q ----------------------------------------------------------------------------------------------------------- */
+
+/* What a pair's points touch (math/lead.h), into `out`. */
+static void touch_pair(const struct sadmm_context *c, const struct sadmm_contact_pair *pair, struct lead_touch *out)
+{
+    const int32_t body[2] = {pair->body_a, pair->body_b};
+    double velocity[2][6] = {{0}}, lead[2][6] = {{0}};
+    const struct lead_touch none = {body[0] >= 0 && body[1] >= 0 ? TOUCH_INNER
+                                    : pair->friction > 0         ? TOUCH_FRICTION
+                                                                 : TOUCH_SMOOTH, {0, 0}};
+    *out = none;
+    for (int s = 0; s < 2; ++s) {
+        if (body[s] < 0) continue;
+        memcpy(velocity[s], &c->system->velocity[6 * (size_t)body[s]], sizeof velocity[s]);
+        sadmm_body_lead(&c->system->rigid[body[s]], velocity[s], lead[s]);
+    }
+    for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
+        const struct sadmm_contact_point *point = &c->system->contacts->points[k];
+        const double *n = pair->normal, *arm_a = point->arm_a, *arm_b = point->arm_b;
+        const double size = lead_size(lead[0], arm_a) + lead_size(lead[1], arm_b);
+        lead_add_push(out, dot3(n, point->impulse));
+        if (lead_is_still(size, c->settings.dt, c->settings.slop)) continue;
+        const double leads[2] = {-lead_along(n, lead[0], arm_a), lead_along(n, lead[1], arm_b)};
+        const double speed = lead_along(n, velocity[1], arm_b) - lead_along(n, velocity[0], arm_a);
+        lead_add_way(out, point->gap, speed, leads, size, c->settings.dt, c->settings.slop);
+    }
+}
+
+/* Of each body the bits of its pairs. */
+static void touch_bodies(struct sadmm_context *c, int thread, int threads)
+{
+    size_t begin, end;
+    cpu_share_bodies(c, thread, threads, &begin, &end);
+    for (size_t i = begin; i < end; ++i) {
+        c->touch[i] = 0;
+        for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) {
+            int side;
+            const size_t record = cpu_record(c, at, &side);
+            if (record >= cpu_pair_records(c)) continue;
+            const struct lead_touch *touch = &c->pair_touch[record];
+            c->touch[i] |= touch->island | touch->body[side];
+        }
+    }
+}
+
+/* Islands have the bits of their bodies, at their labels, but for what is each body's own. */
+static void touch_islands(struct sadmm_context *c)
+{
+    for (int32_t i = 0; i < c->bodies; ++i) c->touch[c->label[i]] |= c->touch[i] & ~TOUCH_CARRIED;
+}
+
 struct integration {
-    const struct sadmm_context *c;
+    struct sadmm_context *c;
     struct sadmm_rigid *next;
 };
 
 static void integrate_share(void *argument, int thread, int threads)
 {
     const struct integration *in = (const struct integration *)argument;
-    const struct sadmm_context *c = in->c;
+    struct sadmm_context *c = in->c;
     size_t begin, end;
+    if (c->plan.momentum) {
+        sadmm_share(cpu_pair_records(c), thread, threads, &begin, &end);
+        for (size_t k = begin; k < end; ++k)
+            if (c->pair_blocks[k / (size_t)LANES].pair[k % (size_t)LANES] >= 0)
+                touch_pair(c, cpu_pair(c, k), &c->pair_touch[k]);
+        sadmm_barrier_wait(&c->barrier, threads);
+        touch_bodies(c, thread, threads);
+        sadmm_barrier_wait(&c->barrier, threads);
+        if (thread == 0) touch_islands(c);
+        sadmm_barrier_wait(&c->barrier, threads);
+    }
     cpu_share_bodies(c, thread, threads, &begin, &end);
-    for (size_t i = begin; i < end; ++i)
-        sadmm_rigid_advance(&c->system->rigid[i], &c->system->velocity[6 * i], c->settings.dt, &in->next[i]);
+    for (size_t i = begin; i < end; ++i) {
+        const struct sadmm_rigid *body = &c->system->rigid[i];
+        const double *velocity = &c->system->velocity[6 * i];
+        const int touch = c->plan.momentum ? c->touch[i] : 0, island = c->plan.momentum ? c->touch[c->label[i]] : 0;
+        double lead[6] = {0};
+        switch (lead_kind_of(island, touch)) {
+        case LEAD_STAYS: break;
+        case LEAD_SHARED: lead_shared(c->settings.gravity, c->settings.dt, lead); break;
+        case LEAD_OWN: sadmm_body_lead(body, velocity, lead); break;
+        }
+        sadmm_rigid_advance(body, velocity, lead, c->settings.dt, &in->next[i]);
+    }
 }
 
 sadmm_status CPU(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)
@@ -73,6 +146,8 @@ sadmm_status CPU(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, s
     cpu_parallel(c, integrate_share, &(struct integration){c, next});
     return SADMM_OK;
 }
+
+/* ---- R ----------------------------------------------------------------------------------------------------------- */
 
 /* Eq. (12) with lambda = -u: J^T lambda / dt, summed over a body's contacts in their fixed order. */
 static void body_wrench(const struct sadmm_context *c, size_t i, double wrench[6])

@@ -66,18 +66,58 @@ static sadmm_status read_penalty(struct sadmm_context *c, double *beta, struct s
     return SADMM_OK;
 }
 
-/* Q: semi-implicit Euler with the primal iterate v. */
+/* Of bodies and islands, what their contacts say of leads. */
+static void touch(struct sadmm_context *c)
+{
+    const struct sadmm_contact_set *contacts = c->system->contacts;
+    for (int32_t i = 0; i < c->system->body_count; ++i) {
+        struct ref_body *body = &c->bodies[i];
+        body->touch = body->island_touch = 0;
+        lead_own(c->system->rigid[i].velocity, body->v, rigid_is_isotropic(v3_load(c->system->rigid[i].inertia)),
+                 body->lead);
+    }
+    for (size_t k = 0; k < contacts->point_count; ++k) {
+        const struct ref_constraint *constraint = &c->constraints[k];
+        const bool inner = constraint->side[0].body >= 0 && constraint->side[1].body >= 0;
+        struct lead_touch touch = {inner ? TOUCH_INNER : constraint->mu > 0 ? TOUCH_FRICTION : TOUCH_SMOOTH, {0, 0}};
+        double speed = 0, lead[2] = {0, 0}, size = 0;
+        for (int s = 0; s < 2; ++s) {
+            const struct ref_side *side = &constraint->side[s];
+            if (side->body < 0) continue;
+            speed += dense6_dot(side->J, c->bodies[side->body].v);
+            lead[s] = dense6_dot(side->J, c->bodies[side->body].lead);
+            size += lead_size(c->bodies[side->body].lead, s ? contacts->points[k].arm_b : contacts->points[k].arm_a);
+        }
+        lead_add_point(&touch, contacts->points[k].gap, constraint->lambda[0], speed, lead, size, c->settings->dt,
+                       c->settings->slop);
+        for (int s = 0; s < 2; ++s) {
+            if (constraint->side[s].body < 0) continue;
+            struct ref_body *body = &c->bodies[constraint->side[s].body];
+            body->touch |= touch.body[s];
+            c->bodies[body->label].island_touch |= touch.island;
+        }
+    }
+}
+
+/* Q: the primal iterate v, less its lead. */
 static sadmm_status integrate(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)
 {
     double dt = c->settings->dt;
     if (!c->system->rigid)
         return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "integrate: the system gives A and b, not rigid bodies");
+    sadmm_ref_label_islands(c);
+    touch(c);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
-        const double *v = c->bodies[i].v;
+        const struct ref_body *from = &c->bodies[i];
+        const enum lead_kind kind = lead_kind_of(c->bodies[from->label].island_touch, from->touch);
         struct sadmm_rigid body = c->system->rigid[i];
-        v3_store(rigid_move(v3_load(body.position), v3_load(v), dt), body.position);
-        q_store(rigid_turn(q_load(body.orientation), v3_load(v + 3), dt), body.orientation);
-        memcpy(body.velocity, v, sizeof body.velocity);
+        double lead[6] = {0}, mean[6];
+        if (kind == LEAD_SHARED) lead_shared(c->settings->gravity, dt, lead);
+        if (kind == LEAD_OWN) memcpy(lead, from->lead, sizeof lead);
+        for (int k = 0; k < 6; ++k) mean[k] = from->v[k] - lead[k];
+        v3_store(rigid_move(v3_load(body.position), v3_load(mean), dt), body.position);
+        q_store(rigid_turn(q_load(body.orientation), v3_load(mean + 3), dt), body.orientation);
+        memcpy(body.velocity, from->v, sizeof body.velocity);
         next[i] = body;
     }
     return SADMM_OK;

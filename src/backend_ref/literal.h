@@ -13,6 +13,7 @@
 #define SADMM_BACKEND_REF_LITERAL_H
 
 #include "core/solve/kernels.h"
+#include "core/math/lead.h"
 #include "core/math/limit.h"
 
 /* One side of a constraint: the paper's subscript (i,k) or (j,k). */
@@ -57,6 +58,8 @@ struct ref_body {
     bool loose;                      /* it has contacts, and none is known to hold it */
     double slow_down;                /* the factor of its velocities, but for those motions */
     double impulse[6];               /* sums over the body's constraints */
+    double lead[6];                  /* its own (math/lead.h) */
+    int touch, island_touch;         /* bits: of the body; of the island that it names */
 };
 
 struct sadmm_context {

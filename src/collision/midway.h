@@ -4,8 +4,8 @@
  * first-order error of geometry taken at the start.
  *
  * Gaps are taken back to the start of the step by the same normals and arms, so that "gap + dt x velocity" is the gap
- * at its end. Impulses act at one point of space, whatever moves through it: arms are measured from the centres of mass at
- * the start of the step to a point that both bodies have in common, or pairs would make angular momentum.
+ * at its end. Impulses act at one point of space, whatever moves through it: arms are measured from the centres of mass
+ * at the start of the step to a point that both bodies have in common, or pairs would make angular momentum.
  */
 #ifndef SADMM_COLLISION_MIDWAY_H
 #define SADMM_COLLISION_MIDWAY_H

@@ -249,6 +249,12 @@ inline int atomicMin(int *to, int value)
     *to = std::min(before, value);
     return before;
 }
+inline int atomicOr(int *to, int bits)
+{
+    int before = *to;
+    *to |= bits;
+    return before;
+}
 inline int atomicAdd(int *to, int value)
 {
     int before = *to;

@@ -1,16 +1,19 @@
 /* The arrays that a solve works on, by the view's counts, the plan and the partition. */
 #include "context.h"
 
-/* What restores the momentum of islands. The method `fast` has its islands elsewhere. */
+/* What restores the momentum of islands, and says where leads stay. The method `fast` has its islands elsewhere. */
 static sadmm_status reserve_motions(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_view *v = &c->view;
     const size_t n = (size_t)v->model.bodies;
     v->islands.motions = nullptr;
+    v->islands.touch = nullptr;
     if (!c->fast) v->islands.info = nullptr;
     if (!c->plan.momentum) return SADMM_OK;
     const size_t islands = c->fast ? 0 : n * sizeof(cuda_island);
     TRY(CUDA(reserve)(c, BUFFER_MOTIONS, n * (MOTION_TERMS + 1) * sizeof(double) + islands, error));
+    TRY(CUDA(reserve)(c, BUFFER_TOUCH, n * sizeof(int32_t), error));
+    v->islands.touch = (int32_t *)c->buffers[BUFFER_TOUCH].data;
     v->islands.motions = (double *)c->buffers[BUFFER_MOTIONS].data;
     v->islands.motion_arrivals = (unsigned long long *)(v->islands.motions + n * MOTION_TERMS);
     if (!c->fast) v->islands.info = (cuda_island *)(v->islands.motion_arrivals + n);

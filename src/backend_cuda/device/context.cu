@@ -52,6 +52,7 @@ static const char *const buffer_names[] = {
     "weights",
     "records of sides",
     "momentum of islands",
+    "leads of bodies",
     "bodies' input",
     "pairs' input",
     "points' input",

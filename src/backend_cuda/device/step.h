@@ -9,6 +9,7 @@
  *     penalties   C, beta, factors (fast: weights, C, factors); and: is this what the step was planned for?
  *     iterate     (15), new weights where asked for (the kernel table's own kernels); fast: convergence checks
  *     limit       fast: islands that have more energy than they may
+ *     touch       what contacts say of leads (math/lead.h)
  *     finish      impulses into the contacts, moved bodies, wrenches; beside it (16), (17)
  *     commit      the report; the step counts only if nothing was aborted
  *

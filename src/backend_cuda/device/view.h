@@ -198,6 +198,8 @@ struct island_view {
     double *terms;                /* slots x TERMS: of bodies, then added up in place (weight/island_sums.h) */
     unsigned long long *arrivals; /* slots: of terms at places they are added up at; 0 between kernels */
     int32_t *limited;             /* islands slowed down */
+    int32_t *touch;               /* worlds with contacts: bodies: bits (math/lead.h), of the body and, at labels, of
+                                     the island; else NULL */
     int32_t *suspects;            /* not 0: some island may have to be, or is not held */
     cuda_stop *stop;
 };

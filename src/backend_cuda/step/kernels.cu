@@ -83,6 +83,7 @@ static __device__ __forceinline__ void start_body(const cuda_view &v, int64_t i,
                                                        : rigid_angular_acceleration(q_load(body->orientation),
                                                                                     v3_load(body->inertia), torque);
     if (lane == LANE_PLACED) out->placed = placed;
+    if (lane == LANE_PLACED && v.islands.touch) v.islands.touch[i] = 0;
 }
 
 /* START_LANES threads a body, a number each: neighbours in memory go to neighbours. */
@@ -126,11 +127,12 @@ static __global__ void admit_kernel(const __grid_constant__ cuda_view v, const _
 struct body_before {
     struct sadmm_rigid body;
     struct sadmm_steady steady;
+    int32_t label;
 };
 
-static __device__ body_before fetch_body(const cuda_step_view &step, int32_t i)
+static __device__ body_before fetch_body(const graph_view &graph, const cuda_step_view &step, int32_t i)
 {
-    const body_before before = {step.before[i], step.steady_before[i]};
+    const body_before before = {step.before[i], step.steady_before[i], step.limits ? graph.label[i] : i};
     return before;
 }
 
@@ -142,7 +144,10 @@ static __device__ bool finish_body(const cuda_view &v, int32_t i, const body_bef
     if (v.step.limits) end_velocity(v, i, velocity);
     else
         for (int k = 0; k < 6; ++k) velocity[k] = v.bodies.state[(size_t)i * ROW + (size_t)k];
-    move_body(&before.body, velocity, dt, next.position, next.orientation, next.velocity);
+    const int island = v.step.limits ? v.islands.touch[before.label] : 0,
+              own = v.step.limits ? v.islands.touch[i] : 0;
+    move_body(&before.body, velocity, dt, v.model.settings->gravity, island, own, next.position, next.orientation,
+              next.velocity);
     steady_keep(&steady, &before.body, &next, dt);
     v.step.after[i] = next;
     v.step.steady_after[i] = steady;
@@ -219,7 +224,7 @@ static __global__ void __launch_bounds__(STEP_THREADS)
     const int32_t p = (i - range.pairs) / v.contacts.lanes, lane = is_pair ? (i - range.pairs) % v.contacts.lanes : 0;
     body_before body = {};
     pair_before pair = {};
-    if (is_body && i < v.model.bodies) body = fetch_body(v.step, i);
+    if (is_body && i < v.model.bodies) body = fetch_body(v.graph, v.step, i);
     if (is_pair) pair = fetch_pair(v.raw, v.step, p, lane);
     /* Layout and penalties are the last that abort a step, the latter where it is not as planned; iterations come
      * between. */

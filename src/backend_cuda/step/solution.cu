@@ -1,6 +1,9 @@
 /* What a step gives back, in raw order and double: v and lambda, beta, the moved bodies (Q), contact wrenches (R). */
 #include "backend_cuda/device/double.h"
+#include "backend_cuda/device/plan_check.h"
+#include "backend_cuda/iterate/slow.h"
 #include "backend_cuda/iterate/solution.h"
+#include "world.h"
 
 /* ---- v and lambda ---------------------------------------------------------------------------------------------- */
 
@@ -70,16 +73,91 @@ extern "C" sadmm_status CUDA(read_penalty)(struct sadmm_context *c, double *beta
     return SADMM_OK;
 }
 
-/* ---- Q: semi-implicit Euler ------------------------------------------------------------------------------------ */
+/* ---- Q: what contacts say of leads (math/lead.h), and moved bodies ----------------------------------------------- */
+
+/* A body of a pair: its velocity at the end of the step, and its lead. */
+struct lead_side {
+    double velocity[6], lead[6];
+};
+
+static __device__ __forceinline__ void load_side(const cuda_view &v, int32_t body, bool whole_step, lead_side *side)
+{
+    const struct sadmm_rigid *rigid = &v.raw.system.rigid[body];
+    solver_real velocity[6];
+    if (whole_step) end_velocity(v, body, velocity);
+    else
+        for (int k = 0; k < 6; ++k) velocity[k] = v.bodies.state[(size_t)body * ROW + (size_t)k];
+    for (int k = 0; k < 6; ++k) side->velocity[k] = (double)velocity[k];
+    lead_own(rigid->velocity, side->velocity, rigid_is_isotropic(v3_load(rigid->inertia)), side->lead);
+}
+
+/* Bits only come: one that is there already needs no more. */
+static __device__ __forceinline__ void add_bits(int32_t *to, int bits)
+{
+    if (bits & ~*to) atomicOr(to, bits);
+}
+
+/* contacts.lanes threads a pair, every so manieth point each. `planned`: of a whole step. */
+static __global__ void touch_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    const int32_t lanes = v.contacts.lanes, p = thread_index() / lanes, lane = thread_index() % lanes;
+    const double dt = v.model.settings->dt, slop = v.model.settings->slop;
+    const bool on = p < live_pairs(v.model) && !(args.planned && !as_planned(v.model, v.step));
+    const struct sadmm_contact_pair *pair = &v.raw.pairs[on ? p : 0];
+    int32_t body[2] = {-1, -1}, first = 0, count = 0;
+    double n[3] = {}, friction = 0;
+    if (on) {
+        body[0] = pair->body_a, body[1] = pair->body_b;
+        first = pair->first, count = pair->count;
+        friction = pair->friction;
+        for (int k = 0; k < 3; ++k) n[k] = pair->normal[k];
+    }
+    wait_for_stream();
+    let_next_begin();
+    if (!on) return;
+    lead_side sides[2] = {};
+    struct lead_touch touch = {
+        body[0] >= 0 && body[1] >= 0 ? TOUCH_INNER : friction > 0 ? TOUCH_FRICTION : TOUCH_SMOOTH, {0, 0}};
+#pragma unroll
+    for (int s = 0; s < 2; ++s)
+        if (body[s] >= 0) load_side(v, body[s], args.planned, &sides[s]);
+    for (int32_t k = lane; k < count; k += lanes) {
+        const struct sadmm_contact_point *point = &v.raw.points[first + k];
+        double impulse[3];
+        v3_store(point_impulse(v.contacts, p, k), impulse);
+        const double leads[2] = {-lead_along(n, sides[0].lead, point->arm_a),
+                                 lead_along(n, sides[1].lead, point->arm_b)},
+                     speed = lead_along(n, sides[1].velocity, point->arm_b) -
+                             lead_along(n, sides[0].velocity, point->arm_a);
+        lead_add_point(&touch, point->gap, dot3(n, impulse), speed, leads,
+                       lead_size(sides[0].lead, point->arm_a) + lead_size(sides[1].lead, point->arm_b), dt, slop);
+    }
+#pragma unroll
+    for (int s = 0; s < 2; ++s)
+        if (body[s] >= 0) {
+            add_bits(&v.islands.touch[v.graph.label[body[s]]], touch.island);
+            if (touch.body[s]) add_bits(&v.islands.touch[body[s]], touch.body[s]);
+        }
+}
+
+sadmm_status CUDA(launch_touch)(struct sadmm_context *c, bool whole_step, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    args.planned = whole_step;
+    const int64_t threads = (int64_t)c->view.contacts.lanes * c->view.contacts.pair_capacity;
+    return CUDA(launch_early)(c, touch_kernel, "touch", blocks_for(threads), THREADS, &args, error);
+}
 
 enum { MOVED = 13 }; /* position, orientation, velocity */
 
-static __global__ void integrate_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+static __global__ void integrate_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     int32_t i = thread_index();
     if (i >= live_bodies(v.model)) return;
     double *out = v.raw.out + MOVED * (size_t)i;
-    move_body(&v.raw.system.rigid[i], v.bodies.state + (size_t)i * ROW, v.model.settings->dt, out, out + 3, out + 7);
+    const int island = args.count ? v.islands.touch[v.graph.label[i]] : 0, own = args.count ? v.islands.touch[i] : 0;
+    move_body(&v.raw.system.rigid[i], v.bodies.state + (size_t)i * ROW, v.model.settings->dt,
+              v.model.settings->gravity, island, own, out, out + 3, out + 7);
 }
 
 extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)
@@ -89,6 +167,12 @@ extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_ri
     if (!c->plan.rigid)
         return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "integrate: the system gives A and b, not rigid bodies");
     CUDA_ENTER(c);
+    args.count = c->plan.momentum; /* there are contacts */
+    if (c->plan.momentum) {
+        CUDA_CALL(c, cudaMemsetAsync(c->view.islands.touch, 0, n * sizeof(int32_t), c->stream),
+                  "cudaMemsetAsync(touch)");
+        TRY(CUDA(launch_touch)(c, false, error));
+    }
     TRY(CUDA(launch)(c, integrate_kernel, "integrate", blocks_for(c->view.model.bodies), &args, error));
     TRY(CUDA(download)(c, c->view.raw.out, MOVED * n * sizeof(double), error));
     const double *from = (const double *)c->buffers[PINNED_OUT].data;

@@ -109,5 +109,7 @@ sadmm_status CUDA(launch_turn)(struct sadmm_context *, struct sadmm_error *error
 sadmm_status CUDA(launch_admit)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_finish)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_commit)(struct sadmm_context *, struct sadmm_error *error);
+/* solution.cu: what contacts say of leads (math/lead.h), where there are some; bits are 0 before. */
+sadmm_status CUDA(launch_touch)(struct sadmm_context *, bool whole_step, struct sadmm_error *error);
 
 #endif

@@ -94,7 +94,7 @@ SADMM_INLINE real rigid_angular_acceleration(quat q, vec3 inertia, vec3 torque)
     return v3_norm(v3(t.x / inertia.x, t.y / inertia.y, t.z / inertia.z));
 }
 
-/* Semi-implicit Euler: the pose moves with the end-of-step velocity. */
+/* A pose after dt of motion by one velocity. */
 SADMM_INLINE vec3 rigid_move(vec3 x, vec3 v, real dt) { return v3_madd(x, dt, v); }
 SADMM_INLINE quat rigid_turn(quat q, vec3 w, real dt) { return q_normalize(q_mul(q_exp(v3_scale(w, dt)), q)); }
 

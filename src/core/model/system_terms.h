@@ -12,7 +12,11 @@ void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_sett
 double sadmm_point_error(const struct sadmm_system *system, const struct sadmm_settings *settings,
                          const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *point);
 
-/* The state after dt: `next` is `body` moved with `velocity` (end-of-step, 6). */
-void sadmm_rigid_advance(const struct sadmm_rigid *body, const double velocity[6], double dt, struct sadmm_rigid *next);
+/* The lead of a body by itself (math/lead.h), which ends the step with `velocity`. */
+void sadmm_body_lead(const struct sadmm_rigid *body, const double velocity[6], double lead[6]);
+
+/* The state after dt: `next` is `body` with `velocity` (end-of-step, 6), moved with that less its lead. */
+void sadmm_rigid_advance(const struct sadmm_rigid *body, const double velocity[6], const double lead[6], double dt,
+                         struct sadmm_rigid *next);
 
 #endif

@@ -1,0 +1,117 @@
+/* How far a step moves a body. Semi-implicit Euler, x + dt v, is ahead of a constant acceleration by half of the step's
+ * change of velocity: its lead. Taken back,
+ *
+ *     x <- x + dt (v - lead),     lead = (v - v before the step) / 2
+ *
+ * is exact for constant forces: gravity, friction that slides, rolling down a slope. But contacts bound v so that gaps
+ * are right after x + dt v. Where taking leads back would close a contact of an island beyond that, all of its bodies
+ * keep theirs, since those that hold on to each other would slip else; but for bodies that fly (docs/algorithm.md,
+ * section 9). Double in every precision. */
+#ifndef SADMM_MATH_LEAD_H
+#define SADMM_MATH_LEAD_H
+
+#include <stdbool.h>
+
+#include "array3.h"
+
+/* What touches an island, bits; then what touches a body of it. */
+enum {
+    TOUCH_INNER = 1,    /* contacts between its bodies */
+    TOUCH_SMOOTH = 2,   /* static ones without friction */
+    TOUCH_FRICTION = 4, /* with friction */
+    TOUCH_JOLT = 8,     /* a contact that taking back leads would close beyond what v does */
+    TOUCH_CARRIED = 16  /* contacts that press on it, or that it might close by itself */
+};
+
+enum lead_kind {
+    LEAD_STAYS,  /* semi-implicit Euler */
+    LEAD_SHARED, /* gravity's alone is taken back: bodies have it in common, so that their angular momentum stays */
+    LEAD_OWN
+};
+
+SADMM_INLINE enum lead_kind lead_kind_of(int island, int body)
+{
+    if (island & TOUCH_INNER && !(island & TOUCH_FRICTION)) return island & TOUCH_SMOOTH ? LEAD_STAYS : LEAD_SHARED;
+    return island & TOUCH_JOLT && body & TOUCH_CARRIED ? LEAD_STAYS : LEAD_OWN;
+}
+
+SADMM_INLINE void lead_shared(const double gravity[3], double dt, double lead[6])
+{
+    SADMM_UNROLL
+    for (int k = 0; k < 3; ++k) {
+        lead[k] = dt / 2 * gravity[k];
+        lead[k + 3] = 0;
+    }
+}
+
+/* A body whose principal moments differ turns about v's axis: that stays where it is in the body's frame then, and so
+ * do energy and angular momentum. Its lead is the part along that axis. */
+SADMM_INLINE void lead_own(const double before[6], const double v[6], int isotropic, double lead[6])
+{
+    SADMM_UNROLL
+    for (int k = 0; k < 6; ++k) lead[k] = (v[k] - before[k]) / 2;
+    if (!isotropic) {
+        const double square = dot3(v + 3, v + 3), along = square > 0 ? dot3(lead + 3, v + 3) / square : 0;
+        SADMM_UNROLL
+        for (int k = 3; k < 6; ++k) lead[k] = along * v[k];
+    }
+}
+
+/* Of the velocity that v gives the point at `arm`, the part along n. */
+SADMM_INLINE double lead_along(const double n[3], const double v[6], const double arm[3])
+{
+    double x[3] = {v[0], v[1], v[2]};
+    add_cross(v + 3, arm, 1, x);
+    return dot3(n, x);
+}
+
+/* No less than the speed by which a lead moves the point: sums of sizes of components. */
+SADMM_INLINE double lead_size(const double lead[6], const double arm[3])
+{
+    return fabs(lead[0]) + fabs(lead[1]) + fabs(lead[2]) +
+           (fabs(lead[3]) + fabs(lead[4]) + fabs(lead[5])) * (fabs(arm[0]) + fabs(arm[1]) + fabs(arm[2]));
+}
+
+/* Taking leads back may close a contact by this share of what they move it by in all, since the normal part of a lead
+ * grows with the square of the speed where a body rolls, or of the slop, which is what a solve that was cut short
+ * jitters by. */
+#define LEAD_SHARE 0.05
+#define LEAD_SLOP 0.1
+
+/* Bits of an island, and of the two bodies, a and b. */
+struct lead_touch {
+    int island, body[2];
+};
+
+/* Of a contact point, by its normal impulse. */
+SADMM_INLINE void lead_add_push(struct lead_touch *touch, double push)
+{
+    SADMM_UNROLL
+    for (int s = 0; s < 2; ++s)
+        if (push > 0) touch->body[s] |= TOUCH_CARRIED;
+}
+
+/* Leads whose sizes come to `size` close nothing worth a look: bodies at rest, say. */
+SADMM_INLINE bool lead_is_still(double size, double dt, double slop) { return dt * size <= LEAD_SLOP * slop / 2; }
+
+/* Of a point whose leads are not still, by its gap, the speed at which it opens, and what the leads of a and b add to
+ * that. Each of two bodies may close half of what is left, whatever the other one does. */
+SADMM_INLINE void lead_add_way(struct lead_touch *touch, double gap, double speed, const double lead[2], double size,
+                               double dt, double slop)
+{
+    const double end = gap + dt * speed, room = (end > 0 ? end : 0) + fmax(LEAD_SHARE * dt * size, LEAD_SLOP * slop);
+    if (dt * (lead[0] + lead[1]) > room) touch->island |= TOUCH_JOLT;
+    SADMM_UNROLL
+    for (int s = 0; s < 2; ++s)
+        if (dt * lead[s] > room / 2) touch->body[s] |= TOUCH_CARRIED;
+}
+
+/* Both. */
+SADMM_INLINE void lead_add_point(struct lead_touch *touch, double gap, double push, double speed, const double lead[2],
+                                 double size, double dt, double slop)
+{
+    lead_add_push(touch, push);
+    if (!lead_is_still(size, dt, slop)) lead_add_way(touch, gap, speed, lead, size, dt, slop);
+}
+
+#endif

@@ -1,0 +1,94 @@
+/* Leads of bodies (core/math/lead.h): which are taken back, and what by. */
+#include <check.h>
+#include <math.h>
+
+#include "core/math/lead.h"
+#include "core/math/rigid.h"
+#include "run_suite.h"
+
+START_TEST(kinds)
+{
+    static const struct {
+        int island, body;
+        enum lead_kind kind;
+    } cases[] = {
+        {0, 0, LEAD_OWN}, /* in the air */
+        {TOUCH_FRICTION, TOUCH_CARRIED, LEAD_OWN},
+        {TOUCH_SMOOTH, TOUCH_CARRIED, LEAD_OWN},
+        {TOUCH_INNER | TOUCH_FRICTION, TOUCH_CARRIED, LEAD_OWN},
+        {TOUCH_INNER | TOUCH_FRICTION | TOUCH_JOLT, TOUCH_CARRIED, LEAD_STAYS},
+        {TOUCH_FRICTION | TOUCH_JOLT, TOUCH_CARRIED, LEAD_STAYS},
+        {TOUCH_INNER | TOUCH_FRICTION | TOUCH_JOLT, 0, LEAD_OWN}, /* it flies */
+        /* momentum along which nothing static acts: a lead of each would change it */
+        {TOUCH_INNER, TOUCH_CARRIED, LEAD_SHARED},
+        {TOUCH_INNER | TOUCH_JOLT, TOUCH_CARRIED, LEAD_SHARED},
+        {TOUCH_INNER | TOUCH_JOLT, 0, LEAD_SHARED},
+        {TOUCH_INNER | TOUCH_SMOOTH, TOUCH_CARRIED, LEAD_STAYS},
+    };
+    ck_assert_int_eq(lead_kind_of(cases[_i].island, cases[_i].body), cases[_i].kind);
+}
+END_TEST
+enum { KINDS = 11 };
+
+/* Bodies without an isotropic inertia are led along their axis of rotation alone: what they turn by leaves that axis
+ * where it is in their own frame. */
+START_TEST(axes)
+{
+    const double before[6] = {1, 2, 3, 0.5, -1, 2}, v[6] = {2, 2, 1, 1, 2, -1}, still[6] = {0};
+    double lead[6], cross[3] = {0};
+    lead_own(before, v, 1, lead);
+    for (int k = 0; k < 6; ++k) ck_assert(lead[k] == (v[k] - before[k]) / 2);
+    lead_own(before, v, 0, lead);
+    for (int k = 0; k < 3; ++k) ck_assert(lead[k] == (v[k] - before[k]) / 2);
+    add_cross(lead + 3, v + 3, 1, cross);
+    ck_assert_double_lt(length3(cross), 1e-15); /* of numbers of about 1 */
+    ck_assert_double_eq_tol(dot3(lead + 3, v + 3), (0.5 * 1 + 3 * 2 + -3 * -1) / 2, 1e-15);
+    lead_own(before, still, 0, lead); /* no axis */
+    for (int k = 3; k < 6; ++k) ck_assert(lead[k] == 0);
+}
+END_TEST
+
+/* dt 0.01 s, slop 1e-5 m: 1e-6 m of noise. Leads are along the normal. */
+START_TEST(points)
+{
+    static const struct {
+        double gap, push, speed, lead[2];
+        int island, body[2];
+    } cases[] = {
+        /* rest, and sliding: nothing along the normal */
+        {0, 1, 0, {0, 0}, 0, {TOUCH_CARRIED, TOUCH_CARRIED}},
+        /* a landing: it stops, from 1 m/s */
+        {0.003, 1, -0.3, {0, 0.35}, TOUCH_JOLT, {TOUCH_CARRIED, TOUCH_CARRIED}},
+        /* what falls is lifted */
+        {0.003, 0, -0.2, {0, -0.05}, 0, {0, 0}},
+        /* what flies up to something has room for it, or for half of it, or has not */
+        {0.003, 0, -0.2, {0, 0.04}, 0, {0, 0}},
+        {0.003, 0, -0.2, {0, 0.06}, 0, {0, TOUCH_CARRIED}},
+        {0.003, 0, -0.2, {0, 0.11}, TOUCH_JOLT, {0, TOUCH_CARRIED}},
+        /* two that fall as one */
+        {0.0001, 0, 0, {0.05, -0.05}, 0, {TOUCH_CARRIED, 0}},
+        /* overlapping ones, and noise */
+        {-0.003, 1, 0.1, {0, 0.05}, TOUCH_JOLT, {TOUCH_CARRIED, TOUCH_CARRIED}},
+        {0, 0, 0, {0, 4e-5}, 0, {0, 0}},
+        /* a bounce that keeps all of its speed goes back to where it was */
+        {0.003, 1, 1, {0, 1}, 0, {TOUCH_CARRIED, TOUCH_CARRIED}},
+    };
+    struct lead_touch touch = {0, {0, 0}};
+    lead_add_point(&touch, cases[_i].gap, cases[_i].push, cases[_i].speed, cases[_i].lead,
+                   fabs(cases[_i].lead[0]) + fabs(cases[_i].lead[1]), 0.01, 1e-5);
+    ck_assert_int_eq(touch.island, cases[_i].island);
+    for (int s = 0; s < 2; ++s) ck_assert_int_eq(touch.body[s], cases[_i].body[s]);
+}
+END_TEST
+enum { POINTS = 10 };
+
+int main(void)
+{
+    Suite *suite = suite_create("lead");
+    TCase *cases = tcase_create("lead");
+    tcase_add_loop_test(cases, kinds, 0, KINDS);
+    tcase_add_test(cases, axes);
+    tcase_add_loop_test(cases, points, 0, POINTS);
+    suite_add_tcase(suite, cases);
+    return run_suite(suite);
+}
