@@ -103,8 +103,8 @@ static __device__ real4 pack(vec3 a, double w)
 }
 
 /* contacts.lanes threads a pair, each every contacts.lanes-th point; the first also what the points share. FAST:
- * records of sides, too. */
-template <bool FAST>
+ * records of sides, too. BOUNCES: a pair may have restitution. */
+template <bool FAST, bool BOUNCES>
 static __global__ void __launch_bounds__(BODY_THREADS)
     assemble_contacts_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
@@ -142,7 +142,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         const size_t slot = point_slot(v.contacts, p, k);
         vec3 impulse = v.model.warm_start ? v3_load(points[k].impulse) : v3(0, 0, 0);
         if (v.model.contact_rows == 1) impulse = v3_scale(normal, v3_dot(normal, impulse)); /* the row there is */
-        const double error = sadmm_contact_e(&v.raw.system, &settings, pair, &points[k]);
+        const double error = BOUNCES ? sadmm_contact_e(&v.raw.system, &settings, pair, points, k)
+                                     : sadmm_contact_e_plain(&v.raw.system, &settings, &points[k]);
         const real4 arm = pack(v3_load(a ? points[k].arm_a : points[k].arm_b), error);
         const solver_real lambda[3] = {(solver_real)impulse.x, (solver_real)impulse.y, (solver_real)impulse.z};
         v.contacts.arm[slot] = arm;
@@ -160,8 +161,11 @@ extern "C" sadmm_status CUDA(assemble_contacts)(struct sadmm_context *c, struct 
 {
     cuda_args args = {};
     CUDA_ENTER(c);
+    const cuda_kernel kernel =
+        c->fast ? (c->bounces ? assemble_contacts_kernel<true, true> : assemble_contacts_kernel<true, false>)
+                : (c->bounces ? assemble_contacts_kernel<false, true> : assemble_contacts_kernel<false, false>);
     return CUDA(launch_of)(
-        c, c->fast ? assemble_contacts_kernel<true> : assemble_contacts_kernel<false>, "assemble_contacts",
+        c, kernel, "assemble_contacts",
         ((int64_t)c->view.contacts.pair_capacity * c->view.contacts.lanes + BODY_THREADS - 1) / BODY_THREADS,
         BODY_THREADS, &args, error);
 }

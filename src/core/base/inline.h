@@ -7,6 +7,12 @@
 #else
 #define SADMM_INLINE static inline
 #endif
+/* What is rare and long: kept out of the functions that call it, and out of their registers. */
+#ifdef __CUDACC__
+#define SADMM_RARE static __host__ __device__ __noinline__ __attribute__((unused))
+#else
+#define SADMM_RARE static __attribute__((noinline, unused))
+#endif
 /* Where a call would cost more than the function. */
 #define SADMM_ALWAYS_INLINE SADMM_INLINE __attribute__((always_inline))
 

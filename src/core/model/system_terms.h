@@ -8,9 +8,9 @@
 void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_settings *settings, int32_t body,
                       double A[36], double b[6]);
 
-/* e of a contact point, m/s. */
+/* e of a pair's k-th point, m/s; points: the pair's. */
 double sadmm_point_error(const struct sadmm_system *system, const struct sadmm_settings *settings,
-                         const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *point);
+                         const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *points, int32_t k);
 
 /* The state after dt: `next` is `body` moved with `velocity` (end-of-step, 6). */
 void sadmm_rigid_advance(const struct sadmm_rigid *body, const double velocity[6], double dt, struct sadmm_rigid *next);

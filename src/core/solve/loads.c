@@ -95,7 +95,7 @@ static int find_supports(const struct predictor *p, int32_t i, const double v[6]
             s->normal = v3_scale(v3_load(pair->normal), is_b ? 1 : -1);
             s->arm = v3_load(is_b ? s->point->arm_b : s->point->arm_a);
             double closing = -v3_dot(s->normal, point_velocity(v, s->arm));
-            double e = sadmm_contact_e(p->system, p->settings, pair, s->point);
+            double e = sadmm_contact_e(p->system, p->settings, pair, &contacts->points[pair->first], k);
             if (e < -LEFT_OVER * fabs(closing)) return -1;
             count += e < LEFT_OVER * closing;
         }
