@@ -231,6 +231,54 @@ START_TEST(balls_apart_hand_the_motion_on)
 }
 END_TEST
 
+/* ---- energy that too few iterations make ---- */
+
+/* Steps until the energy of a stack (its top `heavy` kg, the rest 1 kg) is 0.1 % above the start, at most 60; *limited: of
+ * their reports. */
+static int steps_until_energy(int solver, int iterations, double heavy, int *limited)
+{
+    sadmm_world *world = new_world(solver, 0.005, iterations, true);
+    sadmm_body_id id[4];
+    double start = 0, energy = 0;
+    int steps = 0;
+    add_floor(world, 1);
+    for (int k = 0; k < 4; ++k) {
+        const double half[3] = {0.1, 0.1, 0.1};
+        sadmm_body_def body = sadmm_body_def_default();
+        sadmm_shape_def shape = sadmm_shape_def_default();
+        body.mass = k == 3 ? heavy : 1;
+        sadmm_box_inertia(body.mass, half, body.inertia);
+        body.position[2] = 0.1 + 0.2 * k;
+        MUST(world, sadmm_world_add_body(world, &body, &id[k]));
+        shape.type = SADMM_SHAPE_BOX;
+        memcpy(shape.size, half, sizeof shape.size);
+        shape.friction = 1;
+        MUST(world, sadmm_world_add_shape(world, id[k], &shape, NULL));
+        start += energy_of(world, id[k]);
+    }
+    *limited = 0;
+    while (steps < 60 && energy <= 1.001 * start) {
+        step_world(world, 1);
+        *limited += world_report(world).limited > 0;
+        ++steps;
+        energy = 0;
+        for (int k = 0; k < 4; ++k) energy += energy_of(world, id[k]);
+    }
+    sadmm_world_destroy(world);
+    return steps;
+}
+
+/* The paper's iteration is left as it is, but the report says what it does. */
+START_TEST(energy_that_iterations_make_is_reported)
+{
+    int limited;
+    ck_assert_int_lt(steps_until_energy(_i, 20, 1000, &limited), 60);
+    ck_assert_int_gt(limited, 0);
+    ck_assert_int_eq(steps_until_energy(_i, 300, 1, &limited), 60);
+    ck_assert_int_eq(limited, 0);
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("impacts");
@@ -247,6 +295,9 @@ int main(void)
     tcase_add_loop_test(tests, two_equal_balls, 0, end);
     tcase_add_loop_test(tests, balls_that_touch_part_at_once, 0, end);
     tcase_add_loop_test(tests, balls_apart_hand_the_motion_on, 0, end);
+    for (int k = 0; k < SOLVERS; ++k)
+        if (solvers[k].method == SADMM_METHOD_PAPER)
+            tcase_add_loop_test(tests, energy_that_iterations_make_is_reported, k, k + 1);
     tcase_set_timeout(tests, 60);
     suite_add_tcase(suite, tests);
 #ifdef IMPACTS_ON_CUDA

@@ -312,6 +312,8 @@ void CPU(respond_rows)(struct sadmm_context *, size_t block);
 void CPU(weigh_rows)(struct sadmm_context *, size_t block);
 /* wrenches = J^T lambda; and at the start of a solve. */
 void CPU(sum_wrenches)(struct sadmm_context *);
+/* A^-1 of a body. */
+void CPU(invert)(const struct sadmm_context *, const double A[PACKED6], double inverse[PACKED6]);
 void CPU(start_wrenches)(struct sadmm_context *);
 
 #endif

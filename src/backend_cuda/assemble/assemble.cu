@@ -24,15 +24,15 @@ static __device__ double form(const double M[PACKED], const solver_real x[6])
     return packed_form(M, wide);
 }
 
-/* FAST: A^-1 and the energy of A^-1 b too. */
-template <bool FAST>
+/* ENERGIES: A^-1 and the energy of A^-1 b too. */
+template <bool ENERGIES>
 static __global__ void __launch_bounds__(BODY_THREADS)
-    assemble_bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+    assemble_bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     int32_t i = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x);
     if (i >= v.model.bodies || v.model.live->abort_code) return; /* may run before the step's contacts are known */
     if (i == 0) clear_counts(v.islands);
-    if (!FAST && v.islands.info) v.islands.info[i].held = 0;
+    if (args.paper && ENERGIES) v.islands.info[i].held = v.islands.info[i].rows = 0;
     double A[36], b[6], x[6], factor[36];
     const struct sadmm_settings settings = *v.model.settings;
     sadmm_system_body(&v.raw.system, &settings, i, A, b);
@@ -57,7 +57,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
             for (int k = 0; k <= r; ++k) line[packed_place(r, k)] = (solver_real)A[6 * r + k];
         for (int k = PACKED; k < LINE_GENERAL_A; ++k) line[k] = 0;
     }
-    if (FAST) {
+    if (ENERGIES) {
         double inverse[PACKED];
         invert(v.bodies.rigid, A, inverse);
         for (int k = 0; k < PACKED; ++k) v.bodies.A_inverse[PACKED * (size_t)i + (size_t)k] = inverse[k];
@@ -68,7 +68,10 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 static sadmm_status launch_bodies(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    return CUDA(launch_of)(c, c->fast ? assemble_bodies_kernel<true> : assemble_bodies_kernel<false>, "assemble_bodies",
+    args.paper = !c->fast;
+    return CUDA(launch_of)(c,
+                           c->fast || c->plan.momentum ? assemble_bodies_kernel<true> : assemble_bodies_kernel<false>,
+                           "assemble_bodies",
                            ((int64_t)c->view.model.bodies + BODY_THREADS - 1) / BODY_THREADS, BODY_THREADS, &args,
                            error);
 }

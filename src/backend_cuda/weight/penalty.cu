@@ -63,6 +63,7 @@ static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, const 
         } else {
             add_rows(v.rows, record - v.contacts.pair_capacity, side, C);
             holds = true; /* left alone */
+            if (v.islands.info) v.islands.info[v.graph.label[t.body]].rows = 1;
         }
     }
     if (t.live && holds && v.islands.info) v.islands.info[v.graph.label[t.body]].held = 1;
