@@ -231,6 +231,49 @@ START_TEST(balls_apart_hand_the_motion_on)
 }
 END_TEST
 
+/* ---- heavy on light ---- */
+
+static void add_cube(sadmm_world *world, double mass, double height, double friction, sadmm_body_id *id)
+{
+    const double half[3] = {0.1, 0.1, 0.1};
+    sadmm_body_def body = sadmm_body_def_default();
+    sadmm_shape_def shape = sadmm_shape_def_default();
+    body.mass = mass;
+    sadmm_box_inertia(mass, half, body.inertia);
+    body.position[2] = height;
+    MUST(world, sadmm_world_add_body(world, &body, id));
+    shape.type = SADMM_SHAPE_BOX;
+    memcpy(shape.size, half, sizeof shape.size);
+    shape.friction = friction;
+    MUST(world, sadmm_world_add_shape(world, *id, &shape, NULL));
+}
+
+/* A gram carries up to the range of masses, 1e14 times its own: at rest, and landed on from 1 mm. */
+START_TEST(a_gram_carries_any_mass)
+{
+    static const double ratios[] = {1e4, 1e7, 1e10, 1e14}, heights[] = {0, 1e-3};
+    for (int r = 0; r < 4; ++r)
+        for (int h = 0; h < 2; ++h) {
+            sadmm_world *world = new_world(_i, 0.005, 20, true);
+            const double mass = ratios[r] > 1e12 ? 1e-2 : 1e-3;
+            sadmm_body_id id[2];
+            double top = 0;
+            add_floor(world, 0.5);
+            add_cube(world, mass, 0.1, 0.5, &id[0]);
+            add_cube(world, mass * ratios[r], 0.3 + heights[h], 0.5, &id[1]);
+            for (int k = 0; k < 100; ++k) {
+                step_world(world, 1);
+                top = fmax(top, top_speed(world));
+            }
+            /* Rest: what the predicted loads are rounded by. Landing: the fall's 0.14 m/s, and as much again. */
+            ck_assert_msg(top < (h == 0 ? 1e-9 : 0.28), "%g, from %g m: %g m/s", ratios[r], heights[h], top);
+            /* the slop, and what a landing leaves to be pushed out */
+            ck_assert_double_eq_tol(body_state(world, id[0]).position[2], 0.1, h == 0 ? 2e-5 : 2e-4);
+            sadmm_world_destroy(world);
+        }
+}
+END_TEST
+
 /* ---- energy that too few iterations make ---- */
 
 /* Steps until the energy of a stack (its top `heavy` kg, the rest 1 kg) is 0.1 % above the start, at most 60; *limited: of
@@ -243,17 +286,7 @@ static int steps_until_energy(int solver, int iterations, double heavy, int *lim
     int steps = 0;
     add_floor(world, 1);
     for (int k = 0; k < 4; ++k) {
-        const double half[3] = {0.1, 0.1, 0.1};
-        sadmm_body_def body = sadmm_body_def_default();
-        sadmm_shape_def shape = sadmm_shape_def_default();
-        body.mass = k == 3 ? heavy : 1;
-        sadmm_box_inertia(body.mass, half, body.inertia);
-        body.position[2] = 0.1 + 0.2 * k;
-        MUST(world, sadmm_world_add_body(world, &body, &id[k]));
-        shape.type = SADMM_SHAPE_BOX;
-        memcpy(shape.size, half, sizeof shape.size);
-        shape.friction = 1;
-        MUST(world, sadmm_world_add_shape(world, id[k], &shape, NULL));
+        add_cube(world, k == 3 ? heavy : 1, 0.1 + 0.2 * k, 1, &id[k]);
         start += energy_of(world, id[k]);
     }
     *limited = 0;
@@ -295,9 +328,10 @@ int main(void)
     tcase_add_loop_test(tests, two_equal_balls, 0, end);
     tcase_add_loop_test(tests, balls_that_touch_part_at_once, 0, end);
     tcase_add_loop_test(tests, balls_apart_hand_the_motion_on, 0, end);
-    for (int k = 0; k < SOLVERS; ++k)
-        if (solvers[k].method == SADMM_METHOD_PAPER)
-            tcase_add_loop_test(tests, energy_that_iterations_make_is_reported, k, k + 1);
+    for (int k = 0; k < SOLVERS; ++k) {
+        const bool paper = solvers[k].method == SADMM_METHOD_PAPER;
+        tcase_add_loop_test(tests, paper ? energy_that_iterations_make_is_reported : a_gram_carries_any_mass, k, k + 1);
+    }
     tcase_set_timeout(tests, 60);
     suite_add_tcase(suite, tests);
 #ifdef IMPACTS_ON_CUDA

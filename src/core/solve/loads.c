@@ -9,8 +9,11 @@
 #include "core/model/system_math.h"
 
 enum { MOST_SUPPORTS = 64 };
-/* Stiffness of supports over the body's mass: a body that is stopped keeps one part in this of its motion. */
+/* Stiffness of supports over the body's mass: a body that is stopped keeps one part in this of its motion. With what is
+ * handed down the motion of a light body under a heavy one is far larger than any in the scene, so that what it keeps is
+ * stopped again: each time by the same impulses, one part in STIFF of them. */
 #define STIFF 1e7
+enum { STOPS = 3 };
 /* Impulses outside of their cone by this share of the largest one: the supports' softness and rounding. */
 #define CONE_SLACK 1e-6
 /* Errors up to this share of the motion to be stopped are left to the iteration. */
@@ -114,7 +117,7 @@ static void add_impulse(double g[6], vec3 arm, vec3 impulse)
 static bool hold(const double A[36], const double momentum[6], struct support *supports, int count, double v[6])
 {
     static const double axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    double M[36], L[36], largest = 0, stiffness = STIFF * (A[0] + A[7] + A[14]) / 3;
+    double M[36], L[36], left[6], largest = 0, stiffness = STIFF * (A[0] + A[7] + A[14]) / 3;
     memcpy(M, A, sizeof M);
     for (int k = 0; k < count; ++k)
         for (int axis = 0; axis < 3; ++axis) {
@@ -124,11 +127,15 @@ static bool hold(const double A[36], const double momentum[6], struct support *s
                 for (int c = 0; c <= r; ++c) M[6 * r + c] += stiffness * row[r] * row[c];
         }
     if (!dense6_cholesky(M, L)) return false;
-    dense6_solve(L, momentum, v);
-    for (int k = 0; k < count; ++k) {
-        supports[k].impulse = v3_scale(point_velocity(v, supports[k].arm), -stiffness);
-        largest = fmax(largest, v3_norm(supports[k].impulse));
+    for (int k = 0; k < count; ++k) supports[k].impulse = v3(0, 0, 0);
+    memcpy(left, momentum, sizeof left);
+    for (int stops = 0; stops < STOPS; ++stops) {
+        dense6_solve(L, left, v);
+        for (int k = 0; k < count; ++k)
+            supports[k].impulse = v3_madd(supports[k].impulse, -stiffness, point_velocity(v, supports[k].arm));
+        dense6_mul(A, v, left);
     }
+    for (int k = 0; k < count; ++k) largest = fmax(largest, v3_norm(supports[k].impulse));
     for (int k = 0; k < count; ++k) {
         vec3 within = contact_project(supports[k].impulse, supports[k].normal, supports[k].pair->friction);
         if (v3_norm(v3_sub(within, supports[k].impulse)) > CONE_SLACK * largest) return false;
