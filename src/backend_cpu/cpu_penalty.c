@@ -54,6 +54,7 @@ static void assemble_C(struct sadmm_context *c, int32_t i)
     double trace_A = packed_trace(&c->A[(size_t)i * PACKED6]), trace_C = packed_trace(C);
     const struct sadmm_settings *s = &c->settings;
     c->beta[i] = penalty_of_body(trace_A, trace_C, s->penalty_mass_factor, s->penalty_offset, s->dt);
+    if (c->plan.rigid) packed_round_up(C, (double)SADMM_EPSILON);
 }
 
 static void assemble_C_share(void *context, int thread, int threads)

@@ -103,7 +103,10 @@ static __global__ void __launch_bounds__(BODY_THREADS)
             weighted_matrix<FORM == CLOSED>(v, t, fetch_sides(v.model, v.graph, v.contacts, v.weights, t, t.begin),
                                             t.live ? v.islands.info[v.graph.label[t.body]] : none, args.start, C);
         if (t.live) {
-            if (FORM == PLAIN) beta = penalty_of(v.model, v.bodies, v.bodies.lines + t.body * (size_t)v.bodies.line, C);
+            if (FORM == PLAIN) {
+                beta = penalty_of(v.model, v.bodies, v.bodies.lines + t.body * (size_t)v.bodies.line, C);
+                if (v.bodies.rigid) packed_round_up(C, SOLVER_EPSILON);
+            }
             if (t.lane == 0) v.bodies.beta[t.body] = beta;
 #pragma unroll
             for (int k = 0; k < PACKED; ++k)

@@ -1,17 +1,18 @@
 /* How much restitution an impact may have (docs/algorithm.md, section 6).
  *
- * Newton's law gives every contact of a pair that hits x_n+ = -epsilon x_n-, with x- the velocity that the step would end
- * with but for contacts and forces. An impact changes the kinetic energy by
+ * Newton's law gives every contact of a pair that hits x_n+ = -epsilon x_n-, with x- the velocity that the step would
+ * end with but for contacts and forces. An impact changes the kinetic energy by
  *
  *     sum lambda . (x+ + x-) / 2,      x+ = x- + G lambda
  *
- * Without friction that is <= 0 if e >= epsilon x_n- at every contact, those that part (x_n- > 0) included: it is at most
- * sum lambda_n (epsilon x_n- - e) / (1 + epsilon), from lambda . G lambda >= 0. Friction can make it positive for any
- * epsilon > 0 (Kane's paradox): where it stops or turns the sliding it pushes along x_t-, and through the coupling of G
- * against the normal as well. So epsilon is lowered to the largest that leaves the energy where it is, for the pair by
- * itself and held at the middle of its contacts that hit.
+ * Without friction that is <= 0 if e >= epsilon x_n- at every contact, those that part (x_n- > 0) included: it is at
+ * most sum lambda_n (epsilon x_n- - e) / (1 + epsilon), from lambda . G lambda >= 0. Friction can make it positive for
+ * any epsilon > 0 (Kane's paradox): where it stops or turns the sliding it pushes along x_t-, and through the coupling
+ * of G against the normal as well. So epsilon is lowered to the largest that leaves the energy where it is, for the pair
+ * by itself and held at the middle of its contacts that hit.
  *
- * Forces act in the step as well, half of their push before and half after: in the sum, x- has the half, x+ lacks it. */
+ * Forces act in the step as well, half of their push before and half after: in the sum, x- has the half, and x+ lacks
+ * it. */
 #ifndef SADMM_MATH_IMPACT_H
 #define SADMM_MATH_IMPACT_H
 

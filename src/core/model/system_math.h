@@ -182,7 +182,7 @@ SADMM_INLINE double sadmm_contact_e(const struct sadmm_system *system, const str
                : e;
 }
 
-/* ---- rows ---------------------------------------------------------------------------------------------------------- */
+/* ---- rows -------------------------------------------------------------------------------------------------------- */
 
 /* J = sign [d^T, (arm x d)^T] for the contact direction d: sign +1 on b, -1 on a. */
 SADMM_INLINE void sadmm_contact_row(vec3 d, const double arm[3], double sign, double row[6])
