@@ -8,8 +8,8 @@
  * Without friction that is <= 0 if e >= epsilon x_n- at every contact, those that part (x_n- > 0) included: it is at
  * most sum lambda_n (epsilon x_n- - e) / (1 + epsilon), from lambda . G lambda >= 0. Friction can make it positive for
  * any epsilon > 0 (Kane's paradox): where it stops or turns the sliding it pushes along x_t-, and through the coupling
- * of G against the normal as well. So epsilon is lowered to the largest that leaves the energy where it is, for the pair
- * by itself and held at the middle of its contacts that hit.
+ * of G against the normal as well. So epsilon is lowered to the largest that leaves the energy where it is, for the
+ * pair by itself and held at the middle of its contacts that hit.
  *
  * Forces act in the step as well, half of their push before and half after: in the sum, x- has the half, and x+ lacks
  * it. */
