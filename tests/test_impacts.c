@@ -7,6 +7,7 @@
 #include "run_suite.h"
 enum { EMULATED = 0 };
 #endif
+#include "bouncing.h"
 #include "scene_tools.h"
 
 static const struct {
@@ -53,36 +54,7 @@ static const double size_of_shape[] = {0.1, 0.12, 0.08};
 static sadmm_body_id add_body(sadmm_world *world, sadmm_shape_type type, const sadmm_body_state *state, double friction,
                               double restitution)
 {
-    sadmm_body_def body = sadmm_body_def_default();
-    sadmm_shape_def shape = sadmm_shape_def_default();
-    sadmm_body_id id;
-    body.mass = 1;
-    if (type == SADMM_SHAPE_SPHERE) sadmm_sphere_inertia(1, size_of_shape[0], body.inertia);
-    if (type == SADMM_SHAPE_CAPSULE) sadmm_capsule_inertia(1, size_of_shape[0], size_of_shape[1], body.inertia);
-    if (type == SADMM_SHAPE_BOX) sadmm_box_inertia(1, size_of_shape, body.inertia);
-    memcpy(body.position, state->position, sizeof body.position);
-    memcpy(body.linear_velocity, state->linear_velocity, sizeof body.linear_velocity);
-    memcpy(body.angular_velocity, state->angular_velocity, sizeof body.angular_velocity);
-    MUST(world, sadmm_world_add_body(world, &body, &id));
-    shape.type = type;
-    memcpy(shape.size, size_of_shape, sizeof shape.size);
-    shape.friction = friction;
-    shape.restitution = restitution;
-    MUST(world, sadmm_world_add_shape(world, id, &shape, NULL));
-    return id;
-}
-
-static void add_floor(sadmm_world *world, double friction)
-{
-    sadmm_body_def body = sadmm_body_def_default();
-    sadmm_shape_def shape = sadmm_shape_def_default();
-    sadmm_body_id id;
-    body.type = SADMM_BODY_STATIC;
-    body.environment = -1;
-    MUST(world, sadmm_world_add_body(world, &body, &id));
-    shape.type = SADMM_SHAPE_PLANE;
-    shape.friction = friction;
-    MUST(world, sadmm_world_add_shape(world, id, &shape, NULL));
+    return add_thrown(world, type, size_of_shape, state, 1, friction, restitution);
 }
 
 /* J. Semi-implicit Euler keeps not v^2 / 2 + g z but that with z half a step back: a fall takes g^2 dt^2 / 2 a step
@@ -239,17 +211,9 @@ END_TEST
 
 static void add_cube(sadmm_world *world, double mass, double height, double friction, sadmm_body_id *id)
 {
-    const double half[3] = {0.1, 0.1, 0.1};
-    sadmm_body_def body = sadmm_body_def_default();
-    sadmm_shape_def shape = sadmm_shape_def_default();
-    body.mass = mass;
-    sadmm_box_inertia(mass, half, body.inertia);
-    body.position[2] = height;
-    MUST(world, sadmm_world_add_body(world, &body, id));
-    shape.type = SADMM_SHAPE_BOX;
-    memcpy(shape.size, half, sizeof shape.size);
-    shape.friction = friction;
-    MUST(world, sadmm_world_add_shape(world, *id, &shape, NULL));
+    static const double half[3] = {0.1, 0.1, 0.1};
+    const sadmm_body_state state = {.position = {0, 0, height}};
+    *id = add_thrown(world, SADMM_SHAPE_BOX, half, &state, mass, friction, 0);
 }
 
 /* A gram carries up to the range of masses, 1e14 times its own: at rest, and landed on from 1 mm. */

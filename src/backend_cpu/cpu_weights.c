@@ -195,7 +195,6 @@ static void assemble_C(struct sadmm_context *c, size_t i)
         }
     }
     add_arm_sums(C, &weighted);
-    packed_round_up(C, (double)SADMM_EPSILON);
     c->beta[i] = 1;
 }
 

@@ -1,6 +1,6 @@
 /* After the last iteration: momentum that no contact may change is restored, in either method; in the method `fast` no
- * island keeps more energy than it may have (math/limit.h), in `paper` those that do are counted. Energies and the work of contacts are added up at the
- * bodies that name the islands. */
+ * island keeps more energy than it may have (math/limit.h), in `paper` those that do are counted. Energies and the work
+ * of contacts are added up at the bodies that name the islands. */
 #include <float.h>
 #include <string.h>
 

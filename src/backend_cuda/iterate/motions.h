@@ -73,7 +73,8 @@ static __device__ __noinline__ void store_momentum(const cuda_view &v, const bod
     for (int k = 0; k < MOMENTUM_SUMS; ++k) to[k] = numbers[k];
 }
 
-/* What follows from the sums at `sum`: there the rigid motion, and the island's factor (!slows: 1). One thread of it. */
+/* What follows from the sums at `sum`: there the rigid motion, and the island's factor (!slows: 1). One thread of it.
+ */
 template <bool ENERGIES>
 static __device__ __noinline__ void find_motion(const island_view &islands, cuda_island *island, double *sum,
                                                 bool under_iterated, bool slows)
@@ -117,8 +118,7 @@ static __device__ __forceinline__ void restore_islands(const cuda_view &v, const
     if (!last || t.lane > 0) return;
     const int32_t label = v.graph.label[t.body];
     find_motion<ENERGIES>(v.islands, &v.islands.info[label],
-                      v.islands.motions + (size_t)v.graph.slot_of[label] * MOTION_TERMS, under_iterated,
-                          slows);
+                          v.islands.motions + (size_t)v.graph.slot_of[label] * MOTION_TERMS, under_iterated, slows);
 }
 
 #endif

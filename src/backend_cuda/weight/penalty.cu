@@ -83,6 +83,19 @@ static __device__ __forceinline__ double penalty_of(const model_view &model, con
     return penalty_of_body(trace_A, trace_C, s->penalty_mass_factor, s->penalty_offset, s->dt);
 }
 
+/* Is a body's inertia less than what C is rounded by? */
+static __device__ __forceinline__ bool inertia_drowns(const body_view &bodies, size_t body, double beta,
+                                                      const double C[PACKED])
+{
+    const solver_real *line = bodies.lines + body * (size_t)bodies.line;
+    double A[PACKED] = {};
+#pragma unroll
+    for (int r = 3; r < 6; ++r)
+#pragma unroll
+        for (int k = 3; k <= r; ++k) A[r * (r + 1) / 2 + k] = (double)line_a(line, bodies.rigid, r, k);
+    return packed_inertia_drowns(A, beta, C, SOLVER_EPSILON);
+}
+
 /* ---- kernels ----------------------------------------------------------------------------------------------------- */
 
 /* By which B C is made, and how H is: that of `paper`; the weights of `fast`; those, and H in closed form. */
@@ -103,10 +116,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
             weighted_matrix<FORM == CLOSED>(v, t, fetch_sides(v.model, v.graph, v.contacts, v.weights, t, t.begin),
                                             t.live ? v.islands.info[v.graph.label[t.body]] : none, args.start, C);
         if (t.live) {
-            if (FORM == PLAIN) {
-                beta = penalty_of(v.model, v.bodies, v.bodies.lines + t.body * (size_t)v.bodies.line, C);
-                if (v.bodies.rigid) packed_round_up(C, SOLVER_EPSILON);
-            }
+            if (FORM == PLAIN) beta = penalty_of(v.model, v.bodies, v.bodies.lines + t.body * (size_t)v.bodies.line, C);
             if (t.lane == 0) v.bodies.beta[t.body] = beta;
 #pragma unroll
             for (int k = 0; k < PACKED; ++k)
@@ -116,6 +126,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         beta = v.bodies.beta[t.body];
         for (int k = 0; k < PACKED; ++k) C[k] = v.bodies.C[t.body * PACKED + (size_t)k];
     }
+    if (FACTOR && t.live && FORM == PLAIN && inertia_drowns(v.bodies, t.body, beta, C))
+        packed_round_up(C, SOLVER_EPSILON); /* `fast`: its C is */
     if (FACTOR && t.live && FORM == CLOSED) factor_rigid(v.bodies, t.body, t.lane, C);
     else if (FACTOR && t.live) factor_body(v.bodies, t.body, t.lane, beta, C);
     if (args.planned) check_plan(v.model, v.iteration, v.step);

@@ -10,9 +10,10 @@
 
 enum { MOST_SUPPORTS = 64 };
 /* Stiffness of supports over the body's mass: a body that is stopped keeps one part in this of its motion. With what is
- * handed down the motion of a light body under a heavy one is far larger than any in the scene, so that what it keeps is
- * stopped again: each time by the same impulses, one part in STIFF of them. */
+ * handed down the motion of a light body under a heavy one is far larger than any in the scene: where it keeps more
+ * than KEPT of its own free motion it is stopped again, by impulses that are one part in STIFF of the first. */
 #define STIFF 1e7
+#define KEPT 1e-4
 enum { STOPS = 3 };
 /* Impulses outside of their cone by this share of the largest one: the supports' softness and rounding. */
 #define CONE_SLACK 1e-6
@@ -113,8 +114,18 @@ static void add_impulse(double g[6], vec3 arm, vec3 impulse)
     g[3] += torque.x, g[4] += torque.y, g[5] += torque.z;
 }
 
-/* The least impulses that stop the body: those of stiff dampers. False where contacts cannot give them. */
-static bool hold(const double A[36], const double momentum[6], struct support *supports, int count, double v[6])
+/* Size of v as the speed of what has its energy. */
+static double speed(const double A[36], const double v[6])
+{
+    double momentum[6];
+    dense6_mul(A, v, momentum);
+    return sqrt(dense6_dot(momentum, v) / ((A[0] + A[7] + A[14]) / 3));
+}
+
+/* The least impulses that stop the body: those of stiff dampers; `own`: speed of its free motion. False where contacts
+ * cannot give them. */
+static bool hold(const double A[36], const double momentum[6], double own, struct support *supports, int count,
+                 double v[6])
 {
     static const double axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     double M[36], L[36], left[6], largest = 0, stiffness = STIFF * (A[0] + A[7] + A[14]) / 3;
@@ -133,6 +144,7 @@ static bool hold(const double A[36], const double momentum[6], struct support *s
         dense6_solve(L, left, v);
         for (int k = 0; k < count; ++k)
             supports[k].impulse = v3_madd(supports[k].impulse, -stiffness, point_velocity(v, supports[k].arm));
+        if (speed(A, v) <= KEPT * own) break;
         dense6_mul(A, v, left);
     }
     for (int k = 0; k < count; ++k) largest = fmax(largest, v3_norm(supports[k].impulse));
@@ -143,14 +155,6 @@ static bool hold(const double A[36], const double momentum[6], struct support *s
     return true;
 }
 
-/* Size of v as the speed of what has its energy. */
-static double speed(const double A[36], const double v[6])
-{
-    double momentum[6];
-    dense6_mul(A, v, momentum);
-    return sqrt(dense6_dot(momentum, v) / ((A[0] + A[7] + A[14]) / 3));
-}
-
 /* A body's supports take what it brings and hand it on. False where they cannot stop it. */
 static bool stop(struct predictor *p, int32_t i)
 {
@@ -158,10 +162,12 @@ static bool stop(struct predictor *p, int32_t i)
     double A[36], b[6], L[36], *momentum = &p->momentum[6 * (size_t)i], *v = &p->system->velocity[6 * (size_t)i];
     sadmm_system_body(p->system, p->settings, i, A, b);
     if (!dense6_cholesky(A, L)) return false;
+    dense6_solve(L, b, v);
+    double own = speed(A, v);
     dense6_solve(L, momentum, v);
     double before = speed(A, v);
     int count = find_supports(p, i, v, supports);
-    if (count < 0 || !hold(A, momentum, supports, count, v) || speed(A, v) > LEFT_OVER * before) return false;
+    if (count < 0 || !hold(A, momentum, own, supports, count, v) || speed(A, v) > LEFT_OVER * before) return false;
     for (int k = 0; k < count; ++k) {
         const struct support *s = &supports[k];
         int32_t other = other_body(s->pair, i);
