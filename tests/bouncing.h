@@ -41,7 +41,8 @@ static inline sadmm_body_id add_thrown(sadmm_world *world, sadmm_shape_type type
     return id;
 }
 
-/* A box with spin, and two balls of which one comes down on the other, all with restitution. */
+/* A box with spin, and two balls of which one comes down on the other, all with restitution; a box that lies beside
+ * them, so that no step is without contacts. */
 static inline void add_bouncers(sadmm_world *world, double friction)
 {
     static const double size[3] = {0.1, 0.12, 0.08};
@@ -49,7 +50,9 @@ static inline void add_bouncers(sadmm_world *world, double friction)
         .position = {0, 0, 0.2}, .linear_velocity = {0.5, 0, -2}, .angular_velocity = {8, 5, 2.4}};
     const sadmm_body_state ball = {.position = {1, 0, 0.15}, .linear_velocity = {0, 0.1, -2}};
     const sadmm_body_state above = {.position = {1.02, 0, 0.4}, .linear_velocity = {0, 0, -3}};
+    const sadmm_body_state still = {.position = {0, 2, 0.08}};
     add_floor(world, friction);
+    add_thrown(world, SADMM_SHAPE_BOX, size, &still, 1, friction, 0);
     add_thrown(world, SADMM_SHAPE_BOX, size, &box, 1, friction, 1);
     add_thrown(world, SADMM_SHAPE_SPHERE, size, &ball, 3, friction, 0.8);
     add_thrown(world, SADMM_SHAPE_SPHERE, size, &above, 1, friction, 0.5);
