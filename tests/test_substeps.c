@@ -130,7 +130,8 @@ START_TEST(substeps_equal_short_steps)
 END_TEST
 
 /* Shares that do not come out even are rounded up; without contacts Step 1 is exact, once a sub-step. */
-/* Impacts fall into any of the sub-steps: approach speeds are those of the sub-step, each gives its restitution once. */
+/* Impacts fall into any of the sub-steps: approach speeds are those of the sub-step, each gives its restitution once.
+ */
 START_TEST(impacts_equal_those_of_short_steps)
 {
     enum { SUBSTEPS = 4 };

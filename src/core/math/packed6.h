@@ -75,8 +75,8 @@ SADMM_INLINE void add_arm_sums(double C[PACKED6], const struct arm_sums *s)
 /* C so that what (A + C)^-1 is rounded by cannot make an iteration diverge; epsilon: of the precision that it is kept
  * in. Along axes that contacts do not turn about C is 0 and A + C the inertia, which may be less than the rounding of
  * C: a lever of 1e4 m on a small inertia, a light body under heavy ones. Its inverse is so large there that its
- * rounding outweighs what it is along the others. A C that is more only slows. Units: a diagonal number's own rounding, three
- * entries a row, and those of q q^T / p where the linear part is eliminated. */
+ * rounding outweighs what it is along the others. A C that is more only slows. Units: a diagonal number's own
+ * rounding, three entries a row, and those of q q^T / p where the linear part is eliminated. */
 #define C_ROUNDING 8.0
 SADMM_INLINE void packed_round_up(double C[PACKED6], double epsilon)
 {
