@@ -165,7 +165,8 @@ void contact_problem_raw(struct contact_problem *p, const sadmm_settings *settin
     for (size_t k = 0; k < p->contacts.pair_count; ++k) {
         struct sadmm_contact_pair *pair = &p->contacts.pairs[k];
         for (int32_t i = pair->first; i < pair->first + pair->count; ++i)
-            p->contacts.points[i].error = sadmm_contact_e(&p->system, settings, pair, &p->contacts.points[i]);
+            p->contacts.points[i].error = sadmm_contact_e(&p->system, settings, pair,
+                                                          &p->contacts.points[pair->first], i - pair->first);
     }
     p->A = resize(p->A, 36 * n, sizeof(double));
     p->b = resize(p->b, 6 * n, sizeof(double));

@@ -3,6 +3,7 @@
  * enqueued, planned or repeated. The same checks run on the emulated device (test_cuda_substeps_emulated.c).
  */
 #include "between_steps.h"
+#include "bouncing.h"
 #include "cuda_worlds.h"
 
 static void use_substeps(sadmm_world *world, int substeps)
@@ -74,6 +75,50 @@ START_TEST(substeps_equal_short_steps)
     ck_assert_int_eq(world_report(whole).step, 8);
     sadmm_world_destroy(whole);
     sadmm_world_destroy(parts);
+}
+END_TEST
+
+/* Restitution: by the velocities of the sub-step that an impact falls into, once. Also the counts of the report. */
+START_TEST(impacts_equal_those_by_host_and_of_short_steps)
+{
+    enum { SUBSTEPS = 4 };
+    const int precision = _i / 2;
+    sadmm_world *worlds[3]; /* resident, by the host, short steps */
+    double bounced = 0;
+    for (int k = 0; k < 3; ++k) {
+        sadmm_world_def def = sadmm_world_def_default();
+        def.backend = SADMM_BACKEND_CPU;
+        def.precision = (sadmm_precision)precision;
+        def.settings.method = _i % 2 ? SADMM_METHOD_PAPER : SADMM_METHOD_FAST;
+        def.settings.dt = 0.02;
+        def.settings.iterations = 10 * SUBSTEPS;
+        def.settings.substeps = SUBSTEPS;
+        worlds[k] = create_world(&def);
+        add_bouncers(worlds[k], 0.3);
+        use_device(worlds[k], precision, 0);
+    }
+    by_host(worlds[1]);
+    for (int step = 0; step < (EMULATED ? 15 : 40); ++step) {
+        int limited = 0;
+        for (int k = 0; k < 2; ++k) MUST(worlds[k], sadmm_world_step(worlds[k]));
+        sadmm_settings whole = sadmm_world_settings(worlds[2]), share = whole;
+        share.dt = whole.dt / SUBSTEPS;
+        share.iterations = whole.iterations / SUBSTEPS;
+        share.substeps = 1;
+        MUST(worlds[2], sadmm_world_set_settings(worlds[2], &share));
+        for (int k = 0; k < SUBSTEPS; ++k) {
+            step_world(worlds[2], 1);
+            const int now = world_report(worlds[2]).limited;
+            limited = now > limited ? now : limited;
+        }
+        MUST(worlds[2], sadmm_world_set_settings(worlds[2], &whole));
+        expect_same_world(worlds[0], worlds[1], "impacts by the host");
+        ck_assert_msg(state_hash(worlds[0]) == state_hash(worlds[2]), "impacts of short steps: step %d", step);
+        ck_assert_int_eq(world_report(worlds[0]).limited, limited);
+        bounced = fmax(bounced, upward_speed(worlds[0]));
+    }
+    ck_assert_double_gt(bounced, 1); /* they came down at 2 m/s and more */
+    for (int k = 0; k < 3; ++k) sadmm_world_destroy(worlds[k]);
 }
 END_TEST
 
@@ -381,6 +426,7 @@ int main(void)
     Suite *suite = suite_create("cuda_substeps");
     ADD_CASE(suite, resident_substeps_equal_those_by_host, 0, parts * CASES);
     ADD_CASE(suite, substeps_equal_short_steps, 0, parts);
+    ADD_CASE(suite, impacts_equal_those_by_host_and_of_short_steps, 0, 2 * parts);
     ADD_CASE(suite, enqueued_substeps_equal_single_steps, 0, parts);
     ADD_CASE(suite, changes_between_steps_equal_those_by_host, 0, parts);
     ADD_CASE(suite, a_shape_leaves_its_reach, 0, parts);

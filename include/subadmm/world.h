@@ -232,10 +232,11 @@ typedef struct sadmm_step_report {
                                       (method FAST, settings.certificate_tolerance, at most 64 convergence checks
                                       a step): there every island is checked and stops by itself */
     bool converged;                /* a stop rule was met, by every island */
-    int32_t limited;               /* method FAST: islands that ended the iterations with more kinetic energy than
-                                      contacts can leave them with, or, with fewer than 60 iterations in a step that
-                                      starts warm, in a bounce that they cannot make, and were slowed down. In a few
-                                      steps after an impact that is no reason for more iterations; in many it is */
+    int32_t limited;               /* islands that ended the iterations with more kinetic energy than contacts can
+                                      leave them with. FAST: they were slowed down; and so were those counted here that,
+                                      with fewer than 60 iterations in a step that starts warm, were in a bounce that
+                                      they cannot make. PAPER: they are left as they are. In a few steps after an
+                                      impact that is no reason for more iterations; in many it is */
     int64_t repeated;              /* steps since creation that a backend which runs ahead (CUDA) began with too small
                                       capacities or another plan than they needed, and repeated: nothing is lost but
                                       time */

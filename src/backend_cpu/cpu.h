@@ -314,6 +314,8 @@ void CPU(set_row_steps)(struct sadmm_context *, size_t block);
 /* fast: responses of a row block, once a step; its weights. */
 void CPU(respond_rows)(struct sadmm_context *, size_t block);
 void CPU(weigh_rows)(struct sadmm_context *, size_t block);
+/* A^-1 of a body. */
+void CPU(invert)(const struct sadmm_context *, const double A[PACKED6], double inverse[PACKED6]);
 /* wrenches = J^T lambda; and at the start of a solve. */
 void CPU(sum_wrenches)(struct sadmm_context *);
 void CPU(start_wrenches)(struct sadmm_context *);

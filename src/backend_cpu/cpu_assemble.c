@@ -87,14 +87,16 @@ sadmm_status CPU(assemble_bodies)(struct sadmm_context *c, struct sadmm_error *e
 /* Larger than any velocity: an empty slot's multiplier stays 0. */
 static const real EMPTY_ERROR = (real)1e9;
 
+/* points: the pair's; NULL: the slot is empty. */
 static void assemble_point(const struct sadmm_context *c, const struct sadmm_contact_pair *pair, int k,
-                           const struct sadmm_contact_point *point, struct pair_block *block, int l)
+                           const struct sadmm_contact_point *points, struct pair_block *block, int l)
 {
     static const double zero[3];
-    bool used = point != NULL;
+    bool used = points != NULL;
+    const struct sadmm_contact_point *point = used ? &points[k] : NULL;
     const double *arm = !used ? zero : pair->body_a >= 0 ? point->arm_a : point->arm_b;
     const double *impulse = used && c->plan.warm_start ? point->impulse : zero;
-    real error = used ? (real)sadmm_point_error(c->system, &c->settings, pair, point) : EMPTY_ERROR;
+    real error = used ? (real)sadmm_point_error(c->system, &c->settings, pair, points, k) : EMPTY_ERROR;
     size_t at = block->first + (size_t)k;
     if (c->plan.contact_rows == 1) {
         struct normal_slot *slot = (struct normal_slot *)c->slots + at;
@@ -127,7 +129,7 @@ static void assemble_lane(struct sadmm_context *c, struct pair_block *block, int
     block->body_a[l] = pair ? cpu_body(c, pair->body_a) : c->bodies;
     block->body_b[l] = pair ? cpu_body(c, pair->body_b) : c->bodies;
     for (int k = 0; k < block->slots; ++k)
-        assemble_point(c, pair, k, pair && k < pair->count ? &contacts->points[pair->first + k] : NULL, block, l);
+        assemble_point(c, pair, k, pair && k < pair->count ? &contacts->points[pair->first] : NULL, block, l);
 }
 
 static void assemble_pair_share(void *context, int thread, int threads)

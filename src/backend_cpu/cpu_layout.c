@@ -116,10 +116,11 @@ sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *syst
                sadmm_grow_empty(&c->change, &c->change_capacity, 2 * c->record_count * ROW, sizeof(real))) &&
               sadmm_grow_empty(&c->offsets, &c->offsets_capacity, n + 2, sizeof(int32_t)) &&
               sadmm_grow_empty(&c->incident, &c->incident_capacity, 2 * c->record_count, sizeof(int32_t)) &&
-              (!c->fast || (sadmm_grow_empty(&c->islands, &c->island_capacity, n, sizeof *c->islands) &&
-                            sadmm_grow_empty(&c->body_sums, &c->body_sum_capacity, BODY_SUMS * n, sizeof(double)) &&
-                            sadmm_grow_empty(&c->A_inverse, &c->A_inverse_capacity, n * PACKED6, sizeof(double)) &&
-                            sadmm_grow_empty(&c->pair_response, &c->pair_response_capacity, c->record_count,
+              (!(c->fast || plan->momentum) ||
+               (sadmm_grow_empty(&c->islands, &c->island_capacity, n, sizeof *c->islands) &&
+                sadmm_grow_empty(&c->body_sums, &c->body_sum_capacity, BODY_SUMS * n, sizeof(double)) &&
+                sadmm_grow_empty(&c->A_inverse, &c->A_inverse_capacity, n * PACKED6, sizeof(double)))) &&
+              (!c->fast || (sadmm_grow_empty(&c->pair_response, &c->pair_response_capacity, c->record_count,
                                              sizeof(double)) &&
                             sadmm_grow_empty(&c->pair_weight, &c->pair_weight_capacity, c->record_count,
                                              sizeof(double)) &&

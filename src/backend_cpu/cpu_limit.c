@@ -1,5 +1,5 @@
 /* After the last iteration: momentum that no contact may change is restored (cpu_momentum.c); in the method `fast` no
- * island keeps more energy than it may have (math/limit.h). */
+ * island keeps more energy than it may have (math/limit.h), in `paper` those that do are counted. */
 #include "core/math/dense6.h"
 #include "core/math/relax.h"
 #include "cpu_rows.h"
@@ -144,9 +144,26 @@ static double factor_of(const struct sadmm_context *c, int32_t i, bool under_ite
     return fmin(factor, limit_bounce_factor(&island->limit, island->along, (double)SADMM_EPSILON));
 }
 
+static void invert_share(void *context, int thread, int threads)
+{
+    struct sadmm_context *c = (struct sadmm_context *)context;
+    size_t begin, end;
+    cpu_share_bodies(c, thread, threads, &begin, &end);
+    for (size_t i = begin; i < end; ++i) CPU(invert)(c, &c->A[i * PACKED6], &c->A_inverse[i * PACKED6]);
+}
+
+/* What the method `fast` has from its weights. */
+static void prepare_paper(struct sadmm_context *c)
+{
+    for (int32_t i = 0; i < c->bodies; ++i) c->islands[i].rows = false;
+    for (size_t k = 0; k < sadmm_row_constraint_count(c->system); ++k)
+        cpu_island_of(c, c->system->rows->constraints[k].body_a, c->system->rows->constraints[k].body_b)->rows = true;
+    cpu_parallel(c, invert_share, c);
+}
+
 static void limit_energies(struct sadmm_context *c, int32_t *limited)
 {
-    const bool under_iterated = limit_under_iterated(c->plan.warm, c->settings.iterations);
+    const bool under_iterated = c->fast && limit_under_iterated(c->plan.warm, c->settings.iterations);
     cpu_parallel(c, energies_share, c);
     if (!any_suspect(c, under_iterated)) return;
     CPU(sum_wrenches)(c);
@@ -157,6 +174,7 @@ static void limit_energies(struct sadmm_context *c, int32_t *limited)
         const int32_t loose = c->loose_of[c->label[i]];
         if (factor == 1) continue;
         *limited += c->label[i] == i;
+        if (!c->fast) continue;
         if (loose >= 0) c->loose[loose].slow_down = factor;
         else
             for (int k = 0; k < 6; ++k) c->state[(size_t)i * ROW + (size_t)k] *= (real)factor;
@@ -168,9 +186,10 @@ sadmm_status CPU(limit_velocity)(struct sadmm_context *c, int32_t *limited, stru
     (void)error;
     *limited = 0;
     CPU(find_motions)(c);
-    if (c->fast) limit_energies(c, limited);
+    if (!c->fast) prepare_paper(c);
+    limit_energies(c, limited);
     CPU(move_loose)(c);
     /* residuals are recomputed, should anything follow */
-    if (*limited > 0 || c->loose_count > 0) c->exact_since = RELAX_RESIDUAL_PERIOD;
+    if (c->fast && (*limited > 0 || c->loose_count > 0)) c->exact_since = RELAX_RESIDUAL_PERIOD;
     return SADMM_OK;
 }

@@ -8,7 +8,7 @@
 #include "cpu_rows.h"
 
 /* A^-1, packed. A rigid body's is inverted by blocks. */
-static void invert(const struct sadmm_context *c, const double A[PACKED6], double out[PACKED6])
+void CPU(invert)(const struct sadmm_context *c, const double A[PACKED6], double out[PACKED6])
 {
     if (CPU(has_rigid_mass)(c, A)) {
         packed_invert_rigid(A, out);
@@ -239,7 +239,7 @@ static void respond_share(void *context, int thread, int threads)
     struct sadmm_context *c = (struct sadmm_context *)context;
     size_t begin, end;
     cpu_share_bodies(c, thread, threads, &begin, &end);
-    for (size_t i = begin; i < end; ++i) invert(c, &c->A[i * PACKED6], &c->A_inverse[i * PACKED6]);
+    for (size_t i = begin; i < end; ++i) CPU(invert)(c, &c->A[i * PACKED6], &c->A_inverse[i * PACKED6]);
     sadmm_barrier_wait(&c->barrier, threads);
     size_t pair_records = c->pair_block_count * (size_t)LANES;
     sadmm_share(pair_records, thread, threads, &begin, &end);

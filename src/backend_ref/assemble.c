@@ -82,7 +82,8 @@ sadmm_status sadmm_ref_assemble_contacts(struct sadmm_context *c, struct sadmm_e
             struct ref_constraint *constraint = &c->constraints[k];
             clear(constraint, true, c->plan->contact_rows, pair->body_a, pair->body_b);
             constraint->mu = pair->friction;
-            constraint->e[0] = sadmm_contact_e(c->system, c->settings, pair, point);
+            constraint->e[0] = sadmm_contact_e(c->system, c->settings, pair, &contacts->points[pair->first],
+                                               k - pair->first);
             for (int r = 0; r < constraint->rows; ++r) {
                 if (pair->body_a >= 0)
                     sadmm_contact_row(frame.r[r], point->arm_a, -1, constraint->side[0].J + 6 * r);

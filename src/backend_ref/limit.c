@@ -1,6 +1,6 @@
 /* After the last iteration: momentum that no contact may change is restored, in either method; in the method `fast` no
- * island keeps more energy than it may have (math/limit.h). Energies and the work of contacts are added up at the
- * bodies that name the islands. */
+ * island keeps more energy than it may have (math/limit.h), in `paper` those that do are counted. Energies and the work
+ * of contacts are added up at the bodies that name the islands. */
 #include <float.h>
 #include <string.h>
 
@@ -60,20 +60,32 @@ static double factor_of(struct ref_body *island, bool under_iterated)
     return factor;
 }
 
+/* The method `fast` has them from its weights. */
+static void name_islands(struct sadmm_context *c)
+{
+    sadmm_ref_label_islands(c);
+    for (int32_t i = 0; i < c->system->body_count; ++i) c->bodies[i].rows = false;
+    for (size_t k = c->system->contacts->point_count; k < c->constraint_count; ++k) {
+        const struct ref_side *side = c->constraints[k].side;
+        c->bodies[c->bodies[side[0].body >= 0 ? side[0].body : side[1].body].label].rows = true;
+    }
+}
+
 sadmm_status sadmm_ref_limit_velocity(struct sadmm_context *c, int32_t *limited, struct sadmm_error *error)
 {
     (void)error;
     const bool fast = c->settings->method == SADMM_METHOD_FAST;
     const bool under_iterated = limit_under_iterated(c->plan->warm, c->settings->iterations);
     *limited = 0;
-    if (!fast) sadmm_ref_label_islands(c);
+    if (!fast) name_islands(c);
     sadmm_ref_find_motions(c);
-    if (fast) add_up_energies(c);
+    add_up_energies(c);
     for (int32_t i = 0; i < c->system->body_count; ++i) {
         struct ref_body *island = &c->bodies[i];
         if (island->label != i) continue;
-        island->slow_down = fast ? factor_of(island, under_iterated) : 1;
-        *limited += island->slow_down < 1;
+        const double factor = factor_of(island, fast && under_iterated);
+        island->slow_down = fast ? factor : 1;
+        *limited += factor < 1;
     }
     for (int32_t i = 0; i < c->system->body_count; ++i)
         sadmm_ref_move_island(c, i, c->bodies[c->bodies[i].label].slow_down);

@@ -24,15 +24,18 @@ static __device__ double form(const double M[PACKED], const solver_real x[6])
     return packed_form(M, wide);
 }
 
-/* FAST: A^-1 and the energy of A^-1 b too. */
-template <bool FAST>
+/* ENERGIES: A^-1 and the energy of A^-1 b too. */
+template <bool ENERGIES>
 static __global__ void __launch_bounds__(BODY_THREADS)
-    assemble_bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+    assemble_bodies_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     int32_t i = (int32_t)(blockIdx.x * (unsigned)BODY_THREADS + threadIdx.x);
     if (i >= v.model.bodies || v.model.live->abort_code) return; /* may run before the step's contacts are known */
     if (i == 0) clear_counts(v.islands);
-    if (!FAST && v.islands.info) v.islands.info[i].held = 0;
+    if (args.paper && ENERGIES) {
+        v.islands.info[i].held = v.islands.info[i].rows = 0;
+        v.islands.info[i].slow_down = 1;
+    }
     double A[36], b[6], x[6], factor[36];
     const struct sadmm_settings settings = *v.model.settings;
     sadmm_system_body(&v.raw.system, &settings, i, A, b);
@@ -57,7 +60,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
             for (int k = 0; k <= r; ++k) line[packed_place(r, k)] = (solver_real)A[6 * r + k];
         for (int k = PACKED; k < LINE_GENERAL_A; ++k) line[k] = 0;
     }
-    if (FAST) {
+    if (ENERGIES) {
         double inverse[PACKED];
         invert(v.bodies.rigid, A, inverse);
         for (int k = 0; k < PACKED; ++k) v.bodies.A_inverse[PACKED * (size_t)i + (size_t)k] = inverse[k];
@@ -68,7 +71,10 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 static sadmm_status launch_bodies(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    return CUDA(launch_of)(c, c->fast ? assemble_bodies_kernel<true> : assemble_bodies_kernel<false>, "assemble_bodies",
+    args.paper = !c->fast;
+    return CUDA(launch_of)(c,
+                           c->fast || c->plan.momentum ? assemble_bodies_kernel<true> : assemble_bodies_kernel<false>,
+                           "assemble_bodies",
                            ((int64_t)c->view.model.bodies + BODY_THREADS - 1) / BODY_THREADS, BODY_THREADS, &args,
                            error);
 }
@@ -103,8 +109,8 @@ static __device__ real4 pack(vec3 a, double w)
 }
 
 /* contacts.lanes threads a pair, each every contacts.lanes-th point; the first also what the points share. FAST:
- * records of sides, too. */
-template <bool FAST>
+ * records of sides, too. BOUNCES: a pair may have restitution. */
+template <bool FAST, bool BOUNCES>
 static __global__ void __launch_bounds__(BODY_THREADS)
     assemble_contacts_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
@@ -142,7 +148,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         const size_t slot = point_slot(v.contacts, p, k);
         vec3 impulse = v.model.warm_start ? v3_load(points[k].impulse) : v3(0, 0, 0);
         if (v.model.contact_rows == 1) impulse = v3_scale(normal, v3_dot(normal, impulse)); /* the row there is */
-        const double error = sadmm_contact_e(&v.raw.system, &settings, pair, &points[k]);
+        const double error = BOUNCES ? sadmm_contact_e(&v.raw.system, &settings, pair, points, k)
+                                     : sadmm_contact_e_plain(&v.raw.system, &settings, &points[k]);
         const real4 arm = pack(v3_load(a ? points[k].arm_a : points[k].arm_b), error);
         const solver_real lambda[3] = {(solver_real)impulse.x, (solver_real)impulse.y, (solver_real)impulse.z};
         v.contacts.arm[slot] = arm;
@@ -160,8 +167,11 @@ extern "C" sadmm_status CUDA(assemble_contacts)(struct sadmm_context *c, struct 
 {
     cuda_args args = {};
     CUDA_ENTER(c);
+    const cuda_kernel kernel =
+        c->fast ? (c->bounces ? assemble_contacts_kernel<true, true> : assemble_contacts_kernel<true, false>)
+                : (c->bounces ? assemble_contacts_kernel<false, true> : assemble_contacts_kernel<false, false>);
     return CUDA(launch_of)(
-        c, c->fast ? assemble_contacts_kernel<true> : assemble_contacts_kernel<false>, "assemble_contacts",
+        c, kernel, "assemble_contacts",
         ((int64_t)c->view.contacts.pair_capacity * c->view.contacts.lanes + BODY_THREADS - 1) / BODY_THREADS,
         BODY_THREADS, &args, error);
 }

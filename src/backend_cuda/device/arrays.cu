@@ -1,7 +1,8 @@
 /* The arrays that a solve works on, by the view's counts, the plan and the partition. */
 #include "context.h"
 
-/* What restores the momentum of islands, and says where leads stay. The method `fast` has its islands elsewhere. */
+/* What restores the momentum of islands, and says where leads stay. In `paper` their energies, too: the method `fast`
+ * has these elsewhere. */
 static sadmm_status reserve_motions(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_view *v = &c->view;
@@ -10,13 +11,21 @@ static sadmm_status reserve_motions(struct sadmm_context *c, struct sadmm_error 
     v->islands.touch = nullptr;
     if (!c->fast) v->islands.info = nullptr;
     if (!c->plan.momentum) return SADMM_OK;
-    const size_t islands = c->fast ? 0 : n * sizeof(cuda_island);
+    const size_t islands = c->fast ? 0 : n * ((PACKED + TERMS + 2) * sizeof(double) + sizeof(cuda_island));
     TRY(CUDA(reserve)(c, BUFFER_MOTIONS, n * (MOTION_TERMS + 1) * sizeof(double) + islands, error));
     TRY(CUDA(reserve)(c, BUFFER_TOUCH, n * sizeof(int32_t), error));
     v->islands.touch = (int32_t *)c->buffers[BUFFER_TOUCH].data;
     v->islands.motions = (double *)c->buffers[BUFFER_MOTIONS].data;
     v->islands.motion_arrivals = (unsigned long long *)(v->islands.motions + n * MOTION_TERMS);
-    if (!c->fast) v->islands.info = (cuda_island *)(v->islands.motion_arrivals + n);
+    if (!c->fast) {
+        v->bodies.A_inverse = (double *)(v->islands.motion_arrivals + n);
+        v->bodies.free_energy = v->bodies.A_inverse + n * PACKED;
+        v->islands.terms = v->bodies.free_energy + n;
+        v->islands.arrivals = (unsigned long long *)(v->islands.terms + n * TERMS);
+        v->islands.info = (cuda_island *)(v->islands.arrivals + n);
+        CUDA_CALL(c, cudaMemsetAsync(v->islands.arrivals, 0, n * sizeof *v->islands.arrivals, c->stream),
+                  "cudaMemsetAsync(arrivals)");
+    }
     CUDA_CALL(c, cudaMemsetAsync(v->islands.motion_arrivals, 0, n * sizeof *v->islands.motion_arrivals, c->stream),
               "cudaMemsetAsync(arrivals)");
     return SADMM_OK;

@@ -51,6 +51,7 @@ struct sadmm_context {
     bool measured; /* records and change are apart: the next Step 1 uses records + ratio change */
     bool rescaled; /* ... by view.iteration.ratio; else it is 1 */
     bool fast;     /* the method */
+    bool bounces;  /* some contact may have restitution: kernels that know of it take more registers */
     bool settled;  /* fast: Step 1 ran in this solve */
     int refreshes; /* fast: of the weights, in this solve */
     int exact_since; /* fast: iterations since the momentum residuals were taken */

@@ -1,4 +1,4 @@
-/* The method `fast`: energies of islands, and by what they are slowed down (math/limit.h). In double, from this
+/* Energies of islands, and by what the method `fast` slows them down (math/limit.h). In double, from this
  * precision's data; eight lanes a body. */
 #ifndef SADMM_CUDA_ITERATE_ENERGIES_H
 #define SADMM_CUDA_ITERATE_ENERGIES_H
@@ -59,14 +59,14 @@ static __device__ __forceinline__ double factor_of(const struct limit_energies &
     return under_iterated ? fmin(allowed, limit_bounce_factor(&energies, along, SOLVER_EPSILON)) : allowed;
 }
 
-/* What follows from their sums over an island that is held. One thread of it. */
+/* What follows from their sums over an island that is held; !slows: it is counted, no more. One thread of it. */
 static __device__ __forceinline__ void limit_island(const island_view &islands, cuda_island *island,
-                                                    const double sum[TERMS], bool under_iterated)
+                                                    const double sum[TERMS], bool under_iterated, bool slows)
 {
     const struct limit_energies energies = {sum[0], sum[1], sum[2], sum[3], 0, 0, 0, 0};
     const double factor = factor_of(energies, sum[4], under_iterated);
     if (island->rows) return; /* the energies are those of contacts alone; slow_down stays 1 */
-    island->slow_down = factor;
+    island->slow_down = slows ? factor : 1;
     if (factor != 1) atomicAdd(islands.limited, 1);
 }
 

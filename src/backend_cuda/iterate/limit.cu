@@ -6,7 +6,8 @@
  *   limit     nothing, unless there is one: energies and work, sums over islands (weight/island_sums.h), the factor of
  *             each island's velocities, and the rigid motion of those that are not held. Whole steps apply both where
  *             they move bodies (step/kernels.cu)
- *   momentum  paper: that motion alone
+ *
+ * paper: islands with too much energy are counted, and left as they are; those that are not held get that motion alone.
  */
 #include <string.h>
 
@@ -38,22 +39,17 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     limit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     wait_for_stream();
-    if (!*v.islands.suspects) return;
     const body_thread t = body_of_thread(v.model, v.graph);
+    if (!*v.islands.suspects) {
+        if (args.paper) restore_islands<false>(v, t, is_loose(v, t), false, false);
+        return;
+    }
     double total[TERMS];
     const double term = v.bodies.rigid ? energies_of_body<true, false>(v, t) : energies_of_body<false, false>(v, t);
     const bool loose = v.islands.motions && is_loose(v, t);
     if (add_up_island<add_terms>(v.graph, v.islands, t, term, total) && t.lane == 0 && !loose)
-        limit_island(v.islands, &v.islands.info[v.graph.label[t.body]], total, args.under_iterated);
-    if (v.islands.motions) restore_islands<true>(v, t, loose, args.under_iterated);
-}
-
-static __global__ void __launch_bounds__(BODY_THREADS)
-    momentum_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
-{
-    wait_for_stream();
-    const body_thread t = body_of_thread(v.model, v.graph);
-    restore_islands<false>(v, t, is_loose(v, t), false);
+        limit_island(v.islands, &v.islands.info[v.graph.label[t.body]], total, args.under_iterated, !args.paper);
+    if (v.islands.motions) restore_islands<true>(v, t, loose, args.under_iterated, !args.paper);
 }
 
 static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
@@ -70,13 +66,13 @@ static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __
 static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const char *name, struct sadmm_error *error)
 {
     cuda_args args = {};
-    args.under_iterated = limit_under_iterated(c->plan.warm, c->settings.iterations);
+    args.paper = !c->fast;
+    args.under_iterated = c->fast && limit_under_iterated(c->plan.warm, c->settings.iterations);
     return CUDA(launch_early)(c, kernel, name, body_blocks(c->view.model.bodies), BODY_THREADS, &args, error);
 }
 
 sadmm_status CUDA(enqueue_limit)(struct sadmm_context *c, bool suspected, struct sadmm_error *error)
 {
-    if (!c->fast) return launch(c, momentum_kernel, "momentum", error);
     if (!suspected) TRY(launch(c, suspect_kernel, "energies", error));
     return launch(c, limit_kernel, "limit", error);
 }

@@ -73,15 +73,16 @@ static __device__ __noinline__ void store_momentum(const cuda_view &v, const bod
     for (int k = 0; k < MOMENTUM_SUMS; ++k) to[k] = numbers[k];
 }
 
-/* What follows from the sums at `sum`: there the rigid motion, and the island's factor. One thread of it. */
-template <bool FAST>
+/* What follows from the sums at `sum`: there the rigid motion, and the island's factor (!slows: 1). One thread of it.
+ */
+template <bool ENERGIES>
 static __device__ __noinline__ void find_motion(const island_view &islands, cuda_island *island, double *sum,
-                                                bool under_iterated)
+                                                bool under_iterated, bool slows)
 {
     struct momentum_motions motions;
     momentum_find_motions((struct momentum_sums *)sum, &motions);
     double factor = 1;
-    if (FAST) {
+    if (ENERGIES) {
         const struct momentum_energies rigid = momentum_energies_of(&motions);
         const double *term = sum + MOTION_ENERGIES;
         struct limit_energies energies = {term[0], term[1], 0, term[3], 1, term[2], term[5], 0};
@@ -89,6 +90,7 @@ static __device__ __noinline__ void find_motion(const island_view &islands, cuda
         limit_take_rigid(&energies, &along, &rigid);
         factor = factor_of(energies, along, under_iterated);
         if (factor != 1) atomicAdd(islands.limited, 1);
+        if (!slows) factor = 1;
     }
     momentum_restoring(&motions, factor, sum);
     island->slow_down = factor;
@@ -96,12 +98,12 @@ static __device__ __noinline__ void find_motion(const island_view &islands, cuda
 }
 
 /* The islands of bodies that are `on`, whole ones. Every lane of the warp comes here. */
-template <bool FAST>
+template <bool ENERGIES>
 static __device__ __forceinline__ void restore_islands(const cuda_view &v, const body_thread &t, bool on,
-                                                       bool under_iterated)
+                                                       bool under_iterated, bool slows)
 {
     if (__ballot_sync((unsigned)ALL_LANES, on) == 0) return;
-    if (FAST) store_energies(v, t, on);
+    if (ENERGIES) store_energies(v, t, on);
     store_momentum(v, t, on);
     const bool last =
         add_up_by_powers(v.graph, v.islands.motion_arrivals, t, on, [&](int32_t slot, int64_t apart, int32_t members) {
@@ -115,8 +117,8 @@ static __device__ __forceinline__ void restore_islands(const cuda_view &v, const
     __syncwarp((unsigned)ALL_LANES);
     if (!last || t.lane > 0) return;
     const int32_t label = v.graph.label[t.body];
-    find_motion<FAST>(v.islands, &v.islands.info[label],
-                      v.islands.motions + (size_t)v.graph.slot_of[label] * MOTION_TERMS, under_iterated);
+    find_motion<ENERGIES>(v.islands, &v.islands.info[label],
+                          v.islands.motions + (size_t)v.graph.slot_of[label] * MOTION_TERMS, under_iterated, slows);
 }
 
 #endif

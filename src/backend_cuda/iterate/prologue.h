@@ -89,10 +89,13 @@ static __device__ __noinline__ void limit_in_block(const cuda_view &v, bool unde
     add_up_in_block<add_terms>(part.bodies, part.range, part.terms, barrier);
     for_each_body(v.graph, part, own, [&](const body_thread &t, int32_t i) {
         if (t.live && t.lane == 0 && i == part.range[i].first && v.islands.info[v.graph.label[t.body]].held)
-            limit_island(v.islands, &v.islands.info[v.graph.label[t.body]], part.terms + i * TERMS, under_iterated);
+            limit_island(v.islands, &v.islands.info[v.graph.label[t.body]], part.terms + i * TERMS, under_iterated,
+                         true);
     });
     for_each_body(v.graph, part, own,
-                  [&](const body_thread &t, int32_t) { restore_islands<true>(v, t, is_loose(v, t), under_iterated); });
+                  [&](const body_thread &t, int32_t) {
+                      restore_islands<true>(v, t, is_loose(v, t), under_iterated, true);
+                  });
 }
 
 #endif

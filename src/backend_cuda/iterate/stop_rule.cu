@@ -25,7 +25,8 @@ static __device__ double map_of_contact(const double lambda[3], const double u[3
     return w * sqrt(missed);
 }
 
-/* The largest natural map of a pair's points, m/s. */
+/* The largest natural map of a pair's points, m/s. BOUNCES: it may have restitution. */
+template <bool BOUNCES>
 static __device__ double natural_map(const model_view &model, const body_view &bodies, const contact_view &contacts,
                                      const raw_view &raw, int32_t p)
 {
@@ -58,7 +59,8 @@ static __device__ double natural_map(const model_view &model, const body_view &b
         }
         const vec3 impulse = m3_mul(frame, point_impulse(contacts, p, k)), x = m3_mul(frame, velocity);
         const double w = fmax(weight[0], fmax(weight[1], weight[2])),
-                     e = sadmm_contact_e(&raw.system, &settings, pair, point),
+                     e = BOUNCES ? sadmm_contact_e(&raw.system, &settings, pair, &raw.points[pair->first], k)
+                                 : sadmm_contact_e_plain(&raw.system, &settings, point),
                      lambda[3] = {impulse.x, impulse.y, impulse.z}, u[3] = {x.x + e, x.y, x.z};
         worst = keep_max(worst, map_of_contact(lambda, u, pair->friction, w));
     }
@@ -96,7 +98,7 @@ static __device__ double natural_map_of_rows(const body_view &bodies, const row_
 
 /* Terms of a body: natural map of the constraints that count here (at their first dynamic body); momentum error, and
  * the largest of what it is made of. args.checks: this check's number, from 1; args.count: iterations done. */
-template <bool RIGID>
+template <bool RIGID, bool BOUNCES>
 static __global__ void __launch_bounds__(BODY_THREADS)
     convergence_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
@@ -111,7 +113,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         const int32_t k = p - v.contacts.pair_capacity; /* a block of rows, or a pair */
         if (code & 1 && is_dynamic(v.model, k < 0 ? v.contacts.bodies[p].body_a : v.rows.constraints[k].body_a))
             continue; /* counted there */
-        map = keep_max(map, k < 0 ? natural_map(v.model, v.bodies, v.contacts, v.raw, p)
+        map = keep_max(map, k < 0 ? natural_map<BOUNCES>(v.model, v.bodies, v.contacts, v.raw, p)
                                             : natural_map_of_rows(v.bodies, v.rows, v.raw, k));
     }
     sum_lanes<SUMS>(sums);
@@ -137,8 +139,11 @@ sadmm_status CUDA(enqueue_convergence_check)(struct sadmm_context *c, int done, 
     cuda_args args = {};
     args.checks = ++c->checks;
     args.count = done;
-    return CUDA(launch_of)(c, c->view.bodies.rigid ? convergence_kernel<true> : convergence_kernel<false>,
-                           "convergence check", body_blocks(c->view.model.bodies), BODY_THREADS, &args, error);
+    const cuda_kernel kernel = !c->view.bodies.rigid ? convergence_kernel<false, false>
+                               : c->bounces          ? convergence_kernel<true, true>
+                                                     : convergence_kernel<true, false>;
+    return CUDA(launch_of)(c, kernel, "convergence check", body_blocks(c->view.model.bodies), BODY_THREADS, &args,
+                           error);
 }
 
 extern "C" sadmm_status CUDA(check_convergence)(struct sadmm_context *c, int done, int32_t *unmet,

@@ -145,6 +145,9 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     CUDA_CALL(c, cudaMemsetAsync(buffer<void>(c, BUFFER_WORLD_CONTROL), 0, sizeof(struct cuda_step_control), c->stream),
               "cudaMemsetAsync(control)");
 
+    c->bounces = false;
+    for (size_t k = 0; k < world->input->shape_count; ++k)
+        c->bounces = c->bounces || (world->input->shapes[k].alive && world->input->shapes[k].restitution > 0);
     c->plan.gyroscopic = sadmm_plan_is_gyroscopic(world->rigid, world->body_count);
     /* The state before the first step is the one that is not written by it. */
     TRY(COLLISION(upload)(s->collision, c->stream, world->contacts, error));

@@ -52,6 +52,9 @@ static void count(struct sadmm_context *c)
     v->rows.count = (int32_t)sadmm_row_constraint_count(c->system);
     v->model.contact_rows = c->plan.contact_rows;
     v->model.warm_start = c->plan.warm_start;
+    c->bounces = false;
+    for (size_t p = 0; p < c->system->contacts->pair_count; ++p)
+        c->bounces = c->bounces || c->system->contacts->pairs[p].restitution > 0;
 }
 
 static sadmm_status upload_raw(struct sadmm_context *c, struct sadmm_error *error)

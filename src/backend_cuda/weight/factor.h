@@ -73,10 +73,6 @@ static __device__ __forceinline__ void add_normals(const contact_view &contacts,
     });
 }
 
-/* Units of rounding by which a diagonal number of C may be short: its own, three entries a row, and those of q q^T /
- * p. */
-#define C_ROUNDING 8.0
-
 /* Those from place `begin` on. Every lane of the warp comes here. */
 static __device__ __forceinline__ eight_sides fetch_sides(const model_view &model, const graph_view &graph,
                                                           const contact_view &contacts, const weight_view &weights,
@@ -137,12 +133,7 @@ static __device__ __forceinline__ void weighted_matrix(const cuda_view &v, const
     for (int k = 0; k < SIDE_ARMS; ++k)
         in_order[k] = __shfl_sync((unsigned)ALL_LANES, sum[k / LANES], k % LANES, LANES);
     add_arm_sums(C, &sums);
-    /* Sums are in this precision. What is rounded must not make C less: along axes that contacts do not turn about it
-     * is 0, and what is left there is the inertia, of a light body under heavy ones a small part of C. More only
-     * slows. */
-    C[9] += C_ROUNDING * SOLVER_EPSILON * C[9];
-    C[14] += C_ROUNDING * SOLVER_EPSILON * C[14];
-    C[20] += C_ROUNDING * SOLVER_EPSILON * C[20];
+    packed_round_up(C, SOLVER_EPSILON); /* sums are in this precision, too */
 }
 
 /* ---- H ----------------------------------------------------------------------------------------------------------- */

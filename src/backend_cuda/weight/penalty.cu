@@ -63,6 +63,7 @@ static __device__ __forceinline__ void penalty_matrix(const cuda_view &v, const 
         } else {
             add_rows(v.rows, record - v.contacts.pair_capacity, side, C);
             holds = true; /* left alone */
+            if (v.islands.info) v.islands.info[v.graph.label[t.body]].rows = 1;
         }
     }
     if (t.live && holds && v.islands.info) v.islands.info[v.graph.label[t.body]].held = 1;
@@ -80,6 +81,19 @@ static __device__ __forceinline__ double penalty_of(const model_view &model, con
 #pragma unroll
     for (int k = 0; k < 6; ++k) trace_A += (double)line_a(line, bodies.rigid, k, k);
     return penalty_of_body(trace_A, trace_C, s->penalty_mass_factor, s->penalty_offset, s->dt);
+}
+
+/* Is a body's inertia less than what C is rounded by? */
+static __device__ __forceinline__ bool inertia_drowns(const body_view &bodies, size_t body, double beta,
+                                                      const double C[PACKED])
+{
+    const solver_real *line = bodies.lines + body * (size_t)bodies.line;
+    double A[PACKED] = {};
+#pragma unroll
+    for (int r = 3; r < 6; ++r)
+#pragma unroll
+        for (int k = 3; k <= r; ++k) A[r * (r + 1) / 2 + k] = (double)line_a(line, bodies.rigid, r, k);
+    return packed_inertia_drowns(A, beta, C, SOLVER_EPSILON);
 }
 
 /* ---- kernels ----------------------------------------------------------------------------------------------------- */
@@ -112,6 +126,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
         beta = v.bodies.beta[t.body];
         for (int k = 0; k < PACKED; ++k) C[k] = v.bodies.C[t.body * PACKED + (size_t)k];
     }
+    if (FACTOR && t.live && FORM == PLAIN && inertia_drowns(v.bodies, t.body, beta, C))
+        packed_round_up(C, SOLVER_EPSILON); /* `fast`: its C is */
     if (FACTOR && t.live && FORM == CLOSED) factor_rigid(v.bodies, t.body, t.lane, C);
     else if (FACTOR && t.live) factor_body(v.bodies, t.body, t.lane, beta, C);
     if (args.planned) check_plan(v.model, v.iteration, v.step);

@@ -5,22 +5,18 @@
 #include "vec3.h"
 
 /* e of a contact from its gap (m), in m/s. Apart: the bodies may close the gap in one step and no more. Overlapping
- * beyond the slop: Baumgarte's share of it is pushed out each step, with a capped speed. Restitution: an approach
- * faster than the threshold that would touch within the step leaves with `restitution` times its speed.
- * `approach` is the normal velocity at the start of the step (negative: closing). */
-SADMM_INLINE double contact_error(double gap, double approach, double restitution, double dt, double baumgarte,
-                                  double slop, double correction_speed, double restitution_threshold)
+ * beyond the slop: Baumgarte's share of it is pushed out each step, with a capped speed. */
+SADMM_INLINE double contact_error(double gap, double dt, double baumgarte, double slop, double correction_speed)
 {
-    double e;
-    if (gap >= 0) {
-        e = gap / dt;
-    } else {
-        double depth = -gap - slop;
-        e = depth > 0 ? -fmin(baumgarte * depth / dt, correction_speed) : 0.0;
-    }
-    if (restitution > 0 && approach < -restitution_threshold && gap + approach * dt <= 0)
-        e = fmin(e, restitution * approach);
-    return e;
+    const double depth = -gap - slop;
+    if (gap >= 0) return gap / dt;
+    return depth > 0 ? -fmin(baumgarte * depth / dt, correction_speed) : 0.0;
+}
+
+/* Does a contact that approaches (negative) touch within the step, faster than the threshold of restitution? */
+SADMM_INLINE int contact_hits(double gap, double approach, double dt, double threshold)
+{
+    return approach < -threshold && gap + approach * dt <= 0;
 }
 
 /* ---- the law ------------------------------------------------------------------------------------------------------

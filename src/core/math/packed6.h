@@ -72,6 +72,30 @@ SADMM_INLINE void add_arm_sums(double C[PACKED6], const struct arm_sums *s)
     C[18] -= s->rr[4], C[19] -= s->rr[5], C[20] += s->rr[0] + s->rr[1];
 }
 
+/* C so that what (A + C)^-1 is rounded by cannot make an iteration diverge; epsilon: of the precision that it is kept
+ * in. Along axes that contacts do not turn about C is 0 and A + C the inertia, which may be less than the rounding of
+ * C: a lever of 1e4 m on a small inertia, a light body under heavy ones. Its inverse is so large there that its
+ * rounding outweighs what it is along the others. A C that is more only slows. Units: a diagonal number's own
+ * rounding, three entries a row, and those of q q^T / p where the linear part is eliminated. */
+#define C_ROUNDING 8.0
+SADMM_INLINE void packed_round_up(double C[PACKED6], double epsilon)
+{
+    C[9] += C_ROUNDING * epsilon * C[9];
+    C[14] += C_ROUNDING * epsilon * C[14];
+    C[20] += C_ROUNDING * epsilon * C[20];
+}
+
+/* Is the least principal inertia (at least 4 det / trace^2) less than this many times what is added above? Else the
+ * inverse's rounding is at most a sixteenth of what it is along any axis, and C stays as it is, to the bit. */
+#define INERTIA_ROUNDINGS 2.0
+SADMM_INLINE int packed_inertia_drowns(const double A[PACKED6], double beta, const double C[PACKED6], double epsilon)
+{
+    const double largest = fmax(C[9], fmax(C[14], C[20])), trace = A[9] + A[14] + A[20];
+    const double det = A[9] * (A[14] * A[20] - A[19] * A[19]) - A[13] * (A[13] * A[20] - A[19] * A[18]) +
+                       A[18] * (A[13] * A[19] - A[14] * A[18]);
+    return INERTIA_ROUNDINGS * C_ROUNDING * epsilon * beta * largest * trace * trace > 4 * det;
+}
+
 /* <A^-1, sum J^T J> of a rigid body, whose A^-1 has no mixed part. */
 SADMM_INLINE double packed_dot_arms(const double inverse[PACKED6], const struct arm_sums *s)
 {

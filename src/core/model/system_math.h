@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-#include "core/math/contact.h"
+#include "core/math/impact.h"
 #include "core/math/rigid.h"
 #include "system.h"
 
@@ -56,28 +56,6 @@ SADMM_INLINE vec3 sadmm_contact_velocity(const struct sadmm_contact_pair *pair, 
     return x;
 }
 
-/* e along the normal, m/s. */
-SADMM_INLINE double sadmm_contact_e(const struct sadmm_system *system, const struct sadmm_settings *settings,
-                                     const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *point)
-{
-    double approach = 0;
-    if (system->errors_given) return point->error;
-    if (system->rigid && pair->restitution > 0) {
-        vec3 va = v3(0, 0, 0), vb = va;
-        if (pair->body_a >= 0) {
-            const double *v = system->rigid[pair->body_a].velocity;
-            va = v3_add(v3_load(v), v3_cross(v3_load(v + 3), v3_load(point->arm_a)));
-        }
-        if (pair->body_b >= 0) {
-            const double *v = system->rigid[pair->body_b].velocity;
-            vb = v3_add(v3_load(v), v3_cross(v3_load(v + 3), v3_load(point->arm_b)));
-        }
-        approach = v3_dot(v3_load(pair->normal), v3_sub(vb, va));
-    }
-    return contact_error(point->gap, approach, pair->restitution, settings->dt, settings->baumgarte, settings->slop,
-                         settings->correction_speed, settings->restitution_threshold);
-}
-
 /* The contact's frame: rows n, t1, t2. */
 SADMM_INLINE mat3 sadmm_contact_frame(const double normal[3])
 {
@@ -86,6 +64,125 @@ SADMM_INLINE mat3 sadmm_contact_frame(const double normal[3])
     v3_tangents(frame.r[0], &frame.r[1], &frame.r[2]);
     return frame;
 }
+
+/* ---- e of a contact ---------------------------------------------------------------------------------------------- */
+
+/* A body that hits: its velocity at the end of the step but for contacts and forces, what forces change it by in half a
+ * step, and its response to an impulse. */
+struct sadmm_impact_body {
+    vec3 linear, angular, push, turn;
+    double inverse_mass;
+    mat3 inverse_inertia; /* world frame */
+};
+
+SADMM_INLINE struct sadmm_impact_body sadmm_impact_body_of(const struct sadmm_system *system,
+                                                           const struct sadmm_settings *settings, int32_t i)
+{
+    const double dt = settings->dt;
+    struct sadmm_impact_body out;
+    memset(&out, 0, sizeof out);
+    if (i < 0) return out;
+    const struct sadmm_rigid *body = &system->rigid[i];
+    const mat3 R = q_matrix(q_load(body->orientation));
+    const vec3 inertia = v3_load(body->inertia);
+    const sym3 inverse = rigid_world_inertia(R, v3(1 / inertia.x, 1 / inertia.y, 1 / inertia.z));
+    out.linear = v3_load(body->velocity);
+    out.angular = v3_load(body->velocity + 3);
+    if (!rigid_is_isotropic(inertia))
+        out.angular = m3_mul(R, rigid_gyroscopic(inertia, m3_tmul(R, out.angular), dt));
+    out.push = v3_scale(v3_madd(v3_load(settings->gravity), 1 / body->mass, v3_load(body->wrench)), dt / 2);
+    out.turn = v3_scale(s3_mul(inverse, v3_load(body->wrench + 3)), dt / 2);
+    out.inverse_mass = 1 / body->mass;
+    out.inverse_inertia.r[0] = v3(inverse.xx, inverse.xy, inverse.xz);
+    out.inverse_inertia.r[1] = v3(inverse.xy, inverse.yy, inverse.yz);
+    out.inverse_inertia.r[2] = v3(inverse.xz, inverse.yz, inverse.zz);
+    return out;
+}
+
+/* Relative velocity at arms of the two bodies. */
+SADMM_INLINE vec3 sadmm_impact_velocity(const struct sadmm_impact_body body[2], const vec3 arm[2])
+{
+    return v3_sub(v3_add(body[1].linear, v3_cross(body[1].angular, arm[1])),
+                  v3_add(body[0].linear, v3_cross(body[0].angular, arm[0])));
+}
+
+/* What forces change it by in half a step. */
+SADMM_INLINE vec3 sadmm_impact_push(const struct sadmm_impact_body body[2], const vec3 arm[2])
+{
+    return v3_sub(v3_add(body[1].push, v3_cross(body[1].turn, arm[1])),
+                  v3_add(body[0].push, v3_cross(body[0].turn, arm[0])));
+}
+
+/* Adds to G, the response in the frame, that of a body at an arm. */
+SADMM_INLINE void sadmm_add_response(const struct sadmm_impact_body *body, const mat3 *frame, vec3 arm, mat3 *G)
+{
+    if (body->inverse_mass == 0) return;
+    for (int i = 0; i < 3; ++i) {
+        const vec3 turned = m3_mul(body->inverse_inertia, v3_cross(arm, frame->r[i]));
+        const vec3 moved = v3_madd(v3_cross(turned, arm), body->inverse_mass, frame->r[i]);
+        G->r[i] = v3_add(G->r[i], m3_mul(*frame, moved));
+    }
+}
+
+/* The restitution of a pair whose contacts that hit have their middle at `arm`. */
+SADMM_INLINE double sadmm_impact_restitution(const struct sadmm_impact_body body[2],
+                                             const struct sadmm_contact_pair *pair, const vec3 arm[2])
+{
+    const mat3 frame = sadmm_contact_frame(pair->normal);
+    mat3 G = {{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}};
+    for (int side = 0; side < 2; ++side) sadmm_add_response(&body[side], &frame, arm[side], &G);
+    return impact_restitution(&G, m3_mul(frame, sadmm_impact_velocity(body, arm)),
+                              m3_mul(frame, sadmm_impact_push(body, arm)), pair->friction, pair->restitution);
+}
+
+/* e of a pair's k-th point with restitution, from e without. */
+SADMM_RARE double sadmm_impact_e(const struct sadmm_system *system, const struct sadmm_settings *settings,
+                                 const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *points,
+                                 int32_t at, double e)
+{
+    const double dt = settings->dt, threshold = settings->restitution_threshold;
+    const struct sadmm_impact_body body[2] = {sadmm_impact_body_of(system, settings, pair->body_a),
+                                              sadmm_impact_body_of(system, settings, pair->body_b)};
+    const vec3 normal = v3_load(pair->normal);
+    vec3 middle[2] = {v3(0, 0, 0), v3(0, 0, 0)};
+    double approach = 0, hits = 0, restitution = pair->restitution;
+    for (int32_t k = 0; k < pair->count; ++k) {
+        const vec3 arm[2] = {v3_load(points[k].arm_a), v3_load(points[k].arm_b)};
+        const double closing = v3_dot(normal, sadmm_impact_velocity(body, arm));
+        if (k == at) approach = closing;
+        if (!contact_hits(points[k].gap, closing, dt, threshold)) continue;
+        hits += 1;
+        for (int side = 0; side < 2; ++side) middle[side] = v3_add(middle[side], arm[side]);
+    }
+    if (hits > 0 && pair->friction > 0) {
+        for (int side = 0; side < 2; ++side) middle[side] = v3_scale(middle[side], 1 / hits);
+        restitution = sadmm_impact_restitution(body, pair, middle);
+    }
+    if (contact_hits(points[at].gap, approach, dt, threshold)) return fmin(e, restitution * approach);
+    return approach > 0 ? fmax(e, restitution * approach) : e;
+}
+
+/* e of a point along the normal, m/s, of a pair without restitution. */
+SADMM_INLINE double sadmm_contact_e_plain(const struct sadmm_system *system, const struct sadmm_settings *settings,
+                                           const struct sadmm_contact_point *point)
+{
+    return system->errors_given ? point->error
+                                : contact_error(point->gap, settings->dt, settings->baumgarte, settings->slop,
+                                                settings->correction_speed);
+}
+
+/* e of a pair's k-th point. `points`: the pair's. */
+SADMM_INLINE double sadmm_contact_e(const struct sadmm_system *system, const struct sadmm_settings *settings,
+                                     const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *points,
+                                     int32_t k)
+{
+    const double e = sadmm_contact_e_plain(system, settings, &points[k]);
+    return !system->errors_given && system->rigid && pair->restitution > 0
+               ? sadmm_impact_e(system, settings, pair, points, k, e)
+               : e;
+}
+
+/* ---- rows -------------------------------------------------------------------------------------------------------- */
 
 /* J = sign [d^T, (arm x d)^T] for the contact direction d: sign +1 on b, -1 on a. */
 SADMM_INLINE void sadmm_contact_row(vec3 d, const double arm[3], double sign, double row[6])

@@ -10,9 +10,9 @@ void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_sett
 }
 
 double sadmm_point_error(const struct sadmm_system *system, const struct sadmm_settings *settings,
-                         const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *point)
+                         const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *points, int32_t k)
 {
-    return sadmm_contact_e(system, settings, pair, point);
+    return sadmm_contact_e(system, settings, pair, points, k);
 }
 
 void sadmm_body_lead(const struct sadmm_rigid *body, const double velocity[6], double lead[6])

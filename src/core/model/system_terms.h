@@ -8,9 +8,9 @@
 void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_settings *settings, int32_t body,
                       double A[36], double b[6]);
 
-/* e of a contact point, m/s. */
+/* e of a pair's k-th point, m/s; points: the pair's. */
 double sadmm_point_error(const struct sadmm_system *system, const struct sadmm_settings *settings,
-                         const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *point);
+                         const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *points, int32_t k);
 
 /* The lead of a body by itself (math/lead.h), which ends the step with `velocity`. */
 void sadmm_body_lead(const struct sadmm_rigid *body, const double velocity[6], double lead[6]);

@@ -116,7 +116,8 @@ static void certify_pair(struct tally *tally, const struct sadmm_system *system,
         vec3 lambda = m3_mul(frame, v3_load(point->impulse));
         vec3 x = m3_mul(frame, sadmm_contact_velocity(pair, point, system->velocity));
         const double l[3] = {lambda.x, lambda.y, lambda.z};
-        const double u[3] = {x.x + sadmm_contact_e(system, settings, pair, point), x.y, x.z};
+        const double u[3] = {x.x + sadmm_contact_e(system, settings, pair, &system->contacts->points[pair->first],
+                                                     k - pair->first), x.y, x.z};
         double weight[3] = {0, 0, 0};
         for (int side = 0; side < 2; ++side) {
             int32_t index = side ? pair->body_b : pair->body_a;

@@ -9,8 +9,12 @@
 #include "core/model/system_math.h"
 
 enum { MOST_SUPPORTS = 64 };
-/* Stiffness of supports over the body's mass: a body that is stopped keeps one part in this of its motion. */
+/* Stiffness of supports over the body's mass: a body that is stopped keeps one part in this of its motion. With what is
+ * handed down the motion of a light body under a heavy one is far larger than any in the scene: where it keeps more
+ * than KEPT of its own free motion it is stopped again, by impulses that are one part in STIFF of the first. */
 #define STIFF 1e7
+#define KEPT 1e-4
+enum { STOPS = 3 };
 /* Impulses outside of their cone by this share of the largest one: the supports' softness and rounding. */
 #define CONE_SLACK 1e-6
 /* Errors up to this share of the motion to be stopped are left to the iteration. */
@@ -95,7 +99,7 @@ static int find_supports(const struct predictor *p, int32_t i, const double v[6]
             s->normal = v3_scale(v3_load(pair->normal), is_b ? 1 : -1);
             s->arm = v3_load(is_b ? s->point->arm_b : s->point->arm_a);
             double closing = -v3_dot(s->normal, point_velocity(v, s->arm));
-            double e = sadmm_contact_e(p->system, p->settings, pair, s->point);
+            double e = sadmm_contact_e(p->system, p->settings, pair, &contacts->points[pair->first], k);
             if (e < -LEFT_OVER * fabs(closing)) return -1;
             count += e < LEFT_OVER * closing;
         }
@@ -110,11 +114,21 @@ static void add_impulse(double g[6], vec3 arm, vec3 impulse)
     g[3] += torque.x, g[4] += torque.y, g[5] += torque.z;
 }
 
-/* The least impulses that stop the body: those of stiff dampers. False where contacts cannot give them. */
-static bool hold(const double A[36], const double momentum[6], struct support *supports, int count, double v[6])
+/* Size of v as the speed of what has its energy. */
+static double speed(const double A[36], const double v[6])
+{
+    double momentum[6];
+    dense6_mul(A, v, momentum);
+    return sqrt(dense6_dot(momentum, v) / ((A[0] + A[7] + A[14]) / 3));
+}
+
+/* The least impulses that stop the body: those of stiff dampers; `own`: speed of its free motion. False where contacts
+ * cannot give them. */
+static bool hold(const double A[36], const double momentum[6], double own, struct support *supports, int count,
+                 double v[6])
 {
     static const double axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    double M[36], L[36], largest = 0, stiffness = STIFF * (A[0] + A[7] + A[14]) / 3;
+    double M[36], L[36], left[6], largest = 0, stiffness = STIFF * (A[0] + A[7] + A[14]) / 3;
     memcpy(M, A, sizeof M);
     for (int k = 0; k < count; ++k)
         for (int axis = 0; axis < 3; ++axis) {
@@ -124,24 +138,21 @@ static bool hold(const double A[36], const double momentum[6], struct support *s
                 for (int c = 0; c <= r; ++c) M[6 * r + c] += stiffness * row[r] * row[c];
         }
     if (!dense6_cholesky(M, L)) return false;
-    dense6_solve(L, momentum, v);
-    for (int k = 0; k < count; ++k) {
-        supports[k].impulse = v3_scale(point_velocity(v, supports[k].arm), -stiffness);
-        largest = fmax(largest, v3_norm(supports[k].impulse));
+    for (int k = 0; k < count; ++k) supports[k].impulse = v3(0, 0, 0);
+    memcpy(left, momentum, sizeof left);
+    for (int stops = 0; stops < STOPS; ++stops) {
+        dense6_solve(L, left, v);
+        for (int k = 0; k < count; ++k)
+            supports[k].impulse = v3_madd(supports[k].impulse, -stiffness, point_velocity(v, supports[k].arm));
+        if (speed(A, v) <= KEPT * own) break;
+        dense6_mul(A, v, left);
     }
+    for (int k = 0; k < count; ++k) largest = fmax(largest, v3_norm(supports[k].impulse));
     for (int k = 0; k < count; ++k) {
         vec3 within = contact_project(supports[k].impulse, supports[k].normal, supports[k].pair->friction);
         if (v3_norm(v3_sub(within, supports[k].impulse)) > CONE_SLACK * largest) return false;
     }
     return true;
-}
-
-/* Size of v as the speed of what has its energy. */
-static double speed(const double A[36], const double v[6])
-{
-    double momentum[6];
-    dense6_mul(A, v, momentum);
-    return sqrt(dense6_dot(momentum, v) / ((A[0] + A[7] + A[14]) / 3));
 }
 
 /* A body's supports take what it brings and hand it on. False where they cannot stop it. */
@@ -151,10 +162,12 @@ static bool stop(struct predictor *p, int32_t i)
     double A[36], b[6], L[36], *momentum = &p->momentum[6 * (size_t)i], *v = &p->system->velocity[6 * (size_t)i];
     sadmm_system_body(p->system, p->settings, i, A, b);
     if (!dense6_cholesky(A, L)) return false;
+    dense6_solve(L, b, v);
+    double own = speed(A, v);
     dense6_solve(L, momentum, v);
     double before = speed(A, v);
     int count = find_supports(p, i, v, supports);
-    if (count < 0 || !hold(A, momentum, supports, count, v) || speed(A, v) > LEFT_OVER * before) return false;
+    if (count < 0 || !hold(A, momentum, own, supports, count, v) || speed(A, v) > LEFT_OVER * before) return false;
     for (int k = 0; k < count; ++k) {
         const struct support *s = &supports[k];
         int32_t other = other_body(s->pair, i);

@@ -56,7 +56,7 @@ struct sadmm_resident_report {
     double iterations_mean;    /* over islands */
     bool converged;            /* every island met the stop rule */
     int64_t islands_above;     /* that did not; -1: there was none */
-    int32_t limited;           /* islands, method FAST */
+    int32_t limited;           /* islands with too much energy */
     double penetration_max;    /* m */
     struct sadmm_residual residual; /* -1: not measured */
     struct {

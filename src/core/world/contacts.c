@@ -108,7 +108,8 @@ static sadmm_status freeze(const sadmm_world *world, sadmm_problem *problem, dou
             memcpy(contact->normal, pair->normal, sizeof contact->normal);
             memcpy(contact->arm_a, point->arm_a, sizeof contact->arm_a);
             memcpy(contact->arm_b, point->arm_b, sizeof contact->arm_b);
-            contact->error = sadmm_contact_e(&system, &settings, pair, point);
+            contact->error = sadmm_contact_e(&system, &settings, pair, &world->contacts.points[pair->first],
+                                             k - pair->first);
             contact->friction = pair->friction;
         }
     }

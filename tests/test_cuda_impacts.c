@@ -1,0 +1,3 @@
+/* Impacts, on the CUDA backend. */
+#define IMPACTS_ON_CUDA
+#include "test_impacts.c"
