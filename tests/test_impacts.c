@@ -57,8 +57,7 @@ static sadmm_body_id add_body(sadmm_world *world, sadmm_shape_type type, const s
     return add_thrown(world, type, size_of_shape, state, 1, friction, restitution);
 }
 
-/* J. Semi-implicit Euler keeps not v^2 / 2 + g z but that with z half a step back: a fall takes g^2 dt^2 / 2 a step
- * from the former, and a bounce gives it back (v g dt at once). */
+/* J */
 static double energy_of(sadmm_world *world, sadmm_body_id id)
 {
     const sadmm_body_def body = body_def(world, id);
@@ -71,8 +70,8 @@ static double energy_of(sadmm_world *world, sadmm_body_id id)
                                       {2 * (x * y - s * z), 1 - 2 * (x * x + z * z), 2 * (y * z + s * x)},
                                       {2 * (x * z + s * y), 2 * (y * z - s * x), 1 - 2 * (x * x + y * y)}};
         const double turn = columns[axis][0] * w[0] + columns[axis][1] * w[1] + columns[axis][2] * w[2];
-        const double v = body.linear_velocity[axis], back = body.position[axis] - settings.dt / 2 * v;
-        sum += body.inertia[axis] * turn * turn / 2 + body.mass * (v * v / 2 - settings.gravity[axis] * back);
+        const double v = body.linear_velocity[axis], at = body.position[axis];
+        sum += body.inertia[axis] * turn * turn / 2 + body.mass * (v * v / 2 - settings.gravity[axis] * at);
     }
     return sum;
 }
