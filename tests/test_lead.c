@@ -13,22 +13,23 @@ START_TEST(kinds)
         enum lead_kind kind;
     } cases[] = {
         {0, 0, LEAD_OWN}, /* in the air */
-        {TOUCH_FRICTION, TOUCH_CARRIED, LEAD_OWN},
-        {TOUCH_SMOOTH, TOUCH_CARRIED, LEAD_OWN},
-        {TOUCH_INNER | TOUCH_FRICTION, TOUCH_CARRIED, LEAD_OWN},
-        {TOUCH_INNER | TOUCH_FRICTION | TOUCH_JOLT, TOUCH_CARRIED, LEAD_STAYS},
-        {TOUCH_FRICTION | TOUCH_JOLT, TOUCH_CARRIED, LEAD_STAYS},
+        {TOUCH_FRICTION, TOUCH_CARRIED | TOUCH_MOVED, LEAD_OWN},
+        {TOUCH_FRICTION, TOUCH_CARRIED, LEAD_STAYS}, /* it rests */
+        {TOUCH_SMOOTH, TOUCH_CARRIED | TOUCH_MOVED, LEAD_OWN},
+        {TOUCH_INNER | TOUCH_FRICTION, TOUCH_CARRIED | TOUCH_MOVED, LEAD_OWN},
+        {TOUCH_INNER | TOUCH_FRICTION | TOUCH_JOLT, TOUCH_CARRIED | TOUCH_MOVED, LEAD_STAYS},
+        {TOUCH_FRICTION | TOUCH_JOLT, TOUCH_CARRIED | TOUCH_MOVED, LEAD_STAYS},
         {TOUCH_INNER | TOUCH_FRICTION | TOUCH_JOLT, 0, LEAD_OWN}, /* it flies */
         /* momentum along which nothing static acts: a lead of each would change it */
-        {TOUCH_INNER, TOUCH_CARRIED, LEAD_SHARED},
-        {TOUCH_INNER | TOUCH_JOLT, TOUCH_CARRIED, LEAD_SHARED},
+        {TOUCH_INNER, TOUCH_CARRIED | TOUCH_MOVED, LEAD_SHARED},
+        {TOUCH_INNER | TOUCH_JOLT, TOUCH_CARRIED | TOUCH_MOVED, LEAD_SHARED},
         {TOUCH_INNER | TOUCH_JOLT, 0, LEAD_SHARED},
-        {TOUCH_INNER | TOUCH_SMOOTH, TOUCH_CARRIED, LEAD_STAYS},
+        {TOUCH_INNER | TOUCH_SMOOTH, TOUCH_CARRIED | TOUCH_MOVED, LEAD_STAYS},
     };
     ck_assert_int_eq(lead_kind_of(cases[_i].island, cases[_i].body), cases[_i].kind);
 }
 END_TEST
-enum { KINDS = 11 };
+enum { KINDS = 12 };
 
 /* Bodies without an isotropic inertia are led along their axis of rotation alone: what they turn by leaves that axis
  * where it is in their own frame. */
@@ -73,11 +74,14 @@ START_TEST(points)
         /* a bounce that keeps all of its speed goes back to where it was */
         {0.003, 1, 1, {0, 1}, 0, {TOUCH_CARRIED, TOUCH_CARRIED}},
     };
+    const double size[2] = {fabs(cases[_i].lead[0]), fabs(cases[_i].lead[1])};
     struct lead_touch touch = {0, {0, 0}};
-    lead_add_point(&touch, cases[_i].gap, cases[_i].push, cases[_i].speed, cases[_i].lead,
-                   fabs(cases[_i].lead[0]) + fabs(cases[_i].lead[1]), 0.01, 1e-5);
+    lead_add_point(&touch, cases[_i].gap, cases[_i].push, cases[_i].speed, cases[_i].lead, size, 0.01, 1e-5);
     ck_assert_int_eq(touch.island, cases[_i].island);
-    for (int s = 0; s < 2; ++s) ck_assert_int_eq(touch.body[s], cases[_i].body[s]);
+    for (int s = 0; s < 2; ++s) {
+        ck_assert_int_eq(touch.body[s] & TOUCH_CARRIED, cases[_i].body[s]);
+        ck_assert_int_eq((touch.body[s] & TOUCH_MOVED) != 0, size[s] > 1e-6); /* 1e-8 m */
+    }
 }
 END_TEST
 enum { POINTS = 10 };

@@ -254,8 +254,8 @@ typedef struct sadmm_step_report {
 SADMM_API sadmm_status sadmm_world_report(sadmm_world *world, sadmm_step_report *report);
 
 /* Contacts are found where the bodies are halfway through the step by their velocities at its start, or where what is
- * fast first touches; impulses, gaps and the certificate are those of that geometry (docs/algorithm.md, section 6). With
- * sub-steps: of the last one, and so are the length of the step and its start. */
+ * fast first touches; impulses, gaps and the certificate are those of that geometry (docs/algorithm.md, section 6).
+ * With sub-steps: of the last one, and so are the length of the step and its start. */
 typedef struct sadmm_contact {
     sadmm_body_id body_a, body_b;
     sadmm_shape_id shape_a, shape_b;

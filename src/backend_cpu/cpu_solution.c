@@ -72,8 +72,8 @@ static void touch_pair(const struct sadmm_context *c, const struct sadmm_contact
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
         const struct sadmm_contact_point *point = &c->system->contacts->points[k];
         const double *n = pair->normal, *arm_a = point->arm_a, *arm_b = point->arm_b;
-        const double size = lead_size(lead[0], arm_a) + lead_size(lead[1], arm_b);
-        lead_add_push(out, dot3(n, point->impulse));
+        const double size[2] = {lead_size(lead[0], arm_a), lead_size(lead[1], arm_b)};
+        lead_add_push(out, dot3(n, point->impulse), size, c->settings.dt, c->settings.slop);
         if (lead_is_still(size, c->settings.dt, c->settings.slop)) continue;
         const double leads[2] = {-lead_along(n, lead[0], arm_a), lead_along(n, lead[1], arm_b)};
         const double speed = lead_along(n, velocity[1], arm_b) - lead_along(n, velocity[0], arm_a);
@@ -101,7 +101,7 @@ static void touch_bodies(struct sadmm_context *c, int thread, int threads)
 /* Islands have the bits of their bodies, at their labels, but for what is each body's own. */
 static void touch_islands(struct sadmm_context *c)
 {
-    for (int32_t i = 0; i < c->bodies; ++i) c->touch[c->label[i]] |= c->touch[i] & ~TOUCH_CARRIED;
+    for (int32_t i = 0; i < c->bodies; ++i) c->touch[c->label[i]] |= c->touch[i] & ~(TOUCH_CARRIED | TOUCH_MOVED);
 }
 
 struct integration {

@@ -129,8 +129,8 @@ static __global__ void touch_kernel(const __grid_constant__ cuda_view v, const _
                                  lead_along(n, sides[1].lead, point->arm_b)},
                      speed = lead_along(n, sides[1].velocity, point->arm_b) -
                              lead_along(n, sides[0].velocity, point->arm_a);
-        lead_add_point(&touch, point->gap, dot3(n, impulse), speed, leads,
-                       lead_size(sides[0].lead, point->arm_a) + lead_size(sides[1].lead, point->arm_b), dt, slop);
+        const double size[2] = {lead_size(sides[0].lead, point->arm_a), lead_size(sides[1].lead, point->arm_b)};
+        lead_add_point(&touch, point->gap, dot3(n, impulse), speed, leads, size, dt, slop);
     }
 #pragma unroll
     for (int s = 0; s < 2; ++s)

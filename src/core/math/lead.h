@@ -20,7 +20,8 @@ enum {
     TOUCH_SMOOTH = 2,   /* static ones without friction */
     TOUCH_FRICTION = 4, /* with friction */
     TOUCH_JOLT = 8,     /* a contact that taking back leads would close beyond what v does */
-    TOUCH_CARRIED = 16  /* contacts that press on it, or that it might close by itself */
+    TOUCH_CARRIED = 16, /* contacts that press on it, or that it might close by itself */
+    TOUCH_MOVED = 32    /* where it touches, its lead is more than rounding */
 };
 
 enum lead_kind {
@@ -32,7 +33,8 @@ enum lead_kind {
 SADMM_INLINE enum lead_kind lead_kind_of(int island, int body)
 {
     if (island & TOUCH_INNER && !(island & TOUCH_FRICTION)) return island & TOUCH_SMOOTH ? LEAD_STAYS : LEAD_SHARED;
-    return island & TOUCH_JOLT && body & TOUCH_CARRIED ? LEAD_STAYS : LEAD_OWN;
+    if (!(body & TOUCH_CARRIED)) return LEAD_OWN;
+    return island & TOUCH_JOLT || !(body & TOUCH_MOVED) ? LEAD_STAYS : LEAD_OWN;
 }
 
 SADMM_INLINE void lead_shared(const double gravity[3], double dt, double lead[6])
@@ -77,29 +79,38 @@ SADMM_INLINE double lead_size(const double lead[6], const double arm[3])
  * jitters by. */
 #define LEAD_SHARE 0.05
 #define LEAD_SLOP 0.1
+/* Of a body that is carried, what moves a point by less than this share of the slop is what a body at rest jitters by. A
+ * mean of two velocities does not show the contacts what they corrected by: they would correct it again. */
+#define LEAD_LEAST 1e-3
 
 /* Bits of an island, and of the two bodies, a and b. */
 struct lead_touch {
     int island, body[2];
 };
 
-/* Of a contact point, by its normal impulse. */
-SADMM_INLINE void lead_add_push(struct lead_touch *touch, double push)
+/* Of a contact point, by its normal impulse and the sizes of the leads of a and b there (lead_size). */
+SADMM_INLINE void lead_add_push(struct lead_touch *touch, double push, const double size[2], double dt, double slop)
 {
     SADMM_UNROLL
-    for (int s = 0; s < 2; ++s)
+    for (int s = 0; s < 2; ++s) {
         if (push > 0) touch->body[s] |= TOUCH_CARRIED;
+        if (dt * size[s] > LEAD_LEAST * slop) touch->body[s] |= TOUCH_MOVED;
+    }
 }
 
-/* Leads whose sizes come to `size` close nothing worth a look: bodies at rest, say. */
-SADMM_INLINE bool lead_is_still(double size, double dt, double slop) { return dt * size <= LEAD_SLOP * slop / 2; }
+/* Leads of these sizes close nothing worth a look: bodies at rest, say. */
+SADMM_INLINE bool lead_is_still(const double size[2], double dt, double slop)
+{
+    return dt * (size[0] + size[1]) <= LEAD_SLOP * slop / 2;
+}
 
 /* Of a point whose leads are not still, by its gap, the speed at which it opens, and what the leads of a and b add to
  * that. Each of two bodies may close half of what is left, whatever the other one does. */
-SADMM_INLINE void lead_add_way(struct lead_touch *touch, double gap, double speed, const double lead[2], double size,
-                               double dt, double slop)
+SADMM_INLINE void lead_add_way(struct lead_touch *touch, double gap, double speed, const double lead[2],
+                               const double size[2], double dt, double slop)
 {
-    const double end = gap + dt * speed, room = (end > 0 ? end : 0) + fmax(LEAD_SHARE * dt * size, LEAD_SLOP * slop);
+    const double end = gap + dt * speed,
+                 room = (end > 0 ? end : 0) + fmax(LEAD_SHARE * dt * (size[0] + size[1]), LEAD_SLOP * slop);
     if (dt * (lead[0] + lead[1]) > room) touch->island |= TOUCH_JOLT;
     SADMM_UNROLL
     for (int s = 0; s < 2; ++s)
@@ -108,9 +119,9 @@ SADMM_INLINE void lead_add_way(struct lead_touch *touch, double gap, double spee
 
 /* Both. */
 SADMM_INLINE void lead_add_point(struct lead_touch *touch, double gap, double push, double speed, const double lead[2],
-                                 double size, double dt, double slop)
+                                 const double size[2], double dt, double slop)
 {
-    lead_add_push(touch, push);
+    lead_add_push(touch, push, size, dt, slop);
     if (!lead_is_still(size, dt, slop)) lead_add_way(touch, gap, speed, lead, size, dt, slop);
 }
 
