@@ -4,19 +4,6 @@
 
 #include "scene_tools.h"
 
-static inline void add_floor(sadmm_world *world, double friction)
-{
-    sadmm_body_def body = sadmm_body_def_default();
-    sadmm_shape_def shape = sadmm_shape_def_default();
-    sadmm_body_id id;
-    body.type = SADMM_BODY_STATIC;
-    body.environment = -1;
-    MUST(world, sadmm_world_add_body(world, &body, &id));
-    shape.type = SADMM_SHAPE_PLANE;
-    shape.friction = friction;
-    MUST(world, sadmm_world_add_shape(world, id, &shape, NULL));
-}
-
 /* A body of one shape, with its inertia; its orientation is that of the world. */
 static inline sadmm_body_id add_thrown(sadmm_world *world, sadmm_shape_type type, const double size[3],
                                        const sadmm_body_state *state, double mass, double friction,

@@ -85,19 +85,6 @@ static inline sadmm_body_id add_box(sadmm_world *world, double x, double y, doub
     return add_solid(world, SADMM_SHAPE_BOX, x, y, z, half, mass, friction);
 }
 
-static inline void add_ground(sadmm_world *world, double friction)
-{
-    sadmm_body_def body = sadmm_body_def_default();
-    sadmm_shape_def shape = sadmm_shape_def_default();
-    sadmm_body_id id;
-    body.type = SADMM_BODY_STATIC;
-    body.environment = -1;
-    MUST(world, sadmm_world_add_body(world, &body, &id));
-    shape.type = SADMM_SHAPE_PLANE;
-    shape.friction = friction;
-    MUST(world, sadmm_world_add_shape(world, id, &shape, NULL));
-}
-
 /* Towers of boxes that fall a little and land in different steps; every third one leans on its neighbour. */
 static inline sadmm_world *towers_on(int count, int height, double friction, int precision, int device)
 {
@@ -108,7 +95,7 @@ static inline sadmm_world *towers_on(int count, int height, double friction, int
     def.settings.iterations = EMULATED ? 23 : 35;
     def.settings.penalty_period = 10;
     sadmm_world *world = create_world(&def);
-    add_ground(world, friction);
+    add_floor(world, friction);
     for (int t = 0; t < count; ++t)
         for (int i = 0; i < height; ++i)
             add_box(world, t % 3 == 2 ? 0.5 * t - 0.29 : 0.5 * t, 0.01 * i, 0.1 + 0.002 * t + 0.201 * i, 0.1, 1 + i,

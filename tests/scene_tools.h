@@ -135,4 +135,18 @@ static inline double top_drift(sadmm_world *world, const sadmm_body_state *from)
     return top;
 }
 
+/* A static plane at z = 0 that bodies of all environments meet. */
+static inline void add_floor(sadmm_world *world, double friction)
+{
+    sadmm_body_def body = sadmm_body_def_default();
+    sadmm_shape_def shape = sadmm_shape_def_default();
+    sadmm_body_id id;
+    body.type = SADMM_BODY_STATIC;
+    body.environment = -1;
+    MUST(world, sadmm_world_add_body(world, &body, &id));
+    shape.type = SADMM_SHAPE_PLANE;
+    shape.friction = friction;
+    MUST(world, sadmm_world_add_shape(world, id, &shape, NULL));
+}
+
 #endif

@@ -416,7 +416,7 @@ static sadmm_world *tall_tower(int precision)
     def.backend = SADMM_BACKEND_CPU;
     def.precision = (sadmm_precision)precision;
     sadmm_world *world = create_world(&def);
-    add_ground(world, 0.5);
+    add_floor(world, 0.5);
     for (int i = 0; i < 26; ++i) add_box(world, 0, 0, 0.1 + 0.2 * i, 0.1, 1, 0.5);
     use_device(world, precision, 0);
     return world;
@@ -459,7 +459,7 @@ START_TEST(more_points_than_planned_with_a_stop_rule)
     def.settings.certificate_momentum_tolerance = precision == SADMM_F32 ? 1e-5 : 1e-6; /* f32: rounding is 1e-6 */
     def.settings.check_period = 5;
     sadmm_world *world = create_world(&def);
-    add_ground(world, 0.5);
+    add_floor(world, 0.5);
     for (int i = 0; i < 6; ++i) add_solid(world, SADMM_SHAPE_SPHERE, i, 0, 0.1, 0.1, 1, 0.5);
     add_box(world, 0, 2, 0.15, 0.1, 1, 0.5);
     use_device(world, precision, 0);
@@ -512,7 +512,7 @@ static sadmm_world *stopping_towers(int first, int count, double lift, int preci
     def.settings.certificate_momentum_tolerance = precision == SADMM_F32 ? 1e-5 : 1e-6; /* f32: rounding is 1e-6 */
     def.settings.check_period = check_period;
     sadmm_world *world = create_world(&def);
-    add_ground(world, 0.5);
+    add_floor(world, 0.5);
     for (int t = first; t < first + count; ++t)
         for (int i = 0; i < 3; ++i) /* equal, or the heavier the higher: they land together, and solve apart */
             add_box(world, 2.0 * t, 0.01 * i, 0.1 + lift + 0.201 * i, 0.1, t == 0 ? 1 : 1 + 20 * i, 0.5);

@@ -230,7 +230,7 @@ START_TEST(the_first_contact_comes_late)
         def.settings.iterations = 24;
         def.settings.substeps = 4;
         worlds[k] = create_world(&def);
-        add_ground(worlds[k], 0.5);
+        add_floor(worlds[k], 0.5);
         /* On an edge: the landing turns the box, and it is not held. A sub-step takes it 2.5 mm down. */
         const sadmm_body_id box = add_box(worlds[k], 0, 0, 0.19 + 0.0025 * (_i % 4), 0.1, 1, 0.5);
         sadmm_body_state state = body_state(worlds[k], box);
