@@ -957,7 +957,7 @@ START_TEST(every_pair_of_types_is_listed)
             const bool known = a >= 0 && b < SADMM_SHAPE_TYPE_COUNT;
             const bool listed = known && !(a == SADMM_SHAPE_PLANE && b == SADMM_SHAPE_PLANE);
             const struct sadmm_geometry a_is = geometry_of(a, size), b_is = geometry_of(b, size);
-            const struct pair_pose pose = {{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, {0.1, 0.1, 0.1}}; /* one in the other */
+            const struct pair_pose pose = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0.1, 0.1, 0.1}}; /* one in the other */
             struct manifold m;
             memset(&m, 0x55, sizeof m);
             pair_manifold(&a_is, &b_is, 0, &pose, 0, 0, &m);

@@ -12,8 +12,8 @@
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
 #include "config.h"
+#include "kernels.h"
 #include "pipeline.h"
-#include "narrow_phase.h"
 
 /* Fewer candidates a thread than this are not worth waking it. */
 enum { PAIRS_PER_THREAD = 256 };
@@ -36,6 +36,7 @@ sadmm_status sadmm_collision_create_with(const struct sadmm_broad_phase_kind *ki
     sadmm_status status;
     *out = NULL;
     if (!collision) return sadmm_fail_memory(error, "collision detection");
+    collision->kernels = sadmm_collision_kernels_find();
     status = sadmm_candidates_init(&collision->candidates, kind, error);
     if (status != SADMM_OK) {
         sadmm_free(collision);
@@ -143,7 +144,7 @@ static void find_share(void *argument, int thread, int threads)
     size_t begin, end;
     sadmm_share(f->collision->candidates.list.count, thread, threads, &begin, &end);
     out->pair_count = out->point_count = 0;
-    if (!sadmm_narrow_phase(&f->collision->candidates, f->input, begin, end, f->old, out))
+    if (!f->collision->kernels->narrow_phase(&f->collision->candidates, f->input, begin, end, f->old, out))
         atomic_store(&f->failed, true);
 }
 

@@ -21,7 +21,7 @@
 #ifndef SADMM_COLLISION_MANIFOLD_H
 #define SADMM_COLLISION_MANIFOLD_H
 
-#include "core/math/vec3.h"
+#include "row3.h"
 
 enum { SADMM_MANIFOLD_POINTS = 8 };
 
@@ -41,8 +41,8 @@ struct manifold {
 
 /* Pose of a in the frame of b. Rows of R: p_b = R p_a + t. */
 struct pair_pose {
-    mat3 R;
-    vec3 t;
+    row3 R[3];
+    row3 t;
 };
 
 /* How clearly the cached axis must be beaten: this share of the depth, and of the thinner shape's extent. */
@@ -82,10 +82,11 @@ SADMM_INLINE void manifold_add_between(struct manifold *m, vec3 pa, vec3 pb, uin
     manifold_add(m, v3_scale(v3_add(pa, pb), (real)0.5), v3_dot(m->normal, v3_sub(pb, pa)), feature);
 }
 
-SADMM_INLINE vec3 m3_column(const mat3 *m, int j)
+/* Where a's origin is, and its third axis. */
+SADMM_INLINE vec3 pose_origin(const struct pair_pose *pose) { return r3_vec3(pose->t); }
+SADMM_INLINE vec3 pose_axis(const struct pair_pose *pose)
 {
-    return j == 0 ? v3(m->r[0].x, m->r[1].x, m->r[2].x)
-                  : (j == 1 ? v3(m->r[0].y, m->r[1].y, m->r[2].y) : v3(m->r[0].z, m->r[1].z, m->r[2].z));
+    return v3(r3_vec3(pose->R[0]).z, r3_vec3(pose->R[1]).z, r3_vec3(pose->R[2]).z);
 }
 
 /* A direction (unit) in the upper 27 bits of a cache word: 9 bits a coordinate, to 0.2 degrees. */

@@ -25,8 +25,8 @@
 
 /* Separations of the axes and what became of them. Normals run from 1 to 2; negative: against the axis. */
 struct box_axes {
-    real separation[6];
-    int negative[6];
+    real separation[3 + ROW3];
+    unsigned negative;           /* bits, by axis */
     int cached;                  /* axis of the last step, -1: none */
     bool past;                   /* maybe past the midplane: sides follow the cached one */
     vec3 n_cached;               /* the normal of the last step, turned with the boxes */
@@ -36,6 +36,12 @@ struct box_axes {
     real s_edge;                 /* of `edge`, with the bonus of a cached axis */
     real keep;                   /* absolute part of the preferences */
 };
+
+/* Of a face axis, or the edge axis to choose from. */
+SADMM_INLINE int box_axis_negative(const struct box_axes *axes, int axis)
+{
+    return axis < 6 ? (int)(axes->negative >> axis & 1) : axes->edge_negative;
+}
 
 /* What an axis is given when it is the cached one. */
 SADMM_INLINE real box_bonus(const struct box_axes *axes, real separation)
@@ -66,32 +72,42 @@ SADMM_INLINE void box_recall(const struct box_pair *b, uint32_t cache, struct bo
     axes->past = v3_dot(axes->n_cached, v3_from_array(b->t)) < (real)0.5 * b->thin;
 }
 
+/* Separations along the face axes of a box of half extents h, from one of half extents `other` whose centre is at t: all
+ * along these axes. R: of the other's axes to them, by columns. */
+SADMM_INLINE row3 box_face_separations(row3 t, const real h[ROW3], const row3 R[3], const real other[ROW3])
+{
+    row3 shadows = r3_load(h);
+    int k;
+    for (k = 0; k < 3; ++k) shadows = r3_madd(shadows, other[k], r3_abs(R[k]));
+    return r3_sub(r3_abs(t), shadows);
+}
+
 /* Face axes; false when one separates the boxes. */
 SADMM_INLINE bool box_test_faces(struct box_pair *b, struct box_axes *axes)
 {
-    real *s = axes->separation, reject = b->limit + b->slack;
-    int i, j, axis;
+    const row3 t = r3_load(b->t), reject = r3_fill(b->limit + b->slack),
+               rows[3] = {r3_load(b->R[0]), r3_load(b->R[1]), r3_load(b->R[2])};
+    real *s = axes->separation;
+    row3 columns[3], t2, separations;
+    int axis;
 
-    for (i = 0; i < 3; ++i) {
-        s[i] = real_abs(b->t[i]) -
-               (b->h1[i] + b->Q[i][0] * b->h2[0] + b->Q[i][1] * b->h2[1] + b->Q[i][2] * b->h2[2]);
-        if (s[i] > reject) return false;
-        axes->negative[i] = b->t[i] < 0;
-    }
-    for (j = 0; j < 3; ++j) {
-        b->t2[j] = b->R[0][j] * b->t[0] + b->R[1][j] * b->t[1] + b->R[2][j] * b->t[2];
-        s[3 + j] = real_abs(b->t2[j]) -
-                   (b->h2[j] + b->Q[0][j] * b->h1[0] + b->Q[1][j] * b->h1[1] + b->Q[2][j] * b->h1[2]);
-        if (s[3 + j] > reject) return false;
-        axes->negative[3 + j] = b->t2[j] < 0;
-    }
+    r3_transpose(rows, columns);
+    separations = box_face_separations(t, b->h1, columns, b->h2);
+    if (r3_above(separations, reject)) return false;
+    r3_store(separations, s);
+    t2 = r3_madd(r3_madd(r3_scale(rows[0], b->t[0]), b->t[1], rows[1]), b->t[2], rows[2]);
+    separations = box_face_separations(t2, b->h2, rows, b->h1);
+    if (r3_above(separations, reject)) return false;
+    r3_store(separations, s + 3);
+    r3_store(t2, b->t2);
+    axes->negative = (unsigned)(r3_above(r3_fill(0), t) | r3_above(r3_fill(0), t2) << 3);
     if (axes->past)
         for (axis = 0; axis < 6; ++axis) {
             real d = axis < 3 ? b->t[axis] : b->t2[axis - 3];
             real c = v3_dot(box_axis_direction(b, axis, 0), axes->n_cached);
             if (s[axis] <= 0 && real_abs(c) > MANIFOLD_COS_OPPOSITE && c * d < 0) {
                 s[axis] -= 2 * real_abs(d);
-                axes->negative[axis] = c < 0;
+                axes->negative = (axes->negative & ~(1u << axis)) | (unsigned)(c < 0) << axis;
             }
         }
     axes->best_face = 0;
@@ -104,43 +120,63 @@ SADMM_INLINE bool box_test_faces(struct box_pair *b, struct box_axes *axes)
     return true;
 }
 
+/* The edge axis of edges i and j, by its separation s, not normalised, and (e_i x b_j) . t = d; false when it separates
+ * the boxes. */
+SADMM_INLINE bool box_test_edge(const struct box_pair *b, struct box_axes *axes, int i, int j, real s, real d)
+{
+    const int i1 = i == 2 ? 0 : i + 1, i2 = i1 == 2 ? 0 : i1 + 1, code = 6 + 3 * i + j;
+    const real length2 = b->R[i1][j] * b->R[i1][j] + b->R[i2][j] * b->R[i2][j];
+    real length;
+    int negative;
+
+    if (length2 < MANIFOLD_PARALLEL2) return true;
+    length = real_sqrt(length2);
+    s /= length;
+    if (s > b->limit) return false;
+    negative = d < 0;
+    if (axes->past && s <= 0) {
+        real c = v3_dot(box_edge_axis(b, i, j), axes->n_cached);
+        if (real_abs(c) > MANIFOLD_COS_OPPOSITE * length && c * d < 0) {
+            s -= 2 * real_abs(d) / length;
+            negative = c < 0;
+        }
+    }
+    if (code == axes->cached) s += box_bonus(axes, s);
+    if (s > axes->s_edge) {
+        axes->s_edge = s;
+        axes->edge = code;
+        axes->edge_negative = negative;
+    }
+    return true;
+}
+
 /* Edge axes that can beat the face; false when one separates the boxes. */
 SADMM_INLINE bool box_test_edges(const struct box_pair *b, struct box_axes *axes)
 {
-    real s_face = axes->separation[axes->face];
+    const real s_face = axes->separation[axes->face];
+    const row3 rows[3] = {r3_load(b->R[0]), r3_load(b->R[1]), r3_load(b->R[2])}, h2 = r3_load(b->h2),
+               slack = r3_fill(b->slack), face = r3_fill(s_face), zero = r3_fill(0);
     int i, j;
 
     for (i = 0; i < 3; ++i) {
-        int i1 = i == 2 ? 0 : i + 1, i2 = i1 == 2 ? 0 : i1 + 1;
-        for (j = 0; j < 3; ++j) {
-            int j1 = j == 2 ? 0 : j + 1, j2 = j1 == 2 ? 0 : j1 + 1, code = 6 + 3 * i + j, negative;
-            /* not normalised: (e_i x b_j) . t and the shadows of the boxes */
-            real d = b->t[i2] * b->R[i1][j] - b->t[i1] * b->R[i2][j];
-            real r = b->h1[i1] * b->Q[i2][j] + b->h1[i2] * b->Q[i1][j] + b->h2[j1] * b->Q[i][j2] +
-                     b->h2[j2] * b->Q[i][j1];
-            real s = real_abs(d) - r - b->slack, length2, length;
-            /* division by a length below 1 only makes it worse */
-            if (s <= s_face && s <= 0 && code != axes->cached) continue;
-            length2 = b->R[i1][j] * b->R[i1][j] + b->R[i2][j] * b->R[i2][j];
-            if (length2 < MANIFOLD_PARALLEL2) continue;
-            length = real_sqrt(length2);
-            s /= length;
-            if (s > b->limit) return false;
-            negative = d < 0;
-            if (axes->past && s <= 0) {
-                real c = v3_dot(box_edge_axis(b, i, j), axes->n_cached);
-                if (real_abs(c) > MANIFOLD_COS_OPPOSITE * length && c * d < 0) {
-                    s -= 2 * real_abs(d) / length;
-                    negative = c < 0;
-                }
-            }
-            if (code == axes->cached) s += box_bonus(axes, s);
-            if (s > axes->s_edge) {
-                axes->s_edge = s;
-                axes->edge = code;
-                axes->edge_negative = negative;
-            }
-        }
+        const int i1 = i == 2 ? 0 : i + 1, i2 = i1 == 2 ? 0 : i1 + 1;
+        const row3 own = r3_abs(rows[i]);
+        /* not normalised: (e_i x b_j) . t and the shadows of the boxes */
+        const row3 d = r3_sub(r3_scale(rows[i1], b->t[i2]), r3_scale(rows[i2], b->t[i1]));
+        const row3 shadows = r3_add(r3_add(r3_add(r3_scale(r3_abs(rows[i2]), b->h1[i1]),
+                                                  r3_scale(r3_abs(rows[i1]), b->h1[i2])),
+                                           r3_mul(r3_turn(h2), r3_turn_back(own))),
+                                    r3_mul(r3_turn_back(h2), r3_turn(own)));
+        const row3 s = r3_sub(r3_sub(r3_abs(d), shadows), slack);
+        /* division by a length below 1 only makes it worse */
+        int left = ~(r3_not_above(s, face) & r3_not_above(s, zero)) & 7;
+        real separations[ROW3], along[ROW3];
+        if (axes->cached >= 6 + 3 * i && axes->cached < 9 + 3 * i) left |= 1 << (axes->cached - 6 - 3 * i);
+        if (!left) continue;
+        r3_store(s, separations);
+        r3_store(d, along);
+        for (j = 0; j < 3; ++j)
+            if (left >> j & 1 && !box_test_edge(b, axes, i, j, separations[j], along[j])) return false;
     }
     return true;
 }
@@ -206,7 +242,7 @@ SADMM_INLINE bool box_corner_over_face(const struct box_pair *b, const struct bo
     int face = axes->best_face - 3, k, j;
     real n[3], x[3];
     if (face < 0) return false;
-    v3_to_array(box_axis_direction(b, axes->best_face, axes->negative[axes->best_face]), n);
+    v3_to_array(box_axis_direction(b, axes->best_face, box_axis_negative(axes, axes->best_face)), n);
     for (k = 0; k < 3; ++k) x[k] = (n[k] > 0 ? b->h1[k] : -b->h1[k]) - b->t[k];
     for (j = 0; j < 3; ++j)
         if (j != face && real_abs(x[0] * b->R[0][j] + x[1] * b->R[1][j] + x[2] * b->R[2][j]) > b->h2[j]) return false;
@@ -263,7 +299,7 @@ SADMM_INLINE void manifold_box_box(vec3 half1, vec3 half2, const struct pair_pos
         s = axes.s_edge;
     } else {
         axis = axes.face;
-        negative = axes.negative[axis];
+        negative = box_axis_negative(&axes, axis);
         s = axes.separation[axis];
     }
     edge_first = axes.edge >= 0 && axes.s_edge > axes.separation[axes.best_face];
@@ -295,7 +331,7 @@ SADMM_INLINE void manifold_box_box(vec3 half1, vec3 half2, const struct pair_pos
                     box_corner_manifold(&b, box_axis_direction(&b, axis, negative), m);
                     break;
                 }
-                negative = axis < 6 ? axes.negative[axis] : axes.edge_negative;
+                negative = box_axis_negative(&axes, axis);
                 continue;
             }
         } else if (m->count == 0 || m->points[m->count - 1].separation > b.limit + b.slack) {
@@ -303,11 +339,11 @@ SADMM_INLINE void manifold_box_box(vec3 half1, vec3 half2, const struct pair_pos
             if (turn == BOX_BETTER && axes.edge >= 0) {
                 turn = BOX_OTHER;
                 axis = edge_first ? axes.best_face : axes.edge;
-                negative = axis < 6 ? axes.negative[axis] : axes.edge_negative;
+                negative = box_axis_negative(&axes, axis);
                 continue;
             }
             axis = axes.best_face;
-            negative = axes.negative[axis];
+            negative = box_axis_negative(&axes, axis);
             m->cache = (uint32_t)(axis + 1) | (negative ? BOX_AXIS_NEGATIVE : 0u);
             /* Boxes that may be apart, by the angle of edges that count as parallel over the boxes' extents (slack
              * is those times 4 roundings): there may be nothing of the one over the face of the other. */

@@ -11,25 +11,20 @@
 enum { BOX_AXIS_MASK = 15, BOX_AXIS_NEGATIVE = 16 };
 
 struct box_pair {
-    real h1[3], h2[3];
-    real R[3][3]; /* axes of 2 in the frame of 1: columns */
-    real Q[3][3]; /* |R| */
-    real t[3];    /* centre of 2 in the frame of 1 */
-    real t2[3];   /* the same along the axes of 2 */
+    real h1[ROW3], h2[ROW3];
+    real R[3][ROW3]; /* axes of 2 in the frame of 1: columns */
+    real t[ROW3];    /* centre of 2 in the frame of 1 */
+    real t2[ROW3];   /* the same along the axes of 2 */
     real limit, thin, slack; /* slack: rounding of a separation */
 };
 
 SADMM_INLINE void box_pair_make(vec3 half1, vec3 half2, const struct pair_pose *pose, real limit, struct box_pair *b)
 {
-    int i, j;
-    v3_to_array(half1, b->h1);
-    v3_to_array(half2, b->h2);
-    v3_to_array(pose->R.r[0], b->R[0]);
-    v3_to_array(pose->R.r[1], b->R[1]);
-    v3_to_array(pose->R.r[2], b->R[2]);
-    v3_to_array(pose->t, b->t);
-    for (i = 0; i < 3; ++i)
-        for (j = 0; j < 3; ++j) b->Q[i][j] = real_abs(b->R[i][j]);
+    int i;
+    r3_store(r3_of(half1), b->h1);
+    r3_store(r3_of(half2), b->h2);
+    for (i = 0; i < 3; ++i) r3_store(pose->R[i], b->R[i]);
+    r3_store(pose->t, b->t);
     b->limit = limit;
     b->slack = 4 * SADMM_EPSILON * (b->h1[0] + b->h1[1] + b->h1[2] + b->h2[0] + b->h2[1] + b->h2[2]);
     b->thin = 2 * real_min(real_min(b->h1[0], real_min(b->h1[1], b->h1[2])),

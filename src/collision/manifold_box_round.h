@@ -67,7 +67,7 @@ SADMM_INLINE int box_core_face(const real lo[3], const real hi[3], const real h[
 SADMM_INLINE void manifold_sphere_box(real radius, vec3 h, const struct pair_pose *pose, real limit, uint32_t cache,
                                       struct manifold *m)
 {
-    vec3 c = pose->t, q = box_clamp(c, h), d = v3_sub(q, c);
+    vec3 c = pose_origin(pose), q = box_clamp(c, h), d = v3_sub(q, c);
     real size = radius + v3_max_abs(h), length = v3_norm(d);
     real p[3], hh[3], n_cached[3], s;
     int face;
@@ -275,7 +275,7 @@ SADMM_INLINE void manifold_segment_outside(real radius, real half, vec3 h, vec3 
 SADMM_INLINE void manifold_capsule_box(real radius, real half, vec3 h, const struct pair_pose *pose, real limit,
                                        uint32_t cache, struct manifold *m)
 {
-    vec3 p = pose->t, u = m3_column(&pose->R, 2), x, q;
+    vec3 p = pose_origin(pose), u = pose_axis(pose), x, q;
     real pa[3], ua[3], ha[3], length;
 
     v3_to_array(p, pa);

@@ -8,8 +8,8 @@
 /* Height over the plane of the origin of b's frame; n: the plane's normal in that frame. */
 SADMM_INLINE real plane_offset(const struct pair_pose *pose, vec3 *n)
 {
-    *n = m3_column(&pose->R, 2);
-    return -v3_dot(*n, pose->t);
+    *n = pose_axis(pose);
+    return -v3_dot(*n, pose_origin(pose));
 }
 
 SADMM_INLINE void manifold_plane_round_end(struct manifold *m, vec3 centre, real radius, real offset, real limit,

@@ -32,17 +32,18 @@ SADMM_INLINE void manifold_sphere_sphere(real ra, real rb, const struct pair_pos
                                          struct manifold *m)
 {
     /* concentric: every normal is right, take b's z */
-    direction_or(v3_neg(pose->t), ra + rb, v3(0, 0, 1), &m->normal);
-    manifold_add_balls(m, pose->t, ra, v3(0, 0, 0), rb, limit, 1);
+    const vec3 t = pose_origin(pose);
+    direction_or(v3_neg(t), ra + rb, v3(0, 0, 1), &m->normal);
+    manifold_add_balls(m, t, ra, v3(0, 0, 0), rb, limit, 1);
 }
 
 SADMM_INLINE void manifold_sphere_capsule(real ra, real rb, real half, const struct pair_pose *pose, real limit,
                                           struct manifold *m)
 {
-    vec3 c = v3(0, 0, real_clamp(pose->t.z, -half, half));
+    vec3 t = pose_origin(pose), c = v3(0, 0, real_clamp(t.z, -half, half));
     /* centre on the segment: any direction across it */
-    direction_or(v3_sub(c, pose->t), ra + rb, v3(1, 0, 0), &m->normal);
-    manifold_add_balls(m, pose->t, ra, c, rb, limit, 1);
+    direction_or(v3_sub(c, t), ra + rb, v3(1, 0, 0), &m->normal);
+    manifold_add_balls(m, t, ra, c, rb, limit, 1);
 }
 
 /* Closest points of the segments p + s u, |s| <= hp and q + t w, |t| <= hq (u, w unit). */
@@ -91,7 +92,7 @@ SADMM_INLINE real manifold_add_section(struct manifold *m, vec3 ca, real ra, vec
 SADMM_INLINE void manifold_capsule_capsule(real ra, real ha, real rb, real hb, const struct pair_pose *pose,
                                            real limit, uint32_t cache, struct manifold *m)
 {
-    vec3 u = m3_column(&pose->R, 2), w = v3(0, 0, 1), p = pose->t, cross = v3_cross(u, w), fallback = v3(1, 0, 0), d;
+    vec3 u = pose_axis(pose), w = v3(0, 0, 1), p = pose_origin(pose), cross = v3_cross(u, w), fallback = v3(1, 0, 0), d;
     vec3 ca, cb;
     real s, t, closest, sin2 = v3_norm2(cross), radii = ra + rb, size = radii + ha + hb;
 

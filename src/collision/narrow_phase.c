@@ -1,4 +1,4 @@
-#include "narrow_phase.h"
+#include "kernels.h"
 
 #include "core/base/memory.h"
 #include "contact_emit.h"
@@ -91,8 +91,8 @@ static bool find_children(struct narrow_phase *n, uint32_t a, uint32_t b)
     return true;
 }
 
-bool sadmm_narrow_phase(const struct sadmm_candidates *c, const struct sadmm_collision_input *input, size_t begin,
-                        size_t end, const struct sadmm_contact_set *old, struct sadmm_contact_set *out)
+static bool narrow_phase(const struct sadmm_candidates *c, const struct sadmm_collision_input *input, size_t begin,
+                         size_t end, const struct sadmm_contact_set *old, struct sadmm_contact_set *out)
 {
     struct narrow_phase n = {.candidates = c, .input = input, .old = old, .out = out,
                              .ratio = step_ratio(input->dt, old->dt)};
@@ -108,3 +108,5 @@ bool sadmm_narrow_phase(const struct sadmm_candidates *c, const struct sadmm_col
     }
     return true;
 }
+
+const struct sadmm_collision_kernels SADMM_COLLISION_KERNELS = {.narrow_phase = narrow_phase};

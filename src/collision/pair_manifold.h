@@ -17,17 +17,18 @@
  * row-major, shape to world. */
 SADMM_INLINE struct pair_pose pose_at(bool a_is_plane, const double Ra[9], const double d[3], const double Rb[9])
 {
-    double foot[3], R[9], t[3];
-    struct pair_pose pose;
-    int i, j;
+    const row3_double a0 = r3_load_three(Ra), a1 = r3_load_three(Ra + 3), a2 = r3_load_three(Ra + 6),
+                      b0 = r3_load_three(Rb), b1 = r3_load_three(Rb + 3), b2 = r3_load_three(Rb + 6);
     const double height = d[0] * Ra[2] + d[1] * Ra[5] + d[2] * Ra[8];
+    double foot[3];
+    struct pair_pose pose;
+    int i;
     for (i = 0; i < 3; ++i) foot[i] = a_is_plane ? height * Ra[3 * i + 2] : d[i];
-    for (i = 0; i < 3; ++i) {
-        for (j = 0; j < 3; ++j) R[3 * i + j] = Rb[i] * Ra[j] + Rb[3 + i] * Ra[3 + j] + Rb[6 + i] * Ra[6 + j];
-        t[i] = Rb[i] * foot[0] + Rb[3 + i] * foot[1] + Rb[6 + i] * foot[2];
-    }
-    for (i = 0; i < 3; ++i) pose.R.r[i] = v3((real)R[3 * i], (real)R[3 * i + 1], (real)R[3 * i + 2]);
-    pose.t = v3((real)t[0], (real)t[1], (real)t[2]);
+    for (i = 0; i < 3; ++i)
+        pose.R[i] = r3_round(
+            r3_madd_double(r3_madd_double(r3_scale_double(a0, Rb[i]), Rb[3 + i], a1), Rb[6 + i], a2));
+    pose.t = r3_round(
+        r3_madd_double(r3_madd_double(r3_scale_double(b0, foot[0]), foot[1], b1), foot[2], b2));
     return pose;
 }
 
