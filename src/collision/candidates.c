@@ -153,10 +153,13 @@ static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision
     geometry = &input->geometries[shape->geometry];
     plane = geometry->type == SADMM_SHAPE_PLANE;
     kind = plane ? SLOT_PRESENT | SLOT_PLANE : SLOT_PRESENT;
-    proxy_place(shape, geometry, body, input->dt, input->margin, input->gravity, &c->proxies[slot], &c->boxes[slot]);
+    proxy_place(shape, geometry, body, input->dt, input->margin, input->gravity, &c->proxies[slot],
+                &c->boxes[slot].box);
+    c->boxes[slot].of_plane = plane;
+    if (!plane) swept_box_make(c->proxies[slot].velocity, input->dt, &c->boxes[slot]);
     c->state[slot] = kind;
     if (same && (plane ? plane_stays(entry, &c->proxies[slot])
-                       : stays(entry, &c->boxes[slot], &c->proxies[slot], input)))
+                       : stays(entry, &c->boxes[slot].box, &c->proxies[slot], input)))
         return;
     c->state[slot] = (unsigned char)(kind | SLOT_LEFT);
     *seen = now;
@@ -169,7 +172,7 @@ static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision
             entry->box.hi[k] = c->proxies[slot].R[3 * k + 2];
         }
     } else {
-        enlarge(&c->boxes[slot], &c->proxies[slot], input, &entry->box);
+        enlarge(&c->boxes[slot].box, &c->proxies[slot], input, &entry->box);
     }
 }
 

@@ -31,7 +31,7 @@ struct sadmm_candidates {
 
     /* by shape slot */
     struct sadmm_proxy *proxies;
-    struct sadmm_box3 *boxes;
+    struct sadmm_swept_box *boxes;
     struct sadmm_broad_entry *entries;
     struct sadmm_seen *seen;
     unsigned char *state; /* SLOT_ flags of the step */
@@ -61,11 +61,10 @@ sadmm_status sadmm_candidates_update(struct sadmm_candidates *c, const struct sa
 SADMM_INLINE bool sadmm_candidate_meets(const struct sadmm_candidates *c, const struct sadmm_collision_input *input,
                                         uint32_t a, uint32_t b)
 {
-    if (c->proxies[a].geometry.type == SADMM_SHAPE_PLANE)
-        return proxy_plane_meets(&c->proxies[a], &c->boxes[b],
+    if (c->boxes[a].of_plane)
+        return proxy_plane_meets(&c->proxies[a], &c->boxes[b].box,
                                  proxy_plane_reach(&c->proxies[b], input->margin, fall_of(input->gravity, input->dt)));
-    return boxes_overlap(&c->boxes[a], &c->boxes[b]) &&
-           boxes_meet(&c->boxes[a], c->proxies[a].velocity, &c->boxes[b], c->proxies[b].velocity, input->dt);
+    return swept_boxes_meet(&c->boxes[a], &c->boxes[b]);
 }
 
 #endif
