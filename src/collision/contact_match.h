@@ -70,14 +70,16 @@ SADMM_INLINE uint32_t contact_memory(const struct sadmm_contact_pair *old, const
 SADMM_INLINE void impulse_carry(const double old_normal[3], const double old_impulse[3], const double normal[3],
                                 double friction, double ratio, double out[3])
 {
-    double turned = 0, along = 0, back = 0, size = 0, limit, scale, t[3], impulse[3];
+    double turned = 0, along = 0, back = 0, size = 0, limit, shorter, scale, t[3], impulse[3];
+    bool carries;
     int k;
     for (k = 0; k < 3; ++k) {
         impulse[k] = ratio * old_impulse[k];
         turned += old_normal[k] * normal[k];
         along += old_normal[k] * impulse[k];
     }
-    if (turned <= 0 || along <= 0) return;
+    /* No branches: which points press, and which of them slide, has no order that a processor could foresee. */
+    carries = !((turned <= 0) | (along <= 0));
     for (k = 0; k < 3; ++k) {
         t[k] = impulse[k] - along * old_normal[k];
         back += t[k] * normal[k];
@@ -88,8 +90,9 @@ SADMM_INLINE void impulse_carry(const double old_normal[3], const double old_imp
     }
     size = sqrt(size);
     limit = friction * along;
-    scale = size > limit ? limit / size : 1;
-    for (k = 0; k < 3; ++k) out[k] = along * normal[k] + scale * t[k];
+    shorter = limit / size;
+    scale = size > limit ? shorter : 1;
+    for (k = 0; k < 3; ++k) out[k] = carries ? along * normal[k] + scale * t[k] : out[k];
 }
 
 /* Of the points of the old pair the one of this feature, -1: none. A feature occurs once in a manifold; `guess`: its
