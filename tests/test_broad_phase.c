@@ -445,7 +445,8 @@ START_TEST(what_accelerations_bring_together_is_foreseen)
             touch_without = touch_without || w <= sum + margin * fmin(proxy[0].thin, proxy[1].thin);
         }
         if (!touch) continue;
-        ck_assert_double_le(gap, proxy_limit(&proxy[0], &proxy[1], margin, gravity, dt));
+        ck_assert_double_le(gap, proxy_limit(&proxy[0], &proxy[1], relative_speed(proxy[0].velocity, proxy[1].velocity),
+                                             margin, gravity, dt));
         if (plane)
             ck_assert(
                 proxy_plane_meets(&proxy[0], &box[1], proxy_plane_reach(&proxy[1], margin, fall_of(gravity, dt))));

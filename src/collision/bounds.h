@@ -46,13 +46,19 @@ SADMM_INLINE double own_fall(const double acceleration[2], double reach, double 
     return fall_of(acceleration[0], dt) + (turn < 2 ? turn : 2) * reach;
 }
 
-/* Distance up to which a pair makes contacts, m. spin: rotation_sweep; fall: own_fall; gravity: fall_of it. */
-SADMM_INLINE double pair_limit(double margin, double thin_a, double thin_b, const double va[3], const double vb[3],
-                               double spin_a, double spin_b, double fall_a, double fall_b, double gravity, double dt)
+SADMM_INLINE double relative_speed(const double va[3], const double vb[3])
 {
     double x = vb[0] - va[0], y = vb[1] - va[1], z = vb[2] - va[2];
+    return sqrt(x * x + y * y + z * z);
+}
+
+/* Distance up to which a pair makes contacts, m. speed: relative_speed; spin: rotation_sweep; fall: own_fall; gravity:
+ * fall_of it. */
+SADMM_INLINE double pair_limit(double margin, double thin_a, double thin_b, double speed, double spin_a, double spin_b,
+                               double fall_a, double fall_b, double gravity, double dt)
+{
     double least = margin * (thin_a < thin_b ? thin_a : thin_b), fall = gravity + fall_a + fall_b;
-    return (least > fall ? least : fall) + sqrt(x * x + y * y + z * z) * dt + spin_a + spin_b;
+    return (least > fall ? least : fall) + speed * dt + spin_a + spin_b;
 }
 
 /* A shape's part of max(margin x thinner extent, fall), m. */

@@ -37,11 +37,9 @@ SADMM_INLINE quat turned(quat q, const double angular[3], double ahead)
     return q_normalize(q_mul(turn, q));
 }
 
-/* How far on the centres of mass of a pair are moved, s, by the velocities va and vb. thin: the thinner shape's
- * extent. */
-SADMM_INLINE double move_ahead(const double va[3], const double vb[3], double thin, double dt)
+/* How far on the centres of mass of a pair are moved, s. speed: relative_speed; thin: the thinner shape's extent. */
+SADMM_INLINE double move_ahead(double speed, double thin, double dt)
 {
-    const double x = vb[0] - va[0], y = vb[1] - va[1], z = vb[2] - va[2], speed = sqrt(x * x + y * y + z * z);
     return 0.5 * speed * dt > MIDWAY_TRAVEL * thin ? MIDWAY_TRAVEL * thin / speed : 0.5 * dt;
 }
 

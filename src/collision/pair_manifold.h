@@ -73,7 +73,8 @@ SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const stru
 SADMM_INLINE void find_manifold(const struct sadmm_proxy *a, const struct sadmm_proxy *b, uint32_t child, double margin,
                                 double gravity, double dt, uint32_t cache, struct manifold *m)
 {
-    double ahead = proxy_ahead(a, b, dt), limit = proxy_limit(a, b, margin, gravity, dt);
+    const double speed = relative_speed(a->velocity, b->velocity);
+    double ahead = proxy_ahead(a, b, speed, dt), limit = proxy_limit(a, b, speed, margin, gravity, dt);
     struct advance state = {0, false};
     bool moves_on = advance_needed(ahead, dt);
     for (;;) {
@@ -83,7 +84,7 @@ SADMM_INLINE void find_manifold(const struct sadmm_proxy *a, const struct sadmm_
                       m);
         if (last) break;
         moves_on = advance_pair(a, b, &pose, m, dt, &state, &ahead);
-        if (state.missed) limit = proxy_near(a, b, margin, gravity, dt);
+        if (state.missed) limit = proxy_limit(a, b, 0, margin, gravity, dt);
     }
     m->ahead = ahead;
 }

@@ -77,26 +77,17 @@ SADMM_INLINE double proxy_plane_reach(const struct sadmm_proxy *p, double margin
     return shape_reach(margin, p->thin, 0, gravity);
 }
 
-/* pair_limit of two shapes. */
-SADMM_INLINE double proxy_limit(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double margin, double gravity,
-                                double dt)
+/* pair_limit of two shapes. speed: relative_speed; 0 where they come near without touching. */
+SADMM_INLINE double proxy_limit(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double speed, double margin,
+                                double gravity, double dt)
 {
-    return pair_limit(margin, a->thin, b->thin, a->velocity, b->velocity, a->spin, b->spin, a->fall, b->fall,
-                      fall_of(gravity, dt), dt);
-}
-
-/* pair_limit of what comes near without touching: margin, fall and rotation. */
-SADMM_INLINE double proxy_near(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double margin, double gravity,
-                               double dt)
-{
-    return pair_limit(margin, a->thin, b->thin, a->velocity, a->velocity, a->spin, b->spin, a->fall, b->fall,
-                      fall_of(gravity, dt), dt);
+    return pair_limit(margin, a->thin, b->thin, speed, a->spin, b->spin, a->fall, b->fall, fall_of(gravity, dt), dt);
 }
 
 /* move_ahead of two shapes. */
-SADMM_INLINE double proxy_ahead(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double dt)
+SADMM_INLINE double proxy_ahead(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double speed, double dt)
 {
-    return move_ahead(a->velocity, b->velocity, a->thin < b->thin ? a->thin : b->thin, dt);
+    return move_ahead(speed, a->thin < b->thin ? a->thin : b->thin, dt);
 }
 
 /* What b moves relative to a in `ahead` seconds, m; 0 where velocities are so large that they leave no time. */
