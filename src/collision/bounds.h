@@ -82,18 +82,13 @@ SADMM_INLINE void shape_box(const double centre[3], const double extent[3], doub
     }
 }
 
-/* Along one axis: do a, at rest, and b, in motion relative to it, come together? Both without their own sweeps. Without
- * a branch: most pairs that are asked about are as likely to meet as not. */
-SADMM_INLINE int intervals_come_together(double lo_a, double hi_a, double lo_b, double hi_b, double relative)
-{
-    return (lo_a <= hi_b + upward(relative)) & (lo_b + downward(relative) <= hi_a);
-}
-
-/* The same with their sweeps, which are taken off first. */
+/* Along one axis: do a, at rest, and b, in motion relative to it, come together? Own sweeps are taken off the boxes
+ * first. */
 SADMM_INLINE int intervals_meet(double lo_a, double hi_a, double lo_b, double hi_b, double sweep_a, double sweep_b)
 {
-    return intervals_come_together(lo_a - downward(sweep_a), hi_a - upward(sweep_a), lo_b - downward(sweep_b),
-                                   hi_b - upward(sweep_b), sweep_b - sweep_a);
+    double relative = sweep_b - sweep_a;
+    return lo_a - downward(sweep_a) <= hi_b - upward(sweep_b) + upward(relative) &&
+           lo_b - downward(sweep_b) + downward(relative) <= hi_a - upward(sweep_a);
 }
 
 /* Do two shapes whose boxes overlap come together within the step? Two that move alike sweep over the same places and
@@ -110,35 +105,6 @@ SADMM_INLINE int boxes_overlap(const struct sadmm_box3 *a, const struct sadmm_bo
 {
     return a->lo[0] <= b->hi[0] && b->lo[0] <= a->hi[0] && a->lo[1] <= b->hi[1] && b->lo[1] <= a->hi[1] &&
            a->lo[2] <= b->hi[2] && b->lo[2] <= a->hi[2];
-}
-
-/* A box with what the test of a pair needs of it, side by side: boxes_overlap and boxes_meet without what depends on one
- * shape alone. */
-struct sadmm_swept_box {
-    struct sadmm_box3 box, still; /* still: without its sweep */
-    double sweep[3];
-    int64_t of_plane; /* planes have no box */
-};
-
-SADMM_INLINE void swept_box_make(const double velocity[3], double dt, struct sadmm_swept_box *s)
-{
-    int k;
-    for (k = 0; k < 3; ++k) {
-        s->sweep[k] = velocity[k] * dt;
-        s->still.lo[k] = s->box.lo[k] - downward(s->sweep[k]);
-        s->still.hi[k] = s->box.hi[k] - upward(s->sweep[k]);
-    }
-}
-
-/* boxes_overlap and boxes_meet. */
-SADMM_INLINE int swept_boxes_meet(const struct sadmm_swept_box *a, const struct sadmm_swept_box *b)
-{
-    int k, meet = 1;
-    for (k = 0; k < 3; ++k)
-        meet &= (a->box.lo[k] <= b->box.hi[k]) & (b->box.lo[k] <= a->box.hi[k]) &
-                intervals_come_together(a->still.lo[k], a->still.hi[k], b->still.lo[k], b->still.hi[k],
-                                        b->sweep[k] - a->sweep[k]);
-    return meet;
 }
 
 #endif

@@ -13,6 +13,7 @@
 #include "broad_phase.h"
 #include "collision.h"
 #include "proxy.h"
+#include "swept_box.h"
 
 /* What decides whether a shape's entry in the broad phase is still the same. Planes have no entry. */
 struct sadmm_seen {

@@ -27,9 +27,9 @@ static void emit(const struct sadmm_candidates *c, const struct sadmm_collision_
     }
 }
 
-static bool is_disabled(const struct sadmm_collision_input *input, const struct sadmm_proxy *a,
-                        const struct sadmm_proxy *b)
+static bool is_disabled(const struct sadmm_collision_input *input, uint64_t shapes)
 {
+    const struct sadmm_shape *a = &input->shapes[shapes >> 32], *b = &input->shapes[shapes & UINT32_MAX];
     return input->disabled_body_pair_count &&
            find_key(input->disabled_body_pairs, (int64_t)input->disabled_body_pair_count,
                     unordered_key((uint32_t)a->body, (uint32_t)b->body)) >= 0;
@@ -102,7 +102,7 @@ static size_t list_meeting(const struct sadmm_candidates *c, const struct sadmm_
         const uint64_t key = c->list.keys[i];
         const uint32_t a = (uint32_t)(key >> 32), b = (uint32_t)key;
         keys[count] = key;
-        count += (sadmm_candidate_meets(c, input, a, b) && !is_disabled(input, &c->proxies[a], &c->proxies[b]));
+        count += sadmm_candidate_meets(c, input, a, b);
     }
     return count;
 }
@@ -120,7 +120,7 @@ static bool narrow_phase(const struct sadmm_candidates *c, const struct sadmm_co
         const size_t last = end - begin < MOST_LISTED ? end : begin + MOST_LISTED,
                      count = list_meeting(c, input, begin, last, keys);
         for (size_t i = 0; i < count; ++i)
-            if (!find_children(&n, (uint32_t)(keys[i] >> 32), (uint32_t)keys[i])) return false;
+            if (!is_disabled(input, keys[i]) && !find_children(&n, (uint32_t)(keys[i] >> 32), (uint32_t)keys[i])) return false;
         begin = last;
     }
     return true;

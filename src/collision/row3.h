@@ -38,6 +38,9 @@ SADMM_INLINE row3 r3_abs(row3 a) { return (row3)((row3_mask)a & INT64_MAX); }
 /* (y, z, x) and (z, x, y) */
 SADMM_INLINE row3 r3_turn(row3 a) { return __builtin_shufflevector(a, a, 1, 2, 0, 3); }
 SADMM_INLINE row3 r3_turn_back(row3 a) { return __builtin_shufflevector(a, a, 2, 0, 1, 3); }
+/* The parts that go down, and up (bounds.h). */
+SADMM_INLINE row3 r3_downward(row3 a) { return _mm256_min_pd(a, r3_fill(0)); }
+SADMM_INLINE row3 r3_upward(row3 a) { return _mm256_max_pd(a, r3_fill(0)); }
 /* Bit k: where a's number k is above b's, and is not above. */
 SADMM_INLINE int r3_above(row3 a, row3 b) { return _mm256_movemask_pd((row3)(a > b)) & 7; }
 SADMM_INLINE int r3_not_above(row3 a, row3 b) { return _mm256_movemask_pd((row3)(a <= b)) & 7; }
@@ -83,6 +86,8 @@ SADMM_INLINE row3 r3_madd(row3 a, real s, row3 b) { return v3_madd(a, s, b); }
 SADMM_INLINE row3 r3_abs(row3 a) { return v3(real_abs(a.x), real_abs(a.y), real_abs(a.z)); }
 SADMM_INLINE row3 r3_turn(row3 a) { return v3(a.y, a.z, a.x); }
 SADMM_INLINE row3 r3_turn_back(row3 a) { return v3(a.z, a.x, a.y); }
+SADMM_INLINE row3 r3_downward(row3 a) { return v3(a.x < 0 ? a.x : 0, a.y < 0 ? a.y : 0, a.z < 0 ? a.z : 0); }
+SADMM_INLINE row3 r3_upward(row3 a) { return v3(a.x > 0 ? a.x : 0, a.y > 0 ? a.y : 0, a.z > 0 ? a.z : 0); }
 SADMM_INLINE int r3_above(row3 a, row3 b) { return (a.x > b.x) | (a.y > b.y) << 1 | (a.z > b.z) << 2; }
 SADMM_INLINE int r3_not_above(row3 a, row3 b) { return (a.x <= b.x) | (a.y <= b.y) << 1 | (a.z <= b.z) << 2; }
 SADMM_INLINE void r3_transpose(const row3 rows[3], row3 columns[3])
