@@ -22,7 +22,18 @@ struct sadmm_seen {
     bool alive, moves;
 };
 
+/* What became of a slot. */
+enum {
+    SLOT_PRESENT = 1,
+    SLOT_LEFT = 2, /* its box left the larger one, or the entry changed */
+    SLOT_PLANE = 4,
+    SLOT_REFUSED = 8 /* sadmm_collision_check_shape says why */
+};
+
+struct sadmm_collision_kernels;
+
 struct sadmm_candidates {
+    const struct sadmm_collision_kernels *kernels; /* of the machine's instruction set */
     const struct sadmm_broad_phase_kind *kind;
     struct sadmm_broad_phase *broad_phase;
     bool broad_phase_valid; /* it holds every present entry */

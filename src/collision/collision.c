@@ -36,7 +36,6 @@ sadmm_status sadmm_collision_create_with(const struct sadmm_broad_phase_kind *ki
     sadmm_status status;
     *out = NULL;
     if (!collision) return sadmm_fail_memory(error, "collision detection");
-    collision->kernels = sadmm_collision_kernels_find();
     status = sadmm_candidates_init(&collision->candidates, kind, error);
     if (status != SADMM_OK) {
         sadmm_free(collision);
@@ -144,7 +143,7 @@ static void find_share(void *argument, int thread, int threads)
     size_t begin, end;
     sadmm_share(f->collision->candidates.list.count, thread, threads, &begin, &end);
     out->pair_count = out->point_count = 0;
-    if (!f->collision->kernels->narrow_phase(&f->collision->candidates, f->input, begin, end, f->old, out))
+    if (!f->collision->candidates.kernels->narrow_phase(&f->collision->candidates, f->input, begin, end, f->old, out))
         atomic_store(&f->failed, true);
 }
 

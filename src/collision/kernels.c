@@ -2,10 +2,17 @@
 
 #include "config.h"
 
-const struct sadmm_collision_kernels *sadmm_collision_kernels_find(void)
+const struct sadmm_collision_kernels *sadmm_collision_kernels_at(int index)
 {
+    static const struct sadmm_collision_kernels variants[] = {
 #ifdef SADMM_HAVE_ISA_AVX2
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return &sadmm_collision_kernels_avx2;
+        {"avx2", sadmm_place_slots_avx2, sadmm_narrow_phase_avx2},
 #endif
-    return &sadmm_collision_kernels_baseline;
+        {"baseline", sadmm_place_slots_baseline, sadmm_narrow_phase_baseline},
+    };
+    const int count = (int)(sizeof variants / sizeof *variants);
+#ifdef SADMM_HAVE_ISA_AVX2
+    if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma")) ++index; /* compiled for both */
+#endif
+    return index < count ? &variants[index] : NULL;
 }

@@ -107,8 +107,9 @@ static size_t list_meeting(const struct sadmm_candidates *c, const struct sadmm_
     return count;
 }
 
-static bool narrow_phase(const struct sadmm_candidates *c, const struct sadmm_collision_input *input, size_t begin,
-                         size_t end, const struct sadmm_contact_set *old, struct sadmm_contact_set *out)
+bool SADMM_COLLISION_KERNEL(narrow_phase)(const struct sadmm_candidates *c, const struct sadmm_collision_input *input,
+                                          size_t begin, size_t end, const struct sadmm_contact_set *old,
+                                          struct sadmm_contact_set *out)
 {
     struct narrow_phase n = {.candidates = c, .input = input, .old = old, .out = out,
                              .ratio = step_ratio(input->dt, old->dt)};
@@ -125,5 +126,3 @@ static bool narrow_phase(const struct sadmm_candidates *c, const struct sadmm_co
     }
     return true;
 }
-
-const struct sadmm_collision_kernels SADMM_COLLISION_KERNELS = {.narrow_phase = narrow_phase};

@@ -5,7 +5,6 @@
 #include "candidates.h"
 
 struct sadmm_collision {
-    const struct sadmm_collision_kernels *kernels;
     struct sadmm_candidates candidates;
     /* The set before the last find, to undo it; the next find writes here. Finds again write to `between`, from the
      * set that they replace. */
