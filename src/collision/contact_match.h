@@ -70,7 +70,7 @@ SADMM_INLINE uint32_t contact_memory(const struct sadmm_contact_pair *old, const
 SADMM_INLINE void impulse_carry(const double old_normal[3], const double old_impulse[3], const double normal[3],
                                 double friction, double ratio, double out[3])
 {
-    double turned = 0, along = 0, back = 0, size = 0, limit, shorter, scale, t[3], impulse[3];
+    double turned = 0, along = 0, back = 0, size = 0, slides, scale, t[3], impulse[3];
     bool carries;
     int k;
     for (k = 0; k < 3; ++k) {
@@ -89,9 +89,8 @@ SADMM_INLINE void impulse_carry(const double old_normal[3], const double old_imp
         size += t[k] * t[k];
     }
     size = sqrt(size);
-    limit = friction * along;
-    shorter = limit / size;
-    scale = size > limit ? shorter : 1;
+    slides = friction * along / size;
+    scale = slides < 1 ? slides : 1;
     for (k = 0; k < 3; ++k) out[k] = carries ? along * normal[k] + scale * t[k] : out[k];
 }
 
