@@ -87,7 +87,7 @@ SADMM_INLINE bool box_test_faces(struct box_pair *b, struct box_axes *axes)
 {
     const row3 t = r3_load(b->t), reject = r3_fill(b->limit + b->slack),
                rows[3] = {r3_load(b->R[0]), r3_load(b->R[1]), r3_load(b->R[2])};
-    real *s = axes->separation;
+    real *s = axes->separation, most;
     row3 columns[3], t2, separations;
     int axis;
 
@@ -111,8 +111,10 @@ SADMM_INLINE bool box_test_faces(struct box_pair *b, struct box_axes *axes)
             }
         }
     axes->best_face = 0;
-    for (axis = 1; axis < 6; ++axis)
-        if (s[axis] > s[axes->best_face]) axes->best_face = axis;
+    for (axis = 1, most = s[0]; axis < 6; ++axis) { /* without a branch: any may be the best one */
+        axes->best_face ^= (axes->best_face ^ axis) & -(s[axis] > most);
+        most = real_max(s[axis], most);
+    }
     axes->face = axes->best_face;
     if (axes->cached >= 0 && axes->cached < 6 &&
         s[axes->face] <= s[axes->cached] + box_bonus(axes, s[axes->cached]))

@@ -10,29 +10,38 @@
 /* A vertex of the clipped polygon: in-plane coordinates and separation, and the edge that leaves it: 0-3 edge of the
  * incident face, 4-7 side of the reference face (+u, -u, +v, -v). */
 struct clip_vertex {
-    real x, y, z;
+    real at[ROW3]; /* x, y, z */
     int out;
 };
 
-/* Keep the part of the polygon with sign * coordinate <= h. */
-SADMM_INLINE int clip_side(const struct clip_vertex *in, int count, int along_y, real sign, real h, real tolerance,
-                           int label, struct clip_vertex *out)
+/* What a polygon takes in memory: at most ten vertices, and the first one once more. */
+enum { CLIP_VERTICES = 12 };
+
+/* Keep the part of the polygon with sign * coordinate <= h. Which vertices stay has no order that a processor could
+ * foresee: it writes both the vertex and the crossing, and then counts what stays. */
+SADMM_INLINE int clip_side(struct clip_vertex *in, int count, int axis, real sign, real h, real tolerance, int label,
+                           struct clip_vertex *out)
 {
+    real dp = sign * in[0].at[axis] - h;
     int i, n = 0;
-    for (i = 0; i < count; ++i) {
-        const struct clip_vertex *p = &in[i], *q = &in[i + 1 < count ? i + 1 : 0];
-        real dp = sign * (along_y ? p->y : p->x) - h, dq = sign * (along_y ? q->y : q->x) - h;
-        bool inside = dp <= tolerance;
-        if (n > SADMM_MANIFOLD_POINTS) break;
-        if (inside) out[n++] = *p;
-        if (inside != (dq <= tolerance)) {
-            real f = real_clamp(dp / (dp - dq), 0, 1);
-            struct clip_vertex *c = &out[n++];
-            c->x = p->x + f * (q->x - p->x);
-            c->y = p->y + f * (q->y - p->y);
-            c->z = p->z + f * (q->z - p->z);
-            c->out = inside ? label : p->out;
+    in[count] = in[0];
+    for (i = 0; i < count && n <= SADMM_MANIFOLD_POINTS; ++i) {
+        const real dq = sign * in[i + 1].at[axis] - h;
+        const int inside = dp <= tolerance, crosses = inside ^ (dq <= tolerance), leaves = in[i].out;
+        const row3 p = r3_load(in[i].at);
+        r3_store(p, out[n].at);
+        out[n].out = leaves;
+        n += inside;
+#ifdef __CUDA_ARCH__
+        if (crosses) /* a division there is long */
+#endif
+        {
+            const real f = real_min(1, real_max(0, dp / (dp - dq)));
+            r3_store(r3_madd(p, f, r3_sub(r3_load(in[i + 1].at), p)), out[n].at);
+            out[n].out = leaves ^ ((leaves ^ label) & -inside);
         }
+        n += crosses;
+        dp = dq;
     }
     return n;
 }
@@ -52,7 +61,7 @@ SADMM_INLINE void box_clip_face(const real hr[3], const real hi[3], const real R
 {
     int first = m->count;
     int u = k == 2 ? 0 : k + 1, v = u == 2 ? 0 : u + 1, j = 0, ju, jv, q, i, count = 4, base_bits, ref_bits;
-    struct clip_vertex poly[12], other[12];
+    struct clip_vertex poly[CLIP_VERTICES], other[CLIP_VERTICES];
     int bits[4];
     real si, cx, cy, cz, ux, uy, uz, vx, vy, vz, tol_u, tol_v, tol_z;
     bool clip_u = false, clip_v = false;
@@ -79,15 +88,14 @@ SADMM_INLINE void box_clip_face(const real hr[3], const real hi[3], const real R
         /* around the face: (+,+), (-,+), (-,-), (+,-) */
         int pu = q == 0 || q == 3, pv = q < 2;
         real a = pu ? (real)1 : (real)-1, b = pv ? (real)1 : (real)-1;
-        poly[q].x = cx + a * ux + b * vx;
-        poly[q].y = cy + a * uy + b * vy;
-        poly[q].z = cz + a * uz + b * vz;
-        poly[q].x -= lean.u * poly[q].z;
-        poly[q].y -= lean.v * poly[q].z;
+        real x = cx + a * ux + b * vx, y = cy + a * uy + b * vy, z = cz + a * uz + b * vz;
+        x -= lean.u * z;
+        y -= lean.v * z;
+        r3_store(r3_of(v3(x, y, z)), poly[q].at);
         poly[q].out = q;
         bits[q] = base_bits | (pu ? 1 << ju : 0) | (pv ? 1 << jv : 0);
-        clip_u = clip_u || real_abs(poly[q].x) > hr[u] + tol_u;
-        clip_v = clip_v || real_abs(poly[q].y) > hr[v] + tol_v;
+        clip_u |= real_abs(x) > hr[u] + tol_u;
+        clip_v |= real_abs(y) > hr[v] + tol_v;
     }
     if (clip_u) {
         count = clip_side(poly, count, 0, 1, hr[u], tol_u, 4, other);
@@ -101,11 +109,11 @@ SADMM_INLINE void box_clip_face(const real hr[3], const real hi[3], const real R
         const struct clip_vertex *p = &poly[i];
         int in = poly[i > 0 ? i - 1 : count - 1].out, out = p->out, d;
         uint32_t feature;
-        real position[3], separation = p->z / lean.cosine;
+        real position[3], separation = p->at[2] / lean.cosine;
         bool duplicate = false;
         /* on a corner of the reference face? */
-        bool corner = real_abs(real_abs(p->x) - hr[u]) <= tol_u && real_abs(real_abs(p->y) - hr[v]) <= tol_v;
-        int corner_bits = ref_bits | (p->x > 0 ? 1 << u : 0) | (p->y > 0 ? 1 << v : 0);
+        bool corner = (real_abs(real_abs(p->at[0]) - hr[u]) <= tol_u) & (real_abs(real_abs(p->at[1]) - hr[v]) <= tol_v);
+        int corner_bits = ref_bits | (p->at[0] > 0 ? 1 << u : 0) | (p->at[1] > 0 ? 1 << v : 0);
         if (separation > limit) continue;
         if (in < 4 && out < 4) {
             /* vertex of the incident box; where two coincide the id is that of box 1's */
@@ -130,17 +138,16 @@ SADMM_INLINE void box_clip_face(const real hr[3], const real hi[3], const real R
             if (corner) feature = box_feature_vertex(owner, corner_bits); /* the edge passes by a corner */
         }
         for (d = 0; d < m->count; ++d) {
-            real dx = real_abs(m->points[d].position.x - p->x), dy = real_abs(m->points[d].position.y - p->y);
-            if (m->points[d].feature == feature) duplicate = true;
+            real dx = real_abs(m->points[d].position.x - p->at[0]), dy = real_abs(m->points[d].position.y - p->at[1]);
             /* near each other on a face that is long and steep, but not equally deep: two points */
-            else if (d >= first && dx <= tol_u && dy <= tol_v &&
-                     real_abs(m->points[d].separation - separation) <= tol_z)
-                duplicate = true;
+            duplicate |= (m->points[d].feature == feature) |
+                         ((d >= first) & (dx <= tol_u) & (dy <= tol_v) &
+                          (real_abs(m->points[d].separation - separation) <= tol_z));
         }
         if (duplicate || m->count == SADMM_MANIFOLD_POINTS) continue;
-        position[0] = p->x;
-        position[1] = p->y;
-        position[2] = p->z;
+        position[0] = p->at[0];
+        position[1] = p->at[1];
+        position[2] = p->at[2];
         manifold_add(m, v3_from_array(position), separation, feature);
     }
     /* in-plane to the reference frame, midway between the incident face and the reference face */
