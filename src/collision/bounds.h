@@ -22,10 +22,16 @@ struct sadmm_box3 { double lo[3], hi[3]; };
 SADMM_INLINE double downward(double way) { return way < 0 ? way : 0; }
 SADMM_INLINE double upward(double way) { return way > 0 ? way : 0; }
 
-/* Farthest that rotation moves a point within the step, m. reach: of the shape from the body's centre of mass. */
-SADMM_INLINE double rotation_sweep(const double angular[3], double reach, double dt)
+SADMM_INLINE double turning_rate(const double angular[3])
 {
-    double turn = sqrt(angular[0] * angular[0] + angular[1] * angular[1] + angular[2] * angular[2]) * dt;
+    return sqrt(angular[0] * angular[0] + angular[1] * angular[1] + angular[2] * angular[2]);
+}
+
+/* Farthest that rotation moves a point within the step, m. rate: turning_rate; reach: of the shape from the body's
+ * centre of mass. */
+SADMM_INLINE double rotation_sweep(double rate, double reach, double dt)
+{
+    double turn = rate * dt;
     return (turn < 2 ? turn : 2) * reach;
 }
 

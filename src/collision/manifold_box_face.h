@@ -17,14 +17,18 @@ struct clip_vertex {
 /* What a polygon takes in memory: at most ten vertices, and the first one once more. */
 enum { CLIP_VERTICES = 12 };
 
-/* Keep the part of the polygon with sign * coordinate <= h. Which vertices stay has no order that a processor could
- * foresee: it writes both the vertex and the crossing, and then counts what stays. */
-SADMM_INLINE int clip_side(struct clip_vertex *in, int count, int axis, real sign, real h, real tolerance, int label,
-                           struct clip_vertex *out)
+/* Keep the part of the polygon `in` with sign * coordinate <= h: all of it, or what is then in `out`. Which vertices
+ * stay has no order that a processor could foresee: it writes both the vertex and the crossing, and then counts what
+ * stays. */
+SADMM_INLINE struct clip_vertex *clip_side(struct clip_vertex *in, int *vertices, int axis, real sign, real h,
+                                           real tolerance, int label, struct clip_vertex *out)
 {
+    const int count = *vertices;
     real dp = sign * in[0].at[axis] - h;
-    int i, n = 0;
-    in[count] = in[0];
+    int i, n = 0, all = 1;
+    for (i = 0; i < count; ++i) all &= sign * in[i].at[axis] - h <= tolerance;
+    if (all) return in;
+    r3_store(r3_load(in[0].at), in[count].at);
     for (i = 0; i < count && n <= SADMM_MANIFOLD_POINTS; ++i) {
         const real dq = sign * in[i + 1].at[axis] - h;
         const int inside = dp <= tolerance, crosses = inside ^ (dq <= tolerance), leaves = in[i].out;
@@ -43,7 +47,8 @@ SADMM_INLINE int clip_side(struct clip_vertex *in, int count, int axis, real sig
         n += crosses;
         dp = dq;
     }
-    return n;
+    *vertices = n;
+    return out;
 }
 
 /* How the normal leans in the reference frame: its components along u and v over that along the face's own normal, and
@@ -61,7 +66,7 @@ SADMM_INLINE void box_clip_face(const real hr[3], const real hi[3], const real R
 {
     int first = m->count;
     int u = k == 2 ? 0 : k + 1, v = u == 2 ? 0 : u + 1, j = 0, ju, jv, q, i, count = 4, base_bits, ref_bits;
-    struct clip_vertex poly[CLIP_VERTICES], other[CLIP_VERTICES];
+    struct clip_vertex polygons[2][CLIP_VERTICES], *poly = polygons[0];
     int bits[4];
     real si, cx, cy, cz, ux, uy, uz, vx, vy, vz, tol_u, tol_v, tol_z;
     bool clip_u = false, clip_v = false;
@@ -98,12 +103,12 @@ SADMM_INLINE void box_clip_face(const real hr[3], const real hi[3], const real R
         clip_v |= real_abs(y) > hr[v] + tol_v;
     }
     if (clip_u) {
-        count = clip_side(poly, count, 0, 1, hr[u], tol_u, 4, other);
-        count = clip_side(other, count, 0, -1, hr[u], tol_u, 5, poly);
+        poly = clip_side(poly, &count, 0, 1, hr[u], tol_u, 4, polygons[1]);
+        poly = clip_side(poly, &count, 0, -1, hr[u], tol_u, 5, polygons[poly == polygons[0]]);
     }
     if (clip_v) {
-        count = clip_side(poly, count, 1, 1, hr[v], tol_v, 6, other);
-        count = clip_side(other, count, 1, -1, hr[v], tol_v, 7, poly);
+        poly = clip_side(poly, &count, 1, 1, hr[v], tol_v, 6, polygons[poly == polygons[0]]);
+        poly = clip_side(poly, &count, 1, -1, hr[v], tol_v, 7, polygons[poly == polygons[0]]);
     }
     for (i = 0; i < count; ++i) {
         const struct clip_vertex *p = &poly[i];

@@ -18,10 +18,9 @@
  * they touch with may be another part of them by then (advance.h). */
 #define MIDWAY_TRAVEL 0.1
 
-/* How far on a body is turned, s: half a step, but for MIDWAY_TURN. */
-SADMM_INLINE double turn_ahead(const double angular[3], double dt)
+/* How far on a body is turned, s: half a step, but for MIDWAY_TURN. rate: turning_rate. */
+SADMM_INLINE double turn_ahead(double rate, double dt)
 {
-    const double rate = sqrt(angular[0] * angular[0] + angular[1] * angular[1] + angular[2] * angular[2]);
     return rate * dt > 2 * MIDWAY_TURN ? MIDWAY_TURN / rate : 0.5 * dt;
 }
 

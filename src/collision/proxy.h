@@ -30,7 +30,7 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
                               struct sadmm_proxy *p, struct sadmm_box3 *box)
 {
     bool moves = body->system_body >= 0;
-    const double ahead = moves ? turn_ahead(body->velocity + 3, dt) : 0;
+    const double rate = moves ? turning_rate(body->velocity + 3) : 0, ahead = moves ? turn_ahead(rate, dt) : 0;
     quat q_start = q_load(body->orientation), q_body = moves ? turned(q_start, body->velocity + 3, ahead) : q_start;
     quat q = q_normalize(q_mul(q_body, q_load(shape->orientation)));
     mat3 R = q_matrix(q);
@@ -49,7 +49,7 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
         p->angular[i] = moves ? body->velocity[3 + i] : 0;
     }
     reach = v3_norm(arm) + geometry_radius(geometry);
-    p->spin = moves ? rotation_sweep(body->velocity + 3, reach, dt) : 0;
+    p->spin = moves ? rotation_sweep(rate, reach, dt) : 0;
     p->fall = moves ? own_fall(body->acceleration, reach, dt) : 0;
     p->thin = geometry_thickness(geometry);
     p->inertia = body->inertia;
