@@ -110,11 +110,9 @@ SADMM_INLINE bool box_test_faces(struct box_pair *b, struct box_axes *axes)
                 axes->negative = (axes->negative & ~(1u << axis)) | (unsigned)(c < 0) << axis;
             }
         }
-    axes->best_face = 0;
-    for (axis = 1, most = s[0]; axis < 6; ++axis) { /* without a branch: any may be the best one */
-        axes->best_face ^= (axes->best_face ^ axis) & -(s[axis] > most);
-        most = real_max(s[axis], most);
-    }
+    for (axis = 1, most = s[0]; axis < 6; ++axis) most = real_max(s[axis], most);
+    axes->best_face = lowest_bit(r3_not_above(r3_fill(most), r3_load(s)) |
+                                 r3_not_above(r3_fill(most), r3_load(s + 3)) << 3);
     axes->face = axes->best_face;
     if (axes->cached >= 0 && axes->cached < 6 &&
         s[axes->face] <= s[axes->cached] + box_bonus(axes, s[axes->cached]))

@@ -9,6 +9,16 @@
 
 #include "core/math/vec3.h"
 
+/* Of the lowest bit that is set; 0 where none is. */
+SADMM_INLINE int lowest_bit(int bits)
+{
+#ifdef __CUDA_ARCH__
+    return bits ? __ffs(bits) - 1 : 0;
+#else
+    return bits ? __builtin_ctz((unsigned)bits) : 0;
+#endif
+}
+
 #if defined(__AVX__) && defined(SADMM_REAL_IS_DOUBLE) && !defined(__CUDACC__)
 
 #include <immintrin.h>
