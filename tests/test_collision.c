@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "collision/kernels.h"
 #include "collision/pipeline.h"
 #include "config.h"
 #include "core/base/memory.h"
@@ -969,6 +970,48 @@ START_TEST(contacts_depend_on_the_present_alone)
 }
 END_TEST
 
+/* Boxes on a grid, turned by quarters or a little: faces, edges and corners that coincide. */
+static void fill_grid(struct scene *s, uint64_t seed)
+{
+    struct random r = {seed};
+    for (int i = 0; i < 343; ++i) {
+        const double tilt = i % 3 ? 0 : random_in(&r, -1e-3, 1e-3), quarter = acos(0) * (i % 4);
+        const int32_t box = add_box(s, 0.05, 2 + 0.0999 * (i % 7), 0.0999 * (i / 7 % 7), 0.05 + 0.0999 * (i / 49));
+        turn_body(s, s->shapes[box].body, i % 2, i % 5 == 0, 1, quarter + tilt);
+    }
+}
+
+/* Each variant of the code, of those that this machine can run: bit for bit the same contacts over a run of steps. */
+START_TEST(every_instruction_set_finds_the_same)
+{
+    struct scene *reference = make_scene(NULL), *other = make_scene(NULL);
+    const struct sadmm_collision_kernels *kernels = sadmm_collision_kernels_at(_i);
+    struct random r = {2000};
+    if (kernels) {
+        other->collision->candidates.kernels = kernels;
+        for (int k = 0; k < 2; ++k) {
+            fill_pile(k ? other : reference, 1000, 78, 1);
+            fill_grid(k ? other : reference, 79);
+        }
+    }
+    for (int step = 0; kernels && step < 12; ++step) {
+        for (int32_t i = step; i < reference->body_count; i += 7)
+            if (reference->bodies[i].system_body >= 0)
+                for (int k = 0; k < 6; ++k) reference->bodies[i].velocity[k] = random_in(&r, -1, 1) * (i % 2 ? 1 : 30);
+        memcpy(other->bodies, reference->bodies, sizeof reference->bodies);
+        find(reference);
+        find(other);
+        ck_assert_uint_gt(reference->contacts.point_count, 3000);
+        expect_equal_sets(&other->contacts, &reference->contacts);
+        put_impulses(reference);
+        put_impulses(other);
+        stir(reference, &r, step % 2 ? 1e-5 : 2e-3);
+    }
+    free_scene(other);
+    free_scene(reference);
+}
+END_TEST
+
 /* The same bodies in other slots: the same contacts, with a and b exchanged where the slots say so. */
 START_TEST(slots_do_not_change_the_contacts)
 {
@@ -1068,6 +1111,7 @@ int main(void)
     tcase_add_loop_test(cases, lack_of_memory_changes_nothing, 0, 2);
     tcase_add_loop_test(cases, the_steady_state_allocates_nothing, 0, 2);
     tcase_add_loop_test(cases, contacts_depend_on_the_present_alone, 0, 2);
+    tcase_add_loop_test(cases, every_instruction_set_finds_the_same, 1, 2);
     tcase_add_test(cases, slots_do_not_change_the_contacts);
     tcase_add_test(cases, an_empty_input_gives_an_empty_set);
     suite_add_tcase(suite, cases);

@@ -12,7 +12,7 @@ const struct sadmm_collision_kernels *sadmm_collision_kernels_at(int index)
     };
     const int count = (int)(sizeof variants / sizeof *variants);
 #ifdef SADMM_HAVE_ISA_AVX2
-    if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma")) ++index; /* compiled for both */
+    if (!__builtin_cpu_supports("avx2")) ++index;
 #endif
     return index < count ? &variants[index] : NULL;
 }
