@@ -72,8 +72,8 @@ SADMM_INLINE void box_recall(const struct box_pair *b, uint32_t cache, struct bo
     axes->past = v3_dot(axes->n_cached, v3_from_array(b->t)) < (real)0.5 * b->thin;
 }
 
-/* Separations along the face axes of a box of half extents h, from one of half extents `other` whose centre is at t: all
- * along these axes. R: of the other's axes to them, by columns. */
+/* Separations along the face axes of a box of half extents h, from one of half extents `other` whose centre is at t:
+ * all along these axes. R: of the other's axes to them, by columns. */
 SADMM_INLINE row3 box_face_separations(row3 t, const real h[ROW3], const row3 R[3], const real other[ROW3])
 {
     row3 shadows = r3_load(h);

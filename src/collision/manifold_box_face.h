@@ -115,9 +115,10 @@ SADMM_INLINE void box_clip_face(const real hr[3], const real hi[3], const real R
         int in = poly[i > 0 ? i - 1 : count - 1].out, out = p->out, d;
         uint32_t feature;
         real position[3], separation = p->at[2] / lean.cosine;
-        bool duplicate = false;
+        int duplicate = 0;
         /* on a corner of the reference face? */
-        bool corner = (real_abs(real_abs(p->at[0]) - hr[u]) <= tol_u) & (real_abs(real_abs(p->at[1]) - hr[v]) <= tol_v);
+        const int at_u = real_abs(real_abs(p->at[0]) - hr[u]) <= tol_u,
+                  at_v = real_abs(real_abs(p->at[1]) - hr[v]) <= tol_v, corner = at_u & at_v;
         int corner_bits = ref_bits | (p->at[0] > 0 ? 1 << u : 0) | (p->at[1] > 0 ? 1 << v : 0);
         if (separation > limit) continue;
         if (in < 4 && out < 4) {
@@ -145,9 +146,9 @@ SADMM_INLINE void box_clip_face(const real hr[3], const real hi[3], const real R
         for (d = 0; d < m->count; ++d) {
             real dx = real_abs(m->points[d].position.x - p->at[0]), dy = real_abs(m->points[d].position.y - p->at[1]);
             /* near each other on a face that is long and steep, but not equally deep: two points */
+            real dz = real_abs(m->points[d].separation - separation);
             duplicate |= (m->points[d].feature == feature) |
-                         ((d >= first) & (dx <= tol_u) & (dy <= tol_v) &
-                          (real_abs(m->points[d].separation - separation) <= tol_z));
+                         ((d >= first) & (dx <= tol_u) & (dy <= tol_v) & (dz <= tol_z));
         }
         if (duplicate || m->count == SADMM_MANIFOLD_POINTS) continue;
         position[0] = p->at[0];

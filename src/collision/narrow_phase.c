@@ -121,7 +121,8 @@ bool SADMM_COLLISION_KERNEL(narrow_phase)(const struct sadmm_candidates *c, cons
         const size_t last = end - begin < MOST_LISTED ? end : begin + MOST_LISTED,
                      count = list_meeting(c, input, begin, last, keys);
         for (size_t i = 0; i < count; ++i)
-            if (!is_disabled(input, keys[i]) && !find_children(&n, (uint32_t)(keys[i] >> 32), (uint32_t)keys[i])) return false;
+            if (!is_disabled(input, keys[i]) && !find_children(&n, (uint32_t)(keys[i] >> 32), (uint32_t)keys[i]))
+                return false;
         begin = last;
     }
     return true;

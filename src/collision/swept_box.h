@@ -30,8 +30,9 @@ SADMM_INLINE bool swept_boxes_meet(const struct sadmm_swept_box *a, const struct
     const row3 way = r3_sub(r3_load(b->sweep), r3_load(a->sweep)),
                highest = r3_add(r3_load(b->still.hi), r3_upward(way)),
                lowest = r3_add(r3_load(b->still.lo), r3_downward(way));
-    return (r3_not_above(r3_load(a->box.lo), r3_load(b->box.hi)) & r3_not_above(r3_load(b->box.lo), r3_load(a->box.hi)) &
-            r3_not_above(r3_load(a->still.lo), highest) & r3_not_above(lowest, r3_load(a->still.hi))) == 7;
+    return (r3_not_above(r3_load(a->box.lo), r3_load(b->box.hi)) &
+            r3_not_above(r3_load(b->box.lo), r3_load(a->box.hi)) & r3_not_above(r3_load(a->still.lo), highest) &
+            r3_not_above(lowest, r3_load(a->still.hi))) == 7;
 }
 
 #endif
