@@ -156,7 +156,8 @@ SADMM_INLINE bool box_test_edges(const struct box_pair *b, struct box_axes *axes
     const real s_face = axes->separation[axes->face];
     const row3 rows[3] = {r3_load(b->R[0]), r3_load(b->R[1]), r3_load(b->R[2])}, h2 = r3_load(b->h2),
                slack = r3_fill(b->slack), face = r3_fill(s_face), zero = r3_fill(0);
-    int i, j;
+    real separations[6 + ROW3], along[6 + ROW3];
+    int i, left = 0; /* bits, by edge axis */
 
     for (i = 0; i < 3; ++i) {
         const int i1 = i == 2 ? 0 : i + 1, i2 = i1 == 2 ? 0 : i1 + 1;
@@ -168,15 +169,15 @@ SADMM_INLINE bool box_test_edges(const struct box_pair *b, struct box_axes *axes
                                            r3_mul(r3_turn(h2), r3_turn_back(own))),
                                     r3_mul(r3_turn_back(h2), r3_turn(own)));
         const row3 s = r3_sub(r3_sub(r3_abs(d), shadows), slack);
+        r3_store(s, separations + 3 * i);
+        r3_store(d, along + 3 * i);
         /* division by a length below 1 only makes it worse */
-        int left = ~(r3_not_above(s, face) & r3_not_above(s, zero)) & 7;
-        real separations[ROW3], along[ROW3];
-        if (axes->cached >= 6 + 3 * i && axes->cached < 9 + 3 * i) left |= 1 << (axes->cached - 6 - 3 * i);
-        if (!left) continue;
-        r3_store(s, separations);
-        r3_store(d, along);
-        for (j = 0; j < 3; ++j)
-            if (left >> j & 1 && !box_test_edge(b, axes, i, j, separations[j], along[j])) return false;
+        left |= (~(r3_not_above(s, face) & r3_not_above(s, zero)) & 7) << 3 * i;
+    }
+    if (axes->cached >= 6) left |= 1 << (axes->cached - 6);
+    for (; left; left &= left - 1) {
+        const int e = lowest_bit(left);
+        if (!box_test_edge(b, axes, e / 3, e % 3, separations[e], along[e])) return false;
     }
     return true;
 }
