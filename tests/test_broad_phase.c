@@ -433,8 +433,10 @@ START_TEST(what_accelerations_bring_together_is_foreseen)
             height += s || !plane ? geometry[s].size[0] : 0;
         }
         body[1].position[2] = height; /* above, as seen from the first */
-        for (int s = 0; s < 2; ++s)
-            proxy_place(&shape[s], &geometry[s], &body[s], dt, margin, gravity, &proxy[s], &box[s]);
+        for (int s = 0; s < 2; ++s) {
+            const struct proxy_turn turn = proxy_turn_of(&shape[s], &body[s], dt);
+            proxy_place(&shape[s], &geometry[s], &body[s], &turn, dt, margin, gravity, &proxy[s], &box[s]);
+        }
 
         bool touch = false, touch_without = false;
         for (int moment = 0; moment <= 50 && !touch; ++moment) {

@@ -67,7 +67,8 @@ static bool plane_stays(const struct sadmm_broad_entry *entry, const struct sadm
 }
 
 /* Pose and box of a slot; its entry, enlarged, when the old one does not hold it any more. */
-static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision_input *input, size_t slot, bool renew)
+static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision_input *input, size_t slot,
+                        const struct proxy_turn *turn, bool renew)
 {
     const struct sadmm_shape *shape = slot < input->shape_count ? &input->shapes[slot] : NULL;
     struct sadmm_broad_entry *entry = &c->entries[slot];
@@ -100,7 +101,7 @@ static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision
     geometry = &input->geometries[shape->geometry];
     plane = geometry->type == SADMM_SHAPE_PLANE;
     kind = plane ? SLOT_PRESENT | SLOT_PLANE : SLOT_PRESENT;
-    proxy_place(shape, geometry, body, input->dt, input->margin, input->gravity, &c->proxies[slot],
+    proxy_place(shape, geometry, body, turn, input->dt, input->margin, input->gravity, &c->proxies[slot],
                 &c->boxes[slot].box);
     c->boxes[slot].of_plane = plane;
     if (!plane) swept_box_make(c->proxies[slot].velocity, input->dt, &c->boxes[slot]);
@@ -123,8 +124,19 @@ static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision
     }
 }
 
+/* Turning a shape is a long chain of roots and divisions: several shapes' at once, none waits for another's. */
+enum { TURNED_AT_ONCE = 16 };
+
 void SADMM_COLLISION_KERNEL(place_slots)(struct sadmm_candidates *c, const struct sadmm_collision_input *input,
                                          size_t begin, size_t end, bool renew)
 {
-    for (size_t slot = begin; slot < end; ++slot) update_slot(c, input, slot, renew);
+    struct proxy_turn turns[TURNED_AT_ONCE];
+    for (size_t last; begin < end; begin = last) {
+        last = end - begin < TURNED_AT_ONCE ? end : begin + TURNED_AT_ONCE;
+        for (size_t slot = begin; slot < last && slot < input->shape_count; ++slot) {
+            const struct sadmm_shape *shape = &input->shapes[slot];
+            if (shape->alive) turns[slot - begin] = proxy_turn_of(shape, &input->bodies[shape->body], input->dt);
+        }
+        for (size_t slot = begin; slot < last; ++slot) update_slot(c, input, slot, &turns[slot - begin], renew);
+    }
 }

@@ -24,21 +24,37 @@ struct sadmm_proxy {
     uint32_t revision, placed;
 };
 
-/* `box` is left alone for a plane. gravity: its size, m/s^2. */
-SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadmm_geometry *geometry,
-                              const struct sadmm_collision_body *body, double dt, double margin, double gravity,
-                              struct sadmm_proxy *p, struct sadmm_box3 *box)
+/* How a shape is turned ahead. */
+struct proxy_turn {
+    double rate, ahead; /* rad/s, s */
+    quat body, shape;   /* to the world */
+};
+
+SADMM_INLINE struct proxy_turn proxy_turn_of(const struct sadmm_shape *shape, const struct sadmm_collision_body *body,
+                                             double dt)
 {
-    bool moves = body->system_body >= 0;
-    const double rate = moves ? turning_rate(body->velocity + 3) : 0, ahead = moves ? turn_ahead(rate, dt) : 0;
-    quat q_start = q_load(body->orientation), q_body = moves ? turned(q_start, body->velocity + 3, ahead) : q_start;
-    quat q = q_normalize(q_mul(q_body, q_load(shape->orientation)));
-    mat3 R = q_matrix(q);
-    vec3 arm = m3_mul(q_matrix(q_body), v3_load(shape->position));
+    const bool moves = body->system_body >= 0;
+    const quat start = q_load(body->orientation);
+    struct proxy_turn turn;
+    turn.rate = moves ? turning_rate(body->velocity + 3) : 0;
+    turn.ahead = moves ? turn_ahead(turn.rate, dt) : 0;
+    turn.body = moves ? turned(start, body->velocity + 3, turn.ahead) : start;
+    turn.shape = q_normalize(q_mul(turn.body, q_load(shape->orientation)));
+    return turn;
+}
+
+/* turn: proxy_turn_of. `box` is left alone for a plane. gravity: its size, m/s^2. */
+SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadmm_geometry *geometry,
+                              const struct sadmm_collision_body *body, const struct proxy_turn *turn, double dt,
+                              double margin, double gravity, struct sadmm_proxy *p, struct sadmm_box3 *box)
+{
+    const bool moves = body->system_body >= 0;
+    mat3 R = q_matrix(turn->shape);
+    vec3 arm = m3_mul(q_matrix(turn->body), v3_load(shape->position));
     double extent[3], reach;
     int i;
 
-    p->ahead = ahead;
+    p->ahead = turn->ahead;
     p->geometry = *geometry;
     for (i = 0; i < 3; ++i) v3_store(R.r[i], p->R + 3 * i);
     v3_store(arm, p->arm);
@@ -49,7 +65,7 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
         p->angular[i] = moves ? body->velocity[3 + i] : 0;
     }
     reach = v3_norm(arm) + geometry_radius(geometry);
-    p->spin = moves ? rotation_sweep(rate, reach, dt) : 0;
+    p->spin = moves ? rotation_sweep(turn->rate, reach, dt) : 0;
     p->fall = moves ? own_fall(body->acceleration, reach, dt) : 0;
     p->thin = geometry_thickness(geometry);
     p->inertia = body->inertia;

@@ -147,7 +147,9 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
     struct collision_leaf leaf;
     struct collision_filter filter;
 
-    proxy_place(&shape, &v.geometries[shape.geometry], &body, step.dt, step.margin, step.gravity, &proxy, &leaf.box);
+    const struct proxy_turn turn = proxy_turn_of(&shape, &body, step.dt);
+    proxy_place(&shape, &v.geometries[shape.geometry], &body, &turn, step.dt, step.margin, step.gravity, &proxy,
+                &leaf.box);
     v.proxies[slot] = proxy;
     if (FOR == PLACE_AGAIN) {
         if (i >= v.leaf_count) return;
