@@ -35,9 +35,9 @@
 #include "core/base/barrier.h"
 #include "core/base/parallel.h"
 #include "core/solve/kernels.h"
-#include "core/math/lead.h"
 #include "core/math/limit.h"
 #include "core/math/packed6.h"
+#include "core/model/system_terms.h"
 #include "cpu_lanes.h"
 
 #define SADMM_JOIN2(a, b) a##b
@@ -141,6 +141,7 @@ struct sadmm_context {
     real *state;                     /* rows: v, w, 1/beta, 0 */
     double *A, *C;                   /* bodies x PACKED6 */
     double *beta;                    /* bodies, kg */
+    struct sadmm_lead *leads;        /* of bodies with a state, at the end of a step; the static world's is 0 */
     struct body_block *body_blocks;  /* unless all bodies are general */
     /* Of each body its index among the general ones or -1; the general ones, ascending. Of each body block which lanes
      * are general (bits); where there are some, those behind the last body, too. */
@@ -150,7 +151,7 @@ struct sadmm_context {
     real *b, *A_columns, *H_columns; /* of general bodies: rows; 6 rows (columns of A, of (A + beta C)^-1) a body */
     real *momentum_residuals;                   /* and rows, fast */
     size_t general_of_capacity, general_body_capacity, general_lane_capacity;
-    size_t state_capacity, A_capacity, C_capacity, beta_capacity, body_block_capacity, b_capacity, A_column_capacity,
+    size_t state_capacity, A_capacity, C_capacity, beta_capacity, lead_capacity, body_block_capacity, b_capacity, A_column_capacity,
         H_column_capacity, momentum_residual_capacity;
 
     /* Geometric contacts */
@@ -183,13 +184,12 @@ struct sadmm_context {
 
     /* Islands; without constraints and limits of worlds in the method `paper`: none */
     int32_t *label;             /* bodies: the smallest body of its island */
-    int32_t *touch;             /* bodies: bits (math/lead.h), of the body and, at labels, of the island */
-    struct lead_touch *pair_touch; /* pair records */
+    _Atomic int32_t *touch;     /* bodies: bits (math/lead.h), of the body and, at labels, of the island */
     int32_t *loose_of;          /* bodies, used at labels: index in `loose`, negative: held */
     struct cpu_loose *loose;
     int32_t *loose_bodies, *loose_pairs; /* by island, ascending; of pairs the static ones */
     int32_t loose_count;
-    size_t label_capacity, touch_capacity, pair_touch_capacity, loose_of_capacity, loose_capacity, loose_body_capacity,
+    size_t label_capacity, touch_capacity, loose_of_capacity, loose_capacity, loose_body_capacity,
         loose_pair_capacity;
 
     /* fast */

@@ -77,7 +77,6 @@ bool CPU(find_islands)(struct sadmm_context *c)
     sadmm_islands(c->system, c->label);
     if (!c->plan.momentum) return true;
     if (!sadmm_grow_empty(&c->touch, &c->touch_capacity, n, sizeof(int32_t)) ||
-        !sadmm_grow_empty(&c->pair_touch, &c->pair_touch_capacity, c->record_count, sizeof *c->pair_touch) ||
         !sadmm_grow_empty(&c->loose_of, &c->loose_of_capacity, n, sizeof(int32_t)))
         return false;
     const size_t pairs = mark_held(c);

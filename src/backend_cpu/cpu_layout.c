@@ -102,6 +102,7 @@ sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *syst
               sadmm_grow_empty(&c->A, &c->A_capacity, n * PACKED6, sizeof(double)) &&
               sadmm_grow_empty(&c->C, &c->C_capacity, n * PACKED6, sizeof(double)) &&
               sadmm_grow_empty(&c->beta, &c->beta_capacity, n, sizeof(double)) &&
+              sadmm_grow_empty(&c->leads, &c->lead_capacity, plan->rigid ? n + 1 : 0, sizeof *c->leads) &&
               sadmm_grow_empty(&c->body_blocks, &c->body_block_capacity, general < n ? c->body_block_count : 0,
                    sizeof *c->body_blocks) &&
               sadmm_grow_empty(&c->b, &c->b_capacity, general * ROW, sizeof(real)) &&

@@ -1,4 +1,5 @@
 /* What the step gives back: v and lambda (double), the moved bodies (Q), the contact wrenches (R, eq. 12). */
+#include <stdatomic.h>
 #include <string.h>
 
 #include "core/math/array3.h"
@@ -55,53 +56,57 @@ sadmm_status CPU(read_solution)(struct sadmm_context *c, struct sadmm_error *err
 
 /* ---- Q ----------------------------------------------------------------------------------------------------------- */
 
-/* What a pair's points touch (math/lead.h), into `out`. */
-static void touch_pair(const struct sadmm_context *c, const struct sadmm_contact_pair *pair, struct lead_touch *out)
+/* Bits of a body or an island. Threads may add some at once, in any order: the same ones are there in the end. */
+static void add_bits(_Atomic int32_t *to, int bits)
 {
-    const int32_t body[2] = {pair->body_a, pair->body_b};
-    double velocity[2][6] = {{0}}, lead[2][6] = {{0}};
-    const struct lead_touch none = {body[0] >= 0 && body[1] >= 0 ? TOUCH_INNER
-                                    : pair->friction > 0         ? TOUCH_FRICTION
-                                                                 : TOUCH_SMOOTH, {0, 0}};
-    *out = none;
-    for (int s = 0; s < 2; ++s) {
-        if (body[s] < 0) continue;
-        memcpy(velocity[s], &c->system->velocity[6 * (size_t)body[s]], sizeof velocity[s]);
-        sadmm_body_lead(&c->system->rigid[body[s]], velocity[s], lead[s]);
-    }
+    if (bits & ~atomic_load_explicit(to, memory_order_relaxed))
+        atomic_fetch_or_explicit(to, bits, memory_order_relaxed);
+}
+
+/* What a pair's points touch (math/lead.h). */
+static struct lead_touch touch_of(const struct sadmm_context *c, const struct sadmm_contact_pair *pair)
+{
+    static const double still[6];
+    const double dt = c->settings.dt, slop = c->settings.slop, *n = pair->normal;
+    const struct sadmm_lead *a = &c->leads[cpu_body(c, pair->body_a)], *b = &c->leads[cpu_body(c, pair->body_b)];
+    struct lead_touch touch = {pair->body_a >= 0 && pair->body_b >= 0 ? TOUCH_INNER
+                               : pair->friction > 0                   ? TOUCH_FRICTION
+                                                                      : TOUCH_SMOOTH, {0, 0}};
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
         const struct sadmm_contact_point *point = &c->system->contacts->points[k];
-        const double *n = pair->normal, *arm_a = point->arm_a, *arm_b = point->arm_b;
-        const double size[2] = {lead_size(lead[0], arm_a), lead_size(lead[1], arm_b)};
-        lead_add_push(out, dot3(n, point->impulse), size, c->settings.dt, c->settings.slop);
-        if (lead_is_still(size, c->settings.dt, c->settings.slop)) continue;
-        const double leads[2] = {-lead_along(n, lead[0], arm_a), lead_along(n, lead[1], arm_b)};
-        const double speed = lead_along(n, velocity[1], arm_b) - lead_along(n, velocity[0], arm_a);
-        lead_add_way(out, point->gap, speed, leads, size, c->settings.dt, c->settings.slop);
+        const double *arm_a = point->arm_a, *arm_b = point->arm_b;
+        const double size[2] = {lead_size_at(a->linear, a->angular, arm_a), lead_size_at(b->linear, b->angular, arm_b)};
+        lead_add_push(&touch, dot3(n, point->impulse), size, dt, slop);
+        if (lead_is_still(size, dt, slop)) continue;
+        const double *v_a = pair->body_a >= 0 ? &c->system->velocity[6 * (size_t)pair->body_a] : still,
+                     *v_b = pair->body_b >= 0 ? &c->system->velocity[6 * (size_t)pair->body_b] : still;
+        const double leads[2] = {-lead_along(n, a->lead, arm_a), lead_along(n, b->lead, arm_b)};
+        lead_add_way(&touch, point->gap, lead_along(n, v_b, arm_b) - lead_along(n, v_a, arm_a), leads, size, dt, slop);
+    }
+    return touch;
+}
+
+/* Bodies have bits of their own, islands theirs at their labels: no bit means both. */
+static void touch_pair(struct sadmm_context *c, const struct sadmm_contact_pair *pair)
+{
+    const struct lead_touch touch = touch_of(c, pair);
+    const int32_t body[2] = {pair->body_a, pair->body_b};
+    for (int s = 0; s < 2; ++s) {
+        if (body[s] < 0) continue;
+        add_bits(&c->touch[c->label[body[s]]], touch.island);
+        add_bits(&c->touch[body[s]], touch.body[s]);
     }
 }
 
-/* Of each body the bits of its pairs. */
-static void touch_bodies(struct sadmm_context *c, int thread, int threads)
+/* In place of a body's lead what it takes back. */
+static void choose_lead(const struct sadmm_context *c, size_t i, double lead[6])
 {
-    size_t begin, end;
-    cpu_share_bodies(c, thread, threads, &begin, &end);
-    for (size_t i = begin; i < end; ++i) {
-        c->touch[i] = 0;
-        for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) {
-            int side;
-            const size_t record = cpu_record(c, at, &side);
-            if (record >= cpu_pair_records(c)) continue;
-            const struct lead_touch *touch = &c->pair_touch[record];
-            c->touch[i] |= touch->island | touch->body[side];
-        }
+    switch (lead_kind_of(atomic_load_explicit(&c->touch[c->label[i]], memory_order_relaxed),
+                         atomic_load_explicit(&c->touch[i], memory_order_relaxed))) {
+    case LEAD_STAYS: memset(lead, 0, 6 * sizeof *lead); break;
+    case LEAD_SHARED: lead_shared(c->settings.gravity, c->settings.dt, lead); break;
+    case LEAD_OWN: break;
     }
-}
-
-/* Islands have the bits of their bodies, at their labels, but for what is each body's own. */
-static void touch_islands(struct sadmm_context *c)
-{
-    for (int32_t i = 0; i < c->bodies; ++i) c->touch[c->label[i]] |= c->touch[i] & ~(TOUCH_CARRIED | TOUCH_MOVED);
 }
 
 struct integration {
@@ -113,36 +118,27 @@ static void integrate_share(void *argument, int thread, int threads)
 {
     const struct integration *in = (const struct integration *)argument;
     struct sadmm_context *c = in->c;
-    size_t begin, end;
+    const struct sadmm_rigid *bodies = c->system->rigid;
+    const double *velocity = c->system->velocity;
+    size_t first, past, begin, end;
+    cpu_share_bodies(c, thread, threads, &first, &past);
+    sadmm_find_leads(past - first, bodies + first, velocity + 6 * first, c->leads + first);
     if (c->plan.momentum) {
-        sadmm_share(cpu_pair_records(c), thread, threads, &begin, &end);
-        for (size_t k = begin; k < end; ++k)
-            if (c->pair_blocks[k / (size_t)LANES].pair[k % (size_t)LANES] >= 0)
-                touch_pair(c, cpu_pair(c, k), &c->pair_touch[k]);
+        for (size_t i = first; i < past; ++i) atomic_store_explicit(&c->touch[i], 0, memory_order_relaxed);
         sadmm_barrier_wait(&c->barrier, threads);
-        touch_bodies(c, thread, threads);
+        sadmm_share(c->system->contacts->pair_count, thread, threads, &begin, &end);
+        for (size_t p = begin; p < end; ++p) touch_pair(c, &c->system->contacts->pairs[p]);
         sadmm_barrier_wait(&c->barrier, threads);
-        if (thread == 0) touch_islands(c);
-        sadmm_barrier_wait(&c->barrier, threads);
+        for (size_t i = first; i < past; ++i) choose_lead(c, i, c->leads[i].lead);
     }
-    cpu_share_bodies(c, thread, threads, &begin, &end);
-    for (size_t i = begin; i < end; ++i) {
-        const struct sadmm_rigid *body = &c->system->rigid[i];
-        const double *velocity = &c->system->velocity[6 * i];
-        const int touch = c->plan.momentum ? c->touch[i] : 0, island = c->plan.momentum ? c->touch[c->label[i]] : 0;
-        double lead[6] = {0};
-        switch (lead_kind_of(island, touch)) {
-        case LEAD_STAYS: break;
-        case LEAD_SHARED: lead_shared(c->settings.gravity, c->settings.dt, lead); break;
-        case LEAD_OWN: sadmm_body_lead(body, velocity, lead); break;
-        }
-        sadmm_rigid_advance(body, velocity, lead, c->settings.dt, &in->next[i]);
-    }
+    sadmm_advance(past - first, bodies + first, velocity + 6 * first, c->leads + first, c->settings.dt,
+                  in->next + first);
 }
 
 sadmm_status CPU(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)
 {
     (void)error;
+    memset(&c->leads[c->bodies], 0, sizeof *c->leads);
     cpu_parallel(c, integrate_share, &(struct integration){c, next});
     return SADMM_OK;
 }
@@ -150,23 +146,24 @@ sadmm_status CPU(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, s
 /* ---- R ----------------------------------------------------------------------------------------------------------- */
 
 /* Eq. (12) with lambda = -u: J^T lambda / dt, summed over a body's contacts in their fixed order. */
-static void body_wrench(const struct sadmm_context *c, size_t i, double wrench[6])
+static void body_wrench(const struct sadmm_context *c, size_t i, double out[6])
 {
     const struct sadmm_contact_set *contacts = c->system->contacts;
-    memset(wrench, 0, 6 * sizeof *wrench);
+    const double per_dt[2] = {-1 / c->settings.dt, 1 / c->settings.dt};
+    double wrench[6] = {0};
     for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) {
         int side;
         const size_t record = cpu_record(c, at, &side);
         if (record >= cpu_pair_records(c)) continue; /* contact wrenches only */
         const struct sadmm_contact_pair *pair = cpu_pair(c, record);
-        double per_dt = (side ? 1 : -1) / c->settings.dt;
         for (int k = 0; k < pair->count; ++k) {
             const struct sadmm_contact_point *point = &contacts->points[pair->first + k];
             const double *r = side ? point->arm_b : point->arm_a, *f = point->impulse;
-            for (int j = 0; j < 3; ++j) wrench[j] += per_dt * f[j];
-            add_cross(r, f, per_dt, wrench + 3);
+            for (int j = 0; j < 3; ++j) wrench[j] += per_dt[side] * f[j];
+            add_cross(r, f, per_dt[side], wrench + 3);
         }
     }
+    memcpy(out, wrench, sizeof wrench);
 }
 
 struct recovery {

@@ -67,11 +67,17 @@ SADMM_INLINE double lead_along(const double n[3], const double v[6], const doubl
     return dot3(n, x);
 }
 
-/* No less than the speed by which a lead moves the point: sums of sizes of components. */
+/* Sum of the sizes of components. */
+SADMM_INLINE double size3(const double x[3]) { return fabs(x[0]) + fabs(x[1]) + fabs(x[2]); }
+
+/* No less than the speed by which a lead moves the point; linear, angular: size3 of the lead's parts. */
+SADMM_INLINE double lead_size_at(double linear, double angular, const double arm[3])
+{
+    return linear + angular * size3(arm);
+}
 SADMM_INLINE double lead_size(const double lead[6], const double arm[3])
 {
-    return fabs(lead[0]) + fabs(lead[1]) + fabs(lead[2]) +
-           (fabs(lead[3]) + fabs(lead[4]) + fabs(lead[5])) * (fabs(arm[0]) + fabs(arm[1]) + fabs(arm[2]));
+    return lead_size_at(size3(lead), size3(lead + 3), arm);
 }
 
 /* Taking leads back may close a contact by this share of what they move it by in all, since the normal part of a lead
@@ -92,10 +98,8 @@ struct lead_touch {
 SADMM_INLINE void lead_add_push(struct lead_touch *touch, double push, const double size[2], double dt, double slop)
 {
     SADMM_UNROLL
-    for (int s = 0; s < 2; ++s) {
-        if (push > 0) touch->body[s] |= TOUCH_CARRIED;
-        if (dt * size[s] > LEAD_LEAST * slop) touch->body[s] |= TOUCH_MOVED;
-    }
+    for (int s = 0; s < 2; ++s)
+        touch->body[s] |= (push > 0 ? TOUCH_CARRIED : 0) | (dt * size[s] > LEAD_LEAST * slop ? TOUCH_MOVED : 0);
 }
 
 /* Leads of these sizes close nothing worth a look: bodies at rest, say. */

@@ -15,19 +15,31 @@ double sadmm_point_error(const struct sadmm_system *system, const struct sadmm_s
     return sadmm_contact_e(system, settings, pair, points, k);
 }
 
-void sadmm_body_lead(const struct sadmm_rigid *body, const double velocity[6], double lead[6])
+void sadmm_find_leads(size_t count, const struct sadmm_rigid *bodies, const double *velocity, struct sadmm_lead *leads)
 {
-    lead_own(body->velocity, velocity, rigid_is_isotropic(v3_load(body->inertia)), lead);
+    for (size_t i = 0; i < count; ++i) {
+        struct sadmm_lead *out = &leads[i];
+        lead_own(bodies[i].velocity, velocity + 6 * i, rigid_is_isotropic(v3_load(bodies[i].inertia)), out->lead);
+        out->linear = size3(out->lead);
+        out->angular = size3(out->lead + 3);
+    }
 }
 
-void sadmm_rigid_advance(const struct sadmm_rigid *body, const double velocity[6], const double lead[6], double dt,
-                         struct sadmm_rigid *next)
+static void advance(const struct sadmm_rigid *body, const double velocity[6], const double lead[6], double dt,
+                    struct sadmm_rigid *next)
 {
-    struct sadmm_rigid moved = *body;
     double mean[6];
-    memcpy(moved.velocity, velocity, sizeof moved.velocity);
     for (int k = 0; k < 6; ++k) mean[k] = velocity[k] - lead[k];
-    v3_store(rigid_move(v3_load(body->position), v3_load(mean), dt), moved.position);
-    q_store(rigid_turn(q_load(body->orientation), v3_load(mean + 3), dt), moved.orientation);
-    *next = moved;
+    const vec3 position = rigid_move(v3_load(body->position), v3_load(mean), dt);
+    const quat orientation = rigid_turn(q_load(body->orientation), v3_load(mean + 3), dt);
+    *next = *body;
+    v3_store(position, next->position);
+    q_store(orientation, next->orientation);
+    memcpy(next->velocity, velocity, sizeof next->velocity);
+}
+
+void sadmm_advance(size_t count, const struct sadmm_rigid *bodies, const double *velocity,
+                   const struct sadmm_lead *leads, double dt, struct sadmm_rigid *next)
+{
+    for (size_t i = 0; i < count; ++i) advance(&bodies[i], velocity + 6 * i, leads[i].lead, dt, &next[i]);
 }

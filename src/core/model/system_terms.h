@@ -12,11 +12,16 @@ void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_sett
 double sadmm_point_error(const struct sadmm_system *system, const struct sadmm_settings *settings,
                          const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *points, int32_t k);
 
-/* The lead of a body by itself (math/lead.h), which ends the step with `velocity`. */
-void sadmm_body_lead(const struct sadmm_rigid *body, const double velocity[6], double lead[6]);
+/* A body's lead (math/lead.h), and the sizes of its parts (size3). */
+struct sadmm_lead {
+    double lead[6], linear, angular;
+};
 
-/* The state after dt: `next` is `body` with `velocity` (end-of-step, 6), moved with that less its lead. */
-void sadmm_rigid_advance(const struct sadmm_rigid *body, const double velocity[6], const double lead[6], double dt,
-                         struct sadmm_rigid *next);
+/* Leads of `count` bodies, each by itself, which end the step with `velocity` (count x 6). */
+void sadmm_find_leads(size_t count, const struct sadmm_rigid *bodies, const double *velocity, struct sadmm_lead *leads);
+
+/* States after dt: `next` are `bodies` with `velocity` (end-of-step, count x 6), moved with that less their leads. */
+void sadmm_advance(size_t count, const struct sadmm_rigid *bodies, const double *velocity,
+                   const struct sadmm_lead *leads, double dt, struct sadmm_rigid *next);
 
 #endif
