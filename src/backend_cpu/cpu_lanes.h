@@ -64,6 +64,18 @@ static inline vec sym3_times(lane_sym3 s, vec v)
                  s.xz * v.x + s.yz * v.y + s.zz * v.z};
 }
 
+/* ---- 3-vectors in double, whatever the precision: one in a vector ---------------------------------------------- */
+
+typedef double vec3d __attribute__((vector_size(4 * sizeof(double))));
+
+static inline vec3d vec3d_load(const double x[3]) { return (vec3d){x[0], x[1], x[2], 0}; }
+static inline void vec3d_store(vec3d v, double x[3]) { x[0] = v[0], x[1] = v[1], x[2] = v[2]; }
+static inline vec3d vec3d_cross(vec3d a, vec3d b)
+{
+    return __builtin_shufflevector(a, a, 1, 2, 0, 3) * __builtin_shufflevector(b, b, 2, 0, 1, 3) -
+           __builtin_shufflevector(a, a, 2, 0, 1, 3) * __builtin_shufflevector(b, b, 1, 2, 0, 3);
+}
+
 /* ---- rows <-> lanes ------------------------------------------------------------------------------------------- */
 
 /* LANES rows of ROW numbers are ROW vectors of LANES numbers, element (row l, number c) at 8 l + c. Splitting all

@@ -146,24 +146,25 @@ sadmm_status CPU(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, s
 /* ---- R ----------------------------------------------------------------------------------------------------------- */
 
 /* Eq. (12) with lambda = -u: J^T lambda / dt, summed over a body's contacts in their fixed order. */
-static void body_wrench(const struct sadmm_context *c, size_t i, double out[6])
+static void body_wrench(const struct sadmm_context *c, size_t i, const double per_dt[2], double wrench[6])
 {
     const struct sadmm_contact_set *contacts = c->system->contacts;
-    const double per_dt[2] = {-1 / c->settings.dt, 1 / c->settings.dt};
-    double wrench[6] = {0};
+    vec3d force = {0}, torque = {0};
     for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) {
         int side;
         const size_t record = cpu_record(c, at, &side);
         if (record >= cpu_pair_records(c)) continue; /* contact wrenches only */
         const struct sadmm_contact_pair *pair = cpu_pair(c, record);
+        const double share = per_dt[side];
         for (int k = 0; k < pair->count; ++k) {
             const struct sadmm_contact_point *point = &contacts->points[pair->first + k];
-            const double *r = side ? point->arm_b : point->arm_a, *f = point->impulse;
-            for (int j = 0; j < 3; ++j) wrench[j] += per_dt[side] * f[j];
-            add_cross(r, f, per_dt[side], wrench + 3);
+            const vec3d f = vec3d_load(point->impulse);
+            force += share * f;
+            torque += share * vec3d_cross(vec3d_load(side ? point->arm_b : point->arm_a), f);
         }
     }
-    memcpy(out, wrench, sizeof wrench);
+    vec3d_store(force, wrench);
+    vec3d_store(torque, wrench + 3);
 }
 
 struct recovery {
@@ -176,7 +177,8 @@ static void recover_share(void *argument, int thread, int threads)
     const struct recovery *r = (const struct recovery *)argument;
     size_t begin, end;
     cpu_share_bodies(r->c, thread, threads, &begin, &end);
-    for (size_t i = begin; i < end; ++i) body_wrench(r->c, i, r->wrench + 6 * i);
+    const double per_dt[2] = {-1 / r->c->settings.dt, 1 / r->c->settings.dt}; /* on a, on b */
+    for (size_t i = begin; i < end; ++i) body_wrench(r->c, i, per_dt, r->wrench + 6 * i);
 }
 
 sadmm_status CPU(recover_wrenches)(struct sadmm_context *c, double *wrench, struct sadmm_error *error)
