@@ -16,7 +16,7 @@ bool CPU(has_rigid_mass)(const struct sadmm_context *c, const double A[PACKED6])
     for (int r = 3; r < 6; ++r)
         for (int k = 0; k < 3; ++k) rigid = rigid && A[r * (r + 1) / 2 + k] == 0;
     double xx = A[9], yy = A[14], zz = A[20], xy = A[13], xz = A[18], yz = A[19];
-    double smallest = fmin(xx, fmin(yy, zz)), largest = fmax(xx, fmax(yy, zz));
+    double smallest = min_of(xx, min_of(yy, zz)), largest = max_of(xx, max_of(yy, zz));
     if (!rigid || smallest < LEAST_MOMENT || largest > MOST_MOMENT) return false;
     double determinant = xx * (yy * zz - yz * yz) + xy * (xz * yz - xy * zz) + xz * (xy * yz - xz * yy);
     return determinant > LEAST_DETERMINANT * (xx * yy * zz);

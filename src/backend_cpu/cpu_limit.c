@@ -49,7 +49,7 @@ static void add_pair(const struct sadmm_context *c, size_t record, struct limit_
             error = (double)slot->error[l];
             impulse = (double)slot->lambda[l];
         }
-        work += fmax(0, -error) * impulse;
+        work += max_of(0.0, -error) * impulse;
         drive -= error * impulse;
     }
     sum->work += work;
@@ -141,7 +141,7 @@ static double factor_of(const struct sadmm_context *c, int32_t i, bool under_ite
     if (island->rows) return 1; /* the energies are those of contacts alone */
     const double factor = limit_factor(&island->limit, (double)SADMM_EPSILON);
     if (!under_iterated) return factor;
-    return fmin(factor, limit_bounce_factor(&island->limit, island->along, (double)SADMM_EPSILON));
+    return min_of(factor, limit_bounce_factor(&island->limit, island->along, (double)SADMM_EPSILON));
 }
 
 static void invert_share(void *context, int thread, int threads)

@@ -57,10 +57,12 @@ sadmm_status CPU(read_solution)(struct sadmm_context *c, struct sadmm_error *err
 /* ---- Q ----------------------------------------------------------------------------------------------------------- */
 
 /* Bits of a body or an island. Threads may add some at once, in any order: the same ones are there in the end. */
-static void add_bits(_Atomic int32_t *to, int bits)
+static void add_bits(_Atomic int32_t *to, int bits, bool alone)
 {
-    if (bits & ~atomic_load_explicit(to, memory_order_relaxed))
-        atomic_fetch_or_explicit(to, bits, memory_order_relaxed);
+    const int32_t before = atomic_load_explicit(to, memory_order_relaxed);
+    if (!(bits & ~before)) return;
+    if (alone) atomic_store_explicit(to, before | bits, memory_order_relaxed);
+    else atomic_fetch_or_explicit(to, bits, memory_order_relaxed);
 }
 
 /* What a pair's points touch (math/lead.h). */
@@ -87,15 +89,12 @@ static struct lead_touch touch_of(const struct sadmm_context *c, const struct sa
 }
 
 /* Bodies have bits of their own, islands theirs at their labels: no bit means both. */
-static void touch_pair(struct sadmm_context *c, const struct sadmm_contact_pair *pair)
+static void touch_pair(struct sadmm_context *c, const struct sadmm_contact_pair *pair, bool alone)
 {
     const struct lead_touch touch = touch_of(c, pair);
-    const int32_t body[2] = {pair->body_a, pair->body_b};
-    for (int s = 0; s < 2; ++s) {
-        if (body[s] < 0) continue;
-        add_bits(&c->touch[c->label[body[s]]], touch.island);
-        add_bits(&c->touch[body[s]], touch.body[s]);
-    }
+    add_bits(&c->touch[c->label[pair->body_a >= 0 ? pair->body_a : pair->body_b]], touch.island, alone);
+    if (pair->body_a >= 0) add_bits(&c->touch[pair->body_a], touch.body[0], alone);
+    if (pair->body_b >= 0) add_bits(&c->touch[pair->body_b], touch.body[1], alone);
 }
 
 /* In place of a body's lead what it takes back. */
@@ -127,7 +126,7 @@ static void integrate_share(void *argument, int thread, int threads)
         for (size_t i = first; i < past; ++i) atomic_store_explicit(&c->touch[i], 0, memory_order_relaxed);
         sadmm_barrier_wait(&c->barrier, threads);
         sadmm_share(c->system->contacts->pair_count, thread, threads, &begin, &end);
-        for (size_t p = begin; p < end; ++p) touch_pair(c, &c->system->contacts->pairs[p]);
+        for (size_t p = begin; p < end; ++p) touch_pair(c, &c->system->contacts->pairs[p], threads == 1);
         sadmm_barrier_wait(&c->barrier, threads);
         for (size_t i = first; i < past; ++i) choose_lead(c, i, c->leads[i].lead);
     }

@@ -10,7 +10,7 @@ SADMM_INLINE double contact_error(double gap, double dt, double baumgarte, doubl
 {
     const double depth = -gap - slop;
     if (gap >= 0) return gap / dt;
-    return depth > 0 ? -fmin(baumgarte * depth / dt, correction_speed) : 0.0;
+    return depth > 0 ? -min_of(baumgarte * depth / dt, correction_speed) : 0.0;
 }
 
 /* Does a contact that approaches (negative) touch within the step, faster than the threshold of restitution? */

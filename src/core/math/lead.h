@@ -85,8 +85,8 @@ SADMM_INLINE double lead_size(const double lead[6], const double arm[3])
  * jitters by. */
 #define LEAD_SHARE 0.05
 #define LEAD_SLOP 0.1
-/* Of a body that is carried, what moves a point by less than this share of the slop is what a body at rest jitters by. A
- * mean of two velocities does not show the contacts what they corrected by: they would correct it again. */
+/* Of a body that is carried, what moves a point by less than this share of the slop is what a body at rest jitters by.
+ * A mean of two velocities does not show the contacts what they corrected by: they would correct it again. */
 #define LEAD_LEAST 1e-3
 
 /* Bits of an island, and of the two bodies, a and b. */
@@ -114,7 +114,7 @@ SADMM_INLINE void lead_add_way(struct lead_touch *touch, double gap, double spee
                                const double size[2], double dt, double slop)
 {
     const double end = gap + dt * speed,
-                 room = (end > 0 ? end : 0) + fmax(LEAD_SHARE * dt * (size[0] + size[1]), LEAD_SLOP * slop);
+                 room = (end > 0 ? end : 0) + max_of(LEAD_SHARE * dt * (size[0] + size[1]), LEAD_SLOP * slop);
     if (dt * (lead[0] + lead[1]) > room) touch->island |= TOUCH_JOLT;
     SADMM_UNROLL
     for (int s = 0; s < 2; ++s)

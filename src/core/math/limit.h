@@ -54,7 +54,7 @@ SADMM_INLINE int limit_is_rounding(const struct limit_energies *e, double epsilo
 SADMM_INLINE void limit_take_rigid(struct limit_energies *e, double *along, const struct momentum_energies *rigid)
 {
     e->now -= rigid->now;
-    e->free = fmax(e->free - rigid->free, 0.0);
+    e->free = max_of(e->free - rigid->free, 0.0);
     e->rigid = rigid->free;
     e->loose = 1;
     *along -= rigid->along;
@@ -65,7 +65,7 @@ SADMM_INLINE double limit_work(const struct limit_energies *e)
 {
     if (!e->loose) return e->momentum_residual <= LIMIT_BALANCED * (e->now + e->free) ? e->work : 0;
     const double share = e->drive >= e->response ? 1 : e->drive > 0 ? e->drive / e->response : 0;
-    return fmax(share * (e->work - e->drive / 2), 0.0);
+    return max_of(share * (e->work - e->drive / 2), 0.0);
 }
 
 /* The factor for the island's velocities, 1: none. */
@@ -88,7 +88,7 @@ SADMM_INLINE int limit_under_iterated(int warm, int iterations) { return warm &&
 /* `along`: v . A v_f / 2, J. */
 SADMM_INLINE int limit_bounces(double now, double free, double along, double epsilon)
 {
-    return now > (1 + LIMIT_ROUNDING) * along + fmax(LIMIT_STILL, LIMIT_STILL_ROUNDING * epsilon) * free;
+    return now > (1 + LIMIT_ROUNDING) * along + max_of(LIMIT_STILL, LIMIT_STILL_ROUNDING * epsilon) * free;
 }
 
 /* The factor that takes v back to the sphere, 1: none. */
@@ -97,7 +97,7 @@ SADMM_INLINE double limit_bounce_factor(const struct limit_energies *e, double a
     double factor;
     if (!limit_bounces(e->now, e->free, along, epsilon) || limit_is_rounding(e, epsilon)) return 1;
     factor = (along + sqrt(along * along + 2 * e->now * e->work)) / (2 * e->now);
-    return factor > 1 - LIMIT_ROUNDING ? 1 : fmax(factor, LIMIT_LEAST);
+    return factor > 1 - LIMIT_ROUNDING ? 1 : max_of(factor, LIMIT_LEAST);
 }
 
 #endif

@@ -90,7 +90,7 @@ SADMM_INLINE void packed_round_up(double C[PACKED6], double epsilon)
 #define INERTIA_ROUNDINGS 2.0
 SADMM_INLINE int packed_inertia_drowns(const double A[PACKED6], double beta, const double C[PACKED6], double epsilon)
 {
-    const double largest = fmax(C[9], fmax(C[14], C[20])), trace = A[9] + A[14] + A[20];
+    const double largest = max_of(C[9], max_of(C[14], C[20])), trace = A[9] + A[14] + A[20];
     const double det = A[9] * (A[14] * A[20] - A[19] * A[19]) - A[13] * (A[13] * A[20] - A[19] * A[18]) +
                        A[18] * (A[13] * A[19] - A[14] * A[18]);
     return INERTIA_ROUNDINGS * C_ROUNDING * epsilon * beta * largest * trace * trace > 4 * det;

@@ -16,7 +16,7 @@ SADMM_INLINE double penalty_of_body(double trace_A, double trace_C, double mass_
 SADMM_INLINE double penalty_ratio(double primal, double dual, double limit)
 {
     if (primal <= 0 && dual <= 0) return 1;
-    return fmin(fmax(primal / fmax(dual, 1e-300), 1 / limit), limit);
+    return min_of(max_of(primal / max_of(dual, 1e-300), 1 / limit), limit);
 }
 
 /* 1/s of a constraint, s = 1/beta_a + 1/beta_b; 1/beta of the static world is 0. */

@@ -9,6 +9,7 @@
 #include <stdint.h>
 
 #include "core/base/inline.h"
+#include "max.h"
 
 #ifndef SADMM_REAL
 #define SADMM_REAL double

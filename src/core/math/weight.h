@@ -9,9 +9,7 @@
 #ifndef SADMM_MATH_WEIGHT_H
 #define SADMM_MATH_WEIGHT_H
 
-#include <math.h>
-
-#include "core/base/inline.h"
+#include "max.h"
 
 /* Iterations after which a step that started cold recomputes its weights, from the loads it has found by then: 5, 10,
  * 20, 40, and from there always half as many again. Changes as late as that are small, and a change disturbs. */
@@ -56,7 +54,7 @@ SADMM_INLINE double weight_speed(double energy, double mass)
 /* min(load / V, m), kg; load in N s. */
 SADMM_INLINE double weight_mass(double load, double speed, double mass)
 {
-    return fmin(load / speed, mass);
+    return min_of(load / speed, mass);
 }
 
 /* The weight scale of an island under contacts, a factor of its weights, from the sixth refresh on:
@@ -89,9 +87,9 @@ SADMM_INLINE int weight_stalls(double balance) { return balance > WEIGHT_STALLS;
 
 SADMM_INLINE double weight_next_scale(double scale, double balance)
 {
-    double off = weight_stalls(balance) ? balance / WEIGHT_STALLS : fmin(balance / WEIGHT_LAGS, 1.0);
-    double factor = fmin(fmax(pow(off, WEIGHT_SCALE_POWER), 1 / WEIGHT_SCALE_STEP), WEIGHT_SCALE_STEP);
-    return fmin(fmax(scale * factor, WEIGHT_SCALE_LEAST), WEIGHT_SCALE_MOST);
+    double off = weight_stalls(balance) ? balance / WEIGHT_STALLS : min_of(balance / WEIGHT_LAGS, 1.0);
+    double factor = min_of(max_of(pow(off, WEIGHT_SCALE_POWER), 1 / WEIGHT_SCALE_STEP), WEIGHT_SCALE_STEP);
+    return min_of(max_of(scale * factor, WEIGHT_SCALE_LEAST), WEIGHT_SCALE_MOST);
 }
 
 /* The next weight scale. Returns what the weights of an island that stalls rise by, 0: it does not stall, and takes new
@@ -118,14 +116,14 @@ SADMM_INLINE double weight_rescale(struct weight_island *island, const struct we
 /* 1 and more. */
 SADMM_INLINE double weight_stack_depth(double speed, double push, double mass)
 {
-    return fmax(push / (mass * speed * WEIGHT_DEEP), 1.0);
+    return max_of(push / (mass * speed * WEIGHT_DEEP), 1.0);
 }
 
 /* V: less, and B more, where the island is at rest. */
 SADMM_INLINE double weight_speed_warm(double speed, double stack_depth, double kinetic, double mass)
 {
-    double least = speed / fmin(stack_depth * stack_depth, WEIGHT_DEEP_MOST);
-    return fmin(fmax(least, WEIGHT_REST * sqrt(kinetic / mass)), speed);
+    double least = speed / min_of(stack_depth * stack_depth, WEIGHT_DEEP_MOST);
+    return min_of(max_of(least, WEIGHT_REST * sqrt(kinetic / mass)), speed);
 }
 
 /* Steps that start warm with fewer iterations than this: the springs above would be softer, and heavy bodies on top
@@ -139,14 +137,14 @@ SADMM_INLINE double weight_speed_warm(double speed, double stack_depth, double k
  * no row of steps. */
 SADMM_INLINE double weight_under_iterated(int rigid, int iterations)
 {
-    return rigid ? fmin(fmax((double)WEIGHT_UNDER_ITERATED / iterations, 1.0), WEIGHT_UNDER_ITERATED_MOST) : 1;
+    return rigid ? min_of(max_of((double)WEIGHT_UNDER_ITERATED / iterations, 1.0), WEIGHT_UNDER_ITERATED_MOST) : 1;
 }
 
 /* V of such a step; `warm` is what weight_speed_warm made of `speed`. */
 SADMM_INLINE double weight_speed_under_iterated(double speed, double warm, double under_iterated, double kinetic,
                                                 double mass)
 {
-    return fmin(fmax(speed / under_iterated, WEIGHT_MOVING * sqrt(kinetic / mass)), warm);
+    return min_of(max_of(speed / under_iterated, WEIGHT_MOVING * sqrt(kinetic / mass)), warm);
 }
 
 /* V, and what goes with it. warm: the step starts warm; under_iterated: weight_under_iterated. */
@@ -167,7 +165,7 @@ SADMM_INLINE void weight_update_speed(struct weight_island *island, const struct
 SADMM_INLINE double weight_gap_share(double stack_depth)
 {
     double square = stack_depth * stack_depth;
-    return fmax(1 / (square * square * square), WEIGHT_GAP_LEAST);
+    return max_of(1 / (square * square * square), WEIGHT_GAP_LEAST);
 }
 
 SADMM_INLINE double weight_gap_error(double error, double share, double slop)
@@ -184,7 +182,7 @@ SADMM_INLINE double weight_of_pair(const struct weight_island *island, double lo
 {
     const double scale = island->scale;
     return scale * weight_mass(load, island->speed, island->mass) +
-           fmax(scale, 1.0) * WEIGHT_FLOOR_CONTACT / response;
+           max_of(scale, 1.0) * WEIGHT_FLOOR_CONTACT / response;
 }
 
 /* Sums over the rows of a constraint given by rows: squares of loads (N s) and of multipliers; the mean response. */
