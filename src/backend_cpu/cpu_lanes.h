@@ -68,12 +68,29 @@ static inline vec sym3_times(lane_sym3 s, vec v)
 
 typedef double vec3d __attribute__((vector_size(4 * sizeof(double))));
 
+/* A row in double. */
+typedef double row8d __attribute__((vector_size(8 * sizeof(double))));
+
 static inline vec3d vec3d_load(const double x[3]) { return (vec3d){x[0], x[1], x[2], 0}; }
 static inline void vec3d_store(vec3d v, double x[3]) { x[0] = v[0], x[1] = v[1], x[2] = v[2]; }
 static inline vec3d vec3d_cross(vec3d a, vec3d b)
 {
     return __builtin_shufflevector(a, a, 1, 2, 0, 3) * __builtin_shufflevector(b, b, 2, 0, 1, 3) -
            __builtin_shufflevector(a, a, 2, 0, 1, 3) * __builtin_shufflevector(b, b, 1, 2, 0, 3);
+}
+
+static inline vec3d vec3d_of_lane(const vec *v, size_t l)
+{
+    return (vec3d){(double)v->x[l], (double)v->y[l], (double)v->z[l], 0};
+}
+/* Of a velocity or a momentum. */
+typedef struct vec6d {
+    vec3d linear, angular;
+} vec6d;
+static inline void vec6d_store(vec6d v, double x[6])
+{
+    vec3d_store(v.linear, x);
+    vec3d_store(v.angular, x + 3);
 }
 
 /* ---- rows <-> lanes ------------------------------------------------------------------------------------------- */

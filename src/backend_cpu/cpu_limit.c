@@ -112,14 +112,15 @@ static void energies_share(void *context, int thread, int threads)
 /* A body's terms: of the momentum residual; in loose islands of drive and response. `wrenches` hold J^T lambda. */
 static void impulse_terms(const struct sadmm_context *c, size_t i, double terms[3])
 {
-    double b[6], g[6] = {0}, change[6];
+    double b[6], g[6], change[6];
+    row8d sum = {0};
     terms[0] = terms[1] = terms[2] = 0;
     if (c->loose_of[c->label[i]] < 0) {
         terms[0] = cpu_residual_energy(c, i) / 2;
         return;
     }
-    for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at)
-        for (int k = 0; k < 6; ++k) g[k] += (double)c->wrenches[(size_t)c->incident[at] * ROW + (size_t)k];
+    for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) sum += cpu_wrench(c, c->incident[at]);
+    for (int k = 0; k < 6; ++k) g[k] = sum[k];
     cpu_load_b(c, i, b);
     rigid_product(&c->A_inverse[i * PACKED6], g, change);
     terms[1] = -dense6_dot(change, b);

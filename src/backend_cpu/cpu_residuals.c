@@ -1,38 +1,55 @@
 /* The method `fast`: what the momentum of bodies misses, r = b - A v + J^T lambda, before iterations change it by what
  * v and lambda change. In double, from this precision's b, v and lambda, in the order of a body's records. */
-#include "core/math/array3.h"
 #include "cpu_rows.h"
 
-static void add_pair(const struct sadmm_context *c, size_t record, int side, double r[6])
+/* The impulse on b of point k of a lane, and its arm about a (b where a is static). */
+static void load_point(const struct sadmm_context *c, const struct pair_block *block, size_t l, int k, vec3d *impulse,
+                       vec3d *arm)
+{
+    const size_t at = block->first + (size_t)k;
+    if (c->plan.contact_rows == 3) {
+        const struct point_slot *slot = (const struct point_slot *)c->slots + at;
+        *arm = vec3d_of_lane(&slot->arm, l);
+        *impulse = vec3d_of_lane(&slot->lambda, l);
+    } else {
+        const struct normal_slot *slot = (const struct normal_slot *)c->slots + at;
+        *arm = vec3d_of_lane(&slot->arm, l);
+        *impulse = (double)slot->lambda[l] * vec3d_of_lane(&block->normal, l);
+    }
+}
+
+static void add_pair(const struct sadmm_context *c, size_t record, int side, vec6d *r)
 {
     const struct pair_block *block = &c->pair_blocks[record / (size_t)LANES];
     const size_t l = record % (size_t)LANES;
     const double sign = side ? 1 : -1;
-    const double d[3] = {(double)block->d.x[l], (double)block->d.y[l], (double)block->d.z[l]};
-    for (int k = 0; k < c->system->contacts->pairs[block->pair[l]].count; ++k) {
-        struct cpu_point point = cpu_load_point(c, block, l, k);
-        for (int j = 0; j < 3; ++j) {
-            point.arm[j] += side ? d[j] : 0;
-            r[j] += sign * point.impulse[j];
-        }
-        add_cross(point.arm, point.impulse, sign, r + 3);
+    const vec3d d = side ? vec3d_of_lane(&block->d, l) : (vec3d){0};
+    const int count = c->system->contacts->pairs[block->pair[l]].count;
+    for (int k = 0; k < count; ++k) {
+        vec3d impulse, arm;
+        load_point(c, block, l, k, &impulse, &arm);
+        r->linear += sign * impulse;
+        r->angular += sign * vec3d_cross(arm + d, impulse);
     }
 }
 
-static void add_rows(const struct sadmm_context *c, size_t record, int side, double r[6])
+static void add_rows(const struct sadmm_context *c, size_t record, int side, vec6d *r)
 {
     int lane;
     const struct row_block *block = cpu_row_block(c, record, &lane);
     for (int k = 0; k < cpu_row_count(c, block, lane); ++k) {
         double row[6], lambda = (double)c->row_slots[block->first + (size_t)k].lambda[lane];
         cpu_load_row(c, block, lane, side, k, row);
-        for (int j = 0; j < 6; ++j) r[j] += row[j] * lambda;
+        r->linear += vec3d_load(row) * lambda;
+        r->angular += vec3d_load(row + 3) * lambda;
     }
 }
 
-static void store_momentum_residual(struct sadmm_context *c, size_t i, const double r[6])
+static void store_momentum_residual(struct sadmm_context *c, size_t i, vec6d residual)
 {
     const int32_t general = cpu_general(c, i);
+    double r[6];
+    vec6d_store(residual, r);
     if (general >= 0) {
         for (int k = 0; k < ROW; ++k) c->momentum_residuals[(size_t)general * ROW + (size_t)k] = k < 6 ? (real)r[k] : 0;
         return;
@@ -48,13 +65,12 @@ static void store_momentum_residual(struct sadmm_context *c, size_t i, const dou
 void CPU(recompute_residuals)(struct sadmm_context *c, size_t begin, size_t end)
 {
     for (size_t i = begin; i < end; ++i) {
-        double r[6];
-        cpu_free_momentum(c, i, r);
+        vec6d r = cpu_free_momentum(c, i);
         for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) {
             int side;
             const size_t record = cpu_record(c, at, &side);
-            if (record < cpu_pair_records(c)) add_pair(c, record, side, r);
-            else add_rows(c, record, side, r);
+            if (record < cpu_pair_records(c)) add_pair(c, record, side, &r);
+            else add_rows(c, record, side, &r);
         }
         store_momentum_residual(c, i, r);
     }

@@ -106,13 +106,21 @@ static inline void cpu_load_v(const struct sadmm_context *c, size_t i, double v[
     for (int k = 0; k < 6; ++k) v[k] = (double)c->state[i * ROW + (size_t)k];
 }
 
-/* b - A v */
-static inline void cpu_free_momentum(const struct sadmm_context *c, size_t i, double r[6])
+/* Has a body's A the structure of a rigid one's? */
+static inline bool cpu_is_rigid(const struct sadmm_context *c, size_t i)
 {
-    const double *A = &c->A[i * PACKED6];
-    double v[6];
-    cpu_load_b(c, i, r);
-    cpu_load_v(c, i, v);
+    return c->plan.rigid || cpu_general(c, i) < 0;
+}
+
+/* x . M x, M a body's A or A^-1 */
+static inline double cpu_form(const struct sadmm_context *c, size_t i, const double M[PACKED6], const double x[6])
+{
+    return cpu_is_rigid(c, i) ? packed_form_rigid(M, x) : packed_form(M, x);
+}
+
+/* r -= A v */
+static inline void cpu_take_momentum(const double A[PACKED6], const double v[6], double r[6])
+{
     for (int j = 0, at = 0; j < 6; ++j)
         for (int k = 0; k <= j; ++k, ++at) {
             r[j] -= A[at] * v[k];
@@ -120,14 +128,46 @@ static inline void cpu_free_momentum(const struct sadmm_context *c, size_t i, do
         }
 }
 
+/* b - A v */
+static inline vec6d cpu_free_momentum(const struct sadmm_context *c, size_t i)
+{
+    const double *A = &c->A[i * PACKED6];
+    const real *v = &c->state[i * ROW];
+    double r[6], velocity[6];
+    vec6d out;
+    if (cpu_general(c, i) < 0) {
+        const struct body_block *block = &c->body_blocks[i / (size_t)LANES];
+        out.linear = vec3d_of_lane(&block->b_linear, i % (size_t)LANES);
+        out.angular = vec3d_of_lane(&block->b_angular, i % (size_t)LANES);
+        out.linear -= A[0] * (vec3d){(double)v[0], (double)v[1], (double)v[2], 0};
+        out.angular -= (vec3d){A[9], A[13], A[18], 0} * (double)v[3];
+        out.angular -= (vec3d){A[13], A[14], A[19], 0} * (double)v[4];
+        out.angular -= (vec3d){A[18], A[19], A[20], 0} * (double)v[5];
+        return out;
+    }
+    cpu_load_b(c, i, r);
+    cpu_load_v(c, i, velocity);
+    cpu_take_momentum(A, velocity, r);
+    out.linear = vec3d_load(r);
+    out.angular = vec3d_load(r + 3);
+    return out;
+}
+
+/* A wrench row in double. */
+static inline row8d cpu_wrench(const struct sadmm_context *c, int32_t row)
+{
+    return __builtin_convertvector(*(const row8 *)&c->wrenches[(size_t)row * ROW], row8d);
+}
+
 /* r . A^-1 r, r = b + J^T lambda - A v; `wrenches` hold J^T lambda. */
 static inline double cpu_residual_energy(const struct sadmm_context *c, size_t i)
 {
-    double r[6];
-    cpu_free_momentum(c, i, r);
-    for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at)
-        for (int k = 0; k < 6; ++k) r[k] += (double)c->wrenches[(size_t)c->incident[at] * ROW + (size_t)k];
-    return packed_form(&c->A_inverse[i * PACKED6], r);
+    double r[8] = {0};
+    vec6d_store(cpu_free_momentum(c, i), r);
+    row8d sum = {r[0], r[1], r[2], r[3], r[4], r[5], 0, 0};
+    for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) sum += cpu_wrench(c, c->incident[at]);
+    for (int k = 0; k < 6; ++k) r[k] = sum[k];
+    return cpu_form(c, i, &c->A_inverse[i * PACKED6], r);
 }
 
 /* The island of a constraint between two bodies, one of which may be the static world. */

@@ -91,16 +91,18 @@ static void add_up_loads(struct sadmm_context *c)
 /* A body's part of its island's sums. */
 static void add_up_body(const struct sadmm_context *c, size_t i, double sums[BODY_SUMS])
 {
-    double g[6] = {0}, v[6], push = 0;
+    double g[6], v[6], push = 0;
+    row8d sum = {0};
     for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) {
-        const real *wrench = &c->wrenches[(size_t)c->incident[at] * ROW];
-        const double f[3] = {(double)wrench[0], (double)wrench[1], (double)wrench[2]};
-        for (int k = 0; k < 6; ++k) g[k] += (double)wrench[k];
+        const row8d wrench = cpu_wrench(c, c->incident[at]);
+        const double f[3] = {wrench[0], wrench[1], wrench[2]};
+        sum += wrench;
         push += length3(f);
     }
-    sums[0] = packed_form(&c->A_inverse[i * PACKED6], g);
+    for (int k = 0; k < 6; ++k) g[k] = sum[k];
     cpu_load_v(c, i, v);
-    sums[1] = packed_form(&c->A[i * PACKED6], v);
+    sums[0] = cpu_form(c, i, &c->A_inverse[i * PACKED6], g);
+    sums[1] = cpu_form(c, i, &c->A[i * PACKED6], v);
     sums[2] = push;
 }
 

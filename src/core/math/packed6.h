@@ -31,6 +31,22 @@ SADMM_INLINE double packed_form(const double M[PACKED6], const double x[6])
     return sum;
 }
 
+/* The same of a rigid body's M, in the same order without what is 0 there: to the same bits. */
+SADMM_INLINE double packed_form_rigid(const double M[PACKED6], const double x[6])
+{
+    double sum = 0;
+    sum += M[0] * x[0] * x[0];
+    sum += M[2] * x[1] * x[1];
+    sum += M[5] * x[2] * x[2];
+    sum += M[9] * x[3] * x[3];
+    sum += 2 * M[13] * x[4] * x[3];
+    sum += M[14] * x[4] * x[4];
+    sum += 2 * M[18] * x[5] * x[3];
+    sum += 2 * M[19] * x[5] * x[4];
+    sum += M[20] * x[5] * x[5];
+    return sum;
+}
+
 /* C += weight row^T row */
 SADMM_INLINE void packed_add_row(double C[PACKED6], const double row[6], double weight)
 {
