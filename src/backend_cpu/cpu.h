@@ -198,11 +198,12 @@ struct sadmm_context {
     double *A_inverse;          /* bodies x PACKED6 */
     double *pair_response, *pair_weight; /* pair records: J A^-1 J^T, B in kg */
     double *pair_violation;     /* pair records: terms of the islands' sums */
+    struct arm_sums *pair_arms; /* where contacts have three rows: of pair records on a and b, once a step */
     int refreshes;              /* of the weights, in this solve */
     int exact_since;            /* iterations since the momentum residuals were taken */
     double *body_sums;          /* bodies x BODY_SUMS: terms of the islands' sums */
     size_t body_sum_capacity, island_capacity, A_inverse_capacity, pair_response_capacity,
-        pair_weight_capacity, pair_violation_capacity;
+        pair_weight_capacity, pair_violation_capacity, pair_arm_capacity;
 
     double *thread_max; /* one cache line a thread */
     size_t thread_max_capacity;

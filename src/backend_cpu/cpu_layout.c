@@ -126,7 +126,10 @@ sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *syst
                             sadmm_grow_empty(&c->pair_weight, &c->pair_weight_capacity, c->record_count,
                                              sizeof(double)) &&
                             sadmm_grow_empty(&c->pair_violation, &c->pair_violation_capacity, c->record_count,
-                                             sizeof(double)))) &&
+                                             sizeof(double)) &&
+                            sadmm_grow_empty(&c->pair_arms, &c->pair_arm_capacity,
+                                             plan->contact_rows == 3 ? 2 * cpu_pair_records(c) : 0,
+                                             sizeof *c->pair_arms))) &&
               sadmm_grow_empty(&c->thread_max, &c->thread_max_capacity, (size_t)plan->threads * THREAD_MAX_STRIDE,
                                sizeof(double));
     if (!ok) return sadmm_fail_memory(error, "the cpu backend's step");

@@ -21,14 +21,12 @@ void CPU(invert)(const struct sadmm_context *c, const double A[PACKED6], double 
 }
 
 /* Sums over a pair's points on one of its bodies: of arms where contacts have three rows, else of J^T J. */
-static void pair_arms(const struct sadmm_context *c, const struct sadmm_contact_pair *pair, int side,
-                      struct arm_sums *sums)
+static struct arm_sums pair_arms(const struct sadmm_context *c, const struct sadmm_contact_pair *pair, int side)
 {
-    memset(sums, 0, sizeof *sums);
-    for (int k = 0; k < pair->count; ++k) {
-        const struct sadmm_contact_point *point = &c->system->contacts->points[pair->first + k];
-        add_arm(sums, side ? point->arm_b : point->arm_a, 1);
-    }
+    const struct sadmm_contact_point *points = &c->system->contacts->points[pair->first];
+    struct arm_sums sums = {0};
+    for (int k = 0; k < pair->count; ++k) add_arm(&sums, side ? points[k].arm_b : points[k].arm_a, 1);
+    return sums;
 }
 
 static void pair_rows(const struct sadmm_context *c, const struct sadmm_contact_pair *pair, int side, double S[PACKED6])
@@ -45,25 +43,27 @@ static void pair_rows(const struct sadmm_context *c, const struct sadmm_contact_
 /* ---- responses: J A^-1 J^T, 1/kg, once a step -------------------------------------------------------------------- */
 
 /* Mean over a pair's points and rows. */
-static double pair_response(const struct sadmm_context *c, const struct sadmm_contact_pair *pair)
+static double pair_response(struct sadmm_context *c, size_t record)
 {
+    const struct sadmm_contact_pair *pair = cpu_pair(c, record);
     const int32_t bodies[2] = {pair->body_a, pair->body_b};
     double w = 0, S[PACKED6];
     for (int side = 0; side < 2; ++side) {
         if (bodies[side] < 0) continue;
         const double *inverse = &c->A_inverse[(size_t)bodies[side] * PACKED6];
-        struct arm_sums sums;
-        if (c->plan.contact_rows == 3) pair_arms(c, pair, side, &sums);
-        if (c->plan.contact_rows == 3 && CPU(has_rigid_mass)(c, &c->A[(size_t)bodies[side] * PACKED6])) {
+        if (c->plan.contact_rows == 1) {
+            pair_rows(c, pair, side, S);
+            w += packed_dot(inverse, S);
+            continue;
+        }
+        const struct arm_sums sums = pair_arms(c, pair, side);
+        c->pair_arms[2 * record + (size_t)side] = sums;
+        if (CPU(has_rigid_mass)(c, &c->A[(size_t)bodies[side] * PACKED6])) {
             w += packed_dot_arms(inverse, &sums);
             continue;
         }
-        if (c->plan.contact_rows == 3) {
-            memset(S, 0, sizeof S);
-            add_arm_sums(S, &sums);
-        } else {
-            pair_rows(c, pair, side, S);
-        }
+        memset(S, 0, sizeof S);
+        add_arm_sums(S, &sums);
         w += packed_dot(inverse, S);
     }
     return w / (c->plan.contact_rows * pair->count);
@@ -106,20 +106,22 @@ static void add_up_body(const struct sadmm_context *c, size_t i, double sums[BOD
     sums[2] = push;
 }
 
-/* Mean size of a pair's impulses. */
-static double pair_load(const struct sadmm_context *c, const struct pair_block *block, int l, int count)
+/* Sums of the sizes of the impulses of a block's pairs. Where a pair has no point lambda is 0. */
+static void add_up_impulses(const struct sadmm_context *c, const struct pair_block *block, double sums[LANES])
 {
-    double sum = 0;
-    for (int k = 0; k < count; ++k) {
+    for (int l = 0; l < LANES; ++l) sums[l] = 0;
+    for (int k = 0; k < block->slots; ++k) {
         if (c->plan.contact_rows == 3) {
-            const vec *f = &((const struct point_slot *)c->slots + block->first + k)->lambda;
-            const double impulse[3] = {(double)f->x[l], (double)f->y[l], (double)f->z[l]};
-            sum += length3(impulse);
+            const vec f = ((const struct point_slot *)c->slots + block->first + k)->lambda;
+            for (int l = 0; l < LANES; ++l) {
+                const double impulse[3] = {(double)f.x[l], (double)f.y[l], (double)f.z[l]};
+                sums[l] += length3(impulse);
+            }
         } else {
-            sum += fabs((double)((const struct normal_slot *)c->slots + block->first + k)->lambda[l]);
+            const lanes f = ((const struct normal_slot *)c->slots + block->first + k)->lambda;
+            for (int l = 0; l < LANES; ++l) sums[l] += fabs((double)f[l]);
         }
     }
-    return sum / count;
 }
 
 /* The contacts of deep stacks close small gaps slowly. */
@@ -143,12 +145,14 @@ static void ease_gaps(struct sadmm_context *c, size_t index)
 static void weigh_pair_block(struct sadmm_context *c, size_t index)
 {
     struct pair_block *block = &c->pair_blocks[index];
+    double sums[LANES];
+    add_up_impulses(c, block, sums);
     for (int l = 0; l < LANES; ++l) {
         if (block->pair[l] < 0) continue;
         const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[block->pair[l]];
         const struct cpu_island *island = cpu_island_of(c, pair->body_a, pair->body_b);
         double *B = &c->pair_weight[index * (size_t)LANES + (size_t)l];
-        double load = pair_load(c, block, l, pair->count);
+        double load = sums[l] / pair->count;
         double response = c->pair_response[index * (size_t)LANES + (size_t)l];
         *B = island->rescale > 0 ? *B * island->rescale : weight_of_pair(&island->weights, load, response);
         block->inv_s[l] = (real)(pair->body_a >= 0 && pair->body_b >= 0 ? *B / 2 : *B);
@@ -181,7 +185,7 @@ static void add_weighted_arms(struct arm_sums *to, const struct arm_sums *arms, 
 static void assemble_C(struct sadmm_context *c, size_t i)
 {
     double *C = &c->C[i * PACKED6], S[PACKED6];
-    struct arm_sums arms, weighted = {0};
+    struct arm_sums weighted = {0};
     memset(C, 0, PACKED6 * sizeof *C);
     for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) {
         int side;
@@ -189,8 +193,7 @@ static void assemble_C(struct sadmm_context *c, size_t i)
         if (record >= cpu_pair_records(c)) {
             add_rows(c, record, side, C);
         } else if (c->plan.contact_rows == 3) {
-            pair_arms(c, cpu_pair(c, record), side, &arms);
-            add_weighted_arms(&weighted, &arms, c->pair_weight[record]);
+            add_weighted_arms(&weighted, &c->pair_arms[2 * record + (size_t)side], c->pair_weight[record]);
         } else {
             pair_rows(c, cpu_pair(c, record), side, S);
             for (int k = 0; k < PACKED6; ++k) C[k] += c->pair_weight[record] * S[k];
@@ -247,7 +250,7 @@ static void respond_share(void *context, int thread, int threads)
     sadmm_share(pair_records, thread, threads, &begin, &end);
     for (size_t k = begin; k < end; ++k)
         if (c->pair_blocks[k / (size_t)LANES].pair[k % (size_t)LANES] >= 0)
-            c->pair_response[k] = pair_response(c, cpu_pair(c, k));
+            c->pair_response[k] = pair_response(c, k);
     sadmm_share(c->row_block_count, thread, threads, &begin, &end);
     for (size_t k = begin; k < end; ++k) CPU(respond_rows)(c, k);
 }
