@@ -3,6 +3,7 @@
 
 #include "core/math/dense6.h"
 #include "core/math/contact.h"
+#include "core/model/system_error.h"
 #include "core/model/system_terms.h"
 #include "cpu_rows.h"
 
@@ -13,13 +14,13 @@ static void set_lane(vec *v, int l, const double value[3])
     v->z[l] = (real)value[2];
 }
 
-static void set_rigid_lane(struct body_block *block, int l, const double A[36], const double b[6])
+static void set_rigid_lane(struct body_block *block, int l, const double A[PACKED6], const double b[6])
 {
     set_lane(&block->b_linear, l, b);
     set_lane(&block->b_angular, l, b + 3);
     block->mass[l] = (real)A[0];
-    block->inertia.xx[l] = (real)A[21], block->inertia.yy[l] = (real)A[28], block->inertia.zz[l] = (real)A[35];
-    block->inertia.xy[l] = (real)A[22], block->inertia.xz[l] = (real)A[23], block->inertia.yz[l] = (real)A[29];
+    block->inertia.xx[l] = (real)A[9], block->inertia.yy[l] = (real)A[14], block->inertia.zz[l] = (real)A[20];
+    block->inertia.xy[l] = (real)A[13], block->inertia.xz[l] = (real)A[18], block->inertia.yz[l] = (real)A[19];
 }
 
 /* Of a general body: it stays where it is. */
@@ -29,34 +30,39 @@ static void clear_lane(struct body_block *block, int l)
     for (size_t k = 0; k < sizeof *block / sizeof *numbers; ++k) numbers[k][l] = 0;
 }
 
-static void set_general(struct sadmm_context *c, size_t i, const double A[36], const double b[6])
+static void set_general(struct sadmm_context *c, size_t i, const double M[36], const double b[6])
 {
     for (int k = 0; k < ROW; ++k) {
         c->b[i * ROW + (size_t)k] = k < 6 ? (real)b[k] : 0;
         for (int j = 0; j < 6; ++j)
-            c->A_columns[(i * 6 + (size_t)j) * ROW + (size_t)k] = k < 6 ? (real)A[6 * k + j] : 0;
+            c->A_columns[(i * 6 + (size_t)j) * ROW + (size_t)k] = k < 6 ? (real)M[6 * k + j] : 0;
     }
 }
 
-static void assemble_body(struct sadmm_context *c, int32_t i)
+/* Without a warm start v = A^-1 b. */
+static void set_velocity(struct sadmm_context *c, size_t i, const double M[36], const double b[6])
 {
-    double A[36], b[6], v[6];
-    sadmm_body_terms(c->system, &c->settings, i, A, b);
-    double factor[36];
-    if (c->plan.warm_start || !dense6_cholesky(A, factor))
-        memcpy(v, &c->system->velocity[6 * (size_t)i], sizeof v);
-    else
-        dense6_solve(factor, b, v);
-    real *state = &c->state[(size_t)i * ROW];
-    for (int k = 0; k < ROW; ++k) state[k] = k < 6 ? (real)v[k] : 0;
-    double *packed = &c->A[(size_t)i * PACKED6];
-    for (int r = 0; r < 6; ++r)
-        for (int k = 0; k <= r; ++k) *packed++ = A[6 * r + k];
-    const int32_t general = cpu_general(c, (size_t)i);
-    if (general >= 0) set_general(c, (size_t)general, A, b);
+    const double *v = &c->system->velocity[6 * i];
+    double factor[36], free[6];
+    if (!c->plan.warm_start && dense6_cholesky(M, factor)) {
+        dense6_solve(factor, b, free);
+        v = free;
+    }
+    for (int k = 0; k < ROW; ++k) c->state[i * ROW + (size_t)k] = k < 6 ? (real)v[k] : 0;
+}
+
+static void assemble_body(struct sadmm_context *c, size_t i, const double A[PACKED6], const double b[6])
+{
+    const int32_t general = cpu_general(c, i);
+    double M[36];
+    if (general >= 0 || !c->plan.warm_start)
+        for (int r = 0, at = 0; r < 6; ++r)
+            for (int k = 0; k <= r; ++k, ++at) M[6 * r + k] = M[6 * k + r] = A[at];
+    set_velocity(c, i, M, b);
+    if (general >= 0) set_general(c, (size_t)general, M, b);
     if (c->general_count == (size_t)c->bodies) return;
-    if (general >= 0) clear_lane(&c->body_blocks[i / LANES], i % LANES);
-    else set_rigid_lane(&c->body_blocks[i / LANES], i % LANES, A, b);
+    if (general >= 0) clear_lane(&c->body_blocks[i / (size_t)LANES], (int)(i % (size_t)LANES));
+    else set_rigid_lane(&c->body_blocks[i / (size_t)LANES], (int)(i % (size_t)LANES), A, b);
 }
 
 /* Lanes and the row behind the last body: no mass, no motion. */
@@ -73,7 +79,12 @@ static void assemble_body_share(void *context, int thread, int threads)
     struct sadmm_context *c = (struct sadmm_context *)context;
     size_t begin, end;
     cpu_share_bodies(c, thread, threads, &begin, &end);
-    for (size_t i = begin; i < end; ++i) assemble_body(c, (int32_t)i);
+    for (size_t first = begin; first < end; first += LANES) {
+        const size_t count = end - first < (size_t)LANES ? end - first : (size_t)LANES;
+        double b[6 * LANES], *A = &c->A[first * PACKED6];
+        sadmm_body_terms(c->system, &c->settings, first, count, A, b);
+        for (size_t l = 0; l < count; ++l) assemble_body(c, first + l, A + PACKED6 * l, b + 6 * l);
+    }
 }
 
 sadmm_status CPU(assemble_bodies)(struct sadmm_context *c, struct sadmm_error *error)
@@ -87,23 +98,36 @@ sadmm_status CPU(assemble_bodies)(struct sadmm_context *c, struct sadmm_error *e
 /* Larger than any velocity: an empty slot's multiplier stays 0. */
 static const real EMPTY_ERROR = (real)1e9;
 
-/* points: the pair's; NULL: the slot is empty. */
-static void assemble_point(const struct sadmm_context *c, const struct sadmm_contact_pair *pair, int k,
-                           const struct sadmm_contact_point *points, struct pair_block *block, int l)
+/* What a lane of a block assembles. */
+struct lane_points {
+    const struct sadmm_contact_pair *pair;     /* NULL: none */
+    const struct sadmm_contact_point *points;  /* the pair's */
+    int count;
+};
+
+static real point_error(const struct sadmm_context *c, const struct lane_points *lane, int k)
 {
-    static const double zero[3];
-    bool used = points != NULL;
-    const struct sadmm_contact_point *point = used ? &points[k] : NULL;
-    const double *arm = !used ? zero : pair->body_a >= 0 ? point->arm_a : point->arm_b;
-    const double *impulse = used && c->plan.warm_start ? point->impulse : zero;
-    real error = used ? (real)sadmm_point_error(c->system, &c->settings, pair, points, k) : EMPTY_ERROR;
-    size_t at = block->first + (size_t)k;
+    if (sadmm_pair_bounces(c->system, lane->pair))
+        return (real)sadmm_point_error(c->system, &c->settings, lane->pair, lane->points, k);
+    return (real)sadmm_contact_e_plain(c->system, &c->settings, &lane->points[k]);
+}
+
+static void assemble_point(const struct sadmm_context *c, const struct lane_points *lane, int k,
+                           const struct pair_block *block, int l)
+{
+    static const struct sadmm_contact_point none;
+    const bool used = k < lane->count;
+    const struct sadmm_contact_point *point = used ? &lane->points[k] : &none;
+    const double *arm = used && lane->pair->body_a < 0 ? point->arm_b : point->arm_a;
+    const double *impulse = c->plan.warm_start ? point->impulse : none.impulse;
+    const real error = used ? point_error(c, lane, k) : EMPTY_ERROR;
+    const size_t at = block->first + (size_t)k;
     if (c->plan.contact_rows == 1) {
         struct normal_slot *slot = (struct normal_slot *)c->slots + at;
         set_lane(&slot->arm, l, arm);
         slot->error[l] = error;
-        slot->lambda[l] = used ? (real)(pair->normal[0] * impulse[0] + pair->normal[1] * impulse[1] +
-                                        pair->normal[2] * impulse[2]) : 0;
+        slot->lambda[l] = used ? (real)(lane->pair->normal[0] * impulse[0] + lane->pair->normal[1] * impulse[1] +
+                                        lane->pair->normal[2] * impulse[2]) : 0;
     } else {
         struct point_slot *slot = (struct point_slot *)c->slots + at;
         set_lane(&slot->arm, l, arm);
@@ -117,19 +141,17 @@ static void assemble_lane(struct sadmm_context *c, struct pair_block *block, int
     static const double zero[3], up[3] = {0, 0, 1};
     const struct sadmm_contact_set *contacts = c->system->contacts;
     const struct sadmm_contact_pair *pair = block->pair[l] >= 0 ? &contacts->pairs[block->pair[l]] : NULL;
+    const struct lane_points lane = {pair, pair ? &contacts->points[pair->first] : NULL, pair ? pair->count : 0};
     double d[3] = {0, 0, 0};
-    if (pair && pair->body_a >= 0 && pair->body_b >= 0 && pair->count > 0) {
-        const struct sadmm_contact_point *point = &contacts->points[pair->first];
-        for (int j = 0; j < 3; ++j) d[j] = point->arm_b[j] - point->arm_a[j];
-    }
+    if (pair && pair->body_a >= 0 && pair->body_b >= 0 && pair->count > 0)
+        for (int j = 0; j < 3; ++j) d[j] = lane.points[0].arm_b[j] - lane.points[0].arm_a[j];
     set_lane(&block->normal, l, pair ? pair->normal : up);
     set_lane(&block->d, l, pair ? d : zero);
     block->friction[l] = pair ? cpu_friction(c, pair->friction) : 0;
     block->inv_s[l] = 0;
     block->body_a[l] = pair ? cpu_body(c, pair->body_a) : c->bodies;
     block->body_b[l] = pair ? cpu_body(c, pair->body_b) : c->bodies;
-    for (int k = 0; k < block->slots; ++k)
-        assemble_point(c, pair, k, pair && k < pair->count ? &contacts->points[pair->first] : NULL, block, l);
+    for (int k = 0; k < block->slots; ++k) assemble_point(c, &lane, k, block, l);
 }
 
 static void assemble_pair_share(void *context, int thread, int threads)

@@ -9,8 +9,9 @@
 SADMM_INLINE double contact_error(double gap, double dt, double baumgarte, double slop, double correction_speed)
 {
     const double depth = -gap - slop;
-    if (gap >= 0) return gap / dt;
-    return depth > 0 ? -min_of(baumgarte * depth / dt, correction_speed) : 0.0;
+    const double speed = (gap >= 0 ? gap : baumgarte * depth) / dt; /* one division: which one, nothing foretells */
+    const double pushed = depth > 0 ? -min_of(speed, correction_speed) : 0.0;
+    return gap >= 0 ? speed : pushed;
 }
 
 /* Does a contact that approaches (negative) touch within the step, faster than the threshold of restitution? */

@@ -7,14 +7,27 @@
 
 #include "core/math/impact.h"
 #include "core/math/rigid.h"
-#include "system.h"
+#include "system_error.h"
 
 #ifndef SADMM_REAL_IS_DOUBLE
 #error "system_math.h is double only: do not include it in a source compiled per precision"
 #endif
 
-/* A (6 x 6 row-major) and b of eq. (1). Rigid bodies: A = diag(m I, world inertia) and
- * b = A v + dt (m g + f, tau) with the gyroscopic term inside the angular momentum (math/rigid.h). */
+/* Eq. (1) of a rigid body: A = diag(m I, world inertia) and b = A v + dt (m g + f, tau) with the gyroscopic term inside
+ * the angular momentum (math/rigid.h). Returns the inertia. */
+SADMM_INLINE sym3 sadmm_rigid_body(const struct sadmm_rigid *body, const struct sadmm_settings *settings, double b[6])
+{
+    const double dt = settings->dt;
+    const quat q = q_load(body->orientation);
+    const vec3 inertia = v3_load(body->inertia);
+    const vec3 momentum = rigid_angular_momentum(q, inertia, v3_load(body->velocity + 3), dt);
+    for (int k = 0; k < 3; ++k)
+        b[k] = body->mass * (body->velocity[k] + dt * settings->gravity[k]) + dt * body->wrench[k];
+    v3_store(v3_madd(momentum, dt, v3_load(body->wrench + 3)), b + 3);
+    return rigid_world_inertia(q_matrix(q), inertia);
+}
+
+/* A (6 x 6 row-major) and b of eq. (1). */
 SADMM_INLINE void sadmm_system_body(const struct sadmm_system *system, const struct sadmm_settings *settings, int32_t i,
                                      double A[36], double b[6])
 {
@@ -23,21 +36,11 @@ SADMM_INLINE void sadmm_system_body(const struct sadmm_system *system, const str
         memcpy(b, system->b + 6 * (size_t)i, 6 * sizeof *b);
         return;
     }
-    const struct sadmm_rigid *body = &system->rigid[i];
-    double dt = settings->dt;
-    quat q = q_load(body->orientation);
-    vec3 inertia = v3_load(body->inertia);
-    sym3 I = rigid_world_inertia(q_matrix(q), inertia);
-    vec3 momentum = rigid_angular_momentum(q, inertia, v3_load(body->velocity + 3), dt);
-    vec3 angular = v3_madd(momentum, dt, v3_load(body->wrench + 3));
-
+    const sym3 I = sadmm_rigid_body(&system->rigid[i], settings, b);
     memset(A, 0, 36 * sizeof *A);
-    A[0] = A[7] = A[14] = body->mass;
+    A[0] = A[7] = A[14] = system->rigid[i].mass;
     A[21] = I.xx, A[28] = I.yy, A[35] = I.zz;
     A[22] = A[27] = I.xy, A[23] = A[33] = I.xz, A[29] = A[34] = I.yz;
-    for (int k = 0; k < 3; ++k)
-        b[k] = body->mass * (body->velocity[k] + dt * settings->gravity[k]) + dt * body->wrench[k];
-    v3_store(angular, b + 3);
 }
 
 /* Velocity of b's contact point relative to a's, world frame; `velocity` (bodies x 6). */
@@ -162,22 +165,13 @@ SADMM_RARE double sadmm_impact_e(const struct sadmm_system *system, const struct
     return approach > 0 ? fmax(e, restitution * approach) : e;
 }
 
-/* e of a point along the normal, m/s, of a pair without restitution. */
-SADMM_INLINE double sadmm_contact_e_plain(const struct sadmm_system *system, const struct sadmm_settings *settings,
-                                           const struct sadmm_contact_point *point)
-{
-    return system->errors_given ? point->error
-                                : contact_error(point->gap, settings->dt, settings->baumgarte, settings->slop,
-                                                settings->correction_speed);
-}
-
 /* e of a pair's k-th point. `points`: the pair's. */
 SADMM_INLINE double sadmm_contact_e(const struct sadmm_system *system, const struct sadmm_settings *settings,
                                      const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *points,
                                      int32_t k)
 {
     const double e = sadmm_contact_e_plain(system, settings, &points[k]);
-    return !system->errors_given && system->rigid && pair->restitution > 0
+    return sadmm_pair_bounces(system, pair)
                ? sadmm_impact_e(system, settings, pair, points, k, e)
                : e;
 }

@@ -1,12 +1,31 @@
 #include "system_terms.h"
 
 #include "core/math/lead.h"
+#include "core/math/packed6.h"
 #include "system_math.h"
 
-void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_settings *settings, int32_t body,
-                      double A[36], double b[6])
+static void pack(const double A[36], double out[PACKED6])
 {
-    sadmm_system_body(system, settings, body, A, b);
+    for (int r = 0; r < 6; ++r)
+        for (int k = 0; k <= r; ++k) *out++ = A[6 * r + k];
+}
+
+static void pack_rigid(double mass, sym3 I, double out[PACKED6])
+{
+    memset(out, 0, PACKED6 * sizeof *out);
+    out[0] = out[2] = out[5] = mass;
+    out[9] = I.xx, out[14] = I.yy, out[20] = I.zz;
+    out[13] = I.xy, out[18] = I.xz, out[19] = I.yz;
+}
+
+void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_settings *settings, size_t first,
+                      size_t count, double *A, double *b)
+{
+    const struct sadmm_rigid *bodies = system->rigid;
+    if (!bodies) memcpy(b, system->b + 6 * first, 6 * count * sizeof *b);
+    for (size_t i = 0; i < count && !bodies; ++i) pack(system->A + 36 * (first + i), A + PACKED6 * i);
+    for (size_t i = 0; i < count && bodies; ++i)
+        pack_rigid(bodies[first + i].mass, sadmm_rigid_body(&bodies[first + i], settings, b + 6 * i), A + PACKED6 * i);
 }
 
 double sadmm_point_error(const struct sadmm_system *system, const struct sadmm_settings *settings,

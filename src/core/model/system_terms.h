@@ -4,9 +4,9 @@
 
 #include "system.h"
 
-/* A_i (6 x 6, row-major) and b_i of eq. (1). */
-void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_settings *settings, int32_t body,
-                      double A[36], double b[6]);
+/* A (count x PACKED6: lower triangles) and b (count x 6) of eq. (1), of bodies [first, first + count). */
+void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_settings *settings, size_t first,
+                      size_t count, double *A, double *b);
 
 /* e of a pair's k-th point, m/s; points: the pair's. */
 double sadmm_point_error(const struct sadmm_system *system, const struct sadmm_settings *settings,
