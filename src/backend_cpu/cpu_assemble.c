@@ -3,7 +3,6 @@
 
 #include "core/math/dense6.h"
 #include "core/math/contact.h"
-#include "core/model/system_error.h"
 #include "core/model/system_terms.h"
 #include "cpu_rows.h"
 
@@ -98,40 +97,21 @@ sadmm_status CPU(assemble_bodies)(struct sadmm_context *c, struct sadmm_error *e
 /* Larger than any velocity: an empty slot's multiplier stays 0. */
 static const real EMPTY_ERROR = (real)1e9;
 
-/* What a lane of a block assembles. */
-struct lane_points {
-    const struct sadmm_contact_pair *pair;     /* NULL: none */
-    const struct sadmm_contact_point *points;  /* the pair's */
-    int count;
-};
-
-static real point_error(const struct sadmm_context *c, const struct lane_points *lane, int k)
+/* Point k of a lane; NULL: the slot is empty. Its e comes later. */
+static void assemble_point(const struct sadmm_context *c, const struct sadmm_contact_pair *pair,
+                           const struct sadmm_contact_point *point, size_t at, int l)
 {
-    if (sadmm_pair_bounces(c->system, lane->pair))
-        return (real)sadmm_point_error(c->system, &c->settings, lane->pair, lane->points, k);
-    return (real)sadmm_contact_e_plain(c->system, &c->settings, &lane->points[k]);
-}
-
-static void assemble_point(const struct sadmm_context *c, const struct lane_points *lane, int k,
-                           const struct pair_block *block, int l)
-{
-    static const struct sadmm_contact_point none;
-    const bool used = k < lane->count;
-    const struct sadmm_contact_point *point = used ? &lane->points[k] : &none;
-    const double *arm = used && lane->pair->body_a < 0 ? point->arm_b : point->arm_a;
-    const double *impulse = c->plan.warm_start ? point->impulse : none.impulse;
-    const real error = used ? point_error(c, lane, k) : EMPTY_ERROR;
-    const size_t at = block->first + (size_t)k;
+    static const double zero[3];
+    const double *arm = !point ? zero : pair->body_a >= 0 ? point->arm_a : point->arm_b;
+    const double *impulse = point && c->plan.warm_start ? point->impulse : zero;
     if (c->plan.contact_rows == 1) {
         struct normal_slot *slot = (struct normal_slot *)c->slots + at;
         set_lane(&slot->arm, l, arm);
-        slot->error[l] = error;
-        slot->lambda[l] = used ? (real)(lane->pair->normal[0] * impulse[0] + lane->pair->normal[1] * impulse[1] +
-                                        lane->pair->normal[2] * impulse[2]) : 0;
+        slot->lambda[l] = point ? (real)(pair->normal[0] * impulse[0] + pair->normal[1] * impulse[1] +
+                                         pair->normal[2] * impulse[2]) : 0;
     } else {
         struct point_slot *slot = (struct point_slot *)c->slots + at;
         set_lane(&slot->arm, l, arm);
-        slot->error[l] = error;
         set_lane(&slot->lambda, l, impulse);
     }
 }
@@ -141,17 +121,59 @@ static void assemble_lane(struct sadmm_context *c, struct pair_block *block, int
     static const double zero[3], up[3] = {0, 0, 1};
     const struct sadmm_contact_set *contacts = c->system->contacts;
     const struct sadmm_contact_pair *pair = block->pair[l] >= 0 ? &contacts->pairs[block->pair[l]] : NULL;
-    const struct lane_points lane = {pair, pair ? &contacts->points[pair->first] : NULL, pair ? pair->count : 0};
     double d[3] = {0, 0, 0};
-    if (pair && pair->body_a >= 0 && pair->body_b >= 0 && pair->count > 0)
-        for (int j = 0; j < 3; ++j) d[j] = lane.points[0].arm_b[j] - lane.points[0].arm_a[j];
+    if (pair && pair->body_a >= 0 && pair->body_b >= 0 && pair->count > 0) {
+        const struct sadmm_contact_point *point = &contacts->points[pair->first];
+        for (int j = 0; j < 3; ++j) d[j] = point->arm_b[j] - point->arm_a[j];
+    }
     set_lane(&block->normal, l, pair ? pair->normal : up);
     set_lane(&block->d, l, pair ? d : zero);
     block->friction[l] = pair ? cpu_friction(c, pair->friction) : 0;
     block->inv_s[l] = 0;
     block->body_a[l] = pair ? cpu_body(c, pair->body_a) : c->bodies;
     block->body_b[l] = pair ? cpu_body(c, pair->body_b) : c->bodies;
-    for (int k = 0; k < block->slots; ++k) assemble_point(c, &lane, k, block, l);
+    for (int k = 0; k < block->slots; ++k)
+        assemble_point(c, pair, pair && k < pair->count ? &contacts->points[pair->first + k] : NULL,
+                       block->first + (size_t)k, l);
+}
+
+/* e of a pair's points where it depends on how fast its bodies approach. */
+static void bounce(const struct sadmm_context *c, const struct sadmm_contact_pair *pair, int l,
+                   double errors[SADMM_MAX_POINTS][LANES])
+{
+    for (int k = 0; k < pair->count; ++k)
+        errors[k][l] = sadmm_point_error(c->system, &c->settings, pair, &c->system->contacts->points[pair->first], k);
+}
+
+/* e of a block's points, all lanes of a slot at once. */
+static void assemble_errors(struct sadmm_context *c, const struct pair_block *block)
+{
+    const struct sadmm_contact_set *contacts = c->system->contacts;
+    const struct sadmm_settings settings = c->settings;
+    double errors[SADMM_MAX_POINTS][LANES];
+    int32_t count[LANES];
+    for (int l = 0; l < LANES; ++l) {
+        const struct sadmm_contact_pair *pair = block->pair[l] >= 0 ? &contacts->pairs[block->pair[l]] : NULL;
+        count[l] = pair ? pair->count : 0;
+        for (int k = 0; k < count[l]; ++k) {
+            const struct sadmm_contact_point *point = &contacts->points[pair->first + k];
+            errors[k][l] = c->system->errors_given ? point->error : point->gap;
+        }
+        for (int k = count[l]; k < block->slots; ++k) errors[k][l] = 0;
+    }
+    for (int k = 0; k < block->slots && !c->system->errors_given; ++k)
+        for (int l = 0; l < LANES; ++l)
+            errors[k][l] = contact_error(errors[k][l], settings.dt, settings.baumgarte, settings.slop,
+                                         settings.correction_speed);
+    for (int l = 0; l < LANES; ++l)
+        if (count[l] > 0 && sadmm_pair_bounces(c->system, &contacts->pairs[block->pair[l]]))
+            bounce(c, &contacts->pairs[block->pair[l]], l, errors);
+    for (int k = 0; k < block->slots; ++k) {
+        const size_t at = block->first + (size_t)k;
+        lanes *error = c->plan.contact_rows == 1 ? &((struct normal_slot *)c->slots + at)->error
+                                                 : &((struct point_slot *)c->slots + at)->error;
+        for (int l = 0; l < LANES; ++l) (*error)[l] = k < count[l] ? (real)errors[k][l] : EMPTY_ERROR;
+    }
 }
 
 static void assemble_pair_share(void *context, int thread, int threads)
@@ -159,8 +181,10 @@ static void assemble_pair_share(void *context, int thread, int threads)
     struct sadmm_context *c = (struct sadmm_context *)context;
     size_t begin, end;
     sadmm_share(c->pair_block_count, thread, threads, &begin, &end);
-    for (size_t k = begin; k < end; ++k)
+    for (size_t k = begin; k < end; ++k) {
         for (int l = 0; l < LANES; ++l) assemble_lane(c, &c->pair_blocks[k], l);
+        assemble_errors(c, &c->pair_blocks[k]);
+    }
 }
 
 sadmm_status CPU(assemble_contacts)(struct sadmm_context *c, struct sadmm_error *error)

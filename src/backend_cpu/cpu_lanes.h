@@ -73,11 +73,10 @@ typedef double row8d __attribute__((vector_size(8 * sizeof(double))));
 
 static inline vec3d vec3d_load(const double x[3]) { return (vec3d){x[0], x[1], x[2], 0}; }
 static inline void vec3d_store(vec3d v, double x[3]) { x[0] = v[0], x[1] = v[1], x[2] = v[2]; }
-static inline vec3d vec3d_cross(vec3d a, vec3d b)
-{
-    return __builtin_shufflevector(a, a, 1, 2, 0, 3) * __builtin_shufflevector(b, b, 2, 0, 1, 3) -
-           __builtin_shufflevector(a, a, 2, 0, 1, 3) * __builtin_shufflevector(b, b, 1, 2, 0, 3);
-}
+static inline vec3d vec3d_yzx(vec3d v) { return __builtin_shufflevector(v, v, 1, 2, 0, 3); }
+static inline vec3d vec3d_zxy(vec3d v) { return __builtin_shufflevector(v, v, 2, 0, 1, 3); }
+/* a x b as z, x, y, which is how torques are added up: it needs the fewest shuffles. */
+static inline vec3d vec3d_cross_zxy(vec3d a, vec3d b) { return a * vec3d_yzx(b) - vec3d_yzx(a) * b; }
 
 static inline vec3d vec3d_of_lane(const vec *v, size_t l)
 {

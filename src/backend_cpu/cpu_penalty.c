@@ -72,20 +72,21 @@ sadmm_status CPU(init_penalty)(struct sadmm_context *c, struct sadmm_error *erro
     return SADMM_OK;
 }
 
-/* C of a body, as its factor has it. */
-static void load_C(const struct sadmm_context *c, size_t i, double C[PACKED6])
+/* C of a body, as its factor has it; `rounded` is room for one that is not what it was. */
+static const double *load_C(const struct sadmm_context *c, size_t i, double rounded[PACKED6])
 {
-    memcpy(C, &c->C[i * PACKED6], PACKED6 * sizeof *C);
-    if (packed_inertia_drowns(&c->A[i * PACKED6], c->beta[i], C, (double)SADMM_EPSILON))
-        packed_round_up(C, (double)SADMM_EPSILON);
+    const double *C = &c->C[i * PACKED6];
+    if (!packed_inertia_drowns(&c->A[i * PACKED6], c->beta[i], C, (double)SADMM_EPSILON)) return C;
+    memcpy(rounded, C, PACKED6 * sizeof *rounded);
+    packed_round_up(rounded, (double)SADMM_EPSILON);
+    return rounded;
 }
 
 /* The factor of a rigid body (struct body_block). */
 static void factorize_rigid(struct sadmm_context *c, size_t i)
 {
-    const double *A = &c->A[i * PACKED6];
-    double C[PACKED6];
-    load_C(c, i, C);
+    double rounded[PACKED6];
+    const double *A = &c->A[i * PACKED6], *C = load_C(c, i, rounded);
     double beta = c->beta[i], alpha = A[0] + beta * C[0], ratio = beta / alpha;
     double S[3] = {C[16], C[8], C[10]}; /* [S]x is the lower left block */
     double S2 = S[0] * S[0] + S[1] * S[1] + S[2] * S[2], q = beta * ratio;
@@ -109,10 +110,9 @@ static void factorize_rigid(struct sadmm_context *c, size_t i)
 /* (A + beta C)^-1 in full, of general body `general`. */
 static void factorize_general(struct sadmm_context *c, size_t i, size_t general)
 {
-    double M[36], L[36], C[PACKED6], column[6];
-    const double *A = &c->A[i * PACKED6];
+    double M[36], L[36], rounded[PACKED6], column[6];
+    const double *A = &c->A[i * PACKED6], *C = load_C(c, i, rounded);
     int at = 0;
-    load_C(c, i, C);
     for (int r = 0; r < 6; ++r)
         for (int k = 0; k <= r; ++k, ++at) M[6 * r + k] = M[6 * k + r] = A[at] + c->beta[i] * C[at];
     /* A is positive definite; only a beta C some 1e15 times larger can lose it to rounding: precondition by the

@@ -18,6 +18,7 @@ static void load_point(const struct sadmm_context *c, const struct pair_block *b
     }
 }
 
+/* Of `r` the angular part is z, x, y. */
 static void add_pair(const struct sadmm_context *c, size_t record, int side, vec6d *r)
 {
     const struct pair_block *block = &c->pair_blocks[record / (size_t)LANES];
@@ -29,7 +30,7 @@ static void add_pair(const struct sadmm_context *c, size_t record, int side, vec
         vec3d impulse, arm;
         load_point(c, block, l, k, &impulse, &arm);
         r->linear += sign * impulse;
-        r->angular += sign * vec3d_cross(arm + d, impulse);
+        r->angular += sign * vec3d_cross_zxy(arm + d, impulse);
     }
 }
 
@@ -41,7 +42,7 @@ static void add_rows(const struct sadmm_context *c, size_t record, int side, vec
         double row[6], lambda = (double)c->row_slots[block->first + (size_t)k].lambda[lane];
         cpu_load_row(c, block, lane, side, k, row);
         r->linear += vec3d_load(row) * lambda;
-        r->angular += vec3d_load(row + 3) * lambda;
+        r->angular += vec3d_zxy(vec3d_load(row + 3)) * lambda;
     }
 }
 
@@ -66,12 +67,14 @@ void CPU(recompute_residuals)(struct sadmm_context *c, size_t begin, size_t end)
 {
     for (size_t i = begin; i < end; ++i) {
         vec6d r = cpu_free_momentum(c, i);
+        r.angular = vec3d_zxy(r.angular);
         for (int32_t at = c->offsets[i]; at < c->offsets[i + 1]; ++at) {
             int side;
             const size_t record = cpu_record(c, at, &side);
             if (record < cpu_pair_records(c)) add_pair(c, record, side, &r);
             else add_rows(c, record, side, &r);
         }
+        r.angular = vec3d_yzx(r.angular);
         store_momentum_residual(c, i, r);
     }
 }

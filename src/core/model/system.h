@@ -12,6 +12,7 @@
 #include <stdint.h>
 
 #include "core/base/contact_set.h"
+#include "core/base/inline.h"
 #include "rows.h"
 #include "subadmm/problem.h"
 
@@ -57,6 +58,12 @@ struct sadmm_system {
 static inline size_t sadmm_row_constraint_count(const struct sadmm_system *system)
 {
     return system->rows ? system->rows->constraint_count : 0;
+}
+
+/* Does e of the pair's points depend on how fast its bodies approach? */
+SADMM_INLINE bool sadmm_pair_bounces(const struct sadmm_system *system, const struct sadmm_contact_pair *pair)
+{
+    return !system->errors_given && system->rigid && pair->restitution > 0;
 }
 
 #ifdef __cplusplus

@@ -7,7 +7,7 @@
 
 #include "core/math/impact.h"
 #include "core/math/rigid.h"
-#include "system_error.h"
+#include "system.h"
 
 #ifndef SADMM_REAL_IS_DOUBLE
 #error "system_math.h is double only: do not include it in a source compiled per precision"
@@ -163,6 +163,15 @@ SADMM_RARE double sadmm_impact_e(const struct sadmm_system *system, const struct
     }
     if (contact_hits(points[at].gap, approach, dt, threshold)) return fmin(e, restitution * approach);
     return approach > 0 ? fmax(e, restitution * approach) : e;
+}
+
+/* e of a point along the normal, m/s, of a pair without restitution. */
+SADMM_INLINE double sadmm_contact_e_plain(const struct sadmm_system *system, const struct sadmm_settings *settings,
+                                           const struct sadmm_contact_point *point)
+{
+    return system->errors_given ? point->error
+                                : contact_error(point->gap, settings->dt, settings->baumgarte, settings->slop,
+                                                settings->correction_speed);
 }
 
 /* e of a pair's k-th point. `points`: the pair's. */
