@@ -65,45 +65,26 @@ static void add_bits(_Atomic int32_t *to, int bits, bool alone)
     else atomic_fetch_or_explicit(to, bits, memory_order_relaxed);
 }
 
-/* Where leads move a pair's points by more than nothing. */
-static void add_ways(const struct sadmm_context *c, const struct sadmm_contact_pair *pair, struct lead_touch *touch)
+/* What a pair's points touch (math/lead.h). */
+static struct lead_touch touch_of(const struct sadmm_context *c, const struct sadmm_contact_pair *pair)
 {
     static const double still[6];
     const double dt = c->settings.dt, slop = c->settings.slop, *n = pair->normal;
-    const double *a = c->leads[cpu_body(c, pair->body_a)].lead, *b = c->leads[cpu_body(c, pair->body_b)].lead,
-                 *v_a = pair->body_a >= 0 ? &c->system->velocity[6 * (size_t)pair->body_a] : still,
-                 *v_b = pair->body_b >= 0 ? &c->system->velocity[6 * (size_t)pair->body_b] : still;
-    for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
-        const struct sadmm_contact_point *point = &c->system->contacts->points[k];
-        const double *arm_a = point->arm_a, *arm_b = point->arm_b;
-        const double size[2] = {lead_size(a, arm_a), lead_size(b, arm_b)};
-        if (lead_is_still(size, dt, slop)) continue;
-        const double leads[2] = {-lead_along(n, a, arm_a), lead_along(n, b, arm_b)};
-        lead_add_way(touch, point->gap, lead_along(n, v_b, arm_b) - lead_along(n, v_a, arm_a), leads, size, dt, slop);
-    }
-}
-
-/* What a pair's points touch (math/lead.h). The largest push and the largest sizes stand for all: what is still with
- * them is still with any. */
-static struct lead_touch touch_of(const struct sadmm_context *c, const struct sadmm_contact_pair *pair)
-{
-    const double dt = c->settings.dt, slop = c->settings.slop;
     const struct sadmm_lead *a = &c->leads[cpu_body(c, pair->body_a)], *b = &c->leads[cpu_body(c, pair->body_b)];
     struct lead_touch touch = {pair->body_a >= 0 && pair->body_b >= 0 ? TOUCH_INNER
                                : pair->friction > 0                   ? TOUCH_FRICTION
                                                                       : TOUCH_SMOOTH, {0, 0}};
-    double most = 0, largest[2] = {0, 0};
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
         const struct sadmm_contact_point *point = &c->system->contacts->points[k];
-        const double push = dot3(pair->normal, point->impulse),
-                     size_a = lead_size_at(a->linear, a->angular, point->arm_a),
-                     size_b = lead_size_at(b->linear, b->angular, point->arm_b);
-        most = push > most ? push : most;
-        largest[0] = size_a > largest[0] ? size_a : largest[0];
-        largest[1] = size_b > largest[1] ? size_b : largest[1];
+        const double *arm_a = point->arm_a, *arm_b = point->arm_b;
+        const double size[2] = {lead_size_at(a->linear, a->angular, arm_a), lead_size_at(b->linear, b->angular, arm_b)};
+        lead_add_push(&touch, dot3(n, point->impulse), size, dt, slop);
+        if (lead_is_still(size, dt, slop)) continue;
+        const double *v_a = pair->body_a >= 0 ? &c->system->velocity[6 * (size_t)pair->body_a] : still,
+                     *v_b = pair->body_b >= 0 ? &c->system->velocity[6 * (size_t)pair->body_b] : still;
+        const double leads[2] = {-lead_along(n, a->lead, arm_a), lead_along(n, b->lead, arm_b)};
+        lead_add_way(&touch, point->gap, lead_along(n, v_b, arm_b) - lead_along(n, v_a, arm_a), leads, size, dt, slop);
     }
-    lead_add_push(&touch, most, largest, dt, slop);
-    if (!lead_is_still(largest, dt, slop)) add_ways(c, pair, &touch);
     return touch;
 }
 
