@@ -187,6 +187,7 @@ sadmm_status warm_convergence(const struct warm_plan *plan, sadmm_method method,
     settings->threads = series->threads;
     settings->method = method;
     settings->iterations = plan->iterations;
+    settings->substeps = 1; /* a budget a step: what sub-steps do is a matter of the time step */
     settings->certify = true;
     if (plan->dt > 0) settings->dt = plan->dt;
     w.steps = (int)lround(plan->seconds / settings->dt);

@@ -27,6 +27,8 @@ START_TEST(every_scene_builds_and_steps)
         ck_assert_int_eq(other.def.settings.method, method);
         ck_assert_int_eq(other.def.settings.iterations, info->iterations[method]);
         ck_assert_int_ge(other.def.settings.iterations, 1);
+        const bool shares = method == SADMM_METHOD_FAST && info->substeps > 0;
+        ck_assert_int_eq(other.def.settings.substeps, shares ? info->substeps : 1);
     }
     ck_assert_int_gt(dynamic_bodies(world), 0);
     ck_assert_int_eq(sadmm_scene_before_step(&scene, world, 0, &error), SADMM_OK);

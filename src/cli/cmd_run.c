@@ -127,8 +127,8 @@ static void apply(const struct run_options *o, struct sadmm_scene *scene)
     scene->def.device = (int)o->device;
     if (o->precision_given) scene->def.precision = o->precision;
     if (o->dt > 0) s->dt = o->dt;
-    if (o->substeps > 0) s->substeps = (int)o->substeps;
     if (o->method_given) sadmm_scene_set_method(scene, o->method);
+    if (o->substeps > 0) s->substeps = (int)o->substeps;
     if (o->iterations >= 0) s->iterations = (int)o->iterations;
     if (o->tolerance > 0) s->certificate_tolerance = o->tolerance;
     if (o->check_period > 0) s->check_period = (int)o->check_period;

@@ -24,6 +24,12 @@ static json_t *iterations_json(const struct sadmm_scene_info *info)
     return o;
 }
 
+static json_t *substeps_json(const struct sadmm_scene_info *info)
+{
+    const int fast = info->substeps > 0 ? info->substeps : 1;
+    return json_pack("{si, si}", cli_method_name(SADMM_METHOD_PAPER), 1, cli_method_name(SADMM_METHOD_FAST), fast);
+}
+
 /* ---- the list ---------------------------------------------------------------------------------------------------- */
 
 static json_t *list_json(void)
@@ -37,6 +43,7 @@ static json_t *list_json(void)
         json_object_set_new(o, "description", json_string(info->description));
         json_object_set_new(o, "duration", cli_json_real(info->duration));
         json_object_set_new(o, "iterations", iterations_json(info));
+        json_object_set_new(o, "substeps", substeps_json(info));
         json_array_append_new(array, o);
     }
     return array;
@@ -151,6 +158,7 @@ static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, jso
     json_object_set_new(o, "units", json_string(units));
     json_object_set_new(o, "duration", cli_json_real(scene->duration));
     json_object_set_new(o, "iterations", iterations_json(scene->info));
+    json_object_set_new(o, "substeps", substeps_json(scene->info));
     json_object_set_new(o, "contact_margin", cli_json_real(scene->def.contact_margin));
     json_object_set_new(o, "friction_of_a_pair", json_string("geometric mean"));
     json_object_set_new(o, "settings", cli_json_settings(&scene->def.settings));
@@ -167,9 +175,11 @@ static int show_scene(const char *spec, struct output *json)
     if (sadmm_scene_open(spec, &scene, &error) != SADMM_OK) return cli_error(CLI_USAGE, "%s", error.message);
     if (sadmm_scene_build(&scene, &world, &error) != SADMM_OK) return cli_error(CLI_FAILED, "%s", error.message);
     if (!json) {
-        printf("%s%s: %s\n%d bodies, %d shapes, %g s, dt = %g s, %d iterations (paper: %d; --json for all of it)\n",
-               scene.info->name, scene.info->arguments, scene.info->description, sadmm_world_body_count(world),
-               sadmm_world_shape_count(world), scene.duration, scene.def.settings.dt, scene.def.settings.iterations,
+        printf("%s%s: %s\n%d bodies, %d shapes, %g s, dt = %g s", scene.info->name, scene.info->arguments,
+               scene.info->description, sadmm_world_body_count(world), sadmm_world_shape_count(world), scene.duration,
+               scene.def.settings.dt);
+        if (scene.def.settings.substeps > 1) printf(" in %d sub-steps", scene.def.settings.substeps);
+        printf(", %d iterations (paper: %d; --json for all of it)\n", scene.def.settings.iterations,
                scene.info->iterations[SADMM_METHOD_PAPER]);
         sadmm_world_destroy(world);
         return CLI_DONE;

@@ -103,8 +103,10 @@ sadmm_status sadmm_scene_open(const char *spec, struct sadmm_scene *scene, struc
 
 void sadmm_scene_set_method(struct sadmm_scene *scene, sadmm_method method)
 {
+    const int substeps = scene->info->substeps;
     scene->def.settings.method = method;
     scene->def.settings.iterations = scene->info->iterations[method];
+    scene->def.settings.substeps = method == SADMM_METHOD_FAST && substeps > 0 ? substeps : 1;
 }
 
 sadmm_status sadmm_scene_build(const struct sadmm_scene *scene, sadmm_world **world, struct sadmm_error *error)

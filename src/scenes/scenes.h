@@ -3,7 +3,7 @@
  * A scene is named by a spec: "name", or "name:N" where the scene takes a size. Opening a spec parses it and fills the
  * world definition with the scene's own settings, for the library's default method; the caller may change that
  * definition (backend, precision, dt, iterations, ...) before the world is built from it. A scene has a number of
- * iterations for each method: sadmm_scene_set_method sets both.
+ * iterations for each method, and sub-steps for `fast`: sadmm_scene_set_method sets all three.
  */
 #ifndef SADMM_SCENES_H
 #define SADMM_SCENES_H
@@ -25,6 +25,7 @@ struct sadmm_scene_info {
     const char *description; /* one line */
     double duration;         /* s, simulated time the scene is meant to be run for */
     int iterations[SADMM_METHOD_COUNT]; /* a step, by method */
+    int substeps;            /* of a step of `fast`, which share its iterations; 0: one, as in `paper` */
     bool chaotic; /* trajectories that differ by rounding part within the duration: only statistics can be compared */
 };
 
@@ -44,8 +45,8 @@ struct sadmm_scene {
  * the scene's range). */
 sadmm_status sadmm_scene_open(const char *spec, struct sadmm_scene *scene, struct sadmm_error *error);
 
-/* Solve the scene by `method` in [0, SADMM_METHOD_COUNT): sets the method in scene->def.settings, and the iterations to
- * the scene's own for it. */
+/* Solve the scene by `method` in [0, SADMM_METHOD_COUNT): sets the method in scene->def.settings, and the iterations
+ * and sub-steps to the scene's own for it. */
 void sadmm_scene_set_method(struct sadmm_scene *scene, sadmm_method method);
 
 /* Create a world from scene->def and fill it. The caller destroys it. Errors: those of sadmm_world_create and of the
