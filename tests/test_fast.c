@@ -206,8 +206,8 @@ START_TEST(deep_stacks_are_stiff)
     ck_assert_double_eq_tol(r.c->constraints[0].e[0], e / pow(stack_depth, 6), 1e-9 * e);
     ck_assert_double_eq(r.c->constraints[2].e[0], 0);
     runner_stop(&r);
-    /* Cubes that move at a quarter of V: 20 times more than at rest, and no reason for other weights. */
-    for (int i = 0; i < 30; ++i) problem->system.velocity[6 * i] = 9.81 * 0.005 / 4;
+    /* Cubes that move at V: no springs, and no reason for other weights. */
+    for (int i = 0; i < 30; ++i) problem->system.velocity[6 * i] = 9.81 * 0.005;
     runner_start_method(&r, literal(), &warm, problem, 1, SADMM_METHOD_FAST);
     ck_assert_double_eq_tol(r.c->constraints[0].B[0], 30.0 / 4 + 3.0 / 4, 1e-7);
     runner_stop(&r);
@@ -227,7 +227,7 @@ static void expect_agreement(struct runner *own, struct runner *threads, struct 
     ck_assert(v->difference == 0 && lambda->difference == 0);
 }
 
-/* The same in every table, whatever the threads: at rest, and at a quarter of V. */
+/* The same in every table, whatever the threads: at rest, and at V. */
 START_TEST(deep_stacks_equal_ref)
 {
     const struct sadmm_kernels *table = tables[_i / 2];
@@ -236,7 +236,7 @@ START_TEST(deep_stacks_equal_ref)
     struct spread v = {0, 0}, lambda = {0, 0};
     struct runner ref, own, three;
     warm.warm = true;
-    for (int i = 0; i < 30 && _i % 2; ++i) problem->system.velocity[6 * i] = 9.81 * 0.005 / 4;
+    for (int i = 0; i < 30 && _i % 2; ++i) problem->system.velocity[6 * i] = 9.81 * 0.005;
     runner_start_method(&ref, literal(), &warm, problem, 1, SADMM_METHOD_FAST);
     runner_start_method(&own, table, &warm, problem, 1, SADMM_METHOD_FAST);
     runner_start_method(&three, table, &warm, problem, 3, SADMM_METHOD_FAST);
@@ -276,7 +276,7 @@ START_TEST(under_iterated_weights_are_larger)
     static const struct {
         int iterations;
         double speed, factor; /* over V */
-    } cases[] = {{60, 0, 1}, {100, 0, 1}, {30, 0, 2}, {20, 0, 3}, {1, 0, 6}, {30, 0.5, 2}, {30, 1.6, 1.25}, {30, 4, 1}};
+    } cases[] = {{60, 0, 1}, {100, 0, 1}, {30, 0, 2}, {20, 0, 3}, {1, 0, 6}, {30, 0.5, 2}, {30, 0.8, 1.25}, {30, 2, 1}};
     for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
         struct contact_problem *problem = deep_stack(3);
         sadmm_settings settings = warm_settings(cases[k].iterations, 1);

@@ -108,9 +108,6 @@ SADMM_INLINE double weight_rescale(struct weight_island *island, const struct we
  * controller that excites them. `push`, the sum of the sizes of the impulses that the bodies feel, N s, over m V is
  * twice the number of bodies that a load passes on its way to the ground. */
 #define WEIGHT_DEEP 20.0
-#define WEIGHT_DEEP_MOST 6.0
-/* Over the speed of bodies at rest, the least V. */
-#define WEIGHT_REST 20.0
 #define WEIGHT_GAP_LEAST 0.001
 
 /* 1 and more. */
@@ -119,32 +116,27 @@ SADMM_INLINE double weight_stack_depth(double speed, double push, double mass)
     return max_of(push / (mass * speed * WEIGHT_DEEP), 1.0);
 }
 
-/* V: less, and B more, where the island is at rest. */
-SADMM_INLINE double weight_speed_warm(double speed, double stack_depth, double kinetic, double mass)
-{
-    double least = speed / min_of(stack_depth * stack_depth, WEIGHT_DEEP_MOST);
-    return min_of(max_of(least, WEIGHT_REST * sqrt(kinetic / mass)), speed);
-}
-
 /* Steps that start warm with fewer iterations than this: the springs above would be softer, and heavy bodies on top
- * rock on them. B goes up as the iterations go down, except where the island moves: heavy weights are slow. */
+ * rock on them. */
 #define WEIGHT_UNDER_ITERATED 60
-#define WEIGHT_UNDER_ITERATED_MOST 6.0
-/* Over the speed of bodies that move, the least V. */
-#define WEIGHT_MOVING 0.5
 
-/* By how much V is less, 1: not at all. Steps of a world alone (`rigid`): a problem that is solved in short batches is
- * no row of steps. */
+/* The most that V is divided by. */
+#define WEIGHT_STIFFEST 6.0
+
+/* By how much V is less for that, 1: not at all. Steps of a world alone (`rigid`): a problem that is solved in short
+ * batches is no row of steps. */
 SADMM_INLINE double weight_under_iterated(int rigid, int iterations)
 {
-    return rigid ? min_of(max_of((double)WEIGHT_UNDER_ITERATED / iterations, 1.0), WEIGHT_UNDER_ITERATED_MOST) : 1;
+    return rigid ? min_of(max_of((double)WEIGHT_UNDER_ITERATED / iterations, 1.0), WEIGHT_STIFFEST) : 1;
 }
 
-/* V of such a step; `warm` is what weight_speed_warm made of `speed`. */
-SADMM_INLINE double weight_speed_under_iterated(double speed, double warm, double under_iterated, double kinetic,
-                                                double mass)
+/* V of a step that starts warm: less, and B more, in deep stacks and where the iterations are few; but an island whose
+ * bodies move is no spring, and heavy weights are slow: no less than their speed. */
+SADMM_INLINE double weight_speed_warm(double speed, double stack_depth, double under_iterated, double kinetic,
+                                      double mass)
 {
-    return min_of(max_of(speed / under_iterated, WEIGHT_MOVING * sqrt(kinetic / mass)), warm);
+    const double stiffer = max_of(min_of(stack_depth * stack_depth, WEIGHT_STIFFEST), under_iterated);
+    return min_of(max_of(speed / stiffer, sqrt(kinetic / mass)), speed);
 }
 
 /* V, and what goes with it. warm: the step starts warm; under_iterated: weight_under_iterated. */
@@ -157,8 +149,7 @@ SADMM_INLINE void weight_update_speed(struct weight_island *island, const struct
     island->stack_depth = 1;
     if (!warm) return;
     island->stack_depth = weight_stack_depth(speed, sums->push, mass);
-    island->speed = weight_speed_warm(speed, island->stack_depth, sums->kinetic, mass);
-    island->speed = weight_speed_under_iterated(speed, island->speed, under_iterated, sums->kinetic, mass);
+    island->speed = weight_speed_warm(speed, island->stack_depth, under_iterated, sums->kinetic, mass);
 }
 
 /* The share of a gap within the slop that a step closes; and e with that, `slop` over dt, m/s. */
