@@ -71,6 +71,7 @@ static struct lead_touch touch_of(const struct sadmm_context *c, const struct sa
     static const double still[6];
     const double dt = c->settings.dt, slop = c->settings.slop, *n = pair->normal;
     const struct sadmm_lead *a = &c->leads[cpu_body(c, pair->body_a)], *b = &c->leads[cpu_body(c, pair->body_b)];
+    const double rest[2] = {a->rest, b->rest};
     struct lead_touch touch = {pair->body_a >= 0 && pair->body_b >= 0 ? TOUCH_INNER
                                : pair->friction > 0                   ? TOUCH_FRICTION
                                                                       : TOUCH_SMOOTH, {0, 0}};
@@ -78,7 +79,9 @@ static struct lead_touch touch_of(const struct sadmm_context *c, const struct sa
         const struct sadmm_contact_point *point = &c->system->contacts->points[k];
         const double *arm_a = point->arm_a, *arm_b = point->arm_b;
         const double size[2] = {lead_size_at(a->linear, a->angular, arm_a), lead_size_at(b->linear, b->angular, arm_b)};
-        lead_add_push(&touch, dot3(n, point->impulse), size, dt, slop);
+        const double moves[2] = {lead_size_at(a->moves_linear, a->moves_angular, arm_a),
+                                 lead_size_at(b->moves_linear, b->moves_angular, arm_b)};
+        lead_add_push(&touch, dot3(n, point->impulse), moves, rest);
         if (lead_is_still(size, dt, slop)) continue;
         const double *v_a = pair->body_a >= 0 ? &c->system->velocity[6 * (size_t)pair->body_a] : still,
                      *v_b = pair->body_b >= 0 ? &c->system->velocity[6 * (size_t)pair->body_b] : still;
@@ -121,7 +124,7 @@ static void integrate_share(void *argument, int thread, int threads)
     const double *velocity = c->system->velocity;
     size_t first, past, begin, end;
     cpu_share_bodies(c, thread, threads, &first, &past);
-    sadmm_find_leads(past - first, bodies + first, velocity + 6 * first, c->leads + first);
+    sadmm_find_leads(past - first, bodies + first, velocity + 6 * first, &c->settings, c->leads + first);
     if (c->plan.momentum) {
         for (size_t i = first; i < past; ++i) atomic_store_explicit(&c->touch[i], 0, memory_order_relaxed);
         sadmm_barrier_wait(&c->barrier, threads);

@@ -80,16 +80,20 @@ static void touch(struct sadmm_context *c)
         const struct ref_constraint *constraint = &c->constraints[k];
         const bool inner = constraint->side[0].body >= 0 && constraint->side[1].body >= 0;
         struct lead_touch touch = {inner ? TOUCH_INNER : constraint->mu > 0 ? TOUCH_FRICTION : TOUCH_SMOOTH, {0, 0}};
-        double speed = 0, lead[2] = {0, 0}, size[2] = {0, 0};
+        double speed = 0, lead[2] = {0, 0}, size[2] = {0, 0}, moves[2] = {0, 0}, rest[2] = {0, 0};
         for (int s = 0; s < 2; ++s) {
             const struct ref_side *side = &constraint->side[s];
             if (side->body < 0) continue;
             speed += dense6_dot(side->J, c->bodies[side->body].v);
             lead[s] = dense6_dot(side->J, c->bodies[side->body].lead);
-            size[s] = lead_size(c->bodies[side->body].lead, s ? contacts->points[k].arm_b : contacts->points[k].arm_a);
+            const double *arm = s ? contacts->points[k].arm_b : contacts->points[k].arm_a;
+            size[s] = lead_size(c->bodies[side->body].lead, arm);
+            moves[s] = lead_speed(c->system->rigid[side->body].velocity, c->bodies[side->body].v, arm);
+            rest[s] = lead_rest_speed(c->settings->gravity, c->system->rigid[side->body].wrench,
+                                      c->system->rigid[side->body].mass, c->settings->dt);
         }
-        lead_add_point(&touch, contacts->points[k].gap, constraint->lambda[0], speed, lead, size, c->settings->dt,
-                       c->settings->slop);
+        lead_add_point(&touch, contacts->points[k].gap, constraint->lambda[0], speed, lead, size, moves, rest,
+                       c->settings->dt, c->settings->slop);
         for (int s = 0; s < 2; ++s) {
             if (constraint->side[s].body < 0) continue;
             struct ref_body *body = &c->bodies[constraint->side[s].body];

@@ -75,9 +75,9 @@ extern "C" sadmm_status CUDA(read_penalty)(struct sadmm_context *c, double *beta
 
 /* ---- Q: what contacts say of leads (math/lead.h), and moved bodies ----------------------------------------------- */
 
-/* A body of a pair: its velocity at the end of the step, and its lead. */
+/* A body of a pair: its velocity before the step and at its end, its lead, and lead_rest_speed. */
 struct lead_side {
-    double velocity[6], lead[6];
+    double before[6], velocity[6], lead[6], rest;
 };
 
 static __device__ __forceinline__ void load_side(const cuda_view &v, int32_t body, bool whole_step, lead_side *side)
@@ -87,7 +87,11 @@ static __device__ __forceinline__ void load_side(const cuda_view &v, int32_t bod
     if (whole_step) end_velocity(v, body, velocity);
     else
         for (int k = 0; k < 6; ++k) velocity[k] = v.bodies.state[(size_t)body * ROW + (size_t)k];
-    for (int k = 0; k < 6; ++k) side->velocity[k] = (double)velocity[k];
+    for (int k = 0; k < 6; ++k) {
+        side->before[k] = rigid->velocity[k];
+        side->velocity[k] = (double)velocity[k];
+    }
+    side->rest = lead_rest_speed(v.model.settings->gravity, rigid->wrench, rigid->mass, v.model.settings->dt);
     lead_own(rigid->velocity, side->velocity, rigid_is_isotropic(v3_load(rigid->inertia)), side->lead);
 }
 
@@ -121,6 +125,7 @@ static __global__ void touch_kernel(const __grid_constant__ cuda_view v, const _
 #pragma unroll
     for (int s = 0; s < 2; ++s)
         if (body[s] >= 0) load_side(v, body[s], args.planned, &sides[s]);
+    const double rest[2] = {sides[0].rest, sides[1].rest};
     for (int32_t k = lane; k < count; k += lanes) {
         const struct sadmm_contact_point *point = &v.raw.points[first + k];
         double impulse[3];
@@ -129,8 +134,10 @@ static __global__ void touch_kernel(const __grid_constant__ cuda_view v, const _
                                  lead_along(n, sides[1].lead, point->arm_b)},
                      speed = lead_along(n, sides[1].velocity, point->arm_b) -
                              lead_along(n, sides[0].velocity, point->arm_a);
-        const double size[2] = {lead_size(sides[0].lead, point->arm_a), lead_size(sides[1].lead, point->arm_b)};
-        lead_add_point(&touch, point->gap, dot3(n, impulse), speed, leads, size, dt, slop);
+        const double size[2] = {lead_size(sides[0].lead, point->arm_a), lead_size(sides[1].lead, point->arm_b)},
+                     moves[2] = {lead_speed(sides[0].before, sides[0].velocity, point->arm_a),
+                                 lead_speed(sides[1].before, sides[1].velocity, point->arm_b)};
+        lead_add_point(&touch, point->gap, dot3(n, impulse), speed, leads, size, moves, rest, dt, slop);
     }
 #pragma unroll
     for (int s = 0; s < 2; ++s)

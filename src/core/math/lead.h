@@ -13,6 +13,7 @@
 #include <stdbool.h>
 
 #include "array3.h"
+#include "max.h"
 
 /* What touches an island, bits; then what touches a body of it. */
 enum {
@@ -21,7 +22,7 @@ enum {
     TOUCH_FRICTION = 4, /* with friction */
     TOUCH_JOLT = 8,     /* a contact that taking back leads would close beyond what v does */
     TOUCH_CARRIED = 16, /* contacts that press on it, or that it might close by itself */
-    TOUCH_MOVED = 32    /* where it touches, its lead is more than rounding */
+    TOUCH_MOVED = 32    /* where it touches, it does not rest */
 };
 
 enum lead_kind {
@@ -70,7 +71,7 @@ SADMM_INLINE double lead_along(const double n[3], const double v[6], const doubl
 /* Sum of the sizes of components. */
 SADMM_INLINE double size3(const double x[3]) { return fabs(x[0]) + fabs(x[1]) + fabs(x[2]); }
 
-/* No less than the speed by which a lead moves the point; linear, angular: size3 of the lead's parts. */
+/* No less than the speed at which a velocity, or a lead, moves the point; linear, angular: size3 of its parts. */
 SADMM_INLINE double lead_size_at(double linear, double angular, const double arm[3])
 {
     return linear + angular * size3(arm);
@@ -79,27 +80,45 @@ SADMM_INLINE double lead_size(const double lead[6], const double arm[3])
 {
     return lead_size_at(size3(lead), size3(lead + 3), arm);
 }
+/* The same of the velocities before the step and after, whichever is more; part 0: linear, 1: angular. */
+SADMM_INLINE double lead_speed_part(const double before[6], const double v[6], int part)
+{
+    return max_of(size3(before + 3 * part), size3(v + 3 * part));
+}
+SADMM_INLINE double lead_speed(const double before[6], const double v[6], const double arm[3])
+{
+    return lead_size_at(lead_speed_part(before, v, 0), lead_speed_part(before, v, 1), arm);
+}
 
 /* Taking leads back may close a contact by this share of what they move it by in all, since the normal part of a lead
  * grows with the square of the speed where a body rolls, or of the slop, which is what a solve that was cut short
  * jitters by. */
 #define LEAD_SHARE 0.05
 #define LEAD_SLOP 0.1
-/* Of a body that is carried, what moves a point by less than this share of the slop is what a body at rest jitters by.
- * A mean of two velocities does not show the contacts what they corrected by: they would correct it again. */
-#define LEAD_LEAST 1e-3
+/* A body that is carried and moves its points by less than this share of what it would gain in a step by itself rests.
+ * Contacts that are solved in part are springs, on which it sways; a mean of two velocities would let that grow, for it
+ * does not show the contacts what they corrected by. */
+#define LEAD_LEAST 0.1
+
+/* That speed, m/s; force: on the body, N. */
+SADMM_INLINE double lead_rest_speed(const double gravity[3], const double force[3], double mass, double dt)
+{
+    const double free[3] = {gravity[0] + force[0] / mass, gravity[1] + force[1] / mass, gravity[2] + force[2] / mass};
+    return LEAD_LEAST * dt * size3(free);
+}
 
 /* Bits of an island, and of the two bodies, a and b. */
 struct lead_touch {
     int island, body[2];
 };
 
-/* Of a contact point, by its normal impulse and the sizes of the leads of a and b there (lead_size). */
-SADMM_INLINE void lead_add_push(struct lead_touch *touch, double push, const double size[2], double dt, double slop)
+/* Of a contact point, by its normal impulse, the speeds of a and b there (lead_speed), and what those are at rest
+ * (lead_rest_speed). */
+SADMM_INLINE void lead_add_push(struct lead_touch *touch, double push, const double moves[2], const double rest[2])
 {
     SADMM_UNROLL
     for (int s = 0; s < 2; ++s)
-        touch->body[s] |= (push > 0 ? TOUCH_CARRIED : 0) | (dt * size[s] > LEAD_LEAST * slop ? TOUCH_MOVED : 0);
+        touch->body[s] |= (push > 0 ? TOUCH_CARRIED : 0) | (moves[s] > rest[s] ? TOUCH_MOVED : 0);
 }
 
 /* Leads of these sizes close nothing worth a look: bodies at rest, say. */
@@ -123,9 +142,10 @@ SADMM_INLINE void lead_add_way(struct lead_touch *touch, double gap, double spee
 
 /* Both. */
 SADMM_INLINE void lead_add_point(struct lead_touch *touch, double gap, double push, double speed, const double lead[2],
-                                 const double size[2], double dt, double slop)
+                                 const double size[2], const double moves[2], const double rest[2], double dt,
+                                 double slop)
 {
-    lead_add_push(touch, push, size, dt, slop);
+    lead_add_push(touch, push, moves, rest);
     if (!lead_is_still(size, dt, slop)) lead_add_way(touch, gap, speed, lead, size, dt, slop);
 }
 

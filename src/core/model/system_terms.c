@@ -34,13 +34,17 @@ double sadmm_point_error(const struct sadmm_system *system, const struct sadmm_s
     return sadmm_contact_e(system, settings, pair, points, k);
 }
 
-void sadmm_find_leads(size_t count, const struct sadmm_rigid *bodies, const double *velocity, struct sadmm_lead *leads)
+void sadmm_find_leads(size_t count, const struct sadmm_rigid *bodies, const double *velocity,
+                      const struct sadmm_settings *settings, struct sadmm_lead *leads)
 {
     for (size_t i = 0; i < count; ++i) {
         struct sadmm_lead *out = &leads[i];
         lead_own(bodies[i].velocity, velocity + 6 * i, rigid_is_isotropic(v3_load(bodies[i].inertia)), out->lead);
         out->linear = size3(out->lead);
         out->angular = size3(out->lead + 3);
+        out->moves_linear = lead_speed_part(bodies[i].velocity, velocity + 6 * i, 0);
+        out->moves_angular = lead_speed_part(bodies[i].velocity, velocity + 6 * i, 1);
+        out->rest = lead_rest_speed(settings->gravity, bodies[i].wrench, bodies[i].mass, settings->dt);
     }
 }
 

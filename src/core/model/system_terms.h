@@ -12,13 +12,14 @@ void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_sett
 double sadmm_point_error(const struct sadmm_system *system, const struct sadmm_settings *settings,
                          const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *points, int32_t k);
 
-/* A body's lead (math/lead.h), and the sizes of its parts (size3). */
+/* A body's lead (math/lead.h), the sizes of its parts (size3), the parts of lead_speed, and lead_rest_speed. */
 struct sadmm_lead {
-    double lead[6], linear, angular;
+    double lead[6], linear, angular, moves_linear, moves_angular, rest;
 };
 
 /* Leads of `count` bodies, each by itself, which end the step with `velocity` (count x 6). */
-void sadmm_find_leads(size_t count, const struct sadmm_rigid *bodies, const double *velocity, struct sadmm_lead *leads);
+void sadmm_find_leads(size_t count, const struct sadmm_rigid *bodies, const double *velocity,
+                      const struct sadmm_settings *settings, struct sadmm_lead *leads);
 
 /* States after dt: `next` are `bodies` with `velocity` (end-of-step, count x 6), moved with that less their leads. */
 void sadmm_advance(size_t count, const struct sadmm_rigid *bodies, const double *velocity,
