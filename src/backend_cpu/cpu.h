@@ -151,7 +151,8 @@ struct sadmm_context {
     real *b, *A_columns, *H_columns; /* of general bodies: rows; 6 rows (columns of A, of (A + beta C)^-1) a body */
     real *momentum_residuals;                   /* and rows, fast */
     size_t general_of_capacity, general_body_capacity, general_lane_capacity;
-    size_t state_capacity, A_capacity, C_capacity, beta_capacity, lead_capacity, body_block_capacity, b_capacity, A_column_capacity,
+    size_t state_capacity, A_capacity, C_capacity, beta_capacity, lead_capacity, body_block_capacity, b_capacity,
+        A_column_capacity,
         H_column_capacity, momentum_residual_capacity;
 
     /* Geometric contacts */

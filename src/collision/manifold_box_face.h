@@ -1,5 +1,6 @@
 /* Facing faces, seen along the normal: the face of the other box that points against the reference face is clipped by
- * its sides (Sutherland-Hodgman). The edges of the polygon carry labels, from which the features of its vertices follow.
+ * its sides (Sutherland-Hodgman). The edges of the polygon carry labels, from which the features of its vertices
+ * follow.
  * The normal is the reference face's own, or that of an edge axis near it (manifold_box.h): then the incident face is
  * projected onto the reference plane along the normal, and separations are along it. */
 #ifndef SADMM_COLLISION_MANIFOLD_BOX_FACE_H
