@@ -113,10 +113,11 @@ static void commit_share(void *argument, int thread, int threads)
         steady_keep(&body->steady, &world->start.rigid[i], &world->next[i], settings.dt);
         body->rigid = world->next[i];
         if (!world->plan.wrenches) continue;
-        const double *last = world->wrench + 6 * i, *before = world->wrench_sum + 6 * i;
+        const double *last = world->wrench + 6 * i;
         if (settings.substeps == 1) memcpy(body->contact_wrench, last, sizeof body->contact_wrench);
         else
-            for (int k = 0; k < 6; ++k) body->contact_wrench[k] = (before[k] + last[k]) / settings.substeps;
+            for (int k = 0; k < 6; ++k)
+                body->contact_wrench[k] = (world->wrench_sum[6 * i + (size_t)k] + last[k]) / settings.substeps;
     }
 }
 
