@@ -152,8 +152,7 @@ struct sadmm_context {
     real *momentum_residuals;                   /* and rows, fast */
     size_t general_of_capacity, general_body_capacity, general_lane_capacity;
     size_t state_capacity, A_capacity, C_capacity, beta_capacity, lead_capacity, body_block_capacity, b_capacity,
-        A_column_capacity,
-        H_column_capacity, momentum_residual_capacity;
+        A_column_capacity, H_column_capacity, momentum_residual_capacity;
 
     /* Geometric contacts */
     struct pair_block *pair_blocks;

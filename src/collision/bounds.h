@@ -22,6 +22,7 @@ struct sadmm_box3 { double lo[3], hi[3]; };
 SADMM_INLINE double downward(double way) { return way < 0 ? way : 0; }
 SADMM_INLINE double upward(double way) { return way > 0 ? way : 0; }
 
+/* rad/s. */
 SADMM_INLINE double turning_rate(const double angular[3])
 {
     return sqrt(angular[0] * angular[0] + angular[1] * angular[1] + angular[2] * angular[2]);
@@ -52,6 +53,7 @@ SADMM_INLINE double own_fall(const double acceleration[2], double reach, double 
     return fall_of(acceleration[0], dt) + (turn < 2 ? turn : 2) * reach;
 }
 
+/* Of two velocities, m/s. */
 SADMM_INLINE double relative_speed(const double va[3], const double vb[3])
 {
     double x = vb[0] - va[0], y = vb[1] - va[1], z = vb[2] - va[2];

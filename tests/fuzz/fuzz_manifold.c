@@ -130,16 +130,17 @@ static struct truth truth_of(const struct solid *a, const struct solid *b)
     return t;
 }
 
-/* Tangent of the angle between a normal and the nearest face of two boxes; 0 for the normal of a face. */
-static double lean_of(const struct solid *a, const struct solid *b, const double normal[3])
+/* Tangent of the angle between a normal and the nearest face of two boxes; of the normal of a face it is rounding. By
+ * the cross product: the cosine of a small angle has lost it. */
+static double lean_of(const struct solid *a, const struct solid *b, const double n[3])
 {
-    double cosine = 0;
+    double lean = HUGE_VAL;
     for (int k = 0; k < 6; ++k) {
-        const double *R = k < 3 ? a->R : b->R;
-        const double along = R[k % 3] * normal[0] + R[3 + k % 3] * normal[1] + R[6 + k % 3] * normal[2];
-        cosine = fmax(cosine, fabs(along));
+        const double *R = k < 3 ? a->R : b->R, f[3] = {R[k % 3], R[3 + k % 3], R[6 + k % 3]};
+        const double cross[3] = {f[1] * n[2] - f[2] * n[1], f[2] * n[0] - f[0] * n[2], f[0] * n[1] - f[1] * n[0]};
+        lean = fmin(lean, sqrt(dot3(cross, cross)) / fabs(dot3(f, n)));
     }
-    return cosine < 1 ? sqrt(1 - cosine * cosine) / cosine : 0;
+    return lean;
 }
 
 static void check_solids(const struct solid *a, const struct solid *b, double limit)

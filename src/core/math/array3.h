@@ -5,6 +5,8 @@
 #include "real.h"
 
 SADMM_INLINE double dot3(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+/* 1-norm: no less than the length, and no root. */
+SADMM_INLINE double size3(const double a[3]) { return fabs(a[0]) + fabs(a[1]) + fabs(a[2]); }
 SADMM_INLINE double length3(const double a[3]) { return sqrt(dot3(a, a)); }
 
 /* x += sign w x r */

@@ -68,9 +68,6 @@ SADMM_INLINE double lead_along(const double n[3], const double v[6], const doubl
     return dot3(n, x);
 }
 
-/* Sum of the sizes of components. */
-SADMM_INLINE double size3(const double x[3]) { return fabs(x[0]) + fabs(x[1]) + fabs(x[2]); }
-
 /* No less than the speed at which a velocity, or a lead, moves the point; linear, angular: size3 of its parts. */
 SADMM_INLINE double lead_size_at(double linear, double angular, const double arm[3])
 {
