@@ -28,37 +28,6 @@ static __device__ __forceinline__ void move_body(const struct sadmm_rigid *body,
     q_store(rigid_turn(q_load(body->orientation), v3_load(mean + 3), dt), orientation);
 }
 
-static __device__ __forceinline__ void add_pair_wrench(const contact_view &contacts, const raw_view &raw, int32_t p,
-                                                       int side, double per_dt, double wrench[6])
-{
-    const struct sadmm_contact_pair *pair = &raw.pairs[p];
-    for (int32_t k = 0; k < pair->count; ++k) {
-        const struct sadmm_contact_point *point = &raw.points[pair->first + k];
-        vec3 f = point_impulse(contacts, p, k), m = v3_cross(v3_load(side ? point->arm_b : point->arm_a), f);
-        double sign = side ? per_dt : -per_dt;
-        wrench[0] += sign * f.x, wrench[1] += sign * f.y, wrench[2] += sign * f.z;
-        wrench[3] += sign * m.x, wrench[4] += sign * m.y, wrench[5] += sign * m.z;
-    }
-}
-
-/* R: (12) with lambda = -u, J^T lambda / dt over the sides [begin, end) of a body, by eight lanes that take every
- * eighth side each; the sum is in all of them. per_dt: 1 / dt. Every lane of the warp comes here. */
-static __device__ __forceinline__ void contact_wrench(const graph_view &graph, const contact_view &contacts,
-                                                      const raw_view &raw, int32_t begin, int32_t end, int32_t lane,
-                                                      double per_dt, double wrench[6])
-{
-    for (int k = 0; k < 6; ++k) wrench[k] = 0;
-    for (int32_t at = begin + lane; at < end; at += LANES) {
-        int32_t record = graph.incident[at] / 2, side = graph.incident[at] & 1;
-        if (record < contacts.pair_capacity)
-            add_pair_wrench(contacts, raw, record, side, per_dt, wrench); /* contacts given by geometry only */
-    }
-#pragma unroll
-    for (int o = 1; o < LANES; o *= 2)
-#pragma unroll
-        for (int k = 0; k < 6; ++k) wrench[k] += __shfl_xor_sync(0xffffffffu, wrench[k], o);
-}
-
 static __device__ __forceinline__ void store_wrench(const double wrench[6], int32_t lane, double *out)
 {
 #pragma unroll

@@ -1,4 +1,4 @@
-/* The step's own kernels (device/step.h): start, admit, check, finish, commit, edits. */
+/* The step's own kernels (device/step.h): edits, start, admit, turn, commit. */
 #include <stddef.h>
 
 #include "backend_cuda/device/double.h"
@@ -6,17 +6,8 @@
 #include "collision/bounds.h"
 
 #include "backend_cuda/device/plan_check.h"
-#include "backend_cuda/iterate/slow.h"
-#include "backend_cuda/iterate/solution.h"
-#include "core/model/steady.h"
+#include "move.h"
 #include "world.h"
-
-static __device__ __forceinline__ bool finite_numbers(const double *x, int count)
-{
-    double sum = 0;
-    for (int k = 0; k < count; ++k) sum += x[k] - x[k];
-    return sum == 0;
-}
 
 enum { STEP_THREADS = 64 }; /* a block: few, for long work and many multiprocessors */
 
@@ -121,143 +112,39 @@ static __global__ void admit_kernel(const __grid_constant__ cuda_view v, const _
     v.model.live->points = counts.points;
 }
 
-/* ---- finish ---------------------------------------------------------------------------------------------------- */
+/* ---- bodies again ---------------------------------------------------------------------------------------------- */
 
-/* What is fetched before the iterations have ended. */
-struct body_before {
-    struct sadmm_rigid body;
-    struct sadmm_steady steady;
-    int32_t label;
-};
-
-static __device__ body_before fetch_body(const graph_view &graph, const cuda_step_view &step, int32_t i)
+/* Body i again, where its island is not as it is as a rule. */
+static __device__ __noinline__ void move_again(const cuda_view &v, int32_t i)
 {
-    const body_before before = {step.before[i], step.steady_before[i], step.limits ? graph.label[i] : i};
-    return before;
-}
-
-static __device__ bool finish_body(const cuda_view &v, int32_t i, const body_before &before, double dt)
-{
-    struct sadmm_steady steady = before.steady;
-    struct sadmm_rigid next = before.body;
+    const int32_t label = v.graph.label[i];
+    const int island = v.islands.touch[label] | (v.islands.info[label].held ? TOUCH_AS_A_RULE : 0),
+              own = v.islands.touch[i];
+    if (lead_kind_of(island, own) == lead_kind_of(TOUCH_AS_A_RULE, own)) return;
     solver_real velocity[6];
-    if (v.step.limits) end_velocity(v, i, velocity);
-    else
-        for (int k = 0; k < 6; ++k) velocity[k] = v.bodies.state[(size_t)i * ROW + (size_t)k];
-    const int island = v.step.limits ? v.islands.touch[before.label] : 0,
-              own = v.step.limits ? v.islands.touch[i] : 0;
-    move_body(&before.body, velocity, dt, v.model.settings->gravity, island, own, next.position, next.orientation,
-              next.velocity);
-    steady_keep(&steady, &before.body, &next, dt);
-    v.step.after[i] = next;
-    v.step.steady_after[i] = steady;
-    return finite_numbers(next.position, 3) && finite_numbers(next.orientation, 4) && finite_numbers(next.velocity, 6);
+    end_velocity(v, i, velocity);
+    if (!store_moved(v, i, fetch_body(v.step, i), velocity, island, own, v.model.settings->dt))
+        atomicMin(&v.step.control->offending_body, i);
 }
 
-struct point_before {
-    double impulse[3], gap;
-};
-
-static __device__ point_before fetch_before(const struct sadmm_contact_point *point)
+/* Are there bodies to be moved again (move.h)? */
+static __device__ __forceinline__ bool moves_again(const cuda_view &v)
 {
-    const point_before before = {{point->impulse[0], point->impulse[1], point->impulse[2]}, point->gap};
-    return before;
+    return v.step.limits && *v.islands.again;
 }
 
-struct pair_before {
-    int32_t first, count, body; /* points; a body of it */
-    point_before point;         /* the lane's first */
-};
-
-static __device__ pair_before fetch_pair(const raw_view &raw, const cuda_step_view &step, int32_t p, int32_t lane)
+/* Is this the thread that gives the account of a step? Where bodies are moved again, that is one of the block that ends
+ * last. Every thread of the grid comes here. */
+static __device__ __forceinline__ bool gives_account(struct cuda_step_control *control, bool again)
 {
-    const struct sadmm_contact_pair *pair = &raw.pairs[p];
-    pair_before before = {pair->first, pair->count, pair->body_b >= 0 ? pair->body_b : pair->body_a, {}};
-    if (lane < before.count) before.point = fetch_before(&step.points[before.first + lane]);
-    return before;
-}
-
-/* Impulses of a pair into its points, every v.contacts.lanes-th of them from `lane` on; *depth: the deepest. */
-static __device__ bool finish_pair(const contact_view &contacts, const cuda_step_view &step, int32_t p, int32_t lane,
-                                   const pair_before &pair, double *depth)
-{
-    bool finite = true;
-    for (int32_t k = lane; k < pair.count; k += contacts.lanes) {
-        struct sadmm_contact_point *point = &step.points[pair.first + k];
-        const point_before before = k == lane ? pair.point : fetch_before(point);
-        double *start = step.start_impulse + 3 * (size_t)(pair.first + k), impulse[3];
-        v3_store(point_impulse(contacts, p, k), impulse);
-        finite = finite && finite_numbers(impulse, 3);
-        for (int j = 0; j < 3; ++j) {
-            start[j] = before.impulse[j];
-            point->impulse[j] = impulse[j];
-        }
-        *depth = fmax(*depth, -before.gap);
-    }
-    return finite;
-}
-
-/* Threads for bodies, eight lanes a wrench, threads for points: side by side, each of them long. */
-struct finish_ranges {
-    int32_t wrenches, pairs, end;
-};
-static __host__ __device__ inline finish_ranges ranges_of(const model_view &model, const contact_view &contacts)
-{
-    finish_ranges r;
-    r.wrenches = (model.bodies + WARP - 1) / WARP * WARP;
-    r.pairs = r.wrenches + (model.wrenches ? (LANES * model.bodies + WARP - 1) / WARP * WARP : 0);
-    r.end = r.pairs + contacts.lanes * contacts.pair_capacity;
-    return r;
-}
-
-/* Never reads offending bodies found by this same kernel: which body is named must not depend on timing. */
-static __global__ void __launch_bounds__(STEP_THREADS)
-    finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
-{
-    const int32_t i = (int32_t)(blockIdx.x * (unsigned)STEP_THREADS + threadIdx.x);
-    const finish_ranges range = ranges_of(v.model, v.contacts);
-    struct cuda_step_control *control = v.step.control;
-    double depth = 0;
-    const double dt = v.model.settings->dt;
-    const bool is_body = i < range.wrenches,
-               is_pair = i >= range.pairs && (i - range.pairs) / v.contacts.lanes < live_pairs(v.model);
-    const int32_t p = (i - range.pairs) / v.contacts.lanes, lane = is_pair ? (i - range.pairs) % v.contacts.lanes : 0;
-    body_before body = {};
-    pair_before pair = {};
-    if (is_body && i < v.model.bodies) body = fetch_body(v.graph, v.step, i);
-    if (is_pair) pair = fetch_pair(v.raw, v.step, p, lane);
-    /* Layout and penalties are the last that abort a step, the latter where it is not as planned; iterations come
-     * between. */
-    const bool on = as_planned(v.model, v.step) && !v.model.live->abort_code;
-
-    wait_for_stream();
-    let_next_begin();
-    const unsigned long long deepest = control->depth; /* of those that have come here */
-    if (i == 0) control->stamps[STAMP_SOLVED] = nanoseconds();
-    if (is_body) {
-        if (on && i < v.model.bodies && !finish_body(v, i, body, dt))
-            atomicMin(&control->offending_body, i);
-    } else if (i < range.pairs) {
-        const int32_t slot = (i - range.wrenches) / LANES, of_body = i % LANES;
-        const bool live = on && slot < v.model.bodies;
-        double wrench[6];
-        contact_wrench(v.graph, v.contacts, v.raw, live ? v.graph.offsets[slot] : 0,
-                       live ? v.graph.offsets[slot + 1] : 0, of_body, 1 / dt, wrench);
-        if (live)
-            add_wrench(wrench, of_body, v.step.substep, v.step.substeps,
-                       v.step.wrench + 6 * (size_t)v.graph.body_of[slot]);
-    } else if (on && is_pair) {
-        /* bodies are named first: all of them are below any contact's */
-        if (!finish_pair(v.contacts, v.step, p, lane, pair, &depth))
-            atomicMin(&control->offending_body, v.model.bodies + pair.body);
-    }
-    /* -0 is no depth; a larger one may be there already */
-    unsigned long long bits = depth > 0 ? (unsigned long long)__double_as_longlong(depth) : 0;
-    for (int o = WARP / 2; o > 0; o /= 2) {
-        unsigned long long other = __shfl_xor_sync(0xffffffffu, bits, o);
-        bits = other > bits ? other : bits;
-    }
-    if (threadIdx.x % WARP == 0 && bits > deepest) atomicMax(&control->depth, bits);
+    if (!again) return blockIdx.x == 0 && threadIdx.x == 0;
+    __syncthreads();
+    if (threadIdx.x > 0) return false;
+    __threadfence();
+    if (atomicAdd(&control->ended, 1) + 1 < (int32_t)gridDim.x) return false;
+    control->ended = 0;
+    __threadfence();
+    return true;
 }
 
 /* ---- turn ------------------------------------------------------------------------------------------------------ */
@@ -295,13 +182,16 @@ static __device__ struct cuda_step_totals totals_of(const cuda_view &v, const cu
 
 /* The end of a sub-step that others follow, as seen by it: the account, and what the next one starts from. Threads as
  * in start_step_kernel. */
-static __global__ void turn_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+static __global__ void __launch_bounds__(STEP_THREADS, 16)
+    turn_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     const int64_t t = (int64_t)blockIdx.x * STEP_THREADS + threadIdx.x, i = t / START_LANES;
     const int32_t lane = (int32_t)(t % START_LANES);
+    struct cuda_step_control *control = v.step.control;
     if (v.model.live->abort_code) return;
-    if (t == 0) {
-        struct cuda_step_control *control = v.step.control;
+    const bool again = moves_again(v);
+    if (again && lane == 0 && i < v.model.bodies) move_again(v, (int32_t)i);
+    if (gives_account(control, again)) {
         control->stamps[STAMP_END] = nanoseconds();
         control->totals = totals_of(v, args);
         control->stamps[STAMP_START] = control->stamps[STAMP_END];
@@ -316,14 +206,17 @@ static __global__ void turn_kernel(const __grid_constant__ cuda_view v, const __
 
 static __device__ double double_of(unsigned long long bits) { return __longlong_as_double((long long)bits); }
 
-/* One thread. */
+/* A thread a body where some may have to be moved again, else one block; the report is one thread's. */
 static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     const bool planned = as_planned(v.model, v.step);
     const int32_t aborted = v.model.live->abort_code;
-    wait_for_stream();
-    if (threadIdx.x > 0) return;
     struct cuda_step_control *control = v.step.control;
+    const int32_t i = (int32_t)(blockIdx.x * (unsigned)STEP_THREADS + threadIdx.x);
+    wait_for_stream();
+    const bool again = !aborted && planned && moves_again(v);
+    if (again && i < v.model.bodies) move_again(v, i);
+    if (!gives_account(control, again)) return;
     struct cuda_step_report *report = &v.step.reports[control->sequence % STEPS_AHEAD];
     const int32_t offending_body = control->offending_body,
                   abort_code = abort_of(aborted, planned, offending_body);
@@ -374,17 +267,11 @@ sadmm_status CUDA(launch_admit)(struct sadmm_context *c, struct sadmm_error *err
     return CUDA(launch)(c, admit_kernel, "admit", 1, &args, error);
 }
 
-sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *error)
-{
-    cuda_args args = {};
-    int64_t blocks = ((int64_t)ranges_of(c->view.model, c->view.contacts).end + STEP_THREADS - 1) / STEP_THREADS;
-    return CUDA(launch_early)(c, finish_kernel, "finish", blocks, STEP_THREADS, &args, error);
-}
-
 sadmm_status CUDA(launch_commit)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
     args.checks = c->checks;
     args.count = c->settings.iterations;
-    return CUDA(launch_early)(c, commit_kernel, "commit", 1, STEP_THREADS, &args, error);
+    const int64_t blocks = c->view.step.limits ? (int64_t)(c->view.model.bodies - 1) / STEP_THREADS + 1 : 1;
+    return CUDA(launch_early)(c, commit_kernel, "commit", blocks, STEP_THREADS, &args, error);
 }

@@ -93,7 +93,6 @@ static sadmm_status record_finish(struct sadmm_context *c, bool residuals, struc
         TRY(CUDA(enqueue_residuals)(c, error));
         CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
     }
-    if (c->view.step.limits) TRY(CUDA(launch_touch)(c, true, error));
     TRY(CUDA(launch_finish)(c, error));
     if (residuals) CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
     return SADMM_OK;

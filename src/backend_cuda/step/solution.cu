@@ -1,9 +1,7 @@
 /* What a step gives back, in raw order and double: v and lambda, beta, the moved bodies (Q), contact wrenches (R). */
 #include "backend_cuda/device/double.h"
-#include "backend_cuda/device/plan_check.h"
-#include "backend_cuda/iterate/slow.h"
-#include "backend_cuda/iterate/solution.h"
-#include "world.h"
+#include "backend_cuda/device/body.h"
+#include "touch.h"
 
 /* ---- v and lambda ---------------------------------------------------------------------------------------------- */
 
@@ -75,84 +73,15 @@ extern "C" sadmm_status CUDA(read_penalty)(struct sadmm_context *c, double *beta
 
 /* ---- Q: what contacts say of leads (math/lead.h), and moved bodies ----------------------------------------------- */
 
-/* A body of a pair: its velocity before the step and at its end, its lead, and lead_rest_speed. */
-struct lead_side {
-    double before[6], velocity[6], lead[6], rest;
-};
-
-static __device__ __forceinline__ void load_side(const cuda_view &v, int32_t body, bool whole_step, lead_side *side)
+/* Eight lanes a body; bits are 0 before. */
+static __global__ void touch_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    const struct sadmm_rigid *rigid = &v.raw.system.rigid[body];
-    solver_real velocity[6];
-    if (whole_step) end_velocity(v, body, velocity);
-    else
-        for (int k = 0; k < 6; ++k) velocity[k] = v.bodies.state[(size_t)body * ROW + (size_t)k];
-    for (int k = 0; k < 6; ++k) {
-        side->before[k] = rigid->velocity[k];
-        side->velocity[k] = (double)velocity[k];
-    }
-    side->rest = lead_rest_speed(v.model.settings->gravity, rigid->wrench, rigid->mass, v.model.settings->dt);
-    lead_own(rigid->velocity, side->velocity, rigid_is_isotropic(v3_load(rigid->inertia)), side->lead);
-}
-
-/* Bits only come: one that is there already needs no more. */
-static __device__ __forceinline__ void add_bits(int32_t *to, int bits)
-{
-    if (bits & ~*to) atomicOr(to, bits);
-}
-
-/* contacts.lanes threads a pair, every so manieth point each. `planned`: of a whole step. */
-static __global__ void touch_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
-{
-    const int32_t lanes = v.contacts.lanes, p = thread_index() / lanes, lane = thread_index() % lanes;
-    const double dt = v.model.settings->dt, slop = v.model.settings->slop;
-    const bool on = p < live_pairs(v.model) && !(args.planned && !as_planned(v.model, v.step));
-    const struct sadmm_contact_pair *pair = &v.raw.pairs[on ? p : 0];
-    int32_t body[2] = {-1, -1}, first = 0, count = 0;
-    double n[3] = {}, friction = 0;
-    if (on) {
-        body[0] = pair->body_a, body[1] = pair->body_b;
-        first = pair->first, count = pair->count;
-        friction = pair->friction;
-        for (int k = 0; k < 3; ++k) n[k] = pair->normal[k];
-    }
-    wait_for_stream();
-    let_next_begin();
-    if (!on) return;
-    lead_side sides[2] = {};
-    struct lead_touch touch = {
-        body[0] >= 0 && body[1] >= 0 ? TOUCH_INNER : friction > 0 ? TOUCH_FRICTION : TOUCH_SMOOTH, {0, 0}};
-#pragma unroll
-    for (int s = 0; s < 2; ++s)
-        if (body[s] >= 0) load_side(v, body[s], args.planned, &sides[s]);
-    const double rest[2] = {sides[0].rest, sides[1].rest};
-    for (int32_t k = lane; k < count; k += lanes) {
-        const struct sadmm_contact_point *point = &v.raw.points[first + k];
-        double impulse[3];
-        v3_store(point_impulse(v.contacts, p, k), impulse);
-        const double leads[2] = {-lead_along(n, sides[0].lead, point->arm_a),
-                                 lead_along(n, sides[1].lead, point->arm_b)},
-                     speed = lead_along(n, sides[1].velocity, point->arm_b) -
-                             lead_along(n, sides[0].velocity, point->arm_a);
-        const double size[2] = {lead_size(sides[0].lead, point->arm_a), lead_size(sides[1].lead, point->arm_b)},
-                     moves[2] = {lead_speed(sides[0].before, sides[0].velocity, point->arm_a),
-                                 lead_speed(sides[1].before, sides[1].velocity, point->arm_b)};
-        lead_add_point(&touch, point->gap, dot3(n, impulse), speed, leads, size, moves, rest, dt, slop);
-    }
-#pragma unroll
-    for (int s = 0; s < 2; ++s)
-        if (body[s] >= 0) {
-            add_bits(&v.islands.touch[v.graph.label[body[s]]], touch.island);
-            if (touch.body[s]) add_bits(&v.islands.touch[body[s]], touch.body[s]);
-        }
-}
-
-sadmm_status CUDA(launch_touch)(struct sadmm_context *c, bool whole_step, struct sadmm_error *error)
-{
-    cuda_args args = {};
-    args.planned = whole_step;
-    const int64_t threads = (int64_t)c->view.contacts.lanes * c->view.contacts.pair_capacity;
-    return CUDA(launch_early)(c, touch_kernel, "touch", blocks_for(threads), THREADS, &args, error);
+    const int32_t slot = thread_index() / LANES, lane = (int32_t)threadIdx.x % LANES;
+    const body_thread t = body_of_slot(v.graph, slot, slot < live_bodies(v.model));
+    const int32_t body = (int32_t)t.body, at = t.begin + lane;
+    const lead_sizes own = load_lead_sizes<false>(v, body);
+    const contact_sums sums = sum_touching<false, true>(v, body, own, fetch_touching(v, at, t.end), at, t.end);
+    if (t.live && lane == 0) add_touch(v.islands, body, v.graph.label[body], sums.touch);
 }
 
 enum { MOVED = 13 }; /* position, orientation, velocity */
@@ -178,7 +107,7 @@ extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_ri
     if (c->plan.momentum) {
         CUDA_CALL(c, cudaMemsetAsync(c->view.islands.touch, 0, n * sizeof(int32_t), c->stream),
                   "cudaMemsetAsync(touch)");
-        TRY(CUDA(launch_touch)(c, false, error));
+        TRY(CUDA(launch)(c, touch_kernel, "touch", blocks_for((int64_t)c->view.model.bodies * LANES), &args, error));
     }
     TRY(CUDA(launch)(c, integrate_kernel, "integrate", blocks_for(c->view.model.bodies), &args, error));
     TRY(CUDA(download)(c, c->view.raw.out, MOVED * n * sizeof(double), error));
@@ -196,12 +125,13 @@ extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_ri
 
 static __global__ void wrench_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    int32_t slot = thread_index() / LANES, lane = (int32_t)threadIdx.x % LANES;
-    bool live = slot < live_bodies(v.model);
-    double wrench[6];
-    contact_wrench(v.graph, v.contacts, v.raw, live ? v.graph.offsets[slot] : 0, live ? v.graph.offsets[slot + 1] : 0,
-                   lane, 1 / v.model.settings->dt, wrench);
-    if (live) store_wrench(wrench, lane, v.raw.out + 6 * (size_t)v.graph.body_of[slot]);
+    const int32_t slot = thread_index() / LANES, lane = (int32_t)threadIdx.x % LANES;
+    const body_thread t = body_of_slot(v.graph, slot, slot < live_bodies(v.model));
+    const int32_t at = t.begin + lane;
+    const lead_sizes none = {};
+    const contact_sums sums =
+        sum_touching<false, false>(v, (int32_t)t.body, none, fetch_touching(v, at, t.end), at, t.end);
+    if (t.live) store_wrench(sums.wrench, lane, v.raw.out + 6 * t.body);
 }
 
 extern "C" sadmm_status CUDA(recover_wrenches)(struct sadmm_context *c, double *wrench, struct sadmm_error *error)

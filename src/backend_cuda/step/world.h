@@ -101,7 +101,7 @@ sadmm_status CUDA(record_step)(struct sadmm_context *, int into, struct sadmm_er
 /* read.cu: the report of the last step that was done. */
 void CUDA(report_step)(const struct sadmm_context *, struct sadmm_resident_report *out);
 
-/* kernels.cu: launches of the step's own kernels. */
+/* kernels.cu, finish.cu: launches of the step's own kernels. */
 sadmm_status CUDA(launch_edits)(struct sadmm_context *, const struct sadmm_resident_edit *edits, size_t count,
                                 struct sadmm_error *error);
 sadmm_status CUDA(launch_start)(struct sadmm_context *, struct sadmm_error *error);
@@ -109,7 +109,5 @@ sadmm_status CUDA(launch_turn)(struct sadmm_context *, struct sadmm_error *error
 sadmm_status CUDA(launch_admit)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_finish)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_commit)(struct sadmm_context *, struct sadmm_error *error);
-/* solution.cu: what contacts say of leads (math/lead.h), where there are some; bits are 0 before. */
-sadmm_status CUDA(launch_touch)(struct sadmm_context *, bool whole_step, struct sadmm_error *error);
 
 #endif

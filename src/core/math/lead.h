@@ -109,19 +109,29 @@ struct lead_touch {
     int island, body[2];
 };
 
-/* Of a contact point, by its normal impulse, the speeds of a and b there (lead_speed), and what those are at rest
+/* Of a contact point and a body, by its normal impulse, the body's speed there (lead_speed), and what that is at rest
  * (lead_rest_speed). */
+SADMM_INLINE int lead_push(double push, double moves, double rest)
+{
+    return (push > 0 ? TOUCH_CARRIED : 0) | (moves > rest ? TOUCH_MOVED : 0);
+}
 SADMM_INLINE void lead_add_push(struct lead_touch *touch, double push, const double moves[2], const double rest[2])
 {
     SADMM_UNROLL
-    for (int s = 0; s < 2; ++s)
-        touch->body[s] |= (push > 0 ? TOUCH_CARRIED : 0) | (moves[s] > rest[s] ? TOUCH_MOVED : 0);
+    for (int s = 0; s < 2; ++s) touch->body[s] |= lead_push(push, moves[s], rest[s]);
 }
 
 /* Leads of these sizes close nothing worth a look: bodies at rest, say. */
 SADMM_INLINE bool lead_is_still(const double size[2], double dt, double slop)
 {
     return dt * (size[0] + size[1]) <= LEAD_SLOP * slop / 2;
+}
+
+/* A body whose lead has this size is not carried by what it closes, and leaves jolts to the other one: lead_add_way has
+ * room for twice as much at least, and leads that are not still have one that is not short. */
+SADMM_INLINE bool lead_is_short(double size, double dt, double slop)
+{
+    return dt * size <= LEAD_SLOP * slop / 4;
 }
 
 /* Of a point whose leads are not still, by its gap, the speed at which it opens, and what the leads of a and b add to

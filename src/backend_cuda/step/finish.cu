@@ -1,0 +1,182 @@
+/* The end of a step, or of a sub-step (device/step.h): moved bodies, wrenches, impulses into the contacts. */
+#include "backend_cuda/device/double.h"
+
+#include "backend_cuda/device/body.h"
+#include "backend_cuda/device/plan_check.h"
+#include "move.h"
+#include "touch.h"
+#include "world.h"
+
+/* Blocks of bodies: eight lanes each for what its contacts do, and a warp that moves all of them. Then blocks of
+ * contacts. */
+enum { FINISH_THREADS = 256, FINISH_SIDES = FINISH_THREADS - WARP, FINISH_BODIES = FINISH_SIDES / LANES };
+
+struct finish_blocks {
+    int32_t bodies, end;
+};
+static __host__ __device__ inline finish_blocks finish_blocks_of(const model_view &model, const contact_view &contacts)
+{
+    const int64_t lanes = (int64_t)contacts.lanes * contacts.pair_capacity;
+    const int32_t bodies = (model.bodies + FINISH_BODIES - 1) / FINISH_BODIES;
+    return {bodies, bodies + (int32_t)((lanes + FINISH_THREADS - 1) / FINISH_THREADS)};
+}
+
+/* Between the threads of a block of bodies: what touches them. */
+struct finish_shared {
+    int touch[FINISH_BODIES];
+};
+
+/* ---- bodies ---------------------------------------------------------------------------------------------------- */
+
+/* What contacts say of an island is kept where that is not what holds as a rule (move.h). */
+static __device__ __forceinline__ void tell_touch(const island_view &islands, int32_t body, int32_t label, bool held,
+                                                  int touch)
+{
+    add_touch(islands, body, label, held ? touch & (TOUCH_OF_BODY | TOUCH_JOLT) : touch);
+    if (!held || touch & TOUCH_JOLT) *islands.again = 1;
+}
+
+/* What the lanes of a body do. */
+static __device__ __forceinline__ void finish_sides(const cuda_view &v, bool on, struct finish_shared *shared)
+{
+    const int32_t in_block = (int32_t)threadIdx.x / LANES, slot = (int32_t)blockIdx.x * FINISH_BODIES + in_block;
+    const body_thread t = body_of_slot(v.graph, slot, on && slot < v.model.bodies);
+    const int32_t body = (int32_t)t.body, at = t.begin + t.lane;
+    const bool touched = t.live && v.step.limits;
+    const int32_t label = touched ? v.graph.label[body] : 0;
+    const touching first = fetch_touching(v, at, t.end);
+    lead_sizes own = {};
+    bool held = true;
+    wait_for_stream();
+    let_next_begin();
+    if (touched) {
+        held = v.islands.info[label].held;
+        own = load_lead_sizes<true>(v, body);
+    }
+    const contact_sums sums = sum_touching<true, true>(v, body, own, first, at, t.end);
+    if (t.lane == 0) shared->touch[in_block] = sums.touch;
+    __syncthreads();
+    if (t.live && v.model.wrenches)
+        add_wrench(sums.wrench, t.lane, v.step.substep, v.step.substeps, v.step.wrench + 6 * t.body);
+    if (touched && t.lane == 0) tell_touch(v.islands, body, label, held, sums.touch);
+}
+
+/* What the thread does that moves a body. */
+static __device__ __forceinline__ void finish_body(const cuda_view &v, bool on, double dt,
+                                                   const struct finish_shared *shared)
+{
+    const int32_t in_block = (int32_t)threadIdx.x - FINISH_SIDES,
+                  slot = (int32_t)blockIdx.x * FINISH_BODIES + in_block;
+    const bool live = on && in_block < FINISH_BODIES && slot < v.model.bodies;
+    const int32_t body = live ? v.graph.body_of[slot] : 0;
+    body_before before = {};
+    solver_real velocity[6] = {};
+    if (live) before = fetch_body(v.step, body);
+    wait_for_stream();
+    let_next_begin();
+    if (blockIdx.x == 0 && in_block == 0) v.step.control->stamps[STAMP_SOLVED] = nanoseconds();
+    if (live) load_end_velocity(v, body, velocity);
+    __syncthreads();
+    if (live && !store_moved(v, body, before, velocity, TOUCH_AS_A_RULE, shared->touch[in_block], dt))
+        atomicMin(&v.step.control->offending_body, body);
+}
+
+/* ---- contacts -------------------------------------------------------------------------------------------------- */
+
+struct point_before {
+    double impulse[3], gap;
+};
+
+static __device__ __forceinline__ point_before fetch_before(const struct sadmm_contact_point *point)
+{
+    const point_before before = {{point->impulse[0], point->impulse[1], point->impulse[2]}, point->gap};
+    return before;
+}
+
+struct pair_before {
+    int32_t first, count, body; /* points; a body of it */
+    point_before point;         /* the lane's first */
+};
+
+static __device__ __forceinline__ pair_before fetch_pair(const raw_view &raw, const cuda_step_view &step, int32_t p,
+                                                         int32_t lane)
+{
+    const struct sadmm_contact_pair *pair = &raw.pairs[p];
+    pair_before before = {pair->first, pair->count, pair->body_b >= 0 ? pair->body_b : pair->body_a, {}};
+    if (lane < before.count) before.point = fetch_before(&step.points[before.first + lane]);
+    return before;
+}
+
+/* Impulses of a pair into its points, every v.contacts.lanes-th of them from `lane` on; *depth: the deepest. */
+static __device__ __forceinline__ bool store_impulses(const contact_view &contacts, const cuda_step_view &step,
+                                                      int32_t p, int32_t lane, const pair_before &pair, double *depth)
+{
+    bool finite = true;
+    for (int32_t k = lane; k < pair.count; k += contacts.lanes) {
+        struct sadmm_contact_point *point = &step.points[pair.first + k];
+        const point_before before = k == lane ? pair.point : fetch_before(point);
+        double *start = step.start_impulse + 3 * (size_t)(pair.first + k), impulse[3];
+        v3_store(point_impulse(contacts, p, k), impulse);
+        finite = finite && finite_numbers(impulse, 3);
+        for (int j = 0; j < 3; ++j) {
+            start[j] = before.impulse[j];
+            point->impulse[j] = impulse[j];
+        }
+        *depth = fmax(*depth, -before.gap);
+    }
+    return finite;
+}
+
+/* v.contacts.lanes threads a pair. */
+static __device__ __forceinline__ void finish_pair(const cuda_view &v, bool on, int32_t first_block)
+{
+    const int32_t i = ((int32_t)blockIdx.x - first_block) * FINISH_THREADS + (int32_t)threadIdx.x,
+                  p = i / v.contacts.lanes, lane = i % v.contacts.lanes;
+    const bool live = on && p < live_pairs(v.model);
+    struct cuda_step_control *control = v.step.control;
+    double depth = 0;
+    pair_before pair = {};
+    if (live) pair = fetch_pair(v.raw, v.step, p, lane);
+    wait_for_stream();
+    let_next_begin();
+    const unsigned long long deepest = control->depth; /* of those that have come here */
+    /* bodies are named first: all of them are below any contact's */
+    if (live && !store_impulses(v.contacts, v.step, p, lane, pair, &depth))
+        atomicMin(&control->offending_body, v.model.bodies + pair.body);
+    /* -0 is no depth; a larger one may be there already */
+    unsigned long long bits = depth > 0 ? (unsigned long long)__double_as_longlong(depth) : 0;
+    for (int o = WARP / 2; o > 0; o /= 2) {
+        const unsigned long long other = __shfl_xor_sync((unsigned)ALL_LANES, bits, o);
+        bits = other > bits ? other : bits;
+    }
+    if (threadIdx.x % WARP == 0 && bits > deepest) atomicMax(&control->depth, bits);
+}
+
+/* ---- all of it ------------------------------------------------------------------------------------------------- */
+
+/* Never reads offending bodies found by this same kernel: which body is named must not depend on timing. */
+static __global__ void __launch_bounds__(FINISH_THREADS, 2)
+    finish_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    CUDA_DYNAMIC_SHARED(memory);
+    struct finish_shared *shared = (struct finish_shared *)memory;
+    const finish_blocks blocks = finish_blocks_of(v.model, v.contacts);
+    const double dt = v.model.settings->dt;
+    /* Layout and penalties are the last that abort a step, the latter where it is not as planned; iterations come
+     * between. */
+    const bool on = as_planned(v.model, v.step) && !v.model.live->abort_code;
+    if ((int32_t)blockIdx.x >= blocks.bodies) finish_pair(v, on, blocks.bodies);
+    else if (threadIdx.x < FINISH_SIDES) finish_sides(v, on, shared);
+    else finish_body(v, on, dt, shared);
+}
+
+sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    struct cuda_partition blocks = {};
+    blocks.parts = finish_blocks_of(c->view.model, c->view.contacts).end;
+    blocks.cluster = 1;
+    blocks.threads = FINISH_THREADS;
+    blocks.shared = sizeof(struct finish_shared);
+    return CUDA(launch_partition)(c, finish_kernel, "finish", &blocks, true, &args, error);
+}

@@ -1,0 +1,55 @@
+/* Bodies as a step ends: moved by their velocity less their lead (math/lead.h). What holds for an island is known once
+ * all of its bodies have been looked at. So a body is moved as if its island were held by friction and no contact
+ * jolted, which is so wherever bodies rest; the next kernel moves those again for which that was wrong. */
+#ifndef SADMM_CUDA_STEP_MOVE_H
+#define SADMM_CUDA_STEP_MOVE_H
+
+#include "backend_cuda/iterate/slow.h"
+#include "backend_cuda/iterate/solution.h"
+#include "core/model/steady.h"
+
+/* Bits of an island where nobody has said anything else. */
+enum { TOUCH_AS_A_RULE = TOUCH_INNER | TOUCH_FRICTION };
+
+static __device__ __forceinline__ bool finite_numbers(const double *x, int count)
+{
+    double sum = 0;
+    for (int k = 0; k < count; ++k) sum += x[k] - x[k];
+    return sum == 0;
+}
+
+/* A body as the step began. */
+struct body_before {
+    struct sadmm_rigid body;
+    struct sadmm_steady steady;
+};
+
+static __device__ __forceinline__ body_before fetch_body(const cuda_step_view &step, int32_t i)
+{
+    const body_before before = {step.before[i], step.steady_before[i]};
+    return before;
+}
+
+/* v of body i as the step ends. */
+static __device__ __forceinline__ void load_end_velocity(const cuda_view &v, int32_t i, solver_real velocity[6])
+{
+    if (v.step.limits) end_velocity(v, i, velocity);
+    else
+        for (int k = 0; k < 6; ++k) velocity[k] = v.bodies.state[(size_t)i * ROW + (size_t)k];
+}
+
+/* Body i moved, by the bits of its island and its own; is it finite? */
+static __device__ __forceinline__ bool store_moved(const cuda_view &v, int32_t i, const body_before &before,
+                                                   const solver_real velocity[6], int island, int own, double dt)
+{
+    struct sadmm_steady steady = before.steady;
+    struct sadmm_rigid next = before.body;
+    move_body(&before.body, velocity, dt, v.model.settings->gravity, island, own, next.position, next.orientation,
+              next.velocity);
+    steady_keep(&steady, &before.body, &next, dt);
+    v.step.after[i] = next;
+    v.step.steady_after[i] = steady;
+    return finite_numbers(next.position, 3) && finite_numbers(next.orientation, 4) && finite_numbers(next.velocity, 6);
+}
+
+#endif

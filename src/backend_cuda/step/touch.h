@@ -1,0 +1,183 @@
+/* What its contacts do to a body as a step ends, by its eight lanes, which take every eighth side each: their wrench,
+ * and what they say of leads (math/lead.h). In double. */
+#ifndef SADMM_CUDA_STEP_TOUCH_H
+#define SADMM_CUDA_STEP_TOUCH_H
+
+#include "backend_cuda/iterate/slow.h"
+#include "backend_cuda/iterate/solution.h"
+
+/* A body: its velocity before the step and at its end, and its lead. */
+struct lead_body {
+    double before[6], velocity[6], lead[6];
+};
+
+/* WHOLE: a whole step, where iterations have left `state`; else that is how the step ends. */
+template <bool WHOLE> static __device__ __forceinline__ lead_body load_lead_body(const cuda_view &v, int32_t body)
+{
+    const struct sadmm_rigid *rigid = &v.raw.system.rigid[body];
+    lead_body out;
+    solver_real velocity[6];
+    if (WHOLE) end_velocity(v, body, velocity);
+    else
+        for (int k = 0; k < 6; ++k) velocity[k] = v.bodies.state[(size_t)body * ROW + (size_t)k];
+    for (int k = 0; k < 6; ++k) {
+        out.before[k] = rigid->velocity[k];
+        out.velocity[k] = (double)velocity[k];
+    }
+    lead_own(rigid->velocity, out.velocity, rigid_is_isotropic(v3_load(rigid->inertia)), out.lead);
+    return out;
+}
+
+/* What all contacts of a body compare with: the linear and angular parts of its speed and of its lead (lead_size_at),
+ * and lead_rest_speed. */
+struct lead_sizes {
+    double moves[2], lead[2], rest;
+};
+
+template <bool WHOLE> static __device__ __forceinline__ lead_sizes load_lead_sizes(const cuda_view &v, int32_t body)
+{
+    const lead_body own = load_lead_body<WHOLE>(v, body);
+    const lead_sizes out = {
+        {lead_speed_part(own.before, own.velocity, 0), lead_speed_part(own.before, own.velocity, 1)},
+        {size3(own.lead), size3(own.lead + 3)},
+        lead_rest_speed(v.model.settings->gravity, v.raw.system.rigid[body].wrench, v.raw.system.rigid[body].mass,
+                        v.model.settings->dt)};
+    return out;
+}
+
+/* A side of a body, but for its points: what is known before the iterations end. */
+struct touching {
+    int32_t pair, side; /* pair < 0: none */
+    int32_t first, count, other;
+    double normal[3], friction;
+};
+
+static __device__ __forceinline__ touching fetch_touching(const cuda_view &v, int32_t at, int32_t end)
+{
+    touching out = {-1, 0, 0, 0, -1, {}, 0};
+    if (at >= end) return out;
+    const int32_t code = v.graph.incident[at];
+    if (code / 2 >= v.contacts.pair_capacity) return out; /* rows: problems alone have them */
+    const struct sadmm_contact_pair *pair = &v.raw.pairs[code / 2];
+    out.pair = code / 2, out.side = code & 1;
+    out.first = pair->first, out.count = pair->count;
+    out.other = out.side ? pair->body_a : pair->body_b;
+    out.friction = pair->friction;
+    for (int k = 0; k < 3; ++k) out.normal[k] = pair->normal[k];
+    return out;
+}
+
+/* What the contacts of a pair that move say: of the island, and of the body at `side`. Few bodies move, so that the
+ * others should not pay in registers. */
+template <bool WHOLE>
+static __device__ __noinline__ int ways_of_pair(const cuda_view &v, int32_t body, const touching &t)
+{
+    const double dt = v.model.settings->dt, slop = v.model.settings->slop;
+    struct lead_touch touch = {0, {0, 0}};
+    lead_body ends[2] = {};
+    ends[t.side] = load_lead_body<WHOLE>(v, body);
+    if (t.other >= 0) ends[1 - t.side] = load_lead_body<WHOLE>(v, t.other);
+    for (int32_t k = t.first; k < t.first + t.count; ++k) {
+        const struct sadmm_contact_point *point = &v.raw.points[k];
+        const double leads[2] = {-lead_along(t.normal, ends[0].lead, point->arm_a),
+                                 lead_along(t.normal, ends[1].lead, point->arm_b)},
+                     size[2] = {lead_size(ends[0].lead, point->arm_a), lead_size(ends[1].lead, point->arm_b)},
+                     speed = lead_along(t.normal, ends[1].velocity, point->arm_b) -
+                             lead_along(t.normal, ends[0].velocity, point->arm_a);
+        if (!lead_is_still(size, dt, slop)) lead_add_way(&touch, point->gap, speed, leads, size, dt, slop);
+    }
+    return touch.island | touch.body[t.side];
+}
+
+/* Sums over sides: J^T lambda / dt, (12) with lambda = -u; bits of the island and of the body. */
+struct contact_sums {
+    double wrench[6];
+    int touch;
+};
+
+/* Points of a side that are fetched before the first of them is used. */
+struct touching_points {
+    double arm[POINTS_AT_ONCE][3], impulse[POINTS_AT_ONCE][3];
+};
+
+/* Those from k on; what a lane fetches under a condition is waited for one by one, so the last one stands for those
+ * beyond it. */
+static __device__ __forceinline__ void fetch_points(const cuda_view &v, const touching &t, int32_t k,
+                                                    touching_points *out)
+{
+#pragma unroll
+    for (int32_t j = 0; j < POINTS_AT_ONCE; ++j) {
+        const int32_t at = k + j < t.count ? k + j : t.count - 1;
+        const struct sadmm_contact_point *point = &v.raw.points[t.first + at];
+        const double *arm = t.side ? point->arm_b : point->arm_a;
+#pragma unroll
+        for (int i = 0; i < 3; ++i) out->arm[j][i] = arm[i];
+        v3_store(point_impulse(v.contacts, t.pair, at), out->impulse[j]);
+    }
+}
+
+template <bool WHOLE, bool LEADS>
+static __device__ __forceinline__ void add_touching(const cuda_view &v, int32_t body, const lead_sizes &own,
+                                                    const touching &t, contact_sums *sums)
+{
+    const double dt = v.model.settings->dt, slop = v.model.settings->slop, sign = t.side ? 1 / dt : -(1 / dt);
+    bool moves = false;
+    touching_points points;
+    for (int32_t k = 0; k < t.count; k += POINTS_AT_ONCE) {
+        fetch_points(v, t, k, &points);
+#pragma unroll
+        for (int32_t j = 0; j < POINTS_AT_ONCE; ++j) {
+            if (k + j >= t.count) continue;
+            const double *arm = points.arm[j], *impulse = points.impulse[j];
+            double torque[3] = {};
+            add_cross(arm, impulse, 1, torque);
+#pragma unroll
+            for (int i = 0; i < 3; ++i) {
+                sums->wrench[i] += sign * impulse[i];
+                sums->wrench[i + 3] += sign * torque[i];
+            }
+            if (!LEADS) continue;
+            sums->touch |= lead_push(dot3(t.normal, impulse), lead_size_at(own.moves[0], own.moves[1], arm), own.rest);
+            moves = moves || !lead_is_short(lead_size_at(own.lead[0], own.lead[1], arm), dt, slop);
+        }
+    }
+    if (!LEADS) return;
+    sums->touch |= t.other >= 0 ? TOUCH_INNER : t.friction > 0 ? TOUCH_FRICTION : TOUCH_SMOOTH;
+    if (moves) sums->touch |= ways_of_pair<WHOLE>(v, body, t);
+}
+
+/* Of a body, whose lane's first side is `first`, at place `at` of [at, end); in all of its lanes. Every lane of the
+ * warp comes here. */
+template <bool WHOLE, bool LEADS>
+static __device__ __forceinline__ contact_sums sum_touching(const cuda_view &v, int32_t body, const lead_sizes &own,
+                                                            const touching &first, int32_t at, int32_t end)
+{
+    contact_sums sums = {};
+    touching t = first;
+    while (at < end) {
+        if (t.pair >= 0) add_touching<WHOLE, LEADS>(v, body, own, t, &sums);
+        at += LANES;
+        t = fetch_touching(v, at, end);
+    }
+    sum_lanes<6>(sums.wrench);
+#pragma unroll
+    for (int o = 1; o < LANES; o *= 2) sums.touch |= __shfl_xor_sync((unsigned)ALL_LANES, sums.touch, o);
+    return sums;
+}
+
+enum { TOUCH_OF_BODY = TOUCH_CARRIED | TOUCH_MOVED };
+
+/* Bits only come: one that is there already needs no more. */
+static __device__ __forceinline__ void add_bits(int32_t *to, int bits)
+{
+    if (bits & ~*to) atomicOr(to, bits);
+}
+
+/* Of a body, and of the island that `label` names. */
+static __device__ __forceinline__ void add_touch(const island_view &islands, int32_t body, int32_t label, int touch)
+{
+    add_bits(&islands.touch[body], touch & TOUCH_OF_BODY);
+    add_bits(&islands.touch[label], touch & ~TOUCH_OF_BODY);
+}
+
+#endif
