@@ -28,12 +28,13 @@ struct finish_shared {
 
 /* ---- bodies ---------------------------------------------------------------------------------------------------- */
 
-/* What contacts say of an island is kept where that is not what holds as a rule (move.h). */
+/* What its contacts say of a body; of its island where that is not held, so that what holds as a rule may not
+ * (move.h). */
 static __device__ __forceinline__ void tell_touch(const island_view &islands, int32_t body, int32_t label, bool held,
                                                   int touch)
 {
-    add_touch(islands, body, label, held ? touch & (TOUCH_OF_BODY | TOUCH_JOLT) : touch);
-    if (!held || touch & TOUCH_JOLT) *islands.again = 1;
+    add_touch(islands, body, label, held ? touch & TOUCH_OF_BODY : touch);
+    if (!held) *islands.again = 1;
 }
 
 /* What the lanes of a body do. */
@@ -45,15 +46,15 @@ static __device__ __forceinline__ void finish_sides(const cuda_view &v, bool on,
     const bool touched = t.live && v.step.limits;
     const int32_t label = touched ? v.graph.label[body] : 0;
     const touching first = fetch_touching(v, at, t.end);
-    lead_sizes own = {};
+    lead_speeds own = {};
     bool held = true;
     wait_for_stream();
     let_next_begin();
     if (touched) {
         held = v.islands.info[label].held;
-        own = load_lead_sizes<true>(v, body);
+        own = load_lead_speeds<true>(v, body);
     }
-    const contact_sums sums = sum_touching<true, true>(v, body, own, first, at, t.end);
+    const contact_sums sums = sum_touching<true>(v, own, first, at, t.end);
     if (t.lane == 0) shared->touch[in_block] = sums.touch;
     __syncthreads();
     if (t.live && v.model.wrenches)
@@ -61,7 +62,7 @@ static __device__ __forceinline__ void finish_sides(const cuda_view &v, bool on,
     if (touched && t.lane == 0) tell_touch(v.islands, body, label, held, sums.touch);
 }
 
-/* What the thread does that moves a body. */
+/* What the thread does that moves a body, to both places that there are as a rule while the others look at contacts. */
 static __device__ __forceinline__ void finish_body(const cuda_view &v, bool on, double dt,
                                                    const struct finish_shared *shared)
 {
@@ -70,15 +71,22 @@ static __device__ __forceinline__ void finish_body(const cuda_view &v, bool on, 
     const bool live = on && in_block < FINISH_BODIES && slot < v.model.bodies;
     const int32_t body = live ? v.graph.body_of[slot] : 0;
     body_before before = {};
-    solver_real velocity[6] = {};
+    double velocity[6] = {}, stays[PLACE] = {}, place[PLACE] = {};
     if (live) before = fetch_body(v.step, body);
     wait_for_stream();
     let_next_begin();
     if (blockIdx.x == 0 && in_block == 0) v.step.control->stamps[STAMP_SOLVED] = nanoseconds();
-    if (live) load_end_velocity(v, body, velocity);
+    if (live) {
+        load_end_velocity(v, body, velocity);
+        move_body(&before.body, velocity, dt, v.model.settings->gravity, LEAD_STAYS, stays);
+        move_body(&before.body, velocity, dt, v.model.settings->gravity, LEAD_OWN, place);
+    }
     __syncthreads();
-    if (live && !store_moved(v, body, before, velocity, TOUCH_AS_A_RULE, shared->touch[in_block], dt))
-        atomicMin(&v.step.control->offending_body, body);
+    if (!live) return;
+    const bool keeps = lead_kind_of(TOUCH_AS_A_RULE, shared->touch[in_block]) == LEAD_STAYS;
+#pragma unroll
+    for (int k = 0; k < PLACE; ++k) place[k] = keeps ? stays[k] : place[k];
+    if (!store_moved(v, body, before, velocity, place, dt)) atomicMin(&v.step.control->offending_body, body);
 }
 
 /* ---- contacts -------------------------------------------------------------------------------------------------- */
@@ -94,15 +102,16 @@ static __device__ __forceinline__ point_before fetch_before(const struct sadmm_c
 }
 
 struct pair_before {
-    int32_t first, count, body; /* points; a body of it */
-    point_before point;         /* the lane's first */
+    int32_t first, count; /* points */
+    pair_ends ends;
+    point_before point;   /* the lane's first */
 };
 
 static __device__ __forceinline__ pair_before fetch_pair(const raw_view &raw, const cuda_step_view &step, int32_t p,
                                                          int32_t lane)
 {
     const struct sadmm_contact_pair *pair = &raw.pairs[p];
-    pair_before before = {pair->first, pair->count, pair->body_b >= 0 ? pair->body_b : pair->body_a, {}};
+    pair_before before = {pair->first, pair->count, fetch_ends(pair), {}};
     if (lane < before.count) before.point = fetch_before(&step.points[before.first + lane]);
     return before;
 }
@@ -141,8 +150,10 @@ static __device__ __forceinline__ void finish_pair(const cuda_view &v, bool on, 
     let_next_begin();
     const unsigned long long deepest = control->depth; /* of those that have come here */
     /* bodies are named first: all of them are below any contact's */
+    const int32_t body = pair.ends.body[1] >= 0 ? pair.ends.body[1] : pair.ends.body[0];
     if (live && !store_impulses(v.contacts, v.step, p, lane, pair, &depth))
-        atomicMin(&control->offending_body, v.model.bodies + pair.body);
+        atomicMin(&control->offending_body, v.model.bodies + body);
+    if (live && v.step.limits && add_ways<true>(v, pair.ends, pair.first, pair.count, lane)) *v.islands.again = 1;
     /* -0 is no depth; a larger one may be there already */
     unsigned long long bits = depth > 0 ? (unsigned long long)__double_as_longlong(depth) : 0;
     for (int o = WARP / 2; o > 0; o /= 2) {

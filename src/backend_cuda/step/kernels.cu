@@ -10,6 +10,7 @@
 #include "world.h"
 
 enum { STEP_THREADS = 64 }; /* a block: few, for long work and many multiprocessors */
+enum { TURN_THREADS = 256 }; /* more: bodies that are moved again have a thread each, side by side */
 
 /* ---- edits ----------------------------------------------------------------------------------------------------- */
 
@@ -114,17 +115,20 @@ static __global__ void admit_kernel(const __grid_constant__ cuda_view v, const _
 
 /* ---- bodies again ---------------------------------------------------------------------------------------------- */
 
-/* Body i again, where its island is not as it is as a rule. */
+/* Body i again, now that all is known of its island. */
 static __device__ __noinline__ void move_again(const cuda_view &v, int32_t i)
 {
     const int32_t label = v.graph.label[i];
     const int island = v.islands.touch[label] | (v.islands.info[label].held ? TOUCH_AS_A_RULE : 0),
               own = v.islands.touch[i];
-    if (lead_kind_of(island, own) == lead_kind_of(TOUCH_AS_A_RULE, own)) return;
-    solver_real velocity[6];
-    end_velocity(v, i, velocity);
-    if (!store_moved(v, i, fetch_body(v.step, i), velocity, island, own, v.model.settings->dt))
-        atomicMin(&v.step.control->offending_body, i);
+    const enum lead_kind kind = lead_kind_of(island, own);
+    if (kind == LEAD_OWN) return; /* so it went: what more is known now can only make it stay */
+    const body_before before = fetch_body(v.step, i);
+    const double dt = v.model.settings->dt;
+    double velocity[6], place[PLACE];
+    load_end_velocity(v, i, velocity);
+    move_body(&before.body, velocity, dt, v.model.settings->gravity, kind, place);
+    if (!store_moved(v, i, before, velocity, place, dt)) atomicMin(&v.step.control->offending_body, i);
 }
 
 /* Are there bodies to be moved again (move.h)? */
@@ -182,15 +186,16 @@ static __device__ struct cuda_step_totals totals_of(const cuda_view &v, const cu
 
 /* The end of a sub-step that others follow, as seen by it: the account, and what the next one starts from. Threads as
  * in start_step_kernel. */
-static __global__ void __launch_bounds__(STEP_THREADS, 16)
+static __global__ void __launch_bounds__(TURN_THREADS, 4)
     turn_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    const int64_t t = (int64_t)blockIdx.x * STEP_THREADS + threadIdx.x, i = t / START_LANES;
+    const int64_t t = (int64_t)blockIdx.x * TURN_THREADS + threadIdx.x, i = t / START_LANES,
+                  own = (int64_t)blockIdx.x * (TURN_THREADS / START_LANES) + threadIdx.x;
     const int32_t lane = (int32_t)(t % START_LANES);
     struct cuda_step_control *control = v.step.control;
     if (v.model.live->abort_code) return;
     const bool again = moves_again(v);
-    if (again && lane == 0 && i < v.model.bodies) move_again(v, (int32_t)i);
+    if (again && threadIdx.x < TURN_THREADS / START_LANES && own < v.model.bodies) move_again(v, (int32_t)own);
     if (gives_account(control, again)) {
         control->stamps[STAMP_END] = nanoseconds();
         control->totals = totals_of(v, args);
@@ -255,10 +260,10 @@ sadmm_status CUDA(launch_start)(struct sadmm_context *c, struct sadmm_error *err
 sadmm_status CUDA(launch_turn)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    const int64_t blocks = (int64_t)c->view.model.bodies * START_LANES / STEP_THREADS + 1;
+    const int64_t blocks = (int64_t)c->view.model.bodies * START_LANES / TURN_THREADS + 1;
     args.checks = c->checks;
     args.count = c->settings.iterations;
-    return CUDA(launch_of)(c, turn_kernel, "turn", blocks, STEP_THREADS, &args, error);
+    return CUDA(launch_of)(c, turn_kernel, "turn", blocks, TURN_THREADS, &args, error);
 }
 
 sadmm_status CUDA(launch_admit)(struct sadmm_context *c, struct sadmm_error *error)

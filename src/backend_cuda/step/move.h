@@ -31,25 +31,28 @@ static __device__ __forceinline__ body_before fetch_body(const cuda_step_view &s
 }
 
 /* v of body i as the step ends. */
-static __device__ __forceinline__ void load_end_velocity(const cuda_view &v, int32_t i, solver_real velocity[6])
+static __device__ __forceinline__ void load_end_velocity(const cuda_view &v, int32_t i, double wide[6])
 {
+    solver_real velocity[6];
     if (v.step.limits) end_velocity(v, i, velocity);
     else
         for (int k = 0; k < 6; ++k) velocity[k] = v.bodies.state[(size_t)i * ROW + (size_t)k];
+    for (int k = 0; k < 6; ++k) wide[k] = (double)velocity[k];
 }
 
-/* Body i moved, by the bits of its island and its own; is it finite? */
+/* Body i goes to `place`; is it finite? */
 static __device__ __forceinline__ bool store_moved(const cuda_view &v, int32_t i, const body_before &before,
-                                                   const solver_real velocity[6], int island, int own, double dt)
+                                                   const double velocity[6], const double place[PLACE], double dt)
 {
     struct sadmm_steady steady = before.steady;
     struct sadmm_rigid next = before.body;
-    move_body(&before.body, velocity, dt, v.model.settings->gravity, island, own, next.position, next.orientation,
-              next.velocity);
+    for (int k = 0; k < 3; ++k) next.position[k] = place[k];
+    for (int k = 0; k < 4; ++k) next.orientation[k] = place[3 + k];
+    for (int k = 0; k < 6; ++k) next.velocity[k] = velocity[k];
     steady_keep(&steady, &before.body, &next, dt);
     v.step.after[i] = next;
     v.step.steady_after[i] = steady;
-    return finite_numbers(next.position, 3) && finite_numbers(next.orientation, 4) && finite_numbers(next.velocity, 6);
+    return finite_numbers(place, PLACE) && finite_numbers(velocity, 6);
 }
 
 #endif

@@ -73,14 +73,22 @@ extern "C" sadmm_status CUDA(read_penalty)(struct sadmm_context *c, double *beta
 
 /* ---- Q: what contacts say of leads (math/lead.h), and moved bodies ----------------------------------------------- */
 
-/* Eight lanes a body; bits are 0 before. */
+/* Eight lanes a body, then v.contacts.lanes a pair; bits are 0 before. */
 static __global__ void touch_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    const int32_t slot = thread_index() / LANES, lane = (int32_t)threadIdx.x % LANES;
+    const int32_t slot = thread_index() / LANES, lane = (int32_t)threadIdx.x % LANES,
+                  sides = (v.model.bodies * LANES + THREADS - 1) / THREADS * THREADS;
+    if (thread_index() >= sides) {
+        const int32_t i = thread_index() - sides, p = i / v.contacts.lanes;
+        if (p >= live_pairs(v.model)) return;
+        const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
+        add_ways<false>(v, fetch_ends(pair), pair->first, pair->count, i % v.contacts.lanes);
+        return;
+    }
     const body_thread t = body_of_slot(v.graph, slot, slot < live_bodies(v.model));
     const int32_t body = (int32_t)t.body, at = t.begin + lane;
-    const lead_sizes own = load_lead_sizes<false>(v, body);
-    const contact_sums sums = sum_touching<false, true>(v, body, own, fetch_touching(v, at, t.end), at, t.end);
+    const lead_speeds own = load_lead_speeds<false>(v, body);
+    const contact_sums sums = sum_touching<true>(v, own, fetch_touching(v, at, t.end), at, t.end);
     if (t.live && lane == 0) add_touch(v.islands, body, v.graph.label[body], sums.touch);
 }
 
@@ -92,8 +100,9 @@ static __global__ void integrate_kernel(const __grid_constant__ cuda_view v, con
     if (i >= live_bodies(v.model)) return;
     double *out = v.raw.out + MOVED * (size_t)i;
     const int island = args.count ? v.islands.touch[v.graph.label[i]] : 0, own = args.count ? v.islands.touch[i] : 0;
-    move_body(&v.raw.system.rigid[i], v.bodies.state + (size_t)i * ROW, v.model.settings->dt,
-              v.model.settings->gravity, island, own, out, out + 3, out + 7);
+    for (int k = 0; k < 6; ++k) out[PLACE + k] = (double)v.bodies.state[(size_t)i * ROW + (size_t)k];
+    move_body(&v.raw.system.rigid[i], out + PLACE, v.model.settings->dt, v.model.settings->gravity,
+              lead_kind_of(island, own), out);
 }
 
 extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_rigid *next, struct sadmm_error *error)
@@ -107,7 +116,10 @@ extern "C" sadmm_status CUDA(integrate)(struct sadmm_context *c, struct sadmm_ri
     if (c->plan.momentum) {
         CUDA_CALL(c, cudaMemsetAsync(c->view.islands.touch, 0, n * sizeof(int32_t), c->stream),
                   "cudaMemsetAsync(touch)");
-        TRY(CUDA(launch)(c, touch_kernel, "touch", blocks_for((int64_t)c->view.model.bodies * LANES), &args, error));
+        TRY(CUDA(launch)(c, touch_kernel, "touch",
+                         blocks_for((int64_t)c->view.model.bodies * LANES) +
+                             blocks_for((int64_t)c->view.contacts.lanes * c->view.contacts.pair_capacity),
+                         &args, error));
     }
     TRY(CUDA(launch)(c, integrate_kernel, "integrate", blocks_for(c->view.model.bodies), &args, error));
     TRY(CUDA(download)(c, c->view.raw.out, MOVED * n * sizeof(double), error));
@@ -128,9 +140,8 @@ static __global__ void wrench_kernel(const __grid_constant__ cuda_view v, const 
     const int32_t slot = thread_index() / LANES, lane = (int32_t)threadIdx.x % LANES;
     const body_thread t = body_of_slot(v.graph, slot, slot < live_bodies(v.model));
     const int32_t at = t.begin + lane;
-    const lead_sizes none = {};
-    const contact_sums sums =
-        sum_touching<false, false>(v, (int32_t)t.body, none, fetch_touching(v, at, t.end), at, t.end);
+    const lead_speeds none = {};
+    const contact_sums sums = sum_touching<false>(v, none, fetch_touching(v, at, t.end), at, t.end);
     if (t.live) store_wrench(sums.wrench, lane, v.raw.out + 6 * t.body);
 }
 

@@ -1,5 +1,5 @@
-/* What its contacts do to a body as a step ends, by its eight lanes, which take every eighth side each: their wrench,
- * and what they say of leads (math/lead.h). In double. */
+/* What contacts do to bodies as a step ends. A body's eight lanes take every eighth of its sides each: wrenches, what
+ * presses, and where it does not rest. Lanes of pairs: where leads would close a contact (math/lead.h). In double. */
 #ifndef SADMM_CUDA_STEP_TOUCH_H
 #define SADMM_CUDA_STEP_TOUCH_H
 
@@ -28,20 +28,19 @@ template <bool WHOLE> static __device__ __forceinline__ lead_body load_lead_body
     return out;
 }
 
-/* What all contacts of a body compare with: the linear and angular parts of its speed and of its lead (lead_size_at),
- * and lead_rest_speed. */
-struct lead_sizes {
-    double moves[2], lead[2], rest;
+/* What contacts of a body compare with: the linear and angular parts of its speed (lead_size_at), and
+ * lead_rest_speed. */
+struct lead_speeds {
+    double moves[2], rest;
 };
 
-template <bool WHOLE> static __device__ __forceinline__ lead_sizes load_lead_sizes(const cuda_view &v, int32_t body)
+template <bool WHOLE> static __device__ __forceinline__ lead_speeds load_lead_speeds(const cuda_view &v, int32_t body)
 {
+    const struct sadmm_rigid *rigid = &v.raw.system.rigid[body];
     const lead_body own = load_lead_body<WHOLE>(v, body);
-    const lead_sizes out = {
+    const lead_speeds out = {
         {lead_speed_part(own.before, own.velocity, 0), lead_speed_part(own.before, own.velocity, 1)},
-        {size3(own.lead), size3(own.lead + 3)},
-        lead_rest_speed(v.model.settings->gravity, v.raw.system.rigid[body].wrench, v.raw.system.rigid[body].mass,
-                        v.model.settings->dt)};
+        lead_rest_speed(v.model.settings->gravity, rigid->wrench, rigid->mass, v.model.settings->dt)};
     return out;
 }
 
@@ -65,28 +64,6 @@ static __device__ __forceinline__ touching fetch_touching(const cuda_view &v, in
     out.friction = pair->friction;
     for (int k = 0; k < 3; ++k) out.normal[k] = pair->normal[k];
     return out;
-}
-
-/* What the contacts of a pair that move say: of the island, and of the body at `side`. Few bodies move, so that the
- * others should not pay in registers. */
-template <bool WHOLE>
-static __device__ __noinline__ int ways_of_pair(const cuda_view &v, int32_t body, const touching &t)
-{
-    const double dt = v.model.settings->dt, slop = v.model.settings->slop;
-    struct lead_touch touch = {0, {0, 0}};
-    lead_body ends[2] = {};
-    ends[t.side] = load_lead_body<WHOLE>(v, body);
-    if (t.other >= 0) ends[1 - t.side] = load_lead_body<WHOLE>(v, t.other);
-    for (int32_t k = t.first; k < t.first + t.count; ++k) {
-        const struct sadmm_contact_point *point = &v.raw.points[k];
-        const double leads[2] = {-lead_along(t.normal, ends[0].lead, point->arm_a),
-                                 lead_along(t.normal, ends[1].lead, point->arm_b)},
-                     size[2] = {lead_size(ends[0].lead, point->arm_a), lead_size(ends[1].lead, point->arm_b)},
-                     speed = lead_along(t.normal, ends[1].velocity, point->arm_b) -
-                             lead_along(t.normal, ends[0].velocity, point->arm_a);
-        if (!lead_is_still(size, dt, slop)) lead_add_way(&touch, point->gap, speed, leads, size, dt, slop);
-    }
-    return touch.island | touch.body[t.side];
 }
 
 /* Sums over sides: J^T lambda / dt, (12) with lambda = -u; bits of the island and of the body. */
@@ -116,12 +93,11 @@ static __device__ __forceinline__ void fetch_points(const cuda_view &v, const to
     }
 }
 
-template <bool WHOLE, bool LEADS>
-static __device__ __forceinline__ void add_touching(const cuda_view &v, int32_t body, const lead_sizes &own,
-                                                    const touching &t, contact_sums *sums)
+template <bool LEADS>
+static __device__ __forceinline__ void add_touching(const cuda_view &v, const lead_speeds &own, const touching &t,
+                                                    contact_sums *sums)
 {
-    const double dt = v.model.settings->dt, slop = v.model.settings->slop, sign = t.side ? 1 / dt : -(1 / dt);
-    bool moves = false;
+    const double dt = v.model.settings->dt, sign = t.side ? 1 / dt : -(1 / dt);
     touching_points points;
     for (int32_t k = 0; k < t.count; k += POINTS_AT_ONCE) {
         fetch_points(v, t, k, &points);
@@ -136,26 +112,24 @@ static __device__ __forceinline__ void add_touching(const cuda_view &v, int32_t 
                 sums->wrench[i] += sign * impulse[i];
                 sums->wrench[i + 3] += sign * torque[i];
             }
-            if (!LEADS) continue;
-            sums->touch |= lead_push(dot3(t.normal, impulse), lead_size_at(own.moves[0], own.moves[1], arm), own.rest);
-            moves = moves || !lead_is_short(lead_size_at(own.lead[0], own.lead[1], arm), dt, slop);
+            if (LEADS)
+                sums->touch |=
+                    lead_push(dot3(t.normal, impulse), lead_size_at(own.moves[0], own.moves[1], arm), own.rest);
         }
     }
-    if (!LEADS) return;
-    sums->touch |= t.other >= 0 ? TOUCH_INNER : t.friction > 0 ? TOUCH_FRICTION : TOUCH_SMOOTH;
-    if (moves) sums->touch |= ways_of_pair<WHOLE>(v, body, t);
+    if (LEADS) sums->touch |= t.other >= 0 ? TOUCH_INNER : t.friction > 0 ? TOUCH_FRICTION : TOUCH_SMOOTH;
 }
 
 /* Of a body, whose lane's first side is `first`, at place `at` of [at, end); in all of its lanes. Every lane of the
  * warp comes here. */
-template <bool WHOLE, bool LEADS>
-static __device__ __forceinline__ contact_sums sum_touching(const cuda_view &v, int32_t body, const lead_sizes &own,
+template <bool LEADS>
+static __device__ __forceinline__ contact_sums sum_touching(const cuda_view &v, const lead_speeds &own,
                                                             const touching &first, int32_t at, int32_t end)
 {
     contact_sums sums = {};
     touching t = first;
     while (at < end) {
-        if (t.pair >= 0) add_touching<WHOLE, LEADS>(v, body, own, t, &sums);
+        if (t.pair >= 0) add_touching<LEADS>(v, own, t, &sums);
         at += LANES;
         t = fetch_touching(v, at, end);
     }
@@ -178,6 +152,46 @@ static __device__ __forceinline__ void add_touch(const island_view &islands, int
 {
     add_bits(&islands.touch[body], touch & TOUCH_OF_BODY);
     add_bits(&islands.touch[label], touch & ~TOUCH_OF_BODY);
+}
+
+/* What is known of a pair before the iterations end. */
+struct pair_ends {
+    int32_t body[2]; /* < 0: static */
+    double normal[3];
+};
+
+static __device__ __forceinline__ pair_ends fetch_ends(const struct sadmm_contact_pair *pair)
+{
+    const pair_ends ends = {{pair->body_a, pair->body_b}, {pair->normal[0], pair->normal[1], pair->normal[2]}};
+    return ends;
+}
+
+/* Leads of pair p's bodies: of its points, every v.contacts.lanes-th from `lane` on. Whether anything was said. */
+template <bool WHOLE>
+static __device__ __forceinline__ bool add_ways(const cuda_view &v, const pair_ends &ends, int32_t first, int32_t count,
+                                                int32_t lane)
+{
+    const double dt = v.model.settings->dt, slop = v.model.settings->slop, *n = ends.normal;
+    struct lead_touch touch = {0, {0, 0}};
+    lead_body sides[2] = {};
+#pragma unroll
+    for (int s = 0; s < 2; ++s)
+        if (ends.body[s] >= 0) sides[s] = load_lead_body<WHOLE>(v, ends.body[s]);
+    for (int32_t k = lane; k < count; k += v.contacts.lanes) {
+        const struct sadmm_contact_point *point = &v.raw.points[first + k];
+        const double leads[2] = {-lead_along(n, sides[0].lead, point->arm_a),
+                                 lead_along(n, sides[1].lead, point->arm_b)},
+                     size[2] = {lead_size(sides[0].lead, point->arm_a), lead_size(sides[1].lead, point->arm_b)},
+                     speed = lead_along(n, sides[1].velocity, point->arm_b) -
+                             lead_along(n, sides[0].velocity, point->arm_a);
+        if (!lead_is_still(size, dt, slop)) lead_add_way(&touch, point->gap, speed, leads, size, dt, slop);
+    }
+    if (!(touch.island | touch.body[0] | touch.body[1])) return false;
+#pragma unroll
+    for (int s = 0; s < 2; ++s)
+        if (ends.body[s] >= 0)
+            add_touch(v.islands, ends.body[s], v.graph.label[ends.body[s]], touch.island | touch.body[s]);
+    return true;
 }
 
 #endif

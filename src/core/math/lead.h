@@ -127,13 +127,6 @@ SADMM_INLINE bool lead_is_still(const double size[2], double dt, double slop)
     return dt * (size[0] + size[1]) <= LEAD_SLOP * slop / 2;
 }
 
-/* A body whose lead has this size is not carried by what it closes, and leaves jolts to the other one: lead_add_way has
- * room for twice as much at least, and leads that are not still have one that is not short. */
-SADMM_INLINE bool lead_is_short(double size, double dt, double slop)
-{
-    return dt * size <= LEAD_SLOP * slop / 4;
-}
-
 /* Of a point whose leads are not still, by its gap, the speed at which it opens, and what the leads of a and b add to
  * that. Each of two bodies may close half of what is left, whatever the other one does. */
 SADMM_INLINE void lead_add_way(struct lead_touch *touch, double gap, double speed, const double lead[2],
