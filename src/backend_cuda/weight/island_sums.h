@@ -7,7 +7,7 @@
 
 #include "backend_cuda/device/body.h"
 
-enum { SPREAD = 16, ARRIVAL_BITS = 5 };
+enum { SPREAD_BITS = 4, SPREAD = 1 << SPREAD_BITS, ARRIVAL_BITS = 5 };
 static_assert(SPREAD < 1 << ARRIVAL_BITS && 32 / 4 * ARRIVAL_BITS <= 64, "a number holds the arrivals of every power");
 
 struct add_terms {
@@ -29,8 +29,8 @@ static __device__ __forceinline__ bool add_up_by_powers(const graph_view &graph,
     int32_t rank = t.slot - first;
     int32_t power = 0;
     for (int64_t apart = 1; __ballot_sync((unsigned)ALL_LANES, on && apart < bodies) != 0; apart *= SPREAD, ++power) {
-        const int32_t begin = (int32_t)(rank / (apart * SPREAD) * (apart * SPREAD));
-        const int64_t places = (bodies - begin + apart - 1) / apart;
+        const int32_t begin = (int32_t)(rank & -(apart * SPREAD));
+        const int64_t places = (bodies - begin + apart - 1) >> SPREAD_BITS * power; /* divided by apart */
         const int32_t members = places < SPREAD ? (int32_t)places : (int32_t)SPREAD;
         const bool alone = !on || members < 2 || apart >= bodies;
         bool last = on;
