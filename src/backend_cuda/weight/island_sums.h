@@ -40,8 +40,8 @@ static __device__ __forceinline__ bool add_up_by_powers(const graph_view &graph,
             __threadfence(); /* what the lanes have written, before their body is counted */
             const unsigned long long before = atomicAdd(&arrivals[first + begin], one);
             last = (int32_t)(before >> ARRIVAL_BITS * power & ((1u << ARRIVAL_BITS) - 1)) + 1 == members;
+            __threadfence(); /* and what the others have; before this is set back, which it need not wait for */
             if (last) atomicAdd(&arrivals[first + begin], 0ull - one * (unsigned long long)members);
-            __threadfence(); /* and what the others have */
         }
         on = __shfl_sync((unsigned)ALL_LANES, last, 0, LANES);
         __syncwarp((unsigned)ALL_LANES);
@@ -52,14 +52,15 @@ static __device__ __forceinline__ bool add_up_by_powers(const graph_view &graph,
     return on;
 }
 
-/* Terms of a body, term k in lane k, added up (or what Join says) over its island. True in the lanes of one body of
- * each island; those have all of the sums in `sum`. Every lane of the warp comes here. */
+/* Terms of a body, term k in lane k, added up (or what Join says) over its island, of bodies that are `on`, whole
+ * islands. True in the lanes of one body of each; those have all of the sums in `sum`. Every lane of the warp comes
+ * here. */
 template <class Join>
 static __device__ __forceinline__ bool add_up_island(const graph_view &graph, const island_view &islands,
-                                                     const body_thread &t, double term, double sum[TERMS])
+                                                     const body_thread &t, bool on, double term, double sum[TERMS])
 {
     double *own = islands.terms + (size_t)t.slot * TERMS;
-    if (t.live && t.lane < TERMS) own[t.lane] = term;
+    if (on && t.lane < TERMS) own[t.lane] = term;
     const auto add_up = [&](int32_t slot, int64_t apart, int32_t members) {
         double *to = islands.terms + (size_t)slot * TERMS;
         if (t.lane >= TERMS) return;
@@ -73,10 +74,10 @@ static __device__ __forceinline__ bool add_up_island(const graph_view &graph, co
             if (j < members) term = Join::join(term, all[j]);
         to[t.lane] = term;
     };
-    const bool on = add_up_by_powers(graph, islands.arrivals, t, t.live, add_up);
+    const bool last = add_up_by_powers(graph, islands.arrivals, t, on, add_up);
 #pragma unroll
     for (int k = 0; k < TERMS; ++k) sum[k] = __shfl_sync((unsigned)ALL_LANES, term, k, LANES);
-    return on;
+    return last;
 }
 
 /* Where the island of a body begins, and its size, in bodies of a thread block. */
