@@ -17,6 +17,23 @@ struct largest_term {
     static __device__ __forceinline__ double join(double a, double b) { return keep_max(a, b); }
 };
 
+/* Adds `one`; returns what was there. What the warp has written before, whoever counts later sees, and what those have
+ * written that have counted, this one does. Fences before and after it would be waited for one after the other. */
+static __device__ __forceinline__ unsigned long long count_arrival(unsigned long long *arrivals,
+                                                                    unsigned long long one)
+{
+#ifdef SADMM_CUDA_EMULATED
+    return atomicAdd(arrivals, one);
+#else
+    unsigned long long before;
+    asm volatile("atom.acq_rel.gpu.global.add.u64 %0, [%1], %2;"
+                 : "=l"(before)
+                 : "l"(arrivals), "l"(one)
+                 : "memory");
+    return before;
+#endif
+}
+
 /* Of bodies that are `on`, whole islands of them: add_up(slot, apart, members) for each power, by the lanes of the body
  * that came last. True in the lanes of one body of each island; those see what any body of the island has written
  * before it came here. `arrivals`: slots, 0 before and after. Every lane of the warp comes here. */
@@ -36,11 +53,9 @@ static __device__ __forceinline__ bool add_up_by_powers(const graph_view &graph,
         bool last = on;
         __syncwarp((unsigned)ALL_LANES);
         if (!alone && t.lane == 0) {
-            const unsigned long long one = 1ull << ARRIVAL_BITS * power;
-            __threadfence(); /* what the lanes have written, before their body is counted */
-            const unsigned long long before = atomicAdd(&arrivals[first + begin], one);
+            const unsigned long long one = 1ull << ARRIVAL_BITS * power,
+                                     before = count_arrival(&arrivals[first + begin], one);
             last = (int32_t)(before >> ARRIVAL_BITS * power & ((1u << ARRIVAL_BITS) - 1)) + 1 == members;
-            __threadfence(); /* and what the others have; before this is set back, which it need not wait for */
             if (last) atomicAdd(&arrivals[first + begin], 0ull - one * (unsigned long long)members);
         }
         on = __shfl_sync((unsigned)ALL_LANES, last, 0, LANES);
