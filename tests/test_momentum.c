@@ -92,6 +92,37 @@ START_TEST(motions_are_those_that_contacts_do_not_feel)
 }
 END_TEST
 
+/* In the air: six motions, orthonormal about any origin, and what is restored is all that is missed; also where the
+ * inertia is nearly that of a line, or of a point. */
+START_TEST(islands_in_the_air)
+{
+    static const double sizes[] = {1, 1e-3, 1e-6};
+    for (size_t n = 0; n < sizeof sizes / sizeof *sizes; ++n)
+        for (int along = 0; along < 2; ++along) {
+            const double size = sizes[n], off[3] = {along ? 0 : 3, 0, along ? 1 : -2};
+            struct momentum_sums sums = {{0}, {0}, 0, {0}, {0}, {0}};
+            struct momentum_motions m;
+            double A[PACKED6] = {0}, v[6], b[6], q[6], y[6];
+            A[0] = A[2] = A[5] = 2, A[9] = 0.02 * size, A[14] = 0.03 * size, A[20] = 0.04 * size, A[13] = 0.01 * size;
+            for (int i = 0; i < 2; ++i) {
+                const double place[3] = {i * off[0], i * off[1], i * off[2]};
+                for (int k = 0; k < 6; ++k) v[k] = (1 + i - 0.3 * k), b[k] = (k < 3 ? 1 : size) * (0.5 * k - i);
+                momentum_add_body(&sums, place, A, v, b);
+            }
+            find_motions(sums, &m);
+            ck_assert_int_eq(m.count, 6);
+            for (int k = 0; k < 6; ++k) {
+                momentum_mul(&sums, m.motion[k], y);
+                for (int i = 0; i < 6; ++i) ck_assert_double_eq_tol(dense6_dot(m.motion[i], y), i == k, 1e-12 / size);
+            }
+            momentum_restoring(&m, 1, q);
+            momentum_mul(&sums, q, y);
+            for (int k = 0; k < 6; ++k)
+                ck_assert_double_eq_tol(sums.now[k] + y[k], sums.free[k], 1e-14 * (1 + length3(q) + length3(q + 3)));
+        }
+}
+END_TEST
+
 /* One point with friction leaves turns about it, two the turn about their line, a third beside the line none; a line of
  * points leaves its turn. */
 START_TEST(points_with_friction_hold)
@@ -341,6 +372,7 @@ int main(void)
     Suite *suite = suite_create("momentum");
     TCase *formulas = tcase_create("formulas"), *worlds = tcase_create("worlds");
     tcase_add_test(formulas, motions_are_those_that_contacts_do_not_feel);
+    tcase_add_test(formulas, islands_in_the_air);
     tcase_add_test(formulas, points_with_friction_hold);
     tcase_add_test(formulas, restored_motion_has_the_momentum);
     tcase_set_timeout(worlds, 120);

@@ -201,7 +201,8 @@ struct island_view {
     int32_t *touch;               /* worlds with contacts: bodies: bits (math/lead.h), of the body and, at labels, of
                                      the island; else NULL */
     int32_t *again;               /* worlds: not 0: some bodies have to be moved again (step/move.h) */
-    int32_t *suspects;            /* not 0: some island may have to be, or is not held */
+    int32_t *suspects;            /* not 0: some island that is held may have to be */
+    int32_t *loose;               /* fast: not 0: there are islands that are not held */
     cuda_stop *stop;
 };
 
@@ -294,7 +295,7 @@ static __device__ __forceinline__ int32_t live_rows(const model_view &model, con
 static __device__ __forceinline__ void clear_counts(const island_view &islands)
 {
     const cuda_stop none = {};
-    *islands.limited = *islands.suspects = *islands.moved = *islands.again = 0;
+    *islands.limited = *islands.suspects = *islands.loose = *islands.moved = *islands.again = 0;
     *islands.stop = none;
 }
 

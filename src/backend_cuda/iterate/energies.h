@@ -6,46 +6,60 @@
 #include "backend_cuda/weight/constraint.h"
 #include "slow.h"
 
-/* Of a pair: work of its contacts that push apart, and what e adds to the drive. */
-static inline __device__ void add_work(const contact_view &contacts, int32_t p, double *work, double *drive)
+/* Sums over a body's sides: J^T lambda, then these. */
+enum { WORK = 6, DRIVE, SIDE_SUMS };
+
+/* Of a side of a pair: J^T lambda; where the pair is `counted`, too, work of its contacts that push apart, and what e
+ * adds to the drive. */
+static __device__ __forceinline__ void add_contacts(const contact_view &contacts, int32_t p, bool second, bool counted,
+                                                    double sums[SIDE_SUMS])
 {
     const pair_data pair = load_pair(contacts, p);
-    for (int32_t k = 0; k < pair.count; ++k) {
-        const point_data point = load_point(contacts, p, k, pair);
-        const double push = dot3(pair.normal, point.lambda);
-        *work += fmax(0.0, -point.error) * push;
-        *drive -= point.error * push;
-    }
+    const double sign = second ? 1 : -1;
+    double force[3] = {};
+    for_each_point(contacts, p, pair, [&](const point_data &point) {
+        const double push = counted ? dot3(pair.normal, point.lambda) : 0;
+        double arm[3];
+#pragma unroll
+        for (int j = 0; j < 3; ++j) {
+            arm[j] = second ? point.arm[1][j] : point.arm[0][j];
+            force[j] += point.lambda[j];
+        }
+        add_cross(arm, point.lambda, sign, sums + 3);
+        sums[WORK] += fmax(0.0, -point.error) * push;
+        sums[DRIVE] -= point.error * push;
+    });
+#pragma unroll
+    for (int j = 0; j < 3; ++j) sums[j] += sign * force[j];
 }
 
-/* Terms of a body, one a lane: energy of v, of A^-1 b, of r = b + g - A v, g = J^T lambda; work; v . b / 2. LOOSE: the
- * third is the drive, and there is the response. A pair counts at its first dynamic body. Every lane of the warp comes
- * here. */
-template <bool RIGID, bool LOOSE>
-static __device__ __forceinline__ double energies_of_body(const cuda_view &v, const body_thread &t)
+/* Terms of a body, one a lane: energy of v, of A^-1 b, of r = b + g - A v, g = J^T lambda; work; v . b / 2. `loose`, of
+ * an island that is not held: the third is the drive, and there is the response. A pair counts at its first dynamic
+ * body. Of bodies that are `on`. Every lane of the warp comes here. */
+template <bool RIGID>
+static __device__ __forceinline__ double energies_of_body(const cuda_view &v, const body_thread &t, bool loose, bool on)
 {
-    enum { WORK = 6, DRIVE, PUSH, SUMS };
-    double sums[SUMS] = {}, term[TERMS] = {};
-    for (int32_t at = t.begin + t.lane; at < t.end; at += LANES) {
+    double sums[SIDE_SUMS] = {}, term[TERMS] = {};
+    for (int32_t at = t.begin + t.lane; on && at < t.end; at += LANES) {
         const int32_t code = v.graph.incident[at], p = code / 2;
-        add_side(v.contacts, v.rows, code, sums, &sums[PUSH]);
-        if (p >= v.contacts.pair_capacity || (code & 1 && is_dynamic(v.model, v.contacts.bodies[p].body_a)))
-            continue; /* counted there */
-        add_work(v.contacts, p, &sums[WORK], &sums[DRIVE]);
+        double wrench[6];
+        if (p < v.contacts.pair_capacity) {
+            const bool counted = !(code & 1) || !is_dynamic(v.model, v.contacts.bodies[p].body_a); /* or there */
+            add_contacts(v.contacts, p, code & 1, counted, sums);
+            continue;
+        }
+        wrench_of_rows(v.rows, p - v.contacts.pair_capacity, code & 1, wrench);
+        for (int j = 0; j < 6; ++j) sums[j] += wrench[j];
     }
-    sum_lanes<SUMS>(sums);
+    sum_lanes<SIDE_SUMS>(sums);
     const wide_row<RIGID> row = row_of_body<RIGID>(v.bodies, t);
     const double momentum = product(row.velocity, row.a), g = own_number(sums, t.lane);
     term[0] = dot_lanes(row.velocity, momentum) / 2;
     term[1] = t.live ? v.bodies.free_energy[t.body] : 0;
-    if (LOOSE) {
-        const double change = product(g, row.a_inverse);
-        term[2] = sums[DRIVE] - dot_lanes(change, row.b);
-        term[5] = dot_lanes(change, g);
-    } else {
-        const double r = row.b + g - momentum;
-        term[2] = dot_lanes(r, product(r, row.a_inverse)) / 2;
-    }
+    const double impulse = loose ? g : row.b + g - momentum, change = product(impulse, row.a_inverse),
+                 form = dot_lanes(impulse, change), along = dot_lanes(change, row.b);
+    term[2] = loose ? sums[DRIVE] - along : form / 2;
+    term[5] = loose ? form : 0;
     term[3] = sums[WORK];
     term[4] = dot_lanes(row.velocity, row.b) / 2;
     return own_number(term, t.lane);

@@ -1,13 +1,14 @@
 /* After the last iteration: momentum that no contact may change is restored (iterate/motions.h), and in the method
  * `fast` energies are limited (math/limit.h). In double, from this precision's data; once a step, eight lanes a body.
  *
- *   suspect   is there a body with more energy than its free motion has, or that bounces? Else no island does, unless
- *             it is not held. Persistent kernels test that themselves, those of tier BLOCK see to the rest too
- *   limit     nothing, unless there is one: energies and work, sums over islands (weight/island_sums.h), the factor of
- *             each island's velocities, and the rigid motion of those that are not held. Whole steps apply both where
- *             they move bodies (step/kernels.cu)
+ *   suspect   is there a body with more energy than its free motion has, or that bounces? Else no island does that is
+ *             held. Persistent kernels test that themselves, those of tier BLOCK see to the rest too
+ *   limit     energies and work, sums over islands (weight/island_sums.h), the factor of each island's velocities: of
+ *             islands that are held, if there is such a body; of the others in any case, and the rigid motion that
+ *             restores their momentum. Whole steps apply both where they move bodies (step/kernels.cu)
  *
- * paper: islands with too much energy are counted, and left as they are; those that are not held get that motion alone.
+ * paper: if there is such a body, islands with too much energy are counted, and left as they are; those that are not
+ * held get that motion in any case.
  */
 #include <string.h>
 
@@ -22,34 +23,57 @@ static __device__ __forceinline__ bool suspect(const body_view &bodies, const bo
 {
     const wide_row<RIGID> row = row_of_body<RIGID>(bodies, t);
     const bool speaks = t.live && t.lane == 0;
-    return suspect_body(under_iterated, speaks, speaks ? bodies.free_energy[t.body] : 0, row.velocity, row.b, row.a);
+    const double free = speaks ? bodies.free_energy[t.body] : 0;
+    wait_for_stream(); /* of all that, iterations change velocities alone */
+    const double velocity = t.live && t.lane < 6 ? (double)bodies.state[t.body * ROW + (size_t)t.lane] : 0;
+    return suspect_body(under_iterated, speaks, free, velocity, row.b, row.a);
 }
 
 static __global__ void __launch_bounds__(BODY_THREADS)
     suspect_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    wait_for_stream();
     const body_thread t = body_of_thread(v.model, v.graph);
     if (v.bodies.rigid ? suspect<true>(v.bodies, t, args.under_iterated)
                        : suspect<false>(v.bodies, t, args.under_iterated))
         *v.islands.suspects = 1;
 }
 
-static __global__ void __launch_bounds__(BODY_THREADS)
+/* Worlds have rigid bodies; the others are of problems. By itself: the kernel comes by the other one, too. */
+static __device__ __noinline__ double general_energies(const cuda_view &v, const body_thread &t, bool on)
+{
+    return energies_of_body<false>(v, t, false, on);
+}
+static __device__ __forceinline__ double energies_in_lanes(const cuda_view &v, const body_thread &t, bool loose,
+                                                           bool on)
+{
+    return v.bodies.rigid ? energies_of_body<true>(v, t, loose, on) : general_energies(v, t, on);
+}
+
+/* Islands of bodies that are `on`, which are held. Every lane of the warp comes here. */
+static __device__ __forceinline__ void limit_held(const cuda_view &v, const cuda_args &args, const body_thread &t,
+                                                  bool on, double term)
+{
+    double total[TERMS];
+    if (add_up_island<add_terms>(v.graph, v.islands, t, on, term, total) && t.lane == 0)
+        limit_island(v.islands, &v.islands.info[v.graph.label[t.body]], total, args.under_iterated, !args.paper);
+}
+
+/* So many blocks have registers on a multiprocessor at once: large scenes run in waves of them. */
+enum { LIMIT_BLOCKS = 10 };
+
+static __global__ void __launch_bounds__(BODY_THREADS, LIMIT_BLOCKS)
     limit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
+    const body_thread t = body_of_thread(v.model, v.graph); /* iterations do not change the layout */
+    const int32_t label = t.live ? v.graph.label[t.body] : 0;
     wait_for_stream();
-    const body_thread t = body_of_thread(v.model, v.graph);
-    if (!*v.islands.suspects) {
-        if (args.paper) restore_islands<false>(v, t, is_loose(v, t), false, false);
-        return;
-    }
-    double total[TERMS];
-    const double term = v.bodies.rigid ? energies_of_body<true, false>(v, t) : energies_of_body<false, false>(v, t);
-    const bool loose = v.islands.motions && is_loose(v, t);
-    if (add_up_island<add_terms>(v.graph, v.islands, t, term, total) && t.lane == 0 && !loose)
-        limit_island(v.islands, &v.islands.info[v.graph.label[t.body]], total, args.under_iterated, !args.paper);
-    if (v.islands.motions) restore_islands<true>(v, t, loose, args.under_iterated, !args.paper);
+    const bool loose = v.islands.motions && t.live && !v.islands.info[label].held; /* neither waits for the other */
+    const bool suspected = *v.islands.suspects != 0, held = t.live && suspected && !loose;
+    if (__ballot_sync((unsigned)ALL_LANES, loose || held) == 0) return;
+    const bool energies = suspected || !args.paper;
+    const double term = energies ? energies_in_lanes(v, t, loose, loose || held) : 0;
+    if (suspected) limit_held(v, args, t, held, term);
+    if (v.islands.motions) restore_islands(v, t, loose, energies, term, args.under_iterated, !args.paper);
 }
 
 static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)

@@ -125,9 +125,10 @@ static __device__ __forceinline__ void run_batch(Part &part, const cuda_view &v,
         return;
     }
     if constexpr (PROLOGUE) {
-        if (suspected) *block.suspected = 1;
+        if (suspected) block.flags[FLAG_SUSPECTED] = 1;
         block_barrier<SIZE>();
-        if (*block.suspected) limit_in_block(v, args.under_iterated, block, [] { block_barrier<SIZE>(); });
+        if (block.flags[FLAG_SUSPECTED] || block.flags[FLAG_LOOSE])
+            limit_in_block(v, args.under_iterated, block, [] { block_barrier<SIZE>(); });
     }
 }
 
@@ -150,15 +151,17 @@ static __global__ void __launch_bounds__(most_threads(POINTS, SIZE), 1)
     const block_part block = part.for_prologue();
     const bool begins = PROLOGUE && args.begin;
     /* islands that are not held: this kernel finds them out as it begins, or an earlier one has */
-    if (PROLOGUE && threadIdx.x == 0)
-        *block.suspected = begins || args.limit != LIMIT_WHOLE ? 0 : *v.islands.suspects;
+    if (PROLOGUE && threadIdx.x == 0) {
+        block.flags[FLAG_SUSPECTED] = 0;
+        block.flags[FLAG_LOOSE] = begins || args.limit != LIMIT_WHOLE ? 0 : *v.islands.loose;
+    }
     if constexpr (PROLOGUE)
         if (begins) store_first_terms(v, block, part.found);
     part.fetch_side(); /* on its way while islands are weighed */
     if constexpr (PROLOGUE)
         if (begins) {
             weigh_in_block(v, args, block, part.found, barrier);
-            if (threadIdx.x == 0 && *block.suspected) *v.islands.suspects = 1; /* for kernels after this one */
+            if (threadIdx.x == 0 && block.flags[FLAG_LOOSE]) *v.islands.loose = 1; /* for kernels after this one */
             stamp_assembled(v.step);
         }
     const real relaxation = FAST ? (real)v.model.settings->relaxation : (real)1; /* on its way with what is loaded */

@@ -43,13 +43,14 @@ struct part_memory {
     solver_real *lines, *b;  /* of bodies beyond one for each eight threads: (bodies - threads / LANES) x line, ROW;
                                 FAST: the momentum residual in place of b */
     solver_real *rows;       /* of warps that have rows: ROWS_OF_LANE x ROW_NUMBERS x WARP each */
-    int32_t *suspected;      /* of 2: a body of the part has too much energy, or its island is not held */
+    int32_t *flags;          /* PART_FLAGS (iterate/prologue.h) */
     /* Before the first iteration and after the last one, over what is above (iterate/prologue.h): */
     double *terms;           /* bodies x TERMS */
     island_range *range;     /* bodies */
 };
 
 enum { SLACK = 16 }; /* the end, with what is to come there aligned */
+static_assert(PART_FLAGS * sizeof(int32_t) <= SLACK, "flags are the last");
 
 /* One description of the layout for its size and its addresses. */
 static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *base, bool cluster,
@@ -67,7 +68,7 @@ static __host__ __device__ inline size_t lay_out(part_memory *m, unsigned char *
     const size_t rows = (size_t)most_row_warps(row_constraints, threads) * ROWS_OF_LANE * ROW_NUMBERS * WARP;
     size_t iterating = ((size_t)(m->rows - m->state) + rows) * sizeof(solver_real),
            around = n * (TERMS * sizeof(double) + sizeof(island_range)), used = iterating > around ? iterating : around;
-    m->suspected = (int32_t *)(base + used);
+    m->flags = (int32_t *)(base + used);
     return used + SLACK;
 }
 

@@ -87,7 +87,7 @@ template <int POINTS, int MODE, int SIZE, bool FAST> struct part_run {
     /* What prologue.h sees of it. */
     __device__ __forceinline__ block_part for_prologue(void) const
     {
-        const block_part out = {first_body, bodies, m.terms, m.range, m.suspected};
+        const block_part out = {first_body, bodies, m.terms, m.range, m.flags};
         return out;
     }
     /* fast: has the island of the side met the stop rule? */

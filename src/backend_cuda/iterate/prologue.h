@@ -10,12 +10,15 @@
 #include "backend_cuda/weight/island_sums.h"
 #include "backend_cuda/weight/weigh.h"
 
+/* Of a part, in any of its islands: one is not held; one is; a body has too much energy. */
+enum part_flags { FLAG_LOOSE, FLAG_HELD, FLAG_SUSPECTED, PART_FLAGS };
+
 /* Whole steps of worlds: no row blocks, at least a warp, and blocks whose threads have registers enough. */
 struct block_part {
     int32_t first_body, bodies;
     double *terms;       /* shared: bodies x TERMS */
     island_range *range; /* shared: of bodies */
-    int32_t *suspected;  /* shared: 0 at first; whether there may be something to do for the limit. The next: scratch */
+    int32_t *flags;      /* shared: PART_FLAGS; those that are asked for are 0 at first */
 };
 
 /* use(t, i) for the part's bodies, eight lanes each; `own`: the thread's first. Every thread of the block comes
@@ -71,11 +74,32 @@ static __device__ __forceinline__ void weigh_in_block(const cuda_view &v, const 
         if (!t.live) return;
         if (i == first && t.lane == 0) {
             v.islands.info[v.graph.label[t.body]] = island;
-            part.suspected[island.held] = 1; /* a choice would take registers */
+            part.flags[island.held] = 1; /* FLAG_LOOSE or FLAG_HELD: a choice would take registers */
         }
         factor_rigid(v.bodies, t.body, t.lane, C);
     });
     barrier();
+}
+
+/* What bodies add to their islands' momentum, of those that are not held, added up at an island's first body; as by
+ * powers (weight/island_sums.h). */
+template <class Barrier>
+static __device__ __forceinline__ void add_up_momentum(const cuda_view &v, const block_part &part,
+                                                       const body_thread &own, Barrier barrier)
+{
+    for_each_body(v.graph, part, own, [&](const body_thread &t, int32_t) { store_momentum(v, t, is_loose(v, t)); });
+    for (int32_t apart = 1; apart < part.bodies; apart *= SPREAD) {
+        barrier();
+        for_each_body(v.graph, part, own, [&](const body_thread &t, int32_t i) {
+            if (!is_loose(v, t)) return;
+            const island_range island = part.range[i];
+            const int32_t rank = i - island.first, places = (island.bodies - rank + apart - 1) / apart;
+            if (rank % (apart * SPREAD) == 0 && places > 1)
+                add_up_places(v.islands.motions + (size_t)t.slot * MOTION_TERMS, (size_t)apart * MOTION_TERMS,
+                              places < SPREAD ? places : (int32_t)SPREAD, MOMENTUM_SUMS, t.lane);
+        });
+    }
+    __syncwarp((unsigned)ALL_LANES);
 }
 
 /* The limit of energies, where some body of the part was suspected, and the momentum of islands that are not held. */
@@ -85,17 +109,21 @@ static __device__ __noinline__ void limit_in_block(const cuda_view &v, bool unde
 {
     const body_thread own = body_of_slot(v.graph, part.first_body + (int32_t)threadIdx.x / LANES,
                                          (int32_t)threadIdx.x / LANES < part.bodies);
-    store_terms(v.graph, part, own, [&](const body_thread &t) { return energies_of_body<true, false>(v, t); });
+    const bool suspected = part.flags[FLAG_SUSPECTED] != 0;
+    store_terms(v.graph, part, own, [&](const body_thread &t) {
+        const bool loose = is_loose(v, t), on = suspected || loose;
+        return __ballot_sync((unsigned)ALL_LANES, on) != 0 ? energies_of_body<true>(v, t, loose, on) : 0;
+    });
+    if (part.flags[FLAG_LOOSE]) add_up_momentum(v, part, own, barrier);
     add_up_in_block<add_terms>(part.bodies, part.range, part.terms, barrier);
     for_each_body(v.graph, part, own, [&](const body_thread &t, int32_t i) {
-        if (t.live && t.lane == 0 && i == part.range[i].first && v.islands.info[v.graph.label[t.body]].held)
-            limit_island(v.islands, &v.islands.info[v.graph.label[t.body]], part.terms + i * TERMS, under_iterated,
-                         true);
+        if (!t.live || t.lane > 0 || i != part.range[i].first) return;
+        cuda_island *island = &v.islands.info[v.graph.label[t.body]];
+        const double *energies = part.terms + i * TERMS;
+        double *sum = v.islands.motions + (size_t)t.slot * MOTION_TERMS;
+        if (!island->held) find_motion(v.islands, island, sum, energies, under_iterated, true);
+        else if (suspected) limit_island(v.islands, island, energies, under_iterated, true);
     });
-    for_each_body(v.graph, part, own,
-                  [&](const body_thread &t, int32_t) {
-                      restore_islands<true>(v, t, is_loose(v, t), under_iterated, true);
-                  });
 }
 
 #endif

@@ -123,7 +123,9 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     term[1] = largest_of_lanes(fabs(momentum - row.b - g));
     term[2] = largest_of_lanes(keep_max(fabs(g), keep_max(fabs(momentum), fabs(row.b))));
     term[2] = fmax(term[2], t.live ? mass_of(v.bodies, t.body) * v.model.settings->certificate_tolerance : 0);
-    if (!add_up_island<largest_term>(v.graph, v.islands, t, own_number(term, t.lane), largest) || t.lane != 0) return;
+    if (!add_up_island<largest_term>(v.graph, v.islands, t, t.live, own_number(term, t.lane), largest) ||
+        t.lane != 0)
+        return;
     const bool met = largest[0] <= v.model.settings->certificate_tolerance &&
                      largest[1] <= v.model.settings->certificate_momentum_tolerance * largest[2];
     int32_t *stopped = &v.islands.info[v.graph.label[t.body]].stopped;

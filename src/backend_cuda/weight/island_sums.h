@@ -7,7 +7,7 @@
 
 #include "backend_cuda/device/body.h"
 
-enum { SPREAD = 16, ARRIVAL_BITS = 5 };
+enum { SPREAD_BITS = 4, SPREAD = 1 << SPREAD_BITS, ARRIVAL_BITS = 5 };
 static_assert(SPREAD < 1 << ARRIVAL_BITS && 32 / 4 * ARRIVAL_BITS <= 64, "a number holds the arrivals of every power");
 
 struct add_terms {
@@ -16,6 +16,23 @@ struct add_terms {
 struct largest_term {
     static __device__ __forceinline__ double join(double a, double b) { return keep_max(a, b); }
 };
+
+/* Adds `one`; returns what was there. What the warp has written before, whoever counts later sees, and what those have
+ * written that have counted, this one does. Fences before and after it would be waited for one after the other. */
+static __device__ __forceinline__ unsigned long long count_arrival(unsigned long long *arrivals,
+                                                                    unsigned long long one)
+{
+#ifdef SADMM_CUDA_EMULATED
+    return atomicAdd(arrivals, one);
+#else
+    unsigned long long before;
+    asm volatile("atom.acq_rel.gpu.global.add.u64 %0, [%1], %2;"
+                 : "=l"(before)
+                 : "l"(arrivals), "l"(one)
+                 : "memory");
+    return before;
+#endif
+}
 
 /* Of bodies that are `on`, whole islands of them: add_up(slot, apart, members) for each power, by the lanes of the body
  * that came last. True in the lanes of one body of each island; those see what any body of the island has written
@@ -29,19 +46,17 @@ static __device__ __forceinline__ bool add_up_by_powers(const graph_view &graph,
     int32_t rank = t.slot - first;
     int32_t power = 0;
     for (int64_t apart = 1; __ballot_sync((unsigned)ALL_LANES, on && apart < bodies) != 0; apart *= SPREAD, ++power) {
-        const int32_t begin = (int32_t)(rank / (apart * SPREAD) * (apart * SPREAD));
-        const int64_t places = (bodies - begin + apart - 1) / apart;
+        const int32_t begin = (int32_t)(rank & -(apart * SPREAD));
+        const int64_t places = (bodies - begin + apart - 1) >> SPREAD_BITS * power; /* divided by apart */
         const int32_t members = places < SPREAD ? (int32_t)places : (int32_t)SPREAD;
         const bool alone = !on || members < 2 || apart >= bodies;
         bool last = on;
         __syncwarp((unsigned)ALL_LANES);
         if (!alone && t.lane == 0) {
-            const unsigned long long one = 1ull << ARRIVAL_BITS * power;
-            __threadfence(); /* what the lanes have written, before their body is counted */
-            const unsigned long long before = atomicAdd(&arrivals[first + begin], one);
+            const unsigned long long one = 1ull << ARRIVAL_BITS * power,
+                                     before = count_arrival(&arrivals[first + begin], one);
             last = (int32_t)(before >> ARRIVAL_BITS * power & ((1u << ARRIVAL_BITS) - 1)) + 1 == members;
             if (last) atomicAdd(&arrivals[first + begin], 0ull - one * (unsigned long long)members);
-            __threadfence(); /* and what the others have */
         }
         on = __shfl_sync((unsigned)ALL_LANES, last, 0, LANES);
         __syncwarp((unsigned)ALL_LANES);
@@ -52,14 +67,15 @@ static __device__ __forceinline__ bool add_up_by_powers(const graph_view &graph,
     return on;
 }
 
-/* Terms of a body, term k in lane k, added up (or what Join says) over its island. True in the lanes of one body of
- * each island; those have all of the sums in `sum`. Every lane of the warp comes here. */
+/* Terms of a body, term k in lane k, added up (or what Join says) over its island, of bodies that are `on`, whole
+ * islands. True in the lanes of one body of each; those have all of the sums in `sum`. Every lane of the warp comes
+ * here. */
 template <class Join>
 static __device__ __forceinline__ bool add_up_island(const graph_view &graph, const island_view &islands,
-                                                     const body_thread &t, double term, double sum[TERMS])
+                                                     const body_thread &t, bool on, double term, double sum[TERMS])
 {
     double *own = islands.terms + (size_t)t.slot * TERMS;
-    if (t.live && t.lane < TERMS) own[t.lane] = term;
+    if (on && t.lane < TERMS) own[t.lane] = term;
     const auto add_up = [&](int32_t slot, int64_t apart, int32_t members) {
         double *to = islands.terms + (size_t)slot * TERMS;
         if (t.lane >= TERMS) return;
@@ -73,10 +89,10 @@ static __device__ __forceinline__ bool add_up_island(const graph_view &graph, co
             if (j < members) term = Join::join(term, all[j]);
         to[t.lane] = term;
     };
-    const bool on = add_up_by_powers(graph, islands.arrivals, t, t.live, add_up);
+    const bool last = add_up_by_powers(graph, islands.arrivals, t, on, add_up);
 #pragma unroll
     for (int k = 0; k < TERMS; ++k) sum[k] = __shfl_sync((unsigned)ALL_LANES, term, k, LANES);
-    return on;
+    return last;
 }
 
 /* Where the island of a body begins, and its size, in bodies of a thread block. */

@@ -50,10 +50,10 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     double total[TERMS];
     const double term =
         v.bodies.rigid ? terms_of_body<SCALES, true, ROWS>(v, t) : terms_of_body<SCALES, false, ROWS>(v, t);
-    if (add_up_island<add_terms>(v.graph, v.islands, t, term, total) && t.lane == 0) {
+    if (add_up_island<add_terms>(v.graph, v.islands, t, t.live, term, total) && t.lane == 0) {
         cuda_island *island = &v.islands.info[v.graph.label[t.body]];
         weigh_island<SCALES>(island, total, args);
-        if (!SCALES && args.start && !island->held) *v.islands.suspects = 1;
+        if (!SCALES && args.start && !island->held) *v.islands.loose = 1;
     }
 }
 

@@ -169,9 +169,60 @@ SADMM_INLINE int momentum_null_space(struct momentum_sums *s, double basis[6][6]
     return left;
 }
 
-/* `s` loses its gram. */
+/* A pivot of the inertia that is less than this share of what it is made of is rounding. */
+#define MOMENTUM_PIVOT 1e-14
+
+/* L^-1 of J = L L^T, J about the centre of mass: xx, yx yy, zx zy zz. False where a pivot is lost to rounding. */
+SADMM_INLINE int momentum_inverse_root(const struct momentum_sums *s, const double centre[3], double inverse[6])
+{
+    const double *J = s->inertia, *p = s->moment, xx = J[0] - (p[1] * centre[1] + p[2] * centre[2]),
+                 yy = J[1] - (p[0] * centre[0] + p[2] * centre[2]), zz = J[2] - (p[0] * centre[0] + p[1] * centre[1]),
+                 xy = J[3] + p[0] * centre[1], xz = J[4] + p[0] * centre[2], yz = J[5] + p[1] * centre[2];
+    if (!(xx > MOMENTUM_PIVOT * J[0])) return 0;
+    const double x = 1 / sqrt(xx), yx = xy * x, zx = xz * x, y2 = yy - yx * yx;
+    if (!(y2 > MOMENTUM_PIVOT * J[1])) return 0;
+    const double y = 1 / sqrt(y2), zy = (yz - zx * yx) * y, z2 = zz - zx * zx - zy * zy;
+    if (!(z2 > MOMENTUM_PIVOT * J[2])) return 0;
+    const double z = 1 / sqrt(z2);
+    inverse[0] = x, inverse[2] = y, inverse[5] = z;
+    inverse[1] = -yx * x * y;
+    inverse[3] = -(zx * x + zy * inverse[1]) * z;
+    inverse[4] = -zy * y * z;
+    return 1;
+}
+
+/* Of an island in the air, which is what most are that are not held: the centre of mass moves, and the island turns
+ * about it, either without the other. False where the inertia is lost to rounding. */
+SADMM_INLINE int momentum_find_free(const struct momentum_sums *s, struct momentum_motions *out)
+{
+    const double share = 1 / s->mass, root = sqrt(share),
+                 centre[3] = {share * s->moment[0], share * s->moment[1], share * s->moment[2]};
+    double turn[6];
+    if (!momentum_inverse_root(s, centre, turn)) return 0;
+    SADMM_UNROLL
+    for (int k = 0; k < 3; ++k) {
+        double *move = out->motion[k], *spin = out->motion[k + 3];
+        SADMM_UNROLL
+        for (int j = 0; j < 3; ++j) {
+            move[j] = j == k ? root : 0;
+            move[j + 3] = 0;
+            spin[j] = 0;
+            spin[j + 3] = j <= k ? turn[k * (k + 1) / 2 + j] : 0;
+        }
+        add_cross(centre, spin + 3, 1, spin);
+        out->now[k] = root * s->now[k];
+        out->free[k] = root * s->free[k];
+        out->now[k + 3] = dense6_dot(spin, s->now);
+        out->free[k + 3] = dense6_dot(spin, s->free);
+    }
+    out->count = 6;
+    return 1;
+}
+
+/* `s` loses its gram. Every static contact shows in the directions that its point does not move in. */
 SADMM_INLINE void momentum_find_motions(struct momentum_sums *s, struct momentum_motions *out)
 {
+    if (s->gram[0] + s->gram[2] + s->gram[5] == 0 && momentum_find_free(s, out)) return;
     const int left = momentum_null_space(s, out->motion);
     double y[6];
     out->count = 0;
@@ -226,14 +277,15 @@ SADMM_INLINE struct momentum_energies momentum_energies_of(const struct momentum
 /* The rigid motion q that restores the momentum of factor v: v <- factor v + G q. */
 SADMM_INLINE void momentum_restoring(const struct momentum_motions *motions, double factor, double q[6])
 {
-    SADMM_ROLLED
-    for (int j = 0; j < 6; ++j) q[j] = 0;
+    double sum[6] = {0, 0, 0, 0, 0, 0};
     SADMM_ROLLED
     for (int k = 0; k < motions->count; ++k) {
         const double share = motions->free[k] - factor * motions->now[k];
-        SADMM_ROLLED
-        for (int j = 0; j < 6; ++j) q[j] += share * motions->motion[k][j];
+        SADMM_UNROLL
+        for (int j = 0; j < 6; ++j) sum[j] += share * motions->motion[k][j];
     }
+    SADMM_UNROLL
+    for (int j = 0; j < 6; ++j) q[j] = sum[j];
 }
 
 /* v <- factor v + G q of a body at d. */
