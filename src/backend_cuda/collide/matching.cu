@@ -26,6 +26,7 @@ static __device__ void emit_point(const collision_view &v, const step_lengths &d
                                   uint64_t place)
 {
     const int32_t count = v.sizes[i], at = (int32_t)(place >> 32), first = (int32_t)(uint32_t)place;
+    if (lane == 0) v.pair_of[i] = at;
     if (lane >= count) return;
 
     const struct candidate own = candidate_of(v, v.candidates[i]);
@@ -41,7 +42,6 @@ static __device__ void emit_point(const collision_view &v, const step_lengths &d
         contact_emit_pair(own.a, own.b, own.child, pa, pb, m, normal, friction, first, &pair);
         v.after.pairs[at] = pair;
         v.after.keys[at] = ordered_key(own.a, own.b);
-        if (v.substeps > 1) v.pair_of[i] = at;
     }
 
     struct sadmm_contact_point point;

@@ -63,11 +63,13 @@ static sadmm_status reserve_candidate(struct sadmm_cuda_collision *c, struct sad
     TRY(reserve(c, CANDIDATES_2, candidates, sizeof *v->candidates, error));
     TRY(reserve(c, MANIFOLDS, candidates, sizeof *v->manifolds, error));
     TRY(reserve(c, MATCHES, candidates, sizeof *v->matches, error));
+    TRY(reserve(c, PAIR_OF, candidates, sizeof *v->pair_of, error));
     TRY(reserve(c, SIZES, candidates + SIZES_BEYOND, sizeof *v->sizes, error));
     TRY(reserve(c, PLACES, candidates + 1, sizeof *v->places, error));
     v->found = in<uint64_t>(c, CANDIDATES);
     v->manifolds = in<struct manifold>(c, MANIFOLDS);
     v->matches = in<int32_t>(c, MATCHES);
+    v->pair_of = in<int32_t>(c, PAIR_OF);
     v->sizes = in<uint8_t>(c, SIZES);
     v->places = in<uint64_t>(c, PLACES);
     v->candidate_capacity = (int32_t)c->candidate_capacity;
@@ -272,10 +274,8 @@ static sadmm_status reserve_substeps(struct sadmm_cuda_collision *c, struct sadm
     const size_t slots = c->input_bytes[0] / sizeof *v->shapes;
     TRY(reserve(c, BOXES, slots, sizeof *v->boxes, error));
     TRY(reserve(c, REACHES, slots, sizeof *v->reaches, error));
-    TRY(reserve(c, PAIR_OF, (size_t)c->candidate_capacity, sizeof *v->pair_of, error));
     v->boxes = in<struct sadmm_box3>(c, BOXES);
     v->reaches = in<struct collision_reach>(c, REACHES);
-    v->pair_of = in<int32_t>(c, PAIR_OF);
     return SADMM_OK;
 }
 

@@ -45,7 +45,8 @@ enum {
     COLLISION_THREADS = 256, /* a block */
     GRID_SAMPLES = 128,
     PLACE_THREADS = 32,      /* every access is a sector a thread: what counts is how many multiprocessors share them */
-    NARROW_THREADS = 32,     /* long chains of arithmetic, many registers */
+    NARROW_THREADS = 32,     /* long chains of arithmetic, many registers, ... */
+    NARROW_BLOCKS = 12,      /* ... but not so many that fewer blocks than this are on a multiprocessor */
     TILE_ROWS = 128,         /* all pairs: leaves of a block, one a thread, ... */
     TILE_COLUMNS = 64,       /* ... and later ones that each is tested against, a bit each */
     SMALL_TILE_ROWS = 32,    /* the same of few shapes, ... */
@@ -162,7 +163,7 @@ struct collision_view {
     int32_t slot_bits, child_bits;                 /* of a candidate; child_bits is 0 where every shape has one child */
     struct manifold *manifolds;                    /* by candidate; points beyond `count` are not written */
     int32_t *matches;                              /* by candidate: pair of the last step, or -1 */
-    int32_t *pair_of;                              /* sub-steps: by candidate with a size: its pair in the new set */
+    int32_t *pair_of;                              /* by candidate: its pair in the new set; without: the next one */
     uint8_t *sizes;                                /* points by candidate; 0 beyond the last, SIZES_BEYOND of them */
     uint64_t *places;                              /* exclusive sums of pairs << 32 | points */
 
