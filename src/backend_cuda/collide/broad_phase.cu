@@ -204,9 +204,9 @@ static __device__ __forceinline__ int32_t node_after(const collision_view &v, in
     return common(v, r + 1, r + 2) > common(v, r, r + 1) ? r + 1 : first_leaf + r + 1;
 }
 
-static __global__ void __launch_bounds__(COLLISION_THREADS) build_kernel(const __grid_constant__ collision_view v)
+static __global__ void __launch_bounds__(TREE_THREADS) build_kernel(const __grid_constant__ collision_view v)
 {
-    const int64_t thread = collision_thread(COLLISION_THREADS);
+    const int64_t thread = collision_thread(TREE_THREADS);
     if (thread >= v.leaf_count) return;
     const int32_t i = (int32_t)thread, first_leaf = v.leaf_count - 1;
 
@@ -250,24 +250,45 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) build_kernel(const _
     v.arrivals[i] = 0;
 }
 
+/* What the build has left of an inner node, and stays: fetched a level ahead. */
+struct refit_links {
+    int32_t left, next, parent;
+};
+static __device__ __forceinline__ refit_links links_of(const collision_view &v, int32_t at)
+{
+    const int32_t node = at >= 0 ? at : 0;
+    const refit_links links = {v.nodes[node].child, v.nodes[node].next, v.parents[node]};
+    return links;
+}
+
 /* Boxes from the leaves up: of two children the one that arrives last goes on. Smallest and largest do not depend on
  * the order. A node's right child is the node after its left one. */
-static __global__ void __launch_bounds__(COLLISION_THREADS) refit_kernel(const __grid_constant__ collision_view v)
+static __global__ void __launch_bounds__(TREE_THREADS) refit_kernel(const __grid_constant__ collision_view v)
 {
-    const int64_t thread = collision_thread(COLLISION_THREADS);
+    const int64_t thread = collision_thread(TREE_THREADS);
     if (thread >= v.leaf_count) return;
-    for (int32_t at = v.parents[v.leaf_count - 1 + thread]; at >= 0; at = v.parents[at]) {
-        if (arrive(&v.arrivals[at]) == 0) return;
+    int32_t from = v.leaf_count - 1 + (int32_t)thread, at = v.parents[from];
+    struct collision_node own = v.nodes[from];
+    struct collision_groups groups = v.groups[from];
+    struct refit_links links = links_of(v, at);
+    while (at >= 0) {
         struct collision_node *node = &v.nodes[at];
-        const int32_t child = node->child;
-        const struct collision_node left = v.nodes[child], right = v.nodes[left.next];
+        if (arrive(&v.arrivals[at]) == 0) return;
+        const int32_t other = from == links.left ? own.next : links.left, above = links.parent;
+        const struct collision_node sibling = v.nodes[other];
+        own.next = links.next;
+        links = links_of(v, above);
         for (int k = 0; k < 3; ++k) {
-            node->lo[k] = fminf(left.lo[k], right.lo[k]);
-            node->hi[k] = fmaxf(left.hi[k], right.hi[k]);
+            node->lo[k] = own.lo[k] = fminf(own.lo[k], sibling.lo[k]);
+            node->hi[k] = own.hi[k] = fmaxf(own.hi[k], sibling.hi[k]);
         }
-        if (v.group_bits == 0) continue;
-        const struct collision_groups a = v.groups[child], b = v.groups[left.next];
-        v.groups[at] = {a.low < b.low ? a.low : b.low, a.high > b.high ? a.high : b.high};
+        if (v.group_bits > 0) {
+            const struct collision_groups b = v.groups[other];
+            groups = {groups.low < b.low ? groups.low : b.low, groups.high > b.high ? groups.high : b.high};
+            v.groups[at] = groups;
+        }
+        from = at;
+        at = above;
     }
 }
 
@@ -399,7 +420,7 @@ static __device__ __forceinline__ bool nodes_meet(const struct collision_node &a
  * wait, and they come to leaves at different times. */
 enum { WALK_LEAVES = 24 };
 struct walk_leaves {
-    int32_t numbers[WALK_LEAVES][WALK_THREADS];
+    int32_t numbers[WALK_LEAVES][TREE_THREADS];
 };
 
 /* The first `count` leaves of this thread's list; the next one is fetched while one is tested. */
@@ -447,10 +468,10 @@ static __device__ void walk(const collision_view &v, int32_t i, struct walk_leav
     test_leaves(v, leaf, dt, *list, count, out);
 }
 
-static __global__ void __launch_bounds__(WALK_THREADS) walk_kernel(const __grid_constant__ collision_view v)
+static __global__ void __launch_bounds__(TREE_THREADS) walk_kernel(const __grid_constant__ collision_view v)
 {
     COLLISION_SHARED(walk_leaves, shared);
-    const int64_t thread = collision_thread(WALK_THREADS);
+    const int64_t thread = collision_thread(TREE_THREADS);
     struct batch out;
     if (aborted(v)) return;
     out.count = 0;
@@ -547,10 +568,10 @@ void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels)
     kernels->place = {place_kernel<PLACE_ONE>, PLACE_THREADS, 0, "placing of the shapes"};
     kernels->place_first = {place_kernel<PLACE_FIRST>, PLACE_THREADS, 0, "placing of the shapes"};
     kernels->place_again = {place_kernel<PLACE_AGAIN>, PLACE_THREADS, 0, "placing of the shapes"};
-    kernels->build = {build_kernel, COLLISION_THREADS, 0, "build of the tree"};
-    kernels->refit = {refit_kernel, COLLISION_THREADS, 0, "boxes of the tree"};
+    kernels->build = {build_kernel, TREE_THREADS, 0, "build of the tree"};
+    kernels->refit = {refit_kernel, TREE_THREADS, 0, "boxes of the tree"};
     kernels->clear = {clear_kernel, COLLISION_THREADS, 0, "reset of the candidates"};
-    kernels->walk = {walk_kernel, WALK_THREADS, sizeof(struct walk_leaves), "candidates by the tree"};
+    kernels->walk = {walk_kernel, TREE_THREADS, sizeof(struct walk_leaves), "candidates by the tree"};
     kernels->tiles = {tiles_kernel<TILE_ROWS, TILE_COLUMNS>, TILE_ROWS, sizeof(struct tile<TILE_COLUMNS>),
                       "candidates of all pairs"};
     kernels->small_tiles = {tiles_kernel<SMALL_TILE_ROWS, SMALL_TILE_COLUMNS>, SMALL_TILE_ROWS,

@@ -52,7 +52,7 @@ enum {
     SMALL_TILE_ROWS = 32,    /* the same of few shapes, ... */
     SMALL_TILE_COLUMNS = 16,
     SMALL_TILES_BELOW = 1024, /* ... which are so few */
-    WALK_THREADS = 64,
+    TREE_THREADS = 64,       /* chains of loads: what counts is how many multiprocessors share them */
     RANK_KEYS = 32,          /* sort by counting: keys of a block, ... */
     RANK_SHARES = 8,         /* ... into how many shares the others are split, ... */
     RANK_CHUNK = 1024,       /* ... and how many are staged at a time */
