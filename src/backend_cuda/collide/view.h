@@ -5,7 +5,7 @@
  *   tree     Morton codes, radix sort, Karras' hierarchy, boxes bottom up          (few shapes: not needed)
  *   pairs    candidates: boxes overlap and the pair may meet                       a thread a shape, or tiles of pairs
  *   sort     candidates by (slot of a, slot of b, child), the host's order
- *   narrow   the last step's pair (a search), manifold into slots[candidate]       a thread a candidate
+ *   narrow   the last step's pair (a guess or a search), manifold by candidate     a thread a candidate
  *   scan     where each candidate's contacts go                                    (few candidates: by emit itself)
  *   emit     pairs and points in world terms, the last step's impulses             eight threads a candidate
  *
@@ -22,7 +22,8 @@
  * Small scenes are a matter of latency, not of work: few launches, and blocks so small that they spread over the whole
  * chip. With a small capacity a candidate's place in the order is found by counting the smaller ones, and emit adds up
  * the contacts before its own: two launches where a radix sort and a scan need some eight. With a larger one the sort
- * takes all of it; unused candidates are all ones and go to the end.
+ * takes all of it; unused candidates are all ones and go to the end. What takes the time is one load that waits for
+ * another: kernels ask at once for all that they may need, before it is known whether they do, and only then test.
  *
  * A candidate is a child of a pair of shapes (sadmm_geometry): where every shape has one child, a pair. Shapes are
  * checked when they are taken over (input.cu), so that collision_table.h lists every pair that meets; one that it does
