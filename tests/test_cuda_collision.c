@@ -357,6 +357,8 @@ static const struct soup_kind soups[] = {
     {.name = "several manifolds a pair, all pairs", .bodies = 90, .shapes_a_body = 2, .planes = 2, .density = 2,
      .size_low = 0.3, .size_high = 1, .static_share = 0.2, .friction_share = 1, .dead_share = 0.1, .steps = 4,
      .children = 3},
+    {.name = "more than small tiles are for, all pairs", .bodies = 1100, .shapes_a_body = 1, .planes = 1, .density = 2,
+     .size_low = 0.3, .size_high = 1, .static_share = 0.1, .steps = 1, .tree_from = 1000000},
 };
 enum { SOUPS = sizeof soups / sizeof *soups };
 

@@ -68,23 +68,43 @@ SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const stru
     }
 }
 
-/* The same of two shapes in a step: where they are halfway through it (midway.h), or where a pair that is faster than
- * that first touches (advance.h). What passes by is near, or no contact. */
-SADMM_INLINE void find_manifold(const struct sadmm_proxy *a, const struct sadmm_proxy *b, uint32_t child, double margin,
-                                double gravity, double dt, uint32_t cache, struct manifold *m)
+/* What is known of two shapes in a step before their manifold is asked for. */
+struct pair_start {
+    struct pair_pose pose;
+    double ahead, limit;
+    bool moves_on; /* the pair is one of those in advance.h */
+};
+
+SADMM_INLINE struct pair_start pair_start_of(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double margin,
+                                             double gravity, double dt)
 {
     const double speed = relative_speed(a->velocity, b->velocity);
-    double ahead = proxy_ahead(a, b, speed, dt), limit = proxy_limit(a, b, speed, margin, gravity, dt);
+    struct pair_start start;
+    start.ahead = proxy_ahead(a, b, speed, dt);
+    start.limit = proxy_limit(a, b, speed, margin, gravity, dt);
+    start.moves_on = advance_needed(start.ahead, dt);
+    start.pose = proxies_pose(a, b, start.ahead);
+    return start;
+}
+
+/* The manifold of two shapes in a step: where they are halfway through it (midway.h), or where a pair that is faster
+ * than that first touches (advance.h). What passes by is near, or no contact. start: pair_start_of the two. */
+SADMM_INLINE void find_manifold(const struct sadmm_proxy *a, const struct sadmm_proxy *b, uint32_t child, double margin,
+                                double gravity, double dt, const struct pair_start *start, uint32_t cache,
+                                struct manifold *m)
+{
+    double ahead = start->ahead, limit = start->limit;
+    struct pair_pose pose = start->pose;
     struct advance state = {0, false};
-    bool moves_on = advance_needed(ahead, dt);
+    bool moves_on = start->moves_on;
     for (;;) {
-        const struct pair_pose pose = proxies_pose(a, b, ahead);
         const bool last = !moves_on;
         pair_manifold(&a->geometry, &b->geometry, child, &pose, last ? (real)limit : SADMM_REAL_MAX, last ? cache : 0,
                       m);
         if (last) break;
         moves_on = advance_pair(a, b, &pose, m, dt, &state, &ahead);
         if (state.missed) limit = proxy_limit(a, b, 0, margin, gravity, dt);
+        pose = proxies_pose(a, b, ahead);
     }
     m->ahead = ahead;
 }

@@ -135,17 +135,17 @@ template <int FOR>
 static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t i = collision_thread(PLACE_THREADS);
-    if (aborted(v)) return;
-    if (i == 0 && FOR != PLACE_AGAIN) *v.candidate_count = 0;
-    if (i >= v.leaf_count + v.plane_count) return;
+    const bool stops = aborted(v), is_there = i < v.leaf_count + v.plane_count;
     const struct collision_step step = step_of(v);
-    const uint32_t slot = v.present[i];
+    const uint32_t slot = is_there ? v.present[i] : 0; /* at once, not after what comes next */
+    if (stops) return;
+    if (i == 0 && FOR != PLACE_AGAIN) *v.candidate_count = 0;
+    if (!is_there) return;
     const struct sadmm_shape &shape = v.shapes[slot];
     const struct sadmm_collision_body &body = v.bodies[shape.body];
     const bool moves = body.system_body >= 0;
     struct sadmm_proxy proxy;
     struct collision_leaf leaf;
-    struct collision_filter filter;
 
     const struct proxy_turn turn = proxy_turn_of(&shape, &body, step.dt);
     proxy_place(&shape, &v.geometries[shape.geometry], &body, &turn, step.dt, step.margin, step.gravity, &proxy,
@@ -157,29 +157,33 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
         if (moves && !is_within(v.reaches[slot], proxy, leaf.box, step.dt, v.substep)) *v.abort_code = ABORT_REACH;
         return;
     }
-    filter.category = shape.category;
-    filter.mask = shape.mask;
-    filter.body = shape.body;
-    filter.kind = proxy.geometry.type | (moves ? FILTER_MOVES : 0);
-    v.filters[slot] = filter;
-    if (i >= v.leaf_count) return;
+    const struct collision_filter filter = {shape.category, shape.mask, shape.body,
+                                            proxy.geometry.type | (moves ? FILTER_MOVES : 0)};
+    if (i >= v.leaf_count) {
+        v.filters[slot] = filter;
+        return;
+    }
 
     if (FOR == PLACE_FIRST) {
         v.boxes[slot] = leaf.box;
         leaf.box = make_reach(v, proxy, leaf.box, step.dt, &v.reaches[slot]);
     }
+    for (int k = 0; k < 3; ++k) leaf.velocity[k] = proxy.velocity[k];
+    leaf.thin = proxy.thin;
+    leaf.filter = filter;
     leaf.slot = (int32_t)slot;
-    leaf.reserved = 0;
+    leaf.children = proxy.geometry.children;
     leaf.group_low = body.environment < 0 ? INT32_MIN : body.environment;
     leaf.group_high = body.environment < 0 ? INT32_MAX : body.environment;
-    v.placed[slot] = leaf;
+    v.placed[i] = leaf;
+    if (!v.leaf_keys) return;
 
     const uint64_t group = body.environment < 0 ? 0 : (uint64_t)body.environment;
     const int rest = LEAF_CLASS_SHIFT - v.group_bits;
     uint64_t key = geometry_radius(&proxy.geometry) >= v.large ? LEAF_LARGE : 0;
     if (!moves) key = LEAF_STATIC;
     v.leaf_keys[i] = key << LEAF_CLASS_SHIFT | group << rest | morton(*v.grid, proxy.x) >> (3 * MORTON_BITS - rest);
-    v.leaf_slots[i] = slot;
+    v.leaf_numbers[i] = (uint32_t)i;
 }
 
 /* ---- tree ------------------------------------------------------------------------------------------------------ */
@@ -200,19 +204,20 @@ static __device__ __forceinline__ int32_t node_after(const collision_view &v, in
     return common(v, r + 1, r + 2) > common(v, r, r + 1) ? r + 1 : first_leaf + r + 1;
 }
 
-static __global__ void __launch_bounds__(COLLISION_THREADS) build_kernel(const __grid_constant__ collision_view v)
+static __global__ void __launch_bounds__(TREE_THREADS) build_kernel(const __grid_constant__ collision_view v)
 {
-    const int64_t thread = collision_thread(COLLISION_THREADS);
+    const int64_t thread = collision_thread(TREE_THREADS);
     if (thread >= v.leaf_count) return;
     const int32_t i = (int32_t)thread, first_leaf = v.leaf_count - 1;
 
-    const struct collision_leaf leaf = v.placed[v.leaf_slots[i]];
+    const int32_t number = (int32_t)v.leaf_numbers[i];
+    const struct collision_leaf &leaf = v.placed[number];
     struct collision_node node;
     for (int k = 0; k < 3; ++k) {
         node.lo[k] = round_down(leaf.box.lo[k]);
         node.hi[k] = round_up(leaf.box.hi[k]);
     }
-    node.child = leaf.slot;
+    node.child = number;
     node.next = node_after(v, i);
     v.nodes[first_leaf + i] = node;
     v.groups[first_leaf + i] = {leaf.group_low, leaf.group_high};
@@ -245,24 +250,45 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) build_kernel(const _
     v.arrivals[i] = 0;
 }
 
+/* What the build has left of an inner node, and stays: fetched a level ahead. */
+struct refit_links {
+    int32_t left, next, parent;
+};
+static __device__ __forceinline__ refit_links links_of(const collision_view &v, int32_t at)
+{
+    const int32_t node = at >= 0 ? at : 0;
+    const refit_links links = {v.nodes[node].child, v.nodes[node].next, v.parents[node]};
+    return links;
+}
+
 /* Boxes from the leaves up: of two children the one that arrives last goes on. Smallest and largest do not depend on
  * the order. A node's right child is the node after its left one. */
-static __global__ void __launch_bounds__(COLLISION_THREADS) refit_kernel(const __grid_constant__ collision_view v)
+static __global__ void __launch_bounds__(TREE_THREADS) refit_kernel(const __grid_constant__ collision_view v)
 {
-    const int64_t thread = collision_thread(COLLISION_THREADS);
+    const int64_t thread = collision_thread(TREE_THREADS);
     if (thread >= v.leaf_count) return;
-    for (int32_t at = v.parents[v.leaf_count - 1 + thread]; at >= 0; at = v.parents[at]) {
-        if (arrive(&v.arrivals[at]) == 0) return;
+    int32_t from = v.leaf_count - 1 + (int32_t)thread, at = v.parents[from];
+    struct collision_node own = v.nodes[from];
+    struct collision_groups groups = v.groups[from];
+    struct refit_links links = links_of(v, at);
+    while (at >= 0) {
         struct collision_node *node = &v.nodes[at];
-        const int32_t child = node->child;
-        const struct collision_node left = v.nodes[child], right = v.nodes[left.next];
+        if (arrive(&v.arrivals[at]) == 0) return;
+        const int32_t other = from == links.left ? own.next : links.left, above = links.parent;
+        const struct collision_node sibling = v.nodes[other];
+        own.next = links.next;
+        links = links_of(v, above);
         for (int k = 0; k < 3; ++k) {
-            node->lo[k] = fminf(left.lo[k], right.lo[k]);
-            node->hi[k] = fmaxf(left.hi[k], right.hi[k]);
+            node->lo[k] = own.lo[k] = fminf(own.lo[k], sibling.lo[k]);
+            node->hi[k] = own.hi[k] = fmaxf(own.hi[k], sibling.hi[k]);
         }
-        if (v.group_bits == 0) continue;
-        const struct collision_groups a = v.groups[child], b = v.groups[left.next];
-        v.groups[at] = {a.low < b.low ? a.low : b.low, a.high > b.high ? a.high : b.high};
+        if (v.group_bits > 0) {
+            const struct collision_groups b = v.groups[other];
+            groups = {groups.low < b.low ? groups.low : b.low, groups.high > b.high ? groups.high : b.high};
+            v.groups[at] = groups;
+        }
+        from = at;
+        at = above;
     }
 }
 
@@ -275,33 +301,48 @@ static __global__ void __launch_bounds__(COLLISION_THREADS) clear_kernel(const _
     if (i < v.candidate_capacity) v.found[i] = ~UINT64_C(0);
 }
 
-static __device__ bool may_meet(const collision_view &v, const collision_filter &a, const collision_filter &b)
+/* Tests of pairs are without branches: each would wait for its own load. */
+
+static __device__ __forceinline__ bool filters_meet(const collision_filter &a, const collision_filter &b)
 {
-    if (a.body == b.body || !(a.category & b.mask) || !(b.category & a.mask)) return false;
-    if (!((a.kind | b.kind) & FILTER_MOVES)) return false;
+    return (a.body != b.body) & ((a.category & b.mask) != 0) & ((b.category & a.mask) != 0) &
+           (((a.kind | b.kind) & FILTER_MOVES) != 0);
+}
+
+static __device__ __forceinline__ bool is_enabled(const collision_view &v, const collision_filter &a,
+                                                  const collision_filter &b)
+{
     return v.disabled_count == 0 ||
            find_key(v.disabled_pairs, v.disabled_count, unordered_key((uint32_t)a.body, (uint32_t)b.body)) < 0;
 }
 
+/* boxes_overlap, and the groups. */
 static __device__ __forceinline__ bool leaves_overlap(const struct collision_leaf &a, const struct collision_leaf &b)
 {
-    return a.group_low <= b.group_high && b.group_low <= a.group_high && boxes_overlap(&a.box, &b.box);
+    bool overlap = (a.group_low <= b.group_high) & (b.group_low <= a.group_high);
+    for (int k = 0; k < 3; ++k) overlap = overlap & (a.box.lo[k] <= b.box.hi[k]) & (b.box.lo[k] <= a.box.hi[k]);
+    return overlap;
 }
 
-/* Of leaves that overlap. */
+/* Of leaves that overlap: boxes_meet, and what else keeps two shapes apart. */
 static __device__ __forceinline__ bool leaves_meet(const collision_view &v, const struct collision_leaf &a,
                                                    const struct collision_leaf &b, double dt)
 {
-    return boxes_meet(&a.box, v.proxies[a.slot].velocity, &b.box, v.proxies[b.slot].velocity, dt);
+    bool meet = filters_meet(a.filter, b.filter);
+    for (int k = 0; k < 3; ++k)
+        meet = meet & (intervals_meet(a.box.lo[k], a.box.hi[k], b.box.lo[k], b.box.hi[k], a.velocity[k] * dt,
+                                      b.velocity[k] * dt) != 0);
+    return meet && is_enabled(v, a.filter, b.filter);
 }
 
 /* The first candidate of two shapes: the one of the lower (type, slot) is a. */
-static __device__ __forceinline__ uint64_t candidate_key(const collision_view &v, uint32_t a, int32_t kind_a,
-                                                         uint32_t b, int32_t kind_b)
+static __device__ __forceinline__ uint64_t candidate_key(const collision_view &v, const struct collision_leaf &a,
+                                                         const struct collision_leaf &b)
 {
-    const int type_a = kind_a & FILTER_TYPE, type_b = kind_b & FILTER_TYPE;
-    const bool ordered = type_a < type_b || (type_a == type_b && a < b);
-    return first_candidate(v, ordered ? a : b, ordered ? b : a);
+    const int type_a = a.filter.kind & FILTER_TYPE, type_b = b.filter.kind & FILTER_TYPE;
+    const uint32_t slot_a = (uint32_t)a.slot, slot_b = (uint32_t)b.slot;
+    const bool ordered = type_a < type_b || (type_a == type_b && slot_a < slot_b);
+    return first_candidate(v, ordered ? slot_a : slot_b, ordered ? slot_b : slot_a);
 }
 
 static __device__ __forceinline__ void store_candidate(const collision_view &v, unsigned long long at, uint64_t key)
@@ -339,140 +380,186 @@ static __device__ void finish_batches(const collision_view &v, const struct batc
     write_batch(v, out, reserve_by_warp(v.candidate_count, out.count));
 }
 
+/* A part of what a pair with a plane reaches (proxy_plane_reach). */
+static __device__ __forceinline__ double leaf_plane_reach(const struct collision_leaf &leaf,
+                                                          const struct collision_step &step)
+{
+    return shape_reach(step.margin, leaf.thin, 0, fall_of(step.gravity, step.dt));
+}
+
 /* The planes that a mover meets: those of every group, and those of its own. */
 static __device__ void add_planes(const collision_view &v, const struct collision_step &step, struct batch *out,
-                                  const struct collision_filter &own, const struct collision_leaf &leaf)
+                                  const struct collision_leaf &leaf)
 {
     const uint32_t slot = (uint32_t)leaf.slot;
-    if (v.plane_count == 0 || !(own.kind & FILTER_MOVES)) return;
-    const double reach = proxy_plane_reach(&v.proxies[slot], step.margin, fall_of(step.gravity, step.dt));
+    if (v.plane_count == 0 || !(leaf.filter.kind & FILTER_MOVES)) return;
+    const double reach = leaf_plane_reach(leaf, step);
     const bool grouped = v.shared_planes < v.plane_count && leaf.group_low == leaf.group_high;
     for (int pass = 0; pass < (grouped ? 2 : 1); ++pass) {
         const uint64_t group = pass == 0 ? 0 : (uint64_t)leaf.group_low + 1;
         int64_t i = pass == 0 ? 0 : lower_bound(v.planes, v.plane_count, group << 32);
         for (; i < v.plane_count && v.planes[i] >> 32 == group; ++i) {
             const uint32_t plane = (uint32_t)v.planes[i];
-            if (may_meet(v, v.filters[plane], own) && proxy_plane_meets(&v.proxies[plane], &leaf.box, reach))
-                add(v, out, first_candidate(v, plane, slot), candidates_of(v, plane, slot));
+            const struct sadmm_proxy &proxy = v.proxies[plane];
+            const struct collision_filter filter = v.filters[plane];
+            const bool near = proxy_plane_meets(&proxy, &leaf.box, reach);
+            if ((filters_meet(filter, leaf.filter) & near) && is_enabled(v, filter, leaf.filter))
+                add(v, out, first_candidate(v, plane, slot),
+                    candidates_of(v, proxy.geometry.children, leaf.children));
         }
     }
 }
 
 static __device__ __forceinline__ bool nodes_meet(const struct collision_node &a, const struct collision_node &b)
 {
-    return a.lo[0] <= b.hi[0] && b.lo[0] <= a.hi[0] && a.lo[1] <= b.hi[1] && b.lo[1] <= a.hi[1] && a.lo[2] <= b.hi[2] &&
-           b.lo[2] <= a.hi[2];
+    return (a.lo[0] <= b.hi[0]) & (b.lo[0] <= a.hi[0]) & (a.lo[1] <= b.hi[1]) & (b.lo[1] <= a.hi[1]) &
+           (a.lo[2] <= b.hi[2]) & (b.lo[2] <= a.hi[2]);
+}
+
+/* Leaves that the walk of a thread has come to. They are tested together: while one lane of a warp tests, the others
+ * wait, and they come to leaves at different times. */
+enum { WALK_LEAVES = 24 };
+struct walk_leaves {
+    int32_t numbers[WALK_LEAVES][TREE_THREADS];
+};
+
+/* The first `count` leaves of this thread's list; the next one is fetched while one is tested. */
+static __device__ void test_leaves(const collision_view &v, const struct collision_leaf &leaf, double dt,
+                                   const struct walk_leaves &list, int count, struct batch *out)
+{
+    struct collision_leaf next = v.placed[count > 0 ? list.numbers[0][threadIdx.x] : 0];
+    for (int k = 0; k < count; ++k) {
+        const struct collision_leaf other = next;
+        if (k + 1 < count) next = v.placed[list.numbers[k + 1][threadIdx.x]];
+        if (leaves_overlap(leaf, other) & leaves_meet(v, leaf, other, dt))
+            add(v, out, candidate_key(v, leaf, other), candidates_of(v, leaf.children, other.children));
+    }
 }
 
 /* One leaf against the planes and the later leaves of the tree. Static leaves come last and do not meet each other. */
-static __device__ void walk(const collision_view &v, int32_t i, struct batch *out)
+static __device__ void walk(const collision_view &v, int32_t i, struct walk_leaves *list, struct batch *out)
 {
     const int32_t first_leaf = v.leaf_count - 1;
-    const struct collision_node start = v.nodes[first_leaf + i];
-    const struct collision_filter own = v.filters[start.child];
-    const bool grouped = v.group_bits > 0;
-    if (!(own.kind & FILTER_MOVES)) return;
-    const struct collision_leaf leaf = v.placed[start.child];
     const struct collision_step step = step_of(v);
-    add_planes(v, step, out, own, leaf);
+    const struct collision_node start = v.nodes[first_leaf + i];
+    const struct collision_leaf leaf = v.placed[start.child];
+    const double dt = time_of_candidates(v, step);
+    const bool grouped = v.group_bits > 0;
+    int count = 0;
+    if (!(leaf.filter.kind & FILTER_MOVES)) return;
+    add_planes(v, step, out, leaf);
     for (int32_t at = start.next; at >= 0;) {
         const struct collision_node node = v.nodes[at];
         bool meet = nodes_meet(start, node);
         count_visit();
-        if (meet && grouped) {
+        if (grouped) {
             const struct collision_groups groups = v.groups[at];
-            meet = leaf.group_low <= groups.high && groups.low <= leaf.group_high;
+            meet = meet & (leaf.group_low <= groups.high) & (groups.low <= leaf.group_high);
         }
-        if (meet && at < first_leaf) {
-            at = node.child;
-            continue;
+        if (meet && at >= first_leaf) {
+            list->numbers[count++][threadIdx.x] = node.child;
+            if (count == WALK_LEAVES) {
+                test_leaves(v, leaf, dt, *list, count, out);
+                count = 0;
+            }
         }
-        if (meet && leaves_overlap(leaf, v.placed[node.child]) &&
-            leaves_meet(v, leaf, v.placed[node.child], time_of_candidates(v, step))) {
-            const struct collision_filter other = v.filters[node.child];
-            if (may_meet(v, own, other))
-                add(v, out, candidate_key(v, (uint32_t)leaf.slot, own.kind, (uint32_t)node.child, other.kind),
-                    candidates_of(v, (uint32_t)leaf.slot, (uint32_t)node.child));
-        }
-        at = node.next;
+        at = meet && at < first_leaf ? node.child : node.next;
     }
+    test_leaves(v, leaf, dt, *list, count, out);
 }
 
-static __global__ void __launch_bounds__(COLLISION_THREADS) walk_kernel(const __grid_constant__ collision_view v)
+static __global__ void __launch_bounds__(TREE_THREADS) walk_kernel(const __grid_constant__ collision_view v)
 {
-    const int64_t thread = collision_thread(COLLISION_THREADS);
+    COLLISION_SHARED(walk_leaves, shared);
+    const int64_t thread = collision_thread(TREE_THREADS);
     struct batch out;
     if (aborted(v)) return;
     out.count = 0;
-    if (thread < v.leaf_count) walk(v, (int32_t)thread, &out);
+    if (thread < v.leaf_count) walk(v, (int32_t)thread, &shared, &out);
     finish_batches(v, out);
 }
 
-/* All pairs, in tiles: TILE_ROWS leaves, one a thread, against TILE_COLUMNS others, which lie in shared memory; later
- * ones only. A row's first block has the planes instead. */
-struct tile {
-    struct collision_leaf leaves[TILE_COLUMNS];
-    struct collision_filter filters[TILE_COLUMNS];
+/* All pairs, in tiles: ROWS leaves, one a thread, against COLUMNS others, which lie in shared memory; later ones only.
+ * A row's first block has the planes instead. */
+template <int COLUMNS> struct tile {
+    struct collision_leaf leaves[COLUMNS];
 };
 
-static __global__ void __launch_bounds__(TILE_ROWS) tiles_kernel(const __grid_constant__ collision_view v)
+/* The row's candidates with planes. */
+static __device__ void tile_of_planes(const collision_view &v, const struct collision_step &step,
+                                      const struct collision_leaf &leaf, bool is_there)
 {
-    COLLISION_SHARED(tile, others);
-    const int32_t t = (int32_t)threadIdx.x, columns = tile_columns(v.leaf_count);
-    const int32_t row = (int32_t)blockIdx.x / columns, column = (int32_t)blockIdx.x % columns - 1;
-    const int32_t i = row * TILE_ROWS + t, first = column * TILE_COLUMNS;
-    struct collision_leaf leaf;
-    struct collision_filter own;
-    if (aborted(v) || (column >= 0 && first + TILE_COLUMNS - 1 <= row * TILE_ROWS)) return;
-    const struct collision_step step = step_of(v);
-    if (i < v.leaf_count) {
-        const uint32_t slot = v.present[i];
-        leaf = v.placed[slot];
-        own = v.filters[slot];
-    }
-    if (column < 0) {
-        struct batch out;
-        out.count = 0;
-        if (i < v.leaf_count) add_planes(v, step, &out, own, leaf);
-        finish_batches(v, out);
-        return;
-    }
+    struct batch out;
+    out.count = 0;
+    if (is_there) add_planes(v, step, &out, leaf);
+    finish_batches(v, out);
+}
 
-    const int32_t count = v.leaf_count - first < TILE_COLUMNS ? v.leaf_count - first : TILE_COLUMNS;
-    if (t < count) {
-        const uint32_t slot = v.present[first + t];
-        others.leaves[t] = v.placed[slot];
-        others.filters[t] = v.filters[slot];
-    }
-    __syncthreads();
+/* Bits [begin, end) of 64. */
+static __device__ __forceinline__ uint64_t bits_between(int32_t begin, int32_t end)
+{
+    const uint64_t all = ~UINT64_C(0), from = begin < 64 ? all << begin : 0, to = end < 64 ? all << end : 0;
+    return from & ~to;
+}
+
+/* Which of the others meet leaf i, a bit each: of numbers from `first` on, `count` of them. The loop goes over all that
+ * there is place for, so that it unrolls. */
+template <int COLUMNS>
+static __device__ __forceinline__ uint64_t hits_of(const collision_view &v, const struct collision_step &step,
+                                                   const struct collision_leaf &leaf, int32_t i, int32_t first,
+                                                   int32_t count, const struct collision_leaf *others)
+{
+    const double dt = time_of_candidates(v, step);
     uint64_t hits = 0;
-    if (i < v.leaf_count) {
-        for (int32_t j = 0; j < count; ++j) {
-            const struct collision_leaf other = others.leaves[j];
-            hits |= (uint64_t)leaves_overlap(leaf, other) << j;
-        }
-        if (i >= first) hits &= i - first < TILE_COLUMNS - 1 ? ~UINT64_C(0) << (i - first + 1) : 0;
-        for (uint64_t left = hits; left; left &= left - 1) {
-            const int j = trailing_zeros(left);
-            if (!may_meet(v, own, others.filters[j]) ||
-                !leaves_meet(v, leaf, others.leaves[j], time_of_candidates(v, step)))
-                hits ^= left & (0 - left);
-        }
-    }
-    const uint32_t slot = (uint32_t)leaf.slot;
+    for (int j = 0; j < COLUMNS; ++j) hits |= (uint64_t)leaves_overlap(leaf, others[j]) << j;
+    hits &= bits_between(i >= first ? i - first + 1 : 0, count);
+    for (uint64_t left = hits; left; left &= left - 1)
+        if (!leaves_meet(v, leaf, others[trailing_zeros(left)], dt)) hits ^= left & (0 - left);
+    return hits;
+}
+
+/* The candidates of a leaf's hits. All threads of a warp together. */
+static __device__ __forceinline__ void write_hits(const collision_view &v, const struct collision_leaf &leaf,
+                                                  uint64_t hits, const struct collision_leaf *others)
+{
     unsigned total = (unsigned)bits_set(hits);
     if (v.child_bits > 0) {
         total = 0;
         for (uint64_t left = hits; left; left &= left - 1)
-            total += candidates_of(v, slot, (uint32_t)others.leaves[trailing_zeros(left)].slot);
+            total += candidates_of(v, leaf.children, others[trailing_zeros(left)].children);
     }
     unsigned long long at = reserve_by_warp(v.candidate_count, total);
     for (; hits; hits &= hits - 1) {
-        const int j = trailing_zeros(hits);
-        const uint32_t other = (uint32_t)others.leaves[j].slot, count = candidates_of(v, slot, other);
-        const uint64_t first = candidate_key(v, slot, own.kind, other, others.filters[j].kind);
+        const struct collision_leaf &other = others[trailing_zeros(hits)];
+        const uint32_t count = candidates_of(v, leaf.children, other.children);
+        const uint64_t first = candidate_key(v, leaf, other);
         for (uint32_t child = 0; child < count; ++child) store_candidate(v, at++, first + child);
     }
+}
+
+template <int ROWS, int COLUMNS>
+static __global__ void __launch_bounds__(ROWS) tiles_kernel(const __grid_constant__ collision_view v)
+{
+    COLLISION_SHARED(tile<COLUMNS>, shared);
+    const int32_t t = (int32_t)threadIdx.x, columns = tile_columns(v.leaf_count, COLUMNS);
+    const int32_t row = (int32_t)blockIdx.x / columns, column = (int32_t)blockIdx.x % columns - 1;
+    const int32_t i = row * ROWS + t, first = column * COLUMNS;
+    const int32_t count = v.leaf_count - first < COLUMNS ? v.leaf_count - first : COLUMNS;
+    struct collision_leaf leaf;
+    if (column >= 0 && first + COLUMNS - 1 <= row * ROWS) return;
+    /* all at once: no part waits for another */
+    const bool stops = aborted(v);
+    const struct collision_step step = step_of(v);
+    if (i < v.leaf_count) leaf = v.placed[i];
+    if (column >= 0 && t < count) shared.leaves[t] = v.placed[first + t];
+    if (stops) return;
+    if (column < 0) {
+        tile_of_planes(v, step, leaf, i < v.leaf_count);
+        return;
+    }
+    __syncthreads();
+    const uint64_t hits = i < v.leaf_count ? hits_of<COLUMNS>(v, step, leaf, i, first, count, shared.leaves) : 0;
+    write_hits(v, leaf, hits, shared.leaves);
 }
 
 void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels)
@@ -481,9 +568,12 @@ void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels)
     kernels->place = {place_kernel<PLACE_ONE>, PLACE_THREADS, 0, "placing of the shapes"};
     kernels->place_first = {place_kernel<PLACE_FIRST>, PLACE_THREADS, 0, "placing of the shapes"};
     kernels->place_again = {place_kernel<PLACE_AGAIN>, PLACE_THREADS, 0, "placing of the shapes"};
-    kernels->build = {build_kernel, COLLISION_THREADS, 0, "build of the tree"};
-    kernels->refit = {refit_kernel, COLLISION_THREADS, 0, "boxes of the tree"};
+    kernels->build = {build_kernel, TREE_THREADS, 0, "build of the tree"};
+    kernels->refit = {refit_kernel, TREE_THREADS, 0, "boxes of the tree"};
     kernels->clear = {clear_kernel, COLLISION_THREADS, 0, "reset of the candidates"};
-    kernels->walk = {walk_kernel, COLLISION_THREADS, 0, "candidates by the tree"};
-    kernels->tiles = {tiles_kernel, TILE_ROWS, sizeof(struct tile), "candidates of all pairs"};
+    kernels->walk = {walk_kernel, TREE_THREADS, sizeof(struct walk_leaves), "candidates by the tree"};
+    kernels->tiles = {tiles_kernel<TILE_ROWS, TILE_COLUMNS>, TILE_ROWS, sizeof(struct tile<TILE_COLUMNS>),
+                      "candidates of all pairs"};
+    kernels->small_tiles = {tiles_kernel<SMALL_TILE_ROWS, SMALL_TILE_COLUMNS>, SMALL_TILE_ROWS,
+                            sizeof(struct tile<SMALL_TILE_COLUMNS>), "candidates of all pairs"};
 }

@@ -21,49 +21,82 @@ static __device__ void emit_counts(const collision_view &v, uint64_t total, doub
     v.after.counts->dt = dt;
 }
 
+/* What is known of a candidate before it is known how many there are. Beyond them, and without points, it may be
+ * anything. */
+struct emit_start {
+    struct candidate own;
+    int32_t count, match;
+};
+static __device__ __forceinline__ emit_start emit_start_of(const collision_view &v, int64_t i)
+{
+    const int64_t readable = i < v.candidate_capacity ? i : 0;
+    const emit_start start = {candidate_of(v, v.candidates[readable]), v.sizes[readable], v.matches[readable]};
+    return start;
+}
+
+/* What a point is made of, copied: all of it is asked for before anything waits for any of it, or is written. */
+struct emit_source {
+    struct sadmm_proxy a, b;
+    vec3 normal;
+    double ahead;
+    struct manifold_point point;
+    struct sadmm_contact_pair old; /* for what matches */
+};
+static __device__ __forceinline__ emit_source emit_source_of(const collision_view &v, const emit_start &start,
+                                                             int64_t i, int32_t lane)
+{
+    const struct manifold *m = &v.manifolds[i];
+    emit_source source;
+    source.a = v.proxies[start.own.a];
+    source.b = v.proxies[start.own.b];
+    source.normal = m->normal;
+    source.ahead = m->ahead;
+    source.point = m->points[lane];
+    source.old = v.before.pairs[start.match >= 0 ? start.match : 0];
+    return source;
+}
+
 /* Point `lane` of candidate i; place: pairs << 32 | points before it. */
 static __device__ void emit_point(const collision_view &v, const step_lengths &dt, int64_t i, int32_t lane,
-                                  uint64_t place)
+                                  const emit_start &start, const emit_source &source, uint64_t place)
 {
-    const int32_t count = v.sizes[i], at = (int32_t)(place >> 32), first = (int32_t)(uint32_t)place;
-    if (lane >= count) return;
-
-    const struct candidate own = candidate_of(v, v.candidates[i]);
-    const struct sadmm_proxy *pa = &v.proxies[own.a], *pb = &v.proxies[own.b];
-    const struct manifold *m = &v.manifolds[i];
+    const struct candidate own = start.own;
+    const int32_t at = (int32_t)(place >> 32), first = (int32_t)(uint32_t)place;
+    const struct sadmm_proxy *pa = &source.a, *pb = &source.b;
     const double friction =
         contact_friction(v.friction_pairs, v.friction_values, v.friction_count, own.a, own.b, pa, pb);
     double normal[3];
-    rotate_to_world(pb->R, m->normal, normal);
-
-    if (lane == 0) {
-        struct sadmm_contact_pair pair;
-        contact_emit_pair(own.a, own.b, own.child, pa, pb, m, normal, friction, first, &pair);
-        v.after.pairs[at] = pair;
-        v.after.keys[at] = ordered_key(own.a, own.b);
-        if (v.substeps > 1) v.pair_of[i] = at;
-    }
+    rotate_to_world(pb->R, source.normal, normal);
 
     struct sadmm_contact_point point;
     struct pair_motion motion;
-    pair_motion_of(pa, pb, normal, m->ahead, dt.now, &motion);
-    contact_emit_point(pa, pb, &motion, &m->points[lane], &point);
-    const int32_t match = v.matches[i];
-    if (match >= 0)
-        contact_carry(&v.before.pairs[match], v.before.points, lane, normal, friction, step_ratio(dt.now, dt.before),
-                      &point);
+    pair_motion_of(pa, pb, normal, source.ahead, dt.now, &motion);
+    contact_emit_point(pa, pb, &motion, &source.point, &point);
+    if (start.match >= 0)
+        contact_carry(&source.old, v.before.points, lane, normal, friction, step_ratio(dt.now, dt.before), &point);
     v.after.points[first + lane] = point;
+
+    if (lane > 0) return;
+    struct sadmm_contact_pair pair;
+    contact_emit_pair(own.a, own.b, own.child, pa, pb, &v.manifolds[i], normal, friction, first, &pair);
+    v.after.pairs[at] = pair;
+    v.after.keys[at] = ordered_key(own.a, own.b);
 }
 
-static __global__ void __launch_bounds__(COLLISION_THREADS) emit_kernel(const __grid_constant__ collision_view v)
+static __global__ void __launch_bounds__(COLLISION_THREADS, 2)
+emit_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t thread = collision_thread(COLLISION_THREADS), i = thread / POINT_LANES;
-    if (aborted(v)) return;
+    const int32_t lane = (int32_t)(thread % POINT_LANES), found = usable_candidates(v);
     const step_lengths dt = lengths_of(v);
-    const uint64_t total = v.places[v.candidate_capacity];
+    const uint64_t total = v.places[v.candidate_capacity],
+                   place = v.places[i < v.candidate_capacity ? i : v.candidate_capacity];
+    const emit_start start = emit_start_of(v, i);
+    if (aborted(v)) return;
     if (thread == 0) emit_counts(v, total, dt.now);
-    if (i >= usable_candidates(v) || (int32_t)(uint32_t)total > v.point_capacity) return;
-    emit_point(v, dt, i, (int32_t)(thread % POINT_LANES), v.places[i]);
+    if (i >= found || (int32_t)(uint32_t)total > v.point_capacity) return;
+    if (lane == 0) v.pair_of[i] = (int32_t)(place >> 32);
+    if (lane < start.count) emit_point(v, dt, i, lane, start, emit_source_of(v, start, i, lane), place);
 }
 
 /* ---- few candidates: every block adds up all sizes ------------------------------------------------------------- */
@@ -86,11 +119,15 @@ emit_few_kernel(const __grid_constant__ collision_view v)
 {
     COLLISION_SHARED(emit_sums, shared);
     const int32_t t = (int32_t)threadIdx.x, first = (int32_t)blockIdx.x * EMIT_CANDIDATES;
-    const int32_t i = first + t / POINT_LANES, found = usable_candidates(v);
+    const int32_t i = first + t / POINT_LANES, lane = t % POINT_LANES, found = usable_candidates(v);
     const uint32_t *const sizes = (const uint32_t *)v.sizes;
     uint64_t before = 0, all = 0;
     const step_lengths dt = lengths_of(v);
+    const emit_start start = emit_start_of(v, i);
+    emit_source source;
     if (aborted(v) || (first >= found && first > 0)) return;
+    const bool has_point = i < found && lane < start.count;
+    if (has_point) source = emit_source_of(v, start, i, lane);
     for (int32_t k = t; k < (found + SIZES_A_WORD - 1) / SIZES_A_WORD; k += EMIT_CANDIDATES * POINT_LANES) {
         const uint64_t sum = sum_sizes(sizes[k]);
         all += sum;
@@ -116,7 +153,8 @@ emit_few_kernel(const __grid_constant__ collision_view v)
         const uint32_t word = sizes[k / SIZES_A_WORD];
         before += sum_sizes(i - k < SIZES_A_WORD ? word & ((UINT32_C(1) << 8 * (i - k)) - 1) : word);
     }
-    emit_point(v, dt, i, t % POINT_LANES, before);
+    if (lane == 0) v.pair_of[i] = (int32_t)(before >> 32);
+    if (has_point) emit_point(v, dt, i, lane, start, source, before);
 }
 
 void COLLISION(matching_kernels)(struct collision_kernels *kernels)

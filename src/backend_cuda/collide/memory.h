@@ -15,7 +15,7 @@ struct collision_buffer {
 
 enum buffer_name {
     /* device */
-    PROXIES, FILTERS, PLACED, LEAF_KEYS, LEAF_KEYS_2, LEAF_SLOTS, LEAF_SLOTS_2, NODES, GROUPS, PARENTS, ARRIVALS,
+    PROXIES, FILTERS, PLACED, LEAF_KEYS, LEAF_KEYS_2, LEAF_NUMBERS, LEAF_NUMBERS_2, NODES, GROUPS, PARENTS, ARRIVALS,
     COUNTER, GRID, CANDIDATES, CANDIDATES_2, MANIFOLDS, MATCHES, SIZES, PLACES, TEMP, BOXES, REACHES, PAIR_OF,
     PAIRS, POINTS, PAIR_KEYS, COUNTS, PAIRS_2, POINTS_2, PAIR_KEYS_2, COUNTS_2, PAIRS_3, POINTS_3, PAIR_KEYS_3,
     COUNTS_3,
@@ -146,6 +146,14 @@ static inline void release(struct sadmm_cuda_collision *c, int name)
     b->capacity = 0;
 }
 
+/* Sets are copied whole when they grow, planes have no boxes, and what belongs to candidates is read before it is known
+ * how many there are, the pairs of the last find's among it. */
+static inline bool starts_as_zeros(int name)
+{
+    return name == CANDIDATES || name == CANDIDATES_2 || name == MATCHES || name == SIZES || name == BOXES ||
+           (name >= PAIR_OF && name < SHAPES);
+}
+
 /* At least count x size bytes; what the buffer held is lost when it grows. */
 static inline sadmm_status reserve(struct sadmm_cuda_collision *c, int name, size_t count, size_t size,
                                    struct sadmm_error *error)
@@ -160,8 +168,7 @@ static inline sadmm_status reserve(struct sadmm_cuda_collision *c, int name, siz
     CUDA_CALL(c, name >= PINNED_SHAPES ? cudaMallocHost(&b->data, wanted) : cudaMalloc(&b->data, wanted), what);
     b->capacity = wanted;
     ++c->stats.allocations;
-    /* Sets are copied whole when they grow, and the grid is read where there is no tree. */
-    if (name == GRID || (name >= PAIRS && name < SHAPES))
+    if (starts_as_zeros(name))
         CUDA_CALL(c, cudaMemsetAsync(b->data, 0, wanted, c->stream), what);
     return SADMM_OK;
 }

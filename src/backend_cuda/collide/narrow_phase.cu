@@ -1,5 +1,6 @@
 /* Candidates to manifolds: the last step's pair, for its cache, then the pair's manifold in the frame of b. */
 #include "view.h"
+#include "backend_cuda/device/parallel.h"
 
 /* C headers: an enumerator beside an unsigned number is fine there. */
 #pragma GCC diagnostic push
@@ -20,58 +21,74 @@ static __device__ int64_t find_key_in_eighths(const uint64_t *keys, int64_t coun
     }
     int smaller = 0;
     bool there = false;
-    for (int k = 0; k < 7; ++k) smaller += k < length && keys[low + k] < key;
-    low += smaller;
-    if (low < count) there = keys[low] == key;
-    return there ? low : -1;
+    for (int k = 0; k < 8; ++k) {
+        const uint64_t other = keys[low + k < count ? low + k : 0]; /* always: a branch for each would be waited for */
+        smaller += (k < length) & (other < key);
+        there = there | ((k <= length) & (low + k < count) & (other == key));
+    }
+    return there ? low + smaller : -1;
+}
+
+/* Keys around where one is likely to be: at rest, where the last find put its pair, or would have put it. */
+enum { NEAR = 8 };
+struct near_keys {
+    uint64_t keys[NEAR];
+    int64_t first;
+};
+
+/* guess: any number will do. */
+static __device__ __forceinline__ near_keys near_keys_of(const uint64_t *keys, int64_t count, int64_t guess)
+{
+    struct near_keys near;
+    near.first = (guess < 0 ? 0 : guess < count ? guess : count) - NEAR / 2;
+    for (int k = 0; k < NEAR; ++k) {
+        const int64_t at = near.first + k;
+        const uint64_t there = keys[at >= 0 && at < count ? at : 0];
+        near.keys[k] = at < 0 ? 0 : at < count ? there : ~UINT64_C(0); /* beyond: smaller, or larger, than all */
+    }
+    return near;
+}
+
+/* Do these keys tell where `key` is? Then *at is its index, -1: not there. */
+static __device__ __forceinline__ bool find_key_near(const struct near_keys &near, uint64_t key, int64_t *at)
+{
+    int smaller = 0;
+    bool there = false;
+    for (int k = 0; k < NEAR; ++k) {
+        smaller += near.keys[k] < key;
+        there = there | (near.keys[k] == key);
+    }
+    *at = there ? near.first + smaller : -1;
+    return there | ((smaller > 0) & (smaller < NEAR));
 }
 
 /* Do the two shapes of a candidate of the whole step meet in this sub-step? As sadmm_candidate_meets on the host. */
-static __device__ bool meet_now(const collision_view &v, const struct collision_step &step, const struct candidate &c)
+static __device__ bool meet_now(const collision_view &v, const struct collision_step &step, const struct candidate &c,
+                                const struct sadmm_proxy &a, const struct sadmm_proxy &b)
 {
-    const struct sadmm_proxy *a = &v.proxies[c.a], *b = &v.proxies[c.b];
-    const struct sadmm_box3 box = v.boxes[c.b];
-    if (a->geometry.type == SADMM_SHAPE_PLANE)
-        return proxy_plane_meets(a, &box, proxy_plane_reach(b, step.margin, fall_of(step.gravity, step.dt)));
-    const struct sadmm_box3 own = v.boxes[c.a];
-    return boxes_overlap(&own, &box) && boxes_meet(&own, a->velocity, &box, b->velocity, step.dt);
+    const struct sadmm_box3 own = v.boxes[c.a], box = v.boxes[c.b]; /* a plane has none */
+    if (a.geometry.type == SADMM_SHAPE_PLANE)
+        return proxy_plane_meets(&a, &box, proxy_plane_reach(&b, step.margin, fall_of(step.gravity, step.dt)));
+    return boxes_overlap(&own, &box) && boxes_meet(&own, a.velocity, &box, b.velocity, step.dt);
 }
 
 /* By which find of a step: in later sub-steps the pair that a candidate goes on from is known. */
 enum narrow_for { NARROW_ONE, NARROW_FIRST, NARROW_AGAIN };
 
-template <int FOR>
-static __global__ void __launch_bounds__(NARROW_THREADS) narrow_kernel(const __grid_constant__ collision_view v)
+/* The last step's pair of a candidate, -1: none. */
+static __device__ int64_t search_pair(const collision_view &v, const struct candidate &c, int64_t count)
 {
-    const int64_t i = collision_thread(NARROW_THREADS);
-    if (i >= (int64_t)v.candidate_capacity + SIZES_BEYOND) return;
-    if (i >= usable_candidates(v)) {
-        v.sizes[i] = 0;
-        return;
+    const uint64_t shapes = ordered_key(c.a, c.b);
+    int64_t before = find_key_in_eighths(v.before.keys, count, shapes);
+    if (before >= 0 && c.child > 0) {
+        before = contact_lower_bound(v.before.pairs, before, count, shapes, c.child);
+        if (before == count || contact_shapes(&v.before.pairs[before]) != shapes) before = -1;
     }
-    const struct collision_step step = step_of(v);
-    const struct candidate own = candidate_of(v, v.candidates[i]);
-    const struct sadmm_proxy *pa = &v.proxies[own.a], *pb = &v.proxies[own.b];
-    int64_t before = FOR == NARROW_AGAIN && v.sizes[i] > 0 ? v.pair_of[i] : -1;
-    if (FOR != NARROW_ONE && !meet_now(v, step, own)) {
-        v.sizes[i] = 0;
-        return;
-    }
-    if (FOR != NARROW_AGAIN) {
-        const uint64_t shapes = ordered_key(own.a, own.b);
-        const int32_t count = v.before.counts->pairs;
-        before = find_key_in_eighths(v.before.keys, count, shapes);
-        if (before >= 0 && own.child > 0) {
-            before = contact_lower_bound(v.before.pairs, before, count, shapes, own.child);
-            if (before == count || contact_shapes(&v.before.pairs[before]) != shapes) before = -1;
-        }
-    }
-    const struct sadmm_contact_pair *old = &v.before.pairs[before >= 0 ? before : 0];
-    const uint32_t cache = contact_memory(old, pa, pb); /* at once, not after what comes next */
-    if (!contact_goes_on(old, own.child, pa, pb)) before = -1;
-    struct manifold m;
-    find_manifold(pa, pb, own.child, step.margin, step.gravity, step.dt, before >= 0 ? cache : 0, &m);
+    return before;
+}
 
+static __device__ void store_manifold(const collision_view &v, int64_t i, const struct manifold &m, int64_t before)
+{
     v.sizes[i] = (uint8_t)m.count;
     if (m.count == 0) return;
     v.matches[i] = (int32_t)before;
@@ -81,6 +98,48 @@ static __global__ void __launch_bounds__(NARROW_THREADS) narrow_kernel(const __g
     out->cache = m.cache;
     out->ahead = m.ahead;
     for (int k = 0; k < m.count; ++k) out->points[k] = m.points[k];
+}
+
+/* What takes the time are rounds to memory: what can be asked for together is, before anything waits for any of it. */
+template <int FOR>
+static __global__ void __launch_bounds__(NARROW_THREADS, NARROW_BLOCKS)
+narrow_kernel(const __grid_constant__ collision_view v)
+{
+    const int64_t i = collision_thread(NARROW_THREADS), readable = i < v.candidate_capacity ? i : 0;
+    if (i >= (int64_t)v.candidate_capacity + SIZES_BEYOND) return;
+    const struct candidate own = candidate_of(v, v.candidates[readable]);
+    const int64_t guess = v.pair_of[readable], count = v.before.counts->pairs;
+    const struct collision_step step = step_of(v);
+    const bool had_points = FOR == NARROW_AGAIN && v.sizes[i] > 0;
+    if (i >= usable_candidates(v)) {
+        v.sizes[i] = 0;
+        return;
+    }
+    const int64_t likely = guess >= 0 && guess < count ? guess : 0;
+    const struct sadmm_proxy *pa = &v.proxies[own.a], *pb = &v.proxies[own.b];
+    const struct near_keys near = near_keys_of(v.before.keys, FOR == NARROW_AGAIN ? 0 : count, guess);
+    struct sadmm_contact_pair old = v.before.pairs[likely];
+    const struct sadmm_proxy a = *pa, b = *pb;
+    if (FOR != NARROW_ONE && !meet_now(v, step, own, a, b)) {
+        v.sizes[i] = 0;
+        return;
+    }
+    int64_t before = had_points ? guess : -1;
+    /* where pairs have several manifolds, keys come more than once */
+    const bool known = FOR == NARROW_AGAIN || ((int)find_key_near(near, ordered_key(own.a, own.b), &before) &
+                                               (int)(v.child_bits == 0));
+    const struct pair_start start = pair_start_of(&a, &b, step.margin, step.gravity, step.dt);
+    for (int k = 0; k < 3; k += 2) {
+        keep_fetched(a.geometry.size[k]);
+        keep_fetched(b.geometry.size[k]);
+    }
+    if (!known) before = search_pair(v, own, count);
+    if (before >= 0 && before != likely) old = v.before.pairs[before];
+    const uint32_t cache = contact_memory(&old, &a, &b);
+    if (!contact_goes_on(&old, own.child, &a, &b)) before = -1;
+    struct manifold m;
+    find_manifold(pa, pb, own.child, step.margin, step.gravity, step.dt, &start, before >= 0 ? cache : 0, &m);
+    store_manifold(v, i, m, before);
 }
 
 void COLLISION(narrow_phase_kernels)(struct collision_kernels *kernels)

@@ -9,20 +9,36 @@ struct ranking {
     int32_t smaller[RANK_SHARES][RANK_KEYS];
 };
 
+/* A thread's share of the keys from `base` on. */
+enum { RANK_STAGED = RANK_CHUNK / (RANK_KEYS * RANK_SHARES) };
+static __device__ __forceinline__ void stage(const collision_view &v, int32_t base, uint64_t staged[RANK_STAGED])
+{
+    for (int k = 0; k < RANK_STAGED; ++k) {
+        const int32_t at = base + (int32_t)threadIdx.x + k * RANK_KEYS * RANK_SHARES;
+        staged[k] = v.found[at < v.candidate_capacity ? at : 0];
+    }
+}
+
 static __global__ void __launch_bounds__(RANK_KEYS *RANK_SHARES) rank_kernel(const __grid_constant__ collision_view v)
 {
     COLLISION_SHARED(ranking, shared);
-    const int32_t found = usable_candidates(v), t = (int32_t)threadIdx.x;
-    const int32_t lane = t % RANK_KEYS, share = t / RANK_KEYS;
+    const int32_t t = (int32_t)threadIdx.x, lane = t % RANK_KEYS, share = t / RANK_KEYS;
     const int32_t first = (int32_t)blockIdx.x * RANK_KEYS, own = first + lane;
+    uint64_t staged[RANK_STAGED];
     int32_t smaller = 0;
+    /* the first keys before it is known how many there are: what lies beyond them may be anything */
+    stage(v, 0, staged);
+    const uint64_t key = v.found[own < v.candidate_capacity ? own : 0];
+    const int32_t found = usable_candidates(v);
     if (first >= found) return;
-    const uint64_t key = own < found ? v.found[own] : 0;
     for (int32_t base = 0; base < found; base += RANK_CHUNK) {
         const int32_t left = found - base < RANK_CHUNK ? found - base : RANK_CHUNK;
         const int32_t each = (left + RANK_SHARES - 1) / RANK_SHARES;
-        for (int32_t k = t; k < each * RANK_SHARES; k += RANK_KEYS * RANK_SHARES)
-            shared.keys[k] = k < left ? v.found[base + k] : ~UINT64_C(0);
+        if (base > 0) stage(v, base, staged);
+        for (int k = 0; k < RANK_STAGED; ++k) {
+            const int32_t at = t + k * RANK_KEYS * RANK_SHARES;
+            shared.keys[at] = at < left ? staged[k] : ~UINT64_C(0);
+        }
         __syncthreads();
         for (int32_t k = share * each; k < (share + 1) * each; ++k) smaller += shared.keys[k] < key;
         __syncthreads();

@@ -14,12 +14,12 @@ static sadmm_status reserve_shape(struct sadmm_cuda_collision *c, size_t slots, 
     const size_t leaves = (size_t)v->leaf_count;
     TRY(reserve(c, PROXIES, slots, sizeof *v->proxies, error));
     TRY(reserve(c, FILTERS, slots, sizeof *v->filters, error));
-    TRY(reserve(c, PLACED, slots, sizeof *v->placed, error));
-    TRY(reserve(c, LEAF_KEYS, leaves, sizeof *v->leaf_keys, error));
-    TRY(reserve(c, LEAF_SLOTS, leaves, sizeof *v->leaf_slots, error));
+    TRY(reserve(c, PLACED, leaves, sizeof *v->placed, error));
     if (tree) {
+        TRY(reserve(c, LEAF_KEYS, leaves, sizeof *v->leaf_keys, error));
+        TRY(reserve(c, LEAF_NUMBERS, leaves, sizeof *v->leaf_numbers, error));
         TRY(reserve(c, LEAF_KEYS_2, leaves, sizeof *v->leaf_keys, error));
-        TRY(reserve(c, LEAF_SLOTS_2, leaves, sizeof *v->leaf_slots, error));
+        TRY(reserve(c, LEAF_NUMBERS_2, leaves, sizeof *v->leaf_numbers, error));
         TRY(reserve(c, NODES, 2 * leaves, sizeof *v->nodes, error));
         TRY(reserve(c, GROUPS, 2 * leaves, sizeof *v->groups, error));
         TRY(reserve(c, PARENTS, 2 * leaves, sizeof *v->parents, error));
@@ -31,7 +31,7 @@ static sadmm_status reserve_shape(struct sadmm_cuda_collision *c, size_t slots, 
     v->filters = in<struct collision_filter>(c, FILTERS);
     v->placed = in<struct collision_leaf>(c, PLACED);
     v->leaf_keys = in<uint64_t>(c, LEAF_KEYS);
-    v->leaf_slots = in<uint32_t>(c, LEAF_SLOTS);
+    v->leaf_numbers = in<uint32_t>(c, LEAF_NUMBERS);
     v->nodes = in<struct collision_node>(c, NODES);
     v->groups = in<struct collision_groups>(c, GROUPS);
     v->parents = in<int32_t>(c, PARENTS);
@@ -63,11 +63,13 @@ static sadmm_status reserve_candidate(struct sadmm_cuda_collision *c, struct sad
     TRY(reserve(c, CANDIDATES_2, candidates, sizeof *v->candidates, error));
     TRY(reserve(c, MANIFOLDS, candidates, sizeof *v->manifolds, error));
     TRY(reserve(c, MATCHES, candidates, sizeof *v->matches, error));
+    TRY(reserve(c, PAIR_OF, candidates, sizeof *v->pair_of, error));
     TRY(reserve(c, SIZES, candidates + SIZES_BEYOND, sizeof *v->sizes, error));
     TRY(reserve(c, PLACES, candidates + 1, sizeof *v->places, error));
     v->found = in<uint64_t>(c, CANDIDATES);
     v->manifolds = in<struct manifold>(c, MANIFOLDS);
     v->matches = in<int32_t>(c, MATCHES);
+    v->pair_of = in<int32_t>(c, PAIR_OF);
     v->sizes = in<uint8_t>(c, SIZES);
     v->places = in<uint64_t>(c, PLACES);
     v->candidate_capacity = (int32_t)c->candidate_capacity;
@@ -110,15 +112,16 @@ static sadmm_status build_tree(struct sadmm_cuda_collision *c, struct sadmm_erro
 {
     struct collision_view *v = &c->view;
     uint64_t *const keys[2] = {in<uint64_t>(c, LEAF_KEYS), in<uint64_t>(c, LEAF_KEYS_2)};
-    uint32_t *const slots[2] = {in<uint32_t>(c, LEAF_SLOTS), in<uint32_t>(c, LEAF_SLOTS_2)};
+    uint32_t *const numbers[2] = {in<uint32_t>(c, LEAF_NUMBERS), in<uint32_t>(c, LEAF_NUMBERS_2)};
     size_t bytes = c->buffers[TEMP].capacity;
     int at = 0;
     v->leaf_keys = keys[0];
-    v->leaf_slots = slots[0];
+    v->leaf_numbers = numbers[0];
     c->kernel = "leaf sort";
-    CUDA_CALL(c, COLLISION(sort)(in<void>(c, TEMP), &bytes, keys, slots, v->leaf_count, 64, &at, c->stream), c->kernel);
+    CUDA_CALL(c, COLLISION(sort)(in<void>(c, TEMP), &bytes, keys, numbers, v->leaf_count, 64, &at, c->stream),
+              c->kernel);
     v->leaf_keys = keys[at];
-    v->leaf_slots = slots[at];
+    v->leaf_numbers = numbers[at];
     TRY(launch(c, c->kernels.build, v->leaf_count, error));
     return launch(c, c->kernels.refit, v->leaf_count, error);
 }
@@ -148,8 +151,11 @@ static sadmm_status find_candidates(struct sadmm_cuda_collision *c, bool tree, s
     if (tree) {
         TRY(launch(c, c->kernels.walk, v->leaf_count, error));
     } else {
-        const int64_t rows = (v->leaf_count + TILE_ROWS - 1) / TILE_ROWS;
-        TRY(launch(c, c->kernels.tiles, rows * TILE_ROWS * tile_columns(v->leaf_count), error));
+        const bool small = v->leaf_count < SMALL_TILES_BELOW;
+        const struct collision_launch &tiles = small ? c->kernels.small_tiles : c->kernels.tiles;
+        const int64_t rows = (v->leaf_count + tiles.threads - 1) / tiles.threads;
+        const int32_t columns = tile_columns(v->leaf_count, small ? SMALL_TILE_COLUMNS : TILE_COLUMNS);
+        TRY(launch(c, tiles, rows * tiles.threads * columns, error));
     }
     return sort_candidates(c, error);
 }
@@ -174,8 +180,8 @@ static sadmm_status make_contacts(struct sadmm_cuda_collision *c, struct sadmm_e
 static sadmm_status place_shapes(struct sadmm_cuda_collision *c, bool tree, struct sadmm_error *error)
 {
     const struct collision_view *v = &c->view;
-    c->view.leaf_keys = in<uint64_t>(c, LEAF_KEYS);
-    c->view.leaf_slots = in<uint32_t>(c, LEAF_SLOTS);
+    c->view.leaf_keys = tree ? in<uint64_t>(c, LEAF_KEYS) : nullptr;
+    c->view.leaf_numbers = in<uint32_t>(c, LEAF_NUMBERS);
     if (tree) TRY(launch(c, c->kernels.grid, 1, error));
     TRY(launch(c, v->substeps == 1 ? c->kernels.place : c->kernels.place_first,
                std::max(v->leaf_count + v->plane_count, 1), error));
@@ -268,10 +274,8 @@ static sadmm_status reserve_substeps(struct sadmm_cuda_collision *c, struct sadm
     const size_t slots = c->input_bytes[0] / sizeof *v->shapes;
     TRY(reserve(c, BOXES, slots, sizeof *v->boxes, error));
     TRY(reserve(c, REACHES, slots, sizeof *v->reaches, error));
-    TRY(reserve(c, PAIR_OF, (size_t)c->candidate_capacity, sizeof *v->pair_of, error));
     v->boxes = in<struct sadmm_box3>(c, BOXES);
     v->reaches = in<struct collision_reach>(c, REACHES);
-    v->pair_of = in<int32_t>(c, PAIR_OF);
     return SADMM_OK;
 }
 

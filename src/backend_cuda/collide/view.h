@@ -5,7 +5,7 @@
  *   tree     Morton codes, radix sort, Karras' hierarchy, boxes bottom up          (few shapes: not needed)
  *   pairs    candidates: boxes overlap and the pair may meet                       a thread a shape, or tiles of pairs
  *   sort     candidates by (slot of a, slot of b, child), the host's order
- *   narrow   the last step's pair (a search), manifold into slots[candidate]       a thread a candidate
+ *   narrow   the last step's pair (a guess or a search), manifold by candidate     a thread a candidate
  *   scan     where each candidate's contacts go                                    (few candidates: by emit itself)
  *   emit     pairs and points in world terms, the last step's impulses             eight threads a candidate
  *
@@ -22,7 +22,8 @@
  * Small scenes are a matter of latency, not of work: few launches, and blocks so small that they spread over the whole
  * chip. With a small capacity a candidate's place in the order is found by counting the smaller ones, and emit adds up
  * the contacts before its own: two launches where a radix sort and a scan need some eight. With a larger one the sort
- * takes all of it; unused candidates are all ones and go to the end.
+ * takes all of it; unused candidates are all ones and go to the end. What takes the time is one load that waits for
+ * another: kernels ask at once for all that they may need, before it is known whether they do, and only then test.
  *
  * A candidate is a child of a pair of shapes (sadmm_geometry): where every shape has one child, a pair. Shapes are
  * checked when they are taken over (input.cu), so that collision_table.h lists every pair that meets; one that it does
@@ -45,9 +46,14 @@ enum {
     COLLISION_THREADS = 256, /* a block */
     GRID_SAMPLES = 128,
     PLACE_THREADS = 32,      /* every access is a sector a thread: what counts is how many multiprocessors share them */
-    NARROW_THREADS = 32,     /* long chains of arithmetic, many registers */
+    NARROW_THREADS = 32,     /* long chains of arithmetic, many registers, ... */
+    NARROW_BLOCKS = 12,      /* ... but not so many that fewer blocks than this are on a multiprocessor */
     TILE_ROWS = 128,         /* all pairs: leaves of a block, one a thread, ... */
     TILE_COLUMNS = 64,       /* ... and later ones that each is tested against, a bit each */
+    SMALL_TILE_ROWS = 32,    /* the same of few shapes, ... */
+    SMALL_TILE_COLUMNS = 16,
+    SMALL_TILES_BELOW = 1024, /* ... which are so few */
+    TREE_THREADS = 64,       /* chains of loads: what counts is how many multiprocessors share them */
     RANK_KEYS = 32,          /* sort by counting: keys of a block, ... */
     RANK_SHARES = 8,         /* ... into how many shares the others are split, ... */
     RANK_CHUNK = 1024,       /* ... and how many are staged at a time */
@@ -56,10 +62,21 @@ enum {
     MORTON_BITS = 21         /* an axis */
 };
 
-/* A shape that is no plane. */
+/* What decides whether two shapes may meet at all. */
+struct alignas(16) collision_filter {
+    uint32_t category, mask;
+    int32_t body;
+    int32_t kind; /* type, + FILTER_MOVES */
+};
+enum { FILTER_TYPE = 0xff, FILTER_MOVES = 0x100 };
+
+/* A shape that is no plane, with all that is asked of it when candidates are looked for: what lies elsewhere would be
+ * another round to memory, for one pair after the other. */
 struct alignas(16) collision_leaf {
     struct sadmm_box3 box;
-    int32_t slot, reserved;
+    double velocity[3], thin;      /* as the proxy's */
+    struct collision_filter filter;
+    int32_t slot, children;
     int32_t group_low, group_high; /* a leaf that meets every group spans all */
 };
 
@@ -69,7 +86,7 @@ struct alignas(16) collision_leaf {
  * is one sector of memory; whether two leaves meet is decided by their own boxes. */
 struct alignas(32) collision_node {
     float lo[3], hi[3];
-    int32_t child; /* inner node: its left child; leaf: the slot */
+    int32_t child; /* inner node: its left child; leaf: its number */
     int32_t next;
 };
 
@@ -77,14 +94,6 @@ struct alignas(32) collision_node {
 struct alignas(8) collision_groups {
     int32_t low, high;
 };
-
-/* What decides whether two shapes may meet at all; by slot. */
-struct alignas(16) collision_filter {
-    uint32_t category, mask;
-    int32_t body;
-    int32_t kind; /* type, + FILTER_MOVES */
-};
-enum { FILTER_TYPE = 0xff, FILTER_MOVES = 0x100 };
 
 /* Key of a leaf: class, group, then as much of the Morton code as fits. Small movers come first, large ones and
  * static shapes last: a walk looks for later leaves only, so that no single thread finds everything that a large
@@ -137,12 +146,12 @@ struct collision_view {
     const double *dt, *gravity;                    /* not NULL: of the step, in the place of step's (step_of) */
 
     struct sadmm_proxy *proxies;                   /* by slot */
-    struct collision_filter *filters;              /* by slot */
-    struct collision_leaf *placed;                 /* by slot; with sub-steps: what the whole step reaches */
+    struct collision_filter *filters;              /* of planes, by slot */
+    struct collision_leaf *placed;                 /* as `present`; with sub-steps: what the whole step reaches */
     struct sadmm_box3 *boxes;                      /* sub-steps: of this one, by slot */
     struct collision_reach *reaches;               /* and of all to come */
-    uint64_t *leaf_keys;                           /* by leaf; sorted: tree order */
-    uint32_t *leaf_slots;
+    uint64_t *leaf_keys;                           /* by leaf; sorted: tree order. NULL: there is no tree */
+    uint32_t *leaf_numbers;                        /* in `placed` */
     struct collision_node *nodes;                  /* 2 leaves - 1 */
     struct collision_groups *groups;               /* of nodes */
     int32_t *parents;                              /* of nodes; -1: the root */
@@ -155,7 +164,7 @@ struct collision_view {
     int32_t slot_bits, child_bits;                 /* of a candidate; child_bits is 0 where every shape has one child */
     struct manifold *manifolds;                    /* by candidate; points beyond `count` are not written */
     int32_t *matches;                              /* by candidate: pair of the last step, or -1 */
-    int32_t *pair_of;                              /* sub-steps: by candidate with a size: its pair in the new set */
+    int32_t *pair_of;                              /* by candidate: its pair in the new set; without: the next one */
     uint8_t *sizes;                                /* points by candidate; 0 beyond the last, SIZES_BEYOND of them */
     uint64_t *places;                              /* exclusive sums of pairs << 32 | points */
 
@@ -196,10 +205,10 @@ static __device__ __forceinline__ uint64_t first_candidate(const collision_view 
 {
     return ((uint64_t)a << v.slot_bits | b) << v.child_bits;
 }
-/* Candidates of a pair: they follow the first one. */
-static __device__ __forceinline__ uint32_t candidates_of(const collision_view &v, uint32_t a, uint32_t b)
+/* Candidates of a pair: they follow the first one. children: of the two shapes. */
+static __device__ __forceinline__ uint32_t candidates_of(const collision_view &v, int32_t a, int32_t b)
 {
-    return v.child_bits > 0 ? pair_children(&v.proxies[a].geometry, &v.proxies[b].geometry) : 1;
+    return v.child_bits > 0 ? (uint32_t)a * (uint32_t)b : 1;
 }
 
 /* Candidates that the kernels after the pairs stage work on: none when they did not all fit. */
@@ -215,10 +224,10 @@ static __device__ __forceinline__ int64_t collision_thread(int block)
     return (int64_t)blockIdx.x * block + threadIdx.x;
 }
 
-/* Blocks of a row of tiles: the first has the planes. */
-static __host__ __device__ __forceinline__ int32_t tile_columns(int32_t leaves)
+/* Blocks of a row of tiles: the first has the planes. width: of a tile. */
+static __host__ __device__ __forceinline__ int32_t tile_columns(int32_t leaves, int32_t width)
 {
-    return 1 + (leaves + TILE_COLUMNS - 1) / TILE_COLUMNS;
+    return 1 + (leaves + width - 1) / width;
 }
 
 /* Sizes are read in words of four; and one more than the capacity is scanned: its place is the sum of all. */
@@ -241,8 +250,8 @@ struct collision_launch {
 
 /* The kernels, each beside what it does. */
 struct collision_kernels {
-    struct collision_launch grid, place, place_first, place_again, build, refit, clear, walk, tiles, rank, narrow,
-        narrow_first, narrow_again, emit, emit_few;
+    struct collision_launch grid, place, place_first, place_again, build, refit, clear, walk, tiles, small_tiles, rank,
+        narrow, narrow_first, narrow_again, emit, emit_few;
 };
 void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels);
 void COLLISION(sort_kernels)(struct collision_kernels *kernels);

@@ -36,6 +36,7 @@ static inline unsigned long long reserve(unsigned long long *counter, unsigned c
 }
 inline int64_t node_visits;
 static inline void count_visit(void) { ++node_visits; }
+static inline void keep_fetched(double x) { (void)x; }
 static inline int arrive(int *arrivals) { return (*arrivals)++; }
 static inline int leading_zeros(uint64_t x) { return x ? __builtin_clzll(x) : 64; }
 static inline int trailing_zeros(uint64_t x) { return __builtin_ctzll(x); }
@@ -58,6 +59,8 @@ static __device__ __forceinline__ int arrive(int *arrivals)
     return before;
 }
 static __device__ __forceinline__ void count_visit(void) {}
+/* The number has been loaded by here, whatever becomes of it: what lies beside it is near then. */
+static __device__ __forceinline__ void keep_fetched(double x) { asm volatile("" ::"d"(x)); }
 static __device__ __forceinline__ int leading_zeros(uint64_t x) { return __clzll((long long)x); }
 static __device__ __forceinline__ int trailing_zeros(uint64_t x) { return __ffsll((long long)x) - 1; } /* x not 0 */
 static __device__ __forceinline__ int bits_set(uint64_t x) { return __popcll(x); }
