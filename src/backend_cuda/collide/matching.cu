@@ -34,31 +34,35 @@ static __device__ __forceinline__ emit_start emit_start_of(const collision_view 
     return start;
 }
 
-/* What a point is made of, copied: all of it is asked for before anything waits for any of it, or is written. */
-struct emit_source {
+/* What a point is made of. Copied: all of it is asked for before anything waits for any of it, or is written, which
+ * takes registers; in place: for many threads. */
+struct emit_copy {
     struct sadmm_proxy a, b;
-    vec3 normal;
-    double ahead;
     struct manifold_point point;
     struct sadmm_contact_pair old; /* for what matches */
+    vec3 normal;
+    double ahead;
 };
-static __device__ __forceinline__ emit_source emit_source_of(const collision_view &v, const emit_start &start,
-                                                             int64_t i, int32_t lane)
+struct emit_in_place {
+    const struct sadmm_proxy &a, &b;
+    const struct manifold_point &point;
+    const struct sadmm_contact_pair &old;
+    vec3 normal;
+    double ahead;
+};
+static __device__ __forceinline__ emit_in_place emit_source_of(const collision_view &v, const emit_start &start,
+                                                               int64_t i, int32_t lane)
 {
-    const struct manifold *m = &v.manifolds[i];
-    emit_source source;
-    source.a = v.proxies[start.own.a];
-    source.b = v.proxies[start.own.b];
-    source.normal = m->normal;
-    source.ahead = m->ahead;
-    source.point = m->points[lane];
-    source.old = v.before.pairs[start.match >= 0 ? start.match : 0];
-    return source;
+    const struct manifold &m = v.manifolds[i];
+    return {v.proxies[start.own.a], v.proxies[start.own.b], m.points[lane],
+            v.before.pairs[start.match >= 0 ? start.match : 0], m.normal, m.ahead};
 }
 
 /* Point `lane` of candidate i; place: pairs << 32 | points before it. */
-static __device__ void emit_point(const collision_view &v, const step_lengths &dt, int64_t i, int32_t lane,
-                                  const emit_start &start, const emit_source &source, uint64_t place)
+template <class Source>
+static __device__ __forceinline__ void emit_point(const collision_view &v, const step_lengths &dt, int64_t i,
+                                                  int32_t lane, const emit_start &start, const Source &source,
+                                                  uint64_t place)
 {
     const struct candidate own = start.own;
     const int32_t at = (int32_t)(place >> 32), first = (int32_t)(uint32_t)place;
@@ -83,7 +87,7 @@ static __device__ void emit_point(const collision_view &v, const step_lengths &d
     v.after.keys[at] = ordered_key(own.a, own.b);
 }
 
-static __global__ void __launch_bounds__(COLLISION_THREADS, 2)
+static __global__ void __launch_bounds__(COLLISION_THREADS)
 emit_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t thread = collision_thread(COLLISION_THREADS), i = thread / POINT_LANES;
@@ -124,10 +128,13 @@ emit_few_kernel(const __grid_constant__ collision_view v)
     uint64_t before = 0, all = 0;
     const step_lengths dt = lengths_of(v);
     const emit_start start = emit_start_of(v, i);
-    emit_source source;
+    emit_copy source;
     if (aborted(v) || (first >= found && first > 0)) return;
     const bool has_point = i < found && lane < start.count;
-    if (has_point) source = emit_source_of(v, start, i, lane);
+    if (has_point) {
+        const emit_in_place from = emit_source_of(v, start, i, lane);
+        source = {from.a, from.b, from.point, from.old, from.normal, from.ahead};
+    }
     for (int32_t k = t; k < (found + SIZES_A_WORD - 1) / SIZES_A_WORD; k += EMIT_CANDIDATES * POINT_LANES) {
         const uint64_t sum = sum_sizes(sizes[k]);
         all += sum;

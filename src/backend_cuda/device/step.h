@@ -14,8 +14,8 @@
  *                 report; the step counts only if nothing was aborted
  *
  * A step of several sub-steps (sadmm_settings.substeps) goes through `find` to `finish` for each of them, all in one
- * graph, with `turn` between two: what `commit` does for the one that has ended, and `start` of the next. The step's start is
- * not written to: there is a third state, and a third set of contacts, for what lies between two sub-steps
+ * graph, with `turn` between two: what `commit` does for the one that has ended, and `start` of the next. The step's
+ * start is not written to: there is a third state, and a third set of contacts, for what lies between two sub-steps
  * (step_state). Each sub-step has a plan of its own; the first one's is known beforehand, those of others are taken to
  * be like it until the report of a step that failed says what they are.
  *
@@ -70,7 +70,6 @@ struct cuda_step_control {
     unsigned long long stamps[STAMPS]; /* of the sub-step */
     int32_t offending_body;
     int32_t substep;
-    int32_t ended; /* blocks of the kernel that moves bodies again; 0 between kernels */
     struct sadmm_cuda_contact_counts counts; /* of the last find that was not aborted */
     struct cuda_step_totals totals;
 };
@@ -99,7 +98,8 @@ struct cuda_step_view {
     struct cuda_step_control *control;
     struct cuda_step_report *reports;     /* pinned: STEPS_AHEAD */
     int32_t measured;                     /* residuals of the last iteration are in view.iteration.residual */
-    int32_t limits;                       /* there are contacts: momentum is restored; fast: energies are limited (view.islands) */
+    int32_t limits;                       /* there are contacts: momentum is restored, energies are limited
+                                             (view.islands) */
     int32_t substep, substeps;
 };
 

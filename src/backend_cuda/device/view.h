@@ -200,11 +200,15 @@ struct island_view {
     int32_t *limited;             /* islands slowed down */
     int32_t *touch;               /* worlds with contacts: bodies: bits (math/lead.h), of the body and, at labels, of
                                      the island; else NULL */
-    int32_t *again;               /* worlds: not 0: some bodies have to be moved again (step/move.h) */
+    int32_t *again;               /* worlds: whether bodies have to be moved again; enum cuda_again */
     int32_t *suspects;            /* not 0: some island that is held may have to be */
     int32_t *loose;               /* fast: not 0: there are islands that are not held */
     cuda_stop *stop;
 };
+
+/* Why bodies may have to be moved again (step/move.h): an island is not as it is as a rule; some body's lead closes a
+ * contact, and nothing presses on some body, which may be that one. */
+enum cuda_again { AGAIN, AGAIN_CLOSED, AGAIN_UNPRESSED, AGAIN_WHYS };
 
 /* What passes from sweep to sweep, and what was measured of them. */
 struct iteration_view {
@@ -295,7 +299,8 @@ static __device__ __forceinline__ int32_t live_rows(const model_view &model, con
 static __device__ __forceinline__ void clear_counts(const island_view &islands)
 {
     const cuda_stop none = {};
-    *islands.limited = *islands.suspects = *islands.loose = *islands.moved = *islands.again = 0;
+    *islands.limited = *islands.suspects = *islands.loose = *islands.moved = 0;
+    for (int k = 0; k < AGAIN_WHYS; ++k) islands.again[k] = 0;
     *islands.stop = none;
 }
 

@@ -34,7 +34,8 @@ static __device__ __forceinline__ void tell_touch(const island_view &islands, in
                                                   int touch)
 {
     add_touch(islands, body, label, held ? touch & TOUCH_OF_BODY : touch);
-    if (!held) *islands.again = 1;
+    if (!held) islands.again[AGAIN] = 1;
+    if (!(touch & TOUCH_CARRIED)) islands.again[AGAIN_UNPRESSED] = 1;
 }
 
 /* What the lanes of a body do. */
@@ -42,19 +43,20 @@ static __device__ __forceinline__ void finish_sides(const cuda_view &v, bool on,
 {
     const int32_t in_block = (int32_t)threadIdx.x / LANES, slot = (int32_t)blockIdx.x * FINISH_BODIES + in_block;
     const body_thread t = body_of_slot(v.graph, slot, on && slot < v.model.bodies);
-    const int32_t body = (int32_t)t.body, at = t.begin + t.lane;
-    const bool touched = t.live && v.step.limits;
+    const int32_t body = (int32_t)t.body;
+    const bool touched = t.begin < t.end && v.step.limits;
     const int32_t label = touched ? v.graph.label[body] : 0;
-    const touching first = fetch_touching(v, at, t.end);
+    touching_begun begun = begin_touching(v, t.begin + t.lane, t.end);
     lead_speeds own = {};
     bool held = true;
     wait_for_stream();
     let_next_begin();
+    if (begun.first.pair >= 0) fetch_impulses(v.contacts, begun.first, 0, &begun.points);
     if (touched) {
         held = v.islands.info[label].held;
         own = load_lead_speeds<true>(v, body);
     }
-    const contact_sums sums = sum_touching<true>(v, own, first, at, t.end);
+    const contact_sums sums = sum_touching<true>(v, own, &begun);
     if (t.lane == 0) shared->touch[in_block] = sums.touch;
     __syncthreads();
     if (t.live && v.model.wrenches)
@@ -81,12 +83,14 @@ static __device__ __forceinline__ void finish_body(const cuda_view &v, bool on, 
         move_body(&before.body, velocity, dt, v.model.settings->gravity, LEAD_STAYS, stays);
         move_body(&before.body, velocity, dt, v.model.settings->gravity, LEAD_OWN, place);
     }
+    const bool finite = finite_numbers(stays, PLACE) && finite_numbers(place, PLACE) && finite_numbers(velocity, 6);
     __syncthreads();
     if (!live) return;
     const bool keeps = lead_kind_of(TOUCH_AS_A_RULE, shared->touch[in_block]) == LEAD_STAYS;
 #pragma unroll
     for (int k = 0; k < PLACE; ++k) place[k] = keeps ? stays[k] : place[k];
-    if (!store_moved(v, body, before, velocity, place, dt)) atomicMin(&v.step.control->offending_body, body);
+    store_moved(v, body, before, velocity, place, dt);
+    if (!finite) atomicMin(&v.step.control->offending_body, body);
 }
 
 /* ---- contacts -------------------------------------------------------------------------------------------------- */
@@ -153,7 +157,11 @@ static __device__ __forceinline__ void finish_pair(const cuda_view &v, bool on, 
     const int32_t body = pair.ends.body[1] >= 0 ? pair.ends.body[1] : pair.ends.body[0];
     if (live && !store_impulses(v.contacts, v.step, p, lane, pair, &depth))
         atomicMin(&control->offending_body, v.model.bodies + body);
-    if (live && v.step.limits && add_ways<true>(v, pair.ends, pair.first, pair.count, lane)) *v.islands.again = 1;
+    if (live && v.step.limits) {
+        const int ways = add_ways<true>(v, pair.ends, pair.first, pair.count, lane);
+        if (ways & TOUCH_JOLT) v.islands.again[AGAIN] = 1;
+        if (ways & TOUCH_CARRIED) v.islands.again[AGAIN_CLOSED] = 1;
+    }
     /* -0 is no depth; a larger one may be there already */
     unsigned long long bits = depth > 0 ? (unsigned long long)__double_as_longlong(depth) : 0;
     for (int o = WARP / 2; o > 0; o /= 2) {

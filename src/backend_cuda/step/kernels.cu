@@ -128,27 +128,16 @@ static __device__ __noinline__ void move_again(const cuda_view &v, int32_t i)
     double velocity[6], place[PLACE];
     load_end_velocity(v, i, velocity);
     move_body(&before.body, velocity, dt, v.model.settings->gravity, kind, place);
-    if (!store_moved(v, i, before, velocity, place, dt)) atomicMin(&v.step.control->offending_body, i);
+    store_moved(v, i, before, velocity, place, dt); /* finite, since both places were that it had to choose from */
 }
 
 /* Are there bodies to be moved again (move.h)? */
 static __device__ __forceinline__ bool moves_again(const cuda_view &v)
 {
-    return v.step.limits && *v.islands.again;
-}
-
-/* Is this the thread that gives the account of a step? Where bodies are moved again, that is one of the block that ends
- * last. Every thread of the grid comes here. */
-static __device__ __forceinline__ bool gives_account(struct cuda_step_control *control, bool again)
-{
-    if (!again) return blockIdx.x == 0 && threadIdx.x == 0;
-    __syncthreads();
-    if (threadIdx.x > 0) return false;
-    __threadfence();
-    if (atomicAdd(&control->ended, 1) + 1 < (int32_t)gridDim.x) return false;
-    control->ended = 0;
-    __threadfence();
-    return true;
+    if (!v.step.limits) return false;
+    const int32_t *why = v.islands.again;
+    const int32_t again = why[AGAIN], closed = why[AGAIN_CLOSED], unpressed = why[AGAIN_UNPRESSED];
+    return again || (closed && unpressed);
 }
 
 /* ---- turn ------------------------------------------------------------------------------------------------------ */
@@ -196,7 +185,8 @@ static __global__ void __launch_bounds__(TURN_THREADS, 4)
     if (v.model.live->abort_code) return;
     const bool again = moves_again(v);
     if (again && threadIdx.x < TURN_THREADS / START_LANES && own < v.model.bodies) move_again(v, (int32_t)own);
-    if (gives_account(control, again)) {
+    if (again) __syncthreads(); /* threads of a block start bodies that others of it have moved */
+    if (t == 0) {
         control->stamps[STAMP_END] = nanoseconds();
         control->totals = totals_of(v, args);
         control->stamps[STAMP_START] = control->stamps[STAMP_END];
@@ -221,7 +211,7 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
     wait_for_stream();
     const bool again = !aborted && planned && moves_again(v);
     if (again && i < v.model.bodies) move_again(v, i);
-    if (!gives_account(control, again)) return;
+    if (blockIdx.x > 0 || threadIdx.x > 0) return;
     struct cuda_step_report *report = &v.step.reports[control->sequence % STEPS_AHEAD];
     const int32_t offending_body = control->offending_body,
                   abort_code = abort_of(aborted, planned, offending_body);

@@ -40,8 +40,8 @@ static __device__ __forceinline__ void load_end_velocity(const cuda_view &v, int
     for (int k = 0; k < 6; ++k) wide[k] = (double)velocity[k];
 }
 
-/* Body i goes to `place`; is it finite? */
-static __device__ __forceinline__ bool store_moved(const cuda_view &v, int32_t i, const body_before &before,
+/* Body i goes to `place`. */
+static __device__ __forceinline__ void store_moved(const cuda_view &v, int32_t i, const body_before &before,
                                                    const double velocity[6], const double place[PLACE], double dt)
 {
     struct sadmm_steady steady = before.steady;
@@ -52,7 +52,6 @@ static __device__ __forceinline__ bool store_moved(const cuda_view &v, int32_t i
     steady_keep(&steady, &before.body, &next, dt);
     v.step.after[i] = next;
     v.step.steady_after[i] = steady;
-    return finite_numbers(place, PLACE) && finite_numbers(velocity, 6);
 }
 
 #endif

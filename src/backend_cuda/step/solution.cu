@@ -86,9 +86,11 @@ static __global__ void touch_kernel(const __grid_constant__ cuda_view v, const _
         return;
     }
     const body_thread t = body_of_slot(v.graph, slot, slot < live_bodies(v.model));
-    const int32_t body = (int32_t)t.body, at = t.begin + lane;
+    const int32_t body = (int32_t)t.body;
     const lead_speeds own = load_lead_speeds<false>(v, body);
-    const contact_sums sums = sum_touching<true>(v, own, fetch_touching(v, at, t.end), at, t.end);
+    touching_begun begun = begin_touching(v, t.begin + lane, t.end);
+    if (begun.first.pair >= 0) fetch_impulses(v.contacts, begun.first, 0, &begun.points);
+    const contact_sums sums = sum_touching<true>(v, own, &begun);
     if (t.live && lane == 0) add_touch(v.islands, body, v.graph.label[body], sums.touch);
 }
 
@@ -139,9 +141,10 @@ static __global__ void wrench_kernel(const __grid_constant__ cuda_view v, const 
 {
     const int32_t slot = thread_index() / LANES, lane = (int32_t)threadIdx.x % LANES;
     const body_thread t = body_of_slot(v.graph, slot, slot < live_bodies(v.model));
-    const int32_t at = t.begin + lane;
     const lead_speeds none = {};
-    const contact_sums sums = sum_touching<false>(v, none, fetch_touching(v, at, t.end), at, t.end);
+    touching_begun begun = begin_touching(v, t.begin + lane, t.end);
+    if (begun.first.pair >= 0) fetch_impulses(v.contacts, begun.first, 0, &begun.points);
+    const contact_sums sums = sum_touching<false>(v, none, &begun);
     if (t.live) store_wrench(sums.wrench, lane, v.raw.out + 6 * t.body);
 }
 

@@ -72,66 +72,101 @@ struct contact_sums {
     int touch;
 };
 
-/* Points of a side that are fetched before the first of them is used. */
+/* Points of a side that are fetched before the first of them is used. What a lane fetches under a condition is waited
+ * for one by one, so the last point stands for those beyond it. */
 struct touching_points {
-    double arm[POINTS_AT_ONCE][3], impulse[POINTS_AT_ONCE][3];
+    double arm[POINTS_AT_ONCE][3];
+    solver_real impulse[POINTS_AT_ONCE][3];
 };
 
-/* Those from k on; what a lane fetches under a condition is waited for one by one, so the last one stands for those
- * beyond it. */
-static __device__ __forceinline__ void fetch_points(const cuda_view &v, const touching &t, int32_t k,
-                                                    touching_points *out)
+/* Those from k on: arms, known before the iterations end, */
+static __device__ __forceinline__ void fetch_arms(const raw_view &raw, const touching &t, int32_t k,
+                                                  touching_points *out)
 {
 #pragma unroll
     for (int32_t j = 0; j < POINTS_AT_ONCE; ++j) {
-        const int32_t at = k + j < t.count ? k + j : t.count - 1;
-        const struct sadmm_contact_point *point = &v.raw.points[t.first + at];
+        const struct sadmm_contact_point *point = &raw.points[t.first + (k + j < t.count ? k + j : t.count - 1)];
         const double *arm = t.side ? point->arm_b : point->arm_a;
 #pragma unroll
         for (int i = 0; i < 3; ++i) out->arm[j][i] = arm[i];
-        v3_store(point_impulse(v.contacts, t.pair, at), out->impulse[j]);
     }
 }
 
-template <bool LEADS>
-static __device__ __forceinline__ void add_touching(const cuda_view &v, const lead_speeds &own, const touching &t,
-                                                    contact_sums *sums)
+/* and impulses. */
+static __device__ __forceinline__ void fetch_impulses(const contact_view &contacts, const touching &t, int32_t k,
+                                                      touching_points *out)
 {
-    const double dt = v.model.settings->dt, sign = t.side ? 1 / dt : -(1 / dt);
-    touching_points points;
-    for (int32_t k = 0; k < t.count; k += POINTS_AT_ONCE) {
-        fetch_points(v, t, k, &points);
 #pragma unroll
-        for (int32_t j = 0; j < POINTS_AT_ONCE; ++j) {
-            if (k + j >= t.count) continue;
-            const double *arm = points.arm[j], *impulse = points.impulse[j];
-            double torque[3] = {};
-            add_cross(arm, impulse, 1, torque);
+    for (int32_t j = 0; j < POINTS_AT_ONCE; ++j) {
+        const solver_real *lambda =
+            contacts.lambda + point_slot(contacts, t.pair, k + j < t.count ? k + j : t.count - 1);
 #pragma unroll
-            for (int i = 0; i < 3; ++i) {
-                sums->wrench[i] += sign * impulse[i];
-                sums->wrench[i + 3] += sign * torque[i];
-            }
-            if (LEADS)
-                sums->touch |=
-                    lead_push(dot3(t.normal, impulse), lead_size_at(own.moves[0], own.moves[1], arm), own.rest);
-        }
+        for (int i = 0; i < 3; ++i) out->impulse[j][i] = lambda[(size_t)i * contacts.lambda_stride];
     }
-    if (LEADS) sums->touch |= t.other >= 0 ? TOUCH_INNER : t.friction > 0 ? TOUCH_FRICTION : TOUCH_SMOOTH;
 }
 
-/* Of a body, whose lane's first side is `first`, at place `at` of [at, end); in all of its lanes. Every lane of the
- * warp comes here. */
+/* `points`: those from k on. */
+template <bool LEADS>
+static __device__ __forceinline__ void add_points(const lead_speeds &own, const touching &t, int32_t k,
+                                                  const touching_points &points, double per_dt, contact_sums *sums)
+{
+    const double sign = t.side ? per_dt : -per_dt;
+#pragma unroll
+    for (int32_t j = 0; j < POINTS_AT_ONCE; ++j) {
+        if (k + j >= t.count) continue;
+        const double *arm = points.arm[j];
+        const double impulse[3] = {(double)points.impulse[j][0], (double)points.impulse[j][1],
+                                   (double)points.impulse[j][2]};
+        double torque[3] = {};
+        add_cross(arm, impulse, 1, torque);
+#pragma unroll
+        for (int i = 0; i < 3; ++i) {
+            sums->wrench[i] += sign * impulse[i];
+            sums->wrench[i + 3] += sign * torque[i];
+        }
+        if (LEADS)
+            sums->touch |= lead_push(dot3(t.normal, impulse), lead_size_at(own.moves[0], own.moves[1], arm), own.rest);
+    }
+}
+
+/* A body's lane begins: its first side, at place `at` of [at, end), and that one's first arms. */
+struct touching_begun {
+    int32_t at, end;
+    touching first;
+    touching_points points;
+};
+static __device__ __forceinline__ touching_begun begin_touching(const cuda_view &v, int32_t at, int32_t end)
+{
+    touching_begun out = {at, end, fetch_touching(v, at, end), {}};
+    if (out.first.pair >= 0) fetch_arms(v.raw, out.first, 0, &out.points);
+    return out;
+}
+
+/* Of a body; in all of its lanes. The first impulses are there. Every lane of the warp comes here. */
 template <bool LEADS>
 static __device__ __forceinline__ contact_sums sum_touching(const cuda_view &v, const lead_speeds &own,
-                                                            const touching &first, int32_t at, int32_t end)
+                                                            touching_begun *begun)
 {
+    const double per_dt = 1 / v.model.settings->dt;
     contact_sums sums = {};
-    touching t = first;
-    while (at < end) {
-        if (t.pair >= 0) add_touching<LEADS>(v, own, t, &sums);
+    touching &t = begun->first;
+    touching_points &points = begun->points;
+    for (int32_t at = begun->at; at < begun->end;) {
+        for (int32_t k = 0; t.pair >= 0;) {
+            add_points<LEADS>(own, t, k, points, per_dt, &sums);
+            k += POINTS_AT_ONCE;
+            if (k >= t.count) break;
+            fetch_arms(v.raw, t, k, &points);
+            fetch_impulses(v.contacts, t, k, &points);
+        }
+        if (LEADS && t.pair >= 0)
+            sums.touch |= t.other >= 0 ? TOUCH_INNER : t.friction > 0 ? TOUCH_FRICTION : TOUCH_SMOOTH;
         at += LANES;
-        t = fetch_touching(v, at, end);
+        if (at >= begun->end) break;
+        t = fetch_touching(v, at, begun->end);
+        if (t.pair < 0) continue;
+        fetch_arms(v.raw, t, 0, &points);
+        fetch_impulses(v.contacts, t, 0, &points);
     }
     sum_lanes<6>(sums.wrench);
 #pragma unroll
@@ -166,9 +201,9 @@ static __device__ __forceinline__ pair_ends fetch_ends(const struct sadmm_contac
     return ends;
 }
 
-/* Leads of pair p's bodies: of its points, every v.contacts.lanes-th from `lane` on. Whether anything was said. */
+/* What leads of a pair's bodies close, by its points, every v.contacts.lanes-th from `lane` on; returns all bits. */
 template <bool WHOLE>
-static __device__ __forceinline__ bool add_ways(const cuda_view &v, const pair_ends &ends, int32_t first, int32_t count,
+static __device__ __forceinline__ int add_ways(const cuda_view &v, const pair_ends &ends, int32_t first, int32_t count,
                                                 int32_t lane)
 {
     const double dt = v.model.settings->dt, slop = v.model.settings->slop, *n = ends.normal;
@@ -186,12 +221,13 @@ static __device__ __forceinline__ bool add_ways(const cuda_view &v, const pair_e
                              lead_along(n, sides[0].velocity, point->arm_a);
         if (!lead_is_still(size, dt, slop)) lead_add_way(&touch, point->gap, speed, leads, size, dt, slop);
     }
-    if (!(touch.island | touch.body[0] | touch.body[1])) return false;
+    const int all = touch.island | touch.body[0] | touch.body[1];
+    if (all == 0) return 0;
 #pragma unroll
     for (int s = 0; s < 2; ++s)
         if (ends.body[s] >= 0)
             add_touch(v.islands, ends.body[s], v.graph.label[ends.body[s]], touch.island | touch.body[s]);
-    return true;
+    return all;
 }
 
 #endif
