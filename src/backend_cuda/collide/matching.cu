@@ -93,12 +93,12 @@ emit_kernel(const __grid_constant__ collision_view v)
     const int64_t thread = collision_thread(COLLISION_THREADS), i = thread / POINT_LANES;
     const int32_t lane = (int32_t)(thread % POINT_LANES), found = usable_candidates(v);
     const step_lengths dt = lengths_of(v);
-    const uint64_t total = v.places[v.candidate_capacity],
-                   place = v.places[i < v.candidate_capacity ? i : v.candidate_capacity];
-    const emit_start start = emit_start_of(v, i);
+    const uint64_t total = v.places[v.candidate_capacity];
     if (aborted(v)) return;
     if (thread == 0) emit_counts(v, total, dt.now);
-    if (i >= found || (int32_t)(uint32_t)total > v.point_capacity) return;
+    if (i >= found || (int32_t)(uint32_t)total > v.point_capacity) return; /* many do: nothing is asked for before */
+    const uint64_t place = v.places[i];
+    const emit_start start = emit_start_of(v, i);
     if (lane == 0) v.pair_of[i] = (int32_t)(place >> 32);
     if (lane < start.count) emit_point(v, dt, i, lane, start, emit_source_of(v, start, i, lane), place);
 }

@@ -7,18 +7,22 @@
 #include "touch.h"
 #include "world.h"
 
-/* Blocks of bodies: eight lanes each for what its contacts do, and a warp that moves all of them. Then blocks of
- * contacts. */
+/* Blocks of bodies that something touches: eight lanes each for what its contacts do, and a warp that moves all of
+ * them. Then blocks of bodies that nothing touches, a thread each; then of contacts. */
 enum { FINISH_THREADS = 256, FINISH_SIDES = FINISH_THREADS - WARP, FINISH_BODIES = FINISH_SIDES / LANES };
 
+/* Where each kind ends. */
 struct finish_blocks {
-    int32_t bodies, end;
+    int32_t touched, free, pairs;
 };
 static __host__ __device__ inline finish_blocks finish_blocks_of(const model_view &model, const contact_view &contacts)
 {
     const int64_t lanes = (int64_t)contacts.lanes * contacts.pair_capacity;
-    const int32_t bodies = (model.bodies + FINISH_BODIES - 1) / FINISH_BODIES;
-    return {bodies, bodies + (int32_t)((lanes + FINISH_THREADS - 1) / FINISH_THREADS)};
+    finish_blocks end;
+    end.touched = (model.bodies + FINISH_BODIES - 1) / FINISH_BODIES;
+    end.free = end.touched + (model.bodies + FINISH_THREADS - 1) / FINISH_THREADS;
+    end.pairs = end.free + (int32_t)((lanes + FINISH_THREADS - 1) / FINISH_THREADS);
+    return end;
 }
 
 /* Between the threads of a block of bodies: what touches them. */
@@ -38,11 +42,18 @@ static __device__ __forceinline__ void tell_touch(const island_view &islands, in
     if (!(touch & TOUCH_CARRIED)) islands.again[AGAIN_UNPRESSED] = 1;
 }
 
+/* Does anything touch the bodies of a block? */
+static __device__ __forceinline__ bool any_touched(const cuda_view &v)
+{
+    const int32_t first = (int32_t)blockIdx.x * FINISH_BODIES, end = first + FINISH_BODIES;
+    return v.graph.offsets[first] < v.graph.offsets[end < v.model.bodies ? end : v.model.bodies];
+}
+
 /* What the lanes of a body do. */
-static __device__ __forceinline__ void finish_sides(const cuda_view &v, bool on, struct finish_shared *shared)
+static __device__ __forceinline__ void finish_sides(const cuda_view &v, struct finish_shared *shared)
 {
     const int32_t in_block = (int32_t)threadIdx.x / LANES, slot = (int32_t)blockIdx.x * FINISH_BODIES + in_block;
-    const body_thread t = body_of_slot(v.graph, slot, on && slot < v.model.bodies);
+    const body_thread t = body_of_slot(v.graph, slot, slot < v.model.bodies);
     const int32_t body = (int32_t)t.body;
     const bool touched = t.begin < t.end && v.step.limits;
     const int32_t label = touched ? v.graph.label[body] : 0;
@@ -59,25 +70,24 @@ static __device__ __forceinline__ void finish_sides(const cuda_view &v, bool on,
     const contact_sums sums = sum_touching<true>(v, own, &begun);
     if (t.lane == 0) shared->touch[in_block] = sums.touch;
     __syncthreads();
-    if (t.live && v.model.wrenches)
+    if (t.begin < t.end && v.model.wrenches)
         add_wrench(sums.wrench, t.lane, v.step.substep, v.step.substeps, v.step.wrench + 6 * t.body);
     if (touched && t.lane == 0) tell_touch(v.islands, body, label, held, sums.touch);
 }
 
 /* What the thread does that moves a body, to both places that there are as a rule while the others look at contacts. */
-static __device__ __forceinline__ void finish_body(const cuda_view &v, bool on, double dt,
-                                                   const struct finish_shared *shared)
+static __device__ __forceinline__ void finish_body(const cuda_view &v, double dt, const struct finish_shared *shared)
 {
     const int32_t in_block = (int32_t)threadIdx.x - FINISH_SIDES,
                   slot = (int32_t)blockIdx.x * FINISH_BODIES + in_block;
-    const bool live = on && in_block < FINISH_BODIES && slot < v.model.bodies;
+    const bool live = in_block < FINISH_BODIES && slot < v.model.bodies &&
+                      v.graph.offsets[slot] < v.graph.offsets[slot + 1];
     const int32_t body = live ? v.graph.body_of[slot] : 0;
     body_before before = {};
     double velocity[6] = {}, stays[PLACE] = {}, place[PLACE] = {};
     if (live) before = fetch_body(v.step, body);
     wait_for_stream();
     let_next_begin();
-    if (blockIdx.x == 0 && in_block == 0) v.step.control->stamps[STAMP_SOLVED] = nanoseconds();
     if (live) {
         load_end_velocity(v, body, velocity);
         move_body(&before.body, velocity, dt, v.model.settings->gravity, LEAD_STAYS, stays);
@@ -91,6 +101,27 @@ static __device__ __forceinline__ void finish_body(const cuda_view &v, bool on, 
     for (int k = 0; k < PLACE; ++k) place[k] = keeps ? stays[k] : place[k];
     store_moved(v, body, before, velocity, place, dt);
     if (!finite) atomicMin(&v.step.control->offending_body, body);
+}
+
+/* A body that nothing touches. By itself: the others should not pay in registers. */
+static __device__ __noinline__ void finish_free(const cuda_view &v, double dt, int32_t slot)
+{
+    const bool live = slot < v.model.bodies && v.graph.offsets[slot] == v.graph.offsets[slot + 1];
+    const int32_t body = live ? v.graph.body_of[slot] : 0;
+    body_before before = {};
+    double velocity[6], place[PLACE];
+    if (live) before = fetch_body(v.step, body);
+    wait_for_stream();
+    let_next_begin();
+    if (!live) return;
+    load_end_velocity(v, body, velocity);
+    move_body(&before.body, velocity, dt, v.model.settings->gravity, LEAD_OWN, place);
+    store_moved(v, body, before, velocity, place, dt);
+    const bool finite = finite_numbers(place, PLACE) && finite_numbers(velocity, 6);
+    if (!finite) atomicMin(&v.step.control->offending_body, body);
+    const double none[6] = {};
+    for (int32_t k = 0; v.model.wrenches && k < 6; ++k)
+        add_wrench(none, k, v.step.substep, v.step.substeps, v.step.wrench + 6 * (size_t)body);
 }
 
 /* ---- contacts -------------------------------------------------------------------------------------------------- */
@@ -141,11 +172,10 @@ static __device__ __forceinline__ bool store_impulses(const contact_view &contac
 }
 
 /* v.contacts.lanes threads a pair. */
-static __device__ __forceinline__ void finish_pair(const cuda_view &v, bool on, int32_t first_block)
+static __device__ __forceinline__ void finish_pair(const cuda_view &v, int32_t i)
 {
-    const int32_t i = ((int32_t)blockIdx.x - first_block) * FINISH_THREADS + (int32_t)threadIdx.x,
-                  p = i / v.contacts.lanes, lane = i % v.contacts.lanes;
-    const bool live = on && p < live_pairs(v.model);
+    const int32_t p = i / v.contacts.lanes, lane = i % v.contacts.lanes;
+    const bool live = p < live_pairs(v.model);
     struct cuda_step_control *control = v.step.control;
     double depth = 0;
     pair_before pair = {};
@@ -179,21 +209,31 @@ static __global__ void __launch_bounds__(FINISH_THREADS, 2)
 {
     CUDA_DYNAMIC_SHARED(memory);
     struct finish_shared *shared = (struct finish_shared *)memory;
-    const finish_blocks blocks = finish_blocks_of(v.model, v.contacts);
+    const finish_blocks end = finish_blocks_of(v.model, v.contacts);
     const double dt = v.model.settings->dt;
     /* Layout and penalties are the last that abort a step, the latter where it is not as planned; iterations come
      * between. */
     const bool on = as_planned(v.model, v.step) && !v.model.live->abort_code;
-    if ((int32_t)blockIdx.x >= blocks.bodies) finish_pair(v, on, blocks.bodies);
-    else if (threadIdx.x < FINISH_SIDES) finish_sides(v, on, shared);
-    else finish_body(v, on, dt, shared);
+    const int32_t block = (int32_t)blockIdx.x, t = (int32_t)threadIdx.x;
+    /* A thread that moves nothing. It waits in any case: kernels after this one wait for this one alone. */
+    static_assert(FINISH_THREADS - FINISH_SIDES > FINISH_BODIES, "there is one");
+    if (block == 0 && t == FINISH_THREADS - 1) {
+        wait_for_stream();
+        v.step.control->stamps[STAMP_SOLVED] = nanoseconds();
+    }
+    if (!on) return;
+    if (block >= end.free) finish_pair(v, (block - end.free) * FINISH_THREADS + t);
+    else if (block >= end.touched) finish_free(v, dt, (block - end.touched) * FINISH_THREADS + t);
+    else if (!any_touched(v)) return;
+    else if (t < FINISH_SIDES) finish_sides(v, shared);
+    else finish_body(v, dt, shared);
 }
 
 sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
     struct cuda_partition blocks = {};
-    blocks.parts = finish_blocks_of(c->view.model, c->view.contacts).end;
+    blocks.parts = finish_blocks_of(c->view.model, c->view.contacts).pairs;
     blocks.cluster = 1;
     blocks.threads = FINISH_THREADS;
     blocks.shared = sizeof(struct finish_shared);
