@@ -286,6 +286,51 @@ START_TEST(many_shapes)
 }
 END_TEST
 
+/* A heap that tumbles: islands in the air, on edges and on the floor, whose bodies keep their leads or do not, in more
+ * blocks than one. Against the host's steps, and, on the emulated device, in either order of blocks and threads. */
+START_TEST(heaps_equal_those_by_host)
+{
+    enum { BODIES = 64, WORLDS = EMULATED ? 3 : 2 };
+    const int precision = _i / 2, substeps = 1 + _i % 2;
+    sadmm_world *worlds[WORLDS];
+    for (int k = 0; k < WORLDS; ++k) {
+        sadmm_world_def def = between_def(0.005, 9.81);
+        def.precision = (sadmm_precision)precision;
+        def.settings.method = SADMM_METHOD_FAST;
+        def.settings.iterations = 12;
+        def.settings.substeps = substeps;
+        worlds[k] = create_world(&def);
+        add_floor(worlds[k], 0.5);
+        for (int i = 0; i < BODIES; ++i) {
+            const double x = 0.11 * (i % 4), y = 0.11 * (i / 4 % 4), z = 0.1 + 0.12 * (i / 16);
+            const sadmm_body_id id = add_box(worlds[k], x, y, z, 0.05, 1, 0.5);
+            sadmm_body_state state = body_state(worlds[k], id);
+            const double turn = 0.1 * (i * 7 % 11);
+            state.orientation[0] = cos(turn);
+            state.orientation[1 + i % 3] = sin(turn);
+            state.linear_velocity[2] = -2;
+            MUST(worlds[k], sadmm_world_set_body_state(worlds[k], id, &state));
+        }
+        use_device(worlds[k], precision, 0);
+    }
+    by_host(worlds[0]);
+    for (int step = 0; step < (EMULATED ? 24 : 200); ++step) {
+        for (int k = 0; k < WORLDS; ++k) {
+#ifdef CUDA_EMULATED
+            cuda_emulation_descending = k == 2;
+#endif
+            MUST(worlds[k], sadmm_world_step(worlds[k]));
+        }
+#ifdef CUDA_EMULATED
+        cuda_emulation_descending = 0;
+#endif
+        for (int k = 1; k < WORLDS && step % 4 == 3; ++k) expect_same_world(worlds[0], worlds[k], "heaps");
+    }
+    ck_assert(worlds[1]->resident.loaded && sadmm_world_contact_count(worlds[1]) > BODIES);
+    for (int k = 0; k < WORLDS; ++k) sadmm_world_destroy(worlds[k]);
+}
+END_TEST
+
 /* Whatever the tier, and with the stop rule, where each island stops by itself. */
 START_TEST(tiers_agree)
 {
@@ -432,6 +477,7 @@ int main(void)
     ADD_CASE(suite, a_shape_leaves_its_reach, 0, parts);
     ADD_CASE(suite, the_first_contact_comes_late, 0, 4 * parts);
     ADD_CASE(suite, many_shapes, 0, EMULATED ? 1 : parts);
+    ADD_CASE(suite, heaps_equal_those_by_host, 0, 2 * parts);
     ADD_CASE(suite, tiers_agree, 0, 2 * parts);
     ADD_CASE(suite, a_stop_rule_ends_each_substep, 0, parts);
     ADD_CASE(suite, a_later_substep_that_fails, 0, parts);

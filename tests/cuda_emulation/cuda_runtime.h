@@ -3,8 +3,9 @@
  * SADMM_CUDA_EMULATED.
  *
  * Every CUDA thread is a fiber; a barrier or a shuffle gives way to the others. A barrier that not every thread of its
- * warp, block or grid reaches, fails the launch instead of hanging. Fibers run in ascending or descending order on
- * request: a missing barrier shows as a difference between the two. Device and shared memory is filled with NaN
+ * warp, block or grid reaches, fails the launch instead of hanging. Fibers, and blocks, run in ascending or descending
+ * order on request: a missing barrier, or a block that needs what another one does, shows as a difference between the
+ * two. Device and shared memory is filled with NaN
  * patterns when it is allocated, and each block has its own heap block, so that sanitizers see every access out of
  * bounds.
  *
@@ -562,8 +563,10 @@ static cudaError_t cuda_emulation_launch(const cudaLaunchConfig_t *config, void 
         std::function<void()> body = [&]() { kernel(view, args); };
         gridDim.x = blocks;
         blockDim.x = threads;
-        for (unsigned first = 0; first < blocks; first += together)
+        for (unsigned done = 0; done < blocks; done += together) {
+            const unsigned first = cuda_emulation_descending ? blocks - together - done : done;
             if (!cuda_emulation::run_blocks(body, first, together, threads, shared)) return false;
+        }
         return true;
     });
 }

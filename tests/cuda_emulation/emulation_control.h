@@ -9,7 +9,7 @@
 extern "C" {
 #endif
 
-extern int cuda_emulation_descending;   /* run threads from the last one to the first */
+extern int cuda_emulation_descending;   /* run blocks and threads from the last one to the first */
 extern long cuda_emulation_calls_left;  /* runtime calls that succeed before one fails; < 0: none fails */
 extern int cuda_emulation_lost;         /* every runtime call fails */
 extern long cuda_emulation_allocations; /* device and pinned blocks, streams and graphs alive */

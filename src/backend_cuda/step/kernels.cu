@@ -75,7 +75,6 @@ static __device__ __forceinline__ void start_body(const cuda_view &v, int64_t i,
                                                        : rigid_angular_acceleration(q_load(body->orientation),
                                                                                     v3_load(body->inertia), torque);
     if (lane == LANE_PLACED) out->placed = placed;
-    if (lane == LANE_PLACED && v.islands.touch) v.islands.touch[i] = 0;
 }
 
 /* START_LANES threads a body, a number each: neighbours in memory go to neighbours. */
