@@ -314,7 +314,7 @@ START_TEST(heaps_equal_those_by_host)
         use_device(worlds[k], precision, 0);
     }
     by_host(worlds[0]);
-    for (int step = 0; step < (EMULATED ? 24 : 200); ++step) {
+    for (int step = 0; step < (EMULATED ? 24 : 100); ++step) {
         for (int k = 0; k < WORLDS; ++k) {
 #ifdef CUDA_EMULATED
             cuda_emulation_descending = k == 2;

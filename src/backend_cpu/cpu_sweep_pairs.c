@@ -35,7 +35,7 @@ static inline lanes frame_max(vec change, vec n)
 
 static inline lanes larger_inv_beta(const struct sadmm_context *c, const struct pair_block *block)
 {
-    lanes out;
+    lanes out = {0}; /* gcc 13 sees no value else */
     for (int l = 0; l < LANES && c->fast; ++l) {
         bool both = block->body_a[l] < c->bodies && block->body_b[l] < c->bodies;
         out[l] = block->inv_s[l] > 0 ? 1 / ((both ? 2 : 1) * block->inv_s[l]) : 0;
