@@ -69,38 +69,50 @@ static __device__ __forceinline__ void finish_sides(const cuda_view &v, struct f
     }
     const contact_sums sums = sum_touching<true>(v, own, &begun);
     if (t.lane == 0) shared->touch[in_block] = sums.touch;
-    __syncthreads();
     if (t.begin < t.end && v.model.wrenches)
         add_wrench(sums.wrench, t.lane, v.step.substep, v.step.substeps, v.step.wrench + 6 * t.body);
     if (touched && t.lane == 0) tell_touch(v.islands, body, label, held, sums.touch);
 }
 
-/* What the thread does that moves a body, to both places that there are as a rule while the others look at contacts. */
-static __device__ __forceinline__ void finish_body(const cuda_view &v, double dt, const struct finish_shared *shared)
+/* A body on its way: both places that there are as a rule. */
+struct finish_move {
+    bool live, finite;
+    int32_t body;
+    body_before before;
+    double velocity[6], stays[PLACE], own[PLACE];
+};
+
+/* What the thread does that moves a body, while the others look at contacts; */
+static __device__ __forceinline__ finish_move begin_move(const cuda_view &v, double dt)
 {
     const int32_t in_block = (int32_t)threadIdx.x - FINISH_SIDES,
                   slot = (int32_t)blockIdx.x * FINISH_BODIES + in_block;
-    const bool live = in_block < FINISH_BODIES && slot < v.model.bodies &&
-                      v.graph.offsets[slot] < v.graph.offsets[slot + 1];
-    const int32_t body = live ? v.graph.body_of[slot] : 0;
-    body_before before = {};
-    double velocity[6] = {}, stays[PLACE] = {}, place[PLACE] = {};
-    if (live) before = fetch_body(v.step, body);
+    finish_move m = {};
+    m.live = in_block < FINISH_BODIES && slot < v.model.bodies && v.graph.offsets[slot] < v.graph.offsets[slot + 1];
+    m.body = m.live ? v.graph.body_of[slot] : 0;
+    if (m.live) m.before = fetch_body(v.step, m.body);
     wait_for_stream();
     let_next_begin();
-    if (live) {
-        load_end_velocity(v, body, velocity);
-        move_body(&before.body, velocity, dt, v.model.settings->gravity, LEAD_STAYS, stays);
-        move_body(&before.body, velocity, dt, v.model.settings->gravity, LEAD_OWN, place);
-    }
-    const bool finite = finite_numbers(stays, PLACE) && finite_numbers(place, PLACE) && finite_numbers(velocity, 6);
-    __syncthreads();
-    if (!live) return;
-    const bool keeps = lead_kind_of(TOUCH_AS_A_RULE, shared->touch[in_block]) == LEAD_STAYS;
+    if (!m.live) return m;
+    load_end_velocity(v, m.body, m.velocity);
+    move_body(&m.before.body, m.velocity, dt, v.model.settings->gravity, LEAD_STAYS, m.stays);
+    move_body(&m.before.body, m.velocity, dt, v.model.settings->gravity, LEAD_OWN, m.own);
+    m.finite = finite_numbers(m.stays, PLACE) && finite_numbers(m.own, PLACE) && finite_numbers(m.velocity, 6);
+    return m;
+}
+
+/* and once they have. */
+static __device__ __forceinline__ void end_move(const cuda_view &v, double dt, const finish_move &m,
+                                                const struct finish_shared *shared)
+{
+    const int touch = shared->touch[((int32_t)threadIdx.x - FINISH_SIDES) % FINISH_BODIES];
+    const bool keeps = lead_kind_of(TOUCH_AS_A_RULE, touch) == LEAD_STAYS;
+    double place[PLACE];
+    if (!m.live) return;
 #pragma unroll
-    for (int k = 0; k < PLACE; ++k) place[k] = keeps ? stays[k] : place[k];
-    store_moved(v, body, before, velocity, place, dt);
-    if (!finite) atomicMin(&v.step.control->offending_body, body);
+    for (int k = 0; k < PLACE; ++k) place[k] = keeps ? m.stays[k] : m.own[k];
+    store_moved(v, m.body, m.before, m.velocity, place, dt);
+    if (!m.finite) atomicMin(&v.step.control->offending_body, m.body);
 }
 
 /* A body that nothing touches. By itself: the others should not pay in registers. */
@@ -224,9 +236,12 @@ static __global__ void __launch_bounds__(FINISH_THREADS, 2)
     if (!on) return;
     if (block >= end.free) finish_pair(v, (block - end.free) * FINISH_THREADS + t);
     else if (block >= end.touched) finish_free(v, dt, (block - end.touched) * FINISH_THREADS + t);
-    else if (!any_touched(v)) return;
-    else if (t < FINISH_SIDES) finish_sides(v, shared);
-    else finish_body(v, dt, shared);
+    if (block >= end.touched || !any_touched(v)) return;
+    finish_move move;
+    if (t < FINISH_SIDES) finish_sides(v, shared);
+    else move = begin_move(v, dt);
+    __syncthreads();
+    if (t >= FINISH_SIDES) end_move(v, dt, move, shared);
 }
 
 sadmm_status CUDA(launch_finish)(struct sadmm_context *c, struct sadmm_error *error)
