@@ -22,6 +22,7 @@ static __host__ __device__ inline finish_blocks finish_blocks_of(const model_vie
     end.touched = (model.bodies + FINISH_BODIES - 1) / FINISH_BODIES;
     end.free = end.touched + (model.bodies + FINISH_THREADS - 1) / FINISH_THREADS;
     end.pairs = end.free + (int32_t)((lanes + FINISH_THREADS - 1) / FINISH_THREADS);
+    if (end.pairs == 0) end.pairs = 1; /* one that waits */
     return end;
 }
 

@@ -208,6 +208,7 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
     struct cuda_step_control *control = v.step.control;
     const int32_t i = (int32_t)(blockIdx.x * (unsigned)STEP_THREADS + threadIdx.x);
     wait_for_stream();
+    /* Blocks that begin late may see what the first one says of the step: only where what they move is of no use. */
     const bool again = !aborted && planned && moves_again(v);
     if (again && i < v.model.bodies) move_again(v, i);
     if (blockIdx.x > 0 || threadIdx.x > 0) return;
