@@ -113,10 +113,12 @@ START_TEST(islands_in_the_air)
             ck_assert_int_eq(m.count, 6);
             for (int k = 0; k < 6; ++k) {
                 momentum_mul(&sums, m.motion[k], y);
+                /* products of motions along which the inertia is `size`: rounding over that */
                 for (int i = 0; i < 6; ++i) ck_assert_double_eq_tol(dense6_dot(m.motion[i], y), i == k, 1e-12 / size);
             }
             momentum_restoring(&m, 1, q);
             momentum_mul(&sums, q, y);
+            /* rounding of terms as large as the motion, some ten times over */
             for (int k = 0; k < 6; ++k)
                 ck_assert_double_eq_tol(sums.now[k] + y[k], sums.free[k], 1e-14 * (1 + length3(q) + length3(q + 3)));
         }

@@ -5,7 +5,7 @@
  *             held. Persistent kernels test that themselves, those of tier BLOCK see to the rest too
  *   limit     energies and work, sums over islands (weight/island_sums.h), the factor of each island's velocities: of
  *             islands that are held, if there is such a body; of the others in any case, and the rigid motion that
- *             restores their momentum. Whole steps apply both where they move bodies (step/kernels.cu)
+ *             restores their momentum. Whole steps apply both where they move bodies (step/move.h)
  *
  * paper: if there is such a body, islands with too much energy are counted, and left as they are; those that are not
  * held get that motion in any case.
