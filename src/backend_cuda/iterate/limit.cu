@@ -1,6 +1,8 @@
 /* After the last iteration: momentum that no contact may change is restored (iterate/motions.h), and in the method
  * `fast` energies are limited (math/limit.h). In double, from this precision's data; once a step, eight lanes a body.
  *
+ *   motions   of islands that are not held: which may be restored (beside the iterations, where these do not find out
+ *             themselves what is held)
  *   suspect   is there a body with more energy than its free motion has, or that bounces? Else no island does that is
  *             held. Persistent kernels test that themselves, those of tier BLOCK see to the rest too
  *   limit     energies and work, sums over islands (weight/island_sums.h), the factor of each island's velocities: of
@@ -58,6 +60,15 @@ static __device__ __forceinline__ void limit_held(const cuda_view &v, const cuda
         limit_island(v.islands, &v.islands.info[v.graph.label[t.body]], total, args.under_iterated, !args.paper);
 }
 
+static __global__ void __launch_bounds__(BODY_THREADS)
+    motions_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    wait_for_stream();
+    if (!args.paper && !*v.islands.loose) return; /* paper does not ask */
+    const body_thread t = body_of_thread(v.model, v.graph);
+    find_motions(v, t, is_loose(v, t));
+}
+
 /* So many blocks have registers on a multiprocessor at once: large scenes run in waves of them. */
 enum { LIMIT_BLOCKS = 10 };
 
@@ -95,6 +106,12 @@ static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const ch
     return CUDA(launch_early)(c, kernel, name, body_blocks(c->view.model.bodies), BODY_THREADS, &args, error);
 }
 
+sadmm_status CUDA(enqueue_motions)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    if (!c->view.islands.motions) return SADMM_OK;
+    return launch(c, motions_kernel, "motions", error);
+}
+
 sadmm_status CUDA(enqueue_limit)(struct sadmm_context *c, bool suspected, struct sadmm_error *error)
 {
     if (!suspected) TRY(launch(c, suspect_kernel, "energies", error));
@@ -107,6 +124,7 @@ extern "C" sadmm_status CUDA(limit_velocity)(struct sadmm_context *c, int32_t *l
 {
     cuda_args args = {};
     CUDA_ENTER(c);
+    TRY(CUDA(enqueue_motions)(c, error));
     TRY(CUDA(enqueue_limit)(c, false, error));
     TRY(CUDA(launch)(c, slow_kernel, "limit_velocity", blocks_for(c->view.model.bodies), &args, error));
     TRY(CUDA(download)(c, c->view.islands.limited, sizeof *limited, error));

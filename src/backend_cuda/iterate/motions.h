@@ -1,6 +1,9 @@
 /* The momentum of islands that are not held (math/momentum.h), and by what their other motions are slowed down: sums
  * over the bodies of an island, and the rigid motion that restores its momentum. In double, from the raw contacts and
- * this precision's b and v; eight lanes a body. */
+ * this precision's b and v; eight lanes a body.
+ *
+ * Which motions an island may restore does not depend on velocities: where a kernel can run beside the iterations they
+ * are found there (limit.cu), and what is left for the end are twelve sums and a few products. */
 #ifndef SADMM_CUDA_ITERATE_MOTIONS_H
 #define SADMM_CUDA_ITERATE_MOTIONS_H
 
@@ -8,10 +11,17 @@
 
 #include "backend_cuda/weight/island_sums.h"
 
-/* Sums over an island, as they lie in memory: those of math/momentum.h, then those of energies.h. */
-enum { MOTION_ENERGIES = MOMENTUM_SUMS, MOTION_SUMS = MOTION_ENERGIES + TERMS };
+/* An island's numbers as they lie in memory: at the end the momentum, and the energies of energies.h; before that all
+ * sums of math/momentum.h, in whose place the motions come that follow from them. */
+enum {
+    MOTION_ENERGIES = 6,
+    MOTION_END = MOTION_ENERGIES + TERMS, /* numbers of the end */
+    MOTION_KNOWN = MOTION_END,
+    MOTION_SUMS = MOTION_KNOWN + MOMENTUM_SUMS
+};
 static_assert(sizeof(struct momentum_sums) == MOMENTUM_SUMS * sizeof(double), "numbers are taken one by one");
 static_assert((int)MOTION_SUMS <= (int)MOTION_TERMS, "there is memory for them");
+static_assert(1 + 36 + 6 <= (int)MOMENTUM_SUMS, "and for motions in the place of sums");
 
 /* Is the body one of an island that is not held? */
 static __device__ __forceinline__ bool is_loose(const cuda_view &v, const body_thread &t)
@@ -31,30 +41,35 @@ static __device__ __forceinline__ void add_static_pair(const raw_view &raw, int3
     }
 }
 
-/* Of a body at d, but for the gram. One lane of it. */
-static __device__ __forceinline__ void add_own_motion(const body_view &bodies, size_t body, const double d[3],
-                                                      struct momentum_sums *sums)
+/* (m I, inertia) of a body. */
+static __device__ __forceinline__ void load_inertia(const body_view &bodies, size_t body, double A[PACKED])
 {
     const solver_real *line = bodies.lines + body * (size_t)bodies.line;
-    double A[PACKED] = {}, velocity[6], b[6];
+    for (int k = 0; k < PACKED; ++k) A[k] = 0;
     A[0] = (double)line[0];
     for (int r = 0; r < 3; ++r)
         for (int k = 0; k <= r; ++k) A[packed_place(r + 3, k + 3)] = (double)line[1 + packed_place(r, k)];
-    for (int k = 0; k < 6; ++k) {
-        velocity[k] = (double)bodies.state[body * ROW + (size_t)k];
-        b[k] = (double)bodies.b[body * ROW + (size_t)k];
-    }
-    momentum_add_body(sums, d, A, velocity, b);
+}
+
+static __device__ __forceinline__ void load_row(const solver_real *rows, size_t body, double out[6])
+{
+    for (int k = 0; k < 6; ++k) out[k] = (double)rows[body * ROW + (size_t)k];
+}
+
+/* Where the sums of the island begin whose first slot this is. */
+static __device__ __forceinline__ double *motion_place(const cuda_view &v, int32_t slot)
+{
+    return v.islands.motions + (size_t)slot * MOTION_TERMS;
 }
 
 /* Functions by themselves: all of them at once would take registers from the kernels that iterate. */
 
-/* What a body adds to the sums for the momentum, to its place in `motions`; of bodies that are `on`. Every lane of the
- * warp comes here. */
-static __device__ __noinline__ void store_momentum(const cuda_view &v, const body_thread &t, bool on)
+/* What a body adds to the sums for the momentum, to its place; of bodies that are `on`. `iterated`: with its momentum,
+ * too. Every lane of the warp comes here. */
+static __device__ __noinline__ void store_momentum(const cuda_view &v, const body_thread &t, bool on, bool iterated)
 {
     struct momentum_sums own = {};
-    double d[3] = {}, *to = v.islands.motions + (size_t)t.slot * MOTION_TERMS;
+    double d[3] = {}, A[PACKED], row[6], *to = motion_place(v, t.slot) + MOTION_KNOWN;
     if (on) body_place(v, (int32_t)t.body, v.graph.label[t.body], d);
     for (int32_t at = t.begin + t.lane; on && at < t.end; at += LANES) {
         const int32_t code = v.graph.incident[at], p = code / 2;
@@ -65,9 +80,26 @@ static __device__ __noinline__ void store_momentum(const cuda_view &v, const bod
     }
     if (__ballot_sync((unsigned)ALL_LANES, own.gram[MOMENTUM_CONTACTS] > 0) != 0) sum_lanes<PACKED + 1>(own.gram);
     if (!on || t.lane > 0) return;
-    add_own_motion(v.bodies, t.body, d, &own);
+    load_inertia(v.bodies, t.body, A);
+    load_row(v.bodies.b, t.body, row);
+    momentum_add_known(&own, d, A, row);
+    if (iterated) {
+        load_row(v.bodies.state, t.body, row);
+        momentum_add_now(own.now, d, A, row);
+    }
     const double *numbers = (const double *)&own;
     for (int k = 0; k < MOMENTUM_SUMS; ++k) to[k] = numbers[k];
+}
+
+/* What is left of that for the end: the momentum, at the beginning of the place. One lane of the body. */
+static __device__ __forceinline__ void store_end_momentum(const cuda_view &v, const body_thread &t, int32_t label)
+{
+    double d[3], A[PACKED], velocity[6], now[6] = {}, *to = motion_place(v, t.slot);
+    body_place(v, (int32_t)t.body, label, d);
+    load_inertia(v.bodies, t.body, A);
+    load_row(v.bodies.state, t.body, velocity);
+    momentum_add_now(now, d, A, velocity);
+    for (int k = 0; k < 6; ++k) to[k] = now[k];
 }
 
 /* The first `numbers` of `members` places in `motions`, `stride` numbers apart, added up in the first one, in order.
@@ -100,14 +132,32 @@ static __device__ __forceinline__ void add_up_places(double *first, size_t strid
         if (lane + q * LANES < numbers) first[lane + q * LANES] = sum[q];
 }
 
-/* What follows from an island's sums at `sum`, and from those of its energies, where there are any (NULL: none): the
- * rigid motion, there, and the island's factor (!slows: 1). One thread of it. */
-static __device__ __noinline__ void find_motion(const island_view &islands, cuda_island *island, double *sum,
-                                                const double *term, bool under_iterated, bool slows)
+/* Motions in the place of the sums that they follow from, and back. */
+static __device__ __forceinline__ void keep_motions(const struct momentum_motions &motions, double *known)
 {
-    struct momentum_motions motions;
+    known[0] = (double)motions.count;
+#pragma unroll 1
+    for (int k = 0; k < motions.count; ++k) {
+        for (int j = 0; j < 6; ++j) known[1 + 6 * k + j] = motions.motion[k][j];
+        known[37 + k] = motions.free[k];
+    }
+}
+static __device__ __forceinline__ void take_motions(const double *known, struct momentum_motions *motions)
+{
+    motions->count = (int)known[0];
+    for (int k = 0; k < 6; ++k) { /* all, which are asked for together: what is beyond `count` nobody uses */
+        for (int j = 0; j < 6; ++j) motions->motion[k][j] = __ldcg(known + 1 + 6 * k + j);
+        motions->free[k] = __ldcg(known + 37 + k);
+    }
+}
+
+/* The rigid motion that restores the island's momentum, to `place`, and from its energies, where there are any (NULL:
+ * none), the island's factor (!slows: 1). motions: with the momentum along them. One thread of it. */
+static __device__ __forceinline__ void restore_island(const island_view &islands, cuda_island *island,
+                                                      const struct momentum_motions &motions, const double *term,
+                                                      bool under_iterated, bool slows, double *place)
+{
     double factor = 1;
-    momentum_find_motions((struct momentum_sums *)sum, &motions);
     if (term) {
         const struct momentum_energies rigid = momentum_energies_of(&motions);
         struct limit_energies energies = {term[0], term[1], 0, term[3], 1, term[2], term[5], 0};
@@ -117,32 +167,52 @@ static __device__ __noinline__ void find_motion(const island_view &islands, cuda
         if (factor != 1) atomicAdd(islands.limited, 1);
         if (!slows) factor = 1;
     }
-    momentum_restoring(&motions, factor, sum);
+    momentum_restoring(&motions, factor, place);
     island->slow_down = factor;
     *islands.moved = 1;
 }
 
-/* The islands of bodies that are `on`, whole ones. `energies`: `term` are the lanes' terms of them. Every lane of the
- * warp comes here. */
+/* Adds up `numbers` of every body's place from the `first` one on, by powers, of bodies that are `on`, whole islands.
+ * Every lane of the warp comes here. Returns the place of the island in one thread of it, elsewhere NULL. */
+static __device__ __forceinline__ double *add_up_motions(const cuda_view &v, const body_thread &t, bool on,
+                                                         int32_t first, int32_t numbers)
+{
+    const bool last =
+        add_up_by_powers(v.graph, v.islands.motion_arrivals, t, on, [&](int32_t slot, int64_t apart, int32_t members) {
+            add_up_places(motion_place(v, slot) + first, (size_t)apart * MOTION_TERMS, members, numbers, t.lane);
+        });
+    __syncwarp((unsigned)ALL_LANES);
+    return last && t.lane == 0 ? motion_place(v, v.graph.slot_of[v.graph.label[t.body]]) : nullptr;
+}
+
+/* The motions of the islands of bodies that are `on`, whole ones. Every lane of the warp comes here. */
+static __device__ __forceinline__ void find_motions(const cuda_view &v, const body_thread &t, bool on)
+{
+    struct momentum_motions motions;
+    if (__ballot_sync((unsigned)ALL_LANES, on) == 0) return;
+    store_momentum(v, t, on, false);
+    double *place = add_up_motions(v, t, on, MOTION_KNOWN, MOMENTUM_SUMS);
+    if (!place) return;
+    momentum_find_motions((struct momentum_sums *)(place + MOTION_KNOWN), &motions);
+    keep_motions(motions, place + MOTION_KNOWN);
+}
+
+/* Restores the momentum of the islands of bodies that are `on`, whole ones, along these motions. `energies`: `term` are
+ * the lanes' terms of them. Every lane of the warp comes here. */
 static __device__ __forceinline__ void restore_islands(const cuda_view &v, const body_thread &t, bool on, bool energies,
                                                        double term, bool under_iterated, bool slows)
 {
     if (__ballot_sync((unsigned)ALL_LANES, on) == 0) return;
-    if (on && energies && t.lane < TERMS)
-        v.islands.motions[(size_t)t.slot * MOTION_TERMS + MOTION_ENERGIES + (size_t)t.lane] = term;
-    store_momentum(v, t, on);
-    const int32_t numbers = energies ? (int32_t)MOTION_SUMS : (int32_t)MOMENTUM_SUMS;
-    const bool last =
-        add_up_by_powers(v.graph, v.islands.motion_arrivals, t, on, [&](int32_t slot, int64_t apart, int32_t members) {
-            add_up_places(v.islands.motions + (size_t)slot * MOTION_TERMS, (size_t)apart * MOTION_TERMS, members,
-                          numbers, t.lane);
-        });
-    __syncwarp((unsigned)ALL_LANES);
-    if (!last || t.lane > 0) return;
-    const int32_t label = v.graph.label[t.body];
-    double *sum = v.islands.motions + (size_t)v.graph.slot_of[label] * MOTION_TERMS;
-    find_motion(v.islands, &v.islands.info[label], sum, energies ? sum + MOTION_ENERGIES : nullptr, under_iterated,
-                slows);
+    if (on && energies && t.lane < TERMS) motion_place(v, t.slot)[MOTION_ENERGIES + t.lane] = term;
+    const int32_t label = on ? v.graph.label[t.body] : 0;
+    if (on && t.lane == 0) store_end_momentum(v, t, label);
+    double *place = add_up_motions(v, t, on, 0, energies ? (int32_t)MOTION_END : (int32_t)MOTION_ENERGIES);
+    if (!place) return;
+    struct momentum_motions motions;
+    take_motions(place + MOTION_KNOWN, &motions);
+    momentum_measure(&motions, place);
+    restore_island(v.islands, &v.islands.info[label], motions, energies ? place + MOTION_ENERGIES : nullptr,
+                   under_iterated, slows, place);
 }
 
 #endif

@@ -87,7 +87,7 @@ template <class Barrier>
 static __device__ __forceinline__ void add_up_momentum(const cuda_view &v, const block_part &part,
                                                        const body_thread &own, Barrier barrier)
 {
-    for_each_body(v.graph, part, own, [&](const body_thread &t, int32_t) { store_momentum(v, t, is_loose(v, t)); });
+    for_each_body(v.graph, part, own, [&](const body_thread &t, int32_t) { store_momentum(v, t, is_loose(v, t), true); });
     for (int32_t apart = 1; apart < part.bodies; apart *= SPREAD) {
         barrier();
         for_each_body(v.graph, part, own, [&](const body_thread &t, int32_t i) {
@@ -95,11 +95,20 @@ static __device__ __forceinline__ void add_up_momentum(const cuda_view &v, const
             const island_range island = part.range[i];
             const int32_t rank = i - island.first, places = (island.bodies - rank + apart - 1) / apart;
             if (rank % (apart * SPREAD) == 0 && places > 1)
-                add_up_places(v.islands.motions + (size_t)t.slot * MOTION_TERMS, (size_t)apart * MOTION_TERMS,
+                add_up_places(motion_place(v, t.slot) + MOTION_KNOWN, (size_t)apart * MOTION_TERMS,
                               places < SPREAD ? places : (int32_t)SPREAD, MOMENTUM_SUMS, t.lane);
         });
     }
     __syncwarp((unsigned)ALL_LANES);
+}
+
+/* The motions of an island and what they restore, from its sums, momentum included. One thread of it. */
+static __device__ __noinline__ void find_motion(const island_view &islands, cuda_island *island, double *place,
+                                                const double *term, bool under_iterated, bool slows)
+{
+    struct momentum_motions motions;
+    momentum_find_motions((struct momentum_sums *)(place + MOTION_KNOWN), &motions);
+    restore_island(islands, island, motions, term, under_iterated, slows, place);
 }
 
 /* The limit of energies, where some body of the part was suspected, and the momentum of islands that are not held. */
@@ -120,8 +129,7 @@ static __device__ __noinline__ void limit_in_block(const cuda_view &v, bool unde
         if (!t.live || t.lane > 0 || i != part.range[i].first) return;
         cuda_island *island = &v.islands.info[v.graph.label[t.body]];
         const double *energies = part.terms + i * TERMS;
-        double *sum = v.islands.motions + (size_t)t.slot * MOTION_TERMS;
-        if (!island->held) find_motion(v.islands, island, sum, energies, under_iterated, true);
+        if (!island->held) find_motion(v.islands, island, motion_place(v, t.slot), energies, under_iterated, true);
         else if (suspected) limit_island(v.islands, island, energies, under_iterated, true);
     });
 }

@@ -84,6 +84,26 @@ static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *err
     return SADMM_OK;
 }
 
+/* Which motions of loose islands may be restored, beside the iterations; where those find out themselves what is held,
+ * after them. */
+static bool motions_beside(const struct sadmm_context *c) { return c->plan.momentum && !c->prologue; }
+
+static sadmm_status record_motions(struct sadmm_context *c, struct sadmm_error *error)
+{
+    side_branch side(c);
+    CUDA_CALL(c, side.code, "a branch of the step");
+    TRY(CUDA(enqueue_motions)(c, error));
+    CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
+    return SADMM_OK;
+}
+
+static sadmm_status record_limit(struct sadmm_context *c, bool suspected, struct sadmm_error *error)
+{
+    if (motions_beside(c)) CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
+    else TRY(CUDA(enqueue_motions)(c, error));
+    return CUDA(enqueue_limit)(c, suspected, error);
+}
+
 /* The end of the step, wrenches included; beside it the residuals of the last iteration, where they are wanted. */
 static sadmm_status record_finish(struct sadmm_context *c, bool residuals, struct sadmm_error *error)
 {
@@ -107,7 +127,9 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
     case SADMM_STAGE_GATHER: TRY(CUDA(launch_start)(c, error)); return record_bodies(c, error);
     case SADMM_STAGE_FIND: return CUDA(enqueue_find)(c, c->view.step.substep, error);
     case SADMM_STAGE_PLAN: return record_plan(c, error);
-    case SADMM_STAGE_PENALTY: return CUDA(enqueue_penalties)(c, error);
+    case SADMM_STAGE_PENALTY:
+        TRY(CUDA(enqueue_penalties)(c, error));
+        return motions_beside(c) ? record_motions(c, error) : SADMM_OK;
     case SADMM_STAGE_ITERATE:
         return CUDA(enqueue_iterations)(c, stage->count, stage->measure && (stage->last || !stop_rule_checked(c)),
                                         stage->last || stage->checked ? limit : LIMIT_NONE, error);
@@ -120,7 +142,7 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
         TRY(CUDA(enqueue_balance)(c, error));
         return CUDA(factorize)(c, error);
     case SADMM_STAGE_LIMIT:
-        return limit == LIMIT_WHOLE ? SADMM_OK : CUDA(enqueue_limit)(c, limit == LIMIT_SUSPECTS, error);
+        return limit == LIMIT_WHOLE ? SADMM_OK : record_limit(c, limit == LIMIT_SUSPECTS, error);
     case SADMM_STAGE_INTEGRATE: return record_finish(c, *residuals, error);
     case SADMM_STAGE_TURN:
         TRY(CUDA(launch_turn)(c, error));

@@ -43,23 +43,29 @@ struct momentum_sums {
 };
 enum { MOMENTUM_CONTACTS = PACKED6, MOMENTUM_SUMS = 22 + PACKED6 + 1 };
 
-/* What a body at d adds; A = (m I, inertia). */
-SADMM_INLINE void momentum_add_body(struct momentum_sums *s, const double d[3], const double A[PACKED6],
-                                    const double v[6], const double b[6])
+/* What a body at d adds; A = (m I, inertia). By its velocity alone, */
+SADMM_INLINE void momentum_add_now(double now[6], const double d[3], const double A[PACKED6], const double v[6])
 {
     const double m = A[0], momentum[3] = {m * v[0], m * v[1], m * v[2]};
-    const double square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    SADMM_UNROLL
+    for (int k = 0; k < 3; ++k) now[k] += momentum[k];
+    now[3] += A[9] * v[3] + A[13] * v[4] + A[18] * v[5];
+    now[4] += A[13] * v[3] + A[14] * v[4] + A[19] * v[5];
+    now[5] += A[18] * v[3] + A[19] * v[4] + A[20] * v[5];
+    add_cross(d, momentum, 1, now + 3);
+}
+
+/* by what is known before any iteration, */
+SADMM_INLINE void momentum_add_known(struct momentum_sums *s, const double d[3], const double A[PACKED6],
+                                     const double b[6])
+{
+    const double m = A[0], square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
     SADMM_UNROLL
     for (int k = 0; k < 3; ++k) {
-        s->now[k] += momentum[k];
         s->free[k] += b[k];
         s->free[k + 3] += b[k + 3];
         s->moment[k] += m * d[k];
     }
-    s->now[3] += A[9] * v[3] + A[13] * v[4] + A[18] * v[5];
-    s->now[4] += A[13] * v[3] + A[14] * v[4] + A[19] * v[5];
-    s->now[5] += A[18] * v[3] + A[19] * v[4] + A[20] * v[5];
-    add_cross(d, momentum, 1, s->now + 3);
     add_cross(d, b, 1, s->free + 3);
     s->mass += m;
     s->inertia[0] += A[9] + m * (square - d[0] * d[0]);
@@ -68,6 +74,14 @@ SADMM_INLINE void momentum_add_body(struct momentum_sums *s, const double d[3], 
     s->inertia[3] += A[13] - m * d[0] * d[1];
     s->inertia[4] += A[18] - m * d[0] * d[2];
     s->inertia[5] += A[19] - m * d[1] * d[2];
+}
+
+/* and both. */
+SADMM_INLINE void momentum_add_body(struct momentum_sums *s, const double d[3], const double A[PACKED6],
+                                    const double v[6], const double b[6])
+{
+    momentum_add_now(s->now, d, A, v);
+    momentum_add_known(s, d, A, b);
 }
 
 /* What a static contact adds, its point at r from the origin. */
@@ -253,6 +267,13 @@ SADMM_INLINE void momentum_find_motions(struct momentum_sums *s, struct momentum
         out->free[out->count] = dense6_dot(x, s->free);
         ++out->count;
     }
+}
+
+/* The momentum of `now` (G^T A v) along motions that were found without it: the same bits as with it. */
+SADMM_INLINE void momentum_measure(struct momentum_motions *motions, const double now[6])
+{
+    SADMM_ROLLED
+    for (int k = 0; k < motions->count; ++k) motions->now[k] = dense6_dot(motions->motion[k], now);
 }
 
 /* Energies of the rigid part, J: of v, of A^-1 b, of both together; of what v misses. */
