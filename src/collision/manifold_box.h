@@ -175,10 +175,16 @@ SADMM_INLINE bool box_test_edges(const struct box_pair *b, struct box_axes *axes
         left |= (~(r3_not_above(s, face) & r3_not_above(s, zero)) & 7) << 3 * i;
     }
     if (axes->cached >= 6) left |= 1 << (axes->cached - 6);
+#ifdef __CUDA_ARCH__
+#pragma unroll
+    for (int e = 0; e < 9; ++e) /* separations stay in registers */
+        if ((left >> e & 1) && !box_test_edge(b, axes, e / 3, e % 3, separations[e], along[e])) return false;
+#else
     for (; left; left &= left - 1) {
         const int e = lowest_bit(left);
         if (!box_test_edge(b, axes, e / 3, e % 3, separations[e], along[e])) return false;
     }
+#endif
     return true;
 }
 

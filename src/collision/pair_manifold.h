@@ -102,7 +102,8 @@ SADMM_INLINE void find_manifold(const struct sadmm_proxy *a, const struct sadmm_
         pair_manifold(&a->geometry, &b->geometry, child, &pose, last ? (real)limit : SADMM_REAL_MAX, last ? cache : 0,
                       m);
         if (last) break;
-        moves_on = advance_pair(a, b, &pose, m, dt, &state, &ahead);
+        const struct pair_pose here = pose; /* pair_manifold's own stays in registers */
+        moves_on = advance_pair(a, b, &here, m, dt, &state, &ahead);
         if (state.missed) limit = proxy_limit(a, b, 0, margin, gravity, dt);
         pose = proxies_pose(a, b, ahead);
     }

@@ -40,29 +40,32 @@ struct emit_copy {
     struct sadmm_proxy a, b;
     struct manifold_point point;
     struct sadmm_contact_pair old; /* for what matches */
-    vec3 normal;
-    double ahead;
+    struct manifold head;          /* but for the points */
 };
 struct emit_in_place {
     const struct sadmm_proxy &a, &b;
-    const struct manifold_point &point;
+    struct manifold_point point;
     const struct sadmm_contact_pair &old;
-    vec3 normal;
-    double ahead;
+    struct manifold head;
 };
 static __device__ __forceinline__ emit_in_place emit_source_of(const collision_view &v, const emit_start &start,
                                                                int64_t i, int32_t lane)
 {
-    const struct manifold &m = v.manifolds[i];
-    return {v.proxies[start.own.a], v.proxies[start.own.b], m.points[lane],
-            v.before.pairs[start.match >= 0 ? start.match : 0], m.normal, m.ahead};
+    const struct found_manifold &m = v.manifolds[i];
+    const found_point point = load_wide(&m.points[lane]);
+    struct manifold head;
+    head.normal = m.normal;
+    head.ahead = m.ahead;
+    head.cache = m.cache;
+    head.count = m.count;
+    return {v.proxies[start.own.a], v.proxies[start.own.b], {point.position, point.separation, m.features[lane]},
+            v.before.pairs[start.match >= 0 ? start.match : 0], head};
 }
 
-/* Point `lane` of candidate i; place: pairs << 32 | points before it. */
+/* Point `lane` of a candidate; place: pairs << 32 | points before it. */
 template <class Source>
-static __device__ __forceinline__ void emit_point(const collision_view &v, const step_lengths &dt, int64_t i,
-                                                  int32_t lane, const emit_start &start, const Source &source,
-                                                  uint64_t place)
+static __device__ __forceinline__ void emit_point(const collision_view &v, const step_lengths &dt, int32_t lane,
+                                                  const emit_start &start, const Source &source, uint64_t place)
 {
     const struct candidate own = start.own;
     const int32_t at = (int32_t)(place >> 32), first = (int32_t)(uint32_t)place;
@@ -70,24 +73,27 @@ static __device__ __forceinline__ void emit_point(const collision_view &v, const
     const double friction =
         contact_friction(v.friction_pairs, v.friction_values, v.friction_count, own.a, own.b, pa, pb);
     double normal[3];
-    rotate_to_world(pb->R, source.normal, normal);
+    rotate_to_world(pb->R, source.head.normal, normal);
 
     struct sadmm_contact_point point;
     struct pair_motion motion;
-    pair_motion_of(pa, pb, normal, source.ahead, dt.now, &motion);
+    pair_motion_of(pa, pb, normal, source.head.ahead, dt.now, &motion);
     contact_emit_point(pa, pb, &motion, &source.point, &point);
     if (start.match >= 0)
         contact_carry(&source.old, v.before.points, lane, normal, friction, step_ratio(dt.now, dt.before), &point);
-    v.after.points[first + lane] = point;
+    store_wide(point, &v.after.points[first + lane]);
 
     if (lane > 0) return;
     struct sadmm_contact_pair pair;
-    contact_emit_pair(own.a, own.b, own.child, pa, pb, &v.manifolds[i], normal, friction, first, &pair);
-    v.after.pairs[at] = pair;
+    contact_emit_pair(own.a, own.b, own.child, pa, pb, &source.head, normal, friction, first, &pair);
+    store_wide(pair, &v.after.pairs[at]);
     v.after.keys[at] = ordered_key(own.a, own.b);
 }
 
-static __global__ void __launch_bounds__(COLLISION_THREADS)
+/* So many blocks have registers on a multiprocessor at once. */
+enum { EMIT_BLOCKS = 4 };
+
+static __global__ void __launch_bounds__(COLLISION_THREADS, EMIT_BLOCKS)
 emit_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t thread = collision_thread(COLLISION_THREADS), i = thread / POINT_LANES;
@@ -100,7 +106,7 @@ emit_kernel(const __grid_constant__ collision_view v)
     const uint64_t place = v.places[i];
     const emit_start start = emit_start_of(v, i);
     if (lane == 0) v.pair_of[i] = (int32_t)(place >> 32);
-    if (lane < start.count) emit_point(v, dt, i, lane, start, emit_source_of(v, start, i, lane), place);
+    if (lane < start.count) emit_point(v, dt, lane, start, emit_source_of(v, start, i, lane), place);
 }
 
 /* ---- few candidates: every block adds up all sizes ------------------------------------------------------------- */
@@ -133,7 +139,7 @@ emit_few_kernel(const __grid_constant__ collision_view v)
     const bool has_point = i < found && lane < start.count;
     if (has_point) {
         const emit_in_place from = emit_source_of(v, start, i, lane);
-        source = {from.a, from.b, from.point, from.old, from.normal, from.ahead};
+        source = {from.a, from.b, from.point, from.old, from.head};
     }
     for (int32_t k = t; k < (found + SIZES_A_WORD - 1) / SIZES_A_WORD; k += EMIT_CANDIDATES * POINT_LANES) {
         const uint64_t sum = sum_sizes(sizes[k]);
@@ -161,7 +167,7 @@ emit_few_kernel(const __grid_constant__ collision_view v)
         before += sum_sizes(i - k < SIZES_A_WORD ? word & ((UINT32_C(1) << 8 * (i - k)) - 1) : word);
     }
     if (lane == 0) v.pair_of[i] = (int32_t)(before >> 32);
-    if (has_point) emit_point(v, dt, i, lane, start, source, before);
+    if (has_point) emit_point(v, dt, lane, start, source, before);
 }
 
 void COLLISION(matching_kernels)(struct collision_kernels *kernels)

@@ -92,12 +92,16 @@ static __device__ void store_manifold(const collision_view &v, int64_t i, const 
     v.sizes[i] = (uint8_t)m.count;
     if (m.count == 0) return;
     v.matches[i] = (int32_t)before;
-    struct manifold *out = &v.manifolds[i];
+    struct found_manifold *out = &v.manifolds[i];
     out->normal = m.normal;
-    out->count = m.count;
-    out->cache = m.cache;
     out->ahead = m.ahead;
-    for (int k = 0; k < m.count; ++k) out->points[k] = m.points[k];
+    out->cache = m.cache;
+    out->count = m.count;
+    for (int k = 0; k < m.count; ++k) {
+        const found_point point = {m.points[k].position, m.points[k].separation};
+        store_wide(point, &out->points[k]);
+        out->features[k] = m.points[k].feature;
+    }
 }
 
 /* What takes the time are rounds to memory: what can be asked for together is, before anything waits for any of it. */
@@ -118,7 +122,7 @@ narrow_kernel(const __grid_constant__ collision_view v)
     const int64_t likely = guess >= 0 && guess < count ? guess : 0;
     const struct sadmm_proxy *pa = &v.proxies[own.a], *pb = &v.proxies[own.b];
     const struct near_keys near = near_keys_of(v.before.keys, FOR == NARROW_AGAIN ? 0 : count, guess);
-    struct sadmm_contact_pair old = v.before.pairs[likely];
+    struct sadmm_contact_pair old = load_wide(&v.before.pairs[likely]);
     const struct sadmm_proxy a = *pa, b = *pb;
     if (FOR != NARROW_ONE && !meet_now(v, step, own, a, b)) {
         v.sizes[i] = 0;
@@ -134,7 +138,7 @@ narrow_kernel(const __grid_constant__ collision_view v)
         keep_fetched(b.geometry.size[k]);
     }
     if (!known) before = search_pair(v, own, count);
-    if (before >= 0 && before != likely) old = v.before.pairs[before];
+    if (before >= 0 && before != likely) old = load_wide(&v.before.pairs[before]);
     const uint32_t cache = contact_memory(&old, &a, &b);
     if (!contact_goes_on(&old, own.child, &a, &b)) before = -1;
     struct manifold m;

@@ -67,7 +67,7 @@ static sadmm_status reserve_candidate(struct sadmm_cuda_collision *c, struct sad
     TRY(reserve(c, SIZES, candidates + SIZES_BEYOND, sizeof *v->sizes, error));
     TRY(reserve(c, PLACES, candidates + 1, sizeof *v->places, error));
     v->found = in<uint64_t>(c, CANDIDATES);
-    v->manifolds = in<struct manifold>(c, MANIFOLDS);
+    v->manifolds = in<struct found_manifold>(c, MANIFOLDS);
     v->matches = in<int32_t>(c, MATCHES);
     v->pair_of = in<int32_t>(c, PAIR_OF);
     v->sizes = in<uint8_t>(c, SIZES);

@@ -39,6 +39,7 @@
 #include <cuda_runtime.h>
 
 #include "backend_cuda/device/layout.h"
+#include "backend_cuda/device/wide.h"
 #include "collision/contact_emit.h"
 #include "pipeline.h"
 
@@ -118,6 +119,20 @@ struct collision_reach {
     double velocity[3];
 };
 
+/* A manifold on its way from narrow to emit, in whole pieces (device/wide.h). */
+struct alignas(16) found_point {
+    vec3 position;
+    real separation;
+};
+struct alignas(16) found_manifold {
+    vec3 normal;
+    double ahead;
+    uint32_t cache;
+    int32_t count;
+    found_point points[SADMM_MANIFOLD_POINTS]; /* beyond `count`: not written */
+    uint32_t features[SADMM_MANIFOLD_POINTS];
+};
+
 struct collision_set {
     struct sadmm_contact_pair *pairs;
     struct sadmm_contact_point *points;
@@ -162,7 +177,7 @@ struct collision_view {
     uint64_t *candidates;                          /* sorted */
     int32_t candidate_capacity;
     int32_t slot_bits, child_bits;                 /* of a candidate; child_bits is 0 where every shape has one child */
-    struct manifold *manifolds;                    /* by candidate; points beyond `count` are not written */
+    struct found_manifold *manifolds;              /* by candidate; not written where there are no points */
     int32_t *matches;                              /* by candidate: pair of the last step, or -1 */
     int32_t *pair_of;                              /* by candidate: its pair in the new set; without: the next one */
     uint8_t *sizes;                                /* points by candidate; 0 beyond the last, SIZES_BEYOND of them */
