@@ -41,40 +41,46 @@ static void count_slots(struct sadmm_context *c)
     c->slot_count = slots;
 }
 
-static void record_bodies(const struct sadmm_context *c, size_t record, int32_t bodies[2])
+/* The bodies of a record, -1: static, or there is none. */
+static inline void pair_bodies(const struct sadmm_context *c, size_t record, int32_t bodies[2])
 {
-    bodies[0] = bodies[1] = -1;
-    if (record >= cpu_pair_records(c)) {
-        int lane;
-        const int32_t constraint = cpu_row_block(c, record, &lane)->constraint[lane];
-        if (constraint < 0) return;
-        bodies[0] = c->system->rows->constraints[constraint].body_a;
-        bodies[1] = c->system->rows->constraints[constraint].body_b;
-        return;
-    }
-    int32_t index = c->pair_blocks[record / (size_t)LANES].pair[record % (size_t)LANES];
-    if (index < 0) return;
+    const int32_t index = c->pair_order[record];
     bodies[0] = c->system->contacts->pairs[index].body_a;
     bodies[1] = c->system->contacts->pairs[index].body_b;
+}
+
+static inline void row_bodies(const struct sadmm_context *c, size_t record, int32_t bodies[2])
+{
+    int lane;
+    const int32_t constraint = cpu_row_block(c, record, &lane)->constraint[lane];
+    bodies[0] = constraint < 0 ? -1 : c->system->rows->constraints[constraint].body_a;
+    bodies[1] = constraint < 0 ? -1 : c->system->rows->constraints[constraint].body_b;
+}
+
+static inline void count_record(const struct sadmm_context *c, const int32_t bodies[2])
+{
+    for (int side = 0; side < 2; ++side)
+        if (bodies[side] >= 0) ++c->offsets[bodies[side] + 2];
+}
+
+static inline void list_record(const struct sadmm_context *c, size_t record, const int32_t bodies[2])
+{
+    for (int side = 0; side < 2; ++side)
+        if (bodies[side] >= 0)
+            c->incident[c->offsets[bodies[side] + 1]++] = (int32_t)(record + (side ? c->record_count : 0));
 }
 
 /* Counting sort by body; records ascend within a body, so a body's sum has one order whatever the threads. */
 static void list_incident(struct sadmm_context *c)
 {
+    const size_t pairs = (size_t)c->plan.pairs, rows = cpu_pair_records(c);
     int32_t *offsets = c->offsets, bodies[2];
     memset(offsets, 0, ((size_t)c->bodies + 2) * sizeof *offsets);
-    for (size_t r = 0; r < c->record_count; ++r) {
-        record_bodies(c, r, bodies);
-        for (int side = 0; side < 2; ++side)
-            if (bodies[side] >= 0) ++offsets[bodies[side] + 2];
-    }
+    for (size_t r = 0; r < pairs; ++r) pair_bodies(c, r, bodies), count_record(c, bodies);
+    for (size_t r = rows; r < c->record_count; ++r) row_bodies(c, r, bodies), count_record(c, bodies);
     for (int32_t i = 0; i < c->bodies; ++i) offsets[i + 2] += offsets[i + 1];
-    for (size_t r = 0; r < c->record_count; ++r) {
-        record_bodies(c, r, bodies);
-        for (int side = 0; side < 2; ++side)
-            if (bodies[side] >= 0)
-                c->incident[offsets[bodies[side] + 1]++] = (int32_t)(r + (side ? c->record_count : 0));
-    }
+    for (size_t r = 0; r < pairs; ++r) pair_bodies(c, r, bodies), list_record(c, r, bodies);
+    for (size_t r = rows; r < c->record_count; ++r) row_bodies(c, r, bodies), list_record(c, r, bodies);
 }
 
 sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *system, const struct sadmm_plan *plan,

@@ -65,16 +65,31 @@ static void add_bits(_Atomic int32_t *to, int bits, bool alone)
     else atomic_fetch_or_explicit(to, bits, memory_order_relaxed);
 }
 
-/* What a pair's points touch (math/lead.h). */
-static struct lead_touch touch_of(const struct sadmm_context *c, const struct sadmm_contact_pair *pair)
+/* Bits of a body so far; what becomes of the static world is of no interest. */
+static int bits_of_body(const struct sadmm_context *c, int32_t body)
+{
+    return body >= 0 ? atomic_load_explicit(&c->touch[body], memory_order_relaxed) : TOUCH_CARRIED | TOUCH_MOVED;
+}
+
+/* Nothing more can be learned of leads. */
+static bool way_is_known(const struct lead_touch *touch)
+{
+    return touch->island & TOUCH_JOLT && touch->body[0] & touch->body[1] & TOUCH_CARRIED;
+}
+
+/* What a pair's points touch (math/lead.h), and what other pairs have found of that so far: bits that are known are not
+ * looked for again. */
+static struct lead_touch touch_of(const struct sadmm_context *c, const struct sadmm_contact_pair *pair, int32_t label)
 {
     static const double still[6];
     const double dt = c->settings.dt, slop = c->settings.slop, *n = pair->normal;
     const struct sadmm_lead *a = &c->leads[cpu_body(c, pair->body_a)], *b = &c->leads[cpu_body(c, pair->body_b)];
     const double rest[2] = {a->rest, b->rest};
-    struct lead_touch touch = {pair->body_a >= 0 && pair->body_b >= 0 ? TOUCH_INNER
-                               : pair->friction > 0                   ? TOUCH_FRICTION
-                                                                      : TOUCH_SMOOTH, {0, 0}};
+    struct lead_touch touch = {atomic_load_explicit(&c->touch[label], memory_order_relaxed),
+                               {bits_of_body(c, pair->body_a), bits_of_body(c, pair->body_b)}};
+    touch.island |= pair->body_a >= 0 && pair->body_b >= 0 ? TOUCH_INNER
+                    : pair->friction > 0                   ? TOUCH_FRICTION
+                                                           : TOUCH_SMOOTH;
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
         const struct sadmm_contact_point *point = &c->system->contacts->points[k];
         const double *arm_a = point->arm_a, *arm_b = point->arm_b;
@@ -83,6 +98,10 @@ static struct lead_touch touch_of(const struct sadmm_context *c, const struct sa
                                  lead_size_at(b->moves_linear, b->moves_angular, arm_b)};
         lead_add_push(&touch, dot3(n, point->impulse), moves, rest);
         if (lead_is_still(size, dt, slop)) continue;
+        if (way_is_known(&touch)) {
+            if (touch.body[0] & touch.body[1] & TOUCH_MOVED) break;
+            continue;
+        }
         const double *v_a = pair->body_a >= 0 ? &c->system->velocity[6 * (size_t)pair->body_a] : still,
                      *v_b = pair->body_b >= 0 ? &c->system->velocity[6 * (size_t)pair->body_b] : still;
         const double leads[2] = {-lead_along(n, a->lead, arm_a), lead_along(n, b->lead, arm_b)};
@@ -94,8 +113,9 @@ static struct lead_touch touch_of(const struct sadmm_context *c, const struct sa
 /* Bodies have bits of their own, islands theirs at their labels: no bit means both. */
 static void touch_pair(struct sadmm_context *c, const struct sadmm_contact_pair *pair, bool alone)
 {
-    const struct lead_touch touch = touch_of(c, pair);
-    add_bits(&c->touch[c->label[pair->body_a >= 0 ? pair->body_a : pair->body_b]], touch.island, alone);
+    const int32_t label = c->label[pair->body_a >= 0 ? pair->body_a : pair->body_b];
+    const struct lead_touch touch = touch_of(c, pair, label);
+    add_bits(&c->touch[label], touch.island, alone);
     if (pair->body_a >= 0) add_bits(&c->touch[pair->body_a], touch.body[0], alone);
     if (pair->body_b >= 0) add_bits(&c->touch[pair->body_b], touch.body[1], alone);
 }
