@@ -6,6 +6,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#ifdef __AVX__
+#include <immintrin.h>
+#endif
+
 #include "core/math/contact.h"
 
 enum { LANES = SADMM_VECTOR_BYTES / (int)sizeof(real) };
@@ -71,7 +75,14 @@ typedef double vec3d __attribute__((vector_size(4 * sizeof(double))));
 /* A row in double. */
 typedef double row8d __attribute__((vector_size(8 * sizeof(double))));
 
-static inline vec3d vec3d_load(const double x[3]) { return (vec3d){x[0], x[1], x[2], 0}; }
+static inline vec3d vec3d_load(const double x[3])
+{
+#ifdef __AVX__
+    return _mm256_maskload_pd(x, (__m256i){-1, -1, -1, 0});
+#else
+    return (vec3d){x[0], x[1], x[2], 0};
+#endif
+}
 static inline void vec3d_store(vec3d v, double x[3]) { x[0] = v[0], x[1] = v[1], x[2] = v[2]; }
 static inline vec3d vec3d_yzx(vec3d v) { return __builtin_shufflevector(v, v, 1, 2, 0, 3); }
 static inline vec3d vec3d_zxy(vec3d v) { return __builtin_shufflevector(v, v, 2, 0, 1, 3); }
@@ -80,7 +91,8 @@ static inline vec3d vec3d_cross_zxy(vec3d a, vec3d b) { return a * vec3d_yzx(b) 
 
 static inline vec3d vec3d_of_lane(const vec *v, size_t l)
 {
-    return (vec3d){(double)v->x[l], (double)v->y[l], (double)v->z[l], 0};
+    typedef real numbers __attribute__((vector_size(4 * sizeof(real))));
+    return __builtin_convertvector(((numbers){v->x[l], v->y[l], v->z[l], 0}), vec3d);
 }
 /* Of a velocity or a momentum. */
 typedef struct vec6d {

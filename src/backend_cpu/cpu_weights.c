@@ -24,9 +24,16 @@ void CPU(invert)(const struct sadmm_context *c, const double A[PACKED6], double 
 static struct arm_sums pair_arms(const struct sadmm_context *c, const struct sadmm_contact_pair *pair, int side)
 {
     const struct sadmm_contact_point *points = &c->system->contacts->points[pair->first];
-    struct arm_sums sums = {0};
-    for (int k = 0; k < pair->count; ++k) add_arm(&sums, side ? points[k].arm_b : points[k].arm_a, 1);
-    return sums;
+    vec3d sum = {0}, squares = {0}, products = {0}; /* of products: xy, yz, zx */
+    for (int k = 0; k < pair->count; ++k) {
+        const vec3d r = vec3d_load(side ? points[k].arm_b : points[k].arm_a);
+        sum += r;
+        squares += r * r;
+        products += r * vec3d_yzx(r);
+    }
+    return (struct arm_sums){pair->count,
+                             {sum[0], sum[1], sum[2]},
+                             {squares[0], squares[1], squares[2], products[0], products[2], products[1]}};
 }
 
 static void pair_rows(const struct sadmm_context *c, const struct sadmm_contact_pair *pair, int side, double S[PACKED6])
@@ -58,7 +65,7 @@ static double pair_response(struct sadmm_context *c, size_t record)
         }
         const struct arm_sums sums = pair_arms(c, pair, side);
         c->pair_arms[2 * record + (size_t)side] = sums;
-        if (CPU(has_rigid_mass)(c, &c->A[(size_t)bodies[side] * PACKED6])) {
+        if (c->plan.rigid || CPU(has_rigid_mass)(c, &c->A[(size_t)bodies[side] * PACKED6])) {
             w += packed_dot_arms(inverse, &sums);
             continue;
         }
