@@ -92,7 +92,7 @@ typedef struct sadmm_body_def {
 SADMM_API sadmm_body_def sadmm_body_def_default(void);
 /* *id: the new body. Errors: INVALID_ARGUMENT (range; nothing changes), LIMIT (2^27 bodies), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def, sadmm_body_id *id);
-/* Destroys its shapes too. Errors: STALE_ID. */
+/* Destroys its shapes too, and its joints (joint.h). Errors: STALE_ID. */
 SADMM_API sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id);
 SADMM_API int32_t sadmm_world_body_count(const sadmm_world *world);      /* all, static ones included; of NULL: 0 */
 /* The index-th live body in order of creation slot, index in [0, body_count). Errors: INVALID_ARGUMENT (range). */
@@ -224,7 +224,7 @@ typedef struct sadmm_step_report {
     int64_t step;                  /* steps done since creation */
     double time;                   /* simulated time after the step, s */
     int32_t bodies;                /* dynamic bodies */
-    int32_t joints;                /* constraint blocks (none yet at the world level) */
+    int32_t joints;                /* joints that took part (joint.h): enabled, with something locked or acting */
     int32_t contacts;              /* contact points of the step */
     int32_t pairs;                 /* shape pairs with at least one contact */
     int iterations;                /* done; with a stop rule on CUDA (below): by the island that did most */
@@ -289,9 +289,9 @@ SADMM_API sadmm_status sadmm_world_state_hash(sadmm_world *world, uint64_t *hash
  * a NULL world: "", 0. Waits for steps; the error of one is left for the next call that returns a status. */
 SADMM_API size_t sadmm_world_explain(sadmm_world *world, char *text, size_t size);
 
-/* Freeze the contact problem of the last step, or sub-step (bodies, contacts, its starting values), into `problem`.
- * The k-th dynamic body in slot order is body k. Errors: UNAVAILABLE before the first step, after a removal, and where
- * a failed step took the last one's contacts along (sadmm_world_contact_count); OUT_OF_MEMORY. */
+/* Freeze the contact problem of the last step, or sub-step (bodies, contacts, rows of joints, its starting values),
+ * into `problem`. The k-th dynamic body in slot order is body k. Errors: UNAVAILABLE before the first step, after a
+ * removal, and where a failed step took the last one's contacts along (sadmm_world_contact_count); OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_freeze(sadmm_world *world, sadmm_problem *problem);
 
 #ifdef __cplusplus
