@@ -214,8 +214,8 @@ SADMM_INLINE void weight_add_row(struct weight_row_sums *sums, double lambda, do
  *
  * An iteration brings a velocity on by a share of about 1 / (1 + w B) of what is missing, so that rows that do not hold
  * their bodies should not weigh on them: one whose multiplier is at a bound (a drive at its largest force, friction
- * that slips, a limit that is not met) has 1 / w, with which it lets go or holds in one iteration by itself; a soft one has
- * no more than some times what it resists with, gain / compliance in kg. */
+ * that slips, a limit that is not met) has 1 / w, with which it lets go or holds in one iteration by itself; a soft
+ * one has no more than some times what it resists with, gain / compliance in kg. */
 struct weight_row {
     double weight, along;
 };
