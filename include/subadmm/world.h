@@ -176,8 +176,9 @@ SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_s
 
 /* ---- stepping ---------------------------------------------------------------------------------------------- */
 
-/* Beside bodies and shapes a world keeps from step to step: the impulse of every contact (by shapes and feature), the
- * axis and side of every pair of shapes, and how steadily each body accelerates. The next step starts there, a world's
+/* Beside bodies, shapes and joints a world keeps from step to step: the impulse of every contact (by shapes and
+ * feature), the axis and side of every pair of shapes, the forces of every joint and how often it has gone round, and
+ * how steadily each body accelerates. The next step starts there, a world's
  * first step from nothing. So the same states, reached in another way or set again, go on alike but not bit for bit; a
  * run that is to be repeated bit for bit begins with a new world. */
 
@@ -200,8 +201,9 @@ SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_s
 SADMM_API sadmm_status sadmm_world_step(sadmm_world *world);
 
 /* Begin a step and return without waiting for it, where the backend can: CUDA, in the method FAST from the second step
- * on; not with a residual_tolerance, nor with a certificate_tolerance in the method PAPER or with more than 64
- * convergence checks a step. Elsewhere the same as sadmm_world_step. Steps run in order, a few of them at a time;
+ * on; not in worlds with joints (joint.h), not with a residual_tolerance, nor with a certificate_tolerance in the method
+ * PAPER or with more than 64 convergence checks a step. Elsewhere the same as sadmm_world_step. Steps run in order, a
+ * few of them at a time;
  * states, wrenches and settings set in between take effect at the next one. Getters wait for the steps begun so far.
  * Errors: as sadmm_world_step; they may be those of an earlier step, and then nothing after that step has been done
  * (sadmm_step_report.step counts what has). With settings.certify the step is waited for. One thread at a time a world;
