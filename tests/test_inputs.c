@@ -287,7 +287,7 @@ START_TEST(bad_blocks)
 {
     struct kept given;
     sadmm_problem *p = make(&given);
-    const sadmm_problem_block good = {
+    sadmm_problem_block good = {
         .kind = SADMM_BLOCK_SOFT, .rows = 3, .body_a = 0, .body_b = 1, .jacobian_a = {1}, .jacobian_b = {-1}};
     double lambda[12] = {0};
     sadmm_problem_block c[2] = {good, good};
@@ -299,8 +299,20 @@ START_TEST(bad_blocks)
         c[1] = good;                                              \
     } while (0)
 
-    BAD(kind, (sadmm_block_kind)3, "blocks[1].kind = 3");
+    BAD(kind, (sadmm_block_kind)4, "blocks[1].kind = 4: must be in [0, 3]");
     BAD(kind, (sadmm_block_kind)-1, "blocks[1].kind = -1");
+    const sadmm_problem_block soft = good;
+    good.kind = SADMM_BLOCK_ROWS;
+    for (int r = 0; r < 6; ++r) good.gain[r] = 1;
+    c[1] = good;
+    BAD(gain[1], -1, "blocks[1].gain[1] = -1: must be >= 0");
+    BAD(gain[2], 0, "blocks[1].gain[2] = blocks[1].compliance[2] = 0: one must be > 0");
+    BAD(compliance[0], NAN, "blocks[1].compliance[0] = nan");
+    BAD(lower[1], 2, "blocks[1].lower[1] = 2, upper[1] = 0: must be lower <= upper");
+    BAD(upper[1], NAN, "upper[1] = nan");
+    BAD(lower[0], INFINITY, "blocks[1].lower[0] = inf");
+    good = soft;
+    c[1] = good;
     BAD(rows, 0, "blocks[1].rows = 0: must be in [1, 6]");
     BAD(rows, 7, "blocks[1].rows = 7: must be in [1, 6]");
     c[1].kind = SADMM_BLOCK_CONTACT;

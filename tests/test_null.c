@@ -12,6 +12,7 @@ static sadmm_world *world;
 static sadmm_problem *problem;
 static sadmm_body_id body;
 static sadmm_shape_id shape;
+static sadmm_joint_id joint;
 
 /* The call is refused, and the message names the argument. */
 #define REFUSES(name, call)                                                                              \
@@ -80,6 +81,32 @@ static void on_shapes(void)
     REFUSES("def", sadmm_world_shape_def(world, shape, NULL, NULL));
     ck_assert_int_eq(sadmm_world_shape_def(world, shape, &def, NULL), SADMM_OK); /* body may be NULL */
     REFUSES("world", sadmm_world_set_pair_friction(NULL, shape, shape, 1));
+}
+
+static void on_joints(void)
+{
+    const double zero[3] = {0}, unit[4] = {1, 0, 0, 0};
+    const sadmm_joint_coordinate coordinate = {0};
+    sadmm_joint_def def = sadmm_joint_def_default();
+    sadmm_joint_state state;
+    sadmm_joint_id id;
+    REFUSES("world", sadmm_world_place_joint(NULL, &def, zero, unit));
+    REFUSES("def", sadmm_world_place_joint(world, NULL, zero, unit));
+    REFUSES("position", sadmm_world_place_joint(world, &def, NULL, unit));
+    REFUSES("orientation", sadmm_world_place_joint(world, &def, zero, NULL));
+    REFUSES("world", sadmm_world_add_joint(NULL, &def, &id));
+    REFUSES("def", sadmm_world_add_joint(world, NULL, &id));
+    REFUSES("world", sadmm_world_remove_joint(NULL, joint));
+    ck_assert_int_eq(sadmm_world_joint_count(NULL), 0);
+    REFUSES("world", sadmm_world_joint_at(NULL, 0, &id));
+    REFUSES("id", sadmm_world_joint_at(world, 0, NULL));
+    REFUSES("world", sadmm_world_joint_def(NULL, joint, &def));
+    REFUSES("def", sadmm_world_joint_def(world, joint, NULL));
+    REFUSES("world", sadmm_world_set_joint_enabled(NULL, joint, false));
+    REFUSES("world", sadmm_world_set_joint_coordinate(NULL, joint, 2, &coordinate));
+    REFUSES("coordinate", sadmm_world_set_joint_coordinate(world, joint, 2, NULL));
+    REFUSES("world", sadmm_world_joint_state(NULL, joint, &state));
+    REFUSES("state", sadmm_world_joint_state(world, joint, NULL));
 }
 
 static void on_steps(void)
@@ -176,6 +203,9 @@ static const struct {
       W(set_body_wrench), W(body_contact_wrench), W(set_body_pair_contact)}},
     {on_shapes,
      {W(add_shape), W(remove_shape), W(shape_count), W(shape_at), W(shape_def), W(set_pair_friction)}},
+    {on_joints,
+     {W(place_joint), W(add_joint), W(remove_joint), W(joint_count), W(joint_at), W(joint_def), W(set_joint_enabled),
+      W(set_joint_coordinate), W(joint_state)}},
     {on_steps,
      {W(step), W(step_async), W(wait), W(report), W(contact_count), W(contacts), W(state_hash), W(explain), W(freeze)}},
     {on_problems,
@@ -185,7 +215,7 @@ static const struct {
     {on_others, {"sadmm_backend_query", "sadmm_box_inertia", "sadmm_sphere_inertia", "sadmm_capsule_inertia"}},
     {NULL,
      {"sadmm_settings_default", W(def_default), "sadmm_body_def_default", "sadmm_shape_def_default",
-      "sadmm_status_name", "sadmm_last_message", "sadmm_version", "sadmm_build_commit", "sadmm_build_compiler"}},
+      "sadmm_joint_def_default", "sadmm_status_name", "sadmm_last_message", "sadmm_version", "sadmm_build_commit", "sadmm_build_compiler"}},
 };
 enum { GROUPS = sizeof functions / sizeof *functions };
 
@@ -209,6 +239,11 @@ static void start(void)
     ck_assert_int_eq(sadmm_world_add_shape(world, ground, &plane, NULL), SADMM_OK); /* id may be NULL */
     ck_assert_int_eq(sadmm_world_add_body(world, &ball, &body), SADMM_OK);
     ck_assert_int_eq(sadmm_world_add_shape(world, body, &sphere, &shape), SADMM_OK);
+    sadmm_joint_def slider = sadmm_joint_def_default();
+    slider.kind = SADMM_JOINT_PRISMATIC;
+    slider.body_b = body;
+    slider.position_a[2] = 0.1;
+    ck_assert_int_eq(sadmm_world_add_joint(world, &slider, &joint), SADMM_OK);
     ck_assert_int_eq(sadmm_world_step(world), SADMM_OK);
 }
 

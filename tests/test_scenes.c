@@ -218,6 +218,9 @@ static const struct {
     { "two_balls", 260 }, /* through the collision */
     { "dominoes:8", 40 }, /* through the first collision */
     { "falling_chain:5", 20 }, /* through the first landing */
+    { "chain:5", 40 },
+    { "four_bar:2", 40 },
+    { "slider_crank", 40 },
 };
 
 static uint64_t hash_after(const char *spec, sadmm_method method, int threads, int steps)
@@ -307,7 +310,7 @@ END_TEST
 
 START_TEST(the_list_has_no_twins)
 {
-    ck_assert_uint_eq(sadmm_scene_count(), 19);
+    ck_assert_uint_eq(sadmm_scene_count(), 22);
     ck_assert_ptr_null(sadmm_scene_at(sadmm_scene_count()));
     for (size_t i = 0; i < sadmm_scene_count(); ++i) {
         for (size_t j = 0; j < i; ++j) ck_assert_str_ne(sadmm_scene_at(i)->name, sadmm_scene_at(j)->name);

@@ -41,7 +41,11 @@ typedef struct sadmm_problem_contact {
 typedef enum sadmm_block_kind {
     SADMM_BLOCK_CONTACT = 0, /* 3 rows (normal, tangent, tangent), eq. (5) */
     SADMM_BLOCK_HARD,        /* 1..6 rows, eq. (4) */
-    SADMM_BLOCK_SOFT         /* 1..6 rows, eq. (3) with a gain and a damping a row */
+    SADMM_BLOCK_SOFT,        /* 1..6 rows, eq. (3) with a gain and a damping a row */
+    SADMM_BLOCK_ROWS         /* 1..6 rows, each a law with bounds (docs/algorithm.md, section 1): limits, drives,
+                                dry friction:
+                                gain x + error + compliance lambda = 0 where lower < lambda < upper, >= 0 at lower,
+                                <= 0 at upper */
 } sadmm_block_kind;
 
 typedef struct sadmm_problem_block {
@@ -50,10 +54,12 @@ typedef struct sadmm_problem_block {
     int32_t body_a, body_b;  /* in [-1, body count), not both -1, not equal */
     double jacobian_a[36];   /* (rows x 6) row-major, acts on (linear, angular) of a; ignored when a is -1 */
     double jacobian_b[36];   /* the same for b */
-    double error[6];         /* CONTACT and HARD: e, m/s. SOFT: e, m or rad */
+    double error[6];         /* CONTACT and HARD: e, m/s. SOFT: e, m or rad. ROWS: the law's constant, gain x m/s */
     double friction;         /* CONTACT: mu, in [0, 1e60] */
     double stiffness[6];     /* SOFT: k of lambda = -(k e + c x), N s/m, i.e. dt times the spring constant; >= 0 */
     double damping[6];       /* SOFT: c, kg (use c = dt (damping + dt stiffness) for an implicit spring); >= 0 */
+    double gain[6], compliance[6]; /* ROWS: either may be 0, not both; >= 0. With compliance 1 the gain is in kg */
+    double lower[6], upper[6];     /* ROWS: of lambda, N s, lower <= upper, either may be infinite */
 } sadmm_problem_block;
 
 /* What a solve did. */

@@ -92,7 +92,7 @@ typedef struct sadmm_body_def {
 SADMM_API sadmm_body_def sadmm_body_def_default(void);
 /* *id: the new body. Errors: INVALID_ARGUMENT (range; nothing changes), LIMIT (2^27 bodies), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def, sadmm_body_id *id);
-/* Destroys its shapes too. Errors: STALE_ID. */
+/* Destroys its shapes too, and its joints (joint.h). Errors: STALE_ID. */
 SADMM_API sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id);
 SADMM_API int32_t sadmm_world_body_count(const sadmm_world *world);      /* all, static ones included; of NULL: 0 */
 /* The index-th live body in order of creation slot, index in [0, body_count). Errors: INVALID_ARGUMENT (range). */
@@ -176,8 +176,9 @@ SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_s
 
 /* ---- stepping ---------------------------------------------------------------------------------------------- */
 
-/* Beside bodies and shapes a world keeps from step to step: the impulse of every contact (by shapes and feature), the
- * axis and side of every pair of shapes, and how steadily each body accelerates. The next step starts there, a world's
+/* Beside bodies, shapes and joints a world keeps from step to step: the impulse of every contact (by shapes and
+ * feature), the axis and side of every pair of shapes, the forces of every joint and how often it has gone round, and
+ * how steadily each body accelerates. The next step starts there, a world's
  * first step from nothing. So the same states, reached in another way or set again, go on alike but not bit for bit; a
  * run that is to be repeated bit for bit begins with a new world. */
 
@@ -200,10 +201,10 @@ SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_s
 SADMM_API sadmm_status sadmm_world_step(sadmm_world *world);
 
 /* Begin a step and return without waiting for it, where the backend can: CUDA, in the method FAST from the second step
- * on; not with a residual_tolerance, nor with a certificate_tolerance in the method PAPER or with more than 64
- * convergence checks a step. Elsewhere the same as sadmm_world_step. Steps run in order, a few of them at a time;
- * states, wrenches and settings set in between take effect at the next one. Getters wait for the steps begun so far.
- * Errors: as sadmm_world_step; they may be those of an earlier step, and then nothing after that step has been done
+ * on; not in worlds with joints (joint.h), not with a residual_tolerance, nor with a certificate_tolerance in the method
+ * PAPER or with more than 64 convergence checks a step. Elsewhere the same as sadmm_world_step. Steps run in order, a
+ * few of them at a time; states, wrenches and settings set in between take effect at the next one. Getters wait for the
+ * steps begun so far. Errors: as sadmm_world_step; they may be those of an earlier step, and then nothing after that step has been done
  * (sadmm_step_report.step counts what has). With settings.certify the step is waited for. One thread at a time a world;
  * different worlds are independent, also on one device. */
 SADMM_API sadmm_status sadmm_world_step_async(sadmm_world *world);
@@ -224,7 +225,7 @@ typedef struct sadmm_step_report {
     int64_t step;                  /* steps done since creation */
     double time;                   /* simulated time after the step, s */
     int32_t bodies;                /* dynamic bodies */
-    int32_t joints;                /* constraint blocks (none yet at the world level) */
+    int32_t joints;                /* joints that took part (joint.h): enabled, with something locked or acting */
     int32_t contacts;              /* contact points of the step */
     int32_t pairs;                 /* shape pairs with at least one contact */
     int iterations;                /* done; with a stop rule on CUDA (below): by the island that did most */
@@ -289,9 +290,9 @@ SADMM_API sadmm_status sadmm_world_state_hash(sadmm_world *world, uint64_t *hash
  * a NULL world: "", 0. Waits for steps; the error of one is left for the next call that returns a status. */
 SADMM_API size_t sadmm_world_explain(sadmm_world *world, char *text, size_t size);
 
-/* Freeze the contact problem of the last step, or sub-step (bodies, contacts, its starting values), into `problem`.
- * The k-th dynamic body in slot order is body k. Errors: UNAVAILABLE before the first step, after a removal, and where
- * a failed step took the last one's contacts along (sadmm_world_contact_count); OUT_OF_MEMORY. */
+/* Freeze the contact problem of the last step, or sub-step (bodies, contacts, rows of joints, its starting values),
+ * into `problem`. The k-th dynamic body in slot order is body k. Errors: UNAVAILABLE before the first step, after a
+ * removal, and where a failed step took the last one's contacts along (sadmm_world_contact_count); OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_freeze(sadmm_world *world, sadmm_problem *problem);
 
 #ifdef __cplusplus

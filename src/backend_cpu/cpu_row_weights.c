@@ -52,9 +52,14 @@ static void weigh(struct sadmm_context *c, struct row_block *block, int l)
     const double share = weight_share(&island->weights, sums.load2);
     for (int r = 0; r < count; ++r) {
         struct row_weight *out = &weights[r];
-        const bool coupled = sadmm_row_is_coupled(c->system->rows, first + (size_t)r);
-        const struct weight_row B =
-            weight_of_row(&sums, share, block->cone, coupled, (double)slots[r].lambda[l], out->response);
+        const struct weight_law law = {block->cone,
+                                       sadmm_row_is_coupled(c->system->rows, first + (size_t)r),
+                                       (double)slots[r].gain[l],
+                                       (double)slots[r].compliance[l],
+                                       (double)slots[r].lo[l],
+                                       (double)slots[r].hi[l],
+                                       weight_row_floor(c->plan.rigid, c->settings.iterations)};
+        const struct weight_row B = weight_of_row(&sums, share, &law, (double)slots[r].lambda[l], out->response);
         out->weight = B.weight;
         out->along = B.along;
         slots[r].step[l] = row_step(slots[r].gain[l], slots[r].compliance[l], (real)(inv_n * out->weight));

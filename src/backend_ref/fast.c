@@ -239,7 +239,10 @@ static void weigh_constraint(struct sadmm_context *c, struct ref_constraint *con
         bool coupled = !constraint->cone && constraint->coupled[r];
         for (int q = 0; q < constraint->rows && coupled; ++q)
             if (constraint->coupled[q]) constraint->B[6 * r + q] = share * lambda[r] * lambda[q];
-        constraint->B[7 * r] += weight_of_row(&sums, share, constraint->cone, coupled, lambda[r], w[r]).weight;
+        const struct weight_law law = {constraint->cone,          coupled,           constraint->gain[r],
+                                       constraint->compliance[r], constraint->lo[r], constraint->hi[r],
+                                       weight_row_floor(c->plan->rigid, c->settings->iterations)};
+        constraint->B[7 * r] += weight_of_row(&sums, share, &law, lambda[r], w[r]).weight;
     }
 }
 

@@ -2,6 +2,7 @@
 
 #include "cli.h"
 #include "scenes/scenes.h"
+#include "subadmm/joint.h"
 
 enum { OPTION_JSON };
 
@@ -144,7 +145,73 @@ static sadmm_status add_shapes(sadmm_world *world, json_t *bodies)
     return SADMM_OK;
 }
 
-static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, json_t *bodies)
+static const char *const joint_kinds[SADMM_JOINT_KIND_COUNT] = {
+    [SADMM_JOINT_FIXED] = "fixed",         [SADMM_JOINT_REVOLUTE] = "revolute",   [SADMM_JOINT_PRISMATIC] = "prismatic",
+    [SADMM_JOINT_CYLINDRICAL] = "cylindrical", [SADMM_JOINT_SPHERICAL] = "spherical",
+    [SADMM_JOINT_UNIVERSAL] = "universal", [SADMM_JOINT_PLANAR] = "planar",       [SADMM_JOINT_CARTESIAN] = "cartesian",
+    [SADMM_JOINT_CUSTOM] = "custom",       [SADMM_JOINT_DISTANCE] = "distance",   [SADMM_JOINT_SPRING] = "spring",
+    [SADMM_JOINT_LINK] = "link",
+};
+static const char *const drives[SADMM_DRIVE_COUNT] = {"off", "speed", "position"};
+
+/* What is infinite is null. */
+static json_t *coordinate_json(const sadmm_joint_coordinate *c)
+{
+    json_t *o = json_object();
+    json_object_set_new(o, "limits", c->limited ? cli_json_reals(&c->lower, 2) : json_null());
+    json_object_set_new(o, "drive", json_string(drives[c->drive]));
+    json_object_set_new(o, "target_position", cli_json_real(c->target_position));
+    json_object_set_new(o, "target_speed", cli_json_real(c->target_speed));
+    json_object_set_new(o, "drive_stiffness", cli_json_real(c->drive_stiffness));
+    json_object_set_new(o, "drive_damping", cli_json_real(c->drive_damping));
+    json_object_set_new(o, "drive_force", cli_json_real(c->drive_force));
+    json_object_set_new(o, "friction", cli_json_real(c->friction));
+    json_object_set_new(o, "spring_stiffness", cli_json_real(c->spring_stiffness));
+    json_object_set_new(o, "spring_damping", cli_json_real(c->spring_damping));
+    json_object_set_new(o, "spring_rest", cli_json_real(c->spring_rest));
+    return o;
+}
+
+/* The index of a joint's body in the array, null: the static world. */
+static json_t *body_index(sadmm_world *world, json_t *bodies, sadmm_body_id id)
+{
+    json_t *body = id.slot ? find_body(world, bodies, id) : NULL;
+    return body ? json_incref(json_object_get(body, "index")) : json_null();
+}
+
+static json_t *joint_json(sadmm_world *world, json_t *bodies, const sadmm_joint_def *joint)
+{
+    json_t *o = json_object(), *coordinates = json_array();
+    json_object_set_new(o, "kind", json_string(joint_kinds[joint->kind]));
+    json_object_set_new(o, "locks", json_integer(joint->locks));
+    json_object_set_new(o, "body_a", body_index(world, bodies, joint->body_a));
+    json_object_set_new(o, "body_b", body_index(world, bodies, joint->body_b));
+    json_object_set_new(o, "position_a", cli_json_reals(joint->position_a, 3));
+    json_object_set_new(o, "orientation_a", cli_json_reals(joint->orientation_a, 4));
+    json_object_set_new(o, "position_b", cli_json_reals(joint->position_b, 3));
+    json_object_set_new(o, "orientation_b", cli_json_reals(joint->orientation_b, 4));
+    json_object_set_new(o, "length", cli_json_real(joint->length));
+    json_object_set_new(o, "collide", json_boolean(joint->collide));
+    json_object_set_new(o, "enabled", json_boolean(joint->enabled));
+    for (int k = 0; k < 6; ++k) json_array_append_new(coordinates, coordinate_json(&joint->coordinates[k]));
+    json_object_set_new(o, "coordinates", coordinates);
+    return o;
+}
+
+static sadmm_status add_joints(sadmm_world *world, json_t *bodies, json_t *joints)
+{
+    for (int32_t k = 0; k < sadmm_world_joint_count(world); ++k) {
+        sadmm_joint_id id;
+        sadmm_joint_def def;
+        sadmm_status status = sadmm_world_joint_at(world, k, &id);
+        if (status == SADMM_OK) status = sadmm_world_joint_def(world, id, &def);
+        if (status != SADMM_OK) return status;
+        json_array_append_new(joints, joint_json(world, bodies, &def));
+    }
+    return SADMM_OK;
+}
+
+static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, json_t *bodies, json_t *joints)
 {
     static const char *const units =
         "SI; world frame; quaternions w x y z, body to world; inertia: principal moments in "
@@ -163,6 +230,7 @@ static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, jso
     json_object_set_new(o, "friction_of_a_pair", json_string("geometric mean"));
     json_object_set_new(o, "settings", cli_json_settings(&scene->def.settings));
     json_object_set_new(o, "bodies", bodies);
+    json_object_set_new(o, "joints", joints);
     cli_json_add_build(o);
     return o;
 }
@@ -184,12 +252,14 @@ static int show_scene(const char *spec, struct output *json)
         sadmm_world_destroy(world);
         return CLI_DONE;
     }
-    json_t *bodies = json_array();
+    json_t *bodies = json_array(), *joints = json_array();
     int code;
-    if (add_bodies(world, bodies) == SADMM_OK && add_shapes(world, bodies) == SADMM_OK) {
-        code = cli_write_json(scene_json(spec, &scene, bodies), json);
+    if (add_bodies(world, bodies) == SADMM_OK && add_shapes(world, bodies) == SADMM_OK &&
+        add_joints(world, bodies, joints) == SADMM_OK) {
+        code = cli_write_json(scene_json(spec, &scene, bodies, joints), json);
     } else {
         json_decref(bodies);
+        json_decref(joints);
         code = cli_error(CLI_FAILED, "%s", sadmm_world_message(world));
     }
     sadmm_world_destroy(world);

@@ -62,6 +62,9 @@ static sadmm_status measure(sadmm_problem *problem, struct sizes *s, struct sadm
         if (block.kind == SADMM_BLOCK_SOFT)
             return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED,
                               "block %d is soft: a global friction contact problem has no soft constraints", k);
+        if (block.kind == SADMM_BLOCK_ROWS)
+            return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED,
+                              "block %d has rows with bounds or springs: a global friction contact problem has none", k);
         if (block.kind == SADMM_BLOCK_CONTACT) ++s->contacts;
         else s->hard_rows += block.rows;
     }

@@ -37,5 +37,8 @@ extern const struct sadmm_scene_family sadmm_family_rocking;
 extern const struct sadmm_scene_family sadmm_family_two_balls;
 extern const struct sadmm_scene_family sadmm_family_dominoes;
 extern const struct sadmm_scene_family sadmm_family_falling_chain;
+extern const struct sadmm_scene_family sadmm_family_chain;
+extern const struct sadmm_scene_family sadmm_family_four_bar;
+extern const struct sadmm_scene_family sadmm_family_slider_crank;
 
 #endif

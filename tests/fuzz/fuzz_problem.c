@@ -110,7 +110,7 @@ static void take_block(struct machine *m, sadmm_problem_block *b)
 {
     struct bytes *in = &m->in;
     memset(b, 0, sizeof *b);
-    b->kind = (sadmm_block_kind)(take_rarely(in, 32) ? take_byte(in) : take_choice(in, 3));
+    b->kind = (sadmm_block_kind)(take_rarely(in, 32) ? take_byte(in) : take_choice(in, 4));
     b->rows = b->kind == SADMM_BLOCK_CONTACT && !take_rarely(in, 32) ? 3 : take_choice(in, 8);
     if (b->rows == 0) b->rows = 1;
     b->body_a = take_body(m);
@@ -122,6 +122,12 @@ static void take_block(struct machine *m, sadmm_problem_block *b)
     for (int k = 0; k < 6; ++k) {
         b->stiffness[k] = take_choice(in, 4) ? take_number(in, 0, 100) : fabs(take_magnitude(in));
         b->damping[k] = take_choice(in, 4) ? take_number(in, 0, 1) : fabs(take_magnitude(in));
+    }
+    for (int k = 0; k < 6 && b->kind == SADMM_BLOCK_ROWS; ++k) {
+        b->gain[k] = take_choice(in, 4) ? 1 : fabs(take_magnitude(in));
+        b->compliance[k] = take_choice(in, 2);
+        b->lower[k] = take_choice(in, 2) ? 0 : -INFINITY;
+        b->upper[k] = take_choice(in, 2) ? take_number(in, 0, 1) : INFINITY;
     }
 }
 

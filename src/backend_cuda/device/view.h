@@ -330,6 +330,7 @@ struct cuda_args {
     int32_t relax;      /* fast, STREAM: bits of enum cuda_relax */
     const struct sadmm_resident_edit *edits;
     double factor;
+    double row_floor;   /* fast: weight_row_floor */
 };
 
 /* fast: what goes as many times as far as the settings' relaxation says; else once. */

@@ -81,7 +81,7 @@ static __device__ void respond_rows(const model_view &model, const body_view &bo
 }
 
 /* B = diag(weight) + along along^T */
-static __device__ void weigh_rows(const cuda_view &v, int32_t k, bool first)
+static __device__ void weigh_rows(const cuda_view &v, int32_t k, bool first, double floor)
 {
     const row_constraint about = v.rows.constraints[k];
     row_data *rows = v.rows.data + (size_t)k * SADMM_MAX_ROWS;
@@ -97,9 +97,10 @@ static __device__ void weigh_rows(const cuda_view &v, int32_t k, bool first)
         weight_add_row(&sums, (double)rows[r].lambda, responses[r].scale, responses[r].response, about.rows);
     const double share = weight_share(&island->weights, sums.load2);
     for (int r = 0; r < about.rows; ++r) {
-        const bool coupled = sadmm_law_is_coupled((double)rows[r].compliance, (double)rows[r].lo, (double)rows[r].hi);
-        const struct weight_row B =
-            weight_of_row(&sums, share, about.cone, coupled, (double)rows[r].lambda, responses[r].response);
+        const struct weight_law law = {
+            about.cone, sadmm_law_is_coupled((double)rows[r].compliance, (double)rows[r].lo, (double)rows[r].hi),
+            (double)rows[r].gain, (double)rows[r].compliance, (double)rows[r].lo, (double)rows[r].hi, floor};
+        const struct weight_row B = weight_of_row(&sums, share, &law, (double)rows[r].lambda, responses[r].response);
         rows[r].weight = (solver_real)B.weight;
         rows[r].along = (solver_real)B.along;
     }
@@ -108,7 +109,7 @@ static __device__ void weigh_rows(const cuda_view &v, int32_t k, bool first)
 static __global__ void weigh_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
     const int32_t k = thread_index();
-    if (k < live_rows(v.model, v.rows)) weigh_rows(v, k, args.start);
+    if (k < live_rows(v.model, v.rows)) weigh_rows(v, k, args.start, args.row_floor);
 }
 
 /* ---- launches ---------------------------------------------------------------------------------------------------- */
@@ -125,6 +126,7 @@ cuda_args CUDA(weight_args)(const struct sadmm_context *c)
     args.start = c->refreshes == 0;
     args.warm = c->plan.warm;
     args.factor = weight_under_iterated(c->plan.rigid, c->settings.iterations);
+    args.row_floor = weight_row_floor(c->plan.rigid, c->settings.iterations);
     return args;
 }
 

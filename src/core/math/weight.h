@@ -18,9 +18,19 @@ enum { WEIGHT_FIRST_REFRESH = 5, WEIGHT_DOUBLE_BELOW = 40 };
 SADMM_INLINE int weight_next_refresh(int at) { return at < WEIGHT_DOUBLE_BELOW ? 2 * at : at + at / 2; }
 
 /* phi. Contacts: loads that have not been found yet are the ones to come. Joints and springs hold in all directions,
- * loaded or not. */
+ * loaded or not; but a mechanism moves along what none of its joints holds, which no body knows by itself, and an
+ * iteration brings that motion on by a share of 1 / phi or so. Steps of a world (rigid) with few iterations rather miss
+ * some of what joints hold, which the next steps make good, than of how bodies move, which none does. */
 #define WEIGHT_FLOOR_CONTACT 3.0
 #define WEIGHT_FLOOR_ROW 30.0
+#define WEIGHT_FLOOR_ROW_LEAST 3.0
+#define WEIGHT_FLOOR_ROW_ITERATIONS 200.0 /* from as many on it is the whole */
+
+SADMM_INLINE double weight_row_floor(int rigid, int iterations)
+{
+    const double share = WEIGHT_FLOOR_ROW * iterations / WEIGHT_FLOOR_ROW_ITERATIONS;
+    return rigid ? min_of(max_of(share, WEIGHT_FLOOR_ROW_LEAST), WEIGHT_FLOOR_ROW) : WEIGHT_FLOOR_ROW;
+}
 
 /* Less is rounding of the impulses, and says nothing about loads; m/s. */
 #define WEIGHT_LEAST_SPEED 1e-6
@@ -200,28 +210,50 @@ SADMM_INLINE void weight_add_row(struct weight_row_sums *sums, double lambda, do
 /* B of a constraint given by rows is diag(weight) + along along^T. By share = min(load / V, m) / load^2: of the rows
  * that have neither bounds nor compliance together share lambda lambda^T + phi / w, of each other row
  * share lambda_r^2 + phi / w, so that its bounds and its compliance are met by itself; of a contact (cone)
- * share |lambda|^2 + phi / w. A row nobody feels (w = 0) has no weight. */
+ * share |lambda|^2 + phi / w. A row nobody feels (w = 0) has no weight.
+ *
+ * An iteration brings a velocity on by a share of about 1 / (1 + w B) of what is missing, so that rows that do not hold
+ * their bodies should not weigh on them: one whose multiplier is at a bound (a drive at its largest force, friction
+ * that slips, a limit that is not met) has 1 / w, with which it lets go or holds in one iteration by itself; a soft
+ * one has no more than some times what it resists with, gain / compliance in kg. */
 struct weight_row {
     double weight, along;
 };
+
+/* What the weight of a row depends on; coupled: neither bounds nor compliance (core/model/rows.h); floor:
+ * weight_row_floor. */
+struct weight_law {
+    int cone, coupled;
+    double gain, compliance, lo, hi, floor;
+};
+
+#define WEIGHT_SOFT_MOST 3.0
 
 SADMM_INLINE double weight_share(const struct weight_island *island, double load2)
 {
     return load2 > 0 ? weight_mass(sqrt(load2), island->speed, island->mass) / load2 : 0;
 }
 
-/* coupled: the row has neither bounds nor compliance (core/model/rows.h). */
-SADMM_INLINE struct weight_row weight_of_row(const struct weight_row_sums *sums, double share, int cone, int coupled,
-                                             double lambda, double response)
+/* Of a row with bounds or compliance; response > 0. */
+SADMM_INLINE double weight_of_own(const struct weight_law *law, double share, double lambda, double response)
+{
+    const double held = share * lambda * lambda + law->floor / response;
+    if (lambda <= law->lo || lambda >= law->hi) return min_of(1 / response, held);
+    if (!(law->compliance > 0)) return held;
+    return min_of(WEIGHT_SOFT_MOST * law->gain / law->compliance + 1 / response, held);
+}
+
+SADMM_INLINE struct weight_row weight_of_row(const struct weight_row_sums *sums, double share,
+                                             const struct weight_law *law, double lambda, double response)
 {
     struct weight_row out = {0, 0};
-    if (cone) {
+    if (law->cone) {
         out.weight = share * sums->lambda2 + (sums->response > 0 ? WEIGHT_FLOOR_CONTACT / sums->response : 1);
-    } else if (coupled) {
-        out.weight = response > 0 ? WEIGHT_FLOOR_ROW / response : 0;
+    } else if (law->coupled) {
+        out.weight = response > 0 ? law->floor / response : 0;
         out.along = sqrt(share) * lambda;
     } else {
-        out.weight = response > 0 ? share * lambda * lambda + WEIGHT_FLOOR_ROW / response : 1;
+        out.weight = response > 0 ? weight_of_own(law, share, lambda, response) : 1;
     }
     return out;
 }

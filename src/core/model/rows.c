@@ -62,11 +62,35 @@ bool sadmm_rows_add_block(struct sadmm_rows *rows, const sadmm_problem_block *bl
     for (int32_t r = 0; r < block->rows; ++r) {
         if (block->kind == SADMM_BLOCK_SOFT)
             sadmm_row_soft(rows, first + r, block->stiffness[r], block->damping[r], block->error[r]);
+        else if (block->kind == SADMM_BLOCK_ROWS)
+            sadmm_row_set(rows, first + r, block->gain[r], block->error[r], block->compliance[r], block->lower[r],
+                          block->upper[r]);
         else
             sadmm_row_hard(rows, first + r, block->error[r]);
         if (lambda) rows->lambda[first + r] = lambda[r];
     }
     return true;
+}
+
+void sadmm_rows_block(const struct sadmm_rows *rows, size_t k, sadmm_problem_block *block)
+{
+    const struct sadmm_row_constraint *constraint = &rows->constraints[k];
+    const size_t at = (size_t)constraint->first, n = (size_t)constraint->count;
+    bool hard = true;
+    memset(block, 0, sizeof *block);
+    block->rows = constraint->count;
+    block->body_a = constraint->body_a;
+    block->body_b = constraint->body_b;
+    memcpy(block->jacobian_a, rows->jacobian_a + 6 * at, 6 * n * sizeof(double));
+    memcpy(block->jacobian_b, rows->jacobian_b + 6 * at, 6 * n * sizeof(double));
+    memcpy(block->error, rows->bias + at, n * sizeof(double));
+    for (size_t r = at; r < at + n; ++r) hard = hard && rows->gain[r] == 1 && sadmm_row_is_coupled(rows, r);
+    block->kind = hard ? SADMM_BLOCK_HARD : SADMM_BLOCK_ROWS;
+    if (hard) return;
+    memcpy(block->gain, rows->gain + at, n * sizeof(double));
+    memcpy(block->compliance, rows->compliance + at, n * sizeof(double));
+    memcpy(block->lower, rows->lo + at, n * sizeof(double));
+    memcpy(block->upper, rows->hi + at, n * sizeof(double));
 }
 
 bool sadmm_row_acts(const struct sadmm_rows *rows, size_t r)

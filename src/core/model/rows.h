@@ -50,6 +50,9 @@ int32_t sadmm_rows_add(struct sadmm_rows *rows, int32_t count, int32_t body_a, i
 /* Add what a block means, and its multipliers (6, or NULL for 0). False when memory runs out. */
 bool sadmm_rows_add_block(struct sadmm_rows *rows, const sadmm_problem_block *block, const double *lambda);
 
+/* The block that constraint k is: HARD or ROWS; not of a contact. */
+void sadmm_rows_block(const struct sadmm_rows *rows, size_t k, sadmm_problem_block *block);
+
 /* Laws of row r. */
 static inline void sadmm_row_set(struct sadmm_rows *rows, int32_t r, double gain, double bias, double compliance,
                                  double lo, double hi)

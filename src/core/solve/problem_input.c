@@ -263,11 +263,26 @@ sadmm_status sadmm_problem_set_contacts(sadmm_problem *problem, int32_t count, c
 
 /* ---- blocks -------------------------------------------------------------------------------------------------- */
 
+static sadmm_status check_laws(int32_t index, const sadmm_problem_block *block, struct sadmm_error *error)
+{
+    TRY(check_vector("blocks", index, "gain", block->gain, block->rows, 0, error));
+    TRY(check_vector("blocks", index, "compliance", block->compliance, block->rows, 0, error));
+    for (int r = 0; r < block->rows; ++r) {
+        const double lower = block->lower[r], upper = block->upper[r];
+        if (block->gain[r] == 0 && block->compliance[r] == 0)
+            REFUSE("blocks[%d].gain[%d] = blocks[%d].compliance[%d] = 0: one must be > 0", index, r, index, r);
+        if (!(in_range(lower) || lower == -INFINITY) || !(in_range(upper) || upper == INFINITY) || lower > upper)
+            REFUSE("blocks[%d].lower[%d] = %g, upper[%d] = %g: must be lower <= upper, within +-%g or infinite", index,
+                   r, lower, r, upper, VALUE_LIMIT);
+    }
+    return SADMM_OK;
+}
+
 static sadmm_status check_block(int32_t index, const sadmm_problem_block *block, int32_t bodies,
                                 struct sadmm_error *error)
 {
-    if ((unsigned)block->kind > SADMM_BLOCK_SOFT)
-        REFUSE("blocks[%d].kind = %d: must be in [0, 2]", index, (int)block->kind);
+    if ((unsigned)block->kind > SADMM_BLOCK_ROWS)
+        REFUSE("blocks[%d].kind = %d: must be in [0, 3]", index, (int)block->kind);
     bool contact = block->kind == SADMM_BLOCK_CONTACT;
     if (contact ? block->rows != 3 : block->rows < 1 || block->rows > 6)
         REFUSE("blocks[%d].rows = %d: must be %s", index, block->rows, contact ? "3 for a contact" : "in [1, 6]");
@@ -287,7 +302,7 @@ static sadmm_status check_block(int32_t index, const sadmm_problem_block *block,
         TRY(check_vector("blocks", index, "stiffness", block->stiffness, rows, 0, error));
         TRY(check_vector("blocks", index, "damping", block->damping, rows, 0, error));
     }
-    return SADMM_OK;
+    return block->kind == SADMM_BLOCK_ROWS ? check_laws(index, block, error) : SADMM_OK;
 }
 
 /* Only what the block's kind and size use; the rest is 0, so that no reader has to check `rows` first. */
@@ -306,6 +321,12 @@ static void load_block(const sadmm_problem_block *given, sadmm_problem_block *bl
     if (given->kind == SADMM_BLOCK_SOFT) {
         memcpy(block->stiffness, given->stiffness, rows * sizeof(double));
         memcpy(block->damping, given->damping, rows * sizeof(double));
+    }
+    if (given->kind == SADMM_BLOCK_ROWS) {
+        memcpy(block->gain, given->gain, rows * sizeof(double));
+        memcpy(block->compliance, given->compliance, rows * sizeof(double));
+        memcpy(block->lower, given->lower, rows * sizeof(double));
+        memcpy(block->upper, given->upper, rows * sizeof(double));
     }
 }
 

@@ -179,6 +179,7 @@ sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id)
     TRY(sadmm_world_take_back(world));
     for (size_t s = body->first_shape; body->shape_count > 0; ++s)
         if (world->shapes[s].alive && world->shapes[s].body == (int32_t)id.slot - 1) sadmm_world_kill_shape(world, s);
+    sadmm_world_kill_joints_of(world, (int32_t)id.slot - 1);
     sadmm_pair_table_forget(&world->disabled_pairs, id.slot - 1);
     sadmm_free(body->name);
     body->name = NULL;

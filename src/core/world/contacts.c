@@ -88,21 +88,38 @@ sadmm_status sadmm_world_contacts(sadmm_world *world, int32_t first, int32_t cou
     return SADMM_OK;
 }
 
-static sadmm_status freeze(const sadmm_world *world, sadmm_problem *problem, double *A, double *b, double *v,
-                           sadmm_problem_contact *contacts)
+/* The rows of joints, with the multipliers that the step started from. */
+static void freeze_rows(const struct sadmm_step_start *start, sadmm_problem_block *blocks, double *lambda)
+{
+    for (size_t k = 0; k < start->rows.constraint_count; ++k) {
+        const struct sadmm_row_constraint *constraint = &start->rows.constraints[k];
+        sadmm_rows_block(&start->rows, k, &blocks[k]);
+        for (int32_t r = 0; r < constraint->count; ++r)
+            lambda[6 * k + (size_t)r] = start->multiplier[constraint->first + r];
+    }
+}
+
+/* What a frozen problem is made of. */
+struct frozen {
+    double *A, *b, *v, *lambda;
+    sadmm_problem_contact *contacts;
+    sadmm_problem_block *blocks;
+};
+
+static sadmm_status freeze(const sadmm_world *world, sadmm_problem *problem, const struct frozen *f)
 {
     size_t n = (size_t)world->plan.bodies;
     const sadmm_settings settings = sadmm_settings_of_substep(&world->step_settings);
     struct sadmm_system system = {.body_count = world->plan.bodies, .rigid = world->start.rigid};
     for (size_t i = 0; i < n; ++i) {
-        sadmm_system_body(&system, &settings, (int32_t)i, A + 36 * i, b + 6 * i);
-        memcpy(v + 6 * i, world->start.velocity + 6 * i, 6 * sizeof *v);
+        sadmm_system_body(&system, &settings, (int32_t)i, f->A + 36 * i, f->b + 6 * i);
+        memcpy(f->v + 6 * i, world->start.velocity + 6 * i, 6 * sizeof *f->v);
     }
     for (size_t p = 0; p < world->contacts.pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &world->contacts.pairs[p];
         for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
             const struct sadmm_contact_point *point = &world->contacts.points[k];
-            sadmm_problem_contact *contact = &contacts[k];
+            sadmm_problem_contact *contact = &f->contacts[k];
             contact->body_a = pair->body_a;
             contact->body_b = pair->body_b;
             memcpy(contact->normal, pair->normal, sizeof contact->normal);
@@ -113,9 +130,13 @@ static sadmm_status freeze(const sadmm_world *world, sadmm_problem *problem, dou
             contact->friction = pair->friction;
         }
     }
-    sadmm_status status = sadmm_problem_set_bodies(problem, world->plan.bodies, A, b, v);
+    freeze_rows(&world->start, f->blocks, f->lambda);
+    sadmm_status status = sadmm_problem_set_bodies(problem, world->plan.bodies, f->A, f->b, f->v);
     if (status != SADMM_OK) return status;
-    return sadmm_problem_set_contacts(problem, (int32_t)world->contacts.point_count, contacts, world->start.impulse);
+    status = sadmm_problem_set_contacts(problem, (int32_t)world->contacts.point_count, f->contacts,
+                                        world->start.impulse);
+    if (status != SADMM_OK) return status;
+    return sadmm_problem_set_blocks(problem, (int32_t)world->start.rows.constraint_count, f->blocks, f->lambda);
 }
 
 sadmm_status sadmm_world_freeze(sadmm_world *world, sadmm_problem *problem)
@@ -127,13 +148,25 @@ sadmm_status sadmm_world_freeze(sadmm_world *world, sadmm_problem *problem)
     if (!world->stepped || !world->contacts_readable)
         return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE,
                           "there is no step to freeze: none was made yet, or something was removed since");
-    size_t n = (size_t)world->plan.bodies, k = world->contacts.point_count;
-    double *A = (double *)sadmm_alloc(48 * n, sizeof *A);
-    sadmm_problem_contact *contacts = (sadmm_problem_contact *)sadmm_alloc(k, sizeof *contacts);
-    sadmm_status status = A && contacts ? freeze(world, problem, A, A + 36 * n, A + 42 * n, contacts)
-                                        : sadmm_fail_memory(error, "the frozen problem");
-    if (status != SADMM_OK && A && contacts) sadmm_fail(error, status, "%s", sadmm_problem_message(problem));
-    sadmm_free(A);
-    sadmm_free(contacts);
+    const size_t n = (size_t)world->plan.bodies, points = world->contacts.point_count,
+                 blocks = world->start.rows.constraint_count;
+    struct frozen f;
+    f.A = (double *)sadmm_alloc(48 * n + 6 * blocks, sizeof *f.A);
+    f.contacts = (sadmm_problem_contact *)sadmm_alloc(points, sizeof *f.contacts);
+    f.blocks = (sadmm_problem_block *)sadmm_alloc(blocks, sizeof *f.blocks);
+    const bool allocated = f.A && f.contacts && f.blocks;
+    sadmm_status status = SADMM_OK;
+    if (allocated) {
+        f.b = f.A + 36 * n;
+        f.v = f.b + 6 * n;
+        f.lambda = f.v + 6 * n;
+        status = freeze(world, problem, &f);
+        if (status != SADMM_OK) sadmm_fail(error, status, "%s", sadmm_problem_message(problem));
+    } else {
+        status = sadmm_fail_memory(error, "the frozen problem");
+    }
+    sadmm_free(f.A);
+    sadmm_free(f.contacts);
+    sadmm_free(f.blocks);
     return status;
 }

@@ -19,7 +19,7 @@ __attribute__((format(printf, 2, 3))) static void line(struct text *text, const 
     if (written > 0) text->length += (size_t)written;
 }
 
-static void explain_constraints(struct text *t, const struct sadmm_plan *plan)
+static void explain_constraints(struct text *t, const struct sadmm_plan *plan, int32_t joints)
 {
     if (plan->contact_rows == 3)
         line(t, "contacts     %d points in %d pairs, 3 rows each (friction)\n", plan->points, plan->pairs);
@@ -28,7 +28,9 @@ static void explain_constraints(struct text *t, const struct sadmm_plan *plan)
              plan->pairs);
     else
         line(t, "contacts     left out: nothing touches\n");
-    if (plan->row_constraints) line(t, "rows         %d constraints given by rows\n", plan->row_constraints);
+    if (plan->row_constraints)
+        line(t, "rows         %d constraints of %d joints; steps are made by the host\n", plan->row_constraints,
+             joints);
     else line(t, "rows         left out: there are none\n");
 }
 
@@ -80,7 +82,7 @@ size_t sadmm_world_explain(sadmm_world *world, char *out, size_t size)
     if (settings.substeps > 1)
         line(&t, "sub-steps    %d of %g s with up to %d iterations each; what follows is the last one's\n",
              settings.substeps, settings.dt, settings.iterations);
-    explain_constraints(&t, plan);
+    explain_constraints(&t, plan, world->report.joints);
     explain_options(&t, plan, &settings);
     line(&t, "iterations   %d of at most %d%s\n", world->report.iterations, settings.iterations * settings.substeps,
          world->report.iterations == settings.substeps && !plan->points ? ": without constraints Step 1 is exact" : "");

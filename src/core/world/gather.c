@@ -104,7 +104,7 @@ sadmm_status sadmm_world_gather(sadmm_world *world)
     g.world = world;
     g.barrier = (struct sadmm_barrier){0};
     sadmm_parallel(&world->team, sadmm_pass_threads(last_threads(world), slots), gather_share, &g);
-    return SADMM_OK;
+    return sadmm_world_begin_joints(world);
 }
 
 struct turning {
@@ -147,6 +147,7 @@ void sadmm_world_swap_starts(sadmm_world *world)
 struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *world, int substep)
 {
     const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings);
+    const bool joined = world->joined_pairs.count > 0;
     struct sadmm_collision_input input = {
         .shapes = world->shapes,
         .shape_count = world->shape_slots,
@@ -158,8 +159,8 @@ struct sadmm_collision_input sadmm_world_collision_input(const sadmm_world *worl
         .substeps_left = settings.substeps - 1 - substep,
         .margin = world->def.contact_margin,
         .threads = last_threads(world),
-        .disabled_body_pairs = world->disabled_pairs.keys,
-        .disabled_body_pair_count = world->disabled_pairs.count,
+        .disabled_body_pairs = joined ? world->filtered_pairs : world->disabled_pairs.keys,
+        .disabled_body_pair_count = joined ? world->filtered_count : world->disabled_pairs.count,
         .friction_pairs = world->friction_pairs.keys,
         .friction_values = world->friction_pairs.values,
         .friction_pair_count = world->friction_pairs.count,
@@ -177,6 +178,7 @@ struct sadmm_system sadmm_world_system(sadmm_world *world)
         .velocity = world->velocity,
         .contacts = &world->contacts,
         .first = !world->stepped,
+        .rows = world->start.rows.constraint_count > 0 ? &world->start.rows : NULL,
     };
     return system;
 }

@@ -25,3 +25,15 @@ struct sadmm_shape *sadmm_world_find_shape(const sadmm_world *world, sadmm_shape
                id.slot, id.generation);
     return NULL;
 }
+
+struct sadmm_world_joint *sadmm_world_find_joint(const sadmm_world *world, sadmm_joint_id id, const char *argument,
+                                                 struct sadmm_error *error)
+{
+    if (id.slot >= 1 && id.slot <= world->joint_slots) {
+        struct sadmm_world_joint *joint = &world->joints[id.slot - 1];
+        if (joint->alive && joint->generation == id.generation) return joint;
+    }
+    sadmm_fail(error, SADMM_ERROR_STALE_ID, "%s = (slot %u, generation %u): no such joint (any more)", argument,
+               id.slot, id.generation);
+    return NULL;
+}

@@ -98,6 +98,12 @@ static sadmm_status name_offending_body(sadmm_world *world)
                 if (!isfinite(world->contacts.points[k].impulse[j]))
                     return sadmm_world_not_finite(world, pair->body_b >= 0 ? pair->body_b : pair->body_a);
     }
+    for (size_t k = 0; k < world->start.rows.constraint_count; ++k) {
+        const struct sadmm_row_constraint *constraint = &world->start.rows.constraints[k];
+        for (int32_t r = constraint->first; r < constraint->first + constraint->count; ++r)
+            if (!isfinite(world->start.rows.lambda[r]))
+                return sadmm_world_not_finite(world, constraint->body_b >= 0 ? constraint->body_b : constraint->body_a);
+    }
     return SADMM_ERROR_NON_FINITE;
 }
 
@@ -125,6 +131,7 @@ static void commit(sadmm_world *world)
 {
     const int threads = sadmm_pass_threads(world->plan.threads, (size_t)world->dynamic_count);
     sadmm_parallel(&world->team, threads, commit_share, world);
+    sadmm_world_commit_joints(world);
     world->stepped = true;
     world->contacts_readable = true;
 }
@@ -152,6 +159,7 @@ static sadmm_status make_plan(struct host_step *step)
     sadmm_world *world = step->world;
     double depth = 0;
     step->found = true;
+    TRY(sadmm_world_make_rows(world, &step->settings));
     step->system = sadmm_world_system(world);
     step->system.first = step->system.first && step->stages.substep == 0;
     world->plan = sadmm_plan_make(&step->system, &step->settings);
@@ -182,6 +190,10 @@ static sadmm_status integrate(struct host_step *step)
 {
     sadmm_world *world = step->world;
     TRY(world->kernels->integrate(world->context, world->next, &world->error));
+    if (step->system.rows) {
+        TRY(sadmm_world_move_joined(world, &step->settings));
+        sadmm_world_keep_rows(world, &step->settings);
+    }
     add_substep(step);
     return check_next(world);
 }
@@ -237,6 +249,7 @@ static void report_step(const struct host_step *step)
     for (int phase = 0; phase < SADMM_PHASE_COUNT; ++phase)
         done.ms.total += phase == SADMM_PHASE_CERTIFY ? 0 : ms[phase];
     sadmm_world_report_steps(step->world, 1, &done);
+    step->world->report.joints = step->world->joints_acting;
     step->world->report.certificate = solved->certificate;
     if (step->islands_above > solved->certificate.islands_above)
         step->world->report.certificate.islands_above = step->islands_above;

@@ -2,8 +2,9 @@
  *
  *   slots, pair_table, ids, report   lists and names
  *   gather                           what a step reads
+ *   joint_rows, joint_move           joints as constraint rows, and where they let bodies go
  *   resident                         where a backend keeps the world
- *   shape, body, contacts, explain   what callers see of it, and change
+ *   shape, joint, body, contacts, explain   what callers see of it, and change
  *   step, world                      steps; settings, the whole
  */
 #ifndef SADMM_CORE_WORLD_INTERNAL_H
@@ -13,12 +14,14 @@
 #include "core/base/check.h"
 #include "core/base/error.h"
 #include "core/base/parallel.h"
+#include "core/math/joint.h"
 #include "core/model/settings.h"
 #include "core/solve/certificate.h"
 #include "core/solve/kernels.h"
 #include "core/solve/schedule.h"
 #include "pair_table.h"
 #include "slots.h"
+#include "subadmm/joint.h"
 #include "subadmm/world.h"
 
 enum { SADMM_NAME_SIZE = 64, SADMM_WHY_SIZE = 256 }; /* a name is cut to what fits, with its final 0 */
@@ -40,12 +43,50 @@ struct sadmm_world_body {
     int64_t set_at[SADMM_BODY_EDITS]; /* steps enqueued since the world was loaded, when that was set; -1: before */
 };
 
+/* What acts along a coordinate of a joint, each by a row of its own. */
+enum sadmm_joint_role {
+    SADMM_ROLE_LOCK,
+    SADMM_ROLE_LOWER,
+    SADMM_ROLE_UPPER,
+    SADMM_ROLE_DRIVE,
+    SADMM_ROLE_FRICTION,
+    SADMM_ROLE_SPRING,
+    SADMM_ROLE_COUNT
+};
+
+/* What a joint keeps from step to step. */
+struct sadmm_joint_memory {
+    double force[SADMM_ROLE_COUNT][JOINT_COORDINATES]; /* on b along the coordinate: what the next step starts from */
+    double angle[JOINT_COORDINATES];                   /* of those that wind, at the step's start */
+    double wrench[6], point[3];                        /* as in sadmm_joint_state, on b */
+    bool leads_stay;                                   /* its bodies were moved by the velocities of the step's end */
+};
+
+/* A joint slot. */
+struct sadmm_world_joint {
+    bool alive;
+    uint32_t generation;
+    sadmm_joint_def def;    /* locks: what is locked */
+    int32_t body[2];        /* slots of a and b, -1: the static world */
+    struct joint_frame frame[2];
+    struct sadmm_joint_memory last, next; /* of the last step; of the one at hand, or a sub-step of it */
+};
+
+/* The joint's row that a row of the step is. */
+struct sadmm_joint_source {
+    int32_t joint; /* slot */
+    int8_t role, coordinate, sign;
+    double gap, slack; /* of limits: at the step's start, m or rad; what the turning of the row makes of it in a step */
+};
+
 /* What the last step started from, for contacts, freeze and the certificate. */
 struct sadmm_step_start {
     struct sadmm_rigid *rigid; /* dynamic bodies */
     double *velocity;          /* dynamic bodies x 6: the warm start */
     double *impulse;           /* points x 3: the warm start */
-    size_t rigid_capacity, velocity_capacity, impulse_capacity;
+    struct sadmm_rows rows;    /* of joints; their multipliers are the solution */
+    double *multiplier;        /* rows: the warm start */
+    size_t rigid_capacity, velocity_capacity, impulse_capacity, multiplier_capacity;
 };
 
 struct sadmm_world {
@@ -65,6 +106,19 @@ struct sadmm_world {
     struct sadmm_slot_marks shape_marks;
     uint32_t shape_revisions;
     struct sadmm_pair_table disabled_pairs, friction_pairs;
+
+    struct sadmm_world_joint *joints;
+    size_t joint_slots, joint_capacity;
+    int32_t joint_count;
+    struct sadmm_slot_marks joint_marks;
+    struct sadmm_pair_table joined_pairs; /* bodies that do not meet for their joints; values: how many joints */
+    uint64_t *filtered_pairs;             /* these and `disabled_pairs`, as of the last step */
+    size_t filtered_count, filtered_capacity;
+    struct sadmm_joint_source *joint_sources; /* of the step's rows */
+    int32_t *joint_labels;                    /* dynamic bodies: islands, at the end of a step with joints */
+    uint8_t *joint_touch;                     /* of islands, at their labels (joint_move.c) */
+    size_t joint_source_capacity, joint_label_capacity, joint_touch_capacity;
+    int32_t joints_acting;                    /* in the step at hand */
 
     /* The last step: everything freeze, contacts and the next warm start need. */
     struct sadmm_collision *collision;
@@ -121,6 +175,29 @@ struct sadmm_system sadmm_world_system(sadmm_world *world);
 /* SADMM_ERROR_NON_FINITE that names a dynamic body. */
 sadmm_status sadmm_world_not_finite(sadmm_world *world, int32_t body);
 
+/* ---- joint_rows.c ---- */
+
+/* Pairs of bodies that are not to meet, into `filtered_pairs`; and what joints kept of the last step into what they
+ * keep of this one. */
+sadmm_status sadmm_world_begin_joints(sadmm_world *world);
+/* Rows of the (sub-)step's joints into `start`, from the bodies there. */
+sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *settings);
+/* The solution's multipliers into what joints keep. */
+void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings);
+/* The step is done. */
+void sadmm_world_commit_joints(sadmm_world *world);
+/* A joint's frame on a body, in the world; rigid NULL: on the static world. */
+struct joint_end sadmm_joint_end(const struct joint_frame *frame, const struct sadmm_rigid *rigid);
+/* A radial joint's coordinate 0 is a distance. */
+bool sadmm_joint_is_radial(sadmm_joint_kind kind);
+/* How fast a coordinate changes by the velocities of a and b (6 each). */
+double sadmm_joint_rate(const struct joint_geometry *geometry, int coordinate, const double *a, const double *b);
+
+/* ---- joint_move.c ---- */
+
+/* Bodies of islands with joints as they are after the step, in the place of what the backend made of them. */
+sadmm_status sadmm_world_move_joined(sadmm_world *world, const sadmm_settings *settings);
+
 /* ---- report.c ---- */
 
 /* `steps` more steps have been done; `done` is what the last of them was like. */
@@ -162,6 +239,8 @@ struct sadmm_world_body *sadmm_world_find_body(const sadmm_world *world, sadmm_b
                                                struct sadmm_error *error);
 struct sadmm_shape *sadmm_world_find_shape(const sadmm_world *world, sadmm_shape_id id, const char *argument,
                                            struct sadmm_error *error);
+struct sadmm_world_joint *sadmm_world_find_joint(const sadmm_world *world, sadmm_joint_id id, const char *argument,
+                                                 struct sadmm_error *error);
 
 /* ---- body.c ---- */
 
@@ -171,5 +250,10 @@ sadmm_status sadmm_world_check_inertias(sadmm_world *world, sadmm_precision prec
 /* ---- shape.c ---- */
 
 void sadmm_world_kill_shape(sadmm_world *world, size_t slot);
+
+/* ---- joint.c ---- */
+
+/* The joints of a body that is removed. */
+void sadmm_world_kill_joints_of(sadmm_world *world, int32_t body);
 
 #endif

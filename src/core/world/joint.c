@@ -1,0 +1,394 @@
+/* Joints of a world: what callers see of them, and change. */
+#include "subadmm/joint.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "core/math/rigid.h"
+#include "world_internal.h"
+
+static const double FRAME_LIMIT = 1e9, FORCE_LIMIT = 1e15;
+enum { MOST_JOINTS = 1 << 24 };
+
+enum { TX = 1, TY = 2, TZ = 4, RX = 8, RY = 16, RZ = 32 };
+
+/* CUSTOM names its own. */
+static const uint32_t locks_of[SADMM_JOINT_KIND_COUNT] = {
+    [SADMM_JOINT_FIXED] = JOINT_ALL_LOCKED,
+    [SADMM_JOINT_REVOLUTE] = JOINT_ALL_LOCKED & ~RZ,
+    [SADMM_JOINT_PRISMATIC] = JOINT_ALL_LOCKED & ~TZ,
+    [SADMM_JOINT_CYLINDRICAL] = JOINT_ALL_LOCKED & ~(TZ | RZ),
+    [SADMM_JOINT_SPHERICAL] = TX | TY | TZ,
+    [SADMM_JOINT_UNIVERSAL] = TX | TY | TZ | RZ,
+    [SADMM_JOINT_PLANAR] = TZ | RX | RY,
+    [SADMM_JOINT_CARTESIAN] = RX | RY | RZ,
+    [SADMM_JOINT_DISTANCE] = TX,
+    [SADMM_JOINT_SPRING] = 0,
+    [SADMM_JOINT_LINK] = TX | TZ,
+};
+
+sadmm_joint_def sadmm_joint_def_default(void)
+{
+    sadmm_joint_def def = {.kind = SADMM_JOINT_FIXED,
+                           .orientation_a = {1, 0, 0, 0},
+                           .orientation_b = {1, 0, 0, 0},
+                           .length = -1,
+                           .enabled = true};
+    for (int k = 0; k < JOINT_COORDINATES; ++k) def.coordinates[k].drive_force = INFINITY;
+    return def;
+}
+
+/* ---- checks ------------------------------------------------------------------------------------------------------ */
+
+static bool acts(const sadmm_joint_coordinate *c)
+{
+    return c->limited || c->drive != SADMM_DRIVE_OFF || c->friction != 0 || c->spring_stiffness != 0 ||
+           c->spring_damping != 0;
+}
+
+static sadmm_status check_limits(const char *name, const sadmm_joint_coordinate *c, struct sadmm_error *error)
+{
+    if (isnan(c->lower) || isnan(c->upper) || c->lower == INFINITY || c->upper == -INFINITY || c->lower > c->upper)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "%slower = %g, upper = %g: must be numbers, lower in [-inf, upper], upper in [lower, inf]",
+                          name, c->lower, c->upper);
+    return SADMM_OK;
+}
+
+/* name: what stands before the fields, "coordinate->" say. */
+static sadmm_status check_coordinate(const char *name, const sadmm_joint_coordinate *c, struct sadmm_error *error)
+{
+    const struct {
+        const char *field;
+        double value, least, most;
+    } numbers[] = {
+        {"target_position", c->target_position, -FRAME_LIMIT, FRAME_LIMIT},
+        {"target_speed", c->target_speed, -FRAME_LIMIT, FRAME_LIMIT},
+        {"drive_stiffness", c->drive_stiffness, 0, FORCE_LIMIT},
+        {"drive_damping", c->drive_damping, 0, FORCE_LIMIT},
+        {"drive_force", c->drive_force, 0, INFINITY},
+        {"friction", c->friction, 0, FORCE_LIMIT},
+        {"spring_stiffness", c->spring_stiffness, 0, FORCE_LIMIT},
+        {"spring_damping", c->spring_damping, 0, FORCE_LIMIT},
+        {"spring_rest", c->spring_rest, -FRAME_LIMIT, FRAME_LIMIT},
+    };
+    TRY(check_limits(name, c, error));
+    if ((unsigned)c->drive >= SADMM_DRIVE_COUNT)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%sdrive = %d: must be in [0, %d]", name, (int)c->drive,
+                          SADMM_DRIVE_COUNT - 1);
+    for (size_t k = 0; k < sizeof numbers / sizeof *numbers; ++k)
+        if (!(numbers[k].value >= numbers[k].least && numbers[k].value <= numbers[k].most))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s%s = %g: must be in [%g, %g]", name,
+                              numbers[k].field, numbers[k].value, numbers[k].least, numbers[k].most);
+    return SADMM_OK;
+}
+
+static bool has_coordinate(const sadmm_joint_def *def, int k) { return k == 0 || !sadmm_joint_is_radial(def->kind); }
+
+static sadmm_status check_coordinates(const sadmm_joint_def *def, uint32_t locks, struct sadmm_error *error)
+{
+    for (int k = 0; k < JOINT_COORDINATES; ++k) {
+        const sadmm_joint_coordinate *c = &def->coordinates[k];
+        char name[32] = "def->coordinates[0].";
+        name[17] = (char)('0' + k);
+        TRY(check_coordinate(name, c, error));
+        if (acts(c) && (locks >> k & 1 || !has_coordinate(def, k)))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                              "def->coordinates[%d]: must be the default, for the joint %s that coordinate", k,
+                              locks >> k & 1 ? "locks" : "does not have");
+    }
+    return SADMM_OK;
+}
+
+/* The slot of a joint's body, -1: the static world. */
+static sadmm_status find_side(const sadmm_world *world, sadmm_body_id id, const char *name, int32_t *slot,
+                              struct sadmm_error *error)
+{
+    *slot = -1;
+    if (id.slot == 0 && id.generation == 0) return SADMM_OK;
+    if (!sadmm_world_find_body(world, id, name, error)) return SADMM_ERROR_STALE_ID;
+    *slot = (int32_t)id.slot - 1;
+    return SADMM_OK;
+}
+
+static bool moves(const sadmm_world *world, int32_t slot)
+{
+    return slot >= 0 && world->bodies[slot].type != SADMM_BODY_STATIC;
+}
+
+static sadmm_status find_sides(const sadmm_world *world, const sadmm_joint_def *def, int32_t slots[2],
+                               struct sadmm_error *error)
+{
+    TRY(find_side(world, def->body_a, "def->body_a", &slots[0], error));
+    TRY(find_side(world, def->body_b, "def->body_b", &slots[1], error));
+    if (slots[0] == slots[1] && slots[0] >= 0)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "def->body_a = def->body_b = (slot %u, generation %u): must be two bodies", def->body_a.slot,
+                          def->body_a.generation);
+    if (!moves(world, slots[0]) && !moves(world, slots[1]))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "def->body_a = (slot %u, generation %u), def->body_b = (slot %u, generation %u): one at "
+                          "least must be dynamic", def->body_a.slot, def->body_a.generation, def->body_b.slot,
+                          def->body_b.generation);
+    return SADMM_OK;
+}
+
+static sadmm_status check_frames(const sadmm_joint_def *def, struct joint_frame frames[2], struct sadmm_error *error)
+{
+    static const char *const positions[2] = {"def->position_a", "def->position_b"},
+                             *const orientations[2] = {"def->orientation_a", "def->orientation_b"};
+    for (int s = 0; s < 2; ++s) {
+        const double *position = s ? def->position_b : def->position_a;
+        double unit[4];
+        TRY(sadmm_check_vector(positions[s], position, 3, FRAME_LIMIT, error));
+        TRY(sadmm_check_orientation(orientations[s], s ? def->orientation_b : def->orientation_a, unit, error));
+        frames[s].position = v3_load(position);
+        frames[s].orientation = q_load(unit);
+    }
+    return SADMM_OK;
+}
+
+static sadmm_status check_def(const sadmm_joint_def *def, uint32_t *locks, struct sadmm_error *error)
+{
+    if ((unsigned)def->kind >= SADMM_JOINT_KIND_COUNT)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->kind = %d: must be in [0, %d]", (int)def->kind,
+                          SADMM_JOINT_KIND_COUNT - 1);
+    *locks = def->kind == SADMM_JOINT_CUSTOM ? def->locks : locks_of[def->kind];
+    if (*locks > JOINT_ALL_LOCKED)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->locks = %u: must be in [0, %d]", def->locks,
+                          JOINT_ALL_LOCKED);
+    if (def->length != -1) TRY(sadmm_check_range("def->length (or -1: as it is)", def->length, 0, FRAME_LIMIT, error));
+    return check_coordinates(def, *locks, error);
+}
+
+/* ---- life -------------------------------------------------------------------------------------------------------- */
+
+static bool alive(const sadmm_world *world, size_t slot) { return world->joints[slot].alive; }
+
+static const struct sadmm_rigid *pose_of(const sadmm_world *world, int32_t slot)
+{
+    return slot >= 0 ? &world->bodies[slot].rigid : NULL;
+}
+
+static struct joint_geometry geometry_now(const sadmm_world *world, const struct sadmm_world_joint *joint)
+{
+    struct joint_end ends[2];
+    for (int s = 0; s < 2; ++s) ends[s] = sadmm_joint_end(&joint->frame[s], pose_of(world, joint->body[s]));
+    return joint_geometry_of(&ends[0], &ends[1], joint->def.locks, sadmm_joint_is_radial(joint->def.kind));
+}
+
+/* The pair that does not meet for this joint. */
+static bool leaves_out(const struct sadmm_world_joint *joint, uint64_t *key)
+{
+    if (joint->def.collide || joint->body[0] < 0 || joint->body[1] < 0) return false;
+    *key = sadmm_pair_key((size_t)joint->body[0], (size_t)joint->body[1]);
+    return true;
+}
+
+static sadmm_status add_pair(sadmm_world *world, const struct sadmm_world_joint *joint)
+{
+    uint64_t key;
+    size_t at;
+    if (!leaves_out(joint, &key)) return SADMM_OK;
+    const double before =
+        sadmm_pair_table_find(&world->joined_pairs, key, &at) ? world->joined_pairs.values[at] : 0;
+    return sadmm_pair_table_set(&world->joined_pairs, key, before + 1, &world->error);
+}
+
+static void remove_pair(sadmm_world *world, const struct sadmm_world_joint *joint)
+{
+    uint64_t key;
+    size_t at;
+    if (!leaves_out(joint, &key) || !sadmm_pair_table_find(&world->joined_pairs, key, &at)) return;
+    if (--world->joined_pairs.values[at] <= 0) sadmm_pair_table_remove(&world->joined_pairs, key);
+}
+
+static sadmm_status new_slot(sadmm_world *world, size_t *slot)
+{
+    *slot = world->joint_slots;
+    if ((size_t)world->joint_count < world->joint_slots) *slot = sadmm_slot_free(&world->joint_marks, world, alive);
+    if (*slot >= MOST_JOINTS)
+        return sadmm_fail(&world->error, SADMM_ERROR_LIMIT, "%d joints: a world holds at most 2^24",
+                          world->joint_count);
+    if (!sadmm_grow(&world->joints, &world->joint_capacity, world->joint_slots, *slot + 1, sizeof *world->joints))
+        return sadmm_fail_memory(&world->error, "a joint");
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_add_joint(sadmm_world *world, const sadmm_joint_def *def, sadmm_joint_id *id)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    struct sadmm_world_joint made = {.alive = true};
+    size_t slot;
+    TRY(sadmm_check_given(def, "def", error));
+    made.def = *def;
+    TRY(check_def(def, &made.def.locks, error));
+    TRY(find_sides(world, def, made.body, error));
+    TRY(check_frames(def, made.frame, error));
+    TRY(sadmm_world_take_back(world));
+    q_store(made.frame[0].orientation, made.def.orientation_a);
+    q_store(made.frame[1].orientation, made.def.orientation_b);
+    if (def->length == -1 && sadmm_joint_is_radial(def->kind)) made.def.length = geometry_now(world, &made).value[0];
+    TRY(new_slot(world, &slot));
+    TRY(add_pair(world, &made));
+
+    made.generation = slot < world->joint_slots ? world->joints[slot].generation : 1;
+    world->joints[slot] = made;
+    if (slot == world->joint_slots) ++world->joint_slots;
+    sadmm_slot_taken(&world->joint_marks, slot);
+    ++world->joint_count;
+    if (id) {
+        id->slot = (uint32_t)slot + 1;
+        id->generation = made.generation;
+    }
+    return SADMM_OK;
+}
+
+static void kill_joint(sadmm_world *world, size_t slot)
+{
+    struct sadmm_world_joint *joint = &world->joints[slot];
+    remove_pair(world, joint);
+    joint->alive = false;
+    ++joint->generation;
+    --world->joint_count;
+    sadmm_slot_freed(&world->joint_marks, slot);
+}
+
+sadmm_status sadmm_world_remove_joint(sadmm_world *world, sadmm_joint_id id)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    if (!sadmm_world_find_joint(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_world_take_back(world));
+    kill_joint(world, id.slot - 1);
+    return SADMM_OK;
+}
+
+void sadmm_world_kill_joints_of(sadmm_world *world, int32_t body)
+{
+    for (size_t slot = 0; world->joint_count > 0 && slot < world->joint_slots; ++slot) {
+        const struct sadmm_world_joint *joint = &world->joints[slot];
+        if (joint->alive && (joint->body[0] == body || joint->body[1] == body)) kill_joint(world, slot);
+    }
+}
+
+int32_t sadmm_world_joint_count(const sadmm_world *world) { return world ? world->joint_count : 0; }
+
+sadmm_status sadmm_world_joint_at(sadmm_world *world, int32_t index, sadmm_joint_id *id)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    TRY(sadmm_check_given(id, "id", error));
+    if (index < 0 || index >= world->joint_count)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index,
+                          world->joint_count);
+    size_t slot = (size_t)index;
+    if ((size_t)world->joint_count < world->joint_slots)
+        slot = sadmm_slot_at(&world->joint_marks, index, world, alive);
+    id->slot = (uint32_t)slot + 1;
+    id->generation = world->joints[slot].generation;
+    return SADMM_OK;
+}
+
+/* ---- what it is, and what is set --------------------------------------------------------------------------------- */
+
+sadmm_status sadmm_world_joint_def(sadmm_world *world, sadmm_joint_id id, sadmm_joint_def *def)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    const struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", &world->error);
+    if (!joint) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(def, "def", &world->error));
+    *def = joint->def;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id, bool enabled)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", &world->error);
+    if (!joint) return SADMM_ERROR_STALE_ID;
+    joint->def.enabled = enabled;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id id, int32_t index,
+                                              const sadmm_joint_coordinate *coordinate)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", error);
+    if (!joint) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(coordinate, "coordinate", error));
+    if (index < 0 || index >= JOINT_COORDINATES || joint->def.locks >> index & 1 || !has_coordinate(&joint->def, index))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "index = %d: must be a free coordinate of the joint, in [0, 6) (locked: mask %u)", index,
+                          joint->def.locks);
+    TRY(check_coordinate("coordinate->", coordinate, error));
+    joint->def.coordinates[index] = *coordinate;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_place_joint(sadmm_world *world, sadmm_joint_def *def, const double position[3],
+                                     const double orientation[4])
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    double unit[4];
+    int32_t slots[2];
+    TRY(sadmm_check_given(def, "def", error));
+    TRY(sadmm_check_given(position, "position", error));
+    TRY(sadmm_check_given(orientation, "orientation", error));
+    TRY(find_sides(world, def, slots, error));
+    TRY(sadmm_check_vector("position", position, 3, FRAME_LIMIT, error));
+    TRY(sadmm_check_orientation("orientation", orientation, unit, error));
+    TRY(sadmm_world_pull_bodies(world));
+    for (int s = 0; s < 2; ++s) {
+        static const struct sadmm_rigid origin = {.orientation = {1, 0, 0, 0}};
+        const struct sadmm_rigid *body = slots[s] >= 0 ? pose_of(world, slots[s]) : &origin;
+        const quat back = q_conjugate(q_load(body->orientation));
+        v3_store(q_turn(back, v3_sub(v3_load(position), v3_load(body->position))),
+                 s ? def->position_b : def->position_a);
+        q_store(q_normalize(q_mul(back, q_load(unit))), s ? def->orientation_b : def->orientation_a);
+    }
+    return SADMM_OK;
+}
+
+/* ---- state ------------------------------------------------------------------------------------------------------- */
+
+static void read_motion(const sadmm_world *world, const struct sadmm_world_joint *joint, sadmm_joint_state *state)
+{
+    static const double still[6];
+    const struct joint_geometry geometry = geometry_now(world, joint);
+    const double *v[2];
+    for (int s = 0; s < 2; ++s) v[s] = joint->body[s] >= 0 ? world->bodies[joint->body[s]].rigid.velocity : still;
+    for (int k = 0; k < JOINT_COORDINATES; ++k) {
+        state->position[k] = joint_winds(joint->def.locks, k) ? joint_unwind(geometry.value[k], joint->last.angle[k])
+                                                              : geometry.value[k];
+        state->speed[k] = sadmm_joint_rate(&geometry, k, v[0], v[1]);
+    }
+    if (sadmm_joint_is_radial(joint->def.kind) && joint->def.locks & 1) state->position[0] -= joint->def.length;
+}
+
+sadmm_status sadmm_world_joint_state(sadmm_world *world, sadmm_joint_id id, sadmm_joint_state *state)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    const struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", &world->error);
+    if (!joint) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(state, "state", &world->error));
+    TRY(sadmm_world_pull_bodies(world));
+    const struct sadmm_joint_memory *last = &joint->last;
+    memset(state, 0, sizeof *state);
+    read_motion(world, joint, state);
+    memcpy(state->point, last->point, sizeof state->point);
+    for (int k = 0; k < JOINT_COORDINATES; ++k) {
+        state->wrench_b[k] = last->wrench[k];
+        state->wrench_a[k] = 0 - last->wrench[k];
+        state->lock_force[k] = last->force[SADMM_ROLE_LOCK][k];
+        state->limit_force[k] = last->force[SADMM_ROLE_LOWER][k] + last->force[SADMM_ROLE_UPPER][k];
+        state->drive_force[k] = last->force[SADMM_ROLE_DRIVE][k];
+        state->friction_force[k] = last->force[SADMM_ROLE_FRICTION][k];
+        state->spring_force[k] = last->force[SADMM_ROLE_SPRING][k];
+    }
+    return SADMM_OK;
+}
