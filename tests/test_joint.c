@@ -144,6 +144,7 @@ static void check_refused_laws(sadmm_world *world, sadmm_joint_def good)
         {{.spring_stiffness = NAN}, "coordinates[2].spring_stiffness = nan"},
         {{.spring_damping = -1}, "coordinates[2].spring_damping = -1"},
         {{.spring_rest = INFINITY}, "coordinates[2].spring_rest = inf"},
+        {{.armature = -1}, "coordinates[2].armature = -1: must be in [0,"},
     };
     for (size_t k = 0; k < sizeof bad / sizeof *bad; ++k) {
         sadmm_joint_def def = good;
@@ -189,6 +190,10 @@ START_TEST(bad_input_is_refused)
             check_refused(world, bad, "def->orientation_b = (0, 0, 0, 0)");
             bad = good, bad.length = -2;
             check_refused(world, bad, "def->length (or -1: as it is) = -2");
+            bad = good, bad.break_force = -1;
+            check_refused(world, bad, "def->break_force = -1: must be in [0, inf]");
+            bad = good, bad.break_torque = NAN;
+            check_refused(world, bad, "def->break_torque = nan: must be in [0, inf]");
             bad = good, bad.coordinates[1].friction = 1;
             check_refused(world, bad, "def->coordinates[1]: must be the default, for the joint locks");
             bad = good, bad.kind = SADMM_JOINT_SPRING, bad.coordinates[1].friction = 1;
@@ -395,6 +400,53 @@ START_TEST(reactions_carry_the_weight)
 }
 END_TEST
 
+/* The same along the axes of a's frame, which is a quarter turn about x from the world's. */
+START_TEST(reactions_in_the_joints_frame)
+{
+    static const double place[3] = {0}, quarter[4] = {0.70710678118654752440, 0.70710678118654752440, 0, 0};
+    const double expected[6] = {0, 2 * G, 0, 0, 0, 0.3 * 2 * G};
+    sadmm_world *world = solver_world(_i, 0.005);
+    sadmm_joint_def def = joint_def(SADMM_JOINT_FIXED, WORLD, add_body(world, 0.3, 0, 0));
+    sadmm_joint_id joint;
+    MUST(world, sadmm_world_place_joint(world, &def, place, quarter));
+    MUST(world, sadmm_world_add_joint(world, &def, &joint));
+    step_world(world, 200);
+    const double rounding = solvers[_i].precision == SADMM_F32 ? 1e-4 : 1e-9; /* as above */
+    for (int k = 0; k < 6; ++k)
+        ck_assert_double_eq_tol(joint_state(world, joint).wrench_joint[k], expected[k], rounding);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+/* A body of 2 kg on a lever of 0.3 m that bears 30 N, or 8 N m: 25 N pull it off, or a torque. */
+START_TEST(joints_break)
+{
+    for (int by_torque = 0; by_torque < 2; ++by_torque) {
+        const double zero[3] = {0}, pull[3] = {25, 0, 0}, twist[3] = {0, 0, 8};
+        sadmm_world *world = solver_world(_i, 0.005);
+        const sadmm_body_id body = add_body(world, 0.3, 0, 0);
+        sadmm_joint_def read, def = joint_def(SADMM_JOINT_FIXED, WORLD, body);
+        def.break_force = by_torque ? INFINITY : 30;
+        def.break_torque = by_torque ? 8 : INFINITY;
+        const sadmm_joint_id joint = add_joint(world, def, 0, 0, 0);
+        step_world(world, 50);
+        ck_assert(!joint_state(world, joint).broken);
+        MUST(world, sadmm_world_set_body_wrench(world, body, by_torque ? zero : pull, by_torque ? twist : zero));
+        step_world(world, 10); /* long enough for 20 iterations a step to find the load */
+        MUST(world, sadmm_world_joint_def(world, joint, &read));
+        ck_assert(joint_state(world, joint).broken && !read.enabled && sadmm_world_joint_count(world) == 1);
+        ck_assert_double_lt(body_state(world, body).linear_velocity[2], -G * 0.005 / 2); /* it falls */
+        step_world(world, 1);
+        ck_assert(joint_state(world, joint).broken && world_report(world).joints == 0);
+
+        MUST(world, sadmm_world_set_joint_enabled(world, joint, true));
+        MUST(world, sadmm_world_joint_def(world, joint, &read));
+        ck_assert(!joint_state(world, joint).broken && read.enabled);
+        sadmm_world_destroy(world);
+    }
+}
+END_TEST
+
 /* ---- free coordinates -------------------------------------------------------------------------------------------- */
 
 /* A body of 2 kg, 0.04 kg m^2 about z, that slides along and turns about z without gravity: coordinates 2 and 5. */
@@ -453,6 +505,24 @@ START_TEST(friction_holds_and_slips)
         ck_assert_double_eq_tol(state.speed[c], 1, 2 * CLOSE); /* (2.5 - 1.5) for 1 s */
         ck_assert_double_eq_tol(state.position[c], 0.5, 2 * CLOSE);
         ck_assert_double_eq_tol(state.friction_force[c], -1.5 * m, 1e-6 * m);
+        sadmm_world_destroy(s.world);
+    }
+}
+END_TEST
+
+/* Half as much again as the body's inertia moves along: the force is m d2q/dt2 + 1.5 m d2q/dt2. */
+START_TEST(armature)
+{
+    EACH_COORDINATE(c) {
+        struct slider s = new_slider(_i, 0.005);
+        const double m = s.inertia[c];
+        set_law(&s, c, (sadmm_joint_coordinate){.armature = 1.5 * m});
+        push(&s, c, 2.5 * m);
+        step_world(s.world, 200);
+        const sadmm_joint_state state = joint_state(s.world, s.joint);
+        ck_assert_double_eq_tol(state.speed[c], 1, 2 * CLOSE); /* 1 m/s^2 for 1 s */
+        ck_assert_double_eq_tol(state.position[c], 0.5, 2 * CLOSE);
+        ck_assert_double_eq_tol(state.armature_force[c], -1.5 * m, CLOSE * m);
         sadmm_world_destroy(s.world);
     }
 }
@@ -901,7 +971,10 @@ int main(void)
     tcase_add_test(cases, frames_are_drawn_together);
     tcase_add_loop_test(cases, closed_loops_hold, 0, SOLVERS);
     tcase_add_loop_test(cases, reactions_carry_the_weight, 0, SOLVERS);
+    tcase_add_loop_test(cases, reactions_in_the_joints_frame, 0, SOLVERS);
+    tcase_add_loop_test(cases, joints_break, 0, FAST_SOLVERS);
     tcase_add_loop_test(cases, friction_holds_and_slips, 0, FAST_SOLVERS);
+    tcase_add_loop_test(cases, armature, 0, FAST_SOLVERS);
     tcase_add_loop_test(cases, speed_drive, 0, FAST_SOLVERS);
     tcase_add_loop_test(cases, position_drive, 0, FAST_SOLVERS);
     tcase_add_loop_test(cases, limits_hold, 0, FAST_SOLVERS);

@@ -3,7 +3,7 @@
  * A joint is two frames, one on each body, and six coordinates of b's frame relative to a's: translations 0 to 2 along
  * the axes of a's frame (m), rotations 3 to 5 about x, y, z (rad). Each is locked or free. Locked ones are held at 0 by
  * the solver, exactly, together with all contacts. A free one may have limits, a drive, dry friction, a spring with a
- * damper, all at once.
+ * damper, armature, all at once.
  *
  * Free rotations: where one is free it is the angle about its axis; where two are free and k is locked they are angles
  * about an axis k + 1 of a's frame and an axis k + 2 of b's (cyclic; a universal joint's cross); these count on beyond
@@ -72,6 +72,8 @@ typedef struct sadmm_joint_coordinate {
                                     default 0 */
     double spring_damping;       /* N s/m, in [0, 1e15]; default 0 */
     double spring_rest;          /* m, |x| <= 1e9; default 0 */
+    double armature;             /* inertia of what moves along with the coordinate, say a motor's rotor behind its gear,
+                                    kg (kg m^2), in [0, 1e15]; force = -armature d2q/dt2; default 0 */
 } sadmm_joint_coordinate;
 
 typedef struct sadmm_joint_def {
@@ -91,6 +93,9 @@ typedef struct sadmm_joint_def {
     bool collide;                /* do the two bodies meet each other? Default false. (With a static body only that one
                                     is left out; the static world is no body and leaves none out) */
     bool enabled;                /* default true. A joint that is not does nothing, but for `collide` */
+    double break_force, break_torque; /* N, N m, >= 0, may be infinite; default infinite. A joint that gave more than one
+                                    of them in a (sub-)step (sizes of wrench_b's parts) is not enabled from the next
+                                    step on */
     sadmm_joint_coordinate coordinates[6]; /* locked ones: all default but for drive_force, which is ignored */
 } sadmm_joint_def;
 
@@ -115,7 +120,7 @@ SADMM_API int32_t sadmm_world_joint_count(const sadmm_world *world); /* also tho
 SADMM_API sadmm_status sadmm_world_joint_at(sadmm_world *world, int32_t index, sadmm_joint_id *id);
 /* Read back the definition as it is now. Errors: STALE_ID. */
 SADMM_API sadmm_status sadmm_world_joint_def(sadmm_world *world, sadmm_joint_id id, sadmm_joint_def *def);
-/* From the next step on. Errors: STALE_ID. */
+/* From the next step on; what was broken is whole again when enabled. Errors: STALE_ID. */
 SADMM_API sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id, bool enabled);
 /* Replace what acts along a free coordinate, index in [0, 6), from the next step on. Errors: STALE_ID, INVALID_ARGUMENT
  * (range; the coordinate is locked, or the joint has none of that index; nothing changes). */
@@ -132,8 +137,10 @@ typedef struct sadmm_joint_state {
     double point[3];             /* origin of b's frame, m, world */
     double wrench_a[6], wrench_b[6]; /* all that the joint does to the body: force (N), then torque about `point` (N m),
                                     world frame; wrench_a = -wrench_b */
+    double wrench_joint[6];      /* wrench_b along the axes of a's frame */
     /* by coordinate, N, N m */
-    double lock_force[6], limit_force[6], drive_force[6], friction_force[6], spring_force[6];
+    double lock_force[6], limit_force[6], drive_force[6], friction_force[6], spring_force[6], armature_force[6];
+    bool broken;                 /* by break_force or break_torque */
 } sadmm_joint_state;
 
 /* Errors: STALE_ID, DEVICE. */

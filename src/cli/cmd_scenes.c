@@ -169,6 +169,7 @@ static json_t *coordinate_json(const sadmm_joint_coordinate *c)
     json_object_set_new(o, "spring_stiffness", cli_json_real(c->spring_stiffness));
     json_object_set_new(o, "spring_damping", cli_json_real(c->spring_damping));
     json_object_set_new(o, "spring_rest", cli_json_real(c->spring_rest));
+    json_object_set_new(o, "armature", cli_json_real(c->armature));
     return o;
 }
 
@@ -193,6 +194,8 @@ static json_t *joint_json(sadmm_world *world, json_t *bodies, const sadmm_joint_
     json_object_set_new(o, "length", cli_json_real(joint->length));
     json_object_set_new(o, "collide", json_boolean(joint->collide));
     json_object_set_new(o, "enabled", json_boolean(joint->enabled));
+    json_object_set_new(o, "break_force", cli_json_real(joint->break_force));
+    json_object_set_new(o, "break_torque", cli_json_real(joint->break_torque));
     for (int k = 0; k < 6; ++k) json_array_append_new(coordinates, coordinate_json(&joint->coordinates[k]));
     json_object_set_new(o, "coordinates", coordinates);
     return o;

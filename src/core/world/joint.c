@@ -34,7 +34,9 @@ sadmm_joint_def sadmm_joint_def_default(void)
                            .orientation_a = {1, 0, 0, 0},
                            .orientation_b = {1, 0, 0, 0},
                            .length = -1,
-                           .enabled = true};
+                           .enabled = true,
+                           .break_force = INFINITY,
+                           .break_torque = INFINITY};
     for (int k = 0; k < JOINT_COORDINATES; ++k) def.coordinates[k].drive_force = INFINITY;
     return def;
 }
@@ -44,7 +46,7 @@ sadmm_joint_def sadmm_joint_def_default(void)
 static bool acts(const sadmm_joint_coordinate *c)
 {
     return c->limited || c->drive != SADMM_DRIVE_OFF || c->friction != 0 || c->spring_stiffness != 0 ||
-           c->spring_damping != 0;
+           c->spring_damping != 0 || c->armature != 0;
 }
 
 static sadmm_status check_limits(const char *name, const sadmm_joint_coordinate *c, struct sadmm_error *error)
@@ -72,6 +74,7 @@ static sadmm_status check_coordinate(const char *name, const sadmm_joint_coordin
         {"spring_stiffness", c->spring_stiffness, 0, FORCE_LIMIT},
         {"spring_damping", c->spring_damping, 0, FORCE_LIMIT},
         {"spring_rest", c->spring_rest, -FRAME_LIMIT, FRAME_LIMIT},
+        {"armature", c->armature, 0, FORCE_LIMIT},
     };
     TRY(check_limits(name, c, error));
     if ((unsigned)c->drive >= SADMM_DRIVE_COUNT)
@@ -159,6 +162,8 @@ static sadmm_status check_def(const sadmm_joint_def *def, uint32_t *locks, struc
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->locks = %u: must be in [0, %d]", def->locks,
                           JOINT_ALL_LOCKED);
     if (def->length != -1) TRY(sadmm_check_range("def->length (or -1: as it is)", def->length, 0, FRAME_LIMIT, error));
+    TRY(sadmm_check_range("def->break_force", def->break_force, 0, INFINITY, error));
+    TRY(sadmm_check_range("def->break_torque", def->break_torque, 0, INFINITY, error));
     return check_coordinates(def, *locks, error);
 }
 
@@ -309,6 +314,7 @@ sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id
     struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", &world->error);
     if (!joint) return SADMM_ERROR_STALE_ID;
     joint->def.enabled = enabled;
+    joint->last.broken = joint->last.broken && !enabled;
     return SADMM_OK;
 }
 
@@ -384,11 +390,14 @@ sadmm_status sadmm_world_joint_state(sadmm_world *world, sadmm_joint_id id, sadm
     for (int k = 0; k < JOINT_COORDINATES; ++k) {
         state->wrench_b[k] = last->wrench[k];
         state->wrench_a[k] = 0 - last->wrench[k];
+        state->wrench_joint[k] = last->local[k];
         state->lock_force[k] = last->force[SADMM_ROLE_LOCK][k];
         state->limit_force[k] = last->force[SADMM_ROLE_LOWER][k] + last->force[SADMM_ROLE_UPPER][k];
         state->drive_force[k] = last->force[SADMM_ROLE_DRIVE][k];
         state->friction_force[k] = last->force[SADMM_ROLE_FRICTION][k];
         state->spring_force[k] = last->force[SADMM_ROLE_SPRING][k];
+        state->armature_force[k] = last->force[SADMM_ROLE_ARMATURE][k];
     }
+    state->broken = last->broken;
     return SADMM_OK;
 }

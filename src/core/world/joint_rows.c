@@ -7,8 +7,8 @@
 #include "core/model/steady.h"
 #include "world_internal.h"
 
-/* Six locks, or for each free coordinate two limits, drive, friction and spring. */
-enum { MOST_JOINT_ROWS = 5 * JOINT_COORDINATES };
+/* Six locks, or for each free coordinate two limits, drive, friction, spring and armature. */
+enum { MOST_JOINT_ROWS = 6 * JOINT_COORDINATES };
 
 bool sadmm_joint_is_radial(sadmm_joint_kind kind)
 {
@@ -32,6 +32,7 @@ struct side {
 struct acting_joint {
     struct side side[2];
     struct joint_geometry start, middle;
+    quat frame; /* of a, in the middle */
 };
 
 static struct side side_of(const sadmm_world *world, int32_t slot, const sadmm_settings *settings)
@@ -77,6 +78,7 @@ static struct acting_joint prepare(const sadmm_world *world, const struct sadmm_
     }
     acting.start = joint_geometry_of(&start[0], &start[1], joint->def.locks, radial);
     acting.middle = joint_geometry_of(&middle[0], &middle[1], joint->def.locks, radial);
+    acting.frame = middle[0].orientation;
     return acting;
 }
 
@@ -207,6 +209,9 @@ static void add_free(struct laws *laws, const struct moving *m, int k, const sad
         add_law(laws, (struct law){SADMM_ROLE_FRICTION, k, 1, 1, m->turned, 0, -friction, friction, 0, 0});
     if (c->spring_stiffness > 0 || c->spring_damping > 0)
         add_spring(laws, m, k, SADMM_ROLE_SPRING, c->spring_stiffness, c->spring_damping, c->spring_rest, 0, INFINITY);
+    if (c->armature > 0) /* lambda = -armature (rate at the end - rate at the start) */
+        add_law(laws, (struct law){SADMM_ROLE_ARMATURE, k, 1, c->armature, c->armature * (m->turned - m->before), 1,
+                                   -INFINITY, INFINITY, 0, 0});
 }
 
 /* Locked coordinates first: they are held together. */
@@ -269,6 +274,7 @@ static void forget_forces(struct sadmm_joint_memory *memory)
     memset(memory->force, 0, sizeof memory->force);
     memset(memory->wrench, 0, sizeof memory->wrench);
     memset(memory->point, 0, sizeof memory->point);
+    memset(memory->local, 0, sizeof memory->local);
 }
 
 sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *settings)
@@ -323,6 +329,17 @@ static void add_wrench(const struct joint_geometry *geometry, int k, double forc
     for (int j = 0; j < 3; ++j) wrench[(k < 3 ? 0 : 3) + j] += force * v3_part(geometry->axis[k], j);
 }
 
+/* All rows of the joint are in its wrench. */
+static void end_wrench(struct sadmm_world_joint *joint, const struct acting_joint *acting)
+{
+    struct sadmm_joint_memory *memory = &joint->next;
+    const mat3 frame = q_matrix(acting->frame);
+    for (int part = 0; part < 2; ++part)
+        v3_store(m3_tmul(frame, v3_load(memory->wrench + 3 * part)), memory->local + 3 * part);
+    memory->broken = memory->broken || v3_norm(v3_load(memory->wrench)) > joint->def.break_force ||
+                     v3_norm(v3_load(memory->wrench + 3)) > joint->def.break_torque;
+}
+
 void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings)
 {
     const struct sadmm_rows *rows = &world->start.rows;
@@ -331,6 +348,7 @@ void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings)
     for (size_t r = 0; r < rows->row_count; ++r) {
         const struct sadmm_joint_source *source = &world->joint_sources[r];
         if (!joint || joint != &world->joints[source->joint]) {
+            if (joint) end_wrench(joint, &acting);
             joint = &world->joints[source->joint];
             acting = prepare(world, joint, settings);
             v3_store(acting.middle.point, joint->next.point);
@@ -339,10 +357,17 @@ void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings)
         joint->next.force[source->role][source->coordinate] = force;
         add_wrench(&acting.middle, source->coordinate, force, joint->next.wrench);
     }
+    if (joint) end_wrench(joint, &acting);
+}
+
+static void commit_joint(struct sadmm_world_joint *joint)
+{
+    joint->last = joint->next;
+    joint->def.enabled = joint->def.enabled && !joint->last.broken;
 }
 
 void sadmm_world_commit_joints(sadmm_world *world)
 {
     for (size_t slot = 0; world->joint_count > 0 && slot < world->joint_slots; ++slot)
-        world->joints[slot].last = world->joints[slot].next;
+        if (world->joints[slot].alive) commit_joint(&world->joints[slot]);
 }

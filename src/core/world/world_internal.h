@@ -51,6 +51,7 @@ enum sadmm_joint_role {
     SADMM_ROLE_DRIVE,
     SADMM_ROLE_FRICTION,
     SADMM_ROLE_SPRING,
+    SADMM_ROLE_ARMATURE,
     SADMM_ROLE_COUNT
 };
 
@@ -59,7 +60,9 @@ struct sadmm_joint_memory {
     double force[SADMM_ROLE_COUNT][JOINT_COORDINATES]; /* on b along the coordinate: what the next step starts from */
     double angle[JOINT_COORDINATES];                   /* of those that wind, at the step's start */
     double wrench[6], point[3];                        /* as in sadmm_joint_state, on b */
+    double local[6];                                   /* the wrench along the axes of a's frame */
     bool leads_stay;                                   /* its bodies were moved by the velocities of the step's end */
+    bool broken;                                       /* it gave more than it bears */
 };
 
 /* A joint slot. */
