@@ -62,6 +62,16 @@ static void on_bodies(void)
     REFUSES("world", sadmm_world_set_body_wrench(NULL, body, three, three));
     REFUSES("force", sadmm_world_set_body_wrench(world, body, NULL, three));
     REFUSES("torque", sadmm_world_set_body_wrench(world, body, three, NULL));
+    REFUSES("world", sadmm_world_add_body_force_at(NULL, body, three, three));
+    REFUSES("force", sadmm_world_add_body_force_at(world, body, NULL, three));
+    REFUSES("point", sadmm_world_add_body_force_at(world, body, three, NULL));
+    REFUSES("world", sadmm_world_apply_body_impulse_at(NULL, body, three, three));
+    REFUSES("impulse", sadmm_world_apply_body_impulse_at(world, body, NULL, three));
+    REFUSES("point", sadmm_world_apply_body_impulse_at(world, body, three, NULL));
+    REFUSES("world", sadmm_world_set_body_mass(NULL, body, 1, three));
+    REFUSES("inertia", sadmm_world_set_body_mass(world, body, 1, NULL));
+    REFUSES("world", sadmm_world_set_body_user_data(NULL, body, NULL));
+    ck_assert_ptr_null(sadmm_world_body_user_data(NULL, body));
     REFUSES("world", sadmm_world_body_contact_wrench(NULL, body, six));
     REFUSES("wrench", sadmm_world_body_contact_wrench(world, body, NULL));
     REFUSES("world", sadmm_world_set_body_pair_contact(NULL, body, body, true));
@@ -80,6 +90,7 @@ static void on_shapes(void)
     REFUSES("world", sadmm_world_shape_def(NULL, shape, &def, NULL));
     REFUSES("def", sadmm_world_shape_def(world, shape, NULL, NULL));
     ck_assert_int_eq(sadmm_world_shape_def(world, shape, &def, NULL), SADMM_OK); /* body may be NULL */
+    REFUSES("world", sadmm_world_set_shape_material(NULL, shape, 0.5, 0));
     REFUSES("world", sadmm_world_set_pair_friction(NULL, shape, shape, 1));
 }
 
@@ -200,9 +211,11 @@ static const struct {
     {on_worlds, {W(create), W(destroy), W(message), W(settings), W(set_settings), W(set_backend)}},
     {on_bodies,
      {W(add_body), W(remove_body), W(body_count), W(body_at), W(body_state), W(set_body_state), W(body_def),
-      W(set_body_wrench), W(body_contact_wrench), W(set_body_pair_contact)}},
+      W(set_body_wrench), W(add_body_force_at), W(apply_body_impulse_at), W(set_body_mass), W(set_body_user_data),
+      W(body_user_data), W(body_contact_wrench), W(set_body_pair_contact)}},
     {on_shapes,
-     {W(add_shape), W(remove_shape), W(shape_count), W(shape_at), W(shape_def), W(set_pair_friction)}},
+     {W(add_shape), W(remove_shape), W(shape_count), W(shape_at), W(shape_def), W(set_shape_material),
+      W(set_pair_friction)}},
     {on_joints,
      {W(place_joint), W(add_joint), W(remove_joint), W(joint_count), W(joint_at), W(joint_def), W(set_joint_enabled),
       W(set_joint_coordinate), W(joint_state)}},
@@ -215,7 +228,8 @@ static const struct {
     {on_others, {"sadmm_backend_query", "sadmm_box_inertia", "sadmm_sphere_inertia", "sadmm_capsule_inertia"}},
     {NULL,
      {"sadmm_settings_default", W(def_default), "sadmm_body_def_default", "sadmm_shape_def_default",
-      "sadmm_joint_def_default", "sadmm_status_name", "sadmm_last_message", "sadmm_version", "sadmm_build_commit", "sadmm_build_compiler"}},
+      "sadmm_joint_def_default", "sadmm_status_name", "sadmm_last_message", "sadmm_version", "sadmm_build_commit",
+      "sadmm_build_compiler"}},
 };
 enum { GROUPS = sizeof functions / sizeof *functions };
 

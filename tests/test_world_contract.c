@@ -166,6 +166,134 @@ START_TEST(wrenches_on_static_bodies_are_refused)
 }
 END_TEST
 
+/* A force and an impulse at a point are what they are at the centre, and a moment about it. */
+START_TEST(forces_and_impulses_at_a_point)
+{
+    const double force[3] = {1, -2, 3}, far[3] = {1e300, 0, 0}, turned[4] = {0.5, 0.5, -0.5, 0.5};
+    const double moments[3] = {0.1, 0.2, 0.25};
+    sadmm_body_id ground, ball;
+    sadmm_world *world = ground_and_ball(SADMM_BACKEND_CPU, SADMM_F64, &ground, &ball);
+    sadmm_world *other = ground_and_ball(SADMM_BACKEND_CPU, SADMM_F64, &ground, &ball);
+    sadmm_body_state state = body_state(world, ball);
+    state.position[2] = 10; /* in the air */
+    memcpy(state.orientation, turned, sizeof turned);
+    const double *x = state.position, point[3] = {x[0] + 0.5, x[1], x[2] + 1};
+    const double moment[3] = {0 * 3 - 1 * -2, 1 * 1 - 0.5 * 3, 0.5 * -2}; /* (0.5, 0, 1) x force */
+    MUST(world, sadmm_world_set_body_state(world, ball, &state));
+    MUST(other, sadmm_world_set_body_state(other, ball, &state));
+    MUST(world, sadmm_world_set_body_mass(world, ball, 1, moments));
+    MUST(other, sadmm_world_set_body_mass(other, ball, 1, moments));
+    for (int k = 0; k < 2; ++k) MUST(world, sadmm_world_add_body_force_at(world, ball, force, point)); /* they add up */
+    const double twice[3] = {2, -4, 6}, turn[3] = {2 * moment[0], 2 * moment[1], 2 * moment[2]};
+    MUST(other, sadmm_world_set_body_wrench(other, ball, twice, turn));
+    step_world(world, 5);
+    step_world(other, 5);
+    ck_assert_uint_eq(state_hash(world), state_hash(other)); /* halves and small integers are exact */
+
+    /* The same impulse as a force that acts for one step without gravity. */
+    sadmm_settings settings = sadmm_world_settings(world);
+    memset(settings.gravity, 0, sizeof settings.gravity);
+    sadmm_world *worlds[2] = {world, other};
+    for (int k = 0; k < 2; ++k) {
+        MUST(worlds[k], sadmm_world_set_settings(worlds[k], &settings));
+        MUST(worlds[k], sadmm_world_set_body_wrench(worlds[k], ball, ZERO, ZERO));
+        memset(state.linear_velocity, 0, sizeof state.linear_velocity);
+        memset(state.angular_velocity, 0, sizeof state.angular_velocity);
+        MUST(worlds[k], sadmm_world_set_body_state(worlds[k], ball, &state));
+    }
+    MUST(world, sadmm_world_apply_body_impulse_at(world, ball, force, point));
+    const double push[3] = {force[0] / settings.dt, force[1] / settings.dt, force[2] / settings.dt};
+    MUST(other, sadmm_world_add_body_force_at(other, ball, push, point));
+    step_world(other, 1);
+    const sadmm_body_state now = body_state(world, ball), then = body_state(other, ball);
+    for (int k = 0; k < 3; ++k) { /* a few roundings of numbers of 1 to 1000 */
+        ck_assert_double_eq_tol(now.linear_velocity[k], then.linear_velocity[k], 1e-12);
+        ck_assert_double_eq_tol(now.angular_velocity[k], then.angular_velocity[k], 1e-9);
+        ck_assert(now.position[k] == state.position[k]);
+    }
+    ck_assert_double_gt(fabs(now.angular_velocity[0]), 1);
+
+    REFUSED(world, sadmm_world_add_body_force_at(world, ground, force, point), "is static, and must be dynamic");
+    REFUSED(world, sadmm_world_apply_body_impulse_at(world, ground, force, point), "is static, and must be dynamic");
+    REFUSED(world, sadmm_world_add_body_force_at(world, ball, far, point), "force[0] = 1e+300");
+    REFUSED(world, sadmm_world_add_body_force_at(world, ball, force, far), "point[0] = 1e+300");
+    const double nothing[3] = {NAN, 0, 0};
+    REFUSED(world, sadmm_world_apply_body_impulse_at(world, ball, nothing, point), "impulse[0] = ");
+    sadmm_world_destroy(world);
+    sadmm_world_destroy(other);
+}
+END_TEST
+
+/* A body that weighs more takes longer to speed up, and one that is rough to slide. */
+START_TEST(mass_and_material_can_be_set)
+{
+    const double push[3] = {6, 0, 0}, inertia[3] = {0.03, 0.03, 0.03}, wrong[3] = {1, 1, 3};
+    sadmm_body_id ground, ball;
+    sadmm_world *world = ground_and_ball(_i ? SADMM_BACKEND_REF : SADMM_BACKEND_CPU, SADMM_F64, &ground, &ball);
+    sadmm_settings settings = sadmm_world_settings(world);
+    sadmm_body_def def;
+    sadmm_shape_def shape_def;
+    sadmm_shape_id shape;
+    memset(settings.gravity, 0, sizeof settings.gravity);
+    MUST(world, sadmm_world_set_settings(world, &settings));
+    sadmm_body_state state = body_state(world, ball);
+    state.position[2] = 10;
+    MUST(world, sadmm_world_set_body_state(world, ball, &state));
+    MUST(world, sadmm_world_set_body_wrench(world, ball, push, ZERO));
+    MUST(world, sadmm_world_set_body_mass(world, ball, 3, inertia));
+    step_world(world, 10);
+    ck_assert_double_eq_tol(body_state(world, ball).linear_velocity[0], 2 * 10 * settings.dt, 1e-12);
+    MUST(world, sadmm_world_body_def(world, ball, &def));
+    ck_assert(def.mass == 3 && memcmp(def.inertia, inertia, sizeof inertia) == 0);
+    REFUSED(world, sadmm_world_set_body_mass(world, ball, 0, inertia), "mass = 0: must be in [1e-09, 1e+12]");
+    REFUSED(world, sadmm_world_set_body_mass(world, ball, 1, wrong), "inertia[2] = 3: must be at most");
+    REFUSED(world, sadmm_world_set_body_mass(world, ground, 1, inertia), "is static");
+
+    /* On the ground, 1 m/s, held back by mu g m once there is friction: it slides and rolls at 5/7 of its speed. */
+    settings = sadmm_settings_default();
+    MUST(world, sadmm_world_set_settings(world, &settings));
+    MUST(world, sadmm_world_set_body_wrench(world, ball, ZERO, ZERO));
+    for (int32_t k = 0; k < sadmm_world_shape_count(world); ++k) {
+        MUST(world, sadmm_world_shape_at(world, k, &shape));
+        MUST(world, sadmm_world_set_shape_material(world, shape, 0, 0));
+    }
+    MUST(world, sadmm_world_shape_def(world, shape, &shape_def, NULL));
+    const double r = shape_def.size[0], solid[3] = {1.2 * r * r, 1.2 * r * r, 1.2 * r * r};
+    MUST(world, sadmm_world_set_body_mass(world, ball, 3, solid));
+    memset(&state, 0, sizeof state);
+    state.orientation[0] = 1, state.position[2] = r, state.linear_velocity[0] = 1;
+    MUST(world, sadmm_world_set_body_state(world, ball, &state));
+    step_world(world, 100);
+    ck_assert_double_eq_tol(body_state(world, ball).linear_velocity[0], 1, 1e-9); /* nothing holds it */
+    for (int32_t k = 0; k < sadmm_world_shape_count(world); ++k) {
+        MUST(world, sadmm_world_shape_at(world, k, &shape));
+        MUST(world, sadmm_world_set_shape_material(world, shape, 0.5, 0.25));
+    }
+    MUST(world, sadmm_world_shape_def(world, shape, &shape_def, NULL));
+    ck_assert(shape_def.friction == 0.5 && shape_def.restitution == 0.25);
+    step_world(world, 200);
+    ck_assert_double_eq_tol(body_state(world, ball).linear_velocity[0], 5.0 / 7, 1e-3); /* 20 iterations a step */
+    REFUSED(world, sadmm_world_set_shape_material(world, shape, -1, 0), "friction = -1: must be in [0, 1e+06]");
+    REFUSED(world, sadmm_world_set_shape_material(world, shape, 0, 2), "restitution = 2: must be in [0, 1]");
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+START_TEST(user_data_goes_with_the_body)
+{
+    sadmm_body_id ground, ball;
+    int own = 0;
+    sadmm_world *world = ground_and_ball(SADMM_BACKEND_CPU, SADMM_F64, &ground, &ball);
+    ck_assert_ptr_null(sadmm_world_body_user_data(world, ball));
+    MUST(world, sadmm_world_set_body_user_data(world, ball, &own));
+    ck_assert(sadmm_world_body_user_data(world, ball) == &own && !sadmm_world_body_user_data(world, ground));
+    MUST(world, sadmm_world_remove_body(world, ball));
+    ck_assert_ptr_null(sadmm_world_body_user_data(world, ball));
+    ck_assert_int_eq(sadmm_world_set_body_user_data(world, ball, &own), SADMM_ERROR_STALE_ID);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 /* Inertias at the ends of their ranges make steps, in both methods and with a certificate; beyond they are refused. */
 START_TEST(inertias_that_are_taken_can_be_stepped)
 {
@@ -298,6 +426,9 @@ int main(void)
     tcase_add_loop_test(cases, a_failed_step_leaves_what_can_be_read, 0, 2);
     tcase_add_loop_test(cases, what_was_read_can_be_set, 0, 2);
     tcase_add_test(cases, wrenches_on_static_bodies_are_refused);
+    tcase_add_test(cases, forces_and_impulses_at_a_point);
+    tcase_add_loop_test(cases, mass_and_material_can_be_set, 0, 2);
+    tcase_add_test(cases, user_data_goes_with_the_body);
     tcase_add_loop_test(cases, inertias_that_are_taken_can_be_stepped, 0, 2);
     tcase_add_loop_test(cases, residuals_are_measured_when_a_stop_rule_ends_the_step, 0, 2);
     tcase_add_test(cases, environments_leave_nothing_behind);

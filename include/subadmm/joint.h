@@ -72,7 +72,7 @@ typedef struct sadmm_joint_coordinate {
                                     default 0 */
     double spring_damping;       /* N s/m, in [0, 1e15]; default 0 */
     double spring_rest;          /* m, |x| <= 1e9; default 0 */
-    double armature;             /* inertia of what moves along with the coordinate, say a motor's rotor behind its gear,
+    double armature;             /* inertia of what moves along with the coordinate, say a rotor behind its gear,
                                     kg (kg m^2), in [0, 1e15]; force = -armature d2q/dt2; default 0 */
 } sadmm_joint_coordinate;
 
@@ -93,8 +93,8 @@ typedef struct sadmm_joint_def {
     bool collide;                /* do the two bodies meet each other? Default false. (With a static body only that one
                                     is left out; the static world is no body and leaves none out) */
     bool enabled;                /* default true. A joint that is not does nothing, but for `collide` */
-    double break_force, break_torque; /* N, N m, >= 0, may be infinite; default infinite. A joint that gave more than one
-                                    of them in a (sub-)step (sizes of wrench_b's parts) is not enabled from the next
+    double break_force, break_torque; /* N, N m, >= 0, may be infinite; default infinite. A joint that gave more than
+                                    one of them in a (sub-)step (sizes of wrench_b's parts) is not enabled from the next
                                     step on */
     sadmm_joint_coordinate coordinates[6]; /* locked ones: all default but for drive_force, which is ignored */
 } sadmm_joint_def;

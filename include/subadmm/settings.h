@@ -97,8 +97,8 @@ typedef struct sadmm_settings {
 
     double baumgarte;            /* share of penetration beyond the slop removed a (sub-)step, in [0, 1]; default 0.2 */
     double slop;                 /* penetration left alone, m, in [0, 1]; default 1e-5 */
-    double correction_speed;     /* cap of the corrective speed of contacts along their normals, m/s, and of joints along
-                                    each coordinate, m/s or rad/s; in [0, 1e3]; default 1 */
+    double correction_speed;     /* cap of the corrective speed of contacts along their normals, m/s, and of joints
+                                    along each coordinate, m/s or rad/s; in [0, 1e3]; default 1 */
     double restitution_threshold;/* approach speed under which restitution is ignored, m/s, >= 0; default 0.1 */
 
     int threads;                 /* CPU threads at most, in [0, 1024]; 0 = no bound; default 0. As many work as have

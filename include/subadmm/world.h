@@ -120,6 +120,24 @@ SADMM_API sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id
  * again. Errors: STALE_ID, INVALID_ARGUMENT (range; a static body, which nothing moves). */
 SADMM_API sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, const double force[3],
                                                    const double torque[3]);
+/* Add a force (N, each component within +-1e15) that acts at `point` (m, world, as the body is now, |x| <= 1e9) to the
+ * body's external wrench, which is kept until set again: force, and (point - centre of mass) x force. Errors: STALE_ID,
+ * INVALID_ARGUMENT (range, also of the sum; a static body; nothing changes), DEVICE. */
+SADMM_API sadmm_status sadmm_world_add_body_force_at(sadmm_world *world, sadmm_body_id id, const double force[3],
+                                                     const double point[3]);
+/* Change the body's velocities at once by an impulse (N s, each component finite) at `point` (as above): impulse /
+ * mass, and I^-1 ((point - centre of mass) x impulse). Errors: STALE_ID, INVALID_ARGUMENT (a velocity that would not be
+ * finite; a static body; nothing changes), DEVICE. */
+SADMM_API sadmm_status sadmm_world_apply_body_impulse_at(sadmm_world *world, sadmm_body_id id, const double impulse[3],
+                                                         const double point[3]);
+/* Replace mass (kg) and principal moments (kg m^2), ranges as in the definition, from the next step on; velocities
+ * stay. Errors: STALE_ID, INVALID_ARGUMENT (range; a static body; nothing changes), DEVICE. */
+SADMM_API sadmm_status sadmm_world_set_body_mass(sadmm_world *world, sadmm_body_id id, double mass,
+                                                 const double inertia[3]);
+/* A pointer of the caller's that goes with the body and that the library never looks behind; NULL until set. Of a stale
+ * id or a NULL world it is NULL. Errors: STALE_ID. */
+SADMM_API sadmm_status sadmm_world_set_body_user_data(sadmm_world *world, sadmm_body_id id, void *data);
+SADMM_API void *sadmm_world_body_user_data(const sadmm_world *world, sadmm_body_id id);
 /* Sum of the contact wrenches of the last step on the body: force (N), then torque about its centre of mass
  * (N m), world frame (eq. 12). With sub-steps their mean, so that dt times it is what contacts gave the body in the
  * step. Errors: STALE_ID, UNAVAILABLE when settings.recover_wrenches was false. */
@@ -169,6 +187,10 @@ SADMM_API sadmm_status sadmm_world_shape_at(sadmm_world *world, int32_t index, s
 /* Read back the definition, and the body that has the shape. Errors: STALE_ID. */
 SADMM_API sadmm_status sadmm_world_shape_def(sadmm_world *world, sadmm_shape_id id, sadmm_shape_def *def,
                                              sadmm_body_id *body /* may be NULL */);
+/* Replace friction and restitution of a shape, ranges as in the definition, from the next step on. Errors: STALE_ID,
+ * INVALID_ARGUMENT (range; nothing changes), DEVICE. */
+SADMM_API sadmm_status sadmm_world_set_shape_material(sadmm_world *world, sadmm_shape_id id, double friction,
+                                                      double restitution);
 /* Override the pair's friction (mu in [0, 1e6]), or give -1 to return to the geometric mean. Errors: STALE_ID,
  * INVALID_ARGUMENT (range; a and b the same), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_shape_id a, sadmm_shape_id b,
@@ -201,12 +223,12 @@ SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_s
 SADMM_API sadmm_status sadmm_world_step(sadmm_world *world);
 
 /* Begin a step and return without waiting for it, where the backend can: CUDA, in the method FAST from the second step
- * on; not in worlds with joints (joint.h), not with a residual_tolerance, nor with a certificate_tolerance in the method
- * PAPER or with more than 64 convergence checks a step. Elsewhere the same as sadmm_world_step. Steps run in order, a
+ * on; not in worlds with joints (joint.h), not with a residual_tolerance, nor with a certificate_tolerance in the
+ * method PAPER or with more than 64 convergence checks a step. Elsewhere the same as sadmm_world_step. Steps run in order, a
  * few of them at a time; states, wrenches and settings set in between take effect at the next one. Getters wait for the
- * steps begun so far. Errors: as sadmm_world_step; they may be those of an earlier step, and then nothing after that step has been done
- * (sadmm_step_report.step counts what has). With settings.certify the step is waited for. One thread at a time a world;
- * different worlds are independent, also on one device. */
+ * steps begun so far. Errors: as sadmm_world_step; they may be those of an earlier step, and then nothing after that
+ * step has been done (sadmm_step_report.step counts what has). With settings.certify the step is waited for. One thread at a time a
+ * world; different worlds are independent, also on one device. */
 SADMM_API sadmm_status sadmm_world_step_async(sadmm_world *world);
 /* Wait until all steps begun are done; at once when there are none. Errors: the first one of a step, see above. One
  * thread at a time a world. */

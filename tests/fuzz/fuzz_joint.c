@@ -1,9 +1,9 @@
-/* Joints of a world: the input is a program of calls with ordinary, extreme and wrong definitions, stale ids, and memory
- * that runs out. Whatever the calls:
+/* Joints of a world: the input is a program of calls with ordinary, extreme and wrong definitions, stale ids, and
+ * memory that runs out. Whatever the calls:
  *
  *   - a call that fails leaves joints, bodies and their states as they were, and says why
- *   - after a step that succeeds every state of a body and of a joint is finite, and a joint gives one body the opposite
- *     of what it gives the other
+ *   - after a step that succeeds every state of a body and of a joint is finite, and a joint gives one body the
+ *     opposite of what it gives the other
  *   - what was set is what is read, and a joint is there until it or one of its bodies is removed
  */
 #include <string.h>
@@ -138,7 +138,10 @@ static sadmm_joint_id take_joint(struct machine *m)
                                           : m->joints[take_choice(&m->in, m->joint_ids < IDS ? m->joint_ids : IDS)];
 }
 
-static double take_gain(struct bytes *in) { return take_rarely(in, 16) ? take_extreme(in) : take_scale(in, 1e-3, 1e12); }
+static double take_gain(struct bytes *in)
+{
+    return take_rarely(in, 16) ? take_extreme(in) : take_scale(in, 1e-3, 1e12);
+}
 
 static void take_coordinate(struct bytes *in, sadmm_joint_coordinate *c)
 {

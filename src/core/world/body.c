@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/base/memory.h"
+#include "core/math/rigid.h"
 #include "core/model/steady.h"
 #include "world_internal.h"
 
@@ -51,22 +52,25 @@ sadmm_status sadmm_world_check_inertias(sadmm_world *world, sadmm_precision prec
     return SADMM_OK;
 }
 
-static sadmm_status check_inertia(const double inertia[3], sadmm_precision precision, struct sadmm_error *error)
+/* name: of the argument. */
+static sadmm_status check_inertia(const char *name, const double inertia[3], sadmm_precision precision,
+                                  struct sadmm_error *error)
 {
     for (int k = 0; k < 3; ++k)
         if (!(inertia[k] >= INERTIA_MIN && inertia[k] <= INERTIA_MAX))
-            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->inertia[%d] = %g: must be in [%g, %g] kg m^2",
-                              k, inertia[k], INERTIA_MIN, INERTIA_MAX);
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s[%d] = %g: must be in [%g, %g] kg m^2", name, k,
+                              inertia[k], INERTIA_MIN, INERTIA_MAX);
     for (int k = 0; k < 3; ++k) {
         double others = inertia[(k + 1) % 3] + inertia[(k + 2) % 3];
         if (!(inertia[k] <= others * (1 + 1e-9)))
-            return sadmm_fail(
-                error, SADMM_ERROR_INVALID_ARGUMENT,
-                "def->inertia[%d] = %g: must be at most the sum of the other two, %g (no rigid body has more)", k,
-                inertia[k], others);
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                              "%s[%d] = %g: must be at most the sum of the other two, %g (no rigid body has more)",
+                              name, k, inertia[k], others);
     }
-    return check_inertia_ratio("def->inertia", inertia, precision, error);
+    return check_inertia_ratio(name, inertia, precision, error);
 }
+
+static const double MASS_MIN = 1e-9, MASS_MAX = 1e12;
 
 static sadmm_status check_motion(const char *linear_name, const char *angular_name, const double linear[3],
                                  const double angular[3], sadmm_body_type type, double limit, struct sadmm_error *error)
@@ -88,8 +92,8 @@ static sadmm_status check_def(const sadmm_body_def *def, sadmm_precision precisi
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->type = %d: must be SADMM_BODY_DYNAMIC or _STATIC",
                           (int)def->type);
     if (def->type == SADMM_BODY_DYNAMIC) {
-        TRY(sadmm_check_range("def->mass", def->mass, 1e-9, 1e12, error));
-        TRY(check_inertia(def->inertia, precision, error));
+        TRY(sadmm_check_range("def->mass", def->mass, MASS_MIN, MASS_MAX, error));
+        TRY(check_inertia("def->inertia", def->inertia, precision, error));
     }
     TRY(sadmm_check_vector("def->position", def->position, 3, POSITION_LIMIT, error));
     TRY(sadmm_check_orientation("def->orientation", def->orientation, orientation, error));
@@ -282,6 +286,14 @@ sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id, sadmm_bo
     return SADMM_OK;
 }
 
+static sadmm_status check_dynamic(const struct sadmm_world_body *body, sadmm_body_id id, const char *why,
+                                  struct sadmm_error *error)
+{
+    if (body->type == SADMM_BODY_DYNAMIC) return SADMM_OK;
+    return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                      "id = (slot %u, generation %u): is static, and must be dynamic: %s", id.slot, id.generation, why);
+}
+
 sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, const double force[3],
                                          const double torque[3])
 {
@@ -291,10 +303,7 @@ sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, c
     if (!body) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(force, "force", error));
     TRY(sadmm_check_given(torque, "torque", error));
-    if (body->type == SADMM_BODY_STATIC)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "id = (slot %u, generation %u): is static, and must be dynamic: no wrench moves it", id.slot,
-                          id.generation);
+    TRY(check_dynamic(body, id, "no wrench moves it", error));
     TRY(sadmm_check_vector("force", force, 3, WRENCH_LIMIT, error));
     TRY(sadmm_check_vector("torque", torque, 3, WRENCH_LIMIT, error));
     if (body->system_body < 0) TRY(sadmm_world_take_back(world));
@@ -302,6 +311,87 @@ sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, c
     memcpy(body->rigid.wrench + 3, torque, 3 * sizeof *torque);
     sadmm_world_edit(world, body, SADMM_EDIT_WRENCH);
     return SADMM_OK;
+}
+
+/* moment = (point - centre of mass) x v */
+static void moment_of(const struct sadmm_rigid *rigid, const double v[3], const double point[3], double moment[3])
+{
+    const vec3 arm = v3_sub(v3_load(point), v3_load(rigid->position));
+    v3_store(v3_cross(arm, v3_load(v)), moment);
+}
+
+sadmm_status sadmm_world_add_body_force_at(sadmm_world *world, sadmm_body_id id, const double force[3],
+                                           const double point[3])
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
+    double sum[6];
+    if (!body) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(force, "force", error));
+    TRY(sadmm_check_given(point, "point", error));
+    TRY(sadmm_check_vector("force", force, 3, WRENCH_LIMIT, error));
+    TRY(sadmm_check_vector("point", point, 3, POSITION_LIMIT, error));
+    TRY(sadmm_world_pull_bodies(world));
+    moment_of(&body->rigid, force, point, sum + 3);
+    for (int k = 0; k < 6; ++k) sum[k] = body->rigid.wrench[k] + (k < 3 ? force[k] : sum[k]);
+    return sadmm_world_set_body_wrench(world, id, sum, sum + 3);
+}
+
+sadmm_status sadmm_world_apply_body_impulse_at(sadmm_world *world, sadmm_body_id id, const double impulse[3],
+                                               const double point[3])
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
+    sadmm_body_state state;
+    double moment[3];
+    if (!body) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(impulse, "impulse", error));
+    TRY(sadmm_check_given(point, "point", error));
+    TRY(check_dynamic(body, id, "no impulse moves it", error));
+    TRY(sadmm_check_vector("impulse", impulse, 3, ANY, error));
+    TRY(sadmm_check_vector("point", point, 3, POSITION_LIMIT, error));
+    TRY(sadmm_world_body_state(world, id, &state));
+    moment_of(&body->rigid, impulse, point, moment);
+    const double *I = body->rigid.inertia;
+    const sym3 inverse =
+        rigid_world_inertia(q_matrix(q_load(state.orientation)), v3(1 / I[0], 1 / I[1], 1 / I[2]));
+    v3_store(v3_add(v3_load(state.angular_velocity), s3_mul(inverse, v3_load(moment))), state.angular_velocity);
+    for (int k = 0; k < 3; ++k) state.linear_velocity[k] += impulse[k] / body->rigid.mass;
+    return sadmm_world_set_body_state(world, id, &state);
+}
+
+sadmm_status sadmm_world_set_body_mass(sadmm_world *world, sadmm_body_id id, double mass, const double inertia[3])
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
+    if (!body) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(inertia, "inertia", error));
+    TRY(check_dynamic(body, id, "it has no mass", error));
+    TRY(sadmm_check_range("mass", mass, MASS_MIN, MASS_MAX, error));
+    TRY(check_inertia("inertia", inertia, world->def.precision, error));
+    TRY(sadmm_world_take_back(world));
+    body->rigid.mass = mass;
+    memcpy(body->rigid.inertia, inertia, sizeof body->rigid.inertia);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_set_body_user_data(sadmm_world *world, sadmm_body_id id, void *data)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", &world->error);
+    if (!body) return SADMM_ERROR_STALE_ID;
+    body->user_data = data;
+    return SADMM_OK;
+}
+
+void *sadmm_world_body_user_data(const sadmm_world *world, sadmm_body_id id)
+{
+    struct sadmm_error ignored;
+    const struct sadmm_world_body *body = world ? sadmm_world_find_body(world, id, "id", &ignored) : NULL;
+    return body ? body->user_data : NULL;
 }
 
 sadmm_status sadmm_world_body_contact_wrench(sadmm_world *world, sadmm_body_id id, double wrench[6])

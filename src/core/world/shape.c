@@ -29,6 +29,18 @@ static struct sadmm_geometry geometry_of(const sadmm_shape_def *def)
     return geometry;
 }
 
+/* owner: what stands before the names, "def->" say. */
+static sadmm_status check_material(const char *owner, double friction, double restitution, struct sadmm_error *error)
+{
+    if (!(friction >= 0 && friction <= 1e6))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%sfriction = %g: must be in [0, 1e+06]", owner,
+                          friction);
+    if (!(restitution >= 0 && restitution <= 1))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%srestitution = %g: must be in [0, 1]", owner,
+                          restitution);
+    return SADMM_OK;
+}
+
 static sadmm_status check_def(const struct sadmm_world_body *body, const sadmm_shape_def *def, double orientation[4],
                               struct sadmm_error *error)
 {
@@ -40,8 +52,7 @@ static sadmm_status check_def(const struct sadmm_world_body *body, const sadmm_s
                               def->size[k]);
     TRY(sadmm_check_vector("def->position", def->position, 3, 1e6, error));
     TRY(sadmm_check_orientation("def->orientation", def->orientation, orientation, error));
-    TRY(sadmm_check_range("def->friction", def->friction, 0, 1e6, error));
-    return sadmm_check_range("def->restitution", def->restitution, 0, 1, error);
+    return check_material("def->", def->friction, def->restitution, error);
 }
 
 sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, const sadmm_shape_def *def,
@@ -156,6 +167,19 @@ sadmm_status sadmm_world_shape_def(sadmm_world *world, sadmm_shape_id id, sadmm_
         body->slot = (uint32_t)shape->body + 1;
         body->generation = world->bodies[shape->body].generation;
     }
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_set_shape_material(sadmm_world *world, sadmm_shape_id id, double friction, double restitution)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    struct sadmm_shape *shape = sadmm_world_find_shape(world, id, "id", error);
+    if (!shape) return SADMM_ERROR_STALE_ID;
+    TRY(check_material("", friction, restitution, error));
+    TRY(sadmm_world_take_back(world));
+    shape->friction = friction;
+    shape->restitution = restitution;
     return SADMM_OK;
 }
 

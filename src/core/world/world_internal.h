@@ -38,6 +38,7 @@ struct sadmm_world_body {
     size_t first_shape;  /* none of its shapes is in a lower slot */
     double contact_wrench[6];
     struct sadmm_steady steady;
+    void *user_data;     /* the caller's */
     char *name;          /* a block of its own, so that it stays where it is when slots are added; NULL: none */
     uint32_t edits;                   /* bit of enum sadmm_edit_kind: no step has taken that along yet */
     int64_t set_at[SADMM_BODY_EDITS]; /* steps enqueued since the world was loaded, when that was set; -1: before */
