@@ -81,7 +81,8 @@ static double distance_of(const struct joint_sample *a, const struct joint_sampl
 START_TEST(errors_are_of_second_order)
 {
     enum { COUNT = 8 };
-    static const char *const names[] = {"Revolute_Case01", "Cylindrical_Case03", "RotSpring_Case01", "Universal_Case03"};
+    static const char *const names[] = {"Revolute_Case01", "Cylindrical_Case03", "RotSpring_Case01",
+                                        "Universal_Case03"};
     const struct joint_case *which = find_case(names[_i]);
     struct joint_sample fine[COUNT], middle[COUNT], coarse[COUNT];
     run_case(which, 0.01, COUNT, coarse);

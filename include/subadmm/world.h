@@ -222,13 +222,13 @@ SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_s
  * the error). sadmm_world_set_backend takes the world elsewhere. */
 SADMM_API sadmm_status sadmm_world_step(sadmm_world *world);
 
-/* Begin a step and return without waiting for it, where the backend can: CUDA, in the method FAST from the second step
- * on; not in worlds with joints (joint.h), not with a residual_tolerance, nor with a certificate_tolerance in the
- * method PAPER or with more than 64 convergence checks a step. Elsewhere the same as sadmm_world_step. Steps run in order, a
- * few of them at a time; states, wrenches and settings set in between take effect at the next one. Getters wait for the
- * steps begun so far. Errors: as sadmm_world_step; they may be those of an earlier step, and then nothing after that
- * step has been done (sadmm_step_report.step counts what has). With settings.certify the step is waited for. One thread at a time a
- * world; different worlds are independent, also on one device. */
+/* Begin a step and return without waiting for it, where the backend can: CUDA, in the method FAST from the second
+ * step on; not in worlds with joints (joint.h), not with a residual_tolerance, nor with a certificate_tolerance in
+ * the method PAPER or with more than 64 convergence checks a step. Elsewhere the same as sadmm_world_step. Steps run
+ * in order, a few of them at a time; states, wrenches and settings set in between take effect at the next one.
+ * Getters wait for the steps begun so far. Errors: as sadmm_world_step; they may be those of an earlier step, and
+ * then nothing after that step has been done (sadmm_step_report.step counts what has). With settings.certify the step
+ * is waited for. One thread at a time a world; different worlds are independent, also on one device. */
 SADMM_API sadmm_status sadmm_world_step_async(sadmm_world *world);
 /* Wait until all steps begun are done; at once when there are none. Errors: the first one of a step, see above. One
  * thread at a time a world. */

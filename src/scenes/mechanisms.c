@@ -1,4 +1,5 @@
-/* Mechanisms of joints: a chain with a weight, and closed loops of rods: four-bar linkages in a row, a slider-crank. Rods
+/* Mechanisms of joints: a chain with a weight, and closed loops of rods: four-bar linkages in a row, a slider-crank.
+ * Rods
  * have shapes to look at, which meet nothing.
  *
  * The row of four-bar linkages is a problem of the IFToMM benchmarks of multibody dynamics; it has more locks than it
