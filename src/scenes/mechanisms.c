@@ -1,6 +1,5 @@
 /* Mechanisms of joints: a chain with a weight, and closed loops of rods: four-bar linkages in a row, a slider-crank.
- * Rods
- * have shapes to look at, which meet nothing.
+ * Rods have shapes to look at, which meet nothing.
  *
  * The row of four-bar linkages is a problem of the IFToMM benchmarks of multibody dynamics; it has more locks than it
  * needs, and passes positions where it might part into two motions. */
