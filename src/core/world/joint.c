@@ -87,7 +87,7 @@ static sadmm_status check_coordinate(const char *name, const sadmm_joint_coordin
     return SADMM_OK;
 }
 
-static bool has_coordinate(const sadmm_joint_def *def, int k) { return k == 0 || !sadmm_joint_is_radial(def->kind); }
+static bool has_coordinate(const sadmm_joint_def *def, int k) { return k == 0 || !joint_is_radial(def->kind); }
 
 static sadmm_status check_coordinates(const sadmm_joint_def *def, uint32_t locks, struct sadmm_error *error)
 {
@@ -179,8 +179,8 @@ static const struct sadmm_rigid *pose_of(const sadmm_world *world, int32_t slot)
 static struct joint_geometry geometry_now(const sadmm_world *world, const struct sadmm_world_joint *joint)
 {
     struct joint_end ends[2];
-    for (int s = 0; s < 2; ++s) ends[s] = sadmm_joint_end(&joint->frame[s], pose_of(world, joint->body[s]));
-    return joint_geometry_of(&ends[0], &ends[1], joint->def.locks, sadmm_joint_is_radial(joint->def.kind));
+    for (int s = 0; s < 2; ++s) ends[s] = joint_end_on(&joint->frame[s], pose_of(world, joint->body[s]));
+    return joint_geometry_of(&ends[0], &ends[1], joint->def.locks, joint_is_radial(joint->def.kind));
 }
 
 /* The pair that does not meet for this joint. */
@@ -235,7 +235,7 @@ sadmm_status sadmm_world_add_joint(sadmm_world *world, const sadmm_joint_def *de
     TRY(sadmm_world_take_back(world));
     q_store(made.frame[0].orientation, made.def.orientation_a);
     q_store(made.frame[1].orientation, made.def.orientation_b);
-    if (def->length == -1 && sadmm_joint_is_radial(def->kind)) made.def.length = geometry_now(world, &made).value[0];
+    if (def->length == -1 && joint_is_radial(def->kind)) made.def.length = geometry_now(world, &made).value[0];
     TRY(new_slot(world, &slot));
     TRY(add_pair(world, &made));
 
@@ -371,9 +371,9 @@ static void read_motion(const sadmm_world *world, const struct sadmm_world_joint
     for (int k = 0; k < JOINT_COORDINATES; ++k) {
         state->position[k] = joint_winds(joint->def.locks, k) ? joint_unwind(geometry.value[k], joint->last.angle[k])
                                                               : geometry.value[k];
-        state->speed[k] = sadmm_joint_rate(&geometry, k, v[0], v[1]);
+        state->speed[k] = joint_rate(&geometry, k, v[0], v[1]);
     }
-    if (sadmm_joint_is_radial(joint->def.kind) && joint->def.locks & 1) state->position[0] -= joint->def.length;
+    if (joint_is_radial(joint->def.kind) && joint->def.locks & 1) state->position[0] -= joint->def.length;
 }
 
 sadmm_status sadmm_world_joint_state(sadmm_world *world, sadmm_joint_id id, sadmm_joint_state *state)

@@ -14,7 +14,7 @@
 #include "core/base/check.h"
 #include "core/base/error.h"
 #include "core/base/parallel.h"
-#include "core/math/joint.h"
+#include "core/model/joint_law.h"
 #include "core/model/settings.h"
 #include "core/solve/certificate.h"
 #include "core/solve/kernels.h"
@@ -44,28 +44,6 @@ struct sadmm_world_body {
     int64_t set_at[SADMM_BODY_EDITS]; /* steps enqueued since the world was loaded, when that was set; -1: before */
 };
 
-/* What acts along a coordinate of a joint, each by a row of its own. */
-enum sadmm_joint_role {
-    SADMM_ROLE_LOCK,
-    SADMM_ROLE_LOWER,
-    SADMM_ROLE_UPPER,
-    SADMM_ROLE_DRIVE,
-    SADMM_ROLE_FRICTION,
-    SADMM_ROLE_SPRING,
-    SADMM_ROLE_ARMATURE,
-    SADMM_ROLE_COUNT
-};
-
-/* What a joint keeps from step to step. */
-struct sadmm_joint_memory {
-    double force[SADMM_ROLE_COUNT][JOINT_COORDINATES]; /* on b along the coordinate: what the next step starts from */
-    double angle[JOINT_COORDINATES];                   /* of those that wind, at the step's start */
-    double wrench[6], point[3];                        /* as in sadmm_joint_state, on b */
-    double local[6];                                   /* the wrench along the axes of a's frame */
-    bool leads_stay;                                   /* its bodies were moved by the velocities of the step's end */
-    bool broken;                                       /* it gave more than it bears */
-};
-
 /* A joint slot. */
 struct sadmm_world_joint {
     bool alive;
@@ -74,13 +52,6 @@ struct sadmm_world_joint {
     int32_t body[2];        /* slots of a and b, -1: the static world */
     struct joint_frame frame[2];
     struct sadmm_joint_memory last, next; /* of the last step; of the one at hand, or a sub-step of it */
-};
-
-/* The joint's row that a row of the step is. */
-struct sadmm_joint_source {
-    int32_t joint; /* slot */
-    int8_t role, coordinate, sign;
-    double gap, slack; /* of limits: at the step's start, m or rad; what the turning of the row makes of it in a step */
 };
 
 /* What the last step started from, for contacts, freeze and the certificate. */
@@ -190,12 +161,6 @@ sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *set
 void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings);
 /* The step is done. */
 void sadmm_world_commit_joints(sadmm_world *world);
-/* A joint's frame on a body, in the world; rigid NULL: on the static world. */
-struct joint_end sadmm_joint_end(const struct joint_frame *frame, const struct sadmm_rigid *rigid);
-/* A radial joint's coordinate 0 is a distance. */
-bool sadmm_joint_is_radial(sadmm_joint_kind kind);
-/* How fast a coordinate changes by the velocities of a and b (6 each). */
-double sadmm_joint_rate(const struct joint_geometry *geometry, int coordinate, const double *a, const double *b);
 
 /* ---- joint_move.c ---- */
 
