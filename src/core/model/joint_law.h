@@ -107,6 +107,19 @@ SADMM_INLINE struct joint_end joint_end_halfway(const struct joint_frame *frame,
                         rigid_turn(q_load(side->rigid->orientation), v3_load(side->velocity + 3), dt / 2));
 }
 
+/* From a steered frame, translations are by its origin's velocity alone, along axes that stay where they are in the
+ * middle of the step: a damper that went round with the frame would push what is beside it outwards, without bound. */
+SADMM_INLINE void joint_hold_translations(const struct joint_end start[2], struct acting_joint *acting)
+{
+    const vec3 way = v3_sub(start[1].point, start[0].point);
+    int k;
+    acting->start.arm_a = acting->middle.arm_a = v3(0, 0, 0);
+    for (k = 0; k < 3; ++k) {
+        acting->start.axis[k] = acting->middle.axis[k];
+        acting->start.value[k] = v3_dot(acting->middle.axis[k], way);
+    }
+}
+
 SADMM_INLINE struct acting_joint joint_act(const sadmm_joint_def *def, const struct joint_frame frame[2],
                                            const struct joint_body body[2], const struct sadmm_settings *settings)
 {
@@ -123,6 +136,7 @@ SADMM_INLINE struct acting_joint joint_act(const sadmm_joint_def *def, const str
     acting.start = joint_geometry_of(&start[0], &start[1], def->locks, radial);
     acting.middle = joint_geometry_of(&middle[0], &middle[1], def->locks, radial);
     acting.frame = middle[0].orientation;
+    if (acting.side[0].steered) joint_hold_translations(start, &acting);
     return acting;
 }
 

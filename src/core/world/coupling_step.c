@@ -15,12 +15,13 @@ void sadmm_world_begin_couplings(sadmm_world *world)
 }
 
 void sadmm_coupling_keep(struct sadmm_coupling_memory *memory, const double wrench[6],
-                         const struct joint_geometry *middle)
+                         const struct joint_geometry *middle, double dt)
 {
-    const vec3 force = v3_load(wrench), torque = v3_load(wrench + 3);
+    const vec3 force = v3_load(wrench), torque = v3_load(wrench + 3),
+               target = rigid_move(v3_load(memory->target.position), v3_load(memory->target.velocity), dt / 2);
     double own[6], felt[6];
     v3_store(v3_neg(force), felt);
-    v3_store(v3_neg(v3_add(torque, v3_cross(middle->arm_a, force))), felt + 3); /* arm_a: from the target's origin */
+    v3_store(v3_neg(v3_add(torque, v3_cross(v3_sub(middle->point, target), force))), felt + 3);
     v3_store(force, own);
     v3_store(v3_add(torque, v3_cross(middle->arm_b, force)), own + 3);
     for (int k = 0; k < 6; ++k) {

@@ -177,9 +177,10 @@ sadmm_status sadmm_world_not_finite(sadmm_world *world, int32_t body);
 
 /* What couplings kept of the last step into what they keep of this one. */
 void sadmm_world_begin_couplings(sadmm_world *world);
-/* Of a (sub-)step: the wrench on the body about b's point, at the geometry of its middle. */
+/* Of a (sub-)step of dt, whose target has not moved on: the wrench on the body about b's point, at the geometry of the
+ * middle. */
 void sadmm_coupling_keep(struct sadmm_coupling_memory *memory, const double wrench[6],
-                         const struct joint_geometry *middle);
+                         const struct joint_geometry *middle, double dt);
 /* A (sub-)step of dt is over: targets move on. */
 void sadmm_world_move_targets(sadmm_world *world, double dt);
 /* The step of so many sub-steps is done. */
