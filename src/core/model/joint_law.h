@@ -277,9 +277,10 @@ SADMM_INLINE void joint_add_limits(struct joint_laws *laws, const struct joint_m
 SADMM_INLINE void joint_add_spring(struct joint_laws *laws, const struct joint_moving *m, int k, int role,
                                    double stiffness, double damping, double rest, double speed, double most)
 {
-    const double late = m->memory->leads_stay ? 1 : joint_late(stiffness, damping, m->response, m->dt);
+    const double own = joint_late(stiffness, damping, m->response, m->dt), late = m->memory->leads_stay ? 1 : own;
     double gain, bias;
-    joint_spring(stiffness, damping, m->value - rest, speed, m->before, m->dt, late, &gain, &bias);
+    joint_spring(stiffness, damping, m->value - rest, speed, m->before, m->dt, late,
+                 late + joint_lead(stiffness, damping, own, m->dt), &gain, &bias);
     joint_add_law(laws, m, role, k, 1, gain, bias + gain * m->turned, 1, -most, most, 0);
 }
 
