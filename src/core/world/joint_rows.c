@@ -43,7 +43,10 @@ static void find_laws(struct sadmm_world_joint *joint, const struct acting_joint
             if ((int)(joint->def.locks >> k & 1) != locked || !joint_has_coordinate(&joint->def, k)) continue;
             const struct joint_moving m = joint_moving_of(&joint->def, &joint->next, acting, k, settings);
             if (joint_winds(joint->def.locks, k)) joint->next.angle[k] = m.value;
-            joint_coordinate_laws(&joint->def, k, &m, &laws);
+            const struct joint_table table = {joint->table[k],
+                                              joint->table[k] ? joint->table[k] + joint->table_count[k] : NULL,
+                                              joint->table_count[k]};
+            joint_coordinate_laws(&joint->def, k, &m, joint->table[k] ? &table : NULL, &laws);
             for (int i = 0; i < laws.count; ++i) all->law[all->count++] = laws.law[i];
         }
 }

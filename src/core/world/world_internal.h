@@ -55,6 +55,8 @@ struct sadmm_world_joint {
     sadmm_joint_def def;    /* locks: what is locked */
     int32_t body[2];        /* slots of a and b, -1: the static world */
     struct joint_frame frame[2];
+    double *table[JOINT_COORDINATES];     /* of a coordinate's spring: positions, then loads; NULL: none */
+    int32_t table_count[JOINT_COORDINATES]; /* points */
     struct sadmm_joint_memory last, next; /* of the last step; of the one at hand, or a sub-step of it */
 };
 
@@ -260,6 +262,8 @@ void sadmm_world_kill_shape(sadmm_world *world, size_t slot);
 
 /* ---- joint.c ---- */
 
+/* What joints have beside their slots. */
+void sadmm_world_free_tables(sadmm_world *world);
 /* Put a joint that has been checked into a slot. */
 sadmm_status sadmm_world_insert_joint(sadmm_world *world, const struct sadmm_world_joint *joint, size_t *slot);
 /* With its coupling, if it is of one. */
