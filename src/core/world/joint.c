@@ -304,8 +304,14 @@ sadmm_status sadmm_world_joint_def(sadmm_world *world, sadmm_joint_id id, sadmm_
     const struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", &world->error);
     if (!joint) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(def, "def", &world->error));
+    TRY(sadmm_world_pull_joints(world));
     *def = joint->def;
     return SADMM_OK;
+}
+
+static sadmm_status take_along(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit)
+{
+    return sadmm_world_edit_joint(world, joint, edit) ? SADMM_OK : sadmm_world_take_back(world);
 }
 
 sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id, bool enabled)
@@ -315,7 +321,7 @@ sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id
     if (!joint) return SADMM_ERROR_STALE_ID;
     joint->def.enabled = enabled;
     joint->last.broken = joint->last.broken && !enabled;
-    return SADMM_OK;
+    return take_along(world, joint, SADMM_JOINT_ENABLED);
 }
 
 sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id id, int32_t index,
@@ -332,7 +338,7 @@ sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id
                           joint->def.locks);
     TRY(check_coordinate("coordinate->", coordinate, error));
     joint->def.coordinates[index] = *coordinate;
-    return SADMM_OK;
+    return take_along(world, joint, (enum sadmm_joint_edit)index);
 }
 
 sadmm_status sadmm_world_place_joint(sadmm_world *world, sadmm_joint_def *def, const double position[3],
@@ -383,6 +389,7 @@ sadmm_status sadmm_world_joint_state(sadmm_world *world, sadmm_joint_id id, sadm
     if (!joint) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(state, "state", &world->error));
     TRY(sadmm_world_pull_bodies(world));
+    TRY(sadmm_world_pull_joints(world));
     const struct sadmm_joint_memory *last = &joint->last;
     memset(state, 0, sizeof *state);
     read_motion(world, joint, state);
