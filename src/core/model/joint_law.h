@@ -82,6 +82,7 @@ SADMM_INLINE void joint_coordinate_take(const double x[JOINT_COORDINATE_NUMBERS]
 struct joint_body {
     int32_t system_body;             /* -1: it does not move */
     const struct sadmm_rigid *rigid; /* at the step's start; NULL: the frame is in the world */
+    bool steered;                    /* it is no body of the system and goes by its velocity, whatever acts on it */
 };
 
 SADMM_INLINE struct joint_end joint_end_on(const struct joint_frame *frame, const struct sadmm_rigid *rigid)
@@ -95,8 +96,9 @@ SADMM_INLINE struct joint_end joint_end_on(const struct joint_frame *frame, cons
 
 /* One body of a joint in a step. */
 struct joint_side {
-    int32_t system_body;             /* -1: it does not move */
+    int32_t system_body;             /* -1: it does not move, or is steered */
     const struct sadmm_rigid *rigid; /* at the step's start; NULL: the static world */
+    bool steered;
     double velocity[6], free[6];     /* at the start; at the end of free motion */
     quat back;                       /* what turns the row's torque to where the body's moments are (docs) */
 };
@@ -113,9 +115,11 @@ SADMM_INLINE struct joint_side joint_side_of(struct joint_body body, const struc
     int k;
     side.system_body = body.system_body;
     side.rigid = body.rigid;
+    side.steered = body.steered;
     side.back.w = 1;
     side.back.x = side.back.y = side.back.z = 0;
-    for (k = 0; k < 6; ++k) side.velocity[k] = side.free[k] = body.system_body >= 0 ? body.rigid->velocity[k] : 0;
+    for (k = 0; k < 6; ++k)
+        side.velocity[k] = side.free[k] = body.system_body >= 0 || body.steered ? body.rigid->velocity[k] : 0;
     if (body.system_body < 0) return side;
     for (k = 0; k < 3; ++k)
         side.free[k] += settings->dt * (settings->gravity[k] + side.rigid->wrench[k] / side.rigid->mass);
@@ -132,6 +136,19 @@ SADMM_INLINE struct joint_end joint_end_halfway(const struct joint_frame *frame,
                         rigid_turn(q_load(side->rigid->orientation), v3_load(side->velocity + 3), dt / 2));
 }
 
+/* From a steered frame, translations are by its origin's velocity alone, along axes that stay where they are in the
+ * middle of the step: a damper that went round with the frame would push what is beside it outwards, without bound. */
+SADMM_INLINE void joint_hold_translations(const struct joint_end start[2], struct acting_joint *acting)
+{
+    const vec3 way = v3_sub(start[1].point, start[0].point);
+    int k;
+    acting->start.arm_a = acting->middle.arm_a = v3(0, 0, 0);
+    for (k = 0; k < 3; ++k) {
+        acting->start.axis[k] = acting->middle.axis[k];
+        acting->start.value[k] = v3_dot(acting->middle.axis[k], way);
+    }
+}
+
 SADMM_INLINE struct acting_joint joint_act(const sadmm_joint_def *def, const struct joint_frame frame[2],
                                            const struct joint_body body[2], const struct sadmm_settings *settings)
 {
@@ -143,11 +160,12 @@ SADMM_INLINE struct acting_joint joint_act(const sadmm_joint_def *def, const str
         struct joint_side *side = &acting.side[s];
         *side = joint_side_of(body[s], settings);
         start[s] = middle[s] = joint_end_on(&frame[s], side->rigid);
-        if (side->system_body >= 0) middle[s] = joint_end_halfway(&frame[s], side, settings->dt);
+        if (side->system_body >= 0 || side->steered) middle[s] = joint_end_halfway(&frame[s], side, settings->dt);
     }
     acting.start = joint_geometry_of(&start[0], &start[1], def->locks, radial);
     acting.middle = joint_geometry_of(&middle[0], &middle[1], def->locks, radial);
     acting.frame = middle[0].orientation;
+    if (acting.side[0].steered) joint_hold_translations(start, &acting);
     return acting;
 }
 
@@ -240,7 +258,7 @@ SADMM_INLINE struct joint_moving joint_moving_of(const sadmm_joint_def *def, con
 {
     const struct joint_side *a = &acting->side[0], *b = &acting->side[1];
     struct joint_moving m;
-    double middle = 0, free = 0;
+    double middle = 0, free = 0, steered = 0;
     int s;
     m.memory = memory;
     m.dt = settings->dt;
@@ -252,14 +270,19 @@ SADMM_INLINE struct joint_moving joint_moving_of(const sadmm_joint_def *def, con
     m.before = joint_rate(&acting->start, k, a->velocity, b->velocity);
     for (s = 0; s < 2; ++s) {
         double row[6];
-        if (acting->side[s].system_body < 0) continue;
+        if (acting->side[s].system_body < 0 && !acting->side[s].steered) continue;
         joint_step_row(acting, s, k, row);
+        if (acting->side[s].steered) {
+            steered += joint_row_product(row, acting->side[s].velocity);
+            continue;
+        }
         middle += joint_row_product(row, acting->side[s].velocity);
         free += joint_row_product(row, acting->side[s].free);
         m.response += joint_response(&acting->side[s], row);
     }
+    middle += steered, free += steered;
     m.turning = middle - m.before;
-    m.turned = memory->leads_stay ? 0 : m.turning;
+    m.turned = (memory->leads_stay ? 0 : m.turning) + steered; /* the solve's rates are of its bodies alone */
     m.reach = 2 * m.dt * max_of(fabs(m.before), fabs(free));
     return m;
 }
@@ -283,9 +306,10 @@ SADMM_INLINE void joint_add_limits(struct joint_laws *laws, const struct joint_m
 SADMM_INLINE void joint_add_spring(struct joint_laws *laws, const struct joint_moving *m, int k, int role,
                                    double stiffness, double damping, double rest, double speed, double most)
 {
-    const double late = m->memory->leads_stay ? 1 : joint_late(stiffness, damping, m->response, m->dt);
+    const double own = joint_late(stiffness, damping, m->response, m->dt), late = m->memory->leads_stay ? 1 : own;
     double gain, bias;
-    joint_spring(stiffness, damping, m->value - rest, speed, m->before, m->dt, late, &gain, &bias);
+    joint_spring(stiffness, damping, m->value - rest, speed, m->before, m->dt, late,
+                 late + joint_lead(stiffness, damping, own, m->dt), &gain, &bias);
     joint_add_law(laws, m, role, k, 1, gain, bias + gain * m->turned, 1, -most, most, 0);
 }
 

@@ -65,7 +65,7 @@ struct sadmm_resident_report {
     bool converged;            /* every island met the stop rule */
     int64_t islands_above;     /* that did not; -1: there was none */
     int32_t limited;           /* islands with too much energy */
-    int32_t joints;            /* that took part, in the last sub-step */
+    int32_t joints, couplings; /* that took part, in the last sub-step */
     double penetration_max;    /* m */
     struct sadmm_residual residual; /* -1: not measured */
     struct {

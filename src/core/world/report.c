@@ -11,6 +11,7 @@ void sadmm_world_report_steps(sadmm_world *world, int64_t steps, const struct sa
     report->threads = done->plan.threads;
     report->bodies = done->plan.bodies;
     report->joints = done->joints;
+    report->couplings = done->couplings;
     report->contacts = done->plan.points;
     report->pairs = done->plan.pairs;
     report->iterations = done->iterations;

@@ -132,6 +132,7 @@ static void commit(sadmm_world *world)
     const int threads = sadmm_pass_threads(world->plan.threads, (size_t)world->dynamic_count);
     sadmm_parallel(&world->team, threads, commit_share, world);
     sadmm_world_commit_joints(world);
+    sadmm_world_commit_couplings(world, world->def.settings.substeps);
     world->stepped = true;
     world->contacts_readable = true;
 }
@@ -194,6 +195,7 @@ static sadmm_status integrate(struct host_step *step)
         TRY(sadmm_world_move_joined(world, &step->settings));
         sadmm_world_keep_rows(world, &step->settings);
     }
+    sadmm_world_move_targets(world, step->settings.dt);
     add_substep(step);
     return check_next(world);
 }
@@ -241,6 +243,7 @@ static void report_step(const struct host_step *step)
         .converged = !step->unconverged,
         .limited = step->limited,
         .joints = step->world->joints_acting,
+        .couplings = step->world->couplings_acting,
         .penetration_max = step->depth,
         .residual = solved->residual,
         .ms = {.collide = ms[SADMM_PHASE_COLLIDE], .assemble = ms[SADMM_PHASE_ASSEMBLE],
