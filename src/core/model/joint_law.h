@@ -35,6 +35,14 @@ struct sadmm_joint_memory {
     bool broken;                                       /* it gave more than it bears */
 };
 
+/* A joint as a backend that keeps the world has it. */
+struct sadmm_resident_joint {
+    sadmm_joint_def def;
+    int32_t constraints;         /* that its rows may take, of up to six each */
+    int32_t body[2];             /* dynamic body; -1: it does not move, and its frame is in the world */
+    struct joint_frame frame[2];
+};
+
 /* The joint's row that a row of the step is. */
 struct sadmm_joint_source {
     int32_t joint;
@@ -48,6 +56,27 @@ struct sadmm_joint_source {
 SADMM_INLINE bool joint_is_radial(sadmm_joint_kind kind)
 {
     return kind == SADMM_JOINT_DISTANCE || kind == SADMM_JOINT_SPRING || kind == SADMM_JOINT_LINK;
+}
+
+/* A coordinate's fields as numbers, and back: what passes from the host to a device. */
+enum { JOINT_COORDINATE_NUMBERS = 14 };
+SADMM_INLINE void joint_coordinate_numbers(const sadmm_joint_coordinate *c, double x[JOINT_COORDINATE_NUMBERS])
+{
+    x[0] = c->limited ? 1 : 0, x[1] = c->lower, x[2] = c->upper;
+    x[3] = (double)(int)c->drive, x[4] = c->target_position, x[5] = c->target_speed;
+    x[6] = c->drive_stiffness, x[7] = c->drive_damping, x[8] = c->drive_force;
+    x[9] = c->friction;
+    x[10] = c->spring_stiffness, x[11] = c->spring_damping, x[12] = c->spring_rest;
+    x[13] = c->armature;
+}
+SADMM_INLINE void joint_coordinate_take(const double x[JOINT_COORDINATE_NUMBERS], sadmm_joint_coordinate *c)
+{
+    c->limited = x[0] != 0, c->lower = x[1], c->upper = x[2];
+    c->drive = (sadmm_drive)(int)x[3], c->target_position = x[4], c->target_speed = x[5];
+    c->drive_stiffness = x[6], c->drive_damping = x[7], c->drive_force = x[8];
+    c->friction = x[9];
+    c->spring_stiffness = x[10], c->spring_damping = x[11], c->spring_rest = x[12];
+    c->armature = x[13];
 }
 
 /* ---- bodies and geometry ------------------------------------------------------------------------------------------ */
@@ -357,6 +386,20 @@ SADMM_INLINE bool joint_has_coordinate(const sadmm_joint_def *def, int k)
     return k == 0 || def->locks >> k & 1 || !joint_is_radial(def->kind);
 }
 
+/* Most laws that the joint may have in a step. */
+SADMM_INLINE int joint_most_laws(const sadmm_joint_def *def)
+{
+    int count = 0, k;
+    for (k = 0; k < JOINT_COORDINATES; ++k) {
+        const sadmm_joint_coordinate *c = &def->coordinates[k];
+        if (!joint_has_coordinate(def, k)) continue;
+        count += def->locks >> k & 1 ? 1
+                                     : (c->limited ? 2 : 0) + (c->drive != SADMM_DRIVE_OFF) + (c->friction > 0) +
+                                           (c->spring_stiffness > 0 || c->spring_damping > 0) + (c->armature > 0);
+    }
+    return count;
+}
+
 /* ---- the solution -------------------------------------------------------------------------------------------------- */
 
 SADMM_INLINE void joint_forget_forces(struct sadmm_joint_memory *memory)
@@ -369,14 +412,14 @@ SADMM_INLINE void joint_forget_forces(struct sadmm_joint_memory *memory)
     }
 }
 
-/* A row's multiplier, as a force and as what it is in the world, about the joint's point. */
-SADMM_INLINE void joint_keep_row(struct sadmm_joint_memory *memory, const struct joint_geometry *middle, int role,
+/* A row's multiplier, as a force and as what it is in the world, about the joint's point; axis: in the middle of the
+ * step. */
+SADMM_INLINE void joint_keep_row(struct sadmm_joint_memory *memory, const vec3 axis[JOINT_COORDINATES], int role,
                                  int coordinate, double force)
 {
     int j;
     memory->force[role][coordinate] = force;
-    for (j = 0; j < 3; ++j)
-        memory->wrench[(coordinate < 3 ? 0 : 3) + j] += force * v3_part(middle->axis[coordinate], j);
+    for (j = 0; j < 3; ++j) memory->wrench[(coordinate < 3 ? 0 : 3) + j] += force * v3_part(axis[coordinate], j);
 }
 
 /* All rows of the joint are in its wrench. */

@@ -343,8 +343,14 @@ sadmm_status sadmm_world_joint_def(sadmm_world *world, sadmm_joint_id id, sadmm_
     const struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", &world->error);
     if (!joint) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(def, "def", &world->error));
+    TRY(sadmm_world_pull_joints(world));
     *def = joint->def;
     return SADMM_OK;
+}
+
+static sadmm_status take_along(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit)
+{
+    return sadmm_world_edit_joint(world, joint, edit) ? SADMM_OK : sadmm_world_take_back(world);
 }
 
 sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id, bool enabled)
@@ -354,7 +360,7 @@ sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id
     if (!joint) return SADMM_ERROR_STALE_ID;
     joint->def.enabled = enabled;
     joint->last.broken = joint->last.broken && !enabled;
-    return SADMM_OK;
+    return take_along(world, joint, SADMM_JOINT_ENABLED);
 }
 
 static sadmm_status check_free(const struct sadmm_world_joint *joint, int32_t index, struct sadmm_error *error)
@@ -377,7 +383,7 @@ sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id
     TRY(check_free(joint, index, error));
     TRY(check_coordinate("coordinate->", coordinate, error));
     joint->def.coordinates[index] = *coordinate;
-    return SADMM_OK;
+    return take_along(world, joint, (enum sadmm_joint_edit)index);
 }
 
 static sadmm_status check_table(const double *positions, const double *forces, int32_t count,
@@ -489,6 +495,7 @@ sadmm_status sadmm_world_joint_state(sadmm_world *world, sadmm_joint_id id, sadm
     if (!joint) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(state, "state", &world->error));
     TRY(sadmm_world_pull_bodies(world));
+    TRY(sadmm_world_pull_joints(world));
     const struct sadmm_joint_memory *last = &joint->last;
     memset(state, 0, sizeof *state);
     read_motion(world, joint, state);

@@ -156,7 +156,7 @@ void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings)
             v3_store(acting.middle.point, joint->next.point);
         }
         const double force = source->sign * rows->lambda[r] / settings->dt;
-        joint_keep_row(&joint->next, &acting.middle, source->role, source->coordinate, force);
+        joint_keep_row(&joint->next, acting.middle.axis, source->role, source->coordinate, force);
     }
     if (joint) end_joint(world, joint, &acting, settings->dt);
 }
