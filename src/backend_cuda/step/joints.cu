@@ -30,7 +30,7 @@ enum { ROWS_THREADS = 64 }; /* a block: long work, many multiprocessors */
 
 static __device__ __forceinline__ struct joint_body body_of(const cuda_step_view &step, int32_t body)
 {
-    const struct joint_body out = {body, body >= 0 ? &step.before[body] : nullptr};
+    const struct joint_body out = {body, body >= 0 ? &step.before[body] : nullptr, false};
     return out;
 }
 
@@ -136,7 +136,7 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
     }
     if (coordinate) {
         moving = joint_moving_of(def, &v.joints.before[j], &acting, lane, &settings);
-        joint_coordinate_laws(def, lane, &moving, &laws);
+        joint_coordinate_laws(def, lane, &moving, nullptr, &laws); /* worlds with tables are the host's */
     }
     int rows;
     const int at = place_laws(laws.count, coordinate && (def->locks >> lane & 1), lane, &rows);

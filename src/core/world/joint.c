@@ -268,8 +268,10 @@ static void kill_coupling(sadmm_world *world, size_t slot)
     sadmm_slot_freed(&world->coupling_marks, slot);
 }
 
-static void set_table(struct sadmm_world_joint *joint, int index, double *table, int32_t count)
+static void set_table(sadmm_world *world, size_t slot, int index, double *table, int32_t count)
 {
+    struct sadmm_world_joint *joint = &world->joints[slot];
+    world->table_count += (count > 0) - (joint->table_count[index] > 0);
     sadmm_free(joint->table[index]);
     joint->table[index] = table;
     joint->table_count[index] = count;
@@ -278,14 +280,14 @@ static void set_table(struct sadmm_world_joint *joint, int index, double *table,
 void sadmm_world_free_tables(sadmm_world *world)
 {
     for (size_t slot = 0; slot < world->joint_slots; ++slot)
-        for (int k = 0; k < JOINT_COORDINATES; ++k) set_table(&world->joints[slot], k, NULL, 0);
+        for (int k = 0; k < JOINT_COORDINATES; ++k) set_table(world, slot, k, NULL, 0);
 }
 
 void sadmm_world_kill_joint(sadmm_world *world, size_t slot)
 {
     struct sadmm_world_joint *joint = &world->joints[slot];
     remove_pair(world, joint);
-    for (int k = 0; k < JOINT_COORDINATES; ++k) set_table(joint, k, NULL, 0);
+    for (int k = 0; k < JOINT_COORDINATES; ++k) set_table(world, slot, k, NULL, 0);
     joint->alive = false;
     ++joint->generation;
     --world->joint_count;
@@ -420,6 +422,7 @@ sadmm_status sadmm_world_set_joint_spring_table(sadmm_world *world, sadmm_joint_
     if (!joint) return SADMM_ERROR_STALE_ID;
     TRY(check_free(joint, index, error));
     TRY(check_table(positions, forces, count, error));
+    TRY(sadmm_world_take_back(world));
     const size_t n = (size_t)count;
     double *table = n ? (double *)sadmm_alloc(2 * n, sizeof *table) : NULL;
     if (n && !table) return sadmm_fail_memory(error, "a spring's table");
@@ -427,7 +430,7 @@ sadmm_status sadmm_world_set_joint_spring_table(sadmm_world *world, sadmm_joint_
         memcpy(table, positions, n * sizeof *table);
         memcpy(table + n, forces, n * sizeof *table);
     }
-    set_table(joint, index, table, count);
+    set_table(world, id.slot - 1, index, table, count);
     return SADMM_OK;
 }
 

@@ -114,6 +114,7 @@ struct sadmm_world {
     size_t joint_slots, joint_capacity;
     int32_t joint_count;                  /* live slots, those of couplings among them */
     struct sadmm_slot_marks joint_marks;
+    int32_t table_count;                  /* tables of springs, of all joints */
     struct sadmm_world_coupling *couplings;
     size_t coupling_slots, coupling_capacity;
     int32_t coupling_count;
