@@ -3,6 +3,7 @@
 #include "cli.h"
 #include "scenes/scenes.h"
 #include "subadmm/coupling.h"
+#include "subadmm/gear.h"
 #include "subadmm/joint.h"
 
 enum { OPTION_JSON };
@@ -264,8 +265,52 @@ static sadmm_status add_couplings(sadmm_world *world, json_t *bodies, json_t *co
     return SADMM_OK;
 }
 
-static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, json_t *bodies, json_t *joints,
-                          json_t *couplings)
+/* The index of a joint in the array: joints are listed in order of their slots. */
+static int32_t joint_index(sadmm_world *world, sadmm_joint_id wanted)
+{
+    for (int32_t k = 0; k < sadmm_world_joint_count(world); ++k) {
+        sadmm_joint_id id;
+        if (sadmm_world_joint_at(world, k, &id) == SADMM_OK && id.slot == wanted.slot) return k;
+    }
+    return -1;
+}
+
+static sadmm_status add_gears(sadmm_world *world, json_t *gears)
+{
+    for (int32_t k = 0; k < sadmm_world_gear_count(world); ++k) {
+        sadmm_gear_id id;
+        sadmm_gear_def def;
+        sadmm_status status = sadmm_world_gear_at(world, k, &id);
+        if (status == SADMM_OK) status = sadmm_world_gear_def(world, id, &def);
+        if (status != SADMM_OK) return status;
+        json_t *o = json_object();
+        json_object_set_new(o, "joint_1", json_integer(joint_index(world, def.joint_1)));
+        json_object_set_new(o, "coordinate_1", json_integer(def.coordinate_1));
+        json_object_set_new(o, "joint_2", json_integer(joint_index(world, def.joint_2)));
+        json_object_set_new(o, "coordinate_2", json_integer(def.coordinate_2));
+        json_object_set_new(o, "ratio", cli_json_real(def.ratio));
+        json_object_set_new(o, "offset", cli_json_real(def.offset));
+        json_object_set_new(o, "enabled", json_boolean(def.enabled));
+        json_array_append_new(gears, o);
+    }
+    return SADMM_OK;
+}
+
+/* What is on bodies and between them. */
+struct parts {
+    json_t *bodies, *joints, *couplings, *gears;
+};
+
+static sadmm_status add_parts(sadmm_world *world, const struct parts *parts)
+{
+    sadmm_status status = add_bodies(world, parts->bodies);
+    if (status == SADMM_OK) status = add_shapes(world, parts->bodies);
+    if (status == SADMM_OK) status = add_joints(world, parts->bodies, parts->joints);
+    if (status == SADMM_OK) status = add_couplings(world, parts->bodies, parts->couplings);
+    return status == SADMM_OK ? add_gears(world, parts->gears) : status;
+}
+
+static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, const struct parts *parts)
 {
     static const char *const units =
         "SI; world frame; quaternions w x y z, body to world; inertia: principal moments in "
@@ -283,9 +328,10 @@ static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, jso
     json_object_set_new(o, "contact_margin", cli_json_real(scene->def.contact_margin));
     json_object_set_new(o, "friction_of_a_pair", json_string("geometric mean"));
     json_object_set_new(o, "settings", cli_json_settings(&scene->def.settings));
-    json_object_set_new(o, "bodies", bodies);
-    json_object_set_new(o, "joints", joints);
-    json_object_set_new(o, "couplings", couplings);
+    json_object_set_new(o, "bodies", parts->bodies);
+    json_object_set_new(o, "joints", parts->joints);
+    json_object_set_new(o, "couplings", parts->couplings);
+    json_object_set_new(o, "gears", parts->gears);
     cli_json_add_build(o);
     return o;
 }
@@ -307,15 +353,15 @@ static int show_scene(const char *spec, struct output *json)
         sadmm_world_destroy(world);
         return CLI_DONE;
     }
-    json_t *bodies = json_array(), *joints = json_array(), *couplings = json_array();
+    const struct parts parts = {json_array(), json_array(), json_array(), json_array()};
     int code;
-    if (add_bodies(world, bodies) == SADMM_OK && add_shapes(world, bodies) == SADMM_OK &&
-        add_joints(world, bodies, joints) == SADMM_OK && add_couplings(world, bodies, couplings) == SADMM_OK) {
-        code = cli_write_json(scene_json(spec, &scene, bodies, joints, couplings), json);
+    if (add_parts(world, &parts) == SADMM_OK) {
+        code = cli_write_json(scene_json(spec, &scene, &parts), json);
     } else {
-        json_decref(bodies);
-        json_decref(joints);
-        json_decref(couplings);
+        json_decref(parts.bodies);
+        json_decref(parts.joints);
+        json_decref(parts.couplings);
+        json_decref(parts.gears);
         code = cli_error(CLI_FAILED, "%s", sadmm_world_message(world));
     }
     sadmm_world_destroy(world);

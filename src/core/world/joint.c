@@ -283,10 +283,27 @@ void sadmm_world_free_tables(sadmm_world *world)
         for (int k = 0; k < JOINT_COORDINATES; ++k) set_table(world, slot, k, NULL, 0);
 }
 
+void sadmm_world_kill_gear(sadmm_world *world, size_t slot)
+{
+    world->gears[slot].alive = false;
+    ++world->gears[slot].generation;
+    --world->gear_count;
+    sadmm_slot_freed(&world->gear_marks, slot);
+}
+
+static void kill_gears_of(sadmm_world *world, size_t joint)
+{
+    for (size_t slot = 0; world->gear_count > 0 && slot < world->gear_slots; ++slot) {
+        const struct sadmm_world_gear *gear = &world->gears[slot];
+        if (gear->alive && (gear->joint[0] == joint || gear->joint[1] == joint)) sadmm_world_kill_gear(world, slot);
+    }
+}
+
 void sadmm_world_kill_joint(sadmm_world *world, size_t slot)
 {
     struct sadmm_world_joint *joint = &world->joints[slot];
     remove_pair(world, joint);
+    kill_gears_of(world, slot);
     for (int k = 0; k < JOINT_COORDINATES; ++k) set_table(world, slot, k, NULL, 0);
     joint->alive = false;
     ++joint->generation;

@@ -17,8 +17,8 @@ static struct joint_body body_of(const sadmm_world *world, int32_t slot)
     return out;
 }
 
-static struct acting_joint prepare(const sadmm_world *world, const struct sadmm_world_joint *joint,
-                                   const sadmm_settings *settings)
+struct acting_joint sadmm_world_act_joint(const sadmm_world *world, const struct sadmm_world_joint *joint,
+                                          const sadmm_settings *settings)
 {
     struct joint_body bodies[2] = {body_of(world, joint->body[0]), body_of(world, joint->body[1])};
     if (joint->coupling)
@@ -95,14 +95,14 @@ sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *set
         struct sadmm_world_joint *joint = &world->joints[slot];
         struct all_laws laws;
         if (!joint->alive || !joint->def.enabled) continue;
-        const struct acting_joint acting = prepare(world, joint, settings);
+        const struct acting_joint acting = sadmm_world_act_joint(world, joint, settings);
         find_laws(joint, &acting, settings, &laws);
         if (laws.count > 0) ++*(joint->coupling ? &world->couplings_acting : &world->joints_acting);
         if (!add_constraints(world, (int32_t)slot, &acting, &laws, settings->dt))
             return sadmm_fail_memory(&world->error, "the joints' rows");
         joint_forget_forces(&joint->next); /* the solution tells */
     }
-    return SADMM_OK;
+    return sadmm_world_make_gear_rows(world, settings);
 }
 
 /* ---- from step to step ------------------------------------------------------------------------------------------- */
@@ -130,6 +130,7 @@ sadmm_status sadmm_world_begin_joints(sadmm_world *world)
         joint->next = joint->last;
         if (!joint->def.enabled) joint_forget_forces(&joint->next);
     }
+    sadmm_world_begin_gears(world);
     return filter_pairs(world);
 }
 
@@ -147,18 +148,19 @@ void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings)
     const struct sadmm_rows *rows = &world->start.rows;
     struct sadmm_world_joint *joint = NULL;
     struct acting_joint acting;
-    for (size_t r = 0; r < rows->row_count; ++r) {
+    for (size_t r = 0; r < world->joint_rows; ++r) {
         const struct sadmm_joint_source *source = &world->joint_sources[r];
         if (!joint || joint != &world->joints[source->joint]) {
             if (joint) end_joint(world, joint, &acting, settings->dt);
             joint = &world->joints[source->joint];
-            acting = prepare(world, joint, settings);
+            acting = sadmm_world_act_joint(world, joint, settings);
             v3_store(acting.middle.point, joint->next.point);
         }
         const double force = source->sign * rows->lambda[r] / settings->dt;
         joint_keep_row(&joint->next, acting.middle.axis, source->role, source->coordinate, force);
     }
     if (joint) end_joint(world, joint, &acting, settings->dt);
+    sadmm_world_keep_gear_rows(world, settings->dt);
 }
 
 static void commit_joint(struct sadmm_world_joint *joint)
@@ -171,4 +173,5 @@ void sadmm_world_commit_joints(sadmm_world *world)
 {
     for (size_t slot = 0; world->joint_count > 0 && slot < world->joint_slots; ++slot)
         if (world->joints[slot].alive) commit_joint(&world->joints[slot]);
+    sadmm_world_commit_gears(world);
 }
