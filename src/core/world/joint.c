@@ -334,7 +334,7 @@ sadmm_status sadmm_world_joint_def(sadmm_world *world, sadmm_joint_id id, sadmm_
     return SADMM_OK;
 }
 
-static sadmm_status take_along(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit)
+sadmm_status sadmm_world_take_edit(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit)
 {
     return sadmm_world_edit_joint(world, joint, edit) ? SADMM_OK : sadmm_world_take_back(world);
 }
@@ -346,7 +346,7 @@ sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id
     if (!joint) return SADMM_ERROR_STALE_ID;
     joint->def.enabled = enabled;
     joint->last.broken = joint->last.broken && !enabled;
-    return take_along(world, joint, SADMM_JOINT_ENABLED);
+    return sadmm_world_take_edit(world, joint, SADMM_JOINT_ENABLED);
 }
 
 sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id id, int32_t index,
@@ -363,7 +363,7 @@ sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id
                           joint->def.locks);
     TRY(check_coordinate("coordinate->", coordinate, error));
     joint->def.coordinates[index] = *coordinate;
-    return take_along(world, joint, (enum sadmm_joint_edit)index);
+    return sadmm_world_take_edit(world, joint, (enum sadmm_joint_edit)index);
 }
 
 sadmm_status sadmm_world_place_joint(sadmm_world *world, sadmm_joint_def *def, const double position[3],

@@ -28,7 +28,7 @@ bool sadmm_world_may_reside(const sadmm_world *world)
     const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings), *s = &settings;
     const bool fast = s->method == SADMM_METHOD_FAST,
                few_checks = (s->iterations - 1) / s->check_period < MOST_CHECKS / s->substeps;
-    if ((fast && !world->stepped) || world->coupling_count > 0) return false;
+    if (fast && !world->stepped) return false;
     return world->kernels->resident && s->residual_tolerance <= 0 &&
            (s->certificate_tolerance <= 0 || (fast && few_checks));
 }
@@ -134,6 +134,8 @@ static sadmm_status load(sadmm_world *world)
         .joint_count = world->resident.joint_count,
         .joints = world->resident.joints,
         .joint_memory = world->resident.memory,
+        .coupling_count = world->resident.coupling_count,
+        .coupling_memory = world->resident.coupling_memory,
         .time = world->report.time,
     };
     TRY(world->kernels->resident->load(world->context, &whole, &world->def.settings, &world->error));
