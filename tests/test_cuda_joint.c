@@ -68,7 +68,7 @@ END_TEST
 
 /* ---- steps by the device ----------------------------------------------------------------------------------------- */
 
-enum { YARD_JOINTS = 10, DOOR = 4, MOTOR = 5, GLUE = 6 };
+enum { YARD_JOINTS = 10, DOOR = 4, MOTOR = 5, GLUE = 6, COUPLINGS = 2 };
 
 static sadmm_joint_id join(sadmm_world *world, sadmm_joint_def *def, sadmm_body_id a, sadmm_body_id b, double x,
                            double y, double z)
@@ -93,7 +93,7 @@ static void throw_body(sadmm_world *world, sadmm_body_id id, double vx, double w
 
 /* Joints of all sorts among boxes that fall, land and hit them: a chain with a law a link, a door on a static post with
  * limits and a box thrown at it, a motor that pushes a box, glue that a landing breaks, a spring, a universal and a
- * ball joint in the air; a tower of boxes by itself. */
+ * ball joint in the air; couplings; a tower of boxes by itself. */
 static sadmm_world *yard(int precision, sadmm_method method, int substeps)
 {
     static const sadmm_joint_coordinate laws[] = {
@@ -161,6 +161,18 @@ static sadmm_world *yard(int precision, sadmm_method method, int substeps)
     throw_body(world, third, 0.3, 5);
     join(world, &cross, second, third, 8.8, 0, 0.5);
     join(world, &ball, third, fourth, 9.1, 0, 0);
+    for (int k = 0; k < COUPLINGS; ++k) { /* one lifts a box from another, the other turns one in the air and can do little */
+        sadmm_coupling_def coupling = sadmm_coupling_def_default();
+        if (k == 0) add_box(world, 10, 0, 0.1, 0.1, 1, 0.5);
+        coupling.body = add_box(world, 10 + k, 0, 0.302, 0.1, 0.5, 0.5);
+        coupling.target_position[0] = 10 + k, coupling.target_position[2] = 0.35;
+        coupling.target_velocity[2] = 0.2, coupling.target_velocity[3] = k ? 4 : 0;
+        coupling.position[1] = 0.02;
+        coupling.linear_stiffness = 800, coupling.linear_damping = 20;
+        coupling.angular_stiffness = k ? 5 : 0, coupling.angular_damping = 0.02;
+        coupling.max_force = k ? 3 : INFINITY;
+        MUST(world, sadmm_world_add_coupling(world, &coupling, NULL));
+    }
     for (int i = 0; i < 2; ++i) add_box(world, -2, 0.01 * i, 0.102 + 0.201 * i, 0.1, 1 + i, 0.5);
     use_device(world, precision, 0);
     return world;
@@ -193,10 +205,36 @@ static void expect_close_states(const sadmm_joint_state *a, const sadmm_joint_st
                       a->position[k], b->position[k]);
 }
 
+static sadmm_coupling_id coupling_at(sadmm_world *world, int32_t index)
+{
+    sadmm_coupling_id id;
+    MUST(world, sadmm_world_coupling_at(world, index, &id));
+    return id;
+}
+
+static void expect_same_couplings(sadmm_world *a, sadmm_world *b, const char *what)
+{
+    for (int32_t k = 0; k < COUPLINGS; ++k) {
+        sadmm_coupling_state x, y;
+        sadmm_coupling_def dx, dy;
+        MUST(a, sadmm_world_coupling_state(a, coupling_at(a, k), &x));
+        MUST(b, sadmm_world_coupling_state(b, coupling_at(b, k), &y));
+        MUST(a, sadmm_world_coupling_def(a, coupling_at(a, k), &dx));
+        MUST(b, sadmm_world_coupling_def(b, coupling_at(b, k), &dy));
+        if (EMULATED) ck_assert_msg(memcmp(&x, &y, sizeof x) == 0, "%s: coupling %d", what, k);
+        for (int i = 0; i < 3; ++i) {
+            ck_assert_double_le(fabs(x.position_error[i] - y.position_error[i]), 1e-3);
+            ck_assert_double_le(fabs(dx.target_position[i] - dy.target_position[i]), EMULATED ? 0 : 1e-12);
+        }
+    }
+}
+
 static void expect_same_joints(sadmm_world *a, sadmm_world *b, const char *what)
 {
     if (EMULATED) expect_same_world(a, b, what);
     ck_assert_int_eq(world_report(a).joints, world_report(b).joints);
+    ck_assert_int_eq(world_report(a).couplings, world_report(b).couplings);
+    expect_same_couplings(a, b, what);
     for (int32_t j = 0; j < sadmm_world_joint_count(a); ++j) {
         const sadmm_joint_state x = joint_state(a, j), y = joint_state(b, j);
         sadmm_joint_def da, db;
@@ -235,6 +273,13 @@ static void change(sadmm_world *world, int step)
         MUST(world, sadmm_world_set_joint_coordinate(world, joint_at(world, DOOR), 5, &def.coordinates[5]));
     }
     if (step == 14) MUST(world, sadmm_world_set_joint_enabled(world, joint_at(world, 1), true));
+    if (step == 3 || step == 15) {
+        const double place[3] = {10.02, 0, 0.4}, way[6] = {0.1, 0, -0.3, 0, 0, 2}, turn[4] = {0.8, 0, 0.6, 0};
+        MUST(world, sadmm_world_set_coupling_target(world, coupling_at(world, 0), place, turn, step == 3 ? way : NULL));
+    }
+    if (step == 5) MUST(world, sadmm_world_set_coupling_gains(world, coupling_at(world, 0), 500, 10, 3, 0.1));
+    if (step == 10) MUST(world, sadmm_world_set_coupling_enabled(world, coupling_at(world, 1), false));
+    if (step == 16) MUST(world, sadmm_world_set_coupling_enabled(world, coupling_at(world, 1), true));
 }
 
 START_TEST(resident_joints_equal_those_by_host)

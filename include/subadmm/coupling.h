@@ -12,8 +12,8 @@
  * with any mass at any time step; and bounded, exactly. Method: docs/algorithm.md, section 10.
  *
  * The target's pose is that at the present time of the world; it moves on by its velocity in every (sub-)step, until it
- * is set anew. The caller feels what the target transmits, sadmm_coupling_state.felt_*. Worlds with couplings are
- * stepped by the host on every backend, as those with joints are.
+ * is set anew. The caller feels what the target transmits, sadmm_coupling_state.felt_*. On CUDA targets go along with the
+ * next step, which is not waited for.
  *
  * A coupling is no joint: joints' counts and ids do not have it. Threads and errors: as world.h says. Ids are values with
  * a generation, as bodies' are.

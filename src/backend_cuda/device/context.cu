@@ -68,6 +68,7 @@ static const char *const buffer_names[] = {
     "control of a step",
     "joints",
     "what joints keep",
+    "what couplings keep",
     "rows of joints",
     "islands of joints",
     "staged counts",

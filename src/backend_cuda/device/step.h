@@ -51,9 +51,9 @@ struct cuda_step_totals {
     unsigned long long stamps[STAMPS]; /* ns since the first sub-step began, without what comes between them */
 };
 
-/* Joints that take part, constraints of their rows, those that start with a multiplier other than 0. */
+/* Joints and couplings that take part, constraints of their rows, those that start with a multiplier other than 0. */
 struct cuda_joint_counts {
-    int32_t joints, constraints, warm;
+    int32_t joints, couplings, constraints, warm;
 };
 
 /* Written by commit, read by the host. */

@@ -242,6 +242,8 @@ struct joint_view {
     double *velocity;                   /* bodies x 6: the solution's */
     const struct sadmm_joint_memory *begin, *before; /* count: as the step began, the sub-step; */
     struct sadmm_joint_memory *after;                /* as it ends */
+    const struct sadmm_coupling_memory *couplings_before; /* couplings: as the sub-step began; */
+    struct sadmm_coupling_memory *couplings_after;        /* as it ends */
     int32_t *touch;                 /* bodies: at labels of islands bits (core/model/joint_lead.h) */
 };
 

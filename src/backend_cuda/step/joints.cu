@@ -14,6 +14,7 @@
 #include "core/base/memory.h"
 
 #include "backend_cuda/assemble/assemble.h"
+#include "core/model/coupling_law.h"
 #include "core/model/joint_lead.h"
 #include "move.h"
 #include "world.h"
@@ -22,6 +23,7 @@
 struct cuda_joint_middle {
     vec3 axis[JOINT_COORDINATES];
     quat frame;
+    vec3 arm_b;
 };
 
 /* ---- rows -------------------------------------------------------------------------------------------------------- */
@@ -31,6 +33,15 @@ enum { ROWS_THREADS = 64 }; /* a block: long work, many multiprocessors */
 static __device__ __forceinline__ struct joint_body body_of(const cuda_step_view &step, int32_t body)
 {
     const struct joint_body out = {body, body >= 0 ? &step.before[body] : nullptr, false};
+    return out;
+}
+
+/* End a of a joint: a coupling's is its target. */
+static __device__ __forceinline__ struct joint_body body_a_of(const cuda_view &v,
+                                                              const struct sadmm_resident_joint *joint)
+{
+    if (joint->coupling < 0) return body_of(v.step, joint->body[0]);
+    const struct joint_body out = {-1, &v.joints.couplings_before[joint->coupling].target, true};
     return out;
 }
 
@@ -98,7 +109,9 @@ static __device__ __forceinline__ void store_middle(const joint_view &joints, in
                                                     const struct acting_joint &acting)
 {
     if (lane < JOINT_COORDINATES) joints.middle[j].axis[lane] = acting.middle.axis[lane];
-    else if (lane == JOINT_COORDINATES) joints.middle[j].frame = acting.frame;
+    if (lane != JOINT_COORDINATES) return;
+    joints.middle[j].frame = acting.frame;
+    joints.middle[j].arm_b = acting.middle.arm_b;
 }
 
 /* Constraints of a joint with so many rows. */
@@ -131,7 +144,7 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
     struct joint_laws laws;
     laws.count = 0;
     if (enabled) {
-        const struct joint_body bodies[2] = {body_of(v.step, joint->body[0]), body_of(v.step, joint->body[1])};
+        const struct joint_body bodies[2] = {body_a_of(v, joint), body_of(v.step, joint->body[1])};
         acting = joint_act(def, joint->frame, bodies, &settings);
     }
     if (coordinate) {
@@ -156,7 +169,7 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
     if (rows == 0) return;
     store_middle(v.joints, j, lane, acting);
     if (lane > 0) return;
-    atomicAdd(&v.step.control->joints.joints, 1);
+    atomicAdd(joint->coupling < 0 ? &v.step.control->joints.joints : &v.step.control->joints.couplings, 1);
     atomicAdd(&v.step.control->joints.constraints, (rows + SADMM_MAX_ROWS - 1) / SADMM_MAX_ROWS);
     atomicAdd(&v.step.control->joints.warm, __popc((unsigned)warm));
 }
@@ -175,6 +188,19 @@ static __device__ __forceinline__ int32_t *island_of(const cuda_view &v, int32_t
     return &v.joints.touch[v.graph.label[a >= 0 ? a : b]];
 }
 
+/* joint: what the coupling's has given; NULL: it did not take part. */
+static __device__ __forceinline__ void keep_coupling(const cuda_view &v, int32_t k,
+                                                     const struct sadmm_joint_memory *joint,
+                                                     const struct cuda_joint_middle *middle, double dt)
+{
+    struct sadmm_coupling_memory memory = v.joints.couplings_before[k];
+    if (v.step.substep == 0) coupling_begin(&memory);
+    if (joint) coupling_keep(&memory, joint->wrench, v3_load(joint->point), middle->arm_b, dt);
+    coupling_move(&memory.target, dt);
+    if (v.step.substep + 1 == v.step.substeps) coupling_end(&memory, v.step.substeps);
+    v.joints.couplings_after[k] = memory;
+}
+
 /* Joint j: what its rows carry; what it says of its island. */
 static __device__ __forceinline__ void keep_joint(const cuda_view &v, int32_t j)
 {
@@ -182,7 +208,10 @@ static __device__ __forceinline__ void keep_joint(const cuda_view &v, int32_t j)
     const struct cuda_joint_middle *middle = &v.joints.middle[j];
     const struct sadmm_settings settings = *v.model.settings;
     const int32_t first = v.joints.first[j];
-    if (joint->constraints == 0 || v.raw.constraints[first].count == 0) return;
+    if (joint->constraints == 0 || v.raw.constraints[first].count == 0) {
+        if (joint->coupling >= 0) keep_coupling(v, joint->coupling, nullptr, middle, settings.dt);
+        return;
+    }
     struct sadmm_joint_memory memory = v.joints.after[j];
     const struct joint_lead bodies[2] = {lead_of(v, joint->body[0]), lead_of(v, joint->body[1])};
     int bits = ISLAND_JOINED;
@@ -203,6 +232,7 @@ static __device__ __forceinline__ void keep_joint(const cuda_view &v, int32_t j)
     }
     joint_end_wrench(&memory, &joint->def, middle->frame);
     v.joints.after[j] = memory;
+    if (joint->coupling >= 0) keep_coupling(v, joint->coupling, &memory, middle, settings.dt);
     atomicOr(island_of(v, joint->body[0], joint->body[1]), bits);
     const int32_t named = joint->body[1] >= 0 ? joint->body[1] : joint->body[0];
     if (!(finite == 0)) atomicMin(&v.step.control->offending_body, 2 * v.model.bodies + named);
@@ -278,6 +308,11 @@ static struct sadmm_joint_memory *memory_of(const struct sadmm_context *c, int s
     return buffer<struct sadmm_joint_memory>(c, BUFFER_JOINT_MEMORY) + (size_t)state * (size_t)c->step->joints;
 }
 
+static struct sadmm_coupling_memory *couplings_of(const struct sadmm_context *c, int state)
+{
+    return buffer<struct sadmm_coupling_memory>(c, BUFFER_COUPLING_MEMORY) + (size_t)state * (size_t)c->step->couplings;
+}
+
 void CUDA(view_joints)(struct sadmm_context *c, int into, int substep)
 {
     const struct cuda_step *s = c->step;
@@ -291,6 +326,8 @@ void CUDA(view_joints)(struct sadmm_context *c, int into, int substep)
     joints->begin = memory_of(c, step_state(into, -1, substeps));
     joints->before = memory_of(c, step_state(into, substep - 1, substeps));
     joints->after = memory_of(c, step_state(into, substep, substeps));
+    joints->couplings_before = couplings_of(c, step_state(into, substep - 1, substeps));
+    joints->couplings_after = couplings_of(c, step_state(into, substep, substeps));
     joints->touch = buffer<int32_t>(c, BUFFER_JOINT_TOUCH);
     c->view.rows.count = s->joint_constraints;
     CUDA(bind_raw_rows)(c, row_set(c, into));
@@ -335,17 +372,22 @@ sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resid
                           INT32_MAX / (8 * ROW));
     s->joints = c->view.joints.count = world->joint_count;
     s->joint_constraints = (int32_t)constraints;
+    s->couplings = world->coupling_count;
     if (n == 0) return SADMM_OK;
     const cuda_capacity wanted[] = {
         {BUFFER_JOINTS,
          n * (sizeof(struct sadmm_resident_joint) + sizeof(struct cuda_joint_middle) + sizeof(int32_t))},
         {BUFFER_JOINT_MEMORY, 3 * n * sizeof(struct sadmm_joint_memory)},
+        {BUFFER_COUPLING_MEMORY, 3 * (size_t)s->couplings * sizeof(struct sadmm_coupling_memory)},
         {BUFFER_JOINT_ROWS, 2 * row_set_bytes(s)},
         {BUFFER_JOINT_TOUCH, (size_t)s->bodies * sizeof(int32_t)},
     };
     TRY(reserve_all(c, wanted, error));
     TRY(put(c, c->buffers[BUFFER_JOINTS].data, world->joints, n * sizeof *world->joints, error));
     TRY(put(c, memory_of(c, 1 - s->into), world->joint_memory, n * sizeof *world->joint_memory, error));
+    if (s->couplings > 0)
+        TRY(put(c, couplings_of(c, 1 - s->into), world->coupling_memory,
+                (size_t)s->couplings * sizeof *world->coupling_memory, error));
     return put_first(c, world, error);
 }
 
@@ -363,10 +405,12 @@ static sadmm_status get(struct sadmm_context *c, void *to, const void *from, siz
 }
 
 extern "C" sadmm_status CUDA(read_joints)(struct sadmm_context *c, struct sadmm_joint_memory *memory,
-                                          struct sadmm_error *error)
+                                          struct sadmm_coupling_memory *couplings, struct sadmm_error *error)
 {
     const struct cuda_step *s = c->step;
     CUDA_ENTER(c);
+    if (s->couplings > 0)
+        TRY(get(c, couplings, couplings_of(c, 1 - s->into), (size_t)s->couplings * sizeof *couplings, error));
     return get(c, memory, memory_of(c, 1 - s->into), (size_t)s->joints * sizeof *memory, error);
 }
 

@@ -4,6 +4,7 @@
 #include "backend_cuda/device/double.h"
 
 #include "collision/bounds.h"
+#include "core/model/coupling_law.h"
 #include "core/model/joint_lead.h"
 
 #include "backend_cuda/device/plan_check.h"
@@ -22,6 +23,14 @@ static __device__ __forceinline__ void edit_joint(const joint_view &joints, int3
     sadmm_joint_def *def = &joints.joints[j].def;
     if (k < JOINT_COORDINATES) {
         joint_coordinate_take(values, &def->coordinates[k]);
+        return;
+    }
+    if (k > JOINT_COORDINATES) {
+        struct sadmm_rigid *target = &const_cast<struct sadmm_coupling_memory *>(
+            joints.couplings_before)[joints.joints[j].coupling].target;
+        for (int i = 0; i < 3; ++i) target->position[i] = values[i];
+        for (int i = 0; i < 4; ++i) target->orientation[i] = values[3 + i];
+        for (int i = 0; i < 6; ++i) target->velocity[i] = values[7 + i];
         return;
     }
     def->enabled = values[0] != 0;
@@ -104,7 +113,7 @@ static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, co
         v.step.control->depth = 0;
         v.step.control->offending_body = INT32_MAX;
         v.step.control->stamps[STAMP_START] = nanoseconds();
-        v.step.control->joints = {0, 0, 0};
+        v.step.control->joints = {0, 0, 0, 0};
     }
     if (i >= v.model.bodies) return;
     start_body(v, i, lane, &v.step.before[i], &v.step.steady_before[i]);
@@ -241,7 +250,7 @@ static __global__ void __launch_bounds__(TURN_THREADS, 4)
         control->stamps[STAMP_START] = control->stamps[STAMP_END];
         const int32_t code = abort_of(ABORT_NONE, as_planned(v.model, v.step), control->offending_body);
         if (code) v.model.live->abort_code = code;
-        else control->joints = {0, 0, 0};
+        else control->joints = {0, 0, 0, 0};
     }
     if (i >= v.model.bodies) return;
     start_body(v, i, lane, &v.step.after[i], &v.step.steady_after[i]);

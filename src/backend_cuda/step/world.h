@@ -38,7 +38,7 @@ struct learned {
 struct cuda_step {
     struct sadmm_cuda_collision *collision;
     int32_t bodies, slots;
-    int32_t joints, joint_constraints;
+    int32_t joints, joint_constraints, couplings;
 
     bool planned;               /* capacities, partition and guess are for the world as it is */
     bool recorded;              /* and so are the graphs */

@@ -41,6 +41,7 @@ struct sadmm_resident_joint {
     int32_t constraints;         /* that its rows may take, of up to six each */
     int32_t body[2];             /* dynamic body; -1: it does not move, and its frame is in the world */
     struct joint_frame frame[2];
+    int32_t coupling;            /* number of the coupling whose target its frame a is; -1: none */
 };
 
 /* The joint's row that a row of the step is. */

@@ -20,6 +20,7 @@ struct sadmm_context;
 struct sadmm_collision_input;
 struct sadmm_resident_joint; /* core/model/joint_law.h */
 struct sadmm_joint_memory;
+struct sadmm_coupling_memory; /* core/model/coupling_law.h */
 
 /* A world, from the host. */
 struct sadmm_resident_world {
@@ -32,6 +33,8 @@ struct sadmm_resident_world {
     int32_t joint_count;
     const struct sadmm_resident_joint *joints;      /* (joint_count) */
     const struct sadmm_joint_memory *joint_memory;  /* (joint_count) of the last step */
+    int32_t coupling_count;
+    const struct sadmm_coupling_memory *coupling_memory; /* (coupling_count) likewise */
     double time;                               /* simulated until now, s */
 };
 
@@ -40,7 +43,7 @@ enum sadmm_edit_kind {
     SADMM_EDIT_WRENCH,   /* target: a dynamic body; force, torque (6) */
     SADMM_EDIT_SETTINGS, /* sadmm_settings_numbers(): a backend's own, from what `step` is given */
     SADMM_EDIT_JOINT,    /* target: SADMM_JOINT_TARGETS joint + k; k < 6: the numbers of that coordinate (joint_coordinate_numbers); k = 6:
-                            enabled (1 or 0) */
+                            enabled (1 or 0); k = 7: a coupling's target: position (3), orientation (4), velocity (6) */
     SADMM_EDIT_KINDS
 };
 enum { SADMM_JOINT_TARGETS = 8 }; /* a joint */
@@ -95,8 +98,9 @@ struct sadmm_resident_kernels {
      * s); any pointer may be NULL. Nothing may be enqueued. */
     sadmm_status (*read_start)(struct sadmm_context *, struct sadmm_rigid *rigid, double *velocity, double *impulse,
                                struct sadmm_error *);
-    /* What joints keep after the last step done. Nothing may be enqueued. */
-    sadmm_status (*read_joints)(struct sadmm_context *, struct sadmm_joint_memory *, struct sadmm_error *);
+    /* What joints and couplings keep after the last step done. Nothing may be enqueued. */
+    sadmm_status (*read_joints)(struct sadmm_context *, struct sadmm_joint_memory *, struct sadmm_coupling_memory *,
+                                struct sadmm_error *);
     /* Rows of the joints in the last step done, with the multipliers that it started from, and the solution's (six a
      * constraint that joints may have, at most) and velocities (bodies x 6): where there are joints, bodies need not end
      * with these. Nothing may be enqueued. */

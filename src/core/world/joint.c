@@ -367,7 +367,7 @@ sadmm_status sadmm_world_joint_def(sadmm_world *world, sadmm_joint_id id, sadmm_
     return SADMM_OK;
 }
 
-static sadmm_status take_along(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit)
+sadmm_status sadmm_world_take_edit(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit)
 {
     return sadmm_world_edit_joint(world, joint, edit) ? SADMM_OK : sadmm_world_take_back(world);
 }
@@ -379,7 +379,7 @@ sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id
     if (!joint) return SADMM_ERROR_STALE_ID;
     joint->def.enabled = enabled;
     joint->last.broken = joint->last.broken && !enabled;
-    return take_along(world, joint, SADMM_JOINT_ENABLED);
+    return sadmm_world_take_edit(world, joint, SADMM_JOINT_ENABLED);
 }
 
 static sadmm_status check_free(const struct sadmm_world_joint *joint, int32_t index, struct sadmm_error *error)
@@ -402,7 +402,7 @@ sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id
     TRY(check_free(joint, index, error));
     TRY(check_coordinate("coordinate->", coordinate, error));
     joint->def.coordinates[index] = *coordinate;
-    return take_along(world, joint, (enum sadmm_joint_edit)index);
+    return sadmm_world_take_edit(world, joint, (enum sadmm_joint_edit)index);
 }
 
 static sadmm_status check_table(const double *positions, const double *forces, int32_t count,

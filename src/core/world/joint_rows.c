@@ -139,8 +139,8 @@ static void end_joint(sadmm_world *world, struct sadmm_world_joint *joint, const
 {
     joint_end_wrench(&joint->next, &joint->def, acting->frame);
     if (joint->coupling)
-        sadmm_coupling_keep(&world->couplings[joint->coupling - 1].next, joint->next.wrench, &acting->middle,
-                            dt);
+        coupling_keep(&world->couplings[joint->coupling - 1].next, joint->next.wrench, acting->middle.point,
+                      acting->middle.arm_b, dt);
 }
 
 void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings)

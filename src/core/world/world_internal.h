@@ -15,6 +15,7 @@
 #include "core/base/check.h"
 #include "core/base/error.h"
 #include "core/base/parallel.h"
+#include "core/model/coupling_law.h"
 #include "core/model/joint_law.h"
 #include "core/model/settings.h"
 #include "core/solve/certificate.h"
@@ -47,8 +48,8 @@ struct sadmm_world_body {
     int64_t set_at[SADMM_BODY_EDITS]; /* steps enqueued since the world was loaded, when that was set; -1: before */
 };
 
-/* What may be set of a joint without loading the world again: its coordinates, 0 to 5, and: */
-enum sadmm_joint_edit { SADMM_JOINT_ENABLED = JOINT_COORDINATES, SADMM_JOINT_EDITS };
+/* What may be set of a joint without loading the world again: its coordinates, 0 to 5, and (TARGET: of a coupling) */
+enum sadmm_joint_edit { SADMM_JOINT_ENABLED = JOINT_COORDINATES, SADMM_JOINT_TARGET, SADMM_JOINT_EDITS };
 
 /* A joint slot. That of a coupling is out of callers' sight: its frame a is the target, which is steered, and what acts
  * are position drives of all coordinates. */
@@ -66,12 +67,6 @@ struct sadmm_world_joint {
     int32_t resident_constraints; /* that its rows may take there */
     uint32_t edits;         /* bits of enum sadmm_joint_edit, as in a body */
     int64_t set_at[SADMM_JOINT_EDITS];
-};
-
-/* What a coupling keeps from step to step. */
-struct sadmm_coupling_memory {
-    struct sadmm_rigid target; /* its pose and velocity alone */
-    double felt[6], body[6];   /* as in sadmm_coupling_state; in the step at hand: sums over its sub-steps */
 };
 
 /* A coupling slot. */
@@ -178,10 +173,11 @@ struct sadmm_world {
         struct sadmm_resident_joint *joints; /* as they were loaded; */
         struct sadmm_joint_memory *memory;   /* likewise, and as they are read; */
         int32_t *joint_slots;                /* their slots */
+        struct sadmm_coupling_memory *coupling_memory; /* of those that are of couplings, in their order */
         double *solution;                    /* of their rows */
         uint32_t *edited_joints;             /* slots of joints with `edits`; capacity: all */
-        int32_t joint_count, joint_constraints;
-        size_t joint_capacity, memory_capacity, joint_slot_capacity, solution_capacity, edited_joint_count,
+        int32_t joint_count, joint_constraints, coupling_count;
+        size_t joint_capacity, memory_capacity, coupling_memory_capacity, joint_slot_capacity, solution_capacity, edited_joint_count,
             edited_joint_capacity;
     } resident;
 
@@ -211,10 +207,6 @@ sadmm_status sadmm_world_not_finite(sadmm_world *world, int32_t body);
 
 /* What couplings kept of the last step into what they keep of this one. */
 void sadmm_world_begin_couplings(sadmm_world *world);
-/* Of a (sub-)step of dt, whose target has not moved on: the wrench on the body about b's point, at the geometry of the
- * middle. */
-void sadmm_coupling_keep(struct sadmm_coupling_memory *memory, const double wrench[6],
-                         const struct joint_geometry *middle, double dt);
 /* A (sub-)step of dt is over: targets move on. */
 void sadmm_world_move_targets(sadmm_world *world, double dt);
 /* The step of so many sub-steps is done. */
@@ -286,7 +278,7 @@ sadmm_status sadmm_world_contain(sadmm_world *world, sadmm_status status);
 
 /* Joints of a world that is about to be loaded, into resident.joints and what is beside it. */
 sadmm_status sadmm_world_list_joints(sadmm_world *world);
-/* A joint's coordinate, or whether it is enabled, has been set: the next step takes it along. False: the backend has no
+/* A joint's coordinate, whether it is enabled, or its target has been set: the next step takes it along. False: the backend has no
  * room for its rows, the world is to be taken back. */
 bool sadmm_world_edit_joint(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit);
 /* Edits into resident.edits, from *count on. */
@@ -327,6 +319,8 @@ void sadmm_world_kill_shape(sadmm_world *world, size_t slot);
 
 /* What joints have beside their slots. */
 void sadmm_world_free_tables(sadmm_world *world);
+/* Something of a joint has been set: the next step of the backend that keeps the world takes it along. */
+sadmm_status sadmm_world_take_edit(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit);
 /* Put a joint that has been checked into a slot. */
 sadmm_status sadmm_world_insert_joint(sadmm_world *world, const struct sadmm_world_joint *joint, size_t *slot);
 /* With its coupling, if it is of one, and the gears on it. */
