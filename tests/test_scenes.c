@@ -221,6 +221,7 @@ static const struct {
     { "chain:5", 40 },
     { "four_bar:2", 40 },
     { "slider_crank", 40 },
+    { "bricard", 10 },
 };
 
 static uint64_t hash_after(const char *spec, sadmm_method method, int threads, int steps)
