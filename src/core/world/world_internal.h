@@ -19,6 +19,7 @@
 #include "core/model/joint_law.h"
 #include "core/model/settings.h"
 #include "core/solve/certificate.h"
+#include "core/solve/joined.h"
 #include "core/solve/kernels.h"
 #include "core/solve/schedule.h"
 #include "pair_table.h"
@@ -185,6 +186,7 @@ struct sadmm_world {
     struct sadmm_context *context;
     char why[SADMM_WHY_SIZE];
     struct sadmm_certificate_workspace certificate_workspace;
+    struct sadmm_joined *joined; /* made with the first joint */
     sadmm_step_report report;
 };
 
