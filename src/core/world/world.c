@@ -64,7 +64,7 @@ void sadmm_world_destroy(sadmm_world *world)
     void *blocks[] = {world->bodies, world->shapes, world->shape_generations, world->geometries,
                       world->disabled_pairs.keys, world->disabled_pairs.values, world->joined_pairs.keys,
                       world->joined_pairs.values, world->filtered_pairs, world->joints, world->couplings, world->joint_sources,
-                      world->joint_labels, world->joint_touch, world->start.multiplier, world->last_start.multiplier,
+                      world->joint_labels, world->joint_touch, world->joint_constraints, world->start.multiplier, world->last_start.multiplier,
                       world->friction_pairs.keys,
                       world->friction_pairs.values, world->collision_bodies, world->start.rigid, world->start.velocity,
                       world->start.impulse, world->last_start.rigid, world->last_start.velocity,
