@@ -25,9 +25,14 @@ struct sadmm_joined;
 struct sadmm_joined *sadmm_joined_create(void);
 void sadmm_joined_destroy(struct sadmm_joined *joined);
 
-/* system->velocity and the multipliers of system->rows, in place. What does not fit a direct solve (constraints of more
- * than MOST_AROUND at one body) is left as it is. Errors: OUT_OF_MEMORY, nothing has changed. */
+/* Constraints at one body; more of them are left to the iteration, since all are coupled to each other. */
+enum { SADMM_JOINED_AROUND = 64 };
+
+/* system->velocity and the multipliers of system->rows, in place. slots: constraints of these rows, at places that stay
+ * from step to step, so that the order does, too: one may have no rows at the time, but has the bodies that it joins
+ * when it has. What does not fit a direct solve is left as it is. Errors: OUT_OF_MEMORY, nothing has changed. */
 sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_system *system,
+                                const struct sadmm_row_constraint *slots, size_t slot_count,
                                 const struct sadmm_settings *settings, struct sadmm_error *error);
 
 #endif

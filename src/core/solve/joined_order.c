@@ -169,28 +169,29 @@ static void take_level(struct graph *g, int32_t *order, int32_t *taken)
 
 /* ---- all of it ------------------------------------------------------------------------------------------------------ */
 
-/* Columns as they are found, part by part; then in order of levels. */
+/* Columns as they are found, part by part and level by level. */
 struct column {
-    int32_t constraint, level;
+    int32_t constraint;
     int32_t first, count; /* its rows, constraints, in `rows` */
 };
 
 struct columns {
     struct column *column;
-    int32_t *rows;
+    int32_t *rows, *first_level, *first_of_level;
     int32_t count, levels;
     size_t row_count, row_capacity;
 };
 
-static bool add_columns(const struct maker *m, int32_t part, const struct graph *g, const int32_t *order, int32_t begin,
-                        int32_t end, int32_t level, struct columns *all)
+static bool add_columns(const int32_t *member, const struct graph *g, const int32_t *order, int32_t begin, int32_t end,
+                        struct columns *all)
 {
-    const int32_t *member = m->member + m->first_member[part];
+    all->first_of_level[all->levels++] = all->count;
     for (int32_t at = begin; at < end; ++at) {
         struct column *column = &all->column[all->count++];
-        const size_t most = all->row_count + (size_t)g->count;
-        if (!sadmm_grow(&all->rows, &all->row_capacity, all->row_count, most, sizeof *all->rows)) return false;
-        *column = (struct column){member[order[at]], level, (int32_t)all->row_count, 0};
+        if (!sadmm_grow(&all->rows, &all->row_capacity, all->row_count, all->row_count + (size_t)g->count,
+                        sizeof *all->rows))
+            return false;
+        *column = (struct column){member[order[at]], (int32_t)all->row_count, 0};
         EACH_NEAR(g, order[at], j) all->rows[all->row_count++] = member[j];
         column->count = (int32_t)all->row_count - column->first;
     }
@@ -200,98 +201,16 @@ static bool add_columns(const struct maker *m, int32_t part, const struct graph 
 static bool order_part(const struct maker *m, int32_t part, int32_t *number, int32_t *order, struct columns *all)
 {
     struct graph g = {0};
-    int32_t taken = 0, level = 0;
+    int32_t taken = 0;
     bool fits = make_graph(m, part, number, &g);
+    all->first_level[part] = all->levels;
     while (fits && taken < g.count) {
         const int32_t begin = taken;
         take_level(&g, order, &taken);
-        fits = add_columns(m, part, &g, order, begin, taken, level++, all);
+        fits = add_columns(m->member + m->first_member[part], &g, order, begin, taken, all);
     }
-    if (level > all->levels) all->levels = level;
     free_graph(&g);
     return fits;
-}
-
-static int32_t *take(int32_t **memory, size_t count)
-{
-    int32_t *at = *memory;
-    *memory += count;
-    return at;
-}
-
-static bool reserve(struct sadmm_joined_order *o, size_t updates)
-{
-    const size_t n = (size_t)o->count, b = (size_t)o->blocks;
-    int32_t *memory =
-        (int32_t *)sadmm_alloc(n + (size_t)o->levels + 1 + n + 1 + 2 * b + n + b + 1 + 2 * updates, sizeof *memory);
-    o->memory = memory;
-    if (!memory) return false;
-    o->constraint = take(&memory, n);
-    o->first_of_level = take(&memory, (size_t)o->levels + 1);
-    o->first_below = take(&memory, n + 1);
-    o->row = take(&memory, b);
-    o->column = take(&memory, b);
-    o->first_update = take(&memory, n + b + 1);
-    o->update = take(&memory, 2 * updates);
-    return true;
-}
-
-/* Places by level, then as found; rows of a column by their places. */
-static void place_columns(struct sadmm_joined_order *o, const struct columns *all, int32_t *place, int32_t *found)
-{
-    int32_t at = 0, block = 0;
-    for (int32_t level = 0; level < o->levels; ++level) {
-        o->first_of_level[level] = at;
-        for (int32_t k = 0; k < all->count; ++k) {
-            if (all->column[k].level != level) continue;
-            found[at] = k;
-            place[all->column[k].constraint] = at;
-            o->constraint[at++] = all->column[k].constraint;
-        }
-    }
-    o->first_of_level[o->levels] = at;
-    for (int32_t j = 0; j < o->count; ++j) {
-        const struct column *column = &all->column[found[j]];
-        o->first_below[j] = block;
-        for (int32_t i = 0; i < column->count; ++i) {
-            const int32_t row = place[all->rows[column->first + i]];
-            int32_t to = block++;
-            for (; to > o->first_below[j] && o->row[to - 1] > row; --to) o->row[to] = o->row[to - 1];
-            o->row[to] = row;
-        }
-        for (int32_t b = o->first_below[j]; b < block; ++b) o->column[b] = j;
-    }
-    o->first_below[o->count] = block;
-}
-
-static int32_t find_block(const struct sadmm_joined_order *o, int32_t row, int32_t column)
-{
-    int32_t low = o->first_below[column], high = o->first_below[column + 1] - 1;
-    while (low < high) {
-        const int32_t middle = low + (high - low) / 2;
-        if (o->row[middle] < row) low = middle + 1;
-        else high = middle;
-    }
-    return low;
-}
-
-/* Every column takes from each pair of its rows; counted first (`update` NULL), then listed. */
-static size_t each_update(const struct sadmm_joined_order *o, int32_t *next, int32_t *update)
-{
-    size_t count = 0;
-    for (int32_t k = 0; k < o->count; ++k)
-        for (int32_t w = o->first_below[k]; w < o->first_below[k + 1]; ++w)
-            for (int32_t u = w; u < o->first_below[k + 1]; ++u, ++count) {
-                const int32_t node =
-                    u == w ? o->row[w] : o->count + find_block(o, o->row[u], o->row[w]);
-                if (!update) {
-                    ++next[node + 1];
-                    continue;
-                }
-                update[2 * next[node]] = u;
-                update[2 * next[node]++ + 1] = w;
-            }
-    return count;
 }
 
 static size_t count_updates(const struct columns *all)
@@ -304,36 +223,171 @@ static size_t count_updates(const struct columns *all)
     return count;
 }
 
-/* Which level waits for which: columns of a level are eliminated before any of the next. */
-static bool finish(struct sadmm_joined_order *o, const struct columns *all, int32_t *place, int32_t *found)
+/* The arrays while they are filled. */
+struct arrays {
+    int32_t *constraint, *first_level, *first_of_level, *first_below, *row, *column, *first_update, *update;
+    int32_t *first_body, *body, *first_around, *around;
+    int32_t count, blocks, parts, bodies;
+};
+
+static int32_t *take(int32_t **memory, size_t count)
 {
-    o->count = all->count;
-    o->blocks = (int32_t)all->row_count;
-    o->levels = all->levels;
-    if (!reserve(o, count_updates(all))) return false;
-    place_columns(o, all, place, found);
-    int32_t *next = (int32_t *)sadmm_alloc((size_t)o->count + (size_t)o->blocks + 1, sizeof *next);
+    int32_t *at = *memory;
+    *memory += count;
+    return at;
+}
+
+static bool reserve(struct arrays *o, const struct maker *m, const struct columns *all,
+                    struct sadmm_joined_order *order)
+{
+    const size_t n = (size_t)all->count, b = all->row_count, updates = count_updates(all), parts = (size_t)m->parts,
+                 levels = (size_t)all->levels, bodies = 2 * n;
+    order->size = n + parts + 1 + levels + 1 + n + 1 + 2 * b + n + b + 1 + 2 * updates + parts + 1 + bodies + bodies + 1 +
+                  2 * n;
+    int32_t *memory = order->memory = (int32_t *)sadmm_alloc(order->size, sizeof *memory);
+    if (!memory) return false;
+    o->count = all->count, o->blocks = (int32_t)b, o->parts = m->parts;
+    o->constraint = take(&memory, n);
+    o->first_level = take(&memory, parts + 1);
+    o->first_of_level = take(&memory, levels + 1);
+    o->first_below = take(&memory, n + 1);
+    o->row = take(&memory, b);
+    o->column = take(&memory, b);
+    o->first_update = take(&memory, n + b + 1);
+    o->update = take(&memory, 2 * updates);
+    o->first_body = take(&memory, parts + 1);
+    o->body = take(&memory, bodies);
+    o->first_around = take(&memory, bodies + 1);
+    o->around = take(&memory, 2 * n);
+    return true;
+}
+
+/* Places as columns were found; rows of a column by their places. */
+static void place_columns(struct arrays *o, const struct columns *all, int32_t parts, int32_t *place)
+{
+    int32_t block = 0;
+    memcpy(o->first_level, all->first_level, (size_t)parts * sizeof *o->first_level);
+    memcpy(o->first_of_level, all->first_of_level, (size_t)all->levels * sizeof *o->first_of_level);
+    o->first_level[parts] = all->levels;
+    o->first_of_level[all->levels] = all->count;
+    for (int32_t j = 0; j < o->count; ++j) {
+        o->constraint[j] = all->column[j].constraint;
+        place[o->constraint[j]] = j;
+    }
+    for (int32_t j = 0; j < o->count; ++j) {
+        const struct column *column = &all->column[j];
+        o->first_below[j] = block;
+        for (int32_t i = 0; i < column->count; ++i) {
+            const int32_t row = place[all->rows[column->first + i]];
+            int32_t to = block++;
+            for (; to > o->first_below[j] && o->row[to - 1] > row; --to) o->row[to] = o->row[to - 1];
+            o->row[to] = row;
+        }
+        for (int32_t b = o->first_below[j]; b < block; ++b) o->column[b] = j;
+    }
+    o->first_below[o->count] = block;
+}
+
+static int32_t find_block(const struct arrays *o, int32_t row, int32_t column)
+{
+    int32_t low = o->first_below[column], high = o->first_below[column + 1] - 1;
+    while (low < high) {
+        const int32_t middle = low + (high - low) / 2;
+        if (o->row[middle] < row) low = middle + 1;
+        else high = middle;
+    }
+    return low;
+}
+
+/* Every column takes from each pair of its rows. Into `next` how many a node has, or (list) into `update`. */
+static void each_update(const struct arrays *o, int32_t *next, bool list)
+{
+    for (int32_t k = 0; k < o->count; ++k)
+        for (int32_t w = o->first_below[k]; w < o->first_below[k + 1]; ++w)
+            for (int32_t u = w; u < o->first_below[k + 1]; ++u) {
+                const int32_t node = u == w ? o->row[w] : o->count + find_block(o, o->row[u], o->row[w]);
+                if (list) {
+                    o->update[2 * next[node]] = u;
+                    o->update[2 * next[node] + 1] = w;
+                }
+                ++next[node];
+            }
+}
+
+static bool list_updates(struct arrays *o)
+{
+    const size_t nodes = (size_t)o->count + (size_t)o->blocks;
+    int32_t *next = (int32_t *)sadmm_alloc(nodes + 1, sizeof *next);
     if (!next) return false;
-    each_update(o, o->first_update, NULL);
-    for (int32_t node = 0; node < o->count + o->blocks; ++node) o->first_update[node + 1] += o->first_update[node];
-    memcpy(next, o->first_update, ((size_t)o->count + (size_t)o->blocks) * sizeof *next);
-    each_update(o, next, o->update);
+    each_update(o, o->first_update + 1, false);
+    for (size_t node = 0; node < nodes; ++node) o->first_update[node + 1] += o->first_update[node];
+    memcpy(next, o->first_update, nodes * sizeof *next);
+    each_update(o, next, true);
     sadmm_free(next);
     return true;
 }
 
-static bool make(struct maker *m, int32_t most_around, struct sadmm_joined_order *o)
+/* Bodies of each part as they come, and the sides of constraints at each. entry: bodies -> entry, -1 before. */
+static void list_bodies(struct arrays *o, const int32_t *bodies, int32_t parts, int32_t *entry)
+{
+    for (int32_t part = 0; part < parts; ++part) {
+        o->first_body[part] = o->bodies;
+        for (int32_t p = o->first_of_level[o->first_level[part]]; p < o->first_of_level[o->first_level[part + 1]]; ++p)
+            for (int s = 0; s < 2; ++s) {
+                const int32_t body = bodies[2 * o->constraint[p] + s];
+                if (body < 0) continue;
+                if (entry[body] < 0) {
+                    entry[body] = o->bodies;
+                    o->body[o->bodies++] = body;
+                }
+                ++o->first_around[entry[body] + 1];
+            }
+    }
+    o->first_body[parts] = o->bodies;
+    for (int32_t e = 0; e < o->bodies; ++e) o->first_around[e + 1] += o->first_around[e];
+    const int32_t total = o->first_around[o->bodies];
+    for (int32_t p = o->count - 1; p >= 0; --p)
+        for (int s = 1; s >= 0; --s) {
+            const int32_t body = bodies[2 * o->constraint[p] + s];
+            if (body >= 0) o->around[--o->first_around[entry[body] + 1]] = 2 * p + s;
+        }
+    for (int32_t e = 0; e < o->bodies; ++e) o->first_around[e] = o->first_around[e + 1];
+    o->first_around[o->bodies] = total;
+}
+
+static bool finish(const struct maker *m, const struct columns *all, int32_t *place, int32_t *entry,
+                   struct sadmm_joined_order *order)
+{
+    struct arrays o = {0};
+    if (!reserve(&o, m, all, order)) return false;
+    place_columns(&o, all, m->parts, place);
+    if (!list_updates(&o)) return false;
+    for (int32_t i = 0; i < m->body_count; ++i) entry[i] = -1;
+    list_bodies(&o, m->bodies, m->parts, entry);
+    order->s = (struct joined_structure){
+        .count = o.count, .blocks = o.blocks, .parts = o.parts, .bodies = o.bodies, .constraint = o.constraint,
+        .first_level = o.first_level, .first_of_level = o.first_of_level, .first_below = o.first_below, .row = o.row,
+        .column = o.column, .first_update = o.first_update, .update = o.update, .first_body = o.first_body,
+        .body = o.body, .first_around = o.first_around, .around = o.around};
+    return true;
+}
+
+static bool make(struct maker *m, int32_t most_around, struct sadmm_joined_order *order)
 {
     const size_t n = (size_t)m->constraints + 1;
     struct columns all = {.column = (struct column *)sadmm_alloc(n, sizeof *all.column)};
-    int32_t *number = (int32_t *)sadmm_alloc(3 * n, sizeof *number);
-    bool fits = all.column && number && list_around(m);
-    if (fits) find_parts(m, most_around);
-    for (int32_t part = 0; fits && part < m->parts; ++part) fits = order_part(m, part, number, number + n, &all);
-    fits = fits && finish(o, &all, number, number + 2 * n);
+    int32_t *numbers = (int32_t *)sadmm_alloc(5 * n + (size_t)m->body_count, sizeof *numbers);
+    bool fits = all.column && numbers && list_around(m);
+    if (fits) {
+        find_parts(m, most_around);
+        all.first_level = numbers + 3 * n;
+        all.first_of_level = numbers + 4 * n;
+    }
+    for (int32_t part = 0; fits && part < m->parts; ++part) fits = order_part(m, part, numbers, numbers + n, &all);
+    fits = fits && finish(m, &all, numbers + 2 * n, numbers + 5 * n, order);
     sadmm_free(all.column);
     sadmm_free(all.rows);
-    sadmm_free(number);
+    sadmm_free(numbers);
     return fits;
 }
 

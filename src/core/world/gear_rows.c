@@ -47,6 +47,17 @@ static struct acting_gear act(const sadmm_world *world, const struct sadmm_world
     return out;
 }
 
+/* The constraint that the gear may have, with its row in this step or without. */
+static bool add_slot(sadmm_world *world, const struct sadmm_row_constraint *constraint)
+{
+    const size_t at = world->joint_constraint_count;
+    if (!sadmm_grow(&world->joint_constraints, &world->joint_constraint_capacity, at, at + 1,
+                    sizeof *world->joint_constraints))
+        return false;
+    world->joint_constraints[world->joint_constraint_count++] = *constraint;
+    return true;
+}
+
 sadmm_status sadmm_world_make_gear_rows(sadmm_world *world, const sadmm_settings *settings)
 {
     struct sadmm_rows *rows = &world->start.rows;
@@ -54,13 +65,19 @@ sadmm_status sadmm_world_make_gear_rows(sadmm_world *world, const sadmm_settings
     for (size_t slot = 0; world->gear_count > 0 && slot < world->gear_slots; ++slot) {
         struct sadmm_world_gear *gear = &world->gears[slot];
         const size_t r = rows->row_count;
-        if (!acts(world, gear)) continue;
+        if (!gear->alive) continue;
         const struct acting_gear acting = act(world, gear, settings);
+        const struct sadmm_row_constraint none = {.body_a = acting.body[0], .body_b = acting.body[1]};
+        if (!acts(world, gear)) {
+            if (!add_slot(world, &none)) return sadmm_fail_memory(&world->error, "the gears' rows");
+            continue;
+        }
         if (!sadmm_grow(&world->joint_sources, &world->joint_source_capacity, r, r + 1,
                         sizeof *world->joint_sources) ||
             !sadmm_grow(&world->start.multiplier, &world->start.multiplier_capacity, r, r + 1,
                         sizeof *world->start.multiplier) ||
-            sadmm_rows_add(rows, 1, acting.body[0], acting.body[1]) < 0)
+            sadmm_rows_add(rows, 1, acting.body[0], acting.body[1]) < 0 ||
+            !add_slot(world, &rows->constraints[rows->constraint_count - 1]))
             return sadmm_fail_memory(&world->error, "the gears' rows");
         if (acting.body[0] >= 0) memcpy(rows->jacobian_a + 6 * r, acting.row[0], sizeof acting.row[0]);
         memcpy(rows->jacobian_b + 6 * r, acting.row[1], sizeof acting.row[1]);

@@ -162,7 +162,8 @@ static sadmm_status solve_joined(struct host_step *step)
     if (!step->system.rows) return SADMM_OK;
     if (!world->joined) world->joined = sadmm_joined_create();
     if (!world->joined) return sadmm_fail_memory(&world->error, "joined bodies");
-    return sadmm_joined_solve(world->joined, &step->system, &step->settings, &world->error);
+    return sadmm_joined_solve(world->joined, &step->system, world->joint_constraints, world->joint_constraint_count,
+                              &step->settings, &world->error);
 }
 
 static sadmm_status make_plan(struct host_step *step)
