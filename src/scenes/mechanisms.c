@@ -189,7 +189,7 @@ const struct sadmm_scene_family sadmm_family_bricard = {
         .arguments = "",
         .description = "Bricard's linkage of five rods and six hinges swings to and fro",
         .duration = 10,
-        .iterations = {[SADMM_METHOD_PAPER] = 300, [SADMM_METHOD_FAST] = 500},
+        .iterations = {[SADMM_METHOD_PAPER] = 300, [SADMM_METHOD_FAST] = 60},
     },
     .fill = fill_bricard,
 };

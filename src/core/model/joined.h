@@ -17,6 +17,11 @@
 enum { JOINED_ROWS = SADMM_MAX_ROWS, JOINED_BLOCK = JOINED_ROWS * JOINED_ROWS };
 /* Regularisation of the factor, a share of a row's own response: rows may say the same, but for rounding. */
 #define JOINED_PROXIMAL 1e-11
+/* Compliance of hard rows, a share of a row's own response: a load moves a lock by a billionth of what it would move the
+ * bodies by if nothing else held them. Rows of a loop that has more locks than it needs contradict each other by what
+ * its joints are off, along multipliers to which nothing responds; without it these grow from step to step (scene
+ * bricard: to 1e6 N where 30 are at work) until they hold the loop. */
+#define JOINED_GIVE 1e-9
 /* Rows that come to a bound, or leave one, are found in so many passes at most. */
 enum { JOINED_PASSES = 6 };
 
@@ -189,6 +194,20 @@ SADMM_INLINE void joined_respond(const struct joined_view *v, const struct sadmm
     }
 }
 
+/* That of the row's law; what is hard gives by JOINED_GIVE. */
+SADMM_INLINE double joined_compliance(const struct joined_view *v, const struct sadmm_row_constraint *constraint,
+                                      int32_t r)
+{
+    const size_t law = joined_law(v, r);
+    double response = 0;
+    int side;
+    if (!sadmm_law_is_coupled(v->compliance[law], v->lo[law], v->hi[law])) return v->compliance[law];
+    for (side = 0; side < 2; ++side)
+        if (joined_body(constraint, side) >= 0)
+            response += joined_product(joined_jacobian(v, r, side), joined_answer(v, r, side));
+    return JOINED_GIVE * response;
+}
+
 /* gain x + bias + compliance lambda with the changes so far; moved: with dv. */
 SADMM_INLINE double joined_residual(const struct joined_view *v, const struct sadmm_row_constraint *constraint,
                                     int32_t r, bool moved)
@@ -202,7 +221,8 @@ SADMM_INLINE double joined_residual(const struct joined_view *v, const struct sa
         x += joined_product(joined_jacobian(v, r, side), v->velocity + 6 * (size_t)body);
         if (moved) x += joined_product(joined_jacobian(v, r, side), v->dv + 6 * (size_t)body);
     }
-    return v->gain[law] * x + v->bias[law] + v->compliance[law] * (v->lambda[r] + v->change[r]);
+    return v->gain[law] * x + v->bias[law] +
+           joined_compliance(v, constraint, r) * (v->lambda[r] + v->change[r]);
 }
 
 SADMM_INLINE double joined_clamp(double x, double lo, double hi) { return x < lo ? lo : x > hi ? hi : x; }
@@ -276,7 +296,7 @@ SADMM_INLINE double joined_entry(const struct joined_view *v, int32_t row, int32
                 sum += joined_product(joined_jacobian(v, i->first + k, a), joined_answer(v, j->first + q, b));
     if (diagonal) {
         const size_t law = joined_law(v, i->first + k);
-        sum += JOINED_PROXIMAL * sum + v->compliance[law] / v->gain[law];
+        sum += JOINED_PROXIMAL * sum + joined_compliance(v, i, i->first + k) / v->gain[law];
     }
     return sum;
 }
