@@ -19,6 +19,10 @@
 #include "core/base/error.h"
 #include "core/model/system.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 struct sadmm_joined;
 
 /* NULL: no memory. */
@@ -35,4 +39,7 @@ sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_
                                 const struct sadmm_row_constraint *slots, size_t slot_count,
                                 const struct sadmm_settings *settings, struct sadmm_error *error);
 
+#ifdef __cplusplus
+}
+#endif
 #endif
