@@ -634,9 +634,9 @@ static sadmm_problem *frozen_step(const char *spec, int steps)
     return frozen;
 }
 
-/* Locks of a world's joints are G and b, M v = f + G r, G^T v + b = 0: 7 hinges of two four-bar linkages, 5 rows each. They
- * come back as they were, and so does the solution; 1e-7 m/s: as above. Drives have no place in such a file: refused, by
- * the constraint that has one. */
+/* Locks of a world's joints are G and b, M v = f + G r, G^T v + b = 0: 7 hinges of two four-bar linkages, 5 rows each.
+ * They come back as they were, and so does the solution; 1e-7 m/s: as above. Drives have no place in such a file:
+ * refused, by the constraint that has one. */
 START_TEST(joints_to_file)
 {
     enum { BODIES = 5, N = 6 * BODIES, JOINTS = 7, ROWS = 5 * JOINTS };

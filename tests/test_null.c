@@ -285,8 +285,8 @@ static const struct {
     {on_others, {"sadmm_backend_query", "sadmm_box_inertia", "sadmm_sphere_inertia", "sadmm_capsule_inertia"}},
     {NULL,
      {"sadmm_settings_default", W(def_default), "sadmm_body_def_default", "sadmm_shape_def_default",
-      "sadmm_joint_def_default", "sadmm_coupling_def_default", "sadmm_gear_def_default", "sadmm_status_name", "sadmm_last_message", "sadmm_version", "sadmm_build_commit",
-      "sadmm_build_compiler"}},
+      "sadmm_joint_def_default", "sadmm_coupling_def_default", "sadmm_gear_def_default", "sadmm_status_name",
+      "sadmm_last_message", "sadmm_version", "sadmm_build_commit", "sadmm_build_compiler"}},
 };
 enum { GROUPS = sizeof functions / sizeof *functions };
 

@@ -1,11 +1,11 @@
-/* Joints, couplings, gears and springs' tables of a world: the input is a program of calls with ordinary, extreme and wrong definitions, stale ids, and
- * memory that runs out. Whatever the calls:
+/* Joints, couplings, gears and springs' tables of a world: the input is a program of calls with ordinary, extreme and
+ * wrong definitions, stale ids, and memory that runs out. Whatever the calls:
  *
  *   - a call that fails leaves joints, bodies and their states as they were, and says why
  *   - after a step that succeeds every state of a body and of a joint is finite, and a joint gives one body the
  *     opposite of what it gives the other
  *   - what was set is what is read, and a joint is there until it or one of its bodies is removed
- */
+ * / */
 #include <string.h>
 
 #include "bytes.h"
