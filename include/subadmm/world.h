@@ -86,6 +86,11 @@ typedef struct sadmm_body_def {
     int32_t environment;         /* bodies of different environments never meet; >= 0, or -1 (static only): meets all;
                                     default 0 (static: -1 is the usual choice) */
     const char *name;            /* copied, at most 63 bytes; NULL = "" */
+    /* Of dynamic bodies, ignored for others: */
+    double gravity_scale;        /* the body's gravity over settings.gravity, in [-1e6, 1e6]; default 1 */
+    double linear_damping;       /* 1/s, in [0, 1e6]; default 0. c: a force -c mass velocity, so that free motion decays
+                                    as exp(-c t), exactly and at any dt */
+    double angular_damping;      /* the same of the angular velocity: a torque -c inertia velocity */
 } sadmm_body_def;
 
 /* The defaults named above. Thread-safe. */
@@ -113,13 +118,18 @@ SADMM_API sadmm_status sadmm_world_body_state(sadmm_world *world, sadmm_body_id 
  * without what was known of the side they came from. Velocities may be set with the pose that was read.
  * Errors: STALE_ID, INVALID_ARGUMENT (nothing changes). */
 SADMM_API sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, const sadmm_body_state *state);
-/* Read back the definition (mass, inertia, type, name) with the current state. The name is the world's own: it stays
+/* Read back the definition (mass, inertia, type, name, scale of gravity, damping) with the current state. The name is the world's own: it stays
  * where it is, and valid, until the body is removed or the world destroyed. Errors: STALE_ID, DEVICE. */
 SADMM_API sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id, sadmm_body_def *def);
 /* External force (N) at the centre of mass and torque (N m), world frame, each component within +-1e15; kept until set
  * again. Errors: STALE_ID, INVALID_ARGUMENT (range; a static body, which nothing moves). */
 SADMM_API sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, const double force[3],
                                                    const double torque[3]);
+/* Replace the scale of gravity, or damping (1/s), of a body, ranges and meaning as in the definition, from the next step
+ * on. Errors: STALE_ID, INVALID_ARGUMENT (range; a static body; nothing changes), DEVICE. */
+SADMM_API sadmm_status sadmm_world_set_body_gravity_scale(sadmm_world *world, sadmm_body_id id, double scale);
+SADMM_API sadmm_status sadmm_world_set_body_damping(sadmm_world *world, sadmm_body_id id, double linear,
+                                                    double angular);
 /* Add a force (N, each component within +-1e15) that acts at `point` (m, world, as the body is now, |x| <= 1e9) to the
  * body's external wrench, which is kept until set again: force, and (point - centre of mass) x force. Errors: STALE_ID,
  * INVALID_ARGUMENT (range, also of the sum; a static body; nothing changes), DEVICE. */

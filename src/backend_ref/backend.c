@@ -89,8 +89,10 @@ static void touch(struct sadmm_context *c)
             const double *arm = s ? contacts->points[k].arm_b : contacts->points[k].arm_a;
             size[s] = lead_size(c->bodies[side->body].lead, arm);
             moves[s] = lead_speed(c->system->rigid[side->body].velocity, c->bodies[side->body].v, arm);
-            rest[s] = lead_rest_speed(c->settings->gravity, c->system->rigid[side->body].wrench,
-                                      c->system->rigid[side->body].mass, c->settings->dt);
+            const struct sadmm_rigid *rigid = &c->system->rigid[side->body];
+            rest[s] = lead_rest_speed(c->settings->gravity, rigid->gravity_scale, rigid->wrench, rigid->mass,
+                                      c->settings->dt);
+            if (forces_differ(rigid)) touch.island |= TOUCH_DIFFERS;
         }
         lead_add_point(&touch, contacts->points[k].gap, constraint->lambda[0], speed, lead, size, moves, rest,
                        c->settings->dt, c->settings->slop);

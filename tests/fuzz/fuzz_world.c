@@ -63,6 +63,9 @@ static struct picture look(sadmm_world *world)
         p.objects = mix(p.objects, &id, sizeof id);
         p.objects = mix(p.objects, &def.mass, sizeof def.mass);
         p.objects = mix(p.objects, def.inertia, sizeof def.inertia);
+        p.objects = mix(p.objects, &def.gravity_scale, sizeof def.gravity_scale);
+        p.objects = mix(p.objects, &def.linear_damping, sizeof def.linear_damping);
+        p.objects = mix(p.objects, &def.angular_damping, sizeof def.angular_damping);
         p.objects = mix(p.objects, def.name, strlen(def.name));
         p.objects = mix(p.objects, &def.environment, sizeof def.environment);
     }
@@ -214,6 +217,13 @@ static void take_state(struct bytes *in, double reach, sadmm_body_state *s)
     }
 }
 
+static void take_forces(struct bytes *in, double *scale, double *linear, double *angular)
+{
+    *scale = take_choice(in, 4) ? take_number(in, -2, 2) : take_extreme(in);
+    *linear = take_choice(in, 4) ? take_scale(in, 1e-6, 1e6) : take_extreme(in);
+    *angular = take_choice(in, 4) ? take_scale(in, 1e-6, 1e6) : take_extreme(in);
+}
+
 static sadmm_body_def take_body_def(struct machine *m)
 {
     struct bytes *in = &m->in;
@@ -238,6 +248,7 @@ static sadmm_body_def take_body_def(struct machine *m)
     def.environment = take_rarely(in, 4) ? take_choice(in, 4) - 2 : (def.type == SADMM_BODY_STATIC ? -1 : 0);
     if (take_rarely(in, 16))
         def.name = "a name that is longer than the sixty-three bytes that are kept of it, and then some";
+    if (take_rarely(in, 8)) take_forces(in, &def.gravity_scale, &def.linear_damping, &def.angular_damping);
     return def;
 }
 
@@ -321,6 +332,22 @@ static sadmm_status set_wrench(struct machine *m)
     return sadmm_world_set_body_wrench(m->world, id, force, null ? NULL : torque);
 }
 
+static sadmm_status set_forces(struct machine *m)
+{
+    double scale, linear, angular;
+    sadmm_body_id id = take_body(m);
+    sadmm_body_def read;
+    take_forces(&m->in, &scale, &linear, &angular);
+    const bool of_gravity = take_choice(&m->in, 2);
+    sadmm_status status = of_gravity ? sadmm_world_set_body_gravity_scale(m->world, id, scale)
+                                     : sadmm_world_set_body_damping(m->world, id, linear, angular);
+    if (status != SADMM_OK) return status;
+    MUST(sadmm_world_body_def(m->world, id, &read) == SADMM_OK, "forces that were set");
+    MUST(of_gravity ? read.gravity_scale == scale : read.linear_damping == linear && read.angular_damping == angular,
+         "forces that were set");
+    return SADMM_OK;
+}
+
 static sadmm_status step(struct machine *m)
 {
     if (m->steps >= MAX_STEPS) return SADMM_OK;
@@ -396,6 +423,7 @@ static sadmm_status make_call(struct machine *m)
         return sadmm_world_set_pair_friction(m->world, s, take_shape(m), take_number(&m->in, -1, 1));
     case 14: return freeze(m);
     case 15: case 16: return read_something(m);
+    case 17: return set_forces(m);
     default: return step(m);
     }
 }

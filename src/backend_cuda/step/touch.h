@@ -32,6 +32,7 @@ template <bool WHOLE> static __device__ __forceinline__ lead_body load_lead_body
  * lead_rest_speed. */
 struct lead_speeds {
     double moves[2], rest;
+    int touch; /* TOUCH_DIFFERS, or 0 */
 };
 
 template <bool WHOLE> static __device__ __forceinline__ lead_speeds load_lead_speeds(const cuda_view &v, int32_t body)
@@ -40,7 +41,9 @@ template <bool WHOLE> static __device__ __forceinline__ lead_speeds load_lead_sp
     const lead_body own = load_lead_body<WHOLE>(v, body);
     const lead_speeds out = {
         {lead_speed_part(own.before, own.velocity, 0), lead_speed_part(own.before, own.velocity, 1)},
-        lead_rest_speed(v.model.settings->gravity, rigid->wrench, rigid->mass, v.model.settings->dt)};
+        lead_rest_speed(v.model.settings->gravity, rigid->gravity_scale, rigid->wrench, rigid->mass,
+                        v.model.settings->dt),
+        forces_differ(rigid) ? TOUCH_DIFFERS : 0};
     return out;
 }
 
@@ -148,7 +151,7 @@ static __device__ __forceinline__ contact_sums sum_touching(const cuda_view &v, 
                                                             touching_begun *begun)
 {
     const double per_dt = 1 / v.model.settings->dt;
-    contact_sums sums = {};
+    contact_sums sums = {{}, own.touch};
     touching &t = begun->first;
     touching_points &points = begun->points;
     for (int32_t at = begun->at; at < begun->end;) {

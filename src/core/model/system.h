@@ -28,6 +28,8 @@ struct sadmm_rigid {
     double mass;            /* kg */
     double inertia[3];      /* principal, kg m^2 */
     double wrench[6];       /* external, N, N m, world */
+    double gravity_scale;   /* of the settings' gravity */
+    double damping[2];      /* linear, angular, 1/s (forces.h) */
 };
 
 /* What is remembered of a body's last steps (steady.h). */

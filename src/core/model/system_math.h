@@ -7,6 +7,7 @@
 
 #include "core/math/impact.h"
 #include "core/math/rigid.h"
+#include "forces.h"
 #include "system.h"
 
 #ifndef SADMM_REAL_IS_DOUBLE
@@ -14,17 +15,22 @@
 #endif
 
 /* Eq. (1) of a rigid body: A = diag(m I, world inertia) and b = A v + dt (m g + f, tau) with the gyroscopic term inside
- * the angular momentum (math/rigid.h). Returns the inertia. */
-SADMM_INLINE sym3 sadmm_rigid_body(const struct sadmm_rigid *body, const struct sadmm_settings *settings, double b[6])
+ * the angular momentum (math/rigid.h), and damping (forces.h). Returns the inertia; *mass: of A. */
+SADMM_INLINE sym3 sadmm_rigid_body(const struct sadmm_rigid *body, const struct sadmm_settings *settings, double *mass,
+                                   double b[6])
 {
     const double dt = settings->dt;
     const quat q = q_load(body->orientation);
     const vec3 inertia = v3_load(body->inertia);
+    const struct forces_damping linear = forces_damping_of(body, 0, dt), angular = forces_damping_of(body, 1, dt);
     const vec3 momentum = rigid_angular_momentum(q, inertia, v3_load(body->velocity + 3), dt);
-    for (int k = 0; k < 3; ++k)
-        b[k] = body->mass * (body->velocity[k] + dt * settings->gravity[k]) + dt * body->wrench[k];
-    v3_store(v3_madd(momentum, dt, v3_load(body->wrench + 3)), b + 3);
-    return rigid_world_inertia(q_matrix(q), inertia);
+    for (int k = 0; k < 3; ++k) {
+        const double gained = dt * forces_gravity(body, settings->gravity, k);
+        b[k] = body->mass * (linear.keep * body->velocity[k] + gained) + dt * body->wrench[k];
+    }
+    v3_store(v3_madd(v3_scale(momentum, angular.keep), dt, v3_load(body->wrench + 3)), b + 3);
+    *mass = linear.mass * body->mass;
+    return rigid_world_inertia(q_matrix(q), v3_scale(inertia, angular.mass));
 }
 
 /* A (6 x 6 row-major) and b of eq. (1). */
@@ -36,9 +42,10 @@ SADMM_INLINE void sadmm_system_body(const struct sadmm_system *system, const str
         memcpy(b, system->b + 6 * (size_t)i, 6 * sizeof *b);
         return;
     }
-    const sym3 I = sadmm_rigid_body(&system->rigid[i], settings, b);
+    double mass;
+    const sym3 I = sadmm_rigid_body(&system->rigid[i], settings, &mass, b);
     memset(A, 0, 36 * sizeof *A);
-    A[0] = A[7] = A[14] = system->rigid[i].mass;
+    A[0] = A[7] = A[14] = mass;
     A[21] = I.xx, A[28] = I.yy, A[35] = I.zz;
     A[22] = A[27] = I.xy, A[23] = A[33] = I.xz, A[29] = A[34] = I.yz;
 }
@@ -88,14 +95,18 @@ SADMM_INLINE struct sadmm_impact_body sadmm_impact_body_of(const struct sadmm_sy
     const struct sadmm_rigid *body = &system->rigid[i];
     const mat3 R = q_matrix(q_load(body->orientation));
     const vec3 inertia = v3_load(body->inertia);
-    const sym3 inverse = rigid_world_inertia(R, v3(1 / inertia.x, 1 / inertia.y, 1 / inertia.z));
-    out.linear = v3_load(body->velocity);
+    const struct forces_damping linear = forces_damping_of(body, 0, dt), angular = forces_damping_of(body, 1, dt);
+    const vec3 heavy = v3_scale(inertia, angular.mass);
+    const sym3 inverse = rigid_world_inertia(R, v3(1 / heavy.x, 1 / heavy.y, 1 / heavy.z));
+    out.linear = v3_scale(v3_load(body->velocity), linear.keep / linear.mass);
     out.angular = v3_load(body->velocity + 3);
     if (!rigid_is_isotropic(inertia))
         out.angular = m3_mul(R, rigid_gyroscopic(inertia, m3_tmul(R, out.angular), dt));
-    out.push = v3_scale(v3_madd(v3_load(settings->gravity), 1 / body->mass, v3_load(body->wrench)), dt / 2);
+    out.angular = v3_scale(out.angular, angular.keep / angular.mass);
+    out.push = v3_scale(v3_madd(v3_scale(v3_load(settings->gravity), body->gravity_scale), 1 / body->mass,
+                                v3_load(body->wrench)), dt / 2 / linear.mass);
     out.turn = v3_scale(s3_mul(inverse, v3_load(body->wrench + 3)), dt / 2);
-    out.inverse_mass = 1 / body->mass;
+    out.inverse_mass = 1 / (linear.mass * body->mass);
     out.inverse_inertia.r[0] = v3(inverse.xx, inverse.xy, inverse.xz);
     out.inverse_inertia.r[1] = v3(inverse.xy, inverse.yy, inverse.yz);
     out.inverse_inertia.r[2] = v3(inverse.xz, inverse.yz, inverse.zz);

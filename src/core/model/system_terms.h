@@ -18,6 +18,7 @@ struct sadmm_lead {
     double linear, angular;             /* size3 of its parts */
     double moves_linear, moves_angular; /* lead_speed_part: m/s, rad/s */
     double rest;                        /* lead_rest_speed, m/s */
+    int touch;                          /* TOUCH_DIFFERS, or 0 */
 };
 
 /* Leads of `count` bodies, each by itself, which end the step with `velocity` (count x 6). */

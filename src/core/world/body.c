@@ -15,7 +15,7 @@ static const double ANY = HUGE_VAL;
 
 sadmm_body_def sadmm_body_def_default(void)
 {
-    sadmm_body_def def = {.type = SADMM_BODY_DYNAMIC, .orientation = {1, 0, 0, 0}};
+    sadmm_body_def def = {.type = SADMM_BODY_DYNAMIC, .orientation = {1, 0, 0, 0}, .gravity_scale = 1};
     return def;
 }
 
@@ -70,7 +70,7 @@ static sadmm_status check_inertia(const char *name, const double inertia[3], sad
     return check_inertia_ratio(name, inertia, precision, error);
 }
 
-static const double MASS_MIN = 1e-9, MASS_MAX = 1e12;
+static const double MASS_MIN = 1e-9, MASS_MAX = 1e12, GRAVITY_SCALE_MAX = 1e6, DAMPING_MAX = 1e6;
 
 static sadmm_status check_motion(const char *linear_name, const char *angular_name, const double linear[3],
                                  const double angular[3], sadmm_body_type type, double limit, struct sadmm_error *error)
@@ -94,6 +94,9 @@ static sadmm_status check_def(const sadmm_body_def *def, sadmm_precision precisi
     if (def->type == SADMM_BODY_DYNAMIC) {
         TRY(sadmm_check_range("def->mass", def->mass, MASS_MIN, MASS_MAX, error));
         TRY(check_inertia("def->inertia", def->inertia, precision, error));
+        TRY(sadmm_check_range("def->gravity_scale", def->gravity_scale, -GRAVITY_SCALE_MAX, GRAVITY_SCALE_MAX, error));
+        TRY(sadmm_check_range("def->linear_damping", def->linear_damping, 0, DAMPING_MAX, error));
+        TRY(sadmm_check_range("def->angular_damping", def->angular_damping, 0, DAMPING_MAX, error));
     }
     TRY(sadmm_check_vector("def->position", def->position, 3, POSITION_LIMIT, error));
     TRY(sadmm_check_orientation("def->orientation", def->orientation, orientation, error));
@@ -164,6 +167,9 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def,
         memcpy(rigid->inertia, def->inertia, sizeof rigid->inertia);
         memcpy(rigid->velocity, def->linear_velocity, sizeof def->linear_velocity);
         memcpy(rigid->velocity + 3, def->angular_velocity, sizeof def->angular_velocity);
+        rigid->gravity_scale = def->gravity_scale;
+        rigid->damping[0] = def->linear_damping;
+        rigid->damping[1] = def->angular_damping;
         ++world->dynamic_count;
     }
     body->name = name;
@@ -281,6 +287,9 @@ sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id, sadmm_bo
     memcpy(def->orientation, body->rigid.orientation, sizeof def->orientation);
     memcpy(def->linear_velocity, body->rigid.velocity, sizeof def->linear_velocity);
     memcpy(def->angular_velocity, body->rigid.velocity + 3, sizeof def->angular_velocity);
+    def->gravity_scale = body->rigid.gravity_scale;
+    def->linear_damping = body->rigid.damping[0];
+    def->angular_damping = body->rigid.damping[1];
     def->environment = body->environment;
     def->name = sadmm_world_body_name(body);
     return SADMM_OK;
@@ -309,7 +318,37 @@ sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, c
     if (body->system_body < 0) TRY(sadmm_world_take_back(world));
     memcpy(body->rigid.wrench, force, 3 * sizeof *force);
     memcpy(body->rigid.wrench + 3, torque, 3 * sizeof *torque);
-    sadmm_world_edit(world, body, SADMM_EDIT_WRENCH);
+    sadmm_world_edit(world, body, SADMM_EDIT_FORCES);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_set_body_gravity_scale(sadmm_world *world, sadmm_body_id id, double scale)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
+    if (!body) return SADMM_ERROR_STALE_ID;
+    TRY(check_dynamic(body, id, "gravity does not move it", error));
+    TRY(sadmm_check_range("scale", scale, -GRAVITY_SCALE_MAX, GRAVITY_SCALE_MAX, error));
+    if (body->system_body < 0) TRY(sadmm_world_take_back(world));
+    body->rigid.gravity_scale = scale;
+    sadmm_world_edit(world, body, SADMM_EDIT_FORCES);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_set_body_damping(sadmm_world *world, sadmm_body_id id, double linear, double angular)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
+    if (!body) return SADMM_ERROR_STALE_ID;
+    TRY(check_dynamic(body, id, "it has no motion to damp", error));
+    TRY(sadmm_check_range("linear", linear, 0, DAMPING_MAX, error));
+    TRY(sadmm_check_range("angular", angular, 0, DAMPING_MAX, error));
+    if (body->system_body < 0) TRY(sadmm_world_take_back(world));
+    body->rigid.damping[0] = linear;
+    body->rigid.damping[1] = angular;
+    sadmm_world_edit(world, body, SADMM_EDIT_FORCES);
     return SADMM_OK;
 }
 

@@ -4,7 +4,7 @@
 #include "collision/bounds.h"
 #include "core/base/barrier.h"
 #include "core/base/memory.h"
-#include "core/math/rigid.h"
+#include "core/model/forces.h"
 #include "core/model/steady.h"
 #include "world_internal.h"
 
@@ -18,16 +18,16 @@ static int32_t count_moving(const sadmm_world *world, size_t begin, size_t end)
 }
 
 /* A body as collision sees it. */
-static void place(struct sadmm_collision_body *out, const struct sadmm_rigid *rigid, bool dynamic)
+static void place(struct sadmm_collision_body *out, const struct sadmm_rigid *rigid, bool dynamic,
+                  const sadmm_settings *settings)
 {
     memcpy(out->position, rigid->position, sizeof out->position);
     memcpy(out->orientation, rigid->orientation, sizeof out->orientation);
     memcpy(out->velocity, rigid->velocity, sizeof out->velocity);
     out->acceleration[0] = out->acceleration[1] = out->inertia = 0;
     if (!dynamic) return;
-    out->acceleration[0] = rigid_acceleration(rigid->mass, v3_load(rigid->wrench));
-    out->acceleration[1] = rigid_angular_acceleration(q_load(rigid->orientation), v3_load(rigid->inertia),
-                                                      v3_load(rigid->wrench + 3));
+    out->acceleration[0] = forces_acceleration(rigid, settings->gravity, settings->dt);
+    out->acceleration[1] = forces_angular_acceleration(rigid, settings->dt);
     out->inertia = v3_max_abs(v3_load(rigid->inertia));
 }
 
@@ -51,7 +51,7 @@ static void gather_slots(sadmm_world *world, size_t begin, size_t end, int32_t d
         out->placed = body->steady.placed;
         out->environment = body->environment;
         out->system_body = body->system_body = -1;
-        place(out, &body->rigid, moves(body));
+        place(out, &body->rigid, moves(body), &settings);
         if (!moves(body)) continue;
         out->system_body = body->system_body = dynamic;
         start_body(world, dynamic, &body->rigid, &body->steady, settings.dt);
@@ -116,14 +116,15 @@ static void turn_share(void *argument, int thread, int threads)
 {
     const struct turning *turning = (const struct turning *)argument;
     sadmm_world *world = turning->world;
-    const double dt = sadmm_settings_of_substep(&world->def.settings).dt;
+    const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings);
+    const double dt = settings.dt;
     size_t begin, end;
     sadmm_share((size_t)world->dynamic_count, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) {
         const struct sadmm_rigid *next = &world->next[i];
         steady_keep(&world->steady[i], &world->start.rigid[i], next, dt);
         start_body(world, (int32_t)i, next, &world->steady[i], dt);
-        place(&world->collision_bodies[world->slot_of[i]], next, true);
+        place(&world->collision_bodies[world->slot_of[i]], next, true, &settings);
     }
     if (!world->plan.wrenches) return;
     for (size_t k = 6 * begin; k < 6 * end; ++k)

@@ -49,7 +49,8 @@ static int touch_of(const sadmm_world *world, const struct sadmm_contact_pair *p
             if (bodies[s] < 0) continue;
             const struct sadmm_rigid *rigid = &world->start.rigid[bodies[s]];
             moves[s] = lead_speed(rigid->velocity, velocity_of(world, bodies[s]), arm);
-            rest[s] = lead_rest_speed(settings->gravity, rigid->wrench, rigid->mass, settings->dt);
+            rest[s] = lead_rest_speed(settings->gravity, rigid->gravity_scale, rigid->wrench, rigid->mass,
+                                      settings->dt);
         }
         lead_add_point(&touch, point->gap, dot3(pair->normal, point->impulse), speed, lead, size, moves, rest,
                        settings->dt, settings->slop);

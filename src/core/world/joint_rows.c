@@ -4,6 +4,7 @@
 
 #include "core/base/memory.h"
 #include "core/math/rigid.h"
+#include "core/model/forces.h"
 #include "core/model/steady.h"
 #include "world_internal.h"
 
@@ -45,9 +46,7 @@ static struct side side_of(const sadmm_world *world, int32_t slot, const sadmm_s
     side.system_body = body->system_body;
     side.rigid = &world->start.rigid[side.system_body];
     memcpy(side.velocity, side.rigid->velocity, sizeof side.velocity);
-    memcpy(side.free, side.velocity, sizeof side.free);
-    for (int k = 0; k < 3; ++k)
-        side.free[k] += settings->dt * (settings->gravity[k] + side.rigid->wrench[k] / side.rigid->mass);
+    forces_free(side.rigid, settings->gravity, settings->dt, side.free);
     if (!rigid_is_isotropic(v3_load(side.rigid->inertia)))
         side.back = q_exp(v3_scale(v3_load(side.velocity + 3), -settings->dt / 2));
     return side;

@@ -13,6 +13,7 @@
 
 #include "core/base/clock.h"
 #include "core/base/memory.h"
+#include "core/model/forces.h"
 #include "core/model/steady.h"
 #include "core/solve/certificate.h"
 #include "world_internal.h"
@@ -82,6 +83,8 @@ static void put_edit(struct sadmm_resident_edit *edit, const struct sadmm_world_
         memcpy(edit->values + 7, rigid->velocity, sizeof rigid->velocity);
     } else {
         memcpy(edit->values, rigid->wrench, sizeof rigid->wrench);
+        edit->values[6] = rigid->gravity_scale;
+        memcpy(edit->values + 7, rigid->damping, sizeof rigid->damping);
     }
 }
 
@@ -232,7 +235,7 @@ static sadmm_status settle(sadmm_world *world, sadmm_status status)
                : status;
 }
 
-/* The backend does not change wrenches, nor a state that was set after the last step. */
+/* The backend does not change forces, nor a state that was set after the last step. */
 static sadmm_status pull_bodies(sadmm_world *world)
 {
     TRY(settle(world, SADMM_OK));
@@ -241,7 +244,7 @@ static sadmm_status pull_bodies(sadmm_world *world)
                                               world->plan.wrenches ? world->wrench : NULL, &world->error));
     for (int32_t i = 0; i < world->dynamic_count; ++i) {
         struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
-        memcpy(world->next[i].wrench, body->rigid.wrench, sizeof body->rigid.wrench);
+        forces_copy(&world->next[i], &body->rigid);
         body->steady = world->resident.steady[i];
         if (body->set_at[SADMM_EDIT_STATE] < world->resident.done) body->rigid = world->next[i];
         else steady_place(&body->steady, &world->next[i], body->rigid.position, body->rigid.orientation);
