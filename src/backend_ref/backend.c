@@ -76,6 +76,11 @@ static void touch(struct sadmm_context *c)
         lead_own(c->system->rigid[i].velocity, body->v, rigid_is_isotropic(v3_load(c->system->rigid[i].inertia)),
                  body->lead);
     }
+    for (size_t p = 0; p < contacts->pair_count; ++p) {
+        const struct sadmm_contact_pair *pair = &contacts->pairs[p];
+        if (sadmm_pair_is_driven(c->system, pair))
+            c->bodies[c->bodies[pair->body_a >= 0 ? pair->body_a : pair->body_b].label].island_touch |= TOUCH_JOLT;
+    }
     for (size_t k = 0; k < contacts->point_count; ++k) {
         const struct ref_constraint *constraint = &c->constraints[k];
         const bool inner = constraint->side[0].body >= 0 && constraint->side[1].body >= 0;

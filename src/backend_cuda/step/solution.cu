@@ -83,6 +83,8 @@ static __global__ void touch_kernel(const __grid_constant__ cuda_view v, const _
         if (p >= live_pairs(v.model)) return;
         const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
         add_ways<false>(v, fetch_ends(pair), pair->first, pair->count, i % v.contacts.lanes);
+        if (v.raw.system.driven_count > 0 && i % v.contacts.lanes == 0 && sadmm_pair_is_driven(&v.raw.system, pair))
+            add_bits(&v.islands.touch[v.graph.label[pair->body_a >= 0 ? pair->body_a : pair->body_b]], TOUCH_JOLT);
         return;
     }
     const body_thread t = body_of_slot(v.graph, slot, slot < live_bodies(v.model));

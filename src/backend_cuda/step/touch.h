@@ -194,7 +194,7 @@ static __device__ __forceinline__ void add_touch(const island_view &islands, int
 
 /* What is known of a pair before the iterations end. */
 struct pair_ends {
-    int32_t body[2]; /* < 0: static */
+    int32_t body[2]; /* < 0: not dynamic */
     double normal[3];
 };
 

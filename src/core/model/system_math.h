@@ -50,20 +50,43 @@ SADMM_INLINE void sadmm_system_body(const struct sadmm_system *system, const str
     A[22] = A[27] = I.xy, A[23] = A[33] = I.xz, A[29] = A[34] = I.yz;
 }
 
-/* Velocity of b's contact point relative to a's, world frame; `velocity` (bodies x 6). */
-SADMM_INLINE vec3 sadmm_contact_velocity(const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *point,
-                                          const double *velocity)
+SADMM_INLINE vec3 sadmm_velocity_at(const double v[6], const double arm[3])
+{
+    return v3_add(v3_load(v), v3_cross(v3_load(v + 3), v3_load(arm)));
+}
+
+/* What a driven body adds to the velocity of b's contact point relative to a's, world frame. */
+SADMM_INLINE vec3 sadmm_driven_part(const struct sadmm_system *system, const struct sadmm_contact_pair *pair,
+                                    const struct sadmm_contact_point *point)
+{
+    if (sadmm_body_is_driven(pair->body_b))
+        return sadmm_velocity_at(sadmm_driven_velocity(system, pair->body_b), point->arm_b);
+    if (sadmm_body_is_driven(pair->body_a))
+        return v3_neg(sadmm_velocity_at(sadmm_driven_velocity(system, pair->body_a), point->arm_a));
+    return v3(0, 0, 0);
+}
+
+/* The driven body of a pair, if there is one, as the motion about the other one's centre of mass that its surface has
+ * at the points: with the arms of the other one. `points`: the pair's. */
+SADMM_INLINE void sadmm_driven_about_other(const struct sadmm_system *system, const struct sadmm_contact_pair *pair,
+                                           const struct sadmm_contact_point *points, double motion[6])
+{
+    const bool on_b = sadmm_body_is_driven(pair->body_b);
+    const double *v = sadmm_driven_velocity(system, on_b ? pair->body_b : pair->body_a),
+                 *own = on_b ? points->arm_b : points->arm_a, *other = on_b ? points->arm_a : points->arm_b;
+    v3_store(v3_add(v3_load(v), v3_cross(v3_load(v + 3), v3_sub(v3_load(own), v3_load(other)))), motion);
+    v3_store(v3_load(v + 3), motion + 3);
+}
+
+/* Velocity of b's contact point relative to a's, world frame, by the system's velocities. */
+SADMM_INLINE vec3 sadmm_contact_velocity(const struct sadmm_system *system, const struct sadmm_contact_pair *pair,
+                                          const struct sadmm_contact_point *point)
 {
     vec3 x = v3(0, 0, 0);
-    if (pair->body_b >= 0) {
-        const double *v = velocity + 6 * (size_t)pair->body_b;
-        x = v3_add(v3_load(v), v3_cross(v3_load(v + 3), v3_load(point->arm_b)));
-    }
-    if (pair->body_a >= 0) {
-        const double *v = velocity + 6 * (size_t)pair->body_a;
-        x = v3_sub(x, v3_add(v3_load(v), v3_cross(v3_load(v + 3), v3_load(point->arm_a))));
-    }
-    return x;
+    if (pair->body_b >= 0) x = sadmm_velocity_at(system->velocity + 6 * (size_t)pair->body_b, point->arm_b);
+    if (pair->body_a >= 0)
+        x = v3_sub(x, sadmm_velocity_at(system->velocity + 6 * (size_t)pair->body_a, point->arm_a));
+    return system->driven_count > 0 ? v3_add(x, sadmm_driven_part(system, pair, point)) : x;
 }
 
 /* The contact's frame: rows n, t1, t2. */
@@ -91,6 +114,10 @@ SADMM_INLINE struct sadmm_impact_body sadmm_impact_body_of(const struct sadmm_sy
     const double dt = settings->dt;
     struct sadmm_impact_body out;
     memset(&out, 0, sizeof out);
+    if (sadmm_body_is_driven(i)) {
+        out.linear = v3_load(sadmm_driven_velocity(system, i));
+        out.angular = v3_load(sadmm_driven_velocity(system, i) + 3);
+    }
     if (i < 0) return out;
     const struct sadmm_rigid *body = &system->rigid[i];
     const mat3 R = q_matrix(q_load(body->orientation));

@@ -37,6 +37,11 @@ double sadmm_point_error(const struct sadmm_system *system, const struct sadmm_s
     return sadmm_contact_e(system, settings, pair, points, k);
 }
 
+void sadmm_driven_motion(const struct sadmm_system *system, const struct sadmm_contact_pair *pair, double motion[6])
+{
+    sadmm_driven_about_other(system, pair, &system->contacts->points[pair->first], motion);
+}
+
 void sadmm_find_leads(size_t count, const struct sadmm_rigid *bodies, const double *velocity,
                       const struct sadmm_settings *settings, struct sadmm_lead *leads)
 {

@@ -88,9 +88,9 @@ static sadmm_status check_motion(const char *linear_name, const char *angular_na
 static sadmm_status check_def(const sadmm_body_def *def, sadmm_precision precision, double orientation[4],
                               struct sadmm_error *error)
 {
-    if (def->type != SADMM_BODY_DYNAMIC && def->type != SADMM_BODY_STATIC)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->type = %d: must be SADMM_BODY_DYNAMIC or _STATIC",
-                          (int)def->type);
+    if (def->type != SADMM_BODY_DYNAMIC && def->type != SADMM_BODY_STATIC && def->type != SADMM_BODY_KINEMATIC)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "def->type = %d: must be SADMM_BODY_DYNAMIC, _STATIC or _KINEMATIC", (int)def->type);
     if (def->type == SADMM_BODY_DYNAMIC) {
         TRY(sadmm_check_range("def->mass", def->mass, MASS_MIN, MASS_MAX, error));
         TRY(check_inertia("def->inertia", def->inertia, precision, error));
@@ -102,7 +102,7 @@ static sadmm_status check_def(const sadmm_body_def *def, sadmm_precision precisi
     TRY(sadmm_check_orientation("def->orientation", def->orientation, orientation, error));
     TRY(check_motion("def->linear_velocity", "def->angular_velocity", def->linear_velocity, def->angular_velocity,
                      def->type, VELOCITY_LIMIT, error));
-    int32_t lowest = def->type == SADMM_BODY_STATIC ? -1 : 0;
+    int32_t lowest = def->type == SADMM_BODY_DYNAMIC ? 0 : -1;
     if (def->environment < lowest)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->environment = %d: must be >= %d", def->environment,
                           lowest);
@@ -165,13 +165,14 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def,
     if (def->type == SADMM_BODY_DYNAMIC) {
         rigid->mass = def->mass;
         memcpy(rigid->inertia, def->inertia, sizeof rigid->inertia);
-        memcpy(rigid->velocity, def->linear_velocity, sizeof def->linear_velocity);
-        memcpy(rigid->velocity + 3, def->angular_velocity, sizeof def->angular_velocity);
         rigid->gravity_scale = def->gravity_scale;
         rigid->damping[0] = def->linear_damping;
         rigid->damping[1] = def->angular_damping;
         ++world->dynamic_count;
     }
+    memcpy(rigid->velocity, def->linear_velocity, sizeof def->linear_velocity);
+    memcpy(rigid->velocity + 3, def->angular_velocity, sizeof def->angular_velocity);
+    if (def->type == SADMM_BODY_KINEMATIC) ++world->driven_count;
     body->name = name;
     if (slot == world->body_slots) ++world->body_slots;
     sadmm_slot_taken(&world->body_marks, slot);
@@ -198,6 +199,7 @@ sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id)
     --world->body_count;
     sadmm_slot_freed(&world->body_marks, id.slot - 1);
     if (body->type == SADMM_BODY_DYNAMIC) --world->dynamic_count;
+    if (body->type == SADMM_BODY_KINEMATIC) --world->driven_count;
     world->contacts_readable = false;
     return SADMM_OK;
 }
@@ -267,7 +269,30 @@ sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, co
     memcpy(body->rigid.orientation, orientation, sizeof orientation);
     memcpy(body->rigid.velocity, state->linear_velocity, sizeof state->linear_velocity);
     memcpy(body->rigid.velocity + 3, state->angular_velocity, sizeof state->angular_velocity);
+    body->target.set = false;
     sadmm_world_edit(world, body, SADMM_EDIT_STATE);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_move_body(sadmm_world *world, sadmm_body_id id, const double position[3],
+                                   const double orientation[4])
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
+    double unit[4];
+    if (!body) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(position, "position", error));
+    TRY(sadmm_check_given(orientation, "orientation", error));
+    if (body->type != SADMM_BODY_KINEMATIC)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "id = (slot %u, generation %u): must be kinematic",
+                          id.slot, id.generation);
+    TRY(sadmm_check_vector("position", position, 3, POSITION_LIMIT, error));
+    TRY(sadmm_check_orientation("orientation", orientation, unit, error));
+    keep_if_unit(orientation, unit);
+    memcpy(body->target.position, position, sizeof body->target.position);
+    memcpy(body->target.orientation, unit, sizeof unit);
+    body->target.set = true;
     return SADMM_OK;
 }
 
@@ -300,7 +325,8 @@ static sadmm_status check_dynamic(const struct sadmm_world_body *body, sadmm_bod
 {
     if (body->type == SADMM_BODY_DYNAMIC) return SADMM_OK;
     return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                      "id = (slot %u, generation %u): is static, and must be dynamic: %s", id.slot, id.generation, why);
+                      "id = (slot %u, generation %u): is %s, and must be dynamic: %s", id.slot, id.generation,
+                      body->type == SADMM_BODY_STATIC ? "static" : "kinematic", why);
 }
 
 sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, const double force[3],
@@ -445,7 +471,7 @@ sadmm_status sadmm_world_body_contact_wrench(sadmm_world *world, sadmm_body_id i
         return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE,
                           "contact wrenches: there was no step yet, or settings.recover_wrenches was false");
     if (body->type == SADMM_BODY_STATIC)
-        return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE, "contact wrenches are kept for dynamic bodies only");
+        return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE, "contact wrenches are kept for dynamic and kinematic bodies");
     memcpy(wrench, body->contact_wrench, sizeof body->contact_wrench);
     return SADMM_OK;
 }

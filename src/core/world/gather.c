@@ -8,7 +8,7 @@
 #include "core/model/steady.h"
 #include "world_internal.h"
 
-static bool moves(const struct sadmm_world_body *body) { return body->alive && body->type != SADMM_BODY_STATIC; }
+static bool moves(const struct sadmm_world_body *body) { return body->alive && body->type == SADMM_BODY_DYNAMIC; }
 
 static int32_t count_moving(const sadmm_world *world, size_t begin, size_t end)
 {
@@ -104,6 +104,7 @@ sadmm_status sadmm_world_gather(sadmm_world *world)
     g.world = world;
     g.barrier = (struct sadmm_barrier){0};
     sadmm_parallel(&world->team, sadmm_pass_threads(last_threads(world), slots), gather_share, &g);
+    TRY(sadmm_world_gather_driven(world));
     return sadmm_world_begin_joints(world);
 }
 
@@ -136,6 +137,7 @@ void sadmm_world_turn(sadmm_world *world, int substep)
     struct turning turning = {world, substep};
     sadmm_parallel(&world->team, sadmm_pass_threads(world->plan.threads, (size_t)world->dynamic_count), turn_share,
                    &turning);
+    sadmm_world_turn_driven(world);
 }
 
 void sadmm_world_swap_starts(sadmm_world *world)
@@ -179,6 +181,8 @@ struct sadmm_system sadmm_world_system(sadmm_world *world)
         .velocity = world->velocity,
         .contacts = &world->contacts,
         .first = !world->stepped,
+        .driven = world->start.driven,
+        .driven_count = world->start.driven_count,
         .rows = world->start.rows.constraint_count > 0 ? &world->start.rows : NULL,
     };
     return system;
@@ -186,8 +190,5 @@ struct sadmm_system sadmm_world_system(sadmm_world *world)
 
 sadmm_status sadmm_world_not_finite(sadmm_world *world, int32_t body)
 {
-    int32_t slot = world->slot_of[body];
-    return sadmm_fail(&world->error, SADMM_ERROR_NON_FINITE,
-                      "the step made body (slot %d, generation %u, \"%s\") not finite; the world is as before it",
-                      slot + 1, world->bodies[slot].generation, sadmm_world_body_name(&world->bodies[slot]));
+    return sadmm_world_slot_not_finite(world, world->slot_of[body]);
 }

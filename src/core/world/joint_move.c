@@ -32,11 +32,13 @@ static uint8_t *island_of(const sadmm_world *world, int32_t a, int32_t b)
 
 /* Of a pair of shapes in an island with joints. Leads stay where they would close a contact, and where a body rests on
  * one. */
-static int touch_of(const sadmm_world *world, const struct sadmm_contact_pair *pair, const sadmm_settings *settings)
+static int touch_of(const sadmm_world *world, const struct sadmm_system *system, const struct sadmm_contact_pair *pair,
+                    const sadmm_settings *settings)
 {
     const int32_t bodies[2] = {pair->body_a, pair->body_b};
     struct lead_touch touch = {0, {0, 0}};
     double leads[2][6];
+    if (sadmm_pair_is_driven(system, pair)) return HAS_CONTACTS | LEADS_STAY;
     for (int s = 0; s < 2; ++s) lead_of(world, bodies[s], leads[s]);
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
         const struct sadmm_contact_point *point = &world->contacts.points[k];
@@ -69,7 +71,7 @@ static bool limit_jolts(const sadmm_world *world, const struct sadmm_row_constra
     const struct sadmm_rows *rows = &world->start.rows;
     const struct sadmm_joint_source *source = &world->joint_sources[r];
     const int role = source->role;
-    double lead = 0, speed = 0;
+    double lead = 0, speed = source->driven;
     if ((role != SADMM_ROLE_LOWER && role != SADMM_ROLE_UPPER) || !(rows->lambda[r] > 0)) return false;
     for (int s = 0; s < 2; ++s) {
         const int32_t body = s ? constraint->body_b : constraint->body_a;
@@ -100,7 +102,7 @@ static void find_islands(const sadmm_world *world, const struct sadmm_system *sy
     for (size_t p = 0; p < system->contacts->pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &system->contacts->pairs[p];
         uint8_t *island = island_of(world, pair->body_a, pair->body_b);
-        if (*island & HAS_JOINTS) *island |= (uint8_t)touch_of(world, pair, settings);
+        if (*island & HAS_JOINTS) *island |= (uint8_t)touch_of(world, system, pair, settings);
     }
 }
 

@@ -24,7 +24,8 @@ struct joint_end sadmm_joint_end(const struct joint_frame *frame, const struct s
 
 /* One body of a joint in a step. */
 struct side {
-    int32_t system_body;             /* -1: it does not move */
+    int32_t system_body;             /* -1: it is not solved for */
+    bool moves;                      /* it is not static */
     const struct sadmm_rigid *rigid; /* at the step's start; NULL: the static world */
     double velocity[6], free[6];     /* at the start; at the end of free motion */
     quat back;                       /* what turns the row's torque to where the body's moments are (docs) */
@@ -43,6 +44,13 @@ static struct side side_of(const sadmm_world *world, int32_t slot, const sadmm_s
     const struct sadmm_world_body *body = &world->bodies[slot];
     side.rigid = &body->rigid;
     if (body->type == SADMM_BODY_STATIC) return side;
+    side.moves = true;
+    if (body->type == SADMM_BODY_KINEMATIC) {
+        side.rigid = &world->driven[sadmm_driven(body->system_body)].rigid;
+        memcpy(side.velocity, side.rigid->velocity, sizeof side.velocity);
+        memcpy(side.free, side.velocity, sizeof side.free);
+        return side;
+    }
     side.system_body = body->system_body;
     side.rigid = &world->start.rigid[side.system_body];
     memcpy(side.velocity, side.rigid->velocity, sizeof side.velocity);
@@ -71,7 +79,7 @@ static struct acting_joint prepare(const sadmm_world *world, const struct sadmm_
         struct side *side = &acting.side[s];
         *side = side_of(world, joint->body[s], settings);
         start[s] = middle[s] = sadmm_joint_end(&joint->frame[s], side->rigid);
-        if (side->system_body < 0) continue;
+        if (!side->moves) continue;
         const struct sadmm_rigid rigid = halfway(side, settings->dt);
         middle[s] = sadmm_joint_end(&joint->frame[s], &rigid);
     }
@@ -158,11 +166,11 @@ static struct moving moving_of(const struct sadmm_world_joint *joint, const stru
     m.before = sadmm_joint_rate(&acting->start, k, a->velocity, b->velocity);
     for (int s = 0; s < 2; ++s) {
         double row[6];
-        if (acting->side[s].system_body < 0) continue;
+        if (!acting->side[s].moves) continue;
         step_row(acting, s, k, row);
         middle += product(row, acting->side[s].velocity);
         free += product(row, acting->side[s].free);
-        m.response += response(&acting->side[s], row);
+        if (acting->side[s].system_body >= 0) m.response += response(&acting->side[s], row);
     }
     m.turning = middle - m.before;
     m.turned = joint->next.leads_stay ? 0 : m.turning;
@@ -253,17 +261,21 @@ static bool add_constraints(sadmm_world *world, int32_t slot, const struct actin
                 return false;
         }
         const size_t r = all - (size_t)laws->count + (size_t)i;
+        double driven = 0;
         for (int s = 0; s < 2; ++s) {
-            double *row = (s ? rows->jacobian_b : rows->jacobian_a) + 6 * r;
-            if (acting->side[s].system_body < 0) continue;
+            double *row = (s ? rows->jacobian_b : rows->jacobian_a) + 6 * r, given[6];
+            const bool solved = acting->side[s].system_body >= 0;
+            if (!acting->side[s].moves) continue;
+            if (!solved) row = given;
             step_row(acting, s, law->coordinate, row);
             for (int j = 0; j < 6; ++j) row[j] *= law->sign;
+            if (!solved) driven += product(row, acting->side[s].velocity);
         }
-        sadmm_row_set(rows, (int32_t)r, law->gain, law->bias, law->compliance, law->lo, law->hi);
+        sadmm_row_set(rows, (int32_t)r, law->gain, law->bias + law->gain * driven, law->compliance, law->lo, law->hi);
         rows->lambda[r] = world->start.multiplier[r] =
             law->sign * joint->next.force[law->role][law->coordinate] * dt;
         world->joint_sources[r] = (struct sadmm_joint_source){slot, (int8_t)law->role, (int8_t)law->coordinate,
-                                                              (int8_t)law->sign, law->gap, law->slack};
+                                                              (int8_t)law->sign, law->gap, law->slack, driven};
     }
     return true;
 }

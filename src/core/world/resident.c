@@ -24,12 +24,12 @@ enum { MOST_CHECKS = 64 };
 
 bool sadmm_world_may_reside(const sadmm_world *world)
 {
-    /* Joints become rows on the host. Of the stop rules a backend checks the certificate's in the method FAST alone;
+    /* Joints become rows on the host, and kinematic bodies move there. Of the stop rules a backend checks the certificate's in the method FAST alone;
      * and the loads of a first step are predicted on the host. */
     const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings), *s = &settings;
     const bool fast = s->method == SADMM_METHOD_FAST,
                few_checks = (s->iterations - 1) / s->check_period < MOST_CHECKS / s->substeps;
-    if ((fast && !world->stepped) || world->joint_count > 0) return false;
+    if ((fast && !world->stepped) || world->joint_count > 0 || world->driven_count > 0) return false;
     return world->kernels->resident && s->residual_tolerance <= 0 &&
            (s->certificate_tolerance <= 0 || (fast && few_checks));
 }
@@ -207,6 +207,7 @@ static void take_report(sadmm_world *world, const struct sadmm_resident_report *
     world->resident.bodies_behind = world->resident.contacts_behind = true;
     world->stepped = world->contacts_readable = true;
     sadmm_rows_clear(&world->start.rows); /* of a step by the host, when there were joints */
+    world->start.driven_count = 0;        /* or kinematic bodies */
     world->plan = done->plan;
     world->step_settings = done->settings;
     sadmm_world_report_steps(world, steps, done);

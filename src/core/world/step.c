@@ -131,6 +131,7 @@ static void commit(sadmm_world *world)
 {
     const int threads = sadmm_pass_threads(world->plan.threads, (size_t)world->dynamic_count);
     sadmm_parallel(&world->team, threads, commit_share, world);
+    sadmm_world_commit_driven(world);
     sadmm_world_commit_joints(world);
     world->stepped = true;
     world->contacts_readable = true;
@@ -194,6 +195,7 @@ static sadmm_status integrate(struct host_step *step)
         TRY(sadmm_world_move_joined(world, &step->settings));
         sadmm_world_keep_rows(world, &step->settings);
     }
+    TRY(sadmm_world_move_driven(world, &step->settings));
     add_substep(step);
     return check_next(world);
 }
@@ -206,7 +208,9 @@ static sadmm_status run_stage(struct host_step *step, const struct sadmm_stage *
     case SADMM_STAGE_FIND: return find_contacts(world, step->stages.substep);
     case SADMM_STAGE_PLAN: return make_plan(step);
     case SADMM_STAGE_INTEGRATE: return integrate(step);
-    case SADMM_STAGE_WRENCHES: return world->kernels->recover_wrenches(world->context, world->wrench, &world->error);
+    case SADMM_STAGE_WRENCHES:
+        sadmm_world_add_driven_wrenches(world, &step->settings);
+        return world->kernels->recover_wrenches(world->context, world->wrench, &world->error);
     case SADMM_STAGE_TURN: sadmm_world_turn(world, step->stages.substep - 1); return SADMM_OK;
     case SADMM_STAGE_CERTIFY:
         return sadmm_certify_with(&world->certificate_workspace, &step->system, &step->settings,
