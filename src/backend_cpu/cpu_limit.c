@@ -77,7 +77,7 @@ static bool any_suspect(struct sadmm_context *c, bool under_iterated)
     }
     for (size_t p = 0; c->system->driven_count > 0 && p < c->system->contacts->pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[p];
-        if (sadmm_pair_is_driven(c->system, pair)) cpu_island_of(c, pair->body_a, pair->body_b)->limit.driven = 1;
+        if (sadmm_pair_gives_energy(c->system, pair)) cpu_island_of(c, pair->body_a, pair->body_b)->limit.driven = 1;
     }
     for (int32_t i = 0; i < c->bodies; ++i) {
         const struct cpu_island *island = &c->islands[i];

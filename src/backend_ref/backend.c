@@ -116,6 +116,8 @@ static sadmm_status integrate(struct sadmm_context *c, struct sadmm_rigid *next,
     double dt = c->settings->dt;
     if (!c->system->rigid)
         return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "integrate: the system gives A and b, not rigid bodies");
+    for (int32_t i = 0; i < c->system->body_count && c->system->carried; ++i)
+        for (int k = 0; k < 6; ++k) c->bodies[i].v[k] += c->system->carried[6 * (size_t)i + (size_t)k];
     sadmm_ref_label_islands(c);
     touch(c);
     for (int32_t i = 0; i < c->system->body_count; ++i) {

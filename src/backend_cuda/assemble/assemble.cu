@@ -98,8 +98,12 @@ extern "C" sadmm_status CUDA(assemble_bodies)(struct sadmm_context *c, struct sa
     }
     TRY(
         CUDA(upload)(c, v->raw.system.velocity, PINNED_BODIES, at, system->velocity, 6 * n * sizeof(double), error));
-    TRY(CUDA(upload)(c, (void *)v->raw.system.driven, PINNED_BODIES, at + 6 * n * sizeof(double), system->driven,
-                     6 * (size_t)system->driven_count * sizeof(double), error));
+    const size_t driven = 6 * (size_t)system->driven_count * sizeof(double);
+    at += 6 * n * sizeof(double);
+    TRY(CUDA(upload)(c, (void *)v->raw.system.driven, PINNED_BODIES, at, system->driven, driven, error));
+    if (system->carried)
+        TRY(CUDA(upload)(c, (void *)v->raw.system.carried, PINNED_BODIES, at + driven, system->carried,
+                         6 * n * sizeof(double), error));
     return launch_bodies(c, error);
 }
 

@@ -102,7 +102,7 @@ static __global__ void driven_kernel(const __grid_constant__ cuda_view v, const 
     const int32_t p = thread_index();
     if (p >= live_pairs(v.model)) return;
     const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
-    if (sadmm_pair_is_driven(&v.raw.system, pair))
+    if (sadmm_pair_gives_energy(&v.raw.system, pair))
         v.islands.info[v.graph.label[pair->body_a >= 0 ? pair->body_a : pair->body_b]].rows = 1;
 }
 

@@ -23,6 +23,7 @@ template <bool WHOLE> static __device__ __forceinline__ lead_body load_lead_body
     for (int k = 0; k < 6; ++k) {
         out.before[k] = rigid->velocity[k];
         out.velocity[k] = (double)velocity[k];
+        if (!WHOLE && v.raw.system.carried) out.velocity[k] += v.raw.system.carried[6 * (size_t)body + (size_t)k];
     }
     lead_own(rigid->velocity, out.velocity, rigid_is_isotropic(v3_load(rigid->inertia)), out.lead);
     return out;

@@ -53,6 +53,8 @@ struct sadmm_system {
     double *velocity;                /* (body_count x 6) start in, solution out */
     const double *driven;            /* (driven_count x 6) velocities of driven bodies, m/s, rad/s, world */
     int32_t driven_count;
+    const double *carried;           /* (body_count x 6): velocities are less this, the motion of what an island rides on
+                                        (core/world/driven.c); NULL: as they are */
     struct sadmm_contact_set *contacts;
     bool errors_given;               /* points carry e (problem level) instead of a gap */
     bool first;                      /* no step came before: where there are no impulses, none are known */
@@ -71,13 +73,24 @@ SADMM_INLINE const double *sadmm_driven_velocity(const struct sadmm_system *syst
     return system->driven + 6 * (size_t)sadmm_driven(body);
 }
 
-/* Is one of the pair's bodies driven, and in motion? Islands with such a contact gain energy and momentum from it. */
+/* Is one of the pair's bodies driven, and in motion? */
 SADMM_INLINE bool sadmm_pair_is_driven(const struct sadmm_system *system, const struct sadmm_contact_pair *pair)
 {
     const int32_t body = pair->body_a < pair->body_b ? pair->body_a : pair->body_b;
     if (!sadmm_body_is_driven(body)) return false;
     const double *v = sadmm_driven_velocity(system, body);
     return v[0] != 0 || v[1] != 0 || v[2] != 0 || v[3] != 0 || v[4] != 0 || v[5] != 0;
+}
+
+/* Does the pair give its island energy? One that is carried sees its driven body at rest; but for what turns: its
+ * surface goes on while the step lasts. */
+SADMM_INLINE bool sadmm_pair_gives_energy(const struct sadmm_system *system, const struct sadmm_contact_pair *pair)
+{
+    if (!sadmm_pair_is_driven(system, pair)) return false;
+    if (!system->carried) return true;
+    const double *c = system->carried + 6 * (size_t)(pair->body_a > pair->body_b ? pair->body_a : pair->body_b);
+    const bool turns = c[3] != 0 || c[4] != 0 || c[5] != 0, goes = c[0] != 0 || c[1] != 0 || c[2] != 0;
+    return turns || !goes;
 }
 
 /* Does e of the pair's points depend on how fast its bodies approach? */

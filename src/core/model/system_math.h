@@ -33,6 +33,13 @@ SADMM_INLINE sym3 sadmm_rigid_body(const struct sadmm_rigid *body, const struct 
     return rigid_world_inertia(q_matrix(q), v3_scale(inertia, angular.mass));
 }
 
+/* b of the motion less c, of a rigid body: b - A c. */
+SADMM_INLINE void sadmm_take_carried(double mass, sym3 I, const double c[6], double b[6])
+{
+    for (int k = 0; k < 3; ++k) b[k] -= mass * c[k];
+    v3_store(v3_sub(v3_load(b + 3), s3_mul(I, v3_load(c + 3))), b + 3);
+}
+
 /* A (6 x 6 row-major) and b of eq. (1). */
 SADMM_INLINE void sadmm_system_body(const struct sadmm_system *system, const struct sadmm_settings *settings, int32_t i,
                                      double A[36], double b[6])
@@ -48,6 +55,7 @@ SADMM_INLINE void sadmm_system_body(const struct sadmm_system *system, const str
     A[0] = A[7] = A[14] = mass;
     A[21] = I.xx, A[28] = I.yy, A[35] = I.zz;
     A[22] = A[27] = I.xy, A[23] = A[33] = I.xz, A[29] = A[34] = I.yz;
+    if (system->carried) sadmm_take_carried(mass, I, system->carried + 6 * (size_t)i, b);
 }
 
 SADMM_INLINE vec3 sadmm_velocity_at(const double v[6], const double arm[3])
@@ -55,18 +63,22 @@ SADMM_INLINE vec3 sadmm_velocity_at(const double v[6], const double arm[3])
     return v3_add(v3_load(v), v3_cross(v3_load(v + 3), v3_load(arm)));
 }
 
-/* What a driven body adds to the velocity of b's contact point relative to a's, world frame. */
+/* What a driven body adds to the velocity of b's contact point relative to a's, world frame; and what the other one is
+ * carried by. */
 SADMM_INLINE vec3 sadmm_driven_part(const struct sadmm_system *system, const struct sadmm_contact_pair *pair,
                                     const struct sadmm_contact_point *point)
 {
-    if (sadmm_body_is_driven(pair->body_b))
-        return sadmm_velocity_at(sadmm_driven_velocity(system, pair->body_b), point->arm_b);
-    if (sadmm_body_is_driven(pair->body_a))
-        return v3_neg(sadmm_velocity_at(sadmm_driven_velocity(system, pair->body_a), point->arm_a));
-    return v3(0, 0, 0);
+    const bool on_b = sadmm_body_is_driven(pair->body_b);
+    if (!on_b && !sadmm_body_is_driven(pair->body_a)) return v3(0, 0, 0);
+    vec3 x = sadmm_velocity_at(sadmm_driven_velocity(system, on_b ? pair->body_b : pair->body_a),
+                               on_b ? point->arm_b : point->arm_a);
+    if (system->carried)
+        x = v3_sub(x, sadmm_velocity_at(system->carried + 6 * (size_t)(on_b ? pair->body_a : pair->body_b),
+                                        on_b ? point->arm_a : point->arm_b));
+    return on_b ? x : v3_neg(x);
 }
 
-/* The driven body of a pair, if there is one, as the motion about the other one's centre of mass that its surface has
+/* The driven body of a pair that has one as the motion about the other one's centre of mass that its surface has
  * at the points: with the arms of the other one. `points`: the pair's. */
 SADMM_INLINE void sadmm_driven_about_other(const struct sadmm_system *system, const struct sadmm_contact_pair *pair,
                                            const struct sadmm_contact_point *points, double motion[6])
@@ -76,6 +88,9 @@ SADMM_INLINE void sadmm_driven_about_other(const struct sadmm_system *system, co
                  *own = on_b ? points->arm_b : points->arm_a, *other = on_b ? points->arm_a : points->arm_b;
     v3_store(v3_add(v3_load(v), v3_cross(v3_load(v + 3), v3_sub(v3_load(own), v3_load(other)))), motion);
     v3_store(v3_load(v + 3), motion + 3);
+    if (!system->carried) return;
+    const double *c = system->carried + 6 * (size_t)(on_b ? pair->body_a : pair->body_b);
+    for (int k = 0; k < 6; ++k) motion[k] -= c[k];
 }
 
 /* Velocity of b's contact point relative to a's, world frame, by the system's velocities. */

@@ -28,6 +28,7 @@ void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_sett
         double mass;
         const sym3 I = sadmm_rigid_body(&bodies[first + i], settings, &mass, b + 6 * i);
         pack_rigid(mass, I, A + PACKED6 * i);
+        if (system->carried) sadmm_take_carried(mass, I, system->carried + 6 * (first + i), b + 6 * i);
     }
 }
 

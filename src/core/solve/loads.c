@@ -213,7 +213,7 @@ static void predict(struct predictor *p)
     }
     for (size_t k = 0; system->driven_count > 0 && k < system->contacts->pair_count; ++k) { /* what moves stops nothing */
         const struct sadmm_contact_pair *pair = &system->contacts->pairs[k];
-        if (sadmm_pair_is_driven(system, pair))
+        if (sadmm_pair_gives_energy(system, pair))
             p->failed[p->label[pair->body_a >= 0 ? pair->body_a : pair->body_b]] = true;
     }
     for (int32_t i = 0; i < system->body_count; ++i) {

@@ -150,6 +150,10 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def,
     if (!sadmm_grow(&world->bodies, &world->body_capacity, world->body_slots, slot + 1, sizeof *world->bodies))
         return sadmm_fail_memory(error, "a body");
     TRY(copy_name(def->name, &name, error));
+    if (def->type == SADMM_BODY_KINEMATIC && !sadmm_world_add_driven(world, (int32_t)slot)) {
+        sadmm_free(name);
+        return sadmm_fail_memory(error, "a body");
+    }
 
     struct sadmm_world_body *body = &world->bodies[slot];
     uint32_t generation = slot < world->body_slots ? body->generation : 1;
@@ -172,7 +176,6 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def,
     }
     memcpy(rigid->velocity, def->linear_velocity, sizeof def->linear_velocity);
     memcpy(rigid->velocity + 3, def->angular_velocity, sizeof def->angular_velocity);
-    if (def->type == SADMM_BODY_KINEMATIC) ++world->driven_count;
     body->name = name;
     if (slot == world->body_slots) ++world->body_slots;
     sadmm_slot_taken(&world->body_marks, slot);
@@ -199,7 +202,7 @@ sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id)
     --world->body_count;
     sadmm_slot_freed(&world->body_marks, id.slot - 1);
     if (body->type == SADMM_BODY_DYNAMIC) --world->dynamic_count;
-    if (body->type == SADMM_BODY_KINEMATIC) --world->driven_count;
+    if (body->type == SADMM_BODY_KINEMATIC) sadmm_world_remove_driven(world, (int32_t)id.slot - 1);
     world->contacts_readable = false;
     return SADMM_OK;
 }

@@ -163,6 +163,7 @@ static sadmm_status make_plan(struct host_step *step)
     TRY(sadmm_world_make_rows(world, &step->settings));
     step->system = sadmm_world_system(world);
     step->system.first = step->system.first && step->stages.substep == 0;
+    TRY(sadmm_world_carry(world, &step->system));
     world->plan = sadmm_plan_make(&step->system, &step->settings);
     step->report = sadmm_solve_report_empty(world->kernels);
     TRY(keep_start(world, &depth));
@@ -190,6 +191,7 @@ static sadmm_status solve_stage(struct host_step *step, const struct sadmm_stage
 static sadmm_status integrate(struct host_step *step)
 {
     sadmm_world *world = step->world;
+    sadmm_world_put_down(world, &step->system);
     TRY(world->kernels->integrate(world->context, world->next, &world->error));
     if (step->system.rows) {
         TRY(sadmm_world_move_joined(world, &step->settings));
@@ -213,6 +215,7 @@ static sadmm_status run_stage(struct host_step *step, const struct sadmm_stage *
         return world->kernels->recover_wrenches(world->context, world->wrench, &world->error);
     case SADMM_STAGE_TURN: sadmm_world_turn(world, step->stages.substep - 1); return SADMM_OK;
     case SADMM_STAGE_CERTIFY:
+        step->system.carried = NULL;
         return sadmm_certify_with(&world->certificate_workspace, &step->system, &step->settings,
                                   &step->report.certificate, &world->error);
     case SADMM_STAGE_COMMIT: commit(world); return SADMM_OK;

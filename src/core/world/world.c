@@ -67,7 +67,8 @@ void sadmm_world_destroy(sadmm_world *world)
                       world->friction_pairs.keys,
                       world->friction_pairs.values, world->collision_bodies, world->start.rigid, world->start.velocity,
                       world->start.impulse, world->last_start.rigid, world->last_start.velocity,
-                      world->last_start.impulse, world->start.driven, world->last_start.driven, world->driven, world->next, world->velocity, world->wrench, world->steady,
+                      world->last_start.impulse, world->start.driven, world->last_start.driven, world->driven,
+                      world->driven_slots, world->carried, world->carriers, world->carried_labels, world->next, world->velocity, world->wrench, world->steady,
                       world->wrench_sum, world->slot_of,
                       world->resident.steady, world->resident.edited, world->resident.edits};
     for (size_t i = 0; i < sizeof blocks / sizeof *blocks; ++i) sadmm_free(blocks[i]);

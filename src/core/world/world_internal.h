@@ -116,6 +116,7 @@ struct sadmm_world {
     struct sadmm_world_body *bodies;
     size_t body_slots, body_capacity;
     int32_t body_count, dynamic_count, driven_count; /* driven: kinematic */
+    int32_t *driven_slots;                           /* of these, ascending */
     struct sadmm_slot_marks body_marks;
     struct sadmm_shape *shapes;
     uint32_t *shape_generations;
@@ -149,10 +150,13 @@ struct sadmm_world {
     double *velocity, *wrench;                     /* dynamic bodies x 6 */
     struct sadmm_steady *steady;                   /* dynamic bodies, after the sub-steps made so far */
     struct sadmm_world_driven *driven;             /* in slot order */
+    double *carried;                               /* dynamic bodies x 6: the motion of what they ride on */
+    int32_t *carriers, *carried_labels;            /* islands, and at their labels what they ride on */
     double *wrench_sum;                            /* dynamic bodies x 6, of these; both only where there are several */
     int32_t *slot_of;                              /* dynamic body -> slot */
     size_t collision_body_capacity, next_capacity, velocity_capacity, wrench_capacity, slot_of_capacity,
-        steady_capacity, wrench_sum_capacity, driven_capacity;
+        steady_capacity, wrench_sum_capacity, driven_capacity, driven_slot_capacity, carried_capacity, carrier_capacity,
+        carried_label_capacity;
     struct sadmm_plan plan;
     sadmm_settings step_settings;                  /* of the whole step */
     bool stepped;
@@ -184,6 +188,13 @@ struct sadmm_world {
 
 /* Kinematic bodies in slot order into `driven` and `start`, and numbers of theirs for collision, which has their poses. */
 sadmm_status sadmm_world_gather_driven(sadmm_world *world);
+/* Kinematic body in slot `slot`: it is one from here on, or no more. */
+bool sadmm_world_add_driven(sadmm_world *world, int32_t slot);
+void sadmm_world_remove_driven(sadmm_world *world, int32_t slot);
+/* Islands that ride on a kinematic body are solved as what they are in its motion: system->carried, and system->velocity
+ * less that; and back. */
+sadmm_status sadmm_world_carry(sadmm_world *world, struct sadmm_system *system);
+void sadmm_world_put_down(sadmm_world *world, const struct sadmm_system *system);
 /* Where they are after the (sub-)step. NON_FINITE. */
 sadmm_status sadmm_world_move_driven(sadmm_world *world, const sadmm_settings *settings);
 /* The next sub-step begins there. */
