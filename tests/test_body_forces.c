@@ -223,6 +223,31 @@ START_TEST(a_driven_wheel_is_damped)
 }
 END_TEST
 
+/* What bounces leaves with its share of the speed that it comes with, which damping has had of it in that step:
+ * e exp(-c dt) v. */
+START_TEST(a_damped_ball_bounces_with_what_it_has)
+{
+    const double c = 20, v = 2, restitution = 0.5;
+    const sadmm_world_def def = bodies_def();
+    sadmm_world *world = bodies_world(&def, _i);
+    sadmm_body_def body = point_def(0, 0, 0.1);
+    sadmm_shape_def ball = sadmm_shape_def_default();
+    body.gravity_scale = 0;
+    body.linear_damping = c;
+    body.linear_velocity[2] = -v;
+    const sadmm_body_id id = add_defined(world, &body);
+    ball.type = SADMM_SHAPE_SPHERE;
+    ball.size[0] = 0.1;
+    ball.restitution = restitution;
+    MUST(world, sadmm_world_add_shape(world, id, &ball, NULL));
+    add_floor(world, 0.5);
+    step_world(world, 1);
+    expect_near(body_state(world, id).linear_velocity[2], restitution * exp(-c * def.settings.dt) * v,
+                1e-7 + rounding(_i, 4, v), "speed");
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 /* ---- the calls --------------------------------------------------------------------------------------------------- */
 
 /* Set between steps, they act from the next one on, and go along where a backend keeps the world. */
@@ -358,6 +383,7 @@ int main(void)
     tcase_add_loop_test(cases, a_damped_block_slides_as_coulomb_says, 0, SOLVERS);
     tcase_add_loop_test(cases, bodies_of_different_forces_stay_together, 0, SOLVERS);
     tcase_add_loop_test(cases, a_driven_wheel_is_damped, 0, SOLVERS);
+    tcase_add_loop_test(cases, a_damped_ball_bounces_with_what_it_has, 0, SOLVERS);
     tcase_add_loop_test(cases, they_may_be_set_between_steps, 0, SOLVERS);
     suite_add_tcase(suite, cases);
     return RUN_BODIES_SUITE(suite);

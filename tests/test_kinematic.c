@@ -2,6 +2,7 @@
  * (BODIES_ON_CUDA), which includes this file. */
 #include "body_worlds.h"
 
+#include "core/base/memory.h"
 #include "core/base/parallel.h"
 
 /* What a solve of `iterations` leaves: of the impulses at hand. Both precisions converge that far here. */
@@ -129,7 +130,7 @@ START_TEST(a_lift_carries_weight_and_acceleration)
     const double dt = def.settings.dt;
     sadmm_world *world = bodies_world(&def, _i);
     const sadmm_body_id lift = add_kinematic(world, BELT, 0, 0, -0.1, 0.5);
-    const sadmm_body_def cube = cube_def(0, 0, 0.1);
+    const sadmm_body_def cube = cube_def(0.5, 0.3, 0.1);
     const sadmm_body_id id = add_cube(world, &cube, 0.5);
     step_world(world, 1);
     for (int step = 1; step <= STEPS; ++step) {
@@ -141,6 +142,8 @@ START_TEST(a_lift_carries_weight_and_acceleration)
         if (step > 2) {
             expect_near(force_on(world, id, 2), mass * (G + a), 1e-3 * mass * G, "force on the cube");
             expect_near(force_on(world, lift, 2), -mass * (G + a), 1e-3 * mass * G, "force on the lift");
+            expect_near(force_on(world, lift, 3), -0.3 * mass * (G + a), 1e-3 * mass * G, "torque about x");
+            expect_near(force_on(world, lift, 4), 0.5 * mass * (G + a), 1e-3 * mass * G, "torque about y");
         }
     }
     sadmm_world_destroy(world);
@@ -330,6 +333,40 @@ START_TEST(joints_hold_on_to_it)
         expect_near(state.speed[5], k == 2 ? 5 : 0, 1e-3, "speed to the shaft");
     }
     sadmm_world_destroy(world);
+}
+END_TEST
+
+/* A bead on a rod that turns: r'' = w^2 r along it, r = r_0 cosh(w t), to second order in dt: twice the steps, a quarter of
+ * the error. */
+START_TEST(a_bead_leaves_along_a_turning_rod)
+{
+    enum { STEPS = 50 };
+    const double w = 2, radius = 0.3, t = 0.5;
+    static const double along[4] = {0.70710678118654752, 0, 0.70710678118654752, 0}; /* z onto x */
+    double error[2];
+    for (int fine = 0; fine < 2; ++fine) {
+        sadmm_world_def def = bodies_def();
+        def.settings.iterations = 100;
+        def.settings.dt = t / (STEPS << fine);
+        memset(def.settings.gravity, 0, sizeof def.settings.gravity);
+        sadmm_world *world = bodies_world(&def, _i);
+        sadmm_body_def rod = sadmm_body_def_default(), bead = point_def(radius, 0, 0);
+        rod.type = SADMM_BODY_KINEMATIC;
+        rod.angular_velocity[2] = w;
+        bead.linear_velocity[1] = w * radius, bead.angular_velocity[2] = w;
+        sadmm_joint_def slide = sadmm_joint_def_default();
+        slide.kind = SADMM_JOINT_PRISMATIC;
+        slide.body_a = add_defined(world, &rod), slide.body_b = add_defined(world, &bead);
+        MUST(world, sadmm_world_place_joint(world, &slide, bead.position, along));
+        MUST(world, sadmm_world_add_joint(world, &slide, NULL));
+        step_world(world, STEPS << fine);
+        const sadmm_body_state s = body_state(world, slide.body_b);
+        error[fine] = hypot(s.position[0], s.position[1]) - radius * cosh(w * t);
+        expect_near(atan2(s.position[1], s.position[0]), w * t, 2e-4, "angle");
+        sadmm_world_destroy(world);
+    }
+    ck_assert_msg(fabs(error[0]) < 1e-4, "%g m", error[0]);
+    ck_assert_msg(fabs(error[1]) < 0.3 * fabs(error[0]), "%g and %g m", error[0], error[1]);
 }
 END_TEST
 
@@ -600,6 +637,41 @@ START_TEST(a_step_that_fails_changes_nothing)
 }
 END_TEST
 
+/* Memory may run out anywhere in a step: nothing has changed, and the next one is as if nothing had been. */
+START_TEST(memory_may_run_out)
+{
+    const sadmm_world_def def = bodies_def();
+    sadmm_body_id belt, other;
+    sadmm_world *world = busy_world(&def, _i, &belt), *beside = busy_world(&def, _i, &other);
+    int failures = 0;
+    for (;; ++failures) {
+        const uint64_t before = state_hash(world);
+        sadmm_test_fail_allocations_after(failures);
+        const sadmm_status status = sadmm_world_step(world);
+        sadmm_test_fail_allocations_after(-1);
+        if (status == SADMM_OK) break;
+        ck_assert_int_eq(status, SADMM_ERROR_OUT_OF_MEMORY);
+        ck_assert(state_hash(world) == before);
+        ck_assert_int_lt(failures, 1000);
+    }
+    ck_assert_int_gt(failures, 5);
+    step_world(beside, 1);
+    ck_assert(state_hash(world) == state_hash(beside));
+    sadmm_test_fail_allocations_after(0);
+    sadmm_body_def more = sadmm_body_def_default();
+    more.type = SADMM_BODY_KINEMATIC;
+    more.name = "more";
+    ck_assert_int_eq(sadmm_world_add_body(world, &more, &belt), SADMM_ERROR_OUT_OF_MEMORY);
+    sadmm_test_fail_allocations_after(-1);
+    ck_assert_int_eq(sadmm_world_body_count(world), 5);
+    step_world(world, 2);
+    step_world(beside, 2);
+    ck_assert(state_hash(world) == state_hash(beside));
+    sadmm_world_destroy(world);
+    sadmm_world_destroy(beside);
+}
+END_TEST
+
 /* Contacts of problems have the velocity of their static side: refused between two bodies, kept bit for bit. */
 START_TEST(problems_have_velocities)
 {
@@ -656,6 +728,7 @@ int main(void)
     tcase_add_loop_test(cases, bad_calls_are_refused, 0, 1);
     tcase_add_loop_test(cases, a_step_that_fails_changes_nothing, 0, SOLVERS);
     tcase_add_loop_test(cases, problems_have_velocities, 0, SOLVERS);
+    tcase_add_loop_test(cases, memory_may_run_out, 0, SOLVERS);
 #endif
     tcase_add_loop_test(cases, a_belt_drags_by_friction, 0, 3 * SOLVERS);
     tcase_add_loop_test(cases, a_turntable_carries, 0, SOLVERS);
@@ -665,6 +738,7 @@ int main(void)
     tcase_add_loop_test(cases, what_rides_stands_as_on_the_ground, 0, 3 * SOLVERS);
     tcase_add_loop_test(cases, it_is_where_it_was_moved_to, 0, 2 * SOLVERS);
     tcase_add_loop_test(cases, joints_hold_on_to_it, 0, SOLVERS);
+    tcase_add_loop_test(cases, a_bead_leaves_along_a_turning_rod, 0, SOLVERS);
     tcase_add_loop_test(cases, a_limit_takes_along, 0, SOLVERS);
     tcase_add_loop_test(cases, its_contacts_are_certified, 0, SOLVERS);
     tcase_add_loop_test(cases, substeps_are_steps, 0, SOLVERS);

@@ -115,8 +115,8 @@ static void must_be_sound(struct machine *m)
         double q2 = 0;
         for (int i = 0; i < 4; ++i) q2 += s.orientation[i] * s.orientation[i];
         MUST(fabs(q2 - 1) <= 1e-12, "body %d: |q|^2 - 1 = %g", k, q2 - 1); /* normalised: a few roundings */
-        if (def.type != SADMM_BODY_DYNAMIC) continue;
-        ++dynamic;
+        if (def.type == SADMM_BODY_STATIC) continue;
+        dynamic += def.type == SADMM_BODY_DYNAMIC;
         sadmm_status status = sadmm_world_body_contact_wrench(m->world, id, wrench);
         MUST(status == SADMM_OK || status == SADMM_ERROR_UNAVAILABLE, "wrench: %s", sadmm_status_name(status));
         if (status == SADMM_OK) MUST(all_finite(wrench, 6), "body %d: wrench", k);
@@ -230,7 +230,10 @@ static sadmm_body_def take_body_def(struct machine *m)
     sadmm_body_def def = sadmm_body_def_default();
     sadmm_body_state state;
     int kind = take_choice(in, 8);
-    def.type = kind == 7 ? (sadmm_body_type)take_byte(in) : (sadmm_body_type)(kind >= 5);
+    def.type = kind == 7   ? (sadmm_body_type)take_byte(in)
+               : kind >= 5 ? SADMM_BODY_STATIC
+               : kind == 4 ? SADMM_BODY_KINEMATIC
+                           : SADMM_BODY_DYNAMIC;
     def.mass = take_rarely(in, 16) ? take_extreme(in) : (take_choice(in, 4) ? 1 : take_scale(in, 1e-9, 1e12));
     double size = take_choice(in, 4) ? 0.5 : take_scale(in, 1e-6, 1e6);
     sadmm_sphere_inertia(def.mass, size, def.inertia);
@@ -245,7 +248,7 @@ static sadmm_body_def take_body_def(struct machine *m)
         memcpy(def.linear_velocity, state.linear_velocity, sizeof def.linear_velocity);
         memcpy(def.angular_velocity, state.angular_velocity, sizeof def.angular_velocity);
     }
-    def.environment = take_rarely(in, 4) ? take_choice(in, 4) - 2 : (def.type == SADMM_BODY_STATIC ? -1 : 0);
+    def.environment = take_rarely(in, 4) ? take_choice(in, 4) - 2 : (def.type == SADMM_BODY_DYNAMIC ? 0 : -1);
     if (take_rarely(in, 16))
         def.name = "a name that is longer than the sixty-three bytes that are kept of it, and then some";
     if (take_rarely(in, 8)) take_forces(in, &def.gravity_scale, &def.linear_damping, &def.angular_damping);
@@ -330,6 +333,15 @@ static sadmm_status set_wrench(struct machine *m)
     take_vector(&m->in, -reach, reach, force);
     take_vector(&m->in, -reach, reach, torque);
     return sadmm_world_set_body_wrench(m->world, id, force, null ? NULL : torque);
+}
+
+static sadmm_status move(struct machine *m)
+{
+    double position[3], orientation[4];
+    sadmm_body_id id = take_body(m);
+    take_vector(&m->in, -2, 2, position);
+    take_orientation(&m->in, orientation);
+    return sadmm_world_move_body(m->world, id, position, orientation);
 }
 
 static sadmm_status set_forces(struct machine *m)
@@ -424,6 +436,7 @@ static sadmm_status make_call(struct machine *m)
     case 14: return freeze(m);
     case 15: case 16: return read_something(m);
     case 17: return set_forces(m);
+    case 18: return move(m);
     default: return step(m);
     }
 }

@@ -261,8 +261,8 @@ sadmm_status sadmm_problem_set_contacts(sadmm_problem *problem, int32_t count, c
     set.points = sadmm_alloc((size_t)count, sizeof *set.points);
     int32_t driven_count = 0;
     for (int32_t k = 0; k < count; ++k) driven_count += is_driven(&contacts[k]);
-    double *driven = sadmm_alloc(6 * (size_t)driven_count, sizeof *driven);
-    if (!set.pairs || !set.points || !driven) {
+    double *driven = driven_count > 0 ? sadmm_alloc(6 * (size_t)driven_count, sizeof *driven) : NULL;
+    if (!set.pairs || !set.points || (driven_count > 0 && !driven)) {
         sadmm_free(set.pairs);
         sadmm_free(set.points);
         sadmm_free(driven);
