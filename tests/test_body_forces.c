@@ -195,6 +195,34 @@ START_TEST(bodies_of_different_forces_stay_together)
 }
 END_TEST
 
+/* Bodies that touch in the air have gravity's share of a lead in common (docs/algorithm.md, section 9), unless gravity is
+ * not what they have in common: weightless ones go by v t, damped ones by what damping leaves of it. */
+START_TEST(bodies_that_touch_in_the_air_go_their_way)
+{
+    enum { STEPS = 40 };
+    const double v = 0.5, c = 2;
+    const sadmm_world_def def = bodies_def();
+    const double dt = def.settings.dt, t = STEPS * dt;
+    sadmm_world *world = bodies_world(&def, _i);
+    sadmm_body_id id[4];
+    for (int k = 0; k < 4; ++k) {
+        sadmm_body_def body = cube_def(k / 2, 0, k % 2 ? 0.2 : 0);
+        body.gravity_scale = 0;
+        body.linear_velocity[2] = v;
+        if (k >= 2) body.linear_damping = c;
+        id[k] = add_cube(world, &body, 0.5);
+    }
+    step_world(world, STEPS);
+    ck_assert_int_gt(sadmm_world_contact_count(world), 0);
+    for (int k = 0; k < 4; ++k) {
+        const double z = body_state(world, id[k]).position[2] - (k % 2 ? 0.2 : 0);
+        if (k < 2) expect_near(z, v * t, rounding(_i, STEPS, v) + 1e-9, "weightless");
+        else expect_near(z, -v * expm1(-c * t) / c, c * dt * v * t, "damped"); /* leads stay: of first order */
+    }
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 /* A wheel on a hinge to the static world, driven by a torque T: w' = T / I - c w; the drive's bound is reached. */
 START_TEST(a_driven_wheel_is_damped)
 {
@@ -382,6 +410,7 @@ int main(void)
     tcase_add_loop_test(cases, a_box_weighs_its_share, 0, SOLVERS);
     tcase_add_loop_test(cases, a_damped_block_slides_as_coulomb_says, 0, SOLVERS);
     tcase_add_loop_test(cases, bodies_of_different_forces_stay_together, 0, SOLVERS);
+    tcase_add_loop_test(cases, bodies_that_touch_in_the_air_go_their_way, 0, SOLVERS);
     tcase_add_loop_test(cases, a_driven_wheel_is_damped, 0, SOLVERS);
     tcase_add_loop_test(cases, a_damped_ball_bounces_with_what_it_has, 0, SOLVERS);
     tcase_add_loop_test(cases, they_may_be_set_between_steps, 0, SOLVERS);
