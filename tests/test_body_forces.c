@@ -307,8 +307,8 @@ END_TEST
 #ifndef BODIES_ON_CUDA
 START_TEST(bad_values_are_refused)
 {
-    static const double bad_scales[] = {NAN, INFINITY, -INFINITY, 1.01e6, -1.01e6}, bad_rates[] = {NAN, INFINITY, -1e-9,
-                                                                                                   1.01e6};
+    static const double bad_scales[] = {NAN, INFINITY, -INFINITY, 1.01e6, -1.01e6},
+                        bad_rates[] = {NAN, INFINITY, -1e-9, 1.01e6};
     const sadmm_world_def def = bodies_def();
     sadmm_world *world = bodies_world(&def, _i);
     sadmm_body_def body = point_def(0, 0, 0);
@@ -392,6 +392,47 @@ START_TEST(contacts_reach_as_far_as_damping_brakes)
 END_TEST
 #endif
 
+#ifdef BODIES_ON_CUDA
+/* Cubes of all kinds that fall on each other and a floor, some faster than their velocities tell; what is set goes along
+ * with steps that are made on the device. */
+static sadmm_world *falling_world(int precision)
+{
+    sadmm_world_def def = bodies_def();
+    def.settings.iterations = 20;
+    sadmm_world *world = bodies_world(&def, precision);
+    add_floor(world, 0.5);
+    for (int k = 0; k < 8; ++k) {
+        sadmm_body_def body = cube_def(0.25 * (k / 2), 0, k % 2 ? 0.34 : 0.11);
+        body.gravity_scale = k == 1 ? 60 : k == 3 ? -1 : 0.5 * k;
+        body.linear_damping = k == 4 ? 1e4 : k;
+        body.angular_damping = 3 * k;
+        body.linear_velocity[0] = k == 5 ? 3 : 0;
+        add_cube(world, &body, 0.4);
+    }
+    return world;
+}
+
+START_TEST(the_device_makes_the_hosts_steps)
+{
+    sadmm_world *host = falling_world(_i), *device = falling_world(_i);
+    by_host(host);
+    for (int step = 0; step < 14; ++step) {
+        sadmm_world *const both[2] = {host, device};
+        for (int w = 0; w < 2 && step % 4 == 2; ++w) {
+            MUST(both[w], sadmm_world_set_body_gravity_scale(both[w], body_at(both[w], 3), step));
+            MUST(both[w], sadmm_world_set_body_damping(both[w], body_at(both[w], 6), 50 * step, 0));
+        }
+        step_world(host, 1);
+        step_world(device, 1);
+        expect_same_world(host, device, "a step");
+    }
+    ck_assert(device->resident.loaded && !host->resident.loaded); /* it was the device that made them */
+    sadmm_world_destroy(host);
+    sadmm_world_destroy(device);
+}
+END_TEST
+#endif
+
 int main(void)
 {
     Suite *suite = suite_create("body forces");
@@ -399,6 +440,7 @@ int main(void)
 #ifdef BODIES_ON_CUDA
     if (!find_cuda_tables(tables)) return TEST_SKIPPED;
     tcase_set_timeout(cases, 600);
+    tcase_add_loop_test(cases, the_device_makes_the_hosts_steps, 0, SOLVERS);
 #else
     tcase_add_loop_test(cases, bad_values_are_refused, 0, 1);
     tcase_add_loop_test(cases, contacts_reach_as_far_as_a_heavy_body_falls, 0, SOLVERS);

@@ -59,7 +59,8 @@ START_TEST(a_belt_drags_by_friction)
     sadmm_body_state place = body_state(world, belt);
     place.linear_velocity[0] = speed;
     /* with 5 the first steps, which start cold, are behind by 0.02 m/s */
-    double tolerance = kind == 1 ? 0.05 * speed : (kind == 2 ? 1e-6 : solved(solver)) + 8 * STEPS * epsilon_of(solver) * speed;
+    double tolerance =
+        kind == 1 ? 0.05 * speed : (kind == 2 ? 1e-6 : solved(solver)) + 8 * STEPS * epsilon_of(solver) * speed;
     for (int step = 1; step <= STEPS; ++step) {
         MUST(world, sadmm_world_set_body_state(world, belt, &place));
         step_world(world, 1);
@@ -675,19 +676,20 @@ END_TEST
 /* Contacts of problems have the velocity of their static side: refused between two bodies, kept bit for bit. */
 START_TEST(problems_have_velocities)
 {
-    const double A[72] = {[0] = 2, [7] = 2, [14] = 2, [21] = 1, [28] = 1, [35] = 1,
+    const double A[72] = {[0] = 2,  [7] = 2,  [14] = 2, [21] = 1, [28] = 1, [35] = 1,
                           [36] = 2, [43] = 2, [50] = 2, [57] = 1, [64] = 1, [71] = 1};
     const double b[12] = {0, 0, -1, 0, 0, 0, 0, 0, -1};
     sadmm_problem_contact c[3] = {{.body_a = -1, .body_b = 0, .normal = {0, 0, 1}, .friction = 0.5},
                                   {.body_a = -1, .body_b = 0, .normal = {0, 0, 1}, .friction = 0.5},
-                                  {.body_a = 1, .body_b = -1, .normal = {0, 0, -1}, .friction = 0.5}}, read;
+                                  {.body_a = 1, .body_b = -1, .normal = {0, 0, -1}, .friction = 0.5}},
+                          read;
     sadmm_problem *problem = NULL;
     sadmm_solve_report report;
     double v[12];
     ck_assert_int_eq(sadmm_problem_create(&problem), SADMM_OK);
     ck_assert_int_eq(sadmm_problem_set_bodies(problem, 2, A, b, NULL), SADMM_OK);
     c[0].velocity[0] = c[1].velocity[0] = -0.1; /* the ground goes by +0.1 */
-    c[2].velocity[1] = 0.3;                     /* and under the other one, which presses by 1 and grips by 0.5, by 0.3 */
+    c[2].velocity[1] = 0.3; /* and under the other one, which presses by 1 and grips by 0.5, by 0.3 */
     ck_assert_int_eq(sadmm_problem_set_contacts(problem, 3, c, NULL), SADMM_OK);
     for (int k = 0; k < 3; ++k) {
         ck_assert_int_eq(sadmm_problem_get_contact(problem, k, &read), SADMM_OK);

@@ -63,7 +63,10 @@ SADMM_RARE double forces_braking(const double velocity[3], double z, double dt)
  * towards each other by it than the sum of what is beyond scales of 0 to 1. Linear (m/s^2); angular (rad/s^2). */
 SADMM_INLINE double forces_acceleration(const struct sadmm_rigid *body, const double gravity[3], double dt)
 {
-    const double scale = body->gravity_scale, more = scale > 1 ? scale - 1 : scale < 0 ? -scale : 0,
+    const double scale = body->gravity_scale,
+                 more = scale > 1   ? scale - 1
+                        : scale < 0 ? -scale
+                                    : 0,
                  z = body->damping[0] * dt;
     double size = rigid_acceleration(body->mass, v3_load(body->wrench));
     if (more > 0) size += more * v3_norm(v3_load(gravity));
@@ -71,9 +74,9 @@ SADMM_INLINE double forces_acceleration(const struct sadmm_rigid *body, const do
 }
 SADMM_INLINE double forces_angular_acceleration(const struct sadmm_rigid *body, double dt)
 {
-    const double z = body->damping[1] * dt, size = rigid_angular_acceleration(q_load(body->orientation),
-                                                                              v3_load(body->inertia),
-                                                                              v3_load(body->wrench + 3));
+    const double z = body->damping[1] * dt,
+                 size = rigid_angular_acceleration(q_load(body->orientation), v3_load(body->inertia),
+                                                   v3_load(body->wrench + 3));
     return z > 0 ? size + forces_braking(body->velocity + 3, z, dt) : size;
 }
 
