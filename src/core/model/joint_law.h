@@ -53,6 +53,7 @@ SADMM_INLINE bool joint_is_radial(sadmm_joint_kind kind)
 struct joint_body {
     int32_t system_body;             /* -1: it does not move */
     const struct sadmm_rigid *rigid; /* at the step's start; NULL: the frame is in the world */
+    bool steered;                    /* it is no body of the system and goes by its velocity, whatever acts on it */
 };
 
 SADMM_INLINE struct joint_end joint_end_on(const struct joint_frame *frame, const struct sadmm_rigid *rigid)
@@ -66,8 +67,9 @@ SADMM_INLINE struct joint_end joint_end_on(const struct joint_frame *frame, cons
 
 /* One body of a joint in a step. */
 struct joint_side {
-    int32_t system_body;             /* -1: it does not move */
+    int32_t system_body;             /* -1: it does not move, or is steered */
     const struct sadmm_rigid *rigid; /* at the step's start; NULL: the static world */
+    bool steered;
     double velocity[6], free[6];     /* at the start; at the end of free motion */
     quat back;                       /* what turns the row's torque to where the body's moments are (docs) */
 };
@@ -84,9 +86,11 @@ SADMM_INLINE struct joint_side joint_side_of(struct joint_body body, const struc
     int k;
     side.system_body = body.system_body;
     side.rigid = body.rigid;
+    side.steered = body.steered;
     side.back.w = 1;
     side.back.x = side.back.y = side.back.z = 0;
-    for (k = 0; k < 6; ++k) side.velocity[k] = side.free[k] = body.system_body >= 0 ? body.rigid->velocity[k] : 0;
+    for (k = 0; k < 6; ++k)
+        side.velocity[k] = side.free[k] = body.system_body >= 0 || body.steered ? body.rigid->velocity[k] : 0;
     if (body.system_body < 0) return side;
     for (k = 0; k < 3; ++k)
         side.free[k] += settings->dt * (settings->gravity[k] + side.rigid->wrench[k] / side.rigid->mass);
@@ -114,7 +118,7 @@ SADMM_INLINE struct acting_joint joint_act(const sadmm_joint_def *def, const str
         struct joint_side *side = &acting.side[s];
         *side = joint_side_of(body[s], settings);
         start[s] = middle[s] = joint_end_on(&frame[s], side->rigid);
-        if (side->system_body >= 0) middle[s] = joint_end_halfway(&frame[s], side, settings->dt);
+        if (side->system_body >= 0 || side->steered) middle[s] = joint_end_halfway(&frame[s], side, settings->dt);
     }
     acting.start = joint_geometry_of(&start[0], &start[1], def->locks, radial);
     acting.middle = joint_geometry_of(&middle[0], &middle[1], def->locks, radial);
@@ -211,7 +215,7 @@ SADMM_INLINE struct joint_moving joint_moving_of(const sadmm_joint_def *def, con
 {
     const struct joint_side *a = &acting->side[0], *b = &acting->side[1];
     struct joint_moving m;
-    double middle = 0, free = 0;
+    double middle = 0, free = 0, steered = 0;
     int s;
     m.memory = memory;
     m.dt = settings->dt;
@@ -223,14 +227,19 @@ SADMM_INLINE struct joint_moving joint_moving_of(const sadmm_joint_def *def, con
     m.before = joint_rate(&acting->start, k, a->velocity, b->velocity);
     for (s = 0; s < 2; ++s) {
         double row[6];
-        if (acting->side[s].system_body < 0) continue;
+        if (acting->side[s].system_body < 0 && !acting->side[s].steered) continue;
         joint_step_row(acting, s, k, row);
+        if (acting->side[s].steered) {
+            steered += joint_row_product(row, acting->side[s].velocity);
+            continue;
+        }
         middle += joint_row_product(row, acting->side[s].velocity);
         free += joint_row_product(row, acting->side[s].free);
         m.response += joint_response(&acting->side[s], row);
     }
+    middle += steered, free += steered;
     m.turning = middle - m.before;
-    m.turned = memory->leads_stay ? 0 : m.turning;
+    m.turned = (memory->leads_stay ? 0 : m.turning) + steered; /* the solve's rates are of its bodies alone */
     m.reach = 2 * m.dt * max_of(fabs(m.before), fabs(free));
     return m;
 }

@@ -7,7 +7,7 @@
 
 static struct joint_body body_of(const sadmm_world *world, int32_t slot)
 {
-    struct joint_body out = {-1, NULL};
+    struct joint_body out = {-1, NULL, false};
     if (slot < 0) return out;
     const struct sadmm_world_body *body = &world->bodies[slot];
     out.rigid = &body->rigid;
@@ -20,7 +20,9 @@ static struct joint_body body_of(const sadmm_world *world, int32_t slot)
 static struct acting_joint prepare(const sadmm_world *world, const struct sadmm_world_joint *joint,
                                    const sadmm_settings *settings)
 {
-    const struct joint_body bodies[2] = {body_of(world, joint->body[0]), body_of(world, joint->body[1])};
+    struct joint_body bodies[2] = {body_of(world, joint->body[0]), body_of(world, joint->body[1])};
+    if (joint->coupling)
+        bodies[0] = (struct joint_body){-1, &world->couplings[joint->coupling - 1].next.target, true};
     return joint_act(&joint->def, joint->frame, bodies, settings);
 }
 
@@ -85,14 +87,14 @@ static bool add_constraints(sadmm_world *world, int32_t slot, const struct actin
 sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *settings)
 {
     sadmm_rows_clear(&world->start.rows);
-    world->joints_acting = 0;
+    world->joints_acting = world->couplings_acting = 0;
     for (size_t slot = 0; world->joint_count > 0 && slot < world->joint_slots; ++slot) {
         struct sadmm_world_joint *joint = &world->joints[slot];
         struct all_laws laws;
         if (!joint->alive || !joint->def.enabled) continue;
         const struct acting_joint acting = prepare(world, joint, settings);
         find_laws(joint, &acting, settings, &laws);
-        world->joints_acting += laws.count > 0;
+        if (laws.count > 0) ++*(joint->coupling ? &world->couplings_acting : &world->joints_acting);
         if (!add_constraints(world, (int32_t)slot, &acting, &laws, settings->dt))
             return sadmm_fail_memory(&world->error, "the joints' rows");
         joint_forget_forces(&joint->next); /* the solution tells */
@@ -128,6 +130,14 @@ sadmm_status sadmm_world_begin_joints(sadmm_world *world)
     return filter_pairs(world);
 }
 
+/* All rows of the joint have been kept. */
+static void end_joint(sadmm_world *world, struct sadmm_world_joint *joint, const struct acting_joint *acting)
+{
+    joint_end_wrench(&joint->next, &joint->def, acting->frame);
+    if (joint->coupling)
+        sadmm_coupling_keep(&world->couplings[joint->coupling - 1].next, joint->next.wrench, &acting->middle);
+}
+
 void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings)
 {
     const struct sadmm_rows *rows = &world->start.rows;
@@ -136,7 +146,7 @@ void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings)
     for (size_t r = 0; r < rows->row_count; ++r) {
         const struct sadmm_joint_source *source = &world->joint_sources[r];
         if (!joint || joint != &world->joints[source->joint]) {
-            if (joint) joint_end_wrench(&joint->next, &joint->def, acting.frame);
+            if (joint) end_joint(world, joint, &acting);
             joint = &world->joints[source->joint];
             acting = prepare(world, joint, settings);
             v3_store(acting.middle.point, joint->next.point);
@@ -144,7 +154,7 @@ void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings)
         const double force = source->sign * rows->lambda[r] / settings->dt;
         joint_keep_row(&joint->next, &acting.middle, source->role, source->coordinate, force);
     }
-    if (joint) joint_end_wrench(&joint->next, &joint->def, acting.frame);
+    if (joint) end_joint(world, joint, &acting);
 }
 
 static void commit_joint(struct sadmm_world_joint *joint)
