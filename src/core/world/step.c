@@ -132,6 +132,7 @@ static void commit(sadmm_world *world)
     const int threads = sadmm_pass_threads(world->plan.threads, (size_t)world->dynamic_count);
     sadmm_parallel(&world->team, threads, commit_share, world);
     sadmm_world_commit_joints(world);
+    sadmm_world_commit_couplings(world, world->def.settings.substeps);
     world->stepped = true;
     world->contacts_readable = true;
 }
@@ -194,6 +195,7 @@ static sadmm_status integrate(struct host_step *step)
         TRY(sadmm_world_move_joined(world, &step->settings));
         sadmm_world_keep_rows(world, &step->settings);
     }
+    sadmm_world_move_targets(world, step->settings.dt);
     add_substep(step);
     return check_next(world);
 }
@@ -250,6 +252,7 @@ static void report_step(const struct host_step *step)
         done.ms.total += phase == SADMM_PHASE_CERTIFY ? 0 : ms[phase];
     sadmm_world_report_steps(step->world, 1, &done);
     step->world->report.joints = step->world->joints_acting;
+    step->world->report.couplings = step->world->couplings_acting;
     step->world->report.certificate = solved->certificate;
     if (step->islands_above > solved->certificate.islands_above)
         step->world->report.certificate.islands_above = step->islands_above;

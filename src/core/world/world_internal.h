@@ -2,9 +2,10 @@
  *
  *   slots, pair_table, ids, report   lists and names
  *   gather                           what a step reads
+ *   coupling_step                    what couplings keep from step to step
  *   joint_rows, joint_move           joints as constraint rows, and where they let bodies go
  *   resident                         where a backend keeps the world
- *   shape, joint, body, contacts, explain   what callers see of it, and change
+ *   shape, joint, coupling, body, contacts, explain   what callers see of it, and change
  *   step, world                      steps; settings, the whole
  */
 #ifndef SADMM_CORE_WORLD_INTERNAL_H
@@ -14,13 +15,14 @@
 #include "core/base/check.h"
 #include "core/base/error.h"
 #include "core/base/parallel.h"
-#include "core/math/joint.h"
+#include "core/model/joint_law.h"
 #include "core/model/settings.h"
 #include "core/solve/certificate.h"
 #include "core/solve/kernels.h"
 #include "core/solve/schedule.h"
 #include "pair_table.h"
 #include "slots.h"
+#include "subadmm/coupling.h"
 #include "subadmm/joint.h"
 #include "subadmm/world.h"
 
@@ -44,43 +46,31 @@ struct sadmm_world_body {
     int64_t set_at[SADMM_BODY_EDITS]; /* steps enqueued since the world was loaded, when that was set; -1: before */
 };
 
-/* What acts along a coordinate of a joint, each by a row of its own. */
-enum sadmm_joint_role {
-    SADMM_ROLE_LOCK,
-    SADMM_ROLE_LOWER,
-    SADMM_ROLE_UPPER,
-    SADMM_ROLE_DRIVE,
-    SADMM_ROLE_FRICTION,
-    SADMM_ROLE_SPRING,
-    SADMM_ROLE_ARMATURE,
-    SADMM_ROLE_COUNT
-};
-
-/* What a joint keeps from step to step. */
-struct sadmm_joint_memory {
-    double force[SADMM_ROLE_COUNT][JOINT_COORDINATES]; /* on b along the coordinate: what the next step starts from */
-    double angle[JOINT_COORDINATES];                   /* of those that wind, at the step's start */
-    double wrench[6], point[3];                        /* as in sadmm_joint_state, on b */
-    double local[6];                                   /* the wrench along the axes of a's frame */
-    bool leads_stay;                                   /* its bodies were moved by the velocities of the step's end */
-    bool broken;                                       /* it gave more than it bears */
-};
-
-/* A joint slot. */
+/* A joint slot. That of a coupling is out of callers' sight: its frame a is the target, which is steered, and what acts
+ * are position drives of all coordinates. */
 struct sadmm_world_joint {
     bool alive;
     uint32_t generation;
+    int32_t coupling;       /* number of the coupling that it is of, from 1; 0: of none */
     sadmm_joint_def def;    /* locks: what is locked */
     int32_t body[2];        /* slots of a and b, -1: the static world */
     struct joint_frame frame[2];
     struct sadmm_joint_memory last, next; /* of the last step; of the one at hand, or a sub-step of it */
 };
 
-/* The joint's row that a row of the step is. */
-struct sadmm_joint_source {
-    int32_t joint; /* slot */
-    int8_t role, coordinate, sign;
-    double gap, slack; /* of limits: at the step's start, m or rad; what the turning of the row makes of it in a step */
+/* What a coupling keeps from step to step. */
+struct sadmm_coupling_memory {
+    struct sadmm_rigid target; /* its pose and velocity alone */
+    double felt[6], body[6];   /* as in sadmm_coupling_state; in the step at hand: sums over its sub-steps */
+};
+
+/* A coupling slot. */
+struct sadmm_world_coupling {
+    bool alive;
+    uint32_t generation;
+    sadmm_coupling_def def; /* its target is that in `last` */
+    size_t joint;           /* slot */
+    struct sadmm_coupling_memory last, next;
 };
 
 /* What the last step started from, for contacts, freeze and the certificate. */
@@ -113,8 +103,12 @@ struct sadmm_world {
 
     struct sadmm_world_joint *joints;
     size_t joint_slots, joint_capacity;
-    int32_t joint_count;
+    int32_t joint_count;                  /* live slots, those of couplings among them */
     struct sadmm_slot_marks joint_marks;
+    struct sadmm_world_coupling *couplings;
+    size_t coupling_slots, coupling_capacity;
+    int32_t coupling_count;
+    struct sadmm_slot_marks coupling_marks;
     struct sadmm_pair_table joined_pairs; /* bodies that do not meet for their joints; values: how many joints */
     uint64_t *filtered_pairs;             /* these and `disabled_pairs`, as of the last step */
     size_t filtered_count, filtered_capacity;
@@ -122,7 +116,7 @@ struct sadmm_world {
     int32_t *joint_labels;                    /* dynamic bodies: islands, at the end of a step with joints */
     uint8_t *joint_touch;                     /* of islands, at their labels (joint_move.c) */
     size_t joint_source_capacity, joint_label_capacity, joint_touch_capacity;
-    int32_t joints_acting;                    /* in the step at hand */
+    int32_t joints_acting, couplings_acting;  /* in the step at hand */
 
     /* The last step: everything freeze, contacts and the next warm start need. */
     struct sadmm_collision *collision;
@@ -179,6 +173,18 @@ struct sadmm_system sadmm_world_system(sadmm_world *world);
 /* SADMM_ERROR_NON_FINITE that names a dynamic body. */
 sadmm_status sadmm_world_not_finite(sadmm_world *world, int32_t body);
 
+/* ---- coupling_step.c ---- */
+
+/* What couplings kept of the last step into what they keep of this one. */
+void sadmm_world_begin_couplings(sadmm_world *world);
+/* Of a (sub-)step: the wrench on the body about b's point, at the geometry of its middle. */
+void sadmm_coupling_keep(struct sadmm_coupling_memory *memory, const double wrench[6],
+                         const struct joint_geometry *middle);
+/* A (sub-)step of dt is over: targets move on. */
+void sadmm_world_move_targets(sadmm_world *world, double dt);
+/* The step of so many sub-steps is done. */
+void sadmm_world_commit_couplings(sadmm_world *world, int substeps);
+
 /* ---- joint_rows.c ---- */
 
 /* Pairs of bodies that are not to meet, into `filtered_pairs`; and what joints kept of the last step into what they
@@ -190,12 +196,6 @@ sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *set
 void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings);
 /* The step is done. */
 void sadmm_world_commit_joints(sadmm_world *world);
-/* A joint's frame on a body, in the world; rigid NULL: on the static world. */
-struct joint_end sadmm_joint_end(const struct joint_frame *frame, const struct sadmm_rigid *rigid);
-/* A radial joint's coordinate 0 is a distance. */
-bool sadmm_joint_is_radial(sadmm_joint_kind kind);
-/* How fast a coordinate changes by the velocities of a and b (6 each). */
-double sadmm_joint_rate(const struct joint_geometry *geometry, int coordinate, const double *a, const double *b);
 
 /* ---- joint_move.c ---- */
 
@@ -245,6 +245,8 @@ struct sadmm_shape *sadmm_world_find_shape(const sadmm_world *world, sadmm_shape
                                            struct sadmm_error *error);
 struct sadmm_world_joint *sadmm_world_find_joint(const sadmm_world *world, sadmm_joint_id id, const char *argument,
                                                  struct sadmm_error *error);
+struct sadmm_world_coupling *sadmm_world_find_coupling(const sadmm_world *world, sadmm_coupling_id id,
+                                                       const char *argument, struct sadmm_error *error);
 
 /* ---- body.c ---- */
 
@@ -257,7 +259,11 @@ void sadmm_world_kill_shape(sadmm_world *world, size_t slot);
 
 /* ---- joint.c ---- */
 
-/* The joints of a body that is removed. */
+/* Put a joint that has been checked into a slot. */
+sadmm_status sadmm_world_insert_joint(sadmm_world *world, const struct sadmm_world_joint *joint, size_t *slot);
+/* With its coupling, if it is of one. */
+void sadmm_world_kill_joint(sadmm_world *world, size_t slot);
+/* The joints and couplings of a body that is removed. */
 void sadmm_world_kill_joints_of(sadmm_world *world, int32_t body);
 
 #endif
