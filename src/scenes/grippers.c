@@ -168,17 +168,16 @@ static sadmm_status add_gripper(const struct sadmm_scene *scene, sadmm_world *wo
 
 static sadmm_status fill(const struct sadmm_scene *scene, sadmm_world *world, struct sadmm_error *error)
 {
-    static const struct sadmm_pull pull = {
-        .stiffness = 2e4, .damping = 400, .turn_stiffness = 200, .turn_damping = 4, .force = 500, .torque = 20,
-    };
-    static const double centre[3] = {0, 0, 0};
+    sadmm_coupling_def gains = sadmm_coupling_def_default();
+    gains.linear_stiffness = 2e4, gains.linear_damping = 400, gains.max_force = 500;
+    gains.angular_stiffness = 200, gains.angular_damping = 4, gains.max_torque = 20;
     sadmm_status status = sadmm_place_plane(world, sadmm_frame_world(), 0.8, error);
     for (long i = 0; i < scene->n && status == SADMM_OK; ++i) status = add_gripper(scene, world, i, error);
     for (long i = 0; i < scene->n && status == SADMM_OK; ++i) {
         sadmm_body_id hand;
         status = sadmm_scene_world_error(world, sadmm_world_body_at(world, (int32_t)(1 + BODIES * i + PALM), &hand),
                                          error);
-        if (status == SADMM_OK) status = sadmm_add_pull(world, hand, centre, palm_at(scene, i, 0), &pull, error);
+        if (status == SADMM_OK) status = sadmm_add_pull(world, hand, palm_at(scene, i, 0), &gains, error);
     }
     return status;
 }
@@ -201,8 +200,7 @@ static sadmm_status before_step(const struct sadmm_scene *scene, sadmm_world *wo
             status = sadmm_scene_world_error(world, status, error);
         }
         if (status == SADMM_OK)
-            status = sadmm_move_pull(world, (int32_t)(2 * scene->n), (int32_t)i, palm_at(scene, i, t),
-                                     palm_at(scene, i, t + dt), dt, error);
+            status = sadmm_move_pull(world, (int32_t)i, palm_at(scene, i, t), palm_at(scene, i, t + dt), dt, error);
     }
     return status;
 }

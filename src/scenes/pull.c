@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "core/math/quat.h"
-#include "subadmm/joint.h"
 
 double sadmm_smooth(double x)
 {
@@ -12,48 +11,36 @@ double sadmm_smooth(double x)
     return t * t * t * (10 + t * (6 * t - 15));
 }
 
-/* The rotation vector of a turn. */
-static void turn_vector(const double orientation[4], double out[3])
+sadmm_status sadmm_add_pull(sadmm_world *world, sadmm_body_id body, struct sadmm_frame target,
+                            const sadmm_coupling_def *gains, struct sadmm_error *error)
 {
-    const double w = orientation[0], sign = w < 0 ? -1 : 1;
-    const double s = sqrt(fmax(0, 1 - w * w)), angle = 2 * atan2(s, fabs(w));
-    for (int k = 0; k < 3; ++k) out[k] = orientation[k + 1] * sign * (s > 1e-9 ? angle / s : 2);
+    sadmm_coupling_def def = *gains;
+    def.body = body;
+    memcpy(def.target_position, target.origin, sizeof def.target_position);
+    memcpy(def.target_orientation, target.orientation, sizeof def.target_orientation);
+    return sadmm_scene_world_error(world, sadmm_world_add_coupling(world, &def, NULL), error);
 }
 
-sadmm_status sadmm_add_pull(sadmm_world *world, sadmm_body_id body, const double offset[3], struct sadmm_frame target,
-                            const struct sadmm_pull *pull, struct sadmm_error *error)
+/* The angular velocity that turns one orientation into the other in dt (s), world frame, rad/s. */
+static void turn_rate(const double from[4], const double to[4], double dt, double rate[3])
 {
-    sadmm_joint_def def = sadmm_joint_def_default();
-    def.kind = SADMM_JOINT_CUSTOM;
-    def.body_b = body;
-    memcpy(def.position_b, offset, sizeof def.position_b);
-    double turn[3];
-    turn_vector(target.orientation, turn);
-    for (int k = 0; k < 6; ++k) {
-        def.coordinates[k].drive = SADMM_DRIVE_POSITION;
-        def.coordinates[k].target_position = k < 3 ? target.origin[k] : turn[k - 3];
-        def.coordinates[k].drive_stiffness = k < 3 ? pull->stiffness : pull->turn_stiffness;
-        def.coordinates[k].drive_damping = k < 3 ? pull->damping : pull->turn_damping;
-        def.coordinates[k].drive_force = k < 3 ? pull->force : pull->torque;
-    }
-    return sadmm_scene_world_error(world, sadmm_world_add_joint(world, &def, NULL), error);
+    const double back[4] = {from[0], -from[1], -from[2], -from[3]};
+    double turn[4];
+    q_store(q_mul(q_load(to), q_load(back)), turn);
+    const double sign = turn[0] < 0 ? -1 : 1, s = sqrt(turn[1] * turn[1] + turn[2] * turn[2] + turn[3] * turn[3]);
+    for (int k = 0; k < 3; ++k)
+        rate[k] = s > 0 ? sign * turn[k + 1] / s * 2 * atan2(s, sign * turn[0]) / dt : 0;
 }
 
-sadmm_status sadmm_move_pull(sadmm_world *world, int32_t joints, int32_t pull, struct sadmm_frame now,
-                             struct sadmm_frame next, double dt, struct sadmm_error *error)
+sadmm_status sadmm_move_pull(sadmm_world *world, int32_t index, struct sadmm_frame now, struct sadmm_frame next,
+                             double dt, struct sadmm_error *error)
 {
-    double from[3], to[3];
-    sadmm_joint_id id;
-    sadmm_joint_def def;
-    turn_vector(now.orientation, from);
-    turn_vector(next.orientation, to);
-    sadmm_status status = sadmm_world_joint_at(world, joints + pull, &id);
-    if (status == SADMM_OK) status = sadmm_world_joint_def(world, id, &def);
-    for (int k = 0; k < 6 && status == SADMM_OK; ++k) {
-        sadmm_joint_coordinate *c = &def.coordinates[k];
-        c->target_position = k < 3 ? now.origin[k] : from[k - 3];
-        c->target_speed = (k < 3 ? next.origin[k] - now.origin[k] : to[k - 3] - from[k - 3]) / dt;
-        status = sadmm_world_set_joint_coordinate(world, id, k, c);
-    }
+    double velocity[6];
+    sadmm_coupling_id id;
+    for (int k = 0; k < 3; ++k) velocity[k] = (next.origin[k] - now.origin[k]) / dt;
+    turn_rate(now.orientation, next.orientation, dt, velocity + 3);
+    sadmm_status status = sadmm_world_coupling_at(world, index, &id);
+    if (status == SADMM_OK)
+        status = sadmm_world_set_coupling_target(world, id, now.origin, now.orientation, velocity);
     return sadmm_scene_world_error(world, status, error);
 }

@@ -1,26 +1,20 @@
-/* Bodies that a scene's script leads by the hand: a frame on a body is drawn to a pose that the script moves, by springs
- * and dampers of limited force. */
+/* Bodies that a scene's script leads by the hand: virtual couplings (coupling.h) whose targets follow the script. */
 #ifndef SADMM_SCENES_PULL_H
 #define SADMM_SCENES_PULL_H
 
 #include "place.h"
-
-struct sadmm_pull {
-    double stiffness, damping;           /* N/m, N s/m */
-    double turn_stiffness, turn_damping; /* N m/rad, N m s/rad */
-    double force, torque;                /* at most, N, N m */
-};
+#include "subadmm/coupling.h"
 
 /* Smoothly from 0 at x = 0 to 1 at x = 1, with speed and acceleration 0 at both ends; constant beyond. */
 double sadmm_smooth(double x);
 
-/* Draw the frame at `offset` (m, body frame, not turned against the body) on `body` to `target`. Pulls are counted from
- * 0 in the order in which they are added; a scene adds its joints before its first pull. */
-sadmm_status sadmm_add_pull(sadmm_world *world, sadmm_body_id body, const double offset[3], struct sadmm_frame target,
-                            const struct sadmm_pull *pull, struct sadmm_error *error);
+/* Add a coupling as `gains` says (all but its body, target and frames, which are the body's own) that draws `body` to
+ * `target`. */
+sadmm_status sadmm_add_pull(sadmm_world *world, sadmm_body_id body, struct sadmm_frame target,
+                            const sadmm_coupling_def *gains, struct sadmm_error *error);
 
-/* Lead a pull: it is at `now` and will be at `next` after `dt` (s). `joints`: the scene's own. */
-sadmm_status sadmm_move_pull(sadmm_world *world, int32_t joints, int32_t pull, struct sadmm_frame now,
-                             struct sadmm_frame next, double dt, struct sadmm_error *error);
+/* Lead the world's coupling of this index: its target is at `now`, and at `next` after `dt` (s). */
+sadmm_status sadmm_move_pull(sadmm_world *world, int32_t index, struct sadmm_frame now, struct sadmm_frame next,
+                             double dt, struct sadmm_error *error);
 
 #endif
