@@ -194,7 +194,7 @@ static sadmm_status add_link(sadmm_world *world, struct sadmm_frame at, const st
     const bool along_x = part.shape.type == SADMM_SHAPE_CAPSULE;
     body.mass = part.mass;
     body.name = name;
-    for (int k = 0; k < 3; ++k) body.inertia[k] = inertia[along_x ? 2 - k : k];
+    for (int k = 0; k < 3; ++k) body.inertia[k] = fmax(part.shape.type != SADMM_SHAPE_BOX ? 1e-5 : 0, inertia[along_x ? 2 - k : k]);
     memcpy(body.position, middle.origin, sizeof body.position);
     memcpy(body.orientation, middle.orientation, sizeof body.orientation);
     memset(part.shape.position, 0, sizeof part.shape.position);
