@@ -105,7 +105,7 @@ static void set_finger(const struct finger *f, int first, struct link *links)
                            .part = box_part(pad_half, 1e-9, 0.01)};
     for (int k = 0; k < SADMM_FINGER_LINKS; ++k)
         l[k].drive = k == PAD ? muscle(0.5 * f->strength, 0.5 * f->strength)
-                              : muscle(12 * f->strength, 1.5 * f->strength);
+                              : muscle(20 * f->strength, 3 * f->strength);
     l[META].drive = l[KNUCKLE].drive = muscle(50, 10);
 }
 
