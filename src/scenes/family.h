@@ -47,5 +47,7 @@ extern const struct sadmm_scene_family sadmm_family_four_bar;
 extern const struct sadmm_scene_family sadmm_family_slider_crank;
 extern const struct sadmm_scene_family sadmm_family_grippers;
 extern const struct sadmm_scene_family sadmm_family_hand_demo;
+extern const struct sadmm_scene_family sadmm_family_kapla_tower;
+extern const struct sadmm_scene_family sadmm_family_jenga;
 
 #endif
