@@ -32,7 +32,7 @@ static void add_inertia(const struct sadmm_part *part, vec3 centre, double total
     }
 }
 
-/* Jacobi: turns the symmetric `a` into its eigenvalues on the diagonal and the unit quaternion `axes` to their frame. */
+/* Jacobi: leaves the eigenvalues of the symmetric `a` on its diagonal; `axes`: from their frame, unit quaternion. */
 static void diagonalize(double a[3][3], double axes[4])
 {
     static const double unit[4] = {1, 0, 0, 0};

@@ -49,5 +49,8 @@ extern const struct sadmm_scene_family sadmm_family_grippers;
 extern const struct sadmm_scene_family sadmm_family_hand_demo;
 extern const struct sadmm_scene_family sadmm_family_kapla_tower;
 extern const struct sadmm_scene_family sadmm_family_jenga;
+extern const struct sadmm_scene_family sadmm_family_bridge;
+extern const struct sadmm_scene_family sadmm_family_ragdolls;
+extern const struct sadmm_scene_family sadmm_family_mixer;
 
 #endif

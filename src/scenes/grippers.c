@@ -1,9 +1,9 @@
-/* N parallel-jaw grippers, each with an object in an environment of its own: they close on it, lift it by 0.2 m, shake it
- * for two seconds and hold it. Objects are boxes, balls and capsules of 0.2 to 1 kg, held by friction between two
+/* N parallel-jaw grippers, each with an object in an environment of its own: they close on it, lift it by 0.2 m, shake
+ * it for two seconds and hold it. Objects are boxes, balls and capsules of 0.2 to 1 kg, held by friction between two
  * fingers of 50 g.
  *
- * Forces: a finger's drive (2500 N/m, its target 12 mm inside the object) gives 30 N. Two fingers hold 2 mu 30 N = 48 N;
- * the heaviest object asks for m (g + a) = 1 kg (9.81 + 9) m/s^2, with a = (2 pi 3 Hz)^2 x 25 mm the shake's. */
+ * Forces: a finger's drive (2500 N/m, its target 12 mm inside the object) gives 30 N. Two hold 2 mu 30 N = 48 N; the
+ * heaviest object asks for m (g + a) = 1 kg (9.81 + 9) m/s^2, with a = (2 pi 3 Hz)^2 x 25 mm the shake's. */
 #include <math.h>
 
 #include "core/math/vec3.h"
@@ -256,7 +256,8 @@ const struct sadmm_scene_family sadmm_family_grippers = {
     .info = {
         .name = "grippers",
         .arguments = "[:N]",
-        .description = "N parallel-jaw grippers grasp, lift, shake and hold an object each (N in [1, 10000], default 16)",
+        .description = "N parallel-jaw grippers grasp, lift, shake and hold an object each (N in [1, 10000], "
+                       "default 16)",
         .duration = 5,
         .iterations = {[SADMM_METHOD_PAPER] = 100, [SADMM_METHOD_FAST] = 60},
     },

@@ -15,9 +15,12 @@ enum { X, Y, Z };
 /* ---- geometry, m ------------------------------------------------------------------------------------------------- */
 
 static const double palm_half[3] = {0.045, 0.04, 0.012};
-static const double grip_at[3] = {0.055, 0, -0.085}; /* the middle between the pads, in the palm's frame */
+static const double grip_at[3] = {0.055, 0, -0.085};    /* the middle between the pads, in the palm's frame */
 static const double pad_half[3] = {0.01, 0.007, 0.006}; /* along the finger, across it, thickness */
-static const double bone = 0.007;                    /* radius of the fingers' capsules */
+static const double bone = 0.007;                       /* radius of the fingers' capsules */
+/* kg m^2: of bones, which the flesh and tendons about them turn with. The bare bones' moments (2e-7) would take twice
+ * the iterations: what a joint's torque does to them is far more than what its force does. Pads have their own. */
+static const double least_moment = 1e-5;
 enum { META, KNUCKLE, PROXIMAL, MIDDLE, DISTAL, PAD };
 
 /* From its root in the palm a finger's first link goes to its knuckle; two more reach for the pad's place in the plane
@@ -69,12 +72,12 @@ static struct sadmm_part sphere_part(double radius, double mass)
     return part;
 }
 
-static struct sadmm_part box_part(const double half[3], double from, double mass)
+static struct sadmm_part box_part(const double half[3], double x, double mass)
 {
     struct sadmm_part part = {.shape = sadmm_shape_def_default(), .mass = mass};
     part.shape.type = SADMM_SHAPE_BOX;
     memcpy(part.shape.size, half, sizeof part.shape.size);
-    part.shape.position[0] = from + (from == 0 ? 0 : half[0]);
+    part.shape.position[0] = x;
     return part;
 }
 
@@ -102,7 +105,7 @@ static void set_finger(const struct finger *f, int first, struct link *links)
     l[DISTAL] = (struct link){.parent = first + MIDDLE, .offset = {f->middle, 0, 0}, .axis = Y,
                               .part = capsule_part(f->distal, bone, 0.015)};
     l[PAD] = (struct link){.parent = first + DISTAL, .offset = {f->distal, 0, 0}, .axis = Y,
-                           .part = box_part(pad_half, 1e-9, 0.01)};
+                           .part = box_part(pad_half, pad_half[0], 0.01)};
     for (int k = 0; k < SADMM_FINGER_LINKS; ++k)
         l[k].drive = k == PAD ? muscle(0.5 * f->strength, 0.5 * f->strength)
                               : muscle(20 * f->strength, 3 * f->strength);
@@ -191,10 +194,10 @@ static sadmm_status add_link(sadmm_world *world, struct sadmm_frame at, const st
     const double *centre = link->part.shape.position;
     const struct sadmm_frame middle = sadmm_frame_moved(at, centre[0], centre[1], centre[2]);
     sadmm_part_inertia(&part, inertia);
-    const bool along_x = part.shape.type == SADMM_SHAPE_CAPSULE;
+    const bool along_x = part.shape.type == SADMM_SHAPE_CAPSULE, box = part.shape.type == SADMM_SHAPE_BOX;
     body.mass = part.mass;
     body.name = name;
-    for (int k = 0; k < 3; ++k) body.inertia[k] = fmax(part.shape.type != SADMM_SHAPE_BOX ? 1e-5 : 0, inertia[along_x ? 2 - k : k]);
+    for (int k = 0; k < 3; ++k) body.inertia[k] = fmax(box ? 0 : least_moment, inertia[along_x ? 2 - k : k]);
     memcpy(body.position, middle.origin, sizeof body.position);
     memcpy(body.orientation, middle.orientation, sizeof body.orientation);
     memset(part.shape.position, 0, sizeof part.shape.position);

@@ -1,10 +1,10 @@
 /* The paper's hand demo: 281 bodies, of which 34 are a hand (hand.h) that follows a recorded motion (hand_motion.c) and
- * does at a table what a hand does: it lifts a golden cube of 1 kg and a body of 1.5 kg with fingertips of 10 g and holds
- * each for 5 s, picks a thin spoon from the table, puts a cube on another one and lets go, and pushes a toy car. Beside
- * it walls of small cubes stand, most of the scene's contacts.
+ * does at a table what a hand does: it lifts a golden cube of 1 kg and a body of 1.5 kg with fingertips of 10 g and
+ * holds each for 5 s, picks a thin spoon from the table, puts a cube on another one and lets go, and pushes a toy car.
+ * Beside it walls of small cubes stand, most of the scene's contacts.
  *
- * The paper gives the number of bodies, joints and contacts, masses and what there is to do, but no sizes: those are ours.
- * Nothing but friction holds what is lifted. */
+ * The paper gives the number of bodies, joints and contacts, masses and what there is to do, but no sizes: those are
+ * ours. Nothing but friction holds what is lifted. */
 #include <math.h>
 #include <string.h>
 
@@ -12,6 +12,7 @@
 #include "core/math/quat.h"
 #include "family.h"
 #include "hand_motion.h"
+#include "subadmm/coupling.h"
 #include "subadmm/joint.h"
 
 /* Bodies in order of creation. */
@@ -116,8 +117,10 @@ static sadmm_status place_car(sadmm_world *world, struct sadmm_error *error)
     return status;
 }
 
-/* Walls of cubes, each on two of the row below: five of nine rows, one of four; calls `place` for each cube. */
-static int wall_cubes(double centres[][3])
+enum { WALL_CUBES = 5 * 45 + 10 };
+
+/* Walls of cubes, each on two of the row below: five of nine rows, one of four. Returns how many that are. */
+static int wall_cubes(double centres[WALL_CUBES][3])
 {
     static const struct { double x, y; int rows; } walls[] = {
         {0.42, 0.1, 9}, {0.49, 0.1, 9}, {0.56, 0.1, 9}, {0.63, 0.1, 9}, {0.70, 0.1, 9}, {0.42, -0.15, 4},
@@ -136,7 +139,6 @@ static int wall_cubes(double centres[][3])
     }
     return count;
 }
-enum { WALL_CUBES = 5 * 45 + 10 };
 
 static sadmm_status place_table(sadmm_world *world, struct sadmm_error *error)
 {
@@ -163,7 +165,8 @@ static sadmm_status fill(const struct sadmm_scene *scene, sadmm_world *world, st
     const double apple_at[2] = {0.2, 0.45}, *golden = sadmm_golden_task.at, *stack = sadmm_stack_task.at;
     double centres[WALL_CUBES][3];
     (void)scene;
-    sadmm_status status = sadmm_place_plane(world, sadmm_frame_moved(sadmm_frame_world(), 0, 0, -table_height), 0.8, error);
+    const struct sadmm_frame ground = sadmm_frame_moved(sadmm_frame_world(), 0, 0, -table_height);
+    sadmm_status status = sadmm_place_plane(world, ground, 0.8, error);
     if (status == SADMM_OK) status = place_table(world, error);
     if (status == SADMM_OK) status = sadmm_add_hand(world, &grip, error);
     if (status == SADMM_OK) status = place_cube(world, golden[0], golden[1], golden_half, golden_half, 1, error);
@@ -210,34 +213,59 @@ static sadmm_status in_palm(sadmm_world *world, int32_t index, double at[3], dou
     return SADMM_OK;
 }
 
-/* What was lifted stays where it is in the palm. Memory: height at the start, place in the palm when it was lifted, the
- * lowest height and the largest way from that place since. */
-enum { START, PLACE, LOWEST = PLACE + 3, SLIP, MEMORY };
-
-static sadmm_status observe_held(sadmm_world *world, double t, double dt, int32_t index,
-                                 const struct sadmm_hand_task *about, double rise, struct sadmm_scene_task *task, double memory[MEMORY],
-                                 struct sadmm_error *error)
+/* What the hand feels of its weight and of what it holds, N. */
+static sadmm_status felt_weight(sadmm_world *world, double *weight, struct sadmm_error *error)
 {
-    double at[3], height;
-    if (t > 0 && (t < about->lifted - 1e-9 || task->finished)) return SADMM_OK;
-    sadmm_status status = in_palm(world, index, at, &height, error);
-    if (status != SADMM_OK) return status;
-    if (t == 0) {
-        memory[START] = height;
-        return SADMM_OK;
+    sadmm_coupling_id id;
+    sadmm_coupling_state state;
+    sadmm_status status = sadmm_world_coupling_at(world, 0, &id);
+    if (status == SADMM_OK) status = sadmm_world_coupling_state(world, id, &state);
+    *weight = -state.felt_force[2];
+    return sadmm_scene_world_error(world, status, error);
+}
+
+/* Something is lifted: by `rise` (m) it is off the table, where it stays in the palm. */
+struct lifting {
+    const struct sadmm_hand_task *when;
+    int32_t body;
+    double rise, mass; /* m, kg */
+};
+
+/* Memory: height at the start, place in the palm when it was lifted, the lowest height and the largest way from that
+ * place since, weight that was felt while it was held. */
+enum { START, PLACE, LOWEST = PLACE + 3, SLIP, WEIGHT, MEMORY };
+
+static sadmm_status observe_lifting(sadmm_world *world, double t, double dt, const struct lifting *about,
+                                    struct sadmm_scene_task *task, double memory[MEMORY], struct sadmm_error *error)
+{
+    double at[3], height, weight = 0;
+    if (t > 0 && (t < about->when->lifted - 1e-9 || task->finished)) return SADMM_OK;
+    if (t < about->when->held + 1e-9) {
+        sadmm_status status = in_palm(world, about->body, at, &height, error);
+        if (status == SADMM_OK && t > 0) status = felt_weight(world, &memory[WEIGHT], error);
+        if (status != SADMM_OK) return status;
+        if (t == 0) {
+            memory[START] = height;
+            return SADMM_OK;
+        }
+        if (memory[LOWEST] == 0) { /* heights in the hand are never 0 */
+            memcpy(memory + PLACE, at, sizeof at);
+            memory[LOWEST] = height;
+        }
+        memory[LOWEST] = fmin(memory[LOWEST], height);
+        memory[SLIP] = fmax(memory[SLIP], v3_norm(v3_sub(v3_load(at), v3_load(memory + PLACE))));
+        task->figures[0].value = memory[LOWEST] - memory[START];
+        task->figures[1].value = memory[SLIP];
+        task->figures[2].value = t - about->when->lifted;
     }
-    if (memory[LOWEST] == 0) { /* heights in the hand are never 0 */
-        memcpy(memory + PLACE, at, sizeof at);
-        memory[LOWEST] = height;
-    }
-    memory[LOWEST] = fmin(memory[LOWEST], height);
-    memory[SLIP] = fmax(memory[SLIP], v3_norm(v3_sub(v3_load(at), v3_load(memory + PLACE))));
-    task->figures[0].value = memory[LOWEST] - memory[START];
-    task->figures[1].value = memory[SLIP];
-    task->figures[2].value = t - about->lifted;
-    task->finished = t + dt > about->held + 1e-9; /* the last step of it */
-    task->passed = task->finished && memory[LOWEST] - memory[START] > 0.9 * rise && memory[SLIP] < 0.003;
-    return SADMM_OK;
+    if (t + dt <= about->when->released + 1e-9) return SADMM_OK;
+    /* The hand rests at both times: what it feels less is the weight. */
+    sadmm_status status = felt_weight(world, &weight, error);
+    task->figures[3].value = memory[WEIGHT] - weight;
+    task->finished = true;
+    task->passed = task->figures[0].value > 0.9 * about->rise && task->figures[1].value < 0.003 &&
+                   fabs(task->figures[3].value / (9.81 * about->mass) - 1) < 0.1;
+    return status;
 }
 
 /* The upper cube lies on the lower one, flat, and both rest. */
@@ -309,16 +337,19 @@ static sadmm_status observe_walls(sadmm_world *world, double t, struct sadmm_sce
 static sadmm_status observe(const struct sadmm_scene *scene, sadmm_world *world, int64_t step,
                             struct sadmm_scene_result *result, struct sadmm_error *error)
 {
-    static const struct sadmm_scene_task held = {
-        .figures = {{"lifted", "m", 0}, {"slip", "m", 0}, {"held", "s", 0}}, .figure_count = 3,
+    static const struct sadmm_scene_task lifted = {
+        .figures = {{"lifted", "m", 0}, {"slip", "m", 0}, {"held", "s", 0}, {"felt", "N", 0}}, .figure_count = 4,
     };
+    static const struct lifting golden = {&sadmm_golden_task, GOLDEN, 0.15, 1};
+    static const struct lifting heavy = {&sadmm_heavy_task, HEAVY, 0.13, 1.5};
+    static const struct lifting spoon = {&sadmm_spoon_task, SPOON, 0.1, 0.03};
     enum { GOLDEN_TASK, HEAVY_TASK, SPOON_TASK, STACK_TASK, CAR_TASK, WALLS_TASK, TASKS };
     const double dt = scene->def.settings.dt, t = (double)step * dt;
     struct sadmm_scene_task *tasks = result->tasks;
     double *memory = result->memory;
     if (step == 0) {
         result->task_count = TASKS;
-        tasks[GOLDEN_TASK] = tasks[HEAVY_TASK] = tasks[SPOON_TASK] = held;
+        tasks[GOLDEN_TASK] = tasks[HEAVY_TASK] = tasks[SPOON_TASK] = lifted;
         tasks[GOLDEN_TASK].name = "golden cube";
         tasks[HEAVY_TASK].name = "1.5 kg body";
         tasks[SPOON_TASK].name = "thin spoon";
@@ -332,11 +363,11 @@ static sadmm_status observe(const struct sadmm_scene *scene, sadmm_world *world,
         tasks[WALLS_TASK] =
             (struct sadmm_scene_task){.name = "walls", .figures = {{"moved", "m", 0}}, .figure_count = 1};
     }
-    sadmm_status status = observe_held(world, t, dt, GOLDEN, &sadmm_golden_task, 0.15, &tasks[GOLDEN_TASK], memory, error);
+    sadmm_status status = observe_lifting(world, t, dt, &golden, &tasks[GOLDEN_TASK], memory, error);
     if (status == SADMM_OK)
-        status = observe_held(world, t, dt, HEAVY, &sadmm_heavy_task, 0.13, &tasks[HEAVY_TASK], memory + MEMORY, error);
+        status = observe_lifting(world, t, dt, &heavy, &tasks[HEAVY_TASK], memory + MEMORY, error);
     if (status == SADMM_OK)
-        status = observe_held(world, t, dt, SPOON, &sadmm_spoon_task, 0.1, &tasks[SPOON_TASK], memory + 2 * MEMORY, error);
+        status = observe_lifting(world, t, dt, &spoon, &tasks[SPOON_TASK], memory + 2 * MEMORY, error);
     if (status == SADMM_OK) status = observe_stack(world, t, &tasks[STACK_TASK], error);
     if (status == SADMM_OK) status = observe_car(world, t, &tasks[CAR_TASK], memory + 3 * MEMORY, error);
     if (status == SADMM_OK) status = observe_walls(world, t, &tasks[WALLS_TASK], error);

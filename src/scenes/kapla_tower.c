@@ -1,7 +1,7 @@
 /* A tower of 102 planks, as in the tower test of SimBenchmark (github.com/leggedrobotics/SimBenchmark): six floors of
- * eight planks across and nine along them, which bridge the ones below by 25 mm at each end. All have 10 kg. The test asks
- * how many steps of 10 ms it stands, of 60,000: solvers that leave errors let it creep apart. It has no friction given;
- * here mu = 0.8. */
+ * eight planks across and nine along them, which lie on the ones below by 25 mm at each end. All have 10 kg. The test
+ * asks how many steps of 10 ms it stands, of 60,000: solvers that leave errors let it creep apart. It gives no
+ * friction; here mu = 0.8. */
 #include "built.h"
 #include "family.h"
 

@@ -87,7 +87,8 @@ struct sadmm_scene_result {
 };
 
 /* Look at the world: call before the first step (`step` = 0) and after every one (`step`: steps done). It waits for
- * steps begun where the scene has a measure, and does nothing where it has none. Errors: those of the world's read-outs. */
+ * steps begun where the scene has a measure, and does nothing where it has none. Errors: INVALID_ARGUMENT, those of the
+ * world's read-outs. */
 sadmm_status sadmm_scene_observe(const struct sadmm_scene *scene, sadmm_world *world, int64_t step,
                                  struct sadmm_scene_result *result, struct sadmm_error *error);
 
