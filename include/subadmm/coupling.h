@@ -3,8 +3,8 @@
  *
  * A coupling is a frame on a body and a target: a pose in the world with a velocity. A spring and a damper with six
  * degrees of freedom draw the frame to the target: with d from the target's origin to the frame's, phi the rotation
- * vector from the target's axes to the frame's, and v, w what the frame's point and axes move by, less what the target
- * would carry them along by,
+ * vector from the target's axes to the frame's, and v, w the velocity of the frame's origin and its angular velocity,
+ * less the target's,
  *
  *     force = -linear_stiffness d - linear_damping v          torque = -angular_stiffness phi - angular_damping w
  *
@@ -12,8 +12,8 @@
  * with any mass at any time step; and bounded, exactly. Method: docs/algorithm.md, section 10.
  *
  * The target's pose is that at the present time of the world; it moves on by its velocity in every (sub-)step, until it
- * is set anew. The caller feels what the target transmits, sadmm_coupling_state.felt_*. Worlds with couplings are
- * stepped by the host on every backend, as those with joints are.
+ * is set anew. The caller feels what the target transmits, sadmm_coupling_state.felt_*. On CUDA targets go along with the
+ * next step, which is not waited for.
  *
  * A coupling is no joint: joints' counts and ids do not have it. Threads and errors: as world.h says. Ids are values with
  * a generation, as bodies' are.
@@ -83,8 +83,7 @@ SADMM_API sadmm_status sadmm_world_set_coupling_enabled(sadmm_world *world, sadm
  * geometry of its middle: all 0 before the first one, and where the coupling did not take part. All in the world frame. */
 typedef struct sadmm_coupling_state {
     double felt_force[3], felt_torque[3]; /* what the user feels, the reaction to what the body gets: N, and N m about the
-                                             target's origin. With the target's velocity it makes the power that the
-                                             target takes up */
+                                             target's origin */
     double body_force[3], body_torque[3]; /* on the body: N, and N m about its centre of mass */
     double position_error[3];    /* from the frame's origin to the target's, m */
     double rotation_error[3];    /* rotation vector that turns the frame's axes to the target's, rad, of at most pi */

@@ -34,6 +34,15 @@ struct sadmm_joint_memory {
     bool broken;                                       /* it gave more than it bears */
 };
 
+/* A joint as a backend that keeps the world has it. */
+struct sadmm_resident_joint {
+    sadmm_joint_def def;
+    int32_t constraints;         /* that its rows may take, of up to six each */
+    int32_t body[2];             /* dynamic body; -1: it does not move, and its frame is in the world */
+    struct joint_frame frame[2];
+    int32_t coupling;            /* number of the coupling whose target its frame a is; -1: none */
+};
+
 /* The joint's row that a row of the step is. */
 struct sadmm_joint_source {
     int32_t joint;
@@ -45,6 +54,27 @@ struct sadmm_joint_source {
 SADMM_INLINE bool joint_is_radial(sadmm_joint_kind kind)
 {
     return kind == SADMM_JOINT_DISTANCE || kind == SADMM_JOINT_SPRING || kind == SADMM_JOINT_LINK;
+}
+
+/* A coordinate's fields as numbers, and back: what passes from the host to a device. */
+enum { JOINT_COORDINATE_NUMBERS = 14 };
+SADMM_INLINE void joint_coordinate_numbers(const sadmm_joint_coordinate *c, double x[JOINT_COORDINATE_NUMBERS])
+{
+    x[0] = c->limited ? 1 : 0, x[1] = c->lower, x[2] = c->upper;
+    x[3] = (double)(int)c->drive, x[4] = c->target_position, x[5] = c->target_speed;
+    x[6] = c->drive_stiffness, x[7] = c->drive_damping, x[8] = c->drive_force;
+    x[9] = c->friction;
+    x[10] = c->spring_stiffness, x[11] = c->spring_damping, x[12] = c->spring_rest;
+    x[13] = c->armature;
+}
+SADMM_INLINE void joint_coordinate_take(const double x[JOINT_COORDINATE_NUMBERS], sadmm_joint_coordinate *c)
+{
+    c->limited = x[0] != 0, c->lower = x[1], c->upper = x[2];
+    c->drive = (sadmm_drive)(int)x[3], c->target_position = x[4], c->target_speed = x[5];
+    c->drive_stiffness = x[6], c->drive_damping = x[7], c->drive_force = x[8];
+    c->friction = x[9];
+    c->spring_stiffness = x[10], c->spring_damping = x[11], c->spring_rest = x[12];
+    c->armature = x[13];
 }
 
 /* ---- bodies and geometry ------------------------------------------------------------------------------------------ */
@@ -107,6 +137,19 @@ SADMM_INLINE struct joint_end joint_end_halfway(const struct joint_frame *frame,
                         rigid_turn(q_load(side->rigid->orientation), v3_load(side->velocity + 3), dt / 2));
 }
 
+/* From a steered frame, translations are by its origin's velocity alone, along axes that stay where they are in the
+ * middle of the step: a damper that went round with the frame would push what is beside it outwards, without bound. */
+SADMM_INLINE void joint_hold_translations(const struct joint_end start[2], struct acting_joint *acting)
+{
+    const vec3 way = v3_sub(start[1].point, start[0].point);
+    int k;
+    acting->start.arm_a = acting->middle.arm_a = v3(0, 0, 0);
+    for (k = 0; k < 3; ++k) {
+        acting->start.axis[k] = acting->middle.axis[k];
+        acting->start.value[k] = v3_dot(acting->middle.axis[k], way);
+    }
+}
+
 SADMM_INLINE struct acting_joint joint_act(const sadmm_joint_def *def, const struct joint_frame frame[2],
                                            const struct joint_body body[2], const struct sadmm_settings *settings)
 {
@@ -123,6 +166,7 @@ SADMM_INLINE struct acting_joint joint_act(const sadmm_joint_def *def, const str
     acting.start = joint_geometry_of(&start[0], &start[1], def->locks, radial);
     acting.middle = joint_geometry_of(&middle[0], &middle[1], def->locks, radial);
     acting.frame = middle[0].orientation;
+    if (acting.side[0].steered) joint_hold_translations(start, &acting);
     return acting;
 }
 
@@ -263,9 +307,10 @@ SADMM_INLINE void joint_add_limits(struct joint_laws *laws, const struct joint_m
 SADMM_INLINE void joint_add_spring(struct joint_laws *laws, const struct joint_moving *m, int k, int role,
                                    double stiffness, double damping, double rest, double speed, double most)
 {
-    const double late = m->memory->leads_stay ? 1 : joint_late(stiffness, damping, m->response, m->dt);
+    const double own = joint_late(stiffness, damping, m->response, m->dt), late = m->memory->leads_stay ? 1 : own;
     double gain, bias;
-    joint_spring(stiffness, damping, m->value - rest, speed, m->before, m->dt, late, &gain, &bias);
+    joint_spring(stiffness, damping, m->value - rest, speed, m->before, m->dt, late,
+                 late + joint_lead(stiffness, damping, own, m->dt), &gain, &bias);
     joint_add_law(laws, m, role, k, 1, gain, bias + gain * m->turned, 1, -most, most, 0);
 }
 
@@ -302,6 +347,20 @@ SADMM_INLINE bool joint_has_coordinate(const sadmm_joint_def *def, int k)
     return k == 0 || def->locks >> k & 1 || !joint_is_radial(def->kind);
 }
 
+/* Most laws that the joint may have in a step. */
+SADMM_INLINE int joint_most_laws(const sadmm_joint_def *def)
+{
+    int count = 0, k;
+    for (k = 0; k < JOINT_COORDINATES; ++k) {
+        const sadmm_joint_coordinate *c = &def->coordinates[k];
+        if (!joint_has_coordinate(def, k)) continue;
+        count += def->locks >> k & 1 ? 1
+                                     : (c->limited ? 2 : 0) + (c->drive != SADMM_DRIVE_OFF) + (c->friction > 0) +
+                                           (c->spring_stiffness > 0 || c->spring_damping > 0) + (c->armature > 0);
+    }
+    return count;
+}
+
 /* ---- the solution -------------------------------------------------------------------------------------------------- */
 
 SADMM_INLINE void joint_forget_forces(struct sadmm_joint_memory *memory)
@@ -314,14 +373,14 @@ SADMM_INLINE void joint_forget_forces(struct sadmm_joint_memory *memory)
     }
 }
 
-/* A row's multiplier, as a force and as what it is in the world, about the joint's point. */
-SADMM_INLINE void joint_keep_row(struct sadmm_joint_memory *memory, const struct joint_geometry *middle, int role,
+/* A row's multiplier, as a force and as what it is in the world, about the joint's point; axis: in the middle of the
+ * step. */
+SADMM_INLINE void joint_keep_row(struct sadmm_joint_memory *memory, const vec3 axis[JOINT_COORDINATES], int role,
                                  int coordinate, double force)
 {
     int j;
     memory->force[role][coordinate] = force;
-    for (j = 0; j < 3; ++j)
-        memory->wrench[(coordinate < 3 ? 0 : 3) + j] += force * v3_part(middle->axis[coordinate], j);
+    for (j = 0; j < 3; ++j) memory->wrench[(coordinate < 3 ? 0 : 3) + j] += force * v3_part(axis[coordinate], j);
 }
 
 /* All rows of the joint are in its wrench. */

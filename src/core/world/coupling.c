@@ -168,6 +168,7 @@ sadmm_status sadmm_world_coupling_def(sadmm_world *world, sadmm_coupling_id id, 
     const struct sadmm_world_coupling *coupling = sadmm_world_find_coupling(world, id, "id", &world->error);
     if (!coupling) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(def, "def", &world->error));
+    TRY(sadmm_world_pull_joints(world));
     const struct sadmm_rigid *target = &coupling->last.target;
     *def = coupling->def;
     memcpy(def->target_position, target->position, sizeof def->target_position);
@@ -189,7 +190,7 @@ sadmm_status sadmm_world_set_coupling_target(sadmm_world *world, sadmm_coupling_
     TRY(sadmm_check_given(orientation, "orientation", error));
     TRY(check_target(names, position, orientation, velocity, &target, error));
     coupling->last.target = target;
-    return SADMM_OK;
+    return sadmm_world_take_edit(world, &world->joints[coupling->joint], SADMM_JOINT_TARGET);
 }
 
 /* Gains, limits and whether it acts: those of `def` from here on. */
@@ -197,7 +198,9 @@ static sadmm_status change(sadmm_world *world, struct sadmm_world_coupling *coup
 {
     TRY(check_numbers("", def, &world->error));
     coupling->def = *def;
-    set_drives(&world->joints[coupling->joint].def, def);
+    struct sadmm_world_joint *joint = &world->joints[coupling->joint];
+    set_drives(&joint->def, def);
+    for (int k = 0; k <= SADMM_JOINT_ENABLED; ++k) TRY(sadmm_world_take_edit(world, joint, (enum sadmm_joint_edit)k));
     return SADMM_OK;
 }
 
@@ -246,6 +249,7 @@ sadmm_status sadmm_world_coupling_state(sadmm_world *world, sadmm_coupling_id id
     if (!coupling) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(state, "state", &world->error));
     TRY(sadmm_world_pull_bodies(world));
+    TRY(sadmm_world_pull_joints(world));
     const struct sadmm_coupling_memory *last = &coupling->last;
     const struct sadmm_world_joint *joint = &world->joints[coupling->joint];
     const struct joint_end end = joint_end_on(&joint->frame[1], &world->bodies[joint->body[1]].rigid);

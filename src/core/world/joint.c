@@ -329,8 +329,14 @@ sadmm_status sadmm_world_joint_def(sadmm_world *world, sadmm_joint_id id, sadmm_
     const struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", &world->error);
     if (!joint) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(def, "def", &world->error));
+    TRY(sadmm_world_pull_joints(world));
     *def = joint->def;
     return SADMM_OK;
+}
+
+sadmm_status sadmm_world_take_edit(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit)
+{
+    return sadmm_world_edit_joint(world, joint, edit) ? SADMM_OK : sadmm_world_take_back(world);
 }
 
 sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id, bool enabled)
@@ -340,7 +346,7 @@ sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id
     if (!joint) return SADMM_ERROR_STALE_ID;
     joint->def.enabled = enabled;
     joint->last.broken = joint->last.broken && !enabled;
-    return SADMM_OK;
+    return sadmm_world_take_edit(world, joint, SADMM_JOINT_ENABLED);
 }
 
 sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id id, int32_t index,
@@ -357,7 +363,7 @@ sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id
                           joint->def.locks);
     TRY(check_coordinate("coordinate->", coordinate, error));
     joint->def.coordinates[index] = *coordinate;
-    return SADMM_OK;
+    return sadmm_world_take_edit(world, joint, (enum sadmm_joint_edit)index);
 }
 
 sadmm_status sadmm_world_place_joint(sadmm_world *world, sadmm_joint_def *def, const double position[3],
@@ -408,6 +414,7 @@ sadmm_status sadmm_world_joint_state(sadmm_world *world, sadmm_joint_id id, sadm
     if (!joint) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(state, "state", &world->error));
     TRY(sadmm_world_pull_bodies(world));
+    TRY(sadmm_world_pull_joints(world));
     const struct sadmm_joint_memory *last = &joint->last;
     memset(state, 0, sizeof *state);
     read_motion(world, joint, state);

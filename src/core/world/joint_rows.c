@@ -131,11 +131,12 @@ sadmm_status sadmm_world_begin_joints(sadmm_world *world)
 }
 
 /* All rows of the joint have been kept. */
-static void end_joint(sadmm_world *world, struct sadmm_world_joint *joint, const struct acting_joint *acting)
+static void end_joint(sadmm_world *world, struct sadmm_world_joint *joint, const struct acting_joint *acting, double dt)
 {
     joint_end_wrench(&joint->next, &joint->def, acting->frame);
     if (joint->coupling)
-        sadmm_coupling_keep(&world->couplings[joint->coupling - 1].next, joint->next.wrench, &acting->middle);
+        coupling_keep(&world->couplings[joint->coupling - 1].next, joint->next.wrench, acting->middle.point,
+                      acting->middle.arm_b, dt);
 }
 
 void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings)
@@ -146,15 +147,15 @@ void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings)
     for (size_t r = 0; r < rows->row_count; ++r) {
         const struct sadmm_joint_source *source = &world->joint_sources[r];
         if (!joint || joint != &world->joints[source->joint]) {
-            if (joint) end_joint(world, joint, &acting);
+            if (joint) end_joint(world, joint, &acting, settings->dt);
             joint = &world->joints[source->joint];
             acting = prepare(world, joint, settings);
             v3_store(acting.middle.point, joint->next.point);
         }
         const double force = source->sign * rows->lambda[r] / settings->dt;
-        joint_keep_row(&joint->next, &acting.middle, source->role, source->coordinate, force);
+        joint_keep_row(&joint->next, acting.middle.axis, source->role, source->coordinate, force);
     }
-    if (joint) end_joint(world, joint, &acting);
+    if (joint) end_joint(world, joint, &acting, settings->dt);
 }
 
 static void commit_joint(struct sadmm_world_joint *joint)

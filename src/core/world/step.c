@@ -242,6 +242,8 @@ static void report_step(const struct host_step *step)
         .iterations_mean = step->iterations,
         .converged = !step->unconverged,
         .limited = step->limited,
+        .joints = step->world->joints_acting,
+        .couplings = step->world->couplings_acting,
         .penetration_max = step->depth,
         .residual = solved->residual,
         .ms = {.collide = ms[SADMM_PHASE_COLLIDE], .assemble = ms[SADMM_PHASE_ASSEMBLE],
@@ -251,8 +253,6 @@ static void report_step(const struct host_step *step)
     for (int phase = 0; phase < SADMM_PHASE_COUNT; ++phase)
         done.ms.total += phase == SADMM_PHASE_CERTIFY ? 0 : ms[phase];
     sadmm_world_report_steps(step->world, 1, &done);
-    step->world->report.joints = step->world->joints_acting;
-    step->world->report.couplings = step->world->couplings_acting;
     step->world->report.certificate = solved->certificate;
     if (step->islands_above > solved->certificate.islands_above)
         step->world->report.certificate.islands_above = step->islands_above;

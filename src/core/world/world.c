@@ -69,7 +69,10 @@ void sadmm_world_destroy(sadmm_world *world)
                       world->start.impulse, world->last_start.rigid, world->last_start.velocity,
                       world->last_start.impulse, world->next, world->velocity, world->wrench, world->steady,
                       world->wrench_sum, world->slot_of,
-                      world->resident.steady, world->resident.edited, world->resident.edits};
+                      world->resident.steady, world->resident.edited, world->resident.edits,
+                      world->resident.joints, world->resident.memory, world->resident.joint_slots,
+                      world->resident.solution, world->resident.edited_joints,
+                      world->resident.coupling_memory};
     for (size_t i = 0; i < sizeof blocks / sizeof *blocks; ++i) sadmm_free(blocks[i]);
     sadmm_free(world);
 }

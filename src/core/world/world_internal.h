@@ -4,7 +4,7 @@
  *   gather                           what a step reads
  *   coupling_step                    what couplings keep from step to step
  *   joint_rows, joint_move           joints as constraint rows, and where they let bodies go
- *   resident                         where a backend keeps the world
+ *   resident_joints, resident        where a backend keeps the world
  *   shape, joint, coupling, body, contacts, explain   what callers see of it, and change
  *   step, world                      steps; settings, the whole
  */
@@ -15,6 +15,7 @@
 #include "core/base/check.h"
 #include "core/base/error.h"
 #include "core/base/parallel.h"
+#include "core/model/coupling_law.h"
 #include "core/model/joint_law.h"
 #include "core/model/settings.h"
 #include "core/solve/certificate.h"
@@ -46,6 +47,9 @@ struct sadmm_world_body {
     int64_t set_at[SADMM_BODY_EDITS]; /* steps enqueued since the world was loaded, when that was set; -1: before */
 };
 
+/* What may be set of a joint without loading the world again: its coordinates, 0 to 5, and (TARGET: of a coupling) */
+enum sadmm_joint_edit { SADMM_JOINT_ENABLED = JOINT_COORDINATES, SADMM_JOINT_TARGET, SADMM_JOINT_EDITS };
+
 /* A joint slot. That of a coupling is out of callers' sight: its frame a is the target, which is steered, and what acts
  * are position drives of all coordinates. */
 struct sadmm_world_joint {
@@ -56,12 +60,10 @@ struct sadmm_world_joint {
     int32_t body[2];        /* slots of a and b, -1: the static world */
     struct joint_frame frame[2];
     struct sadmm_joint_memory last, next; /* of the last step; of the one at hand, or a sub-step of it */
-};
-
-/* What a coupling keeps from step to step. */
-struct sadmm_coupling_memory {
-    struct sadmm_rigid target; /* its pose and velocity alone */
-    double felt[6], body[6];   /* as in sadmm_coupling_state; in the step at hand: sums over its sub-steps */
+    int32_t resident;       /* its number in the backend that keeps the world */
+    int32_t resident_constraints; /* that its rows may take there */
+    uint32_t edits;         /* bits of enum sadmm_joint_edit, as in a body */
+    int64_t set_at[SADMM_JOINT_EDITS];
 };
 
 /* A coupling slot. */
@@ -142,6 +144,7 @@ struct sadmm_world {
         struct sadmm_error failed; /* of a step that a call without a status waited for; SADMM_OK: none */
         bool bodies_behind;  /* the bodies above are older than the backend's */
         bool contacts_behind;
+        bool joints_behind;
         int64_t enqueued, done, repeats; /* steps since it was loaded: begun, done as far as known, repeated */
         int64_t kept_step;   /* steps and time of the bodies above */
         double kept_time;
@@ -149,6 +152,15 @@ struct sadmm_world {
         uint32_t *edited;    /* slots of bodies with `edits`; capacity: all dynamic ones */
         struct sadmm_resident_edit *edits; /* for the backend, when a step is enqueued */
         size_t steady_capacity, edited_count, edited_capacity, edit_capacity;
+        struct sadmm_resident_joint *joints; /* as they were loaded; */
+        struct sadmm_joint_memory *memory;   /* likewise, and as they are read; */
+        int32_t *joint_slots;                /* their slots */
+        struct sadmm_coupling_memory *coupling_memory; /* of those that are of couplings, in their order */
+        double *solution;                    /* of their rows */
+        uint32_t *edited_joints;             /* slots of joints with `edits`; capacity: all */
+        int32_t joint_count, joint_constraints, coupling_count;
+        size_t joint_capacity, memory_capacity, coupling_memory_capacity, joint_slot_capacity, solution_capacity, edited_joint_count,
+            edited_joint_capacity;
     } resident;
 
     const struct sadmm_kernels *kernels; /* chosen at the first step */
@@ -177,9 +189,6 @@ sadmm_status sadmm_world_not_finite(sadmm_world *world, int32_t body);
 
 /* What couplings kept of the last step into what they keep of this one. */
 void sadmm_world_begin_couplings(sadmm_world *world);
-/* Of a (sub-)step: the wrench on the body about b's point, at the geometry of its middle. */
-void sadmm_coupling_keep(struct sadmm_coupling_memory *memory, const double wrench[6],
-                         const struct joint_geometry *middle);
 /* A (sub-)step of dt is over: targets move on. */
 void sadmm_world_move_targets(sadmm_world *world, double dt);
 /* The step of so many sub-steps is done. */
@@ -225,7 +234,8 @@ void sadmm_world_settle_quietly(sadmm_world *world);
 /* Bring the bodies (or contacts and everything else) of the last step back, where the backend is ahead. */
 sadmm_status sadmm_world_pull_bodies(sadmm_world *world);
 sadmm_status sadmm_world_pull_contacts(sadmm_world *world);
-/* Both, and from here on the host's world is the one that counts: before anything but a state or a wrench is
+sadmm_status sadmm_world_pull_joints(sadmm_world *world);
+/* All of it, and from here on the host's world is the one that counts: before anything but a state or a wrench is
  * changed. */
 sadmm_status sadmm_world_take_back(sadmm_world *world);
 /* A dynamic body's state or wrench has been set: the next step takes it along. */
@@ -233,6 +243,22 @@ void sadmm_world_edit(sadmm_world *world, struct sadmm_world_body *body, enum sa
 /* Passes `status` on. After SADMM_ERROR_DEVICE the backend's context is given up, the host's world counts again, and
  * the next step begins with a new context. */
 sadmm_status sadmm_world_contain(sadmm_world *world, sadmm_status status);
+
+/* ---- resident_joints.c ---- */
+
+/* Joints of a world that is about to be loaded, into resident.joints and what is beside it. */
+sadmm_status sadmm_world_list_joints(sadmm_world *world);
+/* A joint's coordinate, whether it is enabled, or its target has been set: the next step takes it along. False: the backend has no
+ * room for its rows, the world is to be taken back. */
+bool sadmm_world_edit_joint(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit);
+/* Edits into resident.edits, from *count on. */
+sadmm_status sadmm_world_list_joint_edits(sadmm_world *world, size_t *count);
+void sadmm_world_forget_joint_edits(sadmm_world *world);
+/* As of bodies: what was set for steps that have not been done. */
+void sadmm_world_edit_joints_again(sadmm_world *world);
+/* What joints keep; the last step's rows. Nothing is enqueued. */
+sadmm_status sadmm_world_read_joints(sadmm_world *world);
+sadmm_status sadmm_world_read_rows(sadmm_world *world);
 
 /* ---- ids.c ---- */
 
@@ -259,6 +285,8 @@ void sadmm_world_kill_shape(sadmm_world *world, size_t slot);
 
 /* ---- joint.c ---- */
 
+/* Something of a joint has been set: the next step of the backend that keeps the world takes it along. */
+sadmm_status sadmm_world_take_edit(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit);
 /* Put a joint that has been checked into a slot. */
 sadmm_status sadmm_world_insert_joint(sadmm_world *world, const struct sadmm_world_joint *joint, size_t *slot);
 /* With its coupling, if it is of one. */
