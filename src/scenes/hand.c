@@ -17,14 +17,15 @@ enum { X, Y, Z };
 static const double palm_half[3] = {0.045, 0.04, 0.012};
 static const double grip_at[3] = {0.055, 0, -0.085};    /* the middle between the pads, in the palm's frame */
 static const double pad_half[3] = {0.01, 0.007, 0.006}; /* along the finger, across it, thickness */
-static const double bone = 0.007;                       /* radius of the fingers' capsules */
+static const double bone = 0.007, last_bone = 0.004;     /* radii; a finger's last bone is thinner than its pad */
 /* kg m^2: of bones, which the flesh and tendons about them turn with. The bare bones' moments (2e-7) would take twice
  * the iterations: what a joint's torque does to them is far more than what its force does. Pads have their own. */
 static const double least_moment = 1e-5;
 enum { META, KNUCKLE, PROXIMAL, MIDDLE, DISTAL, PAD };
 
 /* From its root in the palm a finger's first link goes to its knuckle; two more reach for the pad's place in the plane
- * y = const of the palm, the fourth and the pad point down. */
+ * y = const of the palm, the fourth points down and carries the pad in its middle, where it turns to lie flat on what it
+ * presses. */
 struct finger {
     double root[3], knuckle[3];     /* palm frame */
     double proximal, middle, distal; /* lengths */
@@ -34,11 +35,11 @@ struct finger {
 };
 
 static const struct finger fingers[SADMM_HAND_FINGERS] = {
-    {{-0.03, -0.045, -0.012}, {0.005, 0, -0.015}, 0.03, 0.03, 0.02, -1, -1, 4},
-    {{0, -0.027, 0}, {0.045, -0.027, 0}, 0.055, 0.045, 0.02, 1, 1, 1},
-    {{0, -0.009, 0}, {0.045, -0.009, 0}, 0.055, 0.045, 0.02, 1, 1, 1},
-    {{0, 0.009, 0}, {0.045, 0.009, 0}, 0.055, 0.045, 0.02, 1, 1, 1},
-    {{0, 0.027, 0}, {0.045, 0.027, 0}, 0.055, 0.045, 0.02, 1, 1, 1},
+    {{-0.03, -0.045, -0.012}, {0.005, 0, -0.015}, 0.03, 0.03, 0.03, -1, -1, 4},
+    {{0, -0.027, 0}, {0.045, -0.027, 0}, 0.055, 0.045, 0.03, 1, 1, 1},
+    {{0, -0.009, 0}, {0.045, -0.009, 0}, 0.055, 0.045, 0.03, 1, 1, 1},
+    {{0, 0.009, 0}, {0.045, 0.009, 0}, 0.055, 0.045, 0.03, 1, 1, 1},
+    {{0, 0.027, 0}, {0.045, 0.027, 0}, 0.055, 0.045, 0.03, 1, 1, 1},
 };
 
 /* One link: joined to `parent` (index, parents come first) at `offset` in the parent's frame, turned by `yaw` about the
@@ -103,13 +104,13 @@ static void set_finger(const struct finger *f, int first, struct link *links)
     l[MIDDLE] = (struct link){.parent = first + PROXIMAL, .offset = {f->proximal, 0, 0}, .axis = Y,
                               .part = capsule_part(f->middle, bone, 0.02)};
     l[DISTAL] = (struct link){.parent = first + MIDDLE, .offset = {f->middle, 0, 0}, .axis = Y,
-                              .part = capsule_part(f->distal, bone, 0.015)};
-    l[PAD] = (struct link){.parent = first + DISTAL, .offset = {f->distal, 0, 0}, .axis = Y,
-                           .part = box_part(pad_half, pad_half[0], 0.01)};
+                              .part = capsule_part(f->distal, last_bone, 0.015)};
+    l[PAD] = (struct link){.parent = first + DISTAL, .offset = {f->distal + pad_half[0], 0, 0}, .axis = Y,
+                           .part = box_part(pad_half, 0, 0.01)};
     for (int k = 0; k < SADMM_FINGER_LINKS; ++k)
         l[k].drive = k == PAD ? muscle(0.5 * f->strength, 0.5 * f->strength)
-                              : muscle(20 * f->strength, 3 * f->strength);
-    l[META].drive = l[KNUCKLE].drive = muscle(50, 10);
+                              : muscle(40 * f->strength, 3 * f->strength);
+    l[META].drive = l[KNUCKLE].drive = muscle(200, 20);
 }
 
 /* Palm, wrist (flexion, deviation, roll with the forearm), fingers. */

@@ -41,7 +41,7 @@ static struct sadmm_frame doll_at(long i)
 {
     struct sadmm_frame at = sadmm_frame_world();
     at = sadmm_frame_moved(at, 0.25 * cos(2.4 * (double)i), 0.25 * sin(2.4 * (double)i), 1.4 + 1.1 * (double)i);
-    at = sadmm_frame_turned(sadmm_frame_turned(at, 2, 1.3 * (double)i), 0, 1.2 + 0.3 * (double)(i % 3));
+    at = sadmm_frame_turned(sadmm_frame_turned(at, 2, 1.3 * (double)i), 1, 1.2 + 0.3 * (double)(i % 3));
     return sadmm_frame_moved(at, 0, 0, -1);
 }
 
