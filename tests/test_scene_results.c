@@ -74,7 +74,7 @@ START_TEST(grippers_hold_by_friction_alone)
     run_to_result(&scene, world, 0, 1000, &result);
     const struct sadmm_scene_task *task = find_task(&result, "hold");
     ck_assert(task->finished && !task->passed);
-    ck_assert_double_eq_tol(figure(task, "held"), 0, 0);
+    ck_assert_double_lt(figure(task, "held"), 0.5);
     sadmm_world_destroy(world);
 }
 END_TEST
@@ -140,7 +140,7 @@ START_TEST(the_hand_lifts_the_golden_cube)
 }
 END_TEST
 
-/* Pads that press with some 30 N from both sides carry 60 mu N of 10 N: with 0.05 the cube stays on the table. */
+/* Pads press with some 50 N from both sides and carry 100 mu N; the cube has 10 N: with 0.05 it stays on the table. */
 START_TEST(the_hand_holds_by_friction_alone)
 {
     const struct sadmm_scene scene = open_result_scene("hand_demo", SADMM_METHOD_FAST, SADMM_F32);
