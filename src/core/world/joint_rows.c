@@ -84,18 +84,47 @@ static bool add_constraints(sadmm_world *world, int32_t slot, const struct actin
     return true;
 }
 
+int32_t sadmm_joint_constraints(const struct sadmm_world_joint *joint)
+{
+    return joint->coupling ? 1 : (joint_most_laws(&joint->def) + SADMM_MAX_ROWS - 1) / SADMM_MAX_ROWS;
+}
+
+/* The constraints that the joint may have: those from `first` on that it has, and others without rows. */
+static bool add_slots(sadmm_world *world, const struct sadmm_world_joint *joint, size_t first)
+{
+    const size_t count = (size_t)sadmm_joint_constraints(joint), begin = world->joint_constraint_count;
+    const struct sadmm_rows *rows = &world->start.rows;
+    if (!sadmm_grow(&world->joint_constraints, &world->joint_constraint_capacity, begin, begin + count,
+                    sizeof *world->joint_constraints))
+        return false;
+    for (size_t k = 0; k < count; ++k)
+        world->joint_constraints[begin + k] =
+            first + k < rows->constraint_count
+                ? rows->constraints[first + k]
+                : (struct sadmm_row_constraint){.body_a = body_of(world, joint->body[0]).system_body,
+                                                .body_b = body_of(world, joint->body[1]).system_body};
+    world->joint_constraint_count += count;
+    return true;
+}
+
 sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *settings)
 {
     sadmm_rows_clear(&world->start.rows);
     world->joints_acting = world->couplings_acting = 0;
+    world->joint_constraint_count = 0;
     for (size_t slot = 0; world->joint_count > 0 && slot < world->joint_slots; ++slot) {
         struct sadmm_world_joint *joint = &world->joints[slot];
         struct all_laws laws;
-        if (!joint->alive || !joint->def.enabled) continue;
+        if (!joint->alive) continue;
+        const size_t before = world->start.rows.constraint_count;
+        if (!joint->def.enabled) {
+            if (!add_slots(world, joint, before)) return sadmm_fail_memory(&world->error, "the joints' rows");
+            continue;
+        }
         const struct acting_joint acting = prepare(world, joint, settings);
         find_laws(joint, &acting, settings, &laws);
         if (laws.count > 0) ++*(joint->coupling ? &world->couplings_acting : &world->joints_acting);
-        if (!add_constraints(world, (int32_t)slot, &acting, &laws, settings->dt))
+        if (!add_constraints(world, (int32_t)slot, &acting, &laws, settings->dt) || !add_slots(world, joint, before))
             return sadmm_fail_memory(&world->error, "the joints' rows");
         joint_forget_forces(&joint->next); /* the solution tells */
     }

@@ -6,15 +6,9 @@
 
 /* ---- to the backend ---------------------------------------------------------------------------------------------- */
 
-/* Couplings have room for all of their drives: gains of 0 may be set to others. */
-static int32_t constraints_of(const struct sadmm_world_joint *joint)
-{
-    return joint->coupling ? 1 : (joint_most_laws(&joint->def) + SADMM_MAX_ROWS - 1) / SADMM_MAX_ROWS;
-}
-
 static struct sadmm_resident_joint joint_for_backend(const sadmm_world *world, const struct sadmm_world_joint *joint)
 {
-    struct sadmm_resident_joint out = {.def = joint->def, .constraints = constraints_of(joint), .coupling = -1};
+    struct sadmm_resident_joint out = {.def = joint->def, .constraints = sadmm_joint_constraints(joint), .coupling = -1};
     for (int s = 0; s < 2; ++s) {
         const struct sadmm_world_body *body = joint->body[s] >= 0 ? &world->bodies[joint->body[s]] : NULL;
         out.body[s] = body ? body->system_body : -1;
@@ -76,7 +70,7 @@ static void mark(sadmm_world *world, struct sadmm_world_joint *joint, uint32_t e
 bool sadmm_world_edit_joint(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit)
 {
     if (!world->resident.loaded) return true;
-    if (constraints_of(joint) > joint->resident_constraints) return false;
+    if (sadmm_joint_constraints(joint) > joint->resident_constraints) return false;
     mark(world, joint, UINT32_C(1) << edit);
     joint->set_at[edit] = world->resident.enqueued;
     return true;

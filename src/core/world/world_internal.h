@@ -19,6 +19,7 @@
 #include "core/model/joint_law.h"
 #include "core/model/settings.h"
 #include "core/solve/certificate.h"
+#include "core/solve/joined.h"
 #include "core/solve/kernels.h"
 #include "core/solve/schedule.h"
 #include "pair_table.h"
@@ -115,6 +116,8 @@ struct sadmm_world {
     uint64_t *filtered_pairs;             /* these and `disabled_pairs`, as of the last step */
     size_t filtered_count, filtered_capacity;
     struct sadmm_joint_source *joint_sources; /* of the step's rows */
+    struct sadmm_row_constraint *joint_constraints; /* all that joints may have, in order; most have rows in the step */
+    size_t joint_constraint_count, joint_constraint_capacity;
     int32_t *joint_labels;                    /* dynamic bodies: islands, at the end of a step with joints */
     uint8_t *joint_touch;                     /* of islands, at their labels (joint_move.c) */
     size_t joint_source_capacity, joint_label_capacity, joint_touch_capacity;
@@ -167,6 +170,7 @@ struct sadmm_world {
     struct sadmm_context *context;
     char why[SADMM_WHY_SIZE];
     struct sadmm_certificate_workspace certificate_workspace;
+    struct sadmm_joined *joined; /* made with the first joint */
     sadmm_step_report report;
 };
 
@@ -199,6 +203,8 @@ void sadmm_world_commit_couplings(sadmm_world *world, int substeps);
 /* Pairs of bodies that are not to meet, into `filtered_pairs`; and what joints kept of the last step into what they
  * keep of this one. */
 sadmm_status sadmm_world_begin_joints(sadmm_world *world);
+/* The most constraints that a joint's rows may take; those of couplings have room for all of their drives. */
+int32_t sadmm_joint_constraints(const struct sadmm_world_joint *joint);
 /* Rows of the (sub-)step's joints into `start`, from the bodies there. */
 sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *settings);
 /* The solution's multipliers into what joints keep. */
