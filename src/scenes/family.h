@@ -45,6 +45,7 @@ extern const struct sadmm_scene_family sadmm_family_falling_chain;
 extern const struct sadmm_scene_family sadmm_family_chain;
 extern const struct sadmm_scene_family sadmm_family_four_bar;
 extern const struct sadmm_scene_family sadmm_family_slider_crank;
+extern const struct sadmm_scene_family sadmm_family_bricard;
 extern const struct sadmm_scene_family sadmm_family_grippers;
 extern const struct sadmm_scene_family sadmm_family_hand_demo;
 extern const struct sadmm_scene_family sadmm_family_kapla_tower;

@@ -147,7 +147,7 @@ static __device__ __forceinline__ void factor_level(const joined_part &p, int32_
             if (q <= k) block[at] = joined_updated(&p.d, place, place, place, k, q);
         }
         __syncwarp((unsigned)ALL_LANES);
-        if (p.lane == 0) joined_factor_diagonal(block);
+        if (p.lane == 0) joined_cholesky(block);
     }
     __syncthreads();
     for (int32_t b = p.d.s.first_below[first] + p.warp; b < p.d.s.first_below[end]; b += JOINED_WARPS) {
@@ -174,8 +174,8 @@ template <bool FORWARD> static __device__ __forceinline__ void solve_level(const
             own[p.lane] = FORWARD ? joined_forward_row(&p.d, place, p.lane) : joined_backward_row(&p.d, place, p.lane);
         __syncwarp((unsigned)ALL_LANES);
         if (p.lane == 0) {
-            if (FORWARD) dense6_forward(block, own, own);
-            else dense6_backward(block, own, own);
+            if (FORWARD) joined_forward(block, own);
+            else joined_backward(block, own);
         }
     }
     __syncthreads();
@@ -249,12 +249,27 @@ static __device__ __forceinline__ void store_part(const cuda_view &v, const join
     });
     each_row(p, [&](const struct sadmm_row_constraint *, int32_t r, int32_t, int) {
         const double lambda = finite ? joined_bounded(&p.d, r) : p.d.lambda[r];
-        if (after) v.joints.solution[r] = lambda;
-        else v.rows.data[r].lambda = (solver_real)lambda;
+        v.joints.solution[r] = lambda;
+        if (!after) v.rows.data[r].lambda = (solver_real)lambda;
     });
 }
 
-/* args.count: after the iterations. */
+/* Does a contact touch one of its bodies? */
+static __device__ __forceinline__ bool is_touched(const cuda_view &v, const joined_part &p,
+                                                  struct joined_shared *shared)
+{
+    if (p.thread == 0) shared->flag = 0;
+    __syncthreads();
+    each_body(p, [&](int32_t e) {
+        const int32_t slot = v.graph.slot_of[p.d.s.body[e]], first = v.graph.offsets[slot];
+        if (first < v.graph.offsets[slot + 1] && v.graph.incident[first] / 2 < v.contacts.pair_capacity)
+            shared->flag = 1; /* pairs come first */
+    });
+    __syncthreads();
+    return shared->flag != 0;
+}
+
+/* args.count: after the iterations; args.start: it ran before them, too. */
 static __global__ void __launch_bounds__(JOINED_THREADS)
     joined_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
@@ -263,6 +278,8 @@ static __global__ void __launch_bounds__(JOINED_THREADS)
     const bool after = args.count != 0;
     if (v.model.live->abort_code) return;
     const joined_part p = part_of_block(v);
+    /* what no contact touches is as it was solved before the iterations */
+    if (after && args.start && !is_touched(v, p, shared)) return;
     load_part(v, p, after);
     __syncthreads();
     find_missing(v, p);
@@ -294,6 +311,7 @@ sadmm_status CUDA(launch_joined)(struct sadmm_context *c, bool after, struct sad
     blocks.threads = JOINED_THREADS;
     blocks.shared = sizeof(struct joined_shared);
     args.count = after;
+    args.start = c->settings.warm_start;
     return CUDA(launch_partition)(c, joined_kernel, "joined bodies", &blocks, false, &args, error);
 }
 

@@ -149,7 +149,7 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
     }
     if (coordinate) {
         moving = joint_moving_of(def, &v.joints.before[j], &acting, lane, &settings);
-        joint_coordinate_laws(def, lane, &moving, &laws);
+        joint_coordinate_laws(def, lane, &moving, nullptr, &laws); /* worlds with tables are the host's */
     }
     int rows;
     const int at = place_laws(laws.count, coordinate && (def->locks >> lane & 1), lane, &rows);
