@@ -322,6 +322,7 @@ static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, con
     json_object_set_new(o, "scene", json_string(spec));
     json_object_set_new(o, "name", json_string(scene->info->name));
     json_object_set_new(o, "n", *scene->info->arguments ? json_integer(scene->n) : json_null());
+    json_object_set_new(o, "m", scene->m > 0 ? json_integer(scene->m) : json_null());
     json_object_set_new(o, "description", json_string(scene->info->description));
     json_object_set_new(o, "units", json_string(units));
     json_object_set_new(o, "duration", cli_json_real(scene->duration));
