@@ -358,7 +358,8 @@ SADMM_INLINE void joint_add_table_spring(struct joint_laws *laws, const struct j
                   own > 0 ? way.length : INFINITY);
 }
 
-/* Of coordinate k; table: of its spring, NULL where it has none. A locked one has one law; what is locked comes first in a joint's rows, for it is held together. */
+/* Of coordinate k; table: of its spring, NULL where it has none. A locked one has one law; what is locked comes first
+ * in a joint's rows, for it is held together. */
 SADMM_INLINE void joint_coordinate_laws(const sadmm_joint_def *def, int k, const struct joint_moving *m,
                                         const struct joint_table *table, struct joint_laws *laws)
 {

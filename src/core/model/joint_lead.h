@@ -62,9 +62,9 @@ SADMM_INLINE bool joint_contact_holds(const double normal[3], const struct sadmm
     return holds;
 }
 
-/* Does taking leads back carry the joint beyond a limit that it has just reached, or beyond where a spring's table stops
- * it? (A limit that presses all the time, a stone on a string, is met by the mean of both velocities, too.) row_a,
- * row_b: the row's Jacobians. */
+/* Does taking leads back carry the joint beyond a limit that it has just reached, or beyond where a spring's table
+ * stops it? (A limit that presses all the time, a stone on a string, is met by the mean of both velocities, too.)
+ * row_a, row_b: the row's Jacobians. */
 SADMM_INLINE bool joint_limit_jolts(const struct sadmm_joint_source *source, double lambda, const double row_a[6],
                                     const double row_b[6], const struct joint_lead bodies[2],
                                     const struct sadmm_settings *settings)
