@@ -12,8 +12,7 @@
  * docs/algorithm.md, section 10.
  *
  * Forces are along a coordinate, N for translations, N m for rotations; positive ones push b along the coordinate and a
- * against it. Worlds with joints are stepped by the host on every backend (CUDA: the solve is on the device, contacts
- * are found on the host).
+ * against it.
  *
  * Threads and errors: as world.h says. Ids are values with a generation, as bodies' are.
  */
@@ -118,12 +117,13 @@ SADMM_API sadmm_status sadmm_world_remove_joint(sadmm_world *world, sadmm_joint_
 SADMM_API int32_t sadmm_world_joint_count(const sadmm_world *world); /* also those not enabled; of NULL: 0 */
 /* The index-th live joint in order of creation slot, index in [0, joint_count). Errors: INVALID_ARGUMENT (range). */
 SADMM_API sadmm_status sadmm_world_joint_at(sadmm_world *world, int32_t index, sadmm_joint_id *id);
-/* Read back the definition as it is now. Errors: STALE_ID. */
+/* Read back the definition as it is now. Errors: STALE_ID, DEVICE. */
 SADMM_API sadmm_status sadmm_world_joint_def(sadmm_world *world, sadmm_joint_id id, sadmm_joint_def *def);
-/* From the next step on; what was broken is whole again when enabled. Errors: STALE_ID. */
+/* From the next step on; what was broken is whole again when enabled. On CUDA, here and below: goes along with the next
+ * step, which is not waited for. Errors: STALE_ID, DEVICE. */
 SADMM_API sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id, bool enabled);
 /* Replace what acts along a free coordinate, index in [0, 6), from the next step on. Errors: STALE_ID, INVALID_ARGUMENT
- * (range; the coordinate is locked, or the joint has none of that index; nothing changes). */
+ * (range; the coordinate is locked, or the joint has none of that index; nothing changes), DEVICE. */
 SADMM_API sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id id, int32_t index,
                                                         const sadmm_joint_coordinate *coordinate);
 

@@ -2,6 +2,7 @@
 #ifndef SUBADMM_SUBADMM_H
 #define SUBADMM_SUBADMM_H
 
+#include "coupling.h"
 #include "joint.h"
 #include "problem.h"
 #include "settings.h"

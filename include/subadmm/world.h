@@ -105,7 +105,7 @@ typedef struct sadmm_body_def {
 SADMM_API sadmm_body_def sadmm_body_def_default(void);
 /* *id: the new body. Errors: INVALID_ARGUMENT (range; nothing changes), LIMIT (2^27 bodies), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def, sadmm_body_id *id);
-/* Destroys its shapes too, and its joints (joint.h). Errors: STALE_ID. */
+/* Destroys its shapes too, its joints (joint.h) and its couplings (coupling.h). Errors: STALE_ID. */
 SADMM_API sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id);
 SADMM_API int32_t sadmm_world_body_count(const sadmm_world *world);      /* all, static ones included; of NULL: 0 */
 /* The index-th live body in order of creation slot, index in [0, body_count). Errors: INVALID_ARGUMENT (range). */
@@ -250,7 +250,7 @@ SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_s
 SADMM_API sadmm_status sadmm_world_step(sadmm_world *world);
 
 /* Begin a step and return without waiting for it, where the backend can: CUDA, in the method FAST from the second
- * step on; not in worlds with joints (joint.h) or kinematic bodies, not with a residual_tolerance, nor with a certificate_tolerance in
+ * step on; not in worlds with kinematic bodies, not with a residual_tolerance, nor with a certificate_tolerance in
  * the method PAPER or with more than 64 convergence checks a step. Elsewhere the same as sadmm_world_step. Steps run
  * in order, a few of them at a time; states, wrenches and settings set in between take effect at the next one.
  * Getters wait for the steps begun so far. Errors: as sadmm_world_step; they may be those of an earlier step, and
@@ -275,6 +275,7 @@ typedef struct sadmm_step_report {
     double time;                   /* simulated time after the step, s */
     int32_t bodies;                /* dynamic bodies */
     int32_t joints;                /* joints that took part (joint.h): enabled, with something locked or acting */
+    int32_t couplings;             /* couplings that took part (coupling.h): enabled, with gains */
     int32_t contacts;              /* contact points of the step */
     int32_t pairs;                 /* shape pairs with at least one contact */
     int iterations;                /* done; with a stop rule on CUDA (below): by the island that did most */

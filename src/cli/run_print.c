@@ -95,6 +95,7 @@ json_t *run_record_json(const struct run_record *record, const char *spec, const
     json_object_set_new(o, "method", json_string(cli_method_name(scene->def.settings.method)));
     json_object_set_new(o, "bodies", json_integer((json_int_t)record->body_count));
     set_or_null(o, "joints", record, json_integer(last->joints));
+    set_or_null(o, "couplings", record, json_integer(last->couplings));
     json_object_set_new(o, "contacts", contacts_json(record));
     json_object_set_new(o, "steps", json_integer((json_int_t)record->steps));
     json_object_set_new(o, "dt", cli_json_real(scene->def.settings.dt));

@@ -55,6 +55,10 @@ sadmm_status CUDA(read_bodies)(struct sadmm_context *, struct sadmm_rigid *, str
 sadmm_status CUDA(read_contacts)(struct sadmm_context *, struct sadmm_contact_set *, struct sadmm_error *);
 sadmm_status CUDA(read_start)(struct sadmm_context *, struct sadmm_rigid *, double *velocity, double *impulse,
                               struct sadmm_error *);
+sadmm_status CUDA(read_joints)(struct sadmm_context *, struct sadmm_joint_memory *, struct sadmm_coupling_memory *,
+                               struct sadmm_error *);
+sadmm_status CUDA(read_rows)(struct sadmm_context *, struct sadmm_rows *, double *solution, double *velocity,
+                             struct sadmm_error *);
 
 #ifdef __cplusplus
 }

@@ -29,9 +29,12 @@ static __device__ __forceinline__ bool as_planned(const model_view &model, const
     const struct cuda_graph_statistics *statistics = model.statistics;
     const struct cuda_step_guess guess = step.guess;
     const int32_t pairs = model.live->pairs, rows = plan_contact_rows(pairs, statistics->rough);
-    const int32_t warm = plan_mostly_warm(pairs, statistics->warm);
+    const bool joints = guess.rows >= 0;
+    const int32_t constraints = joints ? step.control->joints.constraints : 0;
+    const int32_t warm =
+        plan_mostly_warm(pairs + constraints, statistics->warm + (joints ? step.control->joints.warm : 0));
     return rows == guess.contact_rows && statistics->point_slots <= guess.point_slots &&
-           (guess.warm < 0 || warm == guess.warm);
+           (guess.warm < 0 || warm == guess.warm) && (!joints || guess.rows == (constraints > 0));
 }
 
 /* The grid's first thread compares the statistics with the plan; what runs now and what was assembled is of no use when

@@ -2,14 +2,14 @@
  *
  *     edit        states, wrenches and settings' numbers set since the last step (when there are any)
  *     start       where a solve starts from; bodies as collision sees them
- *     find        contacts, from one set into the other (collide/view.h); beside it A, b of the bodies
+ *     find        contacts, from one set into the other (collide/view.h); beside it A, b of the bodies, rows of joints
  *     admit       do they fit? Then they are this step's (cuda_live)
  *     statistics  of the constraint graph; islands (graph/layout.cu)
  *     layout      slots, sides, parts; beside it contacts in the solver's form
  *     penalties   C, beta, factors (fast: weights, C, factors); and: is this what the step was planned for?
  *     iterate     (15), new weights where asked for (the kernel table's own kernels); fast: convergence checks
  *     limit       fast: islands that have more energy than they may
- *     finish      impulses into the contacts, moved bodies, wrenches; beside it (16), (17)
+ *     finish      impulses into the contacts, moved bodies, wrenches; beside it (16), (17); then what joints keep
  *     commit      bodies whose island turns out to be another than they were taken for, again (step/move.h); the
  *                 report; the step counts only if nothing was aborted
  *
@@ -51,6 +51,11 @@ struct cuda_step_totals {
     unsigned long long stamps[STAMPS]; /* ns since the first sub-step began, without what comes between them */
 };
 
+/* Joints and couplings that take part, constraints of their rows, those that start with a multiplier other than 0. */
+struct cuda_joint_counts {
+    int32_t joints, couplings, constraints, warm;
+};
+
 /* Written by commit, read by the host. */
 struct cuda_step_report {
     int64_t sequence; /* steps enqueued before this one, failed ones included */
@@ -60,6 +65,7 @@ struct cuda_step_report {
     struct sadmm_cuda_contact_counts counts;
     struct cuda_graph_statistics statistics;
     double depth, primal, dual;
+    struct cuda_joint_counts joints; /* of the sub-step that contacts were found for last */
     struct cuda_step_totals totals;
 };
 
@@ -70,6 +76,7 @@ struct cuda_step_control {
     unsigned long long stamps[STAMPS]; /* of the sub-step */
     int32_t offending_body;
     int32_t substep;
+    struct cuda_joint_counts joints; /* of the sub-step */
     struct sadmm_cuda_contact_counts counts; /* of the last find that was not aborted */
     struct cuda_step_totals totals;
 };
@@ -78,7 +85,8 @@ struct cuda_step_control {
 struct cuda_step_guess {
     int32_t contact_rows; /* 0: no contacts */
     int32_t point_slots;
-    int32_t warm;         /* most pairs carry an impulse; -1: does not matter */
+    int32_t warm;         /* most pairs, and constraints of joints, carry an impulse; -1: does not matter */
+    int32_t rows;         /* there are constraints of joints; -1: there are no joints */
 };
 
 struct cuda_step_view {

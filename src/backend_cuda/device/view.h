@@ -233,6 +233,22 @@ struct raw_view {
     double *out; /* results */
 };
 
+/* Joints of a world (step/joints.cu). */
+struct joint_view {
+    int32_t count;
+    struct sadmm_resident_joint *joints;
+    const int32_t *first;           /* count: a joint's first constraint */
+    struct cuda_joint_middle *middle;
+    struct sadmm_joint_source *sources; /* constraints x SADMM_MAX_ROWS, as rows are; */
+    double *solution;                   /* likewise: multipliers */
+    double *velocity;                   /* bodies x 6: the solution's */
+    const struct sadmm_joint_memory *begin, *before; /* count: as the step began, the sub-step; */
+    struct sadmm_joint_memory *after;                /* as it ends */
+    const struct sadmm_coupling_memory *couplings_before; /* couplings: as the sub-step began; */
+    struct sadmm_coupling_memory *couplings_after;        /* as it ends */
+    int32_t *touch;                 /* bodies: at labels of islands bits (core/model/joint_lead.h) */
+};
+
 struct cuda_view {
     struct model_view model;
     struct body_view bodies;
@@ -243,7 +259,8 @@ struct cuda_view {
     struct island_view islands;
     struct iteration_view iteration;
     struct raw_view raw;
-    struct cuda_step_view step; /* whole steps alone */
+    struct cuda_step_view step; /* whole steps alone; */
+    struct joint_view joints;   /* likewise */
 };
 
 /* Programmatic dependent launch (launch_early): wait until all kernels enqueued before have ended. To be called before

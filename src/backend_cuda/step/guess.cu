@@ -21,6 +21,7 @@ struct preview {
     struct cuda_live live;
     struct cuda_graph_statistics statistics;
     struct sadmm_cuda_contact_counts counts;
+    struct cuda_joint_counts joints;
 };
 
 static sadmm_status preview_step(struct sadmm_context *c, struct preview *out, struct sadmm_error *error)
@@ -36,11 +37,13 @@ static sadmm_status preview_step(struct sadmm_context *c, struct preview *out, s
         CUDA(view_into)(c, s->into, 0);
         TRY(CUDA(clear_abort)(c, error));
         TRY(CUDA(launch_start)(c, error));
+        TRY(CUDA(launch_joint_rows)(c, error));
         TRY(CUDA(enqueue_find)(c, 0, error));
         TRY(CUDA(enqueue_statistics)(c, true, error));
         TRY(copy_out(c, &staged->live, c->view.model.live, sizeof staged->live, error));
         TRY(copy_out(c, &staged->statistics, c->view.model.statistics, sizeof staged->statistics, error));
         TRY(copy_out(c, &staged->counts, c->view.step.counts, sizeof staged->counts, error));
+        TRY(copy_out(c, &staged->joints, &c->view.step.control->joints, sizeof staged->joints, error));
         TRY(CUDA(wait)(c, error));
         *out = *staged;
         if (out->live.abort_code != ABORT_CAPACITY) return SADMM_OK;
@@ -52,20 +55,22 @@ static sadmm_status preview_step(struct sadmm_context *c, struct preview *out, s
 }
 
 struct substep_plan CUDA(plan_of)(const struct sadmm_context *c, int32_t pairs, int32_t points,
-                                  const struct cuda_graph_statistics *statistics)
+                                  const struct cuda_graph_statistics *statistics,
+                                  const struct cuda_joint_counts *joints)
 {
     const struct cuda_step *s = c->step;
     struct sadmm_plan plan = {};
     plan.bodies = s->bodies;
     plan.pairs = pairs;
     plan.points = points;
+    plan.row_constraints = joints->constraints;
     plan.contact_rows = plan_contact_rows(plan.points, statistics->rough);
     plan.rigid = true;
     plan.gyroscopic = c->plan.gyroscopic; /* since load */
     plan.threads = 1;
-    sadmm_plan_settle(&plan, &c->settings, plan_mostly_warm(plan.pairs, statistics->warm));
+    sadmm_plan_settle(&plan, &c->settings, plan_mostly_warm(plan.pairs + joints->constraints, statistics->warm + joints->warm));
     const int32_t warm = sadmm_plan_depends_on_warmth(&c->settings) ? plan.warm : -1;
-    const struct substep_plan out = {plan, plan.contact_rows, warm};
+    const struct substep_plan out = {plan, plan.contact_rows, warm, s->joints > 0 ? joints->constraints > 0 : -1};
     return out;
 }
 
@@ -87,7 +92,7 @@ static void plan_substeps(struct sadmm_context *c, struct preview *seen)
     struct learned *learned = &s->learned;
     if (learned->step != s->enqueued) learned->step = -1;
     const int known = learned->step >= 0 && learned->substep < substeps ? learned->substep : 0;
-    s->plans[0] = CUDA(plan_of)(c, seen->live.pairs, seen->live.points, &seen->statistics);
+    s->plans[0] = CUDA(plan_of)(c, seen->live.pairs, seen->live.points, &seen->statistics, &seen->joints);
     for (int k = known + 1; k < substeps; ++k) s->plans[k] = s->plans[known];
     c->plan = s->plans[0].plan;
     for (int k = 1; k < substeps; ++k) {
@@ -129,6 +134,7 @@ sadmm_status CUDA(guess_step)(struct sadmm_context *c, struct sadmm_error *error
                            : seen.statistics.point_slots <= 4 ? 4
                                                               : SADMM_MAX_POINTS;
     s->guess.warm = s->plans[0].warm;
+    s->guess.rows = s->plans[0].rows;
     CUDA(view_counts)(c, generous(seen.counts.pairs));
     c->view.model.points = 0; /* results are read elsewhere */
     seen.statistics.point_slots = s->guess.point_slots;

@@ -4,6 +4,8 @@
 #include "backend_cuda/device/double.h"
 
 #include "collision/bounds.h"
+#include "core/model/coupling_law.h"
+#include "core/model/joint_lead.h"
 
 #include "backend_cuda/device/plan_check.h"
 #include "move.h"
@@ -13,6 +15,27 @@ enum { STEP_THREADS = 64 }; /* a block: few, for long work and many multiprocess
 enum { TURN_THREADS = 256 }; /* more: bodies that are moved again have a thread each, side by side */
 
 /* ---- edits ----------------------------------------------------------------------------------------------------- */
+
+/* SADMM_EDIT_JOINT. A joint that is enabled again is whole again. */
+static __device__ __forceinline__ void edit_joint(const joint_view &joints, int32_t target, const double *values)
+{
+    const int32_t j = target / SADMM_JOINT_TARGETS, k = target % SADMM_JOINT_TARGETS;
+    sadmm_joint_def *def = &joints.joints[j].def;
+    if (k < JOINT_COORDINATES) {
+        joint_coordinate_take(values, &def->coordinates[k]);
+        return;
+    }
+    if (k > JOINT_COORDINATES) {
+        struct sadmm_rigid *target = &const_cast<struct sadmm_coupling_memory *>(
+            joints.couplings_before)[joints.joints[j].coupling].target;
+        for (int i = 0; i < 3; ++i) target->position[i] = values[i];
+        for (int i = 0; i < 4; ++i) target->orientation[i] = values[3 + i];
+        for (int i = 0; i < 6; ++i) target->velocity[i] = values[7 + i];
+        return;
+    }
+    def->enabled = values[0] != 0;
+    const_cast<struct sadmm_joint_memory *>(joints.begin)[j].broken &= !def->enabled;
+}
 
 /* A thread an edit: no two have the same kind and target. */
 static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
@@ -31,6 +54,7 @@ static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __
         kept->gravity = gravity_size(settings->gravity);
         return;
     }
+    if (edit->kind == SADMM_EDIT_JOINT) return edit_joint(v.joints, edit->target, values);
     struct sadmm_rigid *body = const_cast<struct sadmm_rigid *>(&v.step.before[edit->target]);
     if (edit->kind == SADMM_EDIT_STATE) {
         steady_place(const_cast<struct sadmm_steady *>(&v.step.steady_before[edit->target]), body, values, values + 3);
@@ -43,7 +67,9 @@ static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __
         for (int k = 0; k < 2; ++k) body->damping[k] = values[7 + k];
     }
 }
-static_assert((int)SADMM_EDIT_VALUES >= (int)SADMM_SETTING_NUMBERS && (int)SADMM_EDIT_VALUES >= 13, "every kind fits");
+static_assert((int)SADMM_EDIT_VALUES >= (int)SADMM_SETTING_NUMBERS && (int)SADMM_EDIT_VALUES >= 13 &&
+                  (int)SADMM_EDIT_VALUES >= (int)JOINT_COORDINATE_NUMBERS,
+              "every kind fits");
 
 /* ---- start ----------------------------------------------------------------------------------------------------- */
 
@@ -92,6 +118,7 @@ static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, co
         v.step.control->depth = 0;
         v.step.control->offending_body = INT32_MAX;
         v.step.control->stamps[STAMP_START] = nanoseconds();
+        v.step.control->joints = {0, 0, 0, 0};
     }
     if (i >= v.model.bodies) return;
     start_body(v, i, lane, &v.step.before[i], &v.step.steady_before[i]);
@@ -135,6 +162,36 @@ static __device__ __noinline__ void move_again(const cuda_view &v, int32_t i)
     store_moved(v, i, before, velocity, place, dt); /* finite, since both places were that it had to choose from */
 }
 
+/* Body i of an island with joints goes where these let it. */
+static __device__ __noinline__ void move_joined(const cuda_view &v, int32_t i, bool leads_stay)
+{
+    const body_before before = fetch_body(v.step, i);
+    const double dt = v.model.settings->dt;
+    double next[6], place[PLACE];
+    joint_move(&before.body, v.joints.velocity + 6 * (size_t)i, leads_stay, dt, place, place + 3, next);
+    store_moved(v, i, before, next, place, dt);
+}
+
+/* Joint j remembers how its bodies have been moved, once that is known. */
+static __device__ __forceinline__ void end_joints(const joint_view &joints, const graph_view &graph,
+                                                  const raw_view &raw, int32_t j)
+{
+    if (j >= joints.count || joints.joints[j].constraints == 0) return;
+    const struct sadmm_row_constraint *first = &raw.constraints[joints.first[j]];
+    if (first->count == 0) return;
+    joints.after[j].leads_stay =
+        joints.touch[graph.label[first->body_a >= 0 ? first->body_a : first->body_b]] & ISLAND_LEADS_STAY;
+}
+
+/* Body i, where its island has joints as they let it go; else again, if need be. */
+static __device__ __forceinline__ void move_once_more(const cuda_view &v, int32_t i, bool again, bool joined)
+{
+    const int32_t bits = joined ? v.joints.touch[v.graph.label[i]] : 0;
+    if (joined) load_end_velocity(v, i, v.joints.velocity + 6 * (size_t)i);
+    if (bits & ISLAND_JOINED) move_joined(v, i, bits & ISLAND_LEADS_STAY);
+    else if (again) move_again(v, i);
+}
+
 /* Are there bodies to be moved again (move.h)? */
 static __device__ __forceinline__ bool moves_again(const cuda_view &v)
 {
@@ -158,7 +215,7 @@ static __device__ struct cuda_step_totals totals_of(const cuda_view &v, const cu
     const struct cuda_step_totals none = {0, -1, 0, 0, 0, 0, {}};
     const struct cuda_step_control *control = v.step.control;
     struct cuda_step_totals totals = v.step.substep > 0 ? control->totals : none;
-    const bool constrained = control->counts.points > 0;
+    const bool constrained = control->counts.points > 0 || control->joints.constraints > 0;
     const int32_t limited = v.step.limits ? *v.islands.limited : 0, islands = v.model.statistics->islands;
     double iterations = constrained ? args.count : 1;
     if (args.checks > 0) {
@@ -187,15 +244,18 @@ static __global__ void __launch_bounds__(TURN_THREADS, 4)
     const int32_t lane = (int32_t)(t % START_LANES);
     struct cuda_step_control *control = v.step.control;
     if (v.model.live->abort_code) return;
-    const bool again = moves_again(v);
-    if (again && threadIdx.x < TURN_THREADS / START_LANES && own < v.model.bodies) move_again(v, (int32_t)own);
-    if (again) __syncthreads(); /* threads of a block start bodies that others of it have moved */
+    const bool again = moves_again(v), joined = v.joints.count > 0;
+    if ((again || joined) && threadIdx.x < TURN_THREADS / START_LANES && own < v.model.bodies)
+        move_once_more(v, (int32_t)own, again, joined);
+    if (joined) end_joints(v.joints, v.graph, v.raw, (int32_t)t);
+    if (again || joined) __syncthreads(); /* threads of a block start bodies that others of it have moved */
     if (t == 0) {
         control->stamps[STAMP_END] = nanoseconds();
         control->totals = totals_of(v, args);
         control->stamps[STAMP_START] = control->stamps[STAMP_END];
         const int32_t code = abort_of(ABORT_NONE, as_planned(v.model, v.step), control->offending_body);
         if (code) v.model.live->abort_code = code;
+        else control->joints = {0, 0, 0, 0};
     }
     if (i >= v.model.bodies) return;
     start_body(v, i, lane, &v.step.after[i], &v.step.steady_after[i]);
@@ -214,8 +274,9 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
     const int32_t i = (int32_t)(blockIdx.x * (unsigned)STEP_THREADS + threadIdx.x);
     wait_for_stream();
     /* Blocks that begin late may see what the first one says of the step: only where what they move is of no use. */
-    const bool again = !aborted && planned && moves_again(v);
-    if (again && i < v.model.bodies) move_again(v, i);
+    const bool on = !aborted && planned, again = on && moves_again(v), joined = on && v.joints.count > 0;
+    if ((again || joined) && i < v.model.bodies) move_once_more(v, i, again, joined);
+    if (joined) end_joints(v.joints, v.graph, v.raw, i);
     if (blockIdx.x > 0 || threadIdx.x > 0) return;
     struct cuda_step_report *report = &v.step.reports[control->sequence % STEPS_AHEAD];
     const int32_t offending_body = control->offending_body,
@@ -228,6 +289,7 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
     report->substep = control->substep;
     report->counts = control->counts;
     report->statistics = *v.model.statistics;
+    report->joints = control->joints;
     report->depth = double_of(control->depth);
     report->primal = v.step.measured ? double_of(v.iteration.residual[0]) : -1;
     report->dual = v.step.measured ? double_of(v.iteration.residual[1]) : -1;
@@ -255,7 +317,8 @@ sadmm_status CUDA(launch_start)(struct sadmm_context *c, struct sadmm_error *err
 sadmm_status CUDA(launch_turn)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    const int64_t blocks = (int64_t)c->view.model.bodies * START_LANES / TURN_THREADS + 1;
+    const int64_t bodies = (int64_t)c->view.model.bodies * START_LANES, joints = c->view.joints.count,
+                  blocks = (bodies > joints ? bodies : joints) / TURN_THREADS + 1;
     args.checks = c->checks;
     args.count = c->settings.iterations;
     return CUDA(launch_of)(c, turn_kernel, "turn", blocks, TURN_THREADS, &args, error);
@@ -272,6 +335,7 @@ sadmm_status CUDA(launch_commit)(struct sadmm_context *c, struct sadmm_error *er
     cuda_args args = {};
     args.checks = c->checks;
     args.count = c->settings.iterations;
-    const int64_t blocks = c->view.step.limits ? (int64_t)(c->view.model.bodies - 1) / STEP_THREADS + 1 : 1;
+    const int64_t joints = c->view.joints.count, bodies = c->view.step.limits || joints ? c->view.model.bodies : 1,
+                  blocks = ((bodies > joints ? bodies : joints) - 1) / STEP_THREADS + 1;
     return CUDA(launch_early)(c, commit_kernel, "commit", blocks, STEP_THREADS, &args, error);
 }

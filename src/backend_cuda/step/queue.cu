@@ -89,7 +89,8 @@ static void learn(struct sadmm_context *c, int64_t first, const struct cuda_step
         return; /* there are no statistics of it */
     }
     CUDA(merge_statistics)(&learned->statistics, &report->statistics);
-    s->plans[report->substep] = CUDA(plan_of)(c, report->counts.pairs, report->counts.points, &report->statistics);
+    s->plans[report->substep] = CUDA(plan_of)(c, report->counts.pairs, report->counts.points, &report->statistics,
+                                         &report->joints);
     learned->substep = std::max(learned->substep, report->substep);
 }
 
@@ -110,8 +111,7 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
     TRY(CUDA(clear_abort)(c, error));
     TRY(CUDA(wait)(c, error));
     if (report->abort_code == ABORT_NON_FINITE) {
-        s->offending_body =
-            report->offending_body >= s->bodies ? report->offending_body - s->bodies : report->offending_body;
+        s->offending_body = report->offending_body % s->bodies; /* by its state, a contact, or a joint */
         drop_steps(c, first, end);
         return sadmm_fail(error, SADMM_ERROR_NON_FINITE, "the solve gave a velocity or multiplier that is not finite");
     }

@@ -34,6 +34,9 @@ void CUDA(report_step)(const struct sadmm_context *c, struct sadmm_resident_repo
     out->converged = totals->met == share.substeps;
     if (out->converged) out->iterations = totals->most_iterations;
     out->limited = totals->limited;
+    out->joints = last->joints.joints;
+    out->couplings = last->joints.couplings;
+    out->plan.row_constraints = last->joints.constraints;
     out->penetration_max = last->depth;
     out->residual.primal = last->primal;
     out->residual.dual = last->dual;

@@ -56,27 +56,35 @@ static void view_substep(struct sadmm_context *c, int substep)
     c->plan = plan->plan;
     s->guess.contact_rows = plan->contact_rows;
     s->guess.warm = plan->warm;
+    s->guess.rows = plan->rows;
     c->view.model.contact_rows = plan->contact_rows == 1 ? 1 : 3;
     CUDA(view_into)(c, s->into, substep);
     c->prologue = c->fast && !c->plan.residuals && c->view.rows.count == 0 && c->view.model.contact_rows == 3 &&
                   CUDA(persistent_does_prologue)(&c->partition);
 }
 
-/* A and b of the bodies: beside contact finding, of which they need nothing. */
+/* A and b of the bodies, and rows of joints: beside contact finding, of which they need nothing. */
 static sadmm_status record_bodies(struct sadmm_context *c, struct sadmm_error *error)
 {
     side_branch side(c);
     CUDA_CALL(c, side.code, "a branch of the step");
-    return CUDA(enqueue_bodies)(c, error);
+    TRY(CUDA(enqueue_bodies)(c, error));
+    if (c->view.joints.count == 0) return SADMM_OK;
+    TRY(CUDA(launch_joint_rows)(c, error));
+    CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
+    return SADMM_OK;
 }
 
 /* Graph statistics and layout; beside them contacts in the solver's form, and what weights take from pairs. */
 static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *error)
 {
+    if (c->view.joints.count > 0) /* the graph is of their rows, too */
+        CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
     {
         side_branch side(c);
         CUDA_CALL(c, side.code, "a branch of the step");
         TRY(CUDA(assemble_contacts)(c, error));
+        TRY(CUDA(assemble_rows)(c, error));
         CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
     }
     TRY(CUDA(enqueue_statistics_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
@@ -114,6 +122,7 @@ static sadmm_status record_finish(struct sadmm_context *c, bool residuals, struc
         CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
     }
     TRY(CUDA(launch_finish)(c, error));
+    TRY(CUDA(launch_joint_solution)(c, error));
     if (residuals) CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
     return SADMM_OK;
 }
@@ -155,8 +164,8 @@ static sadmm_status record_stage(struct sadmm_context *c, const struct sadmm_sta
     case SADMM_STAGE_SOLUTION: /* INTEGRATE reads it where it is, */
     case SADMM_STAGE_WRENCHES: /* and adds up wrenches */
     case SADMM_STAGE_CERTIFY:  /* by the host, afterwards */
-    case SADMM_STAGE_PREDICT:  /* worlds are not loaded before their first step, */
-    case SADMM_STAGE_ROWS:     /* and have none */
+    case SADMM_STAGE_ROWS:     /* beside PLAN */
+    case SADMM_STAGE_PREDICT:  /* worlds are not loaded before their first step */
     default: return SADMM_OK;
     }
 }

@@ -43,6 +43,7 @@ void CUDA(view_into)(struct sadmm_context *c, int into, int substep)
     c->view.raw.system.velocity = step->start_velocity;
     c->view.raw.pairs = set.pairs;
     c->view.raw.points = set.points;
+    CUDA(view_joints)(c, into, substep);
 }
 
 /* Counts and settings of the view; pairs: their capacity. */
@@ -56,7 +57,7 @@ void CUDA(view_counts)(struct sadmm_context *c, int64_t pairs)
     v->raw.system.body_count = s->bodies;
     v->model.bodies = s->bodies;
     v->contacts.pair_capacity = (int32_t)((pairs + WARP - 1) / WARP * WARP);
-    v->rows.count = 0;
+    v->rows.count = s->joint_constraints;
     v->model.contact_rows = s->guess.contact_rows == 1 ? 1 : 3;
     v->model.warm_start = c->settings.warm_start;
 }
@@ -162,6 +163,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     TRY(CUDA(upload)(c, buffer<struct sadmm_steady>(c, BUFFER_WORLD_STEADY) + before * n, PINNED_BODIES, 0,
                      world->steady, n * sizeof *world->steady, error));
     TRY(CUDA(wait)(c, error));
+    TRY(CUDA(load_joints)(c, world, error));
     CUDA(view_counts)(c, 0);
     TRY(CUDA(reserve_layout)(c, error)); /* live is needed from here on */
     TRY(CUDA(clear_abort)(c, error));

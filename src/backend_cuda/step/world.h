@@ -24,7 +24,7 @@ struct queued_step {
 /* What a sub-step is planned to be. */
 struct substep_plan {
     struct sadmm_plan plan;
-    int32_t contact_rows, warm; /* as in cuda_step_guess */
+    int32_t contact_rows, warm, rows; /* as in cuda_step_guess */
 };
 
 /* From the reports of a step that failed in a later sub-step. */
@@ -38,6 +38,7 @@ struct learned {
 struct cuda_step {
     struct sadmm_cuda_collision *collision;
     int32_t bodies, slots;
+    int32_t joints, joint_constraints, couplings;
 
     bool planned;               /* capacities, partition and guess are for the world as it is */
     bool recorded;              /* and so are the graphs */
@@ -91,7 +92,8 @@ sadmm_status CUDA(clear_abort)(struct sadmm_context *, struct sadmm_error *error
 sadmm_status CUDA(guess_step)(struct sadmm_context *, struct sadmm_error *error);
 /* guess.cu: the plan of a step, of this many pairs and points with these statistics, or a sub-step. */
 struct substep_plan CUDA(plan_of)(const struct sadmm_context *, int32_t pairs, int32_t points,
-                                  const struct cuda_graph_statistics *statistics);
+                                  const struct cuda_graph_statistics *statistics,
+                                  const struct cuda_joint_counts *joints);
 /* guess.cu: *a becomes what a partition for both needs. */
 void CUDA(merge_statistics)(struct cuda_graph_statistics *a, const struct cuda_graph_statistics *b);
 /* record.cu: contacts, up to the gate. */
@@ -109,5 +111,12 @@ sadmm_status CUDA(launch_turn)(struct sadmm_context *, struct sadmm_error *error
 sadmm_status CUDA(launch_admit)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_finish)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_commit)(struct sadmm_context *, struct sadmm_error *error);
+
+/* joints.cu: take over a world's joints; where they are in a sub-step of the step that ends in `into`. */
+sadmm_status CUDA(load_joints)(struct sadmm_context *, const struct sadmm_resident_world *, struct sadmm_error *error);
+void CUDA(view_joints)(struct sadmm_context *, int into, int substep);
+/* joints.cu: rows of the (sub-)step; what its solution says of joints. */
+sadmm_status CUDA(launch_joint_rows)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_joint_solution)(struct sadmm_context *, struct sadmm_error *error);
 
 #endif

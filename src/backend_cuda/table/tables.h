@@ -33,6 +33,8 @@
             .read_bodies = sadmm_cuda_read_bodies##suffix,     \
             .read_contacts = sadmm_cuda_read_contacts##suffix, \
             .read_start = sadmm_cuda_read_start##suffix,       \
+            .read_joints = sadmm_cuda_read_joints##suffix,     \
+            .read_rows = sadmm_cuda_read_rows##suffix,         \
         },                                                     \
     }
 

@@ -85,6 +85,7 @@ static __device__ void weigh_rows(const cuda_view &v, int32_t k, bool first, dou
 {
     const row_constraint about = v.rows.constraints[k];
     row_data *rows = v.rows.data + (size_t)k * SADMM_MAX_ROWS;
+    if (about.rows == 0) return; /* a joint may have fewer than there is room for */
     cuda_island *island =
         &v.islands.info[v.graph.label[is_dynamic(v.model, about.body_a) ? about.body_a : about.body_b]];
     struct weight_row_sums sums = {0, 0, 0};

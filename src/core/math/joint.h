@@ -191,8 +191,10 @@ SADMM_INLINE double joint_feedback(double error, double dt, double most)
  * keeps energy, where the step resolves it; what is stiffer than that is taken more and more at the end of the step,
  * so that it does not ring: `late` from 0 to 1,
  *
- *     q* = q + dt ((1 - late) (x_0 + x) / 4 + late x),     x* = (1 - t) x_0 + t x,  t = (1 + late) / 2
+ *     q* = q + dt ((1 - late) (x_0 + x) / 4 + lead x),     x* = (1 - t) x_0 + t x,  t = (1 + late) / 2
  *
+ * lead: `late`, but for what is stiff and has no damping to speak of, which is late / JOINT_FEEDBACK: without bound it
+ * is the row of what is locked. joint_late is the share of the former, joint_lead what the latter adds.
  * with the coordinate q and its rate x_0 at the start and x at the end of the step. response: the row's J A^-1 J^T. */
 SADMM_INLINE double joint_late(double stiffness, double damping, double response, double dt)
 {
@@ -200,12 +202,17 @@ SADMM_INLINE double joint_late(double stiffness, double damping, double response
     return stiff > 2 ? 1 - 2 / stiff : 0;
 }
 
+SADMM_INLINE double joint_lead(double stiffness, double damping, double late, double dt)
+{
+    return late > 0 ? late * (1 / JOINT_FEEDBACK - 1) * dt * stiffness / (dt * stiffness + damping) : 0;
+}
+
 /* As a row: lambda + gain x + bias = 0. */
 SADMM_INLINE void joint_spring(double stiffness, double damping, double offset, double speed, double before, double dt,
-                               double late, double *gain, double *bias)
+                               double late, double lead, double *gain, double *bias)
 {
     const double t = (1 + late) / 2;
-    *gain = dt * (stiffness * dt * ((1 - late) / 4 + late) + damping * t);
+    *gain = dt * (stiffness * dt * ((1 - late) / 4 + lead) + damping * t);
     *bias = dt * (stiffness * (offset + dt * (1 - late) / 4 * before) + damping * ((1 - t) * before - speed));
 }
 

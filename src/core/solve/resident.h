@@ -13,11 +13,14 @@
 #define SADMM_CORE_SOLVE_RESIDENT_H
 
 #include "core/base/error.h"
-#include "plan.h"
 #include "core/model/system.h"
+#include "plan.h"
 
 struct sadmm_context;
 struct sadmm_collision_input;
+struct sadmm_resident_joint; /* core/model/joint_law.h */
+struct sadmm_joint_memory;
+struct sadmm_coupling_memory; /* core/model/coupling_law.h */
 
 /* A world, from the host. */
 struct sadmm_resident_world {
@@ -27,6 +30,11 @@ struct sadmm_resident_world {
     const struct sadmm_steady *steady;         /* (body_count) */
     const int32_t *slot_of;                    /* (body_count) body slot */
     const struct sadmm_contact_set *contacts;  /* of the last step, with impulses */
+    int32_t joint_count;
+    const struct sadmm_resident_joint *joints;      /* (joint_count) */
+    const struct sadmm_joint_memory *joint_memory;  /* (joint_count) of the last step */
+    int32_t coupling_count;
+    const struct sadmm_coupling_memory *coupling_memory; /* (coupling_count) likewise */
     double time;                               /* simulated until now, s */
 };
 
@@ -34,8 +42,11 @@ enum sadmm_edit_kind {
     SADMM_EDIT_STATE,    /* target: a dynamic body; position (3), orientation (4), velocity (6) */
     SADMM_EDIT_FORCES,   /* target: a dynamic body; force, torque (6), scale of gravity, damping (2) */
     SADMM_EDIT_SETTINGS, /* sadmm_settings_numbers(): a backend's own, from what `step` is given */
+    SADMM_EDIT_JOINT,    /* target: SADMM_JOINT_TARGETS joint + k; k < 6: the numbers of that coordinate (joint_coordinate_numbers); k = 6:
+                            enabled (1 or 0); k = 7: a coupling's target: position (3), orientation (4), velocity (6) */
     SADMM_EDIT_KINDS
 };
+enum { SADMM_JOINT_TARGETS = 8 }; /* a joint */
 enum { SADMM_EDIT_VALUES = 14, SADMM_BODY_EDITS = 2 /* the kinds of a body, the first ones */ };
 
 /* A change between two steps. There is at most one of a kind and target, so that their order does not matter. */
@@ -57,6 +68,7 @@ struct sadmm_resident_report {
     bool converged;            /* every island met the stop rule */
     int64_t islands_above;     /* that did not; -1: there was none */
     int32_t limited;           /* islands with too much energy */
+    int32_t joints, couplings; /* that took part, in the last sub-step */
     double penetration_max;    /* m */
     struct sadmm_residual residual; /* -1: not measured */
     struct {
@@ -86,6 +98,14 @@ struct sadmm_resident_kernels {
      * s); any pointer may be NULL. Nothing may be enqueued. */
     sadmm_status (*read_start)(struct sadmm_context *, struct sadmm_rigid *rigid, double *velocity, double *impulse,
                                struct sadmm_error *);
+    /* What joints and couplings keep after the last step done. Nothing may be enqueued. */
+    sadmm_status (*read_joints)(struct sadmm_context *, struct sadmm_joint_memory *, struct sadmm_coupling_memory *,
+                                struct sadmm_error *);
+    /* Rows of the joints in the last step done, with the multipliers that it started from, and the solution's (six a
+     * constraint that joints may have, at most) and velocities (bodies x 6): where there are joints, bodies need not end
+     * with these. Nothing may be enqueued. */
+    sadmm_status (*read_rows)(struct sadmm_context *, struct sadmm_rows *rows, double *solution, double *velocity,
+                              struct sadmm_error *);
 };
 
 #endif

@@ -19,7 +19,8 @@ __attribute__((format(printf, 2, 3))) static void line(struct text *text, const 
     if (written > 0) text->length += (size_t)written;
 }
 
-static void explain_constraints(struct text *t, const struct sadmm_plan *plan, int32_t joints)
+static void explain_constraints(struct text *t, const struct sadmm_plan *plan, int32_t joints,
+                                int32_t couplings)
 {
     if (plan->contact_rows == 3)
         line(t, "contacts     %d points in %d pairs, 3 rows each (friction)\n", plan->points, plan->pairs);
@@ -29,8 +30,7 @@ static void explain_constraints(struct text *t, const struct sadmm_plan *plan, i
     else
         line(t, "contacts     left out: nothing touches\n");
     if (plan->row_constraints)
-        line(t, "rows         %d constraints of %d joints; steps are made by the host\n", plan->row_constraints,
-             joints);
+        line(t, "rows         %d constraints of %d joints and %d couplings\n", plan->row_constraints, joints, couplings);
     else line(t, "rows         left out: there are none\n");
 }
 
@@ -87,7 +87,7 @@ size_t sadmm_world_explain(sadmm_world *world, char *out, size_t size)
     if (settings.substeps > 1)
         line(&t, "sub-steps    %d of %g s with up to %d iterations each; what follows is the last one's\n",
              settings.substeps, settings.dt, settings.iterations);
-    explain_constraints(&t, plan, world->report.joints);
+    explain_constraints(&t, plan, world->report.joints, world->report.couplings);
     explain_driven(&t, world->driven_count);
     explain_options(&t, plan, &settings);
     line(&t, "iterations   %d of at most %d%s\n", world->report.iterations, settings.iterations * settings.substeps,

@@ -105,6 +105,7 @@ sadmm_status sadmm_world_gather(sadmm_world *world)
     g.barrier = (struct sadmm_barrier){0};
     sadmm_parallel(&world->team, sadmm_pass_threads(last_threads(world), slots), gather_share, &g);
     TRY(sadmm_world_gather_driven(world));
+    sadmm_world_begin_couplings(world);
     return sadmm_world_begin_joints(world);
 }
 

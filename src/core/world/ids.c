@@ -31,9 +31,21 @@ struct sadmm_world_joint *sadmm_world_find_joint(const sadmm_world *world, sadmm
 {
     if (id.slot >= 1 && id.slot <= world->joint_slots) {
         struct sadmm_world_joint *joint = &world->joints[id.slot - 1];
-        if (joint->alive && joint->generation == id.generation) return joint;
+        if (joint->alive && !joint->coupling && joint->generation == id.generation) return joint;
     }
     sadmm_fail(error, SADMM_ERROR_STALE_ID, "%s = (slot %u, generation %u): no such joint (any more)", argument,
+               id.slot, id.generation);
+    return NULL;
+}
+
+struct sadmm_world_coupling *sadmm_world_find_coupling(const sadmm_world *world, sadmm_coupling_id id,
+                                                       const char *argument, struct sadmm_error *error)
+{
+    if (id.slot >= 1 && id.slot <= world->coupling_slots) {
+        struct sadmm_world_coupling *coupling = &world->couplings[id.slot - 1];
+        if (coupling->alive && coupling->generation == id.generation) return coupling;
+    }
+    sadmm_fail(error, SADMM_ERROR_STALE_ID, "%s = (slot %u, generation %u): no such coupling (any more)", argument,
                id.slot, id.generation);
     return NULL;
 }

@@ -87,7 +87,7 @@ static sadmm_status check_coordinate(const char *name, const sadmm_joint_coordin
     return SADMM_OK;
 }
 
-static bool has_coordinate(const sadmm_joint_def *def, int k) { return k == 0 || !sadmm_joint_is_radial(def->kind); }
+static bool has_coordinate(const sadmm_joint_def *def, int k) { return k == 0 || !joint_is_radial(def->kind); }
 
 static sadmm_status check_coordinates(const sadmm_joint_def *def, uint32_t locks, struct sadmm_error *error)
 {
@@ -169,7 +169,8 @@ static sadmm_status check_def(const sadmm_joint_def *def, uint32_t *locks, struc
 
 /* ---- life -------------------------------------------------------------------------------------------------------- */
 
-static bool alive(const sadmm_world *world, size_t slot) { return world->joints[slot].alive; }
+static bool taken(const sadmm_world *world, size_t slot) { return world->joints[slot].alive; }
+static bool alive(const sadmm_world *world, size_t slot) { return taken(world, slot) && !world->joints[slot].coupling; }
 
 static const struct sadmm_rigid *pose_of(const sadmm_world *world, int32_t slot)
 {
@@ -179,8 +180,8 @@ static const struct sadmm_rigid *pose_of(const sadmm_world *world, int32_t slot)
 static struct joint_geometry geometry_now(const sadmm_world *world, const struct sadmm_world_joint *joint)
 {
     struct joint_end ends[2];
-    for (int s = 0; s < 2; ++s) ends[s] = sadmm_joint_end(&joint->frame[s], pose_of(world, joint->body[s]));
-    return joint_geometry_of(&ends[0], &ends[1], joint->def.locks, sadmm_joint_is_radial(joint->def.kind));
+    for (int s = 0; s < 2; ++s) ends[s] = joint_end_on(&joint->frame[s], pose_of(world, joint->body[s]));
+    return joint_geometry_of(&ends[0], &ends[1], joint->def.locks, joint_is_radial(joint->def.kind));
 }
 
 /* The pair that does not meet for this joint. */
@@ -212,12 +213,26 @@ static void remove_pair(sadmm_world *world, const struct sadmm_world_joint *join
 static sadmm_status new_slot(sadmm_world *world, size_t *slot)
 {
     *slot = world->joint_slots;
-    if ((size_t)world->joint_count < world->joint_slots) *slot = sadmm_slot_free(&world->joint_marks, world, alive);
+    if ((size_t)world->joint_count < world->joint_slots) *slot = sadmm_slot_free(&world->joint_marks, world, taken);
     if (*slot >= MOST_JOINTS)
-        return sadmm_fail(&world->error, SADMM_ERROR_LIMIT, "%d joints: a world holds at most 2^24",
+        return sadmm_fail(&world->error, SADMM_ERROR_LIMIT, "%d joints and couplings: a world holds at most 2^24",
                           world->joint_count);
     if (!sadmm_grow(&world->joints, &world->joint_capacity, world->joint_slots, *slot + 1, sizeof *world->joints))
         return sadmm_fail_memory(&world->error, "a joint");
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_insert_joint(sadmm_world *world, const struct sadmm_world_joint *joint, size_t *slot)
+{
+    TRY(new_slot(world, slot));
+    TRY(add_pair(world, joint));
+    struct sadmm_world_joint *made = &world->joints[*slot];
+    const uint32_t generation = *slot < world->joint_slots ? made->generation : 1;
+    *made = *joint;
+    made->generation = generation;
+    if (*slot == world->joint_slots) ++world->joint_slots;
+    if (!made->coupling) sadmm_slot_taken(&world->joint_marks, *slot);
+    ++world->joint_count;
     return SADMM_OK;
 }
 
@@ -235,30 +250,37 @@ sadmm_status sadmm_world_add_joint(sadmm_world *world, const sadmm_joint_def *de
     TRY(sadmm_world_take_back(world));
     q_store(made.frame[0].orientation, made.def.orientation_a);
     q_store(made.frame[1].orientation, made.def.orientation_b);
-    if (def->length == -1 && sadmm_joint_is_radial(def->kind)) made.def.length = geometry_now(world, &made).value[0];
-    TRY(new_slot(world, &slot));
-    TRY(add_pair(world, &made));
-
-    made.generation = slot < world->joint_slots ? world->joints[slot].generation : 1;
-    world->joints[slot] = made;
-    if (slot == world->joint_slots) ++world->joint_slots;
-    sadmm_slot_taken(&world->joint_marks, slot);
-    ++world->joint_count;
+    if (def->length == -1 && joint_is_radial(def->kind)) made.def.length = geometry_now(world, &made).value[0];
+    TRY(sadmm_world_insert_joint(world, &made, &slot));
     if (id) {
         id->slot = (uint32_t)slot + 1;
-        id->generation = made.generation;
+        id->generation = world->joints[slot].generation;
     }
     return SADMM_OK;
 }
 
-static void kill_joint(sadmm_world *world, size_t slot)
+static void kill_coupling(sadmm_world *world, size_t slot)
+{
+    struct sadmm_world_coupling *coupling = &world->couplings[slot];
+    coupling->alive = false;
+    ++coupling->generation;
+    --world->coupling_count;
+    sadmm_slot_freed(&world->coupling_marks, slot);
+}
+
+void sadmm_world_kill_joint(sadmm_world *world, size_t slot)
 {
     struct sadmm_world_joint *joint = &world->joints[slot];
     remove_pair(world, joint);
     joint->alive = false;
     ++joint->generation;
     --world->joint_count;
-    sadmm_slot_freed(&world->joint_marks, slot);
+    if (!joint->coupling) {
+        sadmm_slot_freed(&world->joint_marks, slot);
+        return;
+    }
+    if (slot < world->joint_marks.free) world->joint_marks.free = slot;
+    kill_coupling(world, (size_t)joint->coupling - 1);
 }
 
 sadmm_status sadmm_world_remove_joint(sadmm_world *world, sadmm_joint_id id)
@@ -266,7 +288,7 @@ sadmm_status sadmm_world_remove_joint(sadmm_world *world, sadmm_joint_id id)
     TRY(sadmm_check_given(world, "world", NULL));
     if (!sadmm_world_find_joint(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_world_take_back(world));
-    kill_joint(world, id.slot - 1);
+    sadmm_world_kill_joint(world, id.slot - 1);
     return SADMM_OK;
 }
 
@@ -274,22 +296,25 @@ void sadmm_world_kill_joints_of(sadmm_world *world, int32_t body)
 {
     for (size_t slot = 0; world->joint_count > 0 && slot < world->joint_slots; ++slot) {
         const struct sadmm_world_joint *joint = &world->joints[slot];
-        if (joint->alive && (joint->body[0] == body || joint->body[1] == body)) kill_joint(world, slot);
+        if (joint->alive && (joint->body[0] == body || joint->body[1] == body)) sadmm_world_kill_joint(world, slot);
     }
 }
 
-int32_t sadmm_world_joint_count(const sadmm_world *world) { return world ? world->joint_count : 0; }
+int32_t sadmm_world_joint_count(const sadmm_world *world)
+{
+    return world ? world->joint_count - world->coupling_count : 0;
+}
 
 sadmm_status sadmm_world_joint_at(sadmm_world *world, int32_t index, sadmm_joint_id *id)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
     TRY(sadmm_check_given(id, "id", error));
-    if (index < 0 || index >= world->joint_count)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index,
-                          world->joint_count);
+    const int32_t count = sadmm_world_joint_count(world);
+    if (index < 0 || index >= count)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %d)", index, count);
     size_t slot = (size_t)index;
-    if ((size_t)world->joint_count < world->joint_slots)
+    if ((size_t)count < world->joint_slots)
         slot = sadmm_slot_at(&world->joint_marks, index, world, alive);
     id->slot = (uint32_t)slot + 1;
     id->generation = world->joints[slot].generation;
@@ -304,8 +329,14 @@ sadmm_status sadmm_world_joint_def(sadmm_world *world, sadmm_joint_id id, sadmm_
     const struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", &world->error);
     if (!joint) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(def, "def", &world->error));
+    TRY(sadmm_world_pull_joints(world));
     *def = joint->def;
     return SADMM_OK;
+}
+
+sadmm_status sadmm_world_take_edit(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit)
+{
+    return sadmm_world_edit_joint(world, joint, edit) ? SADMM_OK : sadmm_world_take_back(world);
 }
 
 sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id, bool enabled)
@@ -315,7 +346,7 @@ sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id
     if (!joint) return SADMM_ERROR_STALE_ID;
     joint->def.enabled = enabled;
     joint->last.broken = joint->last.broken && !enabled;
-    return SADMM_OK;
+    return sadmm_world_take_edit(world, joint, SADMM_JOINT_ENABLED);
 }
 
 sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id id, int32_t index,
@@ -332,7 +363,7 @@ sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id
                           joint->def.locks);
     TRY(check_coordinate("coordinate->", coordinate, error));
     joint->def.coordinates[index] = *coordinate;
-    return SADMM_OK;
+    return sadmm_world_take_edit(world, joint, (enum sadmm_joint_edit)index);
 }
 
 sadmm_status sadmm_world_place_joint(sadmm_world *world, sadmm_joint_def *def, const double position[3],
@@ -371,9 +402,9 @@ static void read_motion(const sadmm_world *world, const struct sadmm_world_joint
     for (int k = 0; k < JOINT_COORDINATES; ++k) {
         state->position[k] = joint_winds(joint->def.locks, k) ? joint_unwind(geometry.value[k], joint->last.angle[k])
                                                               : geometry.value[k];
-        state->speed[k] = sadmm_joint_rate(&geometry, k, v[0], v[1]);
+        state->speed[k] = joint_rate(&geometry, k, v[0], v[1]);
     }
-    if (sadmm_joint_is_radial(joint->def.kind) && joint->def.locks & 1) state->position[0] -= joint->def.length;
+    if (joint_is_radial(joint->def.kind) && joint->def.locks & 1) state->position[0] -= joint->def.length;
 }
 
 sadmm_status sadmm_world_joint_state(sadmm_world *world, sadmm_joint_id id, sadmm_joint_state *state)
@@ -383,6 +414,7 @@ sadmm_status sadmm_world_joint_state(sadmm_world *world, sadmm_joint_id id, sadm
     if (!joint) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(state, "state", &world->error));
     TRY(sadmm_world_pull_bodies(world));
+    TRY(sadmm_world_pull_joints(world));
     const struct sadmm_joint_memory *last = &joint->last;
     memset(state, 0, sizeof *state);
     read_motion(world, joint, state);

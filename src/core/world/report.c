@@ -10,7 +10,8 @@ void sadmm_world_report_steps(sadmm_world *world, int64_t steps, const struct sa
     report->precision = world->kernels->precision;
     report->threads = done->plan.threads;
     report->bodies = done->plan.bodies;
-    report->joints = 0; /* a step by the host says how many */
+    report->joints = done->joints;
+    report->couplings = done->couplings;
     report->contacts = done->plan.points;
     report->pairs = done->plan.pairs;
     report->iterations = done->iterations;

@@ -24,12 +24,12 @@ enum { MOST_CHECKS = 64 };
 
 bool sadmm_world_may_reside(const sadmm_world *world)
 {
-    /* Joints become rows on the host, and kinematic bodies move there. Of the stop rules a backend checks the certificate's in the method FAST alone;
+    /* Kinematic bodies move on the host. Of the stop rules a backend checks the certificate's in the method FAST alone;
      * and the loads of a first step are predicted on the host. */
     const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings), *s = &settings;
     const bool fast = s->method == SADMM_METHOD_FAST,
                few_checks = (s->iterations - 1) / s->check_period < MOST_CHECKS / s->substeps;
-    if ((fast && !world->stepped) || world->joint_count > 0 || world->driven_count > 0) return false;
+    if ((fast && !world->stepped) || world->driven_count > 0) return false;
     return world->kernels->resident && s->residual_tolerance <= 0 &&
            (s->certificate_tolerance <= 0 || (fast && few_checks));
 }
@@ -63,12 +63,14 @@ static void edit_again(sadmm_world *world)
             body->set_at[kind] = done;
         }
     }
+    sadmm_world_edit_joints_again(world);
 }
 
 static void forget_edits(sadmm_world *world)
 {
     for (size_t k = 0; k < world->resident.edited_count; ++k) world->bodies[world->resident.edited[k]].edits = 0;
     world->resident.edited_count = 0;
+    sadmm_world_forget_joint_edits(world);
 }
 
 static void put_edit(struct sadmm_resident_edit *edit, const struct sadmm_world_body *body, enum sadmm_edit_kind kind)
@@ -99,7 +101,7 @@ static sadmm_status list_edits(sadmm_world *world, size_t *count)
         for (int kind = 0; kind < SADMM_BODY_EDITS; ++kind)
             if (body->edits >> kind & 1) put_edit(&world->resident.edits[(*count)++], body, (enum sadmm_edit_kind)kind);
     }
-    return SADMM_OK;
+    return sadmm_world_list_joint_edits(world, count);
 }
 
 /* ---- to the backend ---------------------------------------------------------------------------------------------- */
@@ -123,6 +125,7 @@ static sadmm_status load(sadmm_world *world)
         body->edits = 0;
         for (int kind = 0; kind < SADMM_BODY_EDITS; ++kind) body->set_at[kind] = -1;
     }
+    TRY(sadmm_world_list_joints(world));
     struct sadmm_collision_input input = sadmm_world_collision_input(world, 0);
     struct sadmm_resident_world whole = {
         .input = &input,
@@ -131,6 +134,11 @@ static sadmm_status load(sadmm_world *world)
         .steady = world->resident.steady,
         .slot_of = world->slot_of,
         .contacts = &world->contacts,
+        .joint_count = world->resident.joint_count,
+        .joints = world->resident.joints,
+        .joint_memory = world->resident.memory,
+        .coupling_count = world->resident.coupling_count,
+        .coupling_memory = world->resident.coupling_memory,
         .time = world->report.time,
     };
     TRY(world->kernels->resident->load(world->context, &whole, &world->def.settings, &world->error));
@@ -205,9 +213,9 @@ static void take_report(sadmm_world *world, const struct sadmm_resident_report *
     if (steps <= 0) return;
     world->resident.done = done->done;
     world->resident.bodies_behind = world->resident.contacts_behind = true;
+    world->resident.joints_behind = world->resident.joint_count > 0;
     world->stepped = world->contacts_readable = true;
-    sadmm_rows_clear(&world->start.rows); /* of a step by the host, when there were joints */
-    world->start.driven_count = 0;        /* or kinematic bodies */
+    world->start.driven_count = 0; /* of a step by the host, when there were kinematic bodies */
     world->plan = done->plan;
     world->step_settings = done->settings;
     sadmm_world_report_steps(world, steps, done);
@@ -272,10 +280,20 @@ static sadmm_status pull_contacts(sadmm_world *world)
         return sadmm_fail_memory(&world->error, "the step's starting impulses");
     TRY(backend->read_start(world->context, start->rigid, start->velocity, start->impulse, &world->error));
     TRY(backend->read_bodies(world->context, world->next, NULL, NULL, &world->error));
-    TRY(backend->read_contacts(world->context, &world->contacts, &world->error));
     for (size_t i = 0; i < n; ++i)
         memcpy(world->velocity + 6 * i, world->next[i].velocity, 6 * sizeof *world->velocity);
+    TRY(sadmm_world_read_rows(world));
+    TRY(backend->read_contacts(world->context, &world->contacts, &world->error));
     world->resident.contacts_behind = false;
+    return SADMM_OK;
+}
+
+static sadmm_status pull_joints(sadmm_world *world)
+{
+    TRY(settle(world, SADMM_OK));
+    if (!world->resident.joints_behind) return SADMM_OK;
+    TRY(sadmm_world_read_joints(world));
+    world->resident.joints_behind = false;
     return SADMM_OK;
 }
 
@@ -284,6 +302,7 @@ static sadmm_status take_back(sadmm_world *world)
     if (!world->resident.loaded) return SADMM_OK;
     TRY(pull_bodies(world));
     TRY(pull_contacts(world));
+    TRY(pull_joints(world));
     world->resident.loaded = false;
     forget_edits(world);
     return SADMM_OK;
@@ -308,7 +327,7 @@ static void fall_back(sadmm_world *world)
     world->report.time = world->resident.kept_time;
     world->stepped = world->report.step > 0;
     world->resident.loaded = world->resident.running = false;
-    world->resident.bodies_behind = world->resident.contacts_behind = false;
+    world->resident.bodies_behind = world->resident.contacts_behind = world->resident.joints_behind = false;
     forget_edits(world);
 }
 
@@ -345,6 +364,12 @@ sadmm_status sadmm_world_pull_contacts(sadmm_world *world)
 {
     TRY(take_failed(world));
     return sadmm_world_contain(world, pull_contacts(world));
+}
+
+sadmm_status sadmm_world_pull_joints(sadmm_world *world)
+{
+    TRY(take_failed(world));
+    return sadmm_world_contain(world, pull_joints(world));
 }
 
 sadmm_status sadmm_world_take_back(sadmm_world *world)

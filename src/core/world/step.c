@@ -133,6 +133,7 @@ static void commit(sadmm_world *world)
     sadmm_parallel(&world->team, threads, commit_share, world);
     sadmm_world_commit_driven(world);
     sadmm_world_commit_joints(world);
+    sadmm_world_commit_couplings(world, world->def.settings.substeps);
     world->stepped = true;
     world->contacts_readable = true;
 }
@@ -155,6 +156,17 @@ struct host_step {
     double ms[SADMM_PHASE_COUNT];
 };
 
+/* Bodies with joints, directly. */
+static sadmm_status solve_joined(struct host_step *step)
+{
+    sadmm_world *world = step->world;
+    if (!step->system.rows) return SADMM_OK;
+    if (!world->joined) world->joined = sadmm_joined_create();
+    if (!world->joined) return sadmm_fail_memory(&world->error, "joined bodies");
+    return sadmm_joined_solve(world->joined, &step->system, world->joint_constraints, world->joint_constraint_count,
+                              &step->settings, &world->error);
+}
+
 static sadmm_status make_plan(struct host_step *step)
 {
     sadmm_world *world = step->world;
@@ -167,6 +179,7 @@ static sadmm_status make_plan(struct host_step *step)
     world->plan = sadmm_plan_make(&step->system, &step->settings);
     step->report = sadmm_solve_report_empty(world->kernels);
     TRY(keep_start(world, &depth));
+    if (world->plan.warm_start) TRY(solve_joined(step));
     step->depth = depth > step->depth ? depth : step->depth;
     return SADMM_OK;
 }
@@ -194,10 +207,12 @@ static sadmm_status integrate(struct host_step *step)
     sadmm_world_put_down(world, &step->system);
     TRY(world->kernels->integrate(world->context, world->next, &world->error));
     if (step->system.rows) {
+        TRY(solve_joined(step));
         TRY(sadmm_world_move_joined(world, &step->settings));
         sadmm_world_keep_rows(world, &step->settings);
     }
     TRY(sadmm_world_move_driven(world, &step->settings));
+    sadmm_world_move_targets(world, step->settings.dt);
     add_substep(step);
     return check_next(world);
 }
@@ -247,6 +262,8 @@ static void report_step(const struct host_step *step)
         .iterations_mean = step->iterations,
         .converged = !step->unconverged,
         .limited = step->limited,
+        .joints = step->world->joints_acting,
+        .couplings = step->world->couplings_acting,
         .penetration_max = step->depth,
         .residual = solved->residual,
         .ms = {.collide = ms[SADMM_PHASE_COLLIDE], .assemble = ms[SADMM_PHASE_ASSEMBLE],
@@ -256,7 +273,6 @@ static void report_step(const struct host_step *step)
     for (int phase = 0; phase < SADMM_PHASE_COUNT; ++phase)
         done.ms.total += phase == SADMM_PHASE_CERTIFY ? 0 : ms[phase];
     sadmm_world_report_steps(step->world, 1, &done);
-    step->world->report.joints = step->world->joints_acting;
     step->world->report.certificate = solved->certificate;
     if (step->islands_above > solved->certificate.islands_above)
         step->world->report.certificate.islands_above = step->islands_above;

@@ -57,20 +57,24 @@ void sadmm_world_destroy(sadmm_world *world)
     sadmm_collision_destroy(world->collision);
     sadmm_contact_set_free(&world->contacts);
     sadmm_certificate_workspace_free(&world->certificate_workspace);
+    sadmm_joined_destroy(world->joined);
     sadmm_rows_free(&world->start.rows);
     sadmm_rows_free(&world->last_start.rows);
     for (size_t slot = 0; slot < world->body_slots; ++slot) sadmm_free(world->bodies[slot].name);
     void *blocks[] = {world->bodies, world->shapes, world->shape_generations, world->geometries,
                       world->disabled_pairs.keys, world->disabled_pairs.values, world->joined_pairs.keys,
-                      world->joined_pairs.values, world->filtered_pairs, world->joints, world->joint_sources,
-                      world->joint_labels, world->joint_touch, world->start.multiplier, world->last_start.multiplier,
+                      world->joined_pairs.values, world->filtered_pairs, world->joints, world->couplings, world->joint_sources,
+                      world->joint_labels, world->joint_touch, world->joint_constraints, world->start.multiplier, world->last_start.multiplier,
                       world->friction_pairs.keys,
                       world->friction_pairs.values, world->collision_bodies, world->start.rigid, world->start.velocity,
                       world->start.impulse, world->last_start.rigid, world->last_start.velocity,
                       world->last_start.impulse, world->start.driven, world->last_start.driven, world->driven,
                       world->driven_slots, world->carried, world->carriers, world->carried_labels, world->next, world->velocity, world->wrench, world->steady,
                       world->wrench_sum, world->slot_of,
-                      world->resident.steady, world->resident.edited, world->resident.edits};
+                      world->resident.steady, world->resident.edited, world->resident.edits,
+                      world->resident.joints, world->resident.memory, world->resident.joint_slots,
+                      world->resident.solution, world->resident.edited_joints,
+                      world->resident.coupling_memory};
     for (size_t i = 0; i < sizeof blocks / sizeof *blocks; ++i) sadmm_free(blocks[i]);
     sadmm_free(world);
 }

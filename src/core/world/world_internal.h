@@ -3,9 +3,10 @@
  *   slots, pair_table, ids, report   lists and names
  *   driven                           kinematic bodies in a step
  *   gather                           what a step reads
+ *   coupling_step                    what couplings keep from step to step
  *   joint_rows, joint_move           joints as constraint rows, and where they let bodies go
- *   resident                         where a backend keeps the world
- *   shape, joint, body, contacts, explain   what callers see of it, and change
+ *   resident_joints, resident        where a backend keeps the world
+ *   shape, joint, coupling, body, contacts, explain   what callers see of it, and change
  *   step, world                      steps; settings, the whole
  */
 #ifndef SADMM_CORE_WORLD_INTERNAL_H
@@ -15,13 +16,16 @@
 #include "core/base/check.h"
 #include "core/base/error.h"
 #include "core/base/parallel.h"
-#include "core/math/joint.h"
+#include "core/model/coupling_law.h"
+#include "core/model/joint_law.h"
 #include "core/model/settings.h"
 #include "core/solve/certificate.h"
+#include "core/solve/joined.h"
 #include "core/solve/kernels.h"
 #include "core/solve/schedule.h"
 #include "pair_table.h"
 #include "slots.h"
+#include "subadmm/coupling.h"
 #include "subadmm/joint.h"
 #include "subadmm/world.h"
 
@@ -56,44 +60,32 @@ struct sadmm_world_driven {
     double wrench[6];               /* of contacts, of the sub-steps made so far */
 };
 
-/* What acts along a coordinate of a joint, each by a row of its own. */
-enum sadmm_joint_role {
-    SADMM_ROLE_LOCK,
-    SADMM_ROLE_LOWER,
-    SADMM_ROLE_UPPER,
-    SADMM_ROLE_DRIVE,
-    SADMM_ROLE_FRICTION,
-    SADMM_ROLE_SPRING,
-    SADMM_ROLE_ARMATURE,
-    SADMM_ROLE_COUNT
-};
+/* What may be set of a joint without loading the world again: its coordinates, 0 to 5, and (TARGET: of a coupling) */
+enum sadmm_joint_edit { SADMM_JOINT_ENABLED = JOINT_COORDINATES, SADMM_JOINT_TARGET, SADMM_JOINT_EDITS };
 
-/* What a joint keeps from step to step. */
-struct sadmm_joint_memory {
-    double force[SADMM_ROLE_COUNT][JOINT_COORDINATES]; /* on b along the coordinate: what the next step starts from */
-    double angle[JOINT_COORDINATES];                   /* of those that wind, at the step's start */
-    double wrench[6], point[3];                        /* as in sadmm_joint_state, on b */
-    double local[6];                                   /* the wrench along the axes of a's frame */
-    bool leads_stay;                                   /* its bodies were moved by the velocities of the step's end */
-    bool broken;                                       /* it gave more than it bears */
-};
-
-/* A joint slot. */
+/* A joint slot. That of a coupling is out of callers' sight: its frame a is the target, which is steered, and what acts
+ * are position drives of all coordinates. */
 struct sadmm_world_joint {
     bool alive;
     uint32_t generation;
+    int32_t coupling;       /* number of the coupling that it is of, from 1; 0: of none */
     sadmm_joint_def def;    /* locks: what is locked */
     int32_t body[2];        /* slots of a and b, -1: the static world */
     struct joint_frame frame[2];
     struct sadmm_joint_memory last, next; /* of the last step; of the one at hand, or a sub-step of it */
+    int32_t resident;       /* its number in the backend that keeps the world */
+    int32_t resident_constraints; /* that its rows may take there */
+    uint32_t edits;         /* bits of enum sadmm_joint_edit, as in a body */
+    int64_t set_at[SADMM_JOINT_EDITS];
 };
 
-/* The joint's row that a row of the step is. */
-struct sadmm_joint_source {
-    int32_t joint; /* slot */
-    int8_t role, coordinate, sign;
-    double gap, slack; /* of limits: at the step's start, m or rad; what the turning of the row makes of it in a step */
-    double driven;     /* what kinematic sides give the row's rate; it is in the bias */
+/* A coupling slot. */
+struct sadmm_world_coupling {
+    bool alive;
+    uint32_t generation;
+    sadmm_coupling_def def; /* its target is that in `last` */
+    size_t joint;           /* slot */
+    struct sadmm_coupling_memory last, next;
 };
 
 /* What the last step started from, for contacts, freeze and the certificate. */
@@ -129,16 +121,22 @@ struct sadmm_world {
 
     struct sadmm_world_joint *joints;
     size_t joint_slots, joint_capacity;
-    int32_t joint_count;
+    int32_t joint_count;                  /* live slots, those of couplings among them */
     struct sadmm_slot_marks joint_marks;
+    struct sadmm_world_coupling *couplings;
+    size_t coupling_slots, coupling_capacity;
+    int32_t coupling_count;
+    struct sadmm_slot_marks coupling_marks;
     struct sadmm_pair_table joined_pairs; /* bodies that do not meet for their joints; values: how many joints */
     uint64_t *filtered_pairs;             /* these and `disabled_pairs`, as of the last step */
     size_t filtered_count, filtered_capacity;
     struct sadmm_joint_source *joint_sources; /* of the step's rows */
+    struct sadmm_row_constraint *joint_constraints; /* all that joints may have, in order; most have rows in the step */
+    size_t joint_constraint_count, joint_constraint_capacity;
     int32_t *joint_labels;                    /* dynamic bodies: islands, at the end of a step with joints */
     uint8_t *joint_touch;                     /* of islands, at their labels (joint_move.c) */
     size_t joint_source_capacity, joint_label_capacity, joint_touch_capacity;
-    int32_t joints_acting;                    /* in the step at hand */
+    int32_t joints_acting, couplings_acting;  /* in the step at hand */
 
     /* The last step: everything freeze, contacts and the next warm start need. */
     struct sadmm_collision *collision;
@@ -168,6 +166,7 @@ struct sadmm_world {
         struct sadmm_error failed; /* of a step that a call without a status waited for; SADMM_OK: none */
         bool bodies_behind;  /* the bodies above are older than the backend's */
         bool contacts_behind;
+        bool joints_behind;
         int64_t enqueued, done, repeats; /* steps since it was loaded: begun, done as far as known, repeated */
         int64_t kept_step;   /* steps and time of the bodies above */
         double kept_time;
@@ -175,12 +174,22 @@ struct sadmm_world {
         uint32_t *edited;    /* slots of bodies with `edits`; capacity: all dynamic ones */
         struct sadmm_resident_edit *edits; /* for the backend, when a step is enqueued */
         size_t steady_capacity, edited_count, edited_capacity, edit_capacity;
+        struct sadmm_resident_joint *joints; /* as they were loaded; */
+        struct sadmm_joint_memory *memory;   /* likewise, and as they are read; */
+        int32_t *joint_slots;                /* their slots */
+        struct sadmm_coupling_memory *coupling_memory; /* of those that are of couplings, in their order */
+        double *solution;                    /* of their rows */
+        uint32_t *edited_joints;             /* slots of joints with `edits`; capacity: all */
+        int32_t joint_count, joint_constraints, coupling_count;
+        size_t joint_capacity, memory_capacity, coupling_memory_capacity, joint_slot_capacity, solution_capacity, edited_joint_count,
+            edited_joint_capacity;
     } resident;
 
     const struct sadmm_kernels *kernels; /* chosen at the first step */
     struct sadmm_context *context;
     char why[SADMM_WHY_SIZE];
     struct sadmm_certificate_workspace certificate_workspace;
+    struct sadmm_joined *joined; /* made with the first joint */
     sadmm_step_report report;
 };
 
@@ -221,23 +230,28 @@ struct sadmm_system sadmm_world_system(sadmm_world *world);
 /* SADMM_ERROR_NON_FINITE that names a dynamic body. */
 sadmm_status sadmm_world_not_finite(sadmm_world *world, int32_t body);
 
+/* ---- coupling_step.c ---- */
+
+/* What couplings kept of the last step into what they keep of this one. */
+void sadmm_world_begin_couplings(sadmm_world *world);
+/* A (sub-)step of dt is over: targets move on. */
+void sadmm_world_move_targets(sadmm_world *world, double dt);
+/* The step of so many sub-steps is done. */
+void sadmm_world_commit_couplings(sadmm_world *world, int substeps);
+
 /* ---- joint_rows.c ---- */
 
 /* Pairs of bodies that are not to meet, into `filtered_pairs`; and what joints kept of the last step into what they
  * keep of this one. */
 sadmm_status sadmm_world_begin_joints(sadmm_world *world);
+/* The most constraints that a joint's rows may take; those of couplings have room for all of their drives. */
+int32_t sadmm_joint_constraints(const struct sadmm_world_joint *joint);
 /* Rows of the (sub-)step's joints into `start`, from the bodies there. */
 sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *settings);
 /* The solution's multipliers into what joints keep. */
 void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings);
 /* The step is done. */
 void sadmm_world_commit_joints(sadmm_world *world);
-/* A joint's frame on a body, in the world; rigid NULL: on the static world. */
-struct joint_end sadmm_joint_end(const struct joint_frame *frame, const struct sadmm_rigid *rigid);
-/* A radial joint's coordinate 0 is a distance. */
-bool sadmm_joint_is_radial(sadmm_joint_kind kind);
-/* How fast a coordinate changes by the velocities of a and b (6 each). */
-double sadmm_joint_rate(const struct joint_geometry *geometry, int coordinate, const double *a, const double *b);
 
 /* ---- joint_move.c ---- */
 
@@ -267,7 +281,8 @@ void sadmm_world_settle_quietly(sadmm_world *world);
 /* Bring the bodies (or contacts and everything else) of the last step back, where the backend is ahead. */
 sadmm_status sadmm_world_pull_bodies(sadmm_world *world);
 sadmm_status sadmm_world_pull_contacts(sadmm_world *world);
-/* Both, and from here on the host's world is the one that counts: before anything but a state or a wrench is
+sadmm_status sadmm_world_pull_joints(sadmm_world *world);
+/* All of it, and from here on the host's world is the one that counts: before anything but a state or a wrench is
  * changed. */
 sadmm_status sadmm_world_take_back(sadmm_world *world);
 /* A dynamic body's state or wrench has been set: the next step takes it along. */
@@ -275,6 +290,22 @@ void sadmm_world_edit(sadmm_world *world, struct sadmm_world_body *body, enum sa
 /* Passes `status` on. After SADMM_ERROR_DEVICE the backend's context is given up, the host's world counts again, and
  * the next step begins with a new context. */
 sadmm_status sadmm_world_contain(sadmm_world *world, sadmm_status status);
+
+/* ---- resident_joints.c ---- */
+
+/* Joints of a world that is about to be loaded, into resident.joints and what is beside it. */
+sadmm_status sadmm_world_list_joints(sadmm_world *world);
+/* A joint's coordinate, whether it is enabled, or its target has been set: the next step takes it along. False: the backend has no
+ * room for its rows, the world is to be taken back. */
+bool sadmm_world_edit_joint(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit);
+/* Edits into resident.edits, from *count on. */
+sadmm_status sadmm_world_list_joint_edits(sadmm_world *world, size_t *count);
+void sadmm_world_forget_joint_edits(sadmm_world *world);
+/* As of bodies: what was set for steps that have not been done. */
+void sadmm_world_edit_joints_again(sadmm_world *world);
+/* What joints keep; the last step's rows. Nothing is enqueued. */
+sadmm_status sadmm_world_read_joints(sadmm_world *world);
+sadmm_status sadmm_world_read_rows(sadmm_world *world);
 
 /* ---- ids.c ---- */
 
@@ -287,6 +318,8 @@ struct sadmm_shape *sadmm_world_find_shape(const sadmm_world *world, sadmm_shape
                                            struct sadmm_error *error);
 struct sadmm_world_joint *sadmm_world_find_joint(const sadmm_world *world, sadmm_joint_id id, const char *argument,
                                                  struct sadmm_error *error);
+struct sadmm_world_coupling *sadmm_world_find_coupling(const sadmm_world *world, sadmm_coupling_id id,
+                                                       const char *argument, struct sadmm_error *error);
 
 /* ---- body.c ---- */
 
@@ -299,7 +332,13 @@ void sadmm_world_kill_shape(sadmm_world *world, size_t slot);
 
 /* ---- joint.c ---- */
 
-/* The joints of a body that is removed. */
+/* Something of a joint has been set: the next step of the backend that keeps the world takes it along. */
+sadmm_status sadmm_world_take_edit(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit);
+/* Put a joint that has been checked into a slot. */
+sadmm_status sadmm_world_insert_joint(sadmm_world *world, const struct sadmm_world_joint *joint, size_t *slot);
+/* With its coupling, if it is of one. */
+void sadmm_world_kill_joint(sadmm_world *world, size_t slot);
+/* The joints and couplings of a body that is removed. */
 void sadmm_world_kill_joints_of(sadmm_world *world, int32_t body);
 
 #endif

@@ -1,0 +1,454 @@
+/* Joints of a world on the device (docs/algorithm.md, section 10): the host's formulas (core/model/joint_law.h,
+ * joint_lead.h), in double.
+ *
+ *   rows      eight lanes a joint, one a coordinate: its laws as raw rows, as the host would make them. A joint has a
+ *             fixed number of constraints; its rows fill the first ones, the rest join no bodies
+ *   solution  a thread a joint: multipliers into what it keeps; a thread a pair: may the bodies of its island move by
+ *             the means of their velocities? Commit, or turn, moves them then (kernels.cu)
+ */
+#include <string.h>
+
+#include <algorithm>
+
+#include "backend_cuda/device/double.h"
+#include "core/base/memory.h"
+
+#include "backend_cuda/assemble/assemble.h"
+#include "core/model/coupling_law.h"
+#include "core/model/joint_lead.h"
+#include "move.h"
+#include "world.h"
+
+/* What the end of a sub-step needs of a joint's geometry in its middle. */
+struct cuda_joint_middle {
+    vec3 axis[JOINT_COORDINATES];
+    quat frame;
+    vec3 arm_b;
+};
+
+/* ---- rows -------------------------------------------------------------------------------------------------------- */
+
+enum { ROWS_THREADS = 64 }; /* a block: long work, many multiprocessors */
+
+static __device__ __forceinline__ struct joint_body body_of(const cuda_step_view &step, int32_t body)
+{
+    const struct joint_body out = {body, body >= 0 ? &step.before[body] : nullptr, false, false};
+    return out;
+}
+
+/* End a of a joint: a coupling's is its target. */
+static __device__ __forceinline__ struct joint_body body_a_of(const cuda_view &v,
+                                                              const struct sadmm_resident_joint *joint)
+{
+    if (joint->coupling < 0) return body_of(v.step, joint->body[0]);
+    const struct joint_body out = {-1, &v.joints.couplings_before[joint->coupling].target, true, true};
+    return out;
+}
+
+static __device__ __forceinline__ int or_lanes(int bits)
+{
+#pragma unroll
+    for (int o = 1; o < LANES; o *= 2) bits |= __shfl_xor_sync((unsigned)ALL_LANES, bits, o);
+    return bits;
+}
+
+/* Where the lane's laws begin in its joint's rows: what is locked first, coordinates ascending; *all: of the joint.
+ * Every lane of the warp comes here. */
+static __device__ __forceinline__ int place_laws(int count, bool locked, int lane, int *all)
+{
+    int at = 0, total = 0;
+#pragma unroll
+    for (int k = 0; k < JOINT_COORDINATES; ++k) {
+        const int other = __shfl_sync((unsigned)ALL_LANES, count, k, LANES);
+        const bool other_locked = __shfl_sync((unsigned)ALL_LANES, (int)locked, k, LANES) != 0;
+        total += other;
+        at += other_locked != locked ? (other_locked ? other : 0) : k < lane ? other : 0;
+    }
+    *all = total;
+    return at;
+}
+
+static __device__ __forceinline__ void store_row(const cuda_view &v, const struct acting_joint &acting,
+                                                 const struct joint_law &law, int32_t joint, size_t slot, double start)
+{
+    struct raw_row row;
+    for (int s = 0; s < 2; ++s) {
+        for (int j = 0; j < 6; ++j) row.jacobian[s][j] = 0;
+        if (acting.side[s].system_body < 0) continue;
+        joint_step_row(&acting, s, law.coordinate, row.jacobian[s]);
+        for (int j = 0; j < 6; ++j) row.jacobian[s][j] *= law.sign;
+    }
+    row.gain = law.gain, row.bias = law.bias, row.compliance = law.compliance;
+    row.lo = law.lo, row.hi = law.hi;
+    row.lambda = start;
+    const_cast<struct raw_row *>(v.raw.rows)[slot] = row;
+    const struct sadmm_joint_source source = {joint,    (int8_t)law.role, (int8_t)law.coordinate, (int8_t)law.sign,
+                                              law.gap, law.slack, law.steered};
+    v.joints.sources[slot] = source;
+}
+
+/* What the joint will keep: as before, but for what the solution tells. */
+static __device__ __forceinline__ void begin_memory(const joint_view &joints, int32_t j, int lane, bool winds,
+                                                    double angle, bool acts, vec3 point)
+{
+    const struct sadmm_joint_memory *before = &joints.before[j];
+    struct sadmm_joint_memory *after = &joints.after[j];
+    if (lane < JOINT_COORDINATES) {
+        for (int role = 0; role < SADMM_ROLE_COUNT; ++role) after->force[role][lane] = 0;
+        after->wrench[lane] = after->local[lane] = 0;
+        after->angle[lane] = winds ? angle : before->angle[lane];
+        if (lane < 3) after->point[lane] = acts ? v3_part(point, lane) : 0;
+        return;
+    }
+    if (lane > JOINT_COORDINATES) return;
+    after->leads_stay = before->leads_stay;
+    after->broken = before->broken;
+}
+
+static __device__ __forceinline__ void store_middle(const joint_view &joints, int32_t j, int lane,
+                                                    const struct acting_joint &acting)
+{
+    if (lane < JOINT_COORDINATES) joints.middle[j].axis[lane] = acting.middle.axis[lane];
+    if (lane != JOINT_COORDINATES) return;
+    joints.middle[j].frame = acting.frame;
+    joints.middle[j].arm_b = acting.middle.arm_b;
+}
+
+/* Constraints of a joint with so many rows. */
+static __device__ __forceinline__ void store_constraints(const cuda_view &v, const struct sadmm_resident_joint *joint,
+                                                         int32_t first, int lane, int rows)
+{
+    for (int c = lane; c < joint->constraints; c += LANES) {
+        const int left = rows - SADMM_MAX_ROWS * c,
+                  count = left < 0 ? 0 : left < SADMM_MAX_ROWS ? left : (int)SADMM_MAX_ROWS;
+        const struct sadmm_row_constraint out = {count > 0 ? joint->body[0] : -1, count > 0 ? joint->body[1] : -1, 0,
+                                                 count, false, 0};
+        const_cast<struct sadmm_row_constraint *>(v.raw.constraints)[first + c] = out;
+    }
+}
+
+static __global__ void __launch_bounds__(ROWS_THREADS)
+    joint_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    const int32_t t = (int32_t)(blockIdx.x * (unsigned)ROWS_THREADS + threadIdx.x), j = t / LANES;
+    const int lane = t % LANES;
+    if (v.model.live->abort_code) return;
+    const bool live = j < v.joints.count;
+    const struct sadmm_resident_joint *joint = &v.joints.joints[live ? j : 0];
+    const sadmm_joint_def *def = &joint->def;
+    const bool enabled = live && def->enabled && !v.joints.begin[j].broken;
+    const bool coordinate = enabled && lane < JOINT_COORDINATES && joint_has_coordinate(def, lane);
+    const struct sadmm_settings settings = *v.model.settings;
+    struct acting_joint acting;
+    struct joint_moving moving;
+    struct joint_laws laws;
+    laws.count = 0;
+    if (enabled) {
+        const struct joint_body bodies[2] = {body_a_of(v, joint), body_of(v.step, joint->body[1])};
+        acting = joint_act(def, joint->frame, bodies, &settings);
+    }
+    if (coordinate) {
+        moving = joint_moving_of(def, &v.joints.before[j], &acting, lane, &settings);
+        joint_coordinate_laws(def, lane, &moving, &laws);
+    }
+    int rows;
+    const int at = place_laws(laws.count, coordinate && (def->locks >> lane & 1), lane, &rows);
+    const int32_t first = live ? v.joints.first[j] : 0;
+    int warm = 0; /* a bit a constraint */
+    for (int i = 0; i < laws.count; ++i) {
+        const struct joint_law *law = &laws.law[i];
+        const double start = law->sign * v.joints.before[j].force[law->role][lane] * settings.dt;
+        store_row(v, acting, *law, j, (size_t)first * SADMM_MAX_ROWS + (size_t)(at + i), start);
+        if (start != 0) warm |= 1 << (at + i) / SADMM_MAX_ROWS;
+    }
+    warm = or_lanes(warm);
+    if (!live) return;
+    store_constraints(v, joint, first, lane, rows);
+    begin_memory(v.joints, j, lane, coordinate && joint_winds(def->locks, lane), coordinate ? moving.value : 0,
+                 rows > 0, enabled ? acting.middle.point : v3(0, 0, 0));
+    if (rows == 0) return;
+    store_middle(v.joints, j, lane, acting);
+    if (lane > 0) return;
+    atomicAdd(joint->coupling < 0 ? &v.step.control->joints.joints : &v.step.control->joints.couplings, 1);
+    atomicAdd(&v.step.control->joints.constraints, (rows + SADMM_MAX_ROWS - 1) / SADMM_MAX_ROWS);
+    atomicAdd(&v.step.control->joints.warm, __popc((unsigned)warm));
+}
+
+/* ---- the solution -------------------------------------------------------------------------------------------------- */
+
+static __device__ __forceinline__ struct joint_lead lead_of(const cuda_view &v, int32_t body)
+{
+    double velocity[6] = {};
+    if (body >= 0) load_end_velocity(v, body, velocity);
+    return joint_lead_of(body >= 0 ? &v.step.before[body] : nullptr, velocity);
+}
+
+static __device__ __forceinline__ int32_t *island_of(const cuda_view &v, int32_t a, int32_t b)
+{
+    return &v.joints.touch[v.graph.label[a >= 0 ? a : b]];
+}
+
+/* joint: what the coupling's has given; NULL: it did not take part. */
+static __device__ __forceinline__ void keep_coupling(const cuda_view &v, int32_t k,
+                                                     const struct sadmm_joint_memory *joint,
+                                                     const struct cuda_joint_middle *middle, double dt)
+{
+    struct sadmm_coupling_memory memory = v.joints.couplings_before[k];
+    if (v.step.substep == 0) coupling_begin(&memory);
+    if (joint) coupling_keep(&memory, joint->wrench, v3_load(joint->point), middle->arm_b, dt);
+    coupling_move(&memory.target, dt);
+    if (v.step.substep + 1 == v.step.substeps) coupling_end(&memory, v.step.substeps);
+    v.joints.couplings_after[k] = memory;
+}
+
+/* Joint j: what its rows carry; what it says of its island. */
+static __device__ __forceinline__ void keep_joint(const cuda_view &v, int32_t j)
+{
+    const struct sadmm_resident_joint *joint = &v.joints.joints[j];
+    const struct cuda_joint_middle *middle = &v.joints.middle[j];
+    const struct sadmm_settings settings = *v.model.settings;
+    const int32_t first = v.joints.first[j];
+    if (joint->constraints == 0 || v.raw.constraints[first].count == 0) {
+        if (joint->coupling >= 0) keep_coupling(v, joint->coupling, nullptr, middle, settings.dt);
+        return;
+    }
+    struct sadmm_joint_memory memory = v.joints.after[j];
+    const struct joint_lead bodies[2] = {lead_of(v, joint->body[0]), lead_of(v, joint->body[1])};
+    int bits = ISLAND_JOINED;
+    double finite = 0;
+    for (int32_t c = 0; c < joint->constraints; ++c) {
+        const int32_t count = v.raw.constraints[first + c].count;
+        for (int32_t r = 0; r < count; ++r) {
+            const size_t slot = (size_t)(first + c) * SADMM_MAX_ROWS + (size_t)r;
+            const struct sadmm_joint_source source = v.joints.sources[slot];
+            const struct raw_row *row = &v.raw.rows[slot];
+            const double lambda = (double)v.rows.data[slot].lambda;
+            finite += lambda - lambda;
+            v.joints.solution[slot] = lambda;
+            joint_keep_row(&memory, middle->axis, source.role, source.coordinate, source.sign * lambda / settings.dt);
+            if (joint_limit_jolts(&source, lambda, row->jacobian[0], row->jacobian[1], bodies, &settings))
+                bits |= ISLAND_LEADS_STAY;
+        }
+    }
+    joint_end_wrench(&memory, &joint->def, middle->frame);
+    v.joints.after[j] = memory;
+    if (joint->coupling >= 0) keep_coupling(v, joint->coupling, &memory, middle, settings.dt);
+    atomicOr(island_of(v, joint->body[0], joint->body[1]), bits);
+    const int32_t named = joint->body[1] >= 0 ? joint->body[1] : joint->body[0];
+    if (!(finite == 0)) atomicMin(&v.step.control->offending_body, 2 * v.model.bodies + named);
+}
+
+/* Pair p, where its island has joints. */
+static __device__ __forceinline__ void look_at_pair(const cuda_view &v, int32_t p)
+{
+    const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
+    const int32_t a = pair->body_a, b = pair->body_b;
+    if (!v.islands.info[v.graph.label[a >= 0 ? a : b]].rows) return;
+    const struct sadmm_settings settings = *v.model.settings;
+    const struct joint_lead bodies[2] = {lead_of(v, a), lead_of(v, b)};
+    if (joint_contact_holds(pair->normal, &v.raw.points[pair->first], pair->count, bodies, &settings))
+        atomicOr(island_of(v, a, b), ISLAND_LEADS_STAY);
+}
+
+/* args.count: threads for joints; the others are for pairs. */
+static __global__ void __launch_bounds__(ROWS_THREADS)
+    joint_solution_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
+{
+    const int32_t t = (int32_t)(blockIdx.x * (unsigned)ROWS_THREADS + threadIdx.x);
+    if (v.model.live->abort_code) return;
+    if (t < v.joints.count) keep_joint(v, t);
+    else if (t >= args.count && v.step.limits && t - args.count < live_pairs(v.model)) look_at_pair(v, t - args.count);
+}
+
+/* ---- launches ---------------------------------------------------------------------------------------------------- */
+
+sadmm_status CUDA(launch_joint_rows)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    const int64_t threads = (int64_t)c->view.joints.count * LANES;
+    return CUDA(launch_of)(c, joint_rows_kernel, "rows of joints", (threads + ROWS_THREADS - 1) / ROWS_THREADS,
+                           ROWS_THREADS, &args, error);
+}
+
+sadmm_status CUDA(launch_joint_solution)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    cuda_args args = {};
+    const int64_t blocks = (c->view.joints.count + ROWS_THREADS - 1) / ROWS_THREADS,
+                  pairs = c->view.step.limits ? c->view.contacts.pair_capacity : 0;
+    if (blocks == 0) return SADMM_OK;
+    args.count = (int32_t)(blocks * ROWS_THREADS);
+    return CUDA(launch_of)(c, joint_solution_kernel, "joints", blocks + (pairs + ROWS_THREADS - 1) / ROWS_THREADS,
+                           ROWS_THREADS, &args, error);
+}
+
+/* ---- where they are ------------------------------------------------------------------------------------------------ */
+
+/* In BUFFER_JOINTS: definitions, geometry, first constraints. */
+static struct cuda_joint_middle *middle_of(const struct sadmm_context *c)
+{
+    return (struct cuda_joint_middle *)(buffer<struct sadmm_resident_joint>(c, BUFFER_JOINTS) + c->step->joints);
+}
+static int32_t *first_of(const struct sadmm_context *c) { return (int32_t *)(middle_of(c) + c->step->joints); }
+
+/* In BUFFER_JOINT_ROWS, twice, by the state that the step ends in: constraints and rows; then multipliers, velocities
+ * and sources. */
+static size_t row_set_bytes(const struct cuda_step *s)
+{
+    const size_t rows = (size_t)s->joint_constraints * SADMM_MAX_ROWS;
+    return CUDA(raw_row_bytes)(s->joint_constraints) + 6 * (size_t)s->bodies * sizeof(double) +
+           rows * (sizeof(double) + sizeof(struct sadmm_joint_source));
+}
+static char *row_set(const struct sadmm_context *c, int into)
+{
+    return buffer<char>(c, BUFFER_JOINT_ROWS) + (size_t)into * row_set_bytes(c->step);
+}
+
+static struct sadmm_joint_memory *memory_of(const struct sadmm_context *c, int state)
+{
+    return buffer<struct sadmm_joint_memory>(c, BUFFER_JOINT_MEMORY) + (size_t)state * (size_t)c->step->joints;
+}
+
+static struct sadmm_coupling_memory *couplings_of(const struct sadmm_context *c, int state)
+{
+    return buffer<struct sadmm_coupling_memory>(c, BUFFER_COUPLING_MEMORY) + (size_t)state * (size_t)c->step->couplings;
+}
+
+void CUDA(view_joints)(struct sadmm_context *c, int into, int substep)
+{
+    const struct cuda_step *s = c->step;
+    const int substeps = c->settings.substeps;
+    struct joint_view *joints = &c->view.joints;
+    joints->count = s->joints;
+    if (s->joints == 0) return;
+    joints->joints = buffer<struct sadmm_resident_joint>(c, BUFFER_JOINTS);
+    joints->middle = middle_of(c);
+    joints->first = first_of(c);
+    joints->begin = memory_of(c, step_state(into, -1, substeps));
+    joints->before = memory_of(c, step_state(into, substep - 1, substeps));
+    joints->after = memory_of(c, step_state(into, substep, substeps));
+    joints->couplings_before = couplings_of(c, step_state(into, substep - 1, substeps));
+    joints->couplings_after = couplings_of(c, step_state(into, substep, substeps));
+    joints->touch = buffer<int32_t>(c, BUFFER_JOINT_TOUCH);
+    c->view.rows.count = s->joint_constraints;
+    CUDA(bind_raw_rows)(c, row_set(c, into));
+    joints->solution = (double *)(row_set(c, into) + CUDA(raw_row_bytes)(s->joint_constraints));
+    joints->velocity = joints->solution + (size_t)s->joint_constraints * SADMM_MAX_ROWS;
+    joints->sources = (struct sadmm_joint_source *)(joints->velocity + 6 * (size_t)s->bodies);
+}
+
+/* ---- to the device, and back -------------------------------------------------------------------------------------- */
+
+static sadmm_status put(struct sadmm_context *c, void *to, const void *from, size_t bytes, struct sadmm_error *error)
+{
+    TRY(CUDA(reserve)(c, PINNED_ROWS, bytes, error));
+    TRY(CUDA(upload)(c, to, PINNED_ROWS, 0, from, bytes, error));
+    return CUDA(wait)(c, error);
+}
+
+static sadmm_status put_first(struct sadmm_context *c, const struct sadmm_resident_world *world,
+                              struct sadmm_error *error)
+{
+    const size_t n = (size_t)world->joint_count;
+    int32_t *first = (int32_t *)sadmm_alloc(n, sizeof *first), next = 0;
+    if (!first) return sadmm_fail_memory(error, "the cuda backend's joints");
+    for (size_t j = 0; j < n; ++j) {
+        first[j] = next;
+        next += world->joints[j].constraints;
+    }
+    const sadmm_status status = put(c, first_of(c), first, n * sizeof *first, error);
+    sadmm_free(first);
+    return status;
+}
+
+sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resident_world *world,
+                               struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    const size_t n = (size_t)world->joint_count;
+    int64_t constraints = 0;
+    for (size_t j = 0; j < n; ++j) constraints += world->joints[j].constraints;
+    if (constraints > INT32_MAX / (8 * ROW))
+        return sadmm_fail(error, SADMM_ERROR_LIMIT, "%lld constraints of joints: at most %d", (long long)constraints,
+                          INT32_MAX / (8 * ROW));
+    s->joints = c->view.joints.count = world->joint_count;
+    s->joint_constraints = (int32_t)constraints;
+    s->couplings = world->coupling_count;
+    if (n == 0) return SADMM_OK;
+    const cuda_capacity wanted[] = {
+        {BUFFER_JOINTS,
+         n * (sizeof(struct sadmm_resident_joint) + sizeof(struct cuda_joint_middle) + sizeof(int32_t))},
+        {BUFFER_JOINT_MEMORY, 3 * n * sizeof(struct sadmm_joint_memory)},
+        {BUFFER_COUPLING_MEMORY, 3 * (size_t)s->couplings * sizeof(struct sadmm_coupling_memory)},
+        {BUFFER_JOINT_ROWS, 2 * row_set_bytes(s)},
+        {BUFFER_JOINT_TOUCH, (size_t)s->bodies * sizeof(int32_t)},
+    };
+    TRY(reserve_all(c, wanted, error));
+    TRY(put(c, c->buffers[BUFFER_JOINTS].data, world->joints, n * sizeof *world->joints, error));
+    TRY(put(c, memory_of(c, 1 - s->into), world->joint_memory, n * sizeof *world->joint_memory, error));
+    if (s->couplings > 0)
+        TRY(put(c, couplings_of(c, 1 - s->into), world->coupling_memory,
+                (size_t)s->couplings * sizeof *world->coupling_memory, error));
+    return put_first(c, world, error);
+}
+
+/* In pieces that fit into pinned memory of that size. */
+static sadmm_status get(struct sadmm_context *c, void *to, const void *from, size_t bytes, struct sadmm_error *error)
+{
+    enum { PIECE = 16 << 20 };
+    TRY(CUDA(reserve)(c, PINNED_OUT, std::min(bytes, (size_t)PIECE), error));
+    for (size_t at = 0; at < bytes; at += PIECE) {
+        const size_t piece = std::min(bytes - at, (size_t)PIECE);
+        TRY(CUDA(download)(c, (const char *)from + at, piece, error));
+        memcpy((char *)to + at, c->buffers[PINNED_OUT].data, piece);
+    }
+    return SADMM_OK;
+}
+
+extern "C" sadmm_status CUDA(read_joints)(struct sadmm_context *c, struct sadmm_joint_memory *memory,
+                                          struct sadmm_coupling_memory *couplings, struct sadmm_error *error)
+{
+    const struct cuda_step *s = c->step;
+    CUDA_ENTER(c);
+    if (s->couplings > 0)
+        TRY(get(c, couplings, couplings_of(c, 1 - s->into), (size_t)s->couplings * sizeof *couplings, error));
+    return get(c, memory, memory_of(c, 1 - s->into), (size_t)s->joints * sizeof *memory, error);
+}
+
+/* One constraint from the device's form. */
+static bool take_constraint(struct sadmm_rows *rows, const struct sadmm_row_constraint *from, const struct raw_row *row,
+                            const double *own, double *solution)
+{
+    if (from->count == 0) return true;
+    const int32_t first = sadmm_rows_add(rows, from->count, from->body_a, from->body_b);
+    if (first < 0) return false;
+    for (int32_t k = 0; k < from->count; ++k) {
+        const size_t r = (size_t)(first + k);
+        memcpy(rows->jacobian_a + 6 * r, row[k].jacobian[0], sizeof row[k].jacobian[0]);
+        memcpy(rows->jacobian_b + 6 * r, row[k].jacobian[1], sizeof row[k].jacobian[1]);
+        sadmm_row_set(rows, first + k, row[k].gain, row[k].bias, row[k].compliance, row[k].lo, row[k].hi);
+        rows->lambda[r] = row[k].lambda;
+        solution[r] = own[k];
+    }
+    return true;
+}
+
+extern "C" sadmm_status CUDA(read_rows)(struct sadmm_context *c, struct sadmm_rows *rows, double *solution,
+                                        double *velocity, struct sadmm_error *error)
+{
+    const struct cuda_step *s = c->step;
+    const size_t count = (size_t)s->joint_constraints, bytes = row_set_bytes(s);
+    CUDA_ENTER(c);
+    char *all = (char *)sadmm_alloc(bytes, 1);
+    if (!all) return sadmm_fail_memory(error, "the joints' rows");
+    sadmm_status status = get(c, all, row_set(c, 1 - s->into), bytes, error);
+    const struct sadmm_row_constraint *constraints = (const struct sadmm_row_constraint *)all;
+    const struct raw_row *row = (const struct raw_row *)(constraints + count);
+    const double *own = (const double *)(row + count * SADMM_MAX_ROWS);
+    if (status == SADMM_OK && s->bodies > 0)
+        memcpy(velocity, own + count * SADMM_MAX_ROWS, 6 * (size_t)s->bodies * sizeof *velocity);
+    for (size_t k = 0; k < count && status == SADMM_OK; ++k)
+        if (!take_constraint(rows, &constraints[k], row + k * SADMM_MAX_ROWS, own + k * SADMM_MAX_ROWS, solution))
+            status = sadmm_fail_memory(error, "the joints' rows");
+    sadmm_free(all);
+    return status;
+}

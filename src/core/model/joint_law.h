@@ -1,0 +1,403 @@
+/* A joint's laws in a step: its definition and its bodies as scalar rows (math/row.h; docs/algorithm.md, section 10).
+ * Jacobians where the bodies are halfway through the step by their velocities at its start, laws from the errors at its
+ * start. Coordinates are independent of each other, so that a lane of a device may take one. In double. */
+#ifndef SADMM_CORE_MODEL_JOINT_LAW_H
+#define SADMM_CORE_MODEL_JOINT_LAW_H
+
+#include <math.h>
+
+#include "core/math/joint.h"
+#include "core/math/max.h"
+#include "core/math/rigid.h"
+#include "subadmm/joint.h"
+#include "forces.h"
+#include "system.h"
+
+/* What acts along a coordinate of a joint, each by a row of its own. */
+enum sadmm_joint_role {
+    SADMM_ROLE_LOCK,
+    SADMM_ROLE_LOWER,
+    SADMM_ROLE_UPPER,
+    SADMM_ROLE_DRIVE,
+    SADMM_ROLE_FRICTION,
+    SADMM_ROLE_SPRING,
+    SADMM_ROLE_ARMATURE,
+    SADMM_ROLE_COUNT
+};
+
+/* What a joint keeps from step to step. */
+struct sadmm_joint_memory {
+    double force[SADMM_ROLE_COUNT][JOINT_COORDINATES]; /* on b along the coordinate: what the next step starts from */
+    double angle[JOINT_COORDINATES];                   /* of those that wind, at the step's start */
+    double wrench[6], point[3];                        /* as in sadmm_joint_state, on b */
+    double local[6];                                   /* the wrench along the axes of a's frame */
+    bool leads_stay;                                   /* its bodies were moved by the velocities of the step's end */
+    bool broken;                                       /* it gave more than it bears */
+};
+
+/* A joint as a backend that keeps the world has it. */
+struct sadmm_resident_joint {
+    sadmm_joint_def def;
+    int32_t constraints;         /* that its rows may take, of up to six each */
+    int32_t body[2];             /* dynamic body; -1: it does not move, and its frame is in the world */
+    struct joint_frame frame[2];
+    int32_t coupling;            /* number of the coupling whose target its frame a is; -1: none */
+};
+
+/* The joint's row that a row of the step is. */
+struct sadmm_joint_source {
+    int32_t joint;
+    int8_t role, coordinate, sign;
+    double gap, slack; /* of limits: at the step's start, m or rad; what the turning of the row makes of it in a step */
+    double steered;    /* of the row's rate what sides give that are steered; it is in the bias */
+};
+
+/* A radial joint's coordinate 0 is a distance. */
+SADMM_INLINE bool joint_is_radial(sadmm_joint_kind kind)
+{
+    return kind == SADMM_JOINT_DISTANCE || kind == SADMM_JOINT_SPRING || kind == SADMM_JOINT_LINK;
+}
+
+/* A coordinate's fields as numbers, and back: what passes from the host to a device. */
+enum { JOINT_COORDINATE_NUMBERS = 14 };
+SADMM_INLINE void joint_coordinate_numbers(const sadmm_joint_coordinate *c, double x[JOINT_COORDINATE_NUMBERS])
+{
+    x[0] = c->limited ? 1 : 0, x[1] = c->lower, x[2] = c->upper;
+    x[3] = (double)(int)c->drive, x[4] = c->target_position, x[5] = c->target_speed;
+    x[6] = c->drive_stiffness, x[7] = c->drive_damping, x[8] = c->drive_force;
+    x[9] = c->friction;
+    x[10] = c->spring_stiffness, x[11] = c->spring_damping, x[12] = c->spring_rest;
+    x[13] = c->armature;
+}
+SADMM_INLINE void joint_coordinate_take(const double x[JOINT_COORDINATE_NUMBERS], sadmm_joint_coordinate *c)
+{
+    c->limited = x[0] != 0, c->lower = x[1], c->upper = x[2];
+    c->drive = (sadmm_drive)(int)x[3], c->target_position = x[4], c->target_speed = x[5];
+    c->drive_stiffness = x[6], c->drive_damping = x[7], c->drive_force = x[8];
+    c->friction = x[9];
+    c->spring_stiffness = x[10], c->spring_damping = x[11], c->spring_rest = x[12];
+    c->armature = x[13];
+}
+
+/* ---- bodies and geometry ------------------------------------------------------------------------------------------ */
+
+/* What a joint has at one end. */
+struct joint_body {
+    int32_t system_body;             /* -1: it does not move */
+    const struct sadmm_rigid *rigid; /* at the step's start; NULL: the frame is in the world */
+    bool steered;                    /* it is no body of the system and goes by its velocity, whatever acts on it; */
+    bool target;                     /* it is a coupling's target: of a (joint_hold_translations) */
+};
+
+SADMM_INLINE struct joint_end joint_end_on(const struct joint_frame *frame, const struct sadmm_rigid *rigid)
+{
+    struct joint_end end;
+    if (rigid) return joint_end_of(frame, v3_load(rigid->position), q_load(rigid->orientation));
+    end.point = end.arm = frame->position;
+    end.orientation = frame->orientation;
+    return end;
+}
+
+/* One body of a joint in a step. */
+struct joint_side {
+    int32_t system_body;             /* -1: it does not move, or is steered */
+    const struct sadmm_rigid *rigid; /* at the step's start; NULL: the static world */
+    bool steered;
+    double velocity[6], free[6];     /* at the start; at the end of free motion */
+    quat back;                       /* what turns the row's torque to where the body's moments are (docs) */
+};
+
+struct acting_joint {
+    struct joint_side side[2];
+    struct joint_geometry start, middle;
+    quat frame; /* of a, in the middle */
+};
+
+SADMM_INLINE struct joint_side joint_side_of(struct joint_body body, const struct sadmm_settings *settings)
+{
+    struct joint_side side;
+    int k;
+    side.system_body = body.system_body;
+    side.rigid = body.rigid;
+    side.steered = body.steered;
+    side.back.w = 1;
+    side.back.x = side.back.y = side.back.z = 0;
+    for (k = 0; k < 6; ++k)
+        side.velocity[k] = side.free[k] = body.system_body >= 0 || body.steered ? body.rigid->velocity[k] : 0;
+    if (body.system_body < 0) return side;
+    forces_free(side.rigid, settings->gravity, settings->dt, side.free);
+    if (!rigid_is_isotropic(v3_load(side.rigid->inertia)))
+        side.back = q_exp(v3_scale(v3_load(side.velocity + 3), -settings->dt / 2));
+    return side;
+}
+
+/* Its frame after half a step. */
+SADMM_INLINE struct joint_end joint_end_halfway(const struct joint_frame *frame, const struct joint_side *side,
+                                                double dt)
+{
+    return joint_end_of(frame, rigid_move(v3_load(side->rigid->position), v3_load(side->velocity), dt / 2),
+                        rigid_turn(q_load(side->rigid->orientation), v3_load(side->velocity + 3), dt / 2));
+}
+
+/* From a coupling's target, translations are by its origin's velocity alone, along axes that stay where they are in the
+ * middle of the step: a damper that went round with the frame would push what is beside it outwards, without bound. */
+SADMM_INLINE void joint_hold_translations(const struct joint_end start[2], struct acting_joint *acting)
+{
+    const vec3 way = v3_sub(start[1].point, start[0].point);
+    int k;
+    acting->start.arm_a = acting->middle.arm_a = v3(0, 0, 0);
+    for (k = 0; k < 3; ++k) {
+        acting->start.axis[k] = acting->middle.axis[k];
+        acting->start.value[k] = v3_dot(acting->middle.axis[k], way);
+    }
+}
+
+SADMM_INLINE struct acting_joint joint_act(const sadmm_joint_def *def, const struct joint_frame frame[2],
+                                           const struct joint_body body[2], const struct sadmm_settings *settings)
+{
+    const int radial = joint_is_radial(def->kind);
+    struct acting_joint acting;
+    struct joint_end start[2], middle[2];
+    int s;
+    for (s = 0; s < 2; ++s) {
+        struct joint_side *side = &acting.side[s];
+        *side = joint_side_of(body[s], settings);
+        start[s] = middle[s] = joint_end_on(&frame[s], side->rigid);
+        if (side->system_body >= 0 || side->steered) middle[s] = joint_end_halfway(&frame[s], side, settings->dt);
+    }
+    acting.start = joint_geometry_of(&start[0], &start[1], def->locks, radial);
+    acting.middle = joint_geometry_of(&middle[0], &middle[1], def->locks, radial);
+    acting.frame = middle[0].orientation;
+    if (body[0].target) joint_hold_translations(start, &acting);
+    return acting;
+}
+
+/* The step's row of coordinate k on a side. */
+SADMM_INLINE void joint_step_row(const struct acting_joint *acting, int s, int k, double row[6])
+{
+    vec3 linear, angular;
+    const double sign = s ? 1 : -1;
+    joint_row(&acting->middle, k, s ? acting->middle.arm_b : acting->middle.arm_a, &linear, &angular);
+    v3_store(v3_scale(linear, sign), row);
+    v3_store(v3_scale(q_turn(acting->side[s].back, angular), sign), row + 3);
+}
+
+SADMM_INLINE double joint_row_product(const double row[6], const double v[6])
+{
+    double sum = 0;
+    int j;
+    for (j = 0; j < 6; ++j) sum += row[j] * v[j];
+    return sum;
+}
+
+/* How fast a coordinate changes by the velocities of a and b. */
+SADMM_INLINE double joint_rate(const struct joint_geometry *geometry, int coordinate, const double a[6],
+                               const double b[6])
+{
+    double rate = 0;
+    int s;
+    for (s = 0; s < 2; ++s) {
+        const double *v = s ? b : a;
+        vec3 linear, angular;
+        double own;
+        joint_row(geometry, coordinate, s ? geometry->arm_b : geometry->arm_a, &linear, &angular);
+        own = v3_dot(linear, v3_load(v)) + v3_dot(angular, v3_load(v + 3));
+        rate += s ? own : -own;
+    }
+    return rate;
+}
+
+/* row A^-1 row^T of a rigid body. */
+SADMM_INLINE double joint_response(const struct joint_side *side, const double row[6])
+{
+    const double *inertia = side->rigid->inertia;
+    const vec3 turn = m3_tmul(q_matrix(q_load(side->rigid->orientation)), v3_load(row + 3));
+    return v3_norm2(v3_load(row)) / side->rigid->mass + turn.x * turn.x / inertia[0] + turn.y * turn.y / inertia[1] +
+           turn.z * turn.z / inertia[2];
+}
+
+/* ---- one coordinate ----------------------------------------------------------------------------------------------- */
+
+/* A row's law (math/row.h): sign times coordinate k, by its role. */
+struct joint_law {
+    int role, coordinate, sign;
+    double gain, bias, compliance, lo, hi;
+    double gap, slack; /* of limits: sadmm_joint_source */
+    double steered;    /* likewise */
+};
+
+/* Two limits, drive, friction, spring and armature of a coordinate that is free. */
+enum { JOINT_COORDINATE_LAWS = 6 };
+
+struct joint_laws {
+    struct joint_law law[JOINT_COORDINATE_LAWS];
+    int count;
+};
+
+/* Of one coordinate, what its laws are made of. */
+struct joint_moving {
+    const struct sadmm_joint_memory *memory;
+    double value, before; /* and its rate, at the step's start */
+    double turning;       /* what the row's rate by the velocities at the start is more: axes and arms turn */
+    double turned;        /* what the rate at the end is more than the row's, so far as the law counts it */
+    double steered;       /* of the rate what steered sides give */
+    double reach;         /* it may move by so much */
+    double response;
+    double dt, most;      /* most: speed of corrections */
+};
+
+SADMM_INLINE void joint_add_law(struct joint_laws *laws, const struct joint_moving *m, int role, int k, int sign,
+                                double gain, double bias, double compliance, double lo, double hi, double gap)
+{
+    struct joint_law *law = &laws->law[laws->count++];
+    law->role = role, law->coordinate = k, law->sign = sign;
+    law->gain = gain, law->bias = bias, law->compliance = compliance;
+    law->lo = lo, law->hi = hi;
+    law->gap = gap;
+    law->steered = sign * m->steered;
+    law->slack = role == SADMM_ROLE_LOWER || role == SADMM_ROLE_UPPER ? 2 * m->dt * fabs(m->turning) : 0;
+}
+
+SADMM_INLINE struct joint_moving joint_moving_of(const sadmm_joint_def *def, const struct sadmm_joint_memory *memory,
+                                                 const struct acting_joint *acting, int k,
+                                                 const struct sadmm_settings *settings)
+{
+    const struct joint_side *a = &acting->side[0], *b = &acting->side[1];
+    struct joint_moving m;
+    double middle = 0, free = 0, steered = 0;
+    int s;
+    m.memory = memory;
+    m.dt = settings->dt;
+    m.most = settings->correction_speed;
+    m.response = 0;
+    m.value = acting->start.value[k];
+    if (joint_winds(def->locks, k)) m.value = joint_unwind(m.value, memory->angle[k]);
+    if (k == 0 && def->locks & 1 && joint_is_radial(def->kind)) m.value -= def->length;
+    m.before = joint_rate(&acting->start, k, a->velocity, b->velocity);
+    for (s = 0; s < 2; ++s) {
+        double row[6];
+        if (acting->side[s].system_body < 0 && !acting->side[s].steered) continue;
+        joint_step_row(acting, s, k, row);
+        if (acting->side[s].steered) {
+            steered += joint_row_product(row, acting->side[s].velocity);
+            continue;
+        }
+        middle += joint_row_product(row, acting->side[s].velocity);
+        free += joint_row_product(row, acting->side[s].free);
+        m.response += joint_response(&acting->side[s], row);
+    }
+    middle += steered, free += steered;
+    m.steered = steered;
+    m.turning = middle - m.before;
+    m.turned = (memory->leads_stay ? 0 : m.turning) + steered; /* the solve's rates are of its bodies alone */
+    m.reach = 2 * m.dt * max_of(fabs(m.before), fabs(free));
+    return m;
+}
+
+SADMM_INLINE void joint_add_limits(struct joint_laws *laws, const struct joint_moving *m, int k,
+                                   const sadmm_joint_coordinate *c)
+{
+    int upper;
+    for (upper = 0; upper < 2; ++upper) {
+        const int role = upper ? SADMM_ROLE_UPPER : SADMM_ROLE_LOWER, sign = upper ? -1 : 1;
+        const double gap = upper ? c->upper - m->value : m->value - c->lower;
+        const bool pressed = m->memory->force[role][k] != 0;
+        double speed;
+        if (gap > m->reach && !pressed) continue;
+        /* it may close what is left in the step; once it presses it is held as what is locked is */
+        speed = gap >= 0 && !pressed ? gap / m->dt : joint_feedback(gap, m->dt, m->most);
+        if (isfinite(speed)) joint_add_law(laws, m, role, k, sign, 1, sign * m->turned + speed, 0, 0, INFINITY, gap);
+    }
+}
+
+SADMM_INLINE void joint_add_spring(struct joint_laws *laws, const struct joint_moving *m, int k, int role,
+                                   double stiffness, double damping, double rest, double speed, double most)
+{
+    const double own = joint_late(stiffness, damping, m->response, m->dt), late = m->memory->leads_stay ? 1 : own;
+    double gain, bias;
+    joint_spring(stiffness, damping, m->value - rest, speed, m->before, m->dt, late,
+                 late + joint_lead(stiffness, damping, own, m->dt), &gain, &bias);
+    joint_add_law(laws, m, role, k, 1, gain, bias + gain * m->turned, 1, -most, most, 0);
+}
+
+/* Of coordinate k. A locked one has one law; what is locked comes first in a joint's rows, for it is held together. */
+SADMM_INLINE void joint_coordinate_laws(const sadmm_joint_def *def, int k, const struct joint_moving *m,
+                                        struct joint_laws *laws)
+{
+    const sadmm_joint_coordinate *c = &def->coordinates[k];
+    const double drive = c->drive_force * m->dt, friction = c->friction * m->dt;
+    laws->count = 0;
+    if (def->locks >> k & 1) {
+        joint_add_law(laws, m, SADMM_ROLE_LOCK, k, 1, 1, m->turned + joint_feedback(m->value, m->dt, m->most), 0,
+                      -INFINITY, INFINITY, 0);
+        return;
+    }
+    if (c->limited) joint_add_limits(laws, m, k, c);
+    if (c->drive == SADMM_DRIVE_SPEED && drive > 0)
+        joint_add_law(laws, m, SADMM_ROLE_DRIVE, k, 1, 1, m->turned - c->target_speed, 0, -drive, drive, 0);
+    if (c->drive == SADMM_DRIVE_POSITION && drive > 0)
+        joint_add_spring(laws, m, k, SADMM_ROLE_DRIVE, c->drive_stiffness, c->drive_damping, c->target_position,
+                         c->target_speed, drive);
+    if (friction > 0) joint_add_law(laws, m, SADMM_ROLE_FRICTION, k, 1, 1, m->turned, 0, -friction, friction, 0);
+    if (c->spring_stiffness > 0 || c->spring_damping > 0)
+        joint_add_spring(laws, m, k, SADMM_ROLE_SPRING, c->spring_stiffness, c->spring_damping, c->spring_rest, 0,
+                         INFINITY);
+    if (c->armature > 0) /* lambda = -armature (rate at the end - rate at the start) */
+        joint_add_law(laws, m, SADMM_ROLE_ARMATURE, k, 1, c->armature, c->armature * (m->turned - m->before), 1,
+                      -INFINITY, INFINITY, 0);
+}
+
+/* Does the joint have coordinate k? */
+SADMM_INLINE bool joint_has_coordinate(const sadmm_joint_def *def, int k)
+{
+    return k == 0 || def->locks >> k & 1 || !joint_is_radial(def->kind);
+}
+
+/* Most laws that the joint may have in a step. */
+SADMM_INLINE int joint_most_laws(const sadmm_joint_def *def)
+{
+    int count = 0, k;
+    for (k = 0; k < JOINT_COORDINATES; ++k) {
+        const sadmm_joint_coordinate *c = &def->coordinates[k];
+        if (!joint_has_coordinate(def, k)) continue;
+        count += def->locks >> k & 1 ? 1
+                                     : (c->limited ? 2 : 0) + (c->drive != SADMM_DRIVE_OFF) + (c->friction > 0) +
+                                           (c->spring_stiffness > 0 || c->spring_damping > 0) + (c->armature > 0);
+    }
+    return count;
+}
+
+/* ---- the solution -------------------------------------------------------------------------------------------------- */
+
+SADMM_INLINE void joint_forget_forces(struct sadmm_joint_memory *memory)
+{
+    int k, role;
+    for (k = 0; k < JOINT_COORDINATES; ++k) {
+        for (role = 0; role < SADMM_ROLE_COUNT; ++role) memory->force[role][k] = 0;
+        memory->wrench[k] = memory->local[k] = 0;
+        if (k < 3) memory->point[k] = 0;
+    }
+}
+
+/* A row's multiplier, as a force and as what it is in the world, about the joint's point; axis: in the middle of the
+ * step. */
+SADMM_INLINE void joint_keep_row(struct sadmm_joint_memory *memory, const vec3 axis[JOINT_COORDINATES], int role,
+                                 int coordinate, double force)
+{
+    int j;
+    memory->force[role][coordinate] = force;
+    for (j = 0; j < 3; ++j) memory->wrench[(coordinate < 3 ? 0 : 3) + j] += force * v3_part(axis[coordinate], j);
+}
+
+/* All rows of the joint are in its wrench. */
+SADMM_INLINE void joint_end_wrench(struct sadmm_joint_memory *memory, const sadmm_joint_def *def, quat frame)
+{
+    const mat3 axes = q_matrix(frame);
+    int part;
+    for (part = 0; part < 2; ++part)
+        v3_store(m3_tmul(axes, v3_load(memory->wrench + 3 * part)), memory->local + 3 * part);
+    memory->broken = memory->broken || v3_norm(v3_load(memory->wrench)) > def->break_force ||
+                     v3_norm(v3_load(memory->wrench + 3)) > def->break_torque;
+}
+
+#endif

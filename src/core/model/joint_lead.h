@@ -1,0 +1,102 @@
+/* Where joints let bodies go (docs/algorithm.md, section 10): all bodies of an island with joints move by the mean of
+ * their velocities before and after the step, or all by those after it (math/lead.h), or they would come apart. In
+ * double. */
+#ifndef SADMM_CORE_MODEL_JOINT_LEAD_H
+#define SADMM_CORE_MODEL_JOINT_LEAD_H
+
+#include "core/base/contact_set.h"
+#include "core/math/lead.h"
+#include "joint_law.h"
+
+/* Of islands. */
+enum { ISLAND_JOINED = 1, ISLAND_LEADS_STAY = 2 };
+
+/* A body as the step ends. */
+struct joint_lead {
+    const struct sadmm_rigid *rigid; /* at the start; NULL: it does not move */
+    double velocity[6], lead[6];
+};
+
+/* velocity: at the end; rigid NULL: not read. */
+SADMM_INLINE struct joint_lead joint_lead_of(const struct sadmm_rigid *rigid, const double *velocity)
+{
+    struct joint_lead out;
+    int k;
+    out.rigid = rigid;
+    for (k = 0; k < 6; ++k) {
+        out.velocity[k] = rigid ? velocity[k] : 0;
+        out.lead[k] = rigid ? (velocity[k] - rigid->velocity[k]) / 2 : 0;
+    }
+    return out;
+}
+
+/* Of a pair of shapes in an island with joints, points with the solution's impulses: do leads stay, since they would
+ * close a contact, or a body rests on one? */
+SADMM_INLINE bool joint_contact_holds(const double normal[3], const struct sadmm_contact_point *points, int32_t count,
+                                      const struct joint_lead bodies[2], const struct sadmm_settings *settings)
+{
+    const int carried = TOUCH_CARRIED | TOUCH_MOVED;
+    struct lead_touch touch = {0, {0, 0}};
+    int32_t k;
+    int s;
+    bool holds;
+    for (k = 0; k < count; ++k) {
+        const struct sadmm_contact_point *point = &points[k];
+        double speed = 0, lead[2], size[2], moves[2] = {0, 0}, rest[2] = {0, 0};
+        for (s = 0; s < 2; ++s) {
+            const struct joint_lead *body = &bodies[s];
+            const double *arm = s ? point->arm_b : point->arm_a, sign = s ? 1 : -1;
+            speed += sign * lead_along(normal, body->velocity, arm);
+            lead[s] = sign * lead_along(normal, body->lead, arm);
+            size[s] = lead_size(body->lead, arm);
+            if (!body->rigid) continue;
+            moves[s] = lead_speed(body->rigid->velocity, body->velocity, arm);
+            rest[s] = lead_rest_speed(settings->gravity, body->rigid->gravity_scale, body->rigid->wrench,
+                                      body->rigid->mass, settings->dt);
+        }
+        lead_add_point(&touch, point->gap, dot3(normal, point->impulse), speed, lead, size, moves, rest, settings->dt,
+                       settings->slop);
+    }
+    holds = touch.island & TOUCH_JOLT;
+    for (s = 0; s < 2; ++s) holds = holds || (bodies[s].rigid && (touch.body[s] & carried) == TOUCH_CARRIED);
+    return holds;
+}
+
+/* Does taking leads back carry the joint beyond a limit that it has just reached? (One that presses all the time, a
+ * stone on a string, is met by the mean of both velocities, too.) row_a, row_b: the row's Jacobians. */
+SADMM_INLINE bool joint_limit_jolts(const struct sadmm_joint_source *source, double lambda, const double row_a[6],
+                                    const double row_b[6], const struct joint_lead bodies[2],
+                                    const struct sadmm_settings *settings)
+{
+    double lead = 0, speed = source->steered;
+    int s, j;
+    if ((source->role != SADMM_ROLE_LOWER && source->role != SADMM_ROLE_UPPER) || !(lambda > 0)) return false;
+    for (s = 0; s < 2; ++s) {
+        const double *row = s ? row_b : row_a;
+        for (j = 0; j < 6; ++j) {
+            lead += row[j] * bodies[s].lead[j];
+            speed += row[j] * bodies[s].velocity[j];
+        }
+    }
+    return source->gap + settings->dt * (speed - lead) <
+           (source->gap < 0 ? source->gap : 0) - source->slack - LEAD_SLOP * settings->slop;
+}
+
+/* Velocities of bodies whose principal moments differ are solved for as what they are in the body's frame, which turns
+ * by the mean velocity: with it turns what they are in the world. Energy and the size of the angular momentum stay. */
+SADMM_INLINE void joint_move(const struct sadmm_rigid *from, const double v[6], bool leads_stay, double dt,
+                             double position[3], double orientation[4], double velocity[6])
+{
+    double mean[6];
+    int k;
+    for (k = 0; k < 6; ++k) {
+        mean[k] = leads_stay ? v[k] : (from->velocity[k] + v[k]) / 2;
+        velocity[k] = v[k];
+    }
+    v3_store(rigid_move(v3_load(from->position), v3_load(mean), dt), position);
+    q_store(rigid_turn(q_load(from->orientation), v3_load(mean + 3), dt), orientation);
+    if (!leads_stay && !rigid_is_isotropic(v3_load(from->inertia)))
+        v3_store(q_turn(q_exp(v3_scale(v3_load(mean + 3), dt)), v3_load(v + 3)), velocity + 3);
+}
+
+#endif

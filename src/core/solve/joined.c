@@ -1,0 +1,293 @@
+#include "joined.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "core/model/system_math.h"
+#include "joined_order.h"
+
+struct sadmm_joined {
+    struct sadmm_joined_order order;
+    int32_t *bodies;        /* two a constraint: what the order was made for */
+    size_t constraints;
+    int32_t body_count;
+    int32_t *entry;         /* bodies: entry in the order's list, -1: not joined */
+    double *work;           /* the arrays of a view */
+    uint8_t *state;
+    double *impulse;        /* entries x 6: J^T lambda */
+    size_t bodies_capacity, entry_capacity, work_capacity, state_capacity, impulse_capacity;
+};
+
+/* One call. */
+struct solving {
+    struct sadmm_joined *j;
+    const struct sadmm_system *system;
+    const struct sadmm_row_constraint *slots;
+    size_t slot_count;
+    const struct sadmm_settings *settings;
+    struct joined_view view;
+};
+
+struct sadmm_joined *sadmm_joined_create(void)
+{
+    return (struct sadmm_joined *)sadmm_alloc(1, sizeof(struct sadmm_joined));
+}
+
+void sadmm_joined_destroy(struct sadmm_joined *j)
+{
+    if (!j) return;
+    sadmm_joined_order_free(&j->order);
+    void *blocks[] = {j->bodies, j->entry, j->work, j->state, j->impulse};
+    for (size_t k = 0; k < sizeof blocks / sizeof *blocks; ++k) sadmm_free(blocks[k]);
+    sadmm_free(j);
+}
+
+/* ---- structure ------------------------------------------------------------------------------------------------------ */
+
+static bool same_graph(const struct solving *s)
+{
+    const struct sadmm_joined *j = s->j;
+    if (j->constraints != s->slot_count || j->body_count != s->system->body_count) return false;
+    for (size_t k = 0; k < s->slot_count; ++k)
+        if (j->bodies[2 * k] != s->slots[k].body_a || j->bodies[2 * k + 1] != s->slots[k].body_b) return false;
+    return true;
+}
+
+static bool find_order(const struct solving *s)
+{
+    struct sadmm_joined *j = s->j;
+    const size_t n = s->slot_count, bodies = (size_t)s->system->body_count;
+    if (same_graph(s)) return true;
+    j->constraints = 0;
+    if (!sadmm_grow_empty(&j->bodies, &j->bodies_capacity, 2 * n, sizeof *j->bodies) ||
+        !sadmm_grow_empty(&j->entry, &j->entry_capacity, bodies, sizeof *j->entry))
+        return false;
+    for (size_t k = 0; k < n; ++k) {
+        j->bodies[2 * k] = s->slots[k].body_a;
+        j->bodies[2 * k + 1] = s->slots[k].body_b;
+    }
+    if (!sadmm_joined_order_make(&j->order, j->bodies, (int32_t)n, s->system->body_count, SADMM_JOINED_AROUND))
+        return false;
+    for (size_t i = 0; i < bodies; ++i) j->entry[i] = -1;
+    for (int32_t e = 0; e < j->order.s.bodies; ++e) j->entry[j->order.s.body[e]] = e;
+    j->constraints = n;
+    j->body_count = s->system->body_count;
+    return true;
+}
+
+static double *take(double **memory, size_t count)
+{
+    double *at = *memory;
+    *memory += count;
+    return at;
+}
+
+static bool make_view(struct solving *s)
+{
+    struct sadmm_joined *j = s->j;
+    struct sadmm_rows *rows = s->system->rows;
+    const struct joined_structure *o = &j->order.s;
+    const size_t n = (size_t)s->system->body_count, r = rows->row_count, places = (size_t)o->count;
+    const size_t size = 84 * n + 14 * r + (JOINED_BLOCK + JOINED_ROWS) * places + JOINED_BLOCK * (size_t)o->blocks;
+    if (!sadmm_grow_empty(&j->work, &j->work_capacity, size, sizeof *j->work) ||
+        !sadmm_grow_empty(&j->state, &j->state_capacity, r, sizeof *j->state) ||
+        !sadmm_grow_empty(&j->impulse, &j->impulse_capacity, 6 * (size_t)o->bodies, sizeof *j->impulse))
+        return false;
+    double *memory = j->work;
+    s->view = (struct joined_view){
+        .s = *o, .constraints = s->slots, .jacobian = {rows->jacobian_a, rows->jacobian_b}, .gain = rows->gain,
+        .bias = rows->bias, .compliance = rows->compliance, .lo = rows->lo, .hi = rows->hi, .jacobian_stride = 6,
+        .law_stride = 1, .velocity = s->system->velocity, .A = take(&memory, 36 * n), .factor = take(&memory, 36 * n),
+        .missing = take(&memory, 6 * n), .dv = take(&memory, 6 * n), .lambda = take(&memory, r),
+        .change = take(&memory, r), .answer = take(&memory, 12 * r), .state = j->state,
+        .diagonal = take(&memory, JOINED_BLOCK * places), .right = take(&memory, JOINED_ROWS * places),
+        .below = take(&memory, JOINED_BLOCK * (size_t)o->blocks)};
+    memcpy(s->view.lambda, rows->lambda, r * sizeof *rows->lambda);
+    return true;
+}
+
+/* ---- bodies ---------------------------------------------------------------------------------------------------------- */
+
+static int32_t pair_body(const struct sadmm_contact_pair *pair, int side) { return side ? pair->body_b : pair->body_a; }
+
+static void find_impulses(struct solving *s)
+{
+    const struct sadmm_contact_set *contacts = s->system->contacts;
+    const int32_t *entry = s->j->entry;
+    memset(s->j->impulse, 0, 6 * (size_t)s->view.s.bodies * sizeof *s->j->impulse);
+    for (size_t p = 0; p < contacts->pair_count; ++p) {
+        const struct sadmm_contact_pair *pair = &contacts->pairs[p];
+        for (int side = 0; side < 2; ++side) {
+            const int32_t body = pair_body(pair, side), e = body >= 0 ? entry[body] : -1;
+            if (e >= 0)
+                joined_add_pair(&contacts->points[pair->first], pair->count, side, s->j->impulse + 6 * (size_t)e);
+        }
+    }
+    for (size_t k = 0; k < s->slot_count; ++k) {
+        const struct sadmm_row_constraint *constraint = &s->slots[k];
+        for (int side = 0; side < 2; ++side) {
+            const int32_t body = joined_body(constraint, side), e = body >= 0 ? entry[body] : -1;
+            if (e >= 0) joined_add_rows(&s->view, constraint, side, s->j->impulse + 6 * (size_t)e);
+        }
+    }
+}
+
+/* A, and b - A v + J^T lambda. */
+static void find_missing(struct solving *s)
+{
+    for (int32_t e = 0; e < s->view.s.bodies; ++e) {
+        const size_t i = (size_t)s->view.s.body[e];
+        double *A = s->view.A + 36 * i, b[6];
+        sadmm_system_body(s->system, s->settings, (int32_t)i, A, b);
+        joined_miss(&s->view, e, b, s->j->impulse + 6 * (size_t)e);
+    }
+}
+
+/* The speed that its impulses change a part by. */
+static double speed_of(const struct solving *s, int32_t part)
+{
+    double energy = 0, mass = 0;
+    for (int32_t e = s->view.s.first_body[part]; e < s->view.s.first_body[part + 1]; ++e) {
+        const double *A = s->view.A + 36 * (size_t)s->view.s.body[e];
+        energy += joined_energy(A, s->j->impulse + 6 * (size_t)e);
+        mass += A[0];
+    }
+    return joined_speed(energy, mass);
+}
+
+/* The factors of A + C. */
+static void factor_bodies(struct solving *s)
+{
+    const struct sadmm_contact_set *contacts = s->system->contacts;
+    for (int32_t part = 0; part < s->view.s.parts; ++part) {
+        const double speed = speed_of(s, part);
+        for (int32_t e = s->view.s.first_body[part]; e < s->view.s.first_body[part + 1]; ++e)
+            s->j->impulse[6 * (size_t)e] = speed; /* has been used */
+    }
+    for (int32_t e = 0; e < s->view.s.bodies; ++e) {
+        const size_t i = (size_t)s->view.s.body[e];
+        memcpy(s->view.factor + 36 * i, s->view.A + 36 * i, 36 * sizeof(double));
+    }
+    for (size_t p = 0; p < contacts->pair_count; ++p) {
+        const struct sadmm_contact_pair *pair = &contacts->pairs[p];
+        for (int side = 0; side < 2; ++side) {
+            const int32_t body = pair_body(pair, side), e = body >= 0 ? s->j->entry[body] : -1;
+            if (e >= 0)
+                joined_add_contact(&contacts->points[pair->first], pair->count, side, s->j->impulse[6 * (size_t)e],
+                                   s->view.factor + 36 * (size_t)body);
+        }
+    }
+    for (int32_t e = 0; e < s->view.s.bodies; ++e) joined_factor_body(&s->view, e);
+}
+
+/* ---- rows ------------------------------------------------------------------------------------------------------------ */
+
+/* Every row of every place. */
+#define EACH_ROW(view, p, constraint, r)                                                              \
+    for (int32_t p = 0; p < (view)->s.count; ++p)                                                     \
+        for (const struct sadmm_row_constraint *constraint = joined_at(view, p), *end_ = constraint + 1; \
+             constraint < end_; ++constraint)                                                         \
+            for (int32_t r = constraint->first; r < constraint->first + constraint->count; ++r)
+
+static void begin_rows(const struct joined_view *v)
+{
+    EACH_ROW(v, p, constraint, r) {
+        joined_respond(v, constraint, r);
+        joined_begin_row(v, constraint, r);
+    }
+}
+
+static bool change_rows(const struct joined_view *v)
+{
+    bool changed = false;
+    EACH_ROW(v, p, constraint, r) changed = joined_change_row(v, constraint, r) || changed;
+    return changed;
+}
+
+/* ---- a pass ---------------------------------------------------------------------------------------------------------- */
+
+static void factorize(const struct joined_view *v)
+{
+    for (int32_t p = 0; p < v->s.count; ++p) {
+        double *diagonal = v->diagonal + JOINED_BLOCK * (size_t)p;
+        for (int k = 0; k < JOINED_ROWS; ++k)
+            for (int q = 0; q <= k; ++q) diagonal[JOINED_ROWS * k + q] = joined_updated(v, p, p, p, k, q);
+        joined_factor_diagonal(diagonal);
+        for (int32_t b = v->s.first_below[p]; b < v->s.first_below[p + 1]; ++b) {
+            double *block = v->below + JOINED_BLOCK * (size_t)b;
+            for (int k = 0; k < JOINED_ROWS; ++k) {
+                for (int q = 0; q < JOINED_ROWS; ++q)
+                    block[JOINED_ROWS * k + q] = joined_updated(v, v->s.count + b, v->s.row[b], p, k, q);
+                joined_factor_row(block + JOINED_ROWS * k, diagonal);
+            }
+        }
+    }
+}
+
+static void move_bodies(const struct joined_view *v)
+{
+    for (int32_t e = 0; e < v->s.bodies; ++e) joined_move(v, e);
+}
+
+/* Multipliers of rows inside their bounds, for what the others are. */
+static void solve_rows(const struct joined_view *v)
+{
+    EACH_ROW(v, p, constraint, r)
+        if (v->state[r] == JOINED_INSIDE) v->change[r] = 0;
+    move_bodies(v);
+    for (int32_t p = 0; p < v->s.count; ++p)
+        for (int k = 0; k < JOINED_ROWS; ++k) v->right[JOINED_ROWS * (size_t)p + (size_t)k] = joined_right(v, p, k);
+    for (int32_t p = 0; p < v->s.count; ++p) {
+        double *own = v->right + JOINED_ROWS * (size_t)p, sum[JOINED_ROWS];
+        for (int k = 0; k < JOINED_ROWS; ++k) sum[k] = joined_forward_row(v, p, k);
+        dense6_forward(v->diagonal + JOINED_BLOCK * (size_t)p, sum, own);
+    }
+    for (int32_t p = v->s.count - 1; p >= 0; --p) {
+        double *own = v->right + JOINED_ROWS * (size_t)p, sum[JOINED_ROWS];
+        for (int k = 0; k < JOINED_ROWS; ++k) sum[k] = joined_backward_row(v, p, k);
+        dense6_backward(v->diagonal + JOINED_BLOCK * (size_t)p, sum, own);
+    }
+    EACH_ROW(v, p, constraint, r)
+        if (v->state[r] == JOINED_INSIDE)
+            v->change[r] = v->right[JOINED_ROWS * (size_t)p + (size_t)(r - constraint->first)];
+    move_bodies(v);
+}
+
+static bool is_finite(const struct joined_view *v)
+{
+    double sum = 0;
+    for (int32_t e = 0; e < v->s.bodies; ++e)
+        for (size_t k = 0; k < 6; ++k) sum += v->dv[6 * (size_t)v->s.body[e] + k] * 0;
+    EACH_ROW(v, p, constraint, r) sum += v->change[r] * 0;
+    return sum == 0;
+}
+
+static void store(const struct joined_view *v, double *lambda)
+{
+    for (int32_t e = 0; e < v->s.bodies; ++e)
+        for (size_t k = 0; k < 6; ++k)
+            v->velocity[6 * (size_t)v->s.body[e] + k] += v->dv[6 * (size_t)v->s.body[e] + k];
+    EACH_ROW(v, p, constraint, r) lambda[r] = joined_bounded(v, r);
+}
+
+sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_system *system,
+                                const struct sadmm_row_constraint *slots, size_t slot_count,
+                                const struct sadmm_settings *settings, struct sadmm_error *error)
+{
+    struct solving s = {.j = joined, .system = system, .slots = slots, .slot_count = slot_count, .settings = settings};
+    if (!system->rows || system->rows->constraint_count == 0) return SADMM_OK;
+    if (!find_order(&s) || !make_view(&s)) return sadmm_fail_memory(error, "joined bodies");
+    if (s.view.s.count == 0) return SADMM_OK;
+    find_impulses(&s);
+    find_missing(&s);
+    factor_bodies(&s);
+    begin_rows(&s.view);
+    for (int pass = 0; pass < JOINED_PASSES; ++pass) {
+        factorize(&s.view);
+        solve_rows(&s.view);
+        if (!change_rows(&s.view)) break;
+    }
+    if (is_finite(&s.view)) store(&s.view, system->rows->lambda);
+    return SADMM_OK;
+}

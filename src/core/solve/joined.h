@@ -1,0 +1,38 @@
+/* Bodies joined by constraint rows, solved directly: what the method's Step 1 is when such bodies are one subsystem.
+ *
+ * An iteration brings a load along one joint at a time; a chain of a hundred links that holds a thousand times its own
+ * weight would take tens of thousands of them. So before the first iteration and after the last one of a world's step
+ * velocities and multipliers of the rows are those that solve
+ *
+ *     (A + C) dv - J^T dlambda = b - A v + J^T lambda + J_c^T lambda_c        every body with rows
+ *     gain J (v + dv) + bias + compliance (lambda + dlambda) = 0              every row inside its bounds
+ *
+ * with the contacts' impulses lambda_c as they are, and C = sum B J_c^T J_c over the contacts that press, B the mass that
+ * rests on each (math/weight.h). A row whose multiplier leaves its bounds stays at the bound; one that is held there
+ * against its law is let go. Where everything holds already nothing changes: a solution stays what it is. Islands
+ * under rows alone end at their solution whatever the iterations.
+ *
+ * dlambda by a sparse Cholesky factor of J (A + C)^-1 J^T, a block a constraint, in an order of least degree. In double. */
+#ifndef SADMM_CORE_SOLVE_JOINED_H
+#define SADMM_CORE_SOLVE_JOINED_H
+
+#include "core/base/error.h"
+#include "core/model/system.h"
+
+struct sadmm_joined;
+
+/* NULL: no memory. */
+struct sadmm_joined *sadmm_joined_create(void);
+void sadmm_joined_destroy(struct sadmm_joined *joined);
+
+/* Constraints at one body; more of them are left to the iteration, since all are coupled to each other. */
+enum { SADMM_JOINED_AROUND = 64 };
+
+/* system->velocity and the multipliers of system->rows, in place. slots: constraints of these rows, at places that stay
+ * from step to step, so that the order does, too: one may have no rows at the time, but has the bodies that it joins
+ * when it has. What does not fit a direct solve is left as it is. Errors: OUT_OF_MEMORY, nothing has changed. */
+sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_system *system,
+                                const struct sadmm_row_constraint *slots, size_t slot_count,
+                                const struct sadmm_settings *settings, struct sadmm_error *error);
+
+#endif

@@ -1,0 +1,174 @@
+/* Joints of a world that a backend keeps (resident.h): what it is given, what changes, and what comes back. */
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "world_internal.h"
+
+/* ---- to the backend ---------------------------------------------------------------------------------------------- */
+
+static struct sadmm_resident_joint joint_for_backend(const sadmm_world *world, const struct sadmm_world_joint *joint)
+{
+    struct sadmm_resident_joint out = {.def = joint->def, .constraints = sadmm_joint_constraints(joint), .coupling = -1};
+    for (int s = 0; s < 2; ++s) {
+        const struct sadmm_world_body *body = joint->body[s] >= 0 ? &world->bodies[joint->body[s]] : NULL;
+        out.body[s] = body ? body->system_body : -1;
+        out.frame[s] = joint->frame[s];
+        if (!body || out.body[s] >= 0) continue;
+        const struct joint_end end = joint_end_on(&joint->frame[s], &body->rigid);
+        out.frame[s] = (struct joint_frame){end.point, end.orientation};
+    }
+    return out;
+}
+
+sadmm_status sadmm_world_list_joints(sadmm_world *world)
+{
+    const size_t count = (size_t)world->joint_count;
+    size_t i = 0;
+    world->resident.joint_count = world->resident.joint_constraints = world->resident.coupling_count = 0;
+    world->resident.edited_joint_count = 0;
+    if (!sadmm_grow_empty(&world->resident.joints, &world->resident.joint_capacity, count,
+                          sizeof *world->resident.joints) ||
+        !sadmm_grow_empty(&world->resident.memory, &world->resident.memory_capacity, count,
+                          sizeof *world->resident.memory) ||
+        !sadmm_grow_empty(&world->resident.coupling_memory, &world->resident.coupling_memory_capacity,
+                          (size_t)world->coupling_count, sizeof *world->resident.coupling_memory) ||
+        !sadmm_grow_empty(&world->resident.joint_slots, &world->resident.joint_slot_capacity, count,
+                          sizeof *world->resident.joint_slots) ||
+        !sadmm_grow_empty(&world->resident.edited_joints, &world->resident.edited_joint_capacity, count,
+                          sizeof *world->resident.edited_joints))
+        return sadmm_fail_memory(&world->error, "joints for the backend");
+    for (size_t slot = 0; i < count && slot < world->joint_slots; ++slot) {
+        struct sadmm_world_joint *joint = &world->joints[slot];
+        if (!joint->alive) continue;
+        world->resident.joints[i] = joint_for_backend(world, joint);
+        world->resident.memory[i] = joint->last;
+        if (joint->coupling) {
+            world->resident.joints[i].coupling = world->resident.coupling_count;
+            world->resident.coupling_memory[world->resident.coupling_count++] =
+                world->couplings[joint->coupling - 1].last;
+        }
+        world->resident.joint_slots[i] = (int32_t)slot;
+        joint->resident = (int32_t)i;
+        joint->resident_constraints = world->resident.joints[i++].constraints;
+        world->resident.joint_constraints += joint->resident_constraints;
+        joint->edits = 0;
+        for (int edit = 0; edit < SADMM_JOINT_EDITS; ++edit) joint->set_at[edit] = -1;
+    }
+    world->resident.joint_count = (int32_t)i;
+    return SADMM_OK;
+}
+
+/* ---- edits ------------------------------------------------------------------------------------------------------- */
+
+static void mark(sadmm_world *world, struct sadmm_world_joint *joint, uint32_t edits)
+{
+    if (edits && !joint->edits)
+        world->resident.edited_joints[world->resident.edited_joint_count++] = (uint32_t)(joint - world->joints);
+    joint->edits |= edits;
+}
+
+bool sadmm_world_edit_joint(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit)
+{
+    if (!world->resident.loaded) return true;
+    if (sadmm_joint_constraints(joint) > joint->resident_constraints) return false;
+    mark(world, joint, UINT32_C(1) << edit);
+    joint->set_at[edit] = world->resident.enqueued;
+    return true;
+}
+
+void sadmm_world_edit_joints_again(sadmm_world *world)
+{
+    for (int32_t i = 0; i < world->resident.joint_count; ++i) {
+        struct sadmm_world_joint *joint = &world->joints[world->resident.joint_slots[i]];
+        for (int edit = 0; edit < SADMM_JOINT_EDITS; ++edit) {
+            if (joint->set_at[edit] < world->resident.done) continue;
+            mark(world, joint, UINT32_C(1) << edit);
+            joint->set_at[edit] = world->resident.done;
+        }
+    }
+}
+
+void sadmm_world_forget_joint_edits(sadmm_world *world)
+{
+    for (size_t k = 0; k < world->resident.edited_joint_count; ++k)
+        world->joints[world->resident.edited_joints[k]].edits = 0;
+    world->resident.edited_joint_count = 0;
+}
+
+static void put_target(const struct sadmm_rigid *target, double values[SADMM_EDIT_VALUES])
+{
+    memcpy(values, target->position, sizeof target->position);
+    memcpy(values + 3, target->orientation, sizeof target->orientation);
+    memcpy(values + 7, target->velocity, sizeof target->velocity);
+}
+
+sadmm_status sadmm_world_list_joint_edits(sadmm_world *world, size_t *count)
+{
+    if (!sadmm_grow(&world->resident.edits, &world->resident.edit_capacity, *count,
+                    *count + SADMM_JOINT_EDITS * world->resident.edited_joint_count, sizeof *world->resident.edits))
+        return sadmm_fail_memory(&world->error, "changes of joints");
+    for (size_t k = 0; k < world->resident.edited_joint_count; ++k) {
+        const struct sadmm_world_joint *joint = &world->joints[world->resident.edited_joints[k]];
+        for (int edit = 0; edit < SADMM_JOINT_EDITS; ++edit) {
+            if (!(joint->edits >> edit & 1)) continue;
+            struct sadmm_resident_edit *out = &world->resident.edits[(*count)++];
+            memset(out, 0, sizeof *out);
+            out->kind = SADMM_EDIT_JOINT;
+            out->target = SADMM_JOINT_TARGETS * joint->resident + edit;
+            if (edit == SADMM_JOINT_TARGET) put_target(&world->couplings[joint->coupling - 1].last.target, out->values);
+            else if (edit == SADMM_JOINT_ENABLED) out->values[0] = joint->def.enabled;
+            else joint_coordinate_numbers(&joint->def.coordinates[edit], out->values);
+        }
+    }
+    return SADMM_OK;
+}
+
+/* ---- from the backend -------------------------------------------------------------------------------------------- */
+
+/* A target that was set after the last step is newer than what the backend has. */
+static void take_coupling(struct sadmm_world_coupling *coupling, bool target_set,
+                          const struct sadmm_coupling_memory *memory)
+{
+    const struct sadmm_rigid target = coupling->last.target;
+    coupling->last = *memory;
+    if (target_set) coupling->last.target = target;
+}
+
+/* Whether a joint is enabled may have been set since the last step was done. */
+sadmm_status sadmm_world_read_joints(sadmm_world *world)
+{
+    int32_t coupling = 0;
+    TRY(world->kernels->resident->read_joints(world->context, world->resident.memory, world->resident.coupling_memory,
+                                              &world->error));
+    for (int32_t i = 0; i < world->resident.joint_count; ++i) {
+        struct sadmm_world_joint *joint = &world->joints[world->resident.joint_slots[i]];
+        joint->last = world->resident.memory[i];
+        if (joint->set_at[SADMM_JOINT_ENABLED] < world->resident.done)
+            joint->def.enabled = joint->def.enabled && !joint->last.broken;
+        else joint->last.broken = joint->last.broken && !joint->def.enabled;
+        if (joint->coupling)
+            take_coupling(&world->couplings[joint->coupling - 1],
+                          joint->set_at[SADMM_JOINT_TARGET] >= world->resident.done,
+                          &world->resident.coupling_memory[coupling++]);
+    }
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_read_rows(sadmm_world *world)
+{
+    struct sadmm_rows *rows = &world->start.rows;
+    const size_t constraints = (size_t)world->resident.joint_constraints, most = SADMM_MAX_ROWS * constraints;
+    sadmm_rows_clear(rows);
+    if (world->resident.joint_count == 0) return SADMM_OK;
+    if (!sadmm_rows_reserve(rows, constraints, most) ||
+        !sadmm_grow_empty(&world->resident.solution, &world->resident.solution_capacity, most,
+                          sizeof *world->resident.solution) ||
+        !sadmm_grow_empty(&world->start.multiplier, &world->start.multiplier_capacity, most,
+                          sizeof *world->start.multiplier))
+        return sadmm_fail_memory(&world->error, "the joints' rows");
+    TRY(world->kernels->resident->read_rows(world->context, rows, world->resident.solution, world->velocity,
+                                              &world->error));
+    memcpy(world->start.multiplier, rows->lambda, rows->row_count * sizeof *rows->lambda);
+    memcpy(rows->lambda, world->resident.solution, rows->row_count * sizeof *rows->lambda);
+    return SADMM_OK;
+}
