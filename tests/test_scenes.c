@@ -221,6 +221,7 @@ static const struct {
     { "chain:5", 40 },
     { "four_bar:2", 40 },
     { "slider_crank", 40 },
+    { "bricard", 10 },
 };
 
 static uint64_t hash_after(const char *spec, sadmm_method method, int threads, int steps)
@@ -310,7 +311,7 @@ END_TEST
 
 START_TEST(the_list_has_no_twins)
 {
-    ck_assert_uint_eq(sadmm_scene_count(), 22);
+    ck_assert_uint_eq(sadmm_scene_count(), 23);
     ck_assert_ptr_null(sadmm_scene_at(sadmm_scene_count()));
     for (size_t i = 0; i < sadmm_scene_count(); ++i) {
         for (size_t j = 0; j < i; ++j) ck_assert_str_ne(sadmm_scene_at(i)->name, sadmm_scene_at(j)->name);

@@ -3,6 +3,7 @@
 #define SUBADMM_SUBADMM_H
 
 #include "coupling.h"
+#include "gear.h"
 #include "joint.h"
 #include "problem.h"
 #include "settings.h"

@@ -2,6 +2,8 @@
 
 #include "cli.h"
 #include "scenes/scenes.h"
+#include "subadmm/coupling.h"
+#include "subadmm/gear.h"
 #include "subadmm/joint.h"
 
 enum { OPTION_JSON };
@@ -182,7 +184,20 @@ static json_t *body_index(sadmm_world *world, json_t *bodies, sadmm_body_id id)
     return body ? json_incref(json_object_get(body, "index")) : json_null();
 }
 
-static json_t *joint_json(sadmm_world *world, json_t *bodies, const sadmm_joint_def *joint)
+/* Positions and loads; null where there is none. */
+static json_t *table_json(sadmm_world *world, sadmm_joint_id id, int32_t index)
+{
+    double positions[SADMM_MOST_SPRING_POINTS], forces[SADMM_MOST_SPRING_POINTS];
+    int32_t count = 0;
+    if (sadmm_world_joint_spring_table(world, id, index, positions, forces, &count) != SADMM_OK || !count)
+        return json_null();
+    json_t *o = json_object();
+    json_object_set_new(o, "positions", cli_json_reals(positions, (size_t)count));
+    json_object_set_new(o, "forces", cli_json_reals(forces, (size_t)count));
+    return o;
+}
+
+static json_t *joint_json(sadmm_world *world, json_t *bodies, sadmm_joint_id id, const sadmm_joint_def *joint)
 {
     json_t *o = json_object(), *coordinates = json_array();
     json_object_set_new(o, "kind", json_string(joint_kinds[joint->kind]));
@@ -198,7 +213,11 @@ static json_t *joint_json(sadmm_world *world, json_t *bodies, const sadmm_joint_
     json_object_set_new(o, "enabled", json_boolean(joint->enabled));
     json_object_set_new(o, "break_force", cli_json_real(joint->break_force));
     json_object_set_new(o, "break_torque", cli_json_real(joint->break_torque));
-    for (int k = 0; k < 6; ++k) json_array_append_new(coordinates, coordinate_json(&joint->coordinates[k]));
+    for (int k = 0; k < 6; ++k) {
+        json_t *coordinate = coordinate_json(&joint->coordinates[k]);
+        json_object_set_new(coordinate, "spring_table", table_json(world, id, k));
+        json_array_append_new(coordinates, coordinate);
+    }
     json_object_set_new(o, "coordinates", coordinates);
     return o;
 }
@@ -211,12 +230,89 @@ static sadmm_status add_joints(sadmm_world *world, json_t *bodies, json_t *joint
         sadmm_status status = sadmm_world_joint_at(world, k, &id);
         if (status == SADMM_OK) status = sadmm_world_joint_def(world, id, &def);
         if (status != SADMM_OK) return status;
-        json_array_append_new(joints, joint_json(world, bodies, &def));
+        json_array_append_new(joints, joint_json(world, bodies, id, &def));
     }
     return SADMM_OK;
 }
 
-static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, json_t *bodies, json_t *joints)
+static json_t *coupling_json(sadmm_world *world, json_t *bodies, const sadmm_coupling_def *coupling)
+{
+    json_t *o = json_object();
+    json_object_set_new(o, "body", body_index(world, bodies, coupling->body));
+    json_object_set_new(o, "position", cli_json_reals(coupling->position, 3));
+    json_object_set_new(o, "orientation", cli_json_reals(coupling->orientation, 4));
+    json_object_set_new(o, "target_position", cli_json_reals(coupling->target_position, 3));
+    json_object_set_new(o, "target_orientation", cli_json_reals(coupling->target_orientation, 4));
+    json_object_set_new(o, "target_velocity", cli_json_reals(coupling->target_velocity, 6));
+    json_object_set_new(o, "linear_stiffness", cli_json_real(coupling->linear_stiffness));
+    json_object_set_new(o, "linear_damping", cli_json_real(coupling->linear_damping));
+    json_object_set_new(o, "angular_stiffness", cli_json_real(coupling->angular_stiffness));
+    json_object_set_new(o, "angular_damping", cli_json_real(coupling->angular_damping));
+    json_object_set_new(o, "max_force", cli_json_real(coupling->max_force));
+    json_object_set_new(o, "max_torque", cli_json_real(coupling->max_torque));
+    json_object_set_new(o, "enabled", json_boolean(coupling->enabled));
+    return o;
+}
+
+static sadmm_status add_couplings(sadmm_world *world, json_t *bodies, json_t *couplings)
+{
+    for (int32_t k = 0; k < sadmm_world_coupling_count(world); ++k) {
+        sadmm_coupling_id id;
+        sadmm_coupling_def def;
+        sadmm_status status = sadmm_world_coupling_at(world, k, &id);
+        if (status == SADMM_OK) status = sadmm_world_coupling_def(world, id, &def);
+        if (status != SADMM_OK) return status;
+        json_array_append_new(couplings, coupling_json(world, bodies, &def));
+    }
+    return SADMM_OK;
+}
+
+/* The index of a joint in the array: joints are listed in order of their slots. */
+static int32_t joint_index(sadmm_world *world, sadmm_joint_id wanted)
+{
+    for (int32_t k = 0; k < sadmm_world_joint_count(world); ++k) {
+        sadmm_joint_id id;
+        if (sadmm_world_joint_at(world, k, &id) == SADMM_OK && id.slot == wanted.slot) return k;
+    }
+    return -1;
+}
+
+static sadmm_status add_gears(sadmm_world *world, json_t *gears)
+{
+    for (int32_t k = 0; k < sadmm_world_gear_count(world); ++k) {
+        sadmm_gear_id id;
+        sadmm_gear_def def;
+        sadmm_status status = sadmm_world_gear_at(world, k, &id);
+        if (status == SADMM_OK) status = sadmm_world_gear_def(world, id, &def);
+        if (status != SADMM_OK) return status;
+        json_t *o = json_object();
+        json_object_set_new(o, "joint_1", json_integer(joint_index(world, def.joint_1)));
+        json_object_set_new(o, "coordinate_1", json_integer(def.coordinate_1));
+        json_object_set_new(o, "joint_2", json_integer(joint_index(world, def.joint_2)));
+        json_object_set_new(o, "coordinate_2", json_integer(def.coordinate_2));
+        json_object_set_new(o, "ratio", cli_json_real(def.ratio));
+        json_object_set_new(o, "offset", cli_json_real(def.offset));
+        json_object_set_new(o, "enabled", json_boolean(def.enabled));
+        json_array_append_new(gears, o);
+    }
+    return SADMM_OK;
+}
+
+/* What is on bodies and between them. */
+struct parts {
+    json_t *bodies, *joints, *couplings, *gears;
+};
+
+static sadmm_status add_parts(sadmm_world *world, const struct parts *parts)
+{
+    sadmm_status status = add_bodies(world, parts->bodies);
+    if (status == SADMM_OK) status = add_shapes(world, parts->bodies);
+    if (status == SADMM_OK) status = add_joints(world, parts->bodies, parts->joints);
+    if (status == SADMM_OK) status = add_couplings(world, parts->bodies, parts->couplings);
+    return status == SADMM_OK ? add_gears(world, parts->gears) : status;
+}
+
+static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, const struct parts *parts)
 {
     static const char *const units =
         "SI; world frame; quaternions w x y z, body to world; inertia: principal moments in "
@@ -234,8 +330,10 @@ static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, jso
     json_object_set_new(o, "contact_margin", cli_json_real(scene->def.contact_margin));
     json_object_set_new(o, "friction_of_a_pair", json_string("geometric mean"));
     json_object_set_new(o, "settings", cli_json_settings(&scene->def.settings));
-    json_object_set_new(o, "bodies", bodies);
-    json_object_set_new(o, "joints", joints);
+    json_object_set_new(o, "bodies", parts->bodies);
+    json_object_set_new(o, "joints", parts->joints);
+    json_object_set_new(o, "couplings", parts->couplings);
+    json_object_set_new(o, "gears", parts->gears);
     cli_json_add_build(o);
     return o;
 }
@@ -257,14 +355,15 @@ static int show_scene(const char *spec, struct output *json)
         sadmm_world_destroy(world);
         return CLI_DONE;
     }
-    json_t *bodies = json_array(), *joints = json_array();
+    const struct parts parts = {json_array(), json_array(), json_array(), json_array()};
     int code;
-    if (add_bodies(world, bodies) == SADMM_OK && add_shapes(world, bodies) == SADMM_OK &&
-        add_joints(world, bodies, joints) == SADMM_OK) {
-        code = cli_write_json(scene_json(spec, &scene, bodies, joints), json);
+    if (add_parts(world, &parts) == SADMM_OK) {
+        code = cli_write_json(scene_json(spec, &scene, &parts), json);
     } else {
-        json_decref(bodies);
-        json_decref(joints);
+        json_decref(parts.bodies);
+        json_decref(parts.joints);
+        json_decref(parts.couplings);
+        json_decref(parts.gears);
         code = cli_error(CLI_FAILED, "%s", sadmm_world_message(world));
     }
     sadmm_world_destroy(world);

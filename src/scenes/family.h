@@ -40,5 +40,6 @@ extern const struct sadmm_scene_family sadmm_family_falling_chain;
 extern const struct sadmm_scene_family sadmm_family_chain;
 extern const struct sadmm_scene_family sadmm_family_four_bar;
 extern const struct sadmm_scene_family sadmm_family_slider_crank;
+extern const struct sadmm_scene_family sadmm_family_bricard;
 
 #endif

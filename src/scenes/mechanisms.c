@@ -1,8 +1,9 @@
-/* Mechanisms of joints: a chain with a weight, and closed loops of rods: four-bar linkages in a row, a slider-crank.
- * Rods have shapes to look at, which meet nothing.
+/* Mechanisms of joints: a chain with a weight, and closed loops of rods: four-bar linkages in a row, a slider-crank,
+ * Bricard's linkage. Rods have shapes to look at, which meet nothing.
  *
- * The row of four-bar linkages is a problem of the IFToMM benchmarks of multibody dynamics; it has more locks than it
- * needs, and passes positions where it might part into two motions. */
+ * The row of four-bar linkages and Bricard's are problems of the IFToMM benchmarks of multibody dynamics. The former has
+ * more locks than it needs, and passes positions where it might part into two motions; the latter moves by virtue of
+ * its dimensions alone: counted, its locks allow no motion. */
 #include <math.h>
 #include <string.h>
 
@@ -160,4 +161,35 @@ const struct sadmm_scene_family sadmm_family_slider_crank = {
         .iterations = {[SADMM_METHOD_PAPER] = 300, [SADMM_METHOD_FAST] = 60},
     },
     .fill = fill_slider_crank,
+};
+
+/* ---- Bricard's linkage ------------------------------------------------------------------------------------------- */
+
+/* Five rods, and the ground for the sixth, along edges of a cube of 1 m; each hinge's axis is across its two rods. */
+static sadmm_status fill_bricard(const struct sadmm_scene *scene, sadmm_world *world, struct sadmm_error *error)
+{
+    static const double corners[6][3] = {{0, 0, 0}, {1, 0, 0}, {1, 0, -1}, {1, -1, -1}, {0, -1, -1}, {0, -1, 0}};
+    static const int axes[6] = {2, 1, 0, 2, 1, 0};
+    sadmm_body_id last = static_world, rod;
+    sadmm_status status = SADMM_OK;
+    (void)scene;
+    for (int i = 0; i < 6 && status == SADMM_OK; ++i) {
+        rod = static_world;
+        if (i < 5) status = add_rod(world, corners[i], corners[i + 1], at_rest, &rod, error);
+        if (status == SADMM_OK)
+            status = join(world, SADMM_JOINT_REVOLUTE, last, rod, corners[i], axes[i], NULL, error);
+        last = rod;
+    }
+    return status;
+}
+
+const struct sadmm_scene_family sadmm_family_bricard = {
+    .info = {
+        .name = "bricard",
+        .arguments = "",
+        .description = "Bricard's linkage of five rods and six hinges swings to and fro",
+        .duration = 10,
+        .iterations = {[SADMM_METHOD_PAPER] = 300, [SADMM_METHOD_FAST] = 60},
+    },
+    .fill = fill_bricard,
 };

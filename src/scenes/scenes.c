@@ -16,7 +16,7 @@ static const struct sadmm_scene_family *const families[] = {
     &sadmm_family_bounce,        &sadmm_family_spin_plate,      &sadmm_family_rolling,
     &sadmm_family_rocking,       &sadmm_family_two_balls,       &sadmm_family_dominoes,
     &sadmm_family_falling_chain, &sadmm_family_chain,           &sadmm_family_four_bar,
-    &sadmm_family_slider_crank,
+    &sadmm_family_slider_crank,  &sadmm_family_bricard,
 };
 
 enum { FAMILY_COUNT = sizeof families / sizeof families[0] };

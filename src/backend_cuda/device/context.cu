@@ -71,6 +71,8 @@ static const char *const buffer_names[] = {
     "what couplings keep",
     "rows of joints",
     "islands of joints",
+    "joined bodies",
+    "order of joined bodies",
     "staged counts",
     "staged settings",
     "staged bodies",

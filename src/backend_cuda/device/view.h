@@ -246,6 +246,8 @@ struct joint_view {
     struct sadmm_joint_memory *after;                /* as it ends */
     const struct sadmm_coupling_memory *couplings_before; /* couplings: as the sub-step began; */
     struct sadmm_coupling_memory *couplings_after;        /* as it ends */
+    const struct joined_view *direct; /* bodies and rows that are solved directly (step/joined.cu) */
+    const int32_t *is_direct;         /* bodies, then constraints: is it one of them? */
     int32_t *touch;                 /* bodies: at labels of islands bits (core/model/joint_lead.h) */
 };
 

@@ -121,8 +121,8 @@ static __device__ __forceinline__ void store_constraints(const cuda_view &v, con
     for (int c = lane; c < joint->constraints; c += LANES) {
         const int left = rows - SADMM_MAX_ROWS * c,
                   count = left < 0 ? 0 : left < SADMM_MAX_ROWS ? left : (int)SADMM_MAX_ROWS;
-        const struct sadmm_row_constraint out = {count > 0 ? joint->body[0] : -1, count > 0 ? joint->body[1] : -1, 0,
-                                                 count, false, 0};
+        const struct sadmm_row_constraint out = {count > 0 ? joint->body[0] : -1, count > 0 ? joint->body[1] : -1,
+                                                 (first + c) * (int32_t)SADMM_MAX_ROWS, count, false, 0};
         const_cast<struct sadmm_row_constraint *>(v.raw.constraints)[first + c] = out;
     }
 }
@@ -149,7 +149,7 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
     }
     if (coordinate) {
         moving = joint_moving_of(def, &v.joints.before[j], &acting, lane, &settings);
-        joint_coordinate_laws(def, lane, &moving, &laws);
+        joint_coordinate_laws(def, lane, &moving, nullptr, &laws); /* worlds with tables are the host's */
     }
     int rows;
     const int at = place_laws(laws.count, coordinate && (def->locks >> lane & 1), lane, &rows);
@@ -179,7 +179,9 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
 static __device__ __forceinline__ struct joint_lead lead_of(const cuda_view &v, int32_t body)
 {
     double velocity[6] = {};
-    if (body >= 0) load_end_velocity(v, body, velocity);
+    if (body >= 0 && v.joints.is_direct[body])
+        for (size_t k = 0; k < 6; ++k) velocity[k] = v.joints.velocity[6 * (size_t)body + k];
+    else if (body >= 0) load_end_velocity(v, body, velocity);
     return joint_lead_of(body >= 0 ? &v.step.before[body] : nullptr, velocity);
 }
 
@@ -222,9 +224,10 @@ static __device__ __forceinline__ void keep_joint(const cuda_view &v, int32_t j)
             const size_t slot = (size_t)(first + c) * SADMM_MAX_ROWS + (size_t)r;
             const struct sadmm_joint_source source = v.joints.sources[slot];
             const struct raw_row *row = &v.raw.rows[slot];
-            const double lambda = (double)v.rows.data[slot].lambda;
+            const bool direct = v.joints.is_direct[v.model.bodies + first + c];
+            const double lambda = direct ? v.joints.solution[slot] : (double)v.rows.data[slot].lambda;
             finite += lambda - lambda;
-            v.joints.solution[slot] = lambda;
+            if (!direct) v.joints.solution[slot] = lambda;
             joint_keep_row(&memory, middle->axis, source.role, source.coordinate, source.sign * lambda / settings.dt);
             if (joint_limit_jolts(&source, lambda, row->jacobian[0], row->jacobian[1], bodies, &settings))
                 bits |= ISLAND_LEADS_STAY;
@@ -303,6 +306,17 @@ static char *row_set(const struct sadmm_context *c, int into)
     return buffer<char>(c, BUFFER_JOINT_ROWS) + (size_t)into * row_set_bytes(c->step);
 }
 
+struct joint_rows CUDA(joint_rows_of)(const struct sadmm_context *c, int into)
+{
+    const struct cuda_step *s = c->step;
+    const size_t count = (size_t)s->joint_constraints;
+    struct joint_rows out;
+    out.constraints = (struct sadmm_row_constraint *)row_set(c, into);
+    out.rows = (struct raw_row *)(out.constraints + count);
+    out.velocity = (double *)(out.rows + count * SADMM_MAX_ROWS) + count * SADMM_MAX_ROWS;
+    return out;
+}
+
 static struct sadmm_joint_memory *memory_of(const struct sadmm_context *c, int state)
 {
     return buffer<struct sadmm_joint_memory>(c, BUFFER_JOINT_MEMORY) + (size_t)state * (size_t)c->step->joints;
@@ -328,6 +342,7 @@ void CUDA(view_joints)(struct sadmm_context *c, int into, int substep)
     joints->after = memory_of(c, step_state(into, substep, substeps));
     joints->couplings_before = couplings_of(c, step_state(into, substep - 1, substeps));
     joints->couplings_after = couplings_of(c, step_state(into, substep, substeps));
+    CUDA(view_joined)(c, into);
     joints->touch = buffer<int32_t>(c, BUFFER_JOINT_TOUCH);
     c->view.rows.count = s->joint_constraints;
     CUDA(bind_raw_rows)(c, row_set(c, into));
@@ -338,7 +353,7 @@ void CUDA(view_joints)(struct sadmm_context *c, int into, int substep)
 
 /* ---- to the device, and back -------------------------------------------------------------------------------------- */
 
-static sadmm_status put(struct sadmm_context *c, void *to, const void *from, size_t bytes, struct sadmm_error *error)
+sadmm_status CUDA(put)(struct sadmm_context *c, void *to, const void *from, size_t bytes, struct sadmm_error *error)
 {
     TRY(CUDA(reserve)(c, PINNED_ROWS, bytes, error));
     TRY(CUDA(upload)(c, to, PINNED_ROWS, 0, from, bytes, error));
@@ -355,7 +370,7 @@ static sadmm_status put_first(struct sadmm_context *c, const struct sadmm_reside
         first[j] = next;
         next += world->joints[j].constraints;
     }
-    const sadmm_status status = put(c, first_of(c), first, n * sizeof *first, error);
+    const sadmm_status status = CUDA(put)(c, first_of(c), first, n * sizeof *first, error);
     sadmm_free(first);
     return status;
 }
@@ -383,12 +398,13 @@ sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resid
         {BUFFER_JOINT_TOUCH, (size_t)s->bodies * sizeof(int32_t)},
     };
     TRY(reserve_all(c, wanted, error));
-    TRY(put(c, c->buffers[BUFFER_JOINTS].data, world->joints, n * sizeof *world->joints, error));
-    TRY(put(c, memory_of(c, 1 - s->into), world->joint_memory, n * sizeof *world->joint_memory, error));
+    TRY(CUDA(put)(c, c->buffers[BUFFER_JOINTS].data, world->joints, n * sizeof *world->joints, error));
+    TRY(CUDA(put)(c, memory_of(c, 1 - s->into), world->joint_memory, n * sizeof *world->joint_memory, error));
     if (s->couplings > 0)
-        TRY(put(c, couplings_of(c, 1 - s->into), world->coupling_memory,
+        TRY(CUDA(put)(c, couplings_of(c, 1 - s->into), world->coupling_memory,
                 (size_t)s->couplings * sizeof *world->coupling_memory, error));
-    return put_first(c, world, error);
+    TRY(put_first(c, world, error));
+    return CUDA(load_joined)(c, world, error);
 }
 
 /* In pieces that fit into pinned memory of that size. */

@@ -187,7 +187,7 @@ static __device__ __forceinline__ void end_joints(const joint_view &joints, cons
 static __device__ __forceinline__ void move_once_more(const cuda_view &v, int32_t i, bool again, bool joined)
 {
     const int32_t bits = joined ? v.joints.touch[v.graph.label[i]] : 0;
-    if (joined) load_end_velocity(v, i, v.joints.velocity + 6 * (size_t)i);
+    if (joined && !v.joints.is_direct[i]) load_end_velocity(v, i, v.joints.velocity + 6 * (size_t)i);
     if (bits & ISLAND_JOINED) move_joined(v, i, bits & ISLAND_LEADS_STAY);
     else if (again) move_again(v, i);
 }

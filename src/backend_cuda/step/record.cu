@@ -89,7 +89,7 @@ static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *err
     }
     TRY(CUDA(enqueue_statistics_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
     CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
-    return SADMM_OK;
+    return c->settings.warm_start ? CUDA(launch_joined)(c, false, error) : SADMM_OK;
 }
 
 /* Which motions of loose islands may be restored, beside the iterations; where those find out themselves what is held,
@@ -122,6 +122,7 @@ static sadmm_status record_finish(struct sadmm_context *c, bool residuals, struc
         CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
     }
     TRY(CUDA(launch_finish)(c, error));
+    TRY(CUDA(launch_joined)(c, true, error));
     TRY(CUDA(launch_joint_solution)(c, error));
     if (residuals) CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
     return SADMM_OK;

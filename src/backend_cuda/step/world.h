@@ -39,6 +39,7 @@ struct cuda_step {
     struct sadmm_cuda_collision *collision;
     int32_t bodies, slots;
     int32_t joints, joint_constraints, couplings;
+    int32_t joined_parts;       /* of bodies that are solved directly */
 
     bool planned;               /* capacities, partition and guess are for the world as it is */
     bool recorded;              /* and so are the graphs */
@@ -118,5 +119,18 @@ void CUDA(view_joints)(struct sadmm_context *, int into, int substep);
 /* joints.cu: rows of the (sub-)step; what its solution says of joints. */
 sadmm_status CUDA(launch_joint_rows)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_joint_solution)(struct sadmm_context *, struct sadmm_error *error);
+/* joints.cu: rows of a step that ends in `into`, and beside them the solution's velocities. */
+struct joint_rows {
+    struct sadmm_row_constraint *constraints;
+    struct raw_row *rows;
+    double *velocity;
+};
+struct joint_rows CUDA(joint_rows_of)(const struct sadmm_context *, int into);
+/* joined.cu: the same for bodies that joints join, solved directly before the iterations, and after them. */
+sadmm_status CUDA(load_joined)(struct sadmm_context *, const struct sadmm_resident_world *, struct sadmm_error *error);
+void CUDA(view_joined)(struct sadmm_context *, int into);
+sadmm_status CUDA(launch_joined)(struct sadmm_context *, bool after, struct sadmm_error *error);
+/* joints.cu: through pinned memory that is free again when this returns. */
+sadmm_status CUDA(put)(struct sadmm_context *, void *to, const void *from, size_t bytes, struct sadmm_error *error);
 
 #endif

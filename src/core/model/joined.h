@@ -10,13 +10,17 @@
 #define SADMM_CORE_MODEL_JOINED_H
 
 #include "core/base/contact_set.h"
-#include "core/math/dense6.h"
-#include "core/math/vec3.h"
+#include "core/math/rigid.h"
 #include "rows.h"
 
 enum { JOINED_ROWS = SADMM_MAX_ROWS, JOINED_BLOCK = JOINED_ROWS * JOINED_ROWS };
 /* Regularisation of the factor, a share of a row's own response: rows may say the same, but for rounding. */
 #define JOINED_PROXIMAL 1e-11
+/* Compliance of hard rows, a share of a row's own response: a load moves a lock by a billionth of what it would move the
+ * bodies by if nothing else held them. Rows of a loop that has more locks than it needs contradict each other by what
+ * its joints are off, along multipliers to which nothing responds; without it these grow from step to step (scene
+ * bricard: to 1e6 N where 30 are at work) until they hold the loop. */
+#define JOINED_GIVE 1e-9
 /* Rows that come to a bound, or leave one, are found in so many passes at most. */
 enum { JOINED_PASSES = 6 };
 
@@ -81,6 +85,83 @@ SADMM_INLINE double joined_product(const double *x, const double *y)
     return sum;
 }
 
+/* ---- six by six ------------------------------------------------------------------------------------------------------ */
+
+/* Cholesky factor of a symmetric matrix, of which the lower half is read, in the same place; on the diagonal are the
+ * inverses of its own. A pivot that is lost to rounding: the row says what others say, and its solution is 0. In
+ * registers: what waits for memory waits longest here. */
+SADMM_INLINE void joined_cholesky(double matrix[36])
+{
+    double L[6][6];
+    int r, k, i;
+    SADMM_UNROLL
+    for (r = 0; r < 6; ++r) {
+        SADMM_UNROLL
+        for (k = 0; k <= r; ++k) L[r][k] = matrix[6 * r + k];
+    }
+    SADMM_UNROLL
+    for (k = 0; k < 6; ++k) {
+        double d = L[k][k], inverse;
+        SADMM_UNROLL
+        for (i = 0; i < k; ++i) d -= L[k][i] * L[k][i];
+        inverse = d > 0 ? 1 / sqrt(d) : 0;
+        L[k][k] = inverse;
+        SADMM_UNROLL
+        for (r = k + 1; r < 6; ++r) {
+            double sum = L[r][k];
+            SADMM_UNROLL
+            for (i = 0; i < k; ++i) sum -= L[r][i] * L[k][i];
+            L[r][k] = sum * inverse;
+        }
+    }
+    SADMM_UNROLL
+    for (r = 0; r < 6; ++r) {
+        SADMM_UNROLL
+        for (k = 0; k <= r; ++k) matrix[6 * r + k] = L[r][k];
+    }
+}
+
+/* L^-1 x, L^-T x in place; x = A^-1 b by both. */
+SADMM_INLINE void joined_forward(const double L[36], double x[6])
+{
+    double y[6];
+    int r, i;
+    SADMM_UNROLL
+    for (r = 0; r < 6; ++r) {
+        double sum = x[r];
+        SADMM_UNROLL
+        for (i = 0; i < r; ++i) sum -= L[6 * r + i] * y[i];
+        y[r] = sum * L[7 * r];
+    }
+    SADMM_UNROLL
+    for (r = 0; r < 6; ++r) x[r] = y[r];
+}
+SADMM_INLINE void joined_backward(const double L[36], double x[6])
+{
+    double y[6];
+    int r, i;
+    SADMM_UNROLL
+    for (r = 5; r >= 0; --r) {
+        double sum = x[r];
+        SADMM_UNROLL
+        for (i = r + 1; i < 6; ++i) sum -= L[6 * i + r] * y[i];
+        y[r] = sum * L[7 * r];
+    }
+    SADMM_UNROLL
+    for (r = 0; r < 6; ++r) x[r] = y[r];
+}
+SADMM_INLINE void joined_solve(const double L[36], const double b[6], double x[6])
+{
+    double y[6];
+    int k;
+    SADMM_UNROLL
+    for (k = 0; k < 6; ++k) y[k] = b[k];
+    joined_forward(L, y);
+    joined_backward(L, y);
+    SADMM_UNROLL
+    for (k = 0; k < 6; ++k) x[k] = y[k];
+}
+
 /* ---- bodies ---------------------------------------------------------------------------------------------------------- */
 
 /* What the points of a pair press its body on `side` with. */
@@ -109,10 +190,11 @@ SADMM_INLINE void joined_add_rows(const struct joined_view *v, const struct sadm
 /* Twice the energy of the impulses on a body, for the speed that they change its part by (V of math/weight.h). */
 SADMM_INLINE double joined_energy(const double A[36], const double impulse[6])
 {
-    double factor[36], x[6];
-    if (!dense6_cholesky(A, factor)) return 0;
-    dense6_solve(factor, impulse, x);
-    return joined_product(x, impulse);
+    mat3 inertia;
+    vec3 turn = v3_load(impulse + 3);
+    int k;
+    for (k = 0; k < 3; ++k) inertia.r[k] = v3_load(A + 6 * (k + 3) + 3);
+    return v3_norm2(v3_load(impulse)) / A[0] + v3_dot(turn, m3_solve(inertia, turn));
 }
 
 /* B J_c^T J_c of a point at `arm`. */
@@ -152,14 +234,10 @@ SADMM_INLINE void joined_miss(const struct joined_view *v, int32_t e, const doub
             b[k] + impulse[k] - joined_product(v->A + 36 * i + 6 * k, v->velocity + 6 * i);
 }
 
-/* A + C becomes its factor; what has none (a state that is not finite) gives numbers that are not, and is left alone. */
+/* A + C becomes its factor. */
 SADMM_INLINE void joined_factor_body(const struct joined_view *v, int32_t e)
 {
-    double *factor = v->factor + 36 * (size_t)v->s.body[e], sum[36];
-    int k;
-    for (k = 0; k < 36; ++k) sum[k] = factor[k];
-    if (!dense6_cholesky(sum, factor))
-        for (k = 0; k < 36; ++k) factor[k] = NAN;
+    joined_cholesky(v->factor + 36 * (size_t)v->s.body[e]);
 }
 
 /* Entry e of `body`: the free change of velocity, then what its rows change it by. */
@@ -169,7 +247,7 @@ SADMM_INLINE void joined_move(const struct joined_view *v, int32_t e)
     double *dv = v->dv + 6 * i;
     int32_t at, r;
     int k;
-    dense6_solve(v->factor + 36 * i, v->missing + 6 * i, dv);
+    joined_solve(v->factor + 36 * i, v->missing + 6 * i, dv);
     for (at = v->s.first_around[e]; at < v->s.first_around[e + 1]; ++at) {
         const struct sadmm_row_constraint *constraint = joined_at(v, v->s.around[at] / 2);
         for (r = constraint->first; r < constraint->first + constraint->count; ++r)
@@ -185,8 +263,22 @@ SADMM_INLINE void joined_respond(const struct joined_view *v, const struct sadmm
     for (side = 0; side < 2; ++side) {
         const int32_t body = joined_body(constraint, side);
         if (body >= 0)
-            dense6_solve(v->factor + 36 * (size_t)body, joined_jacobian(v, r, side), joined_answer(v, r, side));
+            joined_solve(v->factor + 36 * (size_t)body, joined_jacobian(v, r, side), joined_answer(v, r, side));
     }
+}
+
+/* That of the row's law; what is hard gives by JOINED_GIVE. */
+SADMM_INLINE double joined_compliance(const struct joined_view *v, const struct sadmm_row_constraint *constraint,
+                                      int32_t r)
+{
+    const size_t law = joined_law(v, r);
+    double response = 0;
+    int side;
+    if (!sadmm_law_is_coupled(v->compliance[law], v->lo[law], v->hi[law])) return v->compliance[law];
+    for (side = 0; side < 2; ++side)
+        if (joined_body(constraint, side) >= 0)
+            response += joined_product(joined_jacobian(v, r, side), joined_answer(v, r, side));
+    return JOINED_GIVE * response;
 }
 
 /* gain x + bias + compliance lambda with the changes so far; moved: with dv. */
@@ -202,7 +294,8 @@ SADMM_INLINE double joined_residual(const struct joined_view *v, const struct sa
         x += joined_product(joined_jacobian(v, r, side), v->velocity + 6 * (size_t)body);
         if (moved) x += joined_product(joined_jacobian(v, r, side), v->dv + 6 * (size_t)body);
     }
-    return v->gain[law] * x + v->bias[law] + v->compliance[law] * (v->lambda[r] + v->change[r]);
+    return v->gain[law] * x + v->bias[law] +
+           joined_compliance(v, constraint, r) * (v->lambda[r] + v->change[r]);
 }
 
 SADMM_INLINE double joined_clamp(double x, double lo, double hi) { return x < lo ? lo : x > hi ? hi : x; }
@@ -276,7 +369,7 @@ SADMM_INLINE double joined_entry(const struct joined_view *v, int32_t row, int32
                 sum += joined_product(joined_jacobian(v, i->first + k, a), joined_answer(v, j->first + q, b));
     if (diagonal) {
         const size_t law = joined_law(v, i->first + k);
-        sum += JOINED_PROXIMAL * sum + v->compliance[law] / v->gain[law];
+        sum += JOINED_PROXIMAL * sum + joined_compliance(v, i, i->first + k) / v->gain[law];
     }
     return sum;
 }
@@ -297,35 +390,10 @@ SADMM_INLINE double joined_updated(const struct joined_view *v, int32_t node, in
     return entry;
 }
 
-/* Cholesky factor of a diagonal block in place (lower half). A pivot that is lost to rounding: the row says what others
- * say, and stays as it is. */
-SADMM_INLINE void joined_factor_diagonal(double *block)
-{
-    int k, r, i;
-    for (k = 0; k < JOINED_ROWS; ++k) {
-        double d = block[(JOINED_ROWS + 1) * k];
-        bool lost;
-        for (i = 0; i < k; ++i) d -= block[JOINED_ROWS * k + i] * block[JOINED_ROWS * k + i];
-        lost = !(d > 0) || isinf(d);
-        d = lost ? INFINITY : sqrt(d);
-        block[(JOINED_ROWS + 1) * k] = d;
-        for (r = k + 1; r < JOINED_ROWS; ++r) {
-            double sum = block[JOINED_ROWS * r + k];
-            for (i = 0; i < k; ++i) sum -= block[JOINED_ROWS * r + i] * block[JOINED_ROWS * k + i];
-            block[JOINED_ROWS * r + k] = lost ? 0 : sum / d;
-        }
-    }
-}
-
 /* Row r of a block below: L_ij = S_ij L_jj^-T. */
 SADMM_INLINE void joined_factor_row(double *row, const double *diagonal)
 {
-    int k, i;
-    for (k = 0; k < JOINED_ROWS; ++k) {
-        double sum = row[k];
-        for (i = 0; i < k; ++i) sum -= row[i] * diagonal[JOINED_ROWS * k + i];
-        row[k] = sum / diagonal[(JOINED_ROWS + 1) * k];
-    }
+    joined_forward(diagonal, row);
 }
 
 /* ---- solving with it ------------------------------------------------------------------------------------------------- */

@@ -7,6 +7,7 @@
 #include <math.h>
 
 #include "core/math/joint.h"
+#include "core/math/joint_table.h"
 #include "core/math/max.h"
 #include "core/math/rigid.h"
 #include "subadmm/joint.h"
@@ -48,7 +49,9 @@ struct sadmm_resident_joint {
 struct sadmm_joint_source {
     int32_t joint;
     int8_t role, coordinate, sign;
-    double gap, slack; /* of limits: at the step's start, m or rad; what the turning of the row makes of it in a step */
+    double gap, slack; /* of limits: at the step's start, m or rad; what the turning of the row makes of it in a step.
+                          Of springs, gap: the way to where a steep part of a table stops the coordinate, INFINITY where
+                          there is none */
     double steered;    /* of the row's rate what sides give that are steered; it is in the bias */
 };
 
@@ -238,6 +241,7 @@ struct joint_laws {
 struct joint_moving {
     const struct sadmm_joint_memory *memory;
     double value, before; /* and its rate, at the step's start */
+    double free;          /* its rate at the end, if nothing but gravity and wrenches acted */
     double turning;       /* what the row's rate by the velocities at the start is more: axes and arms turn */
     double turned;        /* what the rate at the end is more than the row's, so far as the law counts it */
     double steered;       /* of the rate what steered sides give */
@@ -289,6 +293,7 @@ SADMM_INLINE struct joint_moving joint_moving_of(const sadmm_joint_def *def, con
     middle += steered, free += steered;
     m.steered = steered;
     m.turning = middle - m.before;
+    m.free = free - m.turning;
     m.turned = (memory->leads_stay ? 0 : m.turning) + steered; /* the solve's rates are of its bodies alone */
     m.reach = 2 * m.dt * max_of(fabs(m.before), fabs(free));
     return m;
@@ -317,12 +322,46 @@ SADMM_INLINE void joint_add_spring(struct joint_laws *laws, const struct joint_m
     double gain, bias;
     joint_spring(stiffness, damping, m->value - rest, speed, m->before, m->dt, late,
                  late + joint_lead(stiffness, damping, own, m->dt), &gain, &bias);
-    joint_add_law(laws, m, role, k, 1, gain, bias + gain * m->turned, 1, -most, most, 0);
+    joint_add_law(laws, m, role, k, 1, gain, bias + gain * m->turned, 1, -most, most, INFINITY);
 }
 
-/* Of coordinate k. A locked one has one law; what is locked comes first in a joint's rows, for it is held together. */
+/* The way that a spring with a table is predicted to go in the step. One that gave nothing meets what moves freely;
+ * else the rate goes on but for what its force changes by. */
+SADMM_INLINE struct joint_table_way joint_way_of(const struct joint_moving *m, int k, const sadmm_joint_coordinate *c,
+                                                 const struct joint_table *table)
+{
+    const double dt = m->dt, give = m->response * dt * dt, /* m that 1 N moves the coordinate by */
+                 pull = give * c->spring_stiffness, drag = m->response * dt * c->spring_damping,
+                 force = m->memory->force[SADMM_ROLE_SPRING][k],
+                 meant = force == 0 ? dt * m->free : dt * m->before - give * force;
+    return joint_table_go(table, m->value, 1 + pull + drag, give, (1 + drag) * m->value + pull * c->spring_rest + meant);
+}
+
+/* The spring of a coordinate with a table, beside which spring_stiffness acts. */
+SADMM_INLINE void joint_add_table_spring(struct joint_laws *laws, const struct joint_moving *m, int k,
+                                         const sadmm_joint_coordinate *c, const struct joint_table *table)
+{
+    const double stiffness = c->spring_stiffness, damping = c->spring_damping;
+    const struct joint_table_way way = joint_way_of(m, k, c, table);
+    const double own = joint_late(stiffness + way.steepest, damping, m->response, m->dt),
+                 late = m->memory->leads_stay ? 1 : own,
+                 lead = way.points > 0 ? 0 : joint_lead(stiffness + way.steepest, damping, own, m->dt);
+    const struct joint_table_line line = joint_table_line_of(table, m->value, &way, own > 0);
+    const double most = line.most.load + stiffness * (line.most.at - c->spring_rest),
+                 least = line.least.load + stiffness * (line.least.at - c->spring_rest);
+    double load = line.load + stiffness * (line.at - c->spring_rest), gain, bias;
+    /* no row has a gain below 0: a load that falls is taken as it is halfway */
+    if (line.slope < 0) load += line.slope * way.length / 2;
+    joint_spring(stiffness + max_of(0, line.slope), damping, m->value - line.at, 0, m->before, m->dt, late, late + lead,
+                 &gain, &bias);
+    joint_add_law(laws, m, SADMM_ROLE_SPRING, k, 1, gain, bias + m->dt * load + gain * m->turned, 1,
+                  line.most.given ? -m->dt * most : -INFINITY, line.least.given ? -m->dt * least : INFINITY,
+                  own > 0 ? way.length : INFINITY);
+}
+
+/* Of coordinate k; table: of its spring, NULL where it has none. A locked one has one law; what is locked comes first in a joint's rows, for it is held together. */
 SADMM_INLINE void joint_coordinate_laws(const sadmm_joint_def *def, int k, const struct joint_moving *m,
-                                        struct joint_laws *laws)
+                                        const struct joint_table *table, struct joint_laws *laws)
 {
     const sadmm_joint_coordinate *c = &def->coordinates[k];
     const double drive = c->drive_force * m->dt, friction = c->friction * m->dt;
@@ -339,7 +378,8 @@ SADMM_INLINE void joint_coordinate_laws(const sadmm_joint_def *def, int k, const
         joint_add_spring(laws, m, k, SADMM_ROLE_DRIVE, c->drive_stiffness, c->drive_damping, c->target_position,
                          c->target_speed, drive);
     if (friction > 0) joint_add_law(laws, m, SADMM_ROLE_FRICTION, k, 1, 1, m->turned, 0, -friction, friction, 0);
-    if (c->spring_stiffness > 0 || c->spring_damping > 0)
+    if (table) joint_add_table_spring(laws, m, k, c, table);
+    else if (c->spring_stiffness > 0 || c->spring_damping > 0)
         joint_add_spring(laws, m, k, SADMM_ROLE_SPRING, c->spring_stiffness, c->spring_damping, c->spring_rest, 0,
                          INFINITY);
     if (c->armature > 0) /* lambda = -armature (rate at the end - rate at the start) */

@@ -62,15 +62,19 @@ SADMM_INLINE bool joint_contact_holds(const double normal[3], const struct sadmm
     return holds;
 }
 
-/* Does taking leads back carry the joint beyond a limit that it has just reached? (One that presses all the time, a
- * stone on a string, is met by the mean of both velocities, too.) row_a, row_b: the row's Jacobians. */
+/* Does taking leads back carry the joint beyond a limit that it has just reached, or beyond where a spring's table stops
+ * it? (A limit that presses all the time, a stone on a string, is met by the mean of both velocities, too.) row_a,
+ * row_b: the row's Jacobians. */
 SADMM_INLINE bool joint_limit_jolts(const struct sadmm_joint_source *source, double lambda, const double row_a[6],
                                     const double row_b[6], const struct joint_lead bodies[2],
                                     const struct sadmm_settings *settings)
 {
-    double lead = 0, speed = source->steered;
+    const bool table = source->role == SADMM_ROLE_SPRING && source->gap < INFINITY;
+    const double margin = source->slack + LEAD_SLOP * settings->slop;
+    double lead = 0, speed = source->steered, way;
     int s, j;
-    if ((source->role != SADMM_ROLE_LOWER && source->role != SADMM_ROLE_UPPER) || !(lambda > 0)) return false;
+    if (!table && ((source->role != SADMM_ROLE_LOWER && source->role != SADMM_ROLE_UPPER) || !(lambda > 0)))
+        return false;
     for (s = 0; s < 2; ++s) {
         const double *row = s ? row_b : row_a;
         for (j = 0; j < 6; ++j) {
@@ -78,8 +82,9 @@ SADMM_INLINE bool joint_limit_jolts(const struct sadmm_joint_source *source, dou
             speed += row[j] * bodies[s].velocity[j];
         }
     }
-    return source->gap + settings->dt * (speed - lead) <
-           (source->gap < 0 ? source->gap : 0) - source->slack - LEAD_SLOP * settings->slop;
+    way = settings->dt * (speed - lead);
+    if (!table) return source->gap + way < (source->gap < 0 ? source->gap : 0) - margin;
+    return lambda < 0 ? way > max_of(source->gap, 0) + margin : -way > max_of(-source->gap, 0) + margin;
 }
 
 /* Velocities of bodies whose principal moments differ are solved for as what they are in the body's frame, which turns

@@ -16,7 +16,11 @@ struct sadmm_joined {
     double *work;           /* the arrays of a view */
     uint8_t *state;
     double *impulse;        /* entries x 6: J^T lambda */
-    size_t bodies_capacity, entry_capacity, work_capacity, state_capacity, impulse_capacity;
+    uint8_t *touched;       /* entries: by a contact */
+    bool kept;              /* velocities and multipliers from before the iterations are in: */
+    double *kept_velocity, *kept_lambda; /* entries x 6; rows */
+    size_t bodies_capacity, entry_capacity, work_capacity, state_capacity, impulse_capacity, touched_capacity,
+        kept_velocity_capacity, kept_lambda_capacity;
 };
 
 /* One call. */
@@ -38,7 +42,7 @@ void sadmm_joined_destroy(struct sadmm_joined *j)
 {
     if (!j) return;
     sadmm_joined_order_free(&j->order);
-    void *blocks[] = {j->bodies, j->entry, j->work, j->state, j->impulse};
+    void *blocks[] = {j->bodies, j->entry, j->work, j->state, j->impulse, j->touched, j->kept_velocity, j->kept_lambda};
     for (size_t k = 0; k < sizeof blocks / sizeof *blocks; ++k) sadmm_free(blocks[k]);
     sadmm_free(j);
 }
@@ -92,7 +96,11 @@ static bool make_view(struct solving *s)
     const size_t size = 84 * n + 14 * r + (JOINED_BLOCK + JOINED_ROWS) * places + JOINED_BLOCK * (size_t)o->blocks;
     if (!sadmm_grow_empty(&j->work, &j->work_capacity, size, sizeof *j->work) ||
         !sadmm_grow_empty(&j->state, &j->state_capacity, r, sizeof *j->state) ||
-        !sadmm_grow_empty(&j->impulse, &j->impulse_capacity, 6 * (size_t)o->bodies, sizeof *j->impulse))
+        !sadmm_grow_empty(&j->impulse, &j->impulse_capacity, 6 * (size_t)o->bodies, sizeof *j->impulse) ||
+        !sadmm_grow_empty(&j->touched, &j->touched_capacity, (size_t)o->bodies, sizeof *j->touched) ||
+        !sadmm_grow_empty(&j->kept_velocity, &j->kept_velocity_capacity, 6 * (size_t)o->bodies,
+                          sizeof *j->kept_velocity) ||
+        !sadmm_grow_empty(&j->kept_lambda, &j->kept_lambda_capacity, r, sizeof *j->kept_lambda))
         return false;
     double *memory = j->work;
     s->view = (struct joined_view){
@@ -116,12 +124,14 @@ static void find_impulses(struct solving *s)
     const struct sadmm_contact_set *contacts = s->system->contacts;
     const int32_t *entry = s->j->entry;
     memset(s->j->impulse, 0, 6 * (size_t)s->view.s.bodies * sizeof *s->j->impulse);
+    memset(s->j->touched, 0, (size_t)s->view.s.bodies);
     for (size_t p = 0; p < contacts->pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &contacts->pairs[p];
         for (int side = 0; side < 2; ++side) {
             const int32_t body = pair_body(pair, side), e = body >= 0 ? entry[body] : -1;
-            if (e >= 0)
-                joined_add_pair(&contacts->points[pair->first], pair->count, side, s->j->impulse + 6 * (size_t)e);
+            if (e < 0) continue;
+            joined_add_pair(&contacts->points[pair->first], pair->count, side, s->j->impulse + 6 * (size_t)e);
+            s->j->touched[e] = 1;
         }
     }
     for (size_t k = 0; k < s->slot_count; ++k) {
@@ -181,113 +191,155 @@ static void factor_bodies(struct solving *s)
     for (int32_t e = 0; e < s->view.s.bodies; ++e) joined_factor_body(&s->view, e);
 }
 
-/* ---- rows ------------------------------------------------------------------------------------------------------------ */
+/* ---- a part ---------------------------------------------------------------------------------------------------------- */
+
+struct part {
+    int32_t place, end_place, entry, end_entry;
+};
+
+static struct part part_of(const struct joined_structure *o, int32_t k)
+{
+    return (struct part){o->first_of_level[o->first_level[k]], o->first_of_level[o->first_level[k + 1]],
+                         o->first_body[k], o->first_body[k + 1]};
+}
 
 /* Every row of every place. */
-#define EACH_ROW(view, p, constraint, r)                                                              \
-    for (int32_t p = 0; p < (view)->s.count; ++p)                                                     \
+#define EACH_ROW(view, part, p, constraint, r)                                                        \
+    for (int32_t p = (part)->place; p < (part)->end_place; ++p)                                       \
         for (const struct sadmm_row_constraint *constraint = joined_at(view, p), *end_ = constraint + 1; \
              constraint < end_; ++constraint)                                                         \
             for (int32_t r = constraint->first; r < constraint->first + constraint->count; ++r)
 
-static void begin_rows(const struct joined_view *v)
+static void begin_rows(const struct joined_view *v, const struct part *part)
 {
-    EACH_ROW(v, p, constraint, r) {
+    EACH_ROW(v, part, p, constraint, r) {
         joined_respond(v, constraint, r);
         joined_begin_row(v, constraint, r);
     }
 }
 
-static bool change_rows(const struct joined_view *v)
+static bool change_rows(const struct joined_view *v, const struct part *part)
 {
     bool changed = false;
-    EACH_ROW(v, p, constraint, r) changed = joined_change_row(v, constraint, r) || changed;
+    EACH_ROW(v, part, p, constraint, r) changed = joined_change_row(v, constraint, r) || changed;
     return changed;
 }
 
-/* ---- a pass ---------------------------------------------------------------------------------------------------------- */
-
-static void factorize(const struct joined_view *v)
+static void factorize(const struct joined_view *v, const struct part *part)
 {
-    for (int32_t p = 0; p < v->s.count; ++p) {
+    for (int32_t p = part->place; p < part->end_place; ++p) {
         double *diagonal = v->diagonal + JOINED_BLOCK * (size_t)p;
         for (int k = 0; k < JOINED_ROWS; ++k)
             for (int q = 0; q <= k; ++q) diagonal[JOINED_ROWS * k + q] = joined_updated(v, p, p, p, k, q);
-        joined_factor_diagonal(diagonal);
+        joined_cholesky(diagonal);
         for (int32_t b = v->s.first_below[p]; b < v->s.first_below[p + 1]; ++b) {
             double *block = v->below + JOINED_BLOCK * (size_t)b;
             for (int k = 0; k < JOINED_ROWS; ++k) {
                 for (int q = 0; q < JOINED_ROWS; ++q)
                     block[JOINED_ROWS * k + q] = joined_updated(v, v->s.count + b, v->s.row[b], p, k, q);
-                joined_factor_row(block + JOINED_ROWS * k, diagonal);
+                joined_forward(diagonal, block + JOINED_ROWS * k); /* L_ij = S_ij L_jj^-T */
             }
         }
     }
 }
 
-static void move_bodies(const struct joined_view *v)
+static void move_bodies(const struct joined_view *v, const struct part *part)
 {
-    for (int32_t e = 0; e < v->s.bodies; ++e) joined_move(v, e);
+    for (int32_t e = part->entry; e < part->end_entry; ++e) joined_move(v, e);
 }
 
 /* Multipliers of rows inside their bounds, for what the others are. */
-static void solve_rows(const struct joined_view *v)
+static void solve_rows(const struct joined_view *v, const struct part *part)
 {
-    EACH_ROW(v, p, constraint, r)
+    EACH_ROW(v, part, p, constraint, r)
         if (v->state[r] == JOINED_INSIDE) v->change[r] = 0;
-    move_bodies(v);
-    for (int32_t p = 0; p < v->s.count; ++p)
+    move_bodies(v, part);
+    for (int32_t p = part->place; p < part->end_place; ++p)
         for (int k = 0; k < JOINED_ROWS; ++k) v->right[JOINED_ROWS * (size_t)p + (size_t)k] = joined_right(v, p, k);
-    for (int32_t p = 0; p < v->s.count; ++p) {
-        double *own = v->right + JOINED_ROWS * (size_t)p, sum[JOINED_ROWS];
-        for (int k = 0; k < JOINED_ROWS; ++k) sum[k] = joined_forward_row(v, p, k);
-        dense6_forward(v->diagonal + JOINED_BLOCK * (size_t)p, sum, own);
+    for (int32_t p = part->place; p < part->end_place; ++p) {
+        double *own = v->right + JOINED_ROWS * (size_t)p;
+        for (int k = 0; k < JOINED_ROWS; ++k) own[k] = joined_forward_row(v, p, k);
+        joined_forward(v->diagonal + JOINED_BLOCK * (size_t)p, own);
     }
-    for (int32_t p = v->s.count - 1; p >= 0; --p) {
-        double *own = v->right + JOINED_ROWS * (size_t)p, sum[JOINED_ROWS];
-        for (int k = 0; k < JOINED_ROWS; ++k) sum[k] = joined_backward_row(v, p, k);
-        dense6_backward(v->diagonal + JOINED_BLOCK * (size_t)p, sum, own);
+    for (int32_t p = part->end_place - 1; p >= part->place; --p) {
+        double *own = v->right + JOINED_ROWS * (size_t)p;
+        for (int k = 0; k < JOINED_ROWS; ++k) own[k] = joined_backward_row(v, p, k);
+        joined_backward(v->diagonal + JOINED_BLOCK * (size_t)p, own);
     }
-    EACH_ROW(v, p, constraint, r)
+    EACH_ROW(v, part, p, constraint, r)
         if (v->state[r] == JOINED_INSIDE)
             v->change[r] = v->right[JOINED_ROWS * (size_t)p + (size_t)(r - constraint->first)];
-    move_bodies(v);
+    move_bodies(v, part);
 }
 
-static bool is_finite(const struct joined_view *v)
+static bool is_finite(const struct joined_view *v, const struct part *part)
 {
     double sum = 0;
-    for (int32_t e = 0; e < v->s.bodies; ++e)
+    for (int32_t e = part->entry; e < part->end_entry; ++e)
         for (size_t k = 0; k < 6; ++k) sum += v->dv[6 * (size_t)v->s.body[e] + k] * 0;
-    EACH_ROW(v, p, constraint, r) sum += v->change[r] * 0;
+    EACH_ROW(v, part, p, constraint, r) sum += v->change[r] * 0;
     return sum == 0;
 }
 
-static void store(const struct joined_view *v, double *lambda)
+static void solve_part(const struct solving *s, const struct part *part)
 {
-    for (int32_t e = 0; e < v->s.bodies; ++e)
-        for (size_t k = 0; k < 6; ++k)
-            v->velocity[6 * (size_t)v->s.body[e] + k] += v->dv[6 * (size_t)v->s.body[e] + k];
-    EACH_ROW(v, p, constraint, r) lambda[r] = joined_bounded(v, r);
+    const struct joined_view *v = &s->view;
+    begin_rows(v, part);
+    for (int pass = 0; pass < JOINED_PASSES; ++pass) {
+        factorize(v, part);
+        solve_rows(v, part);
+        if (!change_rows(v, part)) break;
+    }
+    const bool finite = is_finite(v, part);
+    for (int32_t e = part->entry; finite && e < part->end_entry; ++e)
+        for (size_t k = 0; k < 6; ++k) v->velocity[6 * (size_t)v->s.body[e] + k] += v->dv[6 * (size_t)v->s.body[e] + k];
+    EACH_ROW(v, part, p, constraint, r) s->system->rows->lambda[r] = finite ? joined_bounded(v, r) : v->lambda[r];
+}
+
+/* ---- before and after the iterations --------------------------------------------------------------------------------- */
+
+static bool is_touched(const struct sadmm_joined *j, const struct part *part)
+{
+    for (int32_t e = part->entry; e < part->end_entry; ++e)
+        if (j->touched[e]) return true;
+    return false;
+}
+
+static void keep_part(const struct solving *s, const struct part *part)
+{
+    const struct joined_view *v = &s->view;
+    for (int32_t e = part->entry; e < part->end_entry; ++e)
+        memcpy(s->j->kept_velocity + 6 * (size_t)e, v->velocity + 6 * (size_t)v->s.body[e], 6 * sizeof(double));
+    EACH_ROW(v, part, p, constraint, r) s->j->kept_lambda[r] = s->system->rows->lambda[r];
+}
+
+static void take_kept(const struct solving *s, const struct part *part)
+{
+    const struct joined_view *v = &s->view;
+    for (int32_t e = part->entry; e < part->end_entry; ++e)
+        memcpy(v->velocity + 6 * (size_t)v->s.body[e], s->j->kept_velocity + 6 * (size_t)e, 6 * sizeof(double));
+    EACH_ROW(v, part, p, constraint, r) s->system->rows->lambda[r] = s->j->kept_lambda[r];
 }
 
 sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_system *system,
                                 const struct sadmm_row_constraint *slots, size_t slot_count,
-                                const struct sadmm_settings *settings, struct sadmm_error *error)
+                                const struct sadmm_settings *settings, bool after, struct sadmm_error *error)
 {
-    struct solving s = {.j = joined, .system = system, .slots = slots, .slot_count = slot_count, .settings = settings};
-    if (!system->rows || system->rows->constraint_count == 0) return SADMM_OK;
+    struct solving s = {
+        .j = joined, .system = system, .slots = slots, .slot_count = slot_count, .settings = settings};
     if (!find_order(&s) || !make_view(&s)) return sadmm_fail_memory(error, "joined bodies");
-    if (s.view.s.count == 0) return SADMM_OK;
     find_impulses(&s);
     find_missing(&s);
     factor_bodies(&s);
-    begin_rows(&s.view);
-    for (int pass = 0; pass < JOINED_PASSES; ++pass) {
-        factorize(&s.view);
-        solve_rows(&s.view);
-        if (!change_rows(&s.view)) break;
+    for (int32_t k = 0; k < s.view.s.parts; ++k) {
+        const struct part part = part_of(&s.view.s, k);
+        if (after && joined->kept && !is_touched(joined, &part)) {
+            take_kept(&s, &part);
+            continue;
+        }
+        solve_part(&s, &part);
+        if (!after) keep_part(&s, &part);
     }
-    if (is_finite(&s.view)) store(&s.view, system->rows->lambda);
+    joined->kept = !after;
     return SADMM_OK;
 }

@@ -6,6 +6,7 @@
  *
  *     (A + C) dv - J^T dlambda = b - A v + J^T lambda + J_c^T lambda_c        every body with rows
  *     gain J (v + dv) + bias + compliance (lambda + dlambda) = 0              every row inside its bounds
+ *                                                                             (hard ones with a compliance of JOINED_GIVE)
  *
  * with the contacts' impulses lambda_c as they are, and C = sum B J_c^T J_c over the contacts that press, B the mass that
  * rests on each (math/weight.h). A row whose multiplier leaves its bounds stays at the bound; one that is held there
@@ -19,6 +20,10 @@
 #include "core/base/error.h"
 #include "core/model/system.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 struct sadmm_joined;
 
 /* NULL: no memory. */
@@ -30,9 +35,14 @@ enum { SADMM_JOINED_AROUND = 64 };
 
 /* system->velocity and the multipliers of system->rows, in place. slots: constraints of these rows, at places that stay
  * from step to step, so that the order does, too: one may have no rows at the time, but has the bodies that it joins
- * when it has. What does not fit a direct solve is left as it is. Errors: OUT_OF_MEMORY, nothing has changed. */
+ * when it has. What does not fit a direct solve is left as it is. after: the
+ * iterations have come; parts without contacts then get back what they had before these, which is their solution.
+ * Errors: OUT_OF_MEMORY, nothing has changed. */
 sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_system *system,
                                 const struct sadmm_row_constraint *slots, size_t slot_count,
-                                const struct sadmm_settings *settings, struct sadmm_error *error);
+                                const struct sadmm_settings *settings, bool after, struct sadmm_error *error);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -5,6 +5,10 @@
 
 #include "core/model/joined.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 struct sadmm_joined_order {
     struct joined_structure s;
     int32_t *memory; /* all arrays of it */
@@ -18,4 +22,7 @@ bool sadmm_joined_order_make(struct sadmm_joined_order *order, const int32_t *bo
                              int32_t body_count, int32_t most_around);
 void sadmm_joined_order_free(struct sadmm_joined_order *order);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -49,3 +49,15 @@ struct sadmm_world_coupling *sadmm_world_find_coupling(const sadmm_world *world,
                id.slot, id.generation);
     return NULL;
 }
+
+struct sadmm_world_gear *sadmm_world_find_gear(const sadmm_world *world, sadmm_gear_id id, const char *argument,
+                                               struct sadmm_error *error)
+{
+    if (id.slot >= 1 && id.slot <= world->gear_slots) {
+        struct sadmm_world_gear *gear = &world->gears[id.slot - 1];
+        if (gear->alive && gear->generation == id.generation) return gear;
+    }
+    sadmm_fail(error, SADMM_ERROR_STALE_ID, "%s = (slot %u, generation %u): no such gear (any more)", argument, id.slot,
+               id.generation);
+    return NULL;
+}

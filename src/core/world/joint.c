@@ -268,10 +268,43 @@ static void kill_coupling(sadmm_world *world, size_t slot)
     sadmm_slot_freed(&world->coupling_marks, slot);
 }
 
+static void set_table(sadmm_world *world, size_t slot, int index, double *table, int32_t count)
+{
+    struct sadmm_world_joint *joint = &world->joints[slot];
+    world->table_count += (count > 0) - (joint->table_count[index] > 0);
+    sadmm_free(joint->table[index]);
+    joint->table[index] = table;
+    joint->table_count[index] = count;
+}
+
+void sadmm_world_free_tables(sadmm_world *world)
+{
+    for (size_t slot = 0; slot < world->joint_slots; ++slot)
+        for (int k = 0; k < JOINT_COORDINATES; ++k) set_table(world, slot, k, NULL, 0);
+}
+
+void sadmm_world_kill_gear(sadmm_world *world, size_t slot)
+{
+    world->gears[slot].alive = false;
+    ++world->gears[slot].generation;
+    --world->gear_count;
+    sadmm_slot_freed(&world->gear_marks, slot);
+}
+
+static void kill_gears_of(sadmm_world *world, size_t joint)
+{
+    for (size_t slot = 0; world->gear_count > 0 && slot < world->gear_slots; ++slot) {
+        const struct sadmm_world_gear *gear = &world->gears[slot];
+        if (gear->alive && (gear->joint[0] == joint || gear->joint[1] == joint)) sadmm_world_kill_gear(world, slot);
+    }
+}
+
 void sadmm_world_kill_joint(sadmm_world *world, size_t slot)
 {
     struct sadmm_world_joint *joint = &world->joints[slot];
     remove_pair(world, joint);
+    kill_gears_of(world, slot);
+    for (int k = 0; k < JOINT_COORDINATES; ++k) set_table(world, slot, k, NULL, 0);
     joint->alive = false;
     ++joint->generation;
     --world->joint_count;
@@ -349,6 +382,15 @@ sadmm_status sadmm_world_set_joint_enabled(sadmm_world *world, sadmm_joint_id id
     return sadmm_world_take_edit(world, joint, SADMM_JOINT_ENABLED);
 }
 
+static sadmm_status check_free(const struct sadmm_world_joint *joint, int32_t index, struct sadmm_error *error)
+{
+    if (index < 0 || index >= JOINT_COORDINATES || joint->def.locks >> index & 1 || !has_coordinate(&joint->def, index))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "index = %d: must be a free coordinate of the joint, in [0, 6) (locked: mask %u)", index,
+                          joint->def.locks);
+    return SADMM_OK;
+}
+
 sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id id, int32_t index,
                                               const sadmm_joint_coordinate *coordinate)
 {
@@ -357,13 +399,72 @@ sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id
     struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", error);
     if (!joint) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(coordinate, "coordinate", error));
-    if (index < 0 || index >= JOINT_COORDINATES || joint->def.locks >> index & 1 || !has_coordinate(&joint->def, index))
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "index = %d: must be a free coordinate of the joint, in [0, 6) (locked: mask %u)", index,
-                          joint->def.locks);
+    TRY(check_free(joint, index, error));
     TRY(check_coordinate("coordinate->", coordinate, error));
     joint->def.coordinates[index] = *coordinate;
     return sadmm_world_take_edit(world, joint, (enum sadmm_joint_edit)index);
+}
+
+static sadmm_status check_table(const double *positions, const double *forces, int32_t count,
+                                struct sadmm_error *error)
+{
+    if (count != 0 && (count < 2 || count > SADMM_MOST_SPRING_POINTS))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "count = %d: must be 0 or in [2, %d]", count,
+                          SADMM_MOST_SPRING_POINTS);
+    if (count == 0) return SADMM_OK;
+    TRY(sadmm_check_given(positions, "positions", error));
+    TRY(sadmm_check_given(forces, "forces", error));
+    TRY(sadmm_check_vector("positions", positions, count, FRAME_LIMIT, error));
+    TRY(sadmm_check_vector("forces", forces, count, FORCE_LIMIT, error));
+    for (int32_t i = 1; i < count; ++i) {
+        const double way = positions[i] - positions[i - 1];
+        if (!(way > 0))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                              "positions[%d] = %.17g after positions[%d] = %.17g: must increase", i, positions[i], i - 1,
+                              positions[i - 1]);
+        if (!(fabs(forces[i] - forces[i - 1]) <= FORCE_LIMIT * way))
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                              "forces[%d] = %g after forces[%d] = %g, %g farther: must be within 1e15 a unit of way", i,
+                              forces[i], i - 1, forces[i - 1], way);
+    }
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_set_joint_spring_table(sadmm_world *world, sadmm_joint_id id, int32_t index,
+                                                const double *positions, const double *forces, int32_t count)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", error);
+    if (!joint) return SADMM_ERROR_STALE_ID;
+    TRY(check_free(joint, index, error));
+    TRY(check_table(positions, forces, count, error));
+    TRY(sadmm_world_take_back(world));
+    const size_t n = (size_t)count;
+    double *table = n ? (double *)sadmm_alloc(2 * n, sizeof *table) : NULL;
+    if (n && !table) return sadmm_fail_memory(error, "a spring's table");
+    if (n) {
+        memcpy(table, positions, n * sizeof *table);
+        memcpy(table + n, forces, n * sizeof *table);
+    }
+    set_table(world, id.slot - 1, index, table, count);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_joint_spring_table(sadmm_world *world, sadmm_joint_id id, int32_t index, double *positions,
+                                            double *forces, int32_t *count)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    const struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", &world->error);
+    if (!joint) return SADMM_ERROR_STALE_ID;
+    if (index < 0 || index >= JOINT_COORDINATES)
+        return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, 6)", index);
+    TRY(sadmm_check_given(count, "count", &world->error));
+    const size_t n = (size_t)joint->table_count[index];
+    *count = joint->table_count[index];
+    if (n && positions) memcpy(positions, joint->table[index], n * sizeof *positions);
+    if (n && forces) memcpy(forces, joint->table[index] + n, n * sizeof *forces);
+    return SADMM_OK;
 }
 
 sadmm_status sadmm_world_place_joint(sadmm_world *world, sadmm_joint_def *def, const double position[3],

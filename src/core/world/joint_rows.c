@@ -19,8 +19,8 @@ static struct joint_body body_of(const sadmm_world *world, int32_t slot)
     return out;
 }
 
-static struct acting_joint prepare(const sadmm_world *world, const struct sadmm_world_joint *joint,
-                                   const sadmm_settings *settings)
+struct acting_joint sadmm_world_act_joint(const sadmm_world *world, const struct sadmm_world_joint *joint,
+                                          const sadmm_settings *settings)
 {
     struct joint_body bodies[2] = {body_of(world, joint->body[0]), body_of(world, joint->body[1])};
     if (joint->coupling)
@@ -45,7 +45,10 @@ static void find_laws(struct sadmm_world_joint *joint, const struct acting_joint
             if ((int)(joint->def.locks >> k & 1) != locked || !joint_has_coordinate(&joint->def, k)) continue;
             const struct joint_moving m = joint_moving_of(&joint->def, &joint->next, acting, k, settings);
             if (joint_winds(joint->def.locks, k)) joint->next.angle[k] = m.value;
-            joint_coordinate_laws(&joint->def, k, &m, &laws);
+            const struct joint_table table = {joint->table[k],
+                                              joint->table[k] ? joint->table[k] + joint->table_count[k] : NULL,
+                                              joint->table_count[k]};
+            joint_coordinate_laws(&joint->def, k, &m, joint->table[k] ? &table : NULL, &laws);
             for (int i = 0; i < laws.count; ++i) all->law[all->count++] = laws.law[i];
         }
 }
@@ -88,7 +91,12 @@ static bool add_constraints(sadmm_world *world, int32_t slot, const struct actin
 
 int32_t sadmm_joint_constraints(const struct sadmm_world_joint *joint)
 {
-    return joint->coupling ? 1 : (joint_most_laws(&joint->def) + SADMM_MAX_ROWS - 1) / SADMM_MAX_ROWS;
+    int laws = joint_most_laws(&joint->def);
+    for (int k = 0; k < JOINT_COORDINATES; ++k) { /* a spring that has nothing but its table */
+        const sadmm_joint_coordinate *c = &joint->def.coordinates[k];
+        laws += joint->table[k] && !(c->spring_stiffness > 0 || c->spring_damping > 0);
+    }
+    return joint->coupling ? 1 : (laws + SADMM_MAX_ROWS - 1) / SADMM_MAX_ROWS;
 }
 
 /* The constraints that the joint may have: those from `first` on that it has, and others without rows. */
@@ -123,14 +131,14 @@ sadmm_status sadmm_world_make_rows(sadmm_world *world, const sadmm_settings *set
             if (!add_slots(world, joint, before)) return sadmm_fail_memory(&world->error, "the joints' rows");
             continue;
         }
-        const struct acting_joint acting = prepare(world, joint, settings);
+        const struct acting_joint acting = sadmm_world_act_joint(world, joint, settings);
         find_laws(joint, &acting, settings, &laws);
         if (laws.count > 0) ++*(joint->coupling ? &world->couplings_acting : &world->joints_acting);
         if (!add_constraints(world, (int32_t)slot, &acting, &laws, settings->dt) || !add_slots(world, joint, before))
             return sadmm_fail_memory(&world->error, "the joints' rows");
         joint_forget_forces(&joint->next); /* the solution tells */
     }
-    return SADMM_OK;
+    return sadmm_world_make_gear_rows(world, settings);
 }
 
 /* ---- from step to step ------------------------------------------------------------------------------------------- */
@@ -158,6 +166,7 @@ sadmm_status sadmm_world_begin_joints(sadmm_world *world)
         joint->next = joint->last;
         if (!joint->def.enabled) joint_forget_forces(&joint->next);
     }
+    sadmm_world_begin_gears(world);
     return filter_pairs(world);
 }
 
@@ -175,18 +184,19 @@ void sadmm_world_keep_rows(sadmm_world *world, const sadmm_settings *settings)
     const struct sadmm_rows *rows = &world->start.rows;
     struct sadmm_world_joint *joint = NULL;
     struct acting_joint acting;
-    for (size_t r = 0; r < rows->row_count; ++r) {
+    for (size_t r = 0; r < world->joint_rows; ++r) {
         const struct sadmm_joint_source *source = &world->joint_sources[r];
         if (!joint || joint != &world->joints[source->joint]) {
             if (joint) end_joint(world, joint, &acting, settings->dt);
             joint = &world->joints[source->joint];
-            acting = prepare(world, joint, settings);
+            acting = sadmm_world_act_joint(world, joint, settings);
             v3_store(acting.middle.point, joint->next.point);
         }
         const double force = source->sign * rows->lambda[r] / settings->dt;
         joint_keep_row(&joint->next, acting.middle.axis, source->role, source->coordinate, force);
     }
     if (joint) end_joint(world, joint, &acting, settings->dt);
+    sadmm_world_keep_gear_rows(world, settings->dt);
 }
 
 static void commit_joint(struct sadmm_world_joint *joint)
@@ -199,4 +209,5 @@ void sadmm_world_commit_joints(sadmm_world *world)
 {
     for (size_t slot = 0; world->joint_count > 0 && slot < world->joint_slots; ++slot)
         if (world->joints[slot].alive) commit_joint(&world->joints[slot]);
+    sadmm_world_commit_gears(world);
 }

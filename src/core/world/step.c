@@ -157,14 +157,14 @@ struct host_step {
 };
 
 /* Bodies with joints, directly. */
-static sadmm_status solve_joined(struct host_step *step)
+static sadmm_status solve_joined(struct host_step *step, bool after)
 {
     sadmm_world *world = step->world;
     if (!step->system.rows) return SADMM_OK;
     if (!world->joined) world->joined = sadmm_joined_create();
     if (!world->joined) return sadmm_fail_memory(&world->error, "joined bodies");
     return sadmm_joined_solve(world->joined, &step->system, world->joint_constraints, world->joint_constraint_count,
-                              &step->settings, &world->error);
+                              &step->settings, after, &world->error);
 }
 
 static sadmm_status make_plan(struct host_step *step)
@@ -179,7 +179,7 @@ static sadmm_status make_plan(struct host_step *step)
     world->plan = sadmm_plan_make(&step->system, &step->settings);
     step->report = sadmm_solve_report_empty(world->kernels);
     TRY(keep_start(world, &depth));
-    if (world->plan.warm_start) TRY(solve_joined(step));
+    if (world->plan.warm_start) TRY(solve_joined(step, false));
     step->depth = depth > step->depth ? depth : step->depth;
     return SADMM_OK;
 }
@@ -207,7 +207,7 @@ static sadmm_status integrate(struct host_step *step)
     sadmm_world_put_down(world, &step->system);
     TRY(world->kernels->integrate(world->context, world->next, &world->error));
     if (step->system.rows) {
-        TRY(solve_joined(step));
+        TRY(solve_joined(step, true));
         TRY(sadmm_world_move_joined(world, &step->settings));
         sadmm_world_keep_rows(world, &step->settings);
     }

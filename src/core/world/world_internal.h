@@ -4,9 +4,9 @@
  *   driven                           kinematic bodies in a step
  *   gather                           what a step reads
  *   coupling_step                    what couplings keep from step to step
- *   joint_rows, joint_move           joints as constraint rows, and where they let bodies go
+ *   gear_rows, joint_rows, joint_move   gears and joints as constraint rows, and where they let bodies go
  *   resident_joints, resident        where a backend keeps the world
- *   shape, joint, coupling, body, contacts, explain   what callers see of it, and change
+ *   shape, joint, coupling, gear, body, contacts, explain   what callers see of it, and change
  *   step, world                      steps; settings, the whole
  */
 #ifndef SADMM_CORE_WORLD_INTERNAL_H
@@ -26,6 +26,7 @@
 #include "pair_table.h"
 #include "slots.h"
 #include "subadmm/coupling.h"
+#include "subadmm/gear.h"
 #include "subadmm/joint.h"
 #include "subadmm/world.h"
 
@@ -72,6 +73,8 @@ struct sadmm_world_joint {
     sadmm_joint_def def;    /* locks: what is locked */
     int32_t body[2];        /* slots of a and b, -1: the static world */
     struct joint_frame frame[2];
+    double *table[JOINT_COORDINATES];     /* of a coordinate's spring: positions, then loads; NULL: none */
+    int32_t table_count[JOINT_COORDINATES]; /* points */
     struct sadmm_joint_memory last, next; /* of the last step; of the one at hand, or a sub-step of it */
     int32_t resident;       /* its number in the backend that keeps the world */
     int32_t resident_constraints; /* that its rows may take there */
@@ -86,6 +89,15 @@ struct sadmm_world_coupling {
     sadmm_coupling_def def; /* its target is that in `last` */
     size_t joint;           /* slot */
     struct sadmm_coupling_memory last, next;
+};
+
+/* A gear slot. */
+struct sadmm_world_gear {
+    bool alive;
+    uint32_t generation;
+    sadmm_gear_def def;
+    size_t joint[2]; /* slots */
+    struct { double force; } last, next; /* along the first coordinate, of the last step and of the one at hand */
 };
 
 /* What the last step started from, for contacts, freeze and the certificate. */
@@ -123,6 +135,12 @@ struct sadmm_world {
     size_t joint_slots, joint_capacity;
     int32_t joint_count;                  /* live slots, those of couplings among them */
     struct sadmm_slot_marks joint_marks;
+    int32_t table_count;                  /* tables of springs, of all joints */
+    struct sadmm_world_gear *gears;
+    size_t gear_slots, gear_capacity;
+    int32_t gear_count;
+    struct sadmm_slot_marks gear_marks;
+    size_t joint_rows;                    /* of the step's rows: the first ones; those of gears follow */
     struct sadmm_world_coupling *couplings;
     size_t coupling_slots, coupling_capacity;
     int32_t coupling_count;
@@ -239,7 +257,19 @@ void sadmm_world_move_targets(sadmm_world *world, double dt);
 /* The step of so many sub-steps is done. */
 void sadmm_world_commit_couplings(sadmm_world *world, int substeps);
 
+/* ---- gear_rows.c ---- */
+
+void sadmm_world_begin_gears(sadmm_world *world);
+/* After those of joints. */
+sadmm_status sadmm_world_make_gear_rows(sadmm_world *world, const sadmm_settings *settings);
+void sadmm_world_keep_gear_rows(sadmm_world *world, double dt);
+void sadmm_world_commit_gears(sadmm_world *world);
+
 /* ---- joint_rows.c ---- */
+
+/* A joint in the (sub-)step at hand. */
+struct acting_joint sadmm_world_act_joint(const sadmm_world *world, const struct sadmm_world_joint *joint,
+                                          const sadmm_settings *settings);
 
 /* Pairs of bodies that are not to meet, into `filtered_pairs`; and what joints kept of the last step into what they
  * keep of this one. */
@@ -318,6 +348,8 @@ struct sadmm_shape *sadmm_world_find_shape(const sadmm_world *world, sadmm_shape
                                            struct sadmm_error *error);
 struct sadmm_world_joint *sadmm_world_find_joint(const sadmm_world *world, sadmm_joint_id id, const char *argument,
                                                  struct sadmm_error *error);
+struct sadmm_world_gear *sadmm_world_find_gear(const sadmm_world *world, sadmm_gear_id id, const char *argument,
+                                               struct sadmm_error *error);
 struct sadmm_world_coupling *sadmm_world_find_coupling(const sadmm_world *world, sadmm_coupling_id id,
                                                        const char *argument, struct sadmm_error *error);
 
@@ -332,12 +364,15 @@ void sadmm_world_kill_shape(sadmm_world *world, size_t slot);
 
 /* ---- joint.c ---- */
 
+/* What joints have beside their slots. */
+void sadmm_world_free_tables(sadmm_world *world);
 /* Something of a joint has been set: the next step of the backend that keeps the world takes it along. */
 sadmm_status sadmm_world_take_edit(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit);
 /* Put a joint that has been checked into a slot. */
 sadmm_status sadmm_world_insert_joint(sadmm_world *world, const struct sadmm_world_joint *joint, size_t *slot);
-/* With its coupling, if it is of one. */
+/* With its coupling, if it is of one, and the gears on it. */
 void sadmm_world_kill_joint(sadmm_world *world, size_t slot);
+void sadmm_world_kill_gear(sadmm_world *world, size_t slot);
 /* The joints and couplings of a body that is removed. */
 void sadmm_world_kill_joints_of(sadmm_world *world, int32_t body);
 

@@ -1,0 +1,71 @@
+/* World level: gears, what ties one free coordinate of a joint to one of another, exactly:
+ *
+ *     q_1 + ratio q_2 = offset
+ *
+ * Two toothed wheels that mesh (two revolute joints; ratio = teeth of 2 / teeth of 1), a belt (the same with ratio < 0), a
+ * rack on a pinion (a translation 1, a rotation 2; ratio = -radius, m/rad), a pulley (two translations), a screw (the
+ * translation and the rotation of one cylindrical joint; ratio = -pitch / 2 pi).
+ *
+ * A gear gives force along q_1 and ratio force along q_2, each as the joint's own laws do: between the joint's two
+ * bodies. A row of the solver joins two bodies, so that no more than two of those that the joints are between may be
+ * dynamic: gears have their axles on the static world, on kinematic bodies, or on one another. (Wheels on an axle carrier
+ * that is dynamic, as in planetary gears, are refused.) Angles count on beyond full turns, and errors of the ratio do not add up: they are fed
+ * back as those of locked coordinates. Method: docs/algorithm.md, section 10.
+ *
+ * Worlds with gears are stepped by the host on every backend. Threads and errors: as world.h says. Ids are values with a
+ * generation, as bodies' are.
+ */
+#ifndef SUBADMM_GEAR_H
+#define SUBADMM_GEAR_H
+
+#include "joint.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct sadmm_gear_id { uint32_t slot, generation; } sadmm_gear_id;
+
+typedef struct sadmm_gear_def {
+    sadmm_joint_id joint_1, joint_2; /* may be the same, with two coordinates. No default */
+    int32_t coordinate_1, coordinate_2; /* free ones, in [0, 6): any translation or distance; rotations that are the only
+                                           free one or one of two. No default */
+    double ratio;                /* |ratio| in [1e-9, 1e9], unit of coordinate 1 over that of 2; default 1 */
+    double offset;               /* |offset| <= 1e9, unit of coordinate 1, or NaN: as it is when the gear is added (what
+                                    is read back); default NaN */
+    bool enabled;                /* default true. One that is not does nothing, nor does one with a joint that is not */
+} sadmm_gear_def;
+
+/* The defaults named above. Thread-safe. */
+SADMM_API sadmm_gear_def sadmm_gear_def_default(void);
+
+/* *id: the new gear, until it, or one of its joints or their bodies, is removed. An offset that does not fit is drawn
+ * in by at most settings.correction_speed of coordinate 1. Errors: STALE_ID, INVALID_ARGUMENT (range; a coordinate that
+ * is not free, twice the same one, more than two dynamic bodies; nothing changes), LIMIT (2^24 gears), OUT_OF_MEMORY,
+ * DEVICE. */
+SADMM_API sadmm_status sadmm_world_add_gear(sadmm_world *world, const sadmm_gear_def *def,
+                                            sadmm_gear_id *id /* may be NULL */);
+/* Errors: STALE_ID, DEVICE. */
+SADMM_API sadmm_status sadmm_world_remove_gear(sadmm_world *world, sadmm_gear_id id);
+SADMM_API int32_t sadmm_world_gear_count(const sadmm_world *world); /* also those not enabled; of NULL: 0 */
+/* The index-th live gear in order of creation slot, index in [0, gear_count). Errors: INVALID_ARGUMENT (range). */
+SADMM_API sadmm_status sadmm_world_gear_at(sadmm_world *world, int32_t index, sadmm_gear_id *id);
+/* Read back the definition as it is now. Errors: STALE_ID. */
+SADMM_API sadmm_status sadmm_world_gear_def(sadmm_world *world, sadmm_gear_id id, sadmm_gear_def *def);
+/* From the next step on; its offset stays. Errors: STALE_ID. */
+SADMM_API sadmm_status sadmm_world_set_gear_enabled(sadmm_world *world, sadmm_gear_id id, bool enabled);
+
+typedef struct sadmm_gear_state {
+    double error;                /* q_1 + ratio q_2 - offset of the present poses, unit of coordinate 1 */
+    double force_1, force_2;     /* along the coordinates, N or N m; force_2 = ratio force_1. Mean over the last
+                                    (sub-)step; 0 before the first one and where the gear did not take part. They are not
+                                    in the joints' own wrenches */
+} sadmm_gear_state;
+
+/* Errors: STALE_ID, DEVICE. */
+SADMM_API sadmm_status sadmm_world_gear_state(sadmm_world *world, sadmm_gear_id id, sadmm_gear_state *state);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
