@@ -66,6 +66,48 @@ START_TEST(joints_are_solved_on_the_device)
 }
 END_TEST
 
+/* A table and a gear that come while the device has the world take it back to the host, where both are at home; and it
+ * goes on as there. */
+START_TEST(gears_and_tables_are_the_hosts)
+{
+    static const double positions[3] = {-1, 0, 1}, forces[3] = {-40, 0, 10};
+    sadmm_world *worlds[2] = {chain(_i), chain(_i)};
+    const double close = _i == SADMM_F32 ? 2e-4 : 1e-8; /* as above */
+    use_device(worlds[1], _i, 0);
+    for (int step = 0; step < 30; ++step) {
+        for (int w = 0; w < 2; ++w) {
+            sadmm_joint_id joints[3];
+            sadmm_gear_def gear = sadmm_gear_def_default();
+            for (int k = 0; k < 3; ++k) MUST(worlds[w], sadmm_world_joint_at(worlds[w], k, &joints[k]));
+            gear.joint_1 = joints[0], gear.joint_2 = joints[1];
+            gear.coordinate_1 = gear.coordinate_2 = 5;
+            gear.ratio = 0.5;
+            if (step == 8)
+                MUST(worlds[w], sadmm_world_set_joint_spring_table(worlds[w], joints[2], 5, positions, forces, 3));
+            if (step == 12) MUST(worlds[w], sadmm_world_add_gear(worlds[w], &gear, NULL));
+            if (step == 22)
+                MUST(worlds[w], sadmm_world_set_joint_spring_table(worlds[w], joints[2], 5, NULL, NULL, 0));
+            step_world(worlds[w], 1);
+        }
+        for (int k = 0; k < 4; ++k) {
+            const sadmm_body_state a = body_state(worlds[0], body_at(worlds[0], k)),
+                                   b = body_state(worlds[1], body_at(worlds[1], k));
+            ck_assert_msg(distance(a.position, b.position) < close, "step %d, body %d: %g", step, k,
+                          distance(a.position, b.position));
+        }
+    }
+    for (int w = 0; w < 2; ++w) {
+        sadmm_gear_id gear;
+        sadmm_gear_state state;
+        MUST(worlds[w], sadmm_world_gear_at(worlds[w], 0, &gear));
+        MUST(worlds[w], sadmm_world_gear_state(worlds[w], gear, &state));
+        ck_assert(fabs(state.error) < 1e-4 && state.force_1 != 0);
+        sadmm_world_destroy(worlds[w]);
+    }
+}
+END_TEST
+
+
 /* ---- steps by the device ----------------------------------------------------------------------------------------- */
 
 enum { YARD_JOINTS = 10, DOOR = 4, MOTOR = 5, GLUE = 6, COUPLINGS = 2 };
@@ -371,6 +413,7 @@ int main(void)
     Suite *suite = suite_create("cuda_joint");
     if (!find_cuda_tables(tables)) return TEST_SKIPPED;
     ADD_CASE(suite, joints_are_solved_on_the_device, 0, tested_precisions());
+    ADD_CASE(suite, gears_and_tables_are_the_hosts, 0, tested_precisions());
     ADD_CASE(suite, resident_joints_equal_those_by_host, 0, tested_precisions() * WAYS);
     ADD_CASE(suite, rows_of_a_resident_step_are_read, 0, tested_precisions());
     ADD_CASE(suite, joints_survive_a_step_that_fails, 0, tested_precisions());

@@ -13,6 +13,8 @@ static sadmm_problem *problem;
 static sadmm_body_id body;
 static sadmm_shape_id shape;
 static sadmm_joint_id joint;
+static sadmm_coupling_id coupling;
+static sadmm_gear_id gear;
 
 /* The call is refused, and the message names the argument. */
 #define REFUSES(name, call)                                                                              \
@@ -71,6 +73,11 @@ static void on_bodies(void)
     REFUSES("world", sadmm_world_set_body_mass(NULL, body, 1, three));
     REFUSES("inertia", sadmm_world_set_body_mass(world, body, 1, NULL));
     REFUSES("world", sadmm_world_set_body_user_data(NULL, body, NULL));
+    REFUSES("world", sadmm_world_set_body_gravity_scale(NULL, body, 1));
+    REFUSES("world", sadmm_world_set_body_damping(NULL, body, 0, 0));
+    REFUSES("world", sadmm_world_move_body(NULL, body, three, six));
+    REFUSES("position", sadmm_world_move_body(world, body, NULL, six));
+    REFUSES("orientation", sadmm_world_move_body(world, body, three, NULL));
     ck_assert_ptr_null(sadmm_world_body_user_data(NULL, body));
     REFUSES("world", sadmm_world_body_contact_wrench(NULL, body, six));
     REFUSES("wrench", sadmm_world_body_contact_wrench(world, body, NULL));
@@ -118,6 +125,56 @@ static void on_joints(void)
     REFUSES("coordinate", sadmm_world_set_joint_coordinate(world, joint, 2, NULL));
     REFUSES("world", sadmm_world_joint_state(NULL, joint, &state));
     REFUSES("state", sadmm_world_joint_state(world, joint, NULL));
+    const double two[2] = {0, 1};
+    int32_t count;
+    REFUSES("world", sadmm_world_set_joint_spring_table(NULL, joint, 2, two, two, 2));
+    REFUSES("positions", sadmm_world_set_joint_spring_table(world, joint, 2, NULL, two, 2));
+    REFUSES("forces", sadmm_world_set_joint_spring_table(world, joint, 2, two, NULL, 2));
+    REFUSES("world", sadmm_world_joint_spring_table(NULL, joint, 2, NULL, NULL, &count));
+    REFUSES("count", sadmm_world_joint_spring_table(world, joint, 2, NULL, NULL, NULL));
+    ck_assert_int_eq(sadmm_world_joint_spring_table(world, joint, 2, NULL, NULL, &count), SADMM_OK);
+}
+
+static void on_couplings(void)
+{
+    const double zero[3] = {0}, unit[4] = {1, 0, 0, 0};
+    sadmm_coupling_def def = sadmm_coupling_def_default();
+    sadmm_coupling_state state;
+    sadmm_coupling_id id;
+    REFUSES("world", sadmm_world_add_coupling(NULL, &def, &id));
+    REFUSES("def", sadmm_world_add_coupling(world, NULL, &id));
+    REFUSES("world", sadmm_world_remove_coupling(NULL, coupling));
+    ck_assert_int_eq(sadmm_world_coupling_count(NULL), 0);
+    REFUSES("world", sadmm_world_coupling_at(NULL, 0, &id));
+    REFUSES("id", sadmm_world_coupling_at(world, 0, NULL));
+    REFUSES("world", sadmm_world_coupling_def(NULL, coupling, &def));
+    REFUSES("def", sadmm_world_coupling_def(world, coupling, NULL));
+    REFUSES("world", sadmm_world_set_coupling_target(NULL, coupling, zero, unit, NULL));
+    REFUSES("position", sadmm_world_set_coupling_target(world, coupling, NULL, unit, NULL));
+    REFUSES("orientation", sadmm_world_set_coupling_target(world, coupling, zero, NULL, NULL));
+    REFUSES("world", sadmm_world_set_coupling_gains(NULL, coupling, 1, 1, 1, 1));
+    REFUSES("world", sadmm_world_set_coupling_limits(NULL, coupling, 1, 1));
+    REFUSES("world", sadmm_world_set_coupling_enabled(NULL, coupling, false));
+    REFUSES("world", sadmm_world_coupling_state(NULL, coupling, &state));
+    REFUSES("state", sadmm_world_coupling_state(world, coupling, NULL));
+}
+
+static void on_gears(void)
+{
+    sadmm_gear_def def = sadmm_gear_def_default();
+    sadmm_gear_state state;
+    sadmm_gear_id id;
+    REFUSES("world", sadmm_world_add_gear(NULL, &def, &id));
+    REFUSES("def", sadmm_world_add_gear(world, NULL, &id));
+    REFUSES("world", sadmm_world_remove_gear(NULL, gear));
+    ck_assert_int_eq(sadmm_world_gear_count(NULL), 0);
+    REFUSES("world", sadmm_world_gear_at(NULL, 0, &id));
+    REFUSES("id", sadmm_world_gear_at(world, 0, NULL));
+    REFUSES("world", sadmm_world_gear_def(NULL, gear, &def));
+    REFUSES("def", sadmm_world_gear_def(world, gear, NULL));
+    REFUSES("world", sadmm_world_set_gear_enabled(NULL, gear, false));
+    REFUSES("world", sadmm_world_gear_state(NULL, gear, &state));
+    REFUSES("state", sadmm_world_gear_state(world, gear, NULL));
 }
 
 static void on_steps(void)
@@ -212,13 +269,19 @@ static const struct {
     {on_bodies,
      {W(add_body), W(remove_body), W(body_count), W(body_at), W(body_state), W(set_body_state), W(body_def),
       W(set_body_wrench), W(add_body_force_at), W(apply_body_impulse_at), W(set_body_mass), W(set_body_user_data),
+      W(set_body_gravity_scale), W(set_body_damping), W(move_body),
       W(body_user_data), W(body_contact_wrench), W(set_body_pair_contact)}},
     {on_shapes,
      {W(add_shape), W(remove_shape), W(shape_count), W(shape_at), W(shape_def), W(set_shape_material),
       W(set_pair_friction)}},
     {on_joints,
      {W(place_joint), W(add_joint), W(remove_joint), W(joint_count), W(joint_at), W(joint_def), W(set_joint_enabled),
-      W(set_joint_coordinate), W(joint_state)}},
+      W(set_joint_coordinate), W(joint_state), W(set_joint_spring_table), W(joint_spring_table)}},
+    {on_couplings,
+     {W(add_coupling), W(remove_coupling), W(coupling_count), W(coupling_at), W(coupling_def), W(set_coupling_target),
+      W(set_coupling_gains), W(set_coupling_limits), W(set_coupling_enabled), W(coupling_state)}},
+    {on_gears,
+     {W(add_gear), W(remove_gear), W(gear_count), W(gear_at), W(gear_def), W(set_gear_enabled), W(gear_state)}},
     {on_steps,
      {W(step), W(step_async), W(wait), W(report), W(contact_count), W(contacts), W(state_hash), W(explain), W(freeze)}},
     {on_problems,
@@ -228,8 +291,8 @@ static const struct {
     {on_others, {"sadmm_backend_query", "sadmm_box_inertia", "sadmm_sphere_inertia", "sadmm_capsule_inertia"}},
     {NULL,
      {"sadmm_settings_default", W(def_default), "sadmm_body_def_default", "sadmm_shape_def_default",
-      "sadmm_joint_def_default", "sadmm_status_name", "sadmm_last_message", "sadmm_version", "sadmm_build_commit",
-      "sadmm_build_compiler"}},
+      "sadmm_joint_def_default", "sadmm_coupling_def_default", "sadmm_gear_def_default", "sadmm_status_name",
+      "sadmm_last_message", "sadmm_version", "sadmm_build_commit", "sadmm_build_compiler"}},
 };
 enum { GROUPS = sizeof functions / sizeof *functions };
 
@@ -254,10 +317,18 @@ static void start(void)
     ck_assert_int_eq(sadmm_world_add_body(world, &ball, &body), SADMM_OK);
     ck_assert_int_eq(sadmm_world_add_shape(world, body, &sphere, &shape), SADMM_OK);
     sadmm_joint_def slider = sadmm_joint_def_default();
-    slider.kind = SADMM_JOINT_PRISMATIC;
+    slider.kind = SADMM_JOINT_CYLINDRICAL;
     slider.body_b = body;
     slider.position_a[2] = 0.1;
     ck_assert_int_eq(sadmm_world_add_joint(world, &slider, &joint), SADMM_OK);
+    sadmm_coupling_def pull = sadmm_coupling_def_default();
+    sadmm_gear_def screw = sadmm_gear_def_default();
+    pull.body = body;
+    pull.linear_stiffness = 10;
+    screw.joint_1 = screw.joint_2 = joint;
+    screw.coordinate_1 = 2, screw.coordinate_2 = 5;
+    ck_assert_int_eq(sadmm_world_add_coupling(world, &pull, &coupling), SADMM_OK);
+    ck_assert_int_eq(sadmm_world_add_gear(world, &screw, &gear), SADMM_OK);
     ck_assert_int_eq(sadmm_world_step(world), SADMM_OK);
 }
 

@@ -198,9 +198,8 @@ START_TEST(bricards_linkage_moves_and_stays_closed)
 {
     double x[3] = {0}, off = 0, least = 1;
     struct sadmm_scene scene;
-    sadmm_world *world = open_world("bricard", 0, 300, &scene);
+    sadmm_world *world = open_world("bricard", 0, 60, &scene);
     sadmm_settings settings = sadmm_world_settings(world);
-    settings.method = SADMM_METHOD_PAPER;
     settings.dt = 0.0005;
     MUST(world, sadmm_world_set_settings(world, &settings));
     const double before = energy_of(world);

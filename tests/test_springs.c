@@ -129,15 +129,15 @@ START_TEST(any_stiffness_is_stable)
 }
 END_TEST
 
-/* 1e12 N/m is the hard joint: the chain that swings (POINT), or bears its weight, is where it would be. Solved to
- * rounding; the springs give by 1e-11 m. */
+/* 1e12 N/m is the hard joint: the chain that swings (POINT), or bears its weight, is where it would be; the
+ * springs give by 1e-11 m, and the joints by as little. */
 START_TEST(stiffness_without_bound_is_the_hard_joint)
 {
     const enum kind kind = (enum kind)(_i / SOLVERS);
     const double close = solvers[_i % SOLVERS].precision == SADMM_F32 ? 2e-5 : 1e-8; /* its rounding, over 100 steps */
     struct chain chains[2];
     for (int k = 0; k < 2; ++k) {
-        chains[k] = new_chain(_i % SOLVERS, kind, 0.01, 2000, 1, k ? 1e12 : INFINITY, 0);
+        chains[k] = new_chain(_i % SOLVERS, kind, 0.01, 20, 1, k ? 1e12 : INFINITY, 0);
         step_world(chains[k].world, 100);
     }
     for (int k = 0; k < 2; ++k) {
@@ -201,7 +201,7 @@ struct table {
 /* A body that slides along z on a spring with that table, `push` N against it. */
 static struct chain new_slider(int solver, double dt, double mass, const struct table *table, double push)
 {
-    struct chain c = {.world = new_world(solver, dt, 200)};
+    struct chain c = {.world = new_world(solver, dt, 10)};
     sadmm_settings settings = sadmm_world_settings(c.world);
     settings.gravity[2] = push / mass;
     MUST(c.world, sadmm_world_set_settings(c.world, &settings));
@@ -260,12 +260,14 @@ START_TEST(tables_come_and_go)
     static const struct {
         int32_t index, count;
         const char *part;
-    } refused[] = {{0, 2, "index = 0: must be a free"}, {6, 2, "index = 6"},       {2, 1, "count = 1: must be 0 or in [2, 64]"},
-                   {2, 65, "count = 65"},               {2, -1, "count = -1"},     {2, 2, "positions[1] = 1 after positions[0] = 1"}};
+    } refused[] = {{0, 2, "index = 0: must be a free"},          {6, 2, "index = 6"},
+                   {2, 1, "count = 1: must be 0 or in [2, 64]"}, {2, 65, "count = 65"},
+                   {2, -1, "count = -1"},                        {2, 2, "positions[1] = 1 after positions[0] = 1"}};
     for (size_t k = 0; k < sizeof refused / sizeof *refused; ++k) {
         ck_assert_int_eq(sadmm_world_set_joint_spring_table(c.world, c.joint[0], refused[k].index, same, load,
                                                             refused[k].count), SADMM_ERROR_INVALID_ARGUMENT);
-        ck_assert_msg(strstr(sadmm_world_message(c.world), refused[k].part) != NULL, "%s", sadmm_world_message(c.world));
+        ck_assert_msg(strstr(sadmm_world_message(c.world), refused[k].part) != NULL, "%s",
+                      sadmm_world_message(c.world));
     }
     ck_assert_int_eq(sadmm_world_set_joint_spring_table(c.world, c.joint[0], 2, steep, load, 2),
                      SADMM_ERROR_INVALID_ARGUMENT);
@@ -420,7 +422,8 @@ END_TEST
  * damper it comes to rest at one of the others, on the side of the push. */
 START_TEST(falling_tables_snap_through)
 {
-    const struct table snap = {4, {-0.2, -0.1, 0.1, 0.2}, {0, -10, 10, 0}}, other = {4, {-0.2, -0.1, 0.1, 0.2}, {-50, 10, -10, 50}};
+    const struct table snap = {4, {-0.2, -0.1, 0.1, 0.2}, {0, -10, 10, 0}},
+                       other = {4, {-0.2, -0.1, 0.1, 0.2}, {-50, 10, -10, 50}};
     const sadmm_joint_coordinate damper = {.drive_force = INFINITY, .spring_damping = 5};
     for (int side = -1; side <= 1; side += 2) {
         struct chain c = new_slider(_i, 0.005, 1, &other, side);

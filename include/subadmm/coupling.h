@@ -11,13 +11,12 @@
  * They are part of the step's solve, implicit and together with all contacts and joints, so that any gains are stable
  * with any mass at any time step; and bounded, exactly. Method: docs/algorithm.md, section 10.
  *
- * The target's pose is that at the present time of the world; it moves on by its velocity in every (sub-)step, until it
- * is set anew. The caller feels what the target transmits, sadmm_coupling_state.felt_*. On CUDA targets go along with the
- * next step, which is not waited for.
+ * The target's pose is that at the present time of the world; it moves on by its velocity in every (sub-)step, until
+ * it is set anew. The caller feels what the target transmits, sadmm_coupling_state.felt_*. On CUDA targets go along
+ * with the next step, which is not waited for.
  *
- * A coupling is no joint: joints' counts and ids do not have it. Threads and errors: as world.h says. Ids are values with
- * a generation, as bodies' are.
- */
+ * A coupling is no joint: joints' counts and ids do not have it. Threads and errors: as world.h says. Ids are values
+ * with a generation, as bodies' are. */
 #ifndef SUBADMM_COUPLING_H
 #define SUBADMM_COUPLING_H
 
@@ -50,21 +49,23 @@ typedef struct sadmm_coupling_def {
 /* The defaults named above. Thread-safe. */
 SADMM_API sadmm_coupling_def sadmm_coupling_def_default(void);
 
-/* *id: the new coupling, until it or its body is removed. Errors: STALE_ID, INVALID_ARGUMENT (range; the body is static;
- * nothing changes), LIMIT (2^24 joints and couplings), OUT_OF_MEMORY, DEVICE. */
+/* *id: the new coupling, until it or its body is removed. Errors: STALE_ID, INVALID_ARGUMENT (range; the body is
+ * static; nothing changes), LIMIT (2^24 joints and couplings), OUT_OF_MEMORY, DEVICE. */
 SADMM_API sadmm_status sadmm_world_add_coupling(sadmm_world *world, const sadmm_coupling_def *def,
                                                 sadmm_coupling_id *id /* may be NULL */);
 /* Errors: STALE_ID, DEVICE. */
 SADMM_API sadmm_status sadmm_world_remove_coupling(sadmm_world *world, sadmm_coupling_id id);
 SADMM_API int32_t sadmm_world_coupling_count(const sadmm_world *world); /* also those not enabled; of NULL: 0 */
-/* The index-th live coupling in order of creation slot, index in [0, coupling_count). Errors: INVALID_ARGUMENT (range). */
+/* The index-th live coupling in order of creation slot, index in [0, coupling_count). Errors: INVALID_ARGUMENT
+ * (range). */
 SADMM_API sadmm_status sadmm_world_coupling_at(sadmm_world *world, int32_t index, sadmm_coupling_id *id);
 /* Read back the definition as it is now. Errors: STALE_ID, DEVICE. */
 SADMM_API sadmm_status sadmm_world_coupling_def(sadmm_world *world, sadmm_coupling_id id, sadmm_coupling_def *def);
 
-/* The target at the present time of the world, from the next step on: position (m, world), orientation (target to world,
- * w x y z, unit within 1e-6), velocity (linear, angular, world; NULL: 0). Meant to be called before every step: it takes
- * some ten nanoseconds. Any jump is allowed. Errors: STALE_ID, INVALID_ARGUMENT (range; nothing changes), DEVICE. */
+/* The target at the present time of the world, from the next step on: position (m, world), orientation (target to
+ * world, w x y z, unit within 1e-6), velocity (linear, angular, world; NULL: 0). Meant to be called before every step:
+ * it takes some ten nanoseconds. Any jump is allowed. Errors: STALE_ID, INVALID_ARGUMENT (range; nothing changes),
+ * DEVICE. */
 SADMM_API sadmm_status sadmm_world_set_coupling_target(sadmm_world *world, sadmm_coupling_id id,
                                                        const double position[3], const double orientation[4],
                                                        const double velocity[6] /* may be NULL */);
@@ -79,8 +80,9 @@ SADMM_API sadmm_status sadmm_world_set_coupling_limits(sadmm_world *world, sadmm
 /* From the next step on. Errors: STALE_ID, DEVICE. */
 SADMM_API sadmm_status sadmm_world_set_coupling_enabled(sadmm_world *world, sadmm_coupling_id id, bool enabled);
 
-/* Errors are those of the present poses. Forces are means over the last step (with sub-steps: over all of them), at the
- * geometry of its middle: all 0 before the first one, and where the coupling did not take part. All in the world frame. */
+/* Errors are those of the present poses. Forces are means over the last step (with sub-steps: over all of them), at
+ * the geometry of its middle: all 0 before the first one, and where the coupling did not take part. All in the world
+ * frame. */
 typedef struct sadmm_coupling_state {
     double felt_force[3], felt_torque[3]; /* what the user feels, the reaction to what the body gets: N, and N m about the
                                              target's origin */

@@ -2,19 +2,18 @@
  *
  *     q_1 + ratio q_2 = offset
  *
- * Two toothed wheels that mesh (two revolute joints; ratio = teeth of 2 / teeth of 1), a belt (the same with ratio < 0), a
- * rack on a pinion (a translation 1, a rotation 2; ratio = -radius, m/rad), a pulley (two translations), a screw (the
- * translation and the rotation of one cylindrical joint; ratio = -pitch / 2 pi).
+ * Two toothed wheels that mesh (two revolute joints; ratio = teeth of 2 / teeth of 1), a belt (the same with ratio <
+ * 0), a rack on a pinion (a translation 1, a rotation 2; ratio = -radius, m/rad), a pulley (two translations), a screw
+ * (the translation and the rotation of one cylindrical joint; ratio = -pitch / 2 pi).
  *
  * A gear gives force along q_1 and ratio force along q_2, each as the joint's own laws do: between the joint's two
  * bodies. A row of the solver joins two bodies, so that no more than two of those that the joints are between may be
  * dynamic: gears have their axles on the static world, or on one another. (Wheels on an axle carrier that moves, as in
- * planetary gears, are refused.) Angles count on beyond full turns, and errors of the ratio do not add up: they are fed
- * back as those of locked coordinates. Method: docs/algorithm.md, section 10.
+ * planetary gears, are refused.) Angles count on beyond full turns, and errors of the ratio do not add up: they are
+ * fed back as those of locked coordinates. Method: docs/algorithm.md, section 10.
  *
- * Worlds with gears are stepped by the host on every backend. Threads and errors: as world.h says. Ids are values with a
- * generation, as bodies' are.
- */
+ * Worlds with gears are stepped by the host on every backend. Threads and errors: as world.h says. Ids are values with
+ * a generation, as bodies' are. */
 #ifndef SUBADMM_GEAR_H
 #define SUBADMM_GEAR_H
 

@@ -109,7 +109,7 @@ SADMM_API sadmm_status sadmm_world_place_joint(sadmm_world *world, sadmm_joint_d
 
 /* *id: the new joint, until it or one of its bodies is removed. Frames that do not fit are drawn together in the steps
  * that follow, each coordinate by at most settings.correction_speed (m/s, rad/s). Errors: STALE_ID, INVALID_ARGUMENT
- * (range; a body with itself; two that are static; nothing changes), LIMIT (2^24 joints), OUT_OF_MEMORY. */
+ * (range; a body with itself; two that are not dynamic; nothing changes), LIMIT (2^24 joints), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_add_joint(sadmm_world *world, const sadmm_joint_def *def,
                                              sadmm_joint_id *id /* may be NULL */);
 /* Errors: STALE_ID, DEVICE. */
@@ -130,15 +130,19 @@ SADMM_API sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadm
 enum { SADMM_MOST_SPRING_POINTS = 64 };
 
 /* A spring with a characteristic of its own along a free coordinate, index in [0, 6), from the next step on: forces[i]
- * (N; N m) is the load that holds it at positions[i] (m; rad), so that the force on b is -forces[i] there; straight lines
- * in between, going on beyond the ends. It acts beside spring_stiffness and spring_damping, is part of spring_force,
- * and stays when the coordinate is set. count in [2, SADMM_MOST_SPRING_POINTS], copied; 0: none again (both pointers
- * may be NULL then). |positions| <= 1e9, strictly increasing; |forces| <= 1e15, slopes within +-1e15 N/m.
+ * (N; N m) is the load that holds it at positions[i] (m; rad), so that the force on b is -forces[i] there; straight
+ * lines in between, going on beyond the ends. It acts beside spring_stiffness and spring_damping, is part of
+ * spring_force, and stays when the coordinate is set. count in [2, SADMM_MOST_SPRING_POINTS], copied; 0: none again
+ * (both pointers may be NULL then). |positions| <= 1e9, strictly increasing; |forces| <= 1e15, slopes within +-1e15
+ * N/m.
  *
  * Implicit and of second order in the step, kinks included. Where loads rise with the position any table is stable
  * with any mass and step, as springs are. Where they fall (a spring that snaps through) the force is the one predicted
- * for the way of the step: a step should not take it far then, (1 / mass) |slope| dt^2 < 1 say.
- * Errors: STALE_ID, INVALID_ARGUMENT (range; the coordinate is locked or not there; nothing changes), OUT_OF_MEMORY. */
+ * for the way of the step: a step should not take it far then, (1 / mass) |slope| dt^2 < 1 say. Worlds with tables are
+ * stepped by the host on every backend.
+ *
+ * Errors: STALE_ID, INVALID_ARGUMENT (range; the coordinate is locked or not there; nothing changes), OUT_OF_MEMORY,
+ * DEVICE. */
 SADMM_API sadmm_status sadmm_world_set_joint_spring_table(sadmm_world *world, sadmm_joint_id id, int32_t index,
                                                           const double *positions, const double *forces, int32_t count);
 /* Read it back: *count points, 0 where there is none, into positions and forces, each for SADMM_MOST_SPRING_POINTS

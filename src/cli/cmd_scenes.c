@@ -93,7 +93,9 @@ static json_t *body_json(int32_t index, const sadmm_body_def *body)
     json_t *o = json_object();
     json_object_set_new(o, "index", json_integer(index));
     json_object_set_new(o, "name", json_string(body->name ? body->name : ""));
-    json_object_set_new(o, "type", json_string(dynamic ? "dynamic" : "static"));
+    json_object_set_new(o, "type", json_string(dynamic                                ? "dynamic"
+                                                 : body->type == SADMM_BODY_STATIC ? "static"
+                                                                                   : "kinematic"));
     json_object_set_new(o, "mass", dynamic ? cli_json_real(body->mass) : json_null());
     json_object_set_new(o, "inertia", dynamic ? cli_json_reals(body->inertia, 3) : json_null());
     json_object_set_new(o, "position", cli_json_reals(body->position, 3));

@@ -35,7 +35,7 @@ bool sadmm_fclib_available(void);
 sadmm_status sadmm_fclib_load(const char *path, sadmm_problem **out, struct sadmm_error *error);
 
 /* Write a problem (not its current solution), with a title, over what is at `path`; a file that could not be written
- * is removed. Errors: IO, UNSUPPORTED (soft blocks), OUT_OF_MEMORY, UNAVAILABLE. */
+ * is removed. Errors: IO, UNSUPPORTED (soft rows, rows with bounds), OUT_OF_MEMORY, UNAVAILABLE. */
 sadmm_status sadmm_fclib_save(sadmm_problem *problem, const char *path, const char *title,
                               struct sadmm_error *error);
 

@@ -1,9 +1,9 @@
 /* Mechanisms of joints: a chain with a weight, and closed loops of rods: four-bar linkages in a row, a slider-crank,
  * Bricard's linkage. Rods have shapes to look at, which meet nothing.
  *
- * The row of four-bar linkages and Bricard's are problems of the IFToMM benchmarks of multibody dynamics. The former has
- * more locks than it needs, and passes positions where it might part into two motions; the latter moves by virtue of
- * its dimensions alone: counted, its locks allow no motion. */
+ * The row of four-bar linkages and Bricard's are problems of the IFToMM benchmarks of multibody dynamics. The former
+ * has more locks than it needs, and passes positions where it might part into two motions; the latter moves by virtue
+ * of its dimensions alone: counted, its locks allow no motion. */
 #include <math.h>
 #include <string.h>
 

@@ -1,16 +1,17 @@
-/* Joints of a world: the input is a program of calls with ordinary, extreme and wrong definitions, stale ids, and
- * memory that runs out. Whatever the calls:
+/* Joints, couplings, gears and springs' tables of a world: the input is a program of calls with ordinary, extreme and
+ * wrong definitions, stale ids, and memory that runs out. Whatever the calls:
  *
  *   - a call that fails leaves joints, bodies and their states as they were, and says why
  *   - after a step that succeeds every state of a body and of a joint is finite, and a joint gives one body the
  *     opposite of what it gives the other
  *   - what was set is what is read, and a joint is there until it or one of its bodies is removed
- */
+ * / */
 #include <string.h>
 
 #include "bytes.h"
 #include "core/base/memory.h"
-#include "subadmm/joint.h"
+#include "subadmm/coupling.h"
+#include "subadmm/gear.h"
 
 enum { BODIES = 5, MAX_JOINTS = 8, MAX_CALLS = 48, MAX_STEPS = 12, IDS = 16, COORDINATES = 6 };
 
@@ -21,13 +22,16 @@ struct machine {
     sadmm_body_id bodies[BODIES];
     sadmm_joint_id joints[IDS];
     int joint_ids; /* ever made; the last IDS of them are kept, removed ones too */
+    sadmm_coupling_id couplings[IDS];
+    sadmm_gear_id gears[IDS];
+    int coupling_ids, gear_ids;
     int steps;
 };
 
 /* ---- what a failed call must not change -------------------------------------------------------------------------- */
 
 struct picture {
-    uint64_t states, joints;
+    uint64_t states, joints, others; /* others: couplings, gears */
     int32_t bodies, count;
 };
 
@@ -47,6 +51,37 @@ static uint64_t mix_coordinate(uint64_t hash, const sadmm_joint_coordinate *c)
     hash = mix(hash, numbers, sizeof numbers);
     hash = mix(hash, &c->drive, sizeof c->drive);
     return mix(hash, &c->limited, sizeof c->limited);
+}
+
+static uint64_t look_at_others(sadmm_world *world)
+{
+    uint64_t hash = UINT64_C(0xcbf29ce484222325);
+    for (int32_t k = 0; k < sadmm_world_coupling_count(world); ++k) {
+        sadmm_coupling_id id;
+        sadmm_coupling_def def;
+        sadmm_coupling_state state;
+        MUST(sadmm_world_coupling_at(world, k, &id) == SADMM_OK, "coupling %d", k);
+        MUST(sadmm_world_coupling_def(world, id, &def) == SADMM_OK, "coupling %d", k);
+        MUST(sadmm_world_coupling_state(world, id, &state) == SADMM_OK, "coupling %d", k);
+        hash = mix(hash, def.target_position, sizeof def.target_position);
+        hash = mix(hash, def.target_velocity, sizeof def.target_velocity);
+        hash = mix(hash, &def.linear_stiffness, sizeof def.linear_stiffness);
+        hash = mix(hash, &def.max_torque, sizeof def.max_torque);
+        hash = mix(hash, &def.enabled, sizeof def.enabled);
+        hash = mix(hash, &state, sizeof state);
+    }
+    for (int32_t k = 0; k < sadmm_world_gear_count(world); ++k) {
+        sadmm_gear_id id;
+        sadmm_gear_def def;
+        sadmm_gear_state state;
+        MUST(sadmm_world_gear_at(world, k, &id) == SADMM_OK, "gear %d", k);
+        MUST(sadmm_world_gear_def(world, id, &def) == SADMM_OK, "gear %d", k);
+        MUST(sadmm_world_gear_state(world, id, &state) == SADMM_OK, "gear %d", k);
+        hash = mix(hash, &def.ratio, sizeof def.ratio);
+        hash = mix(hash, &def.enabled, sizeof def.enabled);
+        hash = mix(hash, &state, sizeof state);
+    }
+    return hash;
 }
 
 static struct picture look(sadmm_world *world)
@@ -74,7 +109,14 @@ static struct picture look(sadmm_world *world)
         for (int c = 0; c < COORDINATES; ++c) p.joints = mix_coordinate(p.joints, &def.coordinates[c]);
         p.joints = mix(p.joints, &state, offsetof(sadmm_joint_state, broken)); /* doubles alone */
         p.joints = mix(p.joints, &state.broken, sizeof state.broken);
+        for (int c = 0; c < COORDINATES; ++c) {
+            double numbers[2][SADMM_MOST_SPRING_POINTS];
+            int32_t points;
+            MUST(sadmm_world_joint_spring_table(world, id, c, numbers[0], numbers[1], &points) == SADMM_OK, "a table");
+            for (int n = 0; n < 2; ++n) p.joints = mix(p.joints, numbers[n], (size_t)points * sizeof **numbers);
+        }
     }
+    p.others = look_at_others(world);
     return p;
 }
 
@@ -113,6 +155,15 @@ static void must_be_sound(struct machine *m)
         for (int j = 0; j < 6; ++j)
             MUST(s.wrench_a[j] == -s.wrench_b[j] && isfinite(s.wrench_b[j]), "joint %d: %g, %g", k, s.wrench_a[j],
                  s.wrench_b[j]);
+    }
+    for (int32_t k = 0; most < 1e100 && k < sadmm_world_coupling_count(m->world); ++k) {
+        sadmm_coupling_id id;
+        sadmm_coupling_state s;
+        MUST(sadmm_world_coupling_at(m->world, k, &id) == SADMM_OK, "coupling %d", k);
+        MUST(sadmm_world_coupling_state(m->world, id, &s) == SADMM_OK, "coupling %d", k);
+        MUST(all_finite(s.felt_force, 3) && all_finite(s.felt_torque, 3) && all_finite(s.body_force, 3) &&
+                 all_finite(s.body_torque, 3) && all_finite(s.rotation_error, 3),
+             "coupling %d", k);
     }
     sadmm_step_report report;
     MUST(sadmm_world_report(m->world, &report) == SADMM_OK, "report");
@@ -232,6 +283,95 @@ static sadmm_status set_coordinate(struct machine *m)
     return SADMM_OK;
 }
 
+static sadmm_coupling_id take_coupling(struct machine *m)
+{
+    const int kept = m->coupling_ids < IDS ? m->coupling_ids : IDS;
+    return kept && !take_rarely(&m->in, 16) ? m->couplings[take_choice(&m->in, kept)] : (sadmm_coupling_id){0, 1};
+}
+
+static sadmm_status add_coupling(struct machine *m)
+{
+    struct bytes *in = &m->in;
+    sadmm_coupling_def def = sadmm_coupling_def_default();
+    sadmm_coupling_id id;
+    def.body = take_body(m);
+    take_vector(in, -1, 1, def.position);
+    take_orientation(in, def.orientation);
+    take_vector(in, -2, 2, def.target_position);
+    take_orientation(in, def.target_orientation);
+    take_vector(in, -1, 1, def.target_velocity + 3);
+    def.linear_stiffness = take_gain(in);
+    def.linear_damping = take_gain(in);
+    def.angular_stiffness = take_gain(in);
+    def.angular_damping = take_gain(in);
+    if (take_choice(in, 2)) def.max_force = take_gain(in);
+    if (take_choice(in, 2)) def.max_torque = take_gain(in);
+    def.enabled = take_choice(in, 8) != 7;
+    if (sadmm_world_coupling_count(m->world) >= MAX_JOINTS) return SADMM_OK;
+    const sadmm_status status = sadmm_world_add_coupling(m->world, &def, &id);
+    if (status == SADMM_OK) m->couplings[m->coupling_ids++ % IDS] = id;
+    return status;
+}
+
+static sadmm_status change_coupling(struct machine *m)
+{
+    struct bytes *in = &m->in;
+    const sadmm_coupling_id id = take_coupling(m);
+    const double gains[2] = {take_gain(in), take_gain(in)};
+    double at[3], q[4], velocity[6];
+    switch (take_choice(in, 8)) {
+    case 0: return sadmm_world_remove_coupling(m->world, id);
+    case 1: return sadmm_world_set_coupling_enabled(m->world, id, take_choice(in, 2));
+    case 2: return sadmm_world_set_coupling_limits(m->world, id, gains[0], gains[1]);
+    case 3: return sadmm_world_set_coupling_gains(m->world, id, gains[0], gains[1], 1, 0);
+    default:
+        take_vector(in, -2, 2, at);
+        take_orientation(in, q);
+        take_vector(in, -1, 1, velocity);
+        take_vector(in, -10, 10, velocity + 3);
+        return sadmm_world_set_coupling_target(m->world, id, at, q, take_choice(in, 2) ? velocity : NULL);
+    }
+}
+
+static sadmm_status change_gear(struct machine *m)
+{
+    struct bytes *in = &m->in;
+    sadmm_gear_def def = sadmm_gear_def_default();
+    sadmm_gear_id id = {0, 1};
+    const int kept = m->gear_ids < IDS ? m->gear_ids : IDS;
+    const int what = take_choice(in, 4);
+    if (what < 2) {
+        if (kept) id = m->gears[take_choice(in, kept)];
+        return what ? sadmm_world_set_gear_enabled(m->world, id, take_choice(in, 2))
+                    : sadmm_world_remove_gear(m->world, id);
+    }
+    def.joint_1 = take_joint(m);
+    def.joint_2 = take_joint(m);
+    def.coordinate_1 = take_choice(in, COORDINATES);
+    def.coordinate_2 = take_choice(in, COORDINATES);
+    def.ratio = take_number(in, -4, 4);
+    if (take_choice(in, 2)) def.offset = take_number(in, -1, 1);
+    if (sadmm_world_gear_count(m->world) >= MAX_JOINTS) return SADMM_OK;
+    const sadmm_status status = sadmm_world_add_gear(m->world, &def, &id);
+    if (status == SADMM_OK) m->gears[m->gear_ids++ % IDS] = id;
+    return status;
+}
+
+static sadmm_status set_table(struct machine *m)
+{
+    struct bytes *in = &m->in;
+    const sadmm_joint_id id = take_joint(m);
+    const int32_t index = take_choice(in, COORDINATES);
+    double positions[8], forces[8], at = -1;
+    const int32_t count = take_choice(in, 9);
+    for (int32_t k = 0; k < count; ++k) {
+        positions[k] = take_rarely(in, 32) ? take_extreme(in) : at;
+        forces[k] = take_rarely(in, 32) ? take_extreme(in) : take_in(in, -1e6, 1e6);
+        at += take_scale(in, 1e-6, 1);
+    }
+    return sadmm_world_set_joint_spring_table(m->world, id, index, positions, forces, count);
+}
+
 static sadmm_status set_state(struct machine *m)
 {
     sadmm_body_state s;
@@ -283,7 +423,7 @@ static sadmm_status freeze(struct machine *m)
 static sadmm_status make_call(struct machine *m)
 {
     sadmm_joint_id joint;
-    switch (take_choice(&m->in, 16)) {
+    switch (take_choice(&m->in, 21)) {
     case 0: case 1: case 2: case 3: return add_joint(m);
     case 4: return sadmm_world_remove_joint(m->world, take_joint(m));
     case 5:
@@ -293,18 +433,24 @@ static sadmm_status make_call(struct machine *m)
     case 8: return take_rarely(&m->in, 4) ? sadmm_world_remove_body(m->world, take_body(m)) : set_state(m);
     case 9: return set_settings(m);
     case 10: return freeze(m);
+    case 16: return add_coupling(m);
+    case 17: case 18: return change_coupling(m);
+    case 19: return change_gear(m);
+    case 20: return set_table(m);
     default: return step(m);
     }
 }
 
-/* A row of bodies, one of them static, light and heavy ones, boxes with three moments; the first two touch. */
+/* A row of bodies, one of them static, one at times kinematic, light and heavy ones, boxes with three moments; the first two touch. */
 static void add_bodies(struct machine *m)
 {
     for (int k = 0; k < BODIES; ++k) {
         sadmm_body_def def = sadmm_body_def_default();
         sadmm_shape_def shape = sadmm_shape_def_default();
         const int kind = take_choice(&m->in, 8);
-        def.type = k == 2 ? SADMM_BODY_STATIC : SADMM_BODY_DYNAMIC;
+        def.type = k == 2                ? SADMM_BODY_STATIC
+                   : k == 1 && kind == 7 ? SADMM_BODY_KINEMATIC
+                                         : SADMM_BODY_DYNAMIC;
         def.mass = kind == 0 ? 1e-3 : kind == 1 ? 1e3 : 1;
         shape.type = SADMM_SHAPE_BOX;
         for (int j = 0; j < 3; ++j) shape.size[j] = kind == 2 ? 0.25 : 0.1 * (j + 2);
@@ -344,6 +490,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
              sadmm_status_name(status));
         MUST(after.joints == before.joints && after.count == before.count, "%s: a joint changed",
              sadmm_status_name(status));
+        MUST(after.others == before.others, "%s: a coupling or a gear changed", sadmm_status_name(status));
     }
     sadmm_problem_destroy(m.problem);
     sadmm_world_destroy(m.world);

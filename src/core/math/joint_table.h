@@ -1,6 +1,7 @@
-/* A spring whose force is a table: straight lines between points (position, load), going on by the end slopes, the load
- * being what holds the spring there. In a step it is a line, with one bound perhaps, that is right where the step begins,
- * so that forces at rest are exact. Which line depends on the way that the step is predicted to go, from q_0 to y:
+/* A spring whose force is a table: straight lines between points (position, load), going on by the end slopes, the
+ * load being what holds the spring there. In a step it is a line, with up to two bounds, that is right where the step
+ * begins, so that forces at rest are exact. Which line depends on the way that the step is predicted to go, from q_0
+ * to y:
  *
  *   resolved   slope s = 2/L^2 times the integral of T - T(q_0) over the way's length L, through (q_0, T(q_0)): the
  *              spring's work along the way to second order, kinks included

@@ -51,7 +51,8 @@ SADMM_INLINE bool joint_contact_holds(const double normal[3], const struct sadmm
             size[s] = lead_size(body->lead, arm);
             if (!body->rigid) continue;
             moves[s] = lead_speed(body->rigid->velocity, body->velocity, arm);
-            rest[s] = lead_rest_speed(settings->gravity, body->rigid->wrench, body->rigid->mass, settings->dt);
+            rest[s] = lead_rest_speed(settings->gravity, body->rigid->gravity_scale, body->rigid->wrench,
+                                      body->rigid->mass, settings->dt);
         }
         lead_add_point(&touch, point->gap, dot3(normal, point->impulse), speed, lead, size, moves, rest, settings->dt,
                        settings->slop);
@@ -61,16 +62,16 @@ SADMM_INLINE bool joint_contact_holds(const double normal[3], const struct sadmm
     return holds;
 }
 
-/* Does taking leads back carry the joint beyond a limit that it has just reached, or beyond where a spring's table stops
- * it? (A limit that presses all the time, a stone on a string, is met by the mean of both velocities, too.) row_a,
- * row_b: the row's Jacobians. */
+/* Does taking leads back carry the joint beyond a limit that it has just reached, or beyond where a spring's table
+ * stops it? (A limit that presses all the time, a stone on a string, is met by the mean of both velocities, too.)
+ * row_a, row_b: the row's Jacobians. */
 SADMM_INLINE bool joint_limit_jolts(const struct sadmm_joint_source *source, double lambda, const double row_a[6],
                                     const double row_b[6], const struct joint_lead bodies[2],
                                     const struct sadmm_settings *settings)
 {
     const bool table = source->role == SADMM_ROLE_SPRING && source->gap < INFINITY;
     const double margin = source->slack + LEAD_SLOP * settings->slop;
-    double lead = 0, speed = 0, way;
+    double lead = 0, speed = source->steered, way;
     int s, j;
     if (!table && ((source->role != SADMM_ROLE_LOWER && source->role != SADMM_ROLE_UPPER) || !(lambda > 0)))
         return false;
