@@ -36,11 +36,12 @@ static const struct limb {
     [SHIN_RIGHT] = {{0, -0.11, 0.28}, {0, -0.11, 0.48}, 0.06, 0.16, 2, THIGH_RIGHT, 4, 2.2, 0},
 };
 
-/* Doll i hangs in a tower of its own turn and tilt. */
+/* Eight dolls one above the other, each with a turn and tilt of its own; then the next eight. */
 static struct sadmm_frame doll_at(long i)
 {
+    const double tower = 1.5 * (double)(i / 8), level = (double)(i % 8);
     struct sadmm_frame at = sadmm_frame_world();
-    at = sadmm_frame_moved(at, 0.25 * cos(2.4 * (double)i), 0.25 * sin(2.4 * (double)i), 1.4 + 1.1 * (double)i);
+    at = sadmm_frame_moved(at, tower + 0.25 * cos(2.4 * level), 0.25 * sin(2.4 * level), 1.4 + 1.1 * level);
     at = sadmm_frame_turned(sadmm_frame_turned(at, 2, 1.3 * (double)i), 1, 1.2 + 0.3 * (double)(i % 3));
     return sadmm_frame_moved(at, 0, 0, -1);
 }
