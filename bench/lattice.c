@@ -55,6 +55,7 @@ bool lattice_create(struct lattice *lattice, long contacts)
                 body->position[2] = HALF * (double)(2 * z + 1);
                 body->orientation[0] = 1;
                 body->mass = MASS;
+                body->gravity_scale = 1;
                 for (int k = 0; k < 3; ++k) body->inertia[k] = MASS * 2 / 3 * HALF * HALF;
             }
     for (long i = 0; i < n; ++i) {

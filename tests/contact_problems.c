@@ -107,6 +107,7 @@ int32_t contact_problem_box(struct contact_problem *p, double mass, double hx, d
     body->inertia[2] = mass / 3 * (hx * hx + hy * hy);
     body->position[0] = x, body->position[1] = y, body->position[2] = z;
     body->orientation[0] = 1;
+    body->gravity_scale = 1;
     rebind(p);
     return index;
 }

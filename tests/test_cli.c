@@ -251,6 +251,7 @@ START_TEST(run_reports_null)
 {
     json_t *r = run_json("run pyramid:2 --steps 2 --json");
     ck_assert(json_is_null(at(r, "certificate")));
+    ck_assert(json_is_null(at(r, "scene_result"))); /* it measures none */
     ck_assert(json_is_number(at(r, "residual.primal")));
     json_decref(r);
     r = run_json("run pyramid:2 --steps 0 --certify --json=-");
@@ -287,6 +288,32 @@ START_TEST(run_prints)
     char *text = read_text("r.json");
     json_decref(parse(text));
     free(text);
+}
+END_TEST
+
+/* What a scene measures of its own success, on the way and at the end. */
+START_TEST(run_tells_the_scenes_result)
+{
+    for (int whole = 0; whole < 2; ++whole) {
+        json_t *r = run_json(whole ? "run grippers:2 --json" : "run grippers:2 --steps 10 --json");
+        json_t *tasks = at(r, "scene_result.tasks"), *task = json_array_get(tasks, 0), *figure;
+        ck_assert_uint_eq(json_array_size(tasks), 1);
+        ck_assert_str_eq(string(task, "name"), "hold");
+        ck_assert(json_boolean_value(at(r, "scene_result.passed")) == whole);
+        ck_assert(json_boolean_value(at(task, "passed")) == whole);
+        ck_assert(json_boolean_value(at(task, "finished")) == whole);
+        figure = json_array_get(at(task, "figures"), 1);
+        ck_assert_str_eq(string(figure, "name"), "lifted");
+        ck_assert_str_eq(string(figure, "unit"), "m");
+        ck_assert((number(figure, "value") > 0.1) == whole);
+        json_decref(r);
+    }
+    MUST("run grippers:2 --steps 10", 0);
+    ck_assert_msg(strstr(out, "result         hold           not finished: held 0"), "%s", out);
+    MUST("run grippers:2", 0);
+    ck_assert_msg(strstr(out, "passed: held 2, lifted 0.19"), "%s", out);
+    MUST("run pyramid:2 --steps 3", 0);
+    ck_assert_ptr_null(strstr(out, "result"));
 }
 END_TEST
 
@@ -767,6 +794,7 @@ int main(void)
     tcase_add_test(tests, run_reports_null);
     tcase_add_test(tests, run_prints);
     tcase_add_test(tests, run_stops);
+    tcase_add_test(tests, run_tells_the_scenes_result);
     tcase_add_test(tests, run_default_steps);
     tcase_add_loop_test(tests, same_hash, 0, 4);
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)

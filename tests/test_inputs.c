@@ -260,6 +260,8 @@ START_TEST(bad_contacts)
     BAD(normal[2], 0, "contacts[1].normal: length = 0");
     BAD(arm_a[0], NAN, "contacts[1].arm_a[0] = nan");
     BAD(arm_b[2], INFINITY, "contacts[1].arm_b[2] = inf");
+    BAD(velocity[1], NAN, "contacts[1].velocity[1] = nan");
+    BAD(velocity[2], 0.5, "contacts[1].velocity = (0, 0, 0.5): must be 0, for neither body is -1");
     BAD(error, NAN, "contacts[1].error = nan");
     BAD(error, -INFINITY, "contacts[1].error = -inf");
     BAD(friction, -0.1, "contacts[1].friction = -0.1: must be in [0, 1e+60]");

@@ -25,11 +25,14 @@ START_TEST(kinds)
         {TOUCH_INNER | TOUCH_JOLT, TOUCH_CARRIED | TOUCH_MOVED, LEAD_SHARED},
         {TOUCH_INNER | TOUCH_JOLT, 0, LEAD_SHARED},
         {TOUCH_INNER | TOUCH_SMOOTH, TOUCH_CARRIED | TOUCH_MOVED, LEAD_STAYS},
+        /* nor is what gravity gives its bodies the same */
+        {TOUCH_INNER | TOUCH_DIFFERS, TOUCH_CARRIED | TOUCH_MOVED, LEAD_STAYS},
+        {TOUCH_INNER | TOUCH_FRICTION | TOUCH_DIFFERS, TOUCH_CARRIED | TOUCH_MOVED, LEAD_OWN},
     };
     ck_assert_int_eq(lead_kind_of(cases[_i].island, cases[_i].body), cases[_i].kind);
 }
 END_TEST
-enum { KINDS = 12 };
+enum { KINDS = 14 };
 
 /* Bodies without an isotropic inertia are led along their axis of rotation alone: what they turn by leaves that axis
  * where it is in their own frame. */
@@ -76,8 +79,8 @@ START_TEST(points)
     };
     const double size[2] = {fabs(cases[_i].lead[0]), fabs(cases[_i].lead[1])};
     struct lead_touch touch = {0, {0, 0}};
-    static const double gravity[3] = {0, 0, -10}, force[3] = {0, 0, 8}; /* 1 kg: 0.01 x 2 m/s a step by itself */
-    const double at_rest = lead_rest_speed(gravity, force, 1, 0.01), rest[2] = {at_rest, at_rest};
+    static const double gravity[3] = {0, 0, -20}, force[3] = {0, 0, 8}; /* 1 kg: 0.01 x 2 m/s a step by itself */
+    const double at_rest = lead_rest_speed(gravity, 0.5, force, 1, 0.01), rest[2] = {at_rest, at_rest};
     const double moves[2] = {0.0019, 0.0021};
     lead_add_point(&touch, cases[_i].gap, cases[_i].push, cases[_i].speed, cases[_i].lead, size, moves, rest, 0.01,
                    1e-5);

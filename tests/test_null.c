@@ -73,6 +73,11 @@ static void on_bodies(void)
     REFUSES("world", sadmm_world_set_body_mass(NULL, body, 1, three));
     REFUSES("inertia", sadmm_world_set_body_mass(world, body, 1, NULL));
     REFUSES("world", sadmm_world_set_body_user_data(NULL, body, NULL));
+    REFUSES("world", sadmm_world_set_body_gravity_scale(NULL, body, 1));
+    REFUSES("world", sadmm_world_set_body_damping(NULL, body, 0, 0));
+    REFUSES("world", sadmm_world_move_body(NULL, body, three, six));
+    REFUSES("position", sadmm_world_move_body(world, body, NULL, six));
+    REFUSES("orientation", sadmm_world_move_body(world, body, three, NULL));
     ck_assert_ptr_null(sadmm_world_body_user_data(NULL, body));
     REFUSES("world", sadmm_world_body_contact_wrench(NULL, body, six));
     REFUSES("wrench", sadmm_world_body_contact_wrench(world, body, NULL));
@@ -264,6 +269,7 @@ static const struct {
     {on_bodies,
      {W(add_body), W(remove_body), W(body_count), W(body_at), W(body_state), W(set_body_state), W(body_def),
       W(set_body_wrench), W(add_body_force_at), W(apply_body_impulse_at), W(set_body_mass), W(set_body_user_data),
+      W(set_body_gravity_scale), W(set_body_damping), W(move_body),
       W(body_user_data), W(body_contact_wrench), W(set_body_pair_contact)}},
     {on_shapes,
      {W(add_shape), W(remove_shape), W(shape_count), W(shape_at), W(shape_def), W(set_shape_material),

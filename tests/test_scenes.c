@@ -222,6 +222,13 @@ static const struct {
     { "four_bar:2", 40 },
     { "slider_crank", 40 },
     { "bricard", 10 },
+    { "grippers:3", 150 }, /* through the grasp */
+    { "hand_demo", 60 },
+    { "kapla_tower", 20 },
+    { "jenga", 250 }, /* a block is on its way out */
+    { "bridge", 40 }, /* through the first crate's landing */
+    { "ragdolls:2", 150 },
+    { "mixer:60", 100 },
 };
 
 static uint64_t hash_after(const char *spec, sadmm_method method, int threads, int steps)
@@ -280,6 +287,14 @@ START_TEST(bad_specs_are_refused)
         { "settled_pile:0", "N must be in [1, 1000000]" },
         { "burst:251", "N must be in [1, 250]" },
         { "incline:3", "incline takes no size" },
+        { "chain:1001", "N must be in [1, 1000]" },
+        { "chain:10:", "\"chain:10:\": M must be a whole number in [1, 50000]" },
+        { "chain:10:0", "M must be in [1, 50000]" },
+        { "chain:10:50001", "M must be in [1, 50000]" },
+        { "chain:10:5x", "M must be a whole number" },
+        { "chain::5", "N must be a whole number" },
+        { "chain:10:5:1", "M must be a whole number" },
+        { "pyramid:3:4", "\"pyramid:3:4\": N must be a whole number" }, /* it takes no M */
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
         struct sadmm_scene scene = { .n = 77 };
@@ -290,6 +305,27 @@ START_TEST(bad_specs_are_refused)
     }
     ck_assert_int_eq(sadmm_scene_open(NULL, &(struct sadmm_scene){ 0 }, NULL), SADMM_ERROR_INVALID_ARGUMENT);
     ck_assert_int_eq(sadmm_scene_open("incline", NULL, NULL), SADMM_ERROR_INVALID_ARGUMENT);
+}
+END_TEST
+
+/* The second number of a spec. */
+START_TEST(a_chain_has_its_weight)
+{
+    static const struct {
+        const char *spec;
+        long links, mass;
+    } chains[] = {{"chain", 10, 10}, {"chain:3", 3, 10}, {"chain:3:777", 3, 777}, {"chain:1000:50000", 1000, 50000}};
+    for (size_t i = 0; i < sizeof chains / sizeof *chains; ++i) {
+        struct sadmm_scene scene = open_scene(chains[i].spec);
+        sadmm_world *world = build_scene(&scene);
+        ck_assert_int_eq(scene.n, chains[i].links);
+        ck_assert_int_eq(scene.m, chains[i].mass);
+        ck_assert_int_eq(sadmm_world_body_count(world), chains[i].links + 1);
+        const double mass = body_def(world, body_at(world, (int32_t)chains[i].links)).mass;
+        ck_assert_double_eq_tol(mass, (double)chains[i].mass, 1e-12);
+        sadmm_world_destroy(world);
+    }
+    ck_assert_int_eq(open_scene("pyramid:3").m, 0);
 }
 END_TEST
 
@@ -311,7 +347,7 @@ END_TEST
 
 START_TEST(the_list_has_no_twins)
 {
-    ck_assert_uint_eq(sadmm_scene_count(), 23);
+    ck_assert_uint_eq(sadmm_scene_count(), 30);
     ck_assert_ptr_null(sadmm_scene_at(sadmm_scene_count()));
     for (size_t i = 0; i < sadmm_scene_count(); ++i) {
         for (size_t j = 0; j < i; ++j) ck_assert_str_ne(sadmm_scene_at(i)->name, sadmm_scene_at(j)->name);
@@ -327,6 +363,7 @@ int main(void)
     tcase_set_timeout(cases, 100);
     tcase_add_test(cases, the_list_has_no_twins);
     tcase_add_test(cases, bad_specs_are_refused);
+    tcase_add_test(cases, a_chain_has_its_weight);
     tcase_add_test(cases, bad_builds_are_refused);
     tcase_add_loop_test(cases, every_scene_builds_and_steps, 0, (int)sadmm_scene_count());
     tcase_add_test(cases, sliding_cubes_have_n_cubes);

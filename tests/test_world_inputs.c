@@ -110,6 +110,8 @@ static const struct bad_number bad_body[] = {
     BODY(position[0], NAN, INFINITY, -INFINITY, 1.01e9, -1e300), BODY(position[2], NAN),
     BODY(orientation, 0), /* all 0 */
     BODY(orientation[0], NAN, INFINITY, 1.00001, 0.99999, -2), BODY(orientation[3], 1e-2, NAN),
+    BODY(gravity_scale, NAN, INFINITY, 1.01e6, -1.01e6), BODY(linear_damping, NAN, INFINITY, -1e-9, 1.01e6),
+    BODY(angular_damping, NAN, INFINITY, -1e-9, 1.01e6),
     BODY(linear_velocity[1], NAN, INFINITY, 1.01e6, -1.01e6), BODY(angular_velocity[2], NAN, -INFINITY, 1.01e6),
 };
 #undef BODY

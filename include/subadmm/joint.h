@@ -109,7 +109,7 @@ SADMM_API sadmm_status sadmm_world_place_joint(sadmm_world *world, sadmm_joint_d
 
 /* *id: the new joint, until it or one of its bodies is removed. Frames that do not fit are drawn together in the steps
  * that follow, each coordinate by at most settings.correction_speed (m/s, rad/s). Errors: STALE_ID, INVALID_ARGUMENT
- * (range; a body with itself; two that are static; nothing changes), LIMIT (2^24 joints), OUT_OF_MEMORY. */
+ * (range; a body with itself; two that are not dynamic; nothing changes), LIMIT (2^24 joints), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_add_joint(sadmm_world *world, const sadmm_joint_def *def,
                                              sadmm_joint_id *id /* may be NULL */);
 /* Errors: STALE_ID, DEVICE. */

@@ -35,6 +35,8 @@ typedef struct sadmm_problem_contact {
     double arm_b[3];        /* the same for b */
     double error;           /* e of eq. (5) along the normal, m/s: gap/dt, or the stabilised penetration (negative) */
     double friction;        /* mu, in [0, 1e60] */
+    double velocity[3];     /* what a static side that moves adds to the velocity of b's point relative to a's, m/s,
+                               world frame: x of eq. (5) is J_a v_a + J_b v_b + velocity; 0 where a and b are bodies */
 } sadmm_problem_contact;
 
 /* A constraint given by its Jacobian rows. */

@@ -72,20 +72,33 @@ SADMM_API sadmm_status sadmm_world_set_backend(sadmm_world *world, sadmm_backend
 
 /* ---- bodies ------------------------------------------------------------------------------------------------ */
 
-typedef enum sadmm_body_type { SADMM_BODY_DYNAMIC = 0, SADMM_BODY_STATIC } sadmm_body_type;
+typedef enum sadmm_body_type {
+    SADMM_BODY_DYNAMIC = 0,
+    SADMM_BODY_STATIC,
+    SADMM_BODY_KINEMATIC /* goes by its velocity, which nothing changes but the caller (sadmm_world_set_body_state,
+                            sadmm_world_move_body), and pushes dynamic bodies as what has an infinite mass does; joints
+                            may hold on to it. It meets neither static nor kinematic bodies. Worlds with kinematic
+                            bodies are stepped by the host on every backend; on CUDA the solve of a step runs on the
+                            device */
+} sadmm_body_type;
 
 typedef struct sadmm_body_def {
     sadmm_body_type type;        /* default DYNAMIC */
-    double mass;                 /* kg, in [1e-9, 1e12]; ignored for static bodies; no default (must be set) */
+    double mass;                 /* kg, in [1e-9, 1e12]; of dynamic bodies, ignored for others; no default */
     double inertia[3]; /* principal moments, kg m^2, in [1e-24, 1e24], each <= the sum of the other two (relative
                                     1e-9), the largest <= 1e6 (F32) or 1e12 (F64) times the smallest */
     double position[3];          /* centre of mass, m, |x| <= 1e9 */
     double orientation[4];       /* w x y z, | |q| - 1 | <= 1e-6 (then normalised); default identity */
     double linear_velocity[3];   /* m/s, |v| <= 1e6; 0 for static bodies */
     double angular_velocity[3];  /* rad/s, |w| <= 1e6; 0 for static bodies */
-    int32_t environment;         /* bodies of different environments never meet; >= 0, or -1 (static only): meets all;
+    int32_t environment;         /* bodies of different environments never meet; >= 0, or -1 (not dynamic): meets all;
                                     default 0 (static: -1 is the usual choice) */
     const char *name;            /* copied, at most 63 bytes; NULL = "" */
+    /* Of dynamic bodies, ignored for others: */
+    double gravity_scale;        /* the body's gravity over settings.gravity, in [-1e6, 1e6]; default 1 */
+    double linear_damping;       /* 1/s, in [0, 1e6]; default 0. c: a force -c mass velocity, so that free motion decays
+                                    as exp(-c t), exactly and at any dt */
+    double angular_damping;      /* the same of the angular velocity: a torque -c inertia velocity */
 } sadmm_body_def;
 
 /* The defaults named above. Thread-safe. */
@@ -111,27 +124,40 @@ SADMM_API sadmm_status sadmm_world_body_state(sadmm_world *world, sadmm_body_id 
  * definition, velocities 0 for static bodies. Contacts lose accuracy beyond the ranges of the definition.
  * A pose other than the body has is a jump: the body's contacts are found as those of bodies that never touched before,
  * without what was known of the side they came from. Velocities may be set with the pose that was read.
+ * Of a kinematic body: where it is, and how it moves from then on, until set again. A belt that stays where it is has its
+ * pose set back before every step; what lies on it goes by the velocity.
  * Errors: STALE_ID, INVALID_ARGUMENT (nothing changes). */
 SADMM_API sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, const sadmm_body_state *state);
-/* Read back the definition (mass, inertia, type, name) with the current state. The name is the world's own: it stays
+/* Let a kinematic body go to a pose (m, |x| <= 1e9; w x y z, as in the definition) within the next step, by the constant
+ * velocity that brings it there, a turn by the shorter way; contacts and joints feel that velocity. Then it is there, to
+ * the last bit, and at rest. Setting its state first takes that back. Errors: STALE_ID, INVALID_ARGUMENT (range; a body
+ * that is not kinematic; nothing changes). */
+SADMM_API sadmm_status sadmm_world_move_body(sadmm_world *world, sadmm_body_id id, const double position[3],
+                                             const double orientation[4]);
+/* Read back the definition (mass, inertia, type, name, scale of gravity, damping) with the current state. The name is the world's own: it stays
  * where it is, and valid, until the body is removed or the world destroyed. Errors: STALE_ID, DEVICE. */
 SADMM_API sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id, sadmm_body_def *def);
 /* External force (N) at the centre of mass and torque (N m), world frame, each component within +-1e15; kept until set
- * again. Errors: STALE_ID, INVALID_ARGUMENT (range; a static body, which nothing moves). */
+ * again. Errors: STALE_ID, INVALID_ARGUMENT (range; a body that is not dynamic). */
 SADMM_API sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, const double force[3],
                                                    const double torque[3]);
+/* Replace the scale of gravity, or damping (1/s), of a body, ranges and meaning as in the definition, from the next step
+ * on. Errors: STALE_ID, INVALID_ARGUMENT (range; a body that is not dynamic; nothing changes), DEVICE. */
+SADMM_API sadmm_status sadmm_world_set_body_gravity_scale(sadmm_world *world, sadmm_body_id id, double scale);
+SADMM_API sadmm_status sadmm_world_set_body_damping(sadmm_world *world, sadmm_body_id id, double linear,
+                                                    double angular);
 /* Add a force (N, each component within +-1e15) that acts at `point` (m, world, as the body is now, |x| <= 1e9) to the
  * body's external wrench, which is kept until set again: force, and (point - centre of mass) x force. Errors: STALE_ID,
- * INVALID_ARGUMENT (range, also of the sum; a static body; nothing changes), DEVICE. */
+ * INVALID_ARGUMENT (range, also of the sum; a body that is not dynamic; nothing changes), DEVICE. */
 SADMM_API sadmm_status sadmm_world_add_body_force_at(sadmm_world *world, sadmm_body_id id, const double force[3],
                                                      const double point[3]);
 /* Change the body's velocities at once by an impulse (N s, each component finite) at `point` (as above): impulse /
  * mass, and I^-1 ((point - centre of mass) x impulse). Errors: STALE_ID, INVALID_ARGUMENT (a velocity that would not be
- * finite; a static body; nothing changes), DEVICE. */
+ * finite; a body that is not dynamic; nothing changes), DEVICE. */
 SADMM_API sadmm_status sadmm_world_apply_body_impulse_at(sadmm_world *world, sadmm_body_id id, const double impulse[3],
                                                          const double point[3]);
 /* Replace mass (kg) and principal moments (kg m^2), ranges as in the definition, from the next step on; velocities
- * stay. Errors: STALE_ID, INVALID_ARGUMENT (range; a static body; nothing changes), DEVICE. */
+ * stay. Errors: STALE_ID, INVALID_ARGUMENT (range; a body that is not dynamic; nothing changes), DEVICE. */
 SADMM_API sadmm_status sadmm_world_set_body_mass(sadmm_world *world, sadmm_body_id id, double mass,
                                                  const double inertia[3]);
 /* A pointer of the caller's that goes with the body and that the library never looks behind; NULL until set. Of a stale
@@ -140,7 +166,8 @@ SADMM_API sadmm_status sadmm_world_set_body_user_data(sadmm_world *world, sadmm_
 SADMM_API void *sadmm_world_body_user_data(const sadmm_world *world, sadmm_body_id id);
 /* Sum of the contact wrenches of the last step on the body: force (N), then torque about its centre of mass
  * (N m), world frame (eq. 12). With sub-steps their mean, so that dt times it is what contacts gave the body in the
- * step. Errors: STALE_ID, UNAVAILABLE when settings.recover_wrenches was false. */
+ * step. Of dynamic and kinematic bodies. Errors: STALE_ID, UNAVAILABLE when settings.recover_wrenches was false, and of
+ * static bodies. */
 SADMM_API sadmm_status sadmm_world_body_contact_wrench(sadmm_world *world, sadmm_body_id id, double wrench[6]);
 /* Turn contact between two bodies off or on again (default on). Errors: STALE_ID, INVALID_ARGUMENT (a and b the same),
  * OUT_OF_MEMORY. */
@@ -223,7 +250,7 @@ SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_s
 SADMM_API sadmm_status sadmm_world_step(sadmm_world *world);
 
 /* Begin a step and return without waiting for it, where the backend can: CUDA, in the method FAST from the second
- * step on; not in worlds with joints (joint.h), not with a residual_tolerance, nor with a certificate_tolerance in
+ * step on; not in worlds with kinematic bodies, not with a residual_tolerance, nor with a certificate_tolerance in
  * the method PAPER or with more than 64 convergence checks a step. Elsewhere the same as sadmm_world_step. Steps run
  * in order, a few of them at a time; states, wrenches and settings set in between take effect at the next one.
  * Getters wait for the steps begun so far. Errors: as sadmm_world_step; they may be those of an earlier step, and
@@ -314,7 +341,7 @@ SADMM_API sadmm_status sadmm_world_state_hash(sadmm_world *world, uint64_t *hash
 SADMM_API size_t sadmm_world_explain(sadmm_world *world, char *text, size_t size);
 
 /* Freeze the contact problem of the last step, or sub-step (bodies, contacts, rows of joints, its starting values),
- * into `problem`. The k-th dynamic body in slot order is body k. Errors: UNAVAILABLE before the first step, after a
+ * into `problem`. Kinematic bodies are -1 there, their contacts have a velocity. The k-th dynamic body in slot order is body k. Errors: UNAVAILABLE before the first step, after a
  * removal, and where a failed step took the last one's contacts along (sadmm_world_contact_count); OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_freeze(sadmm_world *world, sadmm_problem *problem);
 

@@ -135,9 +135,10 @@ struct sadmm_context {
     struct sadmm_barrier barrier;
 
     /* Bodies; index `bodies` is the static world: state and 1/beta 0, never written. Rows are padded to whole
-     * blocks. */
+     * blocks. Where there are driven bodies a row a pair record follows, from `driven_row` on: the driven body's motion
+     * about the centre of mass of the other one, whose arms the pair has (sadmm_driven_motion). */
     int32_t bodies;
-    size_t body_block_count;
+    size_t body_block_count, driven_row;
     real *state;                     /* rows: v, w, 1/beta, 0 */
     double *A, *C;                   /* bodies x PACKED6 */
     double *beta;                    /* bodies, kg */

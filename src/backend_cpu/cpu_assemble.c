@@ -97,6 +97,17 @@ sadmm_status CPU(assemble_bodies)(struct sadmm_context *c, struct sadmm_error *e
 /* Larger than any velocity: an empty slot's multiplier stays 0. */
 static const real EMPTY_ERROR = (real)1e9;
 
+/* Row of a pair's body in `state`; `at`: the pair's record. */
+static int32_t row_of(struct sadmm_context *c, const struct sadmm_contact_pair *pair, int32_t body, size_t at)
+{
+    const size_t row = c->driven_row + at;
+    double motion[6];
+    if (!sadmm_body_is_driven(body)) return cpu_body(c, body);
+    sadmm_driven_motion(c->system, pair, motion);
+    for (int k = 0; k < ROW; ++k) c->state[row * ROW + (size_t)k] = k < 6 ? (real)motion[k] : 0;
+    return (int32_t)row;
+}
+
 /* Point k of a lane; NULL: the slot is empty. Its e comes later. */
 static void assemble_point(const struct sadmm_context *c, const struct sadmm_contact_pair *pair,
                            const struct sadmm_contact_point *point, size_t at, int l)
@@ -130,8 +141,9 @@ static void assemble_lane(struct sadmm_context *c, struct pair_block *block, int
     set_lane(&block->d, l, pair ? d : zero);
     block->friction[l] = pair ? cpu_friction(c, pair->friction) : 0;
     block->inv_s[l] = 0;
-    block->body_a[l] = pair ? cpu_body(c, pair->body_a) : c->bodies;
-    block->body_b[l] = pair ? cpu_body(c, pair->body_b) : c->bodies;
+    const size_t at = (size_t)(block - c->pair_blocks) * (size_t)LANES + (size_t)l;
+    block->body_a[l] = pair ? row_of(c, pair, pair->body_a, at) : c->bodies;
+    block->body_b[l] = pair ? row_of(c, pair, pair->body_b, at) : c->bodies;
     for (int k = 0; k < block->slots; ++k)
         assemble_point(c, pair, pair && k < pair->count ? &contacts->points[pair->first + k] : NULL,
                        block->first + (size_t)k, l);

@@ -104,6 +104,8 @@ sadmm_status CPU(begin)(struct sadmm_context *c, const struct sadmm_system *syst
     c->body_block_count = (n + LANES - 1) / LANES;
     if (!CPU(find_forms)(c)) return sadmm_fail_memory(error, "the cpu backend's bodies");
     size_t rows = c->body_block_count * (size_t)LANES + 1, general = c->general_count;
+    c->driven_row = rows;
+    if (system->driven_count > 0) rows += c->pair_block_count * (size_t)LANES;
     bool ok = sadmm_grow_empty(&c->state, &c->state_capacity, rows * ROW, sizeof(real)) &&
               sadmm_grow_empty(&c->A, &c->A_capacity, n * PACKED6, sizeof(double)) &&
               sadmm_grow_empty(&c->C, &c->C_capacity, n * PACKED6, sizeof(double)) &&

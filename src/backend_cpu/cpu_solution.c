@@ -90,6 +90,8 @@ static struct lead_touch touch_of(const struct sadmm_context *c, const struct sa
     touch.island |= pair->body_a >= 0 && pair->body_b >= 0 ? TOUCH_INNER
                     : pair->friction > 0                   ? TOUCH_FRICTION
                                                            : TOUCH_SMOOTH;
+    touch.island |= a->touch | b->touch;
+    if (sadmm_pair_is_driven(c->system, pair)) touch.island |= TOUCH_JOLT;
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
         const struct sadmm_contact_point *point = &c->system->contacts->points[k];
         const double *arm_a = point->arm_a, *arm_b = point->arm_b;

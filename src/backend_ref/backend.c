@@ -76,6 +76,11 @@ static void touch(struct sadmm_context *c)
         lead_own(c->system->rigid[i].velocity, body->v, rigid_is_isotropic(v3_load(c->system->rigid[i].inertia)),
                  body->lead);
     }
+    for (size_t p = 0; p < contacts->pair_count; ++p) {
+        const struct sadmm_contact_pair *pair = &contacts->pairs[p];
+        if (sadmm_pair_is_driven(c->system, pair))
+            c->bodies[c->bodies[pair->body_a >= 0 ? pair->body_a : pair->body_b].label].island_touch |= TOUCH_JOLT;
+    }
     for (size_t k = 0; k < contacts->point_count; ++k) {
         const struct ref_constraint *constraint = &c->constraints[k];
         const bool inner = constraint->side[0].body >= 0 && constraint->side[1].body >= 0;
@@ -89,8 +94,10 @@ static void touch(struct sadmm_context *c)
             const double *arm = s ? contacts->points[k].arm_b : contacts->points[k].arm_a;
             size[s] = lead_size(c->bodies[side->body].lead, arm);
             moves[s] = lead_speed(c->system->rigid[side->body].velocity, c->bodies[side->body].v, arm);
-            rest[s] = lead_rest_speed(c->settings->gravity, c->system->rigid[side->body].wrench,
-                                      c->system->rigid[side->body].mass, c->settings->dt);
+            const struct sadmm_rigid *rigid = &c->system->rigid[side->body];
+            rest[s] = lead_rest_speed(c->settings->gravity, rigid->gravity_scale, rigid->wrench, rigid->mass,
+                                      c->settings->dt);
+            if (forces_differ(rigid)) touch.island |= TOUCH_DIFFERS;
         }
         lead_add_point(&touch, contacts->points[k].gap, constraint->lambda[0], speed, lead, size, moves, rest,
                        c->settings->dt, c->settings->slop);
@@ -109,6 +116,8 @@ static sadmm_status integrate(struct sadmm_context *c, struct sadmm_rigid *next,
     double dt = c->settings->dt;
     if (!c->system->rigid)
         return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "integrate: the system gives A and b, not rigid bodies");
+    for (int32_t i = 0; i < c->system->body_count && c->system->carried; ++i)
+        for (int k = 0; k < 6; ++k) c->bodies[i].v[k] += c->system->carried[6 * (size_t)i + (size_t)k];
     sadmm_ref_label_islands(c);
     touch(c);
     for (int32_t i = 0; i < c->system->body_count; ++i) {

@@ -47,6 +47,11 @@ static void add_up_energies(struct sadmm_context *c)
         sum->work += fmax(0, -constraint->e[0]) * constraint->lambda[0];
         sum->drive -= constraint->e[0] * constraint->lambda[0];
     }
+    for (size_t p = 0; p < c->system->contacts->pair_count; ++p) {
+        const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[p];
+        if (sadmm_pair_gives_energy(c->system, pair))
+            c->bodies[c->bodies[pair->body_a >= 0 ? pair->body_a : pair->body_b].label].limit.driven = 1;
+    }
 }
 
 /* By what an island is slowed down. */

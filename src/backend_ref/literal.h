@@ -29,6 +29,7 @@ struct ref_constraint {
     int rows;
     struct ref_side side[2];
     double e[6];                     /* contact; of other rows the bias */
+    double driven[3];                /* contact: what a driven body adds to x, which has no side */
     double mu;                       /* contact */
     double gain[6], compliance[6], lo[6], hi[6];
     bool coupled[6];                 /* fast: may share a dense weight with other rows (core/model/rows.h) */

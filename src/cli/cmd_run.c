@@ -217,6 +217,15 @@ static int trace_step(struct run_record *record, sadmm_world *world, double time
     return CLI_FAILED;
 }
 
+/* After a step, or before the first. */
+static int observe(const struct sadmm_scene *scene, sadmm_world *world, struct run_record *record)
+{
+    struct sadmm_error error = {0};
+    if (sadmm_scene_observe(scene, world, (int64_t)record->steps, &record->result, &error) == SADMM_OK) return CLI_DONE;
+    snprintf(record->failure, sizeof record->failure, "%s", error.message);
+    return CLI_FAILED;
+}
+
 static int step_all(struct run_options *o, const char *spec, const struct sadmm_scene *scene, sadmm_world *world,
                     struct run_record *record, struct output *trace)
 {
@@ -224,6 +233,7 @@ static int step_all(struct run_options *o, const char *spec, const struct sadmm_
     bool watched = !o->quiet && isatty(STDERR_FILENO);
     if (trace) run_trace_begin(output_stream(trace));
     int code = trace_step(record, world, 0, trace);
+    if (code == CLI_DONE) code = observe(scene, world, record);
     for (long step = 0; code == CLI_DONE && step < o->steps && !interrupted(); ++step) {
         struct sadmm_error error = {0};
         if (sadmm_scene_before_step(scene, world, step, &error) != SADMM_OK) {
@@ -236,6 +246,7 @@ static int step_all(struct run_options *o, const char *spec, const struct sadmm_
             code = CLI_FAILED;
         } else {
             code = trace_step(record, world, record->last.time, trace);
+            if (code == CLI_DONE) code = observe(scene, world, record);
             if (code == CLI_DONE) code = dump_problems(o, step + 1, spec, world, record);
         }
         if (watched) show_progress(&progress, record, o->steps);

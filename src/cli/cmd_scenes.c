@@ -93,7 +93,9 @@ static json_t *body_json(int32_t index, const sadmm_body_def *body)
     json_t *o = json_object();
     json_object_set_new(o, "index", json_integer(index));
     json_object_set_new(o, "name", json_string(body->name ? body->name : ""));
-    json_object_set_new(o, "type", json_string(dynamic ? "dynamic" : "static"));
+    json_object_set_new(o, "type", json_string(dynamic                                ? "dynamic"
+                                                 : body->type == SADMM_BODY_STATIC ? "static"
+                                                                                   : "kinematic"));
     json_object_set_new(o, "mass", dynamic ? cli_json_real(body->mass) : json_null());
     json_object_set_new(o, "inertia", dynamic ? cli_json_reals(body->inertia, 3) : json_null());
     json_object_set_new(o, "position", cli_json_reals(body->position, 3));
@@ -320,6 +322,7 @@ static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, con
     json_object_set_new(o, "scene", json_string(spec));
     json_object_set_new(o, "name", json_string(scene->info->name));
     json_object_set_new(o, "n", *scene->info->arguments ? json_integer(scene->n) : json_null());
+    json_object_set_new(o, "m", scene->m > 0 ? json_integer(scene->m) : json_null());
     json_object_set_new(o, "description", json_string(scene->info->description));
     json_object_set_new(o, "units", json_string(units));
     json_object_set_new(o, "duration", cli_json_real(scene->duration));

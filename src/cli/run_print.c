@@ -72,6 +72,45 @@ static json_t *contacts_json(const struct run_record *record)
     return o;
 }
 
+/* What the scene measured of its own success; null: it does not. */
+static json_t *result_json(const struct sadmm_scene_result *result)
+{
+    if (result->task_count == 0) return json_null();
+    json_t *o = json_object(), *tasks = json_array();
+    for (int k = 0; k < result->task_count; ++k) {
+        const struct sadmm_scene_task *task = &result->tasks[k];
+        json_t *t = json_object(), *figures = json_array();
+        json_object_set_new(t, "name", json_string(task->name));
+        json_object_set_new(t, "finished", json_boolean(task->finished));
+        json_object_set_new(t, "passed", json_boolean(task->passed));
+        for (int f = 0; f < task->figure_count; ++f) {
+            json_t *figure = json_object();
+            json_object_set_new(figure, "name", json_string(task->figures[f].name));
+            json_object_set_new(figure, "value", cli_json_real(task->figures[f].value));
+            json_object_set_new(figure, "unit", json_string(task->figures[f].unit));
+            json_array_append_new(figures, figure);
+        }
+        json_object_set_new(t, "figures", figures);
+        json_array_append_new(tasks, t);
+    }
+    json_object_set_new(o, "passed", json_boolean(sadmm_scene_passed(result)));
+    json_object_set_new(o, "tasks", tasks);
+    return o;
+}
+
+static void print_result(const struct sadmm_scene_result *result)
+{
+    for (int k = 0; k < result->task_count; ++k) {
+        const struct sadmm_scene_task *task = &result->tasks[k];
+        printf("%-14s %-14s %s", k == 0 ? "result" : "", task->name,
+               !task->finished ? "not finished" : task->passed ? "passed" : "FAILED");
+        for (int f = 0; f < task->figure_count; ++f)
+            printf("%s %s %.4g%s%s", f ? "," : ":", task->figures[f].name, task->figures[f].value,
+                   *task->figures[f].unit ? " " : "", task->figures[f].unit);
+        printf("\n");
+    }
+}
+
 /* Set what only a step tells, or null before the first. */
 static void set_or_null(json_t *o, const char *name, const struct run_record *record, json_t *value)
 {
@@ -113,6 +152,7 @@ json_t *run_record_json(const struct run_record *record, const char *spec, const
     set_or_null(o, "penetration_max", record, cli_json_real(record->penetration_max));
     json_object_set_new(o, "speed_max_final", cli_json_real(record->speed_max));
     json_object_set_new(o, "displacement_max", cli_json_real(record->displacement_max));
+    json_object_set_new(o, "scene_result", result_json(&record->result));
     json_object_set_new(o, "state_hash", json_string(hash));
     json_object_set_new(o, "interrupted", json_boolean(interrupted() != 0));
     json_object_set_new(o, "finite", json_boolean(record->finite));
@@ -163,5 +203,6 @@ void run_record_print(const struct run_record *record, const char *spec, const s
     if (record->steps > 0) printf("penetration    %.3g m at most\n", record->penetration_max);
     printf("final state    fastest %.3g m/s, moved %.3g m at most, %s, hash %016" PRIx64 "\n", record->speed_max,
            record->displacement_max, record->finite ? "finite" : "NOT FINITE", record->hash);
+    print_result(&record->result);
     if (*record->failure) printf("FAILED         %s\n", record->failure);
 }

@@ -26,6 +26,7 @@ struct run_record {
     double iterations_sum;   /* over the steps, of their means over islands */
     size_t met;              /* steps that met the stop rule */
     size_t limited_steps;    /* steps that slowed an island down (sadmm_step_report.limited) */
+    struct sadmm_scene_result result; /* the scene's own measure of success */
     sadmm_step_report last;  /* of the last step; zero when steps is 0 */
     double speed_max, displacement_max; /* m/s, m, of the final state */
     bool finite;

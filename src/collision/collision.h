@@ -47,10 +47,10 @@ struct sadmm_shape {
 /* What collision knows of a world's body slot. */
 struct sadmm_collision_body {
     double position[3], orientation[4], velocity[6]; /* velocity 0 for static bodies */
-    double acceleration[2]; /* sizes of what its own force and torque give it, m/s^2, rad/s^2; 0 for static bodies */
-    double inertia;       /* largest principal moment, kg m^2; 0: static, or all alike */
+    double acceleration[2]; /* sizes of what its own force and torque give it, m/s^2, rad/s^2; 0 unless it is dynamic */
+    double inertia;       /* largest principal moment, kg m^2; 0: not dynamic, or all alike */
     uint32_t placed;      /* changes whenever its pose is set: pairs forget the axis they remember (contact_match.h) */
-    int32_t system_body;  /* index among dynamic bodies, -1 for static */
+    int32_t system_body;  /* index among dynamic bodies; -1: static; below: driven, core/base/contact_set.h */
     int32_t environment;  /* -1: meets all */
 };
 

@@ -48,7 +48,7 @@ struct pair_motion {
     double closed; /* by the centres of mass, along the normal, and by what the shifts make of turning in the step, m */
 };
 
-/* ahead: manifold.ahead. The point stays where it is on a body beside a static one. Of two dynamic bodies the arms of
+/* ahead: manifold.ahead. The point stays where it is on a body beside one that is not dynamic. Of two dynamic bodies the arms of
  * the one that is harder to turn take up most of the way: those of a bullet must be its own. */
 SADMM_INLINE void pair_motion_of(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double normal[3],
                                  double ahead, double dt, struct pair_motion *m)
@@ -84,8 +84,8 @@ SADMM_INLINE void contact_emit_point(const struct sadmm_proxy *a, const struct s
     for (k = 0; k < 3; ++k) {
         arm_b[k] += b->arm[k];
         arm_a[k] = arm_b[k] + motion->between[k];
-        point->arm_b[k] = b->system_body >= 0 ? arm_b[k] + motion->shift_b[k] : 0;
-        point->arm_a[k] = a->system_body >= 0 ? arm_a[k] + motion->shift_a[k] : 0;
+        point->arm_b[k] = sadmm_body_moves(b->system_body) ? arm_b[k] + motion->shift_b[k] : 0;
+        point->arm_a[k] = sadmm_body_moves(a->system_body) ? arm_a[k] + motion->shift_a[k] : 0;
         point->impulse[k] = 0;
     }
     point->gap = (double)from->separation + motion->closed + dot3(motion->turn_a, arm_a) +

@@ -30,6 +30,6 @@ sadmm_status sadmm_collision_check_shape(const struct sadmm_collision_input *inp
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "shapes[%zu].geometry = %u: must be in [0, %zu)", slot,
                           shape->geometry, input->geometry_count);
     snprintf(name, sizeof name, "shapes[%zu]: ", slot);
-    return sadmm_geometry_check(&input->geometries[shape->geometry], input->bodies[shape->body].system_body >= 0, name,
+    return sadmm_geometry_check(&input->geometries[shape->geometry], sadmm_body_moves(input->bodies[shape->body].system_body), name,
                                 error);
 }

@@ -48,7 +48,7 @@ static bool stays(const struct sadmm_broad_entry *entry, const struct sadmm_box3
 static void enlarge(const struct sadmm_box3 *box, const struct sadmm_proxy *p,
                     const struct sadmm_collision_input *input, struct sadmm_box3 *larger)
 {
-    double radius = p->system_body >= 0 ? geometry_radius(&p->geometry) : 0;
+    double radius = sadmm_body_moves(p->system_body) ? geometry_radius(&p->geometry) : 0;
     for (int k = 0; k < 3; ++k) {
         const double dt = input->dt * (1 + input->substeps_left),
                      most = fmax(radius, fabs(way_left(input, p->velocity[k])));

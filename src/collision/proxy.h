@@ -33,7 +33,7 @@ struct proxy_turn {
 SADMM_INLINE struct proxy_turn proxy_turn_of(const struct sadmm_shape *shape, const struct sadmm_collision_body *body,
                                              double dt)
 {
-    const bool moves = body->system_body >= 0;
+    const bool moves = sadmm_body_moves(body->system_body);
     const quat start = q_load(body->orientation);
     struct proxy_turn turn;
     turn.rate = moves ? turning_rate(body->velocity + 3) : 0;
@@ -48,7 +48,7 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
                               const struct sadmm_collision_body *body, const struct proxy_turn *turn, double dt,
                               double margin, double gravity, struct sadmm_proxy *p, struct sadmm_box3 *box)
 {
-    const bool moves = body->system_body >= 0;
+    const bool moves = sadmm_body_moves(body->system_body);
     mat3 R = q_matrix(turn->shape);
     vec3 arm = m3_mul(q_matrix(turn->body), v3_load(shape->position));
     double extent[3], reach;

@@ -108,7 +108,8 @@ static bool add_bodies(const double *A, const double *b, struct sadmm_global_pro
 static bool add_contact(const sadmm_problem_contact *contact, int32_t k, struct sadmm_global_problem *g)
 {
     double J[18];
-    g->w[3 * (size_t)k] = contact->error;
+    v3_store(m3_mul(sadmm_contact_frame(contact->normal), v3_load(contact->velocity)), g->w + 3 * (size_t)k);
+    g->w[3 * (size_t)k] += contact->error;
     g->mu[k] = contact->friction;
     contact_rows(contact, contact->arm_a, -1, J);
     if (!add_rows(&g->H, contact->body_a, J, 3, 3 * k)) return false;
@@ -368,7 +369,8 @@ static void contact_solution(const sadmm_problem_contact *contact, const double 
 {
     double J[18];
     mat3 frame = sadmm_contact_frame(contact->normal);
-    u[0] = contact->error;
+    v3_store(m3_mul(frame, v3_load(contact->velocity)), u);
+    u[0] += contact->error;
     contact_rows(contact, contact->arm_a, -1, J);
     add_velocity(J, 3, v, contact->body_a, u);
     contact_rows(contact, contact->arm_b, 1, J);

@@ -8,6 +8,7 @@
 struct sadmm_scene_family {
     struct sadmm_scene_info info; /* why a scene takes more than the default iterations: docs/scenes.md */
     long n_default, n_min, n_max; /* the N of "name:N"; n_max = 0: the scene takes no size */
+    long m_default, m_min, m_max; /* the M of "name:N:M"; m_max = 0: it takes no second number */
 
     /* (optional) Fill the settings of the scene (dt, m, margin) in a default definition; iterations are in `info`. */
     void (*configure)(long n, sadmm_world_def *def);
@@ -16,6 +17,10 @@ struct sadmm_scene_family {
     /* (optional) Scripted input before each step. */
     sadmm_status (*before_step)(const struct sadmm_scene *scene, sadmm_world *world, int64_t step,
                                 struct sadmm_error *error);
+    /* (optional) Measure success (scenes.h): tasks and figures of `result`, which is zeroed before the first call. A
+     * pure function of the world, the step and `result`. */
+    sadmm_status (*observe)(const struct sadmm_scene *scene, sadmm_world *world, int64_t step,
+                            struct sadmm_scene_result *result, struct sadmm_error *error);
 };
 
 extern const struct sadmm_scene_family sadmm_family_sliding_cubes;
@@ -41,5 +46,12 @@ extern const struct sadmm_scene_family sadmm_family_chain;
 extern const struct sadmm_scene_family sadmm_family_four_bar;
 extern const struct sadmm_scene_family sadmm_family_slider_crank;
 extern const struct sadmm_scene_family sadmm_family_bricard;
+extern const struct sadmm_scene_family sadmm_family_grippers;
+extern const struct sadmm_scene_family sadmm_family_hand_demo;
+extern const struct sadmm_scene_family sadmm_family_kapla_tower;
+extern const struct sadmm_scene_family sadmm_family_jenga;
+extern const struct sadmm_scene_family sadmm_family_bridge;
+extern const struct sadmm_scene_family sadmm_family_ragdolls;
+extern const struct sadmm_scene_family sadmm_family_mixer;
 
 #endif

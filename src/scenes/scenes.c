@@ -16,7 +16,9 @@ static const struct sadmm_scene_family *const families[] = {
     &sadmm_family_bounce,        &sadmm_family_spin_plate,      &sadmm_family_rolling,
     &sadmm_family_rocking,       &sadmm_family_two_balls,       &sadmm_family_dominoes,
     &sadmm_family_falling_chain, &sadmm_family_chain,           &sadmm_family_four_bar,
-    &sadmm_family_slider_crank,  &sadmm_family_bricard,
+    &sadmm_family_slider_crank,  &sadmm_family_bricard,         &sadmm_family_grippers,
+    &sadmm_family_hand_demo,     &sadmm_family_kapla_tower,     &sadmm_family_jenga,
+    &sadmm_family_bridge,        &sadmm_family_ragdolls,        &sadmm_family_mixer,
 };
 
 enum { FAMILY_COUNT = sizeof families / sizeof families[0] };
@@ -57,32 +59,44 @@ static sadmm_status fail_unknown(const char *spec, struct sadmm_error *error)
     return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene = \"%.16s\": must be one of %s", spec, names);
 }
 
-/* The N of "name:N": digits only, so that "+5", " 5" and "5x" are refused and not half read. */
-static sadmm_status parse_size(const struct sadmm_scene_family *family, const char *text, long *n,
-                               struct sadmm_error *error)
+/* A number of the spec. Digits only, so that "+5", " 5" and "5x" are refused and not half read. */
+static sadmm_status parse_number(const char *spec, char name, const char *text, size_t length, long min, long max,
+                                 long *out, struct sadmm_error *error)
 {
     char *end;
 
-    if (family->n_max == 0)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene = \"%s:%.40s\": %s takes no size",
-                          family->info.name, text, family->info.name);
     errno = 0;
-    *n = isdigit((unsigned char)text[0]) ? strtol(text, &end, 10) : -1;
-    if (*n < 0 || errno || *end)
+    *out = isdigit((unsigned char)text[0]) ? strtol(text, &end, 10) : -1;
+    if (*out < 0 || errno || end != text + length)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "scene = \"%s:%.40s\": N must be a whole number in [%ld, %ld]", family->info.name, text,
-                          family->n_min, family->n_max);
-    if (*n < family->n_min || *n > family->n_max)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene = \"%s:%ld\": N must be in [%ld, %ld]",
-                          family->info.name, *n, family->n_min, family->n_max);
+                          "scene = \"%.80s\": %c must be a whole number in [%ld, %ld]", spec, name, min, max);
+    if (*out < min || *out > max)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene = \"%.80s\": %c must be in [%ld, %ld]", spec,
+                          name, min, max);
     return SADMM_OK;
+}
+
+/* The N and M of "name:N:M"; `text`: what follows the first colon. */
+static sadmm_status parse_numbers(const struct sadmm_scene_family *family, const char *spec, const char *text, long *n,
+                                  long *m, struct sadmm_error *error)
+{
+    const char *second = strchr(text, ':');
+    sadmm_status status;
+
+    if (family->n_max == 0)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene = \"%.80s\": %s takes no size", spec,
+                          family->info.name);
+    status = parse_number(spec, 'N', text, second && family->m_max > 0 ? (size_t)(second - text) : strlen(text),
+                          family->n_min, family->n_max, n, error);
+    if (status != SADMM_OK || !second) return status;
+    return parse_number(spec, 'M', second + 1, strlen(second + 1), family->m_min, family->m_max, m, error);
 }
 
 sadmm_status sadmm_scene_open(const char *spec, struct sadmm_scene *scene, struct sadmm_error *error)
 {
     const struct sadmm_scene_family *family;
     const char *colon;
-    long n;
+    long n, m;
 
     if (!spec) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene = NULL: must be a string");
     if (!scene) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene out = NULL: must not be NULL");
@@ -90,12 +104,13 @@ sadmm_status sadmm_scene_open(const char *spec, struct sadmm_scene *scene, struc
     family = find(spec, colon ? (size_t)(colon - spec) : strlen(spec));
     if (!family) return fail_unknown(spec, error);
     n = family->n_default;
+    m = family->m_default;
     if (colon) {
-        sadmm_status status = parse_size(family, colon + 1, &n, error);
+        sadmm_status status = parse_numbers(family, spec, colon + 1, &n, &m, error);
         if (status != SADMM_OK) return status;
     }
     *scene = (struct sadmm_scene){
-        .def = sadmm_world_def_default(), .duration = family->info.duration, .info = &family->info, .n = n
+        .def = sadmm_world_def_default(), .duration = family->info.duration, .info = &family->info, .n = n, .m = m
     };
     if (family->configure) family->configure(n, &scene->def);
     sadmm_scene_set_method(scene, scene->def.settings.method);
@@ -140,4 +155,21 @@ sadmm_status sadmm_scene_before_step(const struct sadmm_scene *scene, sadmm_worl
 
     if (!family) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene: must come from sadmm_scene_open");
     return family->before_step ? family->before_step(scene, world, step, error) : SADMM_OK;
+}
+
+sadmm_status sadmm_scene_observe(const struct sadmm_scene *scene, sadmm_world *world, int64_t step,
+                                 struct sadmm_scene_result *result, struct sadmm_error *error)
+{
+    const struct sadmm_scene_family *family = family_of(scene);
+
+    if (!family) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene: must come from sadmm_scene_open");
+    if (!result) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "result = NULL: must not be NULL");
+    return family->observe ? family->observe(scene, world, step, result, error) : SADMM_OK;
+}
+
+bool sadmm_scene_passed(const struct sadmm_scene_result *result)
+{
+    bool all = result->task_count > 0;
+    for (int k = 0; k < result->task_count; ++k) all = all && result->tasks[k].passed;
+    return all;
 }

@@ -1,6 +1,7 @@
 /* The scene library: worlds built by name, shared by the command, the benchmarks, the tests and the examples.
  *
- * A scene is named by a spec: "name", or "name:N" where the scene takes a size. Opening a spec parses it and fills the
+ * A scene is named by a spec: "name", or "name:N" where the scene takes a size, or "name:N:M" where it takes a second
+ * number. Opening a spec parses it and fills the
  * world definition with the scene's own settings, for the library's default method; the caller may change that
  * definition (backend, precision, dt, iterations, ...) before the world is built from it. A scene has a number of
  * iterations for each method, and sub-steps for `fast`: sadmm_scene_set_method sets all three.
@@ -21,7 +22,7 @@ extern "C" {
 
 struct sadmm_scene_info {
     const char *name;
-    const char *arguments;   /* what may follow the name: ":N", or "" */
+    const char *arguments;   /* what may follow the name: "[:N]", "[:N[:M]]", or "" */
     const char *description; /* one line */
     double duration;         /* s, simulated time the scene is meant to be run for */
     int iterations[SADMM_METHOD_COUNT]; /* a step, by method */
@@ -39,10 +40,11 @@ struct sadmm_scene {
     double duration;                    /* s */
     const struct sadmm_scene_info *info;
     long n;                             /* the N of "name:N", or the scene's default */
+    long m;                             /* the M of "name:N:M", or the scene's default; 0: the scene takes none */
 };
 
-/* Parse `spec` and fill `scene`. Errors: INVALID_ARGUMENT (unknown name: the message lists the valid ones; N out of
- * the scene's range). */
+/* Parse `spec` and fill `scene`. Errors: INVALID_ARGUMENT (unknown name: the message lists the valid ones; N or M
+ * out of the scene's range). */
 sadmm_status sadmm_scene_open(const char *spec, struct sadmm_scene *scene, struct sadmm_error *error);
 
 /* Solve the scene by `method` in [0, SADMM_METHOD_COUNT): sets the method in scene->def.settings, and the iterations
@@ -56,6 +58,42 @@ sadmm_status sadmm_scene_build(const struct sadmm_scene *scene, sadmm_world **wo
 /* Scripted inputs: call before every step, with the number of steps done so far. Does nothing for most scenes. */
 sadmm_status sadmm_scene_before_step(const struct sadmm_scene *scene, sadmm_world *world, int64_t step,
                                      struct sadmm_error *error);
+
+/* ---- success ------------------------------------------------------------------------------------------------------
+ *
+ * A scene may measure by itself whether it went as it should, task by task: what was to be grasped is held, what was
+ * built stands. */
+
+enum { SADMM_SCENE_MOST_TASKS = 8, SADMM_SCENE_MOST_FIGURES = 4, SADMM_SCENE_MEMORY = 64 };
+
+struct sadmm_scene_figure {
+    const char *name, *unit; /* static storage */
+    double value;
+};
+
+struct sadmm_scene_task {
+    const char *name; /* static storage */
+    struct sadmm_scene_figure figures[SADMM_SCENE_MOST_FIGURES];
+    int figure_count;
+    bool finished; /* the run has come to where the task is judged */
+    bool passed;   /* finished, and as it should be */
+};
+
+/* Belongs to one run of one world; zeroed before its first step. */
+struct sadmm_scene_result {
+    struct sadmm_scene_task tasks[SADMM_SCENE_MOST_TASKS];
+    int task_count; /* 0: the scene has no measure of success */
+    double memory[SADMM_SCENE_MEMORY]; /* what the scene has to remember from one step to another; its own */
+};
+
+/* Look at the world: call before the first step (`step` = 0) and after every one (`step`: steps done). It waits for
+ * steps begun where the scene has a measure, and does nothing where it has none. Errors: INVALID_ARGUMENT, those of the
+ * world's read-outs. */
+sadmm_status sadmm_scene_observe(const struct sadmm_scene *scene, sadmm_world *world, int64_t step,
+                                 struct sadmm_scene_result *result, struct sadmm_error *error);
+
+/* There are tasks, and all of them have passed. */
+bool sadmm_scene_passed(const struct sadmm_scene_result *result);
 
 #ifdef __cplusplus
 }

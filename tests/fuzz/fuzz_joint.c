@@ -441,14 +441,16 @@ static sadmm_status make_call(struct machine *m)
     }
 }
 
-/* A row of bodies, one of them static, light and heavy ones, boxes with three moments; the first two touch. */
+/* A row of bodies, one of them static, one at times kinematic, light and heavy ones, boxes with three moments; the first two touch. */
 static void add_bodies(struct machine *m)
 {
     for (int k = 0; k < BODIES; ++k) {
         sadmm_body_def def = sadmm_body_def_default();
         sadmm_shape_def shape = sadmm_shape_def_default();
         const int kind = take_choice(&m->in, 8);
-        def.type = k == 2 ? SADMM_BODY_STATIC : SADMM_BODY_DYNAMIC;
+        def.type = k == 2                ? SADMM_BODY_STATIC
+                   : k == 1 && kind == 7 ? SADMM_BODY_KINEMATIC
+                                         : SADMM_BODY_DYNAMIC;
         def.mass = kind == 0 ? 1e-3 : kind == 1 ? 1e3 : 1;
         shape.type = SADMM_SHAPE_BOX;
         for (int j = 0; j < 3; ++j) shape.size[j] = kind == 2 ? 0.25 : 0.1 * (j + 2);

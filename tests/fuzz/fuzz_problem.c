@@ -104,6 +104,9 @@ static void take_contact(struct machine *m, sadmm_problem_contact *c)
     take_values(in, c->arm_b, 3);
     c->error = take_magnitude(in) * take_in(in, -1, 1);
     c->friction = take_choice(in, 4) ? take_in(in, 0, 1) : take_magnitude(in);
+    memset(c->velocity, 0, sizeof c->velocity);
+    if (take_choice(in, 4) == 3 && (c->body_a < 0 || c->body_b < 0 || take_rarely(in, 8)))
+        take_values(in, c->velocity, 3);
 }
 
 static void take_block(struct machine *m, sadmm_problem_block *b)
@@ -158,6 +161,7 @@ static sadmm_status set_contacts(struct machine *m)
             contacts[k].body_b = contacts[k - 1].body_b;
             memcpy(contacts[k].normal, contacts[k - 1].normal, sizeof contacts[k].normal);
             contacts[k].friction = contacts[k - 1].friction;
+            memcpy(contacts[k].velocity, contacts[k - 1].velocity, sizeof contacts[k].velocity);
             for (int i = 0; i < 3; ++i)
                 contacts[k].arm_b[i] = contacts[k].arm_a[i] + (contacts[k - 1].arm_b[i] - contacts[k - 1].arm_a[i]);
         }
@@ -169,7 +173,9 @@ static sadmm_status set_contacts(struct machine *m)
     for (int32_t k = 0; k < count; ++k) {
         MUST(sadmm_problem_get_contact(m->problem, k, &read) == SADMM_OK, "contact %d", k);
         MUST(read.body_a == contacts[k].body_a && read.body_b == contacts[k].body_b &&
-                 read.error == contacts[k].error && read.friction == contacts[k].friction,
+                 read.error == contacts[k].error && read.friction == contacts[k].friction &&
+                 read.velocity[0] == contacts[k].velocity[0] && read.velocity[1] == contacts[k].velocity[1] &&
+                 read.velocity[2] == contacts[k].velocity[2],
              "contact %d", k);
     }
     return SADMM_OK;

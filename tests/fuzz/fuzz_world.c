@@ -63,6 +63,9 @@ static struct picture look(sadmm_world *world)
         p.objects = mix(p.objects, &id, sizeof id);
         p.objects = mix(p.objects, &def.mass, sizeof def.mass);
         p.objects = mix(p.objects, def.inertia, sizeof def.inertia);
+        p.objects = mix(p.objects, &def.gravity_scale, sizeof def.gravity_scale);
+        p.objects = mix(p.objects, &def.linear_damping, sizeof def.linear_damping);
+        p.objects = mix(p.objects, &def.angular_damping, sizeof def.angular_damping);
         p.objects = mix(p.objects, def.name, strlen(def.name));
         p.objects = mix(p.objects, &def.environment, sizeof def.environment);
     }
@@ -112,8 +115,8 @@ static void must_be_sound(struct machine *m)
         double q2 = 0;
         for (int i = 0; i < 4; ++i) q2 += s.orientation[i] * s.orientation[i];
         MUST(fabs(q2 - 1) <= 1e-12, "body %d: |q|^2 - 1 = %g", k, q2 - 1); /* normalised: a few roundings */
-        if (def.type != SADMM_BODY_DYNAMIC) continue;
-        ++dynamic;
+        if (def.type == SADMM_BODY_STATIC) continue;
+        dynamic += def.type == SADMM_BODY_DYNAMIC;
         sadmm_status status = sadmm_world_body_contact_wrench(m->world, id, wrench);
         MUST(status == SADMM_OK || status == SADMM_ERROR_UNAVAILABLE, "wrench: %s", sadmm_status_name(status));
         if (status == SADMM_OK) MUST(all_finite(wrench, 6), "body %d: wrench", k);
@@ -214,13 +217,23 @@ static void take_state(struct bytes *in, double reach, sadmm_body_state *s)
     }
 }
 
+static void take_forces(struct bytes *in, double *scale, double *linear, double *angular)
+{
+    *scale = take_choice(in, 4) ? take_number(in, -2, 2) : take_extreme(in);
+    *linear = take_choice(in, 4) ? take_scale(in, 1e-6, 1e6) : take_extreme(in);
+    *angular = take_choice(in, 4) ? take_scale(in, 1e-6, 1e6) : take_extreme(in);
+}
+
 static sadmm_body_def take_body_def(struct machine *m)
 {
     struct bytes *in = &m->in;
     sadmm_body_def def = sadmm_body_def_default();
     sadmm_body_state state;
     int kind = take_choice(in, 8);
-    def.type = kind == 7 ? (sadmm_body_type)take_byte(in) : (sadmm_body_type)(kind >= 5);
+    def.type = kind == 7   ? (sadmm_body_type)take_byte(in)
+               : kind >= 5 ? SADMM_BODY_STATIC
+               : kind == 4 ? SADMM_BODY_KINEMATIC
+                           : SADMM_BODY_DYNAMIC;
     def.mass = take_rarely(in, 16) ? take_extreme(in) : (take_choice(in, 4) ? 1 : take_scale(in, 1e-9, 1e12));
     double size = take_choice(in, 4) ? 0.5 : take_scale(in, 1e-6, 1e6);
     sadmm_sphere_inertia(def.mass, size, def.inertia);
@@ -235,9 +248,10 @@ static sadmm_body_def take_body_def(struct machine *m)
         memcpy(def.linear_velocity, state.linear_velocity, sizeof def.linear_velocity);
         memcpy(def.angular_velocity, state.angular_velocity, sizeof def.angular_velocity);
     }
-    def.environment = take_rarely(in, 4) ? take_choice(in, 4) - 2 : (def.type == SADMM_BODY_STATIC ? -1 : 0);
+    def.environment = take_rarely(in, 4) ? take_choice(in, 4) - 2 : (def.type == SADMM_BODY_DYNAMIC ? 0 : -1);
     if (take_rarely(in, 16))
         def.name = "a name that is longer than the sixty-three bytes that are kept of it, and then some";
+    if (take_rarely(in, 8)) take_forces(in, &def.gravity_scale, &def.linear_damping, &def.angular_damping);
     return def;
 }
 
@@ -321,6 +335,31 @@ static sadmm_status set_wrench(struct machine *m)
     return sadmm_world_set_body_wrench(m->world, id, force, null ? NULL : torque);
 }
 
+static sadmm_status move(struct machine *m)
+{
+    double position[3], orientation[4];
+    sadmm_body_id id = take_body(m);
+    take_vector(&m->in, -2, 2, position);
+    take_orientation(&m->in, orientation);
+    return sadmm_world_move_body(m->world, id, position, orientation);
+}
+
+static sadmm_status set_forces(struct machine *m)
+{
+    double scale, linear, angular;
+    sadmm_body_id id = take_body(m);
+    sadmm_body_def read;
+    take_forces(&m->in, &scale, &linear, &angular);
+    const bool of_gravity = take_choice(&m->in, 2);
+    sadmm_status status = of_gravity ? sadmm_world_set_body_gravity_scale(m->world, id, scale)
+                                     : sadmm_world_set_body_damping(m->world, id, linear, angular);
+    if (status != SADMM_OK) return status;
+    MUST(sadmm_world_body_def(m->world, id, &read) == SADMM_OK, "forces that were set");
+    MUST(of_gravity ? read.gravity_scale == scale : read.linear_damping == linear && read.angular_damping == angular,
+         "forces that were set");
+    return SADMM_OK;
+}
+
 static sadmm_status step(struct machine *m)
 {
     if (m->steps >= MAX_STEPS) return SADMM_OK;
@@ -396,6 +435,8 @@ static sadmm_status make_call(struct machine *m)
         return sadmm_world_set_pair_friction(m->world, s, take_shape(m), take_number(&m->in, -1, 1));
     case 14: return freeze(m);
     case 15: case 16: return read_something(m);
+    case 17: return set_forces(m);
+    case 18: return move(m);
     default: return step(m);
     }
 }

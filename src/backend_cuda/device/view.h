@@ -83,7 +83,8 @@ struct cuda_island {
     double rescale;      /* not 0: weights of pairs are those taken last, times this */
     double slow_down;    /* math/limit.h: the factor of its velocities */
     int32_t held;        /* not loose (math/momentum.h): some pair holds it, nothing touches it, or there are rows */
-    int32_t rows;        /* there are constraints given by rows: the weight scale stays 1 */
+    int32_t rows;        /* there are constraints given by rows: the weight scale stays 1, energies have no limit; and,
+                            once iterations have ended, a driven body pushes */
     int32_t stopped;     /* iterations after which a check found the tolerances met; 0: not yet */
 };
 
@@ -108,7 +109,7 @@ enum { SIDE_ARMS = 10, SIDE_LOAD = SIDE_ARMS, SIDE_RESPONSE, SIDE_NUMBERS };
 
 /* What a pair joins. */
 struct alignas(16) pair_bodies {
-    int32_t body_a, body_b; /* raw; the static world: `bodies` */
+    int32_t body_a, body_b; /* raw; the static world: `bodies`; above: a row of a driven one */
     int32_t side_a, side_b; /* places of its sides in `incident`, and of their records; of the static world: -1.
                                For the stepwise kernels alone (streamed.cu) */
 };
@@ -139,7 +140,8 @@ struct model_view {
 
 /* Bodies in the solver's form. */
 struct body_view {
-    solver_real *state; /* (bodies + 1) x ROW: v, w, 1/beta, 0; the last row is the static world, all 0 */
+    solver_real *state; /* (bodies + 1) x ROW: v, w, 1/beta, 0; the last row is the static world, all 0. Where there
+                           are driven bodies a row a pair follows (assemble/assemble.cu); tier STREAM reads these */
     solver_real *b;     /* bodies x ROW */
     solver_real *momentum_residual; /* fast: bodies x ROW: b - A v + J^T lambda */
     solver_real *lines; /* bodies x line: A and H (device/line.h) */

@@ -77,7 +77,7 @@ static __device__ __forceinline__ double factor_of(const struct limit_energies &
 static __device__ __forceinline__ void limit_island(const island_view &islands, cuda_island *island,
                                                     const double sum[TERMS], bool under_iterated, bool slows)
 {
-    const struct limit_energies energies = {sum[0], sum[1], sum[2], sum[3], 0, 0, 0, 0};
+    const struct limit_energies energies = {sum[0], sum[1], sum[2], sum[3], 0, 0, 0, 0, 0};
     const double factor = factor_of(energies, sum[4], under_iterated);
     if (island->rows) return; /* the energies are those of contacts alone; slow_down stays 1 */
     island->slow_down = slows ? factor : 1;

@@ -96,6 +96,16 @@ static __global__ void slow_kernel(const __grid_constant__ cuda_view v, const __
     for (int k = 0; k < 6; ++k) state[k] = velocity[k];
 }
 
+/* Islands that driven bodies push are left alone, as those with rows are. A thread a pair. */
+static __global__ void driven_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    const int32_t p = thread_index();
+    if (p >= live_pairs(v.model)) return;
+    const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
+    if (sadmm_pair_gives_energy(&v.raw.system, pair))
+        v.islands.info[v.graph.label[pair->body_a >= 0 ? pair->body_a : pair->body_b]].rows = 1;
+}
+
 /* ---- launches ---------------------------------------------------------------------------------------------------- */
 
 static sadmm_status launch(struct sadmm_context *c, cuda_kernel kernel, const char *name, struct sadmm_error *error)
@@ -124,6 +134,8 @@ extern "C" sadmm_status CUDA(limit_velocity)(struct sadmm_context *c, int32_t *l
 {
     cuda_args args = {};
     CUDA_ENTER(c);
+    if (c->view.raw.system.driven_count > 0)
+        TRY(CUDA(launch)(c, driven_kernel, "driven islands", blocks_for(c->view.contacts.pair_capacity), &args, error));
     TRY(CUDA(enqueue_motions)(c, error));
     TRY(CUDA(enqueue_limit)(c, false, error));
     TRY(CUDA(launch)(c, slow_kernel, "limit_velocity", blocks_for(c->view.model.bodies), &args, error));

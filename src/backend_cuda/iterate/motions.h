@@ -158,9 +158,9 @@ static __device__ __forceinline__ void restore_island(const island_view &islands
                                                       bool under_iterated, bool slows, double *place)
 {
     double factor = 1;
-    if (term) {
+    if (term && !island->rows) {
         const struct momentum_energies rigid = momentum_energies_of(&motions);
-        struct limit_energies energies = {term[0], term[1], 0, term[3], 1, term[2], term[5], 0};
+        struct limit_energies energies = {term[0], term[1], 0, term[3], 1, term[2], term[5], 0, 0};
         double along = term[4];
         limit_take_rigid(&energies, &along, &rigid);
         factor = factor_of(energies, along, under_iterated);

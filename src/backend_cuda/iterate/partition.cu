@@ -275,7 +275,8 @@ sadmm_status CUDA(choose_partition)(struct sadmm_context *c, const struct cuda_g
 {
     cudaError_t code = cudaSuccess;
     struct choice choice;
-    switch (c->wanted) {
+    /* Motions of driven bodies are in memory, a row a pair: the other tiers have no place for them on the chip. */
+    switch (c->view.raw.system.driven_count > 0 ? SADMM_CUDA_TIER_STREAM : c->wanted) {
     case SADMM_CUDA_TIER_BLOCK: choice = choose_block(c, statistics); break;
     case SADMM_CUDA_TIER_CLUSTER: choice = choose_cluster(c, statistics, &code); break;
     case SADMM_CUDA_TIER_GRID: choice = choose_grid(c, statistics, &code); break;

@@ -88,8 +88,9 @@ static __device__ __forceinline__ void load_part(const cuda_view &v, const joine
     });
 }
 
-/* A, and b - A v + J^T lambda; energies of the impulses into `right`, which is not in use yet. */
-static __device__ __forceinline__ void find_missing(const cuda_view &v, const joined_part &p)
+/* A, and b - A v + J^T lambda, or 0 where that is left to contacts; energies of the impulses into `dv`, which is not in
+ * use yet. */
+static __device__ __forceinline__ void find_missing(const cuda_view &v, const joined_part &p, bool left)
 {
     const struct sadmm_settings settings = *v.model.settings;
     each_body(p, [&](int32_t e) {
@@ -104,6 +105,7 @@ static __device__ __forceinline__ void find_missing(const cuda_view &v, const jo
                   });
         sadmm_system_body(&v.raw.system, &settings, body, A, b);
         joined_miss(&p.d, e, b, impulse);
+        for (int k = 0; left && k < 6; ++k) p.d.missing[6 * (size_t)body + (size_t)k] = 0;
         p.d.dv[6 * (size_t)body] = joined_energy(A, impulse);
     });
 }
@@ -236,22 +238,30 @@ static __device__ __forceinline__ bool is_finite(const joined_part &p, struct jo
     return shared->flag == 0;
 }
 
+/* Until the solve after the iterations: NaN where the one before them has not solved the part. */
+static __device__ __forceinline__ double *kept_mark(const joined_part &p)
+{
+    return p.d.dv + 6 * (size_t)p.d.s.body[p.first_body];
+}
+
 /* Before the iterations: what these start from. After them: what the end of the step reads. */
-static __device__ __forceinline__ void store_part(const cuda_view &v, const joined_part &p, bool after, bool finite)
+static __device__ __forceinline__ void store_part(const cuda_view &v, const joined_part &p, bool after, bool solved)
 {
     each_body(p, [&](int32_t e) {
         const size_t body = (size_t)p.d.s.body[e];
         double *velocity = p.d.velocity + 6 * body;
         for (size_t k = 0; k < 6; ++k) {
-            if (finite) velocity[k] += p.d.dv[6 * body + k];
+            if (solved) velocity[k] += p.d.dv[6 * body + k];
             if (!after) v.bodies.state[body * ROW + k] = (solver_real)velocity[k];
         }
     });
     each_row(p, [&](const struct sadmm_row_constraint *, int32_t r, int32_t, int) {
-        const double lambda = finite ? joined_bounded(&p.d, r) : p.d.lambda[r];
+        const double lambda = solved ? joined_bounded(&p.d, r) : p.d.lambda[r];
         v.joints.solution[r] = lambda;
         if (!after) v.rows.data[r].lambda = (solver_real)lambda;
     });
+    __syncthreads();
+    if (!after && p.thread == 0) *kept_mark(p) = solved ? 0 : NAN;
 }
 
 /* Does a contact touch one of its bodies? */
@@ -278,11 +288,13 @@ static __global__ void __launch_bounds__(JOINED_THREADS)
     const bool after = args.count != 0;
     if (v.model.live->abort_code) return;
     const joined_part p = part_of_block(v);
+    const bool touched = is_touched(v, p, shared), kept = after && args.start && !isnan(*kept_mark(p));
+    __syncthreads();
     /* what no contact touches is as it was solved before the iterations */
-    if (after && args.start && !is_touched(v, p, shared)) return;
+    if (kept && !touched) return;
     load_part(v, p, after);
     __syncthreads();
-    find_missing(v, p);
+    find_missing(v, p, touched && v.model.settings->method == SADMM_METHOD_PAPER); /* core/solve/joined.c says why */
     __syncthreads();
     find_speed(p, shared);
     __syncthreads();
@@ -293,12 +305,14 @@ static __global__ void __launch_bounds__(JOINED_THREADS)
         joined_begin_row(&p.d, constraint, r);
     });
     __syncthreads();
-    for (int pass = 0; pass < JOINED_PASSES; ++pass) {
+    bool solved = false;
+    for (int pass = 0; pass < JOINED_PASSES && !solved; ++pass) {
         for (int32_t level = p.first_level; level < p.end_level; ++level) factor_level(p, level);
         solve_rows(p);
-        if (!change_rows(p, shared)) break;
+        solved = !change_rows(p, shared);
     }
-    store_part(v, p, after, is_finite(p, shared));
+    const bool finite = is_finite(p, shared);
+    store_part(v, p, after, solved && finite);
 }
 
 sadmm_status CUDA(launch_joined)(struct sadmm_context *c, bool after, struct sadmm_error *error)

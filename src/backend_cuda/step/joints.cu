@@ -32,7 +32,7 @@ enum { ROWS_THREADS = 64 }; /* a block: long work, many multiprocessors */
 
 static __device__ __forceinline__ struct joint_body body_of(const cuda_step_view &step, int32_t body)
 {
-    const struct joint_body out = {body, body >= 0 ? &step.before[body] : nullptr, false};
+    const struct joint_body out = {body, body >= 0 ? &step.before[body] : nullptr, false, false};
     return out;
 }
 
@@ -41,7 +41,7 @@ static __device__ __forceinline__ struct joint_body body_a_of(const cuda_view &v
                                                               const struct sadmm_resident_joint *joint)
 {
     if (joint->coupling < 0) return body_of(v.step, joint->body[0]);
-    const struct joint_body out = {-1, &v.joints.couplings_before[joint->coupling].target, true};
+    const struct joint_body out = {-1, &v.joints.couplings_before[joint->coupling].target, true, true};
     return out;
 }
 
@@ -83,7 +83,7 @@ static __device__ __forceinline__ void store_row(const cuda_view &v, const struc
     row.lambda = start;
     const_cast<struct raw_row *>(v.raw.rows)[slot] = row;
     const struct sadmm_joint_source source = {joint,    (int8_t)law.role, (int8_t)law.coordinate, (int8_t)law.sign,
-                                              law.gap, law.slack};
+                                              law.gap, law.slack, law.steered};
     v.joints.sources[slot] = source;
 }
 

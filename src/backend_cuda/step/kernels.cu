@@ -63,6 +63,8 @@ static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __
         for (int k = 0; k < 6; ++k) body->velocity[k] = values[7 + k];
     } else {
         for (int k = 0; k < 6; ++k) body->wrench[k] = values[k];
+        body->gravity_scale = values[6];
+        for (int k = 0; k < 2; ++k) body->damping[k] = values[7 + k];
     }
 }
 static_assert((int)SADMM_EDIT_VALUES >= (int)SADMM_SETTING_NUMBERS && (int)SADMM_EDIT_VALUES >= 13 &&
@@ -91,15 +93,18 @@ static __device__ __forceinline__ void start_body(const cuda_view &v, int64_t i,
     const int32_t streak = steady->streak[k / 3];
     const uint32_t placed = steady->placed;
     const vec3 force = v3_load(body->wrench), torque = v3_load(body->wrench + 3);
+    const double scale = body->gravity_scale, damping[2] = {body->damping[0], body->damping[1]};
     struct sadmm_collision_body *out = &v.step.bodies[slot];
     if (lane < CARRIED) ((double *)out)[lane] = number;
     if (lane >= CARRIED_VELOCITY && lane < CARRIED)
         v.step.start_velocity[6 * i + k] = steady_velocity(number, streak, change, step_ratio(dt, last_dt));
-    if (lane == LANE_FORCE) out->acceleration[0] = v3_max_abs(force) == 0 ? 0 : rigid_acceleration(body->mass, force);
+    if (lane == LANE_FORCE)
+        out->acceleration[0] = v3_max_abs(force) == 0 && scale == 1 && damping[0] == 0
+                                   ? 0
+                                   : forces_acceleration(body, v.model.settings->gravity, dt);
     if (lane == LANE_TORQUE)
-        out->acceleration[1] = v3_max_abs(torque) == 0 ? 0
-                                                       : rigid_angular_acceleration(q_load(body->orientation),
-                                                                                    v3_load(body->inertia), torque);
+        out->acceleration[1] =
+            v3_max_abs(torque) == 0 && damping[1] == 0 ? 0 : forces_angular_acceleration(body, dt);
     if (lane == LANE_PLACED) out->placed = placed;
 }
 

@@ -83,6 +83,8 @@ static __global__ void touch_kernel(const __grid_constant__ cuda_view v, const _
         if (p >= live_pairs(v.model)) return;
         const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
         add_ways<false>(v, fetch_ends(pair), pair->first, pair->count, i % v.contacts.lanes);
+        if (v.raw.system.driven_count > 0 && i % v.contacts.lanes == 0 && sadmm_pair_is_driven(&v.raw.system, pair))
+            add_bits(&v.islands.touch[v.graph.label[pair->body_a >= 0 ? pair->body_a : pair->body_b]], TOUCH_JOLT);
         return;
     }
     const body_thread t = body_of_slot(v.graph, slot, slot < live_bodies(v.model));
@@ -102,7 +104,10 @@ static __global__ void integrate_kernel(const __grid_constant__ cuda_view v, con
     if (i >= live_bodies(v.model)) return;
     double *out = v.raw.out + MOVED * (size_t)i;
     const int island = args.count ? v.islands.touch[v.graph.label[i]] : 0, own = args.count ? v.islands.touch[i] : 0;
-    for (int k = 0; k < 6; ++k) out[PLACE + k] = (double)v.bodies.state[(size_t)i * ROW + (size_t)k];
+    for (int k = 0; k < 6; ++k) {
+        out[PLACE + k] = (double)v.bodies.state[(size_t)i * ROW + (size_t)k];
+        if (v.raw.system.carried) out[PLACE + k] += v.raw.system.carried[6 * (size_t)i + (size_t)k];
+    }
     move_body(&v.raw.system.rigid[i], out + PLACE, v.model.settings->dt, v.model.settings->gravity,
               lead_kind_of(island, own), out);
 }

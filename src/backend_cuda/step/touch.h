@@ -23,6 +23,7 @@ template <bool WHOLE> static __device__ __forceinline__ lead_body load_lead_body
     for (int k = 0; k < 6; ++k) {
         out.before[k] = rigid->velocity[k];
         out.velocity[k] = (double)velocity[k];
+        if (!WHOLE && v.raw.system.carried) out.velocity[k] += v.raw.system.carried[6 * (size_t)body + (size_t)k];
     }
     lead_own(rigid->velocity, out.velocity, rigid_is_isotropic(v3_load(rigid->inertia)), out.lead);
     return out;
@@ -32,6 +33,7 @@ template <bool WHOLE> static __device__ __forceinline__ lead_body load_lead_body
  * lead_rest_speed. */
 struct lead_speeds {
     double moves[2], rest;
+    int touch; /* TOUCH_DIFFERS, or 0 */
 };
 
 template <bool WHOLE> static __device__ __forceinline__ lead_speeds load_lead_speeds(const cuda_view &v, int32_t body)
@@ -40,7 +42,9 @@ template <bool WHOLE> static __device__ __forceinline__ lead_speeds load_lead_sp
     const lead_body own = load_lead_body<WHOLE>(v, body);
     const lead_speeds out = {
         {lead_speed_part(own.before, own.velocity, 0), lead_speed_part(own.before, own.velocity, 1)},
-        lead_rest_speed(v.model.settings->gravity, rigid->wrench, rigid->mass, v.model.settings->dt)};
+        lead_rest_speed(v.model.settings->gravity, rigid->gravity_scale, rigid->wrench, rigid->mass,
+                        v.model.settings->dt),
+        forces_differ(rigid) ? TOUCH_DIFFERS : 0};
     return out;
 }
 
@@ -148,7 +152,7 @@ static __device__ __forceinline__ contact_sums sum_touching(const cuda_view &v, 
                                                             touching_begun *begun)
 {
     const double per_dt = 1 / v.model.settings->dt;
-    contact_sums sums = {};
+    contact_sums sums = {{}, own.touch};
     touching &t = begun->first;
     touching_points &points = begun->points;
     for (int32_t at = begun->at; at < begun->end;) {
@@ -191,7 +195,7 @@ static __device__ __forceinline__ void add_touch(const island_view &islands, int
 
 /* What is known of a pair before the iterations end. */
 struct pair_ends {
-    int32_t body[2]; /* < 0: static */
+    int32_t body[2]; /* < 0: not dynamic */
     double normal[3];
 };
 

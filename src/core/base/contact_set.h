@@ -2,8 +2,11 @@
 #ifndef SADMM_CORE_BASE_CONTACT_SET_H
 #define SADMM_CORE_BASE_CONTACT_SET_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+
+#include "inline.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -11,10 +14,18 @@ extern "C" {
 
 enum { SADMM_MAX_POINTS = 8 };
 
+/* Which body of a step something is on: 0 and up, one that is solved for (dynamic); -1, the static world; below, the
+ * (-2 - body)-th driven one, which moves by a velocity that is given and feels nothing. So whatever is not >= 0 is as
+ * static to all but relative velocities. */
+SADMM_INLINE bool sadmm_body_moves(int32_t body) { return body != -1; }
+SADMM_INLINE bool sadmm_body_is_driven(int32_t body) { return body < -1; }
+/* Of the driven body, its number, and back. */
+SADMM_INLINE int32_t sadmm_driven(int32_t body) { return -2 - body; }
+
 /* A manifold of a pair of shapes: one normal, up to SADMM_MAX_POINTS points. Two shapes may have several, told apart by
  * `child` (collision/geometry.h). */
 struct sadmm_contact_pair {
-    int32_t body_a, body_b;   /* system body or -1 */
+    int32_t body_a, body_b;   /* system body, -1: static, below: driven */
     int32_t shape_a, shape_b; /* world shape slot (world level), else -1 */
     int32_t first, count;     /* points */
     double normal[3];         /* unit, from a to b */
@@ -26,7 +37,7 @@ struct sadmm_contact_pair {
 };
 
 struct sadmm_contact_point {
-    double arm_a[3], arm_b[3]; /* from the centre of mass, m, world; arm_a is 0 when a is -1 (same for b) */
+    double arm_a[3], arm_b[3]; /* from the centre of mass, m, world; arm_a is 0 when a is static (same for b) */
     double gap;                /* m (world level) */
     double error;              /* e, m/s: given at the problem level; at the world level see math/contact.h */
     double impulse[3];         /* lambda on b, world frame, N s: warm start in, solution out */

@@ -22,7 +22,8 @@ enum {
     TOUCH_FRICTION = 4, /* with friction */
     TOUCH_JOLT = 8,     /* a contact that taking back leads would close beyond what v does */
     TOUCH_CARRIED = 16, /* contacts that press on it, or that it might close by itself */
-    TOUCH_MOVED = 32    /* where it touches, it does not rest */
+    TOUCH_MOVED = 32,   /* where it touches, it does not rest */
+    TOUCH_DIFFERS = 64  /* of the island again: a body of it has gravity or damping of its own (model/forces.h) */
 };
 
 enum lead_kind {
@@ -33,7 +34,8 @@ enum lead_kind {
 
 SADMM_INLINE enum lead_kind lead_kind_of(int island, int body)
 {
-    if (island & TOUCH_INNER && !(island & TOUCH_FRICTION)) return island & TOUCH_SMOOTH ? LEAD_STAYS : LEAD_SHARED;
+    if (island & TOUCH_INNER && !(island & TOUCH_FRICTION))
+        return island & (TOUCH_SMOOTH | TOUCH_DIFFERS) ? LEAD_STAYS : LEAD_SHARED;
     if (!(body & TOUCH_CARRIED)) return LEAD_OWN;
     return island & TOUCH_JOLT || !(body & TOUCH_MOVED) ? LEAD_STAYS : LEAD_OWN;
 }
@@ -97,10 +99,13 @@ SADMM_INLINE double lead_speed(const double before[6], const double v[6], const 
  * does not show the contacts what they corrected by. */
 #define LEAD_LEAST 0.1
 
-/* That speed, m/s; force: on the body, N. */
-SADMM_INLINE double lead_rest_speed(const double gravity[3], const double force[3], double mass, double dt)
+/* That speed, m/s; scale: of gravity, force: on the body, N. */
+SADMM_INLINE double lead_rest_speed(const double gravity[3], double scale, const double force[3], double mass,
+                                    double dt)
 {
-    const double free[3] = {gravity[0] + force[0] / mass, gravity[1] + force[1] / mass, gravity[2] + force[2] / mass};
+    double free[3];
+    SADMM_UNROLL
+    for (int k = 0; k < 3; ++k) free[k] = scale * gravity[k] + force[k] / mass;
     return LEAD_LEAST * dt * size3(free);
 }
 

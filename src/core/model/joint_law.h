@@ -10,6 +10,7 @@
 #include "core/math/joint_table.h"
 #include "core/math/max.h"
 #include "core/math/rigid.h"
+#include "forces.h"
 #include "subadmm/joint.h"
 #include "system.h"
 
@@ -51,6 +52,7 @@ struct sadmm_joint_source {
     double gap, slack; /* of limits: at the step's start, m or rad; what the turning of the row makes of it in a step.
                           Of springs, gap: the way to where a steep part of a table stops the coordinate, INFINITY where
                           there is none */
+    double steered;    /* of the row's rate what sides give that are steered; it is in the bias */
 };
 
 /* A radial joint's coordinate 0 is a distance. */
@@ -86,7 +88,8 @@ SADMM_INLINE void joint_coordinate_take(const double x[JOINT_COORDINATE_NUMBERS]
 struct joint_body {
     int32_t system_body;             /* -1: it does not move */
     const struct sadmm_rigid *rigid; /* at the step's start; NULL: the frame is in the world */
-    bool steered;                    /* it is no body of the system and goes by its velocity, whatever acts on it */
+    bool steered;                    /* it is no body of the system and goes by its velocity, whatever acts on it; */
+    bool target;                     /* it is a coupling's target: of a (joint_hold_translations) */
 };
 
 SADMM_INLINE struct joint_end joint_end_on(const struct joint_frame *frame, const struct sadmm_rigid *rigid)
@@ -125,8 +128,7 @@ SADMM_INLINE struct joint_side joint_side_of(struct joint_body body, const struc
     for (k = 0; k < 6; ++k)
         side.velocity[k] = side.free[k] = body.system_body >= 0 || body.steered ? body.rigid->velocity[k] : 0;
     if (body.system_body < 0) return side;
-    for (k = 0; k < 3; ++k)
-        side.free[k] += settings->dt * (settings->gravity[k] + side.rigid->wrench[k] / side.rigid->mass);
+    forces_free(side.rigid, settings->gravity, settings->dt, side.free);
     if (!rigid_is_isotropic(v3_load(side.rigid->inertia)))
         side.back = q_exp(v3_scale(v3_load(side.velocity + 3), -settings->dt / 2));
     return side;
@@ -140,7 +142,7 @@ SADMM_INLINE struct joint_end joint_end_halfway(const struct joint_frame *frame,
                         rigid_turn(q_load(side->rigid->orientation), v3_load(side->velocity + 3), dt / 2));
 }
 
-/* From a steered frame, translations are by its origin's velocity alone, along axes that stay where they are in the
+/* From a coupling's target, translations are by its origin's velocity alone, along axes that stay where they are in the
  * middle of the step: a damper that went round with the frame would push what is beside it outwards, without bound. */
 SADMM_INLINE void joint_hold_translations(const struct joint_end start[2], struct acting_joint *acting)
 {
@@ -169,7 +171,7 @@ SADMM_INLINE struct acting_joint joint_act(const sadmm_joint_def *def, const str
     acting.start = joint_geometry_of(&start[0], &start[1], def->locks, radial);
     acting.middle = joint_geometry_of(&middle[0], &middle[1], def->locks, radial);
     acting.frame = middle[0].orientation;
-    if (acting.side[0].steered) joint_hold_translations(start, &acting);
+    if (body[0].target) joint_hold_translations(start, &acting);
     return acting;
 }
 
@@ -223,7 +225,7 @@ SADMM_INLINE double joint_response(const struct joint_side *side, const double r
 struct joint_law {
     int role, coordinate, sign;
     double gain, bias, compliance, lo, hi;
-    double gap, slack; /* of limits: sadmm_joint_source */
+    double gap, slack, steered; /* sadmm_joint_source */
 };
 
 /* Two limits, drive, friction, spring and armature of a coordinate that is free. */
@@ -241,6 +243,7 @@ struct joint_moving {
     double free;          /* its rate at the end, if nothing but gravity and wrenches acted */
     double turning;       /* what the row's rate by the velocities at the start is more: axes and arms turn */
     double turned;        /* what the rate at the end is more than the row's, so far as the law counts it */
+    double steered;       /* of the rate what steered sides give */
     double reach;         /* it may move by so much */
     double response;
     double dt, most;      /* most: speed of corrections */
@@ -254,6 +257,7 @@ SADMM_INLINE void joint_add_law(struct joint_laws *laws, const struct joint_movi
     law->gain = gain, law->bias = bias, law->compliance = compliance;
     law->lo = lo, law->hi = hi;
     law->gap = gap;
+    law->steered = sign * m->steered;
     law->slack = role == SADMM_ROLE_LOWER || role == SADMM_ROLE_UPPER ? 2 * m->dt * fabs(m->turning) : 0;
 }
 
@@ -286,6 +290,7 @@ SADMM_INLINE struct joint_moving joint_moving_of(const sadmm_joint_def *def, con
         m.response += joint_response(&acting->side[s], row);
     }
     middle += steered, free += steered;
+    m.steered = steered;
     m.turning = middle - m.before;
     m.free = free - m.turning;
     m.turned = (memory->leads_stay ? 0 : m.turning) + steered; /* the solve's rates are of its bodies alone */

@@ -51,7 +51,8 @@ SADMM_INLINE bool joint_contact_holds(const double normal[3], const struct sadmm
             size[s] = lead_size(body->lead, arm);
             if (!body->rigid) continue;
             moves[s] = lead_speed(body->rigid->velocity, body->velocity, arm);
-            rest[s] = lead_rest_speed(settings->gravity, body->rigid->wrench, body->rigid->mass, settings->dt);
+            rest[s] = lead_rest_speed(settings->gravity, body->rigid->gravity_scale, body->rigid->wrench,
+                                      body->rigid->mass, settings->dt);
         }
         lead_add_point(&touch, point->gap, dot3(normal, point->impulse), speed, lead, size, moves, rest, settings->dt,
                        settings->slop);
@@ -70,7 +71,7 @@ SADMM_INLINE bool joint_limit_jolts(const struct sadmm_joint_source *source, dou
 {
     const bool table = source->role == SADMM_ROLE_SPRING && source->gap < INFINITY;
     const double margin = source->slack + LEAD_SLOP * settings->slop;
-    double lead = 0, speed = 0, way;
+    double lead = 0, speed = source->steered, way;
     int s, j;
     if (!table && ((source->role != SADMM_ROLE_LOWER && source->role != SADMM_ROLE_UPPER) || !(lambda > 0)))
         return false;

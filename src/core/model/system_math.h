@@ -7,6 +7,7 @@
 
 #include "core/math/impact.h"
 #include "core/math/rigid.h"
+#include "forces.h"
 #include "system.h"
 
 #ifndef SADMM_REAL_IS_DOUBLE
@@ -14,17 +15,29 @@
 #endif
 
 /* Eq. (1) of a rigid body: A = diag(m I, world inertia) and b = A v + dt (m g + f, tau) with the gyroscopic term inside
- * the angular momentum (math/rigid.h). Returns the inertia. */
-SADMM_INLINE sym3 sadmm_rigid_body(const struct sadmm_rigid *body, const struct sadmm_settings *settings, double b[6])
+ * the angular momentum (math/rigid.h), and damping (forces.h). Returns the inertia; *mass: of A. */
+SADMM_INLINE sym3 sadmm_rigid_body(const struct sadmm_rigid *body, const struct sadmm_settings *settings, double *mass,
+                                   double b[6])
 {
     const double dt = settings->dt;
     const quat q = q_load(body->orientation);
     const vec3 inertia = v3_load(body->inertia);
+    const struct forces_damping linear = forces_damping_of(body, 0, dt), angular = forces_damping_of(body, 1, dt);
     const vec3 momentum = rigid_angular_momentum(q, inertia, v3_load(body->velocity + 3), dt);
-    for (int k = 0; k < 3; ++k)
-        b[k] = body->mass * (body->velocity[k] + dt * settings->gravity[k]) + dt * body->wrench[k];
-    v3_store(v3_madd(momentum, dt, v3_load(body->wrench + 3)), b + 3);
-    return rigid_world_inertia(q_matrix(q), inertia);
+    for (int k = 0; k < 3; ++k) {
+        const double gained = dt * forces_gravity(body, settings->gravity, k);
+        b[k] = body->mass * (linear.keep * body->velocity[k] + gained) + dt * body->wrench[k];
+    }
+    v3_store(v3_madd(v3_scale(momentum, angular.keep), dt, v3_load(body->wrench + 3)), b + 3);
+    *mass = linear.mass * body->mass;
+    return rigid_world_inertia(q_matrix(q), v3_scale(inertia, angular.mass));
+}
+
+/* b of the motion less c, of a rigid body: b - A c. */
+SADMM_INLINE void sadmm_take_carried(double mass, sym3 I, const double c[6], double b[6])
+{
+    for (int k = 0; k < 3; ++k) b[k] -= mass * c[k];
+    v3_store(v3_sub(v3_load(b + 3), s3_mul(I, v3_load(c + 3))), b + 3);
 }
 
 /* A (6 x 6 row-major) and b of eq. (1). */
@@ -36,27 +49,59 @@ SADMM_INLINE void sadmm_system_body(const struct sadmm_system *system, const str
         memcpy(b, system->b + 6 * (size_t)i, 6 * sizeof *b);
         return;
     }
-    const sym3 I = sadmm_rigid_body(&system->rigid[i], settings, b);
+    double mass;
+    const sym3 I = sadmm_rigid_body(&system->rigid[i], settings, &mass, b);
     memset(A, 0, 36 * sizeof *A);
-    A[0] = A[7] = A[14] = system->rigid[i].mass;
+    A[0] = A[7] = A[14] = mass;
     A[21] = I.xx, A[28] = I.yy, A[35] = I.zz;
     A[22] = A[27] = I.xy, A[23] = A[33] = I.xz, A[29] = A[34] = I.yz;
+    if (system->carried) sadmm_take_carried(mass, I, system->carried + 6 * (size_t)i, b);
 }
 
-/* Velocity of b's contact point relative to a's, world frame; `velocity` (bodies x 6). */
-SADMM_INLINE vec3 sadmm_contact_velocity(const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *point,
-                                          const double *velocity)
+SADMM_INLINE vec3 sadmm_velocity_at(const double v[6], const double arm[3])
+{
+    return v3_add(v3_load(v), v3_cross(v3_load(v + 3), v3_load(arm)));
+}
+
+/* What a driven body adds to the velocity of b's contact point relative to a's, world frame; and what the other one is
+ * carried by. */
+SADMM_INLINE vec3 sadmm_driven_part(const struct sadmm_system *system, const struct sadmm_contact_pair *pair,
+                                    const struct sadmm_contact_point *point)
+{
+    const bool on_b = sadmm_body_is_driven(pair->body_b);
+    if (!on_b && !sadmm_body_is_driven(pair->body_a)) return v3(0, 0, 0);
+    vec3 x = sadmm_velocity_at(sadmm_driven_velocity(system, on_b ? pair->body_b : pair->body_a),
+                               on_b ? point->arm_b : point->arm_a);
+    if (system->carried)
+        x = v3_sub(x, sadmm_velocity_at(system->carried + 6 * (size_t)(on_b ? pair->body_a : pair->body_b),
+                                        on_b ? point->arm_a : point->arm_b));
+    return on_b ? x : v3_neg(x);
+}
+
+/* The driven body of a pair that has one as the motion about the other one's centre of mass that its surface has
+ * at the points: with the arms of the other one. `points`: the pair's. */
+SADMM_INLINE void sadmm_driven_about_other(const struct sadmm_system *system, const struct sadmm_contact_pair *pair,
+                                           const struct sadmm_contact_point *points, double motion[6])
+{
+    const bool on_b = sadmm_body_is_driven(pair->body_b);
+    const double *v = sadmm_driven_velocity(system, on_b ? pair->body_b : pair->body_a),
+                 *own = on_b ? points->arm_b : points->arm_a, *other = on_b ? points->arm_a : points->arm_b;
+    v3_store(v3_add(v3_load(v), v3_cross(v3_load(v + 3), v3_sub(v3_load(own), v3_load(other)))), motion);
+    v3_store(v3_load(v + 3), motion + 3);
+    if (!system->carried) return;
+    const double *c = system->carried + 6 * (size_t)(on_b ? pair->body_a : pair->body_b);
+    for (int k = 0; k < 6; ++k) motion[k] -= c[k];
+}
+
+/* Velocity of b's contact point relative to a's, world frame, by the system's velocities. */
+SADMM_INLINE vec3 sadmm_contact_velocity(const struct sadmm_system *system, const struct sadmm_contact_pair *pair,
+                                          const struct sadmm_contact_point *point)
 {
     vec3 x = v3(0, 0, 0);
-    if (pair->body_b >= 0) {
-        const double *v = velocity + 6 * (size_t)pair->body_b;
-        x = v3_add(v3_load(v), v3_cross(v3_load(v + 3), v3_load(point->arm_b)));
-    }
-    if (pair->body_a >= 0) {
-        const double *v = velocity + 6 * (size_t)pair->body_a;
-        x = v3_sub(x, v3_add(v3_load(v), v3_cross(v3_load(v + 3), v3_load(point->arm_a))));
-    }
-    return x;
+    if (pair->body_b >= 0) x = sadmm_velocity_at(system->velocity + 6 * (size_t)pair->body_b, point->arm_b);
+    if (pair->body_a >= 0)
+        x = v3_sub(x, sadmm_velocity_at(system->velocity + 6 * (size_t)pair->body_a, point->arm_a));
+    return system->driven_count > 0 ? v3_add(x, sadmm_driven_part(system, pair, point)) : x;
 }
 
 /* The contact's frame: rows n, t1, t2. */
@@ -84,18 +129,26 @@ SADMM_INLINE struct sadmm_impact_body sadmm_impact_body_of(const struct sadmm_sy
     const double dt = settings->dt;
     struct sadmm_impact_body out;
     memset(&out, 0, sizeof out);
+    if (sadmm_body_is_driven(i)) {
+        out.linear = v3_load(sadmm_driven_velocity(system, i));
+        out.angular = v3_load(sadmm_driven_velocity(system, i) + 3);
+    }
     if (i < 0) return out;
     const struct sadmm_rigid *body = &system->rigid[i];
     const mat3 R = q_matrix(q_load(body->orientation));
     const vec3 inertia = v3_load(body->inertia);
-    const sym3 inverse = rigid_world_inertia(R, v3(1 / inertia.x, 1 / inertia.y, 1 / inertia.z));
-    out.linear = v3_load(body->velocity);
+    const struct forces_damping linear = forces_damping_of(body, 0, dt), angular = forces_damping_of(body, 1, dt);
+    const vec3 heavy = v3_scale(inertia, angular.mass);
+    const sym3 inverse = rigid_world_inertia(R, v3(1 / heavy.x, 1 / heavy.y, 1 / heavy.z));
+    out.linear = v3_scale(v3_load(body->velocity), linear.keep / linear.mass);
     out.angular = v3_load(body->velocity + 3);
     if (!rigid_is_isotropic(inertia))
         out.angular = m3_mul(R, rigid_gyroscopic(inertia, m3_tmul(R, out.angular), dt));
-    out.push = v3_scale(v3_madd(v3_load(settings->gravity), 1 / body->mass, v3_load(body->wrench)), dt / 2);
+    out.angular = v3_scale(out.angular, angular.keep / angular.mass);
+    out.push = v3_scale(v3_madd(v3_scale(v3_load(settings->gravity), body->gravity_scale), 1 / body->mass,
+                                v3_load(body->wrench)), dt / 2 / linear.mass);
     out.turn = v3_scale(s3_mul(inverse, v3_load(body->wrench + 3)), dt / 2);
-    out.inverse_mass = 1 / body->mass;
+    out.inverse_mass = 1 / (linear.mass * body->mass);
     out.inverse_inertia.r[0] = v3(inverse.xx, inverse.xy, inverse.xz);
     out.inverse_inertia.r[1] = v3(inverse.xy, inverse.yy, inverse.yz);
     out.inverse_inertia.r[2] = v3(inverse.xz, inverse.yz, inverse.zz);

@@ -24,14 +24,23 @@ void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_sett
     const struct sadmm_rigid *bodies = system->rigid;
     if (!bodies) memcpy(b, system->b + 6 * first, 6 * count * sizeof *b);
     for (size_t i = 0; i < count && !bodies; ++i) pack(system->A + 36 * (first + i), A + PACKED6 * i);
-    for (size_t i = 0; i < count && bodies; ++i)
-        pack_rigid(bodies[first + i].mass, sadmm_rigid_body(&bodies[first + i], settings, b + 6 * i), A + PACKED6 * i);
+    for (size_t i = 0; i < count && bodies; ++i) {
+        double mass;
+        const sym3 I = sadmm_rigid_body(&bodies[first + i], settings, &mass, b + 6 * i);
+        pack_rigid(mass, I, A + PACKED6 * i);
+        if (system->carried) sadmm_take_carried(mass, I, system->carried + 6 * (first + i), b + 6 * i);
+    }
 }
 
 double sadmm_point_error(const struct sadmm_system *system, const struct sadmm_settings *settings,
                          const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *points, int32_t k)
 {
     return sadmm_contact_e(system, settings, pair, points, k);
+}
+
+void sadmm_driven_motion(const struct sadmm_system *system, const struct sadmm_contact_pair *pair, double motion[6])
+{
+    sadmm_driven_about_other(system, pair, &system->contacts->points[pair->first], motion);
 }
 
 void sadmm_find_leads(size_t count, const struct sadmm_rigid *bodies, const double *velocity,
@@ -44,7 +53,9 @@ void sadmm_find_leads(size_t count, const struct sadmm_rigid *bodies, const doub
         out->angular = size3(out->lead + 3);
         out->moves_linear = lead_speed_part(bodies[i].velocity, velocity + 6 * i, 0);
         out->moves_angular = lead_speed_part(bodies[i].velocity, velocity + 6 * i, 1);
-        out->rest = lead_rest_speed(settings->gravity, bodies[i].wrench, bodies[i].mass, settings->dt);
+        out->rest = lead_rest_speed(settings->gravity, bodies[i].gravity_scale, bodies[i].wrench, bodies[i].mass,
+                                    settings->dt);
+        out->touch = forces_differ(&bodies[i]) ? TOUCH_DIFFERS : 0;
     }
 }
 

@@ -12,12 +12,16 @@ void sadmm_body_terms(const struct sadmm_system *system, const struct sadmm_sett
 double sadmm_point_error(const struct sadmm_system *system, const struct sadmm_settings *settings,
                          const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *points, int32_t k);
 
+/* sadmm_driven_about_other (system_math.h). */
+void sadmm_driven_motion(const struct sadmm_system *system, const struct sadmm_contact_pair *pair, double motion[6]);
+
 /* What contacts ask of a body's lead (math/lead.h). World frame. */
 struct sadmm_lead {
     double lead[6];                     /* m/s, rad/s */
     double linear, angular;             /* size3 of its parts */
     double moves_linear, moves_angular; /* lead_speed_part: m/s, rad/s */
     double rest;                        /* lead_rest_speed, m/s */
+    int touch;                          /* TOUCH_DIFFERS, or 0 */
 };
 
 /* Leads of `count` bodies, each by itself, which end the step with `velocity` (count x 6). */

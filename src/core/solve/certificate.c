@@ -114,7 +114,7 @@ static void certify_pair(struct tally *tally, const struct sadmm_system *system,
     for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
         const struct sadmm_contact_point *point = &system->contacts->points[k];
         vec3 lambda = m3_mul(frame, v3_load(point->impulse));
-        vec3 x = m3_mul(frame, sadmm_contact_velocity(pair, point, system->velocity));
+        vec3 x = m3_mul(frame, sadmm_contact_velocity(system, pair, point));
         const double l[3] = {lambda.x, lambda.y, lambda.z};
         const double u[3] = {x.x + sadmm_contact_e(system, settings, pair, &system->contacts->points[pair->first],
                                                      k - pair->first), x.y, x.z};

@@ -17,10 +17,11 @@ struct sadmm_joined {
     uint8_t *state;
     double *impulse;        /* entries x 6: J^T lambda */
     uint8_t *touched;       /* entries: by a contact */
+    uint8_t *kept_part;     /* entries, a part's first: was it solved before the iterations? */
     bool kept;              /* velocities and multipliers from before the iterations are in: */
     double *kept_velocity, *kept_lambda; /* entries x 6; rows */
     size_t bodies_capacity, entry_capacity, work_capacity, state_capacity, impulse_capacity, touched_capacity,
-        kept_velocity_capacity, kept_lambda_capacity;
+        kept_part_capacity, kept_velocity_capacity, kept_lambda_capacity;
 };
 
 /* One call. */
@@ -42,7 +43,7 @@ void sadmm_joined_destroy(struct sadmm_joined *j)
 {
     if (!j) return;
     sadmm_joined_order_free(&j->order);
-    void *blocks[] = {j->bodies, j->entry, j->work, j->state, j->impulse, j->touched, j->kept_velocity, j->kept_lambda};
+    void *blocks[] = {j->bodies, j->entry, j->work, j->state, j->impulse, j->touched, j->kept_part, j->kept_velocity, j->kept_lambda};
     for (size_t k = 0; k < sizeof blocks / sizeof *blocks; ++k) sadmm_free(blocks[k]);
     sadmm_free(j);
 }
@@ -98,6 +99,7 @@ static bool make_view(struct solving *s)
         !sadmm_grow_empty(&j->state, &j->state_capacity, r, sizeof *j->state) ||
         !sadmm_grow_empty(&j->impulse, &j->impulse_capacity, 6 * (size_t)o->bodies, sizeof *j->impulse) ||
         !sadmm_grow_empty(&j->touched, &j->touched_capacity, (size_t)o->bodies, sizeof *j->touched) ||
+        !sadmm_grow_empty(&j->kept_part, &j->kept_part_capacity, (size_t)o->bodies, sizeof *j->kept_part) ||
         !sadmm_grow_empty(&j->kept_velocity, &j->kept_velocity_capacity, 6 * (size_t)o->bodies,
                           sizeof *j->kept_velocity) ||
         !sadmm_grow_empty(&j->kept_lambda, &j->kept_lambda_capacity, r, sizeof *j->kept_lambda))
@@ -281,19 +283,23 @@ static bool is_finite(const struct joined_view *v, const struct part *part)
     return sum == 0;
 }
 
-static void solve_part(const struct solving *s, const struct part *part)
+/* Is it solved? A part whose rows have not settled is left as it is: velocities that go with multipliers beyond their
+ * bounds have energy from nowhere. */
+static bool solve_part(const struct solving *s, const struct part *part)
 {
     const struct joined_view *v = &s->view;
+    bool solved = false;
     begin_rows(v, part);
-    for (int pass = 0; pass < JOINED_PASSES; ++pass) {
+    for (int pass = 0; pass < JOINED_PASSES && !solved; ++pass) {
         factorize(v, part);
         solve_rows(v, part);
-        if (!change_rows(v, part)) break;
+        solved = !change_rows(v, part);
     }
-    const bool finite = is_finite(v, part);
-    for (int32_t e = part->entry; finite && e < part->end_entry; ++e)
+    solved = solved && is_finite(v, part);
+    for (int32_t e = part->entry; solved && e < part->end_entry; ++e)
         for (size_t k = 0; k < 6; ++k) v->velocity[6 * (size_t)v->s.body[e] + k] += v->dv[6 * (size_t)v->s.body[e] + k];
-    EACH_ROW(v, part, p, constraint, r) s->system->rows->lambda[r] = finite ? joined_bounded(v, r) : v->lambda[r];
+    EACH_ROW(v, part, p, constraint, r) s->system->rows->lambda[r] = solved ? joined_bounded(v, r) : v->lambda[r];
+    return solved;
 }
 
 /* ---- before and after the iterations --------------------------------------------------------------------------------- */
@@ -305,9 +311,19 @@ static bool is_touched(const struct sadmm_joined *j, const struct part *part)
     return false;
 }
 
-static void keep_part(const struct solving *s, const struct part *part)
+/* What the momentum misses is the contacts' to mend in the paper's method: its velocity is not the one that goes with
+ * the impulses (docs/algorithm.md, section 6), and rows alone would have to carry the difference. */
+static void leave_to_contacts(const struct joined_view *v, const struct part *part)
+{
+    for (int32_t e = part->entry; e < part->end_entry; ++e)
+        memset(v->missing + 6 * (size_t)v->s.body[e], 0, 6 * sizeof(double));
+}
+
+/* solved: else the iterations' end is better than what they began with. */
+static void keep_part(const struct solving *s, const struct part *part, bool solved)
 {
     const struct joined_view *v = &s->view;
+    s->j->kept_part[part->entry] = solved;
     for (int32_t e = part->entry; e < part->end_entry; ++e)
         memcpy(s->j->kept_velocity + 6 * (size_t)e, v->velocity + 6 * (size_t)v->s.body[e], 6 * sizeof(double));
     EACH_ROW(v, part, p, constraint, r) s->j->kept_lambda[r] = s->system->rows->lambda[r];
@@ -333,12 +349,14 @@ sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_
     factor_bodies(&s);
     for (int32_t k = 0; k < s.view.s.parts; ++k) {
         const struct part part = part_of(&s.view.s, k);
-        if (after && joined->kept && !is_touched(joined, &part)) {
+        const bool touched = is_touched(joined, &part);
+        if (after && joined->kept && !touched && joined->kept_part[part.entry]) {
             take_kept(&s, &part);
             continue;
         }
-        solve_part(&s, &part);
-        if (!after) keep_part(&s, &part);
+        if (touched && settings->method == SADMM_METHOD_PAPER) leave_to_contacts(&s.view, &part);
+        const bool solved = solve_part(&s, &part);
+        if (!after) keep_part(&s, &part, solved);
     }
     joined->kept = !after;
     return SADMM_OK;

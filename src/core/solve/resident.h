@@ -40,7 +40,7 @@ struct sadmm_resident_world {
 
 enum sadmm_edit_kind {
     SADMM_EDIT_STATE,    /* target: a dynamic body; position (3), orientation (4), velocity (6) */
-    SADMM_EDIT_WRENCH,   /* target: a dynamic body; force, torque (6) */
+    SADMM_EDIT_FORCES,   /* target: a dynamic body; force, torque (6), scale of gravity, damping (2) */
     SADMM_EDIT_SETTINGS, /* sadmm_settings_numbers(): a backend's own, from what `step` is given */
     SADMM_EDIT_JOINT,    /* target: SADMM_JOINT_TARGETS joint + k; k < 6: the numbers of that coordinate (joint_coordinate_numbers); k = 6:
                             enabled (1 or 0); k = 7: a coupling's target: position (3), orientation (4), velocity (6) */

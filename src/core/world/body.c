@@ -15,7 +15,7 @@ static const double ANY = HUGE_VAL;
 
 sadmm_body_def sadmm_body_def_default(void)
 {
-    sadmm_body_def def = {.type = SADMM_BODY_DYNAMIC, .orientation = {1, 0, 0, 0}};
+    sadmm_body_def def = {.type = SADMM_BODY_DYNAMIC, .orientation = {1, 0, 0, 0}, .gravity_scale = 1};
     return def;
 }
 
@@ -70,7 +70,7 @@ static sadmm_status check_inertia(const char *name, const double inertia[3], sad
     return check_inertia_ratio(name, inertia, precision, error);
 }
 
-static const double MASS_MIN = 1e-9, MASS_MAX = 1e12;
+static const double MASS_MIN = 1e-9, MASS_MAX = 1e12, GRAVITY_SCALE_MAX = 1e6, DAMPING_MAX = 1e6;
 
 static sadmm_status check_motion(const char *linear_name, const char *angular_name, const double linear[3],
                                  const double angular[3], sadmm_body_type type, double limit, struct sadmm_error *error)
@@ -88,18 +88,21 @@ static sadmm_status check_motion(const char *linear_name, const char *angular_na
 static sadmm_status check_def(const sadmm_body_def *def, sadmm_precision precision, double orientation[4],
                               struct sadmm_error *error)
 {
-    if (def->type != SADMM_BODY_DYNAMIC && def->type != SADMM_BODY_STATIC)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->type = %d: must be SADMM_BODY_DYNAMIC or _STATIC",
-                          (int)def->type);
+    if (def->type != SADMM_BODY_DYNAMIC && def->type != SADMM_BODY_STATIC && def->type != SADMM_BODY_KINEMATIC)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "def->type = %d: must be SADMM_BODY_DYNAMIC, _STATIC or _KINEMATIC", (int)def->type);
     if (def->type == SADMM_BODY_DYNAMIC) {
         TRY(sadmm_check_range("def->mass", def->mass, MASS_MIN, MASS_MAX, error));
         TRY(check_inertia("def->inertia", def->inertia, precision, error));
+        TRY(sadmm_check_range("def->gravity_scale", def->gravity_scale, -GRAVITY_SCALE_MAX, GRAVITY_SCALE_MAX, error));
+        TRY(sadmm_check_range("def->linear_damping", def->linear_damping, 0, DAMPING_MAX, error));
+        TRY(sadmm_check_range("def->angular_damping", def->angular_damping, 0, DAMPING_MAX, error));
     }
     TRY(sadmm_check_vector("def->position", def->position, 3, POSITION_LIMIT, error));
     TRY(sadmm_check_orientation("def->orientation", def->orientation, orientation, error));
     TRY(check_motion("def->linear_velocity", "def->angular_velocity", def->linear_velocity, def->angular_velocity,
                      def->type, VELOCITY_LIMIT, error));
-    int32_t lowest = def->type == SADMM_BODY_STATIC ? -1 : 0;
+    int32_t lowest = def->type == SADMM_BODY_DYNAMIC ? 0 : -1;
     if (def->environment < lowest)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->environment = %d: must be >= %d", def->environment,
                           lowest);
@@ -147,6 +150,10 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def,
     if (!sadmm_grow(&world->bodies, &world->body_capacity, world->body_slots, slot + 1, sizeof *world->bodies))
         return sadmm_fail_memory(error, "a body");
     TRY(copy_name(def->name, &name, error));
+    if (def->type == SADMM_BODY_KINEMATIC && !sadmm_world_add_driven(world, (int32_t)slot)) {
+        sadmm_free(name);
+        return sadmm_fail_memory(error, "a body");
+    }
 
     struct sadmm_world_body *body = &world->bodies[slot];
     uint32_t generation = slot < world->body_slots ? body->generation : 1;
@@ -162,10 +169,13 @@ sadmm_status sadmm_world_add_body(sadmm_world *world, const sadmm_body_def *def,
     if (def->type == SADMM_BODY_DYNAMIC) {
         rigid->mass = def->mass;
         memcpy(rigid->inertia, def->inertia, sizeof rigid->inertia);
-        memcpy(rigid->velocity, def->linear_velocity, sizeof def->linear_velocity);
-        memcpy(rigid->velocity + 3, def->angular_velocity, sizeof def->angular_velocity);
+        rigid->gravity_scale = def->gravity_scale;
+        rigid->damping[0] = def->linear_damping;
+        rigid->damping[1] = def->angular_damping;
         ++world->dynamic_count;
     }
+    memcpy(rigid->velocity, def->linear_velocity, sizeof def->linear_velocity);
+    memcpy(rigid->velocity + 3, def->angular_velocity, sizeof def->angular_velocity);
     body->name = name;
     if (slot == world->body_slots) ++world->body_slots;
     sadmm_slot_taken(&world->body_marks, slot);
@@ -192,6 +202,7 @@ sadmm_status sadmm_world_remove_body(sadmm_world *world, sadmm_body_id id)
     --world->body_count;
     sadmm_slot_freed(&world->body_marks, id.slot - 1);
     if (body->type == SADMM_BODY_DYNAMIC) --world->dynamic_count;
+    if (body->type == SADMM_BODY_KINEMATIC) sadmm_world_remove_driven(world, (int32_t)id.slot - 1);
     world->contacts_readable = false;
     return SADMM_OK;
 }
@@ -261,7 +272,30 @@ sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, co
     memcpy(body->rigid.orientation, orientation, sizeof orientation);
     memcpy(body->rigid.velocity, state->linear_velocity, sizeof state->linear_velocity);
     memcpy(body->rigid.velocity + 3, state->angular_velocity, sizeof state->angular_velocity);
+    body->target.set = false;
     sadmm_world_edit(world, body, SADMM_EDIT_STATE);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_move_body(sadmm_world *world, sadmm_body_id id, const double position[3],
+                                   const double orientation[4])
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
+    double unit[4];
+    if (!body) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(position, "position", error));
+    TRY(sadmm_check_given(orientation, "orientation", error));
+    if (body->type != SADMM_BODY_KINEMATIC)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "id = (slot %u, generation %u): must be kinematic",
+                          id.slot, id.generation);
+    TRY(sadmm_check_vector("position", position, 3, POSITION_LIMIT, error));
+    TRY(sadmm_check_orientation("orientation", orientation, unit, error));
+    keep_if_unit(orientation, unit);
+    memcpy(body->target.position, position, sizeof body->target.position);
+    memcpy(body->target.orientation, unit, sizeof unit);
+    body->target.set = true;
     return SADMM_OK;
 }
 
@@ -281,6 +315,9 @@ sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id, sadmm_bo
     memcpy(def->orientation, body->rigid.orientation, sizeof def->orientation);
     memcpy(def->linear_velocity, body->rigid.velocity, sizeof def->linear_velocity);
     memcpy(def->angular_velocity, body->rigid.velocity + 3, sizeof def->angular_velocity);
+    def->gravity_scale = body->rigid.gravity_scale;
+    def->linear_damping = body->rigid.damping[0];
+    def->angular_damping = body->rigid.damping[1];
     def->environment = body->environment;
     def->name = sadmm_world_body_name(body);
     return SADMM_OK;
@@ -291,7 +328,8 @@ static sadmm_status check_dynamic(const struct sadmm_world_body *body, sadmm_bod
 {
     if (body->type == SADMM_BODY_DYNAMIC) return SADMM_OK;
     return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                      "id = (slot %u, generation %u): is static, and must be dynamic: %s", id.slot, id.generation, why);
+                      "id = (slot %u, generation %u): is %s, and must be dynamic: %s", id.slot, id.generation,
+                      body->type == SADMM_BODY_STATIC ? "static" : "kinematic", why);
 }
 
 sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, const double force[3],
@@ -309,7 +347,37 @@ sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, c
     if (body->system_body < 0) TRY(sadmm_world_take_back(world));
     memcpy(body->rigid.wrench, force, 3 * sizeof *force);
     memcpy(body->rigid.wrench + 3, torque, 3 * sizeof *torque);
-    sadmm_world_edit(world, body, SADMM_EDIT_WRENCH);
+    sadmm_world_edit(world, body, SADMM_EDIT_FORCES);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_set_body_gravity_scale(sadmm_world *world, sadmm_body_id id, double scale)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
+    if (!body) return SADMM_ERROR_STALE_ID;
+    TRY(check_dynamic(body, id, "gravity does not move it", error));
+    TRY(sadmm_check_range("scale", scale, -GRAVITY_SCALE_MAX, GRAVITY_SCALE_MAX, error));
+    if (body->system_body < 0) TRY(sadmm_world_take_back(world));
+    body->rigid.gravity_scale = scale;
+    sadmm_world_edit(world, body, SADMM_EDIT_FORCES);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_set_body_damping(sadmm_world *world, sadmm_body_id id, double linear, double angular)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
+    if (!body) return SADMM_ERROR_STALE_ID;
+    TRY(check_dynamic(body, id, "it has no motion to damp", error));
+    TRY(sadmm_check_range("linear", linear, 0, DAMPING_MAX, error));
+    TRY(sadmm_check_range("angular", angular, 0, DAMPING_MAX, error));
+    if (body->system_body < 0) TRY(sadmm_world_take_back(world));
+    body->rigid.damping[0] = linear;
+    body->rigid.damping[1] = angular;
+    sadmm_world_edit(world, body, SADMM_EDIT_FORCES);
     return SADMM_OK;
 }
 
@@ -406,7 +474,7 @@ sadmm_status sadmm_world_body_contact_wrench(sadmm_world *world, sadmm_body_id i
         return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE,
                           "contact wrenches: there was no step yet, or settings.recover_wrenches was false");
     if (body->type == SADMM_BODY_STATIC)
-        return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE, "contact wrenches are kept for dynamic bodies only");
+        return sadmm_fail(error, SADMM_ERROR_UNAVAILABLE, "contact wrenches are kept for dynamic and kinematic bodies");
     memcpy(wrench, body->contact_wrench, sizeof body->contact_wrench);
     return SADMM_OK;
 }

@@ -110,7 +110,10 @@ static sadmm_status freeze(const sadmm_world *world, sadmm_problem *problem, con
 {
     size_t n = (size_t)world->plan.bodies;
     const sadmm_settings settings = sadmm_settings_of_substep(&world->step_settings);
-    struct sadmm_system system = {.body_count = world->plan.bodies, .rigid = world->start.rigid};
+    struct sadmm_system system = {.body_count = world->plan.bodies,
+                                  .rigid = world->start.rigid,
+                                  .driven = world->start.driven,
+                                  .driven_count = world->start.driven_count};
     for (size_t i = 0; i < n; ++i) {
         sadmm_system_body(&system, &settings, (int32_t)i, f->A + 36 * i, f->b + 6 * i);
         memcpy(f->v + 6 * i, world->start.velocity + 6 * i, 6 * sizeof *f->v);
@@ -120,8 +123,9 @@ static sadmm_status freeze(const sadmm_world *world, sadmm_problem *problem, con
         for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
             const struct sadmm_contact_point *point = &world->contacts.points[k];
             sadmm_problem_contact *contact = &f->contacts[k];
-            contact->body_a = pair->body_a;
-            contact->body_b = pair->body_b;
+            contact->body_a = pair->body_a >= 0 ? pair->body_a : -1;
+            contact->body_b = pair->body_b >= 0 ? pair->body_b : -1;
+            v3_store(sadmm_driven_part(&system, pair, point), contact->velocity);
             memcpy(contact->normal, pair->normal, sizeof contact->normal);
             memcpy(contact->arm_a, point->arm_a, sizeof contact->arm_a);
             memcpy(contact->arm_b, point->arm_b, sizeof contact->arm_b);

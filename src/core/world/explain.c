@@ -34,6 +34,11 @@ static void explain_constraints(struct text *t, const struct sadmm_plan *plan, i
     else line(t, "rows         left out: there are none\n");
 }
 
+static void explain_driven(struct text *t, int32_t count)
+{
+    if (count > 0) line(t, "driven       %d kinematic bodies; steps are made by the host\n", count);
+}
+
 static void explain_options(struct text *t, const struct sadmm_plan *plan, const sadmm_settings *s)
 {
     line(t, plan->gyroscopic ? "gyroscopic   implicit midpoint, for bodies of unequal principal moments\n"
@@ -83,6 +88,7 @@ size_t sadmm_world_explain(sadmm_world *world, char *out, size_t size)
         line(&t, "sub-steps    %d of %g s with up to %d iterations each; what follows is the last one's\n",
              settings.substeps, settings.dt, settings.iterations);
     explain_constraints(&t, plan, world->report.joints, world->report.couplings);
+    explain_driven(&t, world->driven_count);
     explain_options(&t, plan, &settings);
     line(&t, "iterations   %d of at most %d%s\n", world->report.iterations, settings.iterations * settings.substeps,
          world->report.iterations == settings.substeps && !plan->points ? ": without constraints Step 1 is exact" : "");

@@ -4,11 +4,11 @@
 #include "collision/bounds.h"
 #include "core/base/barrier.h"
 #include "core/base/memory.h"
-#include "core/math/rigid.h"
+#include "core/model/forces.h"
 #include "core/model/steady.h"
 #include "world_internal.h"
 
-static bool moves(const struct sadmm_world_body *body) { return body->alive && body->type != SADMM_BODY_STATIC; }
+static bool moves(const struct sadmm_world_body *body) { return body->alive && body->type == SADMM_BODY_DYNAMIC; }
 
 static int32_t count_moving(const sadmm_world *world, size_t begin, size_t end)
 {
@@ -18,16 +18,16 @@ static int32_t count_moving(const sadmm_world *world, size_t begin, size_t end)
 }
 
 /* A body as collision sees it. */
-static void place(struct sadmm_collision_body *out, const struct sadmm_rigid *rigid, bool dynamic)
+static void place(struct sadmm_collision_body *out, const struct sadmm_rigid *rigid, bool dynamic,
+                  const sadmm_settings *settings)
 {
     memcpy(out->position, rigid->position, sizeof out->position);
     memcpy(out->orientation, rigid->orientation, sizeof out->orientation);
     memcpy(out->velocity, rigid->velocity, sizeof out->velocity);
     out->acceleration[0] = out->acceleration[1] = out->inertia = 0;
     if (!dynamic) return;
-    out->acceleration[0] = rigid_acceleration(rigid->mass, v3_load(rigid->wrench));
-    out->acceleration[1] = rigid_angular_acceleration(q_load(rigid->orientation), v3_load(rigid->inertia),
-                                                      v3_load(rigid->wrench + 3));
+    out->acceleration[0] = forces_acceleration(rigid, settings->gravity, settings->dt);
+    out->acceleration[1] = forces_angular_acceleration(rigid, settings->dt);
     out->inertia = v3_max_abs(v3_load(rigid->inertia));
 }
 
@@ -51,7 +51,7 @@ static void gather_slots(sadmm_world *world, size_t begin, size_t end, int32_t d
         out->placed = body->steady.placed;
         out->environment = body->environment;
         out->system_body = body->system_body = -1;
-        place(out, &body->rigid, moves(body));
+        place(out, &body->rigid, moves(body), &settings);
         if (!moves(body)) continue;
         out->system_body = body->system_body = dynamic;
         start_body(world, dynamic, &body->rigid, &body->steady, settings.dt);
@@ -104,6 +104,7 @@ sadmm_status sadmm_world_gather(sadmm_world *world)
     g.world = world;
     g.barrier = (struct sadmm_barrier){0};
     sadmm_parallel(&world->team, sadmm_pass_threads(last_threads(world), slots), gather_share, &g);
+    TRY(sadmm_world_gather_driven(world));
     sadmm_world_begin_couplings(world);
     return sadmm_world_begin_joints(world);
 }
@@ -117,14 +118,15 @@ static void turn_share(void *argument, int thread, int threads)
 {
     const struct turning *turning = (const struct turning *)argument;
     sadmm_world *world = turning->world;
-    const double dt = sadmm_settings_of_substep(&world->def.settings).dt;
+    const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings);
+    const double dt = settings.dt;
     size_t begin, end;
     sadmm_share((size_t)world->dynamic_count, thread, threads, &begin, &end);
     for (size_t i = begin; i < end; ++i) {
         const struct sadmm_rigid *next = &world->next[i];
         steady_keep(&world->steady[i], &world->start.rigid[i], next, dt);
         start_body(world, (int32_t)i, next, &world->steady[i], dt);
-        place(&world->collision_bodies[world->slot_of[i]], next, true);
+        place(&world->collision_bodies[world->slot_of[i]], next, true, &settings);
     }
     if (!world->plan.wrenches) return;
     for (size_t k = 6 * begin; k < 6 * end; ++k)
@@ -136,6 +138,7 @@ void sadmm_world_turn(sadmm_world *world, int substep)
     struct turning turning = {world, substep};
     sadmm_parallel(&world->team, sadmm_pass_threads(world->plan.threads, (size_t)world->dynamic_count), turn_share,
                    &turning);
+    sadmm_world_turn_driven(world);
 }
 
 void sadmm_world_swap_starts(sadmm_world *world)
@@ -179,6 +182,8 @@ struct sadmm_system sadmm_world_system(sadmm_world *world)
         .velocity = world->velocity,
         .contacts = &world->contacts,
         .first = !world->stepped,
+        .driven = world->start.driven,
+        .driven_count = world->start.driven_count,
         .rows = world->start.rows.constraint_count > 0 ? &world->start.rows : NULL,
     };
     return system;
@@ -186,8 +191,5 @@ struct sadmm_system sadmm_world_system(sadmm_world *world)
 
 sadmm_status sadmm_world_not_finite(sadmm_world *world, int32_t body)
 {
-    int32_t slot = world->slot_of[body];
-    return sadmm_fail(&world->error, SADMM_ERROR_NON_FINITE,
-                      "the step made body (slot %d, generation %u, \"%s\") not finite; the world is as before it",
-                      slot + 1, world->bodies[slot].generation, sadmm_world_body_name(&world->bodies[slot]));
+    return sadmm_world_slot_not_finite(world, world->slot_of[body]);
 }

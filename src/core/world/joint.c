@@ -117,7 +117,7 @@ static sadmm_status find_side(const sadmm_world *world, sadmm_body_id id, const 
 
 static bool moves(const sadmm_world *world, int32_t slot)
 {
-    return slot >= 0 && world->bodies[slot].type != SADMM_BODY_STATIC;
+    return slot >= 0 && world->bodies[slot].type == SADMM_BODY_DYNAMIC;
 }
 
 static sadmm_status find_sides(const sadmm_world *world, const sadmm_joint_def *def, int32_t slots[2],

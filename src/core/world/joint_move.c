@@ -45,7 +45,8 @@ static void find_islands(const sadmm_world *world, const struct sadmm_system *sy
         uint8_t *island = island_of(world, pair->body_a, pair->body_b);
         if (!(*island & ISLAND_JOINED) || *island & ISLAND_LEADS_STAY) continue;
         const struct joint_lead bodies[2] = {lead_of(world, pair->body_a), lead_of(world, pair->body_b)};
-        if (joint_contact_holds(pair->normal, &contacts->points[pair->first], pair->count, bodies, settings))
+        if (sadmm_pair_is_driven(system, pair) ||
+            joint_contact_holds(pair->normal, &contacts->points[pair->first], pair->count, bodies, settings))
             *island |= ISLAND_LEADS_STAY;
     }
 }

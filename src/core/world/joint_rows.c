@@ -7,11 +7,13 @@
 
 static struct joint_body body_of(const sadmm_world *world, int32_t slot)
 {
-    struct joint_body out = {-1, NULL, false};
+    struct joint_body out = {-1, NULL, false, false};
     if (slot < 0) return out;
     const struct sadmm_world_body *body = &world->bodies[slot];
     out.rigid = &body->rigid;
     if (body->type == SADMM_BODY_STATIC) return out;
+    if (body->type == SADMM_BODY_KINEMATIC)
+        return (struct joint_body){-1, &world->driven[sadmm_driven(body->system_body)].rigid, true, false};
     out.system_body = body->system_body;
     out.rigid = &world->start.rigid[out.system_body];
     return out;
@@ -22,7 +24,7 @@ struct acting_joint sadmm_world_act_joint(const sadmm_world *world, const struct
 {
     struct joint_body bodies[2] = {body_of(world, joint->body[0]), body_of(world, joint->body[1])};
     if (joint->coupling)
-        bodies[0] = (struct joint_body){-1, &world->couplings[joint->coupling - 1].next.target, true};
+        bodies[0] = (struct joint_body){-1, &world->couplings[joint->coupling - 1].next.target, true, true};
     return joint_act(&joint->def, joint->frame, bodies, settings);
 }
 
@@ -82,7 +84,7 @@ static bool add_constraints(sadmm_world *world, int32_t slot, const struct actin
         rows->lambda[r] = world->start.multiplier[r] =
             law->sign * joint->next.force[law->role][law->coordinate] * dt;
         world->joint_sources[r] = (struct sadmm_joint_source){slot, (int8_t)law->role, (int8_t)law->coordinate,
-                                                              (int8_t)law->sign, law->gap, law->slack};
+                                                              (int8_t)law->sign, law->gap, law->slack, law->steered};
     }
     return true;
 }

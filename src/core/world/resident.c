@@ -13,6 +13,7 @@
 
 #include "core/base/clock.h"
 #include "core/base/memory.h"
+#include "core/model/forces.h"
 #include "core/model/steady.h"
 #include "core/solve/certificate.h"
 #include "world_internal.h"
@@ -23,12 +24,13 @@ enum { MOST_CHECKS = 64 };
 
 bool sadmm_world_may_reside(const sadmm_world *world)
 {
-    /* Gears and tables of springs are the host's. Of the stop rules a backend checks the certificate's in the method
-     * FAST alone; and the loads of a first step are predicted on the host. */
+    /* Gears, tables of springs and kinematic bodies are the host's. Of the stop rules a backend checks the certificate's
+     * in the method FAST alone; and the loads of a first step are predicted on the host. */
     const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings), *s = &settings;
     const bool fast = s->method == SADMM_METHOD_FAST,
                few_checks = (s->iterations - 1) / s->check_period < MOST_CHECKS / s->substeps;
-    if ((fast && !world->stepped) || world->gear_count > 0 || world->table_count > 0) return false;
+    if ((fast && !world->stepped) || world->gear_count > 0 || world->table_count > 0 || world->driven_count > 0)
+        return false;
     return world->kernels->resident && s->residual_tolerance <= 0 &&
            (s->certificate_tolerance <= 0 || (fast && few_checks));
 }
@@ -84,6 +86,8 @@ static void put_edit(struct sadmm_resident_edit *edit, const struct sadmm_world_
         memcpy(edit->values + 7, rigid->velocity, sizeof rigid->velocity);
     } else {
         memcpy(edit->values, rigid->wrench, sizeof rigid->wrench);
+        edit->values[6] = rigid->gravity_scale;
+        memcpy(edit->values + 7, rigid->damping, sizeof rigid->damping);
     }
 }
 
@@ -212,6 +216,7 @@ static void take_report(sadmm_world *world, const struct sadmm_resident_report *
     world->resident.bodies_behind = world->resident.contacts_behind = true;
     world->resident.joints_behind = world->resident.joint_count > 0;
     world->stepped = world->contacts_readable = true;
+    world->start.driven_count = 0; /* of a step by the host, when there were kinematic bodies */
     world->plan = done->plan;
     world->step_settings = done->settings;
     sadmm_world_report_steps(world, steps, done);
@@ -240,7 +245,7 @@ static sadmm_status settle(sadmm_world *world, sadmm_status status)
                : status;
 }
 
-/* The backend does not change wrenches, nor a state that was set after the last step. */
+/* The backend does not change forces, nor a state that was set after the last step. */
 static sadmm_status pull_bodies(sadmm_world *world)
 {
     TRY(settle(world, SADMM_OK));
@@ -249,7 +254,7 @@ static sadmm_status pull_bodies(sadmm_world *world)
                                               world->plan.wrenches ? world->wrench : NULL, &world->error));
     for (int32_t i = 0; i < world->dynamic_count; ++i) {
         struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
-        memcpy(world->next[i].wrench, body->rigid.wrench, sizeof body->rigid.wrench);
+        forces_copy(&world->next[i], &body->rigid);
         body->steady = world->resident.steady[i];
         if (body->set_at[SADMM_EDIT_STATE] < world->resident.done) body->rigid = world->next[i];
         else steady_place(&body->steady, &world->next[i], body->rigid.position, body->rigid.orientation);

@@ -131,6 +131,7 @@ static void commit(sadmm_world *world)
 {
     const int threads = sadmm_pass_threads(world->plan.threads, (size_t)world->dynamic_count);
     sadmm_parallel(&world->team, threads, commit_share, world);
+    sadmm_world_commit_driven(world);
     sadmm_world_commit_joints(world);
     sadmm_world_commit_couplings(world, world->def.settings.substeps);
     world->stepped = true;
@@ -174,6 +175,7 @@ static sadmm_status make_plan(struct host_step *step)
     TRY(sadmm_world_make_rows(world, &step->settings));
     step->system = sadmm_world_system(world);
     step->system.first = step->system.first && step->stages.substep == 0;
+    TRY(sadmm_world_carry(world, &step->system));
     world->plan = sadmm_plan_make(&step->system, &step->settings);
     step->report = sadmm_solve_report_empty(world->kernels);
     TRY(keep_start(world, &depth));
@@ -202,12 +204,14 @@ static sadmm_status solve_stage(struct host_step *step, const struct sadmm_stage
 static sadmm_status integrate(struct host_step *step)
 {
     sadmm_world *world = step->world;
+    sadmm_world_put_down(world, &step->system);
     TRY(world->kernels->integrate(world->context, world->next, &world->error));
     if (step->system.rows) {
         TRY(solve_joined(step, true));
         TRY(sadmm_world_move_joined(world, &step->settings));
         sadmm_world_keep_rows(world, &step->settings);
     }
+    TRY(sadmm_world_move_driven(world, &step->settings));
     sadmm_world_move_targets(world, step->settings.dt);
     add_substep(step);
     return check_next(world);
@@ -221,9 +225,12 @@ static sadmm_status run_stage(struct host_step *step, const struct sadmm_stage *
     case SADMM_STAGE_FIND: return find_contacts(world, step->stages.substep);
     case SADMM_STAGE_PLAN: return make_plan(step);
     case SADMM_STAGE_INTEGRATE: return integrate(step);
-    case SADMM_STAGE_WRENCHES: return world->kernels->recover_wrenches(world->context, world->wrench, &world->error);
+    case SADMM_STAGE_WRENCHES:
+        sadmm_world_add_driven_wrenches(world, &step->settings);
+        return world->kernels->recover_wrenches(world->context, world->wrench, &world->error);
     case SADMM_STAGE_TURN: sadmm_world_turn(world, step->stages.substep - 1); return SADMM_OK;
     case SADMM_STAGE_CERTIFY:
+        step->system.carried = NULL;
         return sadmm_certify_with(&world->certificate_workspace, &step->system, &step->settings,
                                   &step->report.certificate, &world->error);
     case SADMM_STAGE_COMMIT: commit(world); return SADMM_OK;

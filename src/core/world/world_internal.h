@@ -1,6 +1,7 @@
 /* A world's insides, shared by the files of this folder. Each calls those before it alone:
  *
  *   slots, pair_table, ids, report   lists and names
+ *   driven                           kinematic bodies in a step
  *   gather                           what a step reads
  *   coupling_step                    what couplings keep from step to step
  *   gear_rows, joint_rows, joint_move   gears and joints as constraint rows, and where they let bodies go
@@ -37,16 +38,27 @@ struct sadmm_world_body {
     uint32_t generation; /* of the next id when dead, of the current one when alive */
     sadmm_body_type type;
     int32_t environment;
-    int32_t system_body; /* in the last step, -1: static or not there */
+    int32_t system_body; /* in the last step, -1: static or not there, below: driven (core/base/contact_set.h) */
     struct sadmm_rigid rigid;
     int32_t shape_count;
     size_t first_shape;  /* none of its shapes is in a lower slot */
     double contact_wrench[6];
     struct sadmm_steady steady;
+    struct {
+        bool set; /* a kinematic body is to be there after the next step */
+        double position[3], orientation[4];
+    } target;
     void *user_data;     /* the caller's */
     char *name;          /* a block of its own, so that it stays where it is when slots are added; NULL: none */
     uint32_t edits;                   /* bit of enum sadmm_edit_kind: no step has taken that along yet */
     int64_t set_at[SADMM_BODY_EDITS]; /* steps enqueued since the world was loaded, when that was set; -1: before */
+};
+
+/* A kinematic body in a step. */
+struct sadmm_world_driven {
+    int32_t slot;
+    struct sadmm_rigid rigid, next; /* as the (sub-)step begins and ends */
+    double wrench[6];               /* of contacts, of the sub-steps made so far */
 };
 
 /* What may be set of a joint without loading the world again: its coordinates, 0 to 5, and (TARGET: of a coupling) */
@@ -95,7 +107,9 @@ struct sadmm_step_start {
     double *impulse;           /* points x 3: the warm start */
     struct sadmm_rows rows;    /* of joints; their multipliers are the solution */
     double *multiplier;        /* rows: the warm start */
-    size_t rigid_capacity, velocity_capacity, impulse_capacity, multiplier_capacity;
+    double *driven;            /* kinematic bodies x 6: velocities, m/s, rad/s */
+    int32_t driven_count;
+    size_t driven_capacity, rigid_capacity, velocity_capacity, impulse_capacity, multiplier_capacity;
 };
 
 struct sadmm_world {
@@ -105,7 +119,8 @@ struct sadmm_world {
 
     struct sadmm_world_body *bodies;
     size_t body_slots, body_capacity;
-    int32_t body_count, dynamic_count;
+    int32_t body_count, dynamic_count, driven_count; /* driven: kinematic */
+    int32_t *driven_slots;                           /* of these, ascending */
     struct sadmm_slot_marks body_marks;
     struct sadmm_shape *shapes;
     uint32_t *shape_generations;
@@ -150,10 +165,14 @@ struct sadmm_world {
     struct sadmm_rigid *next;                      /* dynamic bodies after the step */
     double *velocity, *wrench;                     /* dynamic bodies x 6 */
     struct sadmm_steady *steady;                   /* dynamic bodies, after the sub-steps made so far */
+    struct sadmm_world_driven *driven;             /* in slot order */
+    double *carried;                               /* dynamic bodies x 6: the motion of what they ride on */
+    int32_t *carriers, *carried_labels;            /* islands, and at their labels what they ride on */
     double *wrench_sum;                            /* dynamic bodies x 6, of these; both only where there are several */
     int32_t *slot_of;                              /* dynamic body -> slot */
     size_t collision_body_capacity, next_capacity, velocity_capacity, wrench_capacity, slot_of_capacity,
-        steady_capacity, wrench_sum_capacity;
+        steady_capacity, wrench_sum_capacity, driven_capacity, driven_slot_capacity, carried_capacity, carrier_capacity,
+        carried_label_capacity;
     struct sadmm_plan plan;
     sadmm_settings step_settings;                  /* of the whole step */
     bool stepped;
@@ -191,6 +210,28 @@ struct sadmm_world {
     struct sadmm_joined *joined; /* made with the first joint */
     sadmm_step_report report;
 };
+
+/* ---- driven.c ---- */
+
+/* Kinematic bodies in slot order into `driven` and `start`, and numbers of theirs for collision, which has their poses. */
+sadmm_status sadmm_world_gather_driven(sadmm_world *world);
+/* Kinematic body in slot `slot`: it is one from here on, or no more. */
+bool sadmm_world_add_driven(sadmm_world *world, int32_t slot);
+void sadmm_world_remove_driven(sadmm_world *world, int32_t slot);
+/* Islands that ride on a kinematic body are solved as what they are in its motion: system->carried, and system->velocity
+ * less that; and back. */
+sadmm_status sadmm_world_carry(sadmm_world *world, struct sadmm_system *system);
+void sadmm_world_put_down(sadmm_world *world, const struct sadmm_system *system);
+/* Where they are after the (sub-)step. NON_FINITE. */
+sadmm_status sadmm_world_move_driven(sadmm_world *world, const sadmm_settings *settings);
+/* The next sub-step begins there. */
+void sadmm_world_turn_driven(sadmm_world *world);
+/* What the (sub-)step's contacts give them. */
+void sadmm_world_add_driven_wrenches(sadmm_world *world, const sadmm_settings *settings);
+/* The step is done. */
+void sadmm_world_commit_driven(sadmm_world *world);
+/* SADMM_ERROR_NON_FINITE that names the body of a slot. */
+sadmm_status sadmm_world_slot_not_finite(sadmm_world *world, int32_t slot);
 
 /* ---- gather.c ---- */
 

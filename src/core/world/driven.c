@@ -1,0 +1,238 @@
+/* Kinematic bodies in a step: driven ones (core/base/contact_set.h). Each goes by its velocity, which is the caller's,
+ * and feels nothing. Those that are moved to a pose go there by the velocity that brings them there.
+ *
+ * An island whose only support is one of them rides on it. With c the rigid motion of that body, taken at the island's
+ * bodies, v = c + v' is a change of variables: A v' = (b - A c) + J^T lambda, contacts between the bodies see no more of
+ * v than of v', and those with the support see it all but at rest. So such an island is solved for v', and all that the
+ * method `fast` makes of velocities and energies (loads of first steps, weights, the limit) is what it is on the ground:
+ * a stack in a lift stands as well as one beside it. Others, a row that a wall pushes over the floor, are solved for v.
+ */
+#include <math.h>
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "core/math/joint.h"
+#include "core/math/rigid.h"
+#include "core/model/islands.h"
+#include "world_internal.h"
+
+bool sadmm_world_add_driven(sadmm_world *world, int32_t slot)
+{
+    int32_t at = world->driven_count;
+    if (!sadmm_grow(&world->driven_slots, &world->driven_slot_capacity, (size_t)at, (size_t)at + 1,
+                    sizeof *world->driven_slots))
+        return false;
+    for (; at > 0 && world->driven_slots[at - 1] > slot; --at) world->driven_slots[at] = world->driven_slots[at - 1];
+    world->driven_slots[at] = slot;
+    ++world->driven_count;
+    return true;
+}
+
+void sadmm_world_remove_driven(sadmm_world *world, int32_t slot)
+{
+    int32_t at = 0;
+    while (world->driven_slots[at] != slot) ++at;
+    --world->driven_count;
+    for (; at < world->driven_count; ++at) world->driven_slots[at] = world->driven_slots[at + 1];
+}
+
+/* The velocity that brings the body where it is to be in dt. */
+static void velocity_to(const struct sadmm_world_body *body, double dt, double velocity[6])
+{
+    const struct sadmm_rigid *rigid = &body->rigid;
+    const quat turn = q_mul(q_load(body->target.orientation), q_conjugate(q_load(rigid->orientation)));
+    for (int k = 0; k < 3; ++k) velocity[k] = (body->target.position[k] - rigid->position[k]) / dt;
+    v3_store(v3_scale(q_log(turn), 1 / dt), velocity + 3);
+}
+
+sadmm_status sadmm_world_slot_not_finite(sadmm_world *world, int32_t slot)
+{
+    return sadmm_fail(&world->error, SADMM_ERROR_NON_FINITE,
+                      "the step made body (slot %d, generation %u, \"%s\") not finite; the world is as before it",
+                      slot + 1, world->bodies[slot].generation, sadmm_world_body_name(&world->bodies[slot]));
+}
+
+sadmm_status sadmm_world_gather_driven(sadmm_world *world)
+{
+    struct sadmm_step_start *start = &world->start;
+    const size_t n = (size_t)world->driven_count;
+    start->driven_count = 0;
+    if (n == 0) return SADMM_OK;
+    if (!sadmm_grow_empty(&start->driven, &start->driven_capacity, 6 * n, sizeof *start->driven) ||
+        !sadmm_grow_empty(&world->driven, &world->driven_capacity, n, sizeof *world->driven))
+        return sadmm_fail_memory(&world->error, "kinematic bodies");
+    for (size_t k = 0; k < n; ++k) {
+        const int32_t slot = world->driven_slots[k];
+        struct sadmm_world_body *body = &world->bodies[slot];
+        struct sadmm_world_driven *driven = &world->driven[k];
+        double *velocity = start->driven + 6 * k;
+        body->system_body = world->collision_bodies[slot].system_body = sadmm_driven((int32_t)k);
+        driven->slot = slot;
+        driven->rigid = driven->next = body->rigid;
+        memset(driven->wrench, 0, sizeof driven->wrench);
+        if (body->target.set) velocity_to(body, world->def.settings.dt, driven->rigid.velocity);
+        memcpy(velocity, driven->rigid.velocity, sizeof driven->rigid.velocity);
+        memcpy(world->collision_bodies[slot].velocity, velocity, sizeof driven->rigid.velocity);
+    }
+    start->driven_count = (int32_t)n;
+    return SADMM_OK;
+}
+
+/* ---- what rides on them ------------------------------------------------------------------------------------------ */
+
+/* Of an island, in place of a driven body: nothing yet; the floor, or several that do not move as one. */
+enum { UNSUPPORTED = 0, SEVERAL = 1 };
+
+/* Do two supports (-1: the static world) move as one? */
+static bool same_motion(const struct sadmm_system *system, int32_t a, int32_t b)
+{
+    if (a == b) return true;
+    if (a >= 0 || b >= 0 || a == -1 || b == -1) return false;
+    const double *va = sadmm_driven_velocity(system, a), *vb = sadmm_driven_velocity(system, b);
+    for (int k = 0; k < 3; ++k)
+        if (va[k] != vb[k] || va[k + 3] != 0 || vb[k + 3] != 0) return false;
+    return true;
+}
+
+static void support(const struct sadmm_world *world, const struct sadmm_system *system, int32_t body, int32_t by)
+{
+    int32_t *carrier = &world->carriers[world->carried_labels[body]];
+    if (*carrier == UNSUPPORTED) *carrier = by;
+    else if (!same_motion(system, *carrier, by)) *carrier = SEVERAL;
+}
+
+/* What every island rides on, at its label. False: none rides on anything. */
+static bool find_carriers(sadmm_world *world, const struct sadmm_system *system)
+{
+    const struct sadmm_rows *rows = system->rows;
+    bool any = false;
+    sadmm_islands(system, world->carried_labels);
+    for (int32_t i = 0; i < system->body_count; ++i) world->carriers[i] = UNSUPPORTED;
+    for (size_t p = 0; p < system->contacts->pair_count; ++p) {
+        const struct sadmm_contact_pair *pair = &system->contacts->pairs[p];
+        if (pair->body_a < 0) support(world, system, pair->body_b, pair->body_a);
+        if (pair->body_b < 0) support(world, system, pair->body_a, pair->body_b);
+    }
+    for (size_t k = 0; k < sadmm_row_constraint_count(system); ++k) {
+        const struct sadmm_row_constraint *constraint = &rows->constraints[k];
+        world->carriers[world->carried_labels[constraint->body_a >= 0 ? constraint->body_a : constraint->body_b]] =
+            SEVERAL;
+    }
+    for (int32_t i = 0; i < system->body_count; ++i) any = any || sadmm_body_is_driven(world->carriers[i]);
+    return any;
+}
+
+/* Of a driven body, at a place (m, world). */
+static void motion_at(const sadmm_world *world, int32_t body, const double place[3], double motion[6])
+{
+    const struct sadmm_rigid *rigid = &world->driven[sadmm_driven(body)].rigid;
+    const vec3 arm = v3_sub(v3_load(place), v3_load(rigid->position)), spin = v3_load(rigid->velocity + 3);
+    v3_store(v3_add(v3_load(rigid->velocity), v3_cross(spin, arm)), motion);
+    v3_store(spin, motion + 3);
+}
+
+static bool any_driven(const struct sadmm_system *system)
+{
+    for (size_t p = 0; system->driven_count > 0 && p < system->contacts->pair_count; ++p)
+        if (sadmm_pair_is_driven(system, &system->contacts->pairs[p])) return true;
+    return false;
+}
+
+sadmm_status sadmm_world_carry(sadmm_world *world, struct sadmm_system *system)
+{
+    const size_t n = (size_t)system->body_count;
+    system->carried = NULL;
+    if (!any_driven(system)) return SADMM_OK;
+    if (!sadmm_grow_empty(&world->carried, &world->carried_capacity, 6 * n, sizeof *world->carried) ||
+        !sadmm_grow_empty(&world->carriers, &world->carrier_capacity, n, sizeof *world->carriers) ||
+        !sadmm_grow_empty(&world->carried_labels, &world->carried_label_capacity, n, sizeof *world->carried_labels))
+        return sadmm_fail_memory(&world->error, "what rides on kinematic bodies");
+    if (!find_carriers(world, system)) return SADMM_OK;
+    for (size_t i = 0; i < n; ++i) {
+        const int32_t by = world->carriers[world->carried_labels[i]];
+        double *motion = world->carried + 6 * i;
+        memset(motion, 0, 6 * sizeof *motion);
+        if (sadmm_body_is_driven(by)) motion_at(world, by, system->rigid[i].position, motion);
+        for (int k = 0; k < 6; ++k) system->velocity[6 * i + (size_t)k] -= motion[k];
+    }
+    system->carried = world->carried;
+    return SADMM_OK;
+}
+
+void sadmm_world_put_down(sadmm_world *world, const struct sadmm_system *system)
+{
+    for (size_t k = 0; system->carried && k < 6 * (size_t)system->body_count; ++k)
+        world->velocity[k] += system->carried[k];
+}
+
+/* ---- from step to step ------------------------------------------------------------------------------------------- */
+
+sadmm_status sadmm_world_move_driven(sadmm_world *world, const sadmm_settings *settings)
+{
+    for (int32_t k = 0; k < world->start.driven_count; ++k) {
+        struct sadmm_world_driven *driven = &world->driven[k];
+        const struct sadmm_rigid *from = &driven->rigid;
+        double sum = 0;
+        driven->next = *from;
+        v3_store(rigid_move(v3_load(from->position), v3_load(from->velocity), settings->dt), driven->next.position);
+        q_store(rigid_turn(q_load(from->orientation), v3_load(from->velocity + 3), settings->dt),
+                driven->next.orientation);
+        for (int j = 0; j < 3; ++j) sum += driven->next.position[j] - driven->next.position[j];
+        for (int j = 0; j < 4; ++j) sum += driven->next.orientation[j] - driven->next.orientation[j];
+        if (sum != 0) return sadmm_world_slot_not_finite(world, driven->slot);
+    }
+    return SADMM_OK;
+}
+
+void sadmm_world_turn_driven(sadmm_world *world)
+{
+    for (int32_t k = 0; k < world->start.driven_count; ++k) {
+        struct sadmm_world_driven *driven = &world->driven[k];
+        struct sadmm_collision_body *out = &world->collision_bodies[driven->slot];
+        driven->rigid = driven->next;
+        memcpy(out->position, driven->rigid.position, sizeof out->position);
+        memcpy(out->orientation, driven->rigid.orientation, sizeof out->orientation);
+    }
+}
+
+/* Adds what a point's impulse (on b) gives the body at `arm`; sign +1: it is b. */
+static void add_impulse(double wrench[6], const double impulse[3], const double arm[3], double share)
+{
+    double torque[3];
+    v3_store(v3_cross(v3_load(arm), v3_load(impulse)), torque);
+    for (int k = 0; k < 3; ++k) {
+        wrench[k] += share * impulse[k];
+        wrench[k + 3] += share * torque[k];
+    }
+}
+
+void sadmm_world_add_driven_wrenches(sadmm_world *world, const sadmm_settings *settings)
+{
+    if (world->start.driven_count == 0) return;
+    const double share = 1 / (settings->dt * settings->substeps); /* of their mean over the sub-steps */
+    for (size_t p = 0; p < world->contacts.pair_count; ++p) {
+        const struct sadmm_contact_pair *pair = &world->contacts.pairs[p];
+        const bool on_b = sadmm_body_is_driven(pair->body_b);
+        if (!on_b && !sadmm_body_is_driven(pair->body_a)) continue;
+        struct sadmm_world_driven *driven = &world->driven[sadmm_driven(on_b ? pair->body_b : pair->body_a)];
+        for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
+            const struct sadmm_contact_point *point = &world->contacts.points[k];
+            add_impulse(driven->wrench, point->impulse, on_b ? point->arm_b : point->arm_a, on_b ? share : -share);
+        }
+    }
+}
+
+void sadmm_world_commit_driven(sadmm_world *world)
+{
+    for (int32_t k = 0; k < world->start.driven_count; ++k) {
+        const struct sadmm_world_driven *driven = &world->driven[k];
+        struct sadmm_world_body *body = &world->bodies[driven->slot];
+        body->rigid = driven->next;
+        if (world->plan.wrenches) memcpy(body->contact_wrench, driven->wrench, sizeof body->contact_wrench);
+        if (!body->target.set) continue;
+        memcpy(body->rigid.position, body->target.position, sizeof body->rigid.position);
+        memcpy(body->rigid.orientation, body->target.orientation, sizeof body->rigid.orientation);
+        memset(body->rigid.velocity, 0, sizeof body->rigid.velocity);
+        body->target.set = false;
+    }
+}
