@@ -3,6 +3,8 @@
  * they start with, and once after them, from what they end with. */
 #include <string.h>
 
+#include <algorithm>
+
 #include "backend_cuda/device/double.h"
 
 #include "core/base/memory.h"
@@ -21,6 +23,12 @@ struct joined_shared {
     int32_t flag;
 };
 
+/* A part's factor and right side, in bytes; they are in shared memory where that is enough for every part. */
+static __host__ __device__ inline size_t factor_bytes(int32_t places, int32_t blocks)
+{
+    return ((JOINED_BLOCK + JOINED_ROWS) * (size_t)places + JOINED_BLOCK * (size_t)blocks) * sizeof(double);
+}
+
 /* A part, by the block that solves it. */
 struct joined_part {
     struct joined_view d;
@@ -28,7 +36,8 @@ struct joined_part {
     int32_t first_level, end_level, first_place, end_place, first_body, end_body;
 };
 
-static __device__ __forceinline__ joined_part part_of_block(const cuda_view &v)
+/* memory: shared, of so many bytes. */
+static __device__ __forceinline__ joined_part part_of_block(const cuda_view &v, unsigned char *memory, int32_t bytes)
 {
     joined_part p;
     p.d = *v.joints.direct;
@@ -37,6 +46,13 @@ static __device__ __forceinline__ joined_part part_of_block(const cuda_view &v)
     p.first_level = p.d.s.first_level[part], p.end_level = p.d.s.first_level[part + 1];
     p.first_place = p.d.s.first_of_level[p.first_level], p.end_place = p.d.s.first_of_level[p.end_level];
     p.first_body = p.d.s.first_body[part], p.end_body = p.d.s.first_body[part + 1];
+    const int32_t places = p.end_place - p.first_place, first_block = p.d.s.first_below[p.first_place],
+                  blocks = p.d.s.first_below[p.end_place] - first_block;
+    if (factor_bytes(places, blocks) > (size_t)bytes) return p;
+    double *at = (double *)memory; /* numbers of places and blocks stay what they are */
+    p.d.diagonal = at - JOINED_BLOCK * (size_t)p.first_place;
+    p.d.right = at + JOINED_BLOCK * (size_t)places - JOINED_ROWS * (size_t)p.first_place;
+    p.d.below = at + (JOINED_BLOCK + JOINED_ROWS) * (size_t)places - JOINED_BLOCK * (size_t)first_block;
     return p;
 }
 
@@ -139,6 +155,23 @@ static __device__ __forceinline__ void factor_bodies(const cuda_view &v, const j
 
 /* ---- a pass ---------------------------------------------------------------------------------------------------------- */
 
+/* All nodes before anything is taken from them: what waits for memory, side by side. */
+static __device__ __forceinline__ void enter_blocks(const joined_part &p)
+{
+    const int32_t first = p.first_place, end = p.end_place;
+    for (int32_t at = first * JOINED_BLOCK + p.thread; at < end * JOINED_BLOCK; at += JOINED_THREADS) {
+        const int32_t place = at / JOINED_BLOCK, k = at % JOINED_BLOCK / JOINED_ROWS, q = at % JOINED_ROWS;
+        if (q <= k) p.d.diagonal[at] = joined_entry(&p.d, place, place, k, q);
+    }
+    const int32_t first_block = p.d.s.first_below[first], end_block = p.d.s.first_below[end];
+    for (int32_t at = first_block * JOINED_BLOCK + p.thread; at < end_block * JOINED_BLOCK; at += JOINED_THREADS) {
+        const int32_t b = at / JOINED_BLOCK;
+        p.d.below[at] = joined_entry(&p.d, p.d.s.row[b], p.d.s.column[b], at % JOINED_BLOCK / JOINED_ROWS,
+                                     at % JOINED_ROWS);
+    }
+    __syncthreads();
+}
+
 static __device__ __forceinline__ void factor_level(const joined_part &p, int32_t level)
 {
     const int32_t first = p.d.s.first_of_level[level], end = p.d.s.first_of_level[level + 1];
@@ -146,7 +179,7 @@ static __device__ __forceinline__ void factor_level(const joined_part &p, int32_
         double *block = p.d.diagonal + JOINED_BLOCK * (size_t)place;
         for (int at = p.lane; at < JOINED_BLOCK; at += WARP) {
             const int k = at / JOINED_ROWS, q = at % JOINED_ROWS;
-            if (q <= k) block[at] = joined_updated(&p.d, place, place, place, k, q);
+            if (q <= k) block[at] = joined_updated(&p.d, place, block[at], k, q);
         }
         __syncwarp((unsigned)ALL_LANES);
         if (p.lane == 0) joined_cholesky(block);
@@ -154,10 +187,9 @@ static __device__ __forceinline__ void factor_level(const joined_part &p, int32_
     __syncthreads();
     for (int32_t b = p.d.s.first_below[first] + p.warp; b < p.d.s.first_below[end]; b += JOINED_WARPS) {
         double *block = p.d.below + JOINED_BLOCK * (size_t)b;
-        const int32_t row = p.d.s.row[b], column = p.d.s.column[b];
+        const int32_t column = p.d.s.column[b];
         for (int at = p.lane; at < JOINED_BLOCK; at += WARP)
-            block[at] =
-                joined_updated(&p.d, p.d.s.count + b, row, column, at / JOINED_ROWS, at % JOINED_ROWS);
+            block[at] = joined_updated(&p.d, p.d.s.count + b, block[at], at / JOINED_ROWS, at % JOINED_ROWS);
         __syncwarp((unsigned)ALL_LANES);
         if (p.lane < JOINED_ROWS)
             joined_factor_row(block + JOINED_ROWS * p.lane, p.d.diagonal + JOINED_BLOCK * (size_t)column);
@@ -287,7 +319,7 @@ static __global__ void __launch_bounds__(JOINED_THREADS)
     struct joined_shared *shared = (struct joined_shared *)memory;
     const bool after = args.count != 0;
     if (v.model.live->abort_code) return;
-    const joined_part p = part_of_block(v);
+    const joined_part p = part_of_block(v, (unsigned char *)(shared + 1), args.bytes);
     const bool touched = is_touched(v, p, shared), kept = after && args.start && !isnan(*kept_mark(p));
     __syncthreads();
     /* what no contact touches is as it was solved before the iterations */
@@ -307,6 +339,7 @@ static __global__ void __launch_bounds__(JOINED_THREADS)
     __syncthreads();
     bool solved = false;
     for (int pass = 0; pass < JOINED_PASSES && !solved; ++pass) {
+        enter_blocks(p);
         for (int32_t level = p.first_level; level < p.end_level; ++level) factor_level(p, level);
         solve_rows(p);
         solved = !change_rows(p, shared);
@@ -323,7 +356,8 @@ sadmm_status CUDA(launch_joined)(struct sadmm_context *c, bool after, struct sad
     blocks.parts = c->step->joined_parts;
     blocks.cluster = 1;
     blocks.threads = JOINED_THREADS;
-    blocks.shared = sizeof(struct joined_shared);
+    args.bytes = c->step->joined_bytes;
+    blocks.shared = sizeof(struct joined_shared) + (size_t)args.bytes;
     args.count = after;
     args.start = c->settings.warm_start;
     return CUDA(launch_partition)(c, joined_kernel, "joined bodies", &blocks, false, &args, error);
@@ -430,7 +464,20 @@ static sadmm_status load_order(struct sadmm_context *c, const struct sadmm_joine
     const sadmm_status status = CUDA(put)(c, to, direct, (numbers - order->size) * sizeof(int32_t), error);
     sadmm_free(direct);
     s->joined_parts = order->s.parts;
-    return status;
+    s->joined_bytes = 0;
+    for (int32_t k = 0; k < order->s.parts; ++k) {
+        const int32_t first = order->s.first_of_level[order->s.first_level[k]],
+                      end = order->s.first_of_level[order->s.first_level[k + 1]];
+        const size_t bytes = factor_bytes(end - first, order->s.first_below[end] - order->s.first_below[first]);
+        if (bytes + sizeof(struct joined_shared) <= (size_t)c->shared_limit)
+            s->joined_bytes = std::max(s->joined_bytes, (int32_t)bytes);
+    }
+    TRY(status);
+    CUDA_CALL(c,
+              cudaFuncSetAttribute((const void *)joined_kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                                   s->joined_bytes + (int)sizeof(struct joined_shared)),
+              "cudaFuncSetAttribute");
+    return SADMM_OK;
 }
 
 sadmm_status CUDA(load_joined)(struct sadmm_context *c, const struct sadmm_resident_world *world,

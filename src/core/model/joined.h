@@ -374,10 +374,9 @@ SADMM_INLINE double joined_entry(const struct joined_view *v, int32_t row, int32
     return sum;
 }
 
-/* The same with all that is taken from it. */
-SADMM_INLINE double joined_updated(const struct joined_view *v, int32_t node, int32_t row, int32_t column, int k, int q)
+/* The same with all that is taken from it; entry: before. */
+SADMM_INLINE double joined_updated(const struct joined_view *v, int32_t node, double entry, int k, int q)
 {
-    double entry = joined_entry(v, row, column, k, q);
     int32_t at;
     int i;
     for (at = v->s.first_update[node]; at < v->s.first_update[node + 1]; ++at) {

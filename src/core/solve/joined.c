@@ -232,13 +232,14 @@ static void factorize(const struct joined_view *v, const struct part *part)
     for (int32_t p = part->place; p < part->end_place; ++p) {
         double *diagonal = v->diagonal + JOINED_BLOCK * (size_t)p;
         for (int k = 0; k < JOINED_ROWS; ++k)
-            for (int q = 0; q <= k; ++q) diagonal[JOINED_ROWS * k + q] = joined_updated(v, p, p, p, k, q);
+            for (int q = 0; q <= k; ++q) diagonal[JOINED_ROWS * k + q] = joined_updated(v, p, joined_entry(v, p, p, k, q), k, q);
         joined_cholesky(diagonal);
         for (int32_t b = v->s.first_below[p]; b < v->s.first_below[p + 1]; ++b) {
             double *block = v->below + JOINED_BLOCK * (size_t)b;
             for (int k = 0; k < JOINED_ROWS; ++k) {
                 for (int q = 0; q < JOINED_ROWS; ++q)
-                    block[JOINED_ROWS * k + q] = joined_updated(v, v->s.count + b, v->s.row[b], p, k, q);
+                    block[JOINED_ROWS * k + q] =
+                        joined_updated(v, v->s.count + b, joined_entry(v, v->s.row[b], p, k, q), k, q);
                 joined_forward(diagonal, block + JOINED_ROWS * k); /* L_ij = S_ij L_jj^-T */
             }
         }
