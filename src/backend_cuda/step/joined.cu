@@ -485,6 +485,7 @@ sadmm_status CUDA(load_joined)(struct sadmm_context *c, const struct sadmm_resid
 {
     struct sadmm_joined_order order = {};
     c->step->joined_parts = 0;
+    if (world->joint_count == 0) return SADMM_OK;
     if (!make_order(world, c->step->joint_constraints, &order))
         return sadmm_fail_memory(error, "the cuda backend's joined bodies");
     const sadmm_status status = load_order(c, &order, error);

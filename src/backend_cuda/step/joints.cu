@@ -342,7 +342,6 @@ void CUDA(view_joints)(struct sadmm_context *c, int into, int substep)
     joints->after = memory_of(c, step_state(into, substep, substeps));
     joints->couplings_before = couplings_of(c, step_state(into, substep - 1, substeps));
     joints->couplings_after = couplings_of(c, step_state(into, substep, substeps));
-    CUDA(view_joined)(c, into);
     joints->touch = buffer<int32_t>(c, BUFFER_JOINT_TOUCH);
     c->view.rows.count = s->joint_constraints;
     CUDA(bind_raw_rows)(c, row_set(c, into));
@@ -403,8 +402,7 @@ sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resid
     if (s->couplings > 0)
         TRY(CUDA(put)(c, couplings_of(c, 1 - s->into), world->coupling_memory,
                 (size_t)s->couplings * sizeof *world->coupling_memory, error));
-    TRY(put_first(c, world, error));
-    return CUDA(load_joined)(c, world, error);
+    return put_first(c, world, error);
 }
 
 /* In pieces that fit into pinned memory of that size. */

@@ -44,6 +44,7 @@ void CUDA(view_into)(struct sadmm_context *c, int into, int substep)
     c->view.raw.pairs = set.pairs;
     c->view.raw.points = set.points;
     CUDA(view_joints)(c, into, substep);
+    CUDA(view_joined)(c, into);
 }
 
 /* Counts and settings of the view; pairs: their capacity. */
@@ -164,6 +165,7 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
                      world->steady, n * sizeof *world->steady, error));
     TRY(CUDA(wait)(c, error));
     TRY(CUDA(load_joints)(c, world, error));
+    TRY(CUDA(load_joined)(c, world, error));
     CUDA(view_counts)(c, 0);
     TRY(CUDA(reserve_layout)(c, error)); /* live is needed from here on */
     TRY(CUDA(clear_abort)(c, error));
