@@ -5,29 +5,6 @@
 #include "core/base/memory.h"
 #include "world_internal.h"
 
-static struct joint_body body_of(const sadmm_world *world, int32_t slot)
-{
-    struct joint_body out = {-1, NULL, false, false};
-    if (slot < 0) return out;
-    const struct sadmm_world_body *body = &world->bodies[slot];
-    out.rigid = &body->rigid;
-    if (body->type == SADMM_BODY_STATIC) return out;
-    if (body->type == SADMM_BODY_KINEMATIC)
-        return (struct joint_body){-1, &world->driven[sadmm_driven(body->system_body)].rigid, true, false};
-    out.system_body = body->system_body;
-    out.rigid = &world->start.rigid[out.system_body];
-    return out;
-}
-
-struct acting_joint sadmm_world_act_joint(const sadmm_world *world, const struct sadmm_world_joint *joint,
-                                          const sadmm_settings *settings)
-{
-    struct joint_body bodies[2] = {body_of(world, joint->body[0]), body_of(world, joint->body[1])};
-    if (joint->coupling)
-        bodies[0] = (struct joint_body){-1, &world->couplings[joint->coupling - 1].next.target, true, true};
-    return joint_act(&joint->def, joint->frame, bodies, settings);
-}
-
 /* Six locks, or what acts along six free coordinates. */
 struct all_laws {
     struct joint_law law[JOINT_COORDINATES * JOINT_COORDINATE_LAWS];
@@ -111,8 +88,8 @@ static bool add_slots(sadmm_world *world, const struct sadmm_world_joint *joint,
         world->joint_constraints[begin + k] =
             first + k < rows->constraint_count
                 ? rows->constraints[first + k]
-                : (struct sadmm_row_constraint){.body_a = body_of(world, joint->body[0]).system_body,
-                                                .body_b = body_of(world, joint->body[1]).system_body};
+                : (struct sadmm_row_constraint){.body_a = sadmm_world_joint_body(world, joint->body[0]).system_body,
+                                                .body_b = sadmm_world_joint_body(world, joint->body[1]).system_body};
     world->joint_constraint_count += count;
     return true;
 }

@@ -4,6 +4,7 @@
  *   driven                           kinematic bodies in a step
  *   gather                           what a step reads
  *   coupling_step                    what couplings keep from step to step
+ *   joint_act                        a joint in a step
  *   gear_rows, joint_rows, joint_move   gears and joints as constraint rows, and where they let bodies go
  *   resident_joints, resident        where a backend keeps the world
  *   shape, joint, coupling, gear, body, contacts, explain   what callers see of it, and change
@@ -265,11 +266,15 @@ sadmm_status sadmm_world_make_gear_rows(sadmm_world *world, const sadmm_settings
 void sadmm_world_keep_gear_rows(sadmm_world *world, double dt);
 void sadmm_world_commit_gears(sadmm_world *world);
 
-/* ---- joint_rows.c ---- */
+/* ---- joint_act.c ---- */
 
-/* A joint in the (sub-)step at hand. */
+/* The body of a slot, or (-1) the static world, as a joint has it in the (sub-)step at hand. */
+struct joint_body sadmm_world_joint_body(const sadmm_world *world, int32_t slot);
+/* A joint in it. */
 struct acting_joint sadmm_world_act_joint(const sadmm_world *world, const struct sadmm_world_joint *joint,
                                           const sadmm_settings *settings);
+
+/* ---- joint_rows.c ---- */
 
 /* Pairs of bodies that are not to meet, into `filtered_pairs`; and what joints kept of the last step into what they
  * keep of this one. */
