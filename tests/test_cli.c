@@ -537,7 +537,39 @@ static void expect_body(json_t *body, size_t index)
     }
 }
 
-/* Every scene, at a small size, is told completely, and has the bodies that a run of it has. */
+/* What is on bodies and between them, with every number that a definition has. */
+static void expect_joints(json_t *scene)
+{
+    static const char *const gains[] = {"linear_stiffness", "linear_damping", "angular_stiffness", "angular_damping"};
+    const double bodies = (double)json_array_size(at(scene, "bodies"));
+    json_t *joints = at(scene, "joints"), *couplings = at(scene, "couplings"), *gears = at(scene, "gears"), *o;
+    size_t k;
+    ck_assert(json_is_array(joints) && json_is_array(couplings) && json_is_array(gears));
+    json_array_foreach(joints, k, o) {
+        json_t *coordinates = at(o, "coordinates"), *coordinate;
+        size_t i;
+        ck_assert_uint_eq(json_array_size(coordinates), 6);
+        json_array_foreach(coordinates, i, coordinate) {
+            json_t *table = at(coordinate, "spring_table");
+            ck_assert(json_is_null(table) ||
+                      json_array_size(at(table, "positions")) == json_array_size(at(table, "forces")));
+            ck_assert_double_ge(number(coordinate, "spring_stiffness"), 0);
+        }
+    }
+    json_array_foreach(couplings, k, o) {
+        ck_assert(number(o, "body") >= 0 && number(o, "body") < bodies);
+        ck_assert_double_eq_tol(length(at(o, "orientation")), 1, 1e-12);
+        ck_assert_double_eq_tol(length(at(o, "target_orientation")), 1, 1e-12);
+        ck_assert_uint_eq(json_array_size(at(o, "target_velocity")), 6);
+        for (size_t i = 0; i < 4; ++i) ck_assert_double_ge(number(o, gains[i]), 0);
+    }
+    json_array_foreach(gears, k, o) {
+        ck_assert(number(o, "joint_1") >= 0 && number(o, "joint_2") < (double)json_array_size(joints));
+        ck_assert(number(o, "ratio") != 0 && isfinite(number(o, "offset")));
+    }
+}
+
+/* Every scene, at a small size, is told completely, and has the bodies and joints that a run of it has. */
 START_TEST(scenes_are_told)
 {
     json_t *list = run_json("scenes --json"), *info;
@@ -563,6 +595,9 @@ START_TEST(scenes_are_told)
         snprintf(text, sizeof text, "run %s --steps 1 --json -", spec);
         json_t *r = run_json(text);
         ck_assert_double_eq(number(r, "bodies"), dynamic);
+        expect_joints(scene);
+        ck_assert_double_le(number(r, "joints"), (double)json_array_size(at(scene, "joints")));
+        ck_assert_double_le(number(r, "couplings"), (double)json_array_size(at(scene, "couplings")));
         json_decref(r);
         json_decref(scene);
     }

@@ -371,6 +371,48 @@ START_TEST(a_bead_leaves_along_a_turning_rod)
 }
 END_TEST
 
+/* Wheels on a carrier that turns: a gear holds their angles to it, q_1 + 2 q_2 = 0, whatever the carrier does. */
+START_TEST(gears_on_a_carrier)
+{
+    enum { STEPS = 60 };
+    static const double unit[4] = {1, 0, 0, 0};
+    const double w = 1.5, speed = 3;
+    sadmm_world_def def = bodies_def();
+    def.settings.iterations = 300;
+    memset(def.settings.gravity, 0, sizeof def.settings.gravity);
+    sadmm_world *world = bodies_world(&def, _i);
+    sadmm_body_def carrier = sadmm_body_def_default();
+    carrier.type = SADMM_BODY_KINEMATIC;
+    carrier.angular_velocity[2] = w;
+    const sadmm_body_id frame = add_defined(world, &carrier);
+    sadmm_gear_def gear = sadmm_gear_def_default();
+    sadmm_joint_id joint[2];
+    for (int k = 0; k < 2; ++k) {
+        const double place[3] = {k ? -0.2 : 0.3, 0, 0};
+        sadmm_body_def wheel = point_def(place[0], 0, 0);
+        wheel.linear_velocity[1] = w * place[0];
+        wheel.angular_velocity[2] = w;
+        sadmm_joint_def hinge = sadmm_joint_def_default();
+        hinge.kind = SADMM_JOINT_REVOLUTE;
+        hinge.body_a = frame, hinge.body_b = add_defined(world, &wheel);
+        if (k == 0) hinge.coordinates[5].drive = SADMM_DRIVE_SPEED, hinge.coordinates[5].target_speed = speed;
+        MUST(world, sadmm_world_place_joint(world, &hinge, place, unit));
+        MUST(world, sadmm_world_add_joint(world, &hinge, &joint[k]));
+    }
+    gear.joint_1 = joint[0], gear.joint_2 = joint[1];
+    gear.coordinate_1 = gear.coordinate_2 = 5;
+    gear.ratio = 2;
+    MUST(world, sadmm_world_add_gear(world, &gear, NULL));
+    step_world(world, STEPS);
+    for (int k = 0; k < 2; ++k) {
+        sadmm_joint_state state;
+        MUST(world, sadmm_world_joint_state(world, joint[k], &state));
+        expect_near(state.speed[5], k ? -speed / 2 : speed, 1e-4, "speed to the carrier");
+    }
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 /* A limit stops what the shaft turns the other way: a wheel at rest is taken along by the shaft from the angle on. */
 START_TEST(a_limit_takes_along)
 {
@@ -741,6 +783,7 @@ int main(void)
     tcase_add_loop_test(cases, it_is_where_it_was_moved_to, 0, 2 * SOLVERS);
     tcase_add_loop_test(cases, joints_hold_on_to_it, 0, SOLVERS);
     tcase_add_loop_test(cases, a_bead_leaves_along_a_turning_rod, 0, SOLVERS);
+    tcase_add_loop_test(cases, gears_on_a_carrier, 0, SOLVERS);
     tcase_add_loop_test(cases, a_limit_takes_along, 0, SOLVERS);
     tcase_add_loop_test(cases, its_contacts_are_certified, 0, SOLVERS);
     tcase_add_loop_test(cases, substeps_are_steps, 0, SOLVERS);

@@ -8,9 +8,9 @@
  *
  * A gear gives force along q_1 and ratio force along q_2, each as the joint's own laws do: between the joint's two
  * bodies. A row of the solver joins two bodies, so that no more than two of those that the joints are between may be
- * dynamic: gears have their axles on the static world, or on one another. (Wheels on an axle carrier that moves, as in
- * planetary gears, are refused.) Angles count on beyond full turns, and errors of the ratio do not add up: they are
- * fed back as those of locked coordinates. Method: docs/algorithm.md, section 10.
+ * dynamic: gears have their axles on the static world, on kinematic bodies, or on one another. (Wheels on an axle
+ * carrier that is dynamic, as in planetary gears, are refused.) Angles count on beyond full turns, and errors of the
+ * ratio do not add up: they are fed back as those of locked coordinates. Method: docs/algorithm.md, section 10.
  *
  * Worlds with gears are stepped by the host on every backend. Threads and errors: as world.h says. Ids are values with
  * a generation, as bodies' are. */

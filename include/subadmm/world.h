@@ -250,7 +250,7 @@ SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_s
 SADMM_API sadmm_status sadmm_world_step(sadmm_world *world);
 
 /* Begin a step and return without waiting for it, where the backend can: CUDA, in the method FAST from the second
- * step on; not in worlds with joints (joint.h) or kinematic bodies, not with a residual_tolerance, nor with a certificate_tolerance in
+ * step on; not in worlds with kinematic bodies, not with a residual_tolerance, nor with a certificate_tolerance in
  * the method PAPER or with more than 64 convergence checks a step. Elsewhere the same as sadmm_world_step. Steps run
  * in order, a few of them at a time; states, wrenches and settings set in between take effect at the next one.
  * Getters wait for the steps begun so far. Errors: as sadmm_world_step; they may be those of an earlier step, and

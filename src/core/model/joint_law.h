@@ -52,7 +52,7 @@ struct sadmm_joint_source {
     double gap, slack; /* of limits: at the step's start, m or rad; what the turning of the row makes of it in a step.
                           Of springs, gap: the way to where a steep part of a table stops the coordinate, INFINITY where
                           there is none */
-    double steered;    /* what sides that are not solved for give the row's rate; it is in the bias */
+    double steered;    /* of the row's rate what sides give that are steered; it is in the bias */
 };
 
 /* A radial joint's coordinate 0 is a distance. */
@@ -89,7 +89,7 @@ struct joint_body {
     int32_t system_body;             /* -1: it does not move */
     const struct sadmm_rigid *rigid; /* at the step's start; NULL: the frame is in the world */
     bool steered;                    /* it is no body of the system and goes by its velocity, whatever acts on it; */
-    bool target;                     /* and it is a coupling's target */
+    bool target;                     /* it is a coupling's target: of a (joint_hold_translations) */
 };
 
 SADMM_INLINE struct joint_end joint_end_on(const struct joint_frame *frame, const struct sadmm_rigid *rigid)
@@ -142,7 +142,7 @@ SADMM_INLINE struct joint_end joint_end_halfway(const struct joint_frame *frame,
                         rigid_turn(q_load(side->rigid->orientation), v3_load(side->velocity + 3), dt / 2));
 }
 
-/* From a target, translations are by its origin's velocity alone, along axes that stay where they are in the
+/* From a coupling's target, translations are by its origin's velocity alone, along axes that stay where they are in the
  * middle of the step: a damper that went round with the frame would push what is beside it outwards, without bound. */
 SADMM_INLINE void joint_hold_translations(const struct joint_end start[2], struct acting_joint *acting)
 {
@@ -243,7 +243,7 @@ struct joint_moving {
     double free;          /* its rate at the end, if nothing but gravity and wrenches acted */
     double turning;       /* what the row's rate by the velocities at the start is more: axes and arms turn */
     double turned;        /* what the rate at the end is more than the row's, so far as the law counts it */
-    double steered;       /* of that, what sides that are not solved for give */
+    double steered;       /* of the rate what steered sides give */
     double reach;         /* it may move by so much */
     double response;
     double dt, most;      /* most: speed of corrections */

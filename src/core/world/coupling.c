@@ -63,10 +63,10 @@ static sadmm_status check_def(const sadmm_world *world, const sadmm_coupling_def
     const struct sadmm_world_body *body = sadmm_world_find_body(world, def->body, "def->body", error);
     double unit[4];
     if (!body) return SADMM_ERROR_STALE_ID;
-    if (body->type == SADMM_BODY_STATIC)
+    if (body->type != SADMM_BODY_DYNAMIC)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "def->body = (slot %u, generation %u): must be dynamic, it is static", def->body.slot,
-                          def->body.generation);
+                          "def->body = (slot %u, generation %u): must be dynamic, it is %s", def->body.slot,
+                          def->body.generation, body->type == SADMM_BODY_STATIC ? "static" : "kinematic");
     TRY(sadmm_check_vector("def->position", def->position, 3, FRAME_LIMIT, error));
     TRY(sadmm_check_orientation("def->orientation", def->orientation, unit, error));
     frame->position = v3_load(def->position);

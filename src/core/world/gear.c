@@ -34,7 +34,7 @@ static int count_bodies(const sadmm_world *world, const struct sadmm_world_joint
     int count = 0;
     for (int i = 0; i < 4; ++i) {
         const int32_t body = joints[i / 2]->body[i % 2];
-        bool known = body < 0 || world->bodies[body].type == SADMM_BODY_STATIC;
+        bool known = body < 0 || world->bodies[body].type != SADMM_BODY_DYNAMIC;
         for (int j = 0; j < count; ++j) known = known || bodies[j] == body;
         if (!known) bodies[count++] = body;
     }
@@ -61,7 +61,7 @@ static sadmm_status check_def(sadmm_world *world, const sadmm_gear_def *def, str
     if (bodies > 2)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                           "def->joint_1, def->joint_2: between %d dynamic bodies, must be 2 at most (what carries the "
-                          "axles must be static)", bodies);
+                          "axles must not be)", bodies);
     return SADMM_OK;
 }
 

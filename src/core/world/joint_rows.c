@@ -12,11 +12,8 @@ static struct joint_body body_of(const sadmm_world *world, int32_t slot)
     const struct sadmm_world_body *body = &world->bodies[slot];
     out.rigid = &body->rigid;
     if (body->type == SADMM_BODY_STATIC) return out;
-    out.steered = body->type == SADMM_BODY_KINEMATIC;
-    if (out.steered) {
-        out.rigid = &world->driven[sadmm_driven(body->system_body)].rigid;
-        return out;
-    }
+    if (body->type == SADMM_BODY_KINEMATIC)
+        return (struct joint_body){-1, &world->driven[sadmm_driven(body->system_body)].rigid, true, false};
     out.system_body = body->system_body;
     out.rigid = &world->start.rigid[out.system_body];
     return out;
