@@ -18,8 +18,8 @@ static const double palm_half[3] = {0.045, 0.04, 0.012};
 static const double grip_at[3] = {0.055, 0, -0.085};    /* the middle between the pads, in the palm's frame */
 static const double pad_half[3] = {0.01, 0.007, 0.006}; /* along the finger, across it, thickness */
 static const double bone = 0.007, last_bone = 0.004;     /* radii; a finger's last bone is thinner than its pad */
-/* kg m^2: of bones, which the flesh and tendons about them turn with. The bare bones' moments (2e-7) would take twice
- * the iterations: what a joint's torque does to them is far more than what its force does. Pads have their own. */
+/* kg m^2: of bones, which the flesh and tendons about them turn with. With the bare bones' moments (2e-7) 60 iterations
+ * leave 0.5 N of error in what the hand feels. Pads have their own. */
 static const double least_moment = 1e-5;
 enum { META, KNUCKLE, PROXIMAL, MIDDLE, DISTAL, PAD };
 
