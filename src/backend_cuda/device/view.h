@@ -332,7 +332,7 @@ enum cuda_limit { LIMIT_NONE, LIMIT_SUSPECTS, LIMIT_WHOLE };
 /* What differs between launches of a kernel. */
 struct cuda_args {
     int32_t count;      /* iterations, or a kind of block */
-    int32_t bytes;      /* of shared memory, for joined bodies */
+    int32_t bytes, numbers; /* of shared memory, for joined bodies */
     int32_t measure;
     int32_t join;       /* the first Step 1 takes records + ratio change */
     int32_t start;      /* the first Step 1 takes J^T lambda^0, whatever the records are */

@@ -16,6 +16,7 @@
 #include "world.h"
 
 enum { JOINED_THREADS = 256, JOINED_WARPS = JOINED_THREADS / WARP };
+enum { MOST_NUMBERS = 8192 }; /* of a structure that blocks copy */
 
 /* What a part's threads tell each other. */
 struct joined_shared {
@@ -24,6 +25,10 @@ struct joined_shared {
 };
 
 /* A part's factor and right side, in bytes; they are in shared memory where that is enough for every part. */
+static inline size_t shared_bytes(int32_t factors, int32_t numbers)
+{
+    return sizeof(struct joined_shared) + (size_t)factors + ((size_t)numbers * sizeof(int32_t) + 7) / 8 * 8;
+}
 static __host__ __device__ inline size_t factor_bytes(int32_t places, int32_t blocks)
 {
     return ((JOINED_BLOCK + JOINED_ROWS) * (size_t)places + JOINED_BLOCK * (size_t)blocks) * sizeof(double);
@@ -36,11 +41,33 @@ struct joined_part {
     int32_t first_level, end_level, first_place, end_place, first_body, end_body;
 };
 
-/* memory: shared, of so many bytes. */
-static __device__ __forceinline__ joined_part part_of_block(const cuda_view &v, unsigned char *memory, int32_t bytes)
+/* The structure in shared memory, whose lists are gone along again and again. */
+static __device__ __forceinline__ struct joined_structure copy_structure(const struct joined_structure &from,
+                                                                         int32_t *to, int32_t size)
+{
+    const int32_t *begin = from.constraint; /* the first array of it (core/solve/joined_order.c) */
+    for (int32_t k = (int32_t)threadIdx.x; k < size; k += JOINED_THREADS) to[k] = begin[k];
+    struct joined_structure s = from;
+    s.constraint = to + (from.constraint - begin), s.first_level = to + (from.first_level - begin);
+    s.first_of_level = to + (from.first_of_level - begin), s.first_below = to + (from.first_below - begin);
+    s.row = to + (from.row - begin), s.column = to + (from.column - begin);
+    s.first_update = to + (from.first_update - begin), s.update = to + (from.update - begin);
+    s.first_body = to + (from.first_body - begin), s.body = to + (from.body - begin);
+    s.first_around = to + (from.first_around - begin), s.around = to + (from.around - begin);
+    __syncthreads();
+    return s;
+}
+
+/* memory: shared, of so many bytes; before them the structure, of so many numbers (0: it is not there). */
+static __device__ __forceinline__ joined_part part_of_block(const cuda_view &v, unsigned char *memory, int32_t bytes,
+                                                            int32_t numbers)
 {
     joined_part p;
     p.d = *v.joints.direct;
+    if (numbers > 0) {
+        p.d.s = copy_structure(p.d.s, (int32_t *)memory, numbers);
+        memory += ((size_t)numbers * sizeof(int32_t) + 7) / 8 * 8;
+    }
     const int32_t part = (int32_t)blockIdx.x;
     p.thread = (int32_t)threadIdx.x, p.warp = p.thread / WARP, p.lane = p.thread % WARP;
     p.first_level = p.d.s.first_level[part], p.end_level = p.d.s.first_level[part + 1];
@@ -319,7 +346,7 @@ static __global__ void __launch_bounds__(JOINED_THREADS)
     struct joined_shared *shared = (struct joined_shared *)memory;
     const bool after = args.count != 0;
     if (v.model.live->abort_code) return;
-    const joined_part p = part_of_block(v, (unsigned char *)(shared + 1), args.bytes);
+    const joined_part p = part_of_block(v, (unsigned char *)(shared + 1), args.bytes, args.numbers);
     const bool touched = is_touched(v, p, shared), kept = after && args.start && !isnan(*kept_mark(p));
     __syncthreads();
     /* what no contact touches is as it was solved before the iterations */
@@ -357,7 +384,8 @@ sadmm_status CUDA(launch_joined)(struct sadmm_context *c, bool after, struct sad
     blocks.cluster = 1;
     blocks.threads = JOINED_THREADS;
     args.bytes = c->step->joined_bytes;
-    blocks.shared = sizeof(struct joined_shared) + (size_t)args.bytes;
+    args.numbers = c->step->joined_numbers;
+    blocks.shared = shared_bytes(args.bytes, args.numbers);
     args.count = after;
     args.start = c->settings.warm_start;
     return CUDA(launch_partition)(c, joined_kernel, "joined bodies", &blocks, false, &args, error);
@@ -465,17 +493,19 @@ static sadmm_status load_order(struct sadmm_context *c, const struct sadmm_joine
     sadmm_free(direct);
     s->joined_parts = order->s.parts;
     s->joined_bytes = 0;
+    /* of what many parts share a block needs little: then it is not worth its copy */
+    s->joined_numbers = order->size <= MOST_NUMBERS ? (int32_t)order->size : 0;
     for (int32_t k = 0; k < order->s.parts; ++k) {
         const int32_t first = order->s.first_of_level[order->s.first_level[k]],
                       end = order->s.first_of_level[order->s.first_level[k + 1]];
         const size_t bytes = factor_bytes(end - first, order->s.first_below[end] - order->s.first_below[first]);
-        if (bytes + sizeof(struct joined_shared) <= (size_t)c->shared_limit)
+        if (shared_bytes((int32_t)bytes, s->joined_numbers) <= (size_t)c->shared_limit)
             s->joined_bytes = std::max(s->joined_bytes, (int32_t)bytes);
     }
     TRY(status);
     CUDA_CALL(c,
               cudaFuncSetAttribute((const void *)joined_kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                                   s->joined_bytes + (int)sizeof(struct joined_shared)),
+                                   (int)shared_bytes(s->joined_bytes, s->joined_numbers)),
               "cudaFuncSetAttribute");
     return SADMM_OK;
 }

@@ -40,7 +40,8 @@ struct cuda_step {
     int32_t bodies, slots;
     int32_t joints, joint_constraints, couplings;
     int32_t joined_parts;       /* of bodies that are solved directly, */
-    int32_t joined_bytes;       /* and of shared memory that their factors take, where one fits */
+    int32_t joined_bytes;       /* of shared memory that their factors take, where one fits, */
+    int32_t joined_numbers;     /* and of their structure there, 0: it stays where it is */
 
     bool planned;               /* capacities, partition and guess are for the world as it is */
     bool recorded;              /* and so are the graphs */

@@ -70,7 +70,8 @@ SADMM_INLINE int32_t joined_body(const struct sadmm_row_constraint *constraint, 
 }
 SADMM_INLINE const double *joined_jacobian(const struct joined_view *v, int32_t r, int side)
 {
-    return v->jacobian[side] + (size_t)v->jacobian_stride * (size_t)r;
+    /* not by an index that varies: the view stays in registers */
+    return (side ? v->jacobian[1] : v->jacobian[0]) + (size_t)v->jacobian_stride * (size_t)r;
 }
 SADMM_INLINE size_t joined_law(const struct joined_view *v, int32_t r) { return (size_t)v->law_stride * (size_t)r; }
 SADMM_INLINE double *joined_answer(const struct joined_view *v, int32_t r, int side)
