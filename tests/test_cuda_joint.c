@@ -188,13 +188,15 @@ static sadmm_world *yard(int precision, sadmm_method method, int substeps)
     add_box(world, 4, 0.02, 0.302, 0.1, 1, 0.5);
     sadmm_joint_def glue = sadmm_joint_def_default();
     glue.break_force = 30;
-    const sadmm_body_id lower = add_box(world, 6, 0, 0.12, 0.1, 1, 0.5), upper = add_box(world, 6.1, 0, 0.4, 0.1, 3, 0.5);
+    const sadmm_body_id lower = add_box(world, 6, 0, 0.12, 0.1, 1, 0.5),
+                        upper = add_box(world, 6.1, 0, 0.4, 0.1, 3, 0.5);
     join(world, &glue, lower, upper, 6, 0, 0.2);
     sadmm_joint_def spring = sadmm_joint_def_default();
     spring.kind = SADMM_JOINT_SPRING;
     spring.coordinates[0].spring_stiffness = 50, spring.coordinates[0].spring_damping = 0.5;
     spring.coordinates[0].spring_rest = 0.3;
-    const sadmm_body_id first = add_box(world, 8, 0, 1, 0.05, 0.2, 0.5), second = add_box(world, 8.5, 0, 1, 0.05, 1, 0.5);
+    const sadmm_body_id first = add_box(world, 8, 0, 1, 0.05, 0.2, 0.5),
+                        second = add_box(world, 8.5, 0, 1, 0.05, 1, 0.5);
     join(world, &spring, first, second, 8.1, 0, 1);
     sadmm_joint_def cross = sadmm_joint_def_default(), ball = sadmm_joint_def_default();
     cross.kind = SADMM_JOINT_UNIVERSAL, ball.kind = SADMM_JOINT_SPHERICAL;
@@ -203,7 +205,8 @@ static sadmm_world *yard(int precision, sadmm_method method, int substeps)
     throw_body(world, third, 0.3, 5);
     join(world, &cross, second, third, 8.8, 0, 0.5);
     join(world, &ball, third, fourth, 9.1, 0, 0);
-    for (int k = 0; k < COUPLINGS; ++k) { /* one lifts a box from another, the other turns one in the air and can do little */
+    for (int k = 0; k < COUPLINGS;
+         ++k) { /* one lifts a box from another, the other turns one in the air and can do little */
         sadmm_coupling_def coupling = sadmm_coupling_def_default();
         if (k == 0) add_box(world, 10, 0, 0.1, 0.1, 1, 0.5);
         coupling.body = add_box(world, 10 + k, 0, 0.302, 0.1, 0.5, 0.5);

@@ -56,7 +56,7 @@ static sadmm_joint_id join(sadmm_world *world, sadmm_joint_kind kind, sadmm_body
     return id;
 }
 
-/* ---- loads far above the mass that bears them ---------------------------------------------------------------------- */
+/* ---- loads far above the mass that bears them -------------------------------------------------------------------- */
 
 /* A chain of 100 links of 0.2 m and 1 kg with a weight at its end hangs: 20 iterations, 100 steps. */
 START_TEST(a_chain_bears_many_times_its_weight)
@@ -146,12 +146,12 @@ START_TEST(a_fast_rotor_stays)
 }
 END_TEST
 
-/* ---- loops ---------------------------------------------------------------------------------------------------------- */
+/* ---- loops ------------------------------------------------------------------------------------------------------- */
 
-/* IFToMM's benchmark A02: three uprights and two crossbars, rods of 1 m and 1 kg, crossbars at 1 m/s, gravity 9.81. With
- * all rods on one line the linkage may part into two motions, and it passes there twice a turn. Returns how far the
- * first upright's tip is from (0.3284573768, 0.9445187937) m after 10 s (Exudyn, its step 1.25e-4 s; it changes by 2e-6 m
- * from twice that). reversed: each crossbar's second hinge has its ends the other way round. */
+/* IFToMM's benchmark A02: three uprights and two crossbars, rods of 1 m and 1 kg, crossbars at 1 m/s, gravity 9.81.
+ * With all rods on one line the linkage may part into two motions, and it passes there twice a turn. Returns how far
+ * the first upright's tip is from (0.3284573768, 0.9445187937) m after 10 s (Exudyn, its step 1.25e-4 s; it changes by
+ * 2e-6 m from twice that). reversed: each crossbar's second hinge has its ends the other way round. */
 static double double_four_bar(double dt, bool reversed)
 {
     const double thin = 1e-6, upright[3] = {1.0 / 12, 1.0 / 12, thin}, across[3] = {thin, 1.0 / 12, 1.0 / 12};
@@ -196,7 +196,7 @@ START_TEST(a_double_four_bar_is_where_it_should_be)
 }
 END_TEST
 
-/* ---- all laws ------------------------------------------------------------------------------------------------------- */
+/* ---- all laws ---------------------------------------------------------------------------------------------------- */
 
 /* Numbers in [0, 1) from an integer hash, the same everywhere. */
 static double random_at(uint32_t *state)
@@ -205,8 +205,9 @@ static double random_at(uint32_t *state)
     return (double)(*state >> 8) / (1 << 24);
 }
 
-/* A random tree of bodies of 10 g to 100 kg with joints of every kind, laws on what is free, some loops: one iteration a
- * step, and the step is solved all the same: rows by the certificate's natural map, and the momentum of every body. */
+/* A random tree of bodies of 10 g to 100 kg with joints of every kind, laws on what is free, some loops: one iteration
+ * a step, and the step is solved all the same: rows by the certificate's natural map, and the momentum of every
+ * body. */
 START_TEST(mechanisms_are_solved_by_one_iteration)
 {
     enum { BODIES = 24 };
@@ -243,7 +244,8 @@ START_TEST(mechanisms_are_solved_by_one_iteration)
         const sadmm_certificate certificate = certified_step(world);
         /* a billionth of the speed that a load gives the body that bears it by itself (core/model/joined.h): 100 kg
          * that are pulled at some m/s on 10 g, 1e4 m/s and more. The iteration alone is off by some m/s. */
-        ck_assert_msg(certificate.ncp_max < 1e-4, "mechanism %d, step %d: natural map %g", _i, step, certificate.ncp_max);
+        ck_assert_msg(certificate.ncp_max < 1e-4, "mechanism %d, step %d: natural map %g", _i, step,
+                      certificate.ncp_max);
         ck_assert_msg(certificate.momentum_max < 1e-9, "mechanism %d, step %d: momentum %g", _i, step,
                       certificate.momentum_max);
     }

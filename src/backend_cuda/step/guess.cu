@@ -68,7 +68,8 @@ struct substep_plan CUDA(plan_of)(const struct sadmm_context *c, int32_t pairs, 
     plan.rigid = true;
     plan.gyroscopic = c->plan.gyroscopic; /* since load */
     plan.threads = 1;
-    sadmm_plan_settle(&plan, &c->settings, plan_mostly_warm(plan.pairs + joints->constraints, statistics->warm + joints->warm));
+    sadmm_plan_settle(&plan, &c->settings,
+                      plan_mostly_warm(plan.pairs + joints->constraints, statistics->warm + joints->warm));
     const int32_t warm = sadmm_plan_depends_on_warmth(&c->settings) ? plan.warm : -1;
     const struct substep_plan out = {plan, plan.contact_rows, warm, s->joints > 0 ? joints->constraints > 0 : -1};
     return out;

@@ -1,6 +1,6 @@
-/* Bodies joined by rows on the device, solved directly (core/solve/joined.h): the host's formulas (core/model/joined.h),
- * in double, in its order. A thread block a part: constraints that hang together. Once before the iterations, from what
- * they start with, and once after them, from what they end with. */
+/* Bodies joined by rows on the device, solved directly (core/solve/joined.h): the host's formulas
+ * (core/model/joined.h), in double, in its order. A thread block a part: constraints that hang together. Once before
+ * the iterations, from what they start with, and once after them, from what they end with. */
 #include <string.h>
 
 #include <algorithm>
@@ -111,7 +111,7 @@ static __device__ __forceinline__ void each_side(const cuda_view &v, int32_t bod
     }
 }
 
-/* ---- what there is --------------------------------------------------------------------------------------------------- */
+/* ---- what there is ----------------------------------------------------------------------------------------------- */
 
 /* Velocities and multipliers: after the iterations, or before. */
 static __device__ __forceinline__ void load_part(const cuda_view &v, const joined_part &p, bool after)
@@ -180,7 +180,7 @@ static __device__ __forceinline__ void factor_bodies(const cuda_view &v, const j
     });
 }
 
-/* ---- a pass ---------------------------------------------------------------------------------------------------------- */
+/* ---- a pass ------------------------------------------------------------------------------------------------------ */
 
 /* All nodes before anything is taken from them: what waits for memory, side by side. */
 static __device__ __forceinline__ void enter_blocks(const joined_part &p)
@@ -281,7 +281,7 @@ static __device__ __forceinline__ bool change_rows(const joined_part &p, struct 
     return changed;
 }
 
-/* ---- what comes of it ------------------------------------------------------------------------------------------------ */
+/* ---- what comes of it -------------------------------------------------------------------------------------------- */
 
 static __device__ __forceinline__ bool is_finite(const joined_part &p, struct joined_shared *shared)
 {
@@ -391,7 +391,7 @@ sadmm_status CUDA(launch_joined)(struct sadmm_context *c, bool after, struct sad
     return CUDA(launch_partition)(c, joined_kernel, "joined bodies", &blocks, false, &args, error);
 }
 
-/* ---- to the device --------------------------------------------------------------------------------------------------- */
+/* ---- to the device ----------------------------------------------------------------------------------------------- */
 
 /* Arrays of a view, one behind the other. */
 static double *take(char **memory, size_t bytes)

@@ -174,7 +174,7 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
     atomicAdd(&v.step.control->joints.warm, __popc((unsigned)warm));
 }
 
-/* ---- the solution -------------------------------------------------------------------------------------------------- */
+/* ---- the solution ------------------------------------------------------------------------------------------------ */
 
 static __device__ __forceinline__ struct joint_lead lead_of(const cuda_view &v, int32_t body)
 {
@@ -284,7 +284,7 @@ sadmm_status CUDA(launch_joint_solution)(struct sadmm_context *c, struct sadmm_e
                            ROWS_THREADS, &args, error);
 }
 
-/* ---- where they are ------------------------------------------------------------------------------------------------ */
+/* ---- where they are ---------------------------------------------------------------------------------------------- */
 
 /* In BUFFER_JOINTS: definitions, geometry, first constraints. */
 static struct cuda_joint_middle *middle_of(const struct sadmm_context *c)
@@ -350,7 +350,7 @@ void CUDA(view_joints)(struct sadmm_context *c, int into, int substep)
     joints->sources = (struct sadmm_joint_source *)(joints->velocity + 6 * (size_t)s->bodies);
 }
 
-/* ---- to the device, and back -------------------------------------------------------------------------------------- */
+/* ---- to the device, and back ------------------------------------------------------------------------------------- */
 
 sadmm_status CUDA(put)(struct sadmm_context *c, void *to, const void *from, size_t bytes, struct sadmm_error *error)
 {

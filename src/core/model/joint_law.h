@@ -82,7 +82,7 @@ SADMM_INLINE void joint_coordinate_take(const double x[JOINT_COORDINATE_NUMBERS]
     c->armature = x[13];
 }
 
-/* ---- bodies and geometry ------------------------------------------------------------------------------------------ */
+/* ---- bodies and geometry ----------------------------------------------------------------------------------------- */
 
 /* What a joint has at one end. */
 struct joint_body {
@@ -219,7 +219,7 @@ SADMM_INLINE double joint_response(const struct joint_side *side, const double r
            turn.z * turn.z / inertia[2];
 }
 
-/* ---- one coordinate ----------------------------------------------------------------------------------------------- */
+/* ---- one coordinate ---------------------------------------------------------------------------------------------- */
 
 /* A row's law (math/row.h): sign times coordinate k, by its role. */
 struct joint_law {
@@ -333,7 +333,8 @@ SADMM_INLINE struct joint_table_way joint_way_of(const struct joint_moving *m, i
                  pull = give * c->spring_stiffness, drag = m->response * dt * c->spring_damping,
                  force = m->memory->force[SADMM_ROLE_SPRING][k],
                  meant = force == 0 ? dt * m->free : dt * m->before - give * force;
-    return joint_table_go(table, m->value, 1 + pull + drag, give, (1 + drag) * m->value + pull * c->spring_rest + meant);
+    return joint_table_go(table, m->value, 1 + pull + drag, give,
+                          (1 + drag) * m->value + pull * c->spring_rest + meant);
 }
 
 /* The spring of a coordinate with a table, beside which spring_stiffness acts. */
@@ -407,7 +408,7 @@ SADMM_INLINE int joint_most_laws(const sadmm_joint_def *def)
     return count;
 }
 
-/* ---- the solution -------------------------------------------------------------------------------------------------- */
+/* ---- the solution ------------------------------------------------------------------------------------------------ */
 
 SADMM_INLINE void joint_forget_forces(struct sadmm_joint_memory *memory)
 {

@@ -53,8 +53,8 @@ struct sadmm_system {
     double *velocity;                /* (body_count x 6) start in, solution out */
     const double *driven;            /* (driven_count x 6) velocities of driven bodies, m/s, rad/s, world */
     int32_t driven_count;
-    const double *carried;           /* (body_count x 6): velocities are less this, the motion of what an island rides on
-                                        (core/world/driven.c); NULL: as they are */
+    const double *carried;           /* (body_count x 6): velocities are less this, the motion of what an island
+                                        rides on (core/world/driven.c); NULL: as they are */
     struct sadmm_contact_set *contacts;
     bool errors_given;               /* points carry e (problem level) instead of a gap */
     bool first;                      /* no step came before: where there are no impulses, none are known */

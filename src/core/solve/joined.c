@@ -43,12 +43,13 @@ void sadmm_joined_destroy(struct sadmm_joined *j)
 {
     if (!j) return;
     sadmm_joined_order_free(&j->order);
-    void *blocks[] = {j->bodies, j->entry, j->work, j->state, j->impulse, j->touched, j->kept_part, j->kept_velocity, j->kept_lambda};
+    void *blocks[] = {j->bodies,  j->entry,     j->work,          j->state,      j->impulse,
+                      j->touched, j->kept_part, j->kept_velocity, j->kept_lambda};
     for (size_t k = 0; k < sizeof blocks / sizeof *blocks; ++k) sadmm_free(blocks[k]);
     sadmm_free(j);
 }
 
-/* ---- structure ------------------------------------------------------------------------------------------------------ */
+/* ---- structure --------------------------------------------------------------------------------------------------- */
 
 static bool same_graph(const struct solving *s)
 {
@@ -117,7 +118,7 @@ static bool make_view(struct solving *s)
     return true;
 }
 
-/* ---- bodies ---------------------------------------------------------------------------------------------------------- */
+/* ---- bodies ------------------------------------------------------------------------------------------------------ */
 
 static int32_t pair_body(const struct sadmm_contact_pair *pair, int side) { return side ? pair->body_b : pair->body_a; }
 
@@ -193,7 +194,7 @@ static void factor_bodies(struct solving *s)
     for (int32_t e = 0; e < s->view.s.bodies; ++e) joined_factor_body(&s->view, e);
 }
 
-/* ---- a part ---------------------------------------------------------------------------------------------------------- */
+/* ---- a part ------------------------------------------------------------------------------------------------------ */
 
 struct part {
     int32_t place, end_place, entry, end_entry;
@@ -232,7 +233,8 @@ static void factorize(const struct joined_view *v, const struct part *part)
     for (int32_t p = part->place; p < part->end_place; ++p) {
         double *diagonal = v->diagonal + JOINED_BLOCK * (size_t)p;
         for (int k = 0; k < JOINED_ROWS; ++k)
-            for (int q = 0; q <= k; ++q) diagonal[JOINED_ROWS * k + q] = joined_updated(v, p, joined_entry(v, p, p, k, q), k, q);
+            for (int q = 0; q <= k; ++q)
+                diagonal[JOINED_ROWS * k + q] = joined_updated(v, p, joined_entry(v, p, p, k, q), k, q);
         joined_cholesky(diagonal);
         for (int32_t b = v->s.first_below[p]; b < v->s.first_below[p + 1]; ++b) {
             double *block = v->below + JOINED_BLOCK * (size_t)b;
@@ -303,7 +305,7 @@ static bool solve_part(const struct solving *s, const struct part *part)
     return solved;
 }
 
-/* ---- before and after the iterations --------------------------------------------------------------------------------- */
+/* ---- before and after the iterations ----------------------------------------------------------------------------- */
 
 static bool is_touched(const struct sadmm_joined *j, const struct part *part)
 {

@@ -6,14 +6,15 @@
  *
  *     (A + C) dv - J^T dlambda = b - A v + J^T lambda + J_c^T lambda_c        every body with rows
  *     gain J (v + dv) + bias + compliance (lambda + dlambda) = 0              every row inside its bounds
- *                                                                             (hard ones with a compliance of JOINED_GIVE)
+ *                                                                     (hard ones: compliance JOINED_GIVE)
  *
- * with the contacts' impulses lambda_c as they are, and C = sum B J_c^T J_c over the contacts that press, B the mass that
- * rests on each (math/weight.h). A row whose multiplier leaves its bounds stays at the bound; one that is held there
- * against its law is let go. Where everything holds already nothing changes: a solution stays what it is. Islands
+ * with the contacts' impulses lambda_c as they are, and C = sum B J_c^T J_c over the contacts that press, B the mass
+ * that rests on each (math/weight.h). A row whose multiplier leaves its bounds stays at the bound; one that is held
+ * there against its law is let go. Where everything holds already nothing changes: a solution stays what it is. Islands
  * under rows alone end at their solution whatever the iterations.
  *
- * dlambda by a sparse Cholesky factor of J (A + C)^-1 J^T, a block a constraint, in an order of least degree. In double. */
+ * dlambda by a sparse Cholesky factor of J (A + C)^-1 J^T, a block a constraint, in an order of least degree. In
+ * double. */
 #ifndef SADMM_CORE_SOLVE_JOINED_H
 #define SADMM_CORE_SOLVE_JOINED_H
 

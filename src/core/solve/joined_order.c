@@ -83,7 +83,7 @@ static void find_parts(struct maker *m, int32_t most_around)
     m->first_member[m->parts] = taken;
 }
 
-/* ---- the order of a part ------------------------------------------------------------------------------------------ */
+/* ---- the order of a part ----------------------------------------------------------------------------------------- */
 
 /* Neighbours of its constraints as bits, by their number in the part. */
 struct graph {
@@ -138,7 +138,8 @@ static void free_graph(struct graph *g)
     sadmm_free(g->gone);
 }
 
-/* What is left of the part without i: its neighbours are coupled to each other. `near` of i itself stays: its column. */
+/* What is left of the part without i: its neighbours are coupled to each other. `near` of i itself stays: its
+ * column. */
 static void eliminate(struct graph *g, int32_t i)
 {
     g->gone[i] = 1;
@@ -167,7 +168,7 @@ static void take_level(struct graph *g, int32_t *order, int32_t *taken)
     for (int32_t at = begin; at < *taken; ++at) eliminate(g, order[at]);
 }
 
-/* ---- all of it ------------------------------------------------------------------------------------------------------ */
+/* ---- all of it --------------------------------------------------------------------------------------------------- */
 
 /* Columns as they are found, part by part and level by level. */
 struct column {
@@ -242,8 +243,8 @@ static bool reserve(struct arrays *o, const struct maker *m, const struct column
 {
     const size_t n = (size_t)all->count, b = all->row_count, updates = count_updates(all), parts = (size_t)m->parts,
                  levels = (size_t)all->levels, bodies = 2 * n;
-    order->size = n + parts + 1 + levels + 1 + n + 1 + 2 * b + n + b + 1 + 2 * updates + parts + 1 + bodies + bodies + 1 +
-                  2 * n;
+    order->size = n + parts + 1 + levels + 1 + n + 1 + 2 * b + n + b + 1 + 2 * updates; /* as they are taken below */
+    order->size += parts + 1 + bodies + bodies + 1 + 2 * n;
     int32_t *memory = order->memory = (int32_t *)sadmm_alloc(order->size, sizeof *memory);
     if (!memory) return false;
     o->count = all->count, o->blocks = (int32_t)b, o->parts = m->parts;

@@ -42,8 +42,9 @@ enum sadmm_edit_kind {
     SADMM_EDIT_STATE,    /* target: a dynamic body; position (3), orientation (4), velocity (6) */
     SADMM_EDIT_FORCES,   /* target: a dynamic body; force, torque (6), scale of gravity, damping (2) */
     SADMM_EDIT_SETTINGS, /* sadmm_settings_numbers(): a backend's own, from what `step` is given */
-    SADMM_EDIT_JOINT,    /* target: SADMM_JOINT_TARGETS joint + k; k < 6: the numbers of that coordinate (joint_coordinate_numbers); k = 6:
-                            enabled (1 or 0); k = 7: a coupling's target: position (3), orientation (4), velocity (6) */
+    SADMM_EDIT_JOINT,    /* target: SADMM_JOINT_TARGETS joint + k; k < 6: the numbers of that coordinate
+                            (joint_coordinate_numbers); k = 6: enabled (1 or 0); k = 7: a coupling's target: position
+                            (3), orientation (4), velocity (6) */
     SADMM_EDIT_KINDS
 };
 enum { SADMM_JOINT_TARGETS = 8 }; /* a joint */
@@ -102,8 +103,8 @@ struct sadmm_resident_kernels {
     sadmm_status (*read_joints)(struct sadmm_context *, struct sadmm_joint_memory *, struct sadmm_coupling_memory *,
                                 struct sadmm_error *);
     /* Rows of the joints in the last step done, with the multipliers that it started from, and the solution's (six a
-     * constraint that joints may have, at most) and velocities (bodies x 6): where there are joints, bodies need not end
-     * with these. Nothing may be enqueued. */
+     * constraint that joints may have, at most) and velocities (bodies x 6): where there are joints, bodies need not
+     * end with these. Nothing may be enqueued. */
     sadmm_status (*read_rows)(struct sadmm_context *, struct sadmm_rows *rows, double *solution, double *velocity,
                               struct sadmm_error *);
 };

@@ -420,8 +420,8 @@ static sadmm_status check_table(const double *positions, const double *forces, i
         const double way = positions[i] - positions[i - 1];
         if (!(way > 0))
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                              "positions[%d] = %.17g after positions[%d] = %.17g: must increase", i, positions[i], i - 1,
-                              positions[i - 1]);
+                              "positions[%d] = %.17g after positions[%d] = %.17g: must increase", i, positions[i],
+                              i - 1, positions[i - 1]);
         if (!(fabs(forces[i] - forces[i - 1]) <= FORCE_LIMIT * way))
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
                               "forces[%d] = %g after forces[%d] = %g, %g farther: must be within 1e15 a unit of way", i,

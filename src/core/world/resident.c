@@ -24,8 +24,8 @@ enum { MOST_CHECKS = 64 };
 
 bool sadmm_world_may_reside(const sadmm_world *world)
 {
-    /* Gears, tables of springs and kinematic bodies are the host's. Of the stop rules a backend checks the certificate's
-     * in the method FAST alone; and the loads of a first step are predicted on the host. */
+    /* Gears, tables of springs and kinematic bodies are the host's. Of the stop rules a backend checks the
+     * certificate's in the method FAST alone; and the loads of a first step are predicted on the host. */
     const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings), *s = &settings;
     const bool fast = s->method == SADMM_METHOD_FAST,
                few_checks = (s->iterations - 1) / s->check_period < MOST_CHECKS / s->substeps;

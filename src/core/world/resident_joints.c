@@ -8,7 +8,8 @@
 
 static struct sadmm_resident_joint joint_for_backend(const sadmm_world *world, const struct sadmm_world_joint *joint)
 {
-    struct sadmm_resident_joint out = {.def = joint->def, .constraints = sadmm_joint_constraints(joint), .coupling = -1};
+    struct sadmm_resident_joint out = {
+        .def = joint->def, .constraints = sadmm_joint_constraints(joint), .coupling = -1};
     for (int s = 0; s < 2; ++s) {
         const struct sadmm_world_body *body = joint->body[s] >= 0 ? &world->bodies[joint->body[s]] : NULL;
         out.body[s] = body ? body->system_body : -1;
