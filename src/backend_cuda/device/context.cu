@@ -2,6 +2,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include <algorithm>
+
 #include "collision/bounds.h"
 #include "core/base/memory.h"
 #include "context.h"
@@ -147,6 +149,26 @@ sadmm_status CUDA(download)(struct sadmm_context *c, const void *from, size_t by
         CUDA_CALL(c, cudaMemcpyAsync(c->buffers[PINNED_OUT].data, from, bytes, cudaMemcpyDeviceToHost, c->stream),
                   "cudaMemcpyAsync from the device");
     return CUDA(wait)(c, error);
+}
+
+sadmm_status CUDA(put)(struct sadmm_context *c, void *to, const void *from, size_t bytes, struct sadmm_error *error)
+{
+    TRY(CUDA(reserve)(c, PINNED_ROWS, bytes, error));
+    TRY(CUDA(upload)(c, to, PINNED_ROWS, 0, from, bytes, error));
+    return CUDA(wait)(c, error);
+}
+
+sadmm_status CUDA(get)(struct sadmm_context *c, void *to, const void *from, size_t bytes, struct sadmm_error *error)
+{
+    enum { PIECE = 16 << 20 }; /* pinned memory is scarce */
+    if (!to) return SADMM_OK;
+    TRY(CUDA(reserve)(c, PINNED_OUT, std::min(bytes, (size_t)PIECE), error));
+    for (size_t at = 0; at < bytes; at += PIECE) {
+        const size_t piece = std::min(bytes - at, (size_t)PIECE);
+        TRY(CUDA(download)(c, (const char *)from + at, piece, error));
+        memcpy((char *)to + at, c->buffers[PINNED_OUT].data, piece);
+    }
+    return SADMM_OK;
 }
 
 void CUDA(plan_settings)(struct sadmm_context *c, const struct sadmm_settings *settings)

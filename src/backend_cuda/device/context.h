@@ -107,8 +107,11 @@ sadmm_status CUDA(clear)(struct sadmm_context *, enum cuda_scalar scalar, struct
 /* Through pinned memory, asynchronously; the pinned buffer is free again once the stream is idle. */
 sadmm_status CUDA(upload)(struct sadmm_context *, void *to, enum cuda_buffer_name staging, size_t at, const void *from,
                           size_t bytes, struct sadmm_error *error);
-/* The first `bytes` of view.raw.out into PINNED_OUT, and wait. */
+/* Into PINNED_OUT, which holds that many bytes, and wait. */
 sadmm_status CUDA(download)(struct sadmm_context *, const void *from, size_t bytes, struct sadmm_error *error);
+/* To the device and from it, through pinned memory that is free again; a null `to` is left out. */
+sadmm_status CUDA(put)(struct sadmm_context *, void *to, const void *from, size_t bytes, struct sadmm_error *error);
+sadmm_status CUDA(get)(struct sadmm_context *, void *to, const void *from, size_t bytes, struct sadmm_error *error);
 sadmm_status CUDA(wait)(struct sadmm_context *, struct sadmm_error *error);
 /* The settings that are no numbers: from the next launch, or recording, on. */
 void CUDA(plan_settings)(struct sadmm_context *, const struct sadmm_settings *settings);

@@ -8,8 +8,6 @@
  */
 #include <string.h>
 
-#include <algorithm>
-
 #include "backend_cuda/device/double.h"
 #include "core/base/memory.h"
 
@@ -352,13 +350,6 @@ void CUDA(view_joints)(struct sadmm_context *c, int into, int substep)
 
 /* ---- to the device, and back ------------------------------------------------------------------------------------- */
 
-sadmm_status CUDA(put)(struct sadmm_context *c, void *to, const void *from, size_t bytes, struct sadmm_error *error)
-{
-    TRY(CUDA(reserve)(c, PINNED_ROWS, bytes, error));
-    TRY(CUDA(upload)(c, to, PINNED_ROWS, 0, from, bytes, error));
-    return CUDA(wait)(c, error);
-}
-
 static sadmm_status put_first(struct sadmm_context *c, const struct sadmm_resident_world *world,
                               struct sadmm_error *error)
 {
@@ -405,27 +396,14 @@ sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resid
     return put_first(c, world, error);
 }
 
-/* In pieces that fit into pinned memory of that size. */
-static sadmm_status get(struct sadmm_context *c, void *to, const void *from, size_t bytes, struct sadmm_error *error)
-{
-    enum { PIECE = 16 << 20 };
-    TRY(CUDA(reserve)(c, PINNED_OUT, std::min(bytes, (size_t)PIECE), error));
-    for (size_t at = 0; at < bytes; at += PIECE) {
-        const size_t piece = std::min(bytes - at, (size_t)PIECE);
-        TRY(CUDA(download)(c, (const char *)from + at, piece, error));
-        memcpy((char *)to + at, c->buffers[PINNED_OUT].data, piece);
-    }
-    return SADMM_OK;
-}
-
 extern "C" sadmm_status CUDA(read_joints)(struct sadmm_context *c, struct sadmm_joint_memory *memory,
                                           struct sadmm_coupling_memory *couplings, struct sadmm_error *error)
 {
     const struct cuda_step *s = c->step;
     CUDA_ENTER(c);
     if (s->couplings > 0)
-        TRY(get(c, couplings, couplings_of(c, 1 - s->into), (size_t)s->couplings * sizeof *couplings, error));
-    return get(c, memory, memory_of(c, 1 - s->into), (size_t)s->joints * sizeof *memory, error);
+        TRY(CUDA(get)(c, couplings, couplings_of(c, 1 - s->into), (size_t)s->couplings * sizeof *couplings, error));
+    return CUDA(get)(c, memory, memory_of(c, 1 - s->into), (size_t)s->joints * sizeof *memory, error);
 }
 
 /* One constraint from the device's form. */
@@ -454,7 +432,7 @@ extern "C" sadmm_status CUDA(read_rows)(struct sadmm_context *c, struct sadmm_ro
     CUDA_ENTER(c);
     char *all = (char *)sadmm_alloc(bytes, 1);
     if (!all) return sadmm_fail_memory(error, "the joints' rows");
-    sadmm_status status = get(c, all, row_set(c, 1 - s->into), bytes, error);
+    sadmm_status status = CUDA(get)(c, all, row_set(c, 1 - s->into), bytes, error);
     const struct sadmm_row_constraint *constraints = (const struct sadmm_row_constraint *)all;
     const struct raw_row *row = (const struct raw_row *)(constraints + count);
     const double *own = (const double *)(row + count * SADMM_MAX_ROWS);

@@ -1,7 +1,4 @@
 /* Whole steps on the device: the world and the report come back (step/world.h). */
-#include <string.h>
-
-#include <algorithm>
 
 #include "collision/collision.h"
 #include "world.h"
@@ -49,20 +46,6 @@ void CUDA(report_step)(const struct sadmm_context *c, struct sadmm_resident_repo
 
 /* ---- entries --------------------------------------------------------------------------------------------------- */
 
-/* In pieces, through pinned memory of that size. */
-static sadmm_status get(struct sadmm_context *c, void *to, const void *from, size_t bytes, struct sadmm_error *error)
-{
-    enum { PIECE = 16 << 20 };
-    if (!to) return SADMM_OK;
-    TRY(CUDA(reserve)(c, PINNED_OUT, std::min(bytes, (size_t)PIECE), error));
-    for (size_t at = 0; at < bytes; at += PIECE) {
-        const size_t piece = std::min(bytes - at, (size_t)PIECE);
-        TRY(CUDA(download)(c, (const char *)from + at, piece, error));
-        memcpy((char *)to + at, c->buffers[PINNED_OUT].data, piece);
-    }
-    return SADMM_OK;
-}
-
 extern "C" sadmm_status CUDA(read_bodies)(struct sadmm_context *c, struct sadmm_rigid *rigid,
                                           struct sadmm_steady *steady, double *wrench, struct sadmm_error *error)
 {
@@ -70,10 +53,10 @@ extern "C" sadmm_status CUDA(read_bodies)(struct sadmm_context *c, struct sadmm_
     const size_t n = (size_t)s->bodies;
     CUDA_ENTER(c);
     CUDA(view_into)(c, s->into, 0);
-    TRY(get(c, rigid, c->view.step.before, n * sizeof *rigid, error));
-    TRY(get(c, steady, c->view.step.steady_before, n * sizeof *steady, error));
-    return get(c, wrench, buffer<double>(c, BUFFER_WORLD_WRENCH) + (size_t)(1 - s->into) * 6 * n,
-               6 * n * sizeof *wrench, error);
+    TRY(CUDA(get)(c, rigid, c->view.step.before, n * sizeof *rigid, error));
+    TRY(CUDA(get)(c, steady, c->view.step.steady_before, n * sizeof *steady, error));
+    return CUDA(get)(c, wrench, buffer<double>(c, BUFFER_WORLD_WRENCH) + (size_t)(1 - s->into) * 6 * n,
+                     6 * n * sizeof *wrench, error);
 }
 
 extern "C" sadmm_status CUDA(read_contacts)(struct sadmm_context *c, struct sadmm_contact_set *contacts,
@@ -90,7 +73,8 @@ extern "C" sadmm_status CUDA(read_start)(struct sadmm_context *c, struct sadmm_r
     CUDA_ENTER(c);
     const int substeps = s->last_settings.substeps, /* of the last one */
               from = step_state(1 - s->into, substeps - 2, substeps);
-    TRY(get(c, rigid, buffer<struct sadmm_rigid>(c, BUFFER_WORLD_BODIES) + (size_t)from * n, n * sizeof *rigid, error));
-    TRY(get(c, velocity, buffer<double>(c, BUFFER_WORLD_VELOCITY), 6 * n * sizeof *velocity, error));
-    return get(c, impulse, buffer<double>(c, BUFFER_WORLD_IMPULSE), 3 * points * sizeof *impulse, error);
+    TRY(CUDA(get)(c, rigid, buffer<struct sadmm_rigid>(c, BUFFER_WORLD_BODIES) + (size_t)from * n, n * sizeof *rigid,
+                  error));
+    TRY(CUDA(get)(c, velocity, buffer<double>(c, BUFFER_WORLD_VELOCITY), 6 * n * sizeof *velocity, error));
+    return CUDA(get)(c, impulse, buffer<double>(c, BUFFER_WORLD_IMPULSE), 3 * points * sizeof *impulse, error);
 }

@@ -98,15 +98,6 @@ static sadmm_status step_create(struct sadmm_context *c, struct sadmm_error *err
     return SADMM_OK;
 }
 
-/* Through pinned memory that is free again when this returns. */
-static sadmm_status put(struct sadmm_context *c, enum cuda_buffer_name name, const void *from, size_t bytes,
-                        struct sadmm_error *error)
-{
-    TRY(CUDA(reserve)(c, PINNED_BODIES, bytes, error));
-    TRY(CUDA(upload)(c, c->buffers[name].data, PINNED_BODIES, 0, from, bytes, error));
-    return CUDA(wait)(c, error);
-}
-
 extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct sadmm_resident_world *world,
                                          const struct sadmm_settings *settings, struct sadmm_error *error)
 {
@@ -155,8 +146,9 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     TRY(COLLISION(upload)(s->collision, c->stream, world->contacts, error));
     s->into = 1 - COLLISION(current)(s->collision);
     const size_t before = (size_t)(1 - s->into);
-    TRY(put(c, BUFFER_WORLD_SLOTS, world->slot_of, n * sizeof *world->slot_of, error));
-    TRY(put(c, BUFFER_WORLD_PLACES, world->input->bodies, slots * sizeof *world->input->bodies, error));
+    TRY(CUDA(put)(c, c->buffers[BUFFER_WORLD_SLOTS].data, world->slot_of, n * sizeof *world->slot_of, error));
+    TRY(CUDA(put)(c, c->buffers[BUFFER_WORLD_PLACES].data, world->input->bodies, slots * sizeof *world->input->bodies,
+                  error));
     TRY(CUDA(reserve)(c, PINNED_BODIES, n * sizeof *world->rigid, error));
     TRY(CUDA(upload)(c, buffer<struct sadmm_rigid>(c, BUFFER_WORLD_BODIES) + before * n, PINNED_BODIES, 0,
                      world->rigid, n * sizeof *world->rigid, error));

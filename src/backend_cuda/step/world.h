@@ -132,7 +132,5 @@ struct joint_rows CUDA(joint_rows_of)(const struct sadmm_context *, int into);
 sadmm_status CUDA(load_joined)(struct sadmm_context *, const struct sadmm_resident_world *, struct sadmm_error *error);
 void CUDA(view_joined)(struct sadmm_context *, int into);
 sadmm_status CUDA(launch_joined)(struct sadmm_context *, bool after, struct sadmm_error *error);
-/* joints.cu: through pinned memory that is free again when this returns. */
-sadmm_status CUDA(put)(struct sadmm_context *, void *to, const void *from, size_t bytes, struct sadmm_error *error);
 
 #endif
