@@ -218,8 +218,8 @@ static __device__ __forceinline__ void factor_level(const joined_part &p, int32_
         for (int at = p.lane; at < JOINED_BLOCK; at += WARP)
             block[at] = joined_updated(&p.d, p.d.s.count + b, block[at], at / JOINED_ROWS, at % JOINED_ROWS);
         __syncwarp((unsigned)ALL_LANES);
-        if (p.lane < JOINED_ROWS)
-            joined_factor_row(block + JOINED_ROWS * p.lane, p.d.diagonal + JOINED_BLOCK * (size_t)column);
+        if (p.lane < JOINED_ROWS) /* L_ij = S_ij L_jj^-T */
+            joined_forward(p.d.diagonal + JOINED_BLOCK * (size_t)column, block + JOINED_ROWS * p.lane);
     }
     __syncthreads();
 }
@@ -393,19 +393,11 @@ sadmm_status CUDA(launch_joined)(struct sadmm_context *c, bool after, struct sad
 
 /* ---- to the device ----------------------------------------------------------------------------------------------- */
 
-/* Arrays of a view, one behind the other. */
-static double *take(char **memory, size_t bytes)
-{
-    double *at = (double *)*memory;
-    *memory += (bytes + 7) / 8 * 8;
-    return at;
-}
-
+/* Of a view: its work, then a state a row. */
 static size_t work_bytes(const struct cuda_step *s, const struct joined_structure *o)
 {
-    const size_t rows = (size_t)s->joint_constraints * SADMM_MAX_ROWS, places = (size_t)o->count;
-    return (84 * (size_t)s->bodies + 14 * rows + (JOINED_BLOCK + JOINED_ROWS) * places +
-            JOINED_BLOCK * (size_t)o->blocks) * sizeof(double) + rows + 8;
+    const size_t rows = (size_t)s->joint_constraints * SADMM_MAX_ROWS;
+    return joined_work_size(o, (size_t)s->bodies, rows) * sizeof(double) + rows;
 }
 
 /* The structure where it is on the device. */
@@ -421,11 +413,10 @@ static struct joined_structure moved(const struct sadmm_joined_order *order, con
 
 /* The view of a step that ends in `into`. */
 static struct joined_view view_of(const struct sadmm_context *c, int into, const struct joined_structure *s,
-                                  char *memory)
+                                  double *work)
 {
     const struct cuda_step *step = c->step;
-    const size_t n = (size_t)step->bodies, rows = (size_t)step->joint_constraints * SADMM_MAX_ROWS,
-                 places = (size_t)s->count;
+    const size_t n = (size_t)step->bodies, rows = (size_t)step->joint_constraints * SADMM_MAX_ROWS;
     const struct joint_rows set = CUDA(joint_rows_of)(c, into);
     struct joined_view d = {};
     d.s = *s;
@@ -436,17 +427,8 @@ static struct joined_view view_of(const struct sadmm_context *c, int into, const
     static_assert(sizeof(struct raw_row) % sizeof(double) == 0, "rows are strided");
     d.jacobian_stride = d.law_stride = (int32_t)(sizeof(struct raw_row) / sizeof(double));
     d.velocity = set.velocity;
-    d.A = take(&memory, 36 * n * sizeof(double));
-    d.factor = take(&memory, 36 * n * sizeof(double));
-    d.missing = take(&memory, 6 * n * sizeof(double));
-    d.dv = take(&memory, 6 * n * sizeof(double));
-    d.lambda = take(&memory, rows * sizeof(double));
-    d.change = take(&memory, rows * sizeof(double));
-    d.answer = take(&memory, 12 * rows * sizeof(double));
-    d.diagonal = take(&memory, JOINED_BLOCK * places * sizeof(double));
-    d.right = take(&memory, JOINED_ROWS * places * sizeof(double));
-    d.below = take(&memory, JOINED_BLOCK * (size_t)s->blocks * sizeof(double));
-    d.state = (uint8_t *)memory;
+    joined_bind_work(&d, work, n, rows);
+    d.state = (uint8_t *)(work + joined_work_size(s, n, rows));
     return d;
 }
 
@@ -484,8 +466,8 @@ static sadmm_status load_order(struct sadmm_context *c, const struct sadmm_joine
     TRY(CUDA(reserve)(c, BUFFER_JOINED_ORDER, numbers * sizeof(int32_t), error));
     int32_t *to = buffer<int32_t>(c, BUFFER_JOINED_ORDER), *order_at = to + (numbers - order->size);
     const struct joined_structure structure = moved(order, order_at);
-    for (int into = 0; into < 2; ++into)
-        views[into] = view_of(c, into, &structure, buffer<char>(c, BUFFER_JOINED) + sizeof views);
+    double *work = (double *)(buffer<char>(c, BUFFER_JOINED) + sizeof views);
+    for (int into = 0; into < 2; ++into) views[into] = view_of(c, into, &structure, work);
     TRY(CUDA(put)(c, buffer<char>(c, BUFFER_JOINED), views, sizeof views, error));
     TRY(CUDA(put)(c, order_at, order->memory, order->size * sizeof(int32_t), error));
     if (!list_direct(s, &order->s, &direct)) return sadmm_fail_memory(error, "the cuda backend's joined bodies");

@@ -63,6 +63,26 @@ struct joined_view {
     double *diagonal, *below, *right;       /* JOINED_BLOCK, JOINED_BLOCK, JOINED_ROWS */
 };
 
+/* Numbers that the work on so many bodies and rows takes, without `velocity` and `state`; and where they lie. */
+SADMM_INLINE size_t joined_work_size(const struct joined_structure *s, size_t bodies, size_t rows)
+{
+    return (2 * 36 + 2 * 6) * bodies + (2 + 2 * 6) * rows + (JOINED_BLOCK + JOINED_ROWS) * (size_t)s->count +
+           JOINED_BLOCK * (size_t)s->blocks;
+}
+SADMM_INLINE void joined_bind_work(struct joined_view *v, double *work, size_t bodies, size_t rows)
+{
+    v->A = work;
+    v->factor = v->A + 36 * bodies;
+    v->missing = v->factor + 36 * bodies;
+    v->dv = v->missing + 6 * bodies;
+    v->lambda = v->dv + 6 * bodies;
+    v->change = v->lambda + rows;
+    v->answer = v->change + rows;
+    v->diagonal = v->answer + 2 * 6 * rows;
+    v->right = v->diagonal + JOINED_BLOCK * (size_t)v->s.count;
+    v->below = v->right + JOINED_ROWS * (size_t)v->s.count;
+}
+
 SADMM_INLINE const struct sadmm_row_constraint *joined_at(const struct joined_view *v, int32_t place)
 {
     return &v->constraints[v->s.constraint[place]];
@@ -392,12 +412,6 @@ SADMM_INLINE double joined_updated(const struct joined_view *v, int32_t node, do
         entry -= sum;
     }
     return entry;
-}
-
-/* Row r of a block below: L_ij = S_ij L_jj^-T. */
-SADMM_INLINE void joined_factor_row(double *row, const double *diagonal)
-{
-    joined_forward(diagonal, row);
 }
 
 /* ---- solving with it --------------------------------------------------------------------------------------------- */

@@ -16,12 +16,13 @@ struct sadmm_joined {
     double *work;           /* the arrays of a view */
     uint8_t *state;
     double *impulse;        /* entries x 6: J^T lambda */
+    double *speed;          /* entries: that its part's impulses change it by; 0: the part is not solved */
     uint8_t *touched;       /* entries: by a contact */
     uint8_t *kept_part;     /* entries, a part's first: was it solved before the iterations? */
     bool kept;              /* velocities and multipliers from before the iterations are in: */
     double *kept_velocity, *kept_lambda; /* entries x 6; rows */
-    size_t bodies_capacity, entry_capacity, work_capacity, state_capacity, impulse_capacity, touched_capacity,
-        kept_part_capacity, kept_velocity_capacity, kept_lambda_capacity;
+    size_t bodies_capacity, entry_capacity, work_capacity, state_capacity, impulse_capacity, speed_capacity,
+        touched_capacity, kept_part_capacity, kept_velocity_capacity, kept_lambda_capacity;
 };
 
 /* One call. */
@@ -43,11 +44,13 @@ void sadmm_joined_destroy(struct sadmm_joined *j)
 {
     if (!j) return;
     sadmm_joined_order_free(&j->order);
-    void *blocks[] = {j->bodies,  j->entry,     j->work,          j->state,      j->impulse,
-                      j->touched, j->kept_part, j->kept_velocity, j->kept_lambda};
+    void *blocks[] = {j->bodies, j->entry,   j->work,      j->state,         j->impulse,
+                      j->speed,  j->touched, j->kept_part, j->kept_velocity, j->kept_lambda};
     for (size_t k = 0; k < sizeof blocks / sizeof *blocks; ++k) sadmm_free(blocks[k]);
     sadmm_free(j);
 }
+
+void sadmm_joined_begin(struct sadmm_joined *j) { j->kept = false; }
 
 /* ---- structure --------------------------------------------------------------------------------------------------- */
 
@@ -82,40 +85,39 @@ static bool find_order(const struct solving *s)
     return true;
 }
 
-static double *take(double **memory, size_t count)
-{
-    double *at = *memory;
-    *memory += count;
-    return at;
-}
-
 static bool make_view(struct solving *s)
 {
     struct sadmm_joined *j = s->j;
     struct sadmm_rows *rows = s->system->rows;
     const struct joined_structure *o = &j->order.s;
-    const size_t n = (size_t)s->system->body_count, r = rows->row_count, places = (size_t)o->count;
-    const size_t size = 84 * n + 14 * r + (JOINED_BLOCK + JOINED_ROWS) * places + JOINED_BLOCK * (size_t)o->blocks;
-    if (!sadmm_grow_empty(&j->work, &j->work_capacity, size, sizeof *j->work) ||
+    const size_t n = (size_t)s->system->body_count, r = rows->row_count;
+    if (!sadmm_grow_empty(&j->work, &j->work_capacity, joined_work_size(o, n, r), sizeof *j->work) ||
         !sadmm_grow_empty(&j->state, &j->state_capacity, r, sizeof *j->state) ||
         !sadmm_grow_empty(&j->impulse, &j->impulse_capacity, 6 * (size_t)o->bodies, sizeof *j->impulse) ||
+        !sadmm_grow_empty(&j->speed, &j->speed_capacity, (size_t)o->bodies, sizeof *j->speed) ||
         !sadmm_grow_empty(&j->touched, &j->touched_capacity, (size_t)o->bodies, sizeof *j->touched) ||
         !sadmm_grow_empty(&j->kept_part, &j->kept_part_capacity, (size_t)o->bodies, sizeof *j->kept_part) ||
         !sadmm_grow_empty(&j->kept_velocity, &j->kept_velocity_capacity, 6 * (size_t)o->bodies,
                           sizeof *j->kept_velocity) ||
         !sadmm_grow_empty(&j->kept_lambda, &j->kept_lambda_capacity, r, sizeof *j->kept_lambda))
         return false;
-    double *memory = j->work;
     s->view = (struct joined_view){
         .s = *o, .constraints = s->slots, .jacobian = {rows->jacobian_a, rows->jacobian_b}, .gain = rows->gain,
         .bias = rows->bias, .compliance = rows->compliance, .lo = rows->lo, .hi = rows->hi, .jacobian_stride = 6,
-        .law_stride = 1, .velocity = s->system->velocity, .A = take(&memory, 36 * n), .factor = take(&memory, 36 * n),
-        .missing = take(&memory, 6 * n), .dv = take(&memory, 6 * n), .lambda = take(&memory, r),
-        .change = take(&memory, r), .answer = take(&memory, 12 * r), .state = j->state,
-        .diagonal = take(&memory, JOINED_BLOCK * places), .right = take(&memory, JOINED_ROWS * places),
-        .below = take(&memory, JOINED_BLOCK * (size_t)o->blocks)};
+        .law_stride = 1, .velocity = s->system->velocity, .state = j->state};
+    joined_bind_work(&s->view, j->work, n, r);
     memcpy(s->view.lambda, rows->lambda, r * sizeof *rows->lambda);
     return true;
+}
+
+struct part {
+    int32_t place, end_place, entry, end_entry;
+};
+
+static struct part part_of(const struct joined_structure *o, int32_t k)
+{
+    return (struct part){o->first_of_level[o->first_level[k]], o->first_of_level[o->first_level[k + 1]],
+                         o->first_body[k], o->first_body[k + 1]};
 }
 
 /* ---- bodies ------------------------------------------------------------------------------------------------------ */
@@ -147,21 +149,22 @@ static void find_impulses(struct solving *s)
 }
 
 /* A, and b - A v + J^T lambda. */
-static void find_missing(struct solving *s)
+static void find_missing(const struct solving *s, const struct part *part)
 {
-    for (int32_t e = 0; e < s->view.s.bodies; ++e) {
+    for (int32_t e = part->entry; e < part->end_entry; ++e) {
         const size_t i = (size_t)s->view.s.body[e];
         double *A = s->view.A + 36 * i, b[6];
         sadmm_system_body(s->system, s->settings, (int32_t)i, A, b);
         joined_miss(&s->view, e, b, s->j->impulse + 6 * (size_t)e);
+        memcpy(s->view.factor + 36 * i, A, 36 * sizeof *A);
     }
 }
 
 /* The speed that its impulses change a part by. */
-static double speed_of(const struct solving *s, int32_t part)
+static double speed_of(const struct solving *s, const struct part *part)
 {
     double energy = 0, mass = 0;
-    for (int32_t e = s->view.s.first_body[part]; e < s->view.s.first_body[part + 1]; ++e) {
+    for (int32_t e = part->entry; e < part->end_entry; ++e) {
         const double *A = s->view.A + 36 * (size_t)s->view.s.body[e];
         energy += joined_energy(A, s->j->impulse + 6 * (size_t)e);
         mass += A[0];
@@ -169,42 +172,22 @@ static double speed_of(const struct solving *s, int32_t part)
     return joined_speed(energy, mass);
 }
 
-/* The factors of A + C. */
-static void factor_bodies(struct solving *s)
+/* C, to every part's A that is factored. */
+static void add_contacts(const struct solving *s)
 {
     const struct sadmm_contact_set *contacts = s->system->contacts;
-    for (int32_t part = 0; part < s->view.s.parts; ++part) {
-        const double speed = speed_of(s, part);
-        for (int32_t e = s->view.s.first_body[part]; e < s->view.s.first_body[part + 1]; ++e)
-            s->j->impulse[6 * (size_t)e] = speed; /* has been used */
-    }
-    for (int32_t e = 0; e < s->view.s.bodies; ++e) {
-        const size_t i = (size_t)s->view.s.body[e];
-        memcpy(s->view.factor + 36 * i, s->view.A + 36 * i, 36 * sizeof(double));
-    }
     for (size_t p = 0; p < contacts->pair_count; ++p) {
         const struct sadmm_contact_pair *pair = &contacts->pairs[p];
         for (int side = 0; side < 2; ++side) {
             const int32_t body = pair_body(pair, side), e = body >= 0 ? s->j->entry[body] : -1;
             if (e >= 0)
-                joined_add_contact(&contacts->points[pair->first], pair->count, side, s->j->impulse[6 * (size_t)e],
+                joined_add_contact(&contacts->points[pair->first], pair->count, side, s->j->speed[e],
                                    s->view.factor + 36 * (size_t)body);
         }
     }
-    for (int32_t e = 0; e < s->view.s.bodies; ++e) joined_factor_body(&s->view, e);
 }
 
 /* ---- a part ------------------------------------------------------------------------------------------------------ */
-
-struct part {
-    int32_t place, end_place, entry, end_entry;
-};
-
-static struct part part_of(const struct joined_structure *o, int32_t k)
-{
-    return (struct part){o->first_of_level[o->first_level[k]], o->first_of_level[o->first_level[k + 1]],
-                         o->first_body[k], o->first_body[k + 1]};
-}
 
 /* Every row of every place. */
 #define EACH_ROW(view, part, p, constraint, r)                                                        \
@@ -292,6 +275,7 @@ static bool solve_part(const struct solving *s, const struct part *part)
 {
     const struct joined_view *v = &s->view;
     bool solved = false;
+    for (int32_t e = part->entry; e < part->end_entry; ++e) joined_factor_body(v, e);
     begin_rows(v, part);
     for (int pass = 0; pass < JOINED_PASSES && !solved; ++pass) {
         factorize(v, part);
@@ -312,6 +296,12 @@ static bool is_touched(const struct sadmm_joined *j, const struct part *part)
     for (int32_t e = part->entry; e < part->end_entry; ++e)
         if (j->touched[e]) return true;
     return false;
+}
+
+/* Is it after the iterations as it was solved before them? No contact touches it. */
+static bool is_kept(const struct sadmm_joined *j, const struct part *part)
+{
+    return j->kept_part[part->entry] && !is_touched(j, part);
 }
 
 /* What the momentum misses is the contacts' to mend in the paper's method: its velocity is not the one that goes with
@@ -347,17 +337,28 @@ sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_
     struct solving s = {
         .j = joined, .system = system, .slots = slots, .slot_count = slot_count, .settings = settings};
     if (!find_order(&s) || !make_view(&s)) return sadmm_fail_memory(error, "joined bodies");
-    find_impulses(&s);
-    find_missing(&s);
-    factor_bodies(&s);
+    const bool kept = after && joined->kept; /* by the same contacts */
+    bool all_kept = kept;
+    for (int32_t k = 0; k < s.view.s.parts && all_kept; ++k) {
+        const struct part part = part_of(&s.view.s, k);
+        all_kept = is_kept(joined, &part);
+    }
+    if (!all_kept) find_impulses(&s);
     for (int32_t k = 0; k < s.view.s.parts; ++k) {
         const struct part part = part_of(&s.view.s, k);
-        const bool touched = is_touched(joined, &part);
-        if (after && joined->kept && !touched && joined->kept_part[part.entry]) {
+        const bool solves = !(kept && is_kept(joined, &part));
+        if (solves) find_missing(&s, &part);
+        const double speed = solves ? speed_of(&s, &part) : 0;
+        for (int32_t e = part.entry; e < part.end_entry; ++e) joined->speed[e] = speed;
+    }
+    if (!all_kept) add_contacts(&s);
+    for (int32_t k = 0; k < s.view.s.parts; ++k) {
+        const struct part part = part_of(&s.view.s, k);
+        if (kept && is_kept(joined, &part)) {
             take_kept(&s, &part);
             continue;
         }
-        if (touched && settings->method == SADMM_METHOD_PAPER) leave_to_contacts(&s.view, &part);
+        if (is_touched(joined, &part) && settings->method == SADMM_METHOD_PAPER) leave_to_contacts(&s.view, &part);
         const bool solved = solve_part(&s, &part);
         if (!after) keep_part(&s, &part, solved);
     }

@@ -34,10 +34,13 @@ void sadmm_joined_destroy(struct sadmm_joined *joined);
 /* Constraints at one body; more of them are left to the iteration, since all are coupled to each other. */
 enum { SADMM_JOINED_AROUND = 64 };
 
+/* A step, or sub-step, begins: nothing of the last one is kept, however that ended. */
+void sadmm_joined_begin(struct sadmm_joined *joined);
+
 /* system->velocity and the multipliers of system->rows, in place. slots: constraints of these rows, at places that stay
  * from step to step, so that the order does, too: one may have no rows at the time, but has the bodies that it joins
- * when it has. What does not fit a direct solve is left as it is. after: the
- * iterations have come; parts without contacts then get back what they had before these, which is their solution.
+ * when it has. What does not fit a direct solve is left as it is. after: the iterations have come; parts without
+ * contacts then get back what they had before these, which is their solution. Contacts are then those of that call.
  * Errors: OUT_OF_MEMORY, nothing has changed. */
 sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_system *system,
                                 const struct sadmm_row_constraint *slots, size_t slot_count,

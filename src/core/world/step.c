@@ -179,6 +179,7 @@ static sadmm_status make_plan(struct host_step *step)
     world->plan = sadmm_plan_make(&step->system, &step->settings);
     step->report = sadmm_solve_report_empty(world->kernels);
     TRY(keep_start(world, &depth));
+    if (world->joined) sadmm_joined_begin(world->joined);
     if (world->plan.warm_start) TRY(solve_joined(step, false));
     step->depth = depth > step->depth ? depth : step->depth;
     return SADMM_OK;
