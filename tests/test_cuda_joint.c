@@ -101,7 +101,7 @@ START_TEST(gears_and_tables_are_the_hosts)
         sadmm_gear_state state;
         MUST(worlds[w], sadmm_world_gear_at(worlds[w], 0, &gear));
         MUST(worlds[w], sadmm_world_gear_state(worlds[w], gear, &state));
-        ck_assert(fabs(state.error) < 1e-4 && state.force_1 != 0);
+        ck_assert(fabs(state.error) < 1e-4 && state.force_1 != 0); /* rad: what a step leaves of it is fed back */
         sadmm_world_destroy(worlds[w]);
     }
 }

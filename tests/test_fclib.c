@@ -661,7 +661,7 @@ START_TEST(joints_to_file)
     solve(read, 1e-10);
     solve(frozen, 1e-10);
     ck_assert_int_eq(sadmm_problem_get_solution(read, v, NULL, lambda), SADMM_OK);
-    for (int r = 0; r < ROWS; ++r) {
+    for (int r = 0; r < ROWS; ++r) { /* solved to 1e-10, below too; three digits for the problem's scale */
         double x = b[r];
         for (int k = 0; k < N; ++k) x += G[k * ROWS + r] * v[k];
         ck_assert_msg(fabs(x) < 1e-7, "row %d: %g", r, x);

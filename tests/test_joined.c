@@ -246,6 +246,7 @@ START_TEST(mechanisms_are_solved_by_one_iteration)
          * that are pulled at some m/s on 10 g, 1e4 m/s and more. The iteration alone is off by some m/s. */
         ck_assert_msg(certificate.ncp_max < 1e-4, "mechanism %d, step %d: natural map %g", _i, step,
                       certificate.ncp_max);
+        /* to rounding: velocities and multipliers are of one solution, in double */
         ck_assert_msg(certificate.momentum_max < 1e-9, "mechanism %d, step %d: momentum %g", _i, step,
                       certificate.momentum_max);
     }

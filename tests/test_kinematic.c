@@ -337,8 +337,8 @@ START_TEST(joints_hold_on_to_it)
 }
 END_TEST
 
-/* A bead on a rod that turns: r'' = w^2 r along it, r = r_0 cosh(w t), to second order in dt: twice the steps, a quarter of
- * the error. */
+/* A bead on a rod that turns: r'' = w^2 r along it, r = r_0 cosh(w t), to second order in dt: twice the steps, a
+ * quarter of the error. */
 START_TEST(a_bead_leaves_along_a_turning_rod)
 {
     enum { STEPS = 50 };
@@ -366,6 +366,7 @@ START_TEST(a_bead_leaves_along_a_turning_rod)
         expect_near(atan2(s.position[1], s.position[0]), w * t, 2e-4, "angle");
         sadmm_world_destroy(world);
     }
+    /* (w dt)^2 of the radius is 1.2e-4 m; a quarter of it at half the step, and a little for the next order */
     ck_assert_msg(fabs(error[0]) < 1e-4, "%g m", error[0]);
     ck_assert_msg(fabs(error[1]) < 0.3 * fabs(error[0]), "%g and %g m", error[0], error[1]);
 }
@@ -740,11 +741,10 @@ START_TEST(problems_have_velocities)
     }
     sadmm_settings settings = sadmm_settings_default();
     settings.iterations = 500;
-    for (int precision = 0; precision < 2; ++precision) {
-        ck_assert_int_eq(sadmm_problem_solve(problem, solvers[_i].backend, solvers[_i].precision, &settings, &report),
-                         SADMM_OK);
-        ck_assert_msg(report.certificate.ncp_max < 1e-5, "%g", report.certificate.ncp_max);
-    }
+    ck_assert_int_eq(sadmm_problem_solve(problem, solvers[_i].backend, solvers[_i].precision, &settings, &report),
+                     SADMM_OK);
+    /* m/s: of velocities of 0.25, and impulses of 1, some tens of single precision's roundings; here and below */
+    ck_assert_msg(report.certificate.ncp_max < 1e-5, "%g", report.certificate.ncp_max);
     ck_assert_int_eq(sadmm_problem_get_solution(problem, v, NULL, NULL), SADMM_OK);
     /* the first one sticks: an impulse of 2 kg x 0.1 m/s of the 0.5 there is; the other one slips at 0.5 / 2 m/s */
     expect_near(v[0], 0.1, 1e-5, "it goes with the ground");

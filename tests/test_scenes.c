@@ -268,10 +268,10 @@ START_TEST(bad_specs_are_refused)
     static const struct {
         const char *spec, *message;
     } bad[] = {
-        { "", "must be one of sliding_cubes[:N], vertical_stacks" },
+        { "", "must be one of sliding_cubes[:N[:doors]], vertical_stacks" },
         { "sliding_cube", "must be one of" },
         { "sliding_cubesx", "must be one of" },
-        { "a name that is so long that it must be cut for the list to fit", "falling_chain[:N]" },
+        { "a name that is so long that it must be cut for the list to fit", "mixer[:N]" },
         { ":5", "must be one of" },
         { "sliding_cubes:", "must be a whole number in [1, 1000000]" },
         { "sliding_cubes:abc", "\"sliding_cubes:abc\": N must be a whole number" },
@@ -329,6 +329,31 @@ START_TEST(a_chain_has_its_weight)
 }
 END_TEST
 
+/* Doors swing, and the raft slides as without them: to the same bits, since they are islands of their own. */
+START_TEST(doors_leave_the_raft_alone)
+{
+    double at[2][3];
+    for (int doors = 0; doors < 2; ++doors) {
+        struct sadmm_scene scene = open_scene(doors ? "sliding_cubes:30:3" : "sliding_cubes:30");
+        sadmm_world *world = build_scene(&scene);
+        ck_assert_int_eq(sadmm_world_joint_count(world), 3 * doors);
+        step_world(world, 200);
+        const sadmm_body_id last = body_at(world, sadmm_world_body_count(world) - 1);
+        memcpy(at[doors], body_state(world, last).position, sizeof at[doors]);
+        if (doors) {
+            sadmm_joint_id hinge;
+            sadmm_joint_state state;
+            MUST(world, sadmm_world_joint_at(world, 2, &hinge));
+            MUST(world, sadmm_world_joint_state(world, hinge, &state));
+            ck_assert_double_gt(fabs(state.position[5]), 0.1); /* it began to swing from an angle of 0 */
+            ck_assert_int_eq(world_report(world).joints, 3);
+        }
+        sadmm_world_destroy(world);
+    }
+    ck_assert_int_eq(memcmp(at[0], at[1], sizeof at[0]), 0);
+}
+END_TEST
+
 START_TEST(bad_builds_are_refused)
 {
     struct sadmm_scene scene = open_scene("incline");
@@ -364,6 +389,7 @@ int main(void)
     tcase_add_test(cases, the_list_has_no_twins);
     tcase_add_test(cases, bad_specs_are_refused);
     tcase_add_test(cases, a_chain_has_its_weight);
+    tcase_add_test(cases, doors_leave_the_raft_alone);
     tcase_add_test(cases, bad_builds_are_refused);
     tcase_add_loop_test(cases, every_scene_builds_and_steps, 0, (int)sadmm_scene_count());
     tcase_add_test(cases, sliding_cubes_have_n_cubes);

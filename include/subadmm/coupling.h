@@ -84,8 +84,8 @@ SADMM_API sadmm_status sadmm_world_set_coupling_enabled(sadmm_world *world, sadm
  * the geometry of its middle: all 0 before the first one, and where the coupling did not take part. All in the world
  * frame. */
 typedef struct sadmm_coupling_state {
-    double felt_force[3], felt_torque[3]; /* what the user feels, the reaction to what the body gets: N, and N m about the
-                                             target's origin */
+    double felt_force[3], felt_torque[3]; /* what the user feels, the reaction to what the body gets: N, and N m about
+                                             the target's origin */
     double body_force[3], body_torque[3]; /* on the body: N, and N m about its centre of mass */
     double position_error[3];    /* from the frame's origin to the target's, m */
     double rotation_error[3];    /* rotation vector that turns the frame's axes to the target's, rad, of at most pi */

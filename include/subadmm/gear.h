@@ -27,8 +27,8 @@ typedef struct sadmm_gear_id { uint32_t slot, generation; } sadmm_gear_id;
 
 typedef struct sadmm_gear_def {
     sadmm_joint_id joint_1, joint_2; /* may be the same, with two coordinates. No default */
-    int32_t coordinate_1, coordinate_2; /* free ones, in [0, 6): any translation or distance; rotations that are the only
-                                           free one or one of two. No default */
+    int32_t coordinate_1, coordinate_2; /* free ones, in [0, 6): any translation or distance; rotations that are the
+                                           only free one or one of two. No default */
     double ratio;                /* |ratio| in [1e-9, 1e9], unit of coordinate 1 over that of 2; default 1 */
     double offset;               /* |offset| <= 1e9, unit of coordinate 1, or NaN: as it is when the gear is added (what
                                     is read back); default NaN */
@@ -57,8 +57,8 @@ SADMM_API sadmm_status sadmm_world_set_gear_enabled(sadmm_world *world, sadmm_ge
 typedef struct sadmm_gear_state {
     double error;                /* q_1 + ratio q_2 - offset of the present poses, unit of coordinate 1 */
     double force_1, force_2;     /* along the coordinates, N or N m; force_2 = ratio force_1. Mean over the last
-                                    (sub-)step; 0 before the first one and where the gear did not take part. They are not
-                                    in the joints' own wrenches */
+                                    (sub-)step; 0 before the first one and where the gear did not take part. They are
+                                    not in the joints' own wrenches */
 } sadmm_gear_state;
 
 /* Errors: STALE_ID, DEVICE. */

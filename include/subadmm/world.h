@@ -124,25 +124,26 @@ SADMM_API sadmm_status sadmm_world_body_state(sadmm_world *world, sadmm_body_id 
  * definition, velocities 0 for static bodies. Contacts lose accuracy beyond the ranges of the definition.
  * A pose other than the body has is a jump: the body's contacts are found as those of bodies that never touched before,
  * without what was known of the side they came from. Velocities may be set with the pose that was read.
- * Of a kinematic body: where it is, and how it moves from then on, until set again. A belt that stays where it is has its
- * pose set back before every step; what lies on it goes by the velocity.
+ * Of a kinematic body: where it is, and how it moves from then on, until set again. A belt that stays where it is has
+ * its pose set back before every step; what lies on it goes by the velocity.
  * Errors: STALE_ID, INVALID_ARGUMENT (nothing changes). */
 SADMM_API sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, const sadmm_body_state *state);
-/* Let a kinematic body go to a pose (m, |x| <= 1e9; w x y z, as in the definition) within the next step, by the constant
- * velocity that brings it there, a turn by the shorter way; contacts and joints feel that velocity. Then it is there, to
- * the last bit, and at rest. Setting its state first takes that back. Errors: STALE_ID, INVALID_ARGUMENT (range; a body
- * that is not kinematic; nothing changes). */
+/* Let a kinematic body go to a pose (m, |x| <= 1e9; w x y z, as in the definition) within the next step, by the
+ * constant velocity that brings it there, a turn by the shorter way; contacts and joints feel that velocity. Then it is
+ * there, to the last bit, and at rest. Setting its state first takes that back. Errors: STALE_ID, INVALID_ARGUMENT
+ * (range; a body that is not kinematic; nothing changes). */
 SADMM_API sadmm_status sadmm_world_move_body(sadmm_world *world, sadmm_body_id id, const double position[3],
                                              const double orientation[4]);
-/* Read back the definition (mass, inertia, type, name, scale of gravity, damping) with the current state. The name is the world's own: it stays
- * where it is, and valid, until the body is removed or the world destroyed. Errors: STALE_ID, DEVICE. */
+/* Read back the definition (mass, inertia, type, name, scale of gravity, damping) with the current state. The name is
+ * the world's own: it stays where it is, and valid, until the body is removed or the world destroyed. Errors: STALE_ID,
+ * DEVICE. */
 SADMM_API sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id, sadmm_body_def *def);
 /* External force (N) at the centre of mass and torque (N m), world frame, each component within +-1e15; kept until set
  * again. Errors: STALE_ID, INVALID_ARGUMENT (range; a body that is not dynamic). */
 SADMM_API sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, const double force[3],
                                                    const double torque[3]);
-/* Replace the scale of gravity, or damping (1/s), of a body, ranges and meaning as in the definition, from the next step
- * on. Errors: STALE_ID, INVALID_ARGUMENT (range; a body that is not dynamic; nothing changes), DEVICE. */
+/* Replace the scale of gravity, or damping (1/s), of a body, ranges and meaning as in the definition, from the next
+ * step on. Errors: STALE_ID, INVALID_ARGUMENT (range; a body that is not dynamic; nothing changes), DEVICE. */
 SADMM_API sadmm_status sadmm_world_set_body_gravity_scale(sadmm_world *world, sadmm_body_id id, double scale);
 SADMM_API sadmm_status sadmm_world_set_body_damping(sadmm_world *world, sadmm_body_id id, double linear,
                                                     double angular);
@@ -250,12 +251,13 @@ SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_s
 SADMM_API sadmm_status sadmm_world_step(sadmm_world *world);
 
 /* Begin a step and return without waiting for it, where the backend can: CUDA, in the method FAST from the second
- * step on; not in worlds with kinematic bodies, not with a residual_tolerance, nor with a certificate_tolerance in
- * the method PAPER or with more than 64 convergence checks a step. Elsewhere the same as sadmm_world_step. Steps run
- * in order, a few of them at a time; states, wrenches and settings set in between take effect at the next one.
- * Getters wait for the steps begun so far. Errors: as sadmm_world_step; they may be those of an earlier step, and
- * then nothing after that step has been done (sadmm_step_report.step counts what has). With settings.certify the step
- * is waited for. One thread at a time a world; different worlds are independent, also on one device. */
+ * step on; not in worlds with kinematic bodies, gears (gear.h) or tables of springs (joint.h), not with a
+ * residual_tolerance, nor with a certificate_tolerance in the method PAPER or with more than 64 convergence checks a
+ * step. Elsewhere the same as sadmm_world_step. Steps run in order, a few of them at a time; states, wrenches and
+ * settings set in between take effect at the next one. Getters wait for the steps begun so far. Errors: as
+ * sadmm_world_step; they may be those of an earlier step, and then nothing after that step has been done
+ * (sadmm_step_report.step counts what has). With settings.certify the step is waited for. One thread at a time a world;
+ * different worlds are independent, also on one device. */
 SADMM_API sadmm_status sadmm_world_step_async(sadmm_world *world);
 /* Wait until all steps begun are done; at once when there are none. Errors: the first one of a step, see above. One
  * thread at a time a world. */
@@ -341,8 +343,9 @@ SADMM_API sadmm_status sadmm_world_state_hash(sadmm_world *world, uint64_t *hash
 SADMM_API size_t sadmm_world_explain(sadmm_world *world, char *text, size_t size);
 
 /* Freeze the contact problem of the last step, or sub-step (bodies, contacts, rows of joints, its starting values),
- * into `problem`. Kinematic bodies are -1 there, their contacts have a velocity. The k-th dynamic body in slot order is body k. Errors: UNAVAILABLE before the first step, after a
- * removal, and where a failed step took the last one's contacts along (sadmm_world_contact_count); OUT_OF_MEMORY. */
+ * into `problem`. The k-th dynamic body in slot order is body k. Kinematic bodies are -1 there, their contacts have a
+ * velocity. Errors: UNAVAILABLE before the first step, after a removal, and where a failed step took the last one's
+ * contacts along (sadmm_world_contact_count); OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_freeze(sadmm_world *world, sadmm_problem *problem);
 
 #ifdef __cplusplus

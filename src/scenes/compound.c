@@ -5,6 +5,17 @@
 
 #include "core/math/quat.h"
 
+struct sadmm_part sadmm_part_at(sadmm_shape_type type, double x, double y, double z, double a, double b, double c,
+                                double mass)
+{
+    struct sadmm_part part = {.shape = sadmm_shape_def_default(), .mass = mass};
+    const double at[3] = {x, y, z}, size[3] = {a, b, c};
+    part.shape.type = type;
+    memcpy(part.shape.position, at, sizeof at);
+    memcpy(part.shape.size, size, sizeof size);
+    return part;
+}
+
 void sadmm_part_inertia(const struct sadmm_part *part, double inertia[3])
 {
     const double *size = part->shape.size;

@@ -12,6 +12,10 @@ struct sadmm_part {
     double mass;           /* kg */
 };
 
+/* A part at (x, y, z), of size a, b, c (sadmm_shape_def.size; 0 where its type has none), not turned. */
+struct sadmm_part sadmm_part_at(sadmm_shape_type type, double x, double y, double z, double a, double b, double c,
+                                double mass);
+
 /* A body of `count` in [1, SADMM_COMPOUND_MOST] parts, laid out in `frame`: its centre of mass, principal axes and
  * moments are those of the parts together (parts that overlap count twice). `id` may be NULL. */
 sadmm_status sadmm_place_compound(sadmm_world *world, struct sadmm_frame frame, const struct sadmm_part *parts,

@@ -56,30 +56,20 @@ static const double z_to_x[4] = {0.70710678118654752440, 0, 0.707106781186547524
 
 static struct sadmm_part capsule_part(double length, double radius, double mass)
 {
-    struct sadmm_part part = {.shape = sadmm_shape_def_default(), .mass = mass};
-    part.shape.type = SADMM_SHAPE_CAPSULE;
-    part.shape.size[0] = radius;
-    part.shape.size[1] = fabs(length) / 2;
-    part.shape.position[0] = length / 2;
+    struct sadmm_part part =
+        sadmm_part_at(SADMM_SHAPE_CAPSULE, length / 2, 0, 0, radius, fabs(length) / 2, 0, mass);
     memcpy(part.shape.orientation, z_to_x, sizeof z_to_x);
     return part;
 }
 
 static struct sadmm_part sphere_part(double radius, double mass)
 {
-    struct sadmm_part part = {.shape = sadmm_shape_def_default(), .mass = mass};
-    part.shape.type = SADMM_SHAPE_SPHERE;
-    part.shape.size[0] = radius;
-    return part;
+    return sadmm_part_at(SADMM_SHAPE_SPHERE, 0, 0, 0, radius, 0, 0, mass);
 }
 
 static struct sadmm_part box_part(const double half[3], double x, double mass)
 {
-    struct sadmm_part part = {.shape = sadmm_shape_def_default(), .mass = mass};
-    part.shape.type = SADMM_SHAPE_BOX;
-    memcpy(part.shape.size, half, sizeof part.shape.size);
-    part.shape.position[0] = x;
-    return part;
+    return sadmm_part_at(SADMM_SHAPE_BOX, x, 0, 0, half[0], half[1], half[2], mass);
 }
 
 /* A drive that holds an angle: N m/rad, of at most `torque` N m, damped over 20 ms. */

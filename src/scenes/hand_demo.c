@@ -30,12 +30,8 @@ static const double table_height = 0.7; /* m, above the floor */
 static struct sadmm_part part(sadmm_shape_type type, double x, double y, double z, double a, double b, double c,
                               double mass)
 {
-    struct sadmm_part p = {.shape = sadmm_shape_def_default(), .mass = mass};
-    const double at[3] = {x, y, z}, size[3] = {a, b, c};
-    p.shape.type = type;
+    struct sadmm_part p = sadmm_part_at(type, x, y, z, a, b, c, mass);
     p.shape.friction = 0.9;
-    memcpy(p.shape.position, at, sizeof at);
-    memcpy(p.shape.size, size, sizeof size);
     return p;
 }
 

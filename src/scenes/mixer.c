@@ -37,12 +37,8 @@ static sadmm_status place_wall(sadmm_world *world, int side, struct sadmm_error 
 
 static struct sadmm_part box(double x, double y, double z, double hx, double hy, double hz, double mass)
 {
-    struct sadmm_part part = {.shape = sadmm_shape_def_default(), .mass = mass};
-    const double at[3] = {x, y, z}, half[3] = {hx, hy, hz};
-    part.shape.type = SADMM_SHAPE_BOX;
+    struct sadmm_part part = sadmm_part_at(SADMM_SHAPE_BOX, x, y, z, hx, hy, hz, mass);
     part.shape.friction = 0.4;
-    memcpy(part.shape.position, at, sizeof at);
-    memcpy(part.shape.size, half, sizeof half);
     return part;
 }
 

@@ -97,10 +97,8 @@ static sadmm_status fill(const struct sadmm_scene *scene, sadmm_world *world, st
         sadmm_body_id ids[PARTS];
         for (int k = 0; k < PARTS && status == SADMM_OK; ++k) {
             const struct limb *l = &limbs[k];
-            struct sadmm_part part = {.shape = sadmm_shape_def_default(), .mass = l->mass};
-            part.shape.type = SADMM_SHAPE_CAPSULE;
-            part.shape.size[0] = l->radius;
-            part.shape.size[1] = l->half_length;
+            struct sadmm_part part =
+                sadmm_part_at(SADMM_SHAPE_CAPSULE, 0, 0, 0, l->radius, l->half_length, 0, l->mass);
             if (l->axis == 1) memcpy(part.shape.orientation, along_y, sizeof along_y);
             const struct sadmm_frame at = sadmm_frame_moved(doll, l->centre[0], l->centre[1], l->centre[2]);
             status = sadmm_place_compound(world, at, &part, 1, NULL, &ids[k], error);

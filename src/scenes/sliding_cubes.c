@@ -8,6 +8,8 @@
  * The slope is steeper than its friction angle and cubes grip one another better than the slope, so that a raft slides
  * as a whole and no contact is lost on the way. The grid is turned against the downhill direction: friction that is
  * not isotropic would bend the path.
+ *
+ * Doors beside the raft, which meet nothing, tell what bodies with joints cost a scene that has few of them.
  */
 #include <math.h>
 #include <string.h>
@@ -15,6 +17,7 @@
 #include "core/base/memory.h"
 #include "family.h"
 #include "place.h"
+#include "subadmm/joint.h"
 
 static const double half = 0.05;       /* m */
 static const double pitch = 0.11;      /* m: gaps of 10 mm, five times the speculative margin */
@@ -65,6 +68,26 @@ static sadmm_status fill_layer(sadmm_world *world, struct sadmm_frame base, cons
     return SADMM_OK;
 }
 
+/* Leaves of 20 kg, 1 x 2 m, uphill of the raft, that swing about axes normal to the slope. */
+static sadmm_status add_doors(sadmm_world *world, struct sadmm_frame base, long count, struct sadmm_error *error)
+{
+    static const struct sadmm_piece leaf = {.half_extents = {0.02, 0.5, 1}, .mass = 20, .friction = cube_friction};
+    sadmm_status status = SADMM_OK;
+    for (long k = 0; k < count && status == SADMM_OK; ++k) {
+        const struct sadmm_frame hinge = sadmm_frame_moved(base, -2 - 2 * (double)(k / 10), 2 * (double)(k % 10), 1.1),
+                                 middle = sadmm_frame_moved(hinge, 0, 0.5, 0);
+        sadmm_joint_def def = sadmm_joint_def_default();
+        def.kind = SADMM_JOINT_REVOLUTE;
+        def.body_a = (sadmm_body_id){0, 0}; /* the static world */
+        status = sadmm_place_box(world, middle, &leaf, &def.body_b, error);
+        if (status != SADMM_OK) return status;
+        status = sadmm_world_place_joint(world, &def, hinge.origin, hinge.orientation);
+        if (status == SADMM_OK) status = sadmm_world_add_joint(world, &def, NULL);
+        status = sadmm_scene_world_error(world, status, error);
+    }
+    return status;
+}
+
 static sadmm_status fill(const struct sadmm_scene *scene, sadmm_world *world, struct sadmm_error *error)
 {
     struct sadmm_frame base = sadmm_frame_turned(sadmm_frame_world(), 1, atan(slope));
@@ -78,6 +101,8 @@ static sadmm_status fill(const struct sadmm_scene *scene, sadmm_world *world, st
     status = layers[0].present && layers[1].present ? SADMM_OK : sadmm_fail_memory(error, "the layers of the scene");
     if (status == SADMM_OK)
         status = sadmm_place_plane(world, base, slope_friction * slope_friction / cube_friction, error);
+    if (status == SADMM_OK)
+        status = add_doors(world, sadmm_frame_moved(base, -pitch * (double)columns, 0, 0), scene->m, error);
     base = sadmm_frame_turned(base, 2, turn);
     for (long level = 0; status == SADMM_OK && (level == 0 || upper > 0) && level < rows; ++level) {
         struct layer *layer = &layers[level % 2];
@@ -100,12 +125,13 @@ static void configure(long n, sadmm_world_def *def)
 const struct sadmm_scene_family sadmm_family_sliding_cubes = {
     .info = {
         .name = "sliding_cubes",
-        .arguments = "[:N]",
-        .description = "N cubes of 1 kg in a layered raft that slides down a slope (N in [1, 1000000], default 2000)",
+        .arguments = "[:N[:doors]]",
+        .description = "N cubes of 1 kg in a layered raft that slides down a slope (N in [1, 1000000], default 2000); "
+                       "doors beside it (in [0, 1000], default 0)",
         .duration = 5.0,
         .iterations = {[SADMM_METHOD_PAPER] = 120, [SADMM_METHOD_FAST] = 20},
     },
-    .n_default = 2000, .n_min = 1, .n_max = 1000000,
+    .n_default = 2000, .n_min = 1, .n_max = 1000000, .m_max = 1000,
     .configure = configure,
     .fill = fill,
 };

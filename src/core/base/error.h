@@ -8,7 +8,7 @@
 extern "C" {
 #endif
 
-enum { SADMM_MESSAGE_SIZE = 320 };
+enum { SADMM_MESSAGE_SIZE = 768 };
 
 struct sadmm_error {
     sadmm_status status;

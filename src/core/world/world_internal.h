@@ -200,7 +200,8 @@ struct sadmm_world {
         double *solution;                    /* of their rows */
         uint32_t *edited_joints;             /* slots of joints with `edits`; capacity: all */
         int32_t joint_count, joint_constraints, coupling_count;
-        size_t joint_capacity, memory_capacity, coupling_memory_capacity, joint_slot_capacity, solution_capacity, edited_joint_count,
+        size_t joint_capacity, memory_capacity, coupling_memory_capacity, joint_slot_capacity, solution_capacity,
+            edited_joint_count,
             edited_joint_capacity;
     } resident;
 
@@ -214,13 +215,14 @@ struct sadmm_world {
 
 /* ---- driven.c ---- */
 
-/* Kinematic bodies in slot order into `driven` and `start`, and numbers of theirs for collision, which has their poses. */
+/* Kinematic bodies in slot order into `driven` and `start`, and numbers of theirs for collision, which has their
+ * poses. */
 sadmm_status sadmm_world_gather_driven(sadmm_world *world);
 /* Kinematic body in slot `slot`: it is one from here on, or no more. */
 bool sadmm_world_add_driven(sadmm_world *world, int32_t slot);
 void sadmm_world_remove_driven(sadmm_world *world, int32_t slot);
-/* Islands that ride on a kinematic body are solved as what they are in its motion: system->carried, and system->velocity
- * less that; and back. */
+/* Islands that ride on a kinematic body are solved as what they are in its motion: system->carried, and
+ * system->velocity less that; and back. */
 sadmm_status sadmm_world_carry(sadmm_world *world, struct sadmm_system *system);
 void sadmm_world_put_down(sadmm_world *world, const struct sadmm_system *system);
 /* Where they are after the (sub-)step. NON_FINITE. */
@@ -330,8 +332,8 @@ sadmm_status sadmm_world_contain(sadmm_world *world, sadmm_status status);
 
 /* Joints of a world that is about to be loaded, into resident.joints and what is beside it. */
 sadmm_status sadmm_world_list_joints(sadmm_world *world);
-/* A joint's coordinate, whether it is enabled, or its target has been set: the next step takes it along. False: the backend has no
- * room for its rows, the world is to be taken back. */
+/* A joint's coordinate, whether it is enabled, or its target has been set: the next step takes it along. False: the
+ * backend has no room for its rows, the world is to be taken back. */
 bool sadmm_world_edit_joint(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit);
 /* Edits into resident.edits, from *count on. */
 sadmm_status sadmm_world_list_joint_edits(sadmm_world *world, size_t *count);
