@@ -41,6 +41,11 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     double A[36], b[6], x[6], factor[36];
     const struct sadmm_settings settings = *v.model.settings;
     sadmm_system_body(&v.raw.system, &settings, i, A, b);
+    if (v.joints.count > 0 && v.joints.is_direct[i]) {
+        const struct cuda_joined_body body = {A[0],  {A[21], A[28], A[35], A[22], A[23], A[29]},
+                                              {b[0], b[1], b[2], b[3], b[4], b[5]}};
+        v.joints.bodies[i] = body;
+    }
     if (v.model.warm_start || !dense6_cholesky(A, factor)) {
         for (int k = 0; k < 6; ++k) x[k] = v.raw.system.velocity[6 * (size_t)i + (size_t)k];
     } else {
@@ -128,6 +133,12 @@ static __device__ __noinline__ int32_t store_driven(const cuda_view &v, const st
     return row;
 }
 
+static __device__ __forceinline__ bool touches_joined(const joint_view &joints, const struct sadmm_contact_pair *pair)
+{
+    return (pair->body_a >= 0 && joints.is_direct[pair->body_a]) ||
+           (pair->body_b >= 0 && joints.is_direct[pair->body_b]);
+}
+
 /* contacts.lanes threads a pair, each every contacts.lanes-th point; the first also what the points share. FAST:
  * records of sides, too. BOUNCES: a pair may have restitution. */
 template <bool FAST, bool BOUNCES>
@@ -138,6 +149,7 @@ static __global__ void __launch_bounds__(BODY_THREADS)
                   lane = t % v.contacts.lanes;
     const bool live = p < live_pairs(v.model);
     const struct sadmm_contact_pair *pair = &v.raw.pairs[live ? p : 0];
+    if (v.joints.count > 0 && live && lane == 0 && touches_joined(v.joints, pair)) v.step.control->joints.together = 1;
     if (!FAST && !live) return;
     /* Those that count are fetched here, not where they are needed. */
     const struct sadmm_settings settings = *v.model.settings;

@@ -74,7 +74,7 @@ static const char *const buffer_names[] = {
     "rows of joints",
     "islands of joints",
     "joined bodies",
-    "order of joined bodies",
+    "contacts of joined bodies",
     "staged counts",
     "staged settings",
     "staged bodies",

@@ -27,7 +27,7 @@ enum cuda_buffer_name {
     BUFFER_WORLD_BODIES, BUFFER_WORLD_STEADY, BUFFER_WORLD_WRENCH, BUFFER_WORLD_VELOCITY, BUFFER_WORLD_IMPULSE,
     BUFFER_WORLD_SLOTS, BUFFER_WORLD_PLACES, BUFFER_WORLD_CONTROL,
     BUFFER_JOINTS, BUFFER_JOINT_MEMORY, BUFFER_COUPLING_MEMORY, BUFFER_JOINT_ROWS, BUFFER_JOINT_TOUCH,
-    BUFFER_JOINED, BUFFER_JOINED_ORDER,
+    BUFFER_JOINED, BUFFER_JOINED_SIDES,
     /* pinned */
     PINNED_LIVE, PINNED_SETTINGS, PINNED_BODIES, PINNED_PAIRS, PINNED_POINTS, PINNED_ROWS, PINNED_OUT, PINNED_REPORTS,
     BUFFER_COUNT
@@ -38,6 +38,8 @@ struct sadmm_context {
     cudaStream_t stream;
     cudaStream_t side;        /* of a step's graph: what does not wait for contacts (step/record.cu) */
     cudaEvent_t fork, join;
+    cudaStream_t joint_side;  /* likewise: joints */
+    cudaEvent_t joint_join;
     int multiprocessors, shared_limit; /* shared_limit: bytes a block may have */
     bool cooperative, clusters, early; /* what the device can launch, with the code that was loaded for it */
 

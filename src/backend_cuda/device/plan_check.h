@@ -34,7 +34,8 @@ static __device__ __forceinline__ bool as_planned(const model_view &model, const
     const int32_t warm =
         plan_mostly_warm(pairs + constraints, statistics->warm + (joints ? step.control->joints.warm : 0));
     return rows == guess.contact_rows && statistics->point_slots <= guess.point_slots &&
-           (guess.warm < 0 || warm == guess.warm) && (!joints || guess.rows == (constraints > 0));
+           (guess.warm < 0 || warm == guess.warm) && (!joints || guess.rows == (constraints > 0)) &&
+           !(guess.apart && step.control->joints.together);
 }
 
 /* The grid's first thread compares the statistics with the plan; what runs now and what was assembled is of no use when

@@ -54,6 +54,9 @@ struct cuda_step_totals {
 /* Joints and couplings that take part, constraints of their rows, those that start with a multiplier other than 0. */
 struct cuda_joint_counts {
     int32_t joints, couplings, constraints, warm;
+    int32_t together; /* not 0: bodies that they join have to iterate with the others: a contact touches them, or they
+                         could not be solved directly */
+    int32_t sides;    /* of pairs, at such bodies, that are listed */
 };
 
 /* Written by commit, read by the host. */
@@ -66,6 +69,7 @@ struct cuda_step_report {
     struct cuda_graph_statistics statistics;
     double depth, primal, dual;
     struct cuda_joint_counts joints; /* of the sub-step that contacts were found for last */
+    int32_t apart;      /* as in cuda_step_guess */
     struct cuda_step_totals totals;
 };
 
@@ -87,6 +91,7 @@ struct cuda_step_guess {
     int32_t point_slots;
     int32_t warm;         /* most pairs, and constraints of joints, carry an impulse; -1: does not matter */
     int32_t rows;         /* there are constraints of joints; -1: there are no joints */
+    int32_t apart;        /* bodies that joints join do not iterate: they are solved directly, beside the rest of the step */
 };
 
 struct cuda_step_view {

@@ -233,6 +233,25 @@ struct raw_view {
     double *out; /* results */
 };
 
+/* A and b of a body that is solved directly. */
+struct cuda_joined_body {
+    double mass, inertia[6], b[6]; /* xx, yy, zz, xy, xz, yz */
+};
+
+/* Bodies that joints join: where the numbers of its structure begin, and its work; how many they are. */
+struct cuda_joined_part {
+    int64_t first_number, first_work;
+    int32_t numbers, label; /* label: as in joint_view.is_direct */
+};
+
+/* A side of a pair: the number of its body in its part, points of the pair; and those of a part. */
+struct cuda_joined_side {
+    int32_t code, entry, first, count;
+};
+struct cuda_joined_range {
+    int32_t first, count;
+};
+
 /* Joints of a world (step/joints.cu). */
 struct joint_view {
     int32_t count;
@@ -246,8 +265,19 @@ struct joint_view {
     struct sadmm_joint_memory *after;                /* as it ends */
     const struct sadmm_coupling_memory *couplings_before; /* couplings: as the sub-step began; */
     struct sadmm_coupling_memory *couplings_after;        /* as it ends */
-    const struct joined_view *direct; /* bodies and rows that are solved directly (step/joined.cu) */
-    const int32_t *is_direct;         /* bodies, then constraints: is it one of them? */
+    int32_t apart;                  /* as in cuda_step_guess */
+    const int32_t *is_direct;       /* bodies: solved directly (step/joined.cu): 1 + the first body of its part; else 0.
+                                       Then constraints: not 0. Those: */
+    struct cuda_joined_body *bodies; /* bodies */
+    const struct cuda_joined_part *parts;
+    const int32_t *structures;      /* (core/model/joined.h) */
+    double *work;
+    int32_t *kept;                  /* parts: solved before the iterations; */
+    uint8_t *kept_state;            /* rows: their state then */
+    const int32_t *entry;           /* bodies: number in their part */
+    int32_t *pair_parts;            /* sides of pairs: as is_direct of the body; small parts find their contacts by it: */
+    struct cuda_joined_range *ranges; /* parts, into */
+    struct cuda_joined_side *sides; /* part by part, ascending in a part; parts as they come */
     int32_t *touch;                 /* bodies: at labels of islands bits (core/model/joint_lead.h) */
 };
 
@@ -332,7 +362,6 @@ enum cuda_limit { LIMIT_NONE, LIMIT_SUSPECTS, LIMIT_WHOLE };
 /* What differs between launches of a kernel. */
 struct cuda_args {
     int32_t count;      /* iterations, or a kind of block */
-    int32_t bytes, numbers; /* of shared memory, for joined bodies */
     int32_t measure;
     int32_t join;       /* the first Step 1 takes records + ratio change */
     int32_t start;      /* the first Step 1 takes J^T lambda^0, whatever the records are */

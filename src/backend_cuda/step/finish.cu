@@ -129,7 +129,7 @@ static __device__ __noinline__ void finish_free(const cuda_view &v, double dt, i
     if (!live) return;
     load_end_velocity(v, body, velocity);
     move_body(&before.body, velocity, dt, v.model.settings->gravity, LEAD_OWN, place);
-    store_moved(v, body, before, velocity, place, dt);
+    if (!moves_apart(v, body)) store_moved(v, body, before, velocity, place, dt);
     const bool finite = finite_numbers(place, PLACE) && finite_numbers(velocity, 6);
     if (!finite) atomicMin(&v.step.control->offending_body, body);
     const double none[6] = {};

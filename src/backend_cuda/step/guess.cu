@@ -124,12 +124,22 @@ static sadmm_status tighten(struct sadmm_context *c, const struct preview *seen,
     return CUDA(clear_abort)(c, error);
 }
 
+bool CUDA(may_be_apart)(const struct sadmm_context *c)
+{
+    const struct cuda_step *s = c->step;
+    return s->joints > 0 && s->all_joined && c->settings.warm_start && !c->plan.residuals && !stop_rule_checked(c);
+}
+
 sadmm_status CUDA(guess_step)(struct sadmm_context *c, struct sadmm_error *error)
 {
     struct cuda_step *s = c->step;
     struct preview seen;
-    TRY(preview_step(c, &seen, error));
-    plan_substeps(c, &seen);
+    for (s->apart = s->untouched >= s->patience;; s->apart = false) {
+        TRY(preview_step(c, &seen, error));
+        plan_substeps(c, &seen);
+        if (!s->apart || CUDA(may_be_apart)(c)) break; /* settings may be other than they were */
+    }
+    s->guess.apart = s->apart;
     s->guess.contact_rows = s->plans[0].contact_rows;
     s->guess.point_slots = seen.statistics.point_slots <= 1   ? 1
                            : seen.statistics.point_slots <= 4 ? 4
@@ -144,6 +154,7 @@ sadmm_status CUDA(guess_step)(struct sadmm_context *c, struct sadmm_error *error
     TRY(CUDA(reserve_layout)(c, error));
     TRY(tighten(c, &seen, error));
     TRY(CUDA(reserve_solver)(c, error));
+    TRY(CUDA(reserve_joined)(c, error));
     TRY(CUDA(reserve)(c, BUFFER_WORLD_IMPULSE, 3 * (size_t)s->point_capacity * sizeof(double), error));
     s->planned = true;
     s->recorded = false;

@@ -3,7 +3,7 @@
  *
  *   rows      eight lanes a joint, one a coordinate: its laws as raw rows, as the host would make them. A joint has a
  *             fixed number of constraints; its rows fill the first ones, the rest join no bodies
- *   solution  a thread a joint: multipliers into what it keeps; a thread a pair: may the bodies of its island move by
+ *   solution  a thread a joint: multipliers into what it keeps; lanes of a pair: may the bodies of its island move by
  *             the means of their velocities? Commit, or turn, moves them then (kernels.cu)
  */
 #include <string.h>
@@ -14,7 +14,7 @@
 #include "backend_cuda/assemble/assemble.h"
 #include "core/model/coupling_law.h"
 #include "core/model/joint_lead.h"
-#include "move.h"
+#include "move_joined.h"
 #include "world.h"
 
 /* What the end of a sub-step needs of a joint's geometry in its middle. */
@@ -185,7 +185,7 @@ static __device__ __forceinline__ struct joint_lead lead_of(const cuda_view &v, 
 
 static __device__ __forceinline__ int32_t *island_of(const cuda_view &v, int32_t a, int32_t b)
 {
-    return &v.joints.touch[v.graph.label[a >= 0 ? a : b]];
+    return &v.joints.touch[joined_label(v, a >= 0 ? a : b)];
 }
 
 /* joint: what the coupling's has given; NULL: it did not take part. */
@@ -239,29 +239,60 @@ static __device__ __forceinline__ void keep_joint(const cuda_view &v, int32_t j)
     if (!(finite == 0)) atomicMin(&v.step.control->offending_body, 2 * v.model.bodies + named);
 }
 
-/* Pair p, where its island has joints. */
-static __device__ __forceinline__ void look_at_pair(const cuda_view &v, int32_t p)
+/* Pair p, where its island has joints: v.contacts.lanes threads, each every so many-th point. Every lane of the warp
+ * comes here. */
+static __device__ __forceinline__ void look_at_pair(const cuda_view &v, int32_t p, int32_t lane)
 {
-    const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
-    const int32_t a = pair->body_a, b = pair->body_b;
-    if (!v.islands.info[v.graph.label[a >= 0 ? a : b]].rows) return;
+    const bool live = v.step.limits && p < live_pairs(v.model);
+    const struct sadmm_contact_pair *pair = &v.raw.pairs[live ? p : 0];
+    const int32_t a = live ? pair->body_a : -1, b = live ? pair->body_b : -1, body = a >= 0 ? a : b;
+    const bool looks = body >= 0 && v.islands.info[v.graph.label[body]].rows;
     const struct sadmm_settings settings = *v.model.settings;
-    const struct joint_lead bodies[2] = {lead_of(v, a), lead_of(v, b)};
-    if (joint_contact_holds(pair->normal, &v.raw.points[pair->first], pair->count, bodies, &settings))
-        atomicOr(island_of(v, a, b), ISLAND_LEADS_STAY);
+    struct joint_lead bodies[2] = {};
+    struct lead_touch touch = {0, {0, 0}};
+    if (looks) {
+        bodies[0] = lead_of(v, a), bodies[1] = lead_of(v, b);
+        for (int32_t k = lane; k < pair->count; k += v.contacts.lanes)
+            joint_contact_touches(pair->normal, &v.raw.points[pair->first + k], bodies, &settings, &touch);
+    }
+    for (int32_t o = 1; o < v.contacts.lanes; o *= 2) {
+        touch.island |= __shfl_xor_sync((unsigned)ALL_LANES, touch.island, o);
+        for (int s = 0; s < 2; ++s) touch.body[s] |= __shfl_xor_sync((unsigned)ALL_LANES, touch.body[s], o);
+    }
+    if (looks && lane == 0 && joint_contacts_hold(&touch, bodies)) atomicOr(island_of(v, a, b), ISLAND_LEADS_STAY);
 }
 
 /* args.count: threads for joints; the others are for pairs. */
 static __global__ void __launch_bounds__(ROWS_THREADS)
     joint_solution_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
-    const int32_t t = (int32_t)(blockIdx.x * (unsigned)ROWS_THREADS + threadIdx.x);
+    const int32_t t = (int32_t)(blockIdx.x * (unsigned)ROWS_THREADS + threadIdx.x), of_pair = t - args.count;
     if (v.model.live->abort_code) return;
     if (t < v.joints.count) keep_joint(v, t);
-    else if (t >= args.count && v.step.limits && t - args.count < live_pairs(v.model)) look_at_pair(v, t - args.count);
+    if (of_pair >= 0) look_at_pair(v, of_pair / v.contacts.lanes, of_pair % v.contacts.lanes);
+}
+
+/* Where joints are apart (device/step.h): their bodies move. A thread a body; one a joint. */
+static __global__ void __launch_bounds__(ROWS_THREADS)
+    joint_move_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
+{
+    const int32_t i = (int32_t)(blockIdx.x * (unsigned)ROWS_THREADS + threadIdx.x);
+    if (v.model.live->abort_code) return;
+    if (i < v.model.bodies && moves_apart(v, i))
+        move_joined(v, i, v.joints.touch[joined_label(v, i)] & ISLAND_LEADS_STAY);
+    end_joints(v, i);
 }
 
 /* ---- launches ---------------------------------------------------------------------------------------------------- */
+
+sadmm_status CUDA(launch_joint_move)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    const cuda_args args = {};
+    const int64_t bodies = c->view.model.bodies, joints = c->view.joints.count;
+    return CUDA(launch_of)(c, joint_move_kernel, "bodies of joints",
+                           ((bodies > joints ? bodies : joints) + ROWS_THREADS - 1) / ROWS_THREADS, ROWS_THREADS, &args,
+                           error);
+}
 
 sadmm_status CUDA(launch_joint_rows)(struct sadmm_context *c, struct sadmm_error *error)
 {
@@ -275,7 +306,9 @@ sadmm_status CUDA(launch_joint_solution)(struct sadmm_context *c, struct sadmm_e
 {
     cuda_args args = {};
     const int64_t blocks = (c->view.joints.count + ROWS_THREADS - 1) / ROWS_THREADS,
-                  pairs = c->view.step.limits ? c->view.contacts.pair_capacity : 0;
+                  pairs = c->view.step.limits && !c->view.joints.apart
+                              ? (int64_t)c->view.contacts.pair_capacity * c->view.contacts.lanes
+                              : 0;
     if (blocks == 0) return SADMM_OK;
     args.count = (int32_t)(blocks * ROWS_THREADS);
     return CUDA(launch_of)(c, joint_solution_kernel, "joints", blocks + (pairs + ROWS_THREADS - 1) / ROWS_THREADS,
@@ -304,17 +337,6 @@ static char *row_set(const struct sadmm_context *c, int into)
     return buffer<char>(c, BUFFER_JOINT_ROWS) + (size_t)into * row_set_bytes(c->step);
 }
 
-struct joint_rows CUDA(joint_rows_of)(const struct sadmm_context *c, int into)
-{
-    const struct cuda_step *s = c->step;
-    const size_t count = (size_t)s->joint_constraints;
-    struct joint_rows out;
-    out.constraints = (struct sadmm_row_constraint *)row_set(c, into);
-    out.rows = (struct raw_row *)(out.constraints + count);
-    out.velocity = (double *)(out.rows + count * SADMM_MAX_ROWS) + count * SADMM_MAX_ROWS;
-    return out;
-}
-
 static struct sadmm_joint_memory *memory_of(const struct sadmm_context *c, int state)
 {
     return buffer<struct sadmm_joint_memory>(c, BUFFER_JOINT_MEMORY) + (size_t)state * (size_t)c->step->joints;
@@ -331,6 +353,7 @@ void CUDA(view_joints)(struct sadmm_context *c, int into, int substep)
     const int substeps = c->settings.substeps;
     struct joint_view *joints = &c->view.joints;
     joints->count = s->joints;
+    joints->apart = s->apart;
     if (s->joints == 0) return;
     joints->joints = buffer<struct sadmm_resident_joint>(c, BUFFER_JOINTS);
     joints->middle = middle_of(c);
@@ -346,6 +369,7 @@ void CUDA(view_joints)(struct sadmm_context *c, int into, int substep)
     joints->solution = (double *)(row_set(c, into) + CUDA(raw_row_bytes)(s->joint_constraints));
     joints->velocity = joints->solution + (size_t)s->joint_constraints * SADMM_MAX_ROWS;
     joints->sources = (struct sadmm_joint_source *)(joints->velocity + 6 * (size_t)s->bodies);
+    if (s->apart) c->view.rows.count = 0;
 }
 
 /* ---- to the device, and back ------------------------------------------------------------------------------------- */
@@ -424,6 +448,25 @@ static bool take_constraint(struct sadmm_rows *rows, const struct sadmm_row_cons
     return true;
 }
 
+/* Where joints are apart their velocities are kept for their bodies alone: the others' are those they have. */
+static sadmm_status take_velocities(struct sadmm_context *c, double *velocity, struct sadmm_error *error)
+{
+    const struct cuda_step *s = c->step;
+    const size_t n = (size_t)s->bodies;
+    if (!s->last.apart) return SADMM_OK;
+    const struct sadmm_rigid *last = buffer<struct sadmm_rigid>(c, BUFFER_WORLD_BODIES) + (size_t)(1 - s->into) * n;
+    struct sadmm_rigid *rigid = (struct sadmm_rigid *)sadmm_alloc(n + 1, sizeof *rigid);
+    int32_t *direct = (int32_t *)sadmm_alloc(n + 1, sizeof *direct);
+    sadmm_status status = rigid && direct ? SADMM_OK : sadmm_fail_memory(error, "the joints' rows");
+    if (status == SADMM_OK) status = CUDA(get)(c, rigid, last, n * sizeof *rigid, error);
+    if (status == SADMM_OK) status = CUDA(get)(c, direct, c->view.joints.is_direct, n * sizeof *direct, error);
+    for (size_t i = 0; i < n && status == SADMM_OK; ++i)
+        if (!direct[i]) memcpy(velocity + 6 * i, rigid[i].velocity, 6 * sizeof *velocity);
+    sadmm_free(rigid);
+    sadmm_free(direct);
+    return status;
+}
+
 extern "C" sadmm_status CUDA(read_rows)(struct sadmm_context *c, struct sadmm_rows *rows, double *solution,
                                         double *velocity, struct sadmm_error *error)
 {
@@ -442,5 +485,6 @@ extern "C" sadmm_status CUDA(read_rows)(struct sadmm_context *c, struct sadmm_ro
         if (!take_constraint(rows, &constraints[k], row + k * SADMM_MAX_ROWS, own + k * SADMM_MAX_ROWS, solution))
             status = sadmm_fail_memory(error, "the joints' rows");
     sadmm_free(all);
+    if (status == SADMM_OK && s->bodies > 0) status = take_velocities(c, velocity, error);
     return status;
 }

@@ -8,7 +8,7 @@
 #include "core/model/joint_lead.h"
 
 #include "backend_cuda/device/plan_check.h"
-#include "move.h"
+#include "move_joined.h"
 #include "world.h"
 
 enum { STEP_THREADS = 64 }; /* a block: few, for long work and many multiprocessors */
@@ -42,9 +42,9 @@ static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __
 {
     int32_t i = thread_index();
     if (i >= args.count || v.model.live->abort_code) return;
-    const struct sadmm_resident_edit *edit = &args.edits[i];
-    const double *values = edit->values;
-    if (edit->kind == SADMM_EDIT_SETTINGS) {
+    const struct sadmm_resident_edit edit = args.edits[i]; /* all of it at once: from the host's memory */
+    const double *values = edit.values;
+    if (edit.kind == SADMM_EDIT_SETTINGS) {
         struct cuda_settings *kept = (struct cuda_settings *)v.model.settings; /* its first member */
         struct sadmm_settings *settings = &kept->settings;
         int k = 0;
@@ -54,10 +54,10 @@ static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __
         kept->gravity = gravity_size(settings->gravity);
         return;
     }
-    if (edit->kind == SADMM_EDIT_JOINT) return edit_joint(v.joints, edit->target, values);
-    struct sadmm_rigid *body = const_cast<struct sadmm_rigid *>(&v.step.before[edit->target]);
-    if (edit->kind == SADMM_EDIT_STATE) {
-        steady_place(const_cast<struct sadmm_steady *>(&v.step.steady_before[edit->target]), body, values, values + 3);
+    if (edit.kind == SADMM_EDIT_JOINT) return edit_joint(v.joints, edit.target, values);
+    struct sadmm_rigid *body = const_cast<struct sadmm_rigid *>(&v.step.before[edit.target]);
+    if (edit.kind == SADMM_EDIT_STATE) {
+        steady_place(const_cast<struct sadmm_steady *>(&v.step.steady_before[edit.target]), body, values, values + 3);
         for (int k = 0; k < 3; ++k) body->position[k] = values[k];
         for (int k = 0; k < 4; ++k) body->orientation[k] = values[3 + k];
         for (int k = 0; k < 6; ++k) body->velocity[k] = values[7 + k];
@@ -118,7 +118,7 @@ static __global__ void start_step_kernel(const __grid_constant__ cuda_view v, co
         v.step.control->depth = 0;
         v.step.control->offending_body = INT32_MAX;
         v.step.control->stamps[STAMP_START] = nanoseconds();
-        v.step.control->joints = {0, 0, 0, 0};
+        v.step.control->joints = {};
     }
     if (i >= v.model.bodies) return;
     start_body(v, i, lane, &v.step.before[i], &v.step.steady_before[i]);
@@ -162,31 +162,10 @@ static __device__ __noinline__ void move_again(const cuda_view &v, int32_t i)
     store_moved(v, i, before, velocity, place, dt); /* finite, since both places were that it had to choose from */
 }
 
-/* Body i of an island with joints goes where these let it. */
-static __device__ __noinline__ void move_joined(const cuda_view &v, int32_t i, bool leads_stay)
-{
-    const body_before before = fetch_body(v.step, i);
-    const double dt = v.model.settings->dt;
-    double next[6], place[PLACE];
-    joint_move(&before.body, v.joints.velocity + 6 * (size_t)i, leads_stay, dt, place, place + 3, next);
-    store_moved(v, i, before, next, place, dt);
-}
-
-/* Joint j remembers how its bodies have been moved, once that is known. */
-static __device__ __forceinline__ void end_joints(const joint_view &joints, const graph_view &graph,
-                                                  const raw_view &raw, int32_t j)
-{
-    if (j >= joints.count || joints.joints[j].constraints == 0) return;
-    const struct sadmm_row_constraint *first = &raw.constraints[joints.first[j]];
-    if (first->count == 0) return;
-    joints.after[j].leads_stay =
-        joints.touch[graph.label[first->body_a >= 0 ? first->body_a : first->body_b]] & ISLAND_LEADS_STAY;
-}
-
 /* Body i, where its island has joints as they let it go; else again, if need be. */
 static __device__ __forceinline__ void move_once_more(const cuda_view &v, int32_t i, bool again, bool joined)
 {
-    const int32_t bits = joined ? v.joints.touch[v.graph.label[i]] : 0;
+    const int32_t bits = joined ? v.joints.touch[joined_label(v, i)] : 0;
     if (joined && !v.joints.is_direct[i]) load_end_velocity(v, i, v.joints.velocity + 6 * (size_t)i);
     if (bits & ISLAND_JOINED) move_joined(v, i, bits & ISLAND_LEADS_STAY);
     else if (again) move_again(v, i);
@@ -244,10 +223,10 @@ static __global__ void __launch_bounds__(TURN_THREADS, 4)
     const int32_t lane = (int32_t)(t % START_LANES);
     struct cuda_step_control *control = v.step.control;
     if (v.model.live->abort_code) return;
-    const bool again = moves_again(v), joined = v.joints.count > 0;
+    const bool again = moves_again(v), joined = v.joints.count > 0 && !v.joints.apart;
     if ((again || joined) && threadIdx.x < TURN_THREADS / START_LANES && own < v.model.bodies)
         move_once_more(v, (int32_t)own, again, joined);
-    if (joined) end_joints(v.joints, v.graph, v.raw, (int32_t)t);
+    if (joined) end_joints(v, (int32_t)t);
     if (again || joined) __syncthreads(); /* threads of a block start bodies that others of it have moved */
     if (t == 0) {
         control->stamps[STAMP_END] = nanoseconds();
@@ -255,7 +234,7 @@ static __global__ void __launch_bounds__(TURN_THREADS, 4)
         control->stamps[STAMP_START] = control->stamps[STAMP_END];
         const int32_t code = abort_of(ABORT_NONE, as_planned(v.model, v.step), control->offending_body);
         if (code) v.model.live->abort_code = code;
-        else control->joints = {0, 0, 0, 0};
+        else control->joints = {};
     }
     if (i >= v.model.bodies) return;
     start_body(v, i, lane, &v.step.after[i], &v.step.steady_after[i]);
@@ -274,9 +253,9 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
     const int32_t i = (int32_t)(blockIdx.x * (unsigned)STEP_THREADS + threadIdx.x);
     wait_for_stream();
     /* Blocks that begin late may see what the first one says of the step: only where what they move is of no use. */
-    const bool on = !aborted && planned, again = on && moves_again(v), joined = on && v.joints.count > 0;
+    const bool on = !aborted && planned, again = on && moves_again(v), joined = on && v.joints.count > 0 && !v.joints.apart;
     if ((again || joined) && i < v.model.bodies) move_once_more(v, i, again, joined);
-    if (joined) end_joints(v.joints, v.graph, v.raw, i);
+    if (joined) end_joints(v, i);
     if (blockIdx.x > 0 || threadIdx.x > 0) return;
     struct cuda_step_report *report = &v.step.reports[control->sequence % STEPS_AHEAD];
     const int32_t offending_body = control->offending_body,
@@ -290,6 +269,7 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
     report->counts = control->counts;
     report->statistics = *v.model.statistics;
     report->joints = control->joints;
+    report->apart = v.joints.apart;
     report->depth = double_of(control->depth);
     report->primal = v.step.measured ? double_of(v.iteration.residual[0]) : -1;
     report->dual = v.step.measured ? double_of(v.iteration.residual[1]) : -1;
@@ -314,10 +294,16 @@ sadmm_status CUDA(launch_start)(struct sadmm_context *c, struct sadmm_error *err
     return CUDA(launch_of)(c, start_step_kernel, "start", blocks, STEP_THREADS, &args, error);
 }
 
+/* Joints whose bodies move at the very end, once it is known where they may go. */
+static int64_t moved_last(const struct sadmm_context *c)
+{
+    return c->view.joints.apart ? 0 : c->view.joints.count;
+}
+
 sadmm_status CUDA(launch_turn)(struct sadmm_context *c, struct sadmm_error *error)
 {
     cuda_args args = {};
-    const int64_t bodies = (int64_t)c->view.model.bodies * START_LANES, joints = c->view.joints.count,
+    const int64_t bodies = (int64_t)c->view.model.bodies * START_LANES, joints = moved_last(c),
                   blocks = (bodies > joints ? bodies : joints) / TURN_THREADS + 1;
     args.checks = c->checks;
     args.count = c->settings.iterations;
@@ -335,7 +321,7 @@ sadmm_status CUDA(launch_commit)(struct sadmm_context *c, struct sadmm_error *er
     cuda_args args = {};
     args.checks = c->checks;
     args.count = c->settings.iterations;
-    const int64_t joints = c->view.joints.count, bodies = c->view.step.limits || joints ? c->view.model.bodies : 1,
+    const int64_t joints = moved_last(c), bodies = c->view.step.limits || joints ? c->view.model.bodies : 1,
                   blocks = ((bodies > joints ? bodies : joints) - 1) / STEP_THREADS + 1;
     return CUDA(launch_early)(c, commit_kernel, "commit", blocks, STEP_THREADS, &args, error);
 }

@@ -6,6 +6,7 @@
 
 #include "backend_cuda/iterate/slow.h"
 #include "backend_cuda/iterate/solution.h"
+#include "core/model/joint_lead.h"
 #include "core/model/steady.h"
 
 /* Bits of an island where nobody has said anything else. */
@@ -28,6 +29,18 @@ static __device__ __forceinline__ body_before fetch_body(const cuda_step_view &s
 {
     const body_before before = {step.before[i], step.steady_before[i]};
     return before;
+}
+
+/* What joints say of a body's island is at: its label; or, where they are solved apart, its part's first body. */
+static __device__ __forceinline__ int32_t joined_label(const cuda_view &v, int32_t body)
+{
+    return v.joints.apart ? v.joints.is_direct[body] - 1 : v.graph.label[body];
+}
+
+/* Do its joints move it, beside the rest of the step (step/joints.cu)? Known once they have. */
+static __device__ __forceinline__ bool moves_apart(const cuda_view &v, int32_t body)
+{
+    return v.joints.apart && v.joints.is_direct[body] && (v.joints.touch[joined_label(v, body)] & ISLAND_JOINED);
 }
 
 /* v of body i as the step ends. */

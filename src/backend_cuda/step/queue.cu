@@ -94,6 +94,16 @@ static void learn(struct sadmm_context *c, int64_t first, const struct cuda_step
     learned->substep = std::max(learned->substep, report->substep);
 }
 
+/* A step was done. Where joined bodies were left alone for a while it is planned that they are; the longer that takes
+ * the more often they were not, since a plan costs what many steps do. The outcome is the same to the last bit. */
+static void see_joined(struct sadmm_context *c, const struct cuda_step_report *report)
+{
+    struct cuda_step *s = c->step;
+    if (s->apart) return;
+    s->untouched = CUDA(may_be_apart)(c) && !report->joints.together ? s->untouched + 1 : 0;
+    if (s->untouched >= s->patience) s->planned = false;
+}
+
 /* The step `first` of the queue has failed, and nothing behind it has been done. */
 static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct cuda_step_report *report,
                             struct sadmm_error *error)
@@ -117,6 +127,11 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
     }
     ++s->repeats;
     s->planned = false;
+    const bool together = s->apart && report->abort_code == ABORT_PLAN && report->joints.together;
+    if (together) {
+        s->untouched = 0;
+        s->patience = std::min(2 * s->patience, (int32_t)MOST_PATIENCE);
+    }
     if (report->abort_code == ABORT_CAPACITY)
         s->candidate_capacity = std::max(s->candidate_capacity, generous(report->counts.candidates));
     if (report->abort_code == ABORT_PARTITION) {
@@ -127,6 +142,7 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
         s->misfit = first;
     }
     if (report->abort_code == ABORT_REACH) s->careful = CAREFUL_STEPS;
+    else if (together) s->learned.step = -1; /* nothing is known of it with its rows */
     else if (report->substep > 0) learn(c, first, report);
     return repeat_steps(c, first, end, error);
 }
@@ -148,6 +164,7 @@ static sadmm_status see_step(struct sadmm_context *c, struct sadmm_error *error)
     ++s->seen;
     ++s->done;
     if (s->careful > 0 && --s->careful == 0) s->planned = false;
+    see_joined(c, &report);
     /* A plan with far too large capacities wastes launches. */
     if (report.counts.pairs < c->view.contacts.pair_capacity / 4 - 256) s->planned = false;
     return SADMM_OK;

@@ -34,6 +34,7 @@ void CUDA(report_step)(const struct sadmm_context *c, struct sadmm_resident_repo
     out->joints = last->joints.joints;
     out->couplings = last->joints.couplings;
     out->plan.row_constraints = last->joints.constraints;
+    out->plan.rows_apart = last->apart;
     out->penetration_max = last->depth;
     out->residual.primal = last->primal;
     out->residual.dual = last->dual;

@@ -22,17 +22,17 @@ sadmm_status CUDA(enqueue_find)(struct sadmm_context *c, int substep, struct sad
     return CUDA(launch_admit)(c, error);
 }
 
-/* Launches go to the side stream while this lives; it begins behind what is on the main one. */
+/* Launches go to a side stream while this lives; it begins behind what is on the main one. */
 namespace {
 struct side_branch {
     struct sadmm_context *c;
     cudaStream_t main;
     cudaError_t code;
-    explicit side_branch(struct sadmm_context *context) : c(context), main(context->stream)
+    side_branch(struct sadmm_context *context, cudaStream_t side) : c(context), main(context->stream)
     {
         code = cudaEventRecord(c->fork, main);
-        if (code == cudaSuccess) code = cudaStreamWaitEvent(c->side, c->fork, 0);
-        c->stream = c->side;
+        if (code == cudaSuccess) code = cudaStreamWaitEvent(side, c->fork, 0);
+        c->stream = side;
     }
     ~side_branch() { c->stream = main; }
     side_branch(const side_branch &) = delete;
@@ -63,33 +63,71 @@ static void view_substep(struct sadmm_context *c, int substep)
                   CUDA(persistent_does_prologue)(&c->partition);
 }
 
-/* A and b of the bodies, and rows of joints: beside contact finding, of which they need nothing. */
-static sadmm_status record_bodies(struct sadmm_context *c, struct sadmm_error *error)
+static sadmm_status wait_for_joints(struct sadmm_context *c, struct sadmm_error *error)
 {
-    side_branch side(c);
-    CUDA_CALL(c, side.code, "a branch of the step");
-    TRY(CUDA(enqueue_bodies)(c, error));
-    if (c->view.joints.count == 0) return SADMM_OK;
-    TRY(CUDA(launch_joint_rows)(c, error));
-    CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
+    CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->joint_join, 0), "cudaStreamWaitEvent");
     return SADMM_OK;
 }
 
-/* Graph statistics and layout; beside them contacts in the solver's form, and what weights take from pairs. */
+/* Rows of joints, and those in the solver's form. Where joined bodies are apart, all that is to be done about them. */
+static sadmm_status record_joints(struct sadmm_context *c, struct sadmm_error *error)
+{
+    side_branch side(c, c->joint_side);
+    CUDA_CALL(c, side.code, "a branch of the step");
+    TRY(CUDA(launch_joint_rows)(c, error));
+    CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent"); /* A and b */
+    if (c->view.joints.apart) {
+        TRY(CUDA(launch_joined)(c, false, error));
+        TRY(CUDA(launch_joint_solution)(c, error));
+        TRY(CUDA(launch_joint_move)(c, error));
+    } else {
+        TRY(CUDA(assemble_rows)(c, error));
+        if (c->fast) TRY(CUDA(enqueue_row_responses)(c, error));
+    }
+    CUDA_CALL(c, cudaEventRecord(c->joint_join, c->stream), "cudaEventRecord");
+    return SADMM_OK;
+}
+
+/* Joined bodies before the iterations or after them, beside what the main stream does then. */
+static sadmm_status record_joined(struct sadmm_context *c, bool after, struct sadmm_error *error)
+{
+    side_branch side(c, c->joint_side);
+    CUDA_CALL(c, side.code, "a branch of the step");
+    if (!after && joined_is_small(c)) TRY(CUDA(launch_pair_parts)(c, error));
+    if (after || c->settings.warm_start) TRY(CUDA(launch_joined)(c, after, error));
+    CUDA_CALL(c, cudaEventRecord(c->joint_join, c->stream), "cudaEventRecord");
+    return SADMM_OK;
+}
+
+/* A and b of the bodies, and joints: beside contact finding, of which they need nothing. */
+static sadmm_status record_bodies(struct sadmm_context *c, struct sadmm_error *error)
+{
+    {
+        side_branch side(c, c->side);
+        CUDA_CALL(c, side.code, "a branch of the step");
+        TRY(CUDA(enqueue_bodies)(c, error));
+        CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
+    }
+    return c->view.joints.count > 0 ? record_joints(c, error) : SADMM_OK;
+}
+
+/* Graph statistics and layout; beside them contacts in the solver's form, what weights take from pairs, and joined
+ * bodies that do not wait for the layout. */
 static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *error)
 {
-    if (c->view.joints.count > 0) /* the graph is of their rows, too */
-        CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
+    const bool together = c->view.joints.count > 0 && !c->view.joints.apart, beside = together && joined_is_small(c);
+    if (together) TRY(wait_for_joints(c, error)); /* the graph is of their rows, too */
+    if (beside) TRY(record_joined(c, false, error));
     {
-        side_branch side(c);
+        side_branch side(c, c->side);
         CUDA_CALL(c, side.code, "a branch of the step");
         TRY(CUDA(assemble_contacts)(c, error));
-        TRY(CUDA(assemble_rows)(c, error));
         CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
     }
     TRY(CUDA(enqueue_statistics_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
     CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
-    return c->settings.warm_start ? CUDA(launch_joined)(c, false, error) : SADMM_OK;
+    if (together && !beside) TRY(record_joined(c, false, error));
+    return together ? wait_for_joints(c, error) : SADMM_OK;
 }
 
 /* Which motions of loose islands may be restored, beside the iterations; where those find out themselves what is held,
@@ -98,7 +136,7 @@ static bool motions_beside(const struct sadmm_context *c) { return c->plan.momen
 
 static sadmm_status record_motions(struct sadmm_context *c, struct sadmm_error *error)
 {
-    side_branch side(c);
+    side_branch side(c, c->side);
     CUDA_CALL(c, side.code, "a branch of the step");
     TRY(CUDA(enqueue_motions)(c, error));
     CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
@@ -112,18 +150,24 @@ static sadmm_status record_limit(struct sadmm_context *c, bool suspected, struct
     return CUDA(enqueue_limit)(c, suspected, error);
 }
 
-/* The end of the step, wrenches included; beside it the residuals of the last iteration, where they are wanted. */
+/* The end of the step, wrenches included; beside it joined bodies, and the residuals of the last iteration where they
+ * are wanted. */
 static sadmm_status record_finish(struct sadmm_context *c, bool residuals, struct sadmm_error *error)
 {
+    const bool joints = c->view.joints.count > 0, apart = c->view.joints.apart;
     if (residuals) {
-        side_branch side(c);
+        side_branch side(c, c->side);
         CUDA_CALL(c, side.code, "a branch of the step");
         TRY(CUDA(enqueue_residuals)(c, error));
         CUDA_CALL(c, cudaEventRecord(c->join, c->stream), "cudaEventRecord");
     }
+    if (joints && !apart) TRY(record_joined(c, true, error));
+    if (joints && apart) TRY(wait_for_joints(c, error));
     TRY(CUDA(launch_finish)(c, error));
-    TRY(CUDA(launch_joined)(c, true, error));
-    TRY(CUDA(launch_joint_solution)(c, error));
+    if (joints && !apart) {
+        TRY(wait_for_joints(c, error));
+        TRY(CUDA(launch_joint_solution)(c, error));
+    }
     if (residuals) CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
     return SADMM_OK;
 }

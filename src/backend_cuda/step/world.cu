@@ -44,7 +44,7 @@ void CUDA(view_into)(struct sadmm_context *c, int into, int substep)
     c->view.raw.pairs = set.pairs;
     c->view.raw.points = set.points;
     CUDA(view_joints)(c, into, substep);
-    CUDA(view_joined)(c, into);
+    CUDA(view_joined)(c);
 }
 
 /* Counts and settings of the view; pairs: their capacity. */
@@ -58,7 +58,7 @@ void CUDA(view_counts)(struct sadmm_context *c, int64_t pairs)
     v->raw.system.body_count = s->bodies;
     v->model.bodies = s->bodies;
     v->contacts.pair_capacity = (int32_t)((pairs + WARP - 1) / WARP * WARP);
-    v->rows.count = s->joint_constraints;
+    v->rows.count = s->apart ? 0 : s->joint_constraints;
     v->model.contact_rows = s->guess.contact_rows == 1 ? 1 : 3;
     v->model.warm_start = c->settings.warm_start;
 }
@@ -124,6 +124,9 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
     s->offending_body = -1;
     s->learned.step = -1;
     s->careful = 0;
+    s->apart = false;
+    s->untouched = 0;
+    s->patience = LEAST_PATIENCE;
     for (struct queued_step &q : s->queue) q.edit_count = 0;
     memset(&s->last, 0, sizeof s->last);
     TRY(CUDA(use_settings)(c, &share, error));

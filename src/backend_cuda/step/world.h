@@ -35,13 +35,20 @@ struct learned {
     struct cuda_graph_statistics statistics; /* the most of any */
 };
 
+/* Steps that joined bodies are left alone until it is planned that they are; twice as many each time they were not. */
+enum { LEAST_PATIENCE = 16, MOST_PATIENCE = 1 << 16 };
+
 struct cuda_step {
     struct sadmm_cuda_collision *collision;
     int32_t bodies, slots;
     int32_t joints, joint_constraints, couplings;
-    int32_t joined_parts;       /* of bodies that are solved directly, */
-    int32_t joined_bytes;       /* of shared memory that their factors take, where one fits, */
-    int32_t joined_numbers;     /* and of their structure there, 0: it stays where it is */
+    int32_t joined_parts;       /* of bodies that are solved directly (joined.cu); */
+    size_t joined_numbers, joined_work; /* of all their structures and work, */
+    size_t joined_bytes;        /* the most that one has of both, where blocks have that in their own memory; else 0 */
+
+    bool all_joined;            /* every constraint is of one */
+    bool apart;                 /* they are planned to be solved beside the rest (cuda_step_guess) */
+    int32_t untouched, patience; /* steps that could have been so since one could not; that it takes for it to be tried */
 
     bool planned;               /* capacities, partition and guess are for the world as it is */
     bool recorded;              /* and so are the graphs */
@@ -97,6 +104,8 @@ sadmm_status CUDA(guess_step)(struct sadmm_context *, struct sadmm_error *error)
 struct substep_plan CUDA(plan_of)(const struct sadmm_context *, int32_t pairs, int32_t points,
                                   const struct cuda_graph_statistics *statistics,
                                   const struct cuda_joint_counts *joints);
+/* guess.cu: may bodies that joints join be solved beside the rest, if nothing touches them? By settings and plan. */
+bool CUDA(may_be_apart)(const struct sadmm_context *);
 /* guess.cu: *a becomes what a partition for both needs. */
 void CUDA(merge_statistics)(struct cuda_graph_statistics *a, const struct cuda_graph_statistics *b);
 /* record.cu: contacts, up to the gate. */
@@ -121,16 +130,17 @@ void CUDA(view_joints)(struct sadmm_context *, int into, int substep);
 /* joints.cu: rows of the (sub-)step; what its solution says of joints. */
 sadmm_status CUDA(launch_joint_rows)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_joint_solution)(struct sadmm_context *, struct sadmm_error *error);
-/* joints.cu: rows of a step that ends in `into`, and beside them the solution's velocities. */
-struct joint_rows {
-    struct sadmm_row_constraint *constraints;
-    struct raw_row *rows;
-    double *velocity;
-};
-struct joint_rows CUDA(joint_rows_of)(const struct sadmm_context *, int into);
-/* joined.cu: the same for bodies that joints join, solved directly before the iterations, and after them. */
+sadmm_status CUDA(launch_joint_move)(struct sadmm_context *, struct sadmm_error *error);
+/* joined_memory.cu: the same for bodies that joints join; what depends on the number of pairs. */
 sadmm_status CUDA(load_joined)(struct sadmm_context *, const struct sadmm_resident_world *, struct sadmm_error *error);
-void CUDA(view_joined)(struct sadmm_context *, int into);
+void CUDA(view_joined)(struct sadmm_context *);
+sadmm_status CUDA(reserve_joined)(struct sadmm_context *, struct sadmm_error *error);
+/* joined.cu: they are solved directly, before the iterations and after them. Where parts are small they find their
+ * contacts themselves, once pair_parts has run; else by the layout. */
 sadmm_status CUDA(launch_joined)(struct sadmm_context *, bool after, struct sadmm_error *error);
+sadmm_status CUDA(launch_pair_parts)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(allow_joined)(struct sadmm_context *, struct sadmm_error *error);
+size_t CUDA(joined_shared_size)(void); /* of a block, beside the part's own */
+static inline bool joined_is_small(const struct sadmm_context *c) { return c->step->joined_bytes > 0; }
 
 #endif

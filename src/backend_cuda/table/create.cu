@@ -65,6 +65,8 @@ static sadmm_status open_device(struct sadmm_context *c, struct sadmm_error *err
     CUDA_CALL(c, LAYOUT(one_block_allow)(c->shared_limit), "loading the kernels");
     CUDA_CALL(c, cudaStreamCreateWithFlags(&c->stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
     CUDA_CALL(c, cudaStreamCreateWithFlags(&c->side, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
+    CUDA_CALL(c, cudaStreamCreateWithFlags(&c->joint_side, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
+    CUDA_CALL(c, cudaEventCreateWithFlags(&c->joint_join, cudaEventDisableTiming), "cudaEventCreateWithFlags");
     CUDA_CALL(c, cudaEventCreateWithFlags(&c->fork, cudaEventDisableTiming), "cudaEventCreateWithFlags");
     CUDA_CALL(c, cudaEventCreateWithFlags(&c->join, cudaEventDisableTiming), "cudaEventCreateWithFlags");
     return SADMM_OK;
@@ -96,6 +98,8 @@ extern "C" void CUDA(destroy)(struct sadmm_context *c)
         CUDA(step_destroy)(c);
         if (c->graph) (void)cudaGraphExecDestroy(c->graph);
         CUDA(release_buffers)(c);
+        if (c->joint_join) (void)cudaEventDestroy(c->joint_join);
+        if (c->joint_side) (void)cudaStreamDestroy(c->joint_side);
         if (c->join) (void)cudaEventDestroy(c->join);
         if (c->fork) (void)cudaEventDestroy(c->fork);
         if (c->side) (void)cudaStreamDestroy(c->side);

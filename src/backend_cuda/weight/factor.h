@@ -58,6 +58,13 @@ static __host__ __device__ __forceinline__ bool has_closed_form(const model_view
     return bodies.rigid && model.contact_rows == 3 && rows.count == 0;
 }
 
+/* The same of a body among others: no row joins it. So it has one form, whatever the others have. */
+static __device__ __forceinline__ bool body_has_closed_form(const cuda_view &v, const body_thread &t)
+{
+    return v.bodies.rigid && v.model.contact_rows == 3 &&
+           (t.begin == t.end || v.graph.incident[t.end - 1] / 2 < v.contacts.pair_capacity); /* rows come last */
+}
+
 /* ---- C ----------------------------------------------------------------------------------------------------------- */
 
 /* B of a side's points into C, where contacts have one row. */

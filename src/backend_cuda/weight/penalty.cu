@@ -98,7 +98,8 @@ static __device__ __forceinline__ bool inertia_drowns(const body_view &bodies, s
 
 /* ---- kernels ----------------------------------------------------------------------------------------------------- */
 
-/* By which B C is made, and how H is: that of `paper`; the weights of `fast`; those, and H in closed form. */
+/* By which B C is made, and how H is: that of `paper`; the weights of `fast`; those, and every body's H in closed
+ * form. */
 enum penalty_form { PLAIN, WEIGHTED, CLOSED };
 
 /* PENALTY: C and beta; FACTOR: H from them. */
@@ -128,7 +129,8 @@ static __global__ void __launch_bounds__(BODY_THREADS)
     }
     if (FACTOR && t.live && FORM == PLAIN && inertia_drowns(v.bodies, t.body, beta, C))
         packed_round_up(C, SOLVER_EPSILON); /* `fast`: its C is */
-    if (FACTOR && t.live && FORM == CLOSED) factor_rigid(v.bodies, t.body, t.lane, C);
+    if (FACTOR && t.live && (FORM == CLOSED || (FORM == WEIGHTED && body_has_closed_form(v, t))))
+        factor_rigid(v.bodies, t.body, t.lane, C);
     else if (FACTOR && t.live) factor_body(v.bodies, t.body, t.lane, beta, C);
     if (args.planned) check_plan(v.model, v.iteration, v.step);
 }
@@ -185,6 +187,7 @@ extern "C" sadmm_status CUDA(init_penalty)(struct sadmm_context *c, struct sadmm
     c->rescaled = false;
     if (c->fast) {
         CUDA(begin_weights)(c);
+        TRY(CUDA(enqueue_row_responses)(c, error));
         TRY(CUDA(enqueue_islands)(c, error));
         return enqueue_weighted_penalties(c, true, false, false, error);
     }
@@ -195,8 +198,9 @@ extern "C" sadmm_status CUDA(factorize)(struct sadmm_context *c, struct sadmm_er
 {
     cuda_args args = {};
     CUDA_ENTER(c);
-    const cuda_kernel kernel =
-        closed_form(c) ? penalty_kernel<false, true, CLOSED> : penalty_kernel<false, true, PLAIN>;
+    const cuda_kernel kernel = closed_form(c) ? penalty_kernel<false, true, CLOSED>
+                               : c->fast      ? penalty_kernel<false, true, WEIGHTED>
+                                              : penalty_kernel<false, true, PLAIN>;
     return launch_bodies(c, kernel, "factorize", &args, error);
 }
 

@@ -48,26 +48,22 @@ static __device__ __forceinline__ void weigh_island(cuda_island *island, const d
     island->rescale = (island->rescale > 0 ? island->rescale : 1) * rise;
 }
 
-/* Number `lane` of what side_wrench would have of side `code` of a row block. */
+/* Component `lane`, below 6, of J^T lambda on side `code` of a row block; of its place for rows that it does not have,
+ * too, which are 0: all of them are fetched at once. */
 static inline __device__ double row_side_number(const contact_view &contacts, const row_view &rows, int32_t code,
                                                 int32_t lane)
 {
-    const int32_t k = code / 2 - contacts.pair_capacity, side = code & 1;
-    const row_data *row = rows_of(rows, k);
-    double square = 0;
-    for (int j = lane < 6 ? lane : 0; j < (lane < 6 ? lane + 1 : 3); ++j) {
-        double sum = 0;
-        for (int r = 0; r < rows.constraints[k].rows; ++r)
-            sum += (double)row[r].jacobian[side][j] * (double)row[r].lambda;
-        if (lane < 6) return sum;
-        square += sum * sum;
-    }
-    return lane == SIDE_PUSH ? sqrt(square) : 0;
+    const row_data *row = rows_of(rows, code / 2 - contacts.pair_capacity);
+    double sum = 0;
+    if (lane >= 6) return 0;
+#pragma unroll
+    for (int r = 0; r < SADMM_MAX_ROWS; ++r)
+        sum += (double)row[r].jacobian[code & 1][lane] * (double)row[r].lambda;
+    return sum;
 }
 
 /* J^T lambda of a body, a component a lane; in lane SIDE_PUSH the sum of the forces' sizes, in lane SIDE_HOLDS how many
- * sides hold it. ROWS: there may be row
- * blocks. */
+ * sides hold it. ROWS: there may be row blocks; then every lane of the warp comes here. */
 template <bool ROWS>
 static __device__ __forceinline__ double sum_sides(const graph_view &graph, const contact_view &contacts,
                                                    const row_view &rows, const weight_view &weights,
@@ -75,7 +71,8 @@ static __device__ __forceinline__ double sum_sides(const graph_view &graph, cons
 {
     enum { AT_ONCE = 4 };
     double sum = 0;
-    for (int32_t first = t.begin; first < t.end; first += AT_ONCE) {
+    for (int32_t first = t.begin; ROWS ? __ballot_sync((unsigned)ALL_LANES, first < t.end) != 0 : first < t.end;
+         first += AT_ONCE) {
         double number[AT_ONCE];
         int32_t code[AT_ONCE];
 #pragma unroll
@@ -86,6 +83,13 @@ static __device__ __forceinline__ double sum_sides(const graph_view &graph, cons
                         : ROWS && code[j] / 2 >= contacts.pair_capacity
                             ? row_side_number(contacts, rows, code[j], t.lane)
                             : weights.side_wrench[(size_t)code[j] * ROW + (size_t)t.lane];
+#pragma unroll
+        for (int32_t j = 0; ROWS && j < AT_ONCE; ++j) {
+            const double x = __shfl_sync((unsigned)ALL_LANES, number[j], 0, LANES),
+                         y = __shfl_sync((unsigned)ALL_LANES, number[j], 1, LANES),
+                         z = __shfl_sync((unsigned)ALL_LANES, number[j], 2, LANES);
+            if (t.lane == SIDE_PUSH && code[j] / 2 >= contacts.pair_capacity) number[j] = sqrt(x * x + y * y + z * z);
+        }
 #pragma unroll
         for (int32_t j = 0; j < AT_ONCE; ++j) sum += number[j];
     }

@@ -20,6 +20,8 @@ sadmm_status CUDA(enqueue_balance)(struct sadmm_context *, struct sadmm_error *e
 void CUDA(begin_weights)(struct sadmm_context *);
 /* fast: what weights of islands depend on beside the islands. */
 cuda_args CUDA(weight_args)(const struct sadmm_context *);
+/* fast: of constraints given by rows what responds to them, once a solve, when they and the bodies are assembled. */
+sadmm_status CUDA(enqueue_row_responses)(struct sadmm_context *, struct sadmm_error *error);
 /* fast: sums over islands, their weight scales, and B of constraints given by rows. */
 sadmm_status CUDA(enqueue_islands)(struct sadmm_context *, struct sadmm_error *error);
 /* fast: the loads of pairs as they are now, then islands again. */

@@ -5,7 +5,7 @@
  *            contacts
  *   terms    eight lanes a body: its momentum residual, what it adds to the sums over its island, the sums
  *            (weight/island_sums.h), and what follows for the island
- *   rows     a thread a constraint given by rows: B
+ *   rows     a thread a row: what responds to it, which nothing in the solve changes; a thread a constraint: B
  *   then C and H (weight/penalty.cu), where each side of a pair works out B for itself
  *
  * The first time, persistent kernels of tier BLOCK do this themselves (iterate/prologue.h). */
@@ -59,25 +59,22 @@ static __global__ void __launch_bounds__(BODY_THREADS)
 
 /* ---- row blocks -------------------------------------------------------------------------------------------------- */
 
-/* Of every row; and what its multiplier counts for in the load of its constraint. */
-static __device__ void respond_rows(const model_view &model, const body_view &bodies, const row_view &rows, int32_t k)
+/* J A^-1 J^T; and what its multiplier counts for in the load of its constraint. A thread a row. */
+static __global__ void respond_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
-    const row_constraint about = rows.constraints[k];
-    const int32_t joined[2] = {about.body_a, about.body_b};
-    double inverse_mass = 0;
-    for (int side = 0; side < 2; ++side)
-        if (is_dynamic(model, joined[side])) inverse_mass += 1 / mass_of(bodies, (size_t)joined[side]);
-    for (int r = 0; r < about.rows; ++r) {
-        double w = 0, push = 0, J[6];
-        for (int side = 0; side < 2; ++side) {
-            if (!is_dynamic(model, joined[side])) continue;
-            load_jacobian(rows_of(rows, k)[r], side, J);
-            w += packed_form(bodies.A_inverse + (size_t)joined[side] * PACKED, J);
-            push = fmax(push, length3(J));
-        }
-        const row_response out = {w, weight_row_scale(push, w, inverse_mass)};
-        rows.responses[(size_t)k * SADMM_MAX_ROWS + (size_t)r] = out;
+    const int32_t slot = thread_index(), k = slot / SADMM_MAX_ROWS, r = slot % SADMM_MAX_ROWS;
+    if (k >= live_rows(v.model, v.rows) || r >= v.rows.constraints[k].rows) return;
+    const int32_t joined[2] = {v.rows.constraints[k].body_a, v.rows.constraints[k].body_b};
+    double inverse_mass = 0, w = 0, push = 0, J[6];
+    for (int side = 0; side < 2; ++side) {
+        if (!is_dynamic(v.model, joined[side])) continue;
+        inverse_mass += 1 / mass_of(v.bodies, (size_t)joined[side]);
+        load_jacobian(rows_of(v.rows, k)[r], side, J);
+        w += packed_form(v.bodies.A_inverse + (size_t)joined[side] * PACKED, J);
+        push = fmax(push, length3(J));
     }
+    const row_response out = {w, weight_row_scale(push, w, inverse_mass)};
+    v.rows.responses[slot] = out;
 }
 
 /* B = diag(weight) + along along^T */
@@ -89,10 +86,7 @@ static __device__ void weigh_rows(const cuda_view &v, int32_t k, bool first, dou
     cuda_island *island =
         &v.islands.info[v.graph.label[is_dynamic(v.model, about.body_a) ? about.body_a : about.body_b]];
     struct weight_row_sums sums = {0, 0, 0};
-    if (first) {
-        respond_rows(v.model, v.bodies, v.rows, k);
-        island->rows = island->held = 1; /* left alone */
-    }
+    if (first) island->rows = island->held = 1; /* left alone */
     const row_response *responses = v.rows.responses + (size_t)k * SADMM_MAX_ROWS;
     for (int r = 0; r < about.rows; ++r)
         weight_add_row(&sums, (double)rows[r].lambda, responses[r].scale, responses[r].response, about.rows);
@@ -129,6 +123,13 @@ cuda_args CUDA(weight_args)(const struct sadmm_context *c)
     args.factor = weight_under_iterated(c->plan.rigid, c->settings.iterations);
     args.row_floor = weight_row_floor(c->plan.rigid, c->settings.iterations);
     return args;
+}
+
+sadmm_status CUDA(enqueue_row_responses)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    const cuda_args args = {};
+    return CUDA(launch)(c, respond_rows_kernel, "responses of rows", blocks_for((int64_t)c->view.rows.count * SADMM_MAX_ROWS),
+                        &args, error);
 }
 
 sadmm_status CUDA(enqueue_islands)(struct sadmm_context *c, struct sadmm_error *error)

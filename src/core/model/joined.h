@@ -1,11 +1,14 @@
 /* Bodies joined by constraint rows, solved directly (core/solve/joined.h): the formulas, entry by entry, for a host
- * that goes through them in order and a device whose threads share them. In double. Every sum goes along a list that
- * ascends, so that both give the same bits.
+ * that goes through them in order and a device whose threads share them. In double. Every sum goes along a list in one
+ * order, so that both give the same bits.
  *
- *   parts      constraints that hang together by bodies that are solved for
- *   places     their constraints, in the order of elimination: part by part, level by level; places of a level are not
- *              coupled to each other
- *   nodes      blocks of the factor: place j its diagonal one, count + b the b-th below the diagonal */
+ * A part is constraints that hang together by bodies that are solved for. It is solved in numbers of its own, from
+ * copies of what it needs, and so that they lie together:
+ *
+ *   places     its constraints, in the order of elimination, level by level; places of a level are not coupled to each
+ *              other. Row k of place p has number JOINED_ROWS p + k
+ *   nodes      blocks of the factor: place p its diagonal one, places + b the b-th below the diagonal
+ *   pushes     what a level does to nodes of later ones, once it is factored: node, and the range of its updates */
 #ifndef SADMM_CORE_MODEL_JOINED_H
 #define SADMM_CORE_MODEL_JOINED_H
 
@@ -22,157 +25,197 @@ enum { JOINED_ROWS = SADMM_MAX_ROWS, JOINED_BLOCK = JOINED_ROWS * JOINED_ROWS };
  * bricard: to 1e6 N where 30 are at work) until they hold the loop. */
 #define JOINED_GIVE 1e-9
 /* Rows that come to a bound, or leave one, are found in so many passes at most; one or two do mostly, and 9 in all but
- * 6 of 8,000 solves of ragdolls that fall on each other. A row that is held against its law by less than a rounding of
+ * 16 of 14,500 solves of ragdolls that fall on each other. A row that is held against its law by less than a rounding of
  * its numbers and JOINED_SLACK, m/s or rad/s, stays where it is, or rounding would have rows come and go for good. */
 enum { JOINED_PASSES = 16 };
 #define JOINED_SLACK 1e-9
 
-/* Where a row is: between its bounds, at one of them, or given: it does not depend on the motion. */
-enum joined_state { JOINED_INSIDE, JOINED_AT_LO, JOINED_AT_HI, JOINED_GIVEN };
+/* Where a row is: between its bounds, at one of them, or given: it does not depend on the motion. Or it is not there:
+ * its constraint has fewer. */
+enum joined_state { JOINED_INSIDE, JOINED_AT_LO, JOINED_AT_HI, JOINED_GIVEN, JOINED_ABSENT };
+
+/* ---- the structure of a part ------------------------------------------------------------------------------------- */
 
 struct joined_structure {
-    int32_t count, blocks, parts, bodies; /* bodies: that have rows solved directly */
-    const int32_t *constraint;     /* (count) place -> constraint */
-    const int32_t *first_level;    /* (parts + 1) part -> its levels */
-    const int32_t *first_of_level; /* (levels + 1) level -> its places */
-    const int32_t *first_below;    /* (count + 1) place of a column -> its blocks */
+    int32_t places, blocks, levels, bodies, updates, pushes, pulls;
+    const int32_t *constraint;     /* (places) of the caller's list */
+    const int32_t *body;           /* (bodies) of the world */
+    const int32_t *side;           /* (places x 2) bodies of the part; -1: not solved for */
+    const int32_t *first_of_level; /* (levels + 1) -> places */
+    const int32_t *first_below;    /* (places + 1) place of a column -> its blocks */
     const int32_t *row, *column;   /* (blocks) places */
-    const int32_t *first_update;   /* (count + blocks + 1) node -> what is taken from it: L_u L_w^T */
-    const int32_t *update;         /* 2 each: blocks u, w; of a diagonal node its row's blocks, u = w */
-    const int32_t *first_body;     /* (parts + 1) part -> its bodies in `body` */
-    const int32_t *body;           /* (bodies) */
-    const int32_t *first_around;   /* (bodies + 1) entry of `body` -> its constraints' sides */
-    const int32_t *around;         /* 2 place + side */
+    const int32_t *common;         /* (blocks) bodies that both have: bit 2 s + t, side s of the row, t of the column */
+    const int32_t *first_update;   /* (places + blocks + 1) node -> what is taken from it: L_u L_w^T, by columns */
+    const int32_t *update;         /* (updates x 2) blocks u, w; of a diagonal node its row's blocks, u = w */
+    const int32_t *first_push;     /* (levels x 2 + 1) -> pushes of a level: to diagonal nodes, to blocks */
+    const int32_t *push;           /* (pushes x 3) node, first and end of its updates by columns of the level */
+    const int32_t *first_pull;     /* (levels + 1) -> pulls: what places of a level are taken from on the way back */
+    const int32_t *pull;           /* (pulls x 3) place of a column, first and end of its blocks in rows of the level */
+    const int32_t *first_around;   /* (bodies + 1) -> sides of constraints at a body */
+    const int32_t *around;         /* (places x 2 at most) 2 place + side, ascending */
+};
+
+/* A structure is numbers that lie together: its counts, then its arrays. */
+enum { JOINED_COUNTS = 7 };
+
+SADMM_INLINE const int32_t *joined_take(const int32_t **at, int32_t count)
+{
+    const int32_t *begin = *at;
+    *at += count;
+    return begin;
+}
+SADMM_INLINE struct joined_structure joined_structure_at(const int32_t *numbers)
+{
+    struct joined_structure s;
+    const int32_t *at = numbers + JOINED_COUNTS;
+    s.places = numbers[0], s.blocks = numbers[1], s.levels = numbers[2], s.bodies = numbers[3];
+    s.updates = numbers[4], s.pushes = numbers[5], s.pulls = numbers[6];
+    s.constraint = joined_take(&at, s.places);
+    s.body = joined_take(&at, s.bodies);
+    s.side = joined_take(&at, 2 * s.places);
+    s.first_of_level = joined_take(&at, s.levels + 1);
+    s.first_below = joined_take(&at, s.places + 1);
+    s.row = joined_take(&at, s.blocks);
+    s.column = joined_take(&at, s.blocks);
+    s.common = joined_take(&at, s.blocks);
+    s.first_update = joined_take(&at, s.places + s.blocks + 1);
+    s.update = joined_take(&at, 2 * s.updates);
+    s.first_push = joined_take(&at, 2 * s.levels + 1);
+    s.push = joined_take(&at, 3 * s.pushes);
+    s.first_pull = joined_take(&at, s.levels + 1);
+    s.pull = joined_take(&at, 3 * s.pulls);
+    s.first_around = joined_take(&at, s.bodies + 1);
+    s.around = joined_take(&at, 2 * s.places);
+    return s;
+}
+
+/* Of so many numbers, in doubles. */
+SADMM_INLINE size_t joined_numbers_size(int32_t numbers) { return ((size_t)numbers + 1) / 2; }
+
+/* ---- a part ------------------------------------------------------------------------------------------------------ */
+
+/* As it is given. */
+struct joined_row {
+    double jacobian[2][6];                 /* on (linear, angular) of a, of b */
+    double gain, bias, compliance, lo, hi; /* its law */
+    double lambda;                         /* its multiplier as it was */
 };
 
 struct joined_view {
     struct joined_structure s;
-    /* The rows, as they lie: number r of a row begins at `first` of its constraint. */
-    const struct sadmm_row_constraint *constraints;
-    const double *jacobian[2], *gain, *bias, *compliance, *lo, *hi;
-    int32_t jacobian_stride, law_stride;
-    /* Work. By body of the system: */
-    double *velocity;                       /* x 6 */
-    double *A, *factor;                     /* x 36: A; Cholesky factor of A + C */
-    double *missing, *dv;                   /* x 6: b - A v + J^T lambda; the change of velocity */
     /* by row: */
-    double *lambda, *change;                /* multipliers as they were, what they change by */
-    double *answer;                         /* 2 x 6: (A + C)^-1 J^T of either side */
+    struct joined_row *rows;
+    double *answer;                   /* x 12: (A + C)^-1 J^T of either side */
+    double *change;                   /* of the multiplier */
+    double *give;                     /* compliance; of what is hard JOINED_GIVE */
     uint8_t *state;
-    /* by place, by block: */
-    double *diagonal, *below, *right;       /* JOINED_BLOCK, JOINED_BLOCK, JOINED_ROWS */
+    /* by body: */
+    double *velocity;                 /* x 6, as it was */
+    double *missing;                  /* x 6: b - A v + J^T lambda, then (A + C)^-1 of it: the free change */
+    double *dv;                       /* x 6: the change of velocity */
+    double *factor;                   /* x 36: A, then the factor of A + C */
+    double *energy;
+    /* by place: */
+    double *diagonal;                 /* x 36: S_jj */
+    double *inverse, *pivot;          /* x 36: L_jj^-T of its factor; x 6: D_j^-1 */
+    double *right, *found;            /* x 6: right sides; what they give */
+    /* by block below the diagonal: */
+    double *below, *share;            /* x 36: S_ij, then L_ij D_j; L_ij */
 };
 
-/* Numbers that the work on so many bodies and rows takes, without `velocity` and `state`; and where they lie. */
-SADMM_INLINE size_t joined_work_size(const struct joined_structure *s, size_t bodies, size_t rows)
+/* Doubles that the arrays take; and where they lie. */
+SADMM_INLINE size_t joined_work_size(const struct joined_structure *s)
 {
-    return (2 * 36 + 2 * 6) * bodies + (2 + 2 * 6) * rows + (JOINED_BLOCK + JOINED_ROWS) * (size_t)s->count +
-           JOINED_BLOCK * (size_t)s->blocks;
+    const size_t places = (size_t)s->places, rows = JOINED_ROWS * places;
+    return rows * (sizeof(struct joined_row) / sizeof(double) + 14) + (rows + 7) / 8 + 55 * (size_t)s->bodies +
+           (2 * JOINED_BLOCK + 3 * JOINED_ROWS) * places + 2 * JOINED_BLOCK * (size_t)s->blocks;
 }
-SADMM_INLINE void joined_bind_work(struct joined_view *v, double *work, size_t bodies, size_t rows)
+SADMM_INLINE struct joined_view joined_view_at(const struct joined_structure *s, double *work)
 {
-    v->A = work;
-    v->factor = v->A + 36 * bodies;
-    v->missing = v->factor + 36 * bodies;
-    v->dv = v->missing + 6 * bodies;
-    v->lambda = v->dv + 6 * bodies;
-    v->change = v->lambda + rows;
-    v->answer = v->change + rows;
-    v->diagonal = v->answer + 2 * 6 * rows;
-    v->right = v->diagonal + JOINED_BLOCK * (size_t)v->s.count;
-    v->below = v->right + JOINED_ROWS * (size_t)v->s.count;
+    const size_t places = (size_t)s->places, rows = JOINED_ROWS * places, bodies = (size_t)s->bodies;
+    struct joined_view v;
+    v.s = *s;
+    v.rows = (struct joined_row *)work;
+    v.answer = (double *)(v.rows + rows);
+    v.change = v.answer + 12 * rows;
+    v.give = v.change + rows;
+    v.velocity = v.give + rows;
+    v.missing = v.velocity + 6 * bodies;
+    v.dv = v.missing + 6 * bodies;
+    v.factor = v.dv + 6 * bodies;
+    v.energy = v.factor + 36 * bodies;
+    v.diagonal = v.energy + bodies;
+    v.inverse = v.diagonal + JOINED_BLOCK * places;
+    v.pivot = v.inverse + JOINED_BLOCK * places;
+    v.right = v.pivot + JOINED_ROWS * places;
+    v.found = v.right + JOINED_ROWS * places;
+    v.below = v.found + JOINED_ROWS * places;
+    v.share = v.below + JOINED_BLOCK * (size_t)s->blocks;
+    v.state = (uint8_t *)(v.share + JOINED_BLOCK * (size_t)s->blocks);
+    return v;
 }
 
-SADMM_INLINE const struct sadmm_row_constraint *joined_at(const struct joined_view *v, int32_t place)
+/* Of six numbers each, x_stride and y_stride apart; in pairs, for sums wait for each other. */
+SADMM_INLINE double joined_strided_product(const double *x, int x_stride, const double *y, int y_stride)
 {
-    return &v->constraints[v->s.constraint[place]];
+    return (x[0] * y[0] + x[x_stride] * y[y_stride]) +
+           (x[2 * x_stride] * y[2 * y_stride] + x[3 * x_stride] * y[3 * y_stride]) +
+           (x[4 * x_stride] * y[4 * y_stride] + x[5 * x_stride] * y[5 * y_stride]);
 }
-SADMM_INLINE int32_t joined_body(const struct sadmm_row_constraint *constraint, int side)
-{
-    return side ? constraint->body_b : constraint->body_a;
-}
-SADMM_INLINE const double *joined_jacobian(const struct joined_view *v, int32_t r, int side)
-{
-    /* not by an index that varies: the view stays in registers */
-    return (side ? v->jacobian[1] : v->jacobian[0]) + (size_t)v->jacobian_stride * (size_t)r;
-}
-SADMM_INLINE size_t joined_law(const struct joined_view *v, int32_t r) { return (size_t)v->law_stride * (size_t)r; }
-SADMM_INLINE double *joined_answer(const struct joined_view *v, int32_t r, int side)
-{
-    return v->answer + 6 * (2 * (size_t)r + (size_t)side);
-}
-SADMM_INLINE double joined_product(const double *x, const double *y)
-{
-    double sum = 0;
-    int k;
-    for (k = 0; k < 6; ++k) sum += x[k] * y[k];
-    return sum;
-}
+SADMM_INLINE double joined_product(const double *x, const double *y) { return joined_strided_product(x, 1, y, 1); }
 
 /* ---- six by six -------------------------------------------------------------------------------------------------- */
 
-/* Cholesky factor of a symmetric matrix, of which the lower half is read, in the same place; on the diagonal are the
- * inverses of its own. A pivot that is lost to rounding: the row says what others say, and its solution is 0. In
- * registers: what waits for memory waits longest here. */
-SADMM_INLINE void joined_cholesky(double matrix[36])
+/* L D L^T of a symmetric matrix S, of which the lower half is read: below the diagonal the unit L, on it D^-1. A pivot
+ * that is lost to rounding: the row says what others say, and its solution is 0. In registers, without roots: what waits
+ * for memory and for quotients waits longest here. */
+SADMM_INLINE void joined_factor(const double S[36], double to[36])
 {
     double L[6][6];
-    int r, k, i;
+    int r, c, k;
     SADMM_UNROLL
     for (r = 0; r < 6; ++r) {
         SADMM_UNROLL
-        for (k = 0; k <= r; ++k) L[r][k] = matrix[6 * r + k];
+        for (k = 0; k <= r; ++k) L[r][k] = S[6 * r + k];
     }
     SADMM_UNROLL
     for (k = 0; k < 6; ++k) {
-        double d = L[k][k], inverse;
-        SADMM_UNROLL
-        for (i = 0; i < k; ++i) d -= L[k][i] * L[k][i];
-        inverse = d > 0 ? 1 / sqrt(d) : 0;
-        L[k][k] = inverse;
+        const double inverse = L[k][k] > 0 ? 1 / L[k][k] : 0;
+        to[7 * k] = inverse;
         SADMM_UNROLL
         for (r = k + 1; r < 6; ++r) {
-            double sum = L[r][k];
+            const double share = L[r][k] * inverse;
+            to[6 * r + k] = share;
             SADMM_UNROLL
-            for (i = 0; i < k; ++i) sum -= L[r][i] * L[k][i];
-            L[r][k] = sum * inverse;
+            for (c = k + 1; c <= r; ++c) L[r][c] -= share * L[c][k];
         }
-    }
-    SADMM_UNROLL
-    for (r = 0; r < 6; ++r) {
-        SADMM_UNROLL
-        for (k = 0; k <= r; ++k) matrix[6 * r + k] = L[r][k];
     }
 }
 
-/* L^-1 x, L^-T x in place; x = A^-1 b by both. */
+/* L^-1 x, D^-1 x, L^-T x in place; x = A^-1 b by all of them. */
 SADMM_INLINE void joined_forward(const double L[36], double x[6])
 {
-    double y[6];
     int r, i;
     SADMM_UNROLL
     for (r = 0; r < 6; ++r) {
-        double sum = x[r];
         SADMM_UNROLL
-        for (i = 0; i < r; ++i) sum -= L[6 * r + i] * y[i];
-        y[r] = sum * L[7 * r];
+        for (i = 0; i < r; ++i) x[r] -= L[6 * r + i] * x[i];
     }
+}
+SADMM_INLINE void joined_scale(const double L[36], double x[6])
+{
+    int k;
     SADMM_UNROLL
-    for (r = 0; r < 6; ++r) x[r] = y[r];
+    for (k = 0; k < 6; ++k) x[k] *= L[7 * k];
 }
 SADMM_INLINE void joined_backward(const double L[36], double x[6])
 {
-    double y[6];
     int r, i;
     SADMM_UNROLL
     for (r = 5; r >= 0; --r) {
-        double sum = x[r];
         SADMM_UNROLL
-        for (i = r + 1; i < 6; ++i) sum -= L[6 * i + r] * y[i];
-        y[r] = sum * L[7 * r];
+        for (i = 5; i > r; --i) x[r] -= L[6 * i + r] * x[i];
     }
-    SADMM_UNROLL
-    for (r = 0; r < 6; ++r) x[r] = y[r];
 }
 SADMM_INLINE void joined_solve(const double L[36], const double b[6], double x[6])
 {
@@ -181,6 +224,7 @@ SADMM_INLINE void joined_solve(const double L[36], const double b[6], double x[6
     SADMM_UNROLL
     for (k = 0; k < 6; ++k) y[k] = b[k];
     joined_forward(L, y);
+    joined_scale(L, y);
     joined_backward(L, y);
     SADMM_UNROLL
     for (k = 0; k < 6; ++k) x[k] = y[k];
@@ -188,27 +232,20 @@ SADMM_INLINE void joined_solve(const double L[36], const double b[6], double x[6
 
 /* ---- bodies ------------------------------------------------------------------------------------------------------ */
 
-/* What the points of a pair press its body on `side` with. */
-SADMM_INLINE void joined_add_pair(const struct sadmm_contact_point *points, int32_t count, int side, double to[6])
+/* Component k of the (force, torque) that a contact presses its body on `side` with; f: its impulse. */
+SADMM_INLINE double joined_point_load(const double arm[3], const double f[3], int side, int k)
 {
-    int32_t k;
-    for (k = 0; k < count; ++k) {
-        const struct sadmm_contact_point *point = &points[k];
-        const double *arm = side ? point->arm_b : point->arm_a, sign = side ? 1 : -1;
-        const double x = sign * point->impulse[0], y = sign * point->impulse[1], z = sign * point->impulse[2];
-        to[0] += x, to[1] += y, to[2] += z;
-        to[3] += arm[1] * z - arm[2] * y;
-        to[4] += arm[2] * x - arm[0] * z;
-        to[5] += arm[0] * y - arm[1] * x;
-    }
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    const double load = k < 3 ? f[k] : arm[i] * f[j] - arm[j] * f[i];
+    return side ? load : -load;
 }
-SADMM_INLINE void joined_add_rows(const struct joined_view *v, const struct sadmm_row_constraint *constraint, int side,
-                                  double to[6])
+
+/* Component k of what rows at a side of a place do to its body. */
+SADMM_INLINE double joined_row_load(const struct joined_view *v, int32_t around, int k)
 {
-    int32_t r;
-    int k;
-    for (r = constraint->first; r < constraint->first + constraint->count; ++r)
-        for (k = 0; k < 6; ++k) to[k] += v->lambda[r] * joined_jacobian(v, r, side)[k];
+    enum { STRIDE = sizeof(struct joined_row) / sizeof(double) };
+    const struct joined_row *first = &v->rows[JOINED_ROWS * (around / 2)];
+    return joined_strided_product(&first->lambda, STRIDE, &first->jacobian[0][6 * (around % 2) + k], STRIDE);
 }
 
 /* Twice the energy of the impulses on a body, for the speed that they change its part by (V of math/weight.h). */
@@ -220,125 +257,109 @@ SADMM_INLINE double joined_energy(const double A[36], const double impulse[6])
     for (k = 0; k < 3; ++k) inertia.r[k] = v3_load(A + 6 * (k + 3) + 3);
     return v3_norm2(v3_load(impulse)) / A[0] + v3_dot(turn, m3_solve(inertia, turn));
 }
-
-/* B J_c^T J_c of a point at `arm`. */
-SADMM_INLINE void joined_add_point(double A[36], double B, const double arm[3])
-{
-    const double x = arm[0], y = arm[1], z = arm[2], square = x * x + y * y + z * z;
-    const double skew[9] = {0, z, -y, -z, 0, x, y, -x, 0}; /* -[arm]x */
-    int i, k;
-    for (i = 0; i < 3; ++i) A[7 * i] += B;
-    for (i = 0; i < 3; ++i)
-        for (k = 0; k < 3; ++k) {
-            A[6 * i + k + 3] += B * skew[3 * i + k];
-            A[6 * (k + 3) + i] += B * skew[3 * i + k];
-            A[6 * (i + 3) + k + 3] += B * ((i == k ? square : 0) - arm[i] * arm[k]);
-        }
-}
-/* The same of a pair, whose contacts are as stiff as the mass that rests on them. */
-SADMM_INLINE void joined_add_contact(const struct sadmm_contact_point *points, int32_t count, int side, double speed,
-                                     double A[36])
-{
-    double load = 0;
-    int32_t k;
-    for (k = 0; k < count; ++k) load += v3_norm(v3_load(points[k].impulse)) / count;
-    for (k = 0; load > 0 && speed > 0 && k < count; ++k)
-        joined_add_point(A, load / speed, side ? points[k].arm_b : points[k].arm_a);
-}
-
 SADMM_INLINE double joined_speed(double energy, double mass) { return mass > 0 ? sqrt(energy / mass) : 0; }
 
-/* Entry e of `body`: b - A v + J^T lambda. */
-SADMM_INLINE void joined_miss(const struct joined_view *v, int32_t e, const double b[6], const double impulse[6])
+/* Entry k, q <= k, of J_c^T J_c of a point at `arm`. */
+SADMM_INLINE double joined_point_entry(const double arm[3], int k, int q)
 {
-    const size_t i = (size_t)v->s.body[e];
-    int k;
-    for (k = 0; k < 6; ++k)
-        v->missing[6 * i + (size_t)k] =
-            b[k] + impulse[k] - joined_product(v->A + 36 * i + 6 * k, v->velocity + 6 * i);
+    const int i = k - 3, j = q - 3;
+    if (k < 3) return k == q ? 1 : 0;
+    if (q < 3) return q == i ? 0 : (i + 1) % 3 == q ? -arm[(q + 1) % 3] : arm[(i + 1) % 3];
+    return (i == j ? arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2] : 0) - arm[i] * arm[j];
 }
 
-/* A + C becomes its factor. */
-SADMM_INLINE void joined_factor_body(const struct joined_view *v, int32_t e)
+/* B of a pair of `count` contacts whose impulses' sizes are `load` in all: as stiff as the mass that rests on them. */
+SADMM_INLINE double joined_contact_weight(double load, int32_t count, double speed)
 {
-    joined_cholesky(v->factor + 36 * (size_t)v->s.body[e]);
+    return load > 0 && speed > 0 ? load / (count * speed) : 0;
 }
 
-/* Entry e of `body`: the free change of velocity, then what its rows change it by. */
-SADMM_INLINE void joined_move(const struct joined_view *v, int32_t e)
+/* Component k of b - A v + J^T lambda, before A becomes A + C. */
+SADMM_INLINE double joined_missing(const struct joined_view *v, int32_t e, int k, double b, double impulse)
 {
-    const size_t i = (size_t)v->s.body[e];
-    double *dv = v->dv + 6 * i;
-    int32_t at, r;
-    int k;
-    joined_solve(v->factor + 36 * i, v->missing + 6 * i, dv);
+    return b + impulse - joined_product(v->factor + 36 * (size_t)e + 6 * k, v->velocity + 6 * (size_t)e);
+}
+
+/* Component k: the free change, then what its rows change it by. */
+SADMM_INLINE void joined_move(const struct joined_view *v, int32_t e, int k)
+{
+    double dv = v->missing[6 * (size_t)e + (size_t)k];
+    int32_t at;
     for (at = v->s.first_around[e]; at < v->s.first_around[e + 1]; ++at) {
-        const struct sadmm_row_constraint *constraint = joined_at(v, v->s.around[at] / 2);
-        for (r = constraint->first; r < constraint->first + constraint->count; ++r)
-            for (k = 0; k < 6; ++k) dv[k] += v->change[r] * joined_answer(v, r, v->s.around[at] % 2)[k];
+        const int32_t first = JOINED_ROWS * (v->s.around[at] / 2), side = v->s.around[at] % 2;
+        dv += joined_strided_product(v->change + first, 1, v->answer + 12 * (size_t)first + 6 * side + k, 12);
     }
+    v->dv[6 * (size_t)e + (size_t)k] = dv;
 }
 
 /* ---- rows -------------------------------------------------------------------------------------------------------- */
 
-SADMM_INLINE void joined_respond(const struct joined_view *v, const struct sadmm_row_constraint *constraint, int32_t r)
+/* Before anything else is known of a row; there: its constraint has it. Else its numbers are 0. */
+SADMM_INLINE void joined_put_row(const struct joined_view *v, int32_t r, bool there)
 {
-    int side;
-    for (side = 0; side < 2; ++side) {
-        const int32_t body = joined_body(constraint, side);
-        if (body >= 0)
-            joined_solve(v->factor + 36 * (size_t)body, joined_jacobian(v, r, side), joined_answer(v, r, side));
-    }
+    v->state[r] = there ? JOINED_INSIDE : JOINED_ABSENT;
+    v->change[r] = v->give[r] = 0;
 }
 
-/* That of the row's law; what is hard gives by JOINED_GIVE. */
-SADMM_INLINE double joined_compliance(const struct joined_view *v, const struct sadmm_row_constraint *constraint,
-                                      int32_t r)
+SADMM_INLINE void joined_respond(const struct joined_view *v, int32_t r, int side)
 {
-    const size_t law = joined_law(v, r);
-    double response = 0;
-    int side;
-    if (!sadmm_law_is_coupled(v->compliance[law], v->lo[law], v->hi[law])) return v->compliance[law];
-    for (side = 0; side < 2; ++side)
-        if (joined_body(constraint, side) >= 0)
-            response += joined_product(joined_jacobian(v, r, side), joined_answer(v, r, side));
-    return JOINED_GIVE * response;
+    const int32_t body = v->s.side[2 * (r / JOINED_ROWS) + side];
+    double *answer = v->answer + 12 * (size_t)r + 6 * (size_t)side;
+    int k;
+    if (body >= 0 && v->state[r] != JOINED_ABSENT)
+        joined_solve(v->factor + 36 * (size_t)body, v->rows[r].jacobian[side], answer);
+    else
+        for (k = 0; k < 6; ++k) answer[k] = 0;
 }
 
 /* gain x + bias + compliance lambda with the changes so far; moved: with dv. */
-SADMM_INLINE double joined_residual(const struct joined_view *v, const struct sadmm_row_constraint *constraint,
-                                    int32_t r, bool moved)
+SADMM_INLINE double joined_residual(const struct joined_view *v, int32_t r, bool moved)
 {
-    const size_t law = joined_law(v, r);
+    const struct joined_row *row = &v->rows[r];
     double x = 0;
     int side;
     for (side = 0; side < 2; ++side) {
-        const int32_t body = joined_body(constraint, side);
+        const int32_t body = v->s.side[2 * (r / JOINED_ROWS) + side];
         if (body < 0) continue;
-        x += joined_product(joined_jacobian(v, r, side), v->velocity + 6 * (size_t)body);
-        if (moved) x += joined_product(joined_jacobian(v, r, side), v->dv + 6 * (size_t)body);
+        x += joined_product(row->jacobian[side], v->velocity + 6 * (size_t)body);
+        if (moved) x += joined_product(row->jacobian[side], v->dv + 6 * (size_t)body);
     }
-    return v->gain[law] * x + v->bias[law] +
-           joined_compliance(v, constraint, r) * (v->lambda[r] + v->change[r]);
+    return row->gain * x + row->bias + v->give[r] * (row->lambda + v->change[r]);
 }
 
 SADMM_INLINE double joined_clamp(double x, double lo, double hi) { return x < lo ? lo : x > hi ? hi : x; }
 
-/* Where a row is before the first pass. */
-SADMM_INLINE void joined_begin_row(const struct joined_view *v, const struct sadmm_row_constraint *constraint,
-                                   int32_t r)
+/* It goes to a bound, or is let go. */
+SADMM_INLINE void joined_put_state(const struct joined_view *v, int32_t r, uint8_t state)
 {
-    const size_t law = joined_law(v, r);
-    const double lambda = v->lambda[r], lo = v->lo[law], hi = v->hi[law];
-    double missing;
+    v->state[r] = state;
+    if (state == JOINED_AT_LO) v->change[r] = v->rows[r].lo - v->rows[r].lambda;
+    if (state == JOINED_AT_HI) v->change[r] = v->rows[r].hi - v->rows[r].lambda;
+}
+
+/* Where a row that is there is before the first pass. earlier: where a solve of this step has left it, which is mostly
+ * where it is still: iterations leave multipliers near bounds on either side. JOINED_ABSENT: there was none. */
+SADMM_INLINE void joined_begin_row(const struct joined_view *v, int32_t r, uint8_t earlier)
+{
+    const struct joined_row *row = &v->rows[r];
+    const double lambda = row->lambda, lo = row->lo, hi = row->hi;
+    double missing, response = 0;
+    int side;
+    for (side = 0; side < 2; ++side)
+        response += joined_product(row->jacobian[side], v->answer + 12 * (size_t)r + 6 * (size_t)side);
+    v->give[r] = sadmm_law_is_coupled(row->compliance, lo, hi) ? JOINED_GIVE * response : row->compliance;
     v->change[r] = joined_clamp(lambda, lo, hi) - lambda;
-    if (v->gain[law] == 0 || !(hi > lo)) {
-        const double given = v->compliance[law] > 0 ? -v->bias[law] / v->compliance[law] : lambda;
+    if (row->gain == 0 || !(hi > lo)) {
+        const double given = row->compliance > 0 ? -row->bias / row->compliance : lambda;
         v->state[r] = JOINED_GIVEN;
         v->change[r] = joined_clamp(given, lo, hi) - lambda;
         return;
     }
-    missing = lambda > lo && lambda < hi ? 0 : joined_residual(v, constraint, r, false);
+    if (earlier == JOINED_INSIDE || earlier == JOINED_AT_LO || earlier == JOINED_AT_HI) {
+        joined_put_state(v, r, earlier);
+        return;
+    }
+    missing = lambda > lo && lambda < hi ? 0 : joined_residual(v, r, false);
     v->state[r] = lambda <= lo && missing >= 0   ? JOINED_AT_LO
                   : lambda >= hi && missing <= 0 ? JOINED_AT_HI
                                                  : JOINED_INSIDE;
@@ -346,111 +367,203 @@ SADMM_INLINE void joined_begin_row(const struct joined_view *v, const struct sad
 
 /* After a pass: one that left its bounds stays at them, one that is held there against its law is let go. Did it
  * change? */
-SADMM_INLINE bool joined_change_row(const struct joined_view *v, const struct sadmm_row_constraint *constraint,
-                                    int32_t r)
+SADMM_INLINE bool joined_change_row(const struct joined_view *v, int32_t r)
 {
-    const size_t law = joined_law(v, r);
+    const struct joined_row *row = &v->rows[r];
     const uint8_t state = v->state[r];
-    const double lambda = v->lambda[r] + v->change[r];
+    const double lambda = row->lambda + v->change[r];
     uint8_t next = state;
     if (state == JOINED_INSIDE) {
-        next = lambda < v->lo[law] ? JOINED_AT_LO : lambda > v->hi[law] ? JOINED_AT_HI : JOINED_INSIDE;
-    } else if (state != JOINED_GIVEN) {
-        const double missing = joined_residual(v, constraint, r, true), least = JOINED_SLACK * (1 + fabs(v->bias[law]));
+        next = lambda < row->lo ? JOINED_AT_LO : lambda > row->hi ? JOINED_AT_HI : JOINED_INSIDE;
+    } else if (state == JOINED_AT_LO || state == JOINED_AT_HI) {
+        const double missing = joined_residual(v, r, true), least = JOINED_SLACK * (1 + fabs(row->bias));
         if (state == JOINED_AT_LO ? missing < -least : missing > least) next = JOINED_INSIDE;
     }
     if (next == state) return false;
-    v->state[r] = next;
-    if (next == JOINED_AT_LO) v->change[r] = v->lo[law] - v->lambda[r];
-    if (next == JOINED_AT_HI) v->change[r] = v->hi[law] - v->lambda[r];
+    joined_put_state(v, r, next);
     return true;
-}
-
-SADMM_INLINE bool joined_is_inside(const struct joined_view *v, const struct sadmm_row_constraint *constraint, int k)
-{
-    return k < constraint->count && v->state[constraint->first + k] == JOINED_INSIDE;
 }
 
 SADMM_INLINE double joined_bounded(const struct joined_view *v, int32_t r)
 {
-    const size_t law = joined_law(v, r);
-    return joined_clamp(v->lambda[r] + v->change[r], v->lo[law], v->hi[law]);
+    return joined_clamp(v->rows[r].lambda + v->change[r], v->rows[r].lo, v->rows[r].hi);
 }
 
 /* ---- the factor -------------------------------------------------------------------------------------------------- */
 
-/* Entry (k, q) of a node before anything is taken from it: J_i (A + C)^-1 J_j^T over the bodies that two constraints
- * have in common. Rows that are not inside their bounds are 0, and 1 on the diagonal. */
-SADMM_INLINE double joined_entry(const struct joined_view *v, int32_t row, int32_t column, int k, int q)
+/* Nodes are worked on in tiles, which fetch little for what they do. */
+enum { TILE_ROWS = 2, TILE_COLUMNS = 3, JOINED_TILES = JOINED_BLOCK / (TILE_ROWS * TILE_COLUMNS) };
+struct joined_tile {
+    double entry[TILE_ROWS][TILE_COLUMNS];
+};
+SADMM_INLINE int joined_tile_row(int tile) { return TILE_ROWS * (tile / (JOINED_ROWS / TILE_COLUMNS)); }
+SADMM_INLINE int joined_tile_column(int tile) { return TILE_COLUMNS * (tile % (JOINED_ROWS / TILE_COLUMNS)); }
+/* Of a symmetric node: is none of it in the lower half? */
+SADMM_INLINE bool joined_tile_is_above(int tile)
 {
-    const struct sadmm_row_constraint *i = joined_at(v, row), *j = joined_at(v, column);
-    const bool diagonal = row == column && k == q;
-    double sum = 0;
-    int a, b;
-    if (!joined_is_inside(v, i, k) || !joined_is_inside(v, j, q)) return diagonal ? 1 : 0;
-    for (a = 0; a < 2; ++a)
-        for (b = 0; b < 2; ++b)
-            if (joined_body(i, a) >= 0 && joined_body(i, a) == joined_body(j, b))
-                sum += joined_product(joined_jacobian(v, i->first + k, a), joined_answer(v, j->first + q, b));
-    if (diagonal) {
-        const size_t law = joined_law(v, i->first + k);
-        sum += JOINED_PROXIMAL * sum + joined_compliance(v, i, i->first + k) / v->gain[law];
-    }
-    return sum;
+    return joined_tile_column(tile) >= joined_tile_row(tile) + TILE_ROWS;
 }
 
-/* The same with all that is taken from it; entry: before. */
-SADMM_INLINE double joined_updated(const struct joined_view *v, int32_t node, double entry, int k, int q)
+SADMM_INLINE struct joined_tile joined_load_tile(const double *node, int tile)
+{
+    const double *at = node + JOINED_ROWS * joined_tile_row(tile) + joined_tile_column(tile);
+    struct joined_tile t;
+    int k, q;
+    SADMM_UNROLL
+    for (k = 0; k < TILE_ROWS; ++k) {
+        SADMM_UNROLL
+        for (q = 0; q < TILE_COLUMNS; ++q) t.entry[k][q] = at[JOINED_ROWS * k + q];
+    }
+    return t;
+}
+SADMM_INLINE void joined_store_tile(double *node, int tile, const struct joined_tile *t)
+{
+    double *at = node + JOINED_ROWS * joined_tile_row(tile) + joined_tile_column(tile);
+    int k, q;
+    SADMM_UNROLL
+    for (k = 0; k < TILE_ROWS; ++k) {
+        SADMM_UNROLL
+        for (q = 0; q < TILE_COLUMNS; ++q) at[JOINED_ROWS * k + q] = t->entry[k][q];
+    }
+}
+
+/* t += sign x y^T, six numbers a row of x and y, which are `x_stride` and `y_stride` apart. */
+SADMM_INLINE void joined_add_products(struct joined_tile *t, double sign, const double *x, int x_stride, const double *y,
+                                      int y_stride)
+{
+    double own[TILE_ROWS][6], other[TILE_COLUMNS][6];
+    int k, q, i;
+    SADMM_UNROLL
+    for (i = 0; i < 6; ++i) {
+        SADMM_UNROLL
+        for (k = 0; k < TILE_ROWS; ++k) own[k][i] = x[x_stride * k + i];
+        SADMM_UNROLL
+        for (q = 0; q < TILE_COLUMNS; ++q) other[q][i] = y[y_stride * q + i];
+    }
+    SADMM_UNROLL
+    for (k = 0; k < TILE_ROWS; ++k) {
+        SADMM_UNROLL
+        for (q = 0; q < TILE_COLUMNS; ++q) {
+            t->entry[k][q] += sign * joined_product(own[k], other[q]);
+        }
+    }
+}
+
+/* A tile of a node in row and column `places` before anything is taken from it: J_i (A + C)^-1 J_j^T over the bodies
+ * that both have, bits as in `common`. Rows that are not inside their bounds are 0, and 1 on the diagonal. */
+SADMM_INLINE struct joined_tile joined_enter(const struct joined_view *v, int32_t row, int32_t column, int32_t common,
+                                             int tile)
+{
+    const size_t first_row = (size_t)(JOINED_ROWS * row + joined_tile_row(tile)),
+                 first_column = (size_t)(JOINED_ROWS * column + joined_tile_column(tile));
+    struct joined_tile t = {{{0}}};
+    int k, q;
+    for (; common; common &= common - 1) { /* bit by bit of those that are set */
+        const int bit = common & 1 ? 0 : common & 2 ? 1 : common & 4 ? 2 : 3;
+        joined_add_products(&t, 1, v->rows[first_row].jacobian[bit / 2], sizeof(struct joined_row) / sizeof(double),
+                            v->answer + 12 * first_column + 6 * (bit % 2), 12);
+    }
+    SADMM_UNROLL
+    for (k = 0; k < TILE_ROWS; ++k) {
+        SADMM_UNROLL
+        for (q = 0; q < TILE_COLUMNS; ++q) {
+            const size_t i = first_row + (size_t)k, j = first_column + (size_t)q;
+            double *entry = &t.entry[k][q];
+            if (v->state[i] != JOINED_INSIDE || v->state[j] != JOINED_INSIDE) *entry = i == j ? 1 : 0;
+            else if (i == j) *entry += JOINED_PROXIMAL * *entry + v->give[i] / v->rows[i].gain;
+        }
+    }
+    return t;
+}
+enum { JOINED_OWN = 1 << 0 | 1 << 3 }; /* what a place has in common with itself: either side */
+
+/* What updates `first` to `end` take from a tile of their node: L_u D L_w^T. */
+SADMM_INLINE void joined_update(const struct joined_view *v, int32_t first, int32_t end, int tile, struct joined_tile *t)
 {
     int32_t at;
-    int i;
-    for (at = v->s.first_update[node]; at < v->s.first_update[node + 1]; ++at) {
-        const double *u = v->below + JOINED_BLOCK * (size_t)v->s.update[2 * at] + JOINED_ROWS * k,
-                     *w = v->below + JOINED_BLOCK * (size_t)v->s.update[2 * at + 1] + JOINED_ROWS * q;
-        double sum = 0;
-        for (i = 0; i < JOINED_ROWS; ++i) sum += u[i] * w[i];
-        entry -= sum;
+    for (at = first; at < end; ++at)
+        joined_add_products(t, -1,
+                            v->share + JOINED_BLOCK * (size_t)v->s.update[2 * at] + JOINED_ROWS * joined_tile_row(tile),
+                            JOINED_ROWS,
+                            v->below + JOINED_BLOCK * (size_t)v->s.update[2 * at + 1] +
+                                JOINED_ROWS * joined_tile_column(tile),
+                            JOINED_ROWS);
+}
+
+/* Row k of a block below the diagonal, L the factor of its column: S_ij L_jj^-T, and L_ij = S_ij L_jj^-T D_j^-1. */
+SADMM_INLINE void joined_finish_row(const struct joined_view *v, const double L[36], int32_t b, int k)
+{
+    const size_t at = JOINED_BLOCK * (size_t)b + (size_t)(JOINED_ROWS * k);
+    double x[6];
+    int q;
+    SADMM_UNROLL
+    for (q = 0; q < 6; ++q) x[q] = v->below[at + (size_t)q];
+    joined_forward(L, x);
+    SADMM_UNROLL
+    for (q = 0; q < 6; ++q) v->below[at + (size_t)q] = x[q];
+    joined_scale(L, x);
+    SADMM_UNROLL
+    for (q = 0; q < 6; ++q) v->share[at + (size_t)q] = x[q];
+}
+
+/* Row k of L_jj^-T, products with which wait for less than a substitution; and of D_j^-1. */
+SADMM_INLINE void joined_invert_row(const struct joined_view *v, const double L[36], int32_t place, int k)
+{
+    double *row = v->inverse + JOINED_BLOCK * (size_t)place + JOINED_ROWS * k, x[6];
+    int q;
+    SADMM_UNROLL
+    for (q = 0; q < 6; ++q) x[q] = q == k ? 1 : 0;
+    joined_forward(L, x);
+    SADMM_UNROLL
+    for (q = 0; q < 6; ++q) {
+        row[q] = x[q];
+        if (q == k) v->pivot[JOINED_ROWS * (size_t)place + (size_t)q] = L[7 * q];
     }
-    return entry;
 }
 
 /* ---- solving with it --------------------------------------------------------------------------------------------- */
 
-/* The right side of row k of a place, moved with the rows that are not inside. */
-SADMM_INLINE double joined_right(const struct joined_view *v, int32_t place, int k)
+/* The right side of a row, moved with the rows that are not inside. */
+SADMM_INLINE double joined_right(const struct joined_view *v, int32_t r)
 {
-    const struct sadmm_row_constraint *constraint = joined_at(v, place);
-    const int32_t r = constraint->first + k;
-    if (!joined_is_inside(v, constraint, k)) return 0;
-    return -joined_residual(v, constraint, r, true) / v->gain[joined_law(v, r)];
+    return v->state[r] == JOINED_INSIDE ? -joined_residual(v, r, true) / v->rows[r].gain : 0;
 }
 
-/* Forward: less what the columns before have found. */
-SADMM_INLINE double joined_forward_row(const struct joined_view *v, int32_t place, int k)
+/* Row r of L_jj^-1 right; then of D_j^-1 of that; then, on the way back, of L_jj^-T right. */
+SADMM_INLINE void joined_find_forward(const struct joined_view *v, int32_t r)
 {
-    double own = v->right[JOINED_ROWS * (size_t)place + (size_t)k];
+    const size_t place = (size_t)(r / JOINED_ROWS);
+    v->found[r] = joined_strided_product(v->inverse + JOINED_BLOCK * place + r % JOINED_ROWS, JOINED_ROWS,
+                                         v->right + JOINED_ROWS * place, 1);
+}
+SADMM_INLINE void joined_turn(const struct joined_view *v, int32_t r) { v->right[r] = v->found[r] * v->pivot[r]; }
+SADMM_INLINE void joined_find_backward(const struct joined_view *v, int32_t r)
+{
+    const size_t place = (size_t)(r / JOINED_ROWS);
+    v->found[r] = joined_product(v->inverse + JOINED_BLOCK * place + JOINED_ROWS * (r % JOINED_ROWS),
+                                 v->right + JOINED_ROWS * place);
+}
+
+/* Forward: what columns before have found is taken from row k of a place, by the updates of its diagonal node. */
+SADMM_INLINE void joined_push_right(const struct joined_view *v, int32_t place, int32_t first, int32_t end, int k)
+{
+    double *own = v->right + JOINED_ROWS * (size_t)place + k;
     int32_t at;
-    int i;
-    for (at = v->s.first_update[place]; at < v->s.first_update[place + 1]; ++at) {
+    for (at = first; at < end; ++at) {
         const int32_t b = v->s.update[2 * at];
-        const double *block = v->below + JOINED_BLOCK * (size_t)b + JOINED_ROWS * k,
-                     *other = v->right + JOINED_ROWS * (size_t)v->s.column[b];
-        for (i = 0; i < JOINED_ROWS; ++i) own -= block[i] * other[i];
+        *own -= joined_product(v->share + JOINED_BLOCK * (size_t)b + JOINED_ROWS * k,
+                               v->found + JOINED_ROWS * (size_t)v->s.column[b]);
     }
-    return own;
 }
 
-SADMM_INLINE double joined_backward_row(const struct joined_view *v, int32_t place, int k)
+/* Backward: what rows after it have found, by its blocks `first` to `end`. */
+SADMM_INLINE void joined_pull_right(const struct joined_view *v, int32_t place, int32_t first, int32_t end, int k)
 {
-    double own = v->right[JOINED_ROWS * (size_t)place + (size_t)k];
+    double *own = v->right + JOINED_ROWS * (size_t)place + k;
     int32_t b;
-    int i;
-    for (b = v->s.first_below[place]; b < v->s.first_below[place + 1]; ++b) {
-        const double *block = v->below + JOINED_BLOCK * (size_t)b,
-                     *other = v->right + JOINED_ROWS * (size_t)v->s.row[b];
-        for (i = 0; i < JOINED_ROWS; ++i) own -= block[JOINED_ROWS * i + k] * other[i];
-    }
-    return own;
+    for (b = end - 1; b >= first; --b)
+        *own -= joined_strided_product(v->share + JOINED_BLOCK * (size_t)b + k, JOINED_ROWS,
+                                       v->found + JOINED_ROWS * (size_t)v->s.row[b], 1);
 }
 
 #endif

@@ -30,35 +30,34 @@ SADMM_INLINE struct joint_lead joint_lead_of(const struct sadmm_rigid *rigid, co
     return out;
 }
 
-/* Of a pair of shapes in an island with joints, points with the solution's impulses: do leads stay, since they would
- * close a contact, or a body rests on one? */
-SADMM_INLINE bool joint_contact_holds(const double normal[3], const struct sadmm_contact_point *points, int32_t count,
-                                      const struct joint_lead bodies[2], const struct sadmm_settings *settings)
+/* Of a pair of shapes in an island with joints, points with the solution's impulses: what one of them does; do leads
+ * stay for what all of them do, since they would close a contact, or a body rests on one? */
+SADMM_INLINE void joint_contact_touches(const double normal[3], const struct sadmm_contact_point *point,
+                                        const struct joint_lead bodies[2], const struct sadmm_settings *settings,
+                                        struct lead_touch *touch)
+{
+    double speed = 0, lead[2], size[2], moves[2] = {0, 0}, rest[2] = {0, 0};
+    int s;
+    for (s = 0; s < 2; ++s) {
+        const struct joint_lead *body = &bodies[s];
+        const double *arm = s ? point->arm_b : point->arm_a, sign = s ? 1 : -1;
+        speed += sign * lead_along(normal, body->velocity, arm);
+        lead[s] = sign * lead_along(normal, body->lead, arm);
+        size[s] = lead_size(body->lead, arm);
+        if (!body->rigid) continue;
+        moves[s] = lead_speed(body->rigid->velocity, body->velocity, arm);
+        rest[s] = lead_rest_speed(settings->gravity, body->rigid->gravity_scale, body->rigid->wrench,
+                                  body->rigid->mass, settings->dt);
+    }
+    lead_add_point(touch, point->gap, dot3(normal, point->impulse), speed, lead, size, moves, rest, settings->dt,
+                   settings->slop);
+}
+SADMM_INLINE bool joint_contacts_hold(const struct lead_touch *touch, const struct joint_lead bodies[2])
 {
     const int carried = TOUCH_CARRIED | TOUCH_MOVED;
-    struct lead_touch touch = {0, {0, 0}};
-    int32_t k;
+    bool holds = touch->island & TOUCH_JOLT;
     int s;
-    bool holds;
-    for (k = 0; k < count; ++k) {
-        const struct sadmm_contact_point *point = &points[k];
-        double speed = 0, lead[2], size[2], moves[2] = {0, 0}, rest[2] = {0, 0};
-        for (s = 0; s < 2; ++s) {
-            const struct joint_lead *body = &bodies[s];
-            const double *arm = s ? point->arm_b : point->arm_a, sign = s ? 1 : -1;
-            speed += sign * lead_along(normal, body->velocity, arm);
-            lead[s] = sign * lead_along(normal, body->lead, arm);
-            size[s] = lead_size(body->lead, arm);
-            if (!body->rigid) continue;
-            moves[s] = lead_speed(body->rigid->velocity, body->velocity, arm);
-            rest[s] = lead_rest_speed(settings->gravity, body->rigid->gravity_scale, body->rigid->wrench,
-                                      body->rigid->mass, settings->dt);
-        }
-        lead_add_point(&touch, point->gap, dot3(normal, point->impulse), speed, lead, size, moves, rest, settings->dt,
-                       settings->slop);
-    }
-    holds = touch.island & TOUCH_JOLT;
-    for (s = 0; s < 2; ++s) holds = holds || (bodies[s].rigid && (touch.body[s] & carried) == TOUCH_CARRIED);
+    for (s = 0; s < 2; ++s) holds = holds || (bodies[s].rigid && (touch->body[s] & carried) == TOUCH_CARRIED);
     return holds;
 }
 

@@ -7,22 +7,30 @@
 #include "core/model/system_math.h"
 #include "joined_order.h"
 
+/* A part, and what is known of it from call to call. */
+struct part {
+    struct joined_view view; /* arrays in `work` */
+    int32_t first_body;      /* its bodies are so many further on in lists of all parts' bodies */
+    double speed;            /* that its impulses change it by; 0: it is not solved */
+    bool touched;            /* by a contact */
+    bool kept;               /* solved before the iterations: */
+    uint8_t *kept_state;     /* rows; in `kept_states` */
+};
+
 struct sadmm_joined {
     struct sadmm_joined_order order;
     int32_t *bodies;        /* two a constraint: what the order was made for */
     size_t constraints;
     int32_t body_count;
-    int32_t *entry;         /* bodies: entry in the order's list, -1: not joined */
-    double *work;           /* the arrays of a view */
-    uint8_t *state;
-    double *impulse;        /* entries x 6: J^T lambda */
-    double *speed;          /* entries: that its part's impulses change it by; 0: the part is not solved */
-    uint8_t *touched;       /* entries: by a contact */
-    uint8_t *kept_part;     /* entries, a part's first: was it solved before the iterations? */
+    struct part *parts;
+    int32_t *part, *entry;  /* bodies: the part, -1: not joined; number in it */
+    double *work;           /* of all views */
+    double *impulse;        /* joined bodies x 6: J^T lambda */
     bool kept;              /* velocities and multipliers from before the iterations are in: */
-    double *kept_velocity, *kept_lambda; /* entries x 6; rows */
-    size_t bodies_capacity, entry_capacity, work_capacity, state_capacity, impulse_capacity, speed_capacity,
-        touched_capacity, kept_part_capacity, kept_velocity_capacity, kept_lambda_capacity;
+    double *kept_velocity, *kept_lambda; /* joined bodies x 6; rows */
+    uint8_t *kept_states;                /* places x JOINED_ROWS of all parts */
+    size_t bodies_capacity, part_capacity, entry_capacity, parts_capacity, work_capacity, impulse_capacity,
+        kept_velocity_capacity, kept_lambda_capacity, kept_states_capacity;
 };
 
 /* One call. */
@@ -32,7 +40,6 @@ struct solving {
     const struct sadmm_row_constraint *slots;
     size_t slot_count;
     const struct sadmm_settings *settings;
-    struct joined_view view;
 };
 
 struct sadmm_joined *sadmm_joined_create(void)
@@ -44,8 +51,8 @@ void sadmm_joined_destroy(struct sadmm_joined *j)
 {
     if (!j) return;
     sadmm_joined_order_free(&j->order);
-    void *blocks[] = {j->bodies, j->entry,   j->work,      j->state,         j->impulse,
-                      j->speed,  j->touched, j->kept_part, j->kept_velocity, j->kept_lambda};
+    void *blocks[] = {j->bodies,  j->parts,         j->part,        j->entry,      j->work,
+                      j->impulse, j->kept_velocity, j->kept_lambda, j->kept_states};
     for (size_t k = 0; k < sizeof blocks / sizeof *blocks; ++k) sadmm_free(blocks[k]);
     sadmm_free(j);
 }
@@ -63,6 +70,40 @@ static bool same_graph(const struct solving *s)
     return true;
 }
 
+/* Views, and which bodies they have. */
+static bool make_parts(struct sadmm_joined *j, size_t bodies)
+{
+    const size_t parts = (size_t)j->order.parts;
+    size_t work = 0, joined = 0, places = 0;
+    for (int32_t k = 0; k < j->order.parts; ++k) {
+        const struct joined_structure s = sadmm_joined_part(&j->order, k);
+        work += joined_work_size(&s);
+        joined += (size_t)s.bodies;
+        places += (size_t)s.places;
+    }
+    if (!sadmm_grow_empty(&j->parts, &j->parts_capacity, parts, sizeof *j->parts) ||
+        !sadmm_grow_empty(&j->work, &j->work_capacity, work, sizeof *j->work) ||
+        !sadmm_grow_empty(&j->kept_states, &j->kept_states_capacity, JOINED_ROWS * places, sizeof *j->kept_states) ||
+        !sadmm_grow_empty(&j->impulse, &j->impulse_capacity, 6 * joined, sizeof *j->impulse) ||
+        !sadmm_grow_empty(&j->kept_velocity, &j->kept_velocity_capacity, 6 * joined, sizeof *j->kept_velocity))
+        return false;
+    for (size_t i = 0; i < bodies; ++i) j->part[i] = -1;
+    work = joined = places = 0;
+    for (int32_t k = 0; k < j->order.parts; ++k) {
+        const struct joined_structure s = sadmm_joined_part(&j->order, k);
+        j->parts[k] = (struct part){.view = joined_view_at(&s, j->work + work), .first_body = (int32_t)joined,
+                                    .kept_state = j->kept_states + JOINED_ROWS * places};
+        for (int32_t e = 0; e < s.bodies; ++e) {
+            j->part[s.body[e]] = k;
+            j->entry[s.body[e]] = e;
+        }
+        work += joined_work_size(&s);
+        joined += (size_t)s.bodies;
+        places += (size_t)s.places;
+    }
+    return true;
+}
+
 static bool find_order(const struct solving *s)
 {
     struct sadmm_joined *j = s->j;
@@ -70,297 +111,284 @@ static bool find_order(const struct solving *s)
     if (same_graph(s)) return true;
     j->constraints = 0;
     if (!sadmm_grow_empty(&j->bodies, &j->bodies_capacity, 2 * n, sizeof *j->bodies) ||
+        !sadmm_grow_empty(&j->part, &j->part_capacity, bodies, sizeof *j->part) ||
         !sadmm_grow_empty(&j->entry, &j->entry_capacity, bodies, sizeof *j->entry))
         return false;
     for (size_t k = 0; k < n; ++k) {
         j->bodies[2 * k] = s->slots[k].body_a;
         j->bodies[2 * k + 1] = s->slots[k].body_b;
     }
-    if (!sadmm_joined_order_make(&j->order, j->bodies, (int32_t)n, s->system->body_count, SADMM_JOINED_AROUND))
+    if (!sadmm_joined_order_make(&j->order, j->bodies, (int32_t)n, s->system->body_count, SADMM_JOINED_AROUND) ||
+        !make_parts(j, bodies))
         return false;
-    for (size_t i = 0; i < bodies; ++i) j->entry[i] = -1;
-    for (int32_t e = 0; e < j->order.s.bodies; ++e) j->entry[j->order.s.body[e]] = e;
     j->constraints = n;
     j->body_count = s->system->body_count;
     return true;
 }
 
-static bool make_view(struct solving *s)
+/* ---- what there is ----------------------------------------------------------------------------------------------- */
+
+/* Calls f(part, its pair, side, entry) for every side of a contact at a joined body, pairs in order. */
+typedef void on_side(struct part *, const struct sadmm_contact_point *, int32_t count, int side, int32_t entry,
+                     double *impulse);
+
+static void each_contact(const struct solving *s, on_side *f)
+{
+    const struct sadmm_contact_set *contacts = s->system->contacts;
+    const struct sadmm_joined *j = s->j;
+    for (size_t p = 0; p < contacts->pair_count; ++p) {
+        const struct sadmm_contact_pair *pair = &contacts->pairs[p];
+        for (int side = 0; side < 2; ++side) {
+            const int32_t body = side ? pair->body_b : pair->body_a;
+            if (body < 0 || j->part[body] < 0) continue;
+            struct part *part = &j->parts[j->part[body]];
+            f(part, &contacts->points[pair->first], pair->count, side, j->entry[body],
+              j->impulse + 6 * (size_t)(part->first_body + j->entry[body]));
+        }
+    }
+}
+
+static void add_impulse(struct part *part, const struct sadmm_contact_point *points, int32_t count, int side,
+                        int32_t entry, double *impulse)
+{
+    (void)entry;
+    part->touched = true;
+    for (int32_t p = 0; p < count; ++p)
+        for (int k = 0; k < 6; ++k) impulse[k] += joined_point_load(side ? points[p].arm_b : points[p].arm_a, points[p].impulse, side, k);
+}
+
+/* C, to A where the part is solved. */
+static void add_weight(struct part *part, const struct sadmm_contact_point *points, int32_t count, int side,
+                       int32_t entry, double *impulse)
+{
+    (void)impulse;
+    double *A = part->view.factor + 36 * (size_t)entry, load = 0;
+    for (int32_t p = 0; p < count; ++p) load += v3_norm(v3_load(points[p].impulse));
+    const double B = joined_contact_weight(load, count, part->speed);
+    for (int32_t p = 0; B > 0 && p < count; ++p)
+        for (int k = 0; k < 6; ++k)
+            for (int q = 0; q <= k; ++q)
+                A[6 * k + q] += B * joined_point_entry(side ? points[p].arm_b : points[p].arm_a, k, q);
+}
+
+static void find_impulses(const struct solving *s)
 {
     struct sadmm_joined *j = s->j;
-    struct sadmm_rows *rows = s->system->rows;
-    const struct joined_structure *o = &j->order.s;
-    const size_t n = (size_t)s->system->body_count, r = rows->row_count;
-    if (!sadmm_grow_empty(&j->work, &j->work_capacity, joined_work_size(o, n, r), sizeof *j->work) ||
-        !sadmm_grow_empty(&j->state, &j->state_capacity, r, sizeof *j->state) ||
-        !sadmm_grow_empty(&j->impulse, &j->impulse_capacity, 6 * (size_t)o->bodies, sizeof *j->impulse) ||
-        !sadmm_grow_empty(&j->speed, &j->speed_capacity, (size_t)o->bodies, sizeof *j->speed) ||
-        !sadmm_grow_empty(&j->touched, &j->touched_capacity, (size_t)o->bodies, sizeof *j->touched) ||
-        !sadmm_grow_empty(&j->kept_part, &j->kept_part_capacity, (size_t)o->bodies, sizeof *j->kept_part) ||
-        !sadmm_grow_empty(&j->kept_velocity, &j->kept_velocity_capacity, 6 * (size_t)o->bodies,
-                          sizeof *j->kept_velocity) ||
-        !sadmm_grow_empty(&j->kept_lambda, &j->kept_lambda_capacity, r, sizeof *j->kept_lambda))
-        return false;
-    s->view = (struct joined_view){
-        .s = *o, .constraints = s->slots, .jacobian = {rows->jacobian_a, rows->jacobian_b}, .gain = rows->gain,
-        .bias = rows->bias, .compliance = rows->compliance, .lo = rows->lo, .hi = rows->hi, .jacobian_stride = 6,
-        .law_stride = 1, .velocity = s->system->velocity, .state = j->state};
-    joined_bind_work(&s->view, j->work, n, r);
-    memcpy(s->view.lambda, rows->lambda, r * sizeof *rows->lambda);
-    return true;
-}
-
-struct part {
-    int32_t place, end_place, entry, end_entry;
-};
-
-static struct part part_of(const struct joined_structure *o, int32_t k)
-{
-    return (struct part){o->first_of_level[o->first_level[k]], o->first_of_level[o->first_level[k + 1]],
-                         o->first_body[k], o->first_body[k + 1]};
-}
-
-/* ---- bodies ------------------------------------------------------------------------------------------------------ */
-
-static int32_t pair_body(const struct sadmm_contact_pair *pair, int side) { return side ? pair->body_b : pair->body_a; }
-
-static void find_impulses(struct solving *s)
-{
-    const struct sadmm_contact_set *contacts = s->system->contacts;
-    const int32_t *entry = s->j->entry;
-    memset(s->j->impulse, 0, 6 * (size_t)s->view.s.bodies * sizeof *s->j->impulse);
-    memset(s->j->touched, 0, (size_t)s->view.s.bodies);
-    for (size_t p = 0; p < contacts->pair_count; ++p) {
-        const struct sadmm_contact_pair *pair = &contacts->pairs[p];
-        for (int side = 0; side < 2; ++side) {
-            const int32_t body = pair_body(pair, side), e = body >= 0 ? entry[body] : -1;
-            if (e < 0) continue;
-            joined_add_pair(&contacts->points[pair->first], pair->count, side, s->j->impulse + 6 * (size_t)e);
-            s->j->touched[e] = 1;
-        }
+    for (int32_t k = 0; k < j->order.parts; ++k) {
+        j->parts[k].touched = false;
+        memset(j->impulse + 6 * (size_t)j->parts[k].first_body, 0,
+               6 * (size_t)j->parts[k].view.s.bodies * sizeof *j->impulse);
     }
-    for (size_t k = 0; k < s->slot_count; ++k) {
-        const struct sadmm_row_constraint *constraint = &s->slots[k];
-        for (int side = 0; side < 2; ++side) {
-            const int32_t body = joined_body(constraint, side), e = body >= 0 ? entry[body] : -1;
-            if (e >= 0) joined_add_rows(&s->view, constraint, side, s->j->impulse + 6 * (size_t)e);
-        }
-    }
+    each_contact(s, add_impulse);
 }
 
-/* A, and b - A v + J^T lambda. */
-static void find_missing(const struct solving *s, const struct part *part)
+static void load_row(const struct solving *s, size_t from, struct joined_row *to)
 {
-    for (int32_t e = part->entry; e < part->end_entry; ++e) {
-        const size_t i = (size_t)s->view.s.body[e];
-        double *A = s->view.A + 36 * i, b[6];
-        sadmm_system_body(s->system, s->settings, (int32_t)i, A, b);
-        joined_miss(&s->view, e, b, s->j->impulse + 6 * (size_t)e);
-        memcpy(s->view.factor + 36 * i, A, 36 * sizeof *A);
-    }
+    const struct sadmm_rows *rows = s->system->rows;
+    memcpy(to->jacobian[0], rows->jacobian_a + 6 * from, sizeof to->jacobian[0]);
+    memcpy(to->jacobian[1], rows->jacobian_b + 6 * from, sizeof to->jacobian[1]);
+    to->gain = rows->gain[from], to->bias = rows->bias[from], to->compliance = rows->compliance[from];
+    to->lo = rows->lo[from], to->hi = rows->hi[from], to->lambda = rows->lambda[from];
 }
 
-/* The speed that its impulses change a part by. */
-static double speed_of(const struct solving *s, const struct part *part)
+/* Calls f's statement for row r of the part, which is row `from` of the system. */
+#define EACH_ROW(s, v, r, from)                                                                         \
+    for (int32_t p_ = 0; p_ < (v)->s.places; ++p_)                                                      \
+        for (int32_t r = JOINED_ROWS * p_, from = (s)->slots[(v)->s.constraint[p_]].first,              \
+                     end_ = r + (s)->slots[(v)->s.constraint[p_]].count;                                \
+             r < end_; ++r, ++from)
+
+/* Rows; velocities; A, and b - A v + J^T lambda; the speed that its impulses change the part by. */
+static void load_part(const struct solving *s, struct part *part)
 {
+    const struct joined_view *v = &part->view;
     double energy = 0, mass = 0;
-    for (int32_t e = part->entry; e < part->end_entry; ++e) {
-        const double *A = s->view.A + 36 * (size_t)s->view.s.body[e];
-        energy += joined_energy(A, s->j->impulse + 6 * (size_t)e);
+    memset(v->rows, 0, (size_t)(JOINED_ROWS * v->s.places) * sizeof *v->rows);
+    for (int32_t r = 0; r < JOINED_ROWS * v->s.places; ++r) joined_put_row(v, r, false);
+    EACH_ROW(s, v, r, from) {
+        load_row(s, (size_t)from, &v->rows[r]);
+        joined_put_row(v, r, true);
+    }
+    for (int32_t e = 0; e < v->s.bodies; ++e) {
+        const size_t i = (size_t)v->s.body[e];
+        double *A = v->factor + 36 * (size_t)e, *impulse = s->j->impulse + 6 * (size_t)(part->first_body + e), b[6];
+        memcpy(v->velocity + 6 * (size_t)e, s->system->velocity + 6 * i, 6 * sizeof *v->velocity);
+        for (int32_t at = v->s.first_around[e]; at < v->s.first_around[e + 1]; ++at)
+            for (int k = 0; k < 6; ++k) impulse[k] += joined_row_load(v, v->s.around[at], k);
+        sadmm_system_body(s->system, s->settings, (int32_t)i, A, b);
+        for (int k = 0; k < 6; ++k) v->missing[6 * e + k] = joined_missing(v, e, k, b[k], impulse[k]);
+        energy += joined_energy(A, impulse);
         mass += A[0];
     }
-    return joined_speed(energy, mass);
-}
-
-/* C, to every part's A that is factored. */
-static void add_contacts(const struct solving *s)
-{
-    const struct sadmm_contact_set *contacts = s->system->contacts;
-    for (size_t p = 0; p < contacts->pair_count; ++p) {
-        const struct sadmm_contact_pair *pair = &contacts->pairs[p];
-        for (int side = 0; side < 2; ++side) {
-            const int32_t body = pair_body(pair, side), e = body >= 0 ? s->j->entry[body] : -1;
-            if (e >= 0)
-                joined_add_contact(&contacts->points[pair->first], pair->count, side, s->j->speed[e],
-                                   s->view.factor + 36 * (size_t)body);
-        }
-    }
+    part->speed = joined_speed(energy, mass);
 }
 
 /* ---- a part ------------------------------------------------------------------------------------------------------ */
 
-/* Every row of every place. */
-#define EACH_ROW(view, part, p, constraint, r)                                                        \
-    for (int32_t p = (part)->place; p < (part)->end_place; ++p)                                       \
-        for (const struct sadmm_row_constraint *constraint = joined_at(view, p), *end_ = constraint + 1; \
-             constraint < end_; ++constraint)                                                         \
-            for (int32_t r = constraint->first; r < constraint->first + constraint->count; ++r)
-
-static void begin_rows(const struct joined_view *v, const struct part *part)
+/* earlier: states of a solve of this step; NULL: none. */
+static void begin_rows(const struct joined_view *v, const uint8_t *earlier)
 {
-    EACH_ROW(v, part, p, constraint, r) {
-        joined_respond(v, constraint, r);
-        joined_begin_row(v, constraint, r);
+    for (int32_t r = 0; r < JOINED_ROWS * v->s.places; ++r) {
+        for (int side = 0; side < 2; ++side) joined_respond(v, r, side);
+        if (v->state[r] != JOINED_ABSENT) joined_begin_row(v, r, earlier ? earlier[r] : JOINED_ABSENT);
     }
 }
 
-static bool change_rows(const struct joined_view *v, const struct part *part)
+static bool change_rows(const struct joined_view *v)
 {
     bool changed = false;
-    EACH_ROW(v, part, p, constraint, r) changed = joined_change_row(v, constraint, r) || changed;
+    for (int32_t r = 0; r < JOINED_ROWS * v->s.places; ++r) changed = joined_change_row(v, r) || changed;
     return changed;
 }
 
-static void factorize(const struct joined_view *v, const struct part *part)
+/* A node with all that is taken from it. */
+static void make_node(const struct joined_view *v, int32_t node, int32_t row, int32_t column, int32_t common, double *to)
 {
-    for (int32_t p = part->place; p < part->end_place; ++p) {
-        double *diagonal = v->diagonal + JOINED_BLOCK * (size_t)p;
-        for (int k = 0; k < JOINED_ROWS; ++k)
-            for (int q = 0; q <= k; ++q)
-                diagonal[JOINED_ROWS * k + q] = joined_updated(v, p, joined_entry(v, p, p, k, q), k, q);
-        joined_cholesky(diagonal);
+    for (int tile = 0; tile < JOINED_TILES; ++tile) {
+        if (row == column && joined_tile_is_above(tile)) continue;
+        struct joined_tile t = joined_enter(v, row, column, common, tile);
+        joined_update(v, v->s.first_update[node], v->s.first_update[node + 1], tile, &t);
+        joined_store_tile(to, tile, &t);
+    }
+}
+
+static void factorize(const struct joined_view *v)
+{
+    for (int32_t p = 0; p < v->s.places; ++p) {
+        double *diagonal = v->diagonal + JOINED_BLOCK * (size_t)p, L[JOINED_BLOCK];
+        make_node(v, p, p, p, JOINED_OWN, diagonal);
+        joined_factor(diagonal, L);
+        for (int k = 0; k < JOINED_ROWS; ++k) joined_invert_row(v, L, p, k);
         for (int32_t b = v->s.first_below[p]; b < v->s.first_below[p + 1]; ++b) {
-            double *block = v->below + JOINED_BLOCK * (size_t)b;
-            for (int k = 0; k < JOINED_ROWS; ++k) {
-                for (int q = 0; q < JOINED_ROWS; ++q)
-                    block[JOINED_ROWS * k + q] =
-                        joined_updated(v, v->s.count + b, joined_entry(v, v->s.row[b], p, k, q), k, q);
-                joined_forward(diagonal, block + JOINED_ROWS * k); /* L_ij = S_ij L_jj^-T */
-            }
+            make_node(v, v->s.places + b, v->s.row[b], p, v->s.common[b], v->below + JOINED_BLOCK * (size_t)b);
+            for (int k = 0; k < JOINED_ROWS; ++k) joined_finish_row(v, L, b, k);
         }
     }
 }
 
-static void move_bodies(const struct joined_view *v, const struct part *part)
+static void move_bodies(const struct joined_view *v)
 {
-    for (int32_t e = part->entry; e < part->end_entry; ++e) joined_move(v, e);
+    for (int32_t e = 0; e < v->s.bodies; ++e)
+        for (int k = 0; k < 6; ++k) joined_move(v, e, k);
 }
 
 /* Multipliers of rows inside their bounds, for what the others are. */
-static void solve_rows(const struct joined_view *v, const struct part *part)
+static void solve_rows(const struct joined_view *v)
 {
-    EACH_ROW(v, part, p, constraint, r)
+    const int32_t rows = JOINED_ROWS * v->s.places;
+    for (int32_t r = 0; r < rows; ++r)
         if (v->state[r] == JOINED_INSIDE) v->change[r] = 0;
-    move_bodies(v, part);
-    for (int32_t p = part->place; p < part->end_place; ++p)
-        for (int k = 0; k < JOINED_ROWS; ++k) v->right[JOINED_ROWS * (size_t)p + (size_t)k] = joined_right(v, p, k);
-    for (int32_t p = part->place; p < part->end_place; ++p) {
-        double *own = v->right + JOINED_ROWS * (size_t)p;
-        for (int k = 0; k < JOINED_ROWS; ++k) own[k] = joined_forward_row(v, p, k);
-        joined_forward(v->diagonal + JOINED_BLOCK * (size_t)p, own);
+    move_bodies(v);
+    for (int32_t r = 0; r < rows; ++r) v->right[r] = joined_right(v, r);
+    for (int32_t p = 0; p < v->s.places; ++p) {
+        for (int k = 0; k < JOINED_ROWS; ++k)
+            joined_push_right(v, p, v->s.first_update[p], v->s.first_update[p + 1], k);
+        for (int k = 0; k < JOINED_ROWS; ++k) joined_find_forward(v, JOINED_ROWS * p + k);
     }
-    for (int32_t p = part->end_place - 1; p >= part->place; --p) {
-        double *own = v->right + JOINED_ROWS * (size_t)p;
-        for (int k = 0; k < JOINED_ROWS; ++k) own[k] = joined_backward_row(v, p, k);
-        joined_backward(v->diagonal + JOINED_BLOCK * (size_t)p, own);
+    for (int32_t r = 0; r < rows; ++r) joined_turn(v, r);
+    for (int32_t p = v->s.places - 1; p >= 0; --p) {
+        for (int k = 0; k < JOINED_ROWS; ++k)
+            joined_pull_right(v, p, v->s.first_below[p], v->s.first_below[p + 1], k);
+        for (int k = 0; k < JOINED_ROWS; ++k) joined_find_backward(v, JOINED_ROWS * p + k);
     }
-    EACH_ROW(v, part, p, constraint, r)
-        if (v->state[r] == JOINED_INSIDE)
-            v->change[r] = v->right[JOINED_ROWS * (size_t)p + (size_t)(r - constraint->first)];
-    move_bodies(v, part);
+    for (int32_t r = 0; r < rows; ++r)
+        if (v->state[r] == JOINED_INSIDE) v->change[r] = v->found[r];
+    move_bodies(v);
 }
 
-static bool is_finite(const struct joined_view *v, const struct part *part)
+static bool is_finite(const struct joined_view *v)
 {
     double sum = 0;
-    for (int32_t e = part->entry; e < part->end_entry; ++e)
-        for (size_t k = 0; k < 6; ++k) sum += v->dv[6 * (size_t)v->s.body[e] + k] * 0;
-    EACH_ROW(v, part, p, constraint, r) sum += v->change[r] * 0;
+    for (int32_t k = 0; k < 6 * v->s.bodies; ++k) sum += v->dv[k] * 0;
+    for (int32_t r = 0; r < JOINED_ROWS * v->s.places; ++r) sum += v->change[r] * 0;
     return sum == 0;
 }
 
 /* Is it solved? A part whose rows have not settled is left as it is: velocities that go with multipliers beyond their
  * bounds have energy from nowhere. */
-static bool solve_part(const struct solving *s, const struct part *part)
+static bool solve_part(const struct solving *s, const struct part *part, const uint8_t *earlier)
 {
-    const struct joined_view *v = &s->view;
+    const struct joined_view *v = &part->view;
     bool solved = false;
-    for (int32_t e = part->entry; e < part->end_entry; ++e) joined_factor_body(v, e);
-    begin_rows(v, part);
-    for (int pass = 0; pass < JOINED_PASSES && !solved; ++pass) {
-        factorize(v, part);
-        solve_rows(v, part);
-        solved = !change_rows(v, part);
+    for (int32_t e = 0; e < v->s.bodies; ++e) {
+        joined_factor(v->factor + 36 * (size_t)e, v->factor + 36 * (size_t)e);
+        joined_solve(v->factor + 36 * (size_t)e, v->missing + 6 * (size_t)e, v->missing + 6 * (size_t)e);
     }
-    solved = solved && is_finite(v, part);
-    for (int32_t e = part->entry; solved && e < part->end_entry; ++e)
-        for (size_t k = 0; k < 6; ++k) v->velocity[6 * (size_t)v->s.body[e] + k] += v->dv[6 * (size_t)v->s.body[e] + k];
-    EACH_ROW(v, part, p, constraint, r) s->system->rows->lambda[r] = solved ? joined_bounded(v, r) : v->lambda[r];
-    return solved;
+    begin_rows(v, earlier);
+    for (int pass = 0; pass < JOINED_PASSES && !solved; ++pass) {
+        factorize(v);
+        solve_rows(v);
+        solved = !change_rows(v);
+    }
+    if (!solved || !is_finite(v)) return false;
+    for (int32_t e = 0; e < v->s.bodies; ++e)
+        for (int k = 0; k < 6; ++k) s->system->velocity[6 * v->s.body[e] + k] = v->velocity[6 * e + k] + v->dv[6 * e + k];
+    EACH_ROW(s, v, r, from) s->system->rows->lambda[from] = joined_bounded(v, r);
+    return true;
 }
 
 /* ---- before and after the iterations ----------------------------------------------------------------------------- */
 
-static bool is_touched(const struct sadmm_joined *j, const struct part *part)
-{
-    for (int32_t e = part->entry; e < part->end_entry; ++e)
-        if (j->touched[e]) return true;
-    return false;
-}
-
-/* Is it after the iterations as it was solved before them? No contact touches it. */
-static bool is_kept(const struct sadmm_joined *j, const struct part *part)
-{
-    return j->kept_part[part->entry] && !is_touched(j, part);
-}
-
 /* What the momentum misses is the contacts' to mend in the paper's method: its velocity is not the one that goes with
  * the impulses (docs/algorithm.md, section 6), and rows alone would have to carry the difference. */
-static void leave_to_contacts(const struct joined_view *v, const struct part *part)
+static void leave_to_contacts(const struct joined_view *v)
 {
-    for (int32_t e = part->entry; e < part->end_entry; ++e)
-        memset(v->missing + 6 * (size_t)v->s.body[e], 0, 6 * sizeof(double));
+    memset(v->missing, 0, 6 * (size_t)v->s.bodies * sizeof *v->missing);
 }
 
 /* solved: else the iterations' end is better than what they began with. */
-static void keep_part(const struct solving *s, const struct part *part, bool solved)
+static void keep_part(const struct solving *s, struct part *part, bool solved)
 {
-    const struct joined_view *v = &s->view;
-    s->j->kept_part[part->entry] = solved;
-    for (int32_t e = part->entry; e < part->end_entry; ++e)
-        memcpy(s->j->kept_velocity + 6 * (size_t)e, v->velocity + 6 * (size_t)v->s.body[e], 6 * sizeof(double));
-    EACH_ROW(v, part, p, constraint, r) s->j->kept_lambda[r] = s->system->rows->lambda[r];
+    const struct joined_view *v = &part->view;
+    part->kept = solved;
+    memcpy(part->kept_state, v->state, (size_t)(JOINED_ROWS * v->s.places));
+    for (int32_t e = 0; e < v->s.bodies; ++e)
+        memcpy(s->j->kept_velocity + 6 * (size_t)(part->first_body + e), s->system->velocity + 6 * v->s.body[e],
+               6 * sizeof(double));
+    EACH_ROW(s, v, r, from) s->j->kept_lambda[from] = s->system->rows->lambda[from];
 }
 
 static void take_kept(const struct solving *s, const struct part *part)
 {
-    const struct joined_view *v = &s->view;
-    for (int32_t e = part->entry; e < part->end_entry; ++e)
-        memcpy(v->velocity + 6 * (size_t)v->s.body[e], s->j->kept_velocity + 6 * (size_t)e, 6 * sizeof(double));
-    EACH_ROW(v, part, p, constraint, r) s->system->rows->lambda[r] = s->j->kept_lambda[r];
+    const struct joined_view *v = &part->view;
+    for (int32_t e = 0; e < v->s.bodies; ++e)
+        memcpy(s->system->velocity + 6 * v->s.body[e], s->j->kept_velocity + 6 * (size_t)(part->first_body + e),
+               6 * sizeof(double));
+    EACH_ROW(s, v, r, from) s->system->rows->lambda[from] = s->j->kept_lambda[from];
 }
+
+/* Is it as it was solved before the iterations? No contact touches it. */
+static bool is_solved(const struct part *part) { return part->kept && !part->touched; }
 
 sadmm_status sadmm_joined_solve(struct sadmm_joined *joined, const struct sadmm_system *system,
                                 const struct sadmm_row_constraint *slots, size_t slot_count,
                                 const struct sadmm_settings *settings, bool after, struct sadmm_error *error)
 {
-    struct solving s = {
-        .j = joined, .system = system, .slots = slots, .slot_count = slot_count, .settings = settings};
-    if (!find_order(&s) || !make_view(&s)) return sadmm_fail_memory(error, "joined bodies");
+    const struct solving s = {joined, system, slots, slot_count, settings};
+    if (!find_order(&s) || !sadmm_grow_empty(&joined->kept_lambda, &joined->kept_lambda_capacity,
+                                             system->rows->row_count, sizeof *joined->kept_lambda))
+        return sadmm_fail_memory(error, "joined bodies");
     const bool kept = after && joined->kept; /* by the same contacts */
-    bool all_kept = kept;
-    for (int32_t k = 0; k < s.view.s.parts && all_kept; ++k) {
-        const struct part part = part_of(&s.view.s, k);
-        all_kept = is_kept(joined, &part);
+    bool solves = !kept;
+    for (int32_t k = 0; k < joined->order.parts; ++k) {
+        struct part *part = &joined->parts[k];
+        part->speed = 0;
+        part->kept = kept && part->kept;
+        solves = solves || !is_solved(part);
     }
-    if (!all_kept) find_impulses(&s);
-    for (int32_t k = 0; k < s.view.s.parts; ++k) {
-        const struct part part = part_of(&s.view.s, k);
-        const bool solves = !(kept && is_kept(joined, &part));
-        if (solves) find_missing(&s, &part);
-        const double speed = solves ? speed_of(&s, &part) : 0;
-        for (int32_t e = part.entry; e < part.end_entry; ++e) joined->speed[e] = speed;
-    }
-    if (!all_kept) add_contacts(&s);
-    for (int32_t k = 0; k < s.view.s.parts; ++k) {
-        const struct part part = part_of(&s.view.s, k);
-        if (kept && is_kept(joined, &part)) {
-            take_kept(&s, &part);
+    if (solves) find_impulses(&s);
+    for (int32_t k = 0; k < joined->order.parts; ++k)
+        if (!is_solved(&joined->parts[k])) load_part(&s, &joined->parts[k]);
+    if (solves) each_contact(&s, add_weight);
+    for (int32_t k = 0; k < joined->order.parts; ++k) {
+        struct part *part = &joined->parts[k];
+        if (is_solved(part)) {
+            take_kept(&s, part);
             continue;
         }
-        if (is_touched(joined, &part) && settings->method == SADMM_METHOD_PAPER) leave_to_contacts(&s.view, &part);
-        const bool solved = solve_part(&s, &part);
-        if (!after) keep_part(&s, &part, solved);
+        if (part->touched && settings->method == SADMM_METHOD_PAPER) leave_to_contacts(&part->view);
+        const bool solved = solve_part(&s, part, part->kept ? part->kept_state : NULL);
+        if (!after) keep_part(&s, part, solved);
     }
     joined->kept = !after;
     return SADMM_OK;

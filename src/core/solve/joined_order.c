@@ -168,226 +168,290 @@ static void take_level(struct graph *g, int32_t *order, int32_t *taken)
     for (int32_t at = begin; at < *taken; ++at) eliminate(g, order[at]);
 }
 
-/* ---- all of it --------------------------------------------------------------------------------------------------- */
+/* ---- the structure of a part ------------------------------------------------------------------------------------- */
 
-/* Columns as they are found, part by part and level by level. */
-struct column {
-    int32_t constraint;
-    int32_t first, count; /* its rows, constraints, in `rows` */
-};
-
+/* While it is made: the order of elimination, and of each place the level and the rows of its column. */
 struct columns {
-    struct column *column;
-    int32_t *rows, *first_level, *first_of_level;
-    int32_t count, levels;
+    int32_t *order, *place, *level; /* place -> constraint of the part, and back; place -> its level */
+    int32_t *first, *rows;          /* places + 1; as they were found: constraints of the part */
     size_t row_count, row_capacity;
+    int32_t places, levels;
 };
 
-static bool add_columns(const int32_t *member, const struct graph *g, const int32_t *order, int32_t begin, int32_t end,
-                        struct columns *all)
+static void free_columns(struct columns *c)
 {
-    all->first_of_level[all->levels++] = all->count;
-    for (int32_t at = begin; at < end; ++at) {
-        struct column *column = &all->column[all->count++];
-        if (!sadmm_grow(&all->rows, &all->row_capacity, all->row_count, all->row_count + (size_t)g->count,
-                        sizeof *all->rows))
-            return false;
-        *column = (struct column){member[order[at]], (int32_t)all->row_count, 0};
-        EACH_NEAR(g, order[at], j) all->rows[all->row_count++] = member[j];
-        column->count = (int32_t)all->row_count - column->first;
-    }
-    return true;
+    sadmm_free(c->order);
+    sadmm_free(c->rows);
 }
 
-static bool order_part(const struct maker *m, int32_t part, int32_t *number, int32_t *order, struct columns *all)
+static bool find_columns(struct graph *g, struct columns *c)
 {
-    struct graph g = {0};
+    const size_t n = (size_t)g->count;
     int32_t taken = 0;
-    bool fits = make_graph(m, part, number, &g);
-    all->first_level[part] = all->levels;
-    while (fits && taken < g.count) {
+    c->order = (int32_t *)sadmm_alloc(4 * n + 1, sizeof *c->order);
+    if (!c->order) return false;
+    c->place = c->order + n, c->level = c->place + n, c->first = c->level + n;
+    c->places = g->count;
+    while (taken < g->count) {
         const int32_t begin = taken;
-        take_level(&g, order, &taken);
-        fits = add_columns(m->member + m->first_member[part], &g, order, begin, taken, all);
+        take_level(g, c->order, &taken);
+        for (int32_t at = begin; at < taken; ++at) {
+            if (!sadmm_grow(&c->rows, &c->row_capacity, c->row_count, c->row_count + n, sizeof *c->rows)) return false;
+            c->place[c->order[at]] = at;
+            c->level[at] = c->levels;
+            EACH_NEAR(g, c->order[at], j) c->rows[c->row_count++] = j;
+            c->first[at + 1] = (int32_t)c->row_count;
+        }
+        ++c->levels;
     }
-    free_graph(&g);
-    return fits;
-}
-
-static size_t count_updates(const struct columns *all)
-{
-    size_t count = 0;
-    for (int32_t k = 0; k < all->count; ++k) {
-        const size_t rows = (size_t)all->column[k].count;
-        count += rows * (rows + 1) / 2;
-    }
-    return count;
-}
-
-/* The arrays while they are filled. */
-struct arrays {
-    int32_t *constraint, *first_level, *first_of_level, *first_below, *row, *column, *first_update, *update;
-    int32_t *first_body, *body, *first_around, *around;
-    int32_t count, blocks, parts, bodies;
-};
-
-static int32_t *take(int32_t **memory, size_t count)
-{
-    int32_t *at = *memory;
-    *memory += count;
-    return at;
-}
-
-static bool reserve(struct arrays *o, const struct maker *m, const struct columns *all,
-                    struct sadmm_joined_order *order)
-{
-    const size_t n = (size_t)all->count, b = all->row_count, updates = count_updates(all), parts = (size_t)m->parts,
-                 levels = (size_t)all->levels, bodies = 2 * n;
-    order->size = n + parts + 1 + levels + 1 + n + 1 + 2 * b + n + b + 1 + 2 * updates; /* as they are taken below */
-    order->size += parts + 1 + bodies + bodies + 1 + 2 * n;
-    int32_t *memory = order->memory = (int32_t *)sadmm_alloc(order->size, sizeof *memory);
-    if (!memory) return false;
-    o->count = all->count, o->blocks = (int32_t)b, o->parts = m->parts;
-    o->constraint = take(&memory, n);
-    o->first_level = take(&memory, parts + 1);
-    o->first_of_level = take(&memory, levels + 1);
-    o->first_below = take(&memory, n + 1);
-    o->row = take(&memory, b);
-    o->column = take(&memory, b);
-    o->first_update = take(&memory, n + b + 1);
-    o->update = take(&memory, 2 * updates);
-    o->first_body = take(&memory, parts + 1);
-    o->body = take(&memory, bodies);
-    o->first_around = take(&memory, bodies + 1);
-    o->around = take(&memory, 2 * n);
     return true;
 }
 
-/* Places as columns were found; rows of a column by their places. */
-static void place_columns(struct arrays *o, const struct columns *all, int32_t parts, int32_t *place)
+/* The numbers of a structure as they grow: arrays are added in the order of joined_structure_at(). */
+struct writer {
+    struct sadmm_joined_order *order;
+    size_t begin, end; /* of this structure */
+};
+
+static int32_t *add(struct writer *w, size_t count)
 {
-    int32_t block = 0;
-    memcpy(o->first_level, all->first_level, (size_t)parts * sizeof *o->first_level);
-    memcpy(o->first_of_level, all->first_of_level, (size_t)all->levels * sizeof *o->first_of_level);
-    o->first_level[parts] = all->levels;
-    o->first_of_level[all->levels] = all->count;
-    for (int32_t j = 0; j < o->count; ++j) {
-        o->constraint[j] = all->column[j].constraint;
-        place[o->constraint[j]] = j;
-    }
-    for (int32_t j = 0; j < o->count; ++j) {
-        const struct column *column = &all->column[j];
-        o->first_below[j] = block;
-        for (int32_t i = 0; i < column->count; ++i) {
-            const int32_t row = place[all->rows[column->first + i]];
-            int32_t to = block++;
-            for (; to > o->first_below[j] && o->row[to - 1] > row; --to) o->row[to] = o->row[to - 1];
-            o->row[to] = row;
-        }
-        for (int32_t b = o->first_below[j]; b < block; ++b) o->column[b] = j;
-    }
-    o->first_below[o->count] = block;
+    struct sadmm_joined_order *o = w->order;
+    if (!sadmm_grow(&o->numbers, &o->numbers_capacity, w->end, w->end + count + 1, sizeof *o->numbers)) return NULL;
+    int32_t *to = o->numbers + w->end;
+    memset(to, 0, count * sizeof *to);
+    w->end += count;
+    return to;
 }
 
-static int32_t find_block(const struct arrays *o, int32_t row, int32_t column)
+/* What there is of it so far. */
+static struct joined_structure written(const struct writer *w)
 {
-    int32_t low = o->first_below[column], high = o->first_below[column + 1] - 1;
+    return joined_structure_at(w->order->numbers + w->begin);
+}
+static int32_t *counts(const struct writer *w) { return w->order->numbers + w->begin; }
+
+/* Constraints by place; bodies as they come, and the sides of places. entry: bodies -> -1, before and after. */
+static bool write_bodies(struct writer *w, const struct maker *m, const int32_t *member, const struct columns *c,
+                         int32_t *entry)
+{
+    const size_t n = (size_t)c->places;
+    if (!add(w, JOINED_COUNTS)) return false;
+    counts(w)[0] = c->places, counts(w)[1] = c->first[n], counts(w)[2] = c->levels;
+    int32_t *constraint = add(w, n), count = 0;
+    if (!constraint) return false;
+    for (int32_t p = 0; p < c->places; ++p) constraint[p] = member[c->order[p]];
+    int32_t *body = add(w, 2 * n); /* more than there are */
+    if (!body) return false;
+    for (int32_t p = 0; p < c->places; ++p)
+        for (int s = 0; s < 2; ++s) {
+            const int32_t i = m->bodies[2 * member[c->order[p]] + s];
+            if (i < 0 || entry[i] >= 0) continue;
+            entry[i] = count;
+            body[count++] = i;
+        }
+    w->end -= 2 * n - (size_t)count;
+    counts(w)[3] = count;
+    int32_t *side = add(w, 2 * n);
+    if (!side) return false;
+    for (int32_t p = 0; p < c->places; ++p)
+        for (int s = 0; s < 2; ++s) {
+            const int32_t i = m->bodies[2 * member[c->order[p]] + s];
+            side[2 * p + s] = i < 0 ? -1 : entry[i];
+        }
+    const struct joined_structure made = written(w);
+    for (int32_t e = 0; e < count; ++e) entry[made.body[e]] = -1;
+    return true;
+}
+
+static int32_t common_of(const int32_t *row_sides, const int32_t *column_sides)
+{
+    int32_t bits = 0;
+    for (int s = 0; s < 2; ++s)
+        for (int t = 0; t < 2; ++t)
+            if (row_sides[s] >= 0 && row_sides[s] == column_sides[t]) bits |= 1 << (2 * s + t);
+    return bits;
+}
+
+/* Rows of a column by their places, ascending. */
+static bool write_blocks(struct writer *w, const struct columns *c)
+{
+    const size_t n = (size_t)c->places, blocks = (size_t)c->first[n];
+    int32_t *first_of_level = add(w, (size_t)c->levels + 1);
+    if (!first_of_level) return false;
+    for (int32_t p = c->places - 1; p >= 0; --p) first_of_level[c->level[p]] = p;
+    first_of_level[c->levels] = c->places;
+    int32_t *first_below = add(w, n + 1 + 3 * blocks);
+    if (!first_below) return false;
+    int32_t *row = first_below + n + 1, *column = row + blocks, *common = column + blocks;
+    const int32_t *side = written(w).side;
+    memcpy(first_below, c->first, (n + 1) * sizeof *first_below);
+    for (int32_t j = 0; j < c->places; ++j)
+        for (int32_t k = c->first[j]; k < c->first[j + 1]; ++k) {
+            const int32_t place = c->place[c->rows[k]];
+            int32_t to = k;
+            for (; to > c->first[j] && row[to - 1] > place; --to) row[to] = row[to - 1];
+            row[to] = place;
+            column[k] = j;
+        }
+    for (size_t b = 0; b < blocks; ++b) common[b] = common_of(side + 2 * row[b], side + 2 * column[b]);
+    return true;
+}
+
+static int32_t find_block(const struct joined_structure *s, int32_t row, int32_t column)
+{
+    int32_t low = s->first_below[column], high = s->first_below[column + 1] - 1;
     while (low < high) {
         const int32_t middle = low + (high - low) / 2;
-        if (o->row[middle] < row) low = middle + 1;
+        if (s->row[middle] < row) low = middle + 1;
         else high = middle;
     }
     return low;
 }
 
-/* Every column takes from each pair of its rows. Into `next` how many a node has, or (list) into `update`. */
-static void each_update(const struct arrays *o, int32_t *next, bool list)
+/* Every column takes from each pair of its rows. Into `next` how many a node has, or (update) into the list. */
+static void each_update(const struct joined_structure *s, int32_t *next, int32_t *update)
 {
-    for (int32_t k = 0; k < o->count; ++k)
-        for (int32_t w = o->first_below[k]; w < o->first_below[k + 1]; ++w)
-            for (int32_t u = w; u < o->first_below[k + 1]; ++u) {
-                const int32_t node = u == w ? o->row[w] : o->count + find_block(o, o->row[u], o->row[w]);
-                if (list) {
-                    o->update[2 * next[node]] = u;
-                    o->update[2 * next[node] + 1] = w;
+    for (int32_t k = 0; k < s->places; ++k)
+        for (int32_t w = s->first_below[k]; w < s->first_below[k + 1]; ++w)
+            for (int32_t u = w; u < s->first_below[k + 1]; ++u) {
+                const int32_t node = u == w ? s->row[w] : s->places + find_block(s, s->row[u], s->row[w]);
+                if (update) {
+                    update[2 * next[node]] = u;
+                    update[2 * next[node] + 1] = w;
                 }
                 ++next[node];
             }
 }
 
-static bool list_updates(struct arrays *o)
+static bool write_updates(struct writer *w)
 {
-    const size_t nodes = (size_t)o->count + (size_t)o->blocks;
-    int32_t *next = (int32_t *)sadmm_alloc(nodes + 1, sizeof *next);
-    if (!next) return false;
-    each_update(o, o->first_update + 1, false);
-    for (size_t node = 0; node < nodes; ++node) o->first_update[node + 1] += o->first_update[node];
-    memcpy(next, o->first_update, nodes * sizeof *next);
-    each_update(o, next, true);
-    sadmm_free(next);
-    return true;
-}
-
-/* Bodies of each part as they come, and the sides of constraints at each. entry: bodies -> entry, -1 before. */
-static void list_bodies(struct arrays *o, const int32_t *bodies, int32_t parts, int32_t *entry)
-{
-    for (int32_t part = 0; part < parts; ++part) {
-        o->first_body[part] = o->bodies;
-        for (int32_t p = o->first_of_level[o->first_level[part]]; p < o->first_of_level[o->first_level[part + 1]]; ++p)
-            for (int s = 0; s < 2; ++s) {
-                const int32_t body = bodies[2 * o->constraint[p] + s];
-                if (body < 0) continue;
-                if (entry[body] < 0) {
-                    entry[body] = o->bodies;
-                    o->body[o->bodies++] = body;
-                }
-                ++o->first_around[entry[body] + 1];
-            }
+    struct joined_structure s = written(w);
+    const size_t nodes = (size_t)s.places + (size_t)s.blocks;
+    int32_t *first = add(w, nodes + 1);
+    if (!first) return false;
+    s = written(w);
+    each_update(&s, first + 1, NULL);
+    for (size_t node = 0; node < nodes; ++node) first[node + 1] += first[node];
+    const int32_t updates = counts(w)[4] = first[nodes];
+    int32_t *update = add(w, 2 * (size_t)updates), *next = (int32_t *)sadmm_alloc(nodes + 1, sizeof *next);
+    if (update && next) {
+        s = written(w);
+        memcpy(next, s.first_update, nodes * sizeof *next);
+        each_update(&s, next, update);
     }
-    o->first_body[parts] = o->bodies;
-    for (int32_t e = 0; e < o->bodies; ++e) o->first_around[e + 1] += o->first_around[e];
-    const int32_t total = o->first_around[o->bodies];
-    for (int32_t p = o->count - 1; p >= 0; --p)
-        for (int s = 1; s >= 0; --s) {
-            const int32_t body = bodies[2 * o->constraint[p] + s];
-            if (body >= 0) o->around[--o->first_around[entry[body] + 1]] = 2 * p + s;
-        }
-    for (int32_t e = 0; e < o->bodies; ++e) o->first_around[e] = o->first_around[e + 1];
-    o->first_around[o->bodies] = total;
+    sadmm_free(next);
+    return update && next;
 }
 
-static bool finish(const struct maker *m, const struct columns *all, int32_t *place, int32_t *entry,
-                   struct sadmm_joined_order *order)
+/* Groups of a list by level, each of which `first` to `end` of something that is `of`. Into `next` how many a level
+ * has, or (list) into the list. */
+static void put_group(int32_t *next, int32_t *list, int32_t level, int32_t of, int32_t first, int32_t end)
 {
-    struct arrays o = {0};
-    if (!reserve(&o, m, all, order)) return false;
-    place_columns(&o, all, m->parts, place);
-    if (!list_updates(&o)) return false;
-    for (int32_t i = 0; i < m->body_count; ++i) entry[i] = -1;
-    list_bodies(&o, m->bodies, m->parts, entry);
-    order->s = (struct joined_structure){
-        .count = o.count, .blocks = o.blocks, .parts = o.parts, .bodies = o.bodies, .constraint = o.constraint,
-        .first_level = o.first_level, .first_of_level = o.first_of_level, .first_below = o.first_below, .row = o.row,
-        .column = o.column, .first_update = o.first_update, .update = o.update, .first_body = o.first_body,
-        .body = o.body, .first_around = o.first_around, .around = o.around};
+    int32_t *to = list ? list + 3 * next[level] : NULL;
+    ++next[level];
+    if (to) to[0] = of, to[1] = first, to[2] = end;
+}
+
+/* Updates of nodes by the level of the column that they come from: 2 level, + 1 for blocks below the diagonal. */
+static void each_push(const struct joined_structure *s, const int32_t *level, int32_t *next, int32_t *list)
+{
+    for (int32_t node = 0; node < s->places + s->blocks; ++node)
+        for (int32_t at = s->first_update[node], end; at < s->first_update[node + 1]; at = end) {
+            const int32_t from = level[s->column[s->update[2 * at]]];
+            for (end = at + 1; end < s->first_update[node + 1]; ++end)
+                if (level[s->column[s->update[2 * end]]] != from) break;
+            put_group(next, list, 2 * from + (node >= s->places), node, at, end);
+        }
+}
+
+/* Blocks of columns by the level of their row. */
+static void each_pull(const struct joined_structure *s, const int32_t *level, int32_t *next, int32_t *list)
+{
+    for (int32_t p = 0; p < s->places; ++p)
+        for (int32_t b = s->first_below[p], end; b < s->first_below[p + 1]; b = end) {
+            for (end = b + 1; end < s->first_below[p + 1]; ++end)
+                if (level[s->row[end]] != level[s->row[b]]) break;
+            put_group(next, list, level[s->row[b]], p, b, end);
+        }
+}
+
+typedef void each_group(const struct joined_structure *, const int32_t *level, int32_t *next, int32_t *list);
+
+/* Where the groups of each begin, then the groups. */
+static bool write_groups(struct writer *w, each_group *each, const int32_t *level, size_t groups, int count_at)
+{
+    int32_t *first = add(w, groups + 1);
+    if (!first) return false;
+    struct joined_structure s = written(w);
+    each(&s, level, first + 1, NULL);
+    for (size_t k = 0; k < groups; ++k) first[k + 1] += first[k];
+    const size_t at = (size_t)(first - w->order->numbers), total = (size_t)first[groups];
+    counts(w)[count_at] = (int32_t)total;
+    int32_t *list = add(w, 3 * total), *next = (int32_t *)sadmm_alloc(groups + 1, sizeof *next);
+    if (list && next) {
+        s = written(w);
+        memcpy(next, w->order->numbers + at, groups * sizeof *next);
+        each(&s, level, next, list);
+    }
+    sadmm_free(next);
+    return list && next;
+}
+
+static bool write_around(struct writer *w)
+{
+    struct joined_structure s = written(w);
+    int32_t *first = add(w, (size_t)s.bodies + 1 + 2 * (size_t)s.places);
+    if (!first) return false;
+    int32_t *around = first + s.bodies + 1;
+    s = written(w);
+    for (int32_t k = 0; k < 2 * s.places; ++k)
+        if (s.side[k] >= 0) ++first[s.side[k] + 1];
+    for (int32_t e = 0; e < s.bodies; ++e) first[e + 1] += first[e];
+    const int32_t total = first[s.bodies];
+    for (int32_t k = 2 * s.places - 1; k >= 0; --k) /* from its end, which becomes its beginning */
+        if (s.side[k] >= 0) around[--first[s.side[k] + 1]] = k;
+    for (int32_t e = 0; e < s.bodies; ++e) first[e] = first[e + 1];
+    first[s.bodies] = total;
     return true;
+}
+
+static bool write_part(struct writer *w, const struct maker *m, const int32_t *member, const struct columns *c,
+                       int32_t *entry)
+{
+    return write_bodies(w, m, member, c, entry) && write_blocks(w, c) && write_updates(w) &&
+           write_groups(w, each_push, c->level, 2 * (size_t)c->levels, 5) &&
+           write_groups(w, each_pull, c->level, (size_t)c->levels, 6) && write_around(w);
+}
+
+/* number: constraints -> number in their part. */
+static bool make_part(const struct maker *m, int32_t part, int32_t *number, int32_t *entry, struct writer *w)
+{
+    struct graph g = {0};
+    struct columns c = {0};
+    const bool fits = make_graph(m, part, number, &g) && find_columns(&g, &c) &&
+                      write_part(w, m, m->member + m->first_member[part], &c, entry);
+    free_columns(&c);
+    free_graph(&g);
+    return fits;
 }
 
 static bool make(struct maker *m, int32_t most_around, struct sadmm_joined_order *order)
 {
     const size_t n = (size_t)m->constraints + 1;
-    struct columns all = {.column = (struct column *)sadmm_alloc(n, sizeof *all.column)};
-    int32_t *numbers = (int32_t *)sadmm_alloc(5 * n + (size_t)m->body_count, sizeof *numbers);
-    bool fits = all.column && numbers && list_around(m);
+    int32_t *numbers = (int32_t *)sadmm_alloc(n + (size_t)m->body_count, sizeof *numbers), *entry = numbers + n;
+    struct writer w = {order, 0, 0};
+    bool fits = numbers && list_around(m);
     if (fits) {
         find_parts(m, most_around);
-        all.first_level = numbers + 3 * n;
-        all.first_of_level = numbers + 4 * n;
+        for (int32_t i = 0; i < m->body_count; ++i) entry[i] = -1;
+        order->first = (size_t *)sadmm_alloc((size_t)m->parts + 1, sizeof *order->first);
+        fits = order->first != NULL;
     }
-    for (int32_t part = 0; fits && part < m->parts; ++part) fits = order_part(m, part, numbers, numbers + n, &all);
-    fits = fits && finish(m, &all, numbers + 2 * n, numbers + 5 * n, order);
-    sadmm_free(all.column);
-    sadmm_free(all.rows);
+    for (; fits && order->parts < m->parts; order->first[order->parts] = w.end) {
+        w.begin = w.end;
+        fits = make_part(m, order->parts, numbers, entry, &w);
+        ++order->parts;
+    }
     sadmm_free(numbers);
     return fits;
 }
@@ -399,17 +463,14 @@ bool sadmm_joined_order_make(struct sadmm_joined_order *order, const int32_t *bo
     struct sadmm_joined_order made = {0};
     const bool fits = make(&m, most_around, &made);
     free_maker(&m);
-    if (!fits) {
-        sadmm_free(made.memory);
-        return false;
-    }
-    sadmm_joined_order_free(order);
-    *order = made;
-    return true;
+    sadmm_joined_order_free(fits ? order : &made);
+    if (fits) *order = made;
+    return fits;
 }
 
 void sadmm_joined_order_free(struct sadmm_joined_order *order)
 {
-    sadmm_free(order->memory);
+    sadmm_free(order->first);
+    sadmm_free(order->numbers);
     *order = (struct sadmm_joined_order){0};
 }

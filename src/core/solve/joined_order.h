@@ -1,5 +1,5 @@
-/* The order and the structure of a sparse Cholesky factor whose blocks are constraints, coupled where they have a body
- * in common (core/model/joined.h). */
+/* The order and the structure of sparse Cholesky factors whose blocks are constraints, coupled where they have a body
+ * in common: a factor a part (core/model/joined.h). */
 #ifndef SADMM_CORE_SOLVE_JOINED_ORDER_H
 #define SADMM_CORE_SOLVE_JOINED_ORDER_H
 
@@ -10,9 +10,10 @@ extern "C" {
 #endif
 
 struct sadmm_joined_order {
-    struct joined_structure s;
-    int32_t *memory; /* all arrays of it */
-    size_t size;     /* numbers there */
+    int32_t parts;
+    size_t *first;    /* (parts + 1) where a part's structure begins in */
+    int32_t *numbers; /* structures */
+    size_t numbers_capacity;
 };
 
 /* bodies: two a constraint, < 0: not solved for. Left out, so that the iteration alone solves them, are constraints of
@@ -21,6 +22,11 @@ struct sadmm_joined_order {
 bool sadmm_joined_order_make(struct sadmm_joined_order *order, const int32_t *bodies, int32_t constraints,
                              int32_t body_count, int32_t most_around);
 void sadmm_joined_order_free(struct sadmm_joined_order *order);
+
+static inline struct joined_structure sadmm_joined_part(const struct sadmm_joined_order *order, int32_t part)
+{
+    return joined_structure_at(order->numbers + order->first[part]);
+}
 
 #ifdef __cplusplus
 }

@@ -40,14 +40,15 @@ static void find_islands(const sadmm_world *world, const struct sadmm_system *sy
     memset(world->joint_touch, 0, (size_t)system->body_count);
     for (size_t k = 0; k < system->rows->constraint_count; ++k)
         add_constraint(world, &system->rows->constraints[k], settings);
-    for (size_t p = 0; p < contacts->pair_count; ++p) {
-        const struct sadmm_contact_pair *pair = &contacts->pairs[p];
+    for (size_t k = 0; k < contacts->pair_count; ++k) {
+        const struct sadmm_contact_pair *pair = &contacts->pairs[k];
         uint8_t *island = island_of(world, pair->body_a, pair->body_b);
         if (!(*island & ISLAND_JOINED) || *island & ISLAND_LEADS_STAY) continue;
         const struct joint_lead bodies[2] = {lead_of(world, pair->body_a), lead_of(world, pair->body_b)};
-        if (sadmm_pair_is_driven(system, pair) ||
-            joint_contact_holds(pair->normal, &contacts->points[pair->first], pair->count, bodies, settings))
-            *island |= ISLAND_LEADS_STAY;
+        struct lead_touch touch = {0, {0, 0}};
+        for (int32_t p = pair->first; p < pair->first + pair->count; ++p)
+            joint_contact_touches(pair->normal, &contacts->points[p], bodies, settings, &touch);
+        if (sadmm_pair_is_driven(system, pair) || joint_contacts_hold(&touch, bodies)) *island |= ISLAND_LEADS_STAY;
     }
 }
 

@@ -1,0 +1,210 @@
+/* A part of joined bodies (core/model/joined.h), solved by a thread block: the host's formulas in its order. */
+#ifndef SADMM_CUDA_STEP_JOINED_BLOCK_H
+#define SADMM_CUDA_STEP_JOINED_BLOCK_H
+
+#include "backend_cuda/device/context.h"
+#include "core/model/joined.h"
+
+enum { JOINED_THREADS = 512 };
+
+/* Calls f(k) for k < count, by a thread each. */
+template <class F> static __device__ __forceinline__ void each(int32_t count, const F &f)
+{
+#pragma unroll 1
+    for (int32_t k = (int32_t)threadIdx.x; k < count; k += JOINED_THREADS) f(k);
+}
+
+/* to[k] = f(k) for k < count: what waits for memory waits together. */
+template <class T, class F> static __device__ __forceinline__ void copy(int32_t count, T *to, const F &f)
+{
+    enum { TOGETHER = 4 };
+#pragma unroll 1
+    for (int32_t first = (int32_t)threadIdx.x; first < count; first += TOGETHER * JOINED_THREADS) {
+        T value[TOGETHER];
+#pragma unroll
+        for (int i = 0; i < TOGETHER; ++i) {
+            const int32_t k = first + i * JOINED_THREADS;
+            value[i] = f(k < count ? k : count - 1);
+        }
+#pragma unroll
+        for (int i = 0; i < TOGETHER; ++i)
+            if (first + i * JOINED_THREADS < count) to[first + i * JOINED_THREADS] = value[i];
+    }
+}
+
+/* Eight lanes a body, one a component. Calls f(entry, component), also for lanes 6 and 7. */
+template <class F> static __device__ __forceinline__ void each_component(const joined_view &p, const F &f)
+{
+    each(p.s.bodies * LANES, [&](int32_t t) { f(t / LANES, t % LANES); });
+}
+
+static __device__ __forceinline__ int32_t row_in_world(const joined_view &p, int32_t r)
+{
+    return p.s.constraint[r / JOINED_ROWS] * SADMM_MAX_ROWS + r % JOINED_ROWS;
+}
+
+/* ---- a pass ------------------------------------------------------------------------------------------------------ */
+
+/* earlier: states of the part's rows after a solve of this step, by number in the world; NULL: there was none. */
+static __device__ __forceinline__ void begin_part(const joined_view &p, const uint8_t *earlier)
+{
+    each(p.s.bodies, [&](int32_t e) {
+        joined_factor(p.factor + 36 * e, p.factor + 36 * e);
+        joined_solve(p.factor + 36 * e, p.missing + 6 * e, p.missing + 6 * e);
+    });
+    __syncthreads();
+    each(p.s.places * JOINED_ROWS * 2, [&](int32_t t) { joined_respond(&p, t / 2, t % 2); });
+    __syncthreads();
+    each(p.s.places * JOINED_ROWS, [&](int32_t r) {
+        if (p.state[r] == JOINED_ABSENT) return;
+        joined_begin_row(&p, r, earlier ? earlier[row_in_world(p, r)] : (uint8_t)JOINED_ABSENT);
+    });
+    __syncthreads();
+}
+
+static __device__ __forceinline__ double *node_of(const joined_view &p, int32_t node)
+{
+    return node < p.s.places ? p.diagonal + JOINED_BLOCK * node : p.below + JOINED_BLOCK * (node - p.s.places);
+}
+
+/* All nodes before anything is taken from them: what waits for memory, side by side. */
+static __device__ __forceinline__ void enter_blocks(const joined_view &p)
+{
+    each((p.s.places + p.s.blocks) * JOINED_TILES, [&](int32_t t) {
+        const int32_t node = t / JOINED_TILES, b = node - p.s.places, tile = t % JOINED_TILES;
+        if (b < 0 && joined_tile_is_above(tile)) return;
+        const struct joined_tile made = joined_enter(&p, b < 0 ? node : p.s.row[b], b < 0 ? node : p.s.column[b],
+                                                     b < 0 ? JOINED_OWN : p.s.common[b], tile);
+        joined_store_tile(node_of(p, node), tile, &made);
+    });
+    __syncthreads();
+}
+
+/* What columns of a level take from later nodes. */
+static __device__ __forceinline__ void push_level(const joined_view &p, int32_t level)
+{
+    const int32_t first = p.s.first_push[2 * level], end = p.s.first_push[2 * level + 2];
+    each((end - first) * JOINED_TILES, [&](int32_t t) {
+        const int32_t *push = p.s.push + 3 * (first + t / JOINED_TILES), tile = t % JOINED_TILES;
+        if (push[0] < p.s.places && joined_tile_is_above(tile)) return;
+        double *node = node_of(p, push[0]);
+        struct joined_tile made = joined_load_tile(node, tile);
+        joined_update(&p, push[1], push[2], tile, &made);
+        joined_store_tile(node, tile, &made);
+    });
+    __syncthreads();
+}
+
+/* Each row of a column factors its diagonal node by itself, which waits for less than a factor that one thread hands to
+ * the others. */
+static __device__ __forceinline__ void factor_level(const joined_view &p, int32_t level)
+{
+    const int32_t first = p.s.first_of_level[level], end = p.s.first_of_level[level + 1],
+                  first_block = p.s.first_below[first], rows = (p.s.first_below[end] - first_block) * JOINED_ROWS;
+    each(rows + (end - first) * JOINED_ROWS, [&](int32_t t) {
+        const bool below = t < rows;
+        const int32_t at = (below ? t : t - rows) / JOINED_ROWS, place = below ? p.s.column[first_block + at] : first + at;
+        double L[JOINED_BLOCK];
+        joined_factor(p.diagonal + JOINED_BLOCK * place, L);
+        if (below) joined_finish_row(&p, L, first_block + at, t % JOINED_ROWS);
+        else joined_invert_row(&p, L, place, t % JOINED_ROWS);
+    });
+    __syncthreads();
+    push_level(p, level);
+}
+
+static __device__ __forceinline__ void forward_level(const joined_view &p, int32_t level)
+{
+    const int32_t first = p.s.first_of_level[level] * JOINED_ROWS, end = p.s.first_of_level[level + 1] * JOINED_ROWS,
+                  first_push = p.s.first_push[2 * level], end_push = p.s.first_push[2 * level + 1];
+    each(end - first, [&](int32_t k) { joined_find_forward(&p, first + k); });
+    __syncthreads();
+    each((end_push - first_push) * JOINED_ROWS, [&](int32_t t) {
+        const int32_t *push = p.s.push + 3 * (first_push + t / JOINED_ROWS);
+        joined_push_right(&p, push[0], push[1], push[2], t % JOINED_ROWS);
+    });
+    __syncthreads();
+}
+
+static __device__ __forceinline__ void backward_level(const joined_view &p, int32_t level)
+{
+    const int32_t first = p.s.first_of_level[level] * JOINED_ROWS, end = p.s.first_of_level[level + 1] * JOINED_ROWS,
+                  first_pull = p.s.first_pull[level], end_pull = p.s.first_pull[level + 1];
+    each(end - first, [&](int32_t k) { joined_find_backward(&p, first + k); });
+    __syncthreads();
+    each((end_pull - first_pull) * JOINED_ROWS, [&](int32_t t) {
+        const int32_t *pull = p.s.pull + 3 * (first_pull + t / JOINED_ROWS);
+        joined_pull_right(&p, pull[0], pull[1], pull[2], t % JOINED_ROWS);
+    });
+    __syncthreads();
+}
+
+static __device__ __forceinline__ void move_bodies(const joined_view &p)
+{
+    each_component(p, [&](int32_t e, int k) {
+        if (k < 6) joined_move(&p, e, k);
+    });
+    __syncthreads();
+}
+
+static __device__ __forceinline__ void solve_rows(const joined_view &p)
+{
+    const int32_t rows = p.s.places * JOINED_ROWS;
+#pragma unroll 1
+    for (int turn = 0; turn < 2; ++turn) { /* to what the other rows say; then as all of them say */
+        each(rows, [&](int32_t r) {
+            if (p.state[r] == JOINED_INSIDE) p.change[r] = turn == 0 ? 0 : p.found[r];
+        });
+        __syncthreads();
+        move_bodies(p);
+        if (turn > 0) return;
+        each(rows, [&](int32_t r) { p.right[r] = joined_right(&p, r); });
+        __syncthreads();
+#pragma unroll 1
+        for (int32_t level = 0; level < p.s.levels; ++level) forward_level(p, level);
+        each(rows, [&](int32_t r) { joined_turn(&p, r); });
+        __syncthreads();
+#pragma unroll 1
+        for (int32_t level = p.s.levels - 1; level >= 0; --level) backward_level(p, level);
+    }
+}
+
+/* Is `f(row)` true of any row? */
+template <class F>
+static __device__ __forceinline__ bool any_row(const joined_view &p, int32_t *shared_flag, const F &f)
+{
+    if (threadIdx.x == 0) *shared_flag = 0;
+    __syncthreads();
+    each(p.s.places * JOINED_ROWS, [&](int32_t r) {
+        if (f(r)) *shared_flag = 1;
+    });
+    __syncthreads();
+    const bool any = *shared_flag != 0;
+    __syncthreads();
+    return any;
+}
+
+/* Until no row changes its state. Are all numbers finite then? */
+static __device__ __forceinline__ bool solve_part(const joined_view &p, const uint8_t *earlier,
+                                                  int32_t *shared_flag)
+{
+    bool changed = true;
+    begin_part(p, earlier);
+#pragma unroll 1
+    for (int pass = 0; pass < JOINED_PASSES && changed; ++pass) {
+        enter_blocks(p);
+#pragma unroll 1
+        for (int32_t level = 0; level < p.s.levels; ++level) factor_level(p, level);
+        solve_rows(p);
+        changed = any_row(p, shared_flag, [&](int32_t r) { return joined_change_row(&p, r); });
+    }
+    return !changed && !any_row(p, shared_flag, [&](int32_t r) { /* a place has no more bodies than rows */
+        const int32_t k = r % JOINED_ROWS, a = p.s.side[2 * (r / JOINED_ROWS)], b = p.s.side[2 * (r / JOINED_ROWS) + 1];
+        double sum = p.change[r] * 0;
+        if (a >= 0) sum += p.dv[6 * a + k] * 0;
+        if (b >= 0) sum += p.dv[6 * b + k] * 0;
+        return !(sum == 0);
+    });
+}
+
+#endif

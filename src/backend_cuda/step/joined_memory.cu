@@ -1,0 +1,148 @@
+/* Joined bodies (step/joined.cu): their parts' structures and work go to the device. */
+#include <string.h>
+
+#include <algorithm>
+
+#include "backend_cuda/device/double.h"
+
+#include "core/base/memory.h"
+#include "core/model/joint_law.h"
+#include "core/solve/joined.h"
+#include "core/solve/joined_order.h"
+#include "world.h"
+
+/* In BUFFER_JOINED, for so many bodies, constraints and parts, in this order: doubles first. */
+struct joined_memory {
+    struct cuda_joined_body *bodies;
+    double *work;
+    struct cuda_joined_part *parts;
+    struct cuda_joined_range *ranges;
+    int32_t *is_direct, *entry, *kept, *structures;
+    uint8_t *kept_state; /* rows */
+    size_t bytes;
+};
+
+static struct joined_memory memory_at(char *at, const struct cuda_step *s)
+{
+    struct joined_memory m;
+    m.bodies = (struct cuda_joined_body *)at;
+    m.work = (double *)(m.bodies + s->bodies);
+    m.parts = (struct cuda_joined_part *)(m.work + s->joined_work);
+    m.ranges = (struct cuda_joined_range *)(m.parts + s->joined_parts);
+    m.is_direct = (int32_t *)(m.ranges + s->joined_parts);
+    m.entry = m.is_direct + s->bodies + s->joint_constraints;
+    m.kept = m.entry + s->bodies;
+    m.structures = m.kept + s->joined_parts;
+    m.kept_state = (uint8_t *)(m.structures + s->joined_numbers);
+    m.bytes = (size_t)((char *)(m.kept_state + (size_t)s->joint_constraints * SADMM_MAX_ROWS) - at);
+    return m;
+}
+
+static bool make_order(const struct sadmm_resident_world *world, int32_t constraints, struct sadmm_joined_order *order)
+{
+    int32_t *bodies = (int32_t *)sadmm_alloc(2 * (size_t)constraints + 1, sizeof *bodies), at = 0;
+    if (!bodies) return false;
+    for (int32_t j = 0; j < world->joint_count; ++j)
+        for (int32_t k = 0; k < world->joints[j].constraints; ++k)
+            for (int s = 0; s < 2; ++s) bodies[at++] = world->joints[j].body[s];
+    const bool made = sadmm_joined_order_make(order, bodies, constraints, world->body_count, SADMM_JOINED_AROUND);
+    sadmm_free(bodies);
+    return made;
+}
+
+/* How much there is of all, and how much memory of its own a block needs, where every part fits there. */
+static void measure(struct sadmm_context *c, const struct sadmm_joined_order *order)
+{
+    struct cuda_step *s = c->step;
+    size_t most = 0;
+    s->joined_parts = order->parts;
+    s->joined_numbers = order->first[order->parts];
+    s->joined_work = 0;
+    int32_t places = 0;
+    for (int32_t k = 0; k < order->parts; ++k) {
+        const struct joined_structure part = sadmm_joined_part(order, k);
+        const size_t work = joined_work_size(&part),
+                     numbers = joined_numbers_size((int32_t)(order->first[k + 1] - order->first[k]));
+        s->joined_work += work;
+        places += part.places;
+        most = std::max(most, (work + numbers) * sizeof(double));
+    }
+    s->all_joined = places == s->joint_constraints;
+    s->joined_bytes = most + CUDA(joined_shared_size)() <= (size_t)c->shared_limit ? most : 0;
+}
+
+/* The host's copy of what is there but for work. */
+static void fill(const struct cuda_step *s, const struct sadmm_joined_order *order, const struct joined_memory *m)
+{
+    size_t work = 0;
+    memcpy(m->structures, order->numbers, s->joined_numbers * sizeof *order->numbers);
+    for (int32_t k = 0; k < order->parts; ++k) {
+        const struct joined_structure part = sadmm_joined_part(order, k);
+        const int32_t label = 1 + *std::min_element(part.body, part.body + part.bodies);
+        const struct cuda_joined_part at = {(int64_t)order->first[k], (int64_t)work,
+                                            (int32_t)(order->first[k + 1] - order->first[k]), label};
+        m->parts[k] = at;
+        work += joined_work_size(&part);
+        for (int32_t e = 0; e < part.bodies; ++e) {
+            m->is_direct[part.body[e]] = label;
+            m->entry[part.body[e]] = e;
+        }
+        for (int32_t p = 0; p < part.places; ++p) m->is_direct[s->bodies + part.constraint[p]] = 1;
+    }
+}
+
+static sadmm_status load_order(struct sadmm_context *c, const struct sadmm_joined_order *order,
+                               struct sadmm_error *error)
+{
+    struct cuda_step *s = c->step;
+    measure(c, order);
+    const size_t bytes = memory_at(nullptr, s).bytes;
+    TRY(CUDA(reserve)(c, BUFFER_JOINED, bytes, error));
+    char *host = (char *)sadmm_alloc(bytes, 1);
+    if (!host) return sadmm_fail_memory(error, "the cuda backend's joined bodies");
+    const struct joined_memory m = memory_at(host, s);
+    fill(s, order, &m);
+    const sadmm_status status = CUDA(put)(c, buffer<char>(c, BUFFER_JOINED), host, bytes, error);
+    sadmm_free(host);
+    TRY(status);
+    return joined_is_small(c) ? CUDA(allow_joined)(c, error) : SADMM_OK;
+}
+
+sadmm_status CUDA(reserve_joined)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    const size_t sides = 2 * (size_t)c->view.contacts.pair_capacity;
+    if (c->step->joined_parts == 0 || !joined_is_small(c)) return SADMM_OK;
+    return CUDA(reserve)(c, BUFFER_JOINED_SIDES, sides * (sizeof(struct cuda_joined_side) + sizeof(int32_t)), error);
+}
+
+sadmm_status CUDA(load_joined)(struct sadmm_context *c, const struct sadmm_resident_world *world,
+                               struct sadmm_error *error)
+{
+    struct sadmm_joined_order order = {};
+    c->step->joined_parts = 0;
+    c->step->joined_bytes = 0;
+    if (world->joint_count == 0) return SADMM_OK;
+    if (!make_order(world, c->step->joint_constraints, &order))
+        return sadmm_fail_memory(error, "the cuda backend's joined bodies");
+    const sadmm_status status = load_order(c, &order, error);
+    sadmm_joined_order_free(&order);
+    return status;
+}
+
+void CUDA(view_joined)(struct sadmm_context *c)
+{
+    if (c->step->joints == 0) return;
+    const struct joined_memory m = memory_at(buffer<char>(c, BUFFER_JOINED), c->step);
+    struct joint_view *joints = &c->view.joints;
+    joints->bodies = m.bodies;
+    joints->work = m.work;
+    joints->parts = m.parts;
+    joints->is_direct = m.is_direct;
+    joints->kept = m.kept;
+    joints->structures = m.structures;
+    joints->kept_state = m.kept_state;
+    joints->ranges = m.ranges;
+    joints->entry = m.entry;
+    joints->sides = buffer<struct cuda_joined_side>(c, BUFFER_JOINED_SIDES);
+    joints->pair_parts = (int32_t *)(joints->sides + 2 * (size_t)c->view.contacts.pair_capacity);
+}

@@ -1,0 +1,28 @@
+/* Where joints let bodies go, and what joints remember of it (docs/algorithm.md, section 10). */
+#ifndef SADMM_CUDA_STEP_MOVE_JOINED_H
+#define SADMM_CUDA_STEP_MOVE_JOINED_H
+
+#include "move.h"
+
+/* Body i of an island with joints goes where these let it. */
+static __device__ __noinline__ void move_joined(const cuda_view &v, int32_t i, bool leads_stay)
+{
+    const body_before before = fetch_body(v.step, i);
+    const double dt = v.model.settings->dt;
+    double next[6], place[PLACE];
+    joint_move(&before.body, v.joints.velocity + 6 * (size_t)i, leads_stay, dt, place, place + 3, next);
+    store_moved(v, i, before, next, place, dt);
+}
+
+/* Joint j remembers how its bodies have been moved, once that is known. */
+static __device__ __forceinline__ void end_joints(const cuda_view &v, int32_t j)
+{
+    const joint_view &joints = v.joints;
+    if (j >= joints.count || joints.joints[j].constraints == 0) return;
+    const struct sadmm_row_constraint *first = &v.raw.constraints[joints.first[j]];
+    if (first->count == 0) return;
+    joints.after[j].leads_stay =
+        joints.touch[joined_label(v, first->body_a >= 0 ? first->body_a : first->body_b)] & ISLAND_LEADS_STAY;
+}
+
+#endif
