@@ -412,6 +412,12 @@ sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resid
         {BUFFER_JOINT_TOUCH, (size_t)s->bodies * sizeof(int32_t)},
     };
     TRY(reserve_all(c, wanted, error));
+    /* Rows that a constraint does not have are fetched, too, beside the number of those that it has (joined.cu); and
+     * structures are copied with what lies between their members. */
+    CUDA_CALL(c, cudaMemsetAsync(buffer<void>(c, BUFFER_JOINT_ROWS), 0, 2 * row_set_bytes(s), c->stream),
+              "cudaMemsetAsync(rows of joints)");
+    CUDA_CALL(c, cudaMemsetAsync(memory_of(c, 0), 0, 3 * n * sizeof(struct sadmm_joint_memory), c->stream),
+              "cudaMemsetAsync(what joints keep)");
     TRY(CUDA(put)(c, c->buffers[BUFFER_JOINTS].data, world->joints, n * sizeof *world->joints, error));
     TRY(CUDA(put)(c, memory_of(c, 1 - s->into), world->joint_memory, n * sizeof *world->joint_memory, error));
     if (s->couplings > 0)

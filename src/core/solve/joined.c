@@ -118,9 +118,12 @@ static bool find_order(const struct solving *s)
         j->bodies[2 * k] = s->slots[k].body_a;
         j->bodies[2 * k + 1] = s->slots[k].body_b;
     }
-    if (!sadmm_joined_order_make(&j->order, j->bodies, (int32_t)n, s->system->body_count, SADMM_JOINED_AROUND) ||
-        !make_parts(j, bodies))
+    if (!sadmm_joined_order_make(&j->order, j->bodies, (int32_t)n, s->system->body_count, SADMM_JOINED_AROUND))
         return false;
+    if (!make_parts(j, bodies)) {
+        sadmm_joined_order_free(&j->order); /* no parts without their views */
+        return false;
+    }
     j->constraints = n;
     j->body_count = s->system->body_count;
     return true;
@@ -128,7 +131,7 @@ static bool find_order(const struct solving *s)
 
 /* ---- what there is ----------------------------------------------------------------------------------------------- */
 
-/* Calls f(part, its pair, side, entry) for every side of a contact at a joined body, pairs in order. */
+/* What is done with a side of a pair at a joined body: number `entry` of its part. impulse: on that body. */
 typedef void on_side(struct part *, const struct sadmm_contact_point *, int32_t count, int side, int32_t entry,
                      double *impulse);
 
@@ -191,7 +194,7 @@ static void load_row(const struct solving *s, size_t from, struct joined_row *to
     to->lo = rows->lo[from], to->hi = rows->hi[from], to->lambda = rows->lambda[from];
 }
 
-/* Calls f's statement for row r of the part, which is row `from` of the system. */
+/* Goes through the rows of a part: r, which is row `from` of the system. */
 #define EACH_ROW(s, v, r, from)                                                                         \
     for (int32_t p_ = 0; p_ < (v)->s.places; ++p_)                                                      \
         for (int32_t r = JOINED_ROWS * p_, from = (s)->slots[(v)->s.constraint[p_]].first,              \
