@@ -245,7 +245,7 @@ SADMM_INLINE double joined_row_load(const struct joined_view *v, int32_t around,
 {
     enum { STRIDE = sizeof(struct joined_row) / sizeof(double) };
     const struct joined_row *first = &v->rows[JOINED_ROWS * (around / 2)];
-    return joined_strided_product(&first->lambda, STRIDE, &first->jacobian[0][6 * (around % 2) + k], STRIDE);
+    return joined_strided_product(&first->lambda, STRIDE, first->jacobian[around % 2] + k, STRIDE);
 }
 
 /* Twice the energy of the impulses on a body, for the speed that they change its part by (V of math/weight.h). */
