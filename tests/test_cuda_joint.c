@@ -444,7 +444,8 @@ START_TEST(joints_that_nothing_touches_are_solved_apart)
     by_host(worlds[0]);
     for (int step = 0; step < 90; ++step) {
         for (int k = 0; k < 2; ++k) {
-            if (step == 40) MUST(worlds[k], sadmm_world_set_joint_enabled(worlds[k], joint_at(worlds[k], 2), false));
+            if (step == 20 || step == 24)
+                MUST(worlds[k], sadmm_world_set_joint_enabled(worlds[k], joint_at(worlds[k], 2), step == 24));
             step_world(worlds[k], 1);
         }
         snprintf(what, sizeof what, "way %d, %s, step %d", way, precision ? "f64" : "f32", step);
@@ -460,7 +461,7 @@ START_TEST(joints_that_nothing_touches_are_solved_apart)
         ck_assert_double_le(fabs(a.ncp_max - b.ncp_max), EMULATED ? 0 : 1e-4);
         ck_assert_double_le(fabs(a.momentum_max - b.momentum_max), EMULATED ? 0 : 1e-3);
     }
-    ck_assert_int_ge(apart, 8); /* before the box comes, and long after it has gone */
+    ck_assert_int_ge(apart, 8); /* until a joint is disabled, before the box comes; and long after it has gone */
     ck_assert_int_ge(changes, 3);
     for (int k = 0; k < 2; ++k) sadmm_world_destroy(worlds[k]);
 }

@@ -2,6 +2,8 @@
  * of few steps brings along a mechanism. */
 #include "scene_tools.h"
 
+#include "core/solve/joined_order.h"
+
 static const double UNIT[4] = {1, 0, 0, 0};
 static const double ABOUT_Y[4] = {0.70710678118654752, -0.70710678118654752, 0, 0}; /* z of the frame along y */
 static const sadmm_body_id WORLD = {0, 0};
@@ -290,6 +292,61 @@ START_TEST(a_failed_step_leaves_nothing)
 }
 END_TEST
 
+/* ---- the order --------------------------------------------------------------------------------------------------- */
+
+static void expect_order(const struct joined_structure *s)
+{
+    for (int32_t b = 0; b < s->blocks; ++b) ck_assert_int_gt(s->row[b], s->column[b]);
+    for (int32_t node = 0; node < s->places + s->blocks; ++node)
+        for (int32_t at = s->first_update[node]; at < s->first_update[node + 1]; ++at) {
+            const int32_t from = s->column[s->update[2 * at]],
+                          column = node < s->places ? node : s->column[node - s->places];
+            ck_assert_int_lt(from, column); /* columns before it alone */
+            ck_assert_int_eq(from, s->column[s->update[2 * at + 1]]);
+        }
+}
+
+/* A hub has more constraints than are solved directly; what hangs on one of its spokes is, by itself. */
+START_TEST(constraints_left_out_are_in_no_part)
+{
+    enum { SPOKES = 65, CHAIN = 9, CONSTRAINTS = SPOKES + CHAIN };
+    int32_t bodies[2 * CONSTRAINTS];
+    struct sadmm_joined_order order = {0};
+    for (int32_t k = 0; k < CONSTRAINTS; ++k) {
+        bodies[2 * k] = k < SPOKES ? 0 : k;
+        bodies[2 * k + 1] = k + 1;
+    }
+    ck_assert(sadmm_joined_order_make(&order, bodies, CONSTRAINTS, CONSTRAINTS + 1, 64));
+    ck_assert_int_eq(order.parts, 1);
+    const struct joined_structure s = sadmm_joined_part(&order, 0);
+    ck_assert_int_eq(s.places, CHAIN);
+    for (int32_t p = 0; p < s.places; ++p) ck_assert_int_ge(s.constraint[p], SPOKES);
+    expect_order(&s);
+    sadmm_joined_order_free(&order);
+}
+END_TEST
+
+/* So is a part whose factor fills up, while a sparse one beside it stays. */
+START_TEST(parts_that_fill_up_are_left_out)
+{
+    enum { BODIES = 60, EACH = 10, CHAIN = 20, CONSTRAINTS = BODIES * EACH + CHAIN };
+    static int32_t bodies[2 * CONSTRAINTS];
+    struct sadmm_joined_order order = {0};
+    uint32_t random = 1;
+    for (int32_t k = 0; k < CONSTRAINTS; ++k) {
+        random = random * 1664525 + 1013904223;
+        bodies[2 * k] = k < BODIES * EACH ? k % BODIES : BODIES + k - BODIES * EACH;
+        bodies[2 * k + 1] = k < BODIES * EACH ? (k + 1 + (int32_t)(random >> 8) % (BODIES - 1)) % BODIES : bodies[2 * k] + 1;
+    }
+    ck_assert(sadmm_joined_order_make(&order, bodies, CONSTRAINTS, BODIES + CHAIN + 1, 64));
+    ck_assert_int_eq(order.parts, 1);
+    const struct joined_structure s = sadmm_joined_part(&order, 0);
+    ck_assert_int_eq(s.places, CHAIN);
+    expect_order(&s);
+    sadmm_joined_order_free(&order);
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("joined");
@@ -302,6 +359,8 @@ int main(void)
     tcase_add_test(tests, a_double_four_bar_is_where_it_should_be);
     tcase_add_loop_test(tests, mechanisms_are_solved_by_one_iteration, 0, 40);
     tcase_add_loop_test(tests, a_failed_step_leaves_nothing, 0, SOLVERS);
+    tcase_add_test(tests, constraints_left_out_are_in_no_part);
+    tcase_add_test(tests, parts_that_fill_up_are_left_out);
     suite_add_tcase(suite, tests);
     return run_suite(suite);
 }

@@ -19,6 +19,10 @@
  * (step_state). Each sub-step has a plan of its own; the first one's is known beforehand, those of others are taken to
  * be like it until the report of a step that failed says what they are.
  *
+ * Joined bodies (step/joined.cu) are solved beside `layout`, or behind it where parts are large, and once more beside
+ * `finish`. Where they are apart (cuda_step_guess) all about joints is a branch from `start` to `finish`, and whether
+ * the step was one for that is known when it has come to its end.
+ *
  * fast, small islands (c->prologue): `iterate` does penalties and limit too, and the last two check the plan.
  *
  * The host plans a step from the statistics of an earlier one: capacities, tier and partition, rows a contact, warm or
@@ -54,8 +58,8 @@ struct cuda_step_totals {
 /* Joints and couplings that take part, constraints of their rows, those that start with a multiplier other than 0. */
 struct cuda_joint_counts {
     int32_t joints, couplings, constraints, warm;
-    int32_t together; /* not 0: bodies that they join have to iterate with the others: a contact touches them, or they
-                         could not be solved directly */
+    int32_t together; /* not 0: bodies that they join have to iterate with the others: a contact touches them, they
+                         could not be solved directly, or a joint has no rows at the time */
     int32_t sides;    /* of pairs, at such bodies, that are listed */
 };
 

@@ -238,13 +238,13 @@ struct cuda_joined_body {
     double mass, inertia[6], b[6]; /* xx, yy, zz, xy, xz, yz */
 };
 
-/* Bodies that joints join: where the numbers of its structure begin, and its work; how many they are. */
+/* A part of bodies that joints join: where the numbers of its structure begin, how many these are, and its work. */
 struct cuda_joined_part {
     int64_t first_number, first_work;
     int32_t numbers, label; /* label: as in joint_view.is_direct */
 };
 
-/* A side of a pair: the number of its body in its part, points of the pair; and those of a part. */
+/* A side of a pair: code 2 pair + side, the number of its body in its part, points of the pair; and those of a part. */
 struct cuda_joined_side {
     int32_t code, entry, first, count;
 };

@@ -225,7 +225,7 @@ static __global__ void __launch_bounds__(FINISH_THREADS, 2)
     const finish_blocks end = finish_blocks_of(v.model, v.contacts);
     const double dt = v.model.settings->dt;
     /* Layout and penalties are the last that abort a step, the latter where it is not as planned; iterations come
-     * between. */
+     * between. Joints that are apart have come to their end: this kernel waits for them before it begins. */
     const bool on = as_planned(v.model, v.step) && !v.model.live->abort_code;
     const int32_t block = (int32_t)blockIdx.x, t = (int32_t)threadIdx.x;
     /* A thread that moves nothing. It waits in any case: kernels after this one wait for this one alone. */

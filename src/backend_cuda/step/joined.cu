@@ -10,6 +10,7 @@
 struct joined_shared {
     double speed;
     int32_t touched, flag;
+    int32_t aborted, pairs; /* as one thread has seen them: a branch beside this one may abort the step at any time */
     struct joined_sides sides;
 };
 
@@ -187,7 +188,8 @@ static __device__ __forceinline__ void store_part(const cuda_view &v, const join
     if (!solved) v.step.control->joints.together = 1;
 }
 
-/* Contacts at the part. Does any touch it? Where the layout's lists say it is known later (load_bodies). */
+/* Contacts at the part. May any touch it? Where the layout's lists say that, it is looked up for a part that was solved
+ * (kept), of which the answer is needed now; load_bodies finds out in any case. */
 template <bool SMALL>
 static __device__ __forceinline__ bool find_touching(const cuda_view &v, const joined_view &p, bool again, bool kept,
                                                      struct joined_shared *shared)
@@ -195,7 +197,7 @@ static __device__ __forceinline__ bool find_touching(const cuda_view &v, const j
     const int32_t part = (int32_t)blockIdx.x;
     if (!SMALL) return !kept || is_touched(v, p, &shared->touched);
     if (again) load_sides(v, v.joints.ranges[part], &shared->sides);
-    else if (!v.joints.apart) find_sides(v, v.joints.parts[part].label, &shared->sides);
+    else if (!v.joints.apart) find_sides(v, v.joints.parts[part].label, shared->pairs, &shared->sides);
     if (!again && threadIdx.x == 0) {
         const struct cuda_joined_range range = {shared->sides.first, shared->sides.count};
         v.joints.ranges[part] = range;
@@ -211,8 +213,13 @@ static __global__ void __launch_bounds__(JOINED_THREADS)
     CUDA_DYNAMIC_SHARED(memory);
     struct joined_shared *shared = (struct joined_shared *)memory;
     const bool after = args.count != 0, again = after && args.start;
-    if (v.model.live->abort_code) return;
-    if (threadIdx.x == 0) shared->touched = shared->sides.count = shared->sides.first = 0;
+    if (threadIdx.x == 0) {
+        shared->aborted = v.model.live->abort_code;
+        shared->pairs = v.model.live->pairs;
+        shared->touched = shared->sides.count = shared->sides.first = 0;
+    }
+    __syncthreads();
+    if (shared->aborted) return;
     const joined_view p = view_of_block<SMALL>(v, (double *)(shared + 1));
     const bool kept = again && v.joints.kept[blockIdx.x], /* it was solved before the iterations; */
                touched = find_touching<SMALL>(v, p, again, kept, shared);
@@ -253,11 +260,8 @@ sadmm_status CUDA(launch_pair_parts)(struct sadmm_context *c, struct sadmm_error
                         &args, error);
 }
 
-sadmm_status CUDA(allow_joined)(struct sadmm_context *c, struct sadmm_error *error)
+cudaError_t CUDA(joined_allow)(int shared_limit)
 {
-    CUDA_CALL(c,
-              cudaFuncSetAttribute((const void *)joined_kernel<true>, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                                   (int)(sizeof(struct joined_shared) + c->step->joined_bytes)),
-              "cudaFuncSetAttribute");
-    return SADMM_OK;
+    return cudaFuncSetAttribute((const void *)joined_kernel<true>, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                                shared_limit);
 }

@@ -33,9 +33,10 @@ struct joined_sides {
 };
 
 /* Finds them among the pairs of the step: those whose body's part has this label. */
-static __device__ __forceinline__ void find_sides(const cuda_view &v, int32_t label, struct joined_sides *sides)
+static __device__ __forceinline__ void find_sides(const cuda_view &v, int32_t label, int32_t pairs,
+                                                  struct joined_sides *sides)
 {
-    const int32_t pairs = live_pairs(v.model), t = (int32_t)threadIdx.x, warp = t / WARP, lane = t % WARP;
+    const int32_t t = (int32_t)threadIdx.x, warp = t / WARP, lane = t % WARP;
     const int32_t *parts = v.joints.pair_parts;
     int32_t own = 0, found = 0;
 #pragma unroll 4

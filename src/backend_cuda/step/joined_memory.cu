@@ -104,8 +104,7 @@ static sadmm_status load_order(struct sadmm_context *c, const struct sadmm_joine
     fill(s, order, &m);
     const sadmm_status status = CUDA(put)(c, buffer<char>(c, BUFFER_JOINED), host, bytes, error);
     sadmm_free(host);
-    TRY(status);
-    return joined_is_small(c) ? CUDA(allow_joined)(c, error) : SADMM_OK;
+    return status;
 }
 
 sadmm_status CUDA(reserve_joined)(struct sadmm_context *c, struct sadmm_error *error)

@@ -4,7 +4,8 @@
  *   rows      eight lanes a joint, one a coordinate: its laws as raw rows, as the host would make them. A joint has a
  *             fixed number of constraints; its rows fill the first ones, the rest join no bodies
  *   solution  a thread a joint: multipliers into what it keeps; lanes of a pair: may the bodies of its island move by
- *             the means of their velocities? Commit, or turn, moves them then (kernels.cu)
+ *             the means of their velocities? Commit, or turn, moves them then (kernels.cu); or
+ *   move      those that are apart (device/step.h)
  */
 #include <string.h>
 
@@ -162,6 +163,8 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
     warm = or_lanes(warm);
     if (!live) return;
     store_constraints(v, joint, first, lane, rows);
+    /* Parts are of all joints, islands of those that act: they are not the same where one does not. */
+    if (rows == 0 && joint->constraints > 0 && lane == 0) v.step.control->joints.together = 1;
     begin_memory(v.joints, j, lane, coordinate && joint_winds(def->locks, lane), coordinate ? moving.value : 0,
                  rows > 0, enabled ? acting.middle.point : v3(0, 0, 0));
     if (rows == 0) return;

@@ -95,7 +95,8 @@ static void learn(struct sadmm_context *c, int64_t first, const struct cuda_step
 }
 
 /* A step was done. Where joined bodies were left alone for a while it is planned that they are; the longer that takes
- * the more often they were not, since a plan costs what many steps do. The outcome is the same to the last bit. */
+ * the more often they were not, since a plan costs what many steps do. The outcome is the same to the last bit: the
+ * part's direct solution, whatever the iterations. */
 static void see_joined(struct sadmm_context *c, const struct cuda_step_report *report)
 {
     struct cuda_step *s = c->step;
@@ -130,6 +131,7 @@ static sadmm_status recover(struct sadmm_context *c, int64_t first, const struct
     const bool together = s->apart && report->abort_code == ABORT_PLAN && report->joints.together;
     if (together) {
         s->untouched = 0;
+        s->misfit = -1; /* another partition */
         s->patience = std::min(2 * s->patience, (int32_t)MOST_PATIENCE);
     }
     if (report->abort_code == ABORT_CAPACITY)

@@ -139,7 +139,7 @@ sadmm_status CUDA(reserve_joined)(struct sadmm_context *, struct sadmm_error *er
  * contacts themselves, once pair_parts has run; else by the layout. */
 sadmm_status CUDA(launch_joined)(struct sadmm_context *, bool after, struct sadmm_error *error);
 sadmm_status CUDA(launch_pair_parts)(struct sadmm_context *, struct sadmm_error *error);
-sadmm_status CUDA(allow_joined)(struct sadmm_context *, struct sadmm_error *error);
+cudaError_t CUDA(joined_allow)(int shared_limit); /* once a device */
 size_t CUDA(joined_shared_size)(void); /* of a block, beside the part's own */
 static inline bool joined_is_small(const struct sadmm_context *c) { return c->step->joined_bytes > 0; }
 

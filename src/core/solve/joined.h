@@ -13,7 +13,7 @@
  * there against its law is let go. Where everything holds already nothing changes: a solution stays what it is. Islands
  * under rows alone end at their solution whatever the iterations.
  *
- * dlambda by a sparse Cholesky factor of J (A + C)^-1 J^T, a block a constraint, in an order of least degree. In
+ * dlambda by a sparse factor L D L^T of J (A + C)^-1 J^T, a block a constraint, in an order of least degree. In
  * double. */
 #ifndef SADMM_CORE_SOLVE_JOINED_H
 #define SADMM_CORE_SOLVE_JOINED_H

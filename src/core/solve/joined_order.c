@@ -6,6 +6,8 @@
 
 /* Larger parts than this are left to the iteration: the sets below are bits. */
 enum { MOST_OF_PART = 8192, WORD = 64 };
+/* And parts whose factor takes more updates, each a product of blocks: a tenth of a second on a core, 8 MB of lists. */
+enum { MOST_UPDATES = 1 << 20 };
 /* A level takes constraints of up to so many neighbours more than the fewest: chains are halved, level by level. */
 enum { DEGREE_SLACK = 1 };
 
@@ -102,7 +104,7 @@ static int32_t count_near(const struct graph *g, int32_t i)
     return count;
 }
 
-/* Calls `visit` for each neighbour, ascending. */
+/* Goes through the neighbours, ascending. */
 #define EACH_NEAR(g, i, j)                                                            \
     for (int32_t w_ = 0; w_ < (g)->words; ++w_)                                        \
         for (uint64_t bits_ = near_of(g, i)[w_]; bits_; bits_ &= bits_ - 1)            \
@@ -123,6 +125,7 @@ static bool make_graph(const struct maker *m, int32_t part, int32_t *number, str
         for (int s = 0; s < 2; ++s) {
             const int32_t body = m->bodies[2 * member[i] + s];
             for (int32_t j = body < 0 ? 0 : m->first[body]; body >= 0 && j < m->first[body + 1]; ++j) {
+                if (m->part[m->around[j]] != part) continue; /* left out of any */
                 const int32_t other = number[m->around[j]];
                 if (other != i) near_of(g, i)[other / WORD] |= UINT64_C(1) << (other % WORD);
             }
@@ -176,6 +179,7 @@ struct columns {
     int32_t *first, *rows;          /* places + 1; as they were found: constraints of the part */
     size_t row_count, row_capacity;
     int32_t places, levels;
+    int64_t updates;
 };
 
 static void free_columns(struct columns *c)
@@ -192,7 +196,7 @@ static bool find_columns(struct graph *g, struct columns *c)
     if (!c->order) return false;
     c->place = c->order + n, c->level = c->place + n, c->first = c->level + n;
     c->places = g->count;
-    while (taken < g->count) {
+    while (taken < g->count && c->updates <= MOST_UPDATES) {
         const int32_t begin = taken;
         take_level(g, c->order, &taken);
         for (int32_t at = begin; at < taken; ++at) {
@@ -201,6 +205,8 @@ static bool find_columns(struct graph *g, struct columns *c)
             c->level[at] = c->levels;
             EACH_NEAR(g, c->order[at], j) c->rows[c->row_count++] = j;
             c->first[at + 1] = (int32_t)c->row_count;
+            const int64_t rows = c->first[at + 1] - c->first[at];
+            c->updates += rows * (rows + 1) / 2;
         }
         ++c->levels;
     }
@@ -423,13 +429,15 @@ static bool write_part(struct writer *w, const struct maker *m, const int32_t *m
            write_groups(w, each_pull, c->level, (size_t)c->levels, 6) && write_around(w);
 }
 
-/* number: constraints -> number in their part. */
-static bool make_part(const struct maker *m, int32_t part, int32_t *number, int32_t *entry, struct writer *w)
+/* number: constraints -> number in their part. *left_out: its factor would be too large. */
+static bool make_part(const struct maker *m, int32_t part, int32_t *number, int32_t *entry, struct writer *w,
+                      bool *left_out)
 {
     struct graph g = {0};
     struct columns c = {0};
-    const bool fits = make_graph(m, part, number, &g) && find_columns(&g, &c) &&
-                      write_part(w, m, m->member + m->first_member[part], &c, entry);
+    bool fits = make_graph(m, part, number, &g) && find_columns(&g, &c);
+    *left_out = fits && c.updates > MOST_UPDATES;
+    fits = fits && (*left_out || write_part(w, m, m->member + m->first_member[part], &c, entry));
     free_columns(&c);
     free_graph(&g);
     return fits;
@@ -438,7 +446,8 @@ static bool make_part(const struct maker *m, int32_t part, int32_t *number, int3
 static bool make(struct maker *m, int32_t most_around, struct sadmm_joined_order *order)
 {
     const size_t n = (size_t)m->constraints + 1;
-    int32_t *numbers = (int32_t *)sadmm_alloc(n + (size_t)m->body_count, sizeof *numbers), *entry = numbers + n;
+    int32_t *numbers = (int32_t *)sadmm_alloc(n + (size_t)m->body_count, sizeof *numbers),
+            *entry = numbers ? numbers + n : NULL;
     struct writer w = {order, 0, 0};
     bool fits = numbers && list_around(m);
     if (fits) {
@@ -447,10 +456,11 @@ static bool make(struct maker *m, int32_t most_around, struct sadmm_joined_order
         order->first = (size_t *)sadmm_alloc((size_t)m->parts + 1, sizeof *order->first);
         fits = order->first != NULL;
     }
-    for (; fits && order->parts < m->parts; order->first[order->parts] = w.end) {
+    for (int32_t part = 0; fits && part < m->parts; ++part) {
+        bool left_out = false;
         w.begin = w.end;
-        fits = make_part(m, order->parts, numbers, entry, &w);
-        ++order->parts;
+        fits = make_part(m, part, numbers, entry, &w, &left_out);
+        if (fits && !left_out) order->first[++order->parts] = w.end;
     }
     sadmm_free(numbers);
     return fits;

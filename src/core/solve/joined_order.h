@@ -1,4 +1,4 @@
-/* The order and the structure of sparse Cholesky factors whose blocks are constraints, coupled where they have a body
+/* The order and the structure of sparse factors L D L^T whose blocks are constraints, coupled where they have a body
  * in common: a factor a part (core/model/joined.h). */
 #ifndef SADMM_CORE_SOLVE_JOINED_ORDER_H
 #define SADMM_CORE_SOLVE_JOINED_ORDER_H
@@ -17,7 +17,7 @@ struct sadmm_joined_order {
 };
 
 /* bodies: two a constraint, < 0: not solved for. Left out, so that the iteration alone solves them, are constraints of
- * no body, those at a body that has more than `most_around`, and parts of thousands. False: no memory, nothing has
+ * no body, those at a body that has more than `most_around`, and parts of thousands, or that fill up. False: no memory, nothing has
  * changed. */
 bool sadmm_joined_order_make(struct sadmm_joined_order *order, const int32_t *bodies, int32_t constraints,
                              int32_t body_count, int32_t most_around);
