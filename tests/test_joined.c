@@ -336,7 +336,8 @@ START_TEST(parts_that_fill_up_are_left_out)
     for (int32_t k = 0; k < CONSTRAINTS; ++k) {
         random = random * 1664525 + 1013904223;
         bodies[2 * k] = k < BODIES * EACH ? k % BODIES : BODIES + k - BODIES * EACH;
-        bodies[2 * k + 1] = k < BODIES * EACH ? (k + 1 + (int32_t)(random >> 8) % (BODIES - 1)) % BODIES : bodies[2 * k] + 1;
+        bodies[2 * k + 1] =
+            k < BODIES * EACH ? (k + 1 + (int32_t)(random >> 8) % (BODIES - 1)) % BODIES : bodies[2 * k] + 1;
     }
     ck_assert(sadmm_joined_order_make(&order, bodies, CONSTRAINTS, BODIES + CHAIN + 1, 64));
     ck_assert_int_eq(order.parts, 1);

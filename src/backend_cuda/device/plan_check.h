@@ -23,21 +23,25 @@ static __device__ __forceinline__ void stamp_assembled(const cuda_step_view &ste
     if (blockIdx.x == 0 && threadIdx.x == 0) step.control->stamps[STAMP_ASSEMBLED] = nanoseconds();
 }
 
-/* Is the step what it was planned for? joints: what they are like is known. */
-static __device__ __forceinline__ bool as_planned(const model_view &model, const cuda_step_view &step,
-                                                  bool joints_known = true)
+/* Are contacts what the step was planned for? */
+static __device__ __forceinline__ bool contacts_as_planned(const model_view &model, const cuda_step_view &step)
+{
+    const struct cuda_graph_statistics *statistics = model.statistics;
+    return plan_contact_rows(model.live->pairs, statistics->rough) == step.guess.contact_rows &&
+           statistics->point_slots <= step.guess.point_slots;
+}
+/* Is the step? Known once its joints are. */
+static __device__ __forceinline__ bool as_planned(const model_view &model, const cuda_step_view &step)
 {
     const struct cuda_graph_statistics *statistics = model.statistics;
     const struct cuda_step_guess guess = step.guess;
-    const int32_t pairs = model.live->pairs, rows = plan_contact_rows(pairs, statistics->rough);
+    const int32_t pairs = model.live->pairs;
     const bool joints = guess.rows >= 0;
-    if (joints && !joints_known) return rows == guess.contact_rows && statistics->point_slots <= guess.point_slots;
     const int32_t constraints = joints ? step.control->joints.constraints : 0;
     const int32_t warm =
         plan_mostly_warm(pairs + constraints, statistics->warm + (joints ? step.control->joints.warm : 0));
-    return rows == guess.contact_rows && statistics->point_slots <= guess.point_slots &&
-           (guess.warm < 0 || warm == guess.warm) && (!joints || guess.rows == (constraints > 0)) &&
-           !(guess.apart && step.control->joints.together);
+    return contacts_as_planned(model, step) && (guess.warm < 0 || warm == guess.warm) &&
+           (!joints || guess.rows == (constraints > 0)) && !(guess.apart && step.control->joints.together);
 }
 
 /* The grid's first thread compares the statistics with the plan; what runs now and what was assembled is of no use when
@@ -49,8 +53,9 @@ static __device__ __forceinline__ void check_plan(const model_view &model, const
     stamp_assembled(step);
     iteration.residual[0] = iteration.residual[1] = 0;
     *iteration.barrier = 0;
-    /* joints that are apart may still be at it */
-    if (!model.live->abort_code && !as_planned(model, step, !step.guess.apart)) model.live->abort_code = ABORT_PLAN;
+    /* a branch beside this one may still count joints that are apart: finish, turn and commit look at them */
+    const bool planned = step.guess.apart ? contacts_as_planned(model, step) : as_planned(model, step);
+    if (!model.live->abort_code && !planned) model.live->abort_code = ABORT_PLAN;
 }
 
 #endif

@@ -95,7 +95,8 @@ struct cuda_step_guess {
     int32_t point_slots;
     int32_t warm;         /* most pairs, and constraints of joints, carry an impulse; -1: does not matter */
     int32_t rows;         /* there are constraints of joints; -1: there are no joints */
-    int32_t apart;        /* bodies that joints join do not iterate: they are solved directly, beside the rest of the step */
+    int32_t apart;        /* bodies that joints join do not iterate: they are solved directly, beside what else the
+                             step does */
 };
 
 struct cuda_step_view {

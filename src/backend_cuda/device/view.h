@@ -275,9 +275,9 @@ struct joint_view {
     int32_t *kept;                  /* parts: solved before the iterations; */
     uint8_t *kept_state;            /* rows: their state then */
     const int32_t *entry;           /* bodies: number in their part */
-    int32_t *pair_parts;            /* sides of pairs: as is_direct of the body; small parts find their contacts by it: */
+    int32_t *pair_parts;            /* sides of pairs: as is_direct of the body. By it small parts find their contacts: */
     struct cuda_joined_range *ranges; /* parts, into */
-    struct cuda_joined_side *sides; /* part by part, ascending in a part; parts as they come */
+    struct cuda_joined_side *sides;   /* part by part, ascending in a part; parts as they come */
     int32_t *touch;                 /* bodies: at labels of islands bits (core/model/joint_lead.h) */
 };
 

@@ -188,21 +188,16 @@ static __device__ __forceinline__ void store_part(const cuda_view &v, const join
     if (!solved) v.step.control->joints.together = 1;
 }
 
-/* Contacts at the part. May any touch it? Where the layout's lists say that, it is looked up for a part that was solved
- * (kept), of which the answer is needed now; load_bodies finds out in any case. */
-template <bool SMALL>
-static __device__ __forceinline__ bool find_touching(const cuda_view &v, const joined_view &p, bool again, bool kept,
-                                                     struct joined_shared *shared)
+/* Of a small part. again: it has looked before the iterations. */
+static __device__ __forceinline__ void look_for_sides(const cuda_view &v, bool again, struct joined_shared *shared)
 {
     const int32_t part = (int32_t)blockIdx.x;
-    if (!SMALL) return !kept || is_touched(v, p, &shared->touched);
     if (again) load_sides(v, v.joints.ranges[part], &shared->sides);
     else if (!v.joints.apart) find_sides(v, v.joints.parts[part].label, shared->pairs, &shared->sides);
     if (!again && threadIdx.x == 0) {
         const struct cuda_joined_range range = {shared->sides.first, shared->sides.count};
         v.joints.ranges[part] = range;
     }
-    return shared->sides.count > 0;
 }
 
 /* args.count: after the iterations; args.start: it ran before them, too. */
@@ -221,9 +216,9 @@ static __global__ void __launch_bounds__(JOINED_THREADS)
     __syncthreads();
     if (shared->aborted) return;
     const joined_view p = view_of_block<SMALL>(v, (double *)(shared + 1));
-    const bool kept = again && v.joints.kept[blockIdx.x], /* it was solved before the iterations; */
-               touched = find_touching<SMALL>(v, p, again, kept, shared);
-    if (kept && !touched) return; /* it is so still */
+    if (SMALL) look_for_sides(v, again, shared);
+    const bool kept = again && v.joints.kept[blockIdx.x]; /* it was solved before the iterations; it is so still: */
+    if (kept && !is_touched<SMALL>(v, p, &shared->sides, &shared->touched)) return;
     load_part<SMALL>(v, p, after, shared);
     const bool solved = solve_part(p, kept ? v.joints.kept_state : nullptr, &shared->flag);
     store_part(v, p, after, solved);
@@ -250,7 +245,8 @@ sadmm_status CUDA(launch_joined)(struct sadmm_context *c, bool after, struct sad
     blocks.shared = sizeof(struct joined_shared) + c->step->joined_bytes;
     args.count = after;
     args.start = c->settings.warm_start;
-    return CUDA(launch_partition)(c, joined_is_small(c) ? joined_kernel<true> : joined_kernel<false>, "joined bodies", &blocks, false, &args, error);
+    return CUDA(launch_partition)(c, joined_is_small(c) ? joined_kernel<true> : joined_kernel<false>, "joined bodies",
+                                  &blocks, false, &args, error);
 }
 
 sadmm_status CUDA(launch_pair_parts)(struct sadmm_context *c, struct sadmm_error *error)

@@ -49,8 +49,8 @@ static __device__ __forceinline__ int32_t row_in_world(const joined_view &p, int
 static __device__ __forceinline__ void begin_part(const joined_view &p, const uint8_t *earlier)
 {
     each(p.s.bodies, [&](int32_t e) {
-        joined_factor(p.factor + 36 * e, p.factor + 36 * e);
-        joined_solve(p.factor + 36 * e, p.missing + 6 * e, p.missing + 6 * e);
+        ldl6_factor(p.factor + 36 * e, p.factor + 36 * e);
+        ldl6_solve(p.factor + 36 * e, p.missing + 6 * e, p.missing + 6 * e);
     });
     __syncthreads();
     each(p.s.places * JOINED_ROWS * 2, [&](int32_t t) { joined_respond(&p, t / 2, t % 2); });
@@ -80,12 +80,19 @@ static __device__ __forceinline__ void enter_blocks(const joined_view &p)
     __syncthreads();
 }
 
+/* Calls f(group, k) for k < share of each group of a list (core/model/joined.h: pushes, pulls), by a thread each. */
+template <class F>
+static __device__ __forceinline__ void each_of_group(const int32_t *list, int32_t first, int32_t end, int32_t share,
+                                                     const F &f)
+{
+    each((end - first) * share, [&](int32_t t) { f(list + 3 * (first + t / share), t % share); });
+}
+
 /* What columns of a level take from later nodes. */
 static __device__ __forceinline__ void push_level(const joined_view &p, int32_t level)
 {
-    const int32_t first = p.s.first_push[2 * level], end = p.s.first_push[2 * level + 2];
-    each((end - first) * JOINED_TILES, [&](int32_t t) {
-        const int32_t *push = p.s.push + 3 * (first + t / JOINED_TILES), tile = t % JOINED_TILES;
+    const int32_t *first = p.s.first_push + 2 * level;
+    each_of_group(p.s.push, first[0], first[2], JOINED_TILES, [&](const int32_t *push, int32_t tile) {
         if (push[0] < p.s.places && joined_tile_is_above(tile)) return;
         double *node = node_of(p, push[0]);
         struct joined_tile made = joined_load_tile(node, tile);
@@ -103,9 +110,10 @@ static __device__ __forceinline__ void factor_level(const joined_view &p, int32_
                   first_block = p.s.first_below[first], rows = (p.s.first_below[end] - first_block) * JOINED_ROWS;
     each(rows + (end - first) * JOINED_ROWS, [&](int32_t t) {
         const bool below = t < rows;
-        const int32_t at = (below ? t : t - rows) / JOINED_ROWS, place = below ? p.s.column[first_block + at] : first + at;
+        const int32_t at = (below ? t : t - rows) / JOINED_ROWS,
+                      place = below ? p.s.column[first_block + at] : first + at;
         double L[JOINED_BLOCK];
-        joined_factor(p.diagonal + JOINED_BLOCK * place, L);
+        ldl6_factor(p.diagonal + JOINED_BLOCK * place, L);
         if (below) joined_finish_row(&p, L, first_block + at, t % JOINED_ROWS);
         else joined_invert_row(&p, L, place, t % JOINED_ROWS);
     });
@@ -116,12 +124,11 @@ static __device__ __forceinline__ void factor_level(const joined_view &p, int32_
 static __device__ __forceinline__ void forward_level(const joined_view &p, int32_t level)
 {
     const int32_t first = p.s.first_of_level[level] * JOINED_ROWS, end = p.s.first_of_level[level + 1] * JOINED_ROWS,
-                  first_push = p.s.first_push[2 * level], end_push = p.s.first_push[2 * level + 1];
+                  *first_push = p.s.first_push + 2 * level;
     each(end - first, [&](int32_t k) { joined_find_forward(&p, first + k); });
     __syncthreads();
-    each((end_push - first_push) * JOINED_ROWS, [&](int32_t t) {
-        const int32_t *push = p.s.push + 3 * (first_push + t / JOINED_ROWS);
-        joined_push_right(&p, push[0], push[1], push[2], t % JOINED_ROWS);
+    each_of_group(p.s.push, first_push[0], first_push[1], JOINED_ROWS, [&](const int32_t *push, int32_t k) {
+        joined_push_right(&p, push[0], push[1], push[2], k);
     });
     __syncthreads();
 }
@@ -129,12 +136,11 @@ static __device__ __forceinline__ void forward_level(const joined_view &p, int32
 static __device__ __forceinline__ void backward_level(const joined_view &p, int32_t level)
 {
     const int32_t first = p.s.first_of_level[level] * JOINED_ROWS, end = p.s.first_of_level[level + 1] * JOINED_ROWS,
-                  first_pull = p.s.first_pull[level], end_pull = p.s.first_pull[level + 1];
+                  *first_pull = p.s.first_pull + level;
     each(end - first, [&](int32_t k) { joined_find_backward(&p, first + k); });
     __syncthreads();
-    each((end_pull - first_pull) * JOINED_ROWS, [&](int32_t t) {
-        const int32_t *pull = p.s.pull + 3 * (first_pull + t / JOINED_ROWS);
-        joined_pull_right(&p, pull[0], pull[1], pull[2], t % JOINED_ROWS);
+    each_of_group(p.s.pull, first_pull[0], first_pull[1], JOINED_ROWS, [&](const int32_t *pull, int32_t k) {
+        joined_pull_right(&p, pull[0], pull[1], pull[2], k);
     });
     __syncthreads();
 }

@@ -127,9 +127,12 @@ static __device__ __forceinline__ void each_contact(const cuda_view &v, const jo
     }
 }
 
-/* Does a contact touch the part? By the layout's lists. touched: 0 before. */
-static __device__ __forceinline__ bool is_touched(const cuda_view &v, const joined_view &p, int32_t *touched)
+/* Does a contact touch the part? touched: 0 before. */
+template <bool SMALL>
+static __device__ __forceinline__ bool is_touched(const cuda_view &v, const joined_view &p,
+                                                  const struct joined_sides *sides, int32_t *touched)
 {
+    if (SMALL) return sides->count > 0;
     each(p.s.bodies, [&](int32_t e) {
         const int32_t slot = v.graph.slot_of[p.s.body[e]], first = v.graph.offsets[slot];
         if (first < v.graph.offsets[slot + 1] && v.graph.incident[first] / 2 < v.contacts.pair_capacity)

@@ -11,30 +11,33 @@
 #include "core/solve/joined_order.h"
 #include "world.h"
 
-/* In BUFFER_JOINED, for so many bodies, constraints and parts, in this order: doubles first. */
+/* In BUFFER_JOINED, in this order: what the host gives; then what is the device's own, in doubles. */
 struct joined_memory {
-    struct cuda_joined_body *bodies;
-    double *work;
     struct cuda_joined_part *parts;
     struct cuda_joined_range *ranges;
     int32_t *is_direct, *entry, *kept, *structures;
     uint8_t *kept_state; /* rows */
+    size_t given;        /* bytes until here */
+    struct cuda_joined_body *bodies;
+    double *work;
     size_t bytes;
 };
 
 static struct joined_memory memory_at(char *at, const struct cuda_step *s)
 {
+    const size_t rows = (size_t)s->joint_constraints * SADMM_MAX_ROWS;
     struct joined_memory m;
-    m.bodies = (struct cuda_joined_body *)at;
-    m.work = (double *)(m.bodies + s->bodies);
-    m.parts = (struct cuda_joined_part *)(m.work + s->joined_work);
+    m.parts = (struct cuda_joined_part *)at;
     m.ranges = (struct cuda_joined_range *)(m.parts + s->joined_parts);
     m.is_direct = (int32_t *)(m.ranges + s->joined_parts);
     m.entry = m.is_direct + s->bodies + s->joint_constraints;
     m.kept = m.entry + s->bodies;
     m.structures = m.kept + s->joined_parts;
     m.kept_state = (uint8_t *)(m.structures + s->joined_numbers);
-    m.bytes = (size_t)((char *)(m.kept_state + (size_t)s->joint_constraints * SADMM_MAX_ROWS) - at);
+    m.given = ((size_t)((char *)(m.kept_state + rows) - at) + sizeof(double) - 1) / sizeof(double) * sizeof(double);
+    m.bodies = (struct cuda_joined_body *)(at + m.given);
+    m.work = (double *)(m.bodies + s->bodies);
+    m.bytes = (size_t)((char *)(m.work + s->joined_work) - at);
     return m;
 }
 
@@ -71,7 +74,7 @@ static void measure(struct sadmm_context *c, const struct sadmm_joined_order *or
     s->joined_bytes = most + CUDA(joined_shared_size)() <= (size_t)c->shared_limit ? most : 0;
 }
 
-/* The host's copy of what is there but for work. */
+/* What the host gives. */
 static void fill(const struct cuda_step *s, const struct sadmm_joined_order *order, const struct joined_memory *m)
 {
     size_t work = 0;
@@ -96,13 +99,13 @@ static sadmm_status load_order(struct sadmm_context *c, const struct sadmm_joine
 {
     struct cuda_step *s = c->step;
     measure(c, order);
-    const size_t bytes = memory_at(nullptr, s).bytes;
-    TRY(CUDA(reserve)(c, BUFFER_JOINED, bytes, error));
-    char *host = (char *)sadmm_alloc(bytes, 1);
+    const struct joined_memory size = memory_at(nullptr, s);
+    TRY(CUDA(reserve)(c, BUFFER_JOINED, size.bytes, error));
+    char *host = (char *)sadmm_alloc(size.given, 1);
     if (!host) return sadmm_fail_memory(error, "the cuda backend's joined bodies");
     const struct joined_memory m = memory_at(host, s);
     fill(s, order, &m);
-    const sadmm_status status = CUDA(put)(c, buffer<char>(c, BUFFER_JOINED), host, bytes, error);
+    const sadmm_status status = CUDA(put)(c, buffer<char>(c, BUFFER_JOINED), host, size.given, error);
     sadmm_free(host);
     return status;
 }

@@ -253,7 +253,8 @@ static __global__ void commit_kernel(const __grid_constant__ cuda_view v, const 
     const int32_t i = (int32_t)(blockIdx.x * (unsigned)STEP_THREADS + threadIdx.x);
     wait_for_stream();
     /* Blocks that begin late may see what the first one says of the step: only where what they move is of no use. */
-    const bool on = !aborted && planned, again = on && moves_again(v), joined = on && v.joints.count > 0 && !v.joints.apart;
+    const bool on = !aborted && planned, again = on && moves_again(v),
+               joined = on && v.joints.count > 0 && !v.joints.apart;
     if ((again || joined) && i < v.model.bodies) move_once_more(v, i, again, joined);
     if (joined) end_joints(v, i);
     if (blockIdx.x > 0 || threadIdx.x > 0) return;

@@ -48,7 +48,8 @@ struct cuda_step {
 
     bool all_joined;            /* every constraint is of one */
     bool apart;                 /* they are planned to be solved beside the rest (cuda_step_guess) */
-    int32_t untouched, patience; /* steps that could have been so since one could not; that it takes for it to be tried */
+    int32_t untouched,
+        patience; /* steps that could have been so since one could not; that it takes for it to be tried */
 
     bool planned;               /* capacities, partition and guess are for the world as it is */
     bool recorded;              /* and so are the graphs */

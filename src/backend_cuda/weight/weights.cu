@@ -128,8 +128,8 @@ cuda_args CUDA(weight_args)(const struct sadmm_context *c)
 sadmm_status CUDA(enqueue_row_responses)(struct sadmm_context *c, struct sadmm_error *error)
 {
     const cuda_args args = {};
-    return CUDA(launch)(c, respond_rows_kernel, "responses of rows", blocks_for((int64_t)c->view.rows.count * SADMM_MAX_ROWS),
-                        &args, error);
+    return CUDA(launch)(c, respond_rows_kernel, "responses of rows",
+                        blocks_for((int64_t)c->view.rows.count * SADMM_MAX_ROWS), &args, error);
 }
 
 sadmm_status CUDA(enqueue_islands)(struct sadmm_context *c, struct sadmm_error *error)

@@ -13,6 +13,7 @@
 #define SADMM_CORE_MODEL_JOINED_H
 
 #include "core/base/contact_set.h"
+#include "core/math/ldl6.h"
 #include "core/math/rigid.h"
 #include "rows.h"
 
@@ -25,8 +26,8 @@ enum { JOINED_ROWS = SADMM_MAX_ROWS, JOINED_BLOCK = JOINED_ROWS * JOINED_ROWS };
  * bricard: to 1e6 N where 30 are at work) until they hold the loop. */
 #define JOINED_GIVE 1e-9
 /* Rows that come to a bound, or leave one, are found in so many passes at most; one or two do mostly, and 9 in all but
- * 16 of 14,500 solves of ragdolls that fall on each other. A row that is held against its law by less than a rounding of
- * its numbers and JOINED_SLACK, m/s or rad/s, stays where it is, or rounding would have rows come and go for good. */
+ * 16 of 14,500 solves of ragdolls that fall on each other. A row that is held against its law by less than a rounding
+ * of its numbers and JOINED_SLACK, m/s or rad/s, stays where it is, or rounding would have rows come and go for good. */
 enum { JOINED_PASSES = 16 };
 #define JOINED_SLACK 1e-9
 
@@ -155,81 +156,6 @@ SADMM_INLINE struct joined_view joined_view_at(const struct joined_structure *s,
     return v;
 }
 
-/* Of six numbers each, x_stride and y_stride apart; in pairs, for sums wait for each other. */
-SADMM_INLINE double joined_strided_product(const double *x, int x_stride, const double *y, int y_stride)
-{
-    return (x[0] * y[0] + x[x_stride] * y[y_stride]) +
-           (x[2 * x_stride] * y[2 * y_stride] + x[3 * x_stride] * y[3 * y_stride]) +
-           (x[4 * x_stride] * y[4 * y_stride] + x[5 * x_stride] * y[5 * y_stride]);
-}
-SADMM_INLINE double joined_product(const double *x, const double *y) { return joined_strided_product(x, 1, y, 1); }
-
-/* ---- six by six -------------------------------------------------------------------------------------------------- */
-
-/* L D L^T of a symmetric matrix S, of which the lower half is read: below the diagonal the unit L, on it D^-1. A pivot
- * that is lost to rounding: the row says what others say, and its solution is 0. In registers, without roots: what waits
- * for memory and for quotients waits longest here. */
-SADMM_INLINE void joined_factor(const double S[36], double to[36])
-{
-    double L[6][6];
-    int r, c, k;
-    SADMM_UNROLL
-    for (r = 0; r < 6; ++r) {
-        SADMM_UNROLL
-        for (k = 0; k <= r; ++k) L[r][k] = S[6 * r + k];
-    }
-    SADMM_UNROLL
-    for (k = 0; k < 6; ++k) {
-        const double inverse = L[k][k] > 0 ? 1 / L[k][k] : 0;
-        to[7 * k] = inverse;
-        SADMM_UNROLL
-        for (r = k + 1; r < 6; ++r) {
-            const double share = L[r][k] * inverse;
-            to[6 * r + k] = share;
-            SADMM_UNROLL
-            for (c = k + 1; c <= r; ++c) L[r][c] -= share * L[c][k];
-        }
-    }
-}
-
-/* L^-1 x, D^-1 x, L^-T x in place; x = A^-1 b by all of them. */
-SADMM_INLINE void joined_forward(const double L[36], double x[6])
-{
-    int r, i;
-    SADMM_UNROLL
-    for (r = 0; r < 6; ++r) {
-        SADMM_UNROLL
-        for (i = 0; i < r; ++i) x[r] -= L[6 * r + i] * x[i];
-    }
-}
-SADMM_INLINE void joined_scale(const double L[36], double x[6])
-{
-    int k;
-    SADMM_UNROLL
-    for (k = 0; k < 6; ++k) x[k] *= L[7 * k];
-}
-SADMM_INLINE void joined_backward(const double L[36], double x[6])
-{
-    int r, i;
-    SADMM_UNROLL
-    for (r = 5; r >= 0; --r) {
-        SADMM_UNROLL
-        for (i = 5; i > r; --i) x[r] -= L[6 * i + r] * x[i];
-    }
-}
-SADMM_INLINE void joined_solve(const double L[36], const double b[6], double x[6])
-{
-    double y[6];
-    int k;
-    SADMM_UNROLL
-    for (k = 0; k < 6; ++k) y[k] = b[k];
-    joined_forward(L, y);
-    joined_scale(L, y);
-    joined_backward(L, y);
-    SADMM_UNROLL
-    for (k = 0; k < 6; ++k) x[k] = y[k];
-}
-
 /* ---- bodies ------------------------------------------------------------------------------------------------------ */
 
 /* Component k of the (force, torque) that a contact presses its body on `side` with; f: its impulse. */
@@ -245,7 +171,7 @@ SADMM_INLINE double joined_row_load(const struct joined_view *v, int32_t around,
 {
     enum { STRIDE = sizeof(struct joined_row) / sizeof(double) };
     const struct joined_row *first = &v->rows[JOINED_ROWS * (around / 2)];
-    return joined_strided_product(&first->lambda, STRIDE, first->jacobian[around % 2] + k, STRIDE);
+    return six_strided_product(&first->lambda, STRIDE, first->jacobian[around % 2] + k, STRIDE);
 }
 
 /* Twice the energy of the impulses on a body, for the speed that they change its part by (V of math/weight.h). */
@@ -277,7 +203,7 @@ SADMM_INLINE double joined_contact_weight(double load, int32_t count, double spe
 /* Component k of b - A v + J^T lambda, before A becomes A + C. */
 SADMM_INLINE double joined_missing(const struct joined_view *v, int32_t e, int k, double b, double impulse)
 {
-    return b + impulse - joined_product(v->factor + 36 * (size_t)e + 6 * k, v->velocity + 6 * (size_t)e);
+    return b + impulse - six_product(v->factor + 36 * (size_t)e + 6 * k, v->velocity + 6 * (size_t)e);
 }
 
 /* Component k: the free change, then what its rows change it by. */
@@ -287,7 +213,7 @@ SADMM_INLINE void joined_move(const struct joined_view *v, int32_t e, int k)
     int32_t at;
     for (at = v->s.first_around[e]; at < v->s.first_around[e + 1]; ++at) {
         const int32_t first = JOINED_ROWS * (v->s.around[at] / 2), side = v->s.around[at] % 2;
-        dv += joined_strided_product(v->change + first, 1, v->answer + 12 * (size_t)first + 6 * side + k, 12);
+        dv += six_strided_product(v->change + first, 1, v->answer + 12 * (size_t)first + 6 * side + k, 12);
     }
     v->dv[6 * (size_t)e + (size_t)k] = dv;
 }
@@ -307,7 +233,7 @@ SADMM_INLINE void joined_respond(const struct joined_view *v, int32_t r, int sid
     double *answer = v->answer + 12 * (size_t)r + 6 * (size_t)side;
     int k;
     if (body >= 0 && v->state[r] != JOINED_ABSENT)
-        joined_solve(v->factor + 36 * (size_t)body, v->rows[r].jacobian[side], answer);
+        ldl6_solve(v->factor + 36 * (size_t)body, v->rows[r].jacobian[side], answer);
     else
         for (k = 0; k < 6; ++k) answer[k] = 0;
 }
@@ -321,8 +247,8 @@ SADMM_INLINE double joined_residual(const struct joined_view *v, int32_t r, bool
     for (side = 0; side < 2; ++side) {
         const int32_t body = v->s.side[2 * (r / JOINED_ROWS) + side];
         if (body < 0) continue;
-        x += joined_product(row->jacobian[side], v->velocity + 6 * (size_t)body);
-        if (moved) x += joined_product(row->jacobian[side], v->dv + 6 * (size_t)body);
+        x += six_product(row->jacobian[side], v->velocity + 6 * (size_t)body);
+        if (moved) x += six_product(row->jacobian[side], v->dv + 6 * (size_t)body);
     }
     return row->gain * x + row->bias + v->give[r] * (row->lambda + v->change[r]);
 }
@@ -346,7 +272,7 @@ SADMM_INLINE void joined_begin_row(const struct joined_view *v, int32_t r, uint8
     double missing, response = 0;
     int side;
     for (side = 0; side < 2; ++side)
-        response += joined_product(row->jacobian[side], v->answer + 12 * (size_t)r + 6 * (size_t)side);
+        response += six_product(row->jacobian[side], v->answer + 12 * (size_t)r + 6 * (size_t)side);
     v->give[r] = sadmm_law_is_coupled(row->compliance, lo, hi) ? JOINED_GIVE * response : row->compliance;
     v->change[r] = joined_clamp(lambda, lo, hi) - lambda;
     if (row->gain == 0 || !(hi > lo)) {
@@ -428,8 +354,8 @@ SADMM_INLINE void joined_store_tile(double *node, int tile, const struct joined_
 }
 
 /* t += sign x y^T, six numbers a row of x and y, which are `x_stride` and `y_stride` apart. */
-SADMM_INLINE void joined_add_products(struct joined_tile *t, double sign, const double *x, int x_stride, const double *y,
-                                      int y_stride)
+SADMM_INLINE void joined_add_products(struct joined_tile *t, double sign, const double *x, int x_stride,
+                                      const double *y, int y_stride)
 {
     double own[TILE_ROWS][6], other[TILE_COLUMNS][6];
     int k, q, i;
@@ -444,7 +370,7 @@ SADMM_INLINE void joined_add_products(struct joined_tile *t, double sign, const 
     for (k = 0; k < TILE_ROWS; ++k) {
         SADMM_UNROLL
         for (q = 0; q < TILE_COLUMNS; ++q) {
-            t->entry[k][q] += sign * joined_product(own[k], other[q]);
+            t->entry[k][q] += sign * six_product(own[k], other[q]);
         }
     }
 }
@@ -478,7 +404,8 @@ SADMM_INLINE struct joined_tile joined_enter(const struct joined_view *v, int32_
 enum { JOINED_OWN = 1 << 0 | 1 << 3 }; /* what a place has in common with itself: either side */
 
 /* What updates `first` to `end` take from a tile of their node: L_u D L_w^T. */
-SADMM_INLINE void joined_update(const struct joined_view *v, int32_t first, int32_t end, int tile, struct joined_tile *t)
+SADMM_INLINE void joined_update(const struct joined_view *v, int32_t first, int32_t end, int tile,
+                                struct joined_tile *t)
 {
     int32_t at;
     for (at = first; at < end; ++at)
@@ -498,10 +425,10 @@ SADMM_INLINE void joined_finish_row(const struct joined_view *v, const double L[
     int q;
     SADMM_UNROLL
     for (q = 0; q < 6; ++q) x[q] = v->below[at + (size_t)q];
-    joined_forward(L, x);
+    ldl6_forward(L, x);
     SADMM_UNROLL
     for (q = 0; q < 6; ++q) v->below[at + (size_t)q] = x[q];
-    joined_scale(L, x);
+    ldl6_scale(L, x);
     SADMM_UNROLL
     for (q = 0; q < 6; ++q) v->share[at + (size_t)q] = x[q];
 }
@@ -513,7 +440,7 @@ SADMM_INLINE void joined_invert_row(const struct joined_view *v, const double L[
     int q;
     SADMM_UNROLL
     for (q = 0; q < 6; ++q) x[q] = q == k ? 1 : 0;
-    joined_forward(L, x);
+    ldl6_forward(L, x);
     SADMM_UNROLL
     for (q = 0; q < 6; ++q) {
         row[q] = x[q];
@@ -533,14 +460,14 @@ SADMM_INLINE double joined_right(const struct joined_view *v, int32_t r)
 SADMM_INLINE void joined_find_forward(const struct joined_view *v, int32_t r)
 {
     const size_t place = (size_t)(r / JOINED_ROWS);
-    v->found[r] = joined_strided_product(v->inverse + JOINED_BLOCK * place + r % JOINED_ROWS, JOINED_ROWS,
+    v->found[r] = six_strided_product(v->inverse + JOINED_BLOCK * place + r % JOINED_ROWS, JOINED_ROWS,
                                          v->right + JOINED_ROWS * place, 1);
 }
 SADMM_INLINE void joined_turn(const struct joined_view *v, int32_t r) { v->right[r] = v->found[r] * v->pivot[r]; }
 SADMM_INLINE void joined_find_backward(const struct joined_view *v, int32_t r)
 {
     const size_t place = (size_t)(r / JOINED_ROWS);
-    v->found[r] = joined_product(v->inverse + JOINED_BLOCK * place + JOINED_ROWS * (r % JOINED_ROWS),
+    v->found[r] = six_product(v->inverse + JOINED_BLOCK * place + JOINED_ROWS * (r % JOINED_ROWS),
                                  v->right + JOINED_ROWS * place);
 }
 
@@ -551,7 +478,7 @@ SADMM_INLINE void joined_push_right(const struct joined_view *v, int32_t place, 
     int32_t at;
     for (at = first; at < end; ++at) {
         const int32_t b = v->s.update[2 * at];
-        *own -= joined_product(v->share + JOINED_BLOCK * (size_t)b + JOINED_ROWS * k,
+        *own -= six_product(v->share + JOINED_BLOCK * (size_t)b + JOINED_ROWS * k,
                                v->found + JOINED_ROWS * (size_t)v->s.column[b]);
     }
 }
@@ -562,7 +489,7 @@ SADMM_INLINE void joined_pull_right(const struct joined_view *v, int32_t place, 
     double *own = v->right + JOINED_ROWS * (size_t)place + k;
     int32_t b;
     for (b = end - 1; b >= first; --b)
-        *own -= joined_strided_product(v->share + JOINED_BLOCK * (size_t)b + k, JOINED_ROWS,
+        *own -= six_strided_product(v->share + JOINED_BLOCK * (size_t)b + k, JOINED_ROWS,
                                        v->found + JOINED_ROWS * (size_t)v->s.row[b], 1);
 }
 

@@ -10,7 +10,8 @@
 /* A part, and what is known of it from call to call. */
 struct part {
     struct joined_view view; /* arrays in `work` */
-    int32_t first_body;      /* its bodies are so many further on in lists of all parts' bodies */
+    double *impulse;         /* bodies x 6, in lists of all parts: J^T lambda; */
+    double *kept_velocity;   /* that before the iterations */
     double speed;            /* that its impulses change it by; 0: it is not solved */
     bool touched;            /* by a contact */
     bool kept;               /* solved before the iterations: */
@@ -25,7 +26,7 @@ struct sadmm_joined {
     struct part *parts;
     int32_t *part, *entry;  /* bodies: the part, -1: not joined; number in it */
     double *work;           /* of all views */
-    double *impulse;        /* joined bodies x 6: J^T lambda */
+    double *impulse;        /* joined bodies x 6 */
     bool kept;              /* velocities and multipliers from before the iterations are in: */
     double *kept_velocity, *kept_lambda; /* joined bodies x 6; rows */
     uint8_t *kept_states;                /* places x JOINED_ROWS of all parts */
@@ -91,7 +92,8 @@ static bool make_parts(struct sadmm_joined *j, size_t bodies)
     work = joined = places = 0;
     for (int32_t k = 0; k < j->order.parts; ++k) {
         const struct joined_structure s = sadmm_joined_part(&j->order, k);
-        j->parts[k] = (struct part){.view = joined_view_at(&s, j->work + work), .first_body = (int32_t)joined,
+        j->parts[k] = (struct part){.view = joined_view_at(&s, j->work + work), .impulse = j->impulse + 6 * joined,
+                                    .kept_velocity = j->kept_velocity + 6 * joined,
                                     .kept_state = j->kept_states + JOINED_ROWS * places};
         for (int32_t e = 0; e < s.bodies; ++e) {
             j->part[s.body[e]] = k;
@@ -131,9 +133,8 @@ static bool find_order(const struct solving *s)
 
 /* ---- what there is ----------------------------------------------------------------------------------------------- */
 
-/* What is done with a side of a pair at a joined body: number `entry` of its part. impulse: on that body. */
-typedef void on_side(struct part *, const struct sadmm_contact_point *, int32_t count, int side, int32_t entry,
-                     double *impulse);
+/* What is done with a side of a pair at a joined body, number `entry` of its part. */
+typedef void on_side(struct part *, const struct sadmm_contact_point *, int32_t count, int side, size_t entry);
 
 static void each_contact(const struct solving *s, on_side *f)
 {
@@ -144,43 +145,46 @@ static void each_contact(const struct solving *s, on_side *f)
         for (int side = 0; side < 2; ++side) {
             const int32_t body = side ? pair->body_b : pair->body_a;
             if (body < 0 || j->part[body] < 0) continue;
-            struct part *part = &j->parts[j->part[body]];
-            f(part, &contacts->points[pair->first], pair->count, side, j->entry[body],
-              j->impulse + 6 * (size_t)(part->first_body + j->entry[body]));
+            f(&j->parts[j->part[body]], &contacts->points[pair->first], pair->count, side, (size_t)j->entry[body]);
         }
     }
 }
 
-static void add_impulse(struct part *part, const struct sadmm_contact_point *points, int32_t count, int side,
-                        int32_t entry, double *impulse)
+static const double *arm_of(const struct sadmm_contact_point *point, int side)
 {
-    (void)entry;
+    return side ? point->arm_b : point->arm_a;
+}
+
+static void add_impulse(struct part *part, const struct sadmm_contact_point *points, int32_t count, int side,
+                        size_t entry)
+{
     part->touched = true;
     for (int32_t p = 0; p < count; ++p)
-        for (int k = 0; k < 6; ++k) impulse[k] += joined_point_load(side ? points[p].arm_b : points[p].arm_a, points[p].impulse, side, k);
+        for (size_t k = 0; k < 6; ++k)
+            part->impulse[6 * entry + k] +=
+                joined_point_load(arm_of(&points[p], side), points[p].impulse, side, (int)k);
 }
 
 /* C, to A where the part is solved. */
 static void add_weight(struct part *part, const struct sadmm_contact_point *points, int32_t count, int side,
-                       int32_t entry, double *impulse)
+                       size_t entry)
 {
-    (void)impulse;
-    double *A = part->view.factor + 36 * (size_t)entry, load = 0;
+    double *A = part->view.factor + 36 * entry, load = 0;
     for (int32_t p = 0; p < count; ++p) load += v3_norm(v3_load(points[p].impulse));
     const double B = joined_contact_weight(load, count, part->speed);
     for (int32_t p = 0; B > 0 && p < count; ++p)
         for (int k = 0; k < 6; ++k)
             for (int q = 0; q <= k; ++q)
-                A[6 * k + q] += B * joined_point_entry(side ? points[p].arm_b : points[p].arm_a, k, q);
+                A[6 * k + q] += B * joined_point_entry(arm_of(&points[p], side), k, q);
 }
 
 static void find_impulses(const struct solving *s)
 {
     struct sadmm_joined *j = s->j;
     for (int32_t k = 0; k < j->order.parts; ++k) {
-        j->parts[k].touched = false;
-        memset(j->impulse + 6 * (size_t)j->parts[k].first_body, 0,
-               6 * (size_t)j->parts[k].view.s.bodies * sizeof *j->impulse);
+        struct part *part = &j->parts[k];
+        part->touched = false;
+        memset(part->impulse, 0, 6 * (size_t)part->view.s.bodies * sizeof *part->impulse);
     }
     each_contact(s, add_impulse);
 }
@@ -214,7 +218,7 @@ static void load_part(const struct solving *s, struct part *part)
     }
     for (int32_t e = 0; e < v->s.bodies; ++e) {
         const size_t i = (size_t)v->s.body[e];
-        double *A = v->factor + 36 * (size_t)e, *impulse = s->j->impulse + 6 * (size_t)(part->first_body + e), b[6];
+        double *A = v->factor + 36 * (size_t)e, *impulse = part->impulse + 6 * (size_t)e, b[6];
         memcpy(v->velocity + 6 * (size_t)e, s->system->velocity + 6 * i, 6 * sizeof *v->velocity);
         for (int32_t at = v->s.first_around[e]; at < v->s.first_around[e + 1]; ++at)
             for (int k = 0; k < 6; ++k) impulse[k] += joined_row_load(v, v->s.around[at], k);
@@ -245,7 +249,8 @@ static bool change_rows(const struct joined_view *v)
 }
 
 /* A node with all that is taken from it. */
-static void make_node(const struct joined_view *v, int32_t node, int32_t row, int32_t column, int32_t common, double *to)
+static void make_node(const struct joined_view *v, int32_t node, int32_t row, int32_t column, int32_t common,
+                      double *to)
 {
     for (int tile = 0; tile < JOINED_TILES; ++tile) {
         if (row == column && joined_tile_is_above(tile)) continue;
@@ -260,7 +265,7 @@ static void factorize(const struct joined_view *v)
     for (int32_t p = 0; p < v->s.places; ++p) {
         double *diagonal = v->diagonal + JOINED_BLOCK * (size_t)p, L[JOINED_BLOCK];
         make_node(v, p, p, p, JOINED_OWN, diagonal);
-        joined_factor(diagonal, L);
+        ldl6_factor(diagonal, L);
         for (int k = 0; k < JOINED_ROWS; ++k) joined_invert_row(v, L, p, k);
         for (int32_t b = v->s.first_below[p]; b < v->s.first_below[p + 1]; ++b) {
             make_node(v, v->s.places + b, v->s.row[b], p, v->s.common[b], v->below + JOINED_BLOCK * (size_t)b);
@@ -314,8 +319,8 @@ static bool solve_part(const struct solving *s, const struct part *part, const u
     const struct joined_view *v = &part->view;
     bool solved = false;
     for (int32_t e = 0; e < v->s.bodies; ++e) {
-        joined_factor(v->factor + 36 * (size_t)e, v->factor + 36 * (size_t)e);
-        joined_solve(v->factor + 36 * (size_t)e, v->missing + 6 * (size_t)e, v->missing + 6 * (size_t)e);
+        ldl6_factor(v->factor + 36 * (size_t)e, v->factor + 36 * (size_t)e);
+        ldl6_solve(v->factor + 36 * (size_t)e, v->missing + 6 * (size_t)e, v->missing + 6 * (size_t)e);
     }
     begin_rows(v, earlier);
     for (int pass = 0; pass < JOINED_PASSES && !solved; ++pass) {
@@ -325,7 +330,8 @@ static bool solve_part(const struct solving *s, const struct part *part, const u
     }
     if (!solved || !is_finite(v)) return false;
     for (int32_t e = 0; e < v->s.bodies; ++e)
-        for (int k = 0; k < 6; ++k) s->system->velocity[6 * v->s.body[e] + k] = v->velocity[6 * e + k] + v->dv[6 * e + k];
+        for (int k = 0; k < 6; ++k)
+            s->system->velocity[6 * v->s.body[e] + k] = v->velocity[6 * e + k] + v->dv[6 * e + k];
     EACH_ROW(s, v, r, from) s->system->rows->lambda[from] = joined_bounded(v, r);
     return true;
 }
@@ -346,8 +352,7 @@ static void keep_part(const struct solving *s, struct part *part, bool solved)
     part->kept = solved;
     memcpy(part->kept_state, v->state, (size_t)(JOINED_ROWS * v->s.places));
     for (int32_t e = 0; e < v->s.bodies; ++e)
-        memcpy(s->j->kept_velocity + 6 * (size_t)(part->first_body + e), s->system->velocity + 6 * v->s.body[e],
-               6 * sizeof(double));
+        memcpy(part->kept_velocity + 6 * e, s->system->velocity + 6 * v->s.body[e], 6 * sizeof(double));
     EACH_ROW(s, v, r, from) s->j->kept_lambda[from] = s->system->rows->lambda[from];
 }
 
@@ -355,8 +360,7 @@ static void take_kept(const struct solving *s, const struct part *part)
 {
     const struct joined_view *v = &part->view;
     for (int32_t e = 0; e < v->s.bodies; ++e)
-        memcpy(s->system->velocity + 6 * v->s.body[e], s->j->kept_velocity + 6 * (size_t)(part->first_body + e),
-               6 * sizeof(double));
+        memcpy(s->system->velocity + 6 * v->s.body[e], part->kept_velocity + 6 * e, 6 * sizeof(double));
     EACH_ROW(s, v, r, from) s->system->rows->lambda[from] = s->j->kept_lambda[from];
 }
 

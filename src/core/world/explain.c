@@ -30,8 +30,8 @@ static void explain_constraints(struct text *t, const struct sadmm_plan *plan, i
     else
         line(t, "contacts     left out: nothing touches\n");
     if (plan->row_constraints)
-        line(t, "rows         %d constraints of %d joints and %d couplings%s\n", plan->row_constraints, joints, couplings,
-             plan->rows_apart ? ", apart: nothing touches their bodies" : "");
+        line(t, "rows         %d constraints of %d joints and %d couplings%s\n", plan->row_constraints, joints,
+             couplings, plan->rows_apart ? ", apart: nothing touches their bodies" : "");
     else line(t, "rows         left out: there are none\n");
 }
 
