@@ -312,9 +312,9 @@ START_TEST(constraints_left_out_are_in_no_part)
     enum { SPOKES = 65, CHAIN = 9, CONSTRAINTS = SPOKES + CHAIN };
     int32_t bodies[2 * CONSTRAINTS];
     struct sadmm_joined_order order = {0};
-    for (int32_t k = 0; k < CONSTRAINTS; ++k) {
-        bodies[2 * k] = k < SPOKES ? 0 : k;
-        bodies[2 * k + 1] = k + 1;
+    for (int32_t k = 0; k < CONSTRAINTS; ++k) { /* the chain's last one is at the last spoke */
+        bodies[2 * k] = k < SPOKES ? 0 : SPOKES + CONSTRAINTS - k;
+        bodies[2 * k + 1] = k < SPOKES ? k + 1 : bodies[2 * k] - 1;
     }
     ck_assert(sadmm_joined_order_make(&order, bodies, CONSTRAINTS, CONSTRAINTS + 1, 64));
     ck_assert_int_eq(order.parts, 1);
