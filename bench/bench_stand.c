@@ -68,7 +68,8 @@ static sadmm_status remember(struct stand *s)
         sadmm_shape_def shape;
         TRY(check(s, sadmm_world_shape_at(s->world, i, &id)));
         TRY(check(s, sadmm_world_shape_def(s->world, id, &shape, NULL)));
-        for (int k = 0; k < (shape.type == SADMM_SHAPE_BOX ? 3 : 1) && shape.type != SADMM_SHAPE_PLANE; ++k)
+        const bool by_extents = shape.type == SADMM_SHAPE_BOX || shape.type == SADMM_SHAPE_HULL;
+        for (int k = 0; k < (by_extents ? 3 : 1) && shape.type != SADMM_SHAPE_PLANE; ++k)
             s->size = fmin(s->size, 2 * shape.size[k]);
     }
     return SADMM_OK;

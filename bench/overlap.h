@@ -20,7 +20,7 @@ struct solid {
     bool fixed;             /* nor do two of bodies that nothing moves */
 };
 
-/* The solid of a shape, at the origin of the world. */
+/* The solid of a shape, at the origin of the world. Not of hulls. */
 struct solid solid_of_shape(const sadmm_shape_def *shape);
 /* To a place in the world: the solid's frame at `position`, turned by the quaternion w x y z. */
 void solid_place(struct solid *solid, const double position[3], const double orientation[4]);

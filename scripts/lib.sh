@@ -6,7 +6,7 @@ project=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 jobs=${JOBS:-$(nproc)}
 
 # Debian's and Ubuntu's names. "package=command": having the command is enough.
-packages_to_run=(gcc=cc 'g++=c++' meson=meson ninja-build=ninja pkgconf=pkg-config libfcl-dev libjansson-dev)
+packages_to_run=(gcc=cc 'g++=c++' meson=meson ninja-build=ninja pkgconf=pkg-config libfcl-dev libqhull-dev libjansson-dev)
 packages_to_test=("${packages_to_run[@]}" git=git libhdf5-dev check clang=clang libclang-rt-dev libomp-dev util-linux=setarch)
 # Used where the release offers it.
 packages_to_test_if_offered=(libsiconos-numerics-dev)

@@ -58,7 +58,7 @@ install_packages "${packages_to_test[@]}"
 install_packages_if_offered "${packages_to_test_if_offered[@]}"
 
 # Features are demanded, not hoped for: a missing package must not pass for a shorter suite.
-features=(-Dwerror=true -Dfcl=enabled -Dopenmp=enabled -Dhdf5=enabled -Dcli=enabled -Dbench=enabled -Dtests=enabled)
+features=(-Dwerror=true -Dfcl=enabled -Dqhull=enabled -Dopenmp=enabled -Dhdf5=enabled -Dcli=enabled -Dbench=enabled -Dtests=enabled)
 package_installed libsiconos-numerics-dev && features+=(-Dsiconos=enabled)
 
 logs=()        # testlog.json of each step that ran
@@ -133,9 +133,9 @@ step_clang() {
 }
 
 step_minimal() {
-    say "minimal: by clang, no FCL, CUDA, HDF5 or OpenMP, no instruction set beyond the compiler's default"
-    CC=clang CXX=clang++ build minimal -Dwerror=true -Dtests=enabled -Dcli=enabled -Dbench=enabled -Dfcl=disabled -Dcuda=disabled \
-        -Dhdf5=disabled -Dopenmp=disabled -Dsiconos=disabled -Dcpu_isas=baseline -Demulated_cuda=disabled || return 1
+    say "minimal: by clang, no FCL, qhull, CUDA, HDF5 or OpenMP, no instruction set beyond the compiler's default"
+    CC=clang CXX=clang++ build minimal -Dwerror=true -Dtests=enabled -Dcli=enabled -Dbench=enabled -Dfcl=disabled -Dqhull=disabled \
+        -Dcuda=disabled -Dhdf5=disabled -Dopenmp=disabled -Dsiconos=disabled -Dcpu_isas=baseline -Demulated_cuda=disabled || return 1
     run_tests minimal --no-suite slow
 }
 

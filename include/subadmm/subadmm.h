@@ -4,7 +4,9 @@
 
 #include "coupling.h"
 #include "gear.h"
+#include "hull.h"
 #include "joint.h"
+#include "mass.h"
 #include "problem.h"
 #include "settings.h"
 #include "status.h"

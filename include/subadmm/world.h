@@ -21,6 +21,7 @@
 #ifndef SUBADMM_WORLD_H
 #define SUBADMM_WORLD_H
 
+#include "hull.h"
 #include "problem.h"
 
 #ifdef __cplusplus
@@ -188,6 +189,8 @@ typedef enum sadmm_shape_type {
     SADMM_SHAPE_SPHERE,    /* size[0] radius */
     SADMM_SHAPE_CAPSULE,   /* size[0] radius, size[1] half length of the segment along the shape's z */
     SADMM_SHAPE_BOX,       /* size: half extents */
+    SADMM_SHAPE_HULL,      /* convex hull (hull.h) in the frame of its points. size ignored; read back: the half extents
+                              of the box that contacts are found with, in m */
     SADMM_SHAPE_TYPE_COUNT
 } sadmm_shape_type;
 
@@ -199,6 +202,9 @@ typedef struct sadmm_shape_def {
     double friction;             /* mu >= 0, <= 1e6; a pair uses the geometric mean; default 0.5 */
     double restitution;          /* in [0, 1]; a pair uses the larger; default 0 */
     uint32_t category, mask; /* two shapes meet if (a.category & b.mask) and (b.category & a.mask); default 1, all */
+    const sadmm_hull *hull;      /* of HULL; NULL, the default, for all others. The world keeps it while it has shapes
+                                    of it, so that the caller may destroy it at once. Read back: the same pointer, which
+                                    is the world's own then */
 } sadmm_shape_def;
 
 /* The defaults named above. Thread-safe. */

@@ -1,6 +1,7 @@
 /* subadmm scenes: the list, or one whole scene as JSON so that another program can rebuild it. */
 
 #include "cli.h"
+#include "core/base/memory.h"
 #include "scenes/scenes.h"
 #include "subadmm/coupling.h"
 #include "subadmm/gear.h"
@@ -68,10 +69,38 @@ static const char *const shape_names[SADMM_SHAPE_TYPE_COUNT] = {
     [SADMM_SHAPE_SPHERE] = "sphere",
     [SADMM_SHAPE_CAPSULE] = "capsule",
     [SADMM_SHAPE_BOX] = "box",
+    [SADMM_SHAPE_HULL] = "hull",
 };
 static const size_t shape_sizes[SADMM_SHAPE_TYPE_COUNT] = {
     [SADMM_SHAPE_PLANE] = 0, [SADMM_SHAPE_SPHERE] = 1, [SADMM_SHAPE_CAPSULE] = 2, [SADMM_SHAPE_BOX] = 3,
+    [SADMM_SHAPE_HULL] = 0,
 };
+
+/* The hulls of a scene's shapes, each once. */
+struct hulls {
+    json_t *vertices; /* of each: the points */
+    const sadmm_hull **list;
+    size_t count, capacity;
+};
+
+static json_t *vertices_json(const sadmm_hull *hull)
+{
+    json_t *array = json_array();
+    for (int32_t v = 0; v < sadmm_hull_vertex_count(hull); ++v)
+        json_array_append_new(array, cli_json_reals(sadmm_hull_vertices(hull) + 3 * v, 3));
+    return array;
+}
+
+/* The number of a hull in the list, or -1: out of memory. */
+static json_int_t hull_index(struct hulls *hulls, const sadmm_hull *hull)
+{
+    for (size_t k = hulls->count; k-- > 0;) /* the next shape mostly has the hull of the last one */
+        if (hulls->list[k] == hull) return (json_int_t)k;
+    if (!sadmm_grow(&hulls->list, &hulls->capacity, hulls->count, hulls->count + 1, sizeof *hulls->list)) return -1;
+    hulls->list[hulls->count] = hull;
+    json_array_append_new(hulls->vertices, vertices_json(hull));
+    return (json_int_t)hulls->count++;
+}
 
 static json_t *shape_json(const sadmm_shape_def *shape)
 {
@@ -135,7 +164,7 @@ static json_t *find_body(sadmm_world *world, json_t *bodies, sadmm_body_id wante
     return NULL;
 }
 
-static sadmm_status add_shapes(sadmm_world *world, json_t *bodies)
+static sadmm_status add_shapes(sadmm_world *world, json_t *bodies, struct hulls *hulls)
 {
     for (int32_t k = 0; k < sadmm_world_shape_count(world); ++k) {
         sadmm_shape_id id;
@@ -144,7 +173,12 @@ static sadmm_status add_shapes(sadmm_world *world, json_t *bodies)
         sadmm_status status = sadmm_world_shape_at(world, k, &id);
         if (status == SADMM_OK) status = sadmm_world_shape_def(world, id, &def, &body);
         if (status != SADMM_OK) return status;
-        json_array_append_new(json_object_get(find_body(world, bodies, body), "shapes"), shape_json(&def));
+        json_t *shape = shape_json(&def);
+        json_array_append_new(json_object_get(find_body(world, bodies, body), "shapes"), shape);
+        if (!def.hull) continue;
+        const json_int_t index = hull_index(hulls, def.hull);
+        if (index < 0) return sadmm_fail_memory(NULL, "the list of hulls");
+        json_object_set_new(shape, "hull", json_integer(index));
     }
     return SADMM_OK;
 }
@@ -301,12 +335,13 @@ static sadmm_status add_gears(sadmm_world *world, json_t *gears)
 /* What is on bodies and between them. */
 struct parts {
     json_t *bodies, *joints, *couplings, *gears;
+    struct hulls hulls;
 };
 
-static sadmm_status add_parts(sadmm_world *world, const struct parts *parts)
+static sadmm_status add_parts(sadmm_world *world, struct parts *parts)
 {
     sadmm_status status = add_bodies(world, parts->bodies);
-    if (status == SADMM_OK) status = add_shapes(world, parts->bodies);
+    if (status == SADMM_OK) status = add_shapes(world, parts->bodies, &parts->hulls);
     if (status == SADMM_OK) status = add_joints(world, parts->bodies, parts->joints);
     if (status == SADMM_OK) status = add_couplings(world, parts->bodies, parts->couplings);
     return status == SADMM_OK ? add_gears(world, parts->gears) : status;
@@ -317,7 +352,7 @@ static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, con
     static const char *const units =
         "SI; world frame; quaternions w x y z, body to world; inertia: principal moments in "
         "the body's frame; box: half extents; capsule: radius, half length along z; plane: "
-        "half-space z <= 0 of its frame";
+        "half-space z <= 0 of its frame; hull: around the vertices of an entry of hulls, in its frame";
     json_t *o = json_object();
     json_object_set_new(o, "scene", json_string(spec));
     json_object_set_new(o, "name", json_string(scene->info->name));
@@ -332,6 +367,7 @@ static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, con
     json_object_set_new(o, "friction_of_a_pair", json_string("geometric mean"));
     json_object_set_new(o, "settings", cli_json_settings(&scene->def.settings));
     json_object_set_new(o, "bodies", parts->bodies);
+    json_object_set_new(o, "hulls", parts->hulls.vertices);
     json_object_set_new(o, "joints", parts->joints);
     json_object_set_new(o, "couplings", parts->couplings);
     json_object_set_new(o, "gears", parts->gears);
@@ -356,7 +392,7 @@ static int show_scene(const char *spec, struct output *json)
         sadmm_world_destroy(world);
         return CLI_DONE;
     }
-    const struct parts parts = {json_array(), json_array(), json_array(), json_array()};
+    struct parts parts = {json_array(), json_array(), json_array(), json_array(), {.vertices = json_array()}};
     int code;
     if (add_parts(world, &parts) == SADMM_OK) {
         code = cli_write_json(scene_json(spec, &scene, &parts), json);
@@ -365,8 +401,10 @@ static int show_scene(const char *spec, struct output *json)
         json_decref(parts.joints);
         json_decref(parts.couplings);
         json_decref(parts.gears);
-        code = cli_error(CLI_FAILED, "%s", sadmm_world_message(world));
+        json_decref(parts.hulls.vertices);
+        code = cli_error(CLI_FAILED, "%s", sadmm_last_message());
     }
+    sadmm_free(parts.hulls.list);
     sadmm_world_destroy(world);
     return code;
 }

@@ -26,7 +26,10 @@ enum { SADMM_MOST_CHILDREN = 65535 }; /* the children of a pair are counted in 3
 struct sadmm_geometry {
     int32_t type;     /* sadmm_shape_type */
     int32_t children; /* in [1, SADMM_MOST_CHILDREN] */
-    double size[3];   /* m, as in sadmm_shape_def */
+    double size[3];   /* m, as in sadmm_shape_def; of HULL the half extents of the box around it, whose centre and axes
+                         are the shape's frame */
+    uint32_t hull;    /* of HULL: offset of its block in the input's `hulls` (hull_data.h) */
+    uint32_t reserved;
 };
 
 /* May a shape be of this geometry, on a body that moves or does not? Else INVALID_ARGUMENT; `name`: what the message
@@ -59,6 +62,9 @@ struct sadmm_collision_input {
     size_t shape_count;               /* slots, dead ones included */
     const struct sadmm_geometry *geometries; /* by handle */
     size_t geometry_count;
+    const double *hulls;              /* the pool (hull_data.h); NULL: no geometry is a HULL */
+    size_t hull_doubles;
+    uint32_t hull_revision;           /* changes whenever the pool does */
     const struct sadmm_collision_body *bodies; /* by world body slot */
     size_t body_count;
     double dt;                        /* of what contacts are found for: the step, or the sub-step */

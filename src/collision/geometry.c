@@ -3,6 +3,7 @@
 #include <stdio.h>
 
 #include "collision_table.h"
+#include "hull_data.h"
 
 sadmm_status sadmm_geometry_check(const struct sadmm_geometry *geometry, bool moves, const char *name,
                                   struct sadmm_error *error)
@@ -30,6 +31,11 @@ sadmm_status sadmm_collision_check_shape(const struct sadmm_collision_input *inp
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "shapes[%zu].geometry = %u: must be in [0, %zu)", slot,
                           shape->geometry, input->geometry_count);
     snprintf(name, sizeof name, "shapes[%zu]: ", slot);
-    return sadmm_geometry_check(&input->geometries[shape->geometry], sadmm_body_moves(input->bodies[shape->body].system_body), name,
-                                error);
+    const struct sadmm_geometry *geometry = &input->geometries[shape->geometry];
+    TRY(sadmm_geometry_check(geometry, sadmm_body_moves(input->bodies[shape->body].system_body), name, error));
+    const size_t hull_doubles = input->hulls ? input->hull_doubles : 0;
+    if (geometry->type == SADMM_SHAPE_HULL && (geometry->hull < HULL_FIRST_OWN || geometry->hull >= hull_doubles))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%shull = %u: must be in [%d, %zu), the pool of hulls",
+                          name, geometry->hull, HULL_FIRST_OWN, hull_doubles);
+    return SADMM_OK;
 }

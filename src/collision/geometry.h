@@ -14,6 +14,7 @@ SADMM_INLINE int geometry_sizes(int type)
     case SADMM_SHAPE_SPHERE: return 1;
     case SADMM_SHAPE_CAPSULE: return 2;
     case SADMM_SHAPE_BOX: return 3;
+    case SADMM_SHAPE_HULL: /* the box around it comes with the hull */
     case SADMM_SHAPE_PLANE:
     case SADMM_SHAPE_TYPE_COUNT: break;
     }
@@ -29,7 +30,8 @@ SADMM_INLINE double geometry_thickness(const struct sadmm_geometry *g)
     switch ((sadmm_shape_type)g->type) {
     case SADMM_SHAPE_SPHERE:
     case SADMM_SHAPE_CAPSULE: return 2 * g->size[0];
-    case SADMM_SHAPE_BOX: return 2 * smaller_of(g->size[0], smaller_of(g->size[1], g->size[2]));
+    case SADMM_SHAPE_BOX:
+    case SADMM_SHAPE_HULL: return 2 * smaller_of(g->size[0], smaller_of(g->size[1], g->size[2]));
     case SADMM_SHAPE_PLANE:
     case SADMM_SHAPE_TYPE_COUNT: break;
     }
@@ -42,7 +44,8 @@ SADMM_INLINE double geometry_radius(const struct sadmm_geometry *g)
     switch ((sadmm_shape_type)g->type) {
     case SADMM_SHAPE_SPHERE: return g->size[0];
     case SADMM_SHAPE_CAPSULE: return g->size[0] + g->size[1];
-    case SADMM_SHAPE_BOX: return sqrt(g->size[0] * g->size[0] + g->size[1] * g->size[1] + g->size[2] * g->size[2]);
+    case SADMM_SHAPE_BOX:
+    case SADMM_SHAPE_HULL: return sqrt(g->size[0] * g->size[0] + g->size[1] * g->size[1] + g->size[2] * g->size[2]);
     case SADMM_SHAPE_PLANE:
     case SADMM_SHAPE_TYPE_COUNT: break;
     }
@@ -62,6 +65,7 @@ SADMM_INLINE void geometry_extents(const struct sadmm_geometry *g, const double 
         for (k = 0; k < 3; ++k) extent[k] = size[0] + fabs(R[3 * k + 2]) * size[1];
         return;
     case SADMM_SHAPE_BOX:
+    case SADMM_SHAPE_HULL:
         for (k = 0; k < 3; ++k)
             extent[k] = fabs(R[3 * k]) * size[0] + fabs(R[3 * k + 1]) * size[1] + fabs(R[3 * k + 2]) * size[2];
         return;

@@ -16,8 +16,6 @@ enum { BOX_ROUND_MASK = 31 };
 /* Separation of the interval [lo, hi] from the slab |x| <= h on the positive and on the negative side. */
 SADMM_INLINE real slab_separation(real lo, real hi, real h, int negative) { return negative ? -hi - h : lo - h; }
 
-SADMM_INLINE vec3 v3_axis(int k, real s) { return v3(k == 0 ? s : 0, k == 1 ? s : 0, k == 2 ? s : 0); }
-
 SADMM_INLINE vec3 box_clamp(vec3 p, vec3 h)
 {
     return v3(real_clamp(p.x, -h.x, h.x), real_clamp(p.y, -h.y, h.y), real_clamp(p.z, -h.z, h.z));

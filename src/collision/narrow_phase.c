@@ -83,7 +83,7 @@ static bool find_children(struct narrow_phase *n, uint32_t a, uint32_t b)
     for (uint32_t child = 0; child < children; ++child) {
         const struct sadmm_contact_pair *before = find_before(n, ordered_key(a, b), child, pa, pb);
         const struct pair_start start = pair_start_of(pa, pb, input->margin, input->gravity, input->dt);
-        find_manifold(pa, pb, child, input->margin, input->gravity, input->dt, &start,
+        find_manifold(pa, pb, input->hulls, child, input->margin, input->gravity, input->dt, &start,
                       before ? contact_memory(before, pa, pb) : 0, &m);
         if (m.count == 0) continue;
         if (!has_capacity(n->out) && !add_capacity(n->out)) return false;

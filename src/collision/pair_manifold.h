@@ -8,6 +8,7 @@
 #include "manifold.h"
 #include "manifold_box.h"
 #include "manifold_box_round.h"
+#include "manifold_hull.h"
 #include "manifold_plane.h"
 #include "manifold_round.h"
 #include "proxy.h"
@@ -50,10 +51,10 @@ SADMM_INLINE struct pair_pose proxies_pose(const struct sadmm_proxy *a, const st
 }
 
 /* Of one child of the pair. The type of a is not above b's; m->count is 0 when the shapes are apart, and for types that
- * are not listed. */
+ * are not listed. hulls: the pool (hull_data.h); NULL: there are none. */
 SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
-                                uint32_t child, const struct pair_pose *pose, real limit, uint32_t cache,
-                                struct manifold *m)
+                                const double *hulls, uint32_t child, const struct pair_pose *pose, real limit,
+                                uint32_t cache, struct manifold *m)
 {
     const vec3 a = v3_load(shape_a->size), b = v3_load(shape_b->size);
     (void)child; /* no type has more than one piece */
@@ -89,9 +90,9 @@ SADMM_INLINE struct pair_start pair_start_of(const struct sadmm_proxy *a, const 
 
 /* The manifold of two shapes in a step: where they are halfway through it (midway.h), or where a pair that is faster
  * than that first touches (advance.h). What passes by is near, or no contact. start: pair_start_of the two. */
-SADMM_INLINE void find_manifold(const struct sadmm_proxy *a, const struct sadmm_proxy *b, uint32_t child, double margin,
-                                double gravity, double dt, const struct pair_start *start, uint32_t cache,
-                                struct manifold *m)
+SADMM_INLINE void find_manifold(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *hulls,
+                                uint32_t child, double margin, double gravity, double dt, const struct pair_start *start,
+                                uint32_t cache, struct manifold *m)
 {
     double ahead = start->ahead, limit = start->limit;
     struct pair_pose pose = start->pose;
@@ -99,8 +100,8 @@ SADMM_INLINE void find_manifold(const struct sadmm_proxy *a, const struct sadmm_
     bool moves_on = start->moves_on;
     for (;;) {
         const bool last = !moves_on;
-        pair_manifold(&a->geometry, &b->geometry, child, &pose, last ? (real)limit : SADMM_REAL_MAX, last ? cache : 0,
-                      m);
+        pair_manifold(&a->geometry, &b->geometry, hulls, child, &pose, last ? (real)limit : SADMM_REAL_MAX,
+                      last ? cache : 0, m);
         if (last) break;
         const struct pair_pose here = pose; /* pair_manifold's own stays in registers */
         moves_on = advance_pair(a, b, &here, m, dt, &state, &ahead);

@@ -139,7 +139,8 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
     const struct collision_step step = step_of(v);
     const uint32_t slot = is_there ? v.present[i] : 0; /* at once, not after what comes next */
     if (stops) return;
-    if (i == 0 && FOR != PLACE_AGAIN) *v.candidate_count = 0;
+    if (i == 0 && FOR != PLACE_AGAIN) v.candidate_count[0] = 0;
+    if (i == 0) v.candidate_count[1] = 0;
     if (!is_there) return;
     const struct sadmm_shape &shape = v.shapes[slot];
     const struct sadmm_collision_body &body = v.bodies[shape.body];

@@ -30,11 +30,13 @@ static sadmm_status upload_input(struct sadmm_cuda_collision *c, int name, const
     return SADMM_OK;
 }
 
-/* A slot's revision changes with everything that matters, its geometry included. */
+/* A slot's revision changes with everything that matters, its geometry included; where a hull lies in the pool may change
+ * without it. */
 static bool shapes_changed(const struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input)
 {
     const struct sadmm_shape *before = in<struct sadmm_shape>(c, PINNED_SHAPES);
-    if (c->input_bytes[0] != input->shape_count * sizeof *before) return true;
+    if (c->input_bytes[0] != input->shape_count * sizeof *before || c->hull_revision != input->hull_revision)
+        return true;
     for (size_t slot = 0; slot < input->shape_count; ++slot) {
         const struct sadmm_shape *now = &input->shapes[slot], *old = &before[slot];
         if (now->alive != old->alive || now->revision != old->revision || now->body != old->body)
@@ -138,7 +140,9 @@ sadmm_status COLLISION(take_input)(struct sadmm_cuda_collision *c, const struct 
                          error));
         TRY(upload_input(c, GEOMETRIES, input->geometries, input->geometry_count, sizeof *input->geometries, true,
                          error));
+        TRY(upload_input(c, HULLS, input->hulls, input->hull_doubles, sizeof *input->hulls, true, error));
         TRY(upload_input(c, SHAPES, input->shapes, input->shape_count, sizeof *input->shapes, true, error));
+        c->hull_revision = input->hull_revision;
     }
     if (!bodies) TRY(upload_input(c, BODIES, input->bodies, input->body_count, sizeof *input->bodies, true, error));
     TRY(list_planes(c, input, error));
@@ -151,6 +155,7 @@ sadmm_status COLLISION(take_input)(struct sadmm_cuda_collision *c, const struct 
 
     v->shapes = in<struct sadmm_shape>(c, SHAPES);
     v->geometries = in<struct sadmm_geometry>(c, GEOMETRIES);
+    v->hulls = input->hulls ? in<double>(c, HULLS) : nullptr;
     v->bodies = bodies ? bodies : in<struct sadmm_collision_body>(c, BODIES);
     v->body_count = (int32_t)input->body_count;
     v->group_bits = group_bits(input);

@@ -16,12 +16,12 @@ struct collision_buffer {
 enum buffer_name {
     /* device */
     PROXIES, FILTERS, PLACED, LEAF_KEYS, LEAF_KEYS_2, LEAF_NUMBERS, LEAF_NUMBERS_2, NODES, GROUPS, PARENTS, ARRIVALS,
-    COUNTER, GRID, CANDIDATES, CANDIDATES_2, MANIFOLDS, MATCHES, SIZES, PLACES, TEMP, BOXES, REACHES, PAIR_OF,
+    COUNTER, GRID, CANDIDATES, CANDIDATES_2, LISTED, MANIFOLDS, MATCHES, SIZES, PLACES, TEMP, BOXES, REACHES, PAIR_OF,
     PAIRS, POINTS, PAIR_KEYS, COUNTS, PAIRS_2, POINTS_2, PAIR_KEYS_2, COUNTS_2, PAIRS_3, POINTS_3, PAIR_KEYS_3,
     COUNTS_3,
-    SHAPES, GEOMETRIES, BODIES, PRESENT, PLANES, DISABLED_PAIRS, FRICTION_PAIRS, FRICTION_VALUES,
+    SHAPES, GEOMETRIES, HULLS, BODIES, PRESENT, PLANES, DISABLED_PAIRS, FRICTION_PAIRS, FRICTION_VALUES,
     /* pinned: first what was uploaded to the last buffers above, in their order */
-    PINNED_SHAPES, PINNED_GEOMETRIES, PINNED_BODIES, PINNED_PRESENT, PINNED_PLANES, PINNED_DISABLED_PAIRS,
+    PINNED_SHAPES, PINNED_GEOMETRIES, PINNED_HULLS, PINNED_BODIES, PINNED_PRESENT, PINNED_PLANES, PINNED_DISABLED_PAIRS,
     PINNED_FRICTION_PAIRS, PINNED_FRICTION_VALUES, PINNED_PAIRS, PINNED_POINTS, PINNED_PAIR_KEYS, PINNED_COUNTS,
     BUFFERS
 };
@@ -29,13 +29,13 @@ enum { SET_BUFFERS = COUNTS_2 - COUNTS, INPUTS = PINNED_SHAPES - SHAPES };
 
 static const char *const buffer_names[BUFFERS] = {
     "placed shapes", "filters", "boxes", "tree keys", "sorted tree keys", "leaves", "sorted leaves", "tree", "groups",
-    "parents", "arrivals", "counter", "grid", "candidates", "sorted candidates", "manifolds", "matches", "sizes",
+    "parents", "arrivals", "counter", "grid", "candidates", "sorted candidates", "listed candidates", "manifolds", "matches", "sizes",
     "places", "sort", "boxes of sub-steps", "reaches", "pairs of candidates",
     "contact pairs", "contact points", "contact keys", "contact counts",
     "contact pairs", "contact points", "contact keys", "contact counts",
     "contact pairs", "contact points", "contact keys", "contact counts",
-    "shapes", "geometries", "bodies", "list of shapes", "planes", "disabled pairs", "friction pairs", "friction values",
-    "staged shapes", "staged geometries", "staged bodies", "staged list of shapes", "staged planes",
+    "shapes", "geometries", "hulls", "bodies", "list of shapes", "planes", "disabled pairs", "friction pairs", "friction values",
+    "staged shapes", "staged geometries", "staged hulls", "staged bodies", "staged list of shapes", "staged planes",
     "staged disabled pairs",
     "staged friction pairs", "staged friction values", "staged contact pairs", "staged contact points",
     "staged contact keys", "staged contact counts",
@@ -76,6 +76,7 @@ struct sadmm_cuda_collision {
     struct collision_view view;
     struct collision_buffer buffers[BUFFERS];
     size_t input_bytes[INPUTS]; /* as uploaded; SIZE_MAX: not */
+    uint32_t hull_revision;
 
     int current;                /* of the two sets */
     struct contact_counts counts[2];

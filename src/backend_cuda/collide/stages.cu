@@ -25,7 +25,7 @@ static sadmm_status reserve_shape(struct sadmm_cuda_collision *c, size_t slots, 
         TRY(reserve(c, PARENTS, 2 * leaves, sizeof *v->parents, error));
         TRY(reserve(c, ARRIVALS, leaves, sizeof *v->arrivals, error));
     }
-    TRY(reserve(c, COUNTER, 1, sizeof *v->candidate_count, error));
+    TRY(reserve(c, COUNTER, 2, sizeof *v->candidate_count, error));
     TRY(reserve(c, GRID, 1, sizeof *v->grid, error));
     v->proxies = in<struct sadmm_proxy>(c, PROXIES);
     v->filters = in<struct collision_filter>(c, FILTERS);
@@ -61,12 +61,14 @@ static sadmm_status reserve_candidate(struct sadmm_cuda_collision *c, struct sad
     const size_t candidates = (size_t)c->candidate_capacity;
     TRY(reserve(c, CANDIDATES, candidates, sizeof *v->candidates, error));
     TRY(reserve(c, CANDIDATES_2, candidates, sizeof *v->candidates, error));
+    if (v->hulls) TRY(reserve(c, LISTED, candidates, sizeof *v->listed, error));
     TRY(reserve(c, MANIFOLDS, candidates, sizeof *v->manifolds, error));
     TRY(reserve(c, MATCHES, candidates, sizeof *v->matches, error));
     TRY(reserve(c, PAIR_OF, candidates, sizeof *v->pair_of, error));
     TRY(reserve(c, SIZES, candidates + SIZES_BEYOND, sizeof *v->sizes, error));
     TRY(reserve(c, PLACES, candidates + 1, sizeof *v->places, error));
     v->found = in<uint64_t>(c, CANDIDATES);
+    v->listed = in<int32_t>(c, LISTED);
     v->manifolds = in<struct found_manifold>(c, MANIFOLDS);
     v->matches = in<int32_t>(c, MATCHES);
     v->pair_of = in<int32_t>(c, PAIR_OF);
@@ -160,15 +162,23 @@ static sadmm_status find_candidates(struct sadmm_cuda_collision *c, bool tree, s
     return sort_candidates(c, error);
 }
 
+static sadmm_status narrow_phase(struct sadmm_cuda_collision *c, struct sadmm_error *error)
+{
+    const struct collision_view *v = &c->view;
+    const struct collision_kernels *k = &c->kernels;
+    const int64_t candidates = (int64_t)v->candidate_capacity + SIZES_BEYOND;
+    const bool one = v->substeps == 1, first = v->substep == 0;
+    if (!v->hulls) return launch(c, one ? k->narrow : first ? k->narrow_first : k->narrow_again, candidates, error);
+    TRY(launch(c, one ? k->hulls : first ? k->hulls_first : k->hulls_again, candidates, error));
+    return launch(c, one ? k->listed : first ? k->listed_first : k->listed_again, v->candidate_capacity, error);
+}
+
 static sadmm_status make_contacts(struct sadmm_cuda_collision *c, struct sadmm_error *error)
 {
     struct collision_view *v = &c->view;
     const int64_t lanes = (int64_t)v->candidate_capacity * POINT_LANES;
     size_t bytes = c->buffers[TEMP].capacity;
-    const struct collision_launch &narrow = v->substeps == 1  ? c->kernels.narrow
-                                            : v->substep == 0 ? c->kernels.narrow_first
-                                                              : c->kernels.narrow_again;
-    TRY(launch(c, narrow, (int64_t)v->candidate_capacity + SIZES_BEYOND, error));
+    TRY(narrow_phase(c, error));
     if (ranked(c)) return launch(c, c->kernels.emit_few, lanes, error);
     c->kernel = "scan of the contacts";
     CUDA_CALL(c, COLLISION(sum)(in<void>(c, TEMP), &bytes, v->sizes, v->places, v->candidate_capacity + 1, c->stream),
@@ -222,7 +232,7 @@ sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots,
             c->point_capacity = std::min<int64_t>(generous(counts->points), INT32_MAX);
         else return SADMM_OK;
         ++c->stats.repeats;
-        CUDA_CALL(c, cudaMemsetAsync(v->candidate_count, 0, sizeof *v->candidate_count, c->stream),
+        CUDA_CALL(c, cudaMemsetAsync(v->candidate_count, 0, 2 * sizeof *v->candidate_count, c->stream),
                   "cudaMemsetAsync(counter)");
     }
 }

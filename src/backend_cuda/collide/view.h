@@ -6,6 +6,7 @@
  *   pairs    candidates: boxes overlap and the pair may meet                       a thread a shape, or tiles of pairs
  *   sort     candidates by (slot of a, slot of b, child), the host's order
  *   narrow   the last step's pair (a guess or a search), manifold by candidate     a thread a candidate
+ *            (where there are hulls two kernels of their own: narrow_hulls.cu)
  *   scan     where each candidate's contacts go                                    (few candidates: by emit itself)
  *   emit     pairs and points in world terms, the last step's impulses             eight threads a candidate
  *
@@ -144,6 +145,7 @@ struct collision_set {
 struct collision_view {
     const struct sadmm_shape *shapes;              /* by slot */
     const struct sadmm_geometry *geometries;       /* by handle */
+    const double *hulls;                           /* the pool (collision/hull_data.h); NULL: no shape is a hull */
     const struct sadmm_collision_body *bodies;     /* by body slot */
     const uint32_t *present;                       /* slots: leaves, then planes */
     const uint64_t *planes;                        /* (group + 1) << 32 | slot, sorted */
@@ -172,7 +174,8 @@ struct collision_view {
     int32_t *parents;                              /* of nodes; -1: the root */
     int32_t *arrivals;                             /* at inner nodes, bottom up */
 
-    unsigned long long *candidate_count;           /* found, whether they fit or not */
+    unsigned long long *candidate_count;           /* [0]: found, whether they fit or not; [1]: listed */
+    int32_t *listed;                               /* candidates that the narrow phase of hulls does by themselves */
     uint64_t *found;                               /* candidates as they come, packed (candidate_of) */
     uint64_t *candidates;                          /* sorted */
     int32_t candidate_capacity;
@@ -266,11 +269,13 @@ struct collision_launch {
 /* The kernels, each beside what it does. */
 struct collision_kernels {
     struct collision_launch grid, place, place_first, place_again, build, refit, clear, walk, tiles, small_tiles, rank,
-        narrow, narrow_first, narrow_again, emit, emit_few;
+        narrow, narrow_first, narrow_again, hulls, hulls_first, hulls_again, listed, listed_first, listed_again, emit,
+        emit_few;
 };
 void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels);
 void COLLISION(sort_kernels)(struct collision_kernels *kernels);
 void COLLISION(narrow_phase_kernels)(struct collision_kernels *kernels);
+void COLLISION(narrow_hulls_kernels)(struct collision_kernels *kernels);
 void COLLISION(matching_kernels)(struct collision_kernels *kernels);
 
 #endif

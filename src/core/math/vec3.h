@@ -9,6 +9,8 @@ typedef struct vec3 { real x, y, z; } vec3;
 typedef struct mat3 { vec3 r[3]; } mat3;
 
 SADMM_INLINE vec3 v3(real x, real y, real z) { vec3 v; v.x = x; v.y = y; v.z = z; return v; }
+/* Along axis k. */
+SADMM_INLINE vec3 v3_axis(int k, real s) { return v3(k == 0 ? s : 0, k == 1 ? s : 0, k == 2 ? s : 0); }
 SADMM_INLINE vec3 v3_load(const double *p) { return v3((real)p[0], (real)p[1], (real)p[2]); }
 SADMM_INLINE void v3_store(vec3 v, double *p) { p[0] = (double)v.x; p[1] = (double)v.y; p[2] = (double)v.z; }
 SADMM_INLINE vec3 v3_add(vec3 a, vec3 b) { return v3(a.x + b.x, a.y + b.y, a.z + b.z); }

@@ -1,8 +1,10 @@
 /* Shapes of a world. */
 #include <string.h>
 
-#include "collision/geometry.h"
+#include "collision/hull.h"
 #include "core/base/memory.h"
+#include "core/math/quat.h"
+#include "shape_form.h"
 #include "world_internal.h"
 
 sadmm_shape_def sadmm_shape_def_default(void)
@@ -22,10 +24,11 @@ static bool alive(const sadmm_world *world, size_t slot)
     return world->shapes[slot].alive;
 }
 
+/* Without the place of its hull, which it gets with the shape. */
 static struct sadmm_geometry geometry_of(const sadmm_shape_def *def)
 {
     struct sadmm_geometry geometry = {.type = (int32_t)def->type, .children = 1};
-    memcpy(geometry.size, def->size, sizeof geometry.size);
+    memcpy(geometry.size, def->type == SADMM_SHAPE_HULL ? def->hull->half : def->size, sizeof geometry.size);
     return geometry;
 }
 
@@ -44,15 +47,35 @@ static sadmm_status check_material(const char *owner, double friction, double re
 static sadmm_status check_def(const struct sadmm_world_body *body, const sadmm_shape_def *def, double orientation[4],
                               struct sadmm_error *error)
 {
+    TRY(sadmm_shape_form_check(def, orientation, error));
     const struct sadmm_geometry geometry = geometry_of(def);
     TRY(sadmm_geometry_check(&geometry, body->type != SADMM_BODY_STATIC, "def->", error));
-    for (int k = 0; k < geometry_sizes(geometry.type); ++k)
-        if (!(def->size[k] >= 1e-6 && def->size[k] <= 1e6))
-            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->size[%d] = %g: must be in [1e-6, 1e6] m", k,
-                              def->size[k]);
-    TRY(sadmm_check_vector("def->position", def->position, 3, 1e6, error));
-    TRY(sadmm_check_orientation("def->orientation", def->orientation, orientation, error));
     return check_material("def->", def->friction, def->restitution, error);
+}
+
+/* Room for what a hull's shape in `slot` has beside it, and its hull in the pool. Errors leave the world as it is. */
+static sadmm_status add_hull(sadmm_world *world, size_t slot, const sadmm_hull *hull, uint32_t *offset)
+{
+    if (!sadmm_grow(&world->hull_shapes, &world->hull_shape_capacity, world->hull_shape_slots, slot + 1,
+                    sizeof *world->hull_shapes))
+        return sadmm_fail_memory(&world->error, "a shape");
+    TRY(sadmm_hull_pool_add(&world->hull_pool, hull, offset, &world->error));
+    if (slot >= world->hull_shape_slots) world->hull_shape_slots = slot + 1;
+    return SADMM_OK;
+}
+
+/* The shape is where contact finding has the hull: in the frame of the box around it. */
+static void place_hull(sadmm_world *world, size_t slot, const sadmm_shape_def *def, const double orientation[4])
+{
+    struct sadmm_world_hull_shape *kept = &world->hull_shapes[slot];
+    struct sadmm_shape *shape = &world->shapes[slot];
+    const sadmm_hull *hull = def->hull;
+    const quat turn = q_load(orientation);
+    kept->hull = hull;
+    memcpy(kept->position, def->position, sizeof kept->position);
+    memcpy(kept->orientation, orientation, sizeof kept->orientation);
+    v3_store(v3_add(v3_load(def->position), m3_mul(q_matrix(turn), v3_load(hull->position))), shape->position);
+    q_store(q_normalize(q_mul(turn, q_load(hull->orientation))), shape->orientation);
 }
 
 sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, const sadmm_shape_def *def,
@@ -77,6 +100,8 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
         !sadmm_grow(&world->geometries, &world->geometry_capacity, world->shape_slots, slot + 1,
                     sizeof *world->geometries))
         return sadmm_fail_memory(error, "a shape");
+    uint32_t offset = 0;
+    if (def->type == SADMM_SHAPE_HULL) TRY(add_hull(world, slot, def->hull, &offset));
 
     struct sadmm_shape *shape = &world->shapes[slot];
     if (slot == world->shape_slots) {
@@ -86,8 +111,10 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
     memset(shape, 0, sizeof *shape);
     shape->geometry = (uint32_t)slot;
     world->geometries[shape->geometry] = geometry_of(def);
+    world->geometries[shape->geometry].hull = offset;
     memcpy(shape->position, def->position, sizeof shape->position);
     memcpy(shape->orientation, orientation, sizeof orientation);
+    if (def->type == SADMM_SHAPE_HULL) place_hull(world, slot, def, orientation);
     shape->friction = def->friction;
     shape->restitution = def->restitution;
     shape->category = def->category;
@@ -105,8 +132,15 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
     return SADMM_OK;
 }
 
+static void remove_hull(sadmm_world *world, size_t slot)
+{
+    world->geometries[world->shapes[slot].geometry].hull = 0;
+    sadmm_hull_pool_remove(&world->hull_pool, world->hull_shapes[slot].hull, world->geometries, world->shape_slots);
+}
+
 void sadmm_world_kill_shape(sadmm_world *world, size_t slot)
 {
+    if (world->geometries[world->shapes[slot].geometry].type == SADMM_SHAPE_HULL) remove_hull(world, slot);
     world->shapes[slot].alive = false;
     ++world->shape_generations[slot];
     --world->shape_count;
@@ -159,6 +193,12 @@ sadmm_status sadmm_world_shape_def(sadmm_world *world, sadmm_shape_id id, sadmm_
     memcpy(def->size, geometry->size, sizeof def->size);
     memcpy(def->position, shape->position, sizeof def->position);
     memcpy(def->orientation, shape->orientation, sizeof def->orientation);
+    if (geometry->type == SADMM_SHAPE_HULL) {
+        const struct sadmm_world_hull_shape *kept = &world->hull_shapes[id.slot - 1];
+        def->hull = kept->hull;
+        memcpy(def->position, kept->position, sizeof def->position);
+        memcpy(def->orientation, kept->orientation, sizeof def->orientation);
+    }
     def->friction = shape->friction;
     def->restitution = shape->restitution;
     def->category = shape->category;

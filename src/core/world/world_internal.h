@@ -1,13 +1,13 @@
 /* A world's insides, shared by the files of this folder. Each calls those before it alone:
  *
- *   slots, pair_table, ids, report   lists and names
+ *   slots, pair_table, hull_pool, ids, report   lists and names
  *   driven                           kinematic bodies in a step
  *   gather                           what a step reads
  *   coupling_step                    what couplings keep from step to step
  *   joint_act                        a joint in a step
  *   gear_rows, joint_rows, joint_move   gears and joints as constraint rows, and where they let bodies go
  *   resident_joints, resident        where a backend keeps the world
- *   shape, joint, coupling, gear, body, contacts, explain   what callers see of it, and change
+ *   shape_form, shape, mass, joint, coupling, gear, body, contacts, explain   what callers see of it, and change
  *   step, world                      steps; settings, the whole
  */
 #ifndef SADMM_CORE_WORLD_INTERNAL_H
@@ -24,6 +24,7 @@
 #include "core/solve/joined.h"
 #include "core/solve/kernels.h"
 #include "core/solve/schedule.h"
+#include "hull_pool.h"
 #include "pair_table.h"
 #include "slots.h"
 #include "subadmm/coupling.h"
@@ -53,6 +54,12 @@ struct sadmm_world_body {
     char *name;          /* a block of its own, so that it stays where it is when slots are added; NULL: none */
     uint32_t edits;                   /* bit of enum sadmm_edit_kind: no step has taken that along yet */
     int64_t set_at[SADMM_BODY_EDITS]; /* steps enqueued since the world was loaded, when that was set; -1: before */
+};
+
+/* What the definition of a hull's shape had; contact finding has the shape in another frame. */
+struct sadmm_world_hull_shape {
+    const sadmm_hull *hull;
+    double position[3], orientation[4];
 };
 
 /* A kinematic body in a step. */
@@ -130,6 +137,9 @@ struct sadmm_world {
     int32_t shape_count;
     struct sadmm_slot_marks shape_marks;
     uint32_t shape_revisions;
+    struct sadmm_hull_pool hull_pool;
+    struct sadmm_world_hull_shape *hull_shapes; /* by slot, as far as there are hulls */
+    size_t hull_shape_slots, hull_shape_capacity;
     struct sadmm_pair_table disabled_pairs, friction_pairs;
 
     struct sadmm_world_joint *joints;

@@ -1,0 +1,190 @@
+/* Depth of two polytopes that meet: the expanding polytope algorithm (van den Bergen, "Proximity queries and
+ * penetration depth computation on 3D game objects", GDC 2001). A polytope inside a - b grows towards the face of a - b
+ * that is nearest to the origin, point by point, until it has that face itself. Heights of faces over the origin are
+ * signed: where a - b just misses the origin the nearest face is the one that says so.
+ */
+#ifndef SADMM_COLLISION_EPA_H
+#define SADMM_COLLISION_EPA_H
+
+#include "gjk.h"
+
+enum { EPA_POINTS = 40, EPA_FACES = 2 * EPA_POINTS - 4, EPA_RIM = 3 * EPA_FACES };
+
+struct epa_face {
+    real height; /* of its plane over the origin, m; largest: it has no area, and is never asked */
+    uint8_t corner[3]; /* counter-clockwise from outside */
+};
+
+struct epa {
+    struct difference_point p[EPA_POINTS];
+    struct epa_face face[EPA_FACES + 1];
+    int points, faces;
+    real least2; /* square of an area, twice, that has no direction */
+};
+
+/* Not unit; outward. */
+SADMM_INLINE vec3 epa_normal(const struct epa *e, const struct epa_face *f)
+{
+    const vec3 a = e->p[f->corner[0]].w;
+    return v3_cross(v3_sub(e->p[f->corner[1]].w, a), v3_sub(e->p[f->corner[2]].w, a));
+}
+
+HULL_PART void epa_add_face(struct epa *e, int a, int b, int c)
+{
+    struct epa_face *f = &e->face[e->faces];
+    vec3 n;
+    real n2;
+    if (e->faces == EPA_FACES) return;
+    f->corner[0] = (uint8_t)a;
+    f->corner[1] = (uint8_t)b;
+    f->corner[2] = (uint8_t)c;
+    n = epa_normal(e, f);
+    n2 = v3_norm2(n);
+    f->height = n2 > e->least2 ? v3_dot(n, e->p[a].w) / real_sqrt(n2) : SADMM_REAL_MAX;
+    ++e->faces;
+}
+
+/* Whichever of the points of a - b farthest along d and against it makes more of `measure`. */
+HULL_PART struct difference_point epa_farther(const struct polytope_pair *pair, vec3 d, vec3 origin)
+{
+    const struct difference_point zero = {{0, 0, 0}, 0, 0};
+    const struct difference_point up = pair_support(pair, d, &zero), down = pair_support(pair, v3_neg(d), &zero);
+    return real_abs(v3_dot(d, v3_sub(up.w, origin))) >= real_abs(v3_dot(d, v3_sub(down.w, origin))) ? up : down;
+}
+
+/* A tetrahedron with as many of the simplex's points as are of use. False: a - b is flat but for rounding. */
+HULL_PART bool epa_begin(const struct polytope_pair *pair, const struct gjk_simplex *s, struct epa *e)
+{
+    struct difference_point *p = e->p;
+    vec3 d, n;
+    int k;
+    e->least2 = SADMM_EPSILON * SADMM_EPSILON * pair->size * pair->size;
+    e->least2 *= e->least2;
+    e->faces = 0;
+    e->points = 4;
+    p[0] = s->p[0];
+    if (s->count > 1) {
+        p[1] = s->p[1];
+    } else {
+        real most = -1;
+        for (k = 0; k < 3; ++k) {
+            const vec3 axis = v3_axis(k, 1);
+            const struct difference_point q = epa_farther(pair, axis, p[0].w);
+            const real far2 = v3_norm2(v3_sub(q.w, p[0].w));
+            if (far2 > most) {
+                most = far2;
+                p[1] = q;
+            }
+        }
+    }
+    d = v3_sub(p[1].w, p[0].w);
+    if (s->count > 2) {
+        p[2] = s->p[2];
+    } else {
+        real most = -1;
+        for (k = 0; k < 3; ++k) {
+            const vec3 across = v3_cross(d, v3_axis(k, 1));
+            const struct difference_point q = epa_farther(pair, across, p[0].w);
+            const real area2 = v3_norm2(v3_cross(d, v3_sub(q.w, p[0].w)));
+            if (area2 > most) {
+                most = area2;
+                p[2] = q;
+            }
+        }
+    }
+    n = v3_cross(d, v3_sub(p[2].w, p[0].w));
+    p[3] = epa_farther(pair, n, p[0].w);
+    if (s->count > 3 && real_abs(v3_dot(n, v3_sub(s->p[3].w, p[0].w))) >=
+                            (real)0.1 * real_abs(v3_dot(n, v3_sub(p[3].w, p[0].w))))
+        p[3] = s->p[3];
+    {
+        const real volume = v3_dot(n, v3_sub(p[3].w, p[0].w));
+        if (!(real_abs(volume) > SADMM_EPSILON * pair->slack * pair->size * pair->size)) return false;
+        if (volume > 0) { /* seen from p[3] the corners 0, 1, 2 run counter-clockwise: they are outside from there */
+            const struct difference_point swap = p[1];
+            p[1] = p[2];
+            p[2] = swap;
+        }
+    }
+    epa_add_face(e, 0, 1, 2);
+    epa_add_face(e, 0, 3, 1);
+    epa_add_face(e, 1, 3, 2);
+    epa_add_face(e, 2, 3, 0);
+    return true;
+}
+
+/* Put `next` in: what it sees goes, and new faces join it to the rim of that. */
+HULL_PART void epa_grow(const struct polytope_pair *pair, struct epa *e, struct difference_point next)
+{
+    uint8_t rim[EPA_RIM][2];
+    int sides = 0, f = 0, k, i;
+    while (f < e->faces) {
+        const struct epa_face *face = &e->face[f];
+        const vec3 n = epa_normal(e, face);
+        const real above = v3_dot(n, v3_sub(next.w, e->p[face->corner[0]].w));
+        if (!(above > 0 && above * above > pair->slack * pair->slack / 16 * v3_norm2(n))) {
+            ++f;
+            continue;
+        }
+        for (k = 0; k < 3; ++k) {
+            const uint8_t from = face->corner[k], to = face->corner[k < 2 ? k + 1 : 0];
+            for (i = 0; i < sides && !(rim[i][0] == to && rim[i][1] == from);) ++i;
+            if (i < sides) { /* the other face beside it goes as well */
+                --sides;
+                rim[i][0] = rim[sides][0];
+                rim[i][1] = rim[sides][1];
+            } else {
+                rim[sides][0] = from;
+                rim[sides][1] = to;
+                ++sides;
+            }
+        }
+        e->face[f] = e->face[--e->faces];
+    }
+    e->p[e->points] = next;
+    for (k = 0; k < sides; ++k) epa_add_face(e, rim[k][0], rim[k][1], e->points);
+    ++e->points;
+}
+
+/* The simplex becomes the face's corners. The origin's foot on its plane may be beside this triangle, on another one of
+ * the same face of a - b: the weights go on there. */
+SADMM_INLINE void epa_simplex(const struct epa *e, const struct epa_face *face, vec3 normal, real height,
+                              struct gjk_simplex *s)
+{
+    int k;
+    s->count = 3;
+    for (k = 0; k < 3; ++k) s->p[k] = e->p[face->corner[k]];
+    simplex_weigh(s, v3_scale(normal, height), normal);
+}
+
+/* The face of a - b nearest to the origin: its outward normal, unit, its points with the weights of the one nearest to
+ * the origin, its height over it. False: rounding has not let it be found. */
+HULL_PART bool epa_depth(const struct polytope_pair *pair, struct gjk_simplex *s, vec3 *normal, real *height)
+{
+    struct epa e;
+    const struct epa_face *best;
+    if (!epa_begin(pair, s, &e)) return false;
+    for (;;) {
+        struct difference_point next;
+        vec3 n;
+        real length;
+        int f, k;
+        bool again = false;
+        best = &e.face[0];
+        for (f = 1; f < e.faces; ++f)
+            if (e.face[f].height < best->height) best = &e.face[f];
+        if (e.faces == 0 || !(best->height < SADMM_REAL_MAX)) return false;
+        n = epa_normal(&e, best);
+        length = v3_norm(n);
+        *normal = v3_scale(n, 1 / length);
+        *height = best->height;
+        next = pair_support(pair, *normal, &e.p[best->corner[0]]);
+        for (k = 0; k < e.points; ++k) again |= same_point(&next, &e.p[k]);
+        if (again || v3_dot(*normal, next.w) - best->height <= pair->slack / 2 || e.points == EPA_POINTS) break;
+        epa_grow(pair, &e, next);
+    }
+    epa_simplex(&e, best, *normal, *height, s);
+    return true;
+}
+
+#endif

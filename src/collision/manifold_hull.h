@@ -1,0 +1,400 @@
+/* A convex hull (b) against plane, sphere, capsule, box and hull (a), in the frame of b.
+ *
+ *   1. The axis of the last step. Where it is a face's, and the points of the facing faces prove that no other is better
+ *      by enough to take its place, that is all: what rests never asks for more.
+ *   2. The distance (gjk.h) or, where the two meet, the depth (epa.h), with the nearest points.
+ *   3. The axis to use. As for boxes (manifold_box.h): the last step's stays unless clearly beaten, and its side until
+ *      the two are apart; a face within 8 degrees of the nearest points' normal is preferred to what is not a face.
+ *   4. The points of the faces that point along it (polytope_face.h); the nearest points as well where these do not
+ *      have them.
+ *
+ * Round shapes are a core, a point or a segment, with a radius: outside the core's distance is exact, and so is the
+ * normal; no face is preferred to it.
+ */
+#ifndef SADMM_COLLISION_MANIFOLD_HULL_H
+#define SADMM_COLLISION_MANIFOLD_HULL_H
+
+#include "epa.h"
+#include "geometry.h"
+#include "manifold_plane.h"
+#include "polytope_face.h"
+
+/* Cores nearer than this share of their size: the vector between them says no more where it points. */
+#define HULL_TOUCH (sizeof(real) == 4 ? (real)1e-4 : (real)1e-9)
+
+SADMM_INLINE void polytope_pair_make(const struct sadmm_geometry *a, const struct sadmm_geometry *b,
+                                     const double *hulls, const struct pair_pose *pose, struct polytope_pair *pair)
+{
+    int i;
+    polytope_of(a, hulls, &pair->a);
+    polytope_of(b, hulls, &pair->b);
+    for (i = 0; i < 3; ++i) pair->R.r[i] = r3_vec3(pose->R[i]);
+    pair->t = r3_vec3(pose->t);
+    pair->thin = (real)smaller_of(geometry_thickness(a), geometry_thickness(b));
+    pair->size = (real)(geometry_radius(a) + geometry_radius(b)) + v3_norm(pair->t);
+    pair->slack = 8 * SADMM_EPSILON * pair->size;
+}
+
+/* Up to here an axis that was used before is good enough. */
+SADMM_INLINE real hull_bonus(const struct polytope_pair *pair, real separation)
+{
+    return MANIFOLD_KEEP_DEPTH * real_max(0, -separation) + MANIFOLD_KEEP_EXTENT * pair->thin;
+}
+
+/* What is left between the two, at most, seen from a point of b's surface that is inside a, or of a's inside b: such a
+ * point has to leave by some face. x: midway between the two surfaces, `gap` < 0 apart along the axis. */
+SADMM_INLINE real hull_way_out(const struct polytope_pair *pair, const struct polytope_axis *axis, vec3 x, real gap)
+{
+    const bool of_a = axis->kind == AXIS_FACE_A;
+    const struct polytope *p = of_a ? &pair->a : &pair->b;
+    vec3 inside = v3_madd(x, (of_a ? gap : -gap) / 2, axis->n);
+    if (of_a) inside = m3_tmul(pair->R, v3_sub(inside, pair->t));
+    return real_max(gap, polytope_height(p, inside, of_a ? axis->a : axis->b));
+}
+
+/* Do the points of a face axis prove that no axis beats it by more than the last step's axis is given? */
+SADMM_INLINE bool hull_is_proven(const struct polytope_pair *pair, const struct polytope_axis *axis,
+                                 const struct manifold *m)
+{
+    const real most = axis->separation + hull_bonus(pair, axis->separation);
+    vec3 middle = v3(0, 0, 0);
+    real gap = 0;
+    int k, deepest = 0;
+    if (m->count == 0) return false;
+    for (k = 0; k < m->count; ++k) {
+        middle = v3_add(middle, m->points[k].position);
+        gap += m->points[k].separation;
+        if (m->points[k].separation < m->points[deepest].separation) deepest = k;
+    }
+    /* two points as near to each other as the planes are: nothing is nearer, and no plane parts them further */
+    if (axis->separation >= 0) return m->points[deepest].separation <= axis->separation + 2 * pair->slack;
+    /* the face along the normal need not have the deepest corner */
+    if (m->points[deepest].separation > axis->separation + MANIFOLD_FLAT * pair->thin) return false;
+    middle = v3_scale(middle, (real)1 / (real)m->count);
+    gap /= (real)m->count;
+    return hull_way_out(pair, axis, middle, gap) <= most ||
+           hull_way_out(pair, axis, m->points[deepest].position, m->points[deepest].separation) <= most;
+}
+
+/* Where rounding leaves nothing else: the best of all faces. */
+SADMM_RARE void hull_best_face(const struct polytope_pair *pair, struct polytope_axis *best)
+{
+    struct polytope_axis axis;
+    int f;
+    axis_of_face_b(pair, 0, best);
+    for (f = 1; f < pair->b.faces; ++f) {
+        axis_of_face_b(pair, f, &axis);
+        if (axis.separation > best->separation) *best = axis;
+    }
+    for (f = 0; f < pair->a.faces; ++f) {
+        axis_of_face_a(pair, f, &axis);
+        if (axis.separation > best->separation) *best = axis;
+    }
+}
+
+/* Two different numbers among a few; false: there are more, or fewer. */
+SADMM_INLINE bool two_of(const int *numbers, int count, int two[2])
+{
+    int k, found = 1;
+    two[0] = numbers[0];
+    two[1] = numbers[0];
+    for (k = 1; k < count; ++k) {
+        if (numbers[k] == two[0] || (found == 2 && numbers[k] == two[1])) continue;
+        if (found == 2) return false;
+        two[found++] = numbers[k];
+    }
+    return found == 2;
+}
+
+/* Are the nearest features an edge of each? Then the axis is theirs. */
+HULL_PART void hull_edges_of(const struct polytope_pair *pair, const struct gjk_simplex *s,
+                                struct polytope_axis *axis)
+{
+    struct polytope_axis edges;
+    int of_a[4], of_b[4], a[2], b[2], k, ea, eb;
+    for (k = 0; k < s->count; ++k) {
+        of_a[k] = s->p[k].a;
+        of_b[k] = s->p[k].b;
+    }
+    if (!two_of(of_a, s->count, a) || !two_of(of_b, s->count, b)) return;
+    ea = polytope_edge_between(&pair->a, a[0], a[1]);
+    eb = polytope_edge_between(&pair->b, b[0], b[1]);
+    if (ea < 0 || eb < 0 || !axis_of_edges(pair, ea, eb, &edges)) return;
+    if (edges.separation >= axis->separation - pair->slack) *axis = edges;
+}
+
+/* The points of two edges that are nearest to each other. False: the edges do not cross, seen along the axis. */
+HULL_PART bool hull_crossing(const struct polytope_pair *pair, const struct polytope_axis *axis, vec3 *pa, vec3 *pb)
+{
+    vec3 a, b;
+    const vec3 da = edge_of_a(pair, axis->a, &a), db = edge_of_b(pair, axis->b, &b);
+    const real la = v3_norm(da), lb = v3_norm(db);
+    const vec3 ua = v3_scale(da, 1 / la), ub = v3_scale(db, 1 / lb);
+    real s, t;
+    segments_closest(v3_madd(a, (real)0.5, da), ua, la / 2, v3_madd(b, (real)0.5, db), ub, lb / 2, &s, &t);
+    *pa = v3_madd(a, la / 2 + s, ua);
+    *pb = v3_madd(b, lb / 2 + t, ub);
+    return v3_norm(v3_cross(axis->n, v3_sub(*pb, *pa))) <= MANIFOLD_KEEP_EXTENT * pair->thin;
+}
+
+/* The axis that the nearest points say, or those that are least deep; and the points. False: too far apart. */
+HULL_PART bool hull_nearest(const struct polytope_pair *pair, vec3 start, real limit, struct polytope_axis *axis,
+                               vec3 *pa, vec3 *pb, uint32_t *feature)
+{
+    struct gjk_simplex s;
+    vec3 v;
+    real length, height;
+    bool apart;
+    const enum gjk_end end = gjk_distance(pair, start, limit + pair_radii(pair) + pair->slack, &s, &v);
+    if (end == GJK_FAR) return false;
+    length = v3_norm(v);
+    apart = end == GJK_APART && length > HULL_TOUCH * pair->size;
+    axis->kind = AXIS_FREE;
+    axis->a = axis->b = 0;
+    if (apart) {
+        axis->n = v3_scale(v, -1 / length);
+        axis->separation = length - pair_radii(pair);
+        if (s.count == 3) simplex_weigh(&s, v, axis->n);
+    } else if (epa_depth(pair, &s, &v, &height)) {
+        axis->n = v;
+        axis->separation = -height - pair_radii(pair);
+    } else {
+        hull_best_face(pair, axis);
+    }
+    if (pair->a.faces > 0) hull_edges_of(pair, &s, axis);
+    if (axis->kind != AXIS_EDGES || !hull_crossing(pair, axis, pa, pb)) gjk_points(pair, &s, pa, pb);
+    *pa = v3_madd(*pa, pair->a.radius, axis->n);
+    *pb = v3_madd(*pb, -pair->b.radius, axis->n);
+    *feature = axis->kind == AXIS_EDGES ? polytope_feature(FEATURE_CROSSING, axis->a, axis->b)
+                                        : polytope_feature(FEATURE_NEAREST, 0, 0);
+    return axis->separation <= limit + pair->slack;
+}
+
+/* The better one of the two faces nearest to the axis; false: none is within 8 degrees of it. */
+SADMM_INLINE bool hull_face_beside(const struct polytope_pair *pair, vec3 n, struct polytope_axis *face)
+{
+    const vec3 na = m3_tmul(pair->R, n), nb = v3_neg(n);
+    const int fa = polytope_face_along(&pair->a, na), fb = polytope_face_along(&pair->b, nb);
+    const bool by_a = v3_dot(polytope_normal(&pair->a, fa), na) > MANIFOLD_COS_NEAR,
+               by_b = v3_dot(polytope_normal(&pair->b, fb), nb) > MANIFOLD_COS_NEAR;
+    struct polytope_axis other;
+    if (by_a) axis_of_face_a(pair, fa, face);
+    if (by_b) {
+        axis_of_face_b(pair, fb, &other);
+        if (!by_a || other.separation > face->separation) *face = other;
+    }
+    return by_a || by_b;
+}
+
+/* a: hull or box. `kept`: the last step's axis, `known`: there is one. */
+SADMM_INLINE void hull_choose(const struct polytope_pair *pair, const struct polytope_axis *kept, bool known,
+                              struct polytope_axis *axis)
+{
+    struct polytope_axis face;
+    real s = axis->separation;
+    if (known) {
+        /* past the middle of a thin one the other side is nearer, but wrong */
+        const bool turned = s < 0 && v3_dot(kept->n, axis->n) < -MANIFOLD_COS_OPPOSITE;
+        if (turned || s <= kept->separation + hull_bonus(pair, kept->separation)) {
+            *axis = *kept;
+            s = kept->separation + hull_bonus(pair, kept->separation);
+            if (turned) return;
+        }
+    }
+    if (axis->kind == AXIS_FACE_A || axis->kind == AXIS_FACE_B || !hull_face_beside(pair, axis->n, &face)) return;
+    /* the bonus of a cached axis does not count against a face of the same direction */
+    if (axis->separation <= face.separation + (real)0.05 * real_abs(face.separation) +
+                                MANIFOLD_KEEP_EXTENT * pair->thin)
+        *axis = face;
+}
+
+/* The point midway between pa and pb, unless m has one that is as deep. */
+SADMM_INLINE void hull_add_nearest(const struct polytope_pair *pair, vec3 pa, vec3 pb, uint32_t feature,
+                                   struct manifold *m)
+{
+    const real gap = v3_dot(m->normal, v3_sub(pb, pa)), even = gap + MANIFOLD_FLAT * pair->thin;
+    const vec3 x = v3_scale(v3_add(pa, pb), (real)0.5);
+    int k, least = 0;
+    for (k = 0; k < m->count; ++k) {
+        if (m->points[k].feature == feature || m->points[k].separation <= even) return;
+        if (m->points[k].separation > m->points[least].separation) least = k;
+    }
+    if (m->count == SADMM_MANIFOLD_POINTS) { /* in place of the one that is farthest apart */
+        m->points[least].position = x;
+        m->points[least].separation = gap;
+        m->points[least].feature = feature;
+    } else {
+        manifold_add(m, x, gap, feature);
+    }
+}
+
+/* What the last step's axis says by itself: true, and the manifold is there, or there is none. Else *start is a
+ * direction to look for the nearest points along; `known`: *kept is an axis. */
+SADMM_INLINE bool hull_by_memory(const struct polytope_pair *pair, real limit, uint32_t cache, struct polytope_axis *kept,
+                                 bool *known, vec3 *start, struct manifold *m)
+{
+    *known = axis_recall(pair, cache, kept);
+    *start = v3_neg(pair->t);
+    if (!*known) return false;
+    *start = kept->n;
+    if (kept->separation > limit + pair->slack) return true;
+    if (kept->kind == AXIS_EDGES || pair->a.faces == 0) return false;
+    facing_manifold(pair, kept->n, kept->separation, limit, m);
+    m->cache = cache;
+    if (hull_is_proven(pair, kept, m)) return true;
+    m->count = 0;
+    m->cache = 0;
+    return false;
+}
+
+/* The last step's axis of two edges in place of the nearest one: do they still cross? */
+SADMM_INLINE void hull_keep_edges(const struct polytope_pair *pair, const struct polytope_axis *nearest,
+                                  struct polytope_axis *axis, vec3 *pa, vec3 *pb, uint32_t *feature)
+{
+    vec3 on_a, on_b;
+    if (axis->kind != AXIS_EDGES || axis_memory(axis) == axis_memory(nearest)) return;
+    if (!hull_crossing(pair, axis, &on_a, &on_b)) {
+        *axis = *nearest;
+        return;
+    }
+    *pa = on_a;
+    *pb = on_b;
+    *feature = polytope_feature(FEATURE_CROSSING, axis->a, axis->b);
+}
+
+/* Round shapes whose core is inside keep to the last step's side as well, and to its axis. */
+SADMM_INLINE void hull_choose_inside(const struct polytope_pair *pair, const struct polytope_axis *kept, bool known,
+                                     struct polytope_axis *axis)
+{
+    if (!known || axis->separation >= -pair_radii(pair)) return;
+    if (v3_dot(kept->n, axis->n) < -MANIFOLD_COS_OPPOSITE ||
+        axis->separation <= kept->separation + hull_bonus(pair, kept->separation))
+        *axis = *kept;
+}
+
+/* Is some face of b seen along n? Round shapes beside an edge or a corner have their nearest point alone. */
+SADMM_INLINE bool hull_has_face_along(const struct polytope_pair *pair, vec3 n)
+{
+    const vec3 outward = v3_neg(n);
+    return v3_dot(polytope_normal(&pair->b, polytope_face_along(&pair->b, outward)), outward) > MANIFOLD_COS_NEAR;
+}
+
+SADMM_RARE void hull_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
+                              const struct pair_pose *pose, real limit, uint32_t cache, struct manifold *m)
+{
+    struct polytope_pair pair;
+    struct polytope_axis kept, nearest, axis;
+    vec3 pa, pb, start;
+    uint32_t feature;
+    bool known;
+
+    polytope_pair_make(a, b, hulls, pose, &pair);
+    if (hull_by_memory(&pair, limit, cache, &kept, &known, &start, m) ||
+        !hull_nearest(&pair, start, limit, &nearest, &pa, &pb, &feature))
+        return;
+    axis = nearest;
+    if (pair.a.faces > 0) hull_choose(&pair, &kept, known, &axis);
+    else hull_choose_inside(&pair, &kept, known, &axis);
+    hull_keep_edges(&pair, &nearest, &axis, &pa, &pb, &feature);
+    if (pair.a.faces > 0 || hull_has_face_along(&pair, axis.n))
+        facing_manifold(&pair, axis.n, axis.separation, limit, m);
+    if (m->count == 0 && (axis.kind == AXIS_FACE_A || axis.kind == AXIS_FACE_B)) axis = nearest; /* not over each other */
+    m->normal = axis.n;
+    m->cache = axis_memory(&axis);
+    hull_add_nearest(&pair, pa, pb, feature, m); /* the face along the normal need not have the deepest corner */
+}
+
+/* The same where that is little work: what goes on as it was, and what is too far apart. False: the whole of it has to
+ * be done. On a device, where the threads of a warp wait for each other, the few of these are done by themselves. */
+SADMM_RARE bool hull_manifold_at_once(const struct sadmm_geometry *a, const struct sadmm_geometry *b,
+                                      const double *hulls, const struct pair_pose *pose, real limit, uint32_t cache,
+                                      struct manifold *m)
+{
+    struct polytope_pair pair;
+    struct polytope_axis kept;
+    struct gjk_simplex s;
+    vec3 start, v;
+    bool known;
+    m->count = 0;
+    m->cache = 0;
+    polytope_pair_make(a, b, hulls, pose, &pair);
+    return hull_by_memory(&pair, limit, cache, &kept, &known, &start, m) ||
+           gjk_distance(&pair, start, limit + pair_radii(&pair) + pair.slack, &s, &v) == GJK_FAR;
+}
+
+/* a: the plane (manifold_plane.h). Of more vertices within the limit than a manifold has points, the lowest one and those
+ * that are outermost, and low, in eight directions. */
+SADMM_RARE void hull_plane_manifold(const struct sadmm_geometry *b, const double *hulls, const struct pair_pose *pose,
+                                    real limit, struct manifold *m)
+{
+    struct polytope p;
+    vec3 n, x1, x2;
+    const real offset = plane_offset(pose, &n);
+    int v, k, within = 0, lowest = 0, best[SADMM_MANIFOLD_POINTS];
+    real least = SADMM_REAL_MAX, most[SADMM_MANIFOLD_POINTS];
+    bool has_lowest = false;
+
+    polytope_at(hulls, b->hull, &p);
+    m->normal = n;
+    v3_tangents(n, &x1, &x2);
+    for (v = 0; v < p.vertices; ++v) {
+        const vec3 x = polytope_vertex(&p, v);
+        const real s = v3_dot(n, x) + offset, sx = v3_dot(x1, x), sy = v3_dot(x2, x);
+        if (s > limit) continue;
+        if (s < least) {
+            least = s;
+            lowest = v;
+        }
+        for (k = 0; k < SADMM_MANIFOLD_POINTS; ++k) {
+            const real along = outermost_along(k, sx, sy, s);
+            if (within == 0 || along > most[k]) {
+                most[k] = along;
+                best[k] = v;
+            }
+        }
+        if (within++ < SADMM_MANIFOLD_POINTS) manifold_add(m, v3_madd(x, -s / 2, n), s, (uint32_t)v + 1);
+    }
+    if (within <= SADMM_MANIFOLD_POINTS) return;
+    m->count = 0;
+    for (k = 0; k < SADMM_MANIFOLD_POINTS; ++k) {
+        const vec3 x = polytope_vertex(&p, best[k]);
+        int i;
+        bool twice = false;
+        for (i = 0; i < k; ++i) twice |= best[i] == best[k];
+        has_lowest |= best[k] == lowest;
+        if (!twice) manifold_add(m, v3_madd(x, -(v3_dot(n, x) + offset) / 2, n), v3_dot(n, x) + offset,
+                                 (uint32_t)best[k] + 1);
+    }
+    if (!has_lowest) {
+        const vec3 x = polytope_vertex(&p, lowest);
+        int i, nearest = 0;
+        real nearest2 = SADMM_REAL_MAX;
+        for (i = 0; i < m->count && m->count == SADMM_MANIFOLD_POINTS; ++i) {
+            const real d2 = v3_norm2(v3_sub(m->points[i].position, x));
+            if (d2 < nearest2) {
+                nearest2 = d2;
+                nearest = i;
+            }
+        }
+        if (m->count < SADMM_MANIFOLD_POINTS) nearest = m->count++;
+        m->points[nearest].position = v3_madd(x, -least / 2, n);
+        m->points[nearest].separation = least;
+        m->points[nearest].feature = (uint32_t)lowest + 1;
+    }
+}
+
+/* Entries of the collision table. Where a caller knows that there are no hulls (a null pool), nothing of them is
+ * compiled into it. */
+SADMM_INLINE void manifold_any_hull(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
+                                    const struct pair_pose *pose, real limit, uint32_t cache, struct manifold *m)
+{
+    if (hulls) hull_manifold(a, b, hulls, pose, limit, cache, m);
+}
+
+SADMM_INLINE void manifold_plane_hull(const struct sadmm_geometry *b, const double *hulls, const struct pair_pose *pose,
+                                      real limit, struct manifold *m)
+{
+    if (hulls) hull_plane_manifold(b, hulls, pose, limit, m);
+}
+
+#endif
