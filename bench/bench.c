@@ -23,6 +23,7 @@ static const struct {
     {"stand", bench_stand, "does a structure stand for many steps, and what does a step cost"},
     {"motion", bench_motion, "total error against run time of scenes in motion, and how deep bodies overlap"},
     {"rows", bench_rows, "what one constraint given by rows costs an iteration of a scene"},
+    {"shapes", bench_shapes, "what the manifold of a pair costs one core, by types of shapes"},
     {"joints", bench_joints, "motions and reactions of joints against reference tables"},
 };
 

@@ -32,7 +32,7 @@ void manifold_in_float(int type_a, const double size_a[3], int type_b, const dou
     memset(&m, 0x55, sizeof m);
     memcpy(a.size, size_a, sizeof a.size);
     memcpy(b.size, size_b, sizeof b.size);
-    pair_manifold(&a, &b, 0, &pose, (float)limit, cache, &m);
+    pair_manifold(&a, &b, NULL, 0, &pose, (float)limit, cache, &m);
     out->count = m.count;
     out->cache = m.cache;
     if (m.count == 0) return;

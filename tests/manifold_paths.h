@@ -305,7 +305,7 @@ static inline struct world_manifold path_touch(const struct path *p, bool in_flo
         struct pair_pose pose = pair_pose(false, p->a.R, p->a.x, p->b.R, p->b.x);
         const struct sadmm_geometry a = geometry_of(p->a.type, p->a.size), b = geometry_of(p->b.type, p->b.size);
         struct manifold m;
-        pair_manifold(&a, &b, 0, &pose, limit, cache, &m);
+        pair_manifold(&a, &b, NULL, 0, &pose, limit, cache, &m);
         w.count = m.count;
         w.cache = m.cache;
         if (m.count == 0) return w;

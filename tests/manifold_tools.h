@@ -147,7 +147,7 @@ static inline struct world_manifold touch(const struct solid *a, const struct so
     struct world_manifold w = {0};
 
     memset(&m, 0x55, sizeof m); /* nothing may rely on what was there */
-    pair_manifold(&a_is, &b_is, 0, &pose, limit, cache, &m);
+    pair_manifold(&a_is, &b_is, NULL, 0, &pose, limit, cache, &m);
     w.count = m.count;
     w.cache = m.cache;
     if (m.count == 0) return w;

@@ -37,6 +37,18 @@ static inline sadmm_world *build_scene(const struct sadmm_scene *scene)
     return world;
 }
 
+/* The scene has convex hulls, and the library was built without what makes them. */
+static inline bool lacks_hulls(const struct sadmm_scene *scene)
+{
+    sadmm_world *world = NULL;
+    struct sadmm_error error = { 0 };
+    const sadmm_status status = sadmm_scene_build(scene, &world, &error);
+    sadmm_world_destroy(world);
+    if (status != SADMM_ERROR_UNAVAILABLE) return false;
+    ck_assert_msg(strstr(error.message, "hull") && world == NULL, "%s: %s", scene->info->name, error.message);
+    return true;
+}
+
 static inline sadmm_world *create_world(const sadmm_world_def *def)
 {
     sadmm_world *world = NULL;

@@ -474,6 +474,9 @@ START_TEST(shapes_without_manifolds_are_refused)
         geometry->children = SADMM_MOST_CHILDREN + 1;
         expect_refused(s, "children = 65536");
         *geometry = good;
+        geometry->type = SADMM_SHAPE_HULL; /* of a pool that there is not */
+        expect_refused(s, "hull = 0");
+        *geometry = good;
         s->shapes[shape].geometry = MAX_SHAPES;
         expect_refused(s, "geometry = 4000");
         s->shapes[shape].geometry = (uint32_t)shape;

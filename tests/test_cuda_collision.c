@@ -6,6 +6,7 @@
  * run on a real one, or the program is skipped and says why. One file: nearly all tests run the same two pipelines
  * (`both`), most of them on the same random soups.
  */
+#include "hull_pool.h"
 #include "scene_tools.h"
 
 #include "backend_cuda/collide/pipeline.h"
@@ -175,6 +176,8 @@ struct soup {
     double *values;
     struct sadmm_collision_input input;
     uint32_t revisions;
+    struct test_pool *pool;    /* of hulls; NULL: there are none */
+    struct sadmm_geometry forms[8];
 };
 
 struct soup_kind {
@@ -185,6 +188,7 @@ struct soup_kind {
     double static_share, filter_share, disabled_share, friction_share, dead_share;
     int steps, tree_from;
     int children;           /* of a geometry, at most; 0: one */
+    int hulls;              /* forms of hulls; 0: no shape is one */
 };
 
 static int compare_keys(const void *a, const void *b)
@@ -217,6 +221,7 @@ static void random_shape(struct soup *s, const struct soup_kind *kind, struct sa
     geometry->children = 1 + (kind->children ? below(kind->children) : 0);
     for (int k = 0; k < 3; ++k) geometry->size[k] = kind->size_low * pow(kind->size_high / kind->size_low, uniform());
     if (chance(0.3)) geometry->size[1] = geometry->size[2] = geometry->size[0];
+    if (kind->hulls && chance(0.6)) *geometry = s->forms[below(kind->hulls)];
     random_quaternion(shape->orientation);
     if (kind->shapes_a_body > 1)
         for (int k = 0; k < 3; ++k) shape->position[k] = between(-1, 1) * geometry->size[0];
@@ -237,6 +242,22 @@ static struct soup soup_new(const struct soup_kind *kind, uint64_t number)
     double volume = 0;
     int32_t dynamic = 0;
     seed(number);
+    if (kind->hulls) {
+        uint64_t state = 4711 + number;
+        s.pool = test_pool_new();
+        for (int form = 0; form < kind->hulls; ++form) {
+            double size[3];
+            struct test_hull h;
+            for (int k = 0; k < 3; ++k) size[k] = between(kind->size_low, kind->size_high);
+            if (form == 0) box_hull(size, &h);
+            else if (form == 1) prism_hull(20, 0.5, &h);
+            else random_hull(&state, form == 2 ? 60 : 6 + below(20), size, &h);
+            s.forms[form] = test_pool_add(s.pool, &h);
+        }
+        s.input.hulls = s.pool->numbers;
+        s.input.hull_doubles = s.pool->used;
+        s.input.hull_revision = (uint32_t)number;
+    }
     s.shapes = calloc((size_t)shapes + 1, sizeof *s.shapes);
     s.geometries = calloc((size_t)shapes + 1, sizeof *s.geometries);
     s.bodies = calloc((size_t)bodies + 1, sizeof *s.bodies);
@@ -305,6 +326,7 @@ static void soup_free(struct soup *s)
     free(s->disabled);
     free(s->friction);
     free(s->values);
+    free(s->pool);
 }
 
 /* A step later: everything moved, some shapes gone, new or others. */
@@ -359,6 +381,10 @@ static const struct soup_kind soups[] = {
      .children = 3},
     {.name = "more than small tiles are for, all pairs", .bodies = 1100, .shapes_a_body = 1, .planes = 1, .density = 2,
      .size_low = 0.3, .size_high = 1, .static_share = 0.1, .steps = 1, .tree_from = 1000000},
+    {.name = "hulls among others, tree", .bodies = 150, .shapes_a_body = 1, .planes = 2, .density = 3, .size_low = 0.3,
+     .size_high = 1, .static_share = 0.1, .dead_share = 0.1, .steps = 4, .tree_from = 1, .hulls = 6},
+    {.name = "hulls among others, all pairs", .bodies = 60, .shapes_a_body = 2, .planes = 1, .density = 3,
+     .size_low = 0.3, .size_high = 1, .static_share = 0.1, .friction_share = 1, .steps = 4, .hulls = 6},
 };
 enum { SOUPS = sizeof soups / sizeof *soups };
 
@@ -615,6 +641,45 @@ START_TEST(slots_are_reused)
 }
 END_TEST
 
+/* A world puts its hulls closer together when some are gone: contents stay, places change. */
+START_TEST(hulls_move_in_the_pool)
+{
+    const double size[3] = {0.5, 0.4, 0.3};
+    struct test_pool *pool = test_pool_new();
+    struct test_hull h;
+    struct both b = both_new(_i ? 1 : 1000000);
+    struct sadmm_collision_body bodies[2] = {
+        {.orientation = {1, 0, 0, 0}, .system_body = 0},
+        {.position = {0, 0, 0.59}, .orientation = {1, 0, 0, 0}, .system_body = 1},
+    };
+    box_hull(size, &h);
+    struct sadmm_geometry geometries[2] = {test_pool_add(pool, &h), geometry_of(SADMM_SHAPE_BOX, 0.2, 0.2, 0.3)};
+    struct sadmm_shape shapes[2] = {shape_of(0), shape_of(1)};
+    struct sadmm_collision_input input = {.shapes = shapes, .shape_count = 2, .geometries = geometries,
+                                          .geometry_count = 2, .bodies = bodies, .body_count = 2, .dt = 0.01,
+                                          .margin = 0.02, .hulls = pool->numbers, .hull_doubles = pool->used,
+                                          .hull_revision = 1};
+    both_find(&b, &input, "first");
+    ck_assert_uint_eq(b.device_set.pair_count, 1);
+    ck_assert_int_eq(b.device_set.pairs[0].count, 4);
+    /* another hull takes its place, and it goes behind that one: no shape's revision says so */
+    const struct sadmm_geometry moved = test_pool_add(pool, &h);
+    prism_hull(5, 3, &h);
+    test_hull_block(&h, pool->numbers + geometries[0].hull);
+    pool->used += 400; /* where the longer one reaches */
+    test_hull_block(&h, pool->numbers + geometries[0].hull);
+    box_hull(size, &h);
+    geometries[0].hull = moved.hull + 400;
+    test_hull_block(&h, pool->numbers + geometries[0].hull);
+    input.hull_doubles = pool->used;
+    ++input.hull_revision;
+    both_find(&b, &input, "moved");
+    ck_assert_int_eq(b.device_set.pairs[0].count, 4);
+    both_free(&b);
+    free(pool);
+}
+END_TEST
+
 /* Pairs are matched by (shape, shape, child): of the four manifolds of two cubes the last step had all but the second.
  * Each goes on with its own impulses and its own axis (two are equally good), and the one that was not there starts
  * without. */
@@ -694,9 +759,9 @@ START_TEST(shapes_without_manifolds_are_refused)
         uint32_t handle;
         const char *words;
     } bad[] = {
-        {SADMM_SHAPE_TYPE_COUNT, 1, 1, "shapes[1]: type = 4"}, {-1, 1, 1, "type = -1"},
+        {SADMM_SHAPE_TYPE_COUNT, 1, 1, "shapes[1]: type = 5"}, {-1, 1, 1, "type = -1"},
         {SADMM_SHAPE_PLANE, 1, 1, "only static bodies"},       {SADMM_SHAPE_SPHERE, 0, 1, "children = 0"},
-        {SADMM_SHAPE_SPHERE, 1, 2, "geometry = 2"},
+        {SADMM_SHAPE_SPHERE, 1, 2, "geometry = 2"},            {SADMM_SHAPE_HULL, 1, 1, "hull = 0"},
     };
     struct both b = both_new(0);
     shapes[0] = shape_of(0);
@@ -933,6 +998,7 @@ int main(void)
     tcase_add_loop_test(tests, few_shapes, 0, 2);
     tcase_add_test(tests, one_place);
     tcase_add_test(tests, slots_are_reused);
+    tcase_add_loop_test(tests, hulls_move_in_the_pool, 0, 2);
     tcase_add_loop_test(tests, children_are_matched_by_number, 0, 4);
     tcase_add_test(tests, shapes_without_manifolds_are_refused);
     tcase_add_test(tests, a_find_can_be_undone);

@@ -6,6 +6,7 @@
  *
  * One file: one function is under test, and these tolerances hold for all of its tests.
  */
+#include "hull_pool.h"
 #include "manifold_tools.h"
 
 #include "subadmm/world.h"
@@ -952,18 +953,24 @@ END_TEST
 START_TEST(every_pair_of_types_is_listed)
 {
     const double size[3] = {0.5, 0.5, 0.5};
+    struct test_pool *pool = test_pool_new();
+    struct test_hull cube;
+    box_hull(size, &cube);
+    const uint32_t hull = test_pool_add(pool, &cube).hull;
     for (int a = -1; a <= 2 * SADMM_SHAPE_TYPE_COUNT; ++a)
         for (int b = a; b <= 2 * SADMM_SHAPE_TYPE_COUNT; ++b) {
             const bool known = a >= 0 && b < SADMM_SHAPE_TYPE_COUNT;
             const bool listed = known && !(a == SADMM_SHAPE_PLANE && b == SADMM_SHAPE_PLANE);
-            const struct sadmm_geometry a_is = geometry_of(a, size), b_is = geometry_of(b, size);
+            struct sadmm_geometry a_is = geometry_of(a, size), b_is = geometry_of(b, size);
             const struct pair_pose pose = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0.1, 0.1, 0.1}}; /* one in the other */
             struct manifold m;
             memset(&m, 0x55, sizeof m);
-            pair_manifold(&a_is, &b_is, 0, &pose, 0, 0, &m);
+            a_is.hull = b_is.hull = hull;
+            pair_manifold(&a_is, &b_is, pool->numbers, 0, &pose, 0, 0, &m);
             ck_assert_msg((m.count > 0) == listed, "types %d and %d: %d points", a, b, m.count);
             ck_assert_msg(pair_is_listed(a, b) == listed && pair_is_listed(b, a) == listed, "types %d and %d", a, b);
         }
+    free(pool);
 }
 END_TEST
 

@@ -258,6 +258,56 @@ static void on_others(void)
     for (int k = 0; k < 3; ++k) ck_assert(inertia[k] == 7);
 }
 
+/* Where hulls can be made; elsewhere that is said. */
+static void on_hulls(void)
+{
+    static const double corners[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+    sadmm_hull_def def = sadmm_hull_def_default();
+    sadmm_hull *hull;
+    sadmm_hull_face face;
+    sadmm_mass mass;
+    def.point_count = 4;
+    REFUSES("out", sadmm_hull_create(&def, NULL));
+    REFUSES("def", sadmm_hull_create(NULL, &hull));
+    REFUSES("def->points", sadmm_hull_create(&def, &hull));
+    ck_assert_ptr_null(hull);
+    sadmm_hull_destroy(NULL);
+    ck_assert_int_eq(sadmm_hull_vertex_count(NULL), 0);
+    ck_assert_int_eq(sadmm_hull_edge_count(NULL), 0);
+    ck_assert_int_eq(sadmm_hull_face_count(NULL), 0);
+    ck_assert_ptr_null(sadmm_hull_vertices(NULL));
+    REFUSES("hull", sadmm_hull_face_at(NULL, 0, &face));
+    REFUSES("hull", sadmm_hull_mass(NULL, 1, &mass));
+    def.points = corners;
+    const sadmm_status status = sadmm_hull_create(&def, &hull);
+    if (status != SADMM_OK) {
+        ck_assert_int_eq(status, SADMM_ERROR_UNAVAILABLE);
+        ck_assert_ptr_nonnull(strstr(sadmm_last_message(), "qhull"));
+        return;
+    }
+    REFUSES("out", sadmm_hull_face_at(hull, 0, NULL));
+    REFUSES("mass", sadmm_hull_mass(hull, 1, NULL));
+    sadmm_hull_destroy(hull);
+}
+
+static void on_masses(void)
+{
+    double position[3] = {0}, orientation[4] = {1};
+    sadmm_shape_def def = sadmm_shape_def_default();
+    sadmm_mass mass = {.mass = 1, .orientation = {1}};
+    def.size[0] = 1;
+    REFUSES("def", sadmm_shape_mass(NULL, 1, &mass));
+    REFUSES("mass", sadmm_shape_mass(&def, 1, NULL));
+    REFUSES("parts", sadmm_mass_sum(NULL, 1, &mass));
+    REFUSES("sum", sadmm_mass_sum(&mass, 1, NULL));
+    REFUSES("mass", sadmm_mass_pose_in_body(NULL, position, orientation));
+    REFUSES("position", sadmm_mass_pose_in_body(&mass, NULL, orientation));
+    REFUSES("orientation", sadmm_mass_pose_in_body(&mass, position, NULL));
+    REFUSES("mass", sadmm_mass_pose_of_body(NULL, position, orientation));
+    REFUSES("position", sadmm_mass_pose_of_body(&mass, NULL, orientation));
+    REFUSES("orientation", sadmm_mass_pose_of_body(&mass, position, NULL));
+}
+
 /* By the function that passes NULL to them; those without a pointer have none. */
 #define P(name) "sadmm_problem_" #name
 #define W(name) "sadmm_world_" #name
@@ -288,10 +338,16 @@ static const struct {
      {P(create), P(destroy), P(message), P(set_bodies), P(set_contacts), P(set_blocks), P(body_count), P(contact_count),
       P(block_count), P(get_bodies), P(get_contact), P(get_block), P(set_device), P(set_tasks), P(solve),
       P(get_solution), P(set_solution), P(certify)}},
+    {on_hulls,
+     {"sadmm_hull_create", "sadmm_hull_destroy", "sadmm_hull_vertex_count", "sadmm_hull_edge_count",
+      "sadmm_hull_face_count", "sadmm_hull_vertices", "sadmm_hull_face_at", "sadmm_hull_mass"}},
+    {on_masses,
+     {"sadmm_shape_mass", "sadmm_mass_sum", "sadmm_mass_pose_in_body", "sadmm_mass_pose_of_body"}},
     {on_others, {"sadmm_backend_query", "sadmm_box_inertia", "sadmm_sphere_inertia", "sadmm_capsule_inertia"}},
     {NULL,
      {"sadmm_settings_default", W(def_default), "sadmm_body_def_default", "sadmm_shape_def_default",
-      "sadmm_joint_def_default", "sadmm_coupling_def_default", "sadmm_gear_def_default", "sadmm_status_name",
+      "sadmm_hull_def_default", "sadmm_joint_def_default", "sadmm_coupling_def_default", "sadmm_gear_def_default",
+      "sadmm_status_name",
       "sadmm_last_message", "sadmm_version", "sadmm_build_commit", "sadmm_build_compiler"}},
 };
 enum { GROUPS = sizeof functions / sizeof *functions };

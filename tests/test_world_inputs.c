@@ -241,6 +241,15 @@ START_TEST(bad_shapes_are_refused)
     expect_refused(w.world, sadmm_world_add_shape(w.world, w.low, &def, NULL), SADMM_ERROR_INVALID_ARGUMENT, "type");
     def.type = (sadmm_shape_type)-1;
     expect_refused(w.world, sadmm_world_add_shape(w.world, w.low, &def, NULL), SADMM_ERROR_INVALID_ARGUMENT, "type");
+    def.type = (sadmm_shape_type)(65536 + SADMM_SHAPE_BOX); /* a box in 16 bits */
+    expect_refused(w.world, sadmm_world_add_shape(w.world, w.low, &def, NULL), SADMM_ERROR_INVALID_ARGUMENT, "type");
+    def.type = SADMM_SHAPE_HULL;
+    expect_refused(w.world, sadmm_world_add_shape(w.world, w.low, &def, NULL), SADMM_ERROR_INVALID_ARGUMENT,
+                   "def->hull = NULL: must be given");
+    def.type = SADMM_SHAPE_BOX;
+    def.hull = (const sadmm_hull *)&def; /* never looked behind */
+    expect_refused(w.world, sadmm_world_add_shape(w.world, w.low, &def, NULL), SADMM_ERROR_INVALID_ARGUMENT,
+                   "def->hull: must be NULL");
     expect_refused(w.world, sadmm_world_add_shape(w.world, w.low, NULL, NULL), SADMM_ERROR_INVALID_ARGUMENT, "def");
     ck_assert_int_eq(sadmm_world_shape_count(w.world), 3);
     expect_equal_future(w.world, other.world);

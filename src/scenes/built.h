@@ -1,22 +1,28 @@
-/* Structures of boxes that are built at rest and have to stay as they are. */
+/* Structures of blocks that are built at rest and have to stay as they are. */
 #ifndef SADMM_SCENES_BUILT_H
 #define SADMM_SCENES_BUILT_H
 
 #include "place.h"
 #include "scenes.h"
 
-/* Where box `i` of a structure was put. */
-typedef struct sadmm_frame (*sadmm_built_at)(int32_t i);
+/* Where block `i` of a structure was put: the frame of its shape. */
+typedef struct sadmm_frame (*sadmm_built_at)(const struct sadmm_scene *scene, int32_t i);
 
-/* Bodies [first, first + count) of the world are boxes 0 to count - 1 of the structure: how far any of them is from
- * where it was put (m), and the fastest one's speed (m/s). `skip`: a box that is left out, or -1. NaN stays NaN. */
-sadmm_status sadmm_measure_built(sadmm_world *world, int32_t first, int32_t count, int32_t skip, sadmm_built_at at,
+/* A structure of blocks of one shape each, which are shapes [first, first + count) of the world. */
+struct sadmm_built {
+    int32_t first, count, skip; /* skip: a block that is left out, or -1 */
+    sadmm_built_at at;
+    double end, most; /* s, m: it has passed if at `end` no block is farther than `most` from where it was put */
+};
+
+/* How far any of the blocks is from where it was put, by the origin of its shape (m), and the fastest one's speed
+ * (m/s). NaN stays NaN. */
+sadmm_status sadmm_measure_built(const struct sadmm_scene *scene, sadmm_world *world, const struct sadmm_built *built,
                                  double *moved, double *speed, struct sadmm_error *error);
 
-/* A task of the figures "moved" (m) and "speed" (m/s), measured of such a structure ten times a second. It has passed
- * if at `end` (s) no box is farther than `most` (m) from where it was put. */
-sadmm_status sadmm_observe_built(const struct sadmm_scene *scene, sadmm_world *world, int64_t step, int32_t first,
-                                 int32_t count, int32_t skip, sadmm_built_at at, double end, double most,
-                                 struct sadmm_scene_task *task, struct sadmm_error *error);
+/* A task of the figures "moved" (m) and "speed" (m/s), measured ten times a second. */
+sadmm_status sadmm_observe_built(const struct sadmm_scene *scene, sadmm_world *world, int64_t step,
+                                 const struct sadmm_built *built, struct sadmm_scene_task *task,
+                                 struct sadmm_error *error);
 
 #endif

@@ -53,5 +53,9 @@ extern const struct sadmm_scene_family sadmm_family_jenga;
 extern const struct sadmm_scene_family sadmm_family_bridge;
 extern const struct sadmm_scene_family sadmm_family_ragdolls;
 extern const struct sadmm_scene_family sadmm_family_mixer;
+extern const struct sadmm_scene_family sadmm_family_arch;
+extern const struct sadmm_scene_family sadmm_family_dry_stone;
+extern const struct sadmm_scene_family sadmm_family_mesh_pile;
+extern const struct sadmm_scene_family sadmm_family_peg_in_hole;
 
 #endif

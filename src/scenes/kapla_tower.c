@@ -16,8 +16,9 @@ static bool lies_across(int32_t i)
 }
 
 /* On a floor: those across, then those along on the right, then on the left. */
-static struct sadmm_frame plank_at(int32_t i)
+static struct sadmm_frame plank_at(const struct sadmm_scene *scene, int32_t i)
 {
+    (void)scene;
     const int32_t k = i % FLOOR;
     const double bottom = 4 * across[2] * (double)(i / FLOOR);
     double x = pitch * k, y = 0;
@@ -38,19 +39,18 @@ static sadmm_status fill(const struct sadmm_scene *scene, sadmm_world *world, st
         {.half_extents = {along[0], along[1], along[2]}, .mass = 10, .friction = 0.8},
         {.half_extents = {across[0], across[1], across[2]}, .mass = 10, .friction = 0.8},
     };
-    (void)scene;
     sadmm_status status = sadmm_place_plane(world, sadmm_frame_world(), 0.8, error);
     for (int32_t i = 0; i < PLANKS && status == SADMM_OK; ++i)
-        status = sadmm_place_box(world, plank_at(i), &pieces[lies_across(i)], NULL, error);
+        status = sadmm_place_box(world, plank_at(scene, i), &pieces[lies_across(i)], NULL, error);
     return status;
 }
 
 static sadmm_status observe(const struct sadmm_scene *scene, sadmm_world *world, int64_t step,
                             struct sadmm_scene_result *result, struct sadmm_error *error)
 {
+    const struct sadmm_built tower = {1, PLANKS, -1, plank_at, .end = scene->info->duration, .most = 1e-3};
     result->task_count = 1;
-    return sadmm_observe_built(scene, world, step, 1, PLANKS, -1, plank_at, scene->info->duration, 1e-3,
-                               &result->tasks[0], error);
+    return sadmm_observe_built(scene, world, step, &tower, &result->tasks[0], error);
 }
 
 static void configure(long n, sadmm_world_def *def)

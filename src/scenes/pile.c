@@ -6,41 +6,12 @@
  * for good and its contacts change all the time.
  */
 #include <math.h>
-#include <stdint.h>
 
-#include "core/math/quat.h"
 #include "family.h"
+#include "noise.h"
 #include "place.h"
 
 static const double spacing = 0.2; /* m: more than the diagonal of either box */
-
-/* Finaliser of MurmurHash3: all bits of the result depend on all bits of x. */
-static uint64_t hash(uint64_t x)
-{
-    x ^= x >> 33;
-    x *= 0xff51afd7ed558ccdu;
-    x ^= x >> 33;
-    x *= 0xc4ceb9fe1a85ec53u;
-    return x ^ x >> 33;
-}
-
-/* The k-th number in [-1, 1) of body i. */
-static double noise(long i, uint64_t k)
-{
-    return (double)(hash((uint64_t)i * 4096 + k + 1) >> 11) * 0x1p-52 - 1.0;
-}
-
-/* Uniform over all orientations: a point of the 4-cube that falls into the ball, normalised. A try succeeds with
- * probability 0.31, so the last resort after 1000 is for the proof only. */
-static quat random_orientation(long i)
-{
-    for (uint64_t k = 0; k < 4000; k += 4) {
-        quat q = { noise(i, k), noise(i, k + 1), noise(i, k + 2), noise(i, k + 3) };
-        double norm2 = q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z;
-        if (norm2 > 0.01 && norm2 <= 1.0) return q_normalize(q);
-    }
-    return (quat){ 1, 0, 0, 0 };
-}
 
 static const double slope = 0.4, slope_friction = 0.3; /* tan and mu: g (sin - mu cos) = 0.91 m/s^2 downhill */
 
@@ -67,8 +38,8 @@ static sadmm_status fill_kind(const struct sadmm_scene *scene, sadmm_world *worl
         double y = spacing * ((double)row - 0.5 * (double)(side - 1));
         struct sadmm_frame place = sadmm_frame_moved(ground, x, y, spacing * ((double)layer + 0.6));
         struct sadmm_piece piece = pieces[i % 2];
-        q_store(random_orientation(i), place.orientation);
-        if (kind == MIXED) piece.mass = pow(10, 1.5 * noise(i, 4095));
+        q_store(sadmm_noise_orientation(i), place.orientation);
+        if (kind == MIXED) piece.mass = pow(10, 1.5 * sadmm_noise(i, 4095));
         status = sadmm_place_box(world, place, &piece, NULL, error);
     }
     return status;

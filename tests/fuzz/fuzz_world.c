@@ -14,7 +14,7 @@
 #include "subadmm/world.h"
 
 /* Few, so that an input is quick and its calls meet the same objects again. */
-enum { MAX_BODIES = 6, MAX_SHAPES = 8, MAX_CALLS = 64, MAX_STEPS = 10, IDS = 16 };
+enum { MAX_BODIES = 6, MAX_SHAPES = 8, MAX_CALLS = 64, MAX_STEPS = 10, IDS = 16, HULLS = 4 };
 enum { MAX_CONTACTS = 8 * MAX_SHAPES * MAX_SHAPES };
 
 struct machine {
@@ -78,6 +78,8 @@ static struct picture look(sadmm_world *world)
         p.objects = mix(p.objects, &id, sizeof id);
         p.objects = mix(p.objects, &body, sizeof body);
         p.objects = mix(p.objects, def.size, sizeof def.size);
+        p.objects = mix(p.objects, def.position, sizeof def.position);
+        p.objects = mix(p.objects, &def.hull, sizeof def.hull);
         p.objects = mix(p.objects, &def.friction, sizeof def.friction);
     }
     return p;
@@ -255,11 +257,34 @@ static sadmm_body_def take_body_def(struct machine *m)
     return def;
 }
 
+/* One of a few hulls, which every input meets again; NULL in libraries that cannot make any. */
+static const sadmm_hull *hull_at(int k)
+{
+    static sadmm_hull *hulls[HULLS];
+    sadmm_hull **hull = &hulls[k % HULLS];
+    if (!*hull) { /* with 4, 6, 8 and 10 corners, the longer the thinner */
+        double points[30];
+        const int count = 2 * (k % HULLS + 2);
+        for (int i = 0; i < count; ++i) {
+            points[3 * i] = 0.5 * cos(2.4 * i);
+            points[3 * i + 1] = 0.5 * sin(2.4 * i);
+            points[3 * i + 2] = (i % 2 ? 0.4 : -0.4) / (k % HULLS + 1);
+        }
+        const sadmm_hull_def def = {.points = points, .point_count = (size_t)count};
+        if (sadmm_hull_create(&def, hull) != SADMM_OK) return NULL;
+    }
+    return *hull;
+}
+
 static sadmm_shape_def take_shape_def(struct machine *m)
 {
     struct bytes *in = &m->in;
     sadmm_shape_def def = sadmm_shape_def_default();
-    def.type = (sadmm_shape_type)(take_rarely(in, 32) ? take_byte(in) : take_choice(in, SADMM_SHAPE_TYPE_COUNT));
+    const bool any_type = take_rarely(in, 32);
+    const int type = take_byte(in);
+    if (!any_type && type >= 240) def.type = SADMM_SHAPE_HULL;
+    else def.type = (sadmm_shape_type)(any_type ? type : type % SADMM_SHAPE_HULL);
+    if (def.type == SADMM_SHAPE_HULL && type < 255) def.hull = hull_at(type);
     bool any_size = take_choice(in, 4) == 3;
     for (int k = 0; k < 3; ++k) {
         def.size[k] = any_size ? take_scale(in, 1e-6, 1e6) : take_in(in, 0.1, 0.9);
@@ -443,6 +468,7 @@ static sadmm_status make_call(struct machine *m)
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
+    for (int k = 0; k < HULLS; ++k) hull_at(k); /* before memory runs out */
     static struct machine m;
     memset(&m, 0, offsetof(struct machine, contacts));
     m.in = bytes_of(data, size);

@@ -1,0 +1,211 @@
+/* subadmm-bench shapes: what the manifold of a pair costs one core, by types. Pairs rest face on face (round shapes: on a
+ * face), each turned in its own way, with the memory of the step before (warm) and without (cold); what is timed is the
+ * narrow phase of contact finding as steps run it, matching and all. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bench.h"
+#include "bench_options.h"
+#include "cli/interrupt.h"
+#include "collision/hull.h"
+#include "collision/kernels.h"
+#include "collision/polytope.h"
+#include "core/base/clock.h"
+#include "core/base/memory.h"
+#include "core/math/quat.h"
+#include "subadmm/subadmm.h"
+
+static const char command[] = "shapes";
+
+enum { PAIRS = 512, FORMS = 8, REPEATS = 30 };
+
+/* A shape of size 1 m or so, and which way it rests on another. */
+struct form {
+    const char *name;
+    struct sadmm_geometry geometry;
+    quat down;    /* turns it so that a face, or its side, is down */
+    double below; /* from its origin to there, m */
+};
+
+struct bench {
+    struct form forms[FORMS];
+    int form_count;
+    sadmm_hull *hulls[FORMS];
+    double *pool;
+    size_t pool_doubles, pool_capacity;
+    struct sadmm_shape shapes[2 * PAIRS];
+    struct sadmm_geometry geometries[2];
+    struct sadmm_collision_body bodies[2 * PAIRS];
+    struct sadmm_collision_input input;
+    struct sadmm_candidates candidates;
+    struct sadmm_contact_set before, after;
+};
+
+static struct form *add_form(struct bench *b, const char *name, int type, double s0, double s1, double s2)
+{
+    struct form *form = &b->forms[b->form_count++];
+    *form = (struct form){.name = name,
+                          .geometry = {.type = type, .children = 1, .size = {s0, s1, s2}},
+                          .down = {1, 0, 0, 0}, .below = s2};
+    return form;
+}
+
+/* The turn that takes the unit vector n to -z. */
+static quat turn_down(const double n[3])
+{
+    const double w = 1 - n[2];
+    const double q[4] = {w, -n[1], n[0], 0}, x[4] = {0, 1, 0, 0};
+    return w < 1e-12 ? q_load(x) : q_normalize(q_load(q));
+}
+
+static sadmm_status add_hull(struct bench *b, const char *name, const double *points, size_t count,
+                             struct sadmm_error *error)
+{
+    const sadmm_hull_def def = {.points = points, .point_count = count, .merge = 1e-6};
+    sadmm_hull *hull;
+    sadmm_status status = sadmm_hull_create(&def, &hull);
+    if (status != SADMM_OK) return sadmm_fail(error, status, "%s", sadmm_last_message());
+    b->hulls[b->form_count] = hull;
+    if (!sadmm_grow(&b->pool, &b->pool_capacity, b->pool_doubles, b->pool_doubles + hull->doubles, sizeof *b->pool))
+        return sadmm_fail_memory(error, "the hulls");
+    struct form *form = add_form(b, name, SADMM_SHAPE_HULL, hull->half[0], hull->half[1], hull->half[2]);
+    form->geometry.hull = (uint32_t)b->pool_doubles;
+    memcpy(b->pool + b->pool_doubles, hull->block, hull->doubles * sizeof *b->pool);
+    b->pool_doubles += hull->doubles;
+    struct polytope p;
+    polytope_at(b->pool, form->geometry.hull, &p);
+    const double n[3] = {p.nx[0], p.ny[0], p.nz[0]};
+    form->down = turn_down(n);
+    form->below = p.offset[0];
+    return SADMM_OK;
+}
+
+/* Points spread over a sphere (golden spiral): all are corners. */
+static void spread(int count, double *points)
+{
+    for (int k = 0; k < count; ++k) {
+        const double z = 1 - (2 * k + 1.0) / count, r = sqrt(1 - z * z), angle = k * 2.399963229728653;
+        const double x[3] = {r * cos(angle), r * sin(angle), z};
+        memcpy(points + 3 * k, x, sizeof x);
+    }
+}
+
+static sadmm_status make_forms(struct bench *b, struct sadmm_error *error)
+{
+    double cube[24], ball[3 * 128];
+    if (!sadmm_grow(&b->pool, &b->pool_capacity, 0, HULL_FIRST_OWN, sizeof *b->pool))
+        return sadmm_fail_memory(error, "the hulls");
+    sadmm_hull_prelude(b->pool);
+    b->pool_doubles = HULL_FIRST_OWN;
+    add_form(b, "sphere", SADMM_SHAPE_SPHERE, 1, 0, 0)->below = 1;
+    const double z[3] = {1, 0, 0};
+    struct form *capsule = add_form(b, "capsule", SADMM_SHAPE_CAPSULE, 0.5, 0.5, 0);
+    capsule->down = turn_down(z);
+    capsule->below = 0.5;
+    add_form(b, "box", SADMM_SHAPE_BOX, 1, 1, 1);
+    for (int v = 0; v < 8; ++v)
+        for (int k = 0; k < 3; ++k) cube[3 * v + k] = v >> k & 1 ? 1 : -1;
+    sadmm_status status = add_hull(b, "box as hull", cube, 8, error);
+    static const struct {
+        const char *name;
+        int count;
+    } balls[] = {{"hull of 16", 16}, {"hull of 32", 32}, {"hull of 128", 128}};
+    for (size_t k = 0; k < sizeof balls / sizeof *balls && status == SADMM_OK; ++k) {
+        spread(balls[k].count, ball);
+        status = add_hull(b, balls[k].name, ball, (size_t)balls[k].count, error);
+    }
+    return status;
+}
+
+/* The pairs, far from each other: `lower` upside down, `upper` on it. */
+static void place(struct bench *b, const struct form *lower, const struct form *upper)
+{
+    static const double flip[4] = {0, 1, 0, 0};
+    b->geometries[0] = lower->geometry;
+    b->geometries[1] = upper->geometry;
+    for (int k = 0; k < 2 * PAIRS; ++k) {
+        const bool on_top = k % 2;
+        const struct form *form = on_top ? upper : lower;
+        const double half = 0.5 * (0.1 + 0.37 * k), turn[4] = {cos(half), 0, 0, sin(half)};
+        struct sadmm_collision_body *body = &b->bodies[k];
+        quat q = q_mul(q_load(turn), form->down);
+        if (!on_top) q = q_mul(q_load(flip), q);
+        *body = (struct sadmm_collision_body){
+            .position = {10.0 * (k / 2), 0.1 * on_top, on_top ? lower->below + upper->below - 1e-4 : 0},
+            .system_body = on_top ? k / 2 : -1, .inertia = 1};
+        q_store(q_normalize(q), body->orientation);
+        b->shapes[k] = (struct sadmm_shape){.geometry = (uint32_t)on_top, .orientation = {1, 0, 0, 0}, .friction = 0.5,
+                                            .category = 1, .mask = UINT32_MAX, .body = k, .alive = true,
+                                            .revision = b->shapes[k].revision + 1};
+    }
+}
+
+/* us a pair; *points: of a pair. */
+static sadmm_status measure(struct bench *b, bool warm, double *us, double *points, struct sadmm_error *error)
+{
+    double best = HUGE_VAL;
+    TRY(sadmm_candidates_update(&b->candidates, &b->input, 1, error));
+    b->before.pair_count = b->before.point_count = 0;
+    for (int repeat = 0; repeat < REPEATS; ++repeat) {
+        const double begin = sadmm_clock_ms();
+        b->after.pair_count = b->after.point_count = 0;
+        if (!b->candidates.kernels->narrow_phase(&b->candidates, &b->input, 0, b->candidates.list.count, &b->before,
+                                                 &b->after))
+            return sadmm_fail_memory(error, "contacts");
+        const double ms = sadmm_clock_ms() - begin;
+        if (repeat > 0 && ms < best) best = ms; /* what disturbs a run only makes it longer */
+        if (warm) {
+            const struct sadmm_contact_set swap = b->before;
+            b->before = b->after;
+            b->after = swap;
+        }
+    }
+    *us = 1e3 * best / PAIRS;
+    *points = (double)(warm ? b->before : b->after).point_count / PAIRS;
+    return SADMM_OK;
+}
+
+static sadmm_status run(struct bench *b, struct sadmm_error *error)
+{
+    TRY(make_forms(b, error));
+    TRY(sadmm_candidates_init(&b->candidates, sadmm_broad_phase_default(), error));
+    b->input = (struct sadmm_collision_input){
+        .shapes = b->shapes, .shape_count = 2 * PAIRS, .geometries = b->geometries, .geometry_count = 2,
+        .hulls = b->pool, .hull_doubles = b->pool_doubles, .bodies = b->bodies, .body_count = 2 * PAIRS,
+        .dt = 0.005, .margin = 0.02, .threads = 1, .gravity = 9.81};
+    printf("%-12s %-12s %8s %10s %10s   (%d pairs, %s, us a pair)\n", "on", "rests", "points", "warm", "cold", PAIRS,
+           b->candidates.kernels->variant);
+    for (int lower = 2; lower < b->form_count; ++lower)
+        for (int upper = 0; upper < b->form_count && !interrupted(); ++upper) {
+            double warm = 0, cold = 0, points = 0;
+            if (upper > lower) continue;
+            place(b, &b->forms[lower], &b->forms[upper]);
+            TRY(measure(b, false, &cold, &points, error));
+            TRY(measure(b, true, &warm, &points, error));
+            printf("%-12s %-12s %8.1f %10.3f %10.3f\n", b->forms[lower].name, b->forms[upper].name, points, warm, cold);
+            fflush(stdout);
+        }
+    return SADMM_OK;
+}
+
+int bench_shapes(int argc, char **argv)
+{
+    struct sadmm_error error = {SADMM_OK, ""};
+    int code = bench_parse(command, NULL, 0, NULL, argc, argv);
+    if (code) return code < 0 ? 0 : code;
+    struct bench *b = sadmm_alloc(1, sizeof *b);
+    sadmm_status status = b ? run(b, &error) : sadmm_fail_memory(&error, "the pairs");
+    if (b) {
+        sadmm_candidates_free(&b->candidates);
+        sadmm_contact_set_free(&b->before);
+        sadmm_contact_set_free(&b->after);
+        for (int k = 0; k < FORMS; ++k) sadmm_hull_destroy(b->hulls[k]);
+        sadmm_free(b->pool);
+    }
+    sadmm_free(b);
+    if (status == SADMM_OK) return 0;
+    fprintf(stderr, "subadmm-bench %s: %s\n", command, error.message);
+    return 1;
+}

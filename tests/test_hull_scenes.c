@@ -1,0 +1,231 @@
+/* Scenes with convex hulls: they pass, in either method and precision; the arch stands and falls where limit analysis
+ * says; and none passes where what it rests on is taken away. */
+#include "scene_results.h"
+
+static const struct {
+    sadmm_method method;
+    sadmm_precision precision;
+} ways[] = {
+    {SADMM_METHOD_FAST, SADMM_F64},
+    {SADMM_METHOD_FAST, SADMM_F32},
+    {SADMM_METHOD_PAPER, SADMM_F64},
+    {SADMM_METHOD_PAPER, SADMM_F32},
+};
+enum { WAYS = sizeof ways / sizeof *ways };
+
+static const char *const specs[] = {"arch", "dry_stone", "mesh_pile:60", "peg_in_hole"};
+enum { SPECS = sizeof specs / sizeof *specs };
+
+START_TEST(scenes_pass)
+{
+    expect_success(specs[_i / WAYS], ways[_i % WAYS].method, ways[_i % WAYS].precision);
+}
+END_TEST
+
+static void set_friction(sadmm_world *world, double mu)
+{
+    for (int32_t k = 0; k < sadmm_world_shape_count(world); ++k) {
+        sadmm_shape_id id;
+        MUST(world, sadmm_world_shape_at(world, k, &id));
+        MUST(world, sadmm_world_set_shape_material(world, id, mu, 0));
+    }
+}
+
+/* The only task of a whole run, or of its first `seconds`; mu < 0: the scene's own friction. */
+static struct sadmm_scene_task run_scene(const char *spec, double mu, double seconds)
+{
+    struct sadmm_scene scene = open_result_scene(spec, SADMM_METHOD_FAST, SADMM_F64);
+    struct sadmm_scene_result result = {0};
+    sadmm_world *world = build_scene(&scene);
+    if (mu >= 0) set_friction(world, mu);
+    run_to_result(&scene, world, 0, lround(fmin(seconds, scene.duration) / scene.def.settings.dt), &result);
+    sadmm_world_destroy(world);
+    ck_assert_int_eq(result.task_count, 1);
+    return result.tasks[0];
+}
+
+/* ---- the arch ---------------------------------------------------------------------------------------------------- */
+
+/* Does a line of thrust fit into an arch of n wedges of radius 1 and thickness t, with a horizontal thrust h? In the
+ * right half the thrust at the crown and the weights from there to a joint at angle b from the crown (sum w, moment
+ * sum w x) pass through the joint at a distance s from the centre:
+ *
+ *     s (h cos b + w sin b) = h c + sum w x,     c: the height of the thrust at the crown,
+ *
+ * and s has to be within the ring at every joint: an interval of h c. The room that is left, < 0: none. */
+static double room(int n, double t, double h)
+{
+    const double pi = 3.14159265358979323846, inner = 1 - t / 2, outer = 1 + t / 2, half = pi / (2 * n);
+    const double weight = 0.5 * (outer * outer - inner * inner) * sin(2 * half); /* of a wedge: its area */
+    const double centre = 2.0 / 3 * cos(half) * (outer * outer + outer * inner + inner * inner) / (outer + inner);
+    double b = 0, w = 0, moment = 0, low = -INFINITY, high = INFINITY;
+    if (n % 2) { /* half of the keystone: between verticals at 0 and to its joint, its lever from the areas' thirds */
+        b = half;
+        w = weight / 2;
+        moment = (outer * outer * outer - inner * inner * inner) * sin(half) * sin(half) * cos(half) / 6;
+    }
+    for (;; b += 2 * half) {
+        const double d = h * cos(b) + w * sin(b);
+        low = fmax(low, inner * d - moment);
+        high = fmin(high, outer * d - moment);
+        if (b > pi / 2 - half) return high - low;
+        w += weight;
+        moment += weight * centre * sin(b + half);
+    }
+}
+
+/* The least thickness for which there is a thrust with room; room is concave in h. */
+static double least_thickness(int n)
+{
+    double thin = 0.01, thick = 0.3;
+    for (int k = 0; k < 40; ++k) {
+        const double t = 0.5 * (thin + thick);
+        double low = 0, high = 2 * t;
+        for (int j = 0; j < 100; ++j) {
+            const double a = low + (high - low) / 3, b = high - (high - low) / 3;
+            if (room(n, t, a) < room(n, t, b)) {
+                low = a;
+            } else {
+                high = b;
+            }
+        }
+        if (room(n, t, low) >= 0) {
+            thick = t;
+        } else {
+            thin = t;
+        }
+    }
+    return thick;
+}
+
+START_TEST(limit_analysis_is_the_known_one)
+{
+    ck_assert_double_eq_tol(least_thickness(1001), 0.1075, 5e-5); /* Milankovitch's ring */
+    ck_assert_double_lt(least_thickness(9), least_thickness(15));
+}
+END_TEST
+
+/* To the millimetre, of a radius of 1 m. */
+START_TEST(the_arch_stands_where_theory_says)
+{
+    static const int stones[] = {9, 15};
+    const double least = 1e3 * least_thickness(stones[_i]);
+    char spec[2][32];
+    snprintf(spec[0], sizeof spec[0], "arch:%d:%d", stones[_i], (int)ceil(least));
+    snprintf(spec[1], sizeof spec[1], "arch:%d:%d", stones[_i], (int)floor(least));
+    const struct sadmm_scene_task stands = run_scene(spec[0], -1, INFINITY), falls = run_scene(spec[1], -1, INFINITY);
+    ck_assert_msg(stands.finished && stands.passed, "%s moved by %g m", spec[0], figure(&stands, "moved"));
+    ck_assert_msg(falls.finished && !falls.passed && figure(&falls, "moved") > 0.5, "%s moved by %g m only", spec[1],
+                  figure(&falls, "moved"));
+}
+END_TEST
+
+/* Whatever its thickness, its thrust at the blocks leans by more than 0.1 of the weight. */
+START_TEST(the_arch_needs_friction)
+{
+    const struct sadmm_scene_task task = run_scene("arch", 0.1, INFINITY);
+    ck_assert(task.finished && !task.passed);
+    ck_assert_double_gt(figure(&task, "moved"), 0.1);
+}
+END_TEST
+
+/* ---- the wall ---------------------------------------------------------------------------------------------------- */
+
+/* Far below what anybody could see: 1e-11 m/s is 0.3 mm a year. And a stone that is pushed shows. */
+START_TEST(the_wall_does_not_creep)
+{
+    struct sadmm_scene scene = open_result_scene("dry_stone", SADMM_METHOD_FAST, SADMM_F64);
+    struct sadmm_scene_result result = {0};
+    sadmm_world *world = build_scene(&scene);
+    run_to_result(&scene, world, 0, 400, &result);
+    sadmm_body_state *from = all_states(world);
+    run_to_result(&scene, world, 400, 1400, &result);
+    ck_assert_double_lt(top_drift(world, from) / 5, 1e-11);
+    free(from);
+    const sadmm_body_id id = body_at(world, sadmm_world_body_count(world) - 1); /* at the end of the top course */
+    sadmm_body_state state = body_state(world, id);
+    state.linear_velocity[0] = 1;
+    MUST(world, sadmm_world_set_body_state(world, id, &state));
+    run_to_result(&scene, world, 1400, 1500, &result);
+    ck_assert_double_gt(figure(&result.tasks[0], "moved"), 0.03); /* v^2 / (2 mu g) = 73 mm */
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+/* ---- the pile ---------------------------------------------------------------------------------------------------- */
+
+START_TEST(the_pile_shares_six_hulls)
+{
+    struct sadmm_scene scene = open_result_scene("mesh_pile:100", SADMM_METHOD_FAST, SADMM_F64);
+    struct sadmm_scene_result result = {0};
+    struct sadmm_error error = {0};
+    const sadmm_hull *hulls[100];
+    int count = 0;
+    sadmm_world *world = build_scene(&scene);
+    for (int32_t k = 0; k < sadmm_world_shape_count(world); ++k) {
+        sadmm_shape_id id;
+        sadmm_shape_def def;
+        int known = 0;
+        MUST(world, sadmm_world_shape_at(world, k, &id));
+        MUST(world, sadmm_world_shape_def(world, id, &def, NULL));
+        for (int j = 0; j < count; ++j) known |= hulls[j] == def.hull;
+        if (def.hull && !known) hulls[count++] = def.hull;
+    }
+    ck_assert_int_eq(count, 6);
+
+    /* one that has left the yard, or is nowhere, shows */
+    run_to_result(&scene, world, 0, 5, &result);
+    const struct sadmm_scene_result early = result;
+    const sadmm_body_id id = body_at(world, sadmm_world_body_count(world) - 1);
+    sadmm_body_state state = body_state(world, id);
+    state.position[2] = -0.01;
+    MUST(world, sadmm_world_set_body_state(world, id, &state));
+    const int64_t end = lround(scene.duration / scene.def.settings.dt);
+    ck_assert_int_eq(sadmm_scene_observe(&scene, world, end, &result, &error), SADMM_OK);
+    ck_assert(result.tasks[0].finished && !result.tasks[0].passed);
+    ck_assert_double_eq(figure(&result.tasks[0], "outside"), 1);
+    state.position[2] = 0.5;
+    MUST(world, sadmm_world_set_body_state(world, id, &state));
+    result = early;
+    ck_assert_int_eq(sadmm_scene_observe(&scene, world, end, &result, &error), SADMM_OK);
+    ck_assert(result.tasks[0].passed); /* nothing has had the time to overlap */
+    sadmm_world_destroy(world);
+}
+END_TEST
+
+/* ---- the peg ----------------------------------------------------------------------------------------------------- */
+
+START_TEST(the_peg_is_not_there_at_once)
+{
+    const struct sadmm_scene_task task = run_scene("peg_in_hole", -1, 0.06);
+    ck_assert(!task.finished && !task.passed);
+    ck_assert_double_gt(figure(&task, "depth"), 0);
+    ck_assert_double_lt(figure(&task, "depth"), 0.03);
+}
+END_TEST
+
+/* Friction of 2 holds it: it stops in the lead-in. */
+START_TEST(a_rough_peg_gets_stuck)
+{
+    const struct sadmm_scene_task task = run_scene("peg_in_hole", 2, INFINITY);
+    ck_assert(task.finished && !task.passed);
+    ck_assert_double_lt(figure(&task, "depth"), 0.03);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("scenes with hulls");
+    TCase *cases = tcase_create("scenes");
+    tcase_set_timeout(cases, 100);
+    tcase_add_loop_test(cases, scenes_pass, 0, SPECS * WAYS);
+    tcase_add_test(cases, limit_analysis_is_the_known_one);
+    tcase_add_loop_test(cases, the_arch_stands_where_theory_says, 0, 2);
+    tcase_add_test(cases, the_arch_needs_friction);
+    tcase_add_test(cases, the_wall_does_not_creep);
+    tcase_add_test(cases, the_pile_shares_six_hulls);
+    tcase_add_test(cases, the_peg_is_not_there_at_once);
+    tcase_add_test(cases, a_rough_peg_gets_stuck);
+    suite_add_tcase(suite, cases);
+    return run_suite(suite);
+}

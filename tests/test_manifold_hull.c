@@ -1,0 +1,612 @@
+/* Contact of convex hulls: nearest points and depth against a reference that tries all features, points and normals
+ * against what the two shapes are, memory, exchange, and boxes as hulls against boxes. */
+#include <check.h>
+#include <stdio.h>
+
+#include "hull_pool.h"
+#include "manifold_tools.h"
+#include "run_suite.h"
+
+/* Two hulls with poses. */
+struct two {
+    struct test_pool *pool;
+    struct test_hull h[2];
+    struct sadmm_geometry g[2];
+    double R[2][9], x[2][3];
+};
+
+static struct pair_pose pose_of(const struct two *t)
+{
+    return pair_pose(false, t->R[0], t->x[0], t->R[1], t->x[1]);
+}
+
+static struct manifold touch_two(const struct two *t, double limit, uint32_t cache)
+{
+    const struct pair_pose pose = pose_of(t);
+    struct manifold m;
+    memset(&m, 0x55, sizeof m);
+    pair_manifold(&t->g[0], &t->g[1], t->pool->numbers, 0, &pose, limit, cache, &m);
+    ck_assert_int_ge(m.count, 0);
+    ck_assert_int_le(m.count, SADMM_MANIFOLD_POINTS);
+    return m;
+}
+
+static void rows_of(const double R[9], double rows[3][3])
+{
+    memcpy(rows, R, 9 * sizeof *R);
+}
+
+/* Distance, or minus the depth, by trying everything. */
+static double reference(const struct two *t)
+{
+    double xa[TEST_HULL_POINTS][3], xb[TEST_HULL_POINTS][3], Ra[3][3], Rb[3][3];
+    rows_of(t->R[0], Ra);
+    rows_of(t->R[1], Rb);
+    test_hull_place(&t->h[0], Ra, t->x[0], xa);
+    test_hull_place(&t->h[1], Rb, t->x[1], xb);
+    const double axes = test_hulls_axes(&t->h[0], (const double(*)[3])xa, Ra, &t->h[1], (const double(*)[3])xb, Rb);
+    return axes < 0 ? axes : test_hulls_distance(&t->h[0], (const double(*)[3])xa, &t->h[1], (const double(*)[3])xb);
+}
+
+static double size_of(const struct two *t)
+{
+    double size = 0;
+    for (int s = 0; s < 2; ++s) size += t_norm(t->g[s].size);
+    return size;
+}
+
+/* The separation of the two along a direction of b's frame. */
+static double along(const struct two *t, vec3 n)
+{
+    double xa[TEST_HULL_POINTS][3], xb[TEST_HULL_POINTS][3], Ra[3][3], Rb[3][3], world[3], local[3];
+    rows_of(t->R[0], Ra);
+    rows_of(t->R[1], Rb);
+    test_hull_place(&t->h[0], Ra, t->x[0], xa);
+    test_hull_place(&t->h[1], Rb, t->x[1], xb);
+    v3_store(n, local);
+    for (int k = 0; k < 3; ++k) world[k] = t_dot(Rb[k], local);
+    return test_apart_along((const double(*)[3])xa, t->h[0].vertices, (const double(*)[3])xb, t->h[1].vertices, world);
+}
+
+/* What a manifold says is true of the two: its normal parts them nearly as well as any, and its points are on both
+ * surfaces, as far apart as they say. */
+static void check_manifold(const struct two *t, const struct manifold *m, double best, double limit, const char *what)
+{
+    const double size = size_of(t), rounding = 1e-10 * size,
+                 thin = fmin(geometry_thickness(&t->g[0]), geometry_thickness(&t->g[1]));
+    double least = HUGE_VAL;
+    if (best > limit + rounding) return;
+    ck_assert_msg(m->count > 0 || best > limit - rounding, "%s: no contact at %g (limit %g)", what, best, limit);
+    if (m->count == 0) return;
+    const double s = along(t, m->normal);
+    ck_assert_msg(fabs(v3_norm(m->normal) - 1) < 1e-12, "%s: |n| - 1 = %g", what, v3_norm(m->normal) - 1);
+    /* a face is preferred: manifold_hull.h */
+    ck_assert_msg(s >= best - 0.1 * fabs(best) - 0.01 * thin - rounding && s <= best + rounding,
+                  "%s: separation %g along the normal, best %g", what, s, best);
+    for (int i = 0; i < m->count; ++i) {
+        const struct manifold_point *p = &m->points[i];
+        least = fmin(least, p->separation);
+        /* no two planes across the normal are nearer to each other than the shapes */
+        ck_assert_msg(p->separation >= s - rounding, "%s: point %d at %g, shapes at %g", what, i, p->separation, s);
+        ck_assert_msg(p->separation <= limit + rounding, "%s: point %d at %g, limit %g", what, i, p->separation, limit);
+        for (int k = 0; k < i; ++k) ck_assert_uint_ne(p->feature, m->points[k].feature);
+        for (int side = 0; side < 2; ++side) { /* on the surface of each: no face of it is above, one is at it */
+            double world[3], own[3], local[3], most = -HUGE_VAL;
+            const double sign = side == 0 ? -0.5 : 0.5;
+            v3_store(v3_madd(p->position, sign * p->separation, m->normal), local);
+            for (int k = 0; k < 3; ++k)
+                world[k] = t_dot(t->R[1] + 3 * k, local) + t->x[1][k] - t->x[side][k];
+            for (int k = 0; k < 3; ++k)
+                own[k] = t->R[side][k] * world[0] + t->R[side][3 + k] * world[1] + t->R[side][6 + k] * world[2];
+            for (int f = 0; f < t->h[side].faces; ++f)
+                most = fmax(most, t_dot(t->h[side].plane[f], own) - t->h[side].plane[f][3]);
+            /* clipping is tolerant (MANIFOLD_SNAP), and so is the memory of two edges (MANIFOLD_KEEP_EXTENT); the nearest
+             * points are not quite across the normal of a face that is preferred to theirs */
+            ck_assert_msg(fabs(most) <= 6e-3 * thin + 0.01 * fabs(p->separation) + rounding, "%s: point %d of %d (%08x) is %g off surface %d, thin %g, gap %g, s %g, best %g", what,
+                          i, m->count, p->feature, most, side, thin, p->separation, s, best);
+        }
+    }
+}
+
+/* The nearest features themselves, before any axis is preferred. */
+static double nearest(const struct two *t, vec3 start)
+{
+    const struct pair_pose pose = pose_of(t);
+    struct polytope_pair pair;
+    struct polytope_axis axis;
+    vec3 pa, pb;
+    uint32_t feature;
+    polytope_pair_make(&t->g[0], &t->g[1], t->pool->numbers, &pose, &pair);
+    ck_assert(hull_nearest(&pair, start, 1e300, &axis, &pa, &pb, &feature));
+    /* the points are as far apart as the axis says */
+    ck_assert_double_eq_tol(v3_dot(axis.n, v3_sub(pb, pa)), axis.separation, 1e-9 * size_of(t));
+    return axis.separation;
+}
+
+static void random_pose(struct random *r, double reach, struct two *t)
+{
+    for (int s = 0; s < 2; ++s) random_rotation(r, t->R[s]);
+    double d[3], length;
+    do {
+        for (int k = 0; k < 3; ++k) d[k] = random_in(r, -1, 1);
+        length = t_norm(d);
+    } while (length > 1 || length < 0.1);
+    for (int k = 0; k < 3; ++k) {
+        t->x[0][k] = random_in(r, -1, 1);
+        t->x[1][k] = t->x[0][k] + reach * d[k] / length;
+    }
+}
+
+static void turn_by(double R[9], const double axis[3], double angle)
+{
+    double turn[9];
+    rotation(turn, axis[0], axis[1], axis[2], angle);
+    multiply(turn, R, R);
+}
+
+static void column_of(const double R[9], int j, double out[3])
+{
+    for (int k = 0; k < 3; ++k) out[k] = R[3 * k + j];
+}
+
+/* Under sanitizers. */
+static int fewer(int count)
+{
+    return getenv("SADMM_TEST_SHORT") ? (count + 3) / 4 : count;
+}
+
+/* Hulls of many forms, needles and plates among them, deep, touching and apart. */
+START_TEST(distance_and_depth_are_the_references)
+{
+    struct random r = {.state = UINT64_C(88172645463325252) + (uint64_t)_i};
+    struct two *t = calloc(1, sizeof *t);
+    const char *more = getenv("HULL_POSES"); /* for long runs by hand: 2,000 take half an hour */
+    const int poses = more ? atoi(more) : fewer(8);
+    ck_assert_ptr_nonnull(t);
+    t->pool = test_pool_new();
+    for (int form = 0; form < 12; ++form) {
+        t->pool->used = HULL_FIRST_OWN;
+        for (int s = 0; s < 2; ++s) {
+            double size[3];
+            const double scale = pow(10, random_in(&r, -3, 2)), flat = pow(10, random_in(&r, -3, 0));
+            for (int k = 0; k < 3; ++k) size[k] = scale * (k == form % 3 ? flat : random_in(&r, 0.5, 1));
+            if (form % 4 == 3) box_hull(size, &t->h[s]);
+            else random_hull(&r.state, 4 + (int)(random_unit(&r) * 20), size, &t->h[s]);
+            t->g[s] = test_pool_add(t->pool, &t->h[s]);
+        }
+        for (int pose = 0; pose < poses; ++pose) {
+            char what[80];
+            const double size = size_of(t);
+            random_pose(&r, size * pow(random_unit(&r), 2), t);
+            const double best = reference(t);
+            snprintf(what, sizeof what, "set %d form %d pose %d", _i, form, pose);
+            const double found = nearest(t, v3(1, 0, 0));
+            ck_assert_msg(fabs(found - best) <= 1e-10 * size, "%s: %g, should be %g (size %g)", what, found, best, size);
+            const struct manifold m = touch_two(t, 0.1 * size, 0);
+            check_manifold(t, &m, best, 0.1 * size, what);
+            /* touching: moved by the distance, and a little less or more */
+            for (int touch = -2; touch <= 2 && best > -0.05 * size; ++touch) {
+                double n[3], world[3];
+                const struct manifold near = touch_two(t, 10 * size, 0);
+                if (near.count == 0) break;
+                v3_store(near.normal, n);
+                for (int k = 0; k < 3; ++k) world[k] = t_dot(t->R[1] + 3 * k, n);
+                const double wanted = touch * (touch % 2 ? 1e-12 : 1e-7) * size,
+                             way = along(t, near.normal) - wanted;
+                for (int k = 0; k < 3; ++k) t->x[1][k] -= way * world[k];
+                const double now = reference(t);
+                const double there = nearest(t, near.normal);
+                ck_assert_msg(fabs(there - now) <= 1e-10 * size, "%s touching %d: %g, should be %g", what, touch, there,
+                              now);
+                const struct manifold close = touch_two(t, 0.01 * size, near.cache);
+                check_manifold(t, &close, now, 0.01 * size, what);
+            }
+        }
+    }
+    free(t->pool);
+    free(t);
+}
+END_TEST
+
+/* Put b onto a: against its separation along the normal from a to b, with `gap` left. */
+static void put_together(struct two *t, double gap)
+{
+    const struct manifold m = touch_two(t, 100 * size_of(t), 0);
+    double n[3], world[3];
+    ck_assert_int_gt(m.count, 0);
+    v3_store(m.normal, n);
+    for (int k = 0; k < 3; ++k) world[k] = t_dot(t->R[1] + 3 * k, n);
+    const double way = along(t, m.normal) - gap;
+    for (int k = 0; k < 3; ++k) t->x[1][k] -= way * world[k];
+}
+
+/* Whichever of two hulls is a: the same planes part them, and the same points are the nearest. */
+START_TEST(exchange_changes_nothing)
+{
+    struct random r = {.state = 77 + (uint64_t)_i};
+    struct two *t = calloc(1, sizeof *t), *u = calloc(1, sizeof *u);
+    const double unit[3] = {1, 1, 1};
+    int alike = 0;
+    t->pool = test_pool_new();
+    for (int pose = 0; pose < 300; ++pose) {
+        t->pool->used = HULL_FIRST_OWN;
+        for (int s = 0; s < 2; ++s) {
+            random_hull(&r.state, 6 + (int)(random_unit(&r) * 16), unit, &t->h[s]);
+            t->g[s] = test_pool_add(t->pool, &t->h[s]);
+        }
+        random_pose(&r, 2, t);
+        put_together(t, random_in(&r, -0.05, 0.05));
+        *u = *t;
+        for (int s = 0; s < 2; ++s) {
+            u->h[s] = t->h[1 - s];
+            u->g[s] = t->g[1 - s];
+            memcpy(u->R[s], t->R[1 - s], sizeof u->R[s]);
+            memcpy(u->x[s], t->x[1 - s], sizeof u->x[s]);
+        }
+        const struct manifold m = touch_two(t, 0.1, 0), w = touch_two(u, 0.1, 0);
+        const double thin = fmin(geometry_thickness(&t->g[0]), geometry_thickness(&t->g[1]));
+        double n[2][3], local[2][3], turned = 0;
+        v3_store(m.normal, local[0]);
+        v3_store(w.normal, local[1]);
+        for (int k = 0; k < 3; ++k) {
+            n[0][k] = t_dot(t->R[1] + 3 * k, local[0]);
+            n[1][k] = t_dot(u->R[1] + 3 * k, local[1]);
+        }
+        for (int k = 0; k < 3; ++k) turned = fmax(turned, fabs(n[0][k] + n[1][k]));
+        /* a face that is preferred, but is over the other one by less than clipping tells, is left to one of the two */
+        ck_assert_double_eq_tol(along(t, m.normal), along(u, w.normal), 0.01 * thin);
+        if (turned > 1e-8) continue;
+        ++alike;
+        ck_assert_double_eq_tol(along(t, m.normal), along(u, w.normal), 1e-10 * size_of(t));
+        double least[2] = {HUGE_VAL, HUGE_VAL};
+        for (int i = 0; i < m.count; ++i) least[0] = fmin(least[0], m.points[i].separation);
+        for (int i = 0; i < w.count; ++i) least[1] = fmin(least[1], w.points[i].separation);
+        ck_assert_double_eq_tol(least[0], least[1], 1e-10 * size_of(t));
+        for (int i = 0; i < m.count; ++i) { /* points of the one are points of the other, but for those that merge */
+            double p[3], nearest_point = HUGE_VAL;
+            v3_store(m.points[i].position, p);
+            for (int k = 0; k < w.count; ++k) {
+                double q[3], d[3];
+                v3_store(w.points[k].position, q);
+                for (int j = 0; j < 3; ++j)
+                    d[j] = t_dot(t->R[1] + 3 * j, p) + t->x[1][j] - t_dot(u->R[1] + 3 * j, q) - u->x[1][j];
+                nearest_point = fmin(nearest_point, t_norm(d));
+            }
+            ck_assert_double_le(nearest_point, 4e-3 * thin);
+        }
+    }
+    ck_assert_int_ge(alike, 294);
+    free(t->pool);
+    free(t);
+    free(u);
+}
+END_TEST
+
+/* A box is a hull like any other: as deep, along the same normal, and resting faces have the same points. */
+START_TEST(boxes_are_hulls)
+{
+    static const double tilts[] = {0, 1e-9, 1e-7, 1e-5, 1e-3};
+    struct random r = {.state = 4711 + (uint64_t)_i};
+    struct two *t = calloc(1, sizeof *t), *u = calloc(1, sizeof *u);
+    t->pool = test_pool_new();
+    for (int pose = 0; pose < 200; ++pose) {
+        double half[2][3], world[3];
+        t->pool->used = HULL_FIRST_OWN;
+        for (int s = 0; s < 2; ++s) {
+            for (int k = 0; k < 3; ++k) half[s][k] = random_in(&r, 0.2, 1);
+            box_hull(half[s], &t->h[s]);
+            t->g[s] = test_pool_add(t->pool, &t->h[s]);
+            rotation(t->R[s], random_in(&r, -1, 1), random_in(&r, -1, 1), 1, tilts[_i]);
+        }
+        for (int k = 0; k < 3; ++k) t->x[0][k] = random_in(&r, -1, 1);
+        for (int k = 0; k < 2; ++k) world[k] = t->x[0][k] + random_in(&r, -0.9, 0.9) * (half[0][k] + half[1][k]);
+        world[2] = t->x[0][2] + half[0][2] + half[1][2] + random_in(&r, -0.02, 0.02);
+        memcpy(t->x[1], world, sizeof world);
+        *u = *t;
+        for (int s = 0; s < 2; ++s) {
+            const struct sadmm_geometry box = {.type = SADMM_SHAPE_BOX, .children = 1,
+                                               .size = {half[s][0], half[s][1], half[s][2]}};
+            u->g[s] = box;
+        }
+        const struct manifold boxes = touch_two(u, 0.1, 0);
+        for (int mixed = 0; mixed < 2; ++mixed) {
+            if (mixed) t->g[0] = u->g[0]; /* a box and a hull */
+            const struct manifold hulls = touch_two(t, 0.1, 0);
+            ck_assert_int_eq(hulls.count, boxes.count);
+            const double best = reference(t);
+            check_manifold(t, &hulls, best, 0.1, "box");
+            for (int i = 0; i < boxes.count; ++i) {
+                double nearest2 = HUGE_VAL, gap = 0;
+                for (int k = 0; k < hulls.count; ++k) {
+                    const double d2 = v3_norm2(v3_sub(boxes.points[i].position, hulls.points[k].position));
+                    if (d2 < nearest2) {
+                        nearest2 = d2;
+                        gap = hulls.points[k].separation;
+                    }
+                }
+                /* both round corners to sides by their own tolerance */
+                ck_assert_double_le(nearest2, 4e-6 + tilts[_i] * tilts[_i]);
+                ck_assert_double_eq_tol(gap, boxes.points[i].separation, 1e-12 + 4 * tilts[_i]);
+            }
+        }
+    }
+    free(t->pool);
+    free(t);
+    free(u);
+}
+END_TEST
+
+/* Slow motions, every manifold with the memory of the one before: as deep as the truth but for what memory is given,
+ * without jumps, and points that go on where nothing has moved. */
+START_TEST(memory_changes_little)
+{
+    struct random r = {.state = 99 + (uint64_t)_i};
+    struct two *t = calloc(1, sizeof *t);
+    const double unit[3] = {1, 1, 1};
+    long same = 0, all = 0, remembered = 0;
+    t->pool = test_pool_new();
+    for (int path = 0; path < fewer(12); ++path) {
+        uint32_t cache = 0;
+        double last = 0, spin[3], move[3];
+        t->pool->used = HULL_FIRST_OWN;
+        for (int s = 0; s < 2; ++s) {
+            if (_i % 3 == 1) prism_hull(3 + (int)(random_unit(&r) * 8), random_in(&r, 0.2, 1), &t->h[s]);
+            else random_hull(&r.state, 8 + (int)(random_unit(&r) * 24), unit, &t->h[s]);
+            t->g[s] = test_pool_add(t->pool, &t->h[s]);
+        }
+        const double thin = fmin(geometry_thickness(&t->g[0]), geometry_thickness(&t->g[1]));
+        random_pose(&r, 1.9, t);
+        put_together(t, -0.01);
+        for (int k = 0; k < 3; ++k) {
+            spin[k] = random_in(&r, -1, 1);
+            move[k] = random_in(&r, -1, 1);
+        }
+        const double step = _i % 2 ? 1e-6 : 2e-3;
+        for (int k = 0; k < 150; ++k) {
+            const struct manifold m = touch_two(t, 0.05, cache);
+            const double best = reference(t);
+            if (best < -0.1) break; /* deep: the side may be remembered (manifold_hull.h) */
+            check_manifold(t, &m, best, 0.05, "path");
+            if (m.count == 0) break;
+            const struct manifold again = touch_two(t, 0.05, m.cache);
+            const double s = along(t, m.normal);
+            remembered += again.cache == m.cache && m.cache != 0;
+            if (k > 0)
+                ck_assert_msg(fabs(s - last) <= 6 * step + 0.1 * fabs(s) + 0.011 * thin, "a jump from %g to %g", last, s);
+            last = s;
+            cache = m.cache;
+            turn_by(t->R[1], spin, step);
+            for (int i = 0; i < 3; ++i) t->x[1][i] += step * move[i];
+            if (step < 1e-5) { /* at rest but for rounding: points stay who they are */
+                const struct manifold next = touch_two(t, 0.05, cache);
+                for (int i = 0; i < m.count; ++i) {
+                    ++all;
+                    for (int q = 0; q < next.count; ++q) same += next.points[q].feature == m.points[i].feature;
+                }
+            }
+        }
+    }
+    ck_assert_int_gt(remembered, 0);
+    if (all > 0) ck_assert_msg(same > 0.99 * (double)all, "%ld of %ld points go on", same, all);
+    free(t->pool);
+    free(t);
+}
+END_TEST
+
+/* Pushed through a plate, slowly: back to where it came from until the two are apart. */
+START_TEST(sides_are_kept)
+{
+    struct two *t = calloc(1, sizeof *t);
+    const double plate[3] = {1, 1, 0.02}, unit[3] = {0.3, 0.3, 0.3};
+    struct random r = {.state = 5 + (uint64_t)_i};
+    uint32_t cache = 0;
+    t->pool = test_pool_new();
+    random_hull(&r.state, 20, unit, &t->h[0]);
+    box_hull(plate, &t->h[1]);
+    for (int s = 0; s < 2; ++s) {
+        t->g[s] = test_pool_add(t->pool, &t->h[s]);
+        random_rotation(&r, t->R[s]);
+    }
+    double up[3];
+    column_of(t->R[1], 2, up);
+    for (int k = 0; k < 400; ++k) {
+        const double height = 0.5 - 0.0015 * k;
+        for (int i = 0; i < 3; ++i) t->x[0][i] = height * up[i];
+        const struct manifold m = touch_two(t, 0.005, cache);
+        cache = m.count > 0 ? m.cache : 0;
+        if (m.count > 0 && along(t, m.normal) < 0)
+            ck_assert_msg(m.normal.z < -0.5, "height %g: normal %g %g %g", height, m.normal.x, m.normal.y, m.normal.z);
+    }
+    free(t->pool);
+    free(t);
+}
+END_TEST
+
+/* Spheres and capsules, as a point and a segment with a radius. */
+START_TEST(round_shapes_are_cores_with_a_radius)
+{
+    struct random r = {.state = 31 + (uint64_t)_i};
+    struct two *t = calloc(1, sizeof *t);
+    const double unit[3] = {1, 0.8, 0.6};
+    t->pool = test_pool_new();
+    for (int pose = 0; pose < 400; ++pose) {
+        const double radius = random_in(&r, 0.05, 0.5), length = _i % 2 ? random_in(&r, 0.05, 1) : 0;
+        t->pool->used = HULL_FIRST_OWN;
+        random_hull(&r.state, 6 + (int)(random_unit(&r) * 20), unit, &t->h[1]);
+        t->g[1] = test_pool_add(t->pool, &t->h[1]);
+        memset(&t->h[0], 0, sizeof t->h[0]);
+        t->h[0].vertices = length > 0 ? 2 : 1;
+        t->h[0].edges = length > 0 ? 1 : 0;
+        t->h[0].edge[0][1] = 1;
+        t->h[0].x[0][2] = -length;
+        t->h[0].x[1][2] = length;
+        const struct sadmm_geometry round = {.type = length > 0 ? SADMM_SHAPE_CAPSULE : SADMM_SHAPE_SPHERE,
+                                             .children = 1, .size = {radius, length, 0}};
+        t->g[0] = round;
+        random_pose(&r, random_in(&r, 0, 2), t);
+        const double best = reference(t) - radius, found = nearest(t, v3(0, 0, 1));
+        ck_assert_msg(fabs(found - best) <= 1e-10, "pose %d: %g, should be %g", pose, found, best);
+        const struct manifold m = touch_two(t, 0.2, 0);
+        if (best > 0.2 + 1e-10) {
+            ck_assert_int_eq(m.count, 0);
+            continue;
+        }
+        ck_assert_int_gt(m.count, 0);
+        ck_assert_int_le(m.count, length > 0 ? 3 : 1);
+        double least = HUGE_VAL;
+        for (int i = 0; i < m.count; ++i) least = fmin(least, m.points[i].separation);
+        ck_assert_double_eq_tol(least, best, 1e-9);
+        ck_assert_double_eq_tol(along(t, m.normal) - radius, best, 1e-9);
+    }
+    free(t->pool);
+    free(t);
+}
+END_TEST
+
+/* A capsule that lies on a face has both ends. */
+START_TEST(a_capsule_lies_on_a_face)
+{
+    struct two *t = calloc(1, sizeof *t);
+    const double half[3] = {1, 1, 0.5};
+    t->pool = test_pool_new();
+    box_hull(half, &t->h[1]);
+    t->g[1] = test_pool_add(t->pool, &t->h[1]);
+    const struct sadmm_geometry capsule = {.type = SADMM_SHAPE_CAPSULE, .children = 1, .size = {0.1, 0.6, 0}};
+    t->g[0] = capsule;
+    rotation(t->R[1], 0, 0, 1, 0.3);
+    rotation(t->R[0], 0, 1, 0, M_PI / 2 + (_i - 1) * 1e-4);
+    t->x[0][0] = _i == 2 ? 0.8 : 0;
+    t->x[0][2] = 0.5 + 0.1 - 1e-4;
+    const struct manifold m = touch_two(t, 0.01, 0);
+    ck_assert_int_eq(m.count, 2);
+    ck_assert_double_eq_tol(m.normal.z, -1, 1e-8); /* beyond the edge: across it and the capsule */
+    for (int i = 0; i < 2; ++i) ck_assert_double_eq_tol(m.points[i].separation, -1e-4, 1e-4);
+    ck_assert_double_gt(v3_norm(v3_sub(m.points[0].position, m.points[1].position)), _i == 2 ? 0.7 : 1.1);
+    free(t->pool);
+    free(t);
+}
+END_TEST
+
+/* The face that points most along the normal need not have the deepest corner. */
+START_TEST(the_deepest_corner_is_there)
+{
+    static const double a[4][3] = {{-.00106, -.00306, .06254}, {-.02411, .01593, .06341},
+                                   {-.02347, .04359, .05641}, {-.04148, .05734, .05466}},
+                        b[4][3] = {{-.03471, .06601, .04755}, {-.05034, -.00488, .11932},
+                                   {-.07769, .02698, .07224}, {-.01758, .00852, .0671}};
+    struct two *t = calloc(1, sizeof *t);
+    double least = HUGE_VAL;
+    t->pool = test_pool_new();
+    test_hull_of(_i ? b : a, 4, 0, &t->h[0]);
+    test_hull_of(_i ? a : b, 4, 0, &t->h[1]);
+    for (int s = 0; s < 2; ++s) {
+        t->g[s] = test_pool_add(t->pool, &t->h[s]);
+        rotation(t->R[s], 0, 0, 1, 0);
+    }
+    struct manifold m = touch_two(t, 1e-3, 0);
+    for (int step = 0; step < 2; ++step) { /* without memory, and with */
+        for (int i = 0; i < m.count; ++i) least = fmin(least, m.points[i].separation);
+        ck_assert_double_eq_tol(least, reference(t), 1e-6);
+        ck_assert_double_eq_tol(least, -2.009e-3, 1e-6);
+        m = touch_two(t, 1e-3, m.cache);
+    }
+    free(t->pool);
+    free(t);
+}
+END_TEST
+
+/* A knife on a face, on its edge: however sharp it is, both ends of the edge carry it. */
+START_TEST(a_knife_stands_on_its_edge)
+{
+    static const double thick[] = {1, 0.3, 0.05, 1e-3};
+    struct two *t = calloc(1, sizeof *t);
+    const double half[3] = {1, 1, 0.5}, d = thick[_i % 4];
+    const double knife[6][3] = {{-0.6, 0, 0}, {0.6, 0, 0}, {-0.6, d, 1}, {0.6, d, 1}, {-0.6, -d, 1}, {0.6, -d, 1}};
+    t->pool = test_pool_new();
+    box_hull(half, &t->h[1]);
+    test_hull_of(knife, 6, 1e-9, &t->h[0]);
+    for (int s = 0; s < 2; ++s) t->g[s] = test_pool_add(t->pool, &t->h[s]);
+    if (_i >= 4) { /* the knife as b */
+        const struct test_hull h = t->h[0];
+        const struct sadmm_geometry g = t->g[0];
+        t->h[0] = t->h[1], t->h[1] = h;
+        t->g[0] = t->g[1], t->g[1] = g;
+    }
+    const int top = _i < 4 ? 0 : 1;
+    rotation(t->R[1 - top], 0, 0, 1, 0.3);
+    rotation(t->R[top], 0, 1, 0, 1e-5);
+    t->x[top][2] = 0.5 - 1e-4;
+    const struct manifold m = touch_two(t, 0.01, 0);
+    ck_assert_int_eq(m.count, 2);
+    ck_assert_double_eq_tol(fabs(m.normal.z), 1, 1e-9);
+    for (int i = 0; i < 2; ++i) ck_assert_double_eq_tol(m.points[i].separation, -1e-4, 1e-5);
+    ck_assert_double_gt(v3_norm(v3_sub(m.points[0].position, m.points[1].position)), 1.1);
+    free(t->pool);
+    free(t);
+}
+END_TEST
+
+/* On a plane: all corners that are near enough, or of more than eight the lowest and the outermost. */
+START_TEST(planes_touch_corners)
+{
+    struct random r = {.state = 63 + (uint64_t)_i};
+    struct test_pool *pool = test_pool_new();
+    struct test_hull h;
+    const double unit[3] = {1, 1, 1};
+    const struct sadmm_geometry plane = {.type = SADMM_SHAPE_PLANE, .children = 1};
+    for (int pose = 0; pose < 200; ++pose) {
+        double R[9], Rp[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, x[3] = {0, 0, 0}, xp[3] = {0, 0, 0}, lowest = HUGE_VAL;
+        const double limit = 0.01;
+        int within = 0;
+        pool->used = HULL_FIRST_OWN;
+        if (_i == 0) random_hull(&r.state, 20, unit, &h);
+        else prism_hull(20, 0.4, &h);
+        const struct sadmm_geometry hull = test_pool_add(pool, &h);
+        if (_i == 0) random_rotation(&r, R);
+        else rotation(R, random_in(&r, -1, 1), random_in(&r, -1, 1), 0, pose % 2 ? 1e-3 : 0);
+        for (int v = 0; v < h.vertices; ++v) lowest = fmin(lowest, t_dot(R + 6, h.x[v]));
+        x[2] = -lowest + random_in(&r, -0.05, 0.009);
+        const struct pair_pose pose_b = pair_pose(true, Rp, xp, R, x);
+        struct manifold m;
+        memset(&m, 0x55, sizeof m);
+        pair_manifold(&plane, &hull, pool->numbers, 0, &pose_b, limit, 0, &m);
+        for (int v = 0; v < h.vertices; ++v) within += t_dot(R + 6, h.x[v]) + x[2] <= limit;
+        if (within <= SADMM_MANIFOLD_POINTS) ck_assert_int_eq(m.count, within);
+        else ck_assert_int_ge(m.count, 4);
+        double least = HUGE_VAL, reach = 0;
+        for (int i = 0; i < m.count; ++i) {
+            double p[3], world[3];
+            v3_store(m.points[i].position, p);
+            for (int k = 0; k < 3; ++k) world[k] = t_dot(R + 3 * k, p) + x[k];
+            ck_assert_double_eq_tol(world[2], m.points[i].separation / 2, 1e-12);
+            least = fmin(least, m.points[i].separation);
+            reach = fmax(reach, hypot(world[0], world[1]));
+            for (int k = 0; k < i; ++k) ck_assert_uint_ne(m.points[i].feature, m.points[k].feature);
+        }
+        ck_assert_double_eq_tol(least, lowest + x[2], 1e-12);
+        if (_i == 1 && pose % 2 == 0) ck_assert_double_gt(reach, 0.99);
+    }
+    free(pool);
+}
+END_TEST
+
+static Suite *suite(void)
+{
+    Suite *s = suite_create("manifold hull");
+    TCase *tests = tcase_create("hulls");
+    tcase_set_timeout(tests, 60);
+    tcase_add_loop_test(tests, distance_and_depth_are_the_references, 0, 8);
+    tcase_add_loop_test(tests, exchange_changes_nothing, 0, 4);
+    tcase_add_loop_test(tests, boxes_are_hulls, 0, 5);
+    tcase_add_loop_test(tests, memory_changes_little, 0, 6);
+    tcase_add_loop_test(tests, sides_are_kept, 0, 6);
+    tcase_add_loop_test(tests, round_shapes_are_cores_with_a_radius, 0, 4);
+    tcase_add_loop_test(tests, a_capsule_lies_on_a_face, 0, 3);
+    tcase_add_loop_test(tests, the_deepest_corner_is_there, 0, 2);
+    tcase_add_loop_test(tests, a_knife_stands_on_its_edge, 0, 8);
+    tcase_add_loop_test(tests, planes_touch_corners, 0, 2);
+    suite_add_tcase(s, tests);
+    return s;
+}
+
+int main(void) { return run_suite(suite()); }
