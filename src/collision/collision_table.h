@@ -1,8 +1,8 @@
 /* Which pairs of types collide, and how: the one list, for host and device.
  *
  * An entry is PAIR(type of a, type of b, call): a is of the lower type or, of two of one type, the shape in the lower
- * slot. In the call a and b are the sizes of the two (vec3, m), shape_a and shape_b their geometries, hulls the pool of
- * hulls (hull_data.h) and child the child of the pair (geometry.h); pose, limit, cache and m are as in manifold.h. The list becomes a switch (pair_manifold.h), not a table of pointers: all of
+ * slot. In the call a and b are the sizes of the two (vec3, m) and child is the child of the pair (geometry.h); pose,
+ * limit, cache and m are as in manifold.h. The list becomes a switch (pair_manifold.h), not a table of pointers: all of
  * it is inlined into the narrow phase, and a pair that is listed twice does not compile.
  *
  * Types without an entry have no contacts and must never meet. Static bodies do not meet each other, so a type that
@@ -27,12 +27,16 @@
     PAIR(SPHERE,  BOX,     manifold_sphere_box(a.x, b, pose, limit, cache, m))                  \
     PAIR(CAPSULE, CAPSULE, manifold_capsule_capsule(a.x, a.y, b.x, b.y, pose, limit, cache, m)) \
     PAIR(CAPSULE, BOX,     manifold_capsule_box(a.x, a.y, b, pose, limit, cache, m))            \
-    PAIR(BOX,     BOX,     manifold_box_box(b, a, pose, limit, cache, m))                       \
-    PAIR(PLANE,   HULL,    manifold_plane_hull(shape_b, hulls, pose, limit, m))                 \
-    PAIR(SPHERE,  HULL,    manifold_any_hull(shape_a, shape_b, hulls, pose, limit, cache, m))   \
-    PAIR(CAPSULE, HULL,    manifold_any_hull(shape_a, shape_b, hulls, pose, limit, cache, m))   \
-    PAIR(BOX,     HULL,    manifold_any_hull(shape_a, shape_b, hulls, pose, limit, cache, m))   \
-    PAIR(HULL,    HULL,    manifold_any_hull(shape_a, shape_b, hulls, pose, limit, cache, m))
+    PAIR(BOX,     BOX,     manifold_box_box(b, a, pose, limit, cache, m))
+
+/* With a hull, by the pool of hulls (hull_data.h), the geometries shape_a and shape_b: a list of their own, so that a
+ * narrow phase without hulls is what it would be if there were none. */
+#define SADMM_HULL_TABLE(PAIR)                                                         \
+    PAIR(PLANE,   HULL, hull_plane_manifold(shape_b, hulls, pose, limit, m))           \
+    PAIR(SPHERE,  HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m)) \
+    PAIR(CAPSULE, HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m)) \
+    PAIR(BOX,     HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m)) \
+    PAIR(HULL,    HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))
 /* clang-format on */
 
 /* One number for two types, below 256 each. */
@@ -43,7 +47,7 @@ SADMM_INLINE bool pair_is_listed(int type_a, int type_b)
 {
     switch (type_a < type_b ? SADMM_TYPE_PAIR(type_a, type_b) : SADMM_TYPE_PAIR(type_b, type_a)) {
 #define SADMM_LISTED(A, B, call) case SADMM_TYPE_PAIR((int)SADMM_SHAPE_##A, (int)SADMM_SHAPE_##B):
-        SADMM_COLLISION_TABLE(SADMM_LISTED) return true;
+        SADMM_COLLISION_TABLE(SADMM_LISTED) SADMM_HULL_TABLE(SADMM_LISTED) return true;
 #undef SADMM_LISTED
     default: return false;
     }

@@ -29,7 +29,7 @@ SADMM_INLINE vec3 epa_normal(const struct epa *e, const struct epa_face *f)
     return v3_cross(v3_sub(e->p[f->corner[1]].w, a), v3_sub(e->p[f->corner[2]].w, a));
 }
 
-HULL_PART void epa_add_face(struct epa *e, int a, int b, int c)
+SADMM_INLINE void epa_add_face(struct epa *e, int a, int b, int c)
 {
     struct epa_face *f = &e->face[e->faces];
     vec3 n;
@@ -45,7 +45,7 @@ HULL_PART void epa_add_face(struct epa *e, int a, int b, int c)
 }
 
 /* Whichever of the points of a - b farthest along d and against it makes more of `measure`. */
-HULL_PART struct difference_point epa_farther(const struct polytope_pair *pair, vec3 d, vec3 origin)
+SADMM_INLINE struct difference_point epa_farther(const struct polytope_pair *pair, vec3 d, vec3 origin)
 {
     const struct difference_point zero = {{0, 0, 0}, 0, 0};
     const struct difference_point up = pair_support(pair, d, &zero), down = pair_support(pair, v3_neg(d), &zero);
@@ -53,7 +53,7 @@ HULL_PART struct difference_point epa_farther(const struct polytope_pair *pair, 
 }
 
 /* A tetrahedron with as many of the simplex's points as are of use. False: a - b is flat but for rounding. */
-HULL_PART bool epa_begin(const struct polytope_pair *pair, const struct gjk_simplex *s, struct epa *e)
+SADMM_INLINE bool epa_begin(const struct polytope_pair *pair, const struct gjk_simplex *s, struct epa *e)
 {
     struct difference_point *p = e->p;
     vec3 d, n;
@@ -114,7 +114,7 @@ HULL_PART bool epa_begin(const struct polytope_pair *pair, const struct gjk_simp
 }
 
 /* Put `next` in: what it sees goes, and new faces join it to the rim of that. */
-HULL_PART void epa_grow(const struct polytope_pair *pair, struct epa *e, struct difference_point next)
+SADMM_INLINE void epa_grow(const struct polytope_pair *pair, struct epa *e, struct difference_point next)
 {
     uint8_t rim[EPA_RIM][2];
     int sides = 0, f = 0, k, i;
@@ -159,7 +159,7 @@ SADMM_INLINE void epa_simplex(const struct epa *e, const struct epa_face *face, 
 
 /* The face of a - b nearest to the origin: its outward normal, unit, its points with the weights of the one nearest to
  * the origin, its height over it. False: rounding has not let it be found. */
-HULL_PART bool epa_depth(const struct polytope_pair *pair, struct gjk_simplex *s, vec3 *normal, real *height)
+SADMM_INLINE bool epa_depth(const struct polytope_pair *pair, struct gjk_simplex *s, vec3 *normal, real *height)
 {
     struct epa e;
     const struct epa_face *best;

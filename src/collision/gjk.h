@@ -39,7 +39,7 @@ SADMM_INLINE void simplex_keep_two(struct gjk_simplex *s, int i, int j, real wei
     s->count = 2;
 }
 
-HULL_PART vec3 closest_on_segment(struct gjk_simplex *s)
+SADMM_INLINE vec3 closest_on_segment(struct gjk_simplex *s)
 {
     const vec3 a = s->p[0].w, d = v3_sub(s->p[1].w, a);
     const real length2 = v3_norm2(d), along = -v3_dot(a, d);
@@ -56,7 +56,7 @@ HULL_PART vec3 closest_on_segment(struct gjk_simplex *s)
 }
 
 /* By the regions of its corners and sides (Ericson, Real-Time Collision Detection, 5.1.5). */
-HULL_PART vec3 closest_on_triangle(struct gjk_simplex *s)
+SADMM_INLINE vec3 closest_on_triangle(struct gjk_simplex *s)
 {
     const vec3 a = s->p[0].w, b = s->p[1].w, c = s->p[2].w, ab = v3_sub(b, a), ac = v3_sub(c, a);
     const real d1 = -v3_dot(ab, a), d2 = -v3_dot(ac, a), d3 = -v3_dot(ab, b), d4 = -v3_dot(ac, b),
@@ -121,7 +121,7 @@ SADMM_INLINE void simplex_weigh(struct gjk_simplex *s, vec3 foot, vec3 normal)
 }
 
 /* The sides behind which the origin is are asked; false: there are none, it is inside. */
-HULL_PART bool closest_on_tetrahedron(struct gjk_simplex *s, vec3 *v)
+SADMM_INLINE bool closest_on_tetrahedron(struct gjk_simplex *s, vec3 *v)
 {
     struct gjk_simplex best;
     real best2 = SADMM_REAL_MAX;
@@ -155,7 +155,7 @@ HULL_PART bool closest_on_tetrahedron(struct gjk_simplex *s, vec3 *v)
 
 /* start: a direction from a to b, of any length. limit: the distance up to which it matters, between the cores. On
  * return *v: the shortest vector of a - b that was found, from b to a. */
-HULL_PART enum gjk_end gjk_distance(const struct polytope_pair *pair, vec3 start, real limit, struct gjk_simplex *s,
+SADMM_INLINE enum gjk_end gjk_distance(const struct polytope_pair *pair, vec3 start, real limit, struct gjk_simplex *s,
                                        vec3 *v)
 {
     struct difference_point at;
@@ -197,7 +197,7 @@ HULL_PART enum gjk_end gjk_distance(const struct polytope_pair *pair, vec3 start
 }
 
 /* The nearest points themselves, on the cores. */
-HULL_PART void gjk_points(const struct polytope_pair *pair, const struct gjk_simplex *s, vec3 *pa, vec3 *pb)
+SADMM_INLINE void gjk_points(const struct polytope_pair *pair, const struct gjk_simplex *s, vec3 *pa, vec3 *pb)
 {
     int k;
     *pa = v3(0, 0, 0);

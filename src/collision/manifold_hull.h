@@ -107,7 +107,7 @@ SADMM_INLINE bool two_of(const int *numbers, int count, int two[2])
 }
 
 /* Are the nearest features an edge of each? Then the axis is theirs. */
-HULL_PART void hull_edges_of(const struct polytope_pair *pair, const struct gjk_simplex *s,
+SADMM_INLINE void hull_edges_of(const struct polytope_pair *pair, const struct gjk_simplex *s,
                                 struct polytope_axis *axis)
 {
     struct polytope_axis edges;
@@ -124,7 +124,7 @@ HULL_PART void hull_edges_of(const struct polytope_pair *pair, const struct gjk_
 }
 
 /* The points of two edges that are nearest to each other. False: the edges do not cross, seen along the axis. */
-HULL_PART bool hull_crossing(const struct polytope_pair *pair, const struct polytope_axis *axis, vec3 *pa, vec3 *pb)
+SADMM_INLINE bool hull_crossing(const struct polytope_pair *pair, const struct polytope_axis *axis, vec3 *pa, vec3 *pb)
 {
     vec3 a, b;
     const vec3 da = edge_of_a(pair, axis->a, &a), db = edge_of_b(pair, axis->b, &b);
@@ -138,7 +138,7 @@ HULL_PART bool hull_crossing(const struct polytope_pair *pair, const struct poly
 }
 
 /* The axis that the nearest points say, or those that are least deep; and the points. False: too far apart. */
-HULL_PART bool hull_nearest(const struct polytope_pair *pair, vec3 start, real limit, struct polytope_axis *axis,
+SADMM_INLINE bool hull_nearest(const struct polytope_pair *pair, vec3 start, real limit, struct polytope_axis *axis,
                                vec3 *pa, vec3 *pb, uint32_t *feature)
 {
     struct gjk_simplex s;
@@ -381,20 +381,6 @@ SADMM_RARE void hull_plane_manifold(const struct sadmm_geometry *b, const double
         m->points[nearest].separation = least;
         m->points[nearest].feature = (uint32_t)lowest + 1;
     }
-}
-
-/* Entries of the collision table. Where a caller knows that there are no hulls (a null pool), nothing of them is
- * compiled into it. */
-SADMM_INLINE void manifold_any_hull(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
-                                    const struct pair_pose *pose, real limit, uint32_t cache, struct manifold *m)
-{
-    if (hulls) hull_manifold(a, b, hulls, pose, limit, cache, m);
-}
-
-SADMM_INLINE void manifold_plane_hull(const struct sadmm_geometry *b, const double *hulls, const struct pair_pose *pose,
-                                      real limit, struct manifold *m)
-{
-    if (hulls) hull_plane_manifold(b, hulls, pose, limit, m);
 }
 
 #endif

@@ -50,6 +50,19 @@ SADMM_INLINE struct pair_pose proxies_pose(const struct sadmm_proxy *a, const st
     return pose_at(a->geometry.type == SADMM_SHAPE_PLANE, a->R, d, b->R);
 }
 
+SADMM_INLINE void pair_manifold_of_hull(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
+                                        const double *hulls, const struct pair_pose *pose, real limit, uint32_t cache,
+                                        struct manifold *m)
+{
+    switch (SADMM_TYPE_PAIR(shape_a->type, shape_b->type)) {
+#define SADMM_MANIFOLD(A, B, call) \
+    case SADMM_TYPE_PAIR((int)SADMM_SHAPE_##A, (int)SADMM_SHAPE_##B): call; break;
+        SADMM_HULL_TABLE(SADMM_MANIFOLD)
+#undef SADMM_MANIFOLD
+    default: break;
+    }
+}
+
 /* Of one child of the pair. The type of a is not above b's; m->count is 0 when the shapes are apart, and for types that
  * are not listed. hulls: the pool (hull_data.h); NULL: there are none. */
 SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
@@ -60,6 +73,10 @@ SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const stru
     (void)child; /* no type has more than one piece */
     m->count = 0;
     m->cache = 0;
+    if (hulls && shape_b->type == SADMM_SHAPE_HULL) {
+        pair_manifold_of_hull(shape_a, shape_b, hulls, pose, limit, cache, m);
+        return;
+    }
     switch (SADMM_TYPE_PAIR(shape_a->type, shape_b->type)) {
 #define SADMM_MANIFOLD(A, B, call) \
     case SADMM_TYPE_PAIR((int)SADMM_SHAPE_##A, (int)SADMM_SHAPE_##B): call; break;

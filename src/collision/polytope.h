@@ -10,14 +10,6 @@
 #include "hull_data.h"
 #include "row3.h"
 
-/* Functions that are called from many places: on a device all of them inlined are more code than an instruction cache
- * holds, and fetching it takes longer than running it. */
-#ifdef __CUDACC__
-#define HULL_PART SADMM_RARE
-#else
-#define HULL_PART SADMM_INLINE
-#endif
-
 /* Up to so many vertices all are looked at; of more a search climbs along edges. */
 enum { POLYTOPE_SCAN = 48 };
 
@@ -149,7 +141,7 @@ SADMM_INLINE int first_largest(const double *x, const double *y, const double *z
 #endif
 
 /* The vertex farthest along d; `from`: where to begin a climb. */
-HULL_PART int polytope_support(const struct polytope *p, vec3 d, int from)
+SADMM_INLINE int polytope_support(const struct polytope *p, vec3 d, int from)
 {
     const vec3 s = v3(d.x * p->scale.x, d.y * p->scale.y, d.z * p->scale.z);
     real most;
@@ -172,13 +164,13 @@ HULL_PART int polytope_support(const struct polytope *p, vec3 d, int from)
 }
 
 /* The face whose normal is nearest to d. */
-HULL_PART int polytope_face_along(const struct polytope *p, vec3 d)
+SADMM_INLINE int polytope_face_along(const struct polytope *p, vec3 d)
 {
     return first_largest(p->nx, p->ny, p->nz, hull_stride(p->faces), d);
 }
 
 /* The height of x over that face, of all but `except`, over which it is highest. */
-HULL_PART real polytope_height(const struct polytope *p, vec3 x, int except)
+SADMM_INLINE real polytope_height(const struct polytope *p, vec3 x, int except)
 {
     real most = -SADMM_REAL_MAX;
     int f;
@@ -190,7 +182,7 @@ HULL_PART real polytope_height(const struct polytope *p, vec3 x, int except)
 }
 
 /* The edge between two vertices, -1: there is none. */
-HULL_PART int polytope_edge_between(const struct polytope *p, int v0, int v1)
+SADMM_INLINE int polytope_edge_between(const struct polytope *p, int v0, int v1)
 {
     int e;
     for (e = 0; e < p->edges; ++e) {

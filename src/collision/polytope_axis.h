@@ -29,13 +29,13 @@ SADMM_INLINE uint32_t axis_memory(const struct polytope_axis *axis)
 }
 
 /* How far the two are apart along n; negative: how deep in each other. */
-HULL_PART real axis_separation(const struct polytope_pair *pair, vec3 n)
+SADMM_INLINE real axis_separation(const struct polytope_pair *pair, vec3 n)
 {
     const struct difference_point zero = {{0, 0, 0}, 0, 0};
     return -v3_dot(n, pair_support(pair, n, &zero).w) - pair_radii(pair);
 }
 
-HULL_PART void axis_of_face_a(const struct polytope_pair *pair, int face, struct polytope_axis *axis)
+SADMM_INLINE void axis_of_face_a(const struct polytope_pair *pair, int face, struct polytope_axis *axis)
 {
     const vec3 n = m3_mul(pair->R, polytope_normal(&pair->a, face));
     const int v = polytope_support(&pair->b, v3_neg(n), 0);
@@ -47,7 +47,7 @@ HULL_PART void axis_of_face_a(const struct polytope_pair *pair, int face, struct
                        pair_radii(pair);
 }
 
-HULL_PART void axis_of_face_b(const struct polytope_pair *pair, int face, struct polytope_axis *axis)
+SADMM_INLINE void axis_of_face_b(const struct polytope_pair *pair, int face, struct polytope_axis *axis)
 {
     const vec3 outward = polytope_normal(&pair->b, face);
     const int v = polytope_support(&pair->a, v3_neg(m3_tmul(pair->R, outward)), 0);
@@ -78,7 +78,7 @@ SADMM_INLINE vec3 edge_outward(const struct polytope *p, int e)
 }
 
 /* False: the edges are parallel, as far as rounding can tell. */
-HULL_PART bool axis_of_edges(const struct polytope_pair *pair, int ea, int eb, struct polytope_axis *axis)
+SADMM_INLINE bool axis_of_edges(const struct polytope_pair *pair, int ea, int eb, struct polytope_axis *axis)
 {
     vec3 from;
     const vec3 da = edge_of_a(pair, ea, &from), db = edge_of_b(pair, eb, &from);

@@ -70,7 +70,7 @@ SADMM_INLINE int facing_edge(const struct polytope *p, vec3 outward, int vertex[
 
 /* x1, x2, n: the plane's axes and the normal. of_a: in b's frame by the pair's pose. outward: the direction of the other
  * one, own frame; face: the one that points there, -1: none. */
-HULL_PART void facing_of(const struct polytope_pair *pair, bool of_a, int face, vec3 outward, vec3 x1, vec3 x2, vec3 n,
+SADMM_INLINE void facing_of(const struct polytope_pair *pair, bool of_a, int face, vec3 outward, vec3 x1, vec3 x2, vec3 n,
                             struct facing *out)
 {
     const struct polytope *p = of_a ? &pair->a : &pair->b;
@@ -93,7 +93,7 @@ HULL_PART void facing_of(const struct polytope_pair *pair, bool of_a, int face, 
 
 /* Keep the part of `in` that is not outside the side from p to q, whose polygon is inside to its left, or, turned = -1,
  * to its right. It comes as `out`. */
-HULL_PART int clip_by_side(const struct facing_corner *in, int count, const struct facing_corner *p,
+SADMM_INLINE int clip_by_side(const struct facing_corner *in, int count, const struct facing_corner *p,
                               const struct facing_corner *q, real turned, int label, real tolerance,
                               struct facing_corner *out)
 {
@@ -125,7 +125,7 @@ SADMM_INLINE bool facing_near(const struct facing_corner *p, real x, real y, rea
 }
 
 /* What makes corner i of the clipped polygon; 0: nothing of its own. */
-HULL_PART uint32_t facing_feature(const struct facing *clip, const struct facing *subject, bool clip_is_a,
+SADMM_INLINE uint32_t facing_feature(const struct facing *clip, const struct facing *subject, bool clip_is_a,
                                      const struct facing_corner *poly, int count, int i, real tolerance)
 {
     const int in = poly[i > 0 ? i - 1 : count - 1].edge, out = poly[i].edge;
@@ -160,7 +160,7 @@ SADMM_INLINE real outermost_along(int k, real x, real y, real gap)
 }
 
 /* Of `count` points those to keep where there are too many: the deepest, and the outermost in eight directions. Bits. */
-HULL_PART uint64_t facing_choice(const struct facing_corner *p, const real *gap, int count)
+SADMM_INLINE uint64_t facing_choice(const struct facing_corner *p, const real *gap, int count)
 {
     uint64_t chosen = 0;
     int k, i, deepest = 0;
@@ -201,7 +201,7 @@ SADMM_INLINE real facing_tolerance(const struct polytope_pair *pair, int fa, int
 
 /* Sets m's normal to n, and its points to those of the faces that point along it. least: the separation of the two
  * along n; what tolerance has let stand beside a face is not nearer. */
-HULL_PART void facing_manifold(const struct polytope_pair *pair, vec3 n, real least, real limit, struct manifold *m)
+SADMM_INLINE void facing_manifold(const struct polytope_pair *pair, vec3 n, real least, real limit, struct manifold *m)
 {
     const vec3 na = m3_tmul(pair->R, n);
     const int fa = facing_face(&pair->a, na), fb = facing_face(&pair->b, v3_neg(n));

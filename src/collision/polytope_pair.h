@@ -27,7 +27,7 @@ SADMM_INLINE vec3 pair_point_a(const struct polytope_pair *pair, int v)
 }
 
 /* Farthest along d; `at`: its vertices are where a search begins. */
-HULL_PART struct difference_point pair_support(const struct polytope_pair *pair, vec3 d,
+SADMM_INLINE struct difference_point pair_support(const struct polytope_pair *pair, vec3 d,
                                                   const struct difference_point *at)
 {
     struct difference_point point;
