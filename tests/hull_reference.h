@@ -118,10 +118,10 @@ static inline void test_hull_block(const struct test_hull *h, double *block)
     header->vertices = h->vertices;
     header->faces = h->faces;
     header->edges = h->edges;
-    header->corners = 2 * h->edges * (h->faces > 0);
     header->vertex_stride = v;
     header->face_stride = f;
     header->doubles = hull_doubles(h->vertices, h->faces, h->edges);
+    header->climbs = 1; /* of convex faces, flat but for rounding */
     for (int k = 0; k < 3; ++k)
         for (int i = 0; i < v; ++i) number[k * v + i] = h->x[i < h->vertices ? i : 0][k];
     for (int k = 0; k < 4; ++k)
@@ -135,6 +135,7 @@ static inline void test_hull_block(const struct test_hull *h, double *block)
     for (int i = 0; i < h->faces; ++i)
         for (int m = 0; m < h->corners[i]; ++m)
             *link++ = (uint16_t)test_hull_edge(h, h->corner[i][m], h->corner[i][(m + 1) % h->corners[i]]);
+    if (h->faces == 0) link += 4 * h->edges; /* corners that there are not */
     for (int e = 0; e < 2 * h->edges; ++e) *link++ = (uint16_t)h->edge[e / 2][e % 2];
     for (int e = 0; e < 2 * h->edges; ++e) *link++ = (uint16_t)h->edge_face[e / 2][e % 2];
     first = link;

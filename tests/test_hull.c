@@ -414,6 +414,32 @@ static const struct sadmm_hull_header *header_at(const double *pool, int offset)
     return (const struct sadmm_hull_header *)(pool + offset);
 }
 
+/* The farthest vertex in any direction is found, from wherever a search begins: also where merged faces, which are not
+ * flat, have more corners than are looked at one by one. */
+START_TEST(the_farthest_vertex_is_found)
+{
+    static const double merges[] = {0, 1e-6, 1e-3};
+    struct cloud c = {.count = 0};
+    for (int k = 0; k < 600; ++k) { /* a flat ellipsoid, by the golden spiral */
+        const double z = 1 - (2 * k + 1.0) / 600, r = sqrt(1 - z * z), angle = k * 2.399963229728653;
+        add_point(&c, r * cos(angle), r * sin(angle), 0.05 * z);
+    }
+    sadmm_hull *hull = NULL;
+    ck_assert_int_eq(try_hull(&c, merges[_i], &hull), SADMM_OK);
+    struct polytope p;
+    polytope_at(hull->block, 0, &p);
+    ck_assert_int_gt(p.vertices, POLYTOPE_SCAN);
+    for (int k = 0; k < 20000; ++k) {
+        const double z = 1 - (2 * k + 1.0) / 20000, r = sqrt(1 - z * z), angle = k * 2.399963229728653;
+        const vec3 d = v3(r * cos(angle), r * sin(angle), z);
+        double most = -HUGE_VAL;
+        for (int v = 0; v < p.vertices; ++v) most = fmax(most, v3_dot(d, polytope_vertex(&p, v)));
+        ck_assert_double_ge(v3_dot(d, polytope_vertex(&p, polytope_support(&p, d, k % p.vertices))), most - 1e-14);
+    }
+    sadmm_hull_destroy(hull);
+}
+END_TEST
+
 START_TEST(the_first_blocks)
 {
     double *pool = calloc(HULL_FIRST_OWN, sizeof *pool);
@@ -473,6 +499,7 @@ int main(void)
     tcase_add_test(shapes, the_box_around);
     tcase_add_test(shapes, sizes);
     tcase_add_test(shapes, a_hundred_thousand_points);
+    tcase_add_loop_test(shapes, the_farthest_vertex_is_found, 0, 3);
     tcase_add_test(shapes, the_first_blocks);
     tcase_add_test(refusals, bad_arguments_are_refused);
     tcase_add_test(refusals, flat_points_are_refused);

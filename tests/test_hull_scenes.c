@@ -204,15 +204,6 @@ START_TEST(the_peg_is_not_there_at_once)
 }
 END_TEST
 
-/* Friction of 2 holds it: it stops in the lead-in. */
-START_TEST(a_rough_peg_gets_stuck)
-{
-    const struct sadmm_scene_task task = run_scene("peg_in_hole", 2, INFINITY);
-    ck_assert(task.finished && !task.passed);
-    ck_assert_double_lt(figure(&task, "depth"), 0.03);
-}
-END_TEST
-
 int main(void)
 {
     Suite *suite = suite_create("scenes with hulls");
@@ -225,7 +216,6 @@ int main(void)
     tcase_add_test(cases, the_wall_does_not_creep);
     tcase_add_test(cases, the_pile_shares_six_hulls);
     tcase_add_test(cases, the_peg_is_not_there_at_once);
-    tcase_add_test(cases, a_rough_peg_gets_stuck);
     suite_add_tcase(suite, cases);
     return run_suite(suite);
 }

@@ -487,6 +487,69 @@ START_TEST(a_capsule_lies_on_a_face)
 }
 END_TEST
 
+/* Prisms with faces in common planes, deep in each other: coplanar points are what an expanding polytope folds on. */
+START_TEST(aligned_prisms_are_as_deep_as_they_are)
+{
+    static const struct {
+        int a, b;
+        double half_a, half_b, t[3];
+    } cases[] = {{8, 3, 1, 1, {0.25, 0.25, -0.5}}, {9, 3, 1, 0.5, {0, 0, 0}}, {3, 3, 1.5, 0.5, {-0.25, -0.5, 0}},
+                 {4, 4, 1, 1, {0, 0, 0}},          {6, 6, 0.5, 1, {0, 0, 0}}, {20, 20, 1, 1, {0.1, 0, 0.2}},
+                 {12, 5, 0.3, 2, {0, 0.5, 0.25}}};
+    const double turns[2][9] = {{0, 0, 1, 1, 0, 0, 0, 1, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    struct two *t = calloc(1, sizeof *t);
+    t->pool = test_pool_new();
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; ++c)
+        for (int turned = 0; turned < 2; ++turned) {
+            t->pool->used = HULL_FIRST_OWN;
+            prism_hull(cases[c].a, cases[c].half_a, &t->h[0]);
+            prism_hull(cases[c].b, cases[c].half_b, &t->h[1]);
+            for (int s = 0; s < 2; ++s) {
+                t->g[s] = test_pool_add(t->pool, &t->h[s]);
+                memcpy(t->R[s], turns[s == 0 ? turned : 1], sizeof t->R[s]);
+                for (int k = 0; k < 3; ++k) t->x[s][k] = s == 0 ? cases[c].t[k] : 0;
+            }
+            char what[40];
+            snprintf(what, sizeof what, "case %d, turn %d", (int)c, turned);
+            const double best = reference(t), found = nearest(t, v3(0.3, 0.5, 0.8));
+            ck_assert_msg(fabs(found - best) <= 1e-10 * size_of(t), "%s: %g, should be %g", what, found, best);
+            const struct manifold m = touch_two(t, 0.01, 0);
+            check_manifold(t, &m, best, 0.01, what);
+        }
+    free(t->pool);
+    free(t);
+}
+END_TEST
+
+/* A word that is no memory of this pair does no harm. */
+START_TEST(any_memory_will_do)
+{
+    struct random r = {.state = 1234 + (uint64_t)_i};
+    struct two *t = calloc(1, sizeof *t);
+    const double unit[3] = {1, 0.7, 0.5};
+    t->pool = test_pool_new();
+    for (int pose = 0; pose < 2000; ++pose) {
+        t->pool->used = HULL_FIRST_OWN;
+        for (int s = 0; s < 2; ++s) {
+            random_hull(&r.state, 4 + (int)(random_unit(&r) * 12), unit, &t->h[s]);
+            t->g[s] = test_pool_add(t->pool, &t->h[s]);
+        }
+        random_pose(&r, random_in(&r, 0.5, 2), t);
+        const uint32_t word = (uint32_t)(random_unit(&r) * 4294967296.0),
+                       edges = 3u << 30 | (uint32_t)(random_unit(&r) * 10) << 15 | (uint32_t)(random_unit(&r) * 10);
+        const struct manifold m = touch_two(t, 0.02, pose % 2 ? word : edges);
+        const double s = m.count > 0 ? along(t, m.normal) : 0;
+        for (int i = 0; i < m.count; ++i) {
+            ck_assert_double_le(m.points[i].separation, 0.02 + 1e-9);
+            ck_assert_double_ge(m.points[i].separation, s - 1e-9);
+        }
+        ck_assert_int_eq(m.count > 0, reference(t) <= 0.02);
+    }
+    free(t->pool);
+    free(t);
+}
+END_TEST
+
 /* The face that points most along the normal need not have the deepest corner. */
 START_TEST(the_deepest_corner_is_there)
 {
@@ -602,6 +665,8 @@ static Suite *suite(void)
     tcase_add_loop_test(tests, sides_are_kept, 0, 6);
     tcase_add_loop_test(tests, round_shapes_are_cores_with_a_radius, 0, 4);
     tcase_add_loop_test(tests, a_capsule_lies_on_a_face, 0, 3);
+    tcase_add_test(tests, aligned_prisms_are_as_deep_as_they_are);
+    tcase_add_loop_test(tests, any_memory_will_do, 0, 2);
     tcase_add_loop_test(tests, the_deepest_corner_is_there, 0, 2);
     tcase_add_loop_test(tests, a_knife_stands_on_its_edge, 0, 8);
     tcase_add_loop_test(tests, planes_touch_corners, 0, 2);

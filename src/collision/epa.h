@@ -20,6 +20,7 @@ struct epa {
     struct epa_face face[EPA_FACES + 1];
     int points, faces;
     real least2; /* square of an area, twice, that has no direction */
+    real thin2;  /* square of a sliver's height that leaves it none */
 };
 
 /* Not unit; outward. */
@@ -33,14 +34,16 @@ SADMM_INLINE void epa_add_face(struct epa *e, int a, int b, int c)
 {
     struct epa_face *f = &e->face[e->faces];
     vec3 n;
-    real n2;
+    real n2, side2;
     if (e->faces == EPA_FACES) return;
     f->corner[0] = (uint8_t)a;
     f->corner[1] = (uint8_t)b;
     f->corner[2] = (uint8_t)c;
     n = epa_normal(e, f);
     n2 = v3_norm2(n);
-    f->height = n2 > e->least2 ? v3_dot(n, e->p[a].w) / real_sqrt(n2) : SADMM_REAL_MAX;
+    side2 = real_max(v3_norm2(v3_sub(e->p[b].w, e->p[a].w)),
+                     real_max(v3_norm2(v3_sub(e->p[c].w, e->p[b].w)), v3_norm2(v3_sub(e->p[a].w, e->p[c].w))));
+    f->height = n2 > e->least2 && n2 > e->thin2 * side2 ? v3_dot(n, e->p[a].w) / real_sqrt(n2) : SADMM_REAL_MAX;
     ++e->faces;
 }
 
@@ -60,9 +63,10 @@ SADMM_INLINE bool epa_begin(const struct polytope_pair *pair, const struct gjk_s
     int k;
     e->least2 = SADMM_EPSILON * SADMM_EPSILON * pair->size * pair->size;
     e->least2 *= e->least2;
+    e->thin2 = pair->slack * pair->slack / 16;
     e->faces = 0;
     e->points = 4;
-    p[0] = s->p[0];
+    p[0] = p[1] = p[2] = s->p[0]; /* NaN is farther than nothing */
     if (s->count > 1) {
         p[1] = s->p[1];
     } else {
@@ -113,33 +117,60 @@ SADMM_INLINE bool epa_begin(const struct polytope_pair *pair, const struct gjk_s
     return true;
 }
 
-/* Put `next` in: what it sees goes, and new faces join it to the rim of that. */
-SADMM_INLINE void epa_grow(const struct polytope_pair *pair, struct epa *e, struct difference_point next)
+/* Take a face away. Its sides become rim, but for those that were rim already: the faces on both sides have gone. */
+SADMM_INLINE int epa_take(struct epa *e, int f, uint8_t rim[EPA_RIM][2], int sides)
+{
+    int k, i;
+    for (k = 0; k < 3; ++k) {
+        const uint8_t from = e->face[f].corner[k], to = e->face[f].corner[k < 2 ? k + 1 : 0];
+        for (i = 0; i < sides && !(rim[i][0] == to && rim[i][1] == from);) ++i;
+        if (i < sides) {
+            --sides;
+            rim[i][0] = rim[sides][0];
+            rim[i][1] = rim[sides][1];
+        } else {
+            rim[sides][0] = from;
+            rim[sides][1] = to;
+            ++sides;
+        }
+    }
+    e->face[f] = e->face[--e->faces];
+    return sides;
+}
+
+/* Is the face beside what has gone, and does `next` see it, or lie in its plane? */
+SADMM_INLINE bool epa_goes(const struct polytope_pair *pair, const struct epa *e, const struct epa_face *face,
+                           uint8_t rim[EPA_RIM][2], int sides, vec3 next)
+{
+    const vec3 n = epa_normal(e, face);
+    const real above = v3_dot(n, v3_sub(next, e->p[face->corner[0]].w));
+    int k, i;
+    if (!(above >= 0 || above * above <= pair->slack * pair->slack / 16 * v3_norm2(n))) return false;
+    for (k = 0; k < 3; ++k) {
+        const uint8_t from = face->corner[k], to = face->corner[k < 2 ? k + 1 : 0];
+        for (i = 0; i < sides; ++i)
+            if (rim[i][0] == to && rim[i][1] == from) return true;
+    }
+    return false;
+}
+
+/* Put `next` in, which face f sees: from there on what it sees goes, and what is in one plane with it, as that would
+ * leave slivers; new faces join it to the rim of that. */
+SADMM_INLINE void epa_grow(const struct polytope_pair *pair, struct epa *e, int f, struct difference_point next)
 {
     uint8_t rim[EPA_RIM][2];
-    int sides = 0, f = 0, k, i;
-    while (f < e->faces) {
-        const struct epa_face *face = &e->face[f];
-        const vec3 n = epa_normal(e, face);
-        const real above = v3_dot(n, v3_sub(next.w, e->p[face->corner[0]].w));
-        if (!(above > 0 && above * above > pair->slack * pair->slack / 16 * v3_norm2(n))) {
-            ++f;
-            continue;
-        }
-        for (k = 0; k < 3; ++k) {
-            const uint8_t from = face->corner[k], to = face->corner[k < 2 ? k + 1 : 0];
-            for (i = 0; i < sides && !(rim[i][0] == to && rim[i][1] == from);) ++i;
-            if (i < sides) { /* the other face beside it goes as well */
-                --sides;
-                rim[i][0] = rim[sides][0];
-                rim[i][1] = rim[sides][1];
-            } else {
-                rim[sides][0] = from;
-                rim[sides][1] = to;
-                ++sides;
+    int sides = epa_take(e, f, rim, 0), k;
+    bool more = true;
+    while (more) {
+        more = false;
+        for (f = 0; f < e->faces;) {
+            if (!epa_goes(pair, e, &e->face[f], rim, sides, next.w)) {
+                ++f;
+                continue;
             }
+            sides = epa_take(e, f, rim, sides);
+            more = true;
         }
-        e->face[f] = e->face[--e->faces];
     }
     e->p[e->points] = next;
     for (k = 0; k < sides; ++k) epa_add_face(e, rim[k][0], rim[k][1], e->points);
@@ -158,32 +189,45 @@ SADMM_INLINE void epa_simplex(const struct epa *e, const struct epa_face *face, 
 }
 
 /* The face of a - b nearest to the origin: its outward normal, unit, its points with the weights of the one nearest to
- * the origin, its height over it. False: rounding has not let it be found. */
+ * the origin, and how far a - b reaches along the normal: where points run out or rounding turns a face, that is still
+ * true, of the best normal that was met. False: rounding has let none be found. */
 SADMM_INLINE bool epa_depth(const struct polytope_pair *pair, struct gjk_simplex *s, vec3 *normal, real *height)
 {
     struct epa e;
-    const struct epa_face *best;
+    struct epa_face found = {SADMM_REAL_MAX, {0, 0, 0}};
+    *height = SADMM_REAL_MAX;
     if (!epa_begin(pair, s, &e)) return false;
     for (;;) {
         struct difference_point next;
+        struct epa_face *best = &e.face[0];
         vec3 n;
-        real length;
+        real reach;
         int f, k;
-        bool again = false;
-        best = &e.face[0];
+        bool again = false, done;
         for (f = 1; f < e.faces; ++f)
             if (e.face[f].height < best->height) best = &e.face[f];
-        if (e.faces == 0 || !(best->height < SADMM_REAL_MAX)) return false;
+        if (e.faces == 0 || !(best->height < SADMM_REAL_MAX)) break;
         n = epa_normal(&e, best);
-        length = v3_norm(n);
-        *normal = v3_scale(n, 1 / length);
-        *height = best->height;
-        next = pair_support(pair, *normal, &e.p[best->corner[0]]);
+        n = v3_scale(n, 1 / v3_norm(n));
+        next = pair_support(pair, n, &e.p[best->corner[0]]);
+        reach = v3_dot(n, next.w);
+        done = reach - best->height <= pair->slack / 2;
+        if (reach < *height || (done && reach <= *height + pair->slack)) {
+            *height = reach;
+            *normal = n;
+            found = *best;
+        }
+        if (done) break;
         for (k = 0; k < e.points; ++k) again |= same_point(&next, &e.p[k]);
-        if (again || v3_dot(*normal, next.w) - best->height <= pair->slack / 2 || e.points == EPA_POINTS) break;
-        epa_grow(pair, &e, next);
+        if (again) { /* not a face of the hull of these points: rounding has turned it */
+            best->height = SADMM_REAL_MAX;
+            continue;
+        }
+        if (e.points == EPA_POINTS) break;
+        epa_grow(pair, &e, (int)(best - e.face), next);
     }
-    epa_simplex(&e, best, *normal, *height, s);
+    if (!(*height < SADMM_REAL_MAX)) return false;
+    epa_simplex(&e, &found, *normal, *height, s);
     return true;
 }
 

@@ -150,6 +150,8 @@ SADMM_INLINE bool closest_on_tetrahedron(struct gjk_simplex *s, vec3 *v)
         }
     }
     if (best.count > 0) *s = best;
+    else
+        for (k = 0; k < 4; ++k) s->weight[k] = (real)0.25;
     return outside && best.count > 0;
 }
 

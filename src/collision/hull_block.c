@@ -1,5 +1,7 @@
 #include "hull_block.h"
 
+#include <math.h>
+#include <stdbool.h>
 #include <string.h>
 
 #include "hull.h"
@@ -60,6 +62,19 @@ static void write_neighbours(const struct sadmm_hull_header *header, const uint1
     first[0] = 0;
 }
 
+/* Are all faces flat, but for rounding? Merged ones are not: across them a body is not convex by their edges alone. */
+static bool has_flat_faces(const struct hull_mesh *mesh, const double *vertices, const double *planes)
+{
+    double size = 0, bent = 0;
+    for (int32_t k = 0; k < 3 * mesh->vertex_count; ++k) size = fmax(size, fabs(vertices[k]));
+    for (int32_t f = 0; f < mesh->face_count; ++f)
+        for (int32_t c = mesh->face_first[f]; c < mesh->face_first[f + 1]; ++c) {
+            const double *n = planes + 4 * f, *x = vertices + 3 * mesh->corner[c];
+            bent = fmax(bent, n[3] - (n[0] * x[0] + n[1] * x[1] + n[2] * x[2]));
+        }
+    return bent <= 1e-13 * size;
+}
+
 /* Where `mesh` has no faces, `ends` has the vertices of its edges; else NULL. */
 static void write_block(const struct hull_mesh *mesh, const double *vertices, const double *planes,
                         const uint16_t *ends, double *block)
@@ -68,17 +83,17 @@ static void write_block(const struct hull_mesh *mesh, const double *vertices, co
         .vertices = mesh->vertex_count,
         .faces = mesh->face_count,
         .edges = mesh->edge_count,
-        .corners = 2 * mesh->edge_count, /* so that what follows is where it is in every block */
         .vertex_stride = hull_stride(mesh->vertex_count),
         .face_stride = hull_stride(mesh->face_count),
         .doubles = (int32_t)sadmm_hull_block_doubles(mesh),
+        .climbs = has_flat_faces(mesh, vertices, planes),
     };
     memset(block, 0, (size_t)header.doubles * sizeof *block);
     memcpy(block, &header, sizeof header);
     double *rows = write_rows(vertices, header.vertices, 3, block + HULL_HEADER_DOUBLES);
     uint16_t *face_first = (uint16_t *)write_rows(planes, header.faces, 4, rows);
-    uint16_t *corner_vertex = face_first + header.faces + 1, *corner_edge = corner_vertex + header.corners;
-    uint16_t *edge_vertex = corner_edge + header.corners, *edge_face = edge_vertex + 2 * header.edges;
+    uint16_t *corner_vertex = face_first + header.faces + 1, *corner_edge = corner_vertex + 2 * header.edges;
+    uint16_t *edge_vertex = corner_edge + 2 * header.edges, *edge_face = edge_vertex + 2 * header.edges;
     uint16_t *vertex_first = edge_face + 2 * header.edges, *vertex_next = vertex_first + header.vertices + 1;
     write_faces(mesh, face_first, corner_vertex, corner_edge);
     if (ends) memcpy(edge_vertex, ends, 2 * (size_t)header.edges * sizeof *ends);

@@ -10,7 +10,7 @@
  *   double   x, y, z of the vertices                          each vertex_stride long
  *   double   x, y, z, offset of the faces                     each face_stride long: normal . point <= offset inside
  *   uint16   face_first[faces + 1]                            a face's corners: [face_first[f], face_first[f + 1])
- *   uint16   corner_vertex[corners], corner_edge[corners]     counter-clockwise seen from outside; the edge that leaves
+ *   uint16   corner_vertex[2 edges], corner_edge[2 edges]     counter-clockwise seen from outside; the edge that leaves
  *   uint16   edge_vertex[2 edges], edge_face[2 edges]         from, to; the face whose corners run that way, the other
  *   uint16   vertex_first[vertices + 1], vertex_next[2 edges] a vertex's neighbours along edges
  *
@@ -33,7 +33,8 @@ enum {
 };
 
 struct sadmm_hull_header {
-    int32_t vertices, faces, edges, corners; /* corners: of all faces, 2 x edges */
+    int32_t vertices, faces, edges; /* all faces have 2 x edges corners */
+    int32_t climbs; /* not 0: along edges every way up ends at the top, but for rounding. Not so where faces are merged */
     int32_t vertex_stride, face_stride;
     int32_t doubles; /* the whole block */
     int32_t reserved;

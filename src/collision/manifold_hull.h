@@ -253,7 +253,8 @@ SADMM_INLINE void hull_keep_edges(const struct polytope_pair *pair, const struct
 {
     vec3 on_a, on_b;
     if (axis->kind != AXIS_EDGES || axis_memory(axis) == axis_memory(nearest)) return;
-    if (!hull_crossing(pair, axis, &on_a, &on_b)) {
+    if (!hull_crossing(pair, axis, &on_a, &on_b) || /* or not the outermost along it? */
+        v3_dot(axis->n, v3_sub(on_b, on_a)) > axis->separation + hull_bonus(pair, axis->separation)) {
         *axis = *nearest;
         return;
     }

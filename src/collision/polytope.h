@@ -10,7 +10,7 @@
 #include "hull_data.h"
 #include "row3.h"
 
-/* Up to so many vertices all are looked at; of more a search climbs along edges. */
+/* Up to so many vertices all are looked at; of more a search climbs along edges, where these lead to the top. */
 enum { POLYTOPE_SCAN = 48 };
 
 struct polytope {
@@ -19,6 +19,7 @@ struct polytope {
     const uint16_t *face_first, *corner_vertex, *corner_edge, *edge_vertex, *edge_face, *vertex_first, *vertex_next;
     int vertices, faces, edges;
     vec3 scale;
+    bool climbs; /* hull_data.h */
     bool scaled; /* the unit cube, its faces as far out as `scale` says */
     real radius; /* m */
 };
@@ -31,6 +32,7 @@ SADMM_INLINE void polytope_at(const double *hulls, uint32_t at, struct polytope 
     p->vertices = header->vertices;
     p->faces = header->faces;
     p->edges = header->edges;
+    p->climbs = header->climbs != 0;
     p->x = block + HULL_HEADER_DOUBLES;
     p->y = p->x + v;
     p->z = p->y + v;
@@ -40,8 +42,8 @@ SADMM_INLINE void polytope_at(const double *hulls, uint32_t at, struct polytope 
     p->offset = p->nz + f;
     p->face_first = (const uint16_t *)(p->offset + f);
     p->corner_vertex = p->face_first + header->faces + 1;
-    p->corner_edge = p->corner_vertex + header->corners;
-    p->edge_vertex = p->corner_edge + header->corners;
+    p->corner_edge = p->corner_vertex + 2 * header->edges;
+    p->edge_vertex = p->corner_edge + 2 * header->edges;
     p->edge_face = p->edge_vertex + 2 * header->edges;
     p->vertex_first = p->edge_face + 2 * header->edges;
     p->vertex_next = p->vertex_first + header->vertices + 1;
@@ -146,7 +148,7 @@ SADMM_INLINE int polytope_support(const struct polytope *p, vec3 d, int from)
     const vec3 s = v3(d.x * p->scale.x, d.y * p->scale.y, d.z * p->scale.z);
     real most;
     int best = from;
-    if (p->vertices <= POLYTOPE_SCAN) return first_largest(p->x, p->y, p->z, hull_stride(p->vertices), s);
+    if (p->vertices <= POLYTOPE_SCAN || !p->climbs) return first_largest(p->x, p->y, p->z, hull_stride(p->vertices), s);
     most = v3_dot(s, v3((real)p->x[best], (real)p->y[best], (real)p->z[best]));
     for (;;) {
         const int last = p->vertex_first[best + 1], before = best;

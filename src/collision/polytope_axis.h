@@ -102,7 +102,7 @@ SADMM_INLINE bool axis_recall(const struct polytope_pair *pair, uint32_t cache, 
                    ea = rest >> AXIS_EDGE_SHIFT, eb = rest & AXIS_EDGE_MASK;
     if (kind == AXIS_FACE_A && rest < (uint32_t)pair->a.faces) axis_of_face_a(pair, (int)rest, axis);
     else if (kind == AXIS_FACE_B && rest < (uint32_t)pair->b.faces) axis_of_face_b(pair, (int)rest, axis);
-    else if (kind == AXIS_EDGES && ea < (uint32_t)pair->a.edges && eb < (uint32_t)pair->b.edges)
+    else if (kind == AXIS_EDGES && pair->a.faces > 0 && ea < (uint32_t)pair->a.edges && eb < (uint32_t)pair->b.edges)
         return axis_of_edges(pair, (int)ea, (int)eb, axis);
     else return false;
     return true;
