@@ -47,7 +47,8 @@ SADMM_INLINE void epa_add_face(struct epa *e, int a, int b, int c)
     ++e->faces;
 }
 
-/* Whichever of the points of a - b farthest along d and against it makes more of `measure`. */
+/* Of the points of a - b farthest along d and against it the one that is farther from the plane through `origin` across
+ * d. */
 SADMM_INLINE struct difference_point epa_farther(const struct polytope_pair *pair, vec3 d, vec3 origin)
 {
     const struct difference_point zero = {{0, 0, 0}, 0, 0};
@@ -104,7 +105,7 @@ SADMM_INLINE bool epa_begin(const struct polytope_pair *pair, const struct gjk_s
     {
         const real volume = v3_dot(n, v3_sub(p[3].w, p[0].w));
         if (!(real_abs(volume) > SADMM_EPSILON * pair->slack * pair->size * pair->size)) return false;
-        if (volume > 0) { /* seen from p[3] the corners 0, 1, 2 run counter-clockwise: they are outside from there */
+        if (volume > 0) { /* p[3] is on the side that the corners 0, 1, 2 face: turned round, they face away from it */
             const struct difference_point swap = p[1];
             p[1] = p[2];
             p[2] = swap;

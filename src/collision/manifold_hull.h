@@ -191,15 +191,11 @@ SADMM_INLINE void hull_choose(const struct polytope_pair *pair, const struct pol
                               struct polytope_axis *axis)
 {
     struct polytope_axis face;
-    real s = axis->separation;
     if (known) {
         /* past the middle of a thin one the other side is nearer, but wrong */
-        const bool turned = s < 0 && v3_dot(kept->n, axis->n) < -MANIFOLD_COS_OPPOSITE;
-        if (turned || s <= kept->separation + hull_bonus(pair, kept->separation)) {
-            *axis = *kept;
-            s = kept->separation + hull_bonus(pair, kept->separation);
-            if (turned) return;
-        }
+        const bool turned = axis->separation < 0 && v3_dot(kept->n, axis->n) < -MANIFOLD_COS_OPPOSITE;
+        if (turned || axis->separation <= kept->separation + hull_bonus(pair, kept->separation)) *axis = *kept;
+        if (turned) return;
     }
     if (axis->kind == AXIS_FACE_A || axis->kind == AXIS_FACE_B || !hull_face_beside(pair, axis->n, &face)) return;
     /* the bonus of a cached axis does not count against a face of the same direction */

@@ -1,7 +1,8 @@
 /* Facing features of two polytopes, seen along a normal: the face of each that points most along it, or, where that is
- * too steep and of round shapes, an edge or a corner in place of it, projected onto a plane across the normal. Where the projections overlap, the corners of
- * the overlap make the points, each with the gap between the faces there (Sutherland and Hodgman, "Reentrant polygon
- * clipping", CACM 1974). Their features follow from the edges that meet there, whichever polygon clips the other.
+ * too steep and of round shapes, an edge or a corner in place of it, projected onto a plane across the normal. Where the
+ * projections overlap, the corners of the overlap make the points, each with the gap between the faces there (Sutherland
+ * and Hodgman, "Reentrant polygon clipping", CACM 1974). Their features follow from the edges that meet there, whichever
+ * polygon clips the other.
  */
 #ifndef SADMM_COLLISION_POLYTOPE_FACE_H
 #define SADMM_COLLISION_POLYTOPE_FACE_H
