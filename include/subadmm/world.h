@@ -22,6 +22,7 @@
 #define SUBADMM_WORLD_H
 
 #include "hull.h"
+#include "mesh.h"
 #include "problem.h"
 
 #ifdef __cplusplus
@@ -191,6 +192,9 @@ typedef enum sadmm_shape_type {
     SADMM_SHAPE_BOX,       /* size: half extents */
     SADMM_SHAPE_HULL,      /* convex hull (hull.h) in the frame of its points. size ignored; read back: the half extents
                               of the box that contacts are found with, in m */
+    SADMM_SHAPE_MESH,      /* triangle mesh or heightfield (mesh.h) in the frame of its vertices, or of its grid; static
+                              and kinematic bodies only. size ignored; read back: the half extents of the box around it,
+                              in m */
     SADMM_SHAPE_TYPE_COUNT
 } sadmm_shape_type;
 
@@ -205,6 +209,7 @@ typedef struct sadmm_shape_def {
     const sadmm_hull *hull;      /* of HULL; NULL, the default, for all others. The world keeps it while it has shapes
                                     of it, so that the caller may destroy it at once. Read back: the same pointer, which
                                     is the world's own then */
+    const sadmm_mesh *mesh;      /* of MESH; the same for it */
 } sadmm_shape_def;
 
 /* The defaults named above. Thread-safe. */

@@ -70,10 +70,11 @@ static const char *const shape_names[SADMM_SHAPE_TYPE_COUNT] = {
     [SADMM_SHAPE_CAPSULE] = "capsule",
     [SADMM_SHAPE_BOX] = "box",
     [SADMM_SHAPE_HULL] = "hull",
+    [SADMM_SHAPE_MESH] = "mesh",
 };
 static const size_t shape_sizes[SADMM_SHAPE_TYPE_COUNT] = {
     [SADMM_SHAPE_PLANE] = 0, [SADMM_SHAPE_SPHERE] = 1, [SADMM_SHAPE_CAPSULE] = 2, [SADMM_SHAPE_BOX] = 3,
-    [SADMM_SHAPE_HULL] = 0,
+    [SADMM_SHAPE_HULL] = 0, [SADMM_SHAPE_MESH] = 0,
 };
 
 /* The hulls of a scene's shapes, each once. */

@@ -29,14 +29,18 @@
     PAIR(CAPSULE, BOX,     manifold_capsule_box(a.x, a.y, b, pose, limit, cache, m))            \
     PAIR(BOX,     BOX,     manifold_box_box(b, a, pose, limit, cache, m))
 
-/* With a hull, by the pool of hulls (hull_data.h), the geometries shape_a and shape_b: a list of their own, so that a
- * narrow phase without hulls is what it would be if there were none. */
-#define SADMM_HULL_TABLE(PAIR)                                                         \
-    PAIR(PLANE,   HULL, hull_plane_manifold(shape_b, hulls, pose, limit, m))           \
-    PAIR(SPHERE,  HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m)) \
-    PAIR(CAPSULE, HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m)) \
-    PAIR(BOX,     HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m)) \
-    PAIR(HULL,    HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))
+/* With a hull or a mesh, by the pool of their blocks (hull_data.h), the geometries shape_a and shape_b: a list of their
+ * own, so that a narrow phase without them is what it would be if there were none. */
+#define SADMM_HULL_TABLE(PAIR)                                                                \
+    PAIR(PLANE,   HULL, hull_plane_manifold(shape_b, hulls, pose, limit, m))                  \
+    PAIR(SPHERE,  HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))        \
+    PAIR(CAPSULE, HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))        \
+    PAIR(BOX,     HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))        \
+    PAIR(HULL,    HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))        \
+    PAIR(SPHERE,  MESH, mesh_manifold(shape_a, shape_b, hulls, child, pose, limit, cache, m)) \
+    PAIR(CAPSULE, MESH, mesh_manifold(shape_a, shape_b, hulls, child, pose, limit, cache, m)) \
+    PAIR(BOX,     MESH, mesh_manifold(shape_a, shape_b, hulls, child, pose, limit, cache, m)) \
+    PAIR(HULL,    MESH, mesh_manifold(shape_a, shape_b, hulls, child, pose, limit, cache, m))
 /* clang-format on */
 
 /* One number for two types, below 256 each. */

@@ -15,6 +15,7 @@ SADMM_INLINE int geometry_sizes(int type)
     case SADMM_SHAPE_CAPSULE: return 2;
     case SADMM_SHAPE_BOX: return 3;
     case SADMM_SHAPE_HULL: /* the box around it comes with the hull */
+    case SADMM_SHAPE_MESH:
     case SADMM_SHAPE_PLANE:
     case SADMM_SHAPE_TYPE_COUNT: break;
     }
@@ -24,7 +25,7 @@ SADMM_INLINE int geometry_sizes(int type)
 /* Not by fmin, which is a call where instructions see NaN in another way. */
 SADMM_INLINE double smaller_of(double a, double b) { return a < b ? a : b; }
 
-/* Smallest extent, m; a plane has none that limits. */
+/* Smallest extent, m; a plane has none that limits, and of a mesh it is the whole that counts. */
 SADMM_INLINE double geometry_thickness(const struct sadmm_geometry *g)
 {
     switch ((sadmm_shape_type)g->type) {
@@ -32,6 +33,7 @@ SADMM_INLINE double geometry_thickness(const struct sadmm_geometry *g)
     case SADMM_SHAPE_CAPSULE: return 2 * g->size[0];
     case SADMM_SHAPE_BOX:
     case SADMM_SHAPE_HULL: return 2 * smaller_of(g->size[0], smaller_of(g->size[1], g->size[2]));
+    case SADMM_SHAPE_MESH: return -2 * smaller_of(-g->size[0], smaller_of(-g->size[1], -g->size[2]));
     case SADMM_SHAPE_PLANE:
     case SADMM_SHAPE_TYPE_COUNT: break;
     }
@@ -45,7 +47,8 @@ SADMM_INLINE double geometry_radius(const struct sadmm_geometry *g)
     case SADMM_SHAPE_SPHERE: return g->size[0];
     case SADMM_SHAPE_CAPSULE: return g->size[0] + g->size[1];
     case SADMM_SHAPE_BOX:
-    case SADMM_SHAPE_HULL: return sqrt(g->size[0] * g->size[0] + g->size[1] * g->size[1] + g->size[2] * g->size[2]);
+    case SADMM_SHAPE_HULL:
+    case SADMM_SHAPE_MESH: return sqrt(g->size[0] * g->size[0] + g->size[1] * g->size[1] + g->size[2] * g->size[2]);
     case SADMM_SHAPE_PLANE:
     case SADMM_SHAPE_TYPE_COUNT: break;
     }
@@ -66,6 +69,7 @@ SADMM_INLINE void geometry_extents(const struct sadmm_geometry *g, const double 
         return;
     case SADMM_SHAPE_BOX:
     case SADMM_SHAPE_HULL:
+    case SADMM_SHAPE_MESH:
         for (k = 0; k < 3; ++k)
             extent[k] = fabs(R[3 * k]) * size[0] + fabs(R[3 * k + 1]) * size[1] + fabs(R[3 * k + 2]) * size[2];
         return;
@@ -75,7 +79,8 @@ SADMM_INLINE void geometry_extents(const struct sadmm_geometry *g, const double 
     for (k = 0; k < 3; ++k) extent[k] = HUGE_VAL;
 }
 
-/* Manifolds that a pair may have at most: child = (child of a) x (children of b) + (child of b). */
+/* Manifolds that a pair may have at most: child = (child of a) x (children of b) + (child of b). 0: a mesh is one of
+ * them, whose triangle is the child (mesh_walk.h finds them). */
 SADMM_INLINE uint32_t pair_children(const struct sadmm_geometry *a, const struct sadmm_geometry *b)
 {
     return (uint32_t)a->children * (uint32_t)b->children;

@@ -9,6 +9,7 @@
 #include "manifold_box.h"
 #include "manifold_box_round.h"
 #include "manifold_hull.h"
+#include "manifold_mesh.h"
 #include "manifold_plane.h"
 #include "manifold_round.h"
 #include "proxy.h"
@@ -51,8 +52,8 @@ SADMM_INLINE struct pair_pose proxies_pose(const struct sadmm_proxy *a, const st
 }
 
 SADMM_INLINE void pair_manifold_of_hull(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
-                                        const double *hulls, const struct pair_pose *pose, real limit, uint32_t cache,
-                                        struct manifold *m)
+                                        const double *hulls, uint32_t child, const struct pair_pose *pose, real limit,
+                                        uint32_t cache, struct manifold *m)
 {
     switch (SADMM_TYPE_PAIR(shape_a->type, shape_b->type)) {
 #define SADMM_MANIFOLD(A, B, call) \
@@ -70,11 +71,10 @@ SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const stru
                                 uint32_t cache, struct manifold *m)
 {
     const vec3 a = v3_load(shape_a->size), b = v3_load(shape_b->size);
-    (void)child; /* no type has more than one piece */
     m->count = 0;
     m->cache = 0;
-    if (hulls && shape_b->type == SADMM_SHAPE_HULL) {
-        pair_manifold_of_hull(shape_a, shape_b, hulls, pose, limit, cache, m);
+    if (hulls && shape_b->type >= SADMM_SHAPE_HULL) {
+        pair_manifold_of_hull(shape_a, shape_b, hulls, child, pose, limit, cache, m);
         return;
     }
     switch (SADMM_TYPE_PAIR(shape_a->type, shape_b->type)) {
@@ -126,6 +126,36 @@ SADMM_INLINE void find_manifold(const struct sadmm_proxy *a, const struct sadmm_
         pose = proxies_pose(a, b, ahead);
     }
     m->ahead = ahead;
+}
+
+/* ---- meshes: their triangles have one pose in common -------------------------------------------------------------- */
+
+/* When a pair that moves on first touches the triangle, s; HUGE_VAL: not within the step. */
+SADMM_RARE double mesh_first_touch(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *blocks,
+                                   uint32_t child, double dt, const struct pair_start *start)
+{
+    struct advance state = {0, false};
+    double ahead = start->ahead;
+    struct pair_pose pose = start->pose;
+    struct manifold m;
+    for (;;) {
+        m.count = 0;
+        mesh_manifold(&a->geometry, &b->geometry, blocks, child, &pose, SADMM_REAL_MAX, 0, &m);
+        if (!advance_pair(a, b, &pose, &m, dt, &state, &ahead)) break;
+        pose = proxies_pose(a, b, ahead);
+    }
+    return state.missed ? HUGE_VAL : ahead;
+}
+
+/* From where the manifolds of all triangles are found: where a pair that moves on touches the first of them. `first`:
+ * the least of mesh_first_touch. */
+SADMM_INLINE void mesh_start_at(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double first, double margin,
+                                double gravity, double dt, struct pair_start *start)
+{
+    if (first < HUGE_VAL) start->ahead = first;
+    else start->limit = proxy_limit(a, b, 0, margin, gravity, dt);
+    start->pose = proxies_pose(a, b, start->ahead);
+    start->moves_on = false;
 }
 
 #endif

@@ -14,7 +14,7 @@ at_once_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t i = collision_thread(NARROW_THREADS);
     if (i < (int64_t)v.candidate_capacity + SIZES_BEYOND && !narrow_candidate<FOR, NARROW_AT_ONCE>(v, i))
-        v.listed[atomicAdd(v.candidate_count + 1, 1ull)] = (int32_t)i;
+        v.listed[atomicAdd(v.candidate_count + COUNT_LISTED, 1ull)] = (int32_t)i;
 }
 
 /* A warp a block; on every chip that this is compiled for about so many run at once. Where there are more than these have
@@ -26,7 +26,7 @@ static __global__ void __launch_bounds__(NARROW_THREADS)
 listed_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t width = NARROW_THREADS, most = LISTED_WARPS, all = (v.candidate_capacity + width - 1) / width,
-                  warps = all < most ? all : most, count = (int64_t)v.candidate_count[1],
+                  warps = all < most ? all : most, count = (int64_t)v.candidate_count[COUNT_LISTED],
                   wanted = (count + warps - 1) / warps, lanes = wanted < width ? wanted : width,
                   i = blockIdx.x * lanes + threadIdx.x;
     if (threadIdx.x < lanes && i < count) narrow_candidate<FOR, NARROW_LISTED>(v, v.listed[i]);
