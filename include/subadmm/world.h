@@ -333,7 +333,10 @@ typedef struct sadmm_contact {
     double friction;      /* mu of the pair */
     double impulse[3];    /* on b, world, N s */
     double force[3];      /* impulse / dt, on b, world, N (eq. 12) */
-    uint32_t feature;     /* id of the touching features, stable from step to step within a shape pair */
+    uint32_t feature;     /* id of the touching features, stable from step to step within a shape pair, and of a mesh
+                             within a triangle */
+    int32_t triangle;     /* of a mesh (mesh.h), as its definition numbers them; of a heightfield twice the cell (row x
+                             (columns - 1) + column), + 1 in its upper half of y. -1: neither shape is a mesh */
 } sadmm_contact;
 
 /* Contacts of the last step that was done, 0 where there was none, world is NULL, or something was removed since. A

@@ -5,8 +5,9 @@
  *   2. What lies on it: the points of the facing faces, if the deepest of the body is among them. That is all that most
  *      pairs ask for.
  *   3. Else the nearest points, or the least depth, and the axis to use, as for hulls. Where the surface does not push
- *      along that, its face takes over, if the body is over it; unless it says something else altogether: that a body
- *      whose rim hangs over a wall is to leave through the wall. Then it is a matter for the other triangles.
+ *      along that, its face takes over, if the body is over it; of what is in each other, the best of all axes that it
+ *      does push along. But not if it says something else altogether: that a body whose rim hangs over a wall is to leave
+ *      through the wall. Then it is a matter for the other triangles.
  *   4. Points on edges and corners that are flat are left out, and of points that several triangles would have along one
  *      and the same normal all but the first triangle's.
  *
@@ -18,6 +19,10 @@
 
 #include "manifold_hull.h"
 #include "mesh_triangle.h"
+
+/* Up to this share of the thinner extent a body is pushed out by the face that it is over, whatever else would be nearer:
+ * a body that slides on to the next triangle of a plane is over it by a sliver, at first. */
+#define MESH_SHALLOW ((real)0.05)
 
 /* What a triangle and a shape are to each other. */
 struct mesh_pair {
@@ -155,16 +160,96 @@ SADMM_INLINE void mesh_ends_over(const struct mesh_pair *p, real limit, struct m
     }
 }
 
-/* The face in place of an axis that the surface does not push along. */
-SADMM_INLINE void mesh_by_face(const struct mesh_pair *p, const struct polytope_axis *axis, bool kept_front, real limit,
-                               struct manifold *m)
+/* The directions that an edge pushes along, if it stands out: they go down to both sides of it. */
+struct mesh_arc {
+    vec3 from, along; /* the edge */
+    vec3 side[2];     /* across it, on the surface, to each side */
+};
+
+/* False: the edge does not stand out. */
+SADMM_INLINE bool mesh_arc_of(const struct mesh_pair *p, int k, struct mesh_arc *arc)
 {
-    if (p->pair.a.faces > 0) facing_manifold(&p->pair, p->front.n, p->front.separation, limit, m);
-    else mesh_ends_over(p, limit, m);
-    m->cache = axis_memory(&p->front);
-    /* deep by the face, while the axis says that it is to leave by another way */
-    if (!kept_front && v3_dot(axis->n, p->front.n) < (real)0.5 && manifold_least(m) < -limit) m->count = 0;
-    mesh_finish(p, AXIS_FACE_B, m);
+    const struct mesh_triangle *t = &p->triangle;
+    vec3 beyond;
+    arc->from = mesh_corner(t, k);
+    arc->along = v3_sub(mesh_corner(t, mesh_next_corner(k)), arc->from);
+    arc->side[0] = v3_cross(t->normal, arc->along);
+    if (t->opposite[k] < 0) { /* the surface ends: as if it went on straight down */
+        arc->side[1] = v3_neg(t->normal);
+        return true;
+    }
+    beyond = v3_sub(v3_sub(mesh_vertex(&p->mesh, t->opposite[k]), t->origin), arc->from);
+    arc->side[1] = beyond;
+    return v3_dot(beyond, t->normal) < 0 && !mesh_marked(t->marks, MESH_EDGE_FLAT, k);
+}
+
+/* The axis of an edge of a and one of the triangle, if both push along it. */
+SADMM_INLINE bool mesh_edge_axis(const struct polytope_pair *pair, const struct mesh_arc *arc, int k, int e,
+                                 struct polytope_axis *axis)
+{
+    vec3 from, n, m[2];
+    const vec3 d = edge_of_a(pair, e, &from);
+    real n2;
+    int i;
+    n = v3_cross(d, arc->along);
+    n2 = v3_norm2(n);
+    if (!(n2 > (real)1e-8 * v3_norm2(d) * v3_norm2(arc->along))) return false;
+    /* into the surface: seen from it, both its sides go down */
+    n = v3_scale(n, (v3_dot(n, arc->side[0]) < 0 ? -1 : 1) / real_sqrt(n2));
+    if (v3_dot(n, arc->side[0]) < 0 || v3_dot(n, arc->side[1]) < 0) return false;
+    if (pair->a.faces > 0) { /* between the normals of its faces */
+        for (i = 0; i < 2; ++i) m[i] = m3_mul(pair->R, polytope_normal(&pair->a, pair->a.edge_face[2 * e + i]));
+        if (v3_dot(v3_cross(m[0], n), v3_cross(n, m[1])) < 0 || v3_dot(n, v3_add(m[0], m[1])) < 0) return false;
+    }
+    axis->kind = AXIS_EDGES;
+    axis->a = e;
+    axis->b = k;
+    axis->n = n;
+    axis->separation = v3_dot(n, v3_sub(arc->from, from)) - pair_radii(pair);
+    return true;
+}
+
+/* Of all axes that the surface pushes along the one by which the two are least deep in each other. */
+SADMM_INLINE void mesh_best_axis(const struct mesh_pair *p, struct polytope_axis *best)
+{
+    const struct polytope_pair *pair = &p->pair;
+    struct polytope_axis axis;
+    struct mesh_arc arc;
+    int f, k, e;
+    *best = p->front;
+    for (f = 0; f < pair->a.faces; ++f) {
+        axis_of_face_a(pair, f, &axis);
+        if (axis.separation > best->separation && mesh_allows(&p->mesh, &p->triangle, v3_neg(axis.n))) *best = axis;
+    }
+    for (k = 0; k < 3; ++k) {
+        if (!mesh_arc_of(p, k, &arc)) continue;
+        for (e = 0; e < pair->a.edges; ++e)
+            if (mesh_edge_axis(pair, &arc, k, e, &axis) && axis.separation > best->separation) *best = axis;
+    }
+}
+
+/* Where the surface does not push along the axis of least depth, or of the nearest points. */
+SADMM_RARE void mesh_by_surface(const struct mesh_pair *p, const struct polytope_axis *nearest, bool kept_front, real limit,
+                                struct manifold *m)
+{
+    const struct polytope_pair *pair = &p->pair;
+    struct polytope_axis axis = p->front;
+    vec3 pa, pb;
+    real least;
+    if (nearest->separation < -pair_radii(pair) && !kept_front) mesh_best_axis(p, &axis);
+    if (axis.kind == AXIS_FACE_B && pair->a.faces == 0) mesh_ends_over(p, limit, m);
+    else facing_manifold(pair, axis.n, axis.separation, limit, m);
+    m->cache = axis_memory(&axis);
+    if (axis.kind == AXIS_EDGES && hull_crossing(pair, &axis, &pa, &pb)) {
+        pa = v3_madd(pa, pair->a.radius, axis.n);
+        hull_add_nearest(pair, pa, pb, polytope_feature(FEATURE_CROSSING, axis.a, axis.b), m);
+    }
+    /* much deeper by it than by a way out that has not much to do with it: that is for other triangles to say */
+    least = manifold_least(m);
+    if (!kept_front && v3_dot(axis.n, nearest->n) < (real)0.5 &&
+        least < 4 * real_min(nearest->separation, 0) - MESH_SHALLOW * pair->thin)
+        m->count = 0;
+    mesh_finish(p, axis.kind, m);
 }
 
 /* limit SADMM_REAL_MAX: the nearest points, whatever the surface around (advance.h). */
@@ -195,7 +280,7 @@ SADMM_RARE void mesh_manifold(const struct sadmm_geometry *a, const struct sadmm
     hull_keep_edges(&p.pair, &nearest, &axis, &pa, &pb, &feature);
     if (!mesh_allows(&p.mesh, &p.triangle, v3_neg(axis.n))) axis = nearest;
     if (!mesh_allows(&p.mesh, &p.triangle, v3_neg(axis.n))) {
-        mesh_by_face(&p, &nearest, known && kept.kind == AXIS_FACE_B, limit, m);
+        mesh_by_surface(&p, &nearest, known && kept.kind == AXIS_FACE_B, limit, m);
         return;
     }
     if (mesh_is_front(&p.triangle, v3_neg(axis.n))) axis = p.front;
@@ -203,7 +288,10 @@ SADMM_RARE void mesh_manifold(const struct sadmm_geometry *a, const struct sadmm
         facing_manifold(&p.pair, axis.n, axis.separation, limit, m);
     if (m->count == 0 && (axis.kind == AXIS_FACE_A || axis.kind == AXIS_FACE_B)) { /* not over each other */
         axis = nearest;
-        if (!mesh_allows(&p.mesh, &p.triangle, v3_neg(axis.n))) return;
+        if (!mesh_allows(&p.mesh, &p.triangle, v3_neg(axis.n))) {
+            mesh_by_surface(&p, &nearest, known && kept.kind == AXIS_FACE_B, limit, m);
+            return;
+        }
     }
     m->normal = axis.n;
     m->cache = axis_memory(&axis);

@@ -103,7 +103,7 @@ SADMM_INLINE enum mesh_part mesh_part_along(const struct mesh_triangle *t, vec3 
         h[k] = v3_dot(u, x);
         size2 = real_max(size2, v3_norm2(x));
     }
-    even = MESH_ACROSS / 8 * real_sqrt(size2);
+    even = 4 * MESH_ACROSS * real_sqrt(size2); /* a search ends with a direction as far off as that */
     top = real_max(h[0], real_max(h[1], h[2]));
     for (k = 0; k < 3; ++k) count += h[k] >= top - even;
     *number = 0;
