@@ -7,6 +7,7 @@
 #include "hull.h"
 #include "joint.h"
 #include "mass.h"
+#include "mesh_file.h"
 #include "problem.h"
 #include "settings.h"
 #include "status.h"
