@@ -290,6 +290,27 @@ static void on_hulls(void)
     sadmm_hull_destroy(hull);
 }
 
+static void on_mesh_files(void)
+{
+    sadmm_mesh_file_def def = sadmm_mesh_file_def_default();
+    sadmm_mesh_file *file;
+    sadmm_mesh_file_info info;
+    def.bytes = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    def.size = strlen((const char *)def.bytes);
+    REFUSES("out", sadmm_mesh_file_read(&def, NULL));
+    REFUSES("def", sadmm_mesh_file_read(NULL, &file));
+    ck_assert_ptr_null(file);
+    sadmm_mesh_file_destroy(NULL);
+    ck_assert_int_eq(sadmm_mesh_file_vertex_count(NULL), 0);
+    ck_assert_int_eq(sadmm_mesh_file_triangle_count(NULL), 0);
+    ck_assert_ptr_null(sadmm_mesh_file_vertices(NULL));
+    ck_assert_ptr_null(sadmm_mesh_file_triangles(NULL));
+    REFUSES("file", sadmm_mesh_file_describe(NULL, &info));
+    ck_assert_int_eq(sadmm_mesh_file_read(&def, &file), SADMM_OK);
+    REFUSES("info", sadmm_mesh_file_describe(file, NULL));
+    sadmm_mesh_file_destroy(file);
+}
+
 static void on_masses(void)
 {
     double position[3] = {0}, orientation[4] = {1};
@@ -341,13 +362,17 @@ static const struct {
     {on_hulls,
      {"sadmm_hull_create", "sadmm_hull_destroy", "sadmm_hull_vertex_count", "sadmm_hull_edge_count",
       "sadmm_hull_face_count", "sadmm_hull_vertices", "sadmm_hull_face_at", "sadmm_hull_mass"}},
+    {on_mesh_files,
+     {"sadmm_mesh_file_read", "sadmm_mesh_file_destroy", "sadmm_mesh_file_vertex_count",
+      "sadmm_mesh_file_triangle_count", "sadmm_mesh_file_vertices", "sadmm_mesh_file_triangles",
+      "sadmm_mesh_file_describe"}},
     {on_masses,
      {"sadmm_shape_mass", "sadmm_mass_sum", "sadmm_mass_pose_in_body", "sadmm_mass_pose_of_body"}},
     {on_others, {"sadmm_backend_query", "sadmm_box_inertia", "sadmm_sphere_inertia", "sadmm_capsule_inertia"}},
     {NULL,
      {"sadmm_settings_default", W(def_default), "sadmm_body_def_default", "sadmm_shape_def_default",
       "sadmm_hull_def_default", "sadmm_joint_def_default", "sadmm_coupling_def_default", "sadmm_gear_def_default",
-      "sadmm_status_name",
+      "sadmm_mesh_file_def_default", "sadmm_status_name",
       "sadmm_last_message", "sadmm_version", "sadmm_build_commit", "sadmm_build_compiler"}},
 };
 enum { GROUPS = sizeof functions / sizeof *functions };

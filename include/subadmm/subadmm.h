@@ -8,6 +8,7 @@
 #include "joint.h"
 #include "mass.h"
 #include "mesh.h"
+#include "mesh_file.h"
 #include "problem.h"
 #include "settings.h"
 #include "status.h"
