@@ -276,6 +276,7 @@ static void on_hulls(void)
     ck_assert_int_eq(sadmm_hull_edge_count(NULL), 0);
     ck_assert_int_eq(sadmm_hull_face_count(NULL), 0);
     ck_assert_ptr_null(sadmm_hull_vertices(NULL));
+    ck_assert_double_eq(sadmm_hull_rounding(NULL), 0);
     REFUSES("hull", sadmm_hull_face_at(NULL, 0, &face));
     REFUSES("hull", sadmm_hull_mass(NULL, 1, &mass));
     def.points = corners;
@@ -366,6 +367,7 @@ static const struct {
      {"sadmm_mesh_file_read", "sadmm_mesh_file_destroy", "sadmm_mesh_file_vertex_count",
       "sadmm_mesh_file_triangle_count", "sadmm_mesh_file_vertices", "sadmm_mesh_file_triangles",
       "sadmm_mesh_file_describe"}},
+      "sadmm_hull_face_count", "sadmm_hull_vertices", "sadmm_hull_rounding", "sadmm_hull_face_at", "sadmm_hull_mass"}},
     {on_masses,
      {"sadmm_shape_mass", "sadmm_mass_sum", "sadmm_mass_pose_in_body", "sadmm_mass_pose_of_body"}},
     {on_others, {"sadmm_backend_query", "sadmm_box_inertia", "sadmm_sphere_inertia", "sadmm_capsule_inertia"}},
