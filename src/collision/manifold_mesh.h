@@ -266,6 +266,7 @@ SADMM_RARE void mesh_manifold(const struct sadmm_geometry *a, const struct sadmm
 
     mesh_pair_make(a, b, blocks, child, pose, &p);
     start = p.front.n;
+    kept = p.front; /* until something is known */
     if (!of_any_distance && mesh_by_memory(&p, limit, cache, &kept, &known, &start, m)) return;
     if (!hull_nearest(&p.pair, start, limit, &nearest, &pa, &pb, &feature)) return;
     axis = nearest;
