@@ -138,7 +138,8 @@ static inline struct soup *soup_ball(const double size[3], int n)
             }
             for (int i = 0; j > 0 && i <= n - j; ++i) {
                 soup_triangle(s, last[i], turned ? row[i] : last[i + 1], turned ? last[i + 1] : row[i]);
-                if (i < n - j) soup_triangle(s, last[i + 1], turned ? row[i] : row[i + 1], turned ? row[i + 1] : row[i]);
+                if (i < n - j)
+                    soup_triangle(s, last[i + 1], turned ? row[i] : row[i + 1], turned ? row[i + 1] : row[i]);
             }
             memcpy(last, row, sizeof row);
         }

@@ -548,7 +548,8 @@ START_TEST(capacities_grow)
     struct sadmm_cuda_collision_stats first = COLLISION(stats)(b.device);
     ck_assert_int_gt(out.counts.points, 1);
     ck_assert_int_ge(first.repeats, 1);
-    /* each capacity once, for the counts are exact; before that pairs with meshes, whose triangles nobody has counted yet */
+    /* each capacity once, for the counts are exact; before that pairs with meshes, whose triangles nobody has counted
+     * yet */
     ck_assert_int_le(first.repeats, kind->meshes ? 3 : 2);
     ck_assert_int_ge(first.candidate_capacity, out.counts.candidates);
     ck_assert_int_ge(first.point_capacity, out.counts.points);

@@ -11,15 +11,15 @@
 /* A shape beside a mesh. */
 struct beside {
     struct test_pool *pool;
-    struct test_hull core;        /* the shape without its radius */
+    struct test_hull core; /* the shape without its radius */
     struct sadmm_geometry shape, surface;
     struct mesh mesh;
-    double R[9], x[3];            /* of the shape, in the frame of the mesh */
+    double R[9], x[3]; /* of the shape, in the frame of the mesh */
 };
 
 static const double unturned[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, origin[3] = {0, 0, 0};
 
-/* ---- meshes -------------------------------------------------------------------------------------------------------- */
+/* ---- meshes ------------------------------------------------------------------------------------------------------ */
 
 static double waves(double x, double y) { return 0.2 * sin(3 * x) * cos(2 * y) + 0.1 * x; }
 static double steps(double x, double y) { return 0.3 * floor(2 * x + 0.1) + 0.2 * floor(1.5 * y); }
@@ -63,7 +63,7 @@ static void take_mesh(struct beside *b, const sadmm_mesh *mesh)
     b->pool->used += mesh->doubles;
 }
 
-/* ---- shapes -------------------------------------------------------------------------------------------------------- */
+/* ---- shapes ------------------------------------------------------------------------------------------------------ */
 
 enum { SHAPES = 6 };
 static void take_shape(struct beside *b, int kind, double scale)
@@ -75,7 +75,8 @@ static void take_shape(struct beside *b, int kind, double scale)
         b->shape = (struct sadmm_geometry){.type = SADMM_SHAPE_SPHERE, .children = 1, .size = {0.15 * scale}};
         b->core.vertices = 1;
     } else if (kind == 1) {
-        b->shape = (struct sadmm_geometry){.type = SADMM_SHAPE_CAPSULE, .children = 1, .size = {0.05 * scale, 0.2 * scale}};
+        b->shape =
+            (struct sadmm_geometry){.type = SADMM_SHAPE_CAPSULE, .children = 1, .size = {0.05 * scale, 0.2 * scale}};
         b->core.vertices = 2;
         b->core.edges = 1;
         b->core.edge[0][1] = 1;
@@ -91,12 +92,9 @@ static void take_shape(struct beside *b, int kind, double scale)
     }
 }
 
-static double radius_of_core(const struct beside *b)
-{
-    return b->core.faces > 0 ? 0 : b->shape.size[0];
-}
+static double radius_of_core(const struct beside *b) { return b->core.faces > 0 ? 0 : b->shape.size[0]; }
 
-/* ---- the reference ------------------------------------------------------------------------------------------------- */
+/* ---- the reference ----------------------------------------------------------------------------------------------- */
 
 static void triangle_hull(const struct mesh *m, int32_t triangle, struct test_hull *h)
 {
@@ -156,7 +154,7 @@ static double distance_of(const struct beside *b, bool *at_end)
     return least - radius_of_core(b);
 }
 
-/* ---- what the library finds ---------------------------------------------------------------------------------------- */
+/* ---- what the library finds -------------------------------------------------------------------------------------- */
 
 /* The least gap of all points, HUGE_VAL: none. memory: by triangle, NULL: none. */
 static double least_gap(const struct beside *b, double limit, uint32_t *memory, int *points)
@@ -206,9 +204,10 @@ static void place_over(struct beside *b, struct random *r, double above)
     v3_store(v3_madd(on, most + radius_of_core(b) + above, n), b->x);
 }
 
-/* ---- tests --------------------------------------------------------------------------------------------------------- */
+/* ---- tests ------------------------------------------------------------------------------------------------------- */
 
-/* Whatever the surface is divided into, the nearest point of all of it is found, with its distance, and nothing nearer. */
+/* Whatever the surface is divided into, the nearest point of all of it is found, with its distance, and
+ * nothing nearer. */
 START_TEST(the_nearest_point_is_found)
 {
     sadmm_mesh *mesh = make_mesh(_i / SHAPES);
@@ -285,7 +284,8 @@ START_TEST(a_convex_mesh_is_its_hull)
         /* both prefer faces within 8 degrees by 5 % of the depth and 0.5 % of the thickness (manifold_hull.h), of which
          * a triangle may have another choice */
         const double most = 0.06 * fabs(expected) + 0.006 * thin;
-        ck_assert_msg(fabs(found - expected) <= most, "pose %d: %.12g by the mesh, %.12g by the hull", i, found, expected);
+        ck_assert_msg(fabs(found - expected) <= most, "pose %d: %.12g by the mesh, %.12g by the hull", i, found,
+                      expected);
     }
     free(s);
     free(b.pool);
@@ -293,8 +293,8 @@ START_TEST(a_convex_mesh_is_its_hull)
 }
 END_TEST
 
-/* Along a path over the surface the least gap changes no faster than the shape moves, but for what the memory of an axis
- * may keep. */
+/* Along a path over the surface the least gap changes no faster than the shape moves, but for what the memory of an
+ * axis may keep, 10 % of the depth and 0.5 % of the thickness (manifold.h), and a little for clipping. */
 START_TEST(nothing_jumps_along_a_path)
 {
     sadmm_mesh *mesh = make_mesh(_i / SHAPES);

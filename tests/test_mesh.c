@@ -18,7 +18,7 @@ static bool same_vec(vec3 a, vec3 b) { return a.x == b.x && a.y == b.y && a.z ==
 static double bumpy(double x, double y) { return 0.3 * sin(3 * x) * cos(2 * y) + 0.1 * x; }
 static double valley(double x, double y) { return fabs(x) + 0 * y; }
 
-/* ---- neighbours ---------------------------------------------------------------------------------------------------- */
+/* ---- neighbours -------------------------------------------------------------------------------------------------- */
 
 static int corner_at(const struct mesh *m, int32_t triangle, vec3 x)
 {
@@ -145,8 +145,7 @@ START_TEST(a_heightfield_is_a_mesh)
             for (int k = 0; k < 3; ++k) {
                 ck_assert(same_vec(mesh_vertex(&m, corner[k]), mesh_vertex(&f, corner_2[k])));
                 ck_assert_int_eq(opposite[k] < 0, opposite_2[k] < 0);
-                if (opposite[k] >= 0)
-                    ck_assert(same_vec(mesh_vertex(&m, opposite[k]), mesh_vertex(&f, opposite_2[k])));
+                if (opposite[k] >= 0) ck_assert(same_vec(mesh_vertex(&m, opposite[k]), mesh_vertex(&f, opposite_2[k])));
                 ck_assert(mesh_marked(m.marks[t], MESH_EDGE_FLAT, k) == mesh_marked(f.marks[twin], MESH_EDGE_FLAT, k));
                 ck_assert(mesh_marked(m.marks[t], MESH_CORNER_FLAT, k) ==
                           mesh_marked(f.marks[twin], MESH_CORNER_FLAT, k));
@@ -159,7 +158,7 @@ START_TEST(a_heightfield_is_a_mesh)
 }
 END_TEST
 
-/* ---- flat ---------------------------------------------------------------------------------------------------------- */
+/* ---- flat -------------------------------------------------------------------------------------------------------- */
 
 static void count_flat(const struct mesh *m, int *edges, int *corners)
 {
@@ -202,7 +201,7 @@ START_TEST(flat_is_what_lies_in_one_plane)
 }
 END_TEST
 
-/* ---- walks --------------------------------------------------------------------------------------------------------- */
+/* ---- walks ------------------------------------------------------------------------------------------------------- */
 
 static void check_walk(const struct mesh *m, const struct sadmm_box3 *box)
 {
@@ -249,7 +248,7 @@ START_TEST(walks_find_all_that_is_near)
 }
 END_TEST
 
-/* ---- input --------------------------------------------------------------------------------------------------------- */
+/* ---- input ------------------------------------------------------------------------------------------------------- */
 
 /* Vertices of one place are one; triangles that are none are left out, and counted. */
 START_TEST(what_is_no_triangle_is_left_out)
@@ -260,8 +259,8 @@ START_TEST(what_is_no_triangle_is_left_out)
         soup_triangle(s, a, b, c);
     }
     soup_triangle(s, 0, 0, 1);
-    soup_triangle(s, 0, 3, 1);                                           /* two corners in one place */
-    soup_triangle(s, 0, 1, soup_vertex(s, 0.5, -0.0, 5));                /* in one line */
+    soup_triangle(s, 0, 3, 1);                            /* two corners in one place */
+    soup_triangle(s, 0, 1, soup_vertex(s, 0.5, -0.0, 5)); /* in one line */
     sadmm_mesh *mesh = soup_mesh(s);
     double lo[3], hi[3];
     ck_assert_int_eq(sadmm_mesh_triangle_count(mesh), 2);

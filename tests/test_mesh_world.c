@@ -40,7 +40,7 @@ static sadmm_shape_id add_surface(sadmm_world *world, sadmm_body_id body, const 
     return id;
 }
 
-/* ---- bodies -------------------------------------------------------------------------------------------------------- */
+/* ---- bodies ------------------------------------------------------------------------------------------------------ */
 
 enum form { BOX, SPHERE, LYING_CAPSULE, STANDING_CAPSULE, HULL, FORMS };
 
@@ -130,7 +130,7 @@ static void look_at_contacts(sadmm_world *world, const double up[3], double *til
     }
 }
 
-/* ---- flat ground --------------------------------------------------------------------------------------------------- */
+/* ---- flat ground ------------------------------------------------------------------------------------------------- */
 
 enum { GROUNDS = 4 };
 static sadmm_mesh *flat_ground(int kind)
@@ -174,8 +174,8 @@ START_TEST(flat_ground_is_a_plane)
             /* the normal of a triangle is one of rounded numbers */
             ck_assert_msg(tilt <= 2e-15, "form %d on ground %d: step %d: a normal is %g off", (int)form, kind, i, tilt);
             /* a capsule that falls over from its end makes much of little */
-            ck_assert_msg(fabs(sideways) < (form == STANDING_CAPSULE ? 1e-7 : 1e-9), "form %d on ground %d: step %d: %g N s sideways", (int)form, kind, i,
-                          sideways);
+            ck_assert_msg(fabs(sideways) < (form == STANDING_CAPSULE ? 1e-7 : 1e-9),
+                          "form %d on ground %d: step %d: %g N s sideways", (int)form, kind, i, sideways);
             if (form != STANDING_CAPSULE || i < 20) ck_assert_int_gt(sadmm_world_contact_count(worlds[1]), 0);
         }
         const sadmm_body_state on_plane = body_state(worlds[0], ids[0]), on_mesh = body_state(worlds[1], ids[1]);
@@ -193,8 +193,8 @@ START_TEST(flat_ground_is_a_plane)
 }
 END_TEST
 
-/* All forms at once, thrown onto the ground: they bounce, tumble and come to rest on it as on a plane. */
-START_TEST(thrown_bodies_come_to_rest)
+/* All forms at once, thrown onto the ground: they bounce, tumble and roll, and stay on it. */
+START_TEST(thrown_bodies_stay_on_the_ground)
 {
     for (int kind = 0; kind < GROUNDS; ++kind) {
         sadmm_mesh *mesh = flat_ground(kind);
@@ -215,8 +215,10 @@ START_TEST(thrown_bodies_come_to_rest)
         }
         for (int i = 0; i < 25; ++i) {
             const sadmm_body_state state = body_state(world, ids[i]);
-            ck_assert_double_gt(state.position[2], 0.2 * side); /* on the ground, not in it */
-            ck_assert_double_lt(state.position[2], 1.2 * side);
+            /* the lowest that one can be is the lying capsule, 1/4 of the side, the highest a capsule on its
+             * end, 3/4 */
+            ck_assert_double_gt(state.position[2], 0.24 * side);
+            ck_assert_double_lt(state.position[2], 0.8 * side);
         }
         ck_assert_double_lt(deepest, 0.05 * side); /* an impact of 3 m/s goes 15 mm a step; most of that is held */
         sadmm_world_destroy(world);
@@ -225,7 +227,7 @@ START_TEST(thrown_bodies_come_to_rest)
 }
 END_TEST
 
-/* ---- edges --------------------------------------------------------------------------------------------------------- */
+/* ---- edges ------------------------------------------------------------------------------------------------------- */
 
 /* A box hangs over the edge of a plate by less than half: it stays, whatever the triangles of the plate's sides, and is
  * not pushed off through them. */
@@ -268,8 +270,8 @@ static double trough(double x, double y)
     return 0.5 * fabs(x);
 }
 
-/* On the ridge of a roof a box balances on a line, in a trough it touches both sides; both with normals that the surface
- * has there. */
+/* On the ridge of a roof a box balances on a line, in a trough it touches both sides; both with normals that the
+ * surface has there. */
 START_TEST(ridges_and_troughs_hold)
 {
     for (int kind = 0; kind < 2; ++kind) {
@@ -298,8 +300,8 @@ START_TEST(ridges_and_troughs_hold)
 }
 END_TEST
 
-/* A ball that rolls over a ball of triangles meets its edges and corners: the path is smooth. One that slides off without
- * friction keeps its energy. */
+/* A ball that rolls over a ball of triangles meets its edges and corners: the path is smooth. One that slides off
+ * without friction keeps its energy. */
 START_TEST(a_ball_slides_over_a_ball)
 {
     const double size[3] = {1, 1, 1};
@@ -330,12 +332,12 @@ START_TEST(a_ball_slides_over_a_ball)
 }
 END_TEST
 
-/* ---- motion -------------------------------------------------------------------------------------------------------- */
+/* ---- motion ------------------------------------------------------------------------------------------------------ */
 
 static double hilly(double x, double y) { return 0.05 * sin(2 * x) * cos(1.5 * y); }
 
-/* Small bodies at 300 m/s do not pass: 1.5 m a step, with a surface that has no thickness. (Hills are low: what slides on
- * at 60 m/s goes 0.3 m a step along the plane that it lies on, and would be in the next hill.) */
+/* Small bodies at 300 m/s do not pass: 1.5 m a step, with a surface that has no thickness. (Hills are low: what slides
+ * on at 60 m/s goes 0.3 m a step along the plane that it lies on, and would be in the next hill.) */
 START_TEST(nothing_fast_passes)
 {
     double z[61 * 61];
@@ -364,8 +366,8 @@ START_TEST(nothing_fast_passes)
                 const sadmm_body_state state = body_state(world, ids[b]);
                 const double *x = state.position;
                 if (fabs(x[0]) > 2.9 || fabs(x[1]) > 2.9) continue; /* it has left the ground */
-                ck_assert_msg(x[2] > hilly(x[0], x[1]), "body %d of form %d on ground %d, step %d: %g m below", b, b % FORMS, kind, i,
-                              hilly(x[0], x[1]) - x[2]);
+                ck_assert_msg(x[2] > hilly(x[0], x[1]), "body %d of form %d on ground %d, step %d: %g m below", b,
+                              b % FORMS, kind, i, hilly(x[0], x[1]) - x[2]);
             }
         }
         sadmm_world_destroy(world);
@@ -395,8 +397,9 @@ START_TEST(a_moved_mesh_carries)
     step_world(world, 200);
     for (int i = 0; i < FORMS - 1; ++i) {
         state = body_state(world, ids[i]);
+        /* 200 iterations a step leave less than 1e-7 of the momentum; after 1 s the lowest is 1/4 of the side above */
         ck_assert_double_eq_tol(state.linear_velocity[2], 1, 1e-6);
-        ck_assert_double_gt(state.position[2], 1 + half[2] + 0.2 * side);
+        ck_assert_double_gt(state.position[2], 1 + half[2] + 0.24 * side);
     }
     sadmm_world_destroy(world);
     sadmm_mesh_destroy(mesh);
@@ -404,7 +407,7 @@ START_TEST(a_moved_mesh_carries)
 }
 END_TEST
 
-/* ---- definitions --------------------------------------------------------------------------------------------------- */
+/* ---- definitions ------------------------------------------------------------------------------------------------- */
 
 START_TEST(meshes_are_read_back_and_shared)
 {
@@ -462,7 +465,7 @@ int main(void)
     TCase *cases = tcase_create("mesh_world");
     tcase_set_timeout(cases, 60);
     tcase_add_loop_test(cases, flat_ground_is_a_plane, 0, 2 * FORMS);
-    tcase_add_test(cases, thrown_bodies_come_to_rest);
+    tcase_add_test(cases, thrown_bodies_stay_on_the_ground);
     tcase_add_test(cases, what_hangs_over_an_edge_stays);
     tcase_add_test(cases, ridges_and_troughs_hold);
     tcase_add_test(cases, a_ball_slides_over_a_ball);

@@ -401,7 +401,7 @@ static const struct {
     {NULL,
      {"sadmm_settings_default", W(def_default), "sadmm_body_def_default", "sadmm_shape_def_default",
       "sadmm_hull_def_default", "sadmm_joint_def_default", "sadmm_coupling_def_default", "sadmm_gear_def_default",
-      "sadmm_mesh_file_def_default", "sadmm_status_name",
+      "sadmm_mesh_def_default", "sadmm_heightfield_def_default", "sadmm_mesh_file_def_default", "sadmm_status_name",
       "sadmm_last_message", "sadmm_version", "sadmm_build_commit", "sadmm_build_compiler"}},
 };
 enum { GROUPS = sizeof functions / sizeof *functions };

@@ -2,12 +2,12 @@
  * (SADMM_SHAPE_MESH, world.h).
  *
  * A mesh is a surface, solid behind: a triangle's corners run counter-clockwise seen from the side where bodies are.
- * Neighbouring triangles know each other. Where bodies slide from one to the next, the edges and corners between them push
- * in no direction that the surface does not (docs/shapes.md), so that flat ground is flat however it is divided.
+ * Neighbouring triangles know each other. Where bodies slide from one to the next, the edges and corners between them
+ * push in no direction that the surface does not (docs/shapes.md), so that flat ground is flat however it is divided.
  *
- * A mesh is made once and never changes. Any number of worlds and threads may use it at the same time; it lives until its
- * maker and every world with shapes of it have let go of it. Every world keeps a copy of its data beside its other shapes
- * (sadmm_mesh_bytes), and a device one more.
+ * A mesh is made once and never changes. Any number of worlds and threads may use it at the same time; it lives until
+ * its maker and every world with shapes of it have let go of it. Every world keeps a copy of its data beside its other
+ * shapes (sadmm_mesh_bytes), and a device one more.
  *
  * Errors are returned as a status; the message is sadmm_last_message.
  */
@@ -38,8 +38,8 @@ typedef struct sadmm_mesh_def {
 /* Nothing given yet. Thread-safe. */
 SADMM_API sadmm_mesh_def sadmm_mesh_def_default(void);
 
-/* *out: the mesh, which belongs to the caller until sadmm_mesh_destroy; NULL after an error. Takes about a microsecond a
- * triangle. Thread-safe. Errors: INVALID_ARGUMENT (range; no triangle is left), OUT_OF_MEMORY. */
+/* *out: the mesh, which belongs to the caller until sadmm_mesh_destroy; NULL after an error. Thread-safe. Errors:
+ * INVALID_ARGUMENT (range; no triangle is left), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_mesh_create(const sadmm_mesh_def *def, sadmm_mesh **out);
 
 /* Heights over a regular grid of the x-y plane, whose middle is the origin; bodies are above. Every cell is two
@@ -54,7 +54,7 @@ typedef struct sadmm_heightfield_def {
 
 /* Nothing given yet. Thread-safe. */
 SADMM_API sadmm_heightfield_def sadmm_heightfield_def_default(void);
-/* As sadmm_mesh_create; takes 12 bytes a height where a mesh of the same surface takes about 150. The frame of a
+/* As sadmm_mesh_create; it takes a tenth of the memory of a mesh of the same surface. The frame of a
  * SADMM_SHAPE_MESH of it is that of the grid. */
 SADMM_API sadmm_status sadmm_heightfield_create(const sadmm_heightfield_def *def, sadmm_mesh **out);
 

@@ -21,8 +21,8 @@ enum { SADMM_MOST_CHILDREN = 65535 }; /* the children of a pair are counted in 3
 
 /* What a shape is made of, apart from where it is and what it is like to touch. Shapes refer to it by a handle, so that
  * several may share one. A geometry has children, the pieces that collide: a pair of shapes has a manifold for each
- * pair of their children, at most. Most types have one child, the whole; where one is given more, each is the whole. The
- * children of a mesh are its triangles: those of a pair are not counted out, but looked for (mesh_walk.h). */
+ * pair of their children, at most. Most types have one child, the whole; where one is given more, each is the whole.
+ * The children of a mesh are its triangles: those of a pair are not counted out, but looked for (mesh_walk.h). */
 struct sadmm_geometry {
     int32_t type;     /* sadmm_shape_type */
     int32_t children; /* in [1, SADMM_MOST_CHILDREN]; of MESH 0 */
@@ -35,8 +35,8 @@ struct sadmm_geometry {
 /* How a body moves: not at all, as the caller says, by its dynamics. */
 enum sadmm_motion { SADMM_MOTION_NONE, SADMM_MOTION_DRIVEN, SADMM_MOTION_DYNAMIC };
 
-/* May a shape be of this geometry, on such a body? Else INVALID_ARGUMENT; `name`: what the message calls the geometry, as
- * "def->". Sizes are not checked. */
+/* May a shape be of this geometry, on such a body? Else INVALID_ARGUMENT; `name`: what the message calls the geometry,
+ * as "def->". Sizes are not checked. */
 sadmm_status sadmm_geometry_check(const struct sadmm_geometry *geometry, enum sadmm_motion motion, const char *name,
                                   struct sadmm_error *error);
 

@@ -6,13 +6,13 @@
  *      pairs ask for.
  *   3. Else the nearest points, or the least depth, and the axis to use, as for hulls. Where the surface does not push
  *      along that, its face takes over, if the body is over it; of what is in each other, the best of all axes that it
- *      does push along. But not if it says something else altogether: that a body whose rim hangs over a wall is to leave
- *      through the wall. Then it is a matter for the other triangles.
- *   4. Points on edges and corners that are flat are left out, and of points that several triangles would have along one
- *      and the same normal all but the first triangle's.
+ *      does push along. But not if it says something else altogether: that a body whose rim hangs over a wall is to
+ *      leave through the wall. Then it is a matter for the other triangles.
+ *   4. Points on edges and corners that are flat are left out, and of points that several triangles would have along
+ *      one and the same normal all but the first triangle's.
  *
- * What is so far below the surface that its deepest point is nearer to another side is still pushed out by the side where
- * it came from, as long as the pair remembers it.
+ * What is so far below the surface that its deepest point is nearer to another side is still pushed out by the side
+ * where it came from, as long as the pair remembers it.
  */
 #ifndef SADMM_COLLISION_MANIFOLD_MESH_H
 #define SADMM_COLLISION_MANIFOLD_MESH_H
@@ -20,16 +20,16 @@
 #include "manifold_hull.h"
 #include "mesh_triangle.h"
 
-/* Up to this share of the thinner extent a body is pushed out by the face that it is over, whatever else would be nearer:
- * a body that slides on to the next triangle of a plane is over it by a sliver, at first. */
+/* Up to this share of the thinner extent a body is pushed out by the face that it is over, whatever else would be
+ * nearer: a body that slides on to the next triangle of a plane is over it by a sliver, at first. */
 #define MESH_SHALLOW ((real)0.05)
 
 /* What a triangle and a shape are to each other. */
 struct mesh_pair {
     struct mesh mesh;
     struct mesh_triangle triangle;
-    struct polytope_pair pair;   /* in the frame of the mesh, moved to the triangle */
-    struct polytope_axis front;  /* the axis of the triangle's face */
+    struct polytope_pair pair;  /* in the frame of the mesh, moved to the triangle */
+    struct polytope_axis front; /* the axis of the triangle's face */
 };
 
 SADMM_INLINE void mesh_pair_make(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *blocks,
@@ -92,8 +92,8 @@ SADMM_INLINE void mesh_finish(const struct mesh_pair *p, int kind, struct manifo
     m->count = kept;
 }
 
-/* Does the body lie on the triangle: is the lowest point of it over the face? known: it did in the last step, or else it
- * must not be deep. */
+/* Does the body lie on the triangle: is the lowest point of it over the face? known: it did in the last step, or else
+ * it must not be deep. */
 SADMM_INLINE bool mesh_lies_on(const struct polytope_pair *pair, const struct polytope_axis *front, bool known,
                                const struct manifold *m)
 {
@@ -144,8 +144,8 @@ SADMM_INLINE bool mesh_is_over(const struct mesh_triangle *t, vec3 x, real toler
     return true;
 }
 
-/* The ends of a capsule, or a sphere, that are over the face: steep ones as well, for what stands on one end may fall onto
- * the other within the step. */
+/* The ends of a capsule, or a sphere, that are over the face: steep ones as well, for what stands on one end may fall
+ * onto the other within the step. */
 SADMM_INLINE void mesh_ends_over(const struct mesh_pair *p, real limit, struct manifold *m)
 {
     const struct polytope_pair *pair = &p->pair;
@@ -229,8 +229,8 @@ SADMM_INLINE void mesh_best_axis(const struct mesh_pair *p, struct polytope_axis
 }
 
 /* Where the surface does not push along the axis of least depth, or of the nearest points. */
-SADMM_RARE void mesh_by_surface(const struct mesh_pair *p, const struct polytope_axis *nearest, bool kept_front, real limit,
-                                struct manifold *m)
+SADMM_RARE void mesh_by_surface(const struct mesh_pair *p, const struct polytope_axis *nearest, bool kept_front,
+                                real limit, struct manifold *m)
 {
     const struct polytope_pair *pair = &p->pair;
     struct polytope_axis axis = p->front;

@@ -8,8 +8,8 @@
 #include "core/base/check.h"
 #include "core/base/memory.h"
 #include "mesh_edges.h"
-#include "mesh_triangle.h"
 #include "mesh_tree.h"
+#include "mesh_triangle.h"
 
 enum { MOST_VERTICES = 1 << 26, MOST_TRIANGLES = 1 << 26, MOST_HEIGHTS = 1 << 26, MOST_COLUMNS = 16384 };
 
@@ -30,7 +30,7 @@ sadmm_heightfield_def sadmm_heightfield_def_default(void)
     return def;
 }
 
-/* ---- uses ---------------------------------------------------------------------------------------------------------- */
+/* ---- uses -------------------------------------------------------------------------------------------------------- */
 
 void sadmm_mesh_retain(const sadmm_mesh *mesh)
 {
@@ -51,12 +51,9 @@ void sadmm_mesh_release(const sadmm_mesh *mesh)
     if (own && atomic_fetch_sub_explicit(&own->uses, 1, memory_order_acq_rel) == 1) free_mesh(own);
 }
 
-void sadmm_mesh_destroy(sadmm_mesh *mesh)
-{
-    sadmm_mesh_release(mesh);
-}
+void sadmm_mesh_destroy(sadmm_mesh *mesh) { sadmm_mesh_release(mesh); }
 
-/* ---- marks --------------------------------------------------------------------------------------------------------- */
+/* ---- marks ------------------------------------------------------------------------------------------------------- */
 
 /* Does the vertex lie in the triangle's plane, seen from its corner k? */
 static bool is_in_plane(const struct mesh *m, const struct mesh_triangle *t, int k, int32_t vertex)
@@ -125,12 +122,12 @@ static bool mark_triangles(const struct mesh *m, const int32_t *beside, uint16_t
     return made;
 }
 
-/* ---- triangles ----------------------------------------------------------------------------------------------------- */
+/* ---- triangles --------------------------------------------------------------------------------------------------- */
 
 /* A mesh on its way from the definition to the block. */
 struct making {
-    int32_t *same;     /* by vertex of the definition: the first one in its place, then its number in the block */
-    double *vertices;  /* from the middle of the box */
+    int32_t *same;    /* by vertex of the definition: the first one in its place, then its number in the block */
+    double *vertices; /* from the middle of the box */
     int32_t *corners, *source, *ordered, *beside;
     int32_t vertex_count, triangle_count;
     struct mesh_tree tree;
@@ -170,7 +167,10 @@ static sadmm_status check_triangles(const sadmm_mesh_def *def, struct sadmm_erro
     return SADMM_OK;
 }
 
-struct place { double x[3]; int32_t vertex; };
+struct place {
+    double x[3];
+    int32_t vertex;
+};
 
 static int compare_places(const void *left, const void *right)
 {
@@ -266,8 +266,7 @@ static bool write_triangles(const struct making *m, sadmm_mesh *mesh)
 {
     struct mesh view;
     const size_t triangles = (size_t)m->triangle_count, vertices = (size_t)m->vertex_count;
-    mesh->doubles =
-        mesh_triangle_doubles(triangles, vertices, (size_t)m->tree.count, (size_t)m->edges.ring_count);
+    mesh->doubles = mesh_triangle_doubles(triangles, vertices, (size_t)m->tree.count, (size_t)m->edges.ring_count);
     mesh->block = (double *)sadmm_alloc(mesh->doubles, sizeof *mesh->block);
     if (!mesh->block) return false;
     const struct sadmm_mesh_header header = {
@@ -306,19 +305,19 @@ static sadmm_status make_triangles(const sadmm_mesh_def *def, struct making *m, 
     keep_triangles(def, m);
     if (m->triangle_count == 0)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "def->triangles: none of %zu has three corners that are not in one line", def->triangle_count);
+                          "def->triangles: none of %zu has three corners that are not in one line",
+                          def->triangle_count);
     mesh->left_out = (int64_t)def->triangle_count - m->triangle_count;
     number_vertices(def, m, mesh);
     if (!sadmm_mesh_tree_make(m->vertices, m->corners, m->triangle_count, &m->tree))
         return sadmm_fail_memory(error, "a mesh");
     order_triangles(m, mesh);
-    if (!sadmm_mesh_edges_find(m->ordered, m->triangle_count, m->vertex_count, &m->edges) ||
-        !write_triangles(m, mesh))
+    if (!sadmm_mesh_edges_find(m->ordered, m->triangle_count, m->vertex_count, &m->edges) || !write_triangles(m, mesh))
         return sadmm_fail_memory(error, "a mesh");
     return SADMM_OK;
 }
 
-/* ---- heights ------------------------------------------------------------------------------------------------------- */
+/* ---- heights ----------------------------------------------------------------------------------------------------- */
 
 static sadmm_status check_heights(const sadmm_heightfield_def *def, struct sadmm_error *error)
 {
@@ -338,8 +337,8 @@ static sadmm_status check_heights(const sadmm_heightfield_def *def, struct sadmm
                               def->spacing[k]);
     for (size_t i = 0; i < (size_t)def->columns * (size_t)def->rows; ++i)
         if (!(fabs(def->heights[i]) <= largest))
-            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->heights[%zu] = %g: must be in [-1e6, 1e6] m", i,
-                              def->heights[i]);
+            return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->heights[%zu] = %g: must be in [-1e6, 1e6] m",
+                              i, def->heights[i]);
     return SADMM_OK;
 }
 
@@ -376,7 +375,7 @@ static sadmm_status make_heights(const sadmm_heightfield_def *def, sadmm_mesh *m
     return SADMM_OK;
 }
 
-/* ---- what callers see ---------------------------------------------------------------------------------------------- */
+/* ---- what callers see -------------------------------------------------------------------------------------------- */
 
 sadmm_status sadmm_mesh_create(const sadmm_mesh_def *def, sadmm_mesh **out)
 {

@@ -1,6 +1,6 @@
 /* A triangle mesh or a heightfield as contact finding reads it: one block of memory without pointers, the same on host
- * and device, in the pool of blocks that hulls are in (hull_data.h), and in a frame whose origin is the middle of the box
- * around it. What takes the time is memory, so that a query fetches little: boxes are float, rounded outwards.
+ * and device, in the pool of blocks that hulls are in (hull_data.h), and in a frame whose origin is the middle of the
+ * box around it. What takes the time is memory, so that a query fetches little: boxes are float, rounded outwards.
  *
  * A block of triangles:
  *
@@ -38,9 +38,9 @@ struct sadmm_mesh_header {
     int32_t ring;            /* of triangles: twice the edges */
     int32_t open_edges;
     int32_t doubles, reserved; /* as in sadmm_hull_header */
-    int32_t columns, rows;   /* of heights */
-    double spacing[2];       /* of heights, m */
-    double half_height;      /* of heights: none is farther from 0, m */
+    int32_t columns, rows;     /* of heights */
+    double spacing[2];         /* of heights, m */
+    double half_height;        /* of heights: none is farther from 0, m */
 };
 
 enum { MESH_HEADER_DOUBLES = 8 };
@@ -75,7 +75,7 @@ struct mesh {
     int32_t triangles, vertices, nodes;
     int32_t columns, rows;
     double spacing[2], half_height;
-    const double *x;   /* vertices, or heights */
+    const double *x; /* vertices, or heights */
     const struct mesh_node *node;
     const int32_t *corner, *opposite, *ring_first, *ring;
     const uint16_t *marks;
@@ -111,7 +111,7 @@ SADMM_INLINE void mesh_at(const double *blocks, uint32_t at, struct mesh *m)
     m->marks = (const uint16_t *)(m->ring + header->ring);
 }
 
-/* ---- vertices, by number ------------------------------------------------------------------------------------------ */
+/* ---- vertices, by number ----------------------------------------------------------------------------------------- */
 
 SADMM_INLINE vec3 mesh_vertex(const struct mesh *m, int32_t v)
 {
@@ -149,7 +149,8 @@ SADMM_INLINE void mesh_corners(const struct mesh *m, int32_t triangle, int32_t c
         corner[0] = low;
         corner[1] = upper ? high : low + 1;
         corner[2] = upper ? high - 1 : high;
-        /* of the lower half: below, to the right, across the diagonal; of the upper one across it, above, to the left */
+        /* of the lower half: below, to the right, across the diagonal; of the upper one across it, above, to
+         * the left */
         if (upper) {
             opposite[0] = low + 1;
             opposite[1] = row + 2 < m->rows ? high + m->columns : -1;

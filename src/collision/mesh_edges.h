@@ -12,7 +12,7 @@ struct mesh_edges {
     int32_t *beside;            /* the triangle there, -1 */
     int32_t *ring_first, *ring; /* vertices + 1; twice the edges: what a vertex has edges to, ascending */
     int32_t ring_count;
-    int32_t open;               /* edges without a triangle, or with more than one, beyond */
+    int32_t open; /* edges without a triangle, or with more than one, beyond */
 };
 
 /* corners: 3 a triangle, in [0, vertices). False: out of memory. */

@@ -11,19 +11,23 @@
 
 enum {
     BINS = 16,
-    TASKS = 64, /* from so many ranges that wait on they are split in the middle, ... */
+    TASKS = 64,     /* from so many ranges that wait on they are split in the middle, ... */
     MORE_TASKS = 32 /* ... which no 2^26 triangles take more often than this */
 };
 
-struct box { float lo[3], hi[3]; };
+struct box {
+    float lo[3], hi[3];
+};
 
-struct range { int32_t begin, end; };
+struct range {
+    int32_t begin, end;
+};
 
 struct making {
     const struct box *boxes; /* by triangle */
     int32_t *order, *spare;
     struct mesh_tree *tree;
-    int32_t *first_node;     /* by place in the order: the first node whose range begins there, -1 */
+    int32_t *first_node; /* by place in the order: the first node whose range begins there, -1 */
 };
 
 static const struct box nothing = {{HUGE_VALF, HUGE_VALF, HUGE_VALF}, {-HUGE_VALF, -HUGE_VALF, -HUGE_VALF}};
@@ -50,7 +54,8 @@ static void box_of(const double *vertices, const int32_t corner[3], struct box *
 {
     for (int k = 0; k < 3; ++k) {
         const double x = vertices[3 * (size_t)corner[0] + (size_t)k], y = vertices[3 * (size_t)corner[1] + (size_t)k],
-                     z = vertices[3 * (size_t)corner[2] + (size_t)k], lo = fmin(x, fmin(y, z)), hi = fmax(x, fmax(y, z));
+                     z = vertices[3 * (size_t)corner[2] + (size_t)k], lo = fmin(x, fmin(y, z)),
+                     hi = fmax(x, fmax(y, z));
         box->lo[k] = (float)lo;
         box->hi[k] = (float)hi;
         if ((double)box->lo[k] > lo) box->lo[k] = nextafterf(box->lo[k], -HUGE_VALF);

@@ -8,7 +8,7 @@
 #include "mesh_data.h"
 
 struct mesh_tree {
-    int32_t *order;         /* triangles as the tree comes to them */
+    int32_t *order;          /* triangles as the tree comes to them */
     struct mesh_node *nodes; /* depth first */
     int32_t count;
 };

@@ -1,9 +1,10 @@
-/* A triangle of a mesh while a manifold with it is computed: a polytope of two faces, and what the surface around it says.
+/* A triangle of a mesh while a manifold with it is computed: a polytope of two faces, and what the surface around it
+ * says.
  *
  * A mesh is a surface with one side. What pushes a body away from it is a face, or an edge or a corner that stands out.
- * So a direction `u` out of the surface is one to push along at an edge or a corner only if nothing of the surface around
- * rises along it: u is in the normal cone there (mesh_allows). Where the nearest points say otherwise, they are an
- * artefact of where the surface is divided: what counts is the face, or a triangle next to it.
+ * So a direction `u` out of the surface is one to push along at an edge or a corner only if nothing of the surface
+ * around rises along it: u is in the normal cone there (mesh_allows). Where the nearest points say otherwise, they are
+ * an artefact of where the surface is divided: what counts is the face, or a triangle next to it.
  */
 #ifndef SADMM_COLLISION_MESH_TRIANGLE_H
 #define SADMM_COLLISION_MESH_TRIANGLE_H
@@ -14,7 +15,7 @@
 enum { MESH_FRONT = 0, MESH_BACK = 1 }; /* the polytope's faces */
 
 struct mesh_triangle {
-    double x[HULL_LANES], y[HULL_LANES], z[HULL_LANES];                      /* corners, from the first one, m */
+    double x[HULL_LANES], y[HULL_LANES], z[HULL_LANES]; /* corners, from the first one, m */
     double nx[HULL_LANES], ny[HULL_LANES], nz[HULL_LANES], offset[HULL_LANES];
     vec3 origin; /* the first corner, frame of the mesh */
     vec3 normal; /* unit, outward */
@@ -48,9 +49,10 @@ SADMM_INLINE void mesh_triangle_of(const struct mesh *m, int32_t triangle, struc
 /* As the narrow phase of hulls reads it. */
 SADMM_INLINE void mesh_triangle_polytope(const struct mesh_triangle *t, struct polytope *p)
 {
-    static const uint16_t face_first[] = {0, 3, 6}, corner_vertex[] = {0, 1, 2, 0, 2, 1}, corner_edge[] = {0, 1, 2, 2, 1, 0},
-                          edge_vertex[] = {0, 1, 1, 2, 2, 0}, edge_face[] = {0, 1, 0, 1, 0, 1},
-                          vertex_first[] = {0, 2, 4, 6}, vertex_next[] = {1, 2, 0, 2, 1, 0};
+    static const uint16_t face_first[] = {0, 3, 6}, corner_vertex[] = {0, 1, 2, 0, 2, 1},
+                          corner_edge[] = {0, 1, 2, 2, 1, 0}, edge_vertex[] = {0, 1, 1, 2, 2, 0},
+                          edge_face[] = {0, 1, 0, 1, 0, 1}, vertex_first[] = {0, 2, 4, 6},
+                          vertex_next[] = {1, 2, 0, 2, 1, 0};
     p->vertices = 3;
     p->faces = 2;
     p->edges = 3;
@@ -79,7 +81,7 @@ SADMM_INLINE vec3 mesh_corner(const struct mesh_triangle *t, int k)
     return v3((real)t->x[k], (real)t->y[k], (real)t->z[k]);
 }
 
-/* ---- what the surface allows -------------------------------------------------------------------------------------- */
+/* ---- what the surface allows ------------------------------------------------------------------------------------- */
 
 /* Sine below which an edge lies across a direction, or goes down along it: rounding of normals. */
 #define MESH_ACROSS (sizeof(real) == 4 ? (real)1e-4 : (real)1e-6)

@@ -10,18 +10,19 @@
 
 struct mesh_walk {
     struct sadmm_box3 box;
-    int32_t at;                  /* node, or cell */
-    int32_t triangle, last;      /* of the leaf, or the cell: still to be tested */
+    int32_t at;                               /* node, or cell */
+    int32_t triangle, last;                   /* of the leaf, or the cell: still to be tested */
     int32_t column, column_end, row, row_end; /* of cells: where the walk goes, ends excluded */
 };
 
-/* The box in which the shape `a` of a pair meets the mesh b, in the frame of b. own: a's box in the world, with its part
- * of what the pair reaches (bounds.h), for the time that the walk is for; `time`: that time, s. */
+/* The box in which the shape `a` of a pair meets the mesh b, in the frame of b. own: a's box in the world, with its
+ * part of what the pair reaches (bounds.h), for the time that the walk is for; `time`: that time, s. */
 SADMM_INLINE void mesh_reach(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const struct sadmm_box3 *own,
                              double margin, double gravity, double dt, double time, struct sadmm_box3 *box)
 {
     const double thin = smaller_of(a->thin, b->thin), speed = v3_norm(v3_load(b->velocity)),
-                 reach = shape_reach(margin, thin, b->fall, fall_of(gravity, dt)) + b->spin * (time / dt) + speed * time;
+                 reach =
+                     shape_reach(margin, thin, b->fall, fall_of(gravity, dt)) + b->spin * (time / dt) + speed * time;
     double middle[3], half[3];
     int i, k;
     for (k = 0; k < 3; ++k) {

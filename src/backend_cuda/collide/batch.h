@@ -2,8 +2,8 @@
 #ifndef SADMM_CUDA_COLLIDE_BATCH_H
 #define SADMM_CUDA_COLLIDE_BATCH_H
 
-#include "view.h"
 #include "backend_cuda/device/parallel.h"
+#include "view.h"
 
 static __device__ __forceinline__ void store_candidate(const collision_view &v, unsigned long long at, uint64_t key)
 {

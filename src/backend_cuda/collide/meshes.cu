@@ -1,9 +1,9 @@
 /* Pairs with a mesh: which triangles they may touch, and where those that are fast first touch one.
  *
  * The pairs stage lists such pairs without order. A thread walks through the mesh for each (collision/mesh_walk.h) and
- * appends a candidate a triangle; from there on these are candidates like all others, sorted with them. What all triangles
- * of a pair have in common, the time of the first touch, is computed by candidate and looked up by the others: after the
- * sort those of a pair are neighbours.
+ * appends a candidate a triangle; from there on these are candidates like all others, sorted with them. What all
+ * triangles of a pair have in common, the time of the first touch, is computed by candidate and looked up by the
+ * others: after the sort those of a pair are neighbours.
  */
 #include "batch.h"
 #include "narrow.h"
@@ -13,8 +13,8 @@ enum { EXPAND_WARPS = 1024 };
 
 /* The box of the shape that is no mesh, in all of the time that candidates are looked for. */
 template <bool SUBSTEPS>
-static __device__ struct sadmm_box3 box_of_candidates(const collision_view &v, const struct collision_step &step, uint32_t slot,
-                                                      const struct sadmm_proxy &proxy)
+static __device__ struct sadmm_box3 box_of_candidates(const collision_view &v, const struct collision_step &step,
+                                                      uint32_t slot, const struct sadmm_proxy &proxy)
 {
     struct sadmm_box3 box;
     if (!SUBSTEPS) {
@@ -31,7 +31,8 @@ static __device__ struct sadmm_box3 box_of_candidates(const collision_view &v, c
 }
 
 template <bool SUBSTEPS>
-static __device__ void expand(const collision_view &v, const struct collision_step &step, uint64_t first, struct batch *out)
+static __device__ void expand(const collision_view &v, const struct collision_step &step, uint64_t first,
+                              struct batch *out)
 {
     const struct candidate pair = candidate_of(v, first);
     const struct sadmm_proxy &a = v.proxies[pair.a], &b = v.proxies[pair.b];

@@ -1,4 +1,5 @@
-/* Candidates to manifolds, what the kernels of it share: the last step's pair, for its cache, and where manifolds go. */
+/* Candidates to manifolds, what the kernels of it share: the last step's pair, for its cache, and where
+ * manifolds go. */
 #ifndef SADMM_CUDA_COLLIDE_NARROW_H
 #define SADMM_CUDA_COLLIDE_NARROW_H
 
@@ -139,7 +140,8 @@ enum narrow_how {
     NARROW_LISTED   /* those */
 };
 
-/* The manifold of a pair with a hull or a mesh, as find_manifold makes it, where it is little work; false: it is not. */
+/* The manifold of a pair with a hull or a mesh, as find_manifold makes it, where it is little work; false: it
+ * is not. */
 static __device__ bool hulls_at_once(const collision_view &v, const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                      const struct pair_start &start, uint32_t child, uint32_t cache, struct manifold *m)
 {

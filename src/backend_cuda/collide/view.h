@@ -27,8 +27,8 @@
  * takes all of it; unused candidates are all ones and go to the end. What takes the time is one load that waits for
  * another: kernels ask at once for all that they may need, before it is known whether they do, and only then test.
  *
- * A candidate is a child of a pair of shapes (sadmm_geometry): where every shape has one child, a pair. Triangles are the
- * children of a mesh. Shapes are
+ * A candidate is a child of a pair of shapes (sadmm_geometry): where every shape has one child, a pair. Triangles are
+ * the children of a mesh. Shapes are
  * checked when they are taken over (input.cu), so that collision_table.h lists every pair that meets; one that it does
  * not list would have no contacts.
  *

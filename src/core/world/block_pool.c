@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "collision/hull.h"
-#include "collision/hull_data.h"
+#include "collision/mesh_data.h"
 #include "core/base/memory.h"
 
 /* Where an owner is in the list, or belongs. */
@@ -50,6 +50,10 @@ sadmm_status sadmm_block_pool_add(struct sadmm_block_pool *pool, const struct sa
 }
 
 /* ---- blocks that move together ---- */
+
+_Static_assert(offsetof(struct sadmm_mesh_header, doubles) == offsetof(struct sadmm_hull_header, doubles) &&
+                   offsetof(struct sadmm_mesh_header, reserved) == offsetof(struct sadmm_hull_header, reserved),
+               "blocks of hulls and of meshes are moved alike");
 
 /* While blocks move a header's `reserved` has the offset that its block gets; 0: its owner is gone. Of a mesh the two
  * members that are used are in the same places. */
