@@ -976,6 +976,10 @@ START_TEST(every_pair_of_types_is_listed)
             a_is.hull = a == SADMM_SHAPE_MESH ? ground : hull;
             b_is.hull = b == SADMM_SHAPE_MESH ? ground : hull;
             pair_manifold(&a_is, &b_is, pool->numbers, 0, &pose, 0, 0, &m);
+            if (b == SADMM_SHAPE_MESH) { /* by itself */
+                ck_assert_int_eq(m.count, 0);
+                if (listed) mesh_manifold(&a_is, &b_is, pool->numbers, 0, &pose, 0, 0, &m);
+            }
             ck_assert_msg((m.count > 0) == listed, "types %d and %d: %d points", a, b, m.count);
             ck_assert_msg(pair_is_listed(a, b) == listed && pair_is_listed(b, a) == listed, "types %d and %d", a, b);
         }

@@ -165,7 +165,9 @@ static double least_gap(const struct beside *b, double limit, uint32_t *memory, 
     for (int32_t t = 0; t < b->mesh.triangles; ++t) {
         struct manifold m;
         memset(&m, 0x55, sizeof m);
-        pair_manifold(&b->shape, &b->surface, b->pool->numbers, (uint32_t)t, &pose, limit, memory ? memory[t] : 0, &m);
+        m.count = 0;
+        m.cache = 0;
+        mesh_manifold(&b->shape, &b->surface, b->pool->numbers, (uint32_t)t, &pose, limit, memory ? memory[t] : 0, &m);
         ck_assert_int_ge(m.count, 0);
         ck_assert_int_le(m.count, SADMM_MANIFOLD_POINTS);
         if (memory) memory[t] = m.count > 0 ? m.cache : 0; /* what has no points is not remembered */

@@ -29,18 +29,22 @@
     PAIR(CAPSULE, BOX,     manifold_capsule_box(a.x, a.y, b, pose, limit, cache, m))            \
     PAIR(BOX,     BOX,     manifold_box_box(b, a, pose, limit, cache, m))
 
-/* With a hull or a mesh, by the pool of their blocks (hull_data.h), the geometries shape_a and shape_b: a list of their
- * own, so that a narrow phase without them is what it would be if there were none. */
-#define SADMM_HULL_TABLE(PAIR)                                                                \
-    PAIR(PLANE,   HULL, hull_plane_manifold(shape_b, hulls, pose, limit, m))                  \
-    PAIR(SPHERE,  HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))        \
-    PAIR(CAPSULE, HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))        \
-    PAIR(BOX,     HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))        \
-    PAIR(HULL,    HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))        \
-    PAIR(SPHERE,  MESH, mesh_manifold(shape_a, shape_b, hulls, child, pose, limit, cache, m)) \
-    PAIR(CAPSULE, MESH, mesh_manifold(shape_a, shape_b, hulls, child, pose, limit, cache, m)) \
-    PAIR(BOX,     MESH, mesh_manifold(shape_a, shape_b, hulls, child, pose, limit, cache, m)) \
-    PAIR(HULL,    MESH, mesh_manifold(shape_a, shape_b, hulls, child, pose, limit, cache, m))
+/* With a hull, by the pool of blocks (hull_data.h), the geometries shape_a and shape_b: a list of their own, so that a
+ * narrow phase without hulls is what it would be if there were none. */
+#define SADMM_HULL_TABLE(PAIR)                                                         \
+    PAIR(PLANE,   HULL, hull_plane_manifold(shape_b, hulls, pose, limit, m))           \
+    PAIR(SPHERE,  HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m)) \
+    PAIR(CAPSULE, HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m)) \
+    PAIR(BOX,     HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m)) \
+    PAIR(HULL,    HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))
+
+/* With a mesh: all by mesh_manifold (manifold_mesh.h), which the narrow phase calls by itself, a triangle after the
+ * other. */
+#define SADMM_MESH_TABLE(PAIR)   \
+    PAIR(SPHERE,  MESH, (void)0) \
+    PAIR(CAPSULE, MESH, (void)0) \
+    PAIR(BOX,     MESH, (void)0) \
+    PAIR(HULL,    MESH, (void)0)
 /* clang-format on */
 
 /* One number for two types, below 256 each. */
@@ -51,7 +55,7 @@ SADMM_INLINE bool pair_is_listed(int type_a, int type_b)
 {
     switch (type_a < type_b ? SADMM_TYPE_PAIR(type_a, type_b) : SADMM_TYPE_PAIR(type_b, type_a)) {
 #define SADMM_LISTED(A, B, call) case SADMM_TYPE_PAIR((int)SADMM_SHAPE_##A, (int)SADMM_SHAPE_##B):
-        SADMM_COLLISION_TABLE(SADMM_LISTED) SADMM_HULL_TABLE(SADMM_LISTED) return true;
+        SADMM_COLLISION_TABLE(SADMM_LISTED) SADMM_HULL_TABLE(SADMM_LISTED) SADMM_MESH_TABLE(SADMM_LISTED) return true;
 #undef SADMM_LISTED
     default: return false;
     }

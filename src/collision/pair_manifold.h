@@ -52,8 +52,8 @@ SADMM_INLINE struct pair_pose proxies_pose(const struct sadmm_proxy *a, const st
 }
 
 SADMM_INLINE void pair_manifold_of_hull(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
-                                        const double *hulls, uint32_t child, const struct pair_pose *pose, real limit,
-                                        uint32_t cache, struct manifold *m)
+                                        const double *hulls, const struct pair_pose *pose, real limit, uint32_t cache,
+                                        struct manifold *m)
 {
     switch (SADMM_TYPE_PAIR(shape_a->type, shape_b->type)) {
 #define SADMM_MANIFOLD(A, B, call) \
@@ -65,16 +65,17 @@ SADMM_INLINE void pair_manifold_of_hull(const struct sadmm_geometry *shape_a, co
 }
 
 /* Of one child of the pair. The type of a is not above b's; m->count is 0 when the shapes are apart, and for types that
- * are not listed. hulls: the pool (hull_data.h); NULL: there are none. */
+ * are not listed or meshes (mesh_manifold). hulls: the pool (hull_data.h); NULL: there are none. */
 SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
                                 const double *hulls, uint32_t child, const struct pair_pose *pose, real limit,
                                 uint32_t cache, struct manifold *m)
 {
     const vec3 a = v3_load(shape_a->size), b = v3_load(shape_b->size);
+    (void)child; /* no type has more than one piece, but meshes */
     m->count = 0;
     m->cache = 0;
-    if (hulls && shape_b->type >= SADMM_SHAPE_HULL) {
-        pair_manifold_of_hull(shape_a, shape_b, hulls, child, pose, limit, cache, m);
+    if (hulls && shape_b->type == SADMM_SHAPE_HULL) {
+        pair_manifold_of_hull(shape_a, shape_b, hulls, pose, limit, cache, m);
         return;
     }
     switch (SADMM_TYPE_PAIR(shape_a->type, shape_b->type)) {

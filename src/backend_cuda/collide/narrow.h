@@ -135,25 +135,43 @@ static __device__ void store_manifold(const collision_view &v, int64_t i, const 
 
 /* What a kernel does for a candidate. */
 enum narrow_how {
-    NARROW_PLAIN,   /* there are no hulls or meshes */
-    NARROW_AT_ONCE, /* of hulls and meshes what is little work; the others are listed */
-    NARROW_LISTED   /* those */
+    NARROW_PLAIN,         /* there are no hulls or meshes */
+    NARROW_AT_ONCE,       /* of hulls what is little work; the others are listed */
+    NARROW_LISTED,        /* those */
+    NARROW_MESHES_AT_ONCE, /* the same of worlds with meshes: further code, which would slow down the others */
+    NARROW_MESHES_LISTED
 };
+static __device__ constexpr bool with_meshes(int how) { return how >= NARROW_MESHES_AT_ONCE; }
+static __device__ constexpr bool is_at_once(int how) { return how == NARROW_AT_ONCE || how == NARROW_MESHES_AT_ONCE; }
+static __device__ constexpr bool is_listed(int how) { return how == NARROW_LISTED || how == NARROW_MESHES_LISTED; }
 
-/* The manifold of a pair with a hull or a mesh, as find_manifold makes it, where it is little work; false: it
- * is not. */
+/* The manifold of a pair with a hull, as find_manifold makes it, where it is little work; false: it is not. */
 static __device__ bool hulls_at_once(const collision_view &v, const struct sadmm_proxy *a, const struct sadmm_proxy *b,
-                                     const struct pair_start &start, uint32_t child, uint32_t cache, struct manifold *m)
+                                     const struct pair_start &start, uint32_t cache, struct manifold *m)
 {
     if (start.moves_on) return false;
     m->ahead = start.ahead;
     m->count = 0;
     m->cache = 0;
-    if (b->geometry.type == SADMM_SHAPE_MESH)
-        return mesh_manifold_at_once(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache, m);
     if (a->geometry.type != SADMM_SHAPE_PLANE)
         return hull_manifold_at_once(&a->geometry, &b->geometry, v.hulls, &start.pose, (real)start.limit, cache, m);
     hull_plane_manifold(&b->geometry, v.hulls, &start.pose, (real)start.limit, m);
+    return true;
+}
+
+/* The manifold with a triangle, as find_triangles makes it on the host; false: it is to be listed. */
+template <int HOW>
+static __device__ bool narrow_triangle(const collision_view &v, const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+                                       const struct pair_start &start, uint32_t child, uint32_t cache,
+                                       struct manifold *m)
+{
+    m->ahead = start.ahead;
+    m->count = 0;
+    m->cache = 0;
+    if (is_at_once(HOW))
+        return mesh_manifold_at_once(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache,
+                                     m);
+    mesh_manifold(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache, m);
     return true;
 }
 
@@ -185,7 +203,8 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
     const bool known = FOR == NARROW_AGAIN || ((int)find_key_near(near, ordered_key(own.a, own.b), &before) &
                                                (int)(v.child_bits == 0));
     struct pair_start start = pair_start_of(&a, &b, step.margin, step.gravity, step.dt);
-    if (HOW != NARROW_PLAIN && b.geometry.type == SADMM_SHAPE_MESH) {
+    const bool on_mesh = with_meshes(HOW) && b.geometry.type == SADMM_SHAPE_MESH;
+    if (on_mesh) {
         if (FOR != NARROW_ONE && !triangle_now(v, step, own, a, b)) {
             v.sizes[i] = 0;
             return true;
@@ -201,11 +220,13 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
     const uint32_t cache = contact_memory(&old, &a, &b);
     if (!contact_goes_on(&old, own.child, &a, &b)) before = -1;
     struct manifold m;
-    if (HOW == NARROW_AT_ONCE && b.geometry.type >= SADMM_SHAPE_HULL) {
-        if (!hulls_at_once(v, pa, pb, start, own.child, before >= 0 ? cache : 0, &m)) return false;
+    if (on_mesh) {
+        if (!narrow_triangle<HOW>(v, pa, pb, start, own.child, before >= 0 ? cache : 0, &m)) return false;
+    } else if (is_at_once(HOW) && b.geometry.type == SADMM_SHAPE_HULL) {
+        if (!hulls_at_once(v, pa, pb, start, before >= 0 ? cache : 0, &m)) return false;
     } else {
-        find_manifold(pa, pb, HOW == NARROW_LISTED ? v.hulls : nullptr, own.child, step.margin, step.gravity, step.dt,
-                      &start, before >= 0 ? cache : 0, &m);
+        find_manifold(pa, pb, is_listed(HOW) ? v.hulls : nullptr, own.child, step.margin, step.gravity, step.dt, &start,
+                      before >= 0 ? cache : 0, &m);
     }
     store_manifold(v, i, m, before);
     return true;

@@ -164,7 +164,8 @@ static sadmm_status find_candidates(struct sadmm_cuda_collision *c, bool tree, s
         TRY(launch(c, tiles, rows * tiles.threads * columns, error));
     }
     if (v->mesh_count > 0) {
-        const int64_t most = (int64_t)v->leaf_count * v->mesh_count, warps = (int64_t)c->kernels.expand_warps * MESH_THREADS;
+        const int64_t most = (int64_t)v->leaf_count * v->mesh_count,
+                      warps = (int64_t)c->kernels.expand_warps * MESH_THREADS;
         TRY(launch(c, v->substeps == 1 ? c->kernels.expand : c->kernels.expand_first, std::min(most, warps), error));
     }
     return sort_candidates(c, error);
@@ -179,8 +180,9 @@ static sadmm_status narrow_phase(struct sadmm_cuda_collision *c, struct sadmm_er
     if (!v->hulls) return launch(c, one ? k->narrow : first ? k->narrow_first : k->narrow_again, candidates, error);
     if (v->mesh_count > 0)
         TRY(launch(c, one ? k->touch : first ? k->touch_first : k->touch_again, v->candidate_capacity, error));
-    TRY(launch(c, one ? k->hulls : first ? k->hulls_first : k->hulls_again, candidates, error));
-    return launch(c, one ? k->listed : first ? k->listed_first : k->listed_again, v->candidate_capacity, error);
+    const struct narrow_kernels *with = v->mesh_count > 0 ? &k->with_meshes : &k->with_hulls;
+    TRY(launch(c, one ? with->at_once : first ? with->at_once_first : with->at_once_again, candidates, error));
+    return launch(c, one ? with->listed : first ? with->listed_first : with->listed_again, v->candidate_capacity, error);
 }
 
 static sadmm_status make_contacts(struct sadmm_cuda_collision *c, struct sadmm_error *error)

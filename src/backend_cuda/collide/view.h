@@ -7,7 +7,7 @@
  *            (a pair with a mesh is listed; `expand` finds its triangles: meshes.cu)
  *   sort     candidates by (slot of a, slot of b, child), the host's order
  *   narrow   the last step's pair (a guess or a search), manifold by candidate     a thread a candidate
- *            (where there are hulls two kernels of their own: narrow_hulls.cu)
+ *            (where there are hulls or meshes two kernels of their own: narrow_listed.h)
  *   scan     where each candidate's contacts go                                    (few candidates: by emit itself)
  *   emit     pairs and points in world terms, the last step's impulses             eight threads a candidate
  *
@@ -276,17 +276,23 @@ struct collision_launch {
     const char *name;
 };
 
+/* The narrow phase where some pairs are much more work than others (narrow_listed.h). */
+struct narrow_kernels {
+    struct collision_launch at_once, at_once_first, at_once_again, listed, listed_first, listed_again;
+};
+
 /* The kernels, each beside what it does. */
 struct collision_kernels {
     struct collision_launch grid, place, place_first, place_again, build, refit, clear, walk, tiles, small_tiles, rank,
-        narrow, narrow_first, narrow_again, hulls, hulls_first, hulls_again, listed, listed_first, listed_again, expand,
-        expand_first, touch, touch_first, touch_again, emit, emit_few;
+        narrow, narrow_first, narrow_again, expand, expand_first, touch, touch_first, touch_again, emit, emit_few;
+    struct narrow_kernels with_hulls, with_meshes; /* in the place of `narrow` where there are any */
     int expand_warps; /* expand is launched for */
 };
 void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels);
 void COLLISION(sort_kernels)(struct collision_kernels *kernels);
 void COLLISION(narrow_phase_kernels)(struct collision_kernels *kernels);
 void COLLISION(narrow_hulls_kernels)(struct collision_kernels *kernels);
+void COLLISION(narrow_meshes_kernels)(struct collision_kernels *kernels);
 void COLLISION(mesh_kernels)(struct collision_kernels *kernels);
 void COLLISION(matching_kernels)(struct collision_kernels *kernels);
 
