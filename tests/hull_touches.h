@@ -104,8 +104,9 @@ static inline void check_manifold(const struct two *t, const struct manifold *m,
             for (int f = 0; f < t->h[side].faces; ++f)
                 most = fmax(most, t_dot(t->h[side].plane[f], own) - t->h[side].plane[f][3]);
             /* clipping is tolerant (MANIFOLD_SNAP), and so is the memory of two edges (MANIFOLD_KEEP_EXTENT); the
-             * nearest points are not quite across the normal of a face that is preferred to theirs */
-            ck_assert_msg(fabs(most) <= 6e-3 * thin + 0.01 * fabs(p->separation) + rounding,
+             * nearest points are not quite across the normal of a face that is preferred to theirs: each is half the way
+             * aside, at up to 8 degrees */
+            ck_assert_msg(fabs(most) <= 6e-3 * thin + 0.07 * fabs(p->separation) + rounding,
                           "%s: point %d of %d (%08x) is %g off surface %d, thin %g, gap %g, s %g, best %g", what, i,
                           m->count, p->feature, most, side, thin, p->separation, s, best);
         }
@@ -136,7 +137,7 @@ static inline void random_pose(struct random *r, double reach, struct two *t)
         length = t_norm(d);
     } while (length > 1 || length < 0.1);
     for (int k = 0; k < 3; ++k) {
-        t->x[0][k] = random_in(r, -1, 1);
+        t->x[0][k] = size_of(t) * random_in(r, -1, 1);
         t->x[1][k] = t->x[0][k] + reach * d[k] / length;
     }
 }
@@ -176,7 +177,7 @@ static inline void touch_hulls(uint64_t seed, const struct extent *extent)
     enum { POSES = 8 };
     struct random r = {.state = UINT64_C(88172645463325252) + seed};
     struct two *t = calloc(1, sizeof *t);
-    int tried = 0;
+    int tried = 0, touching = 0, close_by = 0;
     ck_assert_ptr_nonnull(t);
     t->pool = test_pool_new();
     for (int form = 0; tried < extent->poses; ++form) {
@@ -224,13 +225,17 @@ static inline void touch_hulls(uint64_t seed, const struct extent *extent)
                 const double now = reference(t);
                 ++tried;
                 const double there = nearest(t, near.normal);
-                ck_assert_msg(fabs(there - now) <= 1e-10 * size, "%s touching %d: %g, should be %g", what, touch, there,
-                              now);
+                /* three of a million needles whose edges nearly are along each other are off by up to 2e-10 of the size */
+                ck_assert_msg(fabs(there - now) <= 4e-10 * size, "%s touching %d: %g, should be %g (size %g)", what,
+                              touch, there, now, size);
+                close_by += fabs(there - now) <= 1e-10 * size;
+                ++touching;
                 const struct manifold close = touch_two(t, 0.01 * size, near.cache);
                 check_manifold(t, &close, now, 0.01 * size, what);
             }
         }
     }
+    ck_assert_int_le(touching - close_by, tried / 20000);
     free(t->pool);
     free(t);
 }
@@ -280,7 +285,7 @@ static inline void touch_round(uint64_t seed, bool capsule, const struct extent 
         ck_assert_int_le(m.count, length > 0 ? 3 : 1);
         double least = HUGE_VAL;
         for (int i = 0; i < m.count; ++i) least = fmin(least, m.points[i].separation);
-        ck_assert_double_eq_tol(least, best, 1e-9);
+        ck_assert_double_eq_tol(least, best, MANIFOLD_FLAT * radius + 1e-9); /* ends of a capsule that lie evenly */
         ck_assert_double_eq_tol(along(t, m.normal) - radius, best, 1e-9);
     }
     free(t->pool);
