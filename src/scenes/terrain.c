@@ -84,8 +84,8 @@ static double grid_height(long n, long column, long row)
                  ((double)row - 0.5 * (double)cells_of(n, 1)) * cell[1]);
 }
 
-/* The ground's triangle under (x, y): how far a point is above its plane. */
-static double above_ground(long n, vec3 p)
+/* The ground's triangle under (x, y): how far a point is above its plane; its normal. */
+static double above_ground(long n, vec3 p, vec3 *normal)
 {
     const double u = p.x / cell[0] + 0.5 * (double)cells_of(n, 0), v = p.y / cell[1] + 0.5 * (double)cells_of(n, 1);
     const long column = (long)floor(u), row = (long)floor(v);
@@ -93,8 +93,9 @@ static double above_ground(long n, vec3 p)
     const double low = grid_height(n, column, row), top = grid_height(n, column + 1, row + 1);
     const double corner = b > a ? grid_height(n, column, row + 1) : grid_height(n, column + 1, row);
     const double along = b > a ? top - corner : corner - low, across = b > a ? corner - low : top - corner;
-    const double slope[2] = {along / cell[0], across / cell[1]};
-    return (p.z - (low + a * along + b * across)) / sqrt(1 + slope[0] * slope[0] + slope[1] * slope[1]);
+    const vec3 up = v3(-along / cell[0], -across / cell[1], 1);
+    *normal = v3_scale(up, 1 / v3_norm(up));
+    return (p.z - (low + a * along + b * across)) * normal->z;
 }
 
 static sadmm_status place_ground(const struct sadmm_scene *scene, sadmm_world *world, struct sadmm_error *error)
@@ -206,7 +207,8 @@ static sadmm_status fill(const struct sadmm_scene *scene, sadmm_world *world, st
 
 /* ---- success ----------------------------------------------------------------------------------------------------- */
 
-/* Points of a shape, in its frame, whose balls of the returned radius cover its corners; the k-th, false: no more. */
+/* The k-th of the points of a shape that its corners are, in its frame, or the middles of their balls; false: there are
+ * no more. */
 static bool corner_of(const sadmm_shape_def *shape, int k, vec3 *x, double *ball)
 {
     const double *size = shape->size;
@@ -245,7 +247,7 @@ static void look_at_body(long n, const sadmm_shape_def *shape, const sadmm_body_
     const vec3 v = v3_load(body->linear_velocity), w = m3_tmul(q_matrix(turn), v3_load(body->angular_velocity));
     const double half = half_width(n);
     double ball;
-    vec3 x;
+    vec3 x, normal;
     found->energy += 0.5 * (body->mass * v3_norm2(v) + body->inertia[0] * w.x * w.x + body->inertia[1] * w.y * w.y +
                             body->inertia[2] * w.z * w.z);
     found->speed = larger(found->speed, v3_norm(v));
@@ -253,8 +255,13 @@ static void look_at_body(long n, const sadmm_shape_def *shape, const sadmm_body_
         found->outside += 1;
         return;
     }
-    for (int k = 0; corner_of(shape, k, &x, &ball); ++k)
-        found->below = larger(found->below, ball - above_ground(n, v3_add(from, m3_mul(R, x))));
+    for (int k = 0; corner_of(shape, k, &x, &ball); ++k) {
+        vec3 p = v3_add(from, m3_mul(R, x));
+        double above = above_ground(n, p, &normal);
+        /* of a ball the point towards the triangle under its middle, wherever that is */
+        if (ball > 0) above = above_ground(n, v3_madd(p, -ball, normal), &normal);
+        found->below = larger(found->below, -above);
+    }
 }
 
 static sadmm_status look(const struct sadmm_scene *scene, sadmm_world *world, struct found *found,
