@@ -479,7 +479,7 @@ const struct sadmm_scene_family sadmm_family_marble_run = {
         .arguments = "",
         .description = "eight marbles roll down a ramp, through a loop, a bend and a funnel into a tray",
         .duration = 14,
-        .iterations = {[SADMM_METHOD_PAPER] = 100, [SADMM_METHOD_FAST] = 20},
+        .iterations = {[SADMM_METHOD_PAPER] = 100, [SADMM_METHOD_FAST] = 40},
     },
     .configure = configure,
     .fill = fill,
