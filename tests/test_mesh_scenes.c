@@ -171,7 +171,7 @@ START_TEST(threads_hold_by_friction_where_they_should)
 }
 END_TEST
 
-/* A nut that is turned on its thread by half the play and more shows: half of its way round, it would be in the bolt. */
+/* A nut that is farther up or down than its turns say shows. */
 START_TEST(nuts_that_jump_show)
 {
     const struct sadmm_scene scene = open_result_scene("nuts_and_bolts:2", SADMM_METHOD_FAST, SADMM_F64);

@@ -234,9 +234,9 @@ static const struct {
     { "dry_stone:3", 20 },
     { "mesh_pile:60", 60 }, /* through the first impacts */
     { "peg_in_hole", 50 }, /* through the lead-in */
-    { "terrain:30", 100 }, /* through the first impacts */
-    { "marble_run", 320 }, /* the second one has begun */
-    { "nuts_and_bolts:2", 60 },
+    { "terrain:16", 140 }, /* through the first impacts */
+    { "marble_run", 60 },
+    { "nuts_and_bolts:2", 15 }, /* through the first touch */
 };
 
 static uint64_t hash_after(const char *spec, sadmm_method method, int threads, int steps)

@@ -165,7 +165,8 @@ static json_int_t mesh_index(struct meshes *meshes, const sadmm_mesh *mesh)
 {
     for (size_t k = meshes->count; k-- > 0;)
         if (meshes->list[k] == mesh) return (json_int_t)k;
-    if (!sadmm_grow(&meshes->list, &meshes->capacity, meshes->count, meshes->count + 1, sizeof *meshes->list)) return -1;
+    const size_t needed = meshes->count + 1;
+    if (!sadmm_grow(&meshes->list, &meshes->capacity, meshes->count, needed, sizeof *meshes->list)) return -1;
     json_t *told = mesh_json(mesh);
     if (!told) return -1;
     meshes->list[meshes->count] = mesh;
@@ -441,8 +442,8 @@ static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, con
         "the body's frame; box: half extents; capsule: radius, half length along z; plane: "
         "half-space z <= 0 of its frame; hull: around the vertices of an entry of hulls, in its frame, and what is within "
         "rounding of that; mesh: an entry of meshes, in its frame: triangles of vertices, counter-clockwise seen from "
-        "outside, or heights over a grid of the x-y plane with its middle at the origin, rows along x one after the other "
-        "along y, every cell two triangles parted by the diagonal from its lowest x and y to its highest";
+        "outside, or heights over a grid of the x-y plane with its middle at the origin, rows along x one after the "
+        "other along y, every cell two triangles parted by the diagonal from its lowest x and y to its highest";
     json_t *o = json_object();
     json_object_set_new(o, "scene", json_string(spec));
     json_object_set_new(o, "name", json_string(scene->info->name));

@@ -1,5 +1,5 @@
-/* A marble run: eight marbles roll down a ramp, through a loop and round a bend, into a funnel, and through its hole into
- * a tray. Track and funnel are triangle meshes.
+/* A marble run: eight marbles roll down a ramp, through a loop and round a bend, into a funnel, and through its hole
+ * into a tray. Track and funnel are triangle meshes.
  *
  * The track is a channel, half of a tube with the middle of a facet as its bottom, along a line: a ramp, an arc, a loop
  * that shifts sideways, and a bend; its curves have sections every 2 mm. It nowhere bends away from what rolls on it.
@@ -9,10 +9,10 @@
  *
  *     v^2 = 10/7 g h,     h: how far the marble has come down.
  *
- * Farther on nothing may gain energy, and some is lost: a polygon in place of a curve turns marbles by jolts, n in a turn
- * by t, which take about t^2 / n of the energy along. The time from the ramp to the end of the track without losses is
- * an integral along the line, which no marble may come before, nor much after. A marble begins when the one before it is
- * through the loop. In the funnel the order is lost. */
+ * Farther on nothing may gain energy, and some is lost: a polygon in place of a curve turns marbles by jolts, which
+ * take about t^2 / n of the energy for a turn by t in n of them. The time from the ramp to the end of the track without
+ * losses is an integral along the line, which no marble may come before, nor much after. Marbles begin 0.3 s apart. In
+ * the funnel, a pyramid of eight sides and therefore of large jolts, their order is lost. */
 #include <math.h>
 #include <string.h>
 
@@ -82,8 +82,8 @@ static double eased(double t)
     return t * t * (3 - 2 * t);
 }
 
-/* Go on by `length` in steps no longer than `step`, evenly up by `pitch`, and, gently at both ends, left by `yaw` and to
- * the right by `shift`. */
+/* Go on by `length` in steps no longer than `step`, evenly up by `pitch`, and, gently at both ends, left by `yaw` and
+ * to the right by `shift`. */
 static void go_on(struct line *line, double length, double step, double pitch, double yaw, double shift)
 {
     const int steps = (int)ceil(length / step - 1e-9);

@@ -19,9 +19,9 @@ static const double cell[2] = {0.1, 0.08};            /* m, of the ground */
 static const double spacing = 0.4, least = 0.05;      /* m: of the bodies before they fall, whose radii are at most
                                                          0.18; the smallest extent of a stone */
 static const double around = 0.2, wall = 0.1;         /* m: beside the outermost bodies; half a wall's thickness */
-static const double high = 1.2;                       /* m: no ground is farther from 0, half of what walls rise above */
+static const double high = 1.2;                       /* m: no ground is farther from 0 */
 static const double density = 2000, friction = 0.6;
-static const double deepest = 0.01;                   /* m: what is farther under the ground is through it */
+static const double deepest = 1e-3;                   /* m: what is farther under the ground is through it */
 
 /* ---- ground ------------------------------------------------------------------------------------------------------ */
 
