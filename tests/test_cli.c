@@ -512,8 +512,8 @@ static double length(json_t *array)
     return sqrt(sum);
 }
 
-/* hulls: how many there are to refer to. */
-static void expect_body(json_t *body, size_t index, size_t hulls)
+/* hulls, meshes: how many there are to refer to. */
+static void expect_body(json_t *body, size_t index, size_t hulls, size_t meshes)
 {
     ck_assert_double_eq(number(body, "index"), (double)index);
     bool dynamic = strcmp(string(body, "type"), "dynamic") == 0;
@@ -529,16 +529,44 @@ static void expect_body(json_t *body, size_t index, size_t hulls)
     json_array_foreach(shapes, k, shape) {
         const char *type = string(shape, "type");
         size_t sizes = !strcmp(type, "box") ? 3 : !strcmp(type, "capsule") ? 2 : !strcmp(type, "sphere") ? 1 : 0;
-        ck_assert(sizes > 0 || !strcmp(type, "plane") || !strcmp(type, "hull"));
+        ck_assert(sizes > 0 || !strcmp(type, "plane") || !strcmp(type, "hull") || !strcmp(type, "mesh"));
         if (!strcmp(type, "hull"))
             ck_assert(number(shape, "hull") >= 0 && number(shape, "hull") < (double)hulls &&
                       number(shape, "rounding") >= 0);
         else ck_assert_ptr_null(json_object_get(shape, "hull"));
+        if (!strcmp(type, "mesh")) ck_assert(number(shape, "mesh") >= 0 && number(shape, "mesh") < (double)meshes);
+        else ck_assert_ptr_null(json_object_get(shape, "mesh"));
         ck_assert_uint_eq(json_array_size(at(shape, "size")), sizes);
         ck_assert_double_ge(number(shape, "friction"), 0);
         ck_assert_double_ge(number(shape, "restitution"), 0);
         ck_assert_uint_eq(json_array_size(at(shape, "position")), 3);
         ck_assert_double_eq_tol(length(at(shape, "orientation")), 1, 1e-12);
+    }
+}
+
+/* Of triangles, or of heights: whole, and nothing else. */
+static void expect_mesh(json_t *mesh)
+{
+    json_t *vertices = json_object_get(mesh, "vertices"), *row, *x;
+    size_t i, k, columns = 0;
+    ck_assert_uint_eq(json_object_size(mesh), 2);
+    if (vertices) {
+        ck_assert_uint_ge(json_array_size(at(mesh, "triangles")), 1);
+        json_array_foreach(vertices, i, row) ck_assert_uint_eq(json_array_size(row), 3);
+        json_array_foreach(at(mesh, "triangles"), i, row) {
+            ck_assert_uint_eq(json_array_size(row), 3);
+            json_array_foreach(row, k, x)
+                ck_assert(json_is_integer(x) && json_integer_value(x) >= 0 &&
+                          json_integer_value(x) < (json_int_t)json_array_size(vertices));
+        }
+        return;
+    }
+    ck_assert_uint_eq(json_array_size(at(mesh, "spacing")), 2);
+    ck_assert_uint_ge(json_array_size(at(mesh, "heights")), 2);
+    json_array_foreach(at(mesh, "heights"), i, row) {
+        if (i == 0) columns = json_array_size(row);
+        ck_assert(columns >= 2 && json_array_size(row) == columns);
+        json_array_foreach(row, k, x) ck_assert(json_is_number(x));
     }
 }
 
@@ -583,7 +611,7 @@ static const bool have_hulls = false;
 
 static bool needs_hulls(const char *scene)
 {
-    static const char *const scenes[] = {"arch", "dry_stone", "mesh_pile", "peg_in_hole"};
+    static const char *const scenes[] = {"arch", "dry_stone", "mesh_pile", "peg_in_hole", "terrain", "nuts_and_bolts"};
     for (size_t k = 0; k < sizeof scenes / sizeof *scenes; ++k)
         if (!strcmp(scene, scenes[k])) return true;
     return false;
@@ -606,10 +634,12 @@ START_TEST(scenes_are_told)
         snprintf(spec, sizeof spec, "%s%s", name, *string(info, "arguments") ? size : "");
         snprintf(text, sizeof text, "scenes %s --json -", spec);
         json_t *scene = run_json(text), *bodies = at(scene, "bodies"), *hulls = at(scene, "hulls"), *body, *hull;
+        json_t *meshes = at(scene, "meshes"), *mesh;
         double dynamic = 0;
         json_array_foreach(hulls, i, hull) ck_assert_uint_ge(json_array_size(hull), 4);
+        json_array_foreach(meshes, i, mesh) expect_mesh(mesh);
         json_array_foreach(bodies, i, body) {
-            expect_body(body, i, json_array_size(hulls));
+            expect_body(body, i, json_array_size(hulls), json_array_size(meshes));
             dynamic += strcmp(string(body, "type"), "dynamic") == 0;
         }
         ck_assert_double_gt(number(scene, "duration"), 0);
@@ -626,6 +656,31 @@ START_TEST(scenes_are_told)
     }
     free(table);
     json_decref(list);
+}
+END_TEST
+
+/* A mesh that several bodies have is told once; one of two has a number of its own. */
+START_TEST(meshes_are_told_once)
+{
+    json_t *track = run_json("scenes marble_run --json -"), *bodies = at(track, "bodies");
+    ck_assert_uint_eq(json_array_size(at(track, "meshes")), 2);
+    for (size_t k = 0; k < 2; ++k)
+        ck_assert_double_eq(number(json_array_get(at(json_array_get(bodies, k), "shapes"), 0), "mesh"), (double)k);
+    /* the funnel: three rings of eight vertices; the cone is whole, the wall open at the track's end */
+    json_t *funnel = json_array_get(at(track, "meshes"), 1);
+    ck_assert_uint_eq(json_array_size(at(funnel, "vertices")), 3 * 8);
+    ck_assert_uint_eq(json_array_size(at(funnel, "triangles")), 2 * 8 + 2 * 7);
+    json_decref(track);
+    if (!have_hulls) return;
+    json_t *nuts = run_json("scenes nuts_and_bolts:3 --json -");
+    ck_assert_uint_eq(json_array_size(at(nuts, "meshes")), 1);
+    for (size_t k = 1; k <= 3; ++k)
+        ck_assert_double_eq(
+            number(json_array_get(at(json_array_get(at(nuts, "bodies"), k), "shapes"), 0), "mesh"), 0);
+    json_decref(nuts);
+    json_t *hills = run_json("scenes terrain:2 --json -"), *ground = json_array_get(at(hills, "meshes"), 0);
+    ck_assert_double_eq(json_number_value(json_array_get(at(ground, "spacing"), 1)), 0.08);
+    json_decref(hills);
 }
 END_TEST
 
@@ -827,6 +882,7 @@ int main(void)
     tcase_add_test(tests, options_matter);
     tcase_add_test(tests, traces);
     tcase_add_test(tests, scenes_are_told);
+    tcase_add_test(tests, meshes_are_told_once);
     tcase_add_test(tests, backends_are_told);
     tcase_add_loop_test(tests, backends_agree, 0, 6);
 #ifdef SADMM_HAVE_HDF5

@@ -378,6 +378,111 @@ START_TEST(meshes_are_repeatable)
 }
 END_TEST
 
+/* ---- what is read back ------------------------------------------------------------------------------------------- */
+
+/* Coordinates up to 1.3 m: 2^-52 times that, and the same once more where they have been kept twice. */
+static const double kept = 1.3 * 0x1p-51;
+
+/* Of a mesh, made again from what it tells of itself: the same triangles by the same numbers, in the same places. */
+static void check_made_again(const sadmm_mesh *mesh)
+{
+    const int64_t vertices = sadmm_mesh_vertex_count(mesh), triangles = sadmm_mesh_triangle_count(mesh);
+    struct soup *s = soup_new();
+    for (int64_t v = 0; v < vertices; ++v) {
+        double x[3];
+        ck_assert_int_eq(sadmm_mesh_vertex_at(mesh, v, x), SADMM_OK);
+        soup_vertex(s, x[0], x[1], x[2]);
+    }
+    for (int64_t t = 0; t < triangles; ++t) {
+        int32_t corner[3], number;
+        ck_assert_int_eq(sadmm_mesh_triangle_at(mesh, t, corner, &number), SADMM_OK);
+        ck_assert(number >= 0 && number < triangles);
+        memcpy(s->corner + 3 * number, corner, sizeof corner);
+    }
+    s->triangles = (size_t)triangles;
+    sadmm_mesh *again = soup_mesh(s);
+    ck_assert_int_eq(sadmm_mesh_vertex_count(again), vertices);
+    ck_assert_int_eq(sadmm_mesh_triangle_count(again), triangles);
+    for (int64_t v = 0; v < vertices; ++v) {
+        double x[3], y[3];
+        sadmm_mesh_vertex_at(mesh, v, x);
+        sadmm_mesh_vertex_at(again, v, y);
+        for (int k = 0; k < 3; ++k) ck_assert_double_eq_tol(x[k], y[k], kept);
+    }
+    sadmm_mesh_destroy(again);
+    free(s);
+}
+
+/* Vertices in the order of the definition, those in one place once, unused ones not at all; triangles by their numbers
+ * there, without those left out. */
+START_TEST(meshes_are_read_back)
+{
+    struct soup *s = soup_new();
+    static const double x[6][3] = {{1.3, 0.1, 0}, {9, 9, 9}, {0, 1, 0.7}, {1.3, 0.1, 0}, {-1, 0, 0.3}, {0.2, 0, -1}};
+    for (int v = 0; v < 6; ++v) soup_vertex(s, x[v][0], x[v][1], x[v][2]);
+    soup_triangle(s, 0, 3, 2); /* two corners in one place: left out */
+    soup_triangle(s, 3, 2, 4);
+    soup_triangle(s, 0, 4, 5);
+    sadmm_mesh *mesh = soup_mesh(s);
+    static const int32_t place[4] = {0, 2, 4, 5}, corners[3][3] = {{0}, {0, 1, 2}, {0, 2, 3}};
+    double got[3];
+    ck_assert_int_eq(sadmm_mesh_vertex_count(mesh), 4);
+    for (int v = 0; v < 4; ++v) {
+        ck_assert_int_eq(sadmm_mesh_vertex_at(mesh, v, got), SADMM_OK);
+        for (int k = 0; k < 3; ++k) ck_assert_double_eq_tol(got[k], x[place[v]][k], kept);
+    }
+    unsigned seen = 0;
+    for (int t = 0; t < 2; ++t) {
+        int32_t corner[3], number;
+        ck_assert_int_eq(sadmm_mesh_triangle_at(mesh, t, corner, &number), SADMM_OK);
+        ck_assert(number == 1 || number == 2);
+        ck_assert_mem_eq(corner, corners[number], sizeof corner);
+        seen |= 1u << number;
+    }
+    ck_assert_uint_eq(seen, 6);
+    int32_t columns = 7, rows = 7, number, corner[3];
+    ck_assert_int_eq(sadmm_mesh_grid(mesh, &columns, &rows, got), SADMM_OK);
+    ck_assert(columns == 0 && rows == 0 && got[0] == 0 && got[1] == 0);
+    ck_assert_int_eq(sadmm_mesh_vertex_at(mesh, 4, got), SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert_str_eq(sadmm_last_message(), "vertex = 4: must be in [0, 4)");
+    ck_assert_int_eq(sadmm_mesh_vertex_at(mesh, -1, got), SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert_int_eq(sadmm_mesh_triangle_at(mesh, 2, corner, &number), SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert_str_eq(sadmm_last_message(), "triangle = 2: must be in [0, 2)");
+    ck_assert_int_eq(sadmm_mesh_triangle_at(mesh, -1, corner, &number), SADMM_ERROR_INVALID_ARGUMENT);
+    sadmm_mesh_destroy(mesh);
+    free(s);
+    const double size[3] = {1, 1.2, 0.5};
+    s = soup_ball(size, 9);
+    for (size_t i = 2; i < 3 * s->vertices; i += 3) s->x[i] += 0.7; /* its middle is not the origin */
+    mesh = soup_mesh(s);
+    check_made_again(mesh);
+    sadmm_mesh_destroy(mesh);
+    free(s);
+}
+END_TEST
+
+START_TEST(heightfields_are_read_back)
+{
+    double z[3 * 4], got[3], spacing[2];
+    for (int i = 0; i < 12; ++i) z[i] = 1.3 * sin(i) - 0.2;
+    const sadmm_heightfield_def def = {z, 3, 4, {0.5, 0.25}};
+    sadmm_mesh *mesh = NULL;
+    int32_t columns, rows, corner[3], number;
+    ck_assert_int_eq(sadmm_heightfield_create(&def, &mesh), SADMM_OK);
+    ck_assert_int_eq(sadmm_mesh_grid(mesh, &columns, &rows, spacing), SADMM_OK);
+    ck_assert(columns == 3 && rows == 4 && spacing[0] == 0.5 && spacing[1] == 0.25);
+    ck_assert_int_eq(sadmm_mesh_vertex_count(mesh), 12);
+    for (int i = 0; i < 12; ++i) {
+        ck_assert_int_eq(sadmm_mesh_vertex_at(mesh, i, got), SADMM_OK);
+        ck_assert(got[0] == 0.5 * (i % 3 - 1) && got[1] == 0.25 * (i / 3 - 1.5));
+        ck_assert_double_eq_tol(got[2], z[i], 1.5 * 0x1p-52);
+    }
+    ck_assert_int_eq(sadmm_mesh_triangle_at(mesh, 7, corner, &number), SADMM_OK);
+    ck_assert(number == 7 && corner[0] == 4 && corner[1] == 8 && corner[2] == 7); /* cell (1, 1), its upper half */
+    sadmm_mesh_destroy(mesh);
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("mesh");
@@ -392,6 +497,8 @@ int main(void)
     tcase_add_test(tests, bad_meshes_are_refused);
     tcase_add_test(tests, memory_may_run_out);
     tcase_add_test(tests, meshes_are_repeatable);
+    tcase_add_test(tests, meshes_are_read_back);
+    tcase_add_test(tests, heightfields_are_read_back);
     suite_add_tcase(suite, tests);
     return run_suite(suite);
 }

@@ -300,6 +300,7 @@ static void on_meshes(void)
     const sadmm_heightfield_def field = sadmm_heightfield_def_default();
     sadmm_mesh *mesh = NULL;
     double lowest[3], highest[3];
+    int32_t corner[3], number;
     REFUSES("out", sadmm_mesh_create(&def, NULL));
     REFUSES("def", sadmm_mesh_create(NULL, &mesh));
     REFUSES("def->vertices", sadmm_mesh_create(&no_vertices, &mesh));
@@ -309,6 +310,10 @@ static void on_meshes(void)
     REFUSES("def->heights", sadmm_heightfield_create(&field, &mesh));
     ck_assert_ptr_null(mesh);
     REFUSES("mesh", sadmm_mesh_bounds(NULL, lowest, highest));
+    REFUSES("mesh", sadmm_mesh_vertex_at(NULL, 0, lowest));
+    REFUSES("mesh", sadmm_mesh_triangle_at(NULL, 0, corner, &number));
+    REFUSES("mesh", sadmm_mesh_grid(NULL, &number, &number, lowest));
+    ck_assert_int_eq(sadmm_mesh_vertex_count(NULL), 0);
     sadmm_mesh_destroy(NULL);
     ck_assert_int_eq(sadmm_mesh_triangle_count(NULL), 0);
     ck_assert_int_eq(sadmm_mesh_left_out(NULL), 0);
@@ -390,7 +395,8 @@ static const struct {
       "sadmm_hull_face_count", "sadmm_hull_vertices", "sadmm_hull_rounding", "sadmm_hull_face_at", "sadmm_hull_mass"}},
     {on_meshes,
      {"sadmm_mesh_create", "sadmm_heightfield_create", "sadmm_mesh_destroy", "sadmm_mesh_triangle_count",
-      "sadmm_mesh_left_out", "sadmm_mesh_open_edges", "sadmm_mesh_bytes", "sadmm_mesh_bounds"}},
+      "sadmm_mesh_left_out", "sadmm_mesh_open_edges", "sadmm_mesh_bytes", "sadmm_mesh_bounds",
+      "sadmm_mesh_vertex_count", "sadmm_mesh_vertex_at", "sadmm_mesh_triangle_at", "sadmm_mesh_grid"}},
     {on_mesh_files,
      {"sadmm_mesh_file_read", "sadmm_mesh_file_destroy", "sadmm_mesh_file_vertex_count",
       "sadmm_mesh_file_triangle_count", "sadmm_mesh_file_vertices", "sadmm_mesh_file_triangles",

@@ -2,7 +2,8 @@
 #include "scene_results.h"
 
 static const char *const specs[] = {"hand_demo", "grippers:100", "kapla_tower", "jenga",     "bridge",     "ragdolls",
-                                    "mixer",     "arch",         "dry_stone",   "mesh_pile", "peg_in_hole"};
+                                    "mixer",     "arch",         "dry_stone",   "mesh_pile", "peg_in_hole",
+                                    "terrain",   "marble_run",   "nuts_and_bolts:10"};
 enum { SPECS = sizeof specs / sizeof *specs };
 
 START_TEST(scenes_pass)

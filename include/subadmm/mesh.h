@@ -75,6 +75,24 @@ SADMM_API size_t sadmm_mesh_bytes(const sadmm_mesh *mesh);
 /* The smallest box around it, in the frame of the vertices (or of the grid), m. Errors: INVALID_ARGUMENT (NULL). */
 SADMM_API sadmm_status sadmm_mesh_bounds(const sadmm_mesh *mesh, double lowest[3], double highest[3]);
 
+/* What the definition was, so that the same mesh can be made again, up to rounding: coordinates are kept from the
+ * middle of the box around the mesh, and come back within 2^-52 times the largest of all. */
+
+/* Vertices: those of the definition that triangles have, in its order, of several in one place the first; of a
+ * heightfield all, row by row. Of NULL: 0. */
+SADMM_API int64_t sadmm_mesh_vertex_count(const sadmm_mesh *mesh);
+/* Where a vertex is, in the frame of the definition, m; `vertex` in [0, vertex_count). Errors: INVALID_ARGUMENT (range,
+ * NULL). */
+SADMM_API sadmm_status sadmm_mesh_vertex_at(const sadmm_mesh *mesh, int64_t vertex, double position[3]);
+/* The vertices of a triangle, counter-clockwise seen from outside, and its number as contacts have it
+ * (sadmm_contact.triangle); `triangle` in [0, triangle_count), in an order of the library's own. Errors:
+ * INVALID_ARGUMENT (range, NULL). */
+SADMM_API sadmm_status sadmm_mesh_triangle_at(const sadmm_mesh *mesh, int64_t triangle, int32_t vertices[3],
+                                              int32_t *number);
+/* The grid of a heightfield, as in its definition; of a mesh of triangles columns and rows are 0, and spacing 0 m.
+ * Errors: INVALID_ARGUMENT (NULL). */
+SADMM_API sadmm_status sadmm_mesh_grid(const sadmm_mesh *mesh, int32_t *columns, int32_t *rows, double spacing[2]);
+
 #ifdef __cplusplus
 }
 #endif

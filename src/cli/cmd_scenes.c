@@ -103,6 +103,77 @@ static json_int_t hull_index(struct hulls *hulls, const sadmm_hull *hull)
     return (json_int_t)hulls->count++;
 }
 
+/* The meshes of a scene's shapes, each once. */
+struct meshes {
+    json_t *array;
+    const sadmm_mesh **list;
+    size_t count, capacity;
+};
+
+/* Heights row by row. */
+static json_t *heights_json(const sadmm_mesh *mesh, int32_t columns, int32_t rows, const double spacing[2])
+{
+    json_t *o = json_object(), *heights = json_array();
+    for (int32_t row = 0; row < rows; ++row) {
+        json_t *line = json_array();
+        for (int32_t column = 0; column < columns; ++column) {
+            double x[3] = {0};
+            sadmm_mesh_vertex_at(mesh, (int64_t)row * columns + column, x);
+            json_array_append_new(line, cli_json_real(x[2]));
+        }
+        json_array_append_new(heights, line);
+    }
+    json_object_set_new(o, "heights", heights);
+    json_object_set_new(o, "spacing", cli_json_reals(spacing, 2));
+    return o;
+}
+
+/* In the order of the definition. NULL: out of memory. */
+static json_t *triangles_json(const sadmm_mesh *mesh)
+{
+    const int64_t count = sadmm_mesh_triangle_count(mesh), all = count + sadmm_mesh_left_out(mesh);
+    int64_t *at = (int64_t *)sadmm_alloc((size_t)all, sizeof *at); /* by number: 1 + the triangle, 0: left out */
+    json_t *o = json_object(), *vertices = json_array(), *triangles = json_array();
+    int32_t corner[3], number = 0;
+    for (int64_t t = 0; at && t < count; ++t)
+        if (sadmm_mesh_triangle_at(mesh, t, corner, &number) == SADMM_OK) at[number] = 1 + t;
+    for (int64_t v = 0; v < sadmm_mesh_vertex_count(mesh); ++v) {
+        double x[3] = {0};
+        sadmm_mesh_vertex_at(mesh, v, x);
+        json_array_append_new(vertices, cli_json_reals(x, 3));
+    }
+    for (int64_t k = 0; at && k < all; ++k)
+        if (at[k] && sadmm_mesh_triangle_at(mesh, at[k] - 1, corner, &number) == SADMM_OK)
+            json_array_append_new(triangles, json_pack("[iii]", corner[0], corner[1], corner[2]));
+    json_object_set_new(o, "vertices", vertices);
+    json_object_set_new(o, "triangles", triangles);
+    if (!at) json_decref(o);
+    sadmm_free(at);
+    return at ? o : NULL;
+}
+
+static json_t *mesh_json(const sadmm_mesh *mesh)
+{
+    int32_t columns = 0, rows = 0;
+    double spacing[2];
+    sadmm_mesh_grid(mesh, &columns, &rows, spacing);
+    return columns > 0 ? heights_json(mesh, columns, rows, spacing) : triangles_json(mesh);
+}
+
+/* The number of a mesh in the list, or -1: out of memory. */
+static json_int_t mesh_index(struct meshes *meshes, const sadmm_mesh *mesh)
+{
+    for (size_t k = meshes->count; k-- > 0;)
+        if (meshes->list[k] == mesh) return (json_int_t)k;
+    const size_t needed = meshes->count + 1;
+    if (!sadmm_grow(&meshes->list, &meshes->capacity, meshes->count, needed, sizeof *meshes->list)) return -1;
+    json_t *told = mesh_json(mesh);
+    if (!told) return -1;
+    meshes->list[meshes->count] = mesh;
+    json_array_append_new(meshes->array, told);
+    return (json_int_t)meshes->count++;
+}
+
 static json_t *shape_json(const sadmm_shape_def *shape)
 {
     json_t *o = json_object();
@@ -165,7 +236,24 @@ static json_t *find_body(sadmm_world *world, json_t *bodies, sadmm_body_id wante
     return NULL;
 }
 
-static sadmm_status add_shapes(sadmm_world *world, json_t *bodies, struct hulls *hulls)
+/* What a shape refers to. */
+static sadmm_status add_form(const sadmm_shape_def *def, json_t *shape, struct hulls *hulls, struct meshes *meshes)
+{
+    if (def->hull) {
+        const json_int_t index = hull_index(hulls, def->hull);
+        if (index < 0) return sadmm_fail_memory(NULL, "the list of hulls");
+        json_object_set_new(shape, "hull", json_integer(index));
+        json_object_set_new(shape, "rounding", cli_json_real(sadmm_hull_rounding(def->hull)));
+    }
+    if (def->mesh) {
+        const json_int_t index = mesh_index(meshes, def->mesh);
+        if (index < 0) return sadmm_fail_memory(NULL, "the list of meshes");
+        json_object_set_new(shape, "mesh", json_integer(index));
+    }
+    return SADMM_OK;
+}
+
+static sadmm_status add_shapes(sadmm_world *world, json_t *bodies, struct hulls *hulls, struct meshes *meshes)
 {
     for (int32_t k = 0; k < sadmm_world_shape_count(world); ++k) {
         sadmm_shape_id id;
@@ -176,11 +264,8 @@ static sadmm_status add_shapes(sadmm_world *world, json_t *bodies, struct hulls 
         if (status != SADMM_OK) return status;
         json_t *shape = shape_json(&def);
         json_array_append_new(json_object_get(find_body(world, bodies, body), "shapes"), shape);
-        if (!def.hull) continue;
-        const json_int_t index = hull_index(hulls, def.hull);
-        if (index < 0) return sadmm_fail_memory(NULL, "the list of hulls");
-        json_object_set_new(shape, "hull", json_integer(index));
-        json_object_set_new(shape, "rounding", cli_json_real(sadmm_hull_rounding(def.hull)));
+        status = add_form(&def, shape, hulls, meshes);
+        if (status != SADMM_OK) return status;
     }
     return SADMM_OK;
 }
@@ -338,12 +423,13 @@ static sadmm_status add_gears(sadmm_world *world, json_t *gears)
 struct parts {
     json_t *bodies, *joints, *couplings, *gears;
     struct hulls hulls;
+    struct meshes meshes;
 };
 
 static sadmm_status add_parts(sadmm_world *world, struct parts *parts)
 {
     sadmm_status status = add_bodies(world, parts->bodies);
-    if (status == SADMM_OK) status = add_shapes(world, parts->bodies, &parts->hulls);
+    if (status == SADMM_OK) status = add_shapes(world, parts->bodies, &parts->hulls, &parts->meshes);
     if (status == SADMM_OK) status = add_joints(world, parts->bodies, parts->joints);
     if (status == SADMM_OK) status = add_couplings(world, parts->bodies, parts->couplings);
     return status == SADMM_OK ? add_gears(world, parts->gears) : status;
@@ -355,7 +441,9 @@ static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, con
         "SI; world frame; quaternions w x y z, body to world; inertia: principal moments in "
         "the body's frame; box: half extents; capsule: radius, half length along z; plane: "
         "half-space z <= 0 of its frame; hull: around the vertices of an entry of hulls, in its frame, and what is within "
-        "rounding of that";
+        "rounding of that; mesh: an entry of meshes, in its frame: triangles of vertices, counter-clockwise seen from "
+        "outside, or heights over a grid of the x-y plane with its middle at the origin, rows along x one after the "
+        "other along y, every cell two triangles parted by the diagonal from its lowest x and y to its highest";
     json_t *o = json_object();
     json_object_set_new(o, "scene", json_string(spec));
     json_object_set_new(o, "name", json_string(scene->info->name));
@@ -371,6 +459,7 @@ static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, con
     json_object_set_new(o, "settings", cli_json_settings(&scene->def.settings));
     json_object_set_new(o, "bodies", parts->bodies);
     json_object_set_new(o, "hulls", parts->hulls.vertices);
+    json_object_set_new(o, "meshes", parts->meshes.array);
     json_object_set_new(o, "joints", parts->joints);
     json_object_set_new(o, "couplings", parts->couplings);
     json_object_set_new(o, "gears", parts->gears);
@@ -395,7 +484,8 @@ static int show_scene(const char *spec, struct output *json)
         sadmm_world_destroy(world);
         return CLI_DONE;
     }
-    struct parts parts = {json_array(), json_array(), json_array(), json_array(), {.vertices = json_array()}};
+    struct parts parts = {json_array(), json_array(), json_array(), json_array(), {.vertices = json_array()},
+                          {.array = json_array()}};
     int code;
     if (add_parts(world, &parts) == SADMM_OK) {
         code = cli_write_json(scene_json(spec, &scene, &parts), json);
@@ -405,9 +495,11 @@ static int show_scene(const char *spec, struct output *json)
         json_decref(parts.couplings);
         json_decref(parts.gears);
         json_decref(parts.hulls.vertices);
+        json_decref(parts.meshes.array);
         code = cli_error(CLI_FAILED, "%s", sadmm_last_message());
     }
     sadmm_free(parts.hulls.list);
+    sadmm_free(parts.meshes.list);
     sadmm_world_destroy(world);
     return code;
 }

@@ -436,3 +436,55 @@ sadmm_status sadmm_mesh_bounds(const sadmm_mesh *mesh, double lowest[3], double 
     }
     return SADMM_OK;
 }
+
+int64_t sadmm_mesh_vertex_count(const sadmm_mesh *mesh)
+{
+    if (!mesh) return 0;
+    const struct sadmm_mesh_header *header = header_of(mesh);
+    return header->kind == MESH_HEIGHTS ? (int64_t)header->columns * header->rows : header->vertices;
+}
+
+static sadmm_status check_index(int64_t index, int64_t count, const char *name)
+{
+    if (index >= 0 && index < count) return SADMM_OK;
+    return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "%s = %lld: must be in [0, %lld)", name, (long long)index,
+                      (long long)count);
+}
+
+sadmm_status sadmm_mesh_vertex_at(const sadmm_mesh *mesh, int64_t vertex, double position[3])
+{
+    struct mesh view;
+    TRY(sadmm_check_given(mesh, "mesh", NULL));
+    TRY(sadmm_check_given(position, "position", NULL));
+    TRY(check_index(vertex, sadmm_mesh_vertex_count(mesh), "vertex"));
+    mesh_at(mesh->block, 0, &view);
+    v3_store(v3_add(mesh_vertex(&view, (int32_t)vertex), v3_load(mesh->middle)), position);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_mesh_triangle_at(const sadmm_mesh *mesh, int64_t triangle, int32_t vertices[3], int32_t *number)
+{
+    struct mesh view;
+    int32_t opposite[3];
+    TRY(sadmm_check_given(mesh, "mesh", NULL));
+    TRY(sadmm_check_given(vertices, "vertices", NULL));
+    TRY(sadmm_check_given(number, "number", NULL));
+    TRY(check_index(triangle, sadmm_mesh_triangle_count(mesh), "triangle"));
+    mesh_at(mesh->block, 0, &view);
+    mesh_corners(&view, (int32_t)triangle, vertices, opposite);
+    *number = mesh->source ? mesh->source[triangle] : (int32_t)triangle;
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_mesh_grid(const sadmm_mesh *mesh, int32_t *columns, int32_t *rows, double spacing[2])
+{
+    TRY(sadmm_check_given(mesh, "mesh", NULL));
+    TRY(sadmm_check_given(columns, "columns", NULL));
+    TRY(sadmm_check_given(rows, "rows", NULL));
+    TRY(sadmm_check_given(spacing, "spacing", NULL));
+    const struct sadmm_mesh_header *header = header_of(mesh);
+    *columns = header->columns;
+    *rows = header->rows;
+    memcpy(spacing, header->spacing, sizeof header->spacing);
+    return SADMM_OK;
+}

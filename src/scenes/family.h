@@ -57,5 +57,8 @@ extern const struct sadmm_scene_family sadmm_family_arch;
 extern const struct sadmm_scene_family sadmm_family_dry_stone;
 extern const struct sadmm_scene_family sadmm_family_mesh_pile;
 extern const struct sadmm_scene_family sadmm_family_peg_in_hole;
+extern const struct sadmm_scene_family sadmm_family_terrain;
+extern const struct sadmm_scene_family sadmm_family_nuts_and_bolts;
+extern const struct sadmm_scene_family sadmm_family_marble_run;
 
 #endif

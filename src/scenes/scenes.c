@@ -20,7 +20,8 @@ static const struct sadmm_scene_family *const families[] = {
     &sadmm_family_hand_demo,     &sadmm_family_kapla_tower,     &sadmm_family_jenga,
     &sadmm_family_bridge,        &sadmm_family_ragdolls,        &sadmm_family_mixer,
     &sadmm_family_arch,          &sadmm_family_dry_stone,       &sadmm_family_mesh_pile,
-    &sadmm_family_peg_in_hole,
+    &sadmm_family_peg_in_hole,   &sadmm_family_terrain,
+    &sadmm_family_nuts_and_bolts,  &sadmm_family_marble_run,
 };
 
 enum { FAMILY_COUNT = sizeof families / sizeof families[0] };

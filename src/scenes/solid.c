@@ -22,11 +22,30 @@ sadmm_status sadmm_scene_hull(const double *points, int count, sadmm_hull **hull
     return hand_on(sadmm_hull_create(&def, hull), error);
 }
 
+sadmm_status sadmm_scene_mesh(const sadmm_mesh_def *def, sadmm_mesh **mesh, struct sadmm_error *error)
+{
+    return hand_on(sadmm_mesh_create(def, mesh), error);
+}
+
+sadmm_status sadmm_scene_heights(const sadmm_heightfield_def *def, sadmm_mesh **mesh, struct sadmm_error *error)
+{
+    return hand_on(sadmm_heightfield_create(def, mesh), error);
+}
+
 sadmm_shape_def sadmm_hull_shape(const sadmm_hull *hull, double friction)
 {
     sadmm_shape_def shape = sadmm_shape_def_default();
     shape.type = SADMM_SHAPE_HULL;
     shape.hull = hull;
+    shape.friction = friction;
+    return shape;
+}
+
+sadmm_shape_def sadmm_mesh_shape(const sadmm_mesh *mesh, double friction)
+{
+    sadmm_shape_def shape = sadmm_shape_def_default();
+    shape.type = SADMM_SHAPE_MESH;
+    shape.mesh = mesh;
     shape.friction = friction;
     return shape;
 }

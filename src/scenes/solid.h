@@ -1,4 +1,4 @@
-/* Bodies of convex hulls and other solids of one density. */
+/* Bodies of convex hulls and other solids of one density; ground of meshes. */
 #ifndef SADMM_SCENES_SOLID_H
 #define SADMM_SCENES_SOLID_H
 
@@ -9,8 +9,14 @@
  * library that cannot make hulls. */
 sadmm_status sadmm_scene_hull(const double *points, int count, sadmm_hull **hull, struct sadmm_error *error);
 
+/* A mesh of triangles, and one of heights. *mesh belongs to the caller, NULL after an error. */
+sadmm_status sadmm_scene_mesh(const sadmm_mesh_def *def, sadmm_mesh **mesh, struct sadmm_error *error);
+sadmm_status sadmm_scene_heights(const sadmm_heightfield_def *def, sadmm_mesh **mesh, struct sadmm_error *error);
+
 /* The shape of a hull, where its points are, with a friction; it may be moved and turned. */
 sadmm_shape_def sadmm_hull_shape(const sadmm_hull *hull, double friction);
+/* The same of a mesh, for bodies that are not dynamic. */
+sadmm_shape_def sadmm_mesh_shape(const sadmm_mesh *mesh, double friction);
 
 /* A body of `count` >= 1 shapes laid out in `frame` (shape.position and orientation are in that frame). density
  * (kg/m^3) > 0: it is dynamic, its mass, centre and axes those of the solids together; 0: it is static. `id` may be

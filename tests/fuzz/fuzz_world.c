@@ -15,7 +15,8 @@
 
 /* Few, so that an input is quick and its calls meet the same objects again. */
 enum { MAX_BODIES = 6, MAX_SHAPES = 8, MAX_CALLS = 64, MAX_STEPS = 10, IDS = 16, HULLS = 4 };
-enum { MAX_CONTACTS = 8 * MAX_SHAPES * MAX_SHAPES };
+enum { MESHES = 8, MAX_TRIANGLES = 16 };
+enum { MAX_CONTACTS = 8 * MAX_SHAPES * MAX_SHAPES * MAX_TRIANGLES };
 
 struct machine {
     struct bytes in;
@@ -80,6 +81,7 @@ static struct picture look(sadmm_world *world)
         p.objects = mix(p.objects, def.size, sizeof def.size);
         p.objects = mix(p.objects, def.position, sizeof def.position);
         p.objects = mix(p.objects, &def.hull, sizeof def.hull);
+        p.objects = mix(p.objects, &def.mesh, sizeof def.mesh);
         p.objects = mix(p.objects, &def.friction, sizeof def.friction);
     }
     return p;
@@ -149,6 +151,8 @@ static void must_be_sound(struct machine *m)
         MUST(all_finite(c->position, 3) && all_finite(c->impulse, 3) && all_finite(c->force, 3) && isfinite(c->gap) &&
                  isfinite(c->friction) && c->friction >= 0,
              "contact %d: gap %g, impulse %g %g %g", k, c->gap, c->impulse[0], c->impulse[1], c->impulse[2]);
+        { static long seen, on; ++seen; on += c->triangle >= 0; if (seen % 200 == 0) fprintf(stderr, "contacts %ld on meshes %ld\n", seen, on); }
+        MUST(c->triangle >= -1 && c->triangle < MAX_TRIANGLES, "contact %d: triangle %d", k, c->triangle);
     }
 }
 
@@ -276,6 +280,59 @@ static const sadmm_hull *hull_at(int k)
     return *hull;
 }
 
+/* Heights over 3 x 3 and 4 x 3 points: flat, with steps, with needles. */
+static sadmm_status make_heights(int k, sadmm_mesh **mesh)
+{
+    double heights[12];
+    const sadmm_heightfield_def def = {heights, 3 + k % 2, 3, {0.5, k == 1 ? 0.05 : 0.5}};
+    for (int i = 0; i < 12; ++i) heights[i] = k == 0 ? 0 : k == 1 ? 0.3 * (i % 2) : 0.4 * cos(2.4 * i) + 5 * (i == 4);
+    return sadmm_heightfield_create(&def, mesh);
+}
+
+/* Triangles: two that are one square, a tetrahedron, a fan of which three have one edge, ones that cross each other or
+ * do not meet, and slivers. */
+static sadmm_status make_triangles(int k, sadmm_mesh **mesh)
+{
+    static const double square[12] = {-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0};
+    static const double tetrahedron[12] = {0, 0, 0.6, 0.6, 0, -0.4, -0.3, 0.5, -0.4, -0.3, -0.5, -0.4};
+    static const double fan[15] = {0, -1, 0, 0, 1, 0, 1, 0, 0.2, -1, 0, 0.1, 0.1, 0, 1};
+    static const int32_t corners[3][12] = {
+        {0, 1, 2, 0, 2, 3},
+        {0, 1, 2, 0, 2, 3, 0, 3, 1, 1, 3, 2},
+        {0, 2, 1, 0, 1, 3, 0, 1, 4},
+    };
+    double soup[3 * 3 * MAX_TRIANGLES];
+    int32_t all[3 * MAX_TRIANGLES];
+    for (int i = 0; i < 3 * MAX_TRIANGLES; ++i) {
+        all[i] = i;
+        soup[3 * i] = cos(2.4 * i);
+        soup[3 * i + 1] = sin(1.7 * i);
+        soup[3 * i + 2] = k == 3 ? 0.5 * cos(3.1 * i) : 0;
+        if (k == 4 && i % 3 == 2) { /* beside the edge before by less and less */
+            soup[3 * i] = soup[3 * i - 3] + pow(0.3, i / 3);
+            soup[3 * i + 1] = soup[3 * i - 2];
+        }
+    }
+    const sadmm_mesh_def defs[5] = {
+        {square, 4, corners[0], 2},
+        {tetrahedron, 4, corners[1], 4},
+        {fan, 5, corners[2], 3},
+        {soup, 3 * MAX_TRIANGLES, all, MAX_TRIANGLES},
+        {soup, 3 * MAX_TRIANGLES, all, MAX_TRIANGLES},
+    };
+    return sadmm_mesh_create(&defs[k], mesh);
+}
+
+static const sadmm_mesh *mesh_at_number(int k)
+{
+    static sadmm_mesh *meshes[MESHES];
+    sadmm_mesh **mesh = &meshes[k % MESHES];
+    if (*mesh) return *mesh;
+    const sadmm_status status = k % MESHES < 3 ? make_heights(k % MESHES, mesh) : make_triangles(k % MESHES - 3, mesh);
+    MUST(status == SADMM_OK, "%s", sadmm_last_message());
+    return *mesh;
+}
+
 static sadmm_shape_def take_shape_def(struct machine *m)
 {
     struct bytes *in = &m->in;
@@ -283,8 +340,10 @@ static sadmm_shape_def take_shape_def(struct machine *m)
     const bool any_type = take_rarely(in, 32);
     const int type = take_byte(in);
     if (!any_type && type >= 240) def.type = SADMM_SHAPE_HULL;
+    else if (!any_type && type >= 208) def.type = SADMM_SHAPE_MESH;
     else def.type = (sadmm_shape_type)(any_type ? type : type % SADMM_SHAPE_HULL);
     if (def.type == SADMM_SHAPE_HULL && type < 255) def.hull = hull_at(type);
+    if (def.type == SADMM_SHAPE_MESH && type < 239) def.mesh = mesh_at_number(type);
     bool any_size = take_choice(in, 4) == 3;
     for (int k = 0; k < 3; ++k) {
         def.size[k] = any_size ? take_scale(in, 1e-6, 1e6) : take_in(in, 0.1, 0.9);
@@ -318,10 +377,22 @@ static sadmm_status add_body(struct machine *m)
     return SADMM_OK;
 }
 
+/* The last body made that may have a mesh, if there is one. */
+static sadmm_body_id take_ground(struct machine *m, sadmm_body_id else_this)
+{
+    for (int k = m->body_ids - 1; k >= 0 && k >= m->body_ids - IDS; --k) {
+        sadmm_body_def def;
+        if (sadmm_world_body_def(m->world, m->bodies[k % IDS], &def) == SADMM_OK && def.type != SADMM_BODY_DYNAMIC)
+            return m->bodies[k % IDS];
+    }
+    return else_this;
+}
+
 static sadmm_status add_shape(struct machine *m)
 {
     sadmm_body_id body = take_body(m);
     sadmm_shape_def def = take_shape_def(m), read;
+    if (def.type == SADMM_SHAPE_MESH && take_choice(&m->in, 4)) body = take_ground(m, body);
     sadmm_shape_id id;
     bool null = take_rarely(&m->in, 32);
     if (sadmm_world_shape_count(m->world) >= MAX_SHAPES) return SADMM_OK;
@@ -469,6 +540,7 @@ static sadmm_status make_call(struct machine *m)
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     for (int k = 0; k < HULLS; ++k) hull_at(k); /* before memory runs out */
+    for (int k = 0; k < MESHES; ++k) mesh_at_number(k);
     static struct machine m;
     memset(&m, 0, offsetof(struct machine, contacts));
     m.in = bytes_of(data, size);
