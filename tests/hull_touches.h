@@ -104,8 +104,8 @@ static inline void check_manifold(const struct two *t, const struct manifold *m,
             for (int f = 0; f < t->h[side].faces; ++f)
                 most = fmax(most, t_dot(t->h[side].plane[f], own) - t->h[side].plane[f][3]);
             /* clipping is tolerant (MANIFOLD_SNAP), and so is the memory of two edges (MANIFOLD_KEEP_EXTENT); the
-             * nearest points are not quite across the normal of a face that is preferred to theirs: each is half the way
-             * aside, at up to 8 degrees */
+             * nearest points are not quite across the normal of a face that is preferred to theirs: each is half the
+             * way aside, at up to 8 degrees */
             ck_assert_msg(fabs(most) <= 6e-3 * thin + 0.07 * fabs(p->separation) + rounding,
                           "%s: point %d of %d (%08x) is %g off surface %d, thin %g, gap %g, s %g, best %g", what, i,
                           m->count, p->feature, most, side, thin, p->separation, s, best);
@@ -225,7 +225,7 @@ static inline void touch_hulls(uint64_t seed, const struct extent *extent)
                 const double now = reference(t);
                 ++tried;
                 const double there = nearest(t, near.normal);
-                /* three of a million needles whose edges nearly are along each other are off by up to 2e-10 of the size */
+                /* three in a million, needles whose edges are nearly along each other, are off by up to 2e-10 */
                 ck_assert_msg(fabs(there - now) <= 4e-10 * size, "%s touching %d: %g, should be %g (size %g)", what,
                               touch, there, now, size);
                 close_by += fabs(there - now) <= 1e-10 * size;
