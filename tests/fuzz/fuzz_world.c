@@ -151,7 +151,6 @@ static void must_be_sound(struct machine *m)
         MUST(all_finite(c->position, 3) && all_finite(c->impulse, 3) && all_finite(c->force, 3) && isfinite(c->gap) &&
                  isfinite(c->friction) && c->friction >= 0,
              "contact %d: gap %g, impulse %g %g %g", k, c->gap, c->impulse[0], c->impulse[1], c->impulse[2]);
-        { static long seen, on; ++seen; on += c->triangle >= 0; if (seen % 200 == 0) fprintf(stderr, "contacts %ld on meshes %ld\n", seen, on); }
         MUST(c->triangle >= -1 && c->triangle < MAX_TRIANGLES, "contact %d: triangle %d", k, c->triangle);
     }
 }
