@@ -19,7 +19,7 @@
 
 static const char command[] = "shapes";
 
-enum { PAIRS = 512, FORMS = 8, REPEATS = 30 };
+enum { PAIRS = 512, FORMS = 16, REPEATS = 30 };
 
 /* A shape of size 1 m or so, and which way it rests on another. */
 struct form {
@@ -60,10 +60,10 @@ static quat turn_down(const double n[3])
     return w < 1e-12 ? q_load(x) : q_normalize(q_load(q));
 }
 
-static sadmm_status add_hull(struct bench *b, const char *name, const double *points, size_t count,
+static sadmm_status add_hull(struct bench *b, const char *name, const double *points, size_t count, double rounding,
                              struct sadmm_error *error)
 {
-    const sadmm_hull_def def = {.points = points, .point_count = count, .merge = 1e-6};
+    const sadmm_hull_def def = {.points = points, .point_count = count, .merge = 1e-6, .rounding = rounding};
     sadmm_hull *hull;
     sadmm_status status = sadmm_hull_create(&def, &hull);
     if (status != SADMM_OK) return sadmm_fail(error, status, "%s", sadmm_last_message());
@@ -78,7 +78,7 @@ static sadmm_status add_hull(struct bench *b, const char *name, const double *po
     polytope_at(b->pool, form->geometry.hull, &p);
     const double n[3] = {p.nx[0], p.ny[0], p.nz[0]};
     form->down = turn_down(n);
-    form->below = p.offset[0];
+    form->below = p.offset[0] + p.radius;
     return SADMM_OK;
 }
 
@@ -107,14 +107,16 @@ static sadmm_status make_forms(struct bench *b, struct sadmm_error *error)
     add_form(b, "box", SADMM_SHAPE_BOX, 1, 1, 1);
     for (int v = 0; v < 8; ++v)
         for (int k = 0; k < 3; ++k) cube[3 * v + k] = v >> k & 1 ? 1 : -1;
-    sadmm_status status = add_hull(b, "box as hull", cube, 8, error);
+    sadmm_status status = add_hull(b, "box as hull", cube, 8, 0, error);
+    for (int k = 0; k < 24; ++k) cube[k] *= 0.9;
+    if (status == SADMM_OK) status = add_hull(b, "rounded box", cube, 8, 0.1, error);
     static const struct {
         const char *name;
         int count;
     } balls[] = {{"hull of 16", 16}, {"hull of 32", 32}, {"hull of 128", 128}};
     for (size_t k = 0; k < sizeof balls / sizeof *balls && status == SADMM_OK; ++k) {
         spread(balls[k].count, ball);
-        status = add_hull(b, balls[k].name, ball, (size_t)balls[k].count, error);
+        status = add_hull(b, balls[k].name, ball, (size_t)balls[k].count, 0, error);
     }
     return status;
 }

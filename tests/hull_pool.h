@@ -49,7 +49,7 @@ static inline struct sadmm_geometry test_pool_add(struct test_pool *pool, const 
     test_hull_block(h, pool->numbers + pool->used);
     pool->used += (size_t)hull_doubles(h->vertices, h->faces, h->edges);
     for (int i = 0; i < h->vertices; ++i)
-        for (int k = 0; k < 3; ++k) geometry.size[k] = fmax(geometry.size[k], fabs(h->x[i][k]));
+        for (int k = 0; k < 3; ++k) geometry.size[k] = fmax(geometry.size[k], fabs(h->x[i][k]) + h->rounding);
     return geometry;
 }
 

@@ -88,13 +88,19 @@ static inline void shuffle_cloud(struct cloud *c, uint64_t seed)
     }
 }
 
-static inline sadmm_status try_hull(const struct cloud *c, double merge, sadmm_hull **hull)
+static inline sadmm_status try_round_hull(const struct cloud *c, double merge, double rounding, sadmm_hull **hull)
 {
     sadmm_hull_def def = sadmm_hull_def_default();
     def.points = c->x;
     def.point_count = c->count;
     def.merge = merge;
+    def.rounding = rounding;
     return sadmm_hull_create(&def, hull);
+}
+
+static inline sadmm_status try_hull(const struct cloud *c, double merge, sadmm_hull **hull)
+{
+    return try_round_hull(c, merge, 0, hull);
 }
 
 /* ---- what must hold ---- */
@@ -196,7 +202,8 @@ static inline void check_block(const sadmm_hull *hull, double rounding)
         HOLDS(v3_norm(v3_sub(given, v3_load(hull->vertices + 3 * same))) <= rounding);
         for (int k = 0; k < 3; ++k) most[k] = fmax(most[k], fabs(x[k]));
     }
-    for (int k = 0; k < 3; ++k) HOLDS(most[k] == hull->half[k]);
+    for (int k = 0; k < 3; ++k) HOLDS(most[k] + hull->rounding == hull->half[k]);
+    HOLDS(header->rounding == hull->rounding && p.radius == hull->rounding);
     for (int f = 0; f < p.faces; ++f) {
         const vec3 n = polytope_normal(&p, f);
         double offset = -INFINITY;

@@ -530,7 +530,9 @@ static void expect_body(json_t *body, size_t index, size_t hulls)
         const char *type = string(shape, "type");
         size_t sizes = !strcmp(type, "box") ? 3 : !strcmp(type, "capsule") ? 2 : !strcmp(type, "sphere") ? 1 : 0;
         ck_assert(sizes > 0 || !strcmp(type, "plane") || !strcmp(type, "hull"));
-        if (!strcmp(type, "hull")) ck_assert(number(shape, "hull") >= 0 && number(shape, "hull") < (double)hulls);
+        if (!strcmp(type, "hull"))
+            ck_assert(number(shape, "hull") >= 0 && number(shape, "hull") < (double)hulls &&
+                      number(shape, "rounding") >= 0);
         else ck_assert_ptr_null(json_object_get(shape, "hull"));
         ck_assert_uint_eq(json_array_size(at(shape, "size")), sizes);
         ck_assert_double_ge(number(shape, "friction"), 0);

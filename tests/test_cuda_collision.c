@@ -252,6 +252,7 @@ static struct soup soup_new(const struct soup_kind *kind, uint64_t number)
             if (form == 0) box_hull(size, &h);
             else if (form == 1) prism_hull(20, 0.5, &h);
             else random_hull(&state, form == 2 ? 60 : 6 + below(20), size, &h);
+            if (form > 2 || chance(0.3)) h.rounding = between(0, 0.3 * kind->size_low);
             s.forms[form] = test_pool_add(s.pool, &h);
         }
         s.input.hulls = s.pool->numbers;

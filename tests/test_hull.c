@@ -46,6 +46,33 @@ START_TEST(a_cube)
 }
 END_TEST
 
+/* The polyhedron stays what it is; what is around it grows. */
+START_TEST(a_rounded_box)
+{
+    const struct cloud c = box_cloud(0.1, 0.2, 0.3);
+    sadmm_hull *hull = NULL, *sharp = NULL;
+    ck_assert_int_eq(try_hull(&c, 1e-6, &sharp), SADMM_OK);
+    ck_assert_int_eq(try_round_hull(&c, 1e-6, 0.05, &hull), SADMM_OK);
+    check_hull(hull, &c, 0);
+    expect_counts(hull, 8, 12, 6);
+    ck_assert_double_eq(sadmm_hull_rounding(hull), 0.05);
+    ck_assert_double_eq(sadmm_hull_rounding(sharp), 0);
+    ck_assert_mem_eq(sadmm_hull_vertices(hull), c.x, 24 * sizeof(double));
+    for (int k = 0; k < 3; ++k) {
+        ck_assert_double_eq(hull->half[k], sharp->half[k] + 0.05);
+        ck_assert_double_eq(hull->position[k], sharp->position[k]);
+    }
+    for (int32_t f = 0; f < 6; ++f) {
+        sadmm_hull_face face, same;
+        ck_assert_int_eq(sadmm_hull_face_at(hull, f, &face), SADMM_OK);
+        ck_assert_int_eq(sadmm_hull_face_at(sharp, f, &same), SADMM_OK);
+        ck_assert_double_eq(face.offset, same.offset);
+    }
+    sadmm_hull_destroy(hull);
+    sadmm_hull_destroy(sharp);
+}
+END_TEST
+
 START_TEST(a_tetrahedron)
 {
     const struct cloud c = {.x = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}, .count = 4};
@@ -292,6 +319,13 @@ START_TEST(bad_arguments_are_refused)
         def.merge = merges[k];
         expect_refused(&def, bad, "def->merge");
     }
+    static const double roundings[] = {NAN, -1e-9, 1.01e6};
+    def.merge = 1e-6;
+    for (int k = 0; k < 3; ++k) {
+        def.rounding = roundings[k];
+        expect_refused(&def, bad, "def->rounding");
+    }
+    def.rounding = 0;
     for (size_t k = 0; k < sizeof values / sizeof *values; ++k) {
         c = box_cloud(1, 1, 1);
         c.x[13] = values[k];
@@ -488,6 +522,7 @@ int main(void)
     Suite *suite = suite_create("hull");
     TCase *shapes = tcase_create("shapes"), *refusals = tcase_create("refusals");
     tcase_add_test(shapes, a_cube);
+    tcase_add_test(shapes, a_rounded_box);
     tcase_add_test(shapes, a_tetrahedron);
     tcase_add_test(shapes, a_ball_of_32_points);
     tcase_add_test(shapes, a_prism);

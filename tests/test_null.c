@@ -276,6 +276,7 @@ static void on_hulls(void)
     ck_assert_int_eq(sadmm_hull_edge_count(NULL), 0);
     ck_assert_int_eq(sadmm_hull_face_count(NULL), 0);
     ck_assert_ptr_null(sadmm_hull_vertices(NULL));
+    ck_assert_double_eq(sadmm_hull_rounding(NULL), 0);
     REFUSES("hull", sadmm_hull_face_at(NULL, 0, &face));
     REFUSES("hull", sadmm_hull_mass(NULL, 1, &mass));
     def.points = corners;
@@ -340,7 +341,7 @@ static const struct {
       P(get_solution), P(set_solution), P(certify)}},
     {on_hulls,
      {"sadmm_hull_create", "sadmm_hull_destroy", "sadmm_hull_vertex_count", "sadmm_hull_edge_count",
-      "sadmm_hull_face_count", "sadmm_hull_vertices", "sadmm_hull_face_at", "sadmm_hull_mass"}},
+      "sadmm_hull_face_count", "sadmm_hull_vertices", "sadmm_hull_rounding", "sadmm_hull_face_at", "sadmm_hull_mass"}},
     {on_masses,
      {"sadmm_shape_mass", "sadmm_mass_sum", "sadmm_mass_pose_in_body", "sadmm_mass_pose_of_body"}},
     {on_others, {"sadmm_backend_query", "sadmm_box_inertia", "sadmm_sphere_inertia", "sadmm_capsule_inertia"}},

@@ -1,4 +1,5 @@
-/* Convex hulls: the polyhedron around a set of points, a shape for bodies (SADMM_SHAPE_HULL, world.h).
+/* Convex hulls: the polyhedron around a set of points, a shape for bodies (SADMM_SHAPE_HULL, world.h), with sharp edges or
+ * round ones.
  *
  * A hull is made once and never changes. Any number of worlds and threads may use it at the same time; it lives until
  * its maker and every world with shapes of it have let go of it. The same points give the same hull to the last bit, in
@@ -28,6 +29,9 @@ typedef struct sadmm_hull_def {
                              become one face, and points that stand out from it by no more than that are no vertices;
                              never more than 1/20 of how thick the points lie. In [0, 1e-2]; 0: what rounding alone
                              bends; default 1e-6. Where the joined faces make no convex polyhedron, fewer are joined */
+    double rounding;      /* m, in [0, 1e6]; default 0: the shape is the set of all that is within this of the polyhedron,
+                             its Minkowski sum with a ball. Faces move outward by it, edges and corners are round. A box
+                             with round edges is the hull of 8 points, each this much inside of the box */
 } sadmm_hull_def;
 
 /* The defaults named above. Thread-safe. */
@@ -51,6 +55,9 @@ SADMM_API int32_t sadmm_hull_face_count(const sadmm_hull *hull);
 /* The vertices, 3 numbers each, m: those of the points that are corners of the hull, bit for bit, in the order in which
  * they were given. Of NULL: NULL. Valid as long as the hull. */
 SADMM_API const double *sadmm_hull_vertices(const sadmm_hull *hull);
+
+/* The definition's rounding, m. Of NULL: 0. What the other functions tell is the polyhedron inside. */
+SADMM_API double sadmm_hull_rounding(const sadmm_hull *hull);
 
 typedef struct sadmm_hull_face {
     int32_t corner_count;   /* >= 3 */

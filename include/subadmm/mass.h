@@ -28,7 +28,8 @@ typedef struct sadmm_mass {
 } sadmm_mass;
 
 /* The solid of a sphere, capsule, box or hull in the frame that the definition's position and orientation refer to.
- * density: kg/m^3, in [1e-30, 1e30]; with 1 the mass is the volume. Hulls: exact integrals over the polyhedron. Errors:
+ * density: kg/m^3, in [1e-30, 1e30]; with 1 the mass is the volume. Hulls: exact integrals over the polyhedron, and over
+ * what rounding adds to it. Errors:
  * INVALID_ARGUMENT (range; a plane; nothing is written). */
 SADMM_API sadmm_status sadmm_shape_mass(const sadmm_shape_def *def, double density, sadmm_mass *mass);
 /* The same of a hull in the frame of its points. */

@@ -179,6 +179,7 @@ static sadmm_status add_shapes(sadmm_world *world, json_t *bodies, struct hulls 
         const json_int_t index = hull_index(hulls, def.hull);
         if (index < 0) return sadmm_fail_memory(NULL, "the list of hulls");
         json_object_set_new(shape, "hull", json_integer(index));
+        json_object_set_new(shape, "rounding", cli_json_real(sadmm_hull_rounding(def.hull)));
     }
     return SADMM_OK;
 }
@@ -352,7 +353,8 @@ static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, con
     static const char *const units =
         "SI; world frame; quaternions w x y z, body to world; inertia: principal moments in "
         "the body's frame; box: half extents; capsule: radius, half length along z; plane: "
-        "half-space z <= 0 of its frame; hull: around the vertices of an entry of hulls, in its frame";
+        "half-space z <= 0 of its frame; hull: around the vertices of an entry of hulls, in its frame, and what is within "
+        "rounding of that";
     json_t *o = json_object();
     json_object_set_new(o, "scene", json_string(spec));
     json_object_set_new(o, "name", json_string(scene->info->name));

@@ -69,6 +69,7 @@ struct making {
     double *scaled;            /* the points as qhull gets them */
     double *vertices, *planes; /* of the mesh */
     int32_t *rank;
+    double rounding;
     size_t vertex_capacity, plane_capacity, rank_capacity;
 };
 
@@ -227,7 +228,7 @@ static void choose_box(const struct making *m, const double principal[4], sadmm_
     }
     const struct hull_box box = sadmm_hull_box(m->vertices, count, best, inside);
     memcpy(hull->orientation, best ? best : unit, sizeof hull->orientation);
-    memcpy(hull->half, box.half, sizeof hull->half);
+    for (int k = 0; k < 3; ++k) hull->half[k] = box.half[k] + m->rounding;
     for (int k = 0; k < 3; ++k) hull->position[k] = m->points.middle[k] + box.position[k];
 }
 
@@ -252,11 +253,12 @@ static bool fill(struct making *m, const double *given, const struct hull_solid 
     choose_box(m, solid->axes, hull, inside);
     sadmm_hull_turn_planes(&m->mesh, inside, hull->orientation, m->planes);
     if (!order_as_given(m, inside)) return false;
-    sadmm_hull_block_write(&m->mesh, inside, m->planes, hull->block);
+    sadmm_hull_block_write(&m->mesh, inside, m->planes, m->rounding, hull->block);
     for (int32_t v = 0; v < hull->vertex_count; ++v)
         memcpy(hull->vertices + 3 * v, given + 3 * m->points.at[m->mesh.point[v]].number, 3 * sizeof *given);
     memcpy(hull->face_first, m->mesh.face_first, ((size_t)hull->face_count + 1) * sizeof *hull->face_first);
     memcpy(hull->corners, m->mesh.corner, (size_t)m->mesh.face_first[hull->face_count] * sizeof *hull->corners);
+    hull->rounding = m->rounding;
     hull->volume = solid->volume;
     memcpy(hull->moments, solid->moments, sizeof hull->moments);
     memcpy(hull->axes, solid->axes, sizeof hull->axes);
@@ -268,7 +270,7 @@ static bool fill(struct making *m, const double *given, const struct hull_solid 
 static sadmm_status build(struct making *m, const double *given, sadmm_hull **out, struct sadmm_error *error)
 {
     struct hull_solid solid;
-    if (!sadmm_hull_solid(&m->mesh, m->vertices, &solid))
+    if (!sadmm_hull_solid(&m->mesh, m->vertices, m->planes, m->rounding, &solid))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->points: their hull has a volume of %g m^3",
                           solid.volume);
     double *inside = (double *)sadmm_alloc((size_t)m->mesh.vertex_count, 3 * sizeof *inside);
@@ -302,8 +304,9 @@ sadmm_status sadmm_hull_create(const sadmm_hull_def *def, sadmm_hull **out)
         return sadmm_fail(NULL, SADMM_ERROR_INVALID_ARGUMENT, "def->point_count = %zu: must be in [%d, %d]",
                           def->point_count, LEAST_POINTS, MOST_POINTS);
     TRY(sadmm_check_range("def->merge", def->merge, 0, 1e-2, NULL));
+    TRY(sadmm_check_range("def->rounding", def->rounding, 0, 1e6, NULL));
     TRY(sadmm_check_vector("def->points", def->points, 3 * (int)def->point_count, 1e6, NULL));
-    struct making m = {.scaled = NULL};
+    struct making m = {.rounding = def->rounding};
     const sadmm_status status = make(&m, def, out, NULL);
     free_making(&m);
     return status;
@@ -329,6 +332,11 @@ int32_t sadmm_hull_face_count(const sadmm_hull *hull)
 const double *sadmm_hull_vertices(const sadmm_hull *hull)
 {
     return hull ? hull->vertices : NULL;
+}
+
+double sadmm_hull_rounding(const sadmm_hull *hull)
+{
+    return hull ? hull->rounding : 0;
 }
 
 sadmm_status sadmm_hull_face_at(const sadmm_hull *hull, int32_t face, sadmm_hull_face *out)

@@ -5,6 +5,7 @@
  *   hull_faces.c     qhull: points to faces
  *   hull_mesh.c      faces as loops of corners: are they a polyhedron; their order
  *   hull_measure.c   planes, volume, principal axes, the box around it
+ *   hull_round.c     what rounding adds to the integrals
  *   hull_block.c     the block that contact finding reads (hull_data.h), and those that every pool begins with
  *
  * Contact finding works in the frame of a box around the hull, not in that of the points: its half extents are bounds
@@ -25,7 +26,8 @@ struct sadmm_hull {
     int32_t vertex_count, edge_count, face_count;
     double *block;          /* hull_data.h */
     size_t doubles;         /* of the block */
-    double half[3];         /* of the box around the hull, m */
+    double rounding;        /* m; the vertices are those of the core */
+    double half[3];         /* of the box around the hull, rounding included, m */
     double position[3], orientation[4]; /* the block's frame in that of the points */
     double *vertices;       /* 3 each, as they were given */
     int32_t *face_first;    /* face_count + 1 */

@@ -21,17 +21,6 @@ static double *write_rows(const double *from, int32_t count, int width, double *
     return to;
 }
 
-static int32_t face_of(const struct hull_mesh *mesh, int32_t corner)
-{
-    int32_t low = 0, high = mesh->face_count; /* the last face that begins no later */
-    while (high - low > 1) {
-        const int32_t middle = low + (high - low) / 2;
-        if (mesh->face_first[middle] <= corner) low = middle;
-        else high = middle;
-    }
-    return low;
-}
-
 static void write_faces(const struct hull_mesh *mesh, uint16_t *first, uint16_t *corner_vertex, uint16_t *corner_edge)
 {
     for (int32_t f = 0; f < mesh->face_count; ++f) {
@@ -47,7 +36,7 @@ static void write_edges(const struct hull_mesh *mesh, uint16_t *edge_vertex, uin
 {
     for (int32_t k = 0; k < 2 * mesh->edge_count; ++k) {
         edge_vertex[k] = (uint16_t)mesh->corner[mesh->edge_corner[k]];
-        edge_face[k] = (uint16_t)face_of(mesh, mesh->edge_corner[k]);
+        edge_face[k] = (uint16_t)sadmm_hull_mesh_face_of(mesh, mesh->edge_corner[k]);
     }
 }
 
@@ -76,7 +65,7 @@ static bool has_flat_faces(const struct hull_mesh *mesh, const double *vertices,
 }
 
 /* Where `mesh` has no faces, `ends` has the vertices of its edges; else NULL. */
-static void write_block(const struct hull_mesh *mesh, const double *vertices, const double *planes,
+static void write_block(const struct hull_mesh *mesh, const double *vertices, const double *planes, double rounding,
                         const uint16_t *ends, double *block)
 {
     const struct sadmm_hull_header header = {
@@ -87,6 +76,7 @@ static void write_block(const struct hull_mesh *mesh, const double *vertices, co
         .face_stride = hull_stride(mesh->face_count),
         .doubles = (int32_t)sadmm_hull_block_doubles(mesh),
         .climbs = has_flat_faces(mesh, vertices, planes),
+        .rounding = rounding,
     };
     memset(block, 0, (size_t)header.doubles * sizeof *block);
     memcpy(block, &header, sizeof header);
@@ -101,9 +91,10 @@ static void write_block(const struct hull_mesh *mesh, const double *vertices, co
     write_neighbours(&header, edge_vertex, vertex_first, vertex_next);
 }
 
-void sadmm_hull_block_write(const struct hull_mesh *mesh, const double *vertices, const double *planes, double *block)
+void sadmm_hull_block_write(const struct hull_mesh *mesh, const double *vertices, const double *planes,
+                            double rounding, double *block)
 {
-    write_block(mesh, vertices, planes, NULL, block);
+    write_block(mesh, vertices, planes, rounding, NULL, block);
 }
 
 /* ---- blocks that every pool begins with ---- */
@@ -126,7 +117,7 @@ static void write_cube(double *block)
         planes[4 * f + f / 2] = f % 2 ? -1 : 1;
         planes[4 * f + 3] = 1;
     }
-    write_block(&cube, vertices, planes, NULL, block);
+    write_block(&cube, vertices, planes, 0, NULL, block);
 }
 
 void sadmm_hull_prelude(double *pool)
@@ -134,6 +125,6 @@ void sadmm_hull_prelude(double *pool)
     static const double segment[] = {0, 0, -1, 0, 0, 1}, point[] = {0, 0, 0};
     static const uint16_t ends[] = {0, 1};
     write_cube(pool + HULL_CUBE);
-    write_block(&(struct hull_mesh){.vertex_count = 2, .edge_count = 1}, segment, NULL, ends, pool + HULL_SEGMENT);
-    write_block(&(struct hull_mesh){.vertex_count = 1}, point, NULL, NULL, pool + HULL_POINT);
+    write_block(&(struct hull_mesh){.vertex_count = 2, .edge_count = 1}, segment, NULL, 0, ends, pool + HULL_SEGMENT);
+    write_block(&(struct hull_mesh){.vertex_count = 1}, point, NULL, 0, NULL, pool + HULL_POINT);
 }

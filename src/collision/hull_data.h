@@ -6,7 +6,7 @@
  *
  * A block:
  *
- *   header
+ *   header                                                    counts, and the radius of the ball that rounds the hull
  *   double   x, y, z of the vertices                          each vertex_stride long
  *   double   x, y, z, offset of the faces                     each face_stride long: normal . point <= offset inside
  *   uint16   face_first[faces + 1]                            a face's corners: [face_first[f], face_first[f + 1])
@@ -38,9 +38,10 @@ struct sadmm_hull_header {
     int32_t vertex_stride, face_stride;
     int32_t doubles; /* the whole block */
     int32_t reserved;
+    double rounding; /* m: the hull is the points' with a ball of this radius around every point of it */
 };
 
-enum { HULL_HEADER_DOUBLES = 4 };
+enum { HULL_HEADER_DOUBLES = 5 };
 
 SADMM_INLINE int32_t hull_stride(int32_t count) { return (count + HULL_LANES - 1) / HULL_LANES * HULL_LANES; }
 
@@ -58,11 +59,11 @@ SADMM_INLINE int32_t hull_doubles(int32_t vertices, int32_t faces, int32_t edges
 /* Offsets of the blocks that every pool begins with, and of the first of its own. */
 enum {
     HULL_CUBE = 0,      /* half extents 1. Vertex v: bit k set where coordinate k is +1 */
-    HULL_CUBE_DOUBLES = 4 + 24 + 32 + 34, /* 8 vertices, 6 faces, 12 edges: 7 + 48 + 48 + 9 + 24 = 136 links */
+    HULL_CUBE_DOUBLES = HULL_HEADER_DOUBLES + 24 + 32 + 34, /* 8 vertices, 6 faces, 12 edges: 7 + 48 + 48 + 9 + 24 = 136 links */
     HULL_SEGMENT = HULL_CUBE + HULL_CUBE_DOUBLES, /* (0, 0, -1) to (0, 0, 1); no face */
-    HULL_SEGMENT_DOUBLES = 4 + 12 + 0 + 4, /* 2 vertices, 1 edge: 1 + 4 + 4 + 3 + 2 = 14 links */
+    HULL_SEGMENT_DOUBLES = HULL_HEADER_DOUBLES + 12 + 0 + 4, /* 2 vertices, 1 edge: 1 + 4 + 4 + 3 + 2 = 14 links */
     HULL_POINT = HULL_SEGMENT + HULL_SEGMENT_DOUBLES,
-    HULL_POINT_DOUBLES = 4 + 12 + 0 + 1, /* 1 vertex: 1 + 2 = 3 links */
+    HULL_POINT_DOUBLES = HULL_HEADER_DOUBLES + 12 + 0 + 1, /* 1 vertex: 1 + 2 = 3 links */
     HULL_FIRST_OWN = HULL_POINT + HULL_POINT_DOUBLES
 };
 

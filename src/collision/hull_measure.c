@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "core/math/principal.h"
+#include "hull_round.h"
 
 static vec3 corner_at(const struct hull_mesh *mesh, const double *vertices, int32_t corner)
 {
@@ -78,15 +79,12 @@ double sadmm_hull_bulge(const struct hull_mesh *mesh, const double *vertices, co
 
 /* ---- the solid ---- */
 
-struct integrals {
-    double volume, first[3], second[3][3]; /* of 1, x, x x^T */
-};
-
 /* Sums over the tetrahedra between `origin` and the triangles of the faces, along axes turned by `axes` (its columns);
  * exact but for rounding, and without cancellation where `origin` is inside. */
-static struct integrals integrate(const struct hull_mesh *mesh, const double *vertices, vec3 origin, mat3 axes)
+static struct hull_integrals integrate(const struct hull_mesh *mesh, const double *vertices, const double *planes,
+                                       double rounding, vec3 origin, mat3 axes)
 {
-    struct integrals sum = {0};
+    struct hull_integrals sum = {0};
     for (int32_t f = 0; f < mesh->face_count; ++f) {
         const int32_t first = mesh->face_first[f], end = mesh->face_first[f + 1];
         vec3 p[4]; /* the corners of a triangle and their sum */
@@ -108,6 +106,7 @@ static struct integrals integrate(const struct hull_mesh *mesh, const double *ve
             }
         }
     }
+    if (rounding > 0) sadmm_hull_add_round(mesh, vertices, planes, rounding, origin, axes, &sum);
     for (int i = 0; i < 3; ++i)
         for (int j = i + 1; j < 3; ++j) sum.second[i][j] = sum.second[j][i];
     return sum;
@@ -120,20 +119,22 @@ static vec3 mean(const double *vertices, int32_t count)
     return v3_scale(sum, 1.0 / count);
 }
 
-bool sadmm_hull_solid(const struct hull_mesh *mesh, const double *vertices, struct hull_solid *solid)
+bool sadmm_hull_solid(const struct hull_mesh *mesh, const double *vertices, const double *planes, double rounding,
+                      struct hull_solid *solid)
 {
     static const double none[4] = {1, 0, 0, 0};
     const mat3 given = q_matrix(q_load(none));
     vec3 centre = mean(vertices, mesh->vertex_count);
-    struct integrals sum = integrate(mesh, vertices, centre, given);
+    struct hull_integrals sum = integrate(mesh, vertices, planes, 0, centre, given);
     solid->volume = sum.volume;
     if (!(sum.volume > 0)) return false;
+    if (rounding > 0) sum = integrate(mesh, vertices, planes, rounding, centre, given);
     centre = v3_madd(centre, 1 / sum.volume, v3_load(sum.first));
-    sum = integrate(mesh, vertices, centre, given);
+    sum = integrate(mesh, vertices, planes, rounding, centre, given);
     principal_axes(sum.second, solid->axes);
     /* Again along these axes: across a thin hull they are known to its thickness then, not to its length alone. */
     double rest[4];
-    sum = integrate(mesh, vertices, centre, q_matrix(q_load(solid->axes)));
+    sum = integrate(mesh, vertices, planes, rounding, centre, q_matrix(q_load(solid->axes)));
     principal_axes(sum.second, rest);
     q_store(q_normalize(q_mul(q_load(solid->axes), q_load(rest))), solid->axes);
     solid->volume = sum.volume;

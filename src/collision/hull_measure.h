@@ -26,8 +26,9 @@ struct hull_solid {
     double axes[4];    /* principal axes to the frame of the vertices; unit quaternion */
 };
 
-/* False: it has no volume. */
-bool sadmm_hull_solid(const struct hull_mesh *mesh, const double *vertices, struct hull_solid *solid);
+/* Of the polyhedron, or of what is within `rounding` of it, m. False: the polyhedron has no volume. */
+bool sadmm_hull_solid(const struct hull_mesh *mesh, const double *vertices, const double *planes, double rounding,
+                      struct hull_solid *solid);
 
 /* Axes of a box that lies on the largest face, along its longest edge; unit quaternion. */
 void sadmm_hull_face_axes(const struct hull_mesh *mesh, const double *vertices, double orientation[4]);

@@ -217,3 +217,14 @@ bool sadmm_hull_mesh_order(struct hull_mesh *mesh, const int32_t *rank, double *
     sadmm_free(moved);
     return done;
 }
+
+int32_t sadmm_hull_mesh_face_of(const struct hull_mesh *mesh, int32_t corner)
+{
+    int32_t low = 0, high = mesh->face_count; /* the last face that begins no later */
+    while (high - low > 1) {
+        const int32_t middle = low + (high - low) / 2;
+        if (mesh->face_first[middle] <= corner) low = middle;
+        else high = middle;
+    }
+    return low;
+}

@@ -33,4 +33,7 @@ enum hull_mesh_is sadmm_hull_mesh_close(struct hull_mesh *mesh, int32_t point_co
  * faces in order; `planes`, 4 numbers a face, go along. False: out of memory. */
 bool sadmm_hull_mesh_order(struct hull_mesh *mesh, const int32_t *rank, double *planes);
 
+/* The face that a corner is of. */
+int32_t sadmm_hull_mesh_face_of(const struct hull_mesh *mesh, int32_t corner);
+
 #endif

@@ -8,8 +8,8 @@
  *   4. The points of the faces that point along it (polytope_face.h); the nearest points as well where these do not
  *      have them.
  *
- * Round shapes are a core, a point or a segment, with a radius: outside the core's distance is exact, and so is the
- * normal; no face is preferred to it.
+ * Round shapes are a core, a point or a segment or a hull that has been rounded, with a radius: outside, the cores'
+ * distance is exact, and so is the normal; no face is preferred to it.
  */
 #ifndef SADMM_COLLISION_MANIFOLD_HULL_H
 #define SADMM_COLLISION_MANIFOLD_HULL_H
@@ -47,9 +47,9 @@ SADMM_INLINE real hull_way_out(const struct polytope_pair *pair, const struct po
 {
     const bool of_a = axis->kind == AXIS_FACE_A;
     const struct polytope *p = of_a ? &pair->a : &pair->b;
-    vec3 inside = v3_madd(x, (of_a ? gap : -gap) / 2, axis->n);
+    vec3 inside = v3_madd(x, of_a ? gap / 2 + pair->b.radius : -gap / 2 - pair->a.radius, axis->n);
     if (of_a) inside = m3_tmul(pair->R, v3_sub(inside, pair->t));
-    return real_max(gap, polytope_height(p, inside, of_a ? axis->a : axis->b));
+    return real_max(gap, polytope_height(p, inside, of_a ? axis->a : axis->b) - pair_radii(pair));
 }
 
 /* Do the points of a face axis prove that no axis beats it by more than the last step's axis is given? */
@@ -66,8 +66,8 @@ SADMM_INLINE bool hull_is_proven(const struct polytope_pair *pair, const struct 
         gap += m->points[k].separation;
         if (m->points[k].separation < m->points[deepest].separation) deepest = k;
     }
-    /* two points as near to each other as the planes are: nothing is nearer, and no plane parts them further */
-    if (axis->separation >= 0) return m->points[deepest].separation <= axis->separation + 2 * pair->slack;
+    /* two points of the cores as near to each other as the planes are: nothing is nearer, and no plane parts them further */
+    if (axis->separation >= -pair_radii(pair)) return m->points[deepest].separation <= axis->separation + 2 * pair->slack;
     /* the face along the normal need not have the deepest corner */
     if (m->points[deepest].separation > axis->separation + MANIFOLD_FLAT * pair->thin) return false;
     middle = v3_scale(middle, (real)1 / (real)m->count);
@@ -186,11 +186,24 @@ SADMM_INLINE bool hull_face_beside(const struct polytope_pair *pair, vec3 n, str
     return by_a || by_b;
 }
 
+/* Round edges that touch have the nearest points' normal, whatever it was before: a face is taken where it is that normal.
+ * False: the cores have met. */
+SADMM_INLINE bool hull_choose_round(const struct polytope_pair *pair, struct polytope_axis *axis)
+{
+    struct polytope_axis face;
+    if (!(pair_radii(pair) > 0 && axis->separation >= -pair_radii(pair))) return false;
+    if (axis->kind == AXIS_FREE && hull_face_beside(pair, axis->n, &face) &&
+        axis->separation <= face.separation + 2 * pair->slack)
+        *axis = face;
+    return true;
+}
+
 /* a: hull or box. `kept`: the last step's axis, `known`: there is one. */
 SADMM_INLINE void hull_choose(const struct polytope_pair *pair, const struct polytope_axis *kept, bool known,
                               struct polytope_axis *axis)
 {
     struct polytope_axis face;
+    if (hull_choose_round(pair, axis)) return;
     if (known) {
         /* past the middle of a thin one the other side is nearer, but wrong */
         const bool turned = axis->separation < 0 && v3_dot(kept->n, axis->n) < -MANIFOLD_COS_OPPOSITE;
@@ -319,6 +332,14 @@ SADMM_RARE bool hull_manifold_at_once(const struct sadmm_geometry *a, const stru
            gjk_distance(&pair, start, limit + pair_radii(&pair) + pair.slack, &s, &v) == GJK_FAR;
 }
 
+/* A vertex over the plane, or the lowest point of the ball around it. */
+SADMM_INLINE void hull_plane_point(struct manifold *m, const struct polytope *p, int v, real offset)
+{
+    const vec3 x = polytope_vertex(p, v);
+    const real s = v3_dot(m->normal, x) + offset - p->radius;
+    manifold_add(m, v3_madd(x, -(s / 2 + p->radius), m->normal), s, (uint32_t)v + 1);
+}
+
 /* a: the plane (manifold_plane.h). Of more vertices within the limit than a manifold has points, the lowest one and those
  * that are outermost, and low, in eight directions. */
 SADMM_RARE void hull_plane_manifold(const struct sadmm_geometry *b, const double *hulls, const struct pair_pose *pose,
@@ -336,7 +357,7 @@ SADMM_RARE void hull_plane_manifold(const struct sadmm_geometry *b, const double
     v3_tangents(n, &x1, &x2);
     for (v = 0; v < p.vertices; ++v) {
         const vec3 x = polytope_vertex(&p, v);
-        const real s = v3_dot(n, x) + offset, sx = v3_dot(x1, x), sy = v3_dot(x2, x);
+        const real s = v3_dot(n, x) + offset - p.radius, sx = v3_dot(x1, x), sy = v3_dot(x2, x);
         if (s > limit) continue;
         if (s < least) {
             least = s;
@@ -349,18 +370,16 @@ SADMM_RARE void hull_plane_manifold(const struct sadmm_geometry *b, const double
                 best[k] = v;
             }
         }
-        if (within++ < SADMM_MANIFOLD_POINTS) manifold_add(m, v3_madd(x, -s / 2, n), s, (uint32_t)v + 1);
+        if (within++ < SADMM_MANIFOLD_POINTS) hull_plane_point(m, &p, v, offset);
     }
     if (within <= SADMM_MANIFOLD_POINTS) return;
     m->count = 0;
     for (k = 0; k < SADMM_MANIFOLD_POINTS; ++k) {
-        const vec3 x = polytope_vertex(&p, best[k]);
         int i;
         bool twice = false;
         for (i = 0; i < k; ++i) twice |= best[i] == best[k];
         has_lowest |= best[k] == lowest;
-        if (!twice) manifold_add(m, v3_madd(x, -(v3_dot(n, x) + offset) / 2, n), v3_dot(n, x) + offset,
-                                 (uint32_t)best[k] + 1);
+        if (!twice) hull_plane_point(m, &p, best[k], offset);
     }
     if (!has_lowest) {
         const vec3 x = polytope_vertex(&p, lowest);
@@ -374,7 +393,7 @@ SADMM_RARE void hull_plane_manifold(const struct sadmm_geometry *b, const double
             }
         }
         if (m->count < SADMM_MANIFOLD_POINTS) nearest = m->count++;
-        m->points[nearest].position = v3_madd(x, -least / 2, n);
+        m->points[nearest].position = v3_madd(x, -(least / 2 + p.radius), n);
         m->points[nearest].separation = least;
         m->points[nearest].feature = (uint32_t)lowest + 1;
     }

@@ -49,7 +49,7 @@ SADMM_INLINE void polytope_at(const double *hulls, uint32_t at, struct polytope 
     p->vertex_next = p->vertex_first + header->vertices + 1;
     p->scale = v3(1, 1, 1);
     p->scaled = false;
-    p->radius = 0;
+    p->radius = (real)header->rounding;
 }
 
 /* Of a sphere, capsule, box or hull. */
