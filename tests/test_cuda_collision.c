@@ -189,6 +189,7 @@ struct soup_kind {
     int steps, tree_from;
     int children;           /* of a geometry, at most; 0: one */
     int hulls;              /* forms of hulls; 0: no shape is one */
+    double smooth;          /* share of cylinders, cones and ellipsoids */
 };
 
 static int compare_keys(const void *a, const void *b)
@@ -221,7 +222,8 @@ static void random_shape(struct soup *s, const struct soup_kind *kind, struct sa
     geometry->children = 1 + (kind->children ? below(kind->children) : 0);
     for (int k = 0; k < 3; ++k) geometry->size[k] = kind->size_low * pow(kind->size_high / kind->size_low, uniform());
     if (chance(0.3)) geometry->size[1] = geometry->size[2] = geometry->size[0];
-    if (kind->hulls && chance(0.6)) *geometry = s->forms[below(kind->hulls)];
+    if (kind->smooth > 0 && chance(kind->smooth)) geometry->type = SADMM_SHAPE_CYLINDER + below(3);
+    else if (kind->hulls && chance(0.6)) *geometry = s->forms[below(kind->hulls)];
     random_quaternion(shape->orientation);
     if (kind->shapes_a_body > 1)
         for (int k = 0; k < 3; ++k) shape->position[k] = between(-1, 1) * geometry->size[0];
@@ -242,7 +244,7 @@ static struct soup soup_new(const struct soup_kind *kind, uint64_t number)
     double volume = 0;
     int32_t dynamic = 0;
     seed(number);
-    if (kind->hulls) {
+    if (kind->hulls || kind->smooth > 0) {
         uint64_t state = 4711 + number;
         s.pool = test_pool_new();
         for (int form = 0; form < kind->hulls; ++form) {
@@ -386,6 +388,10 @@ static const struct soup_kind soups[] = {
      .size_high = 1, .static_share = 0.1, .dead_share = 0.1, .steps = 4, .tree_from = 1, .hulls = 6},
     {.name = "hulls among others, all pairs", .bodies = 60, .shapes_a_body = 2, .planes = 1, .density = 3,
      .size_low = 0.3, .size_high = 1, .static_share = 0.1, .friction_share = 1, .steps = 4, .hulls = 6},
+    {.name = "smooth bodies alone, tree", .bodies = 100, .shapes_a_body = 1, .planes = 2, .density = 3, .size_low = 0.1,
+     .size_high = 1, .static_share = 0.1, .dead_share = 0.1, .steps = 4, .tree_from = 1, .smooth = 1},
+    {.name = "smooth bodies among all others, all pairs", .bodies = 80, .shapes_a_body = 2, .planes = 1, .density = 3,
+     .size_low = 0.2, .size_high = 1, .static_share = 0.1, .friction_share = 1, .steps = 4, .hulls = 6, .smooth = 0.5},
 };
 enum { SOUPS = sizeof soups / sizeof *soups };
 
@@ -760,9 +766,10 @@ START_TEST(shapes_without_manifolds_are_refused)
         uint32_t handle;
         const char *words;
     } bad[] = {
-        {SADMM_SHAPE_TYPE_COUNT, 1, 1, "shapes[1]: type = 5"}, {-1, 1, 1, "type = -1"},
+        {SADMM_SHAPE_TYPE_COUNT, 1, 1, "shapes[1]: type = 8"}, {-1, 1, 1, "type = -1"},
         {SADMM_SHAPE_PLANE, 1, 1, "only static bodies"},       {SADMM_SHAPE_SPHERE, 0, 1, "children = 0"},
         {SADMM_SHAPE_SPHERE, 1, 2, "geometry = 2"},            {SADMM_SHAPE_HULL, 1, 1, "hull = 0"},
+        {SADMM_SHAPE_CONE, 1, 1, "type = 6: needs a pool"},
     };
     struct both b = both_new(0);
     shapes[0] = shape_of(0);

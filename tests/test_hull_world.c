@@ -237,7 +237,7 @@ START_TEST(bad_hulls_are_refused)
     ck_assert_int_eq(sadmm_world_add_shape(world, body, &def, NULL), SADMM_ERROR_INVALID_ARGUMENT);
     def.type = (sadmm_shape_type)(65536 + SADMM_SHAPE_BOX);
     ck_assert_int_eq(sadmm_world_add_shape(world, body, &def, NULL), SADMM_ERROR_INVALID_ARGUMENT);
-    ck_assert_ptr_nonnull(strstr(sadmm_world_message(world), "def->type = 65539: must be in [0, 5)"));
+    ck_assert_ptr_nonnull(strstr(sadmm_world_message(world), "def->type = 65539: must be in [0, 8)"));
     ck_assert_uint_eq(hull->uses, 1);
     ck_assert_int_eq(sadmm_world_shape_count(world), 0);
     check_pool(world);

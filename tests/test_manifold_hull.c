@@ -511,7 +511,8 @@ START_TEST(rounded_hulls_are_cores_with_a_radius)
                 ck_assert_double_eq_tol(along(t, m.normal) - rounds, best, rounding);
                 ck_assert_double_eq_tol(least, best, MANIFOLD_FLAT * thin + rounding);
                 const struct manifold again = touch_two(t, 0.1 * size, m.cache);
-                ck_assert_double_eq_tol(along(t, again.normal) - rounds, best, 2e-5 * thin + rounding); /* MANIFOLD_SNAP */
+                /* MANIFOLD_SNAP */
+                ck_assert_double_eq_tol(along(t, again.normal) - rounds, best, 2e-5 * thin + rounding);
             }
             /* midway between the surfaces: no plane across the normal is nearer */
             for (int i = 0; i < m.count; ++i)

@@ -191,6 +191,11 @@ typedef enum sadmm_shape_type {
     SADMM_SHAPE_BOX,       /* size: half extents */
     SADMM_SHAPE_HULL,      /* convex hull (hull.h) in the frame of its points. size ignored; read back: the half extents
                               of the box that contacts are found with, in m */
+    SADMM_SHAPE_CYLINDER,  /* size[0] radius, size[1] half height along the shape's z */
+    SADMM_SHAPE_CONE,      /* size[0] radius of the base, size[1] half height along the shape's z: apex at +size[1],
+                              base at -size[1]. The shape's origin is halfway up the axis, the centre of mass
+                              size[1] / 2 below it */
+    SADMM_SHAPE_ELLIPSOID, /* size: semi-axes */
     SADMM_SHAPE_TYPE_COUNT
 } sadmm_shape_type;
 

@@ -37,6 +37,24 @@
     PAIR(CAPSULE, HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m)) \
     PAIR(BOX,     HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m)) \
     PAIR(HULL,    HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))
+
+/* With a smooth body, by the same: a list of their own again. */
+#define SADMM_CONVEX_TABLE_OF(PAIR, B)                                                \
+    PAIR(PLANE,   B, convex_plane_manifold(shape_b, hulls, pose, limit, m))           \
+    PAIR(SPHERE,  B, convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m)) \
+    PAIR(CAPSULE, B, convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m)) \
+    PAIR(BOX,     B, convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m)) \
+    PAIR(HULL,    B, convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))
+#define SADMM_CONVEX_TABLE(PAIR)                                                                  \
+    SADMM_CONVEX_TABLE_OF(PAIR, CYLINDER)                                                         \
+    SADMM_CONVEX_TABLE_OF(PAIR, CONE)                                                             \
+    SADMM_CONVEX_TABLE_OF(PAIR, ELLIPSOID)                                                        \
+    PAIR(CYLINDER,  CYLINDER,  convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))   \
+    PAIR(CYLINDER,  CONE,      convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))   \
+    PAIR(CYLINDER,  ELLIPSOID, convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))   \
+    PAIR(CONE,      CONE,      convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))   \
+    PAIR(CONE,      ELLIPSOID, convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))   \
+    PAIR(ELLIPSOID, ELLIPSOID, convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))
 /* clang-format on */
 
 /* One number for two types, below 256 each. */
@@ -47,7 +65,10 @@ SADMM_INLINE bool pair_is_listed(int type_a, int type_b)
 {
     switch (type_a < type_b ? SADMM_TYPE_PAIR(type_a, type_b) : SADMM_TYPE_PAIR(type_b, type_a)) {
 #define SADMM_LISTED(A, B, call) case SADMM_TYPE_PAIR((int)SADMM_SHAPE_##A, (int)SADMM_SHAPE_##B):
-        SADMM_COLLISION_TABLE(SADMM_LISTED) SADMM_HULL_TABLE(SADMM_LISTED) return true;
+        SADMM_COLLISION_TABLE(SADMM_LISTED)
+        SADMM_HULL_TABLE(SADMM_LISTED)
+        SADMM_CONVEX_TABLE(SADMM_LISTED)
+        return true;
 #undef SADMM_LISTED
     default: return false;
     }

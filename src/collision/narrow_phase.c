@@ -2,6 +2,7 @@
 
 #include "core/base/memory.h"
 #include "contact_emit.h"
+#define SADMM_SMOOTH_ELSEWHERE SADMM_COLLISION_KERNEL(smooth_manifold)
 #include "pair_manifold.h"
 
 /* Write the manifold as a pair with its points; there is capacity. `before`: the pair that it goes on from, or NULL.

@@ -13,6 +13,18 @@
 #include "manifold_round.h"
 #include "proxy.h"
 
+/* Who includes this says where manifolds of smooth bodies are made: here, unless SADMM_WITHOUT_SMOOTH is set (there are
+ * none), or SADMM_SMOOTH_ELSEWHERE (the name of a function in another object). What they need keeps compilers from
+ * making as much of the rest as they do without it. */
+#if defined SADMM_SMOOTH_ELSEWHERE
+void SADMM_SMOOTH_ELSEWHERE(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
+                            const double *hulls, const struct pair_pose *pose, real limit, uint32_t cache,
+                            struct manifold *m);
+#elif !defined SADMM_WITHOUT_SMOOTH
+#include "smooth_manifold.h"
+#define SADMM_SMOOTH_ELSEWHERE pair_manifold_of_smooth
+#endif
+
 /* Pose of a in b's frame; d: from b's centre to a's origin. The differences are taken in double before anything is
  * rounded to `real`. A plane's origin may be far away: it moves to the foot of the perpendicular from b's centre. R:
  * row-major, shape to world. */
@@ -64,7 +76,7 @@ SADMM_INLINE void pair_manifold_of_hull(const struct sadmm_geometry *shape_a, co
 }
 
 /* Of one child of the pair. The type of a is not above b's; m->count is 0 when the shapes are apart, and for types that
- * are not listed. hulls: the pool (hull_data.h); NULL: there are none. */
+ * are not listed. hulls: the pool (hull_data.h); NULL: there are neither hulls nor smooth bodies. */
 SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
                                 const double *hulls, uint32_t child, const struct pair_pose *pose, real limit,
                                 uint32_t cache, struct manifold *m)
@@ -77,6 +89,12 @@ SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const stru
         pair_manifold_of_hull(shape_a, shape_b, hulls, pose, limit, cache, m);
         return;
     }
+#ifndef SADMM_WITHOUT_SMOOTH
+    if (hulls && geometry_is_smooth(shape_b)) {
+        SADMM_SMOOTH_ELSEWHERE(shape_a, shape_b, hulls, pose, limit, cache, m);
+        return;
+    }
+#endif
     switch (SADMM_TYPE_PAIR(shape_a->type, shape_b->type)) {
 #define SADMM_MANIFOLD(A, B, call) \
     case SADMM_TYPE_PAIR((int)SADMM_SHAPE_##A, (int)SADMM_SHAPE_##B): call; break;

@@ -50,16 +50,18 @@ static const struct sadmm_geometry &geometry_of(const struct sadmm_collision_inp
     return input->geometries[input->shapes[slot].geometry];
 }
 
-/* Bits of a candidate (candidate_of). */
+/* Bits of a candidate (candidate_of); are there smooth bodies? */
 static sadmm_status measure_candidates(struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input,
                                        struct sadmm_error *error)
 {
     struct collision_view *v = &c->view;
     uint64_t most = 1;
+    c->smooth = false;
     for (size_t slot = 0; slot < input->shape_count; ++slot) {
         if (!input->shapes[slot].alive) continue;
         TRY(sadmm_collision_check_shape(input, slot, error));
         most = std::max(most, (uint64_t)geometry_of(input, slot).children);
+        c->smooth |= geometry_is_smooth(&geometry_of(input, slot)) != 0;
     }
     v->slot_bits = std::max(bits_of(input->shape_count), 1);
     v->child_bits = bits_of(most * most - 1);

@@ -111,7 +111,7 @@ static __device__ void store_manifold(const collision_view &v, int64_t i, const 
 enum narrow_how {
     NARROW_PLAIN,   /* there are no hulls */
     NARROW_AT_ONCE, /* of hulls what is little work; the others are listed */
-    NARROW_LISTED   /* those */
+    NARROW_LISTED   /* those, and all pairs with smooth bodies */
 };
 
 /* The manifold of a pair with a hull, as find_manifold makes it, where it is little work; false: it is not. */
@@ -167,6 +167,8 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
     struct manifold m;
     if (HOW == NARROW_AT_ONCE && b.geometry.type == SADMM_SHAPE_HULL) {
         if (!hulls_at_once(v, pa, pb, start, before >= 0 ? cache : 0, &m)) return false;
+    } else if (HOW == NARROW_AT_ONCE && geometry_is_smooth(&b.geometry)) {
+        return false;
     } else {
         find_manifold(pa, pb, HOW == NARROW_LISTED ? v.hulls : nullptr, own.child, step.margin, step.gravity, step.dt,
                       &start, before >= 0 ? cache : 0, &m);

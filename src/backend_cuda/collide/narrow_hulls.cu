@@ -6,7 +6,8 @@
  * as many warps as run at once: no two of them go the same way for long. The list has no order; what is found does not
  * depend on it.
  */
-#include "narrow.h"
+#define SADMM_WITHOUT_SMOOTH
+#include "narrow_listed.h"
 
 template <int FOR>
 static __global__ void __launch_bounds__(NARROW_THREADS, NARROW_BLOCKS)
@@ -15,21 +16,6 @@ at_once_kernel(const __grid_constant__ collision_view v)
     const int64_t i = collision_thread(NARROW_THREADS);
     if (i < (int64_t)v.candidate_capacity + SIZES_BEYOND && !narrow_candidate<FOR, NARROW_AT_ONCE>(v, i))
         v.listed[atomicAdd(v.candidate_count + 1, 1ull)] = (int32_t)i;
-}
-
-/* A warp a block; on every chip that this is compiled for about so many run at once. Where there are more than these have
- * lanes for, further ones follow. */
-enum { LISTED_WARPS = 1024 };
-
-template <int FOR>
-static __global__ void __launch_bounds__(NARROW_THREADS)
-listed_kernel(const __grid_constant__ collision_view v)
-{
-    const int64_t width = NARROW_THREADS, most = LISTED_WARPS, all = (v.candidate_capacity + width - 1) / width,
-                  warps = all < most ? all : most, count = (int64_t)v.candidate_count[1],
-                  wanted = (count + warps - 1) / warps, lanes = wanted < width ? wanted : width,
-                  i = blockIdx.x * lanes + threadIdx.x;
-    if (threadIdx.x < lanes && i < count) narrow_candidate<FOR, NARROW_LISTED>(v, v.listed[i]);
 }
 
 void COLLISION(narrow_hulls_kernels)(struct collision_kernels *kernels)

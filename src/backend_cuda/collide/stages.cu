@@ -170,6 +170,8 @@ static sadmm_status narrow_phase(struct sadmm_cuda_collision *c, struct sadmm_er
     const bool one = v->substeps == 1, first = v->substep == 0;
     if (!v->hulls) return launch(c, one ? k->narrow : first ? k->narrow_first : k->narrow_again, candidates, error);
     TRY(launch(c, one ? k->hulls : first ? k->hulls_first : k->hulls_again, candidates, error));
+    if (c->smooth)
+        return launch(c, one ? k->smooth : first ? k->smooth_first : k->smooth_again, v->candidate_capacity, error);
     return launch(c, one ? k->listed : first ? k->listed_first : k->listed_again, v->candidate_capacity, error);
 }
 

@@ -269,13 +269,14 @@ struct collision_launch {
 /* The kernels, each beside what it does. */
 struct collision_kernels {
     struct collision_launch grid, place, place_first, place_again, build, refit, clear, walk, tiles, small_tiles, rank,
-        narrow, narrow_first, narrow_again, hulls, hulls_first, hulls_again, listed, listed_first, listed_again, emit,
-        emit_few;
+        narrow, narrow_first, narrow_again, hulls, hulls_first, hulls_again, listed, listed_first, listed_again, smooth,
+        smooth_first, smooth_again, emit, emit_few;
 };
 void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels);
 void COLLISION(sort_kernels)(struct collision_kernels *kernels);
 void COLLISION(narrow_phase_kernels)(struct collision_kernels *kernels);
 void COLLISION(narrow_hulls_kernels)(struct collision_kernels *kernels);
+void COLLISION(narrow_smooth_kernels)(struct collision_kernels *kernels);
 void COLLISION(matching_kernels)(struct collision_kernels *kernels);
 
 #endif

@@ -22,6 +22,15 @@ static bool has_at(const struct sadmm_hull_pool *pool, size_t place, const sadmm
     return place < pool->hull_count && pool->hulls[place].hull == hull;
 }
 
+/* Room for `end` doubles, and the first blocks. */
+static sadmm_status reserve(struct sadmm_hull_pool *pool, size_t end, struct sadmm_error *error)
+{
+    if (!sadmm_grow(&pool->blocks, &pool->block_capacity, pool->doubles, end, sizeof *pool->blocks))
+        return sadmm_fail_memory(error, "the hull of a shape");
+    if (pool->doubles == 0) sadmm_hull_prelude(pool->blocks);
+    return SADMM_OK;
+}
+
 sadmm_status sadmm_hull_pool_add(struct sadmm_hull_pool *pool, const sadmm_hull *hull, uint32_t *offset,
                                  struct sadmm_error *error)
 {
@@ -31,10 +40,9 @@ sadmm_status sadmm_hull_pool_add(struct sadmm_hull_pool *pool, const sadmm_hull 
         if (end > INT32_MAX)
             return sadmm_fail(error, SADMM_ERROR_LIMIT, "hulls of %zu numbers: a world has room for 2^31", end);
         if (!sadmm_grow(&pool->hulls, &pool->hull_capacity, pool->hull_count, pool->hull_count + 1,
-                        sizeof *pool->hulls) ||
-            !sadmm_grow(&pool->blocks, &pool->block_capacity, pool->doubles, end, sizeof *pool->blocks))
+                        sizeof *pool->hulls))
             return sadmm_fail_memory(error, "the hull of a shape");
-        if (pool->doubles == 0) sadmm_hull_prelude(pool->blocks);
+        TRY(reserve(pool, end, error));
         memcpy(pool->blocks + begin, hull->block, hull->doubles * sizeof *hull->block);
         memmove(pool->hulls + place + 1, pool->hulls + place, (pool->hull_count - place) * sizeof *pool->hulls);
         pool->hulls[place] = (struct sadmm_pooled_hull){.hull = hull, .offset = (uint32_t)begin};
@@ -83,13 +91,13 @@ static void move_blocks(struct sadmm_hull_pool *pool)
 
 static void close_gaps(struct sadmm_hull_pool *pool, struct sadmm_geometry *geometries, size_t geometry_count)
 {
-    const size_t end = pool->hull_count > 0 ? assign_offsets(pool) : 0;
+    const size_t end = pool->hull_count > 0 ? assign_offsets(pool) : pool->holds > 0 ? HULL_FIRST_OWN : 0;
     for (size_t k = 0; k < pool->hull_count; ++k)
         pool->hulls[k].offset = (uint32_t)header_at(pool, pool->hulls[k].offset)->reserved;
     for (size_t k = 0; k < geometry_count && end > 0; ++k)
         if (geometries[k].type == SADMM_SHAPE_HULL && geometries[k].hull >= HULL_FIRST_OWN)
             geometries[k].hull = (uint32_t)header_at(pool, geometries[k].hull)->reserved;
-    if (end > 0) move_blocks(pool);
+    if (pool->hull_count > 0) move_blocks(pool);
     pool->doubles = end;
     pool->unused = 0;
     ++pool->revision;
@@ -105,6 +113,24 @@ void sadmm_hull_pool_remove(struct sadmm_hull_pool *pool, const sadmm_hull *hull
     pool->unused += hull->doubles;
     sadmm_hull_release(hull);
     if (pool->hull_count == 0 || 2 * pool->unused > pool->doubles) close_gaps(pool, geometries, geometry_count);
+}
+
+sadmm_status sadmm_hull_pool_hold(struct sadmm_hull_pool *pool, struct sadmm_error *error)
+{
+    if (pool->doubles == 0) {
+        TRY(reserve(pool, HULL_FIRST_OWN, error));
+        pool->doubles = HULL_FIRST_OWN;
+        ++pool->revision;
+    }
+    ++pool->holds;
+    return SADMM_OK;
+}
+
+void sadmm_hull_pool_let_go(struct sadmm_hull_pool *pool)
+{
+    if (--pool->holds > 0 || pool->hull_count > 0) return;
+    pool->doubles = pool->unused = 0;
+    ++pool->revision;
 }
 
 void sadmm_hull_pool_free(struct sadmm_hull_pool *pool)

@@ -21,6 +21,7 @@ struct sadmm_hull_pool {
     double *blocks;                  /* in the order in which they came; none of them without a hull */
     size_t doubles, block_capacity;
     size_t unused;                   /* doubles of hulls that are gone */
+    size_t holds;                    /* shapes that need the pool's first blocks alone (geometry.h: smooth ones) */
     uint32_t revision;               /* changes whenever the blocks do */
 };
 
@@ -32,6 +33,9 @@ sadmm_status sadmm_hull_pool_add(struct sadmm_hull_pool *pool, const sadmm_hull 
  * are hulls with them; one that is no more has offset 0. */
 void sadmm_hull_pool_remove(struct sadmm_hull_pool *pool, const sadmm_hull *hull, struct sadmm_geometry *geometries,
                             size_t geometry_count);
+/* The first blocks, for a shape that needs no more; and one such shape less. */
+sadmm_status sadmm_hull_pool_hold(struct sadmm_hull_pool *pool, struct sadmm_error *error);
+void sadmm_hull_pool_let_go(struct sadmm_hull_pool *pool);
 void sadmm_hull_pool_free(struct sadmm_hull_pool *pool);
 
 #endif

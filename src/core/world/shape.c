@@ -1,6 +1,7 @@
 /* Shapes of a world. */
 #include <string.h>
 
+#include "collision/geometry.h"
 #include "collision/hull.h"
 #include "core/base/memory.h"
 #include "core/math/quat.h"
@@ -101,7 +102,9 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
                     sizeof *world->geometries))
         return sadmm_fail_memory(error, "a shape");
     uint32_t offset = 0;
+    const struct sadmm_geometry geometry = geometry_of(def);
     if (def->type == SADMM_SHAPE_HULL) TRY(add_hull(world, slot, def->hull, &offset));
+    else if (geometry_is_smooth(&geometry)) TRY(sadmm_hull_pool_hold(&world->hull_pool, error));
 
     struct sadmm_shape *shape = &world->shapes[slot];
     if (slot == world->shape_slots) {
@@ -110,7 +113,7 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
     }
     memset(shape, 0, sizeof *shape);
     shape->geometry = (uint32_t)slot;
-    world->geometries[shape->geometry] = geometry_of(def);
+    world->geometries[shape->geometry] = geometry;
     world->geometries[shape->geometry].hull = offset;
     memcpy(shape->position, def->position, sizeof shape->position);
     memcpy(shape->orientation, orientation, sizeof orientation);
@@ -140,7 +143,9 @@ static void remove_hull(sadmm_world *world, size_t slot)
 
 void sadmm_world_kill_shape(sadmm_world *world, size_t slot)
 {
-    if (world->geometries[world->shapes[slot].geometry].type == SADMM_SHAPE_HULL) remove_hull(world, slot);
+    const struct sadmm_geometry *geometry = &world->geometries[world->shapes[slot].geometry];
+    if (geometry->type == SADMM_SHAPE_HULL) remove_hull(world, slot);
+    else if (geometry_is_smooth(geometry)) sadmm_hull_pool_let_go(&world->hull_pool);
     world->shapes[slot].alive = false;
     ++world->shape_generations[slot];
     --world->shape_count;

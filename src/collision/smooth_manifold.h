@@ -1,0 +1,21 @@
+/* The manifold of a pair with a smooth body, by types (collision_table.h). */
+#ifndef SADMM_COLLISION_SMOOTH_MANIFOLD_H
+#define SADMM_COLLISION_SMOOTH_MANIFOLD_H
+
+#include "collision_table.h"
+#include "manifold_convex.h"
+
+SADMM_INLINE void pair_manifold_of_smooth(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
+                                          const double *hulls, const struct pair_pose *pose, real limit, uint32_t cache,
+                                          struct manifold *m)
+{
+    switch (SADMM_TYPE_PAIR(shape_a->type, shape_b->type)) {
+#define SADMM_MANIFOLD(A, B, call) \
+    case SADMM_TYPE_PAIR((int)SADMM_SHAPE_##A, (int)SADMM_SHAPE_##B): call; break;
+        SADMM_CONVEX_TABLE(SADMM_MANIFOLD)
+#undef SADMM_MANIFOLD
+    default: break;
+    }
+}
+
+#endif
