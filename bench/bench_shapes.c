@@ -1,6 +1,6 @@
-/* subadmm-bench shapes: what the manifold of a pair costs one core, by types. Pairs rest face on face (round shapes: on a
- * face), each turned in its own way, with the memory of the step before (warm) and without (cold); what is timed is the
- * narrow phase of contact finding as steps run it, matching and all. */
+/* subadmm-bench shapes: what the manifold of a pair costs one core, by types; what a large mesh costs to make. Pairs rest
+ * face on face (round shapes: on a face), each turned in its own way, with the memory of the step before (warm) and
+ * without (cold); what is timed is the narrow phase of contact finding as steps run it, matching and all. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,6 +11,7 @@
 #include "cli/interrupt.h"
 #include "collision/hull.h"
 #include "collision/kernels.h"
+#include "collision/mesh.h"
 #include "collision/polytope.h"
 #include "core/base/clock.h"
 #include "core/base/memory.h"
@@ -60,6 +61,17 @@ static quat turn_down(const double n[3])
     return w < 1e-12 ? q_load(x) : q_normalize(q_load(q));
 }
 
+static sadmm_status append_block(struct bench *b, struct form *form, const double *block, size_t doubles,
+                                 struct sadmm_error *error)
+{
+    if (!sadmm_grow(&b->pool, &b->pool_capacity, b->pool_doubles, b->pool_doubles + doubles, sizeof *b->pool))
+        return sadmm_fail_memory(error, "the pool");
+    form->geometry.hull = (uint32_t)b->pool_doubles;
+    memcpy(b->pool + b->pool_doubles, block, doubles * sizeof *b->pool);
+    b->pool_doubles += doubles;
+    return SADMM_OK;
+}
+
 static sadmm_status add_hull(struct bench *b, const char *name, const double *points, size_t count, double rounding,
                              struct sadmm_error *error)
 {
@@ -68,18 +80,58 @@ static sadmm_status add_hull(struct bench *b, const char *name, const double *po
     sadmm_status status = sadmm_hull_create(&def, &hull);
     if (status != SADMM_OK) return sadmm_fail(error, status, "%s", sadmm_last_message());
     b->hulls[b->form_count] = hull;
-    if (!sadmm_grow(&b->pool, &b->pool_capacity, b->pool_doubles, b->pool_doubles + hull->doubles, sizeof *b->pool))
-        return sadmm_fail_memory(error, "the hulls");
     struct form *form = add_form(b, name, SADMM_SHAPE_HULL, hull->half[0], hull->half[1], hull->half[2]);
-    form->geometry.hull = (uint32_t)b->pool_doubles;
-    memcpy(b->pool + b->pool_doubles, hull->block, hull->doubles * sizeof *b->pool);
-    b->pool_doubles += hull->doubles;
+    TRY(append_block(b, form, hull->block, hull->doubles, error));
     struct polytope p;
     polytope_at(b->pool, form->geometry.hull, &p);
     const double n[3] = {p.nx[0], p.ny[0], p.nz[0]};
     form->down = turn_down(n);
     form->below = p.offset[0] + p.radius;
     return SADMM_OK;
+}
+
+/* Heights over `side` x `side` points; as triangles where `in_triangles`. The caller destroys it. */
+static sadmm_status make_ground(int side, double spacing, double height, bool in_triangles, sadmm_mesh **mesh,
+                                struct sadmm_error *error)
+{
+    const size_t points = (size_t)side * (size_t)side, cells = (size_t)(side - 1) * (size_t)(side - 1);
+    double *x = (double *)sadmm_alloc(4 * points, sizeof *x), *z = x ? x + 3 * points : NULL;
+    int32_t *corners = (int32_t *)sadmm_alloc(6 * cells, sizeof *corners), *to = corners;
+    sadmm_status status = x && corners ? SADMM_OK : sadmm_fail_memory(error, "the ground");
+    for (int32_t v = 0; status == SADMM_OK && v < (int32_t)points; ++v) {
+        const int column = v % side, row = v / side;
+        z[v] = height * sin(0.3 * column) * cos(0.2 * row);
+        x[3 * v] = spacing * (column - 0.5 * (side - 1));
+        x[3 * v + 1] = spacing * (row - 0.5 * (side - 1));
+        x[3 * v + 2] = z[v];
+        if (column == side - 1 || row == side - 1) continue;
+        const int32_t two[6] = {v, v + 1, v + side + 1, v, v + side + 1, v + side};
+        memcpy(to, two, sizeof two);
+        to += 6;
+    }
+    if (status == SADMM_OK) {
+        const sadmm_mesh_def triangles = {x, points, corners, 2 * cells};
+        const sadmm_heightfield_def field = {z, side, side, {spacing, spacing}};
+        status = in_triangles ? sadmm_mesh_create(&triangles, mesh) : sadmm_heightfield_create(&field, mesh);
+        if (status != SADMM_OK) status = sadmm_fail(error, status, "%s", sadmm_last_message());
+    }
+    sadmm_free(x);
+    sadmm_free(corners);
+    return status;
+}
+
+/* Flat, in triangles of a quarter of the bodies. */
+static sadmm_status add_ground(struct bench *b, const char *name, bool in_triangles, struct sadmm_error *error)
+{
+    sadmm_mesh *mesh = NULL;
+    TRY(make_ground(17, 0.5, 0, in_triangles, &mesh, error));
+    struct form *form = add_form(b, name, SADMM_SHAPE_MESH, mesh->half[0], mesh->half[1], mesh->half[2]);
+    form->geometry.children = 0;
+    form->down = (quat){0, 1, 0, 0}; /* bodies rest on its upper side */
+    form->below = 0;
+    const sadmm_status status = append_block(b, form, mesh->block, mesh->doubles, error);
+    sadmm_mesh_destroy(mesh);
+    return status;
 }
 
 /* Points spread over a sphere (golden spiral): all are corners. */
@@ -124,6 +176,8 @@ static sadmm_status make_forms(struct bench *b, struct sadmm_error *error)
         spread(balls[k].count, ball);
         status = add_hull(b, balls[k].name, ball, (size_t)balls[k].count, 0, error);
     }
+    if (status == SADMM_OK) status = add_ground(b, "heights", false, error);
+    if (status == SADMM_OK) status = add_ground(b, "triangles", true, error);
     return status;
 }
 
@@ -175,6 +229,19 @@ static sadmm_status measure(struct bench *b, bool warm, double *us, double *poin
     return SADMM_OK;
 }
 
+/* A million triangles: hills, by heights or one by one. */
+static sadmm_status measure_making(bool in_triangles, struct sadmm_error *error)
+{
+    sadmm_mesh *mesh = NULL;
+    const double begin = sadmm_clock_ms();
+    TRY(make_ground(708, 0.1, 0.5, in_triangles, &mesh, error));
+    printf("%lld triangles %-18s made in %6.0f ms, %6.1f MiB\n", (long long)sadmm_mesh_triangle_count(mesh),
+           in_triangles ? "one by one" : "by their heights", sadmm_clock_ms() - begin,
+           (double)sadmm_mesh_bytes(mesh) / (1 << 20));
+    sadmm_mesh_destroy(mesh);
+    return SADMM_OK;
+}
+
 static sadmm_status run(struct bench *b, struct sadmm_error *error)
 {
     TRY(make_forms(b, error));
@@ -188,13 +255,14 @@ static sadmm_status run(struct bench *b, struct sadmm_error *error)
     for (int lower = 2; lower < b->form_count; ++lower)
         for (int upper = 0; upper < b->form_count && !interrupted(); ++upper) {
             double warm = 0, cold = 0, points = 0;
-            if (upper > lower) continue;
+            if (upper > lower || b->forms[upper].geometry.type == SADMM_SHAPE_MESH) continue;
             place(b, &b->forms[lower], &b->forms[upper]);
             TRY(measure(b, false, &cold, &points, error));
             TRY(measure(b, true, &warm, &points, error));
             printf("%-12s %-12s %8.1f %10.3f %10.3f\n", b->forms[lower].name, b->forms[upper].name, points, warm, cold);
             fflush(stdout);
         }
+    for (int in_triangles = 0; in_triangles < 2 && !interrupted(); ++in_triangles) TRY(measure_making(in_triangles, error));
     return SADMM_OK;
 }
 

@@ -27,6 +27,7 @@ struct solid solid_of_shape(const sadmm_shape_def *shape)
         break;
     case SADMM_SHAPE_PLANE:
     case SADMM_SHAPE_HULL:
+    case SADMM_SHAPE_MESH:
     case SADMM_SHAPE_CYLINDER:
     case SADMM_SHAPE_CONE:
     case SADMM_SHAPE_ELLIPSOID:

@@ -3,8 +3,9 @@
 
     test_docs.py PROJECT
 
-In README.md, CONTRIBUTING.md and docs/*.md: links lead to files, and to headings where they name one; in back quotes, files
-and folders exist, and so do functions, structs, macros and options. docs/architecture.md names every folder of src.
+In README.md, CONTRIBUTING.md and docs/*.md: links lead to files, and to headings where they name one; in back quotes,
+files and folders exist, and so do functions, structs, macros and options; a block of C that names a program of examples
+in its first line is part of that program, which is compiled and run. docs/architecture.md names every folder of src.
 """
 import os
 import re
@@ -71,6 +72,13 @@ def wrong_commands(text, sources):
                     yield f"{command} --{option}: no such option"
 
 
+def wrong_examples(project, text):
+    for name, code in re.findall(r"^```c\n/\* (examples/\w+\.c) \*/\n(.*?)^```", text, re.M | re.S):
+        path = os.path.join(project, name)
+        if not os.path.exists(path) or code not in read(path):
+            yield f"the block of {name} is not in that file"
+
+
 def main():
     project = sys.argv[1]
     paths = tree(project)
@@ -81,7 +89,7 @@ def main():
     for document in documents:
         text = read(os.path.join(project, document))
         errors = list(wrong_links(project, document, text)) + list(wrong_names(text, paths, sources)) + \
-            list(wrong_commands(text, sources))
+            list(wrong_commands(text, sources)) + list(wrong_examples(project, text))
         if document == "docs/architecture.md":
             for path in paths:
                 folder = path[:-1]

@@ -54,27 +54,27 @@ static sadmm_shape_id add_shape(sadmm_world *world, sadmm_body_id body, const sa
 static void check_pool(sadmm_world *world)
 {
     const struct sadmm_collision_input input = sadmm_world_collision_input(world, 0);
-    const struct sadmm_hull_pool *pool = &world->hull_pool;
+    const struct sadmm_block_pool *pool = &world->block_pool;
     double first[HULL_FIRST_OWN];
     size_t used = 0, uses = 0, shapes = 0;
-    ck_assert((input.hulls == NULL) == (pool->hull_count == 0));
+    ck_assert((input.hulls == NULL) == (pool->count == 0));
     if (!input.hulls) {
         ck_assert_uint_eq(input.hull_doubles, 0);
         return;
     }
     sadmm_hull_prelude(first);
     ck_assert_mem_eq(input.hulls, first, sizeof first);
-    for (size_t k = 0; k < pool->hull_count; ++k) {
-        const struct sadmm_pooled_hull *pooled = &pool->hulls[k];
-        ck_assert_mem_eq(input.hulls + pooled->offset, pooled->hull->block, pooled->hull->doubles * sizeof *first);
-        ck_assert(k == 0 || (uintptr_t)pool->hulls[k - 1].hull < (uintptr_t)pooled->hull);
-        used += pooled->hull->doubles;
+    for (size_t k = 0; k < pool->count; ++k) {
+        const struct sadmm_pooled_block *pooled = &pool->pooled[k];
+        ck_assert_mem_eq(input.hulls + pooled->offset, pooled->of.block, pooled->of.doubles * sizeof *first);
+        ck_assert(k == 0 || (uintptr_t)pool->pooled[k - 1].of.owner < (uintptr_t)pooled->of.owner);
+        used += pooled->of.doubles;
         uses += pooled->uses;
     }
     for (size_t slot = 0; slot < world->shape_slots; ++slot) {
         const struct sadmm_geometry *geometry = &world->geometries[slot];
         if (!world->shapes[slot].alive || geometry->type != SADMM_SHAPE_HULL) continue;
-        const sadmm_hull *hull = world->hull_shapes[slot].hull;
+        const sadmm_hull *hull = world->block_shapes[slot].hull;
         ck_assert_mem_eq(input.hulls + geometry->hull, hull->block, hull->doubles * sizeof *first);
         ck_assert_mem_eq(geometry->size, hull->half, sizeof hull->half);
         ++shapes;
@@ -133,15 +133,15 @@ START_TEST(the_pool_follows)
     for (int k = 0; k < HULLS; ++k) hulls[k] = make_hull(3 + 5 * k);
     for (int step = 0; step < 3000; ++step) {
         const int i = (int)((next_number(&seed) + 1) / 2 * SHAPES), k = (int)((next_number(&seed) + 1) / 2 * HULLS);
-        const uint32_t revision = world->hull_pool.revision, shapes = world->shape_revisions;
-        const size_t doubles = world->hull_pool.doubles;
+        const uint32_t revision = world->block_pool.revision, shapes = world->shape_revisions;
+        const size_t doubles = world->block_pool.doubles;
         if (ids[i].slot) {
             MUST(world, sadmm_world_remove_shape(world, ids[i]));
             ids[i].slot = 0;
             ck_assert_uint_eq(world->shape_revisions, shapes);
-            if (world->hull_pool.doubles != doubles) {
-                ck_assert_uint_ne(world->hull_pool.revision, revision);
-                ck_assert_uint_eq(world->hull_pool.unused, 0);
+            if (world->block_pool.doubles != doubles) {
+                ck_assert_uint_ne(world->block_pool.revision, revision);
+                ck_assert_uint_eq(world->block_pool.unused, 0);
                 ++moved;
             }
         } else if (k == 0 && step % 7 != 0) {
@@ -237,7 +237,7 @@ START_TEST(bad_hulls_are_refused)
     ck_assert_int_eq(sadmm_world_add_shape(world, body, &def, NULL), SADMM_ERROR_INVALID_ARGUMENT);
     def.type = (sadmm_shape_type)(65536 + SADMM_SHAPE_BOX);
     ck_assert_int_eq(sadmm_world_add_shape(world, body, &def, NULL), SADMM_ERROR_INVALID_ARGUMENT);
-    ck_assert_ptr_nonnull(strstr(sadmm_world_message(world), "def->type = 65539: must be in [0, 8)"));
+    ck_assert_ptr_nonnull(strstr(sadmm_world_message(world), "def->type = 65539: must be in [0, "));
     ck_assert_uint_eq(hull->uses, 1);
     ck_assert_int_eq(sadmm_world_shape_count(world), 0);
     check_pool(world);
@@ -257,7 +257,7 @@ START_TEST(memory_runs_out)
     for (int k = 0; k < HULLS; ++k) {
         const sadmm_shape_def def = shape_of(hulls[k]);
         for (long n = 0;; ++n, ++failures) {
-            const struct sadmm_hull_pool before = world->hull_pool;
+            const struct sadmm_block_pool before = world->block_pool;
             sadmm_test_fail_allocations_after(n);
             const sadmm_status status = sadmm_world_add_shape(world, body, &def, NULL);
             sadmm_test_fail_allocations_after(-1);
@@ -265,8 +265,8 @@ START_TEST(memory_runs_out)
             ck_assert_int_eq(status, SADMM_ERROR_OUT_OF_MEMORY);
             ck_assert_int_eq(sadmm_world_shape_count(world), k);
             ck_assert_uint_eq(hulls[k]->uses, 1);
-            ck_assert_uint_eq(world->hull_pool.revision, before.revision);
-            ck_assert_uint_eq(world->hull_pool.doubles, before.doubles);
+            ck_assert_uint_eq(world->block_pool.revision, before.revision);
+            ck_assert_uint_eq(world->block_pool.doubles, before.doubles);
             check_pool(world);
         }
         check_pool(world);

@@ -21,6 +21,7 @@ MAY_USE = {folder: CORE[:place] for place, folder in enumerate(CORE)}
 MAY_USE.update({
     "core/world": CORE + ["collision"],
     "collision": ["core/base", "core/math"],
+    "mesh_file": ["core/base"],
     "backend_ref": CORE,
     "backend_cpu": CORE,
     "scenes": ["core/base", "core/math"],

@@ -8,6 +8,7 @@
  */
 #include "hull_pool.h"
 #include "manifold_tools.h"
+#include "mesh_tools.h"
 
 #include "subadmm/world.h"
 
@@ -949,7 +950,8 @@ START_TEST(float_gives_the_same_contacts)
 }
 END_TEST
 
-/* The table is complete but for planes, which do not meet each other; what is not listed has no contacts. */
+/* The table is complete but for planes and meshes, which meet neither each other nor themselves; what is not listed has no
+ * contacts. */
 START_TEST(every_pair_of_types_is_listed)
 {
     const double size[3] = {0.5, 0.5, 0.5};
@@ -957,19 +959,32 @@ START_TEST(every_pair_of_types_is_listed)
     struct test_hull cube;
     box_hull(size, &cube);
     const uint32_t hull = test_pool_add(pool, &cube).hull;
+    struct soup *s = soup_ground(2, 2, 4, 0, 1, soup_flat);
+    sadmm_mesh *mesh = soup_mesh(s);
+    const uint32_t ground = (uint32_t)pool->used;
+    ck_assert_uint_le(pool->used + mesh->doubles, TEST_POOL);
+    memcpy(pool->numbers + ground, mesh->block, mesh->doubles * sizeof *mesh->block);
     for (int a = -1; a <= 2 * SADMM_SHAPE_TYPE_COUNT; ++a)
         for (int b = a; b <= 2 * SADMM_SHAPE_TYPE_COUNT; ++b) {
             const bool known = a >= 0 && b < SADMM_SHAPE_TYPE_COUNT;
-            const bool listed = known && !(a == SADMM_SHAPE_PLANE && b == SADMM_SHAPE_PLANE);
+            const bool listed = known && a != SADMM_SHAPE_MESH &&
+                                !(a == SADMM_SHAPE_PLANE && (b == SADMM_SHAPE_PLANE || b == SADMM_SHAPE_MESH));
             struct sadmm_geometry a_is = geometry_of(a, size), b_is = geometry_of(b, size);
             const struct pair_pose pose = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0.1, 0.1, 0.1}}; /* one in the other */
             struct manifold m;
             memset(&m, 0x55, sizeof m);
-            a_is.hull = b_is.hull = hull;
+            a_is.hull = a == SADMM_SHAPE_MESH ? ground : hull;
+            b_is.hull = b == SADMM_SHAPE_MESH ? ground : hull;
             pair_manifold(&a_is, &b_is, pool->numbers, 0, &pose, 0, 0, &m);
+            if (b == SADMM_SHAPE_MESH) { /* by itself */
+                ck_assert_int_eq(m.count, 0);
+                if (listed) mesh_manifold(&a_is, &b_is, pool->numbers, 0, &pose, 0, 0, &m);
+            }
             ck_assert_msg((m.count > 0) == listed, "types %d and %d: %d points", a, b, m.count);
             ck_assert_msg(pair_is_listed(a, b) == listed && pair_is_listed(b, a) == listed, "types %d and %d", a, b);
         }
+    sadmm_mesh_destroy(mesh);
+    free(s);
     free(pool);
 }
 END_TEST

@@ -291,6 +291,52 @@ static void on_hulls(void)
     sadmm_hull_destroy(hull);
 }
 
+static void on_meshes(void)
+{
+    const double zeros[4] = {0};
+    const int32_t corners[3] = {0, 1, 2};
+    const sadmm_mesh_def def = sadmm_mesh_def_default(), no_triangles = {zeros, 3, NULL, 1},
+                         no_vertices = {NULL, 3, corners, 1};
+    const sadmm_heightfield_def field = sadmm_heightfield_def_default();
+    sadmm_mesh *mesh = NULL;
+    double lowest[3], highest[3];
+    REFUSES("out", sadmm_mesh_create(&def, NULL));
+    REFUSES("def", sadmm_mesh_create(NULL, &mesh));
+    REFUSES("def->vertices", sadmm_mesh_create(&no_vertices, &mesh));
+    REFUSES("def->triangles", sadmm_mesh_create(&no_triangles, &mesh));
+    REFUSES("out", sadmm_heightfield_create(&field, NULL));
+    REFUSES("def", sadmm_heightfield_create(NULL, &mesh));
+    REFUSES("def->heights", sadmm_heightfield_create(&field, &mesh));
+    ck_assert_ptr_null(mesh);
+    REFUSES("mesh", sadmm_mesh_bounds(NULL, lowest, highest));
+    sadmm_mesh_destroy(NULL);
+    ck_assert_int_eq(sadmm_mesh_triangle_count(NULL), 0);
+    ck_assert_int_eq(sadmm_mesh_left_out(NULL), 0);
+    ck_assert_int_eq(sadmm_mesh_open_edges(NULL), 0);
+    ck_assert_uint_eq(sadmm_mesh_bytes(NULL), 0);
+}
+
+static void on_mesh_files(void)
+{
+    sadmm_mesh_file_def def = sadmm_mesh_file_def_default();
+    sadmm_mesh_file *file;
+    sadmm_mesh_file_info info;
+    def.bytes = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    def.size = strlen((const char *)def.bytes);
+    REFUSES("out", sadmm_mesh_file_read(&def, NULL));
+    REFUSES("def", sadmm_mesh_file_read(NULL, &file));
+    ck_assert_ptr_null(file);
+    sadmm_mesh_file_destroy(NULL);
+    ck_assert_int_eq(sadmm_mesh_file_vertex_count(NULL), 0);
+    ck_assert_int_eq(sadmm_mesh_file_triangle_count(NULL), 0);
+    ck_assert_ptr_null(sadmm_mesh_file_vertices(NULL));
+    ck_assert_ptr_null(sadmm_mesh_file_triangles(NULL));
+    REFUSES("file", sadmm_mesh_file_describe(NULL, &info));
+    ck_assert_int_eq(sadmm_mesh_file_read(&def, &file), SADMM_OK);
+    REFUSES("info", sadmm_mesh_file_describe(file, NULL));
+    sadmm_mesh_file_destroy(file);
+}
+
 static void on_masses(void)
 {
     double position[3] = {0}, orientation[4] = {1};
@@ -342,13 +388,20 @@ static const struct {
     {on_hulls,
      {"sadmm_hull_create", "sadmm_hull_destroy", "sadmm_hull_vertex_count", "sadmm_hull_edge_count",
       "sadmm_hull_face_count", "sadmm_hull_vertices", "sadmm_hull_rounding", "sadmm_hull_face_at", "sadmm_hull_mass"}},
+    {on_meshes,
+     {"sadmm_mesh_create", "sadmm_heightfield_create", "sadmm_mesh_destroy", "sadmm_mesh_triangle_count",
+      "sadmm_mesh_left_out", "sadmm_mesh_open_edges", "sadmm_mesh_bytes", "sadmm_mesh_bounds"}},
+    {on_mesh_files,
+     {"sadmm_mesh_file_read", "sadmm_mesh_file_destroy", "sadmm_mesh_file_vertex_count",
+      "sadmm_mesh_file_triangle_count", "sadmm_mesh_file_vertices", "sadmm_mesh_file_triangles",
+      "sadmm_mesh_file_describe"}},
     {on_masses,
      {"sadmm_shape_mass", "sadmm_mass_sum", "sadmm_mass_pose_in_body", "sadmm_mass_pose_of_body"}},
     {on_others, {"sadmm_backend_query", "sadmm_box_inertia", "sadmm_sphere_inertia", "sadmm_capsule_inertia"}},
     {NULL,
      {"sadmm_settings_default", W(def_default), "sadmm_body_def_default", "sadmm_shape_def_default",
       "sadmm_hull_def_default", "sadmm_joint_def_default", "sadmm_coupling_def_default", "sadmm_gear_def_default",
-      "sadmm_status_name",
+      "sadmm_mesh_def_default", "sadmm_heightfield_def_default", "sadmm_mesh_file_def_default", "sadmm_status_name",
       "sadmm_last_message", "sadmm_version", "sadmm_build_commit", "sadmm_build_compiler"}},
 };
 enum { GROUPS = sizeof functions / sizeof *functions };

@@ -1,5 +1,5 @@
-/* Convex hulls: the polyhedron around a set of points, a shape for bodies (SADMM_SHAPE_HULL, world.h), with sharp edges
- * or round ones.
+/* Convex hulls: the polyhedron around a set of points, a shape for bodies (SADMM_SHAPE_HULL, world.h), with sharp edges or
+ * round ones.
  *
  * A hull is made once and never changes. Any number of worlds and threads may use it at the same time; it lives until
  * its maker and every world with shapes of it have let go of it. The same points give the same hull to the last bit, in
@@ -29,9 +29,9 @@ typedef struct sadmm_hull_def {
                              become one face, and points that stand out from it by no more than that are no vertices;
                              never more than 1/20 of how thick the points lie. In [0, 1e-2]; 0: what rounding alone
                              bends; default 1e-6. Where the joined faces make no convex polyhedron, fewer are joined */
-    double rounding;      /* m, in [0, 1e6]; default 0: the shape is all that is within this of the polyhedron, its
-                             Minkowski sum with a ball. Faces move outward by it, edges and corners are round. A box
-                             with round edges is the hull of 8 points, each this much inside of the box's faces */
+    double rounding;      /* m, in [0, 1e6]; default 0: the shape is the set of all that is within this of the polyhedron,
+                             its Minkowski sum with a ball. Faces move outward by it, edges and corners are round. A box
+                             with round edges is the hull of 8 points, each this much inside of the box */
 } sadmm_hull_def;
 
 /* The defaults named above. Thread-safe. */

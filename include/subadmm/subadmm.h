@@ -7,6 +7,8 @@
 #include "hull.h"
 #include "joint.h"
 #include "mass.h"
+#include "mesh.h"
+#include "mesh_file.h"
 #include "problem.h"
 #include "settings.h"
 #include "status.h"

@@ -22,6 +22,7 @@
 #define SUBADMM_WORLD_H
 
 #include "hull.h"
+#include "mesh.h"
 #include "problem.h"
 
 #ifdef __cplusplus
@@ -191,6 +192,9 @@ typedef enum sadmm_shape_type {
     SADMM_SHAPE_BOX,       /* size: half extents */
     SADMM_SHAPE_HULL,      /* convex hull (hull.h) in the frame of its points. size ignored; read back: the half extents
                               of the box that contacts are found with, in m */
+    SADMM_SHAPE_MESH,      /* triangle mesh or heightfield (mesh.h) in the frame of its vertices, or of its grid; static
+                              and kinematic bodies only. size ignored; read back: the half extents of the box around it,
+                              in m */
     SADMM_SHAPE_CYLINDER,  /* size[0] radius, size[1] half height along the shape's z */
     SADMM_SHAPE_CONE,      /* size[0] radius of the base, size[1] half height along the shape's z: apex at +size[1],
                               base at -size[1]. The shape's origin is halfway up the axis, the centre of mass
@@ -210,6 +214,7 @@ typedef struct sadmm_shape_def {
     const sadmm_hull *hull;      /* of HULL; NULL, the default, for all others. The world keeps it while it has shapes
                                     of it, so that the caller may destroy it at once. Read back: the same pointer, which
                                     is the world's own then */
+    const sadmm_mesh *mesh;      /* of MESH; the same for it */
 } sadmm_shape_def;
 
 /* The defaults named above. Thread-safe. */
@@ -333,7 +338,10 @@ typedef struct sadmm_contact {
     double friction;      /* mu of the pair */
     double impulse[3];    /* on b, world, N s */
     double force[3];      /* impulse / dt, on b, world, N (eq. 12) */
-    uint32_t feature;     /* id of the touching features, stable from step to step within a shape pair */
+    uint32_t feature;     /* id of the touching features, stable from step to step within a shape pair, and of a mesh
+                             within a triangle */
+    int32_t triangle;     /* of a mesh (mesh.h), as its definition numbers them; of a heightfield twice the cell (row x
+                             (columns - 1) + column), + 1 in its upper half of y. -1: neither shape is a mesh */
 } sadmm_contact;
 
 /* Contacts of the last step that was done, 0 where there was none, world is NULL, or something was removed since. A

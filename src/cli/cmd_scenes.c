@@ -70,13 +70,14 @@ static const char *const shape_names[SADMM_SHAPE_TYPE_COUNT] = {
     [SADMM_SHAPE_CAPSULE] = "capsule",
     [SADMM_SHAPE_BOX] = "box",
     [SADMM_SHAPE_HULL] = "hull",
+    [SADMM_SHAPE_MESH] = "mesh",
     [SADMM_SHAPE_CYLINDER] = "cylinder",
     [SADMM_SHAPE_CONE] = "cone",
     [SADMM_SHAPE_ELLIPSOID] = "ellipsoid",
 };
 static const size_t shape_sizes[SADMM_SHAPE_TYPE_COUNT] = {
     [SADMM_SHAPE_PLANE] = 0, [SADMM_SHAPE_SPHERE] = 1, [SADMM_SHAPE_CAPSULE] = 2, [SADMM_SHAPE_BOX] = 3,
-    [SADMM_SHAPE_HULL] = 0,  [SADMM_SHAPE_CYLINDER] = 2, [SADMM_SHAPE_CONE] = 2,
+    [SADMM_SHAPE_HULL] = 0, [SADMM_SHAPE_MESH] = 0, [SADMM_SHAPE_CYLINDER] = 2, [SADMM_SHAPE_CONE] = 2,
     [SADMM_SHAPE_ELLIPSOID] = 3,
 };
 

@@ -21,20 +21,23 @@ enum { SADMM_MOST_CHILDREN = 65535 }; /* the children of a pair are counted in 3
 
 /* What a shape is made of, apart from where it is and what it is like to touch. Shapes refer to it by a handle, so that
  * several may share one. A geometry has children, the pieces that collide: a pair of shapes has a manifold for each
- * pair of their children, at most. The types there are have one child, the whole; where one is given more, each is the
- * whole. */
+ * pair of their children, at most. Most types have one child, the whole; where one is given more, each is the whole.
+ * The children of a mesh are its triangles: those of a pair are not counted out, but looked for (mesh_walk.h). */
 struct sadmm_geometry {
     int32_t type;     /* sadmm_shape_type */
-    int32_t children; /* in [1, SADMM_MOST_CHILDREN] */
+    int32_t children; /* in [1, SADMM_MOST_CHILDREN]; of MESH 0 */
     double size[3];   /* m, as in sadmm_shape_def; of HULL the half extents of the box around it, whose centre and axes
-                         are the shape's frame */
-    uint32_t hull;    /* of HULL: offset of its block in the input's `hulls` (hull_data.h) */
+                         are the shape's frame; of MESH too */
+    uint32_t hull;    /* of HULL and MESH: offset of its block in the input's `hulls` (hull_data.h, mesh_data.h) */
     uint32_t reserved;
 };
 
-/* May a shape be of this geometry, on a body that moves or does not? Else INVALID_ARGUMENT; `name`: what the message
- * calls the geometry, as "def->". Sizes are not checked. */
-sadmm_status sadmm_geometry_check(const struct sadmm_geometry *geometry, bool moves, const char *name,
+/* How a body moves: not at all, as the caller says, by its dynamics. */
+enum sadmm_motion { SADMM_MOTION_NONE, SADMM_MOTION_DRIVEN, SADMM_MOTION_DYNAMIC };
+
+/* May a shape be of this geometry, on such a body? Else INVALID_ARGUMENT; `name`: what the message calls the geometry,
+ * as "def->". Sizes are not checked. */
+sadmm_status sadmm_geometry_check(const struct sadmm_geometry *geometry, enum sadmm_motion motion, const char *name,
                                   struct sadmm_error *error);
 
 struct sadmm_shape {
@@ -62,7 +65,7 @@ struct sadmm_collision_input {
     size_t shape_count;               /* slots, dead ones included */
     const struct sadmm_geometry *geometries; /* by handle */
     size_t geometry_count;
-    const double *hulls;              /* the pool (hull_data.h); NULL: no geometry is a HULL, or smooth (geometry.h) */
+    const double *hulls;              /* the pool of blocks (hull_data.h); NULL: none is a HULL, a MESH, or smooth (geometry.h) */
     size_t hull_doubles;
     uint32_t hull_revision;           /* changes whenever the pool does */
     const struct sadmm_collision_body *bodies; /* by world body slot */

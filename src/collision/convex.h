@@ -34,6 +34,7 @@ SADMM_INLINE int convex_form_of(int type)
     case SADMM_SHAPE_CAPSULE:
     case SADMM_SHAPE_BOX:
     case SADMM_SHAPE_HULL:
+    case SADMM_SHAPE_MESH:
     case SADMM_SHAPE_PLANE:
     case SADMM_SHAPE_TYPE_COUNT: break;
     }

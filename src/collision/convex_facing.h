@@ -3,7 +3,7 @@
  * along the normal there, as between two polytopes (polytope_face.h).
  *
  * A disc's rim has no corners. Eight points of it stand for it, evenly spread from a direction that is not the disc's
- * own but the other body's: a side of the face, a plane's x axis, b's of two discs. So a disc that turns about its axis
+ * own but the other body's: a side of the face, a plane's or a mesh's x axis, b's of two discs. So a disc that turns about its axis
  * keeps its points, and it stands as an octagon does: what it tips about is at most 1 - cos(pi / 8) = 7.6 % of the
  * radius inside of the rim. Where rims cross sides and lines the points are exact;
  * where they cross each other they are as far as the discs are parallel.
@@ -207,13 +207,20 @@ SADMM_INLINE void convex_rim_axes(const struct convex_facing *disc, vec3 along, 
     }
 }
 
+/* What the points of a rim that faces `other` are spread from. */
+SADMM_INLINE vec3 convex_spread(const struct convex_pair *pair, const struct convex_facing *other)
+{
+    if (v3_norm2(pair->spread) > 0) return pair->spread;
+    return other->kind == CONVEX_DISC ? v3(1, 0, 0) : v3_sub(other->corner[1], other->corner[0]);
+}
+
 /* Points of the rim that are over a flat of the other one. */
 SADMM_INLINE void convex_rim_over(struct convex_meeting *m, const struct convex_facing *disc, bool disc_is_a,
-                                  const struct convex_facing *flat, vec3 along)
+                                  const struct convex_facing *flat)
 {
     vec3 e1, e2;
     int k;
-    convex_rim_axes(disc, along, &e1, &e2);
+    convex_rim_axes(disc, convex_spread(m->pair, flat), &e1, &e2);
     for (k = 0; k < CONVEX_RIM; ++k) {
         const vec3 x = convex_rim(disc, e1, e2, k);
         if (convex_is_on(flat, convex_over(flat, m->n, x), m->tolerance))
@@ -247,7 +254,7 @@ SADMM_INLINE void convex_disc_face(struct convex_meeting *m, const struct convex
                                    const struct convex_facing *face)
 {
     int k, i;
-    convex_rim_over(m, disc, disc_is_a, face, v3_sub(face->corner[1], face->corner[0]));
+    convex_rim_over(m, disc, disc_is_a, face);
     for (k = 0; k < face->count; ++k)
         if (convex_is_on(disc, convex_over(disc, m->n, face->corner[k]), m->tolerance))
             convex_meet_flat(m, face->corner[k], !disc_is_a, disc,
@@ -268,10 +275,10 @@ SADMM_INLINE void convex_disc_face(struct convex_meeting *m, const struct convex
 SADMM_INLINE void convex_disc_disc(struct convex_meeting *m, const struct convex_facing *a,
                                    const struct convex_facing *b)
 {
-    const vec3 to_b = v3_sub(convex_over(a, m->n, b->centre), a->centre), x = v3(1, 0, 0);
+    const vec3 to_b = v3_sub(convex_over(a, m->n, b->centre), a->centre);
     const real d2 = v3_norm2(to_b), d = real_sqrt(d2);
-    convex_rim_over(m, a, true, b, x);
-    convex_rim_over(m, b, false, a, x);
+    convex_rim_over(m, a, true, b);
+    convex_rim_over(m, b, false, a);
     if (d > m->tolerance && d < a->radius + b->radius && d > real_abs(a->radius - b->radius)) {
         const vec3 e1 = v3_scale(to_b, 1 / d), e2 = v3_cross(a->normal, e1);
         const real along = (d2 + a->radius * a->radius - b->radius * b->radius) / (2 * d),
@@ -410,8 +417,7 @@ SADMM_RARE void convex_facing_manifold(const struct convex_pair *pair, vec3 n, r
         struct convex_facing across;
         const struct convex_facing *other = a.kind == CONVEX_DISC ? &b : &a;
         across.normal = n;
-        convex_rim_axes(&across, other->kind == CONVEX_DISC ? v3(1, 0, 0) : v3_sub(other->corner[1], other->corner[0]),
-                        &meeting.x1, &meeting.x2);
+        convex_rim_axes(&across, convex_spread(pair, other), &meeting.x1, &meeting.x2);
     } else {
         v3_tangents(n, &meeting.x1, &meeting.x2);
     }

@@ -13,11 +13,20 @@ struct convex_pair {
     mat3 R; /* p_b = R p_a + t */
     vec3 t;
     vec3 shift;  /* of b, while it is held away from a */
+    vec3 spread; /* what points of rims are spread from (convex_facing.h); 0: a side of the other one's flat or line */
     real thin;   /* the thinner one's smallest extent */
     real size;   /* of both, and of what is between them: what rounding is measured by */
     real slack;  /* rounding of a separation */
     real enough; /* share of the square of a distance that the walk may miss */
 };
+
+/* What follows from the size. */
+SADMM_INLINE void convex_pair_finish(struct convex_pair *pair)
+{
+    pair->shift = pair->spread = v3(0, 0, 0);
+    pair->slack = 8 * SADMM_EPSILON * pair->size;
+    pair->enough = sizeof(real) == 4 ? (real)1e-5 : (real)1e-8;
+}
 
 SADMM_INLINE void convex_pair_make(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
                                    const struct pair_pose *pose, struct convex_pair *pair)
@@ -27,11 +36,9 @@ SADMM_INLINE void convex_pair_make(const struct sadmm_geometry *a, const struct 
     convex_of(b, hulls, &pair->b);
     for (i = 0; i < 3; ++i) pair->R.r[i] = r3_vec3(pose->R[i]);
     pair->t = r3_vec3(pose->t);
-    pair->shift = v3(0, 0, 0);
     pair->thin = (real)smaller_of(geometry_thickness(a), geometry_thickness(b));
     pair->size = (real)(geometry_radius(a) + geometry_radius(b)) + v3_norm(pair->t);
-    pair->slack = 8 * SADMM_EPSILON * pair->size;
-    pair->enough = sizeof(real) == 4 ? (real)1e-5 : (real)1e-8;
+    convex_pair_finish(pair);
 }
 
 SADMM_INLINE real convex_radii(const struct convex_pair *pair) { return pair->a.p.radius + pair->b.p.radius; }

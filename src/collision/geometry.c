@@ -6,20 +6,30 @@
 #include "geometry.h"
 #include "hull_data.h"
 
-sadmm_status sadmm_geometry_check(const struct sadmm_geometry *geometry, bool moves, const char *name,
+/* Bodies that the caller moves meet dynamic ones alone; but a plane has no box that could be moved. */
+static bool needs_every_pair(const struct sadmm_geometry *geometry, enum sadmm_motion motion)
+{
+    return motion == SADMM_MOTION_DYNAMIC || (motion == SADMM_MOTION_DRIVEN && geometry->type == SADMM_SHAPE_PLANE);
+}
+
+sadmm_status sadmm_geometry_check(const struct sadmm_geometry *geometry, enum sadmm_motion motion, const char *name,
                                   struct sadmm_error *error)
 {
     if ((uint32_t)geometry->type >= SADMM_SHAPE_TYPE_COUNT)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%stype = %d: must be in [0, %d)", name,
                           (int)geometry->type, SADMM_SHAPE_TYPE_COUNT);
-    if (geometry->children < 1 || geometry->children > SADMM_MOST_CHILDREN)
+    if (geometry->type == SADMM_SHAPE_MESH && geometry->children != 0)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%schildren = %d: must be 0 of a mesh", name,
+                          (int)geometry->children);
+    if (geometry->type != SADMM_SHAPE_MESH && (geometry->children < 1 || geometry->children > SADMM_MOST_CHILDREN))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%schildren = %d: must be in [1, %d]", name,
                           (int)geometry->children, SADMM_MOST_CHILDREN);
-    for (int other = 0; moves && other < SADMM_SHAPE_TYPE_COUNT; ++other)
+    for (int other = 0; needs_every_pair(geometry, motion) && other < SADMM_SHAPE_TYPE_COUNT; ++other)
         if (!pair_is_listed(geometry->type, other))
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                              "%stype = %d: has no contacts with type %d, so that only static bodies may have it", name,
-                              (int)geometry->type, other);
+                              "%stype = %d: has no contacts with type %d, so that only %s bodies may have it", name,
+                              (int)geometry->type, other,
+                              geometry->type == SADMM_SHAPE_MESH ? "static and kinematic" : "static");
     return SADMM_OK;
 }
 
@@ -33,9 +43,15 @@ sadmm_status sadmm_collision_check_shape(const struct sadmm_collision_input *inp
                           shape->geometry, input->geometry_count);
     snprintf(name, sizeof name, "shapes[%zu]: ", slot);
     const struct sadmm_geometry *geometry = &input->geometries[shape->geometry];
-    TRY(sadmm_geometry_check(geometry, sadmm_body_moves(input->bodies[shape->body].system_body), name, error));
+    const int32_t body = input->bodies[shape->body].system_body;
+    TRY(sadmm_geometry_check(geometry,
+                             body >= 0                     ? SADMM_MOTION_DYNAMIC
+                             : sadmm_body_is_driven(body) ? SADMM_MOTION_DRIVEN
+                                                          : SADMM_MOTION_NONE,
+                             name, error));
     const size_t hull_doubles = input->hulls ? input->hull_doubles : 0;
-    if (geometry->type == SADMM_SHAPE_HULL && (geometry->hull < HULL_FIRST_OWN || geometry->hull >= hull_doubles))
+    const bool of_block = geometry->type == SADMM_SHAPE_HULL || geometry->type == SADMM_SHAPE_MESH;
+    if (of_block && (geometry->hull < HULL_FIRST_OWN || geometry->hull >= hull_doubles))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%shull = %u: must be in [%d, %zu), the pool of hulls",
                           name, geometry->hull, HULL_FIRST_OWN, hull_doubles);
     if (geometry_is_smooth(geometry) && hull_doubles < HULL_FIRST_OWN)

@@ -18,11 +18,16 @@ SADMM_INLINE int geometry_sizes(int type)
     case SADMM_SHAPE_BOX:
     case SADMM_SHAPE_ELLIPSOID: return 3;
     case SADMM_SHAPE_HULL: /* the box around it comes with the hull */
+    case SADMM_SHAPE_MESH:
     case SADMM_SHAPE_PLANE:
     case SADMM_SHAPE_TYPE_COUNT: break;
     }
     return 0;
 }
+
+/* The order of the two shapes of a pair: by this, of equal ones by slot. As types are numbered, but for meshes, which are
+ * what their triangles' other shapes are looked at from: they come last. */
+SADMM_INLINE int geometry_rank(int type) { return type == SADMM_SHAPE_MESH ? (int)SADMM_SHAPE_TYPE_COUNT : type; }
 
 /* Is it one of those that hulls and the like meet by convex.h, and for which a world has a pool (hull_data.h)? */
 SADMM_INLINE int geometry_is_smooth(const struct sadmm_geometry *g)
@@ -34,7 +39,7 @@ SADMM_INLINE int geometry_is_smooth(const struct sadmm_geometry *g)
 SADMM_INLINE double smaller_of(double a, double b) { return a < b ? a : b; }
 SADMM_INLINE double larger_of(double a, double b) { return a > b ? a : b; }
 
-/* Smallest extent, m; a plane has none that limits. */
+/* Smallest extent, m; a plane has none that limits, and of a mesh it is the whole that counts. */
 SADMM_INLINE double geometry_thickness(const struct sadmm_geometry *g)
 {
     switch ((sadmm_shape_type)g->type) {
@@ -47,6 +52,7 @@ SADMM_INLINE double geometry_thickness(const struct sadmm_geometry *g)
     case SADMM_SHAPE_BOX:
     case SADMM_SHAPE_ELLIPSOID:
     case SADMM_SHAPE_HULL: return 2 * smaller_of(g->size[0], smaller_of(g->size[1], g->size[2]));
+    case SADMM_SHAPE_MESH: return -2 * smaller_of(-g->size[0], smaller_of(-g->size[1], -g->size[2]));
     case SADMM_SHAPE_PLANE:
     case SADMM_SHAPE_TYPE_COUNT: break;
     }
@@ -63,7 +69,8 @@ SADMM_INLINE double geometry_radius(const struct sadmm_geometry *g)
     case SADMM_SHAPE_CONE: return sqrt(g->size[0] * g->size[0] + g->size[1] * g->size[1]);
     case SADMM_SHAPE_ELLIPSOID: return larger_of(g->size[0], larger_of(g->size[1], g->size[2]));
     case SADMM_SHAPE_BOX:
-    case SADMM_SHAPE_HULL: return sqrt(g->size[0] * g->size[0] + g->size[1] * g->size[1] + g->size[2] * g->size[2]);
+    case SADMM_SHAPE_HULL:
+    case SADMM_SHAPE_MESH: return sqrt(g->size[0] * g->size[0] + g->size[1] * g->size[1] + g->size[2] * g->size[2]);
     case SADMM_SHAPE_PLANE:
     case SADMM_SHAPE_TYPE_COUNT: break;
     }
@@ -96,6 +103,7 @@ SADMM_INLINE void geometry_extents(const struct sadmm_geometry *g, const double 
         return;
     case SADMM_SHAPE_BOX:
     case SADMM_SHAPE_HULL:
+    case SADMM_SHAPE_MESH:
         for (k = 0; k < 3; ++k)
             extent[k] = fabs(R[3 * k]) * size[0] + fabs(R[3 * k + 1]) * size[1] + fabs(R[3 * k + 2]) * size[2];
         return;
@@ -105,7 +113,8 @@ SADMM_INLINE void geometry_extents(const struct sadmm_geometry *g, const double 
     for (k = 0; k < 3; ++k) extent[k] = HUGE_VAL;
 }
 
-/* Manifolds that a pair may have at most: child = (child of a) x (children of b) + (child of b). */
+/* Manifolds that a pair may have at most: child = (child of a) x (children of b) + (child of b). 0: a mesh is one of
+ * them, whose triangle is the child (mesh_walk.h finds them). */
 SADMM_INLINE uint32_t pair_children(const struct sadmm_geometry *a, const struct sadmm_geometry *b)
 {
     return (uint32_t)a->children * (uint32_t)b->children;

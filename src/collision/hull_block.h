@@ -4,8 +4,8 @@
 
 #include "hull_mesh.h"
 
-/* Doubles that the block of a closed mesh takes, and the block: vertices 3 numbers each, planes 4 a face; rounding: m.
- * At most HULL_MOST_VERTICES vertices and HULL_MOST_EDGES edges. */
+/* Doubles that the block of a closed mesh takes, and the block: vertices 3 numbers each, planes 4 a face; rounding: m. At
+ * most HULL_MOST_VERTICES vertices and HULL_MOST_EDGES edges. */
 size_t sadmm_hull_block_doubles(const struct hull_mesh *mesh);
 void sadmm_hull_block_write(const struct hull_mesh *mesh, const double *vertices, const double *planes,
                             double rounding, double *block);

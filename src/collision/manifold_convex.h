@@ -86,33 +86,50 @@ SADMM_INLINE bool convex_point_on_flat(const struct convex_pair *pair, const str
     return true;
 }
 
-/* 1. False: the whole of it has to be done, from *side on, which is the last step's where so `known`. */
-SADMM_INLINE bool convex_by_memory(const struct convex_pair *pair, real limit, uint32_t cache, vec3 *side, bool *known,
-                                   struct manifold *m)
+/* What a pair remembers. */
+struct convex_memory {
+    bool known;      /* anything */
+    bool is_flat;    /* a flat: `axis` */
+    bool of_a;
+    int flat;
+    vec3 side;       /* the direction; else one to begin with */
+    struct convex_axis axis;
+};
+
+SADMM_INLINE void convex_recall(const struct convex_pair *pair, uint32_t cache, struct convex_memory *memory)
 {
     const uint32_t kind = cache & CONVEX_MEMORY_MASK, flat = cache >> MANIFOLD_DIRECTION_SHIFT;
-    const bool of_a = kind == CONVEX_MEMORY_FLAT_A;
-    struct convex_axis axis;
-    *known = false;
-    *side = v3_neg(pair->t);
-    if (!(v3_norm2(*side) > 0)) *side = v3(0, 0, 1);
+    memory->known = memory->is_flat = false;
+    memory->of_a = kind == CONVEX_MEMORY_FLAT_A;
+    memory->flat = 0;
+    memory->side = v3_neg(pair->t);
+    if (!(v3_norm2(memory->side) > 0)) memory->side = v3(0, 0, 1);
     if (kind == CONVEX_MEMORY_DIRECTION) {
         const vec3 n = manifold_cached_direction(cache);
-        if (v3_norm2(n) > (real)0.5) {
-            *side = n;
-            *known = true;
-        }
-        return false;
+        if (!(v3_norm2(n) > (real)0.5)) return;
+        memory->side = n;
+        memory->known = true;
+        return;
     }
-    if (kind != CONVEX_MEMORY_FLAT_A && kind != CONVEX_MEMORY_FLAT_B) return false;
-    if (!convex_has_flat(of_a ? &pair->a : &pair->b, flat)) return false;
-    convex_flat_axis(pair, of_a, (int)flat, &axis);
-    *side = axis.n;
-    *known = true;
-    if (axis.separation > limit + pair->slack) return true;
-    if (!convex_point_on_flat(pair, &axis, of_a, (int)flat, limit, m))
-        convex_facing_manifold(pair, axis.n, axis.separation, limit, m);
-    if (convex_is_proven(pair, axis.separation, m)) {
+    if (kind != CONVEX_MEMORY_FLAT_A && kind != CONVEX_MEMORY_FLAT_B) return;
+    if (!convex_has_flat(memory->of_a ? &pair->a : &pair->b, flat)) return;
+    memory->known = memory->is_flat = true;
+    memory->flat = (int)flat;
+    convex_flat_axis(pair, memory->of_a, memory->flat, &memory->axis);
+    memory->side = memory->axis.n;
+}
+
+/* 1. False: the whole of it has to be done. */
+SADMM_INLINE bool convex_by_memory(const struct convex_pair *pair, real limit, uint32_t cache,
+                                   struct convex_memory *memory, struct manifold *m)
+{
+    const struct convex_axis *axis = &memory->axis;
+    convex_recall(pair, cache, memory);
+    if (!memory->is_flat) return false;
+    if (axis->separation > limit + pair->slack) return true;
+    if (!convex_point_on_flat(pair, axis, memory->of_a, memory->flat, limit, m))
+        convex_facing_manifold(pair, axis->n, axis->separation, limit, m);
+    if (convex_is_proven(pair, axis->separation, m)) {
         m->cache = cache;
         return true;
     }
@@ -120,48 +137,58 @@ SADMM_INLINE bool convex_by_memory(const struct convex_pair *pair, real limit, u
     return false;
 }
 
-/* 2 to 4. a, b: of any convex pair; side, known: convex_by_memory. */
-SADMM_INLINE void convex_contact(struct convex_pair *pair, vec3 side, bool known, real limit, struct manifold *m)
+/* 2 and 3. side, known: convex_recall. False: farther apart than the limit. *cache: what is to be remembered of it. */
+SADMM_INLINE bool convex_search(struct convex_pair *pair, vec3 side, bool known, real limit, struct convex_axis *axis,
+                                uint32_t *cache, struct manifold *m)
 {
-    struct convex_axis axis, flat;
+    struct convex_axis flat;
     struct convex_active active;
-    uint32_t memory;
-    if (!known || !convex_follow(pair, side, &axis, &active)) {
-        if (!convex_begin(pair, side, known, limit, &axis, &active)) return;
-        memory = convex_flat_beside(pair, axis.n, &flat);
-        if (memory && flat.separation >= axis.separation - pair->slack) { /* does it stand, or lie? */
+    if (!known || !convex_follow(pair, side, axis, &active)) {
+        if (!convex_begin(pair, side, known, limit, axis, &active)) return false;
+        *cache = convex_flat_beside(pair, axis->n, &flat);
+        if (*cache && flat.separation >= axis->separation - pair->slack) { /* does it stand, or lie? */
             convex_facing_manifold(pair, flat.n, flat.separation, limit, m);
             if (convex_is_proven(pair, flat.separation, m)) {
-                m->cache = memory;
-                return;
+                *axis = flat;
+                return axis->separation <= limit + pair->slack;
             }
+            m->count = 0;
         }
-        convex_finish(pair, &active, &axis);
+        convex_finish(pair, &active, axis);
     }
-    memory = convex_flat_beside(pair, axis.n, &flat);
-    if (memory && flat.separation >= axis.separation - 2 * pair->slack) {
-        axis = flat;
+    *cache = convex_flat_beside(pair, axis->n, &flat);
+    if (*cache && flat.separation >= axis->separation - 2 * pair->slack) {
+        *axis = flat;
     } else {
-        convex_nearest(pair, &active, &axis);
-        memory = CONVEX_MEMORY_DIRECTION | manifold_direction_bits(axis.n);
+        convex_nearest(pair, &active, axis);
+        *cache = CONVEX_MEMORY_DIRECTION | manifold_direction_bits(axis->n);
     }
-    if (axis.separation > limit + pair->slack) {
-        m->count = 0;
-        return;
-    }
-    convex_facing_manifold(pair, axis.n, axis.separation, limit, m);
-    m->cache = memory;
-    hull_add_nearest(pair->thin, axis.pa, axis.pb, polytope_feature(FEATURE_NEAREST, 0, 0), m);
+    return axis->separation <= limit + pair->slack;
+}
+
+/* 4. What faces along the axis, with the nearest points. */
+SADMM_INLINE void convex_points(const struct convex_pair *pair, const struct convex_axis *axis, real limit,
+                                struct manifold *m)
+{
+    convex_facing_manifold(pair, axis->n, axis->separation, limit, m);
+    hull_add_nearest(pair->thin, axis->pa, axis->pb, polytope_feature(FEATURE_NEAREST, 0, 0), m);
 }
 
 SADMM_RARE void convex_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
                                 const struct pair_pose *pose, real limit, uint32_t cache, struct manifold *m)
 {
     struct convex_pair pair;
-    vec3 side;
-    bool known;
+    struct convex_memory memory;
+    struct convex_axis axis;
+    uint32_t found;
     convex_pair_make(a, b, hulls, pose, &pair);
-    if (!convex_by_memory(&pair, limit, cache, &side, &known, m)) convex_contact(&pair, side, known, limit, m);
+    if (convex_by_memory(&pair, limit, cache, &memory, m)) return;
+    if (!convex_search(&pair, memory.side, memory.known, limit, &axis, &found, m)) {
+        m->count = 0;
+        return;
+    }
+    convex_points(&pair, &axis, limit, m);
+    m->cache = found;
 }
 
 /* ---- planes ------------------------------------------------------------------------------------------------------ */

@@ -244,6 +244,10 @@ SADMM_INLINE void hull_add_nearest(real thin, vec3 pa, vec3 pb, uint32_t feature
 SADMM_INLINE bool hull_by_memory(const struct polytope_pair *pair, real limit, uint32_t cache, struct polytope_axis *kept,
                                  bool *known, vec3 *start, struct manifold *m)
 {
+    kept->kind = AXIS_FREE; /* until something is known */
+    kept->n = v3(0, 0, 0);
+    kept->separation = 0;
+    kept->a = kept->b = 0;
     *known = axis_recall(pair, cache, kept);
     *start = v3_neg(pair->t);
     if (!*known) return false;

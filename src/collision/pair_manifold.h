@@ -9,6 +9,7 @@
 #include "manifold_box.h"
 #include "manifold_box_round.h"
 #include "manifold_hull.h"
+#include "manifold_mesh.h"
 #include "manifold_plane.h"
 #include "manifold_round.h"
 #include "proxy.h"
@@ -18,8 +19,8 @@
  * making as much of the rest as they do without it. */
 #if defined SADMM_SMOOTH_ELSEWHERE
 void SADMM_SMOOTH_ELSEWHERE(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
-                            const double *hulls, const struct pair_pose *pose, real limit, uint32_t cache,
-                            struct manifold *m);
+                            const double *hulls, uint32_t child, const struct pair_pose *pose, real limit,
+                            uint32_t cache, struct manifold *m);
 #elif !defined SADMM_WITHOUT_SMOOTH
 #include "smooth_manifold.h"
 #define SADMM_SMOOTH_ELSEWHERE pair_manifold_of_smooth
@@ -76,13 +77,13 @@ SADMM_INLINE void pair_manifold_of_hull(const struct sadmm_geometry *shape_a, co
 }
 
 /* Of one child of the pair. The type of a is not above b's; m->count is 0 when the shapes are apart, and for types that
- * are not listed. hulls: the pool (hull_data.h); NULL: there are neither hulls nor smooth bodies. */
+ * are not listed or meshes (triangle_manifold). hulls: the pool (hull_data.h); NULL: there are none. */
 SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
                                 const double *hulls, uint32_t child, const struct pair_pose *pose, real limit,
                                 uint32_t cache, struct manifold *m)
 {
     const vec3 a = v3_load(shape_a->size), b = v3_load(shape_b->size);
-    (void)child; /* no type has more than one piece */
+    (void)child; /* no type has more than one piece, but meshes */
     m->count = 0;
     m->cache = 0;
     if (hulls && shape_b->type == SADMM_SHAPE_HULL) {
@@ -91,7 +92,7 @@ SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const stru
     }
 #ifndef SADMM_WITHOUT_SMOOTH
     if (hulls && geometry_is_smooth(shape_b)) {
-        SADMM_SMOOTH_ELSEWHERE(shape_a, shape_b, hulls, pose, limit, cache, m);
+        SADMM_SMOOTH_ELSEWHERE(shape_a, shape_b, hulls, child, pose, limit, cache, m);
         return;
     }
 #endif
@@ -144,6 +145,50 @@ SADMM_INLINE void find_manifold(const struct sadmm_proxy *a, const struct sadmm_
         pose = proxies_pose(a, b, ahead);
     }
     m->ahead = ahead;
+}
+
+/* ---- meshes: their triangles have one pose in common -------------------------------------------------------------- */
+
+/* Of a triangle of the mesh b. */
+SADMM_INLINE void triangle_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b,
+                                    const double *blocks, uint32_t child, const struct pair_pose *pose, real limit,
+                                    uint32_t cache, struct manifold *m)
+{
+#ifndef SADMM_WITHOUT_SMOOTH
+    if (geometry_is_smooth(a)) {
+        SADMM_SMOOTH_ELSEWHERE(a, b, blocks, child, pose, limit, cache, m);
+        return;
+    }
+#endif
+    mesh_manifold(a, b, blocks, child, pose, limit, cache, m);
+}
+
+/* When a pair that moves on first touches the triangle, s; HUGE_VAL: not within the step. */
+SADMM_RARE double mesh_first_touch(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *blocks,
+                                   uint32_t child, double dt, const struct pair_start *start)
+{
+    struct advance state = {0, false};
+    double ahead = start->ahead;
+    struct pair_pose pose = start->pose;
+    struct manifold m;
+    for (;;) {
+        m.count = 0;
+        triangle_manifold(&a->geometry, &b->geometry, blocks, child, &pose, SADMM_REAL_MAX, 0, &m);
+        if (!advance_pair(a, b, &pose, &m, dt, &state, &ahead)) break;
+        pose = proxies_pose(a, b, ahead);
+    }
+    return state.missed ? HUGE_VAL : ahead;
+}
+
+/* From where the manifolds of all triangles are found: where a pair that moves on touches the first of them. `first`:
+ * the least of mesh_first_touch. */
+SADMM_INLINE void mesh_start_at(const struct sadmm_proxy *a, const struct sadmm_proxy *b, double first, double margin,
+                                double gravity, double dt, struct pair_start *start)
+{
+    if (first < HUGE_VAL) start->ahead = first;
+    else start->limit = proxy_limit(a, b, 0, margin, gravity, dt);
+    start->pose = proxies_pose(a, b, start->ahead);
+    start->moves_on = false;
 }
 
 #endif

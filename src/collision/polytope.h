@@ -71,6 +71,7 @@ SADMM_INLINE void polytope_of(const struct sadmm_geometry *g, const double *hull
         p->scaled = true;
         return;
     case SADMM_SHAPE_HULL:
+    case SADMM_SHAPE_MESH:
     case SADMM_SHAPE_CYLINDER: /* no polytopes: convex.h */
     case SADMM_SHAPE_CONE:
     case SADMM_SHAPE_ELLIPSOID:

@@ -43,6 +43,15 @@ SADMM_INLINE struct proxy_turn proxy_turn_of(const struct sadmm_shape *shape, co
     return turn;
 }
 
+/* The shape's box (bounds.h). Not of a plane. */
+SADMM_INLINE void proxy_box(const struct sadmm_proxy *p, double dt, double margin, double gravity,
+                            struct sadmm_box3 *box)
+{
+    double extent[3];
+    geometry_extents(&p->geometry, p->R, extent);
+    shape_box(p->x, extent, shape_reach(margin, p->thin, p->fall, fall_of(gravity, dt)), p->velocity, p->spin, dt, box);
+}
+
 /* turn: proxy_turn_of. `box` is left alone for a plane. gravity: its size, m/s^2. */
 SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadmm_geometry *geometry,
                               const struct sadmm_collision_body *body, const struct proxy_turn *turn, double dt,
@@ -51,7 +60,7 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
     const bool moves = sadmm_body_moves(body->system_body);
     mat3 R = q_matrix(turn->shape);
     vec3 arm = m3_mul(q_matrix(turn->body), v3_load(shape->position));
-    double extent[3], reach;
+    double reach;
     int i;
 
     p->ahead = turn->ahead;
@@ -75,9 +84,7 @@ SADMM_INLINE void proxy_place(const struct sadmm_shape *shape, const struct sadm
     p->system_body = body->system_body;
     p->revision = shape->revision;
     p->placed = body->placed;
-    if (geometry->type == SADMM_SHAPE_PLANE) return;
-    geometry_extents(geometry, p->R, extent);
-    shape_box(p->x, extent, shape_reach(margin, p->thin, p->fall, fall_of(gravity, dt)), p->velocity, p->spin, dt, box);
+    if (geometry->type != SADMM_SHAPE_PLANE) proxy_box(p, dt, margin, gravity, box);
 }
 
 SADMM_INLINE void rotate_to_world(const double R[9], vec3 v, double out[3])

@@ -7,8 +7,8 @@
  * Prokopenko and Lebrun-Grandie's, Revising Apetrei's Bounding Volume Hierarchy Construction Algorithm to Allow
  * Stackless Traversal).
  */
-#include "view.h"
-#include "backend_cuda/device/parallel.h"
+#include "batch.h"
+#include "collision/geometry.h"
 
 /* ---- place ----------------------------------------------------------------------------------------------------- */
 
@@ -139,8 +139,8 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
     const struct collision_step step = step_of(v);
     const uint32_t slot = is_there ? v.present[i] : 0; /* at once, not after what comes next */
     if (stops) return;
-    if (i == 0 && FOR != PLACE_AGAIN) v.candidate_count[0] = 0;
-    if (i == 0) v.candidate_count[1] = 0;
+    if (i == 0 && FOR != PLACE_AGAIN) v.candidate_count[COUNT_FOUND] = v.candidate_count[COUNT_MESH_PAIRS] = 0;
+    if (i == 0) v.candidate_count[COUNT_LISTED] = 0;
     if (!is_there) return;
     const struct sadmm_shape &shape = v.shapes[slot];
     const struct sadmm_collision_body &body = v.bodies[shape.body];
@@ -159,7 +159,7 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
         return;
     }
     const struct collision_filter filter = {shape.category, shape.mask, shape.body,
-                                            proxy.geometry.type | (moves ? FILTER_MOVES : 0)};
+                                            geometry_rank(proxy.geometry.type) | (moves ? FILTER_MOVES : 0)};
     if (i >= v.leaf_count) {
         v.filters[slot] = filter;
         return;
@@ -336,49 +336,29 @@ static __device__ __forceinline__ bool leaves_meet(const collision_view &v, cons
     return meet && is_enabled(v, a.filter, b.filter);
 }
 
-/* The first candidate of two shapes: the one of the lower (type, slot) is a. */
+/* The first candidate of two shapes: the one of the lower (rank, slot) is a. */
 static __device__ __forceinline__ uint64_t candidate_key(const collision_view &v, const struct collision_leaf &a,
                                                          const struct collision_leaf &b)
 {
-    const int type_a = a.filter.kind & FILTER_TYPE, type_b = b.filter.kind & FILTER_TYPE;
+    const int rank_a = a.filter.kind & FILTER_RANK, rank_b = b.filter.kind & FILTER_RANK;
     const uint32_t slot_a = (uint32_t)a.slot, slot_b = (uint32_t)b.slot;
-    const bool ordered = type_a < type_b || (type_a == type_b && slot_a < slot_b);
+    const bool ordered = rank_a < rank_b || (rank_a == rank_b && slot_a < slot_b);
     return first_candidate(v, ordered ? slot_a : slot_b, ordered ? slot_b : slot_a);
 }
 
-static __device__ __forceinline__ void store_candidate(const collision_view &v, unsigned long long at, uint64_t key)
+/* A pair whose candidates are the triangles of a mesh. */
+static __device__ __forceinline__ void list_mesh_pair(const collision_view &v, uint64_t first)
 {
-    if (at < (unsigned)v.candidate_capacity) v.found[at] = key;
+    const unsigned long long at = reserve(v.candidate_count + COUNT_MESH_PAIRS, 1);
+    if (at < (unsigned)v.candidate_capacity) v.mesh_pairs[at] = first;
 }
 
-/* Candidates of a thread on their way to memory. */
-enum { BATCH = 16 };
-struct batch {
-    uint64_t keys[BATCH];
-    unsigned count;
-};
-
-static __device__ void write_batch(const collision_view &v, const struct batch &out, unsigned long long first)
+/* The candidates of a pair; count: candidates_of. */
+static __device__ __forceinline__ void add_pair(const collision_view &v, struct batch *out, uint64_t first,
+                                                uint32_t count)
 {
-    for (unsigned i = 0; i < out.count; ++i) store_candidate(v, first + i, out.keys[i]);
-}
-
-/* The candidates of a pair. */
-static __device__ void add(const collision_view &v, struct batch *out, uint64_t first, uint32_t count)
-{
-    for (uint32_t child = 0; child < count; ++child) {
-        if (out->count == BATCH) {
-            write_batch(v, *out, reserve(v.candidate_count, out->count));
-            out->count = 0;
-        }
-        out->keys[out->count++] = first + child;
-    }
-}
-
-/* What is left, by all threads of a warp together. */
-static __device__ void finish_batches(const collision_view &v, const struct batch &out)
-{
-    write_batch(v, out, reserve_by_warp(v.candidate_count, out.count));
+    if (count > 0) add(v, out, first, count);
+    else list_mesh_pair(v, first);
 }
 
 /* A part of what a pair with a plane reaches (proxy_plane_reach). */
@@ -433,7 +413,7 @@ static __device__ void test_leaves(const collision_view &v, const struct collisi
         const struct collision_leaf other = next;
         if (k + 1 < count) next = v.placed[list.numbers[k + 1][threadIdx.x]];
         if (leaves_overlap(leaf, other) & leaves_meet(v, leaf, other, dt))
-            add(v, out, candidate_key(v, leaf, other), candidates_of(v, leaf.children, other.children));
+            add_pair(v, out, candidate_key(v, leaf, other), candidates_of(v, leaf.children, other.children));
     }
 }
 
@@ -535,6 +515,7 @@ static __device__ __forceinline__ void write_hits(const collision_view &v, const
         const uint32_t count = candidates_of(v, leaf.children, other.children);
         const uint64_t first = candidate_key(v, leaf, other);
         for (uint32_t child = 0; child < count; ++child) store_candidate(v, at++, first + child);
+        if (count == 0) list_mesh_pair(v, first);
     }
 }
 

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 
+#include "collision/mesh_data.h"
 #include "memory.h"
 
 /* A mover of this many median radii is large. */
@@ -50,25 +51,42 @@ static const struct sadmm_geometry &geometry_of(const struct sadmm_collision_inp
     return input->geometries[input->shapes[slot].geometry];
 }
 
-/* Bits of a candidate (candidate_of); are there smooth bodies? */
+/* Of a mesh. */
+static uint64_t triangles_of(const struct sadmm_collision_input *input, const struct sadmm_geometry &geometry)
+{
+    struct mesh mesh;
+    mesh_at(input->hulls, geometry.hull, &mesh);
+    return (uint64_t)mesh.triangles;
+}
+
+/* Bits of a candidate (candidate_of); and which kinds of shapes there are. */
 static sadmm_status measure_candidates(struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input,
                                        struct sadmm_error *error)
 {
     struct collision_view *v = &c->view;
-    uint64_t most = 1;
+    uint64_t most = 1, triangles = 0;
+    v->mesh_count = 0;
     c->smooth = false;
     for (size_t slot = 0; slot < input->shape_count; ++slot) {
         if (!input->shapes[slot].alive) continue;
         TRY(sadmm_collision_check_shape(input, slot, error));
-        most = std::max(most, (uint64_t)geometry_of(input, slot).children);
-        c->smooth |= geometry_is_smooth(&geometry_of(input, slot)) != 0;
+        const struct sadmm_geometry &geometry = geometry_of(input, slot);
+        c->smooth |= geometry_is_smooth(&geometry) != 0;
+        if (geometry.type == SADMM_SHAPE_MESH) {
+            ++v->mesh_count;
+            triangles = std::max(triangles, triangles_of(input, geometry));
+        } else {
+            most = std::max(most, (uint64_t)geometry.children);
+        }
     }
     v->slot_bits = std::max(bits_of(input->shape_count), 1);
-    v->child_bits = bits_of(most * most - 1);
+    const uint64_t last = std::max(most * most, triangles) - 1;
+    v->child_bits = v->mesh_count > 0 ? std::max(bits_of(last), 1) : bits_of(last);
     if (2 * v->slot_bits + v->child_bits > 64)
         return sadmm_fail(error, SADMM_ERROR_LIMIT,
                           "%zu shapes of up to %llu children: their pairs take %d bits, at most 64 can be indexed",
-                          input->shape_count, (unsigned long long)most, 2 * v->slot_bits + v->child_bits);
+                          input->shape_count, (unsigned long long)std::max(most, triangles),
+                          2 * v->slot_bits + v->child_bits);
     return SADMM_OK;
 }
 

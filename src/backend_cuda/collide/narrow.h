@@ -1,4 +1,5 @@
-/* Candidates to manifolds, what the kernels of it share: the last step's pair, for its cache, and where manifolds go. */
+/* Candidates to manifolds, what the kernels of it share: the last step's pair, for its cache, and where
+ * manifolds go. */
 #ifndef SADMM_CUDA_COLLIDE_NARROW_H
 #define SADMM_CUDA_COLLIDE_NARROW_H
 
@@ -8,6 +9,7 @@
 /* C headers: an enumerator beside an unsigned number is fine there. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wextra"
+#include "collision/mesh_walk.h"
 #include "collision/pair_manifold.h"
 #pragma GCC diagnostic pop
 
@@ -75,6 +77,30 @@ static __device__ bool meet_now(const collision_view &v, const struct collision_
     return boxes_overlap(&own, &box) && boxes_meet(&own, a.velocity, &box, b.velocity, step.dt);
 }
 
+/* Is the triangle near the shape in this sub-step? As mesh_walk_next finds it on the host. */
+static __device__ bool triangle_now(const collision_view &v, const struct collision_step &step, const struct candidate &c,
+                                    const struct sadmm_proxy &a, const struct sadmm_proxy &b)
+{
+    const struct sadmm_box3 own = v.boxes[c.a];
+    struct sadmm_box3 box;
+    struct mesh mesh;
+    mesh_at(v.hulls, b.geometry.hull, &mesh);
+    mesh_reach(&a, &b, &own, step.margin, step.gravity, step.dt, step.dt, &box);
+    return mesh_triangle_near(&mesh, (int32_t)c.child, &box);
+}
+
+/* When the pair of a candidate first touches any triangle: of its candidates the least. */
+static __device__ double first_touch(const collision_view &v, const struct candidate &c)
+{
+    const uint64_t first = first_candidate(v, c.a, c.b);
+    const int64_t count = usable_candidates(v);
+    double least = HUGE_VAL;
+    for (int64_t i = lower_bound(v.candidates, count, first);
+         i < count && v.candidates[i] >> v.child_bits == first >> v.child_bits; ++i)
+        least = smaller_of(v.touches[i], least);
+    return least;
+}
+
 /* By which find of a step: in later sub-steps the pair that a candidate goes on from is known. */
 enum narrow_for { NARROW_ONE, NARROW_FIRST, NARROW_AGAIN };
 
@@ -109,14 +135,22 @@ static __device__ void store_manifold(const collision_view &v, int64_t i, const 
 
 /* What a kernel does for a candidate. */
 enum narrow_how {
-    NARROW_PLAIN,   /* there are no hulls */
-    NARROW_AT_ONCE, /* of hulls what is little work; the others are listed */
-    NARROW_LISTED   /* those, and all pairs with smooth bodies */
+    NARROW_PLAIN,         /* there are no hulls or meshes */
+    NARROW_AT_ONCE,       /* of hulls what is little work; the others are listed */
+    NARROW_LISTED,        /* those */
+    NARROW_MESHES_AT_ONCE, /* the same of worlds with meshes: further code, which would slow down the others */
+    NARROW_MESHES_LISTED,
+    NARROW_ALL_AT_ONCE,   /* the same again, of worlds with smooth bodies */
+    NARROW_ALL_LISTED
 };
+static __device__ constexpr bool with_meshes(int how) { return how >= NARROW_MESHES_AT_ONCE; }
+static __device__ constexpr bool is_at_once(int how) { return how != NARROW_PLAIN && (how - NARROW_AT_ONCE) % 2 == 0; }
+static __device__ constexpr bool is_listed(int how) { return how != NARROW_PLAIN && !is_at_once(how); }
+static __device__ constexpr bool with_smooth(int how) { return how >= NARROW_ALL_AT_ONCE; }
 
 /* The manifold of a pair with a hull, as find_manifold makes it, where it is little work; false: it is not. */
-static __device__ bool hulls_at_once(const collision_view &v, const struct sadmm_proxy *a,
-                                     const struct sadmm_proxy *b, const struct pair_start &start, uint32_t cache, struct manifold *m)
+static __device__ bool hulls_at_once(const collision_view &v, const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+                                     const struct pair_start &start, uint32_t cache, struct manifold *m)
 {
     if (start.moves_on) return false;
     m->ahead = start.ahead;
@@ -125,6 +159,39 @@ static __device__ bool hulls_at_once(const collision_view &v, const struct sadmm
     if (a->geometry.type != SADMM_SHAPE_PLANE)
         return hull_manifold_at_once(&a->geometry, &b->geometry, v.hulls, &start.pose, (real)start.limit, cache, m);
     hull_plane_manifold(&b->geometry, v.hulls, &start.pose, (real)start.limit, m);
+    return true;
+}
+
+/* The same of a pair with a smooth body: on planes, by formula. */
+static __device__ bool smooth_at_once(const collision_view &v, const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+                                      const struct pair_start &start, struct manifold *m)
+{
+#ifdef SADMM_WITHOUT_SMOOTH
+    return false;
+#else
+    if (start.moves_on || a->geometry.type != SADMM_SHAPE_PLANE) return false;
+    m->ahead = start.ahead;
+    m->count = 0;
+    m->cache = 0;
+    convex_plane_manifold(&b->geometry, v.hulls, &start.pose, (real)start.limit, m);
+    return true;
+#endif
+}
+
+/* The manifold with a triangle, as find_triangles makes it on the host; false: it is to be listed. */
+template <int HOW>
+static __device__ bool narrow_triangle(const collision_view &v, const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+                                       const struct pair_start &start, uint32_t child, uint32_t cache,
+                                       struct manifold *m)
+{
+    m->ahead = start.ahead;
+    m->count = 0;
+    m->cache = 0;
+    if (with_smooth(HOW) && is_at_once(HOW) && geometry_is_smooth(&a->geometry)) return false;
+    if (is_at_once(HOW))
+        return mesh_manifold_at_once(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache,
+                                     m);
+    triangle_manifold(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache, m);
     return true;
 }
 
@@ -155,7 +222,15 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
     /* where pairs have several manifolds, keys come more than once */
     const bool known = FOR == NARROW_AGAIN || ((int)find_key_near(near, ordered_key(own.a, own.b), &before) &
                                                (int)(v.child_bits == 0));
-    const struct pair_start start = pair_start_of(&a, &b, step.margin, step.gravity, step.dt);
+    struct pair_start start = pair_start_of(&a, &b, step.margin, step.gravity, step.dt);
+    const bool on_mesh = with_meshes(HOW) && b.geometry.type == SADMM_SHAPE_MESH;
+    if (on_mesh) {
+        if (FOR != NARROW_ONE && !triangle_now(v, step, own, a, b)) {
+            v.sizes[i] = 0;
+            return true;
+        }
+        if (start.moves_on) mesh_start_at(&a, &b, first_touch(v, own), step.margin, step.gravity, step.dt, &start);
+    }
     for (int k = 0; k < 3; k += 2) {
         keep_fetched(a.geometry.size[k]);
         keep_fetched(b.geometry.size[k]);
@@ -165,13 +240,15 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
     const uint32_t cache = contact_memory(&old, &a, &b);
     if (!contact_goes_on(&old, own.child, &a, &b)) before = -1;
     struct manifold m;
-    if (HOW == NARROW_AT_ONCE && b.geometry.type == SADMM_SHAPE_HULL) {
+    if (on_mesh) {
+        if (!narrow_triangle<HOW>(v, pa, pb, start, own.child, before >= 0 ? cache : 0, &m)) return false;
+    } else if (is_at_once(HOW) && b.geometry.type == SADMM_SHAPE_HULL) {
         if (!hulls_at_once(v, pa, pb, start, before >= 0 ? cache : 0, &m)) return false;
-    } else if (HOW == NARROW_AT_ONCE && geometry_is_smooth(&b.geometry)) {
-        return false;
+    } else if (with_smooth(HOW) && is_at_once(HOW) && geometry_is_smooth(&b.geometry)) {
+        if (!smooth_at_once(v, pa, pb, start, &m)) return false;
     } else {
-        find_manifold(pa, pb, HOW == NARROW_LISTED ? v.hulls : nullptr, own.child, step.margin, step.gravity, step.dt,
-                      &start, before >= 0 ? cache : 0, &m);
+        find_manifold(pa, pb, is_listed(HOW) ? v.hulls : nullptr, own.child, step.margin, step.gravity, step.dt, &start,
+                      before >= 0 ? cache : 0, &m);
     }
     store_manifold(v, i, m, before);
     return true;

@@ -1,23 +1,38 @@
-/* The kernel of listed candidates (narrow_hulls.cu). SADMM_WITHOUT_SMOOTH, set by the includer: of worlds without
- * smooth bodies. */
+/* The narrow phase of worlds with convex hulls, meshes or smooth bodies: two kernels each, apart from those of other worlds, which
+ * would be slower with all that this needs of registers and stack.
+ *
+ * Most pairs with a hull take little: they go on as they were, or are too far apart. The few others (a twentieth in a
+ * heap) take ten times as long, and a warp with one of them would wait for it: so they are listed, and done together, in
+ * as many warps as run at once: no two of them go the same way for long. The list has no order; what is found does not
+ * depend on it.
+ */
 #ifndef SADMM_CUDA_COLLIDE_NARROW_LISTED_H
 #define SADMM_CUDA_COLLIDE_NARROW_LISTED_H
 
 #include "narrow.h"
 
-/* A warp a block; on every chip that this is compiled for about so many run at once. Where there are more than these
- * have lanes for, further ones follow. */
+template <int FOR, int HOW>
+static __global__ void __launch_bounds__(NARROW_THREADS, NARROW_BLOCKS)
+at_once_kernel(const __grid_constant__ collision_view v)
+{
+    const int64_t i = collision_thread(NARROW_THREADS);
+    if (i < (int64_t)v.candidate_capacity + SIZES_BEYOND && !narrow_candidate<FOR, HOW>(v, i))
+        v.listed[atomicAdd(v.candidate_count + COUNT_LISTED, 1ull)] = (int32_t)i;
+}
+
+/* A warp a block; on every chip that this is compiled for about so many run at once. Where there are more than these have
+ * lanes for, further ones follow. */
 enum { LISTED_WARPS = 1024 };
 
-template <int FOR>
+template <int FOR, int HOW>
 static __global__ void __launch_bounds__(NARROW_THREADS)
 listed_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t width = NARROW_THREADS, most = LISTED_WARPS, all = (v.candidate_capacity + width - 1) / width,
-                  warps = all < most ? all : most, count = (int64_t)v.candidate_count[1],
+                  warps = all < most ? all : most, count = (int64_t)v.candidate_count[COUNT_LISTED],
                   wanted = (count + warps - 1) / warps, lanes = wanted < width ? wanted : width,
                   i = blockIdx.x * lanes + threadIdx.x;
-    if (threadIdx.x < lanes && i < count) narrow_candidate<FOR, NARROW_LISTED>(v, v.listed[i]);
+    if (threadIdx.x < lanes && i < count) narrow_candidate<FOR, HOW>(v, v.listed[i]);
 }
 
 #endif

@@ -1,10 +1,19 @@
-/* Listed candidates of worlds with smooth bodies (cylinders, cones, ellipsoids): all pairs with one are listed, beside
- * those of hulls that are (narrow_hulls.cu), whose own kernel stays without what these need of registers and stack. */
+/* The narrow phase of worlds with smooth bodies (cylinders, cones, ellipsoids), beside whatever else there is. */
 #include "narrow_listed.h"
+#include "touch.h"
 
 void COLLISION(narrow_smooth_kernels)(struct collision_kernels *kernels)
 {
-    kernels->smooth = {listed_kernel<NARROW_ONE>, NARROW_THREADS, 0, "narrow phase of smooth bodies"};
-    kernels->smooth_first = {listed_kernel<NARROW_FIRST>, NARROW_THREADS, 0, "narrow phase of smooth bodies"};
-    kernels->smooth_again = {listed_kernel<NARROW_AGAIN>, NARROW_THREADS, 0, "narrow phase of smooth bodies"};
+    struct narrow_kernels *k = &kernels->with_smooth;
+    touch_kernels(k);
+    k->at_once = {at_once_kernel<NARROW_ONE, NARROW_ALL_AT_ONCE>, NARROW_THREADS, 0, "narrow phase of smooth bodies"};
+    k->at_once_first = {at_once_kernel<NARROW_FIRST, NARROW_ALL_AT_ONCE>, NARROW_THREADS, 0,
+                        "narrow phase of smooth bodies"};
+    k->at_once_again = {at_once_kernel<NARROW_AGAIN, NARROW_ALL_AT_ONCE>, NARROW_THREADS, 0,
+                        "narrow phase of smooth bodies"};
+    k->listed = {listed_kernel<NARROW_ONE, NARROW_ALL_LISTED>, NARROW_THREADS, 0, "narrow phase of listed pairs"};
+    k->listed_first = {listed_kernel<NARROW_FIRST, NARROW_ALL_LISTED>, NARROW_THREADS, 0,
+                       "narrow phase of listed pairs"};
+    k->listed_again = {listed_kernel<NARROW_AGAIN, NARROW_ALL_LISTED>, NARROW_THREADS, 0,
+                       "narrow phase of listed pairs"};
 }

@@ -25,7 +25,7 @@ static sadmm_status reserve_shape(struct sadmm_cuda_collision *c, size_t slots, 
         TRY(reserve(c, PARENTS, 2 * leaves, sizeof *v->parents, error));
         TRY(reserve(c, ARRIVALS, leaves, sizeof *v->arrivals, error));
     }
-    TRY(reserve(c, COUNTER, 2, sizeof *v->candidate_count, error));
+    TRY(reserve(c, COUNTER, COUNTERS, sizeof *v->candidate_count, error));
     TRY(reserve(c, GRID, 1, sizeof *v->grid, error));
     v->proxies = in<struct sadmm_proxy>(c, PROXIES);
     v->filters = in<struct collision_filter>(c, FILTERS);
@@ -62,6 +62,8 @@ static sadmm_status reserve_candidate(struct sadmm_cuda_collision *c, struct sad
     TRY(reserve(c, CANDIDATES, candidates, sizeof *v->candidates, error));
     TRY(reserve(c, CANDIDATES_2, candidates, sizeof *v->candidates, error));
     if (v->hulls) TRY(reserve(c, LISTED, candidates, sizeof *v->listed, error));
+    if (v->mesh_count > 0) TRY(reserve(c, MESH_PAIRS, candidates, sizeof *v->mesh_pairs, error));
+    if (v->mesh_count > 0) TRY(reserve(c, TOUCHES, candidates, sizeof *v->touches, error));
     TRY(reserve(c, MANIFOLDS, candidates, sizeof *v->manifolds, error));
     TRY(reserve(c, MATCHES, candidates, sizeof *v->matches, error));
     TRY(reserve(c, PAIR_OF, candidates, sizeof *v->pair_of, error));
@@ -69,6 +71,8 @@ static sadmm_status reserve_candidate(struct sadmm_cuda_collision *c, struct sad
     TRY(reserve(c, PLACES, candidates + 1, sizeof *v->places, error));
     v->found = in<uint64_t>(c, CANDIDATES);
     v->listed = in<int32_t>(c, LISTED);
+    v->mesh_pairs = in<uint64_t>(c, MESH_PAIRS);
+    v->touches = in<double>(c, TOUCHES);
     v->manifolds = in<struct found_manifold>(c, MANIFOLDS);
     v->matches = in<int32_t>(c, MATCHES);
     v->pair_of = in<int32_t>(c, PAIR_OF);
@@ -159,6 +163,11 @@ static sadmm_status find_candidates(struct sadmm_cuda_collision *c, bool tree, s
         const int32_t columns = tile_columns(v->leaf_count, small ? SMALL_TILE_COLUMNS : TILE_COLUMNS);
         TRY(launch(c, tiles, rows * tiles.threads * columns, error));
     }
+    if (v->mesh_count > 0) {
+        const int64_t most = (int64_t)v->leaf_count * v->mesh_count,
+                      warps = (int64_t)c->kernels.expand_warps * MESH_THREADS;
+        TRY(launch(c, v->substeps == 1 ? c->kernels.expand : c->kernels.expand_first, std::min(most, warps), error));
+    }
     return sort_candidates(c, error);
 }
 
@@ -169,10 +178,11 @@ static sadmm_status narrow_phase(struct sadmm_cuda_collision *c, struct sadmm_er
     const int64_t candidates = (int64_t)v->candidate_capacity + SIZES_BEYOND;
     const bool one = v->substeps == 1, first = v->substep == 0;
     if (!v->hulls) return launch(c, one ? k->narrow : first ? k->narrow_first : k->narrow_again, candidates, error);
-    TRY(launch(c, one ? k->hulls : first ? k->hulls_first : k->hulls_again, candidates, error));
-    if (c->smooth)
-        return launch(c, one ? k->smooth : first ? k->smooth_first : k->smooth_again, v->candidate_capacity, error);
-    return launch(c, one ? k->listed : first ? k->listed_first : k->listed_again, v->candidate_capacity, error);
+    const struct narrow_kernels *with = c->smooth ? &k->with_smooth : v->mesh_count > 0 ? &k->with_meshes : &k->with_hulls;
+    if (v->mesh_count > 0)
+        TRY(launch(c, one ? with->touch : first ? with->touch_first : with->touch_again, v->candidate_capacity, error));
+    TRY(launch(c, one ? with->at_once : first ? with->at_once_first : with->at_once_again, candidates, error));
+    return launch(c, one ? with->listed : first ? with->listed_first : with->listed_again, v->candidate_capacity, error);
 }
 
 static sadmm_status make_contacts(struct sadmm_cuda_collision *c, struct sadmm_error *error)
@@ -234,7 +244,7 @@ sadmm_status COLLISION(run_stages)(struct sadmm_cuda_collision *c, size_t slots,
             c->point_capacity = std::min<int64_t>(generous(counts->points), INT32_MAX);
         else return SADMM_OK;
         ++c->stats.repeats;
-        CUDA_CALL(c, cudaMemsetAsync(v->candidate_count, 0, 2 * sizeof *v->candidate_count, c->stream),
+        CUDA_CALL(c, cudaMemsetAsync(v->candidate_count, 0, COUNTERS * sizeof *v->candidate_count, c->stream),
                   "cudaMemsetAsync(counter)");
     }
 }

@@ -4,9 +4,10 @@
  *   place    pose, box and filter of every shape                                   a thread a shape
  *   tree     Morton codes, radix sort, Karras' hierarchy, boxes bottom up          (few shapes: not needed)
  *   pairs    candidates: boxes overlap and the pair may meet                       a thread a shape, or tiles of pairs
+ *            (a pair with a mesh is listed; `expand` finds its triangles: meshes.cu)
  *   sort     candidates by (slot of a, slot of b, child), the host's order
  *   narrow   the last step's pair (a guess or a search), manifold by candidate     a thread a candidate
- *            (where there are hulls two kernels of their own: narrow_hulls.cu)
+ *            (where there are hulls or meshes two kernels of their own: narrow_listed.h)
  *   scan     where each candidate's contacts go                                    (few candidates: by emit itself)
  *   emit     pairs and points in world terms, the last step's impulses             eight threads a candidate
  *
@@ -26,7 +27,8 @@
  * takes all of it; unused candidates are all ones and go to the end. What takes the time is one load that waits for
  * another: kernels ask at once for all that they may need, before it is known whether they do, and only then test.
  *
- * A candidate is a child of a pair of shapes (sadmm_geometry): where every shape has one child, a pair. Shapes are
+ * A candidate is a child of a pair of shapes (sadmm_geometry): where every shape has one child, a pair. Triangles are
+ * the children of a mesh. Shapes are
  * checked when they are taken over (input.cu), so that collision_table.h lists every pair that meets; one that it does
  * not list would have no contacts.
  *
@@ -56,6 +58,7 @@ enum {
     SMALL_TILE_COLUMNS = 16,
     SMALL_TILES_BELOW = 1024, /* ... which are so few */
     TREE_THREADS = 64,       /* chains of loads: what counts is how many multiprocessors share them */
+    MESH_THREADS = 32,       /* the same: walks through meshes */
     RANK_KEYS = 32,          /* sort by counting: keys of a block, ... */
     RANK_SHARES = 8,         /* ... into how many shares the others are split, ... */
     RANK_CHUNK = 1024,       /* ... and how many are staged at a time */
@@ -68,9 +71,9 @@ enum {
 struct alignas(16) collision_filter {
     uint32_t category, mask;
     int32_t body;
-    int32_t kind; /* type, + FILTER_MOVES */
+    int32_t kind; /* geometry_rank, + FILTER_MOVES */
 };
-enum { FILTER_TYPE = 0xff, FILTER_MOVES = 0x100 };
+enum { FILTER_RANK = 0xff, FILTER_MOVES = 0x100 };
 
 /* A shape that is no plane, with all that is asked of it when candidates are looked for: what lies elsewhere would be
  * another round to memory, for one pair after the other. */
@@ -145,13 +148,14 @@ struct collision_set {
 struct collision_view {
     const struct sadmm_shape *shapes;              /* by slot */
     const struct sadmm_geometry *geometries;       /* by handle */
-    const double *hulls;                           /* the pool (collision/hull_data.h); NULL: no shape is a hull */
+    const double *hulls;                           /* the pool (collision/hull_data.h); NULL: no shape is a hull, or a mesh */
     const struct sadmm_collision_body *bodies;     /* by body slot */
     const uint32_t *present;                       /* slots: leaves, then planes */
     const uint64_t *planes;                        /* (group + 1) << 32 | slot, sorted */
     const uint64_t *disabled_pairs, *friction_pairs;
     const double *friction_values;
     int32_t leaf_count, plane_count, disabled_count, friction_count;
+    int32_t mesh_count;                            /* shapes */
     int32_t shared_planes;                         /* the first ones: of group -1 */
     struct collision_step step;
     int32_t substeps, substep;                     /* of the step; 1: what concerns sub-steps is left out */
@@ -174,7 +178,10 @@ struct collision_view {
     int32_t *parents;                              /* of nodes; -1: the root */
     int32_t *arrivals;                             /* at inner nodes, bottom up */
 
-    unsigned long long *candidate_count;           /* [0]: found, whether they fit or not; [1]: listed */
+    unsigned long long *candidate_count;           /* found, whether they fit or not; listed; mesh_pairs (COUNT_) */
+    uint64_t *mesh_pairs;                          /* first_candidate of pairs with a mesh, of which there may be as many as
+                                                      candidates; as they come */
+    double *touches;                               /* by candidate, of triangles and pairs that are fast: mesh_first_touch */
     int32_t *listed;                               /* candidates that the narrow phase of hulls does by themselves */
     uint64_t *found;                               /* candidates as they come, packed (candidate_of) */
     uint64_t *candidates;                          /* sorted */
@@ -223,11 +230,14 @@ static __device__ __forceinline__ uint64_t first_candidate(const collision_view 
 {
     return ((uint64_t)a << v.slot_bits | b) << v.child_bits;
 }
-/* Candidates of a pair: they follow the first one. children: of the two shapes. */
+/* Candidates of a pair: they follow the first one; 0: it is one with a mesh. children: of the two shapes. */
 static __device__ __forceinline__ uint32_t candidates_of(const collision_view &v, int32_t a, int32_t b)
 {
     return v.child_bits > 0 ? (uint32_t)a * (uint32_t)b : 1;
 }
+
+/* Counters. */
+enum { COUNT_FOUND, COUNT_LISTED, COUNT_MESH_PAIRS, COUNTERS };
 
 /* Candidates that the kernels after the pairs stage work on: none when they did not all fit. */
 static __device__ __forceinline__ int32_t usable_candidates(const collision_view &v)
@@ -266,17 +276,26 @@ struct collision_launch {
     const char *name;
 };
 
+/* The narrow phase where some pairs are much more work than others (narrow_listed.h). */
+struct narrow_kernels {
+    struct collision_launch at_once, at_once_first, at_once_again, listed, listed_first, listed_again;
+    struct collision_launch touch, touch_first, touch_again; /* with meshes (touch.h) */
+};
+
 /* The kernels, each beside what it does. */
 struct collision_kernels {
     struct collision_launch grid, place, place_first, place_again, build, refit, clear, walk, tiles, small_tiles, rank,
-        narrow, narrow_first, narrow_again, hulls, hulls_first, hulls_again, listed, listed_first, listed_again, smooth,
-        smooth_first, smooth_again, emit, emit_few;
+        narrow, narrow_first, narrow_again, expand, expand_first, emit, emit_few;
+    struct narrow_kernels with_hulls, with_meshes, with_smooth; /* in the place of `narrow` where there are any */
+    int expand_warps; /* expand is launched for */
 };
 void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels);
 void COLLISION(sort_kernels)(struct collision_kernels *kernels);
 void COLLISION(narrow_phase_kernels)(struct collision_kernels *kernels);
 void COLLISION(narrow_hulls_kernels)(struct collision_kernels *kernels);
+void COLLISION(narrow_meshes_kernels)(struct collision_kernels *kernels);
 void COLLISION(narrow_smooth_kernels)(struct collision_kernels *kernels);
+void COLLISION(mesh_kernels)(struct collision_kernels *kernels);
 void COLLISION(matching_kernels)(struct collision_kernels *kernels);
 
 #endif

@@ -1,6 +1,7 @@
 /* What a world gives out of its last step: contacts and the frozen problem. */
 #include <string.h>
 
+#include "collision/mesh.h"
 #include "core/base/memory.h"
 #include "core/model/system_math.h"
 #include "world_internal.h"
@@ -45,6 +46,14 @@ static size_t pair_of(const struct sadmm_contact_set *contacts, int32_t point)
     return low;
 }
 
+/* As the caller numbers them. */
+static int32_t triangle_of(const sadmm_world *world, const struct sadmm_contact_pair *pair)
+{
+    if (world->geometries[world->shapes[pair->shape_b].geometry].type != SADMM_SHAPE_MESH) return -1;
+    const int32_t *source = world->block_shapes[pair->shape_b].mesh->source;
+    return source ? source[pair->child] : (int32_t)pair->child;
+}
+
 static void read_contact(const sadmm_world *world, const struct sadmm_contact_pair *pair, int32_t index,
                          double dt, sadmm_contact *out)
 {
@@ -64,6 +73,7 @@ static void read_contact(const sadmm_world *world, const struct sadmm_contact_pa
     out->gap = point->gap;
     out->friction = pair->friction;
     out->feature = point->feature;
+    out->triangle = triangle_of(world, pair);
 }
 
 sadmm_status sadmm_world_contacts(sadmm_world *world, int32_t first, int32_t count, sadmm_contact *contacts)

@@ -3,6 +3,7 @@
 
 #include "collision/geometry.h"
 #include "collision/hull.h"
+#include "collision/mesh.h"
 #include "core/base/memory.h"
 #include "core/math/quat.h"
 #include "shape_form.h"
@@ -25,11 +26,12 @@ static bool alive(const sadmm_world *world, size_t slot)
     return world->shapes[slot].alive;
 }
 
-/* Without the place of its hull, which it gets with the shape. */
+/* Without the place of its block, which it gets with the shape. */
 static struct sadmm_geometry geometry_of(const sadmm_shape_def *def)
 {
-    struct sadmm_geometry geometry = {.type = (int32_t)def->type, .children = 1};
-    memcpy(geometry.size, def->type == SADMM_SHAPE_HULL ? def->hull->half : def->size, sizeof geometry.size);
+    struct sadmm_geometry geometry = {.type = (int32_t)def->type, .children = def->type == SADMM_SHAPE_MESH ? 0 : 1};
+    const double *size = def->hull ? def->hull->half : def->mesh ? def->mesh->half : def->size;
+    memcpy(geometry.size, size, sizeof geometry.size);
     return geometry;
 }
 
@@ -50,33 +52,58 @@ static sadmm_status check_def(const struct sadmm_world_body *body, const sadmm_s
 {
     TRY(sadmm_shape_form_check(def, orientation, error));
     const struct sadmm_geometry geometry = geometry_of(def);
-    TRY(sadmm_geometry_check(&geometry, body->type != SADMM_BODY_STATIC, "def->", error));
+    static const enum sadmm_motion motion[] = {[SADMM_BODY_DYNAMIC] = SADMM_MOTION_DYNAMIC,
+                                               [SADMM_BODY_STATIC] = SADMM_MOTION_NONE,
+                                               [SADMM_BODY_KINEMATIC] = SADMM_MOTION_DRIVEN};
+    TRY(sadmm_geometry_check(&geometry, motion[body->type], "def->", error));
     return check_material("def->", def->friction, def->restitution, error);
 }
 
-/* Room for what a hull's shape in `slot` has beside it, and its hull in the pool. Errors leave the world as it is. */
-static sadmm_status add_hull(sadmm_world *world, size_t slot, const sadmm_hull *hull, uint32_t *offset)
+static bool has_block(int type)
 {
-    if (!sadmm_grow(&world->hull_shapes, &world->hull_shape_capacity, world->hull_shape_slots, slot + 1,
-                    sizeof *world->hull_shapes))
+    return type == SADMM_SHAPE_HULL || type == SADMM_SHAPE_MESH;
+}
+
+static void retain_hull(const void *hull) { sadmm_hull_retain((const sadmm_hull *)hull); }
+static void release_hull(const void *hull) { sadmm_hull_release((const sadmm_hull *)hull); }
+static void retain_mesh(const void *mesh) { sadmm_mesh_retain((const sadmm_mesh *)mesh); }
+static void release_mesh(const void *mesh) { sadmm_mesh_release((const sadmm_mesh *)mesh); }
+
+static struct sadmm_block_owner block_owner(const sadmm_shape_def *def)
+{
+    if (def->type == SADMM_SHAPE_HULL)
+        return (struct sadmm_block_owner){def->hull, def->hull->block, def->hull->doubles, retain_hull, release_hull};
+    return (struct sadmm_block_owner){def->mesh, def->mesh->block, def->mesh->doubles, retain_mesh, release_mesh};
+}
+
+/* Room for what a shape with a block in `slot` has beside it, and its block in the pool. Errors leave the world as it
+ * is. */
+static sadmm_status add_block(sadmm_world *world, size_t slot, const sadmm_shape_def *def, uint32_t *offset)
+{
+    const struct sadmm_block_owner owner = block_owner(def);
+    if (!sadmm_grow(&world->block_shapes, &world->block_shape_capacity, world->block_shape_slots, slot + 1,
+                    sizeof *world->block_shapes))
         return sadmm_fail_memory(&world->error, "a shape");
-    TRY(sadmm_hull_pool_add(&world->hull_pool, hull, offset, &world->error));
-    if (slot >= world->hull_shape_slots) world->hull_shape_slots = slot + 1;
+    TRY(sadmm_block_pool_add(&world->block_pool, &owner, offset, &world->error));
+    if (slot >= world->block_shape_slots) world->block_shape_slots = slot + 1;
     return SADMM_OK;
 }
 
-/* The shape is where contact finding has the hull: in the frame of the box around it. */
-static void place_hull(sadmm_world *world, size_t slot, const sadmm_shape_def *def, const double orientation[4])
+/* The shape is where contact finding has it: in the frame of the box around the hull, or the mesh. */
+static void place_block(sadmm_world *world, size_t slot, const sadmm_shape_def *def, const double orientation[4])
 {
-    struct sadmm_world_hull_shape *kept = &world->hull_shapes[slot];
+    static const double as_it_is[4] = {1, 0, 0, 0};
+    struct sadmm_world_block_shape *kept = &world->block_shapes[slot];
     struct sadmm_shape *shape = &world->shapes[slot];
-    const sadmm_hull *hull = def->hull;
     const quat turn = q_load(orientation);
-    kept->hull = hull;
+    const double *middle = def->hull ? def->hull->position : def->mesh->middle,
+                 *axes = def->hull ? def->hull->orientation : as_it_is;
+    kept->hull = def->hull;
+    kept->mesh = def->mesh;
     memcpy(kept->position, def->position, sizeof kept->position);
     memcpy(kept->orientation, orientation, sizeof kept->orientation);
-    v3_store(v3_add(v3_load(def->position), m3_mul(q_matrix(turn), v3_load(hull->position))), shape->position);
-    q_store(q_normalize(q_mul(turn, q_load(hull->orientation))), shape->orientation);
+    v3_store(v3_add(v3_load(def->position), m3_mul(q_matrix(turn), v3_load(middle))), shape->position);
+    q_store(q_normalize(q_mul(turn, q_load(axes))), shape->orientation);
 }
 
 sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, const sadmm_shape_def *def,
@@ -103,8 +130,8 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
         return sadmm_fail_memory(error, "a shape");
     uint32_t offset = 0;
     const struct sadmm_geometry geometry = geometry_of(def);
-    if (def->type == SADMM_SHAPE_HULL) TRY(add_hull(world, slot, def->hull, &offset));
-    else if (geometry_is_smooth(&geometry)) TRY(sadmm_hull_pool_hold(&world->hull_pool, error));
+    if (has_block(def->type)) TRY(add_block(world, slot, def, &offset));
+    else if (geometry_is_smooth(&geometry)) TRY(sadmm_block_pool_hold(&world->block_pool, error));
 
     struct sadmm_shape *shape = &world->shapes[slot];
     if (slot == world->shape_slots) {
@@ -117,7 +144,7 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
     world->geometries[shape->geometry].hull = offset;
     memcpy(shape->position, def->position, sizeof shape->position);
     memcpy(shape->orientation, orientation, sizeof orientation);
-    if (def->type == SADMM_SHAPE_HULL) place_hull(world, slot, def, orientation);
+    if (has_block(def->type)) place_block(world, slot, def, orientation);
     shape->friction = def->friction;
     shape->restitution = def->restitution;
     shape->category = def->category;
@@ -135,17 +162,19 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
     return SADMM_OK;
 }
 
-static void remove_hull(sadmm_world *world, size_t slot)
+static void remove_block(sadmm_world *world, size_t slot)
 {
+    const struct sadmm_world_block_shape *kept = &world->block_shapes[slot];
+    const void *owner = kept->hull ? (const void *)kept->hull : kept->mesh;
     world->geometries[world->shapes[slot].geometry].hull = 0;
-    sadmm_hull_pool_remove(&world->hull_pool, world->hull_shapes[slot].hull, world->geometries, world->shape_slots);
+    sadmm_block_pool_remove(&world->block_pool, owner, world->geometries, world->shape_slots);
 }
 
 void sadmm_world_kill_shape(sadmm_world *world, size_t slot)
 {
     const struct sadmm_geometry *geometry = &world->geometries[world->shapes[slot].geometry];
-    if (geometry->type == SADMM_SHAPE_HULL) remove_hull(world, slot);
-    else if (geometry_is_smooth(geometry)) sadmm_hull_pool_let_go(&world->hull_pool);
+    if (has_block(geometry->type)) remove_block(world, slot);
+    else if (geometry_is_smooth(geometry)) sadmm_block_pool_let_go(&world->block_pool);
     world->shapes[slot].alive = false;
     ++world->shape_generations[slot];
     --world->shape_count;
@@ -198,9 +227,10 @@ sadmm_status sadmm_world_shape_def(sadmm_world *world, sadmm_shape_id id, sadmm_
     memcpy(def->size, geometry->size, sizeof def->size);
     memcpy(def->position, shape->position, sizeof def->position);
     memcpy(def->orientation, shape->orientation, sizeof def->orientation);
-    if (geometry->type == SADMM_SHAPE_HULL) {
-        const struct sadmm_world_hull_shape *kept = &world->hull_shapes[id.slot - 1];
+    if (has_block(geometry->type)) {
+        const struct sadmm_world_block_shape *kept = &world->block_shapes[id.slot - 1];
         def->hull = kept->hull;
+        def->mesh = kept->mesh;
         memcpy(def->position, kept->position, sizeof def->position);
         memcpy(def->orientation, kept->orientation, sizeof def->orientation);
     }

@@ -3,17 +3,25 @@
 #include "collision/geometry.h"
 #include "core/base/check.h"
 
+/* A hull is given with shapes of that type, and with no others; so is a mesh. */
+static sadmm_status check_part(const char *name, const void *part, int of_type, int type, struct sadmm_error *error)
+{
+    if (type == of_type && !part)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->%s = NULL: must be given where def->type is %d", name,
+                          of_type);
+    if (type != of_type && part)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->%s: must be NULL where def->type is %d, not %d", name,
+                          type, of_type);
+    return SADMM_OK;
+}
+
 sadmm_status sadmm_shape_form_check(const sadmm_shape_def *def, double orientation[4], struct sadmm_error *error)
 {
     if ((int)def->type < 0 || def->type >= SADMM_SHAPE_TYPE_COUNT)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->type = %d: must be in [0, %d)", (int)def->type,
                           SADMM_SHAPE_TYPE_COUNT);
-    if (def->type == SADMM_SHAPE_HULL && !def->hull)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->hull = NULL: must be given where def->type is %d",
-                          SADMM_SHAPE_HULL);
-    if (def->type != SADMM_SHAPE_HULL && def->hull)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->hull: must be NULL where def->type is %d, not %d",
-                          (int)def->type, SADMM_SHAPE_HULL);
+    TRY(check_part("hull", def->hull, SADMM_SHAPE_HULL, (int)def->type, error));
+    TRY(check_part("mesh", def->mesh, SADMM_SHAPE_MESH, (int)def->type, error));
     for (int k = 0; k < geometry_sizes(def->type); ++k)
         if (!(def->size[k] >= 1e-6 && def->size[k] <= 1e6))
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->size[%d] = %g: must be in [1e-6, 1e6] m", k,

@@ -62,8 +62,8 @@ void sadmm_world_destroy(sadmm_world *world)
     sadmm_rows_free(&world->last_start.rows);
     for (size_t slot = 0; slot < world->body_slots; ++slot) sadmm_free(world->bodies[slot].name);
     sadmm_world_free_tables(world);
-    sadmm_hull_pool_free(&world->hull_pool);
-    void *blocks[] = {world->bodies, world->shapes, world->shape_generations, world->geometries, world->hull_shapes,
+    sadmm_block_pool_free(&world->block_pool);
+    void *blocks[] = {world->bodies, world->shapes, world->shape_generations, world->geometries, world->block_shapes,
                       world->disabled_pairs.keys, world->disabled_pairs.values, world->joined_pairs.keys,
                       world->joined_pairs.values, world->filtered_pairs, world->joints, world->couplings, world->gears,
                       world->joint_sources, world->joint_labels, world->joint_touch, world->joint_constraints,

@@ -1,6 +1,6 @@
 /* A world's insides, shared by the files of this folder. Each calls those before it alone:
  *
- *   slots, pair_table, hull_pool, ids, report   lists and names
+ *   slots, pair_table, block_pool, ids, report   lists and names
  *   driven                           kinematic bodies in a step
  *   gather                           what a step reads
  *   coupling_step                    what couplings keep from step to step
@@ -13,6 +13,7 @@
 #ifndef SADMM_CORE_WORLD_INTERNAL_H
 #define SADMM_CORE_WORLD_INTERNAL_H
 
+#include "block_pool.h"
 #include "collision/collision.h"
 #include "core/base/check.h"
 #include "core/base/error.h"
@@ -24,7 +25,6 @@
 #include "core/solve/joined.h"
 #include "core/solve/kernels.h"
 #include "core/solve/schedule.h"
-#include "hull_pool.h"
 #include "pair_table.h"
 #include "slots.h"
 #include "subadmm/coupling.h"
@@ -56,9 +56,10 @@ struct sadmm_world_body {
     int64_t set_at[SADMM_BODY_EDITS]; /* steps enqueued since the world was loaded, when that was set; -1: before */
 };
 
-/* What the definition of a hull's shape had; contact finding has the shape in another frame. */
-struct sadmm_world_hull_shape {
-    const sadmm_hull *hull;
+/* What the definition of a hull's shape had, or a mesh's; contact finding has the shape in another frame. */
+struct sadmm_world_block_shape {
+    const sadmm_hull *hull; /* NULL: of a mesh */
+    const sadmm_mesh *mesh;
     double position[3], orientation[4];
 };
 
@@ -137,9 +138,9 @@ struct sadmm_world {
     int32_t shape_count;
     struct sadmm_slot_marks shape_marks;
     uint32_t shape_revisions;
-    struct sadmm_hull_pool hull_pool;
-    struct sadmm_world_hull_shape *hull_shapes; /* by slot, as far as there are hulls */
-    size_t hull_shape_slots, hull_shape_capacity;
+    struct sadmm_block_pool block_pool;
+    struct sadmm_world_block_shape *block_shapes; /* by slot, as far as there are hulls or meshes */
+    size_t block_shape_slots, block_shape_capacity;
     struct sadmm_pair_table disabled_pairs, friction_pairs;
 
     struct sadmm_world_joint *joints;

@@ -1,0 +1,81 @@
+/* Triangle meshes and heightfields: ground, and whatever else does not move or is moved by the caller
+ * (SADMM_SHAPE_MESH, world.h).
+ *
+ * A mesh is a surface, solid behind: a triangle's corners run counter-clockwise seen from the side where bodies are.
+ * Neighbouring triangles know each other. Where bodies slide from one to the next, the edges and corners between them
+ * push in no direction that the surface does not (docs/shapes.md), so that flat ground is flat however it is divided.
+ *
+ * A mesh is made once and never changes. Any number of worlds and threads may use it at the same time; it lives until
+ * its maker and every world with shapes of it have let go of it. Every world keeps a copy of its data beside its other
+ * shapes (sadmm_mesh_bytes), and a device one more.
+ *
+ * Errors are returned as a status; the message is sadmm_last_message.
+ */
+#ifndef SUBADMM_MESH_H
+#define SUBADMM_MESH_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct sadmm_mesh sadmm_mesh;
+
+typedef struct sadmm_mesh_def {
+    const double *vertices;   /* 3 numbers each, m, in [-1e6, 1e6]; those of equal numbers are one vertex. Only read while
+                                 the mesh is made, as are the triangles. No default */
+    size_t vertex_count;      /* in [3, 2^26]; no default */
+    const int32_t *triangles; /* 3 vertices each, in [0, vertex_count), counter-clockwise seen from outside. Triangles
+                                 with two vertices in one place, or whose corners lie within 1e-9 of their longest edge
+                                 of a line, are left out (sadmm_mesh_left_out). No default */
+    size_t triangle_count;    /* in [1, 2^26]; no default */
+} sadmm_mesh_def;
+
+/* Nothing given yet. Thread-safe. */
+SADMM_API sadmm_mesh_def sadmm_mesh_def_default(void);
+
+/* *out: the mesh, which belongs to the caller until sadmm_mesh_destroy; NULL after an error. Thread-safe. Errors:
+ * INVALID_ARGUMENT (range; no triangle is left), OUT_OF_MEMORY. */
+SADMM_API sadmm_status sadmm_mesh_create(const sadmm_mesh_def *def, sadmm_mesh **out);
+
+/* Heights over a regular grid of the x-y plane, whose middle is the origin; bodies are above. Every cell is two
+ * triangles, parted by the diagonal from its lowest x and y to its highest. */
+typedef struct sadmm_heightfield_def {
+    const double *heights;    /* m, in [-1e6, 1e6], columns x rows of them: x runs fastest. Only read while the mesh is
+                                 made. No default */
+    int32_t columns, rows;    /* heights along x, and along y: each in [2, 16384], their product at most 2^26; no
+                                 default */
+    double spacing[2];        /* between two of them along x, and along y, m, in [1e-6, 1e6]; no default */
+} sadmm_heightfield_def;
+
+/* Nothing given yet. Thread-safe. */
+SADMM_API sadmm_heightfield_def sadmm_heightfield_def_default(void);
+/* As sadmm_mesh_create; it takes a tenth of the memory of a mesh of the same surface. The frame of a
+ * SADMM_SHAPE_MESH of it is that of the grid. */
+SADMM_API sadmm_status sadmm_heightfield_create(const sadmm_heightfield_def *def, sadmm_mesh **out);
+
+/* Give up the caller's hold of the mesh; NULL is fine. Worlds that have shapes of it keep it. Thread-safe, once. */
+SADMM_API void sadmm_mesh_destroy(sadmm_mesh *mesh);
+
+/* All of the following only read the mesh, and may run on any number of threads at once. Of NULL: 0. */
+
+/* Triangles that bodies meet: without those left out. */
+SADMM_API int64_t sadmm_mesh_triangle_count(const sadmm_mesh *mesh);
+/* Triangles of the definition that are none: see sadmm_mesh_def. */
+SADMM_API int64_t sadmm_mesh_left_out(const sadmm_mesh *mesh);
+/* Edges of one triangle only, or of more than two: there the surface ends. 0 of a closed one. */
+SADMM_API int64_t sadmm_mesh_open_edges(const sadmm_mesh *mesh);
+/* Memory that a world needs for it, and a device, in bytes. */
+SADMM_API size_t sadmm_mesh_bytes(const sadmm_mesh *mesh);
+
+/* The smallest box around it, in the frame of the vertices (or of the grid), m. Errors: INVALID_ARGUMENT (NULL). */
+SADMM_API sadmm_status sadmm_mesh_bounds(const sadmm_mesh *mesh, double lowest[3], double highest[3]);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,322 @@
+/* A triangle of a mesh (b) against sphere, capsule, box and hull (a), in the frame of the mesh. As for two hulls
+ * (manifold_hull.h), but that the surface has one side, and that it goes on beyond the triangle (mesh_triangle.h):
+ *
+ *   1. What is above the triangle's plane by more than the limit is no contact.
+ *   2. What lies on it: the points of the facing faces, if the deepest of the body is among them. That is all that most
+ *      pairs ask for.
+ *   3. Else the nearest points, or the least depth, and the axis to use, as for hulls. Where the surface does not push
+ *      along that, its face takes over, if the body is over it; of what is in each other, the best of all axes that it
+ *      does push along. But not if it says something else altogether: that a body whose rim hangs over a wall is to
+ *      leave through the wall. Then it is a matter for the other triangles.
+ *   4. Points on edges and corners that are flat are left out, and of points that several triangles would have along
+ *      one and the same normal all but the first triangle's.
+ *
+ * What is so far below the surface that its deepest point is nearer to another side is still pushed out by the side
+ * where it came from, as long as the pair remembers it.
+ */
+#ifndef SADMM_COLLISION_MANIFOLD_MESH_H
+#define SADMM_COLLISION_MANIFOLD_MESH_H
+
+#include "manifold_hull.h"
+#include "mesh_triangle.h"
+
+/* Up to this share of the thinner extent a body is pushed out by the face that it is over, whatever else would be
+ * nearer: a body that slides on to the next triangle of a plane is over it by a sliver, at first. */
+#define MESH_SHALLOW ((real)0.05)
+
+/* What a triangle and a shape are to each other. */
+struct mesh_pair {
+    struct mesh mesh;
+    struct mesh_triangle triangle;
+    struct polytope_pair pair;  /* in the frame of the mesh, moved to the triangle */
+    struct polytope_axis front; /* the axis of the triangle's face */
+};
+
+SADMM_INLINE void mesh_pair_make(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *blocks,
+                                 uint32_t child, const struct pair_pose *pose, struct mesh_pair *p)
+{
+    struct polytope_pair *pair = &p->pair;
+    real size2 = 0;
+    int k;
+    mesh_at(blocks, b->hull, &p->mesh);
+    mesh_triangle_of(&p->mesh, (int32_t)child, &p->triangle);
+    polytope_of(a, blocks, &pair->a);
+    mesh_triangle_polytope(&p->triangle, &pair->b);
+    for (k = 0; k < 3; ++k) {
+        pair->R.r[k] = r3_vec3(pose->R[k]);
+        size2 = real_max(size2, v3_norm2(mesh_corner(&p->triangle, k)));
+    }
+    pair->t = v3_sub(r3_vec3(pose->t), p->triangle.origin);
+    pair->thin = (real)smaller_of(geometry_thickness(a), geometry_thickness(b));
+    pair->size = (real)geometry_radius(a) + real_sqrt(size2) + v3_norm(pair->t);
+    pair->slack = 8 * SADMM_EPSILON * pair->size;
+    axis_of_face_b(pair, MESH_FRONT, &p->front);
+}
+
+SADMM_INLINE real manifold_least(const struct manifold *m)
+{
+    real least = SADMM_REAL_MAX;
+    int k;
+    for (k = 0; k < m->count; ++k) least = real_min(least, m->points[k].separation);
+    return least;
+}
+
+/* A point that says nothing that others do not. shared: other triangles have the same normal. */
+SADMM_INLINE bool mesh_leaves_out(const struct mesh_triangle *t, uint32_t feature, bool shared)
+{
+    const uint32_t number = feature & AXIS_EDGE_MASK;
+    switch (feature >> AXIS_KIND_SHIFT) {
+    case FEATURE_VERTEX_B:
+        return mesh_marked(t->marks, MESH_CORNER_FLAT, (int)number - 1) ||
+               (shared && !mesh_marked(t->marks, MESH_CORNER_OWN, (int)number - 1));
+    case FEATURE_CROSSING:
+        return mesh_marked(t->marks, MESH_EDGE_FLAT, (int)number) ||
+               (shared && !mesh_marked(t->marks, MESH_EDGE_OWN, (int)number));
+    default: return false;
+    }
+}
+
+/* The points that are this triangle's to give, in the frame of the mesh. shared: other triangles have the same normal. */
+SADMM_INLINE void mesh_give(const struct mesh_triangle *t, bool shared, struct manifold *m)
+{
+    int k, kept = 0;
+    for (k = 0; k < m->count; ++k) {
+        struct manifold_point point = m->points[k];
+        if (mesh_leaves_out(t, point.feature, shared)) continue;
+        point.position = v3_add(point.position, t->origin);
+        m->points[kept++] = point;
+    }
+    m->count = kept;
+}
+
+/* kind: of the axis. */
+SADMM_INLINE void mesh_finish(const struct mesh_pair *p, int kind, struct manifold *m)
+{
+    const bool sphere = p->pair.a.vertices == 1;
+    if (sphere && m->count > 0 && !mesh_owns(&p->triangle, v3_neg(m->normal))) m->count = 0;
+    mesh_give(&p->triangle, kind == AXIS_FACE_A, m);
+}
+
+/* Does the body lie on the triangle: is the lowest point of it over the face? known: it did in the last step, or else
+ * it must not be deep. */
+SADMM_INLINE bool mesh_lies_on(const struct polytope_pair *pair, const struct polytope_axis *front, bool known,
+                               const struct manifold *m)
+{
+    const real least = manifold_least(m);
+    if (m->count == 0) return false;
+    if (front->separation >= 0) return least <= front->separation + 2 * pair->slack;
+    return least <= front->separation + MANIFOLD_FLAT * pair->thin &&
+           (known || front->separation >= -MANIFOLD_KEEP_EXTENT * pair->thin);
+}
+
+/* What needs no search: true, and the manifold is there, or there is none. Else as hull_by_memory. */
+SADMM_INLINE bool mesh_by_memory(const struct mesh_pair *p, real limit, uint32_t cache, struct polytope_axis *kept,
+                                 bool *known, vec3 *start, struct manifold *m)
+{
+    const struct polytope_pair *pair = &p->pair;
+    *known = axis_recall(pair, cache, kept) && !(kept->kind == AXIS_FACE_B && kept->b == MESH_BACK);
+    *start = *known ? kept->n : p->front.n;
+    if (p->front.separation > limit + pair->slack || (*known && kept->separation > limit + pair->slack)) return true;
+    if (pair->a.faces == 0 || (*known && kept->kind == AXIS_EDGES)) return false;
+    if (*known && kept->kind == AXIS_FACE_A) {
+        facing_manifold(pair, kept->n, kept->separation, limit, m);
+        if (hull_is_proven(pair, kept, m) && mesh_allows(&p->mesh, &p->triangle, v3_neg(kept->n))) {
+            m->cache = cache;
+            mesh_finish(p, AXIS_FACE_A, m);
+            return true;
+        }
+    } else {
+        facing_manifold(pair, p->front.n, p->front.separation, limit, m);
+        if (mesh_lies_on(pair, &p->front, *known, m)) {
+            m->cache = axis_memory(&p->front);
+            mesh_finish(p, AXIS_FACE_B, m);
+            return true;
+        }
+    }
+    m->count = 0;
+    m->cache = 0;
+    return false;
+}
+
+/* Is x over the face, or beside it by no more than the tolerance? */
+SADMM_INLINE bool mesh_is_over(const struct mesh_triangle *t, vec3 x, real tolerance)
+{
+    int k;
+    for (k = 0; k < 3; ++k) {
+        const vec3 from = mesh_corner(t, k), d = v3_sub(mesh_corner(t, mesh_next_corner(k)), from);
+        if (v3_dot(v3_cross(t->normal, d), v3_sub(x, from)) < -tolerance * v3_norm(d)) return false;
+    }
+    return true;
+}
+
+/* The ends of a capsule, or a sphere, that are over the face: steep ones as well, for what stands on one end may fall
+ * onto the other within the step. */
+SADMM_INLINE void mesh_ends_over(const struct mesh_pair *p, real limit, struct manifold *m)
+{
+    const struct polytope_pair *pair = &p->pair;
+    const vec3 n = p->triangle.normal;
+    int k;
+    m->normal = p->front.n;
+    for (k = 0; k < pair->a.vertices; ++k) {
+        const vec3 x = pair_point_a(pair, k);
+        const real gap = v3_dot(n, x) - pair->a.radius;
+        if (gap > limit + pair->slack || !mesh_is_over(&p->triangle, x, MANIFOLD_SNAP / 2 * pair->thin)) continue;
+        manifold_add(m, v3_madd(x, -pair->a.radius - gap / 2, n), gap, polytope_feature(FEATURE_VERTEX_A, 0, k) + 1);
+    }
+}
+
+/* The directions that an edge pushes along, if it stands out: they go down to both sides of it. */
+struct mesh_arc {
+    vec3 from, along; /* the edge */
+    vec3 side[2];     /* across it, on the surface, to each side */
+};
+
+/* False: the edge does not stand out. */
+SADMM_INLINE bool mesh_arc_of(const struct mesh *mesh, const struct mesh_triangle *t, int k, struct mesh_arc *arc)
+{
+    vec3 beyond;
+    arc->from = mesh_corner(t, k);
+    arc->along = v3_sub(mesh_corner(t, mesh_next_corner(k)), arc->from);
+    arc->side[0] = v3_cross(t->normal, arc->along);
+    if (t->opposite[k] < 0) { /* the surface ends: as if it went on straight down */
+        arc->side[1] = v3_neg(t->normal);
+        return true;
+    }
+    beyond = v3_sub(v3_sub(mesh_vertex(mesh, t->opposite[k]), t->origin), arc->from);
+    arc->side[1] = beyond;
+    return v3_dot(beyond, t->normal) < 0 && !mesh_marked(t->marks, MESH_EDGE_FLAT, k);
+}
+
+/* The axis of an edge of a and one of the triangle, if both push along it. */
+SADMM_INLINE bool mesh_edge_axis(const struct polytope_pair *pair, const struct mesh_arc *arc, int k, int e,
+                                 struct polytope_axis *axis)
+{
+    vec3 from, n, m[2];
+    const vec3 d = edge_of_a(pair, e, &from);
+    real n2;
+    int i;
+    n = v3_cross(d, arc->along);
+    n2 = v3_norm2(n);
+    if (!(n2 > (real)1e-8 * v3_norm2(d) * v3_norm2(arc->along))) return false;
+    /* into the surface: seen from it, both its sides go down */
+    n = v3_scale(n, (v3_dot(n, arc->side[0]) < 0 ? -1 : 1) / real_sqrt(n2));
+    if (v3_dot(n, arc->side[0]) < 0 || v3_dot(n, arc->side[1]) < 0) return false;
+    if (pair->a.faces > 0) { /* between the normals of its faces */
+        for (i = 0; i < 2; ++i) m[i] = m3_mul(pair->R, polytope_normal(&pair->a, pair->a.edge_face[2 * e + i]));
+        if (v3_dot(v3_cross(m[0], n), v3_cross(n, m[1])) < 0 || v3_dot(n, v3_add(m[0], m[1])) < 0) return false;
+    }
+    axis->kind = AXIS_EDGES;
+    axis->a = e;
+    axis->b = k;
+    axis->n = n;
+    axis->separation = v3_dot(n, v3_sub(arc->from, from)) - pair_radii(pair);
+    return true;
+}
+
+/* Of all axes that the surface pushes along the one by which the two are least deep in each other. */
+SADMM_INLINE void mesh_best_axis(const struct mesh_pair *p, struct polytope_axis *best)
+{
+    const struct polytope_pair *pair = &p->pair;
+    struct polytope_axis axis;
+    struct mesh_arc arc;
+    int f, k, e;
+    *best = p->front;
+    for (f = 0; f < pair->a.faces; ++f) {
+        axis_of_face_a(pair, f, &axis);
+        if (axis.separation > best->separation && mesh_allows(&p->mesh, &p->triangle, v3_neg(axis.n))) *best = axis;
+    }
+    for (k = 0; k < 3; ++k) {
+        if (!mesh_arc_of(&p->mesh, &p->triangle, k, &arc)) continue;
+        for (e = 0; e < pair->a.edges; ++e)
+            if (mesh_edge_axis(pair, &arc, k, e, &axis) && axis.separation > best->separation) *best = axis;
+    }
+}
+
+/* Where the surface does not push along the axis of least depth, or of the nearest points. */
+SADMM_RARE void mesh_by_surface(const struct mesh_pair *p, const struct polytope_axis *nearest, bool kept_front,
+                                real limit, struct manifold *m)
+{
+    const struct polytope_pair *pair = &p->pair;
+    struct polytope_axis axis = p->front;
+    vec3 pa, pb;
+    real least;
+    if (nearest->separation < -pair_radii(pair) && !kept_front) mesh_best_axis(p, &axis);
+    if (axis.kind == AXIS_FACE_B && pair->a.faces == 0) mesh_ends_over(p, limit, m);
+    else facing_manifold(pair, axis.n, axis.separation, limit, m);
+    m->cache = axis_memory(&axis);
+    if (axis.kind == AXIS_EDGES && hull_crossing(pair, &axis, &pa, &pb)) {
+        pa = v3_madd(pa, pair->a.radius, axis.n);
+        hull_add_nearest(pair->thin, pa, pb, polytope_feature(FEATURE_CROSSING, axis.a, axis.b), m);
+    }
+    /* much deeper by it than by a way out that has not much to do with it: that is for other triangles to say */
+    least = manifold_least(m);
+    if (!kept_front && v3_dot(axis.n, nearest->n) < (real)0.5 &&
+        least < 4 * real_min(nearest->separation, 0) - MESH_SHALLOW * pair->thin)
+        m->count = 0;
+    mesh_finish(p, axis.kind, m);
+}
+
+/* limit SADMM_REAL_MAX: the nearest points, whatever the surface around (advance.h). */
+SADMM_RARE void mesh_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *blocks,
+                              uint32_t child, const struct pair_pose *pose, real limit, uint32_t cache,
+                              struct manifold *m)
+{
+    struct mesh_pair p;
+    struct polytope_axis kept, nearest, axis;
+    vec3 pa, pb, start;
+    uint32_t feature;
+    bool known = false;
+    const bool of_any_distance = !(limit < SADMM_REAL_MAX);
+
+    mesh_pair_make(a, b, blocks, child, pose, &p);
+    start = p.front.n;
+    kept = p.front; /* until something is known */
+    if (!of_any_distance && mesh_by_memory(&p, limit, cache, &kept, &known, &start, m)) return;
+    if (!hull_nearest(&p.pair, start, limit, &nearest, &pa, &pb, &feature)) return;
+    axis = nearest;
+    if (of_any_distance) {
+        m->normal = axis.n;
+        hull_add_nearest(p.pair.thin, pa, pb, feature, m);
+        m->points[0].position = v3_add(m->points[0].position, p.triangle.origin);
+        return;
+    }
+    if (p.pair.a.faces > 0) hull_choose(&p.pair, &kept, known, &axis);
+    else hull_choose_inside(&p.pair, &kept, known, &axis);
+    hull_keep_edges(&p.pair, &nearest, &axis, &pa, &pb, &feature);
+    if (!mesh_allows(&p.mesh, &p.triangle, v3_neg(axis.n))) axis = nearest;
+    if (!mesh_allows(&p.mesh, &p.triangle, v3_neg(axis.n))) {
+        mesh_by_surface(&p, &nearest, known && kept.kind == AXIS_FACE_B, limit, m);
+        return;
+    }
+    if (mesh_is_front(&p.triangle, v3_neg(axis.n))) axis = p.front;
+    if (p.pair.a.faces > 0 || hull_has_face_along(&p.pair, axis.n))
+        facing_manifold(&p.pair, axis.n, axis.separation, limit, m);
+    if (m->count == 0 && (axis.kind == AXIS_FACE_A || axis.kind == AXIS_FACE_B)) { /* not over each other */
+        axis = nearest;
+        if (!mesh_allows(&p.mesh, &p.triangle, v3_neg(axis.n))) {
+            mesh_by_surface(&p, &nearest, known && kept.kind == AXIS_FACE_B, limit, m);
+            return;
+        }
+    }
+    m->normal = axis.n;
+    m->cache = axis_memory(&axis);
+    hull_add_nearest(p.pair.thin, pa, pb, feature, m);
+    mesh_finish(&p, axis.kind, m);
+}
+
+/* The same where that is little work (hull_manifold_at_once). */
+SADMM_RARE bool mesh_manifold_at_once(const struct sadmm_geometry *a, const struct sadmm_geometry *b,
+                                      const double *blocks, uint32_t child, const struct pair_pose *pose, real limit,
+                                      uint32_t cache, struct manifold *m)
+{
+    struct mesh_pair p;
+    struct polytope_axis kept;
+    struct gjk_simplex s;
+    vec3 start, v;
+    bool known;
+    mesh_pair_make(a, b, blocks, child, pose, &p);
+    return mesh_by_memory(&p, limit, cache, &kept, &known, &start, m) ||
+           gjk_distance(&p.pair, start, limit + pair_radii(&p.pair) + p.pair.slack, &s, &v) == GJK_FAR;
+}
+
+#endif
