@@ -127,6 +127,18 @@ static inline void point_in_world(const struct pair_of *t, vec3 x, double world[
     for (int k = 0; k < 3; ++k) world[k] += t->x[1][k];
 }
 
+/* How far the two points that face each other across `gap` are outside of their bodies, the worse of them. */
+static inline double points_outside(const struct pair_of *t, vec3 n, vec3 middle, double gap)
+{
+    double outside = -HUGE_VAL;
+    for (int s = 0; s < 2; ++s) {
+        double world[3];
+        point_in_world(t, v3_madd(middle, s == 0 ? -gap / 2 : gap / 2, n), world);
+        outside = fmax(outside, own_outside(t, s, world));
+    }
+    return outside;
+}
+
 /* A shape of any type; hulls: of so many points, rounded now and then. scale: m. */
 static inline void random_shape_of(struct random *r, struct pair_of *t, int s, int type, double scale)
 {

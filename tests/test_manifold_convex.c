@@ -24,18 +24,6 @@ static struct convex_axis nearest_axis(const struct pair_of *t)
     return axis;
 }
 
-/* How far the two points that face each other across `gap` are outside of their bodies, the worse of them. */
-static double points_outside(const struct pair_of *t, vec3 n, vec3 middle, double gap)
-{
-    double outside = -HUGE_VAL;
-    for (int s = 0; s < 2; ++s) {
-        double world[3];
-        point_in_world(t, v3_madd(middle, s == 0 ? -gap / 2 : gap / 2, n), world);
-        outside = fmax(outside, own_outside(t, s, world));
-    }
-    return outside;
-}
-
 struct found {
     double apart; /* of the two along n, by their own supports */
     double off;   /* how far from a certificate: |gap of two points - apart|, or how far these are outside */

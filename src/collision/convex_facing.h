@@ -34,6 +34,7 @@ struct convex_meeting {
     const struct convex_pair *pair;
     vec3 n, x1, x2;
     real least, limit, tolerance;
+    real nearest; /* gap of all points that there are, those that are left out included */
     int count;
     struct facing_corner at[CONVEX_POINTS];
     real gap[CONVEX_POINTS];
@@ -155,6 +156,17 @@ SADMM_INLINE bool convex_is_on(const struct convex_facing *flat, vec3 x, real to
     return true;
 }
 
+/* Is the point of a corner, or on a side, of b that is left out? */
+SADMM_INLINE bool convex_leaves_out(const struct convex_pair *pair, uint32_t feature)
+{
+    const uint32_t number = feature & AXIS_EDGE_MASK;
+    switch (feature >> AXIS_KIND_SHIFT) {
+    case FEATURE_VERTEX_B: return number <= 16 && (pair->left_out >> (number - 1) & 1) != 0;
+    case FEATURE_CROSSING: return number < 16 && (pair->left_out >> (16 + number) & 1) != 0;
+    default: return false;
+    }
+}
+
 /* A point by where it is on each of the two, without their rounds. */
 SADMM_CALLED void convex_meet(struct convex_meeting *m, vec3 on_a, vec3 on_b, uint32_t feature)
 {
@@ -163,7 +175,8 @@ SADMM_CALLED void convex_meet(struct convex_meeting *m, vec3 on_a, vec3 on_b, ui
     const vec3 x = v3_madd(v3_scale(v3_add(on_a, on_b), (real)0.5), (pair->a.p.radius - pair->b.p.radius) / 2, m->n);
     struct facing_corner at;
     int k;
-    if (!(gap <= m->limit + pair->slack) || m->count == CONVEX_POINTS) return;
+    m->nearest = real_min(m->nearest, gap);
+    if (!(gap <= m->limit + pair->slack) || m->count == CONVEX_POINTS || convex_leaves_out(pair, feature)) return;
     at.x = v3_dot(m->x1, x);
     at.y = v3_dot(m->x2, x);
     at.z = v3_dot(m->n, x);
@@ -387,8 +400,9 @@ SADMM_INLINE real convex_slope(const struct convex_facing *f, vec3 n)
     return real_sqrt(real_max(0, 1 - c * c)) / c;
 }
 
-/* Sets m's normal to n, and its points to those of what faces along it. least: the separation of the two along n. */
-SADMM_RARE void convex_facing_manifold(const struct convex_pair *pair, vec3 n, real least, real limit,
+/* Sets m's normal to n, and its points to those of what faces along it. least: the separation of the two along n. The
+ * smallest gap of all that there are, those that are left out included; largest: there are none. */
+SADMM_RARE real convex_facing_manifold(const struct convex_pair *pair, vec3 n, real least, real limit,
                                        struct manifold *m)
 {
     struct convex_facing a, b;
@@ -399,15 +413,16 @@ SADMM_RARE void convex_facing_manifold(const struct convex_pair *pair, vec3 n, r
     m->normal = n;
     m->count = 0;
     convex_facing_of(&pair->a, m3_tmul(pair->R, n), &a);
-    if (a.kind == CONVEX_NOTHING) return;
+    if (a.kind == CONVEX_NOTHING) return SADMM_REAL_MAX;
     convex_facing_of(&pair->b, v3_neg(n), &b);
-    if (b.kind == CONVEX_NOTHING) return;
+    if (b.kind == CONVEX_NOTHING) return SADMM_REAL_MAX;
     convex_facing_place(pair, &a);
 
     meeting.pair = pair;
     meeting.n = n;
     meeting.least = least;
     meeting.limit = limit;
+    meeting.nearest = SADMM_REAL_MAX;
     meeting.count = 0;
     slope = convex_slope(&a, n) + convex_slope(&b, n);
     meeting.tolerance = MANIFOLD_SNAP / 2 * slope > FACING_GAP ? FACING_GAP / slope : MANIFOLD_SNAP / 2;
@@ -434,6 +449,7 @@ SADMM_RARE void convex_facing_manifold(const struct convex_pair *pair, vec3 n, r
             manifold_add(m, v3_madd(v3_madd(v3_scale(meeting.x1, p->x), p->y, meeting.x2), p->z, n), meeting.gap[i],
                          meeting.feature[i]);
         }
+    return meeting.nearest;
 }
 
 #endif

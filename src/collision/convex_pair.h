@@ -14,6 +14,7 @@ struct convex_pair {
     vec3 t;
     vec3 shift;  /* of b, while it is held away from a */
     vec3 spread; /* what points of rims are spread from (convex_facing.h); 0: a side of the other one's flat or line */
+    uint32_t left_out; /* of b: bit k: corner k, 16 + k: side k: points there are not wanted (convex_facing.h) */
     real thin;   /* the thinner one's smallest extent */
     real size;   /* of both, and of what is between them: what rounding is measured by */
     real slack;  /* rounding of a separation */
@@ -24,6 +25,7 @@ struct convex_pair {
 SADMM_INLINE void convex_pair_finish(struct convex_pair *pair)
 {
     pair->shift = pair->spread = v3(0, 0, 0);
+    pair->left_out = 0;
     pair->slack = 8 * SADMM_EPSILON * pair->size;
     pair->enough = sizeof(real) == 4 ? (real)1e-5 : (real)1e-8;
 }

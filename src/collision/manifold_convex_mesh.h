@@ -48,6 +48,9 @@ SADMM_INLINE void convex_triangle_make(const struct sadmm_geometry *a, const str
     pair->size = (real)geometry_radius(a) + real_sqrt(size2) + v3_norm(pair->t);
     convex_pair_finish(pair);
     pair->spread = v3(1, 0, 0);
+    for (k = 0; k < 3; ++k) /* before points are chosen: others are to be in their place */
+        pair->left_out |= (uint32_t)mesh_marked(p->triangle.marks, MESH_CORNER_FLAT, k) << k |
+                          (uint32_t)mesh_marked(p->triangle.marks, MESH_EDGE_FLAT, k) << (16 + k);
     convex_flat_axis(pair, false, MESH_FRONT, &p->front);
 }
 
@@ -64,13 +67,16 @@ SADMM_INLINE void convex_mesh_give(const struct convex_triangle *p, bool shared,
     mesh_give(&p->triangle, shared, m);
 }
 
-/* The points along the normal of the face, with the lowest one of the body if it is over the face. */
-SADMM_INLINE void convex_on_front(const struct convex_triangle *p, real limit, struct manifold *m)
+/* The points along the normal of the face, with the lowest one of the body if it is over the face. The smallest gap that
+ * there is, largest: there is none. */
+SADMM_INLINE real convex_on_front(const struct convex_triangle *p, real limit, struct manifold *m)
 {
     const struct convex_axis *front = &p->front;
-    convex_facing_manifold(&p->pair, front->n, front->separation, limit, m);
-    if (mesh_is_over(&p->triangle, front->pa, MANIFOLD_SNAP / 2 * p->pair.thin))
+    const real least = convex_facing_manifold(&p->pair, front->n, front->separation, limit, m);
+    if (!mesh_is_over(&p->triangle, front->pa, MANIFOLD_SNAP / 2 * p->pair.thin)) return least;
+    if (least > front->separation + MANIFOLD_FLAT * p->pair.thin)
         hull_add_nearest(p->pair.thin, front->pa, front->pb, polytope_feature(FEATURE_NEAREST, 0, 0), m);
+    return front->separation;
 }
 
 /* Does the body lie on the triangle (mesh_lies_on)? Then its points are m's. */
@@ -79,9 +85,7 @@ SADMM_INLINE bool convex_lies_on(const struct convex_triangle *p, bool known, re
     const struct convex_pair *pair = &p->pair;
     const real separation = p->front.separation;
     if (!known && separation < -MANIFOLD_KEEP_EXTENT * pair->thin) return false;
-    convex_on_front(p, limit, m);
-    if (m->count == 0) return false;
-    return manifold_least(m) <= separation + (separation >= 0 ? 2 * pair->slack : MANIFOLD_FLAT * pair->thin);
+    return convex_on_front(p, limit, m) <= separation + (separation >= 0 ? 2 * pair->slack : MANIFOLD_FLAT * pair->thin);
 }
 
 /* The axis n, if what of the body is deepest along it is where the edge is. */
@@ -155,13 +159,14 @@ SADMM_RARE void convex_by_surface(const struct convex_triangle *p, const struct 
     struct convex_axis axis = p->front;
     uint32_t cache = CONVEX_MEMORY_FLAT_B | (uint32_t)MESH_FRONT << MANIFOLD_DIRECTION_SHIFT;
     bool front;
+    real least;
     if (nearest->separation < 0 && !kept_front) cache = convex_best_axis(p, &axis);
     front = (cache & CONVEX_MEMORY_MASK) == CONVEX_MEMORY_FLAT_B;
-    if (front) convex_on_front(p, limit, m);
-    else convex_points(pair, &axis, limit, m);
+    if (front) least = convex_on_front(p, limit, m);
+    else convex_points(pair, &axis, limit, m), least = axis.separation;
     m->cache = cache;
     if (!kept_front && v3_dot(axis.n, nearest->n) < (real)0.5 &&
-        manifold_least(m) < 4 * real_min(nearest->separation, 0) - MESH_SHALLOW * pair->thin)
+        least < 4 * real_min(nearest->separation, 0) - MESH_SHALLOW * pair->thin)
         m->count = 0;
     convex_mesh_give(p, !front, m);
 }
