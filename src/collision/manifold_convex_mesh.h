@@ -67,6 +67,15 @@ SADMM_INLINE void convex_mesh_give(const struct convex_triangle *p, bool shared,
     mesh_give(&p->triangle, shared, m);
 }
 
+/* Is a cap of the body along the face, so that points of its rim are the lowest? */
+SADMM_INLINE bool convex_cap_is_even(const struct convex_triangle *p)
+{
+    const struct convex *c = &p->pair.a;
+    const vec3 d = m3_tmul(p->pair.R, p->front.n);
+    return convex_flat(c, d, MANIFOLD_COS_NEAR) >= 0 &&
+           c->size.x * real_sqrt(d.x * d.x + d.y * d.y) <= MANIFOLD_FLAT * p->pair.thin;
+}
+
 /* The points along the normal of the face, with the lowest one of the body if it is over the face. The smallest gap that
  * there is, largest: there is none. */
 SADMM_INLINE real convex_on_front(const struct convex_triangle *p, real limit, struct manifold *m)
@@ -74,9 +83,30 @@ SADMM_INLINE real convex_on_front(const struct convex_triangle *p, real limit, s
     const struct convex_axis *front = &p->front;
     const real least = convex_facing_manifold(&p->pair, front->n, front->separation, limit, m);
     if (!mesh_is_over(&p->triangle, front->pa, MANIFOLD_SNAP / 2 * p->pair.thin)) return least;
-    if (least > front->separation + MANIFOLD_FLAT * p->pair.thin)
+    if (!convex_cap_is_even(p))
         hull_add_nearest(p->pair.thin, front->pa, front->pb, polytope_feature(FEATURE_NEAREST, 0, 0), m);
     return front->separation;
+}
+
+/* Is x, on the triangle, at a side that is flat? What is nearest there says nothing. */
+SADMM_INLINE bool convex_at_flat_side(const struct convex_triangle *p, vec3 x)
+{
+    const struct mesh_triangle *t = &p->triangle;
+    int k;
+    for (k = 0; k < 3; ++k) {
+        const vec3 from = mesh_corner(t, k), d = v3_sub(mesh_corner(t, mesh_next_corner(k)), from);
+        if (mesh_marked(t->marks, MESH_EDGE_FLAT, k) &&
+            v3_norm(v3_cross(d, v3_sub(x, from))) <= MANIFOLD_SNAP / 2 * p->pair.thin * v3_norm(d))
+            return true;
+    }
+    return false;
+}
+
+/* Is u the face's normal, as far as mesh_allows can tell? */
+SADMM_INLINE bool convex_is_front(const struct mesh_triangle *t, vec3 u)
+{
+    int number;
+    return mesh_is_front(t, u) || (v3_dot(u, t->normal) > 0 && mesh_part_along(t, u, &number) == MESH_FACE);
 }
 
 /* Does the body lie on the triangle (mesh_lies_on)? Then its points are m's. */
@@ -158,12 +188,20 @@ SADMM_RARE void convex_by_surface(const struct convex_triangle *p, const struct 
     const struct convex_pair *pair = &p->pair;
     struct convex_axis axis = p->front;
     uint32_t cache = CONVEX_MEMORY_FLAT_B | (uint32_t)MESH_FRONT << MANIFOLD_DIRECTION_SHIFT;
-    bool front;
     real least;
+    bool front;
     if (nearest->separation < 0 && !kept_front) cache = convex_best_axis(p, &axis);
     front = (cache & CONVEX_MEMORY_MASK) == CONVEX_MEMORY_FLAT_B;
-    if (front) least = convex_on_front(p, limit, m);
-    else convex_points(pair, &axis, limit, m), least = axis.separation;
+    if (front) {
+        least = convex_on_front(p, limit, m);
+        /* deep, with the lowest point beside this triangle: over another one, which it may not touch */
+        if (m->count == 0 && axis.separation < -MESH_SHALLOW * pair->thin && nearest->separation < 0 &&
+            v3_dot(axis.n, nearest->n) >= (real)0.5)
+            hull_add_nearest(pair->thin, nearest->pa, nearest->pb, polytope_feature(FEATURE_NEAREST, 0, 0), m);
+    } else {
+        least = axis.separation;
+        convex_points(pair, &axis, limit, m);
+    }
     m->cache = cache;
     if (!kept_front && v3_dot(axis.n, nearest->n) < (real)0.5 &&
         least < 4 * real_min(nearest->separation, 0) - MESH_SHALLOW * pair->thin)
@@ -218,11 +256,14 @@ SADMM_RARE void convex_mesh_manifold(const struct sadmm_geometry *a, const struc
         convex_by_surface(&p, &axis, cache == of_front, limit, m);
         return;
     }
-    if (mesh_is_front(&p.triangle, v3_neg(axis.n))) {
-        axis = p.front;
+    if (convex_is_front(&p.triangle, v3_neg(axis.n))) {
+        convex_on_front(&p, limit, m);
+        if (!convex_at_flat_side(&p, axis.pb))
+            hull_add_nearest(p.pair.thin, axis.pa, axis.pb, polytope_feature(FEATURE_NEAREST, 0, 0), m);
         found = of_front;
+    } else {
+        convex_points(&p.pair, &axis, limit, m);
     }
-    convex_points(&p.pair, &axis, limit, m);
     m->cache = found;
     convex_mesh_give(&p, found != of_front, m);
 }
