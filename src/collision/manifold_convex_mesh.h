@@ -54,11 +54,13 @@ SADMM_INLINE void convex_triangle_make(const struct sadmm_geometry *a, const str
     convex_flat_axis(pair, false, MESH_FRONT, &p->front);
 }
 
-/* The points that are this triangle's to give, in the frame of the mesh. shared: other triangles have the same
- * normal. */
-SADMM_INLINE void convex_mesh_give(const struct convex_triangle *p, bool shared, struct manifold *m)
+/* The points that are this triangle's to give, in the frame of the mesh. cache, separation: of the axis. Where the two
+ * are apart all triangles at an edge or a corner have found the same there; while they overlap each speaks for itself. */
+SADMM_INLINE void convex_mesh_give(const struct convex_triangle *p, uint32_t cache, real separation, struct manifold *m)
 {
-    if (shared && m->count > 0 && !mesh_owns(&p->triangle, v3_neg(m->normal))) {
+    const uint32_t kind = cache & CONVEX_MEMORY_MASK;
+    const bool shared = kind == CONVEX_MEMORY_FLAT_A || (kind == CONVEX_MEMORY_DIRECTION && separation >= 0);
+    if (shared && separation >= 0 && m->count > 0 && !mesh_owns(&p->triangle, v3_neg(m->normal))) {
         int k, kept = 0;
         for (k = 0; k < m->count; ++k)
             if (m->points[k].feature >> AXIS_KIND_SHIFT != FEATURE_NEAREST) m->points[kept++] = m->points[k];
@@ -82,7 +84,7 @@ SADMM_INLINE real convex_on_front(const struct convex_triangle *p, real limit, s
 {
     const struct convex_axis *front = &p->front;
     const real least = convex_facing_manifold(&p->pair, front->n, front->separation, limit, m);
-    if (!mesh_is_over(&p->triangle, front->pa, MANIFOLD_SNAP / 2 * p->pair.thin)) return least;
+    if (!mesh_is_over(&p->triangle, front->pa, 4 * p->pair.slack)) return least;
     if (!convex_cap_is_even(p))
         hull_add_nearest(p->pair.thin, front->pa, front->pb, polytope_feature(FEATURE_NEAREST, 0, 0), m);
     return front->separation;
@@ -102,11 +104,14 @@ SADMM_INLINE bool convex_at_flat_side(const struct convex_triangle *p, vec3 x)
     return false;
 }
 
-/* Is u the face's normal, as far as mesh_allows can tell? */
+/* Is u the face's normal, as far as mesh_allows can tell? The distance along that is the same, to its square. */
+#define CONVEX_FRONT (16 * MESH_ACROSS)
 SADMM_INLINE bool convex_is_front(const struct mesh_triangle *t, vec3 u)
 {
     int number;
-    return mesh_is_front(t, u) || (v3_dot(u, t->normal) > 0 && mesh_part_along(t, u, &number) == MESH_FACE);
+    if (!(v3_dot(u, t->normal) > 0)) return false;
+    return v3_norm2(v3_cross(u, t->normal)) <= CONVEX_FRONT * CONVEX_FRONT ||
+           mesh_part_along(t, u, &number) == MESH_FACE;
 }
 
 /* Does the body lie on the triangle (mesh_lies_on)? Then its points are m's. */
@@ -203,10 +208,13 @@ SADMM_RARE void convex_by_surface(const struct convex_triangle *p, const struct 
         convex_points(pair, &axis, limit, m);
     }
     m->cache = cache;
-    if (!kept_front && v3_dot(axis.n, nearest->n) < (real)0.5 &&
-        least < 4 * real_min(nearest->separation, 0) - MESH_SHALLOW * pair->thin)
-        m->count = 0;
-    convex_mesh_give(p, !front, m);
+    /* much deeper by it than by a way out that has not much to do with it: that is for other triangles to say. They do at
+     * once where this is no face */
+    if (!front || (!kept_front && v3_dot(axis.n, nearest->n) < (real)0.5)) {
+        const real more = front ? MESH_SHALLOW : MANIFOLD_KEEP_EXTENT;
+        if (least < 4 * real_min(nearest->separation, 0) - more * pair->thin) m->count = 0;
+    }
+    convex_mesh_give(p, cache, axis.separation, m);
 }
 
 /* limit SADMM_REAL_MAX: the nearest points, whatever the surface around (advance.h). */
@@ -233,7 +241,7 @@ SADMM_RARE void convex_mesh_manifold(const struct sadmm_geometry *a, const struc
     if (p.front.separation > limit + p.pair.slack) return;
     if (convex_lies_on(&p, cache == of_front, limit, m)) {
         m->cache = of_front;
-        convex_mesh_give(&p, false, m);
+        convex_mesh_give(&p, of_front, p.front.separation, m);
         return;
     }
     m->count = 0;
@@ -243,7 +251,7 @@ SADMM_RARE void convex_mesh_manifold(const struct sadmm_geometry *a, const struc
         if (convex_is_proven(&p.pair, memory.axis.separation, m) &&
             mesh_allows(&p.mesh, &p.triangle, v3_neg(memory.axis.n))) {
             m->cache = cache;
-            convex_mesh_give(&p, true, m);
+            convex_mesh_give(&p, cache, memory.axis.separation, m);
             return;
         }
         m->count = 0;
@@ -265,7 +273,7 @@ SADMM_RARE void convex_mesh_manifold(const struct sadmm_geometry *a, const struc
         convex_points(&p.pair, &axis, limit, m);
     }
     m->cache = found;
-    convex_mesh_give(&p, found != of_front, m);
+    convex_mesh_give(&p, found, axis.separation, m);
 }
 
 #endif
