@@ -1,5 +1,5 @@
 /* Worlds with cylinders, cones, ellipsoids and rounded boxes: they roll as the formulas say, stand and lie still, and
- * rock back. On planes, and on boxes, which they meet by another way. */
+ * rock back. On planes, on boxes and on meshes, which they meet by other ways. */
 #include <check.h>
 #include <math.h>
 #include <stdio.h>
@@ -8,6 +8,7 @@
 #include "collision/hull_data.h"
 #include "core/math/quat.h"
 #include "core/world/world_internal.h"
+#include "mesh_tools.h"
 #include "run_suite.h"
 #include "subadmm/subadmm.h"
 
@@ -19,15 +20,20 @@
 
 static const double G = 9.81;
 
-/* Gravity leans by `angle` towards +x. The ground is a plane, or the top of a box. */
-static sadmm_world *make_world(double dt, double angle, bool box)
+enum { PLANE, BOX, MESH, GROUNDS };
+
+/* Gravity leans by `angle` towards +x. The ground is a plane, the top of a box, or a mesh that is flat, divided without
+ * any order. */
+static sadmm_world *make_world_for(sadmm_backend backend, double dt, double angle, int on)
 {
+    struct soup *soup = on == MESH ? soup_ground(41, 41, 0.5, 0.24, 3, soup_flat) : NULL;
+    sadmm_mesh *mesh = soup ? soup_mesh(soup) : NULL;
     sadmm_world_def def = sadmm_world_def_default();
     sadmm_body_def ground = sadmm_body_def_default();
     sadmm_shape_def shape = sadmm_shape_def_default();
     sadmm_world *world = NULL;
     sadmm_body_id id;
-    def.backend = SADMM_BACKEND_CPU;
+    def.backend = backend;
     def.settings.dt = dt;
     def.settings.iterations = 100;
     def.settings.gravity[0] = G * sin(angle);
@@ -37,13 +43,21 @@ static sadmm_world *make_world(double dt, double angle, bool box)
     ground.type = SADMM_BODY_STATIC;
     ground.environment = -1;
     MUST(world, sadmm_world_add_body(world, &ground, &id));
-    shape.type = box ? SADMM_SHAPE_BOX : SADMM_SHAPE_PLANE;
+    shape.type = on == MESH ? SADMM_SHAPE_MESH : on == BOX ? SADMM_SHAPE_BOX : SADMM_SHAPE_PLANE;
+    shape.mesh = mesh;
     shape.size[0] = shape.size[1] = 20;
     shape.size[2] = 1;
-    shape.position[2] = box ? -1 : 0;
+    shape.position[2] = on == BOX ? -1 : 0;
     shape.friction = 1;
     MUST(world, sadmm_world_add_shape(world, id, &shape, NULL));
+    sadmm_mesh_destroy(mesh);
+    free(soup);
     return world;
+}
+
+static sadmm_world *make_world(double dt, double angle, int on)
+{
+    return make_world_for(SADMM_BACKEND_CPU, dt, angle, on);
 }
 
 /* A solid of this shape, the shape's frame at a position and orientation; the body's own frame is that of its mass. */
@@ -95,8 +109,8 @@ static const double about_x[4] = {0.70710678118654752, 0.70710678118654752, 0, 0
 START_TEST(rolling_down)
 {
     const double angle = 0.3, dt = 0.005, R = 0.2;
-    const bool ellipsoid = _i / 2;
-    sadmm_world *world = make_world(dt, angle, _i % 2);
+    const bool ellipsoid = _i / GROUNDS;
+    sadmm_world *world = make_world(dt, angle, _i % GROUNDS);
     const sadmm_shape_def shape = ellipsoid ? shape_of(SADMM_SHAPE_ELLIPSOID, R, R, 0.3)
                                             : shape_of(SADMM_SHAPE_CYLINDER, R, 0.3, 0);
     const double at[3] = {0, 0, R};
@@ -122,7 +136,8 @@ END_TEST
 START_TEST(standing_still)
 {
     static const double lie[4] = {0.70710678118654752, 0, 0.70710678118654752, 0};
-    sadmm_world *world = make_world(0.005, 0, _i % 2);
+    sadmm_world *world =
+        make_world_for(_i / GROUNDS ? SADMM_BACKEND_REF : SADMM_BACKEND_CPU, 0.005, 0, _i % GROUNDS);
     sadmm_shape_def shape = shape_of(SADMM_SHAPE_CYLINDER, 0.2, 0.3, 0), cone = shape_of(SADMM_SHAPE_CONE, 0.3, 0.3, 0),
                     egg = shape_of(SADMM_SHAPE_ELLIPSOID, 0.4, 0.3, 0.2);
     const double corners[24] = {-.2, -.2, -.1, .2, -.2, -.1, -.2, .2, -.1, .2, .2, -.1,
@@ -167,11 +182,11 @@ END_TEST
 START_TEST(a_tilted_cone)
 {
     const double R = 0.2, half = 0.3, critical = atan(R / (half / 2));
-    const bool falls = _i / 2;
+    const bool falls = _i / GROUNDS;
     const double tilt = critical * (falls ? 1.05 : 0.8);
     const double turn[4] = {cos(tilt / 2), 0, sin(tilt / 2), 0};
     const sadmm_shape_def cone = shape_of(SADMM_SHAPE_CONE, R, half, 0);
-    sadmm_world *world = make_world(0.002, 0, _i % 2);
+    sadmm_world *world = make_world(0.002, 0, _i % GROUNDS);
     /* tilted towards +x, about the point of the rim there */
     const double at[3] = {0, 0, R * sin(tilt) + half * cos(tilt)};
     sadmm_mass mass;
@@ -196,7 +211,7 @@ START_TEST(a_cone_rolls_around_its_apex)
 {
     const double R = 0.15, half = 0.3, a = atan2(R, 2 * half), W = 0.5, dt = 0.001;
     const sadmm_shape_def cone = shape_of(SADMM_SHAPE_CONE, R, half, 0);
-    sadmm_world *world = make_world(dt, 0, _i % 2);
+    sadmm_world *world = make_world(dt, 0, _i % GROUNDS);
     /* apex at the origin, the line it lies on along +x: the axis, from the base to the apex, to -x and down by a */
     const double turn_angle = -(M_PI / 2 + a), turn[4] = {cos(turn_angle / 2), 0, sin(turn_angle / 2), 0};
     const double at[3] = {half * cos(a), 0, half * sin(a)};
@@ -228,7 +243,7 @@ START_TEST(an_ellipsoid_rocks)
 {
     const double a = 0.4, b = 0.3, c = 0.25, tilt = 0.02, dt = 0.001;
     const sadmm_shape_def egg = shape_of(SADMM_SHAPE_ELLIPSOID, a, b, c);
-    sadmm_world *world = make_world(dt, 0, _i % 2);
+    sadmm_world *world = make_world(dt, 0, _i % GROUNDS);
     const double turn[4] = {cos(tilt / 2), 0, sin(tilt / 2), 0}, low = hypot(a * sin(tilt), c * cos(tilt));
     const double at[3] = {0, 0, low};
     sadmm_mass mass;
@@ -253,7 +268,7 @@ END_TEST
 /* Shapes that need no more than the pool's first blocks come and go with hulls, and without. */
 START_TEST(the_pool_stays_as_long_as_it_is_needed)
 {
-    sadmm_world *world = make_world(0.005, 0, true);
+    sadmm_world *world = make_world(0.005, 0, BOX);
     const sadmm_shape_def shape = shape_of(SADMM_SHAPE_CYLINDER, 0.2, 0.3, 0);
     const double at[3] = {0, 0, 0.3}, corners[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
     const sadmm_hull_def points = {.points = corners, .point_count = 4};
@@ -287,7 +302,7 @@ END_TEST
 START_TEST(definitions)
 {
     static const sadmm_shape_type types[] = {SADMM_SHAPE_CYLINDER, SADMM_SHAPE_CONE, SADMM_SHAPE_ELLIPSOID};
-    sadmm_world *world = make_world(0.005, 0, true);
+    sadmm_world *world = make_world(0.005, 0, BOX);
     const double at[3] = {0, 0, 1};
     for (int k = 0; k < 3; ++k) {
         sadmm_shape_def shape = shape_of(types[k], 0.3, 0.2, 0.1), read;
@@ -316,11 +331,11 @@ int main(void)
     Suite *suite = suite_create("worlds with smooth bodies");
     TCase *cases = tcase_create("worlds");
     tcase_set_timeout(cases, 60);
-    tcase_add_loop_test(cases, rolling_down, 0, 4);
-    tcase_add_loop_test(cases, standing_still, 0, 2);
-    tcase_add_loop_test(cases, a_tilted_cone, 0, 4);
-    tcase_add_loop_test(cases, a_cone_rolls_around_its_apex, 0, 2);
-    tcase_add_loop_test(cases, an_ellipsoid_rocks, 0, 2);
+    tcase_add_loop_test(cases, rolling_down, 0, 2 * GROUNDS);
+    tcase_add_loop_test(cases, standing_still, 0, 2 * GROUNDS);
+    tcase_add_loop_test(cases, a_tilted_cone, 0, 2 * GROUNDS);
+    tcase_add_loop_test(cases, a_cone_rolls_around_its_apex, 0, GROUNDS);
+    tcase_add_loop_test(cases, an_ellipsoid_rocks, 0, GROUNDS);
     tcase_add_test(cases, the_pool_stays_as_long_as_it_is_needed);
     tcase_add_test(cases, definitions);
     suite_add_tcase(suite, cases);
