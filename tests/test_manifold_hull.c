@@ -1,224 +1,28 @@
 /* Contact of convex hulls: nearest points and depth against a reference that tries all features, points and normals
  * against what the two shapes are, memory, exchange, and boxes as hulls against boxes. */
-#include <check.h>
-#include <stdio.h>
-
-#include "hull_pool.h"
-#include "manifold_tools.h"
+#include "hull_touches.h"
 #include "run_suite.h"
 
-/* Two hulls with poses. */
-struct two {
-    struct test_pool *pool;
-    struct test_hull h[2];
-    struct sadmm_geometry g[2];
-    double R[2][9], x[2][3];
-};
-
-static struct pair_pose pose_of(const struct two *t)
-{
-    return pair_pose(false, t->R[0], t->x[0], t->R[1], t->x[1]);
-}
-
-static struct manifold touch_two(const struct two *t, double limit, uint32_t cache)
-{
-    const struct pair_pose pose = pose_of(t);
-    struct manifold m;
-    memset(&m, 0x55, sizeof m);
-    pair_manifold(&t->g[0], &t->g[1], t->pool->numbers, 0, &pose, limit, cache, &m);
-    ck_assert_int_ge(m.count, 0);
-    ck_assert_int_le(m.count, SADMM_MANIFOLD_POINTS);
-    return m;
-}
-
-static void rows_of(const double R[9], double rows[3][3])
-{
-    memcpy(rows, R, 9 * sizeof *R);
-}
-
-/* Distance, or minus the depth, by trying everything. */
-static double reference(const struct two *t)
-{
-    double xa[TEST_HULL_POINTS][3], xb[TEST_HULL_POINTS][3], Ra[3][3], Rb[3][3];
-    rows_of(t->R[0], Ra);
-    rows_of(t->R[1], Rb);
-    test_hull_place(&t->h[0], Ra, t->x[0], xa);
-    test_hull_place(&t->h[1], Rb, t->x[1], xb);
-    const double axes = test_hulls_axes(&t->h[0], (const double(*)[3])xa, Ra, &t->h[1], (const double(*)[3])xb, Rb);
-    return axes < 0 ? axes : test_hulls_distance(&t->h[0], (const double(*)[3])xa, &t->h[1], (const double(*)[3])xb);
-}
-
-static double size_of(const struct two *t)
-{
-    double size = 0;
-    for (int s = 0; s < 2; ++s) size += t_norm(t->g[s].size);
-    return size;
-}
-
-/* The separation of the two along a direction of b's frame. */
-static double along(const struct two *t, vec3 n)
-{
-    double xa[TEST_HULL_POINTS][3], xb[TEST_HULL_POINTS][3], Ra[3][3], Rb[3][3], world[3], local[3];
-    rows_of(t->R[0], Ra);
-    rows_of(t->R[1], Rb);
-    test_hull_place(&t->h[0], Ra, t->x[0], xa);
-    test_hull_place(&t->h[1], Rb, t->x[1], xb);
-    v3_store(n, local);
-    for (int k = 0; k < 3; ++k) world[k] = t_dot(Rb[k], local);
-    return test_apart_along((const double(*)[3])xa, t->h[0].vertices, (const double(*)[3])xb, t->h[1].vertices, world);
-}
-
-/* What a manifold says is true of the two: its normal parts them nearly as well as any, and its points are on both
- * surfaces, as far apart as they say. */
-static void check_manifold(const struct two *t, const struct manifold *m, double best, double limit, const char *what)
-{
-    const double size = size_of(t), rounding = 1e-10 * size,
-                 thin = fmin(geometry_thickness(&t->g[0]), geometry_thickness(&t->g[1]));
-    double least = HUGE_VAL;
-    if (best > limit + rounding) return;
-    ck_assert_msg(m->count > 0 || best > limit - rounding, "%s: no contact at %g (limit %g)", what, best, limit);
-    if (m->count == 0) return;
-    const double s = along(t, m->normal);
-    ck_assert_msg(fabs(v3_norm(m->normal) - 1) < 1e-12, "%s: |n| - 1 = %g", what, v3_norm(m->normal) - 1);
-    /* a face is preferred: manifold_hull.h */
-    ck_assert_msg(s >= best - 0.1 * fabs(best) - 0.01 * thin - rounding && s <= best + rounding,
-                  "%s: separation %g along the normal, best %g", what, s, best);
-    for (int i = 0; i < m->count; ++i) {
-        const struct manifold_point *p = &m->points[i];
-        least = fmin(least, p->separation);
-        /* no two planes across the normal are nearer to each other than the shapes */
-        ck_assert_msg(p->separation >= s - rounding, "%s: point %d at %g, shapes at %g", what, i, p->separation, s);
-        ck_assert_msg(p->separation <= limit + rounding, "%s: point %d at %g, limit %g", what, i, p->separation, limit);
-        for (int k = 0; k < i; ++k) ck_assert_uint_ne(p->feature, m->points[k].feature);
-        for (int side = 0; side < 2; ++side) { /* on the surface of each: no face of it is above, one is at it */
-            double world[3], own[3], local[3], most = -HUGE_VAL;
-            const double sign = side == 0 ? -0.5 : 0.5;
-            v3_store(v3_madd(p->position, sign * p->separation, m->normal), local);
-            for (int k = 0; k < 3; ++k)
-                world[k] = t_dot(t->R[1] + 3 * k, local) + t->x[1][k] - t->x[side][k];
-            for (int k = 0; k < 3; ++k)
-                own[k] = t->R[side][k] * world[0] + t->R[side][3 + k] * world[1] + t->R[side][6 + k] * world[2];
-            for (int f = 0; f < t->h[side].faces; ++f)
-                most = fmax(most, t_dot(t->h[side].plane[f], own) - t->h[side].plane[f][3]);
-            /* clipping is tolerant (MANIFOLD_SNAP), and so is the memory of two edges (MANIFOLD_KEEP_EXTENT); the nearest
-             * points are not quite across the normal of a face that is preferred to theirs */
-            ck_assert_msg(fabs(most) <= 6e-3 * thin + 0.01 * fabs(p->separation) + rounding, "%s: point %d of %d (%08x) is %g off surface %d, thin %g, gap %g, s %g, best %g", what,
-                          i, m->count, p->feature, most, side, thin, p->separation, s, best);
-        }
-    }
-}
-
-/* The nearest features themselves, before any axis is preferred. */
-static double nearest(const struct two *t, vec3 start)
-{
-    const struct pair_pose pose = pose_of(t);
-    struct polytope_pair pair;
-    struct polytope_axis axis;
-    vec3 pa, pb;
-    uint32_t feature;
-    polytope_pair_make(&t->g[0], &t->g[1], t->pool->numbers, &pose, &pair);
-    ck_assert(hull_nearest(&pair, start, 1e300, &axis, &pa, &pb, &feature));
-    /* the points are as far apart as the axis says */
-    ck_assert_double_eq_tol(v3_dot(axis.n, v3_sub(pb, pa)), axis.separation, 1e-9 * size_of(t));
-    return axis.separation;
-}
-
-static void random_pose(struct random *r, double reach, struct two *t)
-{
-    for (int s = 0; s < 2; ++s) random_rotation(r, t->R[s]);
-    double d[3], length;
-    do {
-        for (int k = 0; k < 3; ++k) d[k] = random_in(r, -1, 1);
-        length = t_norm(d);
-    } while (length > 1 || length < 0.1);
-    for (int k = 0; k < 3; ++k) {
-        t->x[0][k] = random_in(r, -1, 1);
-        t->x[1][k] = t->x[0][k] + reach * d[k] / length;
-    }
-}
-
-static void turn_by(double R[9], const double axis[3], double angle)
-{
-    double turn[9];
-    rotation(turn, axis[0], axis[1], axis[2], angle);
-    multiply(turn, R, R);
-}
-
-static void column_of(const double R[9], int j, double out[3])
-{
-    for (int k = 0; k < 3; ++k) out[k] = R[3 * k + j];
-}
-
-/* Under sanitizers. */
-static int fewer(int count)
-{
-    return getenv("SADMM_TEST_SHORT") ? (count + 3) / 4 : count;
-}
-
-/* Hulls of many forms, needles and plates among them, deep, touching and apart. */
 START_TEST(distance_and_depth_are_the_references)
 {
-    struct random r = {.state = UINT64_C(88172645463325252) + (uint64_t)_i};
-    struct two *t = calloc(1, sizeof *t);
-    const char *more = getenv("HULL_POSES"); /* for long runs by hand: 2,000 take half an hour */
-    const int poses = more ? atoi(more) : fewer(8);
-    ck_assert_ptr_nonnull(t);
-    t->pool = test_pool_new();
-    for (int form = 0; form < 12; ++form) {
-        t->pool->used = HULL_FIRST_OWN;
-        for (int s = 0; s < 2; ++s) {
-            double size[3];
-            const double scale = pow(10, random_in(&r, -3, 2)), flat = pow(10, random_in(&r, -3, 0));
-            for (int k = 0; k < 3; ++k) size[k] = scale * (k == form % 3 ? flat : random_in(&r, 0.5, 1));
-            if (form % 4 == 3) box_hull(size, &t->h[s]);
-            else random_hull(&r.state, 4 + (int)(random_unit(&r) * 20), size, &t->h[s]);
-            t->g[s] = test_pool_add(t->pool, &t->h[s]);
-        }
-        for (int pose = 0; pose < poses; ++pose) {
-            char what[80];
-            const double size = size_of(t);
-            random_pose(&r, size * pow(random_unit(&r), 2), t);
-            const double best = reference(t);
-            snprintf(what, sizeof what, "set %d form %d pose %d", _i, form, pose);
-            const double found = nearest(t, v3(1, 0, 0));
-            ck_assert_msg(fabs(found - best) <= 1e-10 * size, "%s: %g, should be %g (size %g)", what, found, best, size);
-            const struct manifold m = touch_two(t, 0.1 * size, 0);
-            check_manifold(t, &m, best, 0.1 * size, what);
-            /* touching: moved by the distance, and a little less or more */
-            for (int touch = -2; touch <= 2 && best > -0.05 * size; ++touch) {
-                double n[3], world[3];
-                const struct manifold near = touch_two(t, 10 * size, 0);
-                if (near.count == 0) break;
-                v3_store(near.normal, n);
-                for (int k = 0; k < 3; ++k) world[k] = t_dot(t->R[1] + 3 * k, n);
-                const double wanted = touch * (touch % 2 ? 1e-12 : 1e-7) * size,
-                             way = along(t, near.normal) - wanted;
-                for (int k = 0; k < 3; ++k) t->x[1][k] -= way * world[k];
-                const double now = reference(t);
-                const double there = nearest(t, near.normal);
-                ck_assert_msg(fabs(there - now) <= 1e-10 * size, "%s touching %d: %g, should be %g", what, touch, there,
-                              now);
-                const struct manifold close = touch_two(t, 0.01 * size, near.cache);
-                check_manifold(t, &close, now, 0.01 * size, what);
-            }
-        }
-    }
-    free(t->pool);
-    free(t);
+    const struct extent extent = {fewer(400), 23, 6};
+    touch_hulls((uint64_t)_i, &extent);
 }
 END_TEST
 
-/* Put b onto a: against its separation along the normal from a to b, with `gap` left. */
-static void put_together(struct two *t, double gap)
+START_TEST(round_shapes_are_cores_with_a_radius)
 {
-    const struct manifold m = touch_two(t, 100 * size_of(t), 0);
-    double n[3], world[3];
-    ck_assert_int_gt(m.count, 0);
-    v3_store(m.normal, n);
-    for (int k = 0; k < 3; ++k) world[k] = t_dot(t->R[1] + 3 * k, n);
-    const double way = along(t, m.normal) - gap;
-    for (int k = 0; k < 3; ++k) t->x[1][k] -= way * world[k];
+    const struct extent extent = {400, 25, 0};
+    touch_round((uint64_t)_i, _i % 2, &extent);
 }
+END_TEST
+
+START_TEST(rounded_hulls_are_cores_with_a_radius)
+{
+    const struct extent extent = {fewer(160), 23, 3};
+    touch_rounded((uint64_t)_i, _i % 2, &extent);
+}
+END_TEST
 
 /* Whichever of two hulls is a: the same planes part them, and the same points are the nearest. */
 START_TEST(exchange_changes_nothing)
@@ -420,106 +224,6 @@ START_TEST(sides_are_kept)
         beyond += height < 0;
     }
     ck_assert_int_gt(beyond, 20); /* there were some to be wrong */
-    free(t->pool);
-    free(t);
-}
-END_TEST
-
-/* Spheres and capsules, as a point and a segment with a radius. */
-START_TEST(round_shapes_are_cores_with_a_radius)
-{
-    struct random r = {.state = 31 + (uint64_t)_i};
-    struct two *t = calloc(1, sizeof *t);
-    const double unit[3] = {1, 0.8, 0.6};
-    t->pool = test_pool_new();
-    for (int pose = 0; pose < 400; ++pose) {
-        const double radius = random_in(&r, 0.05, 0.5), length = _i % 2 ? random_in(&r, 0.05, 1) : 0;
-        t->pool->used = HULL_FIRST_OWN;
-        random_hull(&r.state, 6 + (int)(random_unit(&r) * 20), unit, &t->h[1]);
-        t->g[1] = test_pool_add(t->pool, &t->h[1]);
-        memset(&t->h[0], 0, sizeof t->h[0]);
-        t->h[0].vertices = length > 0 ? 2 : 1;
-        t->h[0].edges = length > 0 ? 1 : 0;
-        t->h[0].edge[0][1] = 1;
-        t->h[0].x[0][2] = -length;
-        t->h[0].x[1][2] = length;
-        const struct sadmm_geometry round = {.type = length > 0 ? SADMM_SHAPE_CAPSULE : SADMM_SHAPE_SPHERE,
-                                             .children = 1, .size = {radius, length, 0}};
-        t->g[0] = round;
-        random_pose(&r, random_in(&r, 0, 2), t);
-        const double best = reference(t) - radius, found = nearest(t, v3(0, 0, 1));
-        ck_assert_msg(fabs(found - best) <= 1e-10, "pose %d: %g, should be %g", pose, found, best);
-        const struct manifold m = touch_two(t, 0.2, 0);
-        if (best > 0.2 + 1e-10) {
-            ck_assert_int_eq(m.count, 0);
-            continue;
-        }
-        ck_assert_int_gt(m.count, 0);
-        ck_assert_int_le(m.count, length > 0 ? 3 : 1);
-        double least = HUGE_VAL;
-        for (int i = 0; i < m.count; ++i) least = fmin(least, m.points[i].separation);
-        ck_assert_double_eq_tol(least, best, 1e-9);
-        ck_assert_double_eq_tol(along(t, m.normal) - radius, best, 1e-9);
-    }
-    free(t->pool);
-    free(t);
-}
-END_TEST
-
-/* How far the rounds of the two reach out of what `reference` and `along` measure. */
-static double rounds_of(const struct two *t)
-{
-    return t->h[0].rounding + t->h[1].rounding;
-}
-
-/* A round goes around its hull: as near as the hulls are, less the rounds, along the nearest points' own normal. */
-START_TEST(rounded_hulls_are_cores_with_a_radius)
-{
-    struct random r = {.state = 131 + (uint64_t)_i};
-    struct two *t = calloc(1, sizeof *t);
-    t->pool = test_pool_new();
-    for (int pose = 0; pose < fewer(160); ++pose) {
-        const double scale = pow(10, random_in(&r, -3, 3)), flat = pow(10, random_in(&r, -2, 0));
-        t->pool->used = HULL_FIRST_OWN;
-        for (int s = 0; s < 2; ++s) {
-            double size[3];
-            for (int k = 0; k < 3; ++k) size[k] = scale * (k == pose % 3 ? flat : random_in(&r, 0.5, 1));
-            if (pose % 4 == 3) box_hull(size, &t->h[s]);
-            else random_hull(&r.state, 4 + (int)(random_unit(&r) * 20), size, &t->h[s]);
-            t->h[s].rounding = (pose + s) % 3 ? scale * pow(10, random_in(&r, -2, 0)) : 0;
-            t->g[s] = test_pool_add(t->pool, &t->h[s]);
-        }
-        if (_i % 2 && pose % 2) { /* a box, which has no round of its own */
-            const struct sadmm_geometry box = {.type = SADMM_SHAPE_BOX, .children = 1,
-                                               .size = {0.3 * scale, 0.5 * scale, 0.7 * scale}};
-            t->g[0] = box;
-            box_hull(box.size, &t->h[0]);
-        }
-        const double size = size_of(t), rounds = rounds_of(t), rounding = 1e-10 * size,
-                     thin = fmin(geometry_thickness(&t->g[0]), geometry_thickness(&t->g[1]));
-        random_pose(&r, size * random_unit(&r), t);
-        for (int near = 0; near < 4; ++near) { /* then with the rounds in each other, the deepest short of the cores */
-            const double core = reference(t), best = core - rounds;
-            ck_assert_double_eq_tol(nearest(t, v3(1, 0, 0)), best, rounding);
-            const struct manifold m = touch_two(t, 0.1 * size, 0);
-            ck_assert(m.count > 0 || best > 0.1 * size - rounding);
-            if (m.count == 0) break;
-            double least = HUGE_VAL;
-            for (int i = 0; i < m.count; ++i) least = fmin(least, m.points[i].separation);
-            if (rounds > 0 && core > 1e-6 * size) {
-                /* of the direction half of the digits: a separation is flat about its best */
-                ck_assert_double_eq_tol(along(t, m.normal) - rounds, best, rounding);
-                ck_assert_double_eq_tol(least, best, MANIFOLD_FLAT * thin + rounding);
-                const struct manifold again = touch_two(t, 0.1 * size, m.cache);
-                /* MANIFOLD_SNAP */
-                ck_assert_double_eq_tol(along(t, again.normal) - rounds, best, 2e-5 * thin + rounding);
-            }
-            /* midway between the surfaces: no plane across the normal is nearer */
-            for (int i = 0; i < m.count; ++i)
-                ck_assert_double_ge(m.points[i].separation, along(t, m.normal) - rounds - rounding);
-            put_together(t, near == 0 ? 1e-3 * rounds : near == 1 ? rounds : random_unit(&r) * rounds);
-        }
-    }
     free(t->pool);
     free(t);
 }

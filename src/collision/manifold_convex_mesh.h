@@ -2,7 +2,7 @@
  * along, and which points are left out, is as for polytopes (manifold_mesh.h):
  *
  *   1. What is above the triangle's plane by more than the limit is no contact.
- *   2. What lies on the face: the points of what faces along its normal, or the lowest point alone, where the lowest of
+ *   2. What lies on the face, or is over it where all around it is flat: the points of what faces along its normal, or the lowest point alone, where the lowest of
  *      the body is over the face.
  *   3. What stands on an edge or a corner by a cap, as it did in the last step.
  *   4. Else the direction along which the two are farthest apart, or least deep in each other. Where the surface does
@@ -227,6 +227,7 @@ SADMM_RARE void convex_mesh_manifold(const struct sadmm_geometry *a, const struc
     struct convex_memory memory;
     struct convex_axis axis;
     uint32_t found;
+    bool flat;
     convex_triangle_make(a, b, blocks, child, pose, &p);
     convex_recall(&p.pair, cache, &memory);
     if (!memory.known) memory.side = p.front.n;
@@ -239,7 +240,9 @@ SADMM_RARE void convex_mesh_manifold(const struct sadmm_geometry *a, const struc
         return;
     }
     if (p.front.separation > limit + p.pair.slack) return;
-    if (convex_lies_on(&p, cache == of_front, limit, m)) {
+    /* of what is flat all around the face alone speaks, if only of what is over it */
+    flat = mesh_is_flat(&p.triangle) && p.front.separation >= -MESH_SHALLOW * p.pair.thin;
+    if (convex_lies_on(&p, flat || cache == of_front, limit, m) || flat) {
         m->cache = of_front;
         convex_mesh_give(&p, of_front, p.front.separation, m);
         return;

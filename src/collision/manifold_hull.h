@@ -189,35 +189,27 @@ SADMM_INLINE bool hull_face_beside(const struct polytope_pair *pair, vec3 n, str
     return by_a || by_b;
 }
 
-/* Round edges that touch have the nearest points' normal, whatever it was before: a face is taken where it is that
- * normal. False: the cores have met. */
-SADMM_INLINE bool hull_choose_round(const struct polytope_pair *pair, struct polytope_axis *axis)
-{
-    struct polytope_axis face;
-    if (!(pair_radii(pair) > 0 && axis->separation >= -pair_radii(pair))) return false;
-    if (axis->kind == AXIS_FREE && hull_face_beside(pair, axis->n, &face) &&
-        axis->separation <= face.separation + 2 * pair->slack)
-        *axis = face;
-    return true;
-}
-
 /* a: hull or box. `kept`: the last step's axis, `known`: there is one. */
 SADMM_INLINE void hull_choose(const struct polytope_pair *pair, const struct polytope_axis *kept, bool known,
                               struct polytope_axis *axis)
 {
+    /* round edges that touch have the nearest points' normal, whatever it was before: a face is taken where it is that
+     * normal */
+    const bool round = pair_radii(pair) > 0 && axis->separation >= -pair_radii(pair);
     struct polytope_axis face;
-    if (hull_choose_round(pair, axis)) return;
-    if (known) {
+    real more;
+    if (known && !round) {
         /* past the middle of a thin one the other side is nearer, but wrong */
         const bool turned = axis->separation < 0 && v3_dot(kept->n, axis->n) < -MANIFOLD_COS_OPPOSITE;
         if (turned || axis->separation <= kept->separation + hull_bonus(pair, kept->separation)) *axis = *kept;
         if (turned) return;
     }
-    if (axis->kind == AXIS_FACE_A || axis->kind == AXIS_FACE_B || !hull_face_beside(pair, axis->n, &face)) return;
+    if (axis->kind == AXIS_FACE_A || axis->kind == AXIS_FACE_B || (round && axis->kind != AXIS_FREE) ||
+        !hull_face_beside(pair, axis->n, &face))
+        return;
     /* the bonus of a cached axis does not count against a face of the same direction */
-    if (axis->separation <= face.separation + (real)0.05 * real_abs(face.separation) +
-                                MANIFOLD_KEEP_EXTENT * pair->thin)
-        *axis = face;
+    more = round ? 2 * pair->slack : (real)0.05 * real_abs(face.separation) + MANIFOLD_KEEP_EXTENT * pair->thin;
+    if (axis->separation <= face.separation + more) *axis = face;
 }
 
 /* The point midway between pa and pb, unless m has one that is as deep. */

@@ -1,7 +1,8 @@
 /* A triangle of a mesh (b) against sphere, capsule, box and hull (a), in the frame of the mesh. As for two hulls
  * (manifold_hull.h), but that the surface has one side, and that it goes on beyond the triangle (mesh_triangle.h):
  *
- *   1. What is above the triangle's plane by more than the limit is no contact.
+ *   1. What is above the triangle's plane by more than the limit is no contact. Nor is, where all around the triangle is
+ *      in its plane, what has no vertex over it: of the points there only those are kept.
  *   2. What lies on it: the points of the facing faces, if the deepest of the body is among them. That is all that most
  *      pairs ask for.
  *   3. Else the nearest points, or the least depth, and the axis to use, as for hulls. Where the surface does not push
@@ -109,6 +110,29 @@ SADMM_INLINE bool mesh_lies_on(const struct polytope_pair *pair, const struct po
            (known || front->separation >= -MANIFOLD_KEEP_EXTENT * pair->thin);
 }
 
+/* Is a vertex of the body over the face, or nearly, and within the limit? */
+SADMM_INLINE bool mesh_has_vertex_over(const struct mesh_pair *p, real limit)
+{
+    const struct polytope *a = &p->pair.a;
+    const vec3 n = p->triangle.normal;
+    const real beside = 2 * MANIFOLD_SNAP * p->pair.thin;
+    struct four_planes planes; /* inward of each edge, and down, in a's frame and scale */
+    int k;
+    for (k = 0; k < 4; ++k) {
+        vec3 d = v3_neg(n);
+        planes.least[k] = -(limit + p->pair.slack + a->radius);
+        if (k < 3) {
+            const vec3 from = mesh_corner(&p->triangle, k);
+            d = v3_cross(n, v3_sub(mesh_corner(&p->triangle, mesh_next_corner(k)), from));
+            planes.least[k] = v3_dot(d, from) - beside * v3_norm(d);
+        }
+        planes.least[k] -= v3_dot(d, p->pair.t);
+        d = m3_tmul(p->pair.R, d);
+        planes.n[k] = v3(a->scale.x * d.x, a->scale.y * d.y, a->scale.z * d.z);
+    }
+    return any_within(a->x, a->y, a->z, hull_stride(a->vertices), &planes);
+}
+
 /* What needs no search: true, and the manifold is there, or there is none. Else as hull_by_memory. */
 SADMM_INLINE bool mesh_by_memory(const struct mesh_pair *p, real limit, uint32_t cache, struct polytope_axis *kept,
                                  bool *known, vec3 *start, struct manifold *m)
@@ -117,6 +141,7 @@ SADMM_INLINE bool mesh_by_memory(const struct mesh_pair *p, real limit, uint32_t
     *known = axis_recall(pair, cache, kept) && !(kept->kind == AXIS_FACE_B && kept->b == MESH_BACK);
     *start = *known ? kept->n : p->front.n;
     if (p->front.separation > limit + pair->slack || (*known && kept->separation > limit + pair->slack)) return true;
+    if (mesh_is_flat(&p->triangle) && !mesh_has_vertex_over(p, limit)) return true;
     if (pair->a.faces == 0 || (*known && kept->kind == AXIS_EDGES)) return false;
     if (*known && kept->kind == AXIS_FACE_A) {
         facing_manifold(pair, kept->n, kept->separation, limit, m);

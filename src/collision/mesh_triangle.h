@@ -81,6 +81,13 @@ SADMM_INLINE vec3 mesh_corner(const struct mesh_triangle *t, int k)
     return v3((real)t->x[k], (real)t->y[k], (real)t->z[k]);
 }
 
+/* Is all that is around it in its plane? */
+SADMM_INLINE bool mesh_is_flat(const struct mesh_triangle *t)
+{
+    const uint32_t all = 7u << MESH_EDGE_FLAT | 7u << MESH_CORNER_FLAT;
+    return (t->marks & all) == all;
+}
+
 /* ---- what the surface allows ------------------------------------------------------------------------------------- */
 
 /* Sine below which an edge lies across a direction, or goes down along it: rounding of normals. */

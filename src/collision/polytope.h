@@ -98,6 +98,46 @@ SADMM_INLINE real polytope_offset(const struct polytope *p, int face)
                      : (real)p->offset[face];
 }
 
+/* ---- of many x, y, z, their number a multiple of HULL_LANES: is one of them within all of four planes? --------------- */
+
+struct four_planes {
+    vec3 n[4]; /* n . (x, y, z) is at least this: */
+    real least[4];
+};
+
+#if defined(__AVX2__) && defined(SADMM_REAL_IS_DOUBLE) && !defined(__CUDACC__)
+
+/* Four at a time. */
+SADMM_INLINE bool any_within(const double *x, const double *y, const double *z, int count, const struct four_planes *p)
+{
+    int k, i;
+    for (k = 0; k < count; k += 4) {
+        const row3 xk = r3_load(x + k), yk = r3_load(y + k), zk = r3_load(z + k);
+        row3_mask within = r3_fill(p->n[0].x) * xk + r3_fill(p->n[0].y) * yk + r3_fill(p->n[0].z) * zk >=
+                           r3_fill(p->least[0]);
+        for (i = 1; i < 4; ++i)
+            within &= r3_fill(p->n[i].x) * xk + r3_fill(p->n[i].y) * yk + r3_fill(p->n[i].z) * zk >=
+                      r3_fill(p->least[i]);
+        if (_mm256_movemask_pd((row3)within)) return true;
+    }
+    return false;
+}
+
+#else
+
+SADMM_INLINE bool any_within(const double *x, const double *y, const double *z, int count, const struct four_planes *p)
+{
+    int k, i;
+    for (k = 0; k < count; ++k) {
+        const vec3 at = v3((real)x[k], (real)y[k], (real)z[k]);
+        for (i = 0; i < 4 && v3_dot(p->n[i], at) >= p->least[i];) ++i;
+        if (i == 4) return true;
+    }
+    return false;
+}
+
+#endif
+
 /* ---- the first largest d . (x, y, z) of many --------------------------------------------------------------------- */
 
 #if defined(__AVX2__) && defined(SADMM_REAL_IS_DOUBLE) && !defined(__CUDACC__)
