@@ -163,20 +163,24 @@ static __device__ bool hulls_at_once(const collision_view &v, const struct sadmm
 }
 
 /* The same of a pair with a smooth body: on planes, by formula. */
+#ifdef SADMM_WITHOUT_SMOOTH
+static __device__ bool smooth_at_once(const collision_view &, const struct sadmm_proxy *, const struct sadmm_proxy *,
+                                      const struct pair_start &, struct manifold *)
+{
+    return false;
+}
+#else
 static __device__ bool smooth_at_once(const collision_view &v, const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                       const struct pair_start &start, struct manifold *m)
 {
-#ifdef SADMM_WITHOUT_SMOOTH
-    return false;
-#else
     if (start.moves_on || a->geometry.type != SADMM_SHAPE_PLANE) return false;
     m->ahead = start.ahead;
     m->count = 0;
     m->cache = 0;
     convex_plane_manifold(&b->geometry, v.hulls, &start.pose, (real)start.limit, m);
     return true;
-#endif
 }
+#endif
 
 /* The manifold with a triangle, as find_triangles makes it on the host; false: it is to be listed. */
 template <int HOW>
