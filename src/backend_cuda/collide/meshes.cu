@@ -5,7 +5,7 @@
  */
 #include "batch.h"
 #define SADMM_WITHOUT_SMOOTH
-#include "narrow.h"
+#include "touch.h"
 
 /* The walk of a thread a pair; launched for as many as run at once. */
 enum { EXPAND_WARPS = 1024 };
@@ -67,5 +67,6 @@ void COLLISION(mesh_kernels)(struct collision_kernels *kernels)
 {
     kernels->expand = {expand_kernel<false>, MESH_THREADS, 0, "triangles of pairs"};
     kernels->expand_first = {expand_kernel<true>, MESH_THREADS, 0, "triangles of pairs"};
+    touch_kernels(&kernels->with_meshes);
     kernels->expand_warps = EXPAND_WARPS;
 }

@@ -1,12 +1,10 @@
 /* The narrow phase of worlds with meshes and without smooth bodies. */
 #define SADMM_WITHOUT_SMOOTH
 #include "narrow_listed.h"
-#include "touch.h"
 
 void COLLISION(narrow_meshes_kernels)(struct collision_kernels *kernels)
 {
     struct narrow_kernels *k = &kernels->with_meshes;
-    touch_kernels(k);
     k->at_once = {at_once_kernel<NARROW_ONE, NARROW_MESHES_AT_ONCE>, NARROW_THREADS, 0, "narrow phase of meshes"};
     k->at_once_first = {at_once_kernel<NARROW_FIRST, NARROW_MESHES_AT_ONCE>, NARROW_THREADS, 0,
                         "narrow phase of meshes"};
