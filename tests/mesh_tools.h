@@ -149,7 +149,10 @@ static inline struct soup *soup_ball(const double size[3], int n)
 
 static inline double soup_waves(double x, double y) { return 0.2 * sin(3 * x) * cos(2 * y) + 0.1 * x; }
 static inline double soup_steps(double x, double y) { return 0.3 * floor(2 * x + 0.1) + 0.2 * floor(1.5 * y); }
-static inline double soup_peaks(double x, double y) { return fmax(0, 0.5 - fabs(fmod(fabs(3 * x), 2) - 1)) * (y > 0 ? 1 : 0.1); }
+static inline double soup_peaks(double x, double y)
+{
+    return fmax(0, 0.5 - fabs(fmod(fabs(3 * x), 2) - 1)) * (y > 0 ? 1 : 0.1);
+}
 
 /* Meshes of all kinds. */
 enum { SOUP_MESHES = 8 };

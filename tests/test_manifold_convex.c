@@ -152,7 +152,8 @@ static struct found push_together(struct pair_of *t, double depth)
     return f;
 }
 
-static const char *const names[] = {"plane", "sphere", "capsule", "box", "hull", "mesh", "cylinder", "cone", "ellipsoid"};
+static const char *const names[] = {"plane", "sphere", "capsule", "box", "hull", "mesh",
+                                    "cylinder", "cone", "ellipsoid"};
 
 /* Of a loop's number: a type for b, and how it is posed. */
 static int type_of(int i) { return SADMM_SHAPE_CYLINDER + i % 3; }

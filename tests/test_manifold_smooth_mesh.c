@@ -262,7 +262,8 @@ START_TEST(a_convex_mesh_is_its_hull)
         }
         memcpy(b->t.x[0], u.x[1], sizeof u.x[1]);
         const double found = least_gap(b, limit, NULL, &points);
-        /* while they overlap what is kept, or preferred, may be deeper by 10 % and 0.5 % of the thickness (manifold.h) */
+        /* what is kept, or preferred, while they overlap may be deeper by 10 % and 0.5 % of the thickness
+         * (manifold.h) */
         const double most = MANIFOLD_KEEP_DEPTH * fabs(expected) + 0.006 * thin;
         ck_assert_msg(fabs(found - expected) <= (expected < 0 ? most : 1.1e-4 * thin + 1e-9),
                       "pose %d: %.12g by the mesh, %.12g by the hull", i, found, expected);

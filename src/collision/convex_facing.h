@@ -3,9 +3,9 @@
  * along the normal there, as between two polytopes (polytope_face.h).
  *
  * A disc's rim has no corners. Eight points of it stand for it, evenly spread from a direction that is not the disc's
- * own but the other body's: a side of the face, a plane's or a mesh's x axis, b's of two discs. So a disc that turns about its axis
- * keeps its points, and it stands as an octagon does: what it tips about is at most 1 - cos(pi / 8) = 7.6 % of the
- * radius inside of the rim. Where rims cross sides and lines the points are exact;
+ * own but the other body's: a side of the face, a plane's or a mesh's x axis, b's of two discs. So a disc that turns
+ * about its axis keeps its points, and it stands as an octagon does: what it tips about is at most 1 - cos(pi / 8) =
+ * 7.6 % of the radius inside of the rim. Where rims cross sides and lines the points are exact;
  * where they cross each other they are as far as the discs are parallel.
  */
 #ifndef SADMM_COLLISION_CONVEX_FACING_H

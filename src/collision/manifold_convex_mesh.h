@@ -2,8 +2,8 @@
  * along, and which points are left out, is as for polytopes (manifold_mesh.h):
  *
  *   1. What is above the triangle's plane by more than the limit is no contact.
- *   2. What lies on the face, or is over it where all around it is flat: the points of what faces along its normal, or the lowest point alone, where the lowest of
- *      the body is over the face.
+ *   2. What lies on the face, or is over it where all around it is flat: the points of what faces along its normal, and
+ *      the lowest point of the body where that is over the face.
  *   3. What stands on an edge or a corner by a cap, as it did in the last step.
  *   4. Else the direction along which the two are farthest apart, or least deep in each other. Where the surface does
  *      not push along that, the best direction that it does push along takes over (mesh_by_surface).
@@ -55,7 +55,8 @@ SADMM_INLINE void convex_triangle_make(const struct sadmm_geometry *a, const str
 }
 
 /* The points that are this triangle's to give, in the frame of the mesh. cache, separation: of the axis. Where the two
- * are apart all triangles at an edge or a corner have found the same there; while they overlap each speaks for itself. */
+ * are apart all triangles at an edge or a corner have found the same there; while they overlap each speaks for
+ * itself. */
 SADMM_INLINE void convex_mesh_give(const struct convex_triangle *p, uint32_t cache, real separation, struct manifold *m)
 {
     const uint32_t kind = cache & CONVEX_MEMORY_MASK;
@@ -78,8 +79,8 @@ SADMM_INLINE bool convex_cap_is_even(const struct convex_triangle *p)
            c->size.x * real_sqrt(d.x * d.x + d.y * d.y) <= MANIFOLD_FLAT * p->pair.thin;
 }
 
-/* The points along the normal of the face, with the lowest one of the body if it is over the face. The smallest gap that
- * there is, largest: there is none. */
+/* The points along the normal of the face, with the lowest one of the body if it is over the face. The smallest gap
+ * that there is, largest: there is none. */
 SADMM_INLINE real convex_on_front(const struct convex_triangle *p, real limit, struct manifold *m)
 {
     const struct convex_axis *front = &p->front;
@@ -120,7 +121,7 @@ SADMM_INLINE bool convex_lies_on(const struct convex_triangle *p, bool known, re
     const struct convex_pair *pair = &p->pair;
     const real separation = p->front.separation;
     if (!known && separation < -MANIFOLD_KEEP_EXTENT * pair->thin) return false;
-    return convex_on_front(p, limit, m) <= separation + (separation >= 0 ? 2 * pair->slack : MANIFOLD_FLAT * pair->thin);
+    return convex_on_front(p, limit, m) - separation <= (separation >= 0 ? 2 * pair->slack : MANIFOLD_FLAT * pair->thin);
 }
 
 /* The axis n, if what of the body is deepest along it is where the edge is. */
@@ -208,8 +209,8 @@ SADMM_RARE void convex_by_surface(const struct convex_triangle *p, const struct 
         convex_points(pair, &axis, limit, m);
     }
     m->cache = cache;
-    /* much deeper by it than by a way out that has not much to do with it: that is for other triangles to say. They do at
-     * once where this is no face */
+    /* much deeper by it than by a way out that has not much to do with it: that is for other triangles to say. They do
+     * at once where this is no face */
     if (!front || (!kept_front && v3_dot(axis.n, nearest->n) < (real)0.5)) {
         const real more = front ? MESH_SHALLOW : MANIFOLD_KEEP_EXTENT;
         if (least < 4 * real_min(nearest->separation, 0) - more * pair->thin) m->count = 0;

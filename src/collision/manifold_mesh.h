@@ -77,7 +77,8 @@ SADMM_INLINE bool mesh_leaves_out(const struct mesh_triangle *t, uint32_t featur
     }
 }
 
-/* The points that are this triangle's to give, in the frame of the mesh. shared: other triangles have the same normal. */
+/* The points that are this triangle's to give, in the frame of the mesh. shared: other triangles have the same
+ * normal. */
 SADMM_INLINE void mesh_give(const struct mesh_triangle *t, bool shared, struct manifold *m)
 {
     int k, kept = 0;

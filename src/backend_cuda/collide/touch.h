@@ -1,5 +1,5 @@
-/* Where pairs with a mesh that are fast first touch one of its triangles: what all triangles of a pair have in common is
- * computed by candidate and looked up by the others; after the sort those of a pair are neighbours. */
+/* Where pairs with a mesh that are fast first touch one of its triangles: what all triangles of a pair have in
+ * common is computed by candidate and looked up by the others; after the sort those of a pair are neighbours. */
 #ifndef SADMM_CUDA_COLLIDE_TOUCH_H
 #define SADMM_CUDA_COLLIDE_TOUCH_H
 
