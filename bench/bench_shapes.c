@@ -157,6 +157,12 @@ static sadmm_status make_forms(struct bench *b, struct sadmm_error *error)
     capsule->down = turn_down(z);
     capsule->below = 0.5;
     add_form(b, "box", SADMM_SHAPE_BOX, 1, 1, 1);
+    add_form(b, "cylinder", SADMM_SHAPE_CYLINDER, 1, 1, 1);
+    struct form *log = add_form(b, "its side", SADMM_SHAPE_CYLINDER, 1, 1, 0);
+    log->down = capsule->down;
+    log->below = 1;
+    add_form(b, "cone", SADMM_SHAPE_CONE, 1, 1, 1);
+    add_form(b, "ellipsoid", SADMM_SHAPE_ELLIPSOID, 1, 0.8, 0.6)->below = 0.6;
     for (int v = 0; v < 8; ++v)
         for (int k = 0; k < 3; ++k) cube[3 * v + k] = v >> k & 1 ? 1 : -1;
     sadmm_status status = add_hull(b, "box as hull", cube, 8, 0, error);

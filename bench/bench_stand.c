@@ -68,8 +68,10 @@ static sadmm_status remember(struct stand *s)
         sadmm_shape_def shape;
         TRY(check(s, sadmm_world_shape_at(s->world, i, &id)));
         TRY(check(s, sadmm_world_shape_def(s->world, id, &shape, NULL)));
-        const bool by_extents = shape.type == SADMM_SHAPE_BOX || shape.type == SADMM_SHAPE_HULL;
-        for (int k = 0; k < (by_extents ? 3 : 1) && shape.type != SADMM_SHAPE_PLANE; ++k)
+        const bool three = shape.type == SADMM_SHAPE_BOX || shape.type == SADMM_SHAPE_HULL ||
+                           shape.type == SADMM_SHAPE_ELLIPSOID,
+                   two = shape.type == SADMM_SHAPE_CYLINDER || shape.type == SADMM_SHAPE_CONE;
+        for (int k = 0; k < (three ? 3 : two ? 2 : 1) && shape.type != SADMM_SHAPE_PLANE; ++k)
             s->size = fmin(s->size, 2 * shape.size[k]);
     }
     return SADMM_OK;

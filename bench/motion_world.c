@@ -51,8 +51,8 @@ static sadmm_status list_shapes(struct motion_world *w, const int *moving_of)
         struct motion_shape *shape = &w->shapes[k];
         TRY(motion_world_check(w, sadmm_world_shape_at(w->world, k, &id)));
         TRY(motion_world_check(w, sadmm_world_shape_def(w->world, id, &shape->def, &body)));
-        if (shape->def.type == SADMM_SHAPE_HULL)
-            return sadmm_fail(w->error, SADMM_ERROR_UNSUPPORTED, "a scene with convex hulls: overlaps are measured of "
+        if (shape->def.type >= SADMM_SHAPE_HULL)
+            return sadmm_fail(w->error, SADMM_ERROR_UNSUPPORTED, "a scene with other shapes: overlaps are measured of "
                                                                  "boxes, capsules, spheres and planes alone");
         shape->body = moving_of[body.slot];
         w->solids[k] = solid_of_shape(&shape->def);

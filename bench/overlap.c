@@ -28,6 +28,9 @@ struct solid solid_of_shape(const sadmm_shape_def *shape)
     case SADMM_SHAPE_PLANE:
     case SADMM_SHAPE_HULL:
     case SADMM_SHAPE_MESH:
+    case SADMM_SHAPE_CYLINDER:
+    case SADMM_SHAPE_CONE:
+    case SADMM_SHAPE_ELLIPSOID:
     case SADMM_SHAPE_TYPE_COUNT: break;
     }
     for (int k = 0; k < 3; ++k) solid.axes[k] = v3(k == 0, k == 1, k == 2);

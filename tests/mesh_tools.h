@@ -147,4 +147,40 @@ static inline struct soup *soup_ball(const double size[3], int n)
     return s;
 }
 
+static inline double soup_waves(double x, double y) { return 0.2 * sin(3 * x) * cos(2 * y) + 0.1 * x; }
+static inline double soup_steps(double x, double y) { return 0.3 * floor(2 * x + 0.1) + 0.2 * floor(1.5 * y); }
+static inline double soup_peaks(double x, double y)
+{
+    return fmax(0, 0.5 - fabs(fmod(fabs(3 * x), 2) - 1)) * (y > 0 ? 1 : 0.1);
+}
+
+/* Meshes of all kinds. */
+enum { SOUP_MESHES = 8 };
+static inline sadmm_mesh *soup_some_mesh(int kind)
+{
+    const double half[3] = {1, 0.6, 0.3}, round[3] = {0.8, 1.1, 0.5};
+    struct soup *s = NULL;
+    sadmm_mesh *mesh = NULL;
+    double z[24 * 20];
+    uint64_t seed = 99;
+    switch (kind) {
+    case 0: s = soup_ground(16, 16, 0.2, 0.24, 5, soup_waves); break;
+    case 1: s = soup_ground(21, 21, 0.15, 0.2, 6, soup_steps); break;
+    case 2: s = soup_ground(25, 17, 0.13, 0, 7, soup_peaks); break;
+    case 3: s = soup_ground(9, 9, 0.4, 0.24, 8, soup_flat); break;
+    case 4: s = soup_box(half, 1); break;
+    case 5: s = soup_box(half, 6); break;
+    case 6: s = soup_ball(round, 8); break;
+    default: { /* noise: every corner a peak or a pit */
+        const sadmm_heightfield_def def = {z, 24, 20, {0.12, 0.15}};
+        for (int i = 0; i < 24 * 20; ++i) z[i] = 0.15 * soup_number(&seed);
+        ck_assert_int_eq(sadmm_heightfield_create(&def, &mesh), SADMM_OK);
+        return mesh;
+    }
+    }
+    mesh = soup_mesh(s);
+    free(s);
+    return mesh;
+}
+
 #endif

@@ -192,6 +192,7 @@ struct soup_kind {
     int children;           /* of a geometry, at most; 0: one */
     int hulls;              /* forms of hulls; 0: no shape is one */
     int meshes;             /* forms of meshes, what static bodies are; 0: none is */
+    double smooth;          /* share of cylinders, cones and ellipsoids */
 };
 
 static int compare_keys(const void *a, const void *b)
@@ -224,7 +225,8 @@ static void random_shape(struct shape_soup *s, const struct soup_kind *kind, str
     geometry->children = 1 + (kind->children ? below(kind->children) : 0);
     for (int k = 0; k < 3; ++k) geometry->size[k] = kind->size_low * pow(kind->size_high / kind->size_low, uniform());
     if (chance(0.3)) geometry->size[1] = geometry->size[2] = geometry->size[0];
-    if (kind->hulls && chance(0.6)) *geometry = s->forms[below(kind->hulls)];
+    if (kind->smooth > 0 && chance(kind->smooth)) geometry->type = SADMM_SHAPE_CYLINDER + below(3);
+    else if (kind->hulls && chance(0.6)) *geometry = s->forms[below(kind->hulls)];
     random_quaternion(shape->orientation);
     if (kind->shapes_a_body > 1)
         for (int k = 0; k < 3; ++k) shape->position[k] = between(-1, 1) * geometry->size[0];
@@ -276,7 +278,7 @@ static struct shape_soup shape_soup_new(const struct soup_kind *kind, uint64_t n
     double volume = 0;
     int32_t dynamic = 0;
     seed(number);
-    if (kind->hulls) {
+    if (kind->hulls || kind->smooth > 0) {
         uint64_t state = 4711 + number;
         s.pool = test_pool_new();
         for (int form = 0; form < kind->hulls; ++form) {
@@ -428,6 +430,13 @@ static const struct soup_kind soups[] = {
      .size_high = 1, .static_share = 0.1, .dead_share = 0.1, .steps = 4, .tree_from = 1, .hulls = 5, .meshes = 4},
     {.name = "on meshes, all pairs", .bodies = 60, .shapes_a_body = 1, .planes = 1, .density = 3, .size_low = 0.3,
      .size_high = 1, .static_share = 0.1, .friction_share = 1, .steps = 4, .hulls = 5, .meshes = 4},
+    {.name = "smooth bodies alone, tree", .bodies = 100, .shapes_a_body = 1, .planes = 2, .density = 3, .size_low = 0.1,
+     .size_high = 1, .static_share = 0.1, .dead_share = 0.1, .steps = 4, .tree_from = 1, .smooth = 1},
+    {.name = "smooth bodies among all others, all pairs", .bodies = 80, .shapes_a_body = 2, .planes = 1, .density = 3,
+     .size_low = 0.2, .size_high = 1, .static_share = 0.1, .friction_share = 1, .steps = 4, .hulls = 6, .smooth = 0.5},
+    {.name = "smooth bodies and hulls on meshes, tree", .bodies = 100, .shapes_a_body = 1, .planes = 1, .density = 3,
+     .size_low = 0.3, .size_high = 1, .static_share = 0.15, .steps = 4, .tree_from = 1, .hulls = 3, .meshes = 4,
+     .smooth = 0.7},
 };
 enum { SOUPS = sizeof soups / sizeof *soups };
 
@@ -807,6 +816,7 @@ START_TEST(shapes_without_manifolds_are_refused)
         {SADMM_SHAPE_TYPE_COUNT, 1, 1, "shapes[1]: type = "}, {-1, 1, 1, "type = -1"},
         {SADMM_SHAPE_PLANE, 1, 1, "only static bodies"},       {SADMM_SHAPE_SPHERE, 0, 1, "children = 0"},
         {SADMM_SHAPE_SPHERE, 1, 2, "geometry = 2"},            {SADMM_SHAPE_HULL, 1, 1, "hull = 0"},
+        {SADMM_SHAPE_CONE, 1, 1, "type = 7: needs a pool"},
     };
     struct both b = both_new(0);
     shapes[0] = shape_of(0);

@@ -21,38 +21,6 @@ static const double unturned[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, origin[3] = {0, 0
 
 /* ---- meshes ------------------------------------------------------------------------------------------------------ */
 
-static double waves(double x, double y) { return 0.2 * sin(3 * x) * cos(2 * y) + 0.1 * x; }
-static double steps(double x, double y) { return 0.3 * floor(2 * x + 0.1) + 0.2 * floor(1.5 * y); }
-static double peaks(double x, double y) { return fmax(0, 0.5 - fabs(fmod(fabs(3 * x), 2) - 1)) * (y > 0 ? 1 : 0.1); }
-
-enum { MESHES = 8 };
-static sadmm_mesh *make_mesh(int kind)
-{
-    const double half[3] = {1, 0.6, 0.3}, round[3] = {0.8, 1.1, 0.5};
-    struct soup *s = NULL;
-    sadmm_mesh *mesh = NULL;
-    double z[24 * 20];
-    uint64_t seed = 99;
-    switch (kind) {
-    case 0: s = soup_ground(16, 16, 0.2, 0.24, 5, waves); break;
-    case 1: s = soup_ground(21, 21, 0.15, 0.2, 6, steps); break;
-    case 2: s = soup_ground(25, 17, 0.13, 0, 7, peaks); break;
-    case 3: s = soup_ground(9, 9, 0.4, 0.24, 8, soup_flat); break;
-    case 4: s = soup_box(half, 1); break;
-    case 5: s = soup_box(half, 6); break;
-    case 6: s = soup_ball(round, 8); break;
-    default: { /* noise: every corner a peak or a pit */
-        const sadmm_heightfield_def def = {z, 24, 20, {0.12, 0.15}};
-        for (int i = 0; i < 24 * 20; ++i) z[i] = 0.15 * soup_number(&seed);
-        ck_assert_int_eq(sadmm_heightfield_create(&def, &mesh), SADMM_OK);
-        return mesh;
-    }
-    }
-    mesh = soup_mesh(s);
-    free(s);
-    return mesh;
-}
-
 static void take_mesh(struct beside *b, const sadmm_mesh *mesh)
 {
     b->surface = (struct sadmm_geometry){.type = SADMM_SHAPE_MESH, .hull = (uint32_t)b->pool->used};
@@ -212,7 +180,7 @@ static void place_over(struct beside *b, struct random *r, double above)
  * nothing nearer. */
 START_TEST(the_nearest_point_is_found)
 {
-    sadmm_mesh *mesh = make_mesh(_i / SHAPES);
+    sadmm_mesh *mesh = soup_some_mesh(_i / SHAPES);
     struct beside b = {.pool = test_pool_new()};
     struct random r = {1000 + (uint64_t)_i};
     const double scale = _i % 2 ? 1 : 3, limit = 0.03;
@@ -299,7 +267,7 @@ END_TEST
  * axis may keep, 10 % of the depth and 0.5 % of the thickness (manifold.h), and a little for clipping. */
 START_TEST(nothing_jumps_along_a_path)
 {
-    sadmm_mesh *mesh = make_mesh(_i / SHAPES);
+    sadmm_mesh *mesh = soup_some_mesh(_i / SHAPES);
     struct beside b = {.pool = test_pool_new()};
     struct random r = {5000 + (uint64_t)_i};
     take_mesh(&b, mesh);
@@ -344,9 +312,9 @@ int main(void)
     Suite *suite = suite_create("manifold_mesh");
     TCase *cases = tcase_create("manifold_mesh");
     tcase_set_timeout(cases, 120);
-    tcase_add_loop_test(cases, the_nearest_point_is_found, 0, MESHES * SHAPES);
+    tcase_add_loop_test(cases, the_nearest_point_is_found, 0, SOUP_MESHES * SHAPES);
     tcase_add_loop_test(cases, a_convex_mesh_is_its_hull, 0, 3 * SHAPES);
-    tcase_add_loop_test(cases, nothing_jumps_along_a_path, 0, MESHES * SHAPES);
+    tcase_add_loop_test(cases, nothing_jumps_along_a_path, 0, SOUP_MESHES * SHAPES);
     suite_add_tcase(suite, cases);
     return run_suite(suite);
 }

@@ -153,8 +153,9 @@ static sadmm_mass round_mass(const struct cloud *c, double rounding)
     return mass;
 }
 
-/* Integrals of 1 and x^2 over a rounded box, from slices across x. Inside of |x| <= h they are rectangles b x c with round
- * corners, area(r) = 4 b c + 4 r (b + c) + pi r^2; beyond, at x = h + r s, the same with r sqrt(1 - s^2) for r. */
+/* Integrals of 1 and x^2 over a rounded box, from slices across x. Inside of |x| <= h they are rectangles b x c with
+ * round corners, area(r) = 4 b c + 4 r (b + c) + pi r^2; beyond, at x = h + r s, the same with r sqrt(1 - s^2) for
+ * r. */
 static void slice_round_box(double h, double b, double c, double r, double *volume, double *second)
 {
     /* integrals over s in [0, 1] of s^k sqrt(1 - s^2) and s^k (1 - s^2), k = 0, 1, 2 */
@@ -267,6 +268,41 @@ START_TEST(shapes)
     sadmm_box_inertia(wanted.mass, size, wanted.inertia);
     EXPECT_OK(sadmm_shape_mass(&def, 5, &got));
     expect_same(&got, &wanted, 1e-14);
+    def.type = SADMM_SHAPE_CYLINDER;
+    wanted.mass = 5 * M_PI * 0.09 * 0.4;
+    wanted.inertia[0] = wanted.inertia[1] = wanted.mass * (3 * 0.09 + 0.16) / 12;
+    wanted.inertia[2] = wanted.mass * 0.09 / 2;
+    EXPECT_OK(sadmm_shape_mass(&def, 5, &got));
+    expect_same(&got, &wanted, 1e-14);
+    def.type = SADMM_SHAPE_ELLIPSOID;
+    wanted.mass = 5 * 4 * M_PI / 3 * 0.006;
+    for (int k = 0; k < 3; ++k)
+        wanted.inertia[k] = wanted.mass / 5 * (pow(size[(k + 1) % 3], 2) + pow(size[(k + 2) % 3], 2));
+    EXPECT_OK(sadmm_shape_mass(&def, 5, &got));
+    expect_same(&got, &wanted, 1e-14);
+    /* A cone as what a cylinder's slices are: of radius 0.3 (0.2 - z) / 0.4 at z in [-0.2, 0.2]; the sums of 100,000
+     * are good to 1e-10. Its centre is 0.1 below the middle. */
+    const int slices = 100000;
+    double volume = 0, first = 0, squares[2] = {0};
+    for (int k = 0; k < slices; ++k) {
+        const double dz = 0.4 / slices, z = -0.2 + (k + 0.5) * dz, r = 0.3 * (0.2 - z) / 0.4, disc = M_PI * r * r * dz;
+        volume += disc;
+        first += disc * z;
+        squares[0] += disc * r * r / 4; /* of x, and of y */
+        squares[1] += disc * z * z;
+    }
+    const double middle = first / volume;
+    ck_assert_double_eq_tol(middle, -0.1, 1e-9);
+    def.type = SADMM_SHAPE_CONE;
+    wanted.mass = 5 * volume;
+    wanted.inertia[0] = wanted.inertia[1] = 5 * (squares[0] + squares[1] - volume * middle * middle);
+    wanted.inertia[2] = 5 * 2 * squares[0];
+    v3_store(v3_add(v3(1, 2, 3), m3_mul(q_matrix(q_load(turned)), v3(0, 0, middle))), wanted.centre);
+    EXPECT_OK(sadmm_shape_mass(&def, 5, &got));
+    expect_same(&got, &wanted, 1e-8);
+    memcpy(wanted.centre, def.position, sizeof wanted.centre);
+    wanted.mass = 5 * 8 * 0.006;
+    sadmm_box_inertia(wanted.mass, size, wanted.inertia);
     /* A hull of the box is the same thing, wherever its points are from. */
     struct cloud c = box_cloud(0.3, 0.2, 0.1);
     sadmm_hull *hull = NULL;

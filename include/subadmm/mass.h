@@ -27,9 +27,9 @@ typedef struct sadmm_mass {
     double orientation[4]; /* principal axes to the frame of the layout, w x y z, unit */
 } sadmm_mass;
 
-/* The solid of a sphere, capsule, box or hull in the frame that the definition's position and orientation refer to.
- * density: kg/m^3, in [1e-30, 1e30]; with 1 the mass is the volume. Hulls: exact integrals over the polyhedron, and over
- * what rounding adds to it. Errors:
+/* The solid of any shape but a plane or a mesh in the frame that the definition's position and orientation refer to.
+ * density: kg/m^3, in [1e-30, 1e30]; with 1 the mass is the volume. Hulls: exact integrals over the polyhedron, and
+ * over what rounding adds to it. Errors:
  * INVALID_ARGUMENT (range; a plane; nothing is written). */
 SADMM_API sadmm_status sadmm_shape_mass(const sadmm_shape_def *def, double density, sadmm_mass *mass);
 /* The same of a hull in the frame of its points. */

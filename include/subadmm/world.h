@@ -195,6 +195,11 @@ typedef enum sadmm_shape_type {
     SADMM_SHAPE_MESH,      /* triangle mesh or heightfield (mesh.h) in the frame of its vertices, or of its grid; static
                               and kinematic bodies only. size ignored; read back: the half extents of the box around it,
                               in m */
+    SADMM_SHAPE_CYLINDER,  /* size[0] radius, size[1] half height along the shape's z, m; its origin is the centre */
+    SADMM_SHAPE_CONE,      /* size[0] radius of the base, size[1] half height along the shape's z, m: apex at +size[1],
+                              base at -size[1]. The shape's origin is halfway up the axis, the centre of mass
+                              size[1] / 2 below it (sadmm_shape_mass) */
+    SADMM_SHAPE_ELLIPSOID, /* size: semi-axes along the shape's x, y and z, m; its origin is the centre */
     SADMM_SHAPE_TYPE_COUNT
 } sadmm_shape_type;
 

@@ -71,10 +71,14 @@ static const char *const shape_names[SADMM_SHAPE_TYPE_COUNT] = {
     [SADMM_SHAPE_BOX] = "box",
     [SADMM_SHAPE_HULL] = "hull",
     [SADMM_SHAPE_MESH] = "mesh",
+    [SADMM_SHAPE_CYLINDER] = "cylinder",
+    [SADMM_SHAPE_CONE] = "cone",
+    [SADMM_SHAPE_ELLIPSOID] = "ellipsoid",
 };
 static const size_t shape_sizes[SADMM_SHAPE_TYPE_COUNT] = {
     [SADMM_SHAPE_PLANE] = 0, [SADMM_SHAPE_SPHERE] = 1, [SADMM_SHAPE_CAPSULE] = 2, [SADMM_SHAPE_BOX] = 3,
-    [SADMM_SHAPE_HULL] = 0, [SADMM_SHAPE_MESH] = 0,
+    [SADMM_SHAPE_HULL] = 0, [SADMM_SHAPE_MESH] = 0, [SADMM_SHAPE_CYLINDER] = 2, [SADMM_SHAPE_CONE] = 2,
+    [SADMM_SHAPE_ELLIPSOID] = 3,
 };
 
 /* The hulls of a scene's shapes, each once. */
@@ -443,7 +447,8 @@ static json_t *scene_json(const char *spec, const struct sadmm_scene *scene, con
         "half-space z <= 0 of its frame; hull: around the vertices of an entry of hulls, in its frame, and what is within "
         "rounding of that; mesh: an entry of meshes, in its frame: triangles of vertices, counter-clockwise seen from "
         "outside, or heights over a grid of the x-y plane with its middle at the origin, rows along x one after the "
-        "other along y, every cell two triangles parted by the diagonal from its lowest x and y to its highest";
+        "other along y, every cell two triangles parted by the diagonal from its lowest x and y to its highest; "
+        "cylinder, cone: radius, half height along z, a cone's apex at +z; ellipsoid: semi-axes";
     json_t *o = json_object();
     json_object_set_new(o, "scene", json_string(spec));
     json_object_set_new(o, "name", json_string(scene->info->name));

@@ -4,6 +4,7 @@
 
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
+#include "geometry.h"
 #include "kernels.h"
 #include "keys.h"
 #include "radix_sort.h"
@@ -74,7 +75,9 @@ static bool may_meet(const struct sadmm_collision_input *input, uint32_t a, uint
 static uint64_t ordered(const struct sadmm_candidates *c, uint64_t key)
 {
     uint32_t low = (uint32_t)(key >> 32), high = (uint32_t)key;
-    return c->proxies[high].geometry.type < c->proxies[low].geometry.type ? ordered_key(high, low) : key;
+    const int rank_low = geometry_rank(c->proxies[low].geometry.type),
+              rank_high = geometry_rank(c->proxies[high].geometry.type);
+    return rank_high < rank_low ? ordered_key(high, low) : key;
 }
 
 /* Keys to order (slot of a, slot of b); slots need few bits, so squeeze them together for the sort. */

@@ -65,7 +65,7 @@ struct sadmm_collision_input {
     size_t shape_count;               /* slots, dead ones included */
     const struct sadmm_geometry *geometries; /* by handle */
     size_t geometry_count;
-    const double *hulls;              /* the pool of blocks (hull_data.h); NULL: no geometry is a HULL or a MESH */
+    const double *hulls;              /* the pool of blocks (hull_data.h); NULL: none is a HULL, a MESH, or smooth (geometry.h) */
     size_t hull_doubles;
     uint32_t hull_revision;           /* changes whenever the pool does */
     const struct sadmm_collision_body *bodies; /* by world body slot */

@@ -1,7 +1,7 @@
 /* Which pairs of types collide, and how: the one list, for host and device.
  *
- * An entry is PAIR(type of a, type of b, call): a is of the lower type or, of two of one type, the shape in the lower
- * slot. In the call a and b are the sizes of the two (vec3, m) and child is the child of the pair (geometry.h); pose,
+ * An entry is PAIR(type of a, type of b, call): a is of the lower type (geometry_rank) or, of two of one type, the shape
+ * in the lower slot. In the call a and b are the sizes of the two (vec3, m) and child is the child of the pair (geometry.h); pose,
  * limit, cache and m are as in manifold.h. The list becomes a switch (pair_manifold.h), not a table of pointers: all of
  * it is inlined into the narrow phase, and a pair that is listed twice does not compile.
  *
@@ -14,7 +14,7 @@
 
 #include <stdbool.h>
 
-#include "core/math/real.h"
+#include "geometry.h"
 #include "subadmm/world.h"
 
 /* clang-format off */
@@ -38,13 +38,34 @@
     PAIR(BOX,     HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m)) \
     PAIR(HULL,    HULL, hull_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))
 
-/* With a mesh: all by mesh_manifold (manifold_mesh.h), which the narrow phase calls by itself, a triangle after the
+/* With a mesh: all by triangle_manifold (pair_manifold.h), which the narrow phase calls by itself, a triangle after the
  * other. */
-#define SADMM_MESH_TABLE(PAIR)   \
-    PAIR(SPHERE,  MESH, (void)0) \
-    PAIR(CAPSULE, MESH, (void)0) \
-    PAIR(BOX,     MESH, (void)0) \
-    PAIR(HULL,    MESH, (void)0)
+#define SADMM_MESH_TABLE(PAIR)      \
+    PAIR(SPHERE,    MESH, (void)0) \
+    PAIR(CAPSULE,   MESH, (void)0) \
+    PAIR(BOX,       MESH, (void)0) \
+    PAIR(HULL,      MESH, (void)0) \
+    PAIR(CYLINDER,  MESH, (void)0) \
+    PAIR(CONE,      MESH, (void)0) \
+    PAIR(ELLIPSOID, MESH, (void)0)
+
+/* With a smooth body, by the same: a list of their own again. */
+#define SADMM_CONVEX_TABLE_OF(PAIR, B)                                                \
+    PAIR(PLANE,   B, convex_plane_manifold(shape_b, hulls, pose, limit, m))           \
+    PAIR(SPHERE,  B, convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m)) \
+    PAIR(CAPSULE, B, convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m)) \
+    PAIR(BOX,     B, convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m)) \
+    PAIR(HULL,    B, convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))
+#define SADMM_CONVEX_TABLE(PAIR)                                                                  \
+    SADMM_CONVEX_TABLE_OF(PAIR, CYLINDER)                                                         \
+    SADMM_CONVEX_TABLE_OF(PAIR, CONE)                                                             \
+    SADMM_CONVEX_TABLE_OF(PAIR, ELLIPSOID)                                                        \
+    PAIR(CYLINDER,  CYLINDER,  convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))   \
+    PAIR(CYLINDER,  CONE,      convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))   \
+    PAIR(CYLINDER,  ELLIPSOID, convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))   \
+    PAIR(CONE,      CONE,      convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))   \
+    PAIR(CONE,      ELLIPSOID, convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))   \
+    PAIR(ELLIPSOID, ELLIPSOID, convex_manifold(shape_a, shape_b, hulls, pose, limit, cache, m))
 /* clang-format on */
 
 /* One number for two types, below 256 each. */
@@ -53,9 +74,14 @@
 /* Is there an entry for the two types, in either order? */
 SADMM_INLINE bool pair_is_listed(int type_a, int type_b)
 {
-    switch (type_a < type_b ? SADMM_TYPE_PAIR(type_a, type_b) : SADMM_TYPE_PAIR(type_b, type_a)) {
+    const bool in_order = geometry_rank(type_a) < geometry_rank(type_b);
+    switch (in_order ? SADMM_TYPE_PAIR(type_a, type_b) : SADMM_TYPE_PAIR(type_b, type_a)) {
 #define SADMM_LISTED(A, B, call) case SADMM_TYPE_PAIR((int)SADMM_SHAPE_##A, (int)SADMM_SHAPE_##B):
-        SADMM_COLLISION_TABLE(SADMM_LISTED) SADMM_HULL_TABLE(SADMM_LISTED) SADMM_MESH_TABLE(SADMM_LISTED) return true;
+        SADMM_COLLISION_TABLE(SADMM_LISTED)
+        SADMM_HULL_TABLE(SADMM_LISTED)
+        SADMM_MESH_TABLE(SADMM_LISTED)
+        SADMM_CONVEX_TABLE(SADMM_LISTED)
+        return true;
 #undef SADMM_LISTED
     default: return false;
     }

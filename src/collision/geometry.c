@@ -3,6 +3,7 @@
 #include <stdio.h>
 
 #include "collision_table.h"
+#include "geometry.h"
 #include "hull_data.h"
 
 /* Bodies that the caller moves meet dynamic ones alone; but a plane has no box that could be moved. */
@@ -53,5 +54,9 @@ sadmm_status sadmm_collision_check_shape(const struct sadmm_collision_input *inp
     if (of_block && (geometry->hull < HULL_FIRST_OWN || geometry->hull >= hull_doubles))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%shull = %u: must be in [%d, %zu), the pool of hulls",
                           name, geometry->hull, HULL_FIRST_OWN, hull_doubles);
+    if (geometry_is_smooth(geometry) && hull_doubles < HULL_FIRST_OWN)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "%stype = %d: needs a pool of hulls, of %d doubles or more", name, (int)geometry->type,
+                          HULL_FIRST_OWN);
     return SADMM_OK;
 }

@@ -1,6 +1,7 @@
 /* Distance of two polytopes: Gilbert, Johnson, Keerthi, "A fast procedure for computing the distance between complex
  * objects in three-dimensional space" (IEEE J. Robotics and Automation, 1988). A simplex of points of a - b walks
- * towards the origin; as there are finitely many points, it ends with the nearest feature itself, not near it.
+ * towards the origin; as there are finitely many points, it ends with the nearest feature itself, not near it. The walk
+ * is in gjk_walk.h, as it is the same for pairs that have other points.
  */
 #ifndef SADMM_COLLISION_GJK_H
 #define SADMM_COLLISION_GJK_H
@@ -155,48 +156,12 @@ SADMM_INLINE bool closest_on_tetrahedron(struct gjk_simplex *s, vec3 *v)
     return outside && best.count > 0;
 }
 
-/* start: a direction from a to b, of any length. limit: the distance up to which it matters, between the cores. On
- * return *v: the shortest vector of a - b that was found, from b to a. */
-SADMM_INLINE enum gjk_end gjk_distance(const struct polytope_pair *pair, vec3 start, real limit, struct gjk_simplex *s,
-                                       vec3 *v)
-{
-    struct difference_point at;
-    real v2;
-    int move;
-    at.a = at.b = 0;
-    s->p[0] = pair_support(pair, start, &at);
-    s->count = 1;
-    s->weight[0] = 1;
-    *v = s->p[0].w;
-    v2 = v3_norm2(*v);
-    if (-v3_dot(start, *v) > limit * v3_norm(start)) return GJK_FAR;
-    for (move = 0; move < GJK_MOVES; ++move) {
-        const struct gjk_simplex before = *s;
-        struct difference_point next;
-        vec3 x = v3(0, 0, 0);
-        real along, length;
-        int k;
-        bool again = false;
-        length = real_sqrt(v2);
-        if (length <= pair->slack) return GJK_MEET;
-        next = pair_support(pair, v3_neg(*v), &s->p[s->count - 1]);
-        along = v3_dot(*v, next.w);
-        if (along > limit * length) return GJK_FAR;
-        for (k = 0; k < s->count; ++k) again |= same_point(&next, &s->p[k]);
-        if (again || v2 - along <= pair->slack * length / 4) return GJK_APART;
-        s->p[s->count++] = next;
-        if (s->count == 2) x = closest_on_segment(s);
-        else if (s->count == 3) x = closest_on_triangle(s);
-        else if (!closest_on_tetrahedron(s, &x)) return GJK_MEET;
-        if (!(v3_norm2(x) < v2)) { /* rounding: no nearer any more */
-            *s = before;
-            return GJK_APART;
-        }
-        *v = x;
-        v2 = v3_norm2(x);
-    }
-    return GJK_APART;
-}
+#define GJK_DISTANCE SADMM_INLINE enum gjk_end gjk_distance
+#define GJK_PAIR struct polytope_pair
+#define GJK_SUPPORT pair_support
+#define GJK_SAME same_point
+#define GJK_ENOUGH(pair, v2, length) ((pair)->slack * (length) / 4)
+#include "gjk_walk.h"
 
 /* The nearest points themselves, on the cores. */
 SADMM_INLINE void gjk_points(const struct polytope_pair *pair, const struct gjk_simplex *s, vec3 *pa, vec3 *pb)

@@ -17,6 +17,7 @@
 #include "epa.h"
 #include "geometry.h"
 #include "manifold_plane.h"
+#include "manifold_round.h"
 #include "polytope_face.h"
 
 /* Cores nearer than this share of their size: the vector between them says no more where it points. */
@@ -66,8 +67,10 @@ SADMM_INLINE bool hull_is_proven(const struct polytope_pair *pair, const struct 
         gap += m->points[k].separation;
         if (m->points[k].separation < m->points[deepest].separation) deepest = k;
     }
-    /* two points of the cores as near to each other as the planes are: nothing is nearer, and no plane parts them further */
-    if (axis->separation >= -pair_radii(pair)) return m->points[deepest].separation <= axis->separation + 2 * pair->slack;
+    /* two points of the cores as near to each other as the planes are: nothing is nearer, and no plane parts them
+     * further */
+    if (axis->separation >= -pair_radii(pair))
+        return m->points[deepest].separation <= axis->separation + 2 * pair->slack;
     /* the face along the normal need not have the deepest corner */
     if (m->points[deepest].separation > axis->separation + MANIFOLD_FLAT * pair->thin) return false;
     middle = v3_scale(middle, (real)1 / (real)m->count);
@@ -210,10 +213,9 @@ SADMM_INLINE void hull_choose(const struct polytope_pair *pair, const struct pol
 }
 
 /* The point midway between pa and pb, unless m has one that is as deep. */
-SADMM_INLINE void hull_add_nearest(const struct polytope_pair *pair, vec3 pa, vec3 pb, uint32_t feature,
-                                   struct manifold *m)
+SADMM_INLINE void hull_add_nearest(real thin, vec3 pa, vec3 pb, uint32_t feature, struct manifold *m)
 {
-    const real gap = v3_dot(m->normal, v3_sub(pb, pa)), even = gap + MANIFOLD_FLAT * pair->thin;
+    const real gap = v3_dot(m->normal, v3_sub(pb, pa)), even = gap + MANIFOLD_FLAT * thin;
     const vec3 x = v3_scale(v3_add(pa, pb), (real)0.5);
     int k, least = 0;
     for (k = 0; k < m->count; ++k) {
@@ -307,7 +309,7 @@ SADMM_RARE void hull_manifold(const struct sadmm_geometry *a, const struct sadmm
     if (m->count == 0 && (axis.kind == AXIS_FACE_A || axis.kind == AXIS_FACE_B)) axis = nearest; /* not over each other */
     m->normal = axis.n;
     m->cache = axis_memory(&axis);
-    hull_add_nearest(&pair, pa, pb, feature, m); /* the face along the normal need not have the deepest corner */
+    hull_add_nearest(pair.thin, pa, pb, feature, m); /* the face along the normal need not have the deepest corner */
 }
 
 /* The same where that is little work: what goes on as it was, and what is too far apart. False: the whole of it has to

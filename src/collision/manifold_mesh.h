@@ -77,20 +77,26 @@ SADMM_INLINE bool mesh_leaves_out(const struct mesh_triangle *t, uint32_t featur
     }
 }
 
-/* The points that are this triangle's to give, in the frame of the mesh. kind: of the axis. */
-SADMM_INLINE void mesh_finish(const struct mesh_pair *p, int kind, struct manifold *m)
+/* The points that are this triangle's to give, in the frame of the mesh. shared: other triangles have the same
+ * normal. */
+SADMM_INLINE void mesh_give(const struct mesh_triangle *t, bool shared, struct manifold *m)
 {
-    const vec3 u = v3_neg(m->normal);
-    const bool sphere = p->pair.a.vertices == 1;
     int k, kept = 0;
-    if (sphere && m->count > 0 && !mesh_owns(&p->triangle, u)) m->count = 0;
     for (k = 0; k < m->count; ++k) {
         struct manifold_point point = m->points[k];
-        if (mesh_leaves_out(&p->triangle, point.feature, kind == AXIS_FACE_A)) continue;
-        point.position = v3_add(point.position, p->triangle.origin);
+        if (mesh_leaves_out(t, point.feature, shared)) continue;
+        point.position = v3_add(point.position, t->origin);
         m->points[kept++] = point;
     }
     m->count = kept;
+}
+
+/* kind: of the axis. */
+SADMM_INLINE void mesh_finish(const struct mesh_pair *p, int kind, struct manifold *m)
+{
+    const bool sphere = p->pair.a.vertices == 1;
+    if (sphere && m->count > 0 && !mesh_owns(&p->triangle, v3_neg(m->normal))) m->count = 0;
+    mesh_give(&p->triangle, kind == AXIS_FACE_A, m);
 }
 
 /* Does the body lie on the triangle: is the lowest point of it over the face? known: it did in the last step, or else
@@ -192,9 +198,8 @@ struct mesh_arc {
 };
 
 /* False: the edge does not stand out. */
-SADMM_INLINE bool mesh_arc_of(const struct mesh_pair *p, int k, struct mesh_arc *arc)
+SADMM_INLINE bool mesh_arc_of(const struct mesh *mesh, const struct mesh_triangle *t, int k, struct mesh_arc *arc)
 {
-    const struct mesh_triangle *t = &p->triangle;
     vec3 beyond;
     arc->from = mesh_corner(t, k);
     arc->along = v3_sub(mesh_corner(t, mesh_next_corner(k)), arc->from);
@@ -203,7 +208,7 @@ SADMM_INLINE bool mesh_arc_of(const struct mesh_pair *p, int k, struct mesh_arc 
         arc->side[1] = v3_neg(t->normal);
         return true;
     }
-    beyond = v3_sub(v3_sub(mesh_vertex(&p->mesh, t->opposite[k]), t->origin), arc->from);
+    beyond = v3_sub(v3_sub(mesh_vertex(mesh, t->opposite[k]), t->origin), arc->from);
     arc->side[1] = beyond;
     return v3_dot(beyond, t->normal) < 0 && !mesh_marked(t->marks, MESH_EDGE_FLAT, k);
 }
@@ -247,7 +252,7 @@ SADMM_INLINE void mesh_best_axis(const struct mesh_pair *p, struct polytope_axis
         if (axis.separation > best->separation && mesh_allows(&p->mesh, &p->triangle, v3_neg(axis.n))) *best = axis;
     }
     for (k = 0; k < 3; ++k) {
-        if (!mesh_arc_of(p, k, &arc)) continue;
+        if (!mesh_arc_of(&p->mesh, &p->triangle, k, &arc)) continue;
         for (e = 0; e < pair->a.edges; ++e)
             if (mesh_edge_axis(pair, &arc, k, e, &axis) && axis.separation > best->separation) *best = axis;
     }
@@ -267,7 +272,7 @@ SADMM_RARE void mesh_by_surface(const struct mesh_pair *p, const struct polytope
     m->cache = axis_memory(&axis);
     if (axis.kind == AXIS_EDGES && hull_crossing(pair, &axis, &pa, &pb)) {
         pa = v3_madd(pa, pair->a.radius, axis.n);
-        hull_add_nearest(pair, pa, pb, polytope_feature(FEATURE_CROSSING, axis.a, axis.b), m);
+        hull_add_nearest(pair->thin, pa, pb, polytope_feature(FEATURE_CROSSING, axis.a, axis.b), m);
     }
     /* much deeper by it than by a way out that has not much to do with it: that is for other triangles to say */
     least = manifold_least(m);
@@ -297,7 +302,7 @@ SADMM_RARE void mesh_manifold(const struct sadmm_geometry *a, const struct sadmm
     axis = nearest;
     if (of_any_distance) {
         m->normal = axis.n;
-        hull_add_nearest(&p.pair, pa, pb, feature, m);
+        hull_add_nearest(p.pair.thin, pa, pb, feature, m);
         m->points[0].position = v3_add(m->points[0].position, p.triangle.origin);
         return;
     }
@@ -321,7 +326,7 @@ SADMM_RARE void mesh_manifold(const struct sadmm_geometry *a, const struct sadmm
     }
     m->normal = axis.n;
     m->cache = axis_memory(&axis);
-    hull_add_nearest(&p.pair, pa, pb, feature, m);
+    hull_add_nearest(p.pair.thin, pa, pb, feature, m);
     mesh_finish(&p, axis.kind, m);
 }
 

@@ -3,6 +3,7 @@
 #include "core/base/memory.h"
 #include "contact_emit.h"
 #include "mesh_walk.h"
+#define SADMM_SMOOTH_ELSEWHERE SADMM_COLLISION_KERNEL(smooth_manifold)
 #include "pair_manifold.h"
 
 /* Write the manifold as a pair with its points; there is capacity. `before`: the pair that it goes on from, or NULL.
@@ -117,8 +118,8 @@ __attribute__((noinline)) static bool find_triangles(struct narrow_phase *n, uin
         const struct sadmm_contact_pair *before = find_before(n, ordered_key(a, b), (uint32_t)triangle, pa, pb);
         m.count = 0;
         m.cache = 0;
-        mesh_manifold(&pa->geometry, &pb->geometry, input->hulls, (uint32_t)triangle, &start.pose, (real)start.limit,
-                      before ? contact_memory(before, pa, pb) : 0, &m);
+        triangle_manifold(&pa->geometry, &pb->geometry, input->hulls, (uint32_t)triangle, &start.pose,
+                          (real)start.limit, before ? contact_memory(before, pa, pb) : 0, &m);
         if (!keep(n, a, b, (uint32_t)triangle, &m, before)) return false;
     }
     return true;

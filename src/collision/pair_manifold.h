@@ -14,6 +14,18 @@
 #include "manifold_round.h"
 #include "proxy.h"
 
+/* Who includes this says where manifolds of smooth bodies are made: here, unless SADMM_WITHOUT_SMOOTH is set (there are
+ * none), or SADMM_SMOOTH_ELSEWHERE (the name of a function in another object). What they need keeps compilers from
+ * making as much of the rest as they do without it. */
+#if defined SADMM_SMOOTH_ELSEWHERE
+void SADMM_SMOOTH_ELSEWHERE(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
+                            const double *hulls, uint32_t child, const struct pair_pose *pose, real limit,
+                            uint32_t cache, struct manifold *m);
+#elif !defined SADMM_WITHOUT_SMOOTH
+#include "smooth_manifold.h"
+#define SADMM_SMOOTH_ELSEWHERE pair_manifold_of_smooth
+#endif
+
 /* Pose of a in b's frame; d: from b's centre to a's origin. The differences are taken in double before anything is
  * rounded to `real`. A plane's origin may be far away: it moves to the foot of the perpendicular from b's centre. R:
  * row-major, shape to world. */
@@ -65,7 +77,7 @@ SADMM_INLINE void pair_manifold_of_hull(const struct sadmm_geometry *shape_a, co
 }
 
 /* Of one child of the pair. The type of a is not above b's; m->count is 0 when the shapes are apart, and for types that
- * are not listed or meshes (mesh_manifold). hulls: the pool (hull_data.h); NULL: there are none. */
+ * are not listed or meshes (triangle_manifold). hulls: the pool (hull_data.h); NULL: there are none. */
 SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
                                 const double *hulls, uint32_t child, const struct pair_pose *pose, real limit,
                                 uint32_t cache, struct manifold *m)
@@ -78,6 +90,12 @@ SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const stru
         pair_manifold_of_hull(shape_a, shape_b, hulls, pose, limit, cache, m);
         return;
     }
+#ifndef SADMM_WITHOUT_SMOOTH
+    if (hulls && geometry_is_smooth(shape_b)) {
+        SADMM_SMOOTH_ELSEWHERE(shape_a, shape_b, hulls, child, pose, limit, cache, m);
+        return;
+    }
+#endif
     switch (SADMM_TYPE_PAIR(shape_a->type, shape_b->type)) {
 #define SADMM_MANIFOLD(A, B, call) \
     case SADMM_TYPE_PAIR((int)SADMM_SHAPE_##A, (int)SADMM_SHAPE_##B): call; break;
@@ -131,6 +149,20 @@ SADMM_INLINE void find_manifold(const struct sadmm_proxy *a, const struct sadmm_
 
 /* ---- meshes: their triangles have one pose in common -------------------------------------------------------------- */
 
+/* Of a triangle of the mesh b. */
+SADMM_INLINE void triangle_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b,
+                                    const double *blocks, uint32_t child, const struct pair_pose *pose, real limit,
+                                    uint32_t cache, struct manifold *m)
+{
+#ifndef SADMM_WITHOUT_SMOOTH
+    if (geometry_is_smooth(a)) {
+        SADMM_SMOOTH_ELSEWHERE(a, b, blocks, child, pose, limit, cache, m);
+        return;
+    }
+#endif
+    mesh_manifold(a, b, blocks, child, pose, limit, cache, m);
+}
+
 /* When a pair that moves on first touches the triangle, s; HUGE_VAL: not within the step. */
 SADMM_RARE double mesh_first_touch(const struct sadmm_proxy *a, const struct sadmm_proxy *b, const double *blocks,
                                    uint32_t child, double dt, const struct pair_start *start)
@@ -141,7 +173,7 @@ SADMM_RARE double mesh_first_touch(const struct sadmm_proxy *a, const struct sad
     struct manifold m;
     for (;;) {
         m.count = 0;
-        mesh_manifold(&a->geometry, &b->geometry, blocks, child, &pose, SADMM_REAL_MAX, 0, &m);
+        triangle_manifold(&a->geometry, &b->geometry, blocks, child, &pose, SADMM_REAL_MAX, 0, &m);
         if (!advance_pair(a, b, &pose, &m, dt, &state, &ahead)) break;
         pose = proxies_pose(a, b, ahead);
     }

@@ -72,6 +72,9 @@ SADMM_INLINE void polytope_of(const struct sadmm_geometry *g, const double *hull
         return;
     case SADMM_SHAPE_HULL:
     case SADMM_SHAPE_MESH:
+    case SADMM_SHAPE_CYLINDER: /* no polytopes: convex.h */
+    case SADMM_SHAPE_CONE:
+    case SADMM_SHAPE_ELLIPSOID:
     case SADMM_SHAPE_PLANE:
     case SADMM_SHAPE_TYPE_COUNT: break;
     }

@@ -340,6 +340,7 @@ static sadmm_shape_def take_shape_def(struct machine *m)
     const int type = take_byte(in);
     if (!any_type && type >= 240) def.type = SADMM_SHAPE_HULL;
     else if (!any_type && type >= 208) def.type = SADMM_SHAPE_MESH;
+    else if (!any_type && type >= 176) def.type = (sadmm_shape_type)(SADMM_SHAPE_CYLINDER + type % 3);
     else def.type = (sadmm_shape_type)(any_type ? type : type % SADMM_SHAPE_HULL);
     if (def.type == SADMM_SHAPE_HULL && type < 255) def.hull = hull_at(type);
     if (def.type == SADMM_SHAPE_MESH && type < 239) def.mesh = mesh_at_number(type);

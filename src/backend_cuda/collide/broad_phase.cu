@@ -8,6 +8,7 @@
  * Stackless Traversal).
  */
 #include "batch.h"
+#include "collision/geometry.h"
 
 /* ---- place ----------------------------------------------------------------------------------------------------- */
 
@@ -158,7 +159,7 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
         return;
     }
     const struct collision_filter filter = {shape.category, shape.mask, shape.body,
-                                            proxy.geometry.type | (moves ? FILTER_MOVES : 0)};
+                                            geometry_rank(proxy.geometry.type) | (moves ? FILTER_MOVES : 0)};
     if (i >= v.leaf_count) {
         v.filters[slot] = filter;
         return;
@@ -335,13 +336,13 @@ static __device__ __forceinline__ bool leaves_meet(const collision_view &v, cons
     return meet && is_enabled(v, a.filter, b.filter);
 }
 
-/* The first candidate of two shapes: the one of the lower (type, slot) is a. */
+/* The first candidate of two shapes: the one of the lower (rank, slot) is a. */
 static __device__ __forceinline__ uint64_t candidate_key(const collision_view &v, const struct collision_leaf &a,
                                                          const struct collision_leaf &b)
 {
-    const int type_a = a.filter.kind & FILTER_TYPE, type_b = b.filter.kind & FILTER_TYPE;
+    const int rank_a = a.filter.kind & FILTER_RANK, rank_b = b.filter.kind & FILTER_RANK;
     const uint32_t slot_a = (uint32_t)a.slot, slot_b = (uint32_t)b.slot;
-    const bool ordered = type_a < type_b || (type_a == type_b && slot_a < slot_b);
+    const bool ordered = rank_a < rank_b || (rank_a == rank_b && slot_a < slot_b);
     return first_candidate(v, ordered ? slot_a : slot_b, ordered ? slot_b : slot_a);
 }
 

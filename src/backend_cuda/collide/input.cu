@@ -59,17 +59,19 @@ static uint64_t triangles_of(const struct sadmm_collision_input *input, const st
     return (uint64_t)mesh.triangles;
 }
 
-/* Bits of a candidate (candidate_of). */
+/* Bits of a candidate (candidate_of); and which kinds of shapes there are. */
 static sadmm_status measure_candidates(struct sadmm_cuda_collision *c, const struct sadmm_collision_input *input,
                                        struct sadmm_error *error)
 {
     struct collision_view *v = &c->view;
     uint64_t most = 1, triangles = 0;
     v->mesh_count = 0;
+    c->smooth = false;
     for (size_t slot = 0; slot < input->shape_count; ++slot) {
         if (!input->shapes[slot].alive) continue;
         TRY(sadmm_collision_check_shape(input, slot, error));
         const struct sadmm_geometry &geometry = geometry_of(input, slot);
+        c->smooth |= geometry_is_smooth(&geometry) != 0;
         if (geometry.type == SADMM_SHAPE_MESH) {
             ++v->mesh_count;
             triangles = std::max(triangles, triangles_of(input, geometry));

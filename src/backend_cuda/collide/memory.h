@@ -78,6 +78,7 @@ struct sadmm_cuda_collision {
     struct collision_buffer buffers[BUFFERS];
     size_t input_bytes[INPUTS]; /* as uploaded; SIZE_MAX: not */
     uint32_t hull_revision;
+    bool smooth;                /* a shape is a smooth body (collision/geometry.h) */
 
     int current;                /* of the two sets */
     struct contact_counts counts[2];

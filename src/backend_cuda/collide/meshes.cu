@@ -1,12 +1,11 @@
-/* Pairs with a mesh: which triangles they may touch, and where those that are fast first touch one.
+/* Pairs with a mesh: which triangles they may touch.
  *
  * The pairs stage lists such pairs without order. A thread walks through the mesh for each (collision/mesh_walk.h) and
- * appends a candidate a triangle; from there on these are candidates like all others, sorted with them. What all
- * triangles of a pair have in common, the time of the first touch, is computed by candidate and looked up by the
- * others: after the sort those of a pair are neighbours.
+ * appends a candidate a triangle; from there on these are candidates like all others, sorted with them.
  */
 #include "batch.h"
-#include "narrow.h"
+#define SADMM_WITHOUT_SMOOTH
+#include "touch.h"
 
 /* The walk of a thread a pair; launched for as many as run at once. */
 enum { EXPAND_WARPS = 1024 };
@@ -64,28 +63,10 @@ static __global__ void __launch_bounds__(MESH_THREADS) expand_kernel(const __gri
     finish_batches(v, out);
 }
 
-template <int FOR>
-static __global__ void __launch_bounds__(MESH_THREADS) touch_kernel(const __grid_constant__ collision_view v)
-{
-    const int64_t i = collision_thread(MESH_THREADS);
-    if (i >= usable_candidates(v)) return;
-    const struct candidate own = candidate_of(v, v.candidates[i]);
-    const struct collision_step step = step_of(v);
-    const struct sadmm_proxy &a = v.proxies[own.a], &b = v.proxies[own.b];
-    if (b.geometry.type != SADMM_SHAPE_MESH) return;
-    const struct pair_start start = pair_start_of(&a, &b, step.margin, step.gravity, step.dt);
-    if (!start.moves_on) return;
-    v.touches[i] = FOR != NARROW_ONE && !triangle_now(v, step, own, a, b)
-                       ? HUGE_VAL
-                       : mesh_first_touch(&a, &b, v.hulls, own.child, step.dt, &start);
-}
-
 void COLLISION(mesh_kernels)(struct collision_kernels *kernels)
 {
     kernels->expand = {expand_kernel<false>, MESH_THREADS, 0, "triangles of pairs"};
     kernels->expand_first = {expand_kernel<true>, MESH_THREADS, 0, "triangles of pairs"};
-    kernels->touch = {touch_kernel<NARROW_ONE>, MESH_THREADS, 0, "first touches of meshes"};
-    kernels->touch_first = {touch_kernel<NARROW_FIRST>, MESH_THREADS, 0, "first touches of meshes"};
-    kernels->touch_again = {touch_kernel<NARROW_AGAIN>, MESH_THREADS, 0, "first touches of meshes"};
+    touch_kernels(&kernels->with_meshes);
     kernels->expand_warps = EXPAND_WARPS;
 }

@@ -139,11 +139,14 @@ enum narrow_how {
     NARROW_AT_ONCE,       /* of hulls what is little work; the others are listed */
     NARROW_LISTED,        /* those */
     NARROW_MESHES_AT_ONCE, /* the same of worlds with meshes: further code, which would slow down the others */
-    NARROW_MESHES_LISTED
+    NARROW_MESHES_LISTED,
+    NARROW_ALL_AT_ONCE,   /* the same again, of worlds with smooth bodies */
+    NARROW_ALL_LISTED
 };
 static __device__ constexpr bool with_meshes(int how) { return how >= NARROW_MESHES_AT_ONCE; }
-static __device__ constexpr bool is_at_once(int how) { return how == NARROW_AT_ONCE || how == NARROW_MESHES_AT_ONCE; }
-static __device__ constexpr bool is_listed(int how) { return how == NARROW_LISTED || how == NARROW_MESHES_LISTED; }
+static __device__ constexpr bool is_at_once(int how) { return how != NARROW_PLAIN && (how - NARROW_AT_ONCE) % 2 == 0; }
+static __device__ constexpr bool is_listed(int how) { return how != NARROW_PLAIN && !is_at_once(how); }
+static __device__ constexpr bool with_smooth(int how) { return how >= NARROW_ALL_AT_ONCE; }
 
 /* The manifold of a pair with a hull, as find_manifold makes it, where it is little work; false: it is not. */
 static __device__ bool hulls_at_once(const collision_view &v, const struct sadmm_proxy *a, const struct sadmm_proxy *b,
@@ -159,6 +162,26 @@ static __device__ bool hulls_at_once(const collision_view &v, const struct sadmm
     return true;
 }
 
+/* The same of a pair with a smooth body: on planes, by formula. */
+#ifdef SADMM_WITHOUT_SMOOTH
+static __device__ bool smooth_at_once(const collision_view &, const struct sadmm_proxy *, const struct sadmm_proxy *,
+                                      const struct pair_start &, struct manifold *)
+{
+    return false;
+}
+#else
+static __device__ bool smooth_at_once(const collision_view &v, const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+                                      const struct pair_start &start, struct manifold *m)
+{
+    if (start.moves_on || a->geometry.type != SADMM_SHAPE_PLANE) return false;
+    m->ahead = start.ahead;
+    m->count = 0;
+    m->cache = 0;
+    convex_plane_manifold(&b->geometry, v.hulls, &start.pose, (real)start.limit, m);
+    return true;
+}
+#endif
+
 /* The manifold with a triangle, as find_triangles makes it on the host; false: it is to be listed. */
 template <int HOW>
 static __device__ bool narrow_triangle(const collision_view &v, const struct sadmm_proxy *a, const struct sadmm_proxy *b,
@@ -168,10 +191,11 @@ static __device__ bool narrow_triangle(const collision_view &v, const struct sad
     m->ahead = start.ahead;
     m->count = 0;
     m->cache = 0;
+    if (with_smooth(HOW) && is_at_once(HOW) && geometry_is_smooth(&a->geometry)) return false;
     if (is_at_once(HOW))
         return mesh_manifold_at_once(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache,
                                      m);
-    mesh_manifold(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache, m);
+    triangle_manifold(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache, m);
     return true;
 }
 
@@ -224,6 +248,8 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
         if (!narrow_triangle<HOW>(v, pa, pb, start, own.child, before >= 0 ? cache : 0, &m)) return false;
     } else if (is_at_once(HOW) && b.geometry.type == SADMM_SHAPE_HULL) {
         if (!hulls_at_once(v, pa, pb, start, before >= 0 ? cache : 0, &m)) return false;
+    } else if (with_smooth(HOW) && is_at_once(HOW) && geometry_is_smooth(&b.geometry)) {
+        if (!smooth_at_once(v, pa, pb, start, &m)) return false;
     } else {
         find_manifold(pa, pb, is_listed(HOW) ? v.hulls : nullptr, own.child, step.margin, step.gravity, step.dt, &start,
                       before >= 0 ? cache : 0, &m);

@@ -1,4 +1,5 @@
-/* The narrow phase of worlds with convex hulls and without meshes. */
+/* The narrow phase of worlds with convex hulls, without meshes and smooth bodies. */
+#define SADMM_WITHOUT_SMOOTH
 #include "narrow_listed.h"
 
 void COLLISION(narrow_hulls_kernels)(struct collision_kernels *kernels)

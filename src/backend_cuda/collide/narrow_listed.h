@@ -1,5 +1,5 @@
-/* The narrow phase of worlds with convex hulls, or meshes: two kernels each, apart from those of other worlds, which
- * would be slower with all that this needs of registers and stack.
+/* The narrow phase of worlds with convex hulls, meshes or smooth bodies: two kernels each, apart from those of
+ * other worlds, which would be slower with all that this needs of registers and stack.
  *
  * Most pairs with a hull take little: they go on as they were, or are too far apart. The few others (a twentieth in a
  * heap) take ten times as long, and a warp with one of them would wait for it: so they are listed, and done together, in

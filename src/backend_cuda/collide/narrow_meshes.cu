@@ -1,4 +1,5 @@
-/* The narrow phase of worlds with meshes. */
+/* The narrow phase of worlds with meshes and without smooth bodies. */
+#define SADMM_WITHOUT_SMOOTH
 #include "narrow_listed.h"
 
 void COLLISION(narrow_meshes_kernels)(struct collision_kernels *kernels)

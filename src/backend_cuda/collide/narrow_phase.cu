@@ -1,4 +1,5 @@
 /* Candidates to manifolds: the last step's pair, for its cache, then the pair's manifold in the frame of b. */
+#define SADMM_WITHOUT_SMOOTH
 #include "narrow.h"
 
 template <int FOR>

@@ -38,6 +38,7 @@ extern "C" sadmm_status COLLISION(create)(int device, struct sadmm_cuda_collisio
     COLLISION(narrow_hulls_kernels)(&c->kernels);
     COLLISION(narrow_meshes_kernels)(&c->kernels);
     COLLISION(mesh_kernels)(&c->kernels);
+    COLLISION(narrow_smooth_kernels)(&c->kernels);
     COLLISION(matching_kernels)(&c->kernels);
     *out = c;
     return SADMM_OK;

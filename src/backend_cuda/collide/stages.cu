@@ -178,9 +178,11 @@ static sadmm_status narrow_phase(struct sadmm_cuda_collision *c, struct sadmm_er
     const int64_t candidates = (int64_t)v->candidate_capacity + SIZES_BEYOND;
     const bool one = v->substeps == 1, first = v->substep == 0;
     if (!v->hulls) return launch(c, one ? k->narrow : first ? k->narrow_first : k->narrow_again, candidates, error);
+    const struct narrow_kernels *with = c->smooth           ? &k->with_smooth
+                                        : v->mesh_count > 0 ? &k->with_meshes
+                                                            : &k->with_hulls;
     if (v->mesh_count > 0)
-        TRY(launch(c, one ? k->touch : first ? k->touch_first : k->touch_again, v->candidate_capacity, error));
-    const struct narrow_kernels *with = v->mesh_count > 0 ? &k->with_meshes : &k->with_hulls;
+        TRY(launch(c, one ? with->touch : first ? with->touch_first : with->touch_again, v->candidate_capacity, error));
     TRY(launch(c, one ? with->at_once : first ? with->at_once_first : with->at_once_again, candidates, error));
     return launch(c, one ? with->listed : first ? with->listed_first : with->listed_again, v->candidate_capacity, error);
 }

@@ -71,9 +71,9 @@ enum {
 struct alignas(16) collision_filter {
     uint32_t category, mask;
     int32_t body;
-    int32_t kind; /* type, + FILTER_MOVES */
+    int32_t kind; /* geometry_rank, + FILTER_MOVES */
 };
-enum { FILTER_TYPE = 0xff, FILTER_MOVES = 0x100 };
+enum { FILTER_RANK = 0xff, FILTER_MOVES = 0x100 };
 
 /* A shape that is no plane, with all that is asked of it when candidates are looked for: what lies elsewhere would be
  * another round to memory, for one pair after the other. */
@@ -279,13 +279,14 @@ struct collision_launch {
 /* The narrow phase where some pairs are much more work than others (narrow_listed.h). */
 struct narrow_kernels {
     struct collision_launch at_once, at_once_first, at_once_again, listed, listed_first, listed_again;
+    struct collision_launch touch, touch_first, touch_again; /* with meshes (touch.h) */
 };
 
 /* The kernels, each beside what it does. */
 struct collision_kernels {
     struct collision_launch grid, place, place_first, place_again, build, refit, clear, walk, tiles, small_tiles, rank,
-        narrow, narrow_first, narrow_again, expand, expand_first, touch, touch_first, touch_again, emit, emit_few;
-    struct narrow_kernels with_hulls, with_meshes; /* in the place of `narrow` where there are any */
+        narrow, narrow_first, narrow_again, expand, expand_first, emit, emit_few;
+    struct narrow_kernels with_hulls, with_meshes, with_smooth; /* in the place of `narrow` where there are any */
     int expand_warps; /* expand is launched for */
 };
 void COLLISION(broad_phase_kernels)(struct collision_kernels *kernels);
@@ -293,6 +294,7 @@ void COLLISION(sort_kernels)(struct collision_kernels *kernels);
 void COLLISION(narrow_phase_kernels)(struct collision_kernels *kernels);
 void COLLISION(narrow_hulls_kernels)(struct collision_kernels *kernels);
 void COLLISION(narrow_meshes_kernels)(struct collision_kernels *kernels);
+void COLLISION(narrow_smooth_kernels)(struct collision_kernels *kernels);
 void COLLISION(mesh_kernels)(struct collision_kernels *kernels);
 void COLLISION(matching_kernels)(struct collision_kernels *kernels);
 

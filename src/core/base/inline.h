@@ -13,6 +13,13 @@
 #else
 #define SADMM_RARE static __attribute__((noinline, unused))
 #endif
+/* What is long and called from many places: inline on the host, a call on a device, whose compiler would take
+ * minutes. */
+#ifdef __CUDACC__
+#define SADMM_CALLED SADMM_RARE
+#else
+#define SADMM_CALLED SADMM_INLINE
+#endif
 /* Where a call would cost more than the function. */
 #define SADMM_ALWAYS_INLINE SADMM_INLINE __attribute__((always_inline))
 

@@ -23,6 +23,15 @@ static bool has_at(const struct sadmm_block_pool *pool, size_t place, const void
     return place < pool->count && pool->pooled[place].of.owner == owner;
 }
 
+/* Room for `end` doubles, and the first blocks. */
+static sadmm_status reserve(struct sadmm_block_pool *pool, size_t end, struct sadmm_error *error)
+{
+    if (!sadmm_grow(&pool->blocks, &pool->block_capacity, pool->doubles, end, sizeof *pool->blocks))
+        return sadmm_fail_memory(error, "the hull or mesh of a shape");
+    if (pool->doubles == 0) sadmm_hull_prelude(pool->blocks);
+    return SADMM_OK;
+}
+
 sadmm_status sadmm_block_pool_add(struct sadmm_block_pool *pool, const struct sadmm_block_owner *of, uint32_t *offset,
                                   struct sadmm_error *error)
 {
@@ -32,10 +41,9 @@ sadmm_status sadmm_block_pool_add(struct sadmm_block_pool *pool, const struct sa
         if (end > INT32_MAX)
             return sadmm_fail(error, SADMM_ERROR_LIMIT, "hulls and meshes of %zu numbers: a world has room for 2^31",
                               end);
-        if (!sadmm_grow(&pool->pooled, &pool->capacity, pool->count, pool->count + 1, sizeof *pool->pooled) ||
-            !sadmm_grow(&pool->blocks, &pool->block_capacity, pool->doubles, end, sizeof *pool->blocks))
+        if (!sadmm_grow(&pool->pooled, &pool->capacity, pool->count, pool->count + 1, sizeof *pool->pooled))
             return sadmm_fail_memory(error, "the hull or mesh of a shape");
-        if (pool->doubles == 0) sadmm_hull_prelude(pool->blocks);
+        TRY(reserve(pool, end, error));
         memcpy(pool->blocks + begin, of->block, of->doubles * sizeof *pool->blocks);
         memmove(pool->pooled + place + 1, pool->pooled + place, (pool->count - place) * sizeof *pool->pooled);
         pool->pooled[place] = (struct sadmm_pooled_block){.of = *of, .offset = (uint32_t)begin};
@@ -89,13 +97,13 @@ static void move_blocks(struct sadmm_block_pool *pool)
 
 static void close_gaps(struct sadmm_block_pool *pool, struct sadmm_geometry *geometries, size_t geometry_count)
 {
-    const size_t end = pool->count > 0 ? assign_offsets(pool) : 0;
+    const size_t end = pool->count > 0 ? assign_offsets(pool) : pool->holds > 0 ? HULL_FIRST_OWN : 0;
     for (size_t k = 0; k < pool->count; ++k)
         pool->pooled[k].offset = (uint32_t)header_at(pool, pool->pooled[k].offset)->reserved;
     for (size_t k = 0; k < geometry_count && end > 0; ++k)
         if (geometries[k].hull >= HULL_FIRST_OWN)
             geometries[k].hull = (uint32_t)header_at(pool, geometries[k].hull)->reserved;
-    if (end > 0) move_blocks(pool);
+    if (pool->count > 0) move_blocks(pool);
     pool->doubles = end;
     pool->unused = 0;
     ++pool->revision;
@@ -112,6 +120,24 @@ void sadmm_block_pool_remove(struct sadmm_block_pool *pool, const void *owner, s
     pool->unused += gone.doubles;
     gone.release(gone.owner);
     if (pool->count == 0 || 2 * pool->unused > pool->doubles) close_gaps(pool, geometries, geometry_count);
+}
+
+sadmm_status sadmm_block_pool_hold(struct sadmm_block_pool *pool, struct sadmm_error *error)
+{
+    if (pool->doubles == 0) {
+        TRY(reserve(pool, HULL_FIRST_OWN, error));
+        pool->doubles = HULL_FIRST_OWN;
+        ++pool->revision;
+    }
+    ++pool->holds;
+    return SADMM_OK;
+}
+
+void sadmm_block_pool_let_go(struct sadmm_block_pool *pool)
+{
+    if (--pool->holds > 0 || pool->count > 0) return;
+    pool->doubles = pool->unused = 0;
+    ++pool->revision;
 }
 
 void sadmm_block_pool_free(struct sadmm_block_pool *pool)

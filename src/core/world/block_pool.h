@@ -26,9 +26,10 @@ struct sadmm_pooled_block {
 struct sadmm_block_pool {
     struct sadmm_pooled_block *pooled; /* by the owner's address, so that they are found */
     size_t count, capacity;
-    double *blocks;                  /* in the order in which they came; none of them without an owner */
+    double *blocks;                  /* in the order in which they came; none of them without an owner or a hold */
     size_t doubles, block_capacity;
     size_t unused;                   /* doubles of what is gone */
+    size_t holds;                    /* shapes that need the pool's first blocks alone (geometry.h: smooth ones) */
     uint32_t revision;               /* changes whenever the blocks do */
 };
 
@@ -40,6 +41,9 @@ sadmm_status sadmm_block_pool_add(struct sadmm_block_pool *pool, const struct sa
  * have one with them; one that is no more has offset 0. */
 void sadmm_block_pool_remove(struct sadmm_block_pool *pool, const void *owner, struct sadmm_geometry *geometries,
                              size_t geometry_count);
+/* The first blocks, for a shape that needs no more; and one such shape less. Errors: OUT_OF_MEMORY; nothing changes. */
+sadmm_status sadmm_block_pool_hold(struct sadmm_block_pool *pool, struct sadmm_error *error);
+void sadmm_block_pool_let_go(struct sadmm_block_pool *pool);
 void sadmm_block_pool_free(struct sadmm_block_pool *pool);
 
 #endif

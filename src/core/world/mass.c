@@ -43,6 +43,25 @@ static sadmm_status own_mass(const sadmm_shape_def *def, double density, sadmm_m
         sadmm_box_inertia(mass->mass, s, mass->inertia);
         return SADMM_OK;
     case SADMM_SHAPE_HULL: return sadmm_hull_mass(def->hull, density, mass);
+    /* Any table of moments of inertia; a cone's centre is a quarter of its height above the base. */
+    case SADMM_SHAPE_CYLINDER:
+        mass->mass = density * pi * s[0] * s[0] * 2 * s[1];
+        mass->inertia[0] = mass->inertia[1] = mass->mass * (s[0] * s[0] / 4 + s[1] * s[1] / 3);
+        mass->inertia[2] = mass->mass * s[0] * s[0] / 2;
+        return SADMM_OK;
+    case SADMM_SHAPE_CONE:
+        mass->mass = density * pi / 3 * s[0] * s[0] * 2 * s[1];
+        mass->centre[2] = -s[1] / 2;
+        mass->inertia[0] = mass->inertia[1] = 3.0 / 20 * mass->mass * (s[0] * s[0] + s[1] * s[1]);
+        mass->inertia[2] = 3.0 / 10 * mass->mass * s[0] * s[0];
+        return SADMM_OK;
+    case SADMM_SHAPE_ELLIPSOID:
+        mass->mass = density * 4 / 3 * pi * s[0] * s[1] * s[2];
+        for (int k = 0; k < 3; ++k) {
+            const double a = s[(k + 1) % 3], b = s[(k + 2) % 3];
+            mass->inertia[k] = mass->mass / 5 * (a * a + b * b);
+        }
+        return SADMM_OK;
     case SADMM_SHAPE_PLANE:
     case SADMM_SHAPE_MESH:
     case SADMM_SHAPE_TYPE_COUNT: break;

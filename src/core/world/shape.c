@@ -1,6 +1,7 @@
 /* Shapes of a world. */
 #include <string.h>
 
+#include "collision/geometry.h"
 #include "collision/hull.h"
 #include "collision/mesh.h"
 #include "core/base/memory.h"
@@ -128,7 +129,9 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
                     sizeof *world->geometries))
         return sadmm_fail_memory(error, "a shape");
     uint32_t offset = 0;
+    const struct sadmm_geometry geometry = geometry_of(def);
     if (has_block(def->type)) TRY(add_block(world, slot, def, &offset));
+    else if (geometry_is_smooth(&geometry)) TRY(sadmm_block_pool_hold(&world->block_pool, error));
 
     struct sadmm_shape *shape = &world->shapes[slot];
     if (slot == world->shape_slots) {
@@ -137,7 +140,7 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
     }
     memset(shape, 0, sizeof *shape);
     shape->geometry = (uint32_t)slot;
-    world->geometries[shape->geometry] = geometry_of(def);
+    world->geometries[shape->geometry] = geometry;
     world->geometries[shape->geometry].hull = offset;
     memcpy(shape->position, def->position, sizeof shape->position);
     memcpy(shape->orientation, orientation, sizeof orientation);
@@ -169,7 +172,9 @@ static void remove_block(sadmm_world *world, size_t slot)
 
 void sadmm_world_kill_shape(sadmm_world *world, size_t slot)
 {
-    if (has_block(world->geometries[world->shapes[slot].geometry].type)) remove_block(world, slot);
+    const struct sadmm_geometry *geometry = &world->geometries[world->shapes[slot].geometry];
+    if (has_block(geometry->type)) remove_block(world, slot);
+    else if (geometry_is_smooth(geometry)) sadmm_block_pool_let_go(&world->block_pool);
     world->shapes[slot].alive = false;
     ++world->shape_generations[slot];
     --world->shape_count;

@@ -1,0 +1,384 @@
+/* The direction along which two convex bodies are farthest apart, or least deep in each other, with the nearest points.
+ *
+ * A direction n parts the two by s(n) = -h(n), h the support of a - b; wanted is the largest s over unit n. Where the
+ * two are apart that is one problem with one answer, the shortest vector of a - b. Where they are not, s has several
+ * maxima.
+ *
+ * 1. A start: the shortest vector, the last step's direction, or the one that an expanding polytope finds.
+ * 2. While they overlap, or nearly touch: b is held away from a along the n that is known, by so much, D, that they are
+ *    well apart, and the shortest vector there is the next n. It is where s(n) - D (1 - n . n_before) is largest, so
+ *    that s grows with each move (the proximal point method, Rockafellar 1976, on the sphere). Shallow depths take two
+ *    or three.
+ * 3. Newton's method for the optimum itself: h is the largest of a few functions, h_k of pairs of pieces (convex.h), of
+ *    which at most three meet at a minimum over the sphere. It is where a mean of their points w_k is along n, and all
+ *    h_k are one; the Hessian along tangents of n is that of the mean, less h. A step is taken only together with what
+ *    s says of it, so that in the worst case the direction stays that of 2.
+ */
+#ifndef SADMM_COLLISION_CONVEX_AXIS_H
+#define SADMM_COLLISION_CONVEX_AXIS_H
+
+#include "convex_pair.h"
+
+/* How far apart b is held from a, as shares of the thinner extent: twice the depth, within these bounds. Further apart
+ * moves are small where the two meet by corners, nearer the vector between the two says less. */
+#define CONVEX_APART ((real)0.05)
+#define CONVEX_NEAR (sizeof(real) == 4 ? (real)1e-3 : (real)1e-6)
+/* Curvatures that differ by more have a direction without any. */
+#define CONVEX_SINGULAR (sizeof(real) == 4 ? (real)1e-4 : (real)1e-9)
+/* A last step that is no longer than this has been the last. */
+#define CONVEX_THERE (sizeof(real) == 4 ? (real)1e-3 : (real)1e-8)
+/* Depth up to which the side that the last step knows is not doubted, as a share of the thinner extent. */
+#define CONVEX_SHALLOW ((real)0.05)
+enum { CONVEX_MOVES = 8, CONVEX_STEPS = 16 };
+
+struct convex_axis {
+    vec3 n;          /* unit, from a to b */
+    real separation; /* m */
+    vec3 pa, pb;     /* nearest points: of the bodies, rounds included */
+};
+
+/* Pairs of pieces, with their share of the nearest point. */
+struct convex_active {
+    int count;
+    int a[3], b[3];
+    real weight[3];
+};
+
+/* The three that weigh most, each once. */
+SADMM_INLINE void convex_activate(const struct gjk_simplex *s, struct convex_active *active)
+{
+    int k, i;
+    active->count = 0;
+    for (k = 0; k < s->count; ++k) {
+        const int a = s->p[k].a, b = s->p[k].b;
+        const real weight = real_max(s->weight[k], 0);
+        for (i = 0; i < active->count && !(active->a[i] == a && active->b[i] == b);) ++i;
+        if (i == active->count) {
+            if (i == 3) { /* in place of the one that weighs least */
+                i = active->weight[1] < active->weight[0] ? 1 : 0;
+                if (active->weight[2] < active->weight[i]) i = 2;
+                if (weight <= active->weight[i]) continue;
+            } else {
+                ++active->count;
+            }
+            active->a[i] = a;
+            active->b[i] = b;
+            active->weight[i] = 0;
+        }
+        active->weight[i] += weight;
+    }
+}
+
+SADMM_INLINE void convex_drop(struct convex_active *active, int k)
+{
+    const int last = --active->count;
+    active->a[k] = active->a[last];
+    active->b[k] = active->b[last];
+    active->weight[k] = active->weight[last];
+}
+
+/* The second derivatives of the pair of pieces' h, along tangents t1, t2 of n. */
+SADMM_INLINE void convex_pair_bend(const struct convex_pair *pair, int a, int b, vec3 n, vec3 t1, vec3 t2, real bend[3])
+{
+    real of_a[3], of_b[3];
+    int k;
+    convex_bend(&pair->a, a, m3_tmul(pair->R, n), m3_tmul(pair->R, t1), m3_tmul(pair->R, t2), of_a);
+    convex_bend(&pair->b, b, v3_neg(n), t1, t2, of_b);
+    for (k = 0; k < 3; ++k) bend[k] = of_a[k] + of_b[k];
+}
+
+/* What a Newton step is made of: components along two tangents. */
+struct convex_plane {
+    real g[3][2];  /* of each w_k */
+    real h[3];     /* n . w_k */
+    real m[3];     /* the Hessian: 11, 12, 22 */
+};
+
+/* The step x, and the weights where it leads to. False: the Hessian says that this is no minimum; *singular: it does
+ * not say that it is one. */
+SADMM_INLINE bool convex_newton(const struct convex_plane *p, struct convex_active *active, real x[2], bool *singular)
+{
+    const real *g = p->g[0], *m = p->m;
+    *singular = false;
+    if (active->count == 1) {
+        const real half = (m[0] + m[2]) / 2, low = half - real_sqrt((m[0] - m[2]) * (m[0] - m[2]) / 4 + m[1] * m[1]),
+                   high = 2 * half - low;
+        /* a corner at a rim is stiff along the rim alone: across it steps stay small, and moves have to do the rest */
+        const real more = low > CONVEX_SINGULAR * high ? 0 : (real)1e-3 * high - low;
+        const real m0 = m[0] + more, m2 = m[2] + more, det = m0 * m2 - m[1] * m[1];
+        *singular = more > 0;
+        if (!(high > 0 && det > 0)) return false;
+        x[0] = -(m2 * g[0] - m[1] * g[1]) / det;
+        x[1] = -(m0 * g[1] - m[1] * g[0]) / det;
+        active->weight[0] = 1;
+        return true;
+    }
+    if (active->count == 2) {
+        const real u0 = p->g[1][0] - g[0], u1 = p->g[1][1] - g[1], uu = u0 * u0 + u1 * u1, c = (p->h[0] - p->h[1]) / uu,
+                   bend = m[0] * u1 * u1 - 2 * m[1] * u0 * u1 + m[2] * u0 * u0; /* across u */
+        real along, r0 = g[0] + c * (m[0] * u0 + m[1] * u1), r1 = g[1] + c * (m[1] * u0 + m[2] * u1);
+        if (!(bend > 0 && uu > 0)) return false;
+        along = (r0 * u1 - r1 * u0) / bend;
+        x[0] = c * u0 - along * u1;
+        x[1] = c * u1 + along * u0;
+        r0 = g[0] + m[0] * x[0] + m[1] * x[1];
+        r1 = g[1] + m[1] * x[0] + m[2] * x[1];
+        active->weight[1] = -(u0 * r0 + u1 * r1) / uu;
+        active->weight[0] = 1 - active->weight[1];
+        return true;
+    } else {
+        const real u0 = p->g[1][0] - g[0], u1 = p->g[1][1] - g[1], v0 = p->g[2][0] - g[0], v1 = p->g[2][1] - g[1],
+                   det = u0 * v1 - u1 * v0, cu = p->h[0] - p->h[1], cv = p->h[0] - p->h[2];
+        real r0, r1;
+        if (!(det != 0)) return false;
+        x[0] = (cu * v1 - cv * u1) / det;
+        x[1] = (u0 * cv - v0 * cu) / det;
+        r0 = g[0] + m[0] * x[0] + m[1] * x[1];
+        r1 = g[1] + m[1] * x[0] + m[2] * x[1];
+        active->weight[1] = -(r0 * v1 - r1 * v0) / det;
+        active->weight[2] = -(u0 * r1 - u1 * r0) / det;
+        active->weight[0] = 1 - active->weight[1] - active->weight[2];
+        return true;
+    }
+}
+
+/* A pair of pieces that reaches beyond the active ones along n becomes one of them; false: none does. */
+SADMM_INLINE bool convex_add(const struct convex_pair *pair, vec3 n, struct convex_active *active)
+{
+    const struct difference_point zero = {{0, 0, 0}, 0, 0}, next = convex_support(pair, n, &zero);
+    const real reach = v3_dot(n, next.w) - 2 * pair->slack;
+    int k;
+    for (k = 0; k < active->count; ++k)
+        if ((active->a[k] == next.a && active->b[k] == next.b) ||
+            v3_dot(n, v3_sub(convex_point_a(pair, active->a[k], n), convex_point_b(pair, active->b[k], n))) >= reach)
+            return false;
+    active->a[k] = next.a;
+    active->b[k] = next.b;
+    active->weight[k] = 0;
+    ++active->count;
+    return true;
+}
+
+SADMM_INLINE vec3 convex_turned(vec3 n, real x1, vec3 t1, real x2, vec3 t2)
+{
+    const vec3 at = v3_madd(v3_madd(n, x1, t1), x2, t2);
+    return v3_scale(at, 1 / v3_norm(at));
+}
+
+/* n by Newton's method, as far as s grows with it. False: it does not get there; where s has not grown, all is as it
+ * was. */
+SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_active *active, vec3 *n, real *separation)
+{
+    struct convex_active now = *active;
+    const struct difference_point zero = {{0, 0, 0}, 0, 0};
+    vec3 at = *n;
+    real s, last = 2;
+    bool there = false, singular;
+    int step;
+    for (step = 0; step < CONVEX_STEPS; ++step) {
+        struct convex_plane p;
+        vec3 t1, t2;
+        const vec3 from = at;
+        real x[2], length, mean = 0;
+        int k, least = 0;
+        v3_tangents(at, &t1, &t2);
+        p.m[0] = p.m[1] = p.m[2] = 0;
+        if (step > 0 && now.count < 3 && convex_add(pair, at, &now)) last = 2;
+        for (k = 0; k < now.count; ++k) {
+            const vec3 w = v3_sub(convex_point_a(pair, now.a[k], at), convex_point_b(pair, now.b[k], at));
+            real bend[3];
+            int i;
+            p.g[k][0] = v3_dot(t1, w);
+            p.g[k][1] = v3_dot(t2, w);
+            p.h[k] = v3_dot(at, w);
+            convex_pair_bend(pair, now.a[k], now.b[k], at, t1, t2, bend);
+            for (i = 0; i < 3; ++i) p.m[i] += now.weight[k] * bend[i];
+            mean += now.weight[k] * p.h[k];
+        }
+        p.m[0] -= mean;
+        p.m[2] -= mean;
+        if (!convex_newton(&p, &now, x, &singular)) {
+            if (now.count == 1) return false;
+            for (k = 1; k < now.count; ++k)
+                if (now.weight[k] < now.weight[least]) least = k;
+            convex_drop(&now, least);
+            for (mean = 0, k = 0; k < now.count; ++k) mean += now.weight[k];
+            for (k = 0; k < now.count; ++k) now.weight[k] = mean > 0 ? now.weight[k] / mean : 1 / (real)now.count;
+            continue;
+        }
+        length = real_sqrt(x[0] * x[0] + x[1] * x[1]);
+        if (!(length <= 1)) return false;
+        at = convex_turned(at, x[0], t1, x[1], t2);
+        if (now.count == 1 && length > (real)1e-6) { /* near a rim's axis the bend is another one from place to place */
+            int half;
+            for (half = 0; half < 6; ++half) {
+                const struct difference_point point = convex_support(pair, at, &zero);
+                if (!(v3_dot(at, point.w) > mean + pair->slack) || point.a != now.a[0] || point.b != now.b[0]) break;
+                at = convex_turned(from, x[0] / (real)(2 << half), t1, x[1] / (real)(2 << half), t2);
+                last = 2;
+            }
+        }
+        for (k = 1; k < now.count; ++k)
+            if (now.weight[k] < now.weight[least]) least = k;
+        if (now.weight[least] < 0) { /* the others alone are nearer */
+            for (mean = 0, k = 0; k < now.count; ++k) mean += k == least ? 0 : real_max(now.weight[k], 0);
+            convex_drop(&now, least);
+            for (k = 0; k < now.count; ++k) now.weight[k] = real_max(now.weight[k], 0) / mean;
+            last = 2;
+            continue;
+        }
+        /* there; or as near as rounding lets it */
+        if (length <= 16 * SADMM_EPSILON || (length >= last / 2 && length < (real)1e-3)) {
+            there = length <= CONVEX_THERE && !(singular && mean > 0);
+            if (now.count == 3 || !convex_add(pair, at, &now)) break;
+            there = false;
+            last = 2;
+            continue;
+        }
+        last = length;
+    }
+    s = convex_separation(pair, at);
+    if (!(s >= *separation - pair->slack / 4)) return false;
+    *active = now;
+    *n = at;
+    *separation = s;
+    return there;
+}
+
+/* The moves of 2, at most so many, no nearer than that share of the thinner extent; `active`: the pieces that the last
+ * one ended with. */
+SADMM_CALLED void convex_move(struct convex_pair *pair, int most, real nearest, vec3 *n, real *separation,
+                              struct convex_active *active)
+{
+    int move;
+    for (move = 0; move < most; ++move) {
+        const real depth = real_max(-(*separation + convex_radii(pair)), 0),
+                   held = depth + real_clamp(2 * depth, nearest * pair->thin, CONVEX_APART * pair->thin);
+        struct gjk_simplex s;
+        enum gjk_end end;
+        vec3 v;
+        real length, there;
+        pair->shift = v3_scale(*n, held);
+        end = convex_distance(pair, *n, SADMM_REAL_MAX, &s, &v);
+        pair->shift = v3(0, 0, 0);
+        length = v3_norm(v);
+        if (end != GJK_APART || !(length > 0)) return;
+        v = v3_scale(v, -1 / length);
+        there = convex_separation(pair, v);
+        if (!(there >= *separation - pair->slack)) return;
+        convex_activate(&s, active);
+        *n = v;
+        if (there <= *separation + (real)1e-4 * depth) {
+            *separation = there;
+            return;
+        }
+        *separation = there;
+    }
+}
+
+/* Where a - b contains the origin: along which way out is it least deep? */
+SADMM_RARE void convex_way_out(struct convex_pair *pair, const struct gjk_simplex *simplex, vec3 *n, real *separation,
+                               struct convex_active *active)
+{
+    struct gjk_simplex s = *simplex;
+    real height;
+    if (!convex_epa_depth(pair, &s, n, &height)) { /* flat but for rounding: from centre to centre is as good */
+        const real length = v3_norm(pair->t);
+        *n = length > 0 ? v3_scale(pair->t, -1 / length) : v3(0, 0, 1);
+    }
+    convex_activate(&s, active);
+    *separation = convex_separation(pair, *n);
+    convex_move(pair, CONVEX_MOVES, CONVEX_APART, n, separation, active);
+}
+
+/* The optimum beside the last step's direction, by Newton's method alone. Of bodies that are apart there is no other;
+ * while they are not deep in each other it is the one to stay with. False: not found. */
+SADMM_INLINE bool convex_follow(const struct convex_pair *pair, vec3 side, struct convex_axis *axis,
+                                struct convex_active *active)
+{
+    const struct difference_point zero = {{0, 0, 0}, 0, 0};
+    struct difference_point point;
+    axis->n = v3_scale(side, 1 / v3_norm(side));
+    point = convex_support(pair, axis->n, &zero);
+    active->count = 1;
+    active->a[0] = point.a;
+    active->b[0] = point.b;
+    active->weight[0] = 1;
+    axis->separation = -v3_dot(axis->n, point.w) - convex_radii(pair);
+    return convex_polish(pair, active, &axis->n, &axis->separation) &&
+           axis->separation + convex_radii(pair) >= -CONVEX_SHALLOW * pair->thin;
+}
+
+/* side: the last step's direction, or one to begin with; `known`: it is the last step's. False: farther apart than
+ * `limit`. n, separation and active, before convex_finish. */
+SADMM_INLINE bool convex_begin(struct convex_pair *pair, vec3 side, bool known, real limit, struct convex_axis *axis,
+                               struct convex_active *active)
+{
+    struct gjk_simplex s;
+    vec3 v;
+    real length;
+    const enum gjk_end end = convex_distance(pair, side, limit + convex_radii(pair) + pair->slack, &s, &v);
+    if (end == GJK_FAR) return false;
+    convex_activate(&s, active);
+    length = v3_norm(v);
+    if (end == GJK_APART && length > CONVEX_APART * pair->thin / 8) {
+        axis->n = v3_scale(v, -1 / length);
+        axis->separation = convex_separation(pair, axis->n);
+        return true;
+    }
+    if (end == GJK_APART && length > 1000 * pair->slack) { /* near enough to what it is, whatever it was */
+        side = v3_scale(v, -1 / length);
+        known = true;
+    }
+    if (known) {
+        axis->n = v3_scale(side, 1 / v3_norm(side));
+        axis->separation = convex_separation(pair, axis->n);
+        convex_move(pair, 2, CONVEX_APART, &axis->n, &axis->separation, active);
+        if (axis->separation + convex_radii(pair) >= -CONVEX_SHALLOW * pair->thin) return true;
+    }
+    if (end == GJK_MEET || !known) { /* the last step's side stays unless clearly beaten, and not by the other one */
+        struct convex_active other;
+        vec3 n;
+        real separation;
+        convex_way_out(pair, &s, &n, &separation, &other);
+        if (known && (v3_dot(n, axis->n) < -MANIFOLD_COS_OPPOSITE ||
+                      separation <= axis->separation - MANIFOLD_KEEP_DEPTH * axis->separation +
+                                        MANIFOLD_KEEP_EXTENT * pair->thin))
+            return true;
+        axis->n = n;
+        axis->separation = separation;
+        *active = other;
+    }
+    return true;
+}
+
+/* The optimum beside axis->n. */
+SADMM_INLINE void convex_finish(struct convex_pair *pair, struct convex_active *active, struct convex_axis *axis)
+{
+    if (!convex_polish(pair, active, &axis->n, &axis->separation)) { /* by moves alone, then */
+        const real enough = pair->enough;
+        pair->enough = 0;
+        convex_move(pair, CONVEX_MOVES, CONVEX_NEAR, &axis->n, &axis->separation, active);
+        pair->enough = enough;
+        convex_polish(pair, active, &axis->n, &axis->separation);
+    }
+}
+
+/* The nearest points, by the active pieces. */
+SADMM_INLINE void convex_nearest(const struct convex_pair *pair, const struct convex_active *active,
+                                 struct convex_axis *axis)
+{
+    real all = 0;
+    int k;
+    axis->pa = axis->pb = v3(0, 0, 0);
+    for (k = 0; k < active->count; ++k) {
+        const real weight = real_max(active->weight[k], 0);
+        axis->pa = v3_madd(axis->pa, weight, convex_point_a(pair, active->a[k], axis->n));
+        axis->pb = v3_madd(axis->pb, weight, convex_point_b(pair, active->b[k], axis->n));
+        all += weight;
+    }
+    axis->pa = v3_madd(v3_scale(axis->pa, 1 / all), pair->a.p.radius, axis->n);
+    axis->pb = v3_madd(v3_scale(axis->pb, 1 / all), -pair->b.p.radius, axis->n);
+}
+
+#endif

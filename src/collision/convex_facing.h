@@ -1,0 +1,455 @@
+/* Facing features of two convex bodies, seen along a normal: a flat of each, or, where that is too steep, a straight
+ * line of its surface, or nothing. Where they overlap, the corners of the overlap make the points, each with the gap
+ * along the normal there, as between two polytopes (polytope_face.h).
+ *
+ * A disc's rim has no corners. Eight points of it stand for it, evenly spread from a direction that is not the disc's
+ * own but the other body's: a side of the face, a plane's or a mesh's x axis, b's of two discs. So a disc that turns
+ * about its axis keeps its points, and it stands as an octagon does: what it tips about is at most 1 - cos(pi / 8) =
+ * 7.6 % of the radius inside of the rim. Where rims cross sides and lines the points are exact;
+ * where they cross each other they are as far as the discs are parallel.
+ */
+#ifndef SADMM_COLLISION_CONVEX_FACING_H
+#define SADMM_COLLISION_CONVEX_FACING_H
+
+#include "convex_pair.h"
+#include "polytope_face.h"
+
+enum { CONVEX_RIM = 8, CONVEX_POINTS = 64, CONVEX_END = 16 /* features of ends: above those of a rim */ };
+
+enum convex_facing_kind { CONVEX_NOTHING, CONVEX_LINE, CONVEX_FACE, CONVEX_DISC };
+
+struct convex_facing {
+    int kind, count;
+    vec3 corner[FACING_CORNERS]; /* of a face counter-clockwise seen from outside; the ends of a line */
+    int vertex[FACING_CORNERS], edge[FACING_CORNERS];
+    vec3 normal; /* of a flat, outward from its own body, with its offset; of a line, outward as well */
+    real offset;
+    vec3 centre; /* of a disc */
+    real radius;
+    real inner[2]; /* radii of curvature across a line, at its ends */
+};
+
+/* a - b seen along n, and the points that have been found. */
+struct convex_meeting {
+    const struct convex_pair *pair;
+    vec3 n, x1, x2;
+    real least, limit, tolerance;
+    real nearest; /* gap of all points that there are, those that are left out included */
+    int count;
+    struct facing_corner at[CONVEX_POINTS];
+    real gap[CONVEX_POINTS];
+    uint32_t feature[CONVEX_POINTS];
+};
+
+/* A straight line of a smooth body that looks along d (own frame) to within 8 degrees. */
+SADMM_INLINE bool convex_line(const struct convex *c, vec3 d, struct convex_facing *out)
+{
+    const real r = real_sqrt(d.x * d.x + d.y * d.y);
+    vec3 e;
+    if (c->form != CONVEX_CYLINDER && c->form != CONVEX_CONE) return false;
+    if (!(r > (real)1e-6)) return false;
+    e = v3(d.x / r, d.y / r, 0);
+    out->corner[0] = v3(c->size.x * e.x, c->size.x * e.y, -c->size.y);
+    if (c->form == CONVEX_CYLINDER) {
+        out->normal = e;
+        out->corner[1] = v3(out->corner[0].x, out->corner[0].y, c->size.y);
+        out->inner[0] = out->inner[1] = c->size.x;
+    } else {
+        const real length = real_sqrt(c->size.x * c->size.x + 4 * c->size.y * c->size.y);
+        out->normal = v3(2 * c->size.y / length * e.x, 2 * c->size.y / length * e.y, c->size.x / length);
+        out->corner[1] = v3(0, 0, c->size.y);
+        out->inner[0] = c->size.x * length / (2 * c->size.y); /* to the axis, along the normal */
+        out->inner[1] = 0;
+    }
+    out->kind = CONVEX_LINE;
+    out->count = 2;
+    out->vertex[0] = CONVEX_END;
+    out->vertex[1] = CONVEX_END + 1;
+    out->edge[0] = out->edge[1] = CONVEX_END;
+    return v3_dot(out->normal, d) >= MANIFOLD_COS_NEAR;
+}
+
+/* Of a polytope, as polytope_face.h takes them. */
+SADMM_INLINE void convex_polytope_facing(const struct polytope *p, vec3 d, struct convex_facing *out)
+{
+    const int face = facing_face(p, d);
+    int ends[2], k;
+    if (face >= 0) {
+        const int first = p->face_first[face], all = p->face_first[face + 1] - first;
+        out->kind = CONVEX_FACE;
+        out->count = all < FACING_CORNERS ? all : FACING_CORNERS;
+        for (k = 0; k < out->count; ++k) {
+            const int at = first + (all == out->count ? k : k * all / out->count);
+            out->vertex[k] = p->corner_vertex[at];
+            out->edge[k] = p->corner_edge[at];
+            out->corner[k] = polytope_vertex(p, out->vertex[k]);
+        }
+        out->normal = polytope_normal(p, face);
+        out->offset = polytope_offset(p, face);
+    } else if (p->edges > 0 && facing_edge(p, d, ends) == 2) {
+        out->kind = CONVEX_LINE;
+        out->count = 2;
+        for (k = 0; k < 2; ++k) {
+            out->vertex[k] = ends[k];
+            out->corner[k] = polytope_vertex(p, ends[k]);
+            out->inner[k] = 0;
+        }
+        out->edge[0] = out->edge[1] = polytope_edge_between(p, ends[0], ends[1]);
+        out->normal = d;
+    }
+}
+
+/* What of c looks along d (own frame). */
+SADMM_CALLED void convex_facing_of(const struct convex *c, vec3 d, struct convex_facing *out)
+{
+    const int flat = convex_flat(c, d, MANIFOLD_COS_NEAR);
+    out->kind = CONVEX_NOTHING;
+    out->count = 0;
+    if (c->form == CONVEX_POLYTOPE) {
+        convex_polytope_facing(&c->p, d, out);
+    } else if (flat >= 0) {
+        out->kind = CONVEX_DISC;
+        out->normal = convex_flat_normal(c, flat);
+        out->offset = convex_flat_offset(c, flat);
+        out->centre = v3_scale(out->normal, out->offset);
+        out->radius = c->size.x;
+    } else if (!convex_line(c, d, out)) {
+        out->kind = CONVEX_NOTHING;
+    }
+}
+
+/* From a's frame to b's. */
+SADMM_INLINE void convex_facing_place(const struct convex_pair *pair, struct convex_facing *f)
+{
+    int k;
+    for (k = 0; k < f->count; ++k) f->corner[k] = v3_add(m3_mul(pair->R, f->corner[k]), pair->t);
+    f->normal = m3_mul(pair->R, f->normal);
+    f->offset += v3_dot(f->normal, pair->t);
+    f->centre = v3_add(m3_mul(pair->R, f->centre), pair->t);
+}
+
+/* The point of a flat's plane over x, along n. */
+SADMM_INLINE vec3 convex_over(const struct convex_facing *flat, vec3 n, vec3 x)
+{
+    return v3_madd(x, (flat->offset - v3_dot(flat->normal, x)) / v3_dot(flat->normal, n), n);
+}
+
+/* Outward of side k of a face, unit, in its plane. */
+SADMM_INLINE vec3 convex_side_out(const struct convex_facing *face, int k)
+{
+    const vec3 side = v3_sub(face->corner[k + 1 < face->count ? k + 1 : 0], face->corner[k]),
+               out = v3_cross(side, face->normal);
+    const real length = v3_norm(out);
+    return length > 0 ? v3_scale(out, 1 / length) : v3(0, 0, 0);
+}
+
+/* Is a point of a flat's plane on the flat, or beside it by no more than the tolerance? */
+SADMM_INLINE bool convex_is_on(const struct convex_facing *flat, vec3 x, real tolerance)
+{
+    int k;
+    if (flat->kind == CONVEX_DISC) {
+        const real reach = flat->radius + tolerance;
+        return v3_norm2(v3_sub(x, flat->centre)) <= reach * reach;
+    }
+    for (k = 0; k < flat->count; ++k)
+        if (v3_dot(convex_side_out(flat, k), v3_sub(x, flat->corner[k])) > tolerance) return false;
+    return true;
+}
+
+/* Is the point of a corner, or on a side, of b that is left out? */
+SADMM_INLINE bool convex_leaves_out(const struct convex_pair *pair, uint32_t feature)
+{
+    const uint32_t number = feature & AXIS_EDGE_MASK;
+    switch (feature >> AXIS_KIND_SHIFT) {
+    case FEATURE_VERTEX_B: return number <= 16 && (pair->left_out >> (number - 1) & 1) != 0;
+    case FEATURE_CROSSING: return number < 16 && (pair->left_out >> (16 + number) & 1) != 0;
+    default: return false;
+    }
+}
+
+/* A point by where it is on each of the two, without their rounds. */
+SADMM_CALLED void convex_meet(struct convex_meeting *m, vec3 on_a, vec3 on_b, uint32_t feature)
+{
+    const struct convex_pair *pair = m->pair;
+    const real gap = real_max(v3_dot(m->n, v3_sub(on_b, on_a)) - convex_radii(pair), m->least);
+    const vec3 x = v3_madd(v3_scale(v3_add(on_a, on_b), (real)0.5), (pair->a.p.radius - pair->b.p.radius) / 2, m->n);
+    struct facing_corner at;
+    int k;
+    m->nearest = real_min(m->nearest, gap);
+    if (!(gap <= m->limit + pair->slack) || m->count == CONVEX_POINTS || convex_leaves_out(pair, feature)) return;
+    at.x = v3_dot(m->x1, x);
+    at.y = v3_dot(m->x2, x);
+    at.z = v3_dot(m->n, x);
+    at.edge = 0;
+    for (k = 0; k < m->count; ++k)
+        if (m->feature[k] == feature || (facing_near(&m->at[k], at.x, at.y, m->tolerance) &&
+                                         real_abs(m->gap[k] - gap) <= 2 * m->tolerance))
+            return;
+    m->at[m->count] = at;
+    m->gap[m->count] = gap;
+    m->feature[m->count++] = feature;
+}
+
+/* x is a point of one of the two, of a where so said; the other is a flat. */
+SADMM_INLINE void convex_meet_flat(struct convex_meeting *m, vec3 x, bool of_a, const struct convex_facing *flat,
+                                   uint32_t feature)
+{
+    const vec3 over = convex_over(flat, m->n, x);
+    convex_meet(m, of_a ? x : over, of_a ? over : x, feature);
+}
+
+/* The k-th point of a disc's rim; e1, e2: axes in its plane. */
+SADMM_INLINE vec3 convex_rim(const struct convex_facing *disc, vec3 e1, vec3 e2, int k)
+{
+    const real half = (real)0.70710678118654752;
+    const real cosine = k % 4 == 2 ? 0 : k % 2 ? half : 1, sine = k % 4 == 0 ? 0 : k % 2 ? half : 1;
+    return v3_madd(v3_madd(disc->centre, (k > 2 && k < 6 ? -cosine : cosine) * disc->radius, e1),
+                   (k > 4 ? -sine : sine) * disc->radius, e2);
+}
+
+/* The direction in a disc's plane that is nearest to `along`, unit, and the one across it. */
+SADMM_INLINE void convex_rim_axes(const struct convex_facing *disc, vec3 along, vec3 *e1, vec3 *e2)
+{
+    const vec3 flat = v3_madd(along, -v3_dot(along, disc->normal), disc->normal);
+    const real length2 = v3_norm2(flat);
+    if (length2 > (real)1e-6 * v3_norm2(along)) {
+        *e1 = v3_scale(flat, 1 / real_sqrt(length2));
+        *e2 = v3_cross(disc->normal, *e1);
+    } else {
+        v3_tangents(disc->normal, e1, e2);
+    }
+}
+
+/* What the points of a rim that faces `other` are spread from. */
+SADMM_INLINE vec3 convex_spread(const struct convex_pair *pair, const struct convex_facing *other)
+{
+    if (v3_norm2(pair->spread) > 0) return pair->spread;
+    return other->kind == CONVEX_DISC ? v3(1, 0, 0) : v3_sub(other->corner[1], other->corner[0]);
+}
+
+/* Points of the rim that are over a flat of the other one. */
+SADMM_INLINE void convex_rim_over(struct convex_meeting *m, const struct convex_facing *disc, bool disc_is_a,
+                                  const struct convex_facing *flat)
+{
+    vec3 e1, e2;
+    int k;
+    convex_rim_axes(disc, convex_spread(m->pair, flat), &e1, &e2);
+    for (k = 0; k < CONVEX_RIM; ++k) {
+        const vec3 x = convex_rim(disc, e1, e2, k);
+        if (convex_is_on(flat, convex_over(flat, m->n, x), m->tolerance))
+            convex_meet_flat(m, x, disc_is_a, flat,
+                             polytope_feature(disc_is_a ? FEATURE_VERTEX_A : FEATURE_VERTEX_B, 0, k) + 1);
+    }
+}
+
+/* Where the line through p and q, in a disc's plane, crosses its rim: shares of the way from p to q. False: nowhere. */
+SADMM_INLINE bool convex_crossings(const struct convex_facing *disc, vec3 p, vec3 q, real share[2])
+{
+    const vec3 d = v3_sub(q, p), r = v3_sub(p, disc->centre);
+    const real dd = v3_norm2(d), half = v3_dot(d, r), rest = v3_norm2(r) - disc->radius * disc->radius,
+               det = half * half - dd * rest;
+    real root;
+    if (!(det > 0 && dd > 0)) return false;
+    root = real_sqrt(det);
+    /* both without a difference of like numbers */
+    share[0] = half > 0 ? (-half - root) / dd : rest / (-half + root);
+    share[1] = half > 0 ? rest / (-half - root) : (-half + root) / dd;
+    return true;
+}
+
+/* of_disc, of_other: what is crossed, by a number of its own. */
+SADMM_INLINE uint32_t convex_crossing_feature(bool disc_is_a, int of_disc, int of_other)
+{
+    return polytope_feature(FEATURE_CROSSING, disc_is_a ? of_disc : of_other, disc_is_a ? of_other : of_disc);
+}
+
+SADMM_INLINE void convex_disc_face(struct convex_meeting *m, const struct convex_facing *disc, bool disc_is_a,
+                                   const struct convex_facing *face)
+{
+    int k, i;
+    convex_rim_over(m, disc, disc_is_a, face);
+    for (k = 0; k < face->count; ++k)
+        if (convex_is_on(disc, convex_over(disc, m->n, face->corner[k]), m->tolerance))
+            convex_meet_flat(m, face->corner[k], !disc_is_a, disc,
+                             polytope_feature(disc_is_a ? FEATURE_VERTEX_B : FEATURE_VERTEX_A, 0, face->vertex[k]) + 1);
+    for (k = 0; k < face->count; ++k) {
+        const vec3 from = face->corner[k], to = face->corner[k + 1 < face->count ? k + 1 : 0];
+        real share[2];
+        if (!convex_crossings(disc, convex_over(disc, m->n, from), convex_over(disc, m->n, to), share)) continue;
+        for (i = 0; i < 2; ++i)
+            if (share[i] > 0 && share[i] < 1)
+                convex_meet_flat(m, v3_madd(from, share[i], v3_sub(to, from)), !disc_is_a, disc,
+                                 convex_crossing_feature(disc_is_a, i, face->edge[k]));
+    }
+}
+
+/* Seen along n, which both are across to within 8 degrees, the discs are circles but for 1 - cosine of that: their rims
+ * cross where circles would. */
+SADMM_INLINE void convex_disc_disc(struct convex_meeting *m, const struct convex_facing *a,
+                                   const struct convex_facing *b)
+{
+    const vec3 to_b = v3_sub(convex_over(a, m->n, b->centre), a->centre);
+    const real d2 = v3_norm2(to_b), d = real_sqrt(d2);
+    convex_rim_over(m, a, true, b);
+    convex_rim_over(m, b, false, a);
+    if (d > m->tolerance && d < a->radius + b->radius && d > real_abs(a->radius - b->radius)) {
+        const vec3 e1 = v3_scale(to_b, 1 / d), e2 = v3_cross(a->normal, e1);
+        const real along = (d2 + a->radius * a->radius - b->radius * b->radius) / (2 * d),
+                   height = real_sqrt(real_max(a->radius * a->radius - along * along, 0));
+        int side;
+        for (side = 0; side < 2; ++side)
+            convex_meet_flat(m, v3_madd(v3_madd(a->centre, along, e1), side ? height : -height, e2), true, b,
+                             polytope_feature(FEATURE_CROSSING, side, 0));
+    }
+}
+
+/* The part of a line that is over a flat. */
+SADMM_INLINE void convex_line_flat(struct convex_meeting *m, const struct convex_facing *line, bool line_is_a,
+                                   const struct convex_facing *flat)
+{
+    const vec3 p = convex_over(flat, m->n, line->corner[0]), q = convex_over(flat, m->n, line->corner[1]);
+    const int own = line_is_a ? FEATURE_VERTEX_A : FEATURE_VERTEX_B;
+    real low = 0, high = 1;
+    uint32_t feature[2];
+    int k;
+    for (k = 0; k < 2; ++k) feature[k] = polytope_feature(own, 0, line->vertex[k]) + 1;
+    if (flat->kind == CONVEX_DISC) {
+        real share[2];
+        if (!convex_crossings(flat, p, q, share)) return;
+        for (k = 0; k < 2; ++k) {
+            if (!(k ? share[1] < high : share[0] > low)) continue;
+            if (k) high = share[1];
+            else low = share[0];
+            feature[k] = convex_crossing_feature(!line_is_a, k, line->edge[0]);
+        }
+    } else {
+        for (k = 0; k < flat->count; ++k) {
+            const vec3 out = convex_side_out(flat, k);
+            const real dp = v3_dot(out, v3_sub(p, flat->corner[k])), dq = v3_dot(out, v3_sub(q, flat->corner[k]));
+            const bool p_beyond = dp > m->tolerance, q_beyond = dq > m->tolerance;
+            real share;
+            if (!p_beyond && !q_beyond) continue;
+            if (p_beyond && q_beyond) return;
+            share = dp / (dp - dq);
+            if (p_beyond && share > low) {
+                low = share;
+                feature[0] = convex_crossing_feature(!line_is_a, flat->edge[k], line->edge[0]);
+            } else if (q_beyond && share < high) {
+                high = share;
+                feature[1] = convex_crossing_feature(!line_is_a, flat->edge[k], line->edge[0]);
+            }
+        }
+    }
+    if (!(low <= high)) return;
+    for (k = 0; k < 2; ++k)
+        convex_meet_flat(m, v3_madd(line->corner[0], k ? high : low, v3_sub(line->corner[1], line->corner[0])),
+                         line_is_a, flat, feature[k]);
+}
+
+/* Two lines side by side, to within 8 degrees: both ends of the common stretch, where the round surfaces over them are
+ * nearest to each other. */
+SADMM_INLINE void convex_line_line(struct convex_meeting *m, const struct convex_facing *a,
+                                   const struct convex_facing *b)
+{
+    const vec3 n = m->n;
+    vec3 u = v3_sub(a->corner[1], a->corner[0]), w = v3_sub(b->corner[1], b->corner[0]);
+    real lu, lw, ends[2][2], low, high;
+    int k;
+    u = v3_madd(u, -v3_dot(u, n), n);
+    w = v3_madd(w, -v3_dot(w, n), n);
+    lu = v3_norm(u);
+    lw = v3_norm(w);
+    if (!(lu > 0 && lw > 0) || real_abs(v3_dot(u, w)) < MANIFOLD_COS_NEAR * lu * lw) return;
+    u = v3_scale(u, 1 / lu);
+    for (k = 0; k < 2; ++k) {
+        ends[0][k] = v3_dot(u, a->corner[k]);
+        ends[1][k] = v3_dot(u, b->corner[k]);
+    }
+    low = real_max(real_min(ends[0][0], ends[0][1]), real_min(ends[1][0], ends[1][1]));
+    high = real_min(real_max(ends[0][0], ends[0][1]), real_max(ends[1][0], ends[1][1]));
+    if (!(high - low > MANIFOLD_SNAP * real_min(lu, lw))) return;
+    for (k = 0; k < 2; ++k) {
+        const real at = k ? high : low, sa = (at - ends[0][0]) / (ends[0][1] - ends[0][0]),
+                   sb = (at - ends[1][0]) / (ends[1][1] - ends[1][0]),
+                   ra = a->inner[0] + sa * (a->inner[1] - a->inner[0]),
+                   rb = b->inner[0] + sb * (b->inner[1] - b->inner[0]), round_a = ra + m->pair->a.p.radius,
+                   round_b = rb + m->pair->b.p.radius, rounds = round_a + round_b;
+        /* a's and b's centres of curvature there, and what is between them */
+        const vec3 xa = v3_madd(v3_add(a->corner[0], v3_scale(v3_sub(a->corner[1], a->corner[0]), sa)), -ra, n),
+                   xb = v3_madd(v3_add(b->corner[0], v3_scale(v3_sub(b->corner[1], b->corner[0]), sb)), rb, n),
+                   d = v3_sub(xb, xa);
+        const real along = v3_dot(n, d), aside2 = v3_norm2(v3_madd(d, -along, n)), height2 = rounds * rounds - aside2;
+        vec3 on_a, middle;
+        real height, share;
+        if (!(rounds > 0) || !(height2 > 0)) continue;
+        height = real_sqrt(height2);
+        share = round_a / rounds;
+        middle = v3_madd(v3_madd(xa, share, v3_madd(d, -along, n)), share * height, n); /* of a's surface */
+        on_a = v3_madd(middle, -m->pair->a.p.radius, n);
+        /* which end it is: a's own features, where a ends first or both do, or b's */
+        convex_meet(m, on_a, v3_madd(middle, along - height + m->pair->b.p.radius, n),
+                    (k ? real_max(ends[0][0], ends[0][1]) <= high : real_min(ends[0][0], ends[0][1]) >= low)
+                        ? polytope_feature(FEATURE_VERTEX_A, 0, a->vertex[(ends[0][1] > ends[0][0]) == (k == 1)]) + 1
+                        : polytope_feature(FEATURE_VERTEX_B, 0, b->vertex[(ends[1][1] > ends[1][0]) == (k == 1)]) + 1);
+    }
+}
+
+SADMM_INLINE real convex_slope(const struct convex_facing *f, vec3 n)
+{
+    const real c = f->kind == CONVEX_FACE || f->kind == CONVEX_DISC ? real_abs(v3_dot(f->normal, n)) : 1;
+    return real_sqrt(real_max(0, 1 - c * c)) / c;
+}
+
+/* Sets m's normal to n, and its points to those of what faces along it. least: the separation of the two along n. The
+ * smallest gap of all that there are, those that are left out included; largest: there are none. */
+SADMM_RARE real convex_facing_manifold(const struct convex_pair *pair, vec3 n, real least, real limit,
+                                       struct manifold *m)
+{
+    struct convex_facing a, b;
+    struct convex_meeting meeting;
+    uint64_t chosen;
+    real slope;
+    int i;
+    m->normal = n;
+    m->count = 0;
+    convex_facing_of(&pair->a, m3_tmul(pair->R, n), &a);
+    if (a.kind == CONVEX_NOTHING) return SADMM_REAL_MAX;
+    convex_facing_of(&pair->b, v3_neg(n), &b);
+    if (b.kind == CONVEX_NOTHING) return SADMM_REAL_MAX;
+    convex_facing_place(pair, &a);
+
+    meeting.pair = pair;
+    meeting.n = n;
+    meeting.least = least;
+    meeting.limit = limit;
+    meeting.nearest = SADMM_REAL_MAX;
+    meeting.count = 0;
+    slope = convex_slope(&a, n) + convex_slope(&b, n);
+    meeting.tolerance = MANIFOLD_SNAP / 2 * slope > FACING_GAP ? FACING_GAP / slope : MANIFOLD_SNAP / 2;
+    meeting.tolerance *= pair->thin;
+    /* axes that do not turn with a disc, as those of its rim */
+    if (a.kind == CONVEX_DISC || b.kind == CONVEX_DISC) {
+        struct convex_facing across;
+        const struct convex_facing *other = a.kind == CONVEX_DISC ? &b : &a;
+        across.normal = n;
+        convex_rim_axes(&across, convex_spread(pair, other), &meeting.x1, &meeting.x2);
+    } else {
+        v3_tangents(n, &meeting.x1, &meeting.x2);
+    }
+    if (a.kind == CONVEX_DISC && b.kind == CONVEX_DISC) convex_disc_disc(&meeting, &a, &b);
+    else if (a.kind == CONVEX_DISC && b.kind == CONVEX_FACE) convex_disc_face(&meeting, &a, true, &b);
+    else if (a.kind == CONVEX_FACE && b.kind == CONVEX_DISC) convex_disc_face(&meeting, &b, false, &a);
+    else if (a.kind == CONVEX_LINE && b.kind == CONVEX_LINE) convex_line_line(&meeting, &a, &b);
+    else if (a.kind == CONVEX_LINE) convex_line_flat(&meeting, &a, true, &b);
+    else if (b.kind == CONVEX_LINE) convex_line_flat(&meeting, &b, false, &a);
+    chosen = facing_choice(meeting.at, meeting.gap, meeting.count);
+    for (i = 0; i < meeting.count; ++i)
+        if (chosen >> i & 1) {
+            const struct facing_corner *p = &meeting.at[i];
+            manifold_add(m, v3_madd(v3_madd(v3_scale(meeting.x1, p->x), p->y, meeting.x2), p->z, n), meeting.gap[i],
+                         meeting.feature[i]);
+        }
+    return meeting.nearest;
+}
+
+#endif

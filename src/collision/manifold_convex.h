@@ -1,0 +1,238 @@
+/* Cylinders, cones and ellipsoids (b) against every shape (a), in the frame of b. a may be any convex body.
+ *
+ *   1. The flat of the last step: where the points of what faces along its normal prove that nothing is nearer, that is
+ *      all. What stands on a cap, or lies on a face, asks for nothing else.
+ *   2. The direction along which the two are farthest apart, or least deep in each other (convex_axis.h).
+ *   3. A flat whose normal is that direction, as far as rounding can tell, gives its own: what rolls has its true
+ *      normal, and what stands has one that does not shiver.
+ *   4. The points of what faces along it (convex_facing.h); the nearest points as well where these do not have them.
+ */
+#ifndef SADMM_COLLISION_MANIFOLD_CONVEX_H
+#define SADMM_COLLISION_MANIFOLD_CONVEX_H
+
+#include "convex_axis.h"
+#include "convex_facing.h"
+#include "manifold_hull.h"
+
+/* cache: the lower bits of a direction, or a flat above them. */
+enum { CONVEX_MEMORY_DIRECTION = 1, CONVEX_MEMORY_FLAT_A, CONVEX_MEMORY_FLAT_B, CONVEX_MEMORY_MASK = 31 };
+
+/* The axis of a flat; the nearest points for what has one point alone there. */
+SADMM_CALLED void convex_flat_axis(const struct convex_pair *pair, bool of_a, int flat, struct convex_axis *axis)
+{
+    const struct difference_point zero = {{0, 0, 0}, 0, 0};
+    const vec3 outward = convex_flat_normal(of_a ? &pair->a : &pair->b, flat),
+               n = of_a ? m3_mul(pair->R, outward) : v3_neg(outward);
+    const struct difference_point point = convex_support(pair, n, &zero);
+    axis->n = n;
+    axis->separation = -v3_dot(n, point.w) - convex_radii(pair);
+    axis->pa = v3_madd(convex_point_a(pair, point.a, n), pair->a.p.radius, n);
+    axis->pb = v3_madd(convex_point_b(pair, point.b, n), -pair->b.p.radius, n);
+    if (of_a) axis->pa = v3_madd(axis->pb, -axis->separation, n);
+    else axis->pb = v3_madd(axis->pa, axis->separation, n);
+}
+
+/* The better one of the flats beside n; its memory, 0: there is none within 8 degrees. */
+SADMM_INLINE uint32_t convex_flat_beside(const struct convex_pair *pair, vec3 n, struct convex_axis *axis)
+{
+    const int fa = convex_flat(&pair->a, m3_tmul(pair->R, n), MANIFOLD_COS_NEAR),
+              fb = convex_flat(&pair->b, v3_neg(n), MANIFOLD_COS_NEAR);
+    const int shift = MANIFOLD_DIRECTION_SHIFT;
+    struct convex_axis other;
+    uint32_t memory = 0;
+    if (fa >= 0) {
+        convex_flat_axis(pair, true, fa, axis);
+        memory = CONVEX_MEMORY_FLAT_A | (uint32_t)fa << shift;
+    }
+    if (fb >= 0) {
+        convex_flat_axis(pair, false, fb, &other);
+        if (fa < 0 || other.separation > axis->separation) {
+            *axis = other;
+            memory = CONVEX_MEMORY_FLAT_B | (uint32_t)fb << shift;
+        }
+    }
+    return memory;
+}
+
+/* Do points that face each other along a flat's normal prove that no direction beside it is better? They are as near to
+ * each other as the planes across it are. */
+SADMM_INLINE bool convex_is_proven(const struct convex_pair *pair, real separation, const struct manifold *m)
+{
+    const real apart = separation + convex_radii(pair),
+               even = apart >= 0 ? 2 * pair->slack : 2 * pair->slack + (real)1e-7 * pair->thin;
+    int k;
+    if (apart < -CONVEX_SHALLOW * pair->thin) return false;
+    for (k = 0; k < m->count; ++k)
+        if (m->points[k].separation <= separation + even) return true;
+    return false;
+}
+
+/* Where one of the two has a point alone along a flat's normal: is that over the flat? Then it is the manifold. */
+SADMM_INLINE bool convex_point_on_flat(const struct convex_pair *pair, const struct convex_axis *axis, bool of_a,
+                                       int flat, real limit, struct manifold *m)
+{
+    const struct convex *c = of_a ? &pair->a : &pair->b, *other = of_a ? &pair->b : &pair->a;
+    struct convex_facing facing;
+    vec3 x = of_a ? v3_madd(axis->pa, -pair->a.p.radius, axis->n) : v3_madd(axis->pb, pair->b.p.radius, axis->n);
+    if (axis->separation > limit || axis->separation + convex_radii(pair) < -CONVEX_SHALLOW * pair->thin) return false;
+    convex_facing_of(other, of_a ? v3_neg(axis->n) : m3_tmul(pair->R, axis->n), &facing);
+    if (facing.kind != CONVEX_NOTHING) return false;
+    if (of_a) x = m3_tmul(pair->R, v3_sub(x, pair->t));
+    convex_facing_of(c, convex_flat_normal(c, flat), &facing);
+    if (!convex_is_on(&facing, x, 0)) return false;
+    m->normal = axis->n;
+    m->count = 0;
+    manifold_add_between(m, axis->pa, axis->pb, polytope_feature(FEATURE_NEAREST, 0, 0));
+    return true;
+}
+
+/* What a pair remembers. */
+struct convex_memory {
+    bool known;      /* anything */
+    bool is_flat;    /* a flat: `axis` */
+    bool of_a;
+    int flat;
+    vec3 side;       /* the direction; else one to begin with */
+    struct convex_axis axis;
+};
+
+SADMM_INLINE void convex_recall(const struct convex_pair *pair, uint32_t cache, struct convex_memory *memory)
+{
+    const uint32_t kind = cache & CONVEX_MEMORY_MASK, flat = cache >> MANIFOLD_DIRECTION_SHIFT;
+    memory->known = memory->is_flat = false;
+    memory->of_a = kind == CONVEX_MEMORY_FLAT_A;
+    memory->flat = 0;
+    memory->side = v3_neg(pair->t);
+    if (!(v3_norm2(memory->side) > 0)) memory->side = v3(0, 0, 1);
+    if (kind == CONVEX_MEMORY_DIRECTION) {
+        const vec3 n = manifold_cached_direction(cache);
+        if (!(v3_norm2(n) > (real)0.5)) return;
+        memory->side = n;
+        memory->known = true;
+        return;
+    }
+    if (kind != CONVEX_MEMORY_FLAT_A && kind != CONVEX_MEMORY_FLAT_B) return;
+    if (!convex_has_flat(memory->of_a ? &pair->a : &pair->b, flat)) return;
+    memory->known = memory->is_flat = true;
+    memory->flat = (int)flat;
+    convex_flat_axis(pair, memory->of_a, memory->flat, &memory->axis);
+    memory->side = memory->axis.n;
+}
+
+/* 1. False: the whole of it has to be done. */
+SADMM_INLINE bool convex_by_memory(const struct convex_pair *pair, real limit, uint32_t cache,
+                                   struct convex_memory *memory, struct manifold *m)
+{
+    const struct convex_axis *axis = &memory->axis;
+    convex_recall(pair, cache, memory);
+    if (!memory->is_flat) return false;
+    if (axis->separation > limit + pair->slack) return true;
+    if (!convex_point_on_flat(pair, axis, memory->of_a, memory->flat, limit, m))
+        convex_facing_manifold(pair, axis->n, axis->separation, limit, m);
+    if (convex_is_proven(pair, axis->separation, m)) {
+        m->cache = cache;
+        return true;
+    }
+    m->count = 0;
+    return false;
+}
+
+/* 2 and 3. side, known: convex_recall. False: farther apart than the limit. *cache: what is to be remembered of it. */
+SADMM_INLINE bool convex_search(struct convex_pair *pair, vec3 side, bool known, real limit, struct convex_axis *axis,
+                                uint32_t *cache, struct manifold *m)
+{
+    struct convex_axis flat;
+    struct convex_active active;
+    if (!known || !convex_follow(pair, side, axis, &active)) {
+        if (!convex_begin(pair, side, known, limit, axis, &active)) return false;
+        *cache = convex_flat_beside(pair, axis->n, &flat);
+        if (*cache && flat.separation >= axis->separation - pair->slack) { /* does it stand, or lie? */
+            convex_facing_manifold(pair, flat.n, flat.separation, limit, m);
+            if (convex_is_proven(pair, flat.separation, m)) {
+                *axis = flat;
+                return axis->separation <= limit + pair->slack;
+            }
+            m->count = 0;
+        }
+        convex_finish(pair, &active, axis);
+    }
+    *cache = convex_flat_beside(pair, axis->n, &flat);
+    if (*cache && flat.separation >= axis->separation - 2 * pair->slack) {
+        *axis = flat;
+    } else {
+        convex_nearest(pair, &active, axis);
+        *cache = CONVEX_MEMORY_DIRECTION | manifold_direction_bits(axis->n);
+    }
+    return axis->separation <= limit + pair->slack;
+}
+
+/* 4. What faces along the axis, with the nearest points. */
+SADMM_INLINE void convex_points(const struct convex_pair *pair, const struct convex_axis *axis, real limit,
+                                struct manifold *m)
+{
+    convex_facing_manifold(pair, axis->n, axis->separation, limit, m);
+    hull_add_nearest(pair->thin, axis->pa, axis->pb, polytope_feature(FEATURE_NEAREST, 0, 0), m);
+}
+
+SADMM_RARE void convex_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
+                                const struct pair_pose *pose, real limit, uint32_t cache, struct manifold *m)
+{
+    struct convex_pair pair;
+    struct convex_memory memory;
+    struct convex_axis axis;
+    uint32_t found;
+    convex_pair_make(a, b, hulls, pose, &pair);
+    if (convex_by_memory(&pair, limit, cache, &memory, m)) return;
+    if (!convex_search(&pair, memory.side, memory.known, limit, &axis, &found, m)) {
+        m->count = 0;
+        return;
+    }
+    convex_points(&pair, &axis, limit, m);
+    m->cache = found;
+}
+
+/* ---- planes ------------------------------------------------------------------------------------------------------ */
+
+/* x: a point of b's surface. */
+SADMM_INLINE void convex_plane_point(struct manifold *m, vec3 x, real offset, real limit, uint32_t feature)
+{
+    const real s = v3_dot(m->normal, x) + offset;
+    if (s <= limit) manifold_add(m, v3_madd(x, -s / 2, m->normal), s, feature);
+}
+
+/* a: the plane (manifold_plane.h). The lowest point of every piece; of a cap within 8 degrees of the plane the points
+ * of its rim, which go by the plane's x axis, and the lowest one where it is between them. */
+SADMM_RARE void convex_plane_manifold(const struct sadmm_geometry *b, const double *hulls, const struct pair_pose *pose,
+                                      real limit, struct manifold *m)
+{
+    enum { RIM_FEATURE = 8 };
+    struct convex c;
+    vec3 down;
+    const real offset = plane_offset(pose, &m->normal);
+    int flat, k;
+    convex_of(b, hulls, &c);
+    down = v3_neg(m->normal);
+    if (c.form == CONVEX_ELLIPSOID) {
+        convex_plane_point(m, convex_point(&c, 0, down), offset, limit, 1);
+        return;
+    }
+    flat = convex_flat(&c, down, MANIFOLD_COS_NEAR);
+    if (flat < 0) {
+        for (k = 0; k < 2; ++k) convex_plane_point(m, convex_point(&c, k, down), offset, limit, (uint32_t)k + 1);
+    } else {
+        struct convex_facing disc;
+        const vec3 x = convex_point(&c, flat, down);
+        const real s = v3_dot(m->normal, x) + offset;
+        vec3 e1, e2;
+        disc.normal = convex_flat_normal(&c, flat);
+        disc.centre = v3_scale(disc.normal, c.size.y);
+        disc.radius = c.size.x;
+        convex_rim_axes(&disc, v3(r3_vec3(pose->R[0]).x, r3_vec3(pose->R[1]).x, r3_vec3(pose->R[2]).x), &e1, &e2);
+        for (k = 0; k < CONVEX_RIM; ++k)
+            convex_plane_point(m, convex_rim(&disc, e1, e2, k), offset, limit, RIM_FEATURE + (uint32_t)k);
+        if (s <= limit)
+            hull_add_nearest((real)geometry_thickness(b), v3_madd(x, -s, m->normal), x, (uint32_t)flat + 1, m);
+    }
+}
+
+#endif
