@@ -964,9 +964,11 @@ START_TEST(every_pair_of_types_is_listed)
     const uint32_t ground = (uint32_t)pool->used;
     ck_assert_uint_le(pool->used + mesh->doubles, TEST_POOL);
     memcpy(pool->numbers + ground, mesh->block, mesh->doubles * sizeof *mesh->block);
-    for (int a = -1; a <= 2 * SADMM_SHAPE_TYPE_COUNT; ++a)
-        for (int b = a; b <= 2 * SADMM_SHAPE_TYPE_COUNT; ++b) {
-            const bool known = a >= 0 && b < SADMM_SHAPE_TYPE_COUNT;
+    for (int low = -1; low <= 2 * SADMM_SHAPE_TYPE_COUNT; ++low)
+        for (int high = low; high <= 2 * SADMM_SHAPE_TYPE_COUNT; ++high) {
+            const bool known = low >= 0 && high < SADMM_SHAPE_TYPE_COUNT,
+                       swapped = known && geometry_rank(low) > geometry_rank(high); /* a mesh comes last */
+            const int a = swapped ? high : low, b = swapped ? low : high;
             const bool listed = known && a != SADMM_SHAPE_MESH &&
                                 !(a == SADMM_SHAPE_PLANE && (b == SADMM_SHAPE_PLANE || b == SADMM_SHAPE_MESH));
             struct sadmm_geometry a_is = geometry_of(a, size), b_is = geometry_of(b, size);
