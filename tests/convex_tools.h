@@ -3,21 +3,7 @@
 #ifndef SADMM_TESTS_CONVEX_TOOLS_H
 #define SADMM_TESTS_CONVEX_TOOLS_H
 
-#include "hull_pool.h"
-#include "manifold_tools.h"
-
-/* Two shapes with poses; h: of a hull. */
-struct pair_of {
-    struct test_pool *pool;
-    struct test_hull h[2];
-    struct sadmm_geometry g[2];
-    double R[2][9], x[2][3];
-};
-
-static inline struct pair_pose pair_of_pose(const struct pair_of *t)
-{
-    return pair_pose(false, t->R[0], t->x[0], t->R[1], t->x[1]);
-}
+#include "pair_of.h"
 
 static inline void to_own(const double R[9], const double v[3], double own[3])
 {

@@ -6,25 +6,11 @@
 #include <check.h>
 #include <stdio.h>
 
-#include "hull_pool.h"
-#include "manifold_tools.h"
+#include "pair_of.h"
 
-/* Two hulls with poses. */
-struct two {
-    struct test_pool *pool;
-    struct test_hull h[2];
-    struct sadmm_geometry g[2];
-    double R[2][9], x[2][3];
-};
-
-static inline struct pair_pose pose_of(const struct two *t)
+static inline struct manifold touch_two(const struct pair_of *t, double limit, uint32_t cache)
 {
-    return pair_pose(false, t->R[0], t->x[0], t->R[1], t->x[1]);
-}
-
-static inline struct manifold touch_two(const struct two *t, double limit, uint32_t cache)
-{
-    const struct pair_pose pose = pose_of(t);
+    const struct pair_pose pose = pair_of_pose(t);
     struct manifold m;
     memset(&m, 0x55, sizeof m);
     pair_manifold(&t->g[0], &t->g[1], t->pool->numbers, 0, &pose, limit, cache, &m);
@@ -39,7 +25,7 @@ static inline void rows_of(const double R[9], double rows[3][3])
 }
 
 /* Distance, or minus the depth, by trying everything. */
-static inline double reference(const struct two *t)
+static inline double reference(const struct pair_of *t)
 {
     double xa[TEST_HULL_POINTS][3], xb[TEST_HULL_POINTS][3], Ra[3][3], Rb[3][3];
     rows_of(t->R[0], Ra);
@@ -50,7 +36,7 @@ static inline double reference(const struct two *t)
     return axes < 0 ? axes : test_hulls_distance(&t->h[0], (const double(*)[3])xa, &t->h[1], (const double(*)[3])xb);
 }
 
-static inline double size_of(const struct two *t)
+static inline double size_of(const struct pair_of *t)
 {
     double size = 0;
     for (int s = 0; s < 2; ++s) size += t_norm(t->g[s].size);
@@ -58,7 +44,7 @@ static inline double size_of(const struct two *t)
 }
 
 /* The separation of the two along a direction of b's frame. */
-static inline double along(const struct two *t, vec3 n)
+static inline double along(const struct pair_of *t, vec3 n)
 {
     double xa[TEST_HULL_POINTS][3], xb[TEST_HULL_POINTS][3], Ra[3][3], Rb[3][3], world[3], local[3];
     rows_of(t->R[0], Ra);
@@ -72,7 +58,7 @@ static inline double along(const struct two *t, vec3 n)
 
 /* What a manifold says is true of the two: its normal parts them nearly as well as any, and its points are on both
  * surfaces, as far apart as they say. */
-static inline void check_manifold(const struct two *t, const struct manifold *m, double best, double limit,
+static inline void check_manifold(const struct pair_of *t, const struct manifold *m, double best, double limit,
                                   const char *what)
 {
     const double size = size_of(t), rounding = 1e-10 * size,
@@ -114,9 +100,9 @@ static inline void check_manifold(const struct two *t, const struct manifold *m,
 }
 
 /* The nearest features themselves, before any axis is preferred. */
-static inline double nearest(const struct two *t, vec3 start)
+static inline double nearest(const struct pair_of *t, vec3 start)
 {
-    const struct pair_pose pose = pose_of(t);
+    const struct pair_pose pose = pair_of_pose(t);
     struct polytope_pair pair;
     struct polytope_axis axis;
     vec3 pa, pb;
@@ -128,7 +114,7 @@ static inline double nearest(const struct two *t, vec3 start)
     return axis.separation;
 }
 
-static inline void random_pose(struct random *r, double reach, struct two *t)
+static inline void random_pose(struct random *r, double reach, struct pair_of *t)
 {
     for (int s = 0; s < 2; ++s) random_rotation(r, t->R[s]);
     double d[3], length;
@@ -176,7 +162,7 @@ static inline void touch_hulls(uint64_t seed, const struct extent *extent)
 {
     enum { POSES = 8 };
     struct random r = {.state = UINT64_C(88172645463325252) + seed};
-    struct two *t = calloc(1, sizeof *t);
+    struct pair_of *t = calloc(1, sizeof *t);
     int tried = 0, touching = 0, close_by = 0;
     ck_assert_ptr_nonnull(t);
     t->pool = test_pool_new();
@@ -241,7 +227,7 @@ static inline void touch_hulls(uint64_t seed, const struct extent *extent)
 }
 
 /* Put b onto a: against its separation along the normal from a to b, with `gap` left. */
-static inline void put_together(struct two *t, double gap)
+static inline void put_together(struct pair_of *t, double gap)
 {
     const struct manifold m = touch_two(t, 100 * size_of(t), 0);
     double n[3], world[3];
@@ -256,7 +242,7 @@ static inline void put_together(struct two *t, double gap)
 static inline void touch_round(uint64_t seed, bool capsule, const struct extent *extent)
 {
     struct random r = {.state = 31 + seed};
-    struct two *t = calloc(1, sizeof *t);
+    struct pair_of *t = calloc(1, sizeof *t);
     const double unit[3] = {1, 0.8, 0.6};
     t->pool = test_pool_new();
     for (int pose = 0; pose < extent->poses; ++pose) {
@@ -293,7 +279,7 @@ static inline void touch_round(uint64_t seed, bool capsule, const struct extent 
 }
 
 /* How far the rounds of the two reach out of what `reference` and `along` measure. */
-static inline double rounds_of(const struct two *t)
+static inline double rounds_of(const struct pair_of *t)
 {
     return t->h[0].rounding + t->h[1].rounding;
 }
@@ -302,7 +288,7 @@ static inline double rounds_of(const struct two *t)
 static inline void touch_rounded(uint64_t seed, bool with_boxes, const struct extent *extent)
 {
     struct random r = {.state = 131 + seed};
-    struct two *t = calloc(1, sizeof *t);
+    struct pair_of *t = calloc(1, sizeof *t);
     t->pool = test_pool_new();
     for (int pose = 0; pose < extent->poses; ++pose) {
         const double scale = pow(10, random_in(&r, -extent->exponent, extent->exponent)),

@@ -6,6 +6,17 @@
 
 static const char *const methods[SADMM_METHOD_COUNT] = {[SADMM_METHOD_PAPER] = "paper", [SADMM_METHOD_FAST] = "fast"};
 
+static const struct {
+    sadmm_method method;
+    sadmm_precision precision;
+} ways[] = {
+    {SADMM_METHOD_FAST, SADMM_F64},
+    {SADMM_METHOD_FAST, SADMM_F32},
+    {SADMM_METHOD_PAPER, SADMM_F64},
+    {SADMM_METHOD_PAPER, SADMM_F32},
+};
+enum { WAYS = sizeof ways / sizeof *ways };
+
 /* On the CPU, on one thread: others run beside this one. */
 static inline struct sadmm_scene open_result_scene(const char *spec, sadmm_method method, sadmm_precision precision)
 {
@@ -15,6 +26,16 @@ static inline struct sadmm_scene open_result_scene(const char *spec, sadmm_metho
     scene.def.precision = precision;
     scene.def.settings.threads = 1;
     return scene;
+}
+
+/* Of all shapes. */
+static inline void set_friction(sadmm_world *world, double mu)
+{
+    for (int32_t k = 0; k < sadmm_world_shape_count(world); ++k) {
+        sadmm_shape_id id;
+        MUST(world, sadmm_world_shape_at(world, k, &id));
+        MUST(world, sadmm_world_set_shape_material(world, id, mu, 0));
+    }
 }
 
 /* Step `begin` to `end`, looked at after each of them; with `begin` = 0 also before the first. */

@@ -3,17 +3,6 @@
 #include "scene_results.h"
 #include "scenes/solid.h"
 
-static const struct {
-    sadmm_method method;
-    sadmm_precision precision;
-} ways[] = {
-    {SADMM_METHOD_FAST, SADMM_F64},
-    {SADMM_METHOD_FAST, SADMM_F32},
-    {SADMM_METHOD_PAPER, SADMM_F64},
-    {SADMM_METHOD_PAPER, SADMM_F32},
-};
-enum { WAYS = sizeof ways / sizeof *ways };
-
 static const char *const specs[] = {"arch", "dry_stone", "mesh_pile:60", "peg_in_hole"};
 enum { SPECS = sizeof specs / sizeof *specs };
 
@@ -22,15 +11,6 @@ START_TEST(scenes_pass)
     expect_success(specs[_i / WAYS], ways[_i % WAYS].method, ways[_i % WAYS].precision);
 }
 END_TEST
-
-static void set_friction(sadmm_world *world, double mu)
-{
-    for (int32_t k = 0; k < sadmm_world_shape_count(world); ++k) {
-        sadmm_shape_id id;
-        MUST(world, sadmm_world_shape_at(world, k, &id));
-        MUST(world, sadmm_world_set_shape_material(world, id, mu, 0));
-    }
-}
 
 /* The only task of a whole run, or of its first `seconds`; mu < 0: the scene's own friction. */
 static struct sadmm_scene_task run_scene(const char *spec, double mu, double seconds)

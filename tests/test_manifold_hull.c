@@ -28,7 +28,7 @@ END_TEST
 START_TEST(exchange_changes_nothing)
 {
     struct random r = {.state = 77 + (uint64_t)_i};
-    struct two *t = calloc(1, sizeof *t), *u = calloc(1, sizeof *u);
+    struct pair_of *t = calloc(1, sizeof *t), *u = calloc(1, sizeof *u);
     const double unit[3] = {1, 1, 1};
     int alike = 0;
     t->pool = test_pool_new();
@@ -91,7 +91,7 @@ START_TEST(boxes_are_hulls)
 {
     static const double tilts[] = {0, 1e-9, 1e-7, 1e-5, 1e-3};
     struct random r = {.state = 4711 + (uint64_t)_i};
-    struct two *t = calloc(1, sizeof *t), *u = calloc(1, sizeof *u);
+    struct pair_of *t = calloc(1, sizeof *t), *u = calloc(1, sizeof *u);
     t->pool = test_pool_new();
     for (int pose = 0; pose < 200; ++pose) {
         double half[2][3], world[3];
@@ -145,7 +145,7 @@ END_TEST
 START_TEST(memory_changes_little)
 {
     struct random r = {.state = 99 + (uint64_t)_i};
-    struct two *t = calloc(1, sizeof *t);
+    struct pair_of *t = calloc(1, sizeof *t);
     const double unit[3] = {1, 1, 1};
     long same = 0, all = 0, remembered = 0;
     t->pool = test_pool_new();
@@ -176,7 +176,8 @@ START_TEST(memory_changes_little)
             const double s = along(t, m.normal);
             remembered += again.cache == m.cache && m.cache != 0;
             if (k > 0)
-                ck_assert_msg(fabs(s - last) <= 6 * step + 0.1 * fabs(s) + 0.011 * thin, "a jump from %g to %g", last, s);
+                ck_assert_msg(fabs(s - last) <= 6 * step + 0.1 * fabs(s) + 0.011 * thin, "a jump from %g to %g", last,
+                              s);
             last = s;
             cache = m.cache;
             turn_by(t->R[1], spin, step);
@@ -200,7 +201,7 @@ END_TEST
 /* Pushed through a plate, slowly: back to where it came from until the two are apart. */
 START_TEST(sides_are_kept)
 {
-    struct two *t = calloc(1, sizeof *t);
+    struct pair_of *t = calloc(1, sizeof *t);
     const double plate[3] = {1, 1, 0.02}, unit[3] = {0.3, 0.3, 0.3};
     struct random r = {.state = 5 + (uint64_t)_i};
     uint32_t cache = 0;
@@ -233,7 +234,7 @@ END_TEST
  * laid before: the normal goes along without jumps, and the depth stays. */
 START_TEST(rounded_boxes_roll_smoothly)
 {
-    struct two *t = calloc(1, sizeof *t);
+    struct pair_of *t = calloc(1, sizeof *t);
     const double half[2][3] = {{0.4, 0.3, 0.2}, {0.45, 0.35, 0.25}}, step = 1e-3;
     const double axis[3] = {_i == 0 ? 0 : 0.8, 1, _i == 2 ? 0.4 : 0};
     vec3 last = v3(0, 0, 0);
@@ -277,7 +278,7 @@ END_TEST
 /* A capsule that lies on a face has both ends. */
 START_TEST(a_capsule_lies_on_a_face)
 {
-    struct two *t = calloc(1, sizeof *t);
+    struct pair_of *t = calloc(1, sizeof *t);
     const double half[3] = {1, 1, 0.5};
     t->pool = test_pool_new();
     box_hull(half, &t->h[1]);
@@ -308,7 +309,7 @@ START_TEST(aligned_prisms_are_as_deep_as_they_are)
                  {4, 4, 1, 1, {0, 0, 0}},          {6, 6, 0.5, 1, {0, 0, 0}}, {20, 20, 1, 1, {0.1, 0, 0.2}},
                  {12, 5, 0.3, 2, {0, 0.5, 0.25}}};
     const double turns[2][9] = {{0, 0, 1, 1, 0, 0, 0, 1, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1}};
-    struct two *t = calloc(1, sizeof *t);
+    struct pair_of *t = calloc(1, sizeof *t);
     t->pool = test_pool_new();
     for (size_t c = 0; c < sizeof cases / sizeof *cases; ++c)
         for (int turned = 0; turned < 2; ++turned) {
@@ -336,7 +337,7 @@ END_TEST
 START_TEST(any_memory_will_do)
 {
     struct random r = {.state = 1234 + (uint64_t)_i};
-    struct two *t = calloc(1, sizeof *t);
+    struct pair_of *t = calloc(1, sizeof *t);
     const double unit[3] = {1, 0.7, 0.5};
     t->pool = test_pool_new();
     for (int pose = 0; pose < 2000; ++pose) {
@@ -368,7 +369,7 @@ START_TEST(the_deepest_corner_is_there)
                                    {-.02347, .04359, .05641}, {-.04148, .05734, .05466}},
                         b[4][3] = {{-.03471, .06601, .04755}, {-.05034, -.00488, .11932},
                                    {-.07769, .02698, .07224}, {-.01758, .00852, .0671}};
-    struct two *t = calloc(1, sizeof *t);
+    struct pair_of *t = calloc(1, sizeof *t);
     double least = HUGE_VAL;
     t->pool = test_pool_new();
     test_hull_of(_i ? b : a, 4, 0, &t->h[0]);
@@ -393,7 +394,7 @@ END_TEST
 START_TEST(a_knife_stands_on_its_edge)
 {
     static const double thick[] = {1, 0.3, 0.05, 1e-3};
-    struct two *t = calloc(1, sizeof *t);
+    struct pair_of *t = calloc(1, sizeof *t);
     const double half[3] = {1, 1, 0.5}, d = thick[_i % 4];
     const double knife[6][3] = {{-0.6, 0, 0}, {0.6, 0, 0}, {-0.6, d, 1}, {0.6, d, 1}, {-0.6, -d, 1}, {0.6, -d, 1}};
     t->pool = test_pool_new();

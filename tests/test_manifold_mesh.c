@@ -5,7 +5,7 @@
 #include "collision/mesh_walk.h"
 #include "hull_pool.h"
 #include "manifold_tools.h"
-#include "mesh_tools.h"
+#include "mesh_touches.h"
 #include "run_suite.h"
 
 /* A shape beside a mesh. */
@@ -140,12 +140,7 @@ static double least_gap(const struct beside *b, double limit, uint32_t *memory, 
         ck_assert_int_le(m.count, SADMM_MANIFOLD_POINTS);
         if (memory) memory[t] = m.count > 0 ? m.cache : 0; /* what has no points is not remembered */
         *points += m.count;
-        if (m.count > 0) ck_assert_double_eq_tol(v3_norm(m.normal), 1, 1e-12);
-        for (int k = 0; k < m.count; ++k) {
-            for (int i = 0; i < k; ++i) ck_assert_uint_ne(m.points[k].feature, m.points[i].feature);
-            ck_assert(m.points[k].separation <= limit + 1e-12);
-            least = fmin(least, m.points[k].separation);
-        }
+        least = fmin(least, soup_check_manifold(&m, limit));
     }
     return least;
 }
@@ -153,24 +148,15 @@ static double least_gap(const struct beside *b, double limit, uint32_t *memory, 
 /* Put the shape about `above` over a point of the surface. */
 static void place_over(struct beside *b, struct random *r, double above)
 {
-    int32_t corner[3], opposite[3];
-    const int32_t t = (int32_t)(random_unit(r) * b->mesh.triangles);
-    const double u = random_unit(r), w = random_unit(r) * (1 - u);
-    struct mesh_triangle triangle;
-    double R[9], most = 0;
-    mesh_corners(&b->mesh, t, corner, opposite);
-    mesh_triangle_of(&b->mesh, t, &triangle);
-    random_rotation(r, R);
-    memcpy(b->R, R, sizeof b->R);
-    const vec3 n = triangle.normal;
+    double most = 0;
+    vec3 n;
+    const vec3 on = soup_point_on(&b->mesh, r, &n);
+    random_rotation(r, b->R);
     for (int i = 0; i < b->core.vertices; ++i) {
         double turned[3];
         apply(b->R, b->core.x[i], turned);
         most = fmax(most, -v3_dot(n, v3_load(turned)));
     }
-    const vec3 a = mesh_vertex(&b->mesh, corner[0]), c = mesh_vertex(&b->mesh, corner[1]),
-               d = mesh_vertex(&b->mesh, corner[2]);
-    const vec3 on = v3_add(v3_scale(a, 1 - u - w), v3_add(v3_scale(c, u), v3_scale(d, w)));
     v3_store(v3_madd(on, most + radius_of_core(b) + above, n), b->x);
 }
 

@@ -4,7 +4,7 @@
 #include <check.h>
 
 #include "convex_tools.h"
-#include "mesh_tools.h"
+#include "mesh_touches.h"
 #include "run_suite.h"
 
 /* A shape, 0, beside a mesh, or one of its triangles, 1, whose frame is the world's. */
@@ -113,12 +113,7 @@ static double least_gap(const struct beside *b, double limit, uint32_t *memory, 
         const struct manifold m = touch_triangle(b, k, limit, memory ? memory[k] : 0);
         if (memory) memory[k] = m.count > 0 ? m.cache : 0; /* what has no points is not remembered */
         *points += m.count;
-        if (m.count > 0) ck_assert_double_eq_tol(v3_norm(m.normal), 1, 1e-12);
-        for (int i = 0; i < m.count; ++i) {
-            for (int q = 0; q < i; ++q) ck_assert_uint_ne(m.points[i].feature, m.points[q].feature);
-            ck_assert(m.points[i].separation <= limit + 1e-12);
-            least = fmin(least, m.points[i].separation);
-        }
+        least = fmin(least, soup_check_manifold(&m, limit));
     }
     return least;
 }
@@ -126,19 +121,12 @@ static double least_gap(const struct beside *b, double limit, uint32_t *memory, 
 /* Put the shape about `above` over a point of the surface. */
 static void place_over(struct beside *b, struct random *r, double above)
 {
-    int32_t corner[3], opposite[3];
-    const int32_t k = (int32_t)(random_unit(r) * b->mesh.triangles);
-    const double u = random_unit(r), w = random_unit(r) * (1 - u);
-    struct mesh_triangle triangle;
     double down[3];
-    mesh_corners(&b->mesh, k, corner, opposite);
-    mesh_triangle_of(&b->mesh, k, &triangle);
+    vec3 n;
+    const vec3 on = soup_point_on(&b->mesh, r, &n);
     random_rotation(r, b->t.R[0]);
-    v3_store(v3_neg(triangle.normal), down);
-    const vec3 a = mesh_vertex(&b->mesh, corner[0]), c = mesh_vertex(&b->mesh, corner[1]),
-               d = mesh_vertex(&b->mesh, corner[2]);
-    const vec3 on = v3_add(v3_scale(a, 1 - u - w), v3_add(v3_scale(c, u), v3_scale(d, w)));
-    v3_store(v3_madd(on, own_support(&b->t, 0, down) + above, triangle.normal), b->t.x[0]);
+    v3_store(v3_neg(n), down);
+    v3_store(v3_madd(on, own_support(&b->t, 0, down) + above, n), b->t.x[0]);
 }
 
 /* Whatever the surface is divided into, the nearest point of all of it is found, with its distance, and nothing

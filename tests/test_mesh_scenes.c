@@ -2,17 +2,6 @@
  * rest on is taken away. The whole of each: test_scene_results_slow. */
 #include "scene_results.h"
 
-static const struct {
-    sadmm_method method;
-    sadmm_precision precision;
-} ways[] = {
-    {SADMM_METHOD_FAST, SADMM_F64},
-    {SADMM_METHOD_FAST, SADMM_F32},
-    {SADMM_METHOD_PAPER, SADMM_F64},
-    {SADMM_METHOD_PAPER, SADMM_F32},
-};
-enum { WAYS = sizeof ways / sizeof *ways };
-
 static const char *const specs[] = {"terrain:16", "marble_run", "nuts_and_bolts:1"};
 enum { SPECS = sizeof specs / sizeof *specs };
 
@@ -21,15 +10,6 @@ START_TEST(scenes_pass)
     expect_success(specs[_i / WAYS], ways[_i % WAYS].method, ways[_i % WAYS].precision);
 }
 END_TEST
-
-static void set_friction(sadmm_world *world, double mu)
-{
-    for (int32_t k = 0; k < sadmm_world_shape_count(world); ++k) {
-        sadmm_shape_id id;
-        MUST(world, sadmm_world_shape_at(world, k, &id));
-        MUST(world, sadmm_world_set_shape_material(world, id, mu, 0));
-    }
-}
 
 static int64_t end_of(const struct sadmm_scene *scene)
 {

@@ -39,31 +39,11 @@ END_TEST
 
 /* ---- grasps ------------------------------------------------------------------------------------------------------ */
 
-static const struct {
-    sadmm_method method;
-    sadmm_precision precision;
-} ways[] = {
-    {SADMM_METHOD_FAST, SADMM_F64},
-    {SADMM_METHOD_FAST, SADMM_F32},
-    {SADMM_METHOD_PAPER, SADMM_F64},
-    {SADMM_METHOD_PAPER, SADMM_F32},
-};
-enum { WAYS = sizeof ways / sizeof *ways };
-
 START_TEST(grippers_hold)
 {
     expect_success("grippers", ways[_i].method, ways[_i].precision);
 }
 END_TEST
-
-static void set_friction(sadmm_world *world, double mu)
-{
-    for (int32_t k = 0; k < sadmm_world_shape_count(world); ++k) {
-        sadmm_shape_id id;
-        MUST(world, sadmm_world_shape_at(world, k, &id));
-        MUST(world, sadmm_world_set_shape_material(world, id, mu, 0));
-    }
-}
 
 /* 30 N from both sides carry 60 mu N; the lightest object has 2 N: with 0.02 all fall. */
 START_TEST(grippers_hold_by_friction_alone)

@@ -76,8 +76,8 @@ SADMM_INLINE void pair_manifold_of_hull(const struct sadmm_geometry *shape_a, co
     }
 }
 
-/* Of one child of the pair. The type of a is not above b's; m->count is 0 when the shapes are apart, and for types that
- * are not listed or meshes (triangle_manifold). hulls: the pool (hull_data.h); NULL: there are none. */
+/* Of one child of the pair. The rank of a (geometry.h) is not above b's; m->count is 0 when the shapes are apart, and
+ * for types that are not listed or meshes (triangle_manifold). hulls: the pool (hull_data.h); NULL: there are none. */
 SADMM_INLINE void pair_manifold(const struct sadmm_geometry *shape_a, const struct sadmm_geometry *shape_b,
                                 const double *hulls, uint32_t child, const struct pair_pose *pose, real limit,
                                 uint32_t cache, struct manifold *m)
