@@ -101,8 +101,14 @@ static __device__ double first_touch(const collision_view &v, const struct candi
     return least;
 }
 
-/* By which find of a step: in later sub-steps the pair that a candidate goes on from is known. */
-enum narrow_for { NARROW_ONE, NARROW_FIRST, NARROW_AGAIN };
+/* By which find of a step: in later sub-steps the pair that a candidate goes on from is known. ANY: a kernel for all
+ * three, which the view tells apart, where compiling it takes minutes. */
+enum narrow_for { NARROW_ONE, NARROW_FIRST, NARROW_AGAIN, NARROW_ANY };
+template <int FOR> static __device__ __forceinline__ int narrow_find(const collision_view &v)
+{
+    if (FOR != NARROW_ANY) return FOR;
+    return v.substeps == 1 ? NARROW_ONE : v.substep == 0 ? NARROW_FIRST : NARROW_AGAIN;
+}
 
 /* The last step's pair of a candidate, -1: none. */
 static __device__ int64_t search_pair(const collision_view &v, const struct candidate &c, int64_t count)
@@ -208,28 +214,29 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
     const struct candidate own = candidate_of(v, v.candidates[readable]);
     const int64_t guess = v.pair_of[readable], count = v.before.counts->pairs;
     const struct collision_step step = step_of(v);
-    const bool had_points = FOR == NARROW_AGAIN && v.sizes[i] > 0;
+    const int find = narrow_find<FOR>(v);
+    const bool had_points = find == NARROW_AGAIN && v.sizes[i] > 0;
     if (i >= usable_candidates(v)) {
         v.sizes[i] = 0;
         return true;
     }
     const int64_t likely = guess >= 0 && guess < count ? guess : 0;
     const struct sadmm_proxy *pa = &v.proxies[own.a], *pb = &v.proxies[own.b];
-    const struct near_keys near = near_keys_of(v.before.keys, FOR == NARROW_AGAIN ? 0 : count, guess);
+    const struct near_keys near = near_keys_of(v.before.keys, find == NARROW_AGAIN ? 0 : count, guess);
     struct sadmm_contact_pair old = load_wide(&v.before.pairs[likely]);
     const struct sadmm_proxy a = *pa, b = *pb;
-    if (FOR != NARROW_ONE && !meet_now(v, step, own, a, b)) {
+    if (find != NARROW_ONE && !meet_now(v, step, own, a, b)) {
         v.sizes[i] = 0;
         return true;
     }
     int64_t before = had_points ? guess : -1;
     /* where pairs have several manifolds, keys come more than once */
-    const bool known = FOR == NARROW_AGAIN || ((int)find_key_near(near, ordered_key(own.a, own.b), &before) &
+    const bool known = find == NARROW_AGAIN || ((int)find_key_near(near, ordered_key(own.a, own.b), &before) &
                                                (int)(v.child_bits == 0));
     struct pair_start start = pair_start_of(&a, &b, step.margin, step.gravity, step.dt);
     const bool on_mesh = with_meshes(HOW) && b.geometry.type == SADMM_SHAPE_MESH;
     if (on_mesh) {
-        if (FOR != NARROW_ONE && !triangle_now(v, step, own, a, b)) {
+        if (find != NARROW_ONE && !triangle_now(v, step, own, a, b)) {
             v.sizes[i] = 0;
             return true;
         }

@@ -6,14 +6,8 @@ void COLLISION(narrow_smooth_kernels)(struct collision_kernels *kernels)
 {
     struct narrow_kernels *k = &kernels->with_smooth;
     touch_kernels(k);
-    k->at_once = {at_once_kernel<NARROW_ONE, NARROW_ALL_AT_ONCE>, NARROW_THREADS, 0, "narrow phase of smooth bodies"};
-    k->at_once_first = {at_once_kernel<NARROW_FIRST, NARROW_ALL_AT_ONCE>, NARROW_THREADS, 0,
-                        "narrow phase of smooth bodies"};
-    k->at_once_again = {at_once_kernel<NARROW_AGAIN, NARROW_ALL_AT_ONCE>, NARROW_THREADS, 0,
-                        "narrow phase of smooth bodies"};
-    k->listed = {listed_kernel<NARROW_ONE, NARROW_ALL_LISTED>, NARROW_THREADS, 0, "narrow phase of listed pairs"};
-    k->listed_first = {listed_kernel<NARROW_FIRST, NARROW_ALL_LISTED>, NARROW_THREADS, 0,
-                       "narrow phase of listed pairs"};
-    k->listed_again = {listed_kernel<NARROW_AGAIN, NARROW_ALL_LISTED>, NARROW_THREADS, 0,
-                       "narrow phase of listed pairs"};
+    k->at_once = k->at_once_first = k->at_once_again = {at_once_kernel<NARROW_ANY, NARROW_ALL_AT_ONCE>, NARROW_THREADS, 0,
+                                                        "narrow phase of smooth bodies"};
+    k->listed = k->listed_first = k->listed_again = {listed_kernel<NARROW_ANY, NARROW_ALL_LISTED>, NARROW_THREADS, 0,
+                                                     "narrow phase of listed pairs"};
 }

@@ -16,16 +16,14 @@ static __global__ void __launch_bounds__(MESH_THREADS) touch_kernel(const __grid
     if (b.geometry.type != SADMM_SHAPE_MESH) return;
     const struct pair_start start = pair_start_of(&a, &b, step.margin, step.gravity, step.dt);
     if (!start.moves_on) return;
-    v.touches[i] = FOR != NARROW_ONE && !triangle_now(v, step, own, a, b)
+    v.touches[i] = narrow_find<FOR>(v) != NARROW_ONE && !triangle_now(v, step, own, a, b)
                        ? HUGE_VAL
                        : mesh_first_touch(&a, &b, v.hulls, own.child, step.dt, &start);
 }
 
 static void touch_kernels(struct narrow_kernels *k)
 {
-    k->touch = {touch_kernel<NARROW_ONE>, MESH_THREADS, 0, "first touches of meshes"};
-    k->touch_first = {touch_kernel<NARROW_FIRST>, MESH_THREADS, 0, "first touches of meshes"};
-    k->touch_again = {touch_kernel<NARROW_AGAIN>, MESH_THREADS, 0, "first touches of meshes"};
+    k->touch = k->touch_first = k->touch_again = {touch_kernel<NARROW_ANY>, MESH_THREADS, 0, "first touches of meshes"};
 }
 
 #endif
