@@ -211,7 +211,7 @@ static inline void touch_hulls(uint64_t seed, const struct extent *extent)
                 const double now = reference(t);
                 ++tried;
                 const double there = nearest(t, near.normal);
-                /* three in a million, needles whose edges are nearly along each other, are off by up to 2e-10 */
+                /* needles whose edges are nearly along each other are off by up to 2e-10, few enough of them: below */
                 ck_assert_msg(fabs(there - now) <= 4e-10 * size, "%s touching %d: %g, should be %g (size %g)", what,
                               touch, there, now, size);
                 close_by += fabs(there - now) <= 1e-10 * size;
