@@ -28,6 +28,54 @@ static void set_state(sadmm_world *world, int body, double x, double spin)
     MUST(world, sadmm_world_set_body_state(world, body_at(world, body), &state));
 }
 
+/* ---- the device's memory ----------------------------------------------------------------------------------------- */
+
+static void expect_no_array(sadmm_world *world)
+{
+    sadmm_device_array array;
+    ck_assert_int_eq(sadmm_world_device_array(world, SADMM_ARRAY_BODY_STATE, &array), SADMM_ERROR_UNAVAILABLE);
+}
+
+/* Without a copy, and the numbers that are read with one; not while the host has newer ones. */
+START_TEST(arrays_are_where_the_device_has_them)
+{
+    sadmm_world *world = small_world(_i, 0);
+    const int32_t bodies = sadmm_world_body_count(world);
+    int32_t count, rows[64];
+    expect_no_array(world);
+    for (int round = 0; round < 6; ++round) {
+        sadmm_device_array state, wrench;
+        if (round == 3) {
+            set_wrench(world, 1, 3, 4);
+            expect_no_array(world);
+        }
+        for (int step = 0; step <= round; ++step) MUST(world, sadmm_world_step_async(world));
+        MUST(world, sadmm_world_device_array(world, SADMM_ARRAY_BODY_STATE, &state));
+        MUST(world, sadmm_world_device_array(world, SADMM_ARRAY_BODY_CONTACT_WRENCH, &wrench));
+        MUST(world, sadmm_world_dynamic_bodies(world, rows, 64, &count));
+        ck_assert_int_eq(state.rows, count);
+        ck_assert_int_eq(wrench.rows, count);
+        ck_assert_int_eq(state.columns, 13);
+        ck_assert_int_eq(wrench.columns, 6);
+        ck_assert_int_ge(state.stride, 13);
+        ck_assert(state.values && wrench.values && state.stream && state.device == 0);
+#ifdef CUDA_EMULATED /* whose memory is the host's */
+        double read[64 * 13], read_wrench[64 * 6];
+        MUST(world, sadmm_world_get_array(world, SADMM_ARRAY_BODY_STATE, 0, bodies, read));
+        MUST(world, sadmm_world_get_array(world, SADMM_ARRAY_BODY_CONTACT_WRENCH, 0, bodies, read_wrench));
+        for (int32_t i = 0; i < count; ++i) {
+            ck_assert_mem_eq(state.values + i * state.stride, read + 13 * rows[i], 13 * sizeof *read);
+            ck_assert_mem_eq(wrench.values + i * wrench.stride, read_wrench + 6 * rows[i], 6 * sizeof *read);
+        }
+#endif
+    }
+    ck_assert_int_le(bodies, 64);
+    MUST(world, sadmm_world_remove_body(world, body_at(world, bodies - 1)));
+    expect_no_array(world);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 /* ---- edits ------------------------------------------------------------------------------------------------------- */
 
 /* Several changes of one body before a step: the last one counts, of states and of wrenches, and neither disturbs the
@@ -404,6 +452,7 @@ int main(void)
     ADD_CASE(suite, reading_between_changes, 0, parts);
     ADD_CASE(suite, numbers_of_the_settings_change_at_every_step, 0, 2 * parts);
     ADD_CASE(suite, steps_done_again_have_their_own_settings, 0, parts);
+    ADD_CASE(suite, arrays_are_where_the_device_has_them, 0, parts);
 #ifdef CUDA_EMULATED
     ADD_CASE(suite, a_change_of_numbers_costs_no_wait, 0, parts);
     ADD_CASE(suite, a_call_that_fails_loses_nothing, 0, 2 * parts);

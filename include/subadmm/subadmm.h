@@ -2,6 +2,7 @@
 #ifndef SUBADMM_SUBADMM_H
 #define SUBADMM_SUBADMM_H
 
+#include "arrays.h"
 #include "coupling.h"
 #include "gear.h"
 #include "hull.h"

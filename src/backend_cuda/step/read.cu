@@ -60,6 +60,18 @@ extern "C" sadmm_status CUDA(read_bodies)(struct sadmm_context *c, struct sadmm_
                      6 * n * sizeof *wrench, error);
 }
 
+extern "C" sadmm_status CUDA(view_world)(struct sadmm_context *c, struct sadmm_resident_view *out,
+                                         struct sadmm_error *error)
+{
+    const struct cuda_step *s = c->step;
+    CUDA_ENTER(c);
+    CUDA(view_into)(c, s->into, 0);
+    out->rigid = c->view.step.before;
+    out->wrench = buffer<double>(c, BUFFER_WORLD_WRENCH) + (size_t)(1 - s->into) * 6 * (size_t)s->bodies;
+    out->stream = c->stream;
+    return SADMM_OK;
+}
+
 extern "C" sadmm_status CUDA(read_contacts)(struct sadmm_context *c, struct sadmm_contact_set *contacts,
                                             struct sadmm_error *error)
 {

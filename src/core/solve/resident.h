@@ -78,6 +78,13 @@ struct sadmm_resident_report {
     int32_t offending_body;           /* NON_FINITE: a body that is not finite, -1: unknown */
 };
 
+/* Where a backend has bodies after the last step done: pointers of its device's memory, not to be written to. */
+struct sadmm_resident_view {
+    const struct sadmm_rigid *rigid; /* (bodies) */
+    const double *wrench;            /* bodies x 6, of contacts, where the step recovered them */
+    void *stream;                    /* what steps run on: cudaStream_t */
+};
+
 struct sadmm_resident_kernels {
     /* Take over a world. Everything the backend kept before is forgotten. */
     sadmm_status (*load)(struct sadmm_context *, const struct sadmm_resident_world *, const struct sadmm_settings *,
@@ -93,6 +100,8 @@ struct sadmm_resident_kernels {
     /* The world after the last step done; any pointer may be NULL. Nothing may be enqueued. */
     sadmm_status (*read_bodies)(struct sadmm_context *, struct sadmm_rigid *rigid, struct sadmm_steady *steady,
                                 double *wrench /* (bodies x 6) */, struct sadmm_error *);
+    /* Until the next step, or load. Nothing may be enqueued. */
+    sadmm_status (*view)(struct sadmm_context *, struct sadmm_resident_view *, struct sadmm_error *);
     /* Contacts of the last step done, with its impulses. Nothing may be enqueued. */
     sadmm_status (*read_contacts)(struct sadmm_context *, struct sadmm_contact_set *contacts, struct sadmm_error *);
     /* What the last step done started from: bodies, velocities (bodies x 6, m/s and rad/s) and impulses (points x 3, N

@@ -228,6 +228,17 @@ sadmm_status sadmm_world_body_at(sadmm_world *world, int32_t index, sadmm_body_i
     return SADMM_OK;
 }
 
+sadmm_status sadmm_world_body_index(sadmm_world *world, sadmm_body_id id, int32_t *index)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    if (!sadmm_world_find_body(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(index, "index", &world->error));
+    *index = (int32_t)id.slot - 1;
+    if ((size_t)world->body_count < world->body_slots)
+        *index = sadmm_slot_index(&world->body_marks, id.slot - 1, world, alive);
+    return SADMM_OK;
+}
+
 sadmm_status sadmm_world_body_state(sadmm_world *world, sadmm_body_id id, sadmm_body_state *state)
 {
     TRY(sadmm_check_given(world, "world", NULL));
@@ -252,6 +263,16 @@ static void keep_if_unit(const double given[4], double normalised[4])
     if (most <= 2 * DBL_EPSILON) memcpy(normalised, given, 4 * sizeof *normalised);
 }
 
+sadmm_status sadmm_world_check_body_state(const struct sadmm_world_body *body, const sadmm_body_state *state,
+                                          double orientation[4], struct sadmm_error *error)
+{
+    TRY(sadmm_check_vector("state->position", state->position, 3, ANY, error));
+    TRY(sadmm_check_orientation("state->orientation", state->orientation, orientation, error));
+    keep_if_unit(state->orientation, orientation);
+    return check_motion("state->linear_velocity", "state->angular_velocity", state->linear_velocity,
+                        state->angular_velocity, body->type, ANY, error);
+}
+
 sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, const sadmm_body_state *state)
 {
     TRY(sadmm_check_given(world, "world", NULL));
@@ -260,11 +281,7 @@ sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, co
     double orientation[4];
     if (!body) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(state, "state", error));
-    TRY(sadmm_check_vector("state->position", state->position, 3, ANY, error));
-    TRY(sadmm_check_orientation("state->orientation", state->orientation, orientation, error));
-    keep_if_unit(state->orientation, orientation);
-    TRY(check_motion("state->linear_velocity", "state->angular_velocity", state->linear_velocity,
-                     state->angular_velocity, body->type, ANY, error));
+    TRY(sadmm_world_check_body_state(body, state, orientation, error));
     /* A static body is part of what the backend was given once. */
     if (body->system_body < 0) TRY(sadmm_world_take_back(world));
     steady_place(&body->steady, &body->rigid, state->position, orientation);
@@ -332,6 +349,12 @@ static sadmm_status check_dynamic(const struct sadmm_world_body *body, sadmm_bod
                       body->type == SADMM_BODY_STATIC ? "static" : "kinematic", why);
 }
 
+sadmm_status sadmm_world_check_wrench(const double force[3], const double torque[3], struct sadmm_error *error)
+{
+    TRY(sadmm_check_vector("force", force, 3, WRENCH_LIMIT, error));
+    return sadmm_check_vector("torque", torque, 3, WRENCH_LIMIT, error);
+}
+
 sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, const double force[3],
                                          const double torque[3])
 {
@@ -342,8 +365,7 @@ sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, c
     TRY(sadmm_check_given(force, "force", error));
     TRY(sadmm_check_given(torque, "torque", error));
     TRY(check_dynamic(body, id, "no wrench moves it", error));
-    TRY(sadmm_check_vector("force", force, 3, WRENCH_LIMIT, error));
-    TRY(sadmm_check_vector("torque", torque, 3, WRENCH_LIMIT, error));
+    TRY(sadmm_world_check_wrench(force, torque, error));
     if (body->system_body < 0) TRY(sadmm_world_take_back(world));
     memcpy(body->rigid.wrench, force, 3 * sizeof *force);
     memcpy(body->rigid.wrench + 3, torque, 3 * sizeof *torque);
@@ -430,6 +452,13 @@ sadmm_status sadmm_world_apply_body_impulse_at(sadmm_world *world, sadmm_body_id
     return sadmm_world_set_body_state(world, id, &state);
 }
 
+sadmm_status sadmm_world_check_mass(const sadmm_world *world, double mass, const double inertia[3],
+                                    struct sadmm_error *error)
+{
+    TRY(sadmm_check_range("mass", mass, MASS_MIN, MASS_MAX, error));
+    return check_inertia("inertia", inertia, world->def.precision, error);
+}
+
 sadmm_status sadmm_world_set_body_mass(sadmm_world *world, sadmm_body_id id, double mass, const double inertia[3])
 {
     TRY(sadmm_check_given(world, "world", NULL));
@@ -438,8 +467,7 @@ sadmm_status sadmm_world_set_body_mass(sadmm_world *world, sadmm_body_id id, dou
     if (!body) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(inertia, "inertia", error));
     TRY(check_dynamic(body, id, "it has no mass", error));
-    TRY(sadmm_check_range("mass", mass, MASS_MIN, MASS_MAX, error));
-    TRY(check_inertia("inertia", inertia, world->def.precision, error));
+    TRY(sadmm_world_check_mass(world, mass, inertia, error));
     TRY(sadmm_world_take_back(world));
     body->rigid.mass = mass;
     memcpy(body->rigid.inertia, inertia, sizeof body->rigid.inertia);

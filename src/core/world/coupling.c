@@ -43,7 +43,7 @@ static sadmm_status check_numbers(const char *prefix, const sadmm_coupling_def *
     return SADMM_OK;
 }
 
-/* Into the pose and velocity of `target`. names: of the three. */
+/* names: of the three. */
 static sadmm_status check_target(const char *const names[3], const double position[3], const double orientation[4],
                                  const double velocity[6], struct sadmm_rigid *target, struct sadmm_error *error)
 {
@@ -54,6 +54,13 @@ static sadmm_status check_target(const char *const names[3], const double positi
     if (velocity) memcpy(target->velocity, velocity, sizeof target->velocity);
     else memset(target->velocity, 0, sizeof target->velocity);
     return SADMM_OK;
+}
+
+sadmm_status sadmm_world_check_target(const double position[3], const double orientation[4], const double velocity[6],
+                                      struct sadmm_rigid *target, struct sadmm_error *error)
+{
+    static const char *const names[] = {"position", "orientation", "velocity"};
+    return check_target(names, position, orientation, velocity, target, error);
 }
 
 static sadmm_status check_def(const sadmm_world *world, const sadmm_coupling_def *def, struct joint_frame *frame,
@@ -160,6 +167,17 @@ sadmm_status sadmm_world_coupling_at(sadmm_world *world, int32_t index, sadmm_co
     return SADMM_OK;
 }
 
+sadmm_status sadmm_world_coupling_index(sadmm_world *world, sadmm_coupling_id id, int32_t *index)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    if (!sadmm_world_find_coupling(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(index, "index", &world->error));
+    *index = (int32_t)id.slot - 1;
+    if ((size_t)world->coupling_count < world->coupling_slots)
+        *index = sadmm_slot_index(&world->coupling_marks, id.slot - 1, world, alive);
+    return SADMM_OK;
+}
+
 /* ---- what it is, and what is set --------------------------------------------------------------------------------- */
 
 sadmm_status sadmm_world_coupling_def(sadmm_world *world, sadmm_coupling_id id, sadmm_coupling_def *def)
@@ -180,7 +198,6 @@ sadmm_status sadmm_world_coupling_def(sadmm_world *world, sadmm_coupling_id id, 
 sadmm_status sadmm_world_set_coupling_target(sadmm_world *world, sadmm_coupling_id id, const double position[3],
                                              const double orientation[4], const double velocity[6])
 {
-    static const char *const names[] = {"position", "orientation", "velocity"};
     TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
     struct sadmm_world_coupling *coupling = sadmm_world_find_coupling(world, id, "id", error);
@@ -188,7 +205,7 @@ sadmm_status sadmm_world_set_coupling_target(sadmm_world *world, sadmm_coupling_
     if (!coupling) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(position, "position", error));
     TRY(sadmm_check_given(orientation, "orientation", error));
-    TRY(check_target(names, position, orientation, velocity, &target, error));
+    TRY(sadmm_world_check_target(position, orientation, velocity, &target, error));
     coupling->last.target = target;
     return sadmm_world_take_edit(world, &world->joints[coupling->joint], SADMM_JOINT_TARGET);
 }

@@ -354,6 +354,17 @@ sadmm_status sadmm_world_joint_at(sadmm_world *world, int32_t index, sadmm_joint
     return SADMM_OK;
 }
 
+sadmm_status sadmm_world_joint_index(sadmm_world *world, sadmm_joint_id id, int32_t *index)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    if (!sadmm_world_find_joint(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(index, "index", &world->error));
+    *index = (int32_t)id.slot - 1;
+    if ((size_t)sadmm_world_joint_count(world) < world->joint_slots)
+        *index = sadmm_slot_index(&world->joint_marks, id.slot - 1, world, alive);
+    return SADMM_OK;
+}
+
 /* ---- what it is, and what is set --------------------------------------------------------------------------------- */
 
 sadmm_status sadmm_world_joint_def(sadmm_world *world, sadmm_joint_id id, sadmm_joint_def *def)
@@ -391,6 +402,13 @@ static sadmm_status check_free(const struct sadmm_world_joint *joint, int32_t in
     return SADMM_OK;
 }
 
+sadmm_status sadmm_world_check_coordinate(const struct sadmm_world_joint *joint, int32_t index,
+                                          const sadmm_joint_coordinate *coordinate, struct sadmm_error *error)
+{
+    TRY(check_free(joint, index, error));
+    return check_coordinate("coordinate->", coordinate, error);
+}
+
 sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id id, int32_t index,
                                               const sadmm_joint_coordinate *coordinate)
 {
@@ -399,8 +417,7 @@ sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id
     struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", error);
     if (!joint) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(coordinate, "coordinate", error));
-    TRY(check_free(joint, index, error));
-    TRY(check_coordinate("coordinate->", coordinate, error));
+    TRY(sadmm_world_check_coordinate(joint, index, coordinate, error));
     joint->def.coordinates[index] = *coordinate;
     return sadmm_world_take_edit(world, joint, (enum sadmm_joint_edit)index);
 }

@@ -214,6 +214,17 @@ sadmm_status sadmm_world_shape_at(sadmm_world *world, int32_t index, sadmm_shape
     return SADMM_OK;
 }
 
+sadmm_status sadmm_world_shape_index(sadmm_world *world, sadmm_shape_id id, int32_t *index)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    if (!sadmm_world_find_shape(world, id, "id", &world->error)) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(index, "index", &world->error));
+    *index = (int32_t)id.slot - 1;
+    if ((size_t)world->shape_count < world->shape_slots)
+        *index = sadmm_slot_index(&world->shape_marks, id.slot - 1, world, alive);
+    return SADMM_OK;
+}
+
 sadmm_status sadmm_world_shape_def(sadmm_world *world, sadmm_shape_id id, sadmm_shape_def *def, sadmm_body_id *body)
 {
     TRY(sadmm_check_given(world, "world", NULL));

@@ -15,6 +15,14 @@ size_t sadmm_slot_at(struct sadmm_slot_marks *marks, int32_t index, const sadmm_
     return marks->at;
 }
 
+int32_t sadmm_slot_index(struct sadmm_slot_marks *marks, size_t slot, const sadmm_world *world,
+                         bool (*alive)(const sadmm_world *world, size_t slot))
+{
+    while (marks->at > slot) marks->below -= alive(world, --marks->at);
+    while (marks->at < slot) marks->below += alive(world, marks->at++);
+    return marks->below;
+}
+
 void sadmm_slot_taken(struct sadmm_slot_marks *marks, size_t slot)
 {
     if (slot < marks->at) ++marks->below;

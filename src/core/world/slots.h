@@ -21,6 +21,9 @@ size_t sadmm_slot_free(struct sadmm_slot_marks *marks, const sadmm_world *world,
 /* The slot of the index-th live one, where there is one. */
 size_t sadmm_slot_at(struct sadmm_slot_marks *marks, int32_t index, const sadmm_world *world,
                      bool (*alive)(const sadmm_world *world, size_t slot));
+/* How many live ones are below a slot. */
+int32_t sadmm_slot_index(struct sadmm_slot_marks *marks, size_t slot, const sadmm_world *world,
+                         bool (*alive)(const sadmm_world *world, size_t slot));
 void sadmm_slot_taken(struct sadmm_slot_marks *marks, size_t slot);
 void sadmm_slot_freed(struct sadmm_slot_marks *marks, size_t slot);
 

@@ -8,6 +8,7 @@
  *   gear_rows, joint_rows, joint_move   gears and joints as constraint rows, and where they let bodies go
  *   resident_joints, resident        where a backend keeps the world
  *   shape_form, shape, mass, joint, coupling, gear, body, contacts, explain   what callers see of it, and change
+ *   arrays                           the same, of many at once
  *   step, world                      steps; settings, the whole
  */
 #ifndef SADMM_CORE_WORLD_INTERNAL_H
@@ -27,6 +28,7 @@
 #include "core/solve/schedule.h"
 #include "pair_table.h"
 #include "slots.h"
+#include "subadmm/arrays.h"
 #include "subadmm/coupling.h"
 #include "subadmm/gear.h"
 #include "subadmm/joint.h"
@@ -373,8 +375,21 @@ struct sadmm_world_coupling *sadmm_world_find_coupling(const sadmm_world *world,
 
 /* ---- body.c ---- */
 
+/* May that be set? Else INVALID_ARGUMENT. `orientation`: the state's, normalised where it is off by more than rounding.
+ * Of a wrench and a mass: of a dynamic body. */
+sadmm_status sadmm_world_check_body_state(const struct sadmm_world_body *body, const sadmm_body_state *state,
+                                          double orientation[4], struct sadmm_error *error);
+sadmm_status sadmm_world_check_wrench(const double force[3], const double torque[3], struct sadmm_error *error);
+sadmm_status sadmm_world_check_mass(const sadmm_world *world, double mass, const double inertia[3],
+                                    struct sadmm_error *error);
 /* INVALID_ARGUMENT where a body's moments of inertia lie further apart than the precision can tell. */
 sadmm_status sadmm_world_check_inertias(sadmm_world *world, sadmm_precision precision);
+
+/* ---- coupling.c ---- */
+
+/* A target that may be set, else INVALID_ARGUMENT, into the pose and velocity of `target`. velocity: NULL is 0. */
+sadmm_status sadmm_world_check_target(const double position[3], const double orientation[4], const double velocity[6],
+                                      struct sadmm_rigid *target, struct sadmm_error *error);
 
 /* ---- shape.c ---- */
 
@@ -382,6 +397,9 @@ void sadmm_world_kill_shape(sadmm_world *world, size_t slot);
 
 /* ---- joint.c ---- */
 
+/* May that be set of a joint's coordinate? Else INVALID_ARGUMENT. */
+sadmm_status sadmm_world_check_coordinate(const struct sadmm_world_joint *joint, int32_t index,
+                                          const sadmm_joint_coordinate *coordinate, struct sadmm_error *error);
 /* What joints have beside their slots. */
 void sadmm_world_free_tables(sadmm_world *world);
 /* Something of a joint has been set: the next step of the backend that keeps the world takes it along. */

@@ -1,0 +1,98 @@
+/* World level: many numbers in one call, for learning loops, viewers and bindings of other languages.
+ *
+ * An array has a row for each body, joint or coupling, in the order of sadmm_world_body_at (joint_at, coupling_at), and
+ * a fixed number of columns; all are doubles, row after row. Rows and ids: sadmm_world_body_at, and back
+ * sadmm_world_body_index. Row numbers stay as they are until something is added or removed. Contacts have structs
+ * (sadmm_world_contacts).
+ *
+ * Threads and errors: as world.h says.
+ */
+#ifndef SUBADMM_ARRAYS_H
+#define SUBADMM_ARRAYS_H
+
+#include "coupling.h"
+#include "joint.h"
+#include "world.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum sadmm_array {
+    /* A row a body. */
+    SADMM_ARRAY_BODY_STATE = 0,     /* 13 columns: position (m), orientation (w x y z), linear velocity (m/s), angular
+                                       velocity (rad/s), as in sadmm_body_state. Set: as sadmm_world_set_body_state does;
+                                       rows of static bodies that are as they were cost nothing */
+    SADMM_ARRAY_BODY_WRENCH,        /* 6: external force (N) and torque (N m), world; 0 of bodies that are not dynamic.
+                                       Set: as sadmm_world_set_body_wrench */
+    SADMM_ARRAY_BODY_CONTACT_WRENCH, /* 6: as sadmm_world_body_contact_wrench; 0 of static bodies, and before the first
+                                       step. Read only. UNAVAILABLE where settings.recover_wrenches is false */
+    SADMM_ARRAY_BODY_INERTIA,       /* 4: mass (kg), principal moments (kg m^2); 0 of bodies that are not dynamic. Set:
+                                       as sadmm_world_set_body_mass */
+    /* A row a joint, a column a coordinate (joint.h): m or rad, m/s or rad/s, N or N m. */
+    SADMM_ARRAY_JOINT_POSITION,     /* 6: sadmm_joint_state.position. Read only, as are the next three */
+    SADMM_ARRAY_JOINT_SPEED,        /* 6: sadmm_joint_state.speed */
+    SADMM_ARRAY_JOINT_DRIVE_FORCE,  /* 6: sadmm_joint_state.drive_force */
+    SADMM_ARRAY_JOINT_WRENCH,       /* 6: sadmm_joint_state.wrench_b, world */
+    SADMM_ARRAY_JOINT_TARGET_POSITION, /* 6: target_position of the drives, 0 of locked coordinates, which may only be
+                                       set to that. Set: as sadmm_world_set_joint_coordinate */
+    SADMM_ARRAY_JOINT_TARGET_SPEED, /* 6: the same of target_speed */
+    /* A row a coupling. */
+    SADMM_ARRAY_COUPLING_TARGET,    /* 13: target's position, orientation, velocity (linear, angular), in the units of
+                                       SADMM_ARRAY_BODY_STATE. Set: as sadmm_world_set_coupling_target */
+    SADMM_ARRAY_COUPLING_FELT,      /* 6: felt_force (N), felt_torque (N m) of sadmm_coupling_state. Read only */
+    SADMM_ARRAY_COUNT
+} sadmm_array;
+
+/* Columns of an array; 0 where `array` is none. Thread-safe. */
+SADMM_API int32_t sadmm_array_columns(sadmm_array array);
+/* May it be set? Thread-safe. */
+SADMM_API bool sadmm_array_is_settable(sadmm_array array);
+/* Rows of an array: the number of bodies, joints, couplings; 0 where `array` is none, and of a NULL world. */
+SADMM_API int32_t sadmm_world_array_rows(const sadmm_world *world, sadmm_array array);
+
+/* Rows [first, first + count) into `values` (count x columns). Errors: INVALID_ARGUMENT (array, range; values may be
+ * NULL where count is 0), UNAVAILABLE (above), DEVICE. */
+SADMM_API sadmm_status sadmm_world_get_array(sadmm_world *world, sadmm_array array, int32_t first, int32_t count,
+                                             double *values);
+/* Set rows [first, first + count), each as the call named above does, with its ranges: all of them, or, after an error
+ * in any, none. The message tells which row. Errors: INVALID_ARGUMENT (array, range, values), those of the calls named,
+ * DEVICE. */
+SADMM_API sadmm_status sadmm_world_set_array(sadmm_world *world, sadmm_array array, int32_t first, int32_t count,
+                                             const double *values);
+
+/* The index that sadmm_world_body_at (shape_at, joint_at, coupling_at) has the id under. They take a time that grows
+ * with the number of objects. Errors: STALE_ID. */
+SADMM_API sadmm_status sadmm_world_body_index(sadmm_world *world, sadmm_body_id id, int32_t *index);
+SADMM_API sadmm_status sadmm_world_shape_index(sadmm_world *world, sadmm_shape_id id, int32_t *index);
+SADMM_API sadmm_status sadmm_world_joint_index(sadmm_world *world, sadmm_joint_id id, int32_t *index);
+SADMM_API sadmm_status sadmm_world_coupling_index(sadmm_world *world, sadmm_coupling_id id, int32_t *index);
+
+/* ---- in a device's memory ------------------------------------------------------------------------------------ */
+
+/* An array where the backend has it: in the memory of a device. Not to be written to. */
+typedef struct sadmm_device_array {
+    const double *values; /* of the device: row r's column k is values[r * stride + k] */
+    int64_t rows, columns; /* a row a dynamic body: sadmm_world_dynamic_bodies tells which */
+    int64_t stride;       /* doubles from row to row */
+    int device;           /* its index, as in sadmm_world_def */
+    void *stream;         /* CUDA: the stream (cudaStream_t) that steps run on. The values are there for what is enqueued
+                             on it, and for everything else at once, because the call waits for steps begun */
+} sadmm_device_array;
+
+/* BODY_STATE, or BODY_CONTACT_WRENCH, of the dynamic bodies after the steps begun so far, without a copy. Valid until
+ * the next call on the world that is not a read-out. Let what reads it end, or run on `stream`, before the next step.
+ * Errors: INVALID_ARGUMENT (another array), UNAVAILABLE (the backend has no memory of its own; the world is not there:
+ * before its first steps, after a change that is no state or wrench, worlds that the host steps; a state was set that no
+ * step has taken along yet; BODY_CONTACT_WRENCH: as above), DEVICE. */
+SADMM_API sadmm_status sadmm_world_device_array(sadmm_world *world, sadmm_array array, sadmm_device_array *out);
+/* Of each dynamic body its index (sadmm_world_body_at), ascending, into `indices`, which has room for `capacity`; *count:
+ * how many there are. Errors: INVALID_ARGUMENT (capacity less than that; indices may be NULL where it is 0, to ask for
+ * *count alone). */
+SADMM_API sadmm_status sadmm_world_dynamic_bodies(sadmm_world *world, int32_t *indices, int32_t capacity,
+                                                  int32_t *count);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
