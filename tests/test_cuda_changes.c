@@ -76,6 +76,56 @@ START_TEST(arrays_are_where_the_device_has_them)
 }
 END_TEST
 
+/* ---- saved worlds ------------------------------------------------------------------------------------------------ */
+
+/* A world on the device is saved while it runs, with a change that no step has taken along, and goes on there as if it
+ * had not been; restored into another one, or into itself, it makes the same steps. */
+static void expect_saved(sadmm_world *world, sadmm_world *other, int steps)
+{
+    size_t size;
+    for (int k = 0; k < steps; ++k) MUST(world, sadmm_world_step_async(world));
+    set_wrench(world, 1, 2, 3);
+    MUST(world, sadmm_world_save(world, NULL, 0, &size));
+    void *bytes = malloc(size);
+    MUST(world, sadmm_world_save(world, bytes, size, &size));
+    step_world(world, steps);
+    MUST(other, sadmm_world_restore(other, bytes, size));
+    step_world(other, steps);
+    expect_same_world(world, other, "restored");
+    const uint64_t hash = state_hash(world);
+    MUST(world, sadmm_world_restore(world, bytes, size));
+    step_world(world, steps);
+    ck_assert_uint_eq(state_hash(world), hash);
+    free(bytes);
+}
+
+START_TEST(a_saved_world_goes_on)
+{
+    const int precision = _i / 2, fast = _i % 2;
+    sadmm_world *world = small_world(precision, fast), *other = small_world(precision, fast);
+    step_world(other, 2);
+    expect_saved(world, other, 7);
+    sadmm_world_destroy(world);
+    sadmm_world_destroy(other);
+}
+END_TEST
+
+/* With motors, joints, and hulls on a mesh. */
+START_TEST(a_saved_scene_goes_on)
+{
+    const char *const specs[] = {"ragdolls:1", "terrain:8", "grippers:1"};
+    struct sadmm_scene scene = open_scene(specs[_i % 3]);
+    scene.def.precision = (sadmm_precision)(_i / 3);
+    if (lacks_hulls(&scene)) return;
+    sadmm_world *world = build_scene(&scene), *other = build_scene(&scene);
+    use_device(world, _i / 3, 0);
+    use_device(other, _i / 3, 0);
+    expect_saved(world, other, EMULATED ? 4 : 150);
+    sadmm_world_destroy(world);
+    sadmm_world_destroy(other);
+}
+END_TEST
+
 /* ---- edits ------------------------------------------------------------------------------------------------------- */
 
 /* Several changes of one body before a step: the last one counts, of states and of wrenches, and neither disturbs the
@@ -453,6 +503,8 @@ int main(void)
     ADD_CASE(suite, numbers_of_the_settings_change_at_every_step, 0, 2 * parts);
     ADD_CASE(suite, steps_done_again_have_their_own_settings, 0, parts);
     ADD_CASE(suite, arrays_are_where_the_device_has_them, 0, parts);
+    ADD_CASE(suite, a_saved_world_goes_on, 0, 2 * parts);
+    ADD_CASE(suite, a_saved_scene_goes_on, 0, 3 * parts);
 #ifdef CUDA_EMULATED
     ADD_CASE(suite, a_change_of_numbers_costs_no_wait, 0, parts);
     ADD_CASE(suite, a_call_that_fails_loses_nothing, 0, 2 * parts);

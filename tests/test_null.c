@@ -40,6 +40,44 @@ static void on_worlds(void)
     REFUSES("world", sadmm_world_set_backend(NULL, SADMM_BACKEND_CPU, SADMM_F64, 0));
 }
 
+static void on_arrays(void)
+{
+    double values[13];
+    int32_t index;
+    sadmm_device_array device;
+    ck_assert_int_eq(sadmm_array_columns(SADMM_ARRAY_BODY_STATE), 13);
+    ck_assert(sadmm_array_is_settable(SADMM_ARRAY_BODY_STATE));
+    ck_assert_int_eq(sadmm_world_array_rows(NULL, SADMM_ARRAY_BODY_STATE), 0);
+    REFUSES("world", sadmm_world_get_array(NULL, SADMM_ARRAY_BODY_STATE, 0, 1, values));
+    REFUSES("values", sadmm_world_get_array(world, SADMM_ARRAY_BODY_STATE, 0, 1, NULL));
+    REFUSES("world", sadmm_world_set_array(NULL, SADMM_ARRAY_BODY_STATE, 0, 1, values));
+    REFUSES("values", sadmm_world_set_array(world, SADMM_ARRAY_BODY_STATE, 0, 1, NULL));
+    REFUSES("world", sadmm_world_body_index(NULL, body, &index));
+    REFUSES("index", sadmm_world_body_index(world, body, NULL));
+    REFUSES("world", sadmm_world_shape_index(NULL, shape, &index));
+    REFUSES("index", sadmm_world_shape_index(world, shape, NULL));
+    REFUSES("world", sadmm_world_joint_index(NULL, joint, &index));
+    REFUSES("index", sadmm_world_joint_index(world, joint, NULL));
+    REFUSES("world", sadmm_world_coupling_index(NULL, coupling, &index));
+    REFUSES("index", sadmm_world_coupling_index(world, coupling, NULL));
+    REFUSES("world", sadmm_world_device_array(NULL, SADMM_ARRAY_BODY_STATE, &device));
+    REFUSES("out", sadmm_world_device_array(world, SADMM_ARRAY_BODY_STATE, NULL));
+    REFUSES("world", sadmm_world_dynamic_bodies(NULL, &index, 1, &index));
+    REFUSES("count", sadmm_world_dynamic_bodies(world, &index, 1, NULL));
+    REFUSES("indices", sadmm_world_dynamic_bodies(world, NULL, 1, &index));
+}
+
+static void on_saves(void)
+{
+    char bytes[16] = {0};
+    size_t size;
+    REFUSES("world", sadmm_world_save(NULL, bytes, sizeof bytes, &size));
+    REFUSES("size", sadmm_world_save(world, bytes, sizeof bytes, NULL));
+    REFUSES("buffer", sadmm_world_save(world, NULL, sizeof bytes, &size));
+    REFUSES("world", sadmm_world_restore(NULL, bytes, sizeof bytes));
+    REFUSES("buffer", sadmm_world_restore(world, NULL, 0));
+}
+
 static void on_bodies(void)
 {
     const double three[3] = {0};
@@ -382,6 +420,10 @@ static const struct {
     {on_couplings,
      {W(add_coupling), W(remove_coupling), W(coupling_count), W(coupling_at), W(coupling_def), W(set_coupling_target),
       W(set_coupling_gains), W(set_coupling_limits), W(set_coupling_enabled), W(coupling_state)}},
+    {on_arrays,
+     {"sadmm_array_columns", "sadmm_array_is_settable", W(array_rows), W(get_array), W(set_array), W(body_index),
+      W(shape_index), W(joint_index), W(coupling_index), W(device_array), W(dynamic_bodies)}},
+    {on_saves, {W(save), W(restore)}},
     {on_gears,
      {W(add_gear), W(remove_gear), W(gear_count), W(gear_at), W(gear_def), W(set_gear_enabled), W(gear_state)}},
     {on_steps,

@@ -7,6 +7,7 @@
  *   hull_measure.c   planes, volume, principal axes, the box around it
  *   hull_round.c     what rounding adds to the integrals
  *   hull_block.c     the block that contact finding reads (hull_data.h), and those that every pool begins with
+ *   hull_archive.c   a hull as bytes and back
  *
  * Contact finding works in the frame of a box around the hull, not in that of the points: its half extents are bounds
  * and sizes as a box's are. The axes of the box are those of the points, the principal axes of inertia, or those of the
@@ -42,6 +43,11 @@ struct sadmm_hull {
 /* One more use; one less: the last one frees it. NULL is fine. Thread-safe. */
 void sadmm_hull_retain(const sadmm_hull *hull);
 void sadmm_hull_release(const sadmm_hull *hull);
+
+/* Into an archive (core/base/archive.h), or out of it: a new hull, one use, to be released also after a failure unless
+ * it is NULL. */
+struct sadmm_archive;
+void sadmm_hull_archive(struct sadmm_archive *archive, sadmm_hull **hull);
 
 /* The blocks that every pool begins with, HULL_FIRST_OWN doubles. */
 void sadmm_hull_prelude(double *pool);

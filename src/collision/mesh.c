@@ -11,7 +11,7 @@
 #include "mesh_tree.h"
 #include "mesh_triangle.h"
 
-enum { MOST_VERTICES = 1 << 26, MOST_TRIANGLES = 1 << 26, MOST_HEIGHTS = 1 << 26, MOST_COLUMNS = 16384 };
+enum { MOST_VERTICES = 1 << 26, MOST_TRIANGLES = 1 << 26, MOST_HEIGHTS = 1 << 26 };
 
 static const double largest = 1e6, thinnest = 1e-9; /* m; of the longest edge */
 /* Sine of the angle between two triangles below which they lie in one plane: vertices given in single precision bend
@@ -322,12 +322,12 @@ static sadmm_status make_triangles(const sadmm_mesh_def *def, struct making *m, 
 static sadmm_status check_heights(const sadmm_heightfield_def *def, struct sadmm_error *error)
 {
     TRY(sadmm_check_given(def->heights, "def->heights", error));
-    if (def->columns < 2 || def->columns > MOST_COLUMNS)
+    if (def->columns < 2 || def->columns > MESH_MOST_COLUMNS)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->columns = %d: must be in [2, %d]", def->columns,
-                          MOST_COLUMNS);
-    if (def->rows < 2 || def->rows > MOST_COLUMNS)
+                          MESH_MOST_COLUMNS);
+    if (def->rows < 2 || def->rows > MESH_MOST_COLUMNS)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->rows = %d: must be in [2, %d]", def->rows,
-                          MOST_COLUMNS);
+                          MESH_MOST_COLUMNS);
     if ((int64_t)def->columns * def->rows > MOST_HEIGHTS)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->columns x rows = %lld: must be at most %d",
                           (long long)def->columns * def->rows, MOST_HEIGHTS);

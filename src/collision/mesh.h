@@ -3,6 +3,7 @@
  *   mesh.c         what callers see: checks, queries; the block put together
  *   mesh_edges.c   which triangles are beside each other, which vertices
  *   mesh_tree.c    the tree of boxes, and with it the order of the triangles
+ *   mesh_archive.c a mesh as bytes and back
  *   mesh_data.h    the block that contact finding reads; mesh_walk.h: what is near
  */
 #ifndef SADMM_COLLISION_MESH_H
@@ -27,5 +28,9 @@ struct sadmm_mesh {
 /* One more use; one less: the last one frees it. NULL is fine. Thread-safe. */
 void sadmm_mesh_retain(const sadmm_mesh *mesh);
 void sadmm_mesh_release(const sadmm_mesh *mesh);
+
+/* As sadmm_hull_archive. */
+struct sadmm_archive;
+void sadmm_mesh_archive(struct sadmm_archive *archive, sadmm_mesh **mesh);
 
 #endif

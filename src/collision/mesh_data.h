@@ -58,6 +58,7 @@ struct mesh_node {
     int32_t first; /* of a leaf: triangle << 3 | how many; of others -1 */
 };
 enum { MESH_NODE_DOUBLES = 4, MESH_LEAF = 4 };
+enum { MESH_MOST_COLUMNS = 16384 }; /* and rows, of heights */
 
 SADMM_INLINE size_t mesh_triangle_doubles(size_t triangles, size_t vertices, size_t nodes, size_t ring)
 {

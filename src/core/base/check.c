@@ -36,3 +36,10 @@ sadmm_status sadmm_check_orientation(const char *name, const double q[4], double
     for (int k = 0; k < 4; ++k) out[k] = q[k] / norm;
     return SADMM_OK;
 }
+
+bool sadmm_all_finite(const double *x, size_t count)
+{
+    for (size_t k = 0; k < count; ++k)
+        if (!isfinite(x[k])) return false;
+    return true;
+}

@@ -2,6 +2,9 @@
 #ifndef SADMM_CORE_BASE_CHECK_H
 #define SADMM_CORE_BASE_CHECK_H
 
+#include <stdbool.h>
+#include <stddef.h>
+
 #include "error.h"
 
 sadmm_status sadmm_check_given(const void *pointer, const char *name, struct sadmm_error *error);
@@ -10,5 +13,7 @@ sadmm_status sadmm_check_vector(const char *name, const double *x, int count, do
 sadmm_status sadmm_check_range(const char *name, double x, double low, double high, struct sadmm_error *error);
 /* Unit within 1e-6; normalised into `out`. */
 sadmm_status sadmm_check_orientation(const char *name, const double q[4], double out[4], struct sadmm_error *error);
+
+bool sadmm_all_finite(const double *x, size_t count);
 
 #endif

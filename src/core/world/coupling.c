@@ -56,6 +56,14 @@ static sadmm_status check_target(const char *const names[3], const double positi
     return SADMM_OK;
 }
 
+sadmm_status sadmm_world_check_coupling(const sadmm_coupling_def *def, struct sadmm_error *error)
+{
+    double ignored[4];
+    TRY(sadmm_check_vector("def->position", def->position, 3, FRAME_LIMIT, error));
+    TRY(sadmm_check_orientation("def->orientation", def->orientation, ignored, error));
+    return check_numbers("def->", def, error);
+}
+
 sadmm_status sadmm_world_check_target(const double position[3], const double orientation[4], const double velocity[6],
                                       struct sadmm_rigid *target, struct sadmm_error *error)
 {

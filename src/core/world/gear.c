@@ -41,7 +41,7 @@ static int count_bodies(const sadmm_world *world, const struct sadmm_world_joint
     return count;
 }
 
-static sadmm_status check_def(sadmm_world *world, const sadmm_gear_def *def, struct sadmm_error *error)
+sadmm_status sadmm_world_check_gear(const sadmm_world *world, const sadmm_gear_def *def, struct sadmm_error *error)
 {
     const struct sadmm_world_joint *const joints[2] = {
         sadmm_world_find_joint(world, def->joint_1, "def->joint_1", error),
@@ -84,7 +84,7 @@ sadmm_status sadmm_world_add_gear(sadmm_world *world, const sadmm_gear_def *def,
     struct sadmm_error *error = &world->error;
     struct sadmm_world_gear made = {.alive = true, .generation = 1};
     TRY(sadmm_check_given(def, "def", error));
-    TRY(check_def(world, def, error));
+    TRY(sadmm_world_check_gear(world, def, error));
     TRY(sadmm_world_take_back(world));
     made.def = *def;
     made.joint[0] = def->joint_1.slot - 1;

@@ -167,6 +167,15 @@ static sadmm_status check_def(const sadmm_joint_def *def, uint32_t *locks, struc
     return check_coordinates(def, *locks, error);
 }
 
+sadmm_status sadmm_world_check_joint_def(const sadmm_joint_def *def, struct sadmm_error *error)
+{
+    uint32_t locks = 0;
+    TRY(check_def(def, &locks, error));
+    return locks == def->locks ? SADMM_OK
+                               : sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "def->locks = %u: must be %u, by its kind",
+                                            def->locks, locks);
+}
+
 /* ---- life -------------------------------------------------------------------------------------------------------- */
 
 static bool taken(const sadmm_world *world, size_t slot) { return world->joints[slot].alive; }
@@ -422,8 +431,8 @@ sadmm_status sadmm_world_set_joint_coordinate(sadmm_world *world, sadmm_joint_id
     return sadmm_world_take_edit(world, joint, (enum sadmm_joint_edit)index);
 }
 
-static sadmm_status check_table(const double *positions, const double *forces, int32_t count,
-                                struct sadmm_error *error)
+sadmm_status sadmm_world_check_table(const double *positions, const double *forces, int32_t count,
+                                     struct sadmm_error *error)
 {
     if (count != 0 && (count < 2 || count > SADMM_MOST_SPRING_POINTS))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "count = %d: must be 0 or in [2, %d]", count,
@@ -455,7 +464,7 @@ sadmm_status sadmm_world_set_joint_spring_table(sadmm_world *world, sadmm_joint_
     struct sadmm_world_joint *joint = sadmm_world_find_joint(world, id, "id", error);
     if (!joint) return SADMM_ERROR_STALE_ID;
     TRY(check_free(joint, index, error));
-    TRY(check_table(positions, forces, count, error));
+    TRY(sadmm_world_check_table(positions, forces, count, error));
     TRY(sadmm_world_take_back(world));
     const size_t n = (size_t)count;
     double *table = n ? (double *)sadmm_alloc(2 * n, sizeof *table) : NULL;

@@ -78,13 +78,14 @@ static struct sadmm_block_owner block_owner(const sadmm_shape_def *def)
 
 /* Room for what a shape with a block in `slot` has beside it, and its block in the pool. Errors leave the world as it
  * is. */
-static sadmm_status add_block(sadmm_world *world, size_t slot, const sadmm_shape_def *def, uint32_t *offset)
+static sadmm_status add_block(sadmm_world *world, size_t slot, const sadmm_shape_def *def, uint32_t *offset,
+                              struct sadmm_error *error)
 {
     const struct sadmm_block_owner owner = block_owner(def);
     if (!sadmm_grow(&world->block_shapes, &world->block_shape_capacity, world->block_shape_slots, slot + 1,
                     sizeof *world->block_shapes))
-        return sadmm_fail_memory(&world->error, "a shape");
-    TRY(sadmm_block_pool_add(&world->block_pool, &owner, offset, &world->error));
+        return sadmm_fail_memory(error, "a shape");
+    TRY(sadmm_block_pool_add(&world->block_pool, &owner, offset, error));
     if (slot >= world->block_shape_slots) world->block_shape_slots = slot + 1;
     return SADMM_OK;
 }
@@ -106,16 +107,47 @@ static void place_block(sadmm_world *world, size_t slot, const sadmm_shape_def *
     q_store(q_normalize(q_mul(turn, q_load(axes))), shape->orientation);
 }
 
+sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body_slot, const sadmm_shape_def *def,
+                                   struct sadmm_error *error)
+{
+    struct sadmm_world_body *body = &world->bodies[body_slot];
+    double orientation[4];
+    uint32_t offset = 0;
+    TRY(check_def(body, def, orientation, error));
+    const struct sadmm_geometry geometry = geometry_of(def);
+    if (has_block(def->type)) TRY(add_block(world, slot, def, &offset, error));
+    else if (geometry_is_smooth(&geometry)) TRY(sadmm_block_pool_hold(&world->block_pool, error));
+
+    struct sadmm_shape *shape = &world->shapes[slot];
+    memset(shape, 0, sizeof *shape);
+    shape->geometry = (uint32_t)slot;
+    world->geometries[shape->geometry] = geometry;
+    world->geometries[shape->geometry].hull = offset;
+    memcpy(shape->position, def->position, sizeof shape->position);
+    memcpy(shape->orientation, orientation, sizeof orientation);
+    if (has_block(def->type)) place_block(world, slot, def, orientation);
+    shape->friction = def->friction;
+    shape->restitution = def->restitution;
+    shape->category = def->category;
+    shape->mask = def->mask;
+    shape->body = body_slot;
+    shape->alive = true;
+    shape->revision = ++world->shape_revisions;
+    ++world->shape_count;
+    if (body->shape_count++ == 0 || slot < body->first_shape) body->first_shape = slot;
+    return SADMM_OK;
+}
+
 sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, const sadmm_shape_def *def,
                                    sadmm_shape_id *id)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     struct sadmm_error *error = &world->error;
-    struct sadmm_world_body *body = sadmm_world_find_body(world, body_id, "body", error);
-    double orientation[4];
+    const struct sadmm_world_body *body = sadmm_world_find_body(world, body_id, "body", error);
+    double ignored[4];
     if (!body) return SADMM_ERROR_STALE_ID;
     TRY(sadmm_check_given(def, "def", error));
-    TRY(check_def(body, def, orientation, error));
+    TRY(check_def(body, def, ignored, error)); /* before the world is taken back */
     TRY(sadmm_world_take_back(world));
 
     size_t slot = world->shape_slots;
@@ -128,33 +160,12 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
         !sadmm_grow(&world->geometries, &world->geometry_capacity, world->shape_slots, slot + 1,
                     sizeof *world->geometries))
         return sadmm_fail_memory(error, "a shape");
-    uint32_t offset = 0;
-    const struct sadmm_geometry geometry = geometry_of(def);
-    if (has_block(def->type)) TRY(add_block(world, slot, def, &offset));
-    else if (geometry_is_smooth(&geometry)) TRY(sadmm_block_pool_hold(&world->block_pool, error));
-
-    struct sadmm_shape *shape = &world->shapes[slot];
+    TRY(sadmm_world_put_shape(world, slot, (int32_t)body_id.slot - 1, def, error));
     if (slot == world->shape_slots) {
         ++world->shape_slots;
         world->shape_generations[slot] = 1;
     }
-    memset(shape, 0, sizeof *shape);
-    shape->geometry = (uint32_t)slot;
-    world->geometries[shape->geometry] = geometry;
-    world->geometries[shape->geometry].hull = offset;
-    memcpy(shape->position, def->position, sizeof shape->position);
-    memcpy(shape->orientation, orientation, sizeof orientation);
-    if (has_block(def->type)) place_block(world, slot, def, orientation);
-    shape->friction = def->friction;
-    shape->restitution = def->restitution;
-    shape->category = def->category;
-    shape->mask = def->mask;
-    shape->body = (int32_t)body_id.slot - 1;
-    shape->alive = true;
-    shape->revision = ++world->shape_revisions;
-    ++world->shape_count;
     sadmm_slot_taken(&world->shape_marks, slot);
-    if (body->shape_count++ == 0 || slot < body->first_shape) body->first_shape = slot;
     if (id) {
         id->slot = (uint32_t)slot + 1;
         id->generation = world->shape_generations[slot];

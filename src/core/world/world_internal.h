@@ -385,18 +385,33 @@ sadmm_status sadmm_world_check_mass(const sadmm_world *world, double mass, const
 /* INVALID_ARGUMENT where a body's moments of inertia lie further apart than the precision can tell. */
 sadmm_status sadmm_world_check_inertias(sadmm_world *world, sadmm_precision precision);
 
+/* ---- gear.c ---- */
+
+/* May there be such a gear? Else INVALID_ARGUMENT, STALE_ID. */
+sadmm_status sadmm_world_check_gear(const sadmm_world *world, const sadmm_gear_def *def, struct sadmm_error *error);
+
 /* ---- coupling.c ---- */
 
+/* The numbers of a definition; not its body and its target. */
+sadmm_status sadmm_world_check_coupling(const sadmm_coupling_def *def, struct sadmm_error *error);
 /* A target that may be set, else INVALID_ARGUMENT, into the pose and velocity of `target`. velocity: NULL is 0. */
 sadmm_status sadmm_world_check_target(const double position[3], const double orientation[4], const double velocity[6],
                                       struct sadmm_rigid *target, struct sadmm_error *error);
 
 /* ---- shape.c ---- */
 
+/* A shape into a slot that there is room for and that has a generation. body: the slot of a live one. Errors as of
+ * sadmm_world_add_shape, with nothing changed. */
+sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body, const sadmm_shape_def *def,
+                                   struct sadmm_error *error);
 void sadmm_world_kill_shape(sadmm_world *world, size_t slot);
 
 /* ---- joint.c ---- */
 
+/* Definitions as they are kept: may they be? Else INVALID_ARGUMENT. */
+sadmm_status sadmm_world_check_joint_def(const sadmm_joint_def *def, struct sadmm_error *error);
+sadmm_status sadmm_world_check_table(const double *positions, const double *forces, int32_t count,
+                                     struct sadmm_error *error);
 /* May that be set of a joint's coordinate? Else INVALID_ARGUMENT. */
 sadmm_status sadmm_world_check_coordinate(const struct sadmm_world_joint *joint, int32_t index,
                                           const sadmm_joint_coordinate *coordinate, struct sadmm_error *error);

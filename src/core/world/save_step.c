@@ -1,0 +1,194 @@
+/* The last step of a world, in a saved one: what the next one starts from, and what can be read of it. */
+#include <math.h>
+
+#include "core/base/memory.h"
+#include "save.h"
+
+/* A body of the step, as contacts and rows name it. */
+static bool side_fits(const sadmm_world *world, int32_t body)
+{
+    return body >= -1 ? body < world->plan.bodies : sadmm_driven(body) < world->start.driven_count;
+}
+
+/* ---- contacts ---------------------------------------------------------------------------------------------------- */
+
+static bool shape_fits(const sadmm_world *world, int32_t slot)
+{
+    return slot >= 0 && (size_t)slot < world->shape_slots && (!world->contacts_readable || world->shapes[slot].alive);
+}
+
+/* A triangle of a mesh: read-outs look it up. */
+static bool child_fits(const sadmm_world *world, const struct sadmm_contact_pair *pair)
+{
+    if (!world->contacts_readable) return true;
+    const struct sadmm_geometry *geometry = &world->geometries[world->shapes[pair->shape_b].geometry];
+    if (geometry->type != SADMM_SHAPE_MESH) return true;
+    return (int64_t)pair->child < sadmm_mesh_triangle_count(world->block_shapes[pair->shape_b].mesh);
+}
+
+static bool contacts_fit(const sadmm_world *world)
+{
+    const struct sadmm_contact_set *set = &world->contacts;
+    size_t points = 0;
+    for (size_t k = 0; k < set->pair_count; ++k) {
+        const struct sadmm_contact_pair *pair = &set->pairs[k], *before = k > 0 ? pair - 1 : NULL;
+        if (pair->count < 1 || pair->count > SADMM_MAX_POINTS || (size_t)pair->first != points ||
+            !shape_fits(world, pair->shape_a) || !shape_fits(world, pair->shape_b) || !child_fits(world, pair) ||
+            !side_fits(world, pair->body_a) || !side_fits(world, pair->body_b) ||
+            (pair->body_a < 0 && pair->body_b < 0) || !sadmm_all_finite(pair->normal, 3) || !(pair->friction >= 0) ||
+            !(pair->restitution >= 0))
+            return false;
+        if (before && (before->shape_a > pair->shape_a ||
+                       (before->shape_a == pair->shape_a &&
+                        (before->shape_b > pair->shape_b ||
+                         (before->shape_b == pair->shape_b && before->child >= pair->child)))))
+            return false;
+        points += (size_t)pair->count;
+    }
+    if (points != set->point_count) return false;
+    for (size_t k = 0; k < points; ++k) {
+        const struct sadmm_contact_point *point = &set->points[k];
+        if (!sadmm_all_finite(point->impulse, 3) || !sadmm_all_finite(point->arm_a, 3) || !sadmm_all_finite(point->arm_b, 3) ||
+            !isfinite(point->gap) || !isfinite(point->error))
+            return false;
+    }
+    return set->dt >= 0 && isfinite(set->dt);
+}
+
+static void archive_contacts(struct sadmm_archive *archive, sadmm_world *world)
+{
+    struct sadmm_contact_set *set = &world->contacts;
+    _Static_assert(sizeof *set->pairs == 80 && sizeof *set->points == 96, "no padding");
+    sadmm_archive_array(archive, &set->pairs, &set->pair_count, &set->pair_capacity, sizeof *set->pairs, INT32_MAX);
+    sadmm_archive_array(archive, &set->points, &set->point_count, &set->point_capacity, sizeof *set->points, INT32_MAX);
+    SADMM_ARCHIVE(archive, set->dt);
+    if (archive->reading && archive->status == SADMM_OK)
+        sadmm_archive_expect(archive, contacts_fit(world), "contacts");
+}
+
+/* ---- rows -------------------------------------------------------------------------------------------------------- */
+
+static bool rows_fit(const sadmm_world *world)
+{
+    const struct sadmm_rows *rows = &world->start.rows;
+    size_t count = 0;
+    for (size_t k = 0; k < rows->constraint_count; ++k) {
+        const struct sadmm_row_constraint *c = &rows->constraints[k];
+        if (c->count < 1 || c->count > SADMM_MAX_ROWS || (size_t)c->first != count || !side_fits(world, c->body_a) ||
+            !side_fits(world, c->body_b))
+            return false;
+        count += (size_t)c->count;
+    }
+    return count == rows->row_count;
+}
+
+static void archive_rows(struct sadmm_archive *archive, sadmm_world *world)
+{
+    struct sadmm_rows *rows = &world->start.rows;
+    size_t constraints = rows->constraint_count, count = rows->row_count;
+    sadmm_archive_count(archive, &constraints, 25, INT32_MAX);
+    sadmm_archive_count(archive, &count, 19 * sizeof(double), INT32_MAX);
+    if (archive->reading && archive->status == SADMM_OK) {
+        if (!sadmm_rows_reserve(rows, constraints, count) ||
+            !sadmm_grow_empty(&world->start.multiplier, &world->start.multiplier_capacity, count, sizeof(double))) {
+            archive->status = sadmm_fail_memory(archive->error, "the state of a world");
+            return;
+        }
+        rows->constraint_count = constraints;
+        rows->row_count = count;
+    }
+    if (archive->status != SADMM_OK) return;
+    for (size_t k = 0; k < constraints; ++k) {
+        struct sadmm_row_constraint *c = &rows->constraints[k];
+        SADMM_ARCHIVE(archive, c->body_a);
+        SADMM_ARCHIVE(archive, c->body_b);
+        SADMM_ARCHIVE(archive, c->first);
+        SADMM_ARCHIVE(archive, c->count);
+        sadmm_archive_flag(archive, &c->cone);
+        SADMM_ARCHIVE(archive, c->friction);
+    }
+    double *const columns[] = {rows->gain, rows->bias, rows->compliance, rows->lo, rows->hi, rows->lambda,
+                               world->start.multiplier};
+    if (count > 0) {
+        sadmm_archive_bytes(archive, rows->jacobian_a, 6 * count * sizeof(double));
+        sadmm_archive_bytes(archive, rows->jacobian_b, 6 * count * sizeof(double));
+        for (size_t k = 0; k < sizeof columns / sizeof *columns; ++k)
+            sadmm_archive_bytes(archive, columns[k], count * sizeof(double));
+    }
+    if (archive->reading && archive->status == SADMM_OK) sadmm_archive_expect(archive, rows_fit(world), "rows of joints");
+}
+
+/* ---- plan, start, report ----------------------------------------------------------------------------------------- */
+
+_Static_assert(sizeof(struct sadmm_plan) == 40 && sizeof(sadmm_step_report) == 208,
+               "a plan, or a report, has other members than the list of a saved world");
+
+static void archive_plan(struct sadmm_archive *archive, struct sadmm_plan *plan)
+{
+    bool *const flags[] = {&plan->rows_apart, &plan->rigid, &plan->gyroscopic, &plan->warm_start, &plan->warm,
+                           &plan->penalty_updates, &plan->predict, &plan->weight_refresh, &plan->limit,
+                           &plan->momentum, &plan->residuals, &plan->wrenches, &plan->certificate};
+    SADMM_ARCHIVE(archive, plan->bodies);
+    SADMM_ARCHIVE(archive, plan->pairs);
+    SADMM_ARCHIVE(archive, plan->points);
+    SADMM_ARCHIVE(archive, plan->row_constraints);
+    SADMM_ARCHIVE(archive, plan->contact_rows);
+    SADMM_ARCHIVE(archive, plan->threads);
+    for (size_t k = 0; k < sizeof flags / sizeof *flags; ++k) sadmm_archive_flag(archive, flags[k]);
+}
+
+static void archive_report(struct sadmm_archive *archive, sadmm_step_report *r)
+{
+    SADMM_ARCHIVE(archive, r->backend);
+    SADMM_ARCHIVE(archive, r->precision);
+    SADMM_ARCHIVE(archive, r->threads);
+    SADMM_ARCHIVE(archive, r->step);
+    SADMM_ARCHIVE(archive, r->time);
+    SADMM_ARCHIVE(archive, r->bodies);
+    SADMM_ARCHIVE(archive, r->joints);
+    SADMM_ARCHIVE(archive, r->couplings);
+    SADMM_ARCHIVE(archive, r->contacts);
+    SADMM_ARCHIVE(archive, r->pairs);
+    SADMM_ARCHIVE(archive, r->iterations);
+    SADMM_ARCHIVE(archive, r->iterations_mean);
+    sadmm_archive_flag(archive, &r->converged);
+    SADMM_ARCHIVE(archive, r->limited);
+    SADMM_ARCHIVE(archive, r->repeated);
+    SADMM_ARCHIVE(archive, r->penetration_max);
+    SADMM_ARCHIVE(archive, r->residual);
+    SADMM_ARCHIVE(archive, r->certificate);
+    if (archive->reading)
+        sadmm_archive_expect(archive, r->step >= 0 && isfinite(r->time) && r->contacts >= 0, "the report of a step");
+}
+
+/* Times are left out: they are no state, and equal states are to give equal bytes. */
+void sadmm_archive_step(struct sadmm_archive *archive, sadmm_world *world)
+{
+    struct sadmm_step_start *start = &world->start;
+    sadmm_archive_flag(archive, &world->stepped);
+    sadmm_archive_flag(archive, &world->contacts_readable);
+    archive_report(archive, &world->report);
+    if (!world->stepped) return;
+    sadmm_archive_settings(archive, &world->step_settings);
+    archive_plan(archive, &world->plan);
+    const bool readable = world->contacts_readable;
+    size_t bodies = readable ? (size_t)world->plan.bodies : 0, numbers = 6 * bodies,
+           driven = 6 * (size_t)start->driven_count;
+    if (archive->reading)
+        sadmm_archive_expect(archive, world->plan.bodies >= 0 && (!readable || world->plan.bodies == world->dynamic_count),
+                             "the plan of a step");
+    sadmm_archive_array(archive, &start->driven, &driven, &start->driven_capacity, sizeof(double), INT32_MAX);
+    start->driven_count = (int32_t)(driven / 6);
+    /* Without contacts that can be read nothing of this can. */
+    sadmm_archive_array(archive, &start->rigid, &bodies, &start->rigid_capacity, sizeof *start->rigid, INT32_MAX);
+    sadmm_archive_array(archive, &start->velocity, &numbers, &start->velocity_capacity, sizeof(double), INT32_MAX);
+    if (archive->reading)
+        sadmm_archive_expect(archive, numbers == 6 * bodies && (!readable || bodies == (size_t)world->plan.bodies),
+                             "the start of a step");
+    archive_contacts(archive, world);
+    numbers = readable ? 3 * world->contacts.point_count : 0;
+    sadmm_archive_array(archive, &start->impulse, &numbers, &start->impulse_capacity, sizeof(double), INT32_MAX);
+    if (archive->reading)
+        sadmm_archive_expect(archive, !readable || numbers == 3 * world->contacts.point_count, "the start of a step");
+    if (readable) archive_rows(archive, world);
+}
