@@ -1,0 +1,263 @@
+// Joints, gears and virtual couplings.
+#include "common.h"
+
+static constexpr std::pair<const char *, sadmm_joint_kind> kind_names[] = {
+    {"fixed", SADMM_JOINT_FIXED}, {"revolute", SADMM_JOINT_REVOLUTE}, {"prismatic", SADMM_JOINT_PRISMATIC},
+    {"cylindrical", SADMM_JOINT_CYLINDRICAL}, {"spherical", SADMM_JOINT_SPHERICAL},
+    {"universal", SADMM_JOINT_UNIVERSAL}, {"planar", SADMM_JOINT_PLANAR}, {"cartesian", SADMM_JOINT_CARTESIAN},
+    {"custom", SADMM_JOINT_CUSTOM}, {"distance", SADMM_JOINT_DISTANCE}, {"spring", SADMM_JOINT_SPRING},
+    {"link", SADMM_JOINT_LINK}};
+static constexpr std::pair<const char *, sadmm_drive> drive_names[] = {
+    {"off", SADMM_DRIVE_OFF}, {"speed", SADMM_DRIVE_SPEED}, {"position", SADMM_DRIVE_POSITION}};
+
+using C = sadmm_joint_coordinate;
+
+static void bind_coordinate(nb::module_ &m)
+{
+    nb::class_<C>(m, "Coordinate", "What acts along one free coordinate of a joint; m and N, or rad and N m. Coordinate(limited=True, "
+                                   "lower=-1, upper=1): the defaults, with changes.")
+        .def("__init__", [](nb::pointer_and_handle<C> self, nb::kwargs values) {
+            new (self.p) C(sadmm_joint_def_default().coordinates[0]);
+            nb::inst_mark_ready(self.h);
+            for (auto [name, value] : values) nb::setattr(self.h, nb::cast<nb::str>(name), value);
+        })
+        .def_rw("limited", &C::limited)
+        .def_rw("lower", &C::lower)
+        .def_rw("upper", &C::upper)
+        .def_prop_rw("drive", [](const C &c) { return name_of(c.drive, drive_names); },
+                     [](C &c, const std::string &name) { c.drive = named("drive", name, drive_names); },
+                     "'off', 'speed' or 'position'.")
+        .def_rw("target_position", &C::target_position)
+        .def_rw("target_speed", &C::target_speed)
+        .def_rw("drive_stiffness", &C::drive_stiffness)
+        .def_rw("drive_damping", &C::drive_damping)
+        .def_rw("drive_force", &C::drive_force, "The most that the drive gives.")
+        .def_rw("friction", &C::friction)
+        .def_rw("spring_stiffness", &C::spring_stiffness)
+        .def_rw("spring_damping", &C::spring_damping)
+        .def_rw("spring_rest", &C::spring_rest)
+        .def_rw("armature", &C::armature);
+}
+
+static joint add_joint(nb::handle_t<world> self, const std::string &kind, const std::optional<body> &a,
+                       const std::optional<body> &b, std::optional<vec3> position, std::optional<quat> orientation,
+                       vec3 position_a, quat orientation_a, vec3 position_b, quat orientation_b, uint32_t locks, double length,
+                       bool collide, bool enabled, double break_force, double break_torque, const nb::dict &coordinates)
+{
+    world &w = nb::cast<world &>(self);
+    joint out{nb::borrow(self), &w, {}};
+    sadmm_joint_def def = sadmm_joint_def_default();
+    def.kind = named("kind", kind, kind_names);
+    if (a) def.body_a = a->id;
+    if (b) def.body_b = b->id;
+    if ((a && a->w != &w) || (b && b->w != &w)) throw nb::value_error("a, b: must be bodies of this world");
+    put(position_a, def.position_a), put(orientation_a, def.orientation_a);
+    put(position_b, def.position_b), put(orientation_b, def.orientation_b);
+    def.locks = locks, def.length = length, def.collide = collide, def.enabled = enabled;
+    def.break_force = break_force, def.break_torque = break_torque;
+    for (auto [k, value] : coordinates) {
+        const int index = nb::cast<int>(k);
+        if (index < 0 || index > 5) throw nb::value_error("coordinates: keys must be in [0, 6)");
+        def.coordinates[index] = nb::cast<C>(value);
+    }
+    call(w, [&](sadmm_world *h) {
+        sadmm_status status = SADMM_OK;
+        const quat still{1, 0, 0, 0};
+        if (position || orientation)
+            status = sadmm_world_place_joint(h, &def, (position ? *position : vec3{}).data(), (orientation ? *orientation : still).data());
+        return status == SADMM_OK ? sadmm_world_add_joint(h, &def, &out.id) : status;
+    });
+    return out;
+}
+
+static sadmm_joint_def def_of(const joint &j)
+{
+    sadmm_joint_def def;
+    call(*j.w, [&](sadmm_world *h) { return sadmm_world_joint_def(h, j.id, &def); });
+    return def;
+}
+
+static sadmm_joint_state state_of(const joint &j)
+{
+    sadmm_joint_state state;
+    call(*j.w, [&](sadmm_world *h) { return sadmm_world_joint_state(h, j.id, &state); });
+    return state;
+}
+
+static nb::object body_of(const joint &j, sadmm_body_id id)
+{
+    return id.slot == 0 ? nb::none() : nb::cast(body{j.owner, j.w, id});
+}
+
+static int index_of(int index)
+{
+    if (index < 0 || index > 5) throw nb::index_error("index: must be in [0, 6)");
+    return index;
+}
+
+static void bind_joint(nb::module_ &m)
+{
+    nb::class_<joint> c(m, "Joint", "A joint of a world. Coordinates 0 to 2 are translations along the axes of a's frame, 3 to 5 rotations.");
+    c.def("__eq__", [](const joint &a, const joint &b) { return same_id(a, b); })
+        .def("__hash__", &hash_of<sadmm_joint_id>)
+        .def_prop_ro("world", [](const joint &j) { return j.owner; })
+        .def_prop_ro("index", [](const joint &j) {
+            int32_t index;
+            call(*j.w, [&](sadmm_world *h) { return sadmm_world_joint_index(h, j.id, &index); });
+            return index;
+        }, "Row of the world's arrays.")
+        .def_prop_ro("kind", [](const joint &j) { return name_of(def_of(j).kind, kind_names); })
+        .def_prop_ro("locks", [](const joint &j) { return def_of(j).locks; }, "Bit k: coordinate k is locked.")
+        .def_prop_ro("body_a", [](const joint &j) { return body_of(j, def_of(j).body_a); }, "None: the static world.")
+        .def_prop_ro("body_b", [](const joint &j) { return body_of(j, def_of(j).body_b); })
+        .def_prop_ro("frame_a", [](const joint &j) { const auto d = def_of(j); return std::make_pair(array_of<3>(d.position_a), array_of<4>(d.orientation_a)); }, "(position, orientation) in a's body frame.")
+        .def_prop_ro("frame_b", [](const joint &j) { const auto d = def_of(j); return std::make_pair(array_of<3>(d.position_b), array_of<4>(d.orientation_b)); })
+        .def_prop_rw("enabled", [](const joint &j) { return def_of(j).enabled; },
+                     [](const joint &j, bool on) { call(*j.w, [&](sadmm_world *h) { return sadmm_world_set_joint_enabled(h, j.id, on); }); })
+        .def("coordinate", [](const joint &j, int index) { return def_of(j).coordinates[index_of(index)]; }, "index"_a, "What acts along it, as it is now.")
+        .def("set_coordinate", [](const joint &j, int index, const C &value) {
+            call(*j.w, [&](sadmm_world *h) { return sadmm_world_set_joint_coordinate(h, j.id, index, &value); });
+        }, "index"_a, "coordinate"_a, "From the next step on.")
+        .def("set_target", [](const joint &j, int index, std::optional<double> x, std::optional<double> v) {
+            C value = def_of(j).coordinates[index_of(index)];
+            if (x) value.target_position = *x;
+            if (v) value.target_speed = *v;
+            call(*j.w, [&](sadmm_world *h) { return sadmm_world_set_joint_coordinate(h, j.id, index, &value); });
+        }, "index"_a, "position"_a = nb::none(), "speed"_a = nb::none(), "Of the coordinate's drive.")
+        .def("set_spring_table", [](const joint &j, int index, const std::vector<double> &x, const std::vector<double> &f) {
+            if (x.size() != f.size()) throw nb::value_error("forces: must be as many as positions");
+            call(*j.w, [&](sadmm_world *h) { return sadmm_world_set_joint_spring_table(h, j.id, index, x.data(), f.data(), (int32_t)x.size()); });
+        }, "index"_a, "positions"_a, "forces"_a, "A spring with a characteristic of its own; empty lists: none.")
+        .def("remove", [](const joint &j) { call(*j.w, [&](sadmm_world *h) { return sadmm_world_remove_joint(h, j.id); }); });
+#define OF_STATE(name, doc) .def_prop_ro(#name, [](const joint &j) { return array_of<6>(state_of(j).name); }, doc)
+    c OF_STATE(position, "Coordinates, m and rad; of locked ones what they are off by.")
+        OF_STATE(speed, "m/s and rad/s.")
+        OF_STATE(wrench_a, "On a: force (N), torque about the joint's point (N m), world.")
+        OF_STATE(wrench_b, "On b.")
+        OF_STATE(wrench_joint, "wrench_b along the axes of a's frame.")
+        OF_STATE(lock_force, "By coordinate, N or N m.")
+        OF_STATE(limit_force, "By coordinate.")
+        OF_STATE(drive_force, "By coordinate.")
+        OF_STATE(friction_force, "By coordinate.")
+        OF_STATE(spring_force, "By coordinate.")
+        OF_STATE(armature_force, "By coordinate.")
+        .def_prop_ro("broken", [](const joint &j) { return state_of(j).broken; });
+#undef OF_STATE
+}
+
+static gear add_gear(nb::handle_t<world> self, const joint &a, int32_t coordinate_a, const joint &b, int32_t coordinate_b,
+                     double ratio, std::optional<double> offset, bool enabled)
+{
+    world &w = nb::cast<world &>(self);
+    gear out{nb::borrow(self), &w, {}};
+    sadmm_gear_def def = sadmm_gear_def_default();
+    def.joint_1 = a.id, def.coordinate_1 = coordinate_a;
+    def.joint_2 = b.id, def.coordinate_2 = coordinate_b;
+    def.ratio = ratio, def.enabled = enabled;
+    if (offset) def.offset = *offset;
+    call(w, [&](sadmm_world *h) { return sadmm_world_add_gear(h, &def, &out.id); });
+    return out;
+}
+
+static coupling add_coupling(nb::handle_t<world> self, const body &b, vec3 position, quat orientation,
+                             std::optional<vec3> target_position, std::optional<quat> target_orientation, double linear_stiffness,
+                             double linear_damping, double angular_stiffness, double angular_damping, double max_force,
+                             double max_torque, bool enabled)
+{
+    world &w = nb::cast<world &>(self);
+    coupling out{nb::borrow(self), &w, {}};
+    sadmm_coupling_def def = sadmm_coupling_def_default();
+    def.body = b.id;
+    put(position, def.position), put(orientation, def.orientation);
+    if (target_position) put(*target_position, def.target_position);
+    if (target_orientation) put(*target_orientation, def.target_orientation);
+    def.linear_stiffness = linear_stiffness, def.linear_damping = linear_damping;
+    def.angular_stiffness = angular_stiffness, def.angular_damping = angular_damping;
+    def.max_force = max_force, def.max_torque = max_torque, def.enabled = enabled;
+    call(w, [&](sadmm_world *h) { return sadmm_world_add_coupling(h, &def, &out.id); });
+    return out;
+}
+
+static sadmm_coupling_state state_of(const coupling &c)
+{
+    sadmm_coupling_state state;
+    call(*c.w, [&](sadmm_world *h) { return sadmm_world_coupling_state(h, c.id, &state); });
+    return state;
+}
+
+static void bind_coupling(nb::module_ &m)
+{
+    nb::class_<coupling>(m, "Coupling", "A spring and damper that ties a body to a target pose.")
+        .def("__eq__", [](const coupling &a, const coupling &b) { return same_id(a, b); })
+        .def("__hash__", &hash_of<sadmm_coupling_id>)
+        .def_prop_ro("world", [](const coupling &c) { return c.owner; })
+        .def_prop_ro("index", [](const coupling &c) {
+            int32_t index;
+            call(*c.w, [&](sadmm_world *h) { return sadmm_world_coupling_index(h, c.id, &index); });
+            return index;
+        }, "Row of the world's arrays.")
+        .def("set_target", [](const coupling &c, vec3 x, quat q, std::optional<vec6> v) {
+            call(*c.w, [&](sadmm_world *h) { return sadmm_world_set_coupling_target(h, c.id, x.data(), q.data(), v ? v->data() : nullptr); });
+        }, "position"_a, "orientation"_a = quat{1, 0, 0, 0}, "velocity"_a = nb::none(), "The target at the present time, world frame; velocity: linear, angular.")
+        .def("set_gains", [](const coupling &c, double k, double d, double ka, double da) {
+            call(*c.w, [&](sadmm_world *h) { return sadmm_world_set_coupling_gains(h, c.id, k, d, ka, da); });
+        }, "linear_stiffness"_a, "linear_damping"_a, "angular_stiffness"_a, "angular_damping"_a)
+        .def("set_limits", [](const coupling &c, double f, double t) {
+            call(*c.w, [&](sadmm_world *h) { return sadmm_world_set_coupling_limits(h, c.id, f, t); });
+        }, "max_force"_a, "max_torque"_a)
+        .def("set_enabled", [](const coupling &c, bool on) { call(*c.w, [&](sadmm_world *h) { return sadmm_world_set_coupling_enabled(h, c.id, on); }); }, "enabled"_a)
+        .def_prop_ro("felt_force", [](const coupling &c) { return array_of<3>(state_of(c).felt_force); }, "What the user feels, N.")
+        .def_prop_ro("felt_torque", [](const coupling &c) { return array_of<3>(state_of(c).felt_torque); }, "About the target's origin, N m.")
+        .def_prop_ro("position_error", [](const coupling &c) { return array_of<3>(state_of(c).position_error); }, "m.")
+        .def_prop_ro("rotation_error", [](const coupling &c) { return array_of<3>(state_of(c).rotation_error); }, "Rotation vector, rad.")
+        .def("remove", [](const coupling &c) { call(*c.w, [&](sadmm_world *h) { return sadmm_world_remove_coupling(h, c.id); }); });
+    nb::class_<gear>(m, "Gear", "A ratio between two coordinates of joints.")
+        .def_prop_ro("world", [](const gear &g) { return g.owner; })
+        .def("set_enabled", [](const gear &g, bool on) { call(*g.w, [&](sadmm_world *h) { return sadmm_world_set_gear_enabled(h, g.id, on); }); }, "enabled"_a)
+        .def_prop_ro("error", [](const gear &g) {
+            sadmm_gear_state state;
+            call(*g.w, [&](sadmm_world *h) { return sadmm_world_gear_state(h, g.id, &state); });
+            return state.error;
+        })
+        .def("remove", [](const gear &g) { call(*g.w, [&](sadmm_world *h) { return sadmm_world_remove_gear(h, g.id); }); });
+}
+
+template <class T, class At> static std::vector<T> all_of(nb::handle self, int32_t count, At at)
+{
+    world &w = nb::cast<world &>(self);
+    std::vector<T> out;
+    for (int32_t k = 0; k < count; ++k) {
+        T one{nb::borrow(self), &w, {}};
+        call(w, [&](sadmm_world *h) { return at(h, k, &one.id); });
+        out.push_back(one);
+    }
+    return out;
+}
+
+void bind_joints(nb::module_ &m, nb::class_<world> &w)
+{
+    const double infinite = std::numeric_limits<double>::infinity();
+    bind_coordinate(m);
+    bind_joint(m);
+    bind_coupling(m);
+    w.def("add_joint", &add_joint, "kind"_a, "a"_a.none() = nb::none(), "b"_a.none() = nb::none(), nb::kw_only(), "position"_a = nb::none(),
+          "orientation"_a = nb::none(), "position_a"_a = vec3{}, "orientation_a"_a = quat{1, 0, 0, 0}, "position_b"_a = vec3{},
+          "orientation_b"_a = quat{1, 0, 0, 0}, "locks"_a = 0, "length"_a = -1.0, "collide"_a = false, "enabled"_a = true,
+          "break_force"_a = infinite, "break_torque"_a = infinite, "coordinates"_a = nb::dict(),
+          "A joint between body a and body b (None: the static world). kind: 'fixed', 'revolute' (about z), 'prismatic' (along z),\n"
+          "'cylindrical', 'spherical', 'universal', 'planar', 'cartesian', 'custom' (locks: bits), 'distance', 'spring', 'link'.\n"
+          "Its frames: `position` and `orientation` in the world, as the bodies are now, or position_a ... in the bodies' frames.\n"
+          "coordinates: {5: Coordinate(drive='speed', target_speed=2)}, what acts along free ones.");
+    w.def("add_gear", &add_gear, "joint_1"_a, "coordinate_1"_a, "joint_2"_a, "coordinate_2"_a, "ratio"_a = 1.0, "offset"_a = nb::none(),
+          "enabled"_a = true, "q_1 + ratio q_2 = offset; None: as it is now.");
+    w.def("add_coupling", &add_coupling, "body"_a, nb::kw_only(), "position"_a = vec3{}, "orientation"_a = quat{1, 0, 0, 0},
+          "target_position"_a = nb::none(), "target_orientation"_a = nb::none(), "linear_stiffness"_a = 0.0, "linear_damping"_a = 0.0,
+          "angular_stiffness"_a = 0.0, "angular_damping"_a = 0.0, "max_force"_a = infinite, "max_torque"_a = infinite, "enabled"_a = true,
+          "A virtual coupling of a frame on the body to a target pose in the world. N/m, N s/m, N m/rad, N m s/rad.");
+    w.def_prop_ro("joints", [](nb::handle_t<world> self) {
+        return all_of<joint>(self, sadmm_world_joint_count(nb::cast<world &>(self).handle), &sadmm_world_joint_at);
+    }, "All joints, in the order of the arrays' rows.");
+    w.def_prop_ro("couplings", [](nb::handle_t<world> self) {
+        return all_of<coupling>(self, sadmm_world_coupling_count(nb::cast<world &>(self).handle), &sadmm_world_coupling_at);
+    }, "All couplings.");
+}

@@ -1,0 +1,174 @@
+// Shapes' definitions, hulls, meshes, and the mass of solids.
+#include "common.h"
+
+static constexpr std::pair<const char *, sadmm_shape_type> type_names[] = {
+    {"plane", SADMM_SHAPE_PLANE}, {"sphere", SADMM_SHAPE_SPHERE}, {"capsule", SADMM_SHAPE_CAPSULE},
+    {"box", SADMM_SHAPE_BOX}, {"hull", SADMM_SHAPE_HULL}, {"mesh", SADMM_SHAPE_MESH},
+    {"cylinder", SADMM_SHAPE_CYLINDER}, {"cone", SADMM_SHAPE_CONE}, {"ellipsoid", SADMM_SHAPE_ELLIPSOID}};
+
+using points = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using triangles = nb::ndarray<const int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using grid = nb::ndarray<const double, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
+
+// A numpy array that owns its numbers.
+template <class T> nb::ndarray<nb::numpy, T> numpy_of(std::vector<T> values, std::vector<size_t> shape)
+{
+    auto *kept = new std::vector<T>(std::move(values));
+    nb::capsule owner(kept, [](void *p) noexcept { delete (std::vector<T> *)p; });
+    return nb::ndarray<nb::numpy, T>(kept->data(), shape.size(), shape.data(), owner);
+}
+
+// src/collision/hull.h and mesh.h, which are C
+extern "C" void sadmm_hull_retain(const sadmm_hull *hull);
+extern "C" void sadmm_mesh_retain(const sadmm_mesh *mesh);
+
+void hold_parts(shape_def &shape)
+{
+    if (shape.def.hull) {
+        sadmm_hull_retain(shape.def.hull);
+        shape.hull = std::make_shared<hull_holder>();
+        shape.hull->hull = const_cast<sadmm_hull *>(shape.def.hull);
+    }
+    if (shape.def.mesh) {
+        sadmm_mesh_retain(shape.def.mesh);
+        shape.mesh = std::make_shared<mesh_holder>();
+        shape.mesh->mesh = const_cast<sadmm_mesh *>(shape.def.mesh);
+    }
+}
+
+static shape_def make_hull(points at, double merge, double rounding)
+{
+    shape_def out;
+    sadmm_hull_def def = sadmm_hull_def_default();
+    def.points = at.data(), def.point_count = at.shape(0);
+    if (merge >= 0) def.merge = merge;
+    def.rounding = rounding;
+    out.def.type = SADMM_SHAPE_HULL;
+    out.hull = std::make_shared<hull_holder>();
+    sadmm_status status;
+    {
+        nb::gil_scoped_release release;
+        status = sadmm_hull_create(&def, &out.hull->hull);
+    }
+    check(status);
+    out.def.hull = out.hull->hull;
+    return out;
+}
+
+static shape_def make_mesh(points vertices, triangles corners)
+{
+    shape_def out;
+    sadmm_mesh_def def = sadmm_mesh_def_default();
+    def.vertices = vertices.data(), def.vertex_count = vertices.shape(0);
+    def.triangles = corners.data(), def.triangle_count = corners.shape(0);
+    out.def.type = SADMM_SHAPE_MESH;
+    out.mesh = std::make_shared<mesh_holder>();
+    sadmm_status status;
+    {
+        nb::gil_scoped_release release;
+        status = sadmm_mesh_create(&def, &out.mesh->mesh);
+    }
+    check(status);
+    out.def.mesh = out.mesh->mesh;
+    return out;
+}
+
+static shape_def make_heightfield(grid heights, std::array<double, 2> spacing)
+{
+    shape_def out;
+    sadmm_heightfield_def def = sadmm_heightfield_def_default();
+    def.heights = heights.data();
+    def.rows = (int32_t)heights.shape(0), def.columns = (int32_t)heights.shape(1);
+    def.spacing[0] = spacing[0], def.spacing[1] = spacing[1];
+    out.def.type = SADMM_SHAPE_MESH;
+    out.mesh = std::make_shared<mesh_holder>();
+    check(sadmm_heightfield_create(&def, &out.mesh->mesh));
+    out.def.mesh = out.mesh->mesh;
+    return out;
+}
+
+// What a viewer draws: vertices and triangles, in the frame of the shape.
+static nb::object geometry_of(const shape_def &s)
+{
+    std::vector<double> x;
+    std::vector<int32_t> corners;
+    if (s.def.hull) {
+        const int32_t count = sadmm_hull_vertex_count(s.def.hull);
+        const double *at = sadmm_hull_vertices(s.def.hull);
+        x.assign(at, at + 3 * (size_t)count);
+        for (int32_t f = 0; f < sadmm_hull_face_count(s.def.hull); ++f) {
+            sadmm_hull_face face;
+            check(sadmm_hull_face_at(s.def.hull, f, &face));
+            for (int32_t k = 2; k < face.corner_count; ++k)
+                corners.insert(corners.end(), {face.corners[0], face.corners[k - 1], face.corners[k]});
+        }
+    } else if (s.def.mesh) {
+        for (int64_t v = 0; v < sadmm_mesh_vertex_count(s.def.mesh); ++v) {
+            double at[3];
+            check(sadmm_mesh_vertex_at(s.def.mesh, v, at));
+            x.insert(x.end(), at, at + 3);
+        }
+        for (int64_t t = 0; t < sadmm_mesh_triangle_count(s.def.mesh); ++t) {
+            int32_t of[3], number;
+            check(sadmm_mesh_triangle_at(s.def.mesh, t, of, &number));
+            corners.insert(corners.end(), of, of + 3);
+        }
+    } else {
+        return nb::none();
+    }
+    const size_t vertices = x.size() / 3, count = corners.size() / 3;
+    return nb::make_tuple(numpy_of(std::move(x), {vertices, 3}), numpy_of(std::move(corners), {count, 3}));
+}
+
+void bind_shapes(nb::module_ &m)
+{
+    using S = shape_def;
+    nb::class_<S>(m, "Shape", "A shape's definition; made by subadmm.sphere, box, hull, ... and given to World.add_shape "
+                              "or World.add_solid.")
+        .def("__init__", [](S *self, const std::string &type, const std::vector<double> &size) {
+            new (self) S();
+            self->def.type = named("type", type, type_names);
+            if (self->def.type == SADMM_SHAPE_HULL || self->def.type == SADMM_SHAPE_MESH)
+                throw nb::value_error("a hull is made by subadmm.hull, a mesh by subadmm.mesh or subadmm.heightfield");
+            if (size.size() > 3) throw nb::value_error("size: must have at most three numbers");
+            for (size_t k = 0; k < size.size(); ++k) self->def.size[k] = size[k];
+        }, "type"_a, "size"_a = std::vector<double>())
+        .def_prop_ro("type", [](const S &s) { return name_of(s.def.type, type_names); })
+        .def_prop_rw("size", [](const S &s) { return array_of<3>(s.def.size); }, [](S &s, vec3 x) { put(x, s.def.size); }, "m, as sadmm_shape_def.size.")
+        .def_prop_rw("position", [](const S &s) { return array_of<3>(s.def.position); },
+                     [](S &s, vec3 x) { put(x, s.def.position); }, "In the body's frame, m.")
+        .def_prop_rw("orientation", [](const S &s) { return array_of<4>(s.def.orientation); },
+                     [](S &s, quat q) { put(q, s.def.orientation); }, "To the body's frame, w x y z.")
+        .def_prop_rw("friction", [](const S &s) { return s.def.friction; }, [](S &s, double x) { s.def.friction = x; }, "mu, in [0, 1e6].")
+        .def_prop_rw("restitution", [](const S &s) { return s.def.restitution; }, [](S &s, double x) { s.def.restitution = x; }, "In [0, 1].")
+        .def_prop_rw("category", [](const S &s) { return s.def.category; }, [](S &s, uint32_t x) { s.def.category = x; }, "Bits of what it is.")
+        .def_prop_rw("mask", [](const S &s) { return s.def.mask; }, [](S &s, uint32_t x) { s.def.mask = x; }, "Categories that it meets.")
+        .def("copy", [](const S &s) { return S(s); }, "Another definition of the same shape; hulls and meshes are shared.")
+        .def("geometry", &geometry_of, "(vertices n x 3 in m, triangles m x 3) of a hull or a mesh; None of other types.");
+
+    m.def("_hull", &make_hull, "points"_a, "merge"_a, "rounding"_a);
+    m.def("_mesh", &make_mesh, "vertices"_a, "triangles"_a);
+    m.def("_heightfield", &make_heightfield, "heights"_a, "spacing"_a);
+
+    using M = sadmm_mass;
+    nb::class_<M>(m, "Mass", "Mass, centre of mass and principal axes of solids.")
+        .def_ro("mass", &M::mass, "kg.")
+        .def_prop_ro("centre", [](const M &a) { return array_of<3>(a.centre); }, "m, in the frame of the layout.")
+        .def_prop_ro("inertia", [](const M &a) { return array_of<3>(a.inertia); }, "Principal moments, kg m^2.")
+        .def_prop_ro("orientation", [](const M &a) { return array_of<4>(a.orientation); }, "Principal axes to the frame of the layout.")
+        .def("pose_in_body", [](const M &a, vec3 x, quat q) {
+            check(sadmm_mass_pose_in_body(&a, x.data(), q.data()));
+            return std::make_pair(x, q);
+        }, "position"_a, "orientation"_a, "A pose in the frame of the layout, in that of the body.")
+        .def("pose_of_body", [](const M &a, vec3 x, quat q) {
+            check(sadmm_mass_pose_of_body(&a, x.data(), q.data()));
+            return std::make_pair(x, q);
+        }, "position"_a, "orientation"_a, "The body's pose in the world, where the frame of the layout has this one.");
+    m.def("mass_of", [](const std::vector<const S *> &shapes, double density) {
+        std::vector<M> parts(shapes.size());
+        M sum;
+        for (size_t k = 0; k < shapes.size(); ++k) check(sadmm_shape_mass(&shapes[k]->def, density, &parts[k]));
+        check(sadmm_mass_sum(parts.data(), parts.size(), &sum));
+        return sum;
+    }, "shapes"_a, "density"_a, "Mass of solid shapes of one density (kg/m^3) as one body; where they overlap both count.");
+}

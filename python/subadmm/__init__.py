@@ -1,0 +1,195 @@
+"""Rigid bodies in exact frictional contact, on CPU cores and NVIDIA GPUs.
+
+    import subadmm
+
+    world = subadmm.World()
+    world.add_ground()
+    box = world.add_solid(subadmm.box(0.1, 0.1, 0.1), density=1000, position=(0, 0, 1))
+    world.step(400)
+    print(box.position, world.report.penetration_max)
+
+SI units everywhere; orientations are unit quaternions w x y z, body to world. What a name means in detail is said once, in
+the C headers of the same names (include/subadmm/).
+"""
+
+import numpy as np
+
+from . import _core
+from ._core import (
+    Body,
+    BodyShape,
+    Certificate,
+    Coordinate,
+    Coupling,
+    DeviceError,
+    Error,
+    FileError,
+    Gear,
+    InvalidArgument,
+    Joint,
+    LimitExceeded,
+    Mass,
+    NonFinite,
+    OutOfMemory,
+    Report,
+    Settings,
+    Shape,
+    StaleId,
+    Unavailable,
+    Unsupported,
+    World,
+    backends,
+    build_commit,
+    build_compiler,
+    mass_of,
+    scene,
+    scenes,
+    version,
+)
+
+__version__ = version()
+
+__all__ = [
+    "Body", "BodyShape", "Certificate", "Coordinate", "Coupling", "DeviceError", "Error", "FileError", "Gear",
+    "InvalidArgument", "Joint", "LimitExceeded", "Mass", "NonFinite", "OutOfMemory", "Report", "Settings", "Shape", "StaleId",
+    "Unavailable", "Unsupported", "World", "backends", "box", "build_commit", "build_compiler", "capsule", "cone",
+    "contact_dtype", "cylinder", "ellipsoid", "heightfield", "hull", "mass_of", "mesh", "plane", "scene", "scenes", "sphere",
+    "version",
+]
+
+
+# ---- shapes -----------------------------------------------------------------------------------------------------------
+
+
+def _with(shape, options):
+    for name, value in options.items():
+        if name not in ("position", "orientation", "friction", "restitution", "category", "mask"):
+            raise TypeError(f"{name}: no such option of a shape")
+        setattr(shape, name, value)
+    return shape
+
+
+def plane(**options):
+    """Half-space z <= 0 of the shape's frame, for static bodies. Options of this and all shapes: position and orientation in
+    the body's frame, friction (0.5), restitution (0), category, mask."""
+    return _with(Shape("plane"), options)
+
+
+def sphere(radius, **options):
+    """A ball; m."""
+    return _with(Shape("sphere", [radius]), options)
+
+
+def capsule(radius, half_length, **options):
+    """All within `radius` of a segment of the shape's z axis; m."""
+    return _with(Shape("capsule", [radius, half_length]), options)
+
+
+def box(x, y, z, **options):
+    """Half extents, m."""
+    return _with(Shape("box", [x, y, z]), options)
+
+
+def cylinder(radius, half_height, **options):
+    """Along the shape's z axis; m."""
+    return _with(Shape("cylinder", [radius, half_height]), options)
+
+
+def cone(radius, half_height, **options):
+    """Along the shape's z axis, apex up; the origin is halfway up; m."""
+    return _with(Shape("cone", [radius, half_height]), options)
+
+
+def ellipsoid(x, y, z, **options):
+    """Semi-axes, m."""
+    return _with(Shape("ellipsoid", [x, y, z]), options)
+
+
+def _points(points):
+    return np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
+
+
+def hull(points, merge=None, rounding=0.0, **options):
+    """The convex hull of points (n x 3, m). merge: faces that are flat to within this share of the extent become one;
+    rounding: radius of a ball around every point of it, m."""
+    return _with(_core._hull(_points(points), -1.0 if merge is None else merge, rounding), options)
+
+
+def mesh(vertices, triangles, **options):
+    """Triangles (m x 3 indices, counter-clockwise seen from outside) of vertices (n x 3, m), for static and kinematic
+    bodies."""
+    corners = np.ascontiguousarray(triangles, dtype=np.int32).reshape(-1, 3)
+    return _with(_core._mesh(_points(vertices), corners), options)
+
+
+def heightfield(heights, spacing, **options):
+    """Heights (rows along y x columns along x, m) over a grid whose middle is the origin; spacing: (x, y), m. For static and
+    kinematic bodies."""
+    return _with(_core._heightfield(np.ascontiguousarray(heights, dtype=np.float64), spacing), options)
+
+
+# ---- worlds -----------------------------------------------------------------------------------------------------------
+
+
+def _add_ground(self, friction=0.5, height=0.0):
+    """A static plane z = height that bodies of all environments meet."""
+    ground = self.add_body(type="static", environment=-1, position=(0, 0, height), name="ground")
+    ground.add_shape(plane(friction=friction))
+    return ground
+
+
+def _add_solid(self, shapes, density=None, mass=None, *, position=(0, 0, 0), orientation=(1, 0, 0, 0), type="dynamic",
+               **options):
+    """A body of one shape or several, solid, of one density (kg/m^3) or total mass (kg).
+
+    `position` and `orientation` are those of the frame that the shapes are placed in (the layout); the body itself has its
+    origin at the centre of mass and its axes along the principal ones. Of static and kinematic bodies both frames are the
+    same, and neither density nor mass is needed. Other options: as of add_body.
+    """
+    shapes = [shapes] if isinstance(shapes, Shape) else list(shapes)
+    if not shapes:
+        raise ValueError("shapes: must be one at least")
+    if type != "dynamic":
+        body = self.add_body(type=type, position=position, orientation=orientation, **options)
+        for shape in shapes:
+            body.add_shape(shape)
+        return body
+    if (density is None) == (mass is None):
+        raise ValueError("density, mass: one of the two must be given")
+    whole = mass_of(shapes, 1.0)
+    density = density if density is not None else mass / whole.mass
+    whole = mass_of(shapes, density)
+    place, turn = whole.pose_of_body(position, orientation)
+    body = self.add_body(mass=whole.mass, inertia=whole.inertia, position=place, orientation=turn, **options)
+    try:
+        for shape in shapes:
+            own = shape.copy()
+            own.position, own.orientation = whole.pose_in_body(shape.position, shape.orientation)
+            body.add_shape(own)
+    except Error:
+        body.remove()
+        raise
+    return body
+
+
+#: Members of World.contacts(): ids are (slot, generation); position, normal (from a to b) and gap in m, impulse on b in N s,
+#: force on b in N; triangle: of a mesh, else -1.
+contact_dtype = np.dtype({
+    "names": [member[0] for member in _core._contact_members],
+    "formats": [(member[1], (member[2],)) if member[2] > 1 else member[1] for member in _core._contact_members],
+    "offsets": [member[3] for member in _core._contact_members],
+    "itemsize": _core._contact_size,
+})
+
+
+def _contacts(self):
+    """Contacts of the last step: an array of `contact_dtype`."""
+    return np.frombuffer(self._contacts(), dtype=contact_dtype)
+
+
+World.add_ground = _add_ground
+World.add_solid = _add_solid
+World.contacts = _contacts
+World.positions = property(lambda self: self.get("body_state")[:, :3], doc="Centres of mass of all bodies, n x 3, m.")
+World.orientations = property(lambda self: self.get("body_state")[:, 3:7], doc="Of all bodies, n x 4, w x y z.")
+World.velocities = property(lambda self: self.get("body_state")[:, 7:], doc="Linear (m/s) and angular (rad/s), n x 6.")
