@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Add up meson's test logs and print "N passed, N failed, N skipped".
+"""Add up meson's test logs, and pytest's, and print "N passed, N failed, N skipped".
 
-usage: sum_tests.py [--broken "STEP STEP"] [--left-out "STEP STEP"] [TESTLOG.json]...
+usage: sum_tests.py [--broken "STEP STEP"] [--left-out "STEP STEP"] [TESTLOG.json | JUNIT.xml]...
 
 A Check program counts with each of its checks, any other program as one. A program that ended without its checks' summary
 (a crash, a time-out) is one failure, and so is a step that did not build or a log that is missing. A step that could not
@@ -12,6 +12,7 @@ import json
 import pathlib
 import re
 import sys
+import xml.etree.ElementTree
 
 CHECK_SUMMARY = re.compile(r"^\d+%: Checks: (\d+), Failures: (\d+), Errors: (\d+)", re.MULTILINE)
 
@@ -31,6 +32,19 @@ def count(test):
     if not good and failures == 0:  # the checks were fine, the program was not (a leak found at its exit)
         return checks, 1, 0
     return checks - failures, failures, 0
+
+
+def results(log):
+    """Of each test of a log: its name, its result, (passed, failed, skipped)."""
+    if log.suffix == ".xml":
+        for case in xml.etree.ElementTree.parse(log).iter("testcase"):
+            of = {child.tag for child in case}
+            result = "FAIL" if of & {"failure", "error"} else "SKIP" if "skipped" in of else "OK"
+            yield case.get("name"), result, (int(result == "OK"), int(result == "FAIL"), int(result == "SKIP"))
+        return
+    for line in log.read_text(encoding="utf-8", errors="replace").splitlines():
+        test = json.loads(line)
+        yield test["name"], test["result"], count(test)
 
 
 def main():
@@ -53,11 +67,10 @@ def main():
             counts[1] = 1
             print(f"{step}: no test ran")
         else:
-            for line in log.read_text(encoding="utf-8", errors="replace").splitlines():
-                test = json.loads(line)
-                counts = [a + b for a, b in zip(counts, count(test))]
-                if test["result"] not in ("OK", "EXPECTEDFAIL", "SKIP"):
-                    print(f"{step}: {test['name']}: {test['result']}")
+            for name, result, of in results(log):
+                counts = [a + b for a, b in zip(counts, of)]
+                if result not in ("OK", "EXPECTEDFAIL", "SKIP"):
+                    print(f"{step}: {name}: {result}")
         print(f"{step}: {counts[0]} passed, {counts[1]} failed, {counts[2]} skipped")
         total = [a + b for a, b in zip(total, counts)]
     print(f"{total[0]} passed, {total[1]} failed, {total[2]} skipped")

@@ -4,7 +4,7 @@ set -euo pipefail
 # shellcheck source=scripts/lib.sh
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 
-steps=(plain asan tsan clang minimal cuda)
+steps=(plain python asan tsan clang minimal cuda)
 slow_steps=(fuzz) # with --slow
 more_steps=(gpu)  # only when asked for
 
@@ -14,6 +14,7 @@ usage: scripts/test.sh [--slow] [--only STEP]... [--help]
 
 Installs what is missing (Debian and Ubuntu, as root or by sudo without a password; else says what to install), then:
     plain    every feature but CUDA, warnings are errors, the whole suite
+    python   the Python package: pip install into an environment of its own, and its tests
     asan     address and undefined-behaviour sanitizers, the whole suite
     tsan     thread sanitizer, the tests of suite 'threads'
     clang    by clang with LLVM's OpenMP, the tests of suite 'threads': it writes a lane of a vector by storing the whole vector,
@@ -95,6 +96,22 @@ step_plain() {
     say "plain: every feature but CUDA, warnings are errors"
     build plain "${features[@]}" -Dcuda=disabled || return 1
     if $slow; then run_tests plain; else run_tests plain --no-suite slow; fi
+}
+
+step_python() {
+    local folder=$project/build-python
+    say "python: the package, installed into an environment of its own"
+    rm -rf "$folder/environment" "$folder/meson-logs"
+    mkdir -p "$folder/meson-logs" # where every step has its log
+    python3 -m venv "$folder/environment" || return 1
+    # One instruction set, no CUDA: the steps beside this one have the others.
+    "$folder/environment/bin/pip" install --quiet --disable-pip-version-check "$project[test]" \
+        -Csetup-args=-Dcuda=disabled -Csetup-args=-Dcpu_isas=avx2 -Csetup-args=-Dwerror=true \
+        -Cbuild-dir="$folder/build" || return 1
+    # Away from the sources, so that what was installed is what is tested.
+    (cd "$folder" && SUBADMM=$(find "$project/build-plain/src" -name subadmm -type f 2>/dev/null || true) \
+        environment/bin/python -m pytest -q --junitxml=meson-logs/pytest.xml "$project/python/tests") || true
+    logs+=("$folder/meson-logs/pytest.xml")
 }
 
 step_asan() {
