@@ -23,8 +23,8 @@
  * moves are small where the two meet by corners, nearer the vector between the two says less. */
 #define CONVEX_APART ((real)0.05)
 #define CONVEX_NEAR (sizeof(real) == 4 ? (real)1e-3 : (real)1e-6)
-/* Curvatures that differ by more have a direction without any; and where the larger one is of the pair's own size, which
- * it is not beside a rim's axis: a corner may be that near to a rim. */
+/* Curvatures that differ by more have a direction without any; and where the larger one is of the pair's own size,
+ * which it is not beside a rim's axis: a corner may be that near to a rim. */
 #define CONVEX_SINGULAR (sizeof(real) == 4 ? (real)1e-4 : (real)1e-9)
 #define CONVEX_SINGULAR_NEAR (sizeof(real) == 4 ? (real)1e-4 : (real)1e-11)
 /* A last step that is no longer than this has been the last. */
@@ -357,8 +357,9 @@ SADMM_INLINE bool convex_begin(struct convex_pair *pair, vec3 side, bool known, 
         if (axis->separation + convex_radii(pair) >= (apart ? -pair->slack : -CONVEX_SHALLOW * pair->thin)) return true;
     }
     convex_way_out(pair, &s, &n, &separation, &other);
+    /* the last step's side stays unless clearly beaten, and not by the other one */
     if (apart ? separation <= axis->separation
-              : known && (v3_dot(n, axis->n) < -MANIFOLD_COS_OPPOSITE || /* stays unless clearly beaten, and not by this */
+              : known && (v3_dot(n, axis->n) < -MANIFOLD_COS_OPPOSITE ||
                           separation <= axis->separation - MANIFOLD_KEEP_DEPTH * axis->separation +
                                             MANIFOLD_KEEP_EXTENT * pair->thin))
         return true;
