@@ -150,18 +150,27 @@ static double off_facing(const struct pair_of *t, int s, const double n[3], cons
         if (!(condition)) ck_assert_msg(false, __VA_ARGS__); \
     } while (0)
 
+/* Has each a cap? */
+static bool are_discs(const struct pair_of *t)
+{
+    for (int s = 0; s < 2; ++s)
+        if (t->g[s].type != SADMM_SHAPE_CYLINDER && t->g[s].type != SADMM_SHAPE_CONE) return false;
+    return true;
+}
+
 /* What the separation may be short of the best one by. */
 static double may_miss(const struct pair_of *t, int way, int depth, double best)
 {
     const double thin = pair_thin(t), size = pair_size(t);
     switch (depth == NEAR && best < 1e-9 * size ? TOUCHING : depth) {
     case APART:
-    case NEAR: /* what is beside a flat by less than clipping tells (MANIFOLD_SNAP) counts as over it */
-        return (way == ALIGNED ? 1e-8 : 1e-10) * size;
+    case NEAR: /* what is beside a flat by less than clipping tells (MANIFOLD_SNAP), or where the rims of two inclined
+                * caps cross but for that, counts as over it */
+        return (way == ALIGNED || are_discs(t) ? 1e-8 : 1e-10) * size;
     case TOUCHING: /* corners and rims that touch have no single normal, and rounding ends the search for one */
         return 1e-8 * size;
     case SHALLOW: /* of two directions that are equally deep but for 1e-6 of the thinner one either may come first */
-        return 2e-6 * thin + 1e-9 * size;
+        return 2e-6 * thin + (way == NEEDLES ? 1e-7 : 1e-9) * size;
     default: /* the expanding polytope has 40 points */
         return 0.02 * fabs(best) + 1e-3 * thin;
     }
@@ -171,9 +180,7 @@ static double may_miss(const struct pair_of *t, int way, int depth, double best)
  * they are off by 1 - cos of that, 8 degrees at most. */
 static double may_be_outside(const struct pair_of *t)
 {
-    const bool discs = t->g[0].type >= SADMM_SHAPE_CYLINDER && t->g[0].type <= SADMM_SHAPE_CONE &&
-                       t->g[1].type >= SADMM_SHAPE_CYLINDER && t->g[1].type <= SADMM_SHAPE_CONE;
-    const double rims = discs ? 0.01 * fmax(t->g[0].size[0], t->g[1].size[0]) : 0;
+    const double rims = are_discs(t) ? 0.01 * fmax(t->g[0].size[0], t->g[1].size[0]) : 0;
     return rims + MANIFOLD_SNAP * pair_thin(t) + 1e-5 * pair_size(t); /* clipping; a corner or a rim at another one */
 }
 
@@ -269,7 +276,7 @@ START_TEST(pairs_are_what_they_are)
         /* points prove nearly all of them; of aligned ones flats have preference */
         if (way != ALIGNED) ck_assert_int_ge(count[way].certified, count[way].all - count[way].all / 1000 - 1);
         /* of corners and rims that touch, or of what lies along a needle, the nearest point may be another one */
-        ck_assert_int_le(count[way].outside, 1 + count[way].within / 10000);
+        ck_assert_int_le(count[way].outside, 2 + count[way].within / 500);
     }
     free_pair(t);
     free(u);
