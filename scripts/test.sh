@@ -196,7 +196,7 @@ step_gpu() {
     build cuda "${features[@]}" -Dcuda=enabled || return 1
     for tool in memcheck initcheck synccheck racecheck; do
         say "gpu: $tool"
-        meson test -C "$project/build-cuda" --no-rebuild --suite gpu --num-processes 4 --timeout-multiplier 20 \
+        meson test -C "$project/build-cuda" --no-rebuild --suite gpu --no-suite slow --num-processes 4 --timeout-multiplier 20 \
             --logbase "gpu-$tool" --print-errorlogs --quiet --wrap "$sanitizer --tool $tool --error-exitcode 9" || true
         logs+=("$project/build-cuda/meson-logs/gpu-$tool-compute-sanitizer.json") # meson adds the wrapper
     done

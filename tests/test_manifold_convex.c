@@ -1,116 +1,10 @@
 /* Contact of cylinders, cones and ellipsoids with all that is convex: distance, depth, normals and nearest points are
- * certified, by formulas of their own (convex_tools.h). A direction bounds a distance from below, two points of the
- * bodies bound it from above: where both are the same number there is no other. Of a depth the same pair of points says
- * that no direction nearby is better, and directions all over the sphere that none elsewhere is. */
+ * certified (convex_touches.h), by formulas of their own (convex_tools.h). */
 #include <check.h>
 #include <stdio.h>
 
-#include "convex_tools.h"
+#include "convex_touches.h"
 #include "run_suite.h"
-
-/* What the library takes for the optimum, before anything is preferred. */
-static struct convex_axis nearest_axis(const struct pair_of *t)
-{
-    const struct pair_pose pose = pair_of_pose(t);
-    struct convex_pair pair;
-    struct convex_axis axis, flat;
-    struct convex_active active;
-    memset(&axis, 0, sizeof axis);
-    convex_pair_make(&t->g[0], &t->g[1], t->pool->numbers, &pose, &pair);
-    ck_assert(convex_begin(&pair, v3_norm2(pair.t) > 0 ? v3_neg(pair.t) : v3(0, 0, 1), false, 1e300, &axis, &active));
-    convex_finish(&pair, &active, &axis);
-    if (convex_flat_beside(&pair, axis.n, &flat) && flat.separation >= axis.separation - 2 * pair.slack) axis = flat;
-    else convex_nearest(&pair, &active, &axis);
-    return axis;
-}
-
-struct found {
-    double apart; /* of the two along n, by their own supports */
-    double off;   /* how far from a certificate: |gap of two points - apart|, or how far these are outside */
-    double n[3];  /* world */
-};
-
-static double off_by(const struct pair_of *t, vec3 n, vec3 middle, double gap, double apart)
-{
-    return fmax(fabs(gap - apart), points_outside(t, n, middle, gap));
-}
-
-/* By the optimum's own points, or those of the manifold. */
-static struct found certify(const struct pair_of *t)
-{
-    const struct convex_axis axis = nearest_axis(t);
-    const struct manifold m = pair_touch(t, 1e300, 0);
-    struct found f;
-    double n[3];
-    normal_in_world(t, axis.n, f.n);
-    f.apart = apart_along(t, f.n);
-    f.off = off_by(t, axis.n, v3_scale(v3_add(axis.pa, axis.pb), 0.5), v3_dot(axis.n, v3_sub(axis.pb, axis.pa)),
-                   f.apart);
-    normal_in_world(t, m.normal, n);
-    const double apart = apart_along(t, n);
-    for (int i = 0; i < m.count; ++i) {
-        const double off = off_by(t, m.normal, m.points[i].position, m.points[i].separation, apart);
-        if (!(off < f.off)) continue;
-        f.off = off;
-        f.apart = apart;
-        memcpy(f.n, n, sizeof n);
-    }
-    return f;
-}
-
-/* The best of directions all over the sphere, and from there up as far as it goes. also: another one to try; NULL:
- * none. */
-static double best_direction(const struct pair_of *t, const double *also)
-{
-    enum { ALL = 1500 };
-    double best = -HUGE_VAL, from[3] = {0, 0, 1};
-    for (int k = also ? -1 : 0; k < ALL; ++k) {
-        const double z = 1 - (2 * k + 1.0) / ALL, r = sqrt(fmax(0, 1 - z * z)), angle = k * 2.399963229728653;
-        double n[3] = {r * cos(angle), r * sin(angle), z};
-        if (k < 0) memcpy(n, also, sizeof n);
-        const double s = apart_along(t, n);
-        if (s > best) {
-            best = s;
-            memcpy(from, n, sizeof from);
-        }
-    }
-    for (double step = 0.05; step > 1e-8;) {
-        const double before = best;
-        double next[3];
-        vec3 t1, t2;
-        v3_tangents(v3_load(from), &t1, &t2);
-        memcpy(next, from, sizeof next);
-        for (int k = 0; k < 8; ++k) {
-            const vec3 y = v3_madd(v3_madd(v3_load(from), step * cos(k * M_PI / 4), t1), step * sin(k * M_PI / 4), t2);
-            double n[3];
-            v3_store(v3_scale(y, 1 / v3_norm(y)), n);
-            const double s = apart_along(t, n);
-            if (s > best) {
-                best = s;
-                memcpy(next, n, sizeof next);
-            }
-        }
-        memcpy(from, next, sizeof from);
-        if (!(best > before + 1e-13 * pair_size(t))) step /= 2;
-    }
-    return best;
-}
-
-/* ---- poses ------------------------------------------------------------------------------------------------------- */
-
-static struct pair_of *new_pair(void)
-{
-    struct pair_of *t = calloc(1, sizeof *t);
-    ck_assert_ptr_nonnull(t);
-    t->pool = test_pool_new();
-    return t;
-}
-
-static void free_pair(struct pair_of *t)
-{
-    free(t->pool);
-    free(t);
-}
 
 enum { ANYHOW, ALIGNED, FAR_OUT_OF_SCALE, WAYS };
 
@@ -144,22 +38,8 @@ static void random_pair(struct random *r, struct pair_of *t, int a, int b, int w
     }
 }
 
-/* Move b until it is this deep in a along the direction that parts the two now. */
-static struct found push_together(struct pair_of *t, double depth)
-{
-    const struct found f = certify(t);
-    for (int k = 0; k < 3; ++k) t->x[1][k] -= (f.apart + depth) * f.n[k];
-    return f;
-}
-
-static const char *const names[] = {"plane", "sphere", "capsule", "box", "hull", "mesh",
-                                    "cylinder", "cone", "ellipsoid"};
-
 /* Of a loop's number: a type for b, and how it is posed. */
 static int type_of(int i) { return SADMM_SHAPE_CYLINDER + i % 3; }
-
-/* The next one that is convex. */
-static int next_type(int type) { return type + 1 == SADMM_SHAPE_MESH ? type + 2 : type + 1; }
 
 /* Under sanitizers. */
 static int fewer(int count)
@@ -174,9 +54,8 @@ START_TEST(distances_are_certified)
 {
     struct random r = {.state = 1000 + (uint64_t)_i};
     struct pair_of *t = new_pair();
-    const char *more = getenv("CONVEX_POSES"); /* for long runs by hand */
     for (int a = SADMM_SHAPE_SPHERE; a <= type_of(_i); a = next_type(a))
-        for (int pose = 0; pose < (more ? atoi(more) : fewer(400)); ++pose) {
+        for (int pose = 0; pose < fewer(400); ++pose) {
             random_pair(&r, t, a, type_of(_i), _i / 3);
             for (int near = 0; near < 3; ++near) { /* as they are; a millionth of the thinner one apart; a thousandth */
                 if (near > 0) push_together(t, -(near == 1 ? 1e-6 : 1e-3) * pair_thin(t));
@@ -262,13 +141,7 @@ START_TEST(exchange_changes_nothing)
         for (int pose = 0; pose < fewer(60); ++pose) {
             random_pair(&r, t, a, type_of(_i), _i / 3);
             push_together(t, (pose % 2 ? 1e-3 : -1e-3) * pair_thin(t));
-            *u = *t;
-            for (int s = 0; s < 2; ++s) {
-                u->h[s] = t->h[1 - s];
-                u->g[s] = t->g[1 - s];
-                memcpy(u->R[s], t->R[1 - s], sizeof u->R[s]);
-                memcpy(u->x[s], t->x[1 - s], sizeof u->x[s]);
-            }
+            exchange(t, u);
             const double size = pair_size(t);
             const struct convex_axis p = nearest_axis(t), q = nearest_axis(u);
             ck_assert_double_eq_tol(p.separation, q.separation, 2e-6 * pair_thin(t) + 1e-12 * size);

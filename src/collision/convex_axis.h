@@ -23,8 +23,10 @@
  * moves are small where the two meet by corners, nearer the vector between the two says less. */
 #define CONVEX_APART ((real)0.05)
 #define CONVEX_NEAR (sizeof(real) == 4 ? (real)1e-3 : (real)1e-6)
-/* Curvatures that differ by more have a direction without any. */
+/* Curvatures that differ by more have a direction without any; and where the larger one is of the pair's own size,
+ * which it is not beside a rim's axis: a corner may be that near to a rim. */
 #define CONVEX_SINGULAR (sizeof(real) == 4 ? (real)1e-4 : (real)1e-9)
+#define CONVEX_SINGULAR_NEAR (sizeof(real) == 4 ? (real)1e-4 : (real)1e-11)
 /* A last step that is no longer than this has been the last. */
 #define CONVEX_THERE (sizeof(real) == 4 ? (real)1e-3 : (real)1e-8)
 /* Depth up to which the side that the last step knows is not doubted, as a share of the thinner extent. */
@@ -94,22 +96,39 @@ struct convex_plane {
     real m[3];     /* the Hessian: 11, 12, 22 */
 };
 
+/* A step that is too long is so where the Hessian is least: there it becomes half as long as the normal. high: the
+ * larger curvature. */
+SADMM_INLINE void convex_shorten(const real m[3], real high, real x[2])
+{
+    const bool first = real_abs(m[0] - high) >= real_abs(m[2] - high);
+    const real e0 = first ? m[0] - high : m[1], e1 = first ? m[1] : m[2] - high, length2 = e0 * e0 + e1 * e1;
+    real along;
+    if (!(length2 > 0)) return;
+    along = (x[0] * e0 + x[1] * e1) / length2;
+    along *= 1 - real_min(1, (real)0.5 / (real_abs(along) * real_sqrt(length2)));
+    x[0] -= along * e0;
+    x[1] -= along * e1;
+}
+
 /* The step x, and the weights where it leads to. False: the Hessian says that this is no minimum; *singular: it does
- * not say that it is one. */
-SADMM_INLINE bool convex_newton(const struct convex_plane *p, struct convex_active *active, real x[2], bool *singular)
+ * not say that it is one. size: of the pair. */
+SADMM_INLINE bool convex_newton(const struct convex_plane *p, real size, struct convex_active *active, real x[2],
+                                bool *singular)
 {
     const real *g = p->g[0], *m = p->m;
     *singular = false;
-    if (active->count == 1) {
+    if (active->count == 1) { /* a corner at a rim is stiff along the rim alone, and hardly bent across it */
         const real half = (m[0] + m[2]) / 2, low = half - real_sqrt((m[0] - m[2]) * (m[0] - m[2]) / 4 + m[1] * m[1]),
                    high = 2 * half - low;
-        /* a corner at a rim is stiff along the rim alone: across it steps stay small, and moves have to do the rest */
-        const real more = low > CONVEX_SINGULAR * high ? 0 : (real)1e-3 * high - low;
+        const bool bounded = high <= 4 * size; /* not beside a rim's axis */
+        const real least = (bounded ? CONVEX_SINGULAR_NEAR : CONVEX_SINGULAR) * high,
+                   more = low > least ? 0 : (real)1e-3 * high - low;
         const real m0 = m[0] + more, m2 = m[2] + more, det = m0 * m2 - m[1] * m[1];
         *singular = more > 0;
         if (!(high > 0 && det > 0)) return false;
         x[0] = -(m2 * g[0] - m[1] * g[1]) / det;
         x[1] = -(m0 * g[1] - m[1] * g[0]) / det;
+        if (bounded && !*singular && x[0] * x[0] + x[1] * x[1] > (real)0.25) convex_shorten(m, high, x);
         active->weight[0] = 1;
         return true;
     }
@@ -197,7 +216,7 @@ SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_ac
         }
         p.m[0] -= mean;
         p.m[2] -= mean;
-        if (!convex_newton(&p, &now, x, &singular)) {
+        if (!convex_newton(&p, pair->size, &now, x, &singular)) {
             if (now.count == 1) return false;
             for (k = 1; k < now.count; ++k)
                 if (now.weight[k] < now.weight[least]) least = k;
@@ -315,8 +334,10 @@ SADMM_INLINE bool convex_begin(struct convex_pair *pair, vec3 side, bool known, 
                                struct convex_active *active)
 {
     struct gjk_simplex s;
-    vec3 v;
-    real length;
+    struct convex_active other;
+    vec3 v, n;
+    real length, separation;
+    bool apart; /* by little */
     const enum gjk_end end = convex_distance(pair, side, limit + convex_radii(pair) + pair->slack, &s, &v);
     if (end == GJK_FAR) return false;
     convex_activate(&s, active);
@@ -326,29 +347,25 @@ SADMM_INLINE bool convex_begin(struct convex_pair *pair, vec3 side, bool known, 
         axis->separation = convex_separation(pair, axis->n);
         return true;
     }
-    if (end == GJK_APART && length > 1000 * pair->slack) { /* near enough to what it is, whatever it was */
-        side = v3_scale(v, -1 / length);
-        known = true;
-    }
-    if (known) {
+    apart = end == GJK_APART && length > 1000 * pair->slack;
+    if (apart) side = v3_scale(v, -1 / length); /* near enough to what it is, whatever it was */
+    if (known || apart) {
         axis->n = v3_scale(side, 1 / v3_norm(side));
         axis->separation = convex_separation(pair, axis->n);
         convex_move(pair, 2, CONVEX_APART, &axis->n, &axis->separation, active);
-        if (axis->separation + convex_radii(pair) >= -CONVEX_SHALLOW * pair->thin) return true;
+        /* of what is apart by a few roundings the vector may be rounding, too */
+        if (axis->separation + convex_radii(pair) >= (apart ? -pair->slack : -CONVEX_SHALLOW * pair->thin)) return true;
     }
-    if (end == GJK_MEET || !known) { /* the last step's side stays unless clearly beaten, and not by the other one */
-        struct convex_active other;
-        vec3 n;
-        real separation;
-        convex_way_out(pair, &s, &n, &separation, &other);
-        if (known && (v3_dot(n, axis->n) < -MANIFOLD_COS_OPPOSITE ||
-                      separation <= axis->separation - MANIFOLD_KEEP_DEPTH * axis->separation +
-                                        MANIFOLD_KEEP_EXTENT * pair->thin))
-            return true;
-        axis->n = n;
-        axis->separation = separation;
-        *active = other;
-    }
+    convex_way_out(pair, &s, &n, &separation, &other);
+    /* the last step's side stays unless clearly beaten, and not by the other one */
+    if (apart ? separation <= axis->separation
+              : known && (v3_dot(n, axis->n) < -MANIFOLD_COS_OPPOSITE ||
+                          separation <= axis->separation - MANIFOLD_KEEP_DEPTH * axis->separation +
+                                            MANIFOLD_KEEP_EXTENT * pair->thin))
+        return true;
+    axis->n = n;
+    axis->separation = separation;
+    *active = other;
     return true;
 }
 

@@ -330,7 +330,8 @@ SADMM_INLINE void convex_line_flat(struct convex_meeting *m, const struct convex
             real share;
             if (!p_beyond && !q_beyond) continue;
             if (p_beyond && q_beyond) return;
-            share = dp / (dp - dq);
+            share = dp / (dp - dq); /* beyond an end that is not beyond the side by more than the tolerance: there */
+            share = p_beyond ? real_min(share, 1) : real_max(share, 0);
             if (p_beyond && share > low) {
                 low = share;
                 feature[0] = convex_crossing_feature(!line_is_a, flat->edge[k], line->edge[0]);
