@@ -10,6 +10,7 @@
 #include "mesh.h"
 #include "mesh_file.h"
 #include "problem.h"
+#include "query.h"
 #include "settings.h"
 #include "status.h"
 #include "tasks.h"

@@ -153,6 +153,7 @@ sadmm_status sadmm_world_add_shape(sadmm_world *world, sadmm_body_id body_id, co
     shape->alive = true;
     shape->revision = ++world->shape_revisions;
     ++world->shape_count;
+    sadmm_world_reshaped(world);
     sadmm_slot_taken(&world->shape_marks, slot);
     if (body->shape_count++ == 0 || slot < body->first_shape) body->first_shape = slot;
     if (id) {
@@ -176,6 +177,7 @@ void sadmm_world_kill_shape(sadmm_world *world, size_t slot)
     if (has_block(geometry->type)) remove_block(world, slot);
     else if (geometry_is_smooth(geometry)) sadmm_block_pool_let_go(&world->block_pool);
     world->shapes[slot].alive = false;
+    sadmm_world_reshaped(world);
     ++world->shape_generations[slot];
     --world->shape_count;
     --world->bodies[world->shapes[slot].body].shape_count;

@@ -7,7 +7,8 @@
  *   joint_act                        a joint in a step
  *   gear_rows, joint_rows, joint_move   gears and joints as constraint rows, and where they let bodies go
  *   resident_joints, resident        where a backend keeps the world
- *   shape_form, shape, mass, joint, coupling, gear, body, contacts, explain   what callers see of it, and change
+ *   query_scene                      what queries look at
+ *   shape_form, shape, mass, joint, coupling, gear, body, contacts, query_ray, explain   what callers see of it, and change
  *   step, world                      steps; settings, the whole
  */
 #ifndef SADMM_CORE_WORLD_INTERNAL_H
@@ -15,6 +16,7 @@
 
 #include "block_pool.h"
 #include "collision/collision.h"
+#include "collision/query_tree.h"
 #include "core/base/check.h"
 #include "core/base/error.h"
 #include "core/base/parallel.h"
@@ -30,6 +32,7 @@
 #include "subadmm/coupling.h"
 #include "subadmm/gear.h"
 #include "subadmm/joint.h"
+#include "subadmm/query.h"
 #include "subadmm/world.h"
 
 enum { SADMM_NAME_SIZE = 64, SADMM_WHY_SIZE = 256 }; /* a name is cut to what fits, with its final 0 */
@@ -216,6 +219,16 @@ struct sadmm_world {
             edited_joint_capacity;
     } resident;
 
+    /* What queries look at (query_scene.c). */
+    struct {
+        bool listed;  /* the tree has the world's shapes, and */
+        bool current; /* has them where they are */
+        struct sadmm_query_tree tree;
+        double *prelude; /* what boxes and the like are to a hull (hull_data.h) */
+        struct sadmm_query_hit *hits; /* of a ray */
+        size_t hit_capacity;
+    } query;
+
     const struct sadmm_kernels *kernels; /* chosen at the first step */
     struct sadmm_context *context;
     char why[SADMM_WHY_SIZE];
@@ -354,6 +367,17 @@ void sadmm_world_edit_joints_again(sadmm_world *world);
 /* What joints keep; the last step's rows. Nothing is enqueued. */
 sadmm_status sadmm_world_read_joints(sadmm_world *world);
 sadmm_status sadmm_world_read_rows(sadmm_world *world);
+
+/* ---- query_scene.c ---- */
+
+/* Bodies have moved; shapes have come or gone. */
+static inline void sadmm_world_moved(sadmm_world *world) { world->query.current = false; }
+static inline void sadmm_world_reshaped(sadmm_world *world) { world->query.listed = world->query.current = false; }
+/* Bring the tree up to date. */
+sadmm_status sadmm_world_place_shapes(sadmm_world *world);
+/* `filter`: the caller's, NULL: the defaults. */
+sadmm_status sadmm_world_take_filter(sadmm_world *world, const sadmm_query_filter *filter,
+                                     struct sadmm_shape_filter *taken, sadmm_query_filter *given);
 
 /* ---- ids.c ---- */
 
