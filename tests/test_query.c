@@ -5,47 +5,7 @@
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
 #include "core/world/world_internal.h"
-#include "manifold_tools.h"
-#include "mesh_tools.h"
-#include "scene_tools.h"
-
-static sadmm_world *empty_world(void)
-{
-    sadmm_world_def def = sadmm_world_def_default();
-    def.backend = SADMM_BACKEND_CPU;
-    def.settings.threads = 1;
-    return create_world(&def);
-}
-
-static sadmm_body_id add_body(sadmm_world *world, sadmm_body_type type, double x, double y, double z)
-{
-    const double position[3] = {x, y, z};
-    sadmm_body_def def = sadmm_body_def_default();
-    sadmm_body_id id;
-    def.type = type;
-    def.mass = 1;
-    for (int k = 0; k < 3; ++k) def.inertia[k] = 1;
-    memcpy(def.position, position, sizeof position);
-    MUST(world, sadmm_world_add_body(world, &def, &id));
-    return id;
-}
-
-static sadmm_shape_def shape_of(sadmm_shape_type type, double a, double b, double c)
-{
-    sadmm_shape_def def = sadmm_shape_def_default();
-    def.type = type;
-    def.size[0] = a;
-    def.size[1] = b;
-    def.size[2] = c;
-    return def;
-}
-
-static sadmm_shape_id add_shape(sadmm_world *world, sadmm_body_id body, const sadmm_shape_def *def)
-{
-    sadmm_shape_id id;
-    MUST(world, sadmm_world_add_shape(world, body, def, &id));
-    return id;
-}
+#include "query_worlds.h"
 
 static sadmm_ray ray_of(double x, double y, double z, double dx, double dy, double dz)
 {
@@ -60,8 +20,6 @@ static sadmm_ray_hit cast(sadmm_world *world, sadmm_ray ray, const sadmm_query_f
     MUST(world, sadmm_world_cast_ray(world, &ray, filter, &hit));
     return hit;
 }
-
-static bool same_shape(sadmm_shape_id a, sadmm_shape_id b) { return a.slot == b.slot && a.generation == b.generation; }
 
 static void expect_hit(sadmm_ray_hit hit, sadmm_shape_id shape, double distance, double nx, double ny, double nz)
 {
@@ -103,7 +61,7 @@ START_TEST(rays_by_formula)
     const sadmm_body_id body = add_body(world, SADMM_BODY_DYNAMIC, 0, 0, 0);
     sadmm_shape_def def;
     sadmm_shape_id id;
-#define WITH(...)            \
+#define WITH(...)                \
     def = shape_of(__VA_ARGS__); \
     id = add_shape(world, body, &def);
 #define GONE MUST(world, sadmm_world_remove_shape(world, id))
@@ -142,7 +100,7 @@ START_TEST(rays_by_formula)
     expect_hit(cast(world, ray_of(0.25, 0, 9, 0, 0, -1), NULL), id, 8.75, r2, 0, r2);
     expect_hit(cast(world, ray_of(0.25, 0, -9, 0, 0, 1), NULL), id, 8.5, 0, 0, -1);
     expect_nothing(cast(world, ray_of(5, 0, 0.5000001, -1, 0, 0), NULL)); /* above the apex */
-    expect_nothing(cast(world, ray_of(0.3, 0, 1.5, 1, 0, 0.5), NULL)); /* in the cone that would be above it */
+    expect_nothing(cast(world, ray_of(0.3, 0, 1.5, 1, 0, 0.5), NULL));    /* in the cone that would be above it */
     GONE;
     WITH(SADMM_SHAPE_ELLIPSOID, 1, 2, 3);
     expect_hit(cast(world, ray_of(0, 0, 9, 0, 0, -1), NULL), id, 6, 0, 0, 1);
@@ -196,7 +154,8 @@ END_TEST
 START_TEST(rays_from_inside)
 {
     sadmm_world *world = empty_world();
-    const sadmm_body_id body = add_body(world, SADMM_BODY_DYNAMIC, 0, 0, 0), next = add_body(world, SADMM_BODY_STATIC, 9, 0, 0);
+    const sadmm_body_id body = add_body(world, SADMM_BODY_DYNAMIC, 0, 0, 0),
+                        next = add_body(world, SADMM_BODY_STATIC, 9, 0, 0);
     const sadmm_shape_def ball = shape_of(SADMM_SHAPE_SPHERE, 1, 0, 0);
     sadmm_query_filter filter = sadmm_query_filter_default();
     const sadmm_shape_id id = add_shape(world, body, &ball), far = add_shape(world, next, &ball);
@@ -268,63 +227,6 @@ START_TEST(filters)
 END_TEST
 
 /* ---- against asking shape by shape ---- */
-
-/* Bodies of all types with shapes of all types, some of several, in a heap. */
-struct crowd {
-    sadmm_world *world;
-    struct random r;
-    sadmm_mesh *ground, *field;
-};
-
-static void add_to_crowd(struct crowd *c, int n)
-{
-    static const sadmm_shape_type types[] = {SADMM_SHAPE_SPHERE, SADMM_SHAPE_CAPSULE, SADMM_SHAPE_BOX,
-                                             SADMM_SHAPE_CYLINDER, SADMM_SHAPE_CONE, SADMM_SHAPE_ELLIPSOID};
-    sadmm_body_def def = sadmm_body_def_default();
-    sadmm_body_id body;
-    def.type = n % 5 == 3 ? SADMM_BODY_STATIC : n % 7 == 3 ? SADMM_BODY_KINEMATIC : SADMM_BODY_DYNAMIC;
-    def.mass = 1;
-    for (int k = 0; k < 3; ++k) {
-        def.inertia[k] = 1;
-        def.position[k] = random_in(&c->r, -8, 8);
-    }
-    double q[4], length = 0;
-    for (int k = 0; k < 4; ++k) {
-        q[k] = random_in(&c->r, -1, 1);
-        length += q[k] * q[k];
-    }
-    for (int k = 0; k < 4; ++k) def.orientation[k] = q[k] / sqrt(length);
-    MUST(c->world, sadmm_world_add_body(c->world, &def, &body));
-    for (int k = 0; k <= n % 3; ++k) {
-        sadmm_shape_def shape = shape_of(types[(n + k) % 6], random_in(&c->r, 0.1, 0.8), random_in(&c->r, 0.1, 0.8),
-                                         random_in(&c->r, 0.1, 0.8));
-        shape.position[k] = random_in(&c->r, -0.5, 0.5);
-        add_shape(c->world, body, &shape);
-    }
-}
-
-static struct crowd make_crowd(int bodies, uint64_t seed)
-{
-    struct crowd c = {empty_world(), {seed}, soup_some_mesh(6), soup_some_mesh(7)};
-    const sadmm_body_id ground = add_body(c.world, SADMM_BODY_STATIC, 0, 0, -9), away = add_body(c.world, SADMM_BODY_STATIC, 1, 2, 3);
-    const sadmm_shape_def plane = shape_of(SADMM_SHAPE_PLANE, 0, 0, 0);
-    sadmm_shape_def mesh = shape_of(SADMM_SHAPE_MESH, 0, 0, 0);
-    add_shape(c.world, ground, &plane);
-    mesh.mesh = c.ground;
-    add_shape(c.world, away, &mesh);
-    mesh.mesh = c.field;
-    mesh.position[0] = 3;
-    add_shape(c.world, away, &mesh);
-    for (int n = 0; n < bodies; ++n) add_to_crowd(&c, n);
-    return c;
-}
-
-static void free_crowd(struct crowd *c)
-{
-    sadmm_world_destroy(c->world);
-    sadmm_mesh_destroy(c->ground);
-    sadmm_mesh_destroy(c->field);
-}
 
 static sadmm_ray random_ray(struct random *r)
 {
@@ -449,7 +351,8 @@ START_TEST(triangles_have_their_numbers)
     const sadmm_heightfield_def field_def = {flat, 3, 3, {1, 1}};
     sadmm_mesh *mesh, *field;
     sadmm_world *world = empty_world();
-    const sadmm_body_id body = add_body(world, SADMM_BODY_STATIC, 0, 0, 0), high = add_body(world, SADMM_BODY_STATIC, 0, 0, 5);
+    const sadmm_body_id body = add_body(world, SADMM_BODY_STATIC, 0, 0, 0),
+                        high = add_body(world, SADMM_BODY_STATIC, 0, 0, 5);
     sadmm_shape_def shape = shape_of(SADMM_SHAPE_MESH, 0, 0, 0);
     sadmm_query_filter filter = sadmm_query_filter_default();
     ck_assert_int_eq(sadmm_mesh_create(&def, &mesh), SADMM_OK);
@@ -545,13 +448,6 @@ END_TEST
 
 /* ---- bad input ---- */
 
-static void expect_refused(sadmm_world *world, sadmm_status got, sadmm_status wanted, const char *text)
-{
-    ck_assert_msg(got == wanted, "%s for %s (message: %s)", sadmm_status_name(got), text, sadmm_world_message(world));
-    ck_assert_msg(strstr(sadmm_world_message(world), text), "the message names no \"%s\": %s", text,
-                  sadmm_world_message(world));
-}
-
 START_TEST(bad_rays)
 {
     sadmm_world *world = empty_world();
@@ -585,8 +481,8 @@ START_TEST(bad_rays)
         memcpy((char *)&ray + bad[i].offset, &bad[i].value, sizeof bad[i].value);
         snprintf(text, sizeof text, "ray->%s", bad[i].text);
         expect_refused(world, sadmm_world_cast_ray(world, &ray, NULL, &hit), SADMM_ERROR_INVALID_ARGUMENT, text);
-        expect_refused(world, sadmm_world_cast_ray_all(world, &ray, NULL, 1, &hit, &count), SADMM_ERROR_INVALID_ARGUMENT,
-                       text);
+        expect_refused(world, sadmm_world_cast_ray_all(world, &ray, NULL, 1, &hit, &count),
+                       SADMM_ERROR_INVALID_ARGUMENT, text);
         rays[2] = ray;
         snprintf(text, sizeof text, "rays[2].%s", bad[i].text);
         sadmm_ray_hit hits[3] = {before, before, before};
@@ -608,7 +504,8 @@ START_TEST(bad_rays)
     filter.ignored = body;
     MUST(world, sadmm_world_remove_body(world, body));
     expect_refused(world, sadmm_world_cast_ray(world, &good, &filter, &hit), SADMM_ERROR_STALE_ID, "filter->ignored");
-    expect_refused(world, sadmm_world_cast_rays(world, 1, &good, &filter, &hit), SADMM_ERROR_STALE_ID, "filter->ignored");
+    expect_refused(world, sadmm_world_cast_rays(world, 1, &good, &filter, &hit), SADMM_ERROR_STALE_ID,
+                   "filter->ignored");
     ck_assert(same_hit(&hit, &before) && count == 55);
     MUST(world, sadmm_world_cast_ray_all(world, &good, NULL, 0, NULL, &count));
     ck_assert_int_eq(count, 0);

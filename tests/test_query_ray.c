@@ -113,8 +113,8 @@ static void check_ray(const struct pair_of *t, const struct sadmm_ray_line *ray,
     const double reach = own_support(t, 0, find.normal) - t_dot(find.normal, rel);
     ck_assert_double_ge(reach, -tolerance);
     /* a normal is as exact as where the surface is met: to first order in a needle's radius of curvature */
-    ck_assert_msg(reach <= 4 * tolerance, "type %d: %g below the farthest along the normal, may be %g", t->g[0].type, reach,
-                  4 * tolerance);
+    ck_assert_msg(reach <= 4 * tolerance, "type %d: %g below the farthest along the normal, may be %g", t->g[0].type,
+                  reach, 4 * tolerance);
     ck_assert_double_ge(slope, -1e-9);
     if (depth > tolerance && slope > 0.01)
         ck_assert_double_eq_tol(find.distance, entry(t, ray, low), 2 * tolerance / slope);
@@ -124,8 +124,8 @@ static void check_ray(const struct pair_of *t, const struct sadmm_ray_line *ray,
 /* Of all solids, at all distances. */
 START_TEST(enters_solids)
 {
-    static const int types[] = {SADMM_SHAPE_SPHERE, SADMM_SHAPE_CAPSULE, SADMM_SHAPE_BOX, SADMM_SHAPE_HULL,
-                                SADMM_SHAPE_CYLINDER, SADMM_SHAPE_CONE, SADMM_SHAPE_ELLIPSOID};
+    static const int types[] = {SADMM_SHAPE_SPHERE,   SADMM_SHAPE_CAPSULE, SADMM_SHAPE_BOX,      SADMM_SHAPE_HULL,
+                                SADMM_SHAPE_CYLINDER, SADMM_SHAPE_CONE,    SADMM_SHAPE_ELLIPSOID};
     const int type = types[_i], shapes = getenv("SADMM_TEST_SHORT") ? 5 : type == SADMM_SHAPE_HULL ? 30 : 60;
     struct random r = {(uint64_t)_i * 7919 + 11};
     struct tally tally = {0, 0, 0};
@@ -288,8 +288,12 @@ START_TEST(no_ray_passes_between)
         }
         corners_of(&m, &p, triangle, x);
         for (int k = 0; k < 3; ++k) to[k] = (1 - share) * x[c][k] + share * x[(c + 1) % 3][k];
-        const double own[3] = {closed ? random_in(&r, -4, 4) : n % 3 ? random_in(&r, -0.05, 0.05) : 0,
-                               closed ? random_in(&r, -4, 4) : n % 3 ? random_in(&r, -0.05, 0.05) : 0,
+        const double own[3] = {closed  ? random_in(&r, -4, 4)
+                               : n % 3 ? random_in(&r, -0.05, 0.05)
+                                       : 0,
+                               closed  ? random_in(&r, -4, 4)
+                               : n % 3 ? random_in(&r, -0.05, 0.05)
+                                       : 0,
                                closed ? random_in(&r, -4, 4) : 3};
         apply(p.R, own, up);
         for (int k = 0; k < 3; ++k) from[k] = closed ? p.x[k] + up[k] : to[k] + up[k];
@@ -308,7 +312,8 @@ START_TEST(no_ray_passes_between)
         }
         const struct sadmm_ray_line ray = line_towards(from, to);
         struct sadmm_ray_find find;
-        ck_assert_msg(sadmm_ray_cast(&ray, &p, HUGE_VAL, &find), "mesh %d, ray %d passed at triangle %d", _i, n, triangle);
+        ck_assert_msg(sadmm_ray_cast(&ray, &p, HUGE_VAL, &find), "mesh %d, ray %d passed at triangle %d", _i, n,
+                      triangle);
     }
     sadmm_mesh_destroy(mesh);
 }

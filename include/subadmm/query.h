@@ -88,6 +88,56 @@ SADMM_API sadmm_status sadmm_world_cast_ray_all(sadmm_world *world, const sadmm_
 SADMM_API sadmm_status sadmm_world_cast_rays(sadmm_world *world, int32_t count, const sadmm_ray *rays,
                                              const sadmm_query_filter *filter, sadmm_ray_hit *hits);
 
+/* ---- overlaps ---------------------------------------------------------------------------------------------------- */
+
+/* Both write the ids of shapes in the order of their slots: the first `capacity` of them, or less if there are less;
+ * *count: how many there are. capacity: >= 0; shapes may be NULL where it is 0. filter: NULL: the defaults. Errors:
+ * STALE_ID (filter->ignored). */
+
+/* Shapes whose boxes meet the box from `lowest` to `highest` (m, world; any numbers, infinite ones too, lowest <=
+ * highest). The box of a shape is the smallest along the world's axes; of a hull or a mesh the smallest around its own
+ * box, whose axes are the shape's. A plane meets it by its half-space. */
+SADMM_API sadmm_status sadmm_world_overlap_box(sadmm_world *world, const double lowest[3], const double highest[3],
+                                               const sadmm_query_filter *filter, int32_t capacity,
+                                               sadmm_shape_id *shapes, int32_t *count);
+/* Shapes that overlap the one in `def` as it would be on a body at this pose (position: m, in [-1e9, 1e9]; orientation: w
+ * x y z, as in sadmm_body_def): those that sadmm_world_closest_to_shape says are 0 m apart, or less. def: of any type but
+ * MESH, ranges as in sadmm_shape_def; only type, size, hull, position and orientation count. Two planes overlap unless
+ * they face away from each other, parallel to 1e-12 rad. */
+SADMM_API sadmm_status sadmm_world_overlap_shape(sadmm_world *world, const sadmm_shape_def *def,
+                                                 const double position[3], const double orientation[4],
+                                                 const sadmm_query_filter *filter, int32_t capacity,
+                                                 sadmm_shape_id *shapes, int32_t *count);
+
+/* ---- closest points ---------------------------------------------------------------------------------------------- */
+
+typedef struct sadmm_closest_points {
+    double distance;  /* m; negative: the depth. Moved by it along the normal, b touches a */
+    double normal[3]; /* unit, world, from a to b */
+    double a[3], b[3]; /* points of either, m, world: b - a = distance x normal */
+    int32_t triangle; /* of a mesh, as in sadmm_contact; -1: neither is one */
+} sadmm_closest_points;
+
+/* How far two shapes are apart, or how deep in each other: the shortest way that one would have to be moved. Their
+ * category, mask and environment do not matter.
+ *
+ * Apart: distance to 1e-12, points and normal to 1e-10 of the size (of both shapes and what is between them). Overlapping:
+ * distance is what parts the two along the normal, to 1e-12, and is the least for boxes, hulls, spheres and capsules, up
+ * to where the expanding polytope ends with 40 points; with cylinders, cones and ellipsoids to 1e-3 of the thinner body or
+ * 2 % of the depth; points to 1e-5 of the size (docs/shapes.md, docs/queries.md). What touches along a line or a face has
+ * one of the pairs of points there.
+ *
+ * A mesh is its surface, as contacts have it: what is behind all of it is apart from it. Of several triangles that a
+ * shape is in, the one that it is deepest in counts; the way out of each is to its front, or past its sides.
+ *
+ * Errors: STALE_ID; INVALID_ARGUMENT (a and b the same; two planes; two meshes). */
+SADMM_API sadmm_status sadmm_world_closest_points(sadmm_world *world, sadmm_shape_id a, sadmm_shape_id b,
+                                                  sadmm_closest_points *closest);
+/* The same where a is the shape in `def` at a pose, as in sadmm_world_overlap_shape. */
+SADMM_API sadmm_status sadmm_world_closest_to_shape(sadmm_world *world, const sadmm_shape_def *def,
+                                                    const double position[3], const double orientation[4],
+                                                    sadmm_shape_id b, sadmm_closest_points *closest);
+
 #ifdef __cplusplus
 }
 #endif

@@ -68,7 +68,10 @@ sadmm_status sadmm_query_tree_make(struct sadmm_query_tree *tree, size_t shapes,
         ++with_box;
     }
     if (!sadmm_box_tree_make(tree->boxes, (int32_t)with_box, &tree->tree)) return sadmm_fail_memory(error, "a query");
-    for (size_t i = 0; i < with_box; ++i) tree->shapes[i] = from[tree->tree.order[i]];
+    for (size_t i = 0; i < with_box; ++i) {
+        tree->shapes[i] = from[tree->tree.order[i]];
+        box_of(&tree->shapes[i], &tree->boxes[i]);
+    }
     memcpy(tree->shapes + with_box, from + with_box, (shapes - with_box) * sizeof *from);
     tree->count = (int32_t)with_box;
     tree->planes = (int32_t)(shapes - with_box);
@@ -100,9 +103,9 @@ bool sadmm_query_tree_follow(struct sadmm_query_tree *tree)
             continue;
         }
         for (int32_t s = node->first >> 3; s < (node->first >> 3) + (node->first & 7); ++s) {
-            struct float_box box;
-            box_of(&tree->shapes[s], &box);
-            include(node, box.lo, box.hi);
+            struct float_box *box = &tree->boxes[s];
+            box_of(&tree->shapes[s], box);
+            include(node, box->lo, box->hi);
         }
     }
     return cost_of(&tree->tree) <= WORN * tree->cost;
@@ -144,14 +147,18 @@ int32_t sadmm_query_tree_cast(const struct sadmm_query_tree *tree, const struct 
                               const struct sadmm_shape_filter *filter, bool first, int32_t capacity,
                               struct sadmm_query_hit *hits)
 {
-    struct cast c = {.ray = ray, .filter = filter, .hits = hits, .capacity = capacity, .first = first,
-                     .limit = ray->length};
+    struct cast c = {
+        .ray = ray, .filter = filter, .hits = hits, .capacity = capacity, .first = first, .limit = ray->length};
     const struct mesh_node *leaf;
     struct ray_walk walk;
     for (int32_t i = 0; i < tree->planes; ++i) try_shape(&c, &tree->shapes[tree->count + i]);
     ray_walk_begin(&walk, tree->tree.nodes, tree->tree.count, ray->origin, ray->direction);
     while ((leaf = ray_walk_next(&walk, c.limit)))
-        for (int32_t k = 0; k < (leaf->first & 7); ++k) try_shape(&c, &tree->shapes[(leaf->first >> 3) + k]);
+        for (int32_t s = leaf->first >> 3; s < (leaf->first >> 3) + (leaf->first & 7); ++s) {
+            double enter;
+            if (ray_meets_box(&walk.slabs, tree->boxes[s].lo, tree->boxes[s].hi, c.limit, &enter))
+                try_shape(&c, &tree->shapes[s]);
+        }
     return first ? c.kept : c.all;
 }
 
@@ -162,6 +169,7 @@ static bool plane_meets(const struct sadmm_placed *plane, const struct sadmm_box
     double lowest = 0;
     for (int k = 0; k < 3; ++k) {
         const double n = plane->R[3 * k + 2];
+        if (n == 0) continue; /* the box may have no end that way */
         lowest += n * ((n > 0 ? box->lo[k] : box->hi[k]) - plane->x[k]);
     }
     return lowest <= 0;

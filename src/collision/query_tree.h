@@ -12,8 +12,8 @@ struct sadmm_query_tree {
     struct sadmm_placed *shapes; /* as the tree comes to them, then planes */
     int32_t count, planes;
     struct box_tree tree;
-    double cost; /* of walks through it, when it was made */
-    struct float_box *boxes;
+    double cost;             /* of walks through it, when it was made */
+    struct float_box *boxes; /* of the shapes in it, in their order */
     size_t shape_capacity, box_capacity;
 };
 
@@ -29,9 +29,9 @@ bool sadmm_query_tree_follow(struct sadmm_query_tree *tree);
 
 /* Which shapes a query sees. */
 struct sadmm_shape_filter {
-    uint32_t body_types; /* bits */
-    int32_t ignored;     /* body, -1: none */
-    int32_t environment; /* -1: all */
+    uint32_t body_types;     /* bits */
+    int32_t ignored;         /* body, -1: none */
+    int32_t environment;     /* -1: all */
     uint32_t category, mask; /* both 0: all */
 };
 
@@ -64,6 +64,7 @@ struct sadmm_query_walk {
 /* The next of the shapes whose boxes meet a box, and of the planes whose solids do, in the tree's order; NULL: there are
  * no more. */
 const struct sadmm_placed *sadmm_query_tree_next(const struct sadmm_query_tree *tree, const struct sadmm_box3 *box,
-                                                 const struct sadmm_shape_filter *filter, struct sadmm_query_walk *walk);
+                                                 const struct sadmm_shape_filter *filter,
+                                                 struct sadmm_query_walk *walk);
 
 #endif

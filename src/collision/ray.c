@@ -42,8 +42,8 @@ static bool cast_mesh(const struct sadmm_ray_line *ray, const struct sadmm_place
     const vec3 from = v3_sub(v3_load(ray->origin), v3_load(shape->x));
     const struct ray_line line = {placed_own(shape, from), placed_own(shape, v3_load(ray->direction))};
     vec3 normal;
-    find->triangle = sadmm_ray_mesh(shape->blocks, shape->geometry.hull, &line, limit, ray->from_behind,
-                                    &find->distance, &normal);
+    find->triangle =
+        sadmm_ray_mesh(shape->blocks, shape->geometry.hull, &line, limit, ray->from_behind, &find->distance, &normal);
     find->inside = false;
     if (find->triangle < 0) return false;
     v3_store(placed_world(shape, normal), find->normal);

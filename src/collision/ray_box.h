@@ -22,17 +22,23 @@ static inline struct ray_slabs ray_slabs_of(const double x[3], const double d[3]
 
 /* Does it meet the box within the limit? *enter: where. Rounding favours meeting: of both ends of a slab each is off by
  * up to 3 units of itself. */
-static inline bool ray_meets_box(const struct ray_slabs *s, const struct mesh_node *node, double limit, double *enter)
+static inline bool ray_meets_box(const struct ray_slabs *s, const float lo[3], const float hi[3], double limit,
+                                 double *enter)
 {
     double in = 0, out = limit;
     for (int k = 0; k < 3; ++k) {
-        const double a = ((double)node->lo[k] - s->x[k]) * s->per[k], b = ((double)node->hi[k] - s->x[k]) * s->per[k],
-                     near = a < b ? a : b, far = (a < b ? b : a) * (1 + 8 * DBL_EPSILON);
+        const double a = ((double)lo[k] - s->x[k]) * s->per[k], b = ((double)hi[k] - s->x[k]) * s->per[k],
+                     near = a < b ? a : b, far = (a > b ? a : b) * (1 + 8 * DBL_EPSILON);
         in = near > in ? near : in;
         out = far < out ? far : out;
     }
     *enter = in;
     return in <= out;
+}
+
+static inline bool ray_meets_node(const struct ray_slabs *s, const struct mesh_node *node, double limit, double *enter)
+{
+    return ray_meets_box(s, node->lo, node->hi, limit, enter);
 }
 
 /* A walk through the nodes, the nearer of two first. What does not fit the stack is walked in the order of the nodes. */
@@ -48,8 +54,8 @@ struct ray_walk {
     int32_t at, end; /* nodes to be walked in order */
 };
 
-static inline void ray_walk_begin(struct ray_walk *w, const struct mesh_node *nodes, int32_t count,
-                                  const double x[3], const double d[3])
+static inline void ray_walk_begin(struct ray_walk *w, const struct mesh_node *nodes, int32_t count, const double x[3],
+                                  const double d[3])
 {
     w->slabs = ray_slabs_of(x, d);
     w->nodes = nodes;
@@ -67,18 +73,18 @@ static inline const struct mesh_node *ray_walk_next(struct ray_walk *w, double l
     double enter, other;
     while (w->at < w->end) {
         const struct mesh_node *node = &w->nodes[w->at];
-        const bool meets = ray_meets_box(&w->slabs, node, limit, &enter);
+        const bool meets = ray_meets_node(&w->slabs, node, limit, &enter);
         w->at = meets ? w->at + 1 : node->next;
         if (meets && node->first >= 0) return node;
     }
     while (w->waiting > 0) {
         int32_t at = w->stack[--w->waiting].node;
         if (w->stack[w->waiting].enter > limit) continue;
-        if (at == 0 && !ray_meets_box(&w->slabs, w->nodes, limit, &enter)) continue;
+        if (at == 0 && !ray_meets_node(&w->slabs, w->nodes, limit, &enter)) continue;
         while (w->nodes[at].first < 0) { /* inner: its children are the next node, and the one after that's subtree */
             int32_t near = at + 1, far = w->nodes[at + 1].next;
-            bool to_near = ray_meets_box(&w->slabs, &w->nodes[near], limit, &enter),
-                 to_far = ray_meets_box(&w->slabs, &w->nodes[far], limit, &other);
+            bool to_near = ray_meets_node(&w->slabs, &w->nodes[near], limit, &enter),
+                 to_far = ray_meets_node(&w->slabs, &w->nodes[far], limit, &other);
             at = -1;
             if (!to_near && !to_far) break;
             if (to_near && to_far) {

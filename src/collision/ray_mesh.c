@@ -88,7 +88,8 @@ static void search_tree(struct search *s, const struct ray_line *line)
  * line a number is on may be rounding. False: all is beside the grid. */
 static bool cells_of(double a, double b, double spacing, int32_t cells, int32_t *first, int32_t *last)
 {
-    const double low = (a < b ? a : b) / spacing + 0.5 * cells - 0.01, high = (a < b ? b : a) / spacing + 0.5 * cells + 0.01;
+    const double low = (a < b ? a : b) / spacing + 0.5 * cells - 0.01,
+                 high = (a < b ? b : a) / spacing + 0.5 * cells + 0.01;
     if (!(high >= 0 && low <= cells)) return false;
     *first = low > 0 ? (int32_t)low : 0;
     *last = high < cells ? (int32_t)high : cells - 1;
@@ -131,9 +132,9 @@ static void search_heights(struct search *s, const struct ray_line *line)
         }
         int32_t low, high;
         if (enter > s->limit) return; /* all that follow are farther */
-        if (!(enter <= leave) || !cells_of(x[minor] + enter * d[minor],
-                                           leave < HUGE_VAL ? x[minor] + leave * d[minor] : x[minor],
-                                           m->spacing[minor], cells[minor], &low, &high))
+        if (!(enter <= leave) ||
+            !cells_of(x[minor] + enter * d[minor], leave < HUGE_VAL ? x[minor] + leave * d[minor] : x[minor],
+                      m->spacing[minor], cells[minor], &low, &high))
             continue;
         for (int32_t r = low; r <= high; ++r) {
             const int32_t cell = major == 0 ? r * cells[0] + c : c * cells[0] + r;
@@ -149,7 +150,8 @@ int32_t sadmm_ray_mesh(const double *blocks, uint32_t at, const struct ray_line 
     struct mesh_triangle found;
     struct mesh mesh;
     mesh_at(blocks, at, &mesh);
-    struct search s = {.mesh = &mesh, .shear = shear_of(line), .from_behind = from_behind, .limit = limit, .triangle = -1};
+    struct search s = {
+        .mesh = &mesh, .shear = shear_of(line), .from_behind = from_behind, .limit = limit, .triangle = -1};
     if (mesh.kind == MESH_HEIGHTS) search_heights(&s, line);
     else search_tree(&s, line);
     if (s.triangle < 0) return -1;

@@ -124,10 +124,10 @@ static bool cast_cone(const struct ray_line *line, double radius, double half, s
                  start = from > span->in ? from < span->out ? from : span->out : span->in;
     const vec3 x = at(line, start);
     const double rise = slope * d.z, room = slope * (half - x.z), r2 = x.x * x.x + x.y * x.y,
-                 along = x.x * d.x + x.y * d.y, beside = x.x * d.y - x.y * d.x,
-                 a = across2 - rise * rise, b = along + rise * room, c = r2 - room * room,
+                 along = x.x * d.x + x.y * d.y, beside = x.x * d.y - x.y * d.x, a = across2 - rise * rise,
+                 b = along + rise * room, c = r2 - room * room,
                  /* b^2 - a c, without the difference of what is large where the cone is a needle */
-                 disc = across2 * room * room + rise * (2 * along * room + r2 * rise) - beside * beside;
+        disc = across2 * room * room + rise * (2 * along * room + r2 * rise) - beside * beside;
     double in = -HUGE_VAL, out = HUGE_VAL;
     if (disc < 0) {
         if (a >= 0) return false; /* beside it; else f < 0 all along */

@@ -12,32 +12,36 @@ static const double ORIGIN_LIMIT = 1e9;
 /* Rays for which another thread is worth its while; and how many a thread takes at a time. */
 enum { RAYS_PER_THREAD = 512, RAYS_AT_A_TIME = 64 };
 
-/* Is it one? `name`: "ray" or "rays[17]". */
+static bool is_ray(const sadmm_ray *ray)
+{
+    const double *x = ray->origin, *d = ray->direction;
+    return fabs(x[0]) <= ORIGIN_LIMIT && fabs(x[1]) <= ORIGIN_LIMIT && fabs(x[2]) <= ORIGIN_LIMIT && isfinite(d[0]) &&
+           isfinite(d[1]) && isfinite(d[2]) && (d[0] != 0 || d[1] != 0 || d[2] != 0) && ray->length >= 0;
+}
+
+/* What is wrong with one that is none. `name`: "ray->" or "rays[17].". */
 static sadmm_status check_ray(const sadmm_ray *ray, const char *name, struct sadmm_error *error)
 {
+    if (is_ray(ray)) return SADMM_OK;
     char field[48];
     const double *d = ray->direction;
     snprintf(field, sizeof field, "%sorigin", name);
     TRY(sadmm_check_vector(field, ray->origin, 3, ORIGIN_LIMIT, error));
     snprintf(field, sizeof field, "%sdirection", name);
     TRY(sadmm_check_vector(field, d, 3, HUGE_VAL, error));
-    if (d[0] == 0 && d[1] == 0 && d[2] == 0)
+    if (!(d[0] != 0 || d[1] != 0 || d[2] != 0))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%s = (0, 0, 0): must not be 0", field);
-    if (!(ray->length >= 0))
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%slength = %g: must be >= 0 m", name, ray->length);
-    return SADMM_OK;
+    return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "%slength = %g: must be >= 0 m", name, ray->length);
 }
 
-/* Of any length between the smallest and the largest numbers there are. */
 static void make_unit(const double d[3], double unit[3])
 {
-    const double most = fmax(fabs(d[0]), fmax(fabs(d[1]), fabs(d[2])));
-    double scaled[3], length2 = 0;
-    int power;
-    frexp(most, &power);
-    for (int k = 0; k < 3; ++k) {
-        scaled[k] = ldexp(d[k], -power);
-        length2 += scaled[k] * scaled[k];
+    double scaled[3] = {d[0], d[1], d[2]}, length2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    if (!(length2 > 1e-200 && length2 < 1e200)) { /* by a power of two, which changes no digit */
+        int power;
+        frexp(fmax(fabs(d[0]), fmax(fabs(d[1]), fabs(d[2]))), &power);
+        for (int k = 0; k < 3; ++k) scaled[k] = ldexp(d[k], -power);
+        length2 = scaled[0] * scaled[0] + scaled[1] * scaled[1] + scaled[2] * scaled[2];
     }
     const double length = sqrt(length2);
     for (int k = 0; k < 3; ++k) unit[k] = scaled[k] / length;
@@ -45,8 +49,8 @@ static void make_unit(const double d[3], double unit[3])
 
 static struct sadmm_ray_line line_of(const sadmm_ray *ray, const sadmm_query_filter *filter)
 {
-    struct sadmm_ray_line line = {.length = ray->length, .from_inside = filter->from_inside,
-                                  .from_behind = filter->from_behind};
+    struct sadmm_ray_line line = {
+        .length = ray->length, .from_inside = filter->from_inside, .from_behind = filter->from_behind};
     memcpy(line.origin, ray->origin, sizeof line.origin);
     make_unit(ray->direction, line.direction);
     return line;
@@ -112,8 +116,7 @@ sadmm_status sadmm_world_cast_ray_all(sadmm_world *world, const sadmm_ray *ray, 
     sadmm_query_filter given;
     TRY(sadmm_check_given(ray, "ray", error));
     TRY(sadmm_check_given(count, "count", error));
-    if (capacity < 0)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "capacity = %d: must be >= 0", capacity);
+    if (capacity < 0) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "capacity = %d: must be >= 0", capacity);
     if (capacity > 0) TRY(sadmm_check_given(hits, "hits", error));
     TRY(check_ray(ray, "ray->", error));
     TRY(sadmm_world_take_filter(world, filter, &taken, &given));
@@ -162,7 +165,7 @@ sadmm_status sadmm_world_cast_rays(sadmm_world *world, int32_t count, const sadm
     }
     for (int32_t i = 0; i < count; ++i) {
         char name[24];
-        if (check_ray(&rays[i], "", NULL) == SADMM_OK) continue;
+        if (is_ray(&rays[i])) continue;
         snprintf(name, sizeof name, "rays[%d].", i);
         return check_ray(&rays[i], name, error);
     }

@@ -29,8 +29,10 @@ sadmm_status sadmm_world_take_filter(sadmm_world *world, const sadmm_query_filte
     if (given->environment < -1)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "filter->environment = %d: must be >= -1",
                           given->environment);
-    *taken = (struct sadmm_shape_filter){.body_types = given->body_types, .ignored = -1,
-                                         .environment = given->environment, .category = given->category,
+    *taken = (struct sadmm_shape_filter){.body_types = given->body_types,
+                                         .ignored = -1,
+                                         .environment = given->environment,
+                                         .category = given->category,
                                          .mask = given->mask};
     if (given->ignored.slot == 0 && given->ignored.generation == 0) return SADMM_OK;
     if (!sadmm_world_find_body(world, given->ignored, "filter->ignored", error)) return SADMM_ERROR_STALE_ID;
@@ -38,7 +40,7 @@ sadmm_status sadmm_world_take_filter(sadmm_world *world, const sadmm_query_filte
     return SADMM_OK;
 }
 
-static void place(const sadmm_world *world, uint32_t slot, struct sadmm_placed *placed)
+void sadmm_world_place_shape(const sadmm_world *world, uint32_t slot, struct sadmm_placed *placed)
 {
     const struct sadmm_shape *shape = &world->shapes[slot];
     const struct sadmm_world_body *body = &world->bodies[shape->body];
@@ -60,7 +62,7 @@ static void place_share(void *argument, int thread, int threads)
     const struct sadmm_query_tree *tree = &world->query.tree;
     size_t begin, end;
     sadmm_share((size_t)world->shape_count, thread, threads, &begin, &end);
-    for (size_t i = begin; i < end; ++i) place(world, tree->shapes[i].slot, &tree->shapes[i]);
+    for (size_t i = begin; i < end; ++i) sadmm_world_place_shape(world, tree->shapes[i].slot, &tree->shapes[i]);
 }
 
 /* All shapes of the list anew. */
@@ -76,11 +78,6 @@ static sadmm_status list(sadmm_world *world)
     struct sadmm_query_tree *tree = &world->query.tree;
     size_t count = 0;
     world->query.listed = false;
-    if (!world->query.prelude) {
-        world->query.prelude = (double *)sadmm_alloc(HULL_FIRST_OWN, sizeof *world->query.prelude);
-        if (!world->query.prelude) return sadmm_fail_memory(&world->error, "a query");
-        sadmm_hull_prelude(world->query.prelude);
-    }
     TRY(sadmm_query_tree_reserve(tree, (size_t)world->shape_count, &world->error));
     for (size_t slot = 0; slot < world->shape_slots; ++slot)
         if (world->shapes[slot].alive) tree->shapes[count++].slot = (uint32_t)slot;
@@ -90,9 +87,19 @@ static sadmm_status list(sadmm_world *world)
     return SADMM_OK;
 }
 
-sadmm_status sadmm_world_place_shapes(sadmm_world *world)
+sadmm_status sadmm_world_begin_query(sadmm_world *world)
 {
     TRY(sadmm_world_pull_bodies(world));
+    if (world->query.prelude) return SADMM_OK;
+    world->query.prelude = (double *)sadmm_alloc(HULL_FIRST_OWN, sizeof *world->query.prelude);
+    if (!world->query.prelude) return sadmm_fail_memory(&world->error, "a query");
+    sadmm_hull_prelude(world->query.prelude);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_place_shapes(sadmm_world *world)
+{
+    TRY(sadmm_world_begin_query(world));
     if (world->query.current) return SADMM_OK;
     if (!world->query.listed) return list(world);
     place_all(world);

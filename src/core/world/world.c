@@ -78,7 +78,8 @@ void sadmm_world_destroy(sadmm_world *world)
                       world->resident.steady, world->resident.edited, world->resident.edits,
                       world->resident.joints, world->resident.memory, world->resident.joint_slots,
                       world->resident.solution, world->resident.edited_joints,
-                      world->resident.coupling_memory, world->query.prelude, world->query.hits};
+                      world->resident.coupling_memory, world->query.prelude, world->query.hits,
+                      world->query.slots, world->query.spare};
     for (size_t i = 0; i < sizeof blocks / sizeof *blocks; ++i) sadmm_free(blocks[i]);
     sadmm_free(world);
 }

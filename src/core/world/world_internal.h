@@ -8,7 +8,8 @@
  *   gear_rows, joint_rows, joint_move   gears and joints as constraint rows, and where they let bodies go
  *   resident_joints, resident        where a backend keeps the world
  *   query_scene                      what queries look at
- *   shape_form, shape, mass, joint, coupling, gear, body, contacts, query_ray, explain   what callers see of it, and change
+ *   shape_form, shape, mass, joint, coupling, gear, body, contacts,
+ *   query_ray, query_shape, explain  what callers see of it, and change
  *   step, world                      steps; settings, the whole
  */
 #ifndef SADMM_CORE_WORLD_INTERNAL_H
@@ -226,7 +227,8 @@ struct sadmm_world {
         struct sadmm_query_tree tree;
         double *prelude; /* what boxes and the like are to a hull (hull_data.h) */
         struct sadmm_query_hit *hits; /* of a ray */
-        size_t hit_capacity;
+        uint64_t *slots, *spare;      /* of an overlap */
+        size_t hit_capacity, slot_capacity, spare_capacity;
     } query;
 
     const struct sadmm_kernels *kernels; /* chosen at the first step */
@@ -373,7 +375,11 @@ sadmm_status sadmm_world_read_rows(sadmm_world *world);
 /* Bodies have moved; shapes have come or gone. */
 static inline void sadmm_world_moved(sadmm_world *world) { world->query.current = false; }
 static inline void sadmm_world_reshaped(sadmm_world *world) { world->query.listed = world->query.current = false; }
-/* Bring the tree up to date. */
+/* The bodies of the last step, and what queries need besides: before shapes are placed. */
+sadmm_status sadmm_world_begin_query(sadmm_world *world);
+/* A shape where it is. */
+void sadmm_world_place_shape(const sadmm_world *world, uint32_t slot, struct sadmm_placed *placed);
+/* All of it, and the tree up to date. */
 sadmm_status sadmm_world_place_shapes(sadmm_world *world);
 /* `filter`: the caller's, NULL: the defaults. */
 sadmm_status sadmm_world_take_filter(sadmm_world *world, const sadmm_query_filter *filter,
