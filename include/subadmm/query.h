@@ -118,7 +118,8 @@ typedef struct sadmm_closest_points {
     int32_t triangle; /* of a mesh, as in sadmm_contact; -1: neither is one */
 } sadmm_closest_points;
 
-/* How far two shapes are apart, or how deep in each other: the shortest way that one would have to be moved. Their
+/* How far two shapes are apart, or how deep in each other: the shortest way that one would have to be moved until they
+ * touch. Their
  * category, mask and environment do not matter.
  *
  * Apart: distance to 1e-12, points and normal to 1e-10 of the size (of both shapes and what is between them). Overlapping:
@@ -130,7 +131,8 @@ typedef struct sadmm_closest_points {
  * A mesh is its surface, as contacts have it: what is behind all of it is apart from it. Of several triangles that a
  * shape is in, the one that it is deepest in counts; the way out of each is to its front, or past its sides.
  *
- * Errors: STALE_ID; INVALID_ARGUMENT (a and b the same; two planes; two meshes). */
+ * Errors: STALE_ID; INVALID_ARGUMENT (a and b the same; two planes; two meshes); NON_FINITE (bodies so far away that the
+ * distance is no number). */
 SADMM_API sadmm_status sadmm_world_closest_points(sadmm_world *world, sadmm_shape_id a, sadmm_shape_id b,
                                                   sadmm_closest_points *closest);
 /* The same where a is the shape in `def` at a pose, as in sadmm_world_overlap_shape. */

@@ -26,25 +26,35 @@ static inline bool closest_is_off(vec3 n, double distance, vec3 pa, vec3 pb, dou
     return !(v3_norm(v3_madd(v3_sub(pb, pa), -distance, n)) <= CLOSEST_ON_AXIS * size);
 }
 
+/* The points of two polytopes that overlap, by the direction along which they are least deep: held apart along it they
+ * have them as their nearest ones. False: rounding has let none be found. */
+static inline bool closest_held_apart(const struct polytope_pair *pair, vec3 n, double distance, vec3 *pa, vec3 *pb)
+{
+    struct polytope_pair held = *pair;
+    const double way = pair->size - (distance + pair_radii(pair));
+    struct gjk_simplex s;
+    vec3 v;
+    held.t = v3_madd(pair->t, -way, n);
+    if (gjk_distance(&held, n, HUGE_VAL, &s, &v) != GJK_APART) return false;
+    gjk_points(&held, &s, pa, pb);
+    *pa = v3_madd(*pa, way + pair->a.radius, n);
+    *pb = v3_madd(*pb, -pair->b.radius, n);
+    return !closest_is_off(n, distance, *pa, *pb, pair->size);
+}
+
 /* Of two polytopes, of which b has faces. start: a direction from a to b. */
 static inline bool closest_of_polytopes(const struct polytope_pair *pair, vec3 start, double limit,
                                         struct sadmm_gap *gap)
 {
     struct polytope_axis axis;
     uint32_t feature;
-    vec3 pa, pb;
+    vec3 pa, pb, a, b;
     if (!hull_nearest(pair, start, limit, &axis, &pa, &pb, &feature)) return false;
-    if (closest_is_off(axis.n, axis.separation, pa, pb,
-                       pair->size)) { /* a face that rounding has left: the points there */
-        struct manifold m;
-        m.count = 0;
-        facing_manifold(pair, axis.n, axis.separation, SADMM_REAL_MAX, &m);
-        for (int k = 0; k < m.count; ++k) {
-            const struct manifold_point *p = &m.points[k];
-            if (k > 0 && v3_dot(axis.n, v3_sub(pb, pa)) <= p->separation) continue;
-            pa = v3_madd(p->position, -p->separation / 2, axis.n);
-            pb = v3_madd(p->position, p->separation / 2, axis.n);
-        }
+    /* cores that are in each other: the face of the expanding polytope may be beside the nearest points */
+    if (axis.separation + pair_radii(pair) < HULL_TOUCH * pair->size &&
+        closest_held_apart(pair, axis.n, axis.separation, &a, &b)) {
+        pa = a;
+        pb = b;
     }
     closest_put(axis.n, axis.separation, pa, pb, gap);
     return true;

@@ -9,7 +9,7 @@
 #include "world_internal.h"
 
 /* Shapes for which another thread is worth its while. */
-enum { SHAPES_PER_THREAD = 2048 };
+enum { SHAPES_PER_THREAD = 16384 };
 enum { ALL_BODY_TYPES = 1 << SADMM_BODY_DYNAMIC | 1 << SADMM_BODY_STATIC | 1 << SADMM_BODY_KINEMATIC };
 
 sadmm_query_filter sadmm_query_filter_default(void)
