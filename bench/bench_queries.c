@@ -1,6 +1,6 @@
 /* subadmm-bench queries: what queries of a scene cost. Rays are aimed from all around at points of the box around the
- * scene's bodies (scattered), and from above, side by side (parallel); overlaps and closest points are those of a ball at
- * such points and, of two bodies that follow each other, of their shapes. The shortest of several repeats each. */
+ * scene's bodies (scattered), and from above, side by side (parallel); overlaps and closest points are those of a ball
+ * at such points and, of two bodies that follow each other, of their shapes. The shortest of several repeats each. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* Rays against single shapes: solids by certificates that share nothing with the library (a point of the solid that is
- * farthest along the normal, and the bisection of a function that is negative inside), meshes by trying all triangles. */
+ * farthest along the normal, and the bisection of a function that is negative inside), meshes by all triangles. */
 #include <float.h>
 
 #include "collision/ray.h"

@@ -7,8 +7,8 @@
  *
  * The first query after a step, or after anything has been added, removed or set, brings a tree of boxes up to date
  * (docs/queries.md has what that takes); those that follow use it as it is. Queries change no state and no contact. A
- * world on a device (CUDA) is waited for and its bodies are read back first, as by sadmm_world_body_state; queries run on
- * the host. Worlds that are not asked pay nothing.
+ * world on a device (CUDA) is waited for and its bodies are read back first, as by sadmm_world_body_state; queries run
+ * on the host. Worlds that are not asked pay nothing.
  *
  * Threads: a world is used by one thread at a time (world.h), queries included; sadmm_world_cast_rays takes several by
  * itself.
@@ -83,8 +83,8 @@ SADMM_API sadmm_status sadmm_world_cast_ray_all(sadmm_world *world, const sadmm_
                                                 const sadmm_query_filter *filter, int32_t capacity,
                                                 sadmm_ray_hit *hits, int32_t *count);
 /* sadmm_world_cast_ray for `count` rays: hits[i] is what rays[i] hits, to the bit. On up to settings.threads threads
- * (sadmm_world_def.tasks). count: >= 0; rays and hits may be NULL where it is 0. Errors: STALE_ID; INVALID_ARGUMENT names
- * the first ray that is refused. */
+ * (sadmm_world_def.tasks). count: >= 0; rays and hits may be NULL where it is 0. Errors: STALE_ID; INVALID_ARGUMENT
+ * names the first ray that is refused. */
 SADMM_API sadmm_status sadmm_world_cast_rays(sadmm_world *world, int32_t count, const sadmm_ray *rays,
                                              const sadmm_query_filter *filter, sadmm_ray_hit *hits);
 
@@ -100,10 +100,10 @@ SADMM_API sadmm_status sadmm_world_cast_rays(sadmm_world *world, int32_t count, 
 SADMM_API sadmm_status sadmm_world_overlap_box(sadmm_world *world, const double lowest[3], const double highest[3],
                                                const sadmm_query_filter *filter, int32_t capacity,
                                                sadmm_shape_id *shapes, int32_t *count);
-/* Shapes that overlap the one in `def` as it would be on a body at this pose (position: m, in [-1e9, 1e9]; orientation: w
- * x y z, as in sadmm_body_def): those that sadmm_world_closest_to_shape says are 0 m apart, or less. def: of any type but
- * MESH, ranges as in sadmm_shape_def; only type, size, hull, position and orientation count. Two planes overlap unless
- * they face away from each other, parallel to 1e-12 rad. */
+/* Shapes that overlap the one in `def` as it would be on a body at this pose (position: m, in [-1e9, 1e9]; orientation:
+ * w x y z, as in sadmm_body_def): those that sadmm_world_closest_to_shape says are 0 m apart, or less. def: of any type
+ * but MESH, ranges as in sadmm_shape_def; only type, size, hull, position and orientation count. Two planes overlap
+ * unless they face away from each other, parallel to 1e-12 rad. */
 SADMM_API sadmm_status sadmm_world_overlap_shape(sadmm_world *world, const sadmm_shape_def *def,
                                                  const double position[3], const double orientation[4],
                                                  const sadmm_query_filter *filter, int32_t capacity,
@@ -112,27 +112,26 @@ SADMM_API sadmm_status sadmm_world_overlap_shape(sadmm_world *world, const sadmm
 /* ---- closest points ---------------------------------------------------------------------------------------------- */
 
 typedef struct sadmm_closest_points {
-    double distance;  /* m; negative: the depth. Moved by it along the normal, b touches a */
+    double distance;  /* m; negative: the depth. b moved by -distance along the normal touches a */
     double normal[3]; /* unit, world, from a to b */
     double a[3], b[3]; /* points of either, m, world: b - a = distance x normal */
     int32_t triangle; /* of a mesh, as in sadmm_contact; -1: neither is one */
 } sadmm_closest_points;
 
 /* How far two shapes are apart, or how deep in each other: the shortest way that one would have to be moved until they
- * touch. Their
- * category, mask and environment do not matter.
+ * touch. Their category, mask and environment do not matter.
  *
- * Apart: distance to 1e-12, points and normal to 1e-10 of the size (of both shapes and what is between them). Overlapping:
- * distance is what parts the two along the normal, to 1e-12, and is the least for boxes, hulls, spheres and capsules, up
- * to where the expanding polytope ends with 40 points; with cylinders, cones and ellipsoids to 1e-3 of the thinner body or
- * 2 % of the depth; points to 1e-5 of the size (docs/shapes.md, docs/queries.md). What touches along a line or a face has
- * one of the pairs of points there.
+ * Apart: distance to 1e-12, points and normal to 1e-10 of the size (of both shapes and what is between them).
+ * Overlapping: distance is what parts the two along the normal, to 1e-12, and is the least for boxes, hulls, spheres
+ * and capsules, up to where the expanding polytope ends with 40 points; with cylinders, cones and ellipsoids to 1e-3 of
+ * the thinner body or 2 % of the depth; points to 1e-5 of the size (docs/shapes.md, docs/queries.md). What touches
+ * along a line or a face has one of the pairs of points there.
  *
  * A mesh is its surface, as contacts have it: what is behind all of it is apart from it. Of several triangles that a
  * shape is in, the one that it is deepest in counts; the way out of each is to its front, or past its sides.
  *
- * Errors: STALE_ID; INVALID_ARGUMENT (a and b the same; two planes; two meshes); NON_FINITE (bodies so far away that the
- * distance is no number). */
+ * Errors: STALE_ID; INVALID_ARGUMENT (a and b the same; two planes; two meshes); NON_FINITE (bodies so far away that
+ * the distance is no number). */
 SADMM_API sadmm_status sadmm_world_closest_points(sadmm_world *world, sadmm_shape_id a, sadmm_shape_id b,
                                                   sadmm_closest_points *closest);
 /* The same where a is the shape in `def` at a pose, as in sadmm_world_overlap_shape. */

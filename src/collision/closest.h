@@ -24,7 +24,7 @@ bool sadmm_closest_is_known(int type_a, int type_b);
 /* False: they are farther apart than `limit` (m, >= 0), which may be infinite. */
 bool sadmm_closest(const struct sadmm_placed *a, const struct sadmm_placed *b, double limit, struct sadmm_gap *gap);
 
-/* ---- for closest.c ------------------------------------------------------------------------------------------------ */
+/* ---- for closest.c ---------------------------------------------------------------------------------------------- */
 
 /* a in the frame of b: p_b = R p_a + t. */
 struct closest_pose {

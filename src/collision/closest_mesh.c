@@ -1,5 +1,5 @@
-/* The triangle of a mesh that is nearest to a convex body, or the one that it is deepest in. Boxes that are farther away
- * than what has been found are passed over.
+/* The triangle of a mesh that is nearest to a convex body, or the one that it is deepest in. Boxes that are farther
+ * away than what has been found are passed over.
  *
  * A mesh is a surface with one side: what is in a triangle is as deep as the shortest way off it to that side, in front
  * of the triangle or past its sides. Where the shortest way of all leads behind it, that is straight to the front.

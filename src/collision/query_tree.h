@@ -61,8 +61,8 @@ struct sadmm_query_walk {
     int32_t node, shape, last, plane;
 };
 
-/* The next of the shapes whose boxes meet a box, and of the planes whose solids do, in the tree's order; NULL: there are
- * no more. */
+/* The next of the shapes whose boxes meet a box, and of the planes whose solids do, in the tree's order; NULL: there
+ * are no more. */
 const struct sadmm_placed *sadmm_query_tree_next(const struct sadmm_query_tree *tree, const struct sadmm_box3 *box,
                                                  const struct sadmm_shape_filter *filter,
                                                  struct sadmm_query_walk *walk);

@@ -41,7 +41,7 @@ static inline bool ray_meets_node(const struct ray_slabs *s, const struct mesh_n
     return ray_meets_box(s, node->lo, node->hi, limit, enter);
 }
 
-/* A walk through the nodes, the nearer of two first. What does not fit the stack is walked in the order of the nodes. */
+/* A walk through the nodes, the nearer of two first. What does not fit the stack is walked in the nodes' order. */
 enum { RAY_STACK = 64 };
 struct ray_walk {
     struct ray_slabs slabs;

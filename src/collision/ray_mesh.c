@@ -1,7 +1,7 @@
 /* Rays through meshes that miss nothing between two triangles: Woop, Benthin, Wald, "Watertight ray/triangle
- * intersection", JCGT 2013. Corners are moved to the ray's origin and sheared so that the ray is the z axis; the sides of
- * a triangle are on one or the other side of the axis by the sign of a difference of two products, which rounding may
- * make 0 but never turn around, and which is the same for both triangles at an edge.
+ * intersection", JCGT 2013. Corners are moved to the ray's origin and sheared so that the ray is the z axis; the sides
+ * of a triangle are on one or the other side of the axis by the sign of a difference of two products, which rounding
+ * may make 0 but never turn around, and which is the same for both triangles at an edge.
  */
 #include "mesh_triangle.h"
 #include "ray.h"
@@ -84,8 +84,8 @@ static void search_tree(struct search *s, const struct ray_line *line)
         for (int32_t k = 0; k < (leaf->first & 7); ++k) try_triangle(s, (leaf->first >> 3) + k);
 }
 
-/* The cells [first, last] of `cells` that the coordinates from a to b are in, and one more on each side: which side of a
- * line a number is on may be rounding. False: all is beside the grid. */
+/* The cells [first, last] of `cells` that the coordinates from a to b are in, and one more on each side: which side of
+ * a line a number is on may be rounding. False: all is beside the grid. */
 static bool cells_of(double a, double b, double spacing, int32_t cells, int32_t *first, int32_t *last)
 {
     const double low = (a < b ? a : b) / spacing + 0.5 * cells - 0.01,
