@@ -3,6 +3,7 @@
 #include <float.h>
 
 #include "collision/ray.h"
+#include "collision/ray_box.h"
 #include "convex_tools.h"
 #include "mesh_tools.h"
 #include "run_suite.h"
@@ -371,6 +372,39 @@ START_TEST(crosses_a_grid)
 }
 END_TEST
 
+/* A tree that is deeper than what a walk keeps in mind: every leaf that the ray meets is still come to, once, and none
+ * beyond the limit. */
+START_TEST(walks_a_deep_tree)
+{
+    enum { DEPTH = 150, NODES = 2 * DEPTH + 1 };
+    static struct mesh_node nodes[NODES];
+    const double x[3] = {0, 0, 0}, d[3] = {1, 0, 0}, limits[] = {HUGE_VAL, 930.25};
+    /* inner node, its leaf, and what is left, nearer to the ray's origin */
+    for (int k = 0; k <= DEPTH; ++k) {
+        struct mesh_node *inner = &nodes[2 * k], *leaf = k < DEPTH ? inner + 1 : inner;
+        for (int axis = 1; axis < 3; ++axis) {
+            inner->lo[axis] = leaf->lo[axis] = -1;
+            inner->hi[axis] = leaf->hi[axis] = 1;
+        }
+        inner->lo[0] = 1000 - DEPTH;
+        inner->hi[0] = leaf->hi[0] = (float)(1000 - k) + 0.5f;
+        inner->first = -1;
+        inner->next = NODES;
+        leaf->lo[0] = (float)(1000 - k);
+        leaf->first = k << 3 | 1;
+        leaf->next = k < DEPTH ? 2 * k + 2 : NODES;
+    }
+    for (int l = 0; l < 2; ++l) {
+        const struct mesh_node *leaf;
+        struct ray_walk walk;
+        int times[DEPTH + 1] = {0};
+        ray_walk_begin(&walk, nodes, NODES, x, d);
+        while ((leaf = ray_walk_next(&walk, limits[l]))) ++times[leaf->first >> 3];
+        for (int k = 0; k <= DEPTH; ++k) ck_assert_int_eq(times[k], 1000 - k <= limits[l]);
+    }
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("query_ray");
@@ -379,6 +413,7 @@ int main(void)
     tcase_add_loop_test(tcase, enters_meshes, 0, SOUP_MESHES);
     tcase_add_loop_test(tcase, no_ray_passes_between, 0, SOUP_MESHES);
     tcase_add_test(tcase, crosses_a_grid);
+    tcase_add_test(tcase, walks_a_deep_tree);
     suite_add_tcase(suite, tcase);
     return run_suite(suite);
 }
