@@ -19,8 +19,9 @@ void sadmm_query_tree_free(struct sadmm_query_tree *tree)
 
 sadmm_status sadmm_query_tree_reserve(struct sadmm_query_tree *tree, size_t shapes, struct sadmm_error *error)
 {
-    if (!sadmm_grow_empty(&tree->shapes, &tree->shape_capacity, 2 * shapes, sizeof *tree->shapes) ||
-        !sadmm_grow_empty(&tree->boxes, &tree->box_capacity, shapes, sizeof *tree->boxes))
+    /* one at least, so that there is an array */
+    if (!sadmm_grow_empty(&tree->shapes, &tree->shape_capacity, 2 * shapes + 1, sizeof *tree->shapes) ||
+        !sadmm_grow_empty(&tree->boxes, &tree->box_capacity, shapes + 1, sizeof *tree->boxes))
         return sadmm_fail_memory(error, "a query");
     return SADMM_OK;
 }
