@@ -24,6 +24,7 @@ static const struct {
     {"motion", bench_motion, "total error against run time of scenes in motion, and how deep bodies overlap"},
     {"rows", bench_rows, "what one constraint given by rows costs an iteration of a scene"},
     {"shapes", bench_shapes, "what the manifold of a pair costs one core, by types of shapes"},
+    {"queries", bench_queries, "what rays, overlaps and closest points of a scene cost"},
     {"joints", bench_joints, "motions and reactions of joints against reference tables"},
 };
 

@@ -226,6 +226,41 @@ START_TEST(reading_between_changes)
 }
 END_TEST
 
+/* Queries wait for the steps begun and see the bodies as these and changes have left them. */
+START_TEST(queries_between_changes)
+{
+    const int precision = _i;
+    sadmm_world *host = small_world(precision, 0), *queue = small_world(precision, 0), *worlds[] = {host, queue};
+    enum { RAYS = 40 };
+    int hits = 0;
+    by_host(host);
+    for (int step = 0; step < 10; ++step) {
+        sadmm_ray_hit found[2][RAYS];
+        sadmm_ray rays[RAYS];
+        for (int i = 0; i < RAYS; ++i) {
+            const double angle = 0.157 * i + step;
+            const sadmm_ray ray = {{4 * cos(angle), 4 * sin(angle), 0.05 * i}, {-cos(angle), -sin(angle), 0}, HUGE_VAL};
+            rays[i] = ray;
+        }
+        for (int w = 0; w < 2; ++w) {
+            if (step % 4 == 2) set_state(worlds[w], 4, 1 + 0.01 * step, 1);
+            MUST(worlds[w], sadmm_world_step_async(worlds[w]));
+            if (step % 4 == 3) set_state(worlds[w], 5, 0.52, -1);
+            if (step % 3 == 1) continue;
+            MUST(worlds[w], sadmm_world_cast_rays(worlds[w], RAYS, rays, NULL, found[w]));
+        }
+        for (int i = 0; i < RAYS && step % 3 != 1; ++i) {
+            const sadmm_ray_hit *a = &found[0][i], *b = &found[1][i];
+            ck_assert_msg(a->shape.slot == b->shape.slot && a->distance == b->distance, "step %d, ray %d", step, i);
+            hits += a->shape.slot != 0;
+        }
+    }
+    ck_assert_int_gt(hits, 20);
+    expect_same_world(host, queue, "10 steps");
+    for (int w = 0; w < 2; ++w) sadmm_world_destroy(worlds[w]);
+}
+END_TEST
+
 /* ---- settings ---------------------------------------------------------------------------------------------------- */
 
 /* Every number of the settings changes, a few at every step. */
@@ -500,6 +535,7 @@ int main(void)
     ADD_CASE(suite, the_last_change_of_a_body_counts, 0, parts);
     ADD_CASE(suite, changes_of_a_body_do_not_pile_up, 0, parts);
     ADD_CASE(suite, reading_between_changes, 0, parts);
+    ADD_CASE(suite, queries_between_changes, 0, parts);
     ADD_CASE(suite, numbers_of_the_settings_change_at_every_step, 0, 2 * parts);
     ADD_CASE(suite, steps_done_again_have_their_own_settings, 0, parts);
     ADD_CASE(suite, arrays_are_where_the_device_has_them, 0, parts);

@@ -215,6 +215,55 @@ static void on_gears(void)
     REFUSES("state", sadmm_world_gear_state(world, gear, NULL));
 }
 
+static void on_queries(void)
+{
+    const double zero[3] = {0}, unit[4] = {1, 0, 0, 0};
+    const sadmm_ray ray = {{0, 0, 0}, {0, 0, 1}, 1};
+    sadmm_shape_def def = sadmm_shape_def_default();
+    sadmm_closest_points closest;
+    sadmm_shape_id id;
+    sadmm_ray_hit hit;
+    int32_t count;
+    def.size[0] = 1;
+    REFUSES("world", sadmm_world_cast_ray(NULL, &ray, NULL, &hit));
+    REFUSES("ray", sadmm_world_cast_ray(world, NULL, NULL, &hit));
+    REFUSES("hit", sadmm_world_cast_ray(world, &ray, NULL, NULL));
+    ck_assert_int_eq(sadmm_world_cast_ray(world, &ray, NULL, &hit), SADMM_OK); /* filter may be NULL */
+    REFUSES("world", sadmm_world_cast_ray_all(NULL, &ray, NULL, 1, &hit, &count));
+    REFUSES("ray", sadmm_world_cast_ray_all(world, NULL, NULL, 1, &hit, &count));
+    REFUSES("hits", sadmm_world_cast_ray_all(world, &ray, NULL, 1, NULL, &count));
+    REFUSES("count", sadmm_world_cast_ray_all(world, &ray, NULL, 1, &hit, NULL));
+    ck_assert_int_eq(sadmm_world_cast_ray_all(world, &ray, NULL, 0, NULL, &count), SADMM_OK);
+    REFUSES("world", sadmm_world_cast_rays(NULL, 1, &ray, NULL, &hit));
+    REFUSES("rays", sadmm_world_cast_rays(world, 1, NULL, NULL, &hit));
+    REFUSES("hits", sadmm_world_cast_rays(world, 1, &ray, NULL, NULL));
+    ck_assert_int_eq(sadmm_world_cast_rays(world, 0, NULL, NULL, NULL), SADMM_OK);
+    REFUSES("world", sadmm_world_overlap_box(NULL, zero, zero, NULL, 1, &id, &count));
+    REFUSES("lowest", sadmm_world_overlap_box(world, NULL, zero, NULL, 1, &id, &count));
+    REFUSES("highest", sadmm_world_overlap_box(world, zero, NULL, NULL, 1, &id, &count));
+    REFUSES("shapes", sadmm_world_overlap_box(world, zero, zero, NULL, 1, NULL, &count));
+    REFUSES("count", sadmm_world_overlap_box(world, zero, zero, NULL, 1, &id, NULL));
+    ck_assert_int_eq(sadmm_world_overlap_box(world, zero, zero, NULL, 0, NULL, &count), SADMM_OK);
+    REFUSES("world", sadmm_world_overlap_shape(NULL, &def, zero, unit, NULL, 1, &id, &count));
+    REFUSES("def", sadmm_world_overlap_shape(world, NULL, zero, unit, NULL, 1, &id, &count));
+    REFUSES("position", sadmm_world_overlap_shape(world, &def, NULL, unit, NULL, 1, &id, &count));
+    REFUSES("orientation", sadmm_world_overlap_shape(world, &def, zero, NULL, NULL, 1, &id, &count));
+    REFUSES("shapes", sadmm_world_overlap_shape(world, &def, zero, unit, NULL, 1, NULL, &count));
+    REFUSES("count", sadmm_world_overlap_shape(world, &def, zero, unit, NULL, 1, &id, NULL));
+    ck_assert_int_eq(sadmm_world_overlap_shape(world, &def, zero, unit, NULL, 0, NULL, &count), SADMM_OK);
+    REFUSES("world", sadmm_world_closest_points(NULL, shape, shape, &closest));
+    for (int32_t i = 0; i < 2; ++i) {
+        ck_assert_int_eq(sadmm_world_shape_at(world, i, &id), SADMM_OK);
+        if (id.slot != shape.slot) REFUSES("closest", sadmm_world_closest_points(world, shape, id, NULL));
+    }
+    REFUSES("world", sadmm_world_closest_to_shape(NULL, &def, zero, unit, shape, &closest));
+    REFUSES("def", sadmm_world_closest_to_shape(world, NULL, zero, unit, shape, &closest));
+    REFUSES("position", sadmm_world_closest_to_shape(world, &def, NULL, unit, shape, &closest));
+    REFUSES("orientation", sadmm_world_closest_to_shape(world, &def, zero, NULL, shape, &closest));
+    REFUSES("closest", sadmm_world_closest_to_shape(world, &def, zero, unit, shape, NULL));
+    ck_assert(sadmm_query_filter_default().body_types == 7);
+}
+
 static void on_steps(void)
 {
     sadmm_step_report report;
@@ -426,6 +475,9 @@ static const struct {
     {on_saves, {W(save), W(restore)}},
     {on_gears,
      {W(add_gear), W(remove_gear), W(gear_count), W(gear_at), W(gear_def), W(set_gear_enabled), W(gear_state)}},
+    {on_queries,
+     {"sadmm_query_filter_default", W(cast_ray), W(cast_ray_all), W(cast_rays), W(overlap_box), W(overlap_shape),
+      W(closest_points), W(closest_to_shape)}},
     {on_steps,
      {W(step), W(step_async), W(wait), W(report), W(contact_count), W(contacts), W(state_hash), W(explain), W(freeze)}},
     {on_problems,

@@ -11,6 +11,7 @@
 #include "mesh.h"
 #include "mesh_file.h"
 #include "problem.h"
+#include "query.h"
 #include "save.h"
 #include "settings.h"
 #include "status.h"

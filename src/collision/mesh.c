@@ -130,7 +130,7 @@ struct making {
     double *vertices; /* from the middle of the box */
     int32_t *corners, *source, *ordered, *beside;
     int32_t vertex_count, triangle_count;
-    struct mesh_tree tree;
+    struct box_tree tree;
     struct mesh_edges edges;
 };
 
@@ -142,7 +142,7 @@ static void free_making(struct making *m)
     sadmm_free(m->source);
     sadmm_free(m->ordered);
     sadmm_free(m->beside);
-    sadmm_mesh_tree_free(&m->tree);
+    sadmm_box_tree_free(&m->tree);
     sadmm_mesh_edges_free(&m->edges);
 }
 

@@ -290,6 +290,7 @@ sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body_id id, co
     memcpy(body->rigid.velocity, state->linear_velocity, sizeof state->linear_velocity);
     memcpy(body->rigid.velocity + 3, state->angular_velocity, sizeof state->angular_velocity);
     body->target.set = false;
+    sadmm_world_moved(world);
     sadmm_world_edit(world, body, SADMM_EDIT_STATE);
     return SADMM_OK;
 }

@@ -261,6 +261,7 @@ static sadmm_status pull_bodies(sadmm_world *world)
         if (world->plan.wrenches)
             memcpy(body->contact_wrench, world->wrench + 6 * (size_t)i, sizeof body->contact_wrench);
     }
+    sadmm_world_moved(world);
     world->resident.bodies_behind = false;
     world->resident.kept_step = world->report.step;
     world->resident.kept_time = world->report.time;

@@ -5,7 +5,6 @@
 #include "collision/hull.h"
 #include "collision/mesh.h"
 #include "core/base/memory.h"
-#include "core/math/quat.h"
 #include "shape_form.h"
 #include "world_internal.h"
 
@@ -26,15 +25,6 @@ static bool alive(const sadmm_world *world, size_t slot)
     return world->shapes[slot].alive;
 }
 
-/* Without the place of its block, which it gets with the shape. */
-static struct sadmm_geometry geometry_of(const sadmm_shape_def *def)
-{
-    struct sadmm_geometry geometry = {.type = (int32_t)def->type, .children = def->type == SADMM_SHAPE_MESH ? 0 : 1};
-    const double *size = def->hull ? def->hull->half : def->mesh ? def->mesh->half : def->size;
-    memcpy(geometry.size, size, sizeof geometry.size);
-    return geometry;
-}
-
 /* owner: what stands before the names, "def->" say. */
 static sadmm_status check_material(const char *owner, double friction, double restitution, struct sadmm_error *error)
 {
@@ -51,7 +41,7 @@ static sadmm_status check_def(const struct sadmm_world_body *body, const sadmm_s
                               struct sadmm_error *error)
 {
     TRY(sadmm_shape_form_check(def, orientation, error));
-    const struct sadmm_geometry geometry = geometry_of(def);
+    const struct sadmm_geometry geometry = sadmm_shape_form_geometry(def);
     static const enum sadmm_motion motion[] = {[SADMM_BODY_DYNAMIC] = SADMM_MOTION_DYNAMIC,
                                                [SADMM_BODY_STATIC] = SADMM_MOTION_NONE,
                                                [SADMM_BODY_KINEMATIC] = SADMM_MOTION_DRIVEN};
@@ -90,21 +80,14 @@ static sadmm_status add_block(sadmm_world *world, size_t slot, const sadmm_shape
     return SADMM_OK;
 }
 
-/* The shape is where contact finding has it: in the frame of the box around the hull, or the mesh. */
-static void place_block(sadmm_world *world, size_t slot, const sadmm_shape_def *def, const double orientation[4])
+/* What was given, to be read back. */
+static void keep_given(sadmm_world *world, size_t slot, const sadmm_shape_def *def, const double orientation[4])
 {
-    static const double as_it_is[4] = {1, 0, 0, 0};
     struct sadmm_world_block_shape *kept = &world->block_shapes[slot];
-    struct sadmm_shape *shape = &world->shapes[slot];
-    const quat turn = q_load(orientation);
-    const double *middle = def->hull ? def->hull->position : def->mesh->middle,
-                 *axes = def->hull ? def->hull->orientation : as_it_is;
     kept->hull = def->hull;
     kept->mesh = def->mesh;
     memcpy(kept->position, def->position, sizeof kept->position);
     memcpy(kept->orientation, orientation, sizeof kept->orientation);
-    v3_store(v3_add(v3_load(def->position), m3_mul(q_matrix(turn), v3_load(middle))), shape->position);
-    q_store(q_normalize(q_mul(turn, q_load(axes))), shape->orientation);
 }
 
 sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body_slot, const sadmm_shape_def *def,
@@ -114,7 +97,7 @@ sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body
     double orientation[4];
     uint32_t offset = 0;
     TRY(check_def(body, def, orientation, error));
-    const struct sadmm_geometry geometry = geometry_of(def);
+    const struct sadmm_geometry geometry = sadmm_shape_form_geometry(def);
     if (has_block(def->type)) TRY(add_block(world, slot, def, &offset, error));
     else if (geometry_is_smooth(&geometry)) TRY(sadmm_block_pool_hold(&world->block_pool, error));
 
@@ -123,9 +106,8 @@ sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body
     shape->geometry = (uint32_t)slot;
     world->geometries[shape->geometry] = geometry;
     world->geometries[shape->geometry].hull = offset;
-    memcpy(shape->position, def->position, sizeof shape->position);
-    memcpy(shape->orientation, orientation, sizeof orientation);
-    if (has_block(def->type)) place_block(world, slot, def, orientation);
+    sadmm_shape_form_place(def, orientation, shape->position, shape->orientation);
+    if (has_block(def->type)) keep_given(world, slot, def, orientation);
     shape->friction = def->friction;
     shape->restitution = def->restitution;
     shape->category = def->category;
@@ -134,6 +116,7 @@ sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body
     shape->alive = true;
     shape->revision = ++world->shape_revisions;
     ++world->shape_count;
+    sadmm_world_reshaped(world);
     if (body->shape_count++ == 0 || slot < body->first_shape) body->first_shape = slot;
     return SADMM_OK;
 }
@@ -187,6 +170,7 @@ void sadmm_world_kill_shape(sadmm_world *world, size_t slot)
     if (has_block(geometry->type)) remove_block(world, slot);
     else if (geometry_is_smooth(geometry)) sadmm_block_pool_let_go(&world->block_pool);
     world->shapes[slot].alive = false;
+    sadmm_world_reshaped(world);
     ++world->shape_generations[slot];
     --world->shape_count;
     --world->bodies[world->shapes[slot].body].shape_count;

@@ -1,7 +1,12 @@
 #include "shape_form.h"
 
+#include <string.h>
+
 #include "collision/geometry.h"
+#include "collision/hull.h"
+#include "collision/mesh.h"
 #include "core/base/check.h"
+#include "core/math/quat.h"
 
 /* A hull is given with shapes of that type, and with no others; so is a mesh. */
 static sadmm_status check_part(const char *name, const void *part, int of_type, int type, struct sadmm_error *error)
@@ -28,4 +33,26 @@ sadmm_status sadmm_shape_form_check(const sadmm_shape_def *def, double orientati
                               def->size[k]);
     TRY(sadmm_check_vector("def->position", def->position, 3, 1e6, error));
     return sadmm_check_orientation("def->orientation", def->orientation, orientation, error);
+}
+
+struct sadmm_geometry sadmm_shape_form_geometry(const sadmm_shape_def *def)
+{
+    struct sadmm_geometry geometry = {.type = (int32_t)def->type, .children = def->type == SADMM_SHAPE_MESH ? 0 : 1};
+    const double *size = def->hull ? def->hull->half : def->mesh ? def->mesh->half : def->size;
+    memcpy(geometry.size, size, sizeof geometry.size);
+    return geometry;
+}
+
+void sadmm_shape_form_place(const sadmm_shape_def *def, const double orientation[4], double position_of_geometry[3],
+                            double orientation_of_geometry[4])
+{
+    static const double as_it_is[4] = {1, 0, 0, 0};
+    const quat turn = q_load(orientation);
+    memcpy(position_of_geometry, def->position, 3 * sizeof *def->position);
+    memcpy(orientation_of_geometry, orientation, 4 * sizeof *orientation);
+    if (!def->hull && !def->mesh) return;
+    const double *middle = def->hull ? def->hull->position : def->mesh->middle,
+                 *axes = def->hull ? def->hull->orientation : as_it_is;
+    v3_store(v3_add(v3_load(def->position), m3_mul(q_matrix(turn), v3_load(middle))), position_of_geometry);
+    q_store(q_normalize(q_mul(turn, q_load(axes))), orientation_of_geometry);
 }

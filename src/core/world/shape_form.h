@@ -2,10 +2,16 @@
 #ifndef SADMM_CORE_WORLD_SHAPE_FORM_H
 #define SADMM_CORE_WORLD_SHAPE_FORM_H
 
+#include "collision/collision.h"
 #include "core/base/error.h"
 #include "subadmm/world.h"
 
 /* INVALID_ARGUMENT that names a member of `def`; `orientation`: the definition's, normalised. */
 sadmm_status sadmm_shape_form_check(const sadmm_shape_def *def, double orientation[4], struct sadmm_error *error);
+/* What a checked definition is to contact finding: its geometry, without the place of a block; and where that is in the
+ * frame that the definition is given in: hulls and meshes are in the frame of the box around them. */
+struct sadmm_geometry sadmm_shape_form_geometry(const sadmm_shape_def *def);
+void sadmm_shape_form_place(const sadmm_shape_def *def, const double orientation[4], double position_of_geometry[3],
+                            double orientation_of_geometry[4]);
 
 #endif

@@ -132,6 +132,7 @@ static void commit(sadmm_world *world)
     const int threads = sadmm_pass_threads(world->plan.threads, (size_t)world->dynamic_count);
     sadmm_parallel(&world->team, threads, commit_share, world);
     sadmm_world_commit_driven(world);
+    sadmm_world_moved(world);
     sadmm_world_commit_joints(world);
     sadmm_world_commit_couplings(world, world->def.settings.substeps);
     world->stepped = true;

@@ -63,6 +63,7 @@ void sadmm_world_destroy(sadmm_world *world)
     for (size_t slot = 0; slot < world->body_slots; ++slot) sadmm_free(world->bodies[slot].name);
     sadmm_world_free_tables(world);
     sadmm_block_pool_free(&world->block_pool);
+    sadmm_query_tree_free(&world->query.tree);
     void *blocks[] = {world->bodies, world->shapes, world->shape_generations, world->geometries, world->block_shapes,
                       world->disabled_pairs.keys, world->disabled_pairs.values, world->joined_pairs.keys,
                       world->joined_pairs.values, world->filtered_pairs, world->joints, world->couplings, world->gears,
@@ -77,7 +78,8 @@ void sadmm_world_destroy(sadmm_world *world)
                       world->resident.steady, world->resident.edited, world->resident.edits,
                       world->resident.joints, world->resident.memory, world->resident.joint_slots,
                       world->resident.solution, world->resident.edited_joints,
-                      world->resident.coupling_memory};
+                      world->resident.coupling_memory, world->query.prelude, world->query.hits,
+                      world->query.slots, world->query.spare};
     for (size_t i = 0; i < sizeof blocks / sizeof *blocks; ++i) sadmm_free(blocks[i]);
     sadmm_free(world);
 }

@@ -7,7 +7,9 @@
  *   joint_act                        a joint in a step
  *   gear_rows, joint_rows, joint_move   gears and joints as constraint rows, and where they let bodies go
  *   resident_joints, resident        where a backend keeps the world
- *   shape_form, shape, mass, joint, coupling, gear, body, contacts, explain   what callers see of it, and change
+ *   query_scene                      what queries look at
+ *   shape_form, shape, mass, joint, coupling, gear, body, contacts,
+ *   query_ray, query_shape, explain  what callers see of it, and change
  *   arrays                           the same, of many at once
  *   step, world                      steps; settings, the whole
  */
@@ -16,6 +18,7 @@
 
 #include "block_pool.h"
 #include "collision/collision.h"
+#include "collision/query_tree.h"
 #include "core/base/check.h"
 #include "core/base/error.h"
 #include "core/base/parallel.h"
@@ -32,6 +35,7 @@
 #include "subadmm/coupling.h"
 #include "subadmm/gear.h"
 #include "subadmm/joint.h"
+#include "subadmm/query.h"
 #include "subadmm/world.h"
 
 enum { SADMM_NAME_SIZE = 64, SADMM_WHY_SIZE = 256 }; /* a name is cut to what fits, with its final 0 */
@@ -218,6 +222,17 @@ struct sadmm_world {
             edited_joint_capacity;
     } resident;
 
+    /* What queries look at (query_scene.c). */
+    struct {
+        bool listed;  /* the tree has the world's shapes, and */
+        bool current; /* has them where they are */
+        struct sadmm_query_tree tree;
+        double *prelude; /* what boxes and the like are to a hull (hull_data.h) */
+        struct sadmm_query_hit *hits; /* of a ray */
+        uint64_t *slots, *spare;      /* of an overlap */
+        size_t hit_capacity, slot_capacity, spare_capacity;
+    } query;
+
     const struct sadmm_kernels *kernels; /* chosen at the first step */
     struct sadmm_context *context;
     char why[SADMM_WHY_SIZE];
@@ -356,6 +371,21 @@ void sadmm_world_edit_joints_again(sadmm_world *world);
 /* What joints keep; the last step's rows. Nothing is enqueued. */
 sadmm_status sadmm_world_read_joints(sadmm_world *world);
 sadmm_status sadmm_world_read_rows(sadmm_world *world);
+
+/* ---- query_scene.c ---- */
+
+/* Bodies have moved; shapes have come or gone. */
+static inline void sadmm_world_moved(sadmm_world *world) { world->query.current = false; }
+static inline void sadmm_world_reshaped(sadmm_world *world) { world->query.listed = world->query.current = false; }
+/* The bodies of the last step, and what queries need besides: before shapes are placed. */
+sadmm_status sadmm_world_begin_query(sadmm_world *world);
+/* A shape where it is. */
+void sadmm_world_place_shape(const sadmm_world *world, uint32_t slot, struct sadmm_placed *placed);
+/* All of it, and the tree up to date. */
+sadmm_status sadmm_world_place_shapes(sadmm_world *world);
+/* `filter`: the caller's, NULL: the defaults. */
+sadmm_status sadmm_world_take_filter(sadmm_world *world, const sadmm_query_filter *filter,
+                                     struct sadmm_shape_filter *taken, sadmm_query_filter *given);
 
 /* ---- ids.c ---- */
 
