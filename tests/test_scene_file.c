@@ -212,13 +212,27 @@ static void add_joints(sadmm_world *world, const sadmm_body_id *balls, uint64_t 
         def.enabled = kind != SADMM_JOINT_PLANAR;
         if (kind == SADMM_JOINT_LINK) def.length = 0.75;
         if (kind % 4 == 1) def.break_force = 1e4;
-        if (kind == SADMM_JOINT_REVOLUTE) def.coordinates[5] = (sadmm_joint_coordinate){
-            .limited = true, .lower = -INFINITY, .upper = 2.5, .drive = SADMM_DRIVE_SPEED, .target_speed = 0.1,
-            .drive_force = 20, .friction = 0.01, .spring_stiffness = 3, .spring_damping = 0.5, .spring_rest = 0.2,
-            .armature = 1e-3};
-        if (kind == SADMM_JOINT_PRISMATIC) def.coordinates[2] = (sadmm_joint_coordinate){
-            .limited = true, .lower = -1, .upper = 1, .drive = SADMM_DRIVE_POSITION, .target_position = 0.1,
-            .drive_stiffness = 100, .drive_damping = 10, .drive_force = INFINITY};
+        if (kind == SADMM_JOINT_REVOLUTE)
+            def.coordinates[5] = (sadmm_joint_coordinate){.limited = true,
+                                                          .lower = -INFINITY,
+                                                          .upper = 2.5,
+                                                          .drive = SADMM_DRIVE_SPEED,
+                                                          .target_speed = 0.1,
+                                                          .drive_force = 20,
+                                                          .friction = 0.01,
+                                                          .spring_stiffness = 3,
+                                                          .spring_damping = 0.5,
+                                                          .spring_rest = 0.2,
+                                                          .armature = 1e-3};
+        if (kind == SADMM_JOINT_PRISMATIC)
+            def.coordinates[2] = (sadmm_joint_coordinate){.limited = true,
+                                                          .lower = -1,
+                                                          .upper = 1,
+                                                          .drive = SADMM_DRIVE_POSITION,
+                                                          .target_position = 0.1,
+                                                          .drive_stiffness = 100,
+                                                          .drive_damping = 10,
+                                                          .drive_force = INFINITY};
         MUST(world, sadmm_world_add_joint(world, &def, &id));
         if (kind == SADMM_JOINT_SPRING)
             MUST(world, sadmm_world_set_joint_spring_table(world, id, 0, positions, forces, 3));
@@ -325,15 +339,36 @@ END_TEST
 START_TEST(everything_is_told)
 {
     static const char *const said[] = {
-        "\"force\": [0.1, -2.0, 0.3333333333333333]", "\"torque\": [0.0, 0.001, -1e+15]",
-        "\"gravity_scale\": -0.5", "\"linear_damping\": 0.1", "\"category\": 2147483649", "\"certify\": true",
-        "\"threads\": 2", "\"iterations\": 37", "\"contact_margin\": 0.3333333333333333", "\"limits\": [null, 2.5]",
-        "\"limits\": [-1.0, 1.0]", "\"break_force\": 10000.0", "\"break_force\": null", "\"drive\": \"position\"",
-        "\"positions\": [-0.1, 0.0, 0.3333333333333333]", "\"forces\": [-2.0, 0.1, 7.0]", "\"length\": 0.75",
-        "\"ratio\": -0.3", "\"max_force\": 50.0", "\"max_torque\": null", "\"friction\": 0.77", "\"armature\": 0.001",
-        "\"spacing\": [3.0, 0.7]", "\"type\": \"kinematic\"", "\"locks\": 21", "\"enabled\": false", "\"index\": 17",
+        "\"force\": [0.1, -2.0, 0.3333333333333333]",
+        "\"torque\": [0.0, 0.001, -1e+15]",
+        "\"gravity_scale\": -0.5",
+        "\"linear_damping\": 0.1",
+        "\"category\": 2147483649",
+        "\"certify\": true",
+        "\"threads\": 2",
+        "\"iterations\": 37",
+        "\"contact_margin\": 0.3333333333333333",
+        "\"limits\": [null, 2.5]",
+        "\"limits\": [-1.0, 1.0]",
+        "\"break_force\": 10000.0",
+        "\"break_force\": null",
+        "\"drive\": \"position\"",
+        "\"positions\": [-0.1, 0.0, 0.3333333333333333]",
+        "\"forces\": [-2.0, 0.1, 7.0]",
+        "\"length\": 0.75",
+        "\"ratio\": -0.3",
+        "\"max_force\": 50.0",
+        "\"max_torque\": null",
+        "\"friction\": 0.77",
+        "\"armature\": 0.001",
+        "\"spacing\": [3.0, 0.7]",
+        "\"type\": \"kinematic\"",
+        "\"locks\": 21",
+        "\"enabled\": false",
+        "\"index\": 17",
         "\"contact_off\": [\n    {\n      \"body_a\": 8,\n      \"body_b\": 9\n    }\n  ]",
-        "\"gravity\": [1e-300, 0.0, -9.81]", "\"m\": null",
+        "\"gravity\": [1e-300, 0.0, -9.81]",
+        "\"m\": null",
     };
     struct sadmm_scene scene;
     sadmm_world *world = world_with_everything(&scene);
@@ -409,9 +444,10 @@ END_TEST
 START_TEST(names_stand_for_bodies)
 {
     struct sadmm_scene scene = open_words(
-        HEAD ", \"bodies\": [{\"name\": \"frame\", \"type\": \"static\"}, {\"mass\": 1, \"inertia\": [1, 1, 1], \"name\": "
-             "\"arm\"}], \"joints\": [{\"kind\": \"revolute\", \"body_a\": \"frame\", \"body_b\": \"arm\", "
-             "\"coordinates\": [null, null, null, null, null, {\"limits\": [-1, null]}]}]}");
+        HEAD
+        ", \"bodies\": [{\"name\": \"frame\", \"type\": \"static\"}, {\"mass\": 1, \"inertia\": [1, 1, 1], \"name\": "
+        "\"arm\"}], \"joints\": [{\"kind\": \"revolute\", \"body_a\": \"frame\", \"body_b\": \"arm\", "
+        "\"coordinates\": [null, null, null, null, null, {\"limits\": [-1, null]}]}]}");
     sadmm_world *world = build_scene(&scene);
     sadmm_joint_id id;
     sadmm_joint_def def;
@@ -436,7 +472,8 @@ START_TEST(methods_have_their_numbers)
         {HEAD "}", 20, 100, 1, 1},
         {HEAD ", \"iterations\": {\"fast\": 7, \"paper\": 8}, \"substeps\": {\"fast\": 2}}", 7, 8, 2, 1},
         {HEAD ", \"iterations\": {\"fast\": 7}, \"settings\": {\"iterations\": 9, \"substeps\": 3}}", 9, 100, 3, 1},
-        {HEAD ", \"iterations\": {\"fast\": 7}, \"settings\": {\"method\": \"paper\", \"iterations\": 9, \"substeps\": 2}}",
+        {HEAD
+         ", \"iterations\": {\"fast\": 7}, \"settings\": {\"method\": \"paper\", \"iterations\": 9, \"substeps\": 2}}",
          7, 9, 1, 2},
     };
     for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
@@ -475,6 +512,7 @@ START_TEST(files_have_no_script)
     sadmm_scene_close(&file); /* once more is fine, as is one of the library */
     sadmm_scene_close(&scene);
     sadmm_scene_close(NULL);
+    sadmm_world_destroy(world);
     ck_assert_int_eq(sadmm_scene_build(&file, &world, NULL), SADMM_ERROR_INVALID_ARGUMENT);
     free(text);
 }
@@ -484,8 +522,8 @@ END_TEST
 
 static void expect_refused(sadmm_status got, sadmm_status wanted, const struct sadmm_error *error, const char *says)
 {
-    ck_assert_msg(got == wanted && strstr(error->message, says), "%s, \"%s\": expected %s, \"%s\"", sadmm_status_name(got),
-                  error->message, sadmm_status_name(wanted), says);
+    ck_assert_msg(got == wanted && strstr(error->message, says), "%s, \"%s\": expected %s, \"%s\"",
+                  sadmm_status_name(got), error->message, sadmm_status_name(wanted), says);
 }
 
 START_TEST(arguments_are_checked)
@@ -500,19 +538,24 @@ START_TEST(arguments_are_checked)
     expect_refused(sadmm_scene_open("/tmp/", &scene, &error), SADMM_ERROR_IO, &error, "/tmp/: could not be read: Is a");
     expect_refused(sadmm_scene_open("no.json", &scene, &error), SADMM_ERROR_IO, &error, "no.json: could not be opened");
     expect_refused(sadmm_scene_open("json", &scene, &error), SADMM_ERROR_INVALID_ARGUMENT, &error, "must be one of");
-    expect_refused(sadmm_scene_open_text(NULL, 0, "x", &scene, &error), SADMM_ERROR_INVALID_ARGUMENT, &error, "text = NULL");
+    expect_refused(sadmm_scene_open_text(NULL, 0, "x", &scene, &error), SADMM_ERROR_INVALID_ARGUMENT, &error,
+                   "text = NULL");
     expect_refused(sadmm_scene_open_text("", 0, NULL, NULL, &error), SADMM_ERROR_INVALID_ARGUMENT, &error, "scene out");
     expect_refused(sadmm_scene_open_text("", 0, NULL, &scene, &error), SADMM_ERROR_INVALID_ARGUMENT, &error,
                    "line 1, column 0: '[' or '{' expected");
     expect_refused(sadmm_scene_open_text("{\n1", 3, "x", &scene, &error), SADMM_ERROR_INVALID_ARGUMENT, &error,
                    "x: line 2, column 1: ");
-    expect_refused(sadmm_scene_write(NULL, "x", world, stdout, &error), SADMM_ERROR_INVALID_ARGUMENT, &error, "scene: must");
-    expect_refused(sadmm_scene_write(&plain, "x", NULL, stdout, &error), SADMM_ERROR_INVALID_ARGUMENT, &error, "world =");
-    expect_refused(sadmm_scene_write(&plain, "x", world, NULL, &error), SADMM_ERROR_INVALID_ARGUMENT, &error, "stream =");
+    expect_refused(sadmm_scene_write(NULL, "x", world, stdout, &error), SADMM_ERROR_INVALID_ARGUMENT, &error,
+                   "scene: must");
+    expect_refused(sadmm_scene_write(&plain, "x", NULL, stdout, &error), SADMM_ERROR_INVALID_ARGUMENT, &error,
+                   "world =");
+    expect_refused(sadmm_scene_write(&plain, "x", world, NULL, &error), SADMM_ERROR_INVALID_ARGUMENT, &error,
+                   "stream =");
     FILE *full = fopen("/dev/full", "w");
     if (full) {
         setvbuf(full, NULL, _IONBF, 0);
-        expect_refused(sadmm_scene_write(&plain, "x", world, full, &error), SADMM_ERROR_IO, &error, "could not be written");
+        expect_refused(sadmm_scene_write(&plain, "x", world, full, &error), SADMM_ERROR_IO, &error,
+                       "could not be written");
         fclose(full);
     }
     sadmm_world_destroy(world);

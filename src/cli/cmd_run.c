@@ -357,9 +357,9 @@ const struct cli_command cli_run = {
     .operands = "SCENE",
     .summary = "simulate a scene (subadmm scenes lists them), or a scene file",
     .text =
-        "SCENE: name, name:N or name:N:M; what ends in .json or has a / in it is a scene file, as subadmm scenes NAME\n"
-        "--json writes it. A file is a world at its beginning: without the script that a scene of that name may follow,\n"
-        "and without its measure of success.\n",
+        "SCENE: name, name:N or name:N:M. What ends in .json or has a / in it is a scene file, as subadmm scenes NAME\n"
+        "--json writes it: a world at its beginning, without the script that a scene may follow, and without its\n"
+        "measure of success.\n",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .operands_min = 1,

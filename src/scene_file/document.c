@@ -48,8 +48,8 @@ sadmm_status sadmm_refuse(const struct sadmm_reader *r, const char *member, cons
     va_end(arguments);
     const bool both = r->length > 0 && member;
     const char *end = r->length > 0 || member ? ": " : "";
-    return sadmm_fail(r->error, SADMM_ERROR_INVALID_ARGUMENT, "%s%s%s%s%.60s%s%s", r->name, *r->name ? ": " : "", r->path,
-                      both ? "." : "", member ? member : "", end, what);
+    return sadmm_fail(r->error, SADMM_ERROR_INVALID_ARGUMENT, "%s%s%s%s%.60s%s%s", r->name, *r->name ? ": " : "",
+                      r->path, both ? "." : "", member ? member : "", end, what);
 }
 
 /* What a message shows of a string: its beginning, without what would move a terminal's cursor. */
@@ -123,8 +123,8 @@ sadmm_status sadmm_read_reals(const struct sadmm_reader *r, const char *member, 
     return SADMM_OK;
 }
 
-sadmm_status sadmm_read_whole(const struct sadmm_reader *r, const char *member, const json_t *value, double lo, double hi,
-                              int64_t *number)
+sadmm_status sadmm_read_whole(const struct sadmm_reader *r, const char *member, const json_t *value, double lo,
+                              double hi, int64_t *number)
 {
     const double x = json_is_number(value) ? json_number_value(value) : NAN;
     char range[80];
@@ -225,7 +225,7 @@ sadmm_status sadmm_read_some(const struct sadmm_reader *r, const json_t *object,
 {
     for (size_t k = 0; k < fields->count; ++k) {
         const json_t *value = json_object_get(object, fields->list[k].name);
-        if (value) TRY(read_field(r, &fields->list[k], value, into));
+        if (value && fields->list[k].kind != FIELD_OTHER) TRY(read_field(r, &fields->list[k], value, into));
     }
     return SADMM_OK;
 }
@@ -236,7 +236,7 @@ sadmm_status sadmm_read_fields(const struct sadmm_reader *r, const json_t *objec
     const char *member;
     json_t *value;
     if (!json_is_object(object)) return sadmm_refuse_value(r, NULL, "an object", object);
-    json_object_foreach((json_t *)object, member, value)
-        if (!sadmm_find_field(fields, member)) return refuse_unknown(r, member, fields);
+    json_object_foreach((json_t *)object, member,
+                        value) if (!sadmm_find_field(fields, member)) return refuse_unknown(r, member, fields);
     return sadmm_read_some(r, object, fields, into);
 }

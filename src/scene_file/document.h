@@ -22,19 +22,21 @@ sadmm_status sadmm_parse_json(const struct sadmm_reader *r, const char *text, si
 #ifdef __GNUC__
 __attribute__((format(printf, 2, 3)))
 #endif
-size_t sadmm_enter(struct sadmm_reader *r, const char *format, ...);
+size_t
+sadmm_enter(struct sadmm_reader *r, const char *format, ...);
 void sadmm_leave(struct sadmm_reader *r, size_t length);
 
 /* INVALID_ARGUMENT: a member of the object at hand (NULL: the object itself), and what of it. */
 #ifdef __GNUC__
 __attribute__((format(printf, 3, 4)))
 #endif
-sadmm_status sadmm_refuse(const struct sadmm_reader *r, const char *member, const char *format, ...);
+sadmm_status
+sadmm_refuse(const struct sadmm_reader *r, const char *member, const char *format, ...);
 /* "must be `what`, is a string" */
 sadmm_status sadmm_refuse_value(const struct sadmm_reader *r, const char *member, const char *what,
                                 const json_t *value);
-/* A failed call's own status and message: its "def->" is the path of the object at hand, and so is `joint` ("." before a
- * member, ": " before anything else) where the message has no "def->". OK is passed on. */
+/* A failed call's own status and message: its "def->" is the path of the object at hand. A message without one comes
+ * behind the path and `joint` ("." before a member, ": " before anything else). OK is passed on. */
 sadmm_status sadmm_refuse_as(const struct sadmm_reader *r, sadmm_status status, const char *joint, const char *message);
 
 /* Members of an object that are fields; those that are not there are left as they are. INVALID_ARGUMENT, also where
@@ -49,8 +51,8 @@ sadmm_status sadmm_read_some(const struct sadmm_reader *r, const json_t *object,
 sadmm_status sadmm_read_real(const struct sadmm_reader *r, const char *member, const json_t *value, double *x);
 sadmm_status sadmm_read_reals(const struct sadmm_reader *r, const char *member, const json_t *value, double *x,
                               size_t count);
-sadmm_status sadmm_read_whole(const struct sadmm_reader *r, const char *member, const json_t *value, double lo, double hi,
-                              int64_t *number);
+sadmm_status sadmm_read_whole(const struct sadmm_reader *r, const char *member, const json_t *value, double lo,
+                              double hi, int64_t *number);
 /* Members of an object: NULL where one is not there, INVALID_ARGUMENT where it is of another type. */
 sadmm_status sadmm_read_array(const struct sadmm_reader *r, const json_t *object, const char *member, json_t **array);
 sadmm_status sadmm_read_string(const struct sadmm_reader *r, const json_t *object, const char *member,

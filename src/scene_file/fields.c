@@ -13,9 +13,9 @@ const char *const sadmm_shape_names[SADMM_SHAPE_TYPE_COUNT] = {
     [SADMM_SHAPE_CYLINDER] = "cylinder", [SADMM_SHAPE_CONE] = "cone",     [SADMM_SHAPE_ELLIPSOID] = "ellipsoid",
 };
 static const size_t shape_sizes[SADMM_SHAPE_TYPE_COUNT] = {
-    [SADMM_SHAPE_PLANE] = 0, [SADMM_SHAPE_SPHERE] = 1,   [SADMM_SHAPE_CAPSULE] = 2,
-    [SADMM_SHAPE_BOX] = 3,   [SADMM_SHAPE_HULL] = 0,     [SADMM_SHAPE_MESH] = 0,
-    [SADMM_SHAPE_CYLINDER] = 2, [SADMM_SHAPE_CONE] = 2,  [SADMM_SHAPE_ELLIPSOID] = 3,
+    [SADMM_SHAPE_PLANE] = 0,    [SADMM_SHAPE_SPHERE] = 1, [SADMM_SHAPE_CAPSULE] = 2,
+    [SADMM_SHAPE_BOX] = 3,      [SADMM_SHAPE_HULL] = 0,   [SADMM_SHAPE_MESH] = 0,
+    [SADMM_SHAPE_CYLINDER] = 2, [SADMM_SHAPE_CONE] = 2,   [SADMM_SHAPE_ELLIPSOID] = 3,
 };
 const char *const sadmm_method_names[SADMM_METHOD_COUNT] = {
     [SADMM_METHOD_PAPER] = "paper",
@@ -297,6 +297,7 @@ json_t *sadmm_json_reals(const double *x, size_t count)
 
 static json_t *value_of(const struct sadmm_field *field, const void *from)
 {
+    if (field->kind == FIELD_OTHER) return json_null(); /* of some tables all are, and there is nothing to write */
     const char *const at = (const char *)from + field->offset;
     int32_t number;
     uint32_t bits;

@@ -15,8 +15,8 @@ enum sadmm_field_kind {
     FIELD_BOOL,
     FIELD_INT32,
     FIELD_UINT32,
-    FIELD_NAME,        /* an enumeration: one of `count` names */
-    FIELD_OTHER        /* a member that is no field: its readers and writers are elsewhere */
+    FIELD_NAME, /* an enumeration: one of `count` names */
+    FIELD_OTHER /* a member that is no field: its readers and writers are elsewhere */
 };
 
 struct sadmm_field {

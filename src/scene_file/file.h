@@ -7,7 +7,7 @@
 
 struct sadmm_scene_file {
     json_t *root;
-    char *name; /* of the file, for messages */
+    char *name;                     /* of the file, for messages */
     struct sadmm_scene_about about; /* its strings are the document's, or `name` */
     sadmm_world_def def;
 };

@@ -83,7 +83,8 @@ static sadmm_status read_dynamic(const struct sadmm_filler *f, const json_t *obj
     return SADMM_OK;
 }
 
-static sadmm_status read_body_def(const struct sadmm_filler *f, const json_t *object, size_t number, sadmm_body_def *def)
+static sadmm_status read_body_def(const struct sadmm_filler *f, const json_t *object, size_t number,
+                                  sadmm_body_def *def)
 {
     static const char *const needed[] = {"mass", "inertia"};
     enum { LONGEST_NAME = 63 };
@@ -223,13 +224,15 @@ static sadmm_status read_form(const struct sadmm_filler *f, const json_t *object
         TRY(sadmm_read_number_in(f, object, "hull", f->hull_count, &number));
         def->hull = f->hulls[number];
     } else if (json_object_get(object, "hull")) {
-        return sadmm_refuse(&f->reader, "hull", "must be left out, for the shape is a %s", sadmm_shape_names[def->type]);
+        return sadmm_refuse(&f->reader, "hull", "must be left out, for the shape is a %s",
+                            sadmm_shape_names[def->type]);
     }
     if (def->type == SADMM_SHAPE_MESH) {
         TRY(sadmm_read_number_in(f, object, "mesh", f->mesh_count, &number));
         def->mesh = f->meshes[number];
     } else if (json_object_get(object, "mesh")) {
-        return sadmm_refuse(&f->reader, "mesh", "must be left out, for the shape is a %s", sadmm_shape_names[def->type]);
+        return sadmm_refuse(&f->reader, "mesh", "must be left out, for the shape is a %s",
+                            sadmm_shape_names[def->type]);
     }
     return SADMM_OK;
 }
@@ -241,7 +244,8 @@ static sadmm_status read_shape(struct sadmm_filler *f, const json_t *object, siz
     if (!json_object_get(object, "type")) return sadmm_refuse(&f->reader, "type", "is missing");
     const size_t sizes = sadmm_shape_sizes(def.type);
     const json_t *size = json_object_get(object, "size");
-    if (sizes > 0 && !size) return sadmm_refuse(&f->reader, "size", "is missing, %zu number%s", sizes, sizes > 1 ? "s" : "");
+    if (sizes > 0 && !size)
+        return sadmm_refuse(&f->reader, "size", "is missing, %zu number%s", sizes, sizes > 1 ? "s" : "");
     if (size) TRY(sadmm_read_reals(&f->reader, "size", size, def.size, sizes));
     TRY(read_form(f, object, &def));
     sadmm_before_unit(def.orientation);

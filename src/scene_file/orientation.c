@@ -13,9 +13,9 @@ static bool becomes(const double q[4], const double wanted[4])
     return true;
 }
 
-/* Quaternions on the ray of q, within 1e-6 of unit, their components as rounding makes them or one unit in the last
- * place off. Four in five orientations that were made unit become themselves; for others one in a hundred of these does,
- * as a rule, and of 100,000 all were found within 512 lengths. */
+/* Four in five orientations that were made unit become themselves. For the others quaternions on the ray of q are
+ * tried, within 1e-6 of unit, their components as rounding makes them or one unit in the last place off: one in a
+ * hundred of these becomes q, as a rule, and of 100,000 all were found within 512 lengths. */
 void sadmm_before_unit(double q[4])
 {
     enum { LENGTHS = 512, NEIGHBOURS = 81 };

@@ -54,11 +54,14 @@ static sadmm_status check_format(const struct sadmm_reader *r, const json_t *roo
     const json_t *format = json_object_get(root, "format"), *version = json_object_get(root, "format_version");
     int64_t number;
     if (!format || !version)
-        return sadmm_refuse(r, format ? "format_version" : "format", "is missing: a scene file has \"format\": \"%s\" "
-                            "and \"format_version\": %d", SADMM_SCENE_FORMAT, SADMM_SCENE_FORMAT_VERSION);
+        return sadmm_refuse(r, format ? "format_version" : "format",
+                            "is missing: a scene file has \"format\": \"%s\" "
+                            "and \"format_version\": %d",
+                            SADMM_SCENE_FORMAT, SADMM_SCENE_FORMAT_VERSION);
     if (!json_is_string(format) || strcmp(json_string_value(format), SADMM_SCENE_FORMAT) != 0)
         return sadmm_refuse_value(r, "format", "\"" SADMM_SCENE_FORMAT "\"", format);
-    return sadmm_read_whole(r, "format_version", version, SADMM_SCENE_FORMAT_VERSION, SADMM_SCENE_FORMAT_VERSION, &number);
+    return sadmm_read_whole(r, "format_version", version, SADMM_SCENE_FORMAT_VERSION, SADMM_SCENE_FORMAT_VERSION,
+                            &number);
 }
 
 /* A whole number or null, of "name:N:M". */

@@ -2,8 +2,8 @@
  * docs/scene.schema.json defines it.
  *
  * Both sides of the format are here: what the writer writes of a world the reader makes of it again, bit for bit, and
- * what is written of that is the same text. Neither knows the scenes of the scene library (scenes/scenes.h), which opens
- * files in the same way as names.
+ * what is written of that is the same text. Neither knows the scene library (scenes/scenes.h), which opens files in the
+ * same way as names.
  *
  *   fields.c     members that are fields of the library's definitions: one table each, for both sides
  *   write.c, write_forms.c, write_parts.c, write_text.c   a world to text: the whole; hulls and meshes; joints and what
@@ -60,7 +60,8 @@ const struct sadmm_scene_about *sadmm_scene_file_about(const struct sadmm_scene_
 sadmm_world_def sadmm_scene_file_def(const struct sadmm_scene_file *file);
 
 /* Fill an empty world with what the file has in it. Errors: INVALID_ARGUMENT (as above), those of the calls that add to
- * a world. After an error the world is to be destroyed. A file may fill any number of worlds, on any number of threads. */
+ * a world. After an error the world is to be destroyed. A file may fill any number of worlds, on any number of
+ * threads. */
 sadmm_status sadmm_scene_file_fill(const struct sadmm_scene_file *file, sadmm_world *world, struct sadmm_error *error);
 
 /* Write a world, with its settings, and of `def` precision and margin. Errors: IO, those of the calls that read a

@@ -19,13 +19,13 @@ struct sadmm_form_list {
 
 struct sadmm_writer {
     sadmm_world *world;
-    json_t *root; /* the file */
+    json_t *root;                    /* the file */
     json_t *bodies, *hulls, *meshes; /* in it */
     struct sadmm_slot_list body_slots, shape_slots, joint_slots;
     size_t *shape_place; /* by the number of a shape: its place in its body's list */
     int32_t *shape_body;
     struct sadmm_form_list hull_list, mesh_list;
-    bool complete;       /* no value was lost for want of memory */
+    bool complete; /* no value was lost for want of memory */
     struct sadmm_error *error;
 };
 

@@ -9,8 +9,7 @@ static bool is_flat(const json_t *array)
 {
     json_t *value;
     size_t k;
-    json_array_foreach((json_t *)array, k, value)
-        if (json_is_array(value) || json_is_object(value)) return false;
+    json_array_foreach((json_t *)array, k, value) if (json_is_array(value) || json_is_object(value)) return false;
     return true;
 }
 
@@ -42,8 +41,10 @@ static bool write_array(const json_t *array, FILE *stream, int depth)
     json_t *each;
     size_t k;
     if (fputc('[', stream) == EOF) return false;
-    json_array_foreach((json_t *)array, k, each) {
-        const bool begun = flat ? fprintf(stream, "%s%s", between, k ? " " : "") >= 0 : line(stream, between, depth + 1);
+    json_array_foreach((json_t *)array, k, each)
+    {
+        const bool begun =
+            flat ? fprintf(stream, "%s%s", between, k ? " " : "") >= 0 : line(stream, between, depth + 1);
         if (!begun || !write_value(each, stream, depth + 1)) return false;
         between = ",";
     }
@@ -55,7 +56,8 @@ static bool write_object(const json_t *object, FILE *stream, int depth)
     const char *name, *between = "";
     json_t *each;
     if (fputc('{', stream) == EOF) return false;
-    json_object_foreach((json_t *)object, name, each) {
+    json_object_foreach((json_t *)object, name, each)
+    {
         if (!line(stream, between, depth + 1) || fprintf(stream, "\"%s\": ", name) < 0 ||
             !write_value(each, stream, depth + 1))
             return false;

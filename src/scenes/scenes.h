@@ -54,16 +54,16 @@ struct sadmm_scene {
 /* Is this spec the path of a scene file? */
 bool sadmm_scene_is_file(const char *spec);
 
-/* Parse `spec` and fill `scene`. What is opened is to be closed; a scene of the library has nothing to be freed. Errors:
- * INVALID_ARGUMENT (unknown name: the message lists the valid ones; N or M out of the scene's range), and of a file those
- * of sadmm_scene_open_file. Nothing is to be closed after an error. */
+/* Parse `spec` and fill `scene`. What is opened is to be closed; a scene of the library has nothing to be freed.
+ * Errors: INVALID_ARGUMENT (unknown name: the message lists the valid ones; N or M out of the scene's range), and of a
+ * file those of sadmm_scene_open_file. Nothing is to be closed after an error. */
 sadmm_status sadmm_scene_open(const char *spec, struct sadmm_scene *scene, struct sadmm_error *error);
 
 /* Fill `scene` from a scene file, or from `length` bytes of its text (name: what messages call it; NULL: nothing). Its
- * info has the name and description that the file has; n and m are 0 where it has none. What is wrong with bodies, shapes
- * and what is between them is found when a world is built. Errors: INVALID_ARGUMENT (the message names the line, or the
- * path of the member, its value and what is allowed), IO, LIMIT (more than 4 GiB), OUT_OF_MEMORY, UNAVAILABLE (a build
- * without jansson). */
+ * info has the name and description that the file has; n and m are 0 where it has none. What is wrong with bodies,
+ * shapes and what is between them is found when a world is built. Errors: INVALID_ARGUMENT (the message names the line,
+ * or the path of the member, its value and what is allowed), IO, LIMIT (more than 4 GiB), OUT_OF_MEMORY, UNAVAILABLE (a
+ * build without jansson). */
 sadmm_status sadmm_scene_open_file(const char *path, struct sadmm_scene *scene, struct sadmm_error *error);
 sadmm_status sadmm_scene_open_text(const char *text, size_t length, const char *name, struct sadmm_scene *scene,
                                    struct sadmm_error *error);
