@@ -9,7 +9,7 @@ jobs=${JOBS:-$(nproc)}
 packages_to_run=(gcc=cc 'g++=c++' meson=meson ninja-build=ninja pkgconf=pkg-config libfcl-dev libqhull-dev libjansson-dev)
 packages_to_test=("${packages_to_run[@]}" git=git libhdf5-dev check clang=clang libclang-rt-dev libomp-dev util-linux=setarch)
 # Used where the release offers it.
-packages_to_test_if_offered=(libsiconos-numerics-dev)
+packages_to_test_if_offered=(libsiconos-numerics-dev python3-jsonschema)
 
 say() { printf '\n==> %s\n' "$*"; }
 fail() { printf 'error: %s\n' "$*" >&2; exit 1; }
