@@ -44,7 +44,7 @@ struct sadmm_scene_file;
 /* Is this the name of a scene file? It ends in .json, or there is a / in it. */
 bool sadmm_scene_file_is_path(const char *text);
 
-/* *out: what the file holds, the caller's until sadmm_scene_file_close; NULL after an error. It takes some 5 KB of
+/* *out: what the file holds, the caller's until sadmm_scene_file_close; NULL after an error. It takes some 6 KB of
  * memory a body. Its head (all but bodies, shapes and what is between them) is checked, the rest where worlds are
  * filled. Errors: INVALID_ARGUMENT (the message names the line, or the path of the member, its value and what is
  * allowed), IO, LIMIT (more than 4 GiB). */
