@@ -166,11 +166,13 @@ static int check_scenes(const struct options *o)
 {
     struct sadmm_scene scene;
     struct sadmm_error error;
-    for (int k = 0; k < o->scene_count; ++k)
+    for (int k = 0; k < o->scene_count; ++k) {
         if (sadmm_scene_open(o->scenes[k], &scene, &error) != SADMM_OK) {
             fprintf(stderr, "subadmm-bench %s: %s\n", command, error.message);
             return 2;
         }
+        sadmm_scene_close(&scene);
+    }
     return 0;
 }
 

@@ -139,6 +139,19 @@ static int run(const struct motion_plan *plan, struct motion_study *study, struc
     return json ? write_json(study, runs_on, json) : 0;
 }
 
+static int study_plan(const struct options *o, const struct motion_plan *plan)
+{
+    struct output *json = NULL;
+    int code = 0;
+    if (!available(plan)) return 1;
+    if (o->json && (code = output_open("--json", o->json, OUTPUT_STREAM, &json)) != 0) return code;
+    struct motion_study *study = sadmm_alloc(1, sizeof *study);
+    code = study ? run(plan, study, json) : wrong("out of memory");
+    if (study) motion_study_free(study);
+    sadmm_free(study);
+    return code;
+}
+
 int bench_motion(int argc, char **argv)
 {
     struct options o = {
@@ -147,16 +160,11 @@ int bench_motion(int argc, char **argv)
         .iteration_count = 2, .match = -1, .seeds = 3,
         .starts = 9, .horizon = 0.05, .reference = 6, .reference_iterations = 300,
     };
-    struct motion_plan plan;
-    struct output *json = NULL;
+    struct motion_plan plan = {0};
     int code = parse(argc, argv, &o);
     if (code) return code < 0 ? 0 : code;
-    if ((code = make_plan(&o, &plan)) != 0) return code;
-    if (!available(&plan)) return 1;
-    if (o.json && (code = output_open("--json", o.json, OUTPUT_STREAM, &json)) != 0) return code;
-    struct motion_study *study = sadmm_alloc(1, sizeof *study);
-    code = study ? run(&plan, study, json) : wrong("out of memory");
-    if (study) motion_study_free(study);
-    sadmm_free(study);
+    code = make_plan(&o, &plan);
+    if (code == 0) code = study_plan(&o, &plan);
+    sadmm_scene_close(&plan.scene);
     return code;
 }

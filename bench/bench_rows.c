@@ -53,6 +53,7 @@ static sadmm_status freeze(const struct options *o, sadmm_problem *problem, stru
     if (status == SADMM_OK && (status = sadmm_world_freeze(world, problem)) != SADMM_OK)
         sadmm_fail(error, status, "%s", sadmm_world_message(world));
     sadmm_world_destroy(world);
+    sadmm_scene_close(&scene);
     return status;
 }
 

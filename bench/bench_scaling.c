@@ -137,6 +137,7 @@ static bool run_row(const struct options *o, struct series *s, long size, const 
             sadmm_scene_set_method(&scene, (sadmm_method)o->method);
             if (o->iterations > 0) scene.def.settings.iterations = (int)o->iterations;
             status = scene_timing_run(&scene, &plan, &row.timing, &error);
+            sadmm_scene_close(&scene);
         }
         if (status != SADMM_OK) snprintf(row.status, sizeof row.status, "failed: %.300s", error.message);
         else if (row.timing.steps == 0)
@@ -235,6 +236,7 @@ static int parse(int argc, char **argv, struct options *o)
             fprintf(stderr, "subadmm-bench %s: %s\n", command, error.message);
             return 2;
         }
+        sadmm_scene_close(&scene);
     }
     return 0;
 }

@@ -212,6 +212,7 @@ int bench_stand(int argc, char **argv)
     if (status == SADMM_OK) code = report(&s, &o);
     else fprintf(stderr, "subadmm-bench %s: step %ld: %s\n", command, s.done + 1, s.error.message), code = 1;
     sadmm_world_destroy(s.world);
+    sadmm_scene_close(&scene);
     sadmm_free(s.bodies);
     sadmm_free(s.ms);
     for (int k = 0; k < PHASES; ++k) sadmm_free(s.phases[k]);

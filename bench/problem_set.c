@@ -288,8 +288,10 @@ static sadmm_status from_scene(const char *spec, int steps, struct set_problem *
     out->dt = scene.def.settings.dt;
     out->penalty_period = scene.def.settings.penalty_period;
     status = sadmm_problem_create(&out->problem);
-    if (status != SADMM_OK) return sadmm_fail_memory(error, "the problem");
-    return freeze_after(&scene, steps, out->problem, error);
+    if (status != SADMM_OK) sadmm_fail_memory(error, "the problem");
+    else status = freeze_after(&scene, steps, out->problem, error);
+    sadmm_scene_close(&scene);
+    return status;
 }
 
 /* ---- the set ------------------------------------------------------------------------------------------------- */

@@ -208,5 +208,6 @@ sadmm_status warm_convergence(const struct warm_plan *plan, sadmm_method method,
     sadmm_free(w.momentum);
     sadmm_problem_destroy(w.frozen);
     sadmm_free(w.ms);
+    sadmm_scene_close(&scene);
     return status;
 }

@@ -24,9 +24,10 @@ MAY_USE.update({
     "mesh_file": ["core/base"],
     "backend_ref": CORE,
     "backend_cpu": CORE,
-    "scenes": ["core/base", "core/math"],
+    "scene_file": ["core/base"],
+    "scenes": ["core/base", "core/math", "scene_file"],
     "fclib": ["core/base", "core/model"],
-    "cli": ["core/base", "scenes", "fclib"],
+    "cli": ["core/base", "scene_file", "scenes", "fclib"],
 })
 MAY_USE.update({folder: CORE + ["collision"] + CUDA[:place] for place, folder in enumerate(CUDA)})
 # The list of backends: the one place that names them (each through its find function).

@@ -120,6 +120,18 @@ static void on_bodies(void)
     REFUSES("world", sadmm_world_body_contact_wrench(NULL, body, six));
     REFUSES("wrench", sadmm_world_body_contact_wrench(world, body, NULL));
     REFUSES("world", sadmm_world_set_body_pair_contact(NULL, body, body, true));
+    bool pending;
+    REFUSES("world", sadmm_world_body_wrench(NULL, body, six, six + 3));
+    REFUSES("force", sadmm_world_body_wrench(world, body, NULL, six));
+    REFUSES("torque", sadmm_world_body_wrench(world, body, six, NULL));
+    REFUSES("world", sadmm_world_body_move(NULL, body, &pending, six, six));
+    REFUSES("pending", sadmm_world_body_move(world, body, NULL, six, six));
+    REFUSES("position", sadmm_world_body_move(world, body, &pending, NULL, six));
+    REFUSES("orientation", sadmm_world_body_move(world, body, &pending, six, NULL));
+    ck_assert_int_eq(sadmm_world_body_pair_off_count(NULL), 0);
+    REFUSES("world", sadmm_world_body_pair_off_at(NULL, 0, &id, &id));
+    REFUSES("a", sadmm_world_body_pair_off_at(world, 0, NULL, &id));
+    REFUSES("b", sadmm_world_body_pair_off_at(world, 0, &id, NULL));
 }
 
 static void on_shapes(void)
@@ -137,6 +149,12 @@ static void on_shapes(void)
     ck_assert_int_eq(sadmm_world_shape_def(world, shape, &def, NULL), SADMM_OK); /* body may be NULL */
     REFUSES("world", sadmm_world_set_shape_material(NULL, shape, 0.5, 0));
     REFUSES("world", sadmm_world_set_pair_friction(NULL, shape, shape, 1));
+    double friction;
+    ck_assert_int_eq(sadmm_world_pair_friction_count(NULL), 0);
+    REFUSES("world", sadmm_world_pair_friction_at(NULL, 0, &id, &id, &friction));
+    REFUSES("a", sadmm_world_pair_friction_at(world, 0, NULL, &id, &friction));
+    REFUSES("b", sadmm_world_pair_friction_at(world, 0, &id, NULL, &friction));
+    REFUSES("friction", sadmm_world_pair_friction_at(world, 0, &id, &id, NULL));
 }
 
 static void on_joints(void)
@@ -364,6 +382,7 @@ static void on_hulls(void)
     ck_assert_int_eq(sadmm_hull_face_count(NULL), 0);
     ck_assert_ptr_null(sadmm_hull_vertices(NULL));
     ck_assert_double_eq(sadmm_hull_rounding(NULL), 0);
+    ck_assert_double_eq(sadmm_hull_merge(NULL), 0);
     REFUSES("hull", sadmm_hull_face_at(NULL, 0, &face));
     REFUSES("hull", sadmm_hull_mass(NULL, 1, &mass));
     def.points = corners;
@@ -459,10 +478,11 @@ static const struct {
      {W(add_body), W(remove_body), W(body_count), W(body_at), W(body_state), W(set_body_state), W(body_def),
       W(set_body_wrench), W(add_body_force_at), W(apply_body_impulse_at), W(set_body_mass), W(set_body_user_data),
       W(set_body_gravity_scale), W(set_body_damping), W(move_body),
-      W(body_user_data), W(body_contact_wrench), W(set_body_pair_contact)}},
+      W(body_user_data), W(body_contact_wrench), W(set_body_pair_contact), W(body_wrench), W(body_move),
+      W(body_pair_off_count), W(body_pair_off_at)}},
     {on_shapes,
      {W(add_shape), W(remove_shape), W(shape_count), W(shape_at), W(shape_def), W(set_shape_material),
-      W(set_pair_friction)}},
+      W(set_pair_friction), W(pair_friction_count), W(pair_friction_at)}},
     {on_joints,
      {W(place_joint), W(add_joint), W(remove_joint), W(joint_count), W(joint_at), W(joint_def), W(set_joint_enabled),
       W(set_joint_coordinate), W(joint_state), W(set_joint_spring_table), W(joint_spring_table)}},
@@ -486,7 +506,8 @@ static const struct {
       P(get_solution), P(set_solution), P(certify)}},
     {on_hulls,
      {"sadmm_hull_create", "sadmm_hull_destroy", "sadmm_hull_vertex_count", "sadmm_hull_edge_count",
-      "sadmm_hull_face_count", "sadmm_hull_vertices", "sadmm_hull_rounding", "sadmm_hull_face_at", "sadmm_hull_mass"}},
+      "sadmm_hull_face_count", "sadmm_hull_vertices", "sadmm_hull_rounding", "sadmm_hull_merge",
+      "sadmm_hull_face_at", "sadmm_hull_mass"}},
     {on_meshes,
      {"sadmm_mesh_create", "sadmm_heightfield_create", "sadmm_mesh_destroy", "sadmm_mesh_triangle_count",
       "sadmm_mesh_left_out", "sadmm_mesh_open_edges", "sadmm_mesh_bytes", "sadmm_mesh_bounds",

@@ -279,6 +279,57 @@ START_TEST(mass_and_material_can_be_set)
 }
 END_TEST
 
+/* Wrenches, moves and pairs are read back as they are now, and go with what they are of. */
+START_TEST(what_was_set_is_told)
+{
+    const double force[3] = {1, -2, 1.0 / 3}, torque[3] = {0, 0, 7}, there[3] = {0, 3, 1}, turned[4] = {0.6, 0, 0.8, 0};
+    sadmm_body_id ground, ball, belt, a, b;
+    sadmm_world *world = ground_and_ball(SADMM_BACKEND_CPU, SADMM_F64, &ground, &ball);
+    sadmm_body_def driven = sadmm_body_def_default();
+    sadmm_shape_id shapes[2], first, second;
+    double x[3], y[4], friction;
+    bool pending;
+    driven.type = SADMM_BODY_KINEMATIC;
+    MUST(world, sadmm_world_add_body(world, &driven, &belt));
+    MUST(world, sadmm_world_set_body_wrench(world, ball, force, torque));
+    MUST(world, sadmm_world_add_body_force_at(world, ball, force, body_def(world, ball).position));
+    MUST(world, sadmm_world_body_wrench(world, ball, x, y));
+    for (int k = 0; k < 3; ++k) ck_assert(x[k] == 2 * force[k] && y[k] == torque[k]);
+    MUST(world, sadmm_world_body_wrench(world, ground, x, y));
+    ck_assert_mem_eq(x, ZERO, sizeof ZERO);
+    ck_assert_mem_eq(y, ZERO, sizeof ZERO);
+
+    MUST(world, sadmm_world_body_move(world, belt, &pending, x, y));
+    ck_assert(!pending);
+    MUST(world, sadmm_world_move_body(world, belt, there, turned));
+    MUST(world, sadmm_world_body_move(world, belt, &pending, x, y));
+    ck_assert(pending);
+    ck_assert_mem_eq(x, there, sizeof there);
+    ck_assert_mem_eq(y, turned, sizeof turned);
+    step_world(world, 1);
+    MUST(world, sadmm_world_body_move(world, belt, &pending, x, y));
+    ck_assert(!pending);
+
+    for (int k = 0; k < 2; ++k) MUST(world, sadmm_world_shape_at(world, k, &shapes[k]));
+    ck_assert(sadmm_world_pair_friction_count(world) == 0 && sadmm_world_body_pair_off_count(world) == 0);
+    MUST(world, sadmm_world_set_pair_friction(world, shapes[1], shapes[0], 0.25));
+    MUST(world, sadmm_world_set_body_pair_contact(world, belt, ball, false));
+    ck_assert(sadmm_world_pair_friction_count(world) == 1 && sadmm_world_body_pair_off_count(world) == 1);
+    MUST(world, sadmm_world_pair_friction_at(world, 0, &first, &second, &friction));
+    ck_assert(friction == 0.25 && first.slot == shapes[0].slot && second.slot == shapes[1].slot &&
+              second.generation == shapes[1].generation);
+    MUST(world, sadmm_world_body_pair_off_at(world, 0, &a, &b));
+    ck_assert(a.slot == ball.slot && b.slot == belt.slot && b.generation == belt.generation);
+    REFUSED(world, sadmm_world_pair_friction_at(world, 1, &first, &second, &friction), "index = 1: must be in [0, 1)");
+    REFUSED(world, sadmm_world_body_pair_off_at(world, -1, &a, &b), "index = -1: must be in [0, 1)");
+    MUST(world, sadmm_world_remove_body(world, ball));
+    ck_assert(sadmm_world_pair_friction_count(world) == 0 && sadmm_world_body_pair_off_count(world) == 0);
+    ck_assert_int_eq(sadmm_world_body_wrench(world, ball, x, y), SADMM_ERROR_STALE_ID);
+    ck_assert_int_eq(sadmm_world_body_move(world, ball, &pending, x, y), SADMM_ERROR_STALE_ID);
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 START_TEST(user_data_goes_with_the_body)
 {
     sadmm_body_id ground, ball;
@@ -428,6 +479,7 @@ int main(void)
     tcase_add_test(cases, wrenches_on_static_bodies_are_refused);
     tcase_add_test(cases, forces_and_impulses_at_a_point);
     tcase_add_loop_test(cases, mass_and_material_can_be_set, 0, 2);
+    tcase_add_test(cases, what_was_set_is_told);
     tcase_add_test(cases, user_data_goes_with_the_body);
     tcase_add_loop_test(cases, inertias_that_are_taken_can_be_stepped, 0, 2);
     tcase_add_loop_test(cases, residuals_are_measured_when_a_stop_rule_ends_the_step, 0, 2);

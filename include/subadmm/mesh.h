@@ -75,8 +75,8 @@ SADMM_API size_t sadmm_mesh_bytes(const sadmm_mesh *mesh);
 /* The smallest box around it, in the frame of the vertices (or of the grid), m. Errors: INVALID_ARGUMENT (NULL). */
 SADMM_API sadmm_status sadmm_mesh_bounds(const sadmm_mesh *mesh, double lowest[3], double highest[3]);
 
-/* What the definition was, so that the same mesh can be made again, up to rounding: coordinates are kept from the
- * middle of the box around the mesh, and come back within 2^-52 times the largest of all. */
+/* What the definition was, so that the same mesh can be made again, bit for bit. (Contact finding has coordinates from
+ * the middle of the box around the mesh; where these do not add up to the definition's again, a mesh keeps both.) */
 
 /* Vertices: those of the definition that triangles have, in its order, of several in one place the first; of a
  * heightfield all, row by row. Of NULL: 0. */

@@ -136,6 +136,10 @@ SADMM_API sadmm_status sadmm_world_set_body_state(sadmm_world *world, sadmm_body
  * (range; a body that is not kinematic; nothing changes). */
 SADMM_API sadmm_status sadmm_world_move_body(sadmm_world *world, sadmm_body_id id, const double position[3],
                                              const double orientation[4]);
+/* Is a kinematic body to go to a pose within the next step (sadmm_world_move_body)? *pending: whether; position (m)
+ * and orientation (w x y z) are written where it is. Errors: STALE_ID, DEVICE. */
+SADMM_API sadmm_status sadmm_world_body_move(sadmm_world *world, sadmm_body_id id, bool *pending, double position[3],
+                                             double orientation[4]);
 /* Read back the definition (mass, inertia, type, name, scale of gravity, damping) with the current state. The name is
  * the world's own: it stays where it is, and valid, until the body is removed or the world destroyed. Errors: STALE_ID,
  * DEVICE. */
@@ -144,6 +148,9 @@ SADMM_API sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id
  * again. Errors: STALE_ID, INVALID_ARGUMENT (range; a body that is not dynamic). */
 SADMM_API sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, const double force[3],
                                                    const double torque[3]);
+/* Read back the external force (N) and torque (N m) as they are now; 0 of bodies that are not dynamic. Errors:
+ * STALE_ID, DEVICE. */
+SADMM_API sadmm_status sadmm_world_body_wrench(sadmm_world *world, sadmm_body_id id, double force[3], double torque[3]);
 /* Replace the scale of gravity, or damping (1/s), of a body, ranges and meaning as in the definition, from the next
  * step on. Errors: STALE_ID, INVALID_ARGUMENT (range; a body that is not dynamic; nothing changes), DEVICE. */
 SADMM_API sadmm_status sadmm_world_set_body_gravity_scale(sadmm_world *world, sadmm_body_id id, double scale);
@@ -176,6 +183,12 @@ SADMM_API sadmm_status sadmm_world_body_contact_wrench(sadmm_world *world, sadmm
  * OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_set_body_pair_contact(sadmm_world *world, sadmm_body_id a, sadmm_body_id b,
                                                          bool enabled);
+/* Pairs of bodies whose contact is off; of NULL: 0. */
+SADMM_API int32_t sadmm_world_body_pair_off_count(const sadmm_world *world);
+/* The index-th of them in order of creation slots, the lower slot first, index in [0, body_pair_off_count). Errors:
+ * INVALID_ARGUMENT (range). */
+SADMM_API sadmm_status sadmm_world_body_pair_off_at(sadmm_world *world, int32_t index, sadmm_body_id *a,
+                                                    sadmm_body_id *b);
 
 /* Principal inertia of solid bodies with their axes along the shape's, kg m^2. With a NULL pointer nothing is done.
  * box: half extents (m). capsule: radius and half length of the segment (m), axis z. */
@@ -239,6 +252,12 @@ SADMM_API sadmm_status sadmm_world_set_shape_material(sadmm_world *world, sadmm_
  * INVALID_ARGUMENT (range; a and b the same), OUT_OF_MEMORY. */
 SADMM_API sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_shape_id a, sadmm_shape_id b,
                                                      double friction);
+/* Pairs of shapes with a friction of their own; of NULL: 0. */
+SADMM_API int32_t sadmm_world_pair_friction_count(const sadmm_world *world);
+/* The index-th of them in order of creation slots, the lower slot first, index in [0, pair_friction_count). Errors:
+ * INVALID_ARGUMENT (range). */
+SADMM_API sadmm_status sadmm_world_pair_friction_at(sadmm_world *world, int32_t index, sadmm_shape_id *a,
+                                                    sadmm_shape_id *b, double *friction);
 
 /* ---- stepping ---------------------------------------------------------------------------------------------- */
 

@@ -4,6 +4,7 @@
 #include "check_runs.h"
 #include "cli.h"
 #include "interrupt.h"
+#include "open_scene.h"
 
 enum { OPTION_STEPS, OPTION_METHOD, OPTION_ITERATIONS, OPTION_JSON, OPTION_QUIET };
 
@@ -241,17 +242,19 @@ static int run(int argc, char **argv)
 {
     struct check_options o = {.steps = 20};
     struct sadmm_scene scene;
-    struct sadmm_error error = {0};
     struct output *json;
     const char *spec;
     int code = cli_parse(&cli_check, argc, argv, set_option, &o, &spec);
     if (code >= 0) return code;
-    if (sadmm_scene_open(spec, &scene, &error) != SADMM_OK) return cli_error(CLI_USAGE, "%s", error.message);
+    if ((code = cli_open_scene(spec, &scene)) != CLI_DONE) return code;
     if (o.method_given) sadmm_scene_set_method(&scene, o.method);
     if (o.iterations > 0) scene.def.settings.iterations = (int)o.iterations;
     interrupts_expect();
-    if ((code = cli_open_json(o.json, &json)) != CLI_DONE) return code;
-    return check_scene(&o, spec, &scene, json);
+    cli_protect_scene(spec);
+    code = cli_open_json(o.json, &json);
+    if (code == CLI_DONE) code = check_scene(&o, spec, &scene, json);
+    sadmm_scene_close(&scene);
+    return code;
 }
 
 const struct cli_command cli_check = {

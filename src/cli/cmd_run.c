@@ -10,6 +10,7 @@
 #include "core/base/memory.h"
 #include "fclib/fclib.h"
 #include "interrupt.h"
+#include "open_scene.h"
 #include "run_record.h"
 #include "run_trace.h"
 
@@ -334,22 +335,31 @@ static int run(int argc, char **argv)
     const char *spec;
     int code = cli_parse(&cli_run, argc, argv, set_option, &o, &spec);
     if (code >= 0) return code;
-    if (sadmm_scene_open(spec, &scene, &error) != SADMM_OK) return cli_error(CLI_USAGE, "%s", error.message);
+    if ((code = cli_open_scene(spec, &scene)) != CLI_DONE) return code;
     apply(&o, &scene);
     if (o.steps < 0) o.steps = lround(fmin(scene.duration / scene.def.settings.dt, 1e9));
-    if ((code = check_options(&o, &scene)) != CLI_DONE) return code;
-    interrupts_expect();
-    if ((code = open_outputs(&o, &json, &trace)) != CLI_DONE) return code;
-    if (sadmm_scene_build(&scene, &world, &error) != SADMM_OK) return cli_error(CLI_FAILED, "%s", error.message);
-    code = run_world(&o, spec, &scene, world, json, trace);
+    code = check_options(&o, &scene);
+    if (code == CLI_DONE) {
+        interrupts_expect();
+        cli_protect_scene(spec);
+        code = open_outputs(&o, &json, &trace);
+    }
+    if (code == CLI_DONE && sadmm_scene_build(&scene, &world, &error) != SADMM_OK)
+        code = cli_error(CLI_FAILED, "%s", error.message);
+    if (code == CLI_DONE) code = run_world(&o, spec, &scene, world, json, trace);
     sadmm_world_destroy(world);
+    sadmm_scene_close(&scene);
     return code;
 }
 
 const struct cli_command cli_run = {
     .name = "run",
     .operands = "SCENE",
-    .summary = "simulate a scene (subadmm scenes lists them)",
+    .summary = "simulate a scene (subadmm scenes lists them), or a scene file",
+    .text =
+        "SCENE: name, name:N or name:N:M. What ends in .json or has a / in it is a scene file, as subadmm scenes NAME\n"
+        "--json writes it: a world at its beginning, without the script that a scene may follow, and without its\n"
+        "measure of success.\n",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .operands_min = 1,

@@ -1,20 +1,11 @@
-#include <math.h>
 #include <string.h>
 #include <sys/utsname.h>
 
 #include "cli.h"
+#include "scene_file/fields.h"
 
-json_t *cli_json_real(double x)
-{
-    return isfinite(x) ? json_real(x) : json_null();
-}
-
-json_t *cli_json_reals(const double *x, size_t count)
-{
-    json_t *array = json_array();
-    for (size_t k = 0; k < count; ++k) json_array_append_new(array, cli_json_real(x[k]));
-    return array;
-}
+json_t *cli_json_real(double x) { return sadmm_json_real(x); }
+json_t *cli_json_reals(const double *x, size_t count) { return sadmm_json_reals(x, count); }
 
 /* "model name : ..." of Linux on x86; elsewhere the kind of machine. */
 static bool processor_name(char *text, size_t size)
@@ -47,36 +38,12 @@ json_t *cli_json_device(sadmm_backend backend)
     return processor_name(text, sizeof text) ? json_string(text) : json_null();
 }
 
-void cli_json_add_build(json_t *object)
-{
-    json_object_set_new(object, "version", json_string(sadmm_version()));
-    json_object_set_new(object, "commit", json_string(sadmm_build_commit()));
-    json_object_set_new(object, "compiler", json_string(sadmm_build_compiler()));
-}
+void cli_json_add_build(json_t *object) { sadmm_json_add_build(object); }
 
 json_t *cli_json_settings(const sadmm_settings *s)
 {
     json_t *o = json_object();
-    json_object_set_new(o, "dt", cli_json_real(s->dt));
-    json_object_set_new(o, "substeps", json_integer(s->substeps));
-    json_object_set_new(o, "gravity", cli_json_reals(s->gravity, 3));
-    json_object_set_new(o, "method", json_string(cli_method_name(s->method)));
-    json_object_set_new(o, "iterations", json_integer(s->iterations));
-    json_object_set_new(o, "relaxation", cli_json_real(s->relaxation));
-    json_object_set_new(o, "penalty_period", json_integer(s->penalty_period));
-    json_object_set_new(o, "penalty_mass_factor", cli_json_real(s->penalty_mass_factor));
-    json_object_set_new(o, "penalty_offset", cli_json_real(s->penalty_offset));
-    json_object_set_new(o, "penalty_ratio_limit", cli_json_real(s->penalty_ratio_limit));
-    json_object_set_new(o, "penalty_update_warm", json_boolean(s->penalty_update_warm));
-    json_object_set_new(o, "warm_start", json_boolean(s->warm_start));
-    json_object_set_new(o, "residual_tolerance", cli_json_real(s->residual_tolerance));
-    json_object_set_new(o, "certificate_tolerance", cli_json_real(s->certificate_tolerance));
-    json_object_set_new(o, "certificate_momentum_tolerance", cli_json_real(s->certificate_momentum_tolerance));
-    json_object_set_new(o, "check_period", json_integer(s->check_period));
-    json_object_set_new(o, "baumgarte", cli_json_real(s->baumgarte));
-    json_object_set_new(o, "slop", cli_json_real(s->slop));
-    json_object_set_new(o, "correction_speed", cli_json_real(s->correction_speed));
-    json_object_set_new(o, "restitution_threshold", cli_json_real(s->restitution_threshold));
+    sadmm_write_fields(o, &sadmm_settings_fields, s);
     return o;
 }
 

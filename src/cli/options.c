@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "cli.h"
+#include "scene_file/fields.h"
 
 enum { MOST_OPTIONS = 32, HELP_COLUMN = 28, FIRST_VALUE = 1000 /* of an option, for getopt: no character */ };
 
@@ -157,10 +158,6 @@ static const char *const backend_names[SADMM_BACKEND_COUNT] = {
     [SADMM_BACKEND_CUDA] = "cuda",
 };
 static const char *const precision_names[] = {[SADMM_F32] = "f32", [SADMM_F64] = "f64"};
-static const char *const method_names[SADMM_METHOD_COUNT] = {
-    [SADMM_METHOD_PAPER] = "paper",
-    [SADMM_METHOD_FAST] = "fast",
-};
 
 const char *cli_backend_name(sadmm_backend backend)
 {
@@ -174,7 +171,7 @@ const char *cli_precision_name(sadmm_precision precision)
 
 const char *cli_method_name(sadmm_method method)
 {
-    return (unsigned)method < SADMM_METHOD_COUNT ? method_names[method] : "?";
+    return (unsigned)method < SADMM_METHOD_COUNT ? sadmm_method_names[method] : "?";
 }
 
 bool cli_read_backend(const char *option, const char *text, sadmm_backend *out)
@@ -202,7 +199,7 @@ bool cli_read_precision(const char *option, const char *text, sadmm_precision *o
 bool cli_read_method(const char *option, const char *text, sadmm_method *out)
 {
     for (int k = 0; k < SADMM_METHOD_COUNT; ++k)
-        if (strcmp(text, method_names[k]) == 0) {
+        if (strcmp(text, sadmm_method_names[k]) == 0) {
             *out = (sadmm_method)k;
             return true;
         }

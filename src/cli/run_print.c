@@ -168,6 +168,7 @@ void run_record_print(const struct run_record *record, const char *spec, const s
     const sadmm_step_report *last = &record->last;
     const sadmm_certificate *c = &last->certificate;
     printf("scene          %s, %zu bodies\n", spec, record->body_count);
+    if (scene->loaded) printf("file           a world at its beginning: no script, no measure of success\n");
     printf("steps          %zu of %g s", record->steps, scene->def.settings.dt);
     if (scene->def.settings.substeps > 1) printf(" in %d sub-steps", scene->def.settings.substeps);
     printf("%s\n", interrupted() ? ", interrupted" : "");

@@ -69,7 +69,7 @@ struct making {
     double *scaled;            /* the points as qhull gets them */
     double *vertices, *planes; /* of the mesh */
     int32_t *rank;
-    double rounding;
+    double merge, rounding;
     size_t vertex_capacity, plane_capacity, rank_capacity;
 };
 
@@ -258,6 +258,7 @@ static bool fill(struct making *m, const double *given, const struct hull_solid 
         memcpy(hull->vertices + 3 * v, given + 3 * m->points.at[m->mesh.point[v]].number, 3 * sizeof *given);
     memcpy(hull->face_first, m->mesh.face_first, ((size_t)hull->face_count + 1) * sizeof *hull->face_first);
     memcpy(hull->corners, m->mesh.corner, (size_t)m->mesh.face_first[hull->face_count] * sizeof *hull->corners);
+    hull->merge = m->merge;
     hull->rounding = m->rounding;
     hull->volume = solid->volume;
     memcpy(hull->moments, solid->moments, sizeof hull->moments);
@@ -306,7 +307,7 @@ sadmm_status sadmm_hull_create(const sadmm_hull_def *def, sadmm_hull **out)
     TRY(sadmm_check_range("def->merge", def->merge, 0, 1e-2, NULL));
     TRY(sadmm_check_range("def->rounding", def->rounding, 0, 1e6, NULL));
     TRY(sadmm_check_vector("def->points", def->points, 3 * (int)def->point_count, 1e6, NULL));
-    struct making m = {.rounding = def->rounding};
+    struct making m = {.merge = def->merge, .rounding = def->rounding};
     const sadmm_status status = make(&m, def, out, NULL);
     free_making(&m);
     return status;
@@ -337,6 +338,11 @@ const double *sadmm_hull_vertices(const sadmm_hull *hull)
 double sadmm_hull_rounding(const sadmm_hull *hull)
 {
     return hull ? hull->rounding : 0;
+}
+
+double sadmm_hull_merge(const sadmm_hull *hull)
+{
+    return hull ? hull->merge : 0;
 }
 
 sadmm_status sadmm_hull_face_at(const sadmm_hull *hull, int32_t face, sadmm_hull_face *out)

@@ -27,6 +27,7 @@ struct sadmm_hull {
     int32_t vertex_count, edge_count, face_count;
     double *block;          /* hull_data.h */
     size_t doubles;         /* of the block */
+    double merge;           /* as it was asked for */
     double rounding;        /* m; the vertices are those of the core */
     double half[3];         /* of the box around the hull, rounding included, m */
     double position[3], orientation[4]; /* the block's frame in that of the points */

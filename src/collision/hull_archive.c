@@ -121,7 +121,7 @@ static void archive_lists(struct sadmm_archive *archive, struct sadmm_hull *hull
     if (archive->reading && archive->status == SADMM_OK)
         sadmm_archive_expect(archive,
                              block_fits(hull) && faces_fit(hull) && sadmm_all_finite(hull->vertices, 3 * vertices) &&
-                                 sadmm_all_finite(hull->half, 3) && sadmm_all_finite(hull->position, 3) && sadmm_all_finite(hull->orientation, 4),
+                                 hull->merge >= 0 && hull->merge <= 1e-2 && sadmm_all_finite(hull->half, 3) && sadmm_all_finite(hull->position, 3) && sadmm_all_finite(hull->orientation, 4),
                              "a hull");
 }
 
@@ -142,6 +142,7 @@ void sadmm_hull_archive(struct sadmm_archive *archive, sadmm_hull **hull)
     SADMM_ARCHIVE(archive, h->edge_count);
     SADMM_ARCHIVE(archive, h->face_count);
     SADMM_ARCHIVE(archive, doubles);
+    SADMM_ARCHIVE(archive, h->merge);
     SADMM_ARCHIVE(archive, h->rounding);
     SADMM_ARCHIVE(archive, h->half);
     SADMM_ARCHIVE(archive, h->position);

@@ -42,6 +42,7 @@ static void free_mesh(sadmm_mesh *mesh)
     if (!mesh) return;
     sadmm_free(mesh->block);
     sadmm_free(mesh->source);
+    sadmm_free(mesh->given);
     sadmm_free(mesh);
 }
 
@@ -52,6 +53,22 @@ void sadmm_mesh_release(const sadmm_mesh *mesh)
 }
 
 void sadmm_mesh_destroy(sadmm_mesh *mesh) { sadmm_mesh_release(mesh); }
+
+/* Keep `count` numbers, `per` a vertex, as they were given if one of them would not come back from the block's, which
+ * are from `middle`. False: out of memory. */
+static bool keep_given(sadmm_mesh *mesh, const double *given, const double *inside, size_t count, size_t per,
+                       const double *middle)
+{
+    bool exact = true;
+    for (size_t i = 0; i < count && exact; ++i) {
+        const double back = inside[i] + middle[i % per];
+        exact = memcmp(&back, &given[i], sizeof back) == 0;
+    }
+    if (exact) return true;
+    mesh->given = (double *)sadmm_alloc(count, sizeof *given);
+    if (mesh->given) memcpy(mesh->given, given, count * sizeof *given);
+    return mesh->given != NULL;
+}
 
 /* ---- marks ------------------------------------------------------------------------------------------------------- */
 
@@ -225,8 +242,22 @@ static void keep_triangles(const sadmm_mesh_def *def, struct making *m)
     }
 }
 
-/* Vertices that are corners get numbers in order; the box around them. */
-static void number_vertices(const sadmm_mesh_def *def, struct making *m, sadmm_mesh *mesh)
+/* m->same: the number of every vertex, -1: it is no corner. False: out of memory. */
+static bool keep_vertices(const sadmm_mesh_def *def, const struct making *m, sadmm_mesh *mesh)
+{
+    const size_t count = 3 * (size_t)m->vertex_count;
+    double *corners = (double *)sadmm_alloc(count, sizeof *corners);
+    if (!corners) return false;
+    for (size_t v = 0; v < def->vertex_count; ++v)
+        if (m->same[v] >= 0)
+            memcpy(corners + 3 * (size_t)m->same[v], def->vertices + 3 * v, 3 * sizeof *corners);
+    const bool kept = keep_given(mesh, corners, m->vertices, count, 3, mesh->middle);
+    sadmm_free(corners);
+    return kept;
+}
+
+/* Vertices that are corners get numbers in order; the box around them. False: out of memory. */
+static bool number_vertices(const sadmm_mesh_def *def, struct making *m, sadmm_mesh *mesh)
 {
     double lo[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
     for (size_t v = 0; v < def->vertex_count; ++v) m->same[v] = -1;
@@ -250,6 +281,7 @@ static void number_vertices(const sadmm_mesh_def *def, struct making *m, sadmm_m
         m->vertices[i] -= mesh->middle[i % 3];
         mesh->half[i % 3] = fmax(mesh->half[i % 3], fabs(m->vertices[i]));
     }
+    return keep_vertices(def, m, mesh);
 }
 
 /* Corners as the tree has its triangles; what they were. */
@@ -308,7 +340,7 @@ static sadmm_status make_triangles(const sadmm_mesh_def *def, struct making *m, 
                           "def->triangles: none of %zu has three corners that are not in one line",
                           def->triangle_count);
     mesh->left_out = (int64_t)def->triangle_count - m->triangle_count;
-    number_vertices(def, m, mesh);
+    if (!number_vertices(def, m, mesh)) return sadmm_fail_memory(error, "a mesh");
     if (!sadmm_mesh_tree_make(m->vertices, m->corners, m->triangle_count, &m->tree))
         return sadmm_fail_memory(error, "a mesh");
     order_triangles(m, mesh);
@@ -371,7 +403,9 @@ static sadmm_status make_heights(const sadmm_heightfield_def *def, sadmm_mesh *m
     memcpy(mesh->block, &header, sizeof header);
     mesh_at(mesh->block, 0, &view);
     for (size_t i = 0; i < count; ++i) ((double *)view.x)[i] = def->heights[i] - mesh->middle[2];
-    if (!mark_triangles(&view, NULL, (uint16_t *)view.marks)) return sadmm_fail_memory(error, "a heightfield");
+    if (!mark_triangles(&view, NULL, (uint16_t *)view.marks) ||
+        !keep_given(mesh, def->heights, view.x, count, 1, mesh->middle + 2))
+        return sadmm_fail_memory(error, "a heightfield");
     return SADMM_OK;
 }
 
@@ -459,6 +493,8 @@ sadmm_status sadmm_mesh_vertex_at(const sadmm_mesh *mesh, int64_t vertex, double
     TRY(check_index(vertex, sadmm_mesh_vertex_count(mesh), "vertex"));
     mesh_at(mesh->block, 0, &view);
     v3_store(v3_add(mesh_vertex(&view, (int32_t)vertex), v3_load(mesh->middle)), position);
+    if (mesh->given && view.kind == MESH_HEIGHTS) position[2] = mesh->given[vertex];
+    else if (mesh->given) memcpy(position, mesh->given + 3 * vertex, 3 * sizeof *position);
     return SADMM_OK;
 }
 

@@ -21,6 +21,8 @@ struct sadmm_mesh {
     size_t doubles;        /* of the block */
     double half[3];        /* of the box around it, m */
     double middle[3];      /* of that box, in the frame of the vertices: the block's origin */
+    double *given;         /* vertices (3 numbers each), or heights, as they were given; NULL: the block's, from the
+                              middle, come back to the same bits */
     int32_t *source;       /* by triangle, its number in the definition; NULL: the same */
     int64_t left_out;
 };

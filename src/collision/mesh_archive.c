@@ -65,9 +65,15 @@ static bool mesh_fits(const struct sadmm_mesh *mesh)
     return h->kind == MESH_HEIGHTS ? heights_fit(mesh, h) : h->kind == MESH_TRIANGLES && triangles_fit(mesh, h);
 }
 
+/* Of vertices or heights, where they are kept as they were given. */
+static size_t numbers_given(const struct sadmm_mesh_header *header)
+{
+    return header->kind == MESH_HEIGHTS ? (size_t)header->columns * (size_t)header->rows : 3 * (size_t)header->vertices;
+}
+
 void sadmm_mesh_archive(struct sadmm_archive *archive, sadmm_mesh **mesh)
 {
-    size_t none = 0, none_too = 0, sources = 0;
+    size_t none[3] = {0}, sources = 0, given = 0;
     if (archive->reading) {
         *mesh = (sadmm_mesh *)sadmm_alloc(1, sizeof **mesh);
         if (!*mesh) {
@@ -80,14 +86,17 @@ void sadmm_mesh_archive(struct sadmm_archive *archive, sadmm_mesh **mesh)
     SADMM_ARCHIVE(archive, m->half);
     SADMM_ARCHIVE(archive, m->middle);
     SADMM_ARCHIVE(archive, m->left_out);
-    sadmm_archive_array(archive, &m->block, &m->doubles, &none, sizeof *m->block, INT32_MAX);
-    if (!archive->reading && m->source) sources = (size_t)((const struct sadmm_mesh_header *)m->block)->triangles;
-    sadmm_archive_count(archive, &sources, sizeof *m->source, INT32_MAX);
-    if (archive->reading && sources > 0)
-        sadmm_archive_room(archive, &m->source, &none_too, sources, sizeof *m->source);
-    if (archive->status != SADMM_OK) return;
-    sadmm_archive_bytes(archive, m->source, sources * sizeof *m->source);
-    if (!archive->reading || !sadmm_archive_expect(archive, mesh_fits(m), "a mesh")) return;
-    sadmm_archive_expect(
-        archive, sources == 0 || sources == (size_t)((const struct sadmm_mesh_header *)m->block)->triangles, "a mesh");
+    sadmm_archive_array(archive, &m->block, &m->doubles, &none[0], sizeof *m->block, INT32_MAX);
+    const struct sadmm_mesh_header *header = (const struct sadmm_mesh_header *)m->block;
+    if (!archive->reading && m->source) sources = (size_t)header->triangles;
+    if (!archive->reading && m->given) given = numbers_given(header);
+    sadmm_archive_array(archive, &m->source, &sources, &none[1], sizeof *m->source, INT32_MAX);
+    sadmm_archive_array(archive, &m->given, &given, &none[2], sizeof *m->given, INT32_MAX);
+    if (!archive->reading || archive->status != SADMM_OK) return;
+    if (!sadmm_archive_expect(archive, mesh_fits(m), "a mesh")) return;
+    header = (const struct sadmm_mesh_header *)m->block;
+    sadmm_archive_expect(archive,
+                         (sources == 0 || sources == (size_t)header->triangles) &&
+                             (given == 0 || given == numbers_given(header)) && sadmm_all_finite(m->given, given),
+                         "a mesh");
 }

@@ -6,7 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/base/memory.h"
 #include "family.h"
+#include "scene_file/scene_file.h"
 
 static const struct sadmm_scene_family *const families[] = {
     &sadmm_family_sliding_cubes, &sadmm_family_vertical_stacks, &sadmm_family_oblique_stacks,
@@ -45,9 +47,10 @@ static const struct sadmm_scene_family *find(const char *name, size_t length)
     return NULL;
 }
 
+/* NULL: a scene from a file, or none that was opened. */
 static const struct sadmm_scene_family *family_of(const struct sadmm_scene *scene)
 {
-    return scene && scene->info ? find(scene->info->name, strlen(scene->info->name)) : NULL;
+    return scene && scene->info && !scene->loaded ? find(scene->info->name, strlen(scene->info->name)) : NULL;
 }
 
 static sadmm_status fail_unknown(const char *spec, struct sadmm_error *error)
@@ -95,6 +98,95 @@ static sadmm_status parse_numbers(const struct sadmm_scene_family *family, const
     return parse_number(spec, 'M', second + 1, strlen(second + 1), family->m_min, family->m_max, m, error);
 }
 
+static sadmm_status fail_unopened(struct sadmm_error *error)
+{
+    return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene: must come from sadmm_scene_open");
+}
+
+/* ---- files ------------------------------------------------------------------------------------------------------- */
+
+struct sadmm_scene_loaded {
+    struct sadmm_scene_info info;
+    struct sadmm_scene_file *file;
+};
+
+bool sadmm_scene_is_file(const char *spec) { return spec && sadmm_scene_file_is_path(spec); }
+
+/* A scene of a file that has been read, and that belongs to it. */
+static sadmm_status take_file(struct sadmm_scene_file *file, struct sadmm_scene *scene, struct sadmm_error *error)
+{
+    const struct sadmm_scene_about *about = sadmm_scene_file_about(file);
+    struct sadmm_scene_loaded *loaded = (struct sadmm_scene_loaded *)sadmm_alloc(1, sizeof *loaded);
+    if (!loaded) {
+        sadmm_scene_file_close(file);
+        return sadmm_fail_memory(error, "a scene");
+    }
+    loaded->file = file;
+    loaded->info = (struct sadmm_scene_info){.name = about->name,
+                                             .arguments = "",
+                                             .description = about->description,
+                                             .duration = about->duration,
+                                             .substeps = about->substeps[SADMM_METHOD_FAST]};
+    memcpy(loaded->info.iterations, about->iterations, sizeof about->iterations);
+    *scene = (struct sadmm_scene){.def = sadmm_scene_file_def(file),
+                                  .duration = about->duration,
+                                  .info = &loaded->info,
+                                  .n = about->n < 0 ? 0 : about->n,
+                                  .m = about->m < 0 ? 0 : about->m,
+                                  .loaded = loaded};
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_scene_open_file(const char *path, struct sadmm_scene *scene, struct sadmm_error *error)
+{
+    struct sadmm_scene_file *file;
+    if (!path) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "path = NULL: must be a string");
+    if (!scene) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene out = NULL: must not be NULL");
+    TRY(sadmm_scene_file_open(path, &file, error));
+    return take_file(file, scene, error);
+}
+
+sadmm_status sadmm_scene_open_text(const char *text, size_t length, const char *name, struct sadmm_scene *scene,
+                                   struct sadmm_error *error)
+{
+    struct sadmm_scene_file *file;
+    if (!text) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "text = NULL: must not be NULL");
+    if (!scene) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene out = NULL: must not be NULL");
+    TRY(sadmm_scene_file_parse(text, length, name, &file, error));
+    return take_file(file, scene, error);
+}
+
+void sadmm_scene_close(struct sadmm_scene *scene)
+{
+    if (!scene || !scene->loaded) return;
+    sadmm_scene_file_close(scene->loaded->file);
+    sadmm_free(scene->loaded);
+    scene->loaded = NULL;
+    scene->info = NULL;
+}
+
+sadmm_status sadmm_scene_write(const struct sadmm_scene *scene, const char *spec, sadmm_world *world, FILE *stream,
+                               struct sadmm_error *error)
+{
+    if (!scene || !scene->info) return fail_unopened(error);
+    if (!world) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "world = NULL: must not be NULL");
+    if (!stream) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "stream = NULL: must not be NULL");
+    const struct sadmm_scene_info *info = scene->info;
+    struct sadmm_scene_about about = {.spec = spec ? spec : info->name,
+                                      .name = info->name,
+                                      .description = info->description,
+                                      .n = *info->arguments ? scene->n : -1,
+                                      .m = scene->m > 0 ? scene->m : -1,
+                                      .substeps = {[SADMM_METHOD_PAPER] = 1,
+                                                   [SADMM_METHOD_FAST] = info->substeps > 0 ? info->substeps : 1}};
+    memcpy(about.iterations, info->iterations, sizeof about.iterations);
+    if (scene->loaded) about = *sadmm_scene_file_about(scene->loaded->file);
+    about.duration = scene->duration;
+    return sadmm_scene_file_write(&about, &scene->def, world, stream, error);
+}
+
+/* ---- scenes ------------------------------------------------------------------------------------------------------ */
+
 sadmm_status sadmm_scene_open(const char *spec, struct sadmm_scene *scene, struct sadmm_error *error)
 {
     const struct sadmm_scene_family *family;
@@ -103,6 +195,7 @@ sadmm_status sadmm_scene_open(const char *spec, struct sadmm_scene *scene, struc
 
     if (!spec) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene = NULL: must be a string");
     if (!scene) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene out = NULL: must not be NULL");
+    if (sadmm_scene_is_file(spec)) return sadmm_scene_open_file(spec, scene, error);
     colon = strchr(spec, ':');
     family = find(spec, colon ? (size_t)(colon - spec) : strlen(spec));
     if (!family) return fail_unknown(spec, error);
@@ -126,6 +219,7 @@ void sadmm_scene_set_method(struct sadmm_scene *scene, sadmm_method method)
     scene->def.settings.method = method;
     scene->def.settings.iterations = scene->info->iterations[method];
     scene->def.settings.substeps = method == SADMM_METHOD_FAST && substeps > 0 ? substeps : 1;
+    if (scene->loaded) scene->def.settings.substeps = sadmm_scene_file_about(scene->loaded->file)->substeps[method];
 }
 
 sadmm_status sadmm_scene_build(const struct sadmm_scene *scene, sadmm_world **world, struct sadmm_error *error)
@@ -135,7 +229,7 @@ sadmm_status sadmm_scene_build(const struct sadmm_scene *scene, sadmm_world **wo
 
     if (!world) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "world out = NULL: must not be NULL");
     *world = NULL;
-    if (!family) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene: must come from sadmm_scene_open");
+    if (!family && !(scene && scene->loaded)) return fail_unopened(error);
     status = sadmm_world_create(&scene->def, world);
     if (status != SADMM_OK) {
         char message[SADMM_MESSAGE_SIZE]; /* sadmm_fail writes the buffer that sadmm_last_message reads */
@@ -143,7 +237,7 @@ sadmm_status sadmm_scene_build(const struct sadmm_scene *scene, sadmm_world **wo
         *world = NULL;
         return sadmm_fail(error, status, "%s", message);
     }
-    status = family->fill(scene, *world, error);
+    status = family ? family->fill(scene, *world, error) : sadmm_scene_file_fill(scene->loaded->file, *world, error);
     if (status != SADMM_OK) {
         sadmm_world_destroy(*world);
         *world = NULL;
@@ -156,7 +250,8 @@ sadmm_status sadmm_scene_before_step(const struct sadmm_scene *scene, sadmm_worl
 {
     const struct sadmm_scene_family *family = family_of(scene);
 
-    if (!family) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene: must come from sadmm_scene_open");
+    if (scene && scene->loaded) return SADMM_OK;
+    if (!family) return fail_unopened(error);
     return family->before_step ? family->before_step(scene, world, step, error) : SADMM_OK;
 }
 
@@ -165,9 +260,9 @@ sadmm_status sadmm_scene_observe(const struct sadmm_scene *scene, sadmm_world *w
 {
     const struct sadmm_scene_family *family = family_of(scene);
 
-    if (!family) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "scene: must come from sadmm_scene_open");
+    if (!family && !(scene && scene->loaded)) return fail_unopened(error);
     if (!result) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "result = NULL: must not be NULL");
-    return family->observe ? family->observe(scene, world, step, result, error) : SADMM_OK;
+    return family && family->observe ? family->observe(scene, world, step, result, error) : SADMM_OK;
 }
 
 bool sadmm_scene_passed(const struct sadmm_scene_result *result)

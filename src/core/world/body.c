@@ -317,6 +317,24 @@ sadmm_status sadmm_world_move_body(sadmm_world *world, sadmm_body_id id, const d
     return SADMM_OK;
 }
 
+sadmm_status sadmm_world_body_move(sadmm_world *world, sadmm_body_id id, bool *pending, double position[3],
+                                   double orientation[4])
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
+    if (!body) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(pending, "pending", error));
+    TRY(sadmm_check_given(position, "position", error));
+    TRY(sadmm_check_given(orientation, "orientation", error));
+    TRY(sadmm_world_pull_bodies(world));
+    *pending = body->target.set;
+    if (!body->target.set) return SADMM_OK;
+    memcpy(position, body->target.position, sizeof body->target.position);
+    memcpy(orientation, body->target.orientation, sizeof body->target.orientation);
+    return SADMM_OK;
+}
+
 sadmm_status sadmm_world_body_def(sadmm_world *world, sadmm_body_id id, sadmm_body_def *def)
 {
     TRY(sadmm_check_given(world, "world", NULL));
@@ -371,6 +389,20 @@ sadmm_status sadmm_world_set_body_wrench(sadmm_world *world, sadmm_body_id id, c
     memcpy(body->rigid.wrench, force, 3 * sizeof *force);
     memcpy(body->rigid.wrench + 3, torque, 3 * sizeof *torque);
     sadmm_world_edit(world, body, SADMM_EDIT_FORCES);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_body_wrench(sadmm_world *world, sadmm_body_id id, double force[3], double torque[3])
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    const struct sadmm_world_body *body = sadmm_world_find_body(world, id, "id", error);
+    if (!body) return SADMM_ERROR_STALE_ID;
+    TRY(sadmm_check_given(force, "force", error));
+    TRY(sadmm_check_given(torque, "torque", error));
+    TRY(sadmm_world_pull_bodies(world));
+    memcpy(force, body->rigid.wrench, 3 * sizeof *force);
+    memcpy(torque, body->rigid.wrench + 3, 3 * sizeof *torque);
     return SADMM_OK;
 }
 
@@ -519,6 +551,27 @@ sadmm_status sadmm_world_set_body_pair_contact(sadmm_world *world, sadmm_body_id
     uint64_t key = sadmm_pair_key(a.slot - 1, b.slot - 1);
     if (!enabled) return sadmm_pair_table_set(&world->disabled_pairs, key, 0, error);
     sadmm_pair_table_remove(&world->disabled_pairs, key);
+    return SADMM_OK;
+}
+
+int32_t sadmm_world_body_pair_off_count(const sadmm_world *world)
+{
+    return world ? (int32_t)world->disabled_pairs.count : 0;
+}
+
+sadmm_status sadmm_world_body_pair_off_at(sadmm_world *world, int32_t index, sadmm_body_id *a, sadmm_body_id *b)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    TRY(sadmm_check_given(a, "a", error));
+    TRY(sadmm_check_given(b, "b", error));
+    if (index < 0 || (size_t)index >= world->disabled_pairs.count)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %zu)", index,
+                          world->disabled_pairs.count);
+    const uint64_t key = world->disabled_pairs.keys[index];
+    const uint32_t low = (uint32_t)(key >> 32), high = (uint32_t)key;
+    *a = (sadmm_body_id){low + 1, world->bodies[low].generation};
+    *b = (sadmm_body_id){high + 1, world->bodies[high].generation};
     return SADMM_OK;
 }
 

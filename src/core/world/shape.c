@@ -281,3 +281,27 @@ sadmm_status sadmm_world_set_pair_friction(sadmm_world *world, sadmm_shape_id a,
     TRY(sadmm_world_take_back(world));
     return sadmm_pair_table_set(&world->friction_pairs, key, friction, error);
 }
+
+int32_t sadmm_world_pair_friction_count(const sadmm_world *world)
+{
+    return world ? (int32_t)world->friction_pairs.count : 0;
+}
+
+sadmm_status sadmm_world_pair_friction_at(sadmm_world *world, int32_t index, sadmm_shape_id *a, sadmm_shape_id *b,
+                                          double *friction)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    struct sadmm_error *error = &world->error;
+    TRY(sadmm_check_given(a, "a", error));
+    TRY(sadmm_check_given(b, "b", error));
+    TRY(sadmm_check_given(friction, "friction", error));
+    if (index < 0 || (size_t)index >= world->friction_pairs.count)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "index = %d: must be in [0, %zu)", index,
+                          world->friction_pairs.count);
+    const uint64_t key = world->friction_pairs.keys[index];
+    const uint32_t low = (uint32_t)(key >> 32), high = (uint32_t)key;
+    *a = (sadmm_shape_id){low + 1, world->shape_generations[low]};
+    *b = (sadmm_shape_id){high + 1, world->shape_generations[high]};
+    *friction = world->friction_pairs.values[index];
+    return SADMM_OK;
+}

@@ -1,0 +1,310 @@
+/* A scene file into a world: bodies and shapes. */
+#include "fill.h"
+
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "file.h"
+#include "orientation.h"
+
+sadmm_status sadmm_refuse_world(const struct sadmm_filler *f, sadmm_status status, const char *joint)
+{
+    return sadmm_refuse_as(&f->reader, status, joint, sadmm_world_message(f->world));
+}
+
+sadmm_status sadmm_refuse_last(const struct sadmm_filler *f, sadmm_status status, const char *joint)
+{
+    char message[SADMM_MESSAGE_SIZE]; /* the buffer that sadmm_last_message shows is written anew */
+    if (status == SADMM_OK) return status;
+    snprintf(message, sizeof message, "%s", sadmm_last_message());
+    return sadmm_refuse_as(&f->reader, status, joint, message);
+}
+
+/* ---- references -------------------------------------------------------------------------------------------------- */
+
+sadmm_status sadmm_read_number_in(const struct sadmm_filler *f, const json_t *object, const char *member, size_t count,
+                                  int64_t *number)
+{
+    const json_t *value = json_object_get(object, member);
+    if (!value) return sadmm_refuse(&f->reader, member, "is missing");
+    if (count == 0) return sadmm_refuse(&f->reader, member, "names one of a list that is empty");
+    return sadmm_read_whole(&f->reader, member, value, 0, (double)(count - 1), number);
+}
+
+/* Numbers of bodies by their names, -1 of a name that several have. */
+static sadmm_status list_names(struct sadmm_filler *f)
+{
+    const json_t *list = json_object_get(f->root, "bodies");
+    f->names = json_object();
+    for (size_t k = 0; k < f->body_count; ++k) {
+        const char *name = json_string_value(json_object_get(json_array_get(list, k), "name"));
+        const bool known = name && json_object_get(f->names, name);
+        if (name && json_object_set_new(f->names, name, json_integer(known ? -1 : (json_int_t)k)) != 0)
+            return sadmm_fail_memory(f->reader.error, "the names of a scene file");
+    }
+    return f->names ? SADMM_OK : sadmm_fail_memory(f->reader.error, "the names of a scene file");
+}
+
+static sadmm_status find_name(struct sadmm_filler *f, const char *member, const json_t *value, int64_t *number)
+{
+    if (!f->names) TRY(list_names(f));
+    const json_t *found = json_object_get(f->names, json_string_value(value));
+    *number = found ? json_integer_value(found) : -1;
+    if (*number >= 0) return SADMM_OK;
+    return sadmm_refuse_value(&f->reader, member, found ? "the name of one body only" : "the name of a body", value);
+}
+
+sadmm_status sadmm_read_body(struct sadmm_filler *f, const json_t *object, const char *member, int64_t *number)
+{
+    const json_t *value = json_object_get(object, member);
+    *number = -1;
+    if (!value || json_is_null(value)) return SADMM_OK;
+    if (json_is_string(value)) return find_name(f, member, value, number);
+    return sadmm_read_number_in(f, object, member, f->body_count, number);
+}
+
+/* ---- bodies ------------------------------------------------------------------------------------------------------ */
+
+static bool is_given(const json_t *object, const char *member)
+{
+    const json_t *value = json_object_get(object, member);
+    return value && !json_is_null(value);
+}
+
+/* Members that only dynamic bodies have: of them, read; null or not there on others. */
+static sadmm_status read_dynamic(const struct sadmm_filler *f, const json_t *object, const struct sadmm_fields *fields,
+                                 sadmm_body_type type, void *into)
+{
+    if (type == SADMM_BODY_DYNAMIC) return sadmm_read_some(&f->reader, object, fields, into);
+    for (size_t k = 0; k < fields->count; ++k)
+        if (is_given(object, fields->list[k].name))
+            return sadmm_refuse(&f->reader, fields->list[k].name, "must be null or left out, for the body is %s",
+                                type == SADMM_BODY_STATIC ? "static" : "kinematic");
+    return SADMM_OK;
+}
+
+static sadmm_status read_body_def(const struct sadmm_filler *f, const json_t *object, size_t number,
+                                  sadmm_body_def *def)
+{
+    static const char *const needed[] = {"mass", "inertia"};
+    enum { LONGEST_NAME = 63 };
+    *def = sadmm_body_def_default();
+    TRY(sadmm_read_fields(&f->reader, object, &sadmm_body_fields, def));
+    TRY(sadmm_read_string(&f->reader, object, "name", &def->name));
+    if (def->name && strlen(def->name) > LONGEST_NAME)
+        return sadmm_refuse(&f->reader, "name", "must have at most %d bytes, has %zu", LONGEST_NAME, strlen(def->name));
+    const json_t *given = json_object_get(object, "index");
+    if (given) {
+        int64_t index;
+        TRY(sadmm_read_whole(&f->reader, "index", given, 0, INT32_MAX, &index));
+        if (index != (int64_t)number)
+            return sadmm_refuse(&f->reader, "index", "must be %zu, the body's place in the list, or left out, is %lld",
+                                number, (long long)index);
+    }
+    TRY(read_dynamic(f, object, &sadmm_dynamic_fields, def->type, def));
+    for (int k = 0; k < 2 && def->type == SADMM_BODY_DYNAMIC; ++k)
+        if (!json_object_get(object, needed[k]))
+            return sadmm_refuse(&f->reader, needed[k], "is missing: a dynamic body has mass and inertia");
+    return SADMM_OK;
+}
+
+/* The orientation as it is in the file, if it is unit but for its own rounding. */
+static sadmm_status keep_orientation(const struct sadmm_filler *f, sadmm_body_id id, const double orientation[4])
+{
+    sadmm_body_state state;
+    TRY(sadmm_refuse_world(f, sadmm_world_body_state(f->world, id, &state), ": "));
+    if (memcmp(state.orientation, orientation, sizeof state.orientation) == 0) return SADMM_OK;
+    memcpy(state.orientation, orientation, sizeof state.orientation);
+    return sadmm_refuse_world(f, sadmm_world_set_body_state(f->world, id, &state), ": ");
+}
+
+/* A pose that a kinematic body is to go to within the first step. */
+static sadmm_status read_move(struct sadmm_filler *f, const json_t *object, sadmm_body_id id, sadmm_body_type type)
+{
+    sadmm_body_state target = {.orientation = {1, 0, 0, 0}};
+    if (!is_given(object, "move")) return SADMM_OK;
+    if (type != SADMM_BODY_KINEMATIC)
+        return sadmm_refuse(&f->reader, "move", "must be null or left out, for the body is %s",
+                            type == SADMM_BODY_STATIC ? "static" : "dynamic");
+    const size_t before = sadmm_enter(&f->reader, "move");
+    TRY(sadmm_read_fields(&f->reader, json_object_get(object, "move"), &sadmm_move_fields, &target));
+    TRY(sadmm_refuse_world(f, sadmm_world_move_body(f->world, id, target.position, target.orientation), "."));
+    sadmm_leave(&f->reader, before);
+    return SADMM_OK;
+}
+
+static sadmm_status read_body(struct sadmm_filler *f, const json_t *object, size_t number)
+{
+    sadmm_body_def def;
+    struct sadmm_body_load load = {{0}, {0}};
+    TRY(read_body_def(f, object, number, &def));
+    TRY(read_dynamic(f, object, &sadmm_load_fields, def.type, &load));
+    f->body_types[number] = def.type;
+    TRY(sadmm_refuse_world(f, sadmm_world_add_body(f->world, &def, &f->bodies[number]), ": "));
+    TRY(keep_orientation(f, f->bodies[number], def.orientation));
+    if (is_given(object, "force") || is_given(object, "torque"))
+        TRY(sadmm_refuse_world(f, sadmm_world_set_body_wrench(f->world, f->bodies[number], load.force, load.torque),
+                               "."));
+    return read_move(f, object, f->bodies[number], def.type);
+}
+
+static sadmm_status read_bodies(struct sadmm_filler *f)
+{
+    json_t *list;
+    TRY(sadmm_read_array(&f->reader, f->root, "bodies", &list));
+    const size_t count = json_array_size(list);
+    f->bodies = (sadmm_body_id *)sadmm_alloc(count, sizeof *f->bodies);
+    f->body_types = (sadmm_body_type *)sadmm_alloc(count, sizeof *f->body_types);
+    f->first_shape = (size_t *)sadmm_alloc(count + 1, sizeof *f->first_shape);
+    if (!f->bodies || !f->body_types || !f->first_shape)
+        return sadmm_fail_memory(f->reader.error, "the bodies of a scene file");
+    for (size_t k = 0; k < count; ++k) {
+        json_t *shapes;
+        const size_t before = sadmm_enter(&f->reader, "bodies[%zu]", k);
+        TRY(read_body(f, json_array_get(list, k), k));
+        TRY(sadmm_read_array(&f->reader, json_array_get(list, k), "shapes", &shapes));
+        f->first_shape[k + 1] = f->first_shape[k] + json_array_size(shapes);
+        sadmm_leave(&f->reader, before);
+    }
+    f->body_count = count;
+    return SADMM_OK;
+}
+
+/* ---- shapes ------------------------------------------------------------------------------------------------------ */
+
+/* A shape of the file, and where it is there. */
+struct place {
+    const json_t *object;
+    size_t body, nth;
+};
+
+static size_t enter_shape(struct sadmm_filler *f, const struct place *place)
+{
+    return sadmm_enter(&f->reader, "bodies[%zu].shapes[%zu]", place->body, place->nth);
+}
+
+/* Shapes body by body. */
+static void list_places(const struct sadmm_filler *f, struct place *places)
+{
+    const json_t *bodies = json_object_get(f->root, "bodies");
+    for (size_t k = 0; k < f->body_count; ++k) {
+        const json_t *shapes = json_object_get(json_array_get(bodies, k), "shapes");
+        for (size_t nth = 0; nth < json_array_size(shapes); ++nth)
+            places[f->first_shape[k] + nth] = (struct place){json_array_get(shapes, nth), k, nth};
+    }
+}
+
+/* order[i]: the place of the i-th shape to be made. By their "index", which all have or none; without it as they are in
+ * the file. */
+static sadmm_status order_shapes(struct sadmm_filler *f, const struct place *places, size_t count, size_t *order)
+{
+    size_t with = 0;
+    for (size_t k = 0; k < count; ++k) with += json_object_get(places[k].object, "index") != NULL;
+    for (size_t k = 0; k < count; ++k) order[k] = with ? count : k;
+    for (size_t k = 0; with && k < count; ++k) {
+        const json_t *value = json_object_get(places[k].object, "index");
+        const size_t before = enter_shape(f, &places[k]);
+        int64_t index;
+        if (!value) return sadmm_refuse(&f->reader, "index", "is missing: all shapes must have one, or none");
+        TRY(sadmm_read_whole(&f->reader, "index", value, 0, (double)(count - 1), &index));
+        if (order[index] != count)
+            return sadmm_refuse(&f->reader, "index", "must be another one than bodies[%zu].shapes[%zu] has, is %lld",
+                                places[order[index]].body, places[order[index]].nth, (long long)index);
+        order[index] = k;
+        sadmm_leave(&f->reader, before);
+    }
+    return SADMM_OK;
+}
+
+/* The hull or mesh of a shape that is one; others have none. */
+static sadmm_status read_form(const struct sadmm_filler *f, const json_t *object, sadmm_shape_def *def)
+{
+    int64_t number;
+    if (def->type == SADMM_SHAPE_HULL) {
+        TRY(sadmm_read_number_in(f, object, "hull", f->hull_count, &number));
+        def->hull = f->hulls[number];
+    } else if (json_object_get(object, "hull")) {
+        return sadmm_refuse(&f->reader, "hull", "must be left out, for the shape is a %s",
+                            sadmm_shape_names[def->type]);
+    }
+    if (def->type == SADMM_SHAPE_MESH) {
+        TRY(sadmm_read_number_in(f, object, "mesh", f->mesh_count, &number));
+        def->mesh = f->meshes[number];
+    } else if (json_object_get(object, "mesh")) {
+        return sadmm_refuse(&f->reader, "mesh", "must be left out, for the shape is a %s",
+                            sadmm_shape_names[def->type]);
+    }
+    return SADMM_OK;
+}
+
+static sadmm_status read_shape(struct sadmm_filler *f, const json_t *object, size_t body, sadmm_shape_id *id)
+{
+    sadmm_shape_def def = sadmm_shape_def_default();
+    TRY(sadmm_read_fields(&f->reader, object, &sadmm_shape_fields, &def));
+    if (!json_object_get(object, "type")) return sadmm_refuse(&f->reader, "type", "is missing");
+    const size_t sizes = sadmm_shape_sizes(def.type);
+    const json_t *size = json_object_get(object, "size");
+    if (sizes > 0 && !size)
+        return sadmm_refuse(&f->reader, "size", "is missing, %zu number%s", sizes, sizes > 1 ? "s" : "");
+    if (size) TRY(sadmm_read_reals(&f->reader, "size", size, def.size, sizes));
+    TRY(read_form(f, object, &def));
+    sadmm_before_unit(def.orientation);
+    return sadmm_refuse_world(f, sadmm_world_add_shape(f->world, f->bodies[body], &def, id), ": ");
+}
+
+static sadmm_status read_shapes(struct sadmm_filler *f)
+{
+    const size_t count = f->first_shape[f->body_count];
+    struct place *places = (struct place *)sadmm_alloc(count, sizeof *places);
+    size_t *order = (size_t *)sadmm_alloc(count, sizeof *order);
+    f->shapes = (sadmm_shape_id *)sadmm_alloc(count, sizeof *f->shapes);
+    sadmm_status status = SADMM_OK;
+    if (places && order && f->shapes) {
+        list_places(f, places);
+        status = order_shapes(f, places, count, order);
+        for (size_t k = 0; status == SADMM_OK && k < count; ++k) {
+            const struct place *place = &places[order[k]];
+            const size_t before = enter_shape(f, place);
+            status = read_shape(f, place->object, place->body, &f->shapes[order[k]]);
+            sadmm_leave(&f->reader, before);
+        }
+    } else {
+        status = sadmm_fail_memory(f->reader.error, "the shapes of a scene file");
+    }
+    sadmm_free(places);
+    sadmm_free(order);
+    return status;
+}
+
+/* ---- the whole --------------------------------------------------------------------------------------------------- */
+
+static void free_filler(struct sadmm_filler *f)
+{
+    json_decref(f->names);
+    for (size_t k = 0; k < f->hull_count; ++k) sadmm_hull_destroy(f->hulls[k]);
+    for (size_t k = 0; k < f->mesh_count; ++k) sadmm_mesh_destroy(f->meshes[k]);
+    sadmm_free(f->hulls);
+    sadmm_free(f->meshes);
+    sadmm_free(f->bodies);
+    sadmm_free(f->body_types);
+    sadmm_free(f->shapes);
+    sadmm_free(f->first_shape);
+    sadmm_free(f->joints);
+}
+
+static sadmm_status fill(struct sadmm_filler *f)
+{
+    TRY(read_bodies(f));
+    TRY(sadmm_read_hulls(f));
+    TRY(sadmm_read_meshes(f));
+    TRY(read_shapes(f));
+    return sadmm_read_parts(f);
+}
+
+sadmm_status sadmm_scene_file_fill(const struct sadmm_scene_file *file, sadmm_world *world, struct sadmm_error *error)
+{
+    struct sadmm_filler f = {.reader = {.name = file->name, .error = error}, .root = file->root, .world = world};
+    const sadmm_status status = fill(&f);
+    free_filler(&f);
+    return status;
+}
