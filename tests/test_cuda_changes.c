@@ -30,6 +30,16 @@ static void set_state(sadmm_world *world, int body, double x, double spin)
 
 /* ---- the device's memory ----------------------------------------------------------------------------------------- */
 
+#ifdef CUDA_EMULATED /* whose memory is the host's */
+static void from_device(double *to, const double *from, size_t count) { memcpy(to, from, count * sizeof *to); }
+#else
+int cudaMemcpy(void *to, const void *from, size_t size, int kind); /* the runtime's, which the library has in it */
+static void from_device(double *to, const double *from, size_t count)
+{
+    ck_assert_int_eq(cudaMemcpy(to, from, count * sizeof *to, 2), 0); /* 2: device to host */
+}
+#endif
+
 static void expect_no_array(sadmm_world *world)
 {
     sadmm_device_array array;
@@ -59,15 +69,15 @@ START_TEST(arrays_are_where_the_device_has_them)
         ck_assert_int_eq(wrench.columns, 6);
         ck_assert_int_ge(state.stride, 13);
         ck_assert(state.values && wrench.values && state.stream && state.device == 0);
-#ifdef CUDA_EMULATED /* whose memory is the host's */
-        double read[64 * 13], read_wrench[64 * 6];
+        double read[64 * 13], read_wrench[64 * 6], there[13];
         MUST(world, sadmm_world_get_array(world, SADMM_ARRAY_BODY_STATE, 0, bodies, read));
         MUST(world, sadmm_world_get_array(world, SADMM_ARRAY_BODY_CONTACT_WRENCH, 0, bodies, read_wrench));
         for (int32_t i = 0; i < count; ++i) {
-            ck_assert_mem_eq(state.values + i * state.stride, read + 13 * rows[i], 13 * sizeof *read);
-            ck_assert_mem_eq(wrench.values + i * wrench.stride, read_wrench + 6 * rows[i], 6 * sizeof *read);
+            from_device(there, state.values + i * state.stride, 13);
+            ck_assert_mem_eq(there, read + 13 * rows[i], 13 * sizeof *read);
+            from_device(there, wrench.values + i * wrench.stride, 6);
+            ck_assert_mem_eq(there, read_wrench + 6 * rows[i], 6 * sizeof *read);
         }
-#endif
     }
     ck_assert_int_le(bodies, 64);
     MUST(world, sadmm_world_remove_body(world, body_at(world, bodies - 1)));

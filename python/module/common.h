@@ -14,6 +14,7 @@
 #include <mutex>
 #include <string>
 
+#include "scene_file/scene_file.h"
 #include "scenes/scenes.h"
 #include "subadmm/subadmm.h"
 
@@ -58,7 +59,12 @@ struct world {
     sadmm_scene scene{};
     sadmm_scene_result result{};
     int64_t steps = 0; // of the scene
-    ~world() { sadmm_world_destroy(handle); }
+    sadmm_world_def def = sadmm_world_def_default(); // as it was created, with the precision that it has now
+    ~world()
+    {
+        sadmm_world_destroy(handle);
+        sadmm_scene_close(&scene);
+    }
 };
 
 // f: a call that gives a status. Its message is read under the world's lock.

@@ -1,4 +1,7 @@
 // The scenes of the library, by name.
+#include <cstdio>
+#include <cstdlib>
+
 #include "common.h"
 
 static nb::list list_scenes()
@@ -19,14 +22,15 @@ static void check_error(sadmm_status status, const sadmm_error &error)
     if (status != SADMM_OK) raise_status(status, error.message);
 }
 
-// As `subadmm run` does it.
-static std::unique_ptr<world> build(const std::string &spec, const std::string &backend,
+// Of `spec`, or (a text) of a scene file's text. As `subadmm run` does it.
+static std::unique_ptr<world> build(const std::string &spec, bool is_text, const std::string &backend,
                                     const std::optional<std::string> &precision, const std::optional<std::string> &method,
                                     int device, nb::handle settings)
 {
     auto made = std::make_unique<world>();
     sadmm_error error{};
-    check_error(sadmm_scene_open(spec.c_str(), &made->scene, &error), error);
+    check_error(is_text ? sadmm_scene_open_text(spec.data(), spec.size(), nullptr, &made->scene, &error)
+                        : sadmm_scene_open(spec.c_str(), &made->scene, &error), error);
     sadmm_world_def &def = made->scene.def;
     def.backend = named("backend", backend, backend_names);
     def.device = device;
@@ -45,7 +49,34 @@ static std::unique_ptr<world> build(const std::string &spec, const std::string &
     }
     check_error(status, error);
     made->scripted = true;
+    made->def = def;
     return made;
+}
+
+static std::string to_json(world &w, const std::string &name, const std::string &description, double duration)
+{
+    char *text = nullptr;
+    size_t size = 0;
+    sadmm_error error{};
+    sadmm_status status;
+    {
+        nb::gil_scoped_release release;
+        std::lock_guard<std::mutex> lock(w.mutex);
+        const sadmm_settings settings = sadmm_world_settings(w.handle);
+        sadmm_scene_about about{};
+        about.spec = about.name = name.c_str();
+        about.description = description.c_str();
+        about.n = about.m = -1;
+        about.duration = duration;
+        for (int k = 0; k < SADMM_METHOD_COUNT; ++k) about.iterations[k] = settings.iterations, about.substeps[k] = settings.substeps;
+        FILE *stream = open_memstream(&text, &size);
+        status = stream ? sadmm_scene_file_write(&about, &w.def, w.handle, stream, &error) : SADMM_ERROR_OUT_OF_MEMORY;
+        if (stream) fclose(stream);
+    }
+    const std::string out = text ? std::string(text, size) : std::string();
+    free(text);
+    check_error(status, error);
+    return out;
 }
 
 static nb::object result(world &w)
@@ -65,10 +96,9 @@ void bind_scenes(nb::module_ &m, nb::class_<world> &w)
 {
     m.def("scenes", &list_scenes, "The scenes of the library: a list of dicts with name, arguments, description, duration (s), "
                                   "chaotic.");
-    m.def("scene", &build, "spec"_a, nb::kw_only(), "backend"_a = "auto", "precision"_a = nb::none(), "method"_a = nb::none(),
-          "device"_a = 0, "settings"_a = nb::none(),
-          "A world of a scene by name, 'pile:300' say, as the subadmm command builds and steps it. `settings`: a dict of changes "
-          "to the scene's own, as {'dt': 0.002}.");
+    m.def("_scene", &build, "spec"_a, "is_text"_a, nb::kw_only(), "backend"_a = "auto", "precision"_a = nb::none(), "method"_a = nb::none(),
+          "device"_a = 0, "settings"_a = nb::none());
+    w.def("_to_json", &to_json, "name"_a, "description"_a, "duration"_a);
     w.def_prop_ro("duration", [](world &w) -> nb::object {
         return w.scripted ? nb::cast(w.scene.duration) : nb::none();
     }, "Of a scene: how long it is meant to be run for, s; None of other worlds.");

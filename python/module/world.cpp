@@ -13,6 +13,7 @@ static void init_world(world *self, const std::string &backend, const std::strin
     def.contact_margin = contact_margin;
     if (settings) def.settings = *settings;
     new (self) world();
+    self->def = def;
     const sadmm_status status = sadmm_world_create(&def, &self->handle);
     if (status != SADMM_OK) {
         self->~world();
@@ -231,7 +232,11 @@ void bind_world(nb::module_ &m, nb::class_<world> &w)
     w.def("set_backend", [](world &w, const std::string &backend, const std::string &precision, int device) {
         const auto b = named("backend", backend, backend_names);
         const auto p = named("precision", precision, precision_names);
-        call(w, [&](sadmm_world *h) { return sadmm_world_set_backend(h, b, p, device); });
+        call(w, [&](sadmm_world *h) {
+            const sadmm_status status = sadmm_world_set_backend(h, b, p, device);
+            if (status == SADMM_OK) w.def.precision = p;
+            return status;
+        });
     }, "backend"_a, "precision"_a = "f64", "device"_a = 0, "Who makes the steps from the next one on.");
     w.def("add_body", &add_body, nb::kw_only(), "type"_a = "dynamic", "mass"_a = 0.0, "inertia"_a = vec3{}, "position"_a = vec3{},
           "orientation"_a = quat{1, 0, 0, 0}, "linear_velocity"_a = vec3{}, "angular_velocity"_a = vec3{},

@@ -42,7 +42,6 @@ from ._core import (
     build_commit,
     build_compiler,
     mass_of,
-    scene,
     scenes,
     version,
 )
@@ -53,7 +52,8 @@ __all__ = [
     "Body", "BodyShape", "Certificate", "Coordinate", "Coupling", "DeviceError", "Error", "FileError", "Gear",
     "InvalidArgument", "Joint", "LimitExceeded", "Mass", "NonFinite", "OutOfMemory", "Report", "Settings", "Shape", "StaleId",
     "Unavailable", "Unsupported", "World", "backends", "box", "build_commit", "build_compiler", "capsule", "cone",
-    "contact_dtype", "cylinder", "ellipsoid", "heightfield", "hull", "mass_of", "mesh", "plane", "scene", "scenes", "sphere",
+    "contact_dtype", "cylinder", "ellipsoid", "heightfield", "hull", "mass_of", "mesh", "plane", "scene", "scene_from_json",
+    "scenes", "sphere",
     "version",
 ]
 
@@ -128,6 +128,22 @@ def heightfield(heights, spacing, **options):
     return _with(_core._heightfield(np.ascontiguousarray(heights, dtype=np.float64), spacing), options)
 
 
+# ---- scenes -----------------------------------------------------------------------------------------------------------
+
+
+def scene(spec, *, backend="auto", precision=None, method=None, device=0, settings=None):
+    """A world of a scene by name ("pile:300"), or of a scene file ("my.json": what ends so, or has a slash in it), as the
+    subadmm command builds and steps it: a scene's scripted inputs come with World.step. `settings`: a dict of changes to the
+    scene's own, as {"dt": 0.002}; `method`, "fast" or "paper", brings the scene's iterations for it."""
+    return _core._scene(str(spec), False, backend=backend, precision=precision, method=method, device=device,
+                        settings=settings)
+
+
+def scene_from_json(text, *, backend="auto", precision=None, method=None, device=0, settings=None):
+    """The same of a scene file's text."""
+    return _core._scene(text, True, backend=backend, precision=precision, method=method, device=device, settings=settings)
+
+
 # ---- worlds -----------------------------------------------------------------------------------------------------------
 
 
@@ -187,6 +203,14 @@ def _contacts(self):
     return np.frombuffer(self._contacts(), dtype=contact_dtype)
 
 
+def _to_json(self, name="world", description="", duration=10.0):
+    """The world as it is now as the text of a scene file (docs/scenes.md), which `subadmm run FILE.json`, scene(path) and
+    scene_from_json(text) read; duration: how long it is meant to be run for, s. What steps leave for the next ones is not in
+    it: see save()."""
+    return self._to_json(name, description, duration)
+
+
+World.to_json = _to_json
 World.add_ground = _add_ground
 World.add_solid = _add_solid
 World.contacts = _contacts

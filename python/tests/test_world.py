@@ -221,6 +221,22 @@ def test_scenes_by_name():
     assert world.report.contacts > 0
 
 
+def test_scene_files(tmp_path):
+    world, box = falling_box(settings=subadmm.Settings(dt=0.004))
+    text = world.to_json("fall", "a box falls", 2.0)
+    path = tmp_path / "fall.json"
+    path.write_text(text)
+    other, third = subadmm.scene(path), subadmm.scene_from_json(text, settings={"iterations": 30})
+    assert other.duration == 2.0 and other.settings.dt == 0.004 and third.settings.iterations == 30
+    world.step(100)
+    other.step(100)
+    assert world.state_hash() == other.state_hash()
+    with pytest.raises(subadmm.InvalidArgument, match=r"bodies\[1\]"):
+        subadmm.scene_from_json(text.replace('"mass": 8', '"mass": -8'))
+    with pytest.raises(subadmm.FileError):
+        subadmm.scene("/no/such/file.json")
+
+
 def test_a_scene_measures_itself():
     world = subadmm.scene("rolling", backend="cpu")
     world.step(round(world.duration / world.settings.dt))
