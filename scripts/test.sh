@@ -13,14 +13,14 @@ usage() {
 usage: scripts/test.sh [--slow] [--only STEP]... [--help]
 
 Installs what is missing (Debian and Ubuntu, as root or by sudo without a password; else says what to install), then:
-    plain    every feature but CUDA, warnings are errors, the whole suite
+    plain    every feature but CUDA, warnings are errors, the whole suite; on the emulated CUDA device only with --slow
     python   the Python package: pip install into an environment of its own, and its tests
-    asan     address and undefined-behaviour sanitizers, the whole suite
+    asan     address and undefined-behaviour sanitizers, the whole suite, also on the emulated CUDA device (single precision)
     tsan     thread sanitizer, the tests of suite 'threads'
     clang    by clang with LLVM's OpenMP, the tests of suite 'threads': it writes a lane of a vector by storing the whole vector,
              which makes a race where threads share one
     minimal  by clang, no optional feature, no instruction set beyond the compiler's default, the whole suite without the
-             emulated CUDA device, which plain and asan have
+             emulated CUDA device
     cuda     when nvcc is found: the CUDA backend compiles; its tests run where there is a GPU, and are counted as skipped
              where there is none. There the code is for one architecture and not optimised, since nothing runs it
 with --slow:
@@ -29,7 +29,8 @@ and, when asked for by --only, on a machine with a GPU:
     gpu      the tests of suite 'gpu' under compute-sanitizer: memcheck, initcheck, synccheck, racecheck
 The last line sums up the checks of all steps. Exit status 0: nothing failed.
 
---slow       run the tests of suite 'slow' (in step plain) and step fuzz too; compile CUDA for all architectures
+--slow       run the tests of suite 'slow' and those on the emulated CUDA device in both precisions (in step plain), and step
+             fuzz; compile CUDA for all architectures
 --only STEP  this step only; may be given more than once
 JOBS=n       compile and test with n jobs instead of all cores
 
@@ -94,7 +95,10 @@ fi
 
 step_plain() {
     say "plain: every feature but CUDA, warnings are errors"
-    build plain "${features[@]}" -Dcuda=disabled || return 1
+    # Compiling the device's sources as C++ takes half of this step.
+    local emulated=disabled
+    $slow && emulated=enabled
+    build plain "${features[@]}" -Dcuda=disabled -Demulated_cuda=$emulated || return 1
     if $slow; then run_tests plain; else run_tests plain --no-suite slow; fi
 }
 
