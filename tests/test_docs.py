@@ -21,7 +21,7 @@ def read(path):
 
 def tree(project):
     paths = []
-    for top in ("include", "src", "bench", "tests", "examples", "docs", "scripts", "presets"):
+    for top in ("include", "src", "bench", "tests", "examples", "docs", "scripts", "presets", "python"):
         for folder, _, names in os.walk(os.path.join(project, top)):
             paths += [os.path.relpath(os.path.join(folder, name), project) for name in names]
             paths.append(os.path.relpath(folder, project) + "/")
