@@ -72,5 +72,6 @@ NB_MODULE(_core, m)
     bind_world(m, w);
     bind_arrays(m, w);
     bind_joints(m, w);
+    bind_queries(w);
     bind_scenes(m, w);
 }

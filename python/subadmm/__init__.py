@@ -211,6 +211,17 @@ def _to_json(self, name="world", description="", duration=10.0):
 
 
 World.to_json = _to_json
+def _cast_rays(self, origins, directions, length=np.inf, *, ignore=None, types=(), category=0, mask=0, from_inside=True,
+               from_behind=False):
+    """What rays hit: origins (n x 3, m, world), directions (n x 3, of any length), how far to look (m). A dict of arrays: shape
+    (n; index in World.shapes, -1: nothing), distance (n, m; infinite: nothing), point and normal (n x 3, world), triangle (n;
+    of a mesh, else -1). ignore: a Body; types: of bodies, as ("dynamic",); category, mask: only what would meet a shape with
+    these; from_inside: what the origin is inside of counts, at distance 0; from_behind: triangles count from behind too."""
+    return self._cast_rays(_points(origins), _points(directions), length, ignore, list(types), category, mask, from_inside,
+                           from_behind)
+
+
+World.cast_rays = _cast_rays
 World.add_ground = _add_ground
 World.add_solid = _add_solid
 World.contacts = _contacts

@@ -221,6 +221,28 @@ def test_scenes_by_name():
     assert world.report.contacts > 0
 
 
+def test_queries():
+    world, box = falling_box()
+    ball = world.add_solid(subadmm.sphere(0.2), mass=1, position=(2, 0, 1))
+    ground, cube, globe = world.shapes
+    hit = world.cast_rays([[0, 0, 5], [2, 0, 5], [9, 9, 5], [0, 0, 5]], [[0, 0, -1], [0, 0, -2], [0, 0, -1], [0, 0, 1]])
+    assert hit["shape"].tolist() == [1, 2, 0, -1]
+    assert hit["distance"][:3] == pytest.approx([3.9, 3.8, 5]) and np.isinf(hit["distance"][3])
+    assert hit["normal"][:3].tolist() == [[0, 0, 1]] * 3 and hit["point"][1] == pytest.approx([2, 0, 1.2])
+    assert world.cast_rays([[0, 0, 5]], [[0, 0, -1]], ignore=box)["shape"].tolist() == [0]
+    assert world.cast_rays([[9, 9, 5]], [[0, 0, -1]], types=["dynamic"])["shape"].tolist() == [-1]
+    assert world.cast_rays([[0, 0, 5]], [[0, 0, -1]], length=3)["shape"].tolist() == [-1]
+    assert world.overlap(subadmm.sphere(0.5), position=(0, 0, 1.5)) == [cube]
+    assert globe in world.overlap_box((1.9, -0.1, 0.9), (3, 1, 3)) and cube not in world.overlap_box((1.9, -0.1, 0.9), (3, 1, 3))
+    apart = world.closest_points(cube, globe)
+    assert apart["distance"] == pytest.approx(1.7) and apart["normal"] == pytest.approx([1, 0, 0])
+    assert world.closest_to(subadmm.sphere(0.1), globe, position=(2, 0, 2))["distance"] == pytest.approx(0.7)
+    with pytest.raises(subadmm.InvalidArgument, match="direction"):
+        world.cast_rays([[0, 0, 5]], [[0, 0, 0]])
+    with pytest.raises(ValueError, match="as many"):
+        world.cast_rays([[0, 0, 5]], [[0, 0, 1], [0, 0, 1]])
+
+
 def test_scene_files(tmp_path):
     world, box = falling_box(settings=subadmm.Settings(dt=0.004))
     text = world.to_json("fall", "a box falls", 2.0)
