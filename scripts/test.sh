@@ -108,13 +108,14 @@ step_python() {
     rm -rf "$folder/environment" "$folder/meson-logs"
     mkdir -p "$folder/meson-logs" # where every step has its log
     python3 -m venv "$folder/environment" || return 1
-    # One instruction set, no CUDA: the steps beside this one have the others.
+    # One instruction set, no CUDA: the steps beside this one have the others. The command is built to compare with: another
+    # instruction set rounds otherwise.
     "$folder/environment/bin/pip" install --quiet --disable-pip-version-check "$project[test]" \
         -Csetup-args=-Dcuda=disabled -Csetup-args=-Dcpu_isas=avx2 -Csetup-args=-Dwerror=true \
+        -Csetup-args=-Dcli=enabled \
         -Cbuild-dir="$folder/build" || return 1
     # Away from the sources, so that what was installed is what is tested.
-    (cd "$folder" && SUBADMM=$(find "$project/build-plain/src" -name subadmm -type f 2>/dev/null || true) \
-        environment/bin/python -m pytest -q --junitxml=meson-logs/pytest.xml "$project/python/tests") || true
+    (cd "$folder" && SUBADMM=$folder/build/src/subadmm environment/bin/python -m pytest -q --junitxml=meson-logs/pytest.xml "$project/python/tests") || true
     logs+=("$folder/meson-logs/pytest.xml")
 }
 
