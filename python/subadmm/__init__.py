@@ -53,7 +53,7 @@ __all__ = [
     "Body", "BodyShape", "Certificate", "Coordinate", "Coupling", "DeviceError", "Error", "FileError", "Gear",
     "InvalidArgument", "Joint", "LimitExceeded", "Mass", "NonFinite", "OutOfMemory", "Report", "Settings", "Shape", "StaleId",
     "Unavailable", "Unsupported", "World", "backends", "box", "build_commit", "build_compiler", "capsule", "cone",
-    "contact_dtype", "cylinder", "ellipsoid", "heightfield", "hull", "mass_of", "mesh", "plane", "scene", "scenes", "sphere",
+    "contact_dtype", "cylinder", "ellipsoid", "heightfield", "hull", "load", "mass_of", "mesh", "plane", "scene", "scenes", "sphere",
     "version",
 ]
 
@@ -193,3 +193,5 @@ World.contacts = _contacts
 World.positions = property(lambda self: self.get("body_state")[:, :3], doc="Centres of mass of all bodies, n x 3, m.")
 World.orientations = property(lambda self: self.get("body_state")[:, 3:7], doc="Of all bodies, n x 4, w x y z.")
 World.velocities = property(lambda self: self.get("body_state")[:, 7:], doc="Linear (m/s) and angular (rad/s), n x 6.")
+
+from .importing import load  # noqa: E402 (it uses the names above)
