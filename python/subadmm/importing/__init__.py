@@ -21,7 +21,7 @@ __all__ = ["Loaded", "LoadedActuator", "LoadedJoint", "Note", "Report", "load"]
 
 
 def load(path, *, keyframe=None, qpos=None, qvel=None, settings=None, backend="auto", precision="f64", device=0,
-         carrier_share=1e-4):
+         carrier_share=1e-4, overlaps="ignore"):
     """Build a world from an MJCF or URDF file. Needs the package `mujoco`, which compiles it: pip install subadmm[import].
 
     path: the file, or a mujoco.MjModel that is compiled already.
@@ -30,6 +30,8 @@ def load(path, *, keyframe=None, qpos=None, qvel=None, settings=None, backend="a
     settings: a subadmm.Settings; default: the file's time step and gravity. backend, precision, device: as of World.
     carrier_share: where several joints of one body do not fit one joint here, a carrier is put between them, with this share
         of the body's mass and inertia on top of the body's own; in [1e-6, 1e-1].
+    overlaps: 'ignore' leaves out contact between bodies of one mechanism that overlap where they start, which hard contacts
+        cannot undo; 'keep' does not.
 
     Returns a Loaded: world, bodies, joints, actuators, report. Raises ImportError (no mujoco), ValueError (what MuJoCo does
     not compile; an argument out of range), subadmm.Error (a body that the world does not take, named).
@@ -42,6 +44,8 @@ def load(path, *, keyframe=None, qpos=None, qvel=None, settings=None, backend="a
 
     if not 1e-6 <= carrier_share <= 1e-1:
         raise ValueError(f"carrier_share: {carrier_share} is not in [1e-6, 1e-1]")
+    if overlaps not in ("ignore", "keep"):
+        raise ValueError(f"overlaps: {overlaps!r} is neither 'ignore' nor 'keep'")
     report = Report()
     source = path if isinstance(path, mujoco.MjModel) else compile_file(os.fspath(path), report)
     data = start_of(source, keyframe, qpos, qvel)
@@ -51,7 +55,7 @@ def load(path, *, keyframe=None, qpos=None, qvel=None, settings=None, backend="a
     loaded = Loaded(world, source, report)
     report_options(source, report)
     add_tree(loaded, data, carrier_share)
-    add_shapes(loaded, data)
+    add_shapes(loaded, data, overlaps)
     add_equalities(loaded)
     add_actuators(loaded, data)
     return loaded

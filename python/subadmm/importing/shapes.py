@@ -5,6 +5,7 @@ import numpy as np
 from .filters import MOST_CLASSES, MOST_PAIRS, Filter, friction_of
 from .model import element, name_of
 from .options import disabled
+from .overlap import leave_out
 from .poses import mul, pose
 
 
@@ -75,8 +76,8 @@ class Shapes:
         raise ValueError("its kind is none of those that there are here")
 
 
-def add_shapes(loaded, data):
-    """Shapes on all bodies, and which of them meet."""
+def add_shapes(loaded, data, overlaps):
+    """Shapes on all bodies, and which of them meet. overlaps: of one mechanism, 'ignore' or 'keep'."""
     from .. import Error
 
     source, report, world = loaded.source, loaded.report, loaded.world
@@ -108,7 +109,7 @@ def add_shapes(loaded, data):
         except (Error, ValueError) as error:
             report.add(element(source, "geom", geom), f"not carried over: {error}")
     _report_contact(loaded)
-    ignored = _ignore(loaded, chosen, statics)
+    ignored = _ignore(loaded, data, owner, statics, overlaps)
     _set_friction(loaded, chosen, owner, ignored)
 
 
@@ -127,11 +128,11 @@ def _report_contact(loaded):
     listed("fluid forces are not carried over", lambda g: source.geom_fluid[g, 0])
     for name in ("geom_adhesion", "geom_surfacevel"):
         if hasattr(source, name):
-            values = np.asarray(getattr(source, name)).reshape(source.ngeom, -1)
+            values = np.asarray(getattr(source, name))
             listed(f"{name[5:]} is not carried over", lambda g: np.any(values[g]))
 
 
-def _ignore(loaded, chosen, statics):
+def _ignore(loaded, data, owner, statics, overlaps):
     """Turn off contact between bodies that a joint ties, and those that the file leaves out. Returns the pairs of bodies."""
     source, report = loaded.source, loaded.report
     off = set()
@@ -156,6 +157,8 @@ def _ignore(loaded, chosen, statics):
             if group.kind != "static" and any(touching[other] for other in group.members if other != index):
                 report.add(element(source, "exclude", k),
                            f"leaves out all that is fixed to {element(source, 'body', index)}, not that body alone")
+    if overlaps == "ignore":
+        leave_out(loaded, data, lambda a, b: ignore(owner[a], owner[b]))
     return off
 
 

@@ -106,7 +106,7 @@ def _add_body(loaded, data, group):
                                            linear_velocity=linear, angular_velocity=angular, name=name,
                                            gravity_scale=_gravity_scale(loaded, group))
     except Error as error:
-        error.add_note(f"in {element(source, 'body', root)}") if hasattr(error, "add_note") else None
+        error.args = (f"{element(source, 'body', root)}: {error}",)
         raise
 
 
