@@ -169,7 +169,7 @@ def _set_friction(loaded, chosen, owner, ignored):
     own = {g: 0.0 if source.geom_condim[g] == 1 else float(source.geom_friction[g, 0]) for g in geoms}
     same = {}
     for g in geoms:
-        same.setdefault((own[g], int(source.geom_priority[g]), int(source.geom_condim[g])), []).append(g)
+        same.setdefault((own[g], float(source.geom_friction[g, 0]), int(source.geom_priority[g]), int(source.geom_condim[g])), []).append(g)
     count = 0
     materials = list(same)
     for i, a in enumerate(materials):
