@@ -121,14 +121,17 @@ THIRD = """<body name="two" pos="0 0 -.5"><joint name="j2" axis="0 1 0"/><joint 
     <geom type="box" size=".02 .05 .2" pos=".1 0 -.2" mass=".7"/></body>"""
 
 
-@pytest.mark.parametrize("second, laws, tolerance", [
-    # measured: 1.8e-7, 4.7e-9, 3.9e-5 and 2.6e-4; a quarter of it at half the step, but first order where moments differ (third),
-    # and a carrier's mass and inertia, 1e-4 of the body's (fourth)
-    ("", dict(damping=0, stiffness=0, armature=0), 1e-6),
-    ("", dict(damping=0.2, stiffness=3, armature=0.05), 1e-7),
-    (SECOND, dict(damping=0.1, stiffness=0, armature=0), 1e-4),
-    (THIRD, dict(damping=0, stiffness=1, armature=0.01), 1e-3),
-])
+@pytest.mark.parametrize(
+    "second, laws, tolerance",
+    [
+        # measured: 1.8e-7, 4.7e-9, 3.9e-5 and 2.6e-4; a quarter of it at half the step, but first order where moments differ (third),
+        # and a carrier's mass and inertia, 1e-4 of the body's (fourth)
+        ("", dict(damping=0, stiffness=0, armature=0), 1e-6),
+        ("", dict(damping=0.2, stiffness=3, armature=0.05), 1e-7),
+        (SECOND, dict(damping=0.1, stiffness=0, armature=0), 1e-4),
+        (THIRD, dict(damping=0, stiffness=1, armature=0.01), 1e-3),
+    ],
+)
 def test_pendulums_move_as_in_mujoco(second, laws, tolerance):
     source = model(PENDULUM.format(dt=0.0005, second=second, **laws))
     loaded, data = subadmm.load(source), mujoco.MjData(source)
@@ -140,11 +143,13 @@ def test_pendulums_move_as_in_mujoco(second, laws, tolerance):
 
 
 def test_limits_hold_with_offsets_and_signs():
-    loaded = subadmm.load(model("""
+    loaded = subadmm.load(
+        model("""
         <mujoco><worldbody>
           <body name="door" pos="0 0 1"><joint name="hinge" axis="0 1 0" ref="100" range="80 130"/><geom size=".05" pos=".5 0 0"/></body>
           <body name="drawer" pos="3 0 1"><joint name="slide" type="slide" axis="0 0 1" ref="-.1" range="-.3 .2"/><geom size=".05"/></body>
-        </worldbody></mujoco>"""))
+        </worldbody></mujoco>""")
+    )
     loaded.world.step(2000)
     # what the solver leaves of a pressing limit
     assert loaded.joints["hinge"].position == pytest.approx(np.radians(130), abs=1e-5)
@@ -174,7 +179,8 @@ def test_a_loop_stays_closed():
 
 
 def test_ties_welds_and_sites():
-    loaded = subadmm.load(model("""
+    loaded = subadmm.load(
+        model("""
         <mujoco><option gravity="0 0 0"/><worldbody>
           <body name="a"><joint name="ja" axis="0 0 1" ref="10"/><geom size=".1"/></body>
           <body name="b" pos="1 0 0"><joint name="jb" axis="0 0 -1"/><geom size=".1"/></body>
@@ -191,7 +197,8 @@ def test_ties_welds_and_sites():
           <connect name="sites" site1="s" site2="t"/>
           <weld name="weld" body1="e" body2="f"/>
         </equality>
-        <actuator><motor name="m" joint="jb"/></actuator></mujoco>"""))
+        <actuator><motor name="m" joint="jb"/></actuator></mujoco>""")
+    )
     loaded.actuators["m"].control = 0.01
     loaded.bodies["e"].apply_impulse_at([0, 1, 0], [4, 0, 0])
     loaded.world.step(200)
@@ -220,9 +227,13 @@ ACTUATORS = """
     <general name="weak" joint="j6" gainprm="7" biasprm=".1 -3 -.2" biastype="affine" forcerange="-.2 .2"/>
     <muscle name="muscle" joint="j7" lengthrange="0 1"/>
   </actuator></mujoco>
-""".format(bodies="\n".join(
-    f'<body name="b{k}" pos="{k} 0 0"><joint name="j{k}" axis="0 0 {1 - 2 * (k % 2)}" ref="{10 * k}" damping=".01"/>'
-    '<geom type="box" size=".1 .2 .1"/></body>' for k in range(8)))
+""".format(
+    bodies="\n".join(
+        f'<body name="b{k}" pos="{k} 0 0"><joint name="j{k}" axis="0 0 {1 - 2 * (k % 2)}" ref="{10 * k}" damping=".01"/>'
+        '<geom type="box" size=".1 .2 .1"/></body>'
+        for k in range(8)
+    )
+)
 
 
 def test_actuators_drive_as_in_mujoco():
@@ -244,7 +255,11 @@ def test_actuators_drive_as_in_mujoco():
     assert np.all(moved[:7] > 0.01)
     # second order in the step, and for 'weak' the kink where the force comes off its bound
     assert np.abs(loaded.positions() - data.qpos)[:7].max() < 1e-5
-    assert noted(loaded, "actuator 'muscle'") and noted(loaded, "actuator 'tendon_servo'") and noted(loaded, "tendon 'two'")
+    assert (
+        noted(loaded, "actuator 'muscle'")
+        and noted(loaded, "actuator 'tendon_servo'")
+        and noted(loaded, "tendon 'two'")
+    )
     assert "muscle" not in loaded.actuators
     with pytest.raises(ValueError, match="control of actuator 'motor'"):
         loaded.actuators["motor"].control = np.nan
@@ -261,13 +276,21 @@ SHAPES = """
     {bodies}
   </worldbody></mujoco>
 """
-KINDS = {"sphere": 'size=".1"', "capsule": 'size=".05 .1"', "cylinder": 'size=".05 .1"', "ellipsoid": 'size=".1 .08 .06"',
-         "box": 'size=".1 .08 .06"', "mesh": 'mesh="tetra"'}
+KINDS = {
+    "sphere": 'size=".1"',
+    "capsule": 'size=".05 .1"',
+    "cylinder": 'size=".05 .1"',
+    "ellipsoid": 'size=".1 .08 .06"',
+    "box": 'size=".1 .08 .06"',
+    "mesh": 'mesh="tetra"',
+}
 
 
 def test_geoms_of_every_kind_come_to_rest_where_they_do_in_mujoco():
-    bodies = "\n".join(f'<body name="{kind}" pos="0 {k} .3"><freejoint/><geom name="{kind}" type="{kind}" {size} friction="0.7"/></body>'
-                       for k, (kind, size) in enumerate(KINDS.items()))
+    bodies = "\n".join(
+        f'<body name="{kind}" pos="0 {k} .3"><freejoint/><geom name="{kind}" type="{kind}" {size} friction="0.7"/></body>'
+        for k, (kind, size) in enumerate(KINDS.items())
+    )
     bodies += '<body name="over" pos="5 0 .3"><freejoint/><geom type="box" size=".1 .1 .1"/></body>'
     source = model(SHAPES.format(bodies=bodies))
     loaded, data = subadmm.load(source), mujoco.MjData(source)
@@ -283,7 +306,8 @@ def test_geoms_of_every_kind_come_to_rest_where_they_do_in_mujoco():
 
 
 def test_friction_of_pairs_and_filters():
-    loaded = subadmm.load(model("""
+    loaded = subadmm.load(
+        model("""
         <mujoco><worldbody>
           <geom name="floor" type="plane" size="1 1 1" friction=".2" contype="1" conaffinity="1"/>
           <body name="slick" pos="0 0 .1"><freejoint/><geom name="slick" type="box" size=".1 .1 .1" condim="1" friction=".1"/></body>
@@ -296,7 +320,8 @@ def test_friction_of_pairs_and_filters():
           <body name="paired" pos="5 0 .1"><freejoint/><geom name="paired" type="box" size=".1 .1 .1" contype="0" conaffinity="0"/></body>
         </worldbody>
         <contact><exclude name="apart" body1="world" body2="out"/><pair name="pair" geom1="floor" geom2="paired" friction=".4 .4 .1 .1 .1"/></contact>
-        </mujoco>"""))
+        </mujoco>""")
+    )
     loaded.world.step(100)
     friction = {}
     contacts = loaded.world.contacts()
@@ -304,7 +329,12 @@ def test_friction_of_pairs_and_filters():
     for contact in contacts:
         pair = {by_slot[int(contact["shape_a"][0])], by_slot[int(contact["shape_b"][0])]}
         friction[loaded.source.geom(max(pair)).name] = float(contact["friction"])
-    assert friction == {"slick": 0.2, "rough": 0.9, "paired": 0.4, "ice": 0.0}  # condim is the larger one, as friction is
+    assert friction == {
+        "slick": 0.2,
+        "rough": 0.9,
+        "paired": 0.4,
+        "ice": 0.0,
+    }  # condim is the larger one, as friction is
     for name in ("ghost", "shown", "out"):
         assert loaded.bodies[name].position[2] < 0.06, name  # 0.5 g t^2 with t = 0.2 s, less the margin
 
@@ -314,8 +344,11 @@ def test_many_kinds_of_geoms_still_meet_as_they_should():
 
     random = np.random.default_rng(5)
     geoms = [(int(random.integers(0, 16)), int(random.integers(0, 16))) for _ in range(60)]
-    source = model("<mujoco><worldbody>" + "".join(
-        f'<geom size=".1" contype="{a}" conaffinity="{b}"/>' for a, b in geoms) + "</worldbody></mujoco>")
+    source = model(
+        "<mujoco><worldbody>"
+        + "".join(f'<geom size=".1" contype="{a}" conaffinity="{b}"/>' for a, b in geoms)
+        + "</worldbody></mujoco>"
+    )
     chosen = Filter(source)
     assert not chosen.crowded or len(set(geoms)) > 32
     for i, (a, b) in enumerate(geoms):
@@ -371,10 +404,13 @@ def test_a_urdf_with_a_mesh_of_a_package(tmp_path):
     elbow = loaded.joints["elbow"].joint.coordinate(5)
     assert (elbow.lower, elbow.upper, elbow.friction, elbow.spring_damping) == pytest.approx((-1, 2, 0.2, 0.1))
     assert len(loaded.shapes) == 1 and noted(loaded, "<transmission>")
+    free = subadmm.load(tmp_path / "urdf" / "r.urdf", floating=True)
+    assert free.joints["base_free"].type == "free" and free.bodies["base"].mass == pytest.approx(2)
 
 
 def test_what_is_not_carried_over_is_named():
-    loaded = subadmm.load(model("""
+    loaded = subadmm.load(
+        model("""
         <mujoco><option density="1.2"/><worldbody>
           <camera name="eye"/>
           <geom name="floor" type="plane" size="1 1 1"/>
@@ -383,9 +419,19 @@ def test_what_is_not_carried_over_is_named():
         </worldbody>
         <tendon><spatial name="rope"><site site="s1"/><site site="s2"/></spatial></tendon>
         <actuator><motor name="pull" tendon="rope"/><motor name="push" site="s1" gear="1 0 0 0 0 0"/></actuator>
-        <sensor><accelerometer name="imu" site="s1"/></sensor></mujoco>"""))
-    for name in ("density", "tendon 'rope'", "geoms ball", "joint 'j'", "actuator 'pull'", "actuator 'push'", "sensors", "solref",
-                 "what is drawn"):
+        <sensor><accelerometer name="imu" site="s1"/></sensor></mujoco>""")
+    )
+    for name in (
+        "density",
+        "tendon 'rope'",
+        "geoms ball",
+        "joint 'j'",
+        "actuator 'pull'",
+        "actuator 'push'",
+        "sensors",
+        "solref",
+        "what is drawn",
+    ):
         assert noted(loaded, name), name
     loaded.world.step(100)
     assert loaded.bodies["a"].position[2] == pytest.approx(1, abs=1e-12)  # its weight is compensated
@@ -405,7 +451,11 @@ def test_errors_name_what_they_are_about(tmp_path):
     with pytest.raises(ValueError, match="carrier_share"):
         subadmm.load(source, carrier_share=0)
     with pytest.raises(subadmm.InvalidArgument, match="body 'mote'"):
-        subadmm.load(model('<mujoco><worldbody><body name="mote"><freejoint/><geom size=".1" mass="1e-12"/></body></worldbody></mujoco>'))
+        subadmm.load(
+            model(
+                '<mujoco><worldbody><body name="mote"><freejoint/><geom size=".1" mass="1e-12"/></body></worldbody></mujoco>'
+            )
+        )
 
 
 def test_a_keyframe_is_where_it_starts():

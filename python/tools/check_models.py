@@ -4,7 +4,8 @@
     python check_models.py --list FOLDER ... # also what was not carried over, model by model
 
 Errors are the largest of all bodies: mass and the inertia tensor (about the centre of mass, world axes) relative to the
-body's largest, poses in m and as |q - q'|, at qpos0 and at a pose with every joint elsewhere. The last columns are of 1 s of motion
+body's largest, poses in m and as |q - q'|, at qpos0 and at a pose with every joint elsewhere. The last columns are of
+1 s of motion
 from qpos0: time, worst certificate of its last step, and how far joints are off (locked coordinates; m, rad).
 """
 
@@ -25,7 +26,8 @@ from subadmm.importing.poses import q_matrix
 
 
 def files_of(folders):
-    """Files with a model of their own: of MJCF those with a body or a geom in a worldbody, which others do not include."""
+    """Files with a model of their own: of MJCF those with a body or a geom in a worldbody, which others do not
+    include."""
     out, included = [], set()
     for folder in folders:
         for path in sorted(p for p in Path(folder).rglob("*") if p.suffix in (".xml", ".urdf", ".mjcf")):
@@ -50,7 +52,7 @@ def other_pose(source, seed=1):
             qpos[at] = low + (high - low) * random.uniform(0.1, 0.9)
         else:
             q = random.normal(size=4)
-            qpos[at + (3 if kind == 0 else 0):][:4] = q / np.linalg.norm(q)
+            qpos[at + (3 if kind == 0 else 0) :][:4] = q / np.linalg.norm(q)
     return qpos
 
 
@@ -91,7 +93,7 @@ def pose_errors(loaded, data):
     for j in range(loaded.source.njnt):
         if loaded.source.jnt_type[j] < 2:  # a quaternion's sign says nothing
             k = loaded.source.jnt_qposadr[j] + (3 if loaded.source.jnt_type[j] == 0 else 0)
-            off[k:k + 4] = np.minimum(off[k:k + 4], np.abs(loaded.positions() + data.qpos)[k:k + 4])
+            off[k : k + 4] = np.minimum(off[k : k + 4], np.abs(loaded.positions() + data.qpos)[k : k + 4])
     return max(at, turned), off.max() if off.size else 0.0
 
 
@@ -152,9 +154,13 @@ def print_row(row, base, listed):
         print(f"| {name} | {row['error'][:200]} |", flush=True)
         return
     moved = row["motion"] if "motion" in row else f"{row['ncp']:.0e} | {row['after']:.0e}"
-    print(f"| {name} | {row['bodies']} | {row['joints']} | {row['actuators']} | {len(row['notes'])} | {row['mass']:.0e} | "
-          f"{row['inertia']:.0e} | {row['pose']:.0e} | {max(row['moved'], row['coordinates'], row['locks']):.0e} | "
-          f"{row['seconds']:.2f} | {moved} |", flush=True)
+    print(
+        f"| {name} | {row['bodies']} | {row['joints']} | {row['actuators']} | {len(row['notes'])} | "
+        f"{row['mass']:.0e} | "
+        f"{row['inertia']:.0e} | {row['pose']:.0e} | {max(row['moved'], row['coordinates'], row['locks']):.0e} | "
+        f"{row['seconds']:.2f} | {moved} |",
+        flush=True,
+    )
     if listed:
         for note in row["notes"]:
             print("  -", note)
@@ -186,15 +192,30 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", type=Path)
     parser.add_argument("--list", action="store_true", help="print what was not carried over")
+    parser.add_argument("--jointed", action="store_true", help="print models without joints in the totals only")
     parser.add_argument("--limit", type=float, default=60, help="s a model")
     options = parser.parse_args()
-    print("| model | bodies | joints | actuators | notes | mass | inertia | pose | pose elsewhere | s | natural map, m/s | joints off |")
-    print("|---|---|---|---|---|---|---|---|---|---|---|---|")
+    columns = (
+        "model",
+        "bodies",
+        "joints",
+        "actuators",
+        "notes",
+        "mass",
+        "inertia",
+        "pose",
+        "pose elsewhere",
+        "s",
+        "natural map, m/s",
+        "joints off",
+    )
+    print("| " + " | ".join(columns) + " |\n" + "|---" * len(columns) + "|")
     rows = []
     for folder in options.folders:
         for path in files_of([folder]):
             rows.append(checked(path, options.limit))
-            print_row(rows[-1], folder, options.list)
+            if rows[-1].get("joints", 1) or not options.jointed:
+                print_row(rows[-1], folder, options.list)
     compiled = [r for r in rows if not r["error"].startswith("MuJoCo")]
     loaded = [r for r in compiled if not r["error"]]
     print(f"\n{len(rows)} files; MuJoCo compiles {len(compiled)}; {len(loaded)} of these load")

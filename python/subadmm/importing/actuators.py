@@ -1,8 +1,8 @@
 """Actuators as drives of joints.
 
-An actuator's force is linear: gain control + constant - stiffness length - damping rate, its length gear times the joint's
-position. All of a joint add up to one drive: K = sum gear^2 stiffness, D = sum gear^2 damping, and a force. Where there is neither
-K nor D, a drive of a very small damping and a very large target speed is the force."""
+An actuator's force is linear: gain control + constant - stiffness length - damping rate, its length gear times the
+joint's position. All of a joint add up to one drive: K = sum gear^2 stiffness, D = sum gear^2 damping, and a force.
+Where there is neither K nor D, a drive of a very small damping and a very large target speed is the force."""
 
 import numpy as np
 
@@ -18,8 +18,8 @@ class Drive:
 
     def __init__(self, joint, limit):
         self.joint = joint
-        self.limit = limit    # the joint's own bound of all actuators' force
-        self.actuators = []   # (actuator, factor)
+        self.limit = limit  # the joint's own bound of all actuators' force
+        self.actuators = []  # (actuator, factor)
 
     def update(self):
         joint = self.joint
@@ -59,8 +59,10 @@ def _parts(loaded, index):
         begin = source.tendon_adr[target]
         wraps = range(begin, begin + source.tendon_num[target])
         if all(source.wrap_type[w] == int(mujoco.mjtWrap.mjWRAP_JOINT) for w in wraps):
-            return [(loaded.joints[name_of(source, "joint", int(source.wrap_objid[w]))], gear * float(source.wrap_prm[w]))
-                    for w in wraps], ""
+            return [
+                (loaded.joints[name_of(source, "joint", int(source.wrap_objid[w]))], gear * float(source.wrap_prm[w]))
+                for w in wraps
+            ], ""
         return [], f"it acts on {element(source, 'tendon', target)}, which goes through space"
     return [], f"it acts on a {kind.name[6:].lower()}"
 
@@ -70,7 +72,8 @@ def _law(source, index):
     import mujoco
 
     gain, bias = source.actuator_gainprm[index], source.actuator_biasprm[index]
-    gain_kind, bias_kind = mujoco.mjtGain(int(source.actuator_gaintype[index])), mujoco.mjtBias(int(source.actuator_biastype[index]))
+    gain_kind = mujoco.mjtGain(int(source.actuator_gaintype[index]))
+    bias_kind = mujoco.mjtBias(int(source.actuator_biastype[index]))
     if gain_kind == mujoco.mjtGain.mjGAIN_AFFINE and np.any(gain[1:3]):
         return None, "its gain depends on length or speed"
     if gain_kind not in (mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtGain.mjGAIN_AFFINE):
@@ -95,7 +98,8 @@ def _report_dynamics(loaded, index, law, parts):
     source, report, what = loaded.source, loaded.report, element(loaded.source, "actuator", index)
     kind = mujoco.mjtDyn(int(source.actuator_dyntype[index]))
     if kind != mujoco.mjtDyn.mjDYN_NONE:
-        report.add(what, f"its dynamics ({kind.name[6:].lower()}) is not carried over: the control set is the activation")
+        name = kind.name[6:].lower()
+        report.add(what, f"its dynamics ({name}) is not carried over: the control set is the activation")
     if hasattr(source, "actuator_delay") and source.actuator_delay[index]:
         report.add(what, "its delay is not carried over")
     lower, upper = source.actuator_forcerange[index]
@@ -137,9 +141,14 @@ def add_actuators(loaded, data):
         at = int(source.actuator_ctrladr[index]) if hasattr(source, "actuator_ctrladr") else index
         controlled = source.actuator_ctrllimited[at] and not disabled(source, "CLAMPCTRL")
         actuator = LoadedActuator(
-            name_of(source, "actuator", index), "position" if law[1] else "velocity" if law[2] else "motor", parts, *law,
+            name_of(source, "actuator", index),
+            "position" if law[1] else "velocity" if law[2] else "motor",
+            parts,
+            *law,
             _range(controlled, source.actuator_ctrlrange[at]),
-            _range(source.actuator_forcelimited[index], source.actuator_forcerange[index]), drives)
+            _range(source.actuator_forcelimited[index], source.actuator_forcerange[index]),
+            drives,
+        )
         loaded.actuators[actuator.name] = actuator
         for joint, factor in parts:
             drives.setdefault(joint, Drive(joint, _joint_limit(loaded, joint))).actuators.append((actuator, factor))
@@ -147,7 +156,9 @@ def add_actuators(loaded, data):
     for joint, drive in drives.items():
         bound = [a.name for a, _ in drive.actuators if (a.stiffness or a.damping) and np.isfinite(a.force_range[1])]
         if bound and len(drive.actuators) > 1:
-            report.add("actuators " + ", ".join(bound), f"forcerange is not carried over: joint '{joint.name}' has several actuators")
+            report.add(
+                "actuators " + ", ".join(bound), f"no forcerange here: joint '{joint.name}' has several actuators"
+            )
     for actuator, control in controls:
         actuator.control = control
 
@@ -159,6 +170,9 @@ def _joint_limit(loaded, joint):
     if not source.jnt_actfrclimited[index]:
         return np.inf
     lower, upper = source.jnt_actfrcrange[index]
+    most = float(max(abs(lower), abs(upper)))
     if lower != -upper:
-        loaded.report.add(element(source, "joint", index), f"actuatorfrcrange [{lower:g}, {upper:g}] is +-{max(abs(lower), abs(upper)):g} here")
-    return float(max(abs(lower), abs(upper)))
+        loaded.report.add(
+            element(source, "joint", index), f"actuatorfrcrange [{lower:g}, {upper:g}] is +-{most:g} here"
+        )
+    return most

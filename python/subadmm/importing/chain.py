@@ -1,8 +1,8 @@
 """Several joints of one body, as few joints of the world as they fit in.
 
-MuJoCo turns and moves a body by its joints in their order, each where those before have brought it. A run of them is one joint here
-if it is slides along axes at right angles and then a ball, a hinge or two hinges at a right angle about one point, or a hinge and
-a slide along one line. What is more goes on behind a carrier."""
+MuJoCo turns and moves a body by its joints in their order, each where those before have brought it. A run of them is
+one joint here if it is slides along axes at right angles and then a ball, a hinge or two hinges at a right angle
+about one point, or a hinge and a slide along one line. What is more goes on behind a carrier."""
 
 from typing import NamedTuple
 
@@ -11,17 +11,23 @@ import numpy as np
 from .poses import q_of_matrix
 
 KINDS = {  # free coordinates: name of the joint
-    (5,): "revolute", (2,): "prismatic", (2, 5): "cylindrical", (3, 4, 5): "spherical", (3, 4): "universal",
-    (0, 1, 5): "planar", (0, 1, 2): "cartesian",
+    (5,): "revolute",
+    (2,): "prismatic",
+    (2, 5): "cylindrical",
+    (3, 4, 5): "spherical",
+    (3, 4): "universal",
+    (0, 1, 5): "planar",
+    (0, 1, 2): "cartesian",
 }
 
 
 class Fit(NamedTuple):
     """A joint of the world for a run of joints of the file."""
-    joints: list       # their indices
-    turn: np.ndarray   # the joint's frame to the body's, w x y z
+
+    joints: list  # their indices
+    turn: np.ndarray  # the joint's frame to the body's, w x y z
     point: np.ndarray  # in the body's frame, m
-    places: list       # (coordinate, sign) of each
+    places: list  # (coordinate, sign) of each
     kind: str
     locks: int
 

@@ -8,8 +8,10 @@ import mujoco
 KNOWN_MESHES = (".obj", ".stl", ".msh")
 
 
-def compile_file(path, report):
-    """The mujoco.MjModel of an MJCF or URDF file. Raises FileNotFoundError, ValueError (with MuJoCo's message)."""
+def compile_file(path, report, floating=False):
+    """The mujoco.MjModel of an MJCF or URDF file; floating: a URDF's base is free.
+
+    Raises FileNotFoundError, ValueError (with MuJoCo's message)."""
     path = Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"path: there is no file {path}")
@@ -18,13 +20,15 @@ def compile_file(path, report):
     except tree.ParseError as error:
         raise ValueError(f"path: {path} is no XML: {error}") from error
     if root.tag == "mujoco":
+        if floating:
+            raise ValueError(f"floating: {path} is MJCF, which has free joints itself")
         return mujoco.MjModel.from_xml_path(str(path))
     if root.tag == "robot":
-        return _compile_urdf(root, path, report)
+        return _compile_urdf(root, path, report, floating)
     raise ValueError(f"path: {path} is neither MJCF nor URDF: its root is <{root.tag}>")
 
 
-def _compile_urdf(root, path, report):
+def _compile_urdf(root, path, report, floating):
     """URDF has meshes where MuJoCo does not look for them, and in formats that it does not know."""
     if root.find("mujoco") is None:
         root.insert(0, tree.fromstring('<mujoco><compiler fusestatic="false" discardvisual="true"/></mujoco>'))
@@ -45,7 +49,14 @@ def _compile_urdf(root, path, report):
         name = f"{file.stem}_{number}{suffix}"
         assets[name] = data
         mesh.set("filename", name)
-    return mujoco.MjModel.from_xml_string(tree.tostring(root, encoding="unicode"), assets)
+    text = tree.tostring(root, encoding="unicode")
+    if not floating:
+        return mujoco.MjModel.from_xml_string(text, assets)
+    spec = mujoco.MjSpec.from_string(text, assets=assets)
+    for base in spec.worldbody.bodies:
+        if not base.joints:
+            base.add_freejoint(name=f"{base.name}_free")
+    return spec.compile()
 
 
 def _find(name, folder):

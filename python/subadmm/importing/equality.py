@@ -44,9 +44,16 @@ def _add_loop(loaded, index, weld):
     frame_a = mul(group_a.frame_in_body(body_a), frame_a)
     frame_b = mul(group_b.frame_in_body(body_b), frame_b)
     joint = loaded.world.add_joint(
-        kind, None if group_a.kind == "static" else group_a.body, None if group_b.kind == "static" else group_b.body,
-        position_a=frame_a[0], orientation_a=frame_a[1], position_b=frame_b[0], orientation_b=frame_b[1], collide=True,
-        enabled=bool(source.eq_active0[index]))
+        kind,
+        None if group_a.kind == "static" else group_a.body,
+        None if group_b.kind == "static" else group_b.body,
+        position_a=frame_a[0],
+        orientation_a=frame_a[1],
+        position_b=frame_b[0],
+        orientation_b=frame_b[1],
+        collide=True,
+        enabled=bool(source.eq_active0[index]),
+    )
     loaded.loops[name_of(source, "equality", index)] = joint
 
 
@@ -77,8 +84,15 @@ def _add_tie(loaded, index):
     # with q = sign x + offset of both
     offset = one.sign * (rest - one.offset + ratio * (other.offset - rest2))
     try:
-        gear = loaded.world.add_gear(one.joint, one.coordinate, other.joint, other.coordinate,
-                                     ratio=-one.sign * ratio * other.sign, offset=float(offset), enabled=bool(source.eq_active0[index]))
+        gear = loaded.world.add_gear(
+            one.joint,
+            one.coordinate,
+            other.joint,
+            other.coordinate,
+            ratio=-one.sign * ratio * other.sign,
+            offset=float(offset),
+            enabled=bool(source.eq_active0[index]),
+        )
         loaded.gears[name_of(source, "equality", index)] = gear
     except Error as error:
         report.add(what, f"not carried over: joints '{one.name}' and '{other.name}': {error}")
@@ -97,4 +111,5 @@ def add_equalities(loaded):
         elif kind == kinds.mjEQ_JOINT:
             _add_tie(loaded, index)
         else:
-            loaded.report.add(element(source, "equality", index), f"not carried over: a {kind.name[5:].lower()} constraint")
+            what = element(source, "equality", index)
+            loaded.report.add(what, f"not carried over: a {kind.name[5:].lower()} constraint")

@@ -9,6 +9,7 @@ from .poses import mul, pose, q_of_vector, q_turn
 
 class Note(NamedTuple):
     """Something that was not carried over, or not exactly."""
+
     element: str  # as "tendon 'left'"
     reason: str
 
@@ -38,19 +39,22 @@ def element(source, kind, index):
 
 
 class LoadedJoint:
-    """A joint of the file, and where it is here: coordinate `coordinate` of `joint` (None: a free body's), which is sign x
-    (the file's position - offset). Joints of one body may share a joint of the world."""
+    """A joint of the file, and where it is here.
+
+    Coordinate `coordinate` of `joint` (None: a free body's) is sign x (the file's position - offset). Joints of one
+    body may share a joint of the world.
+    """
 
     def __init__(self, name, type, body, frame, joint=None, coordinate=None, sign=1.0, offset=0.0, turn=None):
         self.name = name
-        self.type = type              #: 'free', 'ball', 'hinge' or 'slide'
-        self.body = body              #: the Body that it moves
-        self.joint = joint            #: the Joint of the world
+        self.type = type  #: 'free', 'ball', 'hinge' or 'slide'
+        self.body = body  #: the Body that it moves
+        self.joint = joint  #: the Joint of the world
         self.coordinate = coordinate  #: its free coordinate, of a ball the first of three
         self.sign = sign
         self.offset = offset
-        self._frame = frame           # of free joints: the file's frame of the body in the Body's
-        self._turn = turn             # of balls: the joint's frame to the file's
+        self._frame = frame  # of free joints: the file's frame of the body in the Body's
+        self._turn = turn  # of balls: the joint's frame to the file's
 
     def __repr__(self):
         return f"<subadmm joint '{self.name}', {self.type}>"
@@ -79,13 +83,13 @@ class LoadedJoint:
 class LoadedActuator:
     """An actuator of the file. Set `control`; what it does to its joint holds until it is set again.
 
-    Its force is gain control - stiffness length - damping rate + constant, in [lower, upper]; it acts on each of `parts`, pairs of
-    a LoadedJoint and a factor (the gear), with factor times the force. Actuators on one joint add up.
+    Its force is gain control - stiffness length - damping rate + constant, in force_range; it acts on each of `parts`,
+    pairs of a LoadedJoint and a factor (the gear), with factor times the force. Actuators on one joint add up.
     """
 
     def __init__(self, name, kind, parts, gain, stiffness, damping, constant, control_range, force_range, drives):
         self.name = name
-        self.kind = kind              #: 'motor', 'position' or 'velocity'
+        self.kind = kind  #: 'motor', 'position' or 'velocity'
         self.parts = parts
         self.gain, self.stiffness, self.damping, self.constant = gain, stiffness, damping, constant
         self.control_range = control_range  #: (lower, upper)
@@ -98,7 +102,7 @@ class LoadedActuator:
 
     @property
     def control(self):
-        """As MuJoCo's ctrl: a motor's force over its gain, a servo's position (m, rad) or speed. Clipped to control_range."""
+        """As MuJoCo's ctrl: a motor's force over its gain, a servo's target (m, rad, or per s); within control_range."""
         return self._control
 
     @control.setter
@@ -120,11 +124,14 @@ class LoadedActuator:
 
 
 class Loaded:
-    """A model in a world: `world`; `bodies`, `joints`, `actuators` by the file's names (those without one: '#' and the index);
-    `report`, what was not carried over; `source`, the mujoco.MjModel.
+    """A model in a world.
 
-    Bodies that the file has without joints are part of the one they are fixed to: several names of one Body. What is fixed to the
-    world has a Body only if something can touch it.
+    `world`; `bodies`, `joints`, `actuators` by the file's names (those without one: '#' and the index); `loops` and
+    `gears`: the joints and gears that its equality constraints are; `report`: what was not carried over; `source`: the
+    mujoco.MjModel.
+
+    Bodies that the file has without joints are part of the one they are fixed to: several names of one Body. What is
+    fixed to the world has a Body only if something can touch it.
     """
 
     def __init__(self, world, source, report):
@@ -135,14 +142,16 @@ class Loaded:
         self.joints = {}
         self.actuators = {}
         self.gears = {}
-        self.loops = {}     # joints that the file's equality constraints became, by their names
-        self.groups = []    # of tree.py, one a body of the file
+        self.loops = {}  # joints that the file's equality constraints became, by their names
+        self.groups = []  # of tree.py, one a body of the file
         self.carriers = []  # bodies between several joints of one
-        self.shapes = {}    # by geom index
+        self.shapes = {}  # by geom index
 
     def __repr__(self):
-        return (f"<subadmm model: {len(self.bodies)} bodies, {len(self.joints)} joints, {len(self.actuators)} actuators, "
-                f"{len(self.report)} notes>")
+        return (
+            f"<subadmm model: {len(self.bodies)} bodies, {len(self.joints)} joints, {len(self.actuators)} actuators, "
+            f"{len(self.report)} notes>"
+        )
 
     def frame(self, name):
         """The pose of the file's frame of a body, as MuJoCo's xpos and xquat: position (m, world), w x y z."""
@@ -157,5 +166,5 @@ class Loaded:
         for index in range(self.source.njnt):
             at = self.source.jnt_qposadr[index]
             value = np.atleast_1d(self.joints[name_of(self.source, "joint", index)].position)
-            out[at:at + value.size] = value
+            out[at : at + value.size] = value
         return out

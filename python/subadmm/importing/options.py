@@ -23,7 +23,7 @@ def report_options(source, report):
     """Notes on what concerns all of the file."""
     option = source.opt
     if source.ngeom or source.neq or source.njnt:
-        report.add("solref, solimp", "not carried over: contacts, limits, friction and loops are hard here, without compliance")
+        report.add("solref, solimp", "not carried over: contacts, limits, friction and loops are hard here")
     if option.density or option.viscosity:
         report.add("option density, viscosity", "not carried over: there is no medium")
     if np.any(option.wind):
@@ -40,8 +40,17 @@ def report_options(source, report):
         report.add("plugins", f"not carried over: {source.nplugin}")
     if source.nsensor:
         report.add("sensors", f"not carried over: {source.nsensor}")
-    drawn = [f"{count} {name}" for count, name in (
-        (source.ncam, "cameras"), (source.nlight, "lights"), (source.nmat, "materials"), (source.ntex, "textures"),
-        (source.nskin, "skins"), (source.nsite, "sites")) if count]
+    drawn = [
+        f"{count} {name}"
+        for count, name in (
+            (source.ncam, "cameras"),
+            (source.nlight, "lights"),
+            (source.nmat, "materials"),
+            (source.ntex, "textures"),
+            (source.nskin, "skins"),
+            (source.nsite, "sites"),
+        )
+        if count
+    ]
     if drawn:
         report.add("what is drawn", "not carried over: " + ", ".join(drawn))

@@ -1,7 +1,7 @@
 """Bodies of one mechanism that overlap where they start.
 
-MuJoCo's soft contacts bear links that are stuck in each other, say a hull around a bent link in the next one's. Hard contacts
-and hard joints cannot both hold there, so contact of such pairs is left out, and reported."""
+MuJoCo's soft contacts bear links that are stuck in each other, say a hull around a bent link in the next one's. Hard
+contacts and hard joints cannot both hold there, so contact of such pairs is left out, and reported."""
 
 from .model import element
 
@@ -13,7 +13,8 @@ def _one_mechanism(source, groups, a, b):
     """Do joints tie the bodies of the file a and b? (The static world ties only what is jointed to it there.)"""
     if groups[a].kind == "static" or groups[b].kind == "static":
         still, moving = (a, b) if groups[a].kind == "static" else (b, a)
-        if source.body_parentid[groups[moving].root] == still and source.jnt_type[source.body_jntadr[groups[moving].root]] != 0:
+        root = groups[moving].root
+        if source.body_parentid[root] == still and source.jnt_type[source.body_jntadr[root]] != 0:
             return True
     return source.body_rootid[a] == source.body_rootid[b]
 
@@ -44,6 +45,8 @@ def leave_out(loaded, data, ignore):
         if bodies in done:
             continue
         done.add(bodies)
-        loaded.report.add(f"contact of {element(source, 'body', bodies[0])} and {element(source, 'body', bodies[1])}",
-                          f"left out: they overlap by {depth:.2g} m at the start, and belong to one mechanism")
+        loaded.report.add(
+            f"contact of {element(source, 'body', bodies[0])} and {element(source, 'body', bodies[1])}",
+            f"left out: they overlap by {depth:.2g} m at the start, and belong to one mechanism",
+        )
         ignore(a, b)

@@ -8,8 +8,14 @@ IDENTITY = (np.zeros(3), np.array([1.0, 0, 0, 0]))
 def q_mul(a, b):
     """Turn by b, then by a."""
     (w, x, y, z), (s, i, j, k) = a, b
-    return np.array([w * s - x * i - y * j - z * k, w * i + x * s + y * k - z * j,
-                     w * j - x * k + y * s + z * i, w * k + x * j - y * i + z * s])
+    return np.array(
+        [
+            w * s - x * i - y * j - z * k,
+            w * i + x * s + y * k - z * j,
+            w * j - x * k + y * s + z * i,
+            w * k + x * j - y * i + z * s,
+        ]
+    )
 
 
 def q_conjugate(q):
@@ -23,9 +29,13 @@ def q_unit(q):
 
 def q_matrix(q):
     w, x, y, z = q
-    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def q_turn(q, v):

@@ -12,12 +12,12 @@ from .poses import mul, pose
 def _hull_points(source, mesh):
     """The corners of the convex hull that MuJoCo has of a mesh, or all vertices where it has none."""
     first = source.mesh_vertadr[mesh]
-    vertices = np.array(source.mesh_vert[first:first + source.mesh_vertnum[mesh]], dtype=np.float64)
+    vertices = np.array(source.mesh_vert[first : first + source.mesh_vertnum[mesh]], dtype=np.float64)
     graph = source.mesh_graphadr[mesh]
     if graph >= 0:
         count = source.mesh_graph[graph]
         begin = graph + 2 + count
-        vertices = vertices[source.mesh_graph[begin:begin + count]]
+        vertices = vertices[source.mesh_graph[begin : begin + count]]
     return vertices
 
 
@@ -27,7 +27,9 @@ def _heightfield(source, field):
     rows, columns = int(source.hfield_nrow[field]), int(source.hfield_ncol[field])
     x, y, top, _ = source.hfield_size[field]
     first = source.hfield_adr[field]
-    heights = np.array(source.hfield_data[first:first + rows * columns], dtype=np.float64).reshape(rows, columns) * top
+    heights = (
+        np.array(source.hfield_data[first : first + rows * columns], dtype=np.float64).reshape(rows, columns) * top
+    )
     return heightfield(heights, (2 * x / (columns - 1), 2 * y / (rows - 1)))
 
 
@@ -85,7 +87,10 @@ def add_shapes(loaded, data, overlaps):
         return
     chosen, makes, statics, owner = Filter(source), Shapes(source), {}, {}
     if chosen.crowded:
-        report.add("contype, conaffinity", f"more than {MOST_CLASSES} kinds of geoms: those that share the last bit meet more than in the file")
+        report.add(
+            "contype, conaffinity",
+            f"more than {MOST_CLASSES} kinds of geoms: those of the last bit meet more than they should",
+        )
     for geom in range(source.ngeom):
         if not chosen.touches(geom):
             continue
@@ -133,7 +138,8 @@ def _report_contact(loaded):
 
 
 def _ignore(loaded, data, owner, statics, overlaps):
-    """Turn off contact between bodies that a joint ties, and those that the file leaves out. Returns the pairs of bodies."""
+    """Turn off contact between bodies that a joint ties, and those that the file leaves out. Returns the pairs of
+    bodies."""
     source, report = loaded.source, loaded.report
     off = set()
 
@@ -155,8 +161,10 @@ def _ignore(loaded, data, owner, statics, overlaps):
         ignore(*bodies)
         for index, group in zip(ends, groups):
             if group.kind != "static" and any(touching[other] for other in group.members if other != index):
-                report.add(element(source, "exclude", k),
-                           f"leaves out all that is fixed to {element(source, 'body', index)}, not that body alone")
+                report.add(
+                    element(source, "exclude", k),
+                    f"leaves out all that is fixed to {element(source, 'body', index)}, not that body alone",
+                )
     if overlaps == "ignore":
         leave_out(loaded, data, lambda a, b: ignore(owner[a], owner[b]))
     return off
@@ -169,7 +177,8 @@ def _set_friction(loaded, chosen, owner, ignored):
     own = {g: 0.0 if source.geom_condim[g] == 1 else float(source.geom_friction[g, 0]) for g in geoms}
     same = {}
     for g in geoms:
-        same.setdefault((own[g], float(source.geom_friction[g, 0]), int(source.geom_priority[g]), int(source.geom_condim[g])), []).append(g)
+        key = own[g], float(source.geom_friction[g, 0]), int(source.geom_priority[g]), int(source.geom_condim[g])
+        same.setdefault(key, []).append(g)
     count = 0
     materials = list(same)
     for i, a in enumerate(materials):
@@ -187,7 +196,7 @@ def _set_friction(loaded, chosen, owner, ignored):
                     if count <= MOST_PAIRS:
                         loaded.shapes[g].set_pair_friction(loaded.shapes[h], want)
     if count > MOST_PAIRS:
-        report.add("friction", f"of {count - MOST_PAIRS} pairs of geoms it is the geometric mean of the two, not the file's larger one")
+        report.add("friction", f"of {count - MOST_PAIRS} pairs of geoms it is the geometric mean, not the larger one")
     for k in range(source.npair):
         g, h = int(source.pair_geom1[k]), int(source.pair_geom2[k])
         if g not in loaded.shapes or h not in loaded.shapes or owner[g] == owner[h]:
@@ -198,7 +207,7 @@ def _set_friction(loaded, chosen, owner, ignored):
             mu = 0.0 if source.pair_dim[k] == 1 else float(source.pair_friction[k, 0])
             loaded.shapes[g].set_pair_friction(loaded.shapes[h], mu)
             if source.pair_friction[k, 1] != source.pair_friction[k, 0] and source.pair_dim[k] > 1:
-                report.add(element(source, "pair", k), "friction that depends on the direction is not carried over: the first of the two is")
+                report.add(element(source, "pair", k), "friction has no directions here: the first of the two is taken")
             if source.pair_margin[k] or source.pair_gap[k]:
                 report.add(element(source, "pair", k), "margin and gap are not carried over")
             if source.pair_dim[k] > 3:

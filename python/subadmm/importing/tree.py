@@ -13,11 +13,11 @@ class Group:
     """Bodies of the file that are fixed to each other: one body of the world, or the static world."""
 
     def __init__(self, root, kind):
-        self.root = root        # index of the body that has the joints
-        self.kind = kind        # 'static', 'kinematic' or 'dynamic'
+        self.root = root  # index of the body that has the joints
+        self.kind = kind  # 'static', 'kinematic' or 'dynamic'
         self.members = []
-        self.frames = {}        # the file's frames of its bodies in the root's
-        self.body = None        # the world's
+        self.frames = {}  # the file's frames of its bodies in the root's
+        self.body = None  # the world's
         self.inertial = IDENTITY  # the world's body's frame in the root's
         self.mass, self.inertia = 0.0, np.zeros(3)
 
@@ -56,8 +56,11 @@ def groups_of(source):
 
 def weigh(source, group):
     """Mass, principal moments and inertial frame of all members."""
-    parts = [(index, mul(group.frames[index], pose(source.body_ipos[index], source.body_iquat[index])))
-             for index in group.members if source.body_mass[index] > 0]
+    parts = [
+        (index, mul(group.frames[index], pose(source.body_ipos[index], source.body_iquat[index])))
+        for index in group.members
+        if source.body_mass[index] > 0 or np.any(source.body_inertia[index])
+    ]
     if len(parts) == 1:
         index, group.inertial = parts[0]
         group.mass, group.inertia = float(source.body_mass[index]), np.array(source.body_inertia[index])
@@ -68,7 +71,9 @@ def weigh(source, group):
     whole = np.zeros((3, 3))
     for mass, (index, frame) in zip(masses, parts):
         turn, arm = q_matrix(frame[1]), frame[0] - centre
-        whole += turn @ np.diag(source.body_inertia[index]) @ turn.T + mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+        whole += turn @ np.diag(source.body_inertia[index]) @ turn.T + mass * (
+            arm @ arm * np.eye(3) - np.outer(arm, arm)
+        )
     moments, axes = np.linalg.eigh(whole)
     if np.linalg.det(axes) < 0:
         axes[:, 2] = -axes[:, 2]
@@ -82,8 +87,11 @@ def _gravity_scale(loaded, group):
     heavy = [index for index in group.members if source.body_mass[index] > 0]
     shares = {float(source.body_gravcomp[index]) for index in heavy}
     if len(shares) > 1:
-        loaded.report.add(element(source, "body", group.root), "gravcomp differs between the bodies fixed to each other: their mean by "
-                          "mass acts, at the common centre of mass")
+        loaded.report.add(
+            element(source, "body", group.root),
+            "gravcomp differs between bodies fixed to each other: "
+            "their mean by mass acts, at the common centre of mass",
+        )
     return 1 - sum(source.body_mass[index] * source.body_gravcomp[index] for index in heavy) / group.mass
 
 
@@ -102,9 +110,16 @@ def _add_body(loaded, data, group):
     linear, angular = velocity_of_frame(source, data, root)
     linear = linear + np.cross(angular, start[0] - data.xpos[root])
     try:
-        group.body = loaded.world.add_body(mass=group.mass, inertia=group.inertia, position=start[0], orientation=start[1],
-                                           linear_velocity=linear, angular_velocity=angular, name=name,
-                                           gravity_scale=_gravity_scale(loaded, group))
+        group.body = loaded.world.add_body(
+            mass=group.mass,
+            inertia=group.inertia,
+            position=start[0],
+            orientation=start[1],
+            linear_velocity=linear,
+            angular_velocity=angular,
+            name=name,
+            gravity_scale=_gravity_scale(loaded, group),
+        )
     except Error as error:
         error.args = (f"{element(source, 'body', root)}: {error}",)
         raise
@@ -152,9 +167,12 @@ def _report_laws(loaded, index):
 def _add_free(loaded, group, index):
     source = loaded.source
     dof = source.jnt_dofadr[index]
-    for array, what in ((source.dof_damping, "damping"), (source.dof_armature, "armature"),
-                        (source.dof_frictionloss, "frictionloss")):
-        if np.any(array[dof:dof + 6]):
+    for array, what in (
+        (source.dof_damping, "damping"),
+        (source.dof_armature, "armature"),
+        (source.dof_frictionloss, "frictionloss"),
+    ):
+        if np.any(array[dof : dof + 6]):
             loaded.report.add(element(source, "joint", index), f"{what} of a free joint is not carried over")
     if source.jnt_stiffness[index]:
         loaded.report.add(element(source, "joint", index), "stiffness of a free joint is not carried over")
@@ -182,15 +200,17 @@ class _Motion:
         if source.jnt_type[index] == 2:
             way = q_turn(turn, source.jnt_axis[index]) * (data.qpos[adr] - source.qpos0[adr])
             self.pose = position + way, turn
-            self.linear = self.linear + np.cross(self.angular, way) + q_turn(turn, source.jnt_axis[index]) * data.qvel[dof]
+            self.linear = (
+                self.linear + np.cross(self.angular, way) + q_turn(turn, source.jnt_axis[index]) * data.qvel[dof]
+            )
             return
         at_anchor = self.linear + np.cross(self.angular, anchor - position)
         if source.jnt_type[index] == 3:
             turn = q_mul(turn, q_about(source.jnt_axis[index], data.qpos[adr] - source.qpos0[adr]))
             own = source.jnt_axis[index] * data.qvel[dof]
         else:
-            turn = q_mul(turn, q_mul(q_conjugate(source.qpos0[adr:adr + 4]), data.qpos[adr:adr + 4]))
-            own = data.qvel[dof:dof + 3]
+            turn = q_mul(turn, q_mul(q_conjugate(source.qpos0[adr : adr + 4]), data.qpos[adr : adr + 4]))
+            own = data.qvel[dof : dof + 3]
         self.angular = self.angular + q_turn(turn, own)
         arm = -q_turn(turn, point)
         self.pose = anchor + arm, turn
@@ -202,14 +222,19 @@ def _add_carrier(loaded, group, motion, point, share):
     arm = group.inertial[0] - point
     moment = share * (group.inertia.max() + group.mass * arm @ arm)
     return loaded.world.add_body(
-        mass=share * group.mass, inertia=[moment] * 3, position=motion.pose[0] + q_turn(motion.pose[1], point),
-        orientation=motion.pose[1], angular_velocity=motion.angular,
+        mass=share * group.mass,
+        inertia=[moment] * 3,
+        position=motion.pose[0] + q_turn(motion.pose[1], point),
+        orientation=motion.pose[1],
+        angular_velocity=motion.angular,
         linear_velocity=motion.linear + np.cross(motion.angular, q_turn(motion.pose[1], point)),
-        name=f"carrier of {name_of(loaded.source, 'body', group.root)}"[:63])
+        name=f"carrier of {name_of(loaded.source, 'body', group.root)}"[:63],
+    )
 
 
 def _add_joint(loaded, data, fit, a, base_a, b, base_b):
-    """One joint of the world for a run of the file's. base: the file's frame at qpos0 in a's body and in b's. Returns the
+    """One joint of the world for a run of the file's. base: the file's frame at qpos0 in a's body and in b's. Returns
+    the
     joint and, for each of the file's, the coordinate, sign and offset."""
     source = loaded.source
     turn_b, back, offsets, coordinates = fit.turn, np.zeros(3), [], {}
@@ -227,12 +252,22 @@ def _add_joint(loaded, data, fit, a, base_a, b, base_b):
         _report_laws(loaded, index)
     frame_a = mul(base_a, pose(fit.point - back, fit.turn))
     frame_b = mul(base_b, pose(fit.point, turn_b))
-    joint = loaded.world.add_joint(fit.kind, a, b, position_a=frame_a[0], orientation_a=frame_a[1], position_b=frame_b[0],
-                                   orientation_b=frame_b[1], locks=fit.locks, collide=True, coordinates=coordinates)
+    joint = loaded.world.add_joint(
+        fit.kind,
+        a,
+        b,
+        position_a=frame_a[0],
+        orientation_a=frame_a[1],
+        position_b=frame_b[0],
+        orientation_b=frame_b[1],
+        locks=fit.locks,
+        collide=True,
+        coordinates=coordinates,
+    )
     types = {1: "ball", 2: "slide", 3: "hinge"}
     for index, (place, sign), offset in zip(fit.joints, fit.places, offsets):
-        name = name_of(source, "joint", index)
-        loaded.joints[name] = LoadedJoint(name, types[int(source.jnt_type[index])], b, None, joint, place, sign, offset, fit.turn)
+        name, kind = name_of(source, "joint", index), types[int(source.jnt_type[index])]
+        loaded.joints[name] = LoadedJoint(name, kind, b, None, joint, place, sign, offset, fit.turn)
 
 
 def _add_joints(loaded, data, group, share):
@@ -261,9 +296,11 @@ def _add_joints(loaded, data, group, share):
         _add_joint(loaded, data, fit, a, base, carrier, pose(-point, IDENTITY[1]))
         a, base = carrier, pose(-point, IDENTITY[1])
     if len(fits) > 1:
-        loaded.report.add(element(source, "body", root),
-                          f"its {len(joints)} joints are {len(fits)} here, with {len(fits) - 1} carrier(s) of {share:g} of its mass and "
-                          "inertia in between")
+        loaded.report.add(
+            element(source, "body", root),
+            f"its {len(joints)} joints are {len(fits)} here, with {len(fits) - 1} carrier(s) in between, each of "
+            f"{share:g} of its mass and inertia",
+        )
 
 
 def add_tree(loaded, data, share):
