@@ -339,6 +339,24 @@ def test_friction_of_pairs_and_filters():
         assert loaded.bodies[name].position[2] < 0.06, name  # 0.5 g t^2 with t = 0.2 s, less the margin
 
 
+@pytest.mark.parametrize("given", ["", 'anchor=".1 .2 .3"', 'anchor=".1 .2 .3" relpose="1 0 0 .9 .1 .2 .3"'])
+def test_welds_have_the_errors_that_mujoco_sees(given):
+    source = model(f"""
+        <mujoco><worldbody>
+          <body name="a" pos="4 0 0" euler="10 20 30"><freejoint/><geom size=".1"/></body>
+          <body name="b" pos="5 0 0" euler="40 0 0"><freejoint/><geom size=".1"/></body>
+        </worldbody><equality><weld name="weld" body1="a" body2="b" {given}/></equality></mujoco>""")
+    data = mujoco.MjData(source)
+    mujoco.mj_forward(source, data)
+    joint = subadmm.load(source).loops["weld"]
+    off = np.linalg.norm(joint.position[:3])
+    # (data.efc_pos has three translations in the world's axes, and sines of half of the rotation)
+    assert off == pytest.approx(np.linalg.norm(data.efc_pos[:3]), abs=EXACT)
+    turned = np.sin(np.linalg.norm(joint.position[3:]) / 2)
+    assert turned == pytest.approx(np.linalg.norm(data.efc_pos[3:6]), abs=EXACT)
+    assert (off < EXACT) == ("relpose" not in given)
+
+
 def test_many_kinds_of_geoms_still_meet_as_they_should():
     from subadmm.importing.filters import Filter
 
@@ -467,3 +485,25 @@ def test_a_keyframe_is_where_it_starts():
     assert (joint.position, joint.speed) == pytest.approx((4, 2), abs=EXACT)  # more than half a turn
     assert loaded.actuators["p"].control == 1.5
     assert joint.joint.coordinate(5).target_position + joint.offset == pytest.approx(1.5)
+
+
+def test_a_mocap_body_leads_what_is_welded_to_it():
+    loaded = subadmm.load(
+        model("""<mujoco><option gravity="0 0 0"/><worldbody>
+            <body name="lead" mocap="true" pos="0 0 1"/>
+            <body name="led" pos=".2 0 1"><freejoint/><geom size=".05"/></body>
+            </worldbody><equality><weld body1="lead" body2="led"/></equality></mujoco>""")
+    )
+    lead, led = loaded.bodies["lead"], loaded.bodies["led"]
+    assert lead.type == "kinematic"
+    for k in range(1, 101):
+        lead.move_to([0, 0.001 * k, 1], [1, 0, 0, 0])
+        loaded.world.step()
+    # the joint's feedback is at most half a step's change of speed behind: 0.5 m/s x 2 ms / 2 at the first step, less after
+    assert led.position == pytest.approx([0.2, 0.1, 1], abs=1e-5)
+
+
+def test_without_mujoco_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(ImportError, match=r"subadmm\[import\]"):
+        subadmm.load("robot.xml")

@@ -115,8 +115,8 @@ def check(path):
     row = {"model": path, "error": "", "notes": []}
     try:
         source = compile_file(path, Report())
-    except (ValueError, ImportError, FileNotFoundError) as error:
-        row["error"] = "MuJoCo: " + " ".join(str(error).split())
+    except (FileNotFoundError, ValueError, ImportError) as error:
+        row["error"] = "not compiled: " + " ".join(str(error).split())
         return row
     try:
         qpos = other_pose(source)
@@ -216,7 +216,7 @@ def main():
             rows.append(checked(path, options.limit))
             if rows[-1].get("joints", 1) or not options.jointed:
                 print_row(rows[-1], folder, options.list)
-    compiled = [r for r in rows if not r["error"].startswith("MuJoCo")]
+    compiled = [r for r in rows if not r["error"].startswith("not compiled")]
     loaded = [r for r in compiled if not r["error"]]
     print(f"\n{len(rows)} files; MuJoCo compiles {len(compiled)}; {len(loaded)} of these load")
     for key in ("mass", "inertia", "pose", "moved", "coordinates", "locks", "ncp", "after"):

@@ -11,7 +11,7 @@ KNOWN_MESHES = (".obj", ".stl", ".msh")
 def compile_file(path, report, floating=False):
     """The mujoco.MjModel of an MJCF or URDF file; floating: a URDF's base is free.
 
-    Raises FileNotFoundError, ValueError (with MuJoCo's message)."""
+    Raises FileNotFoundError (also for a URDF's mesh), ValueError (with MuJoCo's message)."""
     path = Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"path: there is no file {path}")
@@ -44,7 +44,7 @@ def _compile_urdf(root, path, report, floating):
     for number, mesh in enumerate(root.iter("mesh")):
         file = _find(mesh.get("filename", ""), path.parent)
         if file is None:
-            raise ValueError(f"path: {path}: there is no mesh {mesh.get('filename')}")
+            raise FileNotFoundError(f"path: {path}: there is no mesh {mesh.get('filename')}")
         data, suffix = _mesh_of(file)
         name = f"{file.stem}_{number}{suffix}"
         assets[name] = data

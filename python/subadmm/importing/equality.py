@@ -36,9 +36,9 @@ def _add_loop(loaded, index, weld):
     kind = "spherical"
     if not sites and not weld:
         frame_a, frame_b = pose(data[0:3], IDENTITY[1]), pose(data[3:6], IDENTITY[1])
-    elif not sites:  # the pose of b in a, about a point on b
+    elif not sites:  # a point on b, the same point on a, b's orientation in a's
         frame_b = pose(data[0:3], IDENTITY[1])
-        frame_a = mul(pose(data[3:6], data[6:10]), frame_b)
+        frame_a = pose(data[3:6], data[6:10])
     if weld and data[10] != 0:
         kind = "fixed"
     frame_a = mul(group_a.frame_in_body(body_a), frame_a)

@@ -102,7 +102,7 @@ class LoadedActuator:
 
     @property
     def control(self):
-        """As MuJoCo's ctrl: a motor's force over its gain, a servo's target (m, rad, or per s); within control_range."""
+        """As MuJoCo's ctrl: a motor's force over its gain, a servo's target (m, rad or per s). In control_range."""
         return self._control
 
     @control.setter
