@@ -151,6 +151,7 @@ def test_limits_hold_with_offsets_and_signs():
         </worldbody></mujoco>""")
     )
     loaded.world.step(2000)
+    assert not noted(loaded, "joint")
     # what the solver leaves of a pressing limit
     assert loaded.joints["hinge"].position == pytest.approx(np.radians(130), abs=1e-5)
     assert loaded.joints["slide"].position == pytest.approx(-0.3, abs=1e-5)
@@ -348,13 +349,15 @@ def test_welds_have_the_errors_that_mujoco_sees(given):
         </worldbody><equality><weld name="weld" body1="a" body2="b" {given}/></equality></mujoco>""")
     data = mujoco.MjData(source)
     mujoco.mj_forward(source, data)
-    joint = subadmm.load(source).loops["weld"]
+    loaded = subadmm.load(source)
+    joint = loaded.loops["weld"]
     off = np.linalg.norm(joint.position[:3])
     # (data.efc_pos has three translations in the world's axes, and sines of half of the rotation)
     assert off == pytest.approx(np.linalg.norm(data.efc_pos[:3]), abs=EXACT)
     turned = np.sin(np.linalg.norm(joint.position[3:]) / 2)
     assert turned == pytest.approx(np.linalg.norm(data.efc_pos[3:6]), abs=EXACT)
     assert (off < EXACT) == ("relpose" not in given)
+    assert bool(noted(loaded, "equality 'weld'")) == ("relpose" in given)
 
 
 def test_many_kinds_of_geoms_still_meet_as_they_should():

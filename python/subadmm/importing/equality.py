@@ -6,6 +6,8 @@ from .model import element, name_of
 from .options import disabled
 from .poses import IDENTITY, mul, pose
 
+LEAST_GAP = 1e-6  # m, of a loop that is reported as open at the start
+
 
 def _ends(loaded, index):
     """(index of the file's body, frame on it) of both objects of a connect or weld; sites have frames of their own."""
@@ -55,6 +57,9 @@ def _add_loop(loaded, index, weld):
         enabled=bool(source.eq_active0[index]),
     )
     loaded.loops[name_of(source, "equality", index)] = joint
+    off = np.linalg.norm(joint.position[:3])
+    if off > LEAST_GAP:
+        loaded.report.add(what, f"its ends are {off:.3g} m apart at the start")
 
 
 def _add_tie(loaded, index):

@@ -153,6 +153,15 @@ def _passive(loaded, index, place, sign, offset):
     return c
 
 
+def _report_start(loaded, index, at):
+    """A start outside of a limit: the joint is drawn in, which something else may not let it."""
+    low, high = loaded.source.jnt_range[index]
+    if not low - 1e-9 <= at <= high + 1e-9:
+        loaded.report.add(
+            element(loaded.source, "joint", index), f"starts at {at:.4g}, outside of its range [{low:.4g}, {high:.4g}]"
+        )
+
+
 def _report_laws(loaded, index):
     """Laws of a joint that are not linear (MuJoCo 4)."""
     source = loaded.source
@@ -248,6 +257,8 @@ def _add_joint(loaded, data, fit, a, base_a, b, base_b):
             back += source.jnt_axis[index] * source.qpos0[adr]
         offsets.append(float(offset))
         law = _passive(loaded, index, place, sign, offset)
+        if law.limited:
+            _report_start(loaded, index, float(data.qpos[adr]))
         coordinates.update({k: law for k in ((3, 4, 5) if kind == 1 else (place,))})
         _report_laws(loaded, index)
     frame_a = mul(base_a, pose(fit.point - back, fit.turn))
