@@ -114,7 +114,8 @@ def check(path):
     """A row of the table: a dict."""
     row = {"model": path, "error": "", "notes": []}
     try:
-        source = compile_file(path, Report())
+        report = Report()
+        source = compile_file(path, report)
     except (FileNotFoundError, ValueError, ImportError) as error:
         row["error"] = "not compiled: " + " ".join(str(error).split())
         return row
@@ -123,14 +124,14 @@ def check(path):
         moved = subadmm.load(source, qpos=qpos)
         row["moved"], row["coordinates"] = pose_errors(moved, data_at(source, qpos))
         row["locks"] = lock_error(moved.world, tree_joints(moved))
-        loaded = subadmm.load(path)
+        loaded = subadmm.load(source)
     except (subadmm.Error, ValueError) as error:
         row["error"] = f"subadmm: {error}"
         return row
     data = data_at(source, source.qpos0)
     row["bodies"], row["joints"] = len({id(g) for g in loaded.groups if g.kind == "dynamic"}), source.njnt
     row["actuators"] = f"{len(loaded.actuators)}/{getattr(source, 'nactuator', source.nu)}"
-    row["notes"] = [str(note) for note in loaded.report]
+    row["notes"] = [str(note) for note in [*report, *loaded.report]]
     row["mass"], row["inertia"] = mass_errors(loaded, data)
     row["pose"], _ = pose_errors(loaded, data)
     world = loaded.world

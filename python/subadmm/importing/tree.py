@@ -20,6 +20,7 @@ class Group:
         self.body = None  # the world's
         self.inertial = IDENTITY  # the world's body's frame in the root's
         self.mass, self.inertia = 0.0, np.zeros(3)
+        self.gravity_scale = 1.0
 
     def frame_in_body(self, index):
         """The file's frame of body `index` in the world's body (static: in the world)."""
@@ -97,8 +98,6 @@ def _gravity_scale(loaded, group):
 
 def _add_body(loaded, data, group):
     """The world's body of a group, in the start state."""
-    from .. import Error
-
     source, root = loaded.source, group.root
     start = mul(pose(data.xpos[root], data.xquat[root]), group.inertial)
     name = name_of(source, "body", root)[:63]
@@ -109,19 +108,28 @@ def _add_body(loaded, data, group):
     start = mul(pose(data.xpos[root], data.xquat[root]), group.inertial)
     linear, angular = velocity_of_frame(source, data, root)
     linear = linear + np.cross(angular, start[0] - data.xpos[root])
+    group.gravity_scale = _gravity_scale(loaded, group)
+    group.body = _dynamic(
+        loaded,
+        group,
+        mass=group.mass,
+        inertia=group.inertia,
+        position=start[0],
+        orientation=start[1],
+        linear_velocity=linear,
+        angular_velocity=angular,
+        name=name,
+    )
+
+
+def _dynamic(loaded, group, **options):
+    """A dynamic body of a group; errors name the file's body."""
+    from .. import Error
+
     try:
-        group.body = loaded.world.add_body(
-            mass=group.mass,
-            inertia=group.inertia,
-            position=start[0],
-            orientation=start[1],
-            linear_velocity=linear,
-            angular_velocity=angular,
-            name=name,
-            gravity_scale=_gravity_scale(loaded, group),
-        )
+        return loaded.world.add_body(gravity_scale=group.gravity_scale, **options)
     except Error as error:
-        error.args = (f"{element(source, 'body', root)}: {error}",)
+        error.args = (f"{element(loaded.source, 'body', group.root)}: {error}",)
         raise
 
 
@@ -230,7 +238,9 @@ def _add_carrier(loaded, group, motion, point, share):
     """A small body between two joints, at `point` of the group's frame."""
     arm = group.inertial[0] - point
     moment = share * (group.inertia.max() + group.mass * arm @ arm)
-    return loaded.world.add_body(
+    return _dynamic(
+        loaded,
+        group,
         mass=share * group.mass,
         inertia=[moment] * 3,
         position=motion.pose[0] + q_turn(motion.pose[1], point),
