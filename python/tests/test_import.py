@@ -389,6 +389,14 @@ def test_links_that_overlap_are_left_out_by_name():
     assert [note for note in loaded.report if "base" in note.element and "overlap" in note.reason]
     loaded.world.step(1)
     assert loaded.world.report.contacts == 0
+    apart = subadmm.load(
+        model(
+            text.replace("<worldbody>", """<worldbody><geom name="wall" type="box" size=".1 .1 .1" pos="0 0 1.3"/>""")
+        )
+    )
+    assert any("overlap" in note.reason and "left out" not in note.reason for note in apart.report)
+    apart.world.step(1)
+    assert apart.world.report.contacts > 0
     kept = subadmm.load(model(text), overlaps="keep")
     kept.world.step(1)
     assert kept.world.report.contacts > 0

@@ -20,33 +20,30 @@ def _one_mechanism(source, groups, a, b):
 
 
 def overlapping(loaded, data):
-    """Pairs of geoms (a, b, depth in m), of two bodies of one mechanism each, in the start state."""
+    """Pairs of bodies that overlap in the start state, deepest first: (body, body, depth in m, a geom of each)."""
     import mujoco
 
     source, groups = loaded.source, loaded.groups
     mujoco.mj_collision(source, data)
-    least, deepest = LEAST_DEPTH * source.stat.meansize, {}
+    deepest = {}
     for k in range(data.ncon):
-        a, b = sorted(int(g) for g in (data.contact[k].geom[0], data.contact[k].geom[1]))
+        a, b = (int(g) for g in data.contact[k].geom)
         depth = -float(data.contact[k].dist)
-        if depth <= least or a not in loaded.shapes or b not in loaded.shapes:
+        if depth <= LEAST_DEPTH * source.stat.meansize or a not in loaded.shapes or b not in loaded.shapes:
             continue
-        ends = int(source.geom_bodyid[a]), int(source.geom_bodyid[b])
-        if groups[ends[0]] is not groups[ends[1]] and _one_mechanism(source, groups, *ends):
-            deepest[a, b] = max(depth, deepest.get((a, b), 0.0))
-    return [(a, b, depth) for (a, b), depth in deepest.items()]
+        (one, a), (other, b) = sorted(((int(source.geom_bodyid[a]), a), (int(source.geom_bodyid[b]), b)))
+        if groups[one] is not groups[other] and depth > deepest.get((one, other), (0.0,))[0]:
+            deepest[one, other] = depth, a, b
+    return sorted(((*bodies, *found) for bodies, found in deepest.items()), key=lambda pair: -pair[2])
 
 
 def leave_out(loaded, data, ignore):
-    """Call ignore(geom, geom) for one pair of geoms of each pair of bodies that overlap."""
-    source, done = loaded.source, set()
-    for a, b, depth in sorted(overlapping(loaded, data), key=lambda pair: -pair[2]):
-        bodies = int(source.geom_bodyid[a]), int(source.geom_bodyid[b])
-        if bodies in done:
-            continue
-        done.add(bodies)
-        loaded.report.add(
-            f"contact of {element(source, 'body', bodies[0])} and {element(source, 'body', bodies[1])}",
-            f"left out: they overlap by {depth:.2g} m at the start, and belong to one mechanism",
-        )
-        ignore(a, b)
+    """Call ignore(geom, geom) for each pair of bodies of one mechanism that overlap. Report all that do."""
+    source = loaded.source
+    for one, other, depth, a, b in overlapping(loaded, data):
+        what = f"contact of {element(source, 'body', one)} and {element(source, 'body', other)}"
+        if _one_mechanism(source, loaded.groups, one, other):
+            loaded.report.add(what, f"left out: they overlap by {depth:.2g} m at the start, and are of one mechanism")
+            ignore(a, b)
+        else:
+            loaded.report.add(what, f"they overlap by {depth:.2g} m at the start")
