@@ -269,7 +269,6 @@ def test_actuators_drive_as_in_mujoco():
 SHAPES = """
 <mujoco><asset>
     <mesh name="tetra" vertex="0 0 0 .2 0 0 0 .2 0 0 0 .2"/>
-    <mesh name="flat" vertex="0 0 0 1 0 0 0 1 0 1 1 0 .5 .5 1e-9" inertia="shell"/>
     <hfield name="hills" nrow="2" ncol="3" size="1 1 .5 .1" elevation="0 0 0 0 0 0"/>
   </asset><worldbody>
     <geom name="floor" type="plane" size="1 1 1"/>
@@ -531,3 +530,11 @@ def test_a_ball_on_a_slide_swings_as_in_mujoco():
         mujoco.mj_step(source, data)
     # measured: 6e-5; where moments differ torques of joints turn the axis to first order in the step
     assert np.abs(loaded.positions() - data.qpos).max() < 2e-4
+
+
+def test_a_mesh_without_thickness_is_named():
+    loaded = subadmm.load(
+        model("""<mujoco><asset><mesh name="sheet" vertex="0 0 0 1 0 0 0 1 0 .3 .3 5e-7"/></asset><worldbody>
+            <geom name="sheet" type="mesh" mesh="sheet" mass="0"/><geom size=".1" pos="0 0 1"/></worldbody></mujoco>""")
+    )
+    assert noted(loaded, "geom 'sheet'") and len(loaded.shapes) == 1
