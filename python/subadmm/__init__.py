@@ -50,10 +50,11 @@ from ._core import (
 __version__ = version()
 
 __all__ = [
+    "load",
     "Body", "BodyShape", "Certificate", "Coordinate", "Coupling", "DeviceError", "Error", "FileError", "Gear",
     "InvalidArgument", "Joint", "LimitExceeded", "Mass", "NonFinite", "OutOfMemory", "Report", "Settings", "Shape", "StaleId",
     "Unavailable", "Unsupported", "World", "backends", "box", "build_commit", "build_compiler", "capsule", "cone",
-    "contact_dtype", "cylinder", "ellipsoid", "heightfield", "hull", "load", "mass_of", "mesh", "plane", "scene", "scenes", "sphere",
+    "contact_dtype", "cylinder", "ellipsoid", "heightfield", "hull", "mass_of", "mesh", "plane", "scene", "scenes", "sphere",
     "version",
 ]
 
