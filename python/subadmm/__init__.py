@@ -46,6 +46,7 @@ from ._core import (
     scenes,
     version,
 )
+from .importing import load
 
 __version__ = version()
 
@@ -194,5 +195,3 @@ World.contacts = _contacts
 World.positions = property(lambda self: self.get("body_state")[:, :3], doc="Centres of mass of all bodies, n x 3, m.")
 World.orientations = property(lambda self: self.get("body_state")[:, 3:7], doc="Of all bodies, n x 4, w x y z.")
 World.velocities = property(lambda self: self.get("body_state")[:, 7:], doc="Linear (m/s) and angular (rad/s), n x 6.")
-
-from .importing import load  # noqa: E402 (it uses the names above)
