@@ -45,10 +45,12 @@ from ._core import (
     scenes,
     version,
 )
+from .importing import load
 
 __version__ = version()
 
 __all__ = [
+    "load",
     "Body", "BodyShape", "Certificate", "Coordinate", "Coupling", "DeviceError", "Error", "FileError", "Gear",
     "InvalidArgument", "Joint", "LimitExceeded", "Mass", "NonFinite", "OutOfMemory", "Report", "Settings", "Shape", "StaleId",
     "Unavailable", "Unsupported", "World", "backends", "box", "build_commit", "build_compiler", "capsule", "cone",

@@ -1,0 +1,90 @@
+"""Files to MuJoCo's compiled models."""
+
+import xml.etree.ElementTree as tree
+from pathlib import Path
+
+import mujoco
+
+KNOWN_MESHES = (".obj", ".stl", ".msh")
+
+
+def compile_file(path, report, floating=False):
+    """The mujoco.MjModel of an MJCF or URDF file; floating: a URDF's base is free.
+
+    Raises FileNotFoundError (also for a URDF's mesh), ValueError (with MuJoCo's message)."""
+    path = Path(path)
+    if not path.is_file():
+        raise FileNotFoundError(f"path: there is no file {path}")
+    try:
+        root = tree.parse(path).getroot()
+    except tree.ParseError as error:
+        raise ValueError(f"path: {path} is no XML: {error}") from error
+    if root.tag == "mujoco":
+        if floating:
+            raise ValueError(f"floating: {path} is MJCF, which has free joints itself")
+        return mujoco.MjModel.from_xml_path(str(path))
+    if root.tag == "robot":
+        return _compile_urdf(root, path, report, floating)
+    raise ValueError(f"path: {path} is neither MJCF nor URDF: its root is <{root.tag}>")
+
+
+def _compile_urdf(root, path, report, floating):
+    """URDF has meshes where MuJoCo does not look for them, and in formats that it does not know."""
+    if root.find("mujoco") is None:
+        root.insert(0, tree.fromstring('<mujoco><compiler fusestatic="false" discardvisual="true"/></mujoco>'))
+    for kind in ("transmission", "gazebo", "ros2_control"):
+        found = root.findall(kind)
+        if found:
+            report.add(f"<{kind}>", f"not carried over: {len(found)}")
+    for link in root.findall("link"):
+        if link.find("inertial") is not None or link.find("collision") is not None:
+            for visual in link.findall("visual"):  # drawn only: nothing is known by it
+                link.remove(visual)
+    assets = {}
+    for number, mesh in enumerate(root.iter("mesh")):
+        file = _find(mesh.get("filename", ""), path.parent)
+        if file is None:
+            raise FileNotFoundError(f"path: {path}: there is no mesh {mesh.get('filename')}")
+        data, suffix = _mesh_of(file)
+        name = f"{file.stem}_{number}{suffix}"
+        assets[name] = data
+        mesh.set("filename", name)
+    text = tree.tostring(root, encoding="unicode")
+    if not floating:
+        return mujoco.MjModel.from_xml_string(text, assets)
+    spec = mujoco.MjSpec.from_string(text, assets=assets)
+    for base in spec.worldbody.bodies:
+        if not base.joints:
+            base.add_freejoint(name=f"{base.name}_free")
+    return spec.compile()
+
+
+def _find(name, folder):
+    """The file that a URDF names: beside it, or by a package's name in the folders above."""
+    plain = name.removeprefix("file://")
+    if plain.startswith("package://"):
+        plain = plain.removeprefix("package://")
+        choices = [plain, plain.partition("/")[2]]
+    elif plain.startswith("model://"):
+        choices = [plain.removeprefix("model://")]
+    else:
+        choices = [plain]
+    for above in (folder, *folder.resolve().parents):
+        for choice in choices:
+            if (above / choice).is_file():
+                return above / choice
+    return None
+
+
+def _mesh_of(file):
+    """Bytes and suffix of a mesh, in a format that MuJoCo reads."""
+    suffix = file.suffix.lower()
+    if suffix in KNOWN_MESHES:
+        data = file.read_bytes()
+        if suffix != ".stl" or not data[:5].lower().startswith(b"solid"):
+            return data, suffix
+    try:
+        import trimesh
+    except ImportError as error:
+        raise ImportError(f"{file}: this format needs the package trimesh: pip install subadmm[import]") from error
+    return trimesh.load(file, force="mesh").export(file_type="stl"), ".stl"
