@@ -16,6 +16,7 @@ from subadmm import show
 from subadmm.__main__ import main
 from subadmm.show import page, png, recording
 from subadmm.show.raster import rasterise
+from subadmm.show.session import Session
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
@@ -219,3 +220,73 @@ def test_the_page_draws_in_a_browser_without_errors(tmp_path):
     pixels = decoded(shot.read_bytes()).astype(int)
     # Two dolls of strong colours in the middle of a pale page.
     assert (np.ptp(pixels[40:180], axis=2) > 40).mean() > 0.01
+
+
+# ---- the page with the running world ----------------------------------------------------------------------------------
+
+
+def one_box():
+    world = subadmm.World(backend="cpu")
+    world.add_ground()
+    world.add_solid(subadmm.box(0.1, 0.1, 0.1), mass=2, position=(0, 0, 0.1))
+    return world
+
+
+def test_sessions_run_by_the_clock_and_begin_again():
+    session = Session(one_box)
+    dt = session.world.settings.dt
+    assert sum(session.advance(10.4 * dt, 1.0) for _ in range(10)) == 104
+    session.speed = 0.5
+    assert session.advance(10 * dt, 1.0) == 5
+    session.running = False
+    assert session.advance(1.0, 1.0) == 0
+    session.change(method="paper", iterations=77)
+    session.step()
+    assert session.world.report.iterations == 77 and session.steps == 110 and len(session.history["ms"]) == 110
+    with pytest.raises(subadmm.InvalidArgument):
+        session.change(iterations=0)
+    session.reset()
+    assert session.steps == 0 and session.world.settings.method == "fast"
+
+
+def test_the_hand_feels_the_weight_of_what_it_lifts():
+    session = Session(one_box)
+    assert not session.grab(0, (0, 0, 0)) and session.hand() is None
+    assert session.grab(1, (0, 0, 0.2))
+    session.pull((0.3, 0, 0.8))
+    session.step(800)
+    held, hand, force = session.hand()
+    assert session.world.bodies[1].position[2] > 0.5 and hand.tolist() == [0.3, 0, 0.8]
+    # It has come to rest under the hand, but for a thousandth of its swing.
+    assert abs(force - [0, 0, 2 * 9.81]).max() < 0.05 and np.linalg.norm(held - hand) < 0.02
+    session.release()
+    assert session.hand() is None and not session.world.couplings
+    session.step(200)
+    assert session.world.bodies[1].position[2] < 0.15
+
+
+def test_split_meshes_have_edges_and_the_same_triangles():
+    box = show.mesh_of(subadmm.box(1, 2, 3))
+    split = box.split()
+    assert len(split.vertices) == 24 and (split.vertices[split.triangles] == box.vertices[box.triangles]).all()
+    ball = show.mesh_of(subadmm.sphere(1))
+    assert len(ball.split().vertices) == len(ball.vertices)
+
+
+def test_the_view_sends_what_moves():
+    pytest.importorskip("viser")
+    from subadmm.show.view import View
+
+    view = View(Session(one_box), "a box", port=18437)
+    try:
+        view._contacts.value = True
+        view.session.step(5)
+        view.frame()
+        (group, handle), = view._moving
+        assert np.allclose(handle.batched_positions, view.session.world.positions[1:], atol=1e-6) and len(view._forces.points) == 4
+        # Contact forces on the box are up, and so are the arrows.
+        up = np.sign(view.session.world.contacts()["force"][:, 2])
+        assert (np.sign(view._forces.points[:, 1, 2] - view._forces.points[:, 0, 2]) == up).all()
+        assert view.session.world.settings.certify and len(view._plots) == 3
+    finally:
+        view.stop()

@@ -59,6 +59,14 @@ class Mesh:
         total[alone] = normal[np.nonzero(alone)[0] // 3]
         return _unit(total).reshape(count, 3, 3)
 
+    def split(self, crease=0.6):
+        """The same triangles; vertices that have different normals are vertices of their own, so that the mean of the
+        normals at each of them is that of corner_normals."""
+        normal = np.rint(self.corner_normals(crease).reshape(-1, 3) * 1000).astype(np.int64)
+        rows = np.column_stack([self.triangles.reshape(-1), normal])
+        kept, which = np.unique(rows, axis=0, return_inverse=True)
+        return Mesh(self.vertices[kept[:, 0]], which.reshape(-1, 3).astype(np.int32))
+
 
 def _unit(vectors):
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
