@@ -222,6 +222,41 @@ def test_the_page_draws_in_a_browser_without_errors(tmp_path):
     assert (np.ptp(pixels[40:180], axis=2) > 40).mean() > 0.01
 
 
+def test_gltf_files_have_the_poses_of_the_recording(tmp_path):
+    taken = show.record(subadmm.scene("ragdolls:2", backend="cpu"), 0.6, title="dolls")
+    taken.save(tmp_path / "dolls.glb")
+    data = (tmp_path / "dolls.glb").read_bytes()
+    magic, version, length, size, kind = struct.unpack("<4sIII4s", data[:20])
+    assert (magic, version, length, kind) == (b"glTF", 2, len(data), b"JSON") and size % 4 == 0
+    whole = json.loads(data[20:20 + size])
+    blob = data[28 + size:]
+    assert len(blob) % 4 == 0 and whole["buffers"][0]["byteLength"] <= len(blob)
+
+    def read(number):
+        accessor = whole["accessors"][number]
+        view = whole["bufferViews"][accessor["bufferView"]]
+        values = np.frombuffer(blob, "<f4", view["byteLength"] // 4, view["byteOffset"]).reshape(accessor["count"], -1)
+        if "min" in accessor:
+            assert (values.min(axis=0) == np.float32(accessor["min"])).all() and (values.max(axis=0) == np.float32(accessor["max"])).all()
+        return values
+
+    animation, = whole["animations"]
+    moved = {(channel["target"]["node"], channel["target"]["path"]): animation["samplers"][channel["sampler"]]
+             for channel in animation["channels"]}
+    assert len(moved) == 2 * 22                      # all but the ground
+    for frame in (0, 7, len(taken.times) - 1):
+        places, turns = taken.poses(frame)
+        for (node, path), sampler in moved.items():
+            times, values = read(sampler["input"])[:, 0], read(sampler["output"])
+            found = np.array([np.interp(taken.times[frame], times, values[:, k]) for k in range(values.shape[1])])
+            assert np.allclose(found, places[node] if path == "translation" else turns[node][[1, 2, 3, 0]], atol=1e-5)
+    # Every node but the uppermost is under one other, and the uppermost turns z to y.
+    below = [child for node in whole["nodes"] for child in node.get("children", [])]
+    assert sorted(below) == list(range(len(whole["nodes"]) - 1))
+    x, y, z, w = whole["nodes"][-1]["rotation"]
+    assert np.allclose([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], [0, 1, 0])
+
+
 # ---- the page with the running world ----------------------------------------------------------------------------------
 
 

@@ -11,6 +11,7 @@ from .session import Session
 
 _FRAME = 1 / 30          # s between frames
 _PLOT = 0.5              # s between plots
+_BY_POWER = ("kinetic", "error")   # drawn as powers of ten: they go over many
 _CERTIFIED = 500         # bodies
 _ARROWS = 2000           # contacts drawn at most: those with the largest forces
 
@@ -65,9 +66,11 @@ class View:
         with gui.add_folder("Plots", expand_by_default=True):
             for name in ("kinetic", "ms", "error"):
                 what, unit = MEASURES[name]
+                if name in _BY_POWER:
+                    what, unit = f"{what}: power of ten of {unit}", "power"
                 self._plots[name] = gui.add_uplot(
-                    (np.array([0.0, 1.0]), np.array([1.0, 1.0])), ({"label": "s"}, {"label": unit, "stroke": "#3a8c8c", "width": 2}), title=what,
-                    scales={"x": {"time": False}, "y": {"auto": True, "distr": 1 if name == "ms" else 3}}, height=150)
+                    (np.zeros(1), np.zeros(1)), ({"label": "s"}, {"label": unit, "stroke": "#3a8c8c", "width": 2}), title=what,
+                    scales={"x": {"time": False}, "y": {"auto": True}}, height=150)
 
         def settle(**changes):
             try:
@@ -121,9 +124,9 @@ class View:
         # A sun with shadows, and less light from all around than viser has by itself, which makes colours pale.
         scene.configure_default_lights(False)
         scene.configure_environment_map("studio", environment_intensity=0.12)
-        scene.add_light_directional("/sun", color=(255, 244, 225), intensity=0.9, cast_shadow=True, position=tuple(
+        scene.add_light_directional("/sun", color=(255, 244, 225), intensity=1.1, cast_shadow=True, position=tuple(
             description.centre + 3 * radius * SUN))
-        scene.add_light_hemisphere("/sky", sky_color=(220, 235, 255), ground_color=(200, 190, 180), intensity=0.35)
+        scene.add_light_hemisphere("/sky", sky_color=(220, 235, 255), ground_color=(200, 190, 180), intensity=0.45)
         self._arrow = 0.12 * radius
         none, thin = np.zeros((0, 2, 3), np.float32), 0.003 * radius
         self._forces = scene.add_arrows("/forces", none, (200, 40, 50), shaft_radius=thin, head_radius=2.5 * thin,
@@ -195,9 +198,10 @@ class View:
             for name, handle in self._plots.items():
                 values = history[name]
                 if np.isfinite(values).any():
-                    # Energy and error are drawn by their logarithm, down to 1e-20.
-                    least = 0 if name == "ms" else 1e-20
-                    handle.data = (history["time"], np.maximum(np.nan_to_num(values), least))
+                    values = np.nan_to_num(values)
+                    if name in _BY_POWER:
+                        values = np.log10(np.maximum(values, 1e-20))
+                    handle.data = (history["time"], values)
 
 
 def _backends():
