@@ -10,7 +10,9 @@ def _arguments():
     parser = argparse.ArgumentParser(prog="python -m subadmm", description="Scenes to look at.")
     commands = parser.add_subparsers(dest="command", required=True)
     view = commands.add_parser("view", help="open a page with the running scene (needs: pip install 'subadmm[view]')")
-    record = commands.add_parser("record", help="run a scene into a page that plays by itself (.html) or a glTF file (.glb)")
+    record = commands.add_parser(
+        "record", help="run a scene into a page that plays by itself (.html) or a glTF file (.glb)"
+    )
     picture = commands.add_parser("picture", help="run a scene and write a picture of its end (.png)")
     for command in (view, record, picture):
         command.add_argument("scene", help="as 'pile:300'; the names: subadmm.scenes()")
@@ -60,7 +62,9 @@ def _record(world, given):
         now = time.monotonic()
         if sys.stderr.isatty() and (now - said[0] > 0.2 or frame + 1 == frames):
             said[0] = now
-            print(f"\rframe {frame + 1} of {frames}", end="\n" if frame + 1 == frames else "", file=sys.stderr, flush=True)
+            print(
+                f"\rframe {frame + 1} of {frames}", end="\n" if frame + 1 == frames else "", file=sys.stderr, flush=True
+            )
 
     if not given.output.endswith((".html", ".glb")):
         raise ValueError(f"--output: {given.output}; must end in .html or .glb")

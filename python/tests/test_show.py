@@ -26,8 +26,14 @@ try:
 except subadmm.Unavailable:
     TETRAHEDRON = ROUNDED = None
 
-SHAPES = [subadmm.sphere(0.3), subadmm.capsule(0.2, 0.5), subadmm.box(0.1, 0.2, 0.3), subadmm.cylinder(0.3, 0.2),
-          subadmm.cone(0.3, 0.2), subadmm.ellipsoid(0.1, 0.2, 0.4)] + [shape for shape in (TETRAHEDRON, ROUNDED) if shape]
+SHAPES = [
+    subadmm.sphere(0.3),
+    subadmm.capsule(0.2, 0.5),
+    subadmm.box(0.1, 0.2, 0.3),
+    subadmm.cylinder(0.3, 0.2),
+    subadmm.cone(0.3, 0.2),
+    subadmm.ellipsoid(0.1, 0.2, 0.4),
+] + [shape for shape in (TETRAHEDRON, ROUNDED) if shape]
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.type)
@@ -38,8 +44,8 @@ def test_meshes_are_closed_and_have_the_volume_of_the_solid(shape):
         mesh = show.mesh_of(shape, detail=detail)
         assert mesh.is_closed()
         off.append(1 - mesh.volume() / exact)
-    # Inscribed: never more than the solid. A circle of 24 corners lacks 1.2 % of its area, a ball twice that; four times the
-    # corners lack a sixteenth.
+    # Inscribed: never more than the solid. A circle of 24 corners lacks 1.2 % of its area, a ball twice that; four
+    # times the corners lack a sixteenth.
     assert -1e-9 <= off[1] <= off[0] + 1e-9 and off[0] < 0.04 and off[1] < 0.004
     normals = mesh.corner_normals()
     assert np.allclose(np.linalg.norm(normals, axis=2), 1)
@@ -115,7 +121,9 @@ def test_pictures_show_the_scene_and_are_the_same_every_time(tmp_path):
     first = show.picture(world, 160, 100)
     assert first.shape == (100, 160, 3) and (first == show.picture(world, 160, 100)).all()
     # Boxes are colourful, the ground and the backdrop are grey.
-    assert (np.ptp(first.astype(int), axis=2) > 40).mean() > 0.05 and np.ptp(first[:, :5].astype(int), axis=2).max() < 20
+    assert (np.ptp(first.astype(int), axis=2) > 40).mean() > 0.05 and np.ptp(
+        first[:, :5].astype(int), axis=2
+    ).max() < 20
     world.step(20)
     assert (first != show.picture(world, 160, 100)).any()
     out = tmp_path / "a.png"
@@ -127,7 +135,9 @@ def test_a_ball_is_lit_from_the_sun_and_throws_a_shadow():
     world = subadmm.World()
     world.add_ground()
     world.add_solid(subadmm.sphere(1), density=1, position=(0, 0, 1))
-    ball = show.picture(world, 200, 160, show.Camera(np.array([0.0, -0.01, 12]), np.array([0.0, 0, 0])), smooth=1).sum(axis=2)
+    ball = show.picture(world, 200, 160, show.Camera(np.array([0.0, -0.01, 12]), np.array([0.0, 0, 0])), smooth=1).sum(
+        axis=2
+    )
     # From above, x to the right: the sun comes from the left and below, the shadow lies to the right and above.
     assert ball[90:100, 80:90].mean() > ball[60:70, 110:120].mean() + 60
     assert ball[110, 80] > ball[50, 120] + 150
@@ -135,13 +145,20 @@ def test_a_ball_is_lit_from_the_sun_and_throws_a_shadow():
 
 def test_what_is_wrong_is_said(tmp_path, capsys):
     world = subadmm.World()
-    for call, said in [(lambda: show.picture(world, width=4), "width: 4"), (lambda: show.record(world, 0), "seconds: 0"),
-                       (lambda: show.record(world, 1, fps=-1), "fps: -1"), (lambda: show.record(world, 1).save("x.txt"), "x.txt")]:
+    for call, said in [
+        (lambda: show.picture(world, width=4), "width: 4"),
+        (lambda: show.record(world, 0), "seconds: 0"),
+        (lambda: show.record(world, 1, fps=-1), "fps: -1"),
+        (lambda: show.record(world, 1).save("x.txt"), "x.txt"),
+    ]:
         with pytest.raises(ValueError, match=said):
             call()
-    for arguments, said in [(["picture", "nothing", "-o", "a.png"], "nothing"), (["picture", "pile:3", "-o", "a.gif"], "a.gif"),
-                            (["record", "pile:3", "-o", str(tmp_path / "no" / "a.html"), "--steps", "1"], "no"),
-                            (["picture", "pile:3", "-o", "a.png", "--size", "4"], "--size: 4")]:
+    for arguments, said in [
+        (["picture", "nothing", "-o", "a.png"], "nothing"),
+        (["picture", "pile:3", "-o", "a.gif"], "a.gif"),
+        (["record", "pile:3", "-o", str(tmp_path / "no" / "a.html"), "--steps", "1"], "no"),
+        (["picture", "pile:3", "-o", "a.png", "--size", "4"], "--size: 4"),
+    ]:
         assert main(arguments) == 1
         assert said in capsys.readouterr().err
 
@@ -150,7 +167,9 @@ def test_recordings_have_the_poses_of_the_world():
     made, again = (subadmm.scene("ragdolls:2", backend="cpu") for _ in range(2))
     taken = show.record(made, 0.5, fps=30)
     dt = again.settings.dt
-    assert len(taken.times) == 16 and taken.times[0] == 0 and abs(taken.times - np.arange(16) / 30).max() <= dt / 2 + 1e-12
+    assert (
+        len(taken.times) == 16 and taken.times[0] == 0 and abs(taken.times - np.arange(16) / 30).max() <= dt / 2 + 1e-12
+    )
     done = 0
     for k, time in enumerate(taken.times):
         again.step(round(time / dt) - done)
@@ -164,7 +183,13 @@ def test_recordings_have_the_poses_of_the_world():
 
 def test_kinetic_energy_is_that_of_the_bodies():
     world = subadmm.World()
-    world.add_body(mass=2, inertia=(1, 2, 3), orientation=(0.5, 0.5, 0.5, 0.5), linear_velocity=(0, 3, 4), angular_velocity=(0, 0, 2))
+    world.add_body(
+        mass=2,
+        inertia=(1, 2, 3),
+        orientation=(0.5, 0.5, 0.5, 0.5),
+        linear_velocity=(0, 3, 4),
+        angular_velocity=(0, 0, 2),
+    )
     # The turn takes the body's y axis to the world's z axis.
     assert show.measures.measure(world)["kinetic"] == pytest.approx(0.5 * 2 * 25 + 0.5 * 2 * 4)
 
@@ -178,7 +203,11 @@ def read_page(text):
 def test_pages_have_all_of_a_recording_and_nothing_from_elsewhere():
     taken = show.record(subadmm.scene("pile:20", backend="cpu"), 0.4, title="<pile> & co")
     text = page.page_of(taken)
-    assert "&lt;pile&gt;" in text and "<pile>" not in text and not re.search(r"(src|href)=\"(?!data:)|https?://|import ", text)
+    assert (
+        "&lt;pile&gt;" in text
+        and "<pile>" not in text
+        and not re.search(r"(src|href)=\"(?!data:)|https?://|import ", text)
+    )
     header, data = read_page(text)
     assert header["title"] == "<pile> & co" and header["frames"] == len(taken.times)
     for name, values in (("positions", taken.positions), ("turns", taken.orientations)):
@@ -197,13 +226,18 @@ def test_ten_seconds_of_2000_bodies_are_less_than_10_megabytes():
     frames = 301
     speed = np.cumsum(random.normal(0, 0.05, (frames, 2000, 3)), axis=0)
     place = world.positions + np.cumsum(speed, axis=0) / 30
-    angle = np.cumsum(random.normal(0, 3, (2000, 1)) + np.cumsum(random.normal(0, 0.3, (frames, 2000, 1)), axis=0), axis=0) / 30
+    angle = (
+        np.cumsum(random.normal(0, 3, (2000, 1)) + np.cumsum(random.normal(0, 0.3, (frames, 2000, 1)), axis=0), axis=0)
+        / 30
+    )
     axis = random.normal(0, 1, (2000, 3))
     axis /= np.linalg.norm(axis, axis=1, keepdims=True)
     turn = np.concatenate([np.cos(angle / 2), np.sin(angle / 2) * axis], axis=2)
     step = recording.position_step(description)
     assert step <= 1e-4
-    taken = show.Recording(description, "", step, np.arange(frames) / 30, np.rint(place / step), np.rint(turn / recording.TURN_STEP))
+    taken = show.Recording(
+        description, "", step, np.arange(frames) / 30, np.rint(place / step), np.rint(turn / recording.TURN_STEP)
+    )
     assert len(page.page_of(taken)) < 10e6
 
 
@@ -212,10 +246,25 @@ def test_the_page_draws_in_a_browser_without_errors(tmp_path):
     show.record(subadmm.scene("ragdolls:2", backend="cpu"), 0.5, title="dolls").save(tmp_path / "dolls.html")
     shot = tmp_path / "shot.png"
     done = subprocess.run(
-        [CHROMIUM, "--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-         "--enable-logging=stderr", "--window-size=320,240", "--virtual-time-budget=2000", f"--screenshot={shot}",
-         f"--user-data-dir={tmp_path / 'profile'}", f"file://{tmp_path / 'dolls.html'}#t=0.3"],
-        capture_output=True, text=True, timeout=120, env={**os.environ, "HOME": str(tmp_path)})
+        [
+            CHROMIUM,
+            "--headless",
+            "--no-sandbox",
+            "--use-gl=angle",
+            "--use-angle=swiftshader",
+            "--enable-unsafe-swiftshader",
+            "--enable-logging=stderr",
+            "--window-size=320,240",
+            "--virtual-time-budget=2000",
+            f"--screenshot={shot}",
+            f"--user-data-dir={tmp_path / 'profile'}",
+            f"file://{tmp_path / 'dolls.html'}#t=0.3",
+        ],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env={**os.environ, "HOME": str(tmp_path)},
+    )
     assert "CONSOLE" not in done.stderr and shot.exists(), done.stderr[-2000:]
     pixels = decoded(shot.read_bytes()).astype(int)
     # Two dolls of strong colours in the middle of a pale page.
@@ -237,7 +286,9 @@ def test_gltf_files_have_the_poses_of_the_recording(tmp_path):
         view = whole["bufferViews"][accessor["bufferView"]]
         values = np.frombuffer(blob, "<f4", view["byteLength"] // 4, view["byteOffset"]).reshape(accessor["count"], -1)
         if "min" in accessor:
-            assert (values.min(axis=0) == np.float32(accessor["min"])).all() and (values.max(axis=0) == np.float32(accessor["max"])).all()
+            assert (values.min(axis=0) == np.float32(accessor["min"])).all() and (
+                values.max(axis=0) == np.float32(accessor["max"])
+            ).all()
         return values
 
     animation, = whole["animations"]
@@ -257,7 +308,7 @@ def test_gltf_files_have_the_poses_of_the_recording(tmp_path):
     assert np.allclose([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], [0, 1, 0])
 
 
-# ---- the page with the running world ----------------------------------------------------------------------------------
+# ---- the page with the running world -------------------------------------------------------------------------------
 
 
 def one_box():
@@ -318,7 +369,10 @@ def test_the_view_sends_what_moves():
         view.session.step(5)
         view.frame()
         (group, handle), = view._moving
-        assert np.allclose(handle.batched_positions, view.session.world.positions[1:], atol=1e-6) and len(view._forces.points) == 4
+        assert (
+            np.allclose(handle.batched_positions, view.session.world.positions[1:], atol=1e-6)
+            and len(view._forces.points) == 4
+        )
         # Contact forces on the box are up, and so are the arrows.
         up = np.sign(view.session.world.contacts()["force"][:, 2])
         assert (np.sign(view._forces.points[:, 1, 2] - view._forces.points[:, 0, 2]) == up).all()

@@ -11,5 +11,16 @@ from .meshes import Mesh, mesh_of
 from .picture import picture, save_picture
 from .recording import Recording, record
 
-__all__ = ["Camera", "Description", "Group", "Mesh", "Recording", "describe", "looking_at", "mesh_of", "picture", "record",
-           "save_picture"]
+__all__ = [
+    "Camera",
+    "Description",
+    "Group",
+    "Mesh",
+    "Recording",
+    "describe",
+    "looking_at",
+    "mesh_of",
+    "picture",
+    "record",
+    "save_picture",
+]

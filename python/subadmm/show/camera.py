@@ -23,7 +23,8 @@ class Camera:
 
 
 def looking_at(description, azimuth=-60.0, elevation=24.0, zoom=1.0, field=0.6):
-    """A camera that has what moves in view. azimuth, elevation: where it stands, degrees; zoom: 2 comes twice as near."""
+    """A camera that has what moves in view. azimuth, elevation: where it stands, degrees; zoom: 2 comes twice as
+    near."""
     if not zoom > 0:
         raise ValueError(f"zoom: {zoom}; must be greater than 0")
     if not -89 <= elevation <= 89:

@@ -23,7 +23,8 @@ class Group:
     orientation: np.ndarray   # n x 4, w x y z
     scale: np.ndarray         # n x 3
     colour: np.ndarray        # n x 3, sRGB, 0 to 1
-    wall: np.ndarray          # n x 4: horizontal unit normal of a wall, away from the middle, and its place along it, m; 0: no wall
+    # n x 4: horizontal unit normal of a wall, away from the middle, and its place along it, m; 0: no wall
+    wall: np.ndarray
 
     def part(self, which):
         """Some of the instances: n bool."""
@@ -160,8 +161,8 @@ def extent_of(description, positions, orientations):
 
 
 def _extent(groups, positions, turns, dynamic):
-    """Corners of an axis-parallel box around what moves, but for the outermost hundredth of the shapes; around all, where
-    nothing moves."""
+    """Corners of an axis-parallel box around what moves, but for the outermost hundredth of the shapes; around all,
+    where nothing moves."""
     for which in (dynamic, np.ones_like(dynamic)):
         lows, highs = [], []
         for group in groups:

@@ -1,5 +1,5 @@
-"""A recording as binary glTF 2.0 with an animation: a node a body, and under it a node a shape. glTF has y up: a node above
-all turns the scene."""
+"""A recording as binary glTF 2.0 with an animation: a node a body, and under it a node a shape. glTF has y up: a node
+above all turns the scene."""
 import json
 import struct
 
@@ -71,8 +71,13 @@ def glb_of(recording) -> bytes:
     text = json.dumps({name: value for name, value in whole.items() if value != []}, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     blob.extend(b"\0" * (-len(blob) % 4))
-    return (struct.pack("<4sII", b"glTF", 2, 12 + 8 + len(text) + 8 + len(blob)) + struct.pack("<I4s", len(text), b"JSON") + text
-            + struct.pack("<I4s", len(blob), b"BIN\0") + bytes(blob))
+    return (
+        struct.pack("<4sII", b"glTF", 2, 12 + 8 + len(text) + 8 + len(blob))
+        + struct.pack("<I4s", len(text), b"JSON")
+        + text
+        + struct.pack("<I4s", len(blob), b"BIN\0")
+        + bytes(blob)
+    )
 
 
 def _xyzw(q):
@@ -80,7 +85,8 @@ def _xyzw(q):
 
 
 def _animation(recording, put):
-    """Of each body that moves: the frames at which its pose changes and those beside them, between which it is linear."""
+    """Of each body that moves: the frames at which its pose changes and those beside them, between which it is
+    linear."""
     times = recording.times
     poses = np.concatenate([recording.positions, recording.orientations], axis=2)
     changed = (np.diff(poses, axis=0) != 0).any(axis=2)                     # frames - 1 x bodies
@@ -95,8 +101,10 @@ def _animation(recording, put):
             inputs[key] = put(times[frames], _FLOAT, "SCALAR", bounds=True)
         turn = recording.orientations[frames, body].astype(float)
         turn /= np.linalg.norm(turn, axis=1, keepdims=True)
-        for path, values, shape in (("translation", recording.positions[frames, body] * recording.position_step, "VEC3"),
-                                    ("rotation", turn[:, [1, 2, 3, 0]], "VEC4")):
+        for path, values, shape in (
+            ("translation", recording.positions[frames, body] * recording.position_step, "VEC3"),
+            ("rotation", turn[:, [1, 2, 3, 0]], "VEC4"),
+        ):
             samplers.append({"input": inputs[key], "output": put(values, _FLOAT, shape), "interpolation": "LINEAR"})
             channels.append({"sampler": len(samplers) - 1, "target": {"node": int(body), "path": path}})
     return {"name": "run", "samplers": samplers, "channels": channels} if channels else None

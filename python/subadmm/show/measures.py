@@ -27,5 +27,10 @@ def measure(world, state=None, inertia=None):
     state = world.get("body_state") if state is None else state
     inertia = world.get("body_inertia") if inertia is None else inertia
     error = report.certificate.ncp_max
-    return {"kinetic": kinetic_energy(state, inertia), "contacts": report.contacts, "penetration": report.penetration_max,
-            "ms": report.ms["total"], "error": error if error >= 0 else float("nan")}
+    return {
+        "kinetic": kinetic_energy(state, inertia),
+        "contacts": report.contacts,
+        "penetration": report.penetration_max,
+        "ms": report.ms["total"],
+        "error": error if error >= 0 else float("nan"),
+    }

@@ -36,8 +36,8 @@ class Mesh:
         return _unit(np.cross(b - a, c - a))
 
     def corner_normals(self, crease=0.6):
-        """Unit normals of all triangles' corners, m x 3 x 3: the mean over the triangles at a vertex that are turned by less
-        than `crease` (rad), so that round shapes look round and edges stay edges."""
+        """Unit normals of all triangles' corners, m x 3 x 3: the mean over the triangles at a vertex that are turned by
+        less than `crease` (rad), so that round shapes look round and edges stay edges."""
         count = len(self.triangles)
         a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
         across = np.cross(b - a, c - a)                             # as long as the area: large triangles count more
@@ -110,7 +110,9 @@ def _box():
 
 
 def _patch():
-    return Mesh(np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float), np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+    return Mesh(
+        np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float), np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+    )
 
 
 def _rounded(vertices, radius, detail):
@@ -152,8 +154,8 @@ def form_of(shape: Shape, patch=10.0, detail=DETAIL):
 def mesh_of(shape: Shape, patch=10.0, detail=DETAIL) -> Mesh:
     """The mesh of a shape, in its own frame (its position and orientation are left out).
 
-    patch: half the width of what is drawn of a plane, m; detail: corners around a round shape, from 8 on. Round shapes are
-    inscribed: their corners are on the surface."""
+    patch: half the width of what is drawn of a plane, m; detail: corners around a round shape, from 8 on. Round shapes
+    are inscribed: their corners are on the surface."""
     if detail < 8:
         raise ValueError(f"detail: {detail}; must be 8 at least")
     _, scale, make = form_of(shape, patch, detail)

@@ -20,7 +20,9 @@ def _usual_view(recording):
     boxes = [extent_of(recording.description, *recording.poses(k))
              for k in np.unique(np.linspace(0, len(recording.times) - 1, 9).astype(int))]
     low, high = np.mean(boxes, axis=0)
-    return replace(recording.description, centre=(low + high) / 2, radius=max(float(np.linalg.norm(high - low)) / 2, 1e-3))
+    return replace(
+        recording.description, centre=(low + high) / 2, radius=max(float(np.linalg.norm(high - low)) / 2, 1e-3)
+    )
 
 
 def page_of(recording) -> str:
@@ -71,7 +73,10 @@ def page_of(recording) -> str:
     }
     page = (Path(__file__).parent / "player.html").read_text(encoding="utf-8")
     data = base64.b64encode(zlib.compress(bytes(blob), 9)).decode()
-    for mark, text in (("{{title}}", html.escape(recording.title)), ("{{header}}", json.dumps(header).replace("<", "\\u003c")),
-                       ("{{data}}", data)):
+    for mark, text in (
+        ("{{title}}", html.escape(recording.title)),
+        ("{{header}}", json.dumps(header).replace("<", "\\u003c")),
+        ("{{data}}", data),
+    ):
         page = page.replace(mark, text)
     return page

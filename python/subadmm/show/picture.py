@@ -44,10 +44,14 @@ def picture(world, width=960, height=600, camera=None, smooth=2, description=Non
 
     # Where each sample is, and the shares of the corners there: from the ray, which knows no rounding of the depth.
     row, column = np.nonzero(seen)
-    ray = np.stack([(column + 0.5 - wide / 2) / focal, (high / 2 - row - 0.5) / focal, -np.ones(len(row))], axis=1) @ axes
+    ray = (
+        np.stack([(column + 0.5 - wide / 2) / focal, (high / 2 - row - 0.5) / focal, -np.ones(len(row))], axis=1) @ axes
+    )
     a, b, c = corners[at, 0], corners[at, 1], corners[at, 2]
     across = np.cross(b - a, c - a)
-    place = camera.eye + ray * (np.einsum("ij,ij->i", a - camera.eye, across) / np.einsum("ij,ij->i", ray, across))[:, None]
+    place = (
+        camera.eye + ray * (np.einsum("ij,ij->i", a - camera.eye, across) / np.einsum("ij,ij->i", ray, across))[:, None]
+    )
     square = np.einsum("ij,ij->i", across, across)
     share_b = np.einsum("ij,ij->i", np.cross(place - a, c - a), across) / square
     share_c = np.einsum("ij,ij->i", np.cross(b - a, place - a), across) / square
@@ -130,7 +134,9 @@ def _sunlit(place, normal, flat, corners, description):
     scale = _SHADOW_PIXELS / (2 * reach)
     view = (corners - description.centre) @ axes.T
     depth = 20 * description.radius - view[..., 2]
-    screen = np.stack([_SHADOW_PIXELS / 2 + scale * view[..., 0], _SHADOW_PIXELS / 2 - scale * view[..., 1], depth], axis=-1)
+    screen = np.stack(
+        [_SHADOW_PIXELS / 2 + scale * view[..., 0], _SHADOW_PIXELS / 2 - scale * view[..., 1], depth], axis=-1
+    )
     _, nearest = rasterise(screen, _SHADOW_PIXELS, _SHADOW_PIXELS)
     slope = np.clip(1 / np.maximum(flat @ SUN, 0.1), 1, 6)
     moved = place + flat * (1.2 * slope / scale)[:, None]

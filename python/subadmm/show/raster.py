@@ -6,9 +6,10 @@ NOTHING = np.iinfo(np.uint64).max
 
 
 def rasterise(corners, width, height):
-    """corners: m x 3 x 3 of triangles counter-clockwise in view, columns x to the right and y down in pixels, and depth, which
-    is greater than 0 and linear over the picture. Gives (triangle, depth), height x width; triangle -1 and depth infinite
-    where there is none. Triangles seen from behind are left out. The nearer one is kept; of equal ones the first."""
+    """corners: m x 3 x 3 of triangles counter-clockwise in view, columns x to the right and y down in pixels, and
+    depth, which is greater than 0 and linear over the picture. Gives (triangle, depth), height x width; triangle -1 and
+    depth infinite where there is none. Triangles seen from behind are left out. The nearer one is kept; of equal ones
+    the first."""
     x, y = corners[:, :, 0], corners[:, :, 1]
     area = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
     left = np.clip(np.ceil(x.min(axis=1) - 0.5), 0, width).astype(np.int64)
@@ -58,5 +59,7 @@ def _fill(best, corners, area, piece, left, right, begin, count, width):
         covered &= share >= -1e-9
         depth += share * at[:, k, 2][of]
     keep = covered & (depth > 0)
-    key = depth[keep].astype(np.float32).view(np.uint32).astype(np.uint64) << np.uint64(32) | piece[of[keep]].astype(np.uint64)
+    key = depth[keep].astype(np.float32).view(np.uint32).astype(np.uint64) << np.uint64(32) | piece[of[keep]].astype(
+        np.uint64
+    )
     np.minimum.at(best, py[keep] * width + px[keep], key)

@@ -13,8 +13,8 @@ TURN_STEP = 2.0 ** -12
 
 @dataclass
 class Recording:
-    """position_step: positions are whole multiples of it, m. times: s. positions: frames x bodies x 3, orientations: frames x
-    bodies x 4, whole numbers of position_step and TURN_STEP. measures: name: one figure a frame."""
+    """position_step: positions are whole multiples of it, m. times: s. positions: frames x bodies x 3, orientations:
+    frames x bodies x 4, whole numbers of position_step and TURN_STEP. measures: name: one figure a frame."""
     description: Description
     title: str
     position_step: float
@@ -24,8 +24,8 @@ class Recording:
     measures: dict = field(default_factory=dict)
 
     def poses(self, frame):
-        """(positions n x 3 in m, orientations n x 4, unit) of all bodies, as they are played. Off by half a position_step
-        along an axis and 2.5e-4 in a component of the quaternion, an angle of 5e-4 rad, at most."""
+        """(positions n x 3 in m, orientations n x 4, unit) of all bodies, as they are played. Off by half a
+        position_step along an axis and 2.5e-4 in a component of the quaternion, an angle of 5e-4 rad, at most."""
         turns = self.orientations[frame] * TURN_STEP
         return self.positions[frame] * self.position_step, turns / np.linalg.norm(turns, axis=1, keepdims=True)
 
@@ -53,8 +53,8 @@ def position_step(description):
 
 
 def record(world, seconds, fps=30.0, title="", after_frame=None):
-    """Step a world for a time (s, simulated) and keep its poses `fps` times a second, at the nearest step; the first frame
-    is the world as it is. after_frame(frame, frames): called after each."""
+    """Step a world for a time (s, simulated) and keep its poses `fps` times a second, at the nearest step; the first
+    frame is the world as it is. after_frame(frame, frames): called after each."""
     if not seconds > 0:
         raise ValueError(f"seconds: {seconds}; must be greater than 0")
     if not 0 < fps <= 1000:
@@ -75,8 +75,10 @@ def record(world, seconds, fps=30.0, title="", after_frame=None):
         state = world.get("body_state")
         place = np.rint(state[:, :3] / step)
         if np.abs(place).max(initial=0) > 2 ** 30:
-            raise ValueError(f"world: a body is {np.abs(place).max() * step:.3g} m away, farther than a recording can tell; "
-                             f"it must be less than {2 ** 30 * step:.3g} m")
+            raise ValueError(
+                f"world: a body is {np.abs(place).max() * step:.3g} m away, farther than a recording can tell; "
+                f"it must be less than {2**30 * step:.3g} m"
+            )
         positions[k] = place
         turn = state[:, 3:7]
         # q and -q are the same orientation; the one nearer to the last frame's makes small differences.
@@ -95,8 +97,9 @@ def record(world, seconds, fps=30.0, title="", after_frame=None):
 
 
 def packed(values):
-    """Whole numbers, frames x bodies x components, as bytes that deflate well: of each component and body the changes of the
-    change from frame to frame, folded to 0, -1, 1, -2 ... = 0, 1, 2, 3 ..., their lowest bytes first, then the next."""
+    """Whole numbers, frames x bodies x components, as bytes that deflate well: of each component and body the changes
+    of the change from frame to frame, folded to 0, -1, 1, -2 ... = 0, 1, 2, 3 ..., their lowest bytes first, then the
+    next."""
     rows = np.moveaxis(np.asarray(values, np.int64), 0, -1).transpose(1, 0, 2)
     change = np.diff(rows, axis=-1)
     change = np.concatenate([rows[..., :1], np.diff(change, axis=-1, prepend=0)], axis=-1)

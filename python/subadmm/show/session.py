@@ -13,7 +13,8 @@ _STIFFNESS = 4.0  # Hz: a body alone would swing on the hand's spring as often
 
 
 class Session:
-    """build(): a new world. Calls from several threads wait for each other; `lock` keeps the world as it is while held."""
+    """build(): a new world. Calls from several threads wait for each other; `lock` keeps the world as it is while
+    held."""
 
     def __init__(self, build):
         self.lock = threading.RLock()
@@ -53,8 +54,8 @@ class Session:
                 self.history[name].append(value)
 
     def advance(self, seconds, budget):
-        """Where it runs: as many steps as `seconds` of the clock ask for at this speed, but none begun after `budget` seconds
-        of work. What could not be done is left out. Gives the number of steps."""
+        """Where it runs: as many steps as `seconds` of the clock ask for at this speed, but none begun after `budget`
+        seconds of work. What could not be done is left out. Gives the number of steps."""
         with self.lock:
             if not self.running:
                 return 0

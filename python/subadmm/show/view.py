@@ -69,8 +69,12 @@ class View:
                 if name in _BY_POWER:
                     what, unit = f"{what}: power of ten of {unit}", "power"
                 self._plots[name] = gui.add_uplot(
-                    (np.zeros(1), np.zeros(1)), ({"label": "s"}, {"label": unit, "stroke": "#3a8c8c", "width": 2}), title=what,
-                    scales={"x": {"time": False}, "y": {"auto": True}}, height=150)
+                    (np.zeros(1), np.zeros(1)),
+                    ({"label": "s"}, {"label": unit, "stroke": "#3a8c8c", "width": 2}),
+                    title=what,
+                    scales={"x": {"time": False}, "y": {"auto": True}},
+                    height=150,
+                )
 
         def settle(**changes):
             try:
