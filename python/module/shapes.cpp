@@ -144,7 +144,9 @@ void bind_shapes(nb::module_ &m)
         .def_prop_rw("category", [](const S &s) { return s.def.category; }, [](S &s, uint32_t x) { s.def.category = x; }, "Bits of what it is.")
         .def_prop_rw("mask", [](const S &s) { return s.def.mask; }, [](S &s, uint32_t x) { s.def.mask = x; }, "Categories that it meets.")
         .def("copy", [](const S &s) { return S(s); }, "Another definition of the same shape; hulls and meshes are shared.")
-        .def("geometry", &geometry_of, "(vertices n x 3 in m, triangles m x 3) of a hull or a mesh; None of other types.");
+        .def("geometry", &geometry_of, "(vertices n x 3 in m, triangles m x 3) of a hull or a mesh; None of other types.")
+        .def_prop_ro("rounding", [](const S &s) { return sadmm_hull_rounding(s.def.hull); },
+                     "Radius of the ball around every point of a hull, m; what geometry() gives is the polyhedron inside. 0 of other types.");
 
     m.def("_hull", &make_hull, "points"_a, "merge"_a, "rounding"_a);
     m.def("_mesh", &make_mesh, "vertices"_a, "triangles"_a);

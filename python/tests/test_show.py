@@ -1,0 +1,381 @@
+"""Meshes, pictures and recordings of worlds."""
+import base64
+import json
+import os
+import re
+import shutil
+import struct
+import subprocess
+import zlib
+
+import numpy as np
+import pytest
+
+import subadmm
+from subadmm import show
+from subadmm.__main__ import main
+from subadmm.show import page, png, recording
+from subadmm.show.raster import rasterise
+from subadmm.show.session import Session
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+
+try:
+    TETRAHEDRON = subadmm.hull([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)])
+    ROUNDED = subadmm.hull([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], rounding=0.1)
+except subadmm.Unavailable:
+    TETRAHEDRON = ROUNDED = None
+
+SHAPES = [
+    subadmm.sphere(0.3),
+    subadmm.capsule(0.2, 0.5),
+    subadmm.box(0.1, 0.2, 0.3),
+    subadmm.cylinder(0.3, 0.2),
+    subadmm.cone(0.3, 0.2),
+    subadmm.ellipsoid(0.1, 0.2, 0.4),
+] + [shape for shape in (TETRAHEDRON, ROUNDED) if shape]
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.type)
+def test_meshes_are_closed_and_have_the_volume_of_the_solid(shape):
+    exact = subadmm.mass_of([shape], 1.0).mass
+    off = []
+    for detail in (24, 96):
+        mesh = show.mesh_of(shape, detail=detail)
+        assert mesh.is_closed()
+        off.append(1 - mesh.volume() / exact)
+    # Inscribed: never more than the solid. A circle of 24 corners lacks 1.2 % of its area, a ball twice that; four
+    # times the corners lack a sixteenth.
+    assert -1e-9 <= off[1] <= off[0] + 1e-9 and off[0] < 0.04 and off[1] < 0.004
+    normals = mesh.corner_normals()
+    assert np.allclose(np.linalg.norm(normals, axis=2), 1)
+    assert (np.einsum("tkj,tj->tk", normals, mesh.triangle_normals()) > 0.8).all()
+
+
+def test_meshes_of_meshes_are_their_own_and_planes_are_patches():
+    mesh = show.mesh_of(subadmm.box(1, 2, 3))
+    again = show.mesh_of(subadmm.mesh(mesh.vertices, mesh.triangles))
+    assert again.is_closed() and again.volume() == pytest.approx(48)
+    field = show.mesh_of(subadmm.heightfield(np.zeros((3, 4)), (0.5, 0.5)))
+    assert (field.triangle_normals() == [0, 0, 1]).all() and not field.is_closed()
+    patch = show.mesh_of(subadmm.plane(), patch=4)
+    assert np.ptp(patch.vertices, axis=0).tolist() == [8, 8, 0] and (patch.triangle_normals() == [0, 0, 1]).all()
+    with pytest.raises(ValueError, match="detail: 3"):
+        show.mesh_of(subadmm.sphere(1), detail=3)
+
+
+def test_descriptions_have_one_group_for_a_form():
+    world = subadmm.scene("mixed_pile:20")
+    description = show.describe(world)
+    moving = [group for group in description.groups if description.dynamic[group.body].any()]
+    assert len(moving) == 1 and len(np.unique(moving[0].scale[:, 0])) > 1
+    dolls = show.describe(subadmm.scene("ragdolls:2"))
+    colours = np.concatenate([group.colour[dolls.dynamic[group.body]] for group in dolls.groups])
+    assert len(colours) == 22
+    # A doll is of one colour, up to lighter and darker.
+    hues = np.unique(np.round(colours / colours.max(axis=1, keepdims=True), 3), axis=0)
+    assert len(hues) == 2
+
+
+def test_the_nearest_triangle_is_seen_and_triangles_that_share_an_edge_leave_no_gap():
+    far = [[1, 1, 2.0], [1, 31, 2], [31, 31, 2]], [[1, 1, 2.0], [31, 31, 2], [31, 1, 2]]
+    near = [[8, 8, 1.0], [8, 24, 1], [24, 24, 1]]
+    seen, depth = rasterise(np.array([*far, near, near[::-1]]), 32, 32)
+    assert (seen[1:31, 1:31] >= 0).all() and (seen[0] == -1).all() and np.isinf(depth[0]).all()
+    assert seen[20, 12] == 2 and depth[20, 12] == 1 and depth[2, 20] == 2 and not (seen == 3).any()
+
+
+def decoded(data):
+    """Pixels of a PNG of 8-bit colours."""
+    at, body = 8, b""
+    while at < len(data):
+        size, kind = struct.unpack(">I4s", data[at:at + 8])
+        chunk = data[at + 8:at + 8 + size]
+        if kind == b"IHDR":
+            width, height, depth, colours = struct.unpack(">IIBB", chunk[:10])
+        body += chunk if kind == b"IDAT" else b""
+        at += 12 + size
+    assert depth == 8 and colours in (2, 6)
+    size = 3 if colours == 2 else 4
+    rows = np.frombuffer(zlib.decompress(body), np.uint8).reshape(height, -1)
+    above, out = [0] * (size * width), np.zeros((height, size * width), np.uint8)
+    for y in range(height):
+        kind, line = int(rows[y, 0]), rows[y, 1:].tolist()
+        for x in range(size * width):
+            left, corner = (line[x - size], above[x - size]) if x >= size else (0, 0)
+            up = above[x]
+            guess = left + up - corner
+            near = min((abs(guess - left), 0, left), (abs(guess - up), 1, up), (abs(guess - corner), 2, corner))[2]
+            line[x] = (line[x] + (0, left, up, (left + up) // 2, near)[kind]) & 255
+        out[y], above = line, line
+    return out.reshape(height, width, size)[:, :, :3]
+
+
+def test_png_files_have_the_pixels():
+    pixels = np.random.default_rng(3).integers(0, 256, (13, 17, 3)).astype(np.uint8)
+    assert (decoded(png.png_of(pixels)) == pixels).all()
+
+
+def test_pictures_show_the_scene_and_are_the_same_every_time(tmp_path):
+    world = subadmm.scene("pile:30", backend="cpu")
+    first = show.picture(world, 160, 100)
+    assert first.shape == (100, 160, 3) and (first == show.picture(world, 160, 100)).all()
+    # Boxes are colourful, the ground and the backdrop are grey.
+    assert (np.ptp(first.astype(int), axis=2) > 40).mean() > 0.05 and np.ptp(
+        first[:, :5].astype(int), axis=2
+    ).max() < 20
+    world.step(20)
+    assert (first != show.picture(world, 160, 100)).any()
+    out = tmp_path / "a.png"
+    assert main(["picture", "pile:30", "--steps", "20", "--backend", "cpu", "--size", "160x100", "-o", str(out)]) == 0
+    assert (decoded(out.read_bytes()) == show.picture(world, 160, 100)).all()
+
+
+def test_a_ball_is_lit_from_the_sun_and_throws_a_shadow():
+    world = subadmm.World()
+    world.add_ground()
+    world.add_solid(subadmm.sphere(1), density=1, position=(0, 0, 1))
+    ball = show.picture(world, 200, 160, show.Camera(np.array([0.0, -0.01, 12]), np.array([0.0, 0, 0])), smooth=1).sum(
+        axis=2
+    )
+    # From above, x to the right: the sun comes from the left and below, the shadow lies to the right and above.
+    assert ball[90:100, 80:90].mean() > ball[60:70, 110:120].mean() + 60
+    assert ball[110, 80] > ball[50, 120] + 150
+
+
+def test_what_is_wrong_is_said(tmp_path, capsys):
+    world = subadmm.World()
+    for call, said in [
+        (lambda: show.picture(world, width=4), "width: 4"),
+        (lambda: show.record(world, 0), "seconds: 0"),
+        (lambda: show.record(world, 1, fps=-1), "fps: -1"),
+        (lambda: show.record(world, 1).save("x.txt"), "x.txt"),
+    ]:
+        with pytest.raises(ValueError, match=said):
+            call()
+    for arguments, said in [
+        (["picture", "nothing", "-o", "a.png"], "nothing"),
+        (["picture", "pile:3", "-o", "a.gif"], "a.gif"),
+        (["record", "pile:3", "-o", str(tmp_path / "no" / "a.html"), "--steps", "1"], "no"),
+        (["picture", "pile:3", "-o", "a.png", "--size", "4"], "--size: 4"),
+    ]:
+        assert main(arguments) == 1
+        assert said in capsys.readouterr().err
+
+
+def test_recordings_have_the_poses_of_the_world():
+    made, again = (subadmm.scene("ragdolls:2", backend="cpu") for _ in range(2))
+    taken = show.record(made, 0.5, fps=30)
+    dt = again.settings.dt
+    assert (
+        len(taken.times) == 16 and taken.times[0] == 0 and abs(taken.times - np.arange(16) / 30).max() <= dt / 2 + 1e-12
+    )
+    done = 0
+    for k, time in enumerate(taken.times):
+        again.step(round(time / dt) - done)
+        done = round(time / dt)
+        places, turns = taken.poses(k)
+        assert abs(places - again.positions).max() <= taken.position_step / 2 * (1 + 1e-9)
+        same = abs(np.einsum("ij,ij->i", turns, again.orientations))
+        assert (2 * np.arccos(np.minimum(same, 1))).max() < 5e-4
+    assert taken.measures["kinetic"][-1] > 0 and "error" not in taken.measures
+
+
+def test_kinetic_energy_is_that_of_the_bodies():
+    world = subadmm.World()
+    world.add_body(
+        mass=2,
+        inertia=(1, 2, 3),
+        orientation=(0.5, 0.5, 0.5, 0.5),
+        linear_velocity=(0, 3, 4),
+        angular_velocity=(0, 0, 2),
+    )
+    # The turn takes the body's y axis to the world's z axis.
+    assert show.measures.measure(world)["kinetic"] == pytest.approx(0.5 * 2 * 25 + 0.5 * 2 * 4)
+
+
+def read_page(text):
+    """What the page's script reads: (header, data)."""
+    header = json.loads(re.search(r'id="header">(.*?)</script>', text, re.S).group(1))
+    return header, zlib.decompress(base64.b64decode(re.search(r'id="data">(.*?)</script>', text, re.S).group(1)))
+
+
+def test_pages_have_all_of_a_recording_and_nothing_from_elsewhere():
+    taken = show.record(subadmm.scene("pile:20", backend="cpu"), 0.4, title="<pile> & co")
+    text = page.page_of(taken)
+    assert (
+        "&lt;pile&gt;" in text
+        and "<pile>" not in text
+        and not re.search(r"(src|href)=\"(?!data:)|https?://|import ", text)
+    )
+    header, data = read_page(text)
+    assert header["title"] == "<pile> & co" and header["frames"] == len(taken.times)
+    for name, values in (("positions", taken.positions), ("turns", taken.orientations)):
+        kind, at, count = header[name]
+        assert kind == "u8"
+        assert (recording.unpacked(data[at:at + count], *values.shape) == values).all()
+
+
+def test_ten_seconds_of_2000_bodies_are_less_than_10_megabytes():
+    """Of bodies that tumble all the time; those that come to rest take a fifth of it."""
+    world = subadmm.World()
+    for k in range(2000):
+        world.add_solid(subadmm.box(0.1, 0.1, 0.1), density=1000, position=(k % 50, k // 50, 1))
+    description = show.describe(world)
+    random = np.random.default_rng(1)
+    frames = 301
+    speed = np.cumsum(random.normal(0, 0.05, (frames, 2000, 3)), axis=0)
+    place = world.positions + np.cumsum(speed, axis=0) / 30
+    angle = (
+        np.cumsum(random.normal(0, 3, (2000, 1)) + np.cumsum(random.normal(0, 0.3, (frames, 2000, 1)), axis=0), axis=0)
+        / 30
+    )
+    axis = random.normal(0, 1, (2000, 3))
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    turn = np.concatenate([np.cos(angle / 2), np.sin(angle / 2) * axis], axis=2)
+    step = recording.position_step(description)
+    assert step <= 1e-4
+    taken = show.Recording(
+        description, "", step, np.arange(frames) / 30, np.rint(place / step), np.rint(turn / recording.TURN_STEP)
+    )
+    assert len(page.page_of(taken)) < 10e6
+
+
+@pytest.mark.skipif(not CHROMIUM, reason="there is no Chromium")
+def test_the_page_draws_in_a_browser_without_errors(tmp_path):
+    show.record(subadmm.scene("ragdolls:2", backend="cpu"), 0.5, title="dolls").save(tmp_path / "dolls.html")
+    shot = tmp_path / "shot.png"
+    done = subprocess.run(
+        [
+            CHROMIUM,
+            "--headless",
+            "--no-sandbox",
+            "--use-gl=angle",
+            "--use-angle=swiftshader",
+            "--enable-unsafe-swiftshader",
+            "--enable-logging=stderr",
+            "--window-size=320,240",
+            "--virtual-time-budget=2000",
+            f"--screenshot={shot}",
+            f"--user-data-dir={tmp_path / 'profile'}",
+            f"file://{tmp_path / 'dolls.html'}#t=0.3",
+        ],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env={**os.environ, "HOME": str(tmp_path)},
+    )
+    assert "CONSOLE" not in done.stderr and shot.exists(), done.stderr[-2000:]
+    pixels = decoded(shot.read_bytes()).astype(int)
+    # Two dolls of strong colours in the middle of a pale page.
+    assert (np.ptp(pixels[40:180], axis=2) > 40).mean() > 0.01
+
+
+def test_gltf_files_have_the_poses_of_the_recording(tmp_path):
+    taken = show.record(subadmm.scene("ragdolls:2", backend="cpu"), 0.6, title="dolls")
+    taken.save(tmp_path / "dolls.glb")
+    data = (tmp_path / "dolls.glb").read_bytes()
+    magic, version, length, size, kind = struct.unpack("<4sIII4s", data[:20])
+    assert (magic, version, length, kind) == (b"glTF", 2, len(data), b"JSON") and size % 4 == 0
+    whole = json.loads(data[20:20 + size])
+    blob = data[28 + size:]
+    assert len(blob) % 4 == 0 and whole["buffers"][0]["byteLength"] <= len(blob)
+
+    def read(number):
+        accessor = whole["accessors"][number]
+        view = whole["bufferViews"][accessor["bufferView"]]
+        values = np.frombuffer(blob, "<f4", view["byteLength"] // 4, view["byteOffset"]).reshape(accessor["count"], -1)
+        if "min" in accessor:
+            assert (values.min(axis=0) == np.float32(accessor["min"])).all() and (
+                values.max(axis=0) == np.float32(accessor["max"])
+            ).all()
+        return values
+
+    animation, = whole["animations"]
+    moved = {(channel["target"]["node"], channel["target"]["path"]): animation["samplers"][channel["sampler"]]
+             for channel in animation["channels"]}
+    assert len(moved) == 2 * 22                      # all but the ground
+    for frame in (0, 7, len(taken.times) - 1):
+        places, turns = taken.poses(frame)
+        for (node, path), sampler in moved.items():
+            times, values = read(sampler["input"])[:, 0], read(sampler["output"])
+            found = np.array([np.interp(taken.times[frame], times, values[:, k]) for k in range(values.shape[1])])
+            assert np.allclose(found, places[node] if path == "translation" else turns[node][[1, 2, 3, 0]], atol=1e-5)
+    # Every node but the uppermost is under one other, and the uppermost turns z to y.
+    below = [child for node in whole["nodes"] for child in node.get("children", [])]
+    assert sorted(below) == list(range(len(whole["nodes"]) - 1))
+    x, y, z, w = whole["nodes"][-1]["rotation"]
+    assert np.allclose([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], [0, 1, 0])
+
+
+# ---- the page with the running world -------------------------------------------------------------------------------
+
+
+def one_box():
+    world = subadmm.World(backend="cpu")
+    world.add_ground()
+    world.add_solid(subadmm.box(0.1, 0.1, 0.1), mass=2, position=(0, 0, 0.1))
+    return world
+
+
+def test_sessions_run_by_the_clock_and_begin_again():
+    session = Session(one_box)
+    dt = session.world.settings.dt
+    assert sum(session.advance(10.4 * dt, 1.0) for _ in range(10)) == 104
+    session.speed = 0.5
+    assert session.advance(10 * dt, 1.0) == 5
+    session.running = False
+    assert session.advance(1.0, 1.0) == 0
+    session.change(method="paper", iterations=77)
+    session.step()
+    assert session.world.report.iterations == 77 and session.steps == 110 and len(session.history["ms"]) == 110
+    with pytest.raises(subadmm.InvalidArgument):
+        session.change(iterations=0)
+    session.reset()
+    assert session.steps == 0 and session.world.settings.method == "fast"
+
+
+def test_the_hand_feels_the_weight_of_what_it_lifts():
+    session = Session(one_box)
+    assert not session.grab(0, (0, 0, 0)) and session.hand() is None
+    assert session.grab(1, (0, 0, 0.2))
+    session.pull((0.3, 0, 0.8))
+    session.step(800)
+    held, hand, force = session.hand()
+    assert session.world.bodies[1].position[2] > 0.5 and hand.tolist() == [0.3, 0, 0.8]
+    # It has come to rest under the hand, but for a thousandth of its swing.
+    assert abs(force - [0, 0, 2 * 9.81]).max() < 0.05 and np.linalg.norm(held - hand) < 0.02
+    session.release()
+    assert session.hand() is None and not session.world.couplings
+    session.step(200)
+    assert session.world.bodies[1].position[2] < 0.15
+
+
+def test_split_meshes_have_edges_and_the_same_triangles():
+    box = show.mesh_of(subadmm.box(1, 2, 3))
+    split = box.split()
+    assert len(split.vertices) == 24 and (split.vertices[split.triangles] == box.vertices[box.triangles]).all()
+    ball = show.mesh_of(subadmm.sphere(1))
+    assert len(ball.split().vertices) == len(ball.vertices)
+
+
+def test_the_view_sends_what_moves():
+    pytest.importorskip("viser")
+    from subadmm.show.view import View
+
+    view = View(Session(one_box), "a box", port=18437)
+    try:
+        view._contacts.value = True
+        view.session.step(5)
+        view.frame()
+        (group, handle), = view._moving
+        assert (
+            np.allclose(handle.batched_positions, view.session.world.positions[1:], atol=1e-6)
+            and len(view._forces.points) == 4
+        )
+        # Contact forces on the box are up, and so are the arrows.
+        up = np.sign(view.session.world.contacts()["force"][:, 2])
+        assert (np.sign(view._forces.points[:, 1, 2] - view._forces.points[:, 0, 2]) == up).all()
+        assert view.session.world.settings.certify and len(view._plots) == 3
+    finally:
+        view.stop()
