@@ -66,7 +66,7 @@ def wrong_commands(text, sources):
     """Options of the project's commands, in back quotes and in blocks."""
     spans = re.findall(r"^```.*?^```", text, re.M | re.S) + re.findall(r"`([^`]+)`", text)
     for span in spans:
-        for command, rest in re.findall(r"\b(subadmm(?:-bench)? [a-z]+)((?:[^#\n]|\n(?! *subadmm))*)", span):
+        for command, rest in re.findall(r"(?<!-m )\b(subadmm(?:-bench)? [a-z]+)((?:[^#\n]|\n(?! *subadmm))*)", span):
             for option in re.findall(r"(?<!\S)--([a-z][\w\-]*)", rest):
                 if f'"{option}"' not in sources:
                     yield f"{command} --{option}: no such option"
