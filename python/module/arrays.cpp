@@ -130,10 +130,8 @@ void bind_arrays(nb::module_ &m, nb::class_<world> &w)
             rows.resize((size_t)count + 1);
             return sadmm_world_dynamic_bodies(h, rows.data(), count + 1, &count);
         });
-        const size_t count = rows.size() - 1;
-        auto *kept = new std::vector<int32_t>(std::move(rows));
-        nb::capsule owner(kept, [](void *p) noexcept { delete (std::vector<int32_t> *)p; });
-        return nb::cast(nb::ndarray<nb::numpy, int32_t>(kept->data(), 1, &count, owner));
+        const size_t count = rows.size() - 1; // one more, so that there is always a place to write to
+        return numpy_of(std::move(rows), {count});
     }, "Index of each dynamic body, ascending.");
     w.def("_contacts", &contacts);
 }

@@ -121,6 +121,27 @@ template <size_t N> void put(const std::array<double, N> &from, double *to)
     for (size_t k = 0; k < N; ++k) to[k] = from[k];
 }
 
+// Objects of a world by their index in [0, count). at: the library's call that gives an id.
+template <class T, class At> std::vector<T> all_of(nb::handle self, int32_t count, At at)
+{
+    world &w = nb::cast<world &>(self);
+    std::vector<T> out;
+    for (int32_t k = 0; k < count; ++k) {
+        T one{nb::borrow(self), &w, {}};
+        call(w, [&](sadmm_world *h) { return at(h, k, &one.id); });
+        out.push_back(one);
+    }
+    return out;
+}
+
+// A numpy array that owns its numbers.
+template <class T> nb::object numpy_of(std::vector<T> values, std::vector<size_t> shape)
+{
+    auto *kept = new std::vector<T>(std::move(values));
+    nb::capsule owner(kept, [](void *p) noexcept { delete (std::vector<T> *)p; });
+    return nb::cast(nb::ndarray<nb::numpy, T>(kept->data(), shape.size(), shape.data(), owner));
+}
+
 // One of a list of names, or ValueError.
 template <class E, size_t N> E named(const char *what, const std::string &name, const std::pair<const char *, E> (&names)[N])
 {

@@ -20,13 +20,6 @@ static sadmm_query_filter filter_of(world &w, const std::optional<body> &ignore,
     return filter;
 }
 
-template <class T> static nb::object numpy_of(std::vector<T> values, std::vector<size_t> shape)
-{
-    auto *kept = new std::vector<T>(std::move(values));
-    nb::capsule owner(kept, [](void *p) noexcept { delete (std::vector<T> *)p; });
-    return nb::cast(nb::ndarray<nb::numpy, T>(kept->data(), shape.size(), shape.data(), owner));
-}
-
 // By index of the shape, so that all of it is arrays.
 static nb::dict cast_rays(nb::handle_t<world> self, rows3 origins, rows3 directions, double length,
                           const std::optional<body> &ignore, const std::vector<std::string> &types, uint32_t category,

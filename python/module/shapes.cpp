@@ -10,14 +10,6 @@ using points = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::dev
 using triangles = nb::ndarray<const int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using grid = nb::ndarray<const double, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
 
-// A numpy array that owns its numbers.
-template <class T> nb::ndarray<nb::numpy, T> numpy_of(std::vector<T> values, std::vector<size_t> shape)
-{
-    auto *kept = new std::vector<T>(std::move(values));
-    nb::capsule owner(kept, [](void *p) noexcept { delete (std::vector<T> *)p; });
-    return nb::ndarray<nb::numpy, T>(kept->data(), shape.size(), shape.data(), owner);
-}
-
 // src/collision/hull.h and mesh.h, which are C
 extern "C" void sadmm_hull_retain(const sadmm_hull *hull);
 extern "C" void sadmm_mesh_retain(const sadmm_mesh *mesh);

@@ -207,18 +207,6 @@ static void bind_body(nb::module_ &m)
         .def("remove", [](const shape &s) { call(*s.w, [&](sadmm_world *h) { return sadmm_world_remove_shape(h, s.id); }); });
 }
 
-template <class T, class At> static std::vector<T> all_of(nb::handle self, int32_t count, At at)
-{
-    world &w = nb::cast<world &>(self);
-    std::vector<T> out;
-    for (int32_t k = 0; k < count; ++k) {
-        T one{nb::borrow(self), &w, {}};
-        call(w, [&](sadmm_world *h) { return at(h, k, &one.id); });
-        out.push_back(one);
-    }
-    return out;
-}
-
 void bind_world(nb::module_ &m, nb::class_<world> &w)
 {
     bind_body(m);
