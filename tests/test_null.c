@@ -282,6 +282,28 @@ static void on_queries(void)
     ck_assert(sadmm_query_filter_default().body_types == 7);
 }
 
+static void on_events(void)
+{
+    sadmm_event event;
+    sadmm_shape_id id, sensor;
+    sadmm_shape_def def = sadmm_shape_def_default();
+    int32_t count;
+    def.size[0] = 1;
+    def.sensor = true;
+    ck_assert_int_eq(sadmm_world_add_shape(world, body, &def, &sensor), SADMM_OK);
+    REFUSES("world", sadmm_world_record_events(NULL, 1));
+    ck_assert_int_eq(sadmm_world_event_capacity(NULL), 0);
+    ck_assert_int_eq(sadmm_world_event_count(NULL), 0);
+    REFUSES("world", sadmm_world_take_events(NULL, 1, &event, &count, NULL));
+    REFUSES("events", sadmm_world_take_events(world, 1, NULL, &count, NULL));
+    REFUSES("count", sadmm_world_take_events(world, 1, &event, NULL, NULL));
+    ck_assert_int_eq(sadmm_world_take_events(world, 0, NULL, &count, NULL), SADMM_OK);
+    REFUSES("world", sadmm_world_sensor_overlaps(NULL, sensor, 1, &id, &count));
+    REFUSES("shapes", sadmm_world_sensor_overlaps(world, sensor, 1, NULL, &count));
+    REFUSES("count", sadmm_world_sensor_overlaps(world, sensor, 1, &id, NULL));
+    ck_assert_int_eq(sadmm_world_sensor_overlaps(world, sensor, 0, NULL, &count), SADMM_OK);
+}
+
 static void on_steps(void)
 {
     sadmm_step_report report;
@@ -498,6 +520,7 @@ static const struct {
     {on_queries,
      {"sadmm_query_filter_default", W(cast_ray), W(cast_ray_all), W(cast_rays), W(overlap_box), W(overlap_shape),
       W(closest_points), W(closest_to_shape)}},
+    {on_events, {W(record_events), W(event_capacity), W(event_count), W(take_events), W(sensor_overlaps)}},
     {on_steps,
      {W(step), W(step_async), W(wait), W(report), W(contact_count), W(contacts), W(state_hash), W(explain), W(freeze)}},
     {on_problems,

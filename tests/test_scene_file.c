@@ -130,6 +130,7 @@ static sadmm_shape_id add_shape(sadmm_world *world, sadmm_body_id body, sadmm_sh
     def.restitution = 0.125;
     def.category = 0x80000001;
     def.mask = 0xfffffffe | 1;
+    def.sensor = type == SADMM_SHAPE_CONE;
     MUST(world, sadmm_world_add_shape(world, body, &def, &id));
     return id;
 }
@@ -344,6 +345,7 @@ START_TEST(everything_is_told)
         "\"gravity_scale\": -0.5",
         "\"linear_damping\": 0.1",
         "\"category\": 2147483649",
+        "\"sensor\": true",
         "\"certify\": true",
         "\"threads\": 2",
         "\"iterations\": 37",

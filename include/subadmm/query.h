@@ -35,6 +35,7 @@ typedef struct sadmm_query_filter {
     uint32_t category, mask; /* that would meet a shape with these (sadmm_shape_def); default both 0: any */
     bool from_inside;        /* rays: what the origin is inside of counts, at distance 0; default true */
     bool from_behind;        /* rays: triangles of meshes count from behind as well; default false */
+    bool sensors;            /* sensor shapes count as well; default false */
 } sadmm_query_filter;
 
 /* The defaults named above. Thread-safe. */

@@ -173,4 +173,5 @@ void bind_world(nb::module_ &m, nb::class_<world> &w);
 void bind_arrays(nb::module_ &m, nb::class_<world> &w);
 void bind_joints(nb::module_ &m, nb::class_<world> &w);
 void bind_queries(nb::class_<world> &w);
+void bind_events(nb::module_ &m, nb::class_<world> &w);
 void bind_scenes(nb::module_ &m, nb::class_<world> &w);

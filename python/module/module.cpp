@@ -73,5 +73,6 @@ NB_MODULE(_core, m)
     bind_arrays(m, w);
     bind_joints(m, w);
     bind_queries(w);
+    bind_events(m, w);
     bind_scenes(m, w);
 }

@@ -6,7 +6,7 @@
 using rows3 = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 
 static sadmm_query_filter filter_of(world &w, const std::optional<body> &ignore, const std::vector<std::string> &types,
-                                    uint32_t category, uint32_t mask, bool from_inside, bool from_behind)
+                                    uint32_t category, uint32_t mask, bool from_inside, bool from_behind, bool sensors)
 {
     sadmm_query_filter filter = sadmm_query_filter_default();
     if (ignore) {
@@ -16,20 +16,20 @@ static sadmm_query_filter filter_of(world &w, const std::optional<body> &ignore,
     if (!types.empty()) filter.body_types = 0;
     for (const std::string &type : types) filter.body_types |= 1u << named("types", type, body_type_names);
     filter.category = category, filter.mask = mask;
-    filter.from_inside = from_inside, filter.from_behind = from_behind;
+    filter.from_inside = from_inside, filter.from_behind = from_behind, filter.sensors = sensors;
     return filter;
 }
 
 // By index of the shape, so that all of it is arrays.
 static nb::dict cast_rays(nb::handle_t<world> self, rows3 origins, rows3 directions, double length,
                           const std::optional<body> &ignore, const std::vector<std::string> &types, uint32_t category,
-                          uint32_t mask, bool from_inside, bool from_behind)
+                          uint32_t mask, bool from_inside, bool from_behind, bool sensors)
 {
     world &w = nb::cast<world &>(self);
     const size_t n = origins.shape(0);
     if (directions.shape(0) != n) throw nb::value_error("directions: must be as many as origins");
     if (n > INT32_MAX) throw nb::value_error("origins: too many");
-    const sadmm_query_filter filter = filter_of(w, ignore, types, category, mask, from_inside, from_behind);
+    const sadmm_query_filter filter = filter_of(w, ignore, types, category, mask, from_inside, from_behind, sensors);
     std::vector<sadmm_ray> rays(n + 1);
     std::vector<sadmm_ray_hit> hits(n + 1);
     for (size_t i = 0; i < n; ++i) {
@@ -89,7 +89,7 @@ static nb::dict dict_of(const sadmm_closest_points &c)
 void bind_queries(nb::class_<world> &w)
 {
     w.def("_cast_rays", &cast_rays, "origins"_a, "directions"_a, "length"_a, "ignore"_a.none(), "types"_a, "category"_a, "mask"_a,
-          "from_inside"_a, "from_behind"_a);
+          "from_inside"_a, "from_behind"_a, "sensors"_a);
     w.def("overlap_box", [](nb::handle_t<world> self, vec3 lowest, vec3 highest) {
         return overlaps(self, [&](sadmm_world *h, int32_t capacity, sadmm_shape_id *ids, int32_t *count) {
             return sadmm_world_overlap_box(h, lowest.data(), highest.data(), nullptr, capacity, ids, count);

@@ -12,10 +12,16 @@ SI units everywhere; orientations are unit quaternions w x y z, body to world. W
 the C headers of the same names (include/subadmm/).
 """
 
+import warnings
+
 import numpy as np
 
 from . import _core
 from ._core import (
+    CONTACT_BEGUN,
+    CONTACT_ENDED,
+    SENSOR_BEGUN,
+    SENSOR_ENDED,
     Body,
     BodyShape,
     Certificate,
@@ -54,6 +60,7 @@ __all__ = [
     "Body", "BodyShape", "Certificate", "Coordinate", "Coupling", "DeviceError", "Error", "FileError", "Gear",
     "InvalidArgument", "Joint", "LimitExceeded", "Mass", "NonFinite", "OutOfMemory", "Report", "Settings", "Shape", "StaleId",
     "Unavailable", "Unsupported", "World", "backends", "box", "build_commit", "build_compiler", "capsule", "cone",
+    "CONTACT_BEGUN", "CONTACT_ENDED", "SENSOR_BEGUN", "SENSOR_ENDED", "event_dtype",
     "contact_dtype", "cylinder", "ellipsoid", "heightfield", "hull", "mass_of", "mesh", "plane", "scene", "scene_from_json",
     "scenes", "sphere",
     "version",
@@ -65,7 +72,7 @@ __all__ = [
 
 def _with(shape, options):
     for name, value in options.items():
-        if name not in ("position", "orientation", "friction", "restitution", "category", "mask"):
+        if name not in ("position", "orientation", "friction", "restitution", "category", "mask", "sensor"):
             raise TypeError(f"{name}: no such option of a shape")
         setattr(shape, name, value)
     return shape
@@ -73,7 +80,7 @@ def _with(shape, options):
 
 def plane(**options):
     """Half-space z <= 0 of the shape's frame, for static bodies. Options of this and all shapes: position and orientation in
-    the body's frame, friction (0.5), restitution (0), category, mask."""
+    the body's frame, friction (0.5), restitution (0), category, mask, sensor (False: touches nothing, tells what overlaps it)."""
     return _with(Shape("plane"), options)
 
 
@@ -162,7 +169,7 @@ def _add_solid(self, shapes, density=None, mass=None, *, position=(0, 0, 0), ori
 
     `position` and `orientation` are those of the frame that the shapes are placed in (the layout); the body itself has its
     origin at the centre of mass and its axes along the principal ones. Of static and kinematic bodies both frames are the
-    same, and neither density nor mass is needed. Other options: as of add_body.
+    same, and neither density nor mass is needed. Sensors have no mass. Other options: as of add_body.
     """
     shapes = [shapes] if isinstance(shapes, Shape) else list(shapes)
     if not shapes:
@@ -174,9 +181,12 @@ def _add_solid(self, shapes, density=None, mass=None, *, position=(0, 0, 0), ori
         return body
     if (density is None) == (mass is None):
         raise ValueError("density, mass: one of the two must be given")
-    whole = mass_of(shapes, 1.0)
+    solid = [shape for shape in shapes if not shape.sensor]
+    if not solid:
+        raise ValueError("shapes: one at least must be no sensor, which has no mass")
+    whole = mass_of(solid, 1.0)
     density = density if density is not None else mass / whole.mass
-    whole = mass_of(shapes, density)
+    whole = mass_of(solid, density)
     place, turn = whole.pose_of_body(position, orientation)
     body = self.add_body(mass=whole.mass, inertia=whole.inertia, position=place, orientation=turn, **options)
     try:
@@ -205,6 +215,26 @@ def _contacts(self):
     return np.frombuffer(self._contacts(), dtype=contact_dtype)
 
 
+#: Members of World.events(): step that it came with; type, one of CONTACT_BEGUN, CONTACT_ENDED, SENSOR_BEGUN, SENSOR_ENDED; ids
+#: are (slot, generation), a is the sensor of these. Of CONTACT_BEGUN: position (m), normal from a to b, closing speed (m/s) and
+#: the pair's impulse on b (N s).
+event_dtype = np.dtype({
+    "names": [member[0] for member in _core._event_members],
+    "formats": [(member[1], (member[2],)) if member[2] > 1 else member[1] for member in _core._event_members],
+    "offsets": [member[3] for member in _core._event_members],
+    "itemsize": _core._event_size,
+})
+
+
+def _events(self):
+    """Take what has begun and ended since the last call, in steps recorded (record_events): an array of `event_dtype`, the oldest
+    first. Where more came than are kept, the oldest are gone, and a warning says how many."""
+    data, dropped = self._take_events()
+    if dropped:
+        warnings.warn(f"{dropped} events were lost: take them more often, or keep more (record_events)", stacklevel=2)
+    return np.frombuffer(data, dtype=event_dtype)
+
+
 def _to_json(self, name="world", description="", duration=10.0):
     """The world as it is now as the text of a scene file (docs/scenes.md), which `subadmm run FILE.json`, scene(path) and
     scene_from_json(text) read; duration: how long it is meant to be run for, s. What steps leave for the next ones is not in
@@ -214,19 +244,21 @@ def _to_json(self, name="world", description="", duration=10.0):
 
 World.to_json = _to_json
 def _cast_rays(self, origins, directions, length=np.inf, *, ignore=None, types=(), category=0, mask=0, from_inside=True,
-               from_behind=False):
+               from_behind=False, sensors=False):
     """What rays hit: origins (n x 3, m, world), directions (n x 3, of any length), how far to look (m). A dict of arrays: shape
     (n; index in World.shapes, -1: nothing), distance (n, m; infinite: nothing), point and normal (n x 3, world), triangle (n;
     of a mesh, else -1). ignore: a Body; types: of bodies, as ("dynamic",); category, mask: only what would meet a shape with
-    these; from_inside: what the origin is inside of counts, at distance 0; from_behind: triangles count from behind too."""
+    these; from_inside: what the origin is inside of counts, at distance 0; from_behind: triangles count from behind too;
+    sensors: sensor shapes count too."""
     return self._cast_rays(_points(origins), _points(directions), length, ignore, list(types), category, mask, from_inside,
-                           from_behind)
+                           from_behind, sensors)
 
 
 World.cast_rays = _cast_rays
 World.add_ground = _add_ground
 World.add_solid = _add_solid
 World.contacts = _contacts
+World.events = _events
 World.positions = property(lambda self: self.get("body_state")[:, :3], doc="Centres of mass of all bodies, n x 3, m.")
 World.orientations = property(lambda self: self.get("body_state")[:, 3:7], doc="Of all bodies, n x 4, w x y z.")
 World.velocities = property(lambda self: self.get("body_state")[:, 7:], doc="Linear (m/s) and angular (rad/s), n x 6.")

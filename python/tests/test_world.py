@@ -221,6 +221,54 @@ def test_scenes_by_name():
     assert world.report.contacts > 0
 
 
+def test_events_and_sensors():
+    world, box = falling_box()
+    ground = world.shapes[0]
+    gate = world.add_body(type="static", position=(0, 0, 0.5))
+    sensor = gate.add_shape(subadmm.box(1, 1, 0.1, sensor=True))
+    assert sensor.definition.sensor and not ground.definition.sensor
+    world.record_events()
+    seen = []
+    while world.report.step < 400:
+        world.step(10)
+        seen += world.sensor_overlaps(sensor)
+    events = world.events()
+    cube = world.shapes[1]
+    assert set(s.index for s in seen) == {cube.index}
+    kinds = events["type"].tolist()
+    assert kinds.count(subadmm.SENSOR_BEGUN) == 1 and kinds.count(subadmm.SENSOR_ENDED) == 1
+    assert kinds.count(subadmm.CONTACT_BEGUN) == kinds.count(subadmm.CONTACT_ENDED) + 1  # it lies in the end
+    assert (np.diff(events["step"]) >= 0).all()
+    first = events[events["type"] == subadmm.CONTACT_BEGUN][0]
+    assert world.find_shape(first["shape_a"]) == ground and world.find_body(first["body_b"]) == box
+    # 0.9 m of fall: v = 4.2 m/s
+    assert first["normal"] == pytest.approx([0, 0, 1]) and first["speed"] == pytest.approx(4.2, rel=0.02)
+    assert 0 < first["impulse"][2] <= box.mass * 4.3
+    assert len(world.events()) == 0 and world.event_count == 0
+    box.remove()
+    world.step()
+    ended = world.events()
+    assert ended["type"].tolist() == [subadmm.CONTACT_ENDED]
+    with pytest.raises(subadmm.StaleId):
+        world.find_body(ended[0]["body_b"])
+    down = [[0, 0, 5]], [[0, 0, -1]]
+    assert world.cast_rays(*down)["shape"].tolist() == [0]
+    assert world.cast_rays(*down, sensors=True)["shape"].tolist() == [sensor.index]
+    with pytest.raises(subadmm.InvalidArgument, match="sensor"):
+        world.sensor_overlaps(ground)
+    # A sensor has no mass.
+    with pytest.raises(ValueError, match="no sensor"):
+        world.add_solid(subadmm.sphere(1, sensor=True), mass=1)
+    both = world.add_solid([subadmm.sphere(1), subadmm.box(2, 2, 2, sensor=True)], density=1, position=(9, 9, 9))
+    assert both.mass == pytest.approx(4 / 3 * np.pi)
+    world.record_events(1)
+    world.add_solid(subadmm.box(1, 1, 1), mass=1, position=(20, 0, 0.999))
+    world.add_solid(subadmm.box(1, 1, 1), mass=1, position=(30, 0, 0.999))
+    world.step()
+    with pytest.warns(UserWarning, match="1 events were lost"):
+        assert len(world.events()) == 1
+
+
 def test_queries():
     world, box = falling_box()
     ball = world.add_solid(subadmm.sphere(0.2), mass=1, position=(2, 0, 1))

@@ -1,6 +1,7 @@
 /* Collision detection on the host: broad phase (FCL, or sort and sweep), pair manifolds, matching with the last step.
  *
- * Shapes live in slots that stay put for a shape's life; a dead slot has alive = false. The result does not depend on
+ * Shapes live in slots that stay put for a shape's life; a dead slot has alive = false, and a sensor
+ * counts as one. The result does not depend on
  * the order in which a broad phase finds pairs: pairs come out sorted by (shape_a, shape_b, child), where a is the
  * shape of the lower (type, slot) and the normal runs from a to b. Two shapes have a pair for each of their manifolds.
  */
@@ -46,9 +47,12 @@ struct sadmm_shape {
     double friction, restitution;
     uint32_t category, mask;
     int32_t body;     /* world body slot */
-    bool alive;
+    bool alive, sensor; /* a sensor is the world's alone: to contact finding its slot is a dead one */
     uint32_t revision; /* changes whenever the slot is reused or the shape's definition changes, geometry included */
 };
+
+/* Does this slot take part? */
+static inline bool sadmm_shape_collides(const struct sadmm_shape *shape) { return shape->alive && !shape->sensor; }
 
 /* What collision knows of a world's body slot. */
 struct sadmm_collision_body {

@@ -79,7 +79,7 @@ static void update_slot(struct sadmm_candidates *c, const struct sadmm_collision
     unsigned char kind;
     bool plane, same;
 
-    if (!shape || !shape->alive) {
+    if (!shape || !sadmm_shape_collides(shape)) {
         const bool was_plane = seen->alive && !entry->present;
         c->state[slot] = (unsigned char)((seen->alive ? SLOT_LEFT : 0) | (was_plane ? SLOT_PLANE : 0));
         entry->present = false;
@@ -135,7 +135,7 @@ void SADMM_COLLISION_KERNEL(place_slots)(struct sadmm_candidates *c, const struc
         last = end - begin < TURNED_AT_ONCE ? end : begin + TURNED_AT_ONCE;
         for (size_t slot = begin; slot < last && slot < input->shape_count; ++slot) {
             const struct sadmm_shape *shape = &input->shapes[slot];
-            if (shape->alive) turns[slot - begin] = proxy_turn_of(shape, &input->bodies[shape->body], input->dt);
+            if (sadmm_shape_collides(shape)) turns[slot - begin] = proxy_turn_of(shape, &input->bodies[shape->body], input->dt);
         }
         for (size_t slot = begin; slot < last; ++slot) update_slot(c, input, slot, &turns[slot - begin], renew);
     }

@@ -3,6 +3,8 @@
 #ifndef SADMM_COLLISION_PLACED_H
 #define SADMM_COLLISION_PLACED_H
 
+#include <stdbool.h>
+
 #include "bounds.h"
 #include "core/math/quat.h"
 #include "geometry.h"
@@ -16,6 +18,7 @@ struct sadmm_placed {
     int32_t body, environment;
     uint32_t category, mask;
     uint32_t body_type; /* a bit */
+    bool sensor;
 };
 
 /* position, orientation: of the shape's frame in the body's, and of the body's in the world. */

@@ -33,11 +33,12 @@ struct sadmm_shape_filter {
     int32_t ignored;         /* body, -1: none */
     int32_t environment;     /* -1: all */
     uint32_t category, mask; /* both 0: all */
+    bool sensors;            /* these too */
 };
 
 static inline bool sadmm_query_sees(const struct sadmm_shape_filter *f, const struct sadmm_placed *s)
 {
-    return (f->body_types & s->body_type) != 0 && s->body != f->ignored &&
+    return (f->body_types & s->body_type) != 0 && s->body != f->ignored && (f->sensors || !s->sensor) &&
            (f->environment < 0 || s->environment < 0 || f->environment == s->environment) &&
            ((f->category | f->mask) == 0 || ((f->category & s->mask) != 0 && (s->category & f->mask) != 0));
 }

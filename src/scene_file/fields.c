@@ -169,6 +169,7 @@ static const struct sadmm_field shape_list[] = {
     REAL(sadmm_shape_def, restitution),
     UINT32(sadmm_shape_def, category),
     UINT32(sadmm_shape_def, mask),
+    BOOL(sadmm_shape_def, sensor),
     OTHER("hull"),
     OTHER("mesh"),
 };

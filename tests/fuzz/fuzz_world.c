@@ -11,6 +11,7 @@
 
 #include "bytes.h"
 #include "core/base/memory.h"
+#include "subadmm/events.h"
 #include "subadmm/world.h"
 
 /* Few, so that an input is quick and its calls meet the same objects again. */
@@ -356,6 +357,7 @@ static sadmm_shape_def take_shape_def(struct machine *m)
     if (take_choice(in, 2)) def.friction = take_number(in, 0, 2);
     if (take_choice(in, 4) == 3) def.restitution = take_number(in, 0, 1);
     if (take_rarely(in, 16)) def.category = take_byte(in);
+    def.sensor = def.category % 4 == 3 && def.type != SADMM_SHAPE_MESH;
     if (take_rarely(in, 16)) def.mask = take_byte(in);
     return def;
 }
@@ -486,6 +488,21 @@ static sadmm_status freeze(struct machine *m)
     return SADMM_OK;
 }
 
+/* As many as there were, one at a time or all at once; whatever the ring has lost. */
+static sadmm_status take_events(struct machine *m, int32_t room)
+{
+    sadmm_event events[8];
+    int32_t count = -1;
+    const int32_t waiting = sadmm_world_event_count(m->world);
+    const sadmm_status status = sadmm_world_take_events(m->world, room < 8 ? room : 8, events, &count, NULL);
+    if (status != SADMM_OK) return status;
+    MUST(count == (room < waiting ? room : waiting) || count == 8, "%d of %d events taken, for %d", count, waiting, room);
+    for (int32_t k = 0; k < count; ++k)
+        MUST((int)events[k].type >= 0 && events[k].type < SADMM_EVENT_TYPE_COUNT && events[k].shape_b.slot > 0 &&
+                 (k == 0 || events[k].step >= events[k - 1].step), "event %d makes no sense", k);
+    return SADMM_OK;
+}
+
 static sadmm_status read_something(struct machine *m)
 {
     int32_t at = take_choice(&m->in, 12) - 2;
@@ -493,13 +510,17 @@ static sadmm_status read_something(struct machine *m)
     sadmm_shape_id shape;
     double wrench[6];
     char text[32];
+    int32_t count;
     size_t size;
-    switch (take_choice(&m->in, 6)) {
+    switch (take_choice(&m->in, 9)) {
     case 0: return sadmm_world_body_at(m->world, at, &body);
     case 1: return sadmm_world_shape_at(m->world, at, take_rarely(&m->in, 8) ? NULL : &shape);
     case 2: return sadmm_world_contacts(m->world, at, take_choice(&m->in, 8) - 1, at == 3 ? NULL : m->contacts);
     case 3: return sadmm_world_body_contact_wrench(m->world, take_body(m), wrench);
     case 4: return sadmm_world_body_state(m->world, take_body(m), NULL);
+    case 5: return sadmm_world_record_events(m->world, at);
+    case 6: return take_events(m, at);
+    case 7: return sadmm_world_sensor_overlaps(m->world, take_shape(m), at > 0 ? 1 : at, &shape, &count);
     default:
         size = (size_t)take_choice(&m->in, sizeof text + 1);
         sadmm_world_explain(m->world, size ? text : NULL, size);

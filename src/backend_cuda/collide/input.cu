@@ -68,7 +68,7 @@ static sadmm_status measure_candidates(struct sadmm_cuda_collision *c, const str
     v->mesh_count = 0;
     c->smooth = false;
     for (size_t slot = 0; slot < input->shape_count; ++slot) {
-        if (!input->shapes[slot].alive) continue;
+        if (!sadmm_shape_collides(&input->shapes[slot])) continue;
         TRY(sadmm_collision_check_shape(input, slot, error));
         const struct sadmm_geometry &geometry = geometry_of(input, slot);
         c->smooth |= geometry_is_smooth(&geometry) != 0;
@@ -100,12 +100,12 @@ static sadmm_status list_shapes(struct sadmm_cuda_collision *c, const struct sad
         !sadmm_grow_empty(&c->radii, &c->radius_capacity, input->shape_count, sizeof *c->radii))
         return sadmm_fail_memory(error, "collision's list of shapes");
     for (size_t slot = 0; slot < input->shape_count; ++slot) {
-        if (!input->shapes[slot].alive || geometry_of(input, slot).type == SADMM_SHAPE_PLANE) continue;
+        if (!sadmm_shape_collides(&input->shapes[slot]) || geometry_of(input, slot).type == SADMM_SHAPE_PLANE) continue;
         c->radii[leaves] = geometry_radius(&geometry_of(input, slot));
         c->present[leaves++] = (uint32_t)slot;
     }
     for (size_t slot = 0; slot < input->shape_count; ++slot)
-        if (input->shapes[slot].alive && geometry_of(input, slot).type == SADMM_SHAPE_PLANE)
+        if (sadmm_shape_collides(&input->shapes[slot]) && geometry_of(input, slot).type == SADMM_SHAPE_PLANE)
             c->present[leaves + planes++] = (uint32_t)slot;
     if (!sadmm_grow_empty(&c->planes, &c->plane_capacity, planes, sizeof *c->planes))
         return sadmm_fail_memory(error, "collision's list of planes");

@@ -143,7 +143,8 @@ extern "C" sadmm_status CUDA(load_world)(struct sadmm_context *c, const struct s
 
     c->bounces = false;
     for (size_t k = 0; k < world->input->shape_count; ++k)
-        c->bounces = c->bounces || (world->input->shapes[k].alive && world->input->shapes[k].restitution > 0);
+        c->bounces = c->bounces ||
+                     (sadmm_shape_collides(&world->input->shapes[k]) && world->input->shapes[k].restitution > 0);
     c->plan.gyroscopic = sadmm_plan_is_gyroscopic(world->rigid, world->body_count);
     /* The state before the first step is the one that is not written by it. */
     TRY(COLLISION(upload)(s->collision, c->stream, world->contacts, error));

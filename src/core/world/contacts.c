@@ -19,19 +19,6 @@ int32_t sadmm_world_contact_count(sadmm_world *world)
     return readable_contacts(world);
 }
 
-static sadmm_shape_id shape_id(const sadmm_world *world, int32_t slot)
-{
-    sadmm_shape_id id = {(uint32_t)slot + 1, world->shape_generations[slot]};
-    return id;
-}
-
-static sadmm_body_id body_of(const sadmm_world *world, int32_t shape)
-{
-    int32_t slot = world->shapes[shape].body;
-    sadmm_body_id id = {(uint32_t)slot + 1, world->bodies[slot].generation};
-    return id;
-}
-
 /* Pairs are in point order: the pair of a point by bisection. */
 static size_t pair_of(const struct sadmm_contact_set *contacts, int32_t point)
 {
@@ -54,22 +41,38 @@ static int32_t triangle_of(const sadmm_world *world, const struct sadmm_contact_
     return source ? source[pair->child] : (int32_t)pair->child;
 }
 
+void sadmm_world_contact_position(const sadmm_world *world, const struct sadmm_contact_pair *pair,
+                                  const struct sadmm_contact_point *point, double position[3])
+{
+    const int32_t body = pair->body_b >= 0 ? pair->body_b : pair->body_a;
+    const double *arm = pair->body_b >= 0 ? point->arm_b : point->arm_a;
+    for (int k = 0; k < 3; ++k) position[k] = world->start.rigid[body].position[k] + arm[k];
+}
+
+double sadmm_world_contact_speed(const sadmm_world *world, const struct sadmm_contact_pair *pair,
+                                 const struct sadmm_contact_point *point)
+{
+    const struct sadmm_system system = {.driven = world->start.driven, .driven_count = world->start.driven_count};
+    vec3 x = sadmm_driven_part(&system, pair, point);
+    if (pair->body_b >= 0) x = v3_add(x, sadmm_velocity_at(world->start.rigid[pair->body_b].velocity, point->arm_b));
+    if (pair->body_a >= 0) x = v3_sub(x, sadmm_velocity_at(world->start.rigid[pair->body_a].velocity, point->arm_a));
+    return -v3_dot(x, v3_load(pair->normal));
+}
+
 static void read_contact(const sadmm_world *world, const struct sadmm_contact_pair *pair, int32_t index,
                          double dt, sadmm_contact *out)
 {
     const struct sadmm_contact_point *point = &world->contacts.points[index];
-    int32_t body = pair->body_b >= 0 ? pair->body_b : pair->body_a;
-    const double *arm = pair->body_b >= 0 ? point->arm_b : point->arm_a;
-    out->shape_a = shape_id(world, pair->shape_a);
-    out->shape_b = shape_id(world, pair->shape_b);
-    out->body_a = body_of(world, pair->shape_a);
-    out->body_b = body_of(world, pair->shape_b);
+    out->shape_a = sadmm_world_shape_id(world, pair->shape_a);
+    out->shape_b = sadmm_world_shape_id(world, pair->shape_b);
+    out->body_a = sadmm_world_body_id(world, world->shapes[pair->shape_a].body);
+    out->body_b = sadmm_world_body_id(world, world->shapes[pair->shape_b].body);
     for (int k = 0; k < 3; ++k) {
-        out->position[k] = world->start.rigid[body].position[k] + arm[k];
         out->normal[k] = pair->normal[k];
         out->impulse[k] = point->impulse[k];
         out->force[k] = point->impulse[k] / dt;
     }
+    sadmm_world_contact_position(world, pair, point, out->position);
     out->gap = point->gap;
     out->friction = pair->friction;
     out->feature = point->feature;

@@ -1,6 +1,16 @@
 /* From an id to the live object it names, and what to call it. */
 #include "world_internal.h"
 
+sadmm_shape_id sadmm_world_shape_id(const sadmm_world *world, int32_t slot)
+{
+    return (sadmm_shape_id){(uint32_t)slot + 1, world->shape_generations[slot]};
+}
+
+sadmm_body_id sadmm_world_body_id(const sadmm_world *world, int32_t slot)
+{
+    return (sadmm_body_id){(uint32_t)slot + 1, world->bodies[slot].generation};
+}
+
 const char *sadmm_world_body_name(const struct sadmm_world_body *body) { return body->name ? body->name : ""; }
 
 struct sadmm_world_body *sadmm_world_find_body(const sadmm_world *world, sadmm_body_id id, const char *argument,

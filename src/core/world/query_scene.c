@@ -10,11 +10,10 @@
 
 /* Shapes for which another thread is worth its while. */
 enum { SHAPES_PER_THREAD = 16384 };
-enum { ALL_BODY_TYPES = 1 << SADMM_BODY_DYNAMIC | 1 << SADMM_BODY_STATIC | 1 << SADMM_BODY_KINEMATIC };
 
 sadmm_query_filter sadmm_query_filter_default(void)
 {
-    sadmm_query_filter filter = {.body_types = ALL_BODY_TYPES, .environment = -1, .from_inside = true};
+    sadmm_query_filter filter = {.body_types = SADMM_ALL_BODY_TYPES, .environment = -1, .from_inside = true};
     return filter;
 }
 
@@ -23,9 +22,9 @@ sadmm_status sadmm_world_take_filter(sadmm_world *world, const sadmm_query_filte
 {
     struct sadmm_error *error = &world->error;
     *given = filter ? *filter : sadmm_query_filter_default();
-    if (given->body_types > ALL_BODY_TYPES)
+    if (given->body_types > SADMM_ALL_BODY_TYPES)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "filter->body_types = %u: must be in [0, %d]",
-                          given->body_types, ALL_BODY_TYPES);
+                          given->body_types, SADMM_ALL_BODY_TYPES);
     if (given->environment < -1)
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "filter->environment = %d: must be >= -1",
                           given->environment);
@@ -33,7 +32,8 @@ sadmm_status sadmm_world_take_filter(sadmm_world *world, const sadmm_query_filte
                                          .ignored = -1,
                                          .environment = given->environment,
                                          .category = given->category,
-                                         .mask = given->mask};
+                                         .mask = given->mask,
+                                         .sensors = given->sensors};
     if (given->ignored.slot == 0 && given->ignored.generation == 0) return SADMM_OK;
     if (!sadmm_world_find_body(world, given->ignored, "filter->ignored", error)) return SADMM_ERROR_STALE_ID;
     taken->ignored = (int32_t)given->ignored.slot - 1;
@@ -53,6 +53,7 @@ void sadmm_world_place_shape(const sadmm_world *world, uint32_t slot, struct sad
     placed->environment = body->environment;
     placed->category = shape->category;
     placed->mask = shape->mask;
+    placed->sensor = shape->sensor;
     placed->body_type = UINT32_C(1) << body->type;
 }
 

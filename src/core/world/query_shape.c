@@ -42,8 +42,8 @@ static sadmm_status take_shape(sadmm_world *world, const sadmm_shape_def *def, c
 
 /* ---- overlaps ---------------------------------------------------------------------------------------------------- */
 
-static sadmm_status check_room(int32_t capacity, const sadmm_shape_id *shapes, const int32_t *count,
-                               struct sadmm_error *error)
+sadmm_status sadmm_world_check_overlap_room(int32_t capacity, const sadmm_shape_id *shapes, const int32_t *count,
+                                            struct sadmm_error *error)
 {
     TRY(sadmm_check_given(count, "count", error));
     if (capacity < 0) return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "capacity = %d: must be >= 0", capacity);
@@ -69,10 +69,9 @@ static bool overlaps(const struct sadmm_placed *a, const struct sadmm_placed *b)
     return sadmm_closest(a, b, 0, &gap) && gap.distance <= 0;
 }
 
-/* Of what meets the box; shape: NULL: the boxes are all that is asked about. The tree is up to date. */
-static sadmm_status find_overlaps(sadmm_world *world, const struct sadmm_box3 *box, const struct sadmm_placed *shape,
-                                  const struct sadmm_shape_filter *filter, int32_t capacity, sadmm_shape_id *shapes,
-                                  int32_t *count)
+sadmm_status sadmm_world_list_overlaps(sadmm_world *world, const struct sadmm_box3 *box,
+                                       const struct sadmm_placed *shape, const struct sadmm_shape_filter *filter,
+                                       size_t *count)
 {
     const size_t most = (size_t)world->shape_count;
     if (!sadmm_grow_empty(&world->query.slots, &world->query.slot_capacity, most, sizeof *world->query.slots) ||
@@ -81,15 +80,22 @@ static sadmm_status find_overlaps(sadmm_world *world, const struct sadmm_box3 *b
     const struct sadmm_placed *other;
     struct sadmm_query_walk walk = {0};
     size_t found = 0;
+    TRY(sadmm_world_place_shapes(world));
     while ((other = sadmm_query_tree_next(&world->query.tree, box, filter, &walk)))
         if (!shape || overlaps(shape, other)) world->query.slots[found++] = other->slot;
     sadmm_radix_sort(world->query.slots, world->query.spare, found, SLOT_BITS);
+    *count = found;
+    return SADMM_OK;
+}
+
+void sadmm_world_give_overlaps(const sadmm_world *world, size_t found, int32_t capacity, sadmm_shape_id *shapes,
+                               int32_t *count)
+{
     for (size_t i = 0; i < found && i < (size_t)capacity; ++i) {
         shapes[i].slot = (uint32_t)world->query.slots[i] + 1;
         shapes[i].generation = world->shape_generations[world->query.slots[i]];
     }
     *count = (int32_t)found;
-    return SADMM_OK;
 }
 
 sadmm_status sadmm_world_overlap_box(sadmm_world *world, const double lowest[3], const double highest[3],
@@ -101,9 +107,10 @@ sadmm_status sadmm_world_overlap_box(sadmm_world *world, const double lowest[3],
     struct sadmm_shape_filter taken;
     sadmm_query_filter given;
     struct sadmm_box3 box;
+    size_t found;
     TRY(sadmm_check_given(lowest, "lowest", error));
     TRY(sadmm_check_given(highest, "highest", error));
-    TRY(check_room(capacity, shapes, count, error));
+    TRY(sadmm_world_check_overlap_room(capacity, shapes, count, error));
     for (int k = 0; k < 3; ++k) {
         if (!(lowest[k] <= highest[k]))
             return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT, "lowest[%d] = %g: must be <= highest[%d] = %g", k,
@@ -112,8 +119,9 @@ sadmm_status sadmm_world_overlap_box(sadmm_world *world, const double lowest[3],
         box.hi[k] = highest[k];
     }
     TRY(sadmm_world_take_filter(world, filter, &taken, &given));
-    TRY(sadmm_world_place_shapes(world));
-    return find_overlaps(world, &box, NULL, &taken, capacity, shapes, count);
+    TRY(sadmm_world_list_overlaps(world, &box, NULL, &taken, &found));
+    sadmm_world_give_overlaps(world, found, capacity, shapes, count);
+    return SADMM_OK;
 }
 
 sadmm_status sadmm_world_overlap_shape(sadmm_world *world, const sadmm_shape_def *def, const double position[3],
@@ -125,12 +133,14 @@ sadmm_status sadmm_world_overlap_shape(sadmm_world *world, const sadmm_shape_def
     sadmm_query_filter given;
     struct sadmm_placed shape;
     struct sadmm_box3 box;
-    TRY(check_room(capacity, shapes, count, &world->error));
+    size_t found;
+    TRY(sadmm_world_check_overlap_room(capacity, shapes, count, &world->error));
     TRY(sadmm_world_take_filter(world, filter, &taken, &given));
     TRY(take_shape(world, def, position, orientation, &shape));
-    TRY(sadmm_world_place_shapes(world));
     placed_box(&shape, &box);
-    return find_overlaps(world, &box, &shape, &taken, capacity, shapes, count);
+    TRY(sadmm_world_list_overlaps(world, &box, &shape, &taken, &found));
+    sadmm_world_give_overlaps(world, found, capacity, shapes, count);
+    return SADMM_OK;
 }
 
 /* ---- closest points ---------------------------------------------------------------------------------------------- */

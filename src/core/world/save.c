@@ -8,7 +8,7 @@
 #include "save.h"
 
 /* Raised with every change of what is written. */
-enum { FORMAT = 1 };
+enum { FORMAT = 2 };
 
 struct header {
     char magic[8];
@@ -149,6 +149,7 @@ static void exchange(sadmm_world *world, sadmm_world *fresh)
     keep_user_data(fresh, world);
     fresh->def.tasks = world->def.tasks;
     fresh->team = world->team;
+    sadmm_world_hand_events_on(world, fresh);
     if (fresh->kernels && fresh->kernels == world->kernels && fresh->def.device == world->def.device) {
         fresh->context = world->context;
         world->context = NULL;

@@ -236,7 +236,8 @@ static struct kept_shape keep_shape(const sadmm_world *world, size_t slot, const
                                       .friction = shape->friction,
                                       .restitution = shape->restitution,
                                       .category = shape->category,
-                                      .mask = shape->mask},
+                                      .mask = shape->mask,
+                                      .sensor = shape->sensor},
                               .revision = shape->revision,
                               .body = shape->body};
     const bool owned = has_owner(world, slot);
@@ -299,6 +300,7 @@ static void archive_shape(struct sadmm_archive *archive, sadmm_world *world, siz
     SADMM_ARCHIVE(archive, kept.def.restitution);
     SADMM_ARCHIVE(archive, kept.def.category);
     SADMM_ARCHIVE(archive, kept.def.mask);
+    sadmm_archive_flag(archive, &kept.def.sensor);
     SADMM_ARCHIVE(archive, kept.owner);
     SADMM_ARCHIVE(archive, kept.position);
     SADMM_ARCHIVE(archive, kept.orientation);

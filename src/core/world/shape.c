@@ -46,6 +46,10 @@ static sadmm_status check_def(const struct sadmm_world_body *body, const sadmm_s
                                                [SADMM_BODY_STATIC] = SADMM_MOTION_NONE,
                                                [SADMM_BODY_KINEMATIC] = SADMM_MOTION_DRIVEN};
     TRY(sadmm_geometry_check(&geometry, motion[body->type], "def->", error));
+    if (def->sensor && def->type == SADMM_SHAPE_MESH)
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "def->sensor = true: must be false where def->type is %d, a mesh, which has no inside",
+                          (int)def->type);
     return check_material("def->", def->friction, def->restitution, error);
 }
 
@@ -112,10 +116,12 @@ sadmm_status sadmm_world_put_shape(sadmm_world *world, size_t slot, int32_t body
     shape->restitution = def->restitution;
     shape->category = def->category;
     shape->mask = def->mask;
+    shape->sensor = def->sensor;
     shape->body = body_slot;
     shape->alive = true;
     shape->revision = ++world->shape_revisions;
     ++world->shape_count;
+    world->sensor_count += def->sensor;
     sadmm_world_reshaped(world);
     if (body->shape_count++ == 0 || slot < body->first_shape) body->first_shape = slot;
     return SADMM_OK;
@@ -173,6 +179,7 @@ void sadmm_world_kill_shape(sadmm_world *world, size_t slot)
     sadmm_world_reshaped(world);
     ++world->shape_generations[slot];
     --world->shape_count;
+    world->sensor_count -= world->shapes[slot].sensor;
     --world->bodies[world->shapes[slot].body].shape_count;
     sadmm_slot_freed(&world->shape_marks, slot);
     sadmm_pair_table_forget(&world->friction_pairs, (uint32_t)slot);
@@ -244,6 +251,7 @@ sadmm_status sadmm_world_shape_def(sadmm_world *world, sadmm_shape_id id, sadmm_
     def->restitution = shape->restitution;
     def->category = shape->category;
     def->mask = shape->mask;
+    def->sensor = shape->sensor;
     if (body) {
         body->slot = (uint32_t)shape->body + 1;
         body->generation = world->bodies[shape->body].generation;

@@ -309,12 +309,14 @@ sadmm_status sadmm_world_step(sadmm_world *world)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     TRY(sadmm_world_choose_backend(world));
-    return sadmm_world_may_reside(world) ? sadmm_world_resident_step(world, true) : host_step(world);
+    TRY(sadmm_world_may_reside(world) ? sadmm_world_resident_step(world, true) : host_step(world));
+    return sadmm_world_note_events(world);
 }
 
 sadmm_status sadmm_world_step_async(sadmm_world *world)
 {
     TRY(sadmm_check_given(world, "world", NULL));
+    if (world->events.capacity > 0) return sadmm_world_step(world);
     TRY(sadmm_world_choose_backend(world));
     return sadmm_world_may_reside(world) ? sadmm_world_resident_step(world, false) : host_step(world);
 }

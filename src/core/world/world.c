@@ -64,6 +64,7 @@ void sadmm_world_destroy(sadmm_world *world)
     sadmm_world_free_tables(world);
     sadmm_block_pool_free(&world->block_pool);
     sadmm_query_tree_free(&world->query.tree);
+    sadmm_world_free_events(world);
     void *blocks[] = {world->bodies, world->shapes, world->shape_generations, world->geometries, world->block_shapes,
                       world->disabled_pairs.keys, world->disabled_pairs.values, world->joined_pairs.keys,
                       world->joined_pairs.values, world->filtered_pairs, world->joints, world->couplings, world->gears,

@@ -11,6 +11,7 @@
  *   shape_form, shape, mass, joint, coupling, gear, body, contacts,
  *   query_ray, query_shape, explain  what callers see of it, and change
  *   arrays                           the same, of many at once
+ *   sensor, events                   what sensors see; what begins and ends
  *   step, world                      steps; settings, the whole
  */
 #ifndef SADMM_CORE_WORLD_INTERNAL_H
@@ -33,6 +34,7 @@
 #include "slots.h"
 #include "subadmm/arrays.h"
 #include "subadmm/coupling.h"
+#include "subadmm/events.h"
 #include "subadmm/gear.h"
 #include "subadmm/joint.h"
 #include "subadmm/query.h"
@@ -127,6 +129,19 @@ struct sadmm_step_start {
     size_t driven_capacity, rigid_capacity, velocity_capacity, impulse_capacity, multiplier_capacity;
 };
 
+/* Two shapes that touch, or a sensor and what it sees. */
+struct sadmm_touch {
+    sadmm_shape_id a, b;
+    sadmm_body_id body_a, body_b;
+    size_t pair; /* the first one of theirs in the step's contacts */
+};
+
+/* By slots of a, then of b. */
+struct sadmm_touches {
+    struct sadmm_touch *list;
+    size_t count, capacity;
+};
+
 struct sadmm_world {
     sadmm_world_def def; /* settings inside are the current ones */
     struct sadmm_error error;
@@ -141,7 +156,7 @@ struct sadmm_world {
     uint32_t *shape_generations;
     struct sadmm_geometry *geometries; /* every shape has one of its own, by the number of its slot */
     size_t shape_slots, shape_capacity, shape_generation_capacity, geometry_capacity;
-    int32_t shape_count;
+    int32_t shape_count, sensor_count; /* sensors: of these */
     struct sadmm_slot_marks shape_marks;
     uint32_t shape_revisions;
     struct sadmm_block_pool block_pool;
@@ -232,6 +247,16 @@ struct sadmm_world {
         uint64_t *slots, *spare;      /* of an overlap */
         size_t hit_capacity, slot_capacity, spare_capacity;
     } query;
+
+    /* What has begun and ended (events.c). */
+    struct {
+        sadmm_event *waiting; /* (capacity) a ring, `count` from `first` on */
+        int32_t capacity;     /* 0: nothing is recorded */
+        int32_t first, count;
+        int64_t dropped;
+        struct sadmm_touches touching, inside;         /* contacts, sensors, of the last step recorded */
+        struct sadmm_touches touching_now, inside_now; /* of the step at hand */
+    } events;
 
     const struct sadmm_kernels *kernels; /* chosen at the first step */
     struct sadmm_context *context;
@@ -346,6 +371,8 @@ void sadmm_world_settle_quietly(sadmm_world *world);
 /* Bring the bodies (or contacts and everything else) of the last step back, where the backend is ahead. */
 sadmm_status sadmm_world_pull_bodies(sadmm_world *world);
 sadmm_status sadmm_world_pull_contacts(sadmm_world *world);
+/* The contacts alone: all but their positions can be read then. */
+sadmm_status sadmm_world_pull_points(sadmm_world *world);
 sadmm_status sadmm_world_pull_joints(sadmm_world *world);
 /* All of it, and from here on the host's world is the one that counts: before anything but a state or a wrench is
  * changed. */
@@ -377,6 +404,7 @@ sadmm_status sadmm_world_read_rows(sadmm_world *world);
 /* Bodies have moved; shapes have come or gone. */
 static inline void sadmm_world_moved(sadmm_world *world) { world->query.current = false; }
 static inline void sadmm_world_reshaped(sadmm_world *world) { world->query.listed = world->query.current = false; }
+enum { SADMM_ALL_BODY_TYPES = 1 << SADMM_BODY_DYNAMIC | 1 << SADMM_BODY_STATIC | 1 << SADMM_BODY_KINEMATIC };
 /* The bodies of the last step, and what queries need besides: before shapes are placed. */
 sadmm_status sadmm_world_begin_query(sadmm_world *world);
 /* A shape where it is. */
@@ -387,7 +415,46 @@ sadmm_status sadmm_world_place_shapes(sadmm_world *world);
 sadmm_status sadmm_world_take_filter(sadmm_world *world, const sadmm_query_filter *filter,
                                      struct sadmm_shape_filter *taken, sadmm_query_filter *given);
 
+/* ---- query_shape.c ---- */
+
+/* What meets a box (shape: NULL), or overlaps a shape in that box: its slots into query.slots, ascending. The tree is
+ * brought up to date. */
+sadmm_status sadmm_world_list_overlaps(sadmm_world *world, const struct sadmm_box3 *box,
+                                       const struct sadmm_placed *shape, const struct sadmm_shape_filter *filter,
+                                       size_t *count);
+/* To the caller, who has room for `capacity` of them. */
+sadmm_status sadmm_world_check_overlap_room(int32_t capacity, const sadmm_shape_id *shapes, const int32_t *count,
+                                            struct sadmm_error *error);
+void sadmm_world_give_overlaps(const sadmm_world *world, size_t found, int32_t capacity, sadmm_shape_id *shapes,
+                               int32_t *count);
+
+/* ---- contacts.c ---- */
+
+/* A point of the last step: where sadmm_contact says it is. */
+void sadmm_world_contact_position(const sadmm_world *world, const struct sadmm_contact_pair *pair,
+                                  const struct sadmm_contact_point *point, double position[3]);
+
+/* How fast the surfaces come closer there before the step, m/s. */
+double sadmm_world_contact_speed(const sadmm_world *world, const struct sadmm_contact_pair *pair,
+                                 const struct sadmm_contact_point *point);
+
+/* ---- sensor.c ---- */
+
+/* What the sensor in a slot sees: its slots into query.slots, ascending. */
+sadmm_status sadmm_world_list_seen(sadmm_world *world, size_t slot, size_t *count);
+
+/* ---- events.c ---- */
+
+/* A step has been made: what has begun and ended in it. */
+sadmm_status sadmm_world_note_events(sadmm_world *world);
+/* Recording goes on in a world that has been restored, which has none of its own. */
+void sadmm_world_hand_events_on(sadmm_world *from, sadmm_world *to);
+void sadmm_world_free_events(sadmm_world *world);
+
 /* ---- ids.c ---- */
+
+sadmm_shape_id sadmm_world_shape_id(const sadmm_world *world, int32_t slot);
+sadmm_body_id sadmm_world_body_id(const sadmm_world *world, int32_t slot);
 
 /* "" where it has none. */
 const char *sadmm_world_body_name(const struct sadmm_world_body *body);

@@ -1,0 +1,3 @@
+/* Events and sensors on the CUDA backend. */
+#define BODIES_ON_CUDA
+#include "test_events.c"
