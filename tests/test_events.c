@@ -430,6 +430,9 @@ START_TEST(restored_begins_anew)
     static struct pairs told, seen;
     sadmm_world *world = heap(_i, 1, true);
     size_t size;
+#ifdef BODIES_ON_CUDA
+    world->def.backend = SADMM_BACKEND_AUTO; /* it was made for the CPU, and given the device's kernels */
+#endif
     MUST(world, sadmm_world_record_events(world, MOST));
     step_world(world, 60);
     MUST(world, sadmm_world_save(world, NULL, 0, &size));
@@ -527,6 +530,10 @@ int main(void)
 {
     Suite *suite = suite_create("events");
     TCase *tcase = tcase_create("events");
+    tcase_set_timeout(tcase, 600);
+#ifdef BODIES_ON_CUDA
+    if (!find_cuda_tables(tables)) return TEST_SKIPPED;
+#endif
     tcase_add_loop_test(tcase, ball_bounces, 0, SOLVERS);
     tcase_add_loop_test(tcase, rests_and_goes, 0, SOLVERS);
     tcase_add_loop_test(tcase, heap_is_followed, 0, SOLVERS);

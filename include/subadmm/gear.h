@@ -7,9 +7,12 @@
  * (the translation and the rotation of one cylindrical joint; ratio = -pitch / 2 pi).
  *
  * A gear gives force along q_1 and ratio force along q_2, each as the joint's own laws do: between the joint's two
- * bodies. A row of the solver joins two bodies, so that no more than two of those that the joints are between may be
- * dynamic: gears have their axles on the static world, on kinematic bodies, or on one another. (Wheels on an axle
- * carrier that is dynamic, as in planetary gears, are refused.) Angles count on beyond full turns, and errors of the
+ * bodies. Where three of these are dynamic, one must be of both joints: the carrier of two wheels, as a hand is of two
+ * fingers, or the middle one of a chain. There the gear's force acts between the outer two, as that of teeth does, and
+ * the joints' own forces bear the carrier. That needs axes of which a force between the outer two can turn both: not one
+ * that is common to both joints, nor two translations in the same direction; such a gear is refused, and one that comes
+ * to be so rests until it is no more. (Two slides that face each other, on a hand that moves, take a wheel in between: a
+ * body on a hinge, with two gears.) Angles count on beyond full turns, and errors of the
  * ratio do not add up: they are fed back as those of locked coordinates. Method: docs/algorithm.md, section 10.
  *
  * Worlds with gears are stepped by the host on every backend. Threads and errors: as world.h says. Ids are values with
@@ -40,8 +43,8 @@ SADMM_API sadmm_gear_def sadmm_gear_def_default(void);
 
 /* *id: the new gear, until it, or one of its joints or their bodies, is removed. An offset that does not fit is drawn
  * in by at most settings.correction_speed of coordinate 1. Errors: STALE_ID, INVALID_ARGUMENT (range; a coordinate that
- * is not free, twice the same one, more than two dynamic bodies; nothing changes), LIMIT (2^24 gears), OUT_OF_MEMORY,
- * DEVICE. */
+ * is not free, twice the same one, other dynamic bodies or axes than named above; nothing changes), LIMIT (2^24
+ * gears), OUT_OF_MEMORY, DEVICE. */
 SADMM_API sadmm_status sadmm_world_add_gear(sadmm_world *world, const sadmm_gear_def *def,
                                             sadmm_gear_id *id /* may be NULL */);
 /* Errors: STALE_ID, DEVICE. */

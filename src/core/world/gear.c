@@ -27,16 +27,19 @@ static sadmm_status check_coordinate(const sadmm_joint_def *joint, const char *n
                       name, k, joint->locks);
 }
 
-/* Dynamic bodies that the two joints are between. */
-static int count_bodies(const sadmm_world *world, const struct sadmm_world_joint *const joints[2])
+/* Dynamic bodies that the two joints are between; *shared: how many of them are of both. */
+static int count_bodies(const sadmm_world *world, const struct sadmm_world_joint *const joints[2], int *shared)
 {
     int32_t bodies[4];
     int count = 0;
+    *shared = 0;
     for (int i = 0; i < 4; ++i) {
         const int32_t body = joints[i / 2]->body[i % 2];
-        bool known = body < 0 || world->bodies[body].type != SADMM_BODY_DYNAMIC;
-        for (int j = 0; j < count; ++j) known = known || bodies[j] == body;
-        if (!known) bodies[count++] = body;
+        if (body < 0 || world->bodies[body].type != SADMM_BODY_DYNAMIC) continue;
+        int j = 0;
+        while (j < count && bodies[j] != body) ++j;
+        *shared += j < count;
+        if (j == count) bodies[count++] = body;
     }
     return count;
 }
@@ -57,11 +60,12 @@ sadmm_status sadmm_world_check_gear(const sadmm_world *world, const sadmm_gear_d
                           def->ratio, RATIO_LEAST, RATIO_MOST);
     if (!isnan(def->offset))
         TRY(sadmm_check_range("def->offset (or NaN: as it is)", def->offset, -OFFSET_LIMIT, OFFSET_LIMIT, error));
-    const int bodies = count_bodies(world, joints);
-    if (bodies > 2)
+    int shared;
+    const int bodies = count_bodies(world, joints, &shared);
+    if (bodies > 3 || (bodies == 3 && shared == 0))
         return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "def->joint_1, def->joint_2: between %d dynamic bodies, must be 2 at most (what carries the "
-                          "axles must not be)", bodies);
+                          "def->joint_1, def->joint_2: between %d dynamic bodies, must be 2 at most, or 3 of which one is "
+                          "of both joints", bodies);
     return SADMM_OK;
 }
 
@@ -89,6 +93,10 @@ sadmm_status sadmm_world_add_gear(sadmm_world *world, const sadmm_gear_def *def,
     made.def = *def;
     made.joint[0] = def->joint_1.slot - 1;
     made.joint[1] = def->joint_2.slot - 1;
+    if (!sadmm_world_gear_reaches(world, &made))
+        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "def->joint_1, def->joint_2: on a dynamic body, with the same axis or the same direction: no force "
+                          "between the other two bodies moves both (a wheel in between, with two gears, does)");
     if (isnan(def->offset)) TRY(measure(world, def, &made.def.offset));
     size_t slot = world->gear_slots;
     if ((size_t)world->gear_count < slot) slot = sadmm_slot_free(&world->gear_marks, world, alive);

@@ -114,6 +114,7 @@ struct sadmm_world_gear {
     uint32_t generation;
     sadmm_gear_def def;
     size_t joint[2]; /* slots */
+    bool acts;       /* it has a row in the (sub-)step at hand */
     struct { double force; } last, next; /* along the first coordinate, of the last step and of the one at hand */
 };
 
@@ -316,6 +317,8 @@ void sadmm_world_commit_couplings(sadmm_world *world, int substeps);
 /* ---- gear_rows.c ---- */
 
 void sadmm_world_begin_gears(sadmm_world *world);
+/* Can it turn its wheels where they are? Asked of one whose joints are among up to three dynamic bodies. */
+bool sadmm_world_gear_reaches(const sadmm_world *world, const struct sadmm_world_gear *gear);
 /* After those of joints. */
 sadmm_status sadmm_world_make_gear_rows(sadmm_world *world, const sadmm_settings *settings);
 void sadmm_world_keep_gear_rows(sadmm_world *world, double dt);
