@@ -24,6 +24,10 @@ sadmm_status COLLISION(find)(struct sadmm_cuda_collision *collision, void *strea
 sadmm_status COLLISION(download)(struct sadmm_cuda_collision *collision, void *stream,
                                  struct sadmm_contact_set *contacts, struct sadmm_error *error);
 
+/* Which pairs of the current set touch: one entry each, in the set's order, for which there is room. */
+sadmm_status COLLISION(touching)(struct sadmm_cuda_collision *collision, void *stream,
+                                 struct sadmm_touching_shapes *touching, struct sadmm_error *error);
+
 /* ---- for steps that are enqueued: no host in between ---- */
 
 /* Take what a find takes from the host, once; `bodies` (by body slot) will be on the device, written before each

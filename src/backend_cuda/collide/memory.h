@@ -19,10 +19,11 @@ enum buffer_name {
     COUNTER, GRID, CANDIDATES, CANDIDATES_2, LISTED, MESH_PAIRS, TOUCHES, MANIFOLDS, MATCHES, SIZES, PLACES, TEMP, BOXES, REACHES, PAIR_OF,
     PAIRS, POINTS, PAIR_KEYS, COUNTS, PAIRS_2, POINTS_2, PAIR_KEYS_2, COUNTS_2, PAIRS_3, POINTS_3, PAIR_KEYS_3,
     COUNTS_3,
+    TOUCHING,
     SHAPES, GEOMETRIES, HULLS, BODIES, PRESENT, PLANES, DISABLED_PAIRS, FRICTION_PAIRS, FRICTION_VALUES,
     /* pinned: first what was uploaded to the last buffers above, in their order */
     PINNED_SHAPES, PINNED_GEOMETRIES, PINNED_HULLS, PINNED_BODIES, PINNED_PRESENT, PINNED_PLANES, PINNED_DISABLED_PAIRS,
-    PINNED_FRICTION_PAIRS, PINNED_FRICTION_VALUES, PINNED_PAIRS, PINNED_POINTS, PINNED_PAIR_KEYS, PINNED_COUNTS,
+    PINNED_FRICTION_PAIRS, PINNED_FRICTION_VALUES, PINNED_PAIRS, PINNED_POINTS, PINNED_PAIR_KEYS, PINNED_COUNTS, PINNED_TOUCHING,
     BUFFERS
 };
 enum { SET_BUFFERS = COUNTS_2 - COUNTS, INPUTS = PINNED_SHAPES - SHAPES };
@@ -35,11 +36,12 @@ static const char *const buffer_names[BUFFERS] = {
     "contact pairs", "contact points", "contact keys", "contact counts",
     "contact pairs", "contact points", "contact keys", "contact counts",
     "contact pairs", "contact points", "contact keys", "contact counts",
+    "touching pairs",
     "shapes", "geometries", "hulls", "bodies", "list of shapes", "planes", "disabled pairs", "friction pairs", "friction values",
     "staged shapes", "staged geometries", "staged hulls", "staged bodies", "staged list of shapes", "staged planes",
     "staged disabled pairs",
     "staged friction pairs", "staged friction values", "staged contact pairs", "staged contact points",
-    "staged contact keys", "staged contact counts",
+    "staged contact keys", "staged contact counts", "staged touching pairs",
 };
 
 /* As on the host: contact points are indexed by 32 bits. */

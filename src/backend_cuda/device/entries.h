@@ -53,6 +53,7 @@ sadmm_status CUDA(wait_world)(struct sadmm_context *, struct sadmm_resident_repo
 sadmm_status CUDA(read_bodies)(struct sadmm_context *, struct sadmm_rigid *, struct sadmm_steady *, double *wrench,
                                struct sadmm_error *);
 sadmm_status CUDA(read_contacts)(struct sadmm_context *, struct sadmm_contact_set *, struct sadmm_error *);
+sadmm_status CUDA(read_touching)(struct sadmm_context *, struct sadmm_touching_shapes *, struct sadmm_error *);
 sadmm_status CUDA(view_world)(struct sadmm_context *, struct sadmm_resident_view *, struct sadmm_error *);
 sadmm_status CUDA(read_start)(struct sadmm_context *, struct sadmm_rigid *, double *velocity, double *impulse,
                               struct sadmm_error *);

@@ -78,6 +78,12 @@ extern "C" sadmm_status CUDA(read_contacts)(struct sadmm_context *c, struct sadm
     return COLLISION(download)(c->step->collision, c->stream, contacts, error);
 }
 
+extern "C" sadmm_status CUDA(read_touching)(struct sadmm_context *c, struct sadmm_touching_shapes *touching,
+                                            struct sadmm_error *error)
+{
+    return COLLISION(touching)(c->step->collision, c->stream, touching, error);
+}
+
 extern "C" sadmm_status CUDA(read_start)(struct sadmm_context *c, struct sadmm_rigid *rigid, double *velocity,
                                          double *impulse, struct sadmm_error *error)
 {

@@ -33,6 +33,7 @@
             .read_bodies = sadmm_cuda_read_bodies##suffix,     \
             .view = sadmm_cuda_view_world##suffix,             \
             .read_contacts = sadmm_cuda_read_contacts##suffix, \
+            .read_touching = sadmm_cuda_read_touching##suffix, \
             .read_start = sadmm_cuda_read_start##suffix,       \
             .read_joints = sadmm_cuda_read_joints##suffix,     \
             .read_rows = sadmm_cuda_read_rows##suffix,         \

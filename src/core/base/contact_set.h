@@ -45,6 +45,30 @@ struct sadmm_contact_point {
     uint32_t reserved;
 };
 
+/* The shapes of a pair that touches; of one that does not, -1 both. */
+struct sadmm_touching_shapes {
+    int32_t a, b;
+};
+
+/* A pair touches if one of its points carries an impulse, or has a gap of 0 or less. `points`: its own. */
+SADMM_INLINE double sadmm_normal_impulse(const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *point)
+{
+    return pair->normal[0] * point->impulse[0] + pair->normal[1] * point->impulse[1] +
+           pair->normal[2] * point->impulse[2];
+}
+SADMM_INLINE struct sadmm_touching_shapes sadmm_touching_of(const struct sadmm_contact_pair *pair,
+                                                            const struct sadmm_contact_point *points)
+{
+    struct sadmm_touching_shapes out = {-1, -1};
+    int32_t k;
+    for (k = 0; k < pair->count; ++k)
+        if (points[k].gap <= 0 || sadmm_normal_impulse(pair, &points[k]) > 0) {
+            out.a = pair->shape_a;
+            out.b = pair->shape_b;
+        }
+    return out;
+}
+
 /* A contact set that grows. Order: pairs by (shape_a, shape_b, child), points in pair order: point index = contact
  * index. */
 struct sadmm_contact_set {

@@ -104,6 +104,9 @@ struct sadmm_resident_kernels {
     sadmm_status (*view)(struct sadmm_context *, struct sadmm_resident_view *, struct sadmm_error *);
     /* Contacts of the last step done, with its impulses. Nothing may be enqueued. */
     sadmm_status (*read_contacts)(struct sadmm_context *, struct sadmm_contact_set *contacts, struct sadmm_error *);
+    /* Which pairs of the last step done touch (base/contact_set.h): as many as its report has pairs, in the order of
+     * read_contacts. Nothing may be enqueued. */
+    sadmm_status (*read_touching)(struct sadmm_context *, struct sadmm_touching_shapes *, struct sadmm_error *);
     /* What the last step done started from: bodies, velocities (bodies x 6, m/s and rad/s) and impulses (points x 3, N
      * s); any pointer may be NULL. Nothing may be enqueued. */
     sadmm_status (*read_start)(struct sadmm_context *, struct sadmm_rigid *rigid, double *velocity, double *impulse,

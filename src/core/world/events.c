@@ -95,41 +95,32 @@ static bool add(sadmm_world *world, struct sadmm_touches *touches, int32_t a, in
     return true;
 }
 
-static double normal_impulse(const struct sadmm_contact_pair *pair, const struct sadmm_contact_point *point)
+/* The pairs of the step's contacts, which of them touch: from where the contacts are. */
+static sadmm_status list_pairs(sadmm_world *world, size_t *count)
 {
-    return pair->normal[0] * point->impulse[0] + pair->normal[1] * point->impulse[1] +
-           pair->normal[2] * point->impulse[2];
-}
-
-static bool touches(const struct sadmm_contact_set *contacts, const struct sadmm_contact_pair *pair)
-{
-    for (int32_t k = pair->first; k < pair->first + pair->count; ++k)
-        if (contacts->points[k].gap <= 0 || normal_impulse(pair, &contacts->points[k]) > 0) return true;
-    return false;
-}
-
-/* Two shapes may have several pairs, one after the other. */
-static size_t next_shapes(const struct sadmm_contact_set *contacts, size_t p)
-{
-    const struct sadmm_contact_pair *pair = &contacts->pairs[p];
-    while (p < contacts->pair_count && contacts->pairs[p].shape_a == pair->shape_a &&
-           contacts->pairs[p].shape_b == pair->shape_b)
-        ++p;
-    return p;
+    const struct sadmm_contact_set *contacts = &world->contacts;
+    const bool behind = world->resident.contacts_behind;
+    *count = behind ? (size_t)world->report.pairs : contacts->pair_count;
+    if (!sadmm_grow_empty(&world->events.pairs, &world->events.pair_capacity, *count, sizeof *world->events.pairs))
+        return sadmm_fail_memory(&world->error, "events");
+    if (behind) return sadmm_world_read_touching(world, world->events.pairs);
+    for (size_t p = 0; p < *count; ++p)
+        world->events.pairs[p] = sadmm_touching_of(&contacts->pairs[p], contacts->points + contacts->pairs[p].first);
+    return SADMM_OK;
 }
 
 static sadmm_status list_touching(sadmm_world *world)
 {
-    const struct sadmm_contact_set *contacts = &world->contacts;
-    world->events.touching_now.count = 0;
-    TRY(sadmm_world_pull_points(world));
-    for (size_t first = 0, last; first < contacts->pair_count; first = last) {
-        bool any = false;
-        last = next_shapes(contacts, first);
-        for (size_t p = first; p < last && !any; ++p) any = touches(contacts, &contacts->pairs[p]);
-        const struct sadmm_contact_pair *pair = &contacts->pairs[first];
-        if (any && !add(world, &world->events.touching_now, pair->shape_a, pair->shape_b, first))
-            return sadmm_fail_memory(&world->error, "events");
+    struct sadmm_touches *touching = &world->events.touching_now;
+    size_t count;
+    touching->count = 0;
+    TRY(list_pairs(world, &count));
+    for (size_t p = 0; p < count; ++p) {
+        const struct sadmm_touching_shapes shapes = world->events.pairs[p];
+        const struct sadmm_touch *last = touching->count > 0 ? &touching->list[touching->count - 1] : NULL;
+        if (shapes.a < 0 || (last && last->a.slot == (uint32_t)shapes.a + 1 && last->b.slot == (uint32_t)shapes.b + 1))
+            continue; /* two shapes may have several pairs, one after the other */
+        if (!add(world, touching, shapes.a, shapes.b, p)) return sadmm_fail_memory(&world->error, "events");
     }
     return SADMM_OK;
 }
@@ -151,19 +142,27 @@ static sadmm_status list_inside(sadmm_world *world)
 
 /* ---- the comparison ---------------------------------------------------------------------------------------------- */
 
-/* Where two shapes have begun to touch, and how hard. */
-static void describe(const sadmm_world *world, size_t first, sadmm_event *event)
+static bool same_shapes(const struct sadmm_contact_pair *x, const struct sadmm_contact_pair *y)
+{
+    return x->shape_a == y->shape_a && x->shape_b == y->shape_b;
+}
+
+/* Where two shapes have begun to touch, and how hard. at: one of their pairs. */
+static void describe(const sadmm_world *world, size_t at, sadmm_event *event)
 {
     const struct sadmm_contact_set *contacts = &world->contacts;
+    const struct sadmm_contact_pair *pairs = contacts->pairs;
     const struct sadmm_contact_point *strongest = NULL;
     const struct sadmm_contact_pair *of = NULL;
-    const size_t last = next_shapes(contacts, first);
+    size_t first = at, last = at + 1;
     double most = 0;
+    while (first > 0 && same_shapes(&pairs[first - 1], &pairs[at])) --first;
+    while (last < contacts->pair_count && same_shapes(&pairs[last], &pairs[at])) ++last;
     for (size_t p = first; p < last; ++p) {
-        const struct sadmm_contact_pair *pair = &contacts->pairs[p];
+        const struct sadmm_contact_pair *pair = &pairs[p];
         for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
             const struct sadmm_contact_point *point = &contacts->points[k];
-            const double impulse = normal_impulse(pair, point);
+            const double impulse = sadmm_normal_impulse(pair, point);
             for (int i = 0; i < 3; ++i) event->impulse[i] += point->impulse[i];
             if (strongest && !(impulse > most || (impulse == most && point->gap < strongest->gap))) continue;
             strongest = point;
@@ -257,6 +256,6 @@ void sadmm_world_hand_events_on(sadmm_world *from, sadmm_world *to)
 void sadmm_world_free_events(sadmm_world *world)
 {
     void *blocks[] = {world->events.waiting, world->events.touching.list, world->events.inside.list,
-                      world->events.touching_now.list, world->events.inside_now.list};
+                      world->events.touching_now.list, world->events.inside_now.list, world->events.pairs};
     for (size_t i = 0; i < sizeof blocks / sizeof *blocks; ++i) sadmm_free(blocks[i]);
 }

@@ -290,13 +290,6 @@ static sadmm_status pull_contacts(sadmm_world *world)
     return SADMM_OK;
 }
 
-static sadmm_status pull_points(sadmm_world *world)
-{
-    TRY(settle(world, SADMM_OK));
-    if (!world->resident.contacts_behind) return SADMM_OK;
-    return world->kernels->resident->read_contacts(world->context, &world->contacts, &world->error);
-}
-
 static sadmm_status pull_joints(sadmm_world *world)
 {
     TRY(settle(world, SADMM_OK));
@@ -375,10 +368,10 @@ sadmm_status sadmm_world_pull_contacts(sadmm_world *world)
     return sadmm_world_contain(world, pull_contacts(world));
 }
 
-sadmm_status sadmm_world_pull_points(sadmm_world *world)
+sadmm_status sadmm_world_read_touching(sadmm_world *world, struct sadmm_touching_shapes *touching)
 {
-    TRY(take_failed(world));
-    return sadmm_world_contain(world, pull_points(world));
+    return sadmm_world_contain(world,
+                               world->kernels->resident->read_touching(world->context, touching, &world->error));
 }
 
 sadmm_status sadmm_world_pull_joints(sadmm_world *world)

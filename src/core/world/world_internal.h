@@ -134,7 +134,7 @@ struct sadmm_step_start {
 struct sadmm_touch {
     sadmm_shape_id a, b;
     sadmm_body_id body_a, body_b;
-    size_t pair; /* the first one of theirs in the step's contacts */
+    size_t pair; /* one of theirs in the step's contacts */
 };
 
 /* By slots of a, then of b. */
@@ -257,6 +257,8 @@ struct sadmm_world {
         int64_t dropped;
         struct sadmm_touches touching, inside;         /* contacts, sensors, of the last step recorded */
         struct sadmm_touches touching_now, inside_now; /* of the step at hand */
+        struct sadmm_touching_shapes *pairs;           /* of its contacts, which of them touch */
+        size_t pair_capacity;
     } events;
 
     const struct sadmm_kernels *kernels; /* chosen at the first step */
@@ -374,8 +376,9 @@ void sadmm_world_settle_quietly(sadmm_world *world);
 /* Bring the bodies (or contacts and everything else) of the last step back, where the backend is ahead. */
 sadmm_status sadmm_world_pull_bodies(sadmm_world *world);
 sadmm_status sadmm_world_pull_contacts(sadmm_world *world);
-/* The contacts alone: all but their positions can be read then. */
-sadmm_status sadmm_world_pull_points(sadmm_world *world);
+/* Which pairs of the last step touch, where the contacts are behind and no step is running: of every one of the report's
+ * pairs. */
+sadmm_status sadmm_world_read_touching(sadmm_world *world, struct sadmm_touching_shapes *touching);
 sadmm_status sadmm_world_pull_joints(sadmm_world *world);
 /* All of it, and from here on the host's world is the one that counts: before anything but a state or a wrench is
  * changed. */
