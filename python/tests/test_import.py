@@ -538,3 +538,34 @@ def test_a_mesh_without_thickness_is_named():
             <geom name="sheet" type="mesh" mesh="sheet" mass="0"/><geom size=".1" pos="0 0 1"/></worldbody></mujoco>""")
     )
     assert noted(loaded, "geom 'sheet'") and len(loaded.shapes) == 1
+
+
+HAND = """<mujoco><option gravity="0 0 -9.81" timestep=".002"/><worldbody><body name="arm" pos="0 0 1"><joint name="shoulder" type="hinge" axis="0 1 0" pos="-.5 0 0"/>
+  <geom type="box" size=".4 .03 .03" mass="1"/>
+  <body name="hand" pos=".5 0 0"><joint name="wrist" type="hinge" axis="1 0 0"/><geom type="box" size=".05 .05 .02" mass=".5"/>
+   <body name="left" pos=".08 .03 0"><joint name="l" {left}/><geom type="box" size=".03 .005 .005" mass=".02"/></body>
+   <body name="right" pos=".08 -.03 0"><joint name="r" {right}/><geom type="box" size=".03 .005 .005" mass=".02"/></body>
+  </body></body></worldbody>
+  <equality><joint name="tie" joint1="l" joint2="r" polycoef="{polycoef}"/></equality>
+  <actuator><motor name="close" joint="l"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize("left, right, polycoef, wheel", [
+    ('type="slide" axis="0 1 0"', 'type="slide" axis="0 -1 0"', "0 1 0 0 0", True),
+    ('type="slide" axis="0 1 0"', 'type="slide" axis="0 -1 0"', "0.01 1.5 0 0 0", True),
+    ('type="hinge" axis="0 0 1" pos="-.03 0 0"', 'type="hinge" axis="0 0 1" pos="-.03 0 0"', "0 -1 0 0 0", False),
+    ('type="hinge" axis="1 0 0" pos="0 -.03 0"', 'type="hinge" axis="1 0 0" pos="0 .03 0"', "0 -2 0 0 0", True),
+])
+def test_fingers_tied_on_a_hand_that_moves(left, right, polycoef, wheel):
+    text = HAND.format(left=left, right=right, polycoef=polycoef)
+    a0, a1 = (float(x) for x in polycoef.split()[:2])
+    robot = subadmm.load(model(text))
+    notes = [n for n in robot.report if "wheel" in n.reason]
+    assert bool(notes) == wheel and "tie" in robot.gears
+    robot.actuators["close"].control = 0.02
+    for n in range(50):
+        robot.world.step(5)
+        l, r = robot.joints["l"].position, robot.joints["r"].position
+        if n > 20:  # what it is off at the start has been drawn in; locks give by 1e-9 of what would move their bodies
+            assert l == pytest.approx(a0 + a1 * r, abs=1e-6)
+    assert abs(l - a0) > 1e-3 and abs(robot.joints["shoulder"].position) > 0.1  # all of it has moved

@@ -5,6 +5,7 @@ import numpy as np
 from .model import element, name_of
 from .options import disabled
 from .poses import IDENTITY, mul, pose
+from .wheel import tie_by_wheel
 
 LEAST_GAP = 1e-6  # m, of a loop that is reported as open at the start
 
@@ -88,19 +89,18 @@ def _add_tie(loaded, index):
     ratio, rest2 = float(coefficients[1]), source.qpos0[source.jnt_qposadr[second]]
     # with q = sign x + offset of both
     offset = one.sign * (rest - one.offset + ratio * (other.offset - rest2))
+    ends = (one.joint, one.coordinate, other.joint, other.coordinate)
+    terms = {"ratio": -one.sign * ratio * other.sign, "offset": float(offset), "enabled": bool(source.eq_active0[index])}
     try:
-        gear = loaded.world.add_gear(
-            one.joint,
-            one.coordinate,
-            other.joint,
-            other.coordinate,
-            ratio=-one.sign * ratio * other.sign,
-            offset=float(offset),
-            enabled=bool(source.eq_active0[index]),
-        )
-        loaded.gears[name_of(source, "equality", index)] = gear
+        gear = loaded.world.add_gear(*ends, **terms)
     except Error as error:
-        report.add(what, f"not carried over: joints '{one.name}' and '{other.name}': {error}")
+        try:
+            (gear, _), wheel = tie_by_wheel(loaded.world, *ends, **terms)
+        except (Error, ValueError):
+            report.add(what, f"not carried over: joints '{one.name}' and '{other.name}': {error}")
+            return
+        report.add(what, f"by a wheel of {wheel.mass:.3g} kg between joints '{one.name}' and '{other.name}', with two gears")
+    loaded.gears[name_of(source, "equality", index)] = gear
 
 
 def add_equalities(loaded):
