@@ -5,6 +5,15 @@
 
 enum { MOST = 4096 };
 
+/* The emulated device takes milliseconds a step: fewer of them there, of fewer bodies. */
+#ifdef CUDA_EMULATED
+enum { HEAP = 12, HEAP_STEPS = 60 };
+static const double SHORT_STEP = 0.004;
+#else
+enum { HEAP = 30, HEAP_STEPS = 150 };
+static const double SHORT_STEP = 0.001;
+#endif
+
 static sadmm_event events[MOST];
 
 /* Take all of them. */
@@ -59,7 +68,7 @@ static sadmm_body_id add_still(sadmm_world *world, sadmm_body_type type, double 
 /* A ball of 2 kg that falls 0.5 m onto a floor and bounces. */
 START_TEST(ball_bounces)
 {
-    const double dt = 0.001, e = 0.8, height = 0.5;
+    const double dt = SHORT_STEP, e = 0.8, height = 0.5;
     sadmm_world_def def = bodies_def();
     def.settings.dt = dt;
     sadmm_world *world = bodies_world(&def, _i);
@@ -190,14 +199,14 @@ static sadmm_world *heap(int solver, int threads, bool sensors)
     sadmm_world *world = bodies_world(&def, solver);
     const sadmm_body_id ground = add_still(world, SADMM_BODY_STATIC, 0, 0, 0);
     give(world, ground, SADMM_SHAPE_PLANE, 0, false);
-    for (int n = 0; n < 30; ++n) {
+    for (int n = 0; n < HEAP; ++n) {
         sadmm_body_def cube = cube_def(0.13 * (n % 3), 0.11 * (n / 3 % 2), 0.3 + 0.23 * (n / 2));
         cube.angular_velocity[n % 3] = 3;
         const sadmm_body_id body = add_defined(world, &cube);
         give(world, body, n % 4 == 1 ? SADMM_SHAPE_CYLINDER : n % 4 == 3 ? SADMM_SHAPE_SPHERE : SADMM_SHAPE_BOX, 0.1, false);
     }
     if (!sensors) return world;
-    for (int n = 0; n < 30; n += 3) give(world, body_at(world, n + 1), SADMM_SHAPE_SPHERE, 0.16, true);
+    for (int n = 0; n < HEAP; n += 3) give(world, body_at(world, n + 1), SADMM_SHAPE_SPHERE, 0.16, true);
     give(world, ground, SADMM_SHAPE_BOX, 0.4, true);
     give(world, add_still(world, SADMM_BODY_STATIC, 0, 0, 2), SADMM_SHAPE_ELLIPSOID, 0.3, true);
     give(world, add_still(world, SADMM_BODY_STATIC, 0, 0, 1), SADMM_SHAPE_PLANE, 0, true);
@@ -211,14 +220,14 @@ START_TEST(heap_is_followed)
     int32_t count = 0;
     memset(&told, 0, sizeof told);
     MUST(world, sadmm_world_record_events(world, MOST));
-    for (int step = 0; step < 150; ++step) {
+    for (int step = 0; step < HEAP_STEPS; ++step) {
         const int32_t taken = step_and_take(world);
         count += taken;
         follow(&told, taken);
         look(world, &seen);
         ck_assert_msg(memcmp(&told, &seen, sizeof told) == 0, "step %d: events and world disagree", step);
     }
-    ck_assert_int_gt(count, 200);
+    ck_assert_int_gt(count, HEAP);
     sadmm_world_destroy(world);
 }
 END_TEST
@@ -231,7 +240,7 @@ START_TEST(same_on_any_thread)
     for (int run = 0; run < 3; ++run) {
         sadmm_world *world = heap(_i, run == 1 ? 4 : 1, true);
         MUST(world, sadmm_world_record_events(world, MOST));
-        for (int step = 0; step < 120; ++step)
+        for (int step = 0; step < HEAP_STEPS; ++step)
             MUST(world, run == 2 ? sadmm_world_step_async(world) : sadmm_world_step(world));
         counts[run] = take(world);
         if (run == 0) memcpy(wanted, events, sizeof wanted);
@@ -255,9 +264,9 @@ START_TEST(changes_nothing)
     for (int run = 0; run < 3; ++run) {
         sadmm_world *world = heap(_i, 1, false);
         if (run > 0)
-            for (int n = 0; n < 30; ++n) give(world, body_at(world, n + 1), SADMM_SHAPE_BOX, 0.3, true);
+            for (int n = 0; n < HEAP; ++n) give(world, body_at(world, n + 1), SADMM_SHAPE_BOX, 0.3, true);
         if (run > 1) MUST(world, sadmm_world_record_events(world, 10));
-        step_world(world, 100);
+        step_world(world, HEAP_STEPS);
         hashes[run] = state_hash(world);
         sadmm_world_destroy(world);
     }
@@ -278,7 +287,7 @@ static int32_t seen_by(sadmm_world *world, sadmm_shape_id sensor, sadmm_shape_id
 /* A ball falls through a sensor: when it comes and goes, and whom sensors see. */
 START_TEST(sensor_by_formula)
 {
-    const double dt = 0.001;
+    const double dt = SHORT_STEP;
     sadmm_world_def def = bodies_def();
     def.settings.dt = dt;
     sadmm_world *world = bodies_world(&def, _i);
@@ -289,7 +298,7 @@ START_TEST(sensor_by_formula)
     int32_t count = 0;
     sadmm_shape_id shapes[8];
     MUST(world, sadmm_world_record_events(world, 100));
-    step_world(world, 700);
+    step_world(world, (int)(0.7 / dt));
     count = take(world);
     ck_assert_int_eq(count, 2);
     expect_event(&events[0], SADMM_EVENT_SENSOR_BEGUN, sensor, round);
@@ -399,8 +408,8 @@ START_TEST(oldest_are_dropped)
     MUST(whole, sadmm_world_record_events(whole, MOST));
     MUST(narrow, sadmm_world_record_events(narrow, 7));
     ck_assert_int_eq(sadmm_world_event_capacity(narrow), 7);
-    step_world(whole, 100);
-    step_world(narrow, 100);
+    step_world(whole, HEAP_STEPS);
+    step_world(narrow, HEAP_STEPS);
     const int32_t total = take(whole);
     memcpy(all, events, sizeof all);
     ck_assert_int_eq(sadmm_world_event_count(narrow), 7);
@@ -434,7 +443,7 @@ START_TEST(restored_begins_anew)
     world->def.backend = SADMM_BACKEND_AUTO; /* it was made for the CPU, and given the device's kernels */
 #endif
     MUST(world, sadmm_world_record_events(world, MOST));
-    step_world(world, 60);
+    step_world(world, HEAP_STEPS / 2);
     MUST(world, sadmm_world_save(world, NULL, 0, &size));
     void *buffer = malloc(size);
     ck_assert_ptr_nonnull(buffer);
@@ -526,6 +535,15 @@ START_TEST(bad_input)
 }
 END_TEST
 
+static int tested_solvers(void)
+{
+#ifdef BODIES_ON_CUDA
+    return tested_precisions();
+#else
+    return SOLVERS;
+#endif
+}
+
 int main(void)
 {
     Suite *suite = suite_create("events");
@@ -534,20 +552,20 @@ int main(void)
 #ifdef BODIES_ON_CUDA
     if (!find_cuda_tables(tables)) return TEST_SKIPPED;
 #endif
-    tcase_add_loop_test(tcase, ball_bounces, 0, SOLVERS);
-    tcase_add_loop_test(tcase, rests_and_goes, 0, SOLVERS);
-    tcase_add_loop_test(tcase, heap_is_followed, 0, SOLVERS);
-    tcase_add_loop_test(tcase, same_on_any_thread, 0, SOLVERS);
-    tcase_add_loop_test(tcase, changes_nothing, 0, SOLVERS);
-    tcase_add_loop_test(tcase, sensor_by_formula, 0, SOLVERS);
-    tcase_add_loop_test(tcase, who_is_seen, 0, SOLVERS);
-    tcase_add_loop_test(tcase, queries_look_through, 0, SOLVERS);
-    tcase_add_loop_test(tcase, oldest_are_dropped, 0, SOLVERS);
-    tcase_add_loop_test(tcase, restored_begins_anew, 0, SOLVERS);
+    tcase_add_loop_test(tcase, ball_bounces, 0, tested_solvers());
+    tcase_add_loop_test(tcase, rests_and_goes, 0, tested_solvers());
+    tcase_add_loop_test(tcase, heap_is_followed, 0, tested_solvers());
+    tcase_add_loop_test(tcase, same_on_any_thread, 0, tested_solvers());
+    tcase_add_loop_test(tcase, changes_nothing, 0, tested_solvers());
+    tcase_add_loop_test(tcase, sensor_by_formula, 0, tested_solvers());
+    tcase_add_loop_test(tcase, who_is_seen, 0, tested_solvers());
+    tcase_add_loop_test(tcase, queries_look_through, 0, tested_solvers());
+    tcase_add_loop_test(tcase, oldest_are_dropped, 0, tested_solvers());
+    tcase_add_loop_test(tcase, restored_begins_anew, 0, tested_solvers());
 #ifndef BODIES_ON_CUDA
-    tcase_add_loop_test(tcase, out_of_memory, 0, SOLVERS);
+    tcase_add_loop_test(tcase, out_of_memory, 0, tested_solvers());
 #endif
-    tcase_add_loop_test(tcase, bad_input, 0, SOLVERS);
+    tcase_add_loop_test(tcase, bad_input, 0, tested_solvers());
     suite_add_tcase(suite, tcase);
     return RUN_BODIES_SUITE(suite);
 }
