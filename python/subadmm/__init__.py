@@ -45,12 +45,13 @@ from ._core import (
     scenes,
     version,
 )
+from .decomposition import decompose
 from .importing import load
 
 __version__ = version()
 
 __all__ = [
-    "load",
+    "decompose", "load",
     "Body", "BodyShape", "Certificate", "Coordinate", "Coupling", "DeviceError", "Error", "FileError", "Gear",
     "InvalidArgument", "Joint", "LimitExceeded", "Mass", "NonFinite", "OutOfMemory", "Report", "Settings", "Shape", "StaleId",
     "Unavailable", "Unsupported", "World", "backends", "box", "build_commit", "build_compiler", "capsule", "cone",
@@ -205,14 +206,14 @@ def _contacts(self):
     return np.frombuffer(self._contacts(), dtype=contact_dtype)
 
 
-def _to_json(self, name="world", description="", duration=10.0):
+def _to_json(self, name=None, description=None, duration=None):
     """The world as it is now as the text of a scene file (docs/scenes.md), which `subadmm run FILE.json`, scene(path) and
-    scene_from_json(text) read; duration: how long it is meant to be run for, s. What steps leave for the next ones is not in
-    it: see save()."""
+    scene_from_json(text) read; duration: how long it is meant to be run for, s. Of scenes all three are the scene's own where
+    they are not given, of other worlds 'world', nothing and 10 s. What steps leave for the next ones is not in it: see
+    save()."""
     return self._to_json(name, description, duration)
 
 
-World.to_json = _to_json
 def _cast_rays(self, origins, directions, length=np.inf, *, ignore=None, types=(), category=0, mask=0, from_inside=True,
                from_behind=False):
     """What rays hit: origins (n x 3, m, world), directions (n x 3, of any length), how far to look (m). A dict of arrays: shape
@@ -223,6 +224,7 @@ def _cast_rays(self, origins, directions, length=np.inf, *, ignore=None, types=(
                            from_behind)
 
 
+World.to_json = _to_json
 World.cast_rays = _cast_rays
 World.add_ground = _add_ground
 World.add_solid = _add_solid
