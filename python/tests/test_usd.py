@@ -287,6 +287,12 @@ def test_meshes_by_their_approximation():
         assert loaded.bodies[f"/moving{k}"].mass == pytest.approx(48, rel=SINGLE)
     assert [bool(noted(loaded, f"/moving{k}/")) for k in range(5)] == [False, False, False, True, True]
     assert [bool(noted(loaded, f"/static{k}")) for k in range(5)] == [False, False, False, False, True]
+    # equal ones share a hull
+    for k in range(3):
+        place(stage.DefinePrim(f"/copy{k}", "Xform"), (0, 9, k), q_about([0.6, 0, 0.8], k), scale=(0.3, 0.3, 0.3))
+        UsdPhysics.RigidBodyAPI.Apply(stage.GetPrimAtPath(f"/copy{k}"))
+        mesh(stage, f"/copy{k}/mesh", CUBE, FACES, "convexHull")
+    assert subadmm.load(stage).world.to_json().count('"points"') == 5  # and four of those above
     # sides of triangles: rays from outside meet them
     mesh(stage, "/mirrored", CUBE, FACES, position=(0, 20, 0), scale=(-1, 1, 1))
     UsdGeom.Mesh(mesh(stage, "/handed", CUBE, [face[::-1] for face in FACES], position=(0, 30, 0))).CreateOrientationAttr("leftHanded")

@@ -148,14 +148,22 @@ def _decomposed(reader, prim, vertices, triangles):
 
 
 def _mesh(reader, prim, linear, kind):
-    """Shapes of a Mesh by its approximation; kind: of the body."""
-    import subadmm as s
+    """Shapes of a Mesh by its approximation, made once for all that are equal; kind: of the body."""
     from pxr import UsdPhysics
 
     vertices, triangles = mesh_of(prim, linear)
     asked = "none"
     if prim.HasAPI(UsdPhysics.MeshCollisionAPI):
         asked = str(value(UsdPhysics.MeshCollisionAPI(prim).GetApproximationAttr()))
+    key = vertices.tobytes(), triangles.tobytes(), linear.tobytes(), asked, kind
+    if key not in reader.forms:
+        reader.forms[key] = _approximated(reader, prim, linear, kind, asked, vertices, triangles)
+    return [shape.copy() for shape in reader.forms[key]]
+
+
+def _approximated(reader, prim, linear, kind, asked, vertices, triangles):
+    import subadmm as s
+
     if asked == "boundingCube":
         return [_bounding_box(vertices, linear)]
     if asked == "boundingSphere":
@@ -170,6 +178,12 @@ def _mesh(reader, prim, linear, kind):
     return [s.mesh(vertices, triangles)]
 
 
+def _rounded(linear):
+    """To 9 digits: what is the same for several prims but for rounding (3 x 3 with their scale) is the same."""
+    size = 2.0 ** np.ceil(np.log2(np.abs(linear).max() or 1.0))
+    return np.round(linear / size, 9) * size + 0.0  # (no -0)
+
+
 def shapes_of(reader, prim, body, kind):
     """Shapes of a collider in the frame of the prim `body`; none where it is not carried over, which the report says.
     kind: of the body."""
@@ -181,7 +195,7 @@ def shapes_of(reader, prim, body, kind):
     own = reader.place(prim)
     # The prim's frame, turned as the prim is but not scaled, keeps what the shapes are placed in at right angles.
     local = mul(inverse(frame), own)
-    linear = q_matrix(own[1]).T @ reader.linear(prim) * reader.metre
+    linear = _rounded(q_matrix(own[1]).T @ reader.linear(prim) * reader.metre)
     try:
         if prim.IsA(UsdGeom.Mesh):
             shapes = _mesh(reader, prim, linear, kind)

@@ -5,7 +5,7 @@ from collections import Counter
 
 import numpy as np
 
-from ..poses import IDENTITY, mul, pose, q_about, q_turn
+from ..poses import IDENTITY, mul, pose, q_about, q_of_matrix, q_turn
 
 EARTH = 9.81  # m/s^2
 
@@ -31,7 +31,8 @@ def open_stage(path):
     try:
         return Usd.Stage.Open(path)
     except Tf.ErrorException as error:
-        raise ValueError(f"path: {path} is no USD stage: {error}") from error
+        said = " ".join(getattr(one, "commentary", str(one)).strip() for one in error.args)
+        raise ValueError(f"path: {path} is no USD stage: {said}") from error
 
 
 def quat(q):
@@ -60,6 +61,7 @@ class Reader:
 
         self.stage, self.report, self.threshold = stage, report, threshold
         self.reported = set()  # paths of what several prims share and is said once
+        self.forms = {}  # shapes of meshes that are equal
         self.metre = UsdGeom.GetStageMetersPerUnit(stage)
         self.kilogram = UsdPhysics.GetStageKilogramsPerUnit(stage)
         if not UsdGeom.StageHasAuthoredMetersPerUnit(stage):
@@ -123,8 +125,10 @@ class Reader:
 
     def place(self, prim):
         """The pose of a prim without its scale, in the stage's frame, m."""
-        m = self._transforms.GetLocalToWorldTransform(prim)
-        return pose(np.array(m.ExtractTranslation()) * self.metre, quat(m.RemoveScaleShear().ExtractRotationQuat()))
+        # Gf.Matrix4d.RemoveScaleShear, to the last digits: the rotation next to the matrix, of a mirror image's negative
+        m = np.array(self._transforms.GetLocalToWorldTransform(prim))
+        u, _, v = np.linalg.svd(m[:3, :3].T)
+        return pose(m[3, :3] * self.metre, q_of_matrix(u @ v * np.sign(np.linalg.det(u @ v))))
 
     def point(self, prim, local):
         """A point of a prim's own frame (its units) in the stage's frame, m."""
