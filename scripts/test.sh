@@ -110,10 +110,12 @@ step_python() {
     python3 -m venv "$folder/environment" || return 1
     # One instruction set, no CUDA: the steps beside this one have the others. The command is built to compare with: another
     # instruction set rounds otherwise.
-    "$folder/environment/bin/pip" install --quiet --disable-pip-version-check "$project[test,import]" \
+    "$folder/environment/bin/pip" install --quiet --disable-pip-version-check "$project[test,import,usd,decompose]" \
         -Csetup-args=-Dcuda=disabled -Csetup-args=-Dcpu_isas=avx2 -Csetup-args=-Dwerror=true \
         -Csetup-args=-Dcli=enabled \
         -Cbuild-dir="$folder/build" || return 1
+    # For its model of an arm, which an example moves; not for its code, nor for what that needs.
+    "$folder/environment/bin/pip" install --quiet --disable-pip-version-check --no-deps gymnasium-robotics || return 1
     # Away from the sources, so that what was installed is what is tested.
     (cd "$folder" && SUBADMM=$folder/build/src/subadmm environment/bin/python -m pytest -q --junitxml=meson-logs/pytest.xml "$project/python/tests") || true
     logs+=("$folder/meson-logs/pytest.xml")

@@ -222,6 +222,45 @@ START_TEST(order_does_not_matter)
 }
 END_TEST
 
+/* A hull's vertices and its merge make it again, also where a point was left out that reached farthest along an axis: a
+ * bump on the side that the extent is measured by, and dense points on an ellipsoid, of which many are left out. */
+START_TEST(vertices_make_it_again)
+{
+    enum { COUNT = 3000 };
+    static double points[3 * COUNT];
+    int left_out_far = 0;
+    for (int round = 0; round < 12; ++round) {
+        sadmm_hull_def def = sadmm_hull_def_default();
+        uint64_t seed = (uint64_t)round + 5;
+        struct cloud box = box_cloud(1, 1, 2);
+        add_point(&box, 0.1, 0, 2 + 1e-8);
+        for (int i = 0; i < COUNT && round > 0; ++i) {
+            vec3 x = v3(next_number(&seed), next_number(&seed), next_number(&seed));
+            x = v3_scale(x, 1 / v3_norm(x));
+            points[3 * i] = (float)x.x, points[3 * i + 1] = (float)(0.7 * x.y), points[3 * i + 2] = (float)(0.6 * x.z);
+        }
+        def.points = round ? points : box.x;
+        def.point_count = round ? COUNT : box.count;
+        def.merge = round ? pow(10, -6 + round % 4) : def.merge;
+        sadmm_hull *hull, *again;
+        ck_assert_int_eq(sadmm_hull_create(&def, &hull), SADMM_OK);
+        double most[2] = {-1e9, -1e9};
+        for (size_t i = 0; i < def.point_count; ++i) most[0] = fmax(most[0], def.points[3 * i + 2]);
+        for (int32_t v = 0; v < hull->vertex_count; ++v) most[1] = fmax(most[1], hull->vertices[3 * v + 2]);
+        left_out_far += most[1] < most[0];
+        def.points = sadmm_hull_vertices(hull);
+        def.point_count = (size_t)sadmm_hull_vertex_count(hull);
+        ck_assert_int_eq(sadmm_hull_create(&def, &again), SADMM_OK);
+        expect_same_bits(hull, again);
+        ck_assert_int_eq(again->vertex_count, hull->vertex_count);
+        ck_assert_mem_eq(again->vertices, hull->vertices, 3 * (size_t)hull->vertex_count * sizeof *hull->vertices);
+        sadmm_hull_destroy(hull);
+        sadmm_hull_destroy(again);
+    }
+    ck_assert_int_ge(left_out_far, 1);
+}
+END_TEST
+
 /* The box that stands for a hull is the smallest of those that are tried: a turned box's own, a rod's along it. */
 START_TEST(the_box_around)
 {
@@ -531,6 +570,7 @@ int main(void)
     tcase_add_test(shapes, company_is_ignored);
     tcase_add_test(shapes, zeros_of_either_sign);
     tcase_add_test(shapes, order_does_not_matter);
+    tcase_add_test(shapes, vertices_make_it_again);
     tcase_add_test(shapes, the_box_around);
     tcase_add_test(shapes, sizes);
     tcase_add_test(shapes, a_hundred_thousand_points);

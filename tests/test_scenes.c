@@ -378,6 +378,9 @@ START_TEST(bad_builds_are_refused)
     ck_assert_int_eq(sadmm_scene_build(&(struct sadmm_scene){ 0 }, &world, &error), SADMM_ERROR_INVALID_ARGUMENT);
     ck_assert_int_eq(sadmm_scene_build(&scene, NULL, &error), SADMM_ERROR_INVALID_ARGUMENT);
     ck_assert_int_eq(sadmm_scene_before_step(NULL, NULL, 0, &error), SADMM_ERROR_INVALID_ARGUMENT);
+    ck_assert(!sadmm_scene_has_script(NULL) && !sadmm_scene_has_script(&scene));
+    scene = open_scene("grippers:2");
+    ck_assert(sadmm_scene_has_script(&scene));
 }
 END_TEST
 

@@ -58,8 +58,7 @@ SADMM_API const double *sadmm_hull_vertices(const sadmm_hull *hull);
 
 /* The definition's rounding, m. Of NULL: 0. What the other functions tell is the polyhedron inside. */
 SADMM_API double sadmm_hull_rounding(const sadmm_hull *hull);
-/* The definition's merge. Of NULL: 0. With it the vertices make the same hull again, bit for bit, unless it left out a
- * point that reached farthest along an axis of their frame. */
+/* The definition's merge. Of NULL: 0. With it the vertices make the same hull again, bit for bit. */
 SADMM_API double sadmm_hull_merge(const sadmm_hull *hull);
 
 typedef struct sadmm_hull_face {

@@ -56,6 +56,7 @@ struct world {
     sadmm_world *handle = nullptr;
     std::mutex mutex;
     bool scripted = false;
+    std::string spec; // of the scene; of one from a text: none
     sadmm_scene scene{};
     sadmm_scene_result result{};
     int64_t steps = 0; // of the scene

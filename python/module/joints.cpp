@@ -98,7 +98,7 @@ static int index_of(int index)
 static void bind_joint(nb::module_ &m)
 {
     nb::class_<joint> c(m, "Joint", "A joint of a world. Coordinates 0 to 2 are translations along the axes of a's frame, 3 to 5 rotations.");
-    c.def("__eq__", [](const joint &a, const joint &b) { return same_id(a, b); })
+    c.def("__eq__", [](const joint &a, const joint &b) { return same_id(a, b); }, nb::is_operator())
         .def("__hash__", &hash_of<sadmm_joint_id>)
         .def_prop_ro("world", [](const joint &j) { return j.owner; })
         .def_prop_ro("index", [](const joint &j) {
@@ -188,7 +188,7 @@ static sadmm_coupling_state state_of(const coupling &c)
 static void bind_coupling(nb::module_ &m)
 {
     nb::class_<coupling>(m, "Coupling", "A spring and damper that ties a body to a target pose.")
-        .def("__eq__", [](const coupling &a, const coupling &b) { return same_id(a, b); })
+        .def("__eq__", [](const coupling &a, const coupling &b) { return same_id(a, b); }, nb::is_operator())
         .def("__hash__", &hash_of<sadmm_coupling_id>)
         .def_prop_ro("world", [](const coupling &c) { return c.owner; })
         .def_prop_ro("index", [](const coupling &c) {

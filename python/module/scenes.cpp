@@ -49,11 +49,14 @@ static std::unique_ptr<world> build(const std::string &spec, bool is_text, const
     }
     check_error(status, error);
     made->scripted = true;
+    if (!is_text) made->spec = spec;
     made->def = def;
     return made;
 }
 
-static std::string to_json(world &w, const std::string &name, const std::string &description, double duration)
+// As a scene file: of a scene what `subadmm scenes SPEC --json` writes, where nothing else is given.
+static std::string to_json(world &w, const std::optional<std::string> &name, const std::optional<std::string> &description,
+                           std::optional<double> duration)
 {
     char *text = nullptr;
     size_t size = 0;
@@ -62,15 +65,25 @@ static std::string to_json(world &w, const std::string &name, const std::string 
     {
         nb::gil_scoped_release release;
         std::lock_guard<std::mutex> lock(w.mutex);
-        const sadmm_settings settings = sadmm_world_settings(w.handle);
-        sadmm_scene_about about{};
-        about.spec = about.name = name.c_str();
-        about.description = description.c_str();
-        about.n = about.m = -1;
-        about.duration = duration;
-        for (int k = 0; k < SADMM_METHOD_COUNT; ++k) about.iterations[k] = settings.iterations, about.substeps[k] = settings.substeps;
         FILE *stream = open_memstream(&text, &size);
-        status = stream ? sadmm_scene_file_write(&about, &w.def, w.handle, stream, &error) : SADMM_ERROR_OUT_OF_MEMORY;
+        if (!stream) {
+            status = SADMM_ERROR_OUT_OF_MEMORY;
+        } else if (w.scripted && !name && !description) {
+            sadmm_scene scene = w.scene;
+            scene.def = w.def;
+            if (duration) scene.duration = *duration;
+            status = sadmm_scene_write(&scene, w.spec.empty() ? nullptr : w.spec.c_str(), w.handle, stream, &error);
+        } else {
+            const sadmm_settings settings = sadmm_world_settings(w.handle);
+            const std::string own = name.value_or("world"), about_it = description.value_or("");
+            sadmm_scene_about about{};
+            about.spec = about.name = own.c_str();
+            about.description = about_it.c_str();
+            about.n = about.m = -1;
+            about.duration = duration.value_or(w.scripted ? w.scene.duration : 10.0);
+            for (int k = 0; k < SADMM_METHOD_COUNT; ++k) about.iterations[k] = settings.iterations, about.substeps[k] = settings.substeps;
+            status = sadmm_scene_file_write(&about, &w.def, w.handle, stream, &error);
+        }
         if (stream) fclose(stream);
     }
     const std::string out = text ? std::string(text, size) : std::string();
@@ -98,7 +111,9 @@ void bind_scenes(nb::module_ &m, nb::class_<world> &w)
                                   "chaotic.");
     m.def("_scene", &build, "spec"_a, "is_text"_a, nb::kw_only(), "backend"_a = "auto", "precision"_a = nb::none(), "method"_a = nb::none(),
           "device"_a = 0, "settings"_a = nb::none());
-    w.def("_to_json", &to_json, "name"_a, "description"_a, "duration"_a);
+    w.def("_to_json", &to_json, "name"_a.none(), "description"_a.none(), "duration"_a.none());
+    w.def_prop_ro("has_script", [](world &w) { return w.scripted && sadmm_scene_has_script(&w.scene); },
+                  "Of a scene: does it have scripted inputs, which come with steps and are in no scene file?");
     w.def_prop_ro("duration", [](world &w) -> nb::object {
         return w.scripted ? nb::cast(w.scene.duration) : nb::none();
     }, "Of a scene: how long it is meant to be run for, s; None of other worlds.");

@@ -124,7 +124,7 @@ static shape add_shape(const body &b, const shape_def &def)
 static void bind_body(nb::module_ &m)
 {
     nb::class_<body> c(m, "Body", "A body of a world. Body(...) is made by World.add_body, World.add_solid, World.bodies.");
-    c.def("__eq__", [](const body &a, const body &b) { return same_id(a, b); })
+    c.def("__eq__", [](const body &a, const body &b) { return same_id(a, b); }, nb::is_operator())
         .def("__hash__", &hash_of<sadmm_body_id>)
         .def("__repr__", [](const body &b) { return "<subadmm.Body " + std::to_string(b.id.slot) + "." + std::to_string(b.id.generation) + ">"; })
         .def_prop_ro("world", [](const body &b) { return b.owner; })
@@ -175,7 +175,7 @@ static void bind_body(nb::module_ &m)
              "With its shapes, joints and couplings.");
 
     nb::class_<shape>(m, "BodyShape", "A shape on a body.")
-        .def("__eq__", [](const shape &a, const shape &b) { return same_id(a, b); })
+        .def("__eq__", [](const shape &a, const shape &b) { return same_id(a, b); }, nb::is_operator())
         .def("__hash__", &hash_of<sadmm_shape_id>)
         .def_prop_ro("world", [](const shape &s) { return s.owner; })
         .def_prop_ro("index", [](const shape &s) {

@@ -51,12 +51,13 @@ from ._core import (
     scenes,
     version,
 )
+from .decomposition import decompose
 from .importing import load
 
 __version__ = version()
 
 __all__ = [
-    "load",
+    "decompose", "load",
     "Body", "BodyShape", "Certificate", "Coordinate", "Coupling", "DeviceError", "Error", "FileError", "Gear",
     "InvalidArgument", "Joint", "LimitExceeded", "Mass", "NonFinite", "OutOfMemory", "Report", "Settings", "Shape", "StaleId",
     "Unavailable", "Unsupported", "World", "backends", "box", "build_commit", "build_compiler", "capsule", "cone",
@@ -235,14 +236,14 @@ def _events(self):
     return np.frombuffer(data, dtype=event_dtype)
 
 
-def _to_json(self, name="world", description="", duration=10.0):
+def _to_json(self, name=None, description=None, duration=None):
     """The world as it is now as the text of a scene file (docs/scenes.md), which `subadmm run FILE.json`, scene(path) and
-    scene_from_json(text) read; duration: how long it is meant to be run for, s. What steps leave for the next ones is not in
-    it: see save()."""
+    scene_from_json(text) read; duration: how long it is meant to be run for, s. Of scenes all three are the scene's own where
+    they are not given, of other worlds 'world', nothing and 10 s. What steps leave for the next ones is not in it: see
+    save()."""
     return self._to_json(name, description, duration)
 
 
-World.to_json = _to_json
 def _cast_rays(self, origins, directions, length=np.inf, *, ignore=None, types=(), category=0, mask=0, from_inside=True,
                from_behind=False, sensors=False):
     """What rays hit: origins (n x 3, m, world), directions (n x 3, of any length), how far to look (m). A dict of arrays: shape
@@ -254,6 +255,7 @@ def _cast_rays(self, origins, directions, length=np.inf, *, ignore=None, types=(
                            from_behind, sensors)
 
 
+World.to_json = _to_json
 World.cast_rays = _cast_rays
 World.add_ground = _add_ground
 World.add_solid = _add_solid

@@ -1,4 +1,4 @@
-"""python -m subadmm view | record | picture SCENE: scenes to look at."""
+"""python -m subadmm view | record | picture SCENE: scenes to look at; convert FILE: robots as scene files."""
 import argparse
 import sys
 import time
@@ -7,7 +7,7 @@ import subadmm
 
 
 def _arguments():
-    parser = argparse.ArgumentParser(prog="python -m subadmm", description="Scenes to look at.")
+    parser = argparse.ArgumentParser(prog="python -m subadmm", description="Scenes to look at, and robots as scenes.")
     commands = parser.add_subparsers(dest="command", required=True)
     view = commands.add_parser("view", help="open a page with the running scene (needs: pip install 'subadmm[view]')")
     record = commands.add_parser(
@@ -31,6 +31,15 @@ def _arguments():
     picture.add_argument("--azimuth", type=float, default=-60, help="where the camera stands, degrees (-60)")
     picture.add_argument("--elevation", type=float, default=24, help="degrees (24)")
     picture.add_argument("--zoom", type=float, default=1, help="2: twice as near (1)")
+    convert = commands.add_parser("convert", help="write a robot's file (MJCF, URDF, USD) or a scene as a scene file (.json)")
+    convert.add_argument("source", help="a .xml, .urdf, .usd... file, a scene as 'pile:300', or a scene file")
+    convert.add_argument("output", help="the scene file to write, for 'subadmm run' and others")
+    convert.add_argument("--report", metavar="FILE", help="also write what is not carried over to a file, as JSON")
+    convert.add_argument("--duration", type=float, help="how long the scene is meant to be run for, s (default: its own, or 10)")
+    convert.add_argument("--floating", action="store_true", help="URDF: the base is free")
+    convert.add_argument("--keyframe", help="MJCF: the keyframe to start from")
+    convert.add_argument("--decompose", action="store_true",
+                         help="several hulls for each mesh of a moving body (needs: pip install 'subadmm[decompose]')")
     view.add_argument("--host", default="127.0.0.1", help="address to serve at (127.0.0.1: this machine only)")
     view.add_argument("--port", type=int, default=8080, help="port to serve at (8080)")
     return parser
@@ -86,17 +95,33 @@ def _picture(world, given):
     show.save_picture(given.output, world, width=width, height=height, camera=camera, description=description)
 
 
+def _convert(given):
+    from .convert import convert
+
+    if not given.output.endswith(".json"):
+        raise ValueError(f"output: {given.output}; must end in .json")
+    if given.duration is not None and not 0 <= given.duration < float("inf"):
+        raise ValueError(f"--duration: {given.duration}; must be 0 or more")
+    options = {name: getattr(given, name) for name in ("floating", "keyframe", "decompose") if getattr(given, name)}
+    notes = convert(given.source, given.output, report=given.report, duration=given.duration, **options)
+    if notes:
+        print(f"not carried over, or not exactly ({len(notes)}):")
+        print(notes)
+
+
 def main(arguments=None):
     """The command; gives its exit status."""
     given = _arguments().parse_args(arguments)
-    settings = {} if given.iterations is None else {"iterations": given.iterations}
 
     def build():
+        settings = {} if given.iterations is None else {"iterations": given.iterations}
         return subadmm.scene(given.scene, backend=given.backend, precision=given.precision, method=given.method,
                              settings=settings)
 
     try:
-        if given.command == "view":
+        if given.command == "convert":
+            _convert(given)
+        elif given.command == "view":
             from subadmm.show.view import serve
             serve(build, given.scene, host=given.host, port=given.port)
         else:

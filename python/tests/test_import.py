@@ -325,7 +325,7 @@ def test_friction_of_pairs_and_filters():
     loaded.world.step(100)
     friction = {}
     contacts = loaded.world.contacts()
-    by_slot = {shape.index + 1: geom for geom, shape in loaded.shapes.items()}
+    by_slot = {shape.index + 1: geom for geom, shapes in loaded.shapes.items() for shape in shapes}
     for contact in contacts:
         pair = {by_slot[int(contact["shape_a"][0])], by_slot[int(contact["shape_b"][0])]}
         friction[loaded.source.geom(max(pair)).name] = float(contact["friction"])

@@ -39,6 +39,7 @@ def test_arrays():
     state = world.get("body_state")
     assert state.shape == (3, 13) and state.dtype == np.float64
     assert [b.index for b in world.bodies] == [0, 1, 2]
+    assert world.bodies[1] == box and box != ball and box != None and box not in [None, 1, world.shapes[1]]  # noqa: E711
     state[1:, 9] = 1.5
     world.set("body_state", state)
     assert box.linear_velocity[2] == 1.5 and ball.linear_velocity[2] == 1.5
@@ -297,6 +298,8 @@ def test_scene_files(tmp_path):
     path = tmp_path / "fall.json"
     path.write_text(text)
     other, third = subadmm.scene(path), subadmm.scene_from_json(text, settings={"iterations": 30})
+    assert other.to_json() == text and not other.has_script
+    assert '"duration": 5' in other.to_json(duration=5.0) and '"name": "new"' in other.to_json("new")
     assert other.duration == 2.0 and other.settings.dt == 0.004 and third.settings.iterations == 30
     world.step(100)
     other.step(100)

@@ -283,7 +283,7 @@ static sadmm_status build(struct making *m, const double *given, sadmm_hull **ou
     return filled ? SADMM_OK : sadmm_fail_memory(error, "a hull");
 }
 
-static sadmm_status make(struct making *m, const sadmm_hull_def *def, sadmm_hull **out, struct sadmm_error *error)
+static sadmm_status make_once(struct making *m, const sadmm_hull_def *def, sadmm_hull **out, struct sadmm_error *error)
 {
     TRY(sadmm_hull_points_sort(&m->points, def->points, def->point_count, error));
     TRY(sadmm_hull_points_check(&m->points, thinnest, thinnest, error));
@@ -293,6 +293,28 @@ static sadmm_status make(struct making *m, const sadmm_hull_def *def, sadmm_hull
     if (m->points.count > MANY_POINTS) TRY(leave_out_inner(m, error));
     TRY(find_polyhedron(m, def->merge, error));
     return build(m, def->points, out, error);
+}
+
+/* A hull whose vertices make it again: what faces are joined by goes by where the points reach, so that the hull of the
+ * vertices alone may be another one, of fewer. Where points were left out it is made of the others, until none is. */
+static sadmm_status make(const sadmm_hull_def *def, sadmm_hull **out)
+{
+    sadmm_hull_def next = *def;
+    sadmm_hull *last = NULL, *made = NULL;
+    bool done = false;
+    while (!done) {
+        struct making m = {.merge = def->merge, .rounding = def->rounding};
+        const sadmm_status status = make_once(&m, &next, &made, NULL);
+        if (status == SADMM_OK) done = made->vertex_count == m.points.count;
+        free_making(&m);
+        sadmm_hull_release(last); /* whose vertices were the points */
+        if (status != SADMM_OK) return status;
+        last = made;
+        next.points = last->vertices;
+        next.point_count = (size_t)last->vertex_count;
+    }
+    *out = last;
+    return SADMM_OK;
 }
 
 sadmm_status sadmm_hull_create(const sadmm_hull_def *def, sadmm_hull **out)
@@ -307,10 +329,7 @@ sadmm_status sadmm_hull_create(const sadmm_hull_def *def, sadmm_hull **out)
     TRY(sadmm_check_range("def->merge", def->merge, 0, 1e-2, NULL));
     TRY(sadmm_check_range("def->rounding", def->rounding, 0, 1e6, NULL));
     TRY(sadmm_check_vector("def->points", def->points, 3 * (int)def->point_count, 1e6, NULL));
-    struct making m = {.merge = def->merge, .rounding = def->rounding};
-    const sadmm_status status = make(&m, def, out, NULL);
-    free_making(&m);
-    return status;
+    return make(def, out);
 }
 
 /* ---- what callers see ---- */

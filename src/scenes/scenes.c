@@ -255,6 +255,12 @@ sadmm_status sadmm_scene_before_step(const struct sadmm_scene *scene, sadmm_worl
     return family->before_step ? family->before_step(scene, world, step, error) : SADMM_OK;
 }
 
+bool sadmm_scene_has_script(const struct sadmm_scene *scene)
+{
+    const struct sadmm_scene_family *family = family_of(scene);
+    return family && family->before_step;
+}
+
 sadmm_status sadmm_scene_observe(const struct sadmm_scene *scene, sadmm_world *world, int64_t step,
                                  struct sadmm_scene_result *result, struct sadmm_error *error)
 {

@@ -91,6 +91,9 @@ sadmm_status sadmm_scene_build(const struct sadmm_scene *scene, sadmm_world **wo
 sadmm_status sadmm_scene_before_step(const struct sadmm_scene *scene, sadmm_world *world, int64_t step,
                                      struct sadmm_error *error);
 
+/* Does the scene have such inputs? They are not part of what sadmm_scene_write writes. NULL, and files: false. */
+bool sadmm_scene_has_script(const struct sadmm_scene *scene);
+
 /* ---- success ------------------------------------------------------------------------------------------------------
  *
  * A scene may measure by itself whether it went as it should, task by task: what was to be grasped is held, what was

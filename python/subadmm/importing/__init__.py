@@ -1,4 +1,5 @@
-"""Robots and scenes from MJCF and URDF files, read by MuJoCo's compiler (the extra `import` of the package).
+"""Robots and scenes from files: MJCF and URDF, read by MuJoCo's compiler (the extra `import` of the package), and USD, read by
+usd-core (the extra `usd`).
 
     robot = subadmm.load("robot.xml")
     robot.world.step(100)
@@ -9,15 +10,35 @@ docs/import.md says what is carried over, and how. What is not is in `report`, e
 
 import os
 
+from ..decomposition import THRESHOLD
 from .actuators import add_actuators
 from .equality import add_equalities
-from .model import Loaded, LoadedActuator, LoadedJoint, Note, Report
+from .model import Loaded, LoadedActuator, LoadedJoint, LoadedModel, LoadedStage, Note, Report
 from .options import report_options, settings_of
 from .shapes import add_shapes
 from .start import start_of
 from .tree import add_tree
 
-__all__ = ["Loaded", "LoadedActuator", "LoadedJoint", "Note", "Report", "load"]
+__all__ = ["Loaded", "LoadedActuator", "LoadedJoint", "LoadedModel", "LoadedStage", "Note", "Report", "load"]
+
+USD = (".usd", ".usda", ".usdc", ".usdz")
+
+
+def _threshold_of(decompose):
+    """Of decompose=: coacd's threshold, or None."""
+    if decompose is False or decompose is None:
+        return None
+    threshold = THRESHOLD if decompose is True else float(decompose)
+    if not 0.01 <= threshold <= 1:
+        raise ValueError(f"decompose: {decompose} is neither True nor in [0.01, 1]")
+    return threshold
+
+
+def _is_stage(path):
+    """Is it a USD stage, or the name of one?"""
+    if isinstance(path, (str, os.PathLike)):
+        return os.path.splitext(os.fspath(path))[1].lower() in USD
+    return type(path).__module__.startswith("pxr")
 
 
 def load(
@@ -33,22 +54,39 @@ def load(
     device=0,
     carrier_share=1e-4,
     overlaps="ignore",
+    decompose=False,
 ):
-    """Build a world from an MJCF or URDF file, compiled by the package `mujoco` (pip install subadmm[import]).
+    """Build a world from an MJCF or URDF file, compiled by the package `mujoco` (pip install subadmm[import]), or from a USD
+    stage (.usd, .usda, .usdc, .usdz), read by `usd-core` (pip install subadmm[usd]).
 
-    path: the file, or a mujoco.MjModel that is compiled already.
+    path: the file; or a mujoco.MjModel that is compiled already, or a pxr.Usd.Stage that is open.
+    settings: a subadmm.Settings; default: the file's time step and gravity. backend, precision, device: as of World.
+    decompose: True makes several hulls of each mesh of a body that moves, by coacd (pip install subadmm[decompose]); a
+        number in [0.01, 1] is the concavity that may remain (True: 0.05). Default: one hull, which is in the report where
+        it is much larger than the mesh.
+
+    Of MJCF and URDF alone:
     floating: of URDF files: the base is free. Default: it is fixed to the world, as MuJoCo has it.
     keyframe: name or index of the keyframe to start from; qpos (nq), qvel (nv): the start itself, in MuJoCo's
         coordinates (m, rad, quaternions w x y z). Default: qpos0, at rest.
-    settings: a subadmm.Settings; default: the file's time step and gravity. backend, precision, device: as of World.
     carrier_share: where several joints of one body do not fit one joint here, a carrier is put between them, with
         this share of the body's mass and inertia on top of the body's own; in [1e-6, 1e-1].
     overlaps: 'ignore' leaves out contact between bodies of one mechanism that overlap where they start, which hard
         contacts cannot undo; 'keep' does not.
 
-    Returns a Loaded: world, bodies, joints, actuators, report. Raises ImportError (no mujoco), ValueError (what
-    MuJoCo does not compile; an argument out of range), subadmm.Error (a body that the world does not take, named).
+    Returns a LoadedModel or a LoadedStage: world, bodies, joints, report. Raises ImportError (a package that is not there),
+    ValueError (what MuJoCo does not compile or USD does not open; an argument out of range), subadmm.Error (a body that
+    the world does not take, named).
     """
+    threshold = _threshold_of(decompose)
+    if _is_stage(path):
+        given = dict(floating=floating, keyframe=keyframe, qpos=qpos, qvel=qvel)
+        for name, value in given.items():
+            if value is not None and value is not False:
+                raise ValueError(f"{name}: a USD stage has none; it starts as it is")
+        from .usd import load_stage
+
+        return load_stage(path, settings, threshold, backend=backend, precision=precision, device=device)
     try:
         import mujoco
     except ImportError as error:
@@ -70,10 +108,10 @@ def load(
         device=device,
         settings=settings if settings is not None else settings_of(source),
     )
-    loaded = Loaded(world, source, report)
+    loaded = LoadedModel(world, source, report)
     report_options(source, report)
     add_tree(loaded, data, carrier_share)
-    add_shapes(loaded, data, overlaps)
+    add_shapes(loaded, data, overlaps, threshold)
     add_equalities(loaded)
     add_actuators(loaded, data)
     return loaded

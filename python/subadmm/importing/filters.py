@@ -10,9 +10,25 @@ def _meet(a, b):
     return bool((a[0] & b[1]) or (b[0] & a[1]))
 
 
+def classes_of(meets):
+    """(category, mask) of kinds of shapes, by which of them meet (symmetric, k x k, bool), None of those that meet nothing;
+    and whether there are too many classes, so that some meet more than they should. Kinds that meet the same ones share a
+    bit."""
+    rows = {}
+    for k in range(len(meets)):
+        if meets[k].any():
+            rows.setdefault(meets[k].tobytes(), []).append(k)
+    crowded = len(rows) > MOST_CLASSES
+    bit_of = {k: min(bit, MOST_CLASSES - 1) for bit, kinds in enumerate(rows.values()) for k in kinds}
+    masks = {}
+    for k, bit in bit_of.items():  # those that share the last bit meet all that any of them meets
+        masks[bit] = masks.get(bit, 0) | sum(1 << b for b in {bit_of[int(j)] for j in np.flatnonzero(meets[k])})
+    return [(1 << bit_of[k], masks[bit_of[k]]) if k in bit_of else None for k in range(len(meets))], crowded
+
+
 class Filter:
     """category and mask of geoms: (contype, conaffinity) of two geoms meet if one's contype has a bit of the other's
-    conaffinity, or they are an explicit pair. Geoms that meet the same ones share a bit."""
+    conaffinity, or they are an explicit pair."""
 
     def __init__(self, source):
         pairs = {(int(source.pair_geom1[k]), int(source.pair_geom2[k])) for k in range(source.npair)}
@@ -30,29 +46,12 @@ class Filter:
         for a, i in keys.items():
             for b, j in keys.items():
                 meets[i, j] = _meet(a, b) or (a[2], b[2]) in pairs or (b[2], a[2]) in pairs
-        classes = {}
-        for k in range(len(members)):
-            if meets[k].any():
-                classes.setdefault(meets[k].tobytes(), []).append(k)
-        bits = [min(k, MOST_CLASSES - 1) for k in range(len(classes))]
-        self.crowded = len(classes) > MOST_CLASSES
-        bit_of = {k: bit for bit, group in zip(bits, classes.values()) for k in group}
+        classes, self.crowded = classes_of(meets)
         self._category, self._mask = {}, {}
-        for bit, group in zip(bits, classes.values()):
-            mask = 0
-            for k in np.flatnonzero(meets[group[0]]):
-                mask |= 1 << bit_of[int(k)]
-            for k in group:
-                for geom in members[k]:
-                    self._category[geom] = 1 << bit
-                    self._mask[geom] = mask
-        if self.crowded:  # those that share the last bit meet all that any of them meets
-            last = [geom for geom, category in self._category.items() if category == 1 << (MOST_CLASSES - 1)]
-            mask = 0
-            for geom in last:
-                mask |= self._mask[geom]
-            for geom in last:
-                self._mask[geom] = mask
+        for key, geoms in zip(classes, members):
+            if key is not None:
+                for geom in geoms:
+                    self._category[geom], self._mask[geom] = key
 
     def touches(self, geom):
         """Does it meet anything?"""

@@ -17,6 +17,14 @@ class Note(NamedTuple):
         return f"{self.element}: {self.reason}"
 
 
+LONGEST_NAME = 63  # bytes, of a body
+
+
+def world_name(name):
+    """A name as bodies of a world can have it: of a longer one the end."""
+    return name.encode()[-LONGEST_NAME:].decode(errors="ignore")
+
+
 class Report(list):
     """A list of Note; printed one a line."""
 
@@ -124,14 +132,10 @@ class LoadedActuator:
 
 
 class Loaded:
-    """A model in a world.
+    """A file in a world.
 
-    `world`; `bodies`, `joints`, `actuators` by the file's names (those without one: '#' and the index); `loops` and
-    `gears`: the joints and gears that its equality constraints are; `report`: what was not carried over; `source`: the
-    mujoco.MjModel.
-
-    Bodies that the file has without joints are part of the one they are fixed to: several names of one Body. What is
-    fixed to the world has a Body only if something can touch it.
+    `world`; `bodies`, `joints` ... by the file's names; `shapes`: lists of BodyShape by what they were made of; `report`:
+    what was not carried over; `source`: the file as the package that read it has it.
     """
 
     def __init__(self, world, source, report):
@@ -143,15 +147,29 @@ class Loaded:
         self.actuators = {}
         self.gears = {}
         self.loops = {}  # joints that the file's equality constraints became, by their names
-        self.groups = []  # of tree.py, one a body of the file
-        self.carriers = []  # bodies between several joints of one
-        self.shapes = {}  # by geom index
+        self.shapes = {}  # by geom index, or path of a prim
 
     def __repr__(self):
         return (
             f"<subadmm model: {len(self.bodies)} bodies, {len(self.joints)} joints, {len(self.actuators)} actuators, "
             f"{len(self.report)} notes>"
         )
+
+
+class LoadedModel(Loaded):
+    """An MJCF or URDF model in a world.
+
+    `bodies`, `joints`, `actuators` by the file's names (those without one: '#' and the index); `loops` and `gears`: the
+    joints and gears that its equality constraints are; `source`: the mujoco.MjModel.
+
+    Bodies that the file has without joints are part of the one they are fixed to: several names of one Body. What is
+    fixed to the world has a Body only if something can touch it.
+    """
+
+    def __init__(self, world, source, report):
+        super().__init__(world, source, report)
+        self.groups = []  # of tree.py, one a body of the file
+        self.carriers = []  # bodies between several joints of one
 
     def frame(self, name):
         """The pose of the file's frame of a body, as MuJoCo's xpos and xquat: position (m, world), w x y z."""
@@ -168,3 +186,22 @@ class Loaded:
             value = np.atleast_1d(self.joints[name_of(self.source, "joint", index)].position)
             out[at : at + value.size] = value
         return out
+
+
+class LoadedStage(Loaded):
+    """A USD stage in a world: its frame has metres and z up (`stage_to_world`).
+
+    `bodies`: by the prim's path, those of rigid bodies, and the static ones of colliders that are of none; `joints`: the
+    world's Joint by the prim's path (coordinates in m and rad); `shapes`: by the collider's path; `source`: the
+    pxr.Usd.Stage.
+    """
+
+    def __init__(self, world, source, report, stage_to_world):
+        super().__init__(world, source, report)
+        self.stage_to_world = stage_to_world  #: pose of the stage's frame, whose lengths are in m then, in the world
+        self.frames = {}  # of bodies: the prim's frame in the Body's, by path
+
+    def frame(self, path):
+        """The pose of a body's prim, without its scale: position (m, world), w x y z."""
+        body = self.bodies[str(path)]
+        return mul(pose(body.position, body.orientation), self.frames[str(path)])

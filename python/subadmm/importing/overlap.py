@@ -19,6 +19,14 @@ def _one_mechanism(source, groups, a, b):
     return source.body_rootid[a] == source.body_rootid[b]
 
 
+def _depth(loaded, a, b, of_hulls):
+    """Of two geoms, m: MuJoCo's, or where one is several hulls here, of those."""
+    one, other = loaded.shapes[a], loaded.shapes[b]
+    if len(one) == len(other) == 1 or of_hulls <= 0:
+        return of_hulls
+    return max(-loaded.world.closest_points(x, y)["distance"] for x in one for y in other)
+
+
 def overlapping(loaded, data):
     """Pairs of bodies that overlap in the start state, deepest first: (body, body, depth in m, a geom of each)."""
     import mujoco
@@ -28,8 +36,10 @@ def overlapping(loaded, data):
     deepest = {}
     for k in range(data.ncon):
         a, b = (int(g) for g in data.contact[k].geom)
-        depth = -float(data.contact[k].dist)
-        if depth <= LEAST_DEPTH * source.stat.meansize or a not in loaded.shapes or b not in loaded.shapes:
+        if a not in loaded.shapes or b not in loaded.shapes:
+            continue
+        depth = _depth(loaded, a, b, -float(data.contact[k].dist))
+        if depth <= LEAST_DEPTH * source.stat.meansize:
             continue
         (one, a), (other, b) = sorted(((int(source.geom_bodyid[a]), a), (int(source.geom_bodyid[b]), b)))
         if groups[one] is not groups[other] and depth > deepest.get((one, other), (0.0,))[0]:

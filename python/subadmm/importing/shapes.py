@@ -2,11 +2,16 @@
 
 import numpy as np
 
+from ..decomposition import decompose, hull_of, volume_of
 from .filters import MOST_CLASSES, MOST_PAIRS, Filter, friction_of
-from .model import element, name_of
+from .model import element, name_of, world_name
 from .options import disabled
 from .overlap import leave_out
 from .poses import mul, pose
+
+
+#: Volume of a hull over the mesh's, up to which the report says nothing.
+MOST_FILLING = 1.1
 
 
 def _hull_points(source, mesh):
@@ -19,6 +24,13 @@ def _hull_points(source, mesh):
         begin = graph + 2 + count
         vertices = vertices[source.mesh_graph[begin : begin + count]]
     return vertices
+
+
+def _mesh(source, mesh):
+    """Vertices and triangles of a mesh."""
+    first, begin = source.mesh_vertadr[mesh], source.mesh_faceadr[mesh]
+    vertices = source.mesh_vert[first : first + source.mesh_vertnum[mesh]]
+    return np.array(vertices, dtype=np.float64), source.mesh_face[begin : begin + source.mesh_facenum[mesh]]
 
 
 def _heightfield(source, field):
@@ -34,58 +46,79 @@ def _heightfield(source, field):
 
 
 class Shapes:
-    """Makes shapes of geoms; hulls once a mesh."""
+    """Makes shapes of geoms; hulls once a mesh. threshold: of meshes that are to be several hulls (decompose)."""
 
-    def __init__(self, source):
+    def __init__(self, source, threshold=None):
         self.source = source
-        self._hulls = {}
+        self.threshold = threshold
+        self._hulls, self._parts, self._shares = {}, {}, {}
+        self.failed = {}  # meshes that are one hull because they could not be made several: why
 
     def _hull(self, mesh):
-        from .. import Error, hull
-
         if mesh not in self._hulls:
-            points = _hull_points(self.source, mesh)
-            try:
-                made = hull(points)
-            except Error:  # too many corners, or none that fit a polyhedron: once more with coarser faces
-                made = hull(points, merge=1e-3)
-            self._hulls[mesh] = made
+            self._hulls[mesh] = hull_of(_hull_points(self.source, mesh))
         return self._hulls[mesh].copy()
 
-    def make(self, geom):
-        """A Shape in its own frame. Raises subadmm.Error or ValueError."""
+    def _several(self, mesh):
+        from .. import Error
+
+        if mesh not in self._parts:
+            try:
+                self._parts[mesh] = decompose(_mesh(self.source, mesh), self.threshold)
+            except (Error, ValueError) as error:
+                self.failed[mesh] = str(error)
+                self._parts[mesh] = [self._hull(mesh)]
+        return [part.copy() for part in self._parts[mesh]]
+
+    def filling(self, geom):
+        """Volume of a mesh's hull over the mesh's own; 1 of other geoms, and of meshes that are not closed."""
+        from .. import mass_of
+
+        mesh = int(self.source.geom_dataid[geom])
+        if mesh not in self._hulls:
+            return 1.0
+        if mesh not in self._shares:
+            volume = volume_of(*_mesh(self.source, mesh)) or 0.0
+            whole = mass_of([self._hulls[mesh]], 1.0).mass
+            self._shares[mesh] = whole / volume if volume > 1e-6 * whole else 1.0
+        return self._shares[mesh]
+
+    def make(self, geom, moves):
+        """Its shapes, in their own frame: one, but for meshes of bodies that move. Raises subadmm.Error or ValueError."""
         import subadmm as s
         import mujoco
 
         g, size = mujoco.mjtGeom, [float(x) for x in self.source.geom_size[geom]]
         kind = g(int(self.source.geom_type[geom]))
         if kind == g.mjGEOM_PLANE:
-            return s.plane()
+            return [s.plane()]
         if kind == g.mjGEOM_SPHERE:
-            return s.sphere(size[0])
+            return [s.sphere(size[0])]
         if kind == g.mjGEOM_CAPSULE:
-            return s.capsule(size[0], size[1])
+            return [s.capsule(size[0], size[1])]
         if kind == g.mjGEOM_CYLINDER:
-            return s.cylinder(size[0], size[1])
+            return [s.cylinder(size[0], size[1])]
         if kind == g.mjGEOM_ELLIPSOID:
-            return s.ellipsoid(*size)
+            return [s.ellipsoid(*size)]
         if kind == g.mjGEOM_BOX:
-            return s.box(*size)
+            return [s.box(*size)]
         if kind == g.mjGEOM_MESH:
-            return self._hull(int(self.source.geom_dataid[geom]))
+            mesh = int(self.source.geom_dataid[geom])
+            return self._several(mesh) if moves and self.threshold is not None else [self._hull(mesh)]
         if kind == g.mjGEOM_HFIELD:
-            return _heightfield(self.source, int(self.source.geom_dataid[geom]))
+            return [_heightfield(self.source, int(self.source.geom_dataid[geom]))]
         raise ValueError("its kind is none of those that there are here")
 
 
-def add_shapes(loaded, data, overlaps):
-    """Shapes on all bodies, and which of them meet. overlaps: of one mechanism, 'ignore' or 'keep'."""
+def add_shapes(loaded, data, overlaps, threshold):
+    """Shapes on all bodies, and which of them meet. overlaps: of one mechanism, 'ignore' or 'keep'; threshold: as of
+    Shapes."""
     from .. import Error
 
     source, report, world = loaded.source, loaded.report, loaded.world
     if disabled(source, "CONTACT"):
         return
-    chosen, makes, statics, owner = Filter(source), Shapes(source), {}, {}
+    chosen, makes, statics, owner = Filter(source), Shapes(source, threshold), {}, {}
     if chosen.crowded:
         report.add(
             "contype, conaffinity",
@@ -98,24 +131,50 @@ def add_shapes(loaded, data, overlaps):
         group = loaded.groups[index]
         at = mul(group.frame_in_body(index), pose(source.geom_pos[geom], source.geom_quat[geom]))
         try:
-            shape = makes.make(geom)
-            shape.position, shape.orientation = at
-            shape.friction = 0.0 if source.geom_condim[geom] == 1 else float(source.geom_friction[geom, 0])
-            shape.category, shape.mask = chosen.category(geom), chosen.mask(geom)
+            shapes = makes.make(geom, group.kind != "static")
+            for shape in shapes:
+                shape.position, shape.orientation = at
+                shape.friction = 0.0 if source.geom_condim[geom] == 1 else float(source.geom_friction[geom, 0])
+                shape.category, shape.mask = chosen.category(geom), chosen.mask(geom)
             if group.kind == "static":
                 if index not in statics:
                     name = name_of(source, "body", index)
-                    statics[index] = loaded.bodies[name] = world.add_body(type="static", environment=-1, name=name[:63])
+                    statics[index] = loaded.bodies[name] = world.add_body(
+                        type="static", environment=-1, name=world_name(name)
+                    )
                 body = statics[index]
             else:
                 body = group.body
-            loaded.shapes[geom] = body.add_shape(shape)
+            loaded.shapes[geom] = [body.add_shape(shape) for shape in shapes]
             owner[geom] = body
         except (Error, ValueError) as error:
             report.add(element(source, "geom", geom), f"not carried over: {error}")
     _report_contact(loaded)
+    _report_hulls(loaded, makes)
     ignored = _ignore(loaded, data, owner, statics, overlaps)
     _set_friction(loaded, chosen, owner, ignored)
+
+
+def _named(source, geoms):
+    """As reports name several geoms."""
+    names = [name_of(source, "geom", g) for g in geoms]
+    return "geoms " + ", ".join(names[:8]) + (f" and {len(names) - 8} more" if len(names) > 8 else "")
+
+
+def _report_hulls(loaded, makes):
+    """Meshes of moving bodies that their hulls are much larger than."""
+    source = loaded.source
+    for mesh, reason in makes.failed.items():
+        loaded.report.add(element(source, "mesh", mesh), f"is one hull, not several: {reason}")
+    moving = [g for g in loaded.shapes if loaded.groups[int(source.geom_bodyid[g])].kind != "static"]
+    hollow = [g for g in moving if len(loaded.shapes[g]) == 1 and makes.filling(g) > MOST_FILLING]
+    if hollow:
+        most = max(makes.filling(g) for g in hollow)
+        loaded.report.add(
+            _named(source, hollow),
+            f"the convex hull of each mesh stands in, as in MuJoCo: up to {most:.2g} times its volume "
+            "(decompose=True: several hulls)",
+        )
 
 
 def _report_contact(loaded):
@@ -123,10 +182,9 @@ def _report_contact(loaded):
     geoms = list(loaded.shapes)
 
     def listed(what, mask):
-        names = [name_of(source, "geom", g) for g in geoms if mask(g)]
-        if names:
-            more = f" and {len(names) - 8} more" if len(names) > 8 else ""
-            report.add("geoms " + ", ".join(names[:8]) + more, what)
+        named = [g for g in geoms if mask(g)]
+        if named:
+            report.add(_named(source, named), what)
 
     listed("torsional and rolling friction (condim 4, 6) is not carried over", lambda g: source.geom_condim[g] > 3)
     listed("margin and gap are not carried over", lambda g: source.geom_margin[g] or source.geom_gap[g])
@@ -170,6 +228,12 @@ def _ignore(loaded, data, owner, statics, overlaps):
     return off
 
 
+def _set_pair(loaded, g, h, friction):
+    for one in loaded.shapes[g]:
+        for other in loaded.shapes[h]:
+            one.set_pair_friction(other, friction)
+
+
 def _set_friction(loaded, chosen, owner, ignored):
     """Friction of pairs where the world's rule, the geometric mean, is not the file's."""
     source, report = loaded.source, loaded.report
@@ -194,7 +258,7 @@ def _set_friction(loaded, chosen, owner, ignored):
                         continue
                     count += 1
                     if count <= MOST_PAIRS:
-                        loaded.shapes[g].set_pair_friction(loaded.shapes[h], want)
+                        _set_pair(loaded, g, h, want)
     if count > MOST_PAIRS:
         report.add("friction", f"of {count - MOST_PAIRS} pairs of geoms it is the geometric mean, not the larger one")
     for k in range(source.npair):
@@ -205,7 +269,7 @@ def _set_friction(loaded, chosen, owner, ignored):
             report.add(element(source, "pair", k), "not carried over: contact of its bodies is left out")
         else:
             mu = 0.0 if source.pair_dim[k] == 1 else float(source.pair_friction[k, 0])
-            loaded.shapes[g].set_pair_friction(loaded.shapes[h], mu)
+            _set_pair(loaded, g, h, mu)
             if source.pair_friction[k, 1] != source.pair_friction[k, 0] and source.pair_dim[k] > 1:
                 report.add(element(source, "pair", k), "friction has no directions here: the first of the two is taken")
             if source.pair_margin[k] or source.pair_gap[k]:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from . import chain
-from .model import LoadedJoint, element, name_of
+from .model import LoadedJoint, element, name_of, world_name
 from .options import disabled
 from .poses import IDENTITY, inverse, mul, pose, q_about, q_conjugate, q_matrix, q_mul, q_of_matrix, q_turn
 from .start import velocity_of_frame
@@ -100,7 +100,7 @@ def _add_body(loaded, data, group):
     """The world's body of a group, in the start state."""
     source, root = loaded.source, group.root
     start = mul(pose(data.xpos[root], data.xquat[root]), group.inertial)
-    name = name_of(source, "body", root)[:63]
+    name = world_name(name_of(source, "body", root))
     if group.kind == "kinematic":
         group.body = loaded.world.add_body(type="kinematic", position=start[0], orientation=start[1], name=name)
         return
@@ -247,7 +247,7 @@ def _add_carrier(loaded, group, motion, point, share):
         orientation=motion.pose[1],
         angular_velocity=motion.angular,
         linear_velocity=motion.linear + np.cross(motion.angular, q_turn(motion.pose[1], point)),
-        name=f"carrier of {name_of(loaded.source, 'body', group.root)}"[:63],
+        name=world_name(f"carrier of {name_of(loaded.source, 'body', group.root)}"),
     )
 
 

@@ -1,0 +1,68 @@
+"""Robots and scenes as scene files, which the subadmm command and other programs read (docs/scenes.md)."""
+
+import json
+import os
+
+from .importing import load
+from .importing.model import Report
+
+#: Suffixes of files that are loaded; all else is a scene's name, or the path of a scene file.
+MODELS = (".xml", ".mjcf", ".urdf", ".usd", ".usda", ".usdc", ".usdz")
+
+
+def open_source(source, **options):
+    """(world, report, joints) of a robot's file, a scene's name or a scene file. options: as of load(), for robots only.
+
+    report: what of the source is not in the world, or will not be in a scene file of it. joints: {name: place in the file's
+    list of joints and coordinate}, because joints have no names there.
+    """
+    from . import scene
+
+    if os.path.splitext(source)[1].lower() not in MODELS:
+        given = [name for name, value in options.items() if value]
+        if given:
+            raise ValueError(f"{given[0]}: a scene has none; it is of MJCF, URDF or USD files")
+        world, report = scene(source), Report()
+        if world.has_script:
+            report.add(f"scene {source}", "its script, which moves things as it runs, is not in the file")
+        if world.tasks:
+            report.add(f"scene {source}", "what it measures of its own success is not in the file")
+        return world, report, {}
+    loaded = load(source, **options)
+    report = Report(loaded.report)
+    if loaded.actuators:
+        report.add("actuators", "are drives of joints in the file, with the controls that they have now")
+    return loaded.world, report, joints_of(loaded)
+
+
+def joints_of(loaded):
+    """{name: {"joint": place in the world's list, "coordinate": index or None}} of what was loaded."""
+    out = {}
+    for name, joint in loaded.joints.items():
+        if not hasattr(joint, "joint"):  # a stage's are the world's own
+            out[name] = {"joint": joint.index, "coordinate": None}
+        elif joint.joint is not None:  # a free body's is none
+            out[name] = {"joint": joint.joint.index, "coordinate": joint.coordinate}
+    return out
+
+
+def convert(source, path, *, report=None, duration=None, **options):
+    """Write a robot, or a scene, as a scene file at `path`, and return the report (a list of (element, reason)).
+
+    source: an MJCF, URDF or USD file, a scene's name ("pile:300") or a scene file. report: a file to write the report to, as
+    JSON, with the joints' places in the scene file. duration: how long the scene is meant to be run for, s (default: the
+    scene's, 10). Other options: as of load().
+    """
+    world, notes, joints = open_source(os.fspath(source), **options)
+    named = {}
+    if world.duration is None:  # no scene of the library and no scene file
+        named = {"name": os.path.splitext(os.path.basename(source))[0], "description": f"from {os.path.basename(source)}"}
+    text = world.to_json(duration=duration, **named)
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text)
+    if report is not None:
+        said = {"not_carried_over": [note._asdict() for note in notes], "joints": joints}
+        with open(report, "w", encoding="utf-8") as file:
+            json.dump(said, file, indent=1, ensure_ascii=False)
+            file.write("\n")
+    return notes

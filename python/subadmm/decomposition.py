@@ -1,0 +1,82 @@
+"""Meshes as sets of convex hulls, by the package coacd (the extra `decompose` of the package)."""
+
+import numpy as np
+
+from . import _core
+
+#: Share of a mesh's size that its hulls may be off by, where nothing else is said: coacd's own default.
+THRESHOLD = 0.05
+
+
+def vertices_and_triangles(mesh):
+    """Of a Shape that is a mesh or a hull, of a pair, or of an object with vertices and faces, as trimesh has them."""
+    if isinstance(mesh, _core.Shape):
+        geometry = mesh.geometry()
+        if geometry is None:
+            raise ValueError(f"mesh: a {mesh.type} has no triangles")
+        vertices, triangles = geometry
+    elif hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
+        vertices, triangles = mesh.vertices, mesh.faces
+    else:
+        vertices, triangles = mesh
+    vertices = np.ascontiguousarray(vertices, dtype=np.float64).reshape(-1, 3)
+    triangles = np.ascontiguousarray(triangles, dtype=np.int32).reshape(-1, 3)
+    if len(triangles) == 0 or triangles.min() < 0 or triangles.max() >= len(vertices):
+        raise ValueError(f"mesh: triangles must be of vertices in [0, {len(vertices)}), one at least")
+    return vertices, triangles
+
+
+def volume_of(vertices, triangles):
+    """m^3, of what a mesh encloses; None of one that is not closed."""
+    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    # Closed: each edge is walked as often one way as the other. Corners at the same place are one.
+    _, same = np.unique(vertices, axis=0, return_inverse=True)
+    edges = same.reshape(-1)[edges]
+    there = np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0, return_counts=True)
+    back = np.unique(edges[edges[:, 0] != edges[:, 1]][:, ::-1], axis=0, return_counts=True)
+    if not all(np.array_equal(a, b) for a, b in zip(there, back)):
+        return None
+    a, b, c = (vertices[triangles[:, k]] - vertices[0] for k in range(3))
+    return float(np.sum(np.cross(a, b) * c)) / 6
+
+
+def decompose(mesh, threshold=THRESHOLD, *, most=None, seed=0, **options):
+    """A mesh as a list of hull shapes that together are close to it, by coacd (pip install subadmm[decompose]).
+
+    mesh: a Shape made by subadmm.mesh, a pair (vertices n x 3 in m, triangles m x 3), or an object with `vertices` and
+    `faces` (trimesh). threshold: concavity that may remain, in [0.01, 1], as a share of the mesh's size; smaller ones make
+    more hulls and take longer. most: hulls at most; None: no bound. seed: of coacd's search; the same seed, the same
+    hulls. Other options are those of shapes (friction ...), given to all of them; those of `mesh`, where it is a Shape,
+    stand in where none are given.
+
+    Raises ImportError (no coacd), ValueError (arguments), subadmm.Error (a part that is no solid).
+    """
+    if not 0.01 <= threshold <= 1:
+        raise ValueError(f"threshold: {threshold} is not in [0.01, 1]")
+    if most is not None and most < 1:
+        raise ValueError(f"most: {most} must be 1 or more")
+    vertices, triangles = vertices_and_triangles(mesh)
+    try:
+        import coacd
+    except ImportError as error:
+        raise ImportError("subadmm.decompose needs the package coacd: pip install subadmm[decompose]") from error
+    coacd.set_log_level("error")
+    parts = coacd.run_coacd(
+        coacd.Mesh(vertices, triangles), threshold=threshold, max_convex_hull=-1 if most is None else most, seed=seed
+    )
+    if not parts:
+        raise ValueError("mesh: coacd makes no parts of it")
+    if isinstance(mesh, _core.Shape):
+        own = ("position", "orientation", "friction", "restitution", "category", "mask")
+        options = {name: getattr(mesh, name) for name in own} | options
+    return [hull_of(points, **options) for points, _ in parts]
+
+
+def hull_of(points, **options):
+    """A hull, with coarser faces where it has too many corners, or none that fit a polyhedron."""
+    from . import Error, hull
+
+    try:
+        return hull(points, **options)
+    except Error:
+        return hull(points, merge=1e-3, **options)

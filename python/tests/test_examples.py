@@ -1,0 +1,48 @@
+"""The examples in Python do what they say."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def example(name):
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_falling_box(capsys):
+    force, weight = example("falling_box").main()
+    assert force == pytest.approx(weight, rel=1e-6)
+    assert "4 contacts" in capsys.readouterr().out
+
+
+def test_thousand_grippers(capsys):
+    grippers = example("thousand_grippers")
+    held, slip = grippers.main(["--count", "15", "--backend", "cpu"])
+    assert held.all() and slip.max() < 1e-4  # fingers and couplings are springs: they give by some hundredths of a mm
+    assert "15 of 15 hold" in capsys.readouterr().out
+    grippers.SQUEEZE = 0.0  # fingers that only touch hold nothing
+    held, _ = grippers.main(["--count", "6", "--backend", "cpu"])
+    assert not held.any()
+
+
+@pytest.mark.parametrize("mass, lifted", [(0.2, True), (4.0, False)])
+def test_arm_lifts_cube(mass, lifted, capsys):
+    """Two fingers of 10.5 N with friction 1 hold 21 N: 0.2 kg, and not 4."""
+    pytest.importorskip("mujoco")
+    if importlib.util.find_spec("gymnasium_robotics") is None:
+        pytest.skip("the arm's model is in gymnasium-robotics")
+    up, height, slip = example("arm_lifts_cube").main(["--mass", str(mass)])
+    assert up == lifted
+    if lifted:  # 2 mm: the last of the way that the arm is behind
+        assert height == pytest.approx(0.25, abs=2e-3) and slip < 2e-4
+    else:
+        assert height < 0.01
+    assert ("not lifted" in capsys.readouterr().out) != lifted
