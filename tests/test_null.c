@@ -297,6 +297,8 @@ static void on_steps(void)
     REFUSES("world", sadmm_world_contacts(NULL, 0, 1, &contact));
     ck_assert_int_gt(sadmm_world_contact_count(world), 0);
     REFUSES("contacts", sadmm_world_contacts(world, 0, 1, NULL));
+    REFUSES("world", sadmm_world_contact_errors(NULL, 0, 1, &contact.gap));
+    REFUSES("errors", sadmm_world_contact_errors(world, 0, 1, NULL));
     REFUSES("world", sadmm_world_state_hash(NULL, &hash));
     REFUSES("hash", sadmm_world_state_hash(world, NULL));
     ck_assert_uint_eq(sadmm_world_explain(NULL, text, sizeof text), 0);

@@ -55,7 +55,8 @@ void hold_parts(shape_def &shape);
 struct world {
     sadmm_world *handle = nullptr;
     std::mutex mutex;
-    bool scripted = false;
+    bool scripted = false; // is there a script?
+    bool script_on = true; // does it act?
     sadmm_scene scene{};
     sadmm_scene_result result{};
     int64_t steps = 0; // of the scene
