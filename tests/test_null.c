@@ -501,7 +501,7 @@ static const struct {
      {"sadmm_query_filter_default", W(cast_ray), W(cast_ray_all), W(cast_rays), W(overlap_box), W(overlap_shape),
       W(closest_points), W(closest_to_shape)}},
     {on_steps,
-     {W(step), W(step_async), W(wait), W(report), W(contact_count), W(contacts), W(state_hash), W(explain), W(freeze)}},
+     {W(step), W(step_async), W(wait), W(report), W(contact_count), W(contacts), W(contact_errors), W(state_hash), W(explain), W(freeze)}},
     {on_problems,
      {P(create), P(destroy), P(message), P(set_bodies), P(set_contacts), P(set_blocks), P(body_count), P(contact_count),
       P(block_count), P(get_bodies), P(get_contact), P(get_block), P(set_device), P(set_tasks), P(solve),
