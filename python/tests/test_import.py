@@ -627,3 +627,30 @@ def test_urdf_moments_that_no_solid_has_are_mended_and_the_base_stays_a_body(tmp
     assert any("arm" in note.element and "moment" in note.reason for note in robot.report)
     # The hand is 50 mm deep in the base, two joints away: of one mechanism.
     assert any("'base'" in note.element and "'hand'" in note.element and "left out" in note.reason for note in robot.report)
+
+
+def test_locks_of_carriers_give_as_those_of_their_bodies():
+    """The second body has two hinges, with a carrier of 1e-4 of its mass: a billionth of what its weight would move the
+    carrier by is 2e-7 m/s, of what it would move the bodies by 1e-11."""
+    text = """
+    <mujoco>
+      <option timestep="0.002"/>
+      <worldbody>
+        <body><joint axis="0 1 0"/><geom type="capsule" size="0.05 0.2" pos="0 0 -0.25" mass="5"/>
+          <body pos="0 0 -0.5">
+            <joint axis="0 1 0" pos="0 0 0"/><joint axis="0.6 0.8 0" pos="0.01 0 0"/>
+            <geom type="capsule" size="0.05 0.2" pos="0 0 -0.25" mass="5" contype="0"/>
+          </body>
+        </body>
+      </worldbody>
+    </mujoco>"""
+    robot = subadmm.load(mujoco.MjModel.from_xml_string(text))
+    assert len(robot.carriers) == 1
+    settings = robot.world.settings
+    settings.certify = True
+    robot.world.settings = settings
+    worst = 0
+    for _ in range(50):
+        robot.world.step()
+        worst = max(worst, robot.world.report.certificate.ncp_max)
+    assert worst < 5e-9
