@@ -319,6 +319,8 @@ static void on_steps(void)
     REFUSES("world", sadmm_world_contacts(NULL, 0, 1, &contact));
     ck_assert_int_gt(sadmm_world_contact_count(world), 0);
     REFUSES("contacts", sadmm_world_contacts(world, 0, 1, NULL));
+    REFUSES("world", sadmm_world_contact_errors(NULL, 0, 1, &contact.gap));
+    REFUSES("errors", sadmm_world_contact_errors(world, 0, 1, NULL));
     REFUSES("world", sadmm_world_state_hash(NULL, &hash));
     REFUSES("hash", sadmm_world_state_hash(world, NULL));
     ck_assert_uint_eq(sadmm_world_explain(NULL, text, sizeof text), 0);
@@ -522,7 +524,7 @@ static const struct {
       W(closest_points), W(closest_to_shape)}},
     {on_events, {W(record_events), W(event_capacity), W(event_count), W(take_events), W(sensor_overlaps)}},
     {on_steps,
-     {W(step), W(step_async), W(wait), W(report), W(contact_count), W(contacts), W(state_hash), W(explain), W(freeze)}},
+     {W(step), W(step_async), W(wait), W(report), W(contact_count), W(contacts), W(contact_errors), W(state_hash), W(explain), W(freeze)}},
     {on_problems,
      {P(create), P(destroy), P(message), P(set_bodies), P(set_contacts), P(set_blocks), P(body_count), P(contact_count),
       P(block_count), P(get_bodies), P(get_contact), P(get_block), P(set_device), P(set_tasks), P(solve),

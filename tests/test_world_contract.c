@@ -387,6 +387,47 @@ END_TEST
 
 /* ---- reports ----------------------------------------------------------------------------------------------------- */
 
+/* Errors of contacts are what the certificate is the largest of; there are none where it was not asked for, nor after
+ * the world is another one. */
+START_TEST(errors_of_contacts_are_the_certificates)
+{
+    struct sadmm_scene scene = open_scene("pile:10");
+    scene.def.settings.certify = true;
+    scene.def.settings.iterations = 4; /* so that there are errors */
+    sadmm_world *world = build_scene(&scene);
+    step_world(world, 200);
+    const int32_t count = sadmm_world_contact_count(world);
+    double errors[256] = {0}, largest = 0, sum = 0;
+    ck_assert(count > 10 && count <= 256);
+    MUST(world, sadmm_world_contact_errors(world, 0, count, errors));
+    for (int32_t k = 0; k < count; ++k) largest = fmax(largest, errors[k]), sum += errors[k];
+    const sadmm_certificate certificate = world_report(world).certificate;
+    ck_assert(largest > 0 && largest == certificate.ncp_max); /* there are no joints */
+    ck_assert(errors[certificate.ncp_worst] == largest && sum == certificate.ncp_mean * count);
+    double last = -1;
+    MUST(world, sadmm_world_contact_errors(world, count - 1, 1, &last));
+    ck_assert(last == errors[count - 1]);
+    REFUSED(world, sadmm_world_contact_errors(world, 1, count, errors), "[first, first + count)");
+
+    size_t size;
+    MUST(world, sadmm_world_save(world, NULL, 0, &size));
+    void *saved = malloc(size);
+    MUST(world, sadmm_world_save(world, saved, size, &size));
+    MUST(world, sadmm_world_restore(world, saved, size));
+    ck_assert_int_eq(sadmm_world_contact_errors(world, 0, count, errors), SADMM_ERROR_UNAVAILABLE);
+    free(saved);
+    sadmm_settings settings = sadmm_world_settings(world);
+    settings.certify = false;
+    step_world(world, 1);
+    MUST(world, sadmm_world_contact_errors(world, 0, 1, errors));
+    MUST(world, sadmm_world_set_settings(world, &settings));
+    step_world(world, 1);
+    ck_assert_int_eq(sadmm_world_contact_errors(world, 0, 1, errors), SADMM_ERROR_UNAVAILABLE);
+    ck_assert_ptr_nonnull(strstr(sadmm_world_message(world), "settings.certify"));
+    sadmm_world_destroy(world);
+}
+END_TEST
+
 /* Asked for, the residuals are those of the last iteration, whatever ended it; and nothing else changes. */
 START_TEST(residuals_are_measured_when_a_stop_rule_ends_the_step)
 {
@@ -483,6 +524,7 @@ int main(void)
     tcase_add_test(cases, user_data_goes_with_the_body);
     tcase_add_loop_test(cases, inertias_that_are_taken_can_be_stepped, 0, 2);
     tcase_add_loop_test(cases, residuals_are_measured_when_a_stop_rule_ends_the_step, 0, 2);
+    tcase_add_test(cases, errors_of_contacts_are_the_certificates);
     tcase_add_test(cases, environments_leave_nothing_behind);
     tcase_add_test(cases, settings_are_compared_by_their_members);
     suite_add_tcase(suite, cases);

@@ -372,6 +372,10 @@ typedef struct sadmm_contact {
 SADMM_API int32_t sadmm_world_contact_count(sadmm_world *world);
 /* Copy contacts [first, first + count) of the last step. Errors: INVALID_ARGUMENT (range), OUT_OF_MEMORY, DEVICE. */
 SADMM_API sadmm_status sadmm_world_contacts(sadmm_world *world, int32_t first, int32_t count, sadmm_contact *contacts);
+/* Of the same contacts the natural map, m/s (docs/algorithm.md, section 5): how far each is from its law. The largest
+ * of them and of the joints' is the certificate's ncp_max. Errors: INVALID_ARGUMENT (range), UNAVAILABLE (the last step
+ * was made without settings.certify, or the world was restored since), DEVICE. */
+SADMM_API sadmm_status sadmm_world_contact_errors(sadmm_world *world, int32_t first, int32_t count, double *errors);
 
 /* 64-bit hash of all live bodies' poses and velocities (bit patterns, in slot order). Nothing is written after an
  * error. Errors: those of the steps waited for, OUT_OF_MEMORY, DEVICE. */

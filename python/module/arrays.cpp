@@ -78,6 +78,17 @@ static nb::object contacts(world &w)
     return nb::bytes((const char *)all.data(), all.size() * sizeof(sadmm_contact));
 }
 
+static nb::object contact_errors(world &w)
+{
+    std::vector<double> all;
+    call(w, [&](sadmm_world *h) {
+        all.resize((size_t)sadmm_world_contact_count(h));
+        return sadmm_world_contact_errors(h, 0, (int32_t)all.size(), all.data());
+    });
+    const size_t count = all.size();
+    return numpy_of(std::move(all), {count});
+}
+
 static nb::list contact_members()
 {
     nb::list out;
@@ -134,4 +145,6 @@ void bind_arrays(nb::module_ &m, nb::class_<world> &w)
         return numpy_of(std::move(rows), {count});
     }, "Index of each dynamic body, ascending.");
     w.def("_contacts", &contacts);
+    w.def("contact_errors", &contact_errors,
+          "Natural map of each of contacts(), m/s: how far it is from its law. Unavailable where settings.certify is off.");
 }

@@ -55,8 +55,9 @@ void hold_parts(shape_def &shape);
 struct world {
     sadmm_world *handle = nullptr;
     std::mutex mutex;
-    bool scripted = false;
-    std::string spec; // of the scene; of one from a text: none
+    bool scripted = false; // is there a script?
+    bool script_on = true; // does it act?
+    std::string spec;      // of the scene; of one from a text: none
     sadmm_scene scene{};
     sadmm_scene_result result{};
     int64_t steps = 0; // of the scene

@@ -185,6 +185,13 @@ static sadmm_coupling_state state_of(const coupling &c)
     return state;
 }
 
+static sadmm_coupling_def def_of(const coupling &c)
+{
+    sadmm_coupling_def def;
+    call(*c.w, [&](sadmm_world *h) { return sadmm_world_coupling_def(h, c.id, &def); });
+    return def;
+}
+
 static void bind_coupling(nb::module_ &m)
 {
     nb::class_<coupling>(m, "Coupling", "A spring and damper that ties a body to a target pose.")
@@ -196,6 +203,12 @@ static void bind_coupling(nb::module_ &m)
             call(*c.w, [&](sadmm_world *h) { return sadmm_world_coupling_index(h, c.id, &index); });
             return index;
         }, "Row of the world's arrays.")
+        .def_prop_ro("body", [](const coupling &c) { return body{c.owner, c.w, def_of(c).body}; })
+        .def_prop_ro("frame", [](const coupling &c) { const auto d = def_of(c); return std::make_pair(array_of<3>(d.position), array_of<4>(d.orientation)); }, "(position, orientation) on the body, in its body frame.")
+        .def_prop_ro("target", [](const coupling &c) { const auto d = def_of(c); return std::make_pair(array_of<3>(d.target_position), array_of<4>(d.target_orientation)); }, "(position, orientation) now, world.")
+        .def_prop_ro("max_force", [](const coupling &c) { return def_of(c).max_force; }, "N, along each axis of the target.")
+        .def_prop_ro("max_torque", [](const coupling &c) { return def_of(c).max_torque; }, "N m.")
+        .def_prop_ro("enabled", [](const coupling &c) { return def_of(c).enabled; })
         .def("set_target", [](const coupling &c, vec3 x, quat q, std::optional<vec6> v) {
             call(*c.w, [&](sadmm_world *h) { return sadmm_world_set_coupling_target(h, c.id, x.data(), q.data(), v ? v->data() : nullptr); });
         }, "position"_a, "orientation"_a = quat{1, 0, 0, 0}, "velocity"_a = nb::none(), "The target at the present time, world frame; velocity: linear, angular.")

@@ -117,5 +117,12 @@ void bind_scenes(nb::module_ &m, nb::class_<world> &w)
     w.def_prop_ro("duration", [](world &w) -> nb::object {
         return w.scripted ? nb::cast(w.scene.duration) : nb::none();
     }, "Of a scene: how long it is meant to be run for, s; None of other worlds.");
+    w.def_prop_rw("script", [](world &w) { return w.scripted && w.script_on; },
+                  [](world &w, bool on) {
+                      if (on && !w.scripted) throw nb::value_error("script: the world has none; only a scene's world can have one");
+                      w.script_on = on;
+                  },
+                  "Does a scene's script act: the motions that come with its steps, and what it measures? Switched off, joints' and\n"
+                  "couplings' targets are the caller's; on again, it goes on at the time that has come by then.");
     w.def_prop_ro("tasks", &result, "Of a scene: what it measures of its own success, after steps that were waited for.");
 }

@@ -26,7 +26,8 @@ static sadmm_status step_once(world &w, bool wait, std::string &message)
 {
     sadmm_error error{};
     sadmm_status status = SADMM_OK;
-    if (w.scripted) {
+    const bool script = w.scripted && w.script_on;
+    if (script) {
         status = sadmm_scene_before_step(&w.scene, w.handle, w.steps, &error);
         message = error.message;
     }
@@ -35,7 +36,7 @@ static sadmm_status step_once(world &w, bool wait, std::string &message)
         if (status != SADMM_OK) message = sadmm_world_message(w.handle);
     }
     if (status == SADMM_OK) ++w.steps;
-    if (status == SADMM_OK && w.scripted && wait) {
+    if (status == SADMM_OK && script && wait) {
         status = sadmm_scene_observe(&w.scene, w.handle, w.steps, &w.result, &error);
         message = error.message;
     }

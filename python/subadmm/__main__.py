@@ -4,6 +4,7 @@ import sys
 import time
 
 import subadmm
+from subadmm.convert import MODELS
 
 
 def _arguments():
@@ -15,7 +16,7 @@ def _arguments():
     )
     picture = commands.add_parser("picture", help="run a scene and write a picture of its end (.png)")
     for command in (view, record, picture):
-        command.add_argument("scene", help="as 'pile:300'; the names: subadmm.scenes()")
+        command.add_argument("scene", help="as 'pile:300', the names: subadmm.scenes(); or a file, .json, .xml, .urdf or .usd...")
         command.add_argument("--backend", default="auto", choices=["auto", "ref", "cpu", "cuda"])
         command.add_argument("--precision", choices=["f32", "f64"], help="default: the scene's")
         command.add_argument("--method", choices=["fast", "paper"], help="default: the scene's")
@@ -26,6 +27,8 @@ def _arguments():
         length.add_argument("--seconds", type=float, help="simulated time; default: the scene's duration")
         length.add_argument("--steps", type=int, help="instead of --seconds")
     record.add_argument("--fps", type=float, default=30, help="frames a simulated second (30)")
+    record.add_argument("--contacts", type=int, default=0, metavar="N",
+                        help="keep the N largest contact forces of each frame, for arrows in the page (0)")
     record.add_argument("--certify", action="store_true", help="measure the true error of every step, for the plots")
     picture.add_argument("--size", default="960x600", help="WIDTHxHEIGHT in pixels (960x600)")
     picture.add_argument("--azimuth", type=float, default=-60, help="where the camera stands, degrees (-60)")
@@ -45,13 +48,16 @@ def _arguments():
     return parser
 
 
+_DURATION = 10.0  # s, of worlds that do not say
+
+
 def _steps(world, given):
     """How many to make."""
     if given.steps is not None:
         if given.steps < 0:
             raise ValueError(f"--steps: {given.steps}; must be 0 or more")
         return given.steps
-    seconds = world.duration if given.seconds is None else given.seconds
+    seconds = given.seconds if given.seconds is not None else world.duration or _DURATION
     if not 0 <= seconds < float("inf"):
         raise ValueError(f"--seconds: {seconds}; must be 0 or more")
     return round(seconds / world.settings.dt)
@@ -77,7 +83,8 @@ def _record(world, given):
 
     if not given.output.endswith((".html", ".glb")):
         raise ValueError(f"--output: {given.output}; must end in .html or .glb")
-    show.record(world, _steps(world, given) * dt, given.fps, title=given.scene, after_frame=progress).save(given.output)
+    show.record(world, _steps(world, given) * dt, given.fps, title=given.scene, contacts=given.contacts,
+                after_frame=progress).save(given.output)
 
 
 def _picture(world, given):
@@ -115,6 +122,13 @@ def main(arguments=None):
 
     def build():
         settings = {} if given.iterations is None else {"iterations": given.iterations}
+        if given.scene.endswith(MODELS):
+            world = subadmm.load(given.scene, backend=given.backend, precision=given.precision or "f64").world
+            changed = world.settings
+            for name, value in {**settings, **({"method": given.method} if given.method else {})}.items():
+                setattr(changed, name, value)
+            world.settings = changed
+            return world
         return subadmm.scene(given.scene, backend=given.backend, precision=given.precision, method=given.method,
                              settings=settings)
 

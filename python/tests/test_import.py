@@ -569,3 +569,119 @@ def test_fingers_tied_on_a_hand_that_moves(left, right, polycoef, wheel):
         if n > 20:  # what it is off at the start has been drawn in; locks give by 1e-9 of what would move their bodies
             assert l == pytest.approx(a0 + a1 * r, abs=1e-6)
     assert abs(l - a0) > 1e-3 and abs(robot.joints["shoulder"].position) > 0.1  # all of it has moved
+
+
+# ---- what models have that others do not ---------------------------------------------------------------------------
+
+GRIPPER = """
+<mujoco>
+  <option timestep="0.001" gravity="0 0 0"/>
+  <worldbody>
+    <body name="left"><joint name="l" axis="0 0 1" armature="0.01"/><geom type="box" size="0.1 0.01 0.01" mass="0.1"/></body>
+    <body name="right" pos="1 0 0">
+      <joint name="r" axis="0 0 1" armature="0.01" ref="0.3"/><geom type="box" size="0.1 0.01 0.01" mass="0.2"/>
+    </body>
+  </worldbody>
+  <tendon><fixed name="split"><joint joint="l" coef="0.5"/><joint joint="r" coef="-0.25"/></fixed></tendon>
+  <equality>TIE</equality>
+  <actuator><general name="close" tendon="split" gainprm="2" biastype="affine" biasprm="0.05 -5 -0.4" ctrlrange="0 1"/></actuator>
+</mujoco>
+"""
+TIE = '<joint joint1="r" joint2="l" polycoef="0.1 -0.8 0 0 0" solref="0.002 1"/>'
+
+
+def test_servos_of_tendons_act_on_joints_that_are_tied():
+    """As MuJoCo does: the tie there is soft, which is most of the difference."""
+    model = mujoco.MjModel.from_xml_string(GRIPPER.replace("TIE", TIE))
+    data = mujoco.MjData(model)
+    robot = subadmm.load(model)
+    assert not [note for note in robot.report if "actuator" in note.element]
+    robot.actuators["close"].control = data.ctrl[0] = 1
+    for _ in range(4):
+        mujoco.mj_step(model, data, 500)
+        robot.world.step(500)
+        assert abs(robot.positions() - data.qpos).max() < 5e-3
+    # At rest 2 ctrl + 0.05 = 5 length, and the tie holds.
+    left, right = robot.positions()
+    assert 0.5 * left - 0.25 * right == pytest.approx(2.05 / 5, abs=1e-6)
+    assert right - np.radians(0.3) == pytest.approx(0.1 - 0.8 * left, abs=1e-6)
+
+
+def test_servos_of_tendons_over_joints_that_are_not_tied_are_reported():
+    robot = subadmm.load(mujoco.MjModel.from_xml_string(GRIPPER.replace("TIE", "")))
+    assert "tied" in next(note.reason for note in robot.report if note.element == "actuator 'close'")
+    assert not robot.actuators
+
+
+def test_contact_that_no_joint_can_part_is_left_out():
+    """A disc on two slides, 0.2 mm deep in the floor: less than what counts where a joint can mend it."""
+    text = """
+    <mujoco>
+      <option timestep="0.002"/>
+      <worldbody>
+        <geom type="plane" size="1 1 1"/>
+        <body name="disc" pos="0 0 0.0098">
+          <joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/>JOINT
+          <geom type="cylinder" size="0.1 0.01"/>
+        </body>
+      </worldbody>
+    </mujoco>"""
+    held = subadmm.load(mujoco.MjModel.from_xml_string(text.replace("JOINT", "")))
+    assert [note.element for note in held.report if "overlap" in note.reason] == ["contact of body 'world' and body 'disc'"]
+    settings = held.world.settings
+    settings.certify = True
+    held.world.settings = settings
+    held.world.step(10)  # its weight times a billionth, which locks give, is 2e-11 m/s
+    assert held.world.report.contacts == 0 and held.world.report.certificate.ncp_max < 1e-10
+    free = subadmm.load(mujoco.MjModel.from_xml_string(text.replace("JOINT", '<joint type="slide" axis="0 0 1"/>')))
+    assert not [note for note in free.report if "overlap" in note.reason]
+    free.world.step(10)
+    assert free.world.report.contacts > 0
+
+
+def test_urdf_moments_that_no_solid_has_are_mended_and_the_base_stays_a_body(tmp_path):
+    def link(name, moments, extra=""):
+        ixx, iyy, izz = moments
+        return (f'<link name="{name}"><inertial><mass value="1"/><inertia ixx="{ixx}" iyy="{iyy}" izz="{izz}" ixy="0" '
+                f'ixz="0" iyz="0"/></inertial><collision>{extra}<geometry><box size="0.2 0.2 0.2"/></geometry></collision>'
+                "</link>")
+
+    path = tmp_path / "robot.urdf"
+    path.write_text(
+        '<robot name="r"><mujoco><compiler discardvisual="true"/></mujoco>' + link("base", (1, 1, 1))
+        + link("arm", (0.1, 0.1, 0.4), '<origin xyz="1 0 0"/>') + link("hand", (0.1, 0.1, 0.1))
+        + '<joint name="a" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/></joint>'
+        '<joint name="b" type="continuous"><parent link="arm"/><child link="hand"/><axis xyz="0 0 1"/>'
+        '<origin xyz="0.15 0 0"/></joint></robot>')
+    robot = subadmm.load(str(path))
+    assert robot.bodies["arm"].inertia == pytest.approx([0.2] * 3)
+    assert any("arm" in note.element and "moment" in note.reason for note in robot.report)
+    # The hand is 50 mm deep in the base, two joints away: of one mechanism.
+    assert any("'base'" in note.element and "'hand'" in note.element and "left out" in note.reason for note in robot.report)
+
+
+def test_locks_of_carriers_give_as_those_of_their_bodies():
+    """The second body has two hinges, with a carrier of 1e-4 of its mass: a billionth of what its weight would move the
+    carrier by is 2e-7 m/s, of what it would move the bodies by 1e-11."""
+    text = """
+    <mujoco>
+      <option timestep="0.002"/>
+      <worldbody>
+        <body><joint axis="0 1 0"/><geom type="capsule" size="0.05 0.2" pos="0 0 -0.25" mass="5"/>
+          <body pos="0 0 -0.5">
+            <joint axis="0 1 0" pos="0 0 0"/><joint axis="0.6 0.8 0" pos="0.01 0 0"/>
+            <geom type="capsule" size="0.05 0.2" pos="0 0 -0.25" mass="5" contype="0"/>
+          </body>
+        </body>
+      </worldbody>
+    </mujoco>"""
+    robot = subadmm.load(mujoco.MjModel.from_xml_string(text))
+    assert len(robot.carriers) == 1
+    settings = robot.world.settings
+    settings.certify = True
+    robot.world.settings = settings
+    worst = 0
+    for _ in range(50):
+        robot.world.step()
+        worst = max(worst, robot.world.report.certificate.ncp_max)
+    assert worst < 5e-9

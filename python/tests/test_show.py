@@ -1,24 +1,20 @@
 """Meshes, pictures and recordings of worlds."""
 import base64
 import json
-import os
 import re
-import shutil
 import struct
-import subprocess
 import zlib
 
 import numpy as np
 import pytest
 
 import subadmm
+from browser import decoded
 from subadmm import show
 from subadmm.__main__ import main
 from subadmm.show import page, png, recording
 from subadmm.show.raster import rasterise
 from subadmm.show.session import Session
-
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
 try:
     TETRAHEDRON = subadmm.hull([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)])
@@ -85,32 +81,6 @@ def test_the_nearest_triangle_is_seen_and_triangles_that_share_an_edge_leave_no_
     assert seen[20, 12] == 2 and depth[20, 12] == 1 and depth[2, 20] == 2 and not (seen == 3).any()
 
 
-def decoded(data):
-    """Pixels of a PNG of 8-bit colours."""
-    at, body = 8, b""
-    while at < len(data):
-        size, kind = struct.unpack(">I4s", data[at:at + 8])
-        chunk = data[at + 8:at + 8 + size]
-        if kind == b"IHDR":
-            width, height, depth, colours = struct.unpack(">IIBB", chunk[:10])
-        body += chunk if kind == b"IDAT" else b""
-        at += 12 + size
-    assert depth == 8 and colours in (2, 6)
-    size = 3 if colours == 2 else 4
-    rows = np.frombuffer(zlib.decompress(body), np.uint8).reshape(height, -1)
-    above, out = [0] * (size * width), np.zeros((height, size * width), np.uint8)
-    for y in range(height):
-        kind, line = int(rows[y, 0]), rows[y, 1:].tolist()
-        for x in range(size * width):
-            left, corner = (line[x - size], above[x - size]) if x >= size else (0, 0)
-            up = above[x]
-            guess = left + up - corner
-            near = min((abs(guess - left), 0, left), (abs(guess - up), 1, up), (abs(guess - corner), 2, corner))[2]
-            line[x] = (line[x] + (0, left, up, (left + up) // 2, near)[kind]) & 255
-        out[y], above = line, line
-    return out.reshape(height, width, size)[:, :, :3]
-
-
 def test_png_files_have_the_pixels():
     pixels = np.random.default_rng(3).integers(0, 256, (13, 17, 3)).astype(np.uint8)
     assert (decoded(png.png_of(pixels)) == pixels).all()
@@ -149,6 +119,7 @@ def test_what_is_wrong_is_said(tmp_path, capsys):
         (lambda: show.picture(world, width=4), "width: 4"),
         (lambda: show.record(world, 0), "seconds: 0"),
         (lambda: show.record(world, 1, fps=-1), "fps: -1"),
+        (lambda: show.record(world, 1, contacts=-1), "contacts: -1"),
         (lambda: show.record(world, 1).save("x.txt"), "x.txt"),
     ]:
         with pytest.raises(ValueError, match=said):
@@ -241,34 +212,61 @@ def test_ten_seconds_of_2000_bodies_are_less_than_10_megabytes():
     assert len(page.page_of(taken)) < 10e6
 
 
-@pytest.mark.skipif(not CHROMIUM, reason="there is no Chromium")
-def test_the_page_draws_in_a_browser_without_errors(tmp_path):
-    show.record(subadmm.scene("ragdolls:2", backend="cpu"), 0.5, title="dolls").save(tmp_path / "dolls.html")
-    shot = tmp_path / "shot.png"
-    done = subprocess.run(
-        [
-            CHROMIUM,
-            "--headless",
-            "--no-sandbox",
-            "--use-gl=angle",
-            "--use-angle=swiftshader",
-            "--enable-unsafe-swiftshader",
-            "--enable-logging=stderr",
-            "--window-size=320,240",
-            "--virtual-time-budget=2000",
-            f"--screenshot={shot}",
-            f"--user-data-dir={tmp_path / 'profile'}",
-            f"file://{tmp_path / 'dolls.html'}#t=0.3",
-        ],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        env={**os.environ, "HOME": str(tmp_path)},
-    )
-    assert "CONSOLE" not in done.stderr and shot.exists(), done.stderr[-2000:]
-    pixels = decoded(shot.read_bytes()).astype(int)
-    # Two dolls of strong colours in the middle of a pale page.
-    assert (np.ptp(pixels[40:180], axis=2) > 40).mean() > 0.01
+def test_contact_forces_have_the_errors_of_their_contacts():
+    world = subadmm.scene("pile:20", backend="cpu", settings={"iterations": 5})
+    world.step(300)
+    with pytest.raises(subadmm.Unavailable, match="certify"):
+        world.contact_errors()
+    assert np.isnan(show.forces.forces_of(world, 10).error).all()
+    settings = world.settings
+    settings.certify = True
+    world.settings = settings
+    world.step()
+    errors, certificate = world.contact_errors(), world.report.certificate
+    assert len(errors) == world.report.contacts and errors.max() == certificate.ncp_max  # there are no joints
+    assert errors.argmax() == certificate.ncp_worst and errors.mean() == pytest.approx(certificate.ncp_mean)
+    forces, contacts = show.forces.forces_of(world, 10), world.contacts()
+    size = np.linalg.norm(contacts["force"], axis=1)
+    keep = np.sort(np.argsort(size)[-10:])
+    assert (forces.force == contacts["force"][keep]).all() and (forces.error == errors[keep]).all()
+    arrows = forces.arrows(0.3)
+    assert np.linalg.norm(arrows[:, 1] - arrows[:, 0], axis=1).max() == pytest.approx(0.3)
+
+
+def test_colours_of_errors_go_along_the_scale():
+    scale, colours = show.forces.SCALE, show.forces.COLOURS
+    found = show.forces.colours_of([10.0 ** power for power in scale] + [1e-15, 0, 1e3, np.nan])
+    assert (found == [*colours, colours[0], colours[0], colours[-1], show.forces.UNMEASURED]).all()
+    assert all(f"1e{power}" in show.forces.legend() for power in scale)
+
+
+def test_pages_have_the_largest_contact_forces():
+    world = subadmm.scene("pile:20", backend="cpu", settings={"certify": True})
+    taken = show.record(world, 1, contacts=15)
+    header, data = read_page(page.page_of(taken))
+
+    def read(name):
+        kind, at, count = header["forces"][name]
+        return np.frombuffer(data, {"i32": "<i4", "u8": "u1"}[kind], count, at)
+
+    counts = read("counts")
+    assert counts.tolist() == [len(forces.force) for forces in taken.forces] and counts.max() == 15
+    numbers = read("numbers").reshape(6, 2, -1).astype(int)
+    numbers = numbers[:, 0] + 256 * numbers[:, 1]
+    places = np.array(header["forces"]["low"]) + np.array(header["forces"]["span"]) * numbers[:3].T / 65535
+    largest = header["forces"]["largest"]
+    forces = (numbers[3:].T - 32768) / 32767 * 2 * largest
+    whole = [np.concatenate([getattr(one, name) for one in taken.forces]) for name in ("position", "force", "error")]
+    assert abs(places - whole[0]).max() <= max(header["forces"]["span"]) / 65535
+    small = np.linalg.norm(whole[1], axis=1) < 2 * largest
+    assert small.mean() > 0.5 and abs(forces - whole[1])[small].max() <= largest / 16384
+    assert (np.linalg.norm(forces, axis=1) <= 2 * largest * 1.001).all()  # what jolts is cut
+    low, high = header["forces"]["scale"][0], header["forces"]["scale"][-1]
+    levels = low + (high - low) * (read("levels").astype(float) - 1) / 254
+    inside = (whole[2] > 10.0 ** low) & (whole[2] < 10.0 ** high)
+    assert inside.any() and abs(levels[inside] - np.log10(whole[2][inside])).max() <= (high - low) / 500
+    without = read_page(page.page_of(show.record(world, 0.1)))[0]
+    assert without["forces"] is None
 
 
 def test_gltf_files_have_the_poses_of_the_recording(tmp_path):

@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stddef.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "compound.h"
@@ -197,11 +198,17 @@ static sadmm_status add_link(sadmm_world *world, struct sadmm_frame at, const st
     return sadmm_scene_world_error(world, status, error);
 }
 
-static const char *name_of(int link)
+/* As "ring finger knuckle". */
+static void name_of(int link, char name[64])
 {
     static const char *const palm_names[] = {"palm", "wrist", "wrist", "forearm"};
-    static const char *const names[] = {"metacarpal", "knuckle", "proximal", "middle", "distal", "fingertip"};
-    return link <= SADMM_WRIST_LINKS ? palm_names[link] : names[(link - 1 - SADMM_WRIST_LINKS) % SADMM_FINGER_LINKS];
+    static const char *const finger_names[] = {"thumb", "forefinger", "middle finger", "ring finger", "little finger"};
+    static const char *const names[] = {"metacarpal", "knuckle", "proximal", "middle", "distal", "tip"};
+    const int of = link - 1 - SADMM_WRIST_LINKS;
+    if (of < 0)
+        snprintf(name, 64, "%s", palm_names[link]);
+    else
+        snprintf(name, 64, "%s %s", finger_names[of / SADMM_FINGER_LINKS], names[of % SADMM_FINGER_LINKS]);
 }
 
 sadmm_status sadmm_add_hand(sadmm_world *world, const struct sadmm_grip *grip, struct sadmm_error *error)
@@ -221,7 +228,9 @@ sadmm_status sadmm_add_hand(sadmm_world *world, const struct sadmm_grip *grip, s
             at = sadmm_frame_moved(at, l->offset[0], l->offset[1], l->offset[2]);
             frames[k] = sadmm_frame_turned(sadmm_frame_turned(at, Z, l->yaw), l->axis, angles[k]);
         }
-        status = add_link(world, frames[k], l, name_of(k), &ids[k], error);
+        char name[64];
+        name_of(k, name);
+        status = add_link(world, frames[k], l, name, &ids[k], error);
     }
     for (int k = 1; k < SADMM_HAND_LINKS && status == SADMM_OK; ++k) {
         const double *centre = links[k].part.shape.position, back[3] = {-centre[0], -centre[1], -centre[2]};

@@ -8,6 +8,7 @@ import numpy as np
 
 from .model import LoadedActuator, element, name_of
 from .options import disabled
+from .ties import Ties
 
 #: Of a drive that stands for a force: its target, m/s or rad/s. The force is off by a share of speed / target.
 FORCE_SPEED = 1e8
@@ -65,6 +66,23 @@ def _parts(loaded, index):
             ], ""
         return [], f"it acts on {element(source, 'tendon', target)}, which goes through space"
     return [], f"it acts on a {kind.name[6:].lower()}"
+
+
+def _index_of(source, joint):
+    """The file's index of a LoadedJoint."""
+    return next(k for k in range(source.njnt) if name_of(source, "joint", k) == joint.name)
+
+
+def _one_part(loaded, ties, parts):
+    """A servo's parts on joints that are tied together, as one part and the length that is left at its position 0;
+    None where they are not."""
+    tied = [(factor, *ties.of(_index_of(loaded.source, joint))) for joint, factor in parts]
+    roots = {root for _, root, _, _ in tied}
+    if len(roots) != 1:
+        return None
+    name = name_of(loaded.source, "joint", roots.pop())
+    factor = sum(factor * ratio for factor, _, ratio, _ in tied)
+    return (loaded.joints[name], factor), sum(factor * offset for factor, _, _, offset in tied)
 
 
 def _law(source, index):
@@ -126,13 +144,19 @@ def add_actuators(loaded, data):
         return
     drives = {}
     controls = []
+    ties = Ties(loaded)
     for index in range(getattr(source, "nactuator", source.nu)):
         what = element(source, "actuator", index)
         parts, reason = _parts(loaded, index)
         law, why = _law(source, index)
         reason = reason or why
         if not reason and len(parts) > 1 and (law[1] or law[2]):
-            reason = "a servo of a tendon over several joints"
+            one = _one_part(loaded, ties, parts)
+            if one is None:
+                reason = "a servo of a tendon over several joints that are not tied together"
+            else:
+                part, left = one
+                parts, law = [part], (law[0], law[1], law[2], law[3] - law[1] * left)
         if reason:
             report.add(what, f"not carried over: {reason}")
             continue
@@ -166,7 +190,7 @@ def add_actuators(loaded, data):
 def _joint_limit(loaded, joint):
     """The most that all actuators give a joint (actfrcrange)."""
     source = loaded.source
-    index = next(k for k in range(source.njnt) if name_of(source, "joint", k) == joint.name)
+    index = _index_of(source, joint)
     if not source.jnt_actfrclimited[index]:
         return np.inf
     lower, upper = source.jnt_actfrcrange[index]

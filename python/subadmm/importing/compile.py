@@ -31,7 +31,12 @@ def compile_file(path, report, floating=False):
 def _compile_urdf(root, path, report, floating):
     """URDF has meshes where MuJoCo does not look for them, and in formats that it does not know."""
     if root.find("mujoco") is None:
-        root.insert(0, tree.fromstring('<mujoco><compiler fusestatic="false" discardvisual="true"/></mujoco>'))
+        root.insert(0, tree.fromstring('<mujoco><compiler discardvisual="true"/></mujoco>'))
+    options = root.find("mujoco")
+    compiler = options.find("compiler")
+    if compiler is None:
+        compiler = tree.SubElement(options, "compiler")
+    compiler.attrib.setdefault("fusestatic", "false")  # the base stays a body: which geoms are the robot's
     for kind in ("transmission", "gazebo", "ros2_control"):
         found = root.findall(kind)
         if found:
@@ -49,7 +54,19 @@ def _compile_urdf(root, path, report, floating):
         name = f"{file.stem}_{number}{suffix}"
         assets[name] = data
         mesh.set("filename", name)
-    text = tree.tostring(root, encoding="unicode")
+    try:
+        return _compile_text(tree.tostring(root, encoding="unicode"), assets, floating)
+    except ValueError as error:
+        if "balanceinertia" not in str(error):
+            raise
+        report.add(" ".join(str(error).partition("Element name")[2].split()) or "inertia",
+                   "a moment of inertia is larger than the sum of the other two, as no solid's is: all three are their "
+                   "mean here, and so on other bodies where that is so")
+    compiler.set("balanceinertia", "true")
+    return _compile_text(tree.tostring(root, encoding="unicode"), assets, floating)
+
+
+def _compile_text(text, assets, floating):
     if not floating:
         return mujoco.MjModel.from_xml_string(text, assets)
     spec = mujoco.MjSpec.from_string(text, assets=assets)

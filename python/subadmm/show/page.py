@@ -10,6 +10,7 @@ import numpy as np
 
 from .camera import looking_at
 from .description import extent_of
+from .forces import COLOURS, SCALE, UNMEASURED, legend
 from .measures import MEASURES
 from .picture import SUN
 from .recording import TURN_STEP, packed
@@ -23,6 +24,41 @@ def _usual_view(recording):
     return replace(
         recording.description, centre=(low + high) / 2, radius=max(float(np.linalg.norm(high - low)) / 2, 1e-3)
     )
+
+
+def _forces(recording, put):
+    """Arrows of all frames: places in a box and forces as 16-bit numbers, errors as 8-bit ones; each number's low
+    bytes of all arrows, then its high ones, which deflates better."""
+    whole = [np.concatenate([getattr(forces, name) for forces in recording.forces])
+             for name in ("position", "force", "error")]
+    position, force, error = whole
+    if not len(position):
+        return None
+    low, high = position.min(axis=0), position.max(axis=0)
+    span = np.maximum(high - low, 1e-9)
+    size = np.linalg.norm(force, axis=1)
+    # A jolt would make all others too short to see: what is usually the largest of a frame.
+    largest = float(np.median([forces.size.max() for forces in recording.forces if len(forces.force)]))
+    kept = force * np.minimum(1, 2 * largest / np.maximum(size, 1e-300))[:, None]
+    places = np.rint((position - low) / span * 65535).astype(np.uint16)
+    forces = np.rint(kept / (2 * largest) * 32767 + 32768).astype(np.uint16)
+    numbers = np.concatenate([places, forces], axis=1).T
+    # 0: not measured; 1 to 255: from the scale's lowest power of ten to its highest.
+    power = np.log10(np.clip(np.nan_to_num(error, nan=1.0), 1e-300, None))
+    level = 1 + 254 * np.clip((power - SCALE[0]) / (SCALE[-1] - SCALE[0]), 0, 1)
+    level = np.where(np.isnan(error), 0, np.rint(level))
+    return {
+        "counts": put([len(forces.force) for forces in recording.forces], "i32"),
+        "numbers": put(np.stack([numbers & 255, numbers >> 8], axis=1), "u8"),
+        "levels": put(level, "u8"),
+        "low": low.tolist(),
+        "span": span.tolist(),
+        "largest": largest,
+        "scale": list(SCALE),
+        "colours": COLOURS.tolist(),
+        "unmeasured": list(UNMEASURED),
+        "measured": bool(level.any()),
+    }
 
 
 def page_of(recording) -> str:
@@ -68,6 +104,7 @@ def page_of(recording) -> str:
         "positions": put(np.frombuffer(packed(recording.positions), np.uint8), "u8"),
         "turns": put(np.frombuffer(packed(recording.orientations), np.uint8), "u8"),
         "groups": groups,
+        "forces": _forces(recording, put) if recording.forces else None,
         "measures": [{"name": MEASURES[name][0], "unit": MEASURES[name][1], "values": put(values, "f32")}
                      for name, values in recording.measures.items()],
     }
@@ -75,6 +112,7 @@ def page_of(recording) -> str:
     data = base64.b64encode(zlib.compress(bytes(blob), 9)).decode()
     for mark, text in (
         ("{{title}}", html.escape(recording.title)),
+        ("{{legend}}", legend()),
         ("{{header}}", json.dumps(header).replace("<", "\\u003c")),
         ("{{data}}", data),
     ):

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from .description import Description, describe
+from .forces import forces_of
 from .measures import MEASURES, measure
 
 #: Quaternions are kept to whole multiples of this: half of it is the largest error of a component.
@@ -14,7 +15,8 @@ TURN_STEP = 2.0 ** -12
 @dataclass
 class Recording:
     """position_step: positions are whole multiples of it, m. times: s. positions: frames x bodies x 3, orientations:
-    frames x bodies x 4, whole numbers of position_step and TURN_STEP. measures: name: one figure a frame."""
+    frames x bodies x 4, whole numbers of position_step and TURN_STEP. measures: name: one figure a frame. forces: of
+    each frame the Forces kept, or none at all."""
     description: Description
     title: str
     position_step: float
@@ -22,6 +24,7 @@ class Recording:
     positions: np.ndarray
     orientations: np.ndarray
     measures: dict = field(default_factory=dict)
+    forces: list = field(default_factory=list)
 
     def poses(self, frame):
         """(positions n x 3 in m, orientations n x 4, unit) of all bodies, as they are played. Off by half a
@@ -52,13 +55,16 @@ def position_step(description):
     return float(2.0 ** np.floor(np.log2(max(size, 1e-9) / 1000)))
 
 
-def record(world, seconds, fps=30.0, title="", after_frame=None):
+def record(world, seconds, fps=30.0, title="", contacts=0, after_frame=None):
     """Step a world for a time (s, simulated) and keep its poses `fps` times a second, at the nearest step; the first
-    frame is the world as it is. after_frame(frame, frames): called after each."""
+    frame is the world as it is. contacts: so many of the largest contact forces are kept a frame, with their errors
+    where settings ask for certificates. after_frame(frame, frames): called after each."""
     if not seconds > 0:
         raise ValueError(f"seconds: {seconds}; must be greater than 0")
     if not 0 < fps <= 1000:
         raise ValueError(f"fps: {fps}; must be in (0, 1000]")
+    if not contacts >= 0:
+        raise ValueError(f"contacts: {contacts}; must be 0 or more")
     dt = world.settings.dt
     frames = int(np.floor(seconds * fps + 1e-9)) + 1
     at = np.unique(np.rint(np.arange(frames) / (fps * dt)).astype(np.int64))
@@ -68,7 +74,7 @@ def record(world, seconds, fps=30.0, title="", after_frame=None):
     shape = (len(at), description.bodies)
     positions, turns = np.empty(shape + (3,), np.int32), np.empty(shape + (4,), np.int16)
     measures = {name: np.full(len(at), np.nan) for name in MEASURES}
-    before = None
+    before, forces = None, []
     for k, steps in enumerate(at):
         if k:
             world.step(int(steps - at[k - 1]))
@@ -90,10 +96,12 @@ def record(world, seconds, fps=30.0, title="", after_frame=None):
                 measures[name][k] = value
         else:
             measures["kinetic"][0] = measure(world, state, inertia)["kinetic"]
+        if contacts:
+            forces.append(forces_of(world, contacts))
         if after_frame:
             after_frame(k, len(at))
     measures = {name: values for name, values in measures.items() if np.isfinite(values[1:]).any()}
-    return Recording(description, title, step, at * dt, positions, turns, measures)
+    return Recording(description, title, step, at * dt, positions, turns, measures, forces)
 
 
 def packed(values):

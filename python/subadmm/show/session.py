@@ -7,6 +7,7 @@ import numpy as np
 
 from ..rotations import rotate
 from .measures import MEASURES, measure
+from .steering import Steering
 
 _KEPT = 400       # figures over time
 _STIFFNESS = 4.0  # Hz: a body alone would swing on the hand's spring as often
@@ -32,6 +33,7 @@ class Session:
             self.steps = 0
             self.history = {name: deque(maxlen=_KEPT) for name in ("time", *MEASURES)}
             self._inertia = self.world.get("body_inertia")
+            self.steering = Steering(self.world)
 
     def change(self, backend=None, **settings):
         """Other settings of the world, as method="paper", iterations=50, certify=True; from the next step on."""
@@ -47,6 +49,7 @@ class Session:
         """Make steps, and keep their figures."""
         with self.lock:
             for _ in range(n):
+                self.steering.before_step()
                 self.world.step()
                 self.steps += 1
             self.history["time"].append(self.steps * self.world.settings.dt)

@@ -5,15 +5,18 @@ import numpy as np
 
 from .camera import looking_at
 from .description import describe
+from .forces import Forces, colours_of, forces_of, legend
 from .measures import MEASURES
 from .picture import SUN
 from .session import Session
+from .steering_panel import SteeringPanel
 
 _FRAME = 1 / 30          # s between frames
 _PLOT = 0.5              # s between plots
 _BY_POWER = ("kinetic", "error")   # drawn as powers of ten: they go over many
 _CERTIFIED = 500         # bodies
 _ARROWS = 2000           # contacts drawn at most: those with the largest forces
+_NO_FORCES = Forces(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
 
 
 def _viser():
@@ -61,6 +64,8 @@ class View:
             backend = gui.add_dropdown("backend", ("as begun",) + names)
             certify = gui.add_checkbox("measure the error", settings.certify)
         self._contacts = gui.add_checkbox("contact forces", False)
+        self._legend = gui.add_html(legend(), visible=False)
+        self._steering = SteeringPanel(self.server, session)
         self._said = gui.add_markdown("")
         self._plots = {}
         with gui.add_folder("Plots", expand_by_default=True):
@@ -87,6 +92,7 @@ class View:
                 session.reset()
                 changes = {"method": method.value, "iterations": int(iterations.value), "certify": certify.value}
                 settle(**changes, **({} if backend.value == "as begun" else {"backend": backend.value}))
+                self._steering.begin_again()
 
         @buttons.on_click
         def _(_):
@@ -97,6 +103,11 @@ class View:
                 reset()
             else:
                 session.running = not session.running
+
+        @self._contacts.on_update
+        def _(_):
+            for _, handle in self._moving:     # forces are seen through bodies
+                handle.opacity = 0.35 if self._contacts.value else None
 
         @speed.on_update
         def _(_):
@@ -137,6 +148,7 @@ class View:
                                         head_length=6 * thin)
         self._hand = scene.add_arrows("/hand", none, (30, 90, 200), shaft_radius=2 * thin, head_radius=5 * thin,
                                       head_length=12 * thin)
+        self._steering.build_scene(radius)
         camera = looking_at(description, field=1.0)
         self.server.initial_camera.position = tuple(camera.eye)
         self.server.initial_camera.look_at = tuple(camera.target)
@@ -157,7 +169,8 @@ class View:
         self._last = now
         with session.lock:
             state = session.world.get("body_state")
-            arrows = self._contact_arrows() if self._contacts.value else np.zeros((0, 2, 3), np.float32)
+            forces = forces_of(session.world, _ARROWS) if self._contacts.value else _NO_FORCES
+            self._steering.read()
             hand = session.hand()
             report = session.world.report
             now_at = session.steps * session.world.settings.dt
@@ -166,8 +179,11 @@ class View:
                 place, turn = group.poses(state[:, :3], state[:, 3:7])
                 handle.batched_positions = place.astype(np.float32)
                 handle.batched_wxyzs = turn.astype(np.float32)
-            if len(arrows) or len(self._forces.points):
-                self._forces.points = arrows
+            if len(forces.force) or len(self._forces.points):
+                self._forces.points = forces.arrows(self._arrow).astype(np.float32)
+                self._forces.colors = colours_of(forces.error)
+                self._legend.visible = self._contacts.value and not np.isnan(forces.error).all()
+            self._steering.draw()
             if hand is not None:
                 self._hand.points = np.stack([hand[0], hand[1]])[None].astype(np.float32)
             elif len(self._hand.points):
@@ -180,20 +196,8 @@ class View:
             if hand is not None:
                 said += f"\n\nhand: {np.linalg.norm(hand[2]):.3g} N"
             self._said.content = said
+            self._steering.say()
             self._plot()
-
-    def _contact_arrows(self):
-        """n x 2 x 3, m: from each contact along the force on body b; the largest force is as long as `_arrow`."""
-        contacts = self.session.world.contacts()
-        force = contacts["force"]
-        size = np.linalg.norm(force, axis=1)
-        if not len(size) or size.max() == 0:
-            return np.zeros((0, 2, 3), np.float32)
-        if len(size) > _ARROWS:
-            keep = np.argpartition(size, -_ARROWS)[-_ARROWS:]
-            contacts, force, size = contacts[keep], force[keep], size[keep]
-        from_ = contacts["position"]
-        return np.stack([from_, from_ + force * (self._arrow / size.max())], axis=1).astype(np.float32)
 
     def _plot(self):
         with self.session.lock:

@@ -18,10 +18,10 @@
 #include "rows.h"
 
 enum { JOINED_ROWS = SADMM_MAX_ROWS, JOINED_BLOCK = JOINED_ROWS * JOINED_ROWS };
-/* Regularisation of the factor, a share of a row's own response: rows may say the same, but for rounding. */
+/* Regularisation of the factor, a share of a row's scale (below): rows may say the same, but for rounding. */
 #define JOINED_PROXIMAL 1e-11
-/* Compliance of hard rows, a share of a row's own response: a load moves a lock by a billionth of what it would move
- * the bodies by if nothing else held them. Rows of a loop that has more locks than it needs contradict each other by
+/* Compliance of hard rows, a share of a row's scale: a load moves a lock by a billionth of what it would move the heavier
+ * of its bodies by if nothing else held it. Rows of a loop that has more locks than it needs contradict each other by
  * what its joints are off, along multipliers to which nothing responds; without it these grow from step to step (scene
  * bricard: to 1e6 N where 30 are at work) until they hold the loop. */
 #define JOINED_GIVE 1e-9
@@ -263,17 +263,24 @@ SADMM_INLINE void joined_put_state(const struct joined_view *v, int32_t r, uint8
     if (state == JOINED_AT_HI) v->change[r] = v->rows[r].hi - v->rows[r].lambda;
 }
 
+/* What a row's regularisation is a share of: its own response; between two bodies twice that of the one that responds
+ * less. Else what light bodies between heavy ones pass on, carriers of joints say, would make locks soft: of 1e-4 of a
+ * body's moment by ten thousand times as much. */
+SADMM_INLINE double joined_scale(const struct joined_view *v, int32_t r)
+{
+    const double *answer = v->answer + 12 * (size_t)r;
+    const double a = six_product(v->rows[r].jacobian[0], answer), b = six_product(v->rows[r].jacobian[1], answer + 6);
+    return a > 0 && b > 0 ? 2 * (a < b ? a : b) : a + b;
+}
+
 /* Where a row that is there is before the first pass. earlier: where a solve of this step has left it, which is mostly
  * where it is still: iterations leave multipliers near bounds on either side. JOINED_ABSENT: there was none. */
 SADMM_INLINE void joined_begin_row(const struct joined_view *v, int32_t r, uint8_t earlier)
 {
     const struct joined_row *row = &v->rows[r];
     const double lambda = row->lambda, lo = row->lo, hi = row->hi;
-    double missing, response = 0;
-    int side;
-    for (side = 0; side < 2; ++side)
-        response += six_product(row->jacobian[side], v->answer + 12 * (size_t)r + 6 * (size_t)side);
-    v->give[r] = sadmm_law_is_coupled(row->compliance, lo, hi) ? JOINED_GIVE * response : row->compliance;
+    double missing;
+    v->give[r] = sadmm_law_is_coupled(row->compliance, lo, hi) ? JOINED_GIVE * joined_scale(v, r) : row->compliance;
     v->change[r] = joined_clamp(lambda, lo, hi) - lambda;
     if (row->gain == 0 || !(hi > lo)) {
         const double given = row->compliance > 0 ? -row->bias / row->compliance : lambda;
@@ -396,7 +403,7 @@ SADMM_INLINE struct joined_tile joined_enter(const struct joined_view *v, int32_
             const size_t i = first_row + (size_t)k, j = first_column + (size_t)q;
             double *entry = &t.entry[k][q];
             if (v->state[i] != JOINED_INSIDE || v->state[j] != JOINED_INSIDE) *entry = i == j ? 1 : 0;
-            else if (i == j) *entry += JOINED_PROXIMAL * *entry + v->give[i] / v->rows[i].gain;
+            else if (i == j) *entry += JOINED_PROXIMAL * joined_scale(v, (int32_t)i) + v->give[i] / v->rows[i].gain;
         }
     }
     return t;

@@ -20,6 +20,7 @@ struct tally {
     double unit;
     double ncp_max, ncp_sum;
     int64_t ncp_worst, count;
+    double *contact_errors; /* by point */
     double u2, r2, map2; /* siconos: |u|^2, |r|^2, |r - P_K(r - u^)|^2 */
     bool outside; /* rows that siconos does not have */
 };
@@ -131,7 +132,8 @@ static void certify_pair(struct tally *tally, const struct sadmm_system *system,
             }
         }
         double w = fmax(weight[0], fmax(weight[1], weight[2]));
-        count_constraint(tally, k, contact_map(tally, l, u, pair->friction, w), bodies, pair->body_a, pair->body_b);
+        tally->contact_errors[k] = contact_map(tally, l, u, pair->friction, w);
+        count_constraint(tally, k, tally->contact_errors[k], bodies, pair->body_a, pair->body_b);
     }
 }
 
@@ -214,7 +216,9 @@ static sadmm_status certify(struct sadmm_certificate_workspace *workspace, const
                             struct sadmm_error *error)
 {
     size_t count = (size_t)system->body_count;
-    if (!sadmm_grow(&workspace->values, &workspace->capacity, 0, BODY_SIZE * count, sizeof(double)))
+    if (!sadmm_grow(&workspace->values, &workspace->capacity, 0, BODY_SIZE * count, sizeof(double)) ||
+        !sadmm_grow(&workspace->contact_errors, &workspace->contact_capacity, 0, system->contacts->point_count,
+                    sizeof(double)))
         return sadmm_fail_memory(error, "the certificate");
     double *bodies = workspace->values;
     double A[36], b[6];
@@ -227,7 +231,7 @@ static sadmm_status certify(struct sadmm_certificate_workspace *workspace, const
         memset(body + IMPULSE, 0, (BODY_SIZE - IMPULSE) * sizeof *body);
     }
 
-    struct tally tally = {.unit = unit, .ncp_worst = -1};
+    struct tally tally = {.unit = unit, .ncp_worst = -1, .contact_errors = workspace->contact_errors};
     for (size_t p = 0; p < system->contacts->pair_count; ++p)
         certify_pair(&tally, system, settings, &system->contacts->pairs[p], bodies);
     for (size_t k = 0; k < sadmm_row_constraint_count(system); ++k) certify_rows(&tally, system, k, bodies);
@@ -305,6 +309,7 @@ void sadmm_certificate_workspace_free(struct sadmm_certificate_workspace *worksp
 {
     sadmm_free(workspace->values);
     sadmm_free(workspace->labels);
+    sadmm_free(workspace->contact_errors);
     *workspace = (struct sadmm_certificate_workspace){0};
 }
 

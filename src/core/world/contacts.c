@@ -79,18 +79,23 @@ static void read_contact(const sadmm_world *world, const struct sadmm_contact_pa
     out->triangle = triangle_of(world, pair);
 }
 
+static sadmm_status check_range(sadmm_world *world, int32_t first, int32_t count)
+{
+    const int32_t total = readable_contacts(world);
+    if (first < 0 || count < 0 || first > total - count)
+        return sadmm_fail(&world->error, SADMM_ERROR_INVALID_ARGUMENT,
+                          "[first, first + count) = [%d, %lld): must be in [0, %d)", first, (long long)first + count,
+                          total);
+    return SADMM_OK;
+}
+
 sadmm_status sadmm_world_contacts(sadmm_world *world, int32_t first, int32_t count, sadmm_contact *contacts)
 {
     TRY(sadmm_check_given(world, "world", NULL));
     TRY(sadmm_world_settle(world));
-    int32_t total = readable_contacts(world);
-    struct sadmm_error *error = &world->error;
-    if (first < 0 || count < 0 || first > total - count)
-        return sadmm_fail(error, SADMM_ERROR_INVALID_ARGUMENT,
-                          "[first, first + count) = [%d, %lld): must be in [0, %d)", first, (long long)first + count,
-                          total);
+    TRY(check_range(world, first, count));
     if (count == 0) return SADMM_OK;
-    TRY(sadmm_check_given(contacts, "contacts", error));
+    TRY(sadmm_check_given(contacts, "contacts", &world->error));
     TRY(sadmm_world_pull_contacts(world));
     const double dt = sadmm_settings_of_substep(&world->step_settings).dt;
     size_t p = pair_of(&world->contacts, first);
@@ -98,6 +103,20 @@ sadmm_status sadmm_world_contacts(sadmm_world *world, int32_t first, int32_t cou
         while (k >= world->contacts.pairs[p].first + world->contacts.pairs[p].count) ++p;
         read_contact(world, &world->contacts.pairs[p], k, dt, &contacts[k - first]);
     }
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_contact_errors(sadmm_world *world, int32_t first, int32_t count, double *errors)
+{
+    TRY(sadmm_check_given(world, "world", NULL));
+    TRY(sadmm_world_settle(world));
+    TRY(check_range(world, first, count));
+    if (count == 0) return SADMM_OK;
+    TRY(sadmm_check_given(errors, "errors", &world->error));
+    if (world->certified_step != world->report.step)
+        return sadmm_fail(&world->error, SADMM_ERROR_UNAVAILABLE,
+                          "errors of contacts: the last step had none measured; settings.certify asks for them");
+    memcpy(errors, world->certificate_workspace.contact_errors + first, (size_t)count * sizeof *errors);
     return SADMM_OK;
 }
 

@@ -160,6 +160,7 @@ static sadmm_status certify(sadmm_world *world)
     double begin = sadmm_clock_ms();
     TRY(sadmm_certify_with(&world->certificate_workspace, &system, &settings, &world->report.certificate,
                            &world->error));
+    world->certified_step = world->report.step;
     world->report.certify_ms = sadmm_clock_ms() - begin;
     return SADMM_OK;
 }

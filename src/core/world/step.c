@@ -233,6 +233,7 @@ static sadmm_status run_stage(struct host_step *step, const struct sadmm_stage *
     case SADMM_STAGE_TURN: sadmm_world_turn(world, step->stages.substep - 1); return SADMM_OK;
     case SADMM_STAGE_CERTIFY:
         step->system.carried = NULL;
+        world->certified_step = world->report.step + 1; /* what this step will be */
         return sadmm_certify_with(&world->certificate_workspace, &step->system, &step->settings,
                                   &step->report.certificate, &world->error);
     case SADMM_STAGE_COMMIT: commit(world); return SADMM_OK;
@@ -288,6 +289,7 @@ static sadmm_status host_step(sadmm_world *world)
         .world = world, .settings = sadmm_settings_of_substep(&world->def.settings), .islands_above = -1};
     step.stages = sadmm_stages_of(&world->plan, &step.settings, true);
     TRY(sadmm_world_take_back(world));
+    world->certified_step = -1;
     world->team.ran = 1;
     const struct sadmm_plan last_plan = world->plan;
     step.solve = (struct sadmm_solve){world->kernels, world->context, &step.system, &step.settings,

@@ -265,6 +265,7 @@ struct sadmm_world {
     struct sadmm_context *context;
     char why[SADMM_WHY_SIZE];
     struct sadmm_certificate_workspace certificate_workspace;
+    int64_t certified_step; /* the step that the workspace's contacts are of, as report.step counts; -1: of none */
     struct sadmm_joined *joined; /* made with the first joint */
     sadmm_step_report report;
 };

@@ -1,0 +1,157 @@
+"""What a user leads: the targets of a world's couplings and of its joints' position drives."""
+import numpy as np
+
+from ..rotations import multiply, rotate
+from .chains import Finger, driven_chains, opposing, opposing_thumb
+
+_RATE = 40.0  # 1/s: targets go after what the user asks for, which comes in jumps, as a critically damped spring would
+
+
+def _follow(offset, speed, dt):
+    """(offset, speed) after dt (s) of what goes to 0, at first with this offset and speed: exactly."""
+    both = (speed + _RATE * offset) * dt
+    fade = np.exp(-_RATE * dt)
+    return (offset + both) * fade, (speed - _RATE * both) * fade
+
+
+def _unit(q):
+    q = np.array(q, float)
+    return q / np.linalg.norm(q)
+
+
+def _vector(q):
+    """The rotation vector of a unit quaternion, of at most pi."""
+    size = np.linalg.norm(q[1:])
+    return 2 * np.arctan2(size, abs(q[0])) * np.copysign(1, q[0]) / max(size, 1e-300) * q[1:]
+
+
+def _turn(vector):
+    """The quaternion of a rotation vector."""
+    angle = np.linalg.norm(vector)
+    return np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) / max(angle, 1e-300) * np.asarray(vector)])
+
+
+class Lead:
+    """A coupling that is led: its target goes to `position` (m), `orientation` (w x y z), world."""
+
+    def __init__(self, coupling):
+        self.coupling = coupling
+        self.name = coupling.body.name or f"body {coupling.body.index}"
+        self.most = coupling.max_force      # N
+        self.at, self.turn = (np.array(values) for values in coupling.target)
+        self.position, self.orientation = self.at, self.turn
+        self._speed = self._spin = np.zeros(3)
+
+    def step(self, dt):
+        """Bring the target on by a step."""
+        position, orientation = self.position, self.orientation
+        offset, self._speed = _follow(self.at - position, self._speed, dt)
+        away = _vector(multiply(self.turn, orientation * [1, -1, -1, -1]))
+        angle, self._spin = _follow(away, self._spin, dt)
+        at, turn = position + offset, multiply(_turn(angle), orientation)
+        spin = _vector(multiply(turn, self.turn * [1, -1, -1, -1])) / dt
+        self.coupling.set_target(self.at.tolist(), self.turn.tolist(), [*((at - self.at) / dt).tolist(), *spin.tolist()])
+        self.at, self.turn = at, _unit(turn)
+
+    def grip(self):
+        """Where the frame on the body is, m, world."""
+        body, (own, _) = self.coupling.body, self.coupling.frame
+        return np.array(body.position) + rotate(np.array(body.orientation), np.array(own))
+
+    def felt(self):
+        """(force, N; torque about the target, N m): what the user feels."""
+        return np.array(self.coupling.felt_force), np.array(self.coupling.felt_torque)
+
+
+class Hand:
+    """Fingers on one body, which close along the line between the thumb and the others: all by `opening` (m, less
+    than at the beginning: negative; between the thumb and the others), each by its own `more` (m, inwards)."""
+
+    def __init__(self, fingers, targets):
+        self.fingers = fingers
+        self.begin = [np.array([targets[joint.row, joint.coordinate] for joint in finger.chain.joints])
+                      for finger in fingers]
+        self.ways = opposing(fingers, self.begin)
+        self.opening, self.more = 0.0, [0.0] * len(fingers)
+        tips = np.array([finger.at(own)[0] for finger, own in zip(fingers, self.begin)])
+        thumb = opposing_thumb(tips)
+        #: m, along that line, at the beginning
+        self.apart = float((np.delete(tips, thumb, axis=0).mean(axis=0) - tips[thumb]) @ self.ways[thumb])
+
+    def targets(self, k):
+        """Coordinates of the k-th finger."""
+        return self.fingers[k].reach(self.begin[k], (self.more[k] - self.opening / 2) * self.ways[k])
+
+
+class Steering:
+    """leads: of the world's couplings; chains: of its driven joints; hands: of those that are fingers. A scene's
+    script does not act while `on`."""
+
+    def __init__(self, world):
+        self.world = world
+        self.on = False
+        self.leads = [Lead(coupling) for coupling in world.couplings]
+        self.chains = driven_chains(world)
+        self._read_targets()
+        fingers = {}
+        for chain in self.chains:
+            if chain.is_finger and Finger.fits(chain):
+                fingers.setdefault(chain.base, []).append(Finger(chain))
+        self.hands = [Hand(of, self.targets) for of in fingers.values() if len(of) > 1]
+
+    def _read_targets(self):
+        self.targets = self.world.get("joint_target_position")
+        self.goals, self._rates = self.targets.copy(), np.zeros(self.targets.shape)
+        self._led = np.zeros(self.targets.shape, dtype=bool)
+        for chain in self.chains:
+            for joint in chain.joints:
+                self._led[joint.row, joint.coordinate] = True
+        self._speeds = np.where(self._led, 0.0, self.world.get("joint_target_speed"))
+
+    def start(self):
+        """Lead from now on, from where targets are."""
+        has_script, self.on = self.world.script, True
+        if has_script:
+            self.world.script = False
+        self._had_script = has_script
+        self.leads = [Lead(lead.coupling) for lead in self.leads]
+        self._read_targets()
+        self.hands = [Hand(hand.fingers, self.targets) for hand in self.hands]
+
+    def stop(self):
+        """Leave them to the script again, where there is one, or where they are."""
+        self.on = False
+        if self._had_script:
+            self.world.script = True
+        for lead in self.leads:
+            lead.coupling.set_target(lead.at.tolist(), lead.turn.tolist(), [0.0] * 6)
+        self.world.set("joint_target_speed", self._speeds)
+
+    def set_joint(self, joint, value):
+        """Where a Driven is to go, m or rad."""
+        self.goals[joint.row, joint.coordinate] = value
+
+    def close(self, hand, opening=None, finger=None, more=None):
+        """Close a Hand's fingers, or one of them (its number)."""
+        if opening is not None:
+            hand.opening = opening
+        if finger is not None:
+            hand.more[finger] = more
+        for k in range(len(hand.fingers)) if finger is None else [finger]:
+            for joint, value in zip(hand.fingers[k].chain.joints, hand.targets(k)):
+                self.set_joint(joint, value)
+
+    def before_step(self):
+        """Bring all targets on. Called before every step."""
+        if not self.on:
+            return
+        dt = self.world.settings.dt
+        for lead in self.leads:
+            lead.step(dt)
+        if self.chains:
+            offset, self._rates = _follow(self.targets - self.goals, self._rates, dt)
+            targets = self.goals + offset
+            speeds = np.where(self._led, (targets - self.targets) / dt, self._speeds)
+            self.world.set("joint_target_position", self.targets)
+            self.world.set("joint_target_speed", speeds)
+            self.targets = targets
