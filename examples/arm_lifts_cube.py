@@ -3,8 +3,8 @@
     pip install subadmm[import] gymnasium-robotics      # the arm's model is a part of that package
     python arm_lifts_cube.py [--mass 0.2]
 
-The arm is led by velocities of its hand: what turns its joints so (the Jacobian, damped least squares) is added up to the
-targets of its servos, which are what moves it. The cube is held by nothing but contact.
+The arm is led by velocities of its hand: what turns its joints so (the Jacobian, damped least squares) is added up to
+the targets of its servos, which are what moves it. The cube is held by nothing but contact.
 """
 
 import argparse
@@ -131,9 +131,13 @@ def main(arguments=None):
     arm.move(CUBE + [0, 0, HIGH], 1.2, 0.0)
     arm.move(CUBE + [0, 0, HIGH], 0.5, 0.0)
     height, slip = cube.position[2] - CUBE[2], float(np.linalg.norm(arm.cube_in_hand() - closed))
-    print(f"the grip is {1e3 * np.linalg.norm(arm.hand()[0] - CUBE - [0, 0, HIGH]):.2f} mm off, at {arm.world.report.time:.1f} s")
+    off = np.linalg.norm(arm.hand()[0] - CUBE - [0, 0, HIGH])
+    print(f"the grip is {1e3 * off:.2f} mm off, at {arm.world.report.time:.1f} s")
     lifted = height > 0.9 * HIGH and slip < 0.005
-    print(f"the cube is {'' if lifted else 'not '}lifted: {1e3 * height:.1f} mm up, slip {1e3 * slip:.3f} mm since the fingers closed")
+    print(
+        f"the cube is {'' if lifted else 'not '}lifted: {1e3 * height:.1f} mm up, "
+        f"slip {1e3 * slip:.3f} mm since the fingers closed"
+    )
     return lifted, height, slip
 
 

@@ -4,8 +4,9 @@
     python thousand_grippers.py --count 20 --backend cpu
     python thousand_grippers.py --backend cuda --precision f32
 
-The world is that of the scene "grippers:1000" (docs/scenes.md): each gripper is a palm that a coupling leads, and two fingers
-on sliding joints, with a box, a ball or a capsule of 0.2 to 1 kg between them. The scene's own script is left out.
+The world is that of the scene "grippers:1000" (docs/scenes.md): each gripper is a palm that a coupling leads, and two
+fingers on sliding joints, with a box, a ball or a capsule of 0.2 to 1 kg between them. The scene's own script is left
+out.
 """
 
 import argparse
@@ -26,8 +27,8 @@ def smooth(x):
 
 
 class Grippers:
-    """Rows of the world's arrays: body 0 is the ground, then palm, left, right finger and object of each gripper; joints 2 a
-    gripper, couplings 1."""
+    """Rows of the world's arrays: body 0 is the ground, then palm, left, right finger and object of each gripper;
+    joints 2 a gripper, couplings 1."""
 
     def __init__(self, count, backend, precision):
         # As a file it has no script: what moves is what is set here.
@@ -36,7 +37,7 @@ class Grippers:
         self.count = count
         state = world.get("body_state")[1:].reshape(count, 4, 13)
         self.home = state[:, 0, :7]  # of the palms
-        # What is between a finger and the object. Half their widths are the first of their sizes, whatever their form is.
+        # What is between a finger and the object. Half their widths are the first of their sizes, in every form.
         widths = np.array([shape.definition.size[0] for shape in world.shapes[1:]]).reshape(count, 4)
         self.way = state[:, 2, 0] - state[:, 0, 0] - widths[:, 2] - widths[:, 3] + SQUEEZE
         self.targets = world.get("joint_target_position")
@@ -87,9 +88,14 @@ def main(arguments=None):
     end, state = grippers.objects_in_hand()
     slip = np.linalg.norm(end - closed, axis=1)
     held = (slip < 0.005) & (state[:, 0, 2] - grippers.home[:, 2] > 0.95 * LIFT)
-    print(f"{given.count} grippers on {world.report.backend}: {steps} steps in {seconds:.2f} s, {steps / seconds:.0f} steps/s, "
-          f"{given.count * steps / seconds:.0f} gripper steps/s")
-    print(f"{held.sum()} of {given.count} hold what they lifted by {LIFT} m and shook; slip {1e3 * slip.max():.3f} mm at most")
+    print(
+        f"{given.count} grippers on {world.report.backend}: {steps} steps in {seconds:.2f} s, "
+        f"{steps / seconds:.1f} steps/s, {given.count * steps / seconds:.0f} gripper steps/s"
+    )
+    print(
+        f"{held.sum()} of {given.count} hold what they lifted by {LIFT} m and shook; "
+        f"slip {1e3 * slip.max():.3f} mm at most"
+    )
     return held, slip
 
 

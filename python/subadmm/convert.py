@@ -11,10 +11,11 @@ MODELS = (".xml", ".mjcf", ".urdf", ".usd", ".usda", ".usdc", ".usdz")
 
 
 def open_source(source, **options):
-    """(world, report, joints) of a robot's file, a scene's name or a scene file. options: as of load(), for robots only.
+    """(world, report, joints) of a robot's file, a scene's name or a scene file. options: as of load(), for robots
+    only.
 
-    report: what of the source is not in the world, or will not be in a scene file of it. joints: {name: place in the file's
-    list of joints and coordinate}, because joints have no names there.
+    report: what of the source is not in the world, or will not be in a scene file of it. joints: {name: place in the
+    file's list of joints and coordinate}, because joints have no names there.
     """
     from . import scene
 
@@ -49,14 +50,17 @@ def joints_of(loaded):
 def convert(source, path, *, report=None, duration=None, **options):
     """Write a robot, or a scene, as a scene file at `path`, and return the report (a list of (element, reason)).
 
-    source: an MJCF, URDF or USD file, a scene's name ("pile:300") or a scene file. report: a file to write the report to, as
-    JSON, with the joints' places in the scene file. duration: how long the scene is meant to be run for, s (default: the
-    scene's, 10). Other options: as of load().
+    source: an MJCF, URDF or USD file, a scene's name ("pile:300") or a scene file. report: a file to write the report
+    to, as JSON, with the joints' places in the scene file. duration: how long the scene is meant to be run for, s
+    (default: the scene's, 10). Other options: as of load().
     """
     world, notes, joints = open_source(os.fspath(source), **options)
     named = {}
     if world.duration is None:  # no scene of the library and no scene file
-        named = {"name": os.path.splitext(os.path.basename(source))[0], "description": f"from {os.path.basename(source)}"}
+        named = {
+            "name": os.path.splitext(os.path.basename(source))[0],
+            "description": f"from {os.path.basename(source)}",
+        }
     text = world.to_json(duration=duration, **named)
     with open(path, "w", encoding="utf-8") as file:
         file.write(text)

@@ -44,10 +44,10 @@ def decompose(mesh, threshold=THRESHOLD, *, most=None, seed=0, **options):
     """A mesh as a list of hull shapes that together are close to it, by coacd (pip install subadmm[decompose]).
 
     mesh: a Shape made by subadmm.mesh, a pair (vertices n x 3 in m, triangles m x 3), or an object with `vertices` and
-    `faces` (trimesh). threshold: concavity that may remain, in [0.01, 1], as a share of the mesh's size; smaller ones make
-    more hulls and take longer. most: hulls at most; None: no bound. seed: of coacd's search; the same seed, the same
-    hulls. Other options are those of shapes (friction ...), given to all of them; those of `mesh`, where it is a Shape,
-    stand in where none are given.
+    `faces` (trimesh). threshold: concavity that may remain, in [0.01, 1], as a share of the mesh's size; smaller ones
+    make more hulls and take longer. most: hulls at most; None: no bound. seed: of coacd's search; the same seed, the
+    same hulls. Other options are those of shapes (friction ...), given to all of them; those of `mesh`, where it is a
+    Shape, stand in where none are given.
 
     Raises ImportError (no coacd), ValueError (arguments), subadmm.Error (a part that is no solid).
     """

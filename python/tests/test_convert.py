@@ -20,15 +20,19 @@ ROBOT = """
   <geom name="floor" type="plane" size="1 1 1"/>
   <body name="base" pos="0 0 .5"><joint name="slide" type="slide" axis="1 0 0" range="-.1 .3" damping="5"/>
     <geom type="box" size=".1 .1 .05" mass="3"/>
-    <body name="arm" pos="0 0 .1"><joint name="a" axis="0 1 0" armature=".01"/><joint name="b" axis="1 0 0" range="-40 40"/>
+    <body name="arm" pos="0 0 .1"><joint name="a" axis="0 1 0" armature=".01"/>
+      <joint name="b" axis="1 0 0" range="-40 40"/>
       <geom type="capsule" size=".03" fromto="0 0 0 .3 0 0" mass="1"/>
-      <body name="finger" pos=".3 0 0"><joint name="c" axis="0 1 0"/><geom type="cylinder" size=".02 .05" mass=".2"/></body>
-      <body name="thumb" pos=".3 .1 0"><joint name="d" axis="0 1 0"/><geom type="mesh" mesh="wedge" mass=".2"/></body></body></body>
+      <body name="finger" pos=".3 0 0"><joint name="c" axis="0 1 0"/>
+        <geom type="cylinder" size=".02 .05" mass=".2"/></body>
+      <body name="thumb" pos=".3 .1 0"><joint name="d" axis="0 1 0"/>
+        <geom type="mesh" mesh="wedge" mass=".2"/></body></body></body>
   <body name="ball" pos=".4 0 .3"><freejoint/><geom size=".06" friction=".9"/></body>
 </worldbody>
 <asset><mesh name="wedge" vertex="0 0 0 .1 0 0 0 .04 0 0 0 .05"/></asset>
 <equality><joint joint1="c" joint2="d" polycoef="0 1 0 0 0"/></equality>
-<actuator><position name="servo" joint="a" kp="30" kv="2" ctrlrange="-2 2"/><motor name="push" joint="slide"/></actuator>
+<actuator><position name="servo" joint="a" kp="30" kv="2" ctrlrange="-2 2"/>
+  <motor name="push" joint="slide"/></actuator>
 <keyframe><key name="up" qpos="0 .1 0 0 0 .4 0 .3 1 0 0 0" ctrl=".5 2"/></keyframe></mujoco>
 """
 
@@ -36,7 +40,9 @@ ROBOT = """
 def run(path):
     """The command's hash of a scene file; where there is no command, the package's own."""
     if COMMAND:
-        out = subprocess.run([COMMAND, "run", path, "--steps", str(STEPS), "--backend", "cpu"], capture_output=True, text=True).stdout
+        out = subprocess.run(
+            [COMMAND, "run", path, "--steps", str(STEPS), "--backend", "cpu"], capture_output=True, text=True
+        ).stdout
         return re.search(r"hash ([0-9a-f]{16})", out).group(1)
     world = subadmm.scene(path, backend="cpu")
     world.step(STEPS)
@@ -47,7 +53,8 @@ def test_a_robot_runs_as_it_does_here(tmp_path, capsys):
     pytest.importorskip("mujoco")
     (tmp_path / "robot.xml").write_text(ROBOT)
     out, report = tmp_path / "robot.json", tmp_path / "report.json"
-    assert main(["convert", str(tmp_path / "robot.xml"), str(out), "--report", str(report), "--keyframe", "up", "--duration", "3"]) == 0
+    options = ["--report", str(report), "--keyframe", "up", "--duration", "3"]
+    assert main(["convert", str(tmp_path / "robot.xml"), str(out), *options]) == 0
     printed = capsys.readouterr().out
     loaded = subadmm.load(tmp_path / "robot.xml", keyframe="up", backend="cpu")
     loaded.world.step(STEPS)
@@ -55,7 +62,8 @@ def test_a_robot_runs_as_it_does_here(tmp_path, capsys):
     file, said = json.loads(out.read_text()), json.loads(report.read_text())
     assert (file["name"], file["duration"]) == ("robot", 3)
     assert {"base", "arm", "finger", "thumb", "ball"} <= {one["name"] for one in file["bodies"]}
-    assert {note["element"] for note in said["not_carried_over"]} == {note.element for note in loaded.report} | {"actuators"}
+    named = {note["element"] for note in said["not_carried_over"]}
+    assert named == {note.element for note in loaded.report} | {"actuators"}
     assert all(note["element"] in printed and note["reason"] in printed for note in said["not_carried_over"])
     # joints by their places, as gears and arrays have them
     joint = said["joints"]["b"]

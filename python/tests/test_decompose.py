@@ -1,4 +1,5 @@
-"""Meshes as several hulls, by coacd: what they fill, that they are the same each time, and what load() makes of them."""
+"""Meshes as several hulls, by coacd: what they fill, that they are the same each time, and what load() makes of
+them."""
 
 import sys
 
@@ -82,15 +83,17 @@ def test_a_hook_hangs_on_a_bar():
     assert len(note) == 1 and "1.5 times" in note[0].reason  # 0.12 / 0.08
     pytest.importorskip("coacd")
     several = hook(decompose=0.2)
-    assert len(several.shapes[several.source.geom("u").id]) > 1 and not [n for n in several.report if "geoms u" in n.element]
+    assert len(several.shapes[several.source.geom("u").id]) > 1 and not [
+        n for n in several.report if "geoms u" in n.element
+    ]
     assert several.bodies["hook"].mass == hull.bodies["hook"].mass  # MuJoCo's, of the mesh
     several.world.step(1000)
     report, place = several.world.report, several.bodies["hook"].position
     assert report.contacts >= 2 and place[2] > 1 and np.linalg.norm(several.bodies["hook"].linear_velocity) < 1e-3
 
 
-def test_a_stage_that_asks_for_it():
-    pytest.importorskip("pxr")
+def u_stage():
+    """Two U's, one that asks for a decomposition and one for a hull."""
     from pxr import Gf, Usd, UsdGeom, UsdPhysics
 
     vertices, triangles = u_mesh()
@@ -104,14 +107,28 @@ def test_a_stage_that_asks_for_it():
         UsdPhysics.CollisionAPI.Apply(mesh.GetPrim()), UsdPhysics.RigidBodyAPI.Apply(mesh.GetPrim())
         kind = "convexDecomposition" if path == "/asked" else "convexHull"
         UsdPhysics.MeshCollisionAPI.Apply(mesh.GetPrim()).CreateApproximationAttr(kind)
+    return stage
+
+
+def test_without_coacd(monkeypatch):
+    """A stage that asks for parts has one hull then; a caller that does is told."""
+    pytest.importorskip("pxr")
+    stage = u_stage()
+    monkeypatch.setitem(sys.modules, "coacd", None)
+    loaded = subadmm.load(stage)
+    assert len(loaded.shapes["/asked"]) == 1
+    assert any("/asked" in note.element and "one hull" in note.reason for note in loaded.report)
+    with pytest.raises(ImportError, match=r"subadmm\[decompose\]"):
+        subadmm.load(stage, decompose=True)
+
+
+def test_a_stage_that_asks_for_it():
+    pytest.importorskip("pxr")
+    pytest.importorskip("coacd")
+    stage = u_stage()
     loaded = subadmm.load(stage)
     said = [str(note) for note in loaded.report]
     assert any("/hull" in note and "1.5 times" in note for note in said)
     assert loaded.bodies["/hull"].mass == pytest.approx(12, rel=1e-6)
-    try:
-        import coacd  # noqa: F401
-    except ImportError:
-        assert any("/asked" in note and "one hull" in note for note in said)
-        return
     assert len(loaded.shapes["/asked"]) > 1 and loaded.bodies["/asked"].mass == pytest.approx(8, rel=0.02)
     assert len(subadmm.load(stage, decompose=0.1).shapes["/hull"]) > 1

@@ -71,7 +71,18 @@ CUBE = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
 FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 
 
-def joint(stage, kind, path, a=None, b=None, position_a=(0, 0, 0), position_b=(0, 0, 0), turn_a=None, turn_b=None, **attributes):
+def joint(
+    stage,
+    kind,
+    path,
+    a=None,
+    b=None,
+    position_a=(0, 0, 0),
+    position_b=(0, 0, 0),
+    turn_a=None,
+    turn_b=None,
+    **attributes,
+):
     made = getattr(UsdPhysics, kind).Define(stage, path)
     for number, target, position, turn in ((0, a, position_a, turn_a), (1, b, position_b, turn_b)):
         if target:
@@ -109,17 +120,26 @@ def tensor(one):
     return turn @ np.diag(one.inertia) @ turn.T
 
 
-# ---- units and frames --------------------------------------------------------------------------------------------------
+# ---- units and frames ----------------------------------------------------------------------------------------------
 
 
 def falling(metres, up, kilograms):
-    """A turned box with a velocity, in a group that is turned, over a plane; lengths and masses in the stage's units."""
+    """A turned box with a velocity, in a group that is turned, over a plane; lengths and masses in the stage's
+    units."""
     stage, turn = new_stage(metres, up, kilograms), q_about([1, 0, 0], -np.pi / 2) if up == "Y" else (1, 0, 0, 0)
     top = stage.DefinePrim("/top", "Xform")
     place(top, turn=turn)  # what is below has z up
     collider(stage, "/top/ground", "Plane")
-    one = body(stage, "/top/one", np.array([0.1, 0.2, 0.5]) / metres, q_about([0.6, 0, 0.8], 0.5), np.array([0.1, 0.2, 0.05]) / metres,
-               mass=3.0 / kilograms, gprim="Cube", size=2.0)
+    one = body(
+        stage,
+        "/top/one",
+        np.array([0.1, 0.2, 0.5]) / metres,
+        q_about([0.6, 0, 0.8], 0.5),
+        np.array([0.1, 0.2, 0.05]) / metres,
+        mass=3.0 / kilograms,
+        gprim="Cube",
+        size=2.0,
+    )
     api = UsdPhysics.RigidBodyAPI(one)
     api.CreateVelocityAttr(Gf.Vec3f(0.5 / metres, 0, 0)), api.CreateAngularVelocityAttr(Gf.Vec3f(0, 0, 90))
     return subadmm.load(stage)
@@ -154,7 +174,7 @@ def test_gravity_of_the_scene():
     assert subadmm.load(stage, settings=subadmm.Settings(gravity=[1, 2, 3])).world.settings.gravity == [1, 2, 3]
 
 
-# ---- masses ------------------------------------------------------------------------------------------------------------
+# ---- masses --------------------------------------------------------------------------------------------------------
 
 
 def test_masses_by_the_rules_of_usd():
@@ -174,11 +194,15 @@ def test_masses_by_the_rules_of_usd():
     for name, mass in (("sum", None), ("given", 5.0)):
         body(stage, f"/{name}", mass=mass)
         for k, share in ((0, 1.0), (1, 3.0)):
-            UsdPhysics.MassAPI.Apply(collider(stage, f"/{name}/part{k}", "Cube", (0, k, 0), size=0.2)).CreateMassAttr(share)
+            UsdPhysics.MassAPI.Apply(collider(stage, f"/{name}/part{k}", "Cube", (0, k, 0), size=0.2)).CreateMassAttr(
+                share
+            )
     loaded = subadmm.load(stage)
     assert not loaded.report
     ball = 4 / 3 * np.pi * 0.5**3
-    assert [loaded.bodies[p].mass for p in ("/water", "/dense", "/stuff")] == pytest.approx([1000 * ball, 3 * ball, 7 * ball])
+    assert [loaded.bodies[p].mass for p in ("/water", "/dense", "/stuff")] == pytest.approx(
+        [1000 * ball, 3 * ball, 7 * ball]
+    )
     one = loaded.bodies["/both"]
     assert one.mass == pytest.approx(8 * ball) and one.position == pytest.approx([-1, 0, 0])  # (6 (-2) + 2 (2)) / 8
     about = 0.4 * 8 * ball * 0.25  # and 6 at 1 m, 2 at 3 m of the middle
@@ -201,15 +225,21 @@ def test_given_inertia_and_centre_of_mass():
     body(stage, "/point", mass=3.0)
     loaded = subadmm.load(stage)
     made = loaded.bodies["/one"]
-    assert made.mass == 2 and made.position == pytest.approx(np.array([0.1, 0.2, 0.3]) + q_matrix(turn) @ [0.05, 0.1, 0], rel=SINGLE)
+    assert made.mass == 2 and made.position == pytest.approx(
+        np.array([0.1, 0.2, 0.3]) + q_matrix(turn) @ [0.05, 0.1, 0], rel=SINGLE
+    )
     whole = q_matrix(q_mul(turn, axes))
     assert tensor(made) == pytest.approx(whole @ np.diag([0.3, 0.4, 0.5]) @ whole.T, rel=1e-5, abs=1e-7)
     assert loaded.frame("/one")[0] == pytest.approx([0.1, 0.2, 0.3], abs=1e-7)
-    assert np.diag(tensor(loaded.bodies["/two"])) == pytest.approx([0.04, 0.04 + 6 * 0.0025, 0.04 + 6 * 0.0025], rel=SINGLE)
-    assert loaded.bodies["/point"].inertia == pytest.approx([0.4 * 3 * 0.01] * 3) and noted(loaded, "/point", "ball of 3 kg")
+    assert np.diag(tensor(loaded.bodies["/two"])) == pytest.approx(
+        [0.04, 0.04 + 6 * 0.0025, 0.04 + 6 * 0.0025], rel=SINGLE
+    )
+    assert loaded.bodies["/point"].inertia == pytest.approx([0.4 * 3 * 0.01] * 3) and noted(
+        loaded, "/point", "ball of 3 kg"
+    )
 
 
-# ---- shapes ------------------------------------------------------------------------------------------------------------
+# ---- shapes --------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -218,12 +248,33 @@ def test_given_inertia_and_centre_of_mass():
         ("Cube", dict(size=0.4), (1, 2, 0.5), "box", (0.2, 0.4, 0.1), 0.064),
         ("Sphere", dict(radius=0.3), (2, 2, 2), "sphere", (0.6,), 4 / 3 * np.pi * 0.216),
         ("Sphere", dict(radius=0.5), (1, 0.4, 0.6), "ellipsoid", (0.5, 0.2, 0.3), 4 / 3 * np.pi * 0.03),
-        ("Capsule", dict(radius=0.1, height=0.6, axis="X"), None, "capsule", (0.1, 0.3), np.pi * 0.01 * (0.6 + 0.4 / 3)),
+        (
+            "Capsule",
+            dict(radius=0.1, height=0.6, axis="X"),
+            None,
+            "capsule",
+            (0.1, 0.3),
+            np.pi * 0.01 * (0.6 + 0.4 / 3),
+        ),
         ("Cylinder", dict(radius=0.2, height=0.6, axis="Y"), (2, 0.5, 2), "cylinder", (0.4, 0.15), np.pi * 0.16 * 0.3),
         ("Cone", dict(radius=0.2, height=0.6, axis="Z"), (1, 1, 2), "cone", (0.2, 0.6), np.pi * 0.04 * 1.2 / 3),
         ("Cone", dict(radius=0.2, height=0.6, axis="X"), (2, 1, 1.5), "hull", None, np.pi * 0.06 * 1.2 / 3),
-        ("Capsule_1", dict(radiusTop=0.1, radiusBottom=0.1, height=0.4), None, "capsule", (0.1, 0.2), np.pi * 0.01 * (0.4 + 0.4 / 3)),
-        ("Cylinder_1", dict(radiusTop=0.1, radiusBottom=0.2, height=0.3), None, "hull", None, np.pi * 0.1 * (0.01 + 0.02 + 0.04)),
+        (
+            "Capsule_1",
+            dict(radiusTop=0.1, radiusBottom=0.1, height=0.4),
+            None,
+            "capsule",
+            (0.1, 0.2),
+            np.pi * 0.01 * (0.4 + 0.4 / 3),
+        ),
+        (
+            "Cylinder_1",
+            dict(radiusTop=0.1, radiusBottom=0.2, height=0.3),
+            None,
+            "hull",
+            None,
+            np.pi * 0.1 * (0.01 + 0.02 + 0.04),
+        ),
     ],
 )
 def test_gprims(gprim, attributes, scale, type, size, volume):
@@ -295,7 +346,9 @@ def test_meshes_by_their_approximation():
     assert subadmm.load(stage).world.to_json().count('"points"') == 5  # and four of those above
     # sides of triangles: rays from outside meet them
     mesh(stage, "/mirrored", CUBE, FACES, position=(0, 20, 0), scale=(-1, 1, 1))
-    UsdGeom.Mesh(mesh(stage, "/handed", CUBE, [face[::-1] for face in FACES], position=(0, 30, 0))).CreateOrientationAttr("leftHanded")
+    UsdGeom.Mesh(
+        mesh(stage, "/handed", CUBE, [face[::-1] for face in FACES], position=(0, 30, 0))
+    ).CreateOrientationAttr("leftHanded")
     loaded = subadmm.load(stage)
     hits = loaded.world.cast_rays([[3 * 3, 5, 9], [0, 20, 9], [0, 30, 9]], [[0, 0, -1]] * 3)
     assert hits["distance"] == pytest.approx([8.7, 8, 8], rel=SINGLE)
@@ -332,9 +385,23 @@ def test_a_box_slides_by_its_material():
     stage = new_stage()
     ground = collider(stage, "/ground", "Plane", turn=q_about([0, 1, 0], np.radians(30)))
     down = np.array([np.sin(np.radians(60)), 0, -0.5])
-    one = body(stage, "/one", 0.1 * np.array([0.5, 0, np.cos(np.radians(30))]), q_about([0, 1, 0], np.radians(30)), gprim="Cube", size=0.2)
+    one = body(
+        stage,
+        "/one",
+        0.1 * np.array([0.5, 0, np.cos(np.radians(30))]),
+        q_about([0, 1, 0], np.radians(30)),
+        gprim="Cube",
+        size=0.2,
+    )
     material(stage, "/slick", ground, one, StaticFriction=0.4, DynamicFriction=0.3)
-    rough = body(stage, "/rough", (0, 3, 0.05 + 0.1 * np.cos(np.radians(30))), q_about([0, 1, 0], np.radians(30)), gprim="Cube", size=0.2)
+    rough = body(
+        stage,
+        "/rough",
+        (0, 3, 0.05 + 0.1 * np.cos(np.radians(30))),
+        q_about([0, 1, 0], np.radians(30)),
+        gprim="Cube",
+        size=0.2,
+    )
     material(stage, "/sand", rough, StaticFriction=2.0, Restitution=0.25)
     loaded = subadmm.load(stage)
     assert noted(loaded, "/slick", "0.4") and loaded.shapes["/rough"][0].definition.restitution == 0.25
@@ -344,7 +411,7 @@ def test_a_box_slides_by_its_material():
     assert np.linalg.norm(loaded.bodies["/rough"].linear_velocity) < 1e-6  # sqrt(0.3 x 2) > tan 30 degrees
 
 
-# ---- joints ------------------------------------------------------------------------------------------------------------
+# ---- joints --------------------------------------------------------------------------------------------------------
 
 
 def test_a_pendulum_moves_as_the_same_by_hand():
@@ -352,18 +419,42 @@ def test_a_pendulum_moves_as_the_same_by_hand():
     stage = new_stage(metres=0.01, up="Y")
     bar = body(stage, "/bar", (25, 200, 0), gprim="Cube", size=1.0, scale=(50, 4, 6), mass=2.0)
     assert bar
-    joint(stage, "RevoluteJoint", "/hinge", None, "/bar", (0, 200, 0), (-0.5, 0, 0), axis="Z", lowerLimit=-150.0, upperLimit=10.0)
+    joint(
+        stage,
+        "RevoluteJoint",
+        "/hinge",
+        None,
+        "/bar",
+        (0, 200, 0),
+        (-0.5, 0, 0),
+        axis="Z",
+        lowerLimit=-150.0,
+        upperLimit=10.0,
+    )
     drive = UsdPhysics.DriveAPI.Apply(stage.GetPrimAtPath("/hinge"), "angular")
     drive.CreateStiffnessAttr(400.0), drive.CreateDampingAttr(20.0), drive.CreateTargetPositionAttr(-60.0)
     loaded = subadmm.load(stage)
     assert not loaded.report
     world = subadmm.World(settings=loaded.world.settings)
-    own = world.add_body(mass=2.0, inertia=2 / 12 * np.array([0.04**2 + 0.06**2, 0.5**2 + 0.06**2, 0.5**2 + 0.04**2]),
-                         position=(0.25, 0, 2), orientation=q_about([1, 0, 0], np.pi / 2))
+    own = world.add_body(
+        mass=2.0,
+        inertia=2 / 12 * np.array([0.04**2 + 0.06**2, 0.5**2 + 0.06**2, 0.5**2 + 0.04**2]),
+        position=(0.25, 0, 2),
+        orientation=q_about([1, 0, 0], np.pi / 2),
+    )
     degree = np.pi / 180
-    law = subadmm.Coordinate(limited=True, lower=-150 * degree, upper=10 * degree, drive="position",
-                             drive_stiffness=400e-4 / degree, drive_damping=20e-4 / degree, target_position=-60 * degree)
-    hinge = world.add_joint("revolute", None, own, position=(0, 0, 2), orientation=q_about([1, 0, 0], np.pi / 2), coordinates={5: law})
+    law = subadmm.Coordinate(
+        limited=True,
+        lower=-150 * degree,
+        upper=10 * degree,
+        drive="position",
+        drive_stiffness=400e-4 / degree,
+        drive_damping=20e-4 / degree,
+        target_position=-60 * degree,
+    )
+    hinge = world.add_joint(
+        "revolute", None, own, position=(0, 0, 2), orientation=q_about([1, 0, 0], np.pi / 2), coordinates={5: law}
+    )
     assert np.array(own.inertia) == pytest.approx(np.array(loaded.bodies["/bar"].inertia), rel=SINGLE)
     for _ in range(10):
         world.step(20)
@@ -389,7 +480,9 @@ def test_joints_of_every_kind():
         limit(six, name, 1.0, -1.0)
     limit(six, "transZ", -0.2, 0.2), limit(six, "rotZ", -90.0, 45.0)
     drive = UsdPhysics.DriveAPI.Apply(six, "rotZ")
-    drive.CreateStiffnessAttr(1.0), drive.CreateDampingAttr(0.1), drive.CreateTargetPositionAttr(30.0), drive.CreateMaxForceAttr(50.0)
+    drive.CreateStiffnessAttr(1.0), drive.CreateDampingAttr(0.1), drive.CreateTargetPositionAttr(
+        30.0
+    ), drive.CreateMaxForceAttr(50.0)
     joint(stage, "Joint", "/j/free", "/a6", "/free")
     loaded = subadmm.load(stage)
     made = {path[3:]: one for path, one in loaded.joints.items()}
@@ -414,7 +507,9 @@ def test_joints_of_every_kind():
     loaded.world.step(400)
     assert made["slide"].position[2] == pytest.approx(0.3, abs=1e-3)  # still drifting against the stop
     assert made["rope"].position[0] == pytest.approx(0.7, abs=1e-5)
-    assert np.linalg.norm(np.subtract(loaded.bodies["/rod"].position, loaded.bodies["/a4"].position)) == pytest.approx(0.5, abs=1e-5)
+    assert np.linalg.norm(np.subtract(loaded.bodies["/rod"].position, loaded.bodies["/a4"].position)) == pytest.approx(
+        0.5, abs=1e-5
+    )
     assert made["six"].position[5] == pytest.approx(np.radians(30), abs=1e-3)
     assert not made["fixed"].broken
     loaded.bodies["/fixed"].apply_impulse_at([8, 0, 0], [0, 0, 1.5])
@@ -491,7 +586,17 @@ def test_frames_are_those_that_usd_sees():
     a = body(stage, "/top/a", (1, 0, 0), q_about([0, 1, 0], 0.3), (1, 1, 0.5), gprim="Cube", size=1.0)
     b = body(stage, "/top/b", (0, 1, 0), q_about([0, 0, 1], 0.8), gprim="Sphere", radius=0.5)
     place(stage.DefinePrim("/top/b/tip", "Xform"), (0, 0, 0.5), q_about([1, 0, 0], 0.2))
-    joint(stage, "Joint", "/joint", "/top/a", "/top/b/tip", (0.1, 0.2, 0.4), (0.3, 0, 0.1), q_about([0, 0, 1], 0.2), q_about([0, 1, 0], 0.6))
+    joint(
+        stage,
+        "Joint",
+        "/joint",
+        "/top/a",
+        "/top/b/tip",
+        (0.1, 0.2, 0.4),
+        (0.3, 0, 0.1),
+        q_about([0, 0, 1], 0.2),
+        q_about([0, 1, 0], 0.6),
+    )
     loaded = subadmm.load(stage)
     parsed = UsdPhysics.LoadUsdPhysicsFromRange(stage, ["/"])
     desc = next(value[1][0] for key, value in parsed.items() if key == UsdPhysics.ObjectType.D6Joint)
@@ -509,7 +614,7 @@ def test_frames_are_those_that_usd_sees():
         assert abs(have_turn @ want_turn) == pytest.approx(1, abs=1e-6)
 
 
-# ---- filters -----------------------------------------------------------------------------------------------------------
+# ---- filters -------------------------------------------------------------------------------------------------------
 
 
 def test_collision_groups_and_filtered_pairs():
@@ -527,7 +632,9 @@ def test_collision_groups_and_filtered_pairs():
     UsdPhysics.FilteredPairsAPI.Apply(stage.GetPrimAtPath("/pair")).CreateFilteredPairsRel().SetTargets(["/ground"])
     # of a body with two colliders one falls through, the other one does not
     collider(stage, "/inner/second", "Sphere", (0, 0, 0.05), radius=0.1)
-    UsdPhysics.FilteredPairsAPI.Apply(stage.GetPrimAtPath("/inner/ball")).CreateFilteredPairsRel().SetTargets(["/ground"])
+    UsdPhysics.FilteredPairsAPI.Apply(stage.GetPrimAtPath("/inner/ball")).CreateFilteredPairsRel().SetTargets(
+        ["/ground"]
+    )
     place(stage.DefinePrim("/nobody", "Xform"))
     UsdPhysics.FilteredPairsAPI.Apply(stage.GetPrimAtPath("/outer")).CreateFilteredPairsRel().SetTargets(["/nobody"])
     loaded = subadmm.load(stage)
@@ -539,7 +646,7 @@ def test_collision_groups_and_filtered_pairs():
     assert noted(loaded, "/off", "no collider")
 
 
-# ---- what is left ------------------------------------------------------------------------------------------------------
+# ---- what is left --------------------------------------------------------------------------------------------------
 
 
 def test_kinematic_bodies_and_disabled_ones():

@@ -1,5 +1,5 @@
-"""Robots and scenes from files: MJCF and URDF, read by MuJoCo's compiler (the extra `import` of the package), and USD, read by
-usd-core (the extra `usd`).
+"""Robots and scenes from files: MJCF and URDF, read by MuJoCo's compiler (the extra `import` of the package), and
+USD, read by usd-core (the extra `usd`).
 
     robot = subadmm.load("robot.xml")
     robot.world.step(100)
@@ -56,14 +56,14 @@ def load(
     overlaps="ignore",
     decompose=False,
 ):
-    """Build a world from an MJCF or URDF file, compiled by the package `mujoco` (pip install subadmm[import]), or from a USD
-    stage (.usd, .usda, .usdc, .usdz), read by `usd-core` (pip install subadmm[usd]).
+    """Build a world from an MJCF or URDF file, compiled by the package `mujoco` (pip install subadmm[import]), or
+    from a USD stage (.usd, .usda, .usdc, .usdz), read by `usd-core` (pip install subadmm[usd]).
 
     path: the file; or a mujoco.MjModel that is compiled already, or a pxr.Usd.Stage that is open.
     settings: a subadmm.Settings; default: the file's time step and gravity. backend, precision, device: as of World.
     decompose: True makes several hulls of each mesh of a body that moves, by coacd (pip install subadmm[decompose]); a
-        number in [0.01, 1] is the concavity that may remain (True: 0.05). Default: one hull, which is in the report where
-        it is much larger than the mesh.
+        number in [0.01, 1] is the concavity that may remain (True: 0.05). Default: one hull, which is in the report
+        where it is much larger than the mesh.
 
     Of MJCF and URDF alone:
     floating: of URDF files: the base is free. Default: it is fixed to the world, as MuJoCo has it.
@@ -74,9 +74,9 @@ def load(
     overlaps: 'ignore' leaves out contact between bodies of one mechanism that overlap where they start, which hard
         contacts cannot undo; 'keep' does not.
 
-    Returns a LoadedModel or a LoadedStage: world, bodies, joints, report. Raises ImportError (a package that is not there),
-    ValueError (what MuJoCo does not compile or USD does not open; an argument out of range), subadmm.Error (a body that
-    the world does not take, named).
+    Returns a LoadedModel or a LoadedStage: world, bodies, joints, report. Raises ImportError (a package that is not
+    there), ValueError (what MuJoCo does not compile or USD does not open; an argument out of range), subadmm.Error (a
+    body that the world does not take, named).
     """
     threshold = _threshold_of(decompose)
     if _is_stage(path):

@@ -11,9 +11,9 @@ def _meet(a, b):
 
 
 def classes_of(meets):
-    """(category, mask) of kinds of shapes, by which of them meet (symmetric, k x k, bool), None of those that meet nothing;
-    and whether there are too many classes, so that some meet more than they should. Kinds that meet the same ones share a
-    bit."""
+    """(category, mask) of kinds of shapes, by which of them meet (symmetric, k x k, bool), None of those that meet
+    nothing; and whether there are too many classes, so that some meet more than they should. Kinds that meet the same
+    ones share a bit."""
     rows = {}
     for k in range(len(meets)):
         if meets[k].any():

@@ -134,8 +134,8 @@ class LoadedActuator:
 class Loaded:
     """A file in a world.
 
-    `world`; `bodies`, `joints` ... by the file's names; `shapes`: lists of BodyShape by what they were made of; `report`:
-    what was not carried over; `source`: the file as the package that read it has it.
+    `world`; `bodies`, `joints` ... by the file's names; `shapes`: lists of BodyShape by what they were made of;
+    `report`: what was not carried over; `source`: the file as the package that read it has it.
     """
 
     def __init__(self, world, source, report):
@@ -191,8 +191,8 @@ class LoadedModel(Loaded):
 class LoadedStage(Loaded):
     """A USD stage in a world: its frame has metres and z up (`stage_to_world`).
 
-    `bodies`: by the prim's path, those of rigid bodies, and the static ones of colliders that are of none; `joints`: the
-    world's Joint by the prim's path (coordinates in m and rad); `shapes`: by the collider's path; `source`: the
+    `bodies`: by the prim's path, those of rigid bodies, and the static ones of colliders that are of none; `joints`:
+    the world's Joint by the prim's path (coordinates in m and rad); `shapes`: by the collider's path; `source`: the
     pxr.Usd.Stage.
     """
 

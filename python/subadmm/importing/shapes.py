@@ -9,7 +9,6 @@ from .options import disabled
 from .overlap import leave_out
 from .poses import mul, pose
 
-
 #: Volume of a hull over the mesh's, up to which the report says nothing.
 MOST_FILLING = 1.1
 
@@ -84,7 +83,8 @@ class Shapes:
         return self._shares[mesh]
 
     def make(self, geom, moves):
-        """Its shapes, in their own frame: one, but for meshes of bodies that move. Raises subadmm.Error or ValueError."""
+        """Its shapes, in their own frame: one, but for meshes of bodies that move. Raises subadmm.Error or
+        ValueError."""
         import subadmm as s
         import mujoco
 

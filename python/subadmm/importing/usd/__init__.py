@@ -8,8 +8,8 @@ from .stage import Reader, gravity_of, open_stage
 
 
 def load_stage(path, settings, threshold, **options):
-    """A LoadedStage of a file or an open stage. settings: Settings or None; threshold: of decompose, or None; options: of
-    World."""
+    """A LoadedStage of a file or an open stage. settings: Settings or None; threshold: of decompose, or None;
+    options: of World."""
     from ... import Settings, World
     from ..model import LoadedStage, Report
 

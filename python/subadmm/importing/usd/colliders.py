@@ -58,7 +58,9 @@ def _round(reader, prim, make, bottom, top, half_height, caps, linear):
         (x, y, z), turn = axes[1], axes[0]
         if abs(x - y) <= SAME * max(x, y) and (not caps or abs(x - z) <= SAME * z):
             return make(bottom * (x + y) / 2, half_height * z, orientation=turn)
-    reader.report.add(reader.element(prim), "is no round shape here, by its scale or its two radii: a polyhedron stands in")
+    reader.report.add(
+        reader.element(prim), "is no round shape here, by its scale or its two radii: a polyhedron stands in"
+    )
     return hull_of(outline(bottom, top, half_height, caps) @ linear.T)
 
 
@@ -131,7 +133,9 @@ def _hull(reader, prim, vertices, triangles, asked):
         volume = volume_of(vertices, triangles)
         share = mass_of([shape], 1.0).mass / volume if volume and volume > 0 else 1.0
         if share > MOST_FILLING:
-            reader.report.add(reader.element(prim), f"the convex hull, as the stage asks for, has {share:.2g} times its volume")
+            reader.report.add(
+                reader.element(prim), f"the convex hull, as the stage asks for, has {share:.2g} times its volume"
+            )
     return [shape]
 
 
@@ -143,6 +147,8 @@ def _decomposed(reader, prim, vertices, triangles):
     try:
         return decompose((vertices, triangles), THRESHOLD if reader.threshold is None else reader.threshold)
     except (ImportError, ValueError, Error) as error:
+        if isinstance(error, ImportError) and reader.threshold is not None:
+            raise  # asked for by the caller, not by the stage
         reader.report.add(reader.element(prim), f"is one hull, not several: {error}")
         return _hull(reader, prim, vertices, triangles, "convexDecomposition")
 

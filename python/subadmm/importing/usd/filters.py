@@ -51,7 +51,9 @@ def _pairs(reader):
         for target in UsdPhysics.FilteredPairsAPI(prim).GetFilteredPairsRel().GetTargets():
             other = _below(reader, target)
             if not any(own) or not any(other):
-                reader.report.add(reader.element(prim), f"filtered pair with {target}: not carried over, there is no body")
+                reader.report.add(
+                    reader.element(prim), f"filtered pair with {target}: not carried over, there is no body"
+                )
             bodies += [(a, b) for a in own[0] for b in other[0] if a != b]
             for some, rest in ((own, other), (other, own)):
                 colliders += [(a, b) for a in some[1] for body in rest[0] for b in colliders_of.get(body, [])]

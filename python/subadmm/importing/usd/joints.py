@@ -71,7 +71,9 @@ def _drive(reader, prim, name, index, coordinate):
     drive = UsdPhysics.DriveAPI(prim, name)
     stiffness, damping = value(drive.GetStiffnessAttr()), value(drive.GetDampingAttr())
     if value(drive.GetTypeAttr()) == UsdPhysics.Tokens.acceleration:
-        reader.report.add(reader.element(prim), f"drive '{name}' is not carried over: its force is relative to the mass")
+        reader.report.add(
+            reader.element(prim), f"drive '{name}' is not carried over: its force is relative to the mass"
+        )
         return
     if stiffness == 0 and damping == 0:
         return
@@ -146,7 +148,9 @@ def _d6(reader, prim, limits, coordinates):
         low, high = value(api.GetLowAttr()), value(api.GetHighAttr())
         if name not in D6:
             if np.isfinite(low) or np.isfinite(high):
-                reader.report.add(reader.element(prim), f"limit '{name}' is not carried over: not beside other coordinates")
+                reader.report.add(
+                    reader.element(prim), f"limit '{name}' is not carried over: not beside other coordinates"
+                )
             continue
         index = D6[name]
         if low > high:

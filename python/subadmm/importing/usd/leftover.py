@@ -4,10 +4,11 @@ from .stage import Counts
 
 #: Beginnings of applied schemas that are of drawing, assets and collections, or that other parts of the import read.
 NO_PHYSICS = (
-    "MaterialBindingAPI", "CollectionAPI", "GeomModelAPI", "MotionAPI", "PrimvarsAPI", "VisibilityAPI", "XformCommonAPI",
-    "ShapingAPI", "ShadowAPI", "LightAPI", "LightListAPI", "MeshLightAPI", "VolumeLightAPI", "ClipsAPI", "ModelAPI",
-    "SkelBindingAPI", "ConnectableAPI", "CoordSysAPI", "NodeDefAPI", "Semantics", "ColorSpace", "AssetPreviewsAPI",
-    "SceneGraphPrimAPI", "HydraGenerativeProceduralAPI", "RenderSettings", "PreviewSurface",
+    "MaterialBindingAPI", "CollectionAPI", "GeomModelAPI", "MotionAPI", "PrimvarsAPI", "VisibilityAPI",
+    "XformCommonAPI", "ShapingAPI", "ShadowAPI", "LightAPI", "LightListAPI", "MeshLightAPI", "VolumeLightAPI",
+    "ClipsAPI", "ModelAPI", "SkelBindingAPI", "ConnectableAPI", "CoordSysAPI", "NodeDefAPI", "Semantics",
+    "ColorSpace", "AssetPreviewsAPI", "SceneGraphPrimAPI", "HydraGenerativeProceduralAPI", "RenderSettings",
+    "PreviewSurface",
 )  # fmt: skip
 READ = (
     "PhysicsRigidBodyAPI", "PhysicsMassAPI", "PhysicsCollisionAPI", "PhysicsMeshCollisionAPI", "PhysicsMaterialAPI",
@@ -42,7 +43,9 @@ def report_leftover(reader):
             if str(prim.GetPath()) not in reader.bodies and str(prim.GetPath()) not in reader.colliders:
                 reader.report.add(reader.element(prim), "its mass is not carried over: it is no body and no collider")
         if prim.IsA(UsdGeom.PointInstancer) and _is_of_instances(prim):
-            reader.report.add(reader.element(prim), "not carried over: its instances (its prototypes are, where they stand)")
+            reader.report.add(
+                reader.element(prim), "not carried over: its instances (its prototypes are, where they stand)"
+            )
         if prim.IsA(UsdGeom.Gprim) and not prim.HasAPI(UsdPhysics.CollisionAPI):
             drawn.add("gprims", prim)
         elif prim.IsA(UsdGeom.Camera):
@@ -56,4 +59,6 @@ def report_leftover(reader):
     for name, count, first in types:
         reader.report.add(f"prims of type {name}", f"not carried over: {count}, as {first}")
     if any(True for _ in drawn):
-        reader.report.add("what is drawn", "not carried over: " + ", ".join(f"{count} {what}" for what, count, _ in drawn))
+        reader.report.add(
+            "what is drawn", "not carried over: " + ", ".join(f"{count} {what}" for what, count, _ in drawn)
+        )

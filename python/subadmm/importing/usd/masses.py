@@ -1,5 +1,5 @@
-"""Mass, centre of mass and inertia of a rigid body, by UsdPhysics' rules: what the body says goes before what its colliders
-add up to; of a collider its mass before its density, then the body's density, the material's, and water's."""
+"""Mass, centre of mass and inertia of a rigid body, by UsdPhysics' rules: what the body says goes before what its
+colliders add up to; of a collider its mass before its density, then the body's density, the material's, and water's."""
 
 import numpy as np
 
@@ -24,8 +24,8 @@ def _offset(arm):
 
 
 def _given(reader, prim):
-    """What a prim's MassAPI says: mass, density (0: nothing), centre (m, in the prim's frame without its scale), inertia
-    (None: nothing), turn of its axes."""
+    """What a prim's MassAPI says: mass, density (0: nothing), centre (m, in the prim's frame without its scale),
+    inertia (None: nothing), turn of its axes."""
     from pxr import UsdPhysics
 
     if not prim.HasAPI(UsdPhysics.MassAPI):
@@ -60,9 +60,7 @@ def _collider(reader, prim, body, shapes, body_density):
     """The Weight of one, in the frame of the prim `body`."""
     from ... import mass_of
 
-    mass, density, centre, inertia, axes = (
-        _given(reader, prim) if prim != body else (0.0, 0.0, None, None, IDENTITY[1])
-    )
+    mass, density, centre, inertia, axes = _given(reader, prim) if prim != body else (0.0, 0.0, None, None, IDENTITY[1])
     whole = mass_of(shapes, density or body_density or density_of(reader, prim) or WATER)
     out = Weight(whole.mass, np.array(whole.centre), _tensor(whole.inertia, whole.orientation))
     if mass > 0:
@@ -86,7 +84,8 @@ def _sum(parts):
 
 
 def weight_of(reader, body, colliders):
-    """(mass, principal moments, pose of the principal frame in the prim's) of a body. colliders: [(prim, its shapes)]."""
+    """(mass, principal moments, pose of the principal frame in the prim's) of a body. colliders: [(prim, its
+    shapes)]."""
     mass, density, centre, inertia, axes = _given(reader, body)
     parts = [_collider(reader, prim, body, shapes, density) for prim, shapes in colliders if shapes]
     if parts:

@@ -52,8 +52,8 @@ def value(attribute):
 class Reader:
     """What the parts of the import share: the stage, its units, the prims of interest.
 
-    Lengths are brought to m by `metre`, masses to kg by `kilogram`; poses in the stage's frame by `turn`, the pose of that
-    frame in the world's, whose z is up.
+    Lengths are brought to m by `metre`, masses to kg by `kilogram`; poses in the stage's frame by `turn`, the pose of
+    that frame in the world's, whose z is up.
     """
 
     def __init__(self, stage, report, threshold):
@@ -125,7 +125,8 @@ class Reader:
 
     def place(self, prim):
         """The pose of a prim without its scale, in the stage's frame, m."""
-        # Gf.Matrix4d.RemoveScaleShear, to the last digits: the rotation next to the matrix, of a mirror image's negative
+        # Gf.Matrix4d.RemoveScaleShear, to the last digits: the rotation next to the matrix, of a mirror image's
+        # negative
         m = np.array(self._transforms.GetLocalToWorldTransform(prim))
         u, _, v = np.linalg.svd(m[:3, :3].T)
         return pose(m[3, :3] * self.metre, q_of_matrix(u @ v * np.sign(np.linalg.det(u @ v))))
