@@ -73,6 +73,13 @@ def test_descriptions_have_one_group_for_a_form():
     assert len(hues) == 2
 
 
+def test_sensors_are_not_drawn():
+    world = subadmm.World()
+    body = world.add_solid([subadmm.sphere(0.1), subadmm.box(3, 3, 3, sensor=True)], density=1)
+    groups = show.describe(world).groups
+    assert len(groups) == 1 and len(groups[0].body) == 1 and groups[0].body[0] == body.index
+
+
 def test_the_nearest_triangle_is_seen_and_triangles_that_share_an_edge_leave_no_gap():
     far = [[1, 1, 2.0], [1, 31, 2], [31, 31, 2]], [[1, 1, 2.0], [31, 31, 2], [31, 1, 2]]
     near = [[8, 8, 1.0], [8, 24, 1], [24, 24, 1]]

@@ -93,7 +93,7 @@ def test_a_target_goes_to_where_the_user_wants_it_without_jumps():
 
 
 def test_a_led_hand_lifts_a_cube_and_feels_its_weight():
-    session = Session(lambda: subadmm.scene("hand_demo", backend="cpu"))
+    session = Session(lambda: subadmm.scene("hand_demo", backend="cpu", settings={"threads": 1}))
     world, steering = session.world, session.steering
     cube = world.bodies[2 + 34]
     assert cube.mass == 1

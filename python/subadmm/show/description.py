@@ -96,6 +96,7 @@ def describe(world) -> Description:
     dynamic = np.array([body.type == "dynamic" for body in bodies], dtype=bool)
     colour = _colours(world, bodies)
     shapes = [(shape.body.index, shape.definition) for shape in world.shapes]
+    shapes = [(row, shape) for row, shape in shapes if not shape.sensor]  # nobody sees them
 
     # How large what moves is, from the shapes' meshes; planes come afterwards, with a patch that fits.
     found = {}
