@@ -27,8 +27,6 @@
  * which it is not beside a rim's axis: a corner may be that near to a rim. */
 #define CONVEX_SINGULAR (sizeof(real) == 4 ? (real)1e-4 : (real)1e-9)
 #define CONVEX_SINGULAR_NEAR (sizeof(real) == 4 ? (real)1e-4 : (real)1e-11)
-/* A last step that is no longer than this has been the last. */
-#define CONVEX_THERE (sizeof(real) == 4 ? (real)1e-3 : (real)1e-8)
 /* Depth up to which the side that the last step knows is not doubted, as a share of the thinner extent. */
 #define CONVEX_SHALLOW ((real)0.05)
 enum { CONVEX_MOVES = 8, CONVEX_STEPS = 16 };
@@ -161,21 +159,44 @@ SADMM_INLINE bool convex_newton(const struct convex_plane *p, real size, struct 
     }
 }
 
-/* A pair of pieces that reaches beyond the active ones along n becomes one of them; false: none does. */
-SADMM_INLINE bool convex_add(const struct convex_pair *pair, vec3 n, struct convex_active *active)
+/* `next`, which reaches beyond the active pairs, becomes one of them: in place of the one whose weight is the first to
+ * go where its own grows and the mean of their points stays (the pivot of the simplex method). False: none gives way. */
+SADMM_INLINE bool convex_enter(const struct convex_plane *p, const real g[2], const struct difference_point *next,
+                               struct convex_active *active)
 {
-    const struct difference_point zero = {{0, 0, 0}, 0, 0}, next = convex_support(pair, n, &zero);
-    const real reach = v3_dot(n, next.w) - 2 * pair->slack;
+    real share = 0;
+    int at = active->count, k;
+    if (at == 3) {
+        const real u0 = p->g[1][0] - p->g[0][0], u1 = p->g[1][1] - p->g[0][1], v0 = p->g[2][0] - p->g[0][0],
+                   v1 = p->g[2][1] - p->g[0][1], d0 = g[0] - p->g[0][0], d1 = g[1] - p->g[0][1],
+                   det = u0 * v1 - u1 * v0;
+        real of[3]; /* g as a mean of theirs */
+        if (!(det != 0)) return false;
+        of[1] = (d0 * v1 - d1 * v0) / det;
+        of[2] = (u0 * d1 - u1 * d0) / det;
+        of[0] = 1 - of[1] - of[2];
+        for (k = 0; k < 3; ++k)
+            if (of[k] > 0 && (at == 3 || active->weight[k] < share * of[k])) {
+                at = k;
+                share = active->weight[k] / of[k];
+            }
+        if (at == 3) return false;
+        for (k = 0; k < 3; ++k) active->weight[k] -= share * of[k];
+    } else {
+        ++active->count;
+    }
+    active->a[at] = next->a;
+    active->b[at] = next->b;
+    active->weight[at] = share;
+    return true;
+}
+
+SADMM_INLINE bool convex_is_active(const struct convex_active *active, const struct difference_point *point)
+{
     int k;
     for (k = 0; k < active->count; ++k)
-        if ((active->a[k] == next.a && active->b[k] == next.b) ||
-            v3_dot(n, v3_sub(convex_point_a(pair, active->a[k], n), convex_point_b(pair, active->b[k], n))) >= reach)
-            return false;
-    active->a[k] = next.a;
-    active->b[k] = next.b;
-    active->weight[k] = 0;
-    ++active->count;
-    return true;
+        if (active->a[k] == point->a && active->b[k] == point->b) return true;
+    return false;
 }
 
 SADMM_INLINE vec3 convex_turned(vec3 n, real x1, vec3 t1, real x2, vec3 t2)
@@ -184,25 +205,31 @@ SADMM_INLINE vec3 convex_turned(vec3 n, real x1, vec3 t1, real x2, vec3 t2)
     return v3_scale(at, 1 / v3_norm(at));
 }
 
-/* n by Newton's method, as far as s grows with it. False: it does not get there; where s has not grown, all is as it
- * was. */
+/* What h may lose beside n, by the mean of points along n: `off`, how far that is beside n; mean, how far along; length:
+ * of the last step. Of what is apart no other direction has more, while the two overlap none nearby. */
+SADMM_INLINE real convex_gain(real off, real mean, real length)
+{
+    return off * real_min(1, mean < 0 ? off / -mean : length);
+}
+
+/* n by Newton's method. False: it is not certain that this is the optimum; where s has not grown, all is as it was. */
 SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_active *active, vec3 *n, real *separation)
 {
     struct convex_active now = *active;
     const struct difference_point zero = {{0, 0, 0}, 0, 0};
     vec3 at = *n;
-    real s, last = 2;
-    bool there = false, singular;
+    real s, length = 2, last = 2;
+    bool certain = false, singular = false;
     int step;
     for (step = 0; step < CONVEX_STEPS; ++step) {
+        const struct difference_point next = convex_support(pair, at, &zero);
+        const vec3 from = at;
         struct convex_plane p;
         vec3 t1, t2;
-        const vec3 from = at;
-        real x[2], length, mean = 0;
+        real x[2], mean = 0, off0 = 0, off1 = 0, lack;
         int k, least = 0;
         v3_tangents(at, &t1, &t2);
         p.m[0] = p.m[1] = p.m[2] = 0;
-        if (step > 0 && now.count < 3 && convex_add(pair, at, &now)) last = 2;
         for (k = 0; k < now.count; ++k) {
             const vec3 w = v3_sub(convex_point_a(pair, now.a[k], at), convex_point_b(pair, now.b[k], at));
             real bend[3];
@@ -213,9 +240,25 @@ SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_ac
             convex_pair_bend(pair, now.a[k], now.b[k], at, t1, t2, bend);
             for (i = 0; i < 3; ++i) p.m[i] += now.weight[k] * bend[i];
             mean += now.weight[k] * p.h[k];
+            off0 += now.weight[k] * p.g[k][0];
+            off1 += now.weight[k] * p.g[k][1];
+        }
+        lack = v3_dot(at, next.w) - mean;
+        if (length <= 16 * SADMM_EPSILON || (length >= last / 2 && length < (real)1e-3)) { /* or rounding ends it */
+            certain = lack + convex_gain(real_sqrt(off0 * off0 + off1 * off1), mean, length) <= 8 * pair->slack &&
+                      !(singular && mean > 0);
+            if (certain || convex_is_active(&now, &next)) break;
+            length = last = 2;
+        }
+        if (lack > 2 * pair->slack && !convex_is_active(&now, &next)) {
+            const real g[2] = {v3_dot(t1, next.w), v3_dot(t2, next.w)};
+            if (!convex_enter(&p, g, &next, &now)) break;
+            length = 2;
+            continue;
         }
         p.m[0] -= mean;
         p.m[2] -= mean;
+        last = length;
         if (!convex_newton(&p, pair->size, &now, x, &singular)) {
             if (now.count == 1) return false;
             for (k = 1; k < now.count; ++k)
@@ -223,6 +266,7 @@ SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_ac
             convex_drop(&now, least);
             for (mean = 0, k = 0; k < now.count; ++k) mean += now.weight[k];
             for (k = 0; k < now.count; ++k) now.weight[k] = mean > 0 ? now.weight[k] / mean : 1 / (real)now.count;
+            length = 2;
             continue;
         }
         length = real_sqrt(x[0] * x[0] + x[1] * x[1]);
@@ -234,7 +278,7 @@ SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_ac
                 const struct difference_point point = convex_support(pair, at, &zero);
                 if (!(v3_dot(at, point.w) > mean + pair->slack) || point.a != now.a[0] || point.b != now.b[0]) break;
                 at = convex_turned(from, x[0] / (real)(2 << half), t1, x[1] / (real)(2 << half), t2);
-                last = 2;
+                length = 2;
             }
         }
         for (k = 1; k < now.count; ++k)
@@ -243,25 +287,15 @@ SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_ac
             for (mean = 0, k = 0; k < now.count; ++k) mean += k == least ? 0 : real_max(now.weight[k], 0);
             convex_drop(&now, least);
             for (k = 0; k < now.count; ++k) now.weight[k] = real_max(now.weight[k], 0) / mean;
-            last = 2;
-            continue;
+            length = 2;
         }
-        /* there; or as near as rounding lets it */
-        if (length <= 16 * SADMM_EPSILON || (length >= last / 2 && length < (real)1e-3)) {
-            there = length <= CONVEX_THERE && !(singular && mean > 0);
-            if (now.count == 3 || !convex_add(pair, at, &now)) break;
-            there = false;
-            last = 2;
-            continue;
-        }
-        last = length;
     }
     s = convex_separation(pair, at);
     if (!(s >= *separation - pair->slack / 4)) return false;
     *active = now;
     *n = at;
     *separation = s;
-    return there;
+    return certain;
 }
 
 /* The moves of 2, at most so many, no nearer than that share of the thinner extent; `active`: the pieces that the last
