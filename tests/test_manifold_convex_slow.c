@@ -103,8 +103,7 @@ static struct convex_axis bare_axis(const struct pair_of *t)
     struct convex_active active;
     memset(&axis, 0, sizeof axis);
     convex_pair_make(&t->g[0], &t->g[1], t->pool->numbers, &pose, &pair);
-    convex_begin(&pair, v3_norm2(pair.t) > 0 ? v3_neg(pair.t) : v3(0, 0, 1), false, 1e300, &axis, &active);
-    convex_finish(&pair, &active, &axis);
+    convex_find(&pair, v3_norm2(pair.t) > 0 ? v3_neg(pair.t) : v3(0, 0, 1), false, 1e300, &axis, &active);
     convex_nearest(&pair, &active, &axis);
     return axis;
 }
