@@ -20,7 +20,7 @@
 /* Depth up to which the side that the last step knows is not doubted, as a share of the thinner extent. */
 #define CONVEX_SHALLOW ((real)0.05)
 /* What is less deep than this share of its face's depth over it has that face's optimum. */
-#define CONVEX_FINE ((real)0.1)
+#define CONVEX_FINE ((real)0.02)
 /* How far apart b is held from a, as shares of the thinner extent: twice the depth, within these bounds. Further apart
  * moves are small where the two meet by corners, nearer the vector between the two says less. */
 #define CONVEX_APART ((real)0.05)
@@ -43,16 +43,6 @@ SADMM_INLINE void convex_axis_along(const struct convex_pair *pair, vec3 n, stru
     axis->n = n;
     axis->separation = -v3_dot(n, point.w) - convex_radii(pair);
     convex_activate_one(&point, active);
-}
-
-/* A flat beside n, if that is as good as `least`. */
-SADMM_INLINE bool convex_take_flat(const struct convex_pair *pair, vec3 n, real least, struct convex_axis *axis,
-                                   struct convex_active *active)
-{
-    struct convex_axis flat;
-    if (!convex_flat_beside(pair, n, &flat) || !(flat.separation >= least)) return false;
-    convex_axis_along(pair, flat.n, axis, active);
-    return true;
 }
 
 /* b is held away from a along the n that is known, by so much, D, that they are well apart, and the shortest vector
@@ -186,8 +176,15 @@ SADMM_INLINE bool convex_apart(const struct convex_pair *pair, const struct gjk_
 {
     const real length = v3_norm(v);
     const vec3 n = v3_scale(v, -1 / length);
+    struct convex_axis flat;
+    uint32_t of_flat;
     if (!(length > 1000 * pair->slack)) return false; /* of less the vector may be rounding */
-    if (convex_take_flat(pair, n, length - convex_radii(pair) - 2 * pair->slack, axis, active)) return true;
+    of_flat = convex_flat_beside(pair, n, &flat);
+    if (of_flat && flat.separation >= length - convex_radii(pair) - 2 * pair->slack &&
+        convex_is_flat_proven(pair, &flat, of_flat)) {
+        convex_axis_along(pair, flat.n, axis, active);
+        return true;
+    }
     axis->n = n;
     axis->separation = convex_separation(pair, n);
     convex_activate(s, active);

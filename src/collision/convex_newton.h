@@ -256,7 +256,12 @@ SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_ac
             continue;
         }
         length = real_sqrt(x[0] * x[0] + x[1] * x[1]);
-        if (!(length <= 1)) return false;
+        if (!(length <= 16 / CONVEX_SINGULAR)) return false; /* NaN as well */
+        if (length > 1) { /* the Hessian says nothing of what is so far away */
+            x[0] /= 2 * length;
+            x[1] /= 2 * length;
+            length = 2;
+        }
         at = convex_turned(at, x[0], t1, x[1], t2);
         if (now.count == 1 && length > (real)1e-6) { /* near a rim's axis the bend is another one from place to place */
             int half;
