@@ -15,8 +15,7 @@ static inline struct convex_axis nearest_axis(const struct pair_of *t)
     struct convex_active active;
     memset(&axis, 0, sizeof axis);
     convex_pair_make(&t->g[0], &t->g[1], t->pool->numbers, &pose, &pair);
-    ck_assert(convex_begin(&pair, v3_norm2(pair.t) > 0 ? v3_neg(pair.t) : v3(0, 0, 1), false, 1e300, &axis, &active));
-    convex_finish(&pair, &active, &axis);
+    ck_assert(convex_find(&pair, v3_norm2(pair.t) > 0 ? v3_neg(pair.t) : v3(0, 0, 1), false, 1e300, &axis, &active));
     if (convex_flat_beside(&pair, axis.n, &flat) && flat.separation >= axis.separation - 2 * pair.slack) axis = flat;
     else convex_nearest(&pair, &active, &axis);
     return axis;

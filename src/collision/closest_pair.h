@@ -60,19 +60,6 @@ static inline bool closest_of_polytopes(const struct polytope_pair *pair, vec3 s
     return true;
 }
 
-/* Is the point that a flat's axis has on it in the flat? Of the points of the other body that are farthest along its
- * normal it is one, but the flat may face others. */
-static inline bool closest_is_on_flat(const struct convex_pair *pair, const struct convex_axis *axis, bool of_a,
-                                      int flat)
-{
-    const struct convex *c = of_a ? &pair->a : &pair->b;
-    struct convex_facing facing;
-    const vec3 x = of_a ? m3_tmul(pair->R, v3_sub(v3_madd(axis->pa, -pair->a.p.radius, axis->n), pair->t))
-                        : v3_madd(axis->pb, pair->b.p.radius, axis->n);
-    convex_facing_of(c, convex_flat_normal(c, flat), &facing);
-    return convex_is_on(&facing, x, CLOSEST_ON_AXIS * pair->size);
-}
-
 /* The middle of what faces along the axis and is nearest there: the manifold's points are at its rim, and beside it by
  * what contacts tolerate. */
 static inline void closest_middle(const struct convex_pair *pair, struct convex_axis *axis)
@@ -81,7 +68,8 @@ static inline void closest_middle(const struct convex_pair *pair, struct convex_
     vec3 sum = v3(0, 0, 0);
     double least = HUGE_VAL;
     int nearest = 0;
-    convex_facing_manifold(pair, axis->n, axis->separation, SADMM_REAL_MAX, &m);
+    bool proven;
+    convex_facing_manifold(pair, axis->n, axis->separation, SADMM_REAL_MAX, &m, &proven);
     for (int k = 0; k < m.count; ++k) least = smaller_of(m.points[k].separation, least);
     for (int k = 0; k < m.count; ++k) {
         if (m.points[k].separation > least + 1e-9 * pair->size) continue;
@@ -98,15 +86,14 @@ static inline void closest_middle(const struct convex_pair *pair, struct convex_
 static inline bool closest_of_convex(struct convex_pair *pair, vec3 start, double limit, struct sadmm_gap *gap)
 {
     struct convex_axis axis;
-    struct manifold m;
     uint32_t cache;
-    m.count = 0;
     if (!(v3_norm2(start) > 0)) start = v3(0, 0, 1);
-    if (!convex_search(pair, start, false, limit, &axis, &cache, &m)) return false;
+    if (!convex_search(pair, start, false, limit, &axis, &cache)) return false;
     const uint32_t kind = cache & CONVEX_MEMORY_MASK;
     if (kind == CONVEX_MEMORY_DIRECTION
             ? closest_is_off(axis.n, axis.separation, axis.pa, axis.pb, pair->size)
-            : !closest_is_on_flat(pair, &axis, kind == CONVEX_MEMORY_FLAT_A, (int)(cache >> MANIFOLD_DIRECTION_SHIFT)))
+            : !convex_is_on_flat(pair, &axis, kind == CONVEX_MEMORY_FLAT_A, (int)(cache >> MANIFOLD_DIRECTION_SHIFT),
+                                 CLOSEST_ON_AXIS * pair->size))
         closest_middle(pair, &axis);
     closest_put(axis.n, axis.separation, axis.pa, axis.pb, gap);
     return true;

@@ -1,276 +1,58 @@
 /* The direction along which two convex bodies are farthest apart, or least deep in each other, with the nearest points.
  *
- * A direction n parts the two by s(n) = -h(n), h the support of a - b; wanted is the largest s over unit n. Where the
- * two are apart that is one problem with one answer, the shortest vector of a - b. Where they are not, s has several
- * maxima.
+ * Where the two are apart there is one optimum, beside the shortest vector of a - b that a walk finds; where they are
+ * not, s (convex_newton.h) has several.
  *
- * 1. A start: the shortest vector, the last step's direction, or the one that an expanding polytope finds.
- * 2. While they overlap, or nearly touch: b is held away from a along the n that is known, by so much, D, that they are
- *    well apart, and the shortest vector there is the next n. It is where s(n) - D (1 - n . n_before) is largest, so
- *    that s grows with each move (the proximal point method, Rockafellar 1976, on the sphere). Shallow depths take two
- *    or three.
- * 3. Newton's method for the optimum itself: h is the largest of a few functions, h_k of pairs of pieces (convex.h), of
- *    which at most three meet at a minimum over the sphere. It is where a mean of their points w_k is along n, and all
- *    h_k are one; the Hessian along tangents of n is that of the mean, less h. A step is taken only together with what
- *    s says of it, so that in the worst case the direction stays that of 2.
+ * 1. The optimum beside the last step's direction, by Newton's method alone, if that is certain of it and the two are
+ *    not deep in each other.
+ * 2. Else, apart: the same from the shortest vector.
+ * 3. Else of all of them the best one. A polytope inside a - b grows where its faces are nearest to the origin (epa.h).
+ *    No direction across a face is less deep than the face; the optimum that Newton's method, or a flat, has beside it is
+ *    no less deep than the least. A face that is no nearer than the best optimum that has been found is done with, until
+ *    there are no others.
  */
 #ifndef SADMM_COLLISION_CONVEX_AXIS_H
 #define SADMM_COLLISION_CONVEX_AXIS_H
 
-#include "convex_pair.h"
+#include "convex_flat.h"
+#include "convex_newton.h"
 
+/* Depth up to which the side that the last step knows is not doubted, as a share of the thinner extent. */
+#define CONVEX_SHALLOW ((real)0.05)
+/* What is less deep than this share of its face's depth over it has that face's optimum. */
+#define CONVEX_FINE ((real)0.02)
 /* How far apart b is held from a, as shares of the thinner extent: twice the depth, within these bounds. Further apart
  * moves are small where the two meet by corners, nearer the vector between the two says less. */
 #define CONVEX_APART ((real)0.05)
 #define CONVEX_NEAR (sizeof(real) == 4 ? (real)1e-3 : (real)1e-6)
-/* Curvatures that differ by more have a direction without any; and where the larger one is of the pair's own size,
- * which it is not beside a rim's axis: a corner may be that near to a rim. */
-#define CONVEX_SINGULAR (sizeof(real) == 4 ? (real)1e-4 : (real)1e-9)
-#define CONVEX_SINGULAR_NEAR (sizeof(real) == 4 ? (real)1e-4 : (real)1e-11)
-/* A last step that is no longer than this has been the last. */
-#define CONVEX_THERE (sizeof(real) == 4 ? (real)1e-3 : (real)1e-8)
-/* Depth up to which the side that the last step knows is not doubted, as a share of the thinner extent. */
-#define CONVEX_SHALLOW ((real)0.05)
-enum { CONVEX_MOVES = 8, CONVEX_STEPS = 16 };
+enum { CONVEX_MOVES = 8, CONVEX_TRIES = 24 };
 
-struct convex_axis {
-    vec3 n;          /* unit, from a to b */
-    real separation; /* m */
-    vec3 pa, pb;     /* nearest points: of the bodies, rounds included */
-};
-
-/* Pairs of pieces, with their share of the nearest point. */
-struct convex_active {
-    int count;
-    int a[3], b[3];
-    real weight[3];
-};
-
-/* The three that weigh most, each once. */
-SADMM_INLINE void convex_activate(const struct gjk_simplex *s, struct convex_active *active)
+SADMM_INLINE void convex_activate_one(const struct difference_point *point, struct convex_active *active)
 {
-    int k, i;
-    active->count = 0;
-    for (k = 0; k < s->count; ++k) {
-        const int a = s->p[k].a, b = s->p[k].b;
-        const real weight = real_max(s->weight[k], 0);
-        for (i = 0; i < active->count && !(active->a[i] == a && active->b[i] == b);) ++i;
-        if (i == active->count) {
-            if (i == 3) { /* in place of the one that weighs least */
-                i = active->weight[1] < active->weight[0] ? 1 : 0;
-                if (active->weight[2] < active->weight[i]) i = 2;
-                if (weight <= active->weight[i]) continue;
-            } else {
-                ++active->count;
-            }
-            active->a[i] = a;
-            active->b[i] = b;
-            active->weight[i] = 0;
-        }
-        active->weight[i] += weight;
-    }
+    active->count = 1;
+    active->a[0] = point->a;
+    active->b[0] = point->b;
+    active->weight[0] = 1;
 }
 
-SADMM_INLINE void convex_drop(struct convex_active *active, int k)
+/* n, with what reaches farthest along it. */
+SADMM_INLINE void convex_axis_along(const struct convex_pair *pair, vec3 n, struct convex_axis *axis,
+                                    struct convex_active *active)
 {
-    const int last = --active->count;
-    active->a[k] = active->a[last];
-    active->b[k] = active->b[last];
-    active->weight[k] = active->weight[last];
+    const struct difference_point zero = {{0, 0, 0}, 0, 0}, point = convex_support(pair, n, &zero);
+    axis->n = n;
+    axis->separation = -v3_dot(n, point.w) - convex_radii(pair);
+    convex_activate_one(&point, active);
 }
 
-/* The second derivatives of the pair of pieces' h, along tangents t1, t2 of n. */
-SADMM_INLINE void convex_pair_bend(const struct convex_pair *pair, int a, int b, vec3 n, vec3 t1, vec3 t2, real bend[3])
-{
-    real of_a[3], of_b[3];
-    int k;
-    convex_bend(&pair->a, a, m3_tmul(pair->R, n), m3_tmul(pair->R, t1), m3_tmul(pair->R, t2), of_a);
-    convex_bend(&pair->b, b, v3_neg(n), t1, t2, of_b);
-    for (k = 0; k < 3; ++k) bend[k] = of_a[k] + of_b[k];
-}
-
-/* What a Newton step is made of: components along two tangents. */
-struct convex_plane {
-    real g[3][2];  /* of each w_k */
-    real h[3];     /* n . w_k */
-    real m[3];     /* the Hessian: 11, 12, 22 */
-};
-
-/* A step that is too long is so where the Hessian is least: there it becomes half as long as the normal. high: the
- * larger curvature. */
-SADMM_INLINE void convex_shorten(const real m[3], real high, real x[2])
-{
-    const bool first = real_abs(m[0] - high) >= real_abs(m[2] - high);
-    const real e0 = first ? m[0] - high : m[1], e1 = first ? m[1] : m[2] - high, length2 = e0 * e0 + e1 * e1;
-    real along;
-    if (!(length2 > 0)) return;
-    along = (x[0] * e0 + x[1] * e1) / length2;
-    along *= 1 - real_min(1, (real)0.5 / (real_abs(along) * real_sqrt(length2)));
-    x[0] -= along * e0;
-    x[1] -= along * e1;
-}
-
-/* The step x, and the weights where it leads to. False: the Hessian says that this is no minimum; *singular: it does
- * not say that it is one. size: of the pair. */
-SADMM_INLINE bool convex_newton(const struct convex_plane *p, real size, struct convex_active *active, real x[2],
-                                bool *singular)
-{
-    const real *g = p->g[0], *m = p->m;
-    *singular = false;
-    if (active->count == 1) { /* a corner at a rim is stiff along the rim alone, and hardly bent across it */
-        const real half = (m[0] + m[2]) / 2, low = half - real_sqrt((m[0] - m[2]) * (m[0] - m[2]) / 4 + m[1] * m[1]),
-                   high = 2 * half - low;
-        const bool bounded = high <= 4 * size; /* not beside a rim's axis */
-        const real least = (bounded ? CONVEX_SINGULAR_NEAR : CONVEX_SINGULAR) * high,
-                   more = low > least ? 0 : (real)1e-3 * high - low;
-        const real m0 = m[0] + more, m2 = m[2] + more, det = m0 * m2 - m[1] * m[1];
-        *singular = more > 0;
-        if (!(high > 0 && det > 0)) return false;
-        x[0] = -(m2 * g[0] - m[1] * g[1]) / det;
-        x[1] = -(m0 * g[1] - m[1] * g[0]) / det;
-        if (bounded && !*singular && x[0] * x[0] + x[1] * x[1] > (real)0.25) convex_shorten(m, high, x);
-        active->weight[0] = 1;
-        return true;
-    }
-    if (active->count == 2) {
-        const real u0 = p->g[1][0] - g[0], u1 = p->g[1][1] - g[1], uu = u0 * u0 + u1 * u1, c = (p->h[0] - p->h[1]) / uu,
-                   bend = m[0] * u1 * u1 - 2 * m[1] * u0 * u1 + m[2] * u0 * u0; /* across u */
-        real along, r0 = g[0] + c * (m[0] * u0 + m[1] * u1), r1 = g[1] + c * (m[1] * u0 + m[2] * u1);
-        if (!(bend > 0 && uu > 0)) return false;
-        along = (r0 * u1 - r1 * u0) / bend;
-        x[0] = c * u0 - along * u1;
-        x[1] = c * u1 + along * u0;
-        r0 = g[0] + m[0] * x[0] + m[1] * x[1];
-        r1 = g[1] + m[1] * x[0] + m[2] * x[1];
-        active->weight[1] = -(u0 * r0 + u1 * r1) / uu;
-        active->weight[0] = 1 - active->weight[1];
-        return true;
-    } else {
-        const real u0 = p->g[1][0] - g[0], u1 = p->g[1][1] - g[1], v0 = p->g[2][0] - g[0], v1 = p->g[2][1] - g[1],
-                   det = u0 * v1 - u1 * v0, cu = p->h[0] - p->h[1], cv = p->h[0] - p->h[2];
-        real r0, r1;
-        if (!(det != 0)) return false;
-        x[0] = (cu * v1 - cv * u1) / det;
-        x[1] = (u0 * cv - v0 * cu) / det;
-        r0 = g[0] + m[0] * x[0] + m[1] * x[1];
-        r1 = g[1] + m[1] * x[0] + m[2] * x[1];
-        active->weight[1] = -(r0 * v1 - r1 * v0) / det;
-        active->weight[2] = -(u0 * r1 - u1 * r0) / det;
-        active->weight[0] = 1 - active->weight[1] - active->weight[2];
-        return true;
-    }
-}
-
-/* A pair of pieces that reaches beyond the active ones along n becomes one of them; false: none does. */
-SADMM_INLINE bool convex_add(const struct convex_pair *pair, vec3 n, struct convex_active *active)
-{
-    const struct difference_point zero = {{0, 0, 0}, 0, 0}, next = convex_support(pair, n, &zero);
-    const real reach = v3_dot(n, next.w) - 2 * pair->slack;
-    int k;
-    for (k = 0; k < active->count; ++k)
-        if ((active->a[k] == next.a && active->b[k] == next.b) ||
-            v3_dot(n, v3_sub(convex_point_a(pair, active->a[k], n), convex_point_b(pair, active->b[k], n))) >= reach)
-            return false;
-    active->a[k] = next.a;
-    active->b[k] = next.b;
-    active->weight[k] = 0;
-    ++active->count;
-    return true;
-}
-
-SADMM_INLINE vec3 convex_turned(vec3 n, real x1, vec3 t1, real x2, vec3 t2)
-{
-    const vec3 at = v3_madd(v3_madd(n, x1, t1), x2, t2);
-    return v3_scale(at, 1 / v3_norm(at));
-}
-
-/* n by Newton's method, as far as s grows with it. False: it does not get there; where s has not grown, all is as it
- * was. */
-SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_active *active, vec3 *n, real *separation)
-{
-    struct convex_active now = *active;
-    const struct difference_point zero = {{0, 0, 0}, 0, 0};
-    vec3 at = *n;
-    real s, last = 2;
-    bool there = false, singular;
-    int step;
-    for (step = 0; step < CONVEX_STEPS; ++step) {
-        struct convex_plane p;
-        vec3 t1, t2;
-        const vec3 from = at;
-        real x[2], length, mean = 0;
-        int k, least = 0;
-        v3_tangents(at, &t1, &t2);
-        p.m[0] = p.m[1] = p.m[2] = 0;
-        if (step > 0 && now.count < 3 && convex_add(pair, at, &now)) last = 2;
-        for (k = 0; k < now.count; ++k) {
-            const vec3 w = v3_sub(convex_point_a(pair, now.a[k], at), convex_point_b(pair, now.b[k], at));
-            real bend[3];
-            int i;
-            p.g[k][0] = v3_dot(t1, w);
-            p.g[k][1] = v3_dot(t2, w);
-            p.h[k] = v3_dot(at, w);
-            convex_pair_bend(pair, now.a[k], now.b[k], at, t1, t2, bend);
-            for (i = 0; i < 3; ++i) p.m[i] += now.weight[k] * bend[i];
-            mean += now.weight[k] * p.h[k];
-        }
-        p.m[0] -= mean;
-        p.m[2] -= mean;
-        if (!convex_newton(&p, pair->size, &now, x, &singular)) {
-            if (now.count == 1) return false;
-            for (k = 1; k < now.count; ++k)
-                if (now.weight[k] < now.weight[least]) least = k;
-            convex_drop(&now, least);
-            for (mean = 0, k = 0; k < now.count; ++k) mean += now.weight[k];
-            for (k = 0; k < now.count; ++k) now.weight[k] = mean > 0 ? now.weight[k] / mean : 1 / (real)now.count;
-            continue;
-        }
-        length = real_sqrt(x[0] * x[0] + x[1] * x[1]);
-        if (!(length <= 1)) return false;
-        at = convex_turned(at, x[0], t1, x[1], t2);
-        if (now.count == 1 && length > (real)1e-6) { /* near a rim's axis the bend is another one from place to place */
-            int half;
-            for (half = 0; half < 6; ++half) {
-                const struct difference_point point = convex_support(pair, at, &zero);
-                if (!(v3_dot(at, point.w) > mean + pair->slack) || point.a != now.a[0] || point.b != now.b[0]) break;
-                at = convex_turned(from, x[0] / (real)(2 << half), t1, x[1] / (real)(2 << half), t2);
-                last = 2;
-            }
-        }
-        for (k = 1; k < now.count; ++k)
-            if (now.weight[k] < now.weight[least]) least = k;
-        if (now.weight[least] < 0) { /* the others alone are nearer */
-            for (mean = 0, k = 0; k < now.count; ++k) mean += k == least ? 0 : real_max(now.weight[k], 0);
-            convex_drop(&now, least);
-            for (k = 0; k < now.count; ++k) now.weight[k] = real_max(now.weight[k], 0) / mean;
-            last = 2;
-            continue;
-        }
-        /* there; or as near as rounding lets it */
-        if (length <= 16 * SADMM_EPSILON || (length >= last / 2 && length < (real)1e-3)) {
-            there = length <= CONVEX_THERE && !(singular && mean > 0);
-            if (now.count == 3 || !convex_add(pair, at, &now)) break;
-            there = false;
-            last = 2;
-            continue;
-        }
-        last = length;
-    }
-    s = convex_separation(pair, at);
-    if (!(s >= *separation - pair->slack / 4)) return false;
-    *active = now;
-    *n = at;
-    *separation = s;
-    return there;
-}
-
-/* The moves of 2, at most so many, no nearer than that share of the thinner extent; `active`: the pieces that the last
- * one ended with. */
-SADMM_CALLED void convex_move(struct convex_pair *pair, int most, real nearest, vec3 *n, real *separation,
+/* b is held away from a along the n that is known, by so much, D, that they are well apart, and the shortest vector
+ * there is the next n. It is where s(n) - D (1 - n . n_before) is largest, so that s grows with each move (the proximal
+ * point method, Rockafellar 1976, on the sphere). active: the pieces that the last one ended with. */
+SADMM_CALLED void convex_move(struct convex_pair *pair, real nearest, vec3 *n, real *separation,
                               struct convex_active *active)
 {
     int move;
-    for (move = 0; move < most; ++move) {
+    for (move = 0; move < CONVEX_MOVES; ++move) {
         const real depth = real_max(-(*separation + convex_radii(pair)), 0),
                    held = depth + real_clamp(2 * depth, nearest * pair->thin, CONVEX_APART * pair->thin);
         struct gjk_simplex s;
@@ -295,90 +77,166 @@ SADMM_CALLED void convex_move(struct convex_pair *pair, int most, real nearest, 
     }
 }
 
-/* Where a - b contains the origin: along which way out is it least deep? */
-SADMM_RARE void convex_way_out(struct convex_pair *pair, const struct gjk_simplex *simplex, vec3 *n, real *separation,
-                               struct convex_active *active)
+/* The optimum beside axis->n. False: not certain. */
+SADMM_CALLED bool convex_local(struct convex_pair *pair, struct convex_axis *axis, struct convex_active *active)
 {
-    struct gjk_simplex s = *simplex;
-    real height;
-    if (!convex_epa_depth(pair, &s, n, &height)) { /* flat but for rounding: from centre to centre is as good */
-        const real length = v3_norm(pair->t);
-        *n = length > 0 ? v3_scale(pair->t, -1 / length) : v3(0, 0, 1);
-    }
-    convex_activate(&s, active);
-    *separation = convex_separation(pair, *n);
-    convex_move(pair, CONVEX_MOVES, CONVEX_APART, n, separation, active);
+    if (convex_polish(pair, active, &axis->n, &axis->separation)) return true;
+    convex_move(pair, CONVEX_APART, &axis->n, &axis->separation, active);
+    if (convex_polish(pair, active, &axis->n, &axis->separation)) return true;
+    pair->enough *= (real)1e-4;
+    convex_move(pair, CONVEX_NEAR, &axis->n, &axis->separation, active);
+    pair->enough *= (real)1e4;
+    return convex_polish(pair, active, &axis->n, &axis->separation);
 }
 
-/* The optimum beside the last step's direction, by Newton's method alone. Of bodies that are apart there is no other;
- * while they are not deep in each other it is the one to stay with. False: not found. */
-SADMM_INLINE bool convex_follow(const struct convex_pair *pair, vec3 side, struct convex_axis *axis,
-                                struct convex_active *active)
+/* The nearest face of the polytope, NULL: there is none left to ask. */
+SADMM_INLINE struct epa_face *convex_nearest_face(struct epa *e)
 {
-    const struct difference_point zero = {{0, 0, 0}, 0, 0};
-    struct difference_point point;
-    axis->n = v3_scale(side, 1 / v3_norm(side));
-    point = convex_support(pair, axis->n, &zero);
-    active->count = 1;
-    active->a[0] = point.a;
-    active->b[0] = point.b;
-    active->weight[0] = 1;
-    axis->separation = -v3_dot(axis->n, point.w) - convex_radii(pair);
-    return convex_polish(pair, active, &axis->n, &axis->separation) &&
-           axis->separation + convex_radii(pair) >= -CONVEX_SHALLOW * pair->thin;
+    struct epa_face *best = &e->face[0];
+    int f;
+    for (f = 1; f < e->faces; ++f)
+        if (e->face[f].height < best->height) best = &e->face[f];
+    return e->faces > 0 && best->height < SADMM_REAL_MAX ? best : NULL;
 }
 
-/* side: the last step's direction, or one to begin with; `known`: it is the last step's. False: farther apart than
- * `limit`. n, separation and active, before convex_finish. */
-SADMM_INLINE bool convex_begin(struct convex_pair *pair, vec3 side, bool known, real limit, struct convex_axis *axis,
-                               struct convex_active *active)
+/* The better one of two. */
+SADMM_INLINE bool convex_take(const struct convex_axis *other, const struct convex_active *of_other,
+                              struct convex_axis *axis, struct convex_active *active)
 {
-    struct gjk_simplex s;
-    struct convex_active other;
-    vec3 v, n;
-    real length, separation;
-    bool apart; /* by little */
-    const enum gjk_end end = convex_distance(pair, side, limit + convex_radii(pair) + pair->slack, &s, &v);
-    if (end == GJK_FAR) return false;
-    convex_activate(&s, active);
-    length = v3_norm(v);
-    if (end == GJK_APART && length > CONVEX_APART * pair->thin / 8) {
-        axis->n = v3_scale(v, -1 / length);
-        axis->separation = convex_separation(pair, axis->n);
-        return true;
-    }
-    apart = end == GJK_APART && length > 1000 * pair->slack;
-    if (apart) side = v3_scale(v, -1 / length); /* near enough to what it is, whatever it was */
-    if (known || apart) {
-        axis->n = v3_scale(side, 1 / v3_norm(side));
-        axis->separation = convex_separation(pair, axis->n);
-        convex_move(pair, 2, CONVEX_APART, &axis->n, &axis->separation, active);
-        /* of what is apart by a few roundings the vector may be rounding, too */
-        if (axis->separation + convex_radii(pair) >= (apart ? -pair->slack : -CONVEX_SHALLOW * pair->thin)) return true;
-    }
-    convex_way_out(pair, &s, &n, &separation, &other);
-    /* the last step's side stays unless clearly beaten, and not by the other one */
-    if (apart ? separation <= axis->separation
-              : known && (v3_dot(n, axis->n) < -MANIFOLD_COS_OPPOSITE ||
-                          separation <= axis->separation - MANIFOLD_KEEP_DEPTH * axis->separation +
-                                            MANIFOLD_KEEP_EXTENT * pair->thin))
-        return true;
-    axis->n = n;
-    axis->separation = separation;
-    *active = other;
+    if (!(other->separation > axis->separation)) return false;
+    *axis = *other;
+    *active = *of_other;
     return true;
 }
 
-/* The optimum beside axis->n. */
-SADMM_INLINE void convex_finish(struct convex_pair *pair, struct convex_active *active, struct convex_axis *axis)
+/* 3. simplex: of a - b, around the origin or beside it. axis: one to begin with. */
+SADMM_RARE void convex_way_out(struct convex_pair *pair, const struct gjk_simplex *simplex, struct convex_axis *axis,
+                               struct convex_active *active)
 {
-    if (!convex_polish(pair, active, &axis->n, &axis->separation)) { /* by moves alone, then */
-        const real enough = pair->enough;
-        pair->enough = 0;
-        convex_move(pair, CONVEX_MOVES, CONVEX_NEAR, &axis->n, &axis->separation, active);
-        pair->enough = enough;
-        convex_polish(pair, active, &axis->n, &axis->separation);
+    struct epa e;
+    uint32_t held = 0; /* by this flat */
+    int tries = 0;
+    bool sure = false, proven = false; /* is axis an optimum, the best one? */
+    if (!convex_epa_begin(pair, simplex, &e)) { /* a - b is flat but for rounding */
+        convex_local(pair, axis, active);
+        return;
     }
+    while (tries < CONVEX_TRIES) {
+        const real best = -(axis->separation + convex_radii(pair));
+        struct epa_face *face = convex_nearest_face(&e);
+        struct difference_point next;
+        struct gjk_simplex s;
+        struct convex_axis other, flat;
+        struct convex_active of_other;
+        uint32_t of_flat;
+        real reach;
+        bool again = false, certain;
+        int k;
+        if (!face) break;
+        if (face->height >= best - pair->equal) { /* unless the two just touch, or rounding has turned faces */
+            proven = face->height > pair->equal && face->height <= best + pair->equal;
+            break;
+        }
+        other.n = epa_normal(&e, face);
+        other.n = v3_scale(other.n, 1 / v3_norm(other.n));
+        next = convex_support(pair, other.n, &e.p[face->corner[0]]);
+        reach = v3_dot(other.n, next.w);
+        other.separation = -reach - convex_radii(pair);
+        epa_simplex(&e, face, other.n, face->height, &s);
+        convex_activate(&s, &of_other);
+        if (convex_take(&other, &of_other, axis, active)) sure = false;
+        for (k = 0; k < e.points; ++k) again |= convex_same_point(&next, &e.p[k]);
+        if (!again && e.points < EPA_POINTS &&
+            reach - face->height > real_max(pair->equal, CONVEX_FINE * real_abs(reach))) {
+            convex_epa_grow(pair, &e, (int)(face - e.face), next);
+            continue;
+        }
+        of_flat = convex_flat_beside(pair, other.n, &flat);
+        if (of_flat && of_flat != held && flat.separation >= axis->separation - pair->slack) {
+            const bool better = flat.separation > axis->separation + pair->equal;
+            convex_axis_along(pair, flat.n, axis, active);
+            sure = convex_is_flat_proven(pair, &flat, of_flat);
+            if (sure) held = of_flat;
+            if (better) continue; /* it may be all that there is to find */
+        }
+        certain = of_flat && of_flat == held ? convex_polish(pair, &of_other, &other.n, &other.separation)
+                                             : convex_local(pair, &other, &of_other);
+        if (convex_take(&other, &of_other, axis, active)) sure = certain;
+        face->height = SADMM_REAL_MAX;
+        ++tries;
+    }
+    if (sure) return;
+    if (proven) convex_polish(pair, active, &axis->n, &axis->separation);
+    else convex_local(pair, axis, active);
+}
+
+/* 2. v: the shortest vector, by the walk. False: not certain. */
+SADMM_INLINE bool convex_apart(const struct convex_pair *pair, const struct gjk_simplex *s, vec3 v,
+                               struct convex_axis *axis, struct convex_active *active)
+{
+    const real length = v3_norm(v);
+    const vec3 n = v3_scale(v, -1 / length);
+    struct convex_axis flat;
+    uint32_t of_flat;
+    if (!(length > 1000 * pair->slack)) return false; /* of less the vector may be rounding */
+    of_flat = convex_flat_beside(pair, n, &flat);
+    if (of_flat && flat.separation >= length - convex_radii(pair) - 2 * pair->slack &&
+        convex_is_flat_proven(pair, &flat, of_flat)) {
+        convex_axis_along(pair, flat.n, axis, active);
+        return true;
+    }
+    axis->n = n;
+    axis->separation = convex_separation(pair, n);
+    convex_activate(s, active);
+    return convex_polish(pair, active, &axis->n, &axis->separation) && axis->separation + convex_radii(pair) > 0;
+}
+
+/* The direction. side: the last step's direction, or one to begin with; known: it is the last step's. False: farther
+ * apart than `limit`. */
+SADMM_INLINE bool convex_find(struct convex_pair *pair, vec3 side, bool known, real limit, struct convex_axis *axis,
+                              struct convex_active *active)
+{
+    struct gjk_simplex s;
+    struct convex_axis kept;
+    struct convex_active of_kept;
+    vec3 v;
+    bool certain = false;
+    enum gjk_end end;
+    if (known) {
+        convex_axis_along(pair, v3_scale(side, 1 / v3_norm(side)), &kept, &of_kept);
+        certain = convex_polish(pair, &of_kept, &kept.n, &kept.separation);
+        if (certain && kept.separation + convex_radii(pair) >= -CONVEX_SHALLOW * pair->thin) {
+            *axis = kept;
+            *active = of_kept;
+            return true;
+        }
+    }
+    end = convex_distance(pair, side, limit + convex_radii(pair) + pair->slack, &s, &v);
+    if (end == GJK_FAR) return false;
+    convex_axis_along(pair, v3_scale(side, 1 / v3_norm(side)), axis, active);
+    if (end == GJK_APART) {
+        const real enough = pair->enough;
+        if (convex_apart(pair, &s, v, axis, active)) return true;
+        pair->enough = 0;
+        end = convex_distance(pair, v3_neg(v), SADMM_REAL_MAX, &s, &v);
+        pair->enough = enough;
+        if (end == GJK_APART && convex_apart(pair, &s, v, axis, active)) return true;
+        if (end == GJK_APART && axis->separation + convex_radii(pair) > CONVEX_NEAR * pair->thin) {
+            convex_local(pair, axis, active);
+            return true;
+        }
+    }
+    convex_way_out(pair, &s, axis, active);
+    if (!known || axis->separation + convex_radii(pair) >= 0) return true;
+    /* the last step's side stays unless clearly beaten, and not by the other one */
+    if (!certain) certain = convex_local(pair, &kept, &of_kept);
+    if (v3_dot(axis->n, kept.n) < -MANIFOLD_COS_OPPOSITE ||
+        (certain && axis->separation <= kept.separation - MANIFOLD_KEEP_DEPTH * kept.separation +
+                                            MANIFOLD_KEEP_EXTENT * pair->thin)) {
+        *axis = kept;
+        *active = of_kept;
+    }
+    return true;
 }
 
 /* The nearest points, by the active pieces. */

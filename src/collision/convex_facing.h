@@ -401,10 +401,30 @@ SADMM_INLINE real convex_slope(const struct convex_facing *f, vec3 n)
     return real_sqrt(real_max(0, 1 - c * c)) / c;
 }
 
+/* Do two points face each other along n that are as near as the planes across it are? Then no direction beside it is
+ * better. What counts as over a flat must be over it here. */
+SADMM_INLINE bool convex_is_proof(const struct convex_meeting *m, const struct convex_facing *a,
+                                  const struct convex_facing *b)
+{
+    const struct convex_pair *pair = m->pair;
+    const real within = 4 * pair->slack;
+    int k;
+    for (k = 0; k < m->count; ++k) {
+        vec3 x;
+        if (m->gap[k] > m->least + pair->equal) continue;
+        x = v3_madd(v3_madd(v3_scale(m->x1, m->at[k].x), m->at[k].y, m->x2), m->at[k].z, m->n);
+        if ((a->kind == CONVEX_LINE || convex_is_on(a, convex_over(a, m->n, x), within)) &&
+            (b->kind == CONVEX_LINE || convex_is_on(b, convex_over(b, m->n, x), within)))
+            return true;
+    }
+    return false;
+}
+
 /* Sets m's normal to n, and its points to those of what faces along it. least: the separation of the two along n. The
- * smallest gap of all that there are, those that are left out included; largest: there are none. */
+ * smallest gap of all that there are, those that are left out included; largest: there are none. *proven: no direction
+ * beside n is better. */
 SADMM_RARE real convex_facing_manifold(const struct convex_pair *pair, vec3 n, real least, real limit,
-                                       struct manifold *m)
+                                       struct manifold *m, bool *proven)
 {
     struct convex_facing a, b;
     struct convex_meeting meeting;
@@ -413,6 +433,7 @@ SADMM_RARE real convex_facing_manifold(const struct convex_pair *pair, vec3 n, r
     int i;
     m->normal = n;
     m->count = 0;
+    *proven = false;
     convex_facing_of(&pair->a, m3_tmul(pair->R, n), &a);
     if (a.kind == CONVEX_NOTHING) return SADMM_REAL_MAX;
     convex_facing_of(&pair->b, v3_neg(n), &b);
@@ -443,6 +464,7 @@ SADMM_RARE real convex_facing_manifold(const struct convex_pair *pair, vec3 n, r
     else if (a.kind == CONVEX_LINE && b.kind == CONVEX_LINE) convex_line_line(&meeting, &a, &b);
     else if (a.kind == CONVEX_LINE) convex_line_flat(&meeting, &a, true, &b);
     else if (b.kind == CONVEX_LINE) convex_line_flat(&meeting, &b, false, &a);
+    *proven = convex_is_proof(&meeting, &a, &b);
     chosen = facing_choice(meeting.at, meeting.gap, meeting.count);
     for (i = 0; i < meeting.count; ++i)
         if (chosen >> i & 1) {

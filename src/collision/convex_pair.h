@@ -19,6 +19,7 @@ struct convex_pair {
     real size;   /* of both, and of what is between them: what rounding is measured by */
     real slack;  /* rounding of a separation */
     real enough; /* share of the square of a distance that the walk may miss */
+    real equal;  /* separations that differ by less are the same */
 };
 
 /* What follows from the size. */
@@ -27,6 +28,7 @@ SADMM_INLINE void convex_pair_finish(struct convex_pair *pair)
     pair->shift = pair->spread = v3(0, 0, 0);
     pair->left_out = 0;
     pair->slack = 8 * SADMM_EPSILON * pair->size;
+    pair->equal = real_max(8 * pair->slack, (real)1e-11 * pair->size);
     pair->enough = sizeof(real) == 4 ? (real)1e-5 : (real)1e-8;
 }
 
@@ -88,8 +90,6 @@ SADMM_INLINE bool convex_same_point(const struct difference_point *p, const stru
 #define EPA_NAME(name) convex_epa_##name
 #define EPA_PAIR struct convex_pair
 #define EPA_SUPPORT convex_support
-#define EPA_SAME convex_same_point
-#define EPA_ENOUGH(pair) real_max((pair)->slack / 2, (real)1e-6 * (pair)->thin)
 #include "epa_grow.h"
 
 #endif

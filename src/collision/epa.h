@@ -83,8 +83,49 @@ SADMM_INLINE void epa_simplex(const struct epa *e, const struct epa_face *face, 
 #define EPA_NAME(name) epa_##name
 #define EPA_PAIR struct polytope_pair
 #define EPA_SUPPORT pair_support
-#define EPA_SAME same_point
-#define EPA_ENOUGH(pair) ((pair)->slack / 2)
 #include "epa_grow.h"
+
+/* The face of a - b nearest to the origin: its outward normal, unit, its points with the weights of the one nearest to
+ * the origin, and how far a - b reaches along the normal: where points run out or rounding turns a face, that is still
+ * true, of the best normal that was met. False: rounding has let none be found. */
+SADMM_INLINE bool epa_depth(const struct polytope_pair *pair, struct gjk_simplex *s, vec3 *normal, real *height)
+{
+    struct epa e;
+    struct epa_face found = {SADMM_REAL_MAX, {0, 0, 0}};
+    *height = SADMM_REAL_MAX;
+    if (!epa_begin(pair, s, &e)) return false;
+    for (;;) {
+        struct difference_point next;
+        struct epa_face *best = &e.face[0];
+        vec3 n;
+        real reach;
+        int f, k;
+        bool again = false, done;
+        for (f = 1; f < e.faces; ++f)
+            if (e.face[f].height < best->height) best = &e.face[f];
+        if (e.faces == 0 || !(best->height < SADMM_REAL_MAX)) break;
+        n = epa_normal(&e, best);
+        n = v3_scale(n, 1 / v3_norm(n));
+        next = pair_support(pair, n, &e.p[best->corner[0]]);
+        reach = v3_dot(n, next.w);
+        done = reach - best->height <= pair->slack / 2;
+        if (reach < *height || (done && reach <= *height + pair->slack)) {
+            *height = reach;
+            *normal = n;
+            found = *best;
+        }
+        if (done) break;
+        for (k = 0; k < e.points; ++k) again |= same_point(&next, &e.p[k]);
+        if (again) { /* not a face of the hull of these points: rounding has turned it */
+            best->height = SADMM_REAL_MAX;
+            continue;
+        }
+        if (e.points == EPA_POINTS) break;
+        epa_grow(pair, &e, (int)(best - e.face), next);
+    }
+    if (!(*height < SADMM_REAL_MAX)) return false;
+    epa_simplex(&e, &found, *normal, *height, s);
+    return true;
+}
 
 #endif

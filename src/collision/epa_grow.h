@@ -1,10 +1,8 @@
 /* The growth of epa.h over the points of any pair: included by whoever defines
  *
  *   EPA_NAME(name)             the functions' names
- *   EPA_PAIR                   the pair, with `slack`, the rounding of a separation, and `size`, what that is measured
- *   by EPA_SUPPORT(pair, d, at)   its difference_point farthest along d
- *   EPA_SAME(p, q)             are two of them one?
- *   EPA_ENOUGH(pair)           what a face may be short of a - b
+ *   EPA_PAIR                   the pair, with `slack`, the rounding of a separation, and `size`, what that is measured by
+ *   EPA_SUPPORT(pair, d, at)   its difference_point farthest along d
  *
  * all of which end here. */
 
@@ -118,51 +116,6 @@ SADMM_INLINE void EPA_NAME(grow)(const EPA_PAIR *pair, struct epa *e, int f, str
     ++e->points;
 }
 
-/* The face of a - b nearest to the origin: its outward normal, unit, its points with the weights of the one nearest to
- * the origin, and how far a - b reaches along the normal: where points run out or rounding turns a face, that is still
- * true, of the best normal that was met. False: rounding has let none be found. */
-SADMM_INLINE bool EPA_NAME(depth)(const EPA_PAIR *pair, struct gjk_simplex *s, vec3 *normal, real *height)
-{
-    struct epa e;
-    struct epa_face found = {SADMM_REAL_MAX, {0, 0, 0}};
-    *height = SADMM_REAL_MAX;
-    if (!EPA_NAME(begin)(pair, s, &e)) return false;
-    for (;;) {
-        struct difference_point next;
-        struct epa_face *best = &e.face[0];
-        vec3 n;
-        real reach;
-        int f, k;
-        bool again = false, done;
-        for (f = 1; f < e.faces; ++f)
-            if (e.face[f].height < best->height) best = &e.face[f];
-        if (e.faces == 0 || !(best->height < SADMM_REAL_MAX)) break;
-        n = epa_normal(&e, best);
-        n = v3_scale(n, 1 / v3_norm(n));
-        next = EPA_SUPPORT(pair, n, &e.p[best->corner[0]]);
-        reach = v3_dot(n, next.w);
-        done = reach - best->height <= EPA_ENOUGH(pair);
-        if (reach < *height || (done && reach <= *height + pair->slack)) {
-            *height = reach;
-            *normal = n;
-            found = *best;
-        }
-        if (done) break;
-        for (k = 0; k < e.points; ++k) again |= EPA_SAME(&next, &e.p[k]);
-        if (again) { /* not a face of the hull of these points: rounding has turned it */
-            best->height = SADMM_REAL_MAX;
-            continue;
-        }
-        if (e.points == EPA_POINTS) break;
-        EPA_NAME(grow)(pair, &e, (int)(best - e.face), next);
-    }
-    if (!(*height < SADMM_REAL_MAX)) return false;
-    epa_simplex(&e, &found, *normal, *height, s);
-    return true;
-}
-
 #undef EPA_NAME
 #undef EPA_PAIR
 #undef EPA_SUPPORT
-#undef EPA_SAME
-#undef EPA_ENOUGH

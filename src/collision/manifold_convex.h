@@ -14,75 +14,16 @@
 #include "convex_facing.h"
 #include "manifold_hull.h"
 
-/* cache: the lower bits of a direction, or a flat above them. */
-enum { CONVEX_MEMORY_DIRECTION = 1, CONVEX_MEMORY_FLAT_A, CONVEX_MEMORY_FLAT_B, CONVEX_MEMORY_MASK = 31 };
-
-/* The axis of a flat; the nearest points for what has one point alone there. */
-SADMM_CALLED void convex_flat_axis(const struct convex_pair *pair, bool of_a, int flat, struct convex_axis *axis)
+/* Along a flat's normal: the points of what faces along it, or the one of what has one alone there. False: it is not
+ * proven that no direction beside it is better, or the two are so deep in each other that another side may be. */
+SADMM_INLINE bool convex_on_flat(const struct convex_pair *pair, const struct convex_axis *axis, bool of_a, int flat,
+                                 real limit, struct manifold *m)
 {
-    const struct difference_point zero = {{0, 0, 0}, 0, 0};
-    const vec3 outward = convex_flat_normal(of_a ? &pair->a : &pair->b, flat),
-               n = of_a ? m3_mul(pair->R, outward) : v3_neg(outward);
-    const struct difference_point point = convex_support(pair, n, &zero);
-    axis->n = n;
-    axis->separation = -v3_dot(n, point.w) - convex_radii(pair);
-    axis->pa = v3_madd(convex_point_a(pair, point.a, n), pair->a.p.radius, n);
-    axis->pb = v3_madd(convex_point_b(pair, point.b, n), -pair->b.p.radius, n);
-    if (of_a) axis->pa = v3_madd(axis->pb, -axis->separation, n);
-    else axis->pb = v3_madd(axis->pa, axis->separation, n);
-}
-
-/* The better one of the flats beside n; its memory, 0: there is none within 8 degrees. */
-SADMM_INLINE uint32_t convex_flat_beside(const struct convex_pair *pair, vec3 n, struct convex_axis *axis)
-{
-    const int fa = convex_flat(&pair->a, m3_tmul(pair->R, n), MANIFOLD_COS_NEAR),
-              fb = convex_flat(&pair->b, v3_neg(n), MANIFOLD_COS_NEAR);
-    const int shift = MANIFOLD_DIRECTION_SHIFT;
-    struct convex_axis other;
-    uint32_t memory = 0;
-    if (fa >= 0) {
-        convex_flat_axis(pair, true, fa, axis);
-        memory = CONVEX_MEMORY_FLAT_A | (uint32_t)fa << shift;
-    }
-    if (fb >= 0) {
-        convex_flat_axis(pair, false, fb, &other);
-        if (fa < 0 || other.separation > axis->separation) {
-            *axis = other;
-            memory = CONVEX_MEMORY_FLAT_B | (uint32_t)fb << shift;
-        }
-    }
-    return memory;
-}
-
-/* Do points that face each other along a flat's normal prove that no direction beside it is better? They are as near to
- * each other as the planes across it are. */
-SADMM_INLINE bool convex_is_proven(const struct convex_pair *pair, real separation, const struct manifold *m)
-{
-    const real apart = separation + convex_radii(pair),
-               even = apart >= 0 ? 2 * pair->slack : 2 * pair->slack + (real)1e-7 * pair->thin;
-    int k;
-    if (apart < -CONVEX_SHALLOW * pair->thin) return false;
-    for (k = 0; k < m->count; ++k)
-        if (m->points[k].separation <= separation + even) return true;
-    return false;
-}
-
-/* Where one of the two has a point alone along a flat's normal: is that over the flat? Then it is the manifold. */
-SADMM_INLINE bool convex_point_on_flat(const struct convex_pair *pair, const struct convex_axis *axis, bool of_a,
-                                       int flat, real limit, struct manifold *m)
-{
-    const struct convex *c = of_a ? &pair->a : &pair->b, *other = of_a ? &pair->b : &pair->a;
-    struct convex_facing facing;
-    vec3 x = of_a ? v3_madd(axis->pa, -pair->a.p.radius, axis->n) : v3_madd(axis->pb, pair->b.p.radius, axis->n);
-    if (axis->separation > limit || axis->separation + convex_radii(pair) < -CONVEX_SHALLOW * pair->thin) return false;
-    convex_facing_of(other, of_a ? v3_neg(axis->n) : m3_tmul(pair->R, axis->n), &facing);
-    if (facing.kind != CONVEX_NOTHING) return false;
-    if (of_a) x = m3_tmul(pair->R, v3_sub(x, pair->t));
-    convex_facing_of(c, convex_flat_normal(c, flat), &facing);
-    if (!convex_is_on(&facing, x, 0)) return false;
-    m->normal = axis->n;
-    m->count = 0;
-    manifold_add_between(m, axis->pa, axis->pb, polytope_feature(FEATURE_NEAREST, 0, 0));
+    bool proven;
+    if (axis->separation + convex_radii(pair) < -CONVEX_SHALLOW * pair->thin) return false;
+    convex_facing_manifold(pair, axis->n, axis->separation, limit, m, &proven);
+    if (proven || !convex_is_on_flat(pair, axis, of_a, flat, 0)) return proven;
+    hull_add_nearest(pair->thin, axis->pa, axis->pb, polytope_feature(FEATURE_NEAREST, 0, 0), m);
     return true;
 }
 
@@ -127,9 +68,7 @@ SADMM_INLINE bool convex_by_memory(const struct convex_pair *pair, real limit, u
     convex_recall(pair, cache, memory);
     if (!memory->is_flat) return false;
     if (axis->separation > limit + pair->slack) return true;
-    if (!convex_point_on_flat(pair, axis, memory->of_a, memory->flat, limit, m))
-        convex_facing_manifold(pair, axis->n, axis->separation, limit, m);
-    if (convex_is_proven(pair, axis->separation, m)) {
+    if (convex_on_flat(pair, axis, memory->of_a, memory->flat, limit, m)) {
         m->cache = cache;
         return true;
     }
@@ -139,23 +78,11 @@ SADMM_INLINE bool convex_by_memory(const struct convex_pair *pair, real limit, u
 
 /* 2 and 3. side, known: convex_recall. False: farther apart than the limit. *cache: what is to be remembered of it. */
 SADMM_INLINE bool convex_search(struct convex_pair *pair, vec3 side, bool known, real limit, struct convex_axis *axis,
-                                uint32_t *cache, struct manifold *m)
+                                uint32_t *cache)
 {
     struct convex_axis flat;
     struct convex_active active;
-    if (!known || !convex_follow(pair, side, axis, &active)) {
-        if (!convex_begin(pair, side, known, limit, axis, &active)) return false;
-        *cache = convex_flat_beside(pair, axis->n, &flat);
-        if (*cache && flat.separation >= axis->separation - pair->slack) { /* does it stand, or lie? */
-            convex_facing_manifold(pair, flat.n, flat.separation, limit, m);
-            if (convex_is_proven(pair, flat.separation, m)) {
-                *axis = flat;
-                return axis->separation <= limit + pair->slack;
-            }
-            m->count = 0;
-        }
-        convex_finish(pair, &active, axis);
-    }
+    if (!convex_find(pair, side, known, limit, axis, &active)) return false;
     *cache = convex_flat_beside(pair, axis->n, &flat);
     if (*cache && flat.separation >= axis->separation - 2 * pair->slack) {
         *axis = flat;
@@ -170,7 +97,8 @@ SADMM_INLINE bool convex_search(struct convex_pair *pair, vec3 side, bool known,
 SADMM_INLINE void convex_points(const struct convex_pair *pair, const struct convex_axis *axis, real limit,
                                 struct manifold *m)
 {
-    convex_facing_manifold(pair, axis->n, axis->separation, limit, m);
+    bool proven;
+    convex_facing_manifold(pair, axis->n, axis->separation, limit, m, &proven);
     hull_add_nearest(pair->thin, axis->pa, axis->pb, polytope_feature(FEATURE_NEAREST, 0, 0), m);
 }
 
@@ -183,7 +111,7 @@ SADMM_RARE void convex_manifold(const struct sadmm_geometry *a, const struct sad
     uint32_t found;
     convex_pair_make(a, b, hulls, pose, &pair);
     if (convex_by_memory(&pair, limit, cache, &memory, m)) return;
-    if (!convex_search(&pair, memory.side, memory.known, limit, &axis, &found, m)) {
+    if (!convex_search(&pair, memory.side, memory.known, limit, &axis, &found)) {
         m->count = 0;
         return;
     }

@@ -84,7 +84,8 @@ SADMM_INLINE bool convex_cap_is_even(const struct convex_triangle *p)
 SADMM_INLINE real convex_on_front(const struct convex_triangle *p, real limit, struct manifold *m)
 {
     const struct convex_axis *front = &p->front;
-    const real least = convex_facing_manifold(&p->pair, front->n, front->separation, limit, m);
+    bool proven;
+    const real least = convex_facing_manifold(&p->pair, front->n, front->separation, limit, m, &proven);
     if (!mesh_is_over(&p->triangle, front->pa, 4 * p->pair.slack)) return least;
     if (!convex_cap_is_even(p))
         hull_add_nearest(p->pair.thin, front->pa, front->pb, polytope_feature(FEATURE_NEAREST, 0, 0), m);
@@ -233,7 +234,7 @@ SADMM_RARE void convex_mesh_manifold(const struct sadmm_geometry *a, const struc
     convex_recall(&p.pair, cache, &memory);
     if (!memory.known) memory.side = p.front.n;
     if (!(limit < SADMM_REAL_MAX)) {
-        if (!convex_search(&p.pair, memory.side, false, limit, &axis, &found, m)) return;
+        if (!convex_search(&p.pair, memory.side, false, limit, &axis, &found)) return;
         m->count = 0;
         m->normal = axis.n;
         hull_add_nearest(p.pair.thin, axis.pa, axis.pb, polytope_feature(FEATURE_NEAREST, 0, 0), m);
@@ -251,8 +252,7 @@ SADMM_RARE void convex_mesh_manifold(const struct sadmm_geometry *a, const struc
     m->count = 0;
     if (memory.is_flat && memory.of_a) {
         if (memory.axis.separation > limit + p.pair.slack) return;
-        convex_facing_manifold(&p.pair, memory.axis.n, memory.axis.separation, limit, m);
-        if (convex_is_proven(&p.pair, memory.axis.separation, m) &&
+        if (convex_on_flat(&p.pair, &memory.axis, true, memory.flat, limit, m) &&
             mesh_allows(&p.mesh, &p.triangle, v3_neg(memory.axis.n))) {
             m->cache = cache;
             convex_mesh_give(&p, cache, memory.axis.separation, m);
@@ -260,7 +260,7 @@ SADMM_RARE void convex_mesh_manifold(const struct sadmm_geometry *a, const struc
         }
         m->count = 0;
     }
-    if (!convex_search(&p.pair, memory.side, memory.known, limit, &axis, &found, m)) {
+    if (!convex_search(&p.pair, memory.side, memory.known, limit, &axis, &found)) {
         m->count = 0;
         return;
     }
