@@ -64,7 +64,7 @@ class View:
             backend = gui.add_dropdown("backend", ("as begun",) + names)
             certify = gui.add_checkbox("measure the error", settings.certify)
         self._contacts = gui.add_checkbox("contact forces", False)
-        self._legend = gui.add_html(legend(), visible=False)
+        self._legend = gui.add_html(f'<div style="padding:0 1em">{legend()}</div>', visible=False)
         self._steering = SteeringPanel(self.server, session)
         self._said = gui.add_markdown("")
         self._plots = {}
