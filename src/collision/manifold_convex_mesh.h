@@ -31,7 +31,7 @@ SADMM_INLINE void convex_triangle_make(const struct sadmm_geometry *a, const str
                                        struct convex_triangle *p)
 {
     struct convex_pair *pair = &p->pair;
-    real size2 = 0;
+    struct mesh_place place;
     int k;
     mesh_at(blocks, b->hull, &p->mesh);
     mesh_triangle_of(&p->mesh, (int32_t)child, &p->triangle);
@@ -39,13 +39,11 @@ SADMM_INLINE void convex_triangle_make(const struct sadmm_geometry *a, const str
     pair->b.form = CONVEX_POLYTOPE;
     pair->b.size = v3(0, 0, 0);
     mesh_triangle_polytope(&p->triangle, &pair->b.p);
-    for (k = 0; k < 3; ++k) {
-        pair->R.r[k] = r3_vec3(pose->R[k]);
-        size2 = real_max(size2, v3_norm2(mesh_corner(&p->triangle, k)));
-    }
-    pair->t = v3_sub(r3_vec3(pose->t), p->triangle.origin);
-    pair->thin = (real)smaller_of(geometry_thickness(a), geometry_thickness(b));
-    pair->size = (real)geometry_radius(a) + real_sqrt(size2) + v3_norm(pair->t);
+    place = mesh_place_of(a, b, &p->triangle, pose);
+    pair->R = place.R;
+    pair->t = place.t;
+    pair->thin = place.thin;
+    pair->size = place.size;
     convex_pair_finish(pair);
     pair->spread = v3(1, 0, 0);
     for (k = 0; k < 3; ++k) /* before points are chosen: others are to be in their place */

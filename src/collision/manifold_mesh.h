@@ -33,23 +33,43 @@ struct mesh_pair {
     struct polytope_axis front; /* the axis of the triangle's face */
 };
 
+/* Where a shape a is, in the frame of the mesh moved to the triangle, and by what the two are measured. */
+struct mesh_place {
+    mat3 R;
+    vec3 t;
+    real thin, size;
+};
+
+SADMM_INLINE struct mesh_place mesh_place_of(const struct sadmm_geometry *a, const struct sadmm_geometry *b,
+                                             const struct mesh_triangle *triangle, const struct pair_pose *pose)
+{
+    struct mesh_place place;
+    real size2 = 0;
+    int k;
+    for (k = 0; k < 3; ++k) {
+        place.R.r[k] = r3_vec3(pose->R[k]);
+        size2 = real_max(size2, v3_norm2(mesh_corner(triangle, k)));
+    }
+    place.t = v3_sub(r3_vec3(pose->t), triangle->origin);
+    place.thin = (real)smaller_of(geometry_thickness(a), geometry_thickness(b));
+    place.size = (real)geometry_radius(a) + real_sqrt(size2) + v3_norm(place.t);
+    return place;
+}
+
 SADMM_INLINE void mesh_pair_make(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *blocks,
                                  uint32_t child, const struct pair_pose *pose, struct mesh_pair *p)
 {
     struct polytope_pair *pair = &p->pair;
-    real size2 = 0;
-    int k;
+    struct mesh_place place;
     mesh_at(blocks, b->hull, &p->mesh);
     mesh_triangle_of(&p->mesh, (int32_t)child, &p->triangle);
     polytope_of(a, blocks, &pair->a);
     mesh_triangle_polytope(&p->triangle, &pair->b);
-    for (k = 0; k < 3; ++k) {
-        pair->R.r[k] = r3_vec3(pose->R[k]);
-        size2 = real_max(size2, v3_norm2(mesh_corner(&p->triangle, k)));
-    }
-    pair->t = v3_sub(r3_vec3(pose->t), p->triangle.origin);
-    pair->thin = (real)smaller_of(geometry_thickness(a), geometry_thickness(b));
-    pair->size = (real)geometry_radius(a) + real_sqrt(size2) + v3_norm(pair->t);
+    place = mesh_place_of(a, b, &p->triangle, pose);
+    pair->R = place.R;
+    pair->t = place.t;
+    pair->thin = place.thin;
+    pair->size = place.size;
     pair->slack = 8 * SADMM_EPSILON * pair->size;
     axis_of_face_b(pair, MESH_FRONT, &p->front);
 }
