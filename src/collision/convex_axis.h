@@ -3,8 +3,8 @@
  * Where the two are apart there is one optimum, beside the shortest vector of a - b that a walk finds; where they are
  * not, s (convex_newton.h) has several.
  *
- * 1. The optimum beside the last step's direction, by Newton's method alone, if that is certain of it and the two are
- *    not deep in each other.
+ * 1. The optimum beside the last step's direction, by Newton's method alone, if that is certain of it. If it parts the
+ *    two there is no other; else it is the one to stay with while they are not apart, nor deep in each other.
  * 2. Else, apart: the same from the shortest vector.
  * 3. Else of all of them the best one. A polytope inside a - b grows where its faces are nearest to the origin (epa.h).
  *    No direction across a face is less deep than the face; the optimum that Newton's method, or a flat, has beside it is
@@ -20,7 +20,7 @@
 /* Depth up to which the side that the last step knows is not doubted, as a share of the thinner extent. */
 #define CONVEX_SHALLOW ((real)0.05)
 /* What is less deep than this share of its face's depth over it has that face's optimum. */
-#define CONVEX_FINE ((real)0.02)
+#define CONVEX_FINE ((real)0.005)
 /* How far apart b is held from a, as shares of the thinner extent: twice the depth, within these bounds. Further apart
  * moves are small where the two meet by corners, nearer the vector between the two says less. */
 #define CONVEX_APART ((real)0.05)
@@ -80,12 +80,13 @@ SADMM_CALLED void convex_move(struct convex_pair *pair, real nearest, vec3 *n, r
 /* The optimum beside axis->n. False: not certain. */
 SADMM_CALLED bool convex_local(struct convex_pair *pair, struct convex_axis *axis, struct convex_active *active)
 {
+    const real enough = pair->enough;
     if (convex_polish(pair, active, &axis->n, &axis->separation)) return true;
     convex_move(pair, CONVEX_APART, &axis->n, &axis->separation, active);
     if (convex_polish(pair, active, &axis->n, &axis->separation)) return true;
-    pair->enough *= (real)1e-4;
+    pair->enough = 0;
     convex_move(pair, CONVEX_NEAR, &axis->n, &axis->separation, active);
-    pair->enough *= (real)1e4;
+    pair->enough = enough;
     return convex_polish(pair, active, &axis->n, &axis->separation);
 }
 
@@ -205,14 +206,16 @@ SADMM_INLINE bool convex_find(struct convex_pair *pair, vec3 side, bool known, r
     if (known) {
         convex_axis_along(pair, v3_scale(side, 1 / v3_norm(side)), &kept, &of_kept);
         certain = convex_polish(pair, &of_kept, &kept.n, &kept.separation);
-        if (certain && kept.separation + convex_radii(pair) >= -CONVEX_SHALLOW * pair->thin) {
-            *axis = kept;
-            *active = of_kept;
-            return true;
-        }
+        *axis = kept;
+        *active = of_kept;
+        if (certain && kept.separation + convex_radii(pair) >= 0) return true;
     }
     end = convex_distance(pair, side, limit + convex_radii(pair) + pair->slack, &s, &v);
     if (end == GJK_FAR) return false;
+    /* it is the optimum beside the last one, but only of what is not apart the one to stay with */
+    if (certain && !(end == GJK_APART && v3_norm(v) > 1000 * pair->slack) &&
+        kept.separation + convex_radii(pair) >= -CONVEX_SHALLOW * pair->thin)
+        return true;
     convex_axis_along(pair, v3_scale(side, 1 / v3_norm(side)), axis, active);
     if (end == GJK_APART) {
         const real enough = pair->enough;
@@ -239,21 +242,36 @@ SADMM_INLINE bool convex_find(struct convex_pair *pair, vec3 side, bool known, r
     return true;
 }
 
-/* The nearest points, by the active pieces. */
+/* The nearest points, by those of the active pieces that are as far along n as the two reach, or nearly; where the direction
+ * is not certain there may be none. */
 SADMM_INLINE void convex_nearest(const struct convex_pair *pair, const struct convex_active *active,
                                  struct convex_axis *axis)
 {
-    real all = 0;
+    const vec3 n = axis->n;
+    const real reach = -(axis->separation + convex_radii(pair)),
+               least = reach - real_max(pair->equal, (real)1e-8 * pair->size);
+    real all = 0, lack;
     int k;
     axis->pa = axis->pb = v3(0, 0, 0);
     for (k = 0; k < active->count; ++k) {
         const real weight = real_max(active->weight[k], 0);
-        axis->pa = v3_madd(axis->pa, weight, convex_point_a(pair, active->a[k], axis->n));
-        axis->pb = v3_madd(axis->pb, weight, convex_point_b(pair, active->b[k], axis->n));
+        const vec3 a = convex_point_a(pair, active->a[k], n), b = convex_point_b(pair, active->b[k], n);
+        if (v3_dot(n, v3_sub(a, b)) < least) continue;
+        axis->pa = v3_madd(axis->pa, weight, a);
+        axis->pb = v3_madd(axis->pb, weight, b);
         all += weight;
     }
-    axis->pa = v3_madd(v3_scale(axis->pa, 1 / all), pair->a.p.radius, axis->n);
-    axis->pb = v3_madd(v3_scale(axis->pb, 1 / all), -pair->b.p.radius, axis->n);
+    if (!(all > 0)) {
+        const struct difference_point zero = {{0, 0, 0}, 0, 0}, point = convex_support(pair, n, &zero);
+        axis->pa = convex_point_a(pair, point.a, n);
+        axis->pb = convex_point_b(pair, point.b, n);
+        all = 1;
+    }
+    axis->pa = v3_scale(axis->pa, 1 / all);
+    axis->pb = v3_scale(axis->pb, 1 / all);
+    lack = reach - v3_dot(n, v3_sub(axis->pa, axis->pb));
+    axis->pa = v3_madd(axis->pa, pair->a.p.radius + lack / 2, n);
+    axis->pb = v3_madd(axis->pb, -pair->b.p.radius - lack / 2, n);
 }
 
 #endif

@@ -93,9 +93,9 @@ SADMM_INLINE void convex_shorten(const real m[3], real high, real x[2])
 }
 
 /* The step x, and the weights where it leads to. False: the Hessian says that this is no minimum; *singular: it does
- * not say that it is one. size: of the pair. */
-SADMM_INLINE bool convex_newton(const struct convex_plane *p, real size, struct convex_active *active, real x[2],
-                                bool *singular)
+ * not say that it is one. size, slack: of the pair. */
+SADMM_INLINE bool convex_newton(const struct convex_plane *p, real size, real slack, struct convex_active *active,
+                                real x[2], bool *singular)
 {
     const real *g = p->g[0], *m = p->m;
     *singular = false;
@@ -118,8 +118,12 @@ SADMM_INLINE bool convex_newton(const struct convex_plane *p, real size, struct 
         const real u0 = p->g[1][0] - g[0], u1 = p->g[1][1] - g[1], uu = u0 * u0 + u1 * u1, c = (p->h[0] - p->h[1]) / uu,
                    bend = m[0] * u1 * u1 - 2 * m[1] * u0 * u1 + m[2] * u0 * u0; /* across u */
         real along, r0 = g[0] + c * (m[0] * u0 + m[1] * u1), r1 = g[1] + c * (m[1] * u0 + m[2] * u1);
-        if (!(bend > 0 && uu > 0)) return false;
-        along = (r0 * u1 - r1 * u0) / bend;
+        const real across = r0 * u1 - r1 * u0, length = real_sqrt(uu);
+        if (!(uu > 0)) return false;
+        *singular = !(bend > 0);
+        if (real_abs(across) <= slack * length) along = 0; /* rounding: corners and rims that touch have no bend */
+        else if (*singular) along = (across > 0 ? (real)0.25 : (real)-0.25) / length; /* on to what ends the slope */
+        else along = across / bend;
         x[0] = c * u0 - along * u1;
         x[1] = c * u1 + along * u0;
         r0 = g[0] + m[0] * x[0] + m[1] * x[1];
@@ -202,7 +206,7 @@ SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_ac
     struct convex_active now = *active;
     const struct difference_point zero = {{0, 0, 0}, 0, 0};
     vec3 at = *n;
-    real s, length = 2, last = 2;
+    real s, length = 2, last = 2, first = 0, miss = 0;
     bool certain = false, singular = true; /* until a step has said what the Hessian is */
     int step, ended = 0;
     for (step = 0;; ++step) {
@@ -229,7 +233,9 @@ SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_ac
         }
         lack = v3_dot(at, next.w) - mean;
         off = real_sqrt(off0 * off0 + off1 * off1);
-        certain = lack + convex_gain(off, mean, length) <= 8 * pair->slack && !(singular && mean > 0);
+        certain = lack + convex_gain(off, mean, length) <= 8 * pair->slack && !(singular && mean > 8 * pair->slack);
+        miss = lack + off;
+        if (step == 0) first = miss;
         if (step == CONVEX_STEPS || (certain && off <= pair->slack)) break;
         if (length <= 16 * SADMM_EPSILON || (length >= last / 2 && length < (real)1e-3)) { /* rounding ends it */
             if (convex_is_active(&now, &next) && (!certain || ++ended == 3)) break;
@@ -244,7 +250,7 @@ SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_ac
         p.m[0] -= mean;
         p.m[2] -= mean;
         last = length;
-        if (!convex_newton(&p, pair->size, &now, x, &singular)) {
+        if (!convex_newton(&p, pair->size, pair->slack, &now, x, &singular)) {
             if (now.count == 1) return false;
             for (k = 1; k < now.count; ++k)
                 if (now.weight[k] < now.weight[least]) least = k;
@@ -283,6 +289,7 @@ SADMM_CALLED bool convex_polish(const struct convex_pair *pair, struct convex_ac
     }
     s = convex_separation(pair, at);
     if (!(s >= *separation - pair->slack / 4)) return false;
+    if (!certain && s <= *separation + pair->slack && miss > first) return false; /* the points were better before */
     *active = now;
     *n = at;
     *separation = s;
