@@ -20,9 +20,9 @@
  * Order: by step; in a step contacts first, then sensors; of either by the slots of a, then of b, and what ended before
  * what begun. Events are the same on all backends as far as their steps are, and do not depend on threads.
  *
- * Price: a step with events recorded is waited for (sadmm_world_step_async), and its contacts are read from the device
- * (CUDA); that time is in no report. With sensors, bodies are read too, and the tree that queries use follows them
- * (query.h). Worlds that record nothing pay nothing; a sensor that nobody asks about costs nothing.
+ * Price: a step with events recorded is waited for (sadmm_world_step_async). On CUDA the device then tells which pairs
+ * touch, and all contacts are read where something has begun; that time is in no report. With sensors, bodies are read
+ * too, and the tree that queries use follows them (query.h). Worlds that record nothing pay nothing; a sensor that nobody asks about costs nothing.
  *
  * Threads: as in world.h, a world is used by one thread at a time.
  */
@@ -63,7 +63,8 @@ typedef struct sadmm_event {
  * oldest are dropped. 0: record no more. What was recorded before is dropped, and what touches in the first step
  * recorded has begun in it, so that every end has had its begin. After sadmm_world_restore recording goes on, and
  * begins anew in the same way. capacity: in [0, 2^24]; memory for it is taken here, about 150 bytes each. Errors:
- * INVALID_ARGUMENT (range; nothing changes), OUT_OF_MEMORY (nothing changes). */
+ * INVALID_ARGUMENT (range; nothing changes), OUT_OF_MEMORY (nothing changes). A device that fails while events are read
+ * after a step makes that step return DEVICE, as one that fails in it does (world.h). */
 SADMM_API sadmm_status sadmm_world_record_events(sadmm_world *world, int32_t capacity);
 /* As it was given; of NULL: 0. */
 SADMM_API int32_t sadmm_world_event_capacity(const sadmm_world *world);

@@ -293,8 +293,8 @@ SADMM_API sadmm_status sadmm_world_step(sadmm_world *world);
  * step. Elsewhere the same as sadmm_world_step. Steps run in order, a few of them at a time; states, wrenches and
  * settings set in between take effect at the next one. Getters wait for the steps begun so far. Errors: as
  * sadmm_world_step; they may be those of an earlier step, and then nothing after that step has been done
- * (sadmm_step_report.step counts what has). With settings.certify the step is waited for. One thread at a time a world;
- * different worlds are independent, also on one device. */
+ * (sadmm_step_report.step counts what has). With settings.certify, or where events are recorded (events.h), the step is
+ * waited for. One thread at a time a world; different worlds are independent, also on one device. */
 SADMM_API sadmm_status sadmm_world_step_async(sadmm_world *world);
 /* Wait until all steps begun are done; at once when there are none. Errors: the first one of a step, see above. One
  * thread at a time a world. */

@@ -201,14 +201,19 @@ def _add_solid(self, shapes, density=None, mass=None, *, position=(0, 0, 0), ori
     return body
 
 
+def _struct_dtype(members, size):
+    """Of a C structure: (name, format, count, offset) of its members, and its size."""
+    return np.dtype({
+        "names": [name for name, _, _, _ in members],
+        "formats": [(form, (count,)) if count > 1 else form for _, form, count, _ in members],
+        "offsets": [offset for _, _, _, offset in members],
+        "itemsize": size,
+    })
+
+
 #: Members of World.contacts(): ids are (slot, generation); position, normal (from a to b) and gap in m, impulse on b in N s,
 #: force on b in N; triangle: of a mesh, else -1.
-contact_dtype = np.dtype({
-    "names": [member[0] for member in _core._contact_members],
-    "formats": [(member[1], (member[2],)) if member[2] > 1 else member[1] for member in _core._contact_members],
-    "offsets": [member[3] for member in _core._contact_members],
-    "itemsize": _core._contact_size,
-})
+contact_dtype = _struct_dtype(_core._contact_members, _core._contact_size)
 
 
 def _contacts(self):
@@ -219,12 +224,7 @@ def _contacts(self):
 #: Members of World.events(): step that it came with; type, one of CONTACT_BEGUN, CONTACT_ENDED, SENSOR_BEGUN, SENSOR_ENDED; ids
 #: are (slot, generation), a is the sensor of these. Of CONTACT_BEGUN: position (m), normal from a to b, closing speed (m/s) and
 #: the pair's impulse on b (N s).
-event_dtype = np.dtype({
-    "names": [member[0] for member in _core._event_members],
-    "formats": [(member[1], (member[2],)) if member[2] > 1 else member[1] for member in _core._event_members],
-    "offsets": [member[3] for member in _core._event_members],
-    "itemsize": _core._event_size,
-})
+event_dtype = _struct_dtype(_core._event_members, _core._event_size)
 
 
 def _events(self):
