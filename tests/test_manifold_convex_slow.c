@@ -177,7 +177,7 @@ static double may_miss(const struct pair_of *t, int depth)
  * they are off by 1 - cos of that, 8 degrees at most. */
 static double may_be_outside(const struct pair_of *t)
 {
-    const double rims = are_discs(t) ? 0.012 * fmax(t->g[0].size[0], t->g[1].size[0]) : 0;
+    const double rims = are_discs(t) ? 0.01 * fmax(t->g[0].size[0], t->g[1].size[0]) : 0;
     return rims + MANIFOLD_SNAP * pair_thin(t) + 1e-5 * pair_size(t); /* clipping; a corner or a rim at another one */
 }
 
