@@ -377,6 +377,50 @@ START_TEST(sides_lie_on_two_points)
 }
 END_TEST
 
+/* Inclined caps, and inclined sides, that face each other: every point is one of both bodies, wherever rims cross and
+ * lines end. All poses are apart, so that the normal is one of nearest points; the two are up to 8 degrees inclined to
+ * that, further than which nothing faces along it. */
+START_TEST(inclined_ones_have_points_of_both)
+{
+    static const int types[][2] = {{SADMM_SHAPE_CYLINDER, SADMM_SHAPE_CYLINDER},
+                                   {SADMM_SHAPE_CONE, SADMM_SHAPE_CONE},
+                                   {SADMM_SHAPE_CAPSULE, SADMM_SHAPE_CYLINDER},
+                                   {SADMM_SHAPE_CAPSULE, SADMM_SHAPE_CONE}};
+    const int *type = types[_i % 4];
+    const bool caps = _i < 2;
+    struct random r = {.state = 9000 + (uint64_t)_i};
+    struct pair_of *t = new_pair();
+    long several = 0, crossings = 0;
+    for (int pose = 0; pose < fewer(4000); ++pose) {
+        for (int s = 0; s < 2; ++s) {
+            double lie[9], tilt[9];
+            const double size[3] = {random_in(&r, 0.3, 1), random_in(&r, 0.3, 1), 0},
+                         slope = type[s] == SADMM_SHAPE_CONE ? atan2(size[0], 2 * size[1]) : 0;
+            t->g[s] = geometry_of(type[s], size);
+            /* a cap, a line or a cone's line up for a, down for b */
+            rotation(lie, 0, 1, 0, caps ? (s ? 0 : M_PI) : (s ? M_PI / 2 + slope : -M_PI / 2 + slope));
+            rotation(tilt, random_in(&r, -1, 1), random_in(&r, -1, 1), caps ? 0 : random_in(&r, -1, 1),
+                     random_in(&r, 0, 0.13));
+            multiply(tilt, lie, t->R[s]);
+            for (int k = 0; k < 3; ++k) t->x[s][k] = k < 2 && s ? random_in(&r, -0.5, 0.5) : s * 2.5;
+        }
+        push_together(t, -random_in(&r, 0.001, 0.05));
+        const struct manifold m = pair_touch(t, 1e300, 0);
+        several += m.count > 1;
+        for (int i = 0; i < m.count; ++i) {
+            const double out = points_outside(t, m.normal, m.points[i].position, m.points[i].separation);
+            crossings += m.points[i].feature >> AXIS_KIND_SHIFT == FEATURE_CROSSING;
+            /* what is beside a side by half of MANIFOLD_SNAP counts as over it */
+            ck_assert_msg(out <= MANIFOLD_SNAP * pair_thin(t) + 1e-9, "%s-%s, pose %d: outside by %g, feature %x",
+                          names[type[0]], names[type[1]], pose, out, m.points[i].feature);
+        }
+    }
+    ck_assert_int_gt(several, fewer(4000) / 4);
+    if (caps) ck_assert_int_gt(crossings, fewer(4000) / 8);
+    free_pair(t);
+}
+END_TEST
+
 /* Planes: the lowest point exactly, in any pose, and the rim of a cap that is nearly flat on it. */
 START_TEST(planes_are_exact)
 {
@@ -430,6 +474,7 @@ static Suite *suite(void)
     tcase_add_loop_test(tests, sides_are_kept, 0, 6);
     tcase_add_loop_test(tests, caps_stand_on_eight_points, 0, 4);
     tcase_add_loop_test(tests, sides_lie_on_two_points, 0, 4);
+    tcase_add_loop_test(tests, inclined_ones_have_points_of_both, 0, 8);
     tcase_add_loop_test(tests, planes_are_exact, 0, 3);
     suite_add_tcase(s, tests);
     return s;

@@ -149,14 +149,6 @@ static double off_facing(const struct pair_of *t, int s, const double n[3], cons
         if (!(condition)) ck_assert_msg(false, __VA_ARGS__); \
     } while (0)
 
-/* Has each a cap? */
-static bool are_discs(const struct pair_of *t)
-{
-    for (int s = 0; s < 2; ++s)
-        if (t->g[s].type != SADMM_SHAPE_CYLINDER && t->g[s].type != SADMM_SHAPE_CONE) return false;
-    return true;
-}
-
 /* What the separation may be short of the best one by: CLOSE but for few poses, and never by more than this. */
 #define CLOSE 1e-10
 static double may_miss(const struct pair_of *t, int depth)
@@ -173,12 +165,10 @@ static double may_miss(const struct pair_of *t, int depth)
     }
 }
 
-/* How far points within the margin may be outside of their bodies. rims: of two discs that are inclined to each other
- * they are off by 1 - cos of that, 8 degrees at most. */
+/* How far points within the margin may be outside of their bodies. */
 static double may_be_outside(const struct pair_of *t)
 {
-    const double rims = are_discs(t) ? 0.01 * fmax(t->g[0].size[0], t->g[1].size[0]) : 0;
-    return rims + MANIFOLD_SNAP * pair_thin(t) + 1e-5 * pair_size(t); /* clipping; a corner or a rim at another one */
+    return MANIFOLD_SNAP * pair_thin(t) + 1e-5 * pair_size(t); /* clipping; a corner or a rim at another one */
 }
 
 struct checked {

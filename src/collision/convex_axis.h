@@ -110,6 +110,51 @@ SADMM_INLINE bool convex_take(const struct convex_axis *other, const struct conv
     return true;
 }
 
+/* Bodies that are all but aligned have optima side by side, at directions of their own, a thousandth of a radian apart:
+ * too near to each other for faces of a polytope. Those of c within a degree of n (own frame): of a flat, and across
+ * straight lines. How many. */
+#define CONVEX_BESIDE ((real)0.99985)
+enum { CONVEX_OWN = 4 };
+SADMM_INLINE int convex_own_directions(const struct convex *c, vec3 n, vec3 own[CONVEX_OWN])
+{
+    const int flat = convex_flat(c, n, CONVEX_BESIDE);
+    int count = 0;
+    if (flat >= 0) own[count++] = convex_flat_normal(c, flat);
+    if (c->form != CONVEX_POLYTOPE) {
+        struct convex_facing line;
+        if (convex_line(c, n, &line) && v3_dot(line.normal, n) >= CONVEX_BESIDE) own[count++] = line.normal;
+    } else if (c->p.edges > 0) { /* edges of the corner */
+        const int v = polytope_support(&c->p, n, 0), last = c->p.vertex_first[v + 1];
+        int k;
+        for (k = c->p.vertex_first[v]; k < last && count < CONVEX_OWN; ++k) {
+            const vec3 edge = v3_sub(polytope_vertex(&c->p, c->p.vertex_next[k]), polytope_vertex(&c->p, v)),
+                       across = v3_madd(n, -v3_dot(n, edge) / v3_norm2(edge), edge);
+            const real length = v3_norm(across);
+            if (length >= CONVEX_BESIDE) own[count++] = v3_scale(across, 1 / length);
+        }
+    }
+    return count;
+}
+
+SADMM_CALLED void convex_ask_beside(struct convex_pair *pair, struct convex_axis *axis, struct convex_active *active)
+{
+    const vec3 n = axis->n;
+    int s, k;
+    for (s = 0; s < 2; ++s) {
+        vec3 own[CONVEX_OWN];
+        const int count = convex_own_directions(s ? &pair->b : &pair->a, s ? v3_neg(n) : m3_tmul(pair->R, n), own);
+        for (k = 0; k < count; ++k) {
+            const vec3 from = s ? v3_neg(own[k]) : m3_mul(pair->R, own[k]);
+            struct convex_axis other;
+            struct convex_active of_other;
+            if (v3_norm2(v3_cross(from, n)) <= 16 * SADMM_EPSILON) continue; /* none that is better by more than rounding */
+            convex_axis_along(pair, from, &other, &of_other);
+            convex_local(pair, &other, &of_other);
+            if (other.separation > axis->separation + pair->equal) convex_take(&other, &of_other, axis, active);
+        }
+    }
+}
+
 /* 3. simplex: of a - b, around the origin or beside it. axis: one to begin with. */
 SADMM_RARE void convex_way_out(struct convex_pair *pair, const struct gjk_simplex *simplex, struct convex_axis *axis,
                                struct convex_active *active)
@@ -166,9 +211,11 @@ SADMM_RARE void convex_way_out(struct convex_pair *pair, const struct gjk_simple
         face->height = SADMM_REAL_MAX;
         ++tries;
     }
-    if (sure) return;
-    if (proven) convex_polish(pair, active, &axis->n, &axis->separation);
-    else convex_local(pair, axis, active);
+    if (!sure) {
+        if (proven) convex_polish(pair, active, &axis->n, &axis->separation);
+        else convex_local(pair, axis, active);
+    }
+    if (!proven || tries > 0) convex_ask_beside(pair, axis, active); /* no face has been given up */
 }
 
 /* 2. v: the shortest vector, by the walk. False: not certain. */

@@ -5,8 +5,7 @@
  * A disc's rim has no corners. Eight points of it stand for it, evenly spread from a direction that is not the disc's
  * own but the other body's: a side of the face, a plane's or a mesh's x axis, b's of two discs. So a disc that turns
  * about its axis keeps its points, and it stands as an octagon does: what it tips about is at most 1 - cos(pi / 8) =
- * 7.6 % of the radius inside of the rim. Where rims cross sides and lines the points are exact;
- * where they cross each other they are as far as the discs are parallel.
+ * 7.6 % of the radius inside of the rim. Where rims cross sides, lines and each other the points are exact.
  */
 #ifndef SADMM_COLLISION_CONVEX_FACING_H
 #define SADMM_COLLISION_CONVEX_FACING_H
@@ -27,6 +26,9 @@ struct convex_facing {
     vec3 centre; /* of a disc */
     real radius;
     real inner[2]; /* radii of curvature across a line, at its ends */
+    bool is_edge;  /* of a polytope; else the line is of a cylinder or a cone: */
+    vec3 axis[2];  /* its axis, beside the ends of the line */
+    real wide[2];  /* its radii there */
 };
 
 /* a - b seen along n, and the points that have been found. */
@@ -61,6 +63,11 @@ SADMM_INLINE bool convex_line(const struct convex *c, vec3 d, struct convex_faci
         out->inner[0] = c->size.x * length / (2 * c->size.y); /* to the axis, along the normal */
         out->inner[1] = 0;
     }
+    out->is_edge = false;
+    out->axis[0] = v3(0, 0, -c->size.y);
+    out->axis[1] = v3(0, 0, c->size.y);
+    out->wide[0] = c->size.x;
+    out->wide[1] = c->form == CONVEX_CYLINDER ? c->size.x : 0;
     out->kind = CONVEX_LINE;
     out->count = 2;
     out->vertex[0] = CONVEX_END;
@@ -96,6 +103,7 @@ SADMM_INLINE void convex_polytope_facing(const struct polytope *p, vec3 d, struc
         }
         out->edge[0] = out->edge[1] = polytope_edge_between(p, ends[0], ends[1]);
         out->normal = d;
+        out->is_edge = true;
     }
 }
 
@@ -126,6 +134,8 @@ SADMM_INLINE void convex_facing_place(const struct convex_pair *pair, struct con
     f->normal = m3_mul(pair->R, f->normal);
     f->offset += v3_dot(f->normal, pair->t);
     f->centre = v3_add(m3_mul(pair->R, f->centre), pair->t);
+    if (f->kind == CONVEX_LINE && !f->is_edge)
+        for (k = 0; k < 2; ++k) f->axis[k] = v3_add(m3_mul(pair->R, f->axis[k]), pair->t);
 }
 
 /* The point of a flat's plane over x, along n. */
@@ -283,8 +293,45 @@ SADMM_INLINE void convex_disc_face(struct convex_meeting *m, const struct convex
     }
 }
 
-/* Seen along n, which both are across to within 8 degrees, the discs are circles but for 1 - cosine of that: their rims
- * cross where circles would. */
+/* Where the rim of b crosses that of a as seen along n: from the point where circles would, by Newton's method in the
+ * angle about b's axis. Along n the rim of b is over p + c q + s r of a's plane, (c, s) on the unit circle, counted from
+ * a's centre; there its length is to be a's radius. False: they do not cross there. */
+SADMM_CALLED bool convex_rim_crossing(const struct convex_meeting *m, const struct convex_facing *a,
+                                      const struct convex_facing *b, vec3 start, vec3 *on_b)
+{
+    enum { STEPS = 8 };
+    const real tilt = v3_dot(a->normal, m->n), wanted = a->radius * a->radius,
+               close = 2 * m->pair->slack * a->radius; /* of a square */
+    const vec3 from = v3_sub(convex_over(b, m->n, start), b->centre), p = v3_sub(convex_over(a, m->n, b->centre), a->centre);
+    vec3 e1, e2, q, r;
+    real c = 1, s = 0;
+    int step;
+    if (!(v3_norm2(from) > 0)) return false;
+    e1 = v3_scale(from, 1 / v3_norm(from));
+    e2 = v3_cross(b->normal, e1);
+    q = v3_scale(v3_madd(e1, -v3_dot(a->normal, e1) / tilt, m->n), b->radius);
+    r = v3_scale(v3_madd(e2, -v3_dot(a->normal, e2) / tilt, m->n), b->radius);
+    for (step = 0; step < STEPS; ++step) {
+        const vec3 y = v3_madd(v3_madd(p, c, q), s, r);
+        const real miss = v3_norm2(y) - wanted, slope = 2 * v3_dot(y, v3_sub(v3_scale(r, c), v3_scale(q, s)));
+        real turn, length, old = c;
+        if (real_abs(miss) <= close) {
+            *on_b = v3_madd(v3_madd(b->centre, c * b->radius, e1), s * b->radius, e2);
+            return true;
+        }
+        turn = miss / slope;
+        if (!(real_abs(turn) < (real)0.5)) return false; /* they touch, or pass */
+        c += s * turn;
+        s -= old * turn;
+        length = real_sqrt(c * c + s * s);
+        c /= length;
+        s /= length;
+    }
+    return false;
+}
+
+/* Seen along n, which both are across to within 8 degrees, the discs are circles but for 1 - cosine of that, and their
+ * rims cross beside where circles would. */
 SADMM_INLINE void convex_disc_disc(struct convex_meeting *m, const struct convex_facing *a,
                                    const struct convex_facing *b)
 {
@@ -297,9 +344,12 @@ SADMM_INLINE void convex_disc_disc(struct convex_meeting *m, const struct convex
         const real along = (d2 + a->radius * a->radius - b->radius * b->radius) / (2 * d),
                    height = real_sqrt(real_max(a->radius * a->radius - along * along, 0));
         int side;
-        for (side = 0; side < 2; ++side)
-            convex_meet_flat(m, v3_madd(v3_madd(a->centre, along, e1), side ? height : -height, e2), true, b,
-                             polytope_feature(FEATURE_CROSSING, side, 0));
+        for (side = 0; side < 2; ++side) {
+            const vec3 start = v3_madd(v3_madd(a->centre, along, e1), side ? height : -height, e2);
+            vec3 x;
+            if (convex_rim_crossing(m, a, b, start, &x))
+                convex_meet_flat(m, x, false, a, polytope_feature(FEATURE_CROSSING, side, 0));
+        }
     }
 }
 
@@ -347,6 +397,59 @@ SADMM_INLINE void convex_line_flat(struct convex_meeting *m, const struct convex
                          line_is_a, flat, feature[k]);
 }
 
+/* x, moved along n to the surface of a cylinder or a cone that it is near. *beyond: how far that is beyond its ends, as a
+ * share of the axis; 0: it is not. */
+SADMM_INLINE vec3 convex_onto_side(const struct convex_facing *line, vec3 n, vec3 x, real *beyond)
+{
+    const vec3 axis = v3_sub(line->axis[1], line->axis[0]), w = v3_sub(x, line->axis[0]);
+    const real length = v3_norm(axis), taper = (line->wide[1] - line->wide[0]) / length,
+               along = v3_dot(w, axis) / length, up = v3_dot(n, axis) / length, wide = line->wide[0] + taper * along,
+               a = 1 - up * up * (1 + taper * taper), b = v3_dot(w, n) - up * (along + taper * wide),
+               c = v3_norm2(w) - along * along - wide * wide, det = b * b - a * c,
+               way = det > 0 && b > 0 ? -c / (b + real_sqrt(det)) : a > 0 ? -b / a : 0, at = (along + way * up) / length;
+    *beyond = at < 0 ? at : real_max(at - 1, 0);
+    return v3_madd(x, way, n);
+}
+
+/* x, moved along n to the ball around the edge's point there, which rounds it. u: along the edge, across n. */
+SADMM_INLINE vec3 convex_onto_edge(const struct convex_facing *line, real round, vec3 n, vec3 u, vec3 x)
+{
+    const vec3 d = v3_sub(line->corner[1], line->corner[0]);
+    const real share = real_clamp(v3_dot(u, v3_sub(x, line->corner[0])) / v3_dot(u, d), 0, 1);
+    const vec3 rel = v3_sub(x, v3_madd(line->corner[0], share, d));
+    const real above = v3_dot(n, rel), aside2 = v3_norm2(rel) - above * above;
+    return v3_madd(x, real_sqrt(real_max(round * round - aside2, 0)) - above, n);
+}
+
+/* Points near the two lines, one over the other along n, are moved to the surfaces that these are of, not beyond their
+ * ends. u: along a's line, across n. */
+SADMM_CALLED void convex_onto_both(const struct convex_meeting *m, const struct convex_facing *a,
+                                   const struct convex_facing *b, vec3 u, vec3 *on_a, vec3 *on_b)
+{
+    enum { MOVES = 3 }; /* each leaves a fiftieth of what there was */
+    int move, s;
+    for (move = 0;; ++move) {
+        real back = 0;
+        for (s = 0; s < 2; ++s) {
+            const struct convex_facing *line = s ? b : a;
+            const vec3 n = s ? v3_neg(m->n) : m->n;
+            vec3 *on = s ? on_b : on_a, axis;
+            real beyond;
+            if (line->is_edge) {
+                *on = convex_onto_edge(line, s ? m->pair->b.p.radius : m->pair->a.p.radius, n, u, *on);
+                continue;
+            }
+            *on = convex_onto_side(line, n, *on, &beyond);
+            axis = v3_sub(line->axis[1], line->axis[0]);
+            beyond *= v3_norm2(axis) / v3_dot(u, axis);
+            if (real_abs(beyond) > real_abs(back)) back = beyond;
+        }
+        if (move == MOVES || real_abs(back) <= m->tolerance) return;
+        *on_a = v3_madd(*on_a, -back, u);
+        *on_b = v3_madd(*on_b, -back, u);
+    }
+}
+
 /* Two lines side by side, to within 8 degrees: both ends of the common stretch, where the round surfaces over them are
  * nearest to each other. */
 SADMM_INLINE void convex_line_line(struct convex_meeting *m, const struct convex_facing *a,
@@ -372,23 +475,18 @@ SADMM_INLINE void convex_line_line(struct convex_meeting *m, const struct convex
     for (k = 0; k < 2; ++k) {
         const real at = k ? high : low, sa = (at - ends[0][0]) / (ends[0][1] - ends[0][0]),
                    sb = (at - ends[1][0]) / (ends[1][1] - ends[1][0]),
-                   ra = a->inner[0] + sa * (a->inner[1] - a->inner[0]),
-                   rb = b->inner[0] + sb * (b->inner[1] - b->inner[0]), round_a = ra + m->pair->a.p.radius,
-                   round_b = rb + m->pair->b.p.radius, rounds = round_a + round_b;
-        /* a's and b's centres of curvature there, and what is between them */
-        const vec3 xa = v3_madd(v3_add(a->corner[0], v3_scale(v3_sub(a->corner[1], a->corner[0]), sa)), -ra, n),
-                   xb = v3_madd(v3_add(b->corner[0], v3_scale(v3_sub(b->corner[1], b->corner[0]), sb)), rb, n),
-                   d = v3_sub(xb, xa);
-        const real along = v3_dot(n, d), aside2 = v3_norm2(v3_madd(d, -along, n)), height2 = rounds * rounds - aside2;
-        vec3 on_a, middle;
-        real height, share;
-        if (!(rounds > 0) || !(height2 > 0)) continue;
-        height = real_sqrt(height2);
-        share = round_a / rounds;
-        middle = v3_madd(v3_madd(xa, share, v3_madd(d, -along, n)), share * height, n); /* of a's surface */
-        on_a = v3_madd(middle, -m->pair->a.p.radius, n);
+                   round_a = a->inner[0] + sa * (a->inner[1] - a->inner[0]) + m->pair->a.p.radius,
+                   round_b = b->inner[0] + sb * (b->inner[1] - b->inner[0]) + m->pair->b.p.radius,
+                   rounds = round_a + round_b;
+        /* a's and b's points there; between them the nearest place, by the radii of curvature */
+        const vec3 xa = v3_madd(a->corner[0], sa, v3_sub(a->corner[1], a->corner[0])),
+                   xb = v3_madd(b->corner[0], sb, v3_sub(b->corner[1], b->corner[0])), d = v3_sub(xb, xa),
+                   aside = v3_madd(d, -v3_dot(n, d), n);
+        vec3 on_a = v3_madd(xa, round_a / rounds, aside), on_b = v3_madd(xb, -round_b / rounds, aside);
+        if (!(rounds > 0) || !(rounds * rounds > v3_norm2(aside))) continue;
+        convex_onto_both(m, a, b, u, &on_a, &on_b);
         /* which end it is: a's own features, where a ends first or both do, or b's */
-        convex_meet(m, on_a, v3_madd(middle, along - height + m->pair->b.p.radius, n),
+        convex_meet(m, v3_madd(on_a, -m->pair->a.p.radius, n), v3_madd(on_b, m->pair->b.p.radius, n),
                     (k ? real_max(ends[0][0], ends[0][1]) <= high : real_min(ends[0][0], ends[0][1]) >= low)
                         ? polytope_feature(FEATURE_VERTEX_A, 0, a->vertex[(ends[0][1] > ends[0][0]) == (k == 1)]) + 1
                         : polytope_feature(FEATURE_VERTEX_B, 0, b->vertex[(ends[1][1] > ends[1][0]) == (k == 1)]) + 1);

@@ -68,9 +68,10 @@ SADMM_INLINE bool hull_is_proven(const struct polytope_pair *pair, const struct 
         if (m->points[k].separation < m->points[deepest].separation) deepest = k;
     }
     /* two points of the cores as near to each other as the planes are: nothing is nearer, and no plane parts them
-     * further */
+     * further; of sharp ones as near as their points are told apart by (hull_add_nearest) */
     if (axis->separation >= -pair_radii(pair))
-        return m->points[deepest].separation <= axis->separation + 2 * pair->slack;
+        return m->points[deepest].separation <=
+               axis->separation + (pair_radii(pair) > 0 ? 2 * pair->slack : MANIFOLD_FLAT * pair->thin);
     /* the face along the normal need not have the deepest corner */
     if (m->points[deepest].separation > axis->separation + MANIFOLD_FLAT * pair->thin) return false;
     middle = v3_scale(middle, (real)1 / (real)m->count);
@@ -138,6 +139,28 @@ SADMM_INLINE bool hull_crossing(const struct polytope_pair *pair, const struct p
     *pa = v3_madd(a, la / 2 + s, ua);
     *pb = v3_madd(b, lb / 2 + t, ub);
     return v3_norm(v3_cross(axis->n, v3_sub(*pb, *pa))) <= MANIFOLD_KEEP_EXTENT * pair->thin;
+}
+
+/* Is the last step's axis one of two edges whose nearest points prove that no other beats it by more than it is given?
+ * pa, pb: these points. While the two are apart, where they are as near as the planes across the axis are. Else each
+ * of them is inside of the other body, and no direction is less deep than its way to that one's surface. */
+SADMM_INLINE bool hull_edges_are_proven(const struct polytope_pair *pair, const struct polytope_axis *axis, vec3 *pa,
+                                        vec3 *pb, uint32_t *feature)
+{
+    const real cores = axis->separation + pair_radii(pair);
+    vec3 d;
+    if (axis->kind != AXIS_EDGES || !hull_crossing(pair, axis, pa, pb)) return false;
+    d = v3_sub(*pb, *pa);
+    if (v3_dot(axis->n, d) > cores + 2 * pair->slack || v3_norm(v3_cross(axis->n, d)) > 2 * pair->slack) return false;
+    if (cores <= HULL_TOUCH * pair->size &&
+        real_min(polytope_height(&pair->b, *pa, -1),
+                 polytope_height(&pair->a, m3_tmul(pair->R, v3_sub(*pb, pair->t)), -1)) >
+            cores + hull_bonus(pair, axis->separation))
+        return false;
+    *pa = v3_madd(*pa, pair->a.radius, axis->n);
+    *pb = v3_madd(*pb, -pair->b.radius, axis->n);
+    *feature = polytope_feature(FEATURE_CROSSING, axis->a, axis->b);
+    return true;
 }
 
 /* The axis that the nearest points say, or those that are least deep; and the points. False: too far apart. */
@@ -287,29 +310,37 @@ SADMM_INLINE bool hull_has_face_along(const struct polytope_pair *pair, vec3 n)
     return v3_dot(polytope_normal(&pair->b, polytope_face_along(&pair->b, outward)), outward) > MANIFOLD_COS_NEAR;
 }
 
+/* The manifold by the nearest points, or those that are least deep, of axis `nearest`. */
+SADMM_INLINE void hull_by_nearest(const struct polytope_pair *pair, const struct polytope_axis *kept, bool known,
+                                  const struct polytope_axis *nearest, vec3 pa, vec3 pb, uint32_t feature, real limit,
+                                  struct manifold *m)
+{
+    struct polytope_axis axis = *nearest;
+    if (pair->a.faces > 0) hull_choose(pair, kept, known, &axis);
+    else hull_choose_inside(pair, kept, known, &axis);
+    hull_keep_edges(pair, nearest, &axis, &pa, &pb, &feature);
+    if (pair->a.faces > 0 || hull_has_face_along(pair, axis.n))
+        facing_manifold(pair, axis.n, axis.separation, limit, m);
+    if (m->count == 0 && (axis.kind == AXIS_FACE_A || axis.kind == AXIS_FACE_B)) axis = *nearest; /* not over each other */
+    m->normal = axis.n;
+    m->cache = axis_memory(&axis);
+    hull_add_nearest(pair->thin, pa, pb, feature, m); /* the face along the normal need not have the deepest corner */
+}
+
 SADMM_RARE void hull_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
                               const struct pair_pose *pose, real limit, uint32_t cache, struct manifold *m)
 {
     struct polytope_pair pair;
-    struct polytope_axis kept, nearest, axis;
+    struct polytope_axis kept, nearest;
     vec3 pa, pb, start;
     uint32_t feature;
     bool known;
 
     polytope_pair_make(a, b, hulls, pose, &pair);
-    if (hull_by_memory(&pair, limit, cache, &kept, &known, &start, m) ||
-        !hull_nearest(&pair, start, limit, &nearest, &pa, &pb, &feature))
-        return;
-    axis = nearest;
-    if (pair.a.faces > 0) hull_choose(&pair, &kept, known, &axis);
-    else hull_choose_inside(&pair, &kept, known, &axis);
-    hull_keep_edges(&pair, &nearest, &axis, &pa, &pb, &feature);
-    if (pair.a.faces > 0 || hull_has_face_along(&pair, axis.n))
-        facing_manifold(&pair, axis.n, axis.separation, limit, m);
-    if (m->count == 0 && (axis.kind == AXIS_FACE_A || axis.kind == AXIS_FACE_B)) axis = nearest; /* not over each other */
-    m->normal = axis.n;
-    m->cache = axis_memory(&axis);
-    hull_add_nearest(pair.thin, pa, pb, feature, m); /* the face along the normal need not have the deepest corner */
+    if (hull_by_memory(&pair, limit, cache, &kept, &known, &start, m)) return;
+    if (hull_edges_are_proven(&pair, &kept, &pa, &pb, &feature)) nearest = kept;
+    else if (!hull_nearest(&pair, start, limit, &nearest, &pa, &pb, &feature)) return;
+    hull_by_nearest(&pair, &kept, known, &nearest, pa, pb, feature, limit, m);
 }
 
 /* The same where that is little work: what goes on as it was, and what is too far apart. False: the whole of it has to
@@ -321,13 +352,18 @@ SADMM_RARE bool hull_manifold_at_once(const struct sadmm_geometry *a, const stru
     struct polytope_pair pair;
     struct polytope_axis kept;
     struct gjk_simplex s;
-    vec3 start, v;
+    vec3 start, v, pa, pb;
+    uint32_t feature;
     bool known;
     m->count = 0;
     m->cache = 0;
     polytope_pair_make(a, b, hulls, pose, &pair);
-    return hull_by_memory(&pair, limit, cache, &kept, &known, &start, m) ||
-           gjk_distance(&pair, start, limit + pair_radii(&pair) + pair.slack, &s, &v) == GJK_FAR;
+    if (hull_by_memory(&pair, limit, cache, &kept, &known, &start, m)) return true;
+    if (hull_edges_are_proven(&pair, &kept, &pa, &pb, &feature)) {
+        hull_by_nearest(&pair, &kept, known, &kept, pa, pb, feature, limit, m);
+        return true;
+    }
+    return gjk_distance(&pair, start, limit + pair_radii(&pair) + pair.slack, &s, &v) == GJK_FAR;
 }
 
 /* A vertex over the plane, or the lowest point of the ball around it. */
