@@ -352,17 +352,12 @@ SADMM_RARE bool hull_manifold_at_once(const struct sadmm_geometry *a, const stru
     struct polytope_pair pair;
     struct polytope_axis kept;
     struct gjk_simplex s;
-    vec3 start, v, pa, pb;
-    uint32_t feature;
+    vec3 start, v;
     bool known;
     m->count = 0;
     m->cache = 0;
     polytope_pair_make(a, b, hulls, pose, &pair);
     if (hull_by_memory(&pair, limit, cache, &kept, &known, &start, m)) return true;
-    if (hull_edges_are_proven(&pair, &kept, &pa, &pb, &feature)) {
-        hull_by_nearest(&pair, &kept, known, &kept, pa, pb, feature, limit, m);
-        return true;
-    }
     return gjk_distance(&pair, start, limit + pair_radii(&pair) + pair.slack, &s, &v) == GJK_FAR;
 }
 
