@@ -20,7 +20,7 @@
 /* Depth up to which the side that the last step knows is not doubted, as a share of the thinner extent. */
 #define CONVEX_SHALLOW ((real)0.05)
 /* What is less deep than this share of its face's depth over it has that face's optimum. */
-#define CONVEX_FINE ((real)0.005)
+#define CONVEX_FINE ((real)0.0005)
 /* How far apart b is held from a, as shares of the thinner extent: twice the depth, within these bounds. Further apart
  * moves are small where the two meet by corners, nearer the vector between the two says less. */
 #define CONVEX_APART ((real)0.05)

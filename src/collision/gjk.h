@@ -22,6 +22,13 @@ enum gjk_end {
     GJK_MEET   /* or too near to tell: the simplex is a start for what is inside */
 };
 
+/* The walk of the distance, and how it has ended. */
+struct gjk_walk {
+    enum gjk_end end;
+    struct gjk_simplex simplex;
+    vec3 v;
+};
+
 SADMM_INLINE void simplex_keep(struct gjk_simplex *s, int i)
 {
     s->p[0] = s->p[i];

@@ -163,18 +163,22 @@ SADMM_INLINE bool hull_edges_are_proven(const struct polytope_pair *pair, const 
     return true;
 }
 
-/* The axis that the nearest points say, or those that are least deep; and the points. False: too far apart. */
-SADMM_INLINE bool hull_nearest(const struct polytope_pair *pair, vec3 start, real limit, struct polytope_axis *axis,
-                               vec3 *pa, vec3 *pb, uint32_t *feature)
+SADMM_INLINE void hull_walk(const struct polytope_pair *pair, vec3 start, real limit, struct gjk_walk *walk)
 {
-    struct gjk_simplex s;
-    vec3 v;
+    walk->end = gjk_distance(pair, start, limit + pair_radii(pair) + pair->slack, &walk->simplex, &walk->v);
+}
+
+/* The axis that the nearest points say, or those that are least deep; and the points. False: too far apart. */
+SADMM_INLINE bool hull_nearest_from(const struct polytope_pair *pair, const struct gjk_walk *walk, real limit,
+                                         struct polytope_axis *axis, vec3 *pa, vec3 *pb, uint32_t *feature)
+{
+    struct gjk_simplex s = walk->simplex;
+    vec3 v = walk->v;
     real length, height;
     bool apart;
-    const enum gjk_end end = gjk_distance(pair, start, limit + pair_radii(pair) + pair->slack, &s, &v);
-    if (end == GJK_FAR) return false;
+    if (walk->end == GJK_FAR) return false;
     length = v3_norm(v);
-    apart = end == GJK_APART && length > HULL_TOUCH * pair->size;
+    apart = walk->end == GJK_APART && length > HULL_TOUCH * pair->size;
     axis->kind = AXIS_FREE;
     axis->a = axis->b = 0;
     if (apart) {
@@ -194,6 +198,14 @@ SADMM_INLINE bool hull_nearest(const struct polytope_pair *pair, vec3 start, rea
     *feature = axis->kind == AXIS_EDGES ? polytope_feature(FEATURE_CROSSING, axis->a, axis->b)
                                         : polytope_feature(FEATURE_NEAREST, 0, 0);
     return axis->separation <= limit + pair->slack;
+}
+
+SADMM_INLINE bool hull_nearest(const struct polytope_pair *pair, vec3 start, real limit, struct polytope_axis *axis,
+                               vec3 *pa, vec3 *pb, uint32_t *feature)
+{
+    struct gjk_walk walk;
+    hull_walk(pair, start, limit, &walk);
+    return hull_nearest_from(pair, &walk, limit, axis, pa, pb, feature);
 }
 
 /* The better one of the two faces nearest to the axis; false: none is within 8 degrees of it. */
@@ -254,16 +266,22 @@ SADMM_INLINE void hull_add_nearest(real thin, vec3 pa, vec3 pb, uint32_t feature
     }
 }
 
-/* What the last step's axis says by itself: true, and the manifold is there, or there is none. Else *start is a
- * direction to look for the nearest points along; `known`: *kept is an axis. */
-SADMM_INLINE bool hull_by_memory(const struct polytope_pair *pair, real limit, uint32_t cache, struct polytope_axis *kept,
-                                 bool *known, vec3 *start, struct manifold *m)
+/* The last step's axis. False: there is none. */
+SADMM_INLINE bool hull_recall(const struct polytope_pair *pair, uint32_t cache, struct polytope_axis *kept)
 {
     kept->kind = AXIS_FREE; /* until something is known */
     kept->n = v3(0, 0, 0);
     kept->separation = 0;
     kept->a = kept->b = 0;
-    *known = axis_recall(pair, cache, kept);
+    return axis_recall(pair, cache, kept);
+}
+
+/* What the last step's axis says by itself: true, and the manifold is there, or there is none. Else *start is a
+ * direction to look for the nearest points along; `known`: *kept is an axis. */
+SADMM_INLINE bool hull_by_memory(const struct polytope_pair *pair, real limit, uint32_t cache, struct polytope_axis *kept,
+                                 bool *known, vec3 *start, struct manifold *m)
+{
+    *known = hull_recall(pair, cache, kept);
     *start = v3_neg(pair->t);
     if (!*known) return false;
     *start = kept->n;
@@ -343,22 +361,40 @@ SADMM_RARE void hull_manifold(const struct sadmm_geometry *a, const struct sadmm
     hull_by_nearest(&pair, &kept, known, &nearest, pa, pb, feature, limit, m);
 }
 
-/* The same where that is little work: what goes on as it was, and what is too far apart. False: the whole of it has to
- * be done. On a device, where the threads of a warp wait for each other, the few of these are done by themselves. */
+/* The same in two parts, for devices, where the threads of a warp wait for each other. What is little work comes first:
+ * what goes on as it was, and what is too far apart. False: the rest has to be done, from where `walk` has ended. */
 SADMM_RARE bool hull_manifold_at_once(const struct sadmm_geometry *a, const struct sadmm_geometry *b,
                                       const double *hulls, const struct pair_pose *pose, real limit, uint32_t cache,
-                                      struct manifold *m)
+                                      struct gjk_walk *walk, struct manifold *m)
 {
     struct polytope_pair pair;
     struct polytope_axis kept;
-    struct gjk_simplex s;
-    vec3 start, v;
+    vec3 start;
     bool known;
     m->count = 0;
     m->cache = 0;
     polytope_pair_make(a, b, hulls, pose, &pair);
     if (hull_by_memory(&pair, limit, cache, &kept, &known, &start, m)) return true;
-    return gjk_distance(&pair, start, limit + pair_radii(&pair) + pair.slack, &s, &v) == GJK_FAR;
+    hull_walk(&pair, start, limit, walk);
+    return walk->end == GJK_FAR;
+}
+
+SADMM_RARE void hull_manifold_from(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
+                                   const struct pair_pose *pose, real limit, uint32_t cache,
+                                   const struct gjk_walk *walk, struct manifold *m)
+{
+    struct polytope_pair pair;
+    struct polytope_axis kept, nearest;
+    vec3 pa, pb;
+    uint32_t feature;
+    bool known;
+    m->count = 0;
+    m->cache = 0;
+    polytope_pair_make(a, b, hulls, pose, &pair);
+    known = hull_recall(&pair, cache, &kept);
+    if (hull_edges_are_proven(&pair, &kept, &pa, &pb, &feature)) nearest = kept;
+    else if (!hull_nearest_from(&pair, walk, limit, &nearest, &pa, &pb, &feature)) return;
+    hull_by_nearest(&pair, &kept, known, &nearest, pa, pb, feature, limit, m);
 }
 
 /* A vertex over the plane, or the lowest point of the ball around it. */

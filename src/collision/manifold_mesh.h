@@ -154,12 +154,18 @@ SADMM_INLINE bool mesh_has_vertex_over(const struct mesh_pair *p, real limit)
     return any_within(a->x, a->y, a->z, hull_stride(a->vertices), &planes);
 }
 
+/* The last step's axis. False: there is none. */
+SADMM_INLINE bool mesh_recall(const struct mesh_pair *p, uint32_t cache, struct polytope_axis *kept)
+{
+    return axis_recall(&p->pair, cache, kept) && !(kept->kind == AXIS_FACE_B && kept->b == MESH_BACK);
+}
+
 /* What needs no search: true, and the manifold is there, or there is none. Else as hull_by_memory. */
 SADMM_INLINE bool mesh_by_memory(const struct mesh_pair *p, real limit, uint32_t cache, struct polytope_axis *kept,
                                  bool *known, vec3 *start, struct manifold *m)
 {
     const struct polytope_pair *pair = &p->pair;
-    *known = axis_recall(pair, cache, kept) && !(kept->kind == AXIS_FACE_B && kept->b == MESH_BACK);
+    *known = mesh_recall(p, cache, kept);
     *start = *known ? kept->n : p->front.n;
     if (p->front.separation > limit + pair->slack || (*known && kept->separation > limit + pair->slack)) return true;
     if (mesh_is_flat(&p->triangle) && !mesh_has_vertex_over(p, limit)) return true;
@@ -302,13 +308,43 @@ SADMM_RARE void mesh_by_surface(const struct mesh_pair *p, const struct polytope
     mesh_finish(p, axis.kind, m);
 }
 
+/* By the nearest points, or those that are least deep, of axis `nearest`. */
+SADMM_INLINE void mesh_by_nearest(const struct mesh_pair *p, const struct polytope_axis *kept, bool known,
+                                  const struct polytope_axis *nearest, vec3 pa, vec3 pb, uint32_t feature, real limit,
+                                  struct manifold *m)
+{
+    struct polytope_axis axis = *nearest;
+    if (p->pair.a.faces > 0) hull_choose(&p->pair, kept, known, &axis);
+    else hull_choose_inside(&p->pair, kept, known, &axis);
+    hull_keep_edges(&p->pair, nearest, &axis, &pa, &pb, &feature);
+    if (!mesh_allows(&p->mesh, &p->triangle, v3_neg(axis.n))) axis = *nearest;
+    if (!mesh_allows(&p->mesh, &p->triangle, v3_neg(axis.n))) {
+        mesh_by_surface(p, nearest, known && kept->kind == AXIS_FACE_B, limit, m);
+        return;
+    }
+    if (mesh_is_front(&p->triangle, v3_neg(axis.n))) axis = p->front;
+    if (p->pair.a.faces > 0 || hull_has_face_along(&p->pair, axis.n))
+        facing_manifold(&p->pair, axis.n, axis.separation, limit, m);
+    if (m->count == 0 && (axis.kind == AXIS_FACE_A || axis.kind == AXIS_FACE_B)) { /* not over each other */
+        axis = *nearest;
+        if (!mesh_allows(&p->mesh, &p->triangle, v3_neg(axis.n))) {
+            mesh_by_surface(p, nearest, known && kept->kind == AXIS_FACE_B, limit, m);
+            return;
+        }
+    }
+    m->normal = axis.n;
+    m->cache = axis_memory(&axis);
+    hull_add_nearest(p->pair.thin, pa, pb, feature, m);
+    mesh_finish(p, axis.kind, m);
+}
+
 /* limit SADMM_REAL_MAX: the nearest points, whatever the surface around (advance.h). */
 SADMM_RARE void mesh_manifold(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *blocks,
                               uint32_t child, const struct pair_pose *pose, real limit, uint32_t cache,
                               struct manifold *m)
 {
     struct mesh_pair p;
-    struct polytope_axis kept, nearest, axis;
+    struct polytope_axis kept, nearest;
     vec3 pa, pb, start;
     uint32_t feature;
     bool known = false;
@@ -319,50 +355,44 @@ SADMM_RARE void mesh_manifold(const struct sadmm_geometry *a, const struct sadmm
     kept = p.front; /* until something is known */
     if (!of_any_distance && mesh_by_memory(&p, limit, cache, &kept, &known, &start, m)) return;
     if (!hull_nearest(&p.pair, start, limit, &nearest, &pa, &pb, &feature)) return;
-    axis = nearest;
     if (of_any_distance) {
-        m->normal = axis.n;
+        m->normal = nearest.n;
         hull_add_nearest(p.pair.thin, pa, pb, feature, m);
         m->points[0].position = v3_add(m->points[0].position, p.triangle.origin);
         return;
     }
-    if (p.pair.a.faces > 0) hull_choose(&p.pair, &kept, known, &axis);
-    else hull_choose_inside(&p.pair, &kept, known, &axis);
-    hull_keep_edges(&p.pair, &nearest, &axis, &pa, &pb, &feature);
-    if (!mesh_allows(&p.mesh, &p.triangle, v3_neg(axis.n))) axis = nearest;
-    if (!mesh_allows(&p.mesh, &p.triangle, v3_neg(axis.n))) {
-        mesh_by_surface(&p, &nearest, known && kept.kind == AXIS_FACE_B, limit, m);
-        return;
-    }
-    if (mesh_is_front(&p.triangle, v3_neg(axis.n))) axis = p.front;
-    if (p.pair.a.faces > 0 || hull_has_face_along(&p.pair, axis.n))
-        facing_manifold(&p.pair, axis.n, axis.separation, limit, m);
-    if (m->count == 0 && (axis.kind == AXIS_FACE_A || axis.kind == AXIS_FACE_B)) { /* not over each other */
-        axis = nearest;
-        if (!mesh_allows(&p.mesh, &p.triangle, v3_neg(axis.n))) {
-            mesh_by_surface(&p, &nearest, known && kept.kind == AXIS_FACE_B, limit, m);
-            return;
-        }
-    }
-    m->normal = axis.n;
-    m->cache = axis_memory(&axis);
-    hull_add_nearest(p.pair.thin, pa, pb, feature, m);
-    mesh_finish(&p, axis.kind, m);
+    mesh_by_nearest(&p, &kept, known, &nearest, pa, pb, feature, limit, m);
 }
 
-/* The same where that is little work (hull_manifold_at_once). */
+/* The same in two parts (hull_manifold_at_once). */
 SADMM_RARE bool mesh_manifold_at_once(const struct sadmm_geometry *a, const struct sadmm_geometry *b,
                                       const double *blocks, uint32_t child, const struct pair_pose *pose, real limit,
-                                      uint32_t cache, struct manifold *m)
+                                      uint32_t cache, struct gjk_walk *walk, struct manifold *m)
 {
     struct mesh_pair p;
     struct polytope_axis kept;
-    struct gjk_simplex s;
-    vec3 start, v;
+    vec3 start;
     bool known;
     mesh_pair_make(a, b, blocks, child, pose, &p);
-    return mesh_by_memory(&p, limit, cache, &kept, &known, &start, m) ||
-           gjk_distance(&p.pair, start, limit + pair_radii(&p.pair) + p.pair.slack, &s, &v) == GJK_FAR;
+    if (mesh_by_memory(&p, limit, cache, &kept, &known, &start, m)) return true;
+    hull_walk(&p.pair, start, limit, walk);
+    return walk->end == GJK_FAR;
+}
+
+SADMM_RARE void mesh_manifold_from(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *blocks,
+                                   uint32_t child, const struct pair_pose *pose, real limit, uint32_t cache,
+                                   const struct gjk_walk *walk, struct manifold *m)
+{
+    struct mesh_pair p;
+    struct polytope_axis kept, nearest;
+    vec3 pa, pb;
+    uint32_t feature;
+    bool known;
+    mesh_pair_make(a, b, blocks, child, pose, &p);
+    kept = p.front;
+    known = mesh_recall(&p, cache, &kept);
+    if (hull_nearest_from(&p.pair, walk, limit, &nearest, &pa, &pb, &feature))
+        mesh_by_nearest(&p, &kept, known, &nearest, pa, pb, feature, limit, m);
 }
 
 #endif

@@ -154,18 +154,31 @@ static __device__ constexpr bool is_at_once(int how) { return how != NARROW_PLAI
 static __device__ constexpr bool is_listed(int how) { return how != NARROW_PLAIN && !is_at_once(how); }
 static __device__ constexpr bool with_smooth(int how) { return how >= NARROW_ALL_AT_ONCE; }
 
-/* The manifold of a pair with a hull, as find_manifold makes it, where it is little work; false: it is not. */
+/* The manifold of a pair with a hull, as find_manifold makes it, where it is little work; false: it is not. walk: what has
+ * been done of it; GJK_FAR: nothing. */
 static __device__ bool hulls_at_once(const collision_view &v, const struct sadmm_proxy *a, const struct sadmm_proxy *b,
-                                     const struct pair_start &start, uint32_t cache, struct manifold *m)
+                                     const struct pair_start &start, uint32_t cache, struct gjk_walk *walk,
+                                     struct manifold *m)
 {
+    walk->end = GJK_FAR;
     if (start.moves_on) return false;
     m->ahead = start.ahead;
     m->count = 0;
     m->cache = 0;
     if (a->geometry.type != SADMM_SHAPE_PLANE)
-        return hull_manifold_at_once(&a->geometry, &b->geometry, v.hulls, &start.pose, (real)start.limit, cache, m);
+        return hull_manifold_at_once(&a->geometry, &b->geometry, v.hulls, &start.pose, (real)start.limit, cache, walk,
+                                     m);
     hull_plane_manifold(&b->geometry, v.hulls, &start.pose, (real)start.limit, m);
     return true;
+}
+
+/* From there. */
+static __device__ void hulls_from(const collision_view &v, const struct sadmm_proxy *a, const struct sadmm_proxy *b,
+                                  const struct pair_start &start, uint32_t cache, const struct gjk_walk *walk,
+                                  struct manifold *m)
+{
+    m->ahead = start.ahead;
+    hull_manifold_from(&a->geometry, &b->geometry, v.hulls, &start.pose, (real)start.limit, cache, walk, m);
 }
 
 /* The same of a pair with a smooth body: on planes, by formula. */
@@ -192,23 +205,28 @@ static __device__ bool smooth_at_once(const collision_view &v, const struct sadm
 template <int HOW>
 static __device__ bool narrow_triangle(const collision_view &v, const struct sadmm_proxy *a, const struct sadmm_proxy *b,
                                        const struct pair_start &start, uint32_t child, uint32_t cache,
-                                       struct manifold *m)
+                                       struct gjk_walk *walk, struct manifold *m)
 {
     m->ahead = start.ahead;
     m->count = 0;
     m->cache = 0;
-    if (with_smooth(HOW) && is_at_once(HOW) && geometry_is_smooth(&a->geometry)) return false;
-    if (is_at_once(HOW))
+    if (is_at_once(HOW)) {
+        walk->end = GJK_FAR;
+        if (with_smooth(HOW) && geometry_is_smooth(&a->geometry)) return false;
         return mesh_manifold_at_once(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache,
-                                     m);
-    triangle_manifold(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache, m);
+                                     walk, m);
+    }
+    if (walk->end != GJK_FAR)
+        mesh_manifold_from(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache, walk, m);
+    else
+        triangle_manifold(&a->geometry, &b->geometry, v.hulls, child, &start.pose, (real)start.limit, cache, m);
     return true;
 }
 
 /* What takes the time are rounds to memory: what can be asked for together is, before anything waits for any of it.
- * False: nothing is written, the candidate is to be listed. */
+ * False: nothing is written, the candidate is to be listed. walk: of pairs with a hull, what has been done at once. */
 template <int FOR, int HOW>
-static __device__ __forceinline__ bool narrow_candidate(const collision_view &v, int64_t i)
+static __device__ __forceinline__ bool narrow_candidate(const collision_view &v, int64_t i, struct gjk_walk *walk)
 {
     const int64_t readable = i < v.candidate_capacity ? i : 0;
     const struct candidate own = candidate_of(v, v.candidates[readable]);
@@ -252,9 +270,11 @@ static __device__ __forceinline__ bool narrow_candidate(const collision_view &v,
     if (!contact_goes_on(&old, own.child, &a, &b)) before = -1;
     struct manifold m;
     if (on_mesh) {
-        if (!narrow_triangle<HOW>(v, pa, pb, start, own.child, before >= 0 ? cache : 0, &m)) return false;
+        if (!narrow_triangle<HOW>(v, pa, pb, start, own.child, before >= 0 ? cache : 0, walk, &m)) return false;
     } else if (is_at_once(HOW) && b.geometry.type == SADMM_SHAPE_HULL) {
-        if (!hulls_at_once(v, pa, pb, start, before >= 0 ? cache : 0, &m)) return false;
+        if (!hulls_at_once(v, pa, pb, start, before >= 0 ? cache : 0, walk, &m)) return false;
+    } else if (is_listed(HOW) && b.geometry.type == SADMM_SHAPE_HULL && walk->end != GJK_FAR) {
+        hulls_from(v, pa, pb, start, before >= 0 ? cache : 0, walk, &m);
     } else if (with_smooth(HOW) && is_at_once(HOW) && geometry_is_smooth(&b.geometry)) {
         if (!smooth_at_once(v, pa, pb, start, &m)) return false;
     } else {

@@ -3,8 +3,8 @@
  *
  * Most pairs with a hull take little: they go on as they were, or are too far apart. The few others (a twentieth in a
  * heap) take ten times as long, and a warp with one of them would wait for it: so they are listed, and done together, in
- * as many warps as run at once: no two of them go the same way for long. The list has no order; what is found does not
- * depend on it.
+ * as many warps as run at once: no two of them go the same way for long. They go on from where the walk of the distance,
+ * which said that they are near, has ended. The list has no order; what is found does not depend on it.
  */
 #ifndef SADMM_CUDA_COLLIDE_NARROW_LISTED_H
 #define SADMM_CUDA_COLLIDE_NARROW_LISTED_H
@@ -16,8 +16,13 @@ static __global__ void __launch_bounds__(NARROW_THREADS, NARROW_BLOCKS)
 at_once_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t i = collision_thread(NARROW_THREADS);
-    if (i < (int64_t)v.candidate_capacity + SIZES_BEYOND && !narrow_candidate<FOR, HOW>(v, i))
-        v.listed[atomicAdd(v.candidate_count + COUNT_LISTED, 1ull)] = (int32_t)i;
+    struct gjk_walk walk;
+    walk.end = GJK_FAR;
+    if (i < (int64_t)v.candidate_capacity + SIZES_BEYOND && !narrow_candidate<FOR, HOW>(v, i, &walk)) {
+        const unsigned long long at = atomicAdd(v.candidate_count + COUNT_LISTED, 1ull);
+        v.listed[at] = (int32_t)i;
+        v.walks[at] = walk;
+    }
 }
 
 /* A warp a block; on every chip that this is compiled for about so many run at once. Where there are more than these have
@@ -32,7 +37,7 @@ listed_kernel(const __grid_constant__ collision_view v)
                   warps = all < most ? all : most, count = (int64_t)v.candidate_count[COUNT_LISTED],
                   wanted = (count + warps - 1) / warps, lanes = wanted < width ? wanted : width,
                   i = blockIdx.x * lanes + threadIdx.x;
-    if (threadIdx.x < lanes && i < count) narrow_candidate<FOR, HOW>(v, v.listed[i]);
+    if (threadIdx.x < lanes && i < count) narrow_candidate<FOR, HOW>(v, v.listed[i], &v.walks[i]);
 }
 
 #endif

@@ -7,7 +7,7 @@ static __global__ void __launch_bounds__(NARROW_THREADS, NARROW_BLOCKS)
 narrow_kernel(const __grid_constant__ collision_view v)
 {
     const int64_t i = collision_thread(NARROW_THREADS);
-    if (i < (int64_t)v.candidate_capacity + SIZES_BEYOND) narrow_candidate<FOR, NARROW_PLAIN>(v, i);
+    if (i < (int64_t)v.candidate_capacity + SIZES_BEYOND) narrow_candidate<FOR, NARROW_PLAIN>(v, i, nullptr);
 }
 
 void COLLISION(narrow_phase_kernels)(struct collision_kernels *kernels)

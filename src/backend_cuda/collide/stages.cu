@@ -62,6 +62,7 @@ static sadmm_status reserve_candidate(struct sadmm_cuda_collision *c, struct sad
     TRY(reserve(c, CANDIDATES, candidates, sizeof *v->candidates, error));
     TRY(reserve(c, CANDIDATES_2, candidates, sizeof *v->candidates, error));
     if (v->hulls) TRY(reserve(c, LISTED, candidates, sizeof *v->listed, error));
+    if (v->hulls) TRY(reserve(c, WALKS, candidates, sizeof *v->walks, error));
     if (v->mesh_count > 0) TRY(reserve(c, MESH_PAIRS, candidates, sizeof *v->mesh_pairs, error));
     if (v->mesh_count > 0) TRY(reserve(c, TOUCHES, candidates, sizeof *v->touches, error));
     TRY(reserve(c, MANIFOLDS, candidates, sizeof *v->manifolds, error));
@@ -71,6 +72,7 @@ static sadmm_status reserve_candidate(struct sadmm_cuda_collision *c, struct sad
     TRY(reserve(c, PLACES, candidates + 1, sizeof *v->places, error));
     v->found = in<uint64_t>(c, CANDIDATES);
     v->listed = in<int32_t>(c, LISTED);
+    v->walks = in<struct gjk_walk>(c, WALKS);
     v->mesh_pairs = in<uint64_t>(c, MESH_PAIRS);
     v->touches = in<double>(c, TOUCHES);
     v->manifolds = in<struct found_manifold>(c, MANIFOLDS);

@@ -44,6 +44,7 @@
 #include "backend_cuda/device/layout.h"
 #include "backend_cuda/device/wide.h"
 #include "collision/contact_emit.h"
+#include "collision/gjk.h"
 #include "pipeline.h"
 
 enum {
@@ -183,6 +184,7 @@ struct collision_view {
                                                       candidates; as they come */
     double *touches;                               /* by candidate, of triangles and pairs that are fast: mesh_first_touch */
     int32_t *listed;                               /* candidates that the narrow phase of hulls does by themselves */
+    struct gjk_walk *walks;                       /* as listed: what of each is done */
     uint64_t *found;                               /* candidates as they come, packed (candidate_of) */
     uint64_t *candidates;                          /* sorted */
     int32_t candidate_capacity;
