@@ -1,9 +1,9 @@
 """Certificates of loaded models, as in docs/import.md: python measure_models.py [--precision f32] [NAME ...]
 
 Two tables. One step by iterations: natural map (m/s) of the step 1 s after the start, made again from the same state
-with more and more iterations. Runs of 10 s: controls of servos go from one end of their range to the other and back every
-2 s (sweep), or are 0; largest natural map, share of the steps with at most 1e-6 m/s, that of the last step; largest errors
-of loops and of locked coordinates (m, rad) over the last 5 s.
+with more and more iterations. Runs of 10 s: controls of servos go from one end of their range to the other and back
+every 2 s (sweep), or are 0; largest natural map, share of the steps with at most 1e-6 m/s, that of the last step;
+largest errors of loops and of locked coordinates (m, rad) over the last 5 s.
 
 Models are from packages by their registry names (BY_ITERATIONS, RUNS); what is not installed is printed and left out.
 NAME: only models whose name has it.
@@ -244,7 +244,7 @@ def main():
     parser.add_argument("names", nargs="*", metavar="NAME")
     parser.add_argument("--backend", default="cpu")
     parser.add_argument("--precision", default="f64")
-    parser.add_argument("--iterations", type=int, nargs="+", help="of the runs, in place of the table's")
+    parser.add_argument("--iterations", type=int, action="append", help="of the runs, in place of the table's")
     given = parser.parse_args()
 
     def wanted(models):
