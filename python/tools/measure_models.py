@@ -213,21 +213,37 @@ def sweep(loaded, time):
             actuator.control = low + (high - low) * share
 
 
+def kind_of_worst(world):
+    """What the constraint with the largest natural map is: a contact that sticks, slips or does not press, or a row."""
+    worst = world.report.certificate.ncp_worst
+    contacts = world.contacts()
+    if worst >= len(contacts):
+        return "row"
+    contact = contacts[worst]
+    pressing = contact["force"] @ contact["normal"]
+    along = np.linalg.norm(contact["force"] - pressing * contact["normal"])
+    if pressing <= 0:
+        return "open"
+    return "slips" if along >= contact["friction"] * pressing * (1 - 1e-9) else "sticks"
+
+
 def run(path, given, iterations, motion, options):
-    """(natural maps, worst error of loops, of locked coordinates)"""
+    """(natural maps, what is worst of those above SMALL, worst error of loops, of locked coordinates)"""
     loaded = loaded_of(path, given, options)
     world, loops, joints = loaded.world, [j for j in loaded.loops.values() if j.enabled], tree_joints(loaded)
     set_iterations(world, iterations)
     steps = round(DURATION / world.settings.dt)
-    maps, loop_off, joint_off = np.zeros(steps), 0.0, 0.0
+    maps, worst, loop_off, joint_off = np.zeros(steps), {}, 0.0, 0.0
     for k in range(steps):
         if motion == "sweep" and k % 4 == 0:
             sweep(loaded, k * world.settings.dt)
         world.step()
         maps[k] = world.report.certificate.ncp_max
+        if given.worst and maps[k] > SMALL:
+            worst.setdefault(kind_of_worst(world), []).append(maps[k])
         if k > steps // 2 and k % 10 == 0:
             loop_off, joint_off = max(loop_off, lock_error(world, loops)), max(joint_off, lock_error(world, joints))
-    return maps, loop_off if loops else None, joint_off
+    return maps, worst, loop_off if loops else None, joint_off
 
 
 def row(*cells):
@@ -245,6 +261,8 @@ def main():
     parser.add_argument("--backend", default="cpu")
     parser.add_argument("--precision", default="f64")
     parser.add_argument("--iterations", type=int, action="append", help="of the runs, in place of the table's")
+    parser.add_argument("--worst", action="store_true",
+                        help="of steps above 1e-6 m/s: how many by a contact that sticks, slips or is open, or a row")
     given = parser.parse_args()
 
     def wanted(models):
@@ -262,10 +280,11 @@ def main():
     head("model, package", "", "iterations", "largest map", "small", "at the end", "loops, m", "joints off")
     for path, (name, package, version, _, motion, counts, options) in wanted(RUNS):
         for count in given.iterations or counts:
-            maps, loops, joints = run(path, given, count, motion, options)
+            maps, worst, loops, joints = run(path, given, count, motion, options)
             row(f"{name}, {package} {version}", motion, str(count), f"{maps.max():.0e}",
                 f"{100 * np.mean(maps <= SMALL):.1f} %", f"{maps[-1]:.0e}", "" if loops is None else f"{loops:.0e}",
-                f"{joints:.0e}")
+                f"{joints:.0e}",
+                *(f"{kind}: {len(of)}, median {np.median(of):.0e}" for kind, of in sorted(worst.items())))
 
 
 if __name__ == "__main__":
