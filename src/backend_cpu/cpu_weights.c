@@ -139,7 +139,8 @@ static void ease_gaps(struct sadmm_context *c, size_t index)
     for (int l = 0; l < LANES; ++l) {
         if (block->pair[l] < 0) continue;
         const struct sadmm_contact_pair *pair = &c->system->contacts->pairs[block->pair[l]];
-        double share = weight_gap_share(cpu_island_of(c, pair->body_a, pair->body_b)->weights.stack_depth);
+        double share = weight_gap_share(cpu_island_of(c, pair->body_a, pair->body_b)->weights.stack_depth,
+                                        c->settings.iterations);
         for (int k = 0; k < pair->count && share < 1; ++k) {
             real *error = c->plan.contact_rows == 3
                               ? (real *)&((struct point_slot *)c->slots + block->first + k)->error

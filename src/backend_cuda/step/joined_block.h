@@ -153,18 +153,17 @@ static __device__ __forceinline__ void move_bodies(const joined_view &p)
     __syncthreads();
 }
 
-static __device__ __forceinline__ void solve_rows(const joined_view &p)
+/* again: from what the multipliers are. */
+static __device__ __forceinline__ void solve_rows(const joined_view &p, bool again)
 {
     const int32_t rows = p.s.places * JOINED_ROWS;
 #pragma unroll 1
     for (int turn = 0; turn < 2; ++turn) { /* to what the other rows say; then as all of them say */
-        each(rows, [&](int32_t r) {
-            if (p.state[r] == JOINED_INSIDE) p.change[r] = turn == 0 ? 0 : p.found[r];
-        });
+        each(rows, [&](int32_t r) { joined_put_change(&p, r, again, turn > 0); });
         __syncthreads();
-        move_bodies(p);
+        if (turn > 0 || !again) move_bodies(p);
         if (turn > 0) return;
-        each(rows, [&](int32_t r) { p.right[r] = joined_right(&p, r); });
+        each(rows, [&](int32_t r) { p.right[r] = joined_right(&p, r, again); });
         __syncthreads();
 #pragma unroll 1
         for (int32_t level = 0; level < p.s.levels; ++level) forward_level(p, level);
@@ -201,8 +200,12 @@ static __device__ __forceinline__ bool solve_part(const joined_view &p, const ui
         enter_blocks(p);
 #pragma unroll 1
         for (int32_t level = 0; level < p.s.levels; ++level) factor_level(p, level);
-        solve_rows(p);
-        changed = any_row(p, shared_flag, [&](int32_t r) { return joined_change_row(&p, r); });
+#pragma unroll 1
+        for (int again = 0; again < 2; ++again) {
+            solve_rows(p, again != 0);
+            changed = any_row(p, shared_flag, [&](int32_t r) { return joined_change_row(&p, r); });
+            if (changed) break;
+        }
     }
     return !changed && !any_row(p, shared_flag, [&](int32_t r) { /* a place has no more bodies than rows */
         const int32_t k = r % JOINED_ROWS, a = p.s.side[2 * (r / JOINED_ROWS)], b = p.s.side[2 * (r / JOINED_ROWS) + 1];

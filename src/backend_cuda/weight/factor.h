@@ -14,7 +14,8 @@
 static __device__ __forceinline__ void ease_gaps(const model_view &model, const contact_view &contacts, int32_t p,
                                                  double stack_depth)
 {
-    const double slop = model.settings->slop / model.settings->dt, share = weight_gap_share(stack_depth);
+    const double slop = model.settings->slop / model.settings->dt,
+                 share = weight_gap_share(stack_depth, model.settings->iterations);
     const int32_t count = share < 1 ? (int32_t)contacts.difference[p].w : 0;
     for (int32_t k = 0; k < count; ++k) {
         solver_real *error = &contacts.arm[point_slot(contacts, p, k)].w;

@@ -162,11 +162,15 @@ SADMM_INLINE void weight_update_speed(struct weight_island *island, const struct
     island->speed = weight_speed_warm(speed, island->stack_depth, under_iterated, sums->kinetic, mass);
 }
 
-/* The share of a gap within the slop that a step closes; and e with that, `slop` over dt, m/s. */
-SADMM_INLINE double weight_gap_share(double stack_depth)
+/* The share of a gap within the slop that a step closes; and e with that, `slop` over dt, m/s. Contacts as springs are
+ * as stiff as there are iterations, and the depth at which a stack buckles on them grows with the root of these: beyond
+ * a number of them depth counts for less, and solves that go on until they are done are of e itself. */
+#define WEIGHT_GAP_ITERATIONS 200.0
+
+SADMM_INLINE double weight_gap_share(double stack_depth, int iterations)
 {
-    double square = stack_depth * stack_depth;
-    return max_of(1 / (square * square * square), WEIGHT_GAP_LEAST);
+    const double square = stack_depth * stack_depth * min_of(WEIGHT_GAP_ITERATIONS / iterations, 1.0);
+    return min_of(max_of(1 / (square * square * square), WEIGHT_GAP_LEAST), 1.0);
 }
 
 SADMM_INLINE double weight_gap_error(double error, double share, double slop)

@@ -20,11 +20,12 @@
 enum { JOINED_ROWS = SADMM_MAX_ROWS, JOINED_BLOCK = JOINED_ROWS * JOINED_ROWS };
 /* Regularisation of the factor, a share of a row's scale (below): rows may say the same, but for rounding. */
 #define JOINED_PROXIMAL 1e-11
-/* Compliance of hard rows, a share of a row's scale: a load moves a lock by a billionth of what it would move the heavier
- * of its bodies by if nothing else held it. Rows of a loop that has more locks than it needs contradict each other by
- * what its joints are off, along multipliers to which nothing responds; without it these grow from step to step (scene
- * bricard: to 1e6 N where 30 are at work) until they hold the loop. */
-#define JOINED_GIVE 1e-9
+/* Compliance of hard rows, a share of a row's scale, with which they are solved twice: what they give by at first is
+ * taken back by the same factor, so that rows that can be met are, to rounding. Rows of a loop that has more locks than
+ * it needs contradict each other by what its joints are off, along multipliers to which nothing responds: these end at
+ * twice that over the compliance. Without one they grow from step to step (scene bricard: to 1e6 N where 30 are at work)
+ * until they hold the loop. */
+#define JOINED_GIVE 2e-9
 /* Rows that come to a bound, or leave one, are found in so many passes at most; one or two do mostly, and 9 in all but
  * 16 of 14,500 solves of ragdolls that fall on each other. A row that is held against its law by less than a rounding
  * of its numbers and JOINED_SLACK, m/s or rad/s, stays where it is, or rounding would have rows come and go for good. */
@@ -108,7 +109,7 @@ struct joined_view {
     struct joined_row *rows;
     double *answer;                   /* x 12: (A + C)^-1 J^T of either side */
     double *change;                   /* of the multiplier */
-    double *give;                     /* compliance; of what is hard JOINED_GIVE */
+    double *give;                     /* compliance of the factor; of what is hard JOINED_GIVE */
     uint8_t *state;
     /* by body: */
     double *velocity;                 /* x 6, as it was */
@@ -238,8 +239,8 @@ SADMM_INLINE void joined_respond(const struct joined_view *v, int32_t r, int sid
         for (k = 0; k < 6; ++k) answer[k] = 0;
 }
 
-/* gain x + bias + compliance lambda with the changes so far; moved: with dv. */
-SADMM_INLINE double joined_residual(const struct joined_view *v, int32_t r, bool moved)
+/* gain x + bias + compliance lambda with the changes so far; moved: with dv; own: by the row's own compliance. */
+SADMM_INLINE double joined_residual(const struct joined_view *v, int32_t r, bool moved, bool own)
 {
     const struct joined_row *row = &v->rows[r];
     double x = 0;
@@ -250,7 +251,7 @@ SADMM_INLINE double joined_residual(const struct joined_view *v, int32_t r, bool
         x += six_product(row->jacobian[side], v->velocity + 6 * (size_t)body);
         if (moved) x += six_product(row->jacobian[side], v->dv + 6 * (size_t)body);
     }
-    return row->gain * x + row->bias + v->give[r] * (row->lambda + v->change[r]);
+    return row->gain * x + row->bias + (own ? row->compliance : v->give[r]) * (row->lambda + v->change[r]);
 }
 
 SADMM_INLINE double joined_clamp(double x, double lo, double hi) { return x < lo ? lo : x > hi ? hi : x; }
@@ -292,7 +293,7 @@ SADMM_INLINE void joined_begin_row(const struct joined_view *v, int32_t r, uint8
         joined_put_state(v, r, earlier);
         return;
     }
-    missing = lambda > lo && lambda < hi ? 0 : joined_residual(v, r, false);
+    missing = lambda > lo && lambda < hi ? 0 : joined_residual(v, r, false, true);
     v->state[r] = lambda <= lo && missing >= 0   ? JOINED_AT_LO
                   : lambda >= hi && missing <= 0 ? JOINED_AT_HI
                                                  : JOINED_INSIDE;
@@ -309,7 +310,7 @@ SADMM_INLINE bool joined_change_row(const struct joined_view *v, int32_t r)
     if (state == JOINED_INSIDE) {
         next = lambda < row->lo ? JOINED_AT_LO : lambda > row->hi ? JOINED_AT_HI : JOINED_INSIDE;
     } else if (state == JOINED_AT_LO || state == JOINED_AT_HI) {
-        const double missing = joined_residual(v, r, true), least = JOINED_SLACK * (1 + fabs(row->bias));
+        const double missing = joined_residual(v, r, true, true), least = JOINED_SLACK * (1 + fabs(row->bias));
         if (state == JOINED_AT_LO ? missing < -least : missing > least) next = JOINED_INSIDE;
     }
     if (next == state) return false;
@@ -457,10 +458,16 @@ SADMM_INLINE void joined_invert_row(const struct joined_view *v, const double L[
 
 /* ---- solving with it --------------------------------------------------------------------------------------------- */
 
-/* The right side of a row, moved with the rows that are not inside. */
-SADMM_INLINE double joined_right(const struct joined_view *v, int32_t r)
+/* The right side of a row, moved with the rows that are not inside. again: what the give and the rounding have left. */
+SADMM_INLINE double joined_right(const struct joined_view *v, int32_t r, bool again)
 {
-    return v->state[r] == JOINED_INSIDE ? -joined_residual(v, r, true) / v->rows[r].gain : 0;
+    return v->state[r] == JOINED_INSIDE ? -joined_residual(v, r, true, again) / v->rows[r].gain : 0;
+}
+
+/* The change of a row's multiplier before and after it has been found. */
+SADMM_INLINE void joined_put_change(const struct joined_view *v, int32_t r, bool again, bool found)
+{
+    if (v->state[r] == JOINED_INSIDE) v->change[r] = (again ? v->change[r] : 0) + (found ? v->found[r] : 0);
 }
 
 /* Row r of L_jj^-1 right; then of D_j^-1 of that; then, on the way back, of L_jj^-T right. */

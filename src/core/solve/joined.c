@@ -280,14 +280,13 @@ static void move_bodies(const struct joined_view *v)
         for (int k = 0; k < 6; ++k) joined_move(v, e, k);
 }
 
-/* Multipliers of rows inside their bounds, for what the others are. */
-static void solve_rows(const struct joined_view *v)
+/* Multipliers of rows inside their bounds, for what the others are. again: from what they are. */
+static void solve_rows(const struct joined_view *v, bool again)
 {
     const int32_t rows = JOINED_ROWS * v->s.places;
-    for (int32_t r = 0; r < rows; ++r)
-        if (v->state[r] == JOINED_INSIDE) v->change[r] = 0;
-    move_bodies(v);
-    for (int32_t r = 0; r < rows; ++r) v->right[r] = joined_right(v, r);
+    for (int32_t r = 0; r < rows; ++r) joined_put_change(v, r, again, false);
+    if (!again) move_bodies(v);
+    for (int32_t r = 0; r < rows; ++r) v->right[r] = joined_right(v, r, again);
     for (int32_t p = 0; p < v->s.places; ++p) {
         for (int k = 0; k < JOINED_ROWS; ++k)
             joined_push_right(v, p, v->s.first_update[p], v->s.first_update[p + 1], k);
@@ -299,8 +298,7 @@ static void solve_rows(const struct joined_view *v)
             joined_pull_right(v, p, v->s.first_below[p], v->s.first_below[p + 1], k);
         for (int k = 0; k < JOINED_ROWS; ++k) joined_find_backward(v, JOINED_ROWS * p + k);
     }
-    for (int32_t r = 0; r < rows; ++r)
-        if (v->state[r] == JOINED_INSIDE) v->change[r] = v->found[r];
+    for (int32_t r = 0; r < rows; ++r) joined_put_change(v, r, again, true);
     move_bodies(v);
 }
 
@@ -325,7 +323,9 @@ static bool solve_part(const struct solving *s, const struct part *part, const u
     begin_rows(v, earlier);
     for (int pass = 0; pass < JOINED_PASSES && !solved; ++pass) {
         factorize(v);
-        solve_rows(v);
+        solve_rows(v, false);
+        if (change_rows(v)) continue;
+        solve_rows(v, true);
         solved = !change_rows(v);
     }
     if (!solved || !is_finite(v)) return false;
