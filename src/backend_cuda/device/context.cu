@@ -68,6 +68,8 @@ static const char *const buffer_names[] = {
     "world's body slots",
     "world's places of bodies",
     "control of a step",
+    "driven bodies",
+    "what bodies ride on",
     "joints",
     "what joints keep",
     "what couplings keep",

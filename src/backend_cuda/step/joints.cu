@@ -29,9 +29,13 @@ struct cuda_joint_middle {
 
 enum { ROWS_THREADS = 64 }; /* a block: long work, many multiprocessors */
 
-static __device__ __forceinline__ struct joint_body body_of(const cuda_step_view &step, int32_t body)
+static __device__ __forceinline__ struct joint_body body_of(const cuda_view &v, int32_t body)
 {
-    const struct joint_body out = {body, body >= 0 ? &step.before[body] : nullptr, false, false};
+    struct joint_body out = {body, body >= 0 ? &v.step.before[body] : nullptr, false, false};
+    if (!sadmm_body_is_driven(body)) return out;
+    out.system_body = -1;
+    out.rigid = &v.driven.moving[sadmm_driven(body)];
+    out.steered = true;
     return out;
 }
 
@@ -39,7 +43,7 @@ static __device__ __forceinline__ struct joint_body body_of(const cuda_step_view
 static __device__ __forceinline__ struct joint_body body_a_of(const cuda_view &v,
                                                               const struct sadmm_resident_joint *joint)
 {
-    if (joint->coupling < 0) return body_of(v.step, joint->body[0]);
+    if (joint->coupling < 0) return body_of(v, joint->body[0]);
     const struct joint_body out = {-1, &v.joints.couplings_before[joint->coupling].target, true, true};
     return out;
 }
@@ -120,7 +124,8 @@ static __device__ __forceinline__ void store_constraints(const cuda_view &v, con
     for (int c = lane; c < joint->constraints; c += LANES) {
         const int left = rows - SADMM_MAX_ROWS * c,
                   count = left < 0 ? 0 : left < SADMM_MAX_ROWS ? left : (int)SADMM_MAX_ROWS;
-        const struct sadmm_row_constraint out = {count > 0 ? joint->body[0] : -1, count > 0 ? joint->body[1] : -1,
+        const int32_t a = joint->body[0] >= 0 ? joint->body[0] : -1, b = joint->body[1] >= 0 ? joint->body[1] : -1;
+        const struct sadmm_row_constraint out = {count > 0 ? a : -1, count > 0 ? b : -1,
                                                  (first + c) * (int32_t)SADMM_MAX_ROWS, count, false, 0};
         const_cast<struct sadmm_row_constraint *>(v.raw.constraints)[first + c] = out;
     }
@@ -143,7 +148,7 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
     struct joint_laws laws;
     laws.count = 0;
     if (enabled) {
-        const struct joint_body bodies[2] = {body_a_of(v, joint), body_of(v.step, joint->body[1])};
+        const struct joint_body bodies[2] = {body_a_of(v, joint), body_of(v, joint->body[1])};
         acting = joint_act(def, joint->frame, bodies, &settings);
     }
     if (coordinate) {
@@ -262,7 +267,9 @@ static __device__ __forceinline__ void look_at_pair(const cuda_view &v, int32_t 
         touch.island |= __shfl_xor_sync((unsigned)ALL_LANES, touch.island, o);
         for (int s = 0; s < 2; ++s) touch.body[s] |= __shfl_xor_sync((unsigned)ALL_LANES, touch.body[s], o);
     }
-    if (looks && lane == 0 && joint_contacts_hold(&touch, bodies)) atomicOr(island_of(v, a, b), ISLAND_LEADS_STAY);
+    const bool driven = looks && v.driven.count > 0 && sadmm_pair_is_driven(&v.raw.system, pair);
+    if (looks && lane == 0 && (driven || joint_contacts_hold(&touch, bodies)))
+        atomicOr(island_of(v, a, b), ISLAND_LEADS_STAY);
 }
 
 /* args.count: threads for joints; the others are for pairs. */

@@ -14,7 +14,7 @@ static struct sadmm_resident_joint joint_for_backend(const sadmm_world *world, c
         const struct sadmm_world_body *body = joint->body[s] >= 0 ? &world->bodies[joint->body[s]] : NULL;
         out.body[s] = body ? body->system_body : -1;
         out.frame[s] = joint->frame[s];
-        if (!body || out.body[s] >= 0) continue;
+        if (!body || sadmm_body_moves(out.body[s])) continue;
         const struct joint_end end = joint_end_on(&joint->frame[s], &body->rigid);
         out.frame[s] = (struct joint_frame){end.point, end.orientation};
     }

@@ -6,7 +6,7 @@
  *   coupling_step                    what couplings keep from step to step
  *   joint_act                        a joint in a step
  *   gear_rows, joint_rows, joint_move   gears and joints as constraint rows, and where they let bodies go
- *   resident_joints, resident        where a backend keeps the world
+ *   resident_joints, resident_driven, resident   where a backend keeps the world
  *   query_scene                      what queries look at
  *   shape_form, shape, mass, joint, coupling, gear, body, contacts,
  *   query_ray, query_shape, explain  what callers see of it, and change
@@ -223,9 +223,11 @@ struct sadmm_world {
         int64_t kept_step;   /* steps and time of the bodies above */
         double kept_time;
         struct sadmm_steady *steady; /* dynamic bodies */
-        uint32_t *edited;    /* slots of bodies with `edits`; capacity: all dynamic ones */
+        struct sadmm_driven_body *driven; /* kinematic bodies, as they are loaded, and as they are read; */
+        double *driven_wrench;       /* (x 6) likewise */
+        uint32_t *edited;    /* slots of bodies with `edits`; capacity: all that move */
         struct sadmm_resident_edit *edits; /* for the backend, when a step is enqueued */
-        size_t steady_capacity, edited_count, edited_capacity, edit_capacity;
+        size_t steady_capacity, driven_capacity, driven_wrench_capacity, edited_count, edited_capacity, edit_capacity;
         struct sadmm_resident_joint *joints; /* as they were loaded; */
         struct sadmm_joint_memory *memory;   /* likewise, and as they are read; */
         int32_t *joint_slots;                /* their slots */
@@ -364,6 +366,14 @@ void sadmm_world_report_steps(sadmm_world *world, int64_t steps, const struct sa
 /* The choice of the kernels, at the first step. */
 sadmm_status sadmm_world_choose_backend(sadmm_world *world);
 
+/* ---- resident_driven.c ---- */
+
+/* Kinematic bodies of a world that is about to be loaded, into resident.driven. */
+sadmm_status sadmm_world_list_driven(sadmm_world *world);
+/* After the last step done; the velocities that they had in it, into `start`. Nothing is enqueued. */
+sadmm_status sadmm_world_read_driven(sadmm_world *world);
+sadmm_status sadmm_world_read_driven_start(sadmm_world *world);
+
 /* ---- resident.c ---- */
 
 /* Can this step be made by a backend that keeps the world? */
@@ -384,7 +394,7 @@ sadmm_status sadmm_world_pull_joints(sadmm_world *world);
 /* All of it, and from here on the host's world is the one that counts: before anything but a state or a wrench is
  * changed. */
 sadmm_status sadmm_world_take_back(sadmm_world *world);
-/* A dynamic body's state or wrench has been set: the next step takes it along. */
+/* A dynamic body's state or wrench has been set, or a kinematic one's state or target: the next step takes it along. */
 void sadmm_world_edit(sadmm_world *world, struct sadmm_world_body *body, enum sadmm_edit_kind kind);
 /* Passes `status` on. After SADMM_ERROR_DEVICE the backend's context is given up, the host's world counts again, and
  * the next step begins with a new context. */
