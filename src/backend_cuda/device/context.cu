@@ -71,6 +71,7 @@ static const char *const buffer_names[] = {
     "driven bodies",
     "what bodies ride on",
     "joints",
+    "gears",
     "what joints keep",
     "what couplings keep",
     "rows of joints",

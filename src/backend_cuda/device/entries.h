@@ -60,7 +60,7 @@ sadmm_status CUDA(view_world)(struct sadmm_context *, struct sadmm_resident_view
 sadmm_status CUDA(read_start)(struct sadmm_context *, struct sadmm_rigid *, double *velocity, double *impulse,
                               struct sadmm_error *);
 sadmm_status CUDA(read_joints)(struct sadmm_context *, struct sadmm_joint_memory *, struct sadmm_coupling_memory *,
-                               struct sadmm_error *);
+                               double *gear_force, struct sadmm_error *);
 sadmm_status CUDA(read_rows)(struct sadmm_context *, struct sadmm_rows *, double *solution, double *velocity,
                              struct sadmm_error *);
 

@@ -15,6 +15,7 @@
 #include "backend_cuda/assemble/assemble.h"
 #include "core/model/coupling_law.h"
 #include "core/model/joint_lead.h"
+#include "joint_bodies.h"
 #include "move_joined.h"
 #include "world.h"
 
@@ -28,25 +29,6 @@ struct cuda_joint_middle {
 /* ---- rows -------------------------------------------------------------------------------------------------------- */
 
 enum { ROWS_THREADS = 64 }; /* a block: long work, many multiprocessors */
-
-static __device__ __forceinline__ struct joint_body body_of(const cuda_view &v, int32_t body)
-{
-    struct joint_body out = {body, body >= 0 ? &v.step.before[body] : nullptr, false, false};
-    if (!sadmm_body_is_driven(body)) return out;
-    out.system_body = -1;
-    out.rigid = &v.driven.moving[sadmm_driven(body)];
-    out.steered = true;
-    return out;
-}
-
-/* End a of a joint: a coupling's is its target. */
-static __device__ __forceinline__ struct joint_body body_a_of(const cuda_view &v,
-                                                              const struct sadmm_resident_joint *joint)
-{
-    if (joint->coupling < 0) return body_of(v, joint->body[0]);
-    const struct joint_body out = {-1, &v.joints.couplings_before[joint->coupling].target, true, true};
-    return out;
-}
 
 static __device__ __forceinline__ int or_lanes(int bits)
 {
@@ -298,7 +280,7 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
 sadmm_status CUDA(launch_joint_move)(struct sadmm_context *c, struct sadmm_error *error)
 {
     const cuda_args args = {};
-    const int64_t bodies = c->view.model.bodies, joints = c->view.joints.count;
+    const int64_t bodies = c->view.model.bodies, joints = c->view.joints.count + c->view.joints.gears;
     return CUDA(launch_of)(c, joint_move_kernel, "bodies of joints",
                            ((bodies > joints ? bodies : joints) + ROWS_THREADS - 1) / ROWS_THREADS, ROWS_THREADS, &args,
                            error);
@@ -308,8 +290,9 @@ sadmm_status CUDA(launch_joint_rows)(struct sadmm_context *c, struct sadmm_error
 {
     cuda_args args = {};
     const int64_t threads = (int64_t)c->view.joints.count * LANES;
-    return CUDA(launch_of)(c, joint_rows_kernel, "rows of joints", (threads + ROWS_THREADS - 1) / ROWS_THREADS,
-                           ROWS_THREADS, &args, error);
+    TRY(CUDA(launch_of)(c, joint_rows_kernel, "rows of joints", (threads + ROWS_THREADS - 1) / ROWS_THREADS,
+                        ROWS_THREADS, &args, error));
+    return CUDA(launch_gear_rows)(c, error);
 }
 
 sadmm_status CUDA(launch_joint_solution)(struct sadmm_context *c, struct sadmm_error *error)
@@ -321,8 +304,9 @@ sadmm_status CUDA(launch_joint_solution)(struct sadmm_context *c, struct sadmm_e
                               : 0;
     if (blocks == 0) return SADMM_OK;
     args.count = (int32_t)(blocks * ROWS_THREADS);
-    return CUDA(launch_of)(c, joint_solution_kernel, "joints", blocks + (pairs + ROWS_THREADS - 1) / ROWS_THREADS,
-                           ROWS_THREADS, &args, error);
+    TRY(CUDA(launch_of)(c, joint_solution_kernel, "joints", blocks + (pairs + ROWS_THREADS - 1) / ROWS_THREADS,
+                        ROWS_THREADS, &args, error));
+    return CUDA(launch_gear_solution)(c, error);
 }
 
 /* ---- where they are ---------------------------------------------------------------------------------------------- */
@@ -379,6 +363,7 @@ void CUDA(view_joints)(struct sadmm_context *c, int into, int substep)
     joints->solution = (double *)(row_set(c, into) + CUDA(raw_row_bytes)(s->joint_constraints));
     joints->velocity = joints->solution + (size_t)s->joint_constraints * SADMM_MAX_ROWS;
     joints->sources = (struct sadmm_joint_source *)(joints->velocity + 6 * (size_t)s->bodies);
+    CUDA(view_gears)(c, into, substep);
     if (s->apart) c->view.rows.count = 0;
 }
 
@@ -404,7 +389,7 @@ sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resid
 {
     struct cuda_step *s = c->step;
     const size_t n = (size_t)world->joint_count;
-    int64_t constraints = 0;
+    int64_t constraints = world->gear_count;
     for (size_t j = 0; j < n; ++j) constraints += world->joints[j].constraints;
     if (constraints > INT32_MAX / (8 * ROW))
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%lld constraints of joints: at most %d", (long long)constraints,
@@ -412,6 +397,7 @@ sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resid
     s->joints = c->view.joints.count = world->joint_count;
     s->joint_constraints = (int32_t)constraints;
     s->couplings = world->coupling_count;
+    s->gears = c->view.joints.gears = world->gear_count;
     if (n == 0) return SADMM_OK;
     const cuda_capacity wanted[] = {
         {BUFFER_JOINTS,
@@ -433,14 +419,17 @@ sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resid
     if (s->couplings > 0)
         TRY(CUDA(put)(c, couplings_of(c, 1 - s->into), world->coupling_memory,
                 (size_t)s->couplings * sizeof *world->coupling_memory, error));
+    TRY(CUDA(load_gears)(c, world, error));
     return put_first(c, world, error);
 }
 
 extern "C" sadmm_status CUDA(read_joints)(struct sadmm_context *c, struct sadmm_joint_memory *memory,
-                                          struct sadmm_coupling_memory *couplings, struct sadmm_error *error)
+                                          struct sadmm_coupling_memory *couplings, double *gear_force,
+                                          struct sadmm_error *error)
 {
     const struct cuda_step *s = c->step;
     CUDA_ENTER(c);
+    TRY(CUDA(read_gears)(c, gear_force, error));
     if (s->couplings > 0)
         TRY(CUDA(get)(c, couplings, couplings_of(c, 1 - s->into), (size_t)s->couplings * sizeof *couplings, error));
     return CUDA(get)(c, memory, memory_of(c, 1 - s->into), (size_t)s->joints * sizeof *memory, error);

@@ -6,6 +6,7 @@
 #include "collision/bounds.h"
 #include "core/model/coupling_law.h"
 #include "core/model/driven.h"
+#include "core/model/gear_law.h"
 #include "core/model/joint_lead.h"
 
 #include "backend_cuda/device/plan_check.h"
@@ -76,6 +77,10 @@ static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __
         return;
     }
     if (edit.kind == SADMM_EDIT_JOINT) return edit_joint(v.joints, edit.target, values);
+    if (edit.kind == SADMM_EDIT_GEAR) {
+        v.joints.gear[edit.target].enabled = values[0] != 0;
+        return;
+    }
     if (sadmm_body_is_driven(edit.target)) return edit_driven(v.driven, edit);
     struct sadmm_rigid *body = const_cast<struct sadmm_rigid *>(&v.step.before[edit.target]);
     if (edit.kind == SADMM_EDIT_STATE) {
@@ -318,7 +323,7 @@ sadmm_status CUDA(launch_start)(struct sadmm_context *c, struct sadmm_error *err
 /* Joints whose bodies move at the very end, once it is known where they may go. */
 static int64_t moved_last(const struct sadmm_context *c)
 {
-    return c->view.joints.apart ? 0 : c->view.joints.count;
+    return c->view.joints.apart ? 0 : c->view.joints.count + c->view.joints.gears;
 }
 
 sadmm_status CUDA(launch_turn)(struct sadmm_context *c, struct sadmm_error *error)

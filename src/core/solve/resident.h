@@ -22,6 +22,7 @@ struct sadmm_resident_joint; /* core/model/joint_law.h */
 struct sadmm_joint_memory;
 struct sadmm_coupling_memory; /* core/model/coupling_law.h */
 struct sadmm_driven_body;     /* core/model/driven.h */
+struct sadmm_resident_gear;   /* core/model/gear_law.h */
 
 /* A world, from the host. */
 struct sadmm_resident_world {
@@ -38,6 +39,9 @@ struct sadmm_resident_world {
     const struct sadmm_joint_memory *joint_memory;  /* (joint_count) of the last step */
     int32_t coupling_count;
     const struct sadmm_coupling_memory *coupling_memory; /* (coupling_count) likewise */
+    int32_t gear_count;
+    const struct sadmm_resident_gear *gears;   /* (gear_count) */
+    const double *gear_force;                  /* (gear_count) along the first coordinate, of the last step: N or N m */
     double time;                               /* simulated until now, s */
 };
 
@@ -50,6 +54,7 @@ enum sadmm_edit_kind {
     SADMM_EDIT_JOINT,    /* target: SADMM_JOINT_TARGETS joint + k; k < 6: the numbers of that coordinate
                             (joint_coordinate_numbers); k = 6: enabled (1 or 0); k = 7: a coupling's target: position
                             (3), orientation (4), velocity (6) */
+    SADMM_EDIT_GEAR,     /* target: a gear; enabled (1 or 0) */
     SADMM_EDIT_KINDS
 };
 enum { SADMM_JOINT_TARGETS = 8 }; /* a joint */
@@ -120,12 +125,12 @@ struct sadmm_resident_kernels {
      * s); any pointer may be NULL. Nothing may be enqueued. */
     sadmm_status (*read_start)(struct sadmm_context *, struct sadmm_rigid *rigid, double *velocity, double *impulse,
                                struct sadmm_error *);
-    /* What joints and couplings keep after the last step done. Nothing may be enqueued. */
+    /* What joints, couplings and gears keep after the last step done. Nothing may be enqueued. */
     sadmm_status (*read_joints)(struct sadmm_context *, struct sadmm_joint_memory *, struct sadmm_coupling_memory *,
-                                struct sadmm_error *);
-    /* Rows of the joints in the last step done, with the multipliers that it started from, and the solution's (six a
-     * constraint that joints may have, at most) and velocities (bodies x 6): where there are joints, bodies need not
-     * end with these. Nothing may be enqueued. */
+                                double *gear_force, struct sadmm_error *);
+    /* Rows of the joints and gears in the last step done, with the multipliers that it started from, and the solution's
+     * (six a constraint that these may have, at most) and velocities (bodies x 6): where there are joints, bodies need
+     * not end with these. Nothing may be enqueued. */
     sadmm_status (*read_rows)(struct sadmm_context *, struct sadmm_rows *rows, double *solution, double *velocity,
                               struct sadmm_error *);
 };

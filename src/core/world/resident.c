@@ -24,12 +24,12 @@ enum { MOST_CHECKS = 64 };
 
 bool sadmm_world_may_reside(const sadmm_world *world)
 {
-    /* Gears and tables of springs are the host's. Of the stop rules a backend checks the
+    /* Tables of springs are the host's. Of the stop rules a backend checks the
      * certificate's in the method FAST alone; and the loads of a first step are predicted on the host. */
     const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings), *s = &settings;
     const bool fast = s->method == SADMM_METHOD_FAST,
                few_checks = (s->iterations - 1) / s->check_period < MOST_CHECKS / s->substeps;
-    if ((fast && !world->stepped) || world->gear_count > 0 || world->table_count > 0)
+    if ((fast && !world->stepped) || world->table_count > 0)
         return false;
     return world->kernels->resident && s->residual_tolerance <= 0 &&
            (s->certificate_tolerance <= 0 || (fast && few_checks));
@@ -143,6 +143,7 @@ static sadmm_status load(sadmm_world *world)
     for (size_t k = 0; k < driven; ++k) begin_edits(&world->bodies[world->driven_slots[k]]);
     TRY(sadmm_world_list_driven(world));
     TRY(sadmm_world_list_joints(world));
+    TRY(sadmm_world_list_gears(world));
     struct sadmm_collision_input input = sadmm_world_collision_input(world, 0);
     struct sadmm_resident_world whole = {
         .input = &input,
@@ -158,6 +159,9 @@ static sadmm_status load(sadmm_world *world)
         .joint_memory = world->resident.memory,
         .coupling_count = world->resident.coupling_count,
         .coupling_memory = world->resident.coupling_memory,
+        .gear_count = world->resident.gear_count,
+        .gears = world->resident.gears,
+        .gear_force = world->resident.gear_force,
         .time = world->report.time,
     };
     TRY(world->kernels->resident->load(world->context, &whole, &world->def.settings, &world->error));

@@ -116,6 +116,8 @@ struct sadmm_world_gear {
     size_t joint[2]; /* slots */
     bool acts;       /* it has a row in the (sub-)step at hand */
     struct { double force; } last, next; /* along the first coordinate, of the last step and of the one at hand */
+    bool edited;     /* its being enabled was set, and no step has taken that along yet; set_at: as in a body */
+    int64_t set_at;
 };
 
 /* What the last step started from, for contacts, freeze and the certificate. */
@@ -234,7 +236,11 @@ struct sadmm_world {
         struct sadmm_coupling_memory *coupling_memory; /* of those that are of couplings, in their order */
         double *solution;                    /* of their rows */
         uint32_t *edited_joints;             /* slots of joints with `edits`; capacity: all */
-        int32_t joint_count, joint_constraints, coupling_count;
+        struct sadmm_resident_gear *gears;   /* in slot order */
+        double *gear_force;                  /* likewise */
+        bool gears_edited;                   /* some of them */
+        size_t gear_capacity, gear_force_capacity;
+        int32_t joint_count, joint_constraints, coupling_count, gear_count;
         size_t joint_capacity, memory_capacity, coupling_memory_capacity, joint_slot_capacity, solution_capacity,
             edited_joint_count,
             edited_joint_capacity;
@@ -407,6 +413,9 @@ sadmm_status sadmm_world_list_joints(sadmm_world *world);
 /* A joint's coordinate, whether it is enabled, or its target has been set: the next step takes it along. False: the
  * backend has no room for its rows, the world is to be taken back. */
 bool sadmm_world_edit_joint(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit);
+/* Gears, once joints are listed. */
+sadmm_status sadmm_world_list_gears(sadmm_world *world);
+void sadmm_world_edit_gear(sadmm_world *world, struct sadmm_world_gear *gear);
 /* Edits into resident.edits, from *count on. */
 sadmm_status sadmm_world_list_joint_edits(sadmm_world *world, size_t *count);
 void sadmm_world_forget_joint_edits(sadmm_world *world);
