@@ -66,9 +66,8 @@ START_TEST(joints_are_solved_on_the_device)
 }
 END_TEST
 
-/* A table that comes while the device has the world takes it back to the host, where it is at home; and it goes on as
- * there. A gear is at home in both. */
-START_TEST(tables_are_the_hosts)
+/* A table and a gear come and go while the device has the world. */
+START_TEST(tables_and_gears_come_and_go)
 {
     static const double positions[3] = {-1, 0, 1}, forces[3] = {-40, 0, 10};
     sadmm_world *worlds[2] = {chain(_i), chain(_i)};
@@ -89,6 +88,7 @@ START_TEST(tables_are_the_hosts)
                 MUST(worlds[w], sadmm_world_set_joint_spring_table(worlds[w], joints[2], 5, NULL, NULL, 0));
             step_world(worlds[w], 1);
         }
+        ck_assert(worlds[1]->resident.loaded == (step > 0));
         for (int k = 0; k < 4; ++k) {
             const sadmm_body_state a = body_state(worlds[0], body_at(worlds[0], k)),
                                    b = body_state(worlds[1], body_at(worlds[1], k));
@@ -363,9 +363,9 @@ START_TEST(resident_joints_equal_those_by_host)
 }
 END_TEST
 
-/* ---- gears ------------------------------------------------------------------------------------------------------- */
+/* ---- gears, tables of springs ------------------------------------------------------------------------------------ */
 
-enum { TRAIN, FINGER, RACK, GEARS };
+enum { TRAIN, FINGER, RACK, GEARS, FIRST_TABLE = 6, TABLES = 3 };
 
 static sadmm_gear_id gear_at(sadmm_world *world, int32_t index)
 {
@@ -390,8 +390,31 @@ static void add_gear(sadmm_world *world, sadmm_joint_id one, int first, sadmm_jo
     MUST(world, sadmm_world_add_gear(world, &def, NULL));
 }
 
+/* A weight that swings on a spring as stiff as a stop beyond its slack, a slide that snaps through, and a spring between
+ * two bodies that pulls ever more. */
+static void add_tables(sadmm_world *world)
+{
+    static const double stop[2][4] = {{-0.1, -0.02, 0.02, 0.03}, {-5, 0, 0, 4000}},
+                        snap[2][4] = {{-0.2, -0.05, 0.05, 0.2}, {-20, 15, -15, 20}},
+                        pull[2][3] = {{0.1, 0.2, 0.4}, {-3, 0, 30}};
+    static const sadmm_body_id ground = {0, 0};
+    sadmm_joint_def slide = sadmm_joint_def_default(), spring = sadmm_joint_def_default();
+    const sadmm_body_id weight = add_link(world, 8);
+    const sadmm_joint_id swing = hinge(world, ground, weight, 7.8);
+    throw_body(world, weight, 0, 3);
+    MUST(world, sadmm_world_set_joint_spring_table(world, swing, 5, stop[0], stop[1], 4));
+    slide.kind = SADMM_JOINT_PRISMATIC;
+    const sadmm_joint_id snaps = join(world, &slide, ground, add_link(world, 9), 9, 0, 0.04);
+    MUST(world, sadmm_world_set_joint_spring_table(world, snaps, 2, snap[0], snap[1], 4));
+    spring.kind = SADMM_JOINT_SPRING;
+    spring.coordinates[0].spring_damping = 0.2;
+    const sadmm_joint_id pulls =
+        join(world, &spring, weight, add_box(world, 8.3, 0, 0.2, 0.1, 0.5, 0.5), 8.1, 0, 0);
+    MUST(world, sadmm_world_set_joint_spring_table(world, pulls, 0, pull[0], pull[1], 3));
+}
+
 /* Two wheels on a carrier that falls onto the floor, a finger of three links whose middle one is of both joints, about
- * axes at an angle, and a rack that a wheel drives against a box. */
+ * axes at an angle, and a rack that a wheel drives against a box; then springs with tables. */
 static sadmm_world *works(int precision, sadmm_method method, int substeps)
 {
     static const sadmm_body_id ground = {0, 0};
@@ -432,6 +455,7 @@ static sadmm_world *works(int precision, sadmm_method method, int substeps)
     add_gear(world, rail, 2, hinge(world, ground, pinion, 6.5), 5, -0.1);
     throw_body(world, pinion, 0, 8);
     add_box(world, 6.21, 0.02, 0.1, 0.1, 1, 0.5);
+    add_tables(world);
     use_device(world, precision, 0);
     return world;
 }
@@ -458,12 +482,12 @@ static void change_gears(sadmm_world *world, int step)
     if (step == 13) MUST(world, sadmm_world_set_joint_enabled(world, joint_at(world, 1), true));
 }
 
-START_TEST(resident_gears_equal_those_by_host)
+START_TEST(resident_gears_and_tables_equal_those_by_host)
 {
     const int precision = _i / WAYS, way = _i % WAYS;
     sadmm_world *worlds[2];
     char what[80];
-    bool worked = false;
+    bool worked = false, sprung[TABLES] = {false};
     make_pair(works, precision, way, worlds);
     ck_assert_int_eq(sadmm_world_gear_count(worlds[1]), GEARS);
     for (int step = 0; step < 18; ++step) {
@@ -480,10 +504,13 @@ START_TEST(resident_gears_equal_those_by_host)
         sadmm_gear_state state;
         MUST(worlds[1], sadmm_world_gear_state(worlds[1], gear_at(worlds[1], RACK), &state));
         worked = worked || state.force_1 != 0;
+        for (int k = 0; k < TABLES; ++k)
+            sprung[k] = sprung[k] ||
+                        joint_state(worlds[1], FIRST_TABLE + k).spring_force[k == 0 ? 5 : k == 1 ? 2 : 0] != 0;
         const bool off = step >= 6 && step < 11;
         if (off) ck_assert(state.force_1 == 0);
     }
-    ck_assert(worked);
+    ck_assert(worked && sprung[0] && sprung[1] && sprung[2]);
     for (int k = 0; k < 2; ++k) sadmm_world_destroy(worlds[k]);
 }
 END_TEST
@@ -697,9 +724,9 @@ int main(void)
     Suite *suite = suite_create("cuda_joint");
     if (!find_cuda_tables(tables)) return TEST_SKIPPED;
     ADD_CASE(suite, joints_are_solved_on_the_device, 0, tested_precisions());
-    ADD_CASE(suite, tables_are_the_hosts, 0, tested_precisions());
+    ADD_CASE(suite, tables_and_gears_come_and_go, 0, tested_precisions());
     ADD_CASE(suite, resident_joints_equal_those_by_host, 0, tested_precisions() * WAYS);
-    ADD_CASE(suite, resident_gears_equal_those_by_host, 0, tested_precisions() * WAYS);
+    ADD_CASE(suite, resident_gears_and_tables_equal_those_by_host, 0, tested_precisions() * WAYS);
     ADD_CASE(suite, geared_worlds_are_saved, 0, tested_precisions());
     ADD_CASE(suite, joints_that_nothing_touches_are_solved_apart, 0, WAYS);
     ADD_CASE(suite, parts_of_any_size_are_solved, 0, 4);

@@ -72,6 +72,7 @@ static const char *const buffer_names[] = {
     "what bodies ride on",
     "joints",
     "gears",
+    "tables of springs",
     "what joints keep",
     "what couplings keep",
     "rows of joints",

@@ -265,6 +265,7 @@ struct joint_view {
     struct sadmm_joint_memory *after;                /* as it ends */
     const struct sadmm_coupling_memory *couplings_before; /* couplings: as the sub-step began; */
     struct sadmm_coupling_memory *couplings_after;        /* as it ends */
+    const double *tables;           /* of springs */
     int32_t gears, first_gear;      /* how many, and the constraint of the first one: one each, after those of joints */
     struct sadmm_resident_gear *gear;
     const double *gear_before;      /* gears: force along the first coordinate, of the last (sub-)step; */

@@ -113,6 +113,21 @@ static __device__ __forceinline__ void store_constraints(const cuda_view &v, con
     }
 }
 
+/* The table of the lane's spring; NULL: it has none. */
+static __device__ __forceinline__ const struct joint_table *table_of(const joint_view &joints,
+                                                                     const struct sadmm_resident_joint *joint, int lane,
+                                                                     struct joint_table *table)
+{
+    const int32_t points = joint->points[lane];
+    if (points == 0) return nullptr;
+    table->position = joints.tables + joint->table[lane];
+    table->load = table->position + points;
+    table->count = points;
+    return table;
+}
+
+/* TABLES: there are springs with tables. By itself: they take registers. */
+template <bool TABLES>
 static __global__ void __launch_bounds__(ROWS_THREADS)
     joint_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
@@ -135,7 +150,8 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
     }
     if (coordinate) {
         moving = joint_moving_of(def, &v.joints.before[j], &acting, lane, &settings);
-        joint_coordinate_laws(def, lane, &moving, nullptr, &laws); /* worlds with tables are the host's */
+        struct joint_table table = {};
+        joint_coordinate_laws(def, lane, &moving, TABLES ? table_of(v.joints, joint, lane, &table) : nullptr, &laws);
     }
     int rows;
     const int at = place_laws(laws.count, coordinate && (def->locks >> lane & 1), lane, &rows);
@@ -290,8 +306,8 @@ sadmm_status CUDA(launch_joint_rows)(struct sadmm_context *c, struct sadmm_error
 {
     cuda_args args = {};
     const int64_t threads = (int64_t)c->view.joints.count * LANES;
-    TRY(CUDA(launch_of)(c, joint_rows_kernel, "rows of joints", (threads + ROWS_THREADS - 1) / ROWS_THREADS,
-                        ROWS_THREADS, &args, error));
+    TRY(CUDA(launch_of)(c, c->step->tables ? joint_rows_kernel<true> : joint_rows_kernel<false>, "rows of joints",
+                        (threads + ROWS_THREADS - 1) / ROWS_THREADS, ROWS_THREADS, &args, error));
     return CUDA(launch_gear_rows)(c, error);
 }
 
@@ -350,6 +366,7 @@ void CUDA(view_joints)(struct sadmm_context *c, int into, int substep)
     joints->apart = s->apart;
     if (s->joints == 0) return;
     joints->joints = buffer<struct sadmm_resident_joint>(c, BUFFER_JOINTS);
+    joints->tables = buffer<double>(c, BUFFER_TABLES);
     joints->middle = middle_of(c);
     joints->first = first_of(c);
     joints->begin = memory_of(c, step_state(into, -1, substeps));
@@ -398,10 +415,12 @@ sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resid
     s->joint_constraints = (int32_t)constraints;
     s->couplings = world->coupling_count;
     s->gears = c->view.joints.gears = world->gear_count;
+    s->tables = world->table_numbers > 0;
     if (n == 0) return SADMM_OK;
     const cuda_capacity wanted[] = {
         {BUFFER_JOINTS,
          n * (sizeof(struct sadmm_resident_joint) + sizeof(struct cuda_joint_middle) + sizeof(int32_t))},
+        {BUFFER_TABLES, world->table_numbers * sizeof *world->tables},
         {BUFFER_JOINT_MEMORY, 3 * n * sizeof(struct sadmm_joint_memory)},
         {BUFFER_COUPLING_MEMORY, 3 * (size_t)s->couplings * sizeof(struct sadmm_coupling_memory)},
         {BUFFER_JOINT_ROWS, 2 * row_set_bytes(s)},
@@ -419,6 +438,9 @@ sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resid
     if (s->couplings > 0)
         TRY(CUDA(put)(c, couplings_of(c, 1 - s->into), world->coupling_memory,
                 (size_t)s->couplings * sizeof *world->coupling_memory, error));
+    if (s->tables)
+        TRY(CUDA(put)(c, c->buffers[BUFFER_TABLES].data, world->tables, world->table_numbers * sizeof *world->tables,
+                error));
     TRY(CUDA(load_gears)(c, world, error));
     return put_first(c, world, error);
 }

@@ -43,6 +43,7 @@ struct cuda_step {
     struct sadmm_cuda_collision *collision;
     int32_t bodies, slots, driven;
     int32_t joints, joint_constraints, couplings, gears;
+    bool tables;                /* some joint has one of a spring */
     int32_t joined_parts;       /* of bodies that are solved directly (joined.cu); */
     size_t joined_numbers, joined_work; /* of all their structures and work, */
     size_t joined_bytes;        /* the most that one has of both, where blocks have that in their own memory; else 0 */

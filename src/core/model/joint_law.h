@@ -44,6 +44,8 @@ struct sadmm_resident_joint {
                                     frame is in the world */
     struct joint_frame frame[2];
     int32_t coupling;            /* number of the coupling whose target its frame a is; -1: none */
+    int32_t table[JOINT_COORDINATES];  /* of a coordinate's spring: where its positions begin, then loads, among all */
+    int32_t points[JOINT_COORDINATES]; /* tables' numbers (solve/resident.h); its points, 0: it has none */
 };
 
 /* The joint's row that a row of the step is. */

@@ -37,6 +37,8 @@ struct sadmm_resident_world {
     int32_t joint_count;
     const struct sadmm_resident_joint *joints;      /* (joint_count) */
     const struct sadmm_joint_memory *joint_memory;  /* (joint_count) of the last step */
+    size_t table_numbers;
+    const double *tables;                      /* (table_numbers) of springs, as joints say */
     int32_t coupling_count;
     const struct sadmm_coupling_memory *coupling_memory; /* (coupling_count) likewise */
     int32_t gear_count;

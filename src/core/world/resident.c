@@ -24,13 +24,12 @@ enum { MOST_CHECKS = 64 };
 
 bool sadmm_world_may_reside(const sadmm_world *world)
 {
-    /* Tables of springs are the host's. Of the stop rules a backend checks the
-     * certificate's in the method FAST alone; and the loads of a first step are predicted on the host. */
+    /* Of the stop rules a backend checks the certificate's in the method FAST alone; and the loads of a first step are
+     * predicted on the host. */
     const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings), *s = &settings;
     const bool fast = s->method == SADMM_METHOD_FAST,
                few_checks = (s->iterations - 1) / s->check_period < MOST_CHECKS / s->substeps;
-    if ((fast && !world->stepped) || world->table_count > 0)
-        return false;
+    if (fast && !world->stepped) return false;
     return world->kernels->resident && s->residual_tolerance <= 0 &&
            (s->certificate_tolerance <= 0 || (fast && few_checks));
 }
@@ -157,6 +156,8 @@ static sadmm_status load(sadmm_world *world)
         .joint_count = world->resident.joint_count,
         .joints = world->resident.joints,
         .joint_memory = world->resident.memory,
+        .table_numbers = world->resident.table_numbers,
+        .tables = world->resident.tables,
         .coupling_count = world->resident.coupling_count,
         .coupling_memory = world->resident.coupling_memory,
         .gear_count = world->resident.gear_count,

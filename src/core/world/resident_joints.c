@@ -22,12 +22,33 @@ static struct sadmm_resident_joint joint_for_backend(const sadmm_world *world, c
     return out;
 }
 
+/* Tables of a joint's springs, after those that are listed. */
+static bool list_tables(sadmm_world *world, const struct sadmm_world_joint *joint, struct sadmm_resident_joint *out)
+{
+    for (int k = 0; k < JOINT_COORDINATES; ++k) {
+        const size_t at = world->resident.table_numbers, numbers = 2 * (size_t)joint->table_count[k];
+        if (!joint->table[k]) continue;
+        if (!sadmm_grow(&world->resident.tables, &world->resident.table_capacity, at, at + numbers,
+                        sizeof *world->resident.tables))
+            return false;
+        memcpy(world->resident.tables + at, joint->table[k], numbers * sizeof *world->resident.tables);
+        out->table[k] = (int32_t)at;
+        out->points[k] = joint->table_count[k];
+        world->resident.table_numbers += numbers;
+    }
+    return true;
+}
+
 sadmm_status sadmm_world_list_joints(sadmm_world *world)
 {
     const size_t count = (size_t)world->joint_count;
     size_t i = 0;
     world->resident.joint_count = world->resident.joint_constraints = world->resident.coupling_count = 0;
     world->resident.edited_joint_count = 0;
+    world->resident.table_numbers = 0;
+    if (world->table_count > INT32_MAX / (2 * SADMM_MOST_SPRING_POINTS))
+        return sadmm_fail(&world->error, SADMM_ERROR_LIMIT, "%d tables of springs: a backend holds at most %d",
+                          world->table_count, INT32_MAX / (2 * SADMM_MOST_SPRING_POINTS));
     if (!sadmm_grow_empty(&world->resident.joints, &world->resident.joint_capacity, count,
                           sizeof *world->resident.joints) ||
         !sadmm_grow_empty(&world->resident.memory, &world->resident.memory_capacity, count,
@@ -43,6 +64,8 @@ sadmm_status sadmm_world_list_joints(sadmm_world *world)
         struct sadmm_world_joint *joint = &world->joints[slot];
         if (!joint->alive) continue;
         world->resident.joints[i] = joint_for_backend(world, joint);
+        if (!list_tables(world, joint, &world->resident.joints[i]))
+            return sadmm_fail_memory(&world->error, "joints for the backend");
         world->resident.memory[i] = joint->last;
         if (joint->coupling) {
             world->resident.joints[i].coupling = world->resident.coupling_count;

@@ -236,6 +236,8 @@ struct sadmm_world {
         struct sadmm_coupling_memory *coupling_memory; /* of those that are of couplings, in their order */
         double *solution;                    /* of their rows */
         uint32_t *edited_joints;             /* slots of joints with `edits`; capacity: all */
+        double *tables;                      /* of springs, joint by joint */
+        size_t table_numbers, table_capacity;
         struct sadmm_resident_gear *gears;   /* in slot order */
         double *gear_force;                  /* likewise */
         bool gears_edited;                   /* some of them */
