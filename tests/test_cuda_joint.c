@@ -66,9 +66,8 @@ START_TEST(joints_are_solved_on_the_device)
 }
 END_TEST
 
-/* A table and a gear that come while the device has the world take it back to the host, where both are at home; and it
- * goes on as there. */
-START_TEST(gears_and_tables_are_the_hosts)
+/* A table and a gear come and go while the device has the world. */
+START_TEST(tables_and_gears_come_and_go)
 {
     static const double positions[3] = {-1, 0, 1}, forces[3] = {-40, 0, 10};
     sadmm_world *worlds[2] = {chain(_i), chain(_i)};
@@ -89,6 +88,7 @@ START_TEST(gears_and_tables_are_the_hosts)
                 MUST(worlds[w], sadmm_world_set_joint_spring_table(worlds[w], joints[2], 5, NULL, NULL, 0));
             step_world(worlds[w], 1);
         }
+        ck_assert(worlds[1]->resident.loaded == (step > 0));
         for (int k = 0; k < 4; ++k) {
             const sadmm_body_state a = body_state(worlds[0], body_at(worlds[0], k)),
                                    b = body_state(worlds[1], body_at(worlds[1], k));
@@ -363,6 +363,182 @@ START_TEST(resident_joints_equal_those_by_host)
 }
 END_TEST
 
+/* ---- gears, tables of springs ------------------------------------------------------------------------------------ */
+
+enum { TRAIN, FINGER, RACK, GEARS, FIRST_TABLE = 6, TABLES = 3 };
+
+static sadmm_gear_id gear_at(sadmm_world *world, int32_t index)
+{
+    sadmm_gear_id id;
+    MUST(world, sadmm_world_gear_at(world, index, &id));
+    return id;
+}
+
+static sadmm_joint_id hinge(sadmm_world *world, sadmm_body_id a, sadmm_body_id b, double x)
+{
+    sadmm_joint_def def = sadmm_joint_def_default();
+    def.kind = SADMM_JOINT_REVOLUTE;
+    return join(world, &def, a, b, x, 0, 1);
+}
+
+static void add_gear(sadmm_world *world, sadmm_joint_id one, int first, sadmm_joint_id two, int second, double ratio)
+{
+    sadmm_gear_def def = sadmm_gear_def_default();
+    def.joint_1 = one, def.joint_2 = two;
+    def.coordinate_1 = first, def.coordinate_2 = second;
+    def.ratio = ratio;
+    MUST(world, sadmm_world_add_gear(world, &def, NULL));
+}
+
+/* A weight that swings on a spring as stiff as a stop beyond its slack, a slide that snaps through, and a spring between
+ * two bodies that pulls ever more. */
+static void add_tables(sadmm_world *world)
+{
+    static const double stop[2][4] = {{-0.1, -0.02, 0.02, 0.03}, {-5, 0, 0, 4000}},
+                        snap[2][4] = {{-0.2, -0.05, 0.05, 0.2}, {-20, 15, -15, 20}},
+                        pull[2][3] = {{0.1, 0.2, 0.4}, {-3, 0, 30}};
+    static const sadmm_body_id ground = {0, 0};
+    sadmm_joint_def slide = sadmm_joint_def_default(), spring = sadmm_joint_def_default();
+    const sadmm_body_id weight = add_link(world, 8);
+    const sadmm_joint_id swing = hinge(world, ground, weight, 7.8);
+    throw_body(world, weight, 0, 3);
+    MUST(world, sadmm_world_set_joint_spring_table(world, swing, 5, stop[0], stop[1], 4));
+    slide.kind = SADMM_JOINT_PRISMATIC;
+    const sadmm_joint_id snaps = join(world, &slide, ground, add_link(world, 9), 9, 0, 0.04);
+    MUST(world, sadmm_world_set_joint_spring_table(world, snaps, 2, snap[0], snap[1], 4));
+    spring.kind = SADMM_JOINT_SPRING;
+    spring.coordinates[0].spring_damping = 0.2;
+    const sadmm_joint_id pulls =
+        join(world, &spring, weight, add_box(world, 8.3, 0, 0.2, 0.1, 0.5, 0.5), 8.1, 0, 0);
+    MUST(world, sadmm_world_set_joint_spring_table(world, pulls, 0, pull[0], pull[1], 3));
+}
+
+/* Two wheels on a carrier that falls onto the floor, a finger of three links whose middle one is of both joints, about
+ * axes at an angle, and a rack that a wheel drives against a box; then springs with tables. */
+static sadmm_world *works(int precision, sadmm_method method, int substeps)
+{
+    static const sadmm_body_id ground = {0, 0};
+    sadmm_world_def def = sadmm_world_def_default();
+    def.backend = SADMM_BACKEND_CPU;
+    def.precision = (sadmm_precision)precision;
+    def.settings.method = method;
+    def.settings.iterations = method == SADMM_METHOD_PAPER ? 23 : 24;
+    def.settings.penalty_period = 10;
+    def.settings.substeps = substeps;
+    sadmm_world *world = create_world(&def);
+    add_floor(world, 0.5);
+    const sadmm_body_id carrier = add_box(world, 0, 0, 0.102, 0.1, 2, 0.5);
+    const sadmm_joint_id one = hinge(world, carrier, add_link(world, 0.3), 0.3),
+                         two = hinge(world, add_link(world, -0.3), carrier, -0.3);
+    throw_body(world, body_at(world, 2), 0, 3);
+    add_gear(world, one, 5, two, 5, 0.6);
+    const sadmm_body_id links[3] = {add_link(world, 3), add_link(world, 3.2), add_link(world, 3.4)};
+    sadmm_joint_id joints[2];
+    for (int k = 0; k < 2; ++k) {
+        const double place[3] = {3.1 + 0.2 * k, 0, 0}, turn[4] = {cos(0.3 * k), sin(0.3 * k), 0, 0};
+        sadmm_joint_def knuckle = sadmm_joint_def_default();
+        knuckle.kind = SADMM_JOINT_REVOLUTE;
+        knuckle.body_a = links[k], knuckle.body_b = links[k + 1];
+        MUST(world, sadmm_world_place_joint(world, &knuckle, place, turn));
+        MUST(world, sadmm_world_add_joint(world, &knuckle, &joints[k]));
+        throw_body(world, links[k], 0.2, 2 + k);
+    }
+    add_gear(world, joints[1], 5, joints[0], 5, -0.7);
+    sadmm_joint_def slide = sadmm_joint_def_default();
+    slide.kind = SADMM_JOINT_PRISMATIC;
+    const double way[3] = {6, 0, 0.1}, along[4] = {sqrt(0.5), 0, sqrt(0.5), 0};
+    slide.body_b = add_box(world, 6, 0, 0.11, 0.1, 1, 0.5);
+    MUST(world, sadmm_world_place_joint(world, &slide, way, along));
+    sadmm_joint_id rail;
+    MUST(world, sadmm_world_add_joint(world, &slide, &rail));
+    const sadmm_body_id pinion = add_link(world, 6.5);
+    add_gear(world, rail, 2, hinge(world, ground, pinion, 6.5), 5, -0.1);
+    throw_body(world, pinion, 0, 8);
+    add_box(world, 6.21, 0.02, 0.1, 0.1, 1, 0.5);
+    add_tables(world);
+    use_device(world, precision, 0);
+    return world;
+}
+
+static void expect_same_gears(sadmm_world *a, sadmm_world *b, const char *what)
+{
+    for (int32_t g = 0; g < sadmm_world_gear_count(a); ++g) {
+        sadmm_gear_state x, y;
+        MUST(a, sadmm_world_gear_state(a, gear_at(a, g), &x));
+        MUST(b, sadmm_world_gear_state(b, gear_at(b, g), &y));
+        if (EMULATED) ck_assert_msg(memcmp(&x, &y, sizeof x) == 0, "%s: gear %d: %g %g", what, g, x.force_1, y.force_1);
+        ck_assert_double_le(fabs(x.error - y.error), 1e-4);
+    }
+}
+
+/* What is set between two steps, in either world. */
+static void change_gears(sadmm_world *world, int step)
+{
+    if (step == 6) MUST(world, sadmm_world_set_gear_enabled(world, gear_at(world, RACK), false));
+    if (step == 8) MUST(world, sadmm_world_set_gear_enabled(world, gear_at(world, FINGER), false));
+    if (step == 9) MUST(world, sadmm_world_set_joint_enabled(world, joint_at(world, 1), false));
+    if (step == 11) MUST(world, sadmm_world_set_gear_enabled(world, gear_at(world, RACK), true));
+    if (step == 12) MUST(world, sadmm_world_set_gear_enabled(world, gear_at(world, FINGER), true));
+    if (step == 13) MUST(world, sadmm_world_set_joint_enabled(world, joint_at(world, 1), true));
+}
+
+START_TEST(resident_gears_and_tables_equal_those_by_host)
+{
+    const int precision = _i / WAYS, way = _i % WAYS;
+    sadmm_world *worlds[2];
+    char what[80];
+    bool worked = false, sprung[TABLES] = {false};
+    make_pair(works, precision, way, worlds);
+    ck_assert_int_eq(sadmm_world_gear_count(worlds[1]), GEARS);
+    for (int step = 0; step < 18; ++step) {
+        for (int k = 0; k < 2; ++k) {
+            change_gears(worlds[k], step);
+            MUST(worlds[k], step % 4 == 2 ? sadmm_world_step_async(worlds[k]) : sadmm_world_step(worlds[k]));
+        }
+        ck_assert(worlds[1]->resident.loaded == (step > 0 || ways[way].method == SADMM_METHOD_PAPER));
+        ck_assert(!worlds[0]->resident.loaded);
+        snprintf(what, sizeof what, "way %d, %s, step %d", way, precision ? "f64" : "f32", step);
+        if (step % 4 == 2) continue;
+        expect_same_joints(worlds[0], worlds[1], what);
+        expect_same_gears(worlds[0], worlds[1], what);
+        sadmm_gear_state state;
+        MUST(worlds[1], sadmm_world_gear_state(worlds[1], gear_at(worlds[1], RACK), &state));
+        worked = worked || state.force_1 != 0;
+        for (int k = 0; k < TABLES; ++k)
+            sprung[k] = sprung[k] ||
+                        joint_state(worlds[1], FIRST_TABLE + k).spring_force[k == 0 ? 5 : k == 1 ? 2 : 0] != 0;
+        const bool off = step >= 6 && step < 11;
+        if (off) ck_assert(state.force_1 == 0);
+    }
+    ck_assert(worked && sprung[0] && sprung[1] && sprung[2]);
+    for (int k = 0; k < 2; ++k) sadmm_world_destroy(worlds[k]);
+}
+END_TEST
+
+/* Saved and restored, mid-run, with a change that no step has taken along. */
+START_TEST(geared_worlds_are_saved)
+{
+    sadmm_world *worlds[2];
+    size_t size;
+    make_pair(works, _i, 0, worlds);
+    step_world(worlds[1], 5);
+    MUST(worlds[1], sadmm_world_set_gear_enabled(worlds[1], gear_at(worlds[1], TRAIN), false));
+    worlds[1]->def.backend = SADMM_BACKEND_AUTO; /* use_device has chosen */
+    MUST(worlds[1], sadmm_world_save(worlds[1], NULL, 0, &size));
+    void *bytes = malloc(size);
+    MUST(worlds[1], sadmm_world_save(worlds[1], bytes, size, &size));
+    MUST(worlds[0], sadmm_world_restore(worlds[0], bytes, size));
+    for (int k = 0; k < 2; ++k) step_world(worlds[k], 4);
+    ck_assert(worlds[0]->resident.loaded && worlds[1]->resident.loaded);
+    expect_same_world(worlds[0], worlds[1], "restored");
+    expect_same_gears(worlds[0], worlds[1], "restored");
+    free(bytes);
+    for (int k = 0; k < 2; ++k) sadmm_world_destroy(worlds[k]);
+}
+END_TEST
+
+/* ---- what is read ------------------------------------------------------------------------------------------------ */
+
 /* The certificate and the frozen problem of a step by the device are those of the step by the host. */
 START_TEST(rows_of_a_resident_step_are_read)
 {
@@ -548,8 +724,10 @@ int main(void)
     Suite *suite = suite_create("cuda_joint");
     if (!find_cuda_tables(tables)) return TEST_SKIPPED;
     ADD_CASE(suite, joints_are_solved_on_the_device, 0, tested_precisions());
-    ADD_CASE(suite, gears_and_tables_are_the_hosts, 0, tested_precisions());
+    ADD_CASE(suite, tables_and_gears_come_and_go, 0, tested_precisions());
     ADD_CASE(suite, resident_joints_equal_those_by_host, 0, tested_precisions() * WAYS);
+    ADD_CASE(suite, resident_gears_and_tables_equal_those_by_host, 0, tested_precisions() * WAYS);
+    ADD_CASE(suite, geared_worlds_are_saved, 0, tested_precisions());
     ADD_CASE(suite, joints_that_nothing_touches_are_solved_apart, 0, WAYS);
     ADD_CASE(suite, parts_of_any_size_are_solved, 0, 4);
     ADD_CASE(suite, rows_of_a_resident_step_are_read, 0, tested_precisions());

@@ -15,8 +15,7 @@
  * body on a hinge, with two gears.) Angles count on beyond full turns, and errors of the
  * ratio do not add up: they are fed back as those of locked coordinates. Method: docs/algorithm.md, section 10.
  *
- * Worlds with gears are stepped by the host on every backend. Threads and errors: as world.h says. Ids are values with
- * a generation, as bodies' are. */
+ * Threads and errors: as world.h says. Ids are values with a generation, as bodies' are. */
 #ifndef SUBADMM_GEAR_H
 #define SUBADMM_GEAR_H
 

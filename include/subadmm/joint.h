@@ -138,8 +138,7 @@ enum { SADMM_MOST_SPRING_POINTS = 64 };
  *
  * Implicit and of second order in the step, kinks included. Where loads rise with the position any table is stable
  * with any mass and step, as springs are. Where they fall (a spring that snaps through) the force is the one predicted
- * for the way of the step: a step should not take it far then, (1 / mass) |slope| dt^2 < 1 say. Worlds with tables are
- * stepped by the host on every backend.
+ * for the way of the step: a step should not take it far then, (1 / mass) |slope| dt^2 < 1 say.
  *
  * Errors: STALE_ID, INVALID_ARGUMENT (range; the coordinate is locked or not there; nothing changes), OUT_OF_MEMORY,
  * DEVICE. */

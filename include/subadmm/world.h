@@ -79,9 +79,9 @@ typedef enum sadmm_body_type {
     SADMM_BODY_STATIC,
     SADMM_BODY_KINEMATIC /* goes by its velocity, which nothing changes but the caller (sadmm_world_set_body_state,
                             sadmm_world_move_body), and pushes dynamic bodies as what has an infinite mass does; joints
-                            may hold on to it. It meets neither static nor kinematic bodies. Worlds with kinematic
-                            bodies are stepped by the host on every backend; on CUDA the solve of a step runs on the
-                            device */
+                            may hold on to it. It meets neither static nor kinematic bodies. On CUDA worlds with
+                            kinematic bodies are kept by the device as others are: what is set of them goes along with
+                            the next step */
 } sadmm_body_type;
 
 typedef struct sadmm_body_def {
@@ -288,9 +288,8 @@ SADMM_API sadmm_status sadmm_world_pair_friction_at(sadmm_world *world, int32_t 
 SADMM_API sadmm_status sadmm_world_step(sadmm_world *world);
 
 /* Begin a step and return without waiting for it, where the backend can: CUDA, in the method FAST from the second
- * step on; not in worlds with kinematic bodies, gears (gear.h) or tables of springs (joint.h), not with a
- * residual_tolerance, nor with a certificate_tolerance in the method PAPER or with more than 64 convergence checks a
- * step. Elsewhere the same as sadmm_world_step. Steps run in order, a few of them at a time; states, wrenches and
+ * step on; not with a residual_tolerance, nor with a certificate_tolerance in the method PAPER or with more than 64
+ * convergence checks a step. Elsewhere the same as sadmm_world_step. Steps run in order, a few of them at a time; states, wrenches and
  * settings set in between take effect at the next one. Getters wait for the steps begun so far. Errors: as
  * sadmm_world_step; they may be those of an earlier step, and then nothing after that step has been done
  * (sadmm_step_report.step counts what has). With settings.certify, or where events are recorded (events.h), the step is

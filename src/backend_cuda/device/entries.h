@@ -52,13 +52,15 @@ sadmm_status CUDA(step_world)(struct sadmm_context *, const struct sadmm_setting
 sadmm_status CUDA(wait_world)(struct sadmm_context *, struct sadmm_resident_report *, struct sadmm_error *);
 sadmm_status CUDA(read_bodies)(struct sadmm_context *, struct sadmm_rigid *, struct sadmm_steady *, double *wrench,
                                struct sadmm_error *);
+sadmm_status CUDA(read_driven)(struct sadmm_context *, struct sadmm_driven_body *, double *wrench, double *velocity,
+                               struct sadmm_error *);
 sadmm_status CUDA(read_contacts)(struct sadmm_context *, struct sadmm_contact_set *, struct sadmm_error *);
 sadmm_status CUDA(read_touching)(struct sadmm_context *, struct sadmm_touching_shapes *, struct sadmm_error *);
 sadmm_status CUDA(view_world)(struct sadmm_context *, struct sadmm_resident_view *, struct sadmm_error *);
 sadmm_status CUDA(read_start)(struct sadmm_context *, struct sadmm_rigid *, double *velocity, double *impulse,
                               struct sadmm_error *);
 sadmm_status CUDA(read_joints)(struct sadmm_context *, struct sadmm_joint_memory *, struct sadmm_coupling_memory *,
-                               struct sadmm_error *);
+                               double *gear_force, struct sadmm_error *);
 sadmm_status CUDA(read_rows)(struct sadmm_context *, struct sadmm_rows *, double *solution, double *velocity,
                              struct sadmm_error *);
 

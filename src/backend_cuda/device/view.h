@@ -265,6 +265,11 @@ struct joint_view {
     struct sadmm_joint_memory *after;                /* as it ends */
     const struct sadmm_coupling_memory *couplings_before; /* couplings: as the sub-step began; */
     struct sadmm_coupling_memory *couplings_after;        /* as it ends */
+    const double *tables;           /* of springs */
+    int32_t gears, first_gear;      /* how many, and the constraint of the first one: one each, after those of joints */
+    struct sadmm_resident_gear *gear;
+    const double *gear_before;      /* gears: force along the first coordinate, of the last (sub-)step; */
+    double *gear_after;             /* of this one */
     int32_t apart;                  /* as in cuda_step_guess */
     const int32_t *is_direct;       /* bodies: solved directly (step/joined.cu): 1 + the first body of its part; else 0.
                                        Then constraints: not 0. Those: */
@@ -281,6 +286,21 @@ struct joint_view {
     int32_t *touch;                 /* bodies: at labels of islands bits (core/model/joint_lead.h) */
 };
 
+/* Driven bodies of a world (step/driven.cu), and what islands ride on them. What the solve sees of both is in
+ * raw_view.system. */
+struct driven_view {
+    int32_t count;
+    const struct sadmm_driven_body *before; /* as the step began; */
+    struct sadmm_driven_body *after;        /* as it ends */
+    struct sadmm_rigid *moving;             /* as the sub-step at hand begins, with the velocities of the step */
+    double *wrench;                         /* x 6: what contacts give them, the mean over the step */
+    double *velocity;                       /* bodies x 6: where the solve starts, less what they are carried by */
+    int32_t *support;                       /* bodies: at labels of islands the first pair with what does not feel it; */
+    int32_t *several;                       /* not 0: there is something else that holds the island */
+    int32_t *moves;                         /* not 0: a driven body of a pair is in motion; */
+    int32_t *carries;                       /* and some island rides on one */
+};
+
 struct cuda_view {
     struct model_view model;
     struct body_view bodies;
@@ -292,8 +312,12 @@ struct cuda_view {
     struct iteration_view iteration;
     struct raw_view raw;
     struct cuda_step_view step; /* whole steps alone; */
-    struct joint_view joints;   /* likewise */
+    struct joint_view joints;   /* likewise; */
+    struct driven_view driven;  /* likewise */
 };
+
+/* In a whole step: is what the solve gives to be added to the motion that bodies are carried by? */
+static __device__ __forceinline__ bool is_carried(const cuda_view &v) { return v.driven.count > 0 && *v.driven.carries; }
 
 /* Programmatic dependent launch (launch_early): wait until all kernels enqueued before have ended. To be called before
  * anything is read that the kernel before writes. What that kernel does not write may be fetched earlier: the kernels

@@ -128,14 +128,20 @@ sadmm_status CUDA(enqueue_limit)(struct sadmm_context *c, bool suspected, struct
     return launch(c, limit_kernel, "limit", error);
 }
 
+sadmm_status CUDA(enqueue_pushed)(struct sadmm_context *c, struct sadmm_error *error)
+{
+    const cuda_args args = {};
+    if (c->view.raw.system.driven_count == 0) return SADMM_OK;
+    return CUDA(launch)(c, driven_kernel, "driven islands", blocks_for(c->view.contacts.pair_capacity), &args, error);
+}
+
 /* ---- entries ----------------------------------------------------------------------------------------------------- */
 
 extern "C" sadmm_status CUDA(limit_velocity)(struct sadmm_context *c, int32_t *limited, struct sadmm_error *error)
 {
     cuda_args args = {};
     CUDA_ENTER(c);
-    if (c->view.raw.system.driven_count > 0)
-        TRY(CUDA(launch)(c, driven_kernel, "driven islands", blocks_for(c->view.contacts.pair_capacity), &args, error));
+    TRY(CUDA(enqueue_pushed)(c, error));
     TRY(CUDA(enqueue_motions)(c, error));
     TRY(CUDA(enqueue_limit)(c, false, error));
     TRY(CUDA(launch)(c, slow_kernel, "limit_velocity", blocks_for(c->view.model.bodies), &args, error));

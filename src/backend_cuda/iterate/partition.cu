@@ -286,7 +286,7 @@ sadmm_status CUDA(choose_partition)(struct sadmm_context *c, const struct cuda_g
     if (code != cudaSuccess) return CUDA(fail)(c, code, "looking for blocks that run side by side", error);
     if (choice.why) return sadmm_fail(error, SADMM_ERROR_UNSUPPORTED, "the cuda tier asked for: %s", choice.why);
     *partition = choice.partition;
-    partition->islands = c->fast || c->plan.momentum || c->view.joints.count > 0;
+    partition->islands = c->fast || c->plan.momentum || c->view.joints.count > 0 || c->view.driven.count > 0;
     return SADMM_OK;
 }
 

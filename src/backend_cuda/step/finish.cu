@@ -184,6 +184,15 @@ static __device__ __forceinline__ bool store_impulses(const contact_view &contac
     return finite;
 }
 
+/* A driven body that moves jolts what it touches. */
+static __device__ __noinline__ int add_jolt(const cuda_view &v, int32_t p)
+{
+    const struct sadmm_contact_pair *pair = &v.raw.pairs[p];
+    if (!sadmm_pair_is_driven(&v.raw.system, pair)) return 0;
+    add_bits(&v.islands.touch[v.graph.label[pair->body_a >= 0 ? pair->body_a : pair->body_b]], TOUCH_JOLT);
+    return TOUCH_JOLT;
+}
+
 /* v.contacts.lanes threads a pair. */
 static __device__ __forceinline__ void finish_pair(const cuda_view &v, int32_t i)
 {
@@ -201,7 +210,8 @@ static __device__ __forceinline__ void finish_pair(const cuda_view &v, int32_t i
     if (live && !store_impulses(v.contacts, v.step, p, lane, pair, &depth))
         atomicMin(&control->offending_body, v.model.bodies + body);
     if (live && v.step.limits) {
-        const int ways = add_ways<true>(v, pair.ends, pair.first, pair.count, lane);
+        int ways = add_ways<true>(v, pair.ends, pair.first, pair.count, lane);
+        if (v.driven.count > 0 && lane == 0) ways |= add_jolt(v, p);
         if (ways & TOUCH_JOLT) v.islands.again[AGAIN] = 1;
         if (ways & TOUCH_CARRIED) v.islands.again[AGAIN_CLOSED] = 1;
     }

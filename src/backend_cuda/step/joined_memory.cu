@@ -5,6 +5,7 @@
 
 #include "backend_cuda/device/double.h"
 
+#include "core/model/gear_law.h"
 #include "core/base/memory.h"
 #include "core/model/joint_law.h"
 #include "core/solve/joined.h"
@@ -48,6 +49,8 @@ static bool make_order(const struct sadmm_resident_world *world, int32_t constra
     for (int32_t j = 0; j < world->joint_count; ++j)
         for (int32_t k = 0; k < world->joints[j].constraints; ++k)
             for (int s = 0; s < 2; ++s) bodies[at++] = world->joints[j].body[s];
+    for (int32_t g = 0; g < world->gear_count; ++g)
+        for (int s = 0; s < 2; ++s) bodies[at++] = world->gears[g].body[s];
     const bool made = sadmm_joined_order_make(order, bodies, constraints, world->body_count, SADMM_JOINED_AROUND);
     sadmm_free(bodies);
     return made;

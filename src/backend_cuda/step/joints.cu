@@ -15,6 +15,7 @@
 #include "backend_cuda/assemble/assemble.h"
 #include "core/model/coupling_law.h"
 #include "core/model/joint_lead.h"
+#include "joint_bodies.h"
 #include "move_joined.h"
 #include "world.h"
 
@@ -28,21 +29,6 @@ struct cuda_joint_middle {
 /* ---- rows -------------------------------------------------------------------------------------------------------- */
 
 enum { ROWS_THREADS = 64 }; /* a block: long work, many multiprocessors */
-
-static __device__ __forceinline__ struct joint_body body_of(const cuda_step_view &step, int32_t body)
-{
-    const struct joint_body out = {body, body >= 0 ? &step.before[body] : nullptr, false, false};
-    return out;
-}
-
-/* End a of a joint: a coupling's is its target. */
-static __device__ __forceinline__ struct joint_body body_a_of(const cuda_view &v,
-                                                              const struct sadmm_resident_joint *joint)
-{
-    if (joint->coupling < 0) return body_of(v.step, joint->body[0]);
-    const struct joint_body out = {-1, &v.joints.couplings_before[joint->coupling].target, true, true};
-    return out;
-}
 
 static __device__ __forceinline__ int or_lanes(int bits)
 {
@@ -120,12 +106,28 @@ static __device__ __forceinline__ void store_constraints(const cuda_view &v, con
     for (int c = lane; c < joint->constraints; c += LANES) {
         const int left = rows - SADMM_MAX_ROWS * c,
                   count = left < 0 ? 0 : left < SADMM_MAX_ROWS ? left : (int)SADMM_MAX_ROWS;
-        const struct sadmm_row_constraint out = {count > 0 ? joint->body[0] : -1, count > 0 ? joint->body[1] : -1,
+        const int32_t a = joint->body[0] >= 0 ? joint->body[0] : -1, b = joint->body[1] >= 0 ? joint->body[1] : -1;
+        const struct sadmm_row_constraint out = {count > 0 ? a : -1, count > 0 ? b : -1,
                                                  (first + c) * (int32_t)SADMM_MAX_ROWS, count, false, 0};
         const_cast<struct sadmm_row_constraint *>(v.raw.constraints)[first + c] = out;
     }
 }
 
+/* The table of the lane's spring; NULL: it has none. */
+static __device__ __forceinline__ const struct joint_table *table_of(const joint_view &joints,
+                                                                     const struct sadmm_resident_joint *joint, int lane,
+                                                                     struct joint_table *table)
+{
+    const int32_t points = joint->points[lane];
+    if (points == 0) return nullptr;
+    table->position = joints.tables + joint->table[lane];
+    table->load = table->position + points;
+    table->count = points;
+    return table;
+}
+
+/* TABLES: there are springs with tables. By itself: they take registers. */
+template <bool TABLES>
 static __global__ void __launch_bounds__(ROWS_THREADS)
     joint_rows_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args)
 {
@@ -143,12 +145,13 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
     struct joint_laws laws;
     laws.count = 0;
     if (enabled) {
-        const struct joint_body bodies[2] = {body_a_of(v, joint), body_of(v.step, joint->body[1])};
+        const struct joint_body bodies[2] = {body_a_of(v, joint), body_of(v, joint->body[1])};
         acting = joint_act(def, joint->frame, bodies, &settings);
     }
     if (coordinate) {
         moving = joint_moving_of(def, &v.joints.before[j], &acting, lane, &settings);
-        joint_coordinate_laws(def, lane, &moving, nullptr, &laws); /* worlds with tables are the host's */
+        struct joint_table table = {};
+        joint_coordinate_laws(def, lane, &moving, TABLES ? table_of(v.joints, joint, lane, &table) : nullptr, &laws);
     }
     int rows;
     const int at = place_laws(laws.count, coordinate && (def->locks >> lane & 1), lane, &rows);
@@ -262,7 +265,9 @@ static __device__ __forceinline__ void look_at_pair(const cuda_view &v, int32_t 
         touch.island |= __shfl_xor_sync((unsigned)ALL_LANES, touch.island, o);
         for (int s = 0; s < 2; ++s) touch.body[s] |= __shfl_xor_sync((unsigned)ALL_LANES, touch.body[s], o);
     }
-    if (looks && lane == 0 && joint_contacts_hold(&touch, bodies)) atomicOr(island_of(v, a, b), ISLAND_LEADS_STAY);
+    const bool driven = looks && v.driven.count > 0 && sadmm_pair_is_driven(&v.raw.system, pair);
+    if (looks && lane == 0 && (driven || joint_contacts_hold(&touch, bodies)))
+        atomicOr(island_of(v, a, b), ISLAND_LEADS_STAY);
 }
 
 /* args.count: threads for joints; the others are for pairs. */
@@ -291,7 +296,7 @@ static __global__ void __launch_bounds__(ROWS_THREADS)
 sadmm_status CUDA(launch_joint_move)(struct sadmm_context *c, struct sadmm_error *error)
 {
     const cuda_args args = {};
-    const int64_t bodies = c->view.model.bodies, joints = c->view.joints.count;
+    const int64_t bodies = c->view.model.bodies, joints = c->view.joints.count + c->view.joints.gears;
     return CUDA(launch_of)(c, joint_move_kernel, "bodies of joints",
                            ((bodies > joints ? bodies : joints) + ROWS_THREADS - 1) / ROWS_THREADS, ROWS_THREADS, &args,
                            error);
@@ -301,8 +306,9 @@ sadmm_status CUDA(launch_joint_rows)(struct sadmm_context *c, struct sadmm_error
 {
     cuda_args args = {};
     const int64_t threads = (int64_t)c->view.joints.count * LANES;
-    return CUDA(launch_of)(c, joint_rows_kernel, "rows of joints", (threads + ROWS_THREADS - 1) / ROWS_THREADS,
-                           ROWS_THREADS, &args, error);
+    TRY(CUDA(launch_of)(c, c->step->tables ? joint_rows_kernel<true> : joint_rows_kernel<false>, "rows of joints",
+                        (threads + ROWS_THREADS - 1) / ROWS_THREADS, ROWS_THREADS, &args, error));
+    return CUDA(launch_gear_rows)(c, error);
 }
 
 sadmm_status CUDA(launch_joint_solution)(struct sadmm_context *c, struct sadmm_error *error)
@@ -314,8 +320,9 @@ sadmm_status CUDA(launch_joint_solution)(struct sadmm_context *c, struct sadmm_e
                               : 0;
     if (blocks == 0) return SADMM_OK;
     args.count = (int32_t)(blocks * ROWS_THREADS);
-    return CUDA(launch_of)(c, joint_solution_kernel, "joints", blocks + (pairs + ROWS_THREADS - 1) / ROWS_THREADS,
-                           ROWS_THREADS, &args, error);
+    TRY(CUDA(launch_of)(c, joint_solution_kernel, "joints", blocks + (pairs + ROWS_THREADS - 1) / ROWS_THREADS,
+                        ROWS_THREADS, &args, error));
+    return CUDA(launch_gear_solution)(c, error);
 }
 
 /* ---- where they are ---------------------------------------------------------------------------------------------- */
@@ -359,6 +366,7 @@ void CUDA(view_joints)(struct sadmm_context *c, int into, int substep)
     joints->apart = s->apart;
     if (s->joints == 0) return;
     joints->joints = buffer<struct sadmm_resident_joint>(c, BUFFER_JOINTS);
+    joints->tables = buffer<double>(c, BUFFER_TABLES);
     joints->middle = middle_of(c);
     joints->first = first_of(c);
     joints->begin = memory_of(c, step_state(into, -1, substeps));
@@ -372,6 +380,7 @@ void CUDA(view_joints)(struct sadmm_context *c, int into, int substep)
     joints->solution = (double *)(row_set(c, into) + CUDA(raw_row_bytes)(s->joint_constraints));
     joints->velocity = joints->solution + (size_t)s->joint_constraints * SADMM_MAX_ROWS;
     joints->sources = (struct sadmm_joint_source *)(joints->velocity + 6 * (size_t)s->bodies);
+    CUDA(view_gears)(c, into, substep);
     if (s->apart) c->view.rows.count = 0;
 }
 
@@ -397,7 +406,7 @@ sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resid
 {
     struct cuda_step *s = c->step;
     const size_t n = (size_t)world->joint_count;
-    int64_t constraints = 0;
+    int64_t constraints = world->gear_count;
     for (size_t j = 0; j < n; ++j) constraints += world->joints[j].constraints;
     if (constraints > INT32_MAX / (8 * ROW))
         return sadmm_fail(error, SADMM_ERROR_LIMIT, "%lld constraints of joints: at most %d", (long long)constraints,
@@ -405,10 +414,13 @@ sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resid
     s->joints = c->view.joints.count = world->joint_count;
     s->joint_constraints = (int32_t)constraints;
     s->couplings = world->coupling_count;
+    s->gears = c->view.joints.gears = world->gear_count;
+    s->tables = world->table_numbers > 0;
     if (n == 0) return SADMM_OK;
     const cuda_capacity wanted[] = {
         {BUFFER_JOINTS,
          n * (sizeof(struct sadmm_resident_joint) + sizeof(struct cuda_joint_middle) + sizeof(int32_t))},
+        {BUFFER_TABLES, world->table_numbers * sizeof *world->tables},
         {BUFFER_JOINT_MEMORY, 3 * n * sizeof(struct sadmm_joint_memory)},
         {BUFFER_COUPLING_MEMORY, 3 * (size_t)s->couplings * sizeof(struct sadmm_coupling_memory)},
         {BUFFER_JOINT_ROWS, 2 * row_set_bytes(s)},
@@ -426,14 +438,20 @@ sadmm_status CUDA(load_joints)(struct sadmm_context *c, const struct sadmm_resid
     if (s->couplings > 0)
         TRY(CUDA(put)(c, couplings_of(c, 1 - s->into), world->coupling_memory,
                 (size_t)s->couplings * sizeof *world->coupling_memory, error));
+    if (s->tables)
+        TRY(CUDA(put)(c, c->buffers[BUFFER_TABLES].data, world->tables, world->table_numbers * sizeof *world->tables,
+                error));
+    TRY(CUDA(load_gears)(c, world, error));
     return put_first(c, world, error);
 }
 
 extern "C" sadmm_status CUDA(read_joints)(struct sadmm_context *c, struct sadmm_joint_memory *memory,
-                                          struct sadmm_coupling_memory *couplings, struct sadmm_error *error)
+                                          struct sadmm_coupling_memory *couplings, double *gear_force,
+                                          struct sadmm_error *error)
 {
     const struct cuda_step *s = c->step;
     CUDA_ENTER(c);
+    TRY(CUDA(read_gears)(c, gear_force, error));
     if (s->couplings > 0)
         TRY(CUDA(get)(c, couplings, couplings_of(c, 1 - s->into), (size_t)s->couplings * sizeof *couplings, error));
     return CUDA(get)(c, memory, memory_of(c, 1 - s->into), (size_t)s->joints * sizeof *memory, error);

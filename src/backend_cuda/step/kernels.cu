@@ -5,6 +5,8 @@
 
 #include "collision/bounds.h"
 #include "core/model/coupling_law.h"
+#include "core/model/driven.h"
+#include "core/model/gear_law.h"
 #include "core/model/joint_lead.h"
 
 #include "backend_cuda/device/plan_check.h"
@@ -37,6 +39,26 @@ static __device__ __forceinline__ void edit_joint(const joint_view &joints, int3
     const_cast<struct sadmm_joint_memory *>(joints.begin)[j].broken &= !def->enabled;
 }
 
+static __device__ __forceinline__ void edit_state(struct sadmm_rigid *body, struct sadmm_steady *steady,
+                                                  const double *values)
+{
+    steady_place(steady, body, values, values + 3);
+    for (int k = 0; k < 3; ++k) body->position[k] = values[k];
+    for (int k = 0; k < 4; ++k) body->orientation[k] = values[3 + k];
+    for (int k = 0; k < 6; ++k) body->velocity[k] = values[7 + k];
+}
+
+static __device__ __forceinline__ void edit_driven(const driven_view &driven, const struct sadmm_resident_edit &edit)
+{
+    struct sadmm_driven_body *body = &const_cast<struct sadmm_driven_body *>(driven.before)[sadmm_driven(edit.target)];
+    const double *values = edit.values;
+    if (edit.kind == SADMM_EDIT_STATE) return edit_state(&body->rigid, &body->steady, values);
+    body->target = values[0] != 0;
+    for (int k = 0; k < 3; ++k) body->position[k] = values[1 + k];
+    for (int k = 0; k < 4; ++k) body->orientation[k] = values[4 + k];
+    body->dt = values[8];
+}
+
 /* A thread an edit: no two have the same kind and target. */
 static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __grid_constant__ cuda_args args)
 {
@@ -55,12 +77,14 @@ static __global__ void edit_kernel(const __grid_constant__ cuda_view v, const __
         return;
     }
     if (edit.kind == SADMM_EDIT_JOINT) return edit_joint(v.joints, edit.target, values);
+    if (edit.kind == SADMM_EDIT_GEAR) {
+        v.joints.gear[edit.target].enabled = values[0] != 0;
+        return;
+    }
+    if (sadmm_body_is_driven(edit.target)) return edit_driven(v.driven, edit);
     struct sadmm_rigid *body = const_cast<struct sadmm_rigid *>(&v.step.before[edit.target]);
     if (edit.kind == SADMM_EDIT_STATE) {
-        steady_place(const_cast<struct sadmm_steady *>(&v.step.steady_before[edit.target]), body, values, values + 3);
-        for (int k = 0; k < 3; ++k) body->position[k] = values[k];
-        for (int k = 0; k < 4; ++k) body->orientation[k] = values[3 + k];
-        for (int k = 0; k < 6; ++k) body->velocity[k] = values[7 + k];
+        edit_state(body, const_cast<struct sadmm_steady *>(&v.step.steady_before[edit.target]), values);
     } else {
         for (int k = 0; k < 6; ++k) body->wrench[k] = values[k];
         body->gravity_scale = values[6];
@@ -292,13 +316,14 @@ sadmm_status CUDA(launch_start)(struct sadmm_context *c, struct sadmm_error *err
 {
     cuda_args args = {};
     const int64_t blocks = (int64_t)c->view.model.bodies * START_LANES / STEP_THREADS + 1;
-    return CUDA(launch_of)(c, start_step_kernel, "start", blocks, STEP_THREADS, &args, error);
+    TRY(CUDA(launch_of)(c, start_step_kernel, "start", blocks, STEP_THREADS, &args, error));
+    return CUDA(launch_driven_start)(c, error);
 }
 
 /* Joints whose bodies move at the very end, once it is known where they may go. */
 static int64_t moved_last(const struct sadmm_context *c)
 {
-    return c->view.joints.apart ? 0 : c->view.joints.count;
+    return c->view.joints.apart ? 0 : c->view.joints.count + c->view.joints.gears;
 }
 
 sadmm_status CUDA(launch_turn)(struct sadmm_context *c, struct sadmm_error *error)

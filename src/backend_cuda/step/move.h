@@ -51,6 +51,8 @@ static __device__ __forceinline__ void load_end_velocity(const cuda_view &v, int
     else
         for (int k = 0; k < 6; ++k) velocity[k] = v.bodies.state[(size_t)i * ROW + (size_t)k];
     for (int k = 0; k < 6; ++k) wide[k] = (double)velocity[k];
+    if (!is_carried(v)) return;
+    for (int k = 0; k < 6; ++k) wide[k] += v.raw.system.carried[6 * (size_t)i + (size_t)k];
 }
 
 /* Body i goes to `place`. */

@@ -2,6 +2,7 @@
 #ifndef SADMM_CUDA_STEP_MOVE_JOINED_H
 #define SADMM_CUDA_STEP_MOVE_JOINED_H
 
+#include "core/model/gear_law.h"
 #include "move.h"
 
 /* Body i of an island with joints goes where these let it. */
@@ -14,12 +15,20 @@ static __device__ __noinline__ void move_joined(const cuda_view &v, int32_t i, b
     store_moved(v, i, before, next, place, dt);
 }
 
-/* Joint j remembers how its bodies have been moved, once that is known. */
+/* Joint j remembers how its bodies have been moved, once that is known; behind the joints, of a gear the first one. */
 static __device__ __forceinline__ void end_joints(const cuda_view &v, int32_t j)
 {
     const joint_view &joints = v.joints;
-    if (j >= joints.count || joints.joints[j].constraints == 0) return;
-    const struct sadmm_row_constraint *first = &v.raw.constraints[joints.first[j]];
+    int32_t constraint;
+    if (j >= joints.count + joints.gears) return;
+    if (j >= joints.count) {
+        constraint = joints.first_gear + j - joints.count;
+        j = joints.gear[j - joints.count].joint[0];
+    } else {
+        if (joints.joints[j].constraints == 0) return;
+        constraint = joints.first[j];
+    }
+    const struct sadmm_row_constraint *first = &v.raw.constraints[constraint];
     if (first->count == 0) return;
     joints.after[j].leads_stay =
         joints.touch[joined_label(v, first->body_a >= 0 ? first->body_a : first->body_b)] & ISLAND_LEADS_STAY;

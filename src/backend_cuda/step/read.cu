@@ -1,6 +1,7 @@
 /* Whole steps on the device: the world and the report come back (step/world.h). */
 
 #include "collision/collision.h"
+#include "core/model/driven.h"
 #include "world.h"
 
 /* ---- the report ------------------------------------------------------------------------------------------------ */
@@ -58,6 +59,21 @@ extern "C" sadmm_status CUDA(read_bodies)(struct sadmm_context *c, struct sadmm_
     TRY(CUDA(get)(c, steady, c->view.step.steady_before, n * sizeof *steady, error));
     return CUDA(get)(c, wrench, buffer<double>(c, BUFFER_WORLD_WRENCH) + (size_t)(1 - s->into) * 6 * n,
                      6 * n * sizeof *wrench, error);
+}
+
+extern "C" sadmm_status CUDA(read_driven)(struct sadmm_context *c, struct sadmm_driven_body *driven, double *wrench,
+                                          double *velocity, struct sadmm_error *error)
+{
+    const struct cuda_step *s = c->step;
+    const size_t n = (size_t)s->driven;
+    CUDA_ENTER(c);
+    CUDA(view_into)(c, 1 - s->into, 0); /* of the last step */
+    const struct driven_view last = c->view.driven;
+    const double *velocities = c->view.raw.system.driven;
+    CUDA(view_into)(c, s->into, 0);
+    TRY(CUDA(get)(c, driven, last.after, n * sizeof *driven, error));
+    TRY(CUDA(get)(c, wrench, last.wrench, 6 * n * sizeof *wrench, error));
+    return CUDA(get)(c, velocity, velocities, 6 * n * sizeof *velocity, error);
 }
 
 extern "C" sadmm_status CUDA(view_world)(struct sadmm_context *c, struct sadmm_resident_view *out,

@@ -99,9 +99,11 @@ static sadmm_status record_joined(struct sadmm_context *c, bool after, struct sa
     return SADMM_OK;
 }
 
-/* A and b of the bodies, and joints: beside contact finding, of which they need nothing. */
+/* A and b of the bodies, and joints: beside contact finding, of which they need nothing. Where there are driven bodies,
+ * bodies wait for what they ride on. */
 static sadmm_status record_bodies(struct sadmm_context *c, struct sadmm_error *error)
 {
+    if (c->view.driven.count > 0) return CUDA(launch_joint_rows)(c, error);
     {
         side_branch side(c, c->side);
         CUDA_CALL(c, side.code, "a branch of the step");
@@ -111,10 +113,25 @@ static sadmm_status record_bodies(struct sadmm_context *c, struct sadmm_error *e
     return c->view.joints.count > 0 ? record_joints(c, error) : SADMM_OK;
 }
 
+/* record_plan where there are driven bodies: one after the other. */
+static sadmm_status record_driven_plan(struct sadmm_context *c, struct sadmm_error *error)
+{
+    TRY(CUDA(enqueue_statistics_and_layout)(c, slots_by_island(&c->partition), &c->partition, error));
+    TRY(CUDA(launch_carry)(c, error));
+    TRY(CUDA(enqueue_bodies)(c, error));
+    TRY(CUDA(assemble_contacts)(c, error));
+    if (c->view.joints.count == 0) return SADMM_OK;
+    TRY(CUDA(assemble_rows)(c, error));
+    if (c->fast) TRY(CUDA(enqueue_row_responses)(c, error));
+    TRY(record_joined(c, false, error));
+    return wait_for_joints(c, error);
+}
+
 /* Graph statistics and layout; beside them contacts in the solver's form, what weights take from pairs, and joined
  * bodies that do not wait for the layout. */
 static sadmm_status record_plan(struct sadmm_context *c, struct sadmm_error *error)
 {
+    if (c->view.driven.count > 0) return record_driven_plan(c, error);
     const bool together = c->view.joints.count > 0 && !c->view.joints.apart, beside = together && joined_is_small(c);
     if (together) TRY(wait_for_joints(c, error)); /* the graph is of their rows, too */
     if (beside) TRY(record_joined(c, false, error));
@@ -145,6 +162,7 @@ static sadmm_status record_motions(struct sadmm_context *c, struct sadmm_error *
 
 static sadmm_status record_limit(struct sadmm_context *c, bool suspected, struct sadmm_error *error)
 {
+    TRY(CUDA(enqueue_pushed)(c, error));
     if (motions_beside(c)) CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
     else TRY(CUDA(enqueue_motions)(c, error));
     return CUDA(enqueue_limit)(c, suspected, error);
@@ -168,6 +186,7 @@ static sadmm_status record_finish(struct sadmm_context *c, bool residuals, struc
         TRY(wait_for_joints(c, error));
         TRY(CUDA(launch_joint_solution)(c, error));
     }
+    TRY(CUDA(launch_driven_finish)(c, error));
     if (residuals) CUDA_CALL(c, cudaStreamWaitEvent(c->stream, c->join, 0), "cudaStreamWaitEvent");
     return SADMM_OK;
 }

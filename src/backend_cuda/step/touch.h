@@ -17,13 +17,14 @@ template <bool WHOLE> static __device__ __forceinline__ lead_body load_lead_body
     const struct sadmm_rigid *rigid = &v.raw.system.rigid[body];
     lead_body out;
     solver_real velocity[6];
+    const bool carried = WHOLE ? is_carried(v) : v.raw.system.carried != nullptr;
     if (WHOLE) end_velocity(v, body, velocity);
     else
         for (int k = 0; k < 6; ++k) velocity[k] = v.bodies.state[(size_t)body * ROW + (size_t)k];
     for (int k = 0; k < 6; ++k) {
         out.before[k] = rigid->velocity[k];
         out.velocity[k] = (double)velocity[k];
-        if (!WHOLE && v.raw.system.carried) out.velocity[k] += v.raw.system.carried[6 * (size_t)body + (size_t)k];
+        if (carried) out.velocity[k] += v.raw.system.carried[6 * (size_t)body + (size_t)k];
     }
     lead_own(rigid->velocity, out.velocity, rigid_is_isotropic(v3_load(rigid->inertia)), out.lead);
     return out;

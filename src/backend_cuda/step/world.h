@@ -5,6 +5,7 @@
  *   record.cu  a step as a graph
  *   queue.cu   run steps and see what became of them; repeat those whose plan did not hold
  *   read.cu    bring the world and the report back
+ *   driven.cu, joints.cu, gears.cu, joined.cu   driven bodies, joints, gears, and bodies joined by them
  */
 #ifndef SADMM_CUDA_STEP_WORLD_H
 #define SADMM_CUDA_STEP_WORLD_H
@@ -40,8 +41,9 @@ enum { LEAST_PATIENCE = 16, MOST_PATIENCE = 1 << 16 };
 
 struct cuda_step {
     struct sadmm_cuda_collision *collision;
-    int32_t bodies, slots;
-    int32_t joints, joint_constraints, couplings;
+    int32_t bodies, slots, driven;
+    int32_t joints, joint_constraints, couplings, gears;
+    bool tables;                /* some joint has one of a spring */
     int32_t joined_parts;       /* of bodies that are solved directly (joined.cu); */
     size_t joined_numbers, joined_work; /* of all their structures and work, */
     size_t joined_bytes;        /* the most that one has of both, where blocks have that in their own memory; else 0 */
@@ -124,6 +126,22 @@ sadmm_status CUDA(launch_turn)(struct sadmm_context *, struct sadmm_error *error
 sadmm_status CUDA(launch_admit)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_finish)(struct sadmm_context *, struct sadmm_error *error);
 sadmm_status CUDA(launch_commit)(struct sadmm_context *, struct sadmm_error *error);
+
+/* driven.cu: take over a world's driven bodies; where they are; */
+sadmm_status CUDA(load_driven)(struct sadmm_context *, const struct sadmm_resident_world *, struct sadmm_error *error);
+void CUDA(view_driven)(struct sadmm_context *, int into);
+/* their velocities and poses as the step begins; once islands are known, what these ride on; */
+sadmm_status CUDA(launch_driven_start)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_carry)(struct sadmm_context *, struct sadmm_error *error);
+/* and the end of a (sub-)step: poses, and what contacts give them. */
+sadmm_status CUDA(launch_driven_finish)(struct sadmm_context *, struct sadmm_error *error);
+
+/* gears.cu: the same for gears, of which joints.cu sees to all of this: */
+sadmm_status CUDA(load_gears)(struct sadmm_context *, const struct sadmm_resident_world *, struct sadmm_error *error);
+void CUDA(view_gears)(struct sadmm_context *, int into, int substep);
+sadmm_status CUDA(launch_gear_rows)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(launch_gear_solution)(struct sadmm_context *, struct sadmm_error *error);
+sadmm_status CUDA(read_gears)(struct sadmm_context *, double *force, struct sadmm_error *error);
 
 /* joints.cu: take over a world's joints; where they are in a sub-step of the step that ends in `into`. */
 sadmm_status CUDA(load_joints)(struct sadmm_context *, const struct sadmm_resident_world *, struct sadmm_error *error);

@@ -55,6 +55,7 @@ static void count(struct sadmm_context *c)
     v->model.points = c->plan.points;
     v->rows.count = (int32_t)sadmm_row_constraint_count(c->system);
     v->joints.count = 0;
+    v->driven.count = 0;
     v->model.contact_rows = c->plan.contact_rows;
     v->model.warm_start = c->plan.warm_start;
     c->bounces = false;

@@ -40,9 +40,12 @@ struct sadmm_joint_memory {
 struct sadmm_resident_joint {
     sadmm_joint_def def;
     int32_t constraints;         /* that its rows may take, of up to six each */
-    int32_t body[2];             /* dynamic body; -1: it does not move, and its frame is in the world */
+    int32_t body[2];             /* dynamic body, or a driven one (base/contact_set.h); -1: it does not move, and its
+                                    frame is in the world */
     struct joint_frame frame[2];
     int32_t coupling;            /* number of the coupling whose target its frame a is; -1: none */
+    int32_t table[JOINT_COORDINATES];  /* of a coordinate's spring: where its positions begin, then loads, among all */
+    int32_t points[JOINT_COORDINATES]; /* tables' numbers (solve/resident.h); its points, 0: it has none */
 };
 
 /* The joint's row that a row of the step is. */

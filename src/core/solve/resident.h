@@ -21,6 +21,8 @@ struct sadmm_collision_input;
 struct sadmm_resident_joint; /* core/model/joint_law.h */
 struct sadmm_joint_memory;
 struct sadmm_coupling_memory; /* core/model/coupling_law.h */
+struct sadmm_driven_body;     /* core/model/driven.h */
+struct sadmm_resident_gear;   /* core/model/gear_law.h */
 
 /* A world, from the host. */
 struct sadmm_resident_world {
@@ -29,26 +31,36 @@ struct sadmm_resident_world {
     const struct sadmm_rigid *rigid;           /* (body_count) */
     const struct sadmm_steady *steady;         /* (body_count) */
     const int32_t *slot_of;                    /* (body_count) body slot */
+    int32_t driven_count;
+    const struct sadmm_driven_body *driven;    /* (driven_count) none with a target: these come as edits */
     const struct sadmm_contact_set *contacts;  /* of the last step, with impulses */
     int32_t joint_count;
     const struct sadmm_resident_joint *joints;      /* (joint_count) */
     const struct sadmm_joint_memory *joint_memory;  /* (joint_count) of the last step */
+    size_t table_numbers;
+    const double *tables;                      /* (table_numbers) of springs, as joints say */
     int32_t coupling_count;
     const struct sadmm_coupling_memory *coupling_memory; /* (coupling_count) likewise */
+    int32_t gear_count;
+    const struct sadmm_resident_gear *gears;   /* (gear_count) */
+    const double *gear_force;                  /* (gear_count) along the first coordinate, of the last step: N or N m */
     double time;                               /* simulated until now, s */
 };
 
 enum sadmm_edit_kind {
-    SADMM_EDIT_STATE,    /* target: a dynamic body; position (3), orientation (4), velocity (6) */
+    SADMM_EDIT_STATE,    /* target: a dynamic body, or a driven one; position (3), orientation (4), velocity (6) */
     SADMM_EDIT_FORCES,   /* target: a dynamic body; force, torque (6), scale of gravity, damping (2) */
+    SADMM_EDIT_TARGET,   /* target: a driven body; 1: it is to be there after the step, 0: it goes by its velocity;
+                            position (3), orientation (4), the length of the step (s) */
     SADMM_EDIT_SETTINGS, /* sadmm_settings_numbers(): a backend's own, from what `step` is given */
     SADMM_EDIT_JOINT,    /* target: SADMM_JOINT_TARGETS joint + k; k < 6: the numbers of that coordinate
                             (joint_coordinate_numbers); k = 6: enabled (1 or 0); k = 7: a coupling's target: position
                             (3), orientation (4), velocity (6) */
+    SADMM_EDIT_GEAR,     /* target: a gear; enabled (1 or 0) */
     SADMM_EDIT_KINDS
 };
 enum { SADMM_JOINT_TARGETS = 8 }; /* a joint */
-enum { SADMM_EDIT_VALUES = 14, SADMM_BODY_EDITS = 2 /* the kinds of a body, the first ones */ };
+enum { SADMM_EDIT_VALUES = 14, SADMM_BODY_EDITS = 3 /* the kinds of a body, the first ones */ };
 
 /* A change between two steps. There is at most one of a kind and target, so that their order does not matter. */
 struct sadmm_resident_edit {
@@ -75,7 +87,7 @@ struct sadmm_resident_report {
     struct {
         double total, collide, assemble, solve, finish;
     } ms;                      /* on the backend's own clock */
-    int32_t offending_body;           /* NON_FINITE: a body that is not finite, -1: unknown */
+    int32_t offending_body;           /* NON_FINITE: a body that is not finite (below: a driven one), -1: unknown */
 };
 
 /* Where a backend has bodies after the last step done: pointers of its device's memory, not to be written to. */
@@ -100,6 +112,10 @@ struct sadmm_resident_kernels {
     /* The world after the last step done; any pointer may be NULL. Nothing may be enqueued. */
     sadmm_status (*read_bodies)(struct sadmm_context *, struct sadmm_rigid *rigid, struct sadmm_steady *steady,
                                 double *wrench /* (bodies x 6) */, struct sadmm_error *);
+    /* Driven bodies after the last step done, what contacts gave them in it (driven_count x 6), and the velocities that
+     * they had in it (driven_count x 6); any pointer may be NULL. Nothing may be enqueued. */
+    sadmm_status (*read_driven)(struct sadmm_context *, struct sadmm_driven_body *, double *wrench, double *velocity,
+                                struct sadmm_error *);
     /* Until the next step, or load. Nothing may be enqueued. */
     sadmm_status (*view)(struct sadmm_context *, struct sadmm_resident_view *, struct sadmm_error *);
     /* Contacts of the last step done, with its impulses. Nothing may be enqueued. */
@@ -111,12 +127,12 @@ struct sadmm_resident_kernels {
      * s); any pointer may be NULL. Nothing may be enqueued. */
     sadmm_status (*read_start)(struct sadmm_context *, struct sadmm_rigid *rigid, double *velocity, double *impulse,
                                struct sadmm_error *);
-    /* What joints and couplings keep after the last step done. Nothing may be enqueued. */
+    /* What joints, couplings and gears keep after the last step done. Nothing may be enqueued. */
     sadmm_status (*read_joints)(struct sadmm_context *, struct sadmm_joint_memory *, struct sadmm_coupling_memory *,
-                                struct sadmm_error *);
-    /* Rows of the joints in the last step done, with the multipliers that it started from, and the solution's (six a
-     * constraint that joints may have, at most) and velocities (bodies x 6): where there are joints, bodies need not
-     * end with these. Nothing may be enqueued. */
+                                double *gear_force, struct sadmm_error *);
+    /* Rows of the joints and gears in the last step done, with the multipliers that it started from, and the solution's
+     * (six a constraint that these may have, at most) and velocities (bodies x 6): where there are joints, bodies need
+     * not end with these. Nothing may be enqueued. */
     sadmm_status (*read_rows)(struct sadmm_context *, struct sadmm_rows *rows, double *solution, double *velocity,
                               struct sadmm_error *);
 };

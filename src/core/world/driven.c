@@ -1,5 +1,5 @@
-/* Kinematic bodies in a step: driven ones (core/base/contact_set.h). Each goes by its velocity, which is the caller's,
- * and feels nothing. Those that are moved to a pose go there by the velocity that brings them there.
+/* Kinematic bodies in a step that the host makes: driven ones (core/model/driven.h). A backend that keeps the world does
+ * the same (backend_cuda/step/driven.cu).
  *
  * An island whose only support is one of them rides on it. With c the rigid motion of that body, taken at the island's
  * bodies, v = c + v' is a change of variables: A v' = (b - A c) + J^T lambda, contacts between the bodies see no more
@@ -7,12 +7,10 @@
  * the method `fast` makes of velocities and energies (loads of first steps, weights, the limit) is what it is on the
  * ground: a stack in a lift stands as well as one beside it. Others, a row that a wall pushes over the floor, are
  * solved for v. */
-#include <math.h>
 #include <string.h>
 
 #include "core/base/memory.h"
-#include "core/math/joint.h"
-#include "core/math/rigid.h"
+#include "core/model/driven.h"
 #include "core/model/islands.h"
 #include "world_internal.h"
 
@@ -34,15 +32,6 @@ void sadmm_world_remove_driven(sadmm_world *world, int32_t slot)
     while (world->driven_slots[at] != slot) ++at;
     --world->driven_count;
     for (; at < world->driven_count; ++at) world->driven_slots[at] = world->driven_slots[at + 1];
-}
-
-/* The velocity that brings the body where it is to be in dt. */
-static void velocity_to(const struct sadmm_world_body *body, double dt, double velocity[6])
-{
-    const struct sadmm_rigid *rigid = &body->rigid;
-    const quat turn = q_mul(q_load(body->target.orientation), q_conjugate(q_load(rigid->orientation)));
-    for (int k = 0; k < 3; ++k) velocity[k] = (body->target.position[k] - rigid->position[k]) / dt;
-    v3_store(v3_scale(q_log(turn), 1 / dt), velocity + 3);
 }
 
 sadmm_status sadmm_world_slot_not_finite(sadmm_world *world, int32_t slot)
@@ -70,7 +59,9 @@ sadmm_status sadmm_world_gather_driven(sadmm_world *world)
         driven->slot = slot;
         driven->rigid = driven->next = body->rigid;
         memset(driven->wrench, 0, sizeof driven->wrench);
-        if (body->target.set) velocity_to(body, world->def.settings.dt, driven->rigid.velocity);
+        if (body->target.set)
+            driven_velocity_to(&body->rigid, body->target.position, body->target.orientation, world->def.settings.dt,
+                               driven->rigid.velocity);
         memcpy(velocity, driven->rigid.velocity, sizeof driven->rigid.velocity);
         memcpy(world->collision_bodies[slot].velocity, velocity, sizeof driven->rigid.velocity);
     }
@@ -83,22 +74,11 @@ sadmm_status sadmm_world_gather_driven(sadmm_world *world)
 /* Of an island, in place of a driven body: nothing yet; the floor, or several that do not move as one. */
 enum { UNSUPPORTED = 0, SEVERAL = 1 };
 
-/* Do two supports (-1: the static world) move as one? */
-static bool same_motion(const struct sadmm_system *system, int32_t a, int32_t b)
-{
-    if (a == b) return true;
-    if (a >= 0 || b >= 0 || a == -1 || b == -1) return false;
-    const double *va = sadmm_driven_velocity(system, a), *vb = sadmm_driven_velocity(system, b);
-    for (int k = 0; k < 3; ++k)
-        if (va[k] != vb[k] || va[k + 3] != 0 || vb[k + 3] != 0) return false;
-    return true;
-}
-
 static void support(const struct sadmm_world *world, const struct sadmm_system *system, int32_t body, int32_t by)
 {
     int32_t *carrier = &world->carriers[world->carried_labels[body]];
     if (*carrier == UNSUPPORTED) *carrier = by;
-    else if (!same_motion(system, *carrier, by)) *carrier = SEVERAL;
+    else if (!driven_same_motion(system, *carrier, by)) *carrier = SEVERAL;
 }
 
 /* What every island rides on, at its label. False: none rides on anything. */
@@ -122,15 +102,6 @@ static bool find_carriers(sadmm_world *world, const struct sadmm_system *system)
     return any;
 }
 
-/* Of a driven body, at a place (m, world). */
-static void motion_at(const sadmm_world *world, int32_t body, const double place[3], double motion[6])
-{
-    const struct sadmm_rigid *rigid = &world->driven[sadmm_driven(body)].rigid;
-    const vec3 arm = v3_sub(v3_load(place), v3_load(rigid->position)), spin = v3_load(rigid->velocity + 3);
-    v3_store(v3_add(v3_load(rigid->velocity), v3_cross(spin, arm)), motion);
-    v3_store(spin, motion + 3);
-}
-
 static bool any_driven(const struct sadmm_system *system)
 {
     for (size_t p = 0; system->driven_count > 0 && p < system->contacts->pair_count; ++p)
@@ -152,7 +123,7 @@ sadmm_status sadmm_world_carry(sadmm_world *world, struct sadmm_system *system)
         const int32_t by = world->carriers[world->carried_labels[i]];
         double *motion = world->carried + 6 * i;
         memset(motion, 0, 6 * sizeof *motion);
-        if (sadmm_body_is_driven(by)) motion_at(world, by, system->rigid[i].position, motion);
+        if (sadmm_body_is_driven(by)) driven_motion_at(&world->driven[sadmm_driven(by)].rigid, system->rigid[i].position, motion);
         for (int k = 0; k < 6; ++k) system->velocity[6 * i + (size_t)k] -= motion[k];
     }
     system->carried = world->carried;
@@ -171,15 +142,8 @@ sadmm_status sadmm_world_move_driven(sadmm_world *world, const sadmm_settings *s
 {
     for (int32_t k = 0; k < world->start.driven_count; ++k) {
         struct sadmm_world_driven *driven = &world->driven[k];
-        const struct sadmm_rigid *from = &driven->rigid;
-        double sum = 0;
-        driven->next = *from;
-        v3_store(rigid_move(v3_load(from->position), v3_load(from->velocity), settings->dt), driven->next.position);
-        q_store(rigid_turn(q_load(from->orientation), v3_load(from->velocity + 3), settings->dt),
-                driven->next.orientation);
-        for (int j = 0; j < 3; ++j) sum += driven->next.position[j] - driven->next.position[j];
-        for (int j = 0; j < 4; ++j) sum += driven->next.orientation[j] - driven->next.orientation[j];
-        if (sum != 0) return sadmm_world_slot_not_finite(world, driven->slot);
+        if (!driven_move(&driven->rigid, settings->dt, &driven->next))
+            return sadmm_world_slot_not_finite(world, driven->slot);
     }
     return SADMM_OK;
 }
@@ -195,17 +159,6 @@ void sadmm_world_turn_driven(sadmm_world *world)
     }
 }
 
-/* Adds what a point's impulse (on b) gives the body at `arm`; sign +1: it is b. */
-static void add_impulse(double wrench[6], const double impulse[3], const double arm[3], double share)
-{
-    double torque[3];
-    v3_store(v3_cross(v3_load(arm), v3_load(impulse)), torque);
-    for (int k = 0; k < 3; ++k) {
-        wrench[k] += share * impulse[k];
-        wrench[k + 3] += share * torque[k];
-    }
-}
-
 void sadmm_world_add_driven_wrenches(sadmm_world *world, const sadmm_settings *settings)
 {
     if (world->start.driven_count == 0) return;
@@ -217,7 +170,9 @@ void sadmm_world_add_driven_wrenches(sadmm_world *world, const sadmm_settings *s
         struct sadmm_world_driven *driven = &world->driven[sadmm_driven(on_b ? pair->body_b : pair->body_a)];
         for (int32_t k = pair->first; k < pair->first + pair->count; ++k) {
             const struct sadmm_contact_point *point = &world->contacts.points[k];
-            add_impulse(driven->wrench, point->impulse, on_b ? point->arm_b : point->arm_a, on_b ? share : -share);
+            for (int j = 0; j < 6; ++j)
+                driven->wrench[j] +=
+                    driven_load(on_b ? point->arm_b : point->arm_a, point->impulse, on_b ? share : -share, j);
         }
     }
 }
@@ -230,9 +185,7 @@ void sadmm_world_commit_driven(sadmm_world *world)
         body->rigid = driven->next;
         if (world->plan.wrenches) memcpy(body->contact_wrench, driven->wrench, sizeof body->contact_wrench);
         if (!body->target.set) continue;
-        memcpy(body->rigid.position, body->target.position, sizeof body->rigid.position);
-        memcpy(body->rigid.orientation, body->target.orientation, sizeof body->rigid.orientation);
-        memset(body->rigid.velocity, 0, sizeof body->rigid.velocity);
+        driven_arrive(body->target.position, body->target.orientation, &body->rigid);
         body->target.set = false;
     }
 }

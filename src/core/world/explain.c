@@ -37,7 +37,7 @@ static void explain_constraints(struct text *t, const struct sadmm_plan *plan, i
 
 static void explain_driven(struct text *t, int32_t count)
 {
-    if (count > 0) line(t, "driven       %d kinematic bodies; steps are made by the host\n", count);
+    if (count > 0) line(t, "driven       %d kinematic bodies\n", count);
 }
 
 static void explain_options(struct text *t, const struct sadmm_plan *plan, const sadmm_settings *s)

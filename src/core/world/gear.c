@@ -157,6 +157,7 @@ sadmm_status sadmm_world_set_gear_enabled(sadmm_world *world, sadmm_gear_id id, 
     struct sadmm_world_gear *gear = sadmm_world_find_gear(world, id, "id", &world->error);
     if (!gear) return SADMM_ERROR_STALE_ID;
     gear->def.enabled = enabled;
+    sadmm_world_edit_gear(world, gear);
     return SADMM_OK;
 }
 

@@ -24,13 +24,12 @@ enum { MOST_CHECKS = 64 };
 
 bool sadmm_world_may_reside(const sadmm_world *world)
 {
-    /* Gears, tables of springs and kinematic bodies are the host's. Of the stop rules a backend checks the
-     * certificate's in the method FAST alone; and the loads of a first step are predicted on the host. */
+    /* Of the stop rules a backend checks the certificate's in the method FAST alone; and the loads of a first step are
+     * predicted on the host. */
     const sadmm_settings settings = sadmm_settings_of_substep(&world->def.settings), *s = &settings;
     const bool fast = s->method == SADMM_METHOD_FAST,
                few_checks = (s->iterations - 1) / s->check_period < MOST_CHECKS / s->substeps;
-    if ((fast && !world->stepped) || world->gear_count > 0 || world->table_count > 0 || world->driven_count > 0)
-        return false;
+    if (fast && !world->stepped) return false;
     return world->kernels->resident && s->residual_tolerance <= 0 &&
            (s->certificate_tolerance <= 0 || (fast && few_checks));
 }
@@ -53,17 +52,19 @@ void sadmm_world_edit(sadmm_world *world, struct sadmm_world_body *body, enum sa
 }
 
 /* What was set for steps that have not been done goes along with the next one. */
+static void edit_body_again(sadmm_world *world, struct sadmm_world_body *body)
+{
+    for (int kind = 0; kind < SADMM_BODY_EDITS; ++kind) {
+        if (body->set_at[kind] < world->resident.done) continue;
+        mark(world, body, UINT32_C(1) << kind);
+        body->set_at[kind] = world->resident.done;
+    }
+}
+
 static void edit_again(sadmm_world *world)
 {
-    const int64_t done = world->resident.done;
-    for (int32_t i = 0; i < world->dynamic_count; ++i) {
-        struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
-        for (int kind = 0; kind < SADMM_BODY_EDITS; ++kind) {
-            if (body->set_at[kind] < done) continue;
-            mark(world, body, UINT32_C(1) << kind);
-            body->set_at[kind] = done;
-        }
-    }
+    for (int32_t i = 0; i < world->dynamic_count; ++i) edit_body_again(world, &world->bodies[world->slot_of[i]]);
+    for (int32_t k = 0; k < world->driven_count; ++k) edit_body_again(world, &world->bodies[world->driven_slots[k]]);
     sadmm_world_edit_joints_again(world);
 }
 
@@ -74,7 +75,8 @@ static void forget_edits(sadmm_world *world)
     sadmm_world_forget_joint_edits(world);
 }
 
-static void put_edit(struct sadmm_resident_edit *edit, const struct sadmm_world_body *body, enum sadmm_edit_kind kind)
+static void put_edit(const sadmm_world *world, struct sadmm_resident_edit *edit, const struct sadmm_world_body *body,
+                     enum sadmm_edit_kind kind)
 {
     const struct sadmm_rigid *rigid = &body->rigid;
     memset(edit, 0, sizeof *edit);
@@ -84,6 +86,11 @@ static void put_edit(struct sadmm_resident_edit *edit, const struct sadmm_world_
         memcpy(edit->values, rigid->position, sizeof rigid->position);
         memcpy(edit->values + 3, rigid->orientation, sizeof rigid->orientation);
         memcpy(edit->values + 7, rigid->velocity, sizeof rigid->velocity);
+    } else if (kind == SADMM_EDIT_TARGET) {
+        edit->values[0] = body->target.set;
+        memcpy(edit->values + 1, body->target.position, sizeof body->target.position);
+        memcpy(edit->values + 4, body->target.orientation, sizeof body->target.orientation);
+        edit->values[8] = world->def.settings.dt;
     } else {
         memcpy(edit->values, rigid->wrench, sizeof rigid->wrench);
         edit->values[6] = rigid->gravity_scale;
@@ -100,7 +107,8 @@ static sadmm_status list_edits(sadmm_world *world, size_t *count)
     for (size_t k = 0; k < world->resident.edited_count; ++k) {
         const struct sadmm_world_body *body = &world->bodies[world->resident.edited[k]];
         for (int kind = 0; kind < SADMM_BODY_EDITS; ++kind)
-            if (body->edits >> kind & 1) put_edit(&world->resident.edits[(*count)++], body, (enum sadmm_edit_kind)kind);
+            if (body->edits >> kind & 1)
+                put_edit(world, &world->resident.edits[(*count)++], body, (enum sadmm_edit_kind)kind);
     }
     return sadmm_world_list_joint_edits(world, count);
 }
@@ -108,25 +116,33 @@ static sadmm_status list_edits(sadmm_world *world, size_t *count)
 /* ---- to the backend ---------------------------------------------------------------------------------------------- */
 
 /* The world as it is now. What the last step started from stays: it can be read until a step is done. */
+static void begin_edits(struct sadmm_world_body *body)
+{
+    body->edits = 0;
+    for (int kind = 0; kind < SADMM_BODY_EDITS; ++kind) body->set_at[kind] = -1;
+}
+
 static sadmm_status load(sadmm_world *world)
 {
-    size_t n = (size_t)world->dynamic_count;
+    size_t n = (size_t)world->dynamic_count, driven = (size_t)world->driven_count;
     sadmm_world_swap_starts(world);
     sadmm_status status = sadmm_world_gather(world);
     sadmm_world_swap_starts(world);
     TRY(status);
     if (!sadmm_grow(&world->resident.steady, &world->resident.steady_capacity, 0, n + 1,
                     sizeof *world->resident.steady) ||
-        !sadmm_grow(&world->resident.edited, &world->resident.edited_capacity, 0, n + 1,
+        !sadmm_grow(&world->resident.edited, &world->resident.edited_capacity, 0, n + driven + 1,
                     sizeof *world->resident.edited))
         return sadmm_fail_memory(&world->error, "the step");
     for (size_t i = 0; i < n; ++i) {
         struct sadmm_world_body *body = &world->bodies[world->slot_of[i]];
         world->resident.steady[i] = body->steady;
-        body->edits = 0;
-        for (int kind = 0; kind < SADMM_BODY_EDITS; ++kind) body->set_at[kind] = -1;
+        begin_edits(body);
     }
+    for (size_t k = 0; k < driven; ++k) begin_edits(&world->bodies[world->driven_slots[k]]);
+    TRY(sadmm_world_list_driven(world));
     TRY(sadmm_world_list_joints(world));
+    TRY(sadmm_world_list_gears(world));
     struct sadmm_collision_input input = sadmm_world_collision_input(world, 0);
     struct sadmm_resident_world whole = {
         .input = &input,
@@ -134,18 +150,29 @@ static sadmm_status load(sadmm_world *world)
         .rigid = world->last_start.rigid,
         .steady = world->resident.steady,
         .slot_of = world->slot_of,
+        .driven_count = world->driven_count,
+        .driven = world->resident.driven,
         .contacts = &world->contacts,
         .joint_count = world->resident.joint_count,
         .joints = world->resident.joints,
         .joint_memory = world->resident.memory,
+        .table_numbers = world->resident.table_numbers,
+        .tables = world->resident.tables,
         .coupling_count = world->resident.coupling_count,
         .coupling_memory = world->resident.coupling_memory,
+        .gear_count = world->resident.gear_count,
+        .gears = world->resident.gears,
+        .gear_force = world->resident.gear_force,
         .time = world->report.time,
     };
     TRY(world->kernels->resident->load(world->context, &whole, &world->def.settings, &world->error));
     world->resident.loaded = true;
     world->resident.enqueued = world->resident.done = world->resident.repeats = 0;
     world->resident.edited_count = 0;
+    for (size_t k = 0; k < driven; ++k) {
+        struct sadmm_world_body *body = &world->bodies[world->driven_slots[k]];
+        if (body->target.set) sadmm_world_edit(world, body, SADMM_EDIT_TARGET);
+    }
     world->resident.kept_step = world->report.step;
     world->resident.kept_time = world->report.time;
     return SADMM_OK;
@@ -217,7 +244,6 @@ static void take_report(sadmm_world *world, const struct sadmm_resident_report *
     world->resident.bodies_behind = world->resident.contacts_behind = true;
     world->resident.joints_behind = world->resident.joint_count > 0;
     world->stepped = world->contacts_readable = true;
-    world->start.driven_count = 0; /* of a step by the host, when there were kinematic bodies */
     world->plan = done->plan;
     world->step_settings = done->settings;
     sadmm_world_report_steps(world, steps, done);
@@ -241,9 +267,9 @@ static sadmm_status settle(sadmm_world *world, sadmm_status status)
         edit_again(world);
     }
     world->resident.enqueued = world->resident.done;
-    return status == SADMM_ERROR_NON_FINITE && report.offending_body >= 0
-               ? sadmm_world_not_finite(world, report.offending_body)
-               : status;
+    if (status != SADMM_ERROR_NON_FINITE || report.offending_body == -1) return status;
+    if (!sadmm_body_is_driven(report.offending_body)) return sadmm_world_not_finite(world, report.offending_body);
+    return sadmm_world_slot_not_finite(world, world->driven_slots[sadmm_driven(report.offending_body)]);
 }
 
 /* The backend does not change forces, nor a state that was set after the last step. */
@@ -262,6 +288,7 @@ static sadmm_status pull_bodies(sadmm_world *world)
         if (world->plan.wrenches)
             memcpy(body->contact_wrench, world->wrench + 6 * (size_t)i, sizeof body->contact_wrench);
     }
+    TRY(sadmm_world_read_driven(world));
     sadmm_world_moved(world);
     world->resident.bodies_behind = false;
     world->resident.kept_step = world->report.step;
@@ -282,6 +309,7 @@ static sadmm_status pull_contacts(sadmm_world *world)
         !sadmm_grow(&start->impulse, &start->impulse_capacity, 0, 3 * count, sizeof *start->impulse))
         return sadmm_fail_memory(&world->error, "the step's starting impulses");
     TRY(backend->read_start(world->context, start->rigid, start->velocity, start->impulse, &world->error));
+    TRY(sadmm_world_read_driven_start(world));
     TRY(backend->read_bodies(world->context, world->next, NULL, NULL, &world->error));
     for (size_t i = 0; i < n; ++i)
         memcpy(world->velocity + 6 * i, world->next[i].velocity, 6 * sizeof *world->velocity);

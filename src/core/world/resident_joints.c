@@ -1,7 +1,8 @@
-/* Joints of a world that a backend keeps (resident.h): what it is given, what changes, and what comes back. */
+/* Joints and gears of a world that a backend keeps (resident.h): what it is given, what changes, what comes back. */
 #include <string.h>
 
 #include "core/base/memory.h"
+#include "core/model/gear_law.h"
 #include "world_internal.h"
 
 /* ---- to the backend ---------------------------------------------------------------------------------------------- */
@@ -14,11 +15,28 @@ static struct sadmm_resident_joint joint_for_backend(const sadmm_world *world, c
         const struct sadmm_world_body *body = joint->body[s] >= 0 ? &world->bodies[joint->body[s]] : NULL;
         out.body[s] = body ? body->system_body : -1;
         out.frame[s] = joint->frame[s];
-        if (!body || out.body[s] >= 0) continue;
+        if (!body || sadmm_body_moves(out.body[s])) continue;
         const struct joint_end end = joint_end_on(&joint->frame[s], &body->rigid);
         out.frame[s] = (struct joint_frame){end.point, end.orientation};
     }
     return out;
+}
+
+/* Tables of a joint's springs, after those that are listed. */
+static bool list_tables(sadmm_world *world, const struct sadmm_world_joint *joint, struct sadmm_resident_joint *out)
+{
+    for (int k = 0; k < JOINT_COORDINATES; ++k) {
+        const size_t at = world->resident.table_numbers, numbers = 2 * (size_t)joint->table_count[k];
+        if (!joint->table[k]) continue;
+        if (!sadmm_grow(&world->resident.tables, &world->resident.table_capacity, at, at + numbers,
+                        sizeof *world->resident.tables))
+            return false;
+        memcpy(world->resident.tables + at, joint->table[k], numbers * sizeof *world->resident.tables);
+        out->table[k] = (int32_t)at;
+        out->points[k] = joint->table_count[k];
+        world->resident.table_numbers += numbers;
+    }
+    return true;
 }
 
 sadmm_status sadmm_world_list_joints(sadmm_world *world)
@@ -27,6 +45,10 @@ sadmm_status sadmm_world_list_joints(sadmm_world *world)
     size_t i = 0;
     world->resident.joint_count = world->resident.joint_constraints = world->resident.coupling_count = 0;
     world->resident.edited_joint_count = 0;
+    world->resident.table_numbers = 0;
+    if (world->table_count > INT32_MAX / (2 * SADMM_MOST_SPRING_POINTS))
+        return sadmm_fail(&world->error, SADMM_ERROR_LIMIT, "%d tables of springs: a backend holds at most %d",
+                          world->table_count, INT32_MAX / (2 * SADMM_MOST_SPRING_POINTS));
     if (!sadmm_grow_empty(&world->resident.joints, &world->resident.joint_capacity, count,
                           sizeof *world->resident.joints) ||
         !sadmm_grow_empty(&world->resident.memory, &world->resident.memory_capacity, count,
@@ -42,6 +64,8 @@ sadmm_status sadmm_world_list_joints(sadmm_world *world)
         struct sadmm_world_joint *joint = &world->joints[slot];
         if (!joint->alive) continue;
         world->resident.joints[i] = joint_for_backend(world, joint);
+        if (!list_tables(world, joint, &world->resident.joints[i]))
+            return sadmm_fail_memory(&world->error, "joints for the backend");
         world->resident.memory[i] = joint->last;
         if (joint->coupling) {
             world->resident.joints[i].coupling = world->resident.coupling_count;
@@ -59,7 +83,87 @@ sadmm_status sadmm_world_list_joints(sadmm_world *world)
     return SADMM_OK;
 }
 
+static struct sadmm_resident_gear gear_for_backend(const sadmm_world *world, const struct sadmm_world_gear *gear)
+{
+    const sadmm_gear_def *def = &gear->def;
+    struct sadmm_resident_gear out = {.coordinate = {def->coordinate_1, def->coordinate_2},
+                                      .ratio = def->ratio,
+                                      .offset = def->offset,
+                                      .enabled = def->enabled};
+    int32_t side[GEAR_JOINTS][2];
+    for (int i = 0; i < GEAR_JOINTS; ++i) {
+        out.joint[i] = world->joints[gear->joint[i]].resident;
+        for (int s = 0; s < 2; ++s) {
+            const int32_t body = world->resident.joints[out.joint[i]].body[s];
+            side[i][s] = body >= 0 ? body : -1;
+        }
+    }
+    gear_row_bodies(side, out.body);
+    return out;
+}
+
+sadmm_status sadmm_world_list_gears(sadmm_world *world)
+{
+    const size_t count = (size_t)world->gear_count;
+    size_t g = 0;
+    if (!sadmm_grow_empty(&world->resident.gears, &world->resident.gear_capacity, count,
+                          sizeof *world->resident.gears) ||
+        !sadmm_grow_empty(&world->resident.gear_force, &world->resident.gear_force_capacity, count,
+                          sizeof *world->resident.gear_force))
+        return sadmm_fail_memory(&world->error, "gears for the backend");
+    for (size_t slot = 0; g < count && slot < world->gear_slots; ++slot) {
+        struct sadmm_world_gear *gear = &world->gears[slot];
+        if (!gear->alive) continue;
+        world->resident.gears[g] = gear_for_backend(world, gear);
+        world->resident.gear_force[g++] = gear->last.force;
+        gear->edited = false;
+        gear->set_at = -1;
+    }
+    world->resident.gear_count = (int32_t)g;
+    world->resident.gears_edited = false;
+    world->resident.joint_constraints += (int32_t)g;
+    return SADMM_OK;
+}
+
 /* ---- edits ------------------------------------------------------------------------------------------------------- */
+
+void sadmm_world_edit_gear(sadmm_world *world, struct sadmm_world_gear *gear)
+{
+    if (!world->resident.loaded) return;
+    gear->edited = world->resident.gears_edited = true;
+    gear->set_at = world->resident.enqueued;
+}
+
+static void edit_gears_again(sadmm_world *world)
+{
+    for (size_t slot = 0; world->resident.gear_count > 0 && slot < world->gear_slots; ++slot) {
+        struct sadmm_world_gear *gear = &world->gears[slot];
+        if (!gear->alive || gear->set_at < world->resident.done) continue;
+        gear->edited = world->resident.gears_edited = true;
+        gear->set_at = world->resident.done;
+    }
+}
+
+static void forget_gear_edits(sadmm_world *world)
+{
+    for (size_t slot = 0; world->resident.gears_edited && slot < world->gear_slots; ++slot)
+        world->gears[slot].edited = false;
+    world->resident.gears_edited = false;
+}
+
+/* Room is there. */
+static void list_gear_edits(sadmm_world *world, size_t *count)
+{
+    int32_t g = 0;
+    for (size_t slot = 0; world->resident.gears_edited && slot < world->gear_slots; ++slot) {
+        const struct sadmm_world_gear *gear = &world->gears[slot];
+        if (!gear->alive) continue;
+        if (gear->edited)
+            world->resident.edits[(*count)++] =
+                (struct sadmm_resident_edit){SADMM_EDIT_GEAR, g, {gear->def.enabled}};
+        ++g;
+    }
+}
 
 static void mark(sadmm_world *world, struct sadmm_world_joint *joint, uint32_t edits)
 {
@@ -87,6 +191,7 @@ void sadmm_world_edit_joints_again(sadmm_world *world)
             joint->set_at[edit] = world->resident.done;
         }
     }
+    edit_gears_again(world);
 }
 
 void sadmm_world_forget_joint_edits(sadmm_world *world)
@@ -94,6 +199,7 @@ void sadmm_world_forget_joint_edits(sadmm_world *world)
     for (size_t k = 0; k < world->resident.edited_joint_count; ++k)
         world->joints[world->resident.edited_joints[k]].edits = 0;
     world->resident.edited_joint_count = 0;
+    forget_gear_edits(world);
 }
 
 static void put_target(const struct sadmm_rigid *target, double values[SADMM_EDIT_VALUES])
@@ -105,8 +211,10 @@ static void put_target(const struct sadmm_rigid *target, double values[SADMM_EDI
 
 sadmm_status sadmm_world_list_joint_edits(sadmm_world *world, size_t *count)
 {
+    const size_t gears = world->resident.gears_edited ? (size_t)world->resident.gear_count : 0;
     if (!sadmm_grow(&world->resident.edits, &world->resident.edit_capacity, *count,
-                    *count + SADMM_JOINT_EDITS * world->resident.edited_joint_count, sizeof *world->resident.edits))
+                    *count + SADMM_JOINT_EDITS * world->resident.edited_joint_count + gears,
+                    sizeof *world->resident.edits))
         return sadmm_fail_memory(&world->error, "changes of joints");
     for (size_t k = 0; k < world->resident.edited_joint_count; ++k) {
         const struct sadmm_world_joint *joint = &world->joints[world->resident.edited_joints[k]];
@@ -121,6 +229,7 @@ sadmm_status sadmm_world_list_joint_edits(sadmm_world *world, size_t *count)
             else joint_coordinate_numbers(&joint->def.coordinates[edit], out->values);
         }
     }
+    list_gear_edits(world, count);
     return SADMM_OK;
 }
 
@@ -140,7 +249,9 @@ sadmm_status sadmm_world_read_joints(sadmm_world *world)
 {
     int32_t coupling = 0;
     TRY(world->kernels->resident->read_joints(world->context, world->resident.memory, world->resident.coupling_memory,
-                                              &world->error));
+                                              world->resident.gear_force, &world->error));
+    for (size_t slot = 0, g = 0; g < (size_t)world->resident.gear_count; ++slot)
+        if (world->gears[slot].alive) world->gears[slot].last.force = world->resident.gear_force[g++];
     for (int32_t i = 0; i < world->resident.joint_count; ++i) {
         struct sadmm_world_joint *joint = &world->joints[world->resident.joint_slots[i]];
         joint->last = world->resident.memory[i];

@@ -6,7 +6,7 @@
  *   coupling_step                    what couplings keep from step to step
  *   joint_act                        a joint in a step
  *   gear_rows, joint_rows, joint_move   gears and joints as constraint rows, and where they let bodies go
- *   resident_joints, resident        where a backend keeps the world
+ *   resident_joints, resident_driven, resident   where a backend keeps the world
  *   query_scene                      what queries look at
  *   shape_form, shape, mass, joint, coupling, gear, body, contacts,
  *   query_ray, query_shape, explain  what callers see of it, and change
@@ -116,6 +116,8 @@ struct sadmm_world_gear {
     size_t joint[2]; /* slots */
     bool acts;       /* it has a row in the (sub-)step at hand */
     struct { double force; } last, next; /* along the first coordinate, of the last step and of the one at hand */
+    bool edited;     /* its being enabled was set, and no step has taken that along yet; set_at: as in a body */
+    int64_t set_at;
 };
 
 /* What the last step started from, for contacts, freeze and the certificate. */
@@ -223,16 +225,24 @@ struct sadmm_world {
         int64_t kept_step;   /* steps and time of the bodies above */
         double kept_time;
         struct sadmm_steady *steady; /* dynamic bodies */
-        uint32_t *edited;    /* slots of bodies with `edits`; capacity: all dynamic ones */
+        struct sadmm_driven_body *driven; /* kinematic bodies, as they are loaded, and as they are read; */
+        double *driven_wrench;       /* (x 6) likewise */
+        uint32_t *edited;    /* slots of bodies with `edits`; capacity: all that move */
         struct sadmm_resident_edit *edits; /* for the backend, when a step is enqueued */
-        size_t steady_capacity, edited_count, edited_capacity, edit_capacity;
+        size_t steady_capacity, driven_capacity, driven_wrench_capacity, edited_count, edited_capacity, edit_capacity;
         struct sadmm_resident_joint *joints; /* as they were loaded; */
         struct sadmm_joint_memory *memory;   /* likewise, and as they are read; */
         int32_t *joint_slots;                /* their slots */
         struct sadmm_coupling_memory *coupling_memory; /* of those that are of couplings, in their order */
         double *solution;                    /* of their rows */
         uint32_t *edited_joints;             /* slots of joints with `edits`; capacity: all */
-        int32_t joint_count, joint_constraints, coupling_count;
+        double *tables;                      /* of springs, joint by joint */
+        size_t table_numbers, table_capacity;
+        struct sadmm_resident_gear *gears;   /* in slot order */
+        double *gear_force;                  /* likewise */
+        bool gears_edited;                   /* some of them */
+        size_t gear_capacity, gear_force_capacity;
+        int32_t joint_count, joint_constraints, coupling_count, gear_count;
         size_t joint_capacity, memory_capacity, coupling_memory_capacity, joint_slot_capacity, solution_capacity,
             edited_joint_count,
             edited_joint_capacity;
@@ -364,6 +374,14 @@ void sadmm_world_report_steps(sadmm_world *world, int64_t steps, const struct sa
 /* The choice of the kernels, at the first step. */
 sadmm_status sadmm_world_choose_backend(sadmm_world *world);
 
+/* ---- resident_driven.c ---- */
+
+/* Kinematic bodies of a world that is about to be loaded, into resident.driven. */
+sadmm_status sadmm_world_list_driven(sadmm_world *world);
+/* After the last step done; the velocities that they had in it, into `start`. Nothing is enqueued. */
+sadmm_status sadmm_world_read_driven(sadmm_world *world);
+sadmm_status sadmm_world_read_driven_start(sadmm_world *world);
+
 /* ---- resident.c ---- */
 
 /* Can this step be made by a backend that keeps the world? */
@@ -384,7 +402,7 @@ sadmm_status sadmm_world_pull_joints(sadmm_world *world);
 /* All of it, and from here on the host's world is the one that counts: before anything but a state or a wrench is
  * changed. */
 sadmm_status sadmm_world_take_back(sadmm_world *world);
-/* A dynamic body's state or wrench has been set: the next step takes it along. */
+/* A dynamic body's state or wrench has been set, or a kinematic one's state or target: the next step takes it along. */
 void sadmm_world_edit(sadmm_world *world, struct sadmm_world_body *body, enum sadmm_edit_kind kind);
 /* Passes `status` on. After SADMM_ERROR_DEVICE the backend's context is given up, the host's world counts again, and
  * the next step begins with a new context. */
@@ -397,6 +415,9 @@ sadmm_status sadmm_world_list_joints(sadmm_world *world);
 /* A joint's coordinate, whether it is enabled, or its target has been set: the next step takes it along. False: the
  * backend has no room for its rows, the world is to be taken back. */
 bool sadmm_world_edit_joint(sadmm_world *world, struct sadmm_world_joint *joint, enum sadmm_joint_edit edit);
+/* Gears, once joints are listed. */
+sadmm_status sadmm_world_list_gears(sadmm_world *world);
+void sadmm_world_edit_gear(sadmm_world *world, struct sadmm_world_gear *gear);
 /* Edits into resident.edits, from *count on. */
 sadmm_status sadmm_world_list_joint_edits(sadmm_world *world, size_t *count);
 void sadmm_world_forget_joint_edits(sadmm_world *world);

@@ -1,0 +1,59 @@
+/* Kinematic bodies of a world that a backend keeps (resident.h). */
+#include <string.h>
+
+#include "core/base/memory.h"
+#include "core/model/driven.h"
+#include "core/model/steady.h"
+#include "world_internal.h"
+
+sadmm_status sadmm_world_list_driven(sadmm_world *world)
+{
+    const size_t n = (size_t)world->driven_count;
+    if (!sadmm_grow_empty(&world->resident.driven, &world->resident.driven_capacity, n,
+                          sizeof *world->resident.driven) ||
+        !sadmm_grow_empty(&world->resident.driven_wrench, &world->resident.driven_wrench_capacity, 6 * n,
+                          sizeof *world->resident.driven_wrench))
+        return sadmm_fail_memory(&world->error, "kinematic bodies");
+    for (size_t k = 0; k < n; ++k) {
+        const struct sadmm_world_body *body = &world->bodies[world->driven_slots[k]];
+        world->resident.driven[k] = (struct sadmm_driven_body){
+            .rigid = body->rigid, .steady = body->steady, .slot = world->driven_slots[k]};
+    }
+    return SADMM_OK;
+}
+
+/* A target is done with by the step that it was set for. Neither that nor a state that was set after the last step is
+ * older than what the backend has. */
+static void take_driven(sadmm_world *world, size_t k, const struct sadmm_driven_body *read)
+{
+    struct sadmm_world_body *body = &world->bodies[world->driven_slots[k]];
+    body->steady = read->steady;
+    if (body->set_at[SADMM_EDIT_STATE] < world->resident.done) body->rigid = read->rigid;
+    else steady_place(&body->steady, &read->rigid, body->rigid.position, body->rigid.orientation);
+    if (body->set_at[SADMM_EDIT_TARGET] < world->resident.done) body->target.set = false;
+    if (world->plan.wrenches)
+        memcpy(body->contact_wrench, world->resident.driven_wrench + 6 * k, sizeof body->contact_wrench);
+}
+
+sadmm_status sadmm_world_read_driven(sadmm_world *world)
+{
+    if (world->driven_count == 0) return SADMM_OK;
+    TRY(world->kernels->resident->read_driven(world->context, world->resident.driven,
+                                              world->plan.wrenches ? world->resident.driven_wrench : NULL, NULL,
+                                              &world->error));
+    for (int32_t k = 0; k < world->driven_count; ++k) take_driven(world, (size_t)k, &world->resident.driven[k]);
+    return SADMM_OK;
+}
+
+sadmm_status sadmm_world_read_driven_start(sadmm_world *world)
+{
+    struct sadmm_step_start *start = &world->start;
+    const size_t n = (size_t)world->driven_count;
+    start->driven_count = 0;
+    if (n == 0) return SADMM_OK;
+    if (!sadmm_grow_empty(&start->driven, &start->driven_capacity, 6 * n, sizeof *start->driven))
+        return sadmm_fail_memory(&world->error, "kinematic bodies");
+    TRY(world->kernels->resident->read_driven(world->context, NULL, NULL, start->driven, &world->error));
+    start->driven_count = world->driven_count;
+    return SADMM_OK;
+}
