@@ -19,8 +19,10 @@
 
 /* Depth up to which the side that the last step knows is not doubted, as a share of the thinner extent. */
 #define CONVEX_SHALLOW ((real)0.05)
-/* What is less deep than this share of its face's depth over it has that face's optimum. */
+/* What is less deep than this share of its face's depth over it has that face's optimum: of bodies that overlap, which
+ * may have several beside each other, and of others. */
 #define CONVEX_FINE ((real)0.0005)
+#define CONVEX_COARSE ((real)0.005)
 /* How far apart b is held from a, as shares of the thinner extent: twice the depth, within these bounds. Further apart
  * moves are small where the two meet by corners, nearer the vector between the two says less. */
 #define CONVEX_APART ((real)0.05)
@@ -168,7 +170,8 @@ SADMM_RARE void convex_way_out(struct convex_pair *pair, const struct gjk_simple
         return;
     }
     while (tries < CONVEX_TRIES) {
-        const real best = -(axis->separation + convex_radii(pair));
+        const real best = -(axis->separation + convex_radii(pair)),
+                   fine = best > pair->equal ? CONVEX_FINE : CONVEX_COARSE;
         struct epa_face *face = convex_nearest_face(&e);
         struct difference_point next;
         struct gjk_simplex s;
@@ -192,8 +195,7 @@ SADMM_RARE void convex_way_out(struct convex_pair *pair, const struct gjk_simple
         convex_activate(&s, &of_other);
         if (convex_take(&other, &of_other, axis, active)) sure = false;
         for (k = 0; k < e.points; ++k) again |= convex_same_point(&next, &e.p[k]);
-        if (!again && e.points < EPA_POINTS &&
-            reach - face->height > real_max(pair->equal, CONVEX_FINE * real_abs(reach))) {
+        if (!again && e.points < EPA_POINTS && reach - face->height > real_max(pair->equal, fine * real_abs(reach))) {
             convex_epa_grow(pair, &e, (int)(face - e.face), next);
             continue;
         }

@@ -202,6 +202,7 @@ static __device__ __forceinline__ bool solve_part(const joined_view &p, const ui
         for (int32_t level = 0; level < p.s.levels; ++level) factor_level(p, level);
 #pragma unroll 1
         for (int again = 0; again < 2; ++again) {
+            if (again && !any_row(p, shared_flag, [&](int32_t r) { return joined_gives_much(&p, r); })) break;
             solve_rows(p, again != 0);
             changed = any_row(p, shared_flag, [&](int32_t r) { return joined_change_row(&p, r); });
             if (changed) break;

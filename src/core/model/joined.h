@@ -20,12 +20,14 @@
 enum { JOINED_ROWS = SADMM_MAX_ROWS, JOINED_BLOCK = JOINED_ROWS * JOINED_ROWS };
 /* Regularisation of the factor, a share of a row's scale (below): rows may say the same, but for rounding. */
 #define JOINED_PROXIMAL 1e-11
-/* Compliance of hard rows, a share of a row's scale, with which they are solved twice: what they give by at first is
- * taken back by the same factor, so that rows that can be met are, to rounding. Rows of a loop that has more locks than
- * it needs contradict each other by what its joints are off, along multipliers to which nothing responds: these end at
- * twice that over the compliance. Without one they grow from step to step (scene bricard: to 1e6 N where 30 are at work)
- * until they hold the loop. */
-#define JOINED_GIVE 2e-9
+/* Compliance of hard rows, a share of a row's scale: a load moves a lock by a billionth of what it would move the heavier
+ * of its bodies by if nothing else held it. Rows of a loop that has more locks than it needs contradict each other by
+ * what its joints are off, along multipliers to which nothing responds; without it these grow from step to step (scene
+ * bricard: to 1e6 N where 30 are at work) until they hold the loop. */
+#define JOINED_GIVE 1e-9
+/* Where a row gives by more than this, m/s or rad/s, all are solved once more by the same factor, which takes back what
+ * they give by: rows that can be met are, to rounding. */
+#define JOINED_GIVES_MUCH 1e-6
 /* Rows that come to a bound, or leave one, are found in so many passes at most; one or two do mostly, and 9 in all but
  * 16 of 14,500 solves of ragdolls that fall on each other. A row that is held against its law by less than a rounding
  * of its numbers and JOINED_SLACK, m/s or rad/s, stays where it is, or rounding would have rows come and go for good. */
@@ -462,6 +464,14 @@ SADMM_INLINE void joined_invert_row(const struct joined_view *v, const double L[
 SADMM_INLINE double joined_right(const struct joined_view *v, int32_t r, bool again)
 {
     return v->state[r] == JOINED_INSIDE ? -joined_residual(v, r, true, again) / v->rows[r].gain : 0;
+}
+
+/* Does the row give by much? */
+SADMM_INLINE bool joined_gives_much(const struct joined_view *v, int32_t r)
+{
+    const struct joined_row *row = &v->rows[r];
+    return v->state[r] == JOINED_INSIDE &&
+           fabs((v->give[r] - row->compliance) * (row->lambda + v->change[r])) > JOINED_GIVES_MUCH;
 }
 
 /* The change of a row's multiplier before and after it has been found. */

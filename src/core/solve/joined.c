@@ -302,6 +302,13 @@ static void solve_rows(const struct joined_view *v, bool again)
     move_bodies(v);
 }
 
+static bool give_much(const struct joined_view *v)
+{
+    for (int32_t r = 0; r < JOINED_ROWS * v->s.places; ++r)
+        if (joined_gives_much(v, r)) return true;
+    return false;
+}
+
 static bool is_finite(const struct joined_view *v)
 {
     double sum = 0;
@@ -325,6 +332,8 @@ static bool solve_part(const struct solving *s, const struct part *part, const u
         factorize(v);
         solve_rows(v, false);
         if (change_rows(v)) continue;
+        solved = true;
+        if (!give_much(v)) continue;
         solve_rows(v, true);
         solved = !change_rows(v);
     }

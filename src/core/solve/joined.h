@@ -6,7 +6,7 @@
  *
  *     (A + C) dv - J^T dlambda = b - A v + J^T lambda + J_c^T lambda_c        every body with rows
  *     gain J (v + dv) + bias + compliance (lambda + dlambda) = 0              every row inside its bounds
- *                                           (hard ones: JOINED_GIVE at first, and once more for what they give by)
+ *                             (hard ones: JOINED_GIVE at first, and once more for what they give by where that is much)
  *
  * with the contacts' impulses lambda_c as they are, and C = sum B J_c^T J_c over the contacts that press, B the mass
  * that rests on each (math/weight.h). A row whose multiplier leaves its bounds stays at the bound; one that is held
