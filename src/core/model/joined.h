@@ -27,7 +27,7 @@ enum { JOINED_ROWS = SADMM_MAX_ROWS, JOINED_BLOCK = JOINED_ROWS * JOINED_ROWS };
 #define JOINED_GIVE 1e-9
 /* Where a row gives by more than this, m/s or rad/s, all are solved once more by the same factor, which takes back what
  * they give by: rows that can be met are, to rounding. */
-#define JOINED_GIVES_MUCH 1e-6
+#define JOINED_GIVES_MUCH 1e-5
 /* Rows that come to a bound, or leave one, are found in so many passes at most; one or two do mostly, and 9 in all but
  * 16 of 14,500 solves of ragdolls that fall on each other. A row that is held against its law by less than a rounding
  * of its numbers and JOINED_SLACK, m/s or rad/s, stays where it is, or rounding would have rows come and go for good. */
