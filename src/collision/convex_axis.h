@@ -114,17 +114,24 @@ SADMM_INLINE bool convex_take(const struct convex_axis *other, const struct conv
 
 /* Bodies that are all but aligned have optima side by side, at directions of their own, a thousandth of a radian apart:
  * too near to each other for faces of a polytope. Those of c within a degree of n (own frame): of a flat, and across
- * straight lines. How many. */
+ * straight lines, of a round side the one at n and the one towards the other body. How many. */
 #define CONVEX_BESIDE ((real)0.99985)
 enum { CONVEX_OWN = 4 };
-SADMM_INLINE int convex_own_directions(const struct convex *c, vec3 n, vec3 own[CONVEX_OWN])
+SADMM_INLINE int convex_own_directions(const struct convex *c, vec3 n, vec3 to_other, vec3 own[CONVEX_OWN])
 {
     const int flat = convex_flat(c, n, CONVEX_BESIDE);
     int count = 0;
     if (flat >= 0) own[count++] = convex_flat_normal(c, flat);
     if (c->form != CONVEX_POLYTOPE) {
+        const real round2 = to_other.x * to_other.x + to_other.y * to_other.y;
         struct convex_facing line;
         if (convex_line(c, n, &line) && v3_dot(line.normal, n) >= CONVEX_BESIDE) own[count++] = line.normal;
+        if (round2 > 0) {
+            const real turn = real_sqrt((n.x * n.x + n.y * n.y) / round2);
+            if (convex_line(c, v3(turn * to_other.x, turn * to_other.y, n.z), &line) &&
+                v3_dot(line.normal, n) >= CONVEX_BESIDE)
+                own[count++] = line.normal;
+        }
     } else if (c->p.edges > 0) { /* edges of the corner */
         const int v = polytope_support(&c->p, n, 0), last = c->p.vertex_first[v + 1];
         int k;
@@ -144,7 +151,8 @@ SADMM_CALLED void convex_ask_beside(struct convex_pair *pair, struct convex_axis
     int s, k;
     for (s = 0; s < 2; ++s) {
         vec3 own[CONVEX_OWN];
-        const int count = convex_own_directions(s ? &pair->b : &pair->a, s ? v3_neg(n) : m3_tmul(pair->R, n), own);
+        const int count = convex_own_directions(s ? &pair->b : &pair->a, s ? v3_neg(n) : m3_tmul(pair->R, n),
+                                                s ? pair->t : v3_neg(m3_tmul(pair->R, pair->t)), own);
         for (k = 0; k < count; ++k) {
             const vec3 from = s ? v3_neg(own[k]) : m3_mul(pair->R, own[k]);
             struct convex_axis other;
