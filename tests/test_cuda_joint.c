@@ -339,6 +339,19 @@ static void make_pair(make_world *make, int precision, int way, sadmm_world *wor
     by_host(worlds[0]);
 }
 
+/* A step of both, after what is set in either; the second one is kept by the device from the first step that it may. */
+static void step_both(sadmm_world *worlds[2], void (*change_world)(sadmm_world *, int), int i, int step, char what[80])
+{
+    const int precision = i / WAYS, way = i % WAYS;
+    for (int k = 0; k < 2; ++k) {
+        change_world(worlds[k], step);
+        MUST(worlds[k], step % 4 == 2 ? sadmm_world_step_async(worlds[k]) : sadmm_world_step(worlds[k]));
+    }
+    ck_assert(worlds[1]->resident.loaded == (step > 0 || ways[way].method == SADMM_METHOD_PAPER));
+    ck_assert(!worlds[0]->resident.loaded);
+    snprintf(what, 80, "way %d, %s, step %d", way, precision ? "f64" : "f32", step);
+}
+
 START_TEST(resident_joints_equal_those_by_host)
 {
     const int precision = _i / WAYS, way = _i % WAYS;
@@ -348,13 +361,7 @@ START_TEST(resident_joints_equal_those_by_host)
     make_pair(yard, precision, way, worlds);
     ck_assert_int_eq(sadmm_world_joint_count(worlds[0]), YARD_JOINTS);
     for (int step = 0; step < 20; ++step) {
-        for (int k = 0; k < 2; ++k) {
-            change(worlds[k], step);
-            MUST(worlds[k], step % 4 == 2 ? sadmm_world_step_async(worlds[k]) : sadmm_world_step(worlds[k]));
-        }
-        ck_assert(worlds[1]->resident.loaded == (step > 0 || ways[way].method == SADMM_METHOD_PAPER));
-        ck_assert(!worlds[0]->resident.loaded);
-        snprintf(what, sizeof what, "way %d, %s, step %d", way, precision ? "f64" : "f32", step);
+        step_both(worlds, change, _i, step, what);
         if (step % 4 != 2) expect_same_joints(worlds[0], worlds[1], what);
         broke = broke || joint_state(worlds[1], GLUE).broken;
     }
@@ -491,13 +498,7 @@ START_TEST(resident_gears_and_tables_equal_those_by_host)
     make_pair(works, precision, way, worlds);
     ck_assert_int_eq(sadmm_world_gear_count(worlds[1]), GEARS);
     for (int step = 0; step < 18; ++step) {
-        for (int k = 0; k < 2; ++k) {
-            change_gears(worlds[k], step);
-            MUST(worlds[k], step % 4 == 2 ? sadmm_world_step_async(worlds[k]) : sadmm_world_step(worlds[k]));
-        }
-        ck_assert(worlds[1]->resident.loaded == (step > 0 || ways[way].method == SADMM_METHOD_PAPER));
-        ck_assert(!worlds[0]->resident.loaded);
-        snprintf(what, sizeof what, "way %d, %s, step %d", way, precision ? "f64" : "f32", step);
+        step_both(worlds, change_gears, _i, step, what);
         if (step % 4 == 2) continue;
         expect_same_joints(worlds[0], worlds[1], what);
         expect_same_gears(worlds[0], worlds[1], what);

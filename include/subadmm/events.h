@@ -22,7 +22,8 @@
  *
  * Price: a step with events recorded is waited for (sadmm_world_step_async). On CUDA the device then tells which pairs
  * touch, and all contacts are read where something has begun; that time is in no report. With sensors, bodies are read
- * too, and the tree that queries use follows them (query.h). Worlds that record nothing pay nothing; a sensor that nobody asks about costs nothing.
+ * too, and the tree that queries use follows them (query.h). Worlds that record nothing pay nothing; a sensor that nobody
+ * asks about costs nothing.
  *
  * Threads: as in world.h, a world is used by one thread at a time.
  */

@@ -289,8 +289,8 @@ SADMM_API sadmm_status sadmm_world_step(sadmm_world *world);
 
 /* Begin a step and return without waiting for it, where the backend can: CUDA, in the method FAST from the second
  * step on; not with a residual_tolerance, nor with a certificate_tolerance in the method PAPER or with more than 64
- * convergence checks a step. Elsewhere the same as sadmm_world_step. Steps run in order, a few of them at a time; states, wrenches and
- * settings set in between take effect at the next one. Getters wait for the steps begun so far. Errors: as
+ * convergence checks a step. Elsewhere the same as sadmm_world_step. Steps run in order, a few of them at a time;
+ * states, wrenches and settings set in between take effect at the next one. Getters wait for the steps begun so far. Errors: as
  * sadmm_world_step; they may be those of an earlier step, and then nothing after that step has been done
  * (sadmm_step_report.step counts what has). With settings.certify, or where events are recorded (events.h), the step is
  * waited for. One thread at a time a world; different worlds are independent, also on one device. */

@@ -157,7 +157,7 @@ SADMM_CALLED void convex_ask_beside(struct convex_pair *pair, struct convex_axis
             const vec3 from = s ? v3_neg(own[k]) : m3_mul(pair->R, own[k]);
             struct convex_axis other;
             struct convex_active of_other;
-            if (v3_norm2(v3_cross(from, n)) <= 16 * SADMM_EPSILON) continue; /* none that is better by more than rounding */
+            if (v3_norm2(v3_cross(from, n)) <= 16 * SADMM_EPSILON) continue; /* no depth changes by more so near */
             convex_axis_along(pair, from, &other, &of_other);
             convex_local(pair, &other, &of_other);
             if (other.separation > axis->separation + pair->equal) convex_take(&other, &of_other, axis, active);
@@ -225,7 +225,8 @@ SADMM_RARE void convex_way_out(struct convex_pair *pair, const struct gjk_simple
         if (proven) convex_polish(pair, active, &axis->n, &axis->separation);
         else convex_local(pair, axis, active);
     }
-    if (!proven || tries > 0) convex_ask_beside(pair, axis, active); /* no face has been given up */
+    /* proof, but for what the faces that were given up have beside their optimum */
+    if (!proven || tries > 0) convex_ask_beside(pair, axis, active);
 }
 
 /* 2. v: the shortest vector, by the walk. False: not certain. */

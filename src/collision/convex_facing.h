@@ -302,7 +302,8 @@ SADMM_CALLED bool convex_rim_crossing(const struct convex_meeting *m, const stru
     enum { STEPS = 8 };
     const real tilt = v3_dot(a->normal, m->n), wanted = a->radius * a->radius,
                close = 2 * m->pair->slack * a->radius; /* of a square */
-    const vec3 from = v3_sub(convex_over(b, m->n, start), b->centre), p = v3_sub(convex_over(a, m->n, b->centre), a->centre);
+    const vec3 from = v3_sub(convex_over(b, m->n, start), b->centre),
+               p = v3_sub(convex_over(a, m->n, b->centre), a->centre);
     vec3 e1, e2, q, r;
     real c = 1, s = 0;
     int step;

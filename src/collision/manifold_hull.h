@@ -379,6 +379,7 @@ SADMM_RARE bool hull_manifold_at_once(const struct sadmm_geometry *a, const stru
     return walk->end == GJK_FAR;
 }
 
+/* The rest. */
 SADMM_RARE void hull_manifold_from(const struct sadmm_geometry *a, const struct sadmm_geometry *b, const double *hulls,
                                    const struct pair_pose *pose, real limit, uint32_t cache,
                                    const struct gjk_walk *walk, struct manifold *m)

@@ -87,7 +87,8 @@ static __device__ double reach_beyond(const struct sadmm_proxy &proxy, double wh
 {
     const double radius = geometry_radius(&proxy.geometry), way = v3_norm(v3_load(proxy.velocity)) * whole,
                  most = MOST_STOP_SHARE * radius;
-    return !sadmm_body_moves(proxy.system_body) ? 0 : REACH_SHARE * radius + (way < most ? way : most) + (substeps - 1) * proxy.spin;
+    if (!sadmm_body_moves(proxy.system_body)) return 0;
+    return REACH_SHARE * radius + (way < most ? way : most) + (substeps - 1) * proxy.spin;
 }
 
 /* The reach, and the box that it sweeps in the whole step. box: of the sub-step. */
@@ -155,8 +156,8 @@ static __global__ void __launch_bounds__(PLACE_THREADS) place_kernel(const __gri
     if (FOR == PLACE_AGAIN) {
         if (i >= v.leaf_count) return;
         v.boxes[slot] = leaf.box;
-        if (sadmm_body_moves(body.system_body) &&
-            !is_within(v.reaches[slot], proxy, leaf.box, step.dt, v.substep)) *v.abort_code = ABORT_REACH;
+        if (sadmm_body_moves(body.system_body) && !is_within(v.reaches[slot], proxy, leaf.box, step.dt, v.substep))
+            *v.abort_code = ABORT_REACH;
         return;
     }
     const struct collision_filter filter = {shape.category, shape.mask, shape.body,

@@ -127,7 +127,8 @@ static sadmm_status tighten(struct sadmm_context *c, const struct preview *seen,
 bool CUDA(may_be_apart)(const struct sadmm_context *c)
 {
     const struct cuda_step *s = c->step;
-    return s->joints > 0 && s->all_joined && s->driven == 0 && c->settings.warm_start && !c->plan.residuals && !stop_rule_checked(c);
+    return s->joints > 0 && s->all_joined && s->driven == 0 && c->settings.warm_start && !c->plan.residuals &&
+           !stop_rule_checked(c);
 }
 
 sadmm_status CUDA(guess_step)(struct sadmm_context *c, struct sadmm_error *error)

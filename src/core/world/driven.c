@@ -123,7 +123,8 @@ sadmm_status sadmm_world_carry(sadmm_world *world, struct sadmm_system *system)
         const int32_t by = world->carriers[world->carried_labels[i]];
         double *motion = world->carried + 6 * i;
         memset(motion, 0, 6 * sizeof *motion);
-        if (sadmm_body_is_driven(by)) driven_motion_at(&world->driven[sadmm_driven(by)].rigid, system->rigid[i].position, motion);
+        if (sadmm_body_is_driven(by))
+            driven_motion_at(&world->driven[sadmm_driven(by)].rigid, system->rigid[i].position, motion);
         for (int k = 0; k < 6; ++k) system->velocity[6 * i + (size_t)k] -= motion[k];
     }
     system->carried = world->carried;

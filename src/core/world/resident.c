@@ -115,13 +115,14 @@ static sadmm_status list_edits(sadmm_world *world, size_t *count)
 
 /* ---- to the backend ---------------------------------------------------------------------------------------------- */
 
-/* The world as it is now. What the last step started from stays: it can be read until a step is done. */
+/* Nothing of it is on its way: what it is now goes along with the world. */
 static void begin_edits(struct sadmm_world_body *body)
 {
     body->edits = 0;
     for (int kind = 0; kind < SADMM_BODY_EDITS; ++kind) body->set_at[kind] = -1;
 }
 
+/* The world as it is now. What the last step started from stays: it can be read until a step is done. */
 static sadmm_status load(sadmm_world *world)
 {
     size_t n = (size_t)world->dynamic_count, driven = (size_t)world->driven_count;
