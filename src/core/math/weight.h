@@ -165,7 +165,7 @@ SADMM_INLINE void weight_update_speed(struct weight_island *island, const struct
 /* The share of a gap within the slop that a step closes; and e with that, `slop` over dt, m/s. Contacts as springs are
  * as stiff as there are iterations, and the depth at which a stack buckles on them grows with the root of these: beyond
  * a number of them depth counts for less, and solves that go on until they are done are of e itself. The number is
- * more than any scene's steps have, which need the rule as it is. */
+ * the most that a scene's steps have, which need the rule as it is. */
 #define WEIGHT_GAP_ITERATIONS 200.0
 
 SADMM_INLINE double weight_gap_share(double stack_depth, int iterations)
